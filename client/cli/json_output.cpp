@@ -1,0 +1,179 @@
+#include "client/cli/json_output.h"
+
+namespace cairn::client {
+namespace {
+
+using nlohmann::json;
+
+json DropsToJson(const std::array<std::uint64_t, kDropReasonCount>& dropped) {
+  json drops = json::object();
+  for (int i = 0; i < kDropReasonCount; ++i) {
+    if (const auto count = dropped[static_cast<std::size_t>(i)]; count > 0) {
+      drops[std::string(DropReasonName(static_cast<DropReason>(i)))] = count;
+    }
+  }
+  return drops;
+}
+
+json StampsToJson(const StampSummary& stamps) {
+  return {{"count", stamps.count},
+          {"duration_s", stamps.duration_s},
+          {"rate_hz", stamps.rate_hz},
+          {"repeated", stamps.repeated},
+          {"went_back", stamps.went_back},
+          {"gaps", stamps.gaps},
+          {"period_p99_s", stamps.period_p99_s},
+          {"longest_gap_s", stamps.longest_gap_s}};
+}
+
+}  // namespace
+
+json ToJson(const Pose2& pose) {
+  return {{"x", pose.x}, {"y", pose.y}, {"theta", pose.theta}};
+}
+
+json ToJson(const PoseReport& pose) {
+  json covariance = json::array();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) covariance.push_back(pose.covariance(row, column));
+  }
+  return {{"robot", pose.robot},
+          {"site", pose.site},
+          {"stamp", pose.stamp},
+          {"scan_sequence", pose.scan_sequence},
+          {"pose", ToJson(pose.T_map_robot)},
+          {"covariance", covariance},
+          {"T_map_odom", ToJson(pose.T_map_odom)},
+          {"localized", pose.localized},
+          {"score", pose.score},
+          {"reason", PoseReasonName(pose.reason)},
+          {"map_epoch", pose.map_epoch}};
+}
+
+json ToJson(const Ledger& ledger) {
+  return {{"robot", ledger.robot},
+          {"sensor", ledger.sensor},
+          {"site", ledger.site},
+          {"received", ledger.received},
+          {"used", ledger.used},
+          {"keyframes", ledger.keyframes},
+          {"waiting", ledger.waiting},
+          {"dropped", DropsToJson(ledger.dropped)},
+          {"dropped_total", ledger.dropped_total()},
+          {"odometry_received", ledger.odometry_received},
+          {"odometry_dropped", ledger.odometry_dropped},
+          {"odometry_merged", ledger.odometry_merged},
+          {"last_sequence", ledger.last_sequence},
+          {"settled_through", ledger.settled_through},
+          {"durable_through", ledger.durable_through},
+          {"last_stamp", ledger.last_stamp},
+          {"latency_p50_ms", ledger.latency_p50_ms},
+          {"latency_p99_ms", ledger.latency_p99_ms}};
+}
+
+json ToJson(const RobotStatus& robot) {
+  json ledgers = json::array();
+  for (const Ledger& ledger : robot.ledgers) ledgers.push_back(ToJson(ledger));
+  return {{"robot", robot.session.robot},
+          {"site", robot.session.site},
+          {"phase", SessionPhaseName(robot.session.phase)},
+          {"status", StatusToJson(robot.session.status)},
+          {"alive", robot.alive},
+          {"pose", ToJson(robot.pose)},
+          {"ledgers", ledgers}};
+}
+
+json ToJson(const MapInfo& map) {
+  json versions = json::array();
+  for (const MapVersionInfo& version : map.versions) {
+    versions.push_back(
+        {{"version", version.version}, {"enabled", version.enabled}, {"job", version.job}, {"note", version.note}});
+  }
+  return {
+      {"site", map.site},
+      {"resolution_m", map.resolution_m},
+      {"epoch", map.epoch},
+      {"version", map.version},
+      {"levels", map.levels},
+      {"tile_count", map.tile_count},
+      {"bounds_m", {{"x_min", map.x_min_m}, {"y_min", map.y_min_m}, {"x_max", map.x_max_m}, {"y_max", map.y_max_m}}},
+      {"robots", map.robots},
+      {"enabled_version", map.enabled_version},
+      {"versions", versions}};
+}
+
+json ToJson(const Job& job) {
+  return {{"id", job.id},
+          {"site", job.site},
+          {"kind", JobKindName(job.kind)},
+          {"state", JobStateName(job.state)},
+          {"progress", job.progress},
+          {"cost_before", job.cost_before},
+          {"cost_after", job.cost_after},
+          {"map_version", job.map_version},
+          {"submitted", job.submitted},
+          {"started", job.started},
+          {"ended", job.ended},
+          {"message", job.message}};
+}
+
+json ToJson(const ScanAccount& account) {
+  return {{"sent", account.sent},
+          {"used", account.used},
+          {"keyframes", account.keyframes},
+          {"waiting", account.waiting},
+          {"dropped", DropsToJson(account.dropped)},
+          {"dropped_total", account.dropped_total()},
+          {"unexplained", account.unexplained()}};
+}
+
+json ToJson(const TrajectoryError& error) {
+  return {{"compared", error.compared}, {"skipped", error.skipped}, {"way_m", error.way_m},
+          {"ate_rmse_m", error.rmse_m}, {"mean_m", error.mean_m},   {"median_m", error.median_m},
+          {"max_m", error.max_m},       {"final_m", error.final_m}, {"rmse_rad", error.rmse_rad},
+          {"max_rad", error.max_rad}};
+}
+
+json ToJson(const LogReport& report) {
+  json findings = json::array(), complaints = json::array(), beams = json::object();
+  for (const Finding& finding : report.findings) {
+    findings.push_back({{"error", finding.error}, {"what", finding.what}, {"advice", finding.advice}});
+  }
+  for (const LogComplaint& complaint : report.summary.complaints) {
+    complaints.push_back({{"line", complaint.line}, {"reason", complaint.reason}});
+  }
+  for (const auto& [count, scans] : report.beam_counts) beams[std::to_string(count)] = scans;
+  return {{"good", !report.has_errors()},
+          {"scans", StampsToJson(report.scans)},
+          {"odometry", StampsToJson(report.odometry)},
+          {"ignored", report.summary.ignored},
+          {"beam_counts", beams},
+          {"field_of_view_rad", report.field_of_view_rad},
+          {"angle_step_rad", report.angle_step_rad},
+          {"range_max_m", report.range_max_m},
+          {"T_robot_laser", ToJson(report.T_robot_laser)},
+          {"hit_share", report.hit_share},
+          {"no_return_share", report.no_return_share},
+          {"invalid_share", report.invalid_share},
+          {"way_m", report.way_m},
+          {"turned_rad", report.turned_rad},
+          {"fastest_m_s", report.fastest_m_s},
+          {"refused", report.refused},
+          {"notes", report.summary.notes},
+          {"complaint_count", report.summary.complaint_count},
+          {"complaints", complaints},
+          {"findings", findings}};
+}
+
+json TileToJson(const Tile& tile) {
+  return {{"level", tile.key.level},   {"x", tile.key.x},
+          {"y", tile.key.y},           {"epoch", tile.epoch},
+          {"version", tile.version},   {"encoding", tile.encoding == TileEncoding::kPng ? "png" : "raw"},
+          {"bytes", tile.bytes.size()}};
+}
+
+json StatusToJson(const Status& status) {
+  return {{"code", StatusCodeName(status.code)}, {"message", status.message}};
+}
+
+}  // namespace cairn::client

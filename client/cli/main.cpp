@@ -1,0 +1,17 @@
+// cairn: the command line of the mapping service. Everything is in RunCairn; here only the process's own things.
+#include <exception>
+#include <iostream>
+
+#include "client/cli/interrupt.h"
+#include "client/cli/program.h"
+
+int main(int argc, char** argv) {
+  cairn::client::CatchInterrupts();
+  try {
+    return static_cast<int>(
+        cairn::client::RunCairn(std::vector<std::string>(argv + 1, argv + argc), std::cout, std::cerr));
+  } catch (const std::exception& error) {
+    std::cerr << "cairn: " << error.what() << "\n";
+    return static_cast<int>(cairn::client::ExitCode::kFailed);
+  }
+}

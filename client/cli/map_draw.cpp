@@ -1,0 +1,82 @@
+#include <fmt/format.h>
+
+#include "client/cli/commands.h"
+#include "client/cli/fetch_map.h"
+#include "client/cli/map_picture.h"
+#include "client/cli/quantity_text.h"
+#include "common/file/atomic_file.h"
+
+namespace cairn::client {
+namespace {
+
+struct DrawArguments {
+  std::string site;
+  std::string map_file;
+  std::vector<std::string> robots;
+  std::vector<std::string> paths;
+  std::vector<std::string> truths;
+  std::string output;
+  PictureOptions picture;
+};
+
+Result<std::vector<PicturePath>> CollectPaths(Program& program, const DrawArguments& arguments) {
+  std::vector<PicturePath> paths;
+  for (const std::string& robot : arguments.robots) {
+    Request request;
+    request.kind = RequestKind::kPath;
+    request.robot = robot;
+    auto reply = program.Ask(request);
+    if (!reply) return tl::unexpected(reply.error());
+    paths.push_back({robot, std::move(reply->path), false});
+  }
+  for (const bool reference : {false, true}) {
+    for (const std::string& text : reference ? arguments.truths : arguments.paths) {
+      const LabelledFile file = ParseLabelledFile(text);
+      auto trajectory = ReadTum(file.path);
+      if (!trajectory) return tl::unexpected(trajectory.error());
+      paths.push_back({file.label, std::move(*trajectory), reference});
+    }
+  }
+  return paths;
+}
+
+ExitCode DrawMap(Program& program, const DrawArguments& arguments) {
+  const auto map = arguments.map_file.empty() ? FetchMap(program, arguments.site) : LoadMapYaml(arguments.map_file);
+  if (!map) return program.Refuse(map.error());
+  const auto paths = CollectPaths(program, arguments);
+  if (!paths) return program.Refuse(paths.error());
+  const auto png = DrawMapPicture(*map, *paths, arguments.picture);
+  if (!png) return program.Refuse(png.error());
+  const auto written = WriteFileAtomically(arguments.output, {reinterpret_cast<const char*>(png->data()), png->size()});
+  if (!written) return program.Refuse(written.error());
+  return program.Print(fmt::format("{}: {} paths, {} KiB\n", arguments.output, paths->size(), png->size() / 1024),
+                       {{"file", arguments.output}, {"paths", paths->size()}, {"bytes", png->size()}});
+}
+
+}  // namespace
+
+void AddMapDraw(CLI::App& map, Program& program) {
+  auto* command = map.add_subcommand("draw", "Draw the map and trajectories over it as a picture for people");
+  command->footer(
+      "The map comes from the server (--site) or a file (--map); paths from the server (--robots) or TUM files.\n"
+      "EXAMPLES\n  cairn map draw --site hall --robots robot1 robot2 -o hall.png\n"
+      "  cairn map draw --map hall.yaml --paths \"robot 1=r1.tum\" --truth truth=t1.tum -o hall.png");
+  auto arguments = std::make_shared<DrawArguments>();
+  auto* source = command->add_option_group("map's source");
+  source->add_option("--site", arguments->site, "The site's name: the map the server has now");
+  source->add_option("--map", arguments->map_file, "A map.yaml file")->type_name("FILE");
+  source->require_option(1);
+  command->add_option("--robots", arguments->robots, "Robots whose paths the server knows");
+  command->add_option("--paths", arguments->paths, "TUM files, each with a label if wanted")->type_name("[LABEL=]FILE");
+  command->add_option("--truth", arguments->truths, "TUM files drawn thin, under the others")
+      ->type_name("[LABEL=]FILE");
+  command->add_option("-o,--output", arguments->output, "The PNG file to write")->required()->type_name("FILE");
+  command->add_option("--width", arguments->picture.width_px, "Pixels across")
+      ->check(CLI::Range(200, 8000))
+      ->capture_default_str();
+  command->add_option("--title", arguments->picture.title, "A line above the map");
+  command->callback(
+      [&program, arguments] { program.action = [&program, arguments] { return DrawMap(program, *arguments); }; });
+}
+
+}  // namespace cairn::client

@@ -1,0 +1,116 @@
+#include "client/cli/program.h"
+
+#include <fmt/format.h>
+
+#include <exception>
+
+#include "client/cli/commands.h"
+#include "client/cli/option_checks.h"
+#include "client/cli/quantity_text.h"
+#include "common/options/config.h"
+#include "common/version.h"
+
+namespace cairn::client {
+
+Result<wire::Bus*> Program::bus() {
+  if (!bus_) {
+    auto created = wire::Bus::Create(options.wire, "cairn");
+    if (!created) return tl::unexpected(created.error());
+    bus_ = std::move(*created);
+  }
+  return bus_.get();
+}
+
+Result<Reply> Program::Ask(const Request& request) {
+  if (!queries_) {
+    const auto opened = bus();
+    if (!opened) return tl::unexpected(opened.error());
+    auto created = QueryClient::Create(**opened);
+    if (!created) return tl::unexpected(created.error());
+    queries_ = std::move(*created);
+  }
+  return queries_->Ask(request, options.timeout_s);
+}
+
+ExitCode Program::Print(const std::string& text, const nlohmann::json& object) {
+  // A name from a file or a peer may hold bytes that are no UTF-8; they must not end the program.
+  if (options.json) {
+    out_ << object.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) << "\n";
+  } else {
+    out_ << text;
+  }
+  out_.flush();
+  return ExitCode::kOk;
+}
+
+ExitCode Program::Refuse(const Status& status) {
+  if (options.json) {
+    Print("", {{"error", {{"code", StatusCodeName(status.code)}, {"message", status.message}}}});
+  }
+  err_ << "cairn: " << status.message << " (" << StatusCodeName(status.code) << ")\n";
+  return ExitCode::kFailed;
+}
+
+namespace {
+
+void AddGlobalOptions(CLI::App& app, Program& program, std::vector<std::string>& assignments) {
+  GlobalOptions& options = program.options;
+  app.add_option("--domain", options.wire.domain, "DDS domain of server and robots")
+      ->envname("CAIRN_DOMAIN")
+      ->check(CLI::Range(0, 232))
+      ->capture_default_str();
+  app.add_option("--set", assignments, "Any option of the wire, e.g. wire.interfaces=192.168.1.5")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+  AddParsed(app, "--timeout", options.timeout_s, ParseDuration, "How long to wait for an answer [5]", "SECONDS");
+  app.add_flag("--json", options.json, "One JSON object on standard output, for machines");
+}
+
+Result<void> ApplyAssignments(GlobalOptions& options, const std::vector<std::string>& assignments, bool domain_given) {
+  const std::int64_t domain = options.wire.domain;
+  auto applied = ApplySet(assignments, [&options](OptionVisitor& visitor) {
+    visitor.Section("wire", "The DDS side.", [&] { wire::Visit(visitor, options.wire); });
+  });
+  if (domain_given) options.wire.domain = domain;  // The more explicit of the two.
+  return applied;
+}
+
+}  // namespace
+
+ExitCode RunCairn(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err) {
+  Program program(out, err);
+  std::vector<std::string> assignments;
+  CLI::App app("Stream robots to a Cairn server, ask it for poses and maps, start its jobs.", "cairn");
+  app.set_version_flag("--version", std::string("cairn ") + kVersion);
+  app.footer(
+      "Options above work with every command, before or after it. `cairn COMMAND --help` tells more.\n"
+      "Exit codes: 0 done, 1 failed (one line on standard error says why), 2 wrong command line.");
+  app.fallthrough();
+  app.require_subcommand(1);
+  AddGlobalOptions(app, program, assignments);
+  AddReplay(app, program);
+  AddSim(app, program);
+  AddPose(app, program);
+  AddPath(app, program);
+  AddMap(app, program);
+  AddTiles(app, program);
+  AddStatus(app, program);
+  AddJob(app, program);
+  AddSession(app, program);
+  AddCheckLog(app, program);
+  AddEval(app, program);
+  AddPing(app, program);
+  try {
+    app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 takes them from the back.
+  } catch (const CLI::ParseError& error) {
+    const int code = app.exit(error, out, err);
+    return code == 0 ? ExitCode::kOk : ExitCode::kUsage;
+  }
+  if (const auto applied = ApplyAssignments(program.options, assignments, app.count("--domain") > 0); !applied) {
+    err << "cairn: " << applied.error().message << "\n";
+    return ExitCode::kUsage;
+  }
+  return program.action();
+}
+
+}  // namespace cairn::client

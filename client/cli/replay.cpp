@@ -1,0 +1,138 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "client/cli/commands.h"
+#include "client/cli/interrupt.h"
+#include "client/cli/json_output.h"
+#include "client/cli/log_options.h"
+#include "client/cli/option_checks.h"
+#include "client/cli/pacer.h"
+#include "client/cli/progress_line.h"
+#include "client/cli/quantity_text.h"
+#include "client/cli/robot_stream.h"
+#include "client/cli/window_option.h"
+
+namespace cairn::client {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+struct ReplayArguments {
+  std::string log;
+  LogReaderOptions reader;
+  StreamOptions stream;
+  double rate = 1.0;
+  bool fast = false;
+  bool end = false;
+};
+
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+// Reads the log and streams it; `total` scans are expected, for the progress bar.
+Result<LogSummary> StreamLog(Program& program, const ReplayArguments& arguments, RobotStream& stream, int total,
+                             Clock::time_point start) {
+  Pacer pacer(arguments.fast ? 0.0 : arguments.rate);
+  ProgressLine progress(program.err(), ErrorIsTerminal(), program.options.json);
+  const auto show = [&](auto&& draw) {
+    const ScanAccount account = stream.account();
+    const double seconds = SecondsSince(start);
+    draw(seconds, static_cast<double>(stream.sent()) / std::max(1, total),
+         fmt::format("{} of {} scans, {:.0f}/s, used {}, dropped {}, waiting {}", stream.sent(), total,
+                     static_cast<double>(stream.sent()) / std::max(1e-3, seconds), account.used,
+                     account.dropped_total(), account.waiting));
+  };
+  Result<void> sent;
+  auto summary = ReadLog(arguments.log, arguments.reader, [&](LogRecord&& record) {
+    pacer.WaitFor(std::visit([](const auto& value) { return value.stamp; }, record));
+    if (Interrupted()) return false;
+    sent = stream.Send(std::move(record));
+    show([&](double s, double share, const std::string& text) { progress.Show(s, share, text); });
+    return sent.has_value();
+  });
+  if (summary && sent) stream.Settle();
+  show([&](double s, double share, const std::string& text) { progress.Finish(s, share, text); });
+  if (!sent) return tl::unexpected(sent.error());
+  return summary;
+}
+
+ExitCode Replay(Program& program, const ReplayArguments& arguments) {
+  // Once without sending: a file that cannot be read must not open a session, and the bar needs its end.
+  const auto survey = ReadLog(arguments.log, arguments.reader, [](LogRecord&&) { return !Interrupted(); });
+  if (!survey) return program.Refuse(survey.error());
+  if (survey->scans == 0) return program.Refuse({StatusCode::kInvalidArgument, arguments.log + " holds no scan"});
+  StreamOptions options = arguments.stream;
+  if (arguments.fast && options.window == 0) options.window = kFastWindow;
+  options.measure_latency = !arguments.fast;
+  auto stream = RobotStream::Open(program, options);
+  if (!stream) return program.Refuse(stream.error());
+
+  const auto start = Clock::now();
+  const auto summary = StreamLog(program, arguments, **stream, survey->scans, start);
+  if (arguments.end) {
+    if (const auto ended = (*stream)->End(); !ended) return program.Refuse(ended.error());
+    (*stream)->Settle();
+  }
+  const ScanAccount account = (*stream)->account();
+  const Percentiles latency = (*stream)->latency_ms();
+  const double seconds = SecondsSince(start);
+  std::string text = fmt::format("{}: {}\n", options.robot, FormatAccount(account));
+  text += fmt::format("took {}, {:.0f} scans/s", FormatDuration(seconds), static_cast<double>(account.sent) / seconds);
+  if (latency.count() > 0) {
+    text += fmt::format(", scan to pose p50 {:.1f} ms, p99 {:.1f} ms", latency.At(0.5), latency.At(0.99));
+  }
+  text += "\n";
+  if (survey->complaint_count > 0) {
+    text += fmt::format("{} lines of the log could not be read, the first: line {}: {}\n", survey->complaint_count,
+                        survey->complaints.front().line, survey->complaints.front().reason);
+  }
+  nlohmann::json object = ToJson(account);
+  object.update({{"robot", options.robot},
+                 {"site", options.site},
+                 {"seconds", seconds},
+                 {"complaint_count", survey->complaint_count}});
+  if (latency.count() > 0) {
+    object.update({{"pose_latency_p50_ms", latency.At(0.5)}, {"pose_latency_p99_ms", latency.At(0.99)}});
+  }
+  if (!summary) object["error"] = StatusToJson(summary.error());
+  program.Print(text, object);
+  if (!summary) {
+    program.err() << "cairn: " << summary.error().message << "\n";
+    return ExitCode::kFailed;
+  }
+  if (Interrupted()) return ExitCode::kFailed;
+  return account.unexplained() == 0 ? ExitCode::kOk : ExitCode::kFailed;
+}
+
+}  // namespace
+
+void AddReplay(CLI::App& app, Program& program) {
+  auto* command = app.add_subcommand("replay", "Stream a robot log to the server, as the robot would have");
+  command->footer(
+      "Reads CARMEN logs (ODOM, FLASER, RLASER, ROBOTLASER1, RAWLASER1) and DP-SLAM logs. With --fast the log goes as\n"
+      "fast as the server takes it: at most --window (32) scans are on the way, so none is lost. The summary is the\n"
+      "server's ledger: used, and dropped by reason. Exit code 1 where a scan is unexplained.\n"
+      "EXAMPLES\n  cairn replay intel.clf --site intel --robot r1 --fast\n"
+      "  cairn replay run.log --site hall --robot r2 --rate 2 --start 1.5,-2,90deg");
+  auto arguments = std::make_shared<ReplayArguments>();
+  command->add_option("log", arguments->log, "The log file")->required()->type_name("FILE");
+  command->add_option("--site", arguments->stream.site, "The site to map into")->required();
+  command->add_option("--robot", arguments->stream.robot, "The robot's name")->required();
+  command->add_option("--sensor", arguments->stream.sensor, "The scanner's name")->capture_default_str();
+  auto* rate = command->add_option("--rate", arguments->rate, "How many times faster than the log's stamps")
+                   ->check(CLI::Range(1e-3, 1e6))
+                   ->capture_default_str();
+  command->add_flag("--fast", arguments->fast, "As fast as the server takes it, without losing a scan")->excludes(rate);
+  AddWindowOption(*command, arguments->stream.window);
+  AddParsed(*command, "--start", arguments->stream.T_map_robot_start, ParseStart, "Where the robot stands at first",
+            "X,Y,THETA");
+  command->add_flag("--end", arguments->end, "End the session afterwards (else it can be resumed)");
+  AddLogOptions(*command, arguments->reader);
+  command->callback(
+      [&program, arguments] { program.action = [&program, arguments] { return Replay(program, *arguments); }; });
+}
+
+}  // namespace cairn::client

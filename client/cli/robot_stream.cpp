@@ -1,0 +1,87 @@
+#include "client/cli/robot_stream.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace cairn::client {
+
+Result<std::unique_ptr<RobotStream>> RobotStream::Open(Program& program, const StreamOptions& options) {
+  const auto bus = program.bus();
+  if (!bus) return tl::unexpected(bus.error());
+  std::unique_ptr<RobotStream> stream(new RobotStream(options, program.options.timeout_s));
+  SessionRequest request;
+  request.robot = options.robot;
+  request.site = options.site;
+  request.sensors = {options.sensor};
+  request.has_start = options.T_map_robot_start.has_value();
+  request.T_map_robot_start = options.T_map_robot_start.value_or(Pose2{});
+  RobotClientOptions client_options;
+  client_options.window.window = options.window;
+  client_options.send_timeout_s = program.options.timeout_s;
+  RobotClient::Callbacks callbacks;
+  callbacks.pose = [self = stream.get()](const PoseReport& pose) { self->OnPose(pose); };
+  auto client = RobotClient::Open(**bus, request, program.options.timeout_s, std::move(callbacks), client_options);
+  if (!client) return tl::unexpected(client.error());
+  stream->client_ = std::move(*client);
+
+  // Asked for, not awaited: a stream nobody has sent on yet may have no published ledger.
+  const auto before = stream->AskLedger(program);
+  if (!before) return tl::unexpected(before.error());
+  stream->before_ = *before;
+  return stream;
+}
+
+Result<Ledger> RobotStream::AskLedger(Program& program) const {
+  Request request;
+  request.kind = RequestKind::kStatus;
+  request.robot = options_.robot;
+  const auto reply = program.Ask(request);
+  if (!reply) return tl::unexpected(reply.error());
+  Ledger ledger;
+  ledger.sensor = options_.sensor;
+  for (const RobotStatus& robot : reply->robots) {
+    for (const Ledger& stream : robot.ledgers) {
+      if (robot.session.robot == options_.robot && stream.sensor == options_.sensor) ledger = stream;
+    }
+  }
+  return ledger;
+}
+
+void RobotStream::OnPose(const PoseReport& pose) {
+  const auto now = Clock::now();
+  const std::lock_guard lock(mutex_);
+  const Departure& departure = departures_[pose.scan_sequence % kRemembered];
+  if (pose.scan_sequence == 0 || departure.sequence != pose.scan_sequence) return;
+  latency_ms_.Add(std::chrono::duration<double, std::milli>(now - departure.time).count());
+}
+
+Result<void> RobotStream::Send(LogRecord&& record) {
+  if (const auto* odometry = std::get_if<Odometry>(&record)) return client_->Publish(*odometry);
+  auto& scan = std::get<Scan>(record);
+  scan.sequence = ++sent_;
+  if (options_.measure_latency) {
+    const std::lock_guard lock(mutex_);
+    departures_[sent_ % kRemembered] = {sent_, Clock::now()};
+  }
+  return client_->Publish(scan);
+}
+
+void RobotStream::Settle() {
+  // What is not settled in time shows as waiting or unexplained in the account.
+  (void)client_->WaitSettled(timeout_s_);
+}
+
+Result<void> RobotStream::End() {
+  return client_->End(timeout_s_);
+}
+
+ScanAccount RobotStream::account() const {
+  return AccountScans(sent_, before_, client_->ledger(options_.sensor).value_or(before_));
+}
+
+Percentiles RobotStream::latency_ms() const {
+  const std::lock_guard lock(mutex_);
+  return latency_ms_;
+}
+
+}  // namespace cairn::client

@@ -1,0 +1,74 @@
+// One robot's session as a source of scans: sends through a RobotClient, measures the time from a scan's publication to
+// the pose that answers it, and accounts for every scan by the server's ledger.
+// Thread rule: one sending thread; the server's answers arrive on the wire's threads.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "client/cli/percentiles.h"
+#include "client/cli/program.h"
+#include "client/cli/scan_account.h"
+#include "client/lib/robot_client.h"
+#include "common/sensor/log_record.h"
+
+namespace cairn::client {
+
+struct StreamOptions {
+  std::string robot;
+  std::string site;
+  std::string sensor = "laser";
+  std::optional<Pose2> T_map_robot_start;
+  // Scans sent and not yet settled, at most: sending waits for the server. 0: no limit, what is too fast is dropped.
+  std::uint64_t window = 0;
+  bool measure_latency = true;  // Says nothing where a scan's way begins with waiting for room.
+};
+
+class RobotStream {
+ public:
+  // Opens the session; fails where no server answers or it refuses the robot. `program` outlives the stream.
+  [[nodiscard]] static Result<std::unique_ptr<RobotStream>> Open(Program& program, const StreamOptions& options);
+
+  // Waits for room in the window; fails where the server settles nothing within the program's timeout.
+  [[nodiscard]] Result<void> Send(LogRecord&& record);
+  // Waits until everything sent is settled, or the program's timeout has passed: account() tells what is left.
+  void Settle();
+  // Ends the session for good.
+  [[nodiscard]] Result<void> End();
+
+  [[nodiscard]] std::uint64_t sent() const { return sent_; }
+  [[nodiscard]] ScanAccount account() const;
+  // Publication to pose, milliseconds.
+  [[nodiscard]] Percentiles latency_ms() const;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::size_t kRemembered = 4096;  // Scans whose time of sending is kept.
+
+  struct Departure {
+    std::uint64_t sequence = 0;
+    Clock::time_point time;
+  };
+
+  RobotStream(const StreamOptions& options, double timeout_s) : options_(options), timeout_s_(timeout_s) {}
+  [[nodiscard]] Result<Ledger> AskLedger(Program& program) const;
+  void OnPose(const PoseReport& pose);
+
+  const StreamOptions options_;
+  const double timeout_s_;
+  std::uint64_t sent_ = 0;
+  Ledger before_;  // The stream's account before the first scan; a resumed session has a past.
+
+  mutable std::mutex mutex_;
+  std::array<Departure, kRemembered> departures_{};
+  Percentiles latency_ms_;
+
+  std::unique_ptr<RobotClient> client_;  // Last: its callbacks use everything above.
+};
+
+}  // namespace cairn::client

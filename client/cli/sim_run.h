@@ -1,0 +1,52 @@
+// Streams a simulated fleet into one site: paces it, keeps the truth, and reports what became of every scan.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/cli/program.h"
+#include "client/cli/scan_account.h"
+#include "client/sim/fleet.h"
+
+namespace cairn::client {
+
+struct SimRunOptions {
+  std::string world = "building";
+  std::string site;
+  std::string prefix = "robot";  // Robots are called prefix1, prefix2, ...
+  sim::FleetOptions fleet;
+  double seconds = 60.0;  // Of the simulated time.
+  double rate = 1.0;
+  bool fast = false;
+  std::uint64_t window = 0;  // Scans on the way per robot, at most; 0: no limit, or kFastWindow with `fast`.
+  bool stream = true;        // False: no server; only the files are written.
+  bool end = false;
+  std::string truth_dir;  // <robot>.tum: true poses at the scans' stamps.
+  std::string log_dir;    // <robot>.log: CARMEN logs of what was streamed.
+  int watched_pid = 0;    // Whose processor time to report.
+};
+
+struct SimRobotReport {
+  std::string robot;
+  Pose2 T_map_robot_start;
+  ScanAccount account;
+  double latency_p50_ms = 0.0;
+  double latency_p99_ms = 0.0;
+};
+
+struct SimReport {
+  std::vector<SimRobotReport> robots;
+  double simulated_s = 0.0;
+  double took_s = 0.0;
+  double latency_p50_ms = 0.0;  // Over all robots.
+  double latency_p99_ms = 0.0;
+  std::optional<double> watched_cpu_share;  // 1: one core, all the time.
+
+  [[nodiscard]] double rate() const { return took_s > 0.0 ? simulated_s / took_s : 0.0; }
+  [[nodiscard]] bool explained() const;
+};
+
+[[nodiscard]] Result<SimReport> RunSim(Program& program, const SimRunOptions& options);
+
+}  // namespace cairn::client

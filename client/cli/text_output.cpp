@@ -1,0 +1,126 @@
+#include "client/cli/text_output.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "client/cli/quantity_text.h"
+#include "common/sensor/stamp_text.h"
+
+namespace cairn::client {
+namespace {
+
+std::string FormatStamps(const StampSummary& stamps) {
+  return fmt::format("{} over {}, {:.1f} Hz, p99 period {}, longest gap {}", stamps.count,
+                     FormatDuration(stamps.duration_s), stamps.rate_hz, FormatDuration(stamps.period_p99_s),
+                     FormatDuration(stamps.longest_gap_s));
+}
+
+}  // namespace
+
+std::string FormatPose(const PoseReport& pose) {
+  const double sigma_m = std::sqrt(std::max(0.0, std::max(pose.covariance(0, 0), pose.covariance(1, 1))));
+  const double sigma_rad = std::sqrt(std::max(0.0, pose.covariance(2, 2)));
+  return fmt::format(
+      "{} in {} at {}: x {:.3f} m  y {:.3f} m  theta {:.4f} rad  (+-{:.3f} m, +-{:.4f} rad)  {}, score {:.2f}, epoch "
+      "{}",
+      pose.robot, pose.site, FormatStamp(pose.stamp), pose.T_map_robot.x, pose.T_map_robot.y, pose.T_map_robot.theta,
+      sigma_m, sigma_rad, PoseReasonName(pose.reason), pose.score, pose.map_epoch);
+}
+
+std::string FormatJob(const Job& job) {
+  std::string line = fmt::format("job {}: {} of {}, {}, {:.0f} %", job.id, JobKindName(job.kind), job.site,
+                                 JobStateName(job.state), 100 * job.progress);
+  if (job.ended > job.started && job.started > 0)
+    line += ", took " + FormatDuration(SecondsFromStamp(job.ended - job.started));
+  if (job.state == JobState::kSucceeded) {
+    line += fmt::format(", cost {:.4g} -> {:.4g}", job.cost_before, job.cost_after);
+    if (job.map_version > 0) line += fmt::format(", map version {}", job.map_version);
+  }
+  if (!job.message.empty()) line += ": " + job.message;
+  return line;
+}
+
+std::string FormatRobot(const RobotStatus& robot) {
+  std::string text =
+      fmt::format("{} in {}: {}{}\n", robot.session.robot, robot.session.site, SessionPhaseName(robot.session.phase),
+                  robot.alive ? ", connected" : ", not connected");
+  if (!robot.session.status.ok()) {
+    text += fmt::format("  {}: {}\n", StatusCodeName(robot.session.status.code), robot.session.status.message);
+  }
+  if (robot.pose.reason != PoseReason::kWaiting) {
+    const Pose2& p = robot.pose.T_map_robot;
+    text += fmt::format("  pose {:.3f} {:.3f} {:.4f} at {}, {}, score {:.2f}\n", p.x, p.y, p.theta,
+                        FormatStamp(robot.pose.stamp), PoseReasonName(robot.pose.reason), robot.pose.score);
+  }
+  for (const Ledger& ledger : robot.ledgers) {
+    text += fmt::format(
+        "  {}: received {}, used {} ({} keyframes), dropped {}, waiting {}; odometry {} (dropped {}, merged {}); "
+        "latency p50 {:.1f} ms, p99 {:.1f} ms\n",
+        ledger.sensor, ledger.received, ledger.used, ledger.keyframes, ledger.dropped_total(), ledger.waiting,
+        ledger.odometry_received, ledger.odometry_dropped, ledger.odometry_merged, ledger.latency_p50_ms,
+        ledger.latency_p99_ms);
+    for (int i = 0; i < kDropReasonCount; ++i) {
+      const std::uint64_t count = ledger.dropped[static_cast<std::size_t>(i)];
+      if (count > 0) text += fmt::format("    dropped {}: {}\n", DropReasonName(static_cast<DropReason>(i)), count);
+    }
+  }
+  return text;
+}
+
+std::string FormatMap(const MapInfo& map) {
+  std::string text = fmt::format("{}: {} tiles in {} levels of {} m, epoch {}, version {}, {} robots\n", map.site,
+                                 map.tile_count, map.levels, map.resolution_m, map.epoch, map.version, map.robots);
+  if (map.tile_count > 0) {
+    text +=
+        fmt::format("  x {:.2f}..{:.2f} m, y {:.2f}..{:.2f} m\n", map.x_min_m, map.x_max_m, map.y_min_m, map.y_max_m);
+  }
+  for (const MapVersionInfo& version : map.versions) {
+    text += fmt::format("  {} version {}{}{}\n", version.enabled ? "*" : " ", version.version,
+                        version.job > 0 ? fmt::format(" by job {}", version.job) : ", live",
+                        version.note.empty() ? "" : ": " + version.note);
+  }
+  return text;
+}
+
+std::string FormatTrajectoryError(const TrajectoryError& e) {
+  return fmt::format(
+      "{} poses over {:.1f} m ({} not comparable): ATE rmse {:.4f} m, mean {:.4f}, median {:.4f}, max {:.4f}, final "
+      "{:.4f}; heading rmse {:.3f} deg, max {:.3f} deg\n",
+      e.compared, e.way_m, e.skipped, e.rmse_m, e.mean_m, e.median_m, e.max_m, e.final_m, Degrees(e.rmse_rad),
+      Degrees(e.max_rad));
+}
+
+std::string FormatLogReport(const LogReport& r) {
+  std::string text = "scans     " + FormatStamps(r.scans) + "\n";
+  text += "odometry  " + FormatStamps(r.odometry) + "\n";
+  std::string beams;
+  std::size_t listed = 0;
+  for (const auto& [count, scans] : r.beam_counts) {
+    if (++listed > 5) {
+      beams += ", ...";
+      break;
+    }
+    beams += fmt::format("{}{} x {}", beams.empty() ? "" : ", ", scans, count);
+  }
+  text += fmt::format(
+      "beams     {}; field of view {:.1f} deg, step {:.3f} deg, up to {:.2f} m, laser at {:.3f} {:.3f} {:.1f} deg\n",
+      beams.empty() ? "none" : beams, Degrees(r.field_of_view_rad), Degrees(r.angle_step_rad), r.range_max_m,
+      r.T_robot_laser.x, r.T_robot_laser.y, Degrees(r.T_robot_laser.theta));
+  text += fmt::format("ranges    {:.1f} % hit, {:.1f} % nothing there, {:.1f} % invalid\n", 100 * r.hit_share,
+                      100 * r.no_return_share, 100 * r.invalid_share);
+  text += fmt::format("motion    {:.1f} m, {:.0f} deg turned, fastest {:.2f} m/s\n", r.way_m, Degrees(r.turned_rad),
+                      r.fastest_m_s);
+  text += fmt::format("lines     {} unreadable, {} of other kinds\n", r.summary.complaint_count, r.summary.ignored);
+  for (const std::string& line : r.summary.notes) text += "note      " + line + "\n";
+  for (const LogComplaint& complaint : r.summary.complaints) {
+    text += fmt::format("line {}: {}\n", complaint.line, complaint.reason);
+  }
+  for (const Finding& finding : r.findings) {
+    text += fmt::format("{}: {}: {}\n", finding.error ? "error" : "warning", finding.what, finding.advice);
+  }
+  return text + (r.has_errors() ? "not clean: scans will be lost\n" : "good for mapping\n");
+}
+
+}  // namespace cairn::client

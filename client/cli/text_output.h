@@ -1,0 +1,22 @@
+// The server's values as lines for people. Stateless.
+#pragma once
+
+#include <string>
+
+#include "client/cli/log_check.h"
+#include "client/cli/trajectory_error.h"
+#include "common/service/request.h"
+
+namespace cairn::client {
+
+// One line: where, how sure, why.
+[[nodiscard]] std::string FormatPose(const PoseReport& pose);
+// One line: state, progress, costs, message.
+[[nodiscard]] std::string FormatJob(const Job& job);
+// Several lines, each ended.
+[[nodiscard]] std::string FormatRobot(const RobotStatus& robot);
+[[nodiscard]] std::string FormatMap(const MapInfo& map);
+[[nodiscard]] std::string FormatTrajectoryError(const TrajectoryError& error);
+[[nodiscard]] std::string FormatLogReport(const LogReport& report);
+
+}  // namespace cairn::client

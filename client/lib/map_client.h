@@ -1,0 +1,50 @@
+// Follows the map of one site: a TileMirror kept up to date by the wire. Gets the whole current map on joining, then
+// what changes. Thread rule: every method from any thread; `on_change` runs on the wire's threads, may call the
+// methods, and must return soon.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/lib/tile_mirror.h"
+#include "common/mutex.h"
+#include "common/wire/bus.h"
+
+namespace cairn::client {
+
+class MapClient {
+ public:
+  [[nodiscard]] static Result<std::unique_ptr<MapClient>> Create(wire::Bus& bus, const std::string& site,
+                                                                 std::function<void()> on_change = {});
+  ~MapClient();
+
+  // Waits until every tile the server announces is here. kUnavailable: no server; kNotFound: it has no such site;
+  // kDeadlineExceeded: some tiles are still missing.
+  [[nodiscard]] Result<void> WaitComplete(double timeout_s);
+
+  // All of one epoch.
+  [[nodiscard]] std::vector<Tile> tiles() const;
+  [[nodiscard]] std::vector<Tile> tiles(int level) const;
+  [[nodiscard]] std::optional<MapInfo> info() const;
+  [[nodiscard]] std::uint32_t epoch() const;
+  [[nodiscard]] std::uint64_t version() const;
+
+ private:
+  MapClient(wire::Bus& bus, const std::string& site, std::function<void()> on_change);
+  template <typename Value>
+  void Apply(Value&& value);
+
+  const wire::Bus& bus_;
+  const std::string site_;
+  const std::function<void()> on_change_;
+  mutable Mutex mutex_;
+  CondVar changed_;
+  TileMirror mirror_ CAIRN_GUARDED_BY(mutex_);
+  std::unique_ptr<wire::Subscription> map_;
+  std::unique_ptr<wire::Subscription> tiles_;
+};
+
+}  // namespace cairn::client

@@ -1,0 +1,68 @@
+#include "client/lib/tile_mirror.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace cairn::client {
+
+bool TileMirror::Enter(std::uint32_t epoch) {
+  if (epoch < epoch_) return false;
+  if (epoch > epoch_) {
+    epoch_ = epoch;
+    version_ = 0;
+    entries_.clear();
+  }
+  return true;
+}
+
+bool TileMirror::Apply(MapInfo&& info) {
+  if (info.site_id != site_id_ || !Enter(info.epoch)) return false;
+  if (info_ && info_->epoch == info.epoch && info.version < info_->version) return false;
+  info_ = std::move(info);
+  return true;
+}
+
+bool TileMirror::Apply(TileSample&& sample) {
+  Tile& tile = sample.tile;
+  if (sample.site_id != site_id_ || !Enter(tile.epoch)) return false;
+  const auto known = entries_.find(tile.key);
+  if (known == entries_.end() && entries_.size() >= kMaxTiles) {
+    ++ignored_;
+    return false;
+  }
+  if (known != entries_.end() && tile.version <= known->second.version) return false;
+  Entry& entry = entries_[tile.key];
+  entry.version = tile.version;
+  version_ = std::max(version_, tile.version);
+  if (sample.deleted) {
+    entry.tile.reset();
+  } else {
+    entry.tile = std::move(tile);
+  }
+  return true;
+}
+
+bool TileMirror::complete() const {
+  if (!info_ || info_->epoch != epoch_ || version_ < info_->version) return false;
+  const auto level0 = std::count_if(entries_.begin(), entries_.end(),
+                                    [](const auto& e) { return e.first.level == 0 && e.second.tile.has_value(); });
+  return static_cast<std::uint64_t>(level0) >= info_->tile_count;
+}
+
+std::vector<Tile> TileMirror::tiles() const {
+  std::vector<Tile> tiles;
+  for (const auto& [key, entry] : entries_) {
+    if (entry.tile) tiles.push_back(*entry.tile);
+  }
+  return tiles;
+}
+
+std::vector<Tile> TileMirror::tiles(int level) const {
+  std::vector<Tile> tiles;
+  for (const auto& [key, entry] : entries_) {
+    if (entry.tile && key.level == level) tiles.push_back(*entry.tile);
+  }
+  return tiles;
+}
+
+}  // namespace cairn::client

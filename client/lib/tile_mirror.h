@@ -1,0 +1,54 @@
+// The tiles of one site as the server has them, built from the map and tile topics in whatever order they come:
+// - a tile of a higher version replaces the whole tile, one of a lower or equal version is old news;
+// - a tombstone removes the tile, and is remembered so that no late older tile brings it back;
+// - the first word of a higher epoch, from either topic, makes every tile of the epochs before void.
+// So what it holds is always of one epoch. Pure value; not thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "common/map/tile.h"
+#include "common/service/map_info.h"
+#include "common/service/stream.h"
+
+namespace cairn::client {
+
+class TileMirror {
+ public:
+  static constexpr std::size_t kMaxTiles = 262144;  // Tiles of all levels; further ones are ignored and counted.
+
+  explicit TileMirror(NameId site_id) : site_id_(site_id) {}
+
+  // True where it changed the mirror. Other sites' values are ignored.
+  bool Apply(MapInfo&& info);
+  bool Apply(TileSample&& sample);
+
+  // Everything the last map info announces is here.
+  [[nodiscard]] bool complete() const;
+  [[nodiscard]] std::uint32_t epoch() const { return epoch_; }
+  [[nodiscard]] std::uint64_t version() const { return version_; }  // Highest of the tiles here.
+  [[nodiscard]] const std::optional<MapInfo>& info() const { return info_; }
+  [[nodiscard]] std::vector<Tile> tiles() const;  // By key.
+  [[nodiscard]] std::vector<Tile> tiles(int level) const;
+  [[nodiscard]] std::uint64_t ignored() const { return ignored_; }
+
+ private:
+  struct Entry {
+    std::uint64_t version = 0;
+    std::optional<Tile> tile;  // Nothing: tombstone.
+  };
+  // False where the epoch is void.
+  bool Enter(std::uint32_t epoch);
+
+  const NameId site_id_;
+  std::uint32_t epoch_ = 0;
+  std::uint64_t version_ = 0;
+  std::optional<MapInfo> info_;
+  std::map<TileKey, Entry> entries_;
+  std::uint64_t ignored_ = 0;
+};
+
+}  // namespace cairn::client

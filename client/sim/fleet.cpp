@@ -1,0 +1,120 @@
+#include "client/sim/fleet.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "client/sim/closed_path.h"
+
+namespace cairn::sim {
+namespace {
+
+// The k-th multiple of a rate's period, without the drift of adding periods.
+Stamp Multiple(std::uint64_t k, double hz) {
+  return static_cast<Stamp>(std::llround(static_cast<double>(k) * 1e9 / hz));
+}
+
+}  // namespace
+
+Result<void> Validate(const FleetOptions& o) {
+  if (o.robots < 1 || o.robots > 1000) return Fail(StatusCode::kInvalidArgument, "fleet: robots must be 1..1000");
+  for (const double hz : {o.scan_hz, o.odometry_hz}) {
+    if (!(hz >= 0.1 && hz <= 1000.0)) return Fail(StatusCode::kInvalidArgument, "fleet: rates must be 0.1..1000 Hz");
+  }
+  if (!(o.robot_radius_m > 0.0 && o.robot_radius_m <= 5.0)) {
+    return Fail(StatusCode::kInvalidArgument, "fleet: the robots' radius must be above 0 and at most 5 m");
+  }
+  if (auto valid = Validate(o.laser); !valid) return valid;
+  if (auto valid = Validate(o.wheels); !valid) return valid;
+  return Validate(o.drive);
+}
+
+Result<Fleet> Fleet::Create(World world, const FleetOptions& options) {
+  if (auto valid = Validate(options); !valid) return tl::unexpected(valid.error());
+  if (world.routes.empty())
+    return Fail(StatusCode::kInvalidArgument, "fleet: the world '" + world.name + "' has no route");
+  return Fleet(std::move(world), options);
+}
+
+Fleet::Fleet(World world, const FleetOptions& options)
+    : world_(std::move(world)), options_(options), walls_(world_.segments) {
+  const auto count = static_cast<std::size_t>(options_.robots), routes = world_.routes.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto& waypoints = world_.routes[i % routes].waypoints_map;
+    const std::size_t on_route = (count - i % routes + routes - 1) / routes;
+    const double length = ClosedLength(waypoints);
+    const PathPlace place =
+        FreePlace(waypoints, length * static_cast<double>(i / routes) / static_cast<double>(on_route));
+    const Pose2 start{place.p_map.x(), place.p_map.y(), WrapAngle(place.heading_rad)};
+    std::seed_seq seeds{static_cast<std::uint32_t>(options_.seed), static_cast<std::uint32_t>(options_.seed >> 32),
+                        static_cast<std::uint32_t>(i)};
+    Random random(seeds);
+    const WheelOptions wheels = DrawWheels(options_.wheels, options_.wheel_spread, random);
+    const auto phase = static_cast<Stamp>(1e9 / options_.scan_hz * static_cast<double>(i) / static_cast<double>(count));
+    robots_.push_back({"robot" + std::to_string(i + 1),
+                       start,
+                       Robot(start, RouteFollower(waypoints, place.next, options_.drive), wheels, random),
+                       phase,
+                       0,
+                       0,
+                       {}});
+  }
+}
+
+PathPlace Fleet::FreePlace(const std::vector<Eigen::Vector2d>& waypoints, double way_m) const {
+  constexpr double kApart_m = 1.0, kStep_m = 0.25;
+  const int tries = static_cast<int>(ClosedLength(waypoints) / kStep_m);
+  for (int k = 0; k < tries; ++k) {
+    const PathPlace place = PlaceOnPath(waypoints, way_m + k * kStep_m);
+    const bool free = std::all_of(robots_.begin(), robots_.end(), [&](const Member& other) {
+      return (other.T_map_robot_start.translation() - place.p_map).norm() >= kApart_m;
+    });
+    if (free) return place;
+  }
+  return PlaceOnPath(waypoints, way_m);  // A crowd: robots may overlap.
+}
+
+Stamp Fleet::NextScan(const Member& member) const {
+  return member.scan_phase + Multiple(member.scans, options_.scan_hz);
+}
+
+Stamp Fleet::NextOdometry(const Member& member) const {
+  return Multiple(member.odometries, options_.odometry_hz);
+}
+
+Scan Fleet::TakeScan(std::size_t index, Stamp since_start) {
+  Member& member = robots_[index];
+  const double seconds = SecondsFromStamp(since_start);
+  std::vector<Disc> discs = world_.discs;
+  for (const Walker& walker : world_.walkers) discs.push_back(WalkerAt(walker, seconds));
+  if (options_.see_each_other) {
+    for (std::size_t i = 0; i < robots_.size(); ++i) {
+      if (i != index) discs.push_back({robots_[i].robot.PoseAt(seconds).translation(), options_.robot_radius_m});
+    }
+  }
+  const Stamp stamp = options_.first_stamp + since_start;
+  Scan scan = MeasureScan(walls_, discs, member.robot.T_map_robot(), member.robot.twist(), stamp, options_.laser,
+                          member.robot.random());
+  scan.sequence = ++member.scans;
+  scan.scan_period_s = 1.0 / options_.scan_hz;
+  member.truth.push_back({stamp, member.robot.T_map_robot()});
+  return scan;
+}
+
+FleetRecord Fleet::Next() {
+  const auto due = [this](const Member& member) { return std::min(NextScan(member), NextOdometry(member)); };
+  const auto next = std::min_element(robots_.begin(), robots_.end(),
+                                     [&](const Member& a, const Member& b) { return due(a) < due(b); });
+  Member& member = *next;
+  const auto index = static_cast<std::size_t>(next - robots_.begin());
+  const Stamp since_start = due(member);
+  member.robot.DriveUntil(SecondsFromStamp(since_start));
+  if (NextOdometry(member) == since_start) {
+    ++member.odometries;
+    return {static_cast<int>(index),
+            Odometry{member.odometries, options_.first_stamp + since_start, member.robot.T_odom_robot()}};
+  }
+  return {static_cast<int>(index), TakeScan(index, since_start)};
+}
+
+}  // namespace cairn::sim

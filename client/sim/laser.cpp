@@ -1,0 +1,77 @@
+#include "client/sim/laser.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "client/sim/arc.h"
+
+namespace cairn::sim {
+namespace {
+
+Result<void> Require(bool holds, const char* what) {
+  if (holds) return {};
+  return Fail(StatusCode::kInvalidArgument, std::string("laser: ") + what);
+}
+
+double StepOf(const LaserOptions& options) {
+  const bool full_turn = options.field_of_view_rad > 2 * kPi - 1e-9;
+  return options.field_of_view_rad / (full_turn ? options.beams : std::max(1, options.beams - 1));
+}
+
+}  // namespace
+
+Result<void> Validate(const LaserOptions& o) {
+  const auto share = [](double value) { return value >= 0.0 && value <= 1.0; };
+  if (auto r = Require(o.beams >= 1 && o.beams <= kMaxBeams, "beams must be 1..8192"); !r) return r;
+  if (auto r = Require(o.field_of_view_rad > 0.0 && o.field_of_view_rad <= 2 * kPi + 1e-9,
+                       "field of view must be above 0 and at most 360 deg");
+      !r)
+    return r;
+  if (auto r = Require(o.range_min_m >= 0.0 && o.range_min_m < o.range_max_m && o.range_max_m <= 1000.0,
+                       "ranges must be 0 <= min < max <= 1000 m");
+      !r)
+    return r;
+  if (auto r = Require(o.noise_m >= 0.0 && o.noise_m <= 10.0 && share(o.noise_share),
+                       "noise must be 0..10 m and 0..1 per metre");
+      !r)
+    return r;
+  if (auto r = Require(share(o.dropout_share), "dropouts must be a share from 0 to 1"); !r) return r;
+  if (auto r = Require(o.sweep_s >= 0.0 && o.sweep_s <= 1.0, "the sweep must take 0..1 s"); !r) return r;
+  return Require(o.T_robot_laser.IsFinite(), "the mounting must be finite");
+}
+
+Scan MeasureScan(const RayCaster& walls, std::span<const Disc> discs, const Pose2& T_map_robot, const Twist& twist,
+                 Stamp stamp, const LaserOptions& options, Random& random) {
+  Scan scan;
+  scan.stamp = stamp;
+  scan.angle_step_rad = StepOf(options);
+  scan.angle_first_rad = options.beams == 1 ? 0.0 : -options.field_of_view_rad / 2;
+  scan.range_min_m = options.range_min_m;
+  scan.range_max_m = options.range_max_m;
+  scan.beam_period_s = options.sweep_s / std::max(1, options.beams - 1);
+  scan.T_robot_laser = options.T_robot_laser;
+  scan.ranges_m.reserve(static_cast<std::size_t>(options.beams));
+
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  Pose2 T_map_laser = T_map_robot * options.T_robot_laser;
+  for (int i = 0; i < options.beams; ++i) {
+    if (scan.beam_period_s > 0.0) {
+      const double t = i * scan.beam_period_s;
+      T_map_laser = T_map_robot * DriveArc(twist.speed_m_s * t, twist.turn_rad_s * t) * options.T_robot_laser;
+    }
+    const double angle = T_map_laser.theta + scan.angle_first_rad + i * scan.angle_step_rad;
+    const Eigen::Vector2d direction(std::cos(angle), std::sin(angle)), origin = T_map_laser.translation();
+    double range = std::min(walls.Cast(origin, direction, options.range_max_m), CastAtDiscs(discs, origin, direction));
+    if (options.dropout_share > 0.0 && uniform(random) < options.dropout_share) {
+      range = 0.0;
+    } else if (range < options.range_max_m) {
+      range = std::max(0.0, range + Normal(random, options.noise_m + options.noise_share * range));
+    }
+    if (range >= options.range_max_m) range = std::numeric_limits<double>::infinity();
+    scan.ranges_m.push_back(static_cast<float>(range));
+  }
+  return scan;
+}
+
+}  // namespace cairn::sim

@@ -1,0 +1,39 @@
+// A planar laser scanner in a simulated world: exact ray casts, then noise and dropouts.
+// A range is r + N(0, (noise_m + noise_share * r)^2). What nothing hits reads +infinity (ROS REP 117); a dropout reads
+// 0, which says nothing. Beams start at the scan's stamp and follow each other within `sweep_s`, while the robot moves.
+// Frames: beams in `laser`, mounted at T_robot_laser.
+#pragma once
+
+#include <span>
+
+#include "client/sim/random.h"
+#include "client/sim/ray_caster.h"
+#include "common/sensor/scan.h"
+
+namespace cairn::sim {
+
+struct LaserOptions {
+  int beams = 360;                            // 1..8192.
+  double field_of_view_rad = Radians(270.0);  // Centred on the laser's x axis; a full turn has no beam twice.
+  double range_min_m = 0.05;
+  double range_max_m = 30.0;     // Farther walls are not seen.
+  double noise_m = 0.01;         // Standard deviation at any range...
+  double noise_share = 0.001;    // ... and what is added to it per metre of range.
+  double dropout_share = 0.002;  // Of all beams, 0..1.
+  double sweep_s = 0.0;          // From the first beam to the last; 0: all at once.
+  Pose2 T_robot_laser{0.12, 0.0, 0.0};
+};
+[[nodiscard]] Result<void> Validate(const LaserOptions& options);
+
+// How a robot moves during a sweep.
+struct Twist {
+  double speed_m_s = 0.0;
+  double turn_rad_s = 0.0;
+};
+
+// `T_map_robot` at the first beam. `discs` are obstacles that are not part of the caster's walls.
+// The scan has no sequence number yet (0); options must be valid.
+[[nodiscard]] Scan MeasureScan(const RayCaster& walls, std::span<const Disc> discs, const Pose2& T_map_robot,
+                               const Twist& twist, Stamp stamp, const LaserOptions& options, Random& random);
+
+}  // namespace cairn::sim

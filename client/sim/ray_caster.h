@@ -1,0 +1,48 @@
+// Distances along rays to a fixed set of segments and to a few discs.
+// Segments lie in a uniform grid that rays walk cell by cell; discs are few and tried one by one. Both sides of a
+// segment stop a ray. A disc that holds the ray's origin does not (a scanner sees out of its own body).
+// Frame: `map`, metres. Immutable after construction: thread-safe.
+// Source: grid walk of Amanatides, Woo, "A fast voxel traversal algorithm for ray tracing", Eurographics 1987.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "client/sim/world.h"
+
+namespace cairn::sim {
+
+inline constexpr double kNothingHit = std::numeric_limits<double>::infinity();
+
+class RayCaster {
+ public:
+  explicit RayCaster(std::vector<Segment> segments);
+
+  // Distance to the nearest segment within `max_m`, else kNothingHit. `direction` has length 1.
+  [[nodiscard]] double Cast(const Eigen::Vector2d& origin_map, const Eigen::Vector2d& direction, double max_m) const;
+
+  // Distance from a point to the nearest segment: the clearance a robot has there.
+  [[nodiscard]] double Clearance(const Eigen::Vector2d& p_map) const;
+
+ private:
+  [[nodiscard]] double CastInCell(std::size_t cell, const Eigen::Vector2d& origin,
+                                  const Eigen::Vector2d& direction) const;
+
+  std::vector<Segment> segments_;
+  Eigen::Vector2d corner_map_ = Eigen::Vector2d::Zero();  // Of cell (0,0).
+  double cell_m_ = 1.0;
+  int columns_ = 0;
+  int rows_ = 0;
+  std::vector<std::uint32_t> cell_begin_;  // Of cell i in members_; one more at the end.
+  std::vector<std::uint32_t> members_;     // Segment indices.
+};
+
+// Distance along the ray to the disc's rim; kNothingHit where it misses or starts inside.
+[[nodiscard]] double CastAtDisc(const Disc& disc, const Eigen::Vector2d& origin_map, const Eigen::Vector2d& direction);
+[[nodiscard]] double CastAtDiscs(std::span<const Disc> discs, const Eigen::Vector2d& origin_map,
+                                 const Eigen::Vector2d& direction);
+
+}  // namespace cairn::sim

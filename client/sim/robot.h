@@ -1,0 +1,35 @@
+// One simulated robot: drives its route, and keeps its true pose and what its odometry believes.
+// Frames: truth in `map`, odometry in `odom`.
+#pragma once
+
+#include "client/sim/random.h"
+#include "client/sim/route_follower.h"
+#include "client/sim/wheels.h"
+
+namespace cairn::sim {
+
+class Robot {
+ public:
+  Robot(const Pose2& T_map_robot_start, RouteFollower follower, const WheelOptions& wheels, Random random);
+
+  // Moves to `seconds` after the start, which is not before the time reached so far.
+  void DriveUntil(double seconds);
+
+  // The true pose at a time a little after the one reached, should the robot keep its velocities.
+  [[nodiscard]] Pose2 PoseAt(double seconds) const;
+
+  [[nodiscard]] const Pose2& T_map_robot() const { return T_map_robot_; }
+  [[nodiscard]] const Pose2& T_odom_robot() const { return wheels_.T_odom_robot(); }
+  [[nodiscard]] const Twist& twist() const { return twist_; }
+  [[nodiscard]] Random& random() { return random_; }
+
+ private:
+  RouteFollower follower_;
+  WheelOdometry wheels_;
+  Random random_;
+  Pose2 T_map_robot_;
+  Twist twist_;
+  double seconds_ = 0.0;
+};
+
+}  // namespace cairn::sim

@@ -1,0 +1,38 @@
+// Small images in memory to and from PNG, PGM and BMP bytes: the one place that calls the image library, so that its
+// exceptions and its trust in headers stop here. Not for photographs. Stateless, thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/status.h"
+
+namespace cairn {
+
+inline constexpr std::int64_t kMaxImagePixels = std::int64_t{1} << 27;  // 580 m x 580 m of 5 cm cells.
+
+// Samples row by row from the image's first row, interleaved by pixel: grey; blue green red; or blue green red alpha.
+struct RasterImage {
+  int width = 0;
+  int height = 0;
+  int channels = 1;
+  std::vector<std::uint8_t> samples;
+};
+
+struct ImageSize {
+  std::int64_t width = 0;
+  std::int64_t height = 0;
+};
+
+// What the header of a PNG, PNM or BMP file claims; nothing for other bytes.
+[[nodiscard]] std::optional<ImageSize> DeclaredSize(const std::vector<std::uint8_t>& bytes);
+
+// `extension` is ".png", ".pgm" (grey only) or ".bmp". `png_level` 0 (fast) to 9 (small).
+[[nodiscard]] Result<std::vector<std::uint8_t>> EncodeImage(const RasterImage& image, const std::string& extension,
+                                                            int png_level);
+// 16-bit samples are reduced to their upper byte. Refuses more than kMaxImagePixels before it allocates for them.
+[[nodiscard]] Result<RasterImage> DecodeImage(const std::vector<std::uint8_t>& bytes);
+
+}  // namespace cairn

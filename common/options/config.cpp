@@ -1,0 +1,91 @@
+#include "common/options/config.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <exception>
+#include <set>
+
+#include "common/file/atomic_file.h"
+#include "common/options/option_fields.h"
+
+namespace cairn {
+namespace {
+
+constexpr std::size_t kMaxBytes = 1u << 20;
+// Aliases can make a small text an endless or exponentially large tree.
+constexpr int kDeepest = 32;
+constexpr std::size_t kMostValues = 10'000;
+
+// Collects the leaves of a YAML tree as assignments. Returns the first problem, or nothing.
+class Flattening {
+ public:
+  explicit Flattening(std::string source) : source_(std::move(source)) {}
+
+  std::string Take(const YAML::Node& node, const std::string& key, int depth) {
+    if (depth > kDeepest || assignments_.size() > kMostValues) return Place(node) + ": nested too deeply or too large";
+    if (node.IsNull()) return {};  // A section with nothing in it.
+    if (node.IsSequence()) return Place(node) + ": " + (key.empty() ? "" : key + ": ") + "lists are not used here";
+    if (node.IsScalar()) {
+      if (key.empty()) return Place(node) + ": not a tree of keys and values";
+      assignments_.push_back({Place(node), key, node.Scalar()});
+      return {};
+    }
+    std::set<std::string> names;
+    for (const auto& entry : node) {
+      if (!entry.first.IsScalar()) return Place(entry.first) + ": a key must be a plain word";
+      const std::string& name = entry.first.Scalar();
+      const std::string full = key.empty() ? name : key + "." + name;
+      if (!names.insert(name).second) return Place(entry.first) + ": " + full + ": given twice";
+      if (std::string problem = Take(entry.second, full, depth + 1); !problem.empty()) return problem;
+    }
+    return {};
+  }
+
+  [[nodiscard]] const std::vector<Assignment>& assignments() const { return assignments_; }
+
+ private:
+  [[nodiscard]] std::string Place(const YAML::Node& node) const {
+    const int line = node.Mark().line;
+    return line < 0 ? source_ : source_ + ":" + std::to_string(line + 1);
+  }
+
+  std::string source_;
+  std::vector<Assignment> assignments_;
+};
+
+}  // namespace
+
+Result<void> ApplyYaml(const std::string& text, const std::string& source, const VisitOptions& visit) {
+  Flattening flat(source);
+  try {
+    const std::string problem = flat.Take(YAML::Load(text), "", 0);
+    if (!problem.empty()) return Fail(StatusCode::kInvalidArgument, problem);
+  } catch (const YAML::Exception& error) {
+    const int line = error.mark.line;
+    return Fail(StatusCode::kInvalidArgument,
+                source + (line < 0 ? "" : ":" + std::to_string(line + 1)) + ": not YAML: " + error.msg);
+  } catch (const std::exception& error) {
+    return Fail(StatusCode::kInvalidArgument, source + ": not YAML: " + error.what());
+  }
+  return Assign(flat.assignments(), visit);
+}
+
+Result<void> ApplyYamlFile(const std::filesystem::path& path, const VisitOptions& visit) {
+  const auto bytes = ReadWholeFile(path, kMaxBytes);
+  if (!bytes) return tl::unexpected(bytes.error());
+  return ApplyYaml(std::string(bytes->begin(), bytes->end()), path.string(), visit);
+}
+
+Result<void> ApplySet(const std::vector<std::string>& assignments, const VisitOptions& visit) {
+  std::vector<Assignment> parsed;
+  for (const std::string& assignment : assignments) {
+    const std::size_t equals = assignment.find('=');
+    if (equals == std::string::npos || equals == 0) {
+      return Fail(StatusCode::kInvalidArgument, "--set: '" + assignment + "' is not key=value");
+    }
+    parsed.push_back({"--set", assignment.substr(0, equals), assignment.substr(equals + 1)});
+  }
+  return Assign(parsed, visit);
+}
+
+}  // namespace cairn

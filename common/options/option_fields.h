@@ -1,0 +1,44 @@
+// The options tree flattened: every field under its full dotted key, and assignments of texts to them. What YAML files
+// and `--set` share. Not thread-safe.
+#pragma once
+
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/options/config.h"
+
+namespace cairn {
+
+struct Assignment {
+  std::string place;  // For errors: "cairnd.yaml:12" or "--set".
+  std::string key;    // Full dotted key.
+  std::string text;
+};
+
+// Assigns all, or nothing where one is in error. Later assignments of a key win.
+[[nodiscard]] Result<void> Assign(const std::vector<Assignment>& assignments, const VisitOptions& visit);
+
+// "2..10 m", "true or false", "a, b or c".
+[[nodiscard]] std::string RangeText(double min, double max, std::string_view unit);
+[[nodiscard]] std::string RangeText(std::int64_t min, std::int64_t max, std::string_view unit);
+[[nodiscard]] std::string NamesText(std::span<const std::string_view> names);
+
+// The shortest text that reads back to the same double.
+[[nodiscard]] std::string ExactText(double value);
+
+// Where the tree's sections are: a visitor that keeps the dotted prefix.
+class SectionVisitor : public OptionVisitor {
+ public:
+  void Section(std::string_view key, std::string_view help, const std::function<void()>& fields) override;
+
+ protected:
+  [[nodiscard]] std::string FullKey(std::string_view key) const { return prefix_ + std::string(key); }
+  virtual void OnSection(const std::string& /*full_key*/) {}
+
+ private:
+  std::string prefix_;
+};
+
+}  // namespace cairn

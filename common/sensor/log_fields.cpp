@@ -1,0 +1,94 @@
+#include "common/sensor/log_fields.h"
+
+#include <charconv>
+#include <cmath>
+
+#include "common/sensor/stamp_text.h"
+
+namespace cairn {
+namespace {
+
+template <typename Number>
+bool Parse(std::string_view text, Number& value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size();
+}
+
+}  // namespace
+
+std::string Shown(std::string_view text) {
+  constexpr std::size_t kLongest = 24;
+  std::string shown;
+  for (const char c : text.substr(0, kLongest)) shown += c >= ' ' && c <= '~' ? c : '?';
+  return text.size() > kLongest ? shown + "..." : shown;
+}
+
+void LogFields::Complain(std::string_view what, std::string_view text) {
+  if (!problem_.empty()) return;
+  problem_ = std::string(what) + (text.empty() ? " is missing" : " is not valid: '" + Shown(text) + "'");
+}
+
+std::string_view LogFields::Word(std::string_view what) {
+  constexpr std::string_view kBlanks = " \t\r";
+  const std::size_t begin = std::min(rest_.find_first_not_of(kBlanks), rest_.size());
+  const std::size_t end = std::min(rest_.find_first_of(kBlanks, begin), rest_.size());
+  const std::string_view word = rest_.substr(begin, end - begin);
+  rest_.remove_prefix(end);
+  if (word.empty()) Complain(what, word);
+  return word;
+}
+
+double LogFields::Real(std::string_view what) {
+  if (!problem_.empty()) return 0.0;
+  const std::string_view word = Word(what);
+  double value = 0.0;
+  if (Parse(word, value) && std::isfinite(value)) return value;
+  Complain(what, word);
+  return 0.0;
+}
+
+float LogFields::Range() {
+  if (!problem_.empty()) return 0.0F;
+  const std::string_view word = Word("a range");
+  float value = 0.0F;
+  if (Parse(word, value)) return value;
+  Complain("a range", word);
+  return 0.0F;
+}
+
+int LogFields::Count(std::string_view what, int min, int max) {
+  if (!problem_.empty()) return 0;
+  const std::string_view word = Word(what);
+  int value = 0;
+  if (Parse(word, value) && value >= min && value <= max) return value;
+  Complain(what, word);
+  return 0;
+}
+
+Pose2 LogFields::Pose(std::string_view what) {
+  const std::string name(what);
+  Pose2 pose{Real(name + " x"), Real(name + " y"), 0.0};
+  const double theta = Real(name + " theta");
+  constexpr double kMaxTheta = 1e6;  // Beyond, a wrapped angle is noise.
+  if (std::abs(theta) > kMaxTheta) Complain(name + " theta", std::to_string(theta));
+  pose.theta = problem_.empty() ? WrapAngle(theta) : 0.0;
+  return pose;
+}
+
+Stamp LogFields::StampSeconds() {
+  if (!problem_.empty()) return 0;
+  const std::string_view word = Word("stamp");
+  if (const auto stamp = ParseStamp(word)) return *stamp;
+  Complain("stamp", word);
+  return 0;
+}
+
+void LogFields::End() {
+  if (!problem_.empty()) return;
+  constexpr std::string_view kBlanks = " \t\r";
+  const std::size_t begin = rest_.find_first_not_of(kBlanks);
+  if (begin != std::string_view::npos)
+    problem_ = "more fields than the message has: '" + Shown(rest_.substr(begin)) + "'";
+}
+
+}  // namespace cairn

@@ -1,0 +1,139 @@
+#include "common/sensor/log_message.h"
+
+#include <algorithm>
+
+#include "common/sensor/log_fields.h"
+
+namespace cairn {
+namespace {
+
+void ReadRanges(LogFields& fields, std::vector<float>& ranges) {
+  const int count = fields.Count("number of readings", 1, kMaxReadings);
+  // Each reading takes a blank and a digit at least: a short line cannot make us allocate for a long one.
+  ranges.reserve(std::min(static_cast<std::size_t>(count), fields.bytes_left() / 2));
+  for (int i = 0; i < count && fields.problem().empty(); ++i) ranges.push_back(fields.Range());
+}
+
+// The old messages do not say their layout. CARMEN's convention is 180 deg from the right, with one beam more than
+// steps where the count is odd (181, 361), and the last beam left out where it is even (180, 360).
+void SetHalfTurnLayout(LaserMessage& laser) {
+  const auto beams = static_cast<double>(laser.ranges_m.size());
+  const bool odd = laser.ranges_m.size() % 2 == 1;
+  laser.angle_first_rad = -kPi / 2;
+  laser.angle_step_rad = kPi / (odd && beams > 1 ? beams - 1 : beams);
+}
+
+void ReadTime(LogFields& fields, Stamp& stamp) {
+  stamp = fields.StampSeconds();
+  static_cast<void>(fields.Word("host name"));
+  fields.SkipReal("logger stamp");
+  fields.End();
+}
+
+LaserMessage ReadOldLaser(LogFields& fields, LaserKind kind) {
+  LaserMessage laser;
+  laser.kind = kind;
+  ReadRanges(fields, laser.ranges_m);
+  SetHalfTurnLayout(laser);
+  laser.T_odom_laser = fields.Pose("laser");
+  laser.T_odom_robot = fields.Pose("robot");
+  ReadTime(fields, laser.stamp);
+  return laser;
+}
+
+LaserMessage ReadNewLaser(LogFields& fields, LaserKind kind) {
+  LaserMessage laser;
+  laser.kind = kind;
+  fields.SkipReal("laser type");
+  laser.angle_first_rad = fields.Real("start angle");
+  const double field_of_view = fields.Real("field of view");
+  laser.angle_step_rad = fields.Real("angular resolution");
+  laser.stated_range_max_m = fields.Real("maximum range");
+  fields.SkipReal("accuracy");
+  fields.SkipReal("remission mode");
+  ReadRanges(fields, laser.ranges_m);
+  if (laser.angle_step_rad == 0.0 && laser.ranges_m.size() > 1) {
+    laser.angle_step_rad = field_of_view / static_cast<double>(laser.ranges_m.size() - 1);
+  }
+  const int remissions = fields.Count("number of remissions", 0, kMaxReadings);
+  for (int i = 0; i < remissions && fields.problem().empty(); ++i) static_cast<void>(fields.Range());
+  if (kind == LaserKind::kRobot) {
+    laser.T_odom_laser = fields.Pose("laser");
+    laser.T_odom_robot = fields.Pose("robot");
+    for (const char* what : {"tv", "rv", "forward safety", "side safety", "turn axis"}) fields.SkipReal(what);
+  }
+  ReadTime(fields, laser.stamp);
+  return laser;
+}
+
+LaserMessage ReadDpslamLaser(LogFields& fields) {
+  LaserMessage laser;
+  laser.kind = LaserKind::kDpslam;
+  ReadRanges(fields, laser.ranges_m);
+  SetHalfTurnLayout(laser);
+  fields.End();
+  return laser;
+}
+
+OdometryMessage ReadOdometry(LogFields& fields) {
+  OdometryMessage odometry;
+  odometry.T_odom_robot = fields.Pose("robot");
+  for (const char* what : {"tv", "rv", "acceleration"}) fields.SkipReal(what);
+  ReadTime(fields, odometry.stamp);
+  return odometry;
+}
+
+OdometryMessage ReadDpslamOdometry(LogFields& fields) {
+  OdometryMessage odometry;
+  odometry.dpslam = true;
+  odometry.T_odom_robot = fields.Pose("robot");
+  fields.End();
+  return odometry;
+}
+
+// PARAM, SYNC, TRUEPOS, SONAR, GPS_NMEA_GGA, ...
+bool LooksLikeMessageName(std::string_view word) {
+  constexpr std::size_t kLongest = 40;
+  return word.size() >= 2 && word.size() <= kLongest && word[0] >= 'A' && word[0] <= 'Z' &&
+         std::all_of(word.begin(), word.end(),
+                     [](char c) { return (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_'; });
+}
+
+template <typename Message>
+LogMessage Checked(const LogFields& fields, Message message) {
+  if (!fields.problem().empty()) return BadMessage{true, fields.problem()};
+  return message;
+}
+
+}  // namespace
+
+LogMessage ParseLogLine(std::string_view line) {
+  LogFields fields(line);
+  const std::string_view kind = fields.Word("message name");
+  if (kind.empty() || kind.front() == '#') return NoMessage{};
+  // One statement each: the fields must be read before their problem is looked at.
+  if (kind == "FLASER" || kind == "RLASER") {
+    auto laser = ReadOldLaser(fields, kind == "FLASER" ? LaserKind::kFront : LaserKind::kRear);
+    return Checked(fields, std::move(laser));
+  }
+  if (kind == "ROBOTLASER1" || kind == "RAWLASER1") {
+    auto laser = ReadNewLaser(fields, kind == "ROBOTLASER1" ? LaserKind::kRobot : LaserKind::kRaw);
+    return Checked(fields, std::move(laser));
+  }
+  if (kind == "Laser") {
+    auto laser = ReadDpslamLaser(fields);
+    return Checked(fields, std::move(laser));
+  }
+  if (kind == "ODOM") {
+    const auto odometry = ReadOdometry(fields);
+    return Checked(fields, odometry);
+  }
+  if (kind == "Odometry") {
+    const auto odometry = ReadDpslamOdometry(fields);
+    return Checked(fields, odometry);
+  }
+  if (LooksLikeMessageName(kind)) return IgnoredMessage{};
+  return BadMessage{false, "unknown message '" + Shown(kind) + "'"};
+}
+
+}  // namespace cairn

@@ -1,0 +1,41 @@
+// Reads a robot log in CARMEN format (ODOM, FLASER, RLASER and the newer ROBOTLASER1, RAWLASER1) or in DP-SLAM's own
+// (Odometry x y theta / Laser n r..., no stamps). The format is recognised from the content. Records come in file
+// order. A bad line is skipped with line number and reason; an unreadable file is an error.
+// Two passes: the first surveys the file (log_survey.h), the second emits.
+//
+// - FLASER n r_1..r_n  x y theta  odom_x odom_y odom_theta  stamp host logger_stamp yields an Odometry and a Scan with
+//   the same stamp (an ODOM of that stamp just before is not repeated). Field of view 180 deg, first beam at -90 deg,
+//   step 180/n for even n, 180/(n-1) for odd n (CARMEN's convention). T_robot_laser follows from laser and robot poses.
+// - ROBOTLASER1 likewise, layout and range limit from the message. RAWLASER1 has no poses: the Scan alone; where the
+//   file also holds ROBOTLASER1 the raw twins are ignored. So is a laser message that repeats another's stamp and
+//   count.
+// - range_max: options.no_return_m; else the limit a message states; else 80 m (a SICK's limit is 80 m, its answers
+//   above mean nothing hit); lowered to where saturated readings pile up. DP-SLAM: options.dpslam_range_max_m, lowered
+//   likewise.
+// - DP-SLAM logs have no stamps: a Laser and the Odometry before it share one, dpslam_scan_period_s after the last
+//   pair's; the first pair is stamped one period. LogReaderOptions carries laser offset and range.
+// Scans are not validated here (ValidateScan), sequence numbers are 0. Memory is bounded for files of any size.
+// Source: CARMEN logger message list; DP-SLAM README (Eliazar, Parr 2003).
+#pragma once
+
+#include <filesystem>
+#include <functional>
+
+#include "common/sensor/log_record.h"
+#include "common/status.h"
+
+namespace cairn {
+
+struct LogReaderOptions {
+  double no_return_m = 0.0;  // > 0: ranges at or above it hit nothing. 0: from the log's format and content.
+  double dpslam_laser_forward_m = 0.40;  // DP-SLAM logs: laser ahead of the robot's pivot.
+  double dpslam_range_max_m = 8.19;
+  double dpslam_scan_period_s = 0.2;  // DP-SLAM logs carry no time.
+};
+
+// The path must be a regular file (it is read twice). Calls `sink` for every record; a sink that returns false ends the
+// reading early.
+[[nodiscard]] Result<LogSummary> ReadLog(const std::filesystem::path& path, const LogReaderOptions& options,
+                                         const std::function<bool(LogRecord&&)>& sink);
+
+}  // namespace cairn

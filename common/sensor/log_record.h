@@ -1,0 +1,31 @@
+// One message of a robot log, whatever file format it came from.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/sensor/odometry.h"
+#include "common/sensor/scan.h"
+
+namespace cairn {
+
+using LogRecord = std::variant<Odometry, Scan>;
+
+// A line that could not be read: skipped, counted, and named.
+struct LogComplaint {
+  int line = 0;  // 1-based.
+  std::string reason;
+};
+
+struct LogSummary {
+  int scans = 0;
+  int odometries = 0;
+  int ignored = 0;                       // Messages of kinds that carry neither (PARAM, SYNC, ...).
+  std::vector<LogComplaint> complaints;  // The first 100.
+  int complaint_count = 0;
+  std::vector<std::string> notes;  // What was concluded from the content: range limit, mounting.
+};
+
+}  // namespace cairn

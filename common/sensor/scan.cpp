@@ -1,0 +1,63 @@
+#include "common/sensor/scan.h"
+
+#include <cmath>
+#include <string>
+
+namespace cairn {
+namespace {
+
+constexpr double kMaxMountingDistance = 100.0;  // m
+constexpr double kMaxPeriod = 1e4;              // s, of a beam or a scan.
+// A full turn computed as step * (beams - 1) in floating point may exceed 2 pi by rounding alone.
+constexpr double kSpanSlack = 1e-6;
+
+tl::unexpected<Status> Bad(const std::string& what, double value) {
+  return Fail(StatusCode::kInvalidArgument, what + " (" + std::to_string(value) + ")");
+}
+
+bool IsPeriod(double seconds) {
+  return std::isfinite(seconds) && seconds >= 0.0 && seconds <= kMaxPeriod;
+}
+
+Result<void> ValidateGeometry(const Scan& scan) {
+  if (!std::isfinite(scan.angle_first_rad)) return Bad("angle of the first beam is not finite", scan.angle_first_rad);
+  if (std::abs(scan.angle_first_rad) > 4.0 * kPi) return Bad("angle of the first beam", scan.angle_first_rad);
+  if (!std::isfinite(scan.angle_step_rad) || scan.angle_step_rad == 0.0) {
+    return Bad("angle step must be finite and not zero", scan.angle_step_rad);
+  }
+  const double span = std::abs(scan.angle_step_rad) * static_cast<double>(scan.ranges_m.size() - 1);
+  if (!(span <= 2.0 * kPi + kSpanSlack)) return Bad("field of view exceeds one turn", span);
+  if (!std::isfinite(scan.range_min_m) || scan.range_min_m < 0.0) return Bad("range_min", scan.range_min_m);
+  if (!std::isfinite(scan.range_max_m)) return Bad("range_max is not finite", scan.range_max_m);
+  if (scan.range_max_m <= scan.range_min_m) return Bad("range_max is not above range_min", scan.range_max_m);
+  if (!std::isfinite(scan.tilt_rad) || std::abs(scan.tilt_rad) >= kPi / 2) return Bad("tilt", scan.tilt_rad);
+  if (!scan.T_robot_laser.IsFinite()) return Fail(StatusCode::kInvalidArgument, "mounting is not finite");
+  const double distance = scan.T_robot_laser.translation().norm();
+  if (!(distance <= kMaxMountingDistance)) return Bad("mounting is too far from the robot, in m", distance);
+  return {};
+}
+
+}  // namespace
+
+BeamClass ClassifyRange(float range_m, double range_min_m, double range_max_m) {
+  const double range = range_m;
+  if (!(range > 0.0) || range < range_min_m) return BeamClass::kInvalid;
+  return range >= range_max_m ? BeamClass::kNoReturn : BeamClass::kHit;
+}
+
+Result<void> ValidateScan(const Scan& scan) {
+  if (scan.ranges_m.empty()) return Fail(StatusCode::kInvalidArgument, "no beams");
+  if (scan.ranges_m.size() > kMaxBeams) {
+    return Fail(StatusCode::kInvalidArgument,
+                std::to_string(scan.ranges_m.size()) + " beams, at most " + std::to_string(kMaxBeams));
+  }
+  if (const auto geometry = ValidateGeometry(scan); !geometry) return geometry;
+  if (!IsPeriod(scan.beam_period_s)) return Bad("beam period", scan.beam_period_s);
+  if (!IsPeriod(scan.scan_period_s)) return Bad("scan period", scan.scan_period_s);
+  for (const float range : scan.ranges_m) {
+    if (ClassifyRange(range, scan.range_min_m, scan.range_max_m) != BeamClass::kInvalid) return {};
+  }
+  return Fail(StatusCode::kInvalidArgument, "no beam has a usable range");
+}
+
+}  // namespace cairn

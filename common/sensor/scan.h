@@ -1,0 +1,40 @@
+// One sweep of a planar laser scanner, as a plain value. Frames: beams in `laser`, mounting T_robot_laser.
+// Not validated by construction: everything that arrives from a peer or a file passes ValidateScan first, and only
+// validated scans reach an estimator.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/geometry/pose2.h"
+#include "common/sensor/stamp.h"
+#include "common/status.h"
+
+namespace cairn {
+
+inline constexpr int kMaxBeams = 8192;
+
+struct Scan {
+  std::uint64_t sequence = 0;    // Per (robot, sensor), from 1, +1 per scan sent. 0: unnumbered.
+  Stamp stamp = 0;               // Of the first beam.
+  double angle_first_rad = 0.0;  // Direction of ranges_m[0] in `laser`.
+  double angle_step_rad = 0.0;   // Between beams; negative for a scanner that turns clockwise.
+  double range_min_m = 0.0;      // Shorter ranges are not measurements.
+  double range_max_m = 0.0;      // Ranges at or above it mean "nothing hit" up to there.
+  double beam_period_s = 0.0;    // Between beams; 0 where the whole scan is taken at once.
+  double scan_period_s = 0.0;    // Between scans; 0 where unknown.
+  double tilt_rad = 0.0;         // Of the scan plane about the laser's y axis.
+  Pose2 T_robot_laser;
+  std::vector<float> ranges_m;  // NaN, negative, zero, infinite allowed: see BeamClass.
+};
+
+// What one range says. Infinite and >= range_max is free space up to range_max; NaN, <= 0 or < range_min says nothing.
+enum class BeamClass : std::uint8_t { kHit, kNoReturn, kInvalid };
+[[nodiscard]] BeamClass ClassifyRange(float range_m, double range_min_m, double range_max_m);
+
+// Checks what an estimator relies on: 1..kMaxBeams beams; finite angles with a non-zero step and a span of at most one
+// turn; 0 <= range_min < range_max, finite; finite non-negative times, mounting within 100 m; |tilt| < pi/2; at least
+// one beam that is not kInvalid. Single bad ranges are normal and stay (kInvalid). Returns why not, naming the value.
+[[nodiscard]] Result<void> ValidateScan(const Scan& scan);
+
+}  // namespace cairn

@@ -1,0 +1,20 @@
+// Time as the sensors stamp it: nanoseconds since the Unix epoch (or any epoch a log uses), int64.
+#pragma once
+
+#include <cstdint>
+
+namespace cairn {
+
+using Stamp = std::int64_t;
+
+inline constexpr Stamp kNanosPerSecond = 1'000'000'000;
+
+// Rounds to the nearest nanosecond. `seconds` must be finite and within +-9.2e9.
+[[nodiscard]] constexpr Stamp StampFromSeconds(double seconds) {
+  return static_cast<Stamp>(seconds * 1e9 + (seconds < 0 ? -0.5 : 0.5));
+}
+[[nodiscard]] constexpr double SecondsFromStamp(Stamp stamp) {
+  return static_cast<double>(stamp) * 1e-9;
+}
+
+}  // namespace cairn

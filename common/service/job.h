@@ -1,0 +1,36 @@
+// Work the server does on the side: it has an id, a state, a progress and a result, and can be cancelled.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "common/sensor/stamp.h"
+#include "common/service/names.h"
+
+namespace cairn {
+
+enum class JobKind : std::uint8_t { kSmooth = 0, kExport, kRelocalise };
+enum class JobState : std::uint8_t { kQueued = 0, kRunning, kSucceeded, kFailed, kCancelled };
+[[nodiscard]] std::string_view JobKindName(JobKind kind);
+[[nodiscard]] std::string_view JobStateName(JobState state);
+[[nodiscard]] constexpr bool IsFinal(JobState state) {
+  return state >= JobState::kSucceeded;
+}
+
+struct Job {
+  std::uint64_t id = 0;
+  std::string site;
+  JobKind kind = JobKind::kSmooth;
+  JobState state = JobState::kQueued;
+  double progress = 0.0;     // 0..1.
+  double cost_before = 0.0;  // Meaning per kind; smoothing: mean squared disagreement of scans and map, m^2.
+  double cost_after = 0.0;
+  std::uint32_t map_version = 0;  // What it published; 0 while none.
+  Stamp submitted = 0;            // Server clock.
+  Stamp started = 0;
+  Stamp ended = 0;
+  std::string message;
+};
+
+}  // namespace cairn

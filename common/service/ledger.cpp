@@ -1,0 +1,20 @@
+#include "common/service/ledger.h"
+
+#include <array>
+#include <numeric>
+
+namespace cairn {
+
+std::string_view DropReasonName(DropReason reason) {
+  static constexpr std::array<std::string_view, kDropReasonCount> kNames = {
+      "no_odometry", "duplicate_stamp", "stamp_went_back", "stamp_jump", "bad_geometry", "too_many_beams",
+      "empty",       "no_session",      "not_owner",       "queue_full", "lost_on_wire", "session_ended"};
+  const auto index = static_cast<std::size_t>(reason);
+  return index < kNames.size() ? kNames[index] : "unknown";
+}
+
+std::uint64_t Ledger::dropped_total() const {
+  return std::accumulate(dropped.begin(), dropped.end(), std::uint64_t{0});
+}
+
+}  // namespace cairn

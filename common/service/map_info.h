@@ -1,0 +1,33 @@
+// What a site's map is at one moment, and the versions it can be switched to.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/service/names.h"
+
+namespace cairn {
+
+struct MapVersionInfo {
+  std::uint32_t version = 0;  // 1: the live map since the site began. Jobs add more.
+  bool enabled = false;
+  std::uint64_t job = 0;  // The job that made it; 0 for the live map.
+  std::string note;
+};
+
+struct MapInfo {
+  NameId site_id = 0;
+  std::string site;
+  double resolution_m = 0.05;  // Of level 0.
+  std::uint32_t epoch = 0;     // Wholesale changes so far; tiles of older epochs are void.
+  std::uint64_t version = 0;   // Highest tile version.
+  std::uint32_t levels = 0;
+  std::uint32_t tile_count = 0;                               // Level 0.
+  double x_min_m = 0, y_min_m = 0, x_max_m = 0, y_max_m = 0;  // Bounds of level-0 tiles; all 0 while empty.
+  std::uint32_t robots = 0;                                   // Sessions in the site.
+  std::uint32_t enabled_version = 1;
+  std::vector<MapVersionInfo> versions;
+};
+
+}  // namespace cairn

@@ -1,0 +1,40 @@
+// The server's current estimate of where a robot is.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "common/geometry/pose2.h"
+#include "common/sensor/stamp.h"
+#include "common/service/names.h"
+
+namespace cairn {
+
+enum class PoseReason : std::uint8_t {
+  kTracking = 0,  // Scans match.
+  kOdometryOnly,  // The last scans did not match; pose by odometry.
+  kDegenerate,    // One direction is not seen (corridor): odometry along it.
+  kLost,          // Too far by odometry alone, or the estimate contradicts the scans.
+  kDiverged,      // The filter failed numerically and was restarted from its last good state.
+  kWaiting,       // No scan used yet.
+};
+[[nodiscard]] std::string_view PoseReasonName(PoseReason reason);
+
+struct PoseReport {
+  NameId robot_id = 0;
+  std::string robot;
+  std::string site;
+  Stamp stamp = 0;
+  std::uint64_t scan_sequence = 0;  // The scan this pose belongs to; 0 for an interpolated answer.
+  Pose2 T_map_robot;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // Of (x, y, theta) in map.
+  Pose2 T_map_odom;
+  bool localized = false;
+  double score = 0.0;  // 0..1: share of the scan explained by the map.
+  PoseReason reason = PoseReason::kWaiting;
+  std::uint32_t map_epoch = 0;
+};
+
+}  // namespace cairn

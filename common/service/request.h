@@ -1,0 +1,98 @@
+// A question to the server and its answer, as plain values: what queries/ answers and what wire/ carries.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/geometry/pose2.h"
+#include "common/map/tile.h"
+#include "common/sensor/trajectory.h"
+#include "common/service/job.h"
+#include "common/service/ledger.h"
+#include "common/service/map_info.h"
+#include "common/service/pose_report.h"
+#include "common/service/session.h"
+#include "common/status.h"
+
+namespace cairn {
+
+enum class RequestKind : std::uint8_t {
+  kPing = 0,
+  kPose,        // robot; stamp or latest.
+  kPath,        // robot; smoothed or live.
+  kTiles,       // site; area, level, since_epoch + since_version.
+  kLandmarks,   // site.
+  kMapInfo,     // site, or all where empty.
+  kStatus,      // Ledgers and session states; robot or all.
+  kJobSubmit,   // site, job_kind, enable.
+  kJobGet,      // job.
+  kJobCancel,   // job.
+  kJobList,     // site or all.
+  kSessionEnd,  // robot.
+  kMapEnable,   // site, map_version (an older version: roll back).
+};
+inline constexpr int kRequestKindCount = 13;
+[[nodiscard]] std::string_view RequestKindName(RequestKind kind);
+
+struct Area {
+  double x_min_m = 0, y_min_m = 0, x_max_m = 0, y_max_m = 0;  // All 0: everywhere.
+};
+
+struct Request {
+  ClientId client = 0;
+  std::int64_t sequence = 0;
+  RequestKind kind = RequestKind::kPing;
+  std::string site;
+  std::string robot;
+  bool latest = true;             // kPose.
+  Stamp stamp = 0;                // kPose, where not latest.
+  bool smoothed = false;          // kPath.
+  Area area;                      // kTiles, kLandmarks.
+  std::uint32_t level = 0;        // kTiles.
+  std::uint32_t since_epoch = 0;  // kTiles: a different epoch than the map's means "send all".
+  std::uint64_t since_version = 0;
+  std::uint64_t job = 0;
+  JobKind job_kind = JobKind::kSmooth;
+  bool enable = true;             // kJobSubmit: enable the map version it makes.
+  std::uint32_t map_version = 0;  // kMapEnable.
+};
+
+struct LandmarkReport {
+  std::uint64_t id = 0;
+  std::string robot;
+  bool corner = false;  // Else the midpoint of a line ended on both sides.
+  Eigen::Vector2d p_map = Eigen::Vector2d::Zero();
+  double direction_rad = 0.0;
+  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
+  std::uint32_t sightings = 0;
+};
+
+// A robot's session as `cairn status` shows it.
+struct RobotStatus {
+  SessionState session;
+  bool alive = false;  // The client's liveliness lease holds.
+  PoseReport pose;
+  std::vector<Ledger> ledgers;  // One per sensor.
+};
+
+// Large answers come in parts of < 64 KB each, `part` from 0; the one with `last` ends them.
+struct Reply {
+  ClientId client = 0;
+  std::int64_t sequence = 0;
+  std::uint32_t part = 0;
+  bool last = true;
+  Status status;  // kNotFound, kUnavailable ("not yet"), kOutOfRange ("never"), ...
+  std::uint32_t map_epoch = 0;
+  std::uint64_t map_version = 0;
+  std::vector<PoseReport> poses;
+  Trajectory path;
+  std::vector<Tile> tiles;
+  std::vector<LandmarkReport> landmarks;
+  std::vector<MapInfo> maps;
+  std::vector<RobotStatus> robots;
+  std::vector<Job> jobs;
+  std::string server_version;  // kPing.
+};
+
+}  // namespace cairn

@@ -1,0 +1,66 @@
+#include "common/wire/bus.h"
+
+#include "common/wire/participant.h"
+#include "common/wire/publication.h"
+#include "common/wire/subscription.h"
+
+namespace cairn::wire {
+namespace {
+
+class DdsBus final : public Bus {
+ public:
+  explicit DdsBus(std::shared_ptr<Participant> participant) : participant_(std::move(participant)) {}
+  [[nodiscard]] const std::shared_ptr<Participant>& participant() const { return participant_; }
+  const WireOptions& options() const override { return participant_->options(); }
+  std::uint64_t datagrams_refused() const override { return participant_->datagrams_refused(); }
+
+ private:
+  const std::shared_ptr<Participant> participant_;
+};
+
+// Create makes nothing else.
+const std::shared_ptr<Participant>& ParticipantOf(const Bus& bus) {
+  return static_cast<const DdsBus&>(bus).participant();
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Bus>> Bus::Create(const WireOptions& options, const std::string& name) {
+  Result<std::shared_ptr<Participant>> participant = Participant::Create(options, name);
+  if (!participant) return tl::unexpected(participant.error());
+  return std::make_unique<DdsBus>(std::move(*participant));
+}
+
+template <typename Value>
+Result<std::unique_ptr<Publication<Value>>> Bus::Advertise() {
+  return DdsPublication<Value>::Make(ParticipantOf(*this));
+}
+
+template <typename Value>
+Result<std::unique_ptr<Subscription>> Bus::Subscribe(std::function<void(Value&&)> on_value, SubscriptionEvents events) {
+  return DdsSubscription<Value>::Make(ParticipantOf(*this), std::move(on_value), std::move(events));
+}
+
+Result<std::unique_ptr<Subscription>> Bus::SubscribeReplies(ClientId client, std::function<void(Reply&&)> on_value,
+                                                            SubscriptionEvents events) {
+  return DdsSubscription<Reply>::Make(ParticipantOf(*this), std::move(on_value), std::move(events), client);
+}
+
+#define CAIRN_WIRE_VALUE(Value)                                                                       \
+  template Result<std::unique_ptr<Publication<Value>>> Bus::Advertise<Value>();                       \
+  template Result<std::unique_ptr<Subscription>> Bus::Subscribe<Value>(std::function<void(Value &&)>, \
+                                                                       SubscriptionEvents)
+CAIRN_WIRE_VALUE(SessionRequest);
+CAIRN_WIRE_VALUE(SessionState);
+CAIRN_WIRE_VALUE(ScanSample);
+CAIRN_WIRE_VALUE(OdometrySample);
+CAIRN_WIRE_VALUE(PoseReport);
+CAIRN_WIRE_VALUE(Ledger);
+CAIRN_WIRE_VALUE(MapInfo);
+CAIRN_WIRE_VALUE(TileSample);
+CAIRN_WIRE_VALUE(Job);
+CAIRN_WIRE_VALUE(Request);
+CAIRN_WIRE_VALUE(Reply);
+#undef CAIRN_WIRE_VALUE
+
+}  // namespace cairn::wire

@@ -1,0 +1,91 @@
+// The DDS domain as typed publications and subscriptions of Cairn's plain values: participants, topics, QoS and the
+// conversion from and to IDL types live behind this header, and nothing else of the project includes a DDS header.
+// What arrives is only converted: lengths and enums are bounded (out of range: the sample is dropped and counted under
+// refused()), contents are validated by the receiver.
+// Thread rule: a Bus and what it makes may be used from any thread; Publish may be called concurrently. Subscription
+// callbacks and events run on a thread of the subscription's own, one at a time and in order; while one runs, its topic
+// waits, so they only convert, push and return.
+// Source of the choices: the measured notes on Fast DDS 2.9 in idl/README.md.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/options/option_visitor.h"
+#include "common/service/request.h"
+#include "common/service/stream.h"
+#include "common/status.h"
+
+namespace cairn::wire {
+
+struct WireOptions {
+  std::int64_t domain = 0;
+  std::vector<std::string> interfaces = {"127.0.0.1"};  // Addresses to bind; never all of them by accident.
+  double liveliness_lease_s = 1.0;
+  double participant_lease_s = 3.0;
+};
+// Domain, addresses (IPv4, present on this machine) and leases.
+[[nodiscard]] Result<void> Validate(const WireOptions& options);
+void Visit(OptionVisitor& visitor, WireOptions& options);  // `interfaces` as one comma-separated text.
+
+template <typename Value>
+class Publication {
+ public:
+  using ValueType = Value;
+  virtual ~Publication() = default;
+  // kOutOfRange where the value exceeds the wire's limits (limits.h), kUnavailable where the middleware did not take it
+  // within its bounded blocking time.
+  [[nodiscard]] virtual Result<void> Publish(const Value& value) = 0;
+  // Waits until every matched subscription has acknowledged everything, or the deadline passes (false).
+  [[nodiscard]] virtual bool WaitForAcknowledgement(std::chrono::milliseconds deadline) = 0;
+  // Peers of the same topic, type name and QoS. Says nothing of their data representation.
+  [[nodiscard]] virtual int matched() const = 0;
+};
+
+struct SubscriptionEvents {
+  std::function<void(int lost_total)> lost;  // Samples lost on the wire.
+  // SessionRequest only: the writer whose last request named `client` let its lease run out or went away (false), or is
+  // heard again (true).
+  std::function<void(ClientId client, bool alive)> liveliness;
+  std::function<void(const std::string& policy)> incompatible_qos;  // A peer that will never match.
+  std::function<void(int matched)> matched;                         // The number of publications changed.
+};
+
+class Subscription {
+ public:
+  virtual ~Subscription() = default;  // Returns after the last callback; not to be called from one.
+  [[nodiscard]] virtual int matched() const = 0;
+  [[nodiscard]] virtual std::uint64_t refused() const = 0;  // Samples that did not decode or exceed the limits.
+};
+
+// Value is one of: SessionRequest, SessionState, ScanSample, OdometrySample, PoseReport, Ledger, MapInfo, TileSample,
+// Job, Request, Reply.
+// Publications and subscriptions may outlive the Bus that made them.
+class Bus {
+ public:
+  virtual ~Bus() = default;
+  [[nodiscard]] static Result<std::unique_ptr<Bus>> Create(const WireOptions& options, const std::string& name);
+
+  template <typename Value>
+  [[nodiscard]] Result<std::unique_ptr<Publication<Value>>> Advertise();
+  template <typename Value>
+  [[nodiscard]] Result<std::unique_ptr<Subscription>> Subscribe(std::function<void(Value&&)> on_value,
+                                                                SubscriptionEvents events = {});
+  // As Subscribe<Reply>, but replies to other clients are skipped before they are decoded.
+  [[nodiscard]] Result<std::unique_ptr<Subscription>> SubscribeReplies(ClientId client,
+                                                                       std::function<void(Reply&&)> on_value,
+                                                                       SubscriptionEvents events = {});
+
+  [[nodiscard]] virtual const WireOptions& options() const = 0;
+  // Datagrams that were no sound RTPS and were kept from the middleware.
+  [[nodiscard]] virtual std::uint64_t datagrams_refused() const = 0;
+
+ protected:
+  Bus() = default;
+};
+
+}  // namespace cairn::wire

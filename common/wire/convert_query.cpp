@@ -1,0 +1,171 @@
+#include <utility>
+
+#include "common/wire/convert.h"
+
+namespace cairn::wire {
+// The parts of a reply. In the namespace itself, not an unnamed one: the lists below look all overloads up together.
+static v1::StampedPose ToWire(const StampedPose& value) {
+  v1::StampedPose wire;
+  wire.stamp_ns(value.stamp);
+  wire.T_map_robot(ToWire(value.T_map_robot));
+  return wire;
+}
+static StampedPose FromWire(v1::StampedPose&& wire) {
+  return {wire.stamp_ns(), FromWire(wire.T_map_robot())};
+}
+
+static v1::TileRecord ToWire(const Tile& value) {
+  v1::TileRecord wire;
+  wire.level(value.key.level);
+  wire.x(value.key.x);
+  wire.y(value.key.y);
+  wire.content(ContentToWire(value));
+  return wire;
+}
+static Tile FromWire(v1::TileRecord&& wire) {
+  Tile value;
+  value.key = {wire.level(), wire.x(), wire.y()};
+  ContentFromWire(std::move(wire.content()), value);
+  return value;
+}
+
+static v1::Landmark ToWire(const LandmarkReport& value) {
+  v1::Landmark wire;
+  wire.id(value.id);
+  wire.robot(value.robot);
+  wire.corner(value.corner);
+  wire.x_m(value.p_map.x());
+  wire.y_m(value.p_map.y());
+  wire.direction_rad(value.direction_rad);
+  wire.covariance({value.covariance(0, 0), value.covariance(0, 1), value.covariance(1, 0), value.covariance(1, 1)});
+  wire.sightings(value.sightings);
+  return wire;
+}
+static LandmarkReport FromWire(v1::Landmark&& wire) {
+  LandmarkReport value;
+  value.id = wire.id();
+  value.robot = std::move(wire.robot());
+  value.corner = wire.corner();
+  value.p_map = {wire.x_m(), wire.y_m()};
+  value.direction_rad = wire.direction_rad();
+  const auto& covariance = wire.covariance();
+  value.covariance << covariance[0], covariance[1], covariance[2], covariance[3];
+  value.sightings = wire.sightings();
+  return value;
+}
+
+static v1::RobotStatus ToWire(const RobotStatus& value) {
+  v1::RobotStatus wire;
+  wire.session(ToWire(value.session));
+  wire.alive(value.alive);
+  wire.pose(ToWire(value.pose));
+  for (const Ledger& ledger : value.ledgers) wire.ledgers().push_back(ToWire(ledger));
+  return wire;
+}
+static RobotStatus FromWire(v1::RobotStatus&& wire) {
+  RobotStatus value;
+  value.session = FromWire(std::move(wire.session()));
+  value.alive = wire.alive();
+  value.pose = FromWire(std::move(wire.pose()));
+  for (v1::Ledger& ledger : wire.ledgers()) value.ledgers.push_back(FromWire(std::move(ledger)));
+  return value;
+}
+
+// Both directions of a list, element by element.
+template <typename Wires, typename Values>
+static void ListToWire(const Values& values, Wires& wires) {
+  wires.reserve(values.size());
+  for (const auto& value : values) wires.push_back(ToWire(value));
+}
+template <typename Wires, typename Values>
+static void ListFromWire(Wires&& wires, Values& values) {
+  values.reserve(wires.size());
+  for (auto& wire : wires) values.push_back(FromWire(std::move(wire)));
+}
+
+v1::Request ToWire(const Request& value) {
+  v1::Request wire;
+  wire.client(value.client);
+  wire.seq(value.sequence);
+  wire.kind(static_cast<v1::RequestKind>(value.kind));
+  wire.site(value.site);
+  wire.robot(value.robot);
+  wire.latest(value.latest);
+  wire.stamp_ns(value.stamp);
+  wire.smoothed(value.smoothed);
+  wire.area().x_min_m(value.area.x_min_m);
+  wire.area().y_min_m(value.area.y_min_m);
+  wire.area().x_max_m(value.area.x_max_m);
+  wire.area().y_max_m(value.area.y_max_m);
+  wire.level(value.level);
+  wire.since_epoch(value.since_epoch);
+  wire.since_version(value.since_version);
+  wire.job(value.job);
+  wire.job_kind(static_cast<v1::JobKind>(value.job_kind));
+  wire.enable(value.enable);
+  wire.map_version(value.map_version);
+  return wire;
+}
+
+Request FromWire(v1::Request&& wire) {
+  Request value;
+  value.client = wire.client();
+  value.sequence = wire.seq();
+  value.kind = static_cast<RequestKind>(wire.kind());
+  value.site = std::move(wire.site());
+  value.robot = std::move(wire.robot());
+  value.latest = wire.latest();
+  value.stamp = wire.stamp_ns();
+  value.smoothed = wire.smoothed();
+  value.area = {wire.area().x_min_m(), wire.area().y_min_m(), wire.area().x_max_m(), wire.area().y_max_m()};
+  value.level = wire.level();
+  value.since_epoch = wire.since_epoch();
+  value.since_version = wire.since_version();
+  value.job = wire.job();
+  value.job_kind = static_cast<JobKind>(wire.job_kind());
+  value.enable = wire.enable();
+  value.map_version = wire.map_version();
+  return value;
+}
+
+v1::Reply ToWire(const Reply& value) {
+  v1::Reply wire;
+  wire.client(value.client);
+  wire.seq(value.sequence);
+  wire.part(value.part);
+  wire.last(value.last);
+  wire.status(ToWire(value.status));
+  wire.map_epoch(value.map_epoch);
+  wire.map_version(value.map_version);
+  ListToWire(value.poses, wire.poses());
+  ListToWire(value.path, wire.path());
+  ListToWire(value.tiles, wire.tiles());
+  ListToWire(value.landmarks, wire.landmarks());
+  ListToWire(value.maps, wire.maps());
+  ListToWire(value.robots, wire.robots());
+  ListToWire(value.jobs, wire.jobs());
+  wire.server_version(value.server_version);
+  return wire;
+}
+
+Reply FromWire(v1::Reply&& wire) {
+  Reply value;
+  value.client = wire.client();
+  value.sequence = wire.seq();
+  value.part = wire.part();
+  value.last = wire.last();
+  value.status = FromWire(std::move(wire.status()));
+  value.map_epoch = wire.map_epoch();
+  value.map_version = wire.map_version();
+  ListFromWire(wire.poses(), value.poses);
+  ListFromWire(wire.path(), value.path);
+  ListFromWire(wire.tiles(), value.tiles);
+  ListFromWire(wire.landmarks(), value.landmarks);
+  ListFromWire(wire.maps(), value.maps);
+  ListFromWire(wire.robots(), value.robots);
+  ListFromWire(wire.jobs(), value.jobs);
+  value.server_version = std::move(wire.server_version());
+  return value;
+}
+
+}  // namespace cairn::wire

@@ -1,0 +1,68 @@
+#include "common/wire/guard_transport.h"
+
+#include <fastdds/rtps/network/SenderResource.h>
+#include <fastdds/rtps/transport/ChainingTransport.h>
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+
+#include "common/wire/rtps_datagram.h"
+
+namespace cairn::wire {
+namespace {
+
+namespace transport = eprosima::fastdds::rtps;
+namespace rtps = eprosima::fastrtps::rtps;
+
+struct GuardDescriptor : transport::ChainingTransportDescriptor {
+  GuardDescriptor(std::shared_ptr<transport::TransportDescriptorInterface> udp,
+                  std::shared_ptr<std::atomic<std::uint64_t>> counter)
+      : ChainingTransportDescriptor(std::move(udp)), refused(std::move(counter)) {}
+  transport::TransportInterface* create_transport() const override;
+
+  std::shared_ptr<std::atomic<std::uint64_t>> refused;
+};
+
+class GuardTransport : public transport::ChainingTransport {
+ public:
+  explicit GuardTransport(const GuardDescriptor& descriptor)
+      : ChainingTransport(descriptor), descriptor_(descriptor), refused_(descriptor.refused) {}
+
+  transport::TransportDescriptorInterface* get_configuration() override { return &descriptor_; }
+
+  bool send(rtps::SenderResource* udp, const rtps::octet* bytes, std::uint32_t size, transport::LocatorsIterator* begin,
+            transport::LocatorsIterator* end, const std::chrono::steady_clock::time_point& timeout) override {
+    return udp->send(bytes, size, begin, end, timeout);
+  }
+
+  void receive(transport::TransportReceiverInterface* next, const rtps::octet* bytes, std::uint32_t size,
+               const rtps::Locator_t& local, const rtps::Locator_t& remote) override {
+    if (InspectDatagram({bytes, size}, gate_) == DatagramFault::kNone) {
+      next->OnDataReceived(bytes, size, local, remote);
+    } else {
+      refused_->fetch_add(1, std::memory_order_relaxed);
+    }
+  }
+
+ private:
+  GuardDescriptor descriptor_;
+  std::shared_ptr<std::atomic<std::uint64_t>> refused_;
+  SequenceGate gate_;
+};
+
+transport::TransportInterface* GuardDescriptor::create_transport() const {
+  return new GuardTransport(*this);  // Fast DDS takes ownership.
+}
+
+}  // namespace
+
+std::shared_ptr<transport::TransportDescriptorInterface> MakeGuardedUdp(
+    const std::vector<std::string>& interfaces, std::shared_ptr<std::atomic<std::uint64_t>> refused) {
+  // Bursts of tiles and replies outrun a default socket buffer; the kernel caps this at its own limit.
+  constexpr std::uint32_t kSocketBufferBytes = 4 * 1024 * 1024;
+  auto udp = std::make_shared<transport::UDPv4TransportDescriptor>();
+  udp->interfaceWhiteList = interfaces;
+  udp->sendBufferSize = kSocketBufferBytes;
+  udp->receiveBufferSize = kSocketBufferBytes;
+  return std::make_shared<GuardDescriptor>(std::move(udp), std::move(refused));
+}
+
+}  // namespace cairn::wire

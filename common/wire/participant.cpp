@@ -1,0 +1,155 @@
+#include "common/wire/participant.h"
+
+#include <fastrtps/attributes/LibrarySettingsAttributes.h>
+#include <fastrtps/xmlparser/XMLProfileManager.h>
+
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/log/Log.hpp>
+#include <mutex>
+
+#include "common/wire/guard_transport.h"
+
+#ifdef CAIRN_ADDRESS_SANITIZER
+// Fast DDS 2.9 deletes an object of its own under another size (RTPSWriter::~RTPSWriter); the address sanitizer would
+// end every program at the end of its first publication. All other checks stay on; ASAN_OPTIONS can switch this one
+// back.
+extern "C" const char* __asan_default_options() {
+  return "new_delete_type_mismatch=0";
+}
+#endif
+
+namespace cairn::wire {
+namespace {
+
+namespace rtps = eprosima::fastrtps::rtps;
+using eprosima::fastrtps::Duration_t;
+using eprosima::fastrtps::types::ReturnCode_t;
+
+// A library of its own must not print; and what peers can provoke must not fill a disk. Errors become values below.
+void ConfigureLibraryOnce() {
+  static std::once_flag once;
+  std::call_once(once, [] {
+    fd::Log::ClearConsumers();
+    fd::Log::SetVerbosity(fd::Log::Kind::Error);
+    // Within one process a full reader would lose samples for good (measured): always go through the socket.
+    eprosima::fastrtps::LibrarySettingsAttributes settings;
+    settings.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;
+    eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
+  });
+}
+
+fd::DomainParticipantQos ParticipantQos(const WireOptions& options, const std::string& name,
+                                        const std::shared_ptr<std::atomic<std::uint64_t>>& refused) {
+  fd::DomainParticipantQos qos;
+  qos.name(name);
+  qos.transport().use_builtin_transports = false;
+  qos.transport().user_transports.push_back(MakeGuardedUdp(options.interfaces, refused));
+  auto& builtin = qos.wire_protocol().builtin;
+  builtin.discovery_config.leaseDuration = Duration_t(options.participant_lease_s);
+  builtin.discovery_config.leaseDuration_announcementperiod = Duration_t(options.participant_lease_s / 3.0);
+  builtin.readerHistoryMemoryPolicy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+  builtin.writerHistoryMemoryPolicy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+  return qos;
+}
+
+// What both ends of a topic share. Every limit is set: the defaults hold 10 instances and refuse the next in silence.
+template <typename Qos>
+void SetCommon(const TopicProfile& profile, int depth, const WireOptions& options, Qos& qos) {
+  qos.reliability().kind = fd::RELIABLE_RELIABILITY_QOS;
+  qos.reliability().max_blocking_time = Duration_t(0.1);
+  qos.durability().kind = profile.transient_local ? fd::TRANSIENT_LOCAL_DURABILITY_QOS : fd::VOLATILE_DURABILITY_QOS;
+  qos.history().kind = fd::KEEP_LAST_HISTORY_QOS;
+  qos.history().depth = depth;
+  qos.resource_limits().max_instances = profile.max_instances;
+  qos.resource_limits().max_samples_per_instance = depth;
+  qos.resource_limits().max_samples = profile.max_instances * depth;
+  qos.resource_limits().allocated_samples = 1;
+  qos.data_sharing().off();
+  // Samples differ much in size; the other policies would keep the largest for each slot (measured: 7 times as much).
+  qos.endpoint().history_memory_policy = rtps::DYNAMIC_RESERVE_MEMORY_MODE;
+  if (profile.leased) {
+    qos.liveliness().kind = fd::AUTOMATIC_LIVELINESS_QOS;
+    qos.liveliness().lease_duration = Duration_t(options.liveliness_lease_s);
+    qos.liveliness().announcement_period = Duration_t(options.liveliness_lease_s / 3.0);
+  }
+}
+
+Status Broken(const std::string& what) {
+  return {StatusCode::kInternal, "Fast DDS refused to make " + what};
+}
+
+}  // namespace
+
+Result<std::shared_ptr<Participant>> Participant::Create(const WireOptions& options, const std::string& name) {
+  if (const Result<void> valid = Validate(options); !valid) return tl::unexpected(valid.error());
+  ConfigureLibraryOnce();
+  const std::shared_ptr<Participant> made(new Participant(options));
+  made->participant_ = fd::DomainParticipantFactory::get_instance()->create_participant(
+      static_cast<fd::DomainId_t>(options.domain), ParticipantQos(options, name, made->datagrams_refused_), nullptr,
+      fd::StatusMask::none());
+  if (made->participant_ == nullptr) {
+    return Fail(StatusCode::kUnavailable, "cannot join DDS domain " + std::to_string(options.domain) +
+                                              ": no free port or address, or the domain is full");
+  }
+  made->publisher_ = made->participant_->create_publisher(fd::PUBLISHER_QOS_DEFAULT);
+  made->subscriber_ = made->participant_->create_subscriber(fd::SUBSCRIBER_QOS_DEFAULT);
+  if (made->publisher_ == nullptr || made->subscriber_ == nullptr) return tl::unexpected(Broken("a publisher"));
+  return made;
+}
+
+Participant::~Participant() {
+  if (participant_ == nullptr) return;
+  participant_->delete_contained_entities();
+  fd::DomainParticipantFactory::get_instance()->delete_participant(participant_);
+}
+
+Result<fd::Topic*> Participant::FindTopic(const TopicProfile& profile, const fd::TypeSupport& type) {
+  const MutexLock lock(mutex_);
+  if (const auto known = topics_.find(profile.name); known != topics_.end()) return known->second;
+  if (type.register_type(participant_) != ReturnCode_t::RETCODE_OK) {
+    return tl::unexpected(Broken(std::string("type ") + type.get_type_name()));
+  }
+  fd::Topic* topic = participant_->create_topic(profile.name, type.get_type_name(), fd::TOPIC_QOS_DEFAULT);
+  if (topic == nullptr) return tl::unexpected(Broken(std::string("topic ") + profile.name));
+  topics_.emplace(profile.name, topic);
+  return topic;
+}
+
+Result<Participant::Writer> Participant::MakeWriter(const TopicProfile& profile, const fd::TypeSupport& type,
+                                                    fd::DataWriterListener* listener) {
+  const Result<fd::Topic*> topic = FindTopic(profile, type);
+  if (!topic) return tl::unexpected(topic.error());
+  fd::DataWriterQos qos;
+  SetCommon(profile, profile.writer_depth, options_, qos);
+  qos.publish_mode().kind = fd::SYNCHRONOUS_PUBLISH_MODE;
+  auto& times = qos.reliable_writer_qos().times;
+  times.initialHeartbeatDelay = Duration_t(0.01);
+  times.heartbeatPeriod = Duration_t(profile.heartbeat_ms * 1e-3);
+  times.nackResponseDelay = Duration_t(0.002);
+  if (profile.deadline_s > 0) qos.deadline().period = Duration_t(profile.deadline_s);
+  fd::DataWriter* writer = publisher_->create_datawriter(*topic, qos, listener);
+  if (writer == nullptr) return tl::unexpected(Broken(std::string("a writer of ") + profile.name));
+  return Writer(writer, WriterDeleter{shared_from_this()});
+}
+
+Result<Participant::Reader> Participant::MakeReader(const TopicProfile& profile, const fd::TypeSupport& type,
+                                                    fd::DataReaderListener* listener) {
+  const Result<fd::Topic*> topic = FindTopic(profile, type);
+  if (!topic) return tl::unexpected(topic.error());
+  fd::DataReaderQos qos;
+  SetCommon(profile, profile.reader_depth, options_, qos);
+  qos.reliable_reader_qos().times.heartbeatResponseDelay = Duration_t(0.001);
+  fd::DataReader* reader = subscriber_->create_datareader(*topic, qos, listener);
+  if (reader == nullptr) return tl::unexpected(Broken(std::string("a reader of ") + profile.name));
+  return Reader(reader, ReaderDeleter{shared_from_this()});
+}
+
+void Participant::WriterDeleter::operator()(fd::DataWriter* writer) const {
+  participant->publisher_->delete_datawriter(writer);
+}
+
+void Participant::ReaderDeleter::operator()(fd::DataReader* reader) const {
+  participant->subscriber_->delete_datareader(reader);
+}
+
+}  // namespace cairn::wire

@@ -1,0 +1,69 @@
+// The one file that makes DDS entities: the participant of a Bus, and the topics, writers and readers on it, with every
+// transport and QoS choice of idl/README.md. Nothing of it is left to a default or to a profile file.
+// Thread-safe. Fast DDS 2.x API: stays inside common/wire.
+#pragma once
+
+#include <atomic>
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/publisher/DataWriterListener.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/subscriber/DataReader.hpp>
+#include <fastdds/dds/subscriber/DataReaderListener.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <fastdds/dds/topic/Topic.hpp>
+#include <fastdds/dds/topic/TypeSupport.hpp>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "common/mutex.h"
+#include "common/wire/bus.h"
+#include "common/wire/topics.h"
+
+namespace cairn::wire {
+
+namespace fd = eprosima::fastdds::dds;  // `namespace dds` is taken by a Fast DDS header.
+
+class Participant : public std::enable_shared_from_this<Participant> {
+ public:
+  struct WriterDeleter {
+    std::shared_ptr<Participant> participant;
+    void operator()(fd::DataWriter* writer) const;
+  };
+  struct ReaderDeleter {
+    std::shared_ptr<Participant> participant;
+    void operator()(fd::DataReader* reader) const;
+  };
+  using Writer = std::unique_ptr<fd::DataWriter, WriterDeleter>;
+  using Reader = std::unique_ptr<fd::DataReader, ReaderDeleter>;
+
+  [[nodiscard]] static Result<std::shared_ptr<Participant>> Create(const WireOptions& options, const std::string& name);
+  ~Participant();
+  Participant(const Participant&) = delete;
+  Participant& operator=(const Participant&) = delete;
+
+  // The listener is called from creation until the entity is deleted, and must outlive it.
+  [[nodiscard]] Result<Writer> MakeWriter(const TopicProfile& profile, const fd::TypeSupport& type,
+                                          fd::DataWriterListener* listener);
+  [[nodiscard]] Result<Reader> MakeReader(const TopicProfile& profile, const fd::TypeSupport& type,
+                                          fd::DataReaderListener* listener);
+
+  [[nodiscard]] const WireOptions& options() const { return options_; }
+  [[nodiscard]] std::uint64_t datagrams_refused() const { return datagrams_refused_->load(std::memory_order_relaxed); }
+
+ private:
+  explicit Participant(const WireOptions& options) : options_(options) {}
+  [[nodiscard]] Result<fd::Topic*> FindTopic(const TopicProfile& profile, const fd::TypeSupport& type);
+
+  const WireOptions options_;
+  const std::shared_ptr<std::atomic<std::uint64_t>> datagrams_refused_ =
+      std::make_shared<std::atomic<std::uint64_t>>(0);
+  fd::DomainParticipant* participant_ = nullptr;  // Set once by Create.
+  fd::Publisher* publisher_ = nullptr;
+  fd::Subscriber* subscriber_ = nullptr;
+  Mutex mutex_;
+  std::map<std::string, fd::Topic*> topics_ CAIRN_GUARDED_BY(mutex_);
+};
+
+}  // namespace cairn::wire

@@ -1,0 +1,263 @@
+#include "common/wire/rtps_datagram.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include "common/wire/limits.h"
+
+namespace cairn::wire {
+namespace {
+
+using Bytes = std::span<const std::uint8_t>;
+
+constexpr std::size_t kHeaderBytes = 20;
+constexpr std::size_t kGuidPrefixOffset = 8;
+constexpr std::uint32_t kMaxSetBits = 256;
+
+enum SubmessageId : std::uint8_t {
+  kPad = 0x01,
+  kAckNack = 0x06,
+  kHeartbeat = 0x07,
+  kGap = 0x08,
+  kInfoTimestamp = 0x09,
+  kInfoSource = 0x0c,
+  kInfoDestination = 0x0e,
+  kNackFrag = 0x12,
+  kHeartbeatFrag = 0x13,
+  kData = 0x15,
+  kDataFrag = 0x16,
+  kEprosimaStatistics = 0x80,
+};
+
+// Reads numbers of one submessage's byte order. The caller checks the size first.
+struct Reader {
+  Bytes bytes;
+  bool little;
+
+  [[nodiscard]] std::uint16_t U16(std::size_t at) const {
+    return static_cast<std::uint16_t>(little ? bytes[at] | bytes[at + 1] << 8 : bytes[at] << 8 | bytes[at + 1]);
+  }
+  [[nodiscard]] std::uint32_t U32(std::size_t at) const {
+    const std::uint32_t first = U16(at);
+    const std::uint32_t second = U16(at + 2);
+    return little ? first | second << 16 : first << 16 | second;
+  }
+  // A sequence number: high word first, whatever the byte order.
+  [[nodiscard]] std::int64_t Sequence(std::size_t at) const {
+    return static_cast<std::int64_t>(static_cast<std::uint64_t>(U32(at)) << 32 | U32(at + 4));
+  }
+};
+
+struct Submessage {
+  std::uint8_t id;
+  std::uint8_t flags;
+  Reader body;
+  Bytes guid_prefix;
+
+  [[nodiscard]] std::size_t size() const { return body.bytes.size(); }
+  // The GUID of the writer whose entity id stands at `at`.
+  [[nodiscard]] SequenceGate::WriterKey Writer(std::size_t at) const {
+    SequenceGate::WriterKey key;
+    std::copy(guid_prefix.begin(), guid_prefix.end(), key.begin());
+    std::copy_n(body.bytes.begin() + static_cast<std::ptrdiff_t>(at), 4, key.begin() + 12);
+    return key;
+  }
+};
+
+// Steps over a parameter list; returns where it ends, or 0 where it is broken.
+std::size_t EndOfParameters(const Reader& body, std::size_t at) {
+  constexpr std::uint16_t kSentinel = 1;
+  constexpr std::uint16_t kKeyHash = 0x70;
+  constexpr std::uint16_t kStatusInfo = 0x71;
+  while (at + 4 <= body.bytes.size()) {
+    const std::uint16_t id = body.U16(at);
+    const std::uint16_t length = body.U16(at + 2);
+    at += 4;
+    if (id == kSentinel) return at;
+    if (length > body.bytes.size() - at) return 0;
+    if (id == kKeyHash && length != 16) return 0;
+    if (id == kStatusInfo && length != 4) return 0;
+    at += length;
+  }
+  return 0;
+}
+
+// `base` at `at`, then the bit count and its words; `tail` bytes must follow.
+bool SetFits(const Submessage& m, std::size_t at, std::size_t tail) {
+  if (m.size() < at + 4) return false;
+  const std::uint32_t bits = m.body.U32(at);
+  return bits <= kMaxSetBits && m.size() >= at + 4 + (bits + 31) / 32 * 4 + tail;
+}
+
+// Inline QoS of DATA and DATA_FRAG. `fixed` bytes come before it; returns the payload's start, 0 where broken.
+std::size_t PayloadStart(const Submessage& m, std::size_t fixed) {
+  constexpr std::uint8_t kInlineQos = 0x02;
+  const std::size_t qos = 4 + static_cast<std::size_t>(m.body.U16(2));
+  if (qos < fixed || qos > m.size()) return 0;
+  return (m.flags & kInlineQos) != 0 ? EndOfParameters(m.body, qos) : qos;
+}
+
+// Of participants, writers and readers (RTPS 9.3.1.5).
+bool IsDiscoveryWriter(Bytes entity) {
+  constexpr std::array<std::uint8_t, 3> kParticipants = {0x00, 0x01, 0x00};
+  constexpr std::array<std::uint8_t, 3> kWriters = {0x00, 0x00, 0x03};
+  constexpr std::array<std::uint8_t, 3> kReaders = {0x00, 0x00, 0x04};
+  constexpr std::uint8_t kBuiltinWriterWithKey = 0xc2;
+  const auto is = [&](const auto& key) { return std::equal(key.begin(), key.end(), entity.begin()); };
+  return entity[3] == kBuiltinWriterWithKey && (is(kParticipants) || is(kWriters) || is(kReaders));
+}
+
+DatagramFault InspectData(const Submessage& m, SequenceGate& gate) {
+  constexpr std::uint8_t kHasData = 0x04;
+  constexpr std::uint8_t kHasKey = 0x08;
+  constexpr std::uint8_t kParameterListEncoding = 0x02;  // PL_CDR_BE; PL_CDR_LE is one more.
+  if (m.size() < 20) return DatagramFault::kFraming;
+  if (!gate.Accept(m.Writer(8), m.body.Sequence(12))) return DatagramFault::kSequence;
+  const std::size_t payload = PayloadStart(m, 20);
+  if (payload == 0) return DatagramFault::kParameterList;
+  if ((m.flags & (kHasData | kHasKey)) == 0) return DatagramFault::kNone;
+  if (m.size() < payload + 4) return DatagramFault::kFraming;
+  // Discovery data is a parameter list, parsed by the library itself. Other built-in data only claims to be one: Fast
+  // DDS sends its liveliness messages so.
+  const std::uint8_t encoding = m.body.bytes[payload + 1];
+  if (IsDiscoveryWriter(m.body.bytes.subspan(8, 4)) && (encoding & 0xfe) == kParameterListEncoding) {
+    const Reader list{m.body.bytes.subspan(payload + 4), (encoding & 1) != 0};
+    if (EndOfParameters(list, 0) == 0) return DatagramFault::kParameterList;
+  }
+  return DatagramFault::kNone;
+}
+
+DatagramFault InspectDataFrag(const Submessage& m, SequenceGate& gate) {
+  if (m.size() < 32) return DatagramFault::kFraming;
+  if (!gate.Accept(m.Writer(8), m.body.Sequence(12))) return DatagramFault::kSequence;
+  const std::uint64_t start = m.body.U32(20);
+  const std::uint64_t count = m.body.U16(24);
+  const std::uint64_t fragment_bytes = m.body.U16(26);
+  const std::uint64_t sample_bytes = m.body.U32(28);
+  if (start == 0 || count == 0 || fragment_bytes == 0) return DatagramFault::kFragment;
+  if (sample_bytes == 0 || sample_bytes > kMaxSampleBytes) return DatagramFault::kFragment;
+  const std::uint64_t fragments = (sample_bytes + fragment_bytes - 1) / fragment_bytes;
+  if (start + count - 1 > fragments) return DatagramFault::kFragment;
+  const std::size_t payload = PayloadStart(m, 32);
+  if (payload == 0) return DatagramFault::kParameterList;
+  const std::uint64_t end = std::min(sample_bytes, (start + count - 1) * fragment_bytes);
+  if (m.size() - payload < end - (start - 1) * fragment_bytes) return DatagramFault::kFragment;
+  return DatagramFault::kNone;
+}
+
+DatagramFault InspectHeartbeat(const Submessage& m, SequenceGate& gate) {
+  if (m.size() < 28) return DatagramFault::kFraming;
+  const std::int64_t first = m.body.Sequence(8);
+  const std::int64_t last = m.body.Sequence(16);
+  if (first < 0 || last < first - 1) return DatagramFault::kSequence;
+  // An empty history says first = last + 1; the gate counts what was written.
+  return gate.Accept(m.Writer(4), std::max(last, first)) ? DatagramFault::kNone : DatagramFault::kSequence;
+}
+
+DatagramFault InspectGap(const Submessage& m, SequenceGate& gate) {
+  if (m.size() < 28) return DatagramFault::kFraming;
+  if (!SetFits(m, 24, 0)) return DatagramFault::kSequenceSet;
+  const std::int64_t start = m.body.Sequence(8);
+  const std::int64_t base = m.body.Sequence(16);
+  // The library walks from start to base one by one.
+  if (start <= 0 || base < start || base - start > SequenceGate::kMaxJump) return DatagramFault::kSequence;
+  return gate.Accept(m.Writer(4), base) ? DatagramFault::kNone : DatagramFault::kSequence;
+}
+
+DatagramFault InspectAck(const Submessage& m) {
+  if (m.size() < 24) return DatagramFault::kFraming;
+  if (m.body.Sequence(8) < 0) return DatagramFault::kSequence;
+  return SetFits(m, 16, 4) ? DatagramFault::kNone : DatagramFault::kSequenceSet;
+}
+
+DatagramFault InspectNackFrag(const Submessage& m) {
+  if (m.size() < 28) return DatagramFault::kFraming;
+  if (m.body.Sequence(8) <= 0) return DatagramFault::kSequence;
+  return SetFits(m, 20, 4) ? DatagramFault::kNone : DatagramFault::kSequenceSet;
+}
+
+DatagramFault InspectSubmessage(const Submessage& m, SequenceGate& gate) {
+  constexpr std::uint8_t kNoTimestamp = 0x02;
+  const auto at_least = [&](std::size_t n) { return m.size() >= n ? DatagramFault::kNone : DatagramFault::kFraming; };
+  switch (m.id) {
+    case kData:
+      return InspectData(m, gate);
+    case kDataFrag:
+      return InspectDataFrag(m, gate);
+    case kHeartbeat:
+      return InspectHeartbeat(m, gate);
+    case kGap:
+      return InspectGap(m, gate);
+    case kAckNack:
+      return InspectAck(m);
+    case kNackFrag:
+      return InspectNackFrag(m);
+    case kHeartbeatFrag:
+      return at_least(24);
+    case kInfoTimestamp:
+      return at_least((m.flags & kNoTimestamp) != 0 ? 0 : 8);
+    case kInfoSource:
+      return at_least(20);
+    case kInfoDestination:
+      return at_least(12);
+    default:
+      return DatagramFault::kNone;  // Receivers skip what they do not know.
+  }
+}
+
+}  // namespace
+
+std::string_view DatagramFaultName(DatagramFault fault) {
+  static constexpr std::array<std::string_view, 8> kNames = {"none",     "not_rtps",     "framing",  "statistics",
+                                                             "sequence", "sequence_set", "fragment", "parameter_list"};
+  return kNames[static_cast<std::size_t>(fault)];
+}
+
+std::size_t SequenceGate::Hash::operator()(const WriterKey& key) const {
+  return std::hash<std::string_view>()({reinterpret_cast<const char*>(key.data()), key.size()});
+}
+
+bool SequenceGate::Accept(const WriterKey& writer, std::int64_t sequence) {
+  if (sequence < 0) return false;
+  const MutexLock lock(mutex_);
+  const auto known = highest_.find(writer);
+  if (known != highest_.end()) {
+    if (sequence > known->second + kMaxJump) return false;
+    known->second = std::max(known->second, sequence);
+    return true;
+  }
+  // First word of a writer: it may have been up for years, not for ages.
+  constexpr std::int64_t kMaxFirst = std::int64_t{1} << 40;
+  if (sequence > kMaxFirst) return false;
+  if (highest_.size() >= kMaxWriters) highest_.clear();
+  highest_.emplace(writer, sequence);
+  return true;
+}
+
+DatagramFault InspectDatagram(Bytes datagram, SequenceGate& gate) {
+  constexpr std::uint8_t kMajorVersion = 2;
+  if (datagram.size() < kHeaderBytes || std::memcmp(datagram.data(), "RTPS", 4) != 0) return DatagramFault::kNotRtps;
+  if (datagram[4] != kMajorVersion) return DatagramFault::kNotRtps;
+  Bytes prefix = datagram.subspan(kGuidPrefixOffset, 12);
+  std::size_t at = kHeaderBytes;
+  while (at < datagram.size()) {
+    if (datagram.size() - at < 4) return DatagramFault::kFraming;
+    const std::uint8_t id = datagram[at];
+    const std::uint8_t flags = datagram[at + 1];
+    const bool little = (flags & 1) != 0;
+    const std::size_t length = Reader{datagram, little}.U16(at + 2);
+    // Length 0 means "to the end of the datagram", but for the two that may be empty.
+    const bool to_the_end = length == 0 && id != kPad && id != kInfoTimestamp;
+    const std::size_t end = to_the_end ? datagram.size() : at + 4 + length;
+    if (end > datagram.size()) return DatagramFault::kFraming;
+    if (id == kEprosimaStatistics && end != datagram.size()) return DatagramFault::kStatistics;
+    const Submessage submessage{id, flags, {datagram.subspan(at + 4, end - at - 4), little}, prefix};
+    const DatagramFault fault = InspectSubmessage(submessage, gate);
+    if (fault != DatagramFault::kNone) return fault;
+    if (id == kInfoSource) prefix = submessage.body.bytes.subspan(8, 12);  // Who the rest speaks for.
+    at = end;
+  }
+  return DatagramFault::kNone;
+}
+
+}  // namespace cairn::wire

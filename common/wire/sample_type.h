@@ -1,0 +1,114 @@
+// The one type support of all topics: wraps a generated one, so that
+// - nothing thrown by decoding reaches the middleware (an unknown encapsulation would end the process): a sample that
+//   does not decode is delivered as such, and the reader counts it;
+// - keys are computed under a lock (the generated ones share a buffer: wrong keys from two threads, measured);
+// - no type objects are announced (Cyclone DDS would refuse the topic);
+// - replies to other clients are skipped by their first eight bytes.
+// Fast DDS 2.x API: stays inside common/wire.
+#pragma once
+
+#include <exception>
+#include <fastdds/dds/topic/TopicDataType.hpp>
+#include <functional>
+#include <optional>
+
+#include "common/mutex.h"
+#include "common/service/session.h"
+#include "common/wire/limits.h"
+
+namespace cairn::wire {
+
+enum class Decoding { kDecoded, kUndecodable, kForeign };
+
+// What readers and writers of a topic pass to the middleware.
+template <typename Wire>
+struct Sample {
+  Wire value;
+  Decoding decoding = Decoding::kDecoded;
+  std::optional<ClientId> only;  // Set by a reader of replies before it takes: whose are wanted.
+};
+
+// The client id that leads a serialised reply; nothing where it is too short or not plain CDR.
+[[nodiscard]] inline std::optional<ClientId> PeekClient(const std::uint8_t* payload, std::uint32_t size) {
+  constexpr std::uint8_t kCdrLittleEndian = 1;
+  constexpr std::uint32_t kEncapsulationBytes = 4;
+  if (size < kEncapsulationBytes + sizeof(ClientId) || payload[0] != 0 || payload[1] > kCdrLittleEndian) return {};
+  ClientId client = 0;
+  for (std::uint32_t i = 0; i < sizeof(ClientId); ++i) {
+    const std::uint32_t at = payload[1] == kCdrLittleEndian ? sizeof(ClientId) - 1 - i : i;
+    client = client << 8 | payload[kEncapsulationBytes + at];
+  }
+  return client;
+}
+
+template <typename Wire, typename Generated>
+class SampleType : public eprosima::fastdds::dds::TopicDataType {
+  using Payload = eprosima::fastrtps::rtps::SerializedPayload_t;
+  using Handle = eprosima::fastrtps::rtps::InstanceHandle_t;
+
+ public:
+  SampleType() {
+    setName(generated_.getName());
+    m_typeSize = generated_.m_typeSize;
+    m_isGetKeyDefined = generated_.m_isGetKeyDefined;
+    auto_fill_type_object(false);
+    auto_fill_type_information(false);
+  }
+
+  bool serialize(void* data, Payload* payload) override {
+    try {
+      return generated_.serialize(&Of(data).value, payload);
+    } catch (const std::exception&) {
+      return false;
+    }
+  }
+
+  // Always true: what did not decode says so itself.
+  bool deserialize(Payload* payload, void* data) override {
+    Sample<Wire>& sample = Of(data);
+    sample.decoding = Decoding::kUndecodable;
+    if (payload->length > kMaxSampleBytes) return true;
+    if (sample.only) {
+      const std::optional<ClientId> client = PeekClient(payload->data, payload->length);
+      if (client && client != sample.only) {
+        sample.decoding = Decoding::kForeign;
+        return true;
+      }
+    }
+    try {
+      if (generated_.deserialize(payload, &sample.value)) sample.decoding = Decoding::kDecoded;
+    } catch (const std::exception&) {
+      // Counted by the reader.
+    }
+    return true;
+  }
+
+  std::function<std::uint32_t()> getSerializedSizeProvider(void* data) override {
+    return generated_.getSerializedSizeProvider(&Of(data).value);
+  }
+  void* createData() override { return new Sample<Wire>(); }
+  void deleteData(void* data) override { delete &Of(data); }
+
+  bool getKey(void* data, Handle* handle, bool force_md5) override {
+    if (!m_isGetKeyDefined) return false;
+    if (Of(data).decoding != Decoding::kDecoded) {
+      // One instance for all garbage. Refusing the sample instead would have it sent again for ever.
+      for (int i = 0; i < 16; ++i) handle->value[i] = 0xff;
+      return true;
+    }
+    const MutexLock lock(key_mutex_);
+    try {
+      return generated_.getKey(&Of(data).value, handle, force_md5);
+    } catch (const std::exception&) {
+      return false;
+    }
+  }
+
+ private:
+  static Sample<Wire>& Of(void* data) { return *static_cast<Sample<Wire>*>(data); }
+
+  Generated generated_;
+  Mutex key_mutex_;
+};
+
+}  // namespace cairn::wire

@@ -1,0 +1,104 @@
+// A typed reader of one topic with a thread of its own. The middleware's threads only wake it: it takes, checks bounds,
+// converts and calls back with no lock of the middleware held, so a slow callback holds up its topic and nothing else.
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <thread>
+#include <type_traits>
+#include <utility>
+
+#include "common/wire/bounds.h"
+#include "common/wire/convert.h"
+#include "common/wire/participant.h"
+#include "common/wire/reader_events.h"
+#include "common/wire/writer_clients.h"
+
+namespace cairn::wire {
+
+template <typename Value>
+class DdsSubscription final : public Subscription {
+  using Wire = typename Topic<Value>::Wire;
+
+ public:
+  [[nodiscard]] static Result<std::unique_ptr<Subscription>> Make(const std::shared_ptr<Participant>& participant,
+                                                                  std::function<void(Value&&)> on_value,
+                                                                  SubscriptionEvents events,
+                                                                  std::optional<ClientId> only = {}) {
+    auto made = std::make_unique<DdsSubscription>(std::move(on_value), std::move(events), only);
+    Result<Participant::Reader> reader = participant->MakeReader(Topic<Value>::kProfile, made->type_, &made->listener_);
+    if (!reader) return tl::unexpected(reader.error());
+    made->reader_ = std::move(*reader);
+    made->thread_ = std::thread([self = made.get()] { self->Run(); });
+    return made;
+  }
+
+  DdsSubscription(std::function<void(Value&&)> on_value, SubscriptionEvents events, std::optional<ClientId> only)
+      : on_value_(std::move(on_value)), events_(std::move(events)), only_(only) {}
+
+  ~DdsSubscription() override {
+    listener_.Stop();
+    if (thread_.joinable()) thread_.join();
+  }
+
+  int matched() const override { return listener_.matched(); }
+  std::uint64_t refused() const override { return refused_.load(std::memory_order_relaxed); }
+
+ private:
+  void Run() {
+    while (std::optional<ReaderNews> news = listener_.Wait()) {
+      TakeAll();
+      Tell(*news);
+    }
+  }
+
+  void TakeAll() {
+    Sample<Wire> sample;
+    fd::SampleInfo info;
+    for (;;) {
+      sample.only = only_;
+      if (reader_->take_next_sample(&sample, &info) != eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) return;
+      if (!info.valid_data || sample.decoding == Decoding::kForeign) continue;
+      if (sample.decoding == Decoding::kUndecodable || !CheckBounds(sample.value)) {
+        refused_.fetch_add(1, std::memory_order_relaxed);
+        continue;
+      }
+      Deliver(FromWire(std::move(sample.value)), info.publication_handle);
+    }
+  }
+
+  void Deliver(Value&& value, const WriterClients::Writer& writer) {
+    if constexpr (std::is_same_v<Value, SessionRequest>) {
+      const ClientId client = value.client;
+      on_value_(std::move(value));
+      // The lease may have run out before the request was taken.
+      if (!clients_.Heard(writer, client) && events_.liveliness) events_.liveliness(client, false);
+    } else {
+      on_value_(std::move(value));
+    }
+  }
+
+  void Tell(const ReaderNews& news) {
+    if (news.matched && events_.matched) events_.matched(*news.matched);
+    if (news.lost_total && events_.lost) events_.lost(*news.lost_total);
+    if (news.incompatible_policy && events_.incompatible_qos) events_.incompatible_qos(*news.incompatible_policy);
+    if constexpr (std::is_same_v<Value, SessionRequest>) {
+      for (const LivelinessChange& change : news.liveliness) {
+        const std::optional<ClientId> client = clients_.Changed(change);
+        if (client && events_.liveliness) events_.liveliness(*client, change.alive);
+      }
+    }
+  }
+
+  const std::function<void(Value&&)> on_value_;
+  const SubscriptionEvents events_;
+  const std::optional<ClientId> only_;
+  std::atomic<std::uint64_t> refused_ = 0;
+  const fd::TypeSupport type_{new typename Topic<Value>::Type()};
+  WriterClients clients_;  // Only the thread's.
+  ReaderEvents listener_;
+  Participant::Reader reader_;  // After the listener: it calls it until it is gone.
+  std::thread thread_;
+};
+
+}  // namespace cairn::wire

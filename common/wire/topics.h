@@ -1,0 +1,104 @@
+// Every topic of Cairn's wire: its name, its type, and what its two ends promise. idl/README.md is the prose of this
+// table.
+#pragma once
+
+#include "cairn/jobPubSubTypes.h"
+#include "cairn/ledgerPubSubTypes.h"
+#include "cairn/mapPubSubTypes.h"
+#include "cairn/odometryPubSubTypes.h"
+#include "cairn/posePubSubTypes.h"
+#include "cairn/queryPubSubTypes.h"
+#include "cairn/scanPubSubTypes.h"
+#include "cairn/sessionPubSubTypes.h"
+#include "cairn/tilePubSubTypes.h"
+#include "common/service/request.h"
+#include "common/service/stream.h"
+#include "common/wire/sample_type.h"
+
+namespace cairn::wire {
+
+// All topics are reliable with bounded histories; the rest differs.
+struct TopicProfile {
+  const char* name;
+  bool transient_local;       // Late joiners get the last samples of each instance.
+  int writer_depth;           // Samples kept per instance until acknowledged; the oldest gives way.
+  int reader_depth;           // Samples waiting per instance for the callback; the oldest gives way.
+  int max_instances;          // Per end. 1: no key.
+  double deadline_s;          // 0: none. Offered only.
+  bool leased;                // Offers, and asks for, the liveliness lease.
+  std::uint8_t heartbeat_ms;  // While something is unacknowledged.
+};
+
+// Readers of streams, sessions, requests and replies must not lose to a busy callback what has been acknowledged, so
+// they wait in a longer queue than the writer's.
+template <typename Value>
+struct Topic;
+
+template <>
+struct Topic<SessionRequest> {
+  using Wire = v1::SessionRequest;
+  using Type = SampleType<Wire, v1::SessionRequestPubSubType>;
+  static constexpr TopicProfile kProfile{"cairn/v1/session", true, 1, 16, 4096, 0.0, true, 20};
+};
+template <>
+struct Topic<SessionState> {
+  using Wire = v1::SessionState;
+  using Type = SampleType<Wire, v1::SessionStatePubSubType>;
+  static constexpr TopicProfile kProfile{"cairn/v1/session_state", true, 1, 4, 16384, 0.0, false, 20};
+};
+template <>
+struct Topic<ScanSample> {
+  using Wire = v1::Scan;
+  using Type = SampleType<Wire, v1::ScanPubSubType>;
+  static constexpr TopicProfile kProfile{"cairn/v1/scan", false, 64, 128, 4096, 0.0, false, 20};
+};
+template <>
+struct Topic<OdometrySample> {
+  using Wire = v1::Odometry;
+  using Type = SampleType<Wire, v1::OdometryPubSubType>;
+  static constexpr TopicProfile kProfile{"cairn/v1/odometry", false, 256, 512, 4096, 0.0, false, 20};
+};
+template <>
+struct Topic<PoseReport> {
+  using Wire = v1::PoseReport;
+  using Type = SampleType<Wire, v1::PoseReportPubSubType>;
+  static constexpr TopicProfile kProfile{"cairn/v1/pose", false, 1, 16, 4096, 1.0, false, 20};
+};
+template <>
+struct Topic<Ledger> {
+  using Wire = v1::Ledger;
+  using Type = SampleType<Wire, v1::LedgerPubSubType>;
+  static constexpr TopicProfile kProfile{"cairn/v1/ledger", true, 1, 1, 4096, 0.0, false, 20};
+};
+template <>
+struct Topic<MapInfo> {
+  using Wire = v1::MapInfo;
+  using Type = SampleType<Wire, v1::MapInfoPubSubType>;
+  static constexpr TopicProfile kProfile{"cairn/v1/map", true, 1, 1, 4096, 0.0, false, 20};
+};
+template <>
+struct Topic<TileSample> {
+  using Wire = v1::Tile;
+  using Type = SampleType<Wire, v1::TilePubSubType>;
+  static constexpr TopicProfile kProfile{"cairn/v1/tile", true, 1, 1, 262144, 0.0, false, 20};
+};
+template <>
+struct Topic<Job> {
+  using Wire = v1::Job;
+  using Type = SampleType<Wire, v1::JobPubSubType>;
+  static constexpr TopicProfile kProfile{"cairn/v1/job", true, 1, 1, 16384, 0.0, false, 20};
+};
+template <>
+struct Topic<Request> {
+  using Wire = v1::Request;
+  using Type = SampleType<Wire, v1::RequestPubSubType>;
+  static constexpr TopicProfile kProfile{"cairn/v1/request", false, 64, 1024, 1, 0.0, false, 20};
+};
+template <>
+struct Topic<Reply> {
+  using Wire = v1::Reply;
+  using Type = SampleType<Wire, v1::ReplyPubSubType>;
+  static constexpr TopicProfile kProfile{"cairn/v1/reply", false, 256, 1024, 1, 0.0, false, 20};
+};
+
+}  // namespace cairn::wire

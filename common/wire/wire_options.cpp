@@ -1,0 +1,84 @@
+#include <arpa/inet.h>
+#include <ifaddrs.h>
+#include <netinet/in.h>
+
+#include <cmath>
+#include <set>
+
+#include "common/wire/bus.h"
+
+namespace cairn::wire {
+namespace {
+
+std::set<std::string> LocalAddresses() {
+  std::set<std::string> addresses;
+  ifaddrs* list = nullptr;
+  if (getifaddrs(&list) != 0) return addresses;
+  for (const ifaddrs* entry = list; entry != nullptr; entry = entry->ifa_next) {
+    if (entry->ifa_addr == nullptr || entry->ifa_addr->sa_family != AF_INET) continue;
+    char text[INET_ADDRSTRLEN] = {};
+    const auto* address = reinterpret_cast<const sockaddr_in*>(entry->ifa_addr);
+    if (inet_ntop(AF_INET, &address->sin_addr, text, sizeof(text)) != nullptr) addresses.emplace(text);
+  }
+  freeifaddrs(list);
+  return addresses;
+}
+
+std::string Join(const std::vector<std::string>& parts) {
+  std::string joined;
+  for (const std::string& part : parts) joined += (joined.empty() ? "" : ",") + part;
+  return joined;
+}
+
+std::vector<std::string> Split(const std::string& text) {
+  std::vector<std::string> parts;
+  std::string part;
+  for (const char c : text + ",") {
+    if (c != ',') {
+      if (c != ' ') part += c;
+    } else if (!part.empty()) {
+      parts.push_back(std::exchange(part, {}));
+    }
+  }
+  return parts;
+}
+
+}  // namespace
+
+Result<void> Validate(const WireOptions& options) {
+  constexpr std::int64_t kMaxDomain = 232;  // Beyond, ports leave 16 bits (RTPS 9.6.1.1).
+  if (options.domain < 0 || options.domain > kMaxDomain) {
+    return Fail(StatusCode::kInvalidArgument, "domain " + std::to_string(options.domain) + " is not in 0..232");
+  }
+  if (options.interfaces.empty()) {
+    return Fail(StatusCode::kInvalidArgument, "interfaces: name at least one IPv4 address of this machine");
+  }
+  const std::set<std::string> local = LocalAddresses();
+  for (const std::string& address : options.interfaces) {
+    // Fast DDS would silently ignore it, and bind nothing.
+    if (local.count(address) == 0) {
+      return Fail(StatusCode::kInvalidArgument, "interfaces: " + address + " is not an IPv4 address of this machine");
+    }
+  }
+  for (const double lease : {options.liveliness_lease_s, options.participant_lease_s}) {
+    if (!std::isfinite(lease) || lease < 0.1 || lease > 3600.0) {
+      return Fail(StatusCode::kInvalidArgument, "a lease of " + std::to_string(lease) + " s is not in 0.1..3600");
+    }
+  }
+  return {};
+}
+
+void Visit(OptionVisitor& visitor, WireOptions& options) {
+  visitor.Integer("domain", options.domain, "", 0, 232,
+                  "DDS domain; robots, server and clients of one fleet share it.");
+  std::string interfaces = Join(options.interfaces);
+  visitor.Text("interfaces", interfaces,
+               "IPv4 addresses to bind, comma-separated. Only these: the network behind them is trusted.");
+  options.interfaces = Split(interfaces);
+  visitor.Real("liveliness_lease_s", options.liveliness_lease_s, "s", 0.1, 3600.0,
+               "A client silent for longer is away. All of a fleet use the same value, or robots a shorter one.");
+  visitor.Real("participant_lease_s", options.participant_lease_s, "s", 0.1, 3600.0,
+               "A process silent for longer is forgotten, and greeted anew when it is back.");
+}
+
+}  // namespace cairn::wire

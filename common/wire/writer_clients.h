@@ -1,0 +1,51 @@
+// Which client stands behind each remote writer of sessions: the last one its requests named. Used by one thread.
+#pragma once
+
+#include <fastdds/dds/common/InstanceHandle.hpp>
+#include <map>
+#include <optional>
+
+#include "common/service/session.h"
+
+namespace cairn::wire {
+
+struct LivelinessChange {
+  eprosima::fastdds::dds::InstanceHandle_t writer;
+  bool alive = false;
+  bool gone = false;  // Unmatched: it will not come back under this handle.
+};
+
+class WriterClients {
+ public:
+  using Writer = eprosima::fastdds::dds::InstanceHandle_t;
+
+  // A request came from the writer. Returns whether its lease holds.
+  bool Heard(const Writer& writer, ClientId client) {
+    Entry& entry = entries_[writer];
+    entry.client = client;
+    return entry.alive;
+  }
+
+  // Returns the client to tell about, where one is known and its state has changed.
+  std::optional<ClientId> Changed(const LivelinessChange& change) {
+    const auto known = entries_.find(change.writer);
+    if (known == entries_.end()) {
+      if (!change.gone) entries_[change.writer].alive = change.alive;
+      return std::nullopt;
+    }
+    const bool changed = known->second.alive != change.alive;
+    const std::optional<ClientId> client = changed ? known->second.client : std::nullopt;
+    known->second.alive = change.alive;
+    if (change.gone) entries_.erase(known);
+    return client;
+  }
+
+ private:
+  struct Entry {
+    std::optional<ClientId> client;
+    bool alive = true;
+  };
+  std::map<Writer, Entry> entries_;
+};
+
+}  // namespace cairn::wire

@@ -1,0 +1,128 @@
+#!/usr/bin/env bash
+# The demo: builds Cairn, starts a server on a DDS domain of its own, streams three simulated robots through one
+# building into one map, asks for poses and tiles meanwhile, smooths, and compares with the truth.
+# A robot log given as argument goes into a second site:  deploy/demo.sh [LOG]
+# Leaves demo-out/ (or $DEMO_OUT): report.md, map.png, building.yaml, trajectories, the server's log. Needs no display.
+# DEMO_SECONDS (150) and DEMO_RATE (3) say how long the robots drive and how much faster than real time; on a machine
+# too slow for that they wait for the server.
+set -euo pipefail
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+log=${1:-}
+out=${DEMO_OUT:-$root/demo-out}
+seconds=${DEMO_SECONDS:-150}
+rate=${DEMO_RATE:-3}
+robots=(robot1 robot2 robot3)
+bin=$root/build/release/bin
+# A domain nobody else is likely to use; 60..219 keeps its ports clear of usual ones.
+export CAIRN_DOMAIN=${CAIRN_DOMAIN:-$((60 + $$ % 160))}
+
+if [ $# -gt 1 ] || [ "$log" = --help ]; then
+  sed -n '2,7s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
+  [ "$log" = --help ] && exit 0
+  exit 2
+fi
+if [ -n "$log" ] && [ ! -r "$log" ]; then echo "demo: cannot read $log" >&2; exit 2; fi
+if [ -n "$log" ]; then log=$(realpath "$log"); fi
+
+step() { printf '\n== %s\n' "$*"; }
+fail() { echo "demo: $*" >&2; exit 1; }
+
+server=
+sim=
+clean_up() {
+  local code=$?
+  trap - EXIT INT TERM
+  for pid in $sim $server; do
+    kill -TERM "$pid" 2>/dev/null || continue
+    for _ in $(seq 50); do kill -0 "$pid" 2>/dev/null || break; sleep 0.1; done
+    kill -KILL "$pid" 2>/dev/null || true
+  done
+  exit "$code"
+}
+trap clean_up EXIT
+trap 'exit 130' INT
+trap 'exit 143' TERM
+
+step "building (the first time takes some minutes)"
+"$root/deploy/install-packages.sh" build
+(cd "$root" && cmake --preset release >/dev/null && cmake --build --preset release --target cairnd cairn)
+
+rm -rf "$out"
+mkdir -p "$out/truth"
+cd "$out"
+began=$(date +%s)
+
+step "starting cairnd on domain $CAIRN_DOMAIN"
+"$bin/cairnd" >cairnd.log 2>&1 &
+server=$!
+for attempt in $(seq 40); do
+  if "$bin/cairn" ping --timeout 500ms >ping.txt 2>/dev/null; then break; fi
+  kill -0 "$server" 2>/dev/null || { cat cairnd.log >&2; fail "the server ended at once"; }
+  [ "$attempt" -lt 40 ] || fail "the server does not answer; see $out/cairnd.log"
+  sleep 0.25
+done
+cat ping.txt
+
+step "three robots drive through one building, $seconds s at $rate times real time"
+"$bin/cairn" sim --world building --robots 3 --beams 360 --hz 10 --seconds "$seconds" --rate "$rate" --window 32 --site building \
+  --truth-dir truth --watch-pid "$server" >sim.txt 2>sim-progress.txt &
+sim=$!
+while kill -0 "$sim" 2>/dev/null; do
+  sleep 5
+  kill -0 "$sim" 2>/dev/null || break
+  tail -n 1 sim-progress.txt
+  for robot in "${robots[@]}"; do "$bin/cairn" pose "$robot" || true; done
+  "$bin/cairn" tiles --site building --level 2 | tail -n 1 || true
+done
+wait "$sim" || { sim=; cat sim.txt sim-progress.txt >&2; fail "scans are missing or unexplained"; }
+sim=
+cat sim.txt
+
+step "what the server knows"
+"$bin/cairn" status | tee status.txt
+"$bin/cairn" map info --site building
+for robot in "${robots[@]}"; do "$bin/cairn" path "$robot" -o "$robot.tum"; done
+"$bin/cairn" map export --site building -o building-online.yaml
+
+step "smoothing the whole trajectories"
+"$bin/cairn" job smooth --site building --wait | tee job.txt
+for robot in "${robots[@]}"; do "$bin/cairn" path "$robot" --smoothed -o "$robot-smooth.tum"; done
+"$bin/cairn" map export --site building -o building.yaml
+"$bin/cairn" map draw --site building --paths robot1=robot1-smooth.tum robot2=robot2-smooth.tum robot3=robot3-smooth.tum \
+  --title "Three robots, one building, one map" -o map.png
+
+if [ -n "$log" ]; then
+  step "the log $(basename "$log") into a second site, as fast as the server takes it"
+  "$bin/cairn" replay "$log" --site log --robot log --fast | tee replay.txt
+  "$bin/cairn" path log -o log.tum
+  "$bin/cairn" map export --site log -o log.yaml
+  "$bin/cairn" map draw --site log --paths log.tum --title "$(basename "$log")" -o log-map.png
+fi
+
+step "errors against the truth"
+quote() { sed 's/^/    /' "$1"; }
+rmse() { "$bin/cairn" eval "$1" "$2" --json | sed -n 's/.*"ate_rmse_m":\([0-9.e+-]*\).*/\1/p'; }
+{
+  printf '# Cairn demo, %s\n\n![map](map.png)\n\n' "$(date -u +%F)"
+  printf 'Three simulated robots, one site, %s s at %s times real time; the starts are given, nothing is aligned.\n\n' "$seconds" "$rate"
+  printf '| robot | online: ATE rmse, m | smoothed: ATE rmse, m |\n|---|---|---|\n'
+  for robot in "${robots[@]}"; do
+    printf '| %s | %.4f | %.4f |\n' "$robot" "$(rmse "$robot.tum" "truth/$robot.tum")" \
+      "$(rmse "$robot-smooth.tum" "truth/$robot.tum")"
+  done
+  printf '\n## What became of every scan\n\n'; quote sim.txt
+  printf '\n## Smoothing\n\n'; quote job.txt
+  if [ -n "$log" ]; then
+    printf '\n## %s\n\n![map of the log](log-map.png)\n\n' "$(basename "$log")"; quote replay.txt
+  fi
+  printf '\n## Files\n\nbuilding.yaml + .png (for Nav2; -online: before smoothing), *.tum (online, -smooth), truth/*.tum, cairnd.log\n'
+} >report.md
+sed -n '/^| robot/,/^$/p' report.md
+
+step "stopping"
+kill -TERM "$server"
+wait "$server" || fail "the server did not stop cleanly; see $out/cairnd.log"
+server=
+rm -f ping.txt sim-progress.txt
+echo "$out: report.md, map.png, trajectories; took $(($(date +%s) - began)) s after the build"

@@ -1,0 +1,23 @@
+// cairnd's command line: what to do, and with which options. Precedence, lowest first: defaults, --config, --set,
+// --domain (or CAIRN_DOMAIN), --log-level.
+#pragma once
+
+#include <optional>
+
+#include "server/cairnd_options.h"
+
+namespace cairn::server {
+
+enum class Task { kServe, kPrintConfig, kCheckConfig };
+
+struct CommandLine {
+  Task task = Task::kServe;
+  CairndOptions options;
+};
+
+// Nothing where the program is to end at once with `exit_code`: 0 after --help and --version, 2 for a wrong command
+// line
+// (--set included), 1 for a configuration file that cannot be used. What was wrong is on standard error.
+[[nodiscard]] std::optional<CommandLine> ParseCommandLine(int argc, char** argv, int& exit_code);
+
+}  // namespace cairn::server

@@ -1,0 +1,29 @@
+#include "server/ingress/admission.h"
+
+#include <memory>
+#include <utility>
+
+#include "server/slam/scan_pipeline.h"
+
+namespace cairn::server {
+
+ScanArrival Admit(ScanSample&& sample, std::chrono::steady_clock::time_point received) {
+  ScanArrival arrival{
+      .stream = sample.stream, .scan = nullptr, .refused = slam::RefusalOf(sample.scan), .received = received};
+  if (arrival.refused) {
+    Scan stub;
+    stub.sequence = sample.scan.sequence;
+    stub.stamp = sample.scan.stamp;
+    arrival.scan = std::make_shared<const Scan>(std::move(stub));
+  } else {
+    arrival.scan = std::make_shared<const Scan>(std::move(sample.scan));
+  }
+  return arrival;
+}
+
+OdometryArrival Admit(OdometrySample&& sample) {
+  return {
+      .stream = sample.stream, .odometry = sample.odometry, .refused = !ValidateOdometry(sample.odometry).has_value()};
+}
+
+}  // namespace cairn::server

@@ -1,0 +1,75 @@
+#include "server/ingress/ingress.h"
+
+#include <spdlog/spdlog.h>
+
+#include <numeric>
+#include <utility>
+
+#include "server/ingress/admission.h"
+
+namespace cairn::server {
+
+Result<std::unique_ptr<Ingress>> Ingress::Open(wire::Bus& bus, Inbound& inbound, Outbound& outbound) {
+  std::unique_ptr<Ingress> ingress(new Ingress(inbound, outbound));
+  if (auto subscribed = ingress->Subscribe(bus); !subscribed) return tl::unexpected(subscribed.error());
+  return ingress;
+}
+
+Ingress::~Ingress() {
+  Close();
+}
+
+void Ingress::Close() {
+  subscriptions_.clear();
+}
+
+std::uint64_t Ingress::malformed() const {
+  return std::accumulate(subscriptions_.begin(), subscriptions_.end(), std::uint64_t{0},
+                         [](std::uint64_t sum, const auto& subscription) { return sum + subscription->refused(); });
+}
+
+template <typename Value>
+Result<void> Ingress::Add(wire::Bus& bus, void (Ingress::*take)(Value&&), wire::SubscriptionEvents events) {
+  events.incompatible_qos = [](const std::string& policy) {
+    spdlog::warn("a client's endpoint will never match: its {} is incompatible (see idl/README.md)", policy);
+  };
+  auto subscription =
+      bus.Subscribe<Value>([this, take](Value&& value) { (this->*take)(std::move(value)); }, std::move(events));
+  if (!subscription) return tl::unexpected(subscription.error());
+  subscriptions_.push_back(std::move(*subscription));
+  return {};
+}
+
+Result<void> Ingress::Subscribe(wire::Bus& bus) {
+  wire::SubscriptionEvents session_events;
+  session_events.liveliness = [this](ClientId client, bool alive) { Push(ClientLiveliness{client, alive}); };
+  // Streams first: a robot that is told its session is open may rely on being heard.
+  if (auto added = Add<ScanSample>(bus, &Ingress::Take); !added) return added;
+  if (auto added = Add<OdometrySample>(bus, &Ingress::Take); !added) return added;
+  if (auto added = Add<Request>(bus, &Ingress::Take); !added) return added;
+  return Add<SessionRequest>(bus, &Ingress::Take, std::move(session_events));
+}
+
+void Ingress::Take(ScanSample&& sample) {
+  Push(Admit(std::move(sample), std::chrono::steady_clock::now()));
+}
+
+void Ingress::Take(OdometrySample&& sample) {
+  Push(Admit(std::move(sample)));
+}
+
+void Ingress::Take(Request&& request) {
+  Reply busy;
+  busy.client = request.client;
+  busy.sequence = request.sequence;
+  if (inbound_.TryPush(std::move(request))) return;
+  overflow_.fetch_add(1, std::memory_order_relaxed);
+  busy.status = {StatusCode::kResourceExhausted, "the server is busy; try again"};
+  outbound_.Send(std::move(busy));
+}
+
+void Ingress::Push(InboundValue&& value) {
+  if (!inbound_.TryPush(std::move(value))) overflow_.fetch_add(1, std::memory_order_relaxed);
+}
+
+}  // namespace cairn::server

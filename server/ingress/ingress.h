@@ -1,0 +1,47 @@
+// The DDS door inwards: subscribes to what robots and clients send, validates, and pushes plain values into the inbound
+// channel. Callbacks never wait; what does not fit is left out and counted, a request is answered "busy".
+// Thread rule: callbacks run on DDS threads; Close returns after the last one.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "common/status.h"
+#include "common/wire/bus.h"
+#include "server/inbound.h"
+#include "server/outbound.h"
+
+namespace cairn::server {
+
+class Ingress {
+ public:
+  [[nodiscard]] static Result<std::unique_ptr<Ingress>> Open(wire::Bus& bus, Inbound& inbound, Outbound& outbound);
+  ~Ingress();
+
+  void Close();
+  // Values left out because the channel was full.
+  [[nodiscard]] std::uint64_t overflow() const { return overflow_.load(std::memory_order_relaxed); }
+  // Samples that were no values: lengths or enums out of range.
+  [[nodiscard]] std::uint64_t malformed() const;
+
+ private:
+  Ingress(Inbound& inbound, Outbound& outbound) : inbound_(inbound), outbound_(outbound) {}
+  Result<void> Subscribe(wire::Bus& bus);
+  template <typename Value>
+  Result<void> Add(wire::Bus& bus, void (Ingress::*take)(Value&&), wire::SubscriptionEvents events = {});
+  void Take(SessionRequest&& request) { Push(std::move(request)); }
+  void Take(ScanSample&& sample);
+  void Take(OdometrySample&& sample);
+  void Take(Request&& request);
+  void Push(InboundValue&& value);
+
+  Inbound& inbound_;
+  Outbound& outbound_;
+  std::atomic<std::uint64_t> overflow_{0};
+  std::vector<std::unique_ptr<wire::Subscription>> subscriptions_;
+};
+
+}  // namespace cairn::server

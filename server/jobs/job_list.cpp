@@ -1,0 +1,142 @@
+#include "server/jobs/job_list.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace cairn::server {
+
+JobList::JobList(const JobsOptions& options, std::function<bool(OutboundValue)> send, std::function<Stamp()> now)
+    : options_(options), send_(std::move(send)), now_(std::move(now)) {}
+
+Result<Job> JobList::Add(const std::string& site, JobKind kind) {
+  const MutexLock lock(mutex_);
+  if (!MakeRoom()) {
+    return cairn::Fail(StatusCode::kResourceExhausted, "too many jobs are waiting (jobs.max_kept)");
+  }
+  const std::uint64_t id = next_++;
+  Entry& entry = jobs_[id];
+  entry.job.id = id;
+  entry.job.site = site;
+  entry.job.kind = kind;
+  entry.job.submitted = now_();
+  entry.control = std::make_shared<JobControl>([this, id](double progress) { Progress(id, progress); });
+  SendLocked(entry);
+  return entry.job;
+}
+
+bool JobList::Start(std::uint64_t id) {
+  const MutexLock lock(mutex_);
+  const auto found = jobs_.find(id);
+  if (found == jobs_.end() || found->second.job.state != JobState::kQueued) return false;
+  found->second.job.state = JobState::kRunning;
+  found->second.job.started = now_();
+  SendLocked(found->second);
+  return true;
+}
+
+void JobList::Succeed(std::uint64_t id, const JobOutcome& outcome) {
+  End(id, JobState::kSucceeded, [&outcome](Job& job) {
+    job.progress = 1.0;
+    job.cost_before = outcome.cost_before;
+    job.cost_after = outcome.cost_after;
+    job.map_version = outcome.map_version;
+    job.message = outcome.message;
+  });
+}
+
+void JobList::Fail(std::uint64_t id, const Status& status) {
+  const JobState state = status.code == StatusCode::kCancelled ? JobState::kCancelled : JobState::kFailed;
+  End(id, state, [&status](Job& job) { job.message = status.message; });
+}
+
+void JobList::End(std::uint64_t id, JobState state, const std::function<void(Job&)>& fill) {
+  const MutexLock lock(mutex_);
+  const auto found = jobs_.find(id);
+  if (found == jobs_.end() || IsFinal(found->second.job.state)) return;
+  Job& job = found->second.job;
+  job.state = state;
+  job.ended = now_();
+  fill(job);
+  SendLocked(found->second);
+}
+
+Result<Job> JobList::Cancel(std::uint64_t id) {
+  const MutexLock lock(mutex_);
+  const auto found = jobs_.find(id);
+  if (found == jobs_.end()) return cairn::Fail(StatusCode::kNotFound, "no job " + std::to_string(id));
+  Job& job = found->second.job;
+  if (IsFinal(job.state)) {
+    return cairn::Fail(StatusCode::kFailedPrecondition,
+                       "job " + std::to_string(id) + " is over: " + std::string(JobStateName(job.state)));
+  }
+  found->second.control->Cancel();
+  if (job.state == JobState::kQueued) {
+    job.state = JobState::kCancelled;
+    job.ended = now_();
+    job.message = "cancelled before it started";
+    SendLocked(found->second);
+  }
+  return job;
+}
+
+void JobList::CancelAll() {
+  for (const Job& job : OfSite({})) {
+    if (!IsFinal(job.state)) static_cast<void>(Cancel(job.id));
+  }
+}
+
+Result<Job> JobList::Find(std::uint64_t id) const {
+  const MutexLock lock(mutex_);
+  const auto found = jobs_.find(id);
+  if (found == jobs_.end()) return cairn::Fail(StatusCode::kNotFound, "no job " + std::to_string(id));
+  return found->second.job;
+}
+
+std::vector<Job> JobList::OfSite(const std::string& site) const {
+  const MutexLock lock(mutex_);
+  std::vector<Job> jobs;
+  for (const auto& [id, entry] : jobs_) {
+    if (site.empty() || entry.job.site == site) jobs.push_back(entry.job);
+  }
+  return jobs;
+}
+
+std::shared_ptr<const JobControl> JobList::ControlOf(std::uint64_t id) const {
+  const MutexLock lock(mutex_);
+  const auto found = jobs_.find(id);
+  return found == jobs_.end() ? nullptr : found->second.control;
+}
+
+void JobList::Tick() {
+  const MutexLock lock(mutex_);
+  for (auto& [id, entry] : jobs_) {
+    if (entry.unsent) SendLocked(entry);
+  }
+}
+
+void JobList::Progress(std::uint64_t id, double progress) {
+  const MutexLock lock(mutex_);
+  const auto found = jobs_.find(id);
+  if (found == jobs_.end() || found->second.job.state != JobState::kRunning) return;
+  Entry& entry = found->second;
+  entry.job.progress = std::clamp(progress, entry.job.progress, 1.0);
+  const auto now = std::chrono::steady_clock::now();
+  if (now - entry.progress_sent < std::chrono::duration<double>(1.0 / options_.progress_rate_hz)) return;
+  entry.progress_sent = now;
+  SendLocked(entry);
+}
+
+void JobList::SendLocked(Entry& entry) {
+  entry.unsent = !send_(entry.job);
+}
+
+bool JobList::MakeRoom() {
+  if (jobs_.size() < static_cast<std::size_t>(options_.max_kept)) return true;
+  const auto oldest =
+      std::find_if(jobs_.begin(), jobs_.end(), [](const auto& entry) { return IsFinal(entry.second.job.state); });
+  if (oldest == jobs_.end()) return false;
+  jobs_.erase(oldest);
+  return true;
+}
+
+}  // namespace cairn::server

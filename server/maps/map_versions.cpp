@@ -1,0 +1,51 @@
+#include "server/maps/map_versions.h"
+
+#include <utility>
+
+namespace cairn::server {
+
+MapVersions::MapVersions(std::size_t max_versions) : max_versions_(max_versions) {
+  versions_[1].info = {.version = 1, .enabled = true, .job = 0, .note = "live"};
+}
+
+std::uint32_t MapVersions::Add(MapVersion version) {
+  const std::uint32_t number = next_++;
+  version.info.version = number;
+  version.info.enabled = false;
+  versions_.emplace(number, std::move(version));
+  for (auto it = versions_.begin(); versions_.size() > max_versions_ && it != versions_.end();) {
+    const bool needed = it->first == 1 || it->first == enabled_ || it->first == number;
+    it = needed ? std::next(it) : versions_.erase(it);
+  }
+  return number;
+}
+
+const MapVersion* MapVersions::Find(std::uint32_t version) const {
+  const auto found = versions_.find(version);
+  return found == versions_.end() ? nullptr : &found->second;
+}
+
+void MapVersions::Enable(std::uint32_t version, std::map<SessionId, RobotGrid> displaced) {
+  MapVersion& outgoing = versions_.at(enabled_);
+  for (auto& [session, part] : displaced) outgoing.parts.insert_or_assign(session, std::move(part));
+  outgoing.info.enabled = false;
+  enabled_ = version;
+  versions_.at(version).info.enabled = true;
+}
+
+std::vector<MapVersionInfo> MapVersions::infos() const {
+  std::vector<MapVersionInfo> infos;
+  for (const auto& [number, version] : versions_) infos.push_back(version.info);
+  return infos;
+}
+
+const SmoothedPaths& MapVersions::smoothed() const {
+  const SmoothedPaths& of_enabled = versions_.at(enabled_).smoothed;
+  if (!of_enabled.empty()) return of_enabled;
+  for (auto it = versions_.rbegin(); it != versions_.rend(); ++it) {
+    if (!it->second.smoothed.empty()) return it->second.smoothed;
+  }
+  return of_enabled;
+}
+
+}  // namespace cairn::server

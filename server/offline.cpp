@@ -1,0 +1,19 @@
+// cairn-offline: a log straight through the estimator, no DDS. The proof that slam stands alone.
+// Exit codes: 0 done, 1 failed, 2 wrong command line.
+#include <iostream>
+
+#include "server/offline/options.h"
+#include "server/offline/run.h"
+
+int main(int argc, char** argv) {
+  int exit_code = 0;
+  const auto options = cairn::server::ParseOfflineOptions(argc, argv, exit_code);
+  if (!options) return exit_code;
+  const auto report = cairn::server::RunOffline(*options);
+  if (!report) {
+    std::cerr << "cairn-offline: " << report.error().message << '\n';
+    return 1;
+  }
+  std::cout << (options->json ? ReportJson(*report) : ReportText(*report));
+  return 0;
+}

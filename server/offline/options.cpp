@@ -1,0 +1,77 @@
+#include "server/offline/options.h"
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "common/options/config.h"
+#include "common/version.h"
+
+namespace cairn::server {
+namespace {
+
+// The sections of cairnd.yaml: one file serves both programs, this one reads `slam`.
+void VisitAll(OptionVisitor& visitor, OfflineOptions& options) {
+  visitor.Section("slam", "The estimator.", [&] { slam::Visit(visitor, options.slam); });
+  for (const char* other : {"server", "robots", "maps", "jobs", "wire"}) visitor.Foreign(other);
+}
+
+}  // namespace
+
+std::optional<OfflineOptions> ParseOfflineOptions(int argc, char** argv, int& exit_code) {
+  OfflineOptions options;
+  std::filesystem::path config;
+  std::vector<std::string> assignments;
+  std::vector<double> start;
+  std::optional<std::int64_t> seed;
+  CLI::App app{"Runs the estimator over a robot log without a server: the same trajectory as through cairnd."};
+  app.set_version_flag("--version", std::string("cairn-offline ") + kVersion);
+  app.add_option("LOG", options.log, "CARMEN or DP-SLAM log")->required();
+  app.add_option("--trajectory", options.trajectory, "Write the online trajectory (TUM)");
+  app.add_option("--map", options.map, "Write the online map (map.yaml and an image beside it)");
+  app.add_flag("--smooth", options.smooth, "Also compute the full-SLAM path and redraw the map from it");
+  app.add_option("--smoothed-trajectory", options.smoothed_trajectory, "Write the full-SLAM trajectory (TUM)");
+  app.add_option("--smoothed-map", options.smoothed_map, "Write the map redrawn from the full-SLAM path");
+  app.add_option("--start", start, "Pose of the robot in the map at the start: x,y,theta (m, rad)")
+      ->delimiter(',')
+      ->expected(3);
+  app.add_option("--config", config, "YAML file; its slam section is used (cairnd's file will do)");
+  app.add_option("--set", assignments, "key=value, e.g. slam.particles=100; repeatable, wins over --config");
+  app.add_option("--seed", seed, "Same as --set slam.seed=N");
+  app.add_option("--threads", options.threads, "0: one per core; the output does not depend on it")
+      ->check(CLI::Range(0, 256));
+  app.add_option("--no-return", options.reader.no_return_m, "Ranges from here on hit nothing (m); 0: from the log");
+  app.add_flag("--json", options.json, "One JSON object on standard output");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    exit_code = app.exit(error) == 0 ? 0 : 2;
+    return std::nullopt;
+  }
+  if (start.size() == 3) options.T_map_robot_start = {start[0], start[1], WrapAngle(start[2])};
+  if (!options.T_map_robot_start.IsFinite()) {
+    std::cerr << "cairn-offline: --start must be three finite numbers\n";
+    exit_code = 2;
+    return std::nullopt;
+  }
+  if (seed) assignments.push_back("slam.seed=" + std::to_string(*seed));
+  options.smooth = options.smooth || !options.smoothed_trajectory.empty() || !options.smoothed_map.empty();
+
+  const VisitOptions visit = [&](OptionVisitor& visitor) { VisitAll(visitor, options); };
+  if (!config.empty()) {
+    if (const auto applied = ApplyYamlFile(config, visit); !applied) {
+      std::cerr << "cairn-offline: " << applied.error().message << '\n';
+      exit_code = 1;
+      return std::nullopt;
+    }
+  }
+  if (const auto applied = ApplySet(assignments, visit); !applied) {
+    std::cerr << "cairn-offline: " << applied.error().message << '\n';
+    exit_code = 2;
+    return std::nullopt;
+  }
+  return options;
+}
+
+}  // namespace cairn::server

@@ -1,0 +1,31 @@
+// cairn-offline's command line.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "common/geometry/pose2.h"
+#include "common/sensor/log_reader.h"
+#include "server/slam/mapper_options.h"
+
+namespace cairn::server {
+
+struct OfflineOptions {
+  std::filesystem::path log;
+  std::filesystem::path trajectory;  // Empty: not written. So with the others.
+  std::filesystem::path map;
+  bool smooth = false;
+  std::filesystem::path smoothed_trajectory;
+  std::filesystem::path smoothed_map;
+  Pose2 T_map_robot_start;
+  std::int64_t threads = 0;  // 0: one per core.
+  bool json = false;
+  LogReaderOptions reader;
+  slam::MapperOptions slam;
+};
+
+// Nothing where the program is to end at once with `exit_code`: 0 after --help or --version, 1 for a configuration file
+// that cannot be used, 2 for a wrong command line. What was wrong is on standard error.
+[[nodiscard]] std::optional<OfflineOptions> ParseOfflineOptions(int argc, char** argv, int& exit_code);
+
+}  // namespace cairn::server

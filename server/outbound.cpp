@@ -1,0 +1,35 @@
+#include "server/outbound.h"
+
+#include <utility>
+
+namespace cairn::server {
+
+Outbound::Outbound(std::size_t capacity_per_lane)
+    : lanes_{BoundedChannel<OutboundValue>(capacity_per_lane), BoundedChannel<OutboundValue>(capacity_per_lane),
+             BoundedChannel<OutboundValue>(capacity_per_lane)} {}
+
+bool Outbound::Send(OutboundValue value) {
+  const Lane of_value = LaneOf(value);
+  if (lane(of_value).TryPush(std::move(value))) return true;
+  refused_.fetch_add(1, std::memory_order_relaxed);
+  return false;
+}
+
+bool Outbound::SendPatiently(OutboundValue value) {
+  const Lane of_value = LaneOf(value);
+  if (lane(of_value).Push(std::move(value))) return true;
+  refused_.fetch_add(1, std::memory_order_relaxed);
+  return false;
+}
+
+void Outbound::Close() {
+  for (auto& lane : lanes_) lane.Close();
+}
+
+Outbound::Lane Outbound::LaneOf(const OutboundValue& value) {
+  if (std::holds_alternative<Reply>(value)) return Lane::kReplies;
+  if (std::holds_alternative<MapInfo>(value) || std::holds_alternative<TileSample>(value)) return Lane::kMap;
+  return Lane::kLive;
+}
+
+}  // namespace cairn::server

@@ -1,0 +1,47 @@
+// What the rooms hand to the doors: plain values over bounded lanes. The only way out.
+// Three lanes, so that a large answer or a whole map never delays a pose: `live` (session states, poses, ledgers,
+// jobs), `map` (map info, tiles), `replies`. Overflow rule: Send never waits and says false; values that describe a
+// state (session, ledger, map, tile, job) stay marked as unsent with their owner, who sends their newest form later; a
+// pose is superseded by the next; a reply is lost and its client's deadline passes. Every loss is counted. Thread rule:
+// any thread.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <variant>
+
+#include "common/bounded_channel.h"
+#include "common/service/request.h"
+#include "common/service/stream.h"
+
+namespace cairn::server {
+
+using OutboundValue = std::variant<SessionState, PoseReport, Ledger, Job, MapInfo, TileSample, Reply>;
+
+class Outbound {
+ public:
+  enum class Lane { kLive = 0, kMap, kReplies };
+  static constexpr int kLanes = 3;
+
+  explicit Outbound(std::size_t capacity_per_lane);
+
+  bool Send(OutboundValue value);
+  // As Send, but waits for room until Close: only for the thread that answers queries, whose own queue then fills and
+  // refuses. The door's reader always moves on (its writes have a bounded blocking time).
+  bool SendPatiently(OutboundValue value);
+  [[nodiscard]] std::uint64_t refused() const { return refused_.load(std::memory_order_relaxed); }
+
+  // The door's side: one reader per lane.
+  [[nodiscard]] BoundedChannel<OutboundValue>& lane(Lane lane) { return lanes_[static_cast<std::size_t>(lane)]; }
+  // No more sending; readers get what is left, then the end.
+  void Close();
+
+ private:
+  static Lane LaneOf(const OutboundValue& value);
+
+  std::array<BoundedChannel<OutboundValue>, kLanes> lanes_;
+  std::atomic<std::uint64_t> refused_{0};
+};
+
+}  // namespace cairn::server

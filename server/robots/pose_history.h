@@ -1,0 +1,67 @@
+// The poses of one session as they were published, for `path` and for poses at past stamps. Append-only in increasing
+// stamps; readers get a PathView that never changes. Blocks of 256 poses are shared, so a view costs one pointer per
+// block. Bounded: beyond `max_poses` the older half keeps every second pose.
+// Thread rule: PoseHistory belongs to the session's lock; a PathView may be read anywhere.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "common/sensor/trajectory.h"
+#include "common/service/pose_report.h"
+
+namespace cairn::server {
+
+// A pose with what its report said of it.
+struct PathPose {
+  Stamp stamp = 0;
+  Pose2 T_map_robot;
+  float score = 0.0F;
+  bool localized = false;
+  PoseReason reason = PoseReason::kWaiting;
+};
+
+class PathView {
+ public:
+  using Block = std::shared_ptr<const std::vector<PathPose>>;
+
+  PathView() = default;
+  explicit PathView(std::vector<Block> blocks) : blocks_(std::move(blocks)) {}
+
+  [[nodiscard]] bool empty() const { return blocks_.empty(); }
+  [[nodiscard]] std::size_t size() const;
+  [[nodiscard]] Stamp first_stamp() const { return blocks_.front()->front().stamp; }
+  [[nodiscard]] Stamp last_stamp() const { return blocks_.back()->back().stamp; }
+  // Interpolated between the two poses around `stamp`, with the worse one's score and reason; nothing outside
+  // first_stamp()..last_stamp().
+  [[nodiscard]] std::optional<PathPose> At(Stamp stamp) const;
+  [[nodiscard]] Trajectory ToTrajectory() const;
+
+ private:
+  std::vector<Block> blocks_;  // None empty; stamps increase through all of them.
+};
+
+class PoseHistory {
+ public:
+  explicit PoseHistory(std::size_t max_poses) : max_poses_(max_poses) {}
+
+  // A stamp not after the last one is left out: a path has increasing stamps.
+  void Append(const PathPose& pose);
+  [[nodiscard]] PathView view() const;
+  [[nodiscard]] std::size_t size() const { return size_; }
+
+ private:
+  static constexpr std::size_t kBlockPoses = 256;
+
+  void ThinOlderHalf();
+
+  const std::size_t max_poses_;
+  std::size_t size_ = 0;
+  std::vector<PathView::Block> full_;  // Immutable from here on.
+  std::vector<PathPose> tail_;         // Fewer than kBlockPoses.
+};
+
+}  // namespace cairn::server

@@ -1,0 +1,57 @@
+// The one front door of a robot's estimator: events in order of arrival, three lanes, each with a bound and a rule.
+// Overflow rules:
+//  - scans: the oldest waiting one gives way and is returned, for the ledger (queue_full);
+//  - odometry: the two oldest become one; poses in `odom` are absolute, so leaving out the older keeps all motion;
+//  - corrections: the newest wins; one displaced is returned and never adopted;
+//  - snapshots, finish, probes: at most kMaxControl wait; more are refused.
+// Thread rule: any thread.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+
+#include "common/mutex.h"
+#include "server/robots/robot_event.h"
+
+namespace cairn::server {
+
+class RobotQueue {
+ public:
+  static constexpr std::size_t kMaxControl = 64;
+
+  RobotQueue(std::size_t max_scans, std::size_t max_odometry) : max_scans_(max_scans), max_odometry_(max_odometry) {}
+
+  // The scan that gave way, if any.
+  std::optional<ScanArrival> Push(ScanArrival scan);
+  // The sample that was merged into its successor, if any.
+  std::optional<OdometryArrival> Push(OdometryArrival odometry);
+  // The correction that was superseded, if any.
+  std::optional<Correction> Push(Correction correction);
+  // Snapshot, finish or probe; false where too many wait.
+  bool PushControl(RobotEvent event);
+
+  // The event that arrived first.
+  [[nodiscard]] std::optional<RobotEvent> Pop();
+  // Takes all waiting scans out, oldest first (the server stops and has no time left).
+  [[nodiscard]] std::deque<ScanArrival> TakeScans();
+  [[nodiscard]] bool empty() const;
+
+ private:
+  template <typename T>
+  struct Arrived {
+    std::uint64_t number;
+    T event;
+  };
+
+  const std::size_t max_scans_;
+  const std::size_t max_odometry_;
+
+  mutable Mutex mutex_;
+  std::uint64_t next_ CAIRN_GUARDED_BY(mutex_) = 0;
+  std::deque<Arrived<ScanArrival>> scans_ CAIRN_GUARDED_BY(mutex_);
+  std::deque<Arrived<OdometryArrival>> odometry_ CAIRN_GUARDED_BY(mutex_);
+  std::deque<Arrived<RobotEvent>> control_ CAIRN_GUARDED_BY(mutex_);
+};
+
+}  // namespace cairn::server

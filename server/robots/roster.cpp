@@ -1,0 +1,228 @@
+#include "server/robots/roster.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace cairn::server {
+namespace {
+
+constexpr double kMaxStartDistanceM = 1e6;
+
+Result<void> ValidateRequest(const SessionRequest& request) {
+  if (auto valid = ValidateName("robot", request.robot); !valid) return valid;
+  if (auto valid = ValidateName("site", request.site); !valid) return valid;
+  if (request.client == 0) return Fail(StatusCode::kInvalidArgument, "client id 0 names nobody");
+  if (request.sensors.empty()) return Fail(StatusCode::kInvalidArgument, "no sensor is named");
+  if (request.sensors.size() > SessionRecord::kMaxSensors) {
+    return Fail(StatusCode::kInvalidArgument, std::to_string(request.sensors.size()) + " sensors; at most 16");
+  }
+  for (const std::string& sensor : request.sensors) {
+    if (auto valid = ValidateName("sensor", sensor); !valid) return valid;
+  }
+  if (request.has_start) {
+    const Pose2& start = request.T_map_robot_start;
+    if (!start.IsFinite() || std::abs(start.x) > kMaxStartDistanceM || std::abs(start.y) > kMaxStartDistanceM) {
+      return Fail(StatusCode::kInvalidArgument, "the start pose is not finite or more than 1000 km away");
+    }
+  }
+  return {};
+}
+
+Pose2 StartOf(const SessionRequest& request) {
+  if (!request.has_start) return {};
+  Pose2 start = request.T_map_robot_start;
+  start.theta = WrapAngle(start.theta);
+  return start;
+}
+
+}  // namespace
+
+Roster::Roster(const RobotsOptions& options, const slam::MapperOptions& mapper, asio::thread_pool& pool,
+               RosterPorts ports)
+    : options_(options),
+      mapper_(mapper),
+      pool_(pool),
+      ports_(std::move(ports)),
+      unclaimed_(static_cast<std::size_t>(options.max_unclaimed)) {}
+
+void Roster::Take(const SessionRequest& request) {
+  if (request.end) {
+    const std::shared_ptr<Session> session = Find(request.robot);
+    if (session == nullptr) {
+      Refuse(request, {StatusCode::kNotFound, "robot '" + request.robot + "' has no session"});
+    } else if (session->record().owner() != request.client) {
+      Refuse(request, {StatusCode::kPermissionDenied, "another client owns the session of '" + request.robot + "'"});
+    } else {
+      session->End();
+    }
+    return;
+  }
+  if (auto admitted = Admit(request); !admitted) Refuse(request, admitted.error());
+}
+
+Result<void> Roster::Admit(const SessionRequest& request) {
+  if (auto valid = ValidateRequest(request); !valid) return valid;
+  std::shared_ptr<Session> session;
+  {
+    const MutexLock lock(mutex_);
+    const auto found = sessions_.find(HashName(request.robot));
+    if (found != sessions_.end()) session = found->second;
+  }
+  if (session == nullptr || session->record().phase() == SessionPhase::kEnded) return Open(request);
+  if (session->ending()) {
+    return Fail(StatusCode::kUnavailable, "the last session of '" + request.robot + "' is still ending; try again");
+  }
+  return Resume(*session, request);
+}
+
+Result<void> Roster::Resume(Session& session, const SessionRequest& request) {
+  const SessionState state = session.record().state();
+  if (state.robot != request.robot) {
+    return Fail(StatusCode::kAlreadyExists,
+                "the names '" + request.robot + "' and '" + state.robot + "' share an id; choose another name");
+  }
+  if (state.client != request.client && session.record().alive()) {
+    return Fail(StatusCode::kAlreadyExists, "another live client streams as '" + request.robot + "'");
+  }
+  if (state.site != request.site) {
+    return Fail(StatusCode::kFailedPrecondition,
+                "'" + request.robot + "' has an open session in site '" + state.site + "'; end it first");
+  }
+  if (!session.record().AddSensors(request.sensors)) {
+    return Fail(StatusCode::kResourceExhausted, "more than 16 sensors in one session");
+  }
+  session.Resume(request.client);
+  return {};
+}
+
+Result<void> Roster::Open(const SessionRequest& request) {
+  const auto epoch = ports_.enter_site(request.site);
+  if (!epoch) return tl::unexpected(epoch.error());
+  const NameId robot_id = HashName(request.robot);
+  std::shared_ptr<Session> session;
+  {
+    const MutexLock lock(mutex_);
+    sessions_.erase(robot_id);
+    if (auto room = MakeRoom(); !room) return room;
+    const SessionSetup setup{.id = next_id_++,
+                             .request = request,
+                             .map_epoch = *epoch,
+                             .estimator = {.mapper = mapper_, .T_map_robot_start = StartOf(request)}};
+    session = std::make_shared<Session>(
+        setup, options_, pool_,
+        SessionOutputs{.send = ports_.send, .grid_changed = [this, site = request.site](GridChange&& change) {
+                         ports_.grid_changed(site, std::move(change));
+                       }});
+    session->record().AddSensors(request.sensors);
+    for (const std::string& sensor : request.sensors) {
+      if (auto account = unclaimed_.Claim(robot_id, HashName(sensor))) {
+        session->record().Inherit(HashName(sensor), std::move(*account));
+      }
+    }
+    sessions_.emplace(robot_id, session);
+  }
+  session->Resume(request.client);
+  ports_.robots_changed(request.site);
+  return {};
+}
+
+Result<void> Roster::MakeRoom() {
+  if (sessions_.size() < static_cast<std::size_t>(options_.max_robots)) return {};
+  auto oldest = sessions_.end();
+  for (auto it = sessions_.begin(); it != sessions_.end(); ++it) {
+    if (it->second->record().phase() != SessionPhase::kEnded) continue;
+    if (oldest == sessions_.end() || it->second->id() < oldest->second->id()) oldest = it;
+  }
+  if (oldest == sessions_.end()) {
+    return Fail(StatusCode::kResourceExhausted,
+                std::to_string(sessions_.size()) + " robots have open sessions; the limit is robots.max_robots");
+  }
+  sessions_.erase(oldest);
+  return {};
+}
+
+void Roster::Refuse(const SessionRequest& request, Status status) {
+  const NameId robot_id = HashName(request.robot);
+  ports_.send(SessionState{.robot_id = robot_id,
+                           .client = request.client,
+                           .robot = request.robot,
+                           .site = request.site,
+                           .phase = SessionPhase::kRefused,
+                           .status = std::move(status)});
+}
+
+void Roster::Take(ScanArrival&& arrival) {
+  const StreamId stream = arrival.stream;
+  const std::uint64_t sequence = arrival.scan->sequence;
+  std::shared_ptr<Session> session;
+  {
+    const MutexLock lock(mutex_);
+    const auto found = sessions_.find(stream.robot_id);
+    if (found != sessions_.end()) session = found->second;
+  }
+  const DropReason reason =
+      session != nullptr && session->record().owner() != stream.client ? DropReason::kNotOwner : DropReason::kNoSession;
+  if (session != nullptr && session->Take(std::move(arrival))) return;
+  const MutexLock lock(mutex_);
+  unclaimed_.Count(stream, sequence, reason);
+}
+
+void Roster::Take(OdometryArrival&& arrival) {
+  std::shared_ptr<Session> session;
+  {
+    const MutexLock lock(mutex_);
+    const auto found = sessions_.find(arrival.stream.robot_id);
+    if (found != sessions_.end()) session = found->second;
+  }
+  if (session != nullptr) session->Take(std::move(arrival));
+}
+
+void Roster::Take(const ClientLiveliness& liveliness) {
+  for (const auto& session : All()) {
+    if (session->record().owner() == liveliness.client) session->SetLiveliness(liveliness.alive);
+  }
+}
+
+Result<void> Roster::End(const std::string& robot) {
+  const std::shared_ptr<Session> session = Find(robot);
+  if (session == nullptr) return Fail(StatusCode::kNotFound, "robot '" + robot + "' has no session");
+  session->End();
+  return {};
+}
+
+void Roster::Tick() {
+  for (const auto& session : All()) session->Tick();
+  const MutexLock lock(mutex_);
+  for (Ledger& ledger : unclaimed_.TakeChanged()) ports_.send(std::move(ledger));
+}
+
+std::shared_ptr<Session> Roster::Find(const std::string& robot) const {
+  const MutexLock lock(mutex_);
+  const auto found = sessions_.find(HashName(robot));
+  if (found == sessions_.end() || found->second->record().state().robot != robot) return nullptr;
+  return found->second;
+}
+
+std::vector<std::shared_ptr<Session>> Roster::All() const {
+  const MutexLock lock(mutex_);
+  std::vector<std::shared_ptr<Session>> all;
+  all.reserve(sessions_.size());
+  for (const auto& [robot_id, session] : sessions_) all.push_back(session);
+  return all;
+}
+
+std::vector<std::shared_ptr<Session>> Roster::InSite(const std::string& site) const {
+  std::vector<std::shared_ptr<Session>> in_site;
+  for (const auto& session : All()) {
+    if (session->record().state().site == site) in_site.push_back(session);
+  }
+  return in_site;
+}
+
+std::uint64_t Roster::unclaimed_overflow() const {
+  const MutexLock lock(mutex_);
+  return unclaimed_.overflow();
+}
+
+}  // namespace cairn::server

@@ -1,0 +1,69 @@
+// Who is here: every session by robot, and who may open one. The door's events are routed from here to the session they
+// belong to; scans without one are counted as unclaimed.
+// Rules of opening: a robot has one session; its owner, or anyone once the owner's liveliness lease is gone, resumes
+// it; another live client is refused (ALREADY_EXISTS). An ended session gives way to a new one. When max_robots is
+// reached, the ended session that is oldest is forgotten first (its part of the map stays). Thread rule: any thread;
+// nothing here waits for an estimator.
+#pragma once
+
+#include <asio/thread_pool.hpp>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/mutex.h"
+#include "server/robots/robots_options.h"
+#include "server/robots/session.h"
+#include "server/robots/unclaimed_streams.h"
+
+namespace cairn::server {
+
+struct RosterPorts {
+  std::function<bool(OutboundValue)> send;
+  // The site's map epoch; NOT_FOUND for a site the server does not serve.
+  std::function<Result<std::uint32_t>(const std::string& site)> enter_site;
+  std::function<void(const std::string& site, GridChange&&)> grid_changed;
+  std::function<void(const std::string& site)> robots_changed;  // Sessions came or went.
+};
+
+class Roster {
+ public:
+  Roster(const RobotsOptions& options, const slam::MapperOptions& mapper, asio::thread_pool& pool, RosterPorts ports);
+
+  // Opens, resumes, refuses or ends; the answer goes out as a SessionState.
+  void Take(const SessionRequest& request);
+  void Take(ScanArrival&& arrival);
+  void Take(OdometryArrival&& arrival);
+  void Take(const ClientLiveliness& liveliness);
+  // NOT_FOUND without such a session.
+  Result<void> End(const std::string& robot);
+  // Publishes what is due.
+  void Tick();
+
+  [[nodiscard]] std::shared_ptr<Session> Find(const std::string& robot) const;
+  [[nodiscard]] std::vector<std::shared_ptr<Session>> All() const;
+  [[nodiscard]] std::vector<std::shared_ptr<Session>> InSite(const std::string& site) const;
+  [[nodiscard]] std::uint64_t unclaimed_overflow() const;
+
+ private:
+  Result<void> Admit(const SessionRequest& request);
+  Result<void> Resume(Session& session, const SessionRequest& request);
+  Result<void> Open(const SessionRequest& request);
+  Result<void> MakeRoom() CAIRN_REQUIRES(mutex_);
+  void Refuse(const SessionRequest& request, Status status);
+
+  const RobotsOptions options_;
+  const slam::MapperOptions mapper_;
+  asio::thread_pool& pool_;
+  const RosterPorts ports_;
+
+  mutable Mutex mutex_;
+  std::map<NameId, std::shared_ptr<Session>> sessions_ CAIRN_GUARDED_BY(mutex_);
+  UnclaimedStreams unclaimed_ CAIRN_GUARDED_BY(mutex_);
+  SessionId next_id_ CAIRN_GUARDED_BY(mutex_) = 1;
+};
+
+}  // namespace cairn::server

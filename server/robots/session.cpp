@@ -1,0 +1,149 @@
+#include "server/robots/session.h"
+
+#include <asio/post.hpp>
+#include <utility>
+
+namespace cairn::server {
+
+Session::Session(const SessionSetup& setup, const RobotsOptions& options, asio::thread_pool& pool,
+                 SessionOutputs outputs)
+    : id_(setup.id),
+      outputs_(std::move(outputs)),
+      record_(setup.id, setup.request, options),
+      queue_(static_cast<std::size_t>(options.queue_scans), static_cast<std::size_t>(options.queue_odometry)),
+      strand_(asio::make_strand(pool)),
+      estimator_(
+          [&] {
+            record_.SetEpoch(setup.map_epoch);
+            return setup.estimator;
+          }(),
+          options, record_, outputs_) {}
+
+bool Session::Take(ScanArrival&& arrival) {
+  const NameId sensor = arrival.stream.sensor_id;
+  const std::uint64_t sequence = arrival.scan->sequence;
+  if (arrival.stream.client != record_.owner()) {
+    const bool known = record_.ForeignScan(sensor, DropReason::kNotOwner) != SessionRecord::Arrival::kUnknownSensor;
+    PublishLedgers(SessionRecord::Urgency::kWhenDue);
+    return known;
+  }
+  const SessionRecord::Arrival kind = record_.ScanReceived(sensor, sequence);
+  if (kind != SessionRecord::Arrival::kNew) return kind == SessionRecord::Arrival::kDuplicate;
+  if (ending_ || arrival.refused) {
+    record_.ScanDropped(sensor, sequence, arrival.refused.value_or(DropReason::kSessionEnded));
+    PublishLedgers(SessionRecord::Urgency::kWhenDue);
+    return true;
+  }
+  if (const auto displaced = queue_.Push(std::move(arrival))) {
+    record_.ScanDropped(displaced->stream.sensor_id, displaced->scan->sequence, DropReason::kQueueFull);
+  }
+  Schedule();
+  return true;
+}
+
+void Session::Take(OdometryArrival&& arrival) {
+  if (arrival.stream.client != record_.owner()) return;
+  record_.OdometryReceived();
+  if (arrival.refused || ending_) {
+    record_.OdometryDropped();
+    return;
+  }
+  if (queue_.Push(std::move(arrival))) record_.OdometryMerged();
+  Schedule();
+}
+
+void Session::Adopt(Correction&& correction) {
+  queue_.Push(std::move(correction));
+  Schedule();
+}
+
+bool Session::Post(RobotEvent&& control) {
+  if (!queue_.PushControl(std::move(control))) return false;
+  Schedule();
+  return true;
+}
+
+void Session::SetLiveliness(bool alive) {
+  record_.SetAlive(alive);
+  const SessionPhase wanted = alive ? SessionPhase::kActive : SessionPhase::kSuspended;
+  if (ending_ || record_.phase() == wanted) return;
+  record_.SetPhase(wanted, alive ? Status{} : Status{StatusCode::kUnavailable, "the robot's client is not alive"});
+  AnnounceState();
+}
+
+void Session::Resume(ClientId client) {
+  record_.Resume(client);
+  AnnounceState();
+}
+
+void Session::End() {
+  if (ending_.exchange(true)) {
+    if (record_.phase() == SessionPhase::kEnded) AnnounceState();  // Whoever asks again gets the answer again.
+    return;
+  }
+  // The end must not be refused by a full control lane: it is asked for once and outlives a burst of snapshots.
+  const bool posted =
+      Post(Finish{.final = true, .done = [self = shared_from_this()] { self->Finished(SessionPhase::kEnded, {}); }});
+  if (!posted) ending_ = false;
+}
+
+void Session::Suspend(std::function<void()> done) {
+  if (ending_.exchange(true)) {
+    if (!Post(Probe{done})) done();
+    return;
+  }
+  const bool posted =
+      Post(Finish{.final = false, .done = [self = shared_from_this(), done] {
+                    self->Finished(SessionPhase::kSuspended, {StatusCode::kUnavailable, "the server is stopping"});
+                    done();
+                  }});
+  if (!posted) done();
+}
+
+void Session::Abandon() {
+  for (const ScanArrival& scan : queue_.TakeScans()) {
+    record_.ScanDropped(scan.stream.sensor_id, scan.scan->sequence, DropReason::kSessionEnded);
+  }
+}
+
+void Session::Tick() {
+  if (state_unsent_) AnnounceState();
+  PublishLedgers(SessionRecord::Urgency::kWhenDue);
+}
+
+void Session::Finished(SessionPhase phase, Status status) {
+  record_.SetPhase(phase, std::move(status));
+  PublishLedgers(SessionRecord::Urgency::kNow);
+  AnnounceState();
+}
+
+void Session::AnnounceState() {
+  state_unsent_ = !outputs_.send(record_.state());
+}
+
+void Session::PublishLedgers(SessionRecord::Urgency urgency) {
+  for (Ledger& ledger : record_.TakeDueLedgers(SessionRecord::Clock::now(), urgency)) {
+    const NameId sensor_id = ledger.sensor_id;
+    if (!outputs_.send(std::move(ledger))) record_.MarkUnsent(sensor_id);
+  }
+}
+
+void Session::Schedule() {
+  if (scheduled_.exchange(true)) return;
+  asio::post(strand_, [self = shared_from_this()] { self->Drain(); });
+}
+
+void Session::Drain() {
+  for (int i = 0; i < kEventsPerTurn; ++i) {
+    std::optional<RobotEvent> event = queue_.Pop();
+    if (!event) break;
+    estimator_.Handle(std::move(*event));
+  }
+  const bool drained = queue_.empty();
+  PublishLedgers(drained ? SessionRecord::Urgency::kDrained : SessionRecord::Urgency::kWhenDue);
+  scheduled_ = false;
+  // An event that came between the last Pop and the line above found `scheduled_` set and relies on this turn.
+  if (!queue_.empty()) Schedule();
+}
+
+}  // namespace cairn::server

@@ -1,0 +1,75 @@
+// One run of a robot in a site: its owner, its queue, its strand and its estimator. Survives disconnection; ends on
+// request. What arrives is admitted or refused at once (owner, phase, duplicate), queued, and handled on the strand in
+// order of arrival; sessions run in parallel on one thread pool.
+// Thread rule: any thread may call; nothing here waits for the estimator.
+#pragma once
+
+#include <asio/strand.hpp>
+#include <asio/thread_pool.hpp>
+#include <atomic>
+#include <memory>
+
+#include "server/robots/robot_queue.h"
+#include "server/robots/session_estimator.h"
+#include "server/robots/session_record.h"
+
+namespace cairn::server {
+
+struct SessionSetup {
+  SessionId id = 0;
+  SessionRequest request;
+  std::uint32_t map_epoch = 0;
+  EstimatorSetup estimator;
+};
+
+class Session : public std::enable_shared_from_this<Session> {
+ public:
+  Session(const SessionSetup& setup, const RobotsOptions& options, asio::thread_pool& pool, SessionOutputs outputs);
+
+  // False where the stream is not this session's: an undeclared sensor.
+  bool Take(ScanArrival&& arrival);
+  void Take(OdometryArrival&& arrival);
+  // The newest correction wins; one still waiting is dropped without a call to its `done`.
+  void Adopt(Correction&& correction);
+  // Snapshot or probe; false where too many wait.
+  bool Post(RobotEvent&& control);
+
+  // The owner's liveliness lease was lost or came back: kSuspended or kActive.
+  void SetLiveliness(bool alive);
+  void Resume(ClientId client);
+  // Scans that arrived are finished, then the session has ended for good.
+  void End();
+  // As End, but the session is only suspended, because the server stops; `done` is called on the strand.
+  void Suspend(std::function<void()> done);
+  // Drops the scans still waiting; what is being estimated is finished.
+  void Abandon();
+  // Publishes ledgers that are due and whatever could not be sent before.
+  void Tick();
+
+  [[nodiscard]] SessionRecord& record() { return record_; }
+  [[nodiscard]] const SessionRecord& record() const { return record_; }
+  [[nodiscard]] SessionId id() const { return id_; }
+  // Its end was asked for; it may still have scans to finish.
+  [[nodiscard]] bool ending() const { return ending_; }
+
+ private:
+  static constexpr int kEventsPerTurn = 8;  // Then the strand makes room for the pool's other work.
+
+  void Schedule();
+  void Drain();
+  void AnnounceState();
+  void PublishLedgers(SessionRecord::Urgency urgency);
+  void Finished(SessionPhase phase, Status status);
+
+  const SessionId id_;
+  const SessionOutputs outputs_;
+  SessionRecord record_;
+  RobotQueue queue_;
+  std::atomic<bool> ending_{false};  // An end was asked for: nothing new is taken.
+  std::atomic<bool> state_unsent_{false};
+  std::atomic<bool> scheduled_{false};
+  asio::strand<asio::thread_pool::executor_type> strand_;
+  SessionEstimator estimator_;  // Strand only.
+};
+
+}  // namespace cairn::server

@@ -1,0 +1,66 @@
+// The strand's side of a session: takes one event after the other and moves the estimator, the record and the map.
+// Not a queue and not an owner: it never asks who sent an event. After Finish it still answers snapshots and adopts
+// corrections, so that a finished robot's part of the map can be smoothed.
+// Thread rule: one thread at a time (the session's strand).
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <unordered_map>
+
+#include "server/outbound.h"
+#include "server/robots/robot_event.h"
+#include "server/robots/session_record.h"
+#include "server/slam/scan_pipeline.h"
+
+namespace cairn::server {
+
+// How a session speaks to the rest of the house. Both never wait.
+struct SessionOutputs {
+  std::function<bool(OutboundValue)> send;
+  std::function<void(GridChange&&)> grid_changed;
+};
+
+struct EstimatorSetup {
+  slam::MapperOptions mapper;
+  Pose2 T_map_robot_start;
+};
+
+class SessionEstimator {
+ public:
+  SessionEstimator(const EstimatorSetup& setup, const RobotsOptions& options, SessionRecord& record,
+                   SessionOutputs outputs);
+
+  void Handle(RobotEvent&& event);
+
+ private:
+  struct Waiting {
+    NameId sensor_id = 0;
+    std::chrono::steady_clock::time_point received;
+  };
+
+  void On(ScanArrival&& arrival);
+  void On(OdometryArrival&& arrival);
+  void On(Correction&& correction);
+  void On(SnapshotWanted&& wanted);
+  void On(Finish&& finish);
+  void On(Probe&& probe);
+  void Used(const Scan& scan, const slam::ScanOutcome& outcome);
+  void Dropped(const Scan& scan, DropReason reason);
+  Waiting TakeWaiting(const Scan& scan);
+  GridChange TakeGridChange();
+  slam::OccupancyGrid::Chunks PublishedChunks();
+  void RefreshLandmarks(bool at_once);
+
+  const std::chrono::duration<double> landmark_period_;
+  SessionRecord& record_;
+  const SessionOutputs outputs_;
+  const SessionSnapshot identity_;  // Names and id; its other parts are empty.
+  std::uint32_t epoch_ = 0;
+  bool ended_ = false;
+  std::unordered_map<const Scan*, Waiting> waiting_;  // Scans inside the pipeline; its pairing bounds them.
+  std::chrono::steady_clock::time_point landmarks_refreshed_{};
+  slam::ScanPipeline pipeline_;
+};
+
+}  // namespace cairn::server

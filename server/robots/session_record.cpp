@@ -1,0 +1,209 @@
+#include "server/robots/session_record.h"
+
+#include <utility>
+
+namespace cairn::server {
+
+SessionRecord::SessionRecord(SessionId id, const SessionRequest& request, const RobotsOptions& options)
+    : id_(id),
+      ledger_period_(
+          std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / options.ledger_rate_hz))),
+      history_(static_cast<std::size_t>(options.max_path_poses)),
+      landmarks_(std::make_shared<const std::vector<LandmarkReport>>()) {
+  const MutexLock lock(mutex_);
+  const NameId robot_id = HashName(request.robot);
+  status_.session = {.robot_id = robot_id,
+                     .client = request.client,
+                     .robot = request.robot,
+                     .site = request.site,
+                     .phase = SessionPhase::kActive,
+                     .status = {}};
+  status_.alive = true;
+  status_.pose.robot_id = robot_id;
+  status_.pose.robot = request.robot;
+  status_.pose.site = request.site;
+  if (request.has_start) status_.pose.T_map_robot = request.T_map_robot_start;
+}
+
+Ledger SessionRecord::NamesOf(NameId sensor_id, const std::string& sensor) const {
+  Ledger names;
+  names.robot_id = status_.session.robot_id;
+  names.sensor_id = sensor_id;
+  names.robot = status_.session.robot;
+  names.sensor = sensor;
+  names.site = status_.session.site;
+  return names;
+}
+
+bool SessionRecord::AddSensors(const std::vector<std::string>& sensors) {
+  const MutexLock lock(mutex_);
+  std::map<NameId, Stream> added;
+  for (const std::string& sensor : sensors) {
+    const NameId sensor_id = HashName(sensor);
+    if (!streams_.contains(sensor_id)) added.emplace(sensor_id, Stream{StreamLedger(NamesOf(sensor_id, sensor))});
+  }
+  if (streams_.size() + added.size() > kMaxSensors) return false;
+  streams_.merge(added);
+  return true;
+}
+
+void SessionRecord::Inherit(NameId sensor_id, StreamLedger&& account) {
+  const MutexLock lock(mutex_);
+  Stream* const stream = Find(sensor_id);
+  if (stream == nullptr) return;
+  account.Rename(stream->account.ledger());
+  stream->account = std::move(account);
+}
+
+SessionRecord::Stream* SessionRecord::Find(NameId sensor_id) {
+  const auto found = streams_.find(sensor_id);
+  return found == streams_.end() ? nullptr : &found->second;
+}
+
+SessionRecord::Arrival SessionRecord::ScanReceived(NameId sensor_id, std::uint64_t sequence) {
+  const MutexLock lock(mutex_);
+  Stream* const stream = Find(sensor_id);
+  if (stream == nullptr) return Arrival::kUnknownSensor;
+  if (!stream->account.Received(sequence)) return Arrival::kDuplicate;
+  stream->changed = true;
+  return Arrival::kNew;
+}
+
+void SessionRecord::ScanDropped(NameId sensor_id, std::uint64_t sequence, DropReason reason) {
+  const MutexLock lock(mutex_);
+  if (Stream* const stream = Find(sensor_id)) {
+    stream->account.Dropped(sequence, reason);
+    stream->changed = true;
+  }
+}
+
+void SessionRecord::ScanUsed(NameId sensor_id, const PoseReport& pose, bool keyframe, double latency_ms) {
+  const MutexLock lock(mutex_);
+  status_.pose = pose;
+  history_.Append({pose.stamp, pose.T_map_robot, static_cast<float>(pose.score), pose.localized, pose.reason});
+  if (Stream* const stream = Find(sensor_id)) {
+    stream->account.Used(pose.scan_sequence, pose.stamp, keyframe, latency_ms);
+    stream->changed = true;
+  }
+}
+
+SessionRecord::Arrival SessionRecord::ForeignScan(NameId sensor_id, DropReason reason) {
+  const MutexLock lock(mutex_);
+  Stream* const stream = Find(sensor_id);
+  if (stream == nullptr) return Arrival::kUnknownSensor;
+  stream->account.DroppedForeign(reason);
+  stream->changed = true;
+  return Arrival::kNew;
+}
+
+void SessionRecord::OdometryReceived() {
+  const MutexLock lock(mutex_);
+  ++odometry_received_;
+}
+
+void SessionRecord::OdometryDropped() {
+  const MutexLock lock(mutex_);
+  ++odometry_dropped_;
+}
+
+void SessionRecord::OdometryMerged() {
+  const MutexLock lock(mutex_);
+  ++odometry_merged_;
+}
+
+void SessionRecord::SetLandmarks(std::vector<LandmarkReport> landmarks) {
+  auto shared = std::make_shared<const std::vector<LandmarkReport>>(std::move(landmarks));
+  const MutexLock lock(mutex_);
+  landmarks_.swap(shared);
+}
+
+void SessionRecord::SetEpoch(std::uint32_t epoch) {
+  const MutexLock lock(mutex_);
+  status_.pose.map_epoch = epoch;
+}
+
+void SessionRecord::SetAlive(bool alive) {
+  const MutexLock lock(mutex_);
+  status_.alive = alive;
+}
+
+void SessionRecord::SetPhase(SessionPhase phase, Status status) {
+  const MutexLock lock(mutex_);
+  status_.session.phase = phase;
+  status_.session.status = std::move(status);
+}
+
+void SessionRecord::Resume(ClientId client) {
+  const MutexLock lock(mutex_);
+  if (status_.session.client != client) {
+    for (auto& [sensor_id, stream] : streams_) stream.account.NewClient();
+  }
+  status_.session.client = client;
+  status_.session.phase = SessionPhase::kActive;
+  status_.session.status = {};
+  status_.alive = true;
+}
+
+ClientId SessionRecord::owner() const {
+  const MutexLock lock(mutex_);
+  return status_.session.client;
+}
+
+bool SessionRecord::alive() const {
+  const MutexLock lock(mutex_);
+  return status_.alive;
+}
+
+SessionPhase SessionRecord::phase() const {
+  const MutexLock lock(mutex_);
+  return status_.session.phase;
+}
+
+SessionState SessionRecord::state() const {
+  const MutexLock lock(mutex_);
+  return status_.session;
+}
+
+std::uint32_t SessionRecord::epoch() const {
+  const MutexLock lock(mutex_);
+  return status_.pose.map_epoch;
+}
+
+Ledger SessionRecord::LedgerOf(const Stream& stream) const {
+  Ledger ledger = stream.account.ledger();
+  ledger.odometry_received = odometry_received_;
+  ledger.odometry_dropped = odometry_dropped_;
+  ledger.odometry_merged = odometry_merged_;
+  return ledger;
+}
+
+SessionSnapshot SessionRecord::snapshot() const {
+  const MutexLock lock(mutex_);
+  SessionSnapshot snapshot{.id = id_, .status = status_, .path = history_.view(), .landmarks = landmarks_};
+  for (const auto& [sensor_id, stream] : streams_) snapshot.status.ledgers.push_back(LedgerOf(stream));
+  return snapshot;
+}
+
+std::vector<Ledger> SessionRecord::TakeDueLedgers(Clock::time_point now, Urgency urgency) {
+  const MutexLock lock(mutex_);
+  std::vector<Ledger> due;
+  for (auto& [sensor_id, stream] : streams_) {
+    const std::uint64_t settled = stream.account.settled_count();
+    const bool burst = settled - stream.settled_when_taken >= kSettledBurst;
+    const bool drained = urgency == Urgency::kDrained && settled != stream.settled_when_taken;
+    const bool rested = now - stream.taken >= ledger_period_;
+    if (urgency != Urgency::kNow && !(stream.changed && (burst || drained || rested))) continue;
+    due.push_back(LedgerOf(stream));
+    stream.changed = false;
+    stream.settled_when_taken = settled;
+    stream.taken = now;
+  }
+  return due;
+}
+
+void SessionRecord::MarkUnsent(NameId sensor_id) {
+  const MutexLock lock(mutex_);
+  if (Stream* const stream = Find(sensor_id)) stream->changed = true;
+}
+
+}  // namespace cairn::server

@@ -1,0 +1,91 @@
+// What is known of one session and shown to the world: phase, owner, newest pose, the ledgers of its streams, its path.
+// Written by the door's side (arrivals) and by the estimator's strand (outcomes); read by queries through snapshot().
+// Decides when a ledger is due: at most `ledger_rate_hz`, but at once every 8 settled scans and when the queue drains,
+// because a client that replays a log waits for the ledger before it sends more.
+// Thread rule: any thread.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/mutex.h"
+#include "server/robots/robots_options.h"
+#include "server/robots/session_snapshot.h"
+#include "server/robots/stream_ledger.h"
+
+namespace cairn::server {
+
+class SessionRecord {
+ public:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::size_t kMaxSensors = 16;
+  static constexpr std::uint64_t kSettledBurst = 8;
+
+  SessionRecord(SessionId id, const SessionRequest& request, const RobotsOptions& options);
+
+  // Sensors the session does not have yet; false where that would be too many.
+  bool AddSensors(const std::vector<std::string>& sensors);
+  // Goes on with the account of a stream that sent before its session was open.
+  void Inherit(NameId sensor_id, StreamLedger&& account);
+
+  // A scan of the owner. kDuplicate and kUnknownSensor leave no trace here.
+  enum class Arrival { kNew, kDuplicate, kUnknownSensor };
+  Arrival ScanReceived(NameId sensor_id, std::uint64_t sequence);
+  void ScanDropped(NameId sensor_id, std::uint64_t sequence, DropReason reason);
+  void ScanUsed(NameId sensor_id, const PoseReport& pose, bool keyframe, double latency_ms);
+  // A scan of a client that does not own the session.
+  Arrival ForeignScan(NameId sensor_id, DropReason reason);
+
+  void OdometryReceived();
+  void OdometryDropped();
+  void OdometryMerged();
+
+  void SetLandmarks(std::vector<LandmarkReport> landmarks);
+  // Another epoch of the map: the newest pose belongs to it from now on.
+  void SetEpoch(std::uint32_t epoch);
+  void SetAlive(bool alive);
+  void SetPhase(SessionPhase phase, Status status);
+  // The robot is back, perhaps as another client process.
+  void Resume(ClientId client);
+
+  [[nodiscard]] ClientId owner() const;
+  [[nodiscard]] bool alive() const;
+  [[nodiscard]] SessionPhase phase() const;
+  [[nodiscard]] SessionState state() const;
+  [[nodiscard]] std::uint32_t epoch() const;
+  [[nodiscard]] SessionSnapshot snapshot() const;
+
+  enum class Urgency { kWhenDue, kDrained, kNow };
+  [[nodiscard]] std::vector<Ledger> TakeDueLedgers(Clock::time_point now, Urgency urgency);
+  // A ledger taken that could not be sent: due again.
+  void MarkUnsent(NameId sensor_id);
+
+ private:
+  struct Stream {
+    StreamLedger account;
+    bool changed = true;
+    std::uint64_t settled_when_taken = 0;
+    Clock::time_point taken{};
+  };
+  Ledger NamesOf(NameId sensor_id, const std::string& sensor) const CAIRN_REQUIRES(mutex_);
+  Ledger LedgerOf(const Stream& stream) const CAIRN_REQUIRES(mutex_);
+  Stream* Find(NameId sensor_id) CAIRN_REQUIRES(mutex_);
+
+  const SessionId id_;
+  const Clock::duration ledger_period_;
+
+  mutable Mutex mutex_;
+  RobotStatus status_ CAIRN_GUARDED_BY(mutex_);  // Its `ledgers` stay empty: they are made on demand.
+  std::map<NameId, Stream> streams_ CAIRN_GUARDED_BY(mutex_);
+  std::uint64_t odometry_received_ CAIRN_GUARDED_BY(mutex_) = 0;
+  std::uint64_t odometry_dropped_ CAIRN_GUARDED_BY(mutex_) = 0;
+  std::uint64_t odometry_merged_ CAIRN_GUARDED_BY(mutex_) = 0;
+  PoseHistory history_ CAIRN_GUARDED_BY(mutex_);
+  std::shared_ptr<const std::vector<LandmarkReport>> landmarks_ CAIRN_GUARDED_BY(mutex_);
+};
+
+}  // namespace cairn::server

@@ -1,0 +1,108 @@
+#include "server/robots/stream_ledger.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace cairn::server {
+namespace {
+
+std::uint64_t& Count(Ledger& ledger, DropReason reason) {
+  return ledger.dropped[static_cast<std::size_t>(reason)];
+}
+
+}  // namespace
+
+bool StreamLedger::Received(std::uint64_t sequence) {
+  const bool first_of_client = std::exchange(new_client_, false);
+  if (sequence > 0) {
+    if (first_of_client && sequence <= ledger_.last_sequence) Restart(0);
+    if (sequence > ledger_.last_sequence && sequence - ledger_.last_sequence > kMaxStep) Restart(sequence - 1);
+    if (sequence > ledger_.last_sequence) {
+      Advance(sequence);
+    } else if (!FillGap(sequence)) {
+      return false;
+    }
+    waiting_.insert(sequence);
+  }
+  ++ledger_.received;
+  ++ledger_.waiting;
+  return true;
+}
+
+void StreamLedger::Used(std::uint64_t sequence, Stamp stamp, bool keyframe, double latency_ms) {
+  ++ledger_.used;
+  if (keyframe) ++ledger_.keyframes;
+  ledger_.last_stamp = stamp;
+  latencies_ms_[latency_count_++ % kLatencies] = static_cast<float>(latency_ms);
+  Settle(sequence);
+}
+
+void StreamLedger::Dropped(std::uint64_t sequence, DropReason reason) {
+  ++Count(ledger_, reason);
+  Settle(sequence);
+}
+
+void StreamLedger::DroppedForeign(DropReason reason) {
+  ++ledger_.received;
+  ++Count(ledger_, reason);
+  ++settled_count_;
+}
+
+void StreamLedger::Rename(const Ledger& names) {
+  ledger_.robot_id = names.robot_id;
+  ledger_.sensor_id = names.sensor_id;
+  ledger_.robot = names.robot;
+  ledger_.sensor = names.sensor;
+  ledger_.site = names.site;
+}
+
+Ledger StreamLedger::ledger() const {
+  Ledger now = ledger_;
+  const std::size_t count = std::min(latency_count_, kLatencies);
+  if (count == 0) return now;
+  auto sorted = latencies_ms_;
+  std::sort(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(count));
+  now.latency_p50_ms = sorted[(count - 1) / 2];
+  now.latency_p99_ms = sorted[(count - 1) * 99 / 100];
+  return now;
+}
+
+void StreamLedger::Advance(std::uint64_t sequence) {
+  const std::uint64_t expected = ledger_.last_sequence + 1;
+  if (sequence > expected) {
+    gaps_.emplace(expected, sequence - 1);
+    Count(ledger_, DropReason::kLostOnWire) += sequence - expected;
+    if (gaps_.size() > kMaxGaps) gaps_.erase(gaps_.begin());
+  }
+  ledger_.last_sequence = sequence;
+}
+
+bool StreamLedger::FillGap(std::uint64_t sequence) {
+  auto after = gaps_.upper_bound(sequence);
+  if (after == gaps_.begin()) return false;
+  const auto gap = std::prev(after);
+  const auto [first, last] = *gap;
+  if (sequence > last) return false;
+  gaps_.erase(gap);
+  if (first < sequence) gaps_.emplace(first, sequence - 1);
+  if (sequence < last) gaps_.emplace(sequence + 1, last);
+  --Count(ledger_, DropReason::kLostOnWire);
+  return true;
+}
+
+void StreamLedger::Restart(std::uint64_t last_sequence) {
+  gaps_.clear();
+  waiting_.clear();
+  ledger_.last_sequence = last_sequence;
+  ledger_.settled_through = last_sequence;
+}
+
+void StreamLedger::Settle(std::uint64_t sequence) {
+  --ledger_.waiting;
+  ++settled_count_;
+  waiting_.erase(sequence);
+  const std::uint64_t through = waiting_.empty() ? ledger_.last_sequence : *waiting_.begin() - 1;
+  ledger_.settled_through = std::max(ledger_.settled_through, through);
+}
+
+}  // namespace cairn::server

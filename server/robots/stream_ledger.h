@@ -1,0 +1,62 @@
+// The account of one stream (robot, sensor): what became of every scan. `received + lost_on_wire` =
+// `used + dropped + waiting` at every moment.
+//
+// Numbers: scans carry sequences from 1. A gap counts as lost_on_wire and settles at once, so a client's window never
+// hangs on it; a late arrival takes its number back out of the lost. A number seen before (a resend of something
+// already received) is ignored and counted nowhere. At most kMaxGaps separate gaps are remembered; older ones stay lost
+// for good. A new client whose first number is not beyond the last one starts the numbering anew; counts go on. A
+// number more than kMaxStep ahead starts the numbering anew as well: no client loses a million scans at once. Thread
+// rule: none of its own; the session's lock guards it.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "common/service/ledger.h"
+
+namespace cairn::server {
+
+class StreamLedger {
+ public:
+  static constexpr std::size_t kMaxGaps = 1024;
+  static constexpr std::uint64_t kMaxStep = 1'000'000;
+
+  explicit StreamLedger(Ledger names) : ledger_(std::move(names)) {}
+
+  // A scan arrived; false for a duplicate number, which the caller forgets. Otherwise Used or Dropped must follow.
+  bool Received(std::uint64_t sequence);
+  void Used(std::uint64_t sequence, Stamp stamp, bool keyframe, double latency_ms);
+  void Dropped(std::uint64_t sequence, DropReason reason);
+  // A scan of someone else's client under this stream's name: counted, its number means nothing here.
+  void DroppedForeign(DropReason reason);
+
+  void Rename(const Ledger& names);
+  // The next scan comes from another client process.
+  void NewClient() { new_client_ = true; }
+
+  // Scans used or dropped so far, for deciding when to publish.
+  [[nodiscard]] std::uint64_t settled_count() const { return settled_count_; }
+  [[nodiscard]] Ledger ledger() const;
+
+ private:
+  static constexpr std::size_t kLatencies = 256;
+
+  void Advance(std::uint64_t sequence);
+  bool FillGap(std::uint64_t sequence);
+  void Restart(std::uint64_t last_sequence);
+  void Settle(std::uint64_t sequence);
+
+  Ledger ledger_;
+  bool new_client_ = false;
+  std::uint64_t settled_count_ = 0;
+  std::set<std::uint64_t> waiting_;              // Numbers received and not settled; bounded by the robot's queue.
+  std::map<std::uint64_t, std::uint64_t> gaps_;  // First missing number -> last missing number, disjoint.
+  std::array<float, kLatencies> latencies_ms_{};
+  std::size_t latency_count_ = 0;
+};
+
+}  // namespace cairn::server

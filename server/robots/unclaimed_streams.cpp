@@ -1,0 +1,43 @@
+#include "server/robots/unclaimed_streams.h"
+
+namespace cairn::server {
+
+void UnclaimedStreams::Count(const StreamId& stream, std::uint64_t sequence, DropReason reason) {
+  const std::pair key(stream.robot_id, stream.sensor_id);
+  auto found = accounts_.find(key);
+  if (found == accounts_.end()) {
+    if (accounts_.size() >= max_streams_) {
+      ++overflow_;
+      return;
+    }
+    Ledger names;
+    names.robot_id = stream.robot_id;
+    names.sensor_id = stream.sensor_id;
+    found = accounts_.emplace(key, Account{StreamLedger(names)}).first;
+  }
+  Account& account = found->second;
+  account.changed = true;
+  if (reason == DropReason::kNotOwner) {
+    account.ledger.DroppedForeign(reason);
+  } else if (account.ledger.Received(sequence)) {
+    account.ledger.Dropped(sequence, reason);
+  }
+}
+
+std::optional<StreamLedger> UnclaimedStreams::Claim(NameId robot_id, NameId sensor_id) {
+  auto node = accounts_.extract({robot_id, sensor_id});
+  if (node.empty()) return std::nullopt;
+  return std::move(node.mapped().ledger);
+}
+
+std::vector<Ledger> UnclaimedStreams::TakeChanged() {
+  std::vector<Ledger> changed;
+  for (auto& [key, account] : accounts_) {
+    if (!account.changed) continue;
+    account.changed = false;
+    changed.push_back(account.ledger.ledger());
+  }
+  return changed;
+}
+
+}  // namespace cairn::server

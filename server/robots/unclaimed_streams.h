@@ -1,0 +1,38 @@
+// Scans that belong to no session, counted per stream as no_session, in a table with a bound: a stranger who invents
+// stream ids costs a fixed amount of memory. Streams beyond the bound are counted together in overflow().
+// Not thread-safe: the roster's lock guards it.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "common/service/stream.h"
+#include "server/robots/stream_ledger.h"
+
+namespace cairn::server {
+
+class UnclaimedStreams {
+ public:
+  explicit UnclaimedStreams(std::size_t max_streams) : max_streams_(max_streams) {}
+
+  void Count(const StreamId& stream, std::uint64_t sequence, DropReason reason);
+  // The account of a stream whose session has just been opened, if it sent before.
+  [[nodiscard]] std::optional<StreamLedger> Claim(NameId robot_id, NameId sensor_id);
+  // Accounts that changed since the last call.
+  [[nodiscard]] std::vector<Ledger> TakeChanged();
+  [[nodiscard]] std::uint64_t overflow() const { return overflow_; }
+
+ private:
+  struct Account {
+    StreamLedger ledger;
+    bool changed = true;
+  };
+  const std::size_t max_streams_;
+  std::map<std::pair<NameId, NameId>, Account> accounts_;
+  std::uint64_t overflow_ = 0;
+};
+
+}  // namespace cairn::server

@@ -1,0 +1,70 @@
+#include "server/slam/features/corners.h"
+
+#include <cmath>
+
+#include "common/geometry/angle.h"
+
+namespace cairn::slam {
+namespace {
+
+double SpacingAtEnd(const LineFeature& line, const Eigen::Vector2d& end, double step) {
+  const double range = end.norm();
+  return range * step / std::max(line.distance / std::max(range, 1e-9), 0.05);
+}
+
+bool EndsMeet(const LineFeature& a, const LineFeature& b, const Eigen::Vector2d& corner, double step,
+              const CornerOptions& options) {
+  const double reach_a = options.real_gap_m + SpacingAtEnd(a, a.last, step);
+  const double reach_b = options.real_gap_m + SpacingAtEnd(b, b.first, step);
+  return (corner - a.last).norm() <= reach_a && (corner - b.first).norm() <= reach_b;
+}
+
+}  // namespace
+
+std::optional<Eigen::Vector2d> MeetingPoint(const LineFeature& a, const LineFeature& b, double min_angle_rad) {
+  const Eigen::Vector2d u = a.direction(), v = b.direction();
+  const double sine = u.x() * v.y() - u.y() * v.x();
+  if (std::abs(sine) < std::sin(min_angle_rad)) return std::nullopt;
+  const Eigen::Vector2d between = b.first - a.first;
+  const double along = (between.x() * v.y() - between.y() * v.x()) / sine;
+  return a.first + along * u;
+}
+
+std::vector<CornerFeature> ExtractCorners(const ScanFeatures& features, const CornerOptions& options) {
+  std::vector<CornerFeature> corners;
+  const std::vector<LineFeature>& lines = features.lines;
+  const int count = static_cast<int>(lines.size());
+  corners.reserve(lines.size() * 2);
+  const auto add = [&](int a, int b, bool following) {
+    const LineFeature &line_a = lines[static_cast<std::size_t>(a)], &line_b = lines[static_cast<std::size_t>(b)];
+    const bool both_long = line_a.length >= options.long_line_m && line_b.length >= options.long_line_m;
+    if (!following && !both_long) return;
+    const auto corner = MeetingPoint(line_a, line_b, options.min_angle_rad);
+    if (!corner) return;
+    const bool real = following && EndsMeet(line_a, line_b, *corner, features.angle_step_rad, options);
+    if (!real && corner->norm() > options.max_distance_m) return;
+    corners.push_back({.position = *corner,
+                       .real = real,
+                       .angle = AngleDiff(line_b.slope, line_a.slope),
+                       .long_lines = both_long,
+                       .line_a = a,
+                       .line_b = b});
+  };
+  for (int a = 0; a < count; ++a) {
+    for (int b = a + 1; b < count; ++b) {
+      const bool across_seam = features.full_turn && count > 2 && a == 0 && b + 1 == count;
+      if (!across_seam) add(a, b, b == a + 1);
+    }
+  }
+  if (features.full_turn && count > 2) add(count - 1, 0, true);
+  return corners;
+}
+
+void Visit(OptionVisitor& visitor, CornerOptions& options) {
+  visitor.Real("min_angle_rad", options.min_angle_rad, "rad", 0.01, 1.5, "least angle between two lines of a corner");
+  visitor.Real("real_gap_m", options.real_gap_m, "m", 0.0, 5.0, "how near ends must come to the corner of a real one");
+  visitor.Real("long_line_m", options.long_line_m, "m", 0.0, 100.0, "lines from this length on are long");
+  visitor.Real("max_distance_m", options.max_distance_m, "m", 0.1, 1000.0, "farthest virtual corner kept");
+}
+
+}  // namespace cairn::slam

@@ -1,0 +1,238 @@
+#include "server/slam/features/line_merge.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "server/slam/features/line_clusters.h"
+#include "server/slam/features/line_straighten.h"
+
+namespace cairn::slam {
+namespace {
+
+constexpr int kFree = -1;
+constexpr int kMaxSkippedSegments = 4;  // Segments of one post or person between two parts of a wall.
+
+enum class Side { kNearer, kOn, kFarther };
+
+class Merger {
+ public:
+  Merger(const Sweep& sweep, const LineOptions& options, SplitResult split)
+      : sweep_(sweep),
+        options_(options),
+        segments_(std::move(split.segments)),
+        owner_(std::move(split.owner)),
+        max_occluded_(sweep.BeamsIn(options.occlusion_rad, 3)) {}
+
+  void JoinCollinear();
+  void Lengthen();
+  [[nodiscard]] std::vector<LineSegment> StrongOnes() const;
+
+ private:
+  int& Owner(int i) { return owner_[static_cast<std::size_t>(sweep_.Wrap(i))]; }
+  Side SideOf(const FittedLine& line, const BeamPoint& hit) const;
+  bool OnlyOccluded(const FittedLine& line, int from, int to) const;
+  bool Join(int a, int b);
+  void LengthenEnd(int k, int direction);
+  void Claim(int k, int i, int direction);
+  bool IsStrong(const LineSegment& segment) const;
+
+  const Sweep& sweep_;
+  const LineOptions& options_;
+  std::vector<LineSegment> segments_;
+  std::vector<int> owner_;  // Per hit: index into segments_.
+  const int max_occluded_;
+};
+
+Side Merger::SideOf(const FittedLine& line, const BeamPoint& hit) const {
+  const double distance = line.DistanceOf(hit.p_robot);
+  if (std::abs(distance) <= SplitDistance(hit.range_m, options_)) return Side::kOn;
+  return (distance > 0.0) == (line.DistanceOf(sweep_.laser()) > 0.0) ? Side::kNearer : Side::kFarther;
+}
+
+// Whether everything the laser saw between hits `from` and `to` lies on the line or before it, and not too much of it.
+bool Merger::OnlyOccluded(const FittedLine& line, int from, int to) const {
+  int occluded = 0;
+  for (int i = from; i < to; ++i) {
+    const SweepGap& gap = sweep_.GapAfter(i);
+    if (gap.to_edge || gap.no_returns > kToleratedDropouts) return false;
+    occluded += gap.beams - 1;
+    if (i + 1 == to) break;
+    const Side side = SideOf(line, sweep_.hit(i + 1));
+    if (side == Side::kFarther) return false;
+    if (side == Side::kNearer) ++occluded;
+  }
+  return occluded <= max_occluded_;
+}
+
+bool Merger::Join(int a, int b) {
+  LineSegment& first = segments_[static_cast<std::size_t>(a)];
+  LineSegment& second = segments_[static_cast<std::size_t>(b)];
+  const int shift = second.begin < first.begin ? sweep_.size() : 0;  // Across the seam.
+  if (second.begin + shift < first.end || second.end + shift - first.begin > sweep_.size()) return false;
+  // Two stubs agree with nearly anything; one of them must be a line by itself.
+  if (std::max(first.count(), second.count()) < options_.min_points) return false;
+  const double cos_angle = std::abs(first.line.normal.dot(second.line.normal));
+  const bool slope_counts = std::min(first.count(), second.count()) >= options_.min_points;
+  if (slope_counts && cos_angle < std::cos(options_.merge_angle_rad)) return false;
+
+  LineSegment joined{.begin = first.begin, .end = second.end + shift, .sums = first.sums + second.sums, .line = {}};
+  joined.line = FitLine(joined.sums);
+  const Eigen::Vector2d gap = sweep_.hit(second.begin).p_robot - sweep_.hit(first.end - 1).p_robot;
+  const double spacing = SpacingAt(joined.line, sweep_.laser(), sweep_.hit(second.begin).p_robot, sweep_.step());
+  if (gap.norm() > std::max(options_.occlusion_m, 4.0 * spacing)) return false;
+  for (int i = joined.begin; i < joined.end; ++i) {
+    if (Owner(i) != a && Owner(i) != b) continue;
+    if (SideOf(joined.line, sweep_.hit(i)) != Side::kOn) return false;
+  }
+  if (!OnlyOccluded(joined.line, first.end - 1, second.begin + shift)) return false;
+  // Parts that are each straight but step away from each other show in the joint deviation before they show in the
+  // largest distance.
+  const double apart = std::max({first.line.deviation, second.line.deviation, options_.range_sigma_m});
+  if (slope_counts && joined.line.deviation > 1.5 * apart) return false;
+
+  for (int i = second.begin; i < second.end; ++i) {
+    if (Owner(i) == b) Owner(i) = a;
+  }
+  first = joined;
+  second.alive = false;
+  return true;
+}
+
+void Merger::JoinCollinear() {
+  const int count = static_cast<int>(segments_.size());
+  for (int a = 0; a < count; ++a) {
+    if (!segments_[static_cast<std::size_t>(a)].alive) continue;
+    int skipped = 0;
+    for (int step = 1; step < count && skipped <= kMaxSkippedSegments; ++step) {
+      const int b = a + step;
+      if (b >= count && !sweep_.full_turn()) break;
+      if (!segments_[static_cast<std::size_t>(b % count)].alive) continue;
+      if (Join(a, b % count)) {
+        skipped = 0;
+      } else {
+        ++skipped;
+      }
+    }
+  }
+}
+
+// How many points a wall of the least length would get here: few when far or seen edge-on, many when near.
+bool Merger::IsStrong(const LineSegment& segment) const {
+  const Eigen::Vector2d first = sweep_.hit(segment.begin).p_robot, last = sweep_.hit(segment.end - 1).p_robot;
+  const double length = (last - first).norm();
+  if (length < options_.min_length_m) return false;
+  if (segment.line.deviation > options_.max_deviation_m) return false;
+  if (segment.line.deviation * options_.min_aspect > length) return false;
+  const double spacing = SpacingAt(segment.line, sweep_.laser(), segment.line.centroid, sweep_.step());
+  const int expected = static_cast<int>(options_.min_length_m / spacing);
+  const int needed = std::clamp(expected, static_cast<int>(options_.min_points),
+                                static_cast<int>(std::max(options_.min_points, options_.max_points_needed)));
+  return segment.count() >= needed;
+}
+
+void Merger::Claim(int k, int i, int direction) {
+  LineSegment& segment = segments_[static_cast<std::size_t>(k)];
+  const int previous = Owner(i);
+  if (previous != kFree) {
+    // The hit was at the facing end of a stub: the stub shrinks.
+    LineSegment& stub = segments_[static_cast<std::size_t>(previous)];
+    if (stub.count() <= 2) {
+      stub.alive = false;
+      for (int j = stub.begin; j < stub.end; ++j) {
+        if (Owner(j) == previous) Owner(j) = kFree;
+      }
+    } else {
+      PointSums one;
+      one.Add(sweep_.hit(i).p_robot);
+      stub.sums = stub.sums - one;
+      if (sweep_.Wrap(stub.begin) == sweep_.Wrap(i)) {
+        do {
+          ++stub.begin;
+        } while (Owner(stub.begin) != previous);
+      } else if (sweep_.Wrap(stub.end - 1) == sweep_.Wrap(i)) {
+        do {
+          --stub.end;
+        } while (Owner(stub.end - 1) != previous);
+      }
+      stub.line = FitLine(stub.sums);
+    }
+  }
+  Owner(i) = k;
+  segment.sums.Add(sweep_.hit(i).p_robot);
+  if (direction > 0) segment.end = i + 1;
+  if (direction < 0) segment.begin = i;
+}
+
+// "Points continued from the end of the line": those on it are added, those before it are passed over, one behind it
+// ends it. Beyond something passed over, one hit alone on the line may be chance: two in a row are asked for.
+void Merger::LengthenEnd(int k, int direction) {
+  LineSegment& segment = segments_[static_cast<std::size_t>(k)];
+  int end = direction > 0 ? segment.end - 1 : segment.begin;
+  int at = end, occluded = 0, pending = end;
+  bool has_pending = false;
+  for (int walked = 0; walked < sweep_.size() - 1; ++walked) {
+    const SweepGap& gap = direction > 0 ? sweep_.GapAfter(at) : sweep_.GapBefore(at);
+    if (gap.to_edge || gap.no_returns > kToleratedDropouts) return;
+    const BeamPoint& hit = sweep_.hit(at += direction);
+    const int owner = Owner(at);
+    if (owner == k) return;  // All the way round.
+    occluded += gap.beams - 1;
+    const Side side = SideOf(segment.line, hit);
+    const double spacing = SpacingAt(segment.line, sweep_.laser(), hit.p_robot, sweep_.step());
+    const double reach = (hit.p_robot - sweep_.hit(end).p_robot).norm();
+    if (side == Side::kFarther || reach > std::max(options_.occlusion_m, 4.0 * spacing)) return;
+    const bool vouched =
+        std::abs(segment.line.DistanceOf(hit.p_robot)) <= EndDistance(segment.line, hit.range_m, options_);
+    if (side == Side::kNearer || !vouched || (owner != kFree && IsStrong(segments_[static_cast<std::size_t>(owner)]))) {
+      has_pending = false;
+      if (++occluded > max_occluded_) return;
+    } else if (occluded > 0 && !has_pending) {
+      pending = at;
+      has_pending = true;
+    } else {
+      if (has_pending) Claim(k, pending, direction);
+      Claim(k, at, direction);
+      segment.line = FitLine(segment.sums);
+      end = at;
+      has_pending = false;
+      occluded = 0;
+    }
+  }
+}
+
+void Merger::Lengthen() {
+  for (std::size_t k = 0; k < segments_.size(); ++k) {
+    if (!segments_[k].alive || !IsStrong(segments_[k])) continue;
+    LengthenEnd(static_cast<int>(k), -1);
+    LengthenEnd(static_cast<int>(k), +1);
+  }
+}
+
+std::vector<LineSegment> Merger::StrongOnes() const {
+  std::vector<LineSegment> strong;
+  for (const LineSegment& segment : segments_) {
+    if (segment.alive && IsStrong(segment)) strong.push_back(segment);
+  }
+  return strong;
+}
+
+}  // namespace
+
+std::vector<LineSegment> MergeSegments(const Sweep& sweep, const LineOptions& options, SplitResult split) {
+  Merger merger(sweep, options, std::move(split));
+  merger.JoinCollinear();
+  merger.Lengthen();
+  std::vector<LineSegment> segments = merger.StrongOnes();
+  // Lengthening backwards may have led across the seam.
+  for (LineSegment& segment : segments) {
+    if (segment.begin < 0) segment.begin += sweep.size(), segment.end += sweep.size();
+    if (segment.begin >= sweep.size()) segment.begin -= sweep.size(), segment.end -= sweep.size();
+  }
+  std::sort(segments.begin(), segments.end(),
+            [](const LineSegment& a, const LineSegment& b) { return a.begin < b.begin; });
+  StraightenBetweenParallels(sweep, options, segments);
+  return segments;
+}
+
+}  // namespace cairn::slam

@@ -1,0 +1,82 @@
+// FastSLAM 2.0: a particle filter over the robot's path whose particles carry their own landmark maps, and whose
+// proposal takes the latest observation into account before it samples. Two kinds of observation: landmarks with two
+// positions each (FS_2LS_2LP), and revisits: the robot's place relative to an old keyframe, measured by matching scans.
+// Between observations a particle moves along the matched motion and only its uncertainty grows; it is sampled when an
+// observation arrives, when a landmark is new, or when `sample_distance_m` has been travelled.
+// Frames: T_map_robot; measurements in `robot` (landmarks) or in the old keyframe's robot frame (revisits).
+// Not thread-safe. Deterministic for a seed.
+// Source: thesis A chapter 4; Montemerlo 2003. Misprints put right are named where they matter.
+#pragma once
+
+#include <cstdint>
+#include <random>
+#include <span>
+#include <vector>
+
+#include "server/slam/filters/landmark_observation.h"
+#include "server/slam/filters/particle.h"
+#include "server/slam/filters/resampling.h"
+#include "server/slam/motion/motion_noise.h"
+
+namespace cairn::slam {
+
+struct FilterOptions {
+  std::int64_t particles = 200;  // Shown as slam.particles.
+  MotionNoise drift{0.002, 0.01, 0.005, 0.0005, 0.002, 0.005};
+  double sample_distance_m = 1.0;  // Travelled before uncertainty is sampled without an observation.
+  double resample_below = 0.5;     // Effective sample size over particles.
+  double max_nis = 16.0;           // Squared Mahalanobis distance beyond which an observation adds no more doubt.
+  double agreement_m = 0.5;        // Particles this near the best one take part in the reported pose.
+  LandmarkNoise landmark;
+};
+void Visit(OptionVisitor& visitor, FilterOptions& options);  // All but `particles`.
+
+// The robot seen from keyframe `keyframe`, by scan matching.
+struct RevisitObservation {
+  std::size_t keyframe = 0;
+  Pose2 T_keyframe_robot;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
+};
+
+class FastSlam2 {
+ public:
+  FastSlam2(const FilterOptions& options, const Pose2& T_map_robot_start, std::uint64_t seed);
+
+  // Prediction (Table 4.2): moves every particle along the matched motion and lets its uncertainty grow.
+  void Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev);
+  // Proposal and weight for one revisit (Tables 4.6, 4.8). False where no particle explains it: nothing changes.
+  bool Observe(const RevisitObservation& revisit);
+  // Proposal, weights, landmark updates and new landmarks of one scan (Tables 4.4-4.8).
+  void Observe(std::span<const LandmarkObservation> sightings);
+  // Ends the step: samples where due, appends the pose to every path, resamples where too few particles count.
+  void Commit();
+
+  [[nodiscard]] const Particle& best() const { return particles_[best_]; }
+  [[nodiscard]] const std::vector<Particle>& particles() const { return particles_; }
+  [[nodiscard]] std::size_t landmark_count() const { return landmark_count_; }
+  // Weighted mean pose of the particles that agree with the best one, and their spread plus its own uncertainty,
+  // (x, y, theta) in map. Steadier than the best particle, which changes hands.
+  struct Estimate {
+    Pose2 T_map_robot;
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  };
+  [[nodiscard]] const Estimate& estimate() const { return estimate_; }
+  [[nodiscard]] double effective_sample_size() const { return effective_; }
+
+ private:
+  void Sample(Particle& particle);
+  std::vector<double> Resample();
+  void Summarise(const std::vector<double>& weights);
+
+  FilterOptions options_;
+  Rng rng_;
+  std::vector<Particle> particles_;
+  std::size_t best_ = 0;
+  std::size_t landmark_count_ = 0;
+  double travelled_ = 0.0;  // Since the last sampling.
+  bool sample_due_ = false;
+  double effective_ = 0.0;
+  Estimate estimate_;
+};
+
+}  // namespace cairn::slam

@@ -1,0 +1,13 @@
+#include "server/slam/keyframe.h"
+
+namespace cairn::slam {
+
+Trajectory MapperSnapshot::FullTrajectory() const {
+  Trajectory trajectory;
+  trajectory.reserve(scans.size());
+  for (const ScanPlace& place : scans)
+    trajectory.push_back({place.stamp, full_path[place.keyframe] * place.T_keyframe_robot});
+  return trajectory;
+}
+
+}  // namespace cairn::slam

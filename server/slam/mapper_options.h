@@ -1,0 +1,30 @@
+// Every option of the estimator, nested as the code is. Defaults serve all logs; Visit names unit, range, meaning.
+#pragma once
+
+#include <cstdint>
+
+#include "common/options/option_visitor.h"
+#include "server/slam/filters/fastslam2.h"
+#include "server/slam/filters/landmark_tracker.h"
+#include "server/slam/front_end.h"
+#include "server/slam/grid/occupancy_grid.h"
+#include "server/slam/matching/revisit_search.h"
+#include "server/slam/motion/motion_gate.h"
+#include "server/slam/scan/odometry_pairing.h"
+
+namespace cairn::slam {
+
+struct MapperOptions {
+  std::int64_t seed = 1;      // Of every robot's random engine: the same robot alone or in a fleet maps alike.
+  double lost_after_m = 2.0;  // Travelled by odometry alone before the robot counts as lost.
+  FrontEndOptions front_end;
+  MotionGateOptions gate;
+  RevisitOptions revisit;
+  LandmarkOptions landmarks;
+  FilterOptions filter;
+  GridOptions grid;
+  PairingOptions pairing;
+};
+void Visit(OptionVisitor& visitor, MapperOptions& options);
+
+}  // namespace cairn::slam

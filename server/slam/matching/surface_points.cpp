@@ -1,0 +1,83 @@
+#include "server/slam/matching/surface_points.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "server/slam/scan/beam_points.h"
+
+namespace cairn::slam {
+namespace {
+
+// How far apart two neighbouring beams may land and still be on one surface.
+double AllowedGap(const BeamPoint& hit, double step, const SurfaceOptions& options) {
+  return std::max(options.neighbour_gap_m * 0.5, std::min(options.neighbour_gap_m * 2.0, 6.0 * hit.range_m * step));
+}
+
+// The run of hits around `centre` that lie on its surface: close to it along the scan, without a jump.
+std::pair<std::size_t, std::size_t> Neighbourhood(const std::vector<BeamPoint>& hits, std::size_t centre, double step,
+                                                  const SurfaceOptions& options) {
+  // Sparse far points need a wider span to have neighbours at all.
+  const double span = std::max(options.neighbour_span_m, 3.0 * hits[centre].range_m * step);
+  const double gap = AllowedGap(hits[centre], step, options);
+  const auto connected = [&](std::size_t a, std::size_t b) {
+    return (hits[a].p_robot - hits[b].p_robot).norm() < gap && std::abs(hits[a].beam - hits[b].beam) <= 3;
+  };
+  std::size_t first = centre, last = centre;
+  while (first > 0 && connected(first, first - 1) && (hits[first - 1].p_robot - hits[centre].p_robot).norm() < span)
+    --first;
+  while (last + 1 < hits.size() && connected(last, last + 1) &&
+         (hits[last + 1].p_robot - hits[centre].p_robot).norm() < span)
+    ++last;
+  return {first, last};
+}
+
+Eigen::Vector2d NormalOf(const std::vector<BeamPoint>& hits, std::size_t first, std::size_t last,
+                         const Eigen::Vector2d& p_sensor, double max_flatness) {
+  if (last - first + 1 < 3) return Eigen::Vector2d::Zero();
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (std::size_t i = first; i <= last; ++i) mean += hits[i].p_robot;
+  mean /= static_cast<double>(last - first + 1);
+  Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
+  for (std::size_t i = first; i <= last; ++i) {
+    const Eigen::Vector2d d = hits[i].p_robot - mean;
+    scatter += d * d.transpose();
+  }
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
+  solver.computeDirect(scatter);
+  if (!(solver.eigenvalues()(0) < max_flatness * solver.eigenvalues()(1))) return Eigen::Vector2d::Zero();
+  Eigen::Vector2d normal = solver.eigenvectors().col(0).normalized();
+  if (normal.dot(p_sensor - mean) < 0) normal = -normal;
+  return normal;
+}
+
+}  // namespace
+
+void Visit(OptionVisitor& visitor, SurfaceOptions& options) {
+  visitor.Real("max_range_m", options.max_range_m, "m", 1.0, 200.0, "Farther hits are not matched.");
+  visitor.Real("min_spacing_m", options.min_spacing_m, "m", 0.0, 1.0, "Between kept points; larger: faster, coarser.");
+  visitor.Real("neighbour_span_m", options.neighbour_span_m, "m", 0.02, 2.0,
+               "Points this near tell the surface's direction; larger: smoother, rounds corners.");
+  visitor.Real("neighbour_gap_m", options.neighbour_gap_m, "m", 0.05, 5.0,
+               "A larger jump between neighbouring beams ends the surface.");
+  visitor.Real("max_flatness", options.max_flatness, "1", 0.001, 1.0,
+               "Spread across over spread along (squared) above which a point has no direction.");
+}
+
+std::vector<SurfacePoint> SurfacePointsOf(std::span<const BeamPoint> points, const Scan& scan,
+                                          const SurfaceOptions& options) {
+  std::vector<BeamPoint> hits(points.begin(), points.end());
+  std::erase_if(hits, [&](const BeamPoint& hit) { return hit.range_m > options.max_range_m; });
+  const double step = std::abs(scan.angle_step_rad);
+  const Eigen::Vector2d p_sensor = scan.T_robot_laser.translation();
+  std::vector<SurfacePoint> surface;
+  surface.reserve(hits.size());
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    if (!surface.empty() && (hits[i].p_robot - surface.back().p).norm() < options.min_spacing_m) continue;
+    const auto [first, last] = Neighbourhood(hits, i, step, options);
+    surface.push_back({hits[i].p_robot, NormalOf(hits, first, last, p_sensor, options.max_flatness)});
+  }
+  return surface;
+}
+
+}  // namespace cairn::slam

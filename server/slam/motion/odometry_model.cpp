@@ -1,0 +1,46 @@
+#include "server/slam/motion/odometry_model.h"
+
+#include <cmath>
+
+namespace cairn::slam {
+
+OdometryControl InverseOdometry(const Pose2& T_prev_curr) {
+  OdometryControl control;
+  control.trans = T_prev_curr.translation().norm();
+  if (control.trans > 1e-4) {
+    control.rot1 = std::atan2(T_prev_curr.y, T_prev_curr.x);
+    if (std::abs(control.rot1) > kPi / 2) {  // Backwards, not turn about and forwards.
+      control.rot1 = WrapAngle(control.rot1 + kPi);
+      control.trans = -control.trans;
+    }
+  } else {
+    control.trans = T_prev_curr.x;
+  }
+  control.rot2 = AngleDiff(T_prev_curr.theta, control.rot1);
+  return control;
+}
+
+Pose2 ApplyControl(const Pose2& T_map_robot, const OdometryControl& control) {
+  const double course = T_map_robot.theta + control.rot1;
+  return {T_map_robot.x + control.trans * std::cos(course), T_map_robot.y + control.trans * std::sin(course),
+          WrapAngle(course + control.rot2)};
+}
+
+Eigen::Matrix3d J_pose_pose(const Pose2& T_map_robot, const OdometryControl& control) {
+  const double course = T_map_robot.theta + control.rot1;
+  Eigen::Matrix3d Gv = Eigen::Matrix3d::Identity();
+  Gv(0, 2) = -control.trans * std::sin(course);
+  Gv(1, 2) = control.trans * std::cos(course);
+  return Gv;
+}
+
+Eigen::Matrix3d J_pose_control(const Pose2& T_map_robot, const OdometryControl& control) {
+  const double course = T_map_robot.theta + control.rot1;
+  Eigen::Matrix3d Gu;
+  Gu << -control.trans * std::sin(course), std::cos(course), 0,  //
+      control.trans * std::cos(course), std::sin(course), 0,     //
+      1, 0, 1;
+  return Gu;
+}
+
+}  // namespace cairn::slam

@@ -1,0 +1,151 @@
+// Whole command lines that need no server, and what wrong ones answer.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "client/cli/program.h"
+#include "common/sensor/trajectory.h"
+
+namespace cairn::client {
+namespace {
+
+using ::testing::HasSubstr;
+
+struct Outcome {
+  ExitCode code;
+  std::string out;
+  std::string err;
+};
+
+Outcome RunLine(const std::vector<std::string>& arguments) {
+  std::ostringstream out, err;
+  const ExitCode code = RunCairn(arguments, out, err);
+  return {code, out.str(), err.str()};
+}
+
+class CommandLine : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
+    directory_ = std::filesystem::path(::testing::TempDir()) / (std::string("cairn_cli_") + test->name());
+    std::filesystem::remove_all(directory_);
+    std::filesystem::create_directories(directory_);
+  }
+  void TearDown() override { std::filesystem::remove_all(directory_); }
+  [[nodiscard]] std::string File(const std::string& name) const { return (directory_ / name).string(); }
+
+  std::filesystem::path directory_;
+};
+
+TEST_F(CommandLine, NonsenseIsAUsageError) {
+  const std::vector<std::vector<std::string>> wrong = {
+      {},
+      {"fly"},
+      {"pose"},
+      {"pose", "r1", "--at", "yesterday"},
+      {"pose", "r1", "--at", "1.5", "--follow"},
+      {"pose", "r1", "--count", "3"},
+      {"replay", "x.log", "--site", "s"},
+      {"replay", "x.log", "--site", "s", "--robot", "r", "--start", "1,2"},
+      {"replay", "x.log", "--site", "s", "--robot", "r", "--fast", "--rate", "2"},
+      {"sim"},
+      {"sim", "--site", "s", "--beams", "0"},
+      {"sim", "--site", "s", "--robots", "many"},
+      {"map"},
+      {"map", "export", "--site", "s"},
+      {"map", "draw", "-o", "x.png"},
+      {"map", "draw", "--site", "s", "--map", "m.yaml", "-o", "x.png"},
+      {"tiles", "--site", "s", "--area", "5,5,1,1"},
+      {"tiles", "--site", "s", "--level", "9"},
+      {"job", "show", "0"},
+      {"ping", "--timeout", "soon"},
+      {"ping", "--domain", "233"},
+      {"ping", "--set", "wire.colour=red"},
+      {"ping", "--set", "wire.liveliness_lease_s=-1"}};
+  for (const auto& arguments : wrong) {
+    const Outcome outcome = RunLine(arguments);
+    EXPECT_EQ(outcome.code, ExitCode::kUsage) << ::testing::PrintToString(arguments);
+    EXPECT_NE(outcome.err, "") << ::testing::PrintToString(arguments);
+    EXPECT_EQ(outcome.out, "") << ::testing::PrintToString(arguments);
+  }
+}
+
+TEST_F(CommandLine, HelpIsNoError) {
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{"--help"}, {"replay", "--help"}, {"map", "draw", "--help"}, {"--version"}}) {
+    const Outcome outcome = RunLine(arguments);
+    EXPECT_EQ(outcome.code, ExitCode::kOk);
+    EXPECT_NE(outcome.out, "");
+  }
+  EXPECT_THAT(RunLine({"replay", "--help"}).out, HasSubstr("EXAMPLES"));
+  EXPECT_THAT(RunLine({"--help"}).out, HasSubstr("Exit codes"));
+}
+
+TEST_F(CommandLine, SimWritesLogsThatCheckLogFindsGood) {
+  const Outcome sim =
+      RunLine({"sim", "--no-stream", "--robots", "2", "--seconds", "20", "--beams", "181", "--fov", "180", "--log-dir",
+               File("logs"), "--truth-dir", File("truth"), "--first-stamp", "1000", "--json"});
+  ASSERT_EQ(sim.code, ExitCode::kOk) << sim.err;
+  const auto report = nlohmann::json::parse(sim.out);
+  EXPECT_EQ(report["robots"].size(), 2u);
+  EXPECT_EQ(report["robots"][1]["robot"], "robot2");
+  const Outcome check = RunLine({"check-log", File("logs/robot1.log"), "--json"});
+  ASSERT_EQ(check.code, ExitCode::kOk) << check.out << check.err;
+  const auto log = nlohmann::json::parse(check.out);
+  EXPECT_EQ(log["scans"]["count"], 200);
+  EXPECT_EQ(log["beam_counts"]["181"], 200);
+  const auto truth = ReadTum(File("truth/robot2.tum"));
+  ASSERT_TRUE(truth) << truth.error().message;
+  EXPECT_EQ(truth->size(), 200u);
+}
+
+TEST_F(CommandLine, TheSameSeedWritesTheSameLog) {
+  const auto content = [this](const std::string& directory, const std::string& seed) {
+    EXPECT_EQ(RunLine({"sim", "--no-stream", "--robots", "1", "--seconds", "5", "--seed", seed, "--first-stamp", "1000",
+                       "--log-dir", File(directory)})
+                  .code,
+              ExitCode::kOk);
+    std::ifstream file(File(directory + "/robot1.log"));
+    return std::string(std::istreambuf_iterator<char>(file), {});
+  };
+  const std::string one = content("a", "7");
+  EXPECT_GT(one.size(), 1000u);
+  EXPECT_EQ(one, content("b", "7"));
+  EXPECT_NE(one, content("c", "8"));
+}
+
+TEST_F(CommandLine, EvalSaysHowFarFromTheTruth) {
+  ASSERT_TRUE(WriteTum({{0, {0, 0, 0}}, {kNanosPerSecond / 10, {1, 0, 0}}}, File("truth.tum")));
+  ASSERT_TRUE(WriteTum({{0, {0, 0.5, 0}}, {kNanosPerSecond / 10, {1, 0.5, 0}}}, File("estimate.tum")));
+  const Outcome plain = RunLine({"eval", File("estimate.tum"), File("truth.tum"), "--json"});
+  ASSERT_EQ(plain.code, ExitCode::kOk) << plain.err;
+  EXPECT_NEAR(nlohmann::json::parse(plain.out)["ate_rmse_m"].get<double>(), 0.5, 1e-9);
+  EXPECT_EQ(RunLine({"eval", File("estimate.tum"), File("truth.tum"), "--max-rmse", "0.4"}).code, ExitCode::kFailed);
+  EXPECT_EQ(RunLine({"eval", File("estimate.tum"), File("truth.tum"), "--align", "se2", "--max-rmse", "0.01"}).code,
+            ExitCode::kOk);
+}
+
+TEST_F(CommandLine, FilesThatAreNotThereFailWithOneLine) {
+  for (const std::vector<std::string>& arguments : {std::vector<std::string>{"check-log", File("none.log")},
+                                                    {"eval", File("none.tum"), File("none.tum")},
+                                                    {"replay", File("none.log"), "--site", "s", "--robot", "r"},
+                                                    {"sim", "--no-stream", "--world", File("none.world")},
+                                                    {"map", "draw", "--map", File("none.yaml"), "-o", File("x.png")}}) {
+    const Outcome outcome = RunLine(arguments);
+    EXPECT_EQ(outcome.code, ExitCode::kFailed) << arguments[0];
+    EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr("none."));
+  }
+}
+
+TEST_F(CommandLine, AnErrorIsAnObjectForMachines) {
+  const Outcome outcome = RunLine({"--json", "check-log", File("none.log")});
+  EXPECT_EQ(outcome.code, ExitCode::kFailed);
+  EXPECT_THAT(nlohmann::json::parse(outcome.out)["error"]["message"].get<std::string>(), HasSubstr("none.log"));
+}
+
+}  // namespace
+}  // namespace cairn::client

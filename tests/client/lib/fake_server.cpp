@@ -1,0 +1,190 @@
+#include "tests/client/lib/fake_server.h"
+
+#include <utility>
+
+#include "tests/loopback.h"
+
+namespace cairn::test {
+
+FakeServer::FakeServer(const wire::WireOptions& options) : bus_(MakeBus("fake server", options)) {
+  sessions_ = Must(bus_->Advertise<SessionState>());
+  ledgers_ = Must(bus_->Advertise<Ledger>());
+  poses_ = Must(bus_->Advertise<PoseReport>());
+  maps_ = Must(bus_->Advertise<MapInfo>());
+  tiles_ = Must(bus_->Advertise<TileSample>());
+  replies_ = Must(bus_->Advertise<Reply>());
+  const auto add = [this](auto subscription) { subscriptions_.push_back(Must(std::move(subscription))); };
+  add(bus_->Subscribe<ScanSample>([this](ScanSample&& sample) { OnScan(std::move(sample)); }));
+  add(bus_->Subscribe<OdometrySample>([this](OdometrySample&&) {
+    const MutexLock lock(mutex_);
+    ++odometry_received_;
+  }));
+  add(bus_->Subscribe<Request>([this](Request&& request) { OnRequest(std::move(request)); }));
+  add(bus_->Subscribe<SessionRequest>([this](SessionRequest&& request) { OnSession(std::move(request)); }));
+}
+
+FakeServer::~FakeServer() {
+  subscriptions_.clear();
+}
+
+void FakeServer::SetSettling(bool settling) {
+  const MutexLock lock(mutex_);
+  settling_ = settling;
+  if (!settling) return;
+  for (const auto& [sensor, account] : accounts_) Report(account.stream);
+}
+
+void FakeServer::SetDurable(bool durable) {
+  const MutexLock lock(mutex_);
+  durable_ = durable;
+}
+
+void FakeServer::SetAnswering(bool answering) {
+  const MutexLock lock(mutex_);
+  answering_ = answering;
+}
+
+void FakeServer::LoseOnce(std::uint64_t sequence) {
+  const MutexLock lock(mutex_);
+  to_lose_.insert(sequence);
+}
+
+void FakeServer::Publish(const MapInfo& info) {
+  Must(maps_->Publish(info));
+}
+
+void FakeServer::Publish(const TileSample& sample) {
+  Must(tiles_->Publish(sample));
+}
+
+std::vector<std::uint64_t> FakeServer::received() const {
+  const MutexLock lock(mutex_);
+  return received_;
+}
+
+ScanSample FakeServer::last_scan() const {
+  const MutexLock lock(mutex_);
+  return last_scan_;
+}
+
+int FakeServer::odometry_received() const {
+  const MutexLock lock(mutex_);
+  return odometry_received_;
+}
+
+std::vector<RequestKind> FakeServer::asked() const {
+  const MutexLock lock(mutex_);
+  return asked_;
+}
+
+void FakeServer::OnSession(SessionRequest&& request) {
+  SessionState state{HashName(request.robot), request.client, request.robot, request.site, SessionPhase::kActive, {}};
+  {
+    const MutexLock lock(mutex_);
+    const ClientId owner = owners_.try_emplace(request.robot, request.client).first->second;
+    if (owner != request.client) {
+      state.phase = SessionPhase::kRefused;
+      state.status = {StatusCode::kAlreadyExists, "robot '" + request.robot + "' is connected already"};
+    } else if (request.end) {
+      state.phase = SessionPhase::kEnded;
+    }
+  }
+  Must(sessions_->Publish(state));
+}
+
+void FakeServer::OnScan(ScanSample&& sample) {
+  const MutexLock lock(mutex_);
+  if (to_lose_.erase(sample.scan.sequence) > 0) return;
+  Account& account = accounts_[sample.stream.sensor_id];
+  account.stream = sample.stream;
+  if (!account.seen.insert(sample.scan.sequence).second) return;
+  received_.push_back(sample.scan.sequence);
+  last_scan_ = sample;
+  if (!settling_) return;
+  Report(sample.stream);
+  PoseReport pose;
+  pose.robot_id = sample.stream.robot_id;
+  pose.stamp = sample.scan.stamp;
+  pose.scan_sequence = sample.scan.sequence;
+  pose.reason = PoseReason::kTracking;
+  Must(poses_->Publish(pose));
+}
+
+// Settles what is here without a gap: unlike the real server it waits for what is missing.
+void FakeServer::Report(const StreamId& stream) {
+  Account& account = accounts_[stream.sensor_id];
+  while (account.seen.count(account.settled + 1) > 0) ++account.settled;
+  Ledger ledger;
+  ledger.robot_id = stream.robot_id;
+  ledger.sensor_id = stream.sensor_id;
+  ledger.received = ledger.used = account.seen.size();
+  ledger.last_sequence = account.seen.empty() ? 0 : *account.seen.rbegin();
+  ledger.settled_through = account.settled;
+  ledger.durable_through = durable_ ? account.settled : 0;
+  Must(ledgers_->Publish(ledger));
+}
+
+void FakeServer::OnRequest(Request&& request) {
+  {
+    const MutexLock lock(mutex_);
+    asked_.push_back(request.kind);
+    if (!answering_ && request.kind != RequestKind::kPing) return;
+  }
+  Reply reply;
+  reply.client = request.client;
+  reply.sequence = request.sequence;
+  switch (request.kind) {
+    case RequestKind::kPing:
+      reply.server_version = "fake";
+      break;
+    case RequestKind::kPose:
+      reply.poses.resize(1);
+      reply.poses[0].robot = request.robot;
+      reply.poses[0].stamp = request.latest ? -1 : request.stamp;
+      break;
+    case RequestKind::kPath:
+      reply.path.resize(request.smoothed ? 2 : 1);
+      break;
+    case RequestKind::kTiles:
+      reply.map_epoch = 3;
+      reply.map_version = 9;
+      reply.tiles.resize(1);
+      reply.tiles[0].bytes.resize(50000);
+      reply.last = false;
+      for (; reply.part + 1 < kTileParts; ++reply.part) {
+        reply.tiles[0].key.x = static_cast<int>(reply.part);
+        Must(replies_->Publish(reply));
+      }
+      reply.tiles[0].key.x = static_cast<int>(reply.part);
+      reply.last = true;
+      break;
+    case RequestKind::kJobSubmit:
+    case RequestKind::kJobGet:
+    case RequestKind::kJobCancel:
+      reply.jobs.resize(1);
+      reply.jobs[0].id = request.kind == RequestKind::kJobSubmit ? 42 : request.job;
+      reply.jobs[0].site = request.site;
+      break;
+    case RequestKind::kLandmarks:
+      reply.landmarks.resize(2);
+      break;
+    case RequestKind::kMapInfo:
+      reply.maps.resize(1);
+      reply.maps[0].site = request.site;
+      break;
+    case RequestKind::kStatus:
+      reply.robots.resize(3);
+      break;
+    case RequestKind::kJobList:
+      reply.jobs.resize(2);
+      break;
+    case RequestKind::kSessionEnd:
+      break;
+    case RequestKind::kMapEnable:
+      reply.status = {StatusCode::kNotFound, "no version " + std::to_string(request.map_version)};
+      break;
+  }
+  Must(replies_->Publish(reply));
+}
+
+}  // namespace cairn::test

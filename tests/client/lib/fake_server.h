@@ -1,0 +1,73 @@
+// A server as clients see it, without an estimator: sessions, ledgers, a pose for every scan, and answers. What it does
+// not do (settle, answer) can be switched off, to see how clients wait.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/mutex.h"
+#include "common/wire/bus.h"
+
+namespace cairn::test {
+
+class FakeServer {
+ public:
+  explicit FakeServer(const wire::WireOptions& options);
+  ~FakeServer();
+
+  // A stopped server receives scans but settles none; resuming settles all it has.
+  void SetSettling(bool settling);
+  void SetDurable(bool durable);  // Settled scans are also called durable.
+  void SetAnswering(bool answering);
+  // Scans with this number are lost on their way, once.
+  void LoseOnce(std::uint64_t sequence);
+
+  void Publish(const MapInfo& info);
+  void Publish(const TileSample& sample);
+
+  [[nodiscard]] std::vector<std::uint64_t> received() const;  // Numbers in order of arrival, duplicates left out.
+  [[nodiscard]] ScanSample last_scan() const;
+  [[nodiscard]] int odometry_received() const;
+  [[nodiscard]] std::vector<RequestKind> asked() const;
+  [[nodiscard]] std::uint64_t datagrams_refused() const { return bus_->datagrams_refused(); }
+
+  static constexpr std::uint32_t kTileParts = 40;  // Of the answer to every tile query, one tile of 50 KB each.
+
+ private:
+  void OnSession(SessionRequest&& request);
+  void OnScan(ScanSample&& sample);
+  void OnRequest(Request&& request);
+  void Report(const StreamId& stream) CAIRN_REQUIRES(mutex_);
+
+  struct Account {
+    StreamId stream;
+    std::set<std::uint64_t> seen;
+    std::uint64_t settled = 0;
+  };
+
+  mutable Mutex mutex_;
+  bool settling_ CAIRN_GUARDED_BY(mutex_) = true;
+  bool durable_ CAIRN_GUARDED_BY(mutex_) = false;
+  bool answering_ CAIRN_GUARDED_BY(mutex_) = true;
+  std::set<std::uint64_t> to_lose_ CAIRN_GUARDED_BY(mutex_);
+  std::map<std::string, ClientId> owners_ CAIRN_GUARDED_BY(mutex_);
+  std::map<NameId, Account> accounts_ CAIRN_GUARDED_BY(mutex_);
+  std::vector<std::uint64_t> received_ CAIRN_GUARDED_BY(mutex_);
+  ScanSample last_scan_ CAIRN_GUARDED_BY(mutex_);
+  int odometry_received_ CAIRN_GUARDED_BY(mutex_) = 0;
+  std::vector<RequestKind> asked_ CAIRN_GUARDED_BY(mutex_);
+
+  std::unique_ptr<wire::Bus> bus_;
+  std::unique_ptr<wire::Publication<SessionState>> sessions_;
+  std::unique_ptr<wire::Publication<Ledger>> ledgers_;
+  std::unique_ptr<wire::Publication<PoseReport>> poses_;
+  std::unique_ptr<wire::Publication<MapInfo>> maps_;
+  std::unique_ptr<wire::Publication<TileSample>> tiles_;
+  std::unique_ptr<wire::Publication<Reply>> replies_;
+  std::vector<std::unique_ptr<wire::Subscription>> subscriptions_;  // Last: their callbacks use everything above.
+};
+
+}  // namespace cairn::test

@@ -1,0 +1,75 @@
+#include "client/lib/map_client.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+
+#include "tests/client/lib/fake_server.h"
+#include "tests/loopback.h"
+
+namespace cairn::client {
+namespace {
+
+using namespace test;
+
+MapInfo Hall(std::uint32_t epoch, std::uint64_t version, std::uint32_t tiles) {
+  MapInfo info;
+  info.site_id = HashName("hall");
+  info.site = "hall";
+  info.epoch = epoch;
+  info.version = version;
+  info.tile_count = tiles;
+  return info;
+}
+
+TileSample TileAt(int x, std::uint32_t epoch, std::uint64_t version) {
+  TileSample sample;
+  sample.site_id = HashName("hall");
+  sample.tile.key = {0, x, -x};
+  sample.tile.epoch = epoch;
+  sample.tile.version = version;
+  sample.tile.bytes.assign(2000, static_cast<std::uint8_t>(x));
+  return sample;
+}
+
+TEST(MapClient, ALateJoinerGetsTheWholeMapAndThenTheChanges) {
+  FakeServer server(LoopbackOptions());
+  for (int x = 0; x < 200; ++x) server.Publish(TileAt(x, 0, static_cast<std::uint64_t>(x) + 1));
+  server.Publish(Hall(0, 200, 200));
+  const auto bus = MakeBus("client");
+  std::atomic<int> changes = 0;
+  const auto client = Must(MapClient::Create(*bus, "hall", [&] { ++changes; }));
+  Must(client->WaitComplete(20.0));
+  EXPECT_EQ(client->tiles(0).size(), 200U);
+  EXPECT_EQ(client->info()->site, "hall");
+  server.Publish(TileAt(7, 0, 201));
+  EXPECT_TRUE(Eventually([&] { return client->version() == 201; }));
+  // 200 tiles, the map's word, the change.
+  EXPECT_TRUE(Eventually([&] { return changes == 202; }));
+}
+
+TEST(MapClient, ANewEpochReplacesTheMapWhole) {
+  FakeServer server(LoopbackOptions());
+  for (int x = 0; x < 10; ++x) server.Publish(TileAt(x, 0, 1));
+  server.Publish(Hall(0, 1, 10));
+  const auto bus = MakeBus("client");
+  const auto client = Must(MapClient::Create(*bus, "hall"));
+  Must(client->WaitComplete(20.0));
+  server.Publish(Hall(1, 2, 1));
+  server.Publish(TileAt(3, 1, 2));
+  EXPECT_TRUE(Eventually([&] { return client->epoch() == 1 && client->tiles().size() == 1; }));
+  Must(client->WaitComplete(20.0));
+}
+
+TEST(MapClient, SaysWhatIsMissing) {
+  const auto bus = MakeBus("client");
+  const auto client = Must(MapClient::Create(*bus, "hall"));
+  EXPECT_EQ(client->WaitComplete(0.1).error().code, StatusCode::kUnavailable);
+  FakeServer server(LoopbackOptions());
+  EXPECT_TRUE(Eventually([&] { return client->WaitComplete(0.05).error().code == StatusCode::kNotFound; }));
+  server.Publish(Hall(0, 1, 10));
+  EXPECT_TRUE(Eventually([&] { return client->WaitComplete(0.05).error().code == StatusCode::kDeadlineExceeded; }));
+}
+
+}  // namespace
+}  // namespace cairn::client

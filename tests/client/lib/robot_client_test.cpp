@@ -1,0 +1,161 @@
+#include "client/lib/robot_client.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numeric>
+
+#include "tests/client/lib/fake_server.h"
+#include "tests/loopback.h"
+
+namespace cairn::client {
+namespace {
+
+using namespace test;
+
+SessionRequest Robot(const std::string& name) {
+  SessionRequest request;
+  request.robot = name;
+  request.site = "hall";
+  request.sensors = {"front", "rear"};
+  return request;
+}
+
+Scan SomeScan() {
+  Scan scan;
+  scan.ranges_m.assign(180, 1.0F);
+  return scan;
+}
+
+std::vector<std::uint64_t> OneTo(std::uint64_t n) {
+  std::vector<std::uint64_t> numbers(n);
+  std::iota(numbers.begin(), numbers.end(), 1);
+  return numbers;
+}
+
+class RobotClientTest : public ::testing::Test {
+ protected:
+  std::unique_ptr<RobotClient> Open(const RobotClientOptions& options = {}, RobotClient::Callbacks callbacks = {}) {
+    return Must(RobotClient::Open(*bus_, Robot("r1"), 20.0, std::move(callbacks), options));
+  }
+
+  std::unique_ptr<FakeServer> server_ = std::make_unique<FakeServer>(LoopbackOptions());
+  const std::unique_ptr<wire::Bus> bus_ = MakeBus("robot");
+};
+
+TEST_F(RobotClientTest, StreamsEverythingInOrderAndSeesItSettled) {
+  const auto client = Open();
+  for (int i = 0; i < 500; ++i) ASSERT_TRUE(client->Publish(SomeScan()));
+  for (int i = 0; i < 50; ++i) ASSERT_TRUE(client->Publish(Odometry{}));
+  ASSERT_TRUE(client->WaitSettled(20.0));
+  EXPECT_EQ(server_->received(), OneTo(500));
+  EXPECT_TRUE(Eventually([&] { return server_->odometry_received() == 50; }));
+  EXPECT_EQ(client->ledger()->settled_through, 500U);
+  EXPECT_EQ(client->resent(), 0U);
+}
+
+TEST_F(RobotClientTest, HandsOutPosesAndLedgers) {
+  std::atomic<int> ledgers = 0;
+  std::atomic<std::uint64_t> pose_of = 0;
+  const auto client =
+      Open({}, {[&](const Ledger&) { ++ledgers; }, [&](const PoseReport& pose) { pose_of = pose.scan_sequence; }, {}});
+  ASSERT_TRUE(client->Publish(SomeScan()));
+  EXPECT_TRUE(Eventually([&] { return ledgers > 0 && pose_of == 1; }));
+  EXPECT_TRUE(Eventually([&] { return client->pose() && client->pose()->reason == PoseReason::kTracking; }));
+}
+
+TEST_F(RobotClientTest, ASecondClientOfOneRobotIsRefusedAndTheFirstGoesOn) {
+  const auto owner = Open();
+  const auto other_bus = MakeBus("impostor");
+  const auto second = RobotClient::Open(*other_bus, Robot("r1"), 20.0);
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().code, StatusCode::kAlreadyExists);
+  EXPECT_EQ(owner->session().phase, SessionPhase::kActive);
+  EXPECT_TRUE(owner->Publish(SomeScan()));
+}
+
+TEST_F(RobotClientTest, StopsAtTheWindowUntilTheServerSettles) {
+  RobotClientOptions options;
+  options.send_timeout_s = 0.2;
+  options.resend_after_s = 100.0;
+  const auto client = Open(options);
+  server_->SetSettling(false);
+  for (int i = 0; i < 32; ++i) ASSERT_TRUE(client->Publish(SomeScan())) << i;
+  const Result<void> full = client->Publish(SomeScan());
+  ASSERT_FALSE(full);
+  EXPECT_EQ(full.error().code, StatusCode::kUnavailable);
+  server_->SetSettling(true);
+  ASSERT_TRUE(Eventually([&] { return client->Publish(SomeScan()).has_value(); }));
+  ASSERT_TRUE(client->WaitSettled(20.0));
+  EXPECT_EQ(server_->received(), OneTo(33));
+}
+
+TEST_F(RobotClientTest, EachSensorHasAWindowOfItsOwn) {
+  RobotClientOptions options;
+  options.send_timeout_s = 0.1;
+  options.resend_after_s = 100.0;
+  const auto client = Open(options);
+  server_->SetSettling(false);
+  for (int i = 0; i < 32; ++i) ASSERT_TRUE(client->Publish(SomeScan(), "front"));
+  EXPECT_FALSE(client->Publish(SomeScan(), "front"));
+  EXPECT_TRUE(client->Publish(SomeScan(), "rear"));
+  const Result<void> unknown = client->Publish(SomeScan(), "roof");
+  ASSERT_FALSE(unknown);
+  EXPECT_EQ(unknown.error().code, StatusCode::kInvalidArgument);
+}
+
+TEST_F(RobotClientTest, SendsAgainWhatGotStuck) {
+  server_->LoseOnce(5);
+  RobotClientOptions options;
+  options.resend_after_s = 0.2;
+  const auto client = Open(options);
+  for (int i = 0; i < 10; ++i) ASSERT_TRUE(client->Publish(SomeScan()));
+  ASSERT_TRUE(client->WaitSettled(20.0));
+  EXPECT_GE(client->resent(), 1U);
+  EXPECT_THAT(server_->received(), ::testing::UnorderedElementsAreArray(OneTo(10)));
+}
+
+// What the old server had not settled, the new one gets; the robot notices nothing but a pause.
+TEST_F(RobotClientTest, GoesOnWithARestartedServer) {
+  RobotClientOptions options;
+  options.resend_after_s = 100.0;  // Only the reconnection may cause it.
+  options.send_timeout_s = 20.0;
+  const auto client = Open(options);
+  for (int i = 0; i < 10; ++i) ASSERT_TRUE(client->Publish(SomeScan()));
+  ASSERT_TRUE(client->WaitSettled(20.0));
+  server_->SetSettling(false);
+  for (int i = 0; i < 5; ++i) ASSERT_TRUE(client->Publish(SomeScan()));
+  ASSERT_TRUE(Eventually([&] { return server_->received().size() == 15; }));
+  server_.reset();
+  ASSERT_TRUE(client->Publish(SomeScan()));  // Into the void.
+  server_ = std::make_unique<FakeServer>(LoopbackOptions());
+  EXPECT_TRUE(Eventually([&] { return server_->received().size() >= 6; }));
+  EXPECT_THAT(server_->received(), ::testing::ElementsAre(11, 12, 13, 14, 15, 16));
+}
+
+TEST_F(RobotClientTest, EndsItsSession) {
+  const auto client = Open();
+  ASSERT_TRUE(client->End(20.0));
+  EXPECT_EQ(client->session().phase, SessionPhase::kEnded);
+  const Result<void> late = client->Publish(SomeScan());
+  ASSERT_FALSE(late);
+  EXPECT_EQ(late.error().code, StatusCode::kFailedPrecondition);
+}
+
+TEST_F(RobotClientTest, NeedsASensor) {
+  SessionRequest request = Robot("r1");
+  request.sensors.clear();
+  EXPECT_FALSE(RobotClient::Open(*bus_, request, 1.0));
+}
+
+TEST(RobotClientAlone, SaysThatNoServerAnswers) {
+  const auto bus = MakeBus("robot");
+  const auto client = RobotClient::Open(*bus, Robot("r1"), 0.2);
+  ASSERT_FALSE(client);
+  EXPECT_EQ(client.error().code, StatusCode::kUnavailable);
+  EXPECT_EQ(client.error().message,
+            "no server answers on domain " + std::to_string(TestDomain()) + " at 127.0.0.1 within 0.2 s");
+}
+
+}  // namespace
+}  // namespace cairn::client

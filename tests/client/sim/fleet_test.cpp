@@ -1,0 +1,231 @@
+#include "client/sim/fleet.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+
+#include "client/sim/shipped_worlds.h"
+
+namespace cairn::sim {
+namespace {
+
+Fleet Make(const std::string& world, const FleetOptions& options) {
+  auto opened = OpenWorld(world);
+  EXPECT_TRUE(opened) << opened.error().message;
+  auto fleet = Fleet::Create(*opened, options);
+  EXPECT_TRUE(fleet) << fleet.error().message;
+  return std::move(*fleet);
+}
+
+Stamp StampOf(const LogRecord& record) {
+  return std::visit([](const auto& value) { return value.stamp; }, record);
+}
+
+std::vector<FleetRecord> Take(Fleet& fleet, double seconds) {
+  std::vector<FleetRecord> records;
+  const FleetRecord first = fleet.Next();
+  const Stamp end = StampOf(first.record) + StampFromSeconds(seconds);
+  for (FleetRecord record = first; StampOf(record.record) <= end; record = fleet.Next()) records.push_back(record);
+  return records;
+}
+
+bool Same(const FleetRecord& a, const FleetRecord& b) {
+  if (a.robot != b.robot || a.record.index() != b.record.index() || StampOf(a.record) != StampOf(b.record))
+    return false;
+  if (const auto* odometry = std::get_if<Odometry>(&a.record)) {
+    return odometry->T_odom_robot == std::get<Odometry>(b.record).T_odom_robot;
+  }
+  return std::get<Scan>(a.record).ranges_m == std::get<Scan>(b.record).ranges_m;
+}
+
+TEST(Fleet, SameSeedGivesTheSameRecords) {
+  FleetOptions options;
+  options.robots = 4;
+  Fleet one = Make("building", options), two = Make("building", options);
+  options.seed = 2;
+  Fleet other = Make("building", options);
+  bool differs = false;
+  for (int i = 0; i < 2000; ++i) {
+    const FleetRecord record = one.Next();
+    EXPECT_TRUE(Same(record, two.Next())) << i;
+    differs |= !Same(record, other.Next());
+  }
+  EXPECT_TRUE(differs);
+}
+
+TEST(Fleet, RecordsComeInTheOrderOfTheirStampsAtTheirRates) {
+  FleetOptions options;
+  options.robots = 3;
+  options.scan_hz = 7;
+  options.odometry_hz = 30;
+  Fleet fleet = Make("building", options);
+  const auto records = Take(fleet, 10.0);
+  std::map<int, int> scans, odometries;
+  Stamp last = options.first_stamp;
+  for (const FleetRecord& record : records) {
+    EXPECT_GE(StampOf(record.record), last);
+    last = StampOf(record.record);
+    if (const auto* scan = std::get_if<Scan>(&record.record)) {
+      EXPECT_EQ(scan->sequence, static_cast<std::uint64_t>(++scans[record.robot]));
+      EXPECT_GT(odometries[record.robot], 0) << "a scan before the first odometry";
+    } else {
+      ++odometries[record.robot];
+    }
+  }
+  for (int robot = 0; robot < 3; ++robot) {
+    EXPECT_NEAR(scans[robot], 70, 1);
+    EXPECT_NEAR(odometries[robot], 300, 1);
+  }
+}
+
+TEST(Fleet, TruthHasOnePosePerScanAtItsStamp) {
+  FleetOptions options;
+  options.robots = 2;
+  Fleet fleet = Make("room", options);
+  std::vector<Stamp> stamps;
+  for (const FleetRecord& record : Take(fleet, 5.0)) {
+    if (record.robot == 1 && std::holds_alternative<Scan>(record.record)) stamps.push_back(StampOf(record.record));
+  }
+  ASSERT_GE(fleet.truth(1).size(), stamps.size());
+  for (std::size_t i = 0; i < stamps.size(); ++i) EXPECT_EQ(fleet.truth(1)[i].stamp, stamps[i]);
+}
+
+TEST(Fleet, OdometryOfPerfectWheelsIsTheTruthSeenFromTheStart) {
+  FleetOptions options;
+  options.robots = 1;
+  options.scan_hz = options.odometry_hz = 10;
+  options.wheels.slip_m_per_sqrt_m = 0;
+  options.wheel_spread = {0, 0};
+  Fleet fleet = Make("building", options);
+  Pose2 T_odom_robot;
+  for (const FleetRecord& record : Take(fleet, 30.0)) {
+    if (const auto* odometry = std::get_if<Odometry>(&record.record)) T_odom_robot = odometry->T_odom_robot;
+    if (std::holds_alternative<Scan>(record.record)) {
+      const Pose2 believed = fleet.T_map_robot_start(0) * T_odom_robot;
+      EXPECT_NEAR((believed.translation() -
+                   fleet.truth(0)[std::get<Scan>(record.record).sequence - 1].T_map_robot.translation())
+                      .norm(),
+                  0, 1e-6);
+    }
+  }
+}
+
+TEST(Fleet, RealWheelsDriftAwayFromTheTruth) {
+  FleetOptions options;
+  options.robots = 1;
+  Fleet fleet = Make("building", options);
+  Pose2 T_odom_robot;
+  for (const FleetRecord& record : Take(fleet, 120.0)) {
+    if (const auto* odometry = std::get_if<Odometry>(&record.record)) T_odom_robot = odometry->T_odom_robot;
+  }
+  const Pose2 believed = fleet.T_map_robot_start(0) * T_odom_robot;
+  const double error = (believed.translation() - fleet.truth(0).back().T_map_robot.translation()).norm();
+  EXPECT_GT(error, 0.2);
+  EXPECT_LT(error, 30.0);
+}
+
+TEST(Fleet, MoreRobotsThanRoutesStartApart) {
+  FleetOptions options;
+  options.robots = 16;
+  const Fleet fleet = Make("building", options);
+  for (int a = 0; a < 16; ++a) {
+    for (int b = a + 1; b < 16; ++b) {
+      const Eigen::Vector2d apart = fleet.T_map_robot_start(a).translation() - fleet.T_map_robot_start(b).translation();
+      EXPECT_GT(apart.norm(), 0.5) << a << " " << b;
+    }
+    EXPECT_EQ(fleet.name(a), "robot" + std::to_string(a + 1));
+  }
+}
+
+TEST(Fleet, RobotsKeepTheirLimits) {
+  FleetOptions options;
+  options.robots = 3;
+  options.odometry_hz = 100;
+  options.scan_hz = 100;
+  options.laser.beams = 1;
+  Fleet fleet = Make("building", options);
+  Take(fleet, 60.0);
+  for (int robot = 0; robot < 3; ++robot) {
+    const Trajectory& truth = fleet.truth(robot);
+    double way = 0;
+    for (std::size_t i = 1; i < truth.size(); ++i) {
+      const double seconds = SecondsFromStamp(truth[i].stamp - truth[i - 1].stamp);
+      const Pose2 step = Between(truth[i - 1].T_map_robot, truth[i].T_map_robot);
+      EXPECT_LE(step.translation().norm(), options.drive.speed_m_s * seconds + 1e-9);
+      EXPECT_LE(std::abs(step.theta), options.drive.turn_rad_s * seconds + 1e-9);
+      way += step.translation().norm();
+    }
+    EXPECT_GT(way, 20.0) << "it gets somewhere";
+  }
+}
+
+TEST(Fleet, RobotsSeeEachOther) {
+  FleetOptions options;
+  options.robots = 2;
+  options.laser.range_max_m = 60;
+  options.laser.noise_m = options.laser.noise_share = options.laser.dropout_share = 0;
+  options.wheels.slip_m_per_sqrt_m = 0;  // No random draws: both fleets drive alike.
+  Fleet seeing = Make("corridor", options);
+  options.see_each_other = false;
+  Fleet blind = Make("corridor", options);
+  int nearer = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const FleetRecord a = seeing.Next(), b = blind.Next();
+    const auto* scan = std::get_if<Scan>(&a.record);
+    if (!scan) continue;
+    for (std::size_t k = 0; k < scan->ranges_m.size(); ++k) {
+      EXPECT_LE(scan->ranges_m[k], std::get<Scan>(b.record).ranges_m[k]);
+      nearer += scan->ranges_m[k] < std::get<Scan>(b.record).ranges_m[k];
+    }
+  }
+  EXPECT_GT(nearer, 100);
+}
+
+class ShippedWorld : public ::testing::TestWithParam<std::string> {};
+
+TEST_P(ShippedWorld, RobotsDriveItsRoutesClearOfEverything) {
+  auto world = OpenWorld(GetParam());
+  ASSERT_TRUE(world) << world.error().message;
+  EXPECT_EQ(world->name, GetParam());
+  const RayCaster walls(world->segments);
+  FleetOptions options;
+  options.robots = static_cast<int>(world->routes.size());
+  options.laser.beams = 1;
+  options.scan_hz = 5;
+  Fleet fleet = Make(GetParam(), options);
+  Take(fleet, 400.0);
+  for (int robot = 0; robot < fleet.robots(); ++robot) {
+    for (const StampedPose& pose : fleet.truth(robot)) {
+      double clearance = walls.Clearance(pose.T_map_robot.translation());
+      for (const Disc& disc : world->discs) {
+        clearance = std::min(clearance, (disc.center_map - pose.T_map_robot.translation()).norm() - disc.radius_m);
+      }
+      ASSERT_GT(clearance, options.robot_radius_m + 0.1)
+          << "robot " << robot << " at " << pose.T_map_robot.x << ", " << pose.T_map_robot.y;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ShippedWorld, ::testing::ValuesIn(ShippedWorldNames()),
+                         [](const auto& param) { return param.param; });
+
+TEST(Fleet, RefusesWhatCannotBe) {
+  const auto world = OpenWorld("room");
+  ASSERT_TRUE(world);
+  FleetOptions options;
+  options.robots = 0;
+  EXPECT_FALSE(Fleet::Create(*world, options));
+  options = {};
+  options.scan_hz = 0;
+  EXPECT_FALSE(Fleet::Create(*world, options));
+  World empty = *world;
+  empty.routes.clear();
+  const auto fleet = Fleet::Create(empty, {});
+  ASSERT_FALSE(fleet);
+  EXPECT_THAT(fleet.error().message, ::testing::HasSubstr("no route"));
+}
+
+}  // namespace
+}  // namespace cairn::sim

@@ -1,0 +1,319 @@
+#include "tests/common/wire/sample_values.h"
+
+#include <cstring>
+#include <limits>
+
+namespace cairn::wire {
+namespace {
+
+constexpr double kMax = std::numeric_limits<double>::max();
+constexpr double kTiny = std::numeric_limits<double>::denorm_min();
+constexpr double kInf = std::numeric_limits<double>::infinity();
+constexpr std::uint64_t kMax64 = std::numeric_limits<std::uint64_t>::max();
+constexpr std::uint32_t kMax32 = std::numeric_limits<std::uint32_t>::max();
+constexpr std::int64_t kMin64 = std::numeric_limits<std::int64_t>::min();
+
+std::string Name(char c) {
+  return std::string(64, c);
+}
+std::string Text(char c) {
+  return std::string(1024, c);
+}
+
+// Bits, so that NaN and -0 are told apart.
+bool Eq(double a, double b) {
+  return std::memcmp(&a, &b, sizeof(a)) == 0;
+}
+bool Eq(const Pose2& a, const Pose2& b) {
+  return Eq(a.x, b.x) && Eq(a.y, b.y) && Eq(a.theta, b.theta);
+}
+template <typename Matrix>
+bool EqMatrix(const Matrix& a, const Matrix& b) {
+  return std::memcmp(a.data(), b.data(), sizeof(double) * static_cast<std::size_t>(a.size())) == 0;
+}
+bool Eq(const Status& a, const Status& b) {
+  return a.code == b.code && a.message == b.message;
+}
+bool Eq(const Tile& a, const Tile& b) {
+  return a.key == b.key && a.epoch == b.epoch && a.version == b.version && a.encoding == b.encoding &&
+         a.bytes == b.bytes;
+}
+bool Eq(const StreamId& a, const StreamId& b) {
+  return a.robot_id == b.robot_id && a.sensor_id == b.sensor_id && a.client == b.client;
+}
+bool Eq(const StampedPose& a, const StampedPose& b) {
+  return a.stamp == b.stamp && Eq(a.T_map_robot, b.T_map_robot);
+}
+bool Eq(const LandmarkReport& a, const LandmarkReport& b) {
+  return a.id == b.id && a.robot == b.robot && a.corner == b.corner && EqMatrix(a.p_map, b.p_map) &&
+         Eq(a.direction_rad, b.direction_rad) && EqMatrix(a.covariance, b.covariance) && a.sightings == b.sightings;
+}
+bool Eq(const MapVersionInfo& a, const MapVersionInfo& b) {
+  return a.version == b.version && a.enabled == b.enabled && a.job == b.job && a.note == b.note;
+}
+template <typename T, typename Equal>
+bool EqList(const std::vector<T>& a, const std::vector<T>& b, Equal equal) {
+  if (a.size() != b.size()) return false;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (!equal(a[i], b[i])) return false;
+  }
+  return true;
+}
+
+Tile ExtremeTileContent(std::size_t bytes) {
+  Tile tile;
+  tile.epoch = kMax32;
+  tile.version = kMax64;
+  tile.encoding = TileEncoding::kRaw;
+  for (std::size_t i = 0; i < bytes; ++i) tile.bytes.push_back(static_cast<std::uint8_t>(i * 7));
+  return tile;
+}
+
+}  // namespace
+
+SessionRequest ExtremeSessionRequest() {
+  SessionRequest value;
+  value.robot = Name('r');
+  value.site = Name('s');
+  for (char c = 'a'; c < 'a' + 16; ++c) value.sensors.push_back(Name(c));
+  value.client = kMax64;
+  value.has_start = true;
+  value.T_map_robot_start = {kMax, -kTiny, -kMax};
+  value.end = true;
+  return value;
+}
+
+SessionState ExtremeSessionState() {
+  return {kMax64, kMax64 - 1, Name('r'), Name('s'), SessionPhase::kSuspended, {StatusCode::kDataLoss, Text('m')}};
+}
+
+ScanSample ExtremeScan(std::size_t beams) {
+  ScanSample value;
+  value.stream = {kMax64, kMax64 - 1, kMax64 - 2};
+  value.scan = {.sequence = kMax64 - 3,
+                .stamp = kMin64,
+                .angle_first_rad = -kMax,
+                .angle_step_rad = kTiny,
+                .range_min_m = -0.0,
+                .range_max_m = kInf,
+                .beam_period_s = std::numeric_limits<double>::quiet_NaN(),
+                .scan_period_s = 1e-9,
+                .tilt_rad = -1.25,
+                .T_robot_laser = {1, -2, 3},
+                .ranges_m = {}};
+  const float specials[] = {0.0F,
+                            -0.0F,
+                            std::numeric_limits<float>::infinity(),
+                            std::numeric_limits<float>::quiet_NaN(),
+                            std::numeric_limits<float>::max(),
+                            1.5F};
+  for (std::size_t i = 0; i < beams; ++i) value.scan.ranges_m.push_back(specials[i % std::size(specials)]);
+  return value;
+}
+
+OdometrySample ExtremeOdometry() {
+  return {{1, kMax64, 3}, {.sequence = kMax64, .stamp = kMin64, .T_odom_robot = {-kMax, kMax, kTiny}}};
+}
+
+PoseReport ExtremePose() {
+  PoseReport value;
+  value.robot_id = kMax64;
+  value.robot = Name('r');
+  value.site = Name('s');
+  value.stamp = kMin64;
+  value.scan_sequence = kMax64;
+  value.T_map_robot = {kMax, kTiny, -3};
+  value.covariance << 1, 2, 3, 4, 5, 6, 7, 8, kInf;
+  value.T_map_odom = {-1, -2, -3};
+  value.localized = true;
+  value.score = 1.0;
+  value.reason = PoseReason::kWaiting;
+  value.map_epoch = kMax32;
+  return value;
+}
+
+Ledger ExtremeLedger() {
+  Ledger value;
+  value.robot_id = kMax64;
+  value.sensor_id = 1;
+  value.robot = Name('r');
+  value.sensor = Name('l');
+  value.site = Name('s');
+  std::uint64_t next = kMax64;
+  for (std::uint64_t* field : {&value.received, &value.used, &value.keyframes, &value.waiting, &value.odometry_received,
+                               &value.odometry_dropped, &value.odometry_merged, &value.last_sequence,
+                               &value.settled_through, &value.durable_through}) {
+    *field = next--;
+  }
+  for (std::uint64_t& count : value.dropped) count = next--;
+  value.last_stamp = kMin64;
+  value.latency_p50_ms = kTiny;
+  value.latency_p99_ms = kMax;
+  return value;
+}
+
+MapInfo ExtremeMapInfo() {
+  MapInfo value;
+  value.site_id = kMax64;
+  value.site = Name('s');
+  value.resolution_m = kTiny;
+  value.epoch = kMax32;
+  value.version = kMax64;
+  value.levels = kMax32 - 1;
+  value.tile_count = kMax32 - 2;
+  value.x_min_m = -kMax;
+  value.y_min_m = -1;
+  value.x_max_m = kMax;
+  value.y_max_m = 2;
+  value.robots = 7;
+  value.enabled_version = kMax32 - 3;
+  value.versions = {{1, true, 0, ""}, {kMax32, false, kMax64, Text('n')}};
+  return value;
+}
+
+TileSample ExtremeTile(std::size_t bytes) {
+  TileSample value{kMax64, ExtremeTileContent(bytes), true};
+  value.tile.key = {15, -32768, 32767};
+  return value;
+}
+
+Job ExtremeJob() {
+  return {.id = kMax64,
+          .site = Name('s'),
+          .kind = JobKind::kRelocalise,
+          .state = JobState::kCancelled,
+          .progress = 1.0,
+          .cost_before = kMax,
+          .cost_after = -0.0,
+          .map_version = kMax32,
+          .submitted = kMin64,
+          .started = -1,
+          .ended = -2,
+          .message = Text('m')};
+}
+
+Request ExtremeRequest() {
+  Request value;
+  value.client = kMax64;
+  value.sequence = kMin64;
+  value.kind = RequestKind::kMapEnable;
+  value.site = Name('s');
+  value.robot = Name('r');
+  value.latest = false;
+  value.stamp = kMin64;
+  value.smoothed = true;
+  value.area = {-kMax, -1, kMax, 2};
+  value.level = 15;
+  value.since_epoch = kMax32;
+  value.since_version = kMax64;
+  value.job = kMax64 - 1;
+  value.job_kind = JobKind::kRelocalise;
+  value.enable = false;
+  value.map_version = kMax32;
+  return value;
+}
+
+Reply ExtremeReply() {
+  Reply value;
+  value.client = kMax64;
+  value.sequence = kMin64;
+  value.part = kMax32;
+  value.last = false;
+  value.status = {StatusCode::kDataLoss, Text('m')};
+  value.map_epoch = kMax32;
+  value.map_version = kMax64;
+  value.poses = {ExtremePose(), PoseReport{}};
+  value.path = {{kMin64, {kMax, -kMax, kTiny}}, {1, {}}};
+  value.tiles = {ExtremeTileContent(16384), ExtremeTileContent(0)};
+  value.tiles[0].key = {3, std::numeric_limits<int>::min(), std::numeric_limits<int>::max()};
+  LandmarkReport landmark;
+  landmark.id = kMax64;
+  landmark.robot = Name('r');
+  landmark.corner = true;
+  landmark.p_map = {kMax, kTiny};
+  landmark.direction_rad = -3;
+  landmark.covariance << 1, 2, 3, 4;
+  landmark.sightings = kMax32;
+  value.landmarks = {landmark, LandmarkReport{}};
+  value.maps = {ExtremeMapInfo()};
+  value.robots = {{ExtremeSessionState(), true, ExtremePose(), {ExtremeLedger(), Ledger{}}}};
+  value.jobs = {ExtremeJob(), Job{}};
+  value.server_version = Text('v');
+  return value;
+}
+
+bool Same(const SessionRequest& a, const SessionRequest& b) {
+  return a.robot == b.robot && a.site == b.site && a.sensors == b.sensors && a.client == b.client &&
+         a.has_start == b.has_start && Eq(a.T_map_robot_start, b.T_map_robot_start) && a.end == b.end;
+}
+bool Same(const SessionState& a, const SessionState& b) {
+  return a.robot_id == b.robot_id && a.client == b.client && a.robot == b.robot && a.site == b.site &&
+         a.phase == b.phase && Eq(a.status, b.status);
+}
+bool Same(const ScanSample& a, const ScanSample& b) {
+  const Scan& s = a.scan;
+  const Scan& t = b.scan;
+  return Eq(a.stream, b.stream) && s.sequence == t.sequence && s.stamp == t.stamp &&
+         Eq(s.angle_first_rad, t.angle_first_rad) && Eq(s.angle_step_rad, t.angle_step_rad) &&
+         Eq(s.range_min_m, t.range_min_m) && Eq(s.range_max_m, t.range_max_m) && Eq(s.beam_period_s, t.beam_period_s) &&
+         Eq(s.scan_period_s, t.scan_period_s) && Eq(s.tilt_rad, t.tilt_rad) && Eq(s.T_robot_laser, t.T_robot_laser) &&
+         s.ranges_m.size() == t.ranges_m.size() &&
+         (s.ranges_m.empty() || std::memcmp(s.ranges_m.data(), t.ranges_m.data(), s.ranges_m.size() * 4) == 0);
+}
+bool Same(const OdometrySample& a, const OdometrySample& b) {
+  return Eq(a.stream, b.stream) && a.odometry.sequence == b.odometry.sequence && a.odometry.stamp == b.odometry.stamp &&
+         Eq(a.odometry.T_odom_robot, b.odometry.T_odom_robot);
+}
+bool Same(const PoseReport& a, const PoseReport& b) {
+  return a.robot_id == b.robot_id && a.robot == b.robot && a.site == b.site && a.stamp == b.stamp &&
+         a.scan_sequence == b.scan_sequence && Eq(a.T_map_robot, b.T_map_robot) &&
+         EqMatrix(a.covariance, b.covariance) && Eq(a.T_map_odom, b.T_map_odom) && a.localized == b.localized &&
+         Eq(a.score, b.score) && a.reason == b.reason && a.map_epoch == b.map_epoch;
+}
+bool Same(const Ledger& a, const Ledger& b) {
+  return a.robot_id == b.robot_id && a.sensor_id == b.sensor_id && a.robot == b.robot && a.sensor == b.sensor &&
+         a.site == b.site && a.received == b.received && a.used == b.used && a.keyframes == b.keyframes &&
+         a.waiting == b.waiting && a.dropped == b.dropped && a.odometry_received == b.odometry_received &&
+         a.odometry_dropped == b.odometry_dropped && a.odometry_merged == b.odometry_merged &&
+         a.last_sequence == b.last_sequence && a.settled_through == b.settled_through &&
+         a.durable_through == b.durable_through && a.last_stamp == b.last_stamp &&
+         Eq(a.latency_p50_ms, b.latency_p50_ms) && Eq(a.latency_p99_ms, b.latency_p99_ms);
+}
+bool Same(const MapInfo& a, const MapInfo& b) {
+  return a.site_id == b.site_id && a.site == b.site && Eq(a.resolution_m, b.resolution_m) && a.epoch == b.epoch &&
+         a.version == b.version && a.levels == b.levels && a.tile_count == b.tile_count && Eq(a.x_min_m, b.x_min_m) &&
+         Eq(a.y_min_m, b.y_min_m) && Eq(a.x_max_m, b.x_max_m) && Eq(a.y_max_m, b.y_max_m) && a.robots == b.robots &&
+         a.enabled_version == b.enabled_version &&
+         EqList(a.versions, b.versions, [](const auto& x, const auto& y) { return Eq(x, y); });
+}
+bool Same(const TileSample& a, const TileSample& b) {
+  return a.site_id == b.site_id && Eq(a.tile, b.tile) && a.deleted == b.deleted;
+}
+bool Same(const Job& a, const Job& b) {
+  return a.id == b.id && a.site == b.site && a.kind == b.kind && a.state == b.state && Eq(a.progress, b.progress) &&
+         Eq(a.cost_before, b.cost_before) && Eq(a.cost_after, b.cost_after) && a.map_version == b.map_version &&
+         a.submitted == b.submitted && a.started == b.started && a.ended == b.ended && a.message == b.message;
+}
+bool Same(const Request& a, const Request& b) {
+  return a.client == b.client && a.sequence == b.sequence && a.kind == b.kind && a.site == b.site &&
+         a.robot == b.robot && a.latest == b.latest && a.stamp == b.stamp && a.smoothed == b.smoothed &&
+         Eq(a.area.x_min_m, b.area.x_min_m) && Eq(a.area.y_min_m, b.area.y_min_m) &&
+         Eq(a.area.x_max_m, b.area.x_max_m) && Eq(a.area.y_max_m, b.area.y_max_m) && a.level == b.level &&
+         a.since_epoch == b.since_epoch && a.since_version == b.since_version && a.job == b.job &&
+         a.job_kind == b.job_kind && a.enable == b.enable && a.map_version == b.map_version;
+}
+bool Same(const Reply& a, const Reply& b) {
+  const auto same = [](const auto& x, const auto& y) { return Same(x, y); };
+  const auto eq = [](const auto& x, const auto& y) { return Eq(x, y); };
+  const auto same_robot = [&](const RobotStatus& x, const RobotStatus& y) {
+    return Same(x.session, y.session) && x.alive == y.alive && Same(x.pose, y.pose) &&
+           EqList(x.ledgers, y.ledgers, same);
+  };
+  return a.client == b.client && a.sequence == b.sequence && a.part == b.part && a.last == b.last &&
+         Eq(a.status, b.status) && a.map_epoch == b.map_epoch && a.map_version == b.map_version &&
+         EqList(a.poses, b.poses, same) && EqList(a.path, b.path, eq) && EqList(a.tiles, b.tiles, eq) &&
+         EqList(a.landmarks, b.landmarks, eq) && EqList(a.maps, b.maps, same) &&
+         EqList(a.robots, b.robots, same_robot) && EqList(a.jobs, b.jobs, same) && a.server_version == b.server_version;
+}
+
+}  // namespace cairn::wire

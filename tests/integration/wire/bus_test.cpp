@@ -1,0 +1,171 @@
+// Every value through real Fast DDS, between two participants.
+#include "common/wire/bus.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/wire/limits.h"
+#include "tests/common/wire/sample_values.h"
+#include "tests/loopback.h"
+
+namespace cairn::wire {
+namespace {
+
+using namespace test;
+
+class BusPair : public ::testing::Test {
+ protected:
+  template <typename Value>
+  void ExpectArrives(const Value& value) {
+    Inbox<Value> inbox;
+    const auto subscription = Must(receiver_->Subscribe<Value>(inbox.Sink()));
+    const auto publication = Must(sender_->Advertise<Value>());
+    ASSERT_TRUE(Eventually([&] { return publication->matched() == 1 && subscription->matched() == 1; }));
+    const Result<void> published = publication->Publish(value);
+    ASSERT_TRUE(published) << published.error().message;
+    ASSERT_TRUE(inbox.WaitFor(1));
+    EXPECT_TRUE(Same(inbox.values()[0], value));
+    EXPECT_TRUE(publication->WaitForAcknowledgement(kDeadline));
+    EXPECT_EQ(subscription->refused(), 0U);
+  }
+
+  // Honest traffic passes the guard.
+  void TearDown() override {
+    EXPECT_EQ(sender_->datagrams_refused(), 0U);
+    EXPECT_EQ(receiver_->datagrams_refused(), 0U);
+  }
+
+  const std::unique_ptr<Bus> sender_ = MakeBus("sender");
+  const std::unique_ptr<Bus> receiver_ = MakeBus("receiver");
+};
+
+TEST_F(BusPair, CarriesSessionRequests) {
+  ExpectArrives(ExtremeSessionRequest());
+}
+TEST_F(BusPair, CarriesSessionStates) {
+  ExpectArrives(ExtremeSessionState());
+}
+TEST_F(BusPair, CarriesScans) {
+  ExpectArrives(ExtremeScan(1081));
+}
+TEST_F(BusPair, CarriesScansOfMoreThanOneDatagram) {
+  ExpectArrives(ExtremeScan(kMaxRangesRead));
+}
+TEST_F(BusPair, CarriesOdometry) {
+  ExpectArrives(ExtremeOdometry());
+}
+TEST_F(BusPair, CarriesPoses) {
+  ExpectArrives(ExtremePose());
+}
+TEST_F(BusPair, CarriesLedgers) {
+  ExpectArrives(ExtremeLedger());
+}
+TEST_F(BusPair, CarriesMapInfo) {
+  ExpectArrives(ExtremeMapInfo());
+}
+TEST_F(BusPair, CarriesTiles) {
+  ExpectArrives(ExtremeTile(kMaxTileBytes));
+}
+TEST_F(BusPair, CarriesJobs) {
+  ExpectArrives(ExtremeJob());
+}
+TEST_F(BusPair, CarriesRequests) {
+  ExpectArrives(ExtremeRequest());
+}
+TEST_F(BusPair, CarriesReplies) {
+  ExpectArrives(ExtremeReply());
+}
+
+TEST_F(BusPair, ALateJoinerGetsTheWholeMap) {
+  constexpr int kTiles = 500;
+  const auto publication = Must(sender_->Advertise<TileSample>());
+  for (int version = 1; version <= 2; ++version) {
+    for (int x = 0; x < kTiles; ++x) {
+      TileSample sample = ExtremeTile(3000);
+      sample.tile.key = {0, x - 250, -x};
+      sample.tile.version = static_cast<std::uint64_t>(version);
+      ASSERT_TRUE(publication->Publish(sample));
+    }
+  }
+  Inbox<TileSample> inbox;
+  const auto subscription = Must(receiver_->Subscribe<TileSample>(inbox.Sink()));
+  ASSERT_TRUE(inbox.WaitFor(kTiles));
+  const std::vector<TileSample> tiles = inbox.values();
+  ASSERT_EQ(tiles.size(), static_cast<std::size_t>(kTiles));
+  for (const TileSample& sample : tiles) EXPECT_EQ(sample.tile.version, 2U);
+}
+
+TEST_F(BusPair, AnswersTwoClientsOfOneNameEach) {
+  SessionState owner = ExtremeSessionState();
+  owner.phase = SessionPhase::kActive;
+  SessionState refused = owner;
+  refused.client = 2;
+  refused.phase = SessionPhase::kRefused;
+  const auto publication = Must(sender_->Advertise<SessionState>());
+  ASSERT_TRUE(publication->Publish(owner));
+  ASSERT_TRUE(publication->Publish(refused));
+  Inbox<SessionState> inbox;
+  const auto subscription = Must(receiver_->Subscribe<SessionState>(inbox.Sink()));
+  ASSERT_TRUE(inbox.WaitFor(2));
+}
+
+TEST_F(BusPair, AClientSeesOnlyItsOwnReplies) {
+  const auto publication = Must(sender_->Advertise<Reply>());
+  Inbox<Reply> mine;
+  Inbox<Reply> theirs;
+  const auto my_subscription = Must(receiver_->SubscribeReplies(1, mine.Sink()));
+  const auto their_subscription = Must(receiver_->SubscribeReplies(2, theirs.Sink()));
+  ASSERT_TRUE(Eventually([&] { return publication->matched() == 2; }));
+  for (std::int64_t i = 0; i < 10; ++i) {
+    Reply reply = ExtremeReply();
+    reply.client = static_cast<ClientId>(1 + i % 2);
+    reply.sequence = i;
+    ASSERT_TRUE(publication->Publish(reply));
+  }
+  ASSERT_TRUE(mine.WaitFor(5));
+  ASSERT_TRUE(theirs.WaitFor(5));
+  for (const Reply& reply : mine.values()) EXPECT_EQ(reply.sequence % 2, 0);
+  for (const Reply& reply : theirs.values()) EXPECT_EQ(reply.sequence % 2, 1);
+  EXPECT_EQ(my_subscription->refused(), 0U);
+}
+
+TEST_F(BusPair, WhatExceedsTheLimitsIsNotSent) {
+  const auto tiles = Must(sender_->Advertise<TileSample>());
+  const Result<void> too_long = tiles->Publish(ExtremeTile(kMaxTileBytes + 1));
+  ASSERT_FALSE(too_long);
+  EXPECT_EQ(too_long.error().code, StatusCode::kOutOfRange);
+  TileSample far = ExtremeTile(10);
+  far.tile.key.x = 40000;
+  EXPECT_FALSE(tiles->Publish(far));
+  const auto replies = Must(sender_->Advertise<Reply>());
+  Reply huge;
+  huge.tiles.assign(10, ExtremeTile(kMaxTileBytes).tile);
+  const Result<void> too_many = replies->Publish(huge);
+  ASSERT_FALSE(too_many);
+  EXPECT_THAT(too_many.error().message, ::testing::HasSubstr("bytes"));
+}
+
+TEST_F(BusPair, MatchesAreAnnounced) {
+  std::atomic<int> matched = 0;
+  SubscriptionEvents events;
+  events.matched = [&](int count) { matched = count; };
+  const auto subscription = Must(receiver_->Subscribe<Job>([](Job&&) {}, events));
+  {
+    const auto publication = Must(sender_->Advertise<Job>());
+    EXPECT_TRUE(Eventually([&] { return matched == 1; }));
+  }
+  EXPECT_TRUE(Eventually([&] { return matched == 0; }));
+}
+
+TEST(Bus, PublicationsAndSubscriptionsOutliveTheirBus) {
+  Inbox<Job> inbox;
+  std::unique_ptr<Bus> bus = MakeBus("short-lived");
+  const auto subscription = Must(bus->Subscribe<Job>(inbox.Sink()));
+  const auto publication = Must(bus->Advertise<Job>());
+  bus.reset();
+  ASSERT_TRUE(publication->Publish(ExtremeJob()));
+  EXPECT_TRUE(inbox.WaitFor(1));
+}
+
+}  // namespace
+}  // namespace cairn::wire

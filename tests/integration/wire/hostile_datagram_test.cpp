@@ -1,0 +1,195 @@
+// Garbage on the DDS ports of two participants that are busy with each other: both go on. Random bytes, random
+// submessages, real discovery datagrams with bytes changed, cut and inserted, and the datagram that aborts a bare
+// Fast DDS 2.9.1 (the assert on a statistics submessage that is not the last; found by fuzzing, idl/README.md).
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include <atomic>
+#include <random>
+#include <thread>
+
+#include "common/wire/bus.h"
+#include "tests/common/wire/sample_values.h"
+#include "tests/loopback.h"
+
+namespace cairn::wire {
+namespace {
+
+using namespace test;
+
+using Bytes = std::vector<std::uint8_t>;
+
+constexpr char kDiscoveryGroup[] = "239.255.0.1";
+
+// RTPS 9.6.1.1.
+std::uint16_t DiscoveryPort() {
+  return static_cast<std::uint16_t>(7400 + 250 * TestDomain());
+}
+
+Bytes KillerDatagram() {
+  Bytes bytes = {'R', 'T', 'P', 'S', 2, 3, 1, 15};
+  bytes.resize(20, 0x42);
+  bytes.insert(bytes.end(), {0x80, 0x01, 56, 0});
+  bytes.resize(80, 0);
+  bytes.insert(bytes.end(), {0x01, 0x01, 0, 0});
+  return bytes;
+}
+
+class Attacker {
+ public:
+  Attacker() {
+    socket_ = socket(AF_INET, SOCK_DGRAM, 0);
+    in_addr loopback{htonl(INADDR_LOOPBACK)};
+    setsockopt(socket_, IPPROTO_IP, IP_MULTICAST_IF, &loopback, sizeof(loopback));
+    // Participants announce themselves here: real datagrams to start from.
+    listener_ = socket(AF_INET, SOCK_DGRAM, 0);
+    const int on = 1;
+    setsockopt(listener_, SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on));
+    setsockopt(listener_, SOL_SOCKET, SO_REUSEPORT, &on, sizeof(on));
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(DiscoveryPort());
+    address.sin_addr.s_addr = inet_addr(kDiscoveryGroup);
+    bound_ = bind(listener_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
+    ip_mreq group{};
+    group.imr_multiaddr.s_addr = inet_addr(kDiscoveryGroup);
+    group.imr_interface = loopback;
+    bound_ = bound_ && setsockopt(listener_, IPPROTO_IP, IP_ADD_MEMBERSHIP, &group, sizeof(group)) == 0;
+    const timeval patience{5, 0};
+    setsockopt(listener_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
+  }
+  ~Attacker() {
+    close(socket_);
+    close(listener_);
+  }
+
+  // Real announcements, as far as the network lets us listen.
+  [[nodiscard]] std::vector<Bytes> Overhear(std::size_t count) const {
+    std::vector<Bytes> heard;
+    while (bound_ && heard.size() < count) {
+      Bytes bytes(65536);
+      const ssize_t size = recv(listener_, bytes.data(), bytes.size(), 0);
+      if (size <= 0) break;
+      bytes.resize(static_cast<std::size_t>(size));
+      heard.push_back(bytes);
+    }
+    return heard;
+  }
+
+  // To the discovery group and to the four unicast ports of the first two participants.
+  void SendEverywhere(const Bytes& bytes) const {
+    Send(bytes, kDiscoveryGroup, DiscoveryPort());
+    for (int offset = 10; offset < 14; ++offset) {
+      Send(bytes, "127.0.0.1", static_cast<std::uint16_t>(DiscoveryPort() + offset));
+    }
+  }
+
+ private:
+  void Send(const Bytes& bytes, const char* host, std::uint16_t port) const {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(port);
+    address.sin_addr.s_addr = inet_addr(host);
+    static_cast<void>(
+        sendto(socket_, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&address), sizeof(address)));
+  }
+
+  int socket_ = -1;
+  int listener_ = -1;
+  bool bound_ = false;
+};
+
+Bytes RandomBytes(std::mt19937& random) {
+  Bytes bytes(random() % 1400);
+  for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random());
+  return bytes;
+}
+
+Bytes RandomSubmessages(std::mt19937& random) {
+  constexpr std::uint8_t kIds[] = {0x01, 0x06, 0x07, 0x08, 0x09, 0x0c, 0x0d, 0x0e, 0x12, 0x13, 0x15, 0x16, 0x80};
+  Bytes bytes = {'R', 'T', 'P', 'S', 2, 3, 1, 15};
+  for (int i = 0; i < 12; ++i) bytes.push_back(static_cast<std::uint8_t>(random()));
+  for (unsigned i = 0, n = 1 + random() % 4; i < n; ++i) {
+    const auto length = static_cast<std::uint8_t>(random() % 80);
+    bytes.insert(bytes.end(), {kIds[random() % std::size(kIds)], static_cast<std::uint8_t>(random()), length, 0});
+    for (unsigned j = 0; j < length; ++j) bytes.push_back(static_cast<std::uint8_t>(random()));
+  }
+  return bytes;
+}
+
+Bytes Mutated(Bytes bytes, std::mt19937& random) {
+  for (unsigned i = 0, n = 1 + random() % 8; i < n && bytes.size() > 24; ++i) {
+    const std::size_t at = 20 + random() % (bytes.size() - 20);
+    const auto place = bytes.begin() + static_cast<std::ptrdiff_t>(at);
+    switch (random() % 4) {
+      case 0:
+        bytes[at] = static_cast<std::uint8_t>(random());
+        break;
+      case 1:
+        std::fill(place, std::min(place + 4, bytes.end()), random() % 2 ? std::uint8_t{0xff} : std::uint8_t{0});
+        break;
+      case 2:
+        bytes.erase(place, std::min(place + 1 + random() % 16, bytes.end()));
+        break;
+      default:
+        bytes.insert(place, 1 + random() % 8, static_cast<std::uint8_t>(random()));
+    }
+  }
+  return bytes;
+}
+
+class HostileDatagrams : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    subscription_ = Must(receiver_->Subscribe<ScanSample>([this](ScanSample&&) { ++received_; }));
+    publication_ = Must(sender_->Advertise<ScanSample>());
+    ASSERT_TRUE(Eventually([&] { return publication_->matched() == 1 && subscription_->matched() == 1; }));
+  }
+  void ExpectDataStillFlows() {
+    for (int i = 0; i < 50; ++i) {
+      const int before = received_;
+      ASSERT_TRUE(publication_->Publish(ExtremeScan(360)));
+      ASSERT_TRUE(Eventually([&] { return received_ > before; }));
+    }
+  }
+
+  std::atomic<int> received_ = 0;
+  const std::unique_ptr<Bus> sender_ = MakeBus("sender");
+  const std::unique_ptr<Bus> receiver_ = MakeBus("receiver");
+  std::unique_ptr<Publication<ScanSample>> publication_;
+  std::unique_ptr<Subscription> subscription_;
+  const Attacker attacker_;
+};
+
+TEST_F(HostileDatagrams, TheKillerOf84BytesIsKeptOut) {
+  attacker_.SendEverywhere(KillerDatagram());
+  EXPECT_TRUE(Eventually([&] { return sender_->datagrams_refused() > 0 && receiver_->datagrams_refused() > 0; }));
+  ExpectDataStillFlows();
+}
+
+TEST_F(HostileDatagrams, RandomBytesAndSubmessagesAreSurvived) {
+  std::mt19937 random(11);
+  for (int i = 0; i < 3000; ++i) {
+    attacker_.SendEverywhere(i % 2 ? RandomBytes(random) : RandomSubmessages(random));
+    if (i % 100 == 0) ExpectDataStillFlows();
+  }
+  ExpectDataStillFlows();
+  EXPECT_GT(sender_->datagrams_refused(), 0U);
+}
+
+TEST_F(HostileDatagrams, MutatedAnnouncementsAreSurvived) {
+  const auto visitor = MakeBus("visitor");  // Its greeting is what is overheard.
+  const std::vector<Bytes> heard = attacker_.Overhear(4);
+  ASSERT_FALSE(heard.empty());
+  std::mt19937 random(12);
+  for (int i = 0; i < 3000; ++i) {
+    attacker_.SendEverywhere(Mutated(heard[static_cast<std::size_t>(i) % heard.size()], random));
+    if (i % 100 == 0) ExpectDataStillFlows();
+  }
+  ExpectDataStillFlows();
+}
+
+}  // namespace
+}  // namespace cairn::wire

@@ -1,0 +1,209 @@
+#!/usr/bin/env bash
+# The one command: installs what is missing, builds every way that counts, runs every test, holds the accuracy.
+#   tests/run.sh                 packages to nodds below; stops at the first that fails
+#   tests/run.sh --full          the sanitizers and clang-tidy besides (asan, tsan, tidy)
+#   tests/run.sh --quick         packages, format, architecture, release
+#   tests/run.sh --stage NAME    this stage (may be repeated), with the build it needs
+#   tests/run.sh --studies       the slow studies besides (tests/studies)
+# What each stage does and why it stands where it stands: tests/README.md. Needs no terminal and asks nothing.
+# The last line counts tests and checks: `N passed, N failed, N skipped`. Exit code: 0 none failed, 1 some, 2 usage.
+set -euo pipefail
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+cd "$root"
+all=(packages format architecture release accuracy nodds)
+full=(asan tsan tidy)
+stages=()
+
+usage() { sed -n '2,/^set/s/^# \{0,1\}//p' "$0"; echo "stages: ${all[*]} ${full[*]} studies"; }
+while [ $# -gt 0 ]; do
+  case $1 in
+    --quick) stages=(packages format architecture release) ;;
+    --full) all+=("${full[@]}") ;;
+    --studies) all+=(studies) ;;
+    --stage)
+      case " ${all[*]} ${full[*]} studies " in
+        *" ${2:-none} "*) ;;
+        *) echo "--stage needs one of: ${all[*]} ${full[*]} studies" >&2; exit 2 ;;
+      esac
+      stages+=("$2")
+      shift ;;
+    -h | --help) usage; exit 0 ;;
+    *) echo "unknown option: $1" >&2; usage >&2; exit 2 ;;
+  esac
+  shift
+done
+[ ${#stages[@]} -gt 0 ] || stages=("${all[@]}")
+
+# As many jobs as processors, but a compiler may take 1.5 GiB.
+memory_jobs=$(awk '/^MemAvailable/ { jobs = int($2 / 1572864); print jobs < 1 ? 1 : jobs }' /proc/meminfo)
+jobs=${CAIRN_JOBS:-$(($(nproc) < memory_jobs ? $(nproc) : memory_jobs))}
+tidy_budget_s=${CAIRN_TIDY_BUDGET_S:-300}
+
+# One compiler cache for all build folders and clones: paths relative to the root, and precompiled headers allowed.
+export CCACHE_BASEDIR=$root CCACHE_SLOPPINESS=pch_defines,time_macros
+export GTEST_COLOR=no CLICOLOR=0
+[ -w "${HOME:-/nowhere}" ] || export CCACHE_DIR=$root/build/ccache
+logs=$root/build/logs
+mkdir -p "$logs"
+
+# Sanitizers want a fixed memory layout; newer kernels' randomisation is too wide for clang 14's.
+fixed_layout=()
+if setarch "$(uname -m)" -R true 2>/dev/null; then fixed_layout=(setarch "$(uname -m)" -R); fi
+export ASAN_OPTIONS=detect_stack_use_after_return=1:strict_string_checks=1
+export UBSAN_OPTIONS=print_stacktrace=1
+# The middleware is built without the thread sanitizer: its own accesses are overlooked, its locks are not. (A suppression
+# `called_from_lib:` would overlook the locks as well, and every callback would look like a race.)
+export TSAN_OPTIONS=ignore_noninstrumented_modules=1:second_deadlock_stack=1
+
+configure() { # preset, cmake options
+  local preset=$1
+  shift
+  cmake --preset "$preset" -DCAIRN_STRICT=ON "$@"
+}
+
+build() { # folder, cmake --build options
+  local folder=$1
+  shift
+  "${fixed_layout[@]}" cmake --build "build/$folder" -j "$jobs" "$@"
+}
+
+run_tests() { # folder, ctest options
+  local folder=$1
+  shift
+  "${fixed_layout[@]}" ctest --test-dir "build/$folder" -j "$jobs" --output-on-failure --no-tests=error \
+    --output-junit "$logs/$stage.xml" "$@"
+}
+
+stage_packages() { deploy/install-packages.sh build test; }
+
+stage_format() {
+  local sources
+  mapfile -t sources < <(tracked '*.h' '*.cpp' '*.c')
+  printf '%s\0' "${sources[@]}" | xargs -0 -n 32 -P "$jobs" clang-format --dry-run -Werror
+  echo "${#sources[@]} files keep to .clang-format"
+}
+
+# What git knows; in an unpacked archive, what is there.
+tracked() {
+  if git rev-parse --git-dir >/dev/null 2>&1; then
+    git ls-files -co --exclude-standard -- "$@" | while read -r file; do [ ! -f "$file" ] || echo "$file"; done
+  else
+    local pattern names=()
+    for pattern in "$@"; do names+=(-o -name "$pattern"); done
+    find common server client tests idl -type f \( "${names[@]:1}" \)
+  fi
+}
+
+stage_architecture() { python3 tests/architecture/include_direction.py "$root"; }
+
+stage_release() {
+  configure release
+  build release
+  run_tests release -LE study
+}
+
+stage_accuracy() {
+  configure release
+  build release --target cairn-offline
+  tests/accuracy/gate.sh build/release/bin build/accuracy
+}
+
+# The same flags as release: the compiler cache hands over every object, only linking and testing is new.
+stage_nodds() {
+  configure release -B build/nodds -DCAIRN_WITH_DDS=OFF
+  build nodds
+  run_tests nodds -LE study
+}
+
+stage_asan() {
+  configure asan
+  build asan
+  run_tests asan -LE study
+}
+
+stage_tsan() {
+  configure tsan
+  build tsan --target tsan_tests
+  run_tests tsan -L tsan
+}
+
+# Reads the commands and the generated code of the asan build.
+stage_tidy() {
+  configure asan
+  build asan
+  python3 tests/tidy.py build/asan --jobs "$jobs" --budget "$tidy_budget_s"
+}
+
+stage_studies() {
+  configure release
+  build release
+  run_tests release -L study
+}
+
+passed=0 failed=0 skipped=0
+
+# Adds up what ctest wrote about the stage, or the stage itself where it ran no tests.
+count() { # exit code
+  local code=$1 row tests bad left
+  summary=$(tail -n 1 "$log")
+  if [ -s "$logs/$stage.xml" ]; then
+    read -ra row <<<"$(python3 -c '
+import sys, xml.etree.ElementTree
+suite = xml.etree.ElementTree.parse(sys.argv[1]).getroot()
+not_run = [case.get("name") for case in suite.iter("testcase") if case.get("status") in ("notrun", "disabled")]
+print(suite.get("tests"), suite.get("failures"), len(not_run), *not_run)' "$logs/$stage.xml")"
+    tests=${row[0]} bad=${row[1]} left=${row[2]}
+    summary="$tests tests"
+    passed=$((passed + tests - bad - left)) failed=$((failed + bad)) skipped=$((skipped + left))
+    [ "$left" -eq 0 ] || printf '   SKIPPED: %s\n' "${row[@]:3}"
+    # A stage can fail besides its tests.
+    [ "$code" -eq 0 ] || [ "$bad" -gt 0 ] || failed=$((failed + 1))
+  else
+    case $code in
+      0) passed=$((passed + 1)) ;;
+      77) skipped=$((skipped + 1)) ;;
+      *) failed=$((failed + 1)) ;;
+    esac
+  fi
+}
+
+cache_use() {
+  [ -s "$logs/$stage.ccache" ] || return 0
+  CCACHE_STATSLOG=$logs/$stage.ccache ccache --show-log-stats 2>/dev/null | sed -n 's/^ *Hits: */, ccache hits /p' | head -n 1
+}
+
+finish() {
+  printf '%s\n' "" "time: ${timings:-none} total ${SECONDS}s"
+  echo "$passed passed, $failed failed, $skipped skipped"
+}
+
+timings=
+for stage in "${stages[@]}"; do
+  start=$SECONDS
+  log=$logs/$stage.log
+  rm -f "$logs/$stage.xml" "$logs/$stage.ccache"
+  echo "== $stage ..."
+  # In a background shell, because a shell whose exit code is tested ignores `set -e`.
+  (
+    set -e
+    export CCACHE_STATSLOG=$logs/$stage.ccache
+    "stage_$stage"
+  ) >"$log" 2>&1 </dev/null &
+  code=0
+  wait $! || code=$?
+  took=$((SECONDS - start))
+  timings+="$stage ${took}s, "
+  count "$code"
+  case $code in
+    0) echo "   ok, ${took} s$(cache_use): $summary" ;;
+    77) echo "   $(grep -m 1 '^SKIPPED' "$log" || echo "SKIPPED")" ;;
+    *)
+      tail -n 150 "$log"
+      echo "FAILED in stage $stage after ${took} s; the whole output: ${log#"$root"/}"
+      finish
+      exit 1 ;;
+  esac
+done
+finish
+[ "$failed" -eq 0 ]

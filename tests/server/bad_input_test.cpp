@@ -1,0 +1,254 @@
+// Bad input, through the door's admission and the whole server: each is refused or handled under a counted reason, and
+// the estimator goes on as if nothing had happened.
+#include <gmock/gmock.h>
+
+#include <functional>
+#include <limits>
+
+#include "tests/server/support/whole_server.h"
+
+namespace cairn::server::testing {
+namespace {
+
+constexpr ClientId kClient = 7;
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInf = std::numeric_limits<float>::infinity();
+
+std::uint64_t Dropped(const Ledger& ledger, DropReason reason) {
+  return ledger.dropped[static_cast<std::size_t>(reason)];
+}
+
+class BadInput : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    house_.Open("r1", kClient);
+    house_.Drive("r1", kClient, 0, 10);
+  }
+  // Scan 11 spoilt; then the robot drives on, and the spoilt scan is the only one not used.
+  void ExpectRefused(DropReason reason, const std::function<void(Scan&)>& spoil) {
+    Scan scan = RoomScan(10);
+    spoil(scan);
+    house_.SendOdometry("r1", kClient, RoomOdometry(10));
+    house_.SendScan("r1", kClient, scan);
+    DriveOn(1);
+    EXPECT_EQ(Dropped(house_.LastLedger("r1"), reason), 1U) << DropReasonName(reason);
+  }
+  void DriveOn(std::uint64_t expected_drops) {
+    house_.Drive("r1", kClient, 11, 20);
+    const Ledger ledger = house_.LastLedger("r1");
+    EXPECT_EQ(ledger.dropped_total(), expected_drops);
+    EXPECT_EQ(ledger.received + Dropped(ledger, DropReason::kLostOnWire), ledger.used + ledger.dropped_total());
+    const Pose2 error = Between(TruePose(19), house_.All<PoseReport>().back().T_map_robot);
+    EXPECT_LT(error.translation().norm(), 0.1);
+  }
+
+  WholeServer house_;
+};
+
+TEST_F(BadInput, SingleBadRangesAreNormal) {
+  Scan scan = RoomScan(10);
+  scan.ranges_m[3] = kNan;
+  scan.ranges_m[40] = kInf;
+  scan.ranges_m[41] = -kInf;
+  scan.ranges_m[60] = -2.0F;
+  scan.ranges_m[80] = 0.0F;
+  house_.SendOdometry("r1", kClient, RoomOdometry(10));
+  house_.SendScan("r1", kClient, scan);
+  DriveOn(0);
+}
+
+TEST_F(BadInput, AScanOfNothingButBadRangesIsEmpty) {
+  ExpectRefused(DropReason::kEmpty, [](Scan& scan) { scan.ranges_m.assign(181, kNan); });
+}
+
+TEST_F(BadInput, AScanWithoutBeamsIsEmpty) {
+  ExpectRefused(DropReason::kEmpty, [](Scan& scan) { scan.ranges_m.clear(); });
+}
+
+TEST_F(BadInput, TooManyBeamsAreRefused) {
+  ExpectRefused(DropReason::kTooManyBeams, [](Scan& scan) { scan.ranges_m.assign(kMaxBeams + 1, 3.0F); });
+}
+
+TEST_F(BadInput, ChangingBeamCountsAreUsed) {
+  Scan scan = RoomScan(10);
+  scan.ranges_m.resize(91);  // The right half of the view.
+  house_.SendOdometry("r1", kClient, RoomOdometry(10));
+  house_.SendScan("r1", kClient, scan);
+  DriveOn(0);
+}
+
+TEST_F(BadInput, GeometryThatDescribesNoScannerIsRefused) {
+  ExpectRefused(DropReason::kBadGeometry, [](Scan& scan) { scan.angle_step_rad = 0.0; });
+}
+
+TEST_F(BadInput, NotANumberInTheMountingIsRefused) {
+  ExpectRefused(DropReason::kBadGeometry, [](Scan& scan) { scan.T_robot_laser.x = kNan; });
+}
+
+TEST_F(BadInput, RangeLimitsTheWrongWayRoundAreRefused) {
+  ExpectRefused(DropReason::kBadGeometry, [](Scan& scan) { scan.range_max_m = -1.0; });
+}
+
+TEST_F(BadInput, AStampThatRepeatsIsRefused) {
+  ExpectRefused(DropReason::kDuplicateStamp, [](Scan& scan) { scan.stamp = RoomScan(9).stamp; });
+}
+
+TEST_F(BadInput, AStampThatGoesBackIsRefused) {
+  ExpectRefused(DropReason::kStampWentBack, [](Scan& scan) { scan.stamp = RoomScan(5).stamp; });
+}
+
+TEST_F(BadInput, AStampThatJumpsAYearIsRefused) {
+  ExpectRefused(DropReason::kStampJump, [](Scan& scan) { scan.stamp += 365LL * 86400 * kNanosPerSecond; });
+}
+
+TEST_F(BadInput, BadOdometryIsCountedAndLeftOut) {
+  Odometry wild = RoomOdometry(10);
+  wild.T_odom_robot.y = std::numeric_limits<double>::infinity();
+  house_.SendOdometry("r1", kClient, wild);
+  Odometry old = RoomOdometry(3);
+  house_.SendOdometry("r1", kClient, old);
+  house_.SendOdometry("r1", kClient, RoomOdometry(10));
+  house_.SendScan("r1", kClient, RoomScan(10));
+  DriveOn(0);
+  EXPECT_EQ(house_.LastLedger("r1").odometry_dropped, 2U);
+}
+
+TEST_F(BadInput, LateOdometryIsWaitedFor) {
+  house_.SendScan("r1", kClient, RoomScan(10));
+  ASSERT_TRUE(house_.WaitFor([&] { return house_.LastLedger("r1").waiting == 1; }));
+  house_.SendOdometry("r1", kClient, RoomOdometry(10));
+  DriveOn(0);
+}
+
+TEST_F(BadInput, MissingOdometryDropsTheScanWithAReason) {
+  // Three seconds without odometry, then it comes back: what lies in the gap has no odometry near.
+  for (int step = 10; step < 40; ++step) house_.SendScan("r1", kClient, RoomScan(step));
+  house_.SendOdometry("r1", kClient, RoomOdometry(45));
+  house_.SendScan("r1", kClient, RoomScan(45));
+  // The last scan settles last; before it arrives, a ledger may already show the gap's thirty and no loss.
+  house_.WaitSettled("r1", RoomScan(45).sequence);
+  const Ledger ledger = house_.LastLedger("r1");
+  EXPECT_EQ(Dropped(ledger, DropReason::kNoOdometry), 30U);
+  EXPECT_EQ(Dropped(ledger, DropReason::kLostOnWire), 5U);  // Sequences 41 to 45 were never sent.
+}
+
+TEST_F(BadInput, GapsInTheNumbersAreLostAndLateArrivalsFillThem) {
+  house_.SendOdometry("r1", kClient, RoomOdometry(10));
+  house_.SendOdometry("r1", kClient, RoomOdometry(11));
+  house_.SendScan("r1", kClient, RoomScan(11));
+  ASSERT_TRUE(house_.WaitFor([&] { return Dropped(house_.LastLedger("r1"), DropReason::kLostOnWire) == 1; }));
+  house_.SendScan("r1", kClient, RoomScan(10));
+  ASSERT_TRUE(house_.WaitFor([&] { return Dropped(house_.LastLedger("r1"), DropReason::kLostOnWire) == 0; }));
+  EXPECT_EQ(Dropped(house_.LastLedger("r1"), DropReason::kStampWentBack), 1U);
+}
+
+TEST_F(BadInput, AResentScanIsNotCountedTwice) {
+  house_.SendScan("r1", kClient, RoomScan(9));
+  house_.SendScan("r1", kClient, RoomScan(4));
+  house_.SendOdometry("r1", kClient, RoomOdometry(10));
+  house_.SendScan("r1", kClient, RoomScan(10));
+  DriveOn(0);
+  EXPECT_EQ(house_.LastLedger("r1").received, 20U);
+}
+
+TEST_F(BadInput, ARobotThatConnectsTwiceIsRefusedWhileTheFirstLives) {
+  house_.Open("r1", 8);
+  ASSERT_TRUE(house_.WaitPhase("r1", 8, SessionPhase::kRefused));
+  EXPECT_EQ(house_.LastState("r1", 8).status.code, StatusCode::kAlreadyExists);
+  house_.SendScan("r1", 8, RoomScan(10));
+  ASSERT_TRUE(house_.WaitFor([&] { return Dropped(house_.LastLedger("r1"), DropReason::kNotOwner) == 1; }));
+
+  house_.Push(ClientLiveliness{kClient, false});
+  ASSERT_TRUE(house_.WaitPhase("r1", kClient, SessionPhase::kSuspended));
+  house_.Open("r1", 8);
+  ASSERT_TRUE(house_.WaitPhase("r1", 8, SessionPhase::kActive));
+  // The new client numbers from 1; poses go on where they were.
+  for (int step = 10; step < 20; ++step) {
+    Scan scan = RoomScan(step);
+    scan.sequence = static_cast<std::uint64_t>(step) - 9;
+    house_.SendOdometry("r1", 8, RoomOdometry(step));
+    house_.SendScan("r1", 8, scan);
+  }
+  ASSERT_TRUE(house_.WaitFor([&] { return house_.LastLedger("r1").used == 20; }));
+  EXPECT_LT(Between(TruePose(19), house_.All<PoseReport>().back().T_map_robot).translation().norm(), 0.1);
+}
+
+TEST_F(BadInput, ScansWithoutASessionAreCountedInABoundedTable) {
+  house_.SendScan("stranger", 99, RoomScan(0));
+  ASSERT_TRUE(house_.WaitFor([&] { return Dropped(house_.LastLedger("stranger"), DropReason::kNoSession) == 1; }));
+  for (int i = 0; i < 1000; ++i) house_.SendScan("stranger" + std::to_string(i), 99, RoomScan(0));
+  house_.SendOdometry("r1", kClient, RoomOdometry(10));
+  house_.SendScan("r1", kClient, RoomScan(10));
+  DriveOn(0);
+  std::set<NameId> strangers;
+  for (const Ledger& ledger : house_.All<Ledger>()) strangers.insert(ledger.robot_id);
+  EXPECT_LE(strangers.size(), static_cast<std::size_t>(TestOptions().robots.max_unclaimed) + 1);
+  // A stranger that opens a session at last keeps what was counted.
+  house_.Open("stranger", 99);
+  ASSERT_TRUE(house_.WaitFor([&] { return house_.LastLedger("stranger").robot == "stranger"; }));
+  EXPECT_EQ(Dropped(house_.LastLedger("stranger"), DropReason::kNoSession), 1U);
+}
+
+TEST(BadSession, UnknownSitesAreRefusedWhereTheServerMakesNone) {
+  ServerOptions options = TestOptions();
+  options.server.create_sites = false;
+  options.server.sites = "hall, lab";
+  WholeServer house(options);
+  house.Open("r1", kClient, "nowhere");
+  ASSERT_TRUE(house.WaitPhase("r1", kClient, SessionPhase::kRefused));
+  EXPECT_EQ(house.LastState("r1", kClient).status.code, StatusCode::kNotFound);
+  EXPECT_THAT(house.LastState("r1", kClient).status.message, ::testing::HasSubstr("nowhere"));
+  house.Open("r1", kClient, "hall");
+  EXPECT_TRUE(house.WaitPhase("r1", kClient, SessionPhase::kActive));
+}
+
+TEST(BadSession, RequestsThatMakeNoSenseAreRefusedWithAReason) {
+  WholeServer house;
+  const SessionRequest good{.robot = "r1",
+                            .site = "lab",
+                            .sensors = {"laser"},
+                            .client = kClient,
+                            .has_start = true,
+                            .T_map_robot_start = {},
+                            .end = false};
+  const auto expect_refused = [&house](SessionRequest request) {
+    const std::string robot = request.robot;
+    const ClientId client = request.client;
+    const auto count = [&] {
+      const auto states = house.All<SessionState>();
+      return std::count_if(states.begin(), states.end(), [&](const SessionState& state) {
+        return state.phase == SessionPhase::kRefused && state.status.code == StatusCode::kInvalidArgument;
+      });
+    };
+    const auto before = count();
+    house.Push(std::move(request));
+    EXPECT_TRUE(house.WaitFor([&] { return count() == before + 1; })) << robot << " " << client;
+  };
+  SessionRequest bad = good;
+  bad.robot = "../etc";
+  expect_refused(bad);
+  bad = good;
+  bad.site = "";
+  expect_refused(bad);
+  bad = good;
+  bad.client = 0;
+  expect_refused(bad);
+  bad = good;
+  bad.sensors.clear();
+  expect_refused(bad);
+  bad = good;
+  bad.sensors.assign(17, "laser");
+  expect_refused(bad);
+  bad = good;
+  bad.sensors = {"no such\nname"};
+  expect_refused(bad);
+  bad = good;
+  bad.T_map_robot_start.theta = kNan;
+  expect_refused(bad);
+  bad = good;
+  bad.T_map_robot_start.x = 1e9;
+  expect_refused(bad);
+}
+
+}  // namespace
+}  // namespace cairn::server::testing

@@ -1,0 +1,107 @@
+#include "server/maps/joint_map.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+namespace cairn::server {
+namespace {
+
+std::shared_ptr<const slam::GridChunk> ChunkOf(std::int16_t log_odds, std::size_t cells = kTileArea) {
+  auto chunk = std::make_shared<slam::GridChunk>();
+  chunk->log_odds.fill(slam::kUnseen);
+  std::fill_n(chunk->log_odds.begin(), cells, log_odds);
+  return chunk;
+}
+
+TEST(JointMap, EvidenceOfSeveralRobotsAdds) {
+  JointMap map;
+  map.Apply({.session = 1, .chunks = {{{0, 0}, ChunkOf(100, 2)}}});
+  map.Apply({.session = 2, .chunks = {{{0, 0}, ChunkOf(50, 1)}}});
+  map.Render();
+  const TileCells& cells = *map.cells().at({0, 0, 0});
+  EXPECT_EQ(cells[0], slam::OccupancyOf(150));
+  EXPECT_EQ(cells[1], slam::OccupancyOf(100));
+  EXPECT_EQ(cells[2], kUnknownCell);
+}
+
+TEST(JointMap, ContraryEvidenceCancels) {
+  JointMap map;
+  map.Apply({.session = 1, .chunks = {{{0, 0}, ChunkOf(200)}}});
+  map.Apply({.session = 2, .chunks = {{{0, 0}, ChunkOf(-200)}}});
+  map.Render();
+  EXPECT_EQ((*map.cells().at({0, 0, 0}))[0], 50);
+}
+
+TEST(JointMap, RenderNamesWhatChangedOnEveryLevelOnce) {
+  JointMap map;
+  map.Apply({.session = 1, .chunks = {{{0, 0}, ChunkOf(100)}, {{1, 0}, ChunkOf(100)}}});
+  const auto changed = map.Render();
+  // Two tiles of level 0 share their parents on levels 1 to 3.
+  EXPECT_EQ(changed, (std::vector<TileKey>{{0, 0, 0}, {0, 1, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}}));
+  EXPECT_TRUE(map.Render().empty());
+  map.Apply({.session = 1, .chunks = {{{0, 0}, ChunkOf(100)}}});  // The same cells again.
+  EXPECT_TRUE(map.Render().empty());
+}
+
+TEST(JointMap, TilesLeftOfTheOriginHaveParentsLeftOfTheOrigin) {
+  JointMap map;
+  map.Apply({.session = 1, .chunks = {{{-1, -3}, ChunkOf(100)}}});
+  map.Render();
+  EXPECT_TRUE(map.cells().contains({1, -1, -2}));
+  EXPECT_TRUE(map.cells().contains({2, -1, -1}));
+  EXPECT_TRUE(map.cells().contains({3, -1, -1}));
+}
+
+TEST(JointMap, AChunkThatGoesTakesItsTileWithIt) {
+  JointMap map;
+  map.Apply({.session = 1, .chunks = {{{0, 0}, ChunkOf(100)}}});
+  map.Render();
+  map.Apply({.session = 1, .chunks = {{{0, 0}, nullptr}}});
+  EXPECT_EQ(map.Render().size(), 4U);
+  EXPECT_TRUE(map.cells().empty());
+}
+
+TEST(JointMap, ReplaceRemovesWhatTheNewGridDoesNotHave) {
+  JointMap map;
+  map.Apply({.session = 1, .chunks = {{{0, 0}, ChunkOf(100)}, {{5, 5}, ChunkOf(100)}}});
+  map.Apply({.session = 2, .chunks = {{{5, 5}, ChunkOf(70)}}});
+  map.Render();
+  map.Replace(1, {{{0, 0}, ChunkOf(-100)}});
+  map.Render();
+  EXPECT_EQ((*map.cells().at({0, 0, 0}))[0], slam::OccupancyOf(-100));
+  EXPECT_EQ((*map.cells().at({0, 5, 5}))[0], slam::OccupancyOf(70));
+  EXPECT_EQ(map.ChunksOf(1).size(), 1U);
+}
+
+// Property: changes applied one by one give the map that a fresh one gives from the final chunks.
+TEST(JointMap, StepByStepEqualsFromScratch) {
+  std::mt19937 random(3);
+  JointMap stepwise;
+  std::map<SessionId, slam::OccupancyGrid::Chunks> latest;
+  for (int i = 0; i < 200; ++i) {
+    const SessionId session = random() % 3;
+    const slam::ChunkKey key{static_cast<int>(random() % 5) - 2, static_cast<int>(random() % 5) - 2};
+    const bool gone = random() % 4 == 0;
+    const auto chunk = gone ? nullptr : ChunkOf(static_cast<std::int16_t>(random() % 400) - 200, random() % kTileArea);
+    stepwise.Apply({.session = session, .chunks = {{key, chunk}}});
+    if (gone) {
+      latest[session].erase(key);
+    } else {
+      latest[session][key] = chunk;
+    }
+    if (i % 7 == 0) stepwise.Render();
+  }
+  stepwise.Render();
+  JointMap fresh;
+  for (const auto& [session, chunks] : latest) fresh.Replace(session, chunks);
+  fresh.Render();
+  ASSERT_EQ(stepwise.cells().size(), fresh.cells().size());
+  for (const auto& [key, cells] : fresh.cells()) {
+    ASSERT_TRUE(stepwise.cells().contains(key));
+    EXPECT_EQ(*stepwise.cells().at(key), *cells);
+  }
+}
+
+}  // namespace
+}  // namespace cairn::server

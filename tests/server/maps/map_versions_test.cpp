@@ -1,0 +1,61 @@
+#include "server/maps/map_versions.h"
+
+#include <gtest/gtest.h>
+
+namespace cairn::server {
+namespace {
+
+MapVersion Smoothed(const std::string& robot) {
+  MapVersion version;
+  version.smoothed[robot] = std::make_shared<const Trajectory>(Trajectory{{1, {}}});
+  return version;
+}
+
+TEST(MapVersions, BeginWithTheLiveMapEnabled) {
+  const MapVersions versions(4);
+  ASSERT_EQ(versions.infos().size(), 1U);
+  EXPECT_EQ(versions.infos()[0].version, 1U);
+  EXPECT_TRUE(versions.infos()[0].enabled);
+}
+
+TEST(MapVersions, AVersionIsAddedDisabled) {
+  MapVersions versions(4);
+  EXPECT_EQ(versions.Add({}), 2U);
+  EXPECT_EQ(versions.enabled(), 1U);
+  EXPECT_FALSE(versions.Find(2)->info.enabled);
+}
+
+TEST(MapVersions, EnablingKeepsWhatTheOutgoingVersionGivesUp) {
+  MapVersions versions(4);
+  versions.Add({});
+  versions.Enable(2, {{7, RobotGrid{{}, 12}}});
+  EXPECT_EQ(versions.enabled(), 2U);
+  EXPECT_EQ(versions.Find(1)->parts.at(7).keyframes, 12U);
+  EXPECT_FALSE(versions.Find(1)->info.enabled);
+  EXPECT_TRUE(versions.Find(2)->info.enabled);
+}
+
+TEST(MapVersions, TheOldestThatNobodyNeedsIsForgotten) {
+  MapVersions versions(3);
+  versions.Add({});
+  versions.Enable(2, {});
+  versions.Add({});
+  versions.Add({});
+  EXPECT_NE(versions.Find(1), nullptr);
+  EXPECT_NE(versions.Find(2), nullptr);
+  EXPECT_EQ(versions.Find(3), nullptr);
+  EXPECT_NE(versions.Find(4), nullptr);
+}
+
+TEST(MapVersions, SmoothedPathsAreTheEnabledOnesOrTheNewest) {
+  MapVersions versions(8);
+  EXPECT_TRUE(versions.smoothed().empty());
+  versions.Add(Smoothed("a"));
+  versions.Add(Smoothed("b"));
+  EXPECT_TRUE(versions.smoothed().contains("b"));
+  versions.Enable(2, {});
+  EXPECT_TRUE(versions.smoothed().contains("a"));
+}
+
+}  // namespace
+}  // namespace cairn::server

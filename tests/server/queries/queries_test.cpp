@@ -1,0 +1,237 @@
+// Every question on hand-made snapshots: answers are functions of values, so there is nothing else to set up.
+#include <gtest/gtest.h>
+
+#include "server/queries/answer.h"
+#include "server/queries/reply_parts.h"
+
+namespace cairn::server {
+namespace {
+
+class Queries : public ::testing::Test {
+ protected:
+  Queries() {
+    session_.status.session = {.robot_id = HashName("r1"),
+                               .client = 1,
+                               .robot = "r1",
+                               .site = "lab",
+                               .phase = SessionPhase::kActive,
+                               .status = {}};
+    session_.landmarks = std::make_shared<const std::vector<LandmarkReport>>();
+    map_.info.site = "lab";
+    map_.info.levels = kPyramidLevels;
+    map_.info.resolution_m = 0.05;
+    map_.info.epoch = 3;
+    map_.info.version = 10;
+    request_.client = 11;
+    request_.sequence = 12;
+    request_.site = "lab";
+    request_.robot = "r1";
+  }
+  void AddPose(Stamp stamp, double x) {
+    history_.Append({stamp, {x, 0, 0}, 0.8F, true, PoseReason::kTracking});
+    session_.path = history_.view();
+    session_.status.pose.robot = "r1";
+    session_.status.pose.stamp = stamp;
+    session_.status.pose.T_map_robot = {x, 0, 0};
+    session_.status.pose.scan_sequence = static_cast<std::uint64_t>(stamp);
+  }
+  void AddTile(TileKey key, std::uint64_t version) {
+    auto tile = std::make_shared<Tile>();
+    tile->key = key;
+    tile->epoch = 3;
+    tile->version = version;
+    map_.tiles[key] = tile;
+  }
+  Reply Ask(RequestKind kind) {
+    request_.kind = kind;
+    Views views;
+    views.session = [this](const std::string& robot) -> std::optional<SessionSnapshot> {
+      if (robot != "r1") return std::nullopt;
+      return session_;
+    };
+    views.sessions = [this] { return std::vector<SessionSnapshot>{session_}; };
+    views.map = [this](const std::string& site) -> std::shared_ptr<const MapSnapshot> {
+      return site == "lab" ? std::make_shared<const MapSnapshot>(map_) : nullptr;
+    };
+    views.maps = [this] {
+      return std::vector<std::shared_ptr<const MapSnapshot>>{std::make_shared<const MapSnapshot>(map_)};
+    };
+    views.job = [this](std::uint64_t id) -> Result<Job> {
+      for (const Job& job : jobs_) {
+        if (job.id == id) return job;
+      }
+      return Fail(StatusCode::kNotFound, "no job");
+    };
+    views.jobs = [this](const std::string&) { return jobs_; };
+    return Answer(request_, views);
+  }
+
+  PoseHistory history_{1000};
+  SessionSnapshot session_;
+  MapSnapshot map_;
+  std::vector<Job> jobs_;
+  Request request_;
+};
+
+TEST_F(Queries, EveryReplyNamesItsRequest) {
+  for (int kind = 0; kind < kRequestKindCount; ++kind) {
+    const Reply reply = Ask(static_cast<RequestKind>(kind));
+    EXPECT_EQ(reply.client, 11U);
+    EXPECT_EQ(reply.sequence, 12);
+  }
+}
+
+TEST_F(Queries, PoseSaysNotYetBeforeTheFirstScan) {
+  EXPECT_EQ(Ask(RequestKind::kPose).status.code, StatusCode::kUnavailable);
+}
+
+TEST_F(Queries, PoseAtAStampIsInterpolatedNotYetOrNever) {
+  AddPose(100, 1.0);
+  AddPose(200, 2.0);
+  EXPECT_EQ(Ask(RequestKind::kPose).poses.at(0).T_map_robot.x, 2.0);
+  request_.latest = false;
+  request_.stamp = 150;
+  const PoseReport between = Ask(RequestKind::kPose).poses.at(0);
+  EXPECT_DOUBLE_EQ(between.T_map_robot.x, 1.5);
+  EXPECT_EQ(between.stamp, 150);
+  EXPECT_EQ(between.scan_sequence, 0U);
+  request_.stamp = 200;
+  EXPECT_EQ(Ask(RequestKind::kPose).poses.at(0).scan_sequence, 200U);
+  request_.stamp = 99;
+  EXPECT_EQ(Ask(RequestKind::kPose).status.code, StatusCode::kOutOfRange);
+  request_.stamp = 201;
+  EXPECT_EQ(Ask(RequestKind::kPose).status.code, StatusCode::kUnavailable);
+  session_.status.session.phase = SessionPhase::kEnded;
+  EXPECT_EQ(Ask(RequestKind::kPose).status.code, StatusCode::kOutOfRange);
+  request_.robot = "r2";
+  EXPECT_EQ(Ask(RequestKind::kPose).status.code, StatusCode::kNotFound);
+}
+
+TEST_F(Queries, PathIsOnlineOrSmoothed) {
+  AddPose(100, 1.0);
+  AddPose(200, 2.0);
+  EXPECT_EQ(Ask(RequestKind::kPath).path.size(), 2U);
+  request_.smoothed = true;
+  EXPECT_EQ(Ask(RequestKind::kPath).status.code, StatusCode::kFailedPrecondition);
+  map_.smoothed["r1"] = std::make_shared<const Trajectory>(Trajectory{{100, {7, 0, 0}}});
+  const Reply smoothed = Ask(RequestKind::kPath);
+  ASSERT_EQ(smoothed.path.size(), 1U);
+  EXPECT_EQ(smoothed.path[0].T_map_robot.x, 7.0);
+}
+
+TEST_F(Queries, TilesByAreaLevelAndVersion) {
+  AddTile({0, 0, 0}, 5);
+  AddTile({0, 1, 0}, 8);
+  AddTile({0, -1, -1}, 10);
+  AddTile({2, 0, 0}, 10);
+  EXPECT_EQ(Ask(RequestKind::kTiles).tiles.size(), 3U);
+  request_.area = {7.0, 1.0, 8.0, 2.0};
+  EXPECT_EQ(Ask(RequestKind::kTiles).tiles.at(0).key, (TileKey{0, 1, 0}));
+  EXPECT_EQ(Ask(RequestKind::kTiles).tiles.size(), 1U);
+  request_.area = {};
+  request_.since_epoch = 3;
+  request_.since_version = 8;
+  EXPECT_EQ(Ask(RequestKind::kTiles).tiles.size(), 1U);
+  request_.since_epoch = 2;  // Another epoch: what the asker has is void.
+  EXPECT_EQ(Ask(RequestKind::kTiles).tiles.size(), 3U);
+  request_.level = 2;
+  EXPECT_EQ(Ask(RequestKind::kTiles).tiles.size(), 1U);
+  EXPECT_EQ(Ask(RequestKind::kTiles).map_epoch, 3U);
+  EXPECT_EQ(Ask(RequestKind::kTiles).map_version, 10U);
+}
+
+TEST_F(Queries, TilesOfImpossibleLevelsAndAreasAreRefused) {
+  request_.level = 4;
+  EXPECT_EQ(Ask(RequestKind::kTiles).status.code, StatusCode::kInvalidArgument);
+  request_.level = 0;
+  request_.area = {1, 1, 0, 0};
+  EXPECT_EQ(Ask(RequestKind::kTiles).status.code, StatusCode::kInvalidArgument);
+  request_.area = {0, 0, std::nan(""), 1};
+  EXPECT_EQ(Ask(RequestKind::kTiles).status.code, StatusCode::kInvalidArgument);
+  request_.site = "moon";
+  EXPECT_EQ(Ask(RequestKind::kTiles).status.code, StatusCode::kNotFound);
+}
+
+TEST_F(Queries, LandmarksOfTheSiteInTheArea) {
+  LandmarkReport near, far;
+  near.p_map = {1, 1};
+  far.p_map = {50, 50};
+  session_.landmarks = std::make_shared<const std::vector<LandmarkReport>>(std::vector<LandmarkReport>{near, far});
+  EXPECT_EQ(Ask(RequestKind::kLandmarks).landmarks.size(), 2U);
+  request_.area = {0, 0, 2, 2};
+  EXPECT_EQ(Ask(RequestKind::kLandmarks).landmarks.size(), 1U);
+  session_.status.session.site = "hall";
+  EXPECT_TRUE(Ask(RequestKind::kLandmarks).landmarks.empty());
+}
+
+TEST_F(Queries, MapInfoOfOneSiteOrAll) {
+  EXPECT_EQ(Ask(RequestKind::kMapInfo).maps.at(0).epoch, 3U);
+  request_.site = "";
+  EXPECT_EQ(Ask(RequestKind::kMapInfo).maps.size(), 1U);
+  request_.site = "moon";
+  EXPECT_EQ(Ask(RequestKind::kMapInfo).status.code, StatusCode::kNotFound);
+}
+
+TEST_F(Queries, StatusOfOneRobotOrAll) {
+  EXPECT_EQ(Ask(RequestKind::kStatus).robots.at(0).session.robot, "r1");
+  request_.robot = "";
+  EXPECT_EQ(Ask(RequestKind::kStatus).robots.size(), 1U);
+  request_.site = "hall";
+  EXPECT_TRUE(Ask(RequestKind::kStatus).robots.empty());
+  request_.robot = "r2";
+  EXPECT_EQ(Ask(RequestKind::kStatus).status.code, StatusCode::kNotFound);
+}
+
+TEST_F(Queries, JobsByIdAndAsAList) {
+  jobs_.resize(2);
+  jobs_[0].id = 4;
+  jobs_[1].id = 5;
+  EXPECT_EQ(Ask(RequestKind::kJobList).jobs.size(), 2U);
+  request_.job = 5;
+  EXPECT_EQ(Ask(RequestKind::kJobGet).jobs.at(0).id, 5U);
+  request_.job = 6;
+  EXPECT_EQ(Ask(RequestKind::kJobGet).status.code, StatusCode::kNotFound);
+}
+
+TEST(ReplyParts, AnEmptyAnswerIsOnePart) {
+  Reply reply;
+  reply.status = {StatusCode::kNotFound, "nothing"};
+  const auto parts = SplitReply(std::move(reply));
+  ASSERT_EQ(parts.size(), 1U);
+  EXPECT_TRUE(parts[0].last);
+  EXPECT_EQ(parts[0].status.code, StatusCode::kNotFound);
+}
+
+TEST(ReplyParts, LargeAnswersKeepOrderAndStaySmall) {
+  Reply reply;
+  reply.client = 3;
+  reply.map_version = 9;
+  for (int i = 0; i < 10000; ++i) reply.path.push_back({i, {}});
+  for (int i = 0; i < 40; ++i) {
+    Tile tile;
+    tile.key = {0, i, 0};
+    tile.bytes.resize(16384);
+    reply.tiles.push_back(tile);
+  }
+  const auto parts = SplitReply(std::move(reply));
+  Stamp next_stamp = 0;
+  int next_tile = 0;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    EXPECT_EQ(parts[i].part, i);
+    EXPECT_EQ(parts[i].last, i + 1 == parts.size());
+    EXPECT_EQ(parts[i].client, 3U);
+    EXPECT_EQ(parts[i].map_version, 9U);
+    std::size_t bytes = parts[i].path.size() * 32;
+    for (const StampedPose& pose : parts[i].path) EXPECT_EQ(pose.stamp, next_stamp++);
+    for (const Tile& tile : parts[i].tiles) {
+      EXPECT_EQ(tile.key.x, next_tile++);
+      bytes += tile.bytes.size();
+    }
+    EXPECT_LE(bytes, kPartBudgetBytes);
+  }
+  EXPECT_EQ(next_stamp, 10000);
+  EXPECT_EQ(next_tile, 40);
+}
+
+}  // namespace
+}  // namespace cairn::server

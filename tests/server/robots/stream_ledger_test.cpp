@@ -1,0 +1,137 @@
+#include "server/robots/stream_ledger.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+namespace cairn::server {
+namespace {
+
+std::uint64_t Lost(const StreamLedger& ledger) {
+  return ledger.ledger().dropped[static_cast<std::size_t>(DropReason::kLostOnWire)];
+}
+
+TEST(StreamLedger, SettledThroughWaitsForTheOldestScan) {
+  StreamLedger ledger{Ledger{}};
+  for (std::uint64_t n = 1; n <= 4; ++n) EXPECT_TRUE(ledger.Received(n));
+  ledger.Used(2, 20, true, 1.0);
+  EXPECT_EQ(ledger.ledger().settled_through, 0U);
+  ledger.Dropped(1, DropReason::kNoOdometry);
+  EXPECT_EQ(ledger.ledger().settled_through, 2U);
+  EXPECT_EQ(ledger.ledger().waiting, 2U);
+  EXPECT_EQ(ledger.ledger().keyframes, 1U);
+}
+
+TEST(StreamLedger, AGapSettlesAtOnceAsLost) {
+  StreamLedger ledger{Ledger{}};
+  EXPECT_TRUE(ledger.Received(5));
+  EXPECT_EQ(Lost(ledger), 4U);
+  ledger.Used(5, 1, false, 1.0);
+  EXPECT_EQ(ledger.ledger().settled_through, 5U);
+}
+
+TEST(StreamLedger, ALateArrivalTakesItsNumberBackFromTheLost) {
+  StreamLedger ledger{Ledger{}};
+  EXPECT_TRUE(ledger.Received(1));
+  EXPECT_TRUE(ledger.Received(6));
+  EXPECT_TRUE(ledger.Received(4));
+  EXPECT_EQ(Lost(ledger), 3U);
+  EXPECT_FALSE(ledger.Received(4));
+  EXPECT_TRUE(ledger.Received(2));
+  EXPECT_TRUE(ledger.Received(3));
+  EXPECT_TRUE(ledger.Received(5));
+  EXPECT_EQ(Lost(ledger), 0U);
+  EXPECT_EQ(ledger.ledger().received, 6U);
+}
+
+TEST(StreamLedger, ADuplicateNumberLeavesNoTrace) {
+  StreamLedger ledger{Ledger{}};
+  EXPECT_TRUE(ledger.Received(1));
+  EXPECT_FALSE(ledger.Received(1));
+  ledger.Used(1, 1, false, 1.0);
+  EXPECT_FALSE(ledger.Received(1));
+  EXPECT_EQ(ledger.ledger().received, 1U);
+  EXPECT_EQ(ledger.ledger().waiting, 0U);
+}
+
+TEST(StreamLedger, UnnumberedScansAreCountedEachTime) {
+  StreamLedger ledger{Ledger{}};
+  EXPECT_TRUE(ledger.Received(0));
+  EXPECT_TRUE(ledger.Received(0));
+  ledger.Used(0, 1, false, 1.0);
+  EXPECT_EQ(ledger.ledger().received, 2U);
+  EXPECT_EQ(ledger.ledger().waiting, 1U);
+}
+
+TEST(StreamLedger, ANewClientMayNumberFromOneAgain) {
+  StreamLedger ledger{Ledger{}};
+  for (std::uint64_t n = 1; n <= 10; ++n) {
+    EXPECT_TRUE(ledger.Received(n));
+    ledger.Used(n, 1, false, 1.0);
+  }
+  ledger.NewClient();
+  EXPECT_TRUE(ledger.Received(2));
+  EXPECT_EQ(Lost(ledger), 1U);
+  ledger.Used(2, 1, false, 1.0);
+  EXPECT_EQ(ledger.ledger().settled_through, 2U);
+  EXPECT_EQ(ledger.ledger().used, 11U);
+}
+
+TEST(StreamLedger, ANewClientMayGoOnWithTheNumbers) {
+  StreamLedger ledger{Ledger{}};
+  EXPECT_TRUE(ledger.Received(1));
+  ledger.NewClient();
+  EXPECT_TRUE(ledger.Received(2));
+  EXPECT_EQ(Lost(ledger), 0U);
+}
+
+TEST(StreamLedger, AnAbsurdNumberStartsAnewInsteadOfLosingMillions) {
+  StreamLedger ledger{Ledger{}};
+  EXPECT_TRUE(ledger.Received(1));
+  EXPECT_TRUE(ledger.Received(UINT64_MAX));
+  EXPECT_EQ(Lost(ledger), 0U);
+  EXPECT_FALSE(ledger.Received(UINT64_MAX));
+}
+
+TEST(StreamLedger, PercentilesAreOfTheLastLatencies) {
+  StreamLedger ledger{Ledger{}};
+  for (std::uint64_t n = 1; n <= 100; ++n) {
+    EXPECT_TRUE(ledger.Received(n));
+    ledger.Used(n, 1, false, static_cast<double>(n));
+  }
+  EXPECT_NEAR(ledger.ledger().latency_p50_ms, 50.0, 1.0);
+  EXPECT_NEAR(ledger.ledger().latency_p99_ms, 99.0, 1.0);
+}
+
+// Property: whatever arrives in whatever order, no scan vanishes and settled_through never goes back.
+TEST(StreamLedger, TheEquationHoldsUnderRandomTraffic) {
+  std::mt19937 random(5);
+  for (int run = 0; run < 50; ++run) {
+    StreamLedger ledger{Ledger{}};
+    std::vector<std::uint64_t> waiting;
+    std::uint64_t settled_before = 0;
+    for (int i = 0; i < 2000; ++i) {
+      if (waiting.empty() || random() % 2 == 0) {
+        const std::uint64_t last = ledger.ledger().last_sequence;
+        const std::uint64_t number = random() % 4 == 0 ? random() % (last + 1) : last + 1 + random() % 3;
+        if (ledger.Received(number)) waiting.push_back(number);
+      } else {
+        const std::size_t at = random() % waiting.size();
+        if (random() % 2 == 0) {
+          ledger.Used(waiting[at], 1, false, 1.0);
+        } else {
+          ledger.Dropped(waiting[at], DropReason::kQueueFull);
+        }
+        waiting.erase(waiting.begin() + static_cast<std::ptrdiff_t>(at));
+      }
+      const Ledger now = ledger.ledger();
+      ASSERT_EQ(now.received + Lost(ledger), now.used + now.dropped_total() + now.waiting);
+      ASSERT_EQ(now.waiting, waiting.size());
+      ASSERT_GE(now.settled_through, settled_before);
+      settled_before = now.settled_through;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace cairn::server

@@ -1,0 +1,131 @@
+#include "server/slam/mapper.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <thread>
+
+#include "tests/server/slam/worlds.h"
+
+namespace cairn::slam {
+namespace {
+
+using test::Laser;
+using test::Look;
+
+// A ring corridor around a block: driving round it once closes a loop.
+test::World Ring() {
+  test::World world = test::Room(-2, -2, 16, 12);
+  world.Add({{2, 2}, {10, 2}, {10, 6}, {2, 6}, {2, 2}});
+  world.Add({{5, -2}, {5, -1.5}, {6, -1.5}, {6, -2}}).Add({{14, 3}, {13.4, 3}, {13.4, 4.2}, {14, 4.2}});
+  return world;
+}
+
+struct Drive {
+  std::vector<std::shared_ptr<const Scan>> scans;
+  std::vector<Pose2> odometry;
+  std::vector<Pose2> truth;
+};
+
+// Twice round the ring, with odometry that turns 1 % too far and scales 2 %.
+Drive DriveRound() {
+  Drive drive;
+  std::mt19937_64 rng(3);
+  const Laser laser{.beams = 181, .step_rad = Radians(1.5), .sigma_m = 0.01};
+  Pose2 truth{0, 0, 0}, odometry{5, 5, 1};
+  const auto step = [&](const Pose2& T_prev_curr) {
+    Scan scan = Look(Ring(), truth, laser, &rng);
+    scan.stamp = static_cast<Stamp>(drive.scans.size() + 1) * 100'000'000;
+    drive.scans.push_back(std::make_shared<const Scan>(std::move(scan)));
+    drive.odometry.push_back(odometry);
+    drive.truth.push_back(truth);
+    truth = truth * T_prev_curr;
+    odometry = odometry * Pose2{1.02 * T_prev_curr.x, 0.0, 1.01 * T_prev_curr.theta};
+  };
+  for (int round = 0; round < 2; ++round) {
+    for (const double side : {12.0, 8.0, 12.0, 8.0}) {
+      for (int i = 0; i < static_cast<int>(side / 0.2); ++i) step({0.2, 0, 0});
+      for (int i = 0; i < 10; ++i) step({0, 0, kPi / 20});
+    }
+  }
+  return drive;
+}
+
+struct MapperRun {
+  Trajectory online;
+  MapperSnapshot snapshot;
+  std::uint64_t keyframes = 0;
+  double worst_m = 0.0;
+};
+
+MapperRun RunMapper(const Drive& drive, const ParallelFor& parallel_for) {
+  MapperOptions options;
+  options.filter.particles = 50;
+  Mapper mapper(options, drive.truth.front(), 1);
+  MapperRun run;
+  for (std::size_t i = 0; i < drive.scans.size(); ++i) {
+    const ScanOutcome outcome = mapper.Process(drive.scans[i], drive.odometry[i], parallel_for);
+    run.online.push_back({outcome.stamp, outcome.T_map_robot});
+    run.keyframes += outcome.keyframe ? 1 : 0;
+    run.worst_m = std::max(run.worst_m, Between(drive.truth[i], outcome.T_map_robot).translation().norm());
+  }
+  run.snapshot = mapper.Snapshot();
+  return run;
+}
+
+TEST(Mapper, FollowsTheRobotTwiceRoundALoop) {
+  const Drive drive = DriveRound();
+  const MapperRun run = RunMapper(drive, SerialFor);
+  const Pose2 odometry_error =
+      Between(drive.truth.back(), drive.truth.front() * Between(drive.odometry.front(), drive.odometry.back()));
+  EXPECT_GT(odometry_error.translation().norm(), 0.5) << "the world must need correcting";
+  EXPECT_LT(run.worst_m, 0.25);
+}
+
+TEST(Mapper, TheFullPathHasAPoseForEveryScan) {
+  const Drive drive = DriveRound();
+  const MapperRun run = RunMapper(drive, SerialFor);
+  const Trajectory full = run.snapshot.FullTrajectory();
+  ASSERT_EQ(full.size(), drive.scans.size());
+  EXPECT_EQ(run.snapshot.keyframes.size(), run.keyframes);
+  for (std::size_t i = 0; i < full.size(); ++i)
+    ASSERT_LT(Between(drive.truth[i], full[i].T_map_robot).translation().norm(), 0.3);
+}
+
+TEST(Mapper, SameInputSameOutputWhateverTheThreads) {
+  const Drive drive = DriveRound();
+  const ParallelFor two_threads = [](int count, const std::function<void(int, int)>& body) {
+    std::thread other([&] { body(count / 2, count); });
+    body(0, count / 2);
+    other.join();
+  };
+  const MapperRun serial = RunMapper(drive, SerialFor), parallel = RunMapper(drive, two_threads);
+  ASSERT_EQ(serial.online.size(), parallel.online.size());
+  for (std::size_t i = 0; i < serial.online.size(); ++i)
+    ASSERT_EQ(serial.online[i].T_map_robot, parallel.online[i].T_map_robot);
+}
+
+TEST(Mapper, StandingStillAddsNoKeyframes) {
+  MapperOptions options;
+  Mapper mapper(options, {}, 1);
+  int keyframes = 0;
+  for (int i = 0; i < 20; ++i)
+    keyframes += mapper.Process(std::make_shared<Scan>(Look(test::Office(), {}, {})), {}, SerialFor).keyframe ? 1 : 0;
+  EXPECT_EQ(keyframes, 1);
+}
+
+TEST(Mapper, BlindTravelIsReportedAsLost) {
+  MapperOptions options;
+  Mapper mapper(options, {}, 1);
+  (void)mapper.Process(std::make_shared<Scan>(Look(test::Office(), {}, {})), {}, SerialFor);
+  Scan empty = Look(test::Office(), {}, {});
+  for (float& range : empty.ranges_m) range = 100.0F;  // Nothing hit.
+  ScanOutcome outcome;
+  for (int i = 1; i <= 30; ++i) outcome = mapper.Process(std::make_shared<Scan>(empty), {0.1 * i, 0, 0}, SerialFor);
+  EXPECT_FALSE(outcome.localized);
+  EXPECT_EQ(outcome.reason, PoseReason::kLost);
+  EXPECT_NEAR(outcome.T_map_robot.x, 3.0, 0.2);  // Odometry carries on.
+}
+
+}  // namespace
+}  // namespace cairn::slam

@@ -1,0 +1,77 @@
+#include "server/slam/matching/point_to_line.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/server/slam/worlds.h"
+
+namespace cairn::slam {
+namespace {
+
+using test::Laser;
+using test::Look;
+using test::World;
+
+std::vector<SurfacePoint> SurfaceOf(const Scan& scan, const SurfaceOptions& options = {}) {
+  return SurfacePointsOf(PointsOf(scan), scan, options);
+}
+
+// The reference holds what the robot sees from the world's origin.
+PointIndex ReferenceOf(const World& world, const Laser& laser) {
+  PointIndex index(PointToLineOptions{}.first_pair_distance_m);
+  for (const SurfacePoint& point : SurfaceOf(Look(world, {}, laser))) index.Add(point);
+  return index;
+}
+
+const Eigen::Matrix3d kPrior = Eigen::Vector3d(0.09, 0.09, 0.04).asDiagonal();
+
+TEST(PointToLine, FindsTheWayBackFromSeveralStartingErrors) {
+  const Laser laser{.beams = 361, .step_rad = Radians(0.5)};
+  const PointIndex reference = ReferenceOf(test::Office(), laser);
+  const Pose2 truth{0.12, -0.08, 0.06};
+  const std::vector<SurfacePoint> points = SurfaceOf(Look(test::Office(), truth, laser));
+  for (const Pose2 error : {Pose2{}, Pose2{0.1, 0.1, 0.05}, Pose2{-0.15, 0.05, -0.1}, Pose2{0.0, -0.2, 0.12}}) {
+    const Pose2 guess = truth * error;
+    const MatchResult match = AlignPointsToSurfaces(points, reference, {guess, guess, kPrior}, {});
+    ASSERT_TRUE(match.converged);
+    EXPECT_LT((match.T_prev_curr.translation() - truth.translation()).norm(), 0.01);
+    EXPECT_LT(std::abs(AngleDiff(match.T_prev_curr.theta, truth.theta)), 0.004);
+    EXPECT_TRUE(IsCovariance(match.covariance));
+    EXPECT_FALSE(match.degenerate);
+  }
+}
+
+TEST(PointToLine, SaysThatACorridorHoldsOnlyOneDirection) {
+  World corridor;
+  corridor.Add({{-50, 1}, {50, 1}}).Add({{-50, -1}, {50, -1}});
+  // Near enough for nearly every hit to have a direction.
+  SurfaceOptions near;
+  near.max_range_m = 4.0;
+  const Laser laser{.beams = 361, .step_rad = Radians(0.5)};
+  PointIndex reference(PointToLineOptions{}.first_pair_distance_m);
+  for (const SurfacePoint& point : SurfaceOf(Look(corridor, {}, laser), near)) reference.Add(point);
+  const std::vector<SurfacePoint> points = SurfaceOf(Look(corridor, {0.3, 0.05, 0.03}, laser), near);
+  const Pose2 guess{0.4, 0.0, 0.0};
+  const MatchResult match = AlignPointsToSurfaces(points, reference, {guess, guess, kPrior}, {});
+  ASSERT_TRUE(match.converged);
+  EXPECT_TRUE(match.degenerate);
+  EXPECT_GT(std::abs(match.degenerate_direction.x()), 0.99);
+  EXPECT_NEAR(match.T_prev_curr.y, 0.05, 0.01);  // The walls do.
+  EXPECT_NEAR(match.T_prev_curr.theta, 0.03, 0.005);
+}
+
+TEST(PointToLine, WithoutPointsTheAnswerIsThePrior) {
+  const PointIndex reference = ReferenceOf(test::Office(), {});
+  const MatchResult match = AlignPointsToSurfaces({}, reference, {{1, 0, 0}, {2, 0, 0}, kPrior}, {});
+  EXPECT_FALSE(match.converged);
+  EXPECT_EQ(match.failure, MatchFailure::kTooFewFeatures);
+  EXPECT_EQ(match.T_prev_curr, (Pose2{2, 0, 0}));
+}
+
+TEST(PointToLine, ScansOfDifferentPlacesDoNotConverge) {
+  const PointIndex reference = ReferenceOf(test::Room(-8, -8, 16, 16), {});
+  const std::vector<SurfacePoint> points = SurfaceOf(Look(test::Office(), {}, {}));
+  EXPECT_FALSE(AlignPointsToSurfaces(points, reference, {{}, {}, kPrior}, {}).converged);
+}
+
+}  // namespace
+}  // namespace cairn::slam

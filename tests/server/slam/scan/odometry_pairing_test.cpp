@@ -1,0 +1,230 @@
+#include "server/slam/scan/odometry_pairing.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <random>
+#include <vector>
+
+namespace cairn::slam {
+namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::Pair;
+
+struct Pairing {
+  explicit Pairing(const PairingOptions& options = {})
+      : pairing(options, {[this](PairedScan&& p) {
+                            pairs.push_back({p.scan->stamp, p.T_odom_robot});
+                          },
+                          [this](const Scan& scan, DropReason reason) { drops.emplace_back(scan.stamp, reason); }}) {}
+
+  void ScanAt(Stamp stamp) {
+    auto scan = std::make_shared<Scan>();
+    scan->stamp = stamp;
+    pairing.Add(std::move(scan));
+  }
+  bool OdometryAt(Stamp stamp, double x) { return pairing.Add(Odometry{0, stamp, {x, 0, 0}}); }
+
+  struct Paired {
+    Stamp stamp;
+    Pose2 T_odom_robot;
+    bool operator==(const Paired&) const = default;
+  };
+  std::vector<Paired> pairs;
+  std::vector<std::pair<Stamp, DropReason>> drops;
+  OdometryPairing pairing;
+};
+
+constexpr Stamp kSecond = kNanosPerSecond;
+
+TEST(OdometryPairing, ExactStampsPairAtOnceInEitherOrder) {
+  Pairing p;
+  EXPECT_TRUE(p.OdometryAt(1 * kSecond, 5));
+  p.ScanAt(1 * kSecond);
+  ASSERT_EQ(p.pairs.size(), 1u);
+  EXPECT_EQ(p.pairs[0].T_odom_robot.x, 5);
+  p.ScanAt(2 * kSecond);
+  EXPECT_EQ(p.pairing.waiting(), 1u);
+  EXPECT_TRUE(p.OdometryAt(2 * kSecond, 6));
+  ASSERT_EQ(p.pairs.size(), 2u);
+  EXPECT_EQ(p.pairs[1].T_odom_robot.x, 6);
+}
+
+TEST(OdometryPairing, InterpolatesBetweenItsNeighbours) {
+  Pairing p;
+  p.OdometryAt(1 * kSecond, 0);
+  p.ScanAt(1 * kSecond + kSecond / 4);
+  EXPECT_THAT(p.pairs, IsEmpty());
+  p.OdometryAt(2 * kSecond, 8);
+  ASSERT_EQ(p.pairs.size(), 1u);
+  EXPECT_NEAR(p.pairs[0].T_odom_robot.x, 2.0, 1e-12);
+}
+
+TEST(OdometryPairing, ScansBeforeTheFirstOdometryAreDropped) {
+  Pairing p;
+  p.ScanAt(1 * kSecond);
+  p.ScanAt(2 * kSecond);
+  p.OdometryAt(2 * kSecond, 3);
+  EXPECT_THAT(p.drops, ElementsAre(Pair(1 * kSecond, DropReason::kNoOdometry)));
+  EXPECT_EQ(p.pairs.size(), 1u);
+}
+
+TEST(OdometryPairing, AGapInTheOdometryDropsTheScansInIt) {
+  PairingOptions options;
+  options.max_gap_s = 1.0;
+  Pairing p(options);
+  p.OdometryAt(1 * kSecond, 0);
+  p.ScanAt(2 * kSecond);
+  p.OdometryAt(3 * kSecond, 1);
+  p.ScanAt(3 * kSecond + 1);
+  p.OdometryAt(4 * kSecond, 1);
+  EXPECT_THAT(p.drops, ElementsAre(Pair(2 * kSecond, DropReason::kNoOdometry)));
+  EXPECT_EQ(p.pairs.size(), 1u);
+}
+
+TEST(OdometryPairing, FinishUsesTheLastOdometryWhileItIsFresh) {
+  PairingOptions options;
+  options.max_gap_s = 1.0;
+  Pairing p(options);
+  p.OdometryAt(1 * kSecond, 7);
+  p.ScanAt(2 * kSecond);
+  p.ScanAt(2 * kSecond + 1);
+  p.pairing.Finish();
+  ASSERT_EQ(p.pairs.size(), 1u);
+  EXPECT_EQ(p.pairs[0].T_odom_robot.x, 7);
+  EXPECT_THAT(p.drops, ElementsAre(Pair(2 * kSecond + 1, DropReason::kNoOdometry)));
+  EXPECT_EQ(p.pairing.waiting(), 0u);
+}
+
+TEST(OdometryPairing, FinishWithoutAnyOdometryDropsAll) {
+  Pairing p;
+  p.ScanAt(1);
+  p.pairing.Finish();
+  EXPECT_THAT(p.drops, ElementsAre(Pair(1, DropReason::kNoOdometry)));
+}
+
+TEST(OdometryPairing, StampsThatRepeatOrGoBackAreRefused) {
+  Pairing p;
+  EXPECT_TRUE(p.OdometryAt(5 * kSecond, 0));
+  EXPECT_FALSE(p.OdometryAt(5 * kSecond, 1));
+  EXPECT_FALSE(p.OdometryAt(4 * kSecond, 1));
+  p.ScanAt(5 * kSecond);
+  p.ScanAt(5 * kSecond);
+  p.ScanAt(4 * kSecond);
+  p.ScanAt(std::numeric_limits<Stamp>::min());
+  EXPECT_EQ(p.pairs.size(), 1u);
+  EXPECT_THAT(p.drops,
+              ElementsAre(Pair(5 * kSecond, DropReason::kDuplicateStamp), Pair(4 * kSecond, DropReason::kStampWentBack),
+                          Pair(std::numeric_limits<Stamp>::min(), DropReason::kStampWentBack)));
+}
+
+TEST(OdometryPairing, OneStampAYearAheadDoesNotBlockTheStream) {
+  constexpr Stamp kYear = 365 * 24 * 3600 * kSecond;
+  Pairing p;
+  p.OdometryAt(1 * kSecond, 0);
+  EXPECT_FALSE(p.OdometryAt(kYear, 0));
+  EXPECT_FALSE(p.OdometryAt(std::numeric_limits<Stamp>::max(), 0));
+  EXPECT_TRUE(p.OdometryAt(2 * kSecond, 0));
+  p.ScanAt(1 * kSecond);
+  p.ScanAt(kYear);
+  p.ScanAt(2 * kSecond);
+  EXPECT_EQ(p.pairs.size(), 2u);
+  EXPECT_THAT(p.drops, ElementsAre(Pair(kYear, DropReason::kStampJump)));
+}
+
+TEST(OdometryPairing, AClockSetAheadIsBelievedOnceItProvesItself) {
+  PairingOptions options;
+  options.jump_confirmations = 3;
+  Pairing p(options);
+  const Stamp later = 1'000'000 * kSecond;
+  p.ScanAt(1 * kSecond);
+  p.ScanAt(later);
+  p.ScanAt(later + kSecond);
+  EXPECT_EQ(p.drops.size(), 2u);
+  p.ScanAt(later + 2 * kSecond);
+  EXPECT_EQ(p.drops.size(), 2u);
+  EXPECT_EQ(p.pairing.waiting(), 2u);
+}
+
+TEST(OdometryPairing, ScatteredJumpsProveNothing) {
+  PairingOptions options;
+  options.jump_confirmations = 2;
+  Pairing p(options);
+  p.ScanAt(1 * kSecond);
+  p.ScanAt(10'000'000 * kSecond / 10);
+  p.ScanAt(2 * kSecond);  // The true clock goes on: the count starts anew.
+  p.ScanAt(1'000'001 * kSecond);
+  p.ScanAt(2'000'000 * kSecond);  // Far from the one before.
+  EXPECT_EQ(p.drops.size(), 3u);
+  EXPECT_EQ(p.pairing.waiting(), 2u);
+}
+
+TEST(OdometryPairing, WaitingScansAreBounded) {
+  PairingOptions options;
+  options.max_waiting_scans = 3;
+  Pairing p(options);
+  for (int i = 1; i <= 5; ++i) p.ScanAt(i * kSecond);
+  EXPECT_EQ(p.pairing.waiting(), 3u);
+  EXPECT_THAT(p.drops,
+              ElementsAre(Pair(1 * kSecond, DropReason::kNoOdometry), Pair(2 * kSecond, DropReason::kNoOdometry)));
+}
+
+TEST(OdometryPairing, OdometryIsBoundedAndTheNewestIsKept) {
+  PairingOptions options;
+  options.max_odometry = 10;
+  Pairing p(options);
+  for (int i = 1; i <= 100; ++i) p.OdometryAt(i * kSecond, i);
+  p.ScanAt(50 * kSecond);                // Forgotten.
+  p.ScanAt(95 * kSecond + kSecond / 2);  // Still known.
+  EXPECT_THAT(p.drops, ElementsAre(Pair(50 * kSecond, DropReason::kNoOdometry)));
+  ASSERT_EQ(p.pairs.size(), 1u);
+  EXPECT_NEAR(p.pairs[0].T_odom_robot.x, 95.5, 1e-9);
+}
+
+// Two streams with equal stamps, gaps, repeats and steps back; any interleaving that keeps each stream's order must
+// give the same pairs and, per stream order, the same fates.
+TEST(OdometryPairing, PairsDoNotDependOnHowTheStreamsInterleave) {
+  std::mt19937_64 random(42);
+  std::vector<Stamp> scans, odometries;
+  for (Stamp t = 0; t < 40 * kSecond; t += static_cast<Stamp>(random() % (kSecond / 2))) {
+    scans.push_back(random() % 17 == 0 && t > kSecond ? t - kSecond : t);
+  }
+  for (Stamp t = 3 * kSecond; t < 38 * kSecond; t += static_cast<Stamp>(random() % (kSecond / 3))) {
+    if (t > 20 * kSecond && t < 23 * kSecond) continue;  // A gap.
+    odometries.push_back(random() % 19 == 0 ? t - kSecond / 2 : t);
+    if (random() % 5 == 0 && t > scans[0]) odometries.push_back(scans[scans.size() / 2]);  // Exact, where it fits.
+  }
+  PairingOptions options;
+  options.max_waiting_scans = 10'000;
+  options.max_odometry = 10'000;
+  const auto run = [&](std::uint64_t seed) {
+    std::mt19937_64 order(seed);
+    Pairing p(options);
+    std::size_t s = 0, o = 0;
+    while (s < scans.size() || o < odometries.size()) {
+      // Bursts of different length: from strictly alternating to one stream wholly before the other.
+      const bool scan_next = o == odometries.size() || (s < scans.size() && order() % (seed % 7 + 2) == 0);
+      if (scan_next) {
+        p.ScanAt(scans[s++]);
+      } else {
+        p.OdometryAt(odometries[o], static_cast<double>(o) * 0.01);
+        ++o;
+      }
+    }
+    p.pairing.Finish();
+    std::sort(p.drops.begin(), p.drops.end());
+    return std::pair(p.pairs, p.drops);
+  };
+  const auto expected = run(1);
+  EXPECT_GT(expected.first.size(), 50u);
+  EXPECT_GT(expected.second.size(), 5u);
+  EXPECT_EQ(expected.first.size() + expected.second.size(), scans.size());
+  for (std::uint64_t seed = 2; seed < 100; ++seed) EXPECT_EQ(run(seed), expected) << seed;
+}
+
+}  // namespace
+}  // namespace cairn::slam
