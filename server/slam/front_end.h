@@ -10,6 +10,7 @@
 #include "common/service/pose_report.h"
 #include "server/slam/features/feature_extraction.h"
 #include "server/slam/matching/point_to_line.h"
+#include "server/slam/matching/scan_view.h"
 #include "server/slam/matching/voting.h"
 #include "server/slam/motion/motion_noise.h"
 
@@ -26,11 +27,6 @@ struct FrontEndOptions {
 };
 void Visit(OptionVisitor& visitor, FrontEndOptions& options);
 
-// One scan as the matchers see it.
-struct ScanView {
-  ScanFeatures features;
-  std::vector<SurfacePoint> points_robot;
-};
 [[nodiscard]] ScanView Look(const Scan& scan, const FrontEndOptions& options);
 
 struct TrackStep {

@@ -14,6 +14,7 @@
 #include "common/service/pose_report.h"
 #include "server/slam/grid/occupancy_grid.h"
 #include "server/slam/keyframe.h"
+#include "server/slam/landmark.h"
 #include "server/slam/mapper_options.h"
 #include "server/slam/parallel_for.h"
 
@@ -29,15 +30,6 @@ struct ScanOutcome {
   double score = 0.0;
   PoseReason reason = PoseReason::kWaiting;
   bool keyframe = false;  // The scan updated filter and map.
-};
-
-struct Landmark {
-  std::uint64_t id = 0;
-  bool corner = false;
-  Eigen::Vector2d p_map = Eigen::Vector2d::Zero();
-  double direction_rad = 0.0;
-  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
-  std::uint32_t sightings = 0;
 };
 
 class Mapper {

@@ -13,6 +13,7 @@
 #include <span>
 #include <vector>
 
+#include "server/slam/filters/filter.h"
 #include "server/slam/filters/landmark_observation.h"
 #include "server/slam/filters/particle.h"
 #include "server/slam/filters/resampling.h"
@@ -30,13 +31,6 @@ struct FilterOptions {
   LandmarkNoise landmark;
 };
 void Visit(OptionVisitor& visitor, FilterOptions& options);  // All but `particles`.
-
-// The robot seen from keyframe `keyframe`, by scan matching.
-struct RevisitObservation {
-  std::size_t keyframe = 0;
-  Pose2 T_keyframe_robot;
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
-};
 
 class FastSlam2 {
  public:
