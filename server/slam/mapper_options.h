@@ -4,8 +4,7 @@
 #include <cstdint>
 
 #include "common/options/option_visitor.h"
-#include "server/slam/filters/fastslam2.h"
-#include "server/slam/filters/landmark_tracker.h"
+#include "server/slam/filters/make_filter.h"
 #include "server/slam/front_end.h"
 #include "server/slam/grid/occupancy_grid.h"
 #include "server/slam/matching/revisit_search.h"
@@ -23,7 +22,6 @@ struct MapperOptions {
   FrontEndOptions front_end;
   MotionGateOptions gate;
   RevisitOptions revisit;
-  LandmarkOptions landmarks;
   FilterOptions filter;
   GridOptions grid;
   PairingOptions pairing;
