@@ -11,7 +11,7 @@ namespace cairn::slam {
 struct Mapper::State {
   State(const MapperOptions& given, const Pose2& T_map_robot_start, std::uint64_t seed)
       : options(given),
-        front_end(given.front_end),
+        front_end(given.front_end, given.matcher, given.matching),
         revisits(given.revisit, given.front_end.refine),
         tracker(given.landmarks, given.filter.landmark),
         filter(given.filter, T_map_robot_start, seed),
@@ -58,7 +58,7 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
 
   // Where the front-end sees the robot, and how far that is from the last keyframe.
   ScanView view = Look(*scan, s.options.front_end);
-  const TrackStep step = s.front_end.Track(view, T_odom_robot);
+  const TrackStep step = s.front_end.Track(view, T_odom_robot, parallel_for);
   s.unmatched_m = step.matched || s.keyframes.empty() ? 0.0 : s.unmatched_m + step.moved_m;
   const bool first = s.keyframes.empty();
   Pose2 T_keyframe_robot = first ? Pose2{} : Between(s.shapes.back().T_track_robot, step.T_track_robot);

@@ -11,6 +11,9 @@ void Visit(OptionVisitor& visitor, MapperOptions& options) {
                   "More: larger loops close, in proportionally more time and memory.");
   visitor.Real("lost_after_m", options.lost_after_m, "m", 0.0, 1000.0,
                "Travelled by odometry alone before the robot counts as lost.");
+  VisitEnum(visitor, "matcher", options.matcher, MatcherNames(), "What compares a scan with the last keyframe.");
+  visitor.Section("matching", "The matchers; the chosen one's options count.",
+                  [&] { Visit(visitor, options.matching); });
   visitor.Section("front_end", "From scan to scan.", [&] { Visit(visitor, options.front_end); });
   visitor.Section("gate", "When a scan is worth an update of filter and map.", [&] { Visit(visitor, options.gate); });
   visitor.Section("revisit", "Recognising places seen before.", [&] { Visit(visitor, options.revisit); });
