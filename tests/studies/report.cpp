@@ -5,6 +5,16 @@
 #include <utility>
 
 namespace cairn::studies {
+namespace {
+
+// Markdown links break at blanks, file systems at slashes.
+std::string FileStem(std::string name) {
+  for (char& c : name)
+    if (c == ' ' || c == '/') c = '_';
+  return name;
+}
+
+}  // namespace
 
 Report::Report(std::filesystem::path directory, const std::string& title, std::ostream& out)
     : directory_(std::move(directory)), out_(out) {
@@ -34,7 +44,7 @@ void Report::Warn(const std::string& text) {
 void Report::Add(const Table& table, const std::string& name) {
   markdown_ += "\n" + table.Markdown();
   out_ << '\n' << table.Aligned() << '\n' << std::flush;
-  WriteFile(name + ".csv", table.Csv());
+  WriteFile(FileStem(name) + ".csv", table.Csv());
 }
 
 void Report::Add(const Plot& plot, const std::string& name) {
@@ -55,9 +65,9 @@ void Report::AddPicture(const RasterImage& picture, const std::string& caption, 
     if (written_) written_ = tl::unexpected<Status>(png.error());
     return;
   }
-  WriteFile(name + ".png", std::string(png->begin(), png->end()));
-  markdown_ += "\n![" + caption + "](" + name + ".png)\n";
-  if (!directory_.empty()) out_ << "   " << (directory_ / (name + ".png")).string() << '\n' << std::flush;
+  WriteFile(FileStem(name) + ".png", std::string(png->begin(), png->end()));
+  markdown_ += "\n![" + caption + "](" + FileStem(name) + ".png)\n";
+  if (!directory_.empty()) out_ << "   " << (directory_ / (FileStem(name) + ".png")).string() << '\n' << std::flush;
 }
 
 Result<void> Report::Finish() {

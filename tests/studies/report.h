@@ -23,7 +23,7 @@ class Report {
   void Text(const std::string& text);
   // What must not be overlooked: a log that is absent, a figure worse than the printed one.
   void Warn(const std::string& text);
-  // Also written as NAME.csv.
+  // Also written as NAME.csv; blanks in names become underscores.
   void Add(const Table& table, const std::string& name);
   // Written as NAME.png; the plot's title is the caption.
   void Add(const Plot& plot, const std::string& name);
