@@ -29,6 +29,7 @@ std::string_view MatcherName(MatcherKind kind) {
 
 void Visit(OptionVisitor& visitor, MatcherOptions& options) {
   visitor.Section("voting", "Seven criteria vote for pairs of lines.", [&] { Visit(visitor, options.voting); });
+  visitor.Section("line_lsq", "Least squares over pairs of lines.", [&] { Visit(visitor, options.line_lsq); });
   visitor.Section("icp", "Points on surfaces, scan to scan.", [&] { Visit(visitor, options.icp); });
 }
 
@@ -38,7 +39,7 @@ MatchResult MatchScans(const ScanView& prev, const ScanView& curr, const MatchPr
     case MatcherKind::kVoting:
       return MatchByVoting(prev.features, curr.features, prior.T_prev_curr, options.voting);
     case MatcherKind::kLineLsq:
-      return Unmatched(prior);
+      return MatchByLineLsq(prev.features, curr.features, prior, options.line_lsq);
     case MatcherKind::kHough:
       return Unmatched(prior);
     case MatcherKind::kNdt:

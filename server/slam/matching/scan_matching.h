@@ -12,6 +12,7 @@
 #include "common/options/option_visitor.h"
 #include "server/slam/match_result.h"
 #include "server/slam/matching/icp.h"
+#include "server/slam/matching/line_lsq.h"
 #include "server/slam/matching/match_prior.h"
 #include "server/slam/matching/scan_view.h"
 #include "server/slam/matching/voting.h"
@@ -26,6 +27,7 @@ enum class MatcherKind : std::uint8_t { kVoting = 0, kLineLsq, kHough, kNdt, kNd
 
 struct MatcherOptions {
   VotingOptions voting;
+  LineLsqOptions line_lsq;
   PointToLineOptions icp;
 };
 void Visit(OptionVisitor& visitor, MatcherOptions& options);
