@@ -32,6 +32,7 @@ void Visit(OptionVisitor& visitor, MatcherOptions& options) {
   visitor.Section("ndt", "Normal distributions, Newton's algorithm.", [&] { Visit(visitor, options.ndt); });
   visitor.Section("ndt_de", "Normal distributions, searched by differential evolution.",
                   [&] { Visit(visitor, options.ndt_de); });
+  visitor.Section("line_lsq", "Least squares over pairs of lines.", [&] { Visit(visitor, options.line_lsq); });
   visitor.Section("icp", "Points on surfaces, scan to scan.", [&] { Visit(visitor, options.icp); });
 }
 
@@ -41,7 +42,7 @@ MatchResult MatchScans(const ScanView& prev, const ScanView& curr, const MatchPr
     case MatcherKind::kVoting:
       return MatchByVoting(prev.features, curr.features, prior.T_prev_curr, options.voting);
     case MatcherKind::kLineLsq:
-      return Unmatched(prior);
+      return MatchByLineLsq(prev.features, curr.features, prior, options.line_lsq);
     case MatcherKind::kHough:
       return Unmatched(prior);
     case MatcherKind::kNdt:

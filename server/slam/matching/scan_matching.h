@@ -12,6 +12,7 @@
 #include "common/options/option_visitor.h"
 #include "server/slam/match_result.h"
 #include "server/slam/matching/icp.h"
+#include "server/slam/matching/line_lsq.h"
 #include "server/slam/matching/match_prior.h"
 #include "server/slam/matching/ndt.h"
 #include "server/slam/matching/ndt_de.h"
@@ -30,6 +31,7 @@ struct MatcherOptions {
   VotingOptions voting;
   NdtOptions ndt;
   NdtDeOptions ndt_de;
+  LineLsqOptions line_lsq;
   PointToLineOptions icp;
 };
 void Visit(OptionVisitor& visitor, MatcherOptions& options);
