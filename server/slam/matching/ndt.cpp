@@ -43,7 +43,13 @@ void Visit(OptionVisitor& visitor, NewtonOptions& options) {
   visitor.Real("stop_step_rad", options.stop_step_rad, "rad", 1e-9, 0.1, "See stop_step_m.");
 }
 
+void Visit(OptionVisitor& visitor, NdtCoarseOptions& options) {
+  visitor.Real("cell_m", options.cell_m, "m", 0.0, 20.0, "Side of its cells; 0: none.");
+  visitor.Real("min_flatness", options.min_flatness, "1", 1e-6, 1.0, "Larger: wider walls, found from farther off.");
+}
+
 void Visit(OptionVisitor& visitor, NdtOptions& options) {
+  visitor.Section("coarse", "A first climb on larger, rounder cells.", [&] { Visit(visitor, options.coarse); });
   visitor.Section("map", "The distributions.", [&] { Visit(visitor, options.map); });
   visitor.Section("thinning", "Of the scan laid on them.", [&] { Visit(visitor, options.thinning); });
   visitor.Section("newton", "The climb to the densest place.", [&] { Visit(visitor, options.newton); });
@@ -79,9 +85,19 @@ MatchResult MatchByNdt(const ScanView& prev, const ScanView& curr, const MatchPr
   const std::vector<Eigen::Vector2d> points = ThinByCentreOfGravity(PositionsOf(curr), options.thinning);
   if (map.empty() || points.size() < static_cast<std::size_t>(options.evidence.min_inliers))
     return UnmatchedNdt(prior, MatchFailure::kTooFewFeatures);
-  const NewtonResult climb = ClimbNdt(map, points, prior.T_prev_curr, options.newton);
+  Pose2 T_start = prior.T_prev_curr;
+  int iterations = 0;
+  if (options.coarse.cell_m > 0.0) {
+    const NdtMap coarse(PositionsOf(prev), {.cell_m = options.coarse.cell_m,
+                                            .min_points = options.map.min_points,
+                                            .min_flatness = options.coarse.min_flatness});
+    const NewtonResult climb = ClimbNdt(coarse, points, T_start, options.newton);
+    T_start = climb.T_map_points;
+    iterations = climb.iterations;
+  }
+  const NewtonResult climb = ClimbNdt(map, points, T_start, options.newton);
   MatchResult result = JudgeNdtPose(map, points, climb.T_map_points, climb.settled, prior, options.evidence);
-  result.iterations = climb.iterations;
+  result.iterations = iterations + climb.iterations;
   return result;
 }
 

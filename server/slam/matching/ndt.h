@@ -21,7 +21,15 @@ struct NewtonOptions {
 };
 void Visit(OptionVisitor& visitor, NewtonOptions& options);
 
+// Beyond the thesis, which blurs by hand where matching fails (5.1.3): a climb on larger, rounder cells goes first.
+struct NdtCoarseOptions {
+  double cell_m = 2.0;  // 0: no coarse climb.
+  double min_flatness = 0.03;
+};
+void Visit(OptionVisitor& visitor, NdtCoarseOptions& options);
+
 struct NdtOptions {
+  NdtCoarseOptions coarse;
   NdtMapOptions map;
   ThinningOptions thinning;
   NewtonOptions newton;
