@@ -4,26 +4,44 @@
 
 #include "server/slam/filters/make_filter.h"
 #include "server/slam/front_end.h"
+#include "server/slam/grid/grid_redraw.h"
+#include "server/slam/matching/loop_search.h"
 #include "server/slam/matching/revisit_search.h"
+#include "server/slam/smoothing/keyframe_graph.h"
 
 namespace cairn::slam {
+
+namespace {
+
+// Keyframes drawn again with every scan after a large loop: a few milliseconds' worth.
+constexpr std::size_t kRedrawnPerScan = 20;
+
+}  // namespace
 
 struct Mapper::State {
   State(const MapperOptions& given, const Pose2& T_map_robot_start, std::uint64_t seed)
       : options(given),
         front_end(given.front_end, given.matcher, given.matching),
         revisits(given.revisit, given.front_end.refine),
+        loops(given.loop, given.front_end.refine),
+        graph(given.filter.fastslam.drift),
         filter(MakeFilter(given.filter.kind, given.filter, T_map_robot_start, seed)),
         grid(given.grid) {}
 
   void AddKeyframe(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot, ScanView view, const TrackStep& step,
                    const ParallelFor& parallel_for);
+  void CloseLargeLoop();
+  void Redraw();
 
   const MapperOptions options;
   FrontEnd front_end;
   RevisitSearch revisits;
+  LoopSearch loops;
+  KeyframeGraph graph;
+  std::vector<double> distances_m;  // Along the graph, from the last keyframe to each.
   std::unique_ptr<Filter> filter;
   OccupancyGrid grid;
+  std::optional<GridRedraw> redraw;  // Under way since a large loop was closed.
 
   std::vector<Keyframe> keyframes;
   std::vector<KeyframeShape> shapes;  // One per keyframe.
@@ -53,6 +71,8 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   State& s = *state_;
   ScanOutcome outcome;
   outcome.stamp = scan->stamp;
+
+  s.Redraw();
 
   // Where the front-end sees the robot, and how far that is from the last keyframe.
   ScanView view = Look(*scan, s.options.front_end);
@@ -84,16 +104,43 @@ void Mapper::State::AddKeyframe(std::shared_ptr<const Scan> scan, const Pose2& T
     const Pose2 motion = Between(shapes.back().T_track_robot, step.T_track_robot);
     travelled_m += motion.translation().norm();
     filter->Predict(motion, Eigen::Matrix3d::Zero());
-    if (const auto revisit = revisits.Find(view.points_robot, shapes, travelled_m, *filter, parallel_for))
-      filter->Observe(*revisit);
+    graph.Append(motion);
+    const auto revisit = revisits.Find(view.points_robot, shapes, distances_m, travelled_m, *filter, parallel_for);
+    if (revisit && filter->Observe(*revisit))
+      graph.AddLoop(revisit->keyframe, keyframes.size(), revisit->T_keyframe_robot, revisit->covariance);
+  } else {
+    graph.Append({});
   }
   filter->Observe(KeyframeSight{*scan, view, step.T_track_robot, travelled_m}, parallel_for);
   filter->Commit();
   front_end.AddKeyframe(view);
-  grid.Draw(*scan, filter->estimate().T_map_robot);
   keyframes.push_back({std::move(scan), T_odom_robot});
   shapes.push_back({step.T_track_robot, travelled_m, std::move(view.points_robot)});
+  distances_m = graph.DistancesFromLast();
+  CloseLargeLoop();
+  grid.Draw(*keyframes.back().scan, filter->estimate().T_map_robot);
   online_path.push_back(filter->estimate().T_map_robot);
+}
+
+// No particle may have gone the way a large loop turns out to have gone: then its error is spread over the whole path.
+void Mapper::State::CloseLargeLoop() {
+  const SharedSequence<Pose2> believed = filter->hypothesis(0).path;
+  const auto loop = loops.Find(keyframes, shapes, believed, distances_m);
+  if (!loop) return;
+  graph.AddLoop(loop->keyframe, keyframes.size() - 1, loop->T_keyframe_robot, loop->covariance);
+  distances_m = graph.DistancesFromLast();
+  std::vector<Pose2> path;
+  for (std::size_t k = 0; k < believed.size(); ++k) path.push_back(believed[k]);
+  if (graph.Optimise(path, options.pose_graph).usable && filter->Rebase(path)) redraw.emplace(options.grid);
+}
+
+void Mapper::State::Redraw() {
+  if (!redraw || !redraw->Advance(keyframes, filter->hypothesis(0).path, kRedrawnPerScan)) return;
+  const OccupancyGrid::Chunks old = grid.chunks();
+  grid = redraw->TakeGrid();
+  redraw.reset();
+  grid.MarkAllDirty();
+  for (const auto& [key, chunk] : old) grid.MarkDirty(key);
 }
 
 const OccupancyGrid& Mapper::grid() const {
@@ -118,6 +165,7 @@ MapperSnapshot Mapper::Snapshot() const {
 void Mapper::AdoptGrid(OccupancyGrid grid, std::size_t keyframes) {
   State& s = *state_;
   s.grid = std::move(grid);
+  s.redraw.reset();
   const SharedSequence<Pose2> path = s.filter->hypothesis(0).path;
   for (std::size_t k = keyframes; k < s.keyframes.size(); ++k) s.grid.Draw(*s.keyframes[k].scan, path[k]);
   s.grid.MarkAllDirty();

@@ -7,10 +7,12 @@
 #include "server/slam/filters/make_filter.h"
 #include "server/slam/front_end.h"
 #include "server/slam/grid/occupancy_grid.h"
+#include "server/slam/matching/loop_search.h"
 #include "server/slam/matching/revisit_search.h"
 #include "server/slam/matching/scan_matching.h"
 #include "server/slam/motion/motion_gate.h"
 #include "server/slam/scan/odometry_pairing.h"
+#include "server/slam/smoothing/pose_graph.h"
 
 namespace cairn::slam {
 
@@ -22,6 +24,8 @@ struct MapperOptions {
   FrontEndOptions front_end;
   MotionGateOptions gate;
   RevisitOptions revisit;
+  LoopOptions loop;
+  PoseGraphOptions pose_graph;
   FilterOptions filter;
   GridOptions grid;
   PairingOptions pairing;

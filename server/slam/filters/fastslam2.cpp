@@ -189,7 +189,8 @@ void FastSlam2::Observe(std::span<const LandmarkObservation> sightings) {
         ++landmark.sightings;
       } else {
         particle.landmarks.Append({Initial(particle.T_map_robot, sighting.p_robot, R_z),
-                                   Initial(particle.T_map_robot, sighting.extension_robot(), R_z), 1});
+                                   Initial(particle.T_map_robot, sighting.extension_robot(), R_z), 1,
+                                   static_cast<std::uint32_t>(particle.path.size())});
       }
     }
   }
@@ -204,6 +205,32 @@ void FastSlam2::Commit() {
   }
   for (Particle& particle : particles_) particle.path.Append(particle.T_map_robot);
   Summarise(Resample());
+}
+
+bool FastSlam2::Rebase(std::span<const Pose2> path) {
+  // What the particles disagreed about is decided: they go on from one path and one map, that of the best.
+  Particle moved = best();
+  for (std::size_t id = 0; id < moved.landmarks.size(); ++id) {
+    LandmarkEstimate& landmark = moved.landmarks.Mutable(id);
+    const Pose2 correction = path[landmark.first_keyframe] * moved.path[landmark.first_keyframe].Inverse();
+    const Eigen::Matrix2d R = correction.rotation();
+    for (LandmarkPosition* position : {&landmark.position, &landmark.extension}) {
+      position->mean = correction * position->mean;
+      position->covariance = R * position->covariance * R.transpose();
+    }
+  }
+  moved.path = {};
+  for (const Pose2& pose : path) moved.path.Append(pose);
+  moved.T_map_robot = path.back();
+  moved.covariance.setZero();
+  moved.log_weight = 0.0;
+  std::fill(particles_.begin(), particles_.end(), moved);
+  best_ = 0;
+  effective_ = static_cast<double>(particles_.size());
+  estimate_ = {moved.T_map_robot, moved.covariance};
+  travelled_ = 0.0;
+  sample_due_ = false;
+  return true;
 }
 
 void FastSlam2::Summarise(const std::vector<double>& weights) {

@@ -46,6 +46,7 @@ class FastSlam2 final : public Filter {
   void Observe(std::span<const LandmarkObservation> sightings);
   // Ends the step: samples where due, appends the pose to every path, resamples where too few particles count.
   void Commit() override;
+  bool Rebase(std::span<const Pose2> path) override;
 
   [[nodiscard]] const Particle& best() const { return particles_[best_]; }
   [[nodiscard]] const std::vector<Particle>& particles() const { return particles_; }
