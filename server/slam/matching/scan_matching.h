@@ -11,6 +11,7 @@
 
 #include "common/options/option_visitor.h"
 #include "server/slam/match_result.h"
+#include "server/slam/matching/hough.h"
 #include "server/slam/matching/icp.h"
 #include "server/slam/matching/line_lsq.h"
 #include "server/slam/matching/match_prior.h"
@@ -28,6 +29,7 @@ enum class MatcherKind : std::uint8_t { kVoting = 0, kLineLsq, kHough, kNdt, kNd
 struct MatcherOptions {
   VotingOptions voting;
   LineLsqOptions line_lsq;
+  HoughOptions hough;
   PointToLineOptions icp;
 };
 void Visit(OptionVisitor& visitor, MatcherOptions& options);
