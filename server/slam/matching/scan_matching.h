@@ -11,6 +11,7 @@
 
 #include "common/options/option_visitor.h"
 #include "server/slam/match_result.h"
+#include "server/slam/matching/hough.h"
 #include "server/slam/matching/icp.h"
 #include "server/slam/matching/line_lsq.h"
 #include "server/slam/matching/match_prior.h"
@@ -32,6 +33,7 @@ struct MatcherOptions {
   NdtOptions ndt;
   NdtDeOptions ndt_de;
   LineLsqOptions line_lsq;
+  HoughOptions hough;
   PointToLineOptions icp;
 };
 void Visit(OptionVisitor& visitor, MatcherOptions& options);
