@@ -21,6 +21,7 @@ using slam::ScanFeatures;
 struct CorridorPair {
   ScanFeatures prev, curr;
   Pose2 T_prev_curr;
+  Pose2 T_map_prev;
 };
 
 CorridorPair DrawPair(const Scene& scene, sim::Random& random) {
@@ -36,7 +37,7 @@ CorridorPair DrawPair(const Scene& scene, sim::Random& random) {
       return slam::ExtractFeatures(scene.Look(pose, laser, random), slam::FeatureOptions{});
     };
     const ScanFeatures prev = see(from);
-    return {prev, see(from * motion), motion};
+    return {prev, see(from * motion), motion, from};
   }
 }
 
@@ -89,15 +90,10 @@ void DrawFigures(StudyContext& context, const CorridorPair& pair) {
   const auto alone = LeastSquaresAlone(pair, options);
   const slam::LineLsqMatch match = slam::MatchLinesByLeastSquares(pair.prev, pair.curr, {}, options);
   const auto figure = [&](const std::string& title, const Pose2& T, const std::string& label) {
-    Plot plot{.title = title,
-              .x = {"x in p1", "m"},
-              .y = {"y in p1", "m"},
-              .equal_scale = true,
-              .width = 1100,
-              .height = 620};
-    plot.series = {LineSeries(pair.prev.lines, {}, "seen from p1", 2),
-                   LineSeries(pair.curr.lines, {}, "seen from p2, not moved", 4),
-                   LineSeries(pair.curr.lines, T, label, 0)};
+    Plot plot{.title = title, .x = {"x", "m"}, .y = {"y", "m"}, .equal_scale = true, .width = 1100, .height = 620};
+    plot.series = {LineSeries(pair.prev.lines, pair.T_map_prev, "seen from p1", 2),
+                   LineSeries(pair.curr.lines, pair.T_map_prev, "seen from p2, not moved", 4),
+                   LineSeries(pair.curr.lines, pair.T_map_prev * T, label, 0)};
     return plot;
   };
   if (alone)
@@ -110,8 +106,8 @@ void DrawFigures(StudyContext& context, const CorridorPair& pair) {
              curr = slam::PolylineLines(pair.curr.lines, options.polylines);
   Series links{.label = "associated", .mark = Mark::kLine, .colour = 6};
   for (const slam::LinePair& link : match.pairs) {
-    const Eigen::Vector2d a = prev[static_cast<std::size_t>(link.prev)].midpoint(),
-                          b = curr[static_cast<std::size_t>(link.curr)].midpoint();
+    const Eigen::Vector2d a = pair.T_map_prev * prev[static_cast<std::size_t>(link.prev)].midpoint();
+    const Eigen::Vector2d b = pair.T_map_prev * curr[static_cast<std::size_t>(link.curr)].midpoint();
     links.x.insert(links.x.end(), {a.x(), b.x(), NAN});
     links.y.insert(links.y.end(), {a.y(), b.y(), NAN});
   }
@@ -144,9 +140,11 @@ bool StudyAssociation(StudyContext& context) {
     struct Way {
       std::string name;
       slam::LineLsqOptions options;
+      bool guess = false;  // From odometry off by 5 cm and 2 deg, instead of the identity.
     };
     const std::vector<Way> ways{{"association as printed, 1 round", AsPrinted(1)},
                                 {"association as printed, 50 rounds", AsPrinted(50)},
+                                {"association as printed, 50 rounds, odometry as the guess", AsPrinted(50), true},
                                 {"association as shipped", slam::LineLsqOptions{}}};
     sim::Random random(context.seed);
     Errors alone;
@@ -158,9 +156,14 @@ bool StudyAssociation(StudyContext& context) {
       const CorridorPair pair = DrawPair(scene, random);
       const int right_before = alone.right;
       alone.Add(LeastSquaresAlone(pair, {}), pair.T_prev_curr);
+      slam::MatchPrior odometry{pair.T_prev_curr, 0.01 * Eigen::Matrix3d::Identity()};
+      odometry.T_prev_curr.x += sim::Normal(random, 0.05);
+      odometry.T_prev_curr.y += sim::Normal(random, 0.05);
+      odometry.T_prev_curr.theta = WrapAngle(odometry.T_prev_curr.theta + sim::Normal(random, Radians(2)));
       bool shipped_right = false;
       for (std::size_t w = 0; w < ways.size(); ++w) {
-        const slam::LineLsqMatch match = slam::MatchLinesByLeastSquares(pair.prev, pair.curr, {}, ways[w].options);
+        const slam::LineLsqMatch match = slam::MatchLinesByLeastSquares(
+            pair.prev, pair.curr, ways[w].guess ? odometry : slam::MatchPrior{}, ways[w].options);
         const int before = errors[w].right;
         errors[w].Add(match.result.converged ? std::optional(match.result.T_prev_curr) : std::nullopt,
                       pair.T_prev_curr);
@@ -200,6 +203,12 @@ bool StudyAssociation(StudyContext& context) {
   }
   report.Add(table, "association");
   report.Add(curve, "figure_5_18");
+  report.Text(
+      "Against the printed curve, ours needs a few rounds, not 50: least squares run to their end in every round. E "
+      "does not fall to "
+      "zero, because the visible parts of long walls differ from place to place; it may rise in the second round, when "
+      "more pairs join. "
+      "The printed gates (0.1 m) find too few pairs without a guess.");
   return plausible;
 }
 
