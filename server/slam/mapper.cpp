@@ -49,6 +49,8 @@ struct Mapper::State {
   std::vector<MapperSnapshot::ScanPlace> scans;
   double travelled_m = 0.0;  // Up to the last keyframe.
   double unmatched_m = 0.0;  // Travelled by odometry alone since the last match.
+  // Of what was travelled by odometry alone since the last keyframe, in that keyframe.
+  Eigen::Matrix3d blind_covariance = Eigen::Matrix3d::Zero();
 };
 
 namespace {
@@ -78,6 +80,7 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   ScanView view = Look(*scan, s.options.front_end);
   const TrackStep step = s.front_end.Track(view, T_odom_robot, parallel_for);
   s.unmatched_m = step.matched || s.keyframes.empty() ? 0.0 : s.unmatched_m + step.moved_m;
+  if (!step.matched) s.blind_covariance += s.options.blind.Covariance({step.moved_m, 0.0, 0.0});
   const bool first = s.keyframes.empty();
   Pose2 T_keyframe_robot = first ? Pose2{} : Between(s.shapes.back().T_track_robot, step.T_track_robot);
 
@@ -103,13 +106,14 @@ void Mapper::State::AddKeyframe(std::shared_ptr<const Scan> scan, const Pose2& T
   if (!keyframes.empty()) {
     const Pose2 motion = Between(shapes.back().T_track_robot, step.T_track_robot);
     travelled_m += motion.translation().norm();
-    filter->Predict(motion, Eigen::Matrix3d::Zero());
-    graph.Append(motion);
+    filter->Predict(motion, blind_covariance);
+    graph.Append(motion, blind_covariance);
+    blind_covariance.setZero();
     const auto revisit = revisits.Find(view.points_robot, shapes, distances_m, travelled_m, *filter, parallel_for);
     if (revisit && filter->Observe(*revisit))
       graph.AddLoop(revisit->keyframe, keyframes.size(), revisit->T_keyframe_robot, revisit->covariance);
   } else {
-    graph.Append({});
+    graph.Append({}, Eigen::Matrix3d::Zero());
   }
   filter->Observe(KeyframeSight{*scan, view, step.T_track_robot, travelled_m}, parallel_for);
   filter->Commit();

@@ -19,6 +19,7 @@ namespace cairn::slam {
 struct MapperOptions {
   std::int64_t seed = 1;      // Of every robot's random engine: the same robot alone or in a fleet maps alike.
   double lost_after_m = 2.0;  // Travelled by odometry alone before the robot counts as lost.
+  MotionNoise blind{0.002, 0.2, 0.0, 0.001, 0.05, 0.0};  // Of motion known by odometry alone, besides the drift.
   MatcherKind matcher = MatcherKind::kVoting;  // What compares a scan with the last keyframe.
   MatcherOptions matching;
   FrontEndOptions front_end;
