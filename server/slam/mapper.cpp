@@ -74,7 +74,8 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   outcome.covariance = s.filter->estimate().covariance;
   outcome.score = first ? 1.0 : step.match.score;
   outcome.reason = first ? PoseReason::kTracking : ReasonOf(step, s.unmatched_m, s.options.lost_after_m);
-  outcome.localized = outcome.reason != PoseReason::kLost;
+  if (s.filter->health().diverged) outcome.reason = PoseReason::kDiverged;
+  outcome.localized = outcome.reason != PoseReason::kLost && outcome.reason != PoseReason::kDiverged;
   return outcome;
 }
 
