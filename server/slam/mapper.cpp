@@ -24,7 +24,7 @@ struct Mapper::State {
         front_end(given.front_end, given.matcher, given.matching),
         revisits(given.revisit, given.front_end.refine),
         loops(given.loop, given.front_end.refine),
-        graph(given.filter.fastslam.drift),
+        graph(given.filter.back_end.drift),
         filter(MakeFilter(given.filter.kind, given.filter, T_map_robot_start, seed)),
         grid(given.grid) {}
 
@@ -97,7 +97,8 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   outcome.covariance = s.filter->estimate().covariance;
   outcome.score = first ? 1.0 : step.match.score;
   outcome.reason = first ? PoseReason::kTracking : ReasonOf(step, s.unmatched_m, s.options.lost_after_m);
-  outcome.localized = outcome.reason != PoseReason::kLost;
+  if (s.filter->health().diverged) outcome.reason = PoseReason::kDiverged;
+  outcome.localized = outcome.reason != PoseReason::kLost && outcome.reason != PoseReason::kDiverged;
   return outcome;
 }
 

@@ -107,7 +107,7 @@ TEST(Mapper, ClosesALargeLoopAndDrawsTheMapAgain) {
     MapperOptions options;
     options.filter.particles = 50;
     options.loop.enabled = loops;
-    options.filter.landmarks.enabled = false;  // They alone would nearly do here.
+    options.filter.back_end.landmarks.enabled = false;  // They alone would nearly do here.
     Mapper mapper(options, {}, 1);
     ScanOutcome outcome;
     for (std::size_t i = 0; i < drive.scans.size(); ++i)
