@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "server/slam/filters/fastslam2.h"
+#include "server/slam/filters/make_filter.h"
 #include "server/slam/front_end.h"
 #include "server/slam/matching/revisit_search.h"
 
@@ -11,10 +11,9 @@ namespace cairn::slam {
 struct Mapper::State {
   State(const MapperOptions& given, const Pose2& T_map_robot_start, std::uint64_t seed)
       : options(given),
-        front_end(given.front_end),
+        front_end(given.front_end, given.matcher, given.matching),
         revisits(given.revisit, given.front_end.refine),
-        tracker(given.landmarks, given.filter.landmark),
-        filter(given.filter, T_map_robot_start, seed),
+        filter(MakeFilter(given.filter.kind, given.filter, T_map_robot_start, seed)),
         grid(given.grid) {}
 
   void AddKeyframe(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot, ScanView view, const TrackStep& step,
@@ -23,8 +22,7 @@ struct Mapper::State {
   const MapperOptions options;
   FrontEnd front_end;
   RevisitSearch revisits;
-  LandmarkTracker tracker;
-  FastSlam2 filter;
+  std::unique_ptr<Filter> filter;
   OccupancyGrid grid;
 
   std::vector<Keyframe> keyframes;
@@ -58,7 +56,7 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
 
   // Where the front-end sees the robot, and how far that is from the last keyframe.
   ScanView view = Look(*scan, s.options.front_end);
-  const TrackStep step = s.front_end.Track(view, T_odom_robot);
+  const TrackStep step = s.front_end.Track(view, T_odom_robot, parallel_for);
   s.unmatched_m = step.matched || s.keyframes.empty() ? 0.0 : s.unmatched_m + step.moved_m;
   const bool first = s.keyframes.empty();
   Pose2 T_keyframe_robot = first ? Pose2{} : Between(s.shapes.back().T_track_robot, step.T_track_robot);
@@ -71,9 +69,9 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   }
   s.scans.push_back({outcome.stamp, s.keyframes.size() - 1, T_keyframe_robot});
 
-  outcome.T_map_robot = s.filter.estimate().T_map_robot * T_keyframe_robot;
+  outcome.T_map_robot = s.filter->estimate().T_map_robot * T_keyframe_robot;
   outcome.T_map_odom = outcome.T_map_robot * T_odom_robot.Inverse();
-  outcome.covariance = s.filter.estimate().covariance;
+  outcome.covariance = s.filter->estimate().covariance;
   outcome.score = first ? 1.0 : step.match.score;
   outcome.reason = first ? PoseReason::kTracking : ReasonOf(step, s.unmatched_m, s.options.lost_after_m);
   outcome.localized = outcome.reason != PoseReason::kLost;
@@ -85,17 +83,17 @@ void Mapper::State::AddKeyframe(std::shared_ptr<const Scan> scan, const Pose2& T
   if (!keyframes.empty()) {
     const Pose2 motion = Between(shapes.back().T_track_robot, step.T_track_robot);
     travelled_m += motion.translation().norm();
-    filter.Predict(motion, Eigen::Matrix3d::Zero());
-    if (const auto revisit = revisits.Find(view.points_robot, shapes, travelled_m, filter, parallel_for))
-      filter.Observe(*revisit);
+    filter->Predict(motion, Eigen::Matrix3d::Zero());
+    if (const auto revisit = revisits.Find(view.points_robot, shapes, travelled_m, *filter, parallel_for))
+      filter->Observe(*revisit);
   }
-  filter.Observe(tracker.Observe(view.features, step.T_track_robot, travelled_m, filter.best()));
-  filter.Commit();
+  filter->Observe(KeyframeSight{*scan, view, step.T_track_robot, travelled_m}, parallel_for);
+  filter->Commit();
   front_end.AddKeyframe(view);
-  grid.Draw(*scan, filter.estimate().T_map_robot);
+  grid.Draw(*scan, filter->estimate().T_map_robot);
   keyframes.push_back({std::move(scan), T_odom_robot});
   shapes.push_back({step.T_track_robot, travelled_m, std::move(view.points_robot)});
-  online_path.push_back(filter.estimate().T_map_robot);
+  online_path.push_back(filter->estimate().T_map_robot);
 }
 
 const OccupancyGrid& Mapper::grid() const {
@@ -107,21 +105,12 @@ std::vector<ChunkKey> Mapper::TakeDirtyChunks() {
 }
 
 std::vector<Landmark> Mapper::landmarks() const {
-  const Particle& best = state_->filter.best();
-  const std::vector<LandmarkSignature>& signatures = state_->tracker.signatures();
-  std::vector<Landmark> landmarks;
-  for (std::size_t id = 0; id < best.landmarks.size(); ++id) {
-    const LandmarkEstimate& estimate = best.landmarks[id];
-    const Eigen::Vector2d along = estimate.extension.mean - estimate.position.mean;
-    landmarks.push_back({id, signatures[id].corner, estimate.position.mean, std::atan2(along.y(), along.x()),
-                         estimate.position.covariance, estimate.sightings});
-  }
-  return landmarks;
+  return state_->filter->landmarks();
 }
 
 MapperSnapshot Mapper::Snapshot() const {
   MapperSnapshot snapshot{state_->keyframes, state_->online_path, {}, state_->scans};
-  const SharedSequence<Pose2>& path = state_->filter.best().path;
+  const SharedSequence<Pose2> path = state_->filter->hypothesis(0).path;
   for (std::size_t k = 0; k < path.size(); ++k) snapshot.full_path.push_back(path[k]);
   return snapshot;
 }
@@ -129,8 +118,8 @@ MapperSnapshot Mapper::Snapshot() const {
 void Mapper::AdoptGrid(OccupancyGrid grid, std::size_t keyframes) {
   State& s = *state_;
   s.grid = std::move(grid);
-  for (std::size_t k = keyframes; k < s.keyframes.size(); ++k)
-    s.grid.Draw(*s.keyframes[k].scan, s.filter.best().path[k]);
+  const SharedSequence<Pose2> path = s.filter->hypothesis(0).path;
+  for (std::size_t k = keyframes; k < s.keyframes.size(); ++k) s.grid.Draw(*s.keyframes[k].scan, path[k]);
   s.grid.MarkAllDirty();
 }
 

@@ -4,11 +4,11 @@
 #include <cstdint>
 
 #include "common/options/option_visitor.h"
-#include "server/slam/filters/fastslam2.h"
-#include "server/slam/filters/landmark_tracker.h"
+#include "server/slam/filters/make_filter.h"
 #include "server/slam/front_end.h"
 #include "server/slam/grid/occupancy_grid.h"
 #include "server/slam/matching/revisit_search.h"
+#include "server/slam/matching/scan_matching.h"
 #include "server/slam/motion/motion_gate.h"
 #include "server/slam/scan/odometry_pairing.h"
 
@@ -17,10 +17,11 @@ namespace cairn::slam {
 struct MapperOptions {
   std::int64_t seed = 1;      // Of every robot's random engine: the same robot alone or in a fleet maps alike.
   double lost_after_m = 2.0;  // Travelled by odometry alone before the robot counts as lost.
+  MatcherKind matcher = MatcherKind::kVoting;  // What compares a scan with the last keyframe.
+  MatcherOptions matching;
   FrontEndOptions front_end;
   MotionGateOptions gate;
   RevisitOptions revisit;
-  LandmarkOptions landmarks;
   FilterOptions filter;
   GridOptions grid;
   PairingOptions pairing;

@@ -75,7 +75,7 @@ LandmarkPosition Initial(const Pose2& T_map_robot, const Eigen::Vector2d& p_robo
 
 }  // namespace
 
-void Visit(OptionVisitor& visitor, FilterOptions& options) {
+void Visit(OptionVisitor& visitor, FastSlamOptions& options) {
   visitor.Section("drift", "Noise of the matched motion: how far the front-end drifts.",
                   [&] { Visit(visitor, options.drift); });
   visitor.Real("sample_distance_m", options.sample_distance_m, "m", 0.0, 1000.0,
@@ -91,8 +91,12 @@ void Visit(OptionVisitor& visitor, FilterOptions& options) {
                "Noise of a landmark's bearing.");
 }
 
-FastSlam2::FastSlam2(const FilterOptions& options, const Pose2& T_map_robot_start, std::uint64_t seed)
-    : options_(options), rng_(seed), particles_(static_cast<std::size_t>(options.particles)) {
+FastSlam2::FastSlam2(const FastSlamOptions& options, const LandmarkOptions& landmarks, std::int64_t particles,
+                     const Pose2& T_map_robot_start, std::uint64_t seed)
+    : options_(options),
+      tracker_(landmarks, options.landmark),
+      rng_(seed),
+      particles_(static_cast<std::size_t>(particles)) {
   for (Particle& particle : particles_) particle.T_map_robot = T_map_robot_start;
   effective_ = static_cast<double>(particles_.size());
 }
@@ -128,6 +132,27 @@ bool FastSlam2::Observe(const RevisitObservation& revisit) {
   }
   sample_due_ = true;
   return true;
+}
+
+void FastSlam2::Observe(const KeyframeSight& sight, const ParallelFor& /*parallel_for*/) {
+  Observe(tracker_.Observe(sight.view.features, sight.T_track_robot, sight.travelled_m, best()));
+}
+
+Hypothesis FastSlam2::hypothesis(std::size_t index) const {
+  const Particle& particle = index == 0 ? best() : particles_[index - 1];
+  return {particle.T_map_robot, particle.path};
+}
+
+std::vector<Landmark> FastSlam2::landmarks() const {
+  const std::vector<LandmarkSignature>& signatures = tracker_.signatures();
+  std::vector<Landmark> landmarks;
+  for (std::size_t id = 0; id < best().landmarks.size(); ++id) {
+    const LandmarkEstimate& estimate = best().landmarks[id];
+    const Eigen::Vector2d along = estimate.extension.mean - estimate.position.mean;
+    landmarks.push_back({id, signatures[id].corner, estimate.position.mean, std::atan2(along.y(), along.x()),
+                         estimate.position.covariance, estimate.sightings});
+  }
+  return landmarks;
 }
 
 void FastSlam2::Observe(std::span<const LandmarkObservation> sightings) {

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "server/slam/filters/fastslam2.h"
+#include "server/slam/filters/filter.h"
 #include "server/slam/matching/point_to_line.h"
 #include "server/slam/parallel_for.h"
 
@@ -43,10 +43,10 @@ class RevisitSearch {
 
   [[nodiscard]] std::optional<RevisitObservation> Find(std::span<const SurfacePoint> points_robot,
                                                        const std::vector<KeyframeShape>& keyframes, double travelled_m,
-                                                       const FastSlam2& filter, const ParallelFor& parallel_for);
+                                                       const Filter& filter, const ParallelFor& parallel_for);
 
  private:
-  MatchResult AlignFromOthers(const FastSlam2& filter, const std::function<MatchResult(const Particle&)>& align,
+  MatchResult AlignFromOthers(const Filter& filter, const std::function<MatchResult(const Hypothesis&)>& align,
                               const ParallelFor& parallel_for) const;
   void BuildReference(const std::vector<KeyframeShape>& keyframes, std::size_t centre);
 
