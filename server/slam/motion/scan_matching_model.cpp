@@ -9,6 +9,10 @@ namespace {
 
 constexpr int kMaxRounds = 200;
 constexpr double kLeastSigma = 1e-5;
+// A failed match may say anything within 1 m, 1 m and 0.5 rad.
+constexpr double kFailureDensity = 1.0 / (2.0 * 2.0 * 1.0);
+constexpr double kFirstFailureShare = 0.05;
+constexpr double kLeastFailureShare = 1e-6;
 
 double NormalDensity(double x, double sigma) {
   return std::exp(-0.5 * x * x / (sigma * sigma)) / (sigma * std::sqrt(2 * kPi));
@@ -17,6 +21,14 @@ double NormalDensity(double x, double sigma) {
 MatchSpread FitSpread(std::span<const SpreadSample> samples, const MatchSpread& start) {
   const Eigen::Vector2d s = FitSigma(samples, {start.base, start.share}, kLeastSigma);
   return {s.x(), s.y()};
+}
+
+double Change(const ScanMatchingModel& a, const ScanMatchingModel& b) {
+  const auto of = [](const MatchSpread& s, const MatchSpread& t) {
+    return std::abs(s.base - t.base) + std::abs(s.share - t.share);
+  };
+  return of(a.along, b.along) + of(a.across, b.across) + of(a.turn, b.turn) +
+         std::abs(a.shortfall_share - b.shortfall_share);
 }
 
 bool MayFallShort(const ScanMatchingModel& model, const Pose2& reported, double lambda_m) {
@@ -56,8 +68,9 @@ Pose2 SampleMotion(const ScanMatchingModel& model, const Pose2& T_prev_curr, dou
 }
 
 ScanMatchingFit FitScanMatching(std::span<const MatchSample> samples, const ScanMatchingModel& start) {
-  ScanMatchingFit fit{start, static_cast<int>(samples.size()), 0};
+  ScanMatchingFit fit{start, static_cast<int>(samples.size())};
   if (samples.empty()) return fit;
+  fit.failure_share = kFirstFailureShare;
   ScanMatchingModel& model = fit.model;
   std::vector<SpreadSample> along, across, turn;
   for (const MatchSample& s : samples) {
@@ -67,31 +80,33 @@ ScanMatchingFit FitScanMatching(std::span<const MatchSample> samples, const Scan
     across.push_back({1.0, std::abs(s.reported.y), dy * dy, 1.0});
     turn.push_back({1.0, std::abs(s.reported.theta), dtheta * dtheta, 1.0});
   }
-  model.across = FitSpread(across, start.across);
-  model.turn = FitSpread(turn, start.turn);
   for (; fit.iterations < kMaxRounds; ++fit.iterations) {
-    double missed = 0.0;
-    int possible = 0;
+    double missed = 0.0, failed = 0.0, possible = 0.0;
     for (std::size_t i = 0; i < samples.size(); ++i) {
       const MatchSample& s = samples[i];
-      along[i].weight = 1.0;
-      if (!MayFallShort(model, s.reported, s.lambda_m)) continue;
-      ++possible;
       const double error = s.truth.x - s.reported.x;
-      const double whole = (1 - model.shortfall_share) * NormalDensity(error, model.along.Sigma(s.reported.x));
-      const double lack = model.shortfall_share * NormalDensity(error - s.lambda_m, s.lambda_m / 2);
-      const double share = whole + lack > 0.0 ? lack / (whole + lack) : 1.0;  // Beyond both: the wider one.
-      along[i].weight = 1.0 - share;
-      missed += share;
+      const double rest = NormalDensity(std::sqrt(across[i].square), model.across.Sigma(s.reported.y)) *
+                          NormalDensity(std::sqrt(turn[i].square), model.turn.Sigma(s.reported.theta));
+      const bool may = MayFallShort(model, s.reported, s.lambda_m);
+      const double share = may ? model.shortfall_share : 0.0;
+      const double good = (1 - fit.failure_share) * rest;
+      const double whole = good * (1 - share) * NormalDensity(error, model.along.Sigma(s.reported.x));
+      const double lack = may ? good * share * NormalDensity(error - s.lambda_m, s.lambda_m / 2) : 0.0;
+      const double sum = whole + lack + fit.failure_share * kFailureDensity;
+      along[i].weight = whole / sum;
+      across[i].weight = turn[i].weight = (whole + lack) / sum;
+      missed += lack / sum;
+      possible += may ? (whole + lack) / sum : 0.0;
+      failed += 1 - (whole + lack) / sum;
     }
-    const MatchSpread before = model.along;
-    const double share_before = model.shortfall_share;
-    model.along = FitSpread(along, before);
-    if (possible > 0) model.shortfall_share = std::clamp(missed / possible, 0.0, 1.0);
-    if (std::abs(model.along.base - before.base) + std::abs(model.along.share - before.share) +
-            std::abs(model.shortfall_share - share_before) <
-        1e-8)
-      break;
+    const ScanMatchingModel before = model;
+    const double failures_before = fit.failure_share;
+    model.along = FitSpread(along, before.along);
+    model.across = FitSpread(across, before.across);
+    model.turn = FitSpread(turn, before.turn);
+    if (possible > 0.0) model.shortfall_share = std::clamp(missed / possible, 0.0, 1.0);
+    fit.failure_share = std::clamp(failed / static_cast<double>(samples.size()), kLeastFailureShare, 1.0);
+    if (Change(model, before) + std::abs(fit.failure_share - failures_before) < 1e-7) break;
   }
   return fit;
 }

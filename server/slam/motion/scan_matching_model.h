@@ -48,10 +48,12 @@ struct ScanMatchingFit {
   ScanMatchingModel model;
   int samples = 0;
   int iterations = 0;
+  double failure_share = 0.0;  // Of the steps: matches that are plainly wrong.
 };
 
-// The most likely model: spreads by Fisher scoring, the shortfalls by expectation maximisation over which of the two
-// densities each step came from. The turn limit is the start's. Without samples the start is returned.
+// The most likely model: spreads by Fisher scoring, within an expectation maximisation over what each step is: a match,
+// a shortfall, or (beyond the source) a failure, which may lie anywhere and must not widen the spreads. The turn limit
+// is the start's. Without samples the start is returned.
 [[nodiscard]] ScanMatchingFit FitScanMatching(std::span<const MatchSample> samples, const ScanMatchingModel& start);
 
 }  // namespace cairn::slam

@@ -69,6 +69,23 @@ TEST(ScanMatchingFit, RecoversInjectedSigmas) {
   EXPECT_NEAR(fit.model.shortfall_share, 0.08, 0.02);
 }
 
+// One match in ten is plainly wrong: the spreads of the others stay what they are.
+TEST(ScanMatchingFit, FailuresAreToldApart) {
+  const ScanMatchingModel truth;
+  std::vector<MatchSample> samples = Draw(truth, 4000, 9);
+  std::mt19937_64 engine(10);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  for (std::size_t i = 0; i < samples.size(); i += 10) {
+    samples[i].truth.x += uniform(engine);
+    samples[i].truth.y += uniform(engine);
+    samples[i].truth.theta += 0.5 * uniform(engine);
+  }
+  const ScanMatchingFit fit = FitScanMatching(samples, {});
+  EXPECT_NEAR(fit.failure_share, 0.1, 0.025);
+  EXPECT_NEAR(fit.model.across.base, truth.across.base, 0.003);
+  EXPECT_NEAR(fit.model.turn.base, truth.turn.base, 0.002);
+}
+
 TEST(ScanMatchingFit, NoShortfallsAreFoundWhereThereAreNone) {
   ScanMatchingModel truth;
   truth.shortfall_share = 0.0;
