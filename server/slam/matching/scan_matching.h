@@ -11,6 +11,7 @@
 
 #include "common/options/option_visitor.h"
 #include "server/slam/match_result.h"
+#include "server/slam/matching/correlative.h"
 #include "server/slam/matching/hough.h"
 #include "server/slam/matching/icp.h"
 #include "server/slam/matching/line_lsq.h"
@@ -35,6 +36,7 @@ struct MatcherOptions {
   LineLsqOptions line_lsq;
   HoughOptions hough;
   PointToLineOptions icp;
+  CorrelativeOptions correlative;
 };
 void Visit(OptionVisitor& visitor, MatcherOptions& options);
 
