@@ -14,7 +14,7 @@ FastSlam<LandmarkModel>::FastSlam(Proposal proposal, const FastSlamOptions& opti
       gate_(ChiSquareQuantile(back_end.landmarks.match_share, LandmarkModel::kGateNumbers)),
       new_nis_(ChiSquareQuantile(back_end.landmarks.match_share, LandmarkModel::kNumbers)),
       candidates_(back_end.landmarks),
-      set_(options, particles, T_map_robot_start, seed),
+      set_(options, back_end.max_nis, particles, T_map_robot_start, seed),
       maps_(static_cast<std::size_t>(particles)),
       contradictions_(back_end.diverged_after) {}
 

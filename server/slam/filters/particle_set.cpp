@@ -9,9 +9,9 @@
 #include "server/slam/motion/dead_reckoning.h"
 
 namespace cairn::slam {
-ParticleSet::ParticleSet(const FastSlamOptions& options, std::int64_t count, const Pose2& T_map_robot_start,
-                         std::uint64_t seed)
-    : options_(options), rng_(seed), particles_(static_cast<std::size_t>(count)) {
+ParticleSet::ParticleSet(const FastSlamOptions& options, double max_nis, std::int64_t count,
+                         const Pose2& T_map_robot_start, std::uint64_t seed)
+    : options_(options), max_nis_(max_nis), rng_(seed), particles_(static_cast<std::size_t>(count)) {
   for (Particle& particle : particles_) particle.T_map_robot = T_map_robot_start;
   effective_ = static_cast<double>(particles_.size());
   estimate_.T_map_robot = T_map_robot_start;
@@ -36,7 +36,7 @@ bool ParticleSet::Observe(const RevisitObservation& revisit) {
     innovations.push_back(InnovateRevisit(particle.path[revisit.keyframe], particle.T_map_robot, revisit));
     nearest = std::min(nearest, Nis<3>(innovations.back().v, innovations.back().S(particle.covariance)));
   }
-  if (!(nearest < options_.max_nis)) return false;
+  if (!(nearest < max_nis_)) return false;
   for (std::size_t i = 0; i < particles_.size(); ++i) Fuse<3>(i, innovations[i]);
   sample_due_ = true;
   return true;
@@ -52,16 +52,8 @@ std::vector<int> ParticleSet::Commit() {
   std::vector<double> weights;
   std::vector<int> parents = Resample(weights);
   Summarise(weights);
-  if (!step_open_) nis_ = 0.0, nis_numbers_ = 0;
-  step_open_ = false;
+  nis_.EndStep();
   return parents;
-}
-
-void ParticleSet::AddNis(double nis, int numbers) {
-  if (!step_open_) nis_ = 0.0, nis_numbers_ = 0;
-  step_open_ = true;
-  nis_ += nis;
-  nis_numbers_ += numbers;
 }
 
 void ParticleSet::Summarise(const std::vector<double>& weights) {
@@ -121,7 +113,7 @@ std::vector<int> ParticleSet::Resample(std::vector<double>& weights) {
 
 FilterHealth ParticleSet::health() const {
   const bool finite = estimate_.T_map_robot.IsFinite() && estimate_.covariance.allFinite();
-  return {effective_, nis_, nis_numbers_, !finite};
+  return {effective_, nis_.sum(), nis_.numbers(), !finite};
 }
 
 }  // namespace cairn::slam
