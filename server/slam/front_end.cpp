@@ -1,6 +1,9 @@
 #include "server/slam/front_end.h"
 
+#include <Eigen/Cholesky>
+#include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace cairn::slam {
 namespace {
@@ -15,32 +18,53 @@ constexpr std::array<double, 4> kTurns = {0.25, 0.5, 0.75, 1.0};
 
 }  // namespace
 
+void Visit(OptionVisitor& visitor, NoOdometryOptions& options) {
+  visitor.Flag("constant_velocity", options.constant_velocity,
+               "The robot is expected to go on as between the last two scans; false: to stand still.");
+  visitor.Real("sigma_m", options.sigma_m, "m", 0.001, 100.0, "Of the expectation; larger: the scan decides more.");
+  visitor.Real("sigma_rad", options.sigma_rad, "rad", 0.001, kPi, "See sigma_m.");
+}
+
 void Visit(OptionVisitor& visitor, FrontEndOptions& options) {
   visitor.Section("features", "Lines and corners taken from a scan.", [&] { Visit(visitor, options.features); });
-  visitor.Section("voting", "Seven criteria vote for pairs of lines.", [&] { Visit(visitor, options.voting); });
   visitor.Section("surface", "Points and surface directions taken from a scan.",
                   [&] { Visit(visitor, options.surface); });
-  visitor.Section("refine", "Point-to-line alignment with the reference.", [&] { Visit(visitor, options.refine); });
+  visitor.Section("refine", "Point-to-line alignment with the reference.", [&] {
+    visitor.Flag("enabled", options.refine_enabled, "False: the matcher's own answer is the pose.");
+    Visit(visitor, options.refine);
+  });
   visitor.Section("odometry", "How far odometry is trusted between scans.", [&] { Visit(visitor, options.odometry); });
+  visitor.Flag("use_odometry", options.use_odometry, "False: scans alone tell the motion.");
+  visitor.Section("no_odometry", "What stands in for odometry where it is not used.",
+                  [&] { Visit(visitor, options.no_odometry); });
   visitor.Integer("reference_keyframes", options.reference_keyframes, "1", 1, 1000,
                   "Keyframes matched against; more: steadier, until drift blurs them.");
   visitor.Real("retry_below", options.retry_below, "1", 0.0, 1.0,
                "Score under which other guesses than odometry are tried.");
+  visitor.Real("max_jump_sigma", options.max_jump_sigma, "1", 0.5, 1000.0,
+               "Without refinement: matches farther from odometry than this are faults.");
 }
 
-FrontEnd::FrontEnd(const FrontEndOptions& options) : options_(options), index_(options.refine.first_pair_distance_m) {}
+FrontEnd::FrontEnd(const FrontEndOptions& options, MatcherKind matcher, const MatcherOptions& matching)
+    : options_(options), matcher_(matcher), matching_(matching), index_(options.refine.first_pair_distance_m) {}
 
 ScanView Look(const Scan& scan, const FrontEndOptions& options) {
   const std::vector<BeamPoint> points = PointsOf(scan);
   return {ExtractFeatures(points, scan, options.features), SurfacePointsOf(points, scan, options.surface)};
 }
 
-TrackStep FrontEnd::Track(const ScanView& view, const Pose2& T_odom_robot) {
+TrackStep FrontEnd::Track(const ScanView& view, const Pose2& T_odom_robot, const ParallelFor& parallel_for) {
   TrackStep step;
   if (started_) {
-    step.match = Align(view, T_odom_robot, step.voting);
+    Guess guess = Predict(T_odom_robot);
+    const MatchResult coarse = MatchLastKeyframe(view, guess, parallel_for);
+    // A forecast is no observation: where the refinement sees nothing, the matcher's answer stays.
+    if (!options_.use_odometry && options_.refine_enabled && coarse.converged) guess.T_track_robot = coarse.T_prev_curr;
+    step.match = options_.refine_enabled ? Refine(view, T_odom_robot, guess, coarse) : Trust(coarse, guess);
+    step.matcher = coarse.failure;
     step.matched = step.match.converged;
     step.moved_m = Between(T_track_robot_, step.match.T_prev_curr).translation().norm();
+    if (!step.matched && !options_.use_odometry) step.moved_m = std::max(step.moved_m, options_.no_odometry.sigma_m);
     T_track_robot_ = step.match.T_prev_curr;
   }
   started_ = true;
@@ -50,24 +74,64 @@ TrackStep FrontEnd::Track(const ScanView& view, const Pose2& T_odom_robot) {
   return step;
 }
 
-MatchResult FrontEnd::Align(const ScanView& view, const Pose2& T_odom_robot, MatchFailure& voting) const {
+FrontEnd::Guess FrontEnd::Predict(const Pose2& T_odom_robot) const {
   const Sight& last = history_.back();
-  const Pose2 motion = Between(last.T_odom_robot, T_odom_robot);
-  const Pose2 guess = last.T_track_robot * motion;
-  const Eigen::Matrix3d J = J_compose_right(last.T_track_robot, motion);
-  const Eigen::Matrix3d prior = J * options_.odometry.Covariance(motion) * J.transpose();
+  if (options_.use_odometry) {
+    const Pose2 motion = Between(last.T_odom_robot, T_odom_robot);
+    const Eigen::Matrix3d J = J_compose_right(last.T_track_robot, motion);
+    return {last.T_track_robot * motion, J * options_.odometry.Covariance(motion) * J.transpose()};
+  }
+  const NoOdometryOptions& expected = options_.no_odometry;
+  Pose2 motion;
+  if (expected.constant_velocity && history_.size() > 1)
+    motion = Between(history_[history_.size() - 2].T_track_robot, last.T_track_robot);
+  const Eigen::Vector3d sigma(expected.sigma_m, expected.sigma_m, expected.sigma_rad);
+  return {last.T_track_robot * motion, sigma.cwiseAbs2().asDiagonal()};
+}
+
+// In track: the matcher itself works in the keyframe's frame.
+MatchResult FrontEnd::MatchLastKeyframe(const ScanView& view, const Guess& guess,
+                                        const ParallelFor& parallel_for) const {
+  const Pose2& T_track_keyframe = keyframe_.T_track_robot;
+  Eigen::Matrix3d R_track_keyframe = Eigen::Matrix3d::Identity();
+  R_track_keyframe.topLeftCorner<2, 2>() = T_track_keyframe.rotation();
+  const MatchPrior prior{Between(T_track_keyframe, guess.T_track_robot),
+                         R_track_keyframe.transpose() * guess.covariance * R_track_keyframe};
+  MatchResult match = MatchScans(keyframe_view_, view, prior, matcher_, matching_, parallel_for);
+  match.T_prev_curr = T_track_keyframe * match.T_prev_curr;
+  match.covariance = R_track_keyframe * match.covariance * R_track_keyframe.transpose();
+  match.degenerate_direction = T_track_keyframe.rotation() * match.degenerate_direction;
+  return match;
+}
+
+MatchResult FrontEnd::Trust(const MatchResult& coarse, const Guess& guess) const {
+  MatchResult match = coarse;
+  if (match.converged) {
+    Eigen::Vector3d jump = match.T_prev_curr.vector() - guess.T_track_robot.vector();
+    jump.z() = WrapAngle(jump.z());
+    const double sigmas = std::sqrt(std::max(0.0, jump.dot(guess.covariance.ldlt().solve(jump))));
+    if (sigmas <= options_.max_jump_sigma) return match;
+    match.failure = MatchFailure::kFault;
+  }
+  match.converged = false;
+  match.degenerate = false;
+  match.T_prev_curr = guess.T_track_robot;
+  match.covariance = guess.covariance;
+  return match;
+}
+
+MatchResult FrontEnd::Refine(const ScanView& view, const Pose2& T_odom_robot, const Guess& guess,
+                             const MatchResult& coarse) const {
   const auto align = [&](const Pose2& start) {
-    return AlignPointsToSurfaces(view.points_robot, index_, {start, guess, prior}, options_.refine);
+    return AlignPointsToSurfaces(view.points_robot, index_, {start, guess.T_track_robot, guess.covariance},
+                                 options_.refine);
   };
 
-  // The lines say where to start; without them, odometry does.
-  const MatchResult lines =
-      MatchByVoting(keyframe_features_, view.features, Between(keyframe_.T_track_robot, guess), options_.voting);
-  voting = lines.failure;
-  MatchResult best = align(lines.converged ? keyframe_.T_track_robot * lines.T_prev_curr : guess);
+  // The matcher says where to start; without it, odometry does.
+  MatchResult best = align(coarse.converged ? coarse.T_prev_curr : guess.T_track_robot);
   if (best.converged && best.score >= options_.retry_below) return best;
-  if (lines.converged) {
-    const MatchResult match = align(guess);
+  if (coarse.converged) {
+    const MatchResult match = align(guess.T_track_robot);
     if (match.converged && (!best.converged || match.score > best.score)) best = match;
     if (best.converged && best.score >= options_.retry_below) return best;
   }
@@ -78,23 +142,23 @@ MatchResult FrontEnd::Align(const ScanView& view, const Pose2& T_odom_robot, Mat
     const MatchResult match = AlignPointsToSurfaces(view.points_robot, index_, {other, other, wide}, options_.refine);
     if (match.converged && (!best.converged || match.score > best.score + 0.05)) best = match;
   };
-  consider(last.T_track_robot);
+  consider(history_.back().T_track_robot);
   for (const std::size_t back : kLookBack) {
-    if (history_.size() < back) continue;
+    if (!options_.use_odometry || history_.size() < back) continue;
     const Sight& sight = history_[history_.size() - back];
     consider(sight.T_track_robot * Between(sight.T_odom_robot, T_odom_robot));
   }
   for (const double turn : kTurns) {
     if (best.converged && best.score >= options_.retry_below) break;
-    consider(guess * Pose2{0, 0, turn});
-    consider(guess * Pose2{0, 0, -turn});
+    consider(guess.T_track_robot * Pose2{0, 0, turn});
+    consider(guess.T_track_robot * Pose2{0, 0, -turn});
   }
   return best;
 }
 
 void FrontEnd::AddKeyframe(const ScanView& view) {
   keyframe_ = history_.back();
-  keyframe_features_ = view.features;
+  keyframe_view_ = view;
   const Eigen::Matrix2d R = T_track_robot_.rotation();
   std::vector<SurfacePoint> points_track;
   points_track.reserve(view.points_robot.size());

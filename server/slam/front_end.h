@@ -1,7 +1,9 @@
-// Follows the robot from scan to scan: matches every scan with what the last keyframes saw, falling back from matching
-// to odometry, and says how it moved and how sure that is. Its frame `track` is smooth and drifts slowly, as a very
-// good odometry; closing loops is the filter's business. Not thread-safe. Deterministic. Source: thesis A 3.5
-// (voting), 3.5.13 and 3.6.1 (fall-backs); Censi 2008 (refinement).
+// Follows the robot from scan to scan: the chosen matcher compares every scan with the last keyframe, an alignment with
+// what the last keyframes saw refines its answer, odometry stands in where neither knows; and says how it moved and how
+// sure that is. Without the refinement the matcher's own answer counts, unless it jumps against the odometry. Its frame
+// `track` is smooth and drifts slowly, as a very good odometry; closing loops is the filter's business. Not
+// thread-safe. Deterministic. Source: thesis A 3.5 (voting), 3.5.13 and 3.6.1 (fall-backs, fault check); Censi 2008
+// (refinement).
 #pragma once
 
 #include <deque>
@@ -10,20 +12,31 @@
 #include "common/service/pose_report.h"
 #include "server/slam/features/feature_extraction.h"
 #include "server/slam/matching/point_to_line.h"
+#include "server/slam/matching/scan_matching.h"
 #include "server/slam/matching/scan_view.h"
-#include "server/slam/matching/voting.h"
 #include "server/slam/motion/motion_noise.h"
 
 namespace cairn::slam {
 
+// What is believed of the next scan's pose while the odometry is withheld: the robot stands still, or goes on as it did.
+struct NoOdometryOptions {
+  bool constant_velocity = false;  // Per scan, not per second: stamps of real logs come in bursts.
+  double sigma_m = 0.3;            // Of the prediction in x and y; also what an unmatched scan counts as travelled.
+  double sigma_rad = 0.2;
+};
+void Visit(OptionVisitor& visitor, NoOdometryOptions& options);
+
 struct FrontEndOptions {
   FeatureOptions features;
-  VotingOptions voting;
   SurfaceOptions surface;
+  bool refine_enabled = true;  // False: the matcher's own answer is the pose.
   PointToLineOptions refine;
   MotionNoise odometry{0.05, 0.8, 0.0, 0.04, 0.4, 1.2};  // Generous: real odometry freezes, jumps, comes late.
+  bool use_odometry = true;  // False: tracking and mapping see scans only (thesis C 4.4).
+  NoOdometryOptions no_odometry;
   std::int64_t reference_keyframes = 40;  // Scans matched against; more: steadier, until drift blurs them.
   double retry_below = 0.65;              // Score under which other guesses than odometry are tried.
+  double max_jump_sigma = 5.0;  // Without refinement: a matcher's answer farther from odometry is a fault (3.6.1).
 };
 void Visit(OptionVisitor& visitor, FrontEndOptions& options);
 
@@ -31,18 +44,18 @@ void Visit(OptionVisitor& visitor, FrontEndOptions& options);
 
 struct TrackStep {
   Pose2 T_track_robot;
-  MatchResult match;                          // Of the scan against the reference; T_prev_curr is T_track_robot.
-  double moved_m = 0.0;                       // Since the scan before.
-  MatchFailure voting = MatchFailure::kNone;  // Why the lines alone did not say.
-  bool matched = false;                       // False: odometry alone.
+  MatchResult match;                           // Of the scan against the reference; T_prev_curr is T_track_robot.
+  double moved_m = 0.0;                        // Since the scan before.
+  MatchFailure matcher = MatchFailure::kNone;  // Why the matcher alone did not say.
+  bool matched = false;                        // False: odometry alone.
 };
 
 class FrontEnd {
  public:
-  explicit FrontEnd(const FrontEndOptions& options);
+  FrontEnd(const FrontEndOptions& options, MatcherKind matcher, const MatcherOptions& matching);
 
   // Where the robot is now. The first scan is at the identity.
-  TrackStep Track(const ScanView& view, const Pose2& T_odom_robot);
+  TrackStep Track(const ScanView& view, const Pose2& T_odom_robot, const ParallelFor& parallel_for);
   // Makes the scan just tracked part of the reference.
   void AddKeyframe(const ScanView& view);
 
@@ -51,13 +64,25 @@ class FrontEnd {
     Pose2 T_track_robot;
     Pose2 T_odom_robot;
   };
-  MatchResult Align(const ScanView& view, const Pose2& T_odom_robot, MatchFailure& voting) const;
+  // Where the robot is by odometry since the last scan, or by the forecast that stands in for it, in track.
+  struct Guess {
+    Pose2 T_track_robot;
+    Eigen::Matrix3d covariance;
+  };
+  [[nodiscard]] Guess Predict(const Pose2& T_odom_robot) const;
+  [[nodiscard]] MatchResult MatchLastKeyframe(const ScanView& view, const Guess& guess,
+                                              const ParallelFor& parallel_for) const;
+  [[nodiscard]] MatchResult Refine(const ScanView& view, const Pose2& T_odom_robot, const Guess& guess,
+                                   const MatchResult& coarse) const;
+  [[nodiscard]] MatchResult Trust(const MatchResult& coarse, const Guess& guess) const;
 
   FrontEndOptions options_;
+  MatcherKind matcher_;
+  MatcherOptions matching_;
   bool started_ = false;
   Pose2 T_track_robot_;
-  Sight keyframe_;  // The last keyframe, and its features in its robot frame.
-  ScanFeatures keyframe_features_;
+  Sight keyframe_;  // The last keyframe, and what it saw, in its robot frame.
+  ScanView keyframe_view_;
   std::deque<Sight> history_;                        // The last scans, newest last.
   std::deque<std::vector<SurfacePoint>> reference_;  // In track, newest last.
   PointIndex index_;

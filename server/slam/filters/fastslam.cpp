@@ -116,6 +116,7 @@ void FastSlam<LandmarkModel>::Remember(std::size_t particle, const LandmarkSight
     map.Mutable(slot).landmark.Learn(T_map_robot, measurement);
   } else if (association.verdict == Verdict::kNew && map[slot].sightings == 0) {
     map.Mutable(slot).landmark = LandmarkModel::Initial(T_map_robot, measurement);
+    map.Mutable(slot).first_keyframe = static_cast<std::uint32_t>(set_[particle].path.size());
   } else {
     return;
   }
@@ -133,6 +134,20 @@ void FastSlam<LandmarkModel>::Commit() {
   survivors.reserve(parents.size());
   for (const int parent : parents) survivors.push_back(maps_[static_cast<std::size_t>(parent)]);
   maps_ = std::move(survivors);
+}
+
+template <typename LandmarkModel>
+bool FastSlam<LandmarkModel>::Rebase(std::span<const Pose2> path) {
+  Map map = maps_[set_.best_index()];
+  for (std::size_t slot = 0; slot < map.size(); ++slot) {
+    if (map[slot].sightings == 0) continue;
+    Entry& entry = map.Mutable(slot);
+    entry.landmark.Move(path[entry.first_keyframe] * set_.best().path[entry.first_keyframe].Inverse());
+    index_.Grow(slot, entry.landmark.p_map());
+  }
+  set_.Rebase(path);
+  std::fill(maps_.begin(), maps_.end(), map);
+  return true;
 }
 
 template <typename LandmarkModel>

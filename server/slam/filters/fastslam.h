@@ -44,6 +44,7 @@ class FastSlam final : public Filter {
   // Association, proposal and weights, sampling, landmark updates and new landmarks (Tables 4.3-4.8).
   void Observe(std::span<const LandmarkSighting> sightings, double travelled_m);
   void Commit() override;
+  bool Rebase(std::span<const Pose2> path) override;
 
   [[nodiscard]] FilterEstimate estimate() const override { return set_.estimate(); }
   [[nodiscard]] FilterHealth health() const override;
@@ -60,7 +61,8 @@ class FastSlam final : public Filter {
   struct Entry {
     LandmarkModel landmark;
     double last_observed_m = 0.0;
-    std::uint32_t sightings = 0;  // 0: this particle does not have it.
+    std::uint32_t sightings = 0;       // 0: this particle does not have it.
+    std::uint32_t first_keyframe = 0;  // It was first seen from here.
   };
   using Map = SharedSequence<Entry>;  // By slot.
 

@@ -54,4 +54,11 @@ void LandmarkOriented::Learn(const Pose2& T_map_robot, const Measurement& measur
   P = 0.5 * (updated + updated.transpose());
 }
 
+void LandmarkOriented::Move(const Pose2& correction) {
+  mean << correction * Eigen::Vector2d(mean.head<2>()), WrapAngle(mean.z() + correction.theta);
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  R.topLeftCorner<2, 2>() = correction.rotation();
+  P = R * P * R.transpose();
+}
+
 }  // namespace cairn::slam

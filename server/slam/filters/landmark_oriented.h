@@ -42,6 +42,7 @@ struct LandmarkOriented {
     fuse(GateInnovation(T_map_robot, measurement));
   }
   void Learn(const Pose2& T_map_robot, const Measurement& measurement);
+  void Move(const Pose2& correction);
 
   [[nodiscard]] Eigen::Vector2d p_map() const { return mean.head<2>(); }
   [[nodiscard]] double slope() const { return mean.z(); }

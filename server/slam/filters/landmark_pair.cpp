@@ -18,6 +18,11 @@ LandmarkPosition PositionAt(const Pose2& T_map_robot, const Eigen::Vector2d& z, 
   return {T_map_robot * Eigen::Vector2d(z.x() * std::cos(z.y()), z.x() * std::sin(z.y())), J * R_z * J.transpose()};
 }
 
+LandmarkPosition Moved(const LandmarkPosition& position, const Pose2& correction) {
+  const Eigen::Matrix2d R = correction.rotation();
+  return {correction * position.mean, R * position.covariance * R.transpose()};
+}
+
 void Update(LandmarkPosition& position, const Pose2& T_map_robot, const Eigen::Vector2d& z,
             const Eigen::Matrix2d& R_z) {
   const RangeBearing predicted = PredictRangeBearing(T_map_robot, position.mean);

@@ -23,6 +23,8 @@ struct LandmarkPosition {
 // Expected range and bearing of a position against a measured one.
 [[nodiscard]] Innovation<2> Innovate(const LandmarkPosition& position, const Pose2& T_map_robot,
                                      const Eigen::Vector2d& z, const Eigen::Matrix2d& R_z);
+// The same landmark after the frame it was mapped in moved by `correction`.
+[[nodiscard]] LandmarkPosition Moved(const LandmarkPosition& position, const Pose2& correction);
 // (4-13), (4-14).
 [[nodiscard]] LandmarkPosition PositionAt(const Pose2& T_map_robot, const Eigen::Vector2d& z,
                                           const Eigen::Matrix2d& R_z);
@@ -55,6 +57,10 @@ struct LandmarkPair {
     fuse(Innovate(extension, T_map_robot, measurement.z_extension, measurement.R_extension));
   }
   void Learn(const Pose2& T_map_robot, const Measurement& measurement);
+  void Move(const Pose2& correction) {
+    position = Moved(position, correction);
+    extension = Moved(extension, correction);
+  }
 
   [[nodiscard]] const Eigen::Vector2d& p_map() const { return position.mean; }
   [[nodiscard]] double slope() const;

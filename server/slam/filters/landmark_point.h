@@ -44,6 +44,10 @@ struct LandmarkPoint {
   void Learn(const Pose2& T_map_robot, const Measurement& measurement) {
     Update(position, T_map_robot, measurement.z, measurement.R_z);
   }
+  void Move(const Pose2& correction) {
+    position = Moved(position, correction);
+    first_slope = WrapAngle(first_slope + correction.theta);
+  }
 
   [[nodiscard]] const Eigen::Vector2d& p_map() const { return position.mean; }
   [[nodiscard]] double slope() const { return first_slope; }

@@ -56,6 +56,19 @@ std::vector<int> ParticleSet::Commit() {
   return parents;
 }
 
+void ParticleSet::Rebase(std::span<const Pose2> path) {
+  Particle particle;
+  particle.T_map_robot = path.back();
+  particle.log_likelihood = best().log_likelihood;
+  for (const Pose2& pose : path) particle.path.Append(pose);
+  std::fill(particles_.begin(), particles_.end(), particle);
+  best_ = 0;
+  travelled_ = 0.0;
+  sample_due_ = false;
+  effective_ = static_cast<double>(particles_.size());
+  estimate_ = {particle.T_map_robot, particle.covariance};
+}
+
 void ParticleSet::Summarise(const std::vector<double>& weights) {
   best_ = 0;
   for (std::size_t i = 1; i < particles_.size(); ++i)

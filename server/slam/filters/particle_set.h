@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "server/slam/filters/fastslam_options.h"
@@ -52,6 +53,8 @@ class ParticleSet {
   // Ends the step: samples where due, appends the pose to every path, resamples where too few particles count. The
   // parents of the new set in order; empty where it stays as it is.
   [[nodiscard]] std::vector<int> Commit();
+  // Every particle goes on from this path: what they disagreed about is decided.
+  void Rebase(std::span<const Pose2> path);
 
   [[nodiscard]] const std::vector<Particle>& particles() const { return particles_; }
   [[nodiscard]] const Particle& operator[](std::size_t index) const { return particles_[index]; }
