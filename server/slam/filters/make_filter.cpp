@@ -3,10 +3,12 @@
 #include <array>
 #include <string_view>
 
+#include "server/slam/dpslam/dpslam.h"
+
 namespace cairn::slam {
 namespace {
 
-constexpr std::array<std::string_view, 1> kFilterNames = {"fastslam2_points"};
+constexpr std::array<std::string_view, 2> kFilterNames = {"fastslam2_points", "dpslam"};
 
 }  // namespace
 
@@ -17,11 +19,17 @@ void Visit(OptionVisitor& visitor, FilterOptions& options) {
   visitor.Section("landmarks", "Which features become landmarks, and when one is seen again.",
                   [&] { Visit(visitor, options.landmarks); });
   visitor.Section("fastslam", "FastSLAM.", [&] { Visit(visitor, options.fastslam); });
+  visitor.Section("dpslam", "DP-SLAM.", [&] { Visit(visitor, options.dpslam); });
 }
 
 std::unique_ptr<Filter> MakeFilter(FilterKind kind, const FilterOptions& options, const Pose2& T_map_robot_start,
                                    std::uint64_t seed) {
   switch (kind) {
+    case FilterKind::kDpSlam: {
+      DpSlamOptions dpslam = options.dpslam;
+      dpslam.low.particles = dpslam.high.particles = options.particles;
+      return std::make_unique<DpSlam>(dpslam, T_map_robot_start, seed);
+    }
     case FilterKind::kFastSlam2Points:
       break;
   }

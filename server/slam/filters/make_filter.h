@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "common/options/option_visitor.h"
+#include "server/slam/dpslam/dpslam_options.h"
 #include "server/slam/filters/fastslam2.h"
 #include "server/slam/filters/filter.h"
 #include "server/slam/filters/landmark_tracker.h"
@@ -14,6 +15,7 @@ namespace cairn::slam {
 
 enum class FilterKind : std::uint8_t {
   kFastSlam2Points = 0,  // Thesis A 4.1-4.6, FS_2LS_2LP.
+  kDpSlam,               // Thesis C 3.2.3, 4.5: grid maps in the particles' family tree.
 };
 
 struct FilterOptions {
@@ -21,6 +23,7 @@ struct FilterOptions {
   std::int64_t particles = 200;  // More: larger loops close, in proportionally more time and memory.
   LandmarkOptions landmarks;
   FastSlamOptions fastslam;
+  DpSlamOptions dpslam;  // `particles` counts on both levels.
 };
 // The fields of the `slam` section that belong to the filter.
 void Visit(OptionVisitor& visitor, FilterOptions& options);
