@@ -36,7 +36,7 @@ void EkfSlam::Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covarianc
 
 bool EkfSlam::Observe(const RevisitObservation& revisit) {
   const Hung& hung = keyframes_[revisit.keyframe];
-  const Eigen::Index at = anchors_[hung.anchor];
+  const Eigen::Index at = anchors_[hung.anchor].at;
   const Pose2 T_map_anchor = state_.pose(at), T_map_robot = state_.robot();
   const Pose2 T_map_keyframe = T_map_anchor * hung.T_anchor_robot;
   const Innovation<3> innovation = InnovateRevisit(T_map_keyframe, T_map_robot, revisit);
@@ -106,7 +106,7 @@ void EkfSlam::AddLandmark(const LandmarkSighting& sighting, double travelled_m) 
   if (landmarks_.size() >= static_cast<std::size_t>(options_.max_landmarks)) DropLeastUseful();
   const auto measured = LandmarkPoint::Measure(sighting, back_end_.landmarks.noise);
   landmarks_.push_back({state_.AddPoint(measured.z, measured.R_z), sighting.slot, sighting.signature,
-                        WrapAngle(state_.robot().theta + sighting.slope), travelled_m, 1});
+                        WrapAngle(state_.robot().theta + sighting.slope), travelled_m, 1, keyframes_.size()});
 }
 
 void EkfSlam::DropLeastUseful() {
@@ -118,26 +118,42 @@ void EkfSlam::DropLeastUseful() {
   state_.Remove(at, 2);
   for (Entry& entry : landmarks_)
     if (entry.at > at) entry.at -= 2;
-  for (Eigen::Index& anchor : anchors_)
-    if (anchor > at) anchor -= 2;
+  for (Anchor& anchor : anchors_)
+    if (anchor.at > at) anchor.at -= 2;
 }
 
 void EkfSlam::Commit() {
   const bool room = anchors_.size() < static_cast<std::size_t>(options_.max_anchors);
   if (anchors_.empty() || (since_anchor_m_ >= options_.anchor_distance_m && room)) {
-    anchors_.push_back(state_.AddRobotPose());
+    anchors_.push_back({state_.AddRobotPose(), keyframes_.size()});
     since_anchor_ = {anchors_.size() - 1, {}, Eigen::Matrix3d::Zero()};
     since_anchor_m_ = 0.0;
   }
   // Updates since the anchor have moved robot and anchor against each other.
-  since_anchor_.T_anchor_robot = Between(state_.pose(anchors_[since_anchor_.anchor]), state_.robot());
+  since_anchor_.T_anchor_robot = Between(state_.pose(anchors_[since_anchor_.anchor].at), state_.robot());
   keyframes_.push_back(since_anchor_);
   path_.Append(state_.robot());
   if (moved_path_)
     for (std::size_t k = 0; k < keyframes_.size(); ++k)
-      path_.Mutable(k) = state_.pose(anchors_[keyframes_[k].anchor]) * keyframes_[k].T_anchor_robot;
+      path_.Mutable(k) = state_.pose(anchors_[keyframes_[k].anchor].at) * keyframes_[k].T_anchor_robot;
   moved_path_ = false;
   nis_.EndStep();
+}
+
+bool EkfSlam::Rebase(std::span<const Pose2> path) {
+  for (Entry& entry : landmarks_) {
+    const Pose2 correction = path[entry.first_keyframe] * path_[entry.first_keyframe].Inverse();
+    state_.SetPoint(entry.at, correction * state_.point(entry.at));
+    entry.slope_map = WrapAngle(entry.slope_map + correction.theta);
+  }
+  for (const Anchor& anchor : anchors_) state_.SetPose(anchor.at, path[anchor.keyframe]);
+  state_.SetPose(0, path.back());
+  for (std::size_t k = 0; k < path.size(); ++k) {
+    keyframes_[k].T_anchor_robot = Between(path[anchors_[keyframes_[k].anchor].keyframe], path[k]);
+    path_.Mutable(k) = path[k];
+  }
+  since_anchor_.T_anchor_robot = keyframes_.back().T_anchor_robot;
+  return true;
 }
 
 FilterHealth EkfSlam::health() const {

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "server/slam/filters/association.h"
@@ -35,6 +36,8 @@ class EkfSlam final : public Filter {
   void Observe(const KeyframeSight& sight, const ParallelFor& parallel_for) override;
   void Observe(const std::vector<LandmarkSighting>& sightings, double travelled_m);
   void Commit() override;
+  // Moves the means; the doubt stays as it was, which is more than there is.
+  bool Rebase(std::span<const Pose2> path) override;
 
   [[nodiscard]] FilterEstimate estimate() const override { return {state_.robot(), state_.covariance<3, 3>(0, 0)}; }
   [[nodiscard]] FilterHealth health() const override;
@@ -52,6 +55,7 @@ class EkfSlam final : public Filter {
     double slope_map = 0.0;  // As first seen; not estimated.
     double last_observed_m = 0.0;
     std::uint32_t sightings = 1;
+    std::size_t first_keyframe = 0;
   };
   // A keyframe by the anchor it hangs on.
   struct Hung {
@@ -70,7 +74,11 @@ class EkfSlam final : public Filter {
   LandmarkCandidates candidates_;
   JointState state_;
   std::vector<Entry> landmarks_;
-  std::vector<Eigen::Index> anchors_;  // Where each old pose is in the state.
+  struct Anchor {
+    Eigen::Index at = 0;  // In the state.
+    std::size_t keyframe = 0;
+  };
+  std::vector<Anchor> anchors_;
   std::vector<Hung> keyframes_;
   Hung since_anchor_;
   double since_anchor_m_ = 0.0;

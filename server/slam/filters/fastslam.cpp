@@ -20,7 +20,7 @@ FastSlam<LandmarkModel>::FastSlam(Proposal proposal, const FastSlamOptions& opti
 
 template <typename LandmarkModel>
 void FastSlam<LandmarkModel>::Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) {
-  if (proposal_ == Proposal::kMotion) return set_.PredictBySampling(T_prev_curr);
+  if (proposal_ == Proposal::kMotion) return set_.PredictBySampling(T_prev_curr, covariance_prev);
   set_.Predict(T_prev_curr, options_.drift.Covariance(T_prev_curr) + covariance_prev);
 }
 

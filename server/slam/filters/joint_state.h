@@ -27,6 +27,10 @@ class JointState {
     return covariance_.block<Rows, Columns>(row, column);
   }
 
+  // Puts a mean elsewhere; covariances stay.
+  void SetPose(Eigen::Index at, const Pose2& pose) { mean_.segment<3>(at) = pose.vector(); }
+  void SetPoint(Eigen::Index at, const Eigen::Vector2d& point) { mean_.segment<2>(at) = point; }
+
   // Only the robot moves: F touches its rows and columns (4.5). `step_covariance_prev` in the frame the step starts
   // from.
   void Move(const Pose2& T_prev_curr, const Eigen::Matrix3d& step_covariance_prev);

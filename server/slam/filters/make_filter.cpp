@@ -3,14 +3,15 @@
 #include <array>
 #include <string_view>
 
+#include "server/slam/dpslam/dpslam.h"
 #include "server/slam/filters/dead_reckoning_filter.h"
 #include "server/slam/filters/fastslam.h"
 
 namespace cairn::slam {
 namespace {
 
-constexpr std::array<std::string_view, 6> kFilterNames = {
-    "fastslam2_points", "fastslam2_oriented", "fastslam1", "ekf", "landmark_correction", "none"};
+constexpr std::array<std::string_view, 7> kFilterNames = {"fastslam2_points", "fastslam2_oriented",  "fastslam1", "ekf",
+                                                          "dpslam",           "landmark_correction", "none"};
 
 }  // namespace
 
@@ -30,6 +31,7 @@ void Visit(OptionVisitor& visitor, FilterOptions& options) {
   visitor.Section("correction", "landmark_correction: deterministic global localisation.",
                   [&] { Visit(visitor, options.correction); });
   visitor.Section("ekf", "EKF-SLAM.", [&] { Visit(visitor, options.ekf); });
+  visitor.Section("dpslam", "DP-SLAM.", [&] { Visit(visitor, options.dpslam); });
 }
 
 std::unique_ptr<Filter> MakeFilter(FilterKind kind, const FilterOptions& options, const Pose2& T_map_robot_start,
@@ -45,6 +47,11 @@ std::unique_ptr<Filter> MakeFilter(FilterKind kind, const FilterOptions& options
       return fastslam.operator()<LandmarkPoint>(Proposal::kMotion);
     case FilterKind::kEkf:
       return std::make_unique<EkfSlam>(options.ekf, options.back_end, T_map_robot_start);
+    case FilterKind::kDpSlam: {
+      DpSlamOptions dpslam = options.dpslam;
+      dpslam.low.particles = dpslam.high.particles = options.particles;
+      return std::make_unique<DpSlam>(dpslam, T_map_robot_start, seed);
+    }
     case FilterKind::kLandmarkCorrection:
       return std::make_unique<LandmarkCorrection>(options.correction, options.back_end, T_map_robot_start);
     case FilterKind::kNone:

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "common/options/option_visitor.h"
+#include "server/slam/dpslam/dpslam_options.h"
 #include "server/slam/filters/back_end_options.h"
 #include "server/slam/filters/ekf_slam.h"
 #include "server/slam/filters/fastslam_options.h"
@@ -19,6 +20,7 @@ enum class FilterKind : std::uint8_t {
   kFastSlam2Oriented,    // Thesis A 4.7, FS_3LS_1LP.
   kFastSlam1,            // Thesis C 4.2.
   kEkf,                  // Thesis C 4.1.
+  kDpSlam,               // Thesis C 3.2.3, 4.5: grid maps in the particles' family tree.
   kLandmarkCorrection,   // Thesis A 3.6.2.
   kNone,                 // The front-end's path as it is.
 };
@@ -30,6 +32,7 @@ struct FilterOptions {
   FastSlamOptions fastslam;
   EkfOptions ekf;
   CorrectionOptions correction;
+  DpSlamOptions dpslam;  // `particles` counts on both levels.
 };
 // The fields of the `slam` section that belong to the filter.
 void Visit(OptionVisitor& visitor, FilterOptions& options);

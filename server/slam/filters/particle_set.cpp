@@ -23,9 +23,17 @@ void ParticleSet::Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covar
   travelled_ += T_prev_curr.translation().norm();
 }
 
-void ParticleSet::PredictBySampling(const Pose2& T_prev_curr) {
-  for (Particle& particle : particles_)
-    particle.T_map_robot = SampleMotion(particle.T_map_robot, T_prev_curr, options_.motion, rng_);
+void ParticleSet::PredictBySampling(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) {
+  const bool more = covariance_prev.trace() > 0.0;
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    Particle& particle = particles_[i];
+    const Pose2 before = particle.T_map_robot;
+    particle.T_map_robot = SampleMotion(before, T_prev_curr, options_.motion, rng_);
+    if (!more) continue;
+    const Eigen::Matrix3d J = J_compose_right(before, T_prev_curr);
+    particle.covariance = J * covariance_prev * J.transpose();
+    Sample(i);
+  }
 }
 
 bool ParticleSet::Observe(const RevisitObservation& revisit) {
@@ -74,22 +82,27 @@ void ParticleSet::Summarise(const std::vector<double>& weights) {
   for (std::size_t i = 1; i < particles_.size(); ++i)
     if (particles_[i].log_likelihood > particles_[best_].log_likelihood) best_ = i;
   const Pose2& centre = best().T_map_robot;
-  Eigen::Vector3d first = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+  const auto from_centre = [&](const Particle& particle) {
+    Eigen::Vector3d d = particle.T_map_robot.vector() - centre.vector();
+    d.z() = WrapAngle(d.z());
+    return d;
+  };
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   double sum = 0.0;
   for (std::size_t i = 0; i < particles_.size(); ++i) {
-    Eigen::Vector3d d = particles_[i].T_map_robot.vector() - centre.vector();
-    d.z() = WrapAngle(d.z());
+    const Eigen::Vector3d d = from_centre(particles_[i]);
     if (d.head<2>().norm() > options_.agreement_m) continue;
-    first += weights[i] * d;
-    second += weights[i] * d * d.transpose();
+    mean += weights[i] * d;
     sum += weights[i];
   }
-  estimate_ = {centre, best().covariance};
-  if (!(sum > 0.0)) return;
-  const Eigen::Vector3d mean = first / sum;
+  if (sum > 0.0) mean /= sum;
   estimate_.T_map_robot = {centre.x + mean.x(), centre.y + mean.y(), WrapAngle(centre.theta + mean.z())};
-  estimate_.covariance += second / sum - mean * mean.transpose();
+  // Doubt is that of all of them: leaving out those that disagree would claim more than is known.
+  estimate_.covariance = best().covariance;
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    const Eigen::Vector3d d = from_centre(particles_[i]) - mean;
+    estimate_.covariance += weights[i] * d * d.transpose();
+  }
 }
 
 void ParticleSet::Sample(std::size_t index) {

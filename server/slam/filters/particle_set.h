@@ -27,8 +27,9 @@ class ParticleSet {
   // Table 4.2: moves every particle along the step and lets its uncertainty grow. `covariance_prev` in the step's
   // start.
   void Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev);
-  // FastSLAM 1.0: moves every particle by a sample of the motion model, which leaves no uncertainty.
-  void PredictBySampling(const Pose2& T_prev_curr);
+  // FastSLAM 1.0: moves every particle by a sample of the motion model, and of what comes on top of it, which leaves no
+  // uncertainty.
+  void PredictBySampling(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev);
 
   // Proposal and weight for one revisit. False where no particle explains it: nothing changes.
   bool Observe(const RevisitObservation& revisit);
@@ -61,8 +62,8 @@ class ParticleSet {
   [[nodiscard]] std::size_t size() const { return particles_.size(); }
   [[nodiscard]] std::size_t best_index() const { return best_; }
   [[nodiscard]] const Particle& best() const { return particles_[best_]; }
-  // Weighted mean pose of the particles that agree with the best one, and their spread plus its own uncertainty.
-  // Steadier than the best particle, which changes hands.
+  // Weighted mean pose of the particles that agree with the best one, steadier than the best particle, which changes
+  // hands; and the spread of all of them about it, plus the uncertainty each has.
   [[nodiscard]] const FilterEstimate& estimate() const { return estimate_; }
   [[nodiscard]] FilterHealth health() const;
 
