@@ -31,7 +31,7 @@ double ErrorOf(const Pose2& answer, const Pose2& truth) {
 }
 
 TEST(LineLsq, AlignsTwoPlacesOfACorridorWhereTheFirstPairsAloneFail) {
-  const Pose2 start{0, 0, 0.05}, motion{0.45, 0.06, 0.14};
+  const Pose2 start{0, 0, 0.05}, motion{0.3, 0.06, 0.14};
   const ScanFeatures prev = See(CorridorWithDoors(), start), curr = See(CorridorWithDoors(), start * motion);
   const MatchPrior nothing_known;
   LineLsqOptions once;

@@ -15,7 +15,7 @@ namespace {
 using test::Laser;
 using test::World;
 
-// Promised and asserted. Errors are of the place; turns may err by a third of a degree per centimetre of them.
+// Promised and asserted. Errors are of the place; turns may err by a degree per centimetre of them.
 struct Capability {
   MatcherKind kind;
   double exact_m;        // Worst error without noise.
@@ -29,12 +29,16 @@ struct Capability {
   bool crowd;            // Finds the motion although half of the view moves.
 };
 constexpr std::array<Capability, 5> kCapabilities = {{
-    {MatcherKind::kVoting, 0.010, 0.003, 0.012, 0.15, Radians(20), 0.02, Radians(120), 0.01, false},
-    {MatcherKind::kLineLsq, 0.012, 0.003, 0.012, 0.20, Radians(5), 0.05, Radians(120), 0.01, false},
-    {MatcherKind::kHough, 0.045, 0.010, 0.030, 0.50, Radians(30), 0.05, Radians(120), 0.01, true},
-    {MatcherKind::kIcp, 0.010, 0.003, 0.010, 0.30, Radians(10), 0.05, Radians(90), 0.10, false},
-    {MatcherKind::kCorrelative, 0.020, 0.006, 0.015, 0.30, Radians(15), 0.05, Radians(90), 0.10, true},
+    {MatcherKind::kVoting, 0.002, 0.002, 0.004, 0.2, Radians(20), 0.02, Radians(90), 0.01, true},
+    {MatcherKind::kLineLsq, 0.002, 0.001, 0.003, 0.3, Radians(5), 0.02, Radians(90), 0.01, true},
+    {MatcherKind::kHough, 0.012, 0.006, 0.008, 0.7, Radians(30), 0.01, Radians(90), 0.01, true},
+    {MatcherKind::kIcp, 0.002, 0.001, 0.003, 0.3, Radians(10), 0.01, Radians(90), 0.01, true},
+    {MatcherKind::kCorrelative, 0.012, 0.004, 0.006, 0.4, Radians(15), 0.01, Radians(90), 0.01, true},
 }};
+
+void PrintTo(const Capability& row, std::ostream* out) {
+  *out << MatcherName(row.kind);
+}
 
 const MatcherOptions kOptions;
 const Eigen::Matrix3d kVague = Eigen::Vector3d(0.09, 0.09, 0.04).asDiagonal();
@@ -82,7 +86,7 @@ TEST_P(ScanMatchers, RecoverTheMotionExactlyWithoutNoise) {
     EXPECT_GT(match.score, 0.5);
     EXPECT_GT(match.inliers, 0);
     worst = std::max(worst, Metres(match.T_prev_curr, motion));
-    EXPECT_LT(Turn(match.T_prev_curr, motion), Radians(33.0) * GetParam().exact_m);
+    EXPECT_LT(Turn(match.T_prev_curr, motion), Radians(100.0) * GetParam().exact_m);
   }
   std::printf("%s: worst error without noise %.4f m\n", MatcherName(GetParam().kind).data(), worst);
   EXPECT_LT(worst, GetParam().exact_m);
@@ -134,12 +138,16 @@ TEST_P(ScanMatchers, ConvergeFromEverywhereInTheirBasin) {
           const MatchResult match = Match(prev, curr, guess, Eigen::Vector3d(0.25, 0.25, 0.25).asDiagonal());
           const bool found = Right(match, motion);
           const bool near = metres <= GetParam().basin_m + 1e-9 && Radians(degrees) <= GetParam().basin_rad + 1e-9;
-          if (near) EXPECT_TRUE(found) << metres << " m, " << side * degrees << " deg, towards " << angle;
+          if (near) {
+            EXPECT_TRUE(found) << metres << " m, " << side * degrees << " deg, towards " << angle;
+          }
           if (!near) {
             ++far;
-            silent += match.converged && !found ? 1 : 0;
+            silent += match.converged && !match.degenerate && !found ? 1 : 0;
           }
-          if (!match.converged) EXPECT_EQ(match.T_prev_curr, guess);
+          if (!match.converged) {
+            EXPECT_EQ(match.T_prev_curr, guess);
+          }
           right += found ? 1 : 0;
           ++tries;
         }
@@ -220,8 +228,12 @@ TEST_P(ScanMatchers, EnoughOfTheViewIsEnough) {
     std::printf("%s: %3.0f deg of view: %s, error %.4f m\n", MatcherName(GetParam().kind).data(), degrees,
                 match.converged ? "matched" : MatchFailureName(match.failure).data(),
                 Metres(match.T_prev_curr, motion));
-    if (view >= GetParam().narrowest_rad - 1e-9) EXPECT_TRUE(Right(match, motion));
-    if (match.converged && !match.degenerate) EXPECT_TRUE(Right(match, motion));  // Never silently wrong.
+    if (view >= GetParam().narrowest_rad - 1e-9) {
+      EXPECT_TRUE(Right(match, motion));
+    }
+    if (match.converged && !match.degenerate) {  // Never silently wrong.
+      EXPECT_TRUE(Right(match, motion));
+    }
   }
 }
 
@@ -256,7 +268,9 @@ TEST_P(ScanMatchers, ACrowdIsSeenThroughOrOwnedUpTo) {
   std::printf("%s: half of the view moves: %d of %d right, %d silently wrong\n", MatcherName(GetParam().kind).data(),
               right, kRuns, silent);
   EXPECT_LE(silent, 1);
-  if (GetParam().crowd) EXPECT_GE(right, kRuns * 3 / 4);
+  if (GetParam().crowd) {
+    EXPECT_GE(right, kRuns * 7 / 10);
+  }
 }
 
 TEST_P(ScanMatchers, TheThreadsDoNotMatter) {
@@ -274,7 +288,9 @@ TEST_P(ScanMatchers, TheThreadsDoNotMatter) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, ScanMatchers, testing::ValuesIn(kCapabilities),
-                         [](const auto& info) { return std::string(MatcherName(info.param.kind)); });
+                         [](const testing::TestParamInfo<Capability>& row) {
+                           return std::string(MatcherName(row.param.kind));
+                         });
 
 TEST(ScanMatching, EveryKindHasANameAndARow) {
   EXPECT_EQ(MatcherNames().size(), 7U);
