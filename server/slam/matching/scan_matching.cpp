@@ -29,6 +29,9 @@ std::string_view MatcherName(MatcherKind kind) {
 
 void Visit(OptionVisitor& visitor, MatcherOptions& options) {
   visitor.Section("voting", "Seven criteria vote for pairs of lines.", [&] { Visit(visitor, options.voting); });
+  visitor.Section("ndt", "Normal distributions, Newton's algorithm.", [&] { Visit(visitor, options.ndt); });
+  visitor.Section("ndt_de", "Normal distributions, searched by differential evolution.",
+                  [&] { Visit(visitor, options.ndt_de); });
   visitor.Section("line_lsq", "Least squares over pairs of lines.", [&] { Visit(visitor, options.line_lsq); });
   visitor.Section("hough", "Correlation in the Hough domain.", [&] { Visit(visitor, options.hough); });
   visitor.Section("icp", "Points on surfaces, scan to scan.", [&] { Visit(visitor, options.icp); });
@@ -45,9 +48,9 @@ MatchResult MatchScans(const ScanView& prev, const ScanView& curr, const MatchPr
     case MatcherKind::kHough:
       return MatchByHough(prev, curr, prior, options.hough, parallel_for);
     case MatcherKind::kNdt:
-      return Unmatched(prior);
+      return MatchByNdt(prev, curr, prior, options.ndt, parallel_for);
     case MatcherKind::kNdtDe:
-      return Unmatched(prior);
+      return MatchByDifferentialEvolution(prev, curr, prior, options.ndt_de, parallel_for);
     case MatcherKind::kIcp:
       return MatchByIcp(prev, curr, prior, options.icp);
     case MatcherKind::kCorrelative:

@@ -16,6 +16,8 @@
 #include "server/slam/matching/icp.h"
 #include "server/slam/matching/line_lsq.h"
 #include "server/slam/matching/match_prior.h"
+#include "server/slam/matching/ndt.h"
+#include "server/slam/matching/ndt_de.h"
 #include "server/slam/matching/scan_view.h"
 #include "server/slam/matching/voting.h"
 #include "server/slam/parallel_for.h"
@@ -27,8 +29,15 @@ enum class MatcherKind : std::uint8_t { kVoting = 0, kLineLsq, kHough, kNdt, kNd
 [[nodiscard]] std::span<const std::string_view> MatcherNames();
 [[nodiscard]] std::string_view MatcherName(MatcherKind kind);
 
+// Whether a matcher looks so far around the prior that starting it elsewhere finds nothing new.
+[[nodiscard]] constexpr bool SearchesWide(MatcherKind kind) {
+  return kind == MatcherKind::kHough || kind == MatcherKind::kNdtDe;
+}
+
 struct MatcherOptions {
   VotingOptions voting;
+  NdtOptions ndt;
+  NdtDeOptions ndt_de;
   LineLsqOptions line_lsq;
   HoughOptions hough;
   PointToLineOptions icp;

@@ -28,12 +28,14 @@ struct Capability {
   double slide_m;        // How far a corridor moves the answer along itself from the prior, at most.
   bool crowd;            // Finds the motion although half of the view moves.
 };
-constexpr std::array<Capability, 5> kCapabilities = {{
+constexpr std::array<Capability, 7> kCapabilities = {{
     {MatcherKind::kVoting, 0.002, 0.002, 0.004, 0.2, Radians(20), 0.02, Radians(90), 0.01, true},
     {MatcherKind::kLineLsq, 0.002, 0.001, 0.003, 0.3, Radians(5), 0.02, Radians(90), 0.01, true},
     {MatcherKind::kHough, 0.012, 0.006, 0.008, 0.7, Radians(30), 0.01, Radians(90), 0.01, true},
     {MatcherKind::kIcp, 0.002, 0.001, 0.003, 0.3, Radians(10), 0.01, Radians(90), 0.01, true},
     {MatcherKind::kCorrelative, 0.012, 0.004, 0.006, 0.4, Radians(15), 0.01, Radians(90), 0.01, true},
+    {MatcherKind::kNdt, 0.02, 0.01, 0.02, 0.2, Radians(10), 0.05, Radians(90), 0.05, true},
+    {MatcherKind::kNdtDe, 0.03, 0.01, 0.02, 0.1, Radians(5), 0.05, Radians(90), 0.05, true},
 }};
 
 void PrintTo(const Capability& row, std::ostream* out) {
@@ -297,7 +299,6 @@ TEST(ScanMatching, EveryKindHasANameAndARow) {
   for (int k = 0; k < 7; ++k) {
     const auto kind = static_cast<MatcherKind>(k);
     EXPECT_FALSE(MatcherName(kind).empty());
-    if (kind == MatcherKind::kNdt || kind == MatcherKind::kNdtDe) continue;  // Not merged yet.
     EXPECT_TRUE(std::any_of(kCapabilities.begin(), kCapabilities.end(),
                             [kind](const Capability& row) { return row.kind == kind; }));
   }

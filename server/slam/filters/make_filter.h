@@ -1,0 +1,34 @@
+// The choice among the back-end filters, and their options. `slam.filter` names the one that runs; every other part of
+// the estimator knows only the interface.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "common/options/option_visitor.h"
+#include "server/slam/filters/back_end_options.h"
+#include "server/slam/filters/fastslam_options.h"
+#include "server/slam/filters/filter.h"
+
+namespace cairn::slam {
+
+enum class FilterKind : std::uint8_t {
+  kFastSlam2Points = 0,  // Thesis A 4.1-4.6, FS_2LS_2LP.
+  kFastSlam2Oriented,    // Thesis A 4.7, FS_3LS_1LP.
+  kFastSlam1,            // Thesis C 4.2.
+};
+
+struct FilterOptions {
+  FilterKind kind = FilterKind::kFastSlam2Points;
+  std::int64_t particles = 200;  // More: larger loops close, in proportionally more time and memory.
+  BackEndOptions back_end;       // Shown as slam.drift, slam.landmarks, slam.diverged_after.
+  FastSlamOptions fastslam;
+};
+// The fields of the `slam` section that belong to the filter.
+void Visit(OptionVisitor& visitor, FilterOptions& options);
+
+// The random engine starts from `seed`.
+[[nodiscard]] std::unique_ptr<Filter> MakeFilter(FilterKind kind, const FilterOptions& options,
+                                                 const Pose2& T_map_robot_start, std::uint64_t seed);
+
+}  // namespace cairn::slam
