@@ -9,7 +9,8 @@ namespace {
 
 bool RunMatchers(StudyContext& context) {
   std::vector<std::string> missing;
-  const std::vector<slam::MatcherKind> kinds = BuiltMatchers(missing);
+  std::vector<slam::MatcherKind> kinds = BuiltMatchers(missing);
+  std::erase_if(kinds, [&](slam::MatcherKind kind) { return !context.Wants(std::string(slam::MatcherName(kind))); });
   for (const std::string& name : missing)
     context.report.Warn("the matcher `" + name + "` is not in this build (it does not align two equal scans)");
   bool plausible = missing.empty();

@@ -61,6 +61,9 @@ void StudyWalls(StudyContext& context, const std::vector<slam::MatcherKind>& kin
                  converged > 0 ? Percent(1.0 * tally.flagged / converged, 0) : "-",
                  Number(DistributionOf(tally.across_cm).p95, 2), Number(DistributionOf(tally.turn_deg).p95, 2),
                  Number(DistributionOf(tally.slid_cm).p95, 1)});
+      if (const double slid = DistributionOf(tally.slid_cm).p95; slid > 5.0)
+        context.report.Warn(std::string(slam::MatcherName(kind)) + " leaves the guess along the " + name +
+                            " by up to " + Number(slid, 0) + " cm, where nothing is to be seen");
       if (converged > 0 && tally.flagged < converged * 9 / 10)
         context.report.Warn(std::string(slam::MatcherName(kind)) + " does not flag " + name + " as degenerate in " +
                             Percent(1.0 - 1.0 * tally.flagged / converged, 0) + " of its answers");

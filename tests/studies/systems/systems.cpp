@@ -56,6 +56,7 @@ bool StudyOneLog(StudyContext& context, const StudyLog& log) {
             .y = {"mean error of relations, online", "m", true}};
   bool plausible = true;
   for (const System& system : AllSystems()) {
+    if (!context.Wants(system.name)) continue;
     std::vector<std::string> assignments{"slam.matcher=" + system.matcher, "slam.filter=" + system.filter};
     assignments.insert(assignments.end(), system.more.begin(), system.more.end());
     const auto options = MapperWith(assignments, context.seed);
