@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "server/slam/matching/degeneracy.h"
 #include "server/slam/matching/surface_agreement.h"
 
 namespace cairn::slam {
@@ -130,6 +131,8 @@ MatchResult FrontEnd::MatchAlone(const ScanView& view, const Pose2& T_odom_robot
     best.converged = false;
     best.failure = MatchFailure::kFault;
   }
+  // Not every matcher holds the prior along a corridor by itself.
+  if (options_.use_odometry) TakeAlongFromPrior({guess.T_track_robot, guess.covariance}, best);
   double explained = Explained(view, best.converged ? best.T_prev_curr : guess.T_track_robot);
   const auto enough = [&] { return best.converged && explained >= options_.retry_below; };
   const auto consider = [&](const Pose2& other) {
