@@ -23,6 +23,8 @@ void Visit(OptionVisitor& visitor, NoOdometryOptions& options) {
                "The robot is expected to go on as between the last two scans; false: to stand still.");
   visitor.Real("sigma_m", options.sigma_m, "m", 0.001, 100.0, "Of the expectation; larger: the scan decides more.");
   visitor.Real("sigma_rad", options.sigma_rad, "rad", 0.001, kPi, "See sigma_m.");
+  visitor.Real("unmatched_step_m", options.unmatched_step_m, "m", 0.0, 100.0,
+               "What a scan without a match counts as travelled, towards being lost.");
 }
 
 void Visit(OptionVisitor& visitor, FrontEndOptions& options) {
@@ -61,10 +63,19 @@ TrackStep FrontEnd::Track(const ScanView& view, const Pose2& T_odom_robot, const
     // A forecast is no observation: where the refinement sees nothing, the matcher's answer stays.
     if (!options_.use_odometry && options_.refine_enabled && coarse.converged) guess.T_track_robot = coarse.T_prev_curr;
     step.match = options_.refine_enabled ? Refine(view, T_odom_robot, guess, coarse) : Trust(coarse, guess);
+    if (!options_.use_odometry && step.match.converged && coarse.converged && coarse.degenerate) {
+      // What the matcher saw no hold along, sparse points of the refinement must not hold either.
+      const Eigen::Vector2d open = coarse.degenerate_direction;
+      const double along = open.dot(coarse.T_prev_curr.translation() - step.match.T_prev_curr.translation());
+      step.match.T_prev_curr.x += along * open.x();
+      step.match.T_prev_curr.y += along * open.y();
+      step.match.degenerate = true;
+      step.match.degenerate_direction = open;
+    }
     step.matcher = coarse.failure;
     step.matched = step.match.converged;
     step.moved_m = Between(T_track_robot_, step.match.T_prev_curr).translation().norm();
-    if (!step.matched && !options_.use_odometry) step.moved_m = std::max(step.moved_m, options_.no_odometry.sigma_m);
+    if (!step.matched && !options_.use_odometry) step.moved_m = std::max(step.moved_m, options_.no_odometry.unmatched_step_m);
     T_track_robot_ = step.match.T_prev_curr;
   }
   started_ = true;
@@ -110,7 +121,8 @@ MatchResult FrontEnd::Trust(const MatchResult& coarse, const Guess& guess) const
     Eigen::Vector3d jump = match.T_prev_curr.vector() - guess.T_track_robot.vector();
     jump.z() = WrapAngle(jump.z());
     const double sigmas = std::sqrt(std::max(0.0, jump.dot(guess.covariance.ldlt().solve(jump))));
-    if (sigmas <= options_.max_jump_sigma) return match;
+    // A forecast is nothing to find a fault with.
+    if (!options_.use_odometry || sigmas <= options_.max_jump_sigma) return match;
     match.failure = MatchFailure::kFault;
   }
   match.converged = false;

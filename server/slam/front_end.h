@@ -20,9 +20,10 @@ namespace cairn::slam {
 
 // What is believed of the next scan's pose while the odometry is withheld: the robot stands still, or goes on as it did.
 struct NoOdometryOptions {
-  bool constant_velocity = false;  // Per scan, not per second: stamps of real logs come in bursts.
-  double sigma_m = 0.3;            // Of the prediction in x and y; also what an unmatched scan counts as travelled.
-  double sigma_rad = 0.2;
+  bool constant_velocity = true;  // Per scan, not per second: stamps of real logs come in bursts.
+  double sigma_m = 0.03;          // Of the prediction; larger: what scans seem to show along a corridor counts more.
+  double sigma_rad = 0.15;
+  double unmatched_step_m = 0.3;  // What a scan without a match counts as travelled, towards being lost.
 };
 void Visit(OptionVisitor& visitor, NoOdometryOptions& options);
 
