@@ -118,10 +118,12 @@ void Session::Finished(SessionPhase phase, Status status) {
 }
 
 void Session::AnnounceState() {
+  const MutexLock lock(publishing_);
   state_unsent_ = !outputs_.send(record_.state());
 }
 
 void Session::PublishLedgers(SessionRecord::Urgency urgency) {
+  const MutexLock lock(publishing_);
   for (Ledger& ledger : record_.TakeDueLedgers(SessionRecord::Clock::now(), urgency)) {
     const NameId sensor_id = ledger.sensor_id;
     if (!outputs_.send(std::move(ledger))) record_.MarkUnsent(sensor_id);

@@ -9,6 +9,7 @@
 #include <atomic>
 #include <memory>
 
+#include "common/mutex.h"
 #include "server/robots/robot_queue.h"
 #include "server/robots/session_estimator.h"
 #include "server/robots/session_record.h"
@@ -68,6 +69,8 @@ class Session : public std::enable_shared_from_this<Session> {
   std::atomic<bool> ending_{false};  // An end was asked for: nothing new is taken.
   std::atomic<bool> state_unsent_{false};
   std::atomic<bool> scheduled_{false};
+  // Held from the reading of a state to its sending: an older state must not overtake a newer one on its way out.
+  Mutex publishing_;
   asio::strand<asio::thread_pool::executor_type> strand_;
   SessionEstimator estimator_;  // Strand only.
 };

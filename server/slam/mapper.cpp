@@ -2,30 +2,46 @@
 
 #include <algorithm>
 
-#include "server/slam/filters/fastslam2.h"
+#include "server/slam/filters/make_filter.h"
 #include "server/slam/front_end.h"
+#include "server/slam/grid/grid_redraw.h"
+#include "server/slam/matching/loop_search.h"
 #include "server/slam/matching/revisit_search.h"
+#include "server/slam/smoothing/keyframe_graph.h"
 
 namespace cairn::slam {
+
+namespace {
+
+// Keyframes drawn again with every scan after a large loop: a few milliseconds' worth.
+constexpr std::size_t kRedrawnPerScan = 20;
+
+}  // namespace
 
 struct Mapper::State {
   State(const MapperOptions& given, const Pose2& T_map_robot_start, std::uint64_t seed)
       : options(given),
         front_end(given.front_end, given.matcher, given.matching),
         revisits(given.revisit, given.front_end.refine),
-        tracker(given.landmarks, given.filter.landmark),
-        filter(given.filter, T_map_robot_start, seed),
+        loops(given.loop, given.front_end.refine),
+        graph(given.filter.fastslam.drift),
+        filter(MakeFilter(given.filter.kind, given.filter, T_map_robot_start, seed)),
         grid(given.grid) {}
 
   void AddKeyframe(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot, ScanView view, const TrackStep& step,
                    const ParallelFor& parallel_for);
+  void CloseLargeLoop();
+  void Redraw();
 
   const MapperOptions options;
   FrontEnd front_end;
   RevisitSearch revisits;
-  LandmarkTracker tracker;
-  FastSlam2 filter;
+  LoopSearch loops;
+  KeyframeGraph graph;
+  std::vector<double> distances_m;  // Along the graph, from the last keyframe to each.
+  std::unique_ptr<Filter> filter;
   OccupancyGrid grid;
+  std::optional<GridRedraw> redraw;  // Under way since a large loop was closed.
 
   std::vector<Keyframe> keyframes;
   std::vector<KeyframeShape> shapes;  // One per keyframe.
@@ -56,6 +72,8 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   ScanOutcome outcome;
   outcome.stamp = scan->stamp;
 
+  s.Redraw();
+
   // Where the front-end sees the robot, and how far that is from the last keyframe.
   ScanView view = Look(*scan, s.options.front_end);
   const TrackStep step = s.front_end.Track(view, T_odom_robot, parallel_for);
@@ -71,9 +89,9 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   }
   s.scans.push_back({outcome.stamp, s.keyframes.size() - 1, T_keyframe_robot});
 
-  outcome.T_map_robot = s.filter.estimate().T_map_robot * T_keyframe_robot;
+  outcome.T_map_robot = s.filter->estimate().T_map_robot * T_keyframe_robot;
   outcome.T_map_odom = outcome.T_map_robot * T_odom_robot.Inverse();
-  outcome.covariance = s.filter.estimate().covariance;
+  outcome.covariance = s.filter->estimate().covariance;
   outcome.score = first ? 1.0 : step.match.score;
   outcome.reason = first ? PoseReason::kTracking : ReasonOf(step, s.unmatched_m, s.options.lost_after_m);
   outcome.localized = outcome.reason != PoseReason::kLost;
@@ -85,17 +103,44 @@ void Mapper::State::AddKeyframe(std::shared_ptr<const Scan> scan, const Pose2& T
   if (!keyframes.empty()) {
     const Pose2 motion = Between(shapes.back().T_track_robot, step.T_track_robot);
     travelled_m += motion.translation().norm();
-    filter.Predict(motion, Eigen::Matrix3d::Zero());
-    if (const auto revisit = revisits.Find(view.points_robot, shapes, travelled_m, filter, parallel_for))
-      filter.Observe(*revisit);
+    filter->Predict(motion, Eigen::Matrix3d::Zero());
+    graph.Append(motion);
+    const auto revisit = revisits.Find(view.points_robot, shapes, distances_m, travelled_m, *filter, parallel_for);
+    if (revisit && filter->Observe(*revisit))
+      graph.AddLoop(revisit->keyframe, keyframes.size(), revisit->T_keyframe_robot, revisit->covariance);
+  } else {
+    graph.Append({});
   }
-  filter.Observe(tracker.Observe(view.features, step.T_track_robot, travelled_m, filter.best()));
-  filter.Commit();
+  filter->Observe(KeyframeSight{*scan, view, step.T_track_robot, travelled_m}, parallel_for);
+  filter->Commit();
   front_end.AddKeyframe(view);
-  grid.Draw(*scan, filter.estimate().T_map_robot);
   keyframes.push_back({std::move(scan), T_odom_robot});
   shapes.push_back({step.T_track_robot, travelled_m, std::move(view.points_robot)});
-  online_path.push_back(filter.estimate().T_map_robot);
+  distances_m = graph.DistancesFromLast();
+  CloseLargeLoop();
+  grid.Draw(*keyframes.back().scan, filter->estimate().T_map_robot);
+  online_path.push_back(filter->estimate().T_map_robot);
+}
+
+// No particle may have gone the way a large loop turns out to have gone: then its error is spread over the whole path.
+void Mapper::State::CloseLargeLoop() {
+  const SharedSequence<Pose2> believed = filter->hypothesis(0).path;
+  const auto loop = loops.Find(keyframes, shapes, believed, distances_m);
+  if (!loop) return;
+  graph.AddLoop(loop->keyframe, keyframes.size() - 1, loop->T_keyframe_robot, loop->covariance);
+  distances_m = graph.DistancesFromLast();
+  std::vector<Pose2> path;
+  for (std::size_t k = 0; k < believed.size(); ++k) path.push_back(believed[k]);
+  if (graph.Optimise(path, options.pose_graph).usable && filter->Rebase(path)) redraw.emplace(options.grid);
+}
+
+void Mapper::State::Redraw() {
+  if (!redraw || !redraw->Advance(keyframes, filter->hypothesis(0).path, kRedrawnPerScan)) return;
+  const OccupancyGrid::Chunks old = grid.chunks();
+  grid = redraw->TakeGrid();
+  redraw.reset();
+  grid.MarkAllDirty();
+  for (const auto& [key, chunk] : old) grid.MarkDirty(key);
 }
 
 const OccupancyGrid& Mapper::grid() const {
@@ -107,21 +152,12 @@ std::vector<ChunkKey> Mapper::TakeDirtyChunks() {
 }
 
 std::vector<Landmark> Mapper::landmarks() const {
-  const Particle& best = state_->filter.best();
-  const std::vector<LandmarkSignature>& signatures = state_->tracker.signatures();
-  std::vector<Landmark> landmarks;
-  for (std::size_t id = 0; id < best.landmarks.size(); ++id) {
-    const LandmarkEstimate& estimate = best.landmarks[id];
-    const Eigen::Vector2d along = estimate.extension.mean - estimate.position.mean;
-    landmarks.push_back({id, signatures[id].corner, estimate.position.mean, std::atan2(along.y(), along.x()),
-                         estimate.position.covariance, estimate.sightings});
-  }
-  return landmarks;
+  return state_->filter->landmarks();
 }
 
 MapperSnapshot Mapper::Snapshot() const {
   MapperSnapshot snapshot{state_->keyframes, state_->online_path, {}, state_->scans};
-  const SharedSequence<Pose2>& path = state_->filter.best().path;
+  const SharedSequence<Pose2> path = state_->filter->hypothesis(0).path;
   for (std::size_t k = 0; k < path.size(); ++k) snapshot.full_path.push_back(path[k]);
   return snapshot;
 }
@@ -129,8 +165,9 @@ MapperSnapshot Mapper::Snapshot() const {
 void Mapper::AdoptGrid(OccupancyGrid grid, std::size_t keyframes) {
   State& s = *state_;
   s.grid = std::move(grid);
-  for (std::size_t k = keyframes; k < s.keyframes.size(); ++k)
-    s.grid.Draw(*s.keyframes[k].scan, s.filter.best().path[k]);
+  s.redraw.reset();
+  const SharedSequence<Pose2> path = s.filter->hypothesis(0).path;
+  for (std::size_t k = keyframes; k < s.keyframes.size(); ++k) s.grid.Draw(*s.keyframes[k].scan, path[k]);
   s.grid.MarkAllDirty();
 }
 

@@ -7,8 +7,7 @@ namespace cairn::slam {
 void Visit(OptionVisitor& visitor, MapperOptions& options) {
   visitor.Integer("seed", options.seed, "1", 0, std::numeric_limits<std::int64_t>::max(),
                   "Of every robot's random engine.");
-  visitor.Integer("particles", options.filter.particles, "1", 1, 10000,
-                  "More: larger loops close, in proportionally more time and memory.");
+  Visit(visitor, options.filter);
   visitor.Real("lost_after_m", options.lost_after_m, "m", 0.0, 1000.0,
                "Travelled by odometry alone before the robot counts as lost.");
   VisitEnum(visitor, "matcher", options.matcher, MatcherNames(), "What compares a scan with the last keyframe.");
@@ -17,9 +16,8 @@ void Visit(OptionVisitor& visitor, MapperOptions& options) {
   visitor.Section("front_end", "From scan to scan.", [&] { Visit(visitor, options.front_end); });
   visitor.Section("gate", "When a scan is worth an update of filter and map.", [&] { Visit(visitor, options.gate); });
   visitor.Section("revisit", "Recognising places seen before.", [&] { Visit(visitor, options.revisit); });
-  visitor.Section("landmarks", "Which features become landmarks, and when one is seen again.",
-                  [&] { Visit(visitor, options.landmarks); });
-  visitor.Section("filter", "FastSLAM 2.0.", [&] { Visit(visitor, options.filter); });
+  visitor.Section("loop", "Finding large loops.", [&] { Visit(visitor, options.loop); });
+  visitor.Section("pose_graph", "The path that fits all loops best.", [&] { Visit(visitor, options.pose_graph); });
   visitor.Section("grid", "The occupancy grid.", [&] { Visit(visitor, options.grid); });
   visitor.Section("pairing", "Joining scans and odometry by their stamps.", [&] { Visit(visitor, options.pairing); });
 }

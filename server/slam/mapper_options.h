@@ -4,14 +4,15 @@
 #include <cstdint>
 
 #include "common/options/option_visitor.h"
-#include "server/slam/filters/fastslam2.h"
-#include "server/slam/filters/landmark_tracker.h"
+#include "server/slam/filters/make_filter.h"
 #include "server/slam/front_end.h"
 #include "server/slam/grid/occupancy_grid.h"
+#include "server/slam/matching/loop_search.h"
 #include "server/slam/matching/revisit_search.h"
 #include "server/slam/matching/scan_matching.h"
 #include "server/slam/motion/motion_gate.h"
 #include "server/slam/scan/odometry_pairing.h"
+#include "server/slam/smoothing/pose_graph.h"
 
 namespace cairn::slam {
 
@@ -23,7 +24,8 @@ struct MapperOptions {
   FrontEndOptions front_end;
   MotionGateOptions gate;
   RevisitOptions revisit;
-  LandmarkOptions landmarks;
+  LoopOptions loop;
+  PoseGraphOptions pose_graph;
   FilterOptions filter;
   GridOptions grid;
   PairingOptions pairing;

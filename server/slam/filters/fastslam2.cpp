@@ -75,7 +75,7 @@ LandmarkPosition Initial(const Pose2& T_map_robot, const Eigen::Vector2d& p_robo
 
 }  // namespace
 
-void Visit(OptionVisitor& visitor, FilterOptions& options) {
+void Visit(OptionVisitor& visitor, FastSlamOptions& options) {
   visitor.Section("drift", "Noise of the matched motion: how far the front-end drifts.",
                   [&] { Visit(visitor, options.drift); });
   visitor.Real("sample_distance_m", options.sample_distance_m, "m", 0.0, 1000.0,
@@ -91,8 +91,12 @@ void Visit(OptionVisitor& visitor, FilterOptions& options) {
                "Noise of a landmark's bearing.");
 }
 
-FastSlam2::FastSlam2(const FilterOptions& options, const Pose2& T_map_robot_start, std::uint64_t seed)
-    : options_(options), rng_(seed), particles_(static_cast<std::size_t>(options.particles)) {
+FastSlam2::FastSlam2(const FastSlamOptions& options, const LandmarkOptions& landmarks, std::int64_t particles,
+                     const Pose2& T_map_robot_start, std::uint64_t seed)
+    : options_(options),
+      tracker_(landmarks, options.landmark),
+      rng_(seed),
+      particles_(static_cast<std::size_t>(particles)) {
   for (Particle& particle : particles_) particle.T_map_robot = T_map_robot_start;
   effective_ = static_cast<double>(particles_.size());
 }
@@ -130,6 +134,27 @@ bool FastSlam2::Observe(const RevisitObservation& revisit) {
   return true;
 }
 
+void FastSlam2::Observe(const KeyframeSight& sight, const ParallelFor& /*parallel_for*/) {
+  Observe(tracker_.Observe(sight.view.features, sight.T_track_robot, sight.travelled_m, best()));
+}
+
+Hypothesis FastSlam2::hypothesis(std::size_t index) const {
+  const Particle& particle = index == 0 ? best() : particles_[index - 1];
+  return {particle.T_map_robot, particle.path};
+}
+
+std::vector<Landmark> FastSlam2::landmarks() const {
+  const std::vector<LandmarkSignature>& signatures = tracker_.signatures();
+  std::vector<Landmark> landmarks;
+  for (std::size_t id = 0; id < best().landmarks.size(); ++id) {
+    const LandmarkEstimate& estimate = best().landmarks[id];
+    const Eigen::Vector2d along = estimate.extension.mean - estimate.position.mean;
+    landmarks.push_back({id, signatures[id].corner, estimate.position.mean, std::atan2(along.y(), along.x()),
+                         estimate.position.covariance, estimate.sightings});
+  }
+  return landmarks;
+}
+
 void FastSlam2::Observe(std::span<const LandmarkObservation> sightings) {
   if (sightings.empty()) return;
   const Eigen::Matrix2d R_z = options_.landmark.R_z();
@@ -164,7 +189,8 @@ void FastSlam2::Observe(std::span<const LandmarkObservation> sightings) {
         ++landmark.sightings;
       } else {
         particle.landmarks.Append({Initial(particle.T_map_robot, sighting.p_robot, R_z),
-                                   Initial(particle.T_map_robot, sighting.extension_robot(), R_z), 1});
+                                   Initial(particle.T_map_robot, sighting.extension_robot(), R_z), 1,
+                                   static_cast<std::uint32_t>(particle.path.size())});
       }
     }
   }
@@ -179,6 +205,32 @@ void FastSlam2::Commit() {
   }
   for (Particle& particle : particles_) particle.path.Append(particle.T_map_robot);
   Summarise(Resample());
+}
+
+bool FastSlam2::Rebase(std::span<const Pose2> path) {
+  // What the particles disagreed about is decided: they go on from one path and one map, that of the best.
+  Particle moved = best();
+  for (std::size_t id = 0; id < moved.landmarks.size(); ++id) {
+    LandmarkEstimate& landmark = moved.landmarks.Mutable(id);
+    const Pose2 correction = path[landmark.first_keyframe] * moved.path[landmark.first_keyframe].Inverse();
+    const Eigen::Matrix2d R = correction.rotation();
+    for (LandmarkPosition* position : {&landmark.position, &landmark.extension}) {
+      position->mean = correction * position->mean;
+      position->covariance = R * position->covariance * R.transpose();
+    }
+  }
+  moved.path = {};
+  for (const Pose2& pose : path) moved.path.Append(pose);
+  moved.T_map_robot = path.back();
+  moved.covariance.setZero();
+  moved.log_weight = 0.0;
+  std::fill(particles_.begin(), particles_.end(), moved);
+  best_ = 0;
+  effective_ = static_cast<double>(particles_.size());
+  estimate_ = {moved.T_map_robot, moved.covariance};
+  travelled_ = 0.0;
+  sample_due_ = false;
+  return true;
 }
 
 void FastSlam2::Summarise(const std::vector<double>& weights) {

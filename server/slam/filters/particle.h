@@ -20,7 +20,8 @@ struct LandmarkPosition {
 struct LandmarkEstimate {
   LandmarkPosition position;
   LandmarkPosition extension;
-  std::uint32_t sightings = 0;  // 0: this particle does not have the landmark.
+  std::uint32_t sightings = 0;       // 0: this particle does not have the landmark.
+  std::uint32_t first_keyframe = 0;  // It was first seen from here.
 };
 
 struct Particle {

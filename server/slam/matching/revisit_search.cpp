@@ -7,15 +7,19 @@ namespace cairn::slam {
 namespace {
 
 // The old keyframe that shows most likely what the robot sees: near, and looking the same way.
-std::optional<std::size_t> NearestKeyframe(const Particle& particle, const std::vector<KeyframeShape>& keyframes,
-                                           double travelled_m, const RevisitOptions& options) {
+std::optional<std::size_t> NearestKeyframe(const Hypothesis& belief, const std::vector<KeyframeShape>& keyframes,
+                                           std::span<const double> distances_m, double travelled_m,
+                                           const RevisitOptions& options) {
   std::optional<std::size_t> nearest;
   double best = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < keyframes.size(); ++k) {
     if (travelled_m - keyframes[k].travelled_m < options.min_travel_m) break;
-    const Pose2 away = Between(particle.path[k], particle.T_map_robot);
-    const double distance = away.translation().norm(), turn = std::abs(away.theta);
-    if (distance > options.max_distance_m || turn > options.max_turn_rad) continue;
+    if (distances_m[k] > options.max_way_m) continue;
+    const Pose2& T_map_k = belief.path[k];
+    const double distance = (T_map_k.translation() - belief.T_map_robot.translation()).norm();
+    if (distance > options.max_distance_m) continue;
+    const double turn = std::abs(AngleDiff(T_map_k.theta, belief.T_map_robot.theta));
+    if (turn > options.max_turn_rad) continue;
     const double cost = distance + options.max_distance_m * turn / options.max_turn_rad;
     if (cost < best) {
       best = cost;
@@ -31,6 +35,8 @@ void Visit(OptionVisitor& visitor, RevisitOptions& options) {
   visitor.Flag("enabled", options.enabled, "Match scans with places seen before.");
   visitor.Real("min_travel_m", options.min_travel_m, "m", 0.0, 1000.0,
                "Between two sightings of a place; less: it is still the same visit.");
+  visitor.Real("max_way_m", options.max_way_m, "m", 0.0, 1e9,
+               "Along what is known, between here and there; beyond, a large loop has to be found first.");
   visitor.Real("max_distance_m", options.max_distance_m, "m", 0.1, 20.0, "Between the robot and the old keyframe.");
   visitor.Real("max_turn_rad", options.max_turn_rad, "rad", 0.05, 3.2, "Between their headings.");
   visitor.Integer("neighbours", options.neighbours, "1", 0, 100, "Keyframes on either side whose surfaces are added.");
@@ -48,21 +54,23 @@ RevisitSearch::RevisitSearch(const RevisitOptions& options, const PointToLineOpt
 }
 
 std::optional<RevisitObservation> RevisitSearch::Find(std::span<const SurfacePoint> points_robot,
-                                                      const std::vector<KeyframeShape>& keyframes, double travelled_m,
-                                                      const FastSlam2& filter, const ParallelFor& parallel_for) {
+                                                      const std::vector<KeyframeShape>& keyframes,
+                                                      std::span<const double> distances_m, double travelled_m,
+                                                      const Filter& filter, const ParallelFor& parallel_for) {
   if (!options_.enabled) return std::nullopt;
-  const std::optional<std::size_t> centre = NearestKeyframe(filter.best(), keyframes, travelled_m, options_);
+  const Hypothesis best = filter.hypothesis(0);
+  const std::optional<std::size_t> centre = NearestKeyframe(best, keyframes, distances_m, travelled_m, options_);
   if (!centre) return std::nullopt;
   BuildReference(keyframes, *centre);
   const Eigen::Matrix3d prior =
       Eigen::Vector3d(options_.guess_sigma_m * options_.guess_sigma_m, options_.guess_sigma_m * options_.guess_sigma_m,
                       options_.guess_sigma_rad * options_.guess_sigma_rad)
           .asDiagonal();
-  const auto align = [&](const Particle& particle) {
-    const Pose2 guess = Between(particle.path[*centre], particle.T_map_robot);
+  const auto align = [&](const Hypothesis& belief) {
+    const Pose2 guess = Between(belief.path[*centre], belief.T_map_robot);
     return AlignPointsToSurfaces(points_robot, reference_, {guess, guess, prior}, align_);
   };
-  MatchResult match = align(filter.best());
+  MatchResult match = align(best);
   if (!match.converged) match = AlignFromOthers(filter, align, parallel_for);
   if (!match.converged) return std::nullopt;
   RevisitObservation revisit{*centre, match.T_prev_curr, match.covariance};
@@ -72,17 +80,17 @@ std::optional<RevisitObservation> RevisitSearch::Find(std::span<const SurfacePoi
   return revisit;
 }
 
-// Tries the beliefs of particles spread over the set; the one that explains most wins.
-MatchResult RevisitSearch::AlignFromOthers(const FastSlam2& filter,
-                                           const std::function<MatchResult(const Particle&)>& align,
+// Tries hypotheses spread over the belief; the one that explains most wins.
+MatchResult RevisitSearch::AlignFromOthers(const Filter& filter,
+                                           const std::function<MatchResult(const Hypothesis&)>& align,
                                            const ParallelFor& parallel_for) const {
-  const std::size_t size = filter.particles().size();
+  const std::size_t size = filter.hypothesis_count() - 1;  // Besides the best.
   const std::size_t guesses = std::min(size, static_cast<std::size_t>(options_.guesses));
   std::vector<MatchResult> matches(guesses);
   parallel_for(static_cast<int>(guesses), [&](int begin, int end) {
     for (int i = begin; i < end; ++i) {
       const auto guess = static_cast<std::size_t>(i);
-      matches[guess] = align(filter.particles()[guess * size / guesses]);
+      matches[guess] = align(filter.hypothesis(1 + guess * size / guesses));
     }
   });
   MatchResult best;

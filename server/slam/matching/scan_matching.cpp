@@ -32,6 +32,8 @@ void Visit(OptionVisitor& visitor, MatcherOptions& options) {
   visitor.Section("ndt", "Normal distributions, Newton's algorithm.", [&] { Visit(visitor, options.ndt); });
   visitor.Section("ndt_de", "Normal distributions, searched by differential evolution.",
                   [&] { Visit(visitor, options.ndt_de); });
+  visitor.Section("line_lsq", "Least squares over pairs of lines.", [&] { Visit(visitor, options.line_lsq); });
+  visitor.Section("hough", "Correlation in the Hough domain.", [&] { Visit(visitor, options.hough); });
   visitor.Section("icp", "Points on surfaces, scan to scan.", [&] { Visit(visitor, options.icp); });
 }
 
@@ -41,9 +43,9 @@ MatchResult MatchScans(const ScanView& prev, const ScanView& curr, const MatchPr
     case MatcherKind::kVoting:
       return MatchByVoting(prev.features, curr.features, prior.T_prev_curr, options.voting);
     case MatcherKind::kLineLsq:
-      return Unmatched(prior);
+      return MatchByLineLsq(prev.features, curr.features, prior, options.line_lsq);
     case MatcherKind::kHough:
-      return Unmatched(prior);
+      return MatchByHough(prev, curr, prior, options.hough, parallel_for);
     case MatcherKind::kNdt:
       return MatchByNdt(prev, curr, prior, options.ndt, parallel_for);
     case MatcherKind::kNdtDe:

@@ -11,7 +11,9 @@
 
 #include "common/options/option_visitor.h"
 #include "server/slam/match_result.h"
+#include "server/slam/matching/hough.h"
 #include "server/slam/matching/icp.h"
+#include "server/slam/matching/line_lsq.h"
 #include "server/slam/matching/match_prior.h"
 #include "server/slam/matching/ndt.h"
 #include "server/slam/matching/ndt_de.h"
@@ -30,6 +32,8 @@ struct MatcherOptions {
   VotingOptions voting;
   NdtOptions ndt;
   NdtDeOptions ndt_de;
+  LineLsqOptions line_lsq;
+  HoughOptions hough;
   PointToLineOptions icp;
 };
 void Visit(OptionVisitor& visitor, MatcherOptions& options);

@@ -7,9 +7,10 @@
 namespace cairn::slam {
 namespace {
 
-FilterOptions Wide() {
-  FilterOptions options;
-  options.particles = 100;
+constexpr std::int64_t kParticles = 100;
+
+FastSlamOptions Wide() {
+  FastSlamOptions options;
   options.drift = {0.0, 0.05, 0.0, 0.0, 0.02, 0.0};
   return options;
 }
@@ -27,7 +28,7 @@ void DriveOutAndBack(FastSlam2& filter) {
 }
 
 TEST(FastSlam2, UncertaintyGrowsAlongThePathAndARevisitTakesItAway) {
-  FastSlam2 filter(Wide(), {}, 1);
+  FastSlam2 filter(Wide(), {}, kParticles, {}, 1);
   DriveOutAndBack(filter);
   const double before = filter.estimate().covariance.topLeftCorner<2, 2>().trace();
   RevisitObservation revisit{0, {0, 0, kPi}, Eigen::Vector3d(0.0025, 0.0025, 0.0004).asDiagonal()};
@@ -42,7 +43,7 @@ TEST(FastSlam2, UncertaintyGrowsAlongThePathAndARevisitTakesItAway) {
 }
 
 TEST(FastSlam2, ARevisitNoParticleExplainsChangesNothing) {
-  FastSlam2 filter(Wide(), {}, 1);
+  FastSlam2 filter(Wide(), {}, kParticles, {}, 1);
   DriveOutAndBack(filter);
   const Pose2 before = filter.best().T_map_robot;
   EXPECT_FALSE(filter.Observe({0, {50, 0, 0}, Eigen::Matrix3d::Identity() * 1e-4}));
@@ -50,7 +51,7 @@ TEST(FastSlam2, ARevisitNoParticleExplainsChangesNothing) {
 }
 
 TEST(FastSlam2, ALandmarkSeenAgainPullsTheRobotBack) {
-  FastSlam2 filter(Wide(), {}, 3);
+  FastSlam2 filter(Wide(), {}, kParticles, {}, 3);
   filter.Observe(std::vector<LandmarkObservation>{{0, false, {2.0, 1.0}, 0.3}, {1, false, {1.0, -2.0}, 1.2}});
   filter.Commit();
   ASSERT_EQ(filter.landmark_count(), 2U);
@@ -65,7 +66,7 @@ TEST(FastSlam2, ALandmarkSeenAgainPullsTheRobotBack) {
 }
 
 TEST(FastSlam2, SameSeedSameParticles) {
-  FastSlam2 a(Wide(), {}, 42), b(Wide(), {}, 42);
+  FastSlam2 a(Wide(), {}, kParticles, {}, 42), b(Wide(), {}, kParticles, {}, 42);
   DriveOutAndBack(a);
   DriveOutAndBack(b);
   for (std::size_t i = 0; i < a.particles().size(); ++i)
@@ -73,7 +74,7 @@ TEST(FastSlam2, SameSeedSameParticles) {
 }
 
 TEST(FastSlam2, EveryParticleKeepsItsWholePath) {
-  FastSlam2 filter(Wide(), {}, 5);
+  FastSlam2 filter(Wide(), {}, kParticles, {}, 5);
   DriveOutAndBack(filter);
   for (const Particle& particle : filter.particles()) {
     ASSERT_EQ(particle.path.size(), 42U);
