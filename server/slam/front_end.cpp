@@ -75,7 +75,8 @@ TrackStep FrontEnd::Track(const ScanView& view, const Pose2& T_odom_robot, const
     step.matcher = coarse.failure;
     step.matched = step.match.converged;
     step.moved_m = Between(T_track_robot_, step.match.T_prev_curr).translation().norm();
-    if (!step.matched && !options_.use_odometry) step.moved_m = std::max(step.moved_m, options_.no_odometry.unmatched_step_m);
+    if (!step.matched && !options_.use_odometry)
+      step.moved_m = std::max(step.moved_m, options_.no_odometry.unmatched_step_m);
     T_track_robot_ = step.match.T_prev_curr;
   }
   started_ = true;

@@ -8,11 +8,12 @@ namespace cairn::slam {
 namespace {
 
 // Finds the direction in which the scan holds the translation least, with the heading free to follow. Where it is open,
-// what the cells seem to know about it comes mostly of their cuts and sampling, and counts for no more than open_sigma_m.
+// what the cells seem to know about it comes mostly of their cuts and sampling, and counts for no more than
+// open_sigma_m.
 void JudgeDegeneracy(const NdtEvidenceOptions& options, Eigen::Matrix3d& information, MatchResult& result) {
-  const Eigen::Matrix2d translation =
-      information.topLeftCorner<2, 2>() - information.topRightCorner<2, 1>() * information.bottomLeftCorner<1, 2>() /
-                                              std::max(information(2, 2), 1e-12);
+  const Eigen::Matrix2d translation = information.topLeftCorner<2, 2>() - information.topRightCorner<2, 1>() *
+                                                                              information.bottomLeftCorner<1, 2>() /
+                                                                              std::max(information(2, 2), 1e-12);
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
   solver.computeDirect(translation);
   result.degenerate = !(solver.eigenvalues()(0) >= options.degenerate_ratio * solver.eigenvalues()(1));
@@ -56,7 +57,8 @@ MatchResult JudgeNdtPose(const NdtMap& map, std::span<const Eigen::Vector2d> poi
   MatchResult result = UnmatchedNdt(prior, MatchFailure::kNotConverged);
   const NdtDerivatives at_pose = map.Derivatives(points_curr, T_prev_curr);
   result.inliers = at_pose.inliers;
-  result.score = static_cast<double>(at_pose.inliers) / static_cast<double>(std::max<std::size_t>(points_curr.size(), 1));
+  result.score =
+      static_cast<double>(at_pose.inliers) / static_cast<double>(std::max<std::size_t>(points_curr.size(), 1));
   Eigen::Matrix3d information = InformationOf(at_pose, options);
   if (!settled || result.score < options.min_score || result.inliers < options.min_inliers || !information.allFinite())
     return result;
