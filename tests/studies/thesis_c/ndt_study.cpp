@@ -19,7 +19,7 @@ ScanSequence SequenceOf(const StudyLog& log) {
     const auto truth = std::lower_bound(log.truth.begin(), log.truth.end(), scan->stamp,
                                         [](const auto& pose, Stamp stamp) { return pose.stamp < stamp; });
     if (!log.truth.empty() && (truth == log.truth.end() || truth->stamp != scan->stamp)) continue;
-    if (!log.truth.empty()) sequence.T_map_robot.push_back(truth->pose);
+    if (!log.truth.empty()) sequence.T_map_robot.push_back(truth->T_map_robot);
     sequence.scans.push_back(*scan);
     sequence.points.emplace_back();
     for (const slam::BeamPoint& hit : slam::PointsOf(*scan)) sequence.points.back().push_back(hit.p_robot);
