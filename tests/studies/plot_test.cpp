@@ -87,12 +87,25 @@ TEST(Plot, OddInputIsDrawnAsFarAsItGoes) {
 TEST(PlotMap, WallsFreeAndUnknownDiffer) {
   OccupancyImage map{0.1, {-1, -1, 0}, 20, 20, std::vector<std::uint8_t>(400, 255)};
   for (int row = 0; row < 20; ++row)
-    for (int column = 0; column < 10; ++column)
+    for (const int column : {0, 1, 2, 3, 4, 15, 16, 17, 18, 19})
       map.cells[static_cast<std::size_t>(20 * row + column)] = row < 10 ? 0 : 100;
   const RasterImage image = DrawMap(map, {.title = "m"});
   EXPECT_TRUE(Holds(image, {0, 0, 0}));
   EXPECT_TRUE(Holds(image, {255, 255, 255}));
   EXPECT_TRUE(Holds(image, {222, 222, 222}));
+}
+
+TEST(PlotMap, UnknownEdgesAreCutOff) {
+  // One known cell in the middle of a wide unknown map fills the picture.
+  OccupancyImage map{1.0, {-50, -50, 0}, 100, 100, std::vector<std::uint8_t>(10000, 255)};
+  map.cells[50 * 100 + 50] = 100;
+  EXPECT_FALSE(Holds(DrawMap(map, {}), {222, 222, 222}));
+}
+
+TEST(Plot, ANarrowMapLeavesRoomForTitleAndLegend) {
+  Plot plot{.title = "a corridor", .equal_scale = true};
+  plot.series = {{.label = "a long label beside the corridor", .x = {0, 1}, .y = {0, 50}}};
+  EXPECT_GE(DrawPlot(plot).width, 640);
 }
 
 TEST(HeatMap, LowIsDarkHighIsBrightAndNothingIsGrey) {
