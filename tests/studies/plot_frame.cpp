@@ -40,7 +40,7 @@ std::vector<double> TicksOf(AxisRange range, bool logarithmic, int wanted) {
           ticks.push_back(value);
       }
     }
-    return ticks;
+    return ticks.size() >= 3 ? ticks : TicksOf(range, false, wanted);
   }
   const double rough = (range.high - range.low) / std::max(wanted, 1);
   const double power = std::pow(10.0, std::floor(std::log10(rough)));

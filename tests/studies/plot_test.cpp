@@ -33,6 +33,9 @@ TEST(PlotAxes, TicksAreRound) {
   EXPECT_EQ(TicksOf({50, 450}, false, 8), (std::vector<double>{50, 100, 150, 200, 250, 300, 350, 400, 450}));
   EXPECT_EQ(TicksOf({0.5, 2000}, true, 5), (std::vector<double>{1, 10, 100, 1000}));
   EXPECT_EQ(TicksOf({1, 10}, true, 5), (std::vector<double>{1, 2, 5, 10}));
+  EXPECT_EQ(TicksOf({0.021, 0.049}, true, 3),
+            (std::vector<double>{0.03, 0.04}));  // Within a decade, as on a plain axis.
+  EXPECT_LE(TicksOf({1e-30, 1e3}, true, 8).size(), 9u);
 }
 
 TEST(PlotAxes, RangesAreNeverEmpty) {

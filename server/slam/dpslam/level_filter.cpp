@@ -18,7 +18,6 @@ bool ShowsRays(std::span<const Evidence> alternatives) {
 }  // namespace
 
 void Visit(OptionVisitor& visitor, LevelOptions& options) {
-  visitor.Integer("particles", options.particles, "1", 1, 10000, "More: longer loops close, in more time and memory.");
   visitor.Real("sigma_m", options.sigma_m, "m", 0.005, 1.0, "Of a range against the map. More: more particles agree.");
   visitor.Real("evidence_share", options.evidence_share, "1", 0.001, 1.0,
                "Of a ray's log likelihood: neighbouring rays err alike. 1: all rays are independent.");

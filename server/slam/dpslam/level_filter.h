@@ -29,7 +29,7 @@ struct LevelOptions {
   double agreement_m = 0.5;  // Particles this near the best one take part in the reported pose.
   MotionNoise drift;         // Low: of a step, on top of what the front-end says. High: of a segment, at its joint.
 };
-void Visit(OptionVisitor& visitor, LevelOptions& options);
+void Visit(OptionVisitor& visitor, LevelOptions& options);  // All but `particles`.
 
 struct GridParticle {
   Pose2 T_map_robot;
