@@ -75,17 +75,19 @@ void AddSim(CLI::App& app, Program& program) {
   for (const std::string& name : sim::ShippedWorldNames()) worlds += " " + name;
   worlds += "; in space:";
   for (const std::string& name : sim::ShippedWorld3Names()) worlds += " " + name;
-  command->footer("Worlds that come with the program:" + worlds +
-                  "; the formats of others are in client/sim/README.md.\n"
-                  "Robots start at the true poses printed, so poses in the map compare with the truth as they are.\n"
-                  "The same seed gives the same scans. Exit code 1 where a scan is unexplained.\n"
-                  "EXAMPLES\n  cairn sim --world building --robots 3 --site hall --seconds 120 --truth-dir truth\n"
-                  "  cairn sim --robots 16 --beams 360 --hz 10 --site load --watch-pid $(pidof cairnd)\n"
-                  "  cairn sim --robots 1 --no-stream --log-dir logs --truth-dir truth\n"
-                  "  cairn sim --robots 1 --world hall3d --laser-model lms200 --nod=-60,45,36 --site hall --log-dir logs");
+  command->footer(
+      "Worlds that come with the program:" + worlds +
+      "; the formats of others are in client/sim/README.md.\n"
+      "Robots start at the true poses printed, so poses in the map compare with the truth as they are.\n"
+      "The same seed gives the same scans. Exit code 1 where a scan is unexplained.\n"
+      "EXAMPLES\n  cairn sim --world building --robots 3 --site hall --seconds 120 --truth-dir truth\n"
+      "  cairn sim --robots 16 --beams 360 --hz 10 --site load --watch-pid $(pidof cairnd)\n"
+      "  cairn sim --robots 1 --no-stream --log-dir logs --truth-dir truth\n"
+      "  cairn sim --robots 1 --world hall3d --laser-model lms200 --nod=-60,45,36 --site hall --log-dir logs");
   auto options = std::make_shared<SimRunOptions>();
   auto start_seconds = std::make_shared<double>(0.0);
-  command->add_option("--world", options->world, "A shipped world, or a world file (in space: .yaml)")->capture_default_str();
+  command->add_option("--world", options->world, "A shipped world, or a world file (in space: .yaml)")
+      ->capture_default_str();
   command->add_option("--site", options->site, "The site to map into");
   command->add_option("--robots", options->fleet.robots, "How many")->check(CLI::Range(1, 256))->capture_default_str();
   command->add_option("--prefix", options->prefix, "Robots are called PREFIX1, PREFIX2, ...")->capture_default_str();

@@ -48,7 +48,8 @@ std::shared_ptr<std::string> AddLaser(CLI::App& command, sim::LaserOptions& lase
       ->type_name("METRES")
       ->capture_default_str()
       ->excludes(named);
-  command.add_option("--error-share", laser.bound_share, "... this share of the range (step: instead, beyond the step)")
+  command
+      .add_option("--error-share", laser.bound_share, "... this share of the range (step: instead, beyond the step)")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str()
       ->excludes(named);

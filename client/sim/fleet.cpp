@@ -101,8 +101,8 @@ Scan Fleet::TakeScan(std::size_t index, Stamp since_start) {
   if (options_.see_each_other) {
     for (std::size_t i = 0; i < robots_.size(); ++i) {
       if (i == index) continue;
-      posts.push_back({{robots_[i].robot.PoseAt(seconds).translation(), options_.robot_radius_m},
-                       options_.robot_height_m});
+      posts.push_back(
+          {{robots_[i].robot.PoseAt(seconds).translation(), options_.robot_radius_m}, options_.robot_height_m});
     }
   }
   const Stamp stamp = options_.first_stamp + since_start;

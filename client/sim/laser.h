@@ -1,8 +1,9 @@
 // A planar laser scanner in a simulated world: exact ray casts, then noise and dropouts.
-// A range is r plus an error of one of three kinds (range_error.h), normal unless told otherwise. What nothing hits reads +infinity (ROS REP 117); a dropout reads
-// 0, which says nothing. Beams start at the scan's stamp and follow each other within `sweep_s`, while the robot moves.
-// The scan plane may be tilted about the laser's y axis, positive downwards, while all beams of a scan share one tilt.
-// Frames: beams in `laser`, mounted at T_robot_laser, `height_m` above the floor. Source: thesis C 4.3.2, 4.3.3.
+// A range is r plus an error of one of three kinds (range_error.h), normal unless told otherwise. What nothing hits
+// reads +infinity (ROS REP 117); a dropout reads 0, which says nothing. Beams start at the scan's stamp and follow each
+// other within `sweep_s`, while the robot moves. The scan plane may be tilted about the laser's y axis, positive
+// downwards, while all beams of a scan share one tilt. Frames: beams in `laser`, mounted at T_robot_laser, `height_m`
+// above the floor. Source: thesis C 4.3.2, 4.3.3.
 #pragma once
 
 #include <span>
@@ -19,11 +20,11 @@ struct LaserOptions {
   int beams = 360;                            // 1..8192.
   double field_of_view_rad = Radians(270.0);  // Centred on the laser's x axis; a full turn has no beam twice.
   double range_min_m = 0.05;
-  double range_max_m = 30.0;     // Farther walls are not seen.
+  double range_max_m = 30.0;  // Farther walls are not seen.
   RangeErrorKind error = RangeErrorKind::kSigma;
-  double noise_m = 0.01;         // kSigma: standard deviation at any range...
-  double noise_share = 0.001;    // ... and what is added to it per metre of range.
-  double bound_m = 0.01;         // kPercent, kStep: see range_error.h.
+  double noise_m = 0.01;       // kSigma: standard deviation at any range...
+  double noise_share = 0.001;  // ... and what is added to it per metre of range.
+  double bound_m = 0.01;       // kPercent, kStep: see range_error.h.
   double bound_share = 0.01;
   double step_m = 1.0;
   double dropout_share = 0.002;  // Of all beams, 0..1.

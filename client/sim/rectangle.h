@@ -17,8 +17,8 @@ struct Rectangle {
   [[nodiscard]] Eigen::Vector3d normal() const;  // Of length 1.
 };
 
-// Distance along the ray (`direction` of length 1) to the rectangle; kNothingHit where it misses, runs alongside or lies
-// behind. The rim counts as hit: rectangles that share an edge leave no gap.
+// Distance along the ray (`direction` of length 1) to the rectangle; kNothingHit where it misses, runs alongside or
+// lies behind. The rim counts as hit: rectangles that share an edge leave no gap.
 [[nodiscard]] double CastAtRectangle(const Rectangle& rectangle, const Eigen::Vector3d& origin_map,
                                      const Eigen::Vector3d& direction);
 

@@ -54,10 +54,9 @@ void RectangleTree::Build(std::int32_t begin, std::int32_t end) {
   Eigen::Index axis = 0;
   centers.sizes().maxCoeff(&axis);
   const std::int32_t middle = begin + (end - begin) / 2;
-  std::nth_element(rectangles_.begin() + begin, rectangles_.begin() + middle, rectangles_.begin() + end,
-                   [axis](const Rectangle& a, const Rectangle& b) {
-                     return BoxOf(a).center()(axis) < BoxOf(b).center()(axis);
-                   });
+  std::nth_element(
+      rectangles_.begin() + begin, rectangles_.begin() + middle, rectangles_.begin() + end,
+      [axis](const Rectangle& a, const Rectangle& b) { return BoxOf(a).center()(axis) < BoxOf(b).center()(axis); });
   Build(begin, middle);
   nodes_[index].right = static_cast<std::int32_t>(nodes_.size());
   Build(middle, end);
@@ -79,8 +78,7 @@ double RectangleTree::Cast(const Eigen::Vector3d& origin_map, const Eigen::Vecto
       continue;
     }
     for (std::int32_t i = node.begin; i < node.end; ++i)
-      nearest =
-          std::min(nearest, CastAtRectangle(rectangles_[static_cast<std::size_t>(i)], origin_map, direction));
+      nearest = std::min(nearest, CastAtRectangle(rectangles_[static_cast<std::size_t>(i)], origin_map, direction));
   }
   return nearest <= max_m ? nearest : kNothingHit;
 }

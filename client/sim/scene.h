@@ -1,5 +1,5 @@
-// What a laser's rays can hit in a world: what stands still (a scene), and what moves (posts). A scene is flat, with walls
-// of any height and no floor, or made of rectangles in space. Frame: `map`, metres, z up. Immutable, thread-safe.
+// What a laser's rays can hit in a world: what stands still (a scene), and what moves (posts). A scene is flat, with
+// walls of any height and no floor, or made of rectangles in space. Frame: `map`, metres, z up. Immutable, thread-safe.
 #pragma once
 
 #include <limits>

@@ -64,7 +64,8 @@ Result<World3> OpenWorld3(const std::string& name_or_path) {
 }
 
 Result<Surroundings> OpenSurroundings(const std::string& name_or_path) {
-  if (IsSpatial(name_or_path)) return OpenWorld3(name_or_path).map([](World3&& w) { return SurroundingsOf(std::move(w)); });
+  if (IsSpatial(name_or_path))
+    return OpenWorld3(name_or_path).map([](World3&& w) { return SurroundingsOf(std::move(w)); });
   return OpenWorld(name_or_path).map([](World&& w) { return SurroundingsOf(std::move(w)); });
 }
 

@@ -1,5 +1,5 @@
-// What a fleet drives in, flat or in space: what stands still, who walks, and where the routes lead. A value: copies share
-// what is immutable.
+// What a fleet drives in, flat or in space: what stands still, who walks, and where the routes lead. A value: copies
+// share what is immutable.
 #pragma once
 
 #include <memory>

@@ -1,5 +1,5 @@
-// A mount that nods the scanner now and then: after a number of level scans, one sweep of tilted ones, each taken at one
-// tilt. The robot halts for it, unless told to drive on. Tilts are about the laser's y axis, positive downwards.
+// A mount that nods the scanner now and then: after a number of level scans, one sweep of tilted ones, each taken at
+// one tilt. The robot halts for it, unless told to drive on. Tilts are about the laser's y axis, positive downwards.
 // Source: thesis C 4.3.2 (rotation about the lateral axis), 6 ("the robot stops and the platform rotates").
 #pragma once
 
@@ -11,7 +11,7 @@
 namespace cairn::sim {
 
 struct TiltOptions {
-  int scans = 0;  // Of one nod; 0: the mount is fixed and level.
+  int scans = 0;                      // Of one nod; 0: the mount is fixed and level.
   double first_rad = Radians(-60.0);  // Up ...
   double last_rad = Radians(45.0);    // ... to down.
   int level_scans = 60;               // Between nods.

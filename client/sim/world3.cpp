@@ -24,12 +24,10 @@ Rectangle Slab(const Eigen::Vector2d& from_map, const Eigen::Vector2d& to_map, d
 void AppendBox(const Box& box, std::vector<Rectangle>* rectangles) {
   const Pose2 T_map_box{box.center_map.x(), box.center_map.y(), WrapAngle(box.turn_rad)};
   const Eigen::Vector2d half = box.size_m / 2;
-  const Eigen::Vector2d corners[] = {T_map_box * Eigen::Vector2d(-half.x(), -half.y()),
-                                     T_map_box * Eigen::Vector2d(half.x(), -half.y()),
-                                     T_map_box * Eigen::Vector2d(half.x(), half.y()),
-                                     T_map_box * Eigen::Vector2d(-half.x(), half.y())};
-  for (int i = 0; i < 4; ++i)
-    rectangles->push_back(Upright(corners[i], corners[(i + 1) % 4], box.bottom_m, box.top_m));
+  const Eigen::Vector2d corners[] = {
+      T_map_box * Eigen::Vector2d(-half.x(), -half.y()), T_map_box * Eigen::Vector2d(half.x(), -half.y()),
+      T_map_box * Eigen::Vector2d(half.x(), half.y()), T_map_box * Eigen::Vector2d(-half.x(), half.y())};
+  for (int i = 0; i < 4; ++i) rectangles->push_back(Upright(corners[i], corners[(i + 1) % 4], box.bottom_m, box.top_m));
   for (const double height : {box.bottom_m, box.top_m})
     rectangles->push_back({At(corners[0], height), At(corners[1] - corners[0], 0.0), At(corners[3] - corners[0], 0.0)});
 }

@@ -52,7 +52,8 @@ class Keys {
     if (!node.IsMap()) Complain(node, what_ + " must be a map");
     for (const auto& entry : node) {
       if (!entry.first.IsScalar()) Complain(entry.first, what_ + ": a key must be a word");
-      if (!left_.insert(entry.first.Scalar()).second) Complain(entry.first, what_ + ": '" + entry.first.Scalar() + "' is there twice");
+      if (!left_.insert(entry.first.Scalar()).second)
+        Complain(entry.first, what_ + ": '" + entry.first.Scalar() + "' is there twice");
     }
   }
 
@@ -116,8 +117,8 @@ Rectangle TakeSlab(Keys& keys) {
 }
 
 Box TakeBox(Keys& keys) {
-  Box box{keys.Point2("center"), keys.Point2("size"), Radians(keys.Number("degrees", 0.0)),
-          keys.Number("bottom", 0.0), keys.Number("top")};
+  Box box{keys.Point2("center"), keys.Point2("size"), Radians(keys.Number("degrees", 0.0)), keys.Number("bottom", 0.0),
+          keys.Number("top")};
   if ((box.size_m.array() <= 0.0).any()) Complain(keys.node(), "a box needs a size");
   RequireRise(keys, box.bottom_m, box.top_m);
   return box;
@@ -170,7 +171,8 @@ Route TakeRoute(Keys& keys) {
   if (!points.IsSequence() || points.size() < 2) Complain(points, "a route needs at least 2 points");
   for (const YAML::Node& node : points) {
     const Eigen::Vector2d point = Point<2>(node, "point");
-    if (!route.waypoints_map.empty() && route.waypoints_map.back() == point) Complain(node, "two equal points in a row");
+    if (!route.waypoints_map.empty() && route.waypoints_map.back() == point)
+      Complain(node, "two equal points in a row");
     route.waypoints_map.push_back(point);
   }
   return route;

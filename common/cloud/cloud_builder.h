@@ -1,6 +1,6 @@
-// Gathers a cloud from scans and the path a robot took: each scan is placed at the path's pose at its stamp, between two
-// poses that are near enough in time. Thinned to one point per cube of `voxel_m`, so memory grows with what was seen, not
-// with how long. Bounded. Deterministic. Not thread-safe.
+// Gathers a cloud from scans and the path a robot took: each scan is placed at the path's pose at its stamp, between
+// two poses that are near enough in time. Thinned to one point per cube of `voxel_m`, so memory grows with what was
+// seen, not with how long. Bounded. Deterministic. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -13,11 +13,11 @@
 namespace cairn {
 
 struct CloudOptions {
-  double height_m = 0.0;       // Of the scanner above the floor.
-  double max_range_m = 1e4;    // Farther hits are left out.
-  double voxel_m = 0.0;        // 0: every point is kept.
-  double max_pose_gap_s = 1.0;  // Between the two poses around a scan; more: the scan has no place.
-  bool tilted_only = false;    // Leave out level scans.
+  double height_m = 0.0;                 // Of the scanner above the floor.
+  double max_range_m = 1e4;              // Farther hits are left out.
+  double voxel_m = 0.0;                  // 0: every point is kept.
+  double max_pose_gap_s = 1.0;           // Between the two poses around a scan; more: the scan has no place.
+  bool tilted_only = false;              // Leave out level scans.
   std::size_t max_points = 100'000'000;  // 1.2 GB.
 };
 [[nodiscard]] Result<void> Validate(const CloudOptions& options);

@@ -61,7 +61,8 @@ TEST(LaserInSpace, RangesAreExactAgainstGeometry) {
         const double x = std::cos(bearing) * std::cos(tilt), y = std::sin(bearing);
         const double c = std::cos(T_map_laser.theta), s = std::sin(T_map_laser.theta);
         const Eigen::Vector3d d(c * x - s * y, s * x + c * y, -std::cos(bearing) * std::sin(tilt));
-        EXPECT_NEAR(scan.ranges_m[static_cast<std::size_t>(i)], RangeInBox({T_map_laser.x, T_map_laser.y, 0.6}, d), 2e-5)
+        EXPECT_NEAR(scan.ranges_m[static_cast<std::size_t>(i)], RangeInBox({T_map_laser.x, T_map_laser.y, 0.6}, d),
+                    2e-5)
             << tilt_deg << " " << heading << " beam " << i;
       }
       EXPECT_TRUE(ValidateScan(scan));

@@ -30,7 +30,9 @@ TEST(CloudFile, EveryFormatReadsBackBitForBit) {
 TEST(CloudFile, HeadersSayWhatTheFormatsAskFor) {
   const std::string ply = EncodeCloud(kCloud, CloudFormat::kPlyText);
   EXPECT_EQ(ply.substr(0, 21), "ply\nformat ascii 1.0\n");
-  EXPECT_THAT(ply, HasSubstr("element vertex 3\nproperty float x\nproperty float y\nproperty float z\nend_header\n1.5 -2.25 0.1\n"));
+  EXPECT_THAT(
+      ply,
+      HasSubstr("element vertex 3\nproperty float x\nproperty float y\nproperty float z\nend_header\n1.5 -2.25 0.1\n"));
   const std::string pcd = EncodeCloud(kCloud, CloudFormat::kPcd);
   EXPECT_THAT(pcd, HasSubstr("FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 3\nHEIGHT 1\n"));
   EXPECT_THAT(pcd, HasSubstr("POINTS 3\nDATA binary\n"));
@@ -39,7 +41,8 @@ TEST(CloudFile, HeadersSayWhatTheFormatsAskFor) {
 
 TEST(CloudFile, FilesOfOtherProgramsWithMoreFieldsAreRead) {
   const auto ply = DecodeCloud(
-      "ply\r\nformat ascii 1.0\nelement vertex 2\nproperty uchar red\nproperty float z\nproperty float x\nproperty float y\n"
+      "ply\r\nformat ascii 1.0\nelement vertex 2\nproperty uchar red\nproperty float z\nproperty float x\nproperty "
+      "float y\n"
       "element face 0\nproperty list uchar int vertex_indices\nend_header\n255 3 1 2\n0 6 4 5\n");
   ASSERT_TRUE(ply) << ply.error().message;
   EXPECT_EQ(*ply, (PointCloud{{1, 2, 3}, {4, 5, 6}}));
@@ -59,10 +62,14 @@ TEST(CloudFile, BrokenFilesAreRefused) {
       "ply\nformat ascii 1.0\nend_header\n",
       "ply\nformat binary_big_endian 1.0\nelement vertex 0\nend_header\n",
       "ply\nformat ascii 1.0\nelement vertex -1\nproperty float x\nproperty float y\nproperty float z\nend_header\n",
-      "ply\nformat ascii 1.0\nelement vertex 99999999999999\nproperty float x\nproperty float y\nproperty float z\nend_header\n",
-      "ply\nformat ascii 1.0\nelement vertex 400000000\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 2 3\n",
-      "ply\nformat ascii 1.0\nelement vertex 1\nproperty double x\nproperty float y\nproperty float z\nend_header\n1 2 3\n",
-      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 two 3\n",
+      "ply\nformat ascii 1.0\nelement vertex 99999999999999\nproperty float x\nproperty float y\nproperty float "
+      "z\nend_header\n",
+      "ply\nformat ascii 1.0\nelement vertex 400000000\nproperty float x\nproperty float y\nproperty float "
+      "z\nend_header\n1 2 3\n",
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty double x\nproperty float y\nproperty float z\nend_header\n1 2 "
+      "3\n",
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n1 "
+      "two 3\n",
       "ply\nformat ascii 1.0\nelement face 1\nelement vertex 1\nend_header\n",
       good.substr(0, good.size() - 1),
       pcd.substr(0, pcd.size() - 6),

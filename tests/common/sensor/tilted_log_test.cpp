@@ -57,7 +57,8 @@ TEST(TiltedLog, ScansComeBackWithTheirTilt) {
     EXPECT_EQ(scans[i].range_max_m, 80.0);
     EXPECT_NEAR(scans[i].T_robot_laser.x, 0.12, 1e-9);
     for (std::size_t k = 0; k < 201; ++k) {
-      const BeamClass was = ClassifyRange(written[i].ranges_m[k], 0, 80), is = ClassifyRange(scans[i].ranges_m[k], 0, 80);
+      const BeamClass was = ClassifyRange(written[i].ranges_m[k], 0, 80),
+                      is = ClassifyRange(scans[i].ranges_m[k], 0, 80);
       EXPECT_EQ(is, was);
       if (was == BeamClass::kHit) {
         EXPECT_EQ(scans[i].ranges_m[k], written[i].ranges_m[k]);
