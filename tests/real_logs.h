@@ -1,24 +1,12 @@
-// Where the published robot logs are: $CAIRN_DATA, or ../shared/data beside the source tree. They are not part of the
-// repository; a test that needs one says CAIRN_NEED_LOG(path, "intel.clf") and is skipped with a reason without it.
+// The published robot logs in tests (real_log_path.h says where they are): a test that needs one says
+// CAIRN_NEED_LOG(path, "intel.clf") and is skipped with a reason without it.
 #pragma once
 
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
-#include <string>
 
-namespace cairn {
-
-inline std::filesystem::path RealLog(const std::string& name) {
-  const char* directory = std::getenv("CAIRN_DATA");
-  if (directory != nullptr) return std::filesystem::path(directory) / name;
-  // Set by ctest. Not compiled in: that would tie cached objects to one clone.
-  const char* source = std::getenv("CAIRN_SOURCE_DIR");
-  return std::filesystem::path(source != nullptr ? source : ".") / "../shared/data" / name;
-}
-
-}  // namespace cairn
+#include "tests/real_log_path.h"
 
 #define CAIRN_NEED_LOG(variable, name)                                                              \
   const std::filesystem::path variable = ::cairn::RealLog(name);                                    \

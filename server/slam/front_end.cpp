@@ -18,6 +18,13 @@ constexpr std::array<double, 4> kTurns = {0.25, 0.5, 0.75, 1.0};
 
 }  // namespace
 
+void Visit(OptionVisitor& visitor, NoOdometryOptions& options) {
+  visitor.Flag("constant_velocity", options.constant_velocity,
+               "The robot is expected to go on as between the last two scans; false: to stand still.");
+  visitor.Real("sigma_m", options.sigma_m, "m", 0.001, 100.0, "Of the expectation; larger: the scan decides more.");
+  visitor.Real("sigma_rad", options.sigma_rad, "rad", 0.001, kPi, "See sigma_m.");
+}
+
 void Visit(OptionVisitor& visitor, FrontEndOptions& options) {
   visitor.Section("features", "Lines and corners taken from a scan.", [&] { Visit(visitor, options.features); });
   visitor.Section("surface", "Points and surface directions taken from a scan.",
@@ -27,6 +34,9 @@ void Visit(OptionVisitor& visitor, FrontEndOptions& options) {
     Visit(visitor, options.refine);
   });
   visitor.Section("odometry", "How far odometry is trusted between scans.", [&] { Visit(visitor, options.odometry); });
+  visitor.Flag("use_odometry", options.use_odometry, "False: scans alone tell the motion.");
+  visitor.Section("no_odometry", "What stands in for odometry where it is not used.",
+                  [&] { Visit(visitor, options.no_odometry); });
   visitor.Integer("reference_keyframes", options.reference_keyframes, "1", 1, 1000,
                   "Keyframes matched against; more: steadier, until drift blurs them.");
   visitor.Real("retry_below", options.retry_below, "1", 0.0, 1.0,
@@ -46,15 +56,15 @@ ScanView Look(const Scan& scan, const FrontEndOptions& options) {
 TrackStep FrontEnd::Track(const ScanView& view, const Pose2& T_odom_robot, const ParallelFor& parallel_for) {
   TrackStep step;
   if (started_) {
-    const Sight& last = history_.back();
-    const Pose2 motion = Between(last.T_odom_robot, T_odom_robot);
-    const Eigen::Matrix3d J = J_compose_right(last.T_track_robot, motion);
-    const Guess guess{last.T_track_robot * motion, J * options_.odometry.Covariance(motion) * J.transpose()};
+    Guess guess = Predict(T_odom_robot);
     const MatchResult coarse = MatchLastKeyframe(view, guess, parallel_for);
+    // A forecast is no observation: where the refinement sees nothing, the matcher's answer stays.
+    if (!options_.use_odometry && options_.refine_enabled && coarse.converged) guess.T_track_robot = coarse.T_prev_curr;
     step.match = options_.refine_enabled ? Refine(view, T_odom_robot, guess, coarse) : Trust(coarse, guess);
     step.matcher = coarse.failure;
     step.matched = step.match.converged;
     step.moved_m = Between(T_track_robot_, step.match.T_prev_curr).translation().norm();
+    if (!step.matched && !options_.use_odometry) step.moved_m = std::max(step.moved_m, options_.no_odometry.sigma_m);
     T_track_robot_ = step.match.T_prev_curr;
   }
   started_ = true;
@@ -62,6 +72,21 @@ TrackStep FrontEnd::Track(const ScanView& view, const Pose2& T_odom_robot, const
   history_.push_back({T_track_robot_, T_odom_robot});
   if (history_.size() > kHistory) history_.pop_front();
   return step;
+}
+
+FrontEnd::Guess FrontEnd::Predict(const Pose2& T_odom_robot) const {
+  const Sight& last = history_.back();
+  if (options_.use_odometry) {
+    const Pose2 motion = Between(last.T_odom_robot, T_odom_robot);
+    const Eigen::Matrix3d J = J_compose_right(last.T_track_robot, motion);
+    return {last.T_track_robot * motion, J * options_.odometry.Covariance(motion) * J.transpose()};
+  }
+  const NoOdometryOptions& expected = options_.no_odometry;
+  Pose2 motion;
+  if (expected.constant_velocity && history_.size() > 1)
+    motion = Between(history_[history_.size() - 2].T_track_robot, last.T_track_robot);
+  const Eigen::Vector3d sigma(expected.sigma_m, expected.sigma_m, expected.sigma_rad);
+  return {last.T_track_robot * motion, sigma.cwiseAbs2().asDiagonal()};
 }
 
 // In track: the matcher itself works in the keyframe's frame.
@@ -119,7 +144,7 @@ MatchResult FrontEnd::Refine(const ScanView& view, const Pose2& T_odom_robot, co
   };
   consider(history_.back().T_track_robot);
   for (const std::size_t back : kLookBack) {
-    if (history_.size() < back) continue;
+    if (!options_.use_odometry || history_.size() < back) continue;
     const Sight& sight = history_[history_.size() - back];
     consider(sight.T_track_robot * Between(sight.T_odom_robot, T_odom_robot));
   }

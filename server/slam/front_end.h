@@ -18,12 +18,22 @@
 
 namespace cairn::slam {
 
+// What is believed of the next scan's pose while the odometry is withheld: the robot stands still, or goes on as it did.
+struct NoOdometryOptions {
+  bool constant_velocity = false;  // Per scan, not per second: stamps of real logs come in bursts.
+  double sigma_m = 0.3;            // Of the prediction in x and y; also what an unmatched scan counts as travelled.
+  double sigma_rad = 0.2;
+};
+void Visit(OptionVisitor& visitor, NoOdometryOptions& options);
+
 struct FrontEndOptions {
   FeatureOptions features;
   SurfaceOptions surface;
   bool refine_enabled = true;  // False: the matcher's own answer is the pose.
   PointToLineOptions refine;
   MotionNoise odometry{0.05, 0.8, 0.0, 0.04, 0.4, 1.2};  // Generous: real odometry freezes, jumps, comes late.
+  bool use_odometry = true;  // False: tracking and mapping see scans only (thesis C 4.4).
+  NoOdometryOptions no_odometry;
   std::int64_t reference_keyframes = 40;  // Scans matched against; more: steadier, until drift blurs them.
   double retry_below = 0.65;              // Score under which other guesses than odometry are tried.
   double max_jump_sigma = 5.0;  // Without refinement: a matcher's answer farther from odometry is a fault (3.6.1).
@@ -54,11 +64,12 @@ class FrontEnd {
     Pose2 T_track_robot;
     Pose2 T_odom_robot;
   };
-  // Where the robot is by odometry since the last scan, in track.
+  // Where the robot is by odometry since the last scan, or by the forecast that stands in for it, in track.
   struct Guess {
     Pose2 T_track_robot;
     Eigen::Matrix3d covariance;
   };
+  [[nodiscard]] Guess Predict(const Pose2& T_odom_robot) const;
   [[nodiscard]] MatchResult MatchLastKeyframe(const ScanView& view, const Guess& guess,
                                               const ParallelFor& parallel_for) const;
   [[nodiscard]] MatchResult Refine(const ScanView& view, const Pose2& T_odom_robot, const Guess& guess,

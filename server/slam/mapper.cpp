@@ -4,16 +4,28 @@
 
 #include "server/slam/filters/make_filter.h"
 #include "server/slam/front_end.h"
+#include "server/slam/grid/grid_redraw.h"
+#include "server/slam/matching/loop_search.h"
 #include "server/slam/matching/revisit_search.h"
 #include "server/slam/scan/tilt.h"
+#include "server/slam/smoothing/keyframe_graph.h"
 
 namespace cairn::slam {
+
+namespace {
+
+// Keyframes drawn again with every scan after a large loop: a few milliseconds' worth.
+constexpr std::size_t kRedrawnPerScan = 20;
+
+}  // namespace
 
 struct Mapper::State {
   State(const MapperOptions& given, const Pose2& T_map_robot_start, std::uint64_t seed)
       : options(given),
         front_end(given.front_end, given.matcher, given.matching),
         revisits(given.revisit, given.front_end.refine),
+        loops(given.loop, given.front_end.refine),
+        graph(given.filter.back_end.drift),
         filter(MakeFilter(given.filter.kind, given.filter, T_map_robot_start, seed)),
         grid(given.grid) {}
 
@@ -21,12 +33,18 @@ struct Mapper::State {
   ScanOutcome Coast(Stamp stamp, const Pose2& T_odom_robot);
   void AddKeyframe(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot, ScanView view, const TrackStep& step,
                    const ParallelFor& parallel_for);
+  void CloseLargeLoop();
+  void Redraw();
 
   const MapperOptions options;
   FrontEnd front_end;
   RevisitSearch revisits;
+  LoopSearch loops;
+  KeyframeGraph graph;
+  std::vector<double> distances_m;  // Along the graph, from the last keyframe to each.
   std::unique_ptr<Filter> filter;
   OccupancyGrid grid;
+  std::optional<GridRedraw> redraw;  // Under way since a large loop was closed.
 
   std::vector<Keyframe> keyframes;
   std::vector<KeyframeShape> shapes;  // One per keyframe.
@@ -37,6 +55,8 @@ struct Mapper::State {
   Pose2 T_odom_level;        // ... and odometry there.
   double travelled_m = 0.0;  // Up to the last keyframe.
   double unmatched_m = 0.0;  // Travelled by odometry alone since the last match.
+  // Of what was travelled by odometry alone since the last keyframe, in that keyframe.
+  Eigen::Matrix3d blind_covariance = Eigen::Matrix3d::Zero();
 };
 
 namespace {
@@ -61,10 +81,13 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   ScanOutcome outcome;
   outcome.stamp = scan->stamp;
 
+  s.Redraw();
+
   // Where the front-end sees the robot, and how far that is from the last keyframe.
   ScanView view = Look(*scan, s.options.front_end);
   const TrackStep step = s.front_end.Track(view, T_odom_robot, parallel_for);
   s.unmatched_m = step.matched || s.keyframes.empty() ? 0.0 : s.unmatched_m + step.moved_m;
+  if (!step.matched) s.blind_covariance += s.options.blind.Covariance({step.moved_m, 0.0, 0.0});
   const bool first = s.keyframes.empty();
   Pose2 T_keyframe_robot = first ? Pose2{} : Between(s.shapes.back().T_track_robot, step.T_track_robot);
 
@@ -81,7 +104,8 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   outcome.covariance = s.filter->estimate().covariance;
   outcome.score = first ? 1.0 : step.match.score;
   outcome.reason = first ? PoseReason::kTracking : ReasonOf(step, s.unmatched_m, s.options.lost_after_m);
-  outcome.localized = outcome.reason != PoseReason::kLost;
+  if (s.filter->health().diverged) outcome.reason = PoseReason::kDiverged;
+  outcome.localized = outcome.reason != PoseReason::kLost && outcome.reason != PoseReason::kDiverged;
   s.level = outcome;
   s.level_place = s.scans.back();
   s.T_odom_level = T_odom_robot;
@@ -101,7 +125,7 @@ ScanOutcome Mapper::State::Coast(Stamp stamp, const Pose2& T_odom_robot) {
   scans.push_back({stamp, level_place.keyframe, level_place.T_keyframe_robot * moved});
   outcome.T_map_robot = level.T_map_robot * moved;
   const Eigen::Matrix3d J = J_compose_right(level.T_map_robot, moved);
-  outcome.covariance += J * options.front_end.odometry.Covariance(moved) * J.transpose();
+  outcome.covariance += J * options.blind.Covariance(moved) * J.transpose();
   if (outcome.localized) outcome.reason = PoseReason::kOdometryOnly;
   return outcome;
 }
@@ -111,17 +135,45 @@ void Mapper::State::AddKeyframe(std::shared_ptr<const Scan> scan, const Pose2& T
   if (!keyframes.empty()) {
     const Pose2 motion = Between(shapes.back().T_track_robot, step.T_track_robot);
     travelled_m += motion.translation().norm();
-    filter->Predict(motion, Eigen::Matrix3d::Zero());
-    if (const auto revisit = revisits.Find(view.points_robot, shapes, travelled_m, *filter, parallel_for))
-      filter->Observe(*revisit);
+    filter->Predict(motion, blind_covariance);
+    graph.Append(motion, blind_covariance);
+    blind_covariance.setZero();
+    const auto revisit = revisits.Find(view.points_robot, shapes, distances_m, travelled_m, *filter, parallel_for);
+    if (revisit && filter->Observe(*revisit))
+      graph.AddLoop(revisit->keyframe, keyframes.size(), revisit->T_keyframe_robot, revisit->covariance);
+  } else {
+    graph.Append({}, Eigen::Matrix3d::Zero());
   }
   filter->Observe(KeyframeSight{*scan, view, step.T_track_robot, travelled_m}, parallel_for);
   filter->Commit();
   front_end.AddKeyframe(view);
-  grid.Draw(*scan, filter->estimate().T_map_robot);
   keyframes.push_back({std::move(scan), T_odom_robot});
   shapes.push_back({step.T_track_robot, travelled_m, std::move(view.points_robot)});
+  distances_m = graph.DistancesFromLast();
+  CloseLargeLoop();
+  grid.Draw(*keyframes.back().scan, filter->estimate().T_map_robot);
   online_path.push_back(filter->estimate().T_map_robot);
+}
+
+// No particle may have gone the way a large loop turns out to have gone: then its error is spread over the whole path.
+void Mapper::State::CloseLargeLoop() {
+  const SharedSequence<Pose2> believed = filter->hypothesis(0).path;
+  const auto loop = loops.Find(keyframes, shapes, believed, distances_m);
+  if (!loop) return;
+  graph.AddLoop(loop->keyframe, keyframes.size() - 1, loop->T_keyframe_robot, loop->covariance);
+  distances_m = graph.DistancesFromLast();
+  std::vector<Pose2> path;
+  for (std::size_t k = 0; k < believed.size(); ++k) path.push_back(believed[k]);
+  if (graph.Optimise(path, options.pose_graph).usable && filter->Rebase(path)) redraw.emplace(options.grid);
+}
+
+void Mapper::State::Redraw() {
+  if (!redraw || !redraw->Advance(keyframes, filter->hypothesis(0).path, kRedrawnPerScan)) return;
+  const OccupancyGrid::Chunks old = grid.chunks();
+  grid = redraw->TakeGrid();
+  redraw.reset();
+  grid.MarkAllDirty();
+  for (const auto& [key, chunk] : old) grid.MarkDirty(key);
 }
 
 const OccupancyGrid& Mapper::grid() const {
@@ -146,6 +198,7 @@ MapperSnapshot Mapper::Snapshot() const {
 void Mapper::AdoptGrid(OccupancyGrid grid, std::size_t keyframes) {
   State& s = *state_;
   s.grid = std::move(grid);
+  s.redraw.reset();
   const SharedSequence<Pose2> path = s.filter->hypothesis(0).path;
   for (std::size_t k = keyframes; k < s.keyframes.size(); ++k) s.grid.Draw(*s.keyframes[k].scan, path[k]);
   s.grid.MarkAllDirty();

@@ -10,6 +10,8 @@ void Visit(OptionVisitor& visitor, MapperOptions& options) {
   Visit(visitor, options.filter);
   visitor.Real("lost_after_m", options.lost_after_m, "m", 0.0, 1000.0,
                "Travelled by odometry alone before the robot counts as lost.");
+  visitor.Section("blind", "Noise of motion known by odometry alone, besides the drift.",
+                  [&] { Visit(visitor, options.blind); });
   visitor.Real("max_tilt_rad", options.max_tilt_rad, "rad", 0.0, 1.58,
                "Scans tilted further get a pose from odometry but are not matched or drawn.");
   VisitEnum(visitor, "matcher", options.matcher, MatcherNames(), "What compares a scan with the last keyframe.");
@@ -18,6 +20,8 @@ void Visit(OptionVisitor& visitor, MapperOptions& options) {
   visitor.Section("front_end", "From scan to scan.", [&] { Visit(visitor, options.front_end); });
   visitor.Section("gate", "When a scan is worth an update of filter and map.", [&] { Visit(visitor, options.gate); });
   visitor.Section("revisit", "Recognising places seen before.", [&] { Visit(visitor, options.revisit); });
+  visitor.Section("loop", "Finding large loops.", [&] { Visit(visitor, options.loop); });
+  visitor.Section("pose_graph", "The path that fits all loops best.", [&] { Visit(visitor, options.pose_graph); });
   visitor.Section("grid", "The occupancy grid.", [&] { Visit(visitor, options.grid); });
   visitor.Section("pairing", "Joining scans and odometry by their stamps.", [&] { Visit(visitor, options.pairing); });
 }

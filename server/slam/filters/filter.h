@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "common/geometry/pose2.h"
@@ -61,6 +62,9 @@ class Filter {
   virtual void Observe(const KeyframeSight& sight, const ParallelFor& parallel_for) = 0;
   // Ends the step: the pose joins the path.
   virtual void Commit() = 0;
+  // Between steps: a large loop showed that the way went like this, one pose per keyframe committed. Every hypothesis
+  // takes it, and what it saw moves with the keyframes it was seen from. False where the filter cannot.
+  virtual bool Rebase(std::span<const Pose2> /*path*/) { return false; }
 
   [[nodiscard]] virtual FilterEstimate estimate() const = 0;
   [[nodiscard]] virtual FilterHealth health() const = 0;

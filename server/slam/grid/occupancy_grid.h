@@ -70,6 +70,8 @@ class OccupancyGrid {
   [[nodiscard]] std::vector<ChunkKey> TakeDirty();
   [[nodiscard]] const Chunks& chunks() const { return chunks_; }
   void MarkAllDirty();
+  // Also a chunk this grid does not have: whoever mirrors the grid has to forget it.
+  void MarkDirty(const ChunkKey& key) { dirty_.insert(key); }
   // 0..100 or kUnknownCell at a point.
   [[nodiscard]] std::uint8_t OccupancyAt(const Eigen::Vector2d& p_map) const;
   [[nodiscard]] const GridOptions& options() const { return options_; }

@@ -1,9 +1,10 @@
 #include "server/slam/matching/point_to_line.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+
+#include "server/slam/matching/degeneracy.h"
 
 namespace cairn::slam {
 namespace {
@@ -50,16 +51,6 @@ Linearisation Linearise(std::span<const SurfacePoint> points_robot, const PointI
     if (std::abs(residual) < options.inlier_distance_m) ++sum.inliers;
   }
   return sum;
-}
-
-// The direction in which the pairs hold the translation least, with the heading free to follow.
-void JudgeDegeneracy(const Eigen::Matrix3d& H, double ratio, MatchResult& result) {
-  const Eigen::Matrix2d H_translation =
-      H.topLeftCorner<2, 2>() - H.topRightCorner<2, 1>() * H.bottomLeftCorner<1, 2>() / std::max(H(2, 2), 1e-12);
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
-  solver.computeDirect(H_translation);
-  result.degenerate = solver.eigenvalues()(0) < ratio * solver.eigenvalues()(1);
-  if (result.degenerate) result.degenerate_direction = solver.eigenvectors().col(0);
 }
 
 }  // namespace

@@ -8,14 +8,18 @@ namespace {
 
 // The old keyframe that shows most likely what the robot sees: near, and looking the same way.
 std::optional<std::size_t> NearestKeyframe(const Hypothesis& belief, const std::vector<KeyframeShape>& keyframes,
-                                           double travelled_m, const RevisitOptions& options) {
+                                           std::span<const double> distances_m, double travelled_m,
+                                           const RevisitOptions& options) {
   std::optional<std::size_t> nearest;
   double best = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < keyframes.size(); ++k) {
     if (travelled_m - keyframes[k].travelled_m < options.min_travel_m) break;
-    const Pose2 away = Between(belief.path[k], belief.T_map_robot);
-    const double distance = away.translation().norm(), turn = std::abs(away.theta);
-    if (distance > options.max_distance_m || turn > options.max_turn_rad) continue;
+    if (distances_m[k] > options.max_way_m) continue;
+    const Pose2& T_map_k = belief.path[k];
+    const double distance = (T_map_k.translation() - belief.T_map_robot.translation()).norm();
+    if (distance > options.max_distance_m) continue;
+    const double turn = std::abs(AngleDiff(T_map_k.theta, belief.T_map_robot.theta));
+    if (turn > options.max_turn_rad) continue;
     const double cost = distance + options.max_distance_m * turn / options.max_turn_rad;
     if (cost < best) {
       best = cost;
@@ -31,6 +35,8 @@ void Visit(OptionVisitor& visitor, RevisitOptions& options) {
   visitor.Flag("enabled", options.enabled, "Match scans with places seen before.");
   visitor.Real("min_travel_m", options.min_travel_m, "m", 0.0, 1000.0,
                "Between two sightings of a place; less: it is still the same visit.");
+  visitor.Real("max_way_m", options.max_way_m, "m", 0.0, 1e9,
+               "Along what is known, between here and there; beyond, a large loop has to be found first.");
   visitor.Real("max_distance_m", options.max_distance_m, "m", 0.1, 20.0, "Between the robot and the old keyframe.");
   visitor.Real("max_turn_rad", options.max_turn_rad, "rad", 0.05, 3.2, "Between their headings.");
   visitor.Integer("neighbours", options.neighbours, "1", 0, 100, "Keyframes on either side whose surfaces are added.");
@@ -48,11 +54,12 @@ RevisitSearch::RevisitSearch(const RevisitOptions& options, const PointToLineOpt
 }
 
 std::optional<RevisitObservation> RevisitSearch::Find(std::span<const SurfacePoint> points_robot,
-                                                      const std::vector<KeyframeShape>& keyframes, double travelled_m,
+                                                      const std::vector<KeyframeShape>& keyframes,
+                                                      std::span<const double> distances_m, double travelled_m,
                                                       const Filter& filter, const ParallelFor& parallel_for) {
   if (!options_.enabled) return std::nullopt;
   const Hypothesis best = filter.hypothesis(0);
-  const std::optional<std::size_t> centre = NearestKeyframe(best, keyframes, travelled_m, options_);
+  const std::optional<std::size_t> centre = NearestKeyframe(best, keyframes, distances_m, travelled_m, options_);
   if (!centre) return std::nullopt;
   BuildReference(keyframes, *centre);
   const Eigen::Matrix3d prior =

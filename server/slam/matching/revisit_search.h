@@ -11,20 +11,15 @@
 
 #include "server/slam/filters/filter.h"
 #include "server/slam/matching/point_to_line.h"
+#include "server/slam/matching/region.h"
 #include "server/slam/parallel_for.h"
 
 namespace cairn::slam {
 
-// What matching needs to know of a keyframe.
-struct KeyframeShape {
-  Pose2 T_track_robot;               // Front-end frame: true to its neighbours, drifting over the whole.
-  double travelled_m = 0.0;          // Along the path up to it.
-  std::vector<SurfacePoint> points;  // In its robot frame.
-};
-
 struct RevisitOptions {
   bool enabled = true;
   double min_travel_m = 12.0;   // Between the two sightings of a place; less: it is still the same visit.
+  double max_way_m = 60.0;      // Along what is known, between here and there; beyond, LoopSearch has to say so first.
   double max_distance_m = 3.0;  // Between the robot and the old keyframe, as believed.
   double max_turn_rad = 1.2;    // ... and their headings; a half-circle scanner sees nothing common beyond.
   std::int64_t neighbours = 8;  // Keyframes on either side whose surfaces are added.
@@ -41,8 +36,10 @@ class RevisitSearch {
  public:
   RevisitSearch(const RevisitOptions& options, const PointToLineOptions& align);
 
+  // `distances_m[k]`: along what is known, from the last keyframe to keyframe k.
   [[nodiscard]] std::optional<RevisitObservation> Find(std::span<const SurfacePoint> points_robot,
-                                                       const std::vector<KeyframeShape>& keyframes, double travelled_m,
+                                                       const std::vector<KeyframeShape>& keyframes,
+                                                       std::span<const double> distances_m, double travelled_m,
                                                        const Filter& filter, const ParallelFor& parallel_for);
 
  private:

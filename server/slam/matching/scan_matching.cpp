@@ -29,26 +29,32 @@ std::string_view MatcherName(MatcherKind kind) {
 
 void Visit(OptionVisitor& visitor, MatcherOptions& options) {
   visitor.Section("voting", "Seven criteria vote for pairs of lines.", [&] { Visit(visitor, options.voting); });
+  visitor.Section("ndt", "Normal distributions, Newton's algorithm.", [&] { Visit(visitor, options.ndt); });
+  visitor.Section("ndt_de", "Normal distributions, searched by differential evolution.",
+                  [&] { Visit(visitor, options.ndt_de); });
+  visitor.Section("line_lsq", "Least squares over pairs of lines.", [&] { Visit(visitor, options.line_lsq); });
+  visitor.Section("hough", "Correlation in the Hough domain.", [&] { Visit(visitor, options.hough); });
   visitor.Section("icp", "Points on surfaces, scan to scan.", [&] { Visit(visitor, options.icp); });
+  visitor.Section("correlative", "Every motion in a window.", [&] { Visit(visitor, options.correlative); });
 }
 
 MatchResult MatchScans(const ScanView& prev, const ScanView& curr, const MatchPrior& prior, MatcherKind kind,
-                       const MatcherOptions& options, const ParallelFor& /*parallel_for*/) {
+                       const MatcherOptions& options, const ParallelFor& parallel_for) {
   switch (kind) {
     case MatcherKind::kVoting:
       return MatchByVoting(prev.features, curr.features, prior.T_prev_curr, options.voting);
     case MatcherKind::kLineLsq:
-      return Unmatched(prior);
+      return MatchByLineLsq(prev.features, curr.features, prior, options.line_lsq);
     case MatcherKind::kHough:
-      return Unmatched(prior);
+      return MatchByHough(prev, curr, prior, options.hough, parallel_for);
     case MatcherKind::kNdt:
-      return Unmatched(prior);
+      return MatchByNdt(prev, curr, prior, options.ndt, parallel_for);
     case MatcherKind::kNdtDe:
-      return Unmatched(prior);
+      return MatchByDifferentialEvolution(prev, curr, prior, options.ndt_de, parallel_for);
     case MatcherKind::kIcp:
       return MatchByIcp(prev, curr, prior, options.icp);
     case MatcherKind::kCorrelative:
-      return Unmatched(prior);
+      return MatchByCorrelation(prev, curr, prior, options.correlative, parallel_for);
   }
   return Unmatched(prior);
 }

@@ -11,8 +11,13 @@
 
 #include "common/options/option_visitor.h"
 #include "server/slam/match_result.h"
+#include "server/slam/matching/correlative.h"
+#include "server/slam/matching/hough.h"
 #include "server/slam/matching/icp.h"
+#include "server/slam/matching/line_lsq.h"
 #include "server/slam/matching/match_prior.h"
+#include "server/slam/matching/ndt.h"
+#include "server/slam/matching/ndt_de.h"
 #include "server/slam/matching/scan_view.h"
 #include "server/slam/matching/voting.h"
 #include "server/slam/parallel_for.h"
@@ -26,7 +31,12 @@ enum class MatcherKind : std::uint8_t { kVoting = 0, kLineLsq, kHough, kNdt, kNd
 
 struct MatcherOptions {
   VotingOptions voting;
+  NdtOptions ndt;
+  NdtDeOptions ndt_de;
+  LineLsqOptions line_lsq;
+  HoughOptions hough;
   PointToLineOptions icp;
+  CorrelativeOptions correlative;
 };
 void Visit(OptionVisitor& visitor, MatcherOptions& options);
 

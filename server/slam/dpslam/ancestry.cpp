@@ -1,0 +1,82 @@
+#include "server/slam/dpslam/ancestry.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace cairn::slam {
+
+Ancestry::Ancestry() : nodes_(1), living_{0} {}
+
+void Ancestry::NextGeneration(std::vector<Birth> births) {
+  const std::vector<Id> parents = std::exchange(living_, {});
+  living_.reserve(births.size());
+  for (Birth& birth : births) living_.push_back(Add(parents[birth.parent], std::move(birth.changes)));
+  for (const Id id : parents) {
+    if (nodes_[id].child_count == 0)
+      RemoveChildless(id);
+    else if (nodes_[id].child_count == 1)
+      JoinOnlyChild(id);
+  }
+}
+
+Ancestry::Id Ancestry::Add(Id parent, MapChanges changes) {
+  Id id = static_cast<Id>(nodes_.size());
+  if (free_.empty()) {
+    nodes_.emplace_back();
+  } else {
+    id = free_.back();
+    free_.pop_back();
+  }
+  nodes_[id] = {parent, 0, 0, std::move(changes)};
+  ++nodes_[parent].child_count;
+  nodes_[parent].child_sum += id;
+  return id;
+}
+
+void Ancestry::RemoveChildless(Id id) {
+  while (nodes_[id].child_count == 0) {
+    const Id parent = nodes_[id].parent;
+    nodes_[id] = {};
+    free_.push_back(id);
+    --nodes_[parent].child_count;  // The line ends at the latest where a living particle branches off.
+    nodes_[parent].child_sum -= id;
+    id = parent;
+  }
+  if (nodes_[id].child_count == 1) JoinOnlyChild(id);
+}
+
+// The child takes the parent's place and keeps its own id, by which the living are known.
+void Ancestry::JoinOnlyChild(Id id) {
+  const Id child = static_cast<Id>(nodes_[id].child_sum);
+  Node& old = nodes_[id];
+  old.changes.Add(std::move(nodes_[child].changes));
+  nodes_[child].changes = std::move(old.changes);
+  nodes_[child].parent = old.parent;
+  if (old.parent != kNobody) nodes_[old.parent].child_sum += std::uint64_t{child} - id;
+  old = {};
+  free_.push_back(id);
+}
+
+void Ancestry::LineTo(Id id, std::vector<Id>& line) const {
+  line.clear();
+  for (; id != kNobody; id = nodes_[id].parent) line.push_back(id);
+  std::reverse(line.begin(), line.end());
+}
+
+std::size_t Ancestry::depth() const {
+  std::size_t deepest = 0;
+  std::vector<Id> line;
+  for (const Id id : living_) {
+    LineTo(id, line);
+    deepest = std::max(deepest, line.size());
+  }
+  return deepest;
+}
+
+std::size_t Ancestry::bytes() const {
+  std::size_t sum = nodes_.capacity() * sizeof(Node);
+  for (const Node& node : nodes_) sum += node.changes.bytes();
+  return sum;
+}
+
+}  // namespace cairn::slam

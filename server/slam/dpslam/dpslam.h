@@ -1,0 +1,60 @@
+// DP-SLAM: a particle filter whose particles own whole grid maps, stored as changes in their family tree. Flat, or
+// hierarchical: the low level maps one segment after the other in frames of their own; the high level joins finished
+// segments, each particle with drift of its own at every joint, and judges a segment's scans on the map it made so far.
+// No landmarks, no revisits: loops close because some particle's map agrees with what is seen again.
+// Frames: poses are T_map_robot; the low level works in the frame of the robot at the start of the segment.
+// Not thread-safe; deterministic for a seed, on any number of threads.
+// Source: Eliazar, Parr 2003-2005; thesis C 3.2.3, 4.5.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "server/slam/dpslam/dpslam_options.h"
+#include "server/slam/filters/filter.h"
+
+namespace cairn::slam {
+
+class DpSlam final : public Filter {
+ public:
+  DpSlam(const DpSlamOptions& options, const Pose2& T_map_robot_start, std::uint64_t seed);
+
+  void Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) override;
+  bool Observe(const RevisitObservation& /*revisit*/) override { return false; }
+  // REQUIRES: at most once a step.
+  void Observe(const KeyframeSight& sight, const ParallelFor& parallel_for) override;
+  // The same with rays at hand.
+  void Observe(std::shared_ptr<const LaserRays> rays, const ParallelFor& parallel_for);
+  void Commit() override;
+
+  [[nodiscard]] FilterEstimate estimate() const override;
+  [[nodiscard]] FilterHealth health() const override;
+  [[nodiscard]] std::size_t hypothesis_count() const override;
+  [[nodiscard]] Hypothesis hypothesis(std::size_t index) const override;
+  [[nodiscard]] std::vector<Landmark> landmarks() const override { return {}; }
+
+  // The low level's maps are of the present segment where there is a high level.
+  [[nodiscard]] const LevelFilter& low() const { return *low_; }
+  [[nodiscard]] const LevelFilter* high() const { return high_ ? &*high_ : nullptr; }
+  // The best particle's map, without the unfinished segment where there is a high level.
+  [[nodiscard]] OccupancyImage MapImage() const;
+  // Of all maps.
+  [[nodiscard]] std::size_t bytes() const;
+
+ private:
+  [[nodiscard]] bool SegmentEnds() const;
+  void EndSegment(const ParallelFor& parallel_for);
+
+  const DpSlamOptions options_;
+  Rng rng_;
+  std::optional<LevelFilter> low_;
+  std::optional<LevelFilter> high_;
+  std::vector<std::shared_ptr<const LaserRays>> segment_;  // Scans since the segment began.
+  double segment_m_ = 0.0;                                 // Travelled since then, and ...
+  double turned_rad_ = 0.0;                                // ... the last step's turn.
+  std::int64_t contradicted_ = 0;                          // Scans in a row.
+  bool observed_ = false;                                  // In this step.
+};
+
+}  // namespace cairn::slam

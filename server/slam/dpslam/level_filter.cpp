@@ -1,0 +1,157 @@
+#include "server/slam/dpslam/level_filter.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace cairn::slam {
+namespace {
+
+bool ShowsRays(std::span<const Evidence> alternatives) {
+  for (const Evidence& evidence : alternatives)
+    for (const PlacedRays& placed : evidence)
+      if (!placed.rays->rays.empty()) return true;
+  return false;
+}
+
+}  // namespace
+
+void Visit(OptionVisitor& visitor, LevelOptions& options) {
+  visitor.Integer("particles", options.particles, "1", 1, 10000, "More: longer loops close, in more time and memory.");
+  visitor.Real("sigma_m", options.sigma_m, "m", 0.005, 1.0, "Of a range against the map. More: more particles agree.");
+  visitor.Real("evidence_share", options.evidence_share, "1", 0.001, 1.0,
+               "Of a ray's log likelihood: neighbouring rays err alike. 1: all rays are independent.");
+  visitor.Real("outlier_share", options.outlier_share, "1", 0.0001, 0.99, "Rays that say nothing about the map.");
+  visitor.Real("resample_below", options.resample_below, "1", 0.0, 1.0,
+               "Share of particles that still count below which the set is resampled; 1: always.");
+  visitor.Integer("ray_stride", options.ray_stride, "1", 1, 1000, "Every n-th ray judges particles; all are drawn.");
+  visitor.Real(
+      "give_up_behind", options.give_up_behind, "1", 0.0, 1000.0,
+      "Weighted log likelihood behind the best, by a quarter of the rays, at which a particle dies; 0: never.");
+  visitor.Real("agreement_m", options.agreement_m, "m", 0.0, 100.0,
+               "Particles this near the best one take part in the reported pose.");
+  visitor.Section("drift", "Noise of a move.", [&] { Visit(visitor, options.drift); });
+}
+
+LevelFilter::LevelFilter(const LevelOptions& options, const OpacityOptions& opacity, const Pose2& T_map_robot_start)
+    : options_(options),
+      maps_(opacity),
+      particles_(static_cast<std::size_t>(options.particles)),
+      mean_(T_map_robot_start),
+      effective_(static_cast<double>(options.particles)) {
+  for (GridParticle& particle : particles_) particle.T_map_robot = T_map_robot_start;
+}
+
+void LevelFilter::Move(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev, Rng& rng) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+  solver.computeDirect(covariance_prev);
+  const Eigen::Matrix3d root = solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  for (GridParticle& particle : particles_) {
+    const Eigen::Vector3d draw(NormalDraw(rng), NormalDraw(rng), NormalDraw(rng));
+    const Eigen::Vector3d step = T_prev_curr.vector() + root * draw;
+    particle.T_map_robot = particle.T_map_robot * Pose2{step.x(), step.y(), WrapAngle(step.z())};
+  }
+  mean_ = mean_ * T_prev_curr;
+}
+
+void LevelFilter::Draw(const Evidence& evidence, const ParallelFor& parallel_for) {
+  const MapSample one{};
+  maps_.NextGeneration({&one, 1}, {&evidence, 1}, parallel_for);
+}
+
+void LevelFilter::Observe(std::span<const Evidence> alternatives, Rng& rng, const ParallelFor& parallel_for) {
+  // What each particle experiences, and where that leaves it.
+  std::vector<std::size_t> chosen(particles_.size(), 0);
+  if (alternatives.size() > 1 && !maps_.blank())
+    for (std::size_t& choice : chosen)
+      choice = std::min(alternatives.size() - 1,
+                        static_cast<std::size_t>(UniformDraw(rng) * static_cast<double>(alternatives.size())));
+  std::vector<MapSample> samples;
+  samples.reserve(particles_.size());
+  for (std::size_t i = 0; i < particles_.size(); ++i)
+    samples.push_back({particles_[i].T_map_robot, particles_[i].map, chosen[i]});
+
+  gain_ = 0.0;
+  const bool sees = ShowsRays(alternatives);
+  if (sees && !maps_.blank()) {
+    const double max_ray_m = maps_.options().max_ray_m;
+    const JudgeOptions judge{{options_.sigma_m, options_.outlier_share, max_ray_m, maps_.options().resolution_m},
+                             static_cast<std::size_t>(options_.ray_stride),
+                             options_.give_up_behind / options_.evidence_share};
+    const std::vector<double> log_likelihoods = maps_.LogLikelihoods(samples, alternatives, judge, parallel_for);
+    for (std::size_t i = 0; i < particles_.size(); ++i) {
+      particles_[i].log_weight += options_.evidence_share * log_likelihoods[i];
+      particles_[i].log_likelihood += options_.evidence_share * log_likelihoods[i];
+    }
+    const auto best = std::max_element(log_likelihoods.begin(), log_likelihoods.end());
+    gain_ = *best;
+    for (const PlacedRays& placed : alternatives[chosen[static_cast<std::size_t>(best - log_likelihoods.begin())]])
+      gain_ -= UnseenLogLikelihood(*placed.rays, judge.ray_stride, maps_.rate()({}), judge.model);
+  }
+
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    GridParticle& particle = particles_[i];
+    const Pose2 T_map_start = particle.T_map_robot;
+    for (const PlacedRays& placed : alternatives[chosen[i]])
+      particle.path.Append(particle.T_map_robot = T_map_start * placed.T_start_robot);
+  }
+  std::vector<double> log_weights;
+  log_weights.reserve(particles_.size());
+  for (const GridParticle& particle : particles_) log_weights.push_back(particle.log_weight);
+  const std::vector<double> weights = NormalisedWeights(log_weights);
+  effective_ = EffectiveSampleSize(weights);
+  Summarise(weights);
+  if (!sees) return;
+
+  // Who survives, and how often. Equal ones share one map.
+  const bool resample = effective_ <= options_.resample_below * static_cast<double>(particles_.size());
+  std::vector<int> parents;
+  if (resample) {
+    parents = StratifiedSurvivors(weights, rng);
+  } else {
+    parents.resize(particles_.size());
+    for (std::size_t i = 0; i < parents.size(); ++i) parents[i] = static_cast<int>(i);
+  }
+  std::vector<GridParticle> next;
+  std::vector<MapSample> survivors;
+  next.reserve(particles_.size());
+  std::size_t best = 0;
+  for (const int parent : parents) {
+    const auto p = static_cast<std::size_t>(parent);
+    if (survivors.empty() || !(survivors.back() == samples[p])) survivors.push_back(samples[p]);
+    next.push_back(particles_[p]);
+    next.back().map = survivors.size() - 1;
+    if (resample) next.back().log_weight = 0.0;
+    if (next.back().log_likelihood > next[best].log_likelihood) best = next.size() - 1;
+  }
+  particles_ = std::move(next);
+  best_ = best;
+  maps_.NextGeneration(survivors, alternatives, parallel_for);
+}
+
+void LevelFilter::Summarise(const std::vector<double>& weights) {
+  best_ = 0;
+  for (std::size_t i = 1; i < particles_.size(); ++i)
+    if (particles_[i].log_likelihood > particles_[best_].log_likelihood) best_ = i;
+  const Pose2& centre = best().T_map_robot;
+  Eigen::Vector3d first = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+  double sum = 0.0;
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    Eigen::Vector3d d = particles_[i].T_map_robot.vector() - centre.vector();
+    d.z() = WrapAngle(d.z());
+    if (weights[i] <= 0.0 || d.head<2>().norm() > options_.agreement_m) continue;
+    first += weights[i] * d;
+    second += weights[i] * d * d.transpose();
+    sum += weights[i];
+  }
+  mean_ = centre;
+  covariance_.setZero();
+  if (!(sum > 0.0)) return;
+  const Eigen::Vector3d shift = first / sum;
+  mean_ = {centre.x + shift.x(), centre.y + shift.y(), WrapAngle(centre.theta + shift.z())};
+  covariance_ = second / sum - shift * shift.transpose();
+}
+
+}  // namespace cairn::slam

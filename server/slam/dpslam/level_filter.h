@@ -1,0 +1,79 @@
+// One level of DP-SLAM: a particle filter over poses whose particles own maps. The low level moves by a step and sees
+// one scan; the high level moves by the drift at a joint and sees a whole segment, with the trajectory the low level
+// found. One step is Move, then Observe. Poses are T_map_robot in the frame of this level. Not thread-safe;
+// deterministic for a seed, on any number of threads. Source: Eliazar, Parr 2003, 2004, 2005 (hierarchical); thesis
+// C 3.2.3, 4.5.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/slam/dpslam/particle_maps.h"
+#include "server/slam/filters/resampling.h"
+#include "server/slam/filters/shared_sequence.h"
+#include "server/slam/motion/motion_noise.h"
+
+namespace cairn::slam {
+
+struct LevelOptions {
+  std::int64_t particles = 500;
+  double sigma_m = 0.05;        // Of a range against the map. Larger: more particles agree.
+  double evidence_share = 0.2;  // Of a ray's log likelihood: neighbouring rays hit the same wall and err alike.
+  double outlier_share = 0.05;  // Rays that say nothing about the map: people, open doors.
+  double resample_below = 1.0;  // Effective sample size over particles; 1: after every scan, as the source does.
+  std::int64_t ray_stride = 1;  // Every n-th ray judges; all are drawn.
+  double give_up_behind =
+      12.0;                  // Weighted log likelihood behind the best at which a particle is not looked at further.
+  double agreement_m = 0.5;  // Particles this near the best one take part in the reported pose.
+  MotionNoise drift;         // Low: of a step, on top of what the front-end says. High: of a segment, at its joint.
+};
+void Visit(OptionVisitor& visitor, LevelOptions& options);
+
+struct GridParticle {
+  Pose2 T_map_robot;
+  std::size_t map = 0;          // Of ParticleMaps.
+  double log_weight = 0.0;      // Since the last resampling.
+  double log_likelihood = 0.0;  // Of the whole path; survives resampling.
+  SharedSequence<Pose2> path;   // T_map_robot at every scan observed.
+};
+
+class LevelFilter {
+ public:
+  LevelFilter(const LevelOptions& options, const OpacityOptions& opacity, const Pose2& T_map_robot_start);
+
+  // Moves every particle by the step with noise of this covariance: (x, y, theta) in the frame the step starts from.
+  void Move(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev, Rng& rng);
+  // Draws scans at a known place before the first Move: the tail of the segment before.
+  void Draw(const Evidence& evidence, const ParallelFor& parallel_for);
+  // Every particle experiences one of the alternatives (drawn with equal chance), is weighted, survives or not, draws
+  // it, and goes on from its last pose. Where no alternative shows a ray, only the paths grow.
+  void Observe(std::span<const Evidence> alternatives, Rng& rng, const ParallelFor& parallel_for);
+
+  [[nodiscard]] const std::vector<GridParticle>& particles() const { return particles_; }
+  [[nodiscard]] const GridParticle& best() const { return particles_[best_]; }
+  [[nodiscard]] std::size_t best_index() const { return best_; }
+  [[nodiscard]] const ParticleMaps& maps() const { return maps_; }
+  // Weighted mean of the particles that agree with the best one, and their spread, before they were resampled.
+  [[nodiscard]] const Pose2& mean() const { return mean_; }
+  [[nodiscard]] const Eigen::Matrix3d& covariance() const { return covariance_; }
+  [[nodiscard]] double effective_sample_size() const { return effective_; }
+  // Log likelihood of the last evidence in the best map, over what a map never seen would say: negative where the map
+  // contradicts it. 0 where there was nothing to compare.
+  [[nodiscard]] double gain() const { return gain_; }
+
+ private:
+  void Summarise(const std::vector<double>& weights);
+
+  const LevelOptions options_;
+  ParticleMaps maps_;
+  std::vector<GridParticle> particles_;  // Ordered by map.
+  std::size_t best_ = 0;
+  Pose2 mean_;
+  Eigen::Matrix3d covariance_ = Eigen::Matrix3d::Zero();
+  double effective_ = 0.0;
+  double gain_ = 0.0;
+};
+
+}  // namespace cairn::slam

@@ -1,0 +1,53 @@
+#include "server/slam/dpslam/opacity.h"
+
+#include <cmath>
+
+#include "common/geometry/angle.h"
+
+namespace cairn::slam {
+
+void Visit(OptionVisitor& visitor, OpacityOptions& options) {
+  visitor.Real("resolution_m", options.resolution_m, "m", 0.02, 1.0, "Side of a cell of the particles' maps.");
+  visitor.Real("max_ray_m", options.max_ray_m, "m", 1.0, 50.0, "Rays are cut here: beyond, a hit only says passed.");
+  visitor.Real("no_return_m", options.no_return_m, "m", 0.0, 50.0,
+               "How far a beam that hit nothing is believed to have passed; 0: it says nothing.");
+  visitor.Real("prior_stops", options.prior_stops, "1", 0.0001, 10.0,
+               "Rays stopped in a cell before it is seen. More: unknown space stops more rays.");
+  visitor.Real("prior_distance_m", options.prior_distance_m, "m", 0.001, 10.0,
+               "Laser distance through a cell before it is seen. More: cells learn slower.");
+  visitor.Integer("max_rays", options.max_rays, "1", 1, 8192, "Of a scan, evenly picked where it has more.");
+}
+
+StopRate::StopRate(const OpacityOptions& options)
+    : prior_stops(static_cast<float>(options.prior_stops)),
+      prior_cells(static_cast<float>(options.prior_distance_m / options.resolution_m)) {}
+
+double StopProbability(double length_m, double opacity_m) {
+  return -std::expm1(-length_m / opacity_m);
+}
+
+double StoppedProbability(std::span<const RaySpan> spans) {
+  double stopped = 0.0;
+  for (std::size_t i = 0; i < spans.size(); ++i) stopped += StopProbabilityAt(spans, i);
+  return stopped;
+}
+
+double StopProbabilityAt(std::span<const RaySpan> spans, std::size_t j) {
+  double reach = 1.0;
+  for (std::size_t i = 0; i < j; ++i) reach *= 1.0 - StopProbability(spans[i].length_m, spans[i].opacity_m);
+  return reach * StopProbability(spans[j].length_m, spans[j].opacity_m);
+}
+
+double MeasurementDensity(double delta_m, double sigma_m) {
+  const double z = delta_m / sigma_m;
+  return std::exp(-0.5 * z * z) / (sigma_m * std::sqrt(2.0 * kPi));
+}
+
+double RayDensity(std::span<const RaySpan> spans, double sigma_m) {
+  double density = 0.0;
+  for (std::size_t i = 0; i < spans.size(); ++i)
+    density += MeasurementDensity(spans[i].delta_m, sigma_m) * StopProbabilityAt(spans, i);
+  return density;
+}
+
+}  // namespace cairn::slam

@@ -1,0 +1,40 @@
+// How well points would fit a reference set, for many poses at once: a raster of 0..255 (255: on a reference point,
+// falling to 0 at `reach_m`), and coarser rasters that hold the best value of every block. The value of a coarse cell
+// bounds what any pose inside it can score, which is what lets a search skip most poses.
+// Frame: that of the reference points. Immutable after construction; any thread may read.
+// Source: multi-resolution correlative matching of Olson, ICRA 2009; bounds as in Hess et al., ICRA 2016, section V.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/slam/matching/surface_points.h"
+
+namespace cairn::slam {
+
+class LikelihoodPyramid {
+ public:
+  // `margin_m` is added around the points: poses that push points out of the raster score 0 for them.
+  LikelihoodPyramid(std::span<const SurfacePoint> reference, double cell_m, double reach_m, int levels);
+
+  // The best value among the 2^level x 2^level cells whose lower left one is (x, y), in cells of level 0.
+  [[nodiscard]] std::uint8_t Best(int level, int x, int y) const {
+    const int column = x + kPad - low_x_, row = y + kPad - low_y_;
+    if (column < 0 || row < 0 || column >= width_ || row >= height_) return 0;
+    return levels_[static_cast<std::size_t>(level)][static_cast<std::size_t>(row * width_ + column)];
+  }
+  [[nodiscard]] double cell_m() const { return cell_m_; }
+  [[nodiscard]] int levels() const { return static_cast<int>(levels_.size()); }
+
+ private:
+  // Blocks that begin left of or below the points still reach into them.
+  static constexpr int kPad = 64;
+
+  double cell_m_;
+  int low_x_ = 0, low_y_ = 0;  // Lowest cell of the points.
+  int width_ = 0, height_ = 0;
+  std::vector<std::vector<std::uint8_t>> levels_;  // Each row-major, width_ x height_.
+};
+
+}  // namespace cairn::slam

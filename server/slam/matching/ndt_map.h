@@ -1,0 +1,67 @@
+// The normal distributions transform of one scan: the plane cut into cells, in each the normal distribution of the
+// points it holds. Four grids of the same cells, shifted by half a cell, overlap, so that every point is judged by four
+// cells and the cuts between cells matter less; a density is the sum over the four, 0..4.
+// Not an occupancy grid: it says where points are likely measured. Frame: that of the points. Metres. Immutable, so
+// thread-safe. Source: Biber and Strasser, IROS 2003; thesis C 2.3.3 (2.11)-(2.19).
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/geometry/pose2.h"
+#include "common/options/option_visitor.h"
+
+namespace cairn::slam {
+
+struct NdtMapOptions {
+  double cell_m = 1.0;         // Larger: found from farther off, but coarser (thesis C 5.1.3 takes 4 m in a mine).
+  std::int64_t min_points = 3;  // Fewer in a cell make no distribution.
+  double min_flatness = 1e-3;  // Least ratio of the variances across and along: a wall is never thinner than that.
+};
+void Visit(OptionVisitor& visitor, NdtMapOptions& options);
+
+// Score of points at one pose with its exact derivatives in (x, y, theta) of the pose; the cuts between cells apart,
+// where the score jumps a little.
+struct NdtDerivatives {
+  double score = 0.0;
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();
+  int inliers = 0;  // Points within three sigma of one of their four cells.
+};
+
+class NdtMap {
+ public:
+  // Points that are not finite or farther than 512 half cells from the mean of all are left out.
+  NdtMap(std::span<const Eigen::Vector2d> points, const NdtMapOptions& options);
+
+  // Sum of the densities of a point's four cells (2.13); 0 where there is none.
+  [[nodiscard]] double Density(const Eigen::Vector2d& p) const;
+  // (2.15): densities of all points mapped by T.
+  [[nodiscard]] double Score(std::span<const Eigen::Vector2d> points, const Pose2& T_map_points) const;
+  [[nodiscard]] NdtDerivatives Derivatives(std::span<const Eigen::Vector2d> points, const Pose2& T_map_points) const;
+  [[nodiscard]] bool empty() const { return quads_.empty(); }
+
+ private:
+  // The four distributions that judge one half cell. Where there is none, `present` is 0.
+  struct Quad {
+    Eigen::Array4d mean_x = Eigen::Array4d::Zero();
+    Eigen::Array4d mean_y = Eigen::Array4d::Zero();
+    Eigen::Array4d B_xx = Eigen::Array4d::Zero();  // Inverse covariance.
+    Eigen::Array4d B_xy = Eigen::Array4d::Zero();
+    Eigen::Array4d B_yy = Eigen::Array4d::Zero();
+    Eigen::Array4d present = Eigen::Array4d::Zero();
+  };
+  [[nodiscard]] const Quad* QuadAt(double x, double y) const;
+  void AddGrid(std::span<const Eigen::Vector2d> points, int grid, const NdtMapOptions& options);
+
+  double half_m_;
+  double x_first_ = 0.0, y_first_ = 0.0;  // Corner of half cell (0, 0).
+  int columns_ = 0, rows_ = 0;            // In half cells.
+  std::vector<std::int32_t> index_;       // Per half cell: its quad, -1 none.
+  std::vector<Quad> quads_;
+};
+
+}  // namespace cairn::slam

@@ -1,0 +1,82 @@
+#include "server/slam/matching/region.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <unordered_set>
+
+namespace cairn::slam {
+
+Stretch StretchAround(std::span<const KeyframeShape> shapes, std::size_t centre, double way_m) {
+  Stretch stretch{centre, centre, centre};
+  const double here = shapes[centre].travelled_m;
+  while (stretch.first > 0 && here - shapes[stretch.first - 1].travelled_m <= way_m) --stretch.first;
+  while (stretch.last + 1 < shapes.size() && shapes[stretch.last + 1].travelled_m - here <= way_m) ++stretch.last;
+  return stretch;
+}
+
+std::vector<SurfacePoint> SurfacesOf(std::span<const KeyframeShape> shapes, const Stretch& stretch, double cell_m) {
+  std::vector<SurfacePoint> surfaces;
+  std::unordered_set<std::int64_t> taken;
+  for (std::size_t k = stretch.first; k <= stretch.last; ++k) {
+    const Pose2 T_anchor_k = Between(shapes[stretch.anchor].T_track_robot, shapes[k].T_track_robot);
+    const Eigen::Matrix2d R = T_anchor_k.rotation();
+    for (const SurfacePoint& point : shapes[k].points) {
+      const Eigen::Vector2d p = R * point.p + T_anchor_k.translation();
+      const auto x = static_cast<std::int64_t>(std::floor(p.x() / cell_m));
+      const auto y = static_cast<std::int64_t>(std::floor(p.y() / cell_m));
+      if (taken.insert((x << 32) ^ (y & 0xffffffff)).second) surfaces.push_back({p, R * point.normal});
+    }
+  }
+  return surfaces;
+}
+
+FreeSpace::FreeSpace(std::span<const Keyframe> keyframes, std::span<const KeyframeShape> shapes,
+                     const Stretch& stretch) {
+  struct Drawn {
+    std::size_t keyframe;
+    Pose2 T_anchor_robot;
+  };
+  std::vector<Drawn> drawn;
+  Eigen::AlignedBox2d box;
+  double drawn_m = -kEveryM;
+  for (std::size_t k = stretch.first; k <= stretch.last; ++k) {
+    if (shapes[k].travelled_m - drawn_m < kEveryM && k != stretch.last) continue;
+    drawn_m = shapes[k].travelled_m;
+    drawn.push_back({k, Between(shapes[stretch.anchor].T_track_robot, shapes[k].T_track_robot)});
+    // A ray starts at the laser, which may sit some way from the robot's origin.
+    const double reach = kMaxRayM + keyframes[k].scan->T_robot_laser.translation().norm() + 2.0 * kCellM;
+    box.extend(drawn.back().T_anchor_robot.translation() - Eigen::Vector2d::Constant(reach));
+    box.extend(drawn.back().T_anchor_robot.translation() + Eigen::Vector2d::Constant(reach));
+  }
+  low_x_ = static_cast<int>(std::floor(box.min().x() / kCellM));
+  low_y_ = static_cast<int>(std::floor(box.min().y() / kCellM));
+  width_ = static_cast<int>(std::ceil(box.max().x() / kCellM)) - low_x_ + 1;
+  height_ = static_cast<int>(std::ceil(box.max().y() / kCellM)) - low_y_ + 1;
+  cells_.assign(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), Seen::kNot);
+
+  ScanRaster raster;
+  const RasterOptions options{.resolution_m = kCellM, .max_ray_m = kMaxRayM, .no_return_free_m = 0.0};
+  for (const Drawn& one : drawn) {
+    raster.Rasterise(*keyframes[one.keyframe].scan, one.T_anchor_robot, options, [&](GridCell cell, bool hit) {
+      const int x = cell.x - low_x_, y = cell.y - low_y_;
+      if (x < 0 || y < 0 || x >= width_ || y >= height_) return;
+      Seen& seen = cells_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)];
+      seen = std::max(seen, hit ? Seen::kHit : Seen::kThrough);
+    });
+  }
+}
+
+bool FreeSpace::Contradicts(const Eigen::Vector2d& p_anchor) const {
+  const int x = static_cast<int>(std::floor(p_anchor.x() / kCellM)) - low_x_,
+            y = static_cast<int>(std::floor(p_anchor.y() / kCellM)) - low_y_;
+  if (x < 1 || y < 1 || x + 1 >= width_ || y + 1 >= height_) return false;
+  for (int row = y - 1; row <= y + 1; ++row)
+    for (int column = x - 1; column <= x + 1; ++column)
+      if (cells_[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(column)] !=
+          Seen::kThrough)
+        return false;
+  return true;
+}
+
+}  // namespace cairn::slam

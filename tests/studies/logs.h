@@ -1,0 +1,46 @@
+// The logs a study runs on: published ones where they are at hand, said loudly where not, and simulated ones with the
+// true path beside them. Whole in memory: studies run over the same log many times.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "client/sim/fleet.h"
+#include "common/sensor/log_record.h"
+#include "common/sensor/trajectory.h"
+#include "tests/studies/relations.h"
+#include "tests/studies/study.h"
+
+namespace cairn::studies {
+
+struct StudyLog {
+  std::string name;  // "intel", "simulated building".
+  std::vector<LogRecord> records;
+  std::vector<Relation> relations;  // True motions between two stamps; empty where unknown.
+  Trajectory truth;                 // Simulated logs only, in `map`.
+  Pose2 T_map_robot_start;          // Of the truth; the identity where unknown.
+
+  [[nodiscard]] std::size_t scans() const;
+  [[nodiscard]] double seconds() const;  // From the first scan to the last.
+};
+
+// The published log NAME.clf or NAME.log with NAME.relations, at most `max_scans` (0: all) of its scans.
+// Where it is absent the report says so, and nothing is returned.
+[[nodiscard]] std::optional<StudyLog> OpenRealLog(StudyContext& context, const std::string& name, int max_scans = 0);
+
+// A log by its path, with FILE.relations beside it where there is one. Reports what is wrong with it.
+[[nodiscard]] std::optional<StudyLog> OpenLogFile(StudyContext& context, const std::filesystem::path& path,
+                                                  int max_scans = 0);
+
+// One robot driving `seconds` through a shipped world or world file. Relations join poses about 1, 5 and 20 m of way
+// apart. Throws std::invalid_argument on a world or options that are not valid: studies name their own.
+[[nodiscard]] StudyLog SimulateLog(const std::string& world, double seconds, const sim::FleetOptions& options);
+
+// What --log names, else those of `names` that are at hand, else a simulated building (said loudly).
+[[nodiscard]] std::vector<StudyLog> ChooseLogs(StudyContext& context, const std::vector<std::string>& names,
+                                               int max_scans = 0);
+
+}  // namespace cairn::studies

@@ -1,0 +1,72 @@
+// cairn-study: measures for people: `cairn-study list`, `cairn-study NAME [--out DIR] [--quick] [--seed N] [--log F]`.
+// Exit codes: 0 done and plausible, 1 the study failed or a figure is not plausible, 2 wrong command line.
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <filesystem>
+#include <iomanip>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "tests/studies/study.h"
+
+namespace cairn::studies {
+namespace {
+
+int ListStudies() {
+  std::size_t widest = 0;
+  for (const Study& study : AllStudies()) widest = std::max(widest, study.name.size());
+  for (const Study& study : AllStudies())
+    std::cout << std::left << std::setw(static_cast<int>(widest) + 2) << study.name << study.help << '\n';
+  return 0;
+}
+
+int RunNamed(const Study& study, const std::filesystem::path& out, bool quick, std::uint64_t seed,
+             const std::vector<std::filesystem::path>& logs) {
+  Report report(out, "cairn-study " + study.name, std::cout);
+  StudyContext context{report, quick, seed, logs};
+  if (quick) report.Warn("a quick run: fewer trials and shorter logs than the study is meant for");
+  bool plausible = false;
+  try {
+    plausible = study.run(context);
+  } catch (const std::exception& error) {
+    report.Warn(std::string("the study ended early: ") + error.what());
+  }
+  if (const auto written = report.Finish(); !written) {
+    std::cerr << "cairn-study: " << written.error().message << '\n';
+    return 1;
+  }
+  if (!plausible) std::cerr << "cairn-study: " << study.name << " FAILED; lines that start with !! say why\n";
+  return plausible ? 0 : 1;
+}
+
+int Main(int argc, char** argv) {
+  std::string name;
+  std::filesystem::path out;
+  std::vector<std::filesystem::path> logs;
+  bool quick = false;
+  std::uint64_t seed = 1;
+  CLI::App app{"Measures the estimators and draws the figures: tables, plots, a Markdown report."};
+  app.add_option("NAME", name, "`list` prints the studies")->required();
+  app.add_option("--out", out, "Folder for report.md, tables and pictures; without it only text is printed");
+  app.add_flag("--quick", quick, "Seconds instead of minutes");
+  app.add_option("--seed", seed, "Of every random engine");
+  app.add_option("--log", logs, "A log instead of the study's own choice; repeatable")->check(CLI::ExistingFile);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  if (name == "list") return ListStudies();
+  for (const Study& study : AllStudies())
+    if (study.name == name) return RunNamed(study, out, quick, seed, logs);
+  std::cerr << "cairn-study: no study is called '" << name << "'; `cairn-study list` prints them\n";
+  return 2;
+}
+
+}  // namespace
+}  // namespace cairn::studies
+
+int main(int argc, char** argv) {
+  return cairn::studies::Main(argc, argv);
+}

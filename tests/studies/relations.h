@@ -1,0 +1,38 @@
+// How well a trajectory keeps the true motions between its poses, without aligning it to anything: the same measure as
+// tests/accuracy/relations_metric.py, in the process.
+// Source: Kuemmerle et al., "On Measuring the Accuracy of SLAM Algorithms", Autonomous Robots 27(4), 2009, (3)-(5).
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <vector>
+
+#include "common/sensor/trajectory.h"
+#include "common/status.h"
+
+namespace cairn::studies {
+
+struct Relation {
+  Stamp from = 0;
+  Stamp to = 0;
+  Pose2 T_from_to;
+};
+
+// `stamp1 stamp2 x y z roll pitch yaw` a line, seconds, `#` starts a comment.
+[[nodiscard]] Result<std::vector<Relation>> ReadRelations(const std::filesystem::path& path);
+
+struct RelationError {
+  std::size_t compared = 0;
+  std::size_t missing = 0;  // A stamp outside the trajectory, or in a gap of more than 2 s.
+  double trans_mean_m = 0.0;
+  double trans_deviation_m = 0.0;
+  double trans_max_m = 0.0;
+  double rot_mean_deg = 0.0;
+  double rot_deviation_deg = 0.0;
+  double rot_max_deg = 0.0;
+};
+
+// NaN means where nothing could be compared.
+[[nodiscard]] RelationError ErrorOf(const Trajectory& trajectory, const std::vector<Relation>& relations);
+
+}  // namespace cairn::studies

@@ -1,0 +1,33 @@
+#include "tests/studies/stopwatch.h"
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <numeric>
+
+namespace cairn::studies {
+
+double UserCpuSeconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_utime.tv_sec) + static_cast<double>(usage.ru_utime.tv_usec) * 1e-6;
+}
+
+Distribution DistributionOf(std::vector<double> samples) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  if (samples.empty()) return {kNone, kNone, kNone, kNone, kNone, kNone};
+  std::sort(samples.begin(), samples.end());
+  const double n = static_cast<double>(samples.size());
+  const double mean = std::accumulate(samples.begin(), samples.end(), 0.0) / n;
+  double squares = 0.0;
+  for (const double sample : samples) squares += (sample - mean) * (sample - mean);
+  const auto at = [&](double share) {
+    return samples[static_cast<std::size_t>(std::clamp(std::ceil(share * n), 1.0, n)) - 1];
+  };
+  return {mean, std::sqrt(squares / n), at(0.5), at(0.95), at(0.99), samples.back()};
+}
+
+}  // namespace cairn::studies

@@ -1,0 +1,43 @@
+// Time used, on the wall and by the processor. Studies are run on machines that do other work besides: the processor
+// time of this process is the honest figure then, and both are printed.
+#pragma once
+
+#include <chrono>
+#include <ctime>
+#include <vector>
+
+namespace cairn::studies {
+
+class Stopwatch {
+ public:
+  Stopwatch() { Restart(); }
+  void Restart() {
+    wall_ = std::chrono::steady_clock::now();
+    cpu_ = CpuNow();
+  }
+  [[nodiscard]] double WallMs() const {
+    return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - wall_).count();
+  }
+  // Of all threads of this process.
+  [[nodiscard]] double CpuMs() const { return CpuNow() - cpu_; }
+
+ private:
+  static double CpuNow() {
+    timespec now{};
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+    return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
+  }
+  std::chrono::steady_clock::time_point wall_;
+  double cpu_ = 0.0;
+};
+
+// Processor time in user mode of the whole process so far.
+[[nodiscard]] double UserCpuSeconds();
+
+struct Distribution {
+  double mean = 0.0, deviation = 0.0, median = 0.0, p95 = 0.0, p99 = 0.0, max = 0.0;
+};
+// Nearest rank; NaN without samples.
+[[nodiscard]] Distribution DistributionOf(std::vector<double> samples);
+
+}  // namespace cairn::studies

@@ -1,0 +1,47 @@
+// What a study is and where the program finds it. A study measures something for people: it prints tables, writes plots
+// and a Markdown report, and says whether what it measured is plausible. Not a test: it may take minutes, and nothing
+// waits for it. Each study's file ends with one line that registers it:
+//
+//   const Registration kRegistered{"thesis-a", "line extraction, matching, FastSLAM beside thesis A", RunThesisA};
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "tests/studies/report.h"
+
+namespace cairn::studies {
+
+struct StudyContext {
+  Report& report;                             // Tables, plots and words go here; also printed as they come.
+  bool quick = false;                         // Seconds instead of minutes: fewer trials, shorter logs, same tables.
+  std::uint64_t seed = 1;                     // Of every random engine: same seed, same figures (times excepted).
+  std::vector<std::filesystem::path> logs{};  // --log: instead of the study's own choice.
+
+  // The larger number, or the smaller one of a quick run.
+  template <typename T>
+  [[nodiscard]] T Pick(T full, T small) const {
+    return quick ? small : full;
+  }
+};
+
+// Returns false where a figure is not plausible or the study could not be made; the report says why.
+using RunStudy = std::function<bool(StudyContext&)>;
+
+struct Study {
+  std::string name;  // As on the command line.
+  std::string help;  // One line.
+  RunStudy run;
+};
+
+// All registered studies by name.
+[[nodiscard]] std::vector<Study> AllStudies();
+
+struct Registration {
+  Registration(std::string name, std::string help, RunStudy run);
+};
+
+}  // namespace cairn::studies
