@@ -1,9 +1,9 @@
 // Follows the robot from scan to scan: the chosen matcher compares every scan with the last keyframe, an alignment with
 // what the last keyframes saw refines its answer, odometry stands in where neither knows; and says how it moved and how
-// sure that is. Without the refinement the matcher's own answer counts, unless it jumps against the odometry. Its frame
-// `track` is smooth and drifts slowly, as a very good odometry; closing loops is the filter's business. Not
-// thread-safe. Deterministic. Source: thesis A 3.5 (voting), 3.5.13 and 3.6.1 (fall-backs, fault check); Censi 2008
-// (refinement).
+// sure that is. Without the refinement the matcher's own answer counts, unless it jumps against the odometry or
+// explains too little of the scan. Its frame `track` is smooth and drifts slowly, as a very good odometry; closing
+// loops is the filter's business. Not thread-safe. Deterministic. Source: thesis A 3.5 (voting), 3.5.13 and 3.6.1
+// (fall-backs, fault check); Censi 2008 (refinement).
 #pragma once
 
 #include <deque>
@@ -76,7 +76,12 @@ class FrontEnd {
                                               const ParallelFor& parallel_for) const;
   [[nodiscard]] MatchResult Refine(const ScanView& view, const Pose2& T_odom_robot, const Guess& guess,
                                    const MatchResult& coarse) const;
-  [[nodiscard]] MatchResult Trust(const MatchResult& coarse, const Guess& guess) const;
+  [[nodiscard]] MatchResult MatchAlone(const ScanView& view, const Pose2& T_odom_robot, const Guess& guess,
+                                       const MatchResult& coarse, const ParallelFor& parallel_for) const;
+  // Without odometry since the last scan: it stood still, or came late. The scan must explain these clearly better.
+  [[nodiscard]] std::vector<Pose2> UnusualGuesses(const Pose2& T_odom_robot) const;
+  // Share of the scan that lies on what the last keyframe saw.
+  [[nodiscard]] double Explained(const ScanView& view, const Pose2& T_track_robot) const;
 
   FrontEndOptions options_;
   MatcherKind matcher_;
@@ -85,6 +90,7 @@ class FrontEnd {
   Pose2 T_track_robot_;
   Sight keyframe_;  // The last keyframe, and what it saw, in its robot frame.
   ScanView keyframe_view_;
+  PointIndex keyframe_index_;
   std::deque<Sight> history_;                        // The last scans, newest last.
   std::deque<std::vector<SurfacePoint>> reference_;  // In track, newest last.
   PointIndex index_;

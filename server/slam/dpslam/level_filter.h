@@ -27,7 +27,7 @@ struct LevelOptions {
   double give_up_behind =
       12.0;                  // Weighted log likelihood behind the best at which a particle is not looked at further.
   double agreement_m = 0.5;  // Particles this near the best one take part in the reported pose.
-  MotionNoise drift;  // Low: of a step, on top of what the front-end says. High: of a segment, at its joint.
+  MotionNoise drift;         // Low: of a step, on top of what the front-end says. High: of a segment, at its joint.
 };
 void Visit(OptionVisitor& visitor, LevelOptions& options);
 

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kGivenUp = -std::numeric_limits<double>::infinity();
 constexpr std::size_t kFirstLook = 4;  // One ray in so many.
-constexpr int kMaxBoxTiles = 40;       // 2560 cells: 26 MB of rates. Farther apart, particles see unknown space.
+constexpr int kMaxBoxTiles = 32;       // 2048 cells: 17 MB of rates. Farther apart, particles see unknown space.
 
 int TileOf(double metres, double resolution_m) {
   const double tiles = std::floor(metres / resolution_m / kChangeTileSide);

@@ -6,20 +6,22 @@
 #include <memory>
 
 #include "common/options/option_visitor.h"
-#include "server/slam/filters/fastslam2.h"
+#include "server/slam/filters/back_end_options.h"
+#include "server/slam/filters/fastslam_options.h"
 #include "server/slam/filters/filter.h"
-#include "server/slam/filters/landmark_tracker.h"
 
 namespace cairn::slam {
 
 enum class FilterKind : std::uint8_t {
   kFastSlam2Points = 0,  // Thesis A 4.1-4.6, FS_2LS_2LP.
+  kFastSlam2Oriented,    // Thesis A 4.7, FS_3LS_1LP.
+  kFastSlam1,            // Thesis C 4.2.
 };
 
 struct FilterOptions {
   FilterKind kind = FilterKind::kFastSlam2Points;
   std::int64_t particles = 200;  // More: larger loops close, in proportionally more time and memory.
-  LandmarkOptions landmarks;
+  BackEndOptions back_end;       // Shown as slam.drift, slam.landmarks, slam.diverged_after.
   FastSlamOptions fastslam;
 };
 // The fields of the `slam` section that belong to the filter.

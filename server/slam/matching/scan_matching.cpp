@@ -35,6 +35,7 @@ void Visit(OptionVisitor& visitor, MatcherOptions& options) {
   visitor.Section("line_lsq", "Least squares over pairs of lines.", [&] { Visit(visitor, options.line_lsq); });
   visitor.Section("hough", "Correlation in the Hough domain.", [&] { Visit(visitor, options.hough); });
   visitor.Section("icp", "Points on surfaces, scan to scan.", [&] { Visit(visitor, options.icp); });
+  visitor.Section("correlative", "Every motion in a window.", [&] { Visit(visitor, options.correlative); });
 }
 
 MatchResult MatchScans(const ScanView& prev, const ScanView& curr, const MatchPrior& prior, MatcherKind kind,
@@ -53,7 +54,7 @@ MatchResult MatchScans(const ScanView& prev, const ScanView& curr, const MatchPr
     case MatcherKind::kIcp:
       return MatchByIcp(prev, curr, prior, options.icp);
     case MatcherKind::kCorrelative:
-      return Unmatched(prior);
+      return MatchByCorrelation(prev, curr, prior, options.correlative, parallel_for);
   }
   return Unmatched(prior);
 }

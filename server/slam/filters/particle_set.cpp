@@ -1,0 +1,140 @@
+#include "server/slam/filters/particle_set.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "server/slam/filters/revisit_innovation.h"
+#include "server/slam/motion/dead_reckoning.h"
+
+namespace cairn::slam {
+ParticleSet::ParticleSet(const FastSlamOptions& options, std::int64_t count, const Pose2& T_map_robot_start,
+                         std::uint64_t seed)
+    : options_(options), rng_(seed), particles_(static_cast<std::size_t>(count)) {
+  for (Particle& particle : particles_) particle.T_map_robot = T_map_robot_start;
+  effective_ = static_cast<double>(particles_.size());
+  estimate_.T_map_robot = T_map_robot_start;
+}
+
+void ParticleSet::Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) {
+  for (Particle& particle : particles_)
+    DeadReckon(particle.T_map_robot, particle.covariance, T_prev_curr, covariance_prev);
+  travelled_ += T_prev_curr.translation().norm();
+}
+
+void ParticleSet::PredictBySampling(const Pose2& T_prev_curr) {
+  for (Particle& particle : particles_)
+    particle.T_map_robot = SampleMotion(particle.T_map_robot, T_prev_curr, options_.motion, rng_);
+}
+
+bool ParticleSet::Observe(const RevisitObservation& revisit) {
+  std::vector<Innovation<3>> innovations;
+  innovations.reserve(particles_.size());
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const Particle& particle : particles_) {
+    innovations.push_back(InnovateRevisit(particle.path[revisit.keyframe], particle.T_map_robot, revisit));
+    nearest = std::min(nearest, Nis<3>(innovations.back().v, innovations.back().S(particle.covariance)));
+  }
+  if (!(nearest < options_.max_nis)) return false;
+  for (std::size_t i = 0; i < particles_.size(); ++i) Fuse<3>(i, innovations[i]);
+  sample_due_ = true;
+  return true;
+}
+
+std::vector<int> ParticleSet::Commit() {
+  if (sample_due_ || travelled_ >= options_.sample_distance_m) {
+    for (std::size_t i = 0; i < particles_.size(); ++i) Sample(i);
+    travelled_ = 0.0;
+    sample_due_ = false;
+  }
+  for (Particle& particle : particles_) particle.path.Append(particle.T_map_robot);
+  std::vector<double> weights;
+  std::vector<int> parents = Resample(weights);
+  Summarise(weights);
+  if (!step_open_) nis_ = 0.0, nis_numbers_ = 0;
+  step_open_ = false;
+  return parents;
+}
+
+void ParticleSet::Rebase(std::span<const Pose2> path) {
+  Particle particle;
+  particle.T_map_robot = path.back();
+  particle.log_likelihood = best().log_likelihood;
+  for (const Pose2& pose : path) particle.path.Append(pose);
+  std::fill(particles_.begin(), particles_.end(), particle);
+  best_ = 0;
+  travelled_ = 0.0;
+  sample_due_ = false;
+  effective_ = static_cast<double>(particles_.size());
+  estimate_ = {particle.T_map_robot, particle.covariance};
+}
+
+void ParticleSet::AddNis(double nis, int numbers) {
+  if (!step_open_) nis_ = 0.0, nis_numbers_ = 0;
+  step_open_ = true;
+  nis_ += nis;
+  nis_numbers_ += numbers;
+}
+
+void ParticleSet::Summarise(const std::vector<double>& weights) {
+  best_ = 0;
+  for (std::size_t i = 1; i < particles_.size(); ++i)
+    if (particles_[i].log_likelihood > particles_[best_].log_likelihood) best_ = i;
+  const Pose2& centre = best().T_map_robot;
+  Eigen::Vector3d first = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+  double sum = 0.0;
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    Eigen::Vector3d d = particles_[i].T_map_robot.vector() - centre.vector();
+    d.z() = WrapAngle(d.z());
+    if (d.head<2>().norm() > options_.agreement_m) continue;
+    first += weights[i] * d;
+    second += weights[i] * d * d.transpose();
+    sum += weights[i];
+  }
+  estimate_ = {centre, best().covariance};
+  if (!(sum > 0.0)) return;
+  const Eigen::Vector3d mean = first / sum;
+  estimate_.T_map_robot = {centre.x + mean.x(), centre.y + mean.y(), WrapAngle(centre.theta + mean.z())};
+  estimate_.covariance += second / sum - mean * mean.transpose();
+}
+
+void ParticleSet::Sample(std::size_t index) {
+  Particle& particle = particles_[index];
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+  solver.computeDirect(particle.covariance);
+  const Eigen::Vector3d spread = solver.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+  const Eigen::Vector3d draw(NormalDraw(rng_), NormalDraw(rng_), NormalDraw(rng_));
+  const Eigen::Vector3d step = solver.eigenvectors() * spread.cwiseProduct(draw);
+  Pose2& pose = particle.T_map_robot;
+  pose = {pose.x + step.x(), pose.y + step.y(), WrapAngle(pose.theta + step.z())};
+  particle.covariance.setZero();
+}
+
+// `weights` becomes those of the set it leaves behind.
+std::vector<int> ParticleSet::Resample(std::vector<double>& weights) {
+  std::vector<double> log_weights;
+  log_weights.reserve(particles_.size());
+  for (const Particle& particle : particles_) log_weights.push_back(particle.log_weight);
+  weights = NormalisedWeights(log_weights);
+  effective_ = EffectiveSampleSize(weights);
+  if (effective_ >= options_.resample_below * static_cast<double>(particles_.size())) return {};
+  std::vector<int> parents = StratifiedSurvivors(weights, rng_);
+  std::vector<Particle> survivors;
+  survivors.reserve(particles_.size());
+  for (const int parent : parents) {
+    survivors.push_back(particles_[static_cast<std::size_t>(parent)]);
+    survivors.back().log_weight = 0.0;
+  }
+  particles_ = std::move(survivors);
+  weights.assign(particles_.size(), 1.0 / static_cast<double>(particles_.size()));
+  return parents;
+}
+
+FilterHealth ParticleSet::health() const {
+  const bool finite = estimate_.T_map_robot.IsFinite() && estimate_.covariance.allFinite();
+  return {effective_, nis_, nis_numbers_, !finite};
+}
+
+}  // namespace cairn::slam
