@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 
+#include "server/slam/matching/degeneracy.h"
 #include "server/slam/matching/surface_agreement.h"
 
 namespace cairn::slam {
@@ -37,6 +38,8 @@ void Visit(OptionVisitor& visitor, NoOdometryOptions& options) {
                "The robot is expected to go on as between the last two scans; false: to stand still.");
   visitor.Real("sigma_m", options.sigma_m, "m", 0.001, 100.0, "Of the expectation; larger: the scan decides more.");
   visitor.Real("sigma_rad", options.sigma_rad, "rad", 0.001, kPi, "See sigma_m.");
+  visitor.Real("unmatched_step_m", options.unmatched_step_m, "m", 0.0, 100.0,
+               "What a scan without a match counts as travelled, towards being lost.");
 }
 
 void Visit(OptionVisitor& visitor, FrontEndOptions& options) {
@@ -80,10 +83,20 @@ TrackStep FrontEnd::Track(const ScanView& view, const Pose2& T_odom_robot, const
     if (!options_.use_odometry && options_.refine_enabled && coarse.converged) guess.T_track_robot = coarse.T_prev_curr;
     step.match = options_.refine_enabled ? Refine(view, T_odom_robot, guess, coarse)
                                          : MatchAlone(view, T_odom_robot, guess, coarse, parallel_for);
+    if (!options_.use_odometry && step.match.converged && coarse.converged && coarse.degenerate) {
+      // What the matcher saw no hold along, sparse points of the refinement must not hold either.
+      const Eigen::Vector2d open = coarse.degenerate_direction;
+      const double along = open.dot(coarse.T_prev_curr.translation() - step.match.T_prev_curr.translation());
+      step.match.T_prev_curr.x += along * open.x();
+      step.match.T_prev_curr.y += along * open.y();
+      step.match.degenerate = true;
+      step.match.degenerate_direction = open;
+    }
     step.matcher = coarse.failure;
     step.matched = step.match.converged;
     step.moved_m = Between(T_track_robot_, step.match.T_prev_curr).translation().norm();
-    if (!step.matched && !options_.use_odometry) step.moved_m = std::max(step.moved_m, options_.no_odometry.sigma_m);
+    if (!step.matched && !options_.use_odometry)
+      step.moved_m = std::max(step.moved_m, options_.no_odometry.unmatched_step_m);
     T_track_robot_ = step.match.T_prev_curr;
   }
   started_ = true;
@@ -126,10 +139,14 @@ MatchResult FrontEnd::MatchLastKeyframe(const ScanView& view, const Guess& guess
 MatchResult FrontEnd::MatchAlone(const ScanView& view, const Pose2& T_odom_robot, const Guess& guess,
                                  const MatchResult& coarse, const ParallelFor& parallel_for) const {
   MatchResult best = coarse;
-  if (best.converged && JumpOf(best.T_prev_curr, guess.T_track_robot, guess.covariance) > options_.max_jump_sigma) {
+  // A forecast is nothing to find a fault with.
+  if (options_.use_odometry && best.converged &&
+      JumpOf(best.T_prev_curr, guess.T_track_robot, guess.covariance) > options_.max_jump_sigma) {
     best.converged = false;
     best.failure = MatchFailure::kFault;
   }
+  // Not every matcher holds the prior along a corridor by itself.
+  if (options_.use_odometry) TakeAlongFromPrior({guess.T_track_robot, guess.covariance}, best);
   double explained = Explained(view, best.converged ? best.T_prev_curr : guess.T_track_robot);
   const auto enough = [&] { return best.converged && explained >= options_.retry_below; };
   const auto consider = [&](const Pose2& other) {

@@ -18,11 +18,13 @@
 
 namespace cairn::slam {
 
-// What is believed of the next scan's pose while the odometry is withheld: the robot stands still, or goes on as it did.
+// What is believed of the next scan's pose while the odometry is withheld: the robot stands still, or goes on as it
+// did.
 struct NoOdometryOptions {
-  bool constant_velocity = false;  // Per scan, not per second: stamps of real logs come in bursts.
-  double sigma_m = 0.3;            // Of the prediction in x and y; also what an unmatched scan counts as travelled.
-  double sigma_rad = 0.2;
+  bool constant_velocity = true;  // Per scan, not per second: stamps of real logs come in bursts.
+  double sigma_m = 0.03;          // Of the prediction; larger: what scans seem to show along a corridor counts more.
+  double sigma_rad = 0.15;
+  double unmatched_step_m = 0.3;  // What a scan without a match counts as travelled, towards being lost.
 };
 void Visit(OptionVisitor& visitor, NoOdometryOptions& options);
 
@@ -32,7 +34,7 @@ struct FrontEndOptions {
   bool refine_enabled = true;  // False: the matcher's own answer is the pose.
   PointToLineOptions refine;
   MotionNoise odometry{0.05, 0.8, 0.0, 0.04, 0.4, 1.2};  // Generous: real odometry freezes, jumps, comes late.
-  bool use_odometry = true;  // False: tracking and mapping see scans only (thesis C 4.4).
+  bool use_odometry = true;                              // False: tracking and mapping see scans only (thesis C 4.4).
   NoOdometryOptions no_odometry;
   std::int64_t reference_keyframes = 40;  // Scans matched against; more: steadier, until drift blurs them.
   double retry_below = 0.65;              // Score under which other guesses than odometry are tried.

