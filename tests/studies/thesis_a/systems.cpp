@@ -1,4 +1,5 @@
 #include <cmath>
+#include <cstdio>
 #include <optional>
 #include <string>
 #include <utility>
@@ -100,6 +101,10 @@ bool StudyOneLog(StudyContext& context, const StudyLog& log) {
     table.Add({variant.name, variant.printed_time, s(split.all.mean), s(split.all.p99), s(split.all.max),
                s(split.others.mean), s(split.keyframes.mean), Number(run.user_cpu_s, 1), variant.printed_error,
                ErrorText(online), ErrorText(full), Count(static_cast<long long>(run.not_localized))});
+    if (double metres = 0, degrees = 0; std::sscanf(variant.printed_error.c_str(), "%lf / %lf", &metres, &degrees) == 2)
+      if (full.trans_mean_m > metres || full.rot_mean_deg > degrees)
+        report.Warn(variant.name + " on " + log.name + " is worse than printed (other log, other yardstick): " +
+                    ErrorText(full) + " beside " + variant.printed_error);
     Series series{.label = variant.name, .mark = Mark::kLine};
     for (std::size_t i = 0; i + 50 <= run.scan_cpu_ms.size(); i += 50) {
       series.x.push_back(static_cast<double>(i));
