@@ -1,8 +1,10 @@
 #include "client/sim/cloud_error.h"
+#include "client/sim/fleet.h"
 #include "client/sim/laser_models.h"
 #include "client/sim/shipped_worlds.h"
 #include "common/cloud/cloud_builder.h"
 #include "common/cloud/cloud_file.h"
+#include "common/sensor/log_record.h"
 #include "server/slam/scan_pipeline.h"
 #include "tests/studies/calibration/calibration.h"
 
