@@ -11,6 +11,7 @@
 namespace cairn::server {
 namespace {
 
+constexpr double kMaxPoseGap_s = 1.0;
 constexpr int kFewestSteps = 50;  // Twelve parameters cannot be learnt from less.
 
 Result<Trajectory> PathOfEstimator(const MotionRunOptions& options, const slam::ParallelFor& parallel_for) {
@@ -31,21 +32,8 @@ Result<Trajectory> PathOfEstimator(const MotionRunOptions& options, const slam::
   return pipeline.mapper().Snapshot().FullTrajectory();
 }
 
-// The pose at a stamp, between poses at most a second apart.
-std::optional<Pose2> PoseAt(const Trajectory& path, Stamp stamp) {
-  const auto after = std::lower_bound(path.begin(), path.end(), stamp,
-                                      [](const StampedPose& pose, Stamp s) { return pose.stamp < s; });
-  if (after == path.end()) return std::nullopt;
-  if (after->stamp == stamp) return after->T_map_robot;
-  if (after == path.begin()) return std::nullopt;
-  const auto before = std::prev(after);
-  const double gap = SecondsFromStamp(after->stamp - before->stamp);
-  if (gap > 1.0) return std::nullopt;
-  return Interpolate(before->T_map_robot, after->T_map_robot, SecondsFromStamp(stamp - before->stamp) / gap);
-}
-
 std::optional<Pose2> MotionBetween(const Trajectory& path, const LogStep& step) {
-  const auto from = PoseAt(path, step.from), to = PoseAt(path, step.to);
+  const auto from = PoseOn(path, step.from, kMaxPoseGap_s), to = PoseOn(path, step.to, kMaxPoseGap_s);
   if (!from || !to) return std::nullopt;
   return Between(*from, *to);
 }

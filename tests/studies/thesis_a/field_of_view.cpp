@@ -67,7 +67,7 @@ bool StudyFieldOfView(StudyContext& context, const std::vector<StudyLog>& logs) 
     for (const System& system : systems) {
       const auto options = MapperWith(system.assignments, context.seed);
       if (!options) {
-        report.Warn(system.name + " is not in this build: " + options.error().message);
+        if (&log == &logs.front()) report.Warn(system.name + " is not in this build: " + options.error().message);
         continue;
       }
       Series in_m{.label = system.name}, in_deg{.label = system.name};

@@ -91,7 +91,6 @@ bool StudyOneLog(StudyContext& context, const StudyLog& log) {
     const auto options = MapperWith(variant.assignments, context.seed);
     if (!options) {
       table.Add({variant.name, variant.printed_time, "not in this build"});
-      report.Warn(variant.name + " is not in this build: " + options.error().message);
       continue;
     }
     const LogRun run = RunOverLog(log, *options);
@@ -140,6 +139,9 @@ bool StudySystems(StudyContext& context, const std::vector<StudyLog>& logs) {
       "end (5.4). The "
       "thesis times scans with and without landmark re-observation; ours does all filter work at keyframes, so those "
       "are split instead.");
+  for (const Variant& variant : Variants())
+    if (const auto options = MapperWith(variant.assignments, context.seed); !options)
+      context.report.Warn(variant.name + " is not in this build: " + options.error().message);
   bool plausible = true;
   for (const StudyLog& log : logs) plausible = StudyOneLog(context, log) && plausible;
   return plausible;

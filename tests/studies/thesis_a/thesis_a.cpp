@@ -14,7 +14,7 @@ bool RunThesisA(StudyContext& context) {
       "Core 2 Duo: they stand beside ours for the shape of the curves, not as a race.");
   bool plausible = StudyLineExtraction(context);
   plausible = StudyPoseFromPairs(context) && plausible;
-  const std::vector<StudyLog> logs = ChooseLogs(context, {"intel", "mit-csail"}, context.Pick(0, 1200));
+  const std::vector<StudyLog> logs = ChooseLogs(context, {"intel", "mit-csail"}, context.Pick(0, 2500));
   plausible = StudySystems(context, logs) && plausible;
   plausible = StudyParticles(context, logs) && plausible;
   return StudyFieldOfView(context, logs) && plausible;
