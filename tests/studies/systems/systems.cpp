@@ -91,12 +91,10 @@ bool StudyOneLog(StudyContext& context, const StudyLog& log) {
 bool RunSystems(StudyContext& context) {
   context.report.Text(
       "One run at a time, one thread, in this process. Times are processor time per scan, so other load on the machine "
-      "does them little "
-      "harm; the user CPU of the whole run stands beside them. Errors are means over the verified relations of the log "
-      "(no alignment). "
-      "Online is what the robot was told at the time, full the best hypothesis' whole path at the end. Matchers run "
-      "with the first "
-      "filter and with it alone in charge of the step (\"not refined\"); filters run with the first matcher.");
+      "does them little harm; the user CPU of the whole run stands beside them. Errors are means over the verified "
+      "relations of the log (no alignment). Online is what the robot was told at the time, full the best hypothesis' "
+      "whole path at the end. Matchers run with the first filter and with it alone in charge of the step (\"not "
+      "refined\"); filters run with the first matcher.");
   bool plausible = true;
   for (const StudyLog& log : ChooseLogs(context, {"mit-csail", "intel"}, context.Pick(0, 500)))
     plausible = StudyOneLog(context, log) && plausible;

@@ -123,12 +123,9 @@ bool StudyAssociation(StudyContext& context) {
   report.Heading("Data association (5.4.3, Figures 5.15-5.18)");
   report.Text(
       "Pairs of poses in the simulated corridor and building, up to 0.4 m, 0.2 m aside and 14 deg apart, no guess "
-      "(identity). Printed: "
-      "least squares by itself \"is not able to furnish a good transformation\"; with association repeated 50 times it "
-      "is, and E (5.5) "
-      "stays up until the 50th round. \"As printed\": normals 0.8, midpoints 0.1 m, slopes 5 deg, all lines weigh the "
-      "same. Right: within 10 "
-      "cm and 2 deg.");
+      "(identity). Printed: least squares by itself \"is not able to furnish a good transformation\"; with association "
+      "repeated 50 times it is, and E (5.5) stays up until the 50th round. \"As printed\": normals 0.8, midpoints 0.1 "
+      "m, slopes 5 deg, all lines weigh the same. Right: within 10 cm and 2 deg.");
   const int cases = context.Pick(400, 60);
   Table table({"world", "way", "right", "median (cm)", "p95 (cm)", "median (deg)", "rounds mean", "rounds p95"});
   Plot curve{.title = "Figure 5.18: E over the rounds of association (mean of the pairs that end right)",
@@ -205,10 +202,8 @@ bool StudyAssociation(StudyContext& context) {
   report.Add(curve, "figure_5_18");
   report.Text(
       "Against the printed curve, ours needs a few rounds, not 50: least squares run to their end in every round. E "
-      "does not fall to "
-      "zero, because the visible parts of long walls differ from place to place; it may rise in the second round, when "
-      "more pairs join. "
-      "The printed gates (0.1 m) find too few pairs without a guess.");
+      "does not fall to zero, because the visible parts of long walls differ from place to place; it may rise in the "
+      "second round, when more pairs join. The printed gates (0.1 m) find too few pairs without a guess.");
   return plausible;
 }
 

@@ -68,9 +68,8 @@ bool StudyLeastSquares(StudyContext& context, const StudyLog& log) {
   }
   report.Text("The " + Count(static_cast<long long>(lines.size())) + " lines of " + from +
               ", moved by the inverse of each transform of Table 5.1; least squares start at the identity and know the "
-              "pairs. Printed: "
-              "\"chi, although starting from high values, falls quickly to zero after a few iterations\" (the thesis "
-              "runs 100).");
+              "pairs. Printed: \"chi, although starting from high values, falls quickly to zero after a few "
+              "iterations\" (the thesis runs 100).");
   std::vector<Way> ways(2);
   ways[0].name = "as shipped";
   ways[1].name = "thesis (all lines weigh the same)";

@@ -50,8 +50,7 @@ bool StudyTracking(StudyContext& context, const std::vector<StudyLog>& logs) {
   report.Heading("Scan after scan on the logs at hand");
   report.Text(
       "Pairs of scans at least 0.25 m or 10 deg apart, odometry as the guess. No truth exists for single steps: the "
-      "answer is compared with "
-      "point-to-line ICP where both converge.");
+      "answer is compared with point-to-line ICP where both converge.");
   Table table({"log", "pairs", "converged", "flagged degenerate", "rounds mean", "rounds p95",
                "apart from ICP median (cm)", "p95 (cm)", "median (deg)", "p95 (deg)", "time mean (ms)", "p99 (ms)",
                "ICP mean (ms)"});
