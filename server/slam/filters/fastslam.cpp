@@ -48,6 +48,8 @@ void FastSlam<LandmarkModel>::Observe(std::span<const LandmarkSighting> sighting
   for (const LandmarkSighting& sighting : sightings) index_.Name(sighting.slot, sighting.signature);
 
   std::vector<Association> associations(sightings.size());
+  std::vector<MixtureInnovation<LandmarkModel::kGateNumbers>> mixtures(sightings.size());
+  const std::vector<double> before = set_.weights();
   for (std::size_t i = 0; i < set_.size(); ++i) {
     for (std::size_t s = 0; s < sightings.size(); ++s) {
       associations[s] = Associate(i, sightings[s], measurements[s], slots[s], travelled_m);
@@ -56,6 +58,12 @@ void FastSlam<LandmarkModel>::Observe(std::span<const LandmarkSighting> sighting
         if (associations[s].verdict == Verdict::kKnown && associations[other].verdict == Verdict::kKnown &&
             associations[s].slot == associations[other].slot)
           associations[s].verdict = Verdict::kIgnored;
+    }
+    for (std::size_t s = 0; s < sightings.size(); ++s) {
+      if (associations[s].verdict != Verdict::kKnown) continue;
+      const auto innovation =
+          maps_[i][associations[s].slot].landmark.GateInnovation(set_[i].T_map_robot, measurements[s]);
+      mixtures[s].Add(before[i], innovation.v, innovation.S(set_[i].covariance));
     }
     for (std::size_t s = 0; s < sightings.size(); ++s) {
       if (associations[s].verdict == Verdict::kKnown) {
@@ -69,6 +77,7 @@ void FastSlam<LandmarkModel>::Observe(std::span<const LandmarkSighting> sighting
     for (std::size_t s = 0; s < sightings.size(); ++s)
       Remember(i, sightings[s], measurements[s], associations[s], travelled_m);
   }
+  for (const auto& mixture : mixtures) set_.Judge(mixture);
   set_.SampledAll();
 }
 

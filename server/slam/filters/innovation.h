@@ -47,4 +47,27 @@ void CorrectPose(Pose2& pose, Eigen::Matrix3d& covariance, const Innovation<N>& 
   covariance = 0.5 * (P + P.transpose());
 }
 
+// The innovation of a belief made of several: mean and covariance over all of them. A single particle's is no test of
+// the filter, since what it has sampled is not in its own S.
+template <int N>
+class MixtureInnovation {
+ public:
+  void Add(double weight, const Eigen::Matrix<double, N, 1>& v, const Eigen::Matrix<double, N, N>& S) {
+    sum_ += weight;
+    mean_ += weight * v;
+    second_ += weight * (S + v * v.transpose());
+  }
+  [[nodiscard]] bool empty() const { return !(sum_ > 0.0); }
+  // REQUIRES: not empty.
+  [[nodiscard]] double nis() const {
+    const Eigen::Matrix<double, N, 1> v = mean_ / sum_;
+    return Nis<N>(v, second_ / sum_ - v * v.transpose());
+  }
+
+ private:
+  double sum_ = 0.0;
+  Eigen::Matrix<double, N, 1> mean_ = Eigen::Matrix<double, N, 1>::Zero();
+  Eigen::Matrix<double, N, N> second_ = Eigen::Matrix<double, N, N>::Zero();
+};
+
 }  // namespace cairn::slam

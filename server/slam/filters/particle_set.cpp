@@ -45,6 +45,11 @@ bool ParticleSet::Observe(const RevisitObservation& revisit) {
     nearest = std::min(nearest, Nis<3>(innovations.back().v, innovations.back().S(particle.covariance)));
   }
   if (!(nearest < max_nis_)) return false;
+  MixtureInnovation<3> mixture;
+  const std::vector<double> before = weights();
+  for (std::size_t i = 0; i < particles_.size(); ++i)
+    mixture.Add(before[i], innovations[i].v, innovations[i].S(particles_[i].covariance));
+  Judge(mixture);
   for (std::size_t i = 0; i < particles_.size(); ++i) Fuse<3>(i, innovations[i]);
   sample_due_ = true;
   return true;
@@ -57,9 +62,9 @@ std::vector<int> ParticleSet::Commit() {
     sample_due_ = false;
   }
   for (Particle& particle : particles_) particle.path.Append(particle.T_map_robot);
-  std::vector<double> weights;
-  std::vector<int> parents = Resample(weights);
-  Summarise(weights);
+  std::vector<double> left;
+  std::vector<int> parents = Resample(left);
+  Summarise(left);
   nis_.EndStep();
   return parents;
 }
@@ -77,7 +82,7 @@ void ParticleSet::Rebase(std::span<const Pose2> path) {
   estimate_ = {particle.T_map_robot, particle.covariance};
 }
 
-void ParticleSet::Summarise(const std::vector<double>& weights) {
+void ParticleSet::Summarise(const std::vector<double>& shares) {
   best_ = 0;
   for (std::size_t i = 1; i < particles_.size(); ++i)
     if (particles_[i].log_likelihood > particles_[best_].log_likelihood) best_ = i;
@@ -92,8 +97,8 @@ void ParticleSet::Summarise(const std::vector<double>& weights) {
   for (std::size_t i = 0; i < particles_.size(); ++i) {
     const Eigen::Vector3d d = from_centre(particles_[i]);
     if (d.head<2>().norm() > options_.agreement_m) continue;
-    mean += weights[i] * d;
-    sum += weights[i];
+    mean += shares[i] * d;
+    sum += shares[i];
   }
   if (sum > 0.0) mean /= sum;
   estimate_.T_map_robot = {centre.x + mean.x(), centre.y + mean.y(), WrapAngle(centre.theta + mean.z())};
@@ -101,7 +106,7 @@ void ParticleSet::Summarise(const std::vector<double>& weights) {
   estimate_.covariance = best().covariance;
   for (std::size_t i = 0; i < particles_.size(); ++i) {
     const Eigen::Vector3d d = from_centre(particles_[i]) - mean;
-    estimate_.covariance += weights[i] * d * d.transpose();
+    estimate_.covariance += shares[i] * d * d.transpose();
   }
 }
 
@@ -117,15 +122,19 @@ void ParticleSet::Sample(std::size_t index) {
   particle.covariance.setZero();
 }
 
-// `weights` becomes those of the set it leaves behind.
-std::vector<int> ParticleSet::Resample(std::vector<double>& weights) {
+std::vector<double> ParticleSet::weights() const {
   std::vector<double> log_weights;
   log_weights.reserve(particles_.size());
   for (const Particle& particle : particles_) log_weights.push_back(particle.log_weight);
-  weights = NormalisedWeights(log_weights);
-  effective_ = EffectiveSampleSize(weights);
+  return NormalisedWeights(log_weights);
+}
+
+// `left`: the weights of the set it leaves behind.
+std::vector<int> ParticleSet::Resample(std::vector<double>& left) {
+  left = weights();
+  effective_ = EffectiveSampleSize(left);
   if (effective_ >= options_.resample_below * static_cast<double>(particles_.size())) return {};
-  std::vector<int> parents = StratifiedSurvivors(weights, rng_);
+  std::vector<int> parents = StratifiedSurvivors(left, rng_);
   std::vector<Particle> survivors;
   survivors.reserve(particles_.size());
   for (const int parent : parents) {
@@ -133,7 +142,7 @@ std::vector<int> ParticleSet::Resample(std::vector<double>& weights) {
     survivors.back().log_weight = 0.0;
   }
   particles_ = std::move(survivors);
-  weights.assign(particles_.size(), 1.0 / static_cast<double>(particles_.size()));
+  left.assign(particles_.size(), 1.0 / static_cast<double>(particles_.size()));
   return parents;
 }
 

@@ -40,13 +40,18 @@ class ParticleSet {
     const Eigen::Matrix<double, N, N> S = innovation.S(particle.covariance);
     const double nis = Nis<N>(innovation.v, S);
     Weigh(index, LogDensity<N>(std::min(nis, max_nis_), S));
-    if (index == best_) nis_.Add(nis, N);
     if (nis < max_nis_) CorrectPose<N>(particle.T_map_robot, particle.covariance, innovation);
   }
   void Weigh(std::size_t index, double log_likelihood) {
     particles_[index].log_weight += log_likelihood;
     particles_[index].log_likelihood += log_likelihood;
   }
+  // What the whole set made of an observation, for health().
+  template <int N>
+  void Judge(const MixtureInnovation<N>& innovation) {
+    if (!innovation.empty()) nis_.Add(innovation.nis(), N);
+  }
+  [[nodiscard]] std::vector<double> weights() const;  // Normalised.
   // Draws the pose from N(xv, pv) and starts collecting uncertainty anew.
   void Sample(std::size_t index);
   void SampledAll() { travelled_ = 0.0; }
@@ -68,8 +73,8 @@ class ParticleSet {
   [[nodiscard]] FilterHealth health() const;
 
  private:
-  std::vector<int> Resample(std::vector<double>& weights);
-  void Summarise(const std::vector<double>& weights);
+  std::vector<int> Resample(std::vector<double>& left);
+  void Summarise(const std::vector<double>& shares);
 
   FastSlamOptions options_;
   double max_nis_;
