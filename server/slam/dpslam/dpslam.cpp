@@ -5,6 +5,12 @@
 #include <utility>
 
 namespace cairn::slam {
+namespace {
+
+// Gain per ray: as where one ray in four ends in what the map says is free.
+constexpr double kContradiction = -1.0;
+
+}  // namespace
 
 DpSlam::DpSlam(const DpSlamOptions& options, const Pose2& T_map_robot_start, std::uint64_t seed)
     : options_(options), rng_(seed) {
@@ -26,7 +32,7 @@ void DpSlam::Observe(std::shared_ptr<const LaserRays> rays, const ParallelFor& p
   const Evidence evidence{{rays, Pose2{}}};
   low_->Observe({&evidence, 1}, rng_, parallel_for);
   observed_ = true;
-  contradicted_ = low_->gain() < 0.0 ? contradicted_ + 1 : 0;
+  contradicted_ = low_->gain() < kContradiction ? contradicted_ + 1 : 0;
   if (!options_.hierarchical) return;
   segment_.push_back(std::move(rays));
   if (SegmentEnds()) EndSegment(parallel_for);

@@ -17,11 +17,22 @@ struct SegmentOptions {
   std::int64_t trajectories = 4;    // Of the low level's particles, handed up for the high level to choose from.
 };
 
+// A rigid trajectory leaves less room for small corrections, hence the larger sigma (Eliazar 2005: 7 cm); a segment's
+// many scans see the same walls, hence the smaller share.
+[[nodiscard]] inline LevelOptions HighLevel() {
+  LevelOptions high;
+  high.sigma_m = 0.07;
+  high.evidence_share = 0.03;
+  high.ray_stride = 4;
+  high.drift = {0.01, 0.005, 0.0, 0.001, 0.001, 0.0};
+  return high;
+}
+
 struct DpSlamOptions {
   bool hierarchical = true;
   OpacityOptions opacity;
-  LevelOptions low{500, 0.05, 0.15, 0.05, 1.0, 1, 12.0, 0.5, {0.004, 0.05, 0.01, 0.001, 0.01, 0.05}};
-  LevelOptions high{500, 0.07, 0.02, 0.05, 1.0, 4, 12.0, 0.5, {0.01, 0.008, 0.0, 0.002, 0.002, 0.0}};
+  LevelOptions low;
+  LevelOptions high = HighLevel();
   SegmentOptions segment;
   std::int64_t diverged_after = 20;  // Scans in a row that the map contradicts before the filter says it is lost.
 };

@@ -18,10 +18,11 @@ bool ShowsRays(std::span<const Evidence> alternatives) {
 }  // namespace
 
 void Visit(OptionVisitor& visitor, LevelOptions& options) {
-  visitor.Integer("particles", options.particles, "1", 1, 10000, "More: longer loops close, in more time and memory.");
   visitor.Real("sigma_m", options.sigma_m, "m", 0.005, 1.0, "Of a range against the map. More: more particles agree.");
   visitor.Real("evidence_share", options.evidence_share, "1", 0.001, 1.0,
                "Of a ray's log likelihood: neighbouring rays err alike. 1: all rays are independent.");
+  visitor.Real("unseen_per_m", options.unseen_per_m, "1/m", 0.001, 100.0,
+               "Density of ray ends in unseen space. Less: maps shrink; more: walls are not found again.");
   visitor.Real("outlier_share", options.outlier_share, "1", 0.0001, 0.99, "Rays that say nothing about the map.");
   visitor.Real("resample_below", options.resample_below, "1", 0.0, 1.0,
                "Share of particles that still count below which the set is resampled; 1: always.");
@@ -76,18 +77,23 @@ void LevelFilter::Observe(std::span<const Evidence> alternatives, Rng& rng, cons
   const bool sees = ShowsRays(alternatives);
   if (sees && !maps_.blank()) {
     const double max_ray_m = maps_.options().max_ray_m;
-    const JudgeOptions judge{{options_.sigma_m, options_.outlier_share, max_ray_m, maps_.options().resolution_m},
-                             static_cast<std::size_t>(options_.ray_stride),
-                             options_.give_up_behind / options_.evidence_share};
+    const JudgeOptions judge{
+        {options_.sigma_m, options_.outlier_share, max_ray_m, maps_.options().resolution_m, options_.unseen_per_m},
+        static_cast<std::size_t>(options_.ray_stride),
+        options_.give_up_behind / options_.evidence_share};
     const std::vector<double> log_likelihoods = maps_.LogLikelihoods(samples, alternatives, judge, parallel_for);
     for (std::size_t i = 0; i < particles_.size(); ++i) {
       particles_[i].log_weight += options_.evidence_share * log_likelihoods[i];
       particles_[i].log_likelihood += options_.evidence_share * log_likelihoods[i];
     }
     const auto best = std::max_element(log_likelihoods.begin(), log_likelihoods.end());
+    std::size_t rays = 0;
     gain_ = *best;
-    for (const PlacedRays& placed : alternatives[chosen[static_cast<std::size_t>(best - log_likelihoods.begin())]])
-      gain_ -= UnseenLogLikelihood(*placed.rays, judge.ray_stride, maps_.rate()({}), judge.model);
+    for (const PlacedRays& placed : alternatives[chosen[static_cast<std::size_t>(best - log_likelihoods.begin())]]) {
+      gain_ -= UnseenLogLikelihood(*placed.rays, judge.ray_stride, judge.model);
+      rays += (placed.rays->rays.size() + judge.ray_stride - 1) / judge.ray_stride;
+    }
+    gain_ /= static_cast<double>(std::max<std::size_t>(rays, 1));
   }
 
   for (std::size_t i = 0; i < particles_.size(); ++i) {

@@ -19,17 +19,20 @@ namespace cairn::slam {
 
 struct LevelOptions {
   std::int64_t particles = 500;
-  double sigma_m = 0.05;        // Of a range against the map. Larger: more particles agree.
-  double evidence_share = 0.2;  // Of a ray's log likelihood: neighbouring rays hit the same wall and err alike.
-  double outlier_share = 0.05;  // Rays that say nothing about the map: people, open doors.
-  double resample_below = 1.0;  // Effective sample size over particles; 1: after every scan, as the source does.
-  std::int64_t ray_stride = 1;  // Every n-th ray judges; all are drawn.
+  double sigma_m = 0.05;         // Of a range against the map. Larger: more particles agree.
+  double evidence_share = 0.15;  // Of a ray's log likelihood: neighbouring rays hit the same wall and err alike.
+  double outlier_share = 0.05;   // Rays that say nothing about the map: people, open doors.
+  double unseen_per_m = 2.0;     // Density of ray ends in unseen space; about that of a ray well explained.
+  double resample_below = 1.0;   // Effective sample size over particles; 1: after every scan, as the source does.
+  std::int64_t ray_stride = 1;   // Every n-th ray judges; all are drawn.
   double give_up_behind =
       12.0;                  // Weighted log likelihood behind the best at which a particle is not looked at further.
   double agreement_m = 0.5;  // Particles this near the best one take part in the reported pose.
-  MotionNoise drift;         // Low: of a step, on top of what the front-end says. High: of a segment, at its joint.
+  MotionNoise drift{
+      0.004, 0.05, 0.01,
+      0.001, 0.01, 0.05};  // Low: of a step, on top of what the front-end says. High: of a segment, at its joint.
 };
-void Visit(OptionVisitor& visitor, LevelOptions& options);
+void Visit(OptionVisitor& visitor, LevelOptions& options);  // All but `particles`.
 
 struct GridParticle {
   Pose2 T_map_robot;
@@ -59,8 +62,8 @@ class LevelFilter {
   [[nodiscard]] const Pose2& mean() const { return mean_; }
   [[nodiscard]] const Eigen::Matrix3d& covariance() const { return covariance_; }
   [[nodiscard]] double effective_sample_size() const { return effective_; }
-  // Log likelihood of the last evidence in the best map, over what a map never seen would say: negative where the map
-  // contradicts it. 0 where there was nothing to compare.
+  // Log likelihood per ray of the last evidence in the best map, over what unseen space says: well below 0 where the
+  // map contradicts it. 0 where there was nothing to compare.
   [[nodiscard]] double gain() const { return gain_; }
 
  private:

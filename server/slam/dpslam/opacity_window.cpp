@@ -5,10 +5,10 @@
 namespace cairn::slam {
 
 OpacityWindow::OpacityWindow(const Ancestry& ancestry, const TileBox& box, const StopRate& rate)
-    : ancestry_(ancestry), box_(box), rate_(rate), unseen_(rate({})) {
+    : ancestry_(ancestry), box_(box), rate_(rate) {
   const std::size_t cells = static_cast<std::size_t>(width()) * static_cast<std::size_t>(height());
   counts_.resize(cells);
-  rates_.assign(cells, unseen_);
+  rates_.resize(cells);
 }
 
 void OpacityWindow::Show(Ancestry::Id id) {
@@ -42,7 +42,7 @@ void OpacityWindow::Apply(const MapChanges& changes) {
         sum = {sum.travel - travel, sum.stops - stops};
       }
       counts[at] = sum;
-      rates[at] = rate_(sum);
+      rates[at] = sum == CellCounts{} ? 0.0F : rate_(sum);
     });
   }
 }

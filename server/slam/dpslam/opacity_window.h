@@ -30,10 +30,9 @@ class OpacityWindow {
   [[nodiscard]] int low_y() const { return box_.low_y << kTileBits; }
   [[nodiscard]] int width() const { return box_.width << kTileBits; }
   [[nodiscard]] int height() const { return box_.height << kTileBits; }
-  // Stops per cell-width of travel, row by row.
+  // Stops per cell-width of travel, row by row; 0 (which no cell seen has) where nothing has been seen.
   [[nodiscard]] const float* rates() const { return rates_.data(); }
   [[nodiscard]] const std::vector<CellCounts>& counts() const { return counts_; }
-  [[nodiscard]] float unseen_rate() const { return unseen_; }
 
  private:
   template <int Sign>
@@ -42,7 +41,6 @@ class OpacityWindow {
   const Ancestry& ancestry_;
   const TileBox box_;
   const StopRate rate_;
-  const float unseen_;
   std::vector<CellCounts> counts_;
   std::vector<float> rates_;
   std::vector<Ancestry::Id> line_, next_line_;

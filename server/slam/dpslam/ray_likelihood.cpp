@@ -19,7 +19,7 @@ struct Inside {
 struct Anywhere {
   const OpacityWindow& window;
   [[nodiscard]] float operator()(int x, int y) const {
-    if (x < 0 || y < 0 || x >= window.width() || y >= window.height()) return window.unseen_rate();
+    if (x < 0 || y < 0 || x >= window.width() || y >= window.height()) return 0.0F;
     return window.rates()[static_cast<std::ptrdiff_t>(y) * window.width() + x];
   }
 };
@@ -27,7 +27,7 @@ struct Anywhere {
 // Lengths in cells. Returns the density per cell of the hit, or the chance to pass.
 template <typename Rates>
 float Walk(const Rates& rates, const Eigen::Vector2d& origin, const Eigen::Vector2d& along, double length, bool hit,
-           float sigma) {
+           float sigma, float unseen) {
   RayWalk walk(origin, along);
   const auto reach = static_cast<float>(kReach) * sigma;
   const auto end = static_cast<float>(length);
@@ -52,10 +52,11 @@ float Walk(const Rates& rates, const Eigen::Vector2d& origin, const Eigen::Vecto
   const float far = end + reach, inverse = 1.0F / sigma;
   float passed = std::exp(-depth), density = 0.0F;
   for (;;) {
-    const float until = std::min(to, far);
-    const float on = passed * std::exp(-(until - from) * rates(walk.x, walk.y));
+    const float until = std::min(to, far), rate = rates(walk.x, walk.y);
+    const float on = passed * std::exp(-(until - from) * rate);
+    const float stopped = rate > 0.0F ? passed - on : passed * (until - from) * unseen;
     const float z = (0.5F * (from + until) - end) * inverse;
-    if (std::abs(z) < static_cast<float>(kReach)) density += (passed - on) * std::exp(-0.5F * z * z);
+    if (std::abs(z) < static_cast<float>(kReach)) density += stopped * std::exp(-0.5F * z * z);
     passed = on;
     if (!(to < far)) break;
     from = to;
@@ -84,10 +85,11 @@ double LikelihoodAt(const OpacityWindow& window, const Eigen::Vector2d& origin, 
   const auto holds = [&](const Eigen::Vector2d& p) {
     return p.x() >= 1.0 && p.y() >= 1.0 && p.x() < window.width() - 1.0 && p.y() < window.height() - 1.0;
   };
-  const float walked =
-      holds(origin) && holds(end)
-          ? Walk(Inside{window.rates(), window.width()}, origin, along, length, ray.hit, static_cast<float>(sigma))
-          : Walk(Anywhere{window}, origin, along, length, ray.hit, static_cast<float>(sigma));
+  const auto unseen = static_cast<float>(model.unseen_per_m * model.resolution_m);
+  const float walked = holds(origin) && holds(end)
+                           ? Walk(Inside{window.rates(), window.width()}, origin, along, length, ray.hit,
+                                  static_cast<float>(sigma), unseen)
+                           : Walk(Anywhere{window}, origin, along, length, ray.hit, static_cast<float>(sigma), unseen);
   return WithOutliers(ray, walked, model);
 }
 
@@ -132,15 +134,13 @@ double LogLikelihood(const OpacityWindow& window, const Pose2& T_map_robot, cons
   return product.log();
 }
 
-double UnseenLogLikelihood(const LaserRays& rays, std::size_t stride, float unseen_rate, const RayModel& model) {
-  LogProduct product;
+double UnseenLogLikelihood(const LaserRays& rays, std::size_t stride, const RayModel& model) {
+  double sum = 0.0;
   for (std::size_t i = 0; i < rays.rays.size(); i += stride) {
     const LaserRay& ray = rays.rays[i];
-    // The same rate everywhere: stops come exponentially, and the Gaussian around the end integrates to 1.
-    const double passed = std::exp(-ray.length_m / model.resolution_m * static_cast<double>(unseen_rate));
-    product.Multiply(WithOutliers(ray, ray.hit ? passed * static_cast<double>(unseen_rate) : passed, model));
+    sum += std::log(WithOutliers(ray, ray.hit ? model.unseen_per_m * model.resolution_m : 1.0, model));
   }
-  return product.log();
+  return sum;
 }
 
 }  // namespace cairn::slam

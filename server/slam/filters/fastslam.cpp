@@ -14,13 +14,13 @@ FastSlam<LandmarkModel>::FastSlam(Proposal proposal, const FastSlamOptions& opti
       gate_(ChiSquareQuantile(back_end.landmarks.match_share, LandmarkModel::kGateNumbers)),
       new_nis_(ChiSquareQuantile(back_end.landmarks.match_share, LandmarkModel::kNumbers)),
       candidates_(back_end.landmarks),
-      set_(options, particles, T_map_robot_start, seed),
+      set_(options, back_end.max_nis, particles, T_map_robot_start, seed),
       maps_(static_cast<std::size_t>(particles)),
       contradictions_(back_end.diverged_after) {}
 
 template <typename LandmarkModel>
 void FastSlam<LandmarkModel>::Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) {
-  if (proposal_ == Proposal::kMotion) return set_.PredictBySampling(T_prev_curr);
+  if (proposal_ == Proposal::kMotion) return set_.PredictBySampling(T_prev_curr, covariance_prev);
   set_.Predict(T_prev_curr, options_.drift.Covariance(T_prev_curr) + covariance_prev);
 }
 

@@ -7,8 +7,6 @@ void Visit(OptionVisitor& visitor, FastSlamOptions& options) {
                "Travelled before uncertainty is sampled without an observation (2.0).");
   visitor.Real("resample_below", options.resample_below, "1", 0.0, 1.0,
                "Share of particles that still count below which the set is resampled.");
-  visitor.Real("max_nis", options.max_nis, "1", 1.0, 1000.0,
-               "Squared Mahalanobis distance beyond which an observation adds no more doubt.");
   visitor.Real("agreement_m", options.agreement_m, "m", 0.0, 100.0,
                "Particles this near the best one take part in the reported pose.");
   visitor.Section("motion", "How 1.0 samples a step.", [&] { Visit(visitor, options.motion); });

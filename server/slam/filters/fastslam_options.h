@@ -11,7 +11,6 @@ namespace cairn::slam {
 struct FastSlamOptions {
   double sample_distance_m = 1.0;  // Travelled before uncertainty is sampled without an observation (2.0 only).
   double resample_below = 0.5;     // Effective sample size over particles.
-  double max_nis = 16.0;           // Squared Mahalanobis distance beyond which an observation adds no more doubt.
   double agreement_m = 0.5;        // Particles this near the best one take part in the reported pose.
   MotionSampling motion;           // How FastSLAM 1.0 samples a step.
 };

@@ -9,9 +9,9 @@
 #include "server/slam/motion/dead_reckoning.h"
 
 namespace cairn::slam {
-ParticleSet::ParticleSet(const FastSlamOptions& options, std::int64_t count, const Pose2& T_map_robot_start,
-                         std::uint64_t seed)
-    : options_(options), rng_(seed), particles_(static_cast<std::size_t>(count)) {
+ParticleSet::ParticleSet(const FastSlamOptions& options, double max_nis, std::int64_t count,
+                         const Pose2& T_map_robot_start, std::uint64_t seed)
+    : options_(options), max_nis_(max_nis), rng_(seed), particles_(static_cast<std::size_t>(count)) {
   for (Particle& particle : particles_) particle.T_map_robot = T_map_robot_start;
   effective_ = static_cast<double>(particles_.size());
   estimate_.T_map_robot = T_map_robot_start;
@@ -23,9 +23,17 @@ void ParticleSet::Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covar
   travelled_ += T_prev_curr.translation().norm();
 }
 
-void ParticleSet::PredictBySampling(const Pose2& T_prev_curr) {
-  for (Particle& particle : particles_)
-    particle.T_map_robot = SampleMotion(particle.T_map_robot, T_prev_curr, options_.motion, rng_);
+void ParticleSet::PredictBySampling(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) {
+  const bool more = covariance_prev.trace() > 0.0;
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    Particle& particle = particles_[i];
+    const Pose2 before = particle.T_map_robot;
+    particle.T_map_robot = SampleMotion(before, T_prev_curr, options_.motion, rng_);
+    if (!more) continue;
+    const Eigen::Matrix3d J = J_compose_right(before, T_prev_curr);
+    particle.covariance = J * covariance_prev * J.transpose();
+    Sample(i);
+  }
 }
 
 bool ParticleSet::Observe(const RevisitObservation& revisit) {
@@ -36,7 +44,7 @@ bool ParticleSet::Observe(const RevisitObservation& revisit) {
     innovations.push_back(InnovateRevisit(particle.path[revisit.keyframe], particle.T_map_robot, revisit));
     nearest = std::min(nearest, Nis<3>(innovations.back().v, innovations.back().S(particle.covariance)));
   }
-  if (!(nearest < options_.max_nis)) return false;
+  if (!(nearest < max_nis_)) return false;
   for (std::size_t i = 0; i < particles_.size(); ++i) Fuse<3>(i, innovations[i]);
   sample_due_ = true;
   return true;
@@ -52,8 +60,7 @@ std::vector<int> ParticleSet::Commit() {
   std::vector<double> weights;
   std::vector<int> parents = Resample(weights);
   Summarise(weights);
-  if (!step_open_) nis_ = 0.0, nis_numbers_ = 0;
-  step_open_ = false;
+  nis_.EndStep();
   return parents;
 }
 
@@ -70,34 +77,32 @@ void ParticleSet::Rebase(std::span<const Pose2> path) {
   estimate_ = {particle.T_map_robot, particle.covariance};
 }
 
-void ParticleSet::AddNis(double nis, int numbers) {
-  if (!step_open_) nis_ = 0.0, nis_numbers_ = 0;
-  step_open_ = true;
-  nis_ += nis;
-  nis_numbers_ += numbers;
-}
-
 void ParticleSet::Summarise(const std::vector<double>& weights) {
   best_ = 0;
   for (std::size_t i = 1; i < particles_.size(); ++i)
     if (particles_[i].log_likelihood > particles_[best_].log_likelihood) best_ = i;
   const Pose2& centre = best().T_map_robot;
-  Eigen::Vector3d first = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+  const auto from_centre = [&](const Particle& particle) {
+    Eigen::Vector3d d = particle.T_map_robot.vector() - centre.vector();
+    d.z() = WrapAngle(d.z());
+    return d;
+  };
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   double sum = 0.0;
   for (std::size_t i = 0; i < particles_.size(); ++i) {
-    Eigen::Vector3d d = particles_[i].T_map_robot.vector() - centre.vector();
-    d.z() = WrapAngle(d.z());
+    const Eigen::Vector3d d = from_centre(particles_[i]);
     if (d.head<2>().norm() > options_.agreement_m) continue;
-    first += weights[i] * d;
-    second += weights[i] * d * d.transpose();
+    mean += weights[i] * d;
     sum += weights[i];
   }
-  estimate_ = {centre, best().covariance};
-  if (!(sum > 0.0)) return;
-  const Eigen::Vector3d mean = first / sum;
+  if (sum > 0.0) mean /= sum;
   estimate_.T_map_robot = {centre.x + mean.x(), centre.y + mean.y(), WrapAngle(centre.theta + mean.z())};
-  estimate_.covariance += second / sum - mean * mean.transpose();
+  // Doubt is that of all of them: leaving out those that disagree would claim more than is known.
+  estimate_.covariance = best().covariance;
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    const Eigen::Vector3d d = from_centre(particles_[i]) - mean;
+    estimate_.covariance += weights[i] * d * d.transpose();
+  }
 }
 
 void ParticleSet::Sample(std::size_t index) {
@@ -134,7 +139,7 @@ std::vector<int> ParticleSet::Resample(std::vector<double>& weights) {
 
 FilterHealth ParticleSet::health() const {
   const bool finite = estimate_.T_map_robot.IsFinite() && estimate_.covariance.allFinite();
-  return {effective_, nis_, nis_numbers_, !finite};
+  return {effective_, nis_.sum(), nis_.numbers(), !finite};
 }
 
 }  // namespace cairn::slam

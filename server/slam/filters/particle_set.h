@@ -14,19 +14,22 @@
 #include "server/slam/filters/innovation.h"
 #include "server/slam/filters/particle.h"
 #include "server/slam/filters/resampling.h"
+#include "server/slam/filters/step_nis.h"
 
 namespace cairn::slam {
 
 class ParticleSet {
  public:
   // REQUIRES: count > 0.
-  ParticleSet(const FastSlamOptions& options, std::int64_t count, const Pose2& T_map_robot_start, std::uint64_t seed);
+  ParticleSet(const FastSlamOptions& options, double max_nis, std::int64_t count, const Pose2& T_map_robot_start,
+              std::uint64_t seed);
 
   // Table 4.2: moves every particle along the step and lets its uncertainty grow. `covariance_prev` in the step's
   // start.
   void Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev);
-  // FastSLAM 1.0: moves every particle by a sample of the motion model, which leaves no uncertainty.
-  void PredictBySampling(const Pose2& T_prev_curr);
+  // FastSLAM 1.0: moves every particle by a sample of the motion model, and of what comes on top of it, which leaves no
+  // uncertainty.
+  void PredictBySampling(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev);
 
   // Proposal and weight for one revisit. False where no particle explains it: nothing changes.
   bool Observe(const RevisitObservation& revisit);
@@ -36,9 +39,9 @@ class ParticleSet {
     Particle& particle = particles_[index];
     const Eigen::Matrix<double, N, N> S = innovation.S(particle.covariance);
     const double nis = Nis<N>(innovation.v, S);
-    Weigh(index, LogDensity<N>(std::min(nis, options_.max_nis), S));
-    if (index == best_) AddNis(nis, N);
-    if (nis < options_.max_nis) CorrectPose<N>(particle.T_map_robot, particle.covariance, innovation);
+    Weigh(index, LogDensity<N>(std::min(nis, max_nis_), S));
+    if (index == best_) nis_.Add(nis, N);
+    if (nis < max_nis_) CorrectPose<N>(particle.T_map_robot, particle.covariance, innovation);
   }
   void Weigh(std::size_t index, double log_likelihood) {
     particles_[index].log_weight += log_likelihood;
@@ -59,26 +62,24 @@ class ParticleSet {
   [[nodiscard]] std::size_t size() const { return particles_.size(); }
   [[nodiscard]] std::size_t best_index() const { return best_; }
   [[nodiscard]] const Particle& best() const { return particles_[best_]; }
-  // Weighted mean pose of the particles that agree with the best one, and their spread plus its own uncertainty.
-  // Steadier than the best particle, which changes hands.
+  // Weighted mean pose of the particles that agree with the best one, steadier than the best particle, which changes
+  // hands; and the spread of all of them about it, plus the uncertainty each has.
   [[nodiscard]] const FilterEstimate& estimate() const { return estimate_; }
   [[nodiscard]] FilterHealth health() const;
 
  private:
-  void AddNis(double nis, int numbers);
   std::vector<int> Resample(std::vector<double>& weights);
   void Summarise(const std::vector<double>& weights);
 
   FastSlamOptions options_;
+  double max_nis_;
   Rng rng_;
   std::vector<Particle> particles_;
   std::size_t best_ = 0;
   double travelled_ = 0.0;  // Since the last sampling.
   bool sample_due_ = false;
   double effective_ = 0.0;
-  double nis_ = 0.0;  // Of this step so far, then of the last.
-  int nis_numbers_ = 0;
-  bool step_open_ = false;
+  StepNis nis_;
   FilterEstimate estimate_;
 };
 

@@ -50,6 +50,7 @@ MatchResult MatchByCorrelation(const ScanView& prev, const ScanView& curr, const
   result.covariance = 0.5 * (answer.covariance + answer.covariance.transpose());
   result.converged = true;
   JudgeDegeneracy(agreement.H, options.degenerate_ratio, result);
+  TakeAlongFromPrior(prior, result);
   return result;
 }
 

@@ -200,20 +200,11 @@ MatchResult MatchByHough(const ScanView& prev, const ScanView& curr, const Match
   result.iterations = 1;
   result.converged = true;
   JudgeDegeneracy(best.agreement.H, options.degenerate_ratio, result);
-  Eigen::Vector2d t = best.T_prev_curr.translation();
-  Eigen::Matrix3d information =
-      Eigen::Vector3d(1.0 / (options.sigma_m * options.sigma_m), 1.0 / (options.sigma_m * options.sigma_m),
-                      1.0 / (options.sigma_rad * options.sigma_rad))
-          .asDiagonal();
-  if (result.degenerate) {
-    const Eigen::Vector2d u = result.degenerate_direction;
-    t = TakeAlongFromPrior(t, prior.T_prev_curr.translation(), u);
-    const double open = u.dot(prior.covariance.topLeftCorner<2, 2>() * u);
-    information.topLeftCorner<2, 2>() += (1.0 / open - information(0, 0)) * u * u.transpose();
-  }
-  result.T_prev_curr = {t.x(), t.y(), best.T_prev_curr.theta};
-  result.covariance = information.inverse();
-  result.covariance = 0.5 * (result.covariance + result.covariance.transpose()).eval();
+  result.T_prev_curr = best.T_prev_curr;
+  result.covariance = Eigen::Vector3d(options.sigma_m * options.sigma_m, options.sigma_m * options.sigma_m,
+                                      options.sigma_rad * options.sigma_rad)
+                          .asDiagonal();
+  TakeAlongFromPrior(prior, result);
   return result;
 }
 

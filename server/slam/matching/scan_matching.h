@@ -29,6 +29,11 @@ enum class MatcherKind : std::uint8_t { kVoting = 0, kLineLsq, kHough, kNdt, kNd
 [[nodiscard]] std::span<const std::string_view> MatcherNames();
 [[nodiscard]] std::string_view MatcherName(MatcherKind kind);
 
+// Whether a matcher looks so far around the prior that starting it elsewhere finds nothing new.
+[[nodiscard]] constexpr bool SearchesWide(MatcherKind kind) {
+  return kind == MatcherKind::kHough || kind == MatcherKind::kNdtDe;
+}
+
 struct MatcherOptions {
   VotingOptions voting;
   NdtOptions ndt;

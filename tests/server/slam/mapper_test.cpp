@@ -145,6 +145,32 @@ TEST(Mapper, SameInputSameOutputWhateverTheThreads) {
     ASSERT_EQ(serial.online[i].T_map_robot, parallel.online[i].T_map_robot);
 }
 
+// Thesis A 3.5.13: rotation from the walls, way along from the odometry; no jump, and the pose says so.
+TEST(Mapper, FollowsOdometryAlongABareCorridorAndSaysSo) {
+  test::World corridor;
+  corridor.Add({{-100, 1}, {100, 1}}).Add({{-100, -1}, {100, -1}});
+  MapperOptions options;
+  options.filter.particles = 20;
+  Mapper mapper(options, {}, 1);
+  int degenerate = 0;
+  double worst_step_m = 0.0;
+  Pose2 before;
+  constexpr int kSteps = 200;
+  for (int i = 0; i < kSteps; ++i) {
+    const Pose2 truth{0.1 * i, 0.1 * std::sin(0.1 * i), 0.1 * std::cos(0.1 * i) - 0.1};
+    auto scan = std::make_shared<Scan>(Look(corridor, truth, Laser{.beams = 361, .step_rad = Radians(0.5)}));
+    scan->stamp = i + 1;
+    const ScanOutcome outcome = mapper.Process(std::move(scan), truth, SerialFor);
+    degenerate += outcome.reason == PoseReason::kDegenerate ? 1 : 0;
+    EXPECT_NEAR(outcome.T_map_robot.y, truth.y, 0.1);
+    if (i > 0) worst_step_m = std::max(worst_step_m, (outcome.T_map_robot.translation() - before.translation()).norm());
+    before = outcome.T_map_robot;
+  }
+  EXPECT_GT(degenerate, kSteps * 9 / 10);
+  EXPECT_LT(worst_step_m, 0.3);
+  EXPECT_NEAR(before.x, 0.1 * (kSteps - 1), 1.0);
+}
+
 TEST(Mapper, StandingStillAddsNoKeyframes) {
   MapperOptions options;
   Mapper mapper(options, {}, 1);

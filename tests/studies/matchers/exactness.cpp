@@ -41,13 +41,10 @@ bool StudyExactness(StudyContext& context, const std::vector<slam::MatcherKind>&
   report.Heading("Time, bias, spread");
   report.Text(
       "Pairs of scans from the routes of the shipped worlds, up to 0.3 m and 12 deg apart, 181 beams; the guess is off "
-      "by 0.05 m and "
-      "2 deg (standard deviations, which the matcher is told). Right: converged within 0.10 m and 2 deg of the truth. "
-      "Wrong: converged, "
-      "not flagged degenerate, and farther off than that: the dangerous kind. Bias and spread are of right answers "
-      "that are not flagged; "
-      "NEES is 3 where the covariance is honest, above where it promises too much. Time is processor time, one "
-      "thread.");
+      "by 0.05 m and 2 deg (standard deviations, which the matcher is told). Right: converged within 0.10 m and 2 deg "
+      "of the truth. Wrong: converged, not flagged degenerate, and farther off than that: the dangerous kind. Bias and "
+      "spread are of right answers that are not flagged; NEES is 3 where the covariance is honest, above where it "
+      "promises too much. Time is processor time, one thread.");
   Table table({"matcher", "noise (cm)", "time mean (ms)", "p99 (ms)", "right", "wrong", "flagged degenerate",
                "bias x, y (mm)", "bias theta (mdeg)", "sigma x, y (mm)", "sigma theta (mdeg)", "p95 (cm)", "NEES"});
   Plot plot{.title = "Error of right answers against range noise",

@@ -147,10 +147,8 @@ bool StudySpecialCases(StudyContext& context, const std::vector<slam::MatcherKin
   context.report.Heading("Corridor, one wall, empty scan, narrow views, crowds");
   context.report.Text(
       "Where walls run one way only, the place along them is not to be seen: a matcher should say so and stay at the "
-      "guess along them "
-      "(slid: how far it left it). Crowds are discs that stand elsewhere in the other scan, over half of the beams. "
-      "Guess and yardstick "
-      "as above.");
+      "guess along them (slid: how far it left it). Crowds are discs that stand elsewhere in the other scan, over half "
+      "of the beams. Guess and yardstick as above.");
   StudyWalls(context, kinds);
   StudyViews(context, kinds);
   return StudyEmptyScans(context, kinds);

@@ -1,0 +1,54 @@
+// A log as steps for DP-SLAM (odometry motion, scan) and a run of the filter over them with every figure at hand: time,
+// memory, shape of the family tree, path and map. Studies only; two threads where asked.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "server/slam/dpslam/dpslam.h"
+#include "tests/studies/logs.h"
+#include "tests/studies/stopwatch.h"
+
+namespace cairn::studies {
+
+struct GridStep {
+  Stamp stamp = 0;
+  Pose2 T_prev_curr;  // By odometry.
+  std::shared_ptr<const Scan> scan;
+};
+
+// Scans at least so far apart by odometry; all where both are 0.
+[[nodiscard]] std::vector<GridStep> GridSteps(const StudyLog& log, double gate_m, double gate_rad);
+
+struct GridRun {
+  std::string name;
+  std::vector<double> cpu_ms;   // Of every scan, all threads ...
+  std::vector<double> wall_ms;  // ... and on the wall.
+  std::vector<double> map_mib;  // All particles' maps after every scan.
+  std::size_t most_nodes = 0;   // Of the low level's family tree, and its longest line.
+  std::size_t longest_line = 0;
+  bool bounds_hold = true;      // Fewer than two nodes a living particle, no line longer than their number.
+  int diverged = 0;             // Scans after which the filter called itself lost.
+  double log_likelihood = 0.0;  // Of the best particle.
+  Trajectory path;              // Of the best particle, at the end.
+  OccupancyImage map;           // Opacity, of the best particle.
+  double naive_mib = 0.0;       // What one copy of the map for every particle takes (4 bytes a cell).
+
+  [[nodiscard]] double PeakMib() const;
+};
+
+[[nodiscard]] GridRun RunGrid(const std::string& name, const std::vector<GridStep>& steps,
+                              const Pose2& T_map_robot_start, const slam::DpSlamOptions& options, std::uint64_t seed,
+                              int threads);
+
+// How far apart the path puts two visits of one place, against the truth: means over all pairs of poses in the same
+// place (1 m) more than `apart_m` of way apart.
+struct LoopError {
+  int pairs = 0;
+  double trans_m = 0.0;
+  double rot_deg = 0.0;
+};
+[[nodiscard]] LoopError LoopErrorOf(const Trajectory& path, const Trajectory& truth, double apart_m);
+
+}  // namespace cairn::studies
