@@ -1,4 +1,5 @@
 #include "client/sim/cloud_error.h"
+#include "client/sim/fleet.h"
 #include "client/sim/laser_models.h"
 #include "client/sim/shipped_worlds.h"
 #include "common/cloud/cloud_builder.h"
