@@ -22,7 +22,7 @@ struct LaserMessage {
   Stamp stamp = 0;  // DP-SLAM: 0, it has none.
   double angle_first_rad = 0.0;
   double angle_step_rad = 0.0;
-  double tilt_rad = 0.0;  // TILTLASER1 only.
+  double tilt_rad = 0.0;            // TILTLASER1 only.
   double stated_range_max_m = 0.0;  // 0: the message does not say.
   std::vector<float> ranges_m;
   std::optional<Pose2> T_odom_laser;
