@@ -19,6 +19,10 @@ void Ancestry::NextGeneration(std::vector<Birth> births) {
   }
 }
 
+void Ancestry::KeepOnly(const ChangeTileKey& low, const ChangeTileKey& high) {
+  for (Node& node : nodes_) node.changes.KeepOnly(low, high);
+}
+
 Ancestry::Id Ancestry::Add(Id parent, MapChanges changes) {
   Id id = static_cast<Id>(nodes_.size());
   if (free_.empty()) {

@@ -28,6 +28,8 @@ class Ancestry {
 
   // The births become the living. REQUIRES: at least one, ordered by parent; that keeps relatives side by side.
   void NextGeneration(std::vector<Birth> births);
+  // All maps forget what lies outside [low, high].
+  void KeepOnly(const ChangeTileKey& low, const ChangeTileKey& high);
 
   [[nodiscard]] std::span<const Id> living() const { return living_; }
   [[nodiscard]] const MapChanges& changes(Id id) const { return nodes_[id].changes; }

@@ -13,15 +13,16 @@ constexpr double kContradiction = -1.0;
 }  // namespace
 
 DpSlam::DpSlam(const DpSlamOptions& options, const Pose2& T_map_robot_start, std::uint64_t seed)
-    : options_(options), rng_(seed) {
-  low_.emplace(options_.low, options_.opacity, options_.hierarchical ? Pose2{} : T_map_robot_start);
+    : options_(options),
+      rng_(seed),
+      low_(options_.low, options_.opacity, options_.hierarchical ? Pose2{} : T_map_robot_start) {
   if (options_.hierarchical) high_.emplace(options_.high, options_.opacity, T_map_robot_start);
 }
 
 void DpSlam::Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) {
-  low_->Move(T_prev_curr, covariance_prev + options_.low.drift.Covariance(T_prev_curr), rng_);
-  segment_m_ += T_prev_curr.translation().norm();
-  turned_rad_ = std::abs(T_prev_curr.theta);
+  low_.Move(T_prev_curr, covariance_prev + options_.low.drift.Covariance(T_prev_curr), rng_);
+  step_m_ += T_prev_curr.translation().norm();
+  turn_rad_ += std::abs(T_prev_curr.theta);
 }
 
 void DpSlam::Observe(const KeyframeSight& sight, const ParallelFor& parallel_for) {
@@ -30,12 +31,12 @@ void DpSlam::Observe(const KeyframeSight& sight, const ParallelFor& parallel_for
 
 void DpSlam::Observe(std::shared_ptr<const LaserRays> rays, const ParallelFor& parallel_for) {
   const Evidence evidence{{rays, Pose2{}}};
-  low_->Observe({&evidence, 1}, rng_, parallel_for);
+  low_.Observe({&evidence, 1}, rng_, parallel_for);
   observed_ = true;
-  contradicted_ = low_->gain() < kContradiction ? contradicted_ + 1 : 0;
+  contradicted_ = low_.gain() < kContradiction ? contradicted_ + 1 : 0;
   if (!options_.hierarchical) return;
-  segment_.push_back(std::move(rays));
-  if (SegmentEnds()) EndSegment(parallel_for);
+  pending_.push_back({std::move(rays), std::exchange(step_m_, 0.0), std::exchange(turn_rad_, 0.0)});
+  if (const std::size_t count = SegmentEnd(); count > 0) HandUp(count, parallel_for);
 }
 
 void DpSlam::Commit() {
@@ -43,82 +44,94 @@ void DpSlam::Commit() {
   observed_ = false;
 }
 
-bool DpSlam::SegmentEnds() const {
+std::size_t DpSlam::SegmentEnd() const {
+  const auto hindsight = static_cast<std::size_t>(options_.segment.hindsight_scans);
+  if (pending_.size() <= hindsight) return 0;
+  const std::size_t count = pending_.size() - hindsight;
+  if (count >= static_cast<std::size_t>(options_.segment.max_scans)) return count;
   // Thesis C 6.1: after a way, not after a number of scans (the robot may stand in one room for hundreds), and not
   // within a fast turn, after which the next segment shares too little with this one.
-  return static_cast<std::int64_t>(segment_.size()) >= options_.segment.max_scans ||
-         (segment_m_ >= options_.segment.length_m && turned_rad_ <= options_.segment.straight_rad);
+  double way_m = 0.0;
+  for (std::size_t k = 0; k < count; ++k) way_m += pending_[k].step_m;
+  return way_m >= options_.segment.length_m &&
+                 pending_[std::min(count, pending_.size() - 1)].turn_rad <= options_.segment.straight_rad
+             ? count
+             : 0;
 }
 
-void DpSlam::EndSegment(const ParallelFor& parallel_for) {
-  // Trajectories from the distribution the low level ends with: its best one first.
+void DpSlam::HandUp(std::size_t count, const ParallelFor& parallel_for) {
+  // Trajectories from the distribution the low level has now: its best one first.
   const auto along = [&](const GridParticle& particle) {
+    const Pose2 T_joint_low = JointOf(particle).Inverse();
     Evidence evidence;
-    evidence.reserve(segment_.size());
-    for (std::size_t k = 0; k < segment_.size(); ++k) evidence.push_back({segment_[k], particle.path[k]});
+    evidence.reserve(count);
+    for (std::size_t k = 0; k < count; ++k)
+      evidence.push_back({pending_[k].rays, T_joint_low * particle.path[handed_up_ + k]});
     return evidence;
   };
-  std::vector<Evidence> trajectories{along(low_->best())};
-  const auto count = static_cast<std::size_t>(options_.segment.trajectories);
-  const std::vector<GridParticle>& particles = low_->particles();
-  for (std::size_t t = 1; t < count; ++t) trajectories.push_back(along(particles[t * particles.size() / count]));
+  std::vector<Evidence> trajectories{along(low_.best())};
+  const auto alternatives = static_cast<std::size_t>(options_.segment.trajectories);
+  const std::vector<GridParticle>& particles = low_.particles();
+  for (std::size_t t = 1; t < alternatives; ++t)
+    trajectories.push_back(along(particles[t * particles.size() / alternatives]));
 
   // The drift of a whole segment, at the joint where it begins (thesis C 4.5.2). The first one is simply drawn.
-  if (!high_->maps().blank()) high_->Move({}, options_.high.drift.Covariance({segment_m_, 0.0, 0.0}), rng_);
+  double way_m = 0.0;
+  for (std::size_t k = 0; k < count; ++k) way_m += pending_[k].step_m;
+  if (!high_->maps().blank()) high_->Move({}, options_.high.drift.Covariance({way_m, 0.0, 0.0}), rng_);
   high_->Observe(trajectories, rng_, parallel_for);
 
-  // The next segment starts here, with the last scans drawn on its map.
-  const Evidence& best = trajectories.front();
-  const Pose2 T_segment_end = best.back().T_start_robot;
-  Evidence tail;
-  const std::size_t overlap = std::min(best.size(), static_cast<std::size_t>(options_.segment.overlap_scans));
-  for (std::size_t k = best.size() - overlap; k < best.size(); ++k)
-    tail.push_back({best[k].rays, Between(T_segment_end, best[k].T_start_robot)});
-  low_.emplace(options_.low, options_.opacity, Pose2{});
-  low_->Draw(tail, parallel_for);
-  segment_.clear();
-  segment_m_ = 0.0;
+  pending_.erase(pending_.begin(), pending_.begin() + static_cast<std::ptrdiff_t>(count));
+  handed_up_ += count;
+  low_.KeepNear(options_.segment.keep_m);
+}
+
+Pose2 DpSlam::JointOf(const GridParticle& low) const {
+  return handed_up_ > 0 ? low.path[handed_up_ - 1] : Pose2{};
 }
 
 FilterEstimate DpSlam::estimate() const {
-  if (!high_) return {low_->mean(), low_->covariance()};
-  const Pose2 &T_map_segment = high_->mean(), &T_segment_robot = low_->mean();
+  if (!high_) return {low_.mean(), low_.covariance()};
+  const Pose2 T_map_segment = high_->mean(), T_segment_robot = Between(JointOf(low_.best()), low_.mean());
   const Eigen::Matrix3d J_left = J_compose_left(T_map_segment, T_segment_robot);
-  const Eigen::Matrix3d J_right = J_compose_right(T_map_segment, T_segment_robot);
+  // The low level's covariance is in its own frame.
+  const Pose2 T_map_low = T_map_segment * JointOf(low_.best()).Inverse();
+  const Eigen::Matrix3d J_low = J_compose_right(T_map_low, low_.mean());
   return {T_map_segment * T_segment_robot,
-          J_left * high_->covariance() * J_left.transpose() + J_right * low_->covariance() * J_right.transpose()};
+          J_left * high_->covariance() * J_left.transpose() + J_low * low_.covariance() * J_low.transpose()};
 }
 
 FilterHealth DpSlam::health() const {
   FilterHealth health;
-  health.effective_sample_size = low_->effective_sample_size();
+  health.effective_sample_size = low_.effective_sample_size();
   health.diverged = contradicted_ >= options_.diverged_after;
   return health;
 }
 
 std::size_t DpSlam::hypothesis_count() const {
-  return (high_ ? *high_ : *low_).particles().size();
+  return (high_ ? *high_ : low_).particles().size();
 }
 
 Hypothesis DpSlam::hypothesis(std::size_t index) const {
-  const LevelFilter& level = high_ ? *high_ : *low_;
+  const LevelFilter& level = high_ ? *high_ : low_;
   const std::size_t best = level.best_index();
   const GridParticle& particle = level.particles()[index == 0 ? best : index <= best ? index - 1 : index];
   if (!high_) return {particle.T_map_robot, particle.path};
-  // The unfinished segment goes along rigidly.
-  const GridParticle& low = low_->best();
-  Hypothesis result{particle.T_map_robot * low.T_map_robot, particle.path};
-  for (std::size_t k = 0; k < low.path.size(); ++k) result.path.Append(particle.T_map_robot * low.path[k]);
+  // What is pending goes along rigidly.
+  const GridParticle& low = low_.best();
+  const Pose2 T_map_low = particle.T_map_robot * JointOf(low).Inverse();
+  Hypothesis result{T_map_low * low.T_map_robot, particle.path};
+  for (std::size_t k = handed_up_; k < low.path.size(); ++k) result.path.Append(T_map_low * low.path[k]);
   return result;
 }
 
 OccupancyImage DpSlam::MapImage() const {
-  const LevelFilter& level = high_ ? *high_ : *low_;
+  const LevelFilter& level = high_ ? *high_ : low_;
   return level.maps().Image(level.best().map);
 }
 
 std::size_t DpSlam::bytes() const {
-  return low_->maps().ancestry().bytes() + (high_ ? high_->maps().ancestry().bytes() : 0);
+  return low_.maps().ancestry().bytes() + (high_ ? high_->maps().ancestry().bytes() : 0);
 }
 
 }  // namespace cairn::slam

@@ -1,8 +1,8 @@
 // DP-SLAM: a particle filter whose particles own whole grid maps, stored as changes in their family tree. Flat, or
-// hierarchical: the low level maps one segment after the other in frames of their own; the high level joins finished
-// segments, each particle with drift of its own at every joint, and judges a segment's scans on the map it made so far.
-// No landmarks, no revisits: loops close because some particle's map agrees with what is seen again.
-// Frames: poses are T_map_robot; the low level works in the frame of the robot at the start of the segment.
+// hierarchical: the low level maps the surroundings only and forgets what is far; the high level joins the segments of
+// trajectory it hands up, each particle with drift of its own at every joint, and judges a segment's scans on the map
+// it made so far. No landmarks, no revisits: loops close because some particle's map agrees with what is seen again.
+// Frames: poses are T_map_robot; the low level's are in a frame of its own, which drifts.
 // Not thread-safe; deterministic for a seed, on any number of threads.
 // Source: Eliazar, Parr 2003-2005; thesis C 3.2.3, 4.5.
 #pragma once
@@ -34,27 +34,36 @@ class DpSlam final : public Filter {
   [[nodiscard]] Hypothesis hypothesis(std::size_t index) const override;
   [[nodiscard]] std::vector<Landmark> landmarks() const override { return {}; }
 
-  // The low level's maps are of the present segment where there is a high level.
-  [[nodiscard]] const LevelFilter& low() const { return *low_; }
+  // The low level knows the surroundings only where there is a high level.
+  [[nodiscard]] const LevelFilter& low() const { return low_; }
   [[nodiscard]] const LevelFilter* high() const { return high_ ? &*high_ : nullptr; }
-  // The best particle's map, without the unfinished segment where there is a high level.
+  // The best particle's map, without the scans still pending where there is a high level.
   [[nodiscard]] OccupancyImage MapImage() const;
   // Of all maps.
   [[nodiscard]] std::size_t bytes() const;
 
  private:
-  [[nodiscard]] bool SegmentEnds() const;
-  void EndSegment(const ParallelFor& parallel_for);
+  struct PendingScan {
+    std::shared_ptr<const LaserRays> rays;
+    double step_m = 0.0;  // From the scan before.
+    double turn_rad = 0.0;
+  };
+  // Scans of the next segment, once it is long enough and hindsight allows; else 0.
+  [[nodiscard]] std::size_t SegmentEnd() const;
+  void HandUp(std::size_t count, const ParallelFor& parallel_for);
+  // Where a low-level particle's pending scans start from.
+  [[nodiscard]] Pose2 JointOf(const GridParticle& low) const;
 
   const DpSlamOptions options_;
   Rng rng_;
-  std::optional<LevelFilter> low_;
+  LevelFilter low_;
   std::optional<LevelFilter> high_;
-  std::vector<std::shared_ptr<const LaserRays>> segment_;  // Scans since the segment began.
-  double segment_m_ = 0.0;                                 // Travelled since then, and ...
-  double turned_rad_ = 0.0;                                // ... the last step's turn.
-  std::int64_t contradicted_ = 0;                          // Scans in a row.
-  bool observed_ = false;                                  // In this step.
+  std::vector<PendingScan> pending_;  // Not handed up yet.
+  std::size_t handed_up_ = 0;         // Scans before them.
+  double step_m_ = 0.0;               // Since the last scan.
+  double turn_rad_ = 0.0;
+  std::int64_t contradicted_ = 0;  // Scans in a row.
+  bool observed_ = false;          // In this step.
 };
 
 }  // namespace cairn::slam

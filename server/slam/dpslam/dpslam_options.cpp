@@ -13,8 +13,10 @@ void Visit(OptionVisitor& visitor, DpSlamOptions& options) {
     visitor.Real("straight_rad", segment.straight_rad, "rad", 0.0, 3.2,
                  "A segment does not end in a step that turns more, unless it is full.");
     visitor.Integer("max_scans", segment.max_scans, "1", 1, 10000, "A segment with so many scans is full.");
-    visitor.Integer("overlap_scans", segment.overlap_scans, "1", 0, 1000,
-                    "Of the segment before, drawn on the new one's map.");
+    visitor.Integer("hindsight_scans", segment.hindsight_scans, "1", 0, 1000,
+                    "The low level goes on so long before a segment is handed up.");
+    visitor.Real("keep_m", segment.keep_m, "m", 1.0, 1000.0,
+                 "The low level forgets what is farther away; more than the laser sees.");
     visitor.Integer("trajectories", segment.trajectories, "1", 1, 1000,
                     "Of the low level, for the high level to choose from.");
   });

@@ -56,11 +56,6 @@ void LevelFilter::Move(const Pose2& T_prev_curr, const Eigen::Matrix3d& covarian
   mean_ = mean_ * T_prev_curr;
 }
 
-void LevelFilter::Draw(const Evidence& evidence, const ParallelFor& parallel_for) {
-  const MapSample one{};
-  maps_.NextGeneration({&one, 1}, {&evidence, 1}, parallel_for);
-}
-
 void LevelFilter::Observe(std::span<const Evidence> alternatives, Rng& rng, const ParallelFor& parallel_for) {
   // What each particle experiences, and where that leaves it.
   std::vector<std::size_t> chosen(particles_.size(), 0);

@@ -48,8 +48,8 @@ class LevelFilter {
 
   // Moves every particle by the step with noise of this covariance: (x, y, theta) in the frame the step starts from.
   void Move(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev, Rng& rng);
-  // Draws scans at a known place before the first Move: the tail of the segment before.
-  void Draw(const Evidence& evidence, const ParallelFor& parallel_for);
+  // All maps forget what is farther from the robot.
+  void KeepNear(double radius_m) { maps_.KeepNear(mean_.translation(), radius_m); }
   // Every particle experiences one of the alternatives (drawn with equal chance), is weighted, survives or not, draws
   // it, and goes on from its last pose. Where no alternative shows a ray, only the paths grow.
   void Observe(std::span<const Evidence> alternatives, Rng& rng, const ParallelFor& parallel_for);

@@ -79,6 +79,12 @@ void MapChanges::Add(MapChanges&& other) {
   other.tiles_.clear();
 }
 
+void MapChanges::KeepOnly(const ChangeTileKey& low, const ChangeTileKey& high) {
+  std::erase_if(tiles_, [&](const ChangeTile& tile) {
+    return tile.key.x < low.x || tile.key.x > high.x || tile.key.y < low.y || tile.key.y > high.y;
+  });
+}
+
 std::size_t MapChanges::bytes() const {
   std::size_t sum = tiles_.capacity() * sizeof(ChangeTile);
   for (const ChangeTile& tile : tiles_) sum += tile.bytes();

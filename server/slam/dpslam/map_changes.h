@@ -62,6 +62,8 @@ class MapChanges {
   void Append(ChangeTile tile) { tiles_.push_back(std::move(tile)); }
   // Takes over the other's changes.
   void Add(MapChanges&& other);
+  // Forgets what lies outside [low, high].
+  void KeepOnly(const ChangeTileKey& low, const ChangeTileKey& high);
 
   [[nodiscard]] const std::vector<ChangeTile>& tiles() const { return tiles_; }
   [[nodiscard]] bool empty() const { return tiles_.empty(); }

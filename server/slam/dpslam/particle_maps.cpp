@@ -97,6 +97,12 @@ void ParticleMaps::NextGeneration(std::span<const MapSample> survivors, std::spa
   ancestry_.NextGeneration(std::move(births));
 }
 
+void ParticleMaps::KeepNear(const Eigen::Vector2d& p_map, double radius_m) {
+  const double resolution_m = options_.resolution_m;
+  ancestry_.KeepOnly({TileOf(p_map.y() - radius_m, resolution_m), TileOf(p_map.x() - radius_m, resolution_m)},
+                     {TileOf(p_map.y() + radius_m, resolution_m), TileOf(p_map.x() + radius_m, resolution_m)});
+}
+
 OccupancyImage ParticleMaps::Image(std::size_t map) const {
   std::vector<Ancestry::Id> line;
   ancestry_.LineTo(ancestry_.living()[map], line);

@@ -49,6 +49,9 @@ class ParticleMaps {
   void NextGeneration(std::span<const MapSample> survivors, std::span<const Evidence> evidence,
                       const ParallelFor& parallel_for);
 
+  // All maps forget what is farther away, in whole tiles.
+  void KeepNear(const Eigen::Vector2d& p_map, double radius_m);
+
   [[nodiscard]] std::size_t count() const { return ancestry_.living().size(); }
   [[nodiscard]] bool blank() const { return ancestry_.size() == 1 && ancestry_.changes(ancestry_.living()[0]).empty(); }
   [[nodiscard]] const Ancestry& ancestry() const { return ancestry_; }

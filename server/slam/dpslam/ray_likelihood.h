@@ -3,7 +3,7 @@
 // person in the way from sinking a particle.
 // Space never seen neither stops a ray on its way nor speaks against an end in it: there every end has the same
 // density, about that of a ray well explained. (With a prior opacity for it, as for seen cells, a ray into the unknown
-// scores worse than one on a known wall; poses that lag behind see more known walls, and maps shrink: 1 m in 100 m was
+// scores worse than one on a known wall, which should favour poses that lag behind; how much that costs is not
 // measured.) Cells farther than 4 sigma from the measured end cannot explain it: before them only the way through
 // counts, and the ray is followed no farther. Stateless, thread-safe. Source: thesis C 3.2.3.1; the textbook form is
 // opacity.h.
