@@ -27,6 +27,8 @@ void AddJob(CLI::App& app, Program& program);  // Adds the two below.
 void AddJobSmooth(CLI::App& job, Program& program);
 void AddJobQueries(CLI::App& job, Program& program);  // list, show, cancel.
 
+void AddCloud(CLI::App& app, Program& program);  // cloud export.
+
 void AddSession(CLI::App& app, Program& program);
 
 }  // namespace cairn::client

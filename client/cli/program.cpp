@@ -94,6 +94,7 @@ ExitCode RunCairn(const std::vector<std::string>& arguments, std::ostream& out, 
   AddPath(app, program);
   AddMap(app, program);
   AddTiles(app, program);
+  AddCloud(app, program);
   AddStatus(app, program);
   AddJob(app, program);
   AddSession(app, program);

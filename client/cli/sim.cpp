@@ -6,7 +6,9 @@
 #include "client/cli/json_output.h"
 #include "client/cli/quantity_text.h"
 #include "client/cli/sim_run.h"
+#include "client/cli/sim_sensor_options.h"
 #include "client/cli/window_option.h"
+#include "client/sim/laser_models.h"
 #include "client/sim/shipped_worlds.h"
 
 namespace cairn::client {
@@ -65,61 +67,27 @@ ExitCode Simulate(Program& program, const SimRunOptions& options) {
   return report->explained() ? ExitCode::kOk : ExitCode::kFailed;
 }
 
-void AddSensorOptions(CLI::App& command, sim::FleetOptions& fleet) {
-  command.add_option("--beams", fleet.laser.beams, "Beams of a scan")
-      ->check(CLI::Range(1, kMaxBeams))
-      ->capture_default_str();
-  command
-      .add_option_function<double>(
-          "--fov", [&fleet](double degrees) { fleet.laser.field_of_view_rad = Radians(degrees); },
-          "Field of view [270]")
-      ->check(CLI::Range(1.0, 360.0))
-      ->type_name("DEGREES");
-  command.add_option("--range", fleet.laser.range_max_m, "How far the scanner sees")
-      ->check(CLI::Range(0.5, 1000.0))
-      ->type_name("METRES")
-      ->capture_default_str();
-  command.add_option("--noise", fleet.laser.noise_m, "Standard deviation of a range")
-      ->check(CLI::Range(0.0, 1.0))
-      ->type_name("METRES")
-      ->capture_default_str();
-  command.add_option("--sweep", fleet.laser.sweep_s, "From a scan's first beam to its last")
-      ->check(CLI::Range(0.0, 1.0))
-      ->type_name("SECONDS")
-      ->capture_default_str();
-  command.add_option("--hz", fleet.scan_hz, "Scans a second")->check(CLI::Range(0.1, 200.0))->capture_default_str();
-  command.add_option("--odometry-hz", fleet.odometry_hz, "Odometry samples a second")
-      ->check(CLI::Range(0.1, 500.0))
-      ->capture_default_str();
-  command.add_option("--slip", fleet.wheels.slip_m_per_sqrt_m, "Random wheel error after 1 m")
-      ->check(CLI::Range(0.0, 0.2))
-      ->type_name("METRES")
-      ->capture_default_str();
-  command.add_option("--wheel-spread", fleet.wheel_spread.wheel_share, "Systematic wheel size error, share")
-      ->check(CLI::Range(0.0, 0.1))
-      ->capture_default_str();
-  command.add_option("--speed", fleet.drive.speed_m_s, "How fast robots drive")
-      ->check(CLI::Range(0.05, 5.0))
-      ->type_name("M/S")
-      ->capture_default_str();
-}
-
 }  // namespace
 
 void AddSim(CLI::App& app, Program& program) {
   auto* command = app.add_subcommand("sim", "Stream a simulated fleet into a site");
   std::string worlds;
   for (const std::string& name : sim::ShippedWorldNames()) worlds += " " + name;
-  command->footer("Worlds that come with the program:" + worlds +
-                  "; the format of others is in client/sim/README.md.\n"
-                  "Robots start at the true poses printed, so poses in the map compare with the truth as they are.\n"
-                  "The same seed gives the same scans. Exit code 1 where a scan is unexplained.\n"
-                  "EXAMPLES\n  cairn sim --world building --robots 3 --site hall --seconds 120 --truth-dir truth\n"
-                  "  cairn sim --robots 16 --beams 360 --hz 10 --site load --watch-pid $(pidof cairnd)\n"
-                  "  cairn sim --robots 1 --no-stream --log-dir logs --truth-dir truth");
+  worlds += "; in space:";
+  for (const std::string& name : sim::ShippedWorld3Names()) worlds += " " + name;
+  command->footer(
+      "Worlds that come with the program:" + worlds +
+      "; the formats of others are in client/sim/README.md.\n"
+      "Robots start at the true poses printed, so poses in the map compare with the truth as they are.\n"
+      "The same seed gives the same scans. Exit code 1 where a scan is unexplained.\n"
+      "EXAMPLES\n  cairn sim --world building --robots 3 --site hall --seconds 120 --truth-dir truth\n"
+      "  cairn sim --robots 16 --beams 360 --hz 10 --site load --watch-pid $(pidof cairnd)\n"
+      "  cairn sim --robots 1 --no-stream --log-dir logs --truth-dir truth\n"
+      "  cairn sim --robots 1 --world hall3d --laser-model lms200 --nod=-60,45,36 --site hall --log-dir logs");
   auto options = std::make_shared<SimRunOptions>();
   auto start_seconds = std::make_shared<double>(0.0);
-  command->add_option("--world", options->world, "A shipped world, or a world file")->capture_default_str();
+  command->add_option("--world", options->world, "A shipped world, or a world file (in space: .yaml)")
+      ->capture_default_str();
   command->add_option("--site", options->site, "The site to map into");
   command->add_option("--robots", options->fleet.robots, "How many")->check(CLI::Range(1, 256))->capture_default_str();
   command->add_option("--prefix", options->prefix, "Robots are called PREFIX1, PREFIX2, ...")->capture_default_str();
@@ -127,7 +95,7 @@ void AddSim(CLI::App& app, Program& program) {
       ->check(CLI::Range(0.1, 1e6))
       ->capture_default_str();
   command->add_option("--seed", options->fleet.seed, "Of all randomness")->capture_default_str();
-  AddSensorOptions(*command, options->fleet);
+  auto model = AddSensorOptions(*command, options->fleet);
   auto* rate = command->add_option("--rate", options->rate, "How many times faster than real time")
                    ->check(CLI::Range(1e-3, 1e4))
                    ->capture_default_str();
@@ -143,8 +111,13 @@ void AddSim(CLI::App& app, Program& program) {
   command->add_flag("--end", options->end, "End the sessions afterwards (else they can be resumed)");
   command->add_option("--watch-pid", options->watched_pid, "Report this process's processor share")
       ->check(CLI::PositiveNumber);
-  command->callback([&program, options, start_seconds] {
-    program.action = [&program, options, start_seconds] {
+  command->callback([&program, options, start_seconds, model] {
+    program.action = [&program, options, start_seconds, model] {
+      if (!model->empty()) {
+        const auto laser = sim::WithModel(options->fleet.laser, *model);
+        if (!laser) return program.Refuse(laser.error());
+        options->fleet.laser = *laser;
+      }
       options->fleet.first_stamp = *start_seconds > 0.0 ? StampFromSeconds(*start_seconds)
                                                         : std::chrono::duration_cast<std::chrono::nanoseconds>(
                                                               std::chrono::system_clock::now().time_since_epoch())

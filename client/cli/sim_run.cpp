@@ -124,7 +124,7 @@ bool SimReport::explained() const {
 }
 
 Result<SimReport> RunSim(Program& program, const SimRunOptions& options) {
-  auto world = sim::OpenWorld(options.world);
+  auto world = sim::OpenSurroundings(options.world);
   if (!world) return tl::unexpected(world.error());
   auto fleet = sim::Fleet::Create(std::move(*world), options.fleet);
   if (!fleet) return tl::unexpected(fleet.error());

@@ -14,6 +14,13 @@ Stamp Multiple(std::uint64_t k, double hz) {
   return static_cast<Stamp>(std::llround(static_cast<double>(k) * 1e9 / hz));
 }
 
+// How many scans a robot needs to stop, and one to stand.
+int HaltScans(const FleetOptions& o) {
+  const double seconds =
+      std::max(o.drive.speed_m_s / o.drive.acceleration_m_s2, o.drive.turn_rad_s / o.drive.turn_acceleration_rad_s2);
+  return static_cast<int>(std::min(std::ceil(seconds * o.scan_hz), 1e6)) + 2;
+}
+
 }  // namespace
 
 Result<void> Validate(const FleetOptions& o) {
@@ -25,22 +32,26 @@ Result<void> Validate(const FleetOptions& o) {
     return Fail(StatusCode::kInvalidArgument, "fleet: the robots' radius must be above 0 and at most 5 m");
   }
   if (auto valid = Validate(o.laser); !valid) return valid;
+  if (!(o.robot_height_m > 0.0 && o.robot_height_m <= 10.0)) {
+    return Fail(StatusCode::kInvalidArgument, "fleet: the robots' height must be above 0 and at most 10 m");
+  }
   if (auto valid = Validate(o.wheels); !valid) return valid;
-  return Validate(o.drive);
+  if (auto valid = Validate(o.drive); !valid) return valid;
+  return Validate(o.tilt, HaltScans(o));
 }
 
-Result<Fleet> Fleet::Create(World world, const FleetOptions& options) {
+Result<Fleet> Fleet::Create(Surroundings surroundings, const FleetOptions& options) {
   if (auto valid = Validate(options); !valid) return tl::unexpected(valid.error());
-  if (world.routes.empty())
-    return Fail(StatusCode::kInvalidArgument, "fleet: the world '" + world.name + "' has no route");
-  return Fleet(std::move(world), options);
+  if (surroundings.routes.empty())
+    return Fail(StatusCode::kInvalidArgument, "fleet: the world '" + surroundings.name + "' has no route");
+  return Fleet(std::move(surroundings), options);
 }
 
-Fleet::Fleet(World world, const FleetOptions& options)
-    : world_(std::move(world)), options_(options), walls_(world_.segments) {
-  const auto count = static_cast<std::size_t>(options_.robots), routes = world_.routes.size();
+Fleet::Fleet(Surroundings surroundings, const FleetOptions& options)
+    : surroundings_(std::move(surroundings)), options_(options) {
+  const auto count = static_cast<std::size_t>(options_.robots), routes = surroundings_.routes.size();
   for (std::size_t i = 0; i < count; ++i) {
-    const auto& waypoints = world_.routes[i % routes].waypoints_map;
+    const auto& waypoints = surroundings_.routes[i % routes].waypoints_map;
     const std::size_t on_route = (count - i % routes + routes - 1) / routes;
     const double length = ClosedLength(waypoints);
     const PathPlace place =
@@ -85,17 +96,20 @@ Stamp Fleet::NextOdometry(const Member& member) const {
 Scan Fleet::TakeScan(std::size_t index, Stamp since_start) {
   Member& member = robots_[index];
   const double seconds = SecondsFromStamp(since_start);
-  std::vector<Disc> discs = world_.discs;
-  for (const Walker& walker : world_.walkers) discs.push_back(WalkerAt(walker, seconds));
+  std::vector<Post> posts = surroundings_.posts;
+  for (const Walker& walker : surroundings_.walkers) posts.push_back({WalkerAt(walker, seconds), kWalkerHeight_m});
   if (options_.see_each_other) {
     for (std::size_t i = 0; i < robots_.size(); ++i) {
-      if (i != index) discs.push_back({robots_[i].robot.PoseAt(seconds).translation(), options_.robot_radius_m});
+      if (i == index) continue;
+      posts.push_back(
+          {{robots_[i].robot.PoseAt(seconds).translation(), options_.robot_radius_m}, options_.robot_height_m});
     }
   }
   const Stamp stamp = options_.first_stamp + since_start;
-  Scan scan = MeasureScan(walls_, discs, member.robot.T_map_robot(), member.robot.twist(), stamp, options_.laser,
-                          member.robot.random());
+  Scan scan = MeasureScan(*surroundings_.scene, posts, member.robot.T_map_robot(), member.robot.twist(), stamp,
+                          TiltOf(member.scans, options_.tilt), options_.laser, member.robot.random());
   scan.sequence = ++member.scans;
+  member.robot.Halt(HaltsAt(member.scans, options_.tilt, HaltScans(options_)));
   scan.scan_period_s = 1.0 / options_.scan_hz;
   member.truth.push_back({stamp, member.robot.T_map_robot()});
   return scan;

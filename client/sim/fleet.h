@@ -1,6 +1,7 @@
 // A fleet of simulated robots in one world, as one endless stream of log records in the order of their stamps, with
 // the true poses beside it. Same world, options and seed: same records, bit for bit. Robots' scans are staggered over
 // the scan period, and each scan has an odometry sample before and after it.
+// A scanner on a tilting mount nods as `tilt` says; then the robot halts.
 // Not a clock: the caller decides how fast to ask. One thread at a time.
 #pragma once
 
@@ -12,6 +13,8 @@
 #include "client/sim/laser.h"
 #include "client/sim/robot.h"
 #include "client/sim/route_follower.h"
+#include "client/sim/surroundings.h"
+#include "client/sim/tilt_mount.h"
 #include "client/sim/wheels.h"
 #include "client/sim/world.h"
 #include "common/sensor/log_record.h"
@@ -25,11 +28,13 @@ struct FleetOptions {
   double scan_hz = 10.0;
   double odometry_hz = 50.0;
   LaserOptions laser;
+  TiltOptions tilt;
   WheelOptions wheels;  // The make's means; every robot differs by wheel_spread.
   WheelSpread wheel_spread;
   DriveOptions drive;
   bool see_each_other = true;  // Robots show in each other's scans as discs.
   double robot_radius_m = 0.22;
+  double robot_height_m = 0.5;
   Stamp first_stamp = 1'700'000'000'000'000'000;
   std::uint64_t seed = 1;
 };
@@ -43,7 +48,10 @@ struct FleetRecord {
 class Fleet {
  public:
   // Fails where the options are out of range or the world has no route.
-  [[nodiscard]] static Result<Fleet> Create(World world, const FleetOptions& options);
+  [[nodiscard]] static Result<Fleet> Create(Surroundings surroundings, const FleetOptions& options);
+  [[nodiscard]] static Result<Fleet> Create(World world, const FleetOptions& options) {
+    return Create(SurroundingsOf(std::move(world)), options);
+  }
 
   [[nodiscard]] int robots() const { return static_cast<int>(robots_.size()); }
   [[nodiscard]] const std::string& name(int robot) const { return members(robot).name; }
@@ -65,7 +73,7 @@ class Fleet {
     Trajectory truth;
   };
 
-  Fleet(World world, const FleetOptions& options);
+  Fleet(Surroundings surroundings, const FleetOptions& options);
   [[nodiscard]] const Member& members(int robot) const { return robots_[static_cast<std::size_t>(robot)]; }
   // The first place on the route, from `way_m` on, that is a metre from every robot placed so far.
   [[nodiscard]] PathPlace FreePlace(const std::vector<Eigen::Vector2d>& waypoints, double way_m) const;
@@ -73,9 +81,8 @@ class Fleet {
   [[nodiscard]] Stamp NextOdometry(const Member& member) const;
   [[nodiscard]] Scan TakeScan(std::size_t index, Stamp since_start);
 
-  World world_;
+  Surroundings surroundings_;
   FleetOptions options_;
-  RayCaster walls_;
   std::vector<Member> robots_;
 };
 

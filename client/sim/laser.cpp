@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "client/sim/arc.h"
 
@@ -32,17 +33,28 @@ Result<void> Validate(const LaserOptions& o) {
                        "ranges must be 0 <= min < max <= 1000 m");
       !r)
     return r;
-  if (auto r = Require(o.noise_m >= 0.0 && o.noise_m <= 10.0 && share(o.noise_share),
-                       "noise must be 0..10 m and 0..1 per metre");
-      !r)
-    return r;
+  if (auto r = Validate(ErrorOf(o)); !r) return r;
+  if (auto r = Require(o.height_m >= 0.0 && o.height_m <= 100.0, "the height must be 0..100 m"); !r) return r;
   if (auto r = Require(share(o.dropout_share), "dropouts must be a share from 0 to 1"); !r) return r;
   if (auto r = Require(o.sweep_s >= 0.0 && o.sweep_s <= 1.0, "the sweep must take 0..1 s"); !r) return r;
   return Require(o.T_robot_laser.IsFinite(), "the mounting must be finite");
 }
 
-Scan MeasureScan(const RayCaster& walls, std::span<const Disc> discs, const Pose2& T_map_robot, const Twist& twist,
-                 Stamp stamp, const LaserOptions& options, Random& random) {
+RangeError ErrorOf(const LaserOptions& options) {
+  return {options.error, options.noise_m, options.noise_share, options.bound_m, options.bound_share, options.step_m};
+}
+
+void SetError(const RangeError& error, LaserOptions* options) {
+  options->error = error.kind;
+  options->noise_m = error.sigma_m;
+  options->noise_share = error.sigma_share;
+  options->bound_m = error.bound_m;
+  options->bound_share = error.bound_share;
+  options->step_m = error.step_m;
+}
+
+Scan MeasureScan(const Scene& scene, std::span<const Post> posts, const Pose2& T_map_robot, const Twist& twist,
+                 Stamp stamp, double tilt_rad, const LaserOptions& options, Random& random) {
   Scan scan;
   scan.stamp = stamp;
   scan.angle_step_rad = StepOf(options);
@@ -50,9 +62,12 @@ Scan MeasureScan(const RayCaster& walls, std::span<const Disc> discs, const Pose
   scan.range_min_m = options.range_min_m;
   scan.range_max_m = options.range_max_m;
   scan.beam_period_s = options.sweep_s / std::max(1, options.beams - 1);
+  scan.tilt_rad = tilt_rad;
   scan.T_robot_laser = options.T_robot_laser;
   scan.ranges_m.reserve(static_cast<std::size_t>(options.beams));
 
+  const RangeError error = ErrorOf(options);
+  const double cos_tilt = std::cos(tilt_rad), sin_tilt = std::sin(tilt_rad);
   std::uniform_real_distribution<double> uniform(0.0, 1.0);
   Pose2 T_map_laser = T_map_robot * options.T_robot_laser;
   for (int i = 0; i < options.beams; ++i) {
@@ -60,18 +75,35 @@ Scan MeasureScan(const RayCaster& walls, std::span<const Disc> discs, const Pose
       const double t = i * scan.beam_period_s;
       T_map_laser = T_map_robot * DriveArc(twist.speed_m_s * t, twist.turn_rad_s * t) * options.T_robot_laser;
     }
-    const double angle = T_map_laser.theta + scan.angle_first_rad + i * scan.angle_step_rad;
-    const Eigen::Vector2d direction(std::cos(angle), std::sin(angle)), origin = T_map_laser.translation();
-    double range = std::min(walls.Cast(origin, direction, options.range_max_m), CastAtDiscs(discs, origin, direction));
+    const double bearing = scan.angle_first_rad + i * scan.angle_step_rad;
+    Eigen::Vector3d direction;
+    if (tilt_rad == 0.0) {
+      const double angle = T_map_laser.theta + bearing;
+      direction = {std::cos(angle), std::sin(angle), 0.0};
+    } else {
+      const Eigen::Vector2d level =
+          T_map_laser.rotation() * Eigen::Vector2d(std::cos(bearing) * cos_tilt, std::sin(bearing));
+      direction = {level.x(), level.y(), -std::cos(bearing) * sin_tilt};
+    }
+    const Eigen::Vector3d origin(T_map_laser.x, T_map_laser.y, options.height_m);
+    double range = std::min(scene.Cast(origin, direction, options.range_max_m), CastAtPosts(posts, origin, direction));
     if (options.dropout_share > 0.0 && uniform(random) < options.dropout_share) {
       range = 0.0;
     } else if (range < options.range_max_m) {
-      range = std::max(0.0, range + Normal(random, options.noise_m + options.noise_share * range));
+      range = std::max(0.0, range + DrawError(error, range, random));
     }
     if (range >= options.range_max_m) range = std::numeric_limits<double>::infinity();
     scan.ranges_m.push_back(static_cast<float>(range));
   }
   return scan;
+}
+
+Scan MeasureScan(const RayCaster& walls, std::span<const Disc> discs, const Pose2& T_map_robot, const Twist& twist,
+                 Stamp stamp, const LaserOptions& options, Random& random) {
+  std::vector<Post> posts;
+  posts.reserve(discs.size());
+  for (const Disc& disc : discs) posts.push_back({disc});
+  return MeasureScan(FlatScene(walls), posts, T_map_robot, twist, stamp, 0.0, options, random);
 }
 
 }  // namespace cairn::sim

@@ -18,7 +18,7 @@ Robot::Robot(const Pose2& T_map_robot_start, RouteFollower follower, const Wheel
 void Robot::DriveUntil(double seconds) {
   while (seconds - seconds_ > 1e-9) {
     const double step = std::min(kMaxStep_s, seconds - seconds_);
-    twist_ = follower_.Steer(T_map_robot_, step);
+    twist_ = halt_ ? follower_.Brake(step) : follower_.Steer(T_map_robot_, step);
     const double way = twist_.speed_m_s * step, turn = twist_.turn_rad_s * step;
     T_map_robot_ = T_map_robot_ * DriveArc(way, turn);
     wheels_.Drive(way, turn, random_);

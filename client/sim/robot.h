@@ -15,6 +15,9 @@ class Robot {
   // Moves to `seconds` after the start, which is not before the time reached so far.
   void DriveUntil(double seconds);
 
+  // From now on brakes and stands, or drives its route again.
+  void Halt(bool halt) { halt_ = halt; }
+
   // The true pose at a time a little after the one reached, should the robot keep its velocities.
   [[nodiscard]] Pose2 PoseAt(double seconds) const;
 
@@ -30,6 +33,7 @@ class Robot {
   Pose2 T_map_robot_;
   Twist twist_;
   double seconds_ = 0.0;
+  bool halt_ = false;
 };
 
 }  // namespace cairn::sim

@@ -43,9 +43,17 @@ Twist RouteFollower::Steer(const Pose2& T_map_robot, double seconds) {
   double speed = std::min(options_.speed_m_s, std::sqrt(corner * corner + 2 * options_.acceleration_m_s2 * brake_way));
   speed *= std::abs(error) < 1.0 ? std::pow(std::cos(error), 4) : 0.0;
 
+  return Towards({speed, turn}, seconds);
+}
+
+Twist RouteFollower::Brake(double seconds) {
+  return Towards({}, seconds);
+}
+
+Twist RouteFollower::Towards(const Twist& wanted, double seconds) {
   const double dv = options_.acceleration_m_s2 * seconds, dw = options_.turn_acceleration_rad_s2 * seconds;
-  twist_.speed_m_s += std::clamp(speed - twist_.speed_m_s, -dv, dv);
-  twist_.turn_rad_s += std::clamp(turn - twist_.turn_rad_s, -dw, dw);
+  twist_.speed_m_s += std::clamp(wanted.speed_m_s - twist_.speed_m_s, -dv, dv);
+  twist_.turn_rad_s += std::clamp(wanted.turn_rad_s - twist_.turn_rad_s, -dw, dw);
   return twist_;
 }
 

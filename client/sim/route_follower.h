@@ -27,9 +27,12 @@ class RouteFollower {
 
   // The velocities for the next `seconds`.
   [[nodiscard]] Twist Steer(const Pose2& T_map_robot, double seconds);
+  // The same while the robot brakes and stands.
+  [[nodiscard]] Twist Brake(double seconds);
 
  private:
   [[nodiscard]] double CornerSpeed() const;
+  [[nodiscard]] Twist Towards(const Twist& wanted, double seconds);
 
   const std::vector<Eigen::Vector2d> waypoints_map_;
   const DriveOptions options_;

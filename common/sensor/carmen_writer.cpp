@@ -68,8 +68,13 @@ void CarmenWriter::Write(const Odometry& odometry) {
 }
 
 void CarmenWriter::Write(const Scan& scan, const Pose2& T_odom_robot) {
-  const bool flaser = IsFlaserLayout(scan);
-  std::string line = flaser ? "FLASER" : "ROBOTLASER1 0";
+  const bool tilted = scan.tilt_rad != 0.0;
+  const bool flaser = !tilted && IsFlaserLayout(scan);
+  std::string line = flaser ? "FLASER" : tilted ? "TILTLASER1" : "ROBOTLASER1 0";
+  if (tilted) {
+    Append(line, scan.tilt_rad);
+    line += " 0";  // Laser type.
+  }
   if (!flaser) {
     Append(line, scan.angle_first_rad);
     Append(line, scan.angle_step_rad * (static_cast<double>(scan.ranges_m.size()) - 1.0));

@@ -1,7 +1,8 @@
 // Writes CARMEN logs (ODOM and FLASER / ROBOTLASER1 lines) that ReadLog reads back. FLASER where the scan is CARMEN's
 // 180-degree layout with a SICK's range limit of 80 m, ROBOTLASER1 otherwise (layout and range limit are in the
 // message). Stamps, poses, angles and hits come back exactly; a beam without a hit as one without a hit, an invalid one
-// as 0. CARMEN has no place for beam times, tilt and range_min: they are lost. Validated scans only. Not thread-safe.
+// as 0. Tilted scans become TILTLASER1 lines, an extension (log_reader.h) that other readers of CARMEN logs skip.
+// CARMEN has no place for beam times and range_min: they are lost. Validated scans only. Not thread-safe.
 #pragma once
 
 #include <ostream>

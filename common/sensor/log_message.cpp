@@ -44,6 +44,7 @@ LaserMessage ReadOldLaser(LogFields& fields, LaserKind kind) {
 LaserMessage ReadNewLaser(LogFields& fields, LaserKind kind) {
   LaserMessage laser;
   laser.kind = kind;
+  if (kind == LaserKind::kTilted) laser.tilt_rad = fields.Real("tilt");
   fields.SkipReal("laser type");
   laser.angle_first_rad = fields.Real("start angle");
   const double field_of_view = fields.Real("field of view");
@@ -57,7 +58,7 @@ LaserMessage ReadNewLaser(LogFields& fields, LaserKind kind) {
   }
   const int remissions = fields.Count("number of remissions", 0, kMaxReadings);
   for (int i = 0; i < remissions && fields.problem().empty(); ++i) static_cast<void>(fields.Range());
-  if (kind == LaserKind::kRobot) {
+  if (kind != LaserKind::kRaw) {
     laser.T_odom_laser = fields.Pose("laser");
     laser.T_odom_robot = fields.Pose("robot");
     for (const char* what : {"tv", "rv", "forward safety", "side safety", "turn axis"}) fields.SkipReal(what);
@@ -118,6 +119,10 @@ LogMessage ParseLogLine(std::string_view line) {
   }
   if (kind == "ROBOTLASER1" || kind == "RAWLASER1") {
     auto laser = ReadNewLaser(fields, kind == "ROBOTLASER1" ? LaserKind::kRobot : LaserKind::kRaw);
+    return Checked(fields, std::move(laser));
+  }
+  if (kind == "TILTLASER1") {
+    auto laser = ReadNewLaser(fields, LaserKind::kTilted);
     return Checked(fields, std::move(laser));
   }
   if (kind == "Laser") {

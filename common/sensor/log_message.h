@@ -13,14 +13,16 @@
 
 namespace cairn {
 
-enum class LaserKind { kFront = 0, kRear, kRobot, kRaw, kDpslam };  // FLASER, RLASER, ROBOTLASER1, RAWLASER1, Laser.
-inline constexpr int kLaserKindCount = 5;
+// FLASER, RLASER, ROBOTLASER1, RAWLASER1, Laser, TILTLASER1.
+enum class LaserKind { kFront = 0, kRear, kRobot, kRaw, kDpslam, kTilted };
+inline constexpr int kLaserKindCount = 6;
 
 struct LaserMessage {
   LaserKind kind = LaserKind::kFront;
   Stamp stamp = 0;  // DP-SLAM: 0, it has none.
   double angle_first_rad = 0.0;
   double angle_step_rad = 0.0;
+  double tilt_rad = 0.0;            // TILTLASER1 only.
   double stated_range_max_m = 0.0;  // 0: the message does not say.
   std::vector<float> ranges_m;
   std::optional<Pose2> T_odom_laser;

@@ -43,8 +43,8 @@ struct LogFacts {
 };
 
 std::string_view KindName(LaserKind kind) {
-  constexpr std::array<std::string_view, kLaserKindCount> kNames = {"FLASER", "RLASER", "ROBOTLASER1", "RAWLASER1",
-                                                                    "Laser"};
+  constexpr std::array<std::string_view, kLaserKindCount> kNames = {"FLASER",    "RLASER", "ROBOTLASER1",
+                                                                    "RAWLASER1", "Laser",  "TILTLASER1"};
   return kNames[Index(kind)];
 }
 
@@ -165,6 +165,7 @@ class LogEmitter {
     scan.angle_first_rad = laser.angle_first_rad;
     scan.angle_step_rad = laser.angle_step_rad;
     scan.range_max_m = RangeMax(laser, facts);
+    scan.tilt_rad = laser.tilt_rad;
     scan.T_robot_laser = facts.T_robot_laser;
     if (facts_.dpslam) scan.scan_period_s = options_.dpslam_scan_period_s;
     scan.ranges_m = std::move(laser.ranges_m);
@@ -175,6 +176,7 @@ class LogEmitter {
   // CARMEN logs the same sweep as RAWLASER1 and ROBOTLASER1, and some robots as FLASER and ROBOTLASER1.
   [[nodiscard]] bool IsTwin(const LaserMessage& laser) const {
     if (laser.kind == LaserKind::kRaw && facts_.lasers[Index(LaserKind::kRobot)].scans > 0) return true;
+    if (laser.kind == LaserKind::kTilted || last_kind_ == LaserKind::kTilted) return false;
     const bool front_twins = laser.kind != LaserKind::kRear && last_kind_ != LaserKind::kRear;
     return summary_.scans > 0 && front_twins && laser.kind != last_kind_ && laser.stamp == last_scan_stamp_ &&
            laser.ranges_m.size() == last_beams_;
@@ -183,6 +185,7 @@ class LogEmitter {
   [[nodiscard]] double RangeMax(const LaserMessage& laser, const LaserFacts& facts) const {
     if (options_.no_return_m > 0.0) return options_.no_return_m;
     const double stated = laser.stated_range_max_m;
+    if (laser.kind == LaserKind::kTilted && stated > 0.0) return stated;  // Ours: it says what it means.
     const bool sick = stated <= 0.0 || (stated >= kSickLimit && stated <= kSickStated);
     if (!facts_.dpslam && !sick) return stated;
     const double limit = facts_.dpslam ? options_.dpslam_range_max_m : kSickLimit;

@@ -9,6 +9,9 @@
 // - ROBOTLASER1 likewise, layout and range limit from the message. RAWLASER1 has no poses: the Scan alone; where the
 //   file also holds ROBOTLASER1 the raw twins are ignored. So is a laser message that repeats another's stamp and
 //   count.
+// - TILTLASER1 tilt <as ROBOTLASER1> is our extension for scanners on a tilting mount: a scan whose plane is turned by
+//   `tilt` (rad) about the laser's y axis, positive downwards. Other readers skip it, as tilted scans would spoil a
+//   flat map; level scans of the same scanner stay ordinary messages. Its range limit is taken as stated.
 // - range_max: options.no_return_m; else the limit a message states; else 80 m (a SICK's limit is 80 m, its answers
 //   above mean nothing hit); lowered to where saturated readings pile up. DP-SLAM: options.dpslam_range_max_m, lowered
 //   likewise.

@@ -23,7 +23,7 @@ struct Scan {
   double range_max_m = 0.0;      // Ranges at or above it mean "nothing hit" up to there.
   double beam_period_s = 0.0;    // Between beams; 0 where the whole scan is taken at once.
   double scan_period_s = 0.0;    // Between scans; 0 where unknown.
-  double tilt_rad = 0.0;         // Of the scan plane about the laser's y axis.
+  double tilt_rad = 0.0;         // Of the scan plane about the laser's y axis: positive looks down.
   Pose2 T_robot_laser;
   std::vector<float> ranges_m;  // NaN, negative, zero, infinite allowed: see BeamClass.
 };

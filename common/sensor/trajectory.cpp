@@ -1,5 +1,6 @@
 #include "common/sensor/trajectory.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -31,6 +32,21 @@ double Yaw(double qx, double qy, double qz, double qw) {
 }
 
 }  // namespace
+
+std::optional<Pose2> PoseOn(const Trajectory& path, Stamp stamp, double max_gap_s) {
+  const auto after = std::lower_bound(path.begin(), path.end(), stamp,
+                                      [](const StampedPose& pose, Stamp s) { return pose.stamp < s; });
+  if (after == path.end()) return std::nullopt;
+  if (after->stamp == stamp) return after->T_map_robot;
+  if (after == path.begin()) return std::nullopt;
+  const auto before = std::prev(after);
+  // Without overflow, for stamps a broken clock may place anywhere in int64.
+  const auto nanos = [&](Stamp later) {
+    return static_cast<double>(static_cast<std::uint64_t>(later) - static_cast<std::uint64_t>(before->stamp));
+  };
+  if (nanos(after->stamp) * 1e-9 > max_gap_s) return std::nullopt;
+  return Interpolate(before->T_map_robot, after->T_map_robot, nanos(stamp) / nanos(after->stamp));
+}
 
 Result<void> WriteTum(const Trajectory& trajectory, const std::filesystem::path& path) {
   std::string text;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <vector>
 
 #include "common/geometry/pose2.h"
@@ -16,6 +17,9 @@ struct StampedPose {
 };
 
 using Trajectory = std::vector<StampedPose>;  // Increasing stamps.
+
+// The pose at a stamp, interpolated between neighbours at most `max_gap_s` apart.
+[[nodiscard]] std::optional<Pose2> PoseOn(const Trajectory& path, Stamp stamp, double max_gap_s);
 
 // One line per pose, stamps with nanoseconds, 9 decimals; written beside the target and renamed (atomic).
 [[nodiscard]] Result<void> WriteTum(const Trajectory& trajectory, const std::filesystem::path& path);

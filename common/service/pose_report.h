@@ -17,7 +17,7 @@ enum class PoseReason : std::uint8_t {
   kOdometryOnly,  // The last scans did not match; pose by odometry.
   kDegenerate,    // One direction is not seen (corridor): odometry along it.
   kLost,          // Too far by odometry alone, or the estimate contradicts the scans.
-  kDiverged,      // The filter failed numerically and was restarted from its last good state.
+  kDiverged,      // The filter's belief contradicts what is seen, or failed numerically.
   kWaiting,       // No scan used yet.
 };
 [[nodiscard]] std::string_view PoseReasonName(PoseReason reason);

@@ -3,6 +3,7 @@
 #include <fastrtps/attributes/LibrarySettingsAttributes.h>
 #include <fastrtps/xmlparser/XMLProfileManager.h>
 
+#include <algorithm>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/log/Log.hpp>
 #include <mutex>
@@ -25,6 +26,10 @@ namespace rtps = eprosima::fastrtps::rtps;
 using eprosima::fastrtps::Duration_t;
 using eprosima::fastrtps::types::ReturnCode_t;
 
+// Two programs that start together on a busy machine may miss each other's first announcements; however long the lease,
+// they find each other a few seconds later.
+constexpr double kMaxAnnouncementPeriodS = 3.0;
+
 // A library of its own must not print; and what peers can provoke must not fill a disk. Errors become values below.
 void ConfigureLibraryOnce() {
   static std::once_flag once;
@@ -46,7 +51,8 @@ fd::DomainParticipantQos ParticipantQos(const WireOptions& options, const std::s
   qos.transport().user_transports.push_back(MakeGuardedUdp(options.interfaces, refused));
   auto& builtin = qos.wire_protocol().builtin;
   builtin.discovery_config.leaseDuration = Duration_t(options.participant_lease_s);
-  builtin.discovery_config.leaseDuration_announcementperiod = Duration_t(options.participant_lease_s / 3.0);
+  builtin.discovery_config.leaseDuration_announcementperiod =
+      Duration_t(std::min(options.participant_lease_s / 3.0, kMaxAnnouncementPeriodS));
   builtin.readerHistoryMemoryPolicy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
   builtin.writerHistoryMemoryPolicy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
   return qos;

@@ -98,7 +98,7 @@ template <>
 struct Topic<Reply> {
   using Wire = v1::Reply;
   using Type = SampleType<Wire, v1::ReplyPubSubType>;
-  static constexpr TopicProfile kProfile{"cairn/v1/reply", false, 256, 1024, 1, 0.0, false, 20};
+  static constexpr TopicProfile kProfile{"cairn/v1/reply", false, 1024, 1024, 1, 0.0, false, 20};
 };
 
 }  // namespace cairn::wire

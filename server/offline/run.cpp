@@ -8,8 +8,8 @@
 #include <iomanip>
 #include <numeric>
 #include <sstream>
-#include <thread>
 
+#include "server/offline/over_threads.h"
 #include "server/slam/grid/grid_image.h"
 #include "server/slam/scan_pipeline.h"
 
@@ -20,20 +20,6 @@ using Clock = std::chrono::steady_clock;
 
 double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-// Spreads a loop over threads in equal blocks; starting them costs some 20 us, which the loops handed to it outweigh.
-slam::ParallelFor OverThreads(std::int64_t threads) {
-  const int count = threads > 0 ? static_cast<int>(threads) : static_cast<int>(std::thread::hardware_concurrency());
-  if (count <= 1) return slam::SerialFor;
-  return [count](int size, const std::function<void(int, int)>& body) {
-    const int blocks = std::min(count, size);
-    std::vector<std::thread> workers;
-    for (int block = 1; block < blocks; ++block)
-      workers.emplace_back([&, block] { body(size * block / blocks, size * (block + 1) / blocks); });
-    if (blocks > 0) body(0, size / blocks);
-    for (std::thread& worker : workers) worker.join();
-  };
 }
 
 double Percentile(std::vector<double> values, double share) {

@@ -5,6 +5,9 @@
 #include <array>
 #include <cmath>
 
+#include "server/slam/matching/degeneracy.h"
+#include "server/slam/matching/surface_agreement.h"
+
 namespace cairn::slam {
 namespace {
 
@@ -16,6 +19,18 @@ constexpr std::size_t kHistory = 16;
 // Turns tried about the guess, either way, while nothing explains the scan: odometry that froze in a turn.
 constexpr std::array<double, 4> kTurns = {0.25, 0.5, 0.75, 1.0};
 
+// How far the robot may be from an unusual guess (variances in m and rad), and how much more of the scan, as a share,
+// has to agree with what comes of it.
+const Eigen::Vector3d kWide(0.25, 0.25, 0.1);
+constexpr double kClearly = 0.05;
+
+// Standard deviations between an answer and odometry.
+double JumpOf(const Pose2& T_track_robot, const Pose2& guess, const Eigen::Matrix3d& covariance) {
+  Eigen::Vector3d jump = T_track_robot.vector() - guess.vector();
+  jump.z() = WrapAngle(jump.z());
+  return std::sqrt(std::max(0.0, jump.dot(covariance.ldlt().solve(jump))));
+}
+
 }  // namespace
 
 void Visit(OptionVisitor& visitor, NoOdometryOptions& options) {
@@ -23,6 +38,8 @@ void Visit(OptionVisitor& visitor, NoOdometryOptions& options) {
                "The robot is expected to go on as between the last two scans; false: to stand still.");
   visitor.Real("sigma_m", options.sigma_m, "m", 0.001, 100.0, "Of the expectation; larger: the scan decides more.");
   visitor.Real("sigma_rad", options.sigma_rad, "rad", 0.001, kPi, "See sigma_m.");
+  visitor.Real("unmatched_step_m", options.unmatched_step_m, "m", 0.0, 100.0,
+               "What a scan without a match counts as travelled, towards being lost.");
 }
 
 void Visit(OptionVisitor& visitor, FrontEndOptions& options) {
@@ -46,7 +63,11 @@ void Visit(OptionVisitor& visitor, FrontEndOptions& options) {
 }
 
 FrontEnd::FrontEnd(const FrontEndOptions& options, MatcherKind matcher, const MatcherOptions& matching)
-    : options_(options), matcher_(matcher), matching_(matching), index_(options.refine.first_pair_distance_m) {}
+    : options_(options),
+      matcher_(matcher),
+      matching_(matching),
+      keyframe_index_(options.refine.inlier_distance_m),
+      index_(options.refine.first_pair_distance_m) {}
 
 ScanView Look(const Scan& scan, const FrontEndOptions& options) {
   const std::vector<BeamPoint> points = PointsOf(scan);
@@ -60,11 +81,22 @@ TrackStep FrontEnd::Track(const ScanView& view, const Pose2& T_odom_robot, const
     const MatchResult coarse = MatchLastKeyframe(view, guess, parallel_for);
     // A forecast is no observation: where the refinement sees nothing, the matcher's answer stays.
     if (!options_.use_odometry && options_.refine_enabled && coarse.converged) guess.T_track_robot = coarse.T_prev_curr;
-    step.match = options_.refine_enabled ? Refine(view, T_odom_robot, guess, coarse) : Trust(coarse, guess);
+    step.match = options_.refine_enabled ? Refine(view, T_odom_robot, guess, coarse)
+                                         : MatchAlone(view, T_odom_robot, guess, coarse, parallel_for);
+    if (!options_.use_odometry && step.match.converged && coarse.converged && coarse.degenerate) {
+      // What the matcher saw no hold along, sparse points of the refinement must not hold either.
+      const Eigen::Vector2d open = coarse.degenerate_direction;
+      const double along = open.dot(coarse.T_prev_curr.translation() - step.match.T_prev_curr.translation());
+      step.match.T_prev_curr.x += along * open.x();
+      step.match.T_prev_curr.y += along * open.y();
+      step.match.degenerate = true;
+      step.match.degenerate_direction = open;
+    }
     step.matcher = coarse.failure;
     step.matched = step.match.converged;
     step.moved_m = Between(T_track_robot_, step.match.T_prev_curr).translation().norm();
-    if (!step.matched && !options_.use_odometry) step.moved_m = std::max(step.moved_m, options_.no_odometry.sigma_m);
+    if (!step.matched && !options_.use_odometry)
+      step.moved_m = std::max(step.moved_m, options_.no_odometry.unmatched_step_m);
     T_track_robot_ = step.match.T_prev_curr;
   }
   started_ = true;
@@ -104,20 +136,58 @@ MatchResult FrontEnd::MatchLastKeyframe(const ScanView& view, const Guess& guess
   return match;
 }
 
-MatchResult FrontEnd::Trust(const MatchResult& coarse, const Guess& guess) const {
-  MatchResult match = coarse;
-  if (match.converged) {
-    Eigen::Vector3d jump = match.T_prev_curr.vector() - guess.T_track_robot.vector();
-    jump.z() = WrapAngle(jump.z());
-    const double sigmas = std::sqrt(std::max(0.0, jump.dot(guess.covariance.ldlt().solve(jump))));
-    if (sigmas <= options_.max_jump_sigma) return match;
-    match.failure = MatchFailure::kFault;
+MatchResult FrontEnd::MatchAlone(const ScanView& view, const Pose2& T_odom_robot, const Guess& guess,
+                                 const MatchResult& coarse, const ParallelFor& parallel_for) const {
+  MatchResult best = coarse;
+  // A forecast is nothing to find a fault with.
+  if (options_.use_odometry && best.converged &&
+      JumpOf(best.T_prev_curr, guess.T_track_robot, guess.covariance) > options_.max_jump_sigma) {
+    best.converged = false;
+    best.failure = MatchFailure::kFault;
   }
-  match.converged = false;
-  match.degenerate = false;
-  match.T_prev_curr = guess.T_track_robot;
-  match.covariance = guess.covariance;
-  return match;
+  // Not every matcher holds the prior along a corridor by itself.
+  if (options_.use_odometry) TakeAlongFromPrior({guess.T_track_robot, guess.covariance}, best);
+  double explained = Explained(view, best.converged ? best.T_prev_curr : guess.T_track_robot);
+  const auto enough = [&] { return best.converged && explained >= options_.retry_below; };
+  const auto consider = [&](const Pose2& other) {
+    const MatchResult match = MatchLastKeyframe(view, {other, kWide.asDiagonal()}, parallel_for);
+    if (!match.converged) return;
+    const double share = Explained(view, match.T_prev_curr);
+    if (share <= explained + kClearly) return;
+    best = match;
+    explained = share;
+  };
+  const bool retry = !SearchesWide(matcher_);
+  if (retry && !enough())
+    for (const Pose2& other : UnusualGuesses(T_odom_robot)) consider(other);
+  for (std::size_t k = 0; retry && k < kTurns.size() && !enough(); ++k) {
+    consider(guess.T_track_robot * Pose2{0, 0, kTurns[k]});
+    consider(guess.T_track_robot * Pose2{0, 0, -kTurns[k]});
+  }
+  best.score = explained;
+  if (best.converged && explained >= options_.refine.min_score) return best;
+  if (best.converged) best.failure = MatchFailure::kInconsistent;
+  best.converged = false;
+  best.degenerate = false;
+  best.T_prev_curr = guess.T_track_robot;
+  best.covariance = guess.covariance;
+  return best;
+}
+
+double FrontEnd::Explained(const ScanView& view, const Pose2& T_track_robot) const {
+  return CompareSurfaces(view.points_robot, keyframe_index_, Between(keyframe_.T_track_robot, T_track_robot),
+                         options_.refine.inlier_distance_m)
+      .score;
+}
+
+std::vector<Pose2> FrontEnd::UnusualGuesses(const Pose2& T_odom_robot) const {
+  std::vector<Pose2> guesses = {history_.back().T_track_robot};
+  for (const std::size_t back : kLookBack) {
+    if (!options_.use_odometry || history_.size() < back) continue;
+    const Sight& sight = history_[history_.size() - back];
+    guesses.push_back(sight.T_track_robot * Between(sight.T_odom_robot, T_odom_robot));
+  }
+  return guesses;
 }
 
 MatchResult FrontEnd::Refine(const ScanView& view, const Pose2& T_odom_robot, const Guess& guess,
@@ -137,17 +207,12 @@ MatchResult FrontEnd::Refine(const ScanView& view, const Pose2& T_odom_robot, co
   }
 
   // An unusual guess has to explain clearly more.
-  const Eigen::Matrix3d wide = Eigen::Vector3d(0.25, 0.25, 0.1).asDiagonal();
   const auto consider = [&](const Pose2& other) {
-    const MatchResult match = AlignPointsToSurfaces(view.points_robot, index_, {other, other, wide}, options_.refine);
-    if (match.converged && (!best.converged || match.score > best.score + 0.05)) best = match;
+    const MatchResult match =
+        AlignPointsToSurfaces(view.points_robot, index_, {other, other, kWide.asDiagonal()}, options_.refine);
+    if (match.converged && (!best.converged || match.score > best.score + kClearly)) best = match;
   };
-  consider(history_.back().T_track_robot);
-  for (const std::size_t back : kLookBack) {
-    if (!options_.use_odometry || history_.size() < back) continue;
-    const Sight& sight = history_[history_.size() - back];
-    consider(sight.T_track_robot * Between(sight.T_odom_robot, T_odom_robot));
-  }
+  for (const Pose2& other : UnusualGuesses(T_odom_robot)) consider(other);
   for (const double turn : kTurns) {
     if (best.converged && best.score >= options_.retry_below) break;
     consider(guess.T_track_robot * Pose2{0, 0, turn});
@@ -159,6 +224,8 @@ MatchResult FrontEnd::Refine(const ScanView& view, const Pose2& T_odom_robot, co
 void FrontEnd::AddKeyframe(const ScanView& view) {
   keyframe_ = history_.back();
   keyframe_view_ = view;
+  keyframe_index_.Clear();
+  for (const SurfacePoint& point : view.points_robot) keyframe_index_.Add(point);
   const Eigen::Matrix2d R = T_track_robot_.rotation();
   std::vector<SurfacePoint> points_track;
   points_track.reserve(view.points_robot.size());

@@ -1,9 +1,9 @@
 // Follows the robot from scan to scan: the chosen matcher compares every scan with the last keyframe, an alignment with
 // what the last keyframes saw refines its answer, odometry stands in where neither knows; and says how it moved and how
-// sure that is. Without the refinement the matcher's own answer counts, unless it jumps against the odometry. Its frame
-// `track` is smooth and drifts slowly, as a very good odometry; closing loops is the filter's business. Not
-// thread-safe. Deterministic. Source: thesis A 3.5 (voting), 3.5.13 and 3.6.1 (fall-backs, fault check); Censi 2008
-// (refinement).
+// sure that is. Without the refinement the matcher's own answer counts, unless it jumps against the odometry or
+// explains too little of the scan. Its frame `track` is smooth and drifts slowly, as a very good odometry; closing
+// loops is the filter's business. Not thread-safe. Deterministic. Source: thesis A 3.5 (voting), 3.5.13 and 3.6.1
+// (fall-backs, fault check); Censi 2008 (refinement).
 #pragma once
 
 #include <deque>
@@ -18,11 +18,13 @@
 
 namespace cairn::slam {
 
-// What is believed of the next scan's pose while the odometry is withheld: the robot stands still, or goes on as it did.
+// What is believed of the next scan's pose while the odometry is withheld: the robot stands still, or goes on as it
+// did.
 struct NoOdometryOptions {
-  bool constant_velocity = false;  // Per scan, not per second: stamps of real logs come in bursts.
-  double sigma_m = 0.3;            // Of the prediction in x and y; also what an unmatched scan counts as travelled.
-  double sigma_rad = 0.2;
+  bool constant_velocity = true;  // Per scan, not per second: stamps of real logs come in bursts.
+  double sigma_m = 0.03;          // Of the prediction; larger: what scans seem to show along a corridor counts more.
+  double sigma_rad = 0.15;
+  double unmatched_step_m = 0.3;  // What a scan without a match counts as travelled, towards being lost.
 };
 void Visit(OptionVisitor& visitor, NoOdometryOptions& options);
 
@@ -32,7 +34,7 @@ struct FrontEndOptions {
   bool refine_enabled = true;  // False: the matcher's own answer is the pose.
   PointToLineOptions refine;
   MotionNoise odometry{0.05, 0.8, 0.0, 0.04, 0.4, 1.2};  // Generous: real odometry freezes, jumps, comes late.
-  bool use_odometry = true;  // False: tracking and mapping see scans only (thesis C 4.4).
+  bool use_odometry = true;                              // False: tracking and mapping see scans only (thesis C 4.4).
   NoOdometryOptions no_odometry;
   std::int64_t reference_keyframes = 40;  // Scans matched against; more: steadier, until drift blurs them.
   double retry_below = 0.65;              // Score under which other guesses than odometry are tried.
@@ -74,7 +76,12 @@ class FrontEnd {
                                               const ParallelFor& parallel_for) const;
   [[nodiscard]] MatchResult Refine(const ScanView& view, const Pose2& T_odom_robot, const Guess& guess,
                                    const MatchResult& coarse) const;
-  [[nodiscard]] MatchResult Trust(const MatchResult& coarse, const Guess& guess) const;
+  [[nodiscard]] MatchResult MatchAlone(const ScanView& view, const Pose2& T_odom_robot, const Guess& guess,
+                                       const MatchResult& coarse, const ParallelFor& parallel_for) const;
+  // Without odometry since the last scan: it stood still, or came late. The scan must explain these clearly better.
+  [[nodiscard]] std::vector<Pose2> UnusualGuesses(const Pose2& T_odom_robot) const;
+  // Share of the scan that lies on what the last keyframe saw.
+  [[nodiscard]] double Explained(const ScanView& view, const Pose2& T_track_robot) const;
 
   FrontEndOptions options_;
   MatcherKind matcher_;
@@ -83,6 +90,7 @@ class FrontEnd {
   Pose2 T_track_robot_;
   Sight keyframe_;  // The last keyframe, and what it saw, in its robot frame.
   ScanView keyframe_view_;
+  PointIndex keyframe_index_;
   std::deque<Sight> history_;                        // The last scans, newest last.
   std::deque<std::vector<SurfacePoint>> reference_;  // In track, newest last.
   PointIndex index_;

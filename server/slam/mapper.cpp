@@ -7,6 +7,7 @@
 #include "server/slam/grid/grid_redraw.h"
 #include "server/slam/matching/loop_search.h"
 #include "server/slam/matching/revisit_search.h"
+#include "server/slam/scan/tilt.h"
 #include "server/slam/smoothing/keyframe_graph.h"
 
 namespace cairn::slam {
@@ -24,10 +25,12 @@ struct Mapper::State {
         front_end(given.front_end, given.matcher, given.matching),
         revisits(given.revisit, given.front_end.refine),
         loops(given.loop, given.front_end.refine),
-        graph(given.filter.fastslam.drift),
+        graph(given.filter.back_end.drift),
         filter(MakeFilter(given.filter.kind, given.filter, T_map_robot_start, seed)),
         grid(given.grid) {}
 
+  // A scan that looks out of the plane: where odometry has taken the robot since the last level one.
+  ScanOutcome Coast(Stamp stamp, const Pose2& T_odom_robot);
   void AddKeyframe(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot, ScanView view, const TrackStep& step,
                    const ParallelFor& parallel_for);
   void CloseLargeLoop();
@@ -47,8 +50,13 @@ struct Mapper::State {
   std::vector<KeyframeShape> shapes;  // One per keyframe.
   std::vector<Pose2> online_path;     // One per keyframe.
   std::vector<MapperSnapshot::ScanPlace> scans;
+  ScanOutcome level;  // Of the last scan that was not tilted ...
+  MapperSnapshot::ScanPlace level_place;
+  Pose2 T_odom_level;        // ... and odometry there.
   double travelled_m = 0.0;  // Up to the last keyframe.
   double unmatched_m = 0.0;  // Travelled by odometry alone since the last match.
+  // Of what was travelled by odometry alone since the last keyframe, in that keyframe.
+  Eigen::Matrix3d blind_covariance = Eigen::Matrix3d::Zero();
 };
 
 namespace {
@@ -69,6 +77,7 @@ Mapper& Mapper::operator=(Mapper&&) noexcept = default;
 ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot,
                             const ParallelFor& parallel_for) {
   State& s = *state_;
+  if (IsTilted(*scan, s.options.max_tilt_rad)) return s.Coast(scan->stamp, T_odom_robot);
   ScanOutcome outcome;
   outcome.stamp = scan->stamp;
 
@@ -78,6 +87,7 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   ScanView view = Look(*scan, s.options.front_end);
   const TrackStep step = s.front_end.Track(view, T_odom_robot, parallel_for);
   s.unmatched_m = step.matched || s.keyframes.empty() ? 0.0 : s.unmatched_m + step.moved_m;
+  if (!step.matched) s.blind_covariance += s.options.blind.Covariance({step.moved_m, 0.0, 0.0});
   const bool first = s.keyframes.empty();
   Pose2 T_keyframe_robot = first ? Pose2{} : Between(s.shapes.back().T_track_robot, step.T_track_robot);
 
@@ -94,7 +104,29 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   outcome.covariance = s.filter->estimate().covariance;
   outcome.score = first ? 1.0 : step.match.score;
   outcome.reason = first ? PoseReason::kTracking : ReasonOf(step, s.unmatched_m, s.options.lost_after_m);
-  outcome.localized = outcome.reason != PoseReason::kLost;
+  if (s.filter->health().diverged) outcome.reason = PoseReason::kDiverged;
+  outcome.localized = outcome.reason != PoseReason::kLost && outcome.reason != PoseReason::kDiverged;
+  s.level = outcome;
+  s.level_place = s.scans.back();
+  s.T_odom_level = T_odom_robot;
+  return outcome;
+}
+
+ScanOutcome Mapper::State::Coast(Stamp stamp, const Pose2& T_odom_robot) {
+  ScanOutcome outcome = level;
+  outcome.stamp = stamp;
+  outcome.keyframe = false;
+  if (keyframes.empty()) {  // The first level scan will stand at the start; until then nobody knows.
+    outcome.T_map_robot = filter->estimate().T_map_robot;
+    outcome.T_map_odom = outcome.T_map_robot * T_odom_robot.Inverse();
+    return outcome;
+  }
+  const Pose2 moved = Between(T_odom_level, T_odom_robot);
+  scans.push_back({stamp, level_place.keyframe, level_place.T_keyframe_robot * moved});
+  outcome.T_map_robot = level.T_map_robot * moved;
+  const Eigen::Matrix3d J = J_compose_right(level.T_map_robot, moved);
+  outcome.covariance += J * options.blind.Covariance(moved) * J.transpose();
+  if (outcome.localized) outcome.reason = PoseReason::kOdometryOnly;
   return outcome;
 }
 
@@ -103,13 +135,14 @@ void Mapper::State::AddKeyframe(std::shared_ptr<const Scan> scan, const Pose2& T
   if (!keyframes.empty()) {
     const Pose2 motion = Between(shapes.back().T_track_robot, step.T_track_robot);
     travelled_m += motion.translation().norm();
-    filter->Predict(motion, Eigen::Matrix3d::Zero());
-    graph.Append(motion);
+    filter->Predict(motion, blind_covariance);
+    graph.Append(motion, blind_covariance);
+    blind_covariance.setZero();
     const auto revisit = revisits.Find(view.points_robot, shapes, distances_m, travelled_m, *filter, parallel_for);
     if (revisit && filter->Observe(*revisit))
       graph.AddLoop(revisit->keyframe, keyframes.size(), revisit->T_keyframe_robot, revisit->covariance);
   } else {
-    graph.Append({});
+    graph.Append({}, Eigen::Matrix3d::Zero());
   }
   filter->Observe(KeyframeSight{*scan, view, step.T_track_robot, travelled_m}, parallel_for);
   filter->Commit();

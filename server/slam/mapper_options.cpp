@@ -10,6 +10,10 @@ void Visit(OptionVisitor& visitor, MapperOptions& options) {
   Visit(visitor, options.filter);
   visitor.Real("lost_after_m", options.lost_after_m, "m", 0.0, 1000.0,
                "Travelled by odometry alone before the robot counts as lost.");
+  visitor.Section("blind", "Noise of motion known by odometry alone, besides the drift.",
+                  [&] { Visit(visitor, options.blind); });
+  visitor.Real("max_tilt_rad", options.max_tilt_rad, "rad", 0.0, 1.58,
+               "Scans tilted further get a pose from odometry but are not matched or drawn.");
   VisitEnum(visitor, "matcher", options.matcher, MatcherNames(), "What compares a scan with the last keyframe.");
   visitor.Section("matching", "The matchers; the chosen one's options count.",
                   [&] { Visit(visitor, options.matching); });

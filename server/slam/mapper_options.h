@@ -17,9 +17,11 @@
 namespace cairn::slam {
 
 struct MapperOptions {
-  std::int64_t seed = 1;      // Of every robot's random engine: the same robot alone or in a fleet maps alike.
-  double lost_after_m = 2.0;  // Travelled by odometry alone before the robot counts as lost.
-  MatcherKind matcher = MatcherKind::kVoting;  // What compares a scan with the last keyframe.
+  std::int64_t seed = 1;        // Of every robot's random engine: the same robot alone or in a fleet maps alike.
+  double lost_after_m = 2.0;    // Travelled by odometry alone before the robot counts as lost.
+  double max_tilt_rad = 0.035;  // Two degrees; scans tilted further get a pose but are not evidence (scan/tilt.h).
+  MotionNoise blind{0.002, 0.2, 0.0, 0.001, 0.05, 0.0};  // Of motion known by odometry alone, besides the drift.
+  MatcherKind matcher = MatcherKind::kVoting;            // What compares a scan with the last keyframe.
   MatcherOptions matching;
   FrontEndOptions front_end;
   MotionGateOptions gate;

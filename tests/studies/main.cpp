@@ -1,4 +1,5 @@
-// cairn-study: measures for people: `cairn-study list`, `cairn-study NAME [--out DIR] [--quick] [--seed N] [--log F]`.
+// cairn-study: measures for people: `cairn-study list`, `cairn-study NAME [--out DIR] [--quick] [--seed N] [--log F]
+// [--only TEXT]`.
 // Exit codes: 0 done and plausible, 1 the study failed or a figure is not plausible, 2 wrong command line.
 #include <CLI/CLI.hpp>
 #include <exception>
@@ -22,9 +23,10 @@ int ListStudies() {
 }
 
 int RunNamed(const Study& study, const std::filesystem::path& out, bool quick, std::uint64_t seed,
-             const std::vector<std::filesystem::path>& logs) {
+             const std::vector<std::filesystem::path>& logs, const std::string& only) {
   Report report(out, "cairn-study " + study.name, std::cout);
-  StudyContext context{report, quick, seed, logs};
+  StudyContext context{report, quick, seed, logs, only};
+  if (!only.empty()) report.Warn("only what is called *" + only + "*");
   if (quick) report.Warn("a quick run: fewer trials and shorter logs than the study is meant for");
   bool plausible = false;
   try {
@@ -44,6 +46,7 @@ int Main(int argc, char** argv) {
   std::string name;
   std::filesystem::path out;
   std::vector<std::filesystem::path> logs;
+  std::string only;
   bool quick = false;
   std::uint64_t seed = 1;
   CLI::App app{"Measures the estimators and draws the figures: tables, plots, a Markdown report."};
@@ -52,6 +55,7 @@ int Main(int argc, char** argv) {
   app.add_flag("--quick", quick, "Seconds instead of minutes");
   app.add_option("--seed", seed, "Of every random engine");
   app.add_option("--log", logs, "A log instead of the study's own choice; repeatable")->check(CLI::ExistingFile);
+  app.add_option("--only", only, "systems, matchers: those whose name contains this");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -59,7 +63,7 @@ int Main(int argc, char** argv) {
   }
   if (name == "list") return ListStudies();
   for (const Study& study : AllStudies())
-    if (study.name == name) return RunNamed(study, out, quick, seed, logs);
+    if (study.name == name) return RunNamed(study, out, quick, seed, logs, only);
   std::cerr << "cairn-study: no study is called '" << name << "'; `cairn-study list` prints them\n";
   return 2;
 }

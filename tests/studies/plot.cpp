@@ -64,16 +64,27 @@ int ColourIndex(const Series& series, std::size_t position) {
   return series.colour.value_or(static_cast<int>(position));
 }
 
-// In the corner of the plot that holds the fewest points.
-void DrawLegend(PlotFrame& frame, const Plot& plot) {
+// 0 x 0 where no series has a label.
+cv::Size LegendSize(const Plot& plot) {
   int widest = 0, lines = 0;
   for (const Series& series : plot.series) {
     if (series.label.empty()) continue;
     widest = std::max(widest, TextWidth(series.label, 0.48));
     ++lines;
   }
-  if (lines == 0) return;
-  const cv::Size size(widest + 52, 20 * lines + 10);
+  return lines == 0 ? cv::Size() : cv::Size(widest + 52, 20 * lines + 10);
+}
+
+// Maps keep room for their legend on the right: every corner of them shows something.
+int RightMargin(const Plot& plot, bool map) {
+  const int legend = LegendSize(plot).width;
+  return map && legend > 0 ? legend + 30 : 24;
+}
+
+// Beside the plot where there is room, else in its corner that holds the fewest points.
+void DrawLegend(PlotFrame& frame, const Plot& plot) {
+  const cv::Size size = LegendSize(plot);
+  if (size.width == 0) return;
   const cv::Rect area = frame.area();
   const cv::Rect corners[] = {{area.br().x - size.width - 10, area.y + 10, size.width, size.height},
                               {area.x + 10, area.y + 10, size.width, size.height},
@@ -87,8 +98,9 @@ void DrawLegend(PlotFrame& frame, const Plot& plot) {
           inside += box.contains(cv::Point(frame.At(series.x[i], series.y[i])));
     return inside;
   };
-  const cv::Rect box = *std::min_element(std::begin(corners), std::end(corners),
-                                         [&](const cv::Rect& a, const cv::Rect& b) { return crowd(a) < crowd(b); });
+  cv::Rect box = *std::min_element(std::begin(corners), std::end(corners),
+                                   [&](const cv::Rect& a, const cv::Rect& b) { return crowd(a) < crowd(b); });
+  if (frame.image().cols - area.br().x >= size.width + 20) box = {area.br().x + 12, area.y, size.width, size.height};
   cv::Mat veil = frame.image().clone();
   cv::rectangle(veil, box, cv::Scalar(255, 255, 255), cv::FILLED);
   cv::addWeighted(veil, 0.85, frame.image(), 0.15, 0.0, frame.image());
@@ -151,7 +163,8 @@ Extent ExtentOf(const Plot& plot, std::vector<double> xs, std::vector<double> ys
 
 RasterImage DrawPlot(const Plot& plot) {
   const Extent extent = ExtentOf(plot, {}, {});
-  PlotFrame frame(plot.width, plot.height, plot.x, extent.x, plot.y, extent.y, plot.equal_scale);
+  PlotFrame frame(plot.width, plot.height, plot.x, extent.x, plot.y, extent.y, plot.equal_scale,
+                  RightMargin(plot, plot.equal_scale));
   frame.DrawGrid();
   DrawSeries(frame, plot, 2);
   frame.DrawAxes(plot.title);
@@ -159,13 +172,42 @@ RasterImage DrawPlot(const Plot& plot) {
   return RasterOf(frame.image());
 }
 
-RasterImage DrawMap(const OccupancyImage& map, const Plot& plot) {
+namespace {
+
+// Without the rows and columns at its edges that nothing is known of: grids grow in whole chunks.
+OccupancyImage Cropped(const OccupancyImage& map) {
+  int left = map.width, right = -1, low = map.height, high = -1;
+  for (int row = 0; row < map.height; ++row)
+    for (int column = 0; column < map.width; ++column) {
+      if (map.cells[static_cast<std::size_t>(row) * static_cast<std::size_t>(map.width) +
+                    static_cast<std::size_t>(column)] > 100)
+        continue;
+      left = std::min(left, column), right = std::max(right, column);
+      low = std::min(low, row), high = std::max(high, row);
+    }
+  OccupancyImage cropped{map.resolution_m, map.T_map_origin, 0, 0, {}};
+  if (right < left) return cropped;
+  cropped.T_map_origin.x += left * map.resolution_m;
+  cropped.T_map_origin.y += low * map.resolution_m;
+  cropped.width = right - left + 1;
+  cropped.height = high - low + 1;
+  for (int row = low; row <= high; ++row) {
+    const auto begin = map.cells.begin() + static_cast<std::ptrdiff_t>(row) * map.width + left;
+    cropped.cells.insert(cropped.cells.end(), begin, begin + cropped.width);
+  }
+  return cropped;
+}
+
+}  // namespace
+
+RasterImage DrawMap(const OccupancyImage& whole, const Plot& plot) {
+  const OccupancyImage map = Cropped(whole);
   const double right = map.T_map_origin.x + map.width * map.resolution_m;
   const double top = map.T_map_origin.y + map.height * map.resolution_m;
   const bool any = map.width > 0 && map.height > 0;
   const Extent extent =
       any ? ExtentOf(plot, {map.T_map_origin.x, right}, {map.T_map_origin.y, top}) : ExtentOf(plot, {}, {});
-  PlotFrame frame(plot.width, plot.height, plot.x, extent.x, plot.y, extent.y, true);
+  PlotFrame frame(plot.width, plot.height, plot.x, extent.x, plot.y, extent.y, true, RightMargin(plot, true));
   if (any) {
     // Darkest cell under each pixel, so that thin walls survive shrinking.
     cv::Mat cells(map.height, map.width, CV_8UC1);

@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kShift = 4;  // Fractional bits of OpenCV's coordinates.
 constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX;
-constexpr int kLeft = 84, kTop = 44, kBottom = 62;
+constexpr int kLeft = 96, kTop = 44, kBottom = 62;
 
 cv::Point Fixed(cv::Point2d p) {
   const auto fixed = [](double value) {
@@ -32,14 +32,15 @@ std::vector<double> TicksOf(AxisRange range, bool logarithmic, int wanted) {
   if (logarithmic) {
     const double first = std::ceil(std::log10(range.low) - 1e-9), last = std::floor(std::log10(range.high) + 1e-9);
     const bool few = last - first < 2.5;
-    for (double power = first - 1; power <= last; power += 1) {
+    const double stride = std::max(1.0, std::ceil((last - first) / std::max(wanted, 1)));
+    for (double power = few ? first - 1 : first; power <= last; power += stride) {
       for (const double digit : {1.0, 2.0, 5.0}) {
         const double value = digit * std::pow(10.0, power);
         if ((digit == 1.0 || few) && value >= range.low * (1 - 1e-9) && value <= range.high * (1 + 1e-9))
           ticks.push_back(value);
       }
     }
-    return ticks;
+    return ticks.size() >= 3 ? ticks : TicksOf(range, false, wanted);
   }
   const double rough = (range.high - range.low) / std::max(wanted, 1);
   const double power = std::pow(10.0, std::floor(std::log10(rough)));
@@ -103,7 +104,7 @@ PlotFrame::PlotFrame(int width, int height, Axis x, AxisRange x_range, Axis y, A
     const int high = static_cast<int>(std::lround((y_range.high - y_range.low) * per_m));
     area_.width = std::max(wide, 50);
     area_.height = std::max(high, 50);
-    width = std::max(area_.width + kLeft + right_margin, 420);
+    width = std::max(area_.width + kLeft + right_margin, 640);
     height = area_.height + kTop + kBottom;
   }
   image_ = cv::Mat(height, width, CV_8UC3, cv::Scalar(255, 255, 255));

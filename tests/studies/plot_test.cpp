@@ -33,6 +33,9 @@ TEST(PlotAxes, TicksAreRound) {
   EXPECT_EQ(TicksOf({50, 450}, false, 8), (std::vector<double>{50, 100, 150, 200, 250, 300, 350, 400, 450}));
   EXPECT_EQ(TicksOf({0.5, 2000}, true, 5), (std::vector<double>{1, 10, 100, 1000}));
   EXPECT_EQ(TicksOf({1, 10}, true, 5), (std::vector<double>{1, 2, 5, 10}));
+  EXPECT_EQ(TicksOf({0.021, 0.049}, true, 3),
+            (std::vector<double>{0.03, 0.04}));  // Within a decade, as on a plain axis.
+  EXPECT_LE(TicksOf({1e-30, 1e3}, true, 8).size(), 9u);
 }
 
 TEST(PlotAxes, RangesAreNeverEmpty) {
@@ -87,12 +90,25 @@ TEST(Plot, OddInputIsDrawnAsFarAsItGoes) {
 TEST(PlotMap, WallsFreeAndUnknownDiffer) {
   OccupancyImage map{0.1, {-1, -1, 0}, 20, 20, std::vector<std::uint8_t>(400, 255)};
   for (int row = 0; row < 20; ++row)
-    for (int column = 0; column < 10; ++column)
+    for (const int column : {0, 1, 2, 3, 4, 15, 16, 17, 18, 19})
       map.cells[static_cast<std::size_t>(20 * row + column)] = row < 10 ? 0 : 100;
   const RasterImage image = DrawMap(map, {.title = "m"});
   EXPECT_TRUE(Holds(image, {0, 0, 0}));
   EXPECT_TRUE(Holds(image, {255, 255, 255}));
   EXPECT_TRUE(Holds(image, {222, 222, 222}));
+}
+
+TEST(PlotMap, UnknownEdgesAreCutOff) {
+  // One known cell in the middle of a wide unknown map fills the picture.
+  OccupancyImage map{1.0, {-50, -50, 0}, 100, 100, std::vector<std::uint8_t>(10000, 255)};
+  map.cells[50 * 100 + 50] = 100;
+  EXPECT_FALSE(Holds(DrawMap(map, {}), {222, 222, 222}));
+}
+
+TEST(Plot, ANarrowMapLeavesRoomForTitleAndLegend) {
+  Plot plot{.title = "a corridor", .equal_scale = true};
+  plot.series = {{.label = "a long label beside the corridor", .x = {0, 1}, .y = {0, 50}}};
+  EXPECT_GE(DrawPlot(plot).width, 640);
 }
 
 TEST(HeatMap, LowIsDarkHighIsBrightAndNothingIsGrey) {

@@ -41,6 +41,10 @@ void Report::Warn(const std::string& text) {
   out_ << "!! " << text << '\n' << std::flush;
 }
 
+void Report::Progress(const std::string& text) {
+  out_ << "   " << text << '\n' << std::flush;
+}
+
 void Report::Add(const Table& table, const std::string& name) {
   markdown_ += "\n" + table.Markdown();
   out_ << '\n' << table.Aligned() << '\n' << std::flush;

@@ -23,6 +23,8 @@ class Report {
   void Text(const std::string& text);
   // What must not be overlooked: a log that is absent, a figure worse than the printed one.
   void Warn(const std::string& text);
+  // Only for who watches: not part of the report.
+  void Progress(const std::string& text);
   // Also written as NAME.csv; blanks in names become underscores.
   void Add(const Table& table, const std::string& name);
   // Written as NAME.png; the plot's title is the caption.

@@ -21,6 +21,10 @@ struct StudyContext {
   std::uint64_t seed = 1;                     // Of every random engine: same seed, same figures (times excepted).
   std::vector<std::filesystem::path> logs{};  // --log: instead of the study's own choice.
 
+  std::string only{};  // --only: of a study that compares named systems, those whose name contains this; empty: all.
+
+  [[nodiscard]] bool Wants(const std::string& name) const { return name.find(only) != std::string::npos; }
+
   // The larger number, or the smaller one of a quick run.
   template <typename T>
   [[nodiscard]] T Pick(T full, T small) const {

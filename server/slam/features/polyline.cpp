@@ -32,9 +32,7 @@ bool Collinear(const LineFeature& a, const LineFeature& b, const PolylineOptions
   const LineFeature &longer = a.length < b.length ? b : a, &shorter = a.length < b.length ? a : b;
   if (FarthestEnd(longer, shorter) > options.collinear_m) return false;
   const Eigen::Vector2d along = longer.direction();
-  const auto span = [&](const LineFeature& line) {
-    return std::minmax({along.dot(line.first), along.dot(line.last)});
-  };
+  const auto span = [&](const LineFeature& line) { return std::minmax({along.dot(line.first), along.dot(line.last)}); };
   const auto in_longer = span(longer), in_shorter = span(shorter);
   const double gap = std::max(in_longer.first - in_shorter.second, in_shorter.first - in_longer.second);
   return gap <= options.gap_m;

@@ -46,9 +46,9 @@ struct FilterEstimate {
 // For the consistency study and for saying "lost".
 struct FilterHealth {
   double effective_sample_size = 1.0;  // 1 for filters with one hypothesis.
-  double nis = 0.0;                    // Sum of squared Mahalanobis innovations of the last step, best hypothesis ...
-  int nis_dimension = 0;               // ... and of how many numbers.
-  bool diverged = false;               // The filter knows that its estimate means nothing any more.
+  double nis = 0.0;       // Sum of squared Mahalanobis innovations of the last step, over the whole belief ...
+  int nis_dimension = 0;  // ... and of how many numbers.
+  bool diverged = false;  // The filter knows that its estimate means nothing any more.
 };
 
 class Filter {

@@ -4,11 +4,14 @@
 #include <string_view>
 
 #include "server/slam/dpslam/dpslam.h"
+#include "server/slam/filters/dead_reckoning_filter.h"
+#include "server/slam/filters/fastslam.h"
 
 namespace cairn::slam {
 namespace {
 
-constexpr std::array<std::string_view, 2> kFilterNames = {"fastslam2_points", "dpslam"};
+constexpr std::array<std::string_view, 7> kFilterNames = {"fastslam2_points", "fastslam2_oriented",  "fastslam1", "ekf",
+                                                          "dpslam",           "landmark_correction", "none"};
 
 }  // namespace
 
@@ -16,24 +19,47 @@ void Visit(OptionVisitor& visitor, FilterOptions& options) {
   VisitEnum(visitor, "filter", options.kind, kFilterNames, "What estimates path and landmarks.");
   visitor.Integer("particles", options.particles, "1", 1, 10000,
                   "More: larger loops close, in proportionally more time and memory.");
+  visitor.Real("max_nis", options.back_end.max_nis, "1", 1.0, 1000.0,
+               "Squared Mahalanobis distance beyond which an observation adds no more doubt.");
+  visitor.Integer("diverged_after", options.back_end.diverged_after, "1", 1, 100000,
+                  "Revisits in a row that contradict the belief before the robot counts as not localized.");
+  visitor.Section("drift", "Noise of the matched motion: how far the front-end drifts.",
+                  [&] { Visit(visitor, options.back_end.drift); });
   visitor.Section("landmarks", "Which features become landmarks, and when one is seen again.",
-                  [&] { Visit(visitor, options.landmarks); });
-  visitor.Section("fastslam", "FastSLAM.", [&] { Visit(visitor, options.fastslam); });
+                  [&] { Visit(visitor, options.back_end.landmarks); });
+  visitor.Section("fastslam", "FastSLAM, all variants.", [&] { Visit(visitor, options.fastslam); });
+  visitor.Section("correction", "landmark_correction: deterministic global localisation.",
+                  [&] { Visit(visitor, options.correction); });
+  visitor.Section("ekf", "EKF-SLAM.", [&] { Visit(visitor, options.ekf); });
   visitor.Section("dpslam", "DP-SLAM.", [&] { Visit(visitor, options.dpslam); });
 }
 
 std::unique_ptr<Filter> MakeFilter(FilterKind kind, const FilterOptions& options, const Pose2& T_map_robot_start,
                                    std::uint64_t seed) {
+  const auto fastslam = [&]<typename LandmarkModel>(Proposal proposal) -> std::unique_ptr<Filter> {
+    return std::make_unique<FastSlam<LandmarkModel>>(proposal, options.fastslam, options.back_end, options.particles,
+                                                     T_map_robot_start, seed);
+  };
   switch (kind) {
+    case FilterKind::kFastSlam2Oriented:
+      return fastslam.operator()<LandmarkOriented>(Proposal::kObservation);
+    case FilterKind::kFastSlam1:
+      return fastslam.operator()<LandmarkPoint>(Proposal::kMotion);
+    case FilterKind::kEkf:
+      return std::make_unique<EkfSlam>(options.ekf, options.back_end, T_map_robot_start);
     case FilterKind::kDpSlam: {
       DpSlamOptions dpslam = options.dpslam;
       dpslam.low.particles = dpslam.high.particles = options.particles;
       return std::make_unique<DpSlam>(dpslam, T_map_robot_start, seed);
     }
+    case FilterKind::kLandmarkCorrection:
+      return std::make_unique<LandmarkCorrection>(options.correction, options.back_end, T_map_robot_start);
+    case FilterKind::kNone:
+      return std::make_unique<DeadReckoningFilter>(options.back_end, T_map_robot_start);
     case FilterKind::kFastSlam2Points:
       break;
   }
-  return std::make_unique<FastSlam2>(options.fastslam, options.landmarks, options.particles, T_map_robot_start, seed);
+  return fastslam.operator()<LandmarkPair>(Proposal::kObservation);
 }
 
 }  // namespace cairn::slam

@@ -19,4 +19,15 @@ Eigen::Vector2d TakeAlongFromPrior(const Eigen::Vector2d& measured, const Eigen:
   return measured + along.dot(prior - measured) * along;
 }
 
+void TakeAlongFromPrior(const MatchPrior& prior, MatchResult& result) {
+  if (!result.degenerate) return;
+  const Eigen::Vector2d u = result.degenerate_direction;
+  const Eigen::Vector2d t = TakeAlongFromPrior(result.T_prev_curr.translation(), prior.T_prev_curr.translation(), u);
+  result.T_prev_curr = {t.x(), t.y(), result.T_prev_curr.theta};
+  Eigen::Matrix3d across = Eigen::Matrix3d::Identity();
+  across.topLeftCorner<2, 2>() -= u * u.transpose();
+  result.covariance = across * result.covariance * across.transpose();
+  result.covariance.topLeftCorner<2, 2>() += u.dot(prior.covariance.topLeftCorner<2, 2>() * u) * u * u.transpose();
+}
+
 }  // namespace cairn::slam

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "server/slam/match_result.h"
+#include "server/slam/matching/match_prior.h"
 
 namespace cairn::slam {
 
@@ -13,5 +14,9 @@ void JudgeDegeneracy(const Eigen::Matrix3d& H, double ratio, MatchResult& result
 // What was measured across `along`, what `prior` says along it. Both translations in one frame; `along` a unit vector.
 [[nodiscard]] Eigen::Vector2d TakeAlongFromPrior(const Eigen::Vector2d& measured, const Eigen::Vector2d& prior,
                                                  const Eigen::Vector2d& along);
+
+// The same for a whole result, where it is degenerate: place and uncertainty along the direction become the prior's.
+// Whatever evidence there seems to be along a corridor is where the view ended, which moves with the robot.
+void TakeAlongFromPrior(const MatchPrior& prior, MatchResult& result);
 
 }  // namespace cairn::slam

@@ -141,8 +141,8 @@ EvolutionResult Evolve(const std::function<double(const Eigen::Vector3d&)>& cost
       const Eigen::Vector3d perturbed = Perturbed(population, others, target, best.x, options);
       const std::array<bool, kDimension> taken = DrawCrossover(engine, options);
       for (int n = 0; n < kDimension; ++n) {
-        trials[i].x(n) = taken[static_cast<std::size_t>(n)] ? Mirrored(perturbed(n), box.min(n), box.max(n))
-                                                            : population[i].x(n);
+        trials[i].x(n) =
+            taken[static_cast<std::size_t>(n)] ? Mirrored(perturbed(n), box.min(n), box.max(n)) : population[i].x(n);
       }
     }
     Judge(trials, cost, parallel_for);

@@ -1,8 +1,8 @@
 // Differential evolution: finds the least value of a function of three variables inside a box by breeding a population
-// of trial vectors, without derivatives and without a guess. Not tied to what the variables mean; ndt_de gives them one.
-// The engine draws in the calling thread only, and a whole generation is judged at once, so the answer does not depend
-// on how the judging is spread over threads. Stateless, thread-safe.
-// Source: Storn and Price 1997 and the ten strategies of their program de36.c; thesis C 2.4.5-2.4.6.
+// of trial vectors, without derivatives and without a guess. Not tied to what the variables mean; ndt_de gives them
+// one. The engine draws in the calling thread only, and a whole generation is judged at once, so the answer does not
+// depend on how the judging is spread over threads. Stateless, thread-safe. Source: Storn and Price 1997 and the ten
+// strategies of their program de36.c; thesis C 2.4.5-2.4.6.
 #pragma once
 
 #include <Eigen/Core>

@@ -37,8 +37,8 @@ struct PointNormal {
 struct LineLeastSquaresOptions {
   double along_weight = 1e-3;  // epsilon of (4.12): how far a midpoint counts along its wall; the visible part of a
                                // wall differs from scan to scan, so more is wrong and none leaves a corridor singular.
-  double normal_weight = 0.1;        // alpha of (4.11): a slope's share per square metre of line (at 1 m: this).
-  double length_power = 1.0;         // Weight of a pair by length; 0: the thesis, all the same.
+  double normal_weight = 0.1;  // alpha of (4.11): a slope's share per square metre of line (at 1 m: this).
+  double length_power = 1.0;   // Weight of a pair by length; 0: the thesis, all the same.
   std::int64_t max_iterations = 30;  // Typical: 4. The thesis runs 100.
   double stop_step = 1e-7;           // Stops when the step (m, rad) is smaller.
 };

@@ -1,6 +1,5 @@
 #include "server/slam/matching/line_lsq.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 
 #include "server/slam/matching/degeneracy.h"
@@ -41,22 +40,13 @@ double PairedShare(std::span<const LineFeature> curr, std::span<const LinePair> 
   return all > 0.0 ? paired / all : 0.0;
 }
 
-// Of the pairs, with the prior's along a corridor.
+// Of the pairs alone: along a corridor the prior takes over afterwards.
 Eigen::Matrix3d CovarianceOf(const ScanFeatures& prev, const ScanFeatures& curr, const LineLsqMatch& match,
-                             const MatchPrior& prior, const LineLsqOptions& options) {
+                             const LineLsqOptions& options) {
   VotingOptions floors;
   floors.line_sigma_floor_m = options.sigma_floor_m;
   floors.line_slope_sigma_floor_rad = options.slope_sigma_floor_rad;
-  MatchResult across = match.result;
-  across.degenerate = false;  // The prior here, not the odometry model, says how sure the place along is.
-  Eigen::Matrix3d covariance = PairsCovariance(prev, curr, match.pairs, across, prior.T_prev_curr, floors);
-  if (match.result.degenerate) {
-    const Eigen::Vector2d u = match.result.degenerate_direction;
-    Eigen::Matrix3d information = covariance.inverse();
-    information.topLeftCorner<2, 2>() += u * u.transpose() / u.dot(prior.covariance.topLeftCorner<2, 2>() * u);
-    covariance = information.inverse();
-  }
-  return 0.5 * (covariance + covariance.transpose()).eval();
+  return PairsCovariance(prev, curr, match.pairs, match.result, match.result.T_prev_curr, floors);
 }
 
 }  // namespace
@@ -115,7 +105,8 @@ LineLsqMatch MatchLinesByLeastSquares(const ScanFeatures& prev_scan, const ScanF
   if (result.score < options.min_score) return fail(MatchFailure::kInconsistent);
   result.inliers = static_cast<int>(match.pairs.size());
   result.converged = true;
-  result.covariance = CovarianceOf(prev, curr, match, prior, options);
+  result.covariance = CovarianceOf(prev, curr, match, options);
+  TakeAlongFromPrior(prior, result);
   return match;
 }
 

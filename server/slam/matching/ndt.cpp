@@ -68,8 +68,8 @@ NewtonResult ClimbNdt(const NdtMap& map, std::span<const Eigen::Vector2d> points
     const NdtDerivatives at = map.Derivatives(points, result.T_map_points);
     Eigen::Vector3d step = StepUphill(at, distance);
     if (!step.allFinite()) return result;
-    const double excess = std::max(step.head<2>().norm() / options.longest_step_m,
-                                   std::abs(step.z()) / options.longest_step_rad);
+    const double excess =
+        std::max(step.head<2>().norm() / options.longest_step_m, std::abs(step.z()) / options.longest_step_rad);
     if (excess > 1.0) step /= excess;
     while (!is_short(step) && map.Score(points, Moved(result.T_map_points, step)) <= at.score) step *= 0.5;
     result.settled = is_short(step);

@@ -2,9 +2,9 @@
 // the search space around the prior, without odometry and without derivatives. Then Newton's algorithm climbs the last
 // millimetres (beyond the thesis; can be switched off).
 // Frames: both scans in their robot frames; answers T_prev_curr. The thesis' y axis points ahead of the robot, ours
-// is x: its (dx, dy) are our (-dy, dx). Stateless, thread-safe; the random engine starts from `seed` at every match, and
-// the answer does not depend on how `parallel_for` splits the work.
-// Source: thesis C 4.4.1 (4.42)-(4.43), Tables 4.4 and 4.5; 4.4.3 (thinning).
+// is x: its (dx, dy) are our (-dy, dx). Stateless, thread-safe; the random engine starts from `seed` at every match,
+// and the answer does not depend on how `parallel_for` splits the work. Source: thesis C 4.4.1 (4.42)-(4.43),
+// Tables 4.4 and 4.5; 4.4.3 (thinning).
 #pragma once
 
 #include "server/slam/matching/differential_evolution.h"

@@ -7,15 +7,21 @@
 namespace cairn::slam {
 namespace {
 
-// The direction in which the scan holds the translation least, with the heading free to follow.
-void JudgeDegeneracy(const Eigen::Matrix3d& information, double ratio, MatchResult& result) {
-  const Eigen::Matrix2d translation =
-      information.topLeftCorner<2, 2>() - information.topRightCorner<2, 1>() * information.bottomLeftCorner<1, 2>() /
-                                              std::max(information(2, 2), 1e-12);
+// Finds the direction in which the scan holds the translation least, with the heading free to follow. Where it is open,
+// what the cells seem to know about it comes mostly of their cuts and sampling, and counts for no more than
+// open_sigma_m.
+void JudgeDegeneracy(const NdtEvidenceOptions& options, Eigen::Matrix3d& information, MatchResult& result) {
+  const Eigen::Matrix2d translation = information.topLeftCorner<2, 2>() - information.topRightCorner<2, 1>() *
+                                                                              information.bottomLeftCorner<1, 2>() /
+                                                                              std::max(information(2, 2), 1e-12);
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
   solver.computeDirect(translation);
-  result.degenerate = !(solver.eigenvalues()(0) >= ratio * solver.eigenvalues()(1));
-  if (result.degenerate) result.degenerate_direction = solver.eigenvectors().col(0);
+  result.degenerate = !(solver.eigenvalues()(0) >= options.degenerate_ratio * solver.eigenvalues()(1));
+  if (!result.degenerate) return;
+  const Eigen::Vector2d open = solver.eigenvectors().col(0);
+  result.degenerate_direction = open;
+  const double excess = solver.eigenvalues()(0) - 1.0 / (options.open_sigma_m * options.open_sigma_m);
+  if (excess > 0.0) information.topLeftCorner<2, 2>() -= excess * open * open.transpose();
 }
 
 }  // namespace
@@ -27,6 +33,8 @@ void Visit(OptionVisitor& visitor, NdtEvidenceOptions& options) {
                "Of the Hessian that counts as information; smaller: more cautious.");
   visitor.Real("degenerate_ratio", options.degenerate_ratio, "1", 0.0, 1.0,
                "Weakest over strongest hold on translation below which it is a corridor.");
+  visitor.Real("open_sigma_m", options.open_sigma_m, "m", 1e-3, 1e3,
+               "Along the direction a corridor leaves open; larger: the prior decides more.");
 }
 
 Eigen::Matrix3d InformationOf(const NdtDerivatives& at_pose, const NdtEvidenceOptions& options) {
@@ -49,12 +57,13 @@ MatchResult JudgeNdtPose(const NdtMap& map, std::span<const Eigen::Vector2d> poi
   MatchResult result = UnmatchedNdt(prior, MatchFailure::kNotConverged);
   const NdtDerivatives at_pose = map.Derivatives(points_curr, T_prev_curr);
   result.inliers = at_pose.inliers;
-  result.score = static_cast<double>(at_pose.inliers) / static_cast<double>(std::max<std::size_t>(points_curr.size(), 1));
-  const Eigen::Matrix3d information = InformationOf(at_pose, options);
+  result.score =
+      static_cast<double>(at_pose.inliers) / static_cast<double>(std::max<std::size_t>(points_curr.size(), 1));
+  Eigen::Matrix3d information = InformationOf(at_pose, options);
   if (!settled || result.score < options.min_score || result.inliers < options.min_inliers || !information.allFinite())
     return result;
 
-  JudgeDegeneracy(information, options.degenerate_ratio, result);
+  JudgeDegeneracy(options, information, result);
   const Eigen::LLT<Eigen::Matrix3d> prior_factor(prior.covariance);
   if (prior_factor.info() != Eigen::Success) return result;
   const Eigen::Matrix3d prior_information = prior_factor.solve(Eigen::Matrix3d::Identity());

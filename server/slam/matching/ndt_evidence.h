@@ -17,7 +17,8 @@ struct NdtEvidenceOptions {
   double min_score = 0.5;          // Fewer explained points: not converged.
   std::int64_t min_inliers = 8;    // Nor with fewer explained points than this.
   double information_share = 0.5;  // Of the Hessian that counts; smaller: more cautious. See InformationOf.
-  double degenerate_ratio = 0.02;  // Weakest over strongest hold on translation below which it is a corridor.
+  double degenerate_ratio = 0.03;  // Weakest over strongest hold on translation below which it is a corridor.
+  double open_sigma_m = 0.05;      // At least, along the open direction. Measured on duke-loop5: 0.045 m a scan.
 };
 void Visit(OptionVisitor& visitor, NdtEvidenceOptions& options);
 

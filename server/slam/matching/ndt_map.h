@@ -17,9 +17,9 @@
 namespace cairn::slam {
 
 struct NdtMapOptions {
-  double cell_m = 1.0;         // Larger: found from farther off, but coarser (thesis C 5.1.3 takes 4 m in a mine).
+  double cell_m = 1.0;          // Larger: found from farther off, but coarser (thesis C 5.1.3 takes 4 m in a mine).
   std::int64_t min_points = 3;  // Fewer in a cell make no distribution.
-  double min_flatness = 1e-3;  // Least ratio of the variances across and along: a wall is never thinner than that.
+  double min_flatness = 1e-3;   // Least ratio of the variances across and along: a wall is never thinner than that.
 };
 void Visit(OptionVisitor& visitor, NdtMapOptions& options);
 

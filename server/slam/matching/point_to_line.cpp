@@ -12,6 +12,7 @@ namespace {
 // Normal equations of the linearised point-to-line errors at one pose, with what the pairs look like.
 struct Linearisation {
   Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d H_surfaces = Eigen::Matrix3d::Zero();  // Of the pairs with a surface direction alone.
   Eigen::Vector3d g = Eigen::Vector3d::Zero();
   int pairs = 0;
   int inliers = 0;
@@ -46,6 +47,7 @@ Linearisation Linearise(std::span<const SurfacePoint> points_robot, const PointI
     const double weight = trust / (1.0 + (residual / scale) * (residual / scale));  // Cauchy.
     const Eigen::Vector3d J(normal.x(), normal.y(), normal.dot(Eigen::Vector2d(-turned.y(), turned.x())));
     sum.H.noalias() += weight * J * J.transpose();
+    if (nearest->smooth()) sum.H_surfaces.noalias() += weight * J * J.transpose();
     sum.g.noalias() += weight * residual * J;
     ++sum.pairs;
     if (std::abs(residual) < options.inlier_distance_m) ++sum.inliers;
@@ -118,7 +120,8 @@ MatchResult AlignPointsToSurfaces(std::span<const SurfacePoint> points_robot, co
   result.converged = true;
   result.covariance = (per_point * sum.H + prior_information).llt().solve(Eigen::Matrix3d::Identity());
   result.covariance = 0.5 * (result.covariance + result.covariance.transpose()).eval();
-  JudgeDegeneracy(sum.H, options.degenerate_ratio, result);
+  // A rough point holds in every direction by its nature; only surfaces tell whether the place does.
+  JudgeDegeneracy(sum.H_surfaces, options.degenerate_ratio, result);
   return result;
 }
 

@@ -33,7 +33,9 @@ void Visit(OptionVisitor& visitor, MatcherOptions& options) {
   visitor.Section("ndt_de", "Normal distributions, searched by differential evolution.",
                   [&] { Visit(visitor, options.ndt_de); });
   visitor.Section("line_lsq", "Least squares over pairs of lines.", [&] { Visit(visitor, options.line_lsq); });
+  visitor.Section("hough", "Correlation in the Hough domain.", [&] { Visit(visitor, options.hough); });
   visitor.Section("icp", "Points on surfaces, scan to scan.", [&] { Visit(visitor, options.icp); });
+  visitor.Section("correlative", "Every motion in a window.", [&] { Visit(visitor, options.correlative); });
 }
 
 MatchResult MatchScans(const ScanView& prev, const ScanView& curr, const MatchPrior& prior, MatcherKind kind,
@@ -44,7 +46,7 @@ MatchResult MatchScans(const ScanView& prev, const ScanView& curr, const MatchPr
     case MatcherKind::kLineLsq:
       return MatchByLineLsq(prev.features, curr.features, prior, options.line_lsq);
     case MatcherKind::kHough:
-      return Unmatched(prior);
+      return MatchByHough(prev, curr, prior, options.hough, parallel_for);
     case MatcherKind::kNdt:
       return MatchByNdt(prev, curr, prior, options.ndt, parallel_for);
     case MatcherKind::kNdtDe:
@@ -52,7 +54,7 @@ MatchResult MatchScans(const ScanView& prev, const ScanView& curr, const MatchPr
     case MatcherKind::kIcp:
       return MatchByIcp(prev, curr, prior, options.icp);
     case MatcherKind::kCorrelative:
-      return Unmatched(prior);
+      return MatchByCorrelation(prev, curr, prior, options.correlative, parallel_for);
   }
   return Unmatched(prior);
 }

@@ -11,6 +11,8 @@
 
 #include "common/options/option_visitor.h"
 #include "server/slam/match_result.h"
+#include "server/slam/matching/correlative.h"
+#include "server/slam/matching/hough.h"
 #include "server/slam/matching/icp.h"
 #include "server/slam/matching/line_lsq.h"
 #include "server/slam/matching/match_prior.h"
@@ -27,12 +29,19 @@ enum class MatcherKind : std::uint8_t { kVoting = 0, kLineLsq, kHough, kNdt, kNd
 [[nodiscard]] std::span<const std::string_view> MatcherNames();
 [[nodiscard]] std::string_view MatcherName(MatcherKind kind);
 
+// Whether a matcher looks so far around the prior that starting it elsewhere finds nothing new.
+[[nodiscard]] constexpr bool SearchesWide(MatcherKind kind) {
+  return kind == MatcherKind::kHough || kind == MatcherKind::kNdtDe;
+}
+
 struct MatcherOptions {
   VotingOptions voting;
   NdtOptions ndt;
   NdtDeOptions ndt_de;
   LineLsqOptions line_lsq;
+  HoughOptions hough;
   PointToLineOptions icp;
+  CorrelativeOptions correlative;
 };
 void Visit(OptionVisitor& visitor, MatcherOptions& options);
 

@@ -1,4 +1,5 @@
-// The bare positions of a scan's points, for matchers that do not use surface directions. In the robot frame of the scan.
+// The bare positions of a scan's points, for matchers that do not use surface directions. In the robot frame of the
+// scan.
 #pragma once
 
 #include <vector>

@@ -51,6 +51,25 @@ Eigen::Vector2d NormalOf(const std::vector<BeamPoint>& hits, std::size_t first, 
   return normal;
 }
 
+// A wall seen at a grazing angle: hits of neighbouring beams lie far apart, yet on one line.
+Eigen::Vector2d GrazingNormalOf(const std::vector<BeamPoint>& hits, std::size_t centre, const Eigen::Vector2d& p_sensor,
+                                const SurfaceOptions& options) {
+  constexpr std::size_t kReach = 2;  // Beams on either side.
+  std::size_t first = centre, last = centre;
+  while (first > 0 && centre - first < kReach && hits[first].beam - hits[first - 1].beam == 1) --first;
+  while (last + 1 < hits.size() && last - centre < kReach && hits[last + 1].beam - hits[last].beam == 1) ++last;
+  if (last - first < 3) return Eigen::Vector2d::Zero();
+  const Eigen::Vector2d along = (hits[last].p_robot - hits[first].p_robot).normalized();
+  const Eigen::Vector2d across(-along.y(), along.x());
+  for (std::size_t i = first; i < last; ++i) {
+    const Eigen::Vector2d step = hits[i + 1].p_robot - hits[i].p_robot;
+    if (step.norm() > options.grazing_gap_m || step.dot(along) < 0.0) return Eigen::Vector2d::Zero();
+    if (std::abs(across.dot(hits[i].p_robot - hits[first].p_robot)) > options.grazing_flat_m)
+      return Eigen::Vector2d::Zero();
+  }
+  return across.dot(p_sensor - hits[centre].p_robot) < 0 ? Eigen::Vector2d(-across) : across;
+}
+
 }  // namespace
 
 void Visit(OptionVisitor& visitor, SurfaceOptions& options) {
@@ -62,6 +81,9 @@ void Visit(OptionVisitor& visitor, SurfaceOptions& options) {
                "A larger jump between neighbouring beams ends the surface.");
   visitor.Real("max_flatness", options.max_flatness, "1", 0.001, 1.0,
                "Spread across over spread along (squared) above which a point has no direction.");
+  visitor.Real("grazing_gap_m", options.grazing_gap_m, "m", 0.0, 20.0,
+               "Hits of neighbouring beams farther apart are not on one wall, however well they line up.");
+  visitor.Real("grazing_flat_m", options.grazing_flat_m, "m", 0.0, 1.0, "... and how well they must line up.");
 }
 
 std::vector<SurfacePoint> SurfacePointsOf(std::span<const BeamPoint> points, const Scan& scan,
@@ -75,7 +97,9 @@ std::vector<SurfacePoint> SurfacePointsOf(std::span<const BeamPoint> points, con
   for (std::size_t i = 0; i < hits.size(); ++i) {
     if (!surface.empty() && (hits[i].p_robot - surface.back().p).norm() < options.min_spacing_m) continue;
     const auto [first, last] = Neighbourhood(hits, i, step, options);
-    surface.push_back({hits[i].p_robot, NormalOf(hits, first, last, p_sensor, options.max_flatness)});
+    Eigen::Vector2d normal = NormalOf(hits, first, last, p_sensor, options.max_flatness);
+    if (normal.isZero()) normal = GrazingNormalOf(hits, i, p_sensor, options);
+    surface.push_back({hits[i].p_robot, normal});
   }
   return surface;
 }

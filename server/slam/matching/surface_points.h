@@ -26,6 +26,8 @@ struct SurfaceOptions {
   double neighbour_span_m = 0.15;  // Neighbours within it tell the normal; larger: smoother, rounds corners.
   double neighbour_gap_m = 0.35;   // A larger jump between neighbouring beams ends the surface (grows with range).
   double max_flatness = 0.12;      // Ratio of the spreads across and along above which there is no normal.
+  double grazing_gap_m = 2.0;      // Hits of neighbouring beams this far apart can still be on one wall ...
+  double grazing_flat_m = 0.04;    // ... if they line up this well. Without, the far ends of corridors hold the robot.
 };
 void Visit(OptionVisitor& visitor, SurfaceOptions& options);
 

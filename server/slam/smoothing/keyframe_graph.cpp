@@ -7,7 +7,7 @@
 
 namespace cairn::slam {
 
-void KeyframeGraph::Append(const Pose2& T_prev_curr) {
+void KeyframeGraph::Append(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) {
   const std::size_t node = travelled_m_.size();
   loops_.emplace_back();
   if (node == 0) {
@@ -15,7 +15,7 @@ void KeyframeGraph::Append(const Pose2& T_prev_curr) {
     return;
   }
   travelled_m_.push_back(travelled_m_.back() + T_prev_curr.translation().norm());
-  relations_.push_back({node - 1, node, T_prev_curr, drift_.Covariance(T_prev_curr), false});
+  relations_.push_back({node - 1, node, T_prev_curr, drift_.Covariance(T_prev_curr) + covariance_prev, false});
 }
 
 void KeyframeGraph::AddLoop(std::size_t from, std::size_t to, const Pose2& T_from_to,

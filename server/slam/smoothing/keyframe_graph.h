@@ -16,8 +16,9 @@ class KeyframeGraph {
   // `drift` is how far a matched step is trusted.
   explicit KeyframeGraph(const MotionNoise& drift) : drift_(drift) {}
 
-  // The next keyframe, seen from the one before (ignored for the first).
-  void Append(const Pose2& T_prev_curr);
+  // The next keyframe, seen from the one before (ignored for the first). `covariance_prev`: of the step, in the frame
+  // it starts from, besides the drift.
+  void Append(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev);
   // Keyframe `to` was recognised from keyframe `from`. REQUIRES: both exist.
   void AddLoop(std::size_t from, std::size_t to, const Pose2& T_from_to, const Eigen::Matrix3d& covariance);
 

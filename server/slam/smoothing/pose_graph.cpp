@@ -9,6 +9,9 @@
 namespace cairn::slam {
 namespace {
 
+// Of the loss, step by step.
+constexpr std::array<double, 3> kWidenings = {100.0, 10.0, 1.0};
+
 using RowMajor3 = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
 class RelationCost final : public ceres::SizedCostFunction<3, 3, 3> {
@@ -62,13 +65,20 @@ PoseGraphSummary OptimisePoses(std::vector<Pose2>& poses, std::span<const PoseRe
   blocks.reserve(poses.size());
   for (const Pose2& pose : poses) blocks.push_back({pose.x, pose.y, pose.theta});
 
-  ceres::Problem problem;
+  // One loss for all loops, so that narrowing it is one assignment.
+  ceres::LossFunctionWrapper loop_loss(nullptr, ceres::TAKE_OWNERSHIP);
+  ceres::Problem::Options ownership;
+  ownership.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ceres::Problem problem(ownership);
   for (const PoseRelation& relation : relations) {
-    problem.AddResidualBlock(new RelationCost(relation),  // The problem owns both.
-                             relation.loop ? new ceres::CauchyLoss(options.loop_loss) : nullptr,
-                             blocks[relation.from].data(), blocks[relation.to].data());
+    problem.AddResidualBlock(new RelationCost(relation),  // The problem owns it.
+                             relation.loop ? &loop_loss : nullptr, blocks[relation.from].data(),
+                             blocks[relation.to].data());
   }
   if (problem.HasParameterBlock(blocks[0].data())) problem.SetParameterBlockConstant(blocks[0].data());
+  const auto narrow_to = [&](double widening) {
+    loop_loss.Reset(new ceres::CauchyLoss(widening * options.loop_loss), ceres::TAKE_OWNERSHIP);
+  };
 
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
@@ -79,13 +89,18 @@ PoseGraphSummary OptimisePoses(std::vector<Pose2>& poses, std::span<const PoseRe
   solver.max_trust_region_radius = 1e16;
   solver.num_threads = 1;
   solver.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  ceres::Solve(solver, &problem, &summary);
 
-  result.cost_before = summary.initial_cost;
-  result.cost_after = summary.final_cost;
-  result.iterations = static_cast<int>(summary.iterations.size());
-  result.usable = summary.IsSolutionUsable() && summary.final_cost <= summary.initial_cost;
+  narrow_to(1.0);
+  problem.Evaluate({}, &result.cost_before, nullptr, nullptr, nullptr);
+  for (const double widening : kWidenings) {
+    narrow_to(widening);
+    ceres::Solver::Summary summary;
+    ceres::Solve(solver, &problem, &summary);
+    if (!summary.IsSolutionUsable()) return result;
+    result.iterations += static_cast<int>(summary.iterations.size());
+    result.cost_after = summary.final_cost;
+  }
+  result.usable = result.cost_after <= result.cost_before;
   if (!result.usable) return result;
   for (std::size_t k = 0; k < poses.size(); ++k) poses[k] = {blocks[k][0], blocks[k][1], WrapAngle(blocks[k][2])};
   return result;

@@ -2,10 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <random>
 #include <thread>
 
-#include "tests/server/slam/worlds.h"
+#include "tests/server/slam/ring_world.h"
 
 namespace cairn::slam {
 namespace {
@@ -82,6 +83,45 @@ TEST(Mapper, FollowsTheRobotTwiceRoundALoop) {
   EXPECT_LT(run.worst_m, 0.25);
 }
 
+// A robot that drives 3 m blind, with slipping wheels, comes back to its start some metres off; what follows
+// from the loop reaches the pose, the path and, some scans later, the map.
+TEST(Mapper, ClosesALargeLoopAndDrawsTheMapAgain) {
+  const test::World world = test::RingCorridor(true);
+  const Laser laser{.beams = 181, .step_rad = Radians(1.0), .range_max_m = 12.0};
+  Drive drive;
+  Pose2 truth, odometry;
+  double way_m = 0.0;
+  for (const Pose2& step : test::RingSteps(140.0, 0.25)) {
+    const bool blind = way_m > 70.0 && way_m < 73.0;
+    Scan scan = Look(world, truth, laser);
+    if (blind) scan.ranges_m.assign(scan.ranges_m.size(), std::numeric_limits<float>::infinity());
+    scan.stamp = static_cast<Stamp>(drive.scans.size() + 1) * 100'000'000;
+    drive.scans.push_back(std::make_shared<const Scan>(std::move(scan)));
+    drive.odometry.push_back(odometry);
+    drive.truth.push_back(truth);
+    truth = truth * step;
+    odometry = odometry * Pose2{(blind ? 1.6 : 1.0) * step.x, 0, step.theta};
+    way_m += step.x;
+  }
+  const auto run = [&](bool loops) {
+    MapperOptions options;
+    options.filter.particles = 50;
+    options.loop.enabled = loops;
+    options.filter.back_end.landmarks.enabled = false;  // They alone would nearly do here.
+    Mapper mapper(options, {}, 1);
+    ScanOutcome outcome;
+    for (std::size_t i = 0; i < drive.scans.size(); ++i)
+      outcome = mapper.Process(drive.scans[i], drive.odometry[i], SerialFor);
+    const double error_m = (outcome.T_map_robot.translation() - drive.truth.back().translation()).norm();
+    return std::pair{error_m, mapper.grid().OccupancyAt({20.0, 0.0})};
+  };
+  const auto [without, unused] = run(false);
+  const auto [with, middle_of_first_side] = run(true);
+  EXPECT_GT(without, 1.0) << "the drift must need correcting";
+  EXPECT_LT(with, 0.3);
+  EXPECT_LT(middle_of_first_side, 50);
+}
+
 TEST(Mapper, TheFullPathHasAPoseForEveryScan) {
   const Drive drive = DriveRound();
   const MapperRun run = RunMapper(drive, SerialFor);
@@ -103,6 +143,32 @@ TEST(Mapper, SameInputSameOutputWhateverTheThreads) {
   ASSERT_EQ(serial.online.size(), parallel.online.size());
   for (std::size_t i = 0; i < serial.online.size(); ++i)
     ASSERT_EQ(serial.online[i].T_map_robot, parallel.online[i].T_map_robot);
+}
+
+// Thesis A 3.5.13: rotation from the walls, way along from the odometry; no jump, and the pose says so.
+TEST(Mapper, FollowsOdometryAlongABareCorridorAndSaysSo) {
+  test::World corridor;
+  corridor.Add({{-100, 1}, {100, 1}}).Add({{-100, -1}, {100, -1}});
+  MapperOptions options;
+  options.filter.particles = 20;
+  Mapper mapper(options, {}, 1);
+  int degenerate = 0;
+  double worst_step_m = 0.0;
+  Pose2 before;
+  constexpr int kSteps = 200;
+  for (int i = 0; i < kSteps; ++i) {
+    const Pose2 truth{0.1 * i, 0.1 * std::sin(0.1 * i), 0.1 * std::cos(0.1 * i) - 0.1};
+    auto scan = std::make_shared<Scan>(Look(corridor, truth, Laser{.beams = 361, .step_rad = Radians(0.5)}));
+    scan->stamp = i + 1;
+    const ScanOutcome outcome = mapper.Process(std::move(scan), truth, SerialFor);
+    degenerate += outcome.reason == PoseReason::kDegenerate ? 1 : 0;
+    EXPECT_NEAR(outcome.T_map_robot.y, truth.y, 0.1);
+    if (i > 0) worst_step_m = std::max(worst_step_m, (outcome.T_map_robot.translation() - before.translation()).norm());
+    before = outcome.T_map_robot;
+  }
+  EXPECT_GT(degenerate, kSteps * 9 / 10);
+  EXPECT_LT(worst_step_m, 0.3);
+  EXPECT_NEAR(before.x, 0.1 * (kSteps - 1), 1.0);
 }
 
 TEST(Mapper, StandingStillAddsNoKeyframes) {

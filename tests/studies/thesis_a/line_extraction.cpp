@@ -83,11 +83,9 @@ bool StudyLineExtraction(StudyContext& context) {
   report.Heading("Line extraction (2.1.1, Table 2.1; 3.3)");
   report.Text(
       "Simulated scans from random places on the robots' routes. A wall counts as visible where a perfect scan hits it "
-      "at least "
-      "9 times over 0.5 m; a line is right where it shows any wall of the world. The printed row comes from real scans "
-      "of an "
-      "office, judged by hand (Nguyen et al. 2005): not the same yardstick. Worlds with furniture and pillars are the "
-      "harder ones.");
+      "at least 9 times over 0.5 m; a line is right where it shows any wall of the world. The printed row comes from "
+      "real scans of an office, judged by hand (Nguyen et al. 2005): not the same yardstick. Worlds with furniture and "
+      "pillars are the harder ones.");
   Table table({"scans", "world", "beams", "sigma range (cm)", "lines/100 scans", "true pos.", "false pos.",
                "sigma r (cm)", "sigma alpha (deg)", "speed (Hz)"});
   table.Add({"thesis, Table 2.1", "real office", "181", "-", "641", "86.0 %", "8.9 %", "1.95", "0.74", "1470"});

@@ -69,8 +69,10 @@ bool SweepLog(StudyContext& context, const StudyLog& log, bool lines_only) {
     Trials mean_s, max_s, online_m, online_deg, full_m, full_deg;
     for (int seed = 0; seed < seeds; ++seed) {
       std::vector<std::string> assignments{"slam.particles=" + Count(printed.particles)};
-      if (lines_only)
-        assignments.insert(assignments.end(), {"slam.front_end.refine.enabled=false", "slam.revisit.enabled=false"});
+      if (lines_only) {
+        const std::vector<std::string> pure = LinesOnly();
+        assignments.insert(assignments.end(), pure.begin(), pure.end());
+      }
       const auto options = MapperWith(assignments, context.seed + static_cast<std::uint64_t>(seed));
       if (!options) {
         report.Warn(options.error().message);

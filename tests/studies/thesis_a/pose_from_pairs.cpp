@@ -141,11 +141,9 @@ bool StudyPoseFromPairs(StudyContext& context) {
   report.Heading("Rotation and translation from matched lines (3.5.12.2, 3.5.12.3)");
   report.Text(
       "Two simulated scans of 181 beams, up to 0.3 m and 15 deg apart, ranges of 1 cm noise, odometry wrong by about 3 "
-      "cm and 2 "
-      "deg; worlds `room`, `building`, `office`. Every way starts from the same pairs the vote selected, wrong ones "
-      "included. The "
-      "thesis argues (Figure 3.29) that distance vectors between lines beat corner points, whose place suffers from "
-      "the lines' slopes.");
+      "cm and 2 deg; worlds `room`, `building`, `office`. Every way starts from the same pairs the vote selected, "
+      "wrong ones included. The thesis argues (Figure 3.29) that distance vectors between lines beat corner points, "
+      "whose place suffers from the lines' slopes.");
   Samples rotations, translations;
   int unmatched = 0;
   const int pairs = context.Pick(1500, 200);

@@ -2,12 +2,17 @@
 // its section to the report and returns whether its figures are plausible.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "tests/studies/logs.h"
 #include "tests/studies/study.h"
 
 namespace cairn::studies {
+
+// What makes the estimator the thesis' own: the voting matcher's answer is the step, no refinement, no revisits, no
+// large loops; landmarks are all a filter sees. Assignments for MapperWith.
+[[nodiscard]] std::vector<std::string> LinesOnly();
 
 // 2.1.1, Table 2.1: true and false positives and the spread of r and alpha of extracted lines, on simulated scans.
 [[nodiscard]] bool StudyLineExtraction(StudyContext& context);

@@ -76,6 +76,21 @@ TEST_F(CairnProgram, SaysWhenThereIsNoServer) {
   }
 }
 
+TEST_F(CairnProgram, ARobotThatNodsIsMappedAndItsCloudLiesOnTheWalls) {
+  ASSERT_NO_FATAL_FAILURE(StartServer());
+  const auto sim =
+      MustJson({"sim",  "--robots",      "1",      "--world",         "hall3d",      "--seconds", "14",     "--hz",
+                "5",    "--laser-model", "lms200", "--nod=-60,40,20", "--nod-every", "30",        "--fast", "--site",
+                "hall", "--first-stamp", "1000",   "--log-dir",       File("")});
+  EXPECT_EQ(sim["robots"][0]["unexplained"], 0);
+  EXPECT_EQ(sim["robots"][0]["used"], 70) << "tilted scans are used too: they get poses";
+  const auto cloud = MustJson({"cloud", "export", File("robot1.log"), "--robot", "robot1", "--height", "0.4", "-o",
+                               File("hall.ply"), "--truth-world", "hall3d"});
+  EXPECT_EQ(cloud["scans_without_pose"], 0);
+  EXPECT_GE(cloud["scans_tilted"], 20);
+  EXPECT_LT(cloud["wall_error_m"]["mean"], 0.02);
+}
+
 TEST_F(CairnProgram, AFleetIsMappedAndEveryScanExplained) {
   ASSERT_NO_FATAL_FAILURE(StartServer());
   const auto report = StreamFleet();

@@ -45,7 +45,6 @@ TEST(Ndt, TheBasinIsAThirdOfACellAndTenDegrees) {
     }
   }
   EXPECT_GE(home, tried - 2) << home << " of " << tried;
-  printf("HOME %d NEES\n", home);
 }
 
 // Noise of 1.5 cm on every range, 200 pairs: the errors are as large as the covariance says, on average.
@@ -66,7 +65,6 @@ TEST(Ndt, TheCovarianceFitsTheErrors) {
     nees += error.dot(match.covariance.llt().solve(error)) / kPairs;
   }
   // Three for a perfect covariance. Ours is one number for all scenes: within a factor of two.
-  printf("NEES %f\n", nees);
   EXPECT_GT(nees, 1.5);
   EXPECT_LT(nees, 6.0);
 }

@@ -1,0 +1,44 @@
+#include "client/sim/scene.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace cairn::sim {
+namespace {
+
+constexpr double kUpright = 1e-9;  // Horizontal share of a direction below which it has no shadow.
+
+}  // namespace
+
+double FlatScene::Cast(const Eigen::Vector3d& origin_map, const Eigen::Vector3d& direction, double max_m) const {
+  const Eigen::Vector2d origin = origin_map.head<2>(), shadow = direction.head<2>();
+  if (direction.z() == 0.0) return walls_.Cast(origin, shadow, max_m);  // Exactly as in the plane.
+  const double share = shadow.norm();
+  if (share < kUpright) return kNothingHit;
+  return walls_.Cast(origin, shadow / share, max_m * share) / share;
+}
+
+double CastAtPost(const Post& post, const Eigen::Vector3d& origin_map, const Eigen::Vector3d& direction) {
+  const Eigen::Vector2d origin = origin_map.head<2>(), shadow = direction.head<2>();
+  const double share = direction.z() == 0.0 ? 1.0 : shadow.norm();
+  double nearest = kNothingHit;
+  if (share >= kUpright) {
+    const double range = CastAtDisc(post.disc, origin, shadow / share) / share;
+    const double height = origin_map.z() + (std::isinf(range) ? 0.0 : range * direction.z());
+    if (height >= 0.0 && height <= post.height_m) nearest = range;
+  }
+  if (direction.z() < 0.0 && origin_map.z() > post.height_m) {
+    const double range = (post.height_m - origin_map.z()) / direction.z();
+    if ((origin + range * shadow - post.disc.center_map).norm() <= post.disc.radius_m)
+      nearest = std::min(nearest, range);
+  }
+  return nearest;
+}
+
+double CastAtPosts(std::span<const Post> posts, const Eigen::Vector3d& origin_map, const Eigen::Vector3d& direction) {
+  double nearest = kNothingHit;
+  for (const Post& post : posts) nearest = std::min(nearest, CastAtPost(post, origin_map, direction));
+  return nearest;
+}
+
+}  // namespace cairn::sim

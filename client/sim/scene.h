@@ -1,0 +1,56 @@
+// What a laser's rays can hit in a world: what stands still (a scene), and what moves (posts). A scene is flat, with
+// walls of any height and no floor, or made of rectangles in space. Frame: `map`, metres, z up. Immutable, thread-safe.
+#pragma once
+
+#include <limits>
+#include <memory>
+#include <span>
+
+#include "client/sim/rectangle_tree.h"
+#include "client/sim/world.h"
+
+namespace cairn::sim {
+
+class Scene {
+ public:
+  virtual ~Scene() = default;
+  // Distance along the ray (`direction` of length 1) to what stands still, within `max_m`; else kNothingHit.
+  [[nodiscard]] virtual double Cast(const Eigen::Vector3d& origin_map, const Eigen::Vector3d& direction,
+                                    double max_m) const = 0;
+};
+
+// Of a flat world's segments: a ray that rises or falls meets a wall where its shadow does.
+class FlatScene : public Scene {
+ public:
+  explicit FlatScene(const RayCaster& walls) : walls_(walls) {}
+  [[nodiscard]] double Cast(const Eigen::Vector3d& origin_map, const Eigen::Vector3d& direction,
+                            double max_m) const override;
+
+ private:
+  const RayCaster& walls_;  // Outlives the scene.
+};
+
+class SolidScene : public Scene {
+ public:
+  explicit SolidScene(std::vector<Rectangle> rectangles) : tree_(std::move(rectangles)) {}
+  [[nodiscard]] double Cast(const Eigen::Vector3d& origin_map, const Eigen::Vector3d& direction,
+                            double max_m) const override {
+    return tree_.Cast(origin_map, direction, max_m);
+  }
+
+ private:
+  RectangleTree tree_;
+};
+
+// An upright cylinder that stands on the floor: a person, a robot, a pillar of a flat world.
+struct Post {
+  Disc disc;
+  double height_m = std::numeric_limits<double>::infinity();
+};
+
+// Distance along the ray to the post's side or top; kNothingHit where it misses or starts inside.
+[[nodiscard]] double CastAtPost(const Post& post, const Eigen::Vector3d& origin_map, const Eigen::Vector3d& direction);
+[[nodiscard]] double CastAtPosts(std::span<const Post> posts, const Eigen::Vector3d& origin_map,
+                                 const Eigen::Vector3d& direction);
+
+}  // namespace cairn::sim

@@ -1,0 +1,51 @@
+// Gathers a cloud from scans and the path a robot took: each scan is placed at the path's pose at its stamp, between
+// two poses that are near enough in time. Thinned to one point per cube of `voxel_m`, so memory grows with what was
+// seen, not with how long. Bounded. Deterministic. Not thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <unordered_set>
+
+#include "common/cloud/scan_points3.h"
+#include "common/sensor/trajectory.h"
+#include "common/status.h"
+
+namespace cairn {
+
+struct CloudOptions {
+  double height_m = 0.0;                 // Of the scanner above the floor.
+  double max_range_m = 1e4;              // Farther hits are left out.
+  double voxel_m = 0.0;                  // 0: every point is kept.
+  double max_pose_gap_s = 1.0;           // Between the two poses around a scan; more: the scan has no place.
+  bool tilted_only = false;              // Leave out level scans.
+  std::size_t max_points = 100'000'000;  // 1.2 GB.
+};
+[[nodiscard]] Result<void> Validate(const CloudOptions& options);
+
+class CloudBuilder {
+ public:
+  // Both must be valid; the path is kept by reference and must outlive the builder.
+  CloudBuilder(const Trajectory& path, const CloudOptions& options);
+
+  // Scans that are not valid, or stand where the path has no pose, are counted and left out. kResourceExhausted beyond
+  // max_points.
+  [[nodiscard]] Result<void> Add(const Scan& scan);
+
+  [[nodiscard]] const PointCloud& cloud() const { return cloud_; }
+  [[nodiscard]] std::int64_t scans_used() const { return used_; }
+  [[nodiscard]] std::int64_t scans_tilted() const { return tilted_; }  // Of those used.
+  [[nodiscard]] std::int64_t scans_level() const { return level_; }    // Left out by tilted_only.
+  [[nodiscard]] std::int64_t scans_invalid() const { return invalid_; }
+  [[nodiscard]] std::int64_t scans_without_pose() const { return without_pose_; }
+
+ private:
+  void Thin(std::size_t first);
+
+  const Trajectory& path_;
+  const CloudOptions options_;
+  PointCloud cloud_;
+  std::unordered_set<std::uint64_t> taken_;  // Cubes that have their point.
+  std::int64_t used_ = 0, tilted_ = 0, level_ = 0, invalid_ = 0, without_pose_ = 0;
+};
+
+}  // namespace cairn

@@ -1,0 +1,154 @@
+#include "server/slam/filters/particle_set.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "server/slam/filters/revisit_innovation.h"
+#include "server/slam/motion/dead_reckoning.h"
+
+namespace cairn::slam {
+ParticleSet::ParticleSet(const FastSlamOptions& options, double max_nis, std::int64_t count,
+                         const Pose2& T_map_robot_start, std::uint64_t seed)
+    : options_(options), max_nis_(max_nis), rng_(seed), particles_(static_cast<std::size_t>(count)) {
+  for (Particle& particle : particles_) particle.T_map_robot = T_map_robot_start;
+  effective_ = static_cast<double>(particles_.size());
+  estimate_.T_map_robot = T_map_robot_start;
+}
+
+void ParticleSet::Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) {
+  for (Particle& particle : particles_)
+    DeadReckon(particle.T_map_robot, particle.covariance, T_prev_curr, covariance_prev);
+  travelled_ += T_prev_curr.translation().norm();
+}
+
+void ParticleSet::PredictBySampling(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) {
+  const bool more = covariance_prev.trace() > 0.0;
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    Particle& particle = particles_[i];
+    const Pose2 before = particle.T_map_robot;
+    particle.T_map_robot = SampleMotion(before, T_prev_curr, options_.motion, rng_);
+    if (!more) continue;
+    const Eigen::Matrix3d J = J_compose_right(before, T_prev_curr);
+    particle.covariance = J * covariance_prev * J.transpose();
+    Sample(i);
+  }
+}
+
+bool ParticleSet::Observe(const RevisitObservation& revisit) {
+  std::vector<Innovation<3>> innovations;
+  innovations.reserve(particles_.size());
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const Particle& particle : particles_) {
+    innovations.push_back(InnovateRevisit(particle.path[revisit.keyframe], particle.T_map_robot, revisit));
+    nearest = std::min(nearest, Nis<3>(innovations.back().v, innovations.back().S(particle.covariance)));
+  }
+  if (!(nearest < max_nis_)) return false;
+  MixtureInnovation<3> mixture;
+  const std::vector<double> before = weights();
+  for (std::size_t i = 0; i < particles_.size(); ++i)
+    mixture.Add(before[i], innovations[i].v, innovations[i].S(particles_[i].covariance));
+  Judge(mixture);
+  for (std::size_t i = 0; i < particles_.size(); ++i) Fuse<3>(i, innovations[i]);
+  sample_due_ = true;
+  return true;
+}
+
+std::vector<int> ParticleSet::Commit() {
+  if (sample_due_ || travelled_ >= options_.sample_distance_m) {
+    for (std::size_t i = 0; i < particles_.size(); ++i) Sample(i);
+    travelled_ = 0.0;
+    sample_due_ = false;
+  }
+  for (Particle& particle : particles_) particle.path.Append(particle.T_map_robot);
+  std::vector<double> left;
+  std::vector<int> parents = Resample(left);
+  Summarise(left);
+  nis_.EndStep();
+  return parents;
+}
+
+void ParticleSet::Rebase(std::span<const Pose2> path) {
+  Particle particle;
+  particle.T_map_robot = path.back();
+  particle.log_likelihood = best().log_likelihood;
+  for (const Pose2& pose : path) particle.path.Append(pose);
+  std::fill(particles_.begin(), particles_.end(), particle);
+  best_ = 0;
+  travelled_ = 0.0;
+  sample_due_ = false;
+  effective_ = static_cast<double>(particles_.size());
+  estimate_ = {particle.T_map_robot, particle.covariance};
+}
+
+void ParticleSet::Summarise(const std::vector<double>& shares) {
+  best_ = 0;
+  for (std::size_t i = 1; i < particles_.size(); ++i)
+    if (particles_[i].log_likelihood > particles_[best_].log_likelihood) best_ = i;
+  const Pose2& centre = best().T_map_robot;
+  const auto from_centre = [&](const Particle& particle) {
+    Eigen::Vector3d d = particle.T_map_robot.vector() - centre.vector();
+    d.z() = WrapAngle(d.z());
+    return d;
+  };
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  double sum = 0.0;
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    const Eigen::Vector3d d = from_centre(particles_[i]);
+    if (d.head<2>().norm() > options_.agreement_m) continue;
+    mean += shares[i] * d;
+    sum += shares[i];
+  }
+  if (sum > 0.0) mean /= sum;
+  estimate_.T_map_robot = {centre.x + mean.x(), centre.y + mean.y(), WrapAngle(centre.theta + mean.z())};
+  // Doubt is that of all of them: leaving out those that disagree would claim more than is known.
+  estimate_.covariance = best().covariance;
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    const Eigen::Vector3d d = from_centre(particles_[i]) - mean;
+    estimate_.covariance += shares[i] * d * d.transpose();
+  }
+}
+
+void ParticleSet::Sample(std::size_t index) {
+  Particle& particle = particles_[index];
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+  solver.computeDirect(particle.covariance);
+  const Eigen::Vector3d spread = solver.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+  const Eigen::Vector3d draw(NormalDraw(rng_), NormalDraw(rng_), NormalDraw(rng_));
+  const Eigen::Vector3d step = solver.eigenvectors() * spread.cwiseProduct(draw);
+  Pose2& pose = particle.T_map_robot;
+  pose = {pose.x + step.x(), pose.y + step.y(), WrapAngle(pose.theta + step.z())};
+  particle.covariance.setZero();
+}
+
+std::vector<double> ParticleSet::weights() const {
+  std::vector<double> log_weights;
+  log_weights.reserve(particles_.size());
+  for (const Particle& particle : particles_) log_weights.push_back(particle.log_weight);
+  return NormalisedWeights(log_weights);
+}
+
+// `left`: the weights of the set it leaves behind.
+std::vector<int> ParticleSet::Resample(std::vector<double>& left) {
+  left = weights();
+  effective_ = EffectiveSampleSize(left);
+  if (effective_ >= options_.resample_below * static_cast<double>(particles_.size())) return {};
+  std::vector<int> parents = StratifiedSurvivors(left, rng_);
+  std::vector<Particle> survivors;
+  survivors.reserve(particles_.size());
+  for (const int parent : parents) {
+    survivors.push_back(particles_[static_cast<std::size_t>(parent)]);
+    survivors.back().log_weight = 0.0;
+  }
+  particles_ = std::move(survivors);
+  left.assign(particles_.size(), 1.0 / static_cast<double>(particles_.size()));
+  return parents;
+}
+
+FilterHealth ParticleSet::health() const {
+  const bool finite = estimate_.T_map_robot.IsFinite() && estimate_.covariance.allFinite();
+  return {effective_, nis_.sum(), nis_.numbers(), !finite};
+}
+
+}  // namespace cairn::slam

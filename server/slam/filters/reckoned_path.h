@@ -1,0 +1,40 @@
+// A path that only adds up the steps it is given, with its uncertainty: what the filters without a belief about their
+// past go by. Poses in `map`, covariances of (x, y, theta). Not thread-safe.
+#pragma once
+
+#include <Eigen/Core>
+
+#include "server/slam/filters/filter.h"
+#include "server/slam/filters/shared_sequence.h"
+#include "server/slam/motion/motion_noise.h"
+
+namespace cairn::slam {
+
+class ReckonedPath {
+ public:
+  ReckonedPath(const MotionNoise& drift, const Pose2& T_map_robot_start) : drift_(drift), pose_(T_map_robot_start) {}
+
+  void Advance(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev);
+  void Keep() { path_.Append(pose_); }
+  // The pose by other knowledge; the path behind stays.
+  void Correct(const Pose2& T_map_robot, const Eigen::Matrix3d& covariance) {
+    pose_ = T_map_robot;
+    covariance_ = covariance;
+  }
+
+  // Squared Mahalanobis distance of a revisit (three numbers), were the steps since that keyframe all there is. Changes
+  // nothing. Linear in the keyframes since.
+  [[nodiscard]] double NisOf(const RevisitObservation& revisit) const;
+
+  [[nodiscard]] const Pose2& T_map_robot() const { return pose_; }
+  [[nodiscard]] const Eigen::Matrix3d& covariance() const { return covariance_; }
+  [[nodiscard]] const SharedSequence<Pose2>& path() const { return path_; }
+
+ private:
+  MotionNoise drift_;
+  Pose2 pose_;
+  Eigen::Matrix3d covariance_ = Eigen::Matrix3d::Zero();
+  SharedSequence<Pose2> path_;
+};
+
+}  // namespace cairn::slam

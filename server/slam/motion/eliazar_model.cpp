@@ -1,0 +1,62 @@
+#include "server/slam/motion/eliazar_model.h"
+
+#include <cmath>
+
+namespace cairn::slam {
+namespace {
+
+void VisitTerm(OptionVisitor& visitor, MotionTermModel& term) {
+  visitor.Real("mean_d", term.mean_d, "1/m", -10.0, 10.0, "Mean per metre of odometry.");
+  visitor.Real("mean_b", term.mean_b, "1/rad", -10.0, 10.0, "Mean per radian of odometry.");
+  visitor.Real("sigma_d", term.sigma_d, "1/m", 0.0, 10.0, "Standard deviation per metre of odometry.");
+  visitor.Real("sigma_b", term.sigma_b, "1/rad", 0.0, 10.0, "Standard deviation per radian of odometry.");
+  visitor.Real("floor", term.floor, "m or rad", 1e-6, 1.0, "Standard deviation of a step at rest.");
+}
+
+}  // namespace
+
+void Visit(OptionVisitor& visitor, EliazarModel& model) {
+  visitor.Section("along", "D: the way along the heading half-way through the turn.",
+                  [&] { VisitTerm(visitor, model.along); });
+  visitor.Section("across", "C: the way across it.", [&] { VisitTerm(visitor, model.across); });
+  visitor.Section("turn", "B: the turn.", [&] { VisitTerm(visitor, model.turn); });
+}
+
+Eigen::Vector3d TermsOf(const Pose2& T_prev_curr) {
+  const double c = std::cos(T_prev_curr.theta / 2), s = std::sin(T_prev_curr.theta / 2);
+  return {c * T_prev_curr.x + s * T_prev_curr.y, -s * T_prev_curr.x + c * T_prev_curr.y, T_prev_curr.theta};
+}
+
+Pose2 MotionOf(const Eigen::Vector3d& terms) {
+  // cos((B + pi)/2) is -sin(B/2): the minor axis of (4.46).
+  const double c = std::cos(terms(2) / 2), s = std::sin(terms(2) / 2);
+  return {c * terms(0) - s * terms(1), s * terms(0) + c * terms(1), WrapAngle(terms(2))};
+}
+
+OdometryStep StepOf(const Pose2& T_prev_curr_odom) {
+  const Eigen::Vector3d terms = TermsOf(T_prev_curr_odom);
+  return {terms(0), terms(2)};
+}
+
+Pose2 SampleMotion(const EliazarModel& model, const OdometryStep& step, std::mt19937_64& engine) {
+  std::normal_distribution<double> normal;
+  Eigen::Vector3d terms;
+  for (int i = 0; i < kMotionTerms; ++i) {
+    const MotionTermModel& term = model.term(i);
+    terms(i) = term.Mean(step.d, step.b) + std::sqrt(term.Variance(step.d, step.b)) * normal(engine);
+  }
+  return MotionOf(terms);
+}
+
+double LogDensity(const EliazarModel& model, const OdometryStep& step, const Eigen::Vector3d& terms) {
+  double sum = 0.0;
+  for (int i = 0; i < kMotionTerms; ++i) {
+    const MotionTermModel& term = model.term(i);
+    const double variance = term.Variance(step.d, step.b), mean = term.Mean(step.d, step.b);
+    const double error = i == 2 ? AngleDiff(terms(i), mean) : terms(i) - mean;
+    sum -= 0.5 * (error * error / variance + std::log(2 * kPi * variance));
+  }
+  return sum;
+}
+
+}  // namespace cairn::slam

@@ -1,0 +1,89 @@
+#include "client/sim/cloud_error.h"
+#include "client/sim/fleet.h"
+#include "client/sim/laser_models.h"
+#include "client/sim/shipped_worlds.h"
+#include "common/cloud/cloud_builder.h"
+#include "common/cloud/cloud_file.h"
+#include "common/sensor/log_record.h"
+#include "server/slam/scan_pipeline.h"
+#include "tests/studies/calibration/calibration.h"
+
+namespace cairn::studies {
+namespace {
+
+struct Drive {
+  std::vector<LogRecord> records;
+  Trajectory truth, estimate;
+};
+
+Drive NodThrough(const sim::FleetOptions& options, double seconds) {
+  Drive drive;
+  auto fleet = sim::Fleet::Create(sim::SurroundingsOf(*sim::OpenWorld3("hall3d")), options);
+  slam::MapperOptions mapper;
+  slam::ScanPipeline pipeline(mapper, fleet->T_map_robot_start(0), slam::SerialFor,
+                              {[&](const Scan& scan, const slam::ScanOutcome& outcome) {
+                                 drive.estimate.push_back({scan.stamp, outcome.T_map_robot});
+                               },
+                               [](const Scan&, DropReason) {}});
+  const Stamp end = options.first_stamp + StampFromSeconds(seconds);
+  for (;;) {
+    LogRecord record = fleet->Next().record;
+    if (std::visit([](const auto& value) { return value.stamp; }, record) > end) break;
+    if (const auto* odometry = std::get_if<Odometry>(&record)) pipeline.Add(*odometry);
+    if (const auto* scan = std::get_if<Scan>(&record)) pipeline.Add(std::make_shared<const Scan>(*scan));
+    drive.records.push_back(std::move(record));
+  }
+  pipeline.Finish();
+  drive.truth = fleet->truth(0);
+  return drive;
+}
+
+PointCloud CloudOf(const Drive& drive, const Trajectory& path, double height_m) {
+  CloudBuilder builder(path, {.height_m = height_m});
+  for (const LogRecord& record : drive.records)
+    if (const auto* scan = std::get_if<Scan>(&record))
+      if (!builder.Add(*scan)) break;
+  return builder.cloud();
+}
+
+}  // namespace
+
+bool StudyCloud(StudyContext& context) {
+  Report& report = context.report;
+  report.Heading("Clouds of a simulated building");
+  report.Text(
+      "A robot drives through hall3d, halts and nods its scanner from 60 deg up to 45 deg down. Distance of the "
+      "cloud's points "
+      "to the nearest true rectangle, with true poses (the laser's error alone) and with the estimator's online poses. "
+      "Bound: 3 cm on average with the estimator's.");
+  const sim::RectangleTree truth(sim::OpenWorld3("hall3d")->rectangles);
+  Table table({"scanner", "poses", "points", "mean (m)", "rms (m)", "median (m)", "p95 (m)", "max (m)"});
+  bool plausible = true;
+  for (const std::string model : {"thesis", "lms200", "lms291-s05", "urg-04lx", "urg-04lx-ug01"}) {
+    sim::FleetOptions options;
+    options.robots = 1;
+    options.seed = context.seed;
+    options.scan_hz = 5;
+    options.laser = *sim::WithModel(options.laser, model);
+    options.tilt = {
+        .scans = 36, .first_rad = Radians(-60.0), .last_rad = Radians(45.0), .level_scans = 60, .halt = true};
+    const Drive drive = NodThrough(options, context.Pick(300.0, 40.0));
+    for (const auto& [name, path] : {std::pair{"true", &drive.truth}, std::pair{"estimated", &drive.estimate}}) {
+      const PointCloud cloud = CloudOf(drive, *path, options.laser.height_m);
+      const sim::CloudError e = sim::MeasureCloud(cloud, truth);
+      table.Add({model, name, Count(static_cast<long long>(e.points)), Number(e.mean_m, 4), Number(e.rms_m, 4),
+                 Number(e.median_m, 4), Number(e.p95_m, 4), Number(e.max_m, 3)});
+      if (model == "lms200" && path == &drive.estimate) {
+        plausible = plausible && e.mean_m < 0.03;
+        if (!report.directory().empty())
+          if (const auto written = WriteCloud(cloud, CloudFormat::kPly, report.directory() / "hall3d.ply"); !written)
+            report.Warn(written.error().message);
+      }
+    }
+  }
+  report.Add(table, "cloud");
+  if (!plausible) report.Warn("the cloud lies farther from the walls than stated");
+  return plausible;
+}
+
+}  // namespace cairn::studies

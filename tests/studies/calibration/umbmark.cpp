@@ -1,0 +1,65 @@
+#include <cmath>
+#include <random>
+
+#include "server/slam/motion/square_run.h"
+#include "tests/studies/calibration/calibration.h"
+
+namespace cairn::studies {
+
+bool StudyUmbmark(StudyContext& context) {
+  Report& report = context.report;
+  report.Heading("UMBmark: wheel errors from square runs");
+  report.Text(
+      "Five runs each way round a square of 4 m, slip of 2 mm after 1 m; mean and spread of what is recovered. The "
+      "bound is "
+      "0.001 on E_d and 0.004 on E_b for the mean error, and a corrected robot must not miss its start by more than "
+      "perfect wheels do through slip alone (first row, plus a tenth).");
+  Table table({"injected E_d", "E_b", "recovered E_d", "+-", "E_b", "+-", "E_sys (m)", "after correction (m)"});
+  const slam::UmbmarkOptions square;
+  const int trials = context.Pick(500, 50);
+  bool plausible = true;
+  double by_slip = 0.0;  // E_sys of perfect wheels: no calibration from as many runs can do better.
+  Series before_cw{.label = "clockwise", .mark = Mark::kPoints},
+      before_ccw{.label = "counter-clockwise", .mark = Mark::kPoints};
+  for (const slam::WheelErrors injected :
+       {slam::WheelErrors{1.0, 1.0}, {1.003, 1.0}, {1.0, 1.01}, {1.006, 0.985}, {0.99, 1.02}}) {
+    double d = 0, dd = 0, b = 0, bb = 0, sys = 0, after = 0;
+    for (int trial = 0; trial < trials; ++trial) {
+      std::mt19937_64 engine(context.seed + static_cast<std::uint64_t>(trial));
+      slam::SquareRunOptions run;
+      run.errors = injected;
+      std::vector<slam::SquareRun> runs;
+      for (int i = 0; i < 10; ++i) runs.push_back(SimulateSquareRun(i % 2 == 0, run, square, engine));
+      const auto result = EvaluateUmbmark(runs, square);
+      if (!result) continue;
+      if (injected.E_d == 1.006 && trial < 4)
+        for (const slam::SquareRun& r : runs) {
+          Series& series = r.clockwise ? before_cw : before_ccw;
+          series.x.push_back(ReturnError(r).x);
+          series.y.push_back(ReturnError(r).y);
+        }
+      d += result->errors.E_d / trials, dd += std::pow(result->errors.E_d - injected.E_d, 2) / trials;
+      b += result->errors.E_b / trials, bb += std::pow(result->errors.E_b - injected.E_b, 2) / trials;
+      sys += result->E_sys_m / trials;
+      // The corrected robot: what is left of the true errors after the correction.
+      const slam::WheelErrors left{injected.E_d / result->errors.E_d, injected.E_b / result->errors.E_b};
+      after += std::max(SquareEnd(true, left, square).translation().norm(),
+                        SquareEnd(false, left, square).translation().norm()) /
+               trials;
+    }
+    table.Add({Number(injected.E_d, 4), Number(injected.E_b, 4), Number(d, 5), Number(std::sqrt(dd), 5), Number(b, 5),
+               Number(std::sqrt(bb), 5), Number(sys, 3), Number(after, 3)});
+    plausible = plausible && std::abs(d - injected.E_d) < 0.001 && std::abs(b - injected.E_b) < 0.004;
+    if (injected.E_d == 1.0 && injected.E_b == 1.0) by_slip = sys;
+    plausible = plausible && after < 1.1 * by_slip;
+  }
+  report.Add(table, "umbmark");
+  Plot plot{.title = "Return errors, E_d = 1.006, E_b = 0.985", .x = {"x", "m"}, .y = {"y", "m"}};
+  plot.series = {before_cw, before_ccw};
+  plot.equal_scale = true;
+  report.Add(plot, "umbmark-runs");
+  if (!plausible) report.Warn("UMBmark does not recover what was injected within the stated bounds");
+  return plausible;
+}
+
+}  // namespace cairn::studies

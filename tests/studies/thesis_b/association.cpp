@@ -1,0 +1,210 @@
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/slam/features/feature_extraction.h"
+#include "server/slam/matching/line_lsq.h"
+#include "tests/studies/scene.h"
+#include "tests/studies/stopwatch.h"
+#include "tests/studies/thesis_b/thesis_b.h"
+
+namespace cairn::studies {
+namespace {
+
+using slam::LineFeature;
+using slam::ScanFeatures;
+
+struct CorridorPair {
+  ScanFeatures prev, curr;
+  Pose2 T_prev_curr;
+  Pose2 T_map_prev;
+};
+
+CorridorPair DrawPair(const Scene& scene, sim::Random& random) {
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  for (;;) {
+    const Pose2 from = scene.DrawPose(random);
+    const Pose2 motion{0.4 * unit(random), 0.2 * unit(random), Radians(14) * unit(random)};
+    if (scene.Clearance(from * motion) < 0.3) continue;
+    const auto see = [&](const Pose2& pose) {
+      sim::LaserOptions laser = Sick(0.01);
+      laser.field_of_view_rad = Radians(270);  // Doors behind the robot tell the place along the corridor as well.
+      laser.beams = 541;
+      return slam::ExtractFeatures(scene.Look(pose, laser, random), slam::FeatureOptions{});
+    };
+    const ScanFeatures prev = see(from);
+    return {prev, see(from * motion), motion, from};
+  }
+}
+
+// Least squares once, over pairs formed once at the identity by normals alone, as nearest midpoints: the thesis' first
+// test.
+std::optional<Pose2> LeastSquaresAlone(const CorridorPair& pair, const slam::LineLsqOptions& options) {
+  std::vector<slam::WeighedPair> weighed;
+  for (const LineFeature& line : pair.curr.lines) {
+    const slam::PointNormal curr = slam::MidpointAndNormal(line);
+    const LineFeature* nearest = nullptr;
+    for (const LineFeature& wall : pair.prev.lines) {
+      if (slam::MidpointAndNormal(wall).n.dot(curr.n) < options.association.min_normal_dot) continue;
+      if (nearest == nullptr ||
+          (wall.midpoint() - line.midpoint()).norm() < (nearest->midpoint() - line.midpoint()).norm())
+        nearest = &wall;
+    }
+    if (nearest != nullptr)
+      weighed.push_back({slam::MidpointAndNormal(*nearest), curr, std::min(nearest->length, line.length)});
+  }
+  if (weighed.empty()) return std::nullopt;
+  return slam::AlignLinePairs(weighed, {}, options.least_squares).T_prev_curr;
+}
+
+// The gates and weights thesis B prints (5.4.3).
+slam::LineLsqOptions AsPrinted(int rounds) {
+  slam::LineLsqOptions options;
+  options.association.max_across_m = options.association.max_along_m = options.association.first_across_m = 0.1;
+  options.association.first_slope_rad = options.association.max_slope_rad;
+  options.association.shrinking_rounds = 0;
+  options.least_squares.length_power = 0.0;
+  options.max_rounds = rounds;
+  options.min_score = 0.0;
+  return options;
+}
+
+struct Errors {
+  std::vector<double> cm, deg;
+  int right = 0, cases = 0;
+  void Add(const std::optional<Pose2>& answer, const Pose2& truth) {
+    ++cases;
+    if (!answer) return;
+    cm.push_back(100 * (answer->translation() - truth.translation()).norm());
+    deg.push_back(Degrees(std::abs(AngleDiff(answer->theta, truth.theta))));
+    right += cm.back() < 10 && deg.back() < 2;
+  }
+};
+
+void DrawFigures(StudyContext& context, const CorridorPair& pair) {
+  slam::LineLsqOptions options;
+  const auto alone = LeastSquaresAlone(pair, options);
+  const slam::LineLsqMatch match = slam::MatchLinesByLeastSquares(pair.prev, pair.curr, {}, options);
+  const auto figure = [&](const std::string& title, const Pose2& T, const std::string& label) {
+    Plot plot{.title = title, .x = {"x", "m"}, .y = {"y", "m"}, .equal_scale = true, .width = 1100, .height = 620};
+    plot.series = {LineSeries(pair.prev.lines, pair.T_map_prev, "seen from p1", 2),
+                   LineSeries(pair.curr.lines, pair.T_map_prev, "seen from p2, not moved", 4),
+                   LineSeries(pair.curr.lines, pair.T_map_prev * T, label, 0)};
+    return plot;
+  };
+  if (alone)
+    context.report.Add(figure("Figure 5.15: least squares alone", *alone, "p2, moved by least squares"), "figure_5_15");
+  context.report.Add(
+      figure("Figure 5.16: with data association", match.result.T_prev_curr, "p2, moved with association"),
+      "figure_5_16");
+  Plot plot = figure("Figure 5.17: the associations", match.result.T_prev_curr, "p2, moved with association");
+  const auto prev = slam::PolylineLines(pair.prev.lines, options.polylines),
+             curr = slam::PolylineLines(pair.curr.lines, options.polylines);
+  Series links{.label = "associated", .mark = Mark::kLine, .colour = 6};
+  for (const slam::LinePair& link : match.pairs) {
+    const Eigen::Vector2d a = pair.T_map_prev * prev[static_cast<std::size_t>(link.prev)].midpoint();
+    const Eigen::Vector2d b = pair.T_map_prev * curr[static_cast<std::size_t>(link.curr)].midpoint();
+    links.x.insert(links.x.end(), {a.x(), b.x(), NAN});
+    links.y.insert(links.y.end(), {a.y(), b.y(), NAN});
+  }
+  plot.series.pop_back();
+  plot.series.push_back(links);
+  context.report.Add(plot, "figure_5_17");
+}
+
+}  // namespace
+
+bool StudyAssociation(StudyContext& context) {
+  Report& report = context.report;
+  report.Heading("Data association (5.4.3, Figures 5.15-5.18)");
+  report.Text(
+      "Pairs of poses in the simulated corridor and building, up to 0.4 m, 0.2 m aside and 14 deg apart, no guess "
+      "(identity). Printed: least squares by itself \"is not able to furnish a good transformation\"; with association "
+      "repeated 50 times it is, and E (5.5) stays up until the 50th round. \"As printed\": normals 0.8, midpoints 0.1 "
+      "m, slopes 5 deg, all lines weigh the same. Right: within 10 cm and 2 deg.");
+  const int cases = context.Pick(400, 60);
+  Table table({"world", "way", "right", "median (cm)", "p95 (cm)", "median (deg)", "rounds mean", "rounds p95"});
+  Plot curve{.title = "Figure 5.18: E over the rounds of association (mean of the pairs that end right)",
+             .x = {"round", ""},
+             .y = {"E", "", true}};
+  bool plausible = true;
+  for (const char* world : {"corridor", "building"}) {
+    const Scene scene(world);
+    struct Way {
+      std::string name;
+      slam::LineLsqOptions options;
+      bool guess = false;  // From odometry off by 5 cm and 2 deg, instead of the identity.
+    };
+    const std::vector<Way> ways{{"association as printed, 1 round", AsPrinted(1)},
+                                {"association as printed, 50 rounds", AsPrinted(50)},
+                                {"association as printed, 50 rounds, odometry as the guess", AsPrinted(50), true},
+                                {"association as shipped", slam::LineLsqOptions{}}};
+    sim::Random random(context.seed);
+    Errors alone;
+    std::vector<Errors> errors(ways.size());
+    std::vector<std::vector<double>> rounds(ways.size()), sums(ways.size(), std::vector<double>(50, 0.0));
+    std::vector<int> counted(ways.size(), 0);
+    bool drawn = false;
+    for (int i = 0; i < cases; ++i) {
+      const CorridorPair pair = DrawPair(scene, random);
+      const int right_before = alone.right;
+      alone.Add(LeastSquaresAlone(pair, {}), pair.T_prev_curr);
+      slam::MatchPrior odometry{pair.T_prev_curr, 0.01 * Eigen::Matrix3d::Identity()};
+      odometry.T_prev_curr.x += sim::Normal(random, 0.05);
+      odometry.T_prev_curr.y += sim::Normal(random, 0.05);
+      odometry.T_prev_curr.theta = WrapAngle(odometry.T_prev_curr.theta + sim::Normal(random, Radians(2)));
+      bool shipped_right = false;
+      for (std::size_t w = 0; w < ways.size(); ++w) {
+        const slam::LineLsqMatch match = slam::MatchLinesByLeastSquares(
+            pair.prev, pair.curr, ways[w].guess ? odometry : slam::MatchPrior{}, ways[w].options);
+        const int before = errors[w].right;
+        errors[w].Add(match.result.converged ? std::optional(match.result.T_prev_curr) : std::nullopt,
+                      pair.T_prev_curr);
+        if (match.result.converged) rounds[w].push_back(match.result.iterations);
+        const bool right = errors[w].right > before;
+        shipped_right = right;  // The last way's.
+        if (!right || match.errors.empty()) continue;
+        ++counted[w];
+        for (std::size_t r = 0; r < 50; ++r) sums[w][r] += match.errors[std::min(r, match.errors.size() - 1)];
+      }
+      if (!drawn && std::string(world) == "corridor" && shipped_right && alone.right == right_before &&
+          pair.T_prev_curr.translation().norm() > 0.25 && pair.curr.lines.size() > 6) {
+        DrawFigures(context, pair);
+        drawn = true;
+      }
+    }
+    const auto add = [&](const std::string& name, const Errors& e, const std::vector<double>& r) {
+      const Distribution d = DistributionOf(r);
+      table.Add({world, name, Percent(1.0 * e.right / e.cases), Number(DistributionOf(e.cm).median, 2),
+                 Number(DistributionOf(e.cm).p95, 1), Number(DistributionOf(e.deg).median, 3), Number(d.mean, 1),
+                 Number(d.p95, 0)});
+    };
+    add("least squares alone", alone, {});
+    for (std::size_t w = 0; w < ways.size(); ++w) {
+      add(ways[w].name, errors[w], rounds[w]);
+      if (w == 0 || counted[w] == 0) continue;
+      Series series{.label = std::string(world) + ", " + ways[w].name, .mark = Mark::kLine};
+      for (std::size_t r = 0; r < 50; ++r)
+        series.x.push_back(static_cast<double>(r + 1)), series.y.push_back(sums[w][r] / counted[w]);
+      curve.series.push_back(series);
+    }
+    if (errors.back().right <= alone.right || errors.back().right < errors.back().cases / 2) {
+      report.Warn(std::string("association is no gain over least squares alone in the ") + world);
+      plausible = false;
+    }
+    if (DistributionOf(rounds.back()).p95 > 50) report.Warn("more than the thesis' 50 rounds are needed");
+  }
+  report.Add(table, "association");
+  report.Add(curve, "figure_5_18");
+  report.Text(
+      "Against the printed curve, ours needs a few rounds, not 50: least squares run to their end in every round. E "
+      "does not fall to zero, because the visible parts of long walls differ from place to place; it may rise in the "
+      "second round, when more pairs join. The printed gates (0.1 m) find too few pairs without a guess.");
+  return plausible;
+}
+
+}  // namespace cairn::studies

@@ -1,0 +1,28 @@
+// The parts of `cairn-study thesis-b` (fast position tracking with lines). Each adds its section to the report and
+// returns whether its figures are plausible.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "server/slam/features/line_feature.h"
+#include "tests/studies/logs.h"
+#include "tests/studies/study.h"
+
+namespace cairn::studies {
+
+// 5.4.2, Table 5.1, Figures 5.7-5.14: the eight transforms recovered by least squares over known pairs; chi curves.
+[[nodiscard]] bool StudyLeastSquares(StudyContext& context, const StudyLog& log);
+
+// 5.4.3, Figures 5.15-5.18: two poses of a corridor, least squares alone and with association; rounds needed.
+[[nodiscard]] bool StudyAssociation(StudyContext& context);
+
+// Scan after scan of the logs at hand, from odometry's guess, beside point-to-line ICP.
+[[nodiscard]] bool StudyTracking(StudyContext& context, const std::vector<StudyLog>& logs);
+
+// The lines as one series of a plot, the pen lifted between them; moved by T.
+[[nodiscard]] Series LineSeries(std::span<const slam::LineFeature> lines, const Pose2& T, std::string label,
+                                int colour);
+
+}  // namespace cairn::studies
