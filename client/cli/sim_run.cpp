@@ -165,6 +165,7 @@ Result<SimReport> RunSim(Program& program, const SimRunOptions& options) {
   }
   report.latency_p50_ms = latency_ms.At(0.5);
   report.latency_p99_ms = latency_ms.At(0.99);
+  report.latency_max_ms = latency_ms.At(1.0);
   if (auto written = WriteTruth(options, *fleet, *outlets); !written) return tl::unexpected(written.error());
   return report;
 }
