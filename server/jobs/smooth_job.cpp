@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "server/jobs/disagreement.h"
+#include "server/slam/smoothing/smoothed_path.h"
 
 namespace cairn::server {
 namespace {
@@ -35,9 +36,10 @@ bool Compare(const slam::MapperSnapshot& snapshot, const std::vector<Pose2>& pat
   return true;
 }
 
-bool Draw(const slam::MapperSnapshot& snapshot, slam::OccupancyGrid& grid, Steps& steps) {
+bool Draw(const slam::MapperSnapshot& snapshot, const std::vector<Pose2>& path, slam::OccupancyGrid& grid,
+          Steps& steps) {
   for (std::size_t i = 0; i < snapshot.keyframes.size(); ++i) {
-    grid.Draw(*snapshot.keyframes[i].scan, snapshot.full_path[i]);
+    grid.Draw(*snapshot.keyframes[i].scan, path[i]);
     if (!steps.Next()) return false;
   }
   return true;
@@ -62,14 +64,14 @@ Result<JobOutcome> SmoothJob::Run(const Job& job, bool enable, const JobControl&
   version.info.job = job.id;
   for (const SessionMaterial& session : *material) {
     const slam::MapperSnapshot& snapshot = session.snapshot;
-    // Loop-closing smoothing goes here: an optimised path in place of the best particle's.
+    const std::vector<Pose2> path = slam::SmoothedPath(snapshot);
     const slam::OccupancyGrid online(session.grid_options, session.chunks);
     slam::OccupancyGrid redrawn(session.grid_options);
     if (!Compare(snapshot, snapshot.online_path, online, before, steps)) return cancelled;
-    if (!Draw(snapshot, redrawn, steps)) return cancelled;
-    if (!Compare(snapshot, snapshot.full_path, redrawn, after, steps)) return cancelled;
+    if (!Draw(snapshot, path, redrawn, steps)) return cancelled;
+    if (!Compare(snapshot, path, redrawn, after, steps)) return cancelled;
     version.parts[session.session] = {redrawn.chunks(), snapshot.keyframes.size()};
-    version.smoothed[session.robot] = std::make_shared<const Trajectory>(snapshot.FullTrajectory());
+    version.smoothed[session.robot] = std::make_shared<const Trajectory>(snapshot.TrajectoryAlong(path));
   }
   const std::string summary = std::to_string(material->size()) + " robots, " + std::to_string(keyframes) +
                               " keyframes, " + std::to_string(scans) + " scans";

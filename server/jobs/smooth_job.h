@@ -1,8 +1,7 @@
-// Full SLAM as a job: takes what every session of the site knows at one moment, redraws each robot's grid along the
-// path of its best particle, and publishes the result as a new map version, disabled until it is enabled. Not a
-// pose-graph optimiser: the path is the particle filter's own. Loop-closing smoothing replaces `full_path` by an
-// optimised path (server/slam/smoothing) at the one place marked in Run.
-// Source: thesis A, 4.7 (full-SLAM path of the best particle).
+// Full SLAM as a job: takes what every session of the site knows at one moment, smooths each robot's path (that of its
+// best particle, fitted to all steps, revisits and loops: slam/smoothing), redraws its grid along it, and publishes the
+// result as a new map version, disabled until it is enabled. Robots are smoothed each by itself: relations between them
+// are not sought. Source: thesis A 5.4 (full-SLAM path of the best particle).
 // Thread rule: runs on the job worker's thread; it may wait for sessions, nobody waits for it.
 #pragma once
 

@@ -30,9 +30,9 @@ std::optional<OfflineOptions> ParseOfflineOptions(int argc, char** argv, int& ex
   app.add_option("LOG", options.log, "CARMEN or DP-SLAM log")->required();
   app.add_option("--trajectory", options.trajectory, "Write the online trajectory (TUM)");
   app.add_option("--map", options.map, "Write the online map (map.yaml and an image beside it)");
-  app.add_flag("--smooth", options.smooth, "Also compute the full-SLAM path and redraw the map from it");
-  app.add_option("--smoothed-trajectory", options.smoothed_trajectory, "Write the full-SLAM trajectory (TUM)");
-  app.add_option("--smoothed-map", options.smoothed_map, "Write the map redrawn from the full-SLAM path");
+  app.add_flag("--smooth", options.smooth, "Also smooth the whole path and redraw the map from it");
+  app.add_option("--smoothed-trajectory", options.smoothed_trajectory, "Write the smoothed trajectory (TUM)");
+  app.add_option("--smoothed-map", options.smoothed_map, "Write the map redrawn from it");
   app.add_option("--start", start, "Pose of the robot in the map at the start: x,y,theta (m, rad)")
       ->delimiter(',')
       ->expected(3);

@@ -2,11 +2,11 @@
 
 namespace cairn::slam {
 
-Trajectory MapperSnapshot::FullTrajectory() const {
+Trajectory MapperSnapshot::TrajectoryAlong(std::span<const Pose2> path) const {
   Trajectory trajectory;
   trajectory.reserve(scans.size());
   for (const ScanPlace& place : scans)
-    trajectory.push_back({place.stamp, full_path[place.keyframe] * place.T_keyframe_robot});
+    trajectory.push_back({place.stamp, path[place.keyframe] * place.T_keyframe_robot});
   return trajectory;
 }
 

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "common/geometry/pose2.h"
 #include "common/sensor/scan.h"
 #include "common/sensor/trajectory.h"
+#include "server/slam/smoothing/pose_graph.h"
 
 namespace cairn::slam {
 
@@ -16,11 +18,14 @@ struct Keyframe {
 };
 
 // What a job needs of a mapper at one moment, shared without locks: keyframes, the path of the best particle through
-// them (full SLAM), and every scan's place relative to the keyframe before it.
+// them (full SLAM), what is known between them, and every scan's place relative to the keyframe before it.
 struct MapperSnapshot {
   std::vector<Keyframe> keyframes;
   std::vector<Pose2> online_path;  // T_map_robot per keyframe as it was estimated at the time.
   std::vector<Pose2> full_path;    // T_map_robot per keyframe along the best particle's ancestry.
+  // Steps, revisits and loops; empty where the filter uses none of these or no place was seen again.
+  std::vector<PoseRelation> relations;
+  PoseGraphOptions pose_graph;
   struct ScanPlace {
     Stamp stamp = 0;
     std::size_t keyframe = 0;  // Index of the last keyframe at or before the scan.
@@ -28,8 +33,9 @@ struct MapperSnapshot {
   };
   std::vector<ScanPlace> scans;
 
-  // The full path at every scan.
-  [[nodiscard]] Trajectory FullTrajectory() const;
+  // A path (one pose per keyframe) at every scan.
+  [[nodiscard]] Trajectory TrajectoryAlong(std::span<const Pose2> path) const;
+  [[nodiscard]] Trajectory FullTrajectory() const { return TrajectoryAlong(full_path); }
 };
 
 }  // namespace cairn::slam

@@ -157,6 +157,7 @@ void Mapper::State::AddKeyframe(std::shared_ptr<const Scan> scan, const Pose2& T
 
 // No particle may have gone the way a large loop turns out to have gone: then its error is spread over the whole path.
 void Mapper::State::CloseLargeLoop() {
+  if (!filter->rebases()) return;
   const SharedSequence<Pose2> believed = filter->hypothesis(0).path;
   const auto loop = loops.Find(keyframes, shapes, believed, distances_m);
   if (!loop) return;
@@ -189,7 +190,12 @@ std::vector<Landmark> Mapper::landmarks() const {
 }
 
 MapperSnapshot Mapper::Snapshot() const {
-  MapperSnapshot snapshot{state_->keyframes, state_->online_path, {}, state_->scans};
+  MapperSnapshot snapshot;
+  snapshot.keyframes = state_->keyframes;
+  snapshot.online_path = state_->online_path;
+  snapshot.scans = state_->scans;
+  snapshot.pose_graph = state_->options.pose_graph;
+  if (state_->graph.has_loops()) snapshot.relations = state_->graph.relations();
   const SharedSequence<Pose2> path = state_->filter->hypothesis(0).path;
   for (std::size_t k = 0; k < path.size(); ++k) snapshot.full_path.push_back(path[k]);
   return snapshot;

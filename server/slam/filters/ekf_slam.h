@@ -37,6 +37,7 @@ class EkfSlam final : public Filter {
   void Observe(const std::vector<LandmarkSighting>& sightings, double travelled_m);
   void Commit() override;
   // Moves the means; the doubt stays as it was, which is more than there is.
+  [[nodiscard]] bool rebases() const override { return true; }
   bool Rebase(std::span<const Pose2> path) override;
 
   [[nodiscard]] FilterEstimate estimate() const override { return {state_.robot(), state_.covariance<3, 3>(0, 0)}; }

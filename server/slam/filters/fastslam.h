@@ -44,6 +44,7 @@ class FastSlam final : public Filter {
   // Association, proposal and weights, sampling, landmark updates and new landmarks (Tables 4.3-4.8).
   void Observe(std::span<const LandmarkSighting> sightings, double travelled_m);
   void Commit() override;
+  [[nodiscard]] bool rebases() const override { return true; }
   bool Rebase(std::span<const Pose2> path) override;
 
   [[nodiscard]] FilterEstimate estimate() const override { return set_.estimate(); }

@@ -62,6 +62,8 @@ class Filter {
   virtual void Observe(const KeyframeSight& sight, const ParallelFor& parallel_for) = 0;
   // Ends the step: the pose joins the path.
   virtual void Commit() = 0;
+  // Whether Rebase does anything.
+  [[nodiscard]] virtual bool rebases() const { return false; }
   // Between steps: a large loop showed that the way went like this, one pose per keyframe committed. Every hypothesis
   // takes it, and what it saw moves with the keyframes it was seen from. False where the filter cannot.
   virtual bool Rebase(std::span<const Pose2> /*path*/) { return false; }

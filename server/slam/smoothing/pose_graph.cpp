@@ -41,6 +41,7 @@ class RelationCost final : public ceres::SizedCostFunction<3, 3, 3> {
 }  // namespace
 
 void Visit(OptionVisitor& visitor, PoseGraphOptions& options) {
+  visitor.Flag("enabled", options.enabled, "Smoothing fits all relations; off: the path of the best particle.");
   visitor.Integer("max_iterations", options.max_iterations, "1", 1, 1000, "Hard bound of the least squares.");
   visitor.Real("loop_loss", options.loop_loss, "1", 0.1, 1000.0,
                "Standard deviations a loop may be off before its pull weakens.");

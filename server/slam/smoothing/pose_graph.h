@@ -25,6 +25,8 @@ struct PoseRelation {
 };
 
 struct PoseGraphOptions {
+  bool enabled =
+      true;  // Smoothing fits the relations; off, it answers with the path of the best particle (thesis A 5.4).
   std::int64_t max_iterations = 20;
   double loop_loss = 3.0;  // Standard deviations a loop may be off before its pull weakens.
 };
