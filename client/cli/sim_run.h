@@ -41,7 +41,7 @@ struct SimReport {
   double took_s = 0.0;
   double latency_p50_ms = 0.0;  // Over all robots.
   double latency_p99_ms = 0.0;
-  double latency_max_ms = 0.0;  // The longest pause any robot saw.
+  double latency_max_ms = 0.0;              // The longest pause any robot saw.
   std::optional<double> watched_cpu_share;  // 1: one core, all the time.
 
   [[nodiscard]] double rate() const { return took_s > 0.0 ? simulated_s / took_s : 0.0; }

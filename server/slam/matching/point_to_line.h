@@ -2,8 +2,9 @@
 // takes part as a prior: where the reference says nothing (along a corridor) the guess stays, everywhere else the scan
 // decides. Not a global search: needs an initial error below about 0.5 m and 20 degrees.
 // Reference points without a direction (rough or sparse surfaces) hold point to point with a fifth of the weight;
-// without them the real logs come out ten times worse. Frames: points in `robot`, reference in `ref`; answers T_ref_robot. Stateless, thread-safe. Source: Censi,
-// ICRA 2008 (metric); Cauchy weights; the prior makes it maximum a posteriori.
+// without them the real logs come out ten times worse. Frames: points in `robot`, reference in `ref`; answers
+// T_ref_robot. Stateless, thread-safe. Source: Censi, ICRA 2008 (metric); Cauchy weights; the prior makes it maximum a
+// posteriori.
 #pragma once
 
 #include <span>
