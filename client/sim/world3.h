@@ -1,5 +1,5 @@
 // A simulated building in space: rectangles, and routes for robots on its floor at z = 0. Frame: `map`, metres, z up.
-// Plain value. Shapes are helpers that add the rectangles they consist of.
+// Plain value. Shapes are functions that add the rectangles they consist of.
 // Source: thesis C 4.3.1: walls, doors, windows, floors, ceilings and curved walls all from rectangles.
 #pragma once
 

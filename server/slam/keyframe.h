@@ -21,7 +21,7 @@ struct Keyframe {
 // them (full SLAM), what is known between them, and every scan's place relative to the keyframe before it.
 struct MapperSnapshot {
   std::vector<Keyframe> keyframes;
-  std::vector<Pose2> online_path;  // T_map_robot per keyframe as it was estimated at the time.
+  std::vector<Pose2> online_path;  // T_map_robot per keyframe as it was drawn into the grid.
   std::vector<Pose2> full_path;    // T_map_robot per keyframe along the best particle's ancestry.
   // Steps, revisits and loops; empty where the filter uses none of these or no place was seen again.
   std::vector<PoseRelation> relations;

@@ -1,7 +1,5 @@
 #include "server/slam/mapper.h"
 
-#include <algorithm>
-
 #include "server/slam/filters/make_filter.h"
 #include "server/slam/front_end.h"
 #include "server/slam/grid/grid_redraw.h"
@@ -44,7 +42,8 @@ struct Mapper::State {
   std::vector<double> distances_m;  // Along the graph, from the last keyframe to each.
   std::unique_ptr<Filter> filter;
   OccupancyGrid grid;
-  std::optional<GridRedraw> redraw;  // Under way since a large loop was closed.
+  std::optional<GridRedraw> redraw;   // Under way since a large loop was closed ...
+  std::size_t rebased_keyframes = 0;  // ... when there were so many keyframes.
 
   std::vector<Keyframe> keyframes;
   std::vector<KeyframeShape> shapes;  // One per keyframe.
@@ -126,7 +125,9 @@ ScanOutcome Mapper::State::Coast(Stamp stamp, const Pose2& T_odom_robot) {
   outcome.T_map_robot = level.T_map_robot * moved;
   const Eigen::Matrix3d J = J_compose_right(level.T_map_robot, moved);
   outcome.covariance += J * options.blind.Covariance(moved) * J.transpose();
-  if (outcome.localized) outcome.reason = PoseReason::kOdometryOnly;
+  if (!outcome.localized) return outcome;
+  outcome.localized = unmatched_m + moved.translation().norm() <= options.lost_after_m;
+  outcome.reason = outcome.localized ? PoseReason::kOdometryOnly : PoseReason::kLost;
   return outcome;
 }
 
@@ -143,6 +144,7 @@ void Mapper::State::AddKeyframe(std::shared_ptr<const Scan> scan, const Pose2& T
       graph.AddLoop(revisit->keyframe, keyframes.size(), revisit->T_keyframe_robot, revisit->covariance);
   } else {
     graph.Append({}, Eigen::Matrix3d::Zero());
+    blind_covariance.setZero();
   }
   filter->Observe(KeyframeSight{*scan, view, step.T_track_robot, travelled_m}, parallel_for);
   filter->Commit();
@@ -161,11 +163,16 @@ void Mapper::State::CloseLargeLoop() {
   const SharedSequence<Pose2> believed = filter->hypothesis(0).path;
   const auto loop = loops.Find(keyframes, shapes, believed, distances_m);
   if (!loop) return;
-  graph.AddLoop(loop->keyframe, keyframes.size() - 1, loop->T_keyframe_robot, loop->covariance);
-  distances_m = graph.DistancesFromLast();
+  KeyframeGraph closed = graph;
+  closed.AddLoop(loop->keyframe, keyframes.size() - 1, loop->T_keyframe_robot, loop->covariance);
   std::vector<Pose2> path;
   for (std::size_t k = 0; k < believed.size(); ++k) path.push_back(believed[k]);
-  if (graph.Optimise(path, options.pose_graph).usable && filter->Rebase(path)) redraw.emplace(options.grid);
+  // Known only once the filter goes on from it: a loop nobody followed must be looked for again.
+  if (!closed.Optimise(path, options.pose_graph).usable || !filter->Rebase(path)) return;
+  graph = std::move(closed);
+  distances_m = graph.DistancesFromLast();
+  rebased_keyframes = keyframes.size();
+  redraw.emplace(options.grid);
 }
 
 void Mapper::State::Redraw() {
@@ -173,6 +180,9 @@ void Mapper::State::Redraw() {
   const OccupancyGrid::Chunks old = grid.chunks();
   grid = redraw->TakeGrid();
   redraw.reset();
+  online_path.clear();
+  const SharedSequence<Pose2> path = filter->hypothesis(0).path;
+  for (std::size_t k = 0; k < path.size(); ++k) online_path.push_back(path[k]);
   grid.MarkAllDirty();
   for (const auto& [key, chunk] : old) grid.MarkDirty(key);
 }
@@ -204,10 +214,13 @@ MapperSnapshot Mapper::Snapshot() const {
 void Mapper::AdoptGrid(OccupancyGrid grid, std::size_t keyframes) {
   State& s = *state_;
   s.grid = std::move(grid);
+  // A grid from before a large loop was closed shows the old way; one being drawn again is thrown away for it.
+  const bool outdated = keyframes < s.rebased_keyframes || s.redraw;
   s.redraw.reset();
   const SharedSequence<Pose2> path = s.filter->hypothesis(0).path;
   for (std::size_t k = keyframes; k < s.keyframes.size(); ++k) s.grid.Draw(*s.keyframes[k].scan, path[k]);
   s.grid.MarkAllDirty();
+  if (outdated) s.redraw.emplace(s.options.grid);
 }
 
 }  // namespace cairn::slam

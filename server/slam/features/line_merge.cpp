@@ -125,7 +125,7 @@ bool Merger::IsStrong(const LineSegment& segment) const {
   if (segment.line.deviation > options_.max_deviation_m) return false;
   if (segment.line.deviation * options_.min_aspect > length) return false;
   const double spacing = SpacingAt(segment.line, sweep_.laser(), segment.line.centroid, sweep_.step());
-  const int expected = static_cast<int>(options_.min_length_m / spacing);
+  const int expected = static_cast<int>(std::min(options_.min_length_m / spacing, 1e6));
   const int needed = std::clamp(expected, static_cast<int>(options_.min_points),
                                 static_cast<int>(std::max(options_.min_points, options_.max_points_needed)));
   return segment.count() >= needed;

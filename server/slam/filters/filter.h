@@ -1,5 +1,6 @@
 // What every back-end filter is to the mapper: the matched motion and the keyframe's evidence go in, an estimate of the
-// pose, the path and the landmarks comes out. One step is Predict, then any number of Observe, then Commit.
+// pose, the path and the landmarks comes out. One step is Predict (not before the first keyframe), then any number of
+// Observe, then Commit.
 // Frames: poses are T_map_robot. Not thread-safe; deterministic for a seed, on any number of threads.
 #pragma once
 

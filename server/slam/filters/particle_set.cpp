@@ -9,6 +9,13 @@
 #include "server/slam/motion/dead_reckoning.h"
 
 namespace cairn::slam {
+namespace {
+
+constexpr double kLoopSigmaM = 0.05;
+constexpr double kLoopSigmaRad = 0.01;
+
+}  // namespace
+
 ParticleSet::ParticleSet(const FastSlamOptions& options, double max_nis, std::int64_t count,
                          const Pose2& T_map_robot_start, std::uint64_t seed)
     : options_(options), max_nis_(max_nis), rng_(seed), particles_(static_cast<std::size_t>(count)) {
@@ -72,6 +79,8 @@ std::vector<int> ParticleSet::Commit() {
 void ParticleSet::Rebase(std::span<const Pose2> path) {
   Particle particle;
   particle.T_map_robot = path.back();
+  // A loop does not make the pose exact.
+  particle.covariance.diagonal() << kLoopSigmaM * kLoopSigmaM, kLoopSigmaM * kLoopSigmaM, kLoopSigmaRad * kLoopSigmaRad;
   particle.log_likelihood = best().log_likelihood;
   for (const Pose2& pose : path) particle.path.Append(pose);
   std::fill(particles_.begin(), particles_.end(), particle);

@@ -2,8 +2,8 @@
 // Not thread-safe.
 #pragma once
 
-#include <optional>
 #include <span>
+#include <utility>
 
 #include "server/slam/filters/shared_sequence.h"
 #include "server/slam/grid/occupancy_grid.h"

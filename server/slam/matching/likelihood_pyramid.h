@@ -15,7 +15,7 @@ namespace cairn::slam {
 
 class LikelihoodPyramid {
  public:
-  // `margin_m` is added around the points: poses that push points out of the raster score 0 for them.
+  // Points that a pose pushes out of the raster score 0. REQUIRES: 2^(levels - 1) <= 64 cells.
   LikelihoodPyramid(std::span<const SurfacePoint> reference, double cell_m, double reach_m, int levels);
 
   // The best value among the 2^level x 2^level cells whose lower left one is (x, y), in cells of level 0.

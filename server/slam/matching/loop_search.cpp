@@ -17,7 +17,7 @@ constexpr std::size_t kCandidateStride = 4;  // Of the old keyframes looked at.
 constexpr Exclusion kRivalBeyond{{}, 1.0, 0.3};
 
 std::vector<Eigen::Vector2d> Sample(const std::vector<SurfacePoint>& surfaces) {
-  const std::size_t stride = std::max<std::size_t>(1, surfaces.size() / kMaxSearchPoints);
+  const std::size_t stride = surfaces.size() / kMaxSearchPoints + 1;
   std::vector<Eigen::Vector2d> points;
   for (std::size_t i = 0; i < surfaces.size(); i += stride) points.push_back(surfaces[i].p);
   return points;
@@ -65,8 +65,8 @@ void Visit(OptionVisitor& visitor, LoopOptions& options) {
   visitor.Real("doubt_per_m", options.doubt_per_m, "m/m", 0.0, 1.0, "... and more per metre between here and there.");
   visitor.Real("doubt_rad", options.doubt_rad, "rad", 0.01, 3.2, "How far the search turns ...");
   visitor.Real("doubt_rad_per_m", options.doubt_rad_per_m, "rad/m", 0.0, 1.0, "... and more per metre.");
-  visitor.Real("max_doubt_m", options.max_doubt_m, "m", 0.1, 100.0, "Upper bound of the reach.");
-  visitor.Real("max_doubt_rad", options.max_doubt_rad, "rad", 0.01, 3.2, "Upper bound of the turn.");
+  visitor.Real("max_doubt_m", options.max_doubt_m, "m", 0.1, 30.0, "Upper bound of the reach.");
+  visitor.Real("max_doubt_rad", options.max_doubt_rad, "rad", 0.01, 1.6, "Upper bound of the turn.");
   visitor.Real("min_score", options.min_score, "1", 0.0, 1.0, "Mean likelihood of the recent surfaces.");
   visitor.Real("max_rival", options.max_rival, "1", 0.0, 1.0,
                "Score of the best pose elsewhere over the best; larger: sooner, and wrong more often.");
@@ -152,6 +152,7 @@ std::optional<LoopSearch::Closure> LoopSearch::Compare(std::span<const Keyframe>
                                                        const Pose2& T_old_recent_guess, double way_m) const {
   const std::size_t now = shapes.size() - 1;
   const Stretch recent_stretch = StretchAround(shapes, now, options_.recent_m);
+  if (old >= recent_stretch.first) return std::nullopt;  // Not an old place but this one.
   const Stretch old_stretch = StretchAround(shapes.first(recent_stretch.first), old, options_.around_m);
   const std::vector<SurfacePoint> recent = SurfacesOf(shapes, recent_stretch, 2.0 * kSearchCellM);
   const std::vector<SurfacePoint> before = SurfacesOf(shapes, old_stretch, 0.5 * kSearchCellM);
@@ -162,7 +163,7 @@ std::optional<LoopSearch::Closure> LoopSearch::Compare(std::span<const Keyframe>
   const SearchWindow window{T_old_recent_guess, Reach(way_m),
                             std::min(options_.max_doubt_rad, options_.doubt_rad + options_.doubt_rad_per_m * way_m)};
   const auto peak = FindBestPose(sample, pyramid, window, options_.min_score);
-  if (!peak) return std::nullopt;
+  if (!peak || !peak->complete) return std::nullopt;
   Exclusion exclusion = kRivalBeyond;
   exclusion.T_ref_curr = peak->T_ref_curr;
   if (FindBestPose(sample, pyramid, window, options_.max_rival * peak->score, exclusion)) return std::nullopt;

@@ -8,10 +8,15 @@
 namespace cairn::slam {
 
 Stretch StretchAround(std::span<const KeyframeShape> shapes, std::size_t centre, double way_m) {
+  constexpr std::size_t kMaxKeyframes = 200;  // To either side: turning on the spot makes many without travelling.
   Stretch stretch{centre, centre, centre};
   const double here = shapes[centre].travelled_m;
-  while (stretch.first > 0 && here - shapes[stretch.first - 1].travelled_m <= way_m) --stretch.first;
-  while (stretch.last + 1 < shapes.size() && shapes[stretch.last + 1].travelled_m - here <= way_m) ++stretch.last;
+  while (stretch.first > 0 && centre - stretch.first < kMaxKeyframes &&
+         here - shapes[stretch.first - 1].travelled_m <= way_m)
+    --stretch.first;
+  while (stretch.last + 1 < shapes.size() && stretch.last - centre < kMaxKeyframes &&
+         shapes[stretch.last + 1].travelled_m - here <= way_m)
+    ++stretch.last;
   return stretch;
 }
 

@@ -55,8 +55,9 @@ class Search {
       for (int y = -reach_cells_; y <= reach_cells_; y += 1 << level)
         for (int x = -reach_cells_; x <= reach_cells_; x += 1 << level) top.push_back({turn, x, y, 0});
     Descend(std::move(top), level);
-    if (!found_) return std::nullopt;
-    return RegionPeak{PoseOf(best_), static_cast<double>(best_.bound) / full};
+    const bool complete = scored_ <= kMaxBlocks;
+    if (!found_ && complete) return std::nullopt;
+    return RegionPeak{PoseOf(best_), static_cast<double>(best_.bound) / full, complete};
   }
 
  private:
@@ -84,6 +85,7 @@ class Search {
     std::erase_if(blocks, [&](const Block& block) { return Excluded(block, level); });
     for (Block& block : blocks) {
       block.bound = 0;
+      if (++scored_ > kMaxBlocks) return;
       for (const Cell& cell : turned_[static_cast<std::size_t>(block.turn)])
         block.bound += pyramid_.Best(level, cell.x + block.x, cell.y + block.y);
     }
@@ -114,6 +116,7 @@ class Search {
   std::vector<std::vector<Cell>> turned_;  // The points' cells at each heading.
   Block best_;
   bool found_ = false;
+  int scored_ = 0;
 };
 
 }  // namespace

@@ -20,7 +20,8 @@ struct SearchWindow {
 
 struct RegionPeak {
   Pose2 T_ref_curr;
-  double score = 0.0;  // 0..1: mean likelihood of the points.
+  double score = 0.0;    // 0..1: mean likelihood of the points.
+  bool complete = true;  // False: the search gave up at its bound on work, and a better pose may have been missed.
 };
 
 // Poses within this of `T_ref_curr` are left out.
@@ -30,7 +31,9 @@ struct Exclusion {
   double radius_rad = 0.2;
 };
 
-// The best pose with a score above `min_score`; nothing where there is none.
+// The best pose with a score above `min_score`; nothing where there is none. Never more than kMaxBlocks blocks are
+// scored.
+inline constexpr int kMaxBlocks = 1'000'000;
 [[nodiscard]] std::optional<RegionPeak> FindBestPose(std::span<const Eigen::Vector2d> points_curr,
                                                      const LikelihoodPyramid& pyramid, const SearchWindow& window,
                                                      double min_score,

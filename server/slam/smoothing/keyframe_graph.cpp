@@ -6,6 +6,12 @@
 #include <utility>
 
 namespace cairn::slam {
+namespace {
+
+// Options may ask for no noise at all; the least squares need some.
+const Eigen::Matrix3d kLeast = 1e-10 * Eigen::Matrix3d::Identity();
+
+}  // namespace
 
 void KeyframeGraph::Append(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) {
   const std::size_t node = travelled_m_.size();
@@ -15,12 +21,12 @@ void KeyframeGraph::Append(const Pose2& T_prev_curr, const Eigen::Matrix3d& cova
     return;
   }
   travelled_m_.push_back(travelled_m_.back() + T_prev_curr.translation().norm());
-  relations_.push_back({node - 1, node, T_prev_curr, drift_.Covariance(T_prev_curr) + covariance_prev, false});
+  relations_.push_back({node - 1, node, T_prev_curr, drift_.Covariance(T_prev_curr) + covariance_prev + kLeast, false});
 }
 
 void KeyframeGraph::AddLoop(std::size_t from, std::size_t to, const Pose2& T_from_to,
                             const Eigen::Matrix3d& covariance) {
-  relations_.push_back({from, to, T_from_to, covariance, true});
+  relations_.push_back({from, to, T_from_to, covariance + kLeast, true});
   const double way_m = T_from_to.translation().norm();
   loops_[from].push_back({to, way_m});
   loops_[to].push_back({from, way_m});

@@ -30,7 +30,7 @@ class KeyframeGraph {
   PoseGraphSummary Optimise(std::vector<Pose2>& path, const PoseGraphOptions& options) const {
     return OptimisePoses(path, relations_, options);
   }
-  [[nodiscard]] bool has_loops() const { return relations_.size() + 1 > size(); }
+  [[nodiscard]] bool has_loops() const { return size() > 0 && relations_.size() + 1 > size(); }
   [[nodiscard]] const std::vector<PoseRelation>& relations() const { return relations_; }
 
  private:
