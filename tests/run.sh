@@ -1,7 +1,6 @@
 #!/usr/bin/env bash
 # The one command: installs what is missing, builds every way that counts, runs every test, holds the accuracy.
-#   tests/run.sh                 packages to nodds below; stops at the first that fails
-#   tests/run.sh --full          the sanitizers and clang-tidy besides (asan, tsan, tidy)
+#   tests/run.sh                 every stage below but the studies; stops at the first that fails
 #   tests/run.sh --quick         packages, format, architecture, release
 #   tests/run.sh --stage NAME    this stage (may be repeated), with the build it needs
 #   tests/run.sh --studies       the slow studies besides (tests/studies)
@@ -11,20 +10,18 @@ set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
-all=(packages format architecture release accuracy nodds)
-full=(asan tsan tidy)
+all=(packages format architecture release accuracy nodds asan tsan tidy)
 stages=()
 
-usage() { sed -n '2,/^set/s/^# \{0,1\}//p' "$0"; echo "stages: ${all[*]} ${full[*]} studies"; }
+usage() { sed -n '2,/^set/s/^# \{0,1\}//p' "$0"; echo "stages: ${all[*]} studies"; }
 while [ $# -gt 0 ]; do
   case $1 in
     --quick) stages=(packages format architecture release) ;;
-    --full) all+=("${full[@]}") ;;
     --studies) all+=(studies) ;;
     --stage)
-      case " ${all[*]} ${full[*]} studies " in
+      case " ${all[*]} studies " in
         *" ${2:-none} "*) ;;
-        *) echo "--stage needs one of: ${all[*]} ${full[*]} studies" >&2; exit 2 ;;
+        *) echo "--stage needs one of: ${all[*]} studies" >&2; exit 2 ;;
       esac
       stages+=("$2")
       shift ;;
@@ -38,7 +35,7 @@ done
 # As many jobs as processors, but a compiler may take 1.5 GiB.
 memory_jobs=$(awk '/^MemAvailable/ { jobs = int($2 / 1572864); print jobs < 1 ? 1 : jobs }' /proc/meminfo)
 jobs=${CAIRN_JOBS:-$(($(nproc) < memory_jobs ? $(nproc) : memory_jobs))}
-tidy_budget_s=${CAIRN_TIDY_BUDGET_S:-300}
+tidy_budget_s=${CAIRN_TIDY_BUDGET_S:-150}
 
 # One compiler cache for all build folders and clones: paths relative to the root, and precompiled headers allowed.
 export CCACHE_BASEDIR=$root CCACHE_SLOPPINESS=pch_defines,time_macros
@@ -56,10 +53,11 @@ export UBSAN_OPTIONS=print_stacktrace=1
 # `called_from_lib:` would overlook the locks as well, and every callback would look like a race.)
 export TSAN_OPTIONS=ignore_noninstrumented_modules=1:second_deadlock_stack=1
 
+# Several sources to a translation unit: parsing the same headers again is half of a cold build.
 configure() { # preset, cmake options
   local preset=$1
   shift
-  cmake --preset "$preset" -DCAIRN_STRICT=ON "$@"
+  cmake --preset "$preset" -DCAIRN_STRICT=ON -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=12 "$@"
 }
 
 build() { # folder, cmake --build options
@@ -128,11 +126,11 @@ stage_tsan() {
   run_tests tsan -L tsan
 }
 
-# Reads the commands and the generated code of the asan build.
+# One source at a time, as an editor sees it: this stage also shows missing includes. Nothing is compiled.
 stage_tidy() {
-  configure asan
-  build asan
-  python3 tests/tidy.py build/asan --jobs "$jobs" --budget "$tidy_budget_s"
+  configure asan -B build/tidy -DCMAKE_UNITY_BUILD=OFF
+  build tidy --target cairn_idl_sources
+  python3 tests/tidy.py build/tidy --jobs "$jobs" --budget "$tidy_budget_s"
 }
 
 stage_studies() {

@@ -13,7 +13,7 @@
 namespace cairn::sim {
 namespace {
 
-constexpr double kMaxCoordinate_m = 1000.0;
+constexpr double kMaxCoordinate3_m = 1000.0;
 constexpr std::size_t kMaxRectangles = 100'000;
 constexpr std::size_t kMaxBytes = 16u << 20;
 constexpr double kUnset = std::numeric_limits<double>::quiet_NaN();
@@ -31,7 +31,7 @@ struct Complaint {
 double Metres(const YAML::Node& node, const std::string& what) {
   double value = 0.0;
   if (!node.IsScalar() || !YAML::convert<double>::decode(node, value) || !std::isfinite(value) ||
-      std::abs(value) > kMaxCoordinate_m)
+      std::abs(value) > kMaxCoordinate3_m)
     Complain(node, what + " must be a number within +-1000");
   return value;
 }

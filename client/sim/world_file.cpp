@@ -19,7 +19,7 @@ constexpr double kMaxCoordinate_m = 10'000.0;
 constexpr std::size_t kMaxSegments = 1'000'000;
 
 // What a statement complains about; the caller adds source and line.
-using Complaint = std::string;
+using WordComplaint = std::string;
 using Words = std::vector<std::string>;
 
 class Statement {
@@ -29,12 +29,12 @@ class Statement {
   [[nodiscard]] const std::string& keyword() const { return words_.front(); }
   [[nodiscard]] bool done() const { return next_ >= words_.size(); }
 
-  tl::expected<std::string, Complaint> Word(const char* what) {
+  tl::expected<std::string, WordComplaint> Word(const char* what) {
     if (done()) return tl::unexpected(std::string(what) + " is missing");
     return words_[next_++];
   }
 
-  tl::expected<double, Complaint> Number(const char* what) {
+  tl::expected<double, WordComplaint> Number(const char* what) {
     const auto word = Word(what);
     if (!word) return tl::unexpected(word.error());
     std::size_t used = 0;
@@ -50,13 +50,13 @@ class Statement {
     return value;
   }
 
-  tl::expected<double, Complaint> Positive(const char* what) {
+  tl::expected<double, WordComplaint> Positive(const char* what) {
     auto value = Number(what);
     if (value && *value <= 0.0) return tl::unexpected(std::string(what) + " must be above 0");
     return value;
   }
 
-  tl::expected<Eigen::Vector2d, Complaint> Point() {
+  tl::expected<Eigen::Vector2d, WordComplaint> Point() {
     const auto x = Number("x");
     if (!x) return tl::unexpected(x.error());
     const auto y = Number("y");
@@ -65,12 +65,12 @@ class Statement {
   }
 
   // All the points that are left, at least `least`; neighbours differ.
-  tl::expected<std::vector<Eigen::Vector2d>, Complaint> Points(std::size_t least) {
+  tl::expected<std::vector<Eigen::Vector2d>, WordComplaint> Points(std::size_t least) {
     std::vector<Eigen::Vector2d> points;
     while (!done()) {
       const auto point = Point();
       if (!point) return tl::unexpected(point.error());
-      if (!points.empty() && points.back() == *point) return tl::unexpected(Complaint("two equal points in a row"));
+      if (!points.empty() && points.back() == *point) return tl::unexpected(WordComplaint("two equal points in a row"));
       points.push_back(*point);
     }
     if (points.size() < least) return tl::unexpected("needs at least " + std::to_string(least) + " points");
@@ -82,7 +82,7 @@ class Statement {
   std::size_t next_ = 1;
 };
 
-using Outcome = tl::expected<void, Complaint>;
+using Outcome = tl::expected<void, WordComplaint>;
 
 class WorldText {
  public:
@@ -94,10 +94,10 @@ class WorldText {
         {"route", &WorldText::TakeRoute}};
     const auto kind = std::find_if(kKinds.begin(), kKinds.end(),
                                    [&](const auto& entry) { return entry.first == statement.keyword(); });
-    if (kind == kKinds.end()) return tl::unexpected(Complaint("not a statement of world files"));
+    if (kind == kKinds.end()) return tl::unexpected(WordComplaint("not a statement of world files"));
     if (auto taken = (this->*kind->second)(statement); !taken) return taken;
-    if (!statement.done()) return tl::unexpected(Complaint("more words than the statement takes"));
-    if (world_.segments.size() > kMaxSegments) return tl::unexpected(Complaint("more than 1000000 segments"));
+    if (!statement.done()) return tl::unexpected(WordComplaint("more words than the statement takes"));
+    if (world_.segments.size() > kMaxSegments) return tl::unexpected(WordComplaint("more than 1000000 segments"));
     return {};
   }
 
@@ -124,16 +124,16 @@ class WorldText {
     const auto b = s.Point();
     if (!b) return tl::unexpected(b.error());
     Wall wall{*a, *b, thickness_m_, {}};
-    if (*a == *b) return tl::unexpected(Complaint("a wall needs two different ends"));
+    if (*a == *b) return tl::unexpected(WordComplaint("a wall needs two different ends"));
     while (!s.done()) {
-      if (*s.Word("gap") != "gap") return tl::unexpected(Complaint("after a wall's ends come only `gap FROM TO`"));
+      if (*s.Word("gap") != "gap") return tl::unexpected(WordComplaint("after a wall's ends come only `gap FROM TO`"));
       const auto from = s.Number("gap's start");
       if (!from) return tl::unexpected(from.error());
       const auto to = s.Number("gap's end");
       if (!to) return tl::unexpected(to.error());
       const double after = wall.gaps.empty() ? 0.0 : wall.gaps.back().to_m;
       if (*from < after || *to <= *from || *to > (*b - *a).norm()) {
-        return tl::unexpected(Complaint("gaps must be in order, inside the wall, and wider than 0"));
+        return tl::unexpected(WordComplaint("gaps must be in order, inside the wall, and wider than 0"));
       }
       wall.gaps.push_back({*from, *to});
     }
@@ -144,7 +144,7 @@ class WorldText {
   Outcome TakeSegment(Statement& s) {
     const auto points = s.Points(2);
     if (!points) return tl::unexpected(points.error());
-    if (points->size() != 2) return tl::unexpected(Complaint("a segment has two points"));
+    if (points->size() != 2) return tl::unexpected(WordComplaint("a segment has two points"));
     AppendChain(*points, false);
     return {};
   }

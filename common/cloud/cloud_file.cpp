@@ -13,7 +13,7 @@ namespace {
 static_assert(std::endian::native == std::endian::little, "binary clouds are written as the machine holds floats");
 static_assert(sizeof(Eigen::Vector3f) == 12);
 
-constexpr std::size_t kMaxBytes = std::size_t{4} << 30;
+constexpr std::size_t kMaxCloudBytes = std::size_t{4} << 30;
 
 std::string HeaderOf(std::size_t points, CloudFormat format) {
   const std::string count = std::to_string(points);
@@ -61,7 +61,7 @@ Result<void> WriteCloud(const PointCloud& cloud, CloudFormat format, const std::
 }
 
 Result<PointCloud> ReadCloud(const std::filesystem::path& path) {
-  const auto bytes = ReadWholeFile(path, kMaxBytes);
+  const auto bytes = ReadWholeFile(path, kMaxCloudBytes);
   if (!bytes) return tl::unexpected(bytes.error());
   auto cloud = DecodeCloud({reinterpret_cast<const char*>(bytes->data()), bytes->size()});
   if (!cloud) return Fail(cloud.error().code, path.string() + ": " + cloud.error().message);

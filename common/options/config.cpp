@@ -11,7 +11,7 @@
 namespace cairn {
 namespace {
 
-constexpr std::size_t kMaxBytes = 1u << 20;
+constexpr std::size_t kMaxConfigBytes = 1u << 20;
 // Aliases can make a small text an endless or exponentially large tree.
 constexpr int kDeepest = 32;
 constexpr std::size_t kMostValues = 10'000;
@@ -71,7 +71,7 @@ Result<void> ApplyYaml(const std::string& text, const std::string& source, const
 }
 
 Result<void> ApplyYamlFile(const std::filesystem::path& path, const VisitOptions& visit) {
-  const auto bytes = ReadWholeFile(path, kMaxBytes);
+  const auto bytes = ReadWholeFile(path, kMaxConfigBytes);
   if (!bytes) return tl::unexpected(bytes.error());
   return ApplyYaml(std::string(bytes->begin(), bytes->end()), path.string(), visit);
 }

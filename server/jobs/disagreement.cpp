@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/slam/scan/tilt.h"
+
 namespace cairn::server {
 namespace {
 
@@ -35,12 +37,12 @@ double NearestSquared(const slam::OccupancyGrid& grid, const Eigen::Vector2d& p_
 void Disagreement::Add(const Scan& scan, const Pose2& T_map_robot, const slam::OccupancyGrid& grid) {
   const Pose2 T_map_laser = T_map_robot * scan.T_robot_laser;
   const double reach_m = grid.options().max_ray_m;  // Farther hits were never drawn.
+  const double cos_tilt = std::cos(scan.tilt_rad);
   for (std::size_t i = 0; i < scan.ranges_m.size(); ++i) {
     const float range_m = scan.ranges_m[i];
     if (ClassifyRange(range_m, scan.range_min_m, scan.range_max_m) != BeamClass::kHit || range_m > reach_m) continue;
     const double bearing = scan.angle_first_rad + static_cast<double>(i) * scan.angle_step_rad;
-    const double flat_m = range_m * std::cos(scan.tilt_rad * std::cos(bearing));
-    const Eigen::Vector2d p_laser = flat_m * Eigen::Vector2d(std::cos(bearing), std::sin(bearing));
+    const Eigen::Vector2d p_laser = slam::OnGround(range_m, bearing, cos_tilt);
     sum_m2_ += NearestSquared(grid, T_map_laser * p_laser, kMaxDistanceM);
     ++beams_;
   }

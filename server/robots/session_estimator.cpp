@@ -120,7 +120,7 @@ void SessionEstimator::RefreshLandmarks(bool at_once) {
 void SessionEstimator::On(Correction&& correction) {
   slam::Mapper& mapper = pipeline_.mapper();
   Adopted adopted{.session = identity_.id,
-                  .displaced = {PublishedChunks(), mapper.Snapshot().keyframes.size()},
+                  .displaced = {PublishedChunks(), mapper.keyframe_count()},
                   .change = {.session = identity_.id, .chunks = {}}};
   mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), std::move(correction.grid.chunks)),
                    correction.grid.keyframes);

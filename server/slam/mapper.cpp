@@ -199,6 +199,10 @@ std::vector<Landmark> Mapper::landmarks() const {
   return state_->filter->landmarks();
 }
 
+std::size_t Mapper::keyframe_count() const {
+  return state_->keyframes.size();
+}
+
 MapperSnapshot Mapper::Snapshot() const {
   MapperSnapshot snapshot;
   snapshot.keyframes = state_->keyframes;

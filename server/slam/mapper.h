@@ -46,6 +46,7 @@ class Mapper {
   // Chunks of the grid changed since the last call.
   [[nodiscard]] std::vector<ChunkKey> TakeDirtyChunks();
   [[nodiscard]] std::vector<Landmark> landmarks() const;  // Of the best particle.
+  [[nodiscard]] std::size_t keyframe_count() const;
   [[nodiscard]] MapperSnapshot Snapshot() const;
   // Replaces the grid by one redrawn from the first `keyframes` keyframes (a finished job), then draws the later
   // keyframes onto it along the current best path. Every chunk of the new grid becomes dirty;

@@ -10,7 +10,7 @@
 namespace cairn::server::testing {
 namespace {
 
-constexpr ClientId kClient = 7;
+constexpr ClientId kSender = 7;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
@@ -21,20 +21,20 @@ std::uint64_t Dropped(const Ledger& ledger, DropReason reason) {
 class BadInput : public ::testing::Test {
  protected:
   void SetUp() override {
-    house_.Open("r1", kClient);
-    house_.Drive("r1", kClient, 0, 10);
+    house_.Open("r1", kSender);
+    house_.Drive("r1", kSender, 0, 10);
   }
   // Scan 11 spoilt; then the robot drives on, and the spoilt scan is the only one not used.
   void ExpectRefused(DropReason reason, const std::function<void(Scan&)>& spoil) {
     Scan scan = RoomScan(10);
     spoil(scan);
-    house_.SendOdometry("r1", kClient, RoomOdometry(10));
-    house_.SendScan("r1", kClient, scan);
+    house_.SendOdometry("r1", kSender, RoomOdometry(10));
+    house_.SendScan("r1", kSender, scan);
     DriveOn(1);
     EXPECT_EQ(Dropped(house_.LastLedger("r1"), reason), 1U) << DropReasonName(reason);
   }
   void DriveOn(std::uint64_t expected_drops) {
-    house_.Drive("r1", kClient, 11, 20);
+    house_.Drive("r1", kSender, 11, 20);
     const Ledger ledger = house_.LastLedger("r1");
     EXPECT_EQ(ledger.dropped_total(), expected_drops);
     EXPECT_EQ(ledger.received + Dropped(ledger, DropReason::kLostOnWire), ledger.used + ledger.dropped_total());
@@ -52,8 +52,8 @@ TEST_F(BadInput, SingleBadRangesAreNormal) {
   scan.ranges_m[41] = -kInf;
   scan.ranges_m[60] = -2.0F;
   scan.ranges_m[80] = 0.0F;
-  house_.SendOdometry("r1", kClient, RoomOdometry(10));
-  house_.SendScan("r1", kClient, scan);
+  house_.SendOdometry("r1", kSender, RoomOdometry(10));
+  house_.SendScan("r1", kSender, scan);
   DriveOn(0);
 }
 
@@ -72,8 +72,8 @@ TEST_F(BadInput, TooManyBeamsAreRefused) {
 TEST_F(BadInput, ChangingBeamCountsAreUsed) {
   Scan scan = RoomScan(10);
   scan.ranges_m.resize(91);  // The right half of the view.
-  house_.SendOdometry("r1", kClient, RoomOdometry(10));
-  house_.SendScan("r1", kClient, scan);
+  house_.SendOdometry("r1", kSender, RoomOdometry(10));
+  house_.SendScan("r1", kSender, scan);
   DriveOn(0);
 }
 
@@ -104,27 +104,27 @@ TEST_F(BadInput, AStampThatJumpsAYearIsRefused) {
 TEST_F(BadInput, BadOdometryIsCountedAndLeftOut) {
   Odometry wild = RoomOdometry(10);
   wild.T_odom_robot.y = std::numeric_limits<double>::infinity();
-  house_.SendOdometry("r1", kClient, wild);
+  house_.SendOdometry("r1", kSender, wild);
   Odometry old = RoomOdometry(3);
-  house_.SendOdometry("r1", kClient, old);
-  house_.SendOdometry("r1", kClient, RoomOdometry(10));
-  house_.SendScan("r1", kClient, RoomScan(10));
+  house_.SendOdometry("r1", kSender, old);
+  house_.SendOdometry("r1", kSender, RoomOdometry(10));
+  house_.SendScan("r1", kSender, RoomScan(10));
   DriveOn(0);
   EXPECT_EQ(house_.LastLedger("r1").odometry_dropped, 2U);
 }
 
 TEST_F(BadInput, LateOdometryIsWaitedFor) {
-  house_.SendScan("r1", kClient, RoomScan(10));
+  house_.SendScan("r1", kSender, RoomScan(10));
   ASSERT_TRUE(house_.WaitFor([&] { return house_.LastLedger("r1").waiting == 1; }));
-  house_.SendOdometry("r1", kClient, RoomOdometry(10));
+  house_.SendOdometry("r1", kSender, RoomOdometry(10));
   DriveOn(0);
 }
 
 TEST_F(BadInput, MissingOdometryDropsTheScanWithAReason) {
   // Three seconds without odometry, then it comes back: what lies in the gap has no odometry near.
-  for (int step = 10; step < 40; ++step) house_.SendScan("r1", kClient, RoomScan(step));
-  house_.SendOdometry("r1", kClient, RoomOdometry(45));
-  house_.SendScan("r1", kClient, RoomScan(45));
+  for (int step = 10; step < 40; ++step) house_.SendScan("r1", kSender, RoomScan(step));
+  house_.SendOdometry("r1", kSender, RoomOdometry(45));
+  house_.SendScan("r1", kSender, RoomScan(45));
   // The last scan settles last; before it arrives, a ledger may already show the gap's thirty and no loss.
   house_.WaitSettled("r1", RoomScan(45).sequence);
   const Ledger ledger = house_.LastLedger("r1");
@@ -133,20 +133,20 @@ TEST_F(BadInput, MissingOdometryDropsTheScanWithAReason) {
 }
 
 TEST_F(BadInput, GapsInTheNumbersAreLostAndLateArrivalsFillThem) {
-  house_.SendOdometry("r1", kClient, RoomOdometry(10));
-  house_.SendOdometry("r1", kClient, RoomOdometry(11));
-  house_.SendScan("r1", kClient, RoomScan(11));
+  house_.SendOdometry("r1", kSender, RoomOdometry(10));
+  house_.SendOdometry("r1", kSender, RoomOdometry(11));
+  house_.SendScan("r1", kSender, RoomScan(11));
   ASSERT_TRUE(house_.WaitFor([&] { return Dropped(house_.LastLedger("r1"), DropReason::kLostOnWire) == 1; }));
-  house_.SendScan("r1", kClient, RoomScan(10));
+  house_.SendScan("r1", kSender, RoomScan(10));
   ASSERT_TRUE(house_.WaitFor([&] { return Dropped(house_.LastLedger("r1"), DropReason::kLostOnWire) == 0; }));
   EXPECT_EQ(Dropped(house_.LastLedger("r1"), DropReason::kStampWentBack), 1U);
 }
 
 TEST_F(BadInput, AResentScanIsNotCountedTwice) {
-  house_.SendScan("r1", kClient, RoomScan(9));
-  house_.SendScan("r1", kClient, RoomScan(4));
-  house_.SendOdometry("r1", kClient, RoomOdometry(10));
-  house_.SendScan("r1", kClient, RoomScan(10));
+  house_.SendScan("r1", kSender, RoomScan(9));
+  house_.SendScan("r1", kSender, RoomScan(4));
+  house_.SendOdometry("r1", kSender, RoomOdometry(10));
+  house_.SendScan("r1", kSender, RoomScan(10));
   DriveOn(0);
   EXPECT_EQ(house_.LastLedger("r1").received, 20U);
 }
@@ -158,8 +158,8 @@ TEST_F(BadInput, ARobotThatConnectsTwiceIsRefusedWhileTheFirstLives) {
   house_.SendScan("r1", 8, RoomScan(10));
   ASSERT_TRUE(house_.WaitFor([&] { return Dropped(house_.LastLedger("r1"), DropReason::kNotOwner) == 1; }));
 
-  house_.Push(ClientLiveliness{kClient, false});
-  ASSERT_TRUE(house_.WaitPhase("r1", kClient, SessionPhase::kSuspended));
+  house_.Push(ClientLiveliness{kSender, false});
+  ASSERT_TRUE(house_.WaitPhase("r1", kSender, SessionPhase::kSuspended));
   house_.Open("r1", 8);
   ASSERT_TRUE(house_.WaitPhase("r1", 8, SessionPhase::kActive));
   // The new client numbers from 1; poses go on where they were.
@@ -177,8 +177,8 @@ TEST_F(BadInput, ScansWithoutASessionAreCountedInABoundedTable) {
   house_.SendScan("stranger", 99, RoomScan(0));
   ASSERT_TRUE(house_.WaitFor([&] { return Dropped(house_.LastLedger("stranger"), DropReason::kNoSession) == 1; }));
   for (int i = 0; i < 1000; ++i) house_.SendScan("stranger" + std::to_string(i), 99, RoomScan(0));
-  house_.SendOdometry("r1", kClient, RoomOdometry(10));
-  house_.SendScan("r1", kClient, RoomScan(10));
+  house_.SendOdometry("r1", kSender, RoomOdometry(10));
+  house_.SendScan("r1", kSender, RoomScan(10));
   DriveOn(0);
   std::set<NameId> strangers;
   for (const Ledger& ledger : house_.All<Ledger>()) strangers.insert(ledger.robot_id);
@@ -194,12 +194,12 @@ TEST(BadSession, UnknownSitesAreRefusedWhereTheServerMakesNone) {
   options.server.create_sites = false;
   options.server.sites = "hall, lab";
   WholeServer house(options);
-  house.Open("r1", kClient, "nowhere");
-  ASSERT_TRUE(house.WaitPhase("r1", kClient, SessionPhase::kRefused));
-  EXPECT_EQ(house.LastState("r1", kClient).status.code, StatusCode::kNotFound);
-  EXPECT_THAT(house.LastState("r1", kClient).status.message, ::testing::HasSubstr("nowhere"));
-  house.Open("r1", kClient, "hall");
-  EXPECT_TRUE(house.WaitPhase("r1", kClient, SessionPhase::kActive));
+  house.Open("r1", kSender, "nowhere");
+  ASSERT_TRUE(house.WaitPhase("r1", kSender, SessionPhase::kRefused));
+  EXPECT_EQ(house.LastState("r1", kSender).status.code, StatusCode::kNotFound);
+  EXPECT_THAT(house.LastState("r1", kSender).status.message, ::testing::HasSubstr("nowhere"));
+  house.Open("r1", kSender, "hall");
+  EXPECT_TRUE(house.WaitPhase("r1", kSender, SessionPhase::kActive));
 }
 
 TEST(BadSession, RequestsThatMakeNoSenseAreRefusedWithAReason) {
@@ -207,7 +207,7 @@ TEST(BadSession, RequestsThatMakeNoSenseAreRefusedWithAReason) {
   const SessionRequest good{.robot = "r1",
                             .site = "lab",
                             .sensors = {"laser"},
-                            .client = kClient,
+                            .client = kSender,
                             .has_start = true,
                             .T_map_robot_start = {},
                             .end = false};

@@ -34,8 +34,9 @@ void Visit(OptionVisitor& visitor, GridOptions& options) {
   visitor.Real("miss_probability", options.miss_probability, "1", 0.01, 0.49, "Nearer 0: one ray through clears it.");
   visitor.Real("clamp_probability", options.clamp_probability, "1", 0.6, 0.999,
                "Nearer 1: more contrary evidence is needed to change a cell.");
-  visitor.Real("max_ray_m", options.max_ray_m, "m", 1.0, 100.0,
-               "Rays are cut here; what is hit farther away is not drawn.");
+  visitor.Real(
+      "max_ray_m", options.max_ray_m, "m", 1.0, 100.0,
+      "Rays are cut here; what is hit farther away is not drawn. Takes (2 max_ray_m / resolution_m)^2 bytes a robot.");
   visitor.Real("no_return_free_m", options.no_return_free_m, "m", 0.0, 100.0,
                "How far a beam that hit nothing clears.");
 }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "server/slam/scan/tilt.h"
+
 namespace cairn::slam {
 namespace {
 
@@ -25,11 +27,11 @@ void ScanRaster::Rasterise(const Scan& scan, const Pose2& T_map_robot, const Ras
   width_ = height_ = 2 * reach + 1;
   marks_.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), 0);
 
-  const double flatten = std::cos(scan.tilt_rad);
+  const double cos_tilt = std::cos(scan.tilt_rad);
   for (std::size_t beam = 0; beam < scan.ranges_m.size(); ++beam) {
     const BeamClass kind = ClassifyRange(scan.ranges_m[beam], scan.range_min_m, scan.range_max_m);
     if (kind == BeamClass::kInvalid) continue;
-    double range = kind == BeamClass::kHit ? static_cast<double>(scan.ranges_m[beam]) * flatten
+    double range = kind == BeamClass::kHit ? static_cast<double>(scan.ranges_m[beam])
                                            : std::min(options.no_return_free_m, scan.range_max_m);
     bool hit = kind == BeamClass::kHit;
     if (range > options.max_ray_m) {
@@ -38,7 +40,7 @@ void ScanRaster::Rasterise(const Scan& scan, const Pose2& T_map_robot, const Ras
     }
     if (range <= 0.0) continue;
     const double bearing = scan.angle_first_rad + static_cast<double>(beam) * scan.angle_step_rad;
-    const Eigen::Vector2d end = T_map_laser * Eigen::Vector2d(range * std::cos(bearing), range * std::sin(bearing));
+    const Eigen::Vector2d end = T_map_laser * OnGround(range, bearing, cos_tilt);
     MarkRay(from, CellOf(end, options.resolution_m), hit);
   }
   for (const std::uint32_t index : touched_) {

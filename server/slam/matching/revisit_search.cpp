@@ -99,11 +99,7 @@ MatchResult RevisitSearch::AlignFromOthers(const Filter& filter,
   return best;
 }
 
-// Surfaces around keyframe `centre`, in its robot frame.
 void RevisitSearch::BuildReference(const std::vector<KeyframeShape>& keyframes, std::size_t centre) {
-  if (reference_centre_ == centre && reference_count_ == keyframes.size()) return;
-  reference_centre_ = centre;
-  reference_count_ = keyframes.size();
   reference_.Clear();
   const auto reach = static_cast<std::size_t>(options_.neighbours);
   const std::size_t first = centre > reach ? centre - reach : 0;

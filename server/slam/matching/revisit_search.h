@@ -45,13 +45,12 @@ class RevisitSearch {
  private:
   MatchResult AlignFromOthers(const Filter& filter, const std::function<MatchResult(const Hypothesis&)>& align,
                               const ParallelFor& parallel_for) const;
+  // The surfaces around keyframe `centre`, in its robot frame.
   void BuildReference(const std::vector<KeyframeShape>& keyframes, std::size_t centre);
 
   RevisitOptions options_;
   PointToLineOptions align_;
-  PointIndex reference_;
-  std::optional<std::size_t> reference_centre_;
-  std::size_t reference_count_ = 0;
+  PointIndex reference_;  // Scratch.
 };
 
 }  // namespace cairn::slam

@@ -7,7 +7,7 @@
 namespace cairn::slam {
 namespace {
 
-constexpr int kMaxRounds = 100;
+constexpr int kMaxSpreadRounds = 100;
 constexpr double kStop = 1e-9;  // Relative.
 
 struct Equations {
@@ -35,7 +35,7 @@ Eigen::Vector2d SolveAbove(const Equations& e, double least, const Eigen::Vector
 
 template <typename Assemble>
 Eigen::Vector2d Iterate(Eigen::Vector2d x, double least, const Assemble& assemble) {
-  for (int round = 0; round < kMaxRounds; ++round) {
+  for (int round = 0; round < kMaxSpreadRounds; ++round) {
     const Eigen::Vector2d next = SolveAbove(assemble(x), least, x);
     const double change = ((next - x).cwiseAbs().array() / (x.cwiseAbs().array() + least)).maxCoeff();
     x = next;

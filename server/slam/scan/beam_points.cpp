@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "server/slam/scan/tilt.h"
+
 namespace cairn::slam {
 
 std::vector<BeamPoint> PointsOf(const Scan& scan) {
@@ -14,11 +16,12 @@ std::vector<BeamPoint> PointsOf(const Scan& scan) {
     if (ClassifyRange(scan.ranges_m[beam], scan.range_min_m, scan.range_max_m) != BeamClass::kHit) continue;
     const double range = scan.ranges_m[beam];
     const double bearing = scan.angle_first_rad + static_cast<double>(beam) * scan.angle_step_rad;
-    const double x = range * std::cos(bearing) * cos_tilt, y = range * std::sin(bearing);
-    points.push_back({.p_robot = {mount.x + cos_mount * x - sin_mount * y, mount.y + sin_mount * x + cos_mount * y},
-                      .range_m = range,
-                      .bearing_rad = bearing,
-                      .beam = static_cast<int>(beam)});
+    const Eigen::Vector2d p = OnGround(range, bearing, cos_tilt);
+    points.push_back(
+        {.p_robot = {mount.x + cos_mount * p.x() - sin_mount * p.y(), mount.y + sin_mount * p.x() + cos_mount * p.y()},
+         .range_m = range,
+         .bearing_rad = bearing,
+         .beam = static_cast<int>(beam)});
   }
   return points;
 }

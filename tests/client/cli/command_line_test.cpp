@@ -14,13 +14,13 @@ namespace {
 
 using ::testing::HasSubstr;
 
-struct Outcome {
+struct CommandOutcome {
   ExitCode code;
   std::string out;
   std::string err;
 };
 
-Outcome RunLine(const std::vector<std::string>& arguments) {
+CommandOutcome RunLine(const std::vector<std::string>& arguments) {
   std::ostringstream out, err;
   const ExitCode code = RunCairn(arguments, out, err);
   return {code, out.str(), err.str()};
@@ -66,7 +66,7 @@ TEST_F(CommandLine, NonsenseIsAUsageError) {
       {"ping", "--set", "wire.colour=red"},
       {"ping", "--set", "wire.liveliness_lease_s=-1"}};
   for (const auto& arguments : wrong) {
-    const Outcome outcome = RunLine(arguments);
+    const CommandOutcome outcome = RunLine(arguments);
     EXPECT_EQ(outcome.code, ExitCode::kUsage) << ::testing::PrintToString(arguments);
     EXPECT_NE(outcome.err, "") << ::testing::PrintToString(arguments);
     EXPECT_EQ(outcome.out, "") << ::testing::PrintToString(arguments);
@@ -76,7 +76,7 @@ TEST_F(CommandLine, NonsenseIsAUsageError) {
 TEST_F(CommandLine, HelpIsNoError) {
   for (const std::vector<std::string>& arguments :
        {std::vector<std::string>{"--help"}, {"replay", "--help"}, {"map", "draw", "--help"}, {"--version"}}) {
-    const Outcome outcome = RunLine(arguments);
+    const CommandOutcome outcome = RunLine(arguments);
     EXPECT_EQ(outcome.code, ExitCode::kOk);
     EXPECT_NE(outcome.out, "");
   }
@@ -85,14 +85,14 @@ TEST_F(CommandLine, HelpIsNoError) {
 }
 
 TEST_F(CommandLine, SimWritesLogsThatCheckLogFindsGood) {
-  const Outcome sim =
+  const CommandOutcome sim =
       RunLine({"sim", "--no-stream", "--robots", "2", "--seconds", "20", "--beams", "181", "--fov", "180", "--log-dir",
                File("logs"), "--truth-dir", File("truth"), "--first-stamp", "1000", "--json"});
   ASSERT_EQ(sim.code, ExitCode::kOk) << sim.err;
   const auto report = nlohmann::json::parse(sim.out);
   EXPECT_EQ(report["robots"].size(), 2u);
   EXPECT_EQ(report["robots"][1]["robot"], "robot2");
-  const Outcome check = RunLine({"check-log", File("logs/robot1.log"), "--json"});
+  const CommandOutcome check = RunLine({"check-log", File("logs/robot1.log"), "--json"});
   ASSERT_EQ(check.code, ExitCode::kOk) << check.out << check.err;
   const auto log = nlohmann::json::parse(check.out);
   EXPECT_EQ(log["scans"]["count"], 200);
@@ -120,7 +120,7 @@ TEST_F(CommandLine, TheSameSeedWritesTheSameLog) {
 TEST_F(CommandLine, EvalSaysHowFarFromTheTruth) {
   ASSERT_TRUE(WriteTum({{0, {0, 0, 0}}, {kNanosPerSecond / 10, {1, 0, 0}}}, File("truth.tum")));
   ASSERT_TRUE(WriteTum({{0, {0, 0.5, 0}}, {kNanosPerSecond / 10, {1, 0.5, 0}}}, File("estimate.tum")));
-  const Outcome plain = RunLine({"eval", File("estimate.tum"), File("truth.tum"), "--json"});
+  const CommandOutcome plain = RunLine({"eval", File("estimate.tum"), File("truth.tum"), "--json"});
   ASSERT_EQ(plain.code, ExitCode::kOk) << plain.err;
   EXPECT_NEAR(nlohmann::json::parse(plain.out)["ate_rmse_m"].get<double>(), 0.5, 1e-9);
   EXPECT_EQ(RunLine({"eval", File("estimate.tum"), File("truth.tum"), "--max-rmse", "0.4"}).code, ExitCode::kFailed);
@@ -134,7 +134,7 @@ TEST_F(CommandLine, FilesThatAreNotThereFailWithOneLine) {
                                                     {"replay", File("none.log"), "--site", "s", "--robot", "r"},
                                                     {"sim", "--no-stream", "--world", File("none.world")},
                                                     {"map", "draw", "--map", File("none.yaml"), "-o", File("x.png")}}) {
-    const Outcome outcome = RunLine(arguments);
+    const CommandOutcome outcome = RunLine(arguments);
     EXPECT_EQ(outcome.code, ExitCode::kFailed) << arguments[0];
     EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
     EXPECT_THAT(outcome.err, HasSubstr("none."));
@@ -142,7 +142,7 @@ TEST_F(CommandLine, FilesThatAreNotThereFailWithOneLine) {
 }
 
 TEST_F(CommandLine, AnErrorIsAnObjectForMachines) {
-  const Outcome outcome = RunLine({"--json", "check-log", File("none.log")});
+  const CommandOutcome outcome = RunLine({"--json", "check-log", File("none.log")});
   EXPECT_EQ(outcome.code, ExitCode::kFailed);
   EXPECT_THAT(nlohmann::json::parse(outcome.out)["error"]["message"].get<std::string>(), HasSubstr("none.log"));
 }

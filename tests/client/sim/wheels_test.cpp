@@ -9,7 +9,7 @@
 namespace cairn::sim {
 namespace {
 
-WheelOptions Perfect() {
+WheelOptions PerfectWheels() {
   WheelOptions options;
   options.slip_m_per_sqrt_m = 0.0;
   return options;
@@ -29,7 +29,7 @@ TEST(DriveArc, AHalfCircleEndsBesideItsStart) {
 
 TEST(Wheels, PerfectWheelsTellTheTruth) {
   Random random(1);
-  WheelOdometry odometry(Perfect());
+  WheelOdometry odometry(PerfectWheels());
   Pose2 truth;
   for (int i = 0; i < 1000; ++i) {
     const double way = 0.01, turn = 0.004 * std::sin(i * 0.01);
@@ -41,7 +41,7 @@ TEST(Wheels, PerfectWheelsTellTheTruth) {
 
 TEST(Wheels, ALargerRightWheelReadsALeftTurn) {
   Random random(1);
-  WheelOptions options = Perfect();
+  WheelOptions options = PerfectWheels();
   options.right_share = 0.01;
   WheelOdometry odometry(options);
   for (int i = 0; i < 1000; ++i) odometry.Drive(0.01, 0.0, random);
@@ -50,7 +50,7 @@ TEST(Wheels, ALargerRightWheelReadsALeftTurn) {
 
 TEST(Wheels, AWiderBelievedBaseReadsSmallerTurns) {
   Random random(1);
-  WheelOptions options = Perfect();
+  WheelOptions options = PerfectWheels();
   options.base_share = 0.25;
   WheelOdometry odometry(options);
   for (int i = 0; i < 100; ++i) odometry.Drive(0.0, 0.02, random);
@@ -58,7 +58,7 @@ TEST(Wheels, AWiderBelievedBaseReadsSmallerTurns) {
 }
 
 TEST(Wheels, SlipHasItsVarianceHoweverFineTheSteps) {
-  WheelOptions options = Perfect();
+  WheelOptions options = PerfectWheels();
   options.slip_m_per_sqrt_m = 0.01;
   const double way = 4.0;
   // Each wheel: variance k^2 * way. The robot's way is their mean, its turn their difference over the base.
@@ -93,7 +93,7 @@ TEST(Wheels, RobotsOfOneMakeDifferByTheSpread) {
   double left = 0, right = 0, base = 0;
   const int n = 4000;
   for (int i = 0; i < n; ++i) {
-    const WheelOptions drawn = DrawWheels(Perfect(), spread, random);
+    const WheelOptions drawn = DrawWheels(PerfectWheels(), spread, random);
     left += drawn.left_share * drawn.left_share;
     right += drawn.right_share * drawn.right_share;
     base += drawn.base_share * drawn.base_share;

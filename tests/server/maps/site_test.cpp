@@ -10,7 +10,7 @@
 namespace cairn::server {
 namespace {
 
-std::shared_ptr<const slam::GridChunk> ChunkOf(std::int16_t log_odds) {
+std::shared_ptr<const slam::GridChunk> UniformChunk(std::int16_t log_odds) {
   auto chunk = std::make_shared<slam::GridChunk>();
   chunk->log_odds.fill(log_odds);
   return chunk;
@@ -70,9 +70,9 @@ class SiteTest : public ::testing::Test {
 };
 
 TEST_F(SiteTest, PublishesOnlyWhatChanged) {
-  site_->Change({.session = 1, .chunks = {{{0, 0}, ChunkOf(100)}, {{9, 9}, ChunkOf(100)}}});
+  site_->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(100)}, {{9, 9}, UniformChunk(100)}}});
   EXPECT_EQ(TakeTiles().size(), 8U);  // Two on each of four levels.
-  site_->Change({.session = 1, .chunks = {{{0, 0}, ChunkOf(120)}}});
+  site_->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(120)}}});
   const auto changed = TakeTiles();
   EXPECT_EQ(changed.size(), 4U);
   for (const TileSample& tile : changed) EXPECT_EQ(tile.tile.version, 2U);
@@ -83,7 +83,7 @@ TEST_F(SiteTest, PublishesOnlyWhatChanged) {
 
 TEST_F(SiteTest, TilesThatCouldNotBeSentGoOutLater) {
   full_ = true;
-  site_->Change({.session = 1, .chunks = {{{0, 0}, ChunkOf(100)}}});
+  site_->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(100)}}});
   EXPECT_TRUE(TakeTiles().empty());
   {
     const MutexLock lock(mutex_);
@@ -93,10 +93,10 @@ TEST_F(SiteTest, TilesThatCouldNotBeSentGoOutLater) {
 }
 
 TEST_F(SiteTest, ASwitchIsSeenAllAtOnceWithTombstones) {
-  site_->Change({.session = 1, .chunks = {{{0, 0}, ChunkOf(100)}}});
-  site_->Change({.session = 2, .chunks = {{{20, 20}, ChunkOf(100)}}});
+  site_->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(100)}}});
+  site_->Change({.session = 2, .chunks = {{{20, 20}, UniformChunk(100)}}});
   TakeTiles();
-  const std::uint32_t version = AddVersion({{1, {{{{0, 0}, ChunkOf(-100)}}, 3}}, {2, {{{{21, 21}, ChunkOf(50)}}, 3}}});
+  const std::uint32_t version = AddVersion({{1, {{{{0, 0}, UniformChunk(-100)}}, 3}}, {2, {{{{21, 21}, UniformChunk(50)}}, 3}}});
   EXPECT_EQ(version, 2U);
   EXPECT_EQ(site_->snapshot()->info.versions.size(), 2U);
   auto enabled = Enable(version);
@@ -105,15 +105,15 @@ TEST_F(SiteTest, ASwitchIsSeenAllAtOnceWithTombstones) {
 
   // The first session has adopted and maps on; the second has not: nothing of it is to be seen yet.
   corrections_[0].second.done({.session = 1,
-                               .displaced = {{{{0, 0}, ChunkOf(100)}}, 5},
-                               .change = {.session = 1, .chunks = {{{0, 0}, ChunkOf(-100)}}}});
-  site_->Change({.session = 1, .chunks = {{{0, 1}, ChunkOf(-50)}}});
+                               .displaced = {{{{0, 0}, UniformChunk(100)}}, 5},
+                               .change = {.session = 1, .chunks = {{{0, 0}, UniformChunk(-100)}}}});
+  site_->Change({.session = 1, .chunks = {{{0, 1}, UniformChunk(-50)}}});
   EXPECT_TRUE(TakeTiles().empty());
   EXPECT_EQ(site_->snapshot()->info.epoch, 0U);
 
   corrections_[1].second.done({.session = 2,
-                               .displaced = {{{{20, 20}, ChunkOf(100)}}, 5},
-                               .change = {.session = 2, .chunks = {{{20, 20}, nullptr}, {{21, 21}, ChunkOf(50)}}}});
+                               .displaced = {{{{20, 20}, UniformChunk(100)}}, 5},
+                               .change = {.session = 2, .chunks = {{{20, 20}, nullptr}, {{21, 21}, UniformChunk(50)}}}});
   EXPECT_EQ(*enabled.get(), 2U);
   std::map<TileKey, TileSample> samples;
   for (const TileSample& tile : TakeTiles()) samples[tile.tile.key] = tile;
@@ -132,10 +132,10 @@ TEST_F(SiteTest, ASwitchIsSeenAllAtOnceWithTombstones) {
 }
 
 TEST_F(SiteTest, SessionsTheServerForgotAreSwitchedWithoutThem) {
-  site_->Change({.session = 1, .chunks = {{{0, 0}, ChunkOf(100)}}});
+  site_->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(100)}}});
   TakeTiles();
   gone_ = true;
-  const std::uint32_t version = AddVersion({{1, {{{{0, 0}, ChunkOf(-100)}}, 3}}});
+  const std::uint32_t version = AddVersion({{1, {{{{0, 0}, UniformChunk(-100)}}, 3}}});
   EXPECT_TRUE(Enable(version).get());
   TakeTiles();
   EXPECT_EQ(site_->snapshot()->info.epoch, 1U);
@@ -151,9 +151,9 @@ TEST_F(SiteTest, SessionsTheServerForgotAreSwitchedWithoutThem) {
 
 // A session may go between the correction and its answer; the switch must not hang for ever.
 TEST_F(SiteTest, ASessionThatGoesWithoutAnsweringDoesNotHoldUpTheSwitch) {
-  site_->Change({.session = 1, .chunks = {{{0, 0}, ChunkOf(100)}}});
+  site_->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(100)}}});
   TakeTiles();
-  const std::uint32_t version = AddVersion({{1, {{{{0, 0}, ChunkOf(-100)}}, 3}}});
+  const std::uint32_t version = AddVersion({{1, {{{{0, 0}, UniformChunk(-100)}}, 3}}});
   auto enabled = Enable(version);
   ASSERT_EQ(corrections_.size(), 1U);
   corrections_.clear();
@@ -161,7 +161,7 @@ TEST_F(SiteTest, ASessionThatGoesWithoutAnsweringDoesNotHoldUpTheSwitch) {
 }
 
 TEST_F(SiteTest, OneSwitchAtATime) {
-  const std::uint32_t version = AddVersion({{1, {{{{0, 0}, ChunkOf(-100)}}, 3}}});
+  const std::uint32_t version = AddVersion({{1, {{{{0, 0}, UniformChunk(-100)}}, 3}}});
   auto first = Enable(version);
   EXPECT_EQ(Enable(1).get().error().code, StatusCode::kUnavailable);
   corrections_.clear();

@@ -83,9 +83,8 @@ TEST(Mapper, FollowsTheRobotTwiceRoundALoop) {
   EXPECT_LT(run.worst_m, 0.25);
 }
 
-// A robot that drives 3 m blind, with slipping wheels, comes back to its start some metres off; what follows
-// from the loop reaches the pose, the path and, some scans later, the map.
-TEST(Mapper, ClosesALargeLoopAndDrawsTheMapAgain) {
+// Round a block, 3 m of it blind and with slipping wheels: back at its start the robot believes to be some metres off.
+Drive DriveRoundABlockAndSlip() {
   const test::World world = test::RingCorridor(true);
   const Laser laser{.beams = 181, .step_rad = Radians(1.0), .range_max_m = 12.0};
   Drive drive;
@@ -103,12 +102,22 @@ TEST(Mapper, ClosesALargeLoopAndDrawsTheMapAgain) {
     odometry = odometry * Pose2{(blind ? 1.6 : 1.0) * step.x, 0, step.theta};
     way_m += step.x;
   }
+  return drive;
+}
+
+MapperOptions SlipOptions(bool loops) {
+  MapperOptions options;
+  options.filter.particles = 50;
+  options.loop.enabled = loops;
+  options.filter.back_end.landmarks.enabled = false;  // They alone would nearly do here.
+  return options;
+}
+
+// What follows from the loop reaches the pose, the path and, some scans later, the map.
+TEST(Mapper, ClosesALargeLoopAndDrawsTheMapAgain) {
+  const Drive drive = DriveRoundABlockAndSlip();
   const auto run = [&](bool loops) {
-    MapperOptions options;
-    options.filter.particles = 50;
-    options.loop.enabled = loops;
-    options.filter.back_end.landmarks.enabled = false;  // They alone would nearly do here.
-    Mapper mapper(options, {}, 1);
+    Mapper mapper(SlipOptions(loops), {}, 1);
     ScanOutcome outcome;
     for (std::size_t i = 0; i < drive.scans.size(); ++i)
       outcome = mapper.Process(drive.scans[i], drive.odometry[i], SerialFor);
@@ -120,6 +129,55 @@ TEST(Mapper, ClosesALargeLoopAndDrawsTheMapAgain) {
   EXPECT_GT(without, 0.4) << "the drift must need correcting";  // 1.0 with gcc, 0.6 with clang: particles differ.
   EXPECT_LT(with, 0.3);
   EXPECT_LT(middle_of_first_side, 50);
+}
+
+// Of the occupied cells of `grid`, the share with none of `other` beside them.
+double ShareMissing(const OccupancyGrid& grid, const OccupancyGrid& other) {
+  const double cell_m = grid.options().resolution_m;
+  const auto occupied = [](const OccupancyGrid& in, double x, double y) {
+    const std::uint8_t cell = in.OccupancyAt({x, y});
+    return cell != kUnknownCell && cell > 65;
+  };
+  int all = 0, missing = 0;
+  for (double x = -5.0; x < 45.0; x += cell_m) {
+    for (double y = -5.0; y < 25.0; y += cell_m) {
+      if (!occupied(grid, x, y)) continue;
+      bool near = false;
+      for (int i = -3; i <= 3; ++i)
+        for (int j = -3; j <= 3; ++j) near = near || occupied(other, x + i * cell_m, y + j * cell_m);
+      ++all;
+      missing += near ? 0 : 1;
+    }
+  }
+  return static_cast<double>(missing) / all;
+}
+
+// A smoothing job takes its snapshot, the robot closes a large loop, and the job's grid comes back showing the old way:
+// it is adopted (the job's answer stands) and then drawn anew along the way that is known now.
+TEST(Mapper, AGridFromBeforeALargeLoopIsDrawnAnew) {
+  const Drive drive = DriveRoundABlockAndSlip();
+  Mapper mapper(SlipOptions(true), {}, 1);
+  const auto process = [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i)
+      static_cast<void>(mapper.Process(drive.scans[i], drive.odometry[i], SerialFor));
+  };
+  const auto published = [&] {
+    static_cast<void>(mapper.TakeDirtyChunks());  // From here on the mapper writes to copies.
+    return OccupancyGrid(mapper.grid().options(), mapper.grid().chunks());
+  };
+  const std::size_t end = drive.scans.size(), snapshot_at = end * 78 / 100, adopted_at = end - 60;
+  process(0, snapshot_at);
+  const OccupancyGrid before = published();
+  const std::size_t keyframes = mapper.keyframe_count();
+  process(snapshot_at, adopted_at);
+  const OccupancyGrid after = published();
+  EXPECT_GT(ShareMissing(before, after), 0.05) << "the loop must have moved walls";
+
+  mapper.AdoptGrid(OccupancyGrid(before.options(), before.chunks()), keyframes);
+  EXPECT_GT(ShareMissing(mapper.grid(), after), 0.03) << "the old walls are there at first";
+  process(adopted_at, end);
+  EXPECT_LT(ShareMissing(mapper.grid(), after), 0.01);
+  EXPECT_LT(ShareMissing(after, mapper.grid()), 0.01);
 }
 
 TEST(Mapper, TheFullPathHasAPoseForEveryScan) {

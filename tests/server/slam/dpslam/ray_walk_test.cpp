@@ -10,19 +10,19 @@
 namespace cairn::slam {
 namespace {
 
-struct Step {
+struct CellOnRay {
   int x, y;
   double from, to;
 };
 
-std::vector<Step> Steps(const Eigen::Vector2d& origin, const Eigen::Vector2d& along, double length) {
-  std::vector<Step> steps;
+std::vector<CellOnRay> CellsOnRay(const Eigen::Vector2d& origin, const Eigen::Vector2d& along, double length) {
+  std::vector<CellOnRay> steps;
   WalkRay(origin, along, length, [&](int x, int y, double from, double to) { steps.push_back({x, y, from, to}); });
   return steps;
 }
 
 TEST(RayWalk, CrossesThreeCellsStraightOn) {
-  const auto steps = Steps({0.5, 0.5}, {1.0, 0.0}, 2.0);
+  const auto steps = CellsOnRay({0.5, 0.5}, {1.0, 0.0}, 2.0);
   ASSERT_EQ(steps.size(), 3u);
   EXPECT_EQ(steps[2].x, 2);
   EXPECT_NEAR(steps[0].to, 0.5, 1e-12);
@@ -39,7 +39,7 @@ TEST(RayWalk, EveryPieceLiesInItsCellAndTheyMakeUpTheRay) {
     const Eigen::Vector2d along(std::cos(angle), std::sin(angle));
     const double way = length(rng);
     double at = 0.0;
-    for (const Step& step : Steps(origin, along, way)) {
+    for (const CellOnRay& step : CellsOnRay(origin, along, way)) {
       ASSERT_NEAR(step.from, at, 1e-12);
       ASSERT_LE(step.from, step.to + 1e-9);
       const Eigen::Vector2d middle = origin + 0.5 * (step.from + step.to) * along;
@@ -52,10 +52,10 @@ TEST(RayWalk, EveryPieceLiesInItsCellAndTheyMakeUpTheRay) {
 }
 
 TEST(RayWalk, StartsOnABorderInEitherDirection) {
-  EXPECT_NEAR(Steps({2.0, 0.5}, {-1.0, 0.0}, 1.5).back().to, 1.5, 1e-12);
-  EXPECT_EQ(Steps({2.0, 0.5}, {-1.0, 0.0}, 1.5).back().x, 0);
-  EXPECT_EQ(Steps({2.0, 0.5}, {1.0, 0.0}, 1.5).back().x, 3);
-  EXPECT_EQ(Steps({2.0, 0.5}, {1.0, 0.0}, 0.0).size(), 1u);
+  EXPECT_NEAR(CellsOnRay({2.0, 0.5}, {-1.0, 0.0}, 1.5).back().to, 1.5, 1e-12);
+  EXPECT_EQ(CellsOnRay({2.0, 0.5}, {-1.0, 0.0}, 1.5).back().x, 0);
+  EXPECT_EQ(CellsOnRay({2.0, 0.5}, {1.0, 0.0}, 1.5).back().x, 3);
+  EXPECT_EQ(CellsOnRay({2.0, 0.5}, {1.0, 0.0}, 0.0).size(), 1u);
 }
 
 }  // namespace

@@ -8,13 +8,13 @@
 namespace cairn::slam {
 namespace {
 
-BackEndOptions Wide() {
+BackEndOptions WideDrift() {
   BackEndOptions options;
   options.drift = {0.0, 0.05, 0.0, 0.0, 0.02, 0.0};
   return options;
 }
 
-void Drive(Filter& filter, const std::vector<Pose2>& steps) {
+void DriveSteps(Filter& filter, const std::vector<Pose2>& steps) {
   for (const Pose2& step : steps) {
     filter.Predict(step, Eigen::Matrix3d::Zero());
     filter.Commit();
@@ -22,14 +22,14 @@ void Drive(Filter& filter, const std::vector<Pose2>& steps) {
 }
 
 // Ten metres out, turn about, ten metres back, as the wheels tell it: half a metre to the left of the truth at the end.
-std::vector<Pose2> OutAndBack() {
+std::vector<Pose2> OutTurnAndBack() {
   std::vector<Pose2> steps(20, {0.5, 0, 0});
   steps.push_back({0, 0, kPi});
   steps.insert(steps.end(), 20, {0.5, -0.025, 0});
   return steps;
 }
 
-std::vector<LandmarkSighting> TwoCorners(const Pose2& T_map_robot, std::size_t first_slot = 0) {
+std::vector<LandmarkSighting> SightTwoCorners(const Pose2& T_map_robot, std::size_t first_slot = 0) {
   const Pose2 T_robot_map = T_map_robot.Inverse();
   return {{first_slot, {true, 1.5}, T_robot_map * Eigen::Vector2d(2.0, 1.0), WrapAngle(0.3 - T_map_robot.theta)},
           {first_slot + 1, {true, -1.5}, T_robot_map * Eigen::Vector2d(1.0, -2.0), WrapAngle(1.2 - T_map_robot.theta)}};
@@ -40,9 +40,9 @@ RevisitObservation AtTheStart() {
 }
 
 TEST(EkfSlam, ARevisitMovesTheRobotAndThePathBehindIt) {
-  EkfSlam filter({}, Wide(), {});
+  EkfSlam filter({}, WideDrift(), {});
   filter.Commit();
-  Drive(filter, OutAndBack());
+  DriveSteps(filter, OutTurnAndBack());
   EXPECT_NEAR(filter.estimate().T_map_robot.y, 0.5, 1e-9);
   const double before = filter.estimate().covariance.trace();
   const Pose2 way = filter.hypothesis(0).path[30];
@@ -57,11 +57,11 @@ TEST(EkfSlam, ARevisitMovesTheRobotAndThePathBehindIt) {
 }
 
 TEST(EkfSlam, LandmarksSeenAgainPullTheRobotBack) {
-  EkfSlam filter({}, Wide(), {});
-  filter.Observe(TwoCorners({}), 0.0);
+  EkfSlam filter({}, WideDrift(), {});
+  filter.Observe(SightTwoCorners({}), 0.0);
   filter.Commit();
-  Drive(filter, OutAndBack());
-  filter.Observe(TwoCorners({0, 0, kPi}, 2), 20.0);
+  DriveSteps(filter, OutTurnAndBack());
+  filter.Observe(SightTwoCorners({0, 0, kPi}, 2), 20.0);
   filter.Commit();
   EXPECT_EQ(filter.landmarks().size(), 2U) << "seen again, not new";
   EXPECT_LT(filter.estimate().T_map_robot.translation().norm(), 0.2);
@@ -73,7 +73,7 @@ TEST(EkfSlam, HoldsNoMoreThanItsBoundsAndStaysACovariance) {
   EkfOptions options;
   options.max_landmarks = 5;
   options.max_anchors = 3;
-  EkfSlam filter(options, Wide(), {});
+  EkfSlam filter(options, WideDrift(), {});
   filter.Commit();
   for (std::size_t i = 0; i < 40; ++i) {
     filter.Predict({2.0, 0, 0}, Eigen::Matrix3d::Zero());
@@ -90,12 +90,12 @@ TEST(EkfSlam, HoldsNoMoreThanItsBoundsAndStaysACovariance) {
 }
 
 TEST(LandmarkCorrection, PutsTheErrorBackToTheLevelOfFirstSight) {
-  LandmarkCorrection filter({}, Wide(), {});
-  filter.Observe(TwoCorners({}), 0.0);
+  LandmarkCorrection filter({}, WideDrift(), {});
+  filter.Observe(SightTwoCorners({}), 0.0);
   filter.Commit();
-  Drive(filter, OutAndBack());
+  DriveSteps(filter, OutTurnAndBack());
   EXPECT_NEAR(filter.estimate().T_map_robot.y, 0.5, 1e-9);
-  filter.Observe(TwoCorners({0, 0, kPi}, 2), 20.0);
+  filter.Observe(SightTwoCorners({0, 0, kPi}, 2), 20.0);
   filter.Commit();
   EXPECT_LT(filter.estimate().T_map_robot.translation().norm(), 0.01);
   EXPECT_EQ(filter.landmarks().size(), 2U) << "a corner that counts is not remembered a second time";
@@ -103,12 +103,12 @@ TEST(LandmarkCorrection, PutsTheErrorBackToTheLevelOfFirstSight) {
 }
 
 TEST(LandmarkCorrection, LinesGiveTheTurnOnly) {
-  LandmarkCorrection filter({}, Wide(), {});
+  LandmarkCorrection filter({}, WideDrift(), {});
   const LandmarkSighting line{0, {false, 1.0}, {2.0, 0.0}, 0.3};
   filter.Observe(std::vector<LandmarkSighting>{line}, 0.0);
   filter.Commit();
-  for (int i = 0; i < 40; ++i) Drive(filter, {{0.5, 0, 0}, {-0.5, 0, 0}});
-  Drive(filter, {{0.1, 0.0, 0.1}});
+  for (int i = 0; i < 40; ++i) DriveSteps(filter, {{0.5, 0, 0}, {-0.5, 0, 0}});
+  DriveSteps(filter, {{0.1, 0.0, 0.1}});
   LandmarkSighting again = line;
   again.p_robot.x() -= 0.1;
   filter.Observe(std::vector<LandmarkSighting>{again}, 40.0);
@@ -120,33 +120,33 @@ TEST(LandmarkCorrection, LinesGiveTheTurnOnly) {
 TEST(LandmarkCorrection, BeforeTravellingAFeatureCorrectsNothing) {
   CorrectionOptions options;
   options.min_travel_m = 50.0;
-  LandmarkCorrection filter(options, Wide(), {});
-  filter.Observe(TwoCorners({}), 0.0);
+  LandmarkCorrection filter(options, WideDrift(), {});
+  filter.Observe(SightTwoCorners({}), 0.0);
   filter.Commit();
-  Drive(filter, OutAndBack());
-  filter.Observe(TwoCorners({0, 0, kPi}, 2), 20.0);
+  DriveSteps(filter, OutTurnAndBack());
+  filter.Observe(SightTwoCorners({0, 0, kPi}, 2), 20.0);
   EXPECT_NEAR(filter.estimate().T_map_robot.y, 0.5, 1e-9);
   EXPECT_EQ(filter.landmarks().size(), 2U) << "but it is recognised";
 }
 
 TEST(LandmarkCorrection, AnImplausibleCorrectionIsLeftAlone) {
-  BackEndOptions sure = Wide();
+  BackEndOptions sure = WideDrift();
   sure.drift = {0.0, 0.001, 0.0, 0.0, 0.0001, 0.0};
   sure.landmarks.noise = {0.01, 0.003, 0.005};
   LandmarkCorrection filter({}, sure, {});
-  filter.Observe(TwoCorners({}), 0.0);
+  filter.Observe(SightTwoCorners({}), 0.0);
   filter.Commit();
-  Drive(filter, OutAndBack());
-  filter.Observe(TwoCorners({0, 0, kPi}, 2), 20.0);
+  DriveSteps(filter, OutTurnAndBack());
+  filter.Observe(SightTwoCorners({0, 0, kPi}, 2), 20.0);
   EXPECT_NEAR(filter.estimate().T_map_robot.y, 0.5, 1e-9);
 }
 
 template <typename FilterType>
-std::unique_ptr<Filter> Make() {
-  if constexpr (std::is_same_v<FilterType, EkfSlam>) return std::make_unique<EkfSlam>(EkfOptions{}, Wide(), Pose2{});
+std::unique_ptr<Filter> MakeSingleBelief() {
+  if constexpr (std::is_same_v<FilterType, EkfSlam>) return std::make_unique<EkfSlam>(EkfOptions{}, WideDrift(), Pose2{});
   if constexpr (std::is_same_v<FilterType, LandmarkCorrection>)
-    return std::make_unique<LandmarkCorrection>(CorrectionOptions{}, Wide(), Pose2{});
-  return std::make_unique<DeadReckoningFilter>(Wide(), Pose2{});
+    return std::make_unique<LandmarkCorrection>(CorrectionOptions{}, WideDrift(), Pose2{});
+  return std::make_unique<DeadReckoningFilter>(WideDrift(), Pose2{});
 }
 
 template <typename FilterType>
@@ -155,9 +155,9 @@ using Filters = testing::Types<EkfSlam, LandmarkCorrection, DeadReckoningFilter>
 TYPED_TEST_SUITE(SingleBelief, Filters);
 
 TYPED_TEST(SingleBelief, SaysThatItIsWrongOnceRevisitsContradictItAgainAndAgain) {
-  const auto filter = Make<TypeParam>();
+  const auto filter = MakeSingleBelief<TypeParam>();
   filter->Commit();
-  Drive(*filter, OutAndBack());
+  DriveSteps(*filter, OutTurnAndBack());
   const Pose2 before = filter->estimate().T_map_robot;
   for (int i = 0; i < 10; ++i) {
     EXPECT_FALSE(filter->health().diverged);
@@ -170,7 +170,7 @@ TYPED_TEST(SingleBelief, SaysThatItIsWrongOnceRevisitsContradictItAgainAndAgain)
 }
 
 TYPED_TEST(SingleBelief, StandsAnEmptyScan) {
-  const auto filter = Make<TypeParam>();
+  const auto filter = MakeSingleBelief<TypeParam>();
   const Scan scan;
   const ScanView view;
   filter->Observe({scan, view, {}, 0.0}, SerialFor);
@@ -180,9 +180,9 @@ TYPED_TEST(SingleBelief, StandsAnEmptyScan) {
 }
 
 TEST(DeadReckoningFilter, UncertaintyIsThatOfTheDrift) {
-  DeadReckoningFilter filter(Wide(), {});
+  DeadReckoningFilter filter(WideDrift(), {});
   filter.Commit();
-  Drive(filter, std::vector<Pose2>(4, {1.0, 0, 0}));
+  DriveSteps(filter, std::vector<Pose2>(4, {1.0, 0, 0}));
   EXPECT_NEAR(filter.estimate().covariance(0, 0), 4 * 0.05 * 0.05, 1e-12);
   EXPECT_NEAR(filter.estimate().covariance(2, 2), 4 * 0.02 * 0.02, 1e-12);
 }

@@ -13,7 +13,7 @@ namespace {
 using test::Laser;
 using test::World;
 
-ScanFeatures See(const World& world, const Pose2& pose, const Laser& laser = {}) {
+ScanFeatures FeaturesFrom(const World& world, const Pose2& pose, const Laser& laser = {}) {
   return ExtractFeatures(test::Look(world, pose, laser), FeatureOptions{});
 }
 
@@ -32,7 +32,7 @@ double ErrorOf(const Pose2& answer, const Pose2& truth) {
 
 TEST(LineLsq, AlignsTwoPlacesOfACorridorWhereTheFirstPairsAloneFail) {
   const Pose2 start{0, 0, 0.05}, motion{0.3, 0.06, 0.14};
-  const ScanFeatures prev = See(CorridorWithDoors(), start), curr = See(CorridorWithDoors(), start * motion);
+  const ScanFeatures prev = FeaturesFrom(CorridorWithDoors(), start), curr = FeaturesFrom(CorridorWithDoors(), start * motion);
   const MatchPrior nothing_known;
   LineLsqOptions once;
   once.max_rounds = 1;
@@ -50,7 +50,7 @@ TEST(LineLsq, AlignsTwoPlacesOfACorridorWhereTheFirstPairsAloneFail) {
 }
 
 TEST(LineLsq, EachLineIsUsedOnce) {
-  const ScanFeatures prev = See(test::Office(), {}), curr = See(test::Office(), {0.2, 0.1, 0.05});
+  const ScanFeatures prev = FeaturesFrom(test::Office(), {}), curr = FeaturesFrom(test::Office(), {0.2, 0.1, 0.05});
   const std::vector<LinePair> pairs = AssociateLines(prev.lines, curr.lines, {0.2, 0.1, 0.05}, 100, {});
   ASSERT_GE(pairs.size(), 4U);
   std::vector<int> used_prev, used_curr;

@@ -102,6 +102,25 @@ TEST(RegionSearch, ACorridorHasARivalAndAHallHasNone) {
   EXPECT_FALSE(FindBestPose(all, pyramid, window, 0.8 * best->score, Exclusion{best->T_ref_curr, 1.0, 0.3}));
 }
 
+// A lattice looks promising from afar everywhere and fits nowhere: nothing can be skipped, and the search says that it
+// gave up.
+TEST(RegionSearch, SaysWhenItGaveUp) {
+  std::vector<SurfacePoint> lattice;
+  for (int x = -60; x <= 60; ++x)
+    for (int y = -60; y <= 60; ++y) lattice.push_back({{0.4 * x + 0.05, 0.4 * y + 0.05}, Eigen::Vector2d::UnitX()});
+  const LikelihoodPyramid pyramid(lattice, kCellM, 0.1, 5);
+  std::mt19937_64 rng(5);
+  std::uniform_real_distribution<double> any(-10.0, 10.0);
+  std::vector<Eigen::Vector2d> scattered;
+  for (int i = 0; i < 30; ++i) scattered.emplace_back(any(rng), any(rng));
+  const auto peak = FindBestPose(scattered, pyramid, {{}, 10.0, 0.4}, 0.0);
+  ASSERT_TRUE(peak);
+  EXPECT_FALSE(peak->complete);
+  const auto small = FindBestPose(scattered, pyramid, {{}, 1.0, 0.1}, 0.0);
+  ASSERT_TRUE(small);
+  EXPECT_TRUE(small->complete);
+}
+
 TEST(RegionSearch, NothingIsFoundWhereNothingIs) {
   const LikelihoodPyramid empty({}, kCellM, 0.3, 5);
   EXPECT_FALSE(FindBestPose(std::vector<Eigen::Vector2d>{{1, 1}}, empty, {{}, 2.0, 0.2}, 0.0));

@@ -52,7 +52,7 @@ ScanView ViewOf(const Scan& scan) {
   return {ExtractFeatures(points, scan, FeatureOptions{}), SurfacePointsOf(points, scan, SurfaceOptions{})};
 }
 
-ScanView See(const World& world, const Pose2& pose, const Laser& laser, std::mt19937_64* engine = nullptr) {
+ScanView ViewFrom(const World& world, const Pose2& pose, const Laser& laser, std::mt19937_64* engine = nullptr) {
   return ViewOf(test::Look(world, pose, laser, engine));
 }
 
@@ -83,7 +83,7 @@ TEST_P(ScanMatchers, RecoverTheMotionExactlyWithoutNoise) {
                               Pose2{0.25, -0.1, Radians(10)}}) {
     const Pose2 guess = motion * Pose2{-0.06, 0.04, 0.03};
     const MatchResult match =
-        Match(See(test::Office(), kStart, kLaser), See(test::Office(), kStart * motion, kLaser), guess);
+        Match(ViewFrom(test::Office(), kStart, kLaser), ViewFrom(test::Office(), kStart * motion, kLaser), guess);
     ASSERT_TRUE(match.converged) << MatchFailureName(match.failure);
     EXPECT_TRUE(IsCovariance(match.covariance));
     EXPECT_FALSE(match.degenerate);
@@ -108,7 +108,7 @@ TEST_P(ScanMatchers, NoiseGivesSpreadButHardlyBias) {
   constexpr int kRuns = 40;
   for (int run = 0; run < kRuns; ++run) {
     const MatchResult match =
-        Match(See(test::Office(), kStart, laser, &engine), See(test::Office(), kStart * motion, laser, &engine),
+        Match(ViewFrom(test::Office(), kStart, laser, &engine), ViewFrom(test::Office(), kStart * motion, laser, &engine),
               motion * Pose2{off(engine), off(engine), off(engine)});
     if (!match.converged) continue;
     ++matched;
@@ -126,7 +126,7 @@ TEST_P(ScanMatchers, NoiseGivesSpreadButHardlyBias) {
 
 TEST_P(ScanMatchers, ConvergeFromEverywhereInTheirBasin) {
   const Pose2 motion{0.25, 0.05, 0.12};
-  const ScanView prev = See(test::Office(), kStart, kLaser), curr = See(test::Office(), kStart * motion, kLaser);
+  const ScanView prev = ViewFrom(test::Office(), kStart, kLaser), curr = ViewFrom(test::Office(), kStart * motion, kLaser);
   int far = 0, silent = 0;
   const int directions = GetParam().kind == MatcherKind::kNdtDe ? 1 : 6;  // A population a start: too slow for more.
   std::printf("%s: share of starts that lead to the answer; rows m, columns deg\n       0    5   10   15   20   30\n",
@@ -172,7 +172,7 @@ TEST_P(ScanMatchers, ACorridorIsFlaggedAndDoesNotMoveTheAnswerAlong) {
   Laser laser = kLaser;
   laser.range_max_m = 5.0;
   const Pose2 start{0, 0, 0.1}, motion{0.3, 0.03, 0.05}, guess{0.22, 0.0, 0.02};
-  const MatchResult match = Match(See(corridor, start, laser), See(corridor, start * motion, laser), guess,
+  const MatchResult match = Match(ViewFrom(corridor, start, laser), ViewFrom(corridor, start * motion, laser), guess,
                                   Eigen::Vector3d(0.01, 0.01, 0.01).asDiagonal());
   ASSERT_TRUE(match.converged) << MatchFailureName(match.failure);
   EXPECT_TRUE(match.degenerate);
@@ -196,7 +196,7 @@ TEST_P(ScanMatchers, OneWallNeverMovesTheRobotAlongIt) {
   laser.range_max_m = 6.0;
   const Pose2 motion{0.2, 0.05, 0.06}, guess{0.15, 0.02, 0.03};
   const MatchResult match =
-      Match(See(wall, {}, laser), See(wall, motion, laser), guess, Eigen::Vector3d(0.01, 0.01, 0.01).asDiagonal());
+      Match(ViewFrom(wall, {}, laser), ViewFrom(wall, motion, laser), guess, Eigen::Vector3d(0.01, 0.01, 0.01).asDiagonal());
   EXPECT_LT(std::abs(match.T_prev_curr.y - guess.y), GetParam().slide_m);
   if (!match.converged) return;
   EXPECT_TRUE(match.degenerate);
@@ -204,7 +204,7 @@ TEST_P(ScanMatchers, OneWallNeverMovesTheRobotAlongIt) {
 }
 
 TEST_P(ScanMatchers, WithoutAScanThePriorIsTheAnswer) {
-  const ScanView office = See(test::Office(), kStart, kLaser), nothing;
+  const ScanView office = ViewFrom(test::Office(), kStart, kLaser), nothing;
   ScanView point;
   point.points_robot.push_back({{1, 0}, {-1, 0}});
   const Pose2 guess{0.2, 0.01, 0.3};
@@ -228,7 +228,7 @@ TEST_P(ScanMatchers, EnoughOfTheViewIsEnough) {
     const double view = Radians(degrees);
     const int beams = static_cast<int>(std::lround(2 * degrees)) + (degrees < 360.0 ? 1 : 0);
     const Laser laser{.beams = beams, .first_rad = -0.5 * view, .step_rad = Radians(0.5)};
-    const MatchResult match = Match(See(test::Office(), kStart, laser), See(test::Office(), kStart * motion, laser),
+    const MatchResult match = Match(ViewFrom(test::Office(), kStart, laser), ViewFrom(test::Office(), kStart * motion, laser),
                                     motion * Pose2{0.04, -0.04, 0.03});
     std::printf("%s: %3.0f deg of view: %s, error %.4f m\n", MatcherName(GetParam().kind).data(), degrees,
                 match.converged ? "matched" : MatchFailureName(match.failure).data(),
@@ -280,7 +280,7 @@ TEST_P(ScanMatchers, ACrowdIsSeenThroughOrOwnedUpTo) {
 
 TEST_P(ScanMatchers, TheThreadsDoNotMatter) {
   const Pose2 motion{0.25, 0.05, 0.12};
-  const ScanView prev = See(test::Office(), kStart, kLaser), curr = See(test::Office(), kStart * motion, kLaser);
+  const ScanView prev = ViewFrom(test::Office(), kStart, kLaser), curr = ViewFrom(test::Office(), kStart * motion, kLaser);
   const ParallelFor backwards = [](int count, const std::function<void(int, int)>& body) {
     for (int end = count; end > 0; end -= 3) body(std::max(0, end - 3), end);
   };
