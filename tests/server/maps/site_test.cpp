@@ -96,7 +96,8 @@ TEST_F(SiteTest, ASwitchIsSeenAllAtOnceWithTombstones) {
   site_->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(100)}}});
   site_->Change({.session = 2, .chunks = {{{20, 20}, UniformChunk(100)}}});
   TakeTiles();
-  const std::uint32_t version = AddVersion({{1, {{{{0, 0}, UniformChunk(-100)}}, 3}}, {2, {{{{21, 21}, UniformChunk(50)}}, 3}}});
+  const std::uint32_t version =
+      AddVersion({{1, {{{{0, 0}, UniformChunk(-100)}}, 3}}, {2, {{{{21, 21}, UniformChunk(50)}}, 3}}});
   EXPECT_EQ(version, 2U);
   EXPECT_EQ(site_->snapshot()->info.versions.size(), 2U);
   auto enabled = Enable(version);
@@ -111,9 +112,10 @@ TEST_F(SiteTest, ASwitchIsSeenAllAtOnceWithTombstones) {
   EXPECT_TRUE(TakeTiles().empty());
   EXPECT_EQ(site_->snapshot()->info.epoch, 0U);
 
-  corrections_[1].second.done({.session = 2,
-                               .displaced = {{{{20, 20}, UniformChunk(100)}}, 5},
-                               .change = {.session = 2, .chunks = {{{20, 20}, nullptr}, {{21, 21}, UniformChunk(50)}}}});
+  corrections_[1].second.done(
+      {.session = 2,
+       .displaced = {{{{20, 20}, UniformChunk(100)}}, 5},
+       .change = {.session = 2, .chunks = {{{20, 20}, nullptr}, {{21, 21}, UniformChunk(50)}}}});
   EXPECT_EQ(*enabled.get(), 2U);
   std::map<TileKey, TileSample> samples;
   for (const TileSample& tile : TakeTiles()) samples[tile.tile.key] = tile;

@@ -120,20 +120,20 @@ TEST_F(CairnProgram, AFleetIsMappedAndEveryScanExplained) {
 TEST_F(CairnProgram, TheMapComesAsTilesFilesAndPicture) {
   ASSERT_NO_FATAL_FAILURE(StartServer());
   StreamFleet();
-  // The map is published a few times a second; wait until the last scans are in it.
-  nlohmann::json all;
+  // The map is published a few times a second; wait until the last scans are in it and no version comes any more.
+  nlohmann::json all, none;
   EXPECT_TRUE(test::Eventually([&] {
     const auto before = MustJson({"map", "info", "--site", "hall"})["maps"][0];
     all = MustJson({"tiles", "--site", "hall", "-o", File("tiles")});
+    none = MustJson({"tiles", "--site", "hall", "--since-epoch", std::to_string(all["map_epoch"].get<int>()),
+                     "--since-version", std::to_string(all["map_version"].get<int>())});
     return before["tile_count"] > 4 && all["tiles"].size() == before["tile_count"] &&
-           all["map_version"] == before["version"];
+           all["map_version"] == before["version"] && none["map_version"] == all["map_version"];
   }));
+  EXPECT_EQ(none["tiles"].size(), 0u);
   EXPECT_TRUE(std::filesystem::exists(File("tiles/L0_0_0.png")));
   EXPECT_LT(MustJson({"tiles", "--site", "hall", "--level", "2"})["tiles"].size(), all["tiles"].size());
   EXPECT_LT(MustJson({"tiles", "--site", "hall", "--area", "0.1,0.1,6,6"})["tiles"].size(), all["tiles"].size());
-  const auto none = MustJson({"tiles", "--site", "hall", "--since-epoch", std::to_string(all["map_epoch"].get<int>()),
-                              "--since-version", std::to_string(all["map_version"].get<int>())});
-  EXPECT_EQ(none["tiles"].size(), 0u);
 
   const auto exported = MustJson({"map", "export", "--site", "hall", "-o", File("hall.yaml"), "--image", "pgm"});
   const auto map = LoadMapYaml(File("hall.yaml"));

@@ -143,7 +143,8 @@ TEST(LandmarkCorrection, AnImplausibleCorrectionIsLeftAlone) {
 
 template <typename FilterType>
 std::unique_ptr<Filter> MakeSingleBelief() {
-  if constexpr (std::is_same_v<FilterType, EkfSlam>) return std::make_unique<EkfSlam>(EkfOptions{}, WideDrift(), Pose2{});
+  if constexpr (std::is_same_v<FilterType, EkfSlam>)
+    return std::make_unique<EkfSlam>(EkfOptions{}, WideDrift(), Pose2{});
   if constexpr (std::is_same_v<FilterType, LandmarkCorrection>)
     return std::make_unique<LandmarkCorrection>(CorrectionOptions{}, WideDrift(), Pose2{});
   return std::make_unique<DeadReckoningFilter>(WideDrift(), Pose2{});

@@ -32,7 +32,8 @@ double ErrorOf(const Pose2& answer, const Pose2& truth) {
 
 TEST(LineLsq, AlignsTwoPlacesOfACorridorWhereTheFirstPairsAloneFail) {
   const Pose2 start{0, 0, 0.05}, motion{0.3, 0.06, 0.14};
-  const ScanFeatures prev = FeaturesFrom(CorridorWithDoors(), start), curr = FeaturesFrom(CorridorWithDoors(), start * motion);
+  const ScanFeatures prev = FeaturesFrom(CorridorWithDoors(), start),
+                     curr = FeaturesFrom(CorridorWithDoors(), start * motion);
   const MatchPrior nothing_known;
   LineLsqOptions once;
   once.max_rounds = 1;

@@ -107,9 +107,9 @@ TEST_P(ScanMatchers, NoiseGivesSpreadButHardlyBias) {
   int matched = 0;
   constexpr int kRuns = 40;
   for (int run = 0; run < kRuns; ++run) {
-    const MatchResult match =
-        Match(ViewFrom(test::Office(), kStart, laser, &engine), ViewFrom(test::Office(), kStart * motion, laser, &engine),
-              motion * Pose2{off(engine), off(engine), off(engine)});
+    const MatchResult match = Match(ViewFrom(test::Office(), kStart, laser, &engine),
+                                    ViewFrom(test::Office(), kStart * motion, laser, &engine),
+                                    motion * Pose2{off(engine), off(engine), off(engine)});
     if (!match.converged) continue;
     ++matched;
     const Eigen::Vector2d error = match.T_prev_curr.translation() - motion.translation();
@@ -126,7 +126,8 @@ TEST_P(ScanMatchers, NoiseGivesSpreadButHardlyBias) {
 
 TEST_P(ScanMatchers, ConvergeFromEverywhereInTheirBasin) {
   const Pose2 motion{0.25, 0.05, 0.12};
-  const ScanView prev = ViewFrom(test::Office(), kStart, kLaser), curr = ViewFrom(test::Office(), kStart * motion, kLaser);
+  const ScanView prev = ViewFrom(test::Office(), kStart, kLaser),
+                 curr = ViewFrom(test::Office(), kStart * motion, kLaser);
   int far = 0, silent = 0;
   const int directions = GetParam().kind == MatcherKind::kNdtDe ? 1 : 6;  // A population a start: too slow for more.
   std::printf("%s: share of starts that lead to the answer; rows m, columns deg\n       0    5   10   15   20   30\n",
@@ -195,8 +196,8 @@ TEST_P(ScanMatchers, OneWallNeverMovesTheRobotAlongIt) {
   Laser laser = kLaser;
   laser.range_max_m = 6.0;
   const Pose2 motion{0.2, 0.05, 0.06}, guess{0.15, 0.02, 0.03};
-  const MatchResult match =
-      Match(ViewFrom(wall, {}, laser), ViewFrom(wall, motion, laser), guess, Eigen::Vector3d(0.01, 0.01, 0.01).asDiagonal());
+  const MatchResult match = Match(ViewFrom(wall, {}, laser), ViewFrom(wall, motion, laser), guess,
+                                  Eigen::Vector3d(0.01, 0.01, 0.01).asDiagonal());
   EXPECT_LT(std::abs(match.T_prev_curr.y - guess.y), GetParam().slide_m);
   if (!match.converged) return;
   EXPECT_TRUE(match.degenerate);
@@ -228,8 +229,9 @@ TEST_P(ScanMatchers, EnoughOfTheViewIsEnough) {
     const double view = Radians(degrees);
     const int beams = static_cast<int>(std::lround(2 * degrees)) + (degrees < 360.0 ? 1 : 0);
     const Laser laser{.beams = beams, .first_rad = -0.5 * view, .step_rad = Radians(0.5)};
-    const MatchResult match = Match(ViewFrom(test::Office(), kStart, laser), ViewFrom(test::Office(), kStart * motion, laser),
-                                    motion * Pose2{0.04, -0.04, 0.03});
+    const MatchResult match =
+        Match(ViewFrom(test::Office(), kStart, laser), ViewFrom(test::Office(), kStart * motion, laser),
+              motion * Pose2{0.04, -0.04, 0.03});
     std::printf("%s: %3.0f deg of view: %s, error %.4f m\n", MatcherName(GetParam().kind).data(), degrees,
                 match.converged ? "matched" : MatchFailureName(match.failure).data(),
                 Metres(match.T_prev_curr, motion));
@@ -280,7 +282,8 @@ TEST_P(ScanMatchers, ACrowdIsSeenThroughOrOwnedUpTo) {
 
 TEST_P(ScanMatchers, TheThreadsDoNotMatter) {
   const Pose2 motion{0.25, 0.05, 0.12};
-  const ScanView prev = ViewFrom(test::Office(), kStart, kLaser), curr = ViewFrom(test::Office(), kStart * motion, kLaser);
+  const ScanView prev = ViewFrom(test::Office(), kStart, kLaser),
+                 curr = ViewFrom(test::Office(), kStart * motion, kLaser);
   const ParallelFor backwards = [](int count, const std::function<void(int, int)>& body) {
     for (int end = count; end > 0; end -= 3) body(std::max(0, end - 3), end);
   };
