@@ -7,10 +7,11 @@ namespace cairn::slam {
 namespace {
 
 constexpr std::size_t kMaxWitnesses = 3;
-constexpr std::size_t kMinLooks = 5;  // Of a stretch, for a verdict.
-constexpr int kMinKnown = 20;         // Points compared, for a look to count.
-constexpr double kTurnCostM = 1.0;    // Per radian: who looks elsewhere sees less in common.
-constexpr double kSamePlaceM = 3.0;   // Of way, between two witnesses.
+constexpr std::size_t kMinLooks = 5;    // Of a stretch, for a verdict.
+constexpr std::size_t kMaxLooks = 500;  // Who turns on the spot looks often without travelling.
+constexpr int kMinKnown = 20;           // Points compared, for a look to count.
+constexpr double kTurnCostM = 1.0;      // Per radian: who looks elsewhere sees less in common.
+constexpr double kSamePlaceM = 3.0;     // Of way, between two witnesses.
 
 }  // namespace
 
@@ -82,7 +83,8 @@ std::vector<std::size_t> SelfCheck::Witnesses(std::span<const KeyframeShape> sha
 }
 
 void SelfCheck::Judge() {
-  while (looks_.back().travelled_m - looks_.front().travelled_m > options_.stretch_m) looks_.pop_front();
+  while (looks_.back().travelled_m - looks_.front().travelled_m > options_.stretch_m || looks_.size() > kMaxLooks)
+    looks_.pop_front();
   if (looks_.size() < kMinLooks) return;
   Testimony sum;
   for (const Looked& look : looks_) sum += look.testimony;
