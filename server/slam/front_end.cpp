@@ -58,6 +58,9 @@ void Visit(OptionVisitor& visitor, FrontEndOptions& options) {
                   "Keyframes matched against; more: steadier, until drift blurs them.");
   visitor.Real("retry_below", options.retry_below, "1", 0.0, 1.0,
                "Score under which other guesses than odometry are tried.");
+  visitor.Real("keep_above", options.keep_above, "1", 0.0, 1.0,
+               "Without refinement: score from which icp and correlative keep their reference; lower: less drift while "
+               "it lasts, poorer matches.");
   visitor.Real("max_jump_sigma", options.max_jump_sigma, "1", 0.5, 1000.0,
                "Without refinement: matches farther from odometry than this are faults.");
 }
@@ -98,6 +101,7 @@ TrackStep FrontEnd::Track(const ScanView& view, const Pose2& T_odom_robot, const
     if (!step.matched && !options_.use_odometry)
       step.moved_m = std::max(step.moved_m, options_.no_odometry.unmatched_step_m);
     T_track_robot_ = step.match.T_prev_curr;
+    score_ = step.match.score;
   }
   started_ = true;
   step.T_track_robot = T_track_robot_;
@@ -222,6 +226,7 @@ MatchResult FrontEnd::Refine(const ScanView& view, const Pose2& T_odom_robot, co
 }
 
 void FrontEnd::AddKeyframe(const ScanView& view) {
+  if (!options_.refine_enabled && KeepsReference(matcher_) && score_ >= options_.keep_above) return;
   keyframe_ = history_.back();
   keyframe_view_ = view;
   keyframe_index_.Clear();

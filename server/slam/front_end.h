@@ -1,7 +1,8 @@
 // Follows the robot from scan to scan: the chosen matcher compares every scan with the last keyframe, an alignment with
 // what the last keyframes saw refines its answer, odometry stands in where neither knows; and says how it moved and how
 // sure that is. Without the refinement the matcher's own answer counts, unless it jumps against the odometry or
-// explains too little of the scan. Its frame `track` is smooth and drifts slowly, as a very good odometry; closing
+// explains too little of the scan; matchers of points then keep a keyframe as reference while it explains the next
+// ones. Its frame `track` is smooth and drifts slowly, as a very good odometry; closing
 // loops is the filter's business. Not thread-safe. Deterministic. Source: thesis A 3.5 (voting), 3.5.13 and 3.6.1
 // (fall-backs, fault check); Censi 2008 (refinement).
 #pragma once
@@ -38,6 +39,7 @@ struct FrontEndOptions {
   NoOdometryOptions no_odometry;
   std::int64_t reference_keyframes = 40;  // Scans matched against; more: steadier, until drift blurs them.
   double retry_below = 0.65;              // Score under which other guesses than odometry are tried.
+  double keep_above = 0.75;               // Without refinement: score from which the reference stays (KeepsReference).
   double max_jump_sigma = 5.0;  // Without refinement: a matcher's answer farther from odometry is a fault (3.6.1).
 };
 void Visit(OptionVisitor& visitor, FrontEndOptions& options);
@@ -88,7 +90,8 @@ class FrontEnd {
   MatcherOptions matching_;
   bool started_ = false;
   Pose2 T_track_robot_;
-  Sight keyframe_;  // The last keyframe, and what it saw, in its robot frame.
+  double score_ = 0.0;  // Of the last match.
+  Sight keyframe_;  // What the matcher compares with, the last keyframe mostly, and what it saw, in its robot frame.
   ScanView keyframe_view_;
   PointIndex keyframe_index_;
   std::deque<Sight> history_;                        // The last scans, newest last.

@@ -5,6 +5,7 @@
 #include "server/slam/grid/grid_redraw.h"
 #include "server/slam/matching/loop_search.h"
 #include "server/slam/matching/revisit_search.h"
+#include "server/slam/matching/self_check.h"
 #include "server/slam/scan/tilt.h"
 #include "server/slam/smoothing/keyframe_graph.h"
 
@@ -23,6 +24,7 @@ struct Mapper::State {
         front_end(given.front_end, given.matcher, given.matching),
         revisits(given.revisit, given.front_end.refine),
         loops(given.loop, given.front_end.refine),
+        self_check(given.self_check),
         graph(given.filter.back_end.drift),
         filter(MakeFilter(given.filter.kind, given.filter, T_map_robot_start, seed)),
         grid(given.grid) {}
@@ -38,6 +40,7 @@ struct Mapper::State {
   FrontEnd front_end;
   RevisitSearch revisits;
   LoopSearch loops;
+  SelfCheck self_check;
   KeyframeGraph graph;
   std::vector<double> distances_m;  // Along the graph, from the last keyframe to each.
   std::unique_ptr<Filter> filter;
@@ -103,7 +106,7 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   outcome.covariance = s.filter->estimate().covariance;
   outcome.score = first ? 1.0 : step.match.score;
   outcome.reason = first ? PoseReason::kTracking : ReasonOf(step, s.unmatched_m, s.options.lost_after_m);
-  if (s.filter->health().diverged) outcome.reason = PoseReason::kDiverged;
+  if (s.filter->health().diverged || s.self_check.contradicted()) outcome.reason = PoseReason::kDiverged;
   outcome.localized = outcome.reason != PoseReason::kLost && outcome.reason != PoseReason::kDiverged;
   s.level = outcome;
   s.level_place = s.scans.back();
@@ -153,6 +156,7 @@ void Mapper::State::AddKeyframe(std::shared_ptr<const Scan> scan, const Pose2& T
   shapes.push_back({step.T_track_robot, travelled_m, std::move(view.points_robot)});
   distances_m = graph.DistancesFromLast();
   CloseLargeLoop();
+  self_check.Look(keyframes, shapes, filter->hypothesis(0).path);
   grid.Draw(*keyframes.back().scan, filter->estimate().T_map_robot);
   online_path.push_back(filter->estimate().T_map_robot);
 }
@@ -173,6 +177,7 @@ void Mapper::State::CloseLargeLoop() {
   distances_m = graph.DistancesFromLast();
   rebased_keyframes = keyframes.size();
   redraw.emplace(options.grid);
+  self_check.Forget();
 }
 
 void Mapper::State::Redraw() {

@@ -21,6 +21,8 @@ void Visit(OptionVisitor& visitor, MapperOptions& options) {
   visitor.Section("gate", "When a scan is worth an update of filter and map.", [&] { Visit(visitor, options.gate); });
   visitor.Section("revisit", "Recognising places seen before.", [&] { Visit(visitor, options.revisit); });
   visitor.Section("loop", "Finding large loops.", [&] { Visit(visitor, options.loop); });
+  visitor.Section("self_check", "Noticing that scans and map contradict each other.",
+                  [&] { Visit(visitor, options.self_check); });
   visitor.Section("pose_graph", "The path that fits all loops best.", [&] { Visit(visitor, options.pose_graph); });
   visitor.Section("grid", "The occupancy grid.", [&] { Visit(visitor, options.grid); });
   visitor.Section("pairing", "Joining scans and odometry by their stamps.", [&] { Visit(visitor, options.pairing); });

@@ -10,6 +10,7 @@
 #include "server/slam/matching/loop_search.h"
 #include "server/slam/matching/revisit_search.h"
 #include "server/slam/matching/scan_matching.h"
+#include "server/slam/matching/self_check.h"
 #include "server/slam/motion/motion_gate.h"
 #include "server/slam/scan/odometry_pairing.h"
 #include "server/slam/smoothing/pose_graph.h"
@@ -27,6 +28,7 @@ struct MapperOptions {
   MotionGateOptions gate;
   RevisitOptions revisit;
   LoopOptions loop;
+  SelfCheckOptions self_check;
   PoseGraphOptions pose_graph;
   FilterOptions filter;
   GridOptions grid;

@@ -20,6 +20,7 @@ LogRun RunOverLog(const StudyLog& log, const slam::MapperOptions& options) {
                                      run.online.push_back({scan.stamp, outcome.T_map_robot});
                                      run.keyframes += outcome.keyframe ? 1 : 0;
                                      run.not_localized += outcome.localized ? 0 : 1;
+                                     run.localized.push_back(outcome.localized ? 1 : 0);
                                      ++run.reasons[static_cast<std::size_t>(outcome.reason)];
                                      watch.Restart();
                                    },

@@ -28,6 +28,7 @@ struct LogRun {
   std::uint64_t keyframes = 0;
   std::array<std::uint64_t, kPoseReasonCount> reasons{};  // Scans by what the mapper said of its pose.
   std::uint64_t not_localized = 0;
+  std::vector<std::uint8_t> localized;  // Per pose of `online`: whether the mapper stood by it.
   std::size_t landmarks = 0;
   slam::MapperSnapshot snapshot;
 

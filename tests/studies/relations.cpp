@@ -62,20 +62,26 @@ Result<std::vector<Relation>> ReadRelations(const std::filesystem::path& path) {
   return relations;
 }
 
+std::vector<RelationResidual> ResidualsOf(const Trajectory& trajectory, const std::vector<Relation>& relations) {
+  std::vector<RelationResidual> residuals;
+  for (const Relation& relation : relations) {
+    const auto T_map_from = PoseAt(trajectory, relation.from), T_map_to = PoseAt(trajectory, relation.to);
+    if (!T_map_from || !T_map_to) continue;
+    const Pose2 off = Between(relation.T_from_to, Between(*T_map_from, *T_map_to));
+    residuals.push_back({relation.from, relation.to, off.translation().norm(), Degrees(std::abs(off.theta))});
+  }
+  return residuals;
+}
+
 RelationError ErrorOf(const Trajectory& trajectory, const std::vector<Relation>& relations) {
   RelationError error;
   std::vector<double> distances, angles;
-  for (const Relation& relation : relations) {
-    const auto T_map_from = PoseAt(trajectory, relation.from), T_map_to = PoseAt(trajectory, relation.to);
-    if (!T_map_from || !T_map_to) {
-      ++error.missing;
-      continue;
-    }
-    const Pose2 off = Between(relation.T_from_to, Between(*T_map_from, *T_map_to));
-    distances.push_back(off.translation().norm());
-    angles.push_back(Degrees(std::abs(off.theta)));
+  for (const RelationResidual& residual : ResidualsOf(trajectory, relations)) {
+    distances.push_back(residual.trans_m);
+    angles.push_back(residual.rot_deg);
   }
   error.compared = distances.size();
+  error.missing = relations.size() - error.compared;
   const Moments trans = MomentsOf(distances), rot = MomentsOf(angles);
   error.trans_mean_m = trans.mean, error.trans_deviation_m = trans.deviation, error.trans_max_m = trans.max;
   error.rot_mean_deg = rot.mean, error.rot_deviation_deg = rot.deviation, error.rot_max_deg = rot.max;

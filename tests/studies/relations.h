@@ -21,6 +21,18 @@ struct Relation {
 // `stamp1 stamp2 x y z roll pitch yaw` a line, seconds, `#` starts a comment.
 [[nodiscard]] Result<std::vector<Relation>> ReadRelations(const std::filesystem::path& path);
 
+// How far off one relation is in a trajectory.
+struct RelationResidual {
+  Stamp from = 0;
+  Stamp to = 0;
+  double trans_m = 0.0;
+  double rot_deg = 0.0;
+};
+
+// Of the relations whose stamps the trajectory has, in their order.
+[[nodiscard]] std::vector<RelationResidual> ResidualsOf(const Trajectory& trajectory,
+                                                        const std::vector<Relation>& relations);
+
 struct RelationError {
   std::size_t compared = 0;
   std::size_t missing = 0;  // A stamp outside the trajectory, or in a gap of more than 2 s.

@@ -34,6 +34,13 @@ enum class MatcherKind : std::uint8_t { kVoting = 0, kLineLsq, kHough, kNdt, kNd
   return kind == MatcherKind::kHough || kind == MatcherKind::kNdtDe;
 }
 
+// Whether a matcher is as exact from a metre away as from nearby, so that a reference that still explains the scan is
+// better kept: each change of the reference adds an error. Lines and cells change too much with the place they are
+// seen from.
+[[nodiscard]] constexpr bool KeepsReference(MatcherKind kind) {
+  return kind == MatcherKind::kIcp || kind == MatcherKind::kCorrelative;
+}
+
 struct MatcherOptions {
   VotingOptions voting;
   NdtOptions ndt;

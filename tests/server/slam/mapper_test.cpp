@@ -83,15 +83,15 @@ TEST(Mapper, FollowsTheRobotTwiceRoundALoop) {
   EXPECT_LT(run.worst_m, 0.25);
 }
 
-// Round a block, 3 m of it blind and with slipping wheels: back at its start the robot believes to be some metres off.
-Drive DriveRoundABlockAndSlip() {
+// Once round a large ring and 28 m more. Blind from `blind_from_m` for `blind_m` of way, where the wheels slip.
+Drive DriveLargeRing(double blind_from_m, double blind_m) {
   const test::World world = test::RingCorridor(true);
   const Laser laser{.beams = 181, .step_rad = Radians(1.0), .range_max_m = 12.0};
   Drive drive;
   Pose2 truth, odometry;
   double way_m = 0.0;
   for (const Pose2& step : test::RingSteps(140.0, 0.25)) {
-    const bool blind = way_m > 70.0 && way_m < 73.0;
+    const bool blind = way_m > blind_from_m && way_m < blind_from_m + blind_m;
     Scan scan = Look(world, truth, laser);
     if (blind) scan.ranges_m.assign(scan.ranges_m.size(), std::numeric_limits<float>::infinity());
     scan.stamp = static_cast<Stamp>(drive.scans.size() + 1) * 100'000'000;
@@ -115,7 +115,7 @@ MapperOptions SlipOptions(bool loops) {
 
 // What follows from the loop reaches the pose, the path and, some scans later, the map.
 TEST(Mapper, ClosesALargeLoopAndDrawsTheMapAgain) {
-  const Drive drive = DriveRoundABlockAndSlip();
+  const Drive drive = DriveLargeRing(70.0, 3.0);
   const auto run = [&](bool loops) {
     Mapper mapper(SlipOptions(loops), {}, 1);
     ScanOutcome outcome;
@@ -155,7 +155,7 @@ double ShareMissing(const OccupancyGrid& grid, const OccupancyGrid& other) {
 // A smoothing job takes its snapshot, the robot closes a large loop, and the job's grid comes back showing the old way:
 // it is adopted (the job's answer stands) and then drawn anew along the way that is known now.
 TEST(Mapper, AGridFromBeforeALargeLoopIsDrawnAnew) {
-  const Drive drive = DriveRoundABlockAndSlip();
+  const Drive drive = DriveLargeRing(70.0, 3.0);
   Mapper mapper(SlipOptions(true), {}, 1);
   const auto process = [&](std::size_t from, std::size_t to) {
     for (std::size_t i = from; i < to; ++i)
@@ -178,6 +178,41 @@ TEST(Mapper, AGridFromBeforeALargeLoopIsDrawnAnew) {
   process(adopted_at, end);
   EXPECT_LT(ShareMissing(mapper.grid(), after), 0.01);
   EXPECT_LT(ShareMissing(after, mapper.grid()), 0.01);
+}
+
+// No filter puts the slip of a short side right: the first side is drawn again beside itself. Whoever asks is told,
+// from the second round on and not before. Where the loop is closed, the robot knows again where it is.
+TEST(Mapper, SaysSoWhereItDrawsTheMapBesideItself) {
+  const Drive drive = DriveLargeRing(42.0, 1.2);
+  const auto run = [&](FilterKind filter, bool self_check) {
+    MapperOptions options;
+    options.filter.kind = filter;
+    options.filter.particles = 50;
+    options.self_check.enabled = self_check;
+    Mapper mapper(options, {}, 1);
+    std::vector<ScanOutcome> outcomes;
+    for (std::size_t i = 0; i < drive.scans.size(); ++i)
+      outcomes.push_back(mapper.Process(drive.scans[i], drive.odometry[i], SerialFor));
+    return outcomes;
+  };
+  const auto error_m = [&](const ScanOutcome& outcome) {
+    return (outcome.T_map_robot.translation() - drive.truth.back().translation()).norm();
+  };
+  const auto silent = run(FilterKind::kNone, false), told = run(FilterKind::kNone, true);
+  const auto closed = run(FilterKind::kFastSlam2Points, true);
+  ASSERT_GT(error_m(told.back()), 0.4) << "the slip must need correcting";
+  EXPECT_TRUE(silent.back().localized);
+  EXPECT_FALSE(told.back().localized);
+  EXPECT_EQ(told.back().reason, PoseReason::kDiverged);
+  const std::size_t back_at_start = 416 + 15;  // Steps of 0.25 m and five turns a corner: 8 m before the start.
+  for (std::size_t i = 0; i < drive.scans.size(); ++i) {
+    EXPECT_EQ(told[i].T_map_robot, silent[i].T_map_robot);  // It judges, and changes nothing.
+    if (i < back_at_start) {
+      EXPECT_TRUE(told[i].localized) << i;
+    }
+  }
+  EXPECT_LT(error_m(closed.back()), 0.3);
+  EXPECT_TRUE(closed.back().localized);
 }
 
 TEST(Mapper, TheFullPathHasAPoseForEveryScan) {
