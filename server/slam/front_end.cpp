@@ -40,6 +40,8 @@ void Visit(OptionVisitor& visitor, NoOdometryOptions& options) {
   visitor.Real("sigma_rad", options.sigma_rad, "rad", 0.001, kPi, "See sigma_m.");
   visitor.Real("unmatched_step_m", options.unmatched_step_m, "m", 0.0, 100.0,
                "What a scan without a match counts as travelled, towards being lost.");
+  visitor.Integer("merged_keyframes", options.merged_keyframes, "1", 1, 1000,
+                  "Keyframes whose points the matcher sees as one; more: less pull towards standing still.");
 }
 
 void Visit(OptionVisitor& visitor, FrontEndOptions& options) {
@@ -223,9 +225,6 @@ MatchResult FrontEnd::Refine(const ScanView& view, const Pose2& T_odom_robot, co
 
 void FrontEnd::AddKeyframe(const ScanView& view) {
   keyframe_ = history_.back();
-  keyframe_view_ = view;
-  keyframe_index_.Clear();
-  for (const SurfacePoint& point : view.points_robot) keyframe_index_.Add(point);
   const Eigen::Matrix2d R = T_track_robot_.rotation();
   std::vector<SurfacePoint> points_track;
   points_track.reserve(view.points_robot.size());
@@ -236,6 +235,21 @@ void FrontEnd::AddKeyframe(const ScanView& view) {
   index_.Clear();
   for (const auto& points : reference_)
     for (const SurfacePoint& point : points) index_.Add(point);
+
+  keyframe_view_ = view;
+  if (!options_.use_odometry)
+    keyframe_view_.points_robot = MergedPoints(static_cast<std::size_t>(options_.no_odometry.merged_keyframes));
+  keyframe_index_.Clear();
+  for (const SurfacePoint& point : keyframe_view_.points_robot) keyframe_index_.Add(point);
+}
+
+std::vector<SurfacePoint> FrontEnd::MergedPoints(std::size_t keyframes) const {
+  const Pose2 T_keyframe_track = keyframe_.T_track_robot.Inverse();
+  const Eigen::Matrix2d R = T_keyframe_track.rotation();
+  std::vector<SurfacePoint> merged;
+  for (std::size_t k = reference_.size() - std::min(keyframes, reference_.size()); k < reference_.size(); ++k)
+    for (const SurfacePoint& point : reference_[k]) merged.push_back({T_keyframe_track * point.p, R * point.normal});
+  return merged;
 }
 
 }  // namespace cairn::slam

@@ -25,6 +25,7 @@ struct NoOdometryOptions {
   double sigma_m = 0.03;          // Of the prediction; larger: what scans seem to show along a corridor counts more.
   double sigma_rad = 0.15;
   double unmatched_step_m = 0.3;  // What a scan without a match counts as travelled, towards being lost.
+  std::int64_t merged_keyframes = 8;  // The matcher compares with what these saw; more: less pull towards standing still.
 };
 void Visit(OptionVisitor& visitor, NoOdometryOptions& options);
 
@@ -82,6 +83,8 @@ class FrontEnd {
   [[nodiscard]] std::vector<Pose2> UnusualGuesses(const Pose2& T_odom_robot) const;
   // Share of the scan that lies on what the last keyframe saw.
   [[nodiscard]] double Explained(const ScanView& view, const Pose2& T_track_robot) const;
+  // What the last keyframes saw, in the robot frame of the last of them.
+  [[nodiscard]] std::vector<SurfacePoint> MergedPoints(std::size_t keyframes) const;
 
   FrontEndOptions options_;
   MatcherKind matcher_;
