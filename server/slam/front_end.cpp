@@ -79,21 +79,10 @@ ScanView Look(const Scan& scan, const FrontEndOptions& options) {
 TrackStep FrontEnd::Track(const ScanView& view, const Pose2& T_odom_robot, const ParallelFor& parallel_for) {
   TrackStep step;
   if (started_) {
-    Guess guess = Predict(T_odom_robot);
+    const Guess guess = Predict(T_odom_robot);
     const MatchResult coarse = MatchLastKeyframe(view, guess, parallel_for);
-    // A forecast is no observation: where the refinement sees nothing, the matcher's answer stays.
-    if (!options_.use_odometry && options_.refine_enabled && coarse.converged) guess.T_track_robot = coarse.T_prev_curr;
     step.match = options_.refine_enabled ? Refine(view, T_odom_robot, guess, coarse)
                                          : MatchAlone(view, T_odom_robot, guess, coarse, parallel_for);
-    if (!options_.use_odometry && step.match.converged && coarse.converged && coarse.degenerate) {
-      // What the matcher saw no hold along, sparse points of the refinement must not hold either.
-      const Eigen::Vector2d open = coarse.degenerate_direction;
-      const double along = open.dot(coarse.T_prev_curr.translation() - step.match.T_prev_curr.translation());
-      step.match.T_prev_curr.x += along * open.x();
-      step.match.T_prev_curr.y += along * open.y();
-      step.match.degenerate = true;
-      step.match.degenerate_direction = open;
-    }
     step.matcher = coarse.failure;
     step.matched = step.match.converged;
     step.moved_m = Between(T_track_robot_, step.match.T_prev_curr).translation().norm();
