@@ -118,8 +118,9 @@ class StandingThreads {
 slam::ParallelFor OverThreads(std::int64_t threads) {
   const int count = threads > 0 ? static_cast<int>(threads) : static_cast<int>(std::thread::hardware_concurrency());
   if (count <= 1) return slam::SerialFor;
-  return [pool = std::make_shared<StandingThreads>(count - 1)](
-             int size, const std::function<void(int, int)>& body) { pool->Run(size, body); };
+  return [pool = std::make_shared<StandingThreads>(count - 1)](int size, const std::function<void(int, int)>& body) {
+    pool->Run(size, body);
+  };
 }
 
 }  // namespace cairn::server

@@ -1,4 +1,6 @@
-// Matching neighbouring keyframes from odometry's guess: by voting over lines, and by aligning points with lines.
+// Matching of neighbouring keyframes: from odometry's guess by voting over lines and by aligning points with lines, and
+// without a guess by the evolution of thesis C.
+#include "server/offline/over_threads.h"
 #include "server/slam/matching/icp.h"
 #include "server/slam/matching/ndt_de.h"
 #include "server/slam/matching/voting.h"
