@@ -80,14 +80,19 @@ TrackStep FrontEnd::Track(const ScanView& view, const Pose2& T_odom_robot, const
   TrackStep step;
   if (started_) {
     const Guess guess = Predict(T_odom_robot);
-    const MatchResult coarse = MatchLastKeyframe(view, guess, parallel_for);
+    MatchResult coarse = MatchLastKeyframe(view, guess, parallel_for);
+    // Points slide along a corridor slowly: the refinement must begin where it is to stay if they show nothing.
+    if (!options_.use_odometry && options_.refine_enabled)
+      TakeAlongFromPrior({guess.T_track_robot, guess.covariance}, coarse);
     step.match = options_.refine_enabled ? Refine(view, T_odom_robot, guess, coarse)
                                          : MatchAlone(view, T_odom_robot, guess, coarse, parallel_for);
     step.matcher = coarse.failure;
     step.matched = step.match.converged;
     step.moved_m = Between(T_track_robot_, step.match.T_prev_curr).translation().norm();
-    if (!step.matched && !options_.use_odometry)
-      step.moved_m = std::max(step.moved_m, options_.no_odometry.unmatched_step_m);
+    if (!options_.use_odometry) {
+      if (!step.matched) step.moved_m = std::max(step.moved_m, options_.no_odometry.unmatched_step_m);
+      step.forecast_covariance = ForecastShare(step.match);
+    }
     T_track_robot_ = step.match.T_prev_curr;
   }
   started_ = true;
@@ -110,6 +115,20 @@ FrontEnd::Guess FrontEnd::Predict(const Pose2& T_odom_robot) const {
     motion = Between(history_[history_.size() - 2].T_track_robot, last.T_track_robot);
   const Eigen::Vector3d sigma(expected.sigma_m, expected.sigma_m, expected.sigma_rad);
   return {last.T_track_robot * motion, sigma.cwiseAbs2().asDiagonal()};
+}
+
+Eigen::Matrix3d FrontEnd::ForecastShare(const MatchResult& match) const {
+  if (match.converged && !match.degenerate) return Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d unseen = match.covariance;
+  if (match.converged) {
+    const Eigen::Vector2d u = match.degenerate_direction;
+    const double along = u.dot(unseen.topLeftCorner<2, 2>() * u);
+    unseen.setZero();
+    unseen.topLeftCorner<2, 2>() = along * u * u.transpose();
+  }
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  R.topLeftCorner<2, 2>() = keyframe_.T_track_robot.rotation().transpose();
+  return R * unseen * R.transpose();
 }
 
 // In track: the matcher itself works in the keyframe's frame.

@@ -41,6 +41,22 @@ TEST(NdtMap, CellsLieWhereThePlaneSaysNotWhereThePointsBegin) {
   EXPECT_NEAR(NdtMap(points, {}).Density({0.3, 0.22}), alone, 1e-12);
 }
 
+// In single precision, wherever the scan lies: means are kept from the corners of their half cells.
+TEST(NdtMap, TheScoreIsTheSumOfTheDensities) {
+  for (const Pose2& place : {Pose2{}, Pose2{31000.25, -47000.5, 1.0}}) {
+    Points points = OfficePoints();
+    for (Eigen::Vector2d& p : points) p = place * p;
+    const NdtMap map(points, {});
+    const Pose2 off{0.013, -0.02, 0.0};
+    double sum = 0.0;
+    for (const Eigen::Vector2d& p : points) sum += map.Density(off * p);
+    EXPECT_GT(sum, 50.0);
+    EXPECT_NEAR(map.Score(points, off), sum, 1e-5 * sum);
+    EXPECT_NEAR(map.Derivatives(points, off).score, sum, 1e-9 * sum);
+    EXPECT_LT(map.Score(points, off * Pose2{40.0, 40.0, 0.0}), 1e-6);  // Absent distributions add nothing.
+  }
+}
+
 TEST(NdtMap, TwoPointsMakeNoDistributionAndThreeEqualOnesNeither) {
   EXPECT_TRUE(NdtMap(Points{{0, 0}, {0.1, 0}}, {}).empty());
   EXPECT_TRUE(NdtMap(Points{{0.2, 0.2}, {0.2, 0.2}, {0.2, 0.2}}, {}).empty());
