@@ -57,9 +57,11 @@ void ListPeaks(Report& report, const std::vector<double>& fitness, const Sequenc
 void MapWithoutOdometry(StudyContext& context, const StudyLog& log, Table& table) {
   for (const bool refined : {true, false}) {
     context.report.Progress(log.name + " without odometry" + (refined ? ", refined" : ""));
-    const auto options = MapperWith({"slam.matcher=ndt_de", "slam.front_end.use_odometry=false",
-                                     std::string("slam.front_end.refine.enabled=") + (refined ? "true" : "false")},
-                                    context.seed);
+    // The page of slam names these for mapping without odometry, for every log.
+    const auto options = MapperWith(
+        {"slam.matcher=ndt_de", "slam.front_end.use_odometry=false", "slam.revisit.max_distance_m=6",
+         "slam.revisit.neighbours=20", std::string("slam.front_end.refine.enabled=") + (refined ? "true" : "false")},
+        context.seed);
     if (!options) {
       context.report.Warn(options.error().message);
       continue;
