@@ -46,7 +46,7 @@ void ListPeaks(Report& report, const std::vector<double>& fitness, const Sequenc
   Table table({"step (" + name + ")", "fitness", "A", "explained", "ahead (m)", "aside (m)", "turn (deg)"});
   for (std::size_t i = 0; i < std::min<std::size_t>(12, order.size()); ++i) {
     const slam::NdtDeMatch& match = errors.steps[order[i]].match;
-    const Pose2& T = match.result.T_prev_curr;
+    const Pose2& T = errors.steps[order[i]].T_prev_curr;
     table.Add({Count(static_cast<long long>(order[i] + 1)), Number(match.fitness, 1), Number(match.self_score, 1),
                Percent(match.result.score, 0), Number(T.x, 3), Number(T.y, 3), Number(Degrees(T.theta), 2)});
   }
