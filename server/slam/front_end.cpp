@@ -40,6 +40,8 @@ void Visit(OptionVisitor& visitor, NoOdometryOptions& options) {
   visitor.Real("sigma_rad", options.sigma_rad, "rad", 0.001, kPi, "See sigma_m.");
   visitor.Real("unmatched_step_m", options.unmatched_step_m, "m", 0.0, 100.0,
                "What a scan without a match counts as travelled, towards being lost.");
+  visitor.Integer("merged_keyframes", options.merged_keyframes, "1", 1, 1000,
+                  "Keyframes whose points the matcher sees as one; more: less pull towards standing still.");
 }
 
 void Visit(OptionVisitor& visitor, FrontEndOptions& options) {
@@ -80,26 +82,20 @@ ScanView Look(const Scan& scan, const FrontEndOptions& options) {
 TrackStep FrontEnd::Track(const ScanView& view, const Pose2& T_odom_robot, const ParallelFor& parallel_for) {
   TrackStep step;
   if (started_) {
-    Guess guess = Predict(T_odom_robot);
-    const MatchResult coarse = MatchLastKeyframe(view, guess, parallel_for);
-    // A forecast is no observation: where the refinement sees nothing, the matcher's answer stays.
-    if (!options_.use_odometry && options_.refine_enabled && coarse.converged) guess.T_track_robot = coarse.T_prev_curr;
+    const Guess guess = Predict(T_odom_robot);
+    MatchResult coarse = MatchLastKeyframe(view, guess, parallel_for);
+    // Points slide along a corridor slowly: the refinement must begin where it is to stay if they show nothing.
+    if (!options_.use_odometry && options_.refine_enabled)
+      TakeAlongFromPrior({guess.T_track_robot, guess.covariance}, coarse);
     step.match = options_.refine_enabled ? Refine(view, T_odom_robot, guess, coarse)
                                          : MatchAlone(view, T_odom_robot, guess, coarse, parallel_for);
-    if (!options_.use_odometry && step.match.converged && coarse.converged && coarse.degenerate) {
-      // What the matcher saw no hold along, sparse points of the refinement must not hold either.
-      const Eigen::Vector2d open = coarse.degenerate_direction;
-      const double along = open.dot(coarse.T_prev_curr.translation() - step.match.T_prev_curr.translation());
-      step.match.T_prev_curr.x += along * open.x();
-      step.match.T_prev_curr.y += along * open.y();
-      step.match.degenerate = true;
-      step.match.degenerate_direction = open;
-    }
     step.matcher = coarse.failure;
     step.matched = step.match.converged;
     step.moved_m = Between(T_track_robot_, step.match.T_prev_curr).translation().norm();
-    if (!step.matched && !options_.use_odometry)
-      step.moved_m = std::max(step.moved_m, options_.no_odometry.unmatched_step_m);
+    if (!options_.use_odometry) {
+      if (!step.matched) step.moved_m = std::max(step.moved_m, options_.no_odometry.unmatched_step_m);
+      step.forecast_covariance = ForecastShare(step.match);
+    }
     T_track_robot_ = step.match.T_prev_curr;
     score_ = step.match.score;
   }
@@ -123,6 +119,20 @@ FrontEnd::Guess FrontEnd::Predict(const Pose2& T_odom_robot) const {
     motion = Between(history_[history_.size() - 2].T_track_robot, last.T_track_robot);
   const Eigen::Vector3d sigma(expected.sigma_m, expected.sigma_m, expected.sigma_rad);
   return {last.T_track_robot * motion, sigma.cwiseAbs2().asDiagonal()};
+}
+
+Eigen::Matrix3d FrontEnd::ForecastShare(const MatchResult& match) const {
+  if (match.converged && !match.degenerate) return Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d unseen = match.covariance;
+  if (match.converged) {
+    const Eigen::Vector2d u = match.degenerate_direction;
+    const double along = u.dot(unseen.topLeftCorner<2, 2>() * u);
+    unseen.setZero();
+    unseen.topLeftCorner<2, 2>() = along * u * u.transpose();
+  }
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  R.topLeftCorner<2, 2>() = keyframe_.T_track_robot.rotation().transpose();
+  return R * unseen * R.transpose();
 }
 
 // In track: the matcher itself works in the keyframe's frame.
@@ -228,9 +238,6 @@ MatchResult FrontEnd::Refine(const ScanView& view, const Pose2& T_odom_robot, co
 void FrontEnd::AddKeyframe(const ScanView& view) {
   if (!options_.refine_enabled && KeepsReference(matcher_) && score_ >= options_.keep_above) return;
   keyframe_ = history_.back();
-  keyframe_view_ = view;
-  keyframe_index_.Clear();
-  for (const SurfacePoint& point : view.points_robot) keyframe_index_.Add(point);
   const Eigen::Matrix2d R = T_track_robot_.rotation();
   std::vector<SurfacePoint> points_track;
   points_track.reserve(view.points_robot.size());
@@ -241,6 +248,21 @@ void FrontEnd::AddKeyframe(const ScanView& view) {
   index_.Clear();
   for (const auto& points : reference_)
     for (const SurfacePoint& point : points) index_.Add(point);
+
+  keyframe_view_ = view;
+  if (!options_.use_odometry)
+    keyframe_view_.points_robot = MergedPoints(static_cast<std::size_t>(options_.no_odometry.merged_keyframes));
+  keyframe_index_.Clear();
+  for (const SurfacePoint& point : keyframe_view_.points_robot) keyframe_index_.Add(point);
+}
+
+std::vector<SurfacePoint> FrontEnd::MergedPoints(std::size_t keyframes) const {
+  const Pose2 T_keyframe_track = keyframe_.T_track_robot.Inverse();
+  const Eigen::Matrix2d R = T_keyframe_track.rotation();
+  std::vector<SurfacePoint> merged;
+  for (std::size_t k = reference_.size() - std::min(keyframes, reference_.size()); k < reference_.size(); ++k)
+    for (const SurfacePoint& point : reference_[k]) merged.push_back({T_keyframe_track * point.p, R * point.normal});
+  return merged;
 }
 
 }  // namespace cairn::slam

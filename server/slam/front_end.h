@@ -26,6 +26,8 @@ struct NoOdometryOptions {
   double sigma_m = 0.03;          // Of the prediction; larger: what scans seem to show along a corridor counts more.
   double sigma_rad = 0.15;
   double unmatched_step_m = 0.3;  // What a scan without a match counts as travelled, towards being lost.
+  std::int64_t merged_keyframes =
+      8;  // The matcher compares with what these saw; more: less pull towards standing still.
 };
 void Visit(OptionVisitor& visitor, NoOdometryOptions& options);
 
@@ -52,6 +54,9 @@ struct TrackStep {
   double moved_m = 0.0;                        // Since the scan before.
   MatchFailure matcher = MatchFailure::kNone;  // Why the matcher alone did not say.
   bool matched = false;                        // False: odometry alone.
+  // Of what no scan and no odometry showed of this step, in the last keyframe: a corridor's way, a scan unmatched. Zero
+  // where odometry is used, which the mapper accounts for.
+  Eigen::Matrix3d forecast_covariance = Eigen::Matrix3d::Zero();
 };
 
 class FrontEnd {
@@ -82,8 +87,11 @@ class FrontEnd {
                                        const MatchResult& coarse, const ParallelFor& parallel_for) const;
   // Without odometry since the last scan: it stood still, or came late. The scan must explain these clearly better.
   [[nodiscard]] std::vector<Pose2> UnusualGuesses(const Pose2& T_odom_robot) const;
+  [[nodiscard]] Eigen::Matrix3d ForecastShare(const MatchResult& match) const;
   // Share of the scan that lies on what the last keyframe saw.
   [[nodiscard]] double Explained(const ScanView& view, const Pose2& T_track_robot) const;
+  // What the last keyframes saw, in the robot frame of the last of them.
+  [[nodiscard]] std::vector<SurfacePoint> MergedPoints(std::size_t keyframes) const;
 
   FrontEndOptions options_;
   MatcherKind matcher_;

@@ -57,7 +57,7 @@ struct Mapper::State {
   Pose2 T_odom_level;        // ... and odometry there.
   double travelled_m = 0.0;  // Up to the last keyframe.
   double unmatched_m = 0.0;  // Travelled by odometry alone since the last match.
-  // Of what was travelled by odometry alone since the last keyframe, in that keyframe.
+  // Of what was travelled by odometry or a forecast alone since the last keyframe, in that keyframe.
   Eigen::Matrix3d blind_covariance = Eigen::Matrix3d::Zero();
 };
 
@@ -90,6 +90,7 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   const TrackStep step = s.front_end.Track(view, T_odom_robot, parallel_for);
   s.unmatched_m = step.matched || s.keyframes.empty() ? 0.0 : s.unmatched_m + step.moved_m;
   if (!step.matched) s.blind_covariance += s.options.blind.Covariance({step.moved_m, 0.0, 0.0});
+  s.blind_covariance += step.forecast_covariance;
   const bool first = s.keyframes.empty();
   Pose2 T_keyframe_robot = first ? Pose2{} : Between(s.shapes.back().T_track_robot, step.T_track_robot);
 

@@ -39,7 +39,8 @@ MAY_INCLUDE = {
     "client/cli": [*COMMON, "common/wire", "client/lib", "client/sim"],
     # Tests may look into everything.
     "tests": [*CHANNELS, "common", "common/wire", "server/slam", "server/ops", "server/maps", "server/robots",
-              "server/jobs", "server/queries", "server/ingress", "server/egress", "server", "server/calibrate", "client/lib", "client/sim", "client/web",
+              "server/jobs", "server/queries", "server/ingress", "server/egress", "server", "server/offline",
+              "server/calibrate", "client/lib", "client/sim", "client/web",
               "client/cli"],
 }
 

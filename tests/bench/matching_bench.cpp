@@ -1,5 +1,8 @@
-// Matching neighbouring keyframes from odometry's guess: by voting over lines, and by aligning points with lines.
+// Matching of neighbouring keyframes: from odometry's guess by voting over lines and by aligning points with lines, and
+// without a guess by the evolution of thesis C.
+#include "server/offline/over_threads.h"
 #include "server/slam/matching/icp.h"
+#include "server/slam/matching/ndt_de.h"
 #include "server/slam/matching/voting.h"
 #include "tests/bench/bench_input.h"
 
@@ -35,6 +38,18 @@ void PointToLine(benchmark::State& state) {
   });
 }
 BENCHMARK(PointToLine)->Apply(AllInputs);
+
+// Population 100, 50 generations, none of them saved by a stop rule.
+void Evolution(benchmark::State& state, std::int64_t threads) {
+  const slam::ParallelFor parallel_for = server::OverThreads(threads);
+  const slam::NdtDeOptions options;
+  OverPairs(state, [&](const slam::ScanView& prev, const slam::ScanView& curr, const Pose2& /*odometry*/) {
+    return slam::MatchByDifferentialEvolution(prev, curr, {{}, Eigen::Vector3d(1e4, 1e4, 1e2).asDiagonal()}, options,
+                                              parallel_for);
+  });
+}
+BENCHMARK_CAPTURE(Evolution, one_thread, 1)->Apply(AllInputs)->UseRealTime();
+BENCHMARK_CAPTURE(Evolution, two_threads, 2)->Apply(AllInputs)->UseRealTime();
 
 }  // namespace
 }  // namespace cairn::bench

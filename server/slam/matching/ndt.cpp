@@ -71,7 +71,7 @@ NewtonResult ClimbNdt(const NdtMap& map, std::span<const Eigen::Vector2d> points
     const double excess =
         std::max(step.head<2>().norm() / options.longest_step_m, std::abs(step.z()) / options.longest_step_rad);
     if (excess > 1.0) step /= excess;
-    while (!is_short(step) && map.Score(points, Moved(result.T_map_points, step)) <= at.score) step *= 0.5;
+    while (!is_short(step) && map.Derivatives(points, Moved(result.T_map_points, step)).score <= at.score) step *= 0.5;
     result.settled = is_short(step);
     // The last, short step is not proven to climb: it is not taken.
     if (!result.settled) result.T_map_points = Moved(result.T_map_points, step);

@@ -31,6 +31,7 @@ NdtDeMatch SearchNdt(std::span<const Eigen::Vector2d> points_prev, std::span<con
   NdtDeMatch match;
   const NdtMap map(points_prev, options.map);
   const std::vector<Eigen::Vector2d> points = ThinByCentreOfGravity(points_curr, options.thinning);
+  match.T_evolved = prior.T_prev_curr;
   match.self_score = map.Score(ThinByCentreOfGravity(points_prev, options.thinning), Pose2{});
   match.fitness = match.self_score;
   if (map.empty() || points.size() < static_cast<std::size_t>(options.evidence.min_inliers)) {
@@ -46,7 +47,8 @@ NdtDeMatch SearchNdt(std::span<const Eigen::Vector2d> points_prev, std::span<con
   const EvolutionResult evolved = Evolve(fitness, box, options.evolution, engine, parallel_for);
   match.fitness = evolved.cost;
   match.generations = evolved.generations;
-  Pose2 T_prev_curr = pose_at(evolved.best);
+  match.T_evolved = pose_at(evolved.best);
+  Pose2 T_prev_curr = match.T_evolved;
   int iterations = evolved.generations;
   if (options.climb) {
     const NewtonResult climb = ClimbNdt(map, points, T_prev_curr, options.newton);

@@ -36,6 +36,7 @@ void Visit(OptionVisitor& visitor, NdtDeOptions& options);
 // The answer and what the thesis judges it by.
 struct NdtDeMatch {
   MatchResult result;
+  Pose2 T_evolved;          // The evolution's best as it is, neither climbed nor joined with the prior.
   double fitness = 0.0;     // (4.43) at the evolution's best: A minus its score. The thesis: below 30 likely right.
   double self_score = 0.0;  // A, of the previous scan in its own distributions.
   int generations = 0;

@@ -68,6 +68,40 @@ TEST(NoOdometry, ABareCorridorIsFlaggedAndComesOutShortNotWild) {
   EXPECT_LT(x_track, 2.1);
 }
 
+// The last keyframe alone saw nothing; those before it did.
+TEST(NoOdometry, TheMatcherSeesWhatTheLastKeyframesSaw) {
+  for (const bool merged : {true, false}) {
+    FrontEndOptions options;
+    options.use_odometry = false;
+    options.refine_enabled = false;
+    options.no_odometry.merged_keyframes = merged ? 8 : 1;
+    FrontEnd front_end(options, MatcherKind::kNdt, MatcherOptions{});
+    const ScanView view = test::ViewFrom(test::Office(), {});
+    front_end.Track(view, {}, SerialFor);
+    front_end.AddKeyframe(view);
+    front_end.Track(view, {}, SerialFor);
+    front_end.AddKeyframe(ScanView{});
+    const TrackStep step = front_end.Track(test::ViewFrom(test::Office(), {0.1, 0.0, 0.0}), {}, SerialFor);
+    EXPECT_EQ(step.matched, merged);
+    EXPECT_NEAR(step.T_track_robot.x, merged ? 0.1 : 0.0, 0.02);
+  }
+}
+
+TEST(NoOdometry, WhatOnlyTheForecastShowedIsDoubt) {
+  FrontEnd office = WithoutOdometry(MatcherKind::kNdt, true), hall = WithoutOdometry(MatcherKind::kNdt, true);
+  const ScanView room = test::ViewFrom(test::Office(), {}), corridor = test::ViewFrom(test::LongCorridor(), {});
+  office.Track(room, {}, SerialFor);
+  office.AddKeyframe(room);
+  hall.Track(corridor, {}, SerialFor);
+  hall.AddKeyframe(corridor);
+  EXPECT_TRUE(office.Track(room, {}, SerialFor).forecast_covariance.isZero());
+  const Eigen::Matrix3d along = hall.Track(corridor, {}, SerialFor).forecast_covariance;
+  EXPECT_GT(along(0, 0), 1e-4);
+  EXPECT_LT(along(1, 1), 1e-2 * along(0, 0));
+  EXPECT_EQ(along(2, 2), 0.0);
+  EXPECT_GT(office.Track(ScanView{}, {}, SerialFor).forecast_covariance(2, 2), 0.0);
+}
+
 TEST(NoOdometry, ScansWithoutAMatchCountTowardsBeingLost) {
   FrontEnd front_end = WithoutOdometry(MatcherKind::kNdtDe, true);
   const ScanView view = test::ViewFrom(test::Office(), {});

@@ -35,9 +35,10 @@ SequenceErrors MatchSequence(const ScanSequence& sequence, const slam::NdtDeOpti
   for (std::size_t i = 1; i < sequence.points.size(); ++i) {
     StepError step;
     step.match = slam::SearchNdt(sequence.points[i - 1], sequence.points[i], nothing_known, options, slam::SerialFor);
+    step.T_prev_curr = options.climb ? step.match.result.T_prev_curr : step.match.T_evolved;
     if (!sequence.T_map_robot.empty()) {
       const Pose2 truth = Between(sequence.T_map_robot[i - 1], sequence.T_map_robot[i]);
-      step.error = step.match.result.T_prev_curr.vector() - truth.vector();
+      step.error = step.T_prev_curr.vector() - truth.vector();
       step.error.z() = WrapAngle(step.error.z());
     }
     errors.steps.push_back(step);
@@ -80,7 +81,7 @@ slam::NdtDeOptions ThesisOptions(std::uint64_t seed) {
 
 std::vector<Pose2> ChainOf(const SequenceErrors& errors) {
   std::vector<Pose2> poses{Pose2{}};
-  for (const StepError& step : errors.steps) poses.push_back(poses.back() * step.match.result.T_prev_curr);
+  for (const StepError& step : errors.steps) poses.push_back(poses.back() * step.T_prev_curr);
   return poses;
 }
 

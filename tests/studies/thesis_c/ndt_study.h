@@ -25,6 +25,9 @@ struct ScanSequence {
 // One step of the sequence. Errors in the axes of ours: x ahead, y to the left (the thesis' y and -x).
 struct StepError {
   slam::NdtDeMatch match;
+  // The evolution's own answer, or where it is climbed from there. Not the join with what was believed before: where an
+  // evolution ended far from a maximum that would say "nothing known: stand still".
+  Pose2 T_prev_curr;
   Eigen::Vector3d error = Eigen::Vector3d::Zero();  // Zero where the truth is not known.
   [[nodiscard]] double metres() const { return error.head<2>().norm(); }
   [[nodiscard]] double degrees() const { return std::abs(Degrees(error.z())); }

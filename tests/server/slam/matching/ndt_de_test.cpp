@@ -52,6 +52,20 @@ TEST(NdtDe, TheEvolutionAloneComesWithinCentimetres) {
   EXPECT_LT(TurnOf(match, truth), 0.02);
 }
 
+// Far from a maximum nothing holds the pose, and the answer falls back to what was believed; what the evolution found
+// stays at hand.
+TEST(NdtDe, TheEvolvedPoseIsNotJoinedWithThePrior) {
+  NdtDeOptions options;
+  options.climb = false;
+  options.evolution.generations = 0;
+  const std::vector<Eigen::Vector2d> points = PositionsOf(ViewFrom(test::Office(), {}));
+  const MatchPrior sure{{}, Eigen::Vector3d(1e-8, 1e-8, 1e-8).asDiagonal()};
+  const NdtDeMatch match =
+      SearchNdt(points, PositionsOf(ViewFrom(test::Office(), {0.7, 0.0, 0.0})), sure, options, SerialFor);
+  EXPECT_GT(match.T_evolved.x, 0.1);  // One of the first population; the prior is where it began.
+  EXPECT_LT(std::abs(match.result.T_prev_curr.x), 0.01);
+}
+
 TEST(NdtDe, TheFitnessIsSmallWhereTheMatchIsRightAndLargeWhereNot) {
   const std::vector<Eigen::Vector2d> prev = PositionsOf(ViewFrom(test::Office(), {}));
   const NdtDeMatch right =

@@ -17,6 +17,12 @@ Points OfficePoints(const Pose2& T_world_robot = {}) {
   return PositionsOf(test::ViewFrom(test::Office(), T_world_robot));
 }
 
+double SumOfDensities(const NdtMap& map, const Points& points, const Pose2& T) {
+  double sum = 0.0;
+  for (const Eigen::Vector2d& p : points) sum += map.Density(T * p);
+  return sum;
+}
+
 // Four points in the square (0, 0.5)^2: in the plain grid and in each shifted one they share a cell, so the density is
 // four times the one normal distribution of (2.13).
 TEST(NdtMap, ADensityIsTheSumOfFourNormalDistributions) {
@@ -39,6 +45,21 @@ TEST(NdtMap, CellsLieWhereThePlaneSaysNotWhereThePointsBegin) {
   const double alone = NdtMap(points, {}).Density({0.3, 0.22});
   points.insert(points.begin(), {-7.3, 12.9});
   EXPECT_NEAR(NdtMap(points, {}).Density({0.3, 0.22}), alone, 1e-12);
+}
+
+// In single precision, wherever the scan lies: means are kept from the corners of their half cells.
+TEST(NdtMap, TheScoreIsTheSumOfTheDensities) {
+  for (const Pose2& place : {Pose2{}, Pose2{31000.25, -47000.5, 1.0}}) {
+    Points points = OfficePoints();
+    for (Eigen::Vector2d& p : points) p = place * p;
+    const NdtMap map(points, {});
+    const Pose2 off{0.013, -0.02, 0.0};
+    const double sum = SumOfDensities(map, points, off);
+    EXPECT_GT(sum, 50.0);
+    EXPECT_NEAR(map.Score(points, off), sum, 1e-5 * sum);
+    EXPECT_NEAR(map.Derivatives(points, off).score, sum, 1e-9 * sum);
+    EXPECT_LT(map.Score(points, off * Pose2{40.0, 40.0, 0.0}), 1e-6);  // Absent distributions add nothing.
+  }
 }
 
 TEST(NdtMap, TwoPointsMakeNoDistributionAndThreeEqualOnesNeither) {
@@ -75,10 +96,11 @@ TEST(NdtMap, DerivativesAgreeWithDifferences) {
       if (std::abs(q.x() - std::round(q.x())) > 2e-3 && std::abs(q.y() - std::round(q.y())) > 2e-3) smooth.push_back(p);
     }
     const NdtDerivatives at = map.Derivatives(smooth, T);
-    EXPECT_NEAR(at.score, map.Score(smooth, T), 1e-9);
+    // In full precision, which Score() has not.
     const auto score = [&](const Eigen::Vector3d& x) {
-      return Eigen::Matrix<double, 1, 1>(map.Score(smooth, {x.x(), x.y(), x.z()}));
+      return Eigen::Matrix<double, 1, 1>(SumOfDensities(map, smooth, {x.x(), x.y(), x.z()}));
     };
+    EXPECT_NEAR(at.score, score(T.vector())(0), 1e-9);
     const auto gradient = [&](const Eigen::Vector3d& x) -> Eigen::Vector3d {
       return map.Derivatives(smooth, {x.x(), x.y(), x.z()}).gradient;
     };
