@@ -10,7 +10,7 @@ namespace cairn::studies {
 namespace {
 
 constexpr int kThreads = 2;
-constexpr std::uint64_t kTunedOn = 15;  // Simulated robots the high level was developed on: not measured here.
+constexpr std::uint64_t kTunedOn = 17;  // Simulated robots the high level was developed on: not measured here.
 
 // Raw wheels of an unknown robot: 15 % of the way, 3 deg a metre, 20 % of a turn.
 constexpr slam::MotionNoise kRawOdometry{0.004, 0.15, 0.02, 0.002, 0.05, 0.2};
@@ -112,7 +112,7 @@ Closed StudyLoop(StudyContext& context, std::int64_t size, int trials, bool& pla
       "The simulated office, 60 x 40 m, once round its ring corridor and some way on, a 180 degree laser of 8 m range, "
       "the simulator's ordinary odometry. Scans are a metre apart, as in the thesis' loop of this size (183 scans, "
       "Figure 3.11). The flat filter gets as many particles as both levels of the other together. The high level was "
-      "developed on robots 6-15; the robots here begin after those. *Loop error*: how far apart the path puts two "
+      "developed on robots 6-17; the robots here begin after those. *Loop error*: how far apart the path puts two "
       "visits of one place, against the truth. A loop counts as closed below 0.3 m.");
   const std::int64_t particles = size;
   Table table({"robot", "filter", "odometry's loop error (m)", "loop error (m)", "(deg)", "closed"});
