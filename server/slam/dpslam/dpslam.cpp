@@ -16,7 +16,7 @@ DpSlam::DpSlam(const DpSlamOptions& options, const Pose2& T_map_robot_start, std
     : options_(options),
       rng_(seed),
       low_(options_.low, options_.opacity, options_.hierarchical ? Pose2{} : T_map_robot_start) {
-  if (options_.hierarchical) high_.emplace(options_.high, options_.opacity, T_map_robot_start);
+  if (options_.hierarchical) high_.emplace(options_.high, options_.opacity, options_.segment.keep_m, T_map_robot_start);
 }
 
 void DpSlam::Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) {
@@ -31,12 +31,18 @@ void DpSlam::Observe(const KeyframeSight& sight, const ParallelFor& parallel_for
 
 void DpSlam::Observe(std::shared_ptr<const LaserRays> rays, const ParallelFor& parallel_for) {
   const Evidence evidence{{rays, Pose2{}}};
-  low_.Observe({&evidence, 1}, rng_, parallel_for);
+  low_.Observe(evidence, rng_, parallel_for);
   observed_ = true;
   contradicted_ = low_.gain() < kContradiction ? contradicted_ + 1 : 0;
   if (!options_.hierarchical) return;
   pending_.push_back({std::move(rays), std::exchange(step_m_, 0.0), std::exchange(turn_rad_, 0.0)});
-  if (const std::size_t count = SegmentEnd(); count > 0) HandUp(count, parallel_for);
+  if (high_->at_work()) {
+    high_->Work(rng_, parallel_for);
+    if (high_->at_work()) return;
+    pending_.erase(pending_.begin(), pending_.begin() + static_cast<std::ptrdiff_t>(at_work_));
+    handed_up_ += std::exchange(at_work_, 0);
+  }
+  if (const std::size_t count = SegmentEnd(); count > 0) HandUp(count);
 }
 
 void DpSlam::Commit() {
@@ -59,7 +65,7 @@ std::size_t DpSlam::SegmentEnd() const {
              : 0;
 }
 
-void DpSlam::HandUp(std::size_t count, const ParallelFor& parallel_for) {
+void DpSlam::HandUp(std::size_t count) {
   // Trajectories from the distribution the low level has now: its best one first.
   const auto along = [&](const GridParticle& particle) {
     const Pose2 T_joint_low = JointOf(particle).Inverse();
@@ -75,14 +81,10 @@ void DpSlam::HandUp(std::size_t count, const ParallelFor& parallel_for) {
   for (std::size_t t = 1; t < alternatives; ++t)
     trajectories.push_back(along(particles[t * particles.size() / alternatives]));
 
-  // The drift of a whole segment, at the joint where it begins (thesis C 4.5.2). The first one is simply drawn.
   double way_m = 0.0;
   for (std::size_t k = 0; k < count; ++k) way_m += pending_[k].step_m;
-  if (!high_->maps().blank()) high_->Move({}, options_.high.drift.Covariance({way_m, 0.0, 0.0}), rng_);
-  high_->Observe(trajectories, rng_, parallel_for);
-
-  pending_.erase(pending_.begin(), pending_.begin() + static_cast<std::ptrdiff_t>(count));
-  handed_up_ += count;
+  high_->Take(std::move(trajectories), way_m, rng_);
+  at_work_ = count;
   low_.KeepNear(options_.segment.keep_m);
 }
 
@@ -92,13 +94,13 @@ Pose2 DpSlam::JointOf(const GridParticle& low) const {
 
 FilterEstimate DpSlam::estimate() const {
   if (!high_) return {low_.mean(), low_.covariance()};
-  const Pose2 T_map_segment = high_->mean(), T_segment_robot = Between(JointOf(low_.best()), low_.mean());
+  const Pose2 T_map_segment = high_->level().mean(), T_segment_robot = Between(JointOf(low_.best()), low_.mean());
   const Eigen::Matrix3d J_left = J_compose_left(T_map_segment, T_segment_robot);
   // The low level's covariance is in its own frame.
   const Pose2 T_map_low = T_map_segment * JointOf(low_.best()).Inverse();
   const Eigen::Matrix3d J_low = J_compose_right(T_map_low, low_.mean());
   return {T_map_segment * T_segment_robot,
-          J_left * high_->covariance() * J_left.transpose() + J_low * low_.covariance() * J_low.transpose()};
+          J_left * high_->level().covariance() * J_left.transpose() + J_low * low_.covariance() * J_low.transpose()};
 }
 
 FilterHealth DpSlam::health() const {
@@ -109,11 +111,11 @@ FilterHealth DpSlam::health() const {
 }
 
 std::size_t DpSlam::hypothesis_count() const {
-  return (high_ ? *high_ : low_).particles().size();
+  return (high_ ? high_->level() : low_).particles().size();
 }
 
 Hypothesis DpSlam::hypothesis(std::size_t index) const {
-  const LevelFilter& level = high_ ? *high_ : low_;
+  const LevelFilter& level = high_ ? high_->level() : low_;
   const std::size_t best = level.best_index();
   const GridParticle& particle = level.particles()[index == 0 ? best : index <= best ? index - 1 : index];
   if (!high_) return {particle.T_map_robot, particle.path};
@@ -126,12 +128,11 @@ Hypothesis DpSlam::hypothesis(std::size_t index) const {
 }
 
 OccupancyImage DpSlam::MapImage() const {
-  const LevelFilter& level = high_ ? *high_ : low_;
-  return level.maps().Image(level.best().map);
+  return high_ ? high_->MapImage() : low_.maps().Image(low_.best().map);
 }
 
 std::size_t DpSlam::bytes() const {
-  return low_.maps().ancestry().bytes() + (high_ ? high_->maps().ancestry().bytes() : 0);
+  return low_.maps().ancestry().bytes() + (high_ ? high_->bytes() : 0);
 }
 
 }  // namespace cairn::slam

@@ -1,10 +1,10 @@
 // DP-SLAM: a particle filter whose particles own whole grid maps, stored as changes in their family tree. Flat, or
-// hierarchical: the low level maps the surroundings only and forgets what is far; the high level joins the segments of
-// trajectory it hands up, each particle with drift of its own at every joint, and judges a segment's scans on the map
-// it made so far. No landmarks, no revisits: loops close because some particle's map agrees with what is seen again.
-// Frames: poses are T_map_robot; the low level's are in a frame of its own, which drifts.
-// Not thread-safe; deterministic for a seed, on any number of threads.
-// Source: Eliazar, Parr 2003-2005; thesis C 3.2.3, 4.5.
+// hierarchical: the low level maps the surroundings only and forgets what is far; the high level (segment_filter.h)
+// joins the segments of trajectory it hands up, each particle with drift of its own at every joint, and judges a
+// segment's scans on what the low level had forgotten. No landmarks, no revisits: loops close because some particle's
+// map agrees with what is seen again. Frames: poses are T_map_robot; the low level's are in a frame of its own, which
+// drifts. Not thread-safe; deterministic for a seed, on any number of threads. Source: Eliazar, Parr 2003-2005; thesis
+// C 3.2.3, 4.5.
 #pragma once
 
 #include <memory>
@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "server/slam/dpslam/dpslam_options.h"
+#include "server/slam/dpslam/segment_filter.h"
 #include "server/slam/filters/filter.h"
 
 namespace cairn::slam {
@@ -36,7 +37,7 @@ class DpSlam final : public Filter {
 
   // The low level knows the surroundings only where there is a high level.
   [[nodiscard]] const LevelFilter& low() const { return low_; }
-  [[nodiscard]] const LevelFilter* high() const { return high_ ? &*high_ : nullptr; }
+  [[nodiscard]] const LevelFilter* high() const { return high_ ? &high_->level() : nullptr; }
   // The best particle's map, without the scans still pending where there is a high level.
   [[nodiscard]] OccupancyImage MapImage() const;
   // Of all maps.
@@ -50,16 +51,17 @@ class DpSlam final : public Filter {
   };
   // Scans of the next segment, once it is long enough and hindsight allows; else 0.
   [[nodiscard]] std::size_t SegmentEnd() const;
-  void HandUp(std::size_t count, const ParallelFor& parallel_for);
+  void HandUp(std::size_t count);
   // Where a low-level particle's pending scans start from.
   [[nodiscard]] Pose2 JointOf(const GridParticle& low) const;
 
   const DpSlamOptions options_;
   Rng rng_;
   LevelFilter low_;
-  std::optional<LevelFilter> high_;
-  std::vector<PendingScan> pending_;  // Not handed up yet.
+  std::optional<SegmentFilter> high_;
+  std::vector<PendingScan> pending_;  // Not in the high level yet.
   std::size_t handed_up_ = 0;         // Scans before them.
+  std::size_t at_work_ = 0;           // Of the pending, those the high level is working at.
   double step_m_ = 0.0;               // Since the last scan.
   double turn_rad_ = 0.0;
   std::int64_t contradicted_ = 0;  // Scans in a row.

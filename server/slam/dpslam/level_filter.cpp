@@ -8,11 +8,9 @@
 namespace cairn::slam {
 namespace {
 
-bool ShowsRays(std::span<const Evidence> alternatives) {
-  for (const Evidence& evidence : alternatives)
-    for (const PlacedRays& placed : evidence)
-      if (!placed.rays->rays.empty()) return true;
-  return false;
+bool ShowsRays(const Evidence& evidence) {
+  return std::any_of(evidence.begin(), evidence.end(),
+                     [](const PlacedRays& placed) { return !placed.rays->rays.empty(); });
 }
 
 }  // namespace
@@ -56,82 +54,95 @@ void LevelFilter::Move(const Pose2& T_prev_curr, const Eigen::Matrix3d& covarian
   mean_ = mean_ * T_prev_curr;
 }
 
-void LevelFilter::Observe(std::span<const Evidence> alternatives, Rng& rng, const ParallelFor& parallel_for) {
-  // What each particle experiences, and where that leaves it.
-  std::vector<std::size_t> chosen(particles_.size(), 0);
-  if (alternatives.size() > 1 && !maps_.blank())
-    for (std::size_t& choice : chosen)
-      choice = std::min(alternatives.size() - 1,
-                        static_cast<std::size_t>(UniformDraw(rng) * static_cast<double>(alternatives.size())));
+void LevelFilter::Observe(const Evidence& evidence, Rng& rng, const ParallelFor& parallel_for) {
   std::vector<MapSample> samples;
   samples.reserve(particles_.size());
-  for (std::size_t i = 0; i < particles_.size(); ++i)
-    samples.push_back({particles_[i].T_map_robot, particles_[i].map, chosen[i]});
-
+  for (const GridParticle& particle : particles_) samples.push_back({particle.T_map_robot, particle.map, 0});
+  const bool sees = ShowsRays(evidence);
   gain_ = 0.0;
-  const bool sees = ShowsRays(alternatives);
   if (sees && !maps_.blank()) {
-    const double max_ray_m = maps_.options().max_ray_m;
-    const JudgeOptions judge{
-        {options_.sigma_m, options_.outlier_share, max_ray_m, maps_.options().resolution_m, options_.unseen_per_m},
-        static_cast<std::size_t>(options_.ray_stride),
-        options_.give_up_behind / options_.evidence_share};
-    const std::vector<double> log_likelihoods = maps_.LogLikelihoods(samples, alternatives, judge, parallel_for);
+    const std::vector<double> log_likelihoods = Judge(samples, {&evidence, 1}, parallel_for);
     for (std::size_t i = 0; i < particles_.size(); ++i) {
       particles_[i].log_weight += options_.evidence_share * log_likelihoods[i];
       particles_[i].log_likelihood += options_.evidence_share * log_likelihoods[i];
     }
-    const auto best = std::max_element(log_likelihoods.begin(), log_likelihoods.end());
-    std::size_t rays = 0;
-    gain_ = *best;
-    for (const PlacedRays& placed : alternatives[chosen[static_cast<std::size_t>(best - log_likelihoods.begin())]]) {
-      gain_ -= UnseenLogLikelihood(*placed.rays, judge.ray_stride, judge.model);
-      rays += (placed.rays->rays.size() + judge.ray_stride - 1) / judge.ray_stride;
-    }
-    gain_ /= static_cast<double>(std::max<std::size_t>(rays, 1));
+    gain_ = GainOf(evidence, *std::max_element(log_likelihoods.begin(), log_likelihoods.end()));
   }
+  for (std::size_t i = 0; i < particles_.size(); ++i)
+    for (const PlacedRays& placed : evidence)
+      particles_[i].path.Append(particles_[i].T_map_robot = samples[i].T_map_start * placed.T_start_robot);
+  const std::vector<double> weights = Summarise();
+  if (!sees) return;
 
-  for (std::size_t i = 0; i < particles_.size(); ++i) {
-    GridParticle& particle = particles_[i];
-    const Pose2 T_map_start = particle.T_map_robot;
-    for (const PlacedRays& placed : alternatives[chosen[i]])
-      particle.path.Append(particle.T_map_robot = T_map_start * placed.T_start_robot);
+  // Who survives, and how often.
+  if (effective_ <= options_.resample_below * static_cast<double>(particles_.size())) {
+    std::vector<GridParticle> next;
+    std::vector<MapSample> survivors;
+    next.reserve(particles_.size());
+    std::size_t best = 0;
+    for (const int parent : StratifiedSurvivors(weights, rng)) {
+      next.push_back(particles_[static_cast<std::size_t>(parent)]);
+      next.back().log_weight = 0.0;
+      survivors.push_back(samples[static_cast<std::size_t>(parent)]);
+      if (next.back().log_likelihood > next[best].log_likelihood) best = next.size() - 1;
+    }
+    particles_ = std::move(next);
+    samples = std::move(survivors);
+    best_ = best;
   }
+  const Drawings drawings = Distinct(samples);
+  Adopt(drawings, maps_.Draw(drawings.distinct, {&evidence, 1}, parallel_for));
+}
+
+RayModel LevelFilter::Model() const {
+  const OpacityOptions& opacity = maps_.options();
+  return {options_.sigma_m, options_.outlier_share, opacity.max_ray_m, opacity.resolution_m, options_.unseen_per_m};
+}
+
+std::vector<double> LevelFilter::Judge(std::span<const MapSample> samples, std::span<const Evidence> alternatives,
+                                       const ParallelFor& parallel_for) const {
+  return maps_.LogLikelihoods(
+      samples, alternatives,
+      {Model(), static_cast<std::size_t>(options_.ray_stride), options_.give_up_behind / options_.evidence_share},
+      parallel_for);
+}
+
+double LevelFilter::GainOf(const Evidence& evidence, double log_likelihood) const {
+  const auto stride = static_cast<std::size_t>(options_.ray_stride);
+  std::size_t rays = 0;
+  for (const PlacedRays& placed : evidence) {
+    log_likelihood -= UnseenLogLikelihood(*placed.rays, stride, Model());
+    rays += (placed.rays->rays.size() + stride - 1) / stride;
+  }
+  return log_likelihood / static_cast<double>(std::max<std::size_t>(rays, 1));
+}
+
+LevelFilter::Drawings LevelFilter::Distinct(std::span<const MapSample> samples) {
+  Drawings drawings;
+  drawings.of_particle.reserve(samples.size());
+  for (const MapSample& sample : samples) {
+    if (drawings.distinct.empty() || !(drawings.distinct.back() == sample)) drawings.distinct.push_back(sample);
+    drawings.of_particle.push_back(drawings.distinct.size() - 1);
+  }
+  return drawings;
+}
+
+void LevelFilter::Replace(std::vector<GridParticle> particles) {
+  particles_ = std::move(particles);
+  (void)Summarise();
+}
+
+void LevelFilter::Adopt(const Drawings& drawings, std::vector<Ancestry::Birth> births) {
+  maps_.NextGeneration(std::move(births));
+  for (std::size_t i = 0; i < particles_.size(); ++i) particles_[i].map = drawings.of_particle[i];
+}
+
+std::vector<double> LevelFilter::Summarise() {
   std::vector<double> log_weights;
   log_weights.reserve(particles_.size());
   for (const GridParticle& particle : particles_) log_weights.push_back(particle.log_weight);
-  const std::vector<double> weights = NormalisedWeights(log_weights);
+  std::vector<double> weights = NormalisedWeights(log_weights);
   effective_ = EffectiveSampleSize(weights);
-  Summarise(weights);
-  if (!sees) return;
-
-  // Who survives, and how often. Equal ones share one map.
-  const bool resample = effective_ <= options_.resample_below * static_cast<double>(particles_.size());
-  std::vector<int> parents;
-  if (resample) {
-    parents = StratifiedSurvivors(weights, rng);
-  } else {
-    parents.resize(particles_.size());
-    for (std::size_t i = 0; i < parents.size(); ++i) parents[i] = static_cast<int>(i);
-  }
-  std::vector<GridParticle> next;
-  std::vector<MapSample> survivors;
-  next.reserve(particles_.size());
-  std::size_t best = 0;
-  for (const int parent : parents) {
-    const auto p = static_cast<std::size_t>(parent);
-    if (survivors.empty() || !(survivors.back() == samples[p])) survivors.push_back(samples[p]);
-    next.push_back(particles_[p]);
-    next.back().map = survivors.size() - 1;
-    if (resample) next.back().log_weight = 0.0;
-    if (next.back().log_likelihood > next[best].log_likelihood) best = next.size() - 1;
-  }
-  particles_ = std::move(next);
-  best_ = best;
-  maps_.NextGeneration(survivors, alternatives, parallel_for);
-}
-
-void LevelFilter::Summarise(const std::vector<double>& weights) {
   best_ = 0;
   for (std::size_t i = 1; i < particles_.size(); ++i)
     if (particles_[i].log_likelihood > particles_[best_].log_likelihood) best_ = i;
@@ -149,10 +160,11 @@ void LevelFilter::Summarise(const std::vector<double>& weights) {
   }
   mean_ = centre;
   covariance_.setZero();
-  if (!(sum > 0.0)) return;
+  if (!(sum > 0.0)) return weights;
   const Eigen::Vector3d shift = first / sum;
   mean_ = {centre.x + shift.x(), centre.y + shift.y(), WrapAngle(centre.theta + shift.z())};
   covariance_ = second / sum - shift * shift.transpose();
+  return weights;
 }
 
 }  // namespace cairn::slam

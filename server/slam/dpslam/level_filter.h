@@ -1,8 +1,7 @@
-// One level of DP-SLAM: a particle filter over poses whose particles own maps. The low level moves by a step and sees
-// one scan; the high level moves by the drift at a joint and sees a whole segment, with the trajectory the low level
-// found. One step is Move, then Observe. Poses are T_map_robot in the frame of this level. Not thread-safe;
-// deterministic for a seed, on any number of threads. Source: Eliazar, Parr 2003, 2004, 2005 (hierarchical); thesis
-// C 3.2.3, 4.5.
+// One level of DP-SLAM: a particle filter over poses whose particles own maps. One step of the low level is Move, then
+// Observe a scan. The high level (segment_filter.h) makes its step of the parts. Poses are T_map_robot in the
+// frame of this level. Not thread-safe; deterministic for a seed, on any number of threads.
+// Source: Eliazar, Parr 2003, 2004, 2005 (hierarchical); thesis C 3.2.3, 4.5.
 #pragma once
 
 #include <Eigen/Core>
@@ -50,24 +49,43 @@ class LevelFilter {
   void Move(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev, Rng& rng);
   // All maps forget what is farther from the robot.
   void KeepNear(double radius_m) { maps_.KeepNear(mean_.translation(), radius_m); }
-  // Every particle experiences one of the alternatives (drawn with equal chance), is weighted, survives or not, draws
-  // it, and goes on from its last pose. Where no alternative shows a ray, only the paths grow.
-  void Observe(std::span<const Evidence> alternatives, Rng& rng, const ParallelFor& parallel_for);
+  // Every particle is weighted, survives or not, and draws the evidence; its last pose is where the particle then is.
+  // Where it shows no ray, only the paths grow.
+  void Observe(const Evidence& evidence, Rng& rng, const ParallelFor& parallel_for);
+
+  // Parts of a step, for the high level. A sample is what one particle experiences, in the order of the particles.
+  // Log likelihood of each of the samples, which may be some only.
+  [[nodiscard]] std::vector<double> Judge(std::span<const MapSample> samples, std::span<const Evidence> alternatives,
+                                          const ParallelFor& parallel_for) const;
+  // Those alike draw once and share the map.
+  struct Drawings {
+    std::vector<MapSample> distinct;
+    std::vector<std::size_t> of_particle;  // Index in `distinct`.
+  };
+  [[nodiscard]] static Drawings Distinct(std::span<const MapSample> samples);
+  // The particles after a step, weighted; their maps are still those they had. REQUIRES: as many, ordered by map.
+  void Replace(std::vector<GridParticle> particles);
+  // Draws: from now on they own these maps. REQUIRES: a birth for each of the distinct.
+  void Adopt(const Drawings& drawings, std::vector<Ancestry::Birth> births);
 
   [[nodiscard]] const std::vector<GridParticle>& particles() const { return particles_; }
   [[nodiscard]] const GridParticle& best() const { return particles_[best_]; }
   [[nodiscard]] std::size_t best_index() const { return best_; }
+  [[nodiscard]] const LevelOptions& options() const { return options_; }
   [[nodiscard]] const ParticleMaps& maps() const { return maps_; }
   // Weighted mean of the particles that agree with the best one, and their spread, before they were resampled.
   [[nodiscard]] const Pose2& mean() const { return mean_; }
   [[nodiscard]] const Eigen::Matrix3d& covariance() const { return covariance_; }
   [[nodiscard]] double effective_sample_size() const { return effective_; }
-  // Log likelihood per ray of the last evidence in the best map, over what unseen space says: well below 0 where the
+  // Log likelihood per ray of the last evidence where it fits best, over what unseen space says: well below 0 where the
   // map contradicts it. 0 where there was nothing to compare.
   [[nodiscard]] double gain() const { return gain_; }
 
  private:
-  void Summarise(const std::vector<double>& weights);
+  [[nodiscard]] RayModel Model() const;
+  [[nodiscard]] double GainOf(const Evidence& evidence, double log_likelihood) const;
+  // Finds the best one, mean and spread; returns the weights.
+  std::vector<double> Summarise();
 
   const LevelOptions options_;
   ParticleMaps maps_;

@@ -82,8 +82,9 @@ std::vector<double> ParticleMaps::LogLikelihoods(std::span<const MapSample> samp
   return result;
 }
 
-void ParticleMaps::NextGeneration(std::span<const MapSample> survivors, std::span<const Evidence> evidence,
-                                  const ParallelFor& parallel_for) {
+std::vector<Ancestry::Birth> ParticleMaps::Draw(std::span<const MapSample> survivors,
+                                                std::span<const Evidence> evidence,
+                                                const ParallelFor& parallel_for) const {
   std::vector<Ancestry::Birth> births(survivors.size());
   parallel_for(static_cast<int>(survivors.size()), [&](int begin, int end) {
     ChangePainter painter(options_.resolution_m);
@@ -94,7 +95,7 @@ void ParticleMaps::NextGeneration(std::span<const MapSample> survivors, std::spa
       births[i] = {survivor.map, painter.Take()};
     }
   });
-  ancestry_.NextGeneration(std::move(births));
+  return births;
 }
 
 void ParticleMaps::KeepNear(const Eigen::Vector2d& p_map, double radius_m) {
@@ -103,27 +104,32 @@ void ParticleMaps::KeepNear(const Eigen::Vector2d& p_map, double radius_m) {
                      {TileOf(p_map.y() + radius_m, resolution_m), TileOf(p_map.x() + radius_m, resolution_m)});
 }
 
-OccupancyImage ParticleMaps::Image(std::size_t map) const {
+OccupancyImage ParticleMaps::Image(std::size_t map, std::span<const PlacedRays> undrawn) const {
+  ChangePainter painter(options_.resolution_m);
+  for (const PlacedRays& placed : undrawn) painter.Draw(*placed.rays, placed.T_start_robot);
+  MapChanges whole = painter.Take();
   std::vector<Ancestry::Id> line;
   ancestry_.LineTo(ancestry_.living()[map], line);
+  for (const Ancestry::Id id : line) whole.Add(MapChanges(ancestry_.changes(id)));
   TileBox box;
   int high_x = INT32_MIN, high_y = INT32_MIN;
   box.low_x = box.low_y = INT32_MAX;
-  for (const Ancestry::Id id : line) {
-    for (const ChangeTile& tile : ancestry_.changes(id).tiles()) {
-      box.low_x = std::min(box.low_x, tile.key.x), high_x = std::max(high_x, tile.key.x);
-      box.low_y = std::min(box.low_y, tile.key.y), high_y = std::max(high_y, tile.key.y);
-    }
+  for (const ChangeTile& tile : whole.tiles()) {
+    box.low_x = std::min(box.low_x, tile.key.x), high_x = std::max(high_x, tile.key.x);
+    box.low_y = std::min(box.low_y, tile.key.y), high_y = std::max(high_y, tile.key.y);
   }
   OccupancyImage image;
   image.resolution_m = options_.resolution_m;
   // Bounded like every picture here (kMaxImagePixels): a map wider than that is not drawn.
-  if (line.empty() || box.low_x > high_x || std::int64_t{high_x} - box.low_x >= 256 ||
-      std::int64_t{high_y} - box.low_y >= 256)
+  if (box.low_x > high_x || std::int64_t{high_x} - box.low_x >= 256 || std::int64_t{high_y} - box.low_y >= 256)
     return image;
   box.width = high_x - box.low_x + 1, box.height = high_y - box.low_y + 1;
-  OpacityWindow window(ancestry_, box, rate_);
-  window.Show(line.back());
+  Ancestry alone;
+  std::vector<Ancestry::Birth> only;
+  only.push_back({0, std::move(whole)});
+  alone.NextGeneration(std::move(only));
+  OpacityWindow window(alone, box, rate_);
+  window.Show(alone.living()[0]);
   image.width = window.width(), image.height = window.height();
   image.T_map_origin = {window.low_x() * image.resolution_m, window.low_y() * image.resolution_m, 0.0};
   image.cells.reserve(window.counts().size());

@@ -1,12 +1,13 @@
-// The maps of all particles, in their family tree: how well evidence agrees with each, and drawing it where it
-// survives. Evidence is a piece of trajectory with its scans: one scan in the low level, a whole segment in the high
-// level. A particle is judged by a quarter of the rays first; who then is hopelessly behind the best sees no more of
-// them. Frames: `map` of the particles; evidence is placed by T_map_start. Not thread-safe; spreads its work by
-// ParallelFor, with the same result on any number of threads. Source: Eliazar, Parr 2003, 2004; thesis C 3.2.3.2-4.
+// The maps of all particles, in their family tree: how well evidence agrees with each, and drawing it there. Evidence
+// is a piece of trajectory with its scans: one scan in the low level, a whole segment in the high level. A particle is
+// judged by a quarter of the rays first; who then is hopelessly behind the best sees no more of them. Frames: `map` of
+// the particles; evidence is placed by T_map_start. Not thread-safe; spreads its work by ParallelFor, with the same
+// result on any number of threads. Source: Eliazar, Parr 2003, 2004; thesis C 3.2.3.2-4.
 #pragma once
 
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "common/map/occupancy_image.h"
@@ -45,9 +46,12 @@ class ParticleMaps {
   [[nodiscard]] std::vector<double> LogLikelihoods(std::span<const MapSample> samples,
                                                    std::span<const Evidence> evidence, const JudgeOptions& options,
                                                    const ParallelFor& parallel_for) const;
-  // Each survivor draws its evidence and owns map [its index] from now on. REQUIRES: ordered by map, at least one.
-  void NextGeneration(std::span<const MapSample> survivors, std::span<const Evidence> evidence,
-                      const ParallelFor& parallel_for);
+  // What each of them would add to its map by drawing its evidence.
+  [[nodiscard]] std::vector<Ancestry::Birth> Draw(std::span<const MapSample> survivors,
+                                                  std::span<const Evidence> evidence,
+                                                  const ParallelFor& parallel_for) const;
+  // From now on there is a map for each birth, in their order. REQUIRES: ordered by parent, at least one.
+  void NextGeneration(std::vector<Ancestry::Birth> births) { ancestry_.NextGeneration(std::move(births)); }
 
   // All maps forget what is farther away, in whole tiles.
   void KeepNear(const Eigen::Vector2d& p_map, double radius_m);
@@ -57,8 +61,9 @@ class ParticleMaps {
   [[nodiscard]] const Ancestry& ancestry() const { return ancestry_; }
   [[nodiscard]] const OpacityOptions& options() const { return options_; }
   [[nodiscard]] const StopRate& rate() const { return rate_; }
-  // How likely a ray straight through each cell of one map is stopped there, 0..100; unknown where none has been.
-  [[nodiscard]] OccupancyImage Image(std::size_t map) const;
+  // How likely a ray straight through each cell of one map, and what is still to be drawn in it, is stopped there,
+  // 0..100; unknown where none has been.
+  [[nodiscard]] OccupancyImage Image(std::size_t map, std::span<const PlacedRays> undrawn = {}) const;
 
  private:
   OpacityOptions options_;

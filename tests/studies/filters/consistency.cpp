@@ -18,6 +18,7 @@ using slam::NormalDraw;
 constexpr double kStepM = 0.25;
 constexpr int kPointEvery = 8;  // Keyframes.
 constexpr double kSightM = 6.0;
+constexpr double kRoundM = 40.0;
 
 struct Corner {
   Eigen::Vector2d p;
@@ -221,6 +222,7 @@ ConsistencyResult StudyConsistency(const ConsistencyOptions& options) {
   const std::vector<Pose2> steps = TrueSteps(options.rounds);
   double travelled = 0.0, nis = 0.0;
   int nis_numbers = 0;
+  std::size_t points_before = 0;
   for (std::size_t p = 0, i = 0; p < sums.size(); ++p) {
     for (; i < (p + 1) * kPointEvery; ++i) travelled += steps[i].translation().norm();
     ConsistencyPoint point;
@@ -234,10 +236,15 @@ ConsistencyResult StudyConsistency(const ConsistencyOptions& options) {
     nis += sums[p].nis;
     nis_numbers += sums[p].nis_numbers;
     result.nees_mean += point.nees / static_cast<double>(sums.size());
+    const bool before = travelled < kRoundM - kSightM;
+    (before ? result.nees_before : result.nees_after) += point.nees;
+    points_before += before ? 1 : 0;
     if (point.nees >= result.nees_low && point.nees <= result.nees_high)
       result.nees_inside += 1.0 / static_cast<double>(sums.size());
     result.points.push_back(point);
   }
+  result.nees_before /= static_cast<double>(std::max<std::size_t>(points_before, 1));
+  result.nees_after /= static_cast<double>(std::max<std::size_t>(sums.size() - points_before, 1));
   if (nis_numbers > 0) result.nis_per_number = nis / nis_numbers;
   Bounds(nis_numbers, result.nis_low, result.nis_high);
   if (!result.points.empty()) result.position_error_m = result.points.back().position_error_m;

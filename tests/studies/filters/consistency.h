@@ -40,7 +40,9 @@ struct ConsistencyResult {
   std::vector<ConsistencyPoint> points;
   double nees_low = 0.0;  // 95 % of consistent filters lie between, at every point.
   double nees_high = 0.0;
-  double nees_mean = 0.0;    // Over all points.
+  double nees_mean = 0.0;    // Over all points,
+  double nees_before = 0.0;  // over those before anything of the loop's beginning is seen again,
+  double nees_after = 0.0;   // and over the others.
   double nees_inside = 0.0;  // Share of points inside the bounds.
   double nis_per_number = 0.0;
   double nis_low = 0.0, nis_high = 0.0;  // Of the whole.

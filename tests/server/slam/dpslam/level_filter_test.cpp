@@ -97,7 +97,7 @@ TEST(LevelFilter, IsTheFilterThatCopiesMaps) {
       naive.Move(drive[i].T_prev_curr, Noise(), naive_rng);
     }
     const Evidence seen = One(drive[i].scan);
-    filter.Observe({&seen, 1}, rng, InBlocks(3));
+    filter.Observe(seen, rng, InBlocks(3));
     naive.Observe(*seen[0].rays, naive_rng);
     for (std::size_t p = 0; p < filter.particles().size(); ++p) {
       ASSERT_EQ(filter.particles()[p].T_map_robot, naive.particles()[p].pose) << "step " << i;
@@ -131,7 +131,7 @@ TEST(LevelFilter, SameBytesOnAnyNumberOfThreads) {
     const Evidence seen = One(step.scan);
     for (std::size_t k = 0; k < 3; ++k) {
       filters[k].Move(step.T_prev_curr, Noise(), rngs[k]);
-      filters[k].Observe({&seen, 1}, rngs[k], InBlocks(blocks[k]));
+      filters[k].Observe(seen, rngs[k], InBlocks(blocks[k]));
     }
     for (std::size_t k = 1; k < 3; ++k) {
       ASSERT_EQ(filters[k].mean(), filters[0].mean());
@@ -157,8 +157,8 @@ TEST(LevelFilter, GivingUpEarlySparesTheSurvivors) {
     const Evidence seen = One(step.scan);
     patient.Move(step.T_prev_curr, 10.0 * Noise(), a);
     brisk.Move(step.T_prev_curr, 10.0 * Noise(), b);
-    patient.Observe({&seen, 1}, a, SerialFor);
-    brisk.Observe({&seen, 1}, b, SerialFor);
+    patient.Observe(seen, a, SerialFor);
+    brisk.Observe(seen, b, SerialFor);
   }
   EXPECT_LT((patient.mean().translation() - brisk.mean().translation()).norm(), 0.05);
   const Eigen::Vector2d truth = drive.back().T_map_robot.translation();
@@ -174,7 +174,7 @@ TEST(LevelFilter, ParticlesCostWhatTheyChange) {
   for (const DriveStep& step : drive) {
     const Evidence seen = One(step.scan);
     filter.Move(step.T_prev_curr, Noise(), rng);
-    filter.Observe({&seen, 1}, rng, SerialFor);
+    filter.Observe(seen, rng, SerialFor);
     const Ancestry& ancestry = filter.maps().ancestry();
     ASSERT_LE(ancestry.size(), 2 * ancestry.living().size() - 1);
     ASSERT_LE(ancestry.living().size(), 60u);
@@ -190,14 +190,14 @@ TEST(LevelFilter, AScanThatSaysNothingOnlyLengthensPaths) {
   LevelFilter filter(SmallLevel(), {}, {});
   Rng rng(9);
   Evidence nothing{{std::make_shared<LaserRays>(), Pose2{}}};
-  filter.Observe({&nothing, 1}, rng, SerialFor);
+  filter.Observe(nothing, rng, SerialFor);
   EXPECT_TRUE(filter.maps().blank());
   const Evidence first = One(drive[0].scan);
-  filter.Observe({&first, 1}, rng, SerialFor);
+  filter.Observe(first, rng, SerialFor);
   EXPECT_FALSE(filter.maps().blank());
   EXPECT_EQ(filter.maps().count(), 1u);  // All particles alike: one map.
   filter.Move({0.2, 0.0, 0.0}, Noise(), rng);
-  filter.Observe({&nothing, 1}, rng, SerialFor);
+  filter.Observe(nothing, rng, SerialFor);
   EXPECT_EQ(filter.maps().count(), 1u);
   EXPECT_EQ(filter.best().path.size(), 3u);
   EXPECT_NEAR(filter.mean().x, 0.2, 0.02);
@@ -211,7 +211,7 @@ TEST(LevelFilter, SurvivesScatteredParticlesAndFarPlaces) {
   for (std::size_t i = 0; i < 6; ++i) {
     const Evidence seen = One(drive[i].scan);
     filter.Move({i == 4 ? 1e7 : 0.2, 0.0, 0.1}, i >= 2 ? wild : Noise(), rng);
-    filter.Observe({&seen, 1}, rng, InBlocks(2));
+    filter.Observe(seen, rng, InBlocks(2));
     EXPECT_TRUE(filter.mean().IsFinite());
     EXPECT_TRUE(filter.covariance().allFinite());
   }

@@ -1,0 +1,117 @@
+#include "server/slam/dpslam/segment_filter.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/server/slam/dpslam/drive.h"
+
+namespace cairn::slam {
+namespace {
+
+constexpr double kMemoryM = 12.0;
+
+LevelOptions High(std::int64_t particles) {
+  LevelOptions options;
+  options.particles = particles;
+  options.sigma_m = 0.07;
+  options.evidence_share = 0.2;
+  options.unseen_per_m = 0.3;
+  options.ray_stride = 4;
+  options.resample_below = 0.5;
+  options.give_up_behind = 0.0;
+  options.drift = {0.05, 0.0, 0.0, 0.02, 0.0, 0.0};
+  return options;
+}
+
+// A ring driven past its start in segments of eight scans a metre apart, every one of them bent the same way.
+struct Segments {
+  std::vector<Pose2> truth;  // Of every scan.
+  std::vector<Evidence> trajectories;
+};
+Segments BentRing(double bend_rad, double width_m = 24.0, double laps = 1.25) {
+  constexpr std::size_t kScans = 8;
+  const auto drive = DriveRing(width_m, 18.0, laps, 61, 21);
+  Segments segments;
+  std::vector<std::shared_ptr<LaserRays>> rays;
+  for (std::size_t i = 0; i < drive.size(); i += 5) {
+    segments.truth.push_back(drive[i].T_map_robot);
+    rays.push_back(std::make_shared<LaserRays>(RaysOf(drive[i].scan, {})));
+  }
+  for (std::size_t first = 0; first + kScans <= rays.size(); first += kScans) {
+    const Pose2 T_joint = segments.truth[first == 0 ? 0 : first - 1].Inverse();
+    Evidence trajectory;
+    for (std::size_t k = 0; k < kScans; ++k)
+      trajectory.push_back({rays[first + k], T_joint * segments.truth[first + k] *
+                                                 Pose2{0.0, 0.0, bend_rad * static_cast<double>(k + 1) / kScans}});
+    segments.trajectories.push_back(std::move(trajectory));
+  }
+  segments.truth.resize(kScans * segments.trajectories.size());
+  return segments;
+}
+
+// How far the path puts the last scan from where it stands to the first scan near it, against the truth.
+double LoopErrorOf(const Segments& segments, const SharedSequence<Pose2>& path) {
+  const std::size_t last = segments.truth.size() - 1;
+  std::size_t near = 0;
+  for (std::size_t i = 0; i < last / 2; ++i)
+    if (Between(segments.truth[i], segments.truth[last]).translation().norm() <
+        Between(segments.truth[near], segments.truth[last]).translation().norm())
+      near = i;
+  return Between(Between(segments.truth[near], segments.truth[last]), Between(path[near], path[last]))
+      .translation()
+      .norm();
+}
+
+TEST(SegmentFilter, ClosesALoopThatNoParticleFits) {
+  const Segments segments = BentRing(0.015);
+  const Pose2 start = segments.truth.front();
+  SegmentFilter filter(High(60), {}, kMemoryM, start);
+  Rng rng(1);
+  Pose2 joint = start;
+  SharedSequence<Pose2> bent;
+  for (const Evidence& trajectory : segments.trajectories) {
+    filter.Take({trajectory}, 8.0, rng);
+    while (filter.at_work()) filter.Work(rng, SerialFor);
+    const Pose2 from = joint;
+    for (const PlacedRays& placed : trajectory) bent.Append(joint = from * placed.T_start_robot);
+  }
+  ASSERT_EQ(filter.level().best().path.size(), segments.truth.size());
+  EXPECT_GT(LoopErrorOf(segments, bent), 0.5);
+  EXPECT_LT(LoopErrorOf(segments, filter.level().best().path), 0.2);
+  EXPECT_GT(filter.MapImage().width, 0);
+}
+
+TEST(SegmentFilter, WhereNobodyComesBackNobodyDiesAndNothingIsDrawn) {
+  const Segments segments = BentRing(0.0, 70.0, 0.35);  // Along one side.
+  SegmentFilter filter(High(20), {}, kMemoryM, segments.truth.front());
+  Rng rng(2);
+  ASSERT_GT(segments.trajectories.size(), 5u);
+  for (const Evidence& trajectory : segments.trajectories) {
+    filter.Take({trajectory}, 8.0, rng);
+    while (filter.at_work()) filter.Work(rng, SerialFor);
+    EXPECT_NEAR(filter.level().effective_sample_size(), 20.0, 1e-6);
+    EXPECT_TRUE(filter.level().maps().blank());
+  }
+  EXPECT_GT(filter.level().covariance().trace(), 1e-3);
+}
+
+TEST(SegmentFilter, ChangesNothingOutsideUntilItsWorkIsDone) {
+  const Segments segments = BentRing(0.0);
+  SegmentFilter filter(High(20), {}, kMemoryM, segments.truth.front());
+  Rng rng(3);
+  int calls = 0;
+  for (const Evidence& trajectory : segments.trajectories) {
+    const SharedSequence<Pose2> before = filter.level().best().path;
+    filter.Take({trajectory}, 8.0, rng);
+    while (filter.at_work()) {
+      ASSERT_EQ(filter.level().best().path.size(), before.size());
+      for (std::size_t k = 0; k < before.size(); ++k) ASSERT_EQ(filter.level().best().path[k], before[k]);
+      filter.Work(rng, SerialFor);
+      ++calls;
+    }
+    EXPECT_EQ(filter.level().best().path.size(), before.size() + trajectory.size());
+  }
+  EXPECT_GT(calls, static_cast<int>(segments.trajectories.size()));  // Some took more than one.
+}
+
+}  // namespace
+}  // namespace cairn::slam
