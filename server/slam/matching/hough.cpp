@@ -20,7 +20,7 @@ struct ShiftConstraint {
   double weight = 0.0;
 };
 
-struct Hypothesis {
+struct TurnHypothesis {
   Pose2 T_prev_curr;
   SurfaceAgreement agreement;
   double rank = -1.0;  // Explained share less what the prior takes.
@@ -42,13 +42,13 @@ class HoughMatch {
   }
 
   [[nodiscard]] std::vector<double> Turns() const;
-  [[nodiscard]] Hypothesis BestShift(double turn) const;
+  [[nodiscard]] TurnHypothesis BestShift(double turn) const;
 
  private:
   [[nodiscard]] std::vector<ShiftConstraint> Constraints(double turn) const;
   [[nodiscard]] Pose2 Combine(std::span<const ShiftConstraint> constraints, const ShiftConstraint& a,
                               const ShiftConstraint* b, double turn) const;
-  void Consider(const Pose2& T, Hypothesis& best) const;
+  void Consider(const Pose2& T, TurnHypothesis& best) const;
   [[nodiscard]] double PriorLoss(const Pose2& T) const;
 
   const std::vector<SurfacePoint>& curr_points_;
@@ -125,7 +125,7 @@ double HoughMatch::PriorLoss(const Pose2& T) const {
   return options_.prior_weight * (1.0 - std::exp(-0.5 * away.dot(prior_information_ * away)));
 }
 
-void HoughMatch::Consider(const Pose2& T, Hypothesis& best) const {
+void HoughMatch::Consider(const Pose2& T, TurnHypothesis& best) const {
   if ((T.translation() - prior_.T_prev_curr.translation()).norm() > 1.5 * options_.max_translation_m) return;
   const SurfaceAgreement agreement = CompareSurfaces(curr_points_, reference_, T, options_.inlier_distance_m);
   // Of answers that explain equally many points, the one that explains them better.
@@ -133,9 +133,9 @@ void HoughMatch::Consider(const Pose2& T, Hypothesis& best) const {
   if (!best.found || rank > best.rank) best = {T, agreement, rank, true};
 }
 
-Hypothesis HoughMatch::BestShift(double turn) const {
+TurnHypothesis HoughMatch::BestShift(double turn) const {
   const std::vector<ShiftConstraint> constraints = Constraints(turn);
-  Hypothesis best;
+  TurnHypothesis best;
   bool crossing = false;
   for (std::size_t i = 0; i < constraints.size(); ++i) {
     for (std::size_t j = i + 1; j < constraints.size(); ++j) {
@@ -183,13 +183,13 @@ MatchResult MatchByHough(const ScanView& prev, const ScanView& curr, const Match
   if (prev.points_robot.size() < 5 || curr.points_robot.size() < 5) return Failed(prior, MatchFailure::kTooFewFeatures);
   const HoughMatch match(prev, curr, prior, options);
   const std::vector<double> turns = match.Turns();
-  std::vector<Hypothesis> hypotheses(turns.size());
+  std::vector<TurnHypothesis> hypotheses(turns.size());
   parallel_for(static_cast<int>(turns.size()), [&](int begin, int end) {
     for (int i = begin; i < end; ++i)
       hypotheses[static_cast<std::size_t>(i)] = match.BestShift(turns[static_cast<std::size_t>(i)]);
   });
-  Hypothesis best;
-  for (const Hypothesis& hypothesis : hypotheses)
+  TurnHypothesis best;
+  for (const TurnHypothesis& hypothesis : hypotheses)
     if (hypothesis.found && (!best.found || hypothesis.rank > best.rank)) best = hypothesis;
   if (!best.found) return Failed(prior, MatchFailure::kNoPairs);
   if (best.agreement.score < options.min_score) return Failed(prior, MatchFailure::kInconsistent);
