@@ -124,7 +124,7 @@ ScanOutcome Mapper::State::Coast(Stamp stamp, const Pose2& T_odom_robot) {
     outcome.T_map_odom = outcome.T_map_robot * T_odom_robot.Inverse();
     return outcome;
   }
-  const Pose2 moved = Between(T_odom_level, T_odom_robot);
+  const Pose2 moved = options.front_end.use_odometry ? Between(T_odom_level, T_odom_robot) : Pose2{};
   scans.push_back({stamp, level_place.keyframe, level_place.T_keyframe_robot * moved});
   outcome.T_map_robot = level.T_map_robot * moved;
   const Eigen::Matrix3d J = J_compose_right(level.T_map_robot, moved);

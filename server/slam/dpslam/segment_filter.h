@@ -4,9 +4,7 @@
 // - Evidence counts once: that neighbouring segments fit together is what the low level found them by, so a segment is
 //   judged on those only that the low level had forgotten. (Judged on its neighbours too, particles die for drift that
 //   a loop would have shown to be right: few are left when the robot comes round.)
-// - Until somebody comes near it again a segment is a placement and nothing is drawn: particles stay apart for the
-// price
-//   of a pose.
+// - Until somebody comes near it again a segment is a placement and nothing is drawn: staying apart costs a pose.
 // - Where a loop closes, few of the particles fit. The evidence is let in by and by, and particles that double move on:
 //   the drift at their joints is drawn anew near what it was (Neal 1998; Del Moral et al. 2006), by a proposal that
 //   keeps its distribution (Cotter et al. 2013), so that the likelihood alone decides. All joints move that nothing

@@ -132,6 +132,22 @@ TEST(TiltedScans, BeforeTheFirstLevelScanNobodyKnows) {
   EXPECT_TRUE(mapper.Snapshot().keyframes.empty());
 }
 
+TEST(TiltedScans, StayWhereTheLevelOneWasIfOdometryIsWithheld) {
+  MapperOptions options;
+  options.front_end.use_odometry = false;
+  Mapper mapper(options, {1, 2, 0.5}, 1);
+  const auto scan_where = [](bool tilted) {
+    for (const LogRecord& record : NoddingDrive().records)
+      if (const auto* scan = std::get_if<Scan>(&record); scan != nullptr && IsTilted(*scan, kLimit_rad) == tilted)
+        return std::make_shared<const Scan>(*scan);
+    return std::shared_ptr<const Scan>();
+  };
+  static_cast<void>(mapper.Process(scan_where(false), {}, SerialFor));
+  const ScanOutcome outcome = mapper.Process(scan_where(true), {7, 8, 1}, SerialFor);
+  EXPECT_EQ(outcome.reason, PoseReason::kOdometryOnly);
+  EXPECT_EQ(outcome.T_map_robot, (Pose2{1, 2, 0.5}));
+}
+
 // Stated bounds: with true poses the cloud's error is the laser's noise; with the estimator's, under 3 cm on average.
 TEST(Cloud, LiesOnTheWallsOfTheSimulatedBuilding) {
   const Drive& drive = NoddingDrive();
