@@ -10,7 +10,7 @@ set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
-all=(packages format architecture release accuracy nodds asan tsan tidy)
+all=(packages format architecture release accuracy demo nodds asan tsan tidy)
 stages=()
 
 usage() { sed -n '2,/^set/s/^# \{0,1\}//p' "$0"; echo "stages: ${all[*]} studies"; }
@@ -107,6 +107,13 @@ stage_accuracy() {
   tests/accuracy/gate.sh build/release/bin build/accuracy
 }
 
+# The README's first command, cut short. Finds what the release stage built.
+stage_demo() {
+  DEMO_SECONDS=20 DEMO_OUT=$root/build/demo deploy/demo.sh
+  local left
+  for left in map.png report.md; do [ -s "build/demo/$left" ] || { echo "the demo left no $left"; return 1; }; done
+}
+
 # The same flags as release: the compiler cache hands over every object, only linking and testing is new.
 stage_nodds() {
   configure release -B build/nodds -DCAIRN_WITH_DDS=OFF
@@ -176,25 +183,33 @@ finish() {
   echo "$passed passed, $failed failed, $skipped skipped"
 }
 
+group=
+trap '[ -z "$group" ] || kill -TERM -- "-$group" 2>/dev/null; exit 143' INT TERM
 timings=
 for stage in "${stages[@]}"; do
   start=$SECONDS
   log=$logs/$stage.log
   rm -f "$logs/$stage.xml" "$logs/$stage.ccache"
   echo "== $stage ..."
-  # In a background shell, because a shell whose exit code is tested ignores `set -e`.
+  # In a background shell, because a shell whose exit code is tested ignores `set -e`; in a process group of its own,
+  # which ends with this script.
+  set -m
   (
     set -e
     export CCACHE_STATSLOG=$logs/$stage.ccache
     "stage_$stage"
   ) >"$log" 2>&1 </dev/null &
+  group=$!
+  set +m
   code=0
-  wait $! || code=$?
+  wait "$group" || code=$?
   took=$((SECONDS - start))
   timings+="$stage ${took}s, "
   count "$code"
   case $code in
-    0) echo "   ok, ${took} s$(cache_use): $summary" ;;
+    0)
+      echo "   ok, ${took} s$(cache_use): $summary"
+      grep -m 1 'NOT REACHED' "$log" | cut -c 1-60 || true ;;
     77) echo "   $(grep -m 1 '^SKIPPED' "$log" || echo "SKIPPED")" ;;
     *)
       tail -n 150 "$log"

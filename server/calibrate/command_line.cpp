@@ -65,8 +65,9 @@ void AddOdometry(CLI::App& app, Shared& shared) {
   command->add_option("--right-diameter", options->square.drive.right_diameter_m, "Believed (m)")
       ->check(CLI::Range(0.001, 10.0))
       ->capture_default_str();
-  command->add_option("--set", *assignments,
-                      "run.KEY=VALUE of the simulation: E_d, E_b, slip_m_per_sqrt_m, bumps, bump_m");
+  command
+      ->add_option("--set", *assignments, "run.KEY=VALUE of the simulation: E_d, E_b, slip_m_per_sqrt_m, bumps, bump_m")
+      ->allow_extra_args(false);
   command->callback([&shared, options, assignments] {
     shared.action = [&shared, options, assignments] {
       const auto applied = ApplySet(*assignments, [&](OptionVisitor& visitor) {
@@ -99,13 +100,14 @@ void AddMotion(CLI::App& app, Shared& shared) {
   command->add_option("LOG", options->log, "CARMEN or DP-SLAM log")->required();
   command->add_option("--truth", options->truth, "True poses (TUM)");
   command->add_flag("!--no-matcher", options->matcher_model, "Leave out the scan matcher's model");
-  command->add_option("--seed", *seed, "Of all randomness; same as --set fit.seed=N slam.seed=N")
+  command->add_option("--seed", *seed, "Of all randomness; same as --set fit.seed=N --set slam.seed=N")
       ->check(CLI::NonNegativeNumber);
   command->add_option("--threads", options->threads, "0: one per core; the output does not depend on it")
       ->check(CLI::Range(0, 256));
   command->add_option("--max-steps", options->max_steps, "Of the log, at most; 0: all")->check(CLI::NonNegativeNumber);
   command->add_option("--config", *config, "YAML file; its slam section is used (cairnd's file will do)");
-  command->add_option("--set", *assignments, "key=value, e.g. slam.gate.distance_m=0.5, fit.particles=200; repeatable");
+  command->add_option("--set", *assignments, "key=value, e.g. slam.gate.distance_m=0.5, fit.particles=200; repeatable")
+      ->allow_extra_args(false);
   command->callback([&shared, options, assignments, config, seed] {
     shared.action = [&shared, options, assignments, config, seed] {
       const VisitOptions visit = [&](OptionVisitor& visitor) {

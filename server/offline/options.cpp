@@ -37,7 +37,8 @@ std::optional<OfflineOptions> ParseOfflineOptions(int argc, char** argv, int& ex
       ->delimiter(',')
       ->expected(3);
   app.add_option("--config", config, "YAML file; its slam section is used (cairnd's file will do)");
-  app.add_option("--set", assignments, "key=value, e.g. slam.particles=100; repeatable, wins over --config");
+  app.add_option("--set", assignments, "key=value, e.g. slam.particles=100; repeatable, wins over --config")
+      ->allow_extra_args(false);
   app.add_option("--seed", seed, "Same as --set slam.seed=N");
   app.add_option("--threads", options.threads, "0: one per core; the output does not depend on it")
       ->check(CLI::Range(0, 256));

@@ -130,9 +130,7 @@ Eigen::Matrix3d FrontEnd::ForecastShare(const MatchResult& match) const {
     unseen.setZero();
     unseen.topLeftCorner<2, 2>() = along * u * u.transpose();
   }
-  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  R.topLeftCorner<2, 2>() = keyframe_.T_track_robot.rotation().transpose();
-  return R * unseen * R.transpose();
+  return unseen;
 }
 
 // In track: the matcher itself works in the keyframe's frame.
@@ -236,7 +234,8 @@ MatchResult FrontEnd::Refine(const ScanView& view, const Pose2& T_odom_robot, co
 }
 
 void FrontEnd::AddKeyframe(const ScanView& view) {
-  if (!options_.refine_enabled && KeepsReference(matcher_) && score_ >= options_.keep_above) return;
+  const bool matcher_alone = !options_.refine_enabled && !reference_.empty();
+  if (matcher_alone && KeepsReference(matcher_) && score_ >= options_.keep_above) return;
   keyframe_ = history_.back();
   const Eigen::Matrix2d R = T_track_robot_.rotation();
   std::vector<SurfacePoint> points_track;

@@ -54,7 +54,7 @@ struct TrackStep {
   double moved_m = 0.0;                        // Since the scan before.
   MatchFailure matcher = MatchFailure::kNone;  // Why the matcher alone did not say.
   bool matched = false;                        // False: odometry alone.
-  // Of what no scan and no odometry showed of this step, in the last keyframe: a corridor's way, a scan unmatched. Zero
+  // Of what no scan and no odometry showed of this step, along track's axes: a corridor's way, a scan unmatched. Zero
   // where odometry is used, which the mapper accounts for.
   Eigen::Matrix3d forecast_covariance = Eigen::Matrix3d::Zero();
 };

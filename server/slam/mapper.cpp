@@ -89,8 +89,13 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   ScanView view = Look(*scan, s.options.front_end);
   const TrackStep step = s.front_end.Track(view, T_odom_robot, parallel_for);
   s.unmatched_m = step.matched || s.keyframes.empty() ? 0.0 : s.unmatched_m + step.moved_m;
-  if (!step.matched) s.blind_covariance += s.options.blind.Covariance({step.moved_m, 0.0, 0.0});
-  s.blind_covariance += step.forecast_covariance;
+  if (!step.matched && s.options.front_end.use_odometry)
+    s.blind_covariance += s.options.blind.Covariance({step.moved_m, 0.0, 0.0});
+  if (!s.shapes.empty()) {
+    Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+    R.topLeftCorner<2, 2>() = s.shapes.back().T_track_robot.rotation().transpose();
+    s.blind_covariance += R * step.forecast_covariance * R.transpose();
+  }
   const bool first = s.keyframes.empty();
   Pose2 T_keyframe_robot = first ? Pose2{} : Between(s.shapes.back().T_track_robot, step.T_track_robot);
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "server/slam/scan/tilt.h"
+
 namespace cairn::slam {
 
 LaserRays RaysOf(const Scan& scan, const OpacityOptions& options) {
@@ -20,7 +22,7 @@ LaserRays RaysOf(const Scan& scan, const OpacityOptions& options) {
     const double range =
         ray.hit ? static_cast<double>(scan.ranges_m[beam]) : std::min(options.no_return_m, scan.range_max_m);
     const double bearing = scan.angle_first_rad + static_cast<double>(beam) * scan.angle_step_rad;
-    const Eigen::Vector2d end_laser(range * std::cos(bearing) * cos_tilt, range * std::sin(bearing));
+    const Eigen::Vector2d end_laser = OnGround(range, bearing, cos_tilt);
     ray.length_m = end_laser.norm();
     if (!(ray.length_m > 1e-3)) continue;
     const Eigen::Vector2d along = end_laser / ray.length_m;

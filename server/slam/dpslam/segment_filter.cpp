@@ -96,6 +96,7 @@ void SegmentFilter::Take(std::vector<Evidence> trajectories, double way_m, Rng& 
       candidate.joints.erase(candidate.joints.begin(), candidate.joints.begin() + fixed);
   }
   std::erase_if(open_, [&](std::size_t s) { return s < free_; });
+  for (std::size_t s = 0; s < free_; ++s) segments_[s].judged = {};
   open_.push_back(segments_.size() - 1);
   log_likelihoods_.clear();
   proposed_.clear();

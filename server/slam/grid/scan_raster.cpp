@@ -11,9 +11,14 @@ namespace {
 
 constexpr std::uint8_t kFree = 1, kHit = 2;
 
+// A pose may be anything finite: where cells can not be counted any more, the last one stands for all.
+int CellAlong(double coordinate_m, double resolution_m) {
+  constexpr double kFarthest = 1e9;
+  return static_cast<int>(std::clamp(std::floor(coordinate_m / resolution_m), -kFarthest, kFarthest));
+}
+
 GridCell CellOf(const Eigen::Vector2d& p_map, double resolution_m) {
-  return {static_cast<int>(std::floor(p_map.x() / resolution_m)),
-          static_cast<int>(std::floor(p_map.y() / resolution_m))};
+  return {CellAlong(p_map.x(), resolution_m), CellAlong(p_map.y(), resolution_m)};
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 
 namespace cairn::slam {
 
-PointIndex::PointIndex(double cell_m) : cell_m_(cell_m), heads_(kSide * kSide, -1) {}
+PointIndex::PointIndex(double cell_m) : cell_m_(cell_m), heads_(kSide * kSide, -1), counts_(kSide * kSide, 0) {}
 
 std::size_t PointIndex::Bucket(int x, int y) {
   return static_cast<std::size_t>((y & (kSide - 1)) * kSide + (x & (kSide - 1)));
@@ -13,6 +13,7 @@ std::size_t PointIndex::Bucket(int x, int y) {
 
 void PointIndex::Clear() {
   std::fill(heads_.begin(), heads_.end(), -1);
+  std::fill(counts_.begin(), counts_.end(), std::uint16_t{0});
   next_.clear();
   points_.clear();
 }
@@ -20,6 +21,8 @@ void PointIndex::Clear() {
 void PointIndex::Add(const SurfacePoint& point) {
   const std::size_t bucket =
       Bucket(static_cast<int>(std::floor(point.p.x() / cell_m_)), static_cast<int>(std::floor(point.p.y() / cell_m_)));
+  if (counts_[bucket] == kMaxInBucket) return;
+  ++counts_[bucket];
   next_.push_back(heads_[bucket]);
   heads_[bucket] = static_cast<std::int32_t>(points_.size());
   points_.push_back(point);

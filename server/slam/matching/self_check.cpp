@@ -32,7 +32,9 @@ void Visit(OptionVisitor& visitor, SelfCheckOptions& options) {
 void SelfCheck::Look(std::span<const Keyframe> keyframes, std::span<const KeyframeShape> shapes,
                      const SharedSequence<Pose2>& path) {
   const double here_m = shapes.back().travelled_m;
-  if (!options_.enabled || here_m - looked_at_m_ < options_.every_m) return;
+  // A stretch must have room for the looks a verdict takes.
+  const double every_m = std::min(options_.every_m, options_.stretch_m / static_cast<double>(kMinLooks));
+  if (!options_.enabled || here_m - looked_at_m_ < every_m) return;
   looked_at_m_ = here_m;
   const std::size_t now = shapes.size() - 1;
   Looked look{here_m, {}};

@@ -9,6 +9,10 @@
 namespace cairn::slam {
 namespace {
 
+// Bounds on the work a scan can ask for; no scanner of the field comes near with walls about it.
+constexpr std::size_t kMaxPoints = 2048;
+constexpr std::size_t kMaxNeighbours = 512;  // To either side.
+
 // How far apart two neighbouring beams may land and still be on one surface.
 double AllowedGap(const BeamPoint& hit, double step, const SurfaceOptions& options) {
   return std::max(options.neighbour_gap_m * 0.5, std::min(options.neighbour_gap_m * 2.0, 6.0 * hit.range_m * step));
@@ -24,9 +28,10 @@ std::pair<std::size_t, std::size_t> Neighbourhood(const std::vector<BeamPoint>& 
     return (hits[a].p_robot - hits[b].p_robot).norm() < gap && std::abs(hits[a].beam - hits[b].beam) <= 3;
   };
   std::size_t first = centre, last = centre;
-  while (first > 0 && connected(first, first - 1) && (hits[first - 1].p_robot - hits[centre].p_robot).norm() < span)
+  while (first > 0 && centre - first < kMaxNeighbours && connected(first, first - 1) &&
+         (hits[first - 1].p_robot - hits[centre].p_robot).norm() < span)
     --first;
-  while (last + 1 < hits.size() && connected(last, last + 1) &&
+  while (last + 1 < hits.size() && last - centre < kMaxNeighbours && connected(last, last + 1) &&
          (hits[last + 1].p_robot - hits[centre].p_robot).norm() < span)
     ++last;
   return {first, last};
@@ -93,8 +98,9 @@ std::vector<SurfacePoint> SurfacePointsOf(std::span<const BeamPoint> points, con
   const double step = std::abs(scan.angle_step_rad);
   const Eigen::Vector2d p_sensor = scan.T_robot_laser.translation();
   std::vector<SurfacePoint> surface;
-  surface.reserve(hits.size());
-  for (std::size_t i = 0; i < hits.size(); ++i) {
+  const std::size_t stride = hits.size() / kMaxPoints + 1;
+  surface.reserve(hits.size() / stride + 1);
+  for (std::size_t i = 0; i < hits.size(); i += stride) {
     if (!surface.empty() && (hits[i].p_robot - surface.back().p).norm() < options.min_spacing_m) continue;
     const auto [first, last] = Neighbourhood(hits, i, step, options);
     Eigen::Vector2d normal = NormalOf(hits, first, last, p_sensor, options.max_flatness);

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "server/slam/scan/beam_points.h"
+
 namespace cairn::slam {
 namespace {
 
@@ -16,7 +18,8 @@ enum class Verdict : std::uint8_t { kUnknown, kBorneOut, kContradicted };
 // A scan, ready to be asked about many points.
 class Witness {
  public:
-  Witness(const Scan& scan, double near_m) : scan_(scan), near_m_(near_m), step_rad_(std::abs(scan.angle_step_rad)) {
+  Witness(const Scan& scan, double near_m)
+      : scan_(scan), near_m_(near_m), step_rad_(std::abs(scan.angle_step_rad)), full_turn_(IsFullTurn(scan)) {
     for (std::size_t k = 0; k < cosines_.size(); ++k) cosines_[k] = std::cos(static_cast<double>(k) * step_rad_);
   }
 
@@ -27,7 +30,7 @@ class Witness {
     if (scan_.angle_step_rad < 0.0) turn = -turn;
     turn -= 2.0 * kPi * std::floor(turn / (2.0 * kPi));
     const double beam = std::round(turn / step_rad_);
-    if (beam >= static_cast<double>(scan_.ranges_m.size())) return Verdict::kUnknown;
+    if (!full_turn_ && beam >= static_cast<double>(scan_.ranges_m.size())) return Verdict::kUnknown;
     const double beams_near = std::ceil(near_m_ / (range_m * step_rad_));
     const int reach = beams_near < kMaxReach ? std::max(kMinReach, static_cast<int>(beams_near)) : kMaxReach;
     return About(static_cast<int>(beam), reach, range_m);
@@ -36,10 +39,12 @@ class Witness {
  private:
   // `beam`: the one that points at the point, `range_m` away; `reach`: beams to either side that pass near it.
   [[nodiscard]] Verdict About(int beam, int reach, double range_m) const {
-    if (beam - reach < 0 || beam + reach >= static_cast<int>(scan_.ranges_m.size())) return Verdict::kUnknown;
+    const int beams = static_cast<int>(scan_.ranges_m.size());
+    if (beams <= 2 * reach) return Verdict::kUnknown;
+    if (!full_turn_ && (beam - reach < 0 || beam + reach >= beams)) return Verdict::kUnknown;
     bool all_beyond = true;
     for (int k = -reach; k <= reach; ++k) {
-      const float seen = scan_.ranges_m[static_cast<std::size_t>(beam + k)];
+      const float seen = scan_.ranges_m[static_cast<std::size_t>((beam + k + beams) % beams)];
       // What returns nothing may be dark or glass as well as far.
       if (ClassifyRange(seen, scan_.range_min_m, scan_.range_max_m) != BeamClass::kHit) {
         all_beyond = false;
@@ -57,6 +62,7 @@ class Witness {
   const Scan& scan_;
   const double near_m_;
   const double step_rad_;
+  const bool full_turn_;
   std::array<double, kMaxReach + 1> cosines_{};
 };
 
@@ -64,6 +70,7 @@ class Witness {
 
 Testimony Testify(const Scan& witness, const Pose2& T_witness_points, std::span<const SurfacePoint> points,
                   double near_m, double max_range_m) {
+  if (witness.tilt_rad != 0.0) return {};  // Its ranges are not lengths on the ground.
   const Pose2 T_laser_points = witness.T_robot_laser.Inverse() * T_witness_points;
   const Eigen::Matrix2d R = T_laser_points.rotation();
   const Eigen::Vector2d t = T_laser_points.translation();

@@ -1,0 +1,88 @@
+// cairn-offline as a process, over a simulated log: what it writes, what it prints, and that neither depends on the
+// run.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "client/cli/program.h"
+#include "common/sensor/trajectory.h"
+#include "tests/system/child_process.h"
+#include "tests/temp_directory.h"
+
+namespace cairn::client {
+namespace {
+
+class CairnOffline : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    logs_ = new TempDirectory;
+    std::ostringstream out, err;
+    const ExitCode code = RunCairn({"sim", "--no-stream", "--robots", "1", "--seconds", "20", "--beams", "181", "--fov",
+                                    "180", "--first-stamp", "1000", "--log-dir", logs_->path().string()},
+                                   out, err);
+    ASSERT_EQ(code, ExitCode::kOk) << err.str();
+  }
+  static void TearDownTestSuite() {
+    delete logs_;
+    logs_ = nullptr;
+  }
+
+  static std::string Log() { return (*logs_ / "robot1.log").string(); }
+  static ChildProcess::Outcome Run(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {CAIRN_OFFLINE_PATH, "--set", "slam.particles=30"});
+    return ChildProcess(arguments).Wait();
+  }
+
+  static inline TempDirectory* logs_ = nullptr;
+};
+
+TEST_F(CairnOffline, SameInputAndSeedGiveTheSameBytesWhateverTheThreads) {
+  const std::vector<std::string> names{"t.tum", "s.tum", "map.yaml", "map.png"};
+  std::vector<std::string> first;
+  for (const std::string threads : {"1", "1", "2", "5"}) {
+    const TempDirectory out;
+    const auto run = Run({Log(), "--threads", threads, "--trajectory", (out / "t.tum").string(), "--smooth",
+                          "--smoothed-trajectory", (out / "s.tum").string(), "--map", (out / "map.yaml").string()});
+    ASSERT_EQ(run.exit_code, 0) << run.output;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      const std::string bytes = out.Read(names[i]);
+      ASSERT_FALSE(bytes.empty()) << names[i];
+      if (first.size() < names.size()) {
+        first.push_back(bytes);
+      } else {
+        EXPECT_TRUE(bytes == first[i]) << names[i] << " with " << threads << " threads";
+      }
+    }
+    const auto online = ReadTum((out / "t.tum").string()), smoothed = ReadTum((out / "s.tum").string());
+    ASSERT_TRUE(online && smoothed);
+    EXPECT_EQ(online->size(), smoothed->size());
+  }
+}
+
+TEST_F(CairnOffline, PrintsOneObjectForMachines) {
+  const auto run = Run({Log(), "--json"});
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  const auto report = nlohmann::json::parse(run.output);
+  for (const char* key : {"time_ms_mean", "time_ms_p50", "time_ms_p99", "time_ms_max", "cpu_s", "wall_s", "scans_used",
+                          "scans_dropped", "landmarks", "peak_rss_mib"})
+    EXPECT_TRUE(report.contains(key)) << key;
+  EXPECT_GT(report["scans_used"], 100);
+  EXPECT_EQ(report["scans_dropped"], 0);
+  EXPECT_LE(report["time_ms_p50"], report["time_ms_p99"]);
+}
+
+TEST_F(CairnOffline, SaysWhatIsWrongAndExitsByIt) {
+  const auto missing = Run({"/nowhere/at-all.log"});
+  EXPECT_EQ(missing.exit_code, 1);
+  EXPECT_NE(missing.output.find("at-all.log"), std::string::npos) << missing.output;
+  EXPECT_EQ(Run({}).exit_code, 2);
+  EXPECT_EQ(Run({Log(), "--no-such-option"}).exit_code, 2);
+  const auto range = Run({Log(), "--set", "slam.grid.resolution_m=5"});
+  EXPECT_NE(range.exit_code, 0);
+  EXPECT_NE(range.output.find("resolution_m"), std::string::npos) << range.output;
+}
+
+}  // namespace
+}  // namespace cairn::client
