@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # The one command: installs what is missing, builds every way that counts, runs every test, holds the accuracy.
-#   tests/run.sh                 every stage below but the studies; stops at the first that fails
+#   tests/run.sh                 packages to tsan below; stops at the first that fails
+#   tests/run.sh --full          clang-tidy besides
 #   tests/run.sh --quick         packages, format, architecture, release
 #   tests/run.sh --stage NAME    this stage (may be repeated), with the build it needs
 #   tests/run.sh --studies       the slow studies besides (tests/studies)
@@ -10,18 +11,20 @@ set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
-all=(packages format architecture release accuracy demo nodds asan tsan tidy)
+all=(packages format architecture release accuracy demo nodds asan tsan)
+full=(tidy)
 stages=()
 
-usage() { sed -n '2,/^set/s/^# \{0,1\}//p' "$0"; echo "stages: ${all[*]} studies"; }
+usage() { sed -n '2,/^set/s/^# \{0,1\}//p' "$0"; echo "stages: ${all[*]} ${full[*]} studies"; }
 while [ $# -gt 0 ]; do
   case $1 in
     --quick) stages=(packages format architecture release) ;;
+    --full) all+=("${full[@]}") ;;
     --studies) all+=(studies) ;;
     --stage)
-      case " ${all[*]} studies " in
+      case " ${all[*]} ${full[*]} studies " in
         *" ${2:-none} "*) ;;
-        *) echo "--stage needs one of: ${all[*]} studies" >&2; exit 2 ;;
+        *) echo "--stage needs one of: ${all[*]} ${full[*]} studies" >&2; exit 2 ;;
       esac
       stages+=("$2")
       shift ;;
