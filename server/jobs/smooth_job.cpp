@@ -3,52 +3,11 @@
 #include <memory>
 #include <utility>
 
-#include "server/jobs/disagreement.h"
-#include "server/slam/smoothing/smoothed_path.h"
+#include "server/slam/smoothing/smoothed_map.h"
 
 namespace cairn::server {
-namespace {
-
-// Scans drawn and compared so far, as a share of all: what `progress` means.
-class Steps {
- public:
-  Steps(std::size_t total, const JobControl& control) : total_(total), control_(control) {}
-  // False where the job is to end.
-  bool Next() {
-    control_.Progress(static_cast<double>(++done_) / static_cast<double>(total_));
-    return !control_.cancelled();
-  }
-
- private:
-  const std::size_t total_;
-  std::size_t done_ = 0;
-  const JobControl& control_;
-};
-
-constexpr int kStepsPerKeyframe = 3;  // Compared before, drawn, compared after.
-
-bool Compare(const slam::MapperSnapshot& snapshot, const std::vector<Pose2>& path, const slam::OccupancyGrid& grid,
-             Disagreement& disagreement, Steps& steps) {
-  for (std::size_t i = 0; i < snapshot.keyframes.size(); ++i) {
-    disagreement.Add(*snapshot.keyframes[i].scan, path[i], grid);
-    if (!steps.Next()) return false;
-  }
-  return true;
-}
-
-bool Draw(const slam::MapperSnapshot& snapshot, const std::vector<Pose2>& path, slam::OccupancyGrid& grid,
-          Steps& steps) {
-  for (std::size_t i = 0; i < snapshot.keyframes.size(); ++i) {
-    grid.Draw(*snapshot.keyframes[i].scan, path[i]);
-    if (!steps.Next()) return false;
-  }
-  return true;
-}
-
-}  // namespace
 
 Result<JobOutcome> SmoothJob::Run(const Job& job, bool enable, const JobControl& control) const {
-  const auto cancelled = Fail(StatusCode::kCancelled, "cancelled");
   const auto material = ports_.collect(job.site, control);
   if (!material) return tl::unexpected(material.error());
   std::size_t keyframes = 0, scans = 0;
@@ -58,20 +17,24 @@ Result<JobOutcome> SmoothJob::Run(const Job& job, bool enable, const JobControl&
   }
   if (keyframes == 0) return Fail(StatusCode::kFailedPrecondition, "site '" + job.site + "' has no scans to smooth");
 
-  Steps steps(kStepsPerKeyframe * keyframes, control);
-  Disagreement before, after;
+  // Progress is the share of scans drawn and compared.
+  const double steps = static_cast<double>(slam::kSmoothingStepsPerKeyframe) * static_cast<double>(keyframes);
+  std::size_t done = 0;
+  const auto next = [&] {
+    control.Progress(static_cast<double>(done++) / steps);
+    return !control.cancelled();
+  };
+  slam::Disagreement before, after;
   MapVersion version;
   version.info.job = job.id;
   for (const SessionMaterial& session : *material) {
     const slam::MapperSnapshot& snapshot = session.snapshot;
-    const std::vector<Pose2> path = slam::SmoothedPath(snapshot);
-    const slam::OccupancyGrid online(session.grid_options, session.chunks);
-    slam::OccupancyGrid redrawn(session.grid_options);
-    if (!Compare(snapshot, snapshot.online_path, online, before, steps)) return cancelled;
-    if (!Draw(snapshot, path, redrawn, steps)) return cancelled;
-    if (!Compare(snapshot, path, redrawn, after, steps)) return cancelled;
-    version.parts[session.session] = {redrawn.chunks(), snapshot.keyframes.size()};
-    version.smoothed[session.robot] = std::make_shared<const Trajectory>(snapshot.TrajectoryAlong(path));
+    const auto map = slam::SmoothMap(snapshot, session.grid_options, next);
+    if (!map) return Fail(StatusCode::kCancelled, "cancelled");
+    before.Add(map->before);
+    after.Add(map->after);
+    version.parts[session.session] = {map->grid.chunks(), snapshot.keyframes.size()};
+    version.smoothed[session.robot] = std::make_shared<const Trajectory>(snapshot.TrajectoryAlong(map->path));
   }
   const std::string summary = std::to_string(material->size()) + " robots, " + std::to_string(keyframes) +
                               " keyframes, " + std::to_string(scans) + " scans";

@@ -1,8 +1,8 @@
 // Full SLAM as a job: takes what every session of the site knows at one moment, smooths each robot's path (that of its
-// best particle, fitted to all steps, revisits and loops: slam/smoothing), redraws its grid along it, and publishes the
-// result as a new map version, disabled until it is enabled. Robots are smoothed each by itself: relations between them
-// are not sought. Source: thesis A 5.4 (full-SLAM path of the best particle).
-// Thread rule: runs on the job worker's thread; it may wait for sessions, nobody waits for it.
+// best particle, fitted to all steps, revisits and loops: slam/smoothing), with its grid drawn along it, and publishes
+// the result as a new map version, disabled until it is enabled. Robots are smoothed each by itself: relations between
+// them are not sought. Source: thesis A 5.4 (full-SLAM path of the best particle). Thread rule: runs on the job
+// worker's thread; it may wait for sessions, nobody waits for it.
 #pragma once
 
 #include <functional>

@@ -12,7 +12,7 @@
 #include "server/offline/over_threads.h"
 #include "server/slam/grid/grid_image.h"
 #include "server/slam/scan_pipeline.h"
-#include "server/slam/smoothing/smoothed_path.h"
+#include "server/slam/smoothing/smoothed_map.h"
 
 namespace cairn::server {
 namespace {
@@ -60,13 +60,12 @@ Result<void> WriteResults(const OfflineOptions& options, const Trajectory& onlin
     if (auto written = WriteMap(mapper.grid(), options.map); !written) return written;
   if (!options.smooth) return {};
   const slam::MapperSnapshot snapshot = mapper.Snapshot();
-  const std::vector<Pose2> path = slam::SmoothedPath(snapshot);
-  if (!options.smoothed_trajectory.empty())
-    if (auto written = WriteTum(snapshot.TrajectoryAlong(path), options.smoothed_trajectory); !written) return written;
-  if (options.smoothed_map.empty()) return {};
-  slam::OccupancyGrid redrawn(options.slam.grid);
-  for (std::size_t k = 0; k < snapshot.keyframes.size(); ++k) redrawn.Draw(*snapshot.keyframes[k].scan, path[k]);
-  return WriteMap(redrawn, options.smoothed_map);
+  const auto smoothed = slam::SmoothMap(snapshot, options.slam.grid, [] { return true; });
+  if (!options.smoothed_trajectory.empty()) {
+    auto written = WriteTum(snapshot.TrajectoryAlong(smoothed->path), options.smoothed_trajectory);
+    if (!written) return written;
+  }
+  return options.smoothed_map.empty() ? Result<void>{} : WriteMap(smoothed->grid, options.smoothed_map);
 }
 
 }  // namespace

@@ -22,7 +22,6 @@ struct SessionMaterial {
   std::string robot;
   slam::MapperSnapshot snapshot;
   slam::GridOptions grid_options;
-  slam::OccupancyGrid::Chunks chunks;  // The grid as it stands with all keyframes of the snapshot.
 };
 
 // A robot's grid, drawn from its first `keyframes` keyframes: immutable chunks, shared.

@@ -135,12 +135,10 @@ void SessionEstimator::On(Correction&& correction) {
 }
 
 void SessionEstimator::On(SnapshotWanted&& wanted) {
-  slam::OccupancyGrid::Chunks chunks = PublishedChunks();
   wanted.done({.session = identity_.id,
                .robot = identity_.status.session.robot,
                .snapshot = pipeline_.mapper().Snapshot(),
-               .grid_options = pipeline_.mapper().grid().options(),
-               .chunks = std::move(chunks)});
+               .grid_options = pipeline_.mapper().grid().options()});
 }
 
 void SessionEstimator::On(Finish&& finish) {

@@ -1,22 +1,22 @@
-#include "server/jobs/disagreement.h"
+#include "server/slam/smoothing/disagreement.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "server/slam/scan/tilt.h"
 
-namespace cairn::server {
+namespace cairn::slam {
 namespace {
 
 constexpr std::uint8_t kOccupiedFrom = 50;  // Percent.
 
-bool Occupied(const slam::OccupancyGrid& grid, const Eigen::Vector2d& p_map) {
+bool Occupied(const OccupancyGrid& grid, const Eigen::Vector2d& p_map) {
   const std::uint8_t cell = grid.OccupancyAt(p_map);
   return cell != kUnknownCell && cell > kOccupiedFrom;
 }
 
 // Rings of cells outwards: most beams end in an occupied cell and stop at the first look.
-double NearestSquared(const slam::OccupancyGrid& grid, const Eigen::Vector2d& p_map, double max_distance_m) {
+double NearestSquared(const OccupancyGrid& grid, const Eigen::Vector2d& p_map, double max_distance_m) {
   if (Occupied(grid, p_map)) return 0.0;
   const double cell_m = grid.options().resolution_m;
   const int rings = static_cast<int>(std::ceil(max_distance_m / cell_m));
@@ -34,7 +34,7 @@ double NearestSquared(const slam::OccupancyGrid& grid, const Eigen::Vector2d& p_
 
 }  // namespace
 
-void Disagreement::Add(const Scan& scan, const Pose2& T_map_robot, const slam::OccupancyGrid& grid) {
+void Disagreement::Add(const Scan& scan, const Pose2& T_map_robot, const OccupancyGrid& grid) {
   const Pose2 T_map_laser = T_map_robot * scan.T_robot_laser;
   const double reach_m = grid.options().max_ray_m;  // Farther hits were never drawn.
   const double cos_tilt = std::cos(scan.tilt_rad);
@@ -42,10 +42,15 @@ void Disagreement::Add(const Scan& scan, const Pose2& T_map_robot, const slam::O
     const float range_m = scan.ranges_m[i];
     if (ClassifyRange(range_m, scan.range_min_m, scan.range_max_m) != BeamClass::kHit || range_m > reach_m) continue;
     const double bearing = scan.angle_first_rad + static_cast<double>(i) * scan.angle_step_rad;
-    const Eigen::Vector2d p_laser = slam::OnGround(range_m, bearing, cos_tilt);
+    const Eigen::Vector2d p_laser = OnGround(range_m, bearing, cos_tilt);
     sum_m2_ += NearestSquared(grid, T_map_laser * p_laser, kMaxDistanceM);
     ++beams_;
   }
 }
 
-}  // namespace cairn::server
+void Disagreement::Add(const Disagreement& other) {
+  sum_m2_ += other.sum_m2_;
+  beams_ += other.beams_;
+}
+
+}  // namespace cairn::slam
