@@ -1,14 +1,11 @@
 // What tests over real sockets share: a domain of this process's own, and waiting on conditions with a deadline.
 #pragma once
 
-#include <fcntl.h>
 #include <gtest/gtest.h>
-#include <sys/file.h>
 #include <unistd.h>
 
 #include <chrono>
 #include <condition_variable>
-#include <filesystem>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -17,26 +14,12 @@
 #include <vector>
 
 #include "common/wire/bus.h"
+#include "tests/test_domain.h"
 
 namespace cairn::test {
 
 using wire::Bus;
 using wire::WireOptions;
-
-// 1..200, held by a file lock until the process ends, so that tests run side by side.
-inline std::int64_t TestDomain() {
-  static const std::int64_t domain = [] {
-    for (int i = 0; i < 200; ++i) {
-      const int candidate = 1 + (getpid() + i) % 200;
-      const std::string path = std::filesystem::temp_directory_path() / ("cairn-domain-" + std::to_string(candidate));
-      const int file = open(path.c_str(), O_CREAT | O_RDWR | O_CLOEXEC, 0666);
-      if (file >= 0 && flock(file, LOCK_EX | LOCK_NB) == 0) return candidate;
-      if (file >= 0) close(file);
-    }
-    throw std::runtime_error("all DDS test domains are in use");
-  }();
-  return domain;
-}
 
 inline WireOptions LoopbackOptions() {
   WireOptions options;

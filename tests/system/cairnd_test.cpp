@@ -9,7 +9,7 @@
 #include "common/wire/bus.h"
 #include "tests/loopback.h"
 #include "tests/server/support/room_world.h"
-#include "tests/system/child_process.h"
+#include "tests/child_process.h"
 #include "tests/temp_directory.h"
 
 namespace cairn::server {

@@ -8,7 +8,7 @@
 
 #include "tests/loopback.h"
 #include "tests/real_logs.h"
-#include "tests/system/child_process.h"
+#include "tests/child_process.h"
 
 namespace cairn {
 namespace {

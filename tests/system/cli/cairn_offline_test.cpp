@@ -8,7 +8,7 @@
 
 #include "client/cli/program.h"
 #include "common/sensor/trajectory.h"
-#include "tests/system/child_process.h"
+#include "tests/child_process.h"
 #include "tests/temp_directory.h"
 
 namespace cairn::client {

@@ -13,7 +13,7 @@
 #include "common/sensor/stamp_text.h"
 #include "common/sensor/trajectory.h"
 #include "tests/loopback.h"
-#include "tests/system/child_process.h"
+#include "tests/child_process.h"
 #include "tests/temp_directory.h"
 
 namespace cairn::client {

@@ -52,7 +52,19 @@ class ChildProcess {
   ChildProcess(const ChildProcess&) = delete;
   ChildProcess& operator=(const ChildProcess&) = delete;
 
+  [[nodiscard]] pid_t pid() const { return pid_; }
   void Signal(int signal) const { kill(pid_, signal); }
+
+  // Whether it still runs after at most this long. Its output must fit into the pipe until Wait reads it (64 KiB).
+  bool RunningAfter(std::chrono::milliseconds time) const {
+    siginfo_t info{};
+    const auto end = std::chrono::steady_clock::now() + time;
+    while (waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0) {
+      if (std::chrono::steady_clock::now() >= end) return true;
+      usleep(2000);
+    }
+    return false;
+  }
 
   // Reads to the end of its output, then its exit code; killed where it takes longer than the deadline.
   Outcome Wait(std::chrono::seconds deadline = std::chrono::seconds(60)) {
