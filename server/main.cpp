@@ -92,11 +92,7 @@ int Serve(const CairndOptions& options) {
   return 0;
 }
 
-}  // namespace
-}  // namespace cairn::server
-
-int main(int argc, char** argv) {
-  using namespace cairn::server;
+int Main(int argc, char** argv) {
   int exit_code = 0;
   const auto line = ParseCommandLine(argc, argv, exit_code);
   if (!line) return exit_code;
@@ -111,4 +107,11 @@ int main(int argc, char** argv) {
       break;
   }
   return Serve(line->options);
+}
+
+}  // namespace
+}  // namespace cairn::server
+
+int main(int argc, char** argv) {
+  return cairn::server::Main(argc, argv);
 }

@@ -148,12 +148,12 @@ Result<void> Server::Start() {
   }
   desk_.Start();
   worker_.Start();
-  dispatcher_ = std::jthread([this](std::stop_token stop) { Dispatch(std::move(stop)); });
-  housekeeping_ = std::jthread([this](std::stop_token stop) { KeepHouse(std::move(stop)); });
+  dispatcher_ = std::jthread([this](const std::stop_token& stop) { Dispatch(stop); });
+  housekeeping_ = std::jthread([this](const std::stop_token& stop) { KeepHouse(stop); });
   return {};
 }
 
-void Server::Dispatch(std::stop_token stop) {
+void Server::Dispatch(const std::stop_token& stop) {
   while (auto value = inbound_.Pop(stop)) {
     std::visit(
         [this](auto&& alternative) {
@@ -168,7 +168,7 @@ void Server::Dispatch(std::stop_token stop) {
   }
 }
 
-void Server::KeepHouse(std::stop_token stop) {
+void Server::KeepHouse(const std::stop_token& stop) {
   const auto publish_period =
       std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / options_.maps.publish_rate_hz));
   Mutex mutex;
@@ -234,6 +234,7 @@ Result<std::vector<SessionMaterial>> Server::CollectMaterial(const std::string& 
     if (auto answer = answers->PopFor(std::chrono::milliseconds(50))) material.emplace(answer->session, *answer);
   }
   std::vector<SessionMaterial> all;
+  all.reserve(material.size());
   for (auto& [id, one] : material) all.push_back(std::move(one));
   return all;
 }

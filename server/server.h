@@ -43,8 +43,8 @@ class Server {
   DeskPorts MakeDeskPorts();
   std::map<JobKind, JobWork> MakeJobWorks();
 
-  void Dispatch(std::stop_token stop);
-  void KeepHouse(std::stop_token stop);
+  void Dispatch(const std::stop_token& stop);
+  void KeepHouse(const std::stop_token& stop);
   void CheckHealth();
   void FinishSessions();
   void PublishMaps();

@@ -9,14 +9,14 @@
 namespace cairn::client {
 namespace {
 
-struct ExportArguments {
+struct CloudArguments {
   CloudExportOptions options;
   std::string robot;
   std::string trajectory;
   bool smoothed = false;
 };
 
-Result<Trajectory> PathOf(Program& program, const ExportArguments& arguments) {
+Result<Trajectory> PathOf(Program& program, const CloudArguments& arguments) {
   if (!arguments.trajectory.empty()) return ReadTum(arguments.trajectory);
   Request request;
   request.kind = RequestKind::kPath;
@@ -27,7 +27,7 @@ Result<Trajectory> PathOf(Program& program, const ExportArguments& arguments) {
   return std::move(reply->path);
 }
 
-ExitCode Export(Program& program, const ExportArguments& arguments) {
+ExitCode Export(Program& program, const CloudArguments& arguments) {
   const CloudExportOptions& options = arguments.options;
   if (arguments.robot.empty() == arguments.trajectory.empty()) {
     program.err() << "cairn cloud export: give either --robot (asks the server) or --trajectory\n";
@@ -73,7 +73,7 @@ void AddCloudExport(CLI::App& cloud, Program& program) {
       "EXAMPLES\n  cairn cloud export robot1.log --robot robot1 --height 0.4 -o hall.ply\n"
       "  cairn cloud export robot1.log --trajectory robot1.tum --height 0.4 --tilted-only --voxel 0.02 -o hall.pcd\n"
       "  cairn cloud export robot1.log --trajectory robot1.tum --height 0.4 -o hall.ply --truth-world hall3d");
-  auto arguments = std::make_shared<ExportArguments>();
+  auto arguments = std::make_shared<CloudArguments>();
   CloudExportOptions& options = arguments->options;
   command->add_option("log", options.log, "CARMEN or DP-SLAM log with the scans")->required();
   command->add_option("-o,--output", options.output, "File to write: .ply or .pcd")->required()->type_name("FILE");

@@ -9,7 +9,7 @@ namespace cairn::client {
 namespace {
 
 std::shared_ptr<std::string> AddLaser(CLI::App& command, sim::LaserOptions& laser) {
-  const auto model = std::make_shared<std::string>();
+  auto model = std::make_shared<std::string>();
   auto* named = command.add_option("--laser-model", *model, "Field of view, resolution, range and error of a scanner")
                     ->check(CLI::IsMember(sim::LaserModelNames()));
   command.add_option("--beams", laser.beams, "Beams of a scan")

@@ -53,9 +53,9 @@ Fleet::Fleet(Surroundings surroundings, const FleetOptions& options)
   for (std::size_t i = 0; i < count; ++i) {
     const auto& waypoints = surroundings_.routes[i % routes].waypoints_map;
     const std::size_t on_route = (count - i % routes + routes - 1) / routes;
-    const double length = ClosedLength(waypoints);
-    const PathPlace place =
-        FreePlace(waypoints, length * static_cast<double>(i / routes) / static_cast<double>(on_route));
+    const std::size_t before_on_route = i / routes;
+    const double way_m = ClosedLength(waypoints) * static_cast<double>(before_on_route) / static_cast<double>(on_route);
+    const PathPlace place = FreePlace(waypoints, way_m);
     const Pose2 start{place.p_map.x(), place.p_map.y(), WrapAngle(place.heading_rad)};
     std::seed_seq seeds{static_cast<std::uint32_t>(options_.seed), static_cast<std::uint32_t>(options_.seed >> 32),
                         static_cast<std::uint32_t>(i)};
@@ -76,7 +76,7 @@ PathPlace Fleet::FreePlace(const std::vector<Eigen::Vector2d>& waypoints, double
   constexpr double kApart_m = 1.0, kStep_m = 0.25;
   const int tries = static_cast<int>(ClosedLength(waypoints) / kStep_m);
   for (int k = 0; k < tries; ++k) {
-    const PathPlace place = PlaceOnPath(waypoints, way_m + k * kStep_m);
+    PathPlace place = PlaceOnPath(waypoints, way_m + k * kStep_m);
     const bool free = std::all_of(robots_.begin(), robots_.end(), [&](const Member& other) {
       return (other.T_map_robot_start.translation() - place.p_map).norm() >= kApart_m;
     });

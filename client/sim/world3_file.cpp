@@ -100,7 +100,7 @@ Rectangle TakeRectangle(Keys& keys) {
     Complain(corners, "a rectangle has three corners in a row, or all four");
   const auto p = [&](std::size_t i) { return Point<3>(corners[i], "corner"); };
   const Eigen::Vector3d a = p(0), b = p(1), c = p(2);
-  const Rectangle rectangle{b, a - b, c - b};
+  Rectangle rectangle{b, a - b, c - b};
   const double area = rectangle.side_a.cross(rectangle.side_b).norm();
   if (area < 1e-9) Complain(corners, "a rectangle needs an area");
   if (std::abs(rectangle.side_a.dot(rectangle.side_b)) > 1e-6 * area)

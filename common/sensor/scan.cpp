@@ -51,7 +51,7 @@ Result<void> ValidateScan(const Scan& scan) {
     return Fail(StatusCode::kInvalidArgument,
                 std::to_string(scan.ranges_m.size()) + " beams, at most " + std::to_string(kMaxBeams));
   }
-  if (const auto geometry = ValidateGeometry(scan); !geometry) return geometry;
+  if (auto geometry = ValidateGeometry(scan); !geometry) return geometry;
   if (!IsPeriod(scan.beam_period_s)) return Bad("beam period", scan.beam_period_s);
   if (!IsPeriod(scan.scan_period_s)) return Bad("scan period", scan.scan_period_s);
   for (const float range : scan.ranges_m) {

@@ -46,10 +46,12 @@ Result<std::unique_ptr<Subscription>> Bus::SubscribeReplies(ClientId client, std
   return DdsSubscription<Reply>::Make(ParticipantOf(*this), std::move(on_value), std::move(events), client);
 }
 
+// A type in parentheses is no type. NOLINTBEGIN(bugprone-macro-parentheses)
 #define CAIRN_WIRE_VALUE(Value)                                                                       \
   template Result<std::unique_ptr<Publication<Value>>> Bus::Advertise<Value>();                       \
   template Result<std::unique_ptr<Subscription>> Bus::Subscribe<Value>(std::function<void(Value &&)>, \
                                                                        SubscriptionEvents)
+// NOLINTEND(bugprone-macro-parentheses)
 CAIRN_WIRE_VALUE(SessionRequest);
 CAIRN_WIRE_VALUE(SessionState);
 CAIRN_WIRE_VALUE(ScanSample);

@@ -14,7 +14,7 @@
 // Fast DDS 2.9 deletes an object of its own under another size (RTPSWriter::~RTPSWriter); the address sanitizer would
 // end every program at the end of its first publication. All other checks stay on; ASAN_OPTIONS can switch this one
 // back.
-extern "C" const char* __asan_default_options() {
+extern "C" const char* __asan_default_options() {  // NOLINT(readability-identifier-naming): the sanitizer's name.
   return "new_delete_type_mismatch=0";
 }
 #endif

@@ -23,7 +23,7 @@ JobWorker::~JobWorker() {
 }
 
 void JobWorker::Start() {
-  thread_ = std::jthread([this](std::stop_token stop) { Run(std::move(stop)); });
+  thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
 }
 
 Result<Job> JobWorker::Submit(const std::string& site, JobKind kind, bool enable) {
@@ -48,7 +48,7 @@ void JobWorker::Stop() {
   }
 }
 
-void JobWorker::Run(std::stop_token stop) {
+void JobWorker::Run(const std::stop_token& stop) {
   LowerOwnPriority(options_.nice);
   while (const auto ticket = queue_.Pop(stop)) {
     if (!list_.Start(ticket->id)) continue;

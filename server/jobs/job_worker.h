@@ -32,7 +32,7 @@ class JobWorker {
     std::uint64_t id = 0;
     bool enable = false;
   };
-  void Run(std::stop_token stop);
+  void Run(const std::stop_token& stop);
 
   const JobsOptions options_;
   JobList& list_;

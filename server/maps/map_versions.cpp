@@ -27,7 +27,7 @@ const MapVersion* MapVersions::Find(std::uint32_t version) const {
 
 void MapVersions::Enable(std::uint32_t version, std::map<SessionId, RobotGrid> displaced) {
   MapVersion& outgoing = versions_.at(enabled_);
-  for (auto& [session, part] : displaced) outgoing.parts.insert_or_assign(session, std::move(part));
+  for (auto& part : displaced) outgoing.parts.insert_or_assign(part.first, std::move(part.second));
   outgoing.info.enabled = false;
   enabled_ = version;
   versions_.at(version).info.enabled = true;

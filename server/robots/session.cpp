@@ -87,7 +87,7 @@ void Session::End() {
   if (!posted) ending_ = false;
 }
 
-void Session::Suspend(std::function<void()> done) {
+void Session::Suspend(const std::function<void()>& done) {
   if (ending_.exchange(true)) {
     if (!Post(Probe{done})) done();
     return;

@@ -41,7 +41,7 @@ class Session : public std::enable_shared_from_this<Session> {
   // Scans that arrived are finished, then the session has ended for good.
   void End();
   // As End, but the session is only suspended, because the server stops; `done` is called on the strand.
-  void Suspend(std::function<void()> done);
+  void Suspend(const std::function<void()>& done);
   // Drops the scans still waiting; what is being estimated is finished.
   void Abandon();
   // Publishes ledgers that are due and whatever could not be sent before.

@@ -8,7 +8,7 @@
 namespace cairn::slam {
 namespace {
 
-constexpr double kReach = 4.0;  // Sigmas.
+constexpr double kBeamReach = 4.0;  // Sigmas.
 
 // Rates of a window by cell: without bounds checks, and with.
 struct Inside {
@@ -29,7 +29,7 @@ template <typename Rates>
 float Walk(const Rates& rates, const Eigen::Vector2d& origin, const Eigen::Vector2d& along, double length, bool hit,
            float sigma, float unseen) {
   RayWalk walk(origin, along);
-  const auto reach = static_cast<float>(kReach) * sigma;
+  const auto reach = static_cast<float>(kBeamReach) * sigma;
   const auto end = static_cast<float>(length);
   const float near = hit ? end - reach : end;
   auto next_x = static_cast<float>(walk.next_x), next_y = static_cast<float>(walk.next_y);
@@ -56,7 +56,7 @@ float Walk(const Rates& rates, const Eigen::Vector2d& origin, const Eigen::Vecto
     const float on = passed * std::exp(-(until - from) * rate);
     const float stopped = rate > 0.0F ? passed - on : passed * (until - from) * unseen;
     const float z = (0.5F * (from + until) - end) * inverse;
-    if (std::abs(z) < static_cast<float>(kReach)) density += stopped * std::exp(-0.5F * z * z);
+    if (std::abs(z) < static_cast<float>(kBeamReach)) density += stopped * std::exp(-0.5F * z * z);
     passed = on;
     if (!(to < far)) break;
     from = to;
@@ -80,7 +80,7 @@ double LikelihoodAt(const OpacityWindow& window, const Eigen::Vector2d& origin, 
                     const LaserRay& ray, const RayModel& model) {
   const double length = ray.length_m / model.resolution_m;
   const double sigma = model.sigma_m / model.resolution_m;
-  const double last = length + (ray.hit ? kReach * sigma : 0.0) + 1.0;
+  const double last = length + (ray.hit ? kBeamReach * sigma : 0.0) + 1.0;
   const Eigen::Vector2d end = origin + last * along;
   const auto holds = [&](const Eigen::Vector2d& p) {
     return p.x() >= 1.0 && p.y() >= 1.0 && p.x() < window.width() - 1.0 && p.y() < window.height() - 1.0;

@@ -10,7 +10,7 @@
 namespace cairn::slam {
 namespace {
 
-constexpr int kFree = -1;
+constexpr int kUnowned = -1;
 constexpr int kMaxSkippedSegments = 4;  // Segments of one post or person between two parts of a wall.
 
 enum class Side { kNearer, kOn, kFarther };
@@ -134,13 +134,13 @@ bool Merger::IsStrong(const LineSegment& segment) const {
 void Merger::Claim(int k, int i, int direction) {
   LineSegment& segment = segments_[static_cast<std::size_t>(k)];
   const int previous = Owner(i);
-  if (previous != kFree) {
+  if (previous != kUnowned) {
     // The hit was at the facing end of a stub: the stub shrinks.
     LineSegment& stub = segments_[static_cast<std::size_t>(previous)];
     if (stub.count() <= 2) {
       stub.alive = false;
       for (int j = stub.begin; j < stub.end; ++j) {
-        if (Owner(j) == previous) Owner(j) = kFree;
+        if (Owner(j) == previous) Owner(j) = kUnowned;
       }
     } else {
       PointSums one;
@@ -184,7 +184,8 @@ void Merger::LengthenEnd(int k, int direction) {
     if (side == Side::kFarther || reach > std::max(options_.occlusion_m, 4.0 * spacing)) return;
     const bool vouched =
         std::abs(segment.line.DistanceOf(hit.p_robot)) <= EndDistance(segment.line, hit.range_m, options_);
-    if (side == Side::kNearer || !vouched || (owner != kFree && IsStrong(segments_[static_cast<std::size_t>(owner)]))) {
+    if (side == Side::kNearer || !vouched ||
+        (owner != kUnowned && IsStrong(segments_[static_cast<std::size_t>(owner)]))) {
       has_pending = false;
       if (++occluded > max_occluded_) return;
     } else if (occluded > 0 && !has_pending) {

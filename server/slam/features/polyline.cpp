@@ -67,7 +67,8 @@ LineFeature Join(const LineFeature& a, const LineFeature& b) {
 
 // Where two lines of a chain meet: their crossing, or half-way between their ends where they hardly cross.
 Eigen::Vector2d JointOf(const LineFeature& a, const LineFeature& b, double reach_m) {
-  const Eigen::Vector2d between = 0.5 * (a.last + b.first), u = a.direction(), v = b.direction();
+  Eigen::Vector2d between = 0.5 * (a.last + b.first);
+  const Eigen::Vector2d u = a.direction(), v = b.direction();
   const double sine = u.x() * v.y() - u.y() * v.x();
   if (std::abs(sine) < std::sin(Radians(15.0))) return between;
   const Eigen::Vector2d to_b = b.first - a.last;

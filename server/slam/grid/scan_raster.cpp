@@ -9,7 +9,7 @@
 namespace cairn::slam {
 namespace {
 
-constexpr std::uint8_t kFree = 1, kHit = 2;
+constexpr std::uint8_t kPassed = 1, kHit = 2;
 
 // A pose may be anything finite: where cells can not be counted any more, the last one stands for all.
 int CellAlong(double coordinate_m, double resolution_m) {
@@ -61,12 +61,12 @@ void ScanRaster::MarkRay(GridCell from, GridCell to, bool hit) {
   const int step_x = from.x < to.x ? 1 : -1, step_y = from.y < to.y ? 1 : -1;
   int error = dx + dy, x = from.x, y = from.y;
   while (x != to.x || y != to.y) {
-    Mark(x, y, kFree);
+    Mark(x, y, kPassed);
     const int twice = 2 * error;
     if (twice >= dy) error += dy, x += step_x;
     if (twice <= dx) error += dx, y += step_y;
   }
-  Mark(to.x, to.y, hit ? kHit : kFree);
+  Mark(to.x, to.y, hit ? kHit : kPassed);
 }
 
 void ScanRaster::Mark(int x, int y, std::uint8_t mark) {

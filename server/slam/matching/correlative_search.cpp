@@ -7,7 +7,7 @@
 namespace cairn::slam {
 namespace {
 
-constexpr double kReach = 3.0;  // Sigmas at which a point stops telling anything.
+constexpr double kPointReach = 3.0;  // Sigmas at which a point stops telling anything.
 
 std::vector<Eigen::Vector2d> Pick(std::span<const SurfacePoint> points, const CorrelativeOptions& options) {
   std::vector<Eigen::Vector2d> near;
@@ -29,7 +29,7 @@ CorrelativeSearch::CorrelativeSearch(std::span<const SurfacePoint> reference, st
       prior_(prior),
       prior_cholesky_(prior.covariance),
       points_(Pick(points, options)),
-      table_(reference, options.cell_m, kReach * options.sigma_m, options.max_range_m,
+      table_(reference, options.cell_m, kPointReach * options.sigma_m, options.max_range_m,
              options.window_m + options.cell_m, static_cast<int>(options.block)) {
   double farthest = 1.0;
   for (const Eigen::Vector2d& p : points_) farthest = std::max(farthest, p.norm());
@@ -41,7 +41,7 @@ CorrelativeSearch::CorrelativeSearch(std::span<const SurfacePoint> reference, st
 // The sum of table values of all points, as a logarithm: nothing lost where every point is on a surface.
 double CorrelativeSearch::FromSum(std::int64_t sum) const {
   const double lost = static_cast<double>(points_.size()) - static_cast<double>(sum) / 255.0;
-  return -0.5 * kReach * kReach * options_.effective_points * lost;
+  return -0.5 * kPointReach * kPointReach * options_.effective_points * lost;
 }
 
 Pose2 CorrelativeSearch::PoseOf(const Turn& turn, int x, int y) const {

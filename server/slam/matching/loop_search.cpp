@@ -30,7 +30,7 @@ PointIndex IndexOf(const std::vector<SurfacePoint>& surfaces, double cell_m) {
 }
 
 // How many of `surfaces`, put at `T`, are found on the other side, and how many contradict it.
-struct Evidence {
+struct Agreement {
   int explained = 0;
   int conflicts = 0;
   [[nodiscard]] double conflict() const {
@@ -38,18 +38,18 @@ struct Evidence {
   }
 };
 
-Evidence Weigh(const std::vector<SurfacePoint>& surfaces, const Pose2& T, const PointIndex& other,
-               const FreeSpace& other_free, double near_m) {
-  Evidence evidence;
+Agreement Weigh(const std::vector<SurfacePoint>& surfaces, const Pose2& T, const PointIndex& other,
+                const FreeSpace& other_free, double near_m) {
+  Agreement agreement;
   for (const SurfacePoint& surface : surfaces) {
     const Eigen::Vector2d p = T * surface.p;
     if (other.Nearest(p, near_m) != nullptr) {
-      ++evidence.explained;
+      ++agreement.explained;
     } else if (other_free.Contradicts(p)) {
-      ++evidence.conflicts;
+      ++agreement.conflicts;
     }
   }
-  return evidence;
+  return agreement;
 }
 
 }  // namespace
@@ -176,8 +176,8 @@ std::optional<LoopSearch::Closure> LoopSearch::Compare(std::span<const Keyframe>
   const FreeSpace before_free(keyframes, shapes, old_stretch), recent_free(keyframes, shapes, recent_stretch);
   const PointIndex recent_index = IndexOf(recent, align_.first_pair_distance_m);
   const double near_m = 2.0 * align_.inlier_distance_m;
-  const Evidence ours = Weigh(recent, aligned.T_prev_curr, before_index, before_free, near_m);
-  const Evidence theirs = Weigh(before, aligned.T_prev_curr.Inverse(), recent_index, recent_free, near_m);
+  const Agreement ours = Weigh(recent, aligned.T_prev_curr, before_index, before_free, near_m);
+  const Agreement theirs = Weigh(before, aligned.T_prev_curr.Inverse(), recent_index, recent_free, near_m);
   if (ours.explained < options_.min_explained * static_cast<double>(recent.size())) return std::nullopt;
   if (std::max(ours.conflict(), theirs.conflict()) > options_.max_conflict) return std::nullopt;
   return Closure{old, now, aligned.T_prev_curr, aligned.score};

@@ -34,7 +34,7 @@ Eigen::Matrix3d OdometryCovariance(const Pose2& T_prev_curr_odometry, const Odom
 Eigen::Matrix3d PairsCovariance(const ScanFeatures& prev, const ScanFeatures& curr, std::span<const LinePair> pairs,
                                 const MatchResult& result, const Pose2& T_prev_curr_odometry,
                                 const VotingOptions& options) {
-  const Eigen::Matrix3d odometry = OdometryCovariance(T_prev_curr_odometry, options.odometry);
+  Eigen::Matrix3d odometry = OdometryCovariance(T_prev_curr_odometry, options.odometry);
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   double chi2 = 0.0;
   int residuals = 0;

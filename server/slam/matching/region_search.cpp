@@ -23,10 +23,10 @@ struct Block {
   std::int64_t bound = 0;  // Sum over the points.
 };
 
-class Search {
+class BranchAndBound {
  public:
-  Search(std::span<const Eigen::Vector2d> points, const LikelihoodPyramid& pyramid, const SearchWindow& window,
-         const std::optional<Exclusion>& exclusion)
+  BranchAndBound(std::span<const Eigen::Vector2d> points, const LikelihoodPyramid& pyramid, const SearchWindow& window,
+                 const std::optional<Exclusion>& exclusion)
       : pyramid_(pyramid), window_(window), exclusion_(exclusion) {
     double farthest = 1.0;
     for (const Eigen::Vector2d& p : points) farthest = std::max(farthest, p.norm());
@@ -125,7 +125,7 @@ std::optional<RegionPeak> FindBestPose(std::span<const Eigen::Vector2d> points_c
                                        const SearchWindow& window, double min_score,
                                        const std::optional<Exclusion>& exclusion) {
   if (points_curr.empty()) return std::nullopt;
-  return Search(points_curr, pyramid, window, exclusion).Run(min_score);
+  return BranchAndBound(points_curr, pyramid, window, exclusion).Run(min_score);
 }
 
 }  // namespace cairn::slam

@@ -59,10 +59,10 @@ Eigen::Vector2d NormalOf(const std::vector<BeamPoint>& hits, std::size_t first, 
 // A wall seen at a grazing angle: hits of neighbouring beams lie far apart, yet on one line.
 Eigen::Vector2d GrazingNormalOf(const std::vector<BeamPoint>& hits, std::size_t centre, const Eigen::Vector2d& p_sensor,
                                 const SurfaceOptions& options) {
-  constexpr std::size_t kReach = 2;  // Beams on either side.
+  constexpr std::size_t kEachSide = 2;  // Beams on either side.
   std::size_t first = centre, last = centre;
-  while (first > 0 && centre - first < kReach && hits[first].beam - hits[first - 1].beam == 1) --first;
-  while (last + 1 < hits.size() && last - centre < kReach && hits[last + 1].beam - hits[last].beam == 1) ++last;
+  while (first > 0 && centre - first < kEachSide && hits[first].beam - hits[first - 1].beam == 1) --first;
+  while (last + 1 < hits.size() && last - centre < kEachSide && hits[last + 1].beam - hits[last].beam == 1) ++last;
   if (last - first < 3) return Eigen::Vector2d::Zero();
   const Eigen::Vector2d along = (hits[last].p_robot - hits[first].p_robot).normalized();
   const Eigen::Vector2d across(-along.y(), along.x());

@@ -13,7 +13,7 @@ namespace {
 constexpr int kMinReach = 1;   // Beams to either side: a point may lie between two.
 constexpr int kMaxReach = 16;  // Near points: the beams right about it say enough.
 
-enum class Verdict : std::uint8_t { kUnknown, kBorneOut, kContradicted };
+enum class Answer : std::uint8_t { kUnknown, kBorneOut, kContradicted };
 
 // A scan, ready to be asked about many points.
 class Witness {
@@ -23,14 +23,14 @@ class Witness {
     for (std::size_t k = 0; k < cosines_.size(); ++k) cosines_[k] = std::cos(static_cast<double>(k) * step_rad_);
   }
 
-  [[nodiscard]] Verdict About(const Eigen::Vector2d& p_laser) const {
+  [[nodiscard]] Answer About(const Eigen::Vector2d& p_laser) const {
     const double range_m = p_laser.norm();
     // From the first beam, the way the scanner turns, in [0, 2 pi).
     double turn = std::atan2(p_laser.y(), p_laser.x()) - scan_.angle_first_rad;
     if (scan_.angle_step_rad < 0.0) turn = -turn;
     turn -= 2.0 * kPi * std::floor(turn / (2.0 * kPi));
     const double beam = std::round(turn / step_rad_);
-    if (!full_turn_ && beam >= static_cast<double>(scan_.ranges_m.size())) return Verdict::kUnknown;
+    if (!full_turn_ && beam >= static_cast<double>(scan_.ranges_m.size())) return Answer::kUnknown;
     const double beams_near = std::ceil(near_m_ / (range_m * step_rad_));
     const int reach = beams_near < kMaxReach ? std::max(kMinReach, static_cast<int>(beams_near)) : kMaxReach;
     return About(static_cast<int>(beam), reach, range_m);
@@ -38,10 +38,10 @@ class Witness {
 
  private:
   // `beam`: the one that points at the point, `range_m` away; `reach`: beams to either side that pass near it.
-  [[nodiscard]] Verdict About(int beam, int reach, double range_m) const {
+  [[nodiscard]] Answer About(int beam, int reach, double range_m) const {
     const int beams = static_cast<int>(scan_.ranges_m.size());
-    if (beams <= 2 * reach) return Verdict::kUnknown;
-    if (!full_turn_ && (beam - reach < 0 || beam + reach >= beams)) return Verdict::kUnknown;
+    if (beams <= 2 * reach) return Answer::kUnknown;
+    if (!full_turn_ && (beam - reach < 0 || beam + reach >= beams)) return Answer::kUnknown;
     bool all_beyond = true;
     for (int k = -reach; k <= reach; ++k) {
       const float seen = scan_.ranges_m[static_cast<std::size_t>((beam + k + beams) % beams)];
@@ -53,10 +53,10 @@ class Witness {
       const double seen_m = seen;
       const double cosine = cosines_[static_cast<std::size_t>(std::abs(k))];
       const double apart_m2 = seen_m * seen_m + range_m * range_m - 2.0 * seen_m * range_m * cosine;
-      if (apart_m2 < near_m_ * near_m_) return Verdict::kBorneOut;
+      if (apart_m2 < near_m_ * near_m_) return Answer::kBorneOut;
       all_beyond = all_beyond && seen_m > range_m;
     }
-    return all_beyond ? Verdict::kContradicted : Verdict::kUnknown;
+    return all_beyond ? Answer::kContradicted : Answer::kUnknown;
   }
 
   const Scan& scan_;
@@ -79,9 +79,9 @@ Testimony Testify(const Scan& witness, const Pose2& T_witness_points, std::span<
   for (const SurfacePoint& point : points) {
     const Eigen::Vector2d p_laser = R * point.p + t;
     if (p_laser.squaredNorm() > max_range_m * max_range_m || p_laser.squaredNorm() < near_m * near_m) continue;
-    const Verdict verdict = asked.About(p_laser);
-    testimony.borne_out += verdict == Verdict::kBorneOut ? 1 : 0;
-    testimony.contradicted += verdict == Verdict::kContradicted ? 1 : 0;
+    const Answer verdict = asked.About(p_laser);
+    testimony.borne_out += verdict == Answer::kBorneOut ? 1 : 0;
+    testimony.contradicted += verdict == Answer::kContradicted ? 1 : 0;
   }
   return testimony;
 }

@@ -26,7 +26,7 @@ Eigen::Vector2d SolveAbove(const Equations& e, double least, const Eigen::Vector
   if (e.A(0, 0) <= 0.0 && e.A(1, 1) <= 0.0) return fallback;
   const double determinant = e.A(0, 0) * e.A(1, 1) - e.A(0, 1) * e.A(1, 0);
   if (determinant <= 1e-12 * e.A(0, 0) * e.A(1, 1)) return alone(e.A(0, 0) >= e.A(1, 1) ? 0 : 1);
-  const Eigen::Vector2d x = e.A.ldlt().solve(e.y);
+  Eigen::Vector2d x = e.A.ldlt().solve(e.y);
   if (x(0) >= least && x(1) >= least) return x;
   const Eigen::Vector2d first = alone(0), second = alone(1);
   const auto cost = [&](const Eigen::Vector2d& p) { return 0.5 * p.dot(e.A * p) - e.y.dot(p); };
