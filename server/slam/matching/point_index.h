@@ -14,6 +14,8 @@ namespace cairn::slam {
 
 class PointIndex {
  public:
+  static constexpr std::uint16_t kMaxInBucket = 1000;
+
   // `cell_m` is also the largest distance at which Nearest finds anything for sure.
   explicit PointIndex(double cell_m);
 
@@ -25,7 +27,6 @@ class PointIndex {
 
  private:
   static constexpr int kSide = 256;  // Buckets per side of the torus.
-  static constexpr std::uint16_t kMaxInBucket = 1000;
   [[nodiscard]] static std::size_t Bucket(int x, int y);
 
   double cell_m_;
