@@ -55,7 +55,7 @@ int Main(int argc, char** argv) {
   app.add_flag("--quick", quick, "Seconds instead of minutes");
   app.add_option("--seed", seed, "Of every random engine");
   app.add_option("--log", logs, "A log instead of the study's own choice; repeatable")->check(CLI::ExistingFile);
-  app.add_option("--only", only, "systems, matchers: those whose name contains this");
+  app.add_option("--only", only, "Of a study in parts, those whose name contains this");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -21,7 +21,8 @@ struct StudyContext {
   std::uint64_t seed = 1;                     // Of every random engine: same seed, same figures (times excepted).
   std::vector<std::filesystem::path> logs{};  // --log: instead of the study's own choice.
 
-  std::string only{};  // --only: of a study that compares named systems, those whose name contains this; empty: all.
+  std::string
+      only{};  // --only: of a study in named parts or of named systems, those whose name contains this; empty: all.
 
   [[nodiscard]] bool Wants(const std::string& name) const { return name.find(only) != std::string::npos; }
 

@@ -9,6 +9,7 @@
 #include "server/slam/filters/chi_square.h"
 #include "server/slam/filters/resampling.h"
 #include "server/slam/motion/velocity_model.h"
+#include "tests/studies/filters/corner_world.h"
 
 namespace cairn::studies {
 namespace {
@@ -17,14 +18,7 @@ using slam::NormalDraw;
 
 constexpr double kStepM = 0.25;
 constexpr int kPointEvery = 8;  // Keyframes.
-constexpr double kSightM = 6.0;
 constexpr double kRoundM = 40.0;
-
-struct Corner {
-  Eigen::Vector2d p;
-  double slope = 0.0;
-  double angle = 1.5;
-};
 
 // Around the loop, inside and outside, nowhere two alike close together.
 std::vector<Corner> Corners() {
@@ -53,26 +47,6 @@ std::vector<Pose2> TrueSteps(int rounds) {
 Eigen::Vector3d Draw(const Eigen::Matrix3d& covariance, slam::Rng& rng) {
   const Eigen::Vector3d unit(NormalDraw(rng), NormalDraw(rng), NormalDraw(rng));
   return covariance.llt().matrixL() * unit;
-}
-
-slam::ScanView Look(const Pose2& truth, const slam::LandmarkNoise& noise, double factor, slam::Rng& rng) {
-  slam::ScanView view;
-  for (const Corner& corner : Corners()) {
-    const Eigen::Vector2d p_robot = truth.Inverse() * corner.p;
-    if (p_robot.norm() > kSightM || std::abs(std::atan2(p_robot.y(), p_robot.x())) > kPi / 2) continue;
-    const double range = p_robot.norm() + factor * noise.range_m * NormalDraw(rng);
-    const double bearing = std::atan2(p_robot.y(), p_robot.x()) + factor * noise.bearing_rad * NormalDraw(rng);
-    slam::LineFeature line;
-    line.slope = WrapAngle(corner.slope - truth.theta + factor * noise.slope_rad * NormalDraw(rng));
-    slam::CornerFeature seen;
-    seen.position = range * Eigen::Vector2d(std::cos(bearing), std::sin(bearing));
-    seen.real = true;
-    seen.angle = corner.angle;
-    seen.line_a = static_cast<int>(view.features.lines.size());
-    view.features.lines.push_back(line);
-    view.features.corners.push_back(seen);
-  }
-  return view;
 }
 
 std::size_t AncestryDepth(const slam::Filter& filter) {
@@ -121,6 +95,7 @@ Run DriveOnce(const ConsistencyOptions& options, std::uint64_t seed) {
   slam::Rng rng(seed * 7919 + 13);
   const Eigen::Matrix3d revisit_covariance = Eigen::Vector3d(0.0025, 0.0025, 0.0001).asDiagonal();
   const Scan scan;
+  const std::vector<Corner> corners = Corners();
   Run run;
   Sums since;
   Pose2 truth, track;
@@ -128,7 +103,7 @@ Run DriveOnce(const ConsistencyOptions& options, std::uint64_t seed) {
   std::vector<double> way;
   double travelled = 0.0;
   const auto keyframe = [&] {
-    const slam::ScanView view = Look(truth, told.back_end.landmarks.noise, options.noise_factor, rng);
+    const slam::ScanView view = SeenCorners(corners, truth, told.back_end.landmarks.noise, options.noise_factor, rng);
     if (options.revisits) {
       std::ptrdiff_t nearest = -1;
       for (std::size_t k = 0; k < path.size() && travelled - way[k] > 12.0; ++k) {
@@ -236,7 +211,7 @@ ConsistencyResult StudyConsistency(const ConsistencyOptions& options) {
     nis += sums[p].nis;
     nis_numbers += sums[p].nis_numbers;
     result.nees_mean += point.nees / static_cast<double>(sums.size());
-    const bool before = travelled < kRoundM - kSightM;
+    const bool before = travelled < kRoundM - kCornerSightM;
     (before ? result.nees_before : result.nees_after) += point.nees;
     points_before += before ? 1 : 0;
     if (point.nees >= result.nees_low && point.nees <= result.nees_high)
