@@ -40,8 +40,9 @@ void Visit(OptionVisitor& visitor, NoOdometryOptions& options) {
   visitor.Real("sigma_rad", options.sigma_rad, "rad", 0.001, kPi, "See sigma_m.");
   visitor.Real("unmatched_step_m", options.unmatched_step_m, "m", 0.0, 100.0,
                "What a scan without a match counts as travelled, towards being lost.");
-  visitor.Integer("merged_keyframes", options.merged_keyframes, "1", 1, 1000,
-                  "Keyframes whose points the matcher sees as one; more: less pull towards standing still.");
+  visitor.Integer(
+      "merged_keyframes", options.merged_keyframes, "1", 1, 1000,
+      "Keyframes whose points the matcher sees as one (of those kept); more: less pull towards standing still.");
 }
 
 void Visit(OptionVisitor& visitor, FrontEndOptions& options) {

@@ -26,8 +26,8 @@ struct NoOdometryOptions {
   double sigma_m = 0.03;          // Of the prediction; larger: what scans seem to show along a corridor counts more.
   double sigma_rad = 0.15;
   double unmatched_step_m = 0.3;  // What a scan without a match counts as travelled, towards being lost.
-  std::int64_t merged_keyframes =
-      8;  // The matcher compares with what these saw; more: less pull towards standing still.
+  // The matcher compares with what these saw, of the reference_keyframes kept; more: less pull towards standing still.
+  std::int64_t merged_keyframes = 8;
 };
 void Visit(OptionVisitor& visitor, NoOdometryOptions& options);
 
