@@ -46,7 +46,8 @@ trap 'exit 143' TERM
 
 step "building (the first time takes some minutes)"
 "$root/deploy/install-packages.sh" build
-(cd "$root" && cmake --preset release >/dev/null && cmake --build --preset release --target cairnd cairn)
+(cd "$root" && cmake --preset release >/dev/null &&
+  cmake --build --preset release -j "$(deploy/build-jobs.sh)" --target cairnd cairn)
 
 rm -rf "$out"
 mkdir -p "$out/truth"

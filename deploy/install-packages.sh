@@ -42,7 +42,8 @@ if [ "$(id -u)" -ne 0 ]; then
   if command -v sudo >/dev/null && sudo -n true 2>/dev/null; then
     as_root=(sudo -n env DEBIAN_FRONTEND=noninteractive)
   else
-    fail "not root and sudo does not work without a password; ask an administrator to install: ${missing//$'\n'/ }"
+    fail "not root, and sudo does not work without a password. Run once: sudo $(printf %q "$(realpath "$0")") $*
+It installs: ${missing//$'\n'/ }"
   fi
 fi
 export DEBIAN_FRONTEND=noninteractive
@@ -71,7 +72,8 @@ for line in $missing; do
   for name in ${line//|/ }; do
     if apt-cache show --no-all-versions "$name" >/dev/null 2>&1; then chosen=$name; break; fi
   done
-  [ -n "$chosen" ] || fail "no package source offers ${line//|/ or }"
+  # An update without a network counts as done, with warnings.
+  [ -n "$chosen" ] || { cat "$log" >&2; fail "no package source offers ${line//|/ or }"; }
   names+=("$chosen")
 done
 try install -y --no-install-recommends "${names[@]}" || fail "apt-get could not install: ${names[*]}"

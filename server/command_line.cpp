@@ -11,7 +11,6 @@
 namespace cairn::server {
 namespace {
 
-constexpr int kFailed = 1;
 constexpr int kUsage = 2;
 
 bool Complain(const Result<void>& result) {
@@ -47,7 +46,7 @@ std::optional<CommandLine> ParseCommandLine(int argc, char** argv, int& exit_cod
   CommandLine line;
   const VisitOptions visit = [&line](OptionVisitor& visitor) { Visit(visitor, line.options); };
   if (!config.empty() && Complain(ApplyYamlFile(config, visit))) {
-    exit_code = kFailed;
+    exit_code = kUsage;
     return std::nullopt;
   }
   if (domain != -1) assignments.push_back("wire.domain=" + std::to_string(domain));

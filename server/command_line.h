@@ -16,8 +16,7 @@ struct CommandLine {
 };
 
 // Nothing where the program is to end at once with `exit_code`: 0 after --help and --version, 2 for a wrong command
-// line
-// (--set included), 1 for a configuration file that cannot be used. What was wrong is on standard error.
+// line or configuration, which the next start would meet again. What was wrong is on standard error.
 [[nodiscard]] std::optional<CommandLine> ParseCommandLine(int argc, char** argv, int& exit_code);
 
 }  // namespace cairn::server

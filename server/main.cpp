@@ -1,5 +1,5 @@
-// cairnd: options -> doors and server -> signals -> exit code. 0: stopped when asked to; 1: could not start; 2: wrong
-// command line.
+// cairnd: options -> doors and server -> signals -> exit code. 0: stopped when asked to; 1: could not start, which may
+// pass (an address that is not there yet); 2: wrong command line or configuration, which starting again does not mend.
 #include <spdlog/spdlog.h>
 
 #include <algorithm>

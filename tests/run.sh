@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # The one command: installs what is missing, builds every way that counts, runs every test, holds the accuracy.
-#   tests/run.sh                 every stage but the studies; stops at the first that fails
+#   tests/run.sh                 packages to tsan below; stops at the first that fails
+#   tests/run.sh --full          a real systemd besides
 #   tests/run.sh --quick         packages, format, architecture, release
 #   tests/run.sh --stage NAME    this stage (may be repeated), with the build it needs
 #   tests/run.sh --studies       whatever else is asked for, and the slow studies (tests/studies) last
@@ -11,18 +12,21 @@ set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
 all=(packages format architecture release accuracy demo nodds tidy asan tsan)
+full=(systemd)
 stages=()
 studies=()
+full_too=0
 
-usage() { sed -n '2,/^set/s/^# \{0,1\}//p' "$0"; echo "stages: ${all[*]} studies"; }
+usage() { sed -n '2,/^set/s/^# \{0,1\}//p' "$0"; echo "stages: ${all[*]} ${full[*]} studies"; }
 while [ $# -gt 0 ]; do
   case $1 in
     --quick) stages+=(packages format architecture release) ;;
+    --full) full_too=1 ;;
     --studies) studies=(studies) ;;
     --stage)
-      case " ${all[*]} studies " in
+      case " ${all[*]} ${full[*]} studies " in
         *" ${2:-none} "*) ;;
-        *) echo "--stage needs one of: ${all[*]} studies" >&2; exit 2 ;;
+        *) echo "--stage needs one of: ${all[*]} ${full[*]} studies" >&2; exit 2 ;;
       esac
       stages+=("$2")
       shift ;;
@@ -32,11 +36,10 @@ while [ $# -gt 0 ]; do
   shift
 done
 [ ${#stages[@]} -gt 0 ] || stages=("${all[@]}")
+[ "$full_too" -eq 0 ] || stages+=("${full[@]}")
 stages+=("${studies[@]}")
 
-# As many jobs as processors, but a compiler may take 1.5 GiB.
-memory_jobs=$(awk '/^MemAvailable/ { jobs = int($2 / 1572864); print jobs < 1 ? 1 : jobs }' /proc/meminfo)
-jobs=${CAIRN_JOBS:-$(($(nproc) < memory_jobs ? $(nproc) : memory_jobs))}
+jobs=${CAIRN_JOBS:-$(deploy/build-jobs.sh)}
 
 # One compiler cache for all build folders and clones: paths relative to the root, and precompiled headers allowed.
 export CCACHE_BASEDIR=$root CCACHE_SLOPPINESS=pch_defines,time_macros
@@ -138,6 +141,15 @@ stage_tidy() {
   configure asan -B build/tidy -DCMAKE_UNITY_BUILD_BATCH_SIZE=0
   build tidy --target cairn_idl_sources
   python3 tests/tidy.py build/tidy --jobs "$jobs"
+}
+
+# Root only: it makes a system of its own and boots it.
+stage_systemd() {
+  if [ "$(id -u)" -ne 0 ]; then echo "SKIPPED: not root"; return 77; fi
+  deploy/install-packages.sh boot
+  configure release
+  build release --target cairnd cairn cairn-offline cairn-calibrate
+  tests/deploy/boot_systemd.sh build/release build/systemd
 }
 
 stage_studies() {

@@ -30,7 +30,7 @@ fake sudo 'exit 1'
 fake apt-get 'echo "$*" >>"$WORLD/asked"
 [ "$DEBIAN_FRONTEND" = noninteractive ] || exit 9
 if [ -s "$WORLD/locked" ]; then sed -i 1d "$WORLD/locked"; echo "could not get lock" >&2; exit 100; fi
-case " $* " in *" install "*) printf "%s\n" "$@" | sed -n "/^--no-install/,\$p" | tail -n +2 >>"$WORLD/installed" ;; esac'
+case " $* " in *" update "*) echo "W: no route to update" ;; *" install "*) printf "%s\n" "$@" | sed -n "/^--no-install/,\$p" | tail -n +2 >>"$WORLD/installed" ;; esac'
 }
 export WORLD=$world
 
@@ -71,10 +71,13 @@ expect "a locked package database is tried again" [ "$(wc -l <"$world/asked")" -
 reset 'compiler' ''
 install 1
 expect "a package no source offers is named" grep -q 'library-2 or library-1' "$world/said"
+# Without a network apt-get only warns, and the package lists are as empty as before.
+expect "with what apt-get said of its sources" grep -q 'W: no route to update' "$world/said"
 
 reset 'compiler' 'library-2'
 WORLD_UID=1000 install 1
-expect "neither root nor sudo is said in words" grep -q 'not root and sudo does not work' "$world/said"
+expect "neither root nor sudo is said in words" grep -q 'not root, and sudo does not work' "$world/said"
+expect "and what to run" grep -q "sudo $world/deploy/install-packages.sh build" "$world/said"
 expect "and what to install is named" grep -q 'library-2' "$world/said"
 
 install 2 nothing

@@ -56,7 +56,7 @@ TEST(CairndCommandLine, SetOverridesTheFileAndDomainOverridesBoth) {
   EXPECT_THAT(outcome.output, HasSubstr("domain: 9 "));
 }
 
-TEST(CairndCommandLine, WrongUsageEndsWithTwoAndABadFileWithOneNamingTheLine) {
+TEST(CairndCommandLine, WrongUsageAndABadFileEndWithTwoNamingTheLine) {
   EXPECT_EQ(RunCairnd({"--no-such-flag"}).exit_code, 2);
   EXPECT_EQ(RunCairnd({"--set", "slam.no_such_key=1"}).exit_code, 2);
   EXPECT_EQ(RunCairnd({"--domain", "9999"}).exit_code, 2);
@@ -65,9 +65,10 @@ TEST(CairndCommandLine, WrongUsageEndsWithTwoAndABadFileWithOneNamingTheLine) {
   const std::string path = (directory / "bad.yaml").string();
   std::ofstream(path) << "maps:\n  publish_rate_hz: 4000\n";
   const auto outcome = RunCairnd({"--config", path, "--check-config"});
-  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.exit_code, 2);
   EXPECT_THAT(outcome.output, HasSubstr("bad.yaml:2"));
   EXPECT_THAT(outcome.output, HasSubstr("maps.publish_rate_hz"));
+  EXPECT_EQ(RunCairnd({"--config", (directory / "absent.yaml").string()}).exit_code, 2);
 }
 
 TEST(CairndCommandLine, AnAddressOfAnotherMachineIsAClearStartUpError) {

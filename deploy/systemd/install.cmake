@@ -1,0 +1,22 @@
+# Run by `cmake --install`: the unit and the configuration it names, for the prefix of that moment (--prefix, DESTDIR).
+set(bindir ${CMAKE_INSTALL_PREFIX}/bin)
+set(docdir ${CMAKE_INSTALL_PREFIX}/share/doc/cairn)
+set(sysconfdir ${CMAKE_INSTALL_PREFIX}/etc)
+if(CMAKE_INSTALL_PREFIX STREQUAL "/usr")
+  set(sysconfdir /etc)
+endif()
+
+# Whoever has changed the configuration keeps it; the defaults of this version then lie beside it.
+set(name cairnd.yaml)
+if(EXISTS $ENV{DESTDIR}${sysconfdir}/cairn/cairnd.yaml)
+  set(name cairnd.yaml.default)
+endif()
+file(INSTALL ${CMAKE_CURRENT_LIST_DIR}/../cairnd.yaml DESTINATION ${sysconfdir}/cairn RENAME ${name})
+# The service's user reads it: whatever root's umask is, the folder can be entered.
+file(CHMOD $ENV{DESTDIR}${sysconfdir}/cairn PERMISSIONS
+  OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
+
+set(unit $ENV{DESTDIR}${CMAKE_INSTALL_PREFIX}/lib/systemd/system/cairnd.service)
+message(STATUS "Installing: ${unit}")
+configure_file(${CMAKE_CURRENT_LIST_DIR}/cairnd.service.in ${unit} @ONLY)
+file(CHMOD ${unit} PERMISSIONS OWNER_READ OWNER_WRITE GROUP_READ WORLD_READ)
