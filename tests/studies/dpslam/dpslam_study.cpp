@@ -90,9 +90,10 @@ bool StudyCost(StudyContext& context, const StudyLog& log) {
     if (size.particles != 500) continue;
     const double mean = DistributionOf(run.cpu_ms).mean;
     report.Text("Target: below 500 MiB and 200 ms a scan on 2 cores with 500 particles. " + name +
-                " particles: " + Number(run.PeakMib(), 1) + " MiB, " + Number(mean, 1) + " ms of processor time (" +
-                Number(mean / kThreads, 1) + " ms a core).");
-    plausible = plausible && run.PeakMib() < 500.0 && mean / kThreads <= 200.0;
+                " particles: " + Number(run.PeakMib(), 1) + " MiB, " + Number(mean, 1) + " ms of processor time, " +
+                Number(DistributionOf(run.wall_ms).mean, 1) + " ms on the wall.");
+    // On one core: nothing is taken for granted about how well the work spreads.
+    plausible = plausible && run.PeakMib() < 500.0 && mean <= 200.0;
     if (context.quick) break;
   }
   report.Add(table, "cost-" + log.name);
@@ -181,6 +182,12 @@ bool StudyLoops(StudyContext& context) {
   }
   context.report.Text("Of all thirty: flat " + std::to_string(sum.flat) + ", two levels " +
                       std::to_string(sum.two_levels) + ".");
+  // As many as the thesis' filter has: both close, and the cost is what counts.
+  const Closed many = StudyLoop(context, 1000, 2, plausible);
+  if (many.two_levels < 2) {
+    context.report.Warn("1000 + 1000 particles closed " + std::to_string(many.two_levels) + " of 2 loops");
+    plausible = false;
+  }
   if (sum.two_levels <= sum.flat) {
     context.report.Warn("two levels did not close more loops than one");
     plausible = false;
@@ -191,8 +198,11 @@ bool StudyLoops(StudyContext& context) {
 bool RunDpSlam(StudyContext& context) {
   bool plausible = true;
   if (context.logs.empty()) {
-    if (const auto log = OpenRealLog(context, "duke-loop5", context.Pick(0, 150))) plausible = StudyCost(context, *log);
-    return StudyLoops(context) && plausible;
+    if (context.Wants("cost"))
+      if (const auto log = OpenRealLog(context, "duke-loop5", context.Pick(0, 150)))
+        plausible = StudyCost(context, *log);
+    if (context.Wants("loops")) plausible = StudyLoops(context) && plausible;
+    return plausible;
   }
   for (const StudyLog& log : ChooseLogs(context, {})) plausible = StudyCost(context, log) && plausible;
   return plausible;

@@ -14,12 +14,14 @@ bool RunThesisA(StudyContext& context) {
       "**None of the three is at hand**: the published logs that are (Intel Research Lab Seattle, MIT CSAIL) stand in, "
       "and errors are those of verified relations between poses. Printed figures are the thesis' own, from its logs, "
       "in Matlab on a 2 GHz Core 2 Duo: they stand beside ours for the shape of the curves, not as a race.");
-  bool plausible = StudyLineExtraction(context);
-  plausible = StudyPoseFromPairs(context) && plausible;
+  bool plausible = true;
+  if (context.Wants("lines")) plausible = StudyLineExtraction(context) && plausible;
+  if (context.Wants("pairs")) plausible = StudyPoseFromPairs(context) && plausible;
   const std::vector<StudyLog> logs = ChooseLogs(context, {"intel", "mit-csail"}, context.Pick(0, 2500));
-  plausible = StudySystems(context, logs) && plausible;
-  plausible = StudyParticles(context, logs) && plausible;
-  return StudyFieldOfView(context, logs) && plausible;
+  if (context.Wants("systems")) plausible = StudySystems(context, logs) && plausible;
+  if (context.Wants("particles")) plausible = StudyParticles(context, logs) && plausible;
+  if (context.Wants("view")) plausible = StudyFieldOfView(context, logs) && plausible;
+  return plausible;
 }
 
 const Registration kRegistered{"thesis-a", "lines, matching and FastSLAM beside the tables and figures of thesis A",
