@@ -7,6 +7,7 @@
 #include <limits>
 #include <string>
 #include <thread>
+#include <vector>
 
 namespace cairn::slam {
 namespace {
@@ -84,6 +85,84 @@ TEST_P(EveryStrategy, DoesNotDependOnTheThreads) {
 INSTANTIATE_TEST_SUITE_P(StornAndPrice, EveryStrategy, testing::Range(0, 10), [](const auto& strategy) {
   return std::string(kEvolutionStrategyNames[static_cast<std::size_t>(strategy.param)]);
 });
+
+// The first two populations a run asks the cost of: the random one, and its trials.
+struct TwoGenerations {
+  std::vector<Eigen::Vector3d> first, trials;
+};
+
+TwoGenerations Record(const EvolutionOptions& options, const SearchBox& box, std::uint64_t seed) {
+  std::vector<Eigen::Vector3d> asked;
+  std::mt19937_64 engine(seed);
+  (void)Evolve(
+      [&](const Eigen::Vector3d& x) {
+        asked.push_back(x);
+        return Bowl(x);
+      },
+      box, options, engine, SerialFor);
+  const auto half = asked.begin() + static_cast<std::ptrdiff_t>(asked.size() / 2);
+  return {{asked.begin(), half}, {half, asked.end()}};
+}
+
+// Thesis C 2.4.6 and de36.c, written down once more: `r` are other members than the target, all different.
+Eigen::Vector3d AsPrinted(const std::string& name, const std::vector<Eigen::Vector3d>& x, int target, int best,
+                          double F, const std::vector<int>& r) {
+  const auto at = [&](int k) { return x[static_cast<std::size_t>(r[static_cast<std::size_t>(k)])]; };
+  const Eigen::Vector3d xi = x[static_cast<std::size_t>(target)], xb = x[static_cast<std::size_t>(best)];
+  if (name.starts_with("best_1")) return xb + F * (at(0) - at(1));
+  if (name.starts_with("rand_1")) return at(0) + F * (at(1) - at(2));
+  if (name.starts_with("rand_to_best")) return xi + F * (xb - xi) + F * (at(0) - at(1));
+  if (name.starts_with("best_2")) return xb + F * (at(0) + at(1) - at(2) - at(3));
+  return at(4) + F * (at(0) + at(1) - at(2) - at(3));
+}
+
+TEST_P(EveryStrategy, PerturbsAsPrinted) {
+  const std::string name(kEvolutionStrategyNames[static_cast<std::size_t>(GetParam())]);
+  EvolutionOptions options = OptionsOf(strategy());
+  options.population = 6;
+  options.generations = 1;
+  options.scale = 0.37;
+  options.crossover = 1.0;  // Every variable comes from the perturbed vector.
+  const SearchBox box{{-20, -20, -20}, {20, 20, 20}};
+  int compared = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const auto [first, trials] = Record(options, box, seed);
+    ASSERT_EQ(trials.size(), 6U);
+    const auto least =
+        std::min_element(first.begin(), first.end(), [](const auto& a, const auto& b) { return Bowl(a) < Bowl(b); });
+    const int best = static_cast<int>(least - first.begin());
+    for (int target = 0; target < 6; ++target) {
+      std::vector<int> r;
+      for (int k = 0; k < 6; ++k)
+        if (k != target) r.push_back(k);
+      bool found = false, mirrored = false;
+      do {
+        const Eigen::Vector3d expected = AsPrinted(name, first, target, best, options.scale, r);
+        found |= (expected - trials[static_cast<std::size_t>(target)]).norm() < 1e-9;
+        mirrored |= (expected.array().abs() > 20.0).any();
+      } while (std::next_permutation(r.begin(), r.end()));
+      EXPECT_TRUE(found || mirrored) << seed << ", target " << target;
+      compared += found ? 1 : 0;
+    }
+  }
+  EXPECT_GT(compared, 20);
+}
+
+// Of three variables, exponential crossing takes 1 + CR + CR^2 on average, a run of neighbours; binomial 1 + 2 CR.
+TEST_P(EveryStrategy, CrossesAsManyVariablesAsItsNameSays) {
+  EvolutionOptions options = OptionsOf(strategy());
+  options.generations = 1;
+  options.crossover = 0.4;
+  double taken = 0.0, trials_in_all = 0.0;
+  for (std::uint64_t seed = 1; seed <= 100; ++seed) {
+    const auto [first, trials] = Record(options, {{-20, -20, -20}, {20, 20, 20}}, seed);
+    for (std::size_t i = 0; i < trials.size(); ++i)
+      taken += static_cast<double>((trials[i].array() != first[i].array()).count());
+    trials_in_all += static_cast<double>(trials.size());
+  }
+  const bool binomial = GetParam() >= 5;
+  EXPECT_NEAR(taken / trials_in_all, binomial ? 1 + 2 * 0.4 : 1 + 0.4 + 0.16, 0.03);
+}
 
 TEST(DifferentialEvolution, StrategiesDifferFromEachOther) {
   std::vector<double> costs;
