@@ -18,7 +18,11 @@ constexpr double kLoopSigmaRad = 0.01;
 
 ParticleSet::ParticleSet(const FastSlamOptions& options, double max_nis, std::int64_t count,
                          const Pose2& T_map_robot_start, std::uint64_t seed)
-    : options_(options), max_nis_(max_nis), rng_(seed), particles_(static_cast<std::size_t>(count)) {
+    : options_(options),
+      max_nis_(max_nis),
+      rng_(seed),
+      particles_(static_cast<std::size_t>(count)),
+      genealogy_(particles_.size()) {
   for (Particle& particle : particles_) particle.T_map_robot = T_map_robot_start;
   effective_ = static_cast<double>(particles_.size());
   estimate_.T_map_robot = T_map_robot_start;
@@ -87,6 +91,7 @@ void ParticleSet::Rebase(std::span<const Pose2> path) {
   best_ = 0;
   travelled_ = 0.0;
   sample_due_ = false;
+  genealogy_.Forget();
   effective_ = static_cast<double>(particles_.size());
   estimate_ = {particle.T_map_robot, particle.covariance};
 }
@@ -112,11 +117,16 @@ void ParticleSet::Summarise(const std::vector<double>& shares) {
   if (sum > 0.0) mean /= sum;
   estimate_.T_map_robot = {centre.x + mean.x(), centre.y + mean.y(), WrapAngle(centre.theta + mean.z())};
   // Doubt is that of all of them: leaving out those that disagree would claim more than is known.
-  estimate_.covariance = best().covariance;
+  std::vector<Eigen::Vector3d> deviations;
+  deviations.reserve(particles_.size());
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   for (std::size_t i = 0; i < particles_.size(); ++i) {
-    const Eigen::Vector3d d = from_centre(particles_[i]) - mean;
-    estimate_.covariance += shares[i] * d * d.transpose();
+    deviations.push_back(from_centre(particles_[i]) - mean);
+    spread += shares[i] * deviations.back() * deviations.back().transpose();
   }
+  const Eigen::Vector3d unit = spread.diagonal().cwiseSqrt().cwiseMax(1e-9);
+  // Twice: the mean is off by it, and the spread about such a mean falls short by as much.
+  estimate_.covariance = best().covariance + spread + 2.0 * genealogy_.VarianceOfMean(shares, deviations, unit);
 }
 
 void ParticleSet::Sample(std::size_t index) {
@@ -151,6 +161,7 @@ std::vector<int> ParticleSet::Resample(std::vector<double>& left) {
     survivors.back().log_weight = 0.0;
   }
   particles_ = std::move(survivors);
+  genealogy_.Add(parents);
   left.assign(particles_.size(), 1.0 / static_cast<double>(particles_.size()));
   return parents;
 }

@@ -11,6 +11,7 @@
 
 #include "server/slam/filters/fastslam_options.h"
 #include "server/slam/filters/filter.h"
+#include "server/slam/filters/genealogy.h"
 #include "server/slam/filters/innovation.h"
 #include "server/slam/filters/particle.h"
 #include "server/slam/filters/resampling.h"
@@ -68,7 +69,8 @@ class ParticleSet {
   [[nodiscard]] std::size_t best_index() const { return best_; }
   [[nodiscard]] const Particle& best() const { return particles_[best_]; }
   // Weighted mean pose of the particles that agree with the best one, steadier than the best particle, which changes
-  // hands; and the spread of all of them about it, plus the uncertainty each has.
+  // hands; and the spread of all of them about it, plus the uncertainty each has, plus how far a mean of so few
+  // ancestors may be off.
   [[nodiscard]] const FilterEstimate& estimate() const { return estimate_; }
   [[nodiscard]] FilterHealth health() const;
 
@@ -80,6 +82,7 @@ class ParticleSet {
   double max_nis_;
   Rng rng_;
   std::vector<Particle> particles_;
+  Genealogy genealogy_;
   std::size_t best_ = 0;
   double travelled_ = 0.0;  // Since the last sampling.
   bool sample_due_ = false;
