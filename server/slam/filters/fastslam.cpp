@@ -67,8 +67,11 @@ void FastSlam<LandmarkModel>::Observe(std::span<const LandmarkSighting> sighting
     }
     for (std::size_t s = 0; s < sightings.size(); ++s) {
       if (associations[s].verdict == Verdict::kKnown) {
-        maps_[i][associations[s].slot].landmark.ForEachInnovation(
-            set_[i].T_map_robot, measurements[s], [&](const auto& innovation) { set_.Fuse(i, innovation); });
+        const Entry& entry = maps_[i][associations[s].slot];
+        entry.landmark.ForEachInnovation(set_[i].T_map_robot, measurements[s], [&](const auto& innovation) {
+          if (i == set_.best_index()) set_.Tie(entry.first_keyframe, innovation);
+          set_.Fuse(i, innovation);
+        });
       } else {
         set_.Weigh(i, LandmarkModel::LogDensityAt(new_nis_, measurements[s]));
       }

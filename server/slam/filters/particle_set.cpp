@@ -1,5 +1,6 @@
 #include "server/slam/filters/particle_set.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
@@ -18,20 +19,23 @@ constexpr double kLoopSigmaRad = 0.01;
 
 ParticleSet::ParticleSet(const FastSlamOptions& options, double max_nis, std::int64_t count,
                          const Pose2& T_map_robot_start, std::uint64_t seed)
-    : options_(options), max_nis_(max_nis), rng_(seed), particles_(static_cast<std::size_t>(count)) {
+    : options_(options), max_nis_(max_nis), rng_(seed), particles_(static_cast<std::size_t>(count)), errors_(~seed) {
   for (Particle& particle : particles_) particle.T_map_robot = T_map_robot_start;
   effective_ = static_cast<double>(particles_.size());
   estimate_.T_map_robot = T_map_robot_start;
 }
 
 void ParticleSet::Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) {
+  errors_.Move(best().T_map_robot, T_prev_curr, covariance_prev);
   for (Particle& particle : particles_)
     DeadReckon(particle.T_map_robot, particle.covariance, T_prev_curr, covariance_prev);
   travelled_ += T_prev_curr.translation().norm();
 }
 
 void ParticleSet::PredictBySampling(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) {
+  errors_.MoveBySampling(best().T_map_robot, T_prev_curr, options_.motion);
   const bool more = covariance_prev.trace() > 0.0;
+  if (more) errors_.Move(best().T_map_robot, T_prev_curr, covariance_prev);
   for (std::size_t i = 0; i < particles_.size(); ++i) {
     Particle& particle = particles_[i];
     const Pose2 before = particle.T_map_robot;
@@ -57,6 +61,7 @@ bool ParticleSet::Observe(const RevisitObservation& revisit) {
   for (std::size_t i = 0; i < particles_.size(); ++i)
     mixture.Add(before[i], innovations[i].v, innovations[i].S(particles_[i].covariance));
   Judge(mixture);
+  Tie<3>(revisit.keyframe, innovations[best_]);
   for (std::size_t i = 0; i < particles_.size(); ++i) Fuse<3>(i, innovations[i]);
   sample_due_ = true;
   return true;
@@ -69,6 +74,7 @@ std::vector<int> ParticleSet::Commit() {
     sample_due_ = false;
   }
   for (Particle& particle : particles_) particle.path.Append(particle.T_map_robot);
+  errors_.Keep(spread_share_);
   std::vector<double> left;
   std::vector<int> parents = Resample(left);
   Summarise(left);
@@ -87,6 +93,7 @@ void ParticleSet::Rebase(std::span<const Pose2> path) {
   best_ = 0;
   travelled_ = 0.0;
   sample_due_ = false;
+  errors_.Rebase(path.size(), path.back(), particle.covariance);
   effective_ = static_cast<double>(particles_.size());
   estimate_ = {particle.T_map_robot, particle.covariance};
 }
@@ -111,12 +118,17 @@ void ParticleSet::Summarise(const std::vector<double>& shares) {
   }
   if (sum > 0.0) mean /= sum;
   estimate_.T_map_robot = {centre.x + mean.x(), centre.y + mean.y(), WrapAngle(centre.theta + mean.z())};
-  // Doubt is that of all of them: leaving out those that disagree would claim more than is known.
-  estimate_.covariance = best().covariance;
+  const Eigen::Matrix3d covariance = errors_.covariance(estimate_.T_map_robot);
+  const Eigen::LDLT<Eigen::Matrix3d> whiten(covariance);
+  Eigen::Vector3d spread = Eigen::Vector3d::Zero();
+  estimate_.covariance = covariance;
   for (std::size_t i = 0; i < particles_.size(); ++i) {
     const Eigen::Vector3d d = from_centre(particles_[i]) - mean;
-    estimate_.covariance += shares[i] * d * d.transpose();
+    spread += shares[i] * d.cwiseAbs2();
+    if (d.dot(whiten.solve(d)) > max_nis_) estimate_.covariance += shares[i] * d * d.transpose();
   }
+  const Eigen::Vector3d variance = covariance.diagonal().cwiseMax(1e-12);
+  spread_share_ = std::min(1.0, spread.cwiseQuotient(variance).mean());
 }
 
 void ParticleSet::Sample(std::size_t index) {
@@ -151,6 +163,7 @@ std::vector<int> ParticleSet::Resample(std::vector<double>& left) {
     survivors.back().log_weight = 0.0;
   }
   particles_ = std::move(survivors);
+  errors_.Resample(ShareOfSiblings(parents));
   left.assign(particles_.size(), 1.0 / static_cast<double>(particles_.size()));
   return parents;
 }

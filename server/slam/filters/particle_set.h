@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "server/slam/filters/error_ensemble.h"
 #include "server/slam/filters/fastslam_options.h"
 #include "server/slam/filters/filter.h"
 #include "server/slam/filters/innovation.h"
@@ -42,6 +43,12 @@ class ParticleSet {
     Weigh(index, LogDensity<N>(std::min(nis, max_nis_), S));
     if (nis < max_nis_) CorrectPose<N>(particle.T_map_robot, particle.covariance, innovation);
   }
+  // For the doubt about the estimate: an observation of something first seen from `keyframe`, as the best particle
+  // has it.
+  template <int N>
+  void Tie(std::size_t keyframe, const Innovation<N>& innovation) {
+    errors_.Tie<N>(keyframe, best().T_map_robot, innovation);
+  }
   void Weigh(std::size_t index, double log_likelihood) {
     particles_[index].log_weight += log_likelihood;
     particles_[index].log_likelihood += log_likelihood;
@@ -68,7 +75,8 @@ class ParticleSet {
   [[nodiscard]] std::size_t best_index() const { return best_; }
   [[nodiscard]] const Particle& best() const { return particles_[best_]; }
   // Weighted mean pose of the particles that agree with the best one, steadier than the best particle, which changes
-  // hands; and the spread of all of them about it, plus the uncertainty each has.
+  // hands; and how wrong it may be, which is more than the particles' spread (error_ensemble.h). Particles too far off
+  // to be covered by that add their distance.
   [[nodiscard]] const FilterEstimate& estimate() const { return estimate_; }
   [[nodiscard]] FilterHealth health() const;
 
@@ -80,6 +88,8 @@ class ParticleSet {
   double max_nis_;
   Rng rng_;
   std::vector<Particle> particles_;
+  ErrorEnsemble errors_;
+  double spread_share_ = 1.0;  // Of the variance of the pose: what the particles spread over.
   std::size_t best_ = 0;
   double travelled_ = 0.0;  // Since the last sampling.
   bool sample_due_ = false;

@@ -43,6 +43,16 @@ std::vector<int> StratifiedSurvivors(std::span<const double> weights, Rng& rng) 
   return survivors;
 }
 
+double ShareOfSiblings(std::span<const int> parents) {
+  const auto n = static_cast<double>(parents.size());
+  double pairs = 0.0, elder = 0.0;  // Siblings before this one.
+  for (std::size_t i = 1; i < parents.size(); ++i) {
+    elder = parents[i] == parents[i - 1] ? elder + 1.0 : 0.0;
+    pairs += elder;
+  }
+  return n > 1.0 ? 2.0 * pairs / (n * (n - 1.0)) : 1.0;
+}
+
 double UniformDraw(Rng& rng) {
   return static_cast<double>(rng() >> 11) * 0x1.0p-53;
 }

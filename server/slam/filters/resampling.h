@@ -20,6 +20,10 @@ using Rng = std::mt19937_64;
 // The parent of each of weights.size() survivors, in ascending order; one draw in each of n equal strata.
 [[nodiscard]] std::vector<int> StratifiedSurvivors(std::span<const double> weights, Rng& rng);
 
+// How many pairs of survivors have the same parent, of all pairs: what resampling takes off the spread of a set.
+// REQUIRES: parents ascending.
+[[nodiscard]] double ShareOfSiblings(std::span<const int> parents);
+
 // Uniform in [0, 1) and standard normal with a definition of our own, so that every standard library gives the same.
 [[nodiscard]] double UniformDraw(Rng& rng);
 [[nodiscard]] double NormalDraw(Rng& rng);
