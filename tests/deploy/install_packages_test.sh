@@ -84,7 +84,7 @@ install 2 nothing
 expect "an unknown section is a usage error that names the known ones" grep -q 'build test' "$world/said"
 
 # The real list: one plain name or alternatives a line, nothing twice.
-bad=$(grep -vE '^(#.*|\[(build|run|test)\]|[a-z0-9][a-z0-9.+-]+( \| [a-z0-9][a-z0-9.+-]+)*|)$' "$source_dir/deploy/packages.txt" || true)
+bad=$(grep -vE '^(#.*|\[(build|run|test|boot)\]|[a-z0-9][a-z0-9.+-]+( \| [a-z0-9][a-z0-9.+-]+)*|)$' "$source_dir/deploy/packages.txt" || true)
 expect "every line of packages.txt has a known form ($bad)" [ -z "$bad" ]
 twice=$(grep -vE '^(#|\[|$)' "$source_dir/deploy/packages.txt" | sort | uniq -d)
 expect "no package is listed twice ($twice)" [ -z "$twice" ]
