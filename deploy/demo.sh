@@ -9,7 +9,7 @@ set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 log=${1:-}
-out=${DEMO_OUT:-$root/demo-out}
+out=$(realpath -m "${DEMO_OUT:-$root/demo-out}")
 seconds=${DEMO_SECONDS:-150}
 rate=${DEMO_RATE:-3}
 robots=(robot1 robot2 robot3)
@@ -24,6 +24,11 @@ if [ $# -gt 1 ] || [ "$log" = --help ]; then
 fi
 if [ -n "$log" ] && [ ! -r "$log" ]; then echo "demo: cannot read $log" >&2; exit 2; fi
 if [ -n "$log" ]; then log=$(realpath "$log"); fi
+# It is emptied below.
+if [ -n "$(ls -A "$out" 2>/dev/null)" ] && [ ! -e "$out/cairnd.log" ]; then
+  echo "demo: $out holds something that is not a demo's; name another DEMO_OUT" >&2
+  exit 2
+fi
 
 step() { printf '\n== %s\n' "$*"; }
 fail() { echo "demo: $*" >&2; exit 1; }
