@@ -14,8 +14,8 @@ seconds=${DEMO_SECONDS:-150}
 rate=${DEMO_RATE:-3}
 robots=(robot1 robot2 robot3)
 bin=$root/build/release/bin
-# A domain nobody else is likely to use; 60..219 keeps its ports clear of usual ones.
-export CAIRN_DOMAIN=${CAIRN_DOMAIN:-$((60 + $$ % 160))}
+# A domain nobody else is likely to use; up to 101 its ports lie below those the kernel gives to others.
+export CAIRN_DOMAIN=${CAIRN_DOMAIN:-$((60 + $$ % 42))}
 
 if [ $# -gt 1 ] || [ "$log" = --help ]; then
   sed -n '2,7s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"

@@ -1,6 +1,7 @@
 #include "server/command_line.h"
 
 #include <CLI/CLI.hpp>
+#include <cstdlib>
 #include <iostream>
 #include <string>
 #include <vector>
@@ -26,12 +27,12 @@ std::optional<CommandLine> ParseCommandLine(int argc, char** argv, int& exit_cod
                "cairnd");
   std::string config, log_level;
   std::vector<std::string> assignments;
-  std::int64_t domain = -1;
+  std::optional<std::int64_t> domain;
   bool print_config = false, check_config = false;
   app.add_option("--config", config, "Configuration file (YAML); every key has a default");
   app.add_option("--set", assignments, "Overrides one key, e.g. --set slam.particles=100; may be repeated")
       ->allow_extra_args(false);
-  app.add_option("--domain", domain, "DDS domain (wire.domain)")->envname("CAIRN_DOMAIN");
+  app.add_option("--domain", domain, "DDS domain (wire.domain); CAIRN_DOMAIN stands below --set and above the file");
   app.add_option("--log-level", log_level, "trace, debug, info, warn, error, critical or off (server.log_level)");
   app.add_flag("--print-config", print_config, "Print the whole configuration with comments, and end");
   app.add_flag("--check-config", check_config, "Check the configuration, and end");
@@ -49,7 +50,14 @@ std::optional<CommandLine> ParseCommandLine(int argc, char** argv, int& exit_cod
     exit_code = kUsage;
     return std::nullopt;
   }
-  if (domain != -1) assignments.push_back("wire.domain=" + std::to_string(domain));
+  if (const char* of_machine = std::getenv("CAIRN_DOMAIN"); of_machine != nullptr && *of_machine != '\0') {
+    if (const auto applied = ApplySet({std::string("wire.domain=") + of_machine}, visit); !applied) {
+      std::cerr << "cairnd: CAIRN_DOMAIN: " << applied.error().message << "\n";
+      exit_code = kUsage;
+      return std::nullopt;
+    }
+  }
+  if (domain) assignments.push_back("wire.domain=" + std::to_string(*domain));
   if (!log_level.empty()) assignments.push_back("server.log_level=" + log_level);
   if (Complain(ApplySet(assignments, visit))) {
     exit_code = kUsage;

@@ -1,5 +1,5 @@
 // cairnd's command line: what to do, and with which options. Precedence, lowest first: defaults, --config, --set,
-// --domain (or CAIRN_DOMAIN), --log-level.
+// --domain, --log-level; CAIRN_DOMAIN stands above the file, below the command line.
 #pragma once
 
 #include <optional>

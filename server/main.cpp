@@ -16,6 +16,7 @@
 #include "server/command_line.h"
 #include "server/egress/egress.h"
 #include "server/ingress/ingress.h"
+#include "server/ingress/other_servers.h"
 #include "server/ops/service_notifier.h"
 #include "server/server.h"
 
@@ -34,9 +35,24 @@ void LogConfig(const CairndOptions& options) {
   }
 }
 
+// Live participants of this machine are discovered within a fifth of it.
+constexpr std::chrono::milliseconds kDiscovery{500};
+
+// Two servers that start at the same moment, or in networks joined later, cannot see each other in time.
+void WarnOfOthers(asio::steady_timer& timer, const OtherServers& others, int known) {
+  timer.expires_after(std::chrono::seconds(1));
+  timer.async_wait([&timer, &others, known](const asio::error_code& error) {
+    if (error) return;
+    const int count = others.count();
+    if (count > known)
+      spdlog::error("another server serves this DDS domain: robots and people get half the truth from each; stop one");
+    WarnOfOthers(timer, others, count);
+  });
+}
+
 // Runs until SIGTERM or SIGINT; feeds the watchdog while the server is healthy.
 void WaitForSignal(asio::io_context& context, asio::signal_set& signals, const Server& server,
-                   const ServiceNotifier& notifier) {
+                   const OtherServers& others, const ServiceNotifier& notifier) {
   signals.async_wait([&context](const asio::error_code& error, int signal) {
     if (!error) spdlog::info("signal {}: stopping", signal);
     context.stop();
@@ -51,6 +67,8 @@ void WaitForSignal(asio::io_context& context, asio::signal_set& signals, const S
     timer.async_wait(feed);
   };
   if (watchdog) feed({});
+  asio::steady_timer second(context);
+  WarnOfOthers(second, others, 0);
   context.run();
 }
 
@@ -71,6 +89,12 @@ int Serve(const CairndOptions& options) {
   Outbound outbound(static_cast<std::size_t>(process.outbound_capacity));
   auto bus = wire::Bus::Create(options.wire, "cairnd");
   if (!bus) return failed(bus.error());
+  const auto others = OtherServers::Watch(**bus);
+  if (!others) return failed(others.error());
+  if ((*others)->FoundWithin(kDiscovery))
+    return failed({StatusCode::kAlreadyExists, "another server serves DDS domain " +
+                                                   std::to_string(options.wire.domain) +
+                                                   "; give one of them another (--domain, CAIRN_DOMAIN)"});
   auto egress = Egress::Open(**bus, outbound);
   if (!egress) return failed(egress.error());
   Server server(options.server, inbound, outbound);
@@ -81,7 +105,7 @@ int Serve(const CairndOptions& options) {
   const ServiceNotifier notifier;
   notifier.Ready("serving DDS domain " + std::to_string(options.wire.domain));
   spdlog::info("ready");
-  WaitForSignal(context, signals, server, notifier);
+  WaitForSignal(context, signals, server, **others, notifier);
   notifier.Stopping();
 
   (*ingress)->Close();

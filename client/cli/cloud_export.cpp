@@ -4,6 +4,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/json_output.h"
+#include "client/cli/option_checks.h"
 #include "client/sim/shipped_worlds.h"
 
 namespace cairn::client {
@@ -81,11 +82,11 @@ void AddCloudExport(CLI::App& cloud, Program& program) {
   command->add_flag("--smoothed", arguments->smoothed, "That of the enabled smoothing job instead of the live one");
   command->add_option("--trajectory", arguments->trajectory, "TUM file with the path")->type_name("FILE");
   command->add_option("--height", options.cloud.height_m, "Of the scanner above the floor")
-      ->check(CLI::Range(-1000.0, 1000.0))
+      ->check(InRange(-1000.0, 1000.0))
       ->type_name("METRES")
       ->capture_default_str();
   command->add_option("--voxel", options.cloud.voxel_m, "Keep one point per cube of this size; 0: all")
-      ->check(CLI::Range(0.0, 100.0))
+      ->check(InRange(0.0, 100.0))
       ->type_name("METRES")
       ->capture_default_str();
   command->add_option("--max-range", options.cloud.max_range_m, "Leave out hits farther away")

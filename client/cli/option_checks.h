@@ -3,7 +3,9 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <charconv>
 #include <functional>
+#include <sstream>
 #include <string>
 
 #include "common/status.h"
@@ -23,6 +25,24 @@ CLI::Option* AddParsed(CLI::App& app, const std::string& name, T& value, Parser 
           },
           help)
       ->type_name(type_name);
+}
+
+// A number of the range, its ends included. (CLI::Range lets NaN pass, and prints all digits of its ends.)
+inline CLI::Validator InRange(double least, double most) {
+  const auto shortest = [](double value) {
+    std::ostringstream text;
+    text << value;
+    return text.str();
+  };
+  const std::string range = shortest(least) + " to " + shortest(most);
+  return CLI::Validator(
+      [=](std::string& text) {
+        double value = 0.0;
+        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+        const bool good = error == std::errc() && end == text.data() + text.size() && value >= least && value <= most;
+        return good ? std::string() : "'" + text + "' is not a number from " + range;
+      },
+      "");
 }
 
 }  // namespace cairn::client

@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <cstdlib>
 #include <exception>
+#include <optional>
+#include <utility>
 
 #include "client/cli/commands.h"
 #include "client/cli/option_checks.h"
@@ -53,33 +56,39 @@ ExitCode Program::Refuse(const Status& status) {
 
 namespace {
 
-void AddGlobalOptions(CLI::App& app, Program& program, std::vector<std::string>& assignments) {
+// What may be said of the wire, least first: CAIRN_DOMAIN, --set, --domain.
+struct WireArguments {
+  std::vector<std::string> assignments;
+  std::optional<std::int64_t> domain;
+};
+
+void AddGlobalOptions(CLI::App& app, Program& program, WireArguments& wire) {
   GlobalOptions& options = program.options;
-  app.add_option("--domain", options.wire.domain, "DDS domain of server and robots")
-      ->envname("CAIRN_DOMAIN")
-      ->check(CLI::Range(0, 232))
-      ->capture_default_str();
-  app.add_option("--set", assignments, "Any option of the wire, e.g. wire.interfaces=192.168.1.5")
+  app.add_option("--domain", wire.domain, "DDS domain of server and robots [CAIRN_DOMAIN, or 0]");
+  app.add_option("--set", wire.assignments, "Any option of the wire, e.g. wire.interfaces=192.168.1.5")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
   AddParsed(app, "--timeout", options.timeout_s, ParseDuration, "How long to wait for an answer [5]", "SECONDS");
   app.add_flag("--json", options.json, "One JSON object on standard output, for machines");
 }
 
-Result<void> ApplyAssignments(GlobalOptions& options, const std::vector<std::string>& assignments, bool domain_given) {
-  const std::int64_t domain = options.wire.domain;
-  auto applied = ApplySet(assignments, [&options](OptionVisitor& visitor) {
+Result<void> ApplyWire(GlobalOptions& options, WireArguments arguments) {
+  const VisitOptions visit = [&options](OptionVisitor& visitor) {
     visitor.Section("wire", "The DDS side.", [&] { wire::Visit(visitor, options.wire); });
-  });
-  if (domain_given) options.wire.domain = domain;  // The more explicit of the two.
-  return applied;
+  };
+  if (const char* of_machine = std::getenv("CAIRN_DOMAIN"); of_machine != nullptr && *of_machine != '\0') {
+    if (const auto applied = ApplySet({std::string("wire.domain=") + of_machine}, visit); !applied)
+      return Fail(applied.error().code, "CAIRN_DOMAIN: " + applied.error().message);
+  }
+  if (arguments.domain) arguments.assignments.push_back("wire.domain=" + std::to_string(*arguments.domain));
+  return ApplySet(arguments.assignments, visit);
 }
 
 }  // namespace
 
 ExitCode RunCairn(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err) {
   Program program(out, err);
-  std::vector<std::string> assignments;
+  WireArguments wire;
   CLI::App app("Stream robots to a Cairn server, ask it for poses and maps, start its jobs.", "cairn");
   app.set_version_flag("--version", std::string("cairn ") + kVersion);
   app.footer(
@@ -87,7 +96,7 @@ ExitCode RunCairn(const std::vector<std::string>& arguments, std::ostream& out, 
       "Exit codes: 0 done, 1 failed (one line on standard error says why), 2 wrong command line.");
   app.fallthrough();
   app.require_subcommand(1);
-  AddGlobalOptions(app, program, assignments);
+  AddGlobalOptions(app, program, wire);
   AddReplay(app, program);
   AddSim(app, program);
   AddPose(app, program);
@@ -107,7 +116,7 @@ ExitCode RunCairn(const std::vector<std::string>& arguments, std::ostream& out, 
     const int code = app.exit(error, out, err);
     return code == 0 ? ExitCode::kOk : ExitCode::kUsage;
   }
-  if (const auto applied = ApplyAssignments(program.options, assignments, app.count("--domain") > 0); !applied) {
+  if (const auto applied = ApplyWire(program.options, std::move(wire)); !applied) {
     err << "cairn: " << applied.error().message << "\n";
     return ExitCode::kUsage;
   }

@@ -97,14 +97,16 @@ ExitCode Replay(Program& program, const ReplayArguments& arguments) {
   if (latency.count() > 0) {
     object.update({{"pose_latency_p50_ms", latency.At(0.5)}, {"pose_latency_p99_ms", latency.At(0.99)}});
   }
-  if (!summary) object["error"] = StatusToJson(summary.error());
+  Status status = summary ? Status{} : summary.error();
+  if (status.ok() && !Interrupted() && account.unexplained() != 0)
+    status = {StatusCode::kDataLoss, std::to_string(account.unexplained()) + " scans are not in the server's account"};
+  if (!status.ok()) object["error"] = StatusToJson(status);
   program.Print(text, object);
-  if (!summary) {
-    program.err() << "cairn: " << summary.error().message << "\n";
-    return ExitCode::kFailed;
-  }
-  if (Interrupted()) return ExitCode::kFailed;
-  return account.unexplained() == 0 ? ExitCode::kOk : ExitCode::kFailed;
+  if (!status.ok())
+    program.err() << "cairn: " << status.message << " (" << StatusCodeName(status.code) << ")\n";
+  else if (account.used == 0)
+    program.err() << "cairn: no scan was used\n";
+  return status.ok() && !Interrupted() ? ExitCode::kOk : ExitCode::kFailed;
 }
 
 }  // namespace
@@ -123,7 +125,7 @@ void AddReplay(CLI::App& app, Program& program) {
   command->add_option("--robot", arguments->stream.robot, "The robot's name")->required();
   command->add_option("--sensor", arguments->stream.sensor, "The scanner's name")->capture_default_str();
   auto* rate = command->add_option("--rate", arguments->rate, "How many times faster than the log's stamps")
-                   ->check(CLI::Range(1e-3, 1e6))
+                   ->check(InRange(1e-3, 1e6))
                    ->capture_default_str();
   command->add_flag("--fast", arguments->fast, "As fast as the server takes it, without losing a scan")->excludes(rate);
   AddWindowOption(*command, arguments->stream.window);

@@ -55,7 +55,19 @@ void RobotStream::OnPose(const PoseReport& pose) {
   latency_ms_.Add(std::chrono::duration<double, std::milli>(now - departure.time).count());
 }
 
+// A robot would wait for its server; who streams a log wants to know.
+Result<void> RobotStream::CheckServer() {
+  const SessionState state = client_->session();
+  if (state.phase == SessionPhase::kSuspended && state.status.code == StatusCode::kUnavailable)
+    return Fail(StatusCode::kUnavailable, "the session is suspended: " + state.status.message);
+  const auto now = Clock::now();
+  if (client_->connected()) connected_ = now;
+  if (std::chrono::duration<double>(now - connected_).count() < timeout_s_) return {};
+  return Fail(StatusCode::kUnavailable, "the server went away while '" + options_.robot + "' was streaming");
+}
+
 Result<void> RobotStream::Send(LogRecord&& record) {
+  if (auto there = CheckServer(); !there) return there;
   if (const auto* odometry = std::get_if<Odometry>(&record)) return client_->Publish(*odometry);
   auto& scan = std::get<Scan>(record);
   scan.sequence = ++sent_;

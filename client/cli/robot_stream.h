@@ -34,7 +34,8 @@ class RobotStream {
   // Opens the session; fails where no server answers or it refuses the robot. `program` outlives the stream.
   [[nodiscard]] static Result<std::unique_ptr<RobotStream>> Open(Program& program, const StreamOptions& options);
 
-  // Waits for room in the window; fails where the server settles nothing within the program's timeout.
+  // Waits for room in the window; fails where the server settles nothing within the program's timeout, says that it
+  // stops, or has been away for that long.
   [[nodiscard]] Result<void> Send(LogRecord&& record);
   // Waits until everything sent is settled, or the program's timeout has passed: account() tells what is left.
   void Settle();
@@ -58,10 +59,12 @@ class RobotStream {
   RobotStream(const StreamOptions& options, double timeout_s) : options_(options), timeout_s_(timeout_s) {}
   [[nodiscard]] Result<Ledger> AskLedger(Program& program) const;
   void OnPose(const PoseReport& pose);
+  [[nodiscard]] Result<void> CheckServer();
 
   const StreamOptions options_;
   const double timeout_s_;
   std::uint64_t sent_ = 0;
+  Clock::time_point connected_ = Clock::now();  // When a server was there last.
   Ledger before_;  // The stream's account before the first scan; a resumed session has a past.
 
   mutable std::mutex mutex_;

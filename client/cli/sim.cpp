@@ -4,6 +4,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/json_output.h"
+#include "client/cli/option_checks.h"
 #include "client/cli/quantity_text.h"
 #include "client/cli/sim_run.h"
 #include "client/cli/sim_sensor_options.h"
@@ -92,13 +93,11 @@ void AddSim(CLI::App& app, Program& program) {
   command->add_option("--site", options->site, "The site to map into");
   command->add_option("--robots", options->fleet.robots, "How many")->check(CLI::Range(1, 256))->capture_default_str();
   command->add_option("--prefix", options->prefix, "Robots are called PREFIX1, PREFIX2, ...")->capture_default_str();
-  command->add_option("--seconds", options->seconds, "Simulated time")
-      ->check(CLI::Range(0.1, 1e6))
-      ->capture_default_str();
+  command->add_option("--seconds", options->seconds, "Simulated time")->check(InRange(0.1, 1e6))->capture_default_str();
   command->add_option("--seed", options->fleet.seed, "Of all randomness")->capture_default_str();
   auto model = AddSensorOptions(*command, options->fleet);
   auto* rate = command->add_option("--rate", options->rate, "How many times faster than real time")
-                   ->check(CLI::Range(1e-3, 1e4))
+                   ->check(InRange(1e-3, 1e4))
                    ->capture_default_str();
   command->add_flag("--fast", options->fast, "As fast as the server takes it, without losing a scan")->excludes(rate);
   AddWindowOption(*command, options->window);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <vector>
 
+#include "client/cli/option_checks.h"
 #include "client/sim/laser_models.h"
 
 namespace cairn::client {
@@ -19,16 +20,16 @@ std::shared_ptr<std::string> AddLaser(CLI::App& command, sim::LaserOptions& lase
   command
       .add_option_function<double>(
           "--fov", [&laser](double degrees) { laser.field_of_view_rad = Radians(degrees); }, "Field of view [270]")
-      ->check(CLI::Range(1.0, 360.0))
+      ->check(InRange(1.0, 360.0))
       ->type_name("DEGREES")
       ->excludes(named);
   command.add_option("--range", laser.range_max_m, "How far the scanner sees")
-      ->check(CLI::Range(0.5, 1000.0))
+      ->check(InRange(0.5, 1000.0))
       ->type_name("METRES")
       ->capture_default_str()
       ->excludes(named);
   command.add_option("--noise", laser.noise_m, "Standard deviation of a range, where --error is sigma")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(InRange(0.0, 1.0))
       ->type_name("METRES")
       ->capture_default_str()
       ->excludes(named);
@@ -44,26 +45,26 @@ std::shared_ptr<std::string> AddLaser(CLI::App& command, sim::LaserOptions& lase
       ->check(CLI::IsMember(std::vector<std::string>(names.begin(), names.end())))
       ->excludes(named);
   command.add_option("--error-bound", laser.bound_m, "percent, step: ranges are off by at most this, and")
-      ->check(CLI::Range(0.0, 10.0))
+      ->check(InRange(0.0, 10.0))
       ->type_name("METRES")
       ->capture_default_str()
       ->excludes(named);
   command
       .add_option("--error-share", laser.bound_share, "... this share of the range (step: instead, beyond the step)")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(InRange(0.0, 1.0))
       ->capture_default_str()
       ->excludes(named);
   command.add_option("--error-step", laser.step_m, "step: up to here the bound holds, beyond it the share")
-      ->check(CLI::Range(0.0, 1000.0))
+      ->check(InRange(0.0, 1000.0))
       ->type_name("METRES")
       ->capture_default_str()
       ->excludes(named);
   command.add_option("--sweep", laser.sweep_s, "From a scan's first beam to its last")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(InRange(0.0, 1.0))
       ->type_name("SECONDS")
       ->capture_default_str();
   command.add_option("--laser-height", laser.height_m, "Of the scanner above the floor")
-      ->check(CLI::Range(0.0, 100.0))
+      ->check(InRange(0.0, 100.0))
       ->type_name("METRES")
       ->capture_default_str();
   return model;
@@ -98,19 +99,19 @@ void AddTilt(CLI::App& command, sim::TiltOptions& tilt) {
 std::shared_ptr<std::string> AddSensorOptions(CLI::App& command, sim::FleetOptions& fleet) {
   auto model = AddLaser(command, fleet.laser);
   AddTilt(command, fleet.tilt);
-  command.add_option("--hz", fleet.scan_hz, "Scans a second")->check(CLI::Range(0.1, 200.0))->capture_default_str();
+  command.add_option("--hz", fleet.scan_hz, "Scans a second")->check(InRange(0.1, 200.0))->capture_default_str();
   command.add_option("--odometry-hz", fleet.odometry_hz, "Odometry samples a second")
-      ->check(CLI::Range(0.1, 500.0))
+      ->check(InRange(0.1, 500.0))
       ->capture_default_str();
   command.add_option("--slip", fleet.wheels.slip_m_per_sqrt_m, "Random wheel error after 1 m")
-      ->check(CLI::Range(0.0, 0.2))
+      ->check(InRange(0.0, 0.2))
       ->type_name("METRES")
       ->capture_default_str();
   command.add_option("--wheel-spread", fleet.wheel_spread.wheel_share, "Systematic wheel size error, share")
-      ->check(CLI::Range(0.0, 0.1))
+      ->check(InRange(0.0, 0.1))
       ->capture_default_str();
   command.add_option("--speed", fleet.drive.speed_m_s, "How fast robots drive")
-      ->check(CLI::Range(0.05, 5.0))
+      ->check(InRange(0.05, 5.0))
       ->type_name("M/S")
       ->capture_default_str();
   return model;

@@ -55,6 +55,7 @@ class RobotClient {
 
   [[nodiscard]] ClientId id() const { return request_.client; }
   [[nodiscard]] SessionState session() const;
+  [[nodiscard]] bool connected() const { return scans_->matched() > 0; }  // Whether a server listens right now.
   [[nodiscard]] std::optional<PoseReport> pose() const;
   [[nodiscard]] std::optional<Ledger> ledger() const;  // Of the first sensor.
   [[nodiscard]] std::optional<Ledger> ledger(const std::string& sensor) const;

@@ -11,9 +11,13 @@
 namespace cairn::server {
 namespace {
 
-// The sections of cairnd.yaml: one file serves both programs, this one reads `slam`.
-void VisitAll(OptionVisitor& visitor, OfflineOptions& options) {
+void VisitSlam(OptionVisitor& visitor, OfflineOptions& options) {
   visitor.Section("slam", "The estimator.", [&] { slam::Visit(visitor, options.slam); });
+}
+
+// The sections of cairnd.yaml: one file serves both programs, this one reads `slam`.
+void VisitFile(OptionVisitor& visitor, OfflineOptions& options) {
+  VisitSlam(visitor, options);
   for (const char* other : {"server", "robots", "maps", "jobs", "wire"}) visitor.Foreign(other);
 }
 
@@ -24,7 +28,7 @@ std::optional<OfflineOptions> ParseOfflineOptions(int argc, char** argv, int& ex
   std::filesystem::path config;
   std::vector<std::string> assignments;
   std::vector<double> start;
-  std::optional<std::int64_t> seed;
+  std::string seed;  // A text: a number too large is an error, not another number.
   CLI::App app{"Runs the estimator over a robot log without a server: the same trajectory as through cairnd."};
   app.set_version_flag("--version", std::string("cairn-offline ") + kVersion);
   app.add_option("LOG", options.log, "CARMEN or DP-SLAM log")->required();
@@ -56,18 +60,20 @@ std::optional<OfflineOptions> ParseOfflineOptions(int argc, char** argv, int& ex
     exit_code = 2;
     return std::nullopt;
   }
-  if (seed) assignments.push_back("slam.seed=" + std::to_string(*seed));
+  if (!seed.empty()) assignments.push_back("slam.seed=" + seed);
   options.smooth = options.smooth || !options.smoothed_trajectory.empty() || !options.smoothed_map.empty();
 
-  const VisitOptions visit = [&](OptionVisitor& visitor) { VisitAll(visitor, options); };
   if (!config.empty()) {
-    if (const auto applied = ApplyYamlFile(config, visit); !applied) {
+    if (const auto applied = ApplyYamlFile(config, [&](OptionVisitor& visitor) { VisitFile(visitor, options); });
+        !applied) {
       std::cerr << "cairn-offline: " << applied.error().message << '\n';
-      exit_code = 1;
+      exit_code = 2;
       return std::nullopt;
     }
   }
-  if (const auto applied = ApplySet(assignments, visit); !applied) {
+  // On the command line a key of the server is a mistake.
+  const auto applied = ApplySet(assignments, [&](OptionVisitor& visitor) { VisitSlam(visitor, options); });
+  if (!applied) {
     std::cerr << "cairn-offline: " << applied.error().message << '\n';
     exit_code = 2;
     return std::nullopt;

@@ -24,8 +24,8 @@ struct OfflineOptions {
   slam::MapperOptions slam;
 };
 
-// Nothing where the program is to end at once with `exit_code`: 0 after --help or --version, 1 for a configuration file
-// that cannot be used, 2 for a wrong command line. What was wrong is on standard error.
+// Nothing where the program is to end at once with `exit_code`: 0 after --help or --version, 2 for a wrong command
+// line or configuration. What was wrong is on standard error.
 [[nodiscard]] std::optional<OfflineOptions> ParseOfflineOptions(int argc, char** argv, int& exit_code);
 
 }  // namespace cairn::server

@@ -10,8 +10,8 @@ PoseReport ReportAt(const PoseReport& newest, Stamp stamp, const PathPose& pose)
   report.stamp = stamp;
   report.scan_sequence = 0;
   report.T_map_robot = pose.T_map_robot;
-  report.covariance.setZero();  // Not kept for past poses.
-  report.T_map_odom = {};
+  report.covariance = pose.covariance.cast<double>();
+  report.T_map_odom = pose.T_map_odom;
   report.localized = pose.localized;
   report.score = pose.score;
   report.reason = pose.reason;

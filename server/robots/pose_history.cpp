@@ -20,8 +20,14 @@ std::optional<PathPose> PathView::At(Stamp stamp) const {
   const PathPose& before = after == (*block)->begin() ? (*std::prev(block))->back() : *std::prev(after);
   const double fraction = static_cast<double>(stamp - before.stamp) / static_cast<double>(after->stamp - before.stamp);
   const PathPose& worse = before.score < after->score ? before : *after;
-  return PathPose{stamp, Interpolate(before.T_map_robot, after->T_map_robot, fraction), worse.score,
-                  before.localized && after->localized, worse.reason};
+  const auto share = static_cast<float>(fraction);
+  return PathPose{stamp,
+                  Interpolate(before.T_map_robot, after->T_map_robot, fraction),
+                  worse.score,
+                  before.localized && after->localized,
+                  worse.reason,
+                  (1.0F - share) * before.covariance + share * after->covariance,
+                  Interpolate(before.T_map_odom, after->T_map_odom, fraction)};
 }
 
 Trajectory PathView::ToTrajectory() const {

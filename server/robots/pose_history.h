@@ -22,6 +22,8 @@ struct PathPose {
   float score = 0.0F;
   bool localized = false;
   PoseReason reason = PoseReason::kWaiting;
+  Eigen::Matrix3f covariance = Eigen::Matrix3f::Zero();  // Of (x, y, theta) in map.
+  Pose2 T_map_odom;
 };
 
 class PathView {
@@ -35,8 +37,8 @@ class PathView {
   [[nodiscard]] std::size_t size() const;
   [[nodiscard]] Stamp first_stamp() const { return blocks_.front()->front().stamp; }
   [[nodiscard]] Stamp last_stamp() const { return blocks_.back()->back().stamp; }
-  // Interpolated between the two poses around `stamp`, with the worse one's score and reason; nothing outside
-  // first_stamp()..last_stamp().
+  // Interpolated between the two poses around `stamp`, covariance too, with the worse one's score and reason; nothing
+  // outside first_stamp()..last_stamp().
   [[nodiscard]] std::optional<PathPose> At(Stamp stamp) const;
   [[nodiscard]] Trajectory ToTrajectory() const;
 

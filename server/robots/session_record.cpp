@@ -80,7 +80,8 @@ void SessionRecord::ScanDropped(NameId sensor_id, std::uint64_t sequence, DropRe
 void SessionRecord::ScanUsed(NameId sensor_id, const PoseReport& pose, bool keyframe, double latency_ms) {
   const MutexLock lock(mutex_);
   status_.pose = pose;
-  history_.Append({pose.stamp, pose.T_map_robot, static_cast<float>(pose.score), pose.localized, pose.reason});
+  history_.Append({pose.stamp, pose.T_map_robot, static_cast<float>(pose.score), pose.localized, pose.reason,
+                   pose.covariance.cast<float>(), pose.T_map_odom});
   if (Stream* const stream = Find(sensor_id)) {
     stream->account.Used(pose.scan_sequence, pose.stamp, keyframe, latency_ms);
     stream->changed = true;

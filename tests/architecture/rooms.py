@@ -81,7 +81,7 @@ IMPURE_WORDS = (r"std::(this_thread|j?thread|mutex|async)\b", r"\b(system|steady
                 r"\bthread_local\b")
 
 # Settings come through options; the environment is read where a program starts.
-READS_ENVIRONMENT = ("server/main.cpp", "server/offline.cpp", "server/calibrate.cpp", "client/cli", "client/web", "tests")
+READS_ENVIRONMENT = ("server/command_line.cpp", "server/offline.cpp", "server/calibrate.cpp", "client/cli", "client/web", "tests")
 
 # Names that say nothing: whole words of a file name, whole file names, and ends of type names.
 EMPTY_WORDS = {"util", "utils", "misc", "helper", "helpers", "manager", "stuff", "common"}

@@ -7,9 +7,9 @@
 #include <random>
 
 #include "common/wire/bus.h"
+#include "tests/child_process.h"
 #include "tests/loopback.h"
 #include "tests/server/support/room_world.h"
-#include "tests/child_process.h"
 #include "tests/temp_directory.h"
 
 namespace cairn::server {
@@ -28,6 +28,22 @@ constexpr ClientId kClient = 77;
 ChildProcess::Outcome RunCairnd(std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), CAIRND_PATH);
   return ChildProcess(std::move(arguments)).Wait();
+}
+
+// CAIRN_DOMAIN is the machine's: above a shipped file, below what is typed.
+TEST(CairndCommandLine, TheDomainOfTheMachineGivesWayToWhatIsTyped) {
+  const TempDirectory directory;
+  const std::string path = (directory / "c.yaml").string();
+  std::ofstream(path) << "wire: {domain: 5}\n";
+  setenv("CAIRN_DOMAIN", "77", 1);
+  EXPECT_THAT(RunCairnd({"--config", path, "--print-config"}).output, HasSubstr("domain: 77 "));
+  EXPECT_THAT(RunCairnd({"--set", "wire.domain=6", "--print-config"}).output, HasSubstr("domain: 6 "));
+  EXPECT_THAT(RunCairnd({"--set", "wire.domain=6", "--domain", "7", "--print-config"}).output, HasSubstr("domain: 7 "));
+  setenv("CAIRN_DOMAIN", "much", 1);
+  const auto outcome = RunCairnd({"--check-config"});
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_THAT(outcome.output, HasSubstr("CAIRN_DOMAIN"));
+  unsetenv("CAIRN_DOMAIN");
 }
 
 TEST(CairndCommandLine, PrintsItsVersion) {
@@ -60,6 +76,7 @@ TEST(CairndCommandLine, WrongUsageAndABadFileEndWithTwoNamingTheLine) {
   EXPECT_EQ(RunCairnd({"--no-such-flag"}).exit_code, 2);
   EXPECT_EQ(RunCairnd({"--set", "slam.no_such_key=1"}).exit_code, 2);
   EXPECT_EQ(RunCairnd({"--domain", "9999"}).exit_code, 2);
+  EXPECT_EQ(RunCairnd({"--domain", "-1"}).exit_code, 2);
   EXPECT_EQ(RunCairnd({"--log-level", "loud"}).exit_code, 2);
   const TempDirectory directory;
   const std::string path = (directory / "bad.yaml").string();

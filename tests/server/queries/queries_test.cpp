@@ -28,7 +28,8 @@ class Queries : public ::testing::Test {
     request_.robot = "r1";
   }
   void AddPose(Stamp stamp, double x) {
-    history_.Append({stamp, {x, 0, 0}, 0.8F, true, PoseReason::kTracking});
+    const Eigen::Matrix3f covariance = 0.01F * static_cast<float>(x) * Eigen::Matrix3f::Identity();
+    history_.Append({stamp, {x, 0, 0}, 0.8F, true, PoseReason::kTracking, covariance, {0.1 * x, 0, 0}});
     session_.path = history_.view();
     session_.status.pose.robot = "r1";
     session_.status.pose.stamp = stamp;
@@ -95,6 +96,8 @@ TEST_F(Queries, PoseAtAStampIsInterpolatedNotYetOrNever) {
   EXPECT_DOUBLE_EQ(between.T_map_robot.x, 1.5);
   EXPECT_EQ(between.stamp, 150);
   EXPECT_EQ(between.scan_sequence, 0U);
+  EXPECT_NEAR(between.covariance(0, 0), 0.015, 1e-6);  // Between those of its neighbours, not none.
+  EXPECT_NEAR(between.T_map_odom.x, 0.15, 1e-9);
   request_.stamp = 200;
   EXPECT_EQ(Ask(RequestKind::kPose).poses.at(0).scan_sequence, 200U);
   request_.stamp = 99;

@@ -6,7 +6,7 @@ namespace cairn::server {
 namespace {
 
 PathPose PoseAt(Stamp stamp) {
-  return {stamp, {0.1 * static_cast<double>(stamp), 0, 0}, 0.5F, true, PoseReason::kTracking};
+  return {stamp, {0.1 * static_cast<double>(stamp), 0, 0}, 0.5F, true, PoseReason::kTracking, {}, {}};
 }
 
 TEST(PoseHistory, InterpolatesBetweenPosesAcrossBlocks) {
@@ -55,13 +55,15 @@ TEST(PoseHistory, StaysBelowItsBoundAndKeepsBothEnds) {
 
 TEST(PoseHistory, AnInterpolatedPoseIsAsGoodAsTheWorseOfTheTwo) {
   PoseHistory history(100);
-  history.Append({10, {}, 0.9F, true, PoseReason::kTracking});
-  history.Append({20, {}, 0.2F, false, PoseReason::kLost});
+  history.Append({10, {}, 0.9F, true, PoseReason::kTracking, Eigen::Matrix3f::Identity(), {1, 0, 0}});
+  history.Append({20, {}, 0.2F, false, PoseReason::kLost, 3.0F * Eigen::Matrix3f::Identity(), {2, 0, 0}});
   const auto pose = history.view().At(15);
   ASSERT_TRUE(pose);
   EXPECT_EQ(pose->score, 0.2F);
   EXPECT_FALSE(pose->localized);
   EXPECT_EQ(pose->reason, PoseReason::kLost);
+  EXPECT_FLOAT_EQ(pose->covariance(1, 1), 2.0F);
+  EXPECT_DOUBLE_EQ(pose->T_map_odom.x, 1.5);
 }
 
 }  // namespace

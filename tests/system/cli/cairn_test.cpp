@@ -12,8 +12,8 @@
 #include "common/map/occupancy_image.h"
 #include "common/sensor/stamp_text.h"
 #include "common/sensor/trajectory.h"
-#include "tests/loopback.h"
 #include "tests/child_process.h"
+#include "tests/loopback.h"
 #include "tests/temp_directory.h"
 
 namespace cairn::client {
@@ -241,6 +241,40 @@ TEST_F(CairnProgram, AServerThatDiesWhileStreamingIsAClearError) {
   server_->Wait();
   replay.join();
   EXPECT_EQ(replayed->code, ExitCode::kFailed) << replayed->out;
+  EXPECT_THAT(replayed->err, HasSubstr("UNAVAILABLE"));
+}
+
+// It went on streaming to nobody, at the log's own pace.
+TEST_F(CairnProgram, AServerThatIsStoppedEndsAReplayAtOnceWithAReason) {
+  ASSERT_NO_FATAL_FAILURE(StartServer());
+  WriteLog("200");
+  std::optional<Outcome> replayed;
+  std::thread replay([&] {
+    replayed = Cairn({"replay", File("robot1.log"), "--site", "hall", "--robot", "r1", "--rate", "2"}, "3s");
+  });
+  ASSERT_TRUE(test::Eventually([] { return Cairn({"pose", "r1"}, "1s").code == ExitCode::kOk; }));
+  const auto stopped = std::chrono::steady_clock::now();
+  server_->Signal(SIGTERM);
+  server_->Wait();
+  replay.join();
+  EXPECT_EQ(replayed->code, ExitCode::kFailed) << replayed->out;
+  EXPECT_THAT(replayed->err, HasSubstr("the server is stopping"));
+  // The log has 100 s to go.
+  EXPECT_LT(std::chrono::steady_clock::now() - stopped, std::chrono::seconds(30));
+}
+
+TEST_F(CairnProgram, ASecondServerOfTheDomainIsRefused) {
+  ASSERT_NO_FATAL_FAILURE(StartServer());
+  const auto second = ChildProcess({CAIRND_PATH, "--domain", std::to_string(test::TestDomain())}).Wait();
+  EXPECT_EQ(second.exit_code, 1);
+  EXPECT_THAT(second.output, HasSubstr("another server serves DDS domain"));
+  EXPECT_EQ(Cairn({"ping"}, "5s").code, ExitCode::kOk);
+}
+
+TEST_F(CairnProgram, NumbersThatAreNoneAreUsageErrors) {
+  EXPECT_EQ(Cairn({"sim", "--no-stream", "--seconds", "nan"}, "1s").code, ExitCode::kUsage);
+  EXPECT_EQ(Cairn({"replay", "x.log", "--site", "hall", "--robot", "r1", "--rate", "nan"}, "1s").code,
+            ExitCode::kUsage);
 }
 
 }  // namespace
