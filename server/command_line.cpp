@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/options/config.h"
+#include "common/service/names.h"
 #include "common/version.h"
 
 namespace cairn::server {
@@ -60,6 +61,11 @@ std::optional<CommandLine> ParseCommandLine(int argc, char** argv, int& exit_cod
   if (domain) assignments.push_back("wire.domain=" + std::to_string(*domain));
   if (!log_level.empty()) assignments.push_back("server.log_level=" + log_level);
   if (Complain(ApplySet(assignments, visit))) {
+    exit_code = kUsage;
+    return std::nullopt;
+  }
+  for (const std::string& site : line.options.server.server.site_names()) {
+    if (!Complain(ValidateName("server.sites", site))) continue;
     exit_code = kUsage;
     return std::nullopt;
   }

@@ -16,8 +16,9 @@ void VisitProcess(OptionVisitor& visitor, ProcessOptions& options) {
                   "Between the rooms and the DDS doors, outwards, per lane (live, map, replies).");
   visitor.Integer("query_queue", options.query_queue, "requests", 1, 65536,
                   "Requests waiting; more are answered RESOURCE_EXHAUSTED at once.");
-  visitor.Real("stop_timeout_s", options.stop_timeout_s, "s", 0.0, 60.0,
-               "For finishing accepted scans after SIGTERM; what is left then is dropped and counted.");
+  visitor.Real("stop_timeout_s", options.stop_timeout_s, "s", 0.0, 8.0,
+               "For finishing accepted scans after SIGTERM; what is left then is dropped and counted (systemd kills "
+               "after 10 s).");
   visitor.Real("stall_limit_s", options.stall_limit_s, "s", 0.5, 600.0,
                "A strand silent for longer stops the pings to the service manager's watchdog.");
 }

@@ -1,5 +1,6 @@
 #include "client/cli/commands.h"
 #include "client/cli/json_output.h"
+#include "client/cli/option_checks.h"
 #include "client/cli/text_output.h"
 
 namespace cairn::client {
@@ -34,13 +35,13 @@ void AddJobQueries(CLI::App& job, Program& program) {
   auto show = std::make_shared<Request>();
   show->kind = RequestKind::kJobGet;
   auto* show_command = job.add_subcommand("show", "One job");
-  show_command->add_option("id", show->job, "The job's number")->required()->check(CLI::PositiveNumber);
+  show_command->add_option("id", show->job, "The job's number")->required()->check(InRange(1, 1e15));
   Run(*show_command, program, show);
 
   auto cancel = std::make_shared<Request>();
   cancel->kind = RequestKind::kJobCancel;
   auto* cancel_command = job.add_subcommand("cancel", "End a job that has not ended; nothing of it is kept");
-  cancel_command->add_option("id", cancel->job, "The job's number")->required()->check(CLI::PositiveNumber);
+  cancel_command->add_option("id", cancel->job, "The job's number")->required()->check(InRange(1, 1e15));
   Run(*cancel_command, program, cancel);
 }
 

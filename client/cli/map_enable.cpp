@@ -5,6 +5,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/fetch_map.h"
 #include "client/cli/json_output.h"
+#include "client/cli/option_checks.h"
 #include "client/cli/text_output.h"
 
 namespace cairn::client {
@@ -46,7 +47,7 @@ void AddMapEnable(CLI::App& map, Program& program) {
   auto arguments = std::make_shared<EnableArguments>();
   auto* enable = map.add_subcommand("enable", "Switch the site to one of its map versions (see map info)");
   enable->add_option("--site", arguments->site, "The site's name")->required();
-  enable->add_option("--version", arguments->version, "The version to enable")->required()->check(CLI::PositiveNumber);
+  enable->add_option("--version", arguments->version, "The version to enable")->required()->check(InRange(1, 1e15));
   enable->callback([&program, arguments] {
     program.action = [&program, arguments] { return Enable(program, arguments->site, arguments->version); };
   });

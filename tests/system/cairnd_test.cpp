@@ -77,6 +77,7 @@ TEST(CairndCommandLine, WrongUsageAndABadFileEndWithTwoNamingTheLine) {
   EXPECT_EQ(RunCairnd({"--set", "slam.no_such_key=1"}).exit_code, 2);
   EXPECT_EQ(RunCairnd({"--domain", "9999"}).exit_code, 2);
   EXPECT_EQ(RunCairnd({"--domain", "-1"}).exit_code, 2);
+  EXPECT_EQ(RunCairnd({"--set", "server.sites=a,b/c", "--check-config"}).exit_code, 2);
   EXPECT_EQ(RunCairnd({"--log-level", "loud"}).exit_code, 2);
   const TempDirectory directory;
   const std::string path = (directory / "bad.yaml").string();
