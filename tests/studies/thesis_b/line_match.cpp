@@ -30,12 +30,6 @@ constexpr double kReachM = 15.0;       // Of the map round a place that is known
 constexpr std::size_t kLongest = 150;  // Lines of a log's map that are searched from nothing.
 constexpr int kRefusedInARow = 5;      // Searches none of whose answers is near the belief, until it is given up.
 
-slam::LineMatchOptions Bounded() {
-  slam::LineMatchOptions options;
-  options.max_verifications = 300'000;  // A second or so.
-  return options;
-}
-
 bool IsRight(const Pose2& answer, const Pose2& truth) {
   return (answer.translation() - truth.translation()).norm() < kRightM &&
          Degrees(std::abs(AngleDiff(answer.theta, truth.theta))) < kRightDeg;
@@ -53,7 +47,7 @@ struct Placings {
   void Add(const std::vector<MapLine>& map, const Scan& scan, const Pose2& truth) {
     const auto lines = LinesOf(scan);
     const Stopwatch watch;
-    const slam::LineMatchAnswer answer = slam::MatchLinesWithMap(map, lines, Bounded());
+    const slam::LineMatchAnswer answer = slam::MatchLinesWithMap(map, lines, {});
     cpu_ms.push_back(watch.CpuMs());
     hypotheses.push_back(static_cast<double>(answer.hypotheses.size()));
     ++queries;
@@ -130,7 +124,7 @@ Followed Follow(const std::vector<GridStep>& steps, const Trajectory& truth, con
       const Stopwatch watch;
       const slam::LineMatchAnswer answer =
           slam::MatchLinesWithMap(known ? LinesNear(map, belief.T_map_robot.translation(), kReachM) : map_from_nothing,
-                                  LinesOf(*steps[i].scan), Bounded());
+                                  LinesOf(*steps[i].scan), {});
       run.cpu_ms += watch.CpuMs();
       ++run.searches;
       if (const auto chosen = Choose(belief, known, answer)) {
@@ -227,7 +221,6 @@ std::vector<Pose2> PlacesAlong(const sim::World& world, int count) {
 
 bool InSimulation(StudyContext& context, Table& placed, Table& followed) {
   Report& report = context.report;
-  bool plausible = true;
   int right = 0, wrong = 0;
   for (const std::string& name : sim::ShippedWorldNames()) {
     report.Progress("LineMatch in " + name);
@@ -237,7 +230,7 @@ bool InSimulation(StudyContext& context, Table& placed, Table& followed) {
     const Scene scene(name);
     sim::Random random(context.seed);
     Placings placings;
-    for (const Pose2& place : PlacesAlong(*world, context.Pick(120, 16)))
+    for (const Pose2& place : PlacesAlong(*world, context.Pick(80, 16)))
       placings.Add(map, scene.Look(place, Sick(0.01), random), place);
     placings.AddTo(placed, name, map.size());
     right += placings.right;
@@ -252,11 +245,8 @@ bool InSimulation(StudyContext& context, Table& placed, Table& followed) {
     AddFollowed(followed, name, run);
     DrawFollowed(report, name, map, log.truth, run);
   }
-  if (right < wrong) {
-    report.Warn("LineMatch places more scans wrong than right in the simulated worlds");
-    plausible = false;
-  }
-  return plausible;
+  if (right < wrong) report.Warn("LineMatch places more scans wrong than right in the simulated worlds");
+  return right >= wrong;
 }
 
 void OnLog(StudyContext& context, const StudyLog& log, Table& placed, Table& followed) {
@@ -307,7 +297,7 @@ bool StudyLineMatch(StudyContext& context) {
       "worlds: their walls are the map, scans along the robots' routes (180 deg, 1 cm noise), posts and people are not "
       "in it. Logs: the map is every keyframe's lines along the smoothed path of the whole log, collinear ones "
       "merged; the scans are every 50th of those that are no keyframes; the smoothed path is the truth. The thesis "
-      "prints no figures. A search ends after 300,000 verifications.");
+      "prints no figures.");
   Table placed = PlacingsTable(), followed = FollowedTable();
   const bool plausible = InSimulation(context, placed, followed);
   for (const StudyLog& log : ChooseLogs(context, {"mit-csail", "intel"}, context.Pick(0, 400)))

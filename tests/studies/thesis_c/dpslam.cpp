@@ -17,6 +17,7 @@ constexpr double kPrintedM = 0.3;  // "Being kept mostly under 300mm" (Figure 5.
 // The thesis' proposal: steps from scans alone move the particles.
 struct WithoutOdometry {
   std::string name, matcher, filter;
+  std::vector<std::string> more{};
 };
 
 // Against the truth: the whole path, and the motion from scan to scan.
@@ -57,9 +58,10 @@ std::string Spread(const std::vector<double>& values, int decimals) {
 // Empty where the options do not exist in this build.
 std::optional<LogRun> RunAndDraw(StudyContext& context, const StudyLog& log, const WithoutOdometry& system) {
   context.report.Progress("5.3: " + system.name + " on " + log.name);
-  const auto options = MapperWith({"slam.matcher=" + system.matcher, "slam.filter=" + system.filter,
-                                   "slam.front_end.use_odometry=false", "slam.front_end.refine.enabled=false"},
-                                  context.seed);
+  std::vector<std::string> assignments{"slam.matcher=" + system.matcher, "slam.filter=" + system.filter,
+                                       "slam.front_end.use_odometry=false", "slam.front_end.refine.enabled=false"};
+  assignments.insert(assignments.end(), system.more.begin(), system.more.end());
+  const auto options = MapperWith(assignments, context.seed);
   if (!options) {
     context.report.Warn(options.error().message);
     return std::nullopt;
@@ -79,7 +81,7 @@ StudyLog SimulatedLoops(const StudyContext& context) {
   options.laser = Sick(0.015);
   options.drive.speed_m_s = 0.9;
   options.drive.turn_rad_s = 1.2;  // As in 5.1: inside Table 4.4.
-  return SimulateLog("building", context.Pick(120.0, 16.0), options);
+  return SimulateLog("building", context.Pick(240.0, 16.0), options);
 }
 
 }  // namespace
@@ -91,9 +93,16 @@ bool StudyDpSlamWithoutOdometry(StudyContext& context) {
       "Odometry withheld, the matcher's steps as they are (not refined), the filter DP-SLAM with its defaults (the "
       "thesis: 1000 and 1500 particles). Truth: a simulated drive through the building. Printed: \"the error does not "
       "increase with time, being kept mostly under 300mm\", unlike Figure 5.7, the same steps chained. *End*: the last "
-      "fifth of the way.");
-  std::vector<WithoutOdometry> systems{{"ndt chained", "ndt", "none"}, {"ndt, dpslam", "ndt", "dpslam"}};
-  if (!context.quick) systems.push_back({"ndt_de, dpslam", "ndt_de", "dpslam"});
+      "fifth of the way. *ndt*: climbed by Newton's method; *evolution*: the thesis' own matcher, not climbed.");
+  std::vector<WithoutOdometry> systems{
+      {"ndt chained", "ndt", "none"},
+      {"ndt with dpslam", "ndt", "dpslam"},
+      {"ndt with dpslam, one level", "ndt", "dpslam", {"slam.dpslam.hierarchical=false"}}};
+  if (!context.quick) {
+    const std::vector<std::string> no_climb{"slam.ndt_de.climb=false"};
+    systems.push_back({"evolution chained", "ndt_de", "none", no_climb});
+    systems.push_back({"evolution with dpslam", "ndt_de", "dpslam", no_climb});
+  }
   Table table({"log", "system", "scans", "way (m)", "median (m)", "p95 (m)", "max (m)", "end median (m)",
                "under 300 mm", "step ahead (m)", "step aside (m)", "step turn (deg)", "cpu (ms) a scan"});
   table.Add({"thesis, simulated", "evolution, DP-SLAM", "-", "-", "-", "-", "-", "-", "mostly", "Figure 5.26",
@@ -119,8 +128,8 @@ bool StudyDpSlamWithoutOdometry(StudyContext& context) {
                Spread(errors.aside_m, 4), Spread(errors.turn_deg, 3), Number(run->time_ms().mean, 1)});
     errors.accumulated.label = system.name;
     plot.series.push_back(errors.accumulated);
-    if (system.filter == "dpslam" && system.matcher == "ndt" && under <= 0.5) {
-      report.Warn("DP-SLAM with ndt's steps is not mostly under 300 mm");
+    if (system.filter == "dpslam" && under <= 0.5) {
+      report.Warn(system.name + " is not mostly under 300 mm");
       plausible = false;
     }
   }
@@ -136,6 +145,10 @@ bool StudyDpSlamWithoutOdometry(StudyContext& context) {
   }
   report.Add(table, "dpslam_without_odometry");
   report.Add(plot, "figure_5_25");
+  report.Text(
+      "Chained steps that err less than the thesis' (its evolution: 2 cm each) drift little, and DP-SLAM has little to "
+      "gain over them: its particles spread and its map cells are centimetres. What it buys is that the error "
+      "stays.");
   return plausible;
 }
 
