@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <cmath>
+
 #include "client/sim/cloud_error.h"
 #include "client/sim/fleet.h"
 #include "client/sim/laser_models.h"
@@ -46,6 +49,38 @@ PointCloud CloudOf(const Drive& drive, const Trajectory& path, double height_m) 
   return builder.cloud();
 }
 
+// Mean size of the range errors that the laser's maker states, over the hits of a drive. With true poses a point is
+// never farther from the walls than its range is wrong.
+double StatedError(const Drive& drive, const sim::RangeError& error) {
+  const double mean_share = error.kind == sim::RangeErrorKind::kSigma ? std::sqrt(2.0 / kPi) : 0.5;
+  double sum = 0.0, hits = 0.0;
+  for (const LogRecord& record : drive.records) {
+    const auto* scan = std::get_if<Scan>(&record);
+    if (scan == nullptr) continue;
+    for (const float range : scan->ranges_m) {
+      if (!std::isfinite(range) || range <= 0.0F) continue;
+      sum += mean_share * sim::ErrorScale(error, range);
+      ++hits;
+    }
+  }
+  return hits > 0.0 ? sum / hits : 0.0;
+}
+
+// Mean distance of a path's poses from the true ones.
+double PoseError(const Trajectory& path, const Trajectory& truth) {
+  double sum = 0.0, poses = 0.0;
+  for (const StampedPose& pose : path) {
+    const auto there = std::ranges::lower_bound(truth, pose.stamp, {}, &StampedPose::stamp);
+    if (there == truth.end() || there->stamp != pose.stamp) continue;
+    sum += (pose.T_map_robot.translation() - there->T_map_robot.translation()).norm();
+    ++poses;
+  }
+  return poses > 0.0 ? sum / poses : 0.0;
+}
+
+constexpr double kPosesM = 0.025;  // What the estimator's poses may add on average ...
+constexpr double kFarM = 8.0;      // ... with a scanner of at least this range.
+
 }  // namespace
 
 bool StudyCloud(StudyContext& context) {
@@ -55,9 +90,14 @@ bool StudyCloud(StudyContext& context) {
       "A robot drives through hall3d, halts and nods its scanner from 60 deg up to 45 deg down. Distance of the "
       "cloud's points "
       "to the nearest true rectangle, with true poses (the laser's error alone) and with the estimator's online poses. "
-      "Bound: 3 cm on average with the estimator's.");
+      "Bounds of the mean: with true poses, for every scanner, the mean size of its stated range error over the ranges "
+      "it measured; with the estimator's 2.5 cm more, for scanners of 8 m range or more. The URG-04LX (4 m) and its "
+      "UG01 (5.6 m) lose sight of the hall's walls, and their poses drift: no error stated for the laser bounds that, "
+      "so "
+      "their clouds with estimated poses are printed beside the poses' own error, not checked.");
   const sim::RectangleTree truth(sim::OpenWorld3("hall3d")->rectangles);
-  Table table({"scanner", "poses", "points", "mean (m)", "rms (m)", "median (m)", "p95 (m)", "max (m)"});
+  Table table({"scanner", "poses", "points", "mean (m)", "rms (m)", "median (m)", "p95 (m)", "max (m)",
+               "bound of the mean (m)", "poses off by, mean (m)"});
   bool plausible = true;
   for (const std::string model : {"thesis", "lms200", "lms291-s05", "urg-04lx", "urg-04lx-ug01"}) {
     sim::FleetOptions options;
@@ -68,13 +108,21 @@ bool StudyCloud(StudyContext& context) {
     options.tilt = {
         .scans = 36, .first_rad = Radians(-60.0), .last_rad = Radians(45.0), .level_scans = 60, .halt = true};
     const Drive drive = NodThrough(options, context.Pick(300.0, 40.0));
+    const double stated = StatedError(drive, sim::ErrorOf(options.laser));
     for (const auto& [name, path] : {std::pair{"true", &drive.truth}, std::pair{"estimated", &drive.estimate}}) {
       const PointCloud cloud = CloudOf(drive, *path, options.laser.height_m);
       const sim::CloudError e = sim::MeasureCloud(cloud, truth);
+      const bool estimated = path == &drive.estimate;
+      double bound = stated;
+      if (estimated) bound = options.laser.range_max_m >= kFarM ? stated + kPosesM : NAN;
       table.Add({model, name, Count(static_cast<long long>(e.points)), Number(e.mean_m, 4), Number(e.rms_m, 4),
-                 Number(e.median_m, 4), Number(e.p95_m, 4), Number(e.max_m, 3)});
-      if (model == "lms200" && path == &drive.estimate) {
-        plausible = plausible && e.mean_m < 0.03;
+                 Number(e.median_m, 4), Number(e.p95_m, 4), Number(e.max_m, 3), Number(bound, 4),
+                 Number(PoseError(*path, drive.truth), 3)});
+      if (!std::isnan(bound) && !(e.mean_m <= bound)) {
+        report.Warn(model + ", " + name + " poses: the cloud lies farther from the walls than its bound");
+        plausible = false;
+      }
+      if (model == "lms200" && estimated) {
         if (!report.directory().empty())
           if (const auto written = WriteCloud(cloud, CloudFormat::kPly, report.directory() / "hall3d.ply"); !written)
             report.Warn(written.error().message);
@@ -82,7 +130,6 @@ bool StudyCloud(StudyContext& context) {
     }
   }
   report.Add(table, "cloud");
-  if (!plausible) report.Warn("the cloud lies farther from the walls than stated");
   return plausible;
 }
 

@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -24,11 +26,12 @@ struct CorridorPair {
   Pose2 T_map_prev;
 };
 
-CorridorPair DrawPair(const Scene& scene, sim::Random& random) {
+// `share` of 0.4 m ahead, 0.2 m aside and 14 deg.
+CorridorPair DrawPair(const Scene& scene, double share, sim::Random& random) {
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   for (;;) {
     const Pose2 from = scene.DrawPose(random);
-    const Pose2 motion{0.4 * unit(random), 0.2 * unit(random), Radians(14) * unit(random)};
+    const Pose2 motion{share * 0.4 * unit(random), share * 0.2 * unit(random), share * Radians(14) * unit(random)};
     if (scene.Clearance(from * motion) < 0.3) continue;
     const auto see = [&](const Pose2& pose) {
       sim::LaserOptions laser = Sick(0.01);
@@ -41,18 +44,22 @@ CorridorPair DrawPair(const Scene& scene, sim::Random& random) {
   }
 }
 
-// Least squares once, over pairs formed once at the identity by normals alone, as nearest midpoints: the thesis' first
-// test.
-std::optional<Pose2> LeastSquaresAlone(const CorridorPair& pair, const slam::LineLsqOptions& options) {
+// Least squares once, over pairs formed once at the identity: the thesis' first test. It does not say by what; by
+// normals alone ("the closest one comparing the normals", 4.3.2), or the nearest midpoint of those with like normals.
+enum class Couples : std::uint8_t { kClosestNormal, kNearestMidpoint };
+std::optional<Pose2> LeastSquaresAlone(const CorridorPair& pair, Couples couples, const slam::LineLsqOptions& options) {
   std::vector<slam::WeighedPair> weighed;
   for (const LineFeature& line : pair.curr.lines) {
     const slam::PointNormal curr = slam::MidpointAndNormal(line);
     const LineFeature* nearest = nullptr;
+    double least = std::numeric_limits<double>::infinity();
     for (const LineFeature& wall : pair.prev.lines) {
-      if (slam::MidpointAndNormal(wall).n.dot(curr.n) < options.association.min_normal_dot) continue;
-      if (nearest == nullptr ||
-          (wall.midpoint() - line.midpoint()).norm() < (nearest->midpoint() - line.midpoint()).norm())
-        nearest = &wall;
+      const double dot = slam::MidpointAndNormal(wall).n.dot(curr.n);
+      if (dot < options.association.min_normal_dot) continue;
+      const double apart = couples == Couples::kClosestNormal ? 1.0 - dot : (wall.midpoint() - line.midpoint()).norm();
+      if (apart >= least) continue;
+      least = apart;
+      nearest = &wall;
     }
     if (nearest != nullptr)
       weighed.push_back({slam::MidpointAndNormal(*nearest), curr, std::min(nearest->length, line.length)});
@@ -61,7 +68,7 @@ std::optional<Pose2> LeastSquaresAlone(const CorridorPair& pair, const slam::Lin
   return slam::AlignLinePairs(weighed, {}, options.least_squares).T_prev_curr;
 }
 
-// The gates and weights thesis B prints (5.4.3).
+// The gates and weights thesis B prints (5.4.3). MP_THRESHOLD is printed as 0.1^2: of the square of the distance.
 slam::LineLsqOptions AsPrinted(int rounds) {
   slam::LineLsqOptions options;
   options.association.max_across_m = options.association.max_along_m = options.association.first_across_m = 0.1;
@@ -76,18 +83,29 @@ slam::LineLsqOptions AsPrinted(int rounds) {
 struct Errors {
   std::vector<double> cm, deg;
   int right = 0, cases = 0;
-  void Add(const std::optional<Pose2>& answer, const Pose2& truth) {
+  bool Add(const std::optional<Pose2>& answer, const Pose2& truth) {
     ++cases;
-    if (!answer) return;
+    if (!answer) return false;
     cm.push_back(100 * (answer->translation() - truth.translation()).norm());
     deg.push_back(Degrees(std::abs(AngleDiff(answer->theta, truth.theta))));
-    right += cm.back() < 10 && deg.back() < 2;
+    const bool is_right = cm.back() < 10 && deg.back() < 2;
+    right += is_right;
+    return is_right;
+  }
+};
+
+// Pairs that one way gets right and another does not.
+struct Against {
+  int gained = 0, lost = 0;
+  void Add(bool alone_right, bool association_right) {
+    gained += !alone_right && association_right;
+    lost += alone_right && !association_right;
   }
 };
 
 void DrawFigures(StudyContext& context, const CorridorPair& pair) {
   slam::LineLsqOptions options;
-  const auto alone = LeastSquaresAlone(pair, options);
+  const auto alone = LeastSquaresAlone(pair, Couples::kNearestMidpoint, options);
   const slam::LineLsqMatch match = slam::MatchLinesByLeastSquares(pair.prev, pair.curr, {}, options);
   const auto figure = [&](const std::string& title, const Pose2& T, const std::string& label) {
     Plot plot{.title = title, .x = {"x", "m"}, .y = {"y", "m"}, .equal_scale = true, .width = 1100, .height = 620};
@@ -125,85 +143,124 @@ bool StudyAssociation(StudyContext& context) {
       "Pairs of poses in the simulated corridor and building, up to 0.4 m, 0.2 m aside and 14 deg apart, no guess "
       "(identity). Printed: least squares by itself \"is not able to furnish a good transformation\"; with association "
       "repeated 50 times it is, and E (5.5) stays up until the 50th round. \"As printed\": normals 0.8, midpoints 0.1 "
-      "m, slopes 5 deg, all lines weigh the same. Right: within 10 cm and 2 deg.");
+      "m, slopes 5 deg, all lines weigh the same. Right: within 10 cm and 2 deg. *Gained*, *lost*: pairs right where "
+      "least squares alone (nearest midpoints) is wrong, and the reverse. *Close*: a fifth of these motions, inside "
+      "the printed gates.");
   const int cases = context.Pick(400, 60);
-  Table table({"world", "way", "right", "median (cm)", "p95 (cm)", "median (deg)", "rounds mean", "rounds p95"});
+  Table table({"world", "way", "right", "gained", "lost", "median (cm)", "p95 (cm)", "median (deg)", "rounds mean",
+               "rounds p95"});
   Plot curve{.title = "Figure 5.18: E over the rounds of association (mean of the pairs that end right)",
              .x = {"round", ""},
              .y = {"E", "", true}};
   bool plausible = true;
-  for (const char* world : {"corridor", "building"}) {
-    const Scene scene(world);
+  struct Case {
+    std::string name, world;
+    double share;
+  };
+  for (const Case& place :
+       {Case{"corridor", "corridor", 1.0}, {"building", "building", 1.0}, {"building, close", "building", 0.2}}) {
+    const std::string& world = place.name;
+    const Scene scene(place.world);
+    enum class Guess : std::uint8_t { kIdentity, kLeastSquares, kOdometry };
     struct Way {
       std::string name;
       slam::LineLsqOptions options;
-      bool guess = false;  // From odometry off by 5 cm and 2 deg, instead of the identity.
+      Guess guess = Guess::kIdentity;
+      Errors errors{};
+      Against against{};
+      std::vector<double> rounds{}, sums = std::vector<double>(50, 0.0);
+      int counted = 0;
     };
-    const std::vector<Way> ways{{"association as printed, 1 round", AsPrinted(1)},
-                                {"association as printed, 50 rounds", AsPrinted(50)},
-                                {"association as printed, 50 rounds, odometry as the guess", AsPrinted(50), true},
-                                {"association as shipped", slam::LineLsqOptions{}}};
+    slam::LineLsqOptions one_step = AsPrinted(50);  // Figure 4.2: one step of least squares a round.
+    one_step.least_squares.max_iterations = 1;
+    std::vector<Way> ways{
+        {"association as printed, 1 round", AsPrinted(1)},
+        {"association as printed, 50 rounds", AsPrinted(50)},
+        {"association as printed, 50 rounds of one step", one_step},
+        {"least squares alone, then association as printed, 50 rounds", AsPrinted(50), Guess::kLeastSquares},
+        {"association as printed, 50 rounds, odometry as the guess", AsPrinted(50), Guess::kOdometry},
+        {"association as shipped", slam::LineLsqOptions{}}};
     sim::Random random(context.seed);
-    Errors alone;
-    std::vector<Errors> errors(ways.size());
-    std::vector<std::vector<double>> rounds(ways.size()), sums(ways.size(), std::vector<double>(50, 0.0));
-    std::vector<int> counted(ways.size(), 0);
+    Errors alone, by_normals;
+    Against by_normals_against;
     bool drawn = false;
     for (int i = 0; i < cases; ++i) {
-      const CorridorPair pair = DrawPair(scene, random);
-      const int right_before = alone.right;
-      alone.Add(LeastSquaresAlone(pair, {}), pair.T_prev_curr);
+      const CorridorPair pair = DrawPair(scene, place.share, random);
+      const auto start = LeastSquaresAlone(pair, Couples::kNearestMidpoint, {});
+      const bool alone_right = alone.Add(start, pair.T_prev_curr);
+      by_normals_against.Add(alone_right,
+                             by_normals.Add(LeastSquaresAlone(pair, Couples::kClosestNormal, {}), pair.T_prev_curr));
       slam::MatchPrior odometry{pair.T_prev_curr, 0.01 * Eigen::Matrix3d::Identity()};
       odometry.T_prev_curr.x += sim::Normal(random, 0.05);
       odometry.T_prev_curr.y += sim::Normal(random, 0.05);
       odometry.T_prev_curr.theta = WrapAngle(odometry.T_prev_curr.theta + sim::Normal(random, Radians(2)));
       bool shipped_right = false;
-      for (std::size_t w = 0; w < ways.size(); ++w) {
-        const slam::LineLsqMatch match = slam::MatchLinesByLeastSquares(
-            pair.prev, pair.curr, ways[w].guess ? odometry : slam::MatchPrior{}, ways[w].options);
-        const int before = errors[w].right;
-        errors[w].Add(match.result.converged ? std::optional(match.result.T_prev_curr) : std::nullopt,
-                      pair.T_prev_curr);
-        if (match.result.converged) rounds[w].push_back(match.result.iterations);
-        const bool right = errors[w].right > before;
+      for (Way& way : ways) {
+        slam::MatchPrior prior;
+        if (way.guess == Guess::kOdometry) prior = odometry;
+        if (way.guess == Guess::kLeastSquares && start) prior.T_prev_curr = *start;
+        const slam::LineLsqMatch match = slam::MatchLinesByLeastSquares(pair.prev, pair.curr, prior, way.options);
+        const bool right = way.errors.Add(
+            match.result.converged ? std::optional(match.result.T_prev_curr) : std::nullopt, pair.T_prev_curr);
+        way.against.Add(alone_right, right);
+        if (match.result.converged) way.rounds.push_back(match.result.iterations);
         shipped_right = right;  // The last way's.
         if (!right || match.errors.empty()) continue;
-        ++counted[w];
-        for (std::size_t r = 0; r < 50; ++r) sums[w][r] += match.errors[std::min(r, match.errors.size() - 1)];
+        ++way.counted;
+        for (std::size_t r = 0; r < 50; ++r) way.sums[r] += match.errors[std::min(r, match.errors.size() - 1)];
       }
-      if (!drawn && std::string(world) == "corridor" && shipped_right && alone.right == right_before &&
+      if (!drawn && world == "corridor" && shipped_right && !alone_right &&
           pair.T_prev_curr.translation().norm() > 0.25 && pair.curr.lines.size() > 6) {
         DrawFigures(context, pair);
         drawn = true;
       }
     }
-    const auto add = [&](const std::string& name, const Errors& e, const std::vector<double>& r) {
+    const auto add = [&](const std::string& name, const Errors& e, const Against& against,
+                         const std::vector<double>& r) {
       const Distribution d = DistributionOf(r);
-      table.Add({world, name, Percent(1.0 * e.right / e.cases), Number(DistributionOf(e.cm).median, 2),
-                 Number(DistributionOf(e.cm).p95, 1), Number(DistributionOf(e.deg).median, 3), Number(d.mean, 1),
-                 Number(d.p95, 0)});
+      table.Add({world, name, Percent(1.0 * e.right / e.cases), Count(against.gained), Count(against.lost),
+                 Number(DistributionOf(e.cm).median, 2), Number(DistributionOf(e.cm).p95, 1),
+                 Number(DistributionOf(e.deg).median, 3), Number(d.mean, 1), Number(d.p95, 0)});
     };
-    add("least squares alone", alone, {});
-    for (std::size_t w = 0; w < ways.size(); ++w) {
-      add(ways[w].name, errors[w], rounds[w]);
-      if (w == 0 || counted[w] == 0) continue;
-      Series series{.label = std::string(world) + ", " + ways[w].name, .mark = Mark::kLine};
+    add("least squares alone, pairs by closest normals", by_normals, by_normals_against, {});
+    add("least squares alone, pairs by nearest midpoints", alone, {}, {});
+    for (const Way& way : ways) {
+      add(way.name, way.errors, way.against, way.rounds);
+      if (&way == &ways.front() || way.counted == 0) continue;
+      Series series{.label = world + ", " + way.name, .mark = Mark::kLine};
       for (std::size_t r = 0; r < 50; ++r)
-        series.x.push_back(static_cast<double>(r + 1)), series.y.push_back(sums[w][r] / counted[w]);
+        series.x.push_back(static_cast<double>(r + 1)), series.y.push_back(way.sums[r] / way.counted);
       curve.series.push_back(series);
     }
-    if (errors.back().right <= alone.right || errors.back().right < errors.back().cases / 2) {
-      report.Warn(std::string("association is no gain over least squares alone in the ") + world);
+    const Way& shipped = ways.back();
+    report.Text(world + ": least squares alone fails and association (as shipped) succeeds on " +
+                Count(shipped.against.gained) + " of " + Count(cases) + " pairs, the reverse on " +
+                Count(shipped.against.lost) + ".");
+    if (shipped.against.gained <= shipped.against.lost || shipped.errors.right < shipped.errors.cases / 2) {
+      report.Warn("association is no gain over least squares alone: " + world);
       plausible = false;
     }
-    if (DistributionOf(rounds.back()).p95 > 50) report.Warn("more than the thesis' 50 rounds are needed");
+    const Way& printed = ways[1];
+    if (place.share < 1.0 && printed.errors.right < printed.errors.cases / 2) {
+      report.Warn("association as printed fails on close pairs, against the thesis");
+      plausible = false;
+    }
+    if (DistributionOf(shipped.rounds).p95 > 50) report.Warn("more than the thesis' 50 rounds are needed");
   }
   report.Add(table, "association");
   report.Add(curve, "figure_5_18");
   report.Text(
       "Against the printed curve, ours needs a few rounds, not 50: least squares run to their end in every round. E "
       "does not fall to zero, because the visible parts of long walls differ from place to place; it may rise in the "
-      "second round, when more pairs join. The printed gates (0.1 m) find too few pairs without a guess.");
+      "second round, when more pairs join.");
+  report.Text(
+      "The printed gates are read rightly (MP_THRESHOLD = 0.1^2 bounds a squared distance; ours, across and along the "
+      "wall by itself, are if anything wider): they presuppose the thesis' \"two close robot poses\". From the "
+      "identity "
+      "no wall passes them after 5 deg or 0.1 m of motion, however many the rounds; on close pairs they do what is "
+      "printed, and least squares over pairs by normals alone, as 4.3.2 begins, fail as in Figure 5.15. With a guess "
+      "(least squares' own, or odometry) they serve the wide pairs too. The shipped gates start wide and shrink "
+      "instead. Pairs by nearest midpoints, which the thesis has not, are the harder opponent.");
   return plausible;
 }
 

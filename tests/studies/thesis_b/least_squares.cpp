@@ -24,17 +24,8 @@ constexpr Transform kTable[] = {{"5.7", -5, -0.3, -1.5 * kPi},   {"5.8", -5, -0.
                                 {"5.11", 0.5, -0.3, -1.5 * kPi}, {"5.12", 0.5, -0.3, kPi / 6},
                                 {"5.13", 0.5, 7, -1.5 * kPi},    {"5.14", 0.5, 7, kPi / 6}};
 
-// The same lines seen from elsewhere.
-LineFeature Seen(const LineFeature& line, const Pose2& T) {
-  LineFeature moved = line;
-  moved.first = T * line.first;
-  moved.last = T * line.last;
-  moved.slope = WrapAngle(line.slope + T.theta);
-  return moved;
-}
-
 // The first scan of the log that shows enough lines.
-std::vector<LineFeature> LinesOf(const StudyLog& log, std::string& from) {
+std::vector<LineFeature> MostLinesOf(const StudyLog& log, std::string& from) {
   std::vector<LineFeature> best;
   int index = 0;
   for (const LogRecord& record : log.records) {
@@ -61,7 +52,7 @@ bool StudyLeastSquares(StudyContext& context, const StudyLog& log) {
   Report& report = context.report;
   report.Heading("Least squares over known pairs (5.4.2, Table 5.1, Figures 5.7-5.14)");
   std::string from;
-  const std::vector<LineFeature> lines = LinesOf(log, from);
+  const std::vector<LineFeature> lines = MostLinesOf(log, from);
   if (lines.size() < 3) {
     report.Warn("no scan of " + log.name + " shows three lines");
     return false;
@@ -88,7 +79,7 @@ bool StudyLeastSquares(StudyContext& context, const StudyLog& log) {
       std::vector<slam::WeighedPair> pairs;
       std::vector<LineFeature> moved;
       for (const LineFeature& line : lines) {
-        moved.push_back(Seen(line, T_inverse));
+        moved.push_back(SeenFrom(line, T_inverse));
         pairs.push_back({slam::MidpointAndNormal(line), slam::MidpointAndNormal(moved.back()), line.length});
       }
       const slam::LineAlignment alignment = slam::AlignLinePairs(pairs, {}, way.options);

@@ -16,6 +16,14 @@ Series LineSeries(std::span<const slam::LineFeature> lines, const Pose2& T, std:
   return series;
 }
 
+slam::LineFeature SeenFrom(const slam::LineFeature& line, const Pose2& T) {
+  slam::LineFeature moved = line;
+  moved.first = T * line.first;
+  moved.last = T * line.last;
+  moved.slope = WrapAngle(line.slope + T.theta);
+  return moved;
+}
+
 namespace {
 
 bool RunThesisB(StudyContext& context) {
@@ -26,7 +34,8 @@ bool RunThesisB(StudyContext& context) {
   const std::vector<StudyLog> logs = ChooseLogs(context, {"mit-csail", "intel"}, context.Pick(4000, 400));
   bool plausible = StudyLeastSquares(context, logs.front());
   plausible = StudyAssociation(context) && plausible;
-  return StudyTracking(context, logs) && plausible;
+  plausible = StudyTracking(context, logs) && plausible;
+  return StudyLineMatch(context) && plausible;
 }
 
 const Registration kRegistered{

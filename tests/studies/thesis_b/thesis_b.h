@@ -21,6 +21,13 @@ namespace cairn::studies {
 // Scan after scan of the logs at hand, from odometry's guess, beside point-to-line ICP.
 [[nodiscard]] bool StudyTracking(StudyContext& context, const std::vector<StudyLog>& logs);
 
+// 2.2.2: the place in a known map of lines from nothing, and followed with odometry, in the simulated worlds and on the
+// logs at hand.
+[[nodiscard]] bool StudyLineMatch(StudyContext& context);
+
+// The same line in another frame: its ends and slope (normal_angle and distance keep what they were).
+[[nodiscard]] slam::LineFeature SeenFrom(const slam::LineFeature& line, const Pose2& T);
+
 // The lines as one series of a plot, the pen lifted between them; moved by T.
 [[nodiscard]] Series LineSeries(std::span<const slam::LineFeature> lines, const Pose2& T, std::string label,
                                 int colour);

@@ -17,6 +17,9 @@ namespace cairn::studies {
 // 5.1.3, Figures 5.10-5.18: fitness along real logs, its peaks, and maps without odometry.
 [[nodiscard]] bool StudyFitness(StudyContext& context);
 
+// 5.3, Figures 5.24-5.28: DP-SLAM fed with scan-matched steps instead of odometry, its error over the way.
+[[nodiscard]] bool StudyDpSlamWithoutOdometry(StudyContext& context);
+
 // From how far off Newton's algorithm (2.3.3) comes home, with and without its coarse climb, beside the evolution.
 [[nodiscard]] bool StudyNewtonBasin(StudyContext& context);
 
