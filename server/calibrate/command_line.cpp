@@ -4,6 +4,7 @@
 #include <functional>
 #include <optional>
 
+#include "common/file/atomic_file.h"
 #include "common/options/config.h"
 #include "common/version.h"
 #include "server/calibrate/json_text.h"
@@ -83,6 +84,12 @@ void AddOdometry(CLI::App& app, Shared& shared) {
   });
 }
 
+Result<void> WriteConfig(const MotionReport& report, bool with_odometry, const std::filesystem::path& path) {
+  const auto yaml = ReportConfig(report, with_odometry);
+  if (!yaml) return tl::unexpected(yaml.error());
+  return WriteFileAtomically(path, *yaml);
+}
+
 void AddMotion(CLI::App& app, Shared& shared) {
   auto* command =
       app.add_subcommand("motion", "Motion models of a robot from its log: Eliazar's, and the scan matcher's");
@@ -92,14 +99,21 @@ void AddMotion(CLI::App& app, Shared& shared) {
       "belong to steps of about that size. The scan matcher's errors are taken against --truth, or else against the\n"
       "estimator's own whole path.\n"
       "EXAMPLES\n  cairn-calibrate motion intel.clf --json\n  cairn-calibrate motion robot1.log --truth robot1.tum\n"
-      "  cairn-calibrate motion intel.clf --set slam.matcher=ndt_de --set fit.particles=200");
+      "  cairn-calibrate motion intel.clf --set slam.matcher=ndt_de --set fit.particles=200\n"
+      "  cairn-calibrate motion intel.clf -o learnt.yaml && cairn-offline intel.clf --config learnt.yaml "
+      "--set slam.filter=dpslam");
   auto options = std::make_shared<MotionRunOptions>();
   auto assignments = std::make_shared<std::vector<std::string>>();
   auto config = std::make_shared<std::filesystem::path>();
   auto seed = std::make_shared<std::optional<std::int64_t>>();
+  auto learnt = std::make_shared<std::filesystem::path>();
   command->add_option("LOG", options->log, "CARMEN or DP-SLAM log")->required();
   command->add_option("--truth", options->truth, "True poses (TUM)");
-  command->add_flag("!--no-matcher", options->matcher_model, "Leave out the scan matcher's model");
+  auto* no_matcher = command->add_flag("!--no-matcher", options->matcher_model, "Leave out the scan matcher's model");
+  command
+      ->add_option("-o,--options", *learnt,
+                   "Also write what was learnt as YAML, for --config of cairn-offline and cairnd")
+      ->excludes(no_matcher);
   command->add_option("--seed", *seed, "Of all randomness; same as --set fit.seed=N --set slam.seed=N")
       ->check(CLI::NonNegativeNumber);
   command->add_option("--threads", options->threads, "0: one per core; the output does not depend on it")
@@ -108,8 +122,8 @@ void AddMotion(CLI::App& app, Shared& shared) {
   command->add_option("--config", *config, "YAML file; its slam section is used (cairnd's file will do)");
   command->add_option("--set", *assignments, "key=value, e.g. slam.gate.distance_m=0.5, fit.particles=200; repeatable")
       ->allow_extra_args(false);
-  command->callback([&shared, options, assignments, config, seed] {
-    shared.action = [&shared, options, assignments, config, seed] {
+  command->callback([&shared, options, assignments, config, seed, learnt] {
+    shared.action = [&shared, options, assignments, config, seed, learnt] {
       const VisitOptions visit = [&](OptionVisitor& visitor) {
         visitor.Section("slam", "The estimator.", [&] { slam::Visit(visitor, options->slam); });
         visitor.Section("fit", "Expectation maximisation.", [&] { slam::Visit(visitor, options->fit); });
@@ -122,7 +136,11 @@ void AddMotion(CLI::App& app, Shared& shared) {
       if (!config->empty())
         if (const auto applied = ApplyYamlFile(*config, visit); !applied) return shared.Refuse(applied.error(), 1);
       if (const auto applied = ApplySet(*assignments, visit); !applied) return shared.Refuse(applied.error(), 2);
-      return Show(shared, RunMotion(*options));
+      const Result<MotionReport> report = RunMotion(*options);
+      if (report && !learnt->empty())
+        if (const auto written = WriteConfig(*report, options->slam.front_end.use_odometry, *learnt); !written)
+          return shared.Refuse(written.error(), 1);
+      return Show(shared, report);
     };
   });
 }

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "server/slam/front_end.h"
+#include "server/slam/motion/constant_speed.h"
 #include "server/slam/scan/odometry_pairing.h"
 #include "server/slam/scan/tilt.h"
 #include "server/slam/scan_pipeline.h"
@@ -28,7 +29,7 @@ class StepTaker {
     if (odometry.translation().norm() <= options_.max_step_m) {
       Measure(now, odometry);
     } else {
-      speed_.reset();
+      speed_.Forget();
     }
     last_ = std::move(now);
   }
@@ -44,10 +45,6 @@ class StepTaker {
     Pose2 T_odom_robot;
     slam::ScanView view;
   };
-  struct Speed {
-    double forward_m_s = 0.0;
-    double turn_rad_s = 0.0;
-  };
 
   void Measure(const Sight& now, const Pose2& odometry) {
     LogStep step{last_->stamp, now.stamp, odometry, {}, {}, 0.0};
@@ -59,25 +56,23 @@ class StepTaker {
                                              options_.slam.front_end.refine);
 
     const double seconds = SecondsFromStamp(now.stamp - last_->stamp);
-    Pose2 forecast;
-    if (speed_ && seconds < 10.0) {
-      forecast = {speed_->forward_m_s * seconds, 0.0, WrapAngle(speed_->turn_rad_s * seconds)};
-      step.lambda_m = std::abs(forecast.x);
-    }
+    const Pose2 forecast = speed_.Forecast(seconds);
+    step.lambda_m = std::abs(forecast.x);
     step.blind = slam::MatchScans(last_->view, now.view, {forecast, wide}, options_.slam.matcher,
                                   options_.slam.matching, parallel_for_);
     // The forecast lives on what scan matching says, never on odometry.
-    const Pose2& moved = step.match.converged ? step.match.T_prev_curr : step.blind.T_prev_curr;
-    speed_.reset();
-    if (seconds > 0.0 && (step.match.converged || step.blind.converged))
-      speed_ = Speed{moved.x / seconds, moved.theta / seconds};
+    if (step.match.converged || step.blind.converged) {
+      speed_.Moved(step.match.converged ? step.match.T_prev_curr : step.blind.T_prev_curr, seconds);
+    } else {
+      speed_.Forget();
+    }
     result_.steps.push_back(step);
   }
 
   const LogStepOptions& options_;
   const slam::ParallelFor& parallel_for_;
   std::optional<Sight> last_;
-  std::optional<Speed> speed_;
+  slam::ConstantSpeed speed_;
   LogSteps result_;
 };
 

@@ -44,5 +44,9 @@ struct MotionReport {
 [[nodiscard]] Result<MotionReport> RunMotion(const MotionRunOptions& options);
 [[nodiscard]] std::string ReportText(const MotionReport& report);
 [[nodiscard]] std::string ReportJson(const MotionReport& report);
+// As options of the estimator (YAML): slam.motion, and the filters that sample motion told to use it: Eliazar's model
+// with odometry, without it the scan matcher's. kInvalidArgument where the matcher's model was not learnt, or a number
+// is out of its option's range.
+[[nodiscard]] Result<std::string> ReportConfig(const MotionReport& report, bool with_odometry);
 
 }  // namespace cairn::server

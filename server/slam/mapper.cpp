@@ -1,11 +1,14 @@
 #include "server/slam/mapper.h"
 
+#include <cmath>
+
 #include "server/slam/filters/make_filter.h"
 #include "server/slam/front_end.h"
 #include "server/slam/grid/grid_redraw.h"
 #include "server/slam/matching/loop_search.h"
 #include "server/slam/matching/revisit_search.h"
 #include "server/slam/matching/self_check.h"
+#include "server/slam/motion/constant_speed.h"
 #include "server/slam/scan/tilt.h"
 #include "server/slam/smoothing/keyframe_graph.h"
 
@@ -41,6 +44,7 @@ struct Mapper::State {
   RevisitSearch revisits;
   LoopSearch loops;
   SelfCheck self_check;
+  ConstantSpeed speed;  // From keyframe to keyframe.
   KeyframeGraph graph;
   std::vector<double> distances_m;  // Along the graph, from the last keyframe to each.
   std::unique_ptr<Filter> filter;
@@ -145,7 +149,13 @@ void Mapper::State::AddKeyframe(std::shared_ptr<const Scan> scan, const Pose2& T
   if (!keyframes.empty()) {
     const Pose2 motion = Between(shapes.back().T_track_robot, step.T_track_robot);
     travelled_m += motion.translation().norm();
-    filter->Predict(motion, blind_covariance);
+    const double seconds = SecondsFromStamp(scan->stamp - keyframes.back().scan->stamp);
+    StepMotion measured{motion, blind_covariance};
+    if (options.front_end.use_odometry)
+      measured.T_prev_curr_odom = Between(keyframes.back().T_odom_robot, T_odom_robot);
+    measured.lambda_m = std::abs(speed.Forecast(seconds).x);
+    filter->Predict(measured);
+    speed.Moved(motion, seconds);
     graph.Append(motion, blind_covariance);
     blind_covariance.setZero();
     const auto revisit = revisits.Find(view.points_robot, shapes, distances_m, travelled_m, *filter, parallel_for);

@@ -27,7 +27,7 @@ void FastSlamStep(benchmark::State& state) {
     const BenchKeyframe &prev = input->keyframes[k], &curr = input->keyframes[k + 1];
     const Pose2 motion = Between(prev.T_odom_robot, curr.T_odom_robot);
     travelled_m += motion.translation().norm();
-    filter->Predict(motion, Eigen::Matrix3d::Zero());
+    filter->Predict({motion});
     filter->Observe(slam::KeyframeSight{curr.scan, curr.view, curr.T_odom_robot, travelled_m}, slam::SerialFor);
     filter->Commit();
     ++k;

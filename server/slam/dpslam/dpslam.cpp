@@ -19,10 +19,26 @@ DpSlam::DpSlam(const DpSlamOptions& options, const Pose2& T_map_robot_start, std
   if (options_.hierarchical) high_.emplace(options_.high, options_.opacity, options_.segment.keep_m, T_map_robot_start);
 }
 
-void DpSlam::Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) {
-  low_.Move(T_prev_curr, covariance_prev + options_.low.drift.Covariance(T_prev_curr), rng_);
-  step_m_ += T_prev_curr.translation().norm();
-  turn_rad_ += std::abs(T_prev_curr.theta);
+void DpSlam::Predict(const StepMotion& step) {
+  switch (options_.motion) {
+    case LowMotion::kGaussian:
+      low_.Move(step.T_prev_curr, step.covariance_prev + options_.low.drift.Covariance(step.T_prev_curr), rng_);
+      break;
+    case LowMotion::kEliazar: {
+      const StepMotion input = step.ByOdometry();
+      const EliazarModel& model = options_.learnt.eliazar;
+      const OdometryStep odometry = StepOf(input.T_prev_curr);
+      low_.Move([&] { return SampleMotion(model, odometry, rng_); }, MeanMotion(model, odometry), input.covariance_prev,
+                rng_);
+      break;
+    }
+    case LowMotion::kScanMatching:
+      low_.Move([&] { return SampleMotion(options_.learnt.scan_matching, step.T_prev_curr, step.lambda_m, rng_); },
+                step.T_prev_curr, step.covariance_prev, rng_);
+      break;
+  }
+  step_m_ += step.T_prev_curr.translation().norm();
+  turn_rad_ += std::abs(step.T_prev_curr.theta);
 }
 
 void DpSlam::Observe(const KeyframeSight& sight, const ParallelFor& parallel_for) {

@@ -21,7 +21,7 @@ class DpSlam final : public Filter {
  public:
   DpSlam(const DpSlamOptions& options, const Pose2& T_map_robot_start, std::uint64_t seed);
 
-  void Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) override;
+  void Predict(const StepMotion& step) override;
   bool Observe(const RevisitObservation& /*revisit*/) override { return false; }
   // REQUIRES: at most once a step.
   void Observe(const KeyframeSight& sight, const ParallelFor& parallel_for) override;

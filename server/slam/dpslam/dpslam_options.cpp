@@ -1,9 +1,23 @@
 #include "server/slam/dpslam/dpslam_options.h"
 
+#include <array>
+#include <string_view>
+
 namespace cairn::slam {
+namespace {
+
+constexpr std::array<std::string_view, 3> kLowMotionNames = {"gaussian", "eliazar", "scan_matching"};
+
+}  // namespace
+
+void Visit(OptionVisitor& visitor, LowMotion& motion) {
+  VisitEnum(visitor, "motion", motion, kLowMotionNames,
+            "How the low level samples a step: low.drift, or with what slam.motion says.");
+}
 
 void Visit(OptionVisitor& visitor, DpSlamOptions& options) {
   visitor.Flag("hierarchical", options.hierarchical, "Two levels; one alone drifts over long loops.");
+  Visit(visitor, options.motion);
   visitor.Section("opacity", "The cells of the particles' maps.", [&] { Visit(visitor, options.opacity); });
   visitor.Section("low", "From scan to scan.", [&] { Visit(visitor, options.low); });
   visitor.Section("high", "From segment to segment.", [&] { Visit(visitor, options.high); });

@@ -6,6 +6,7 @@
 
 #include "server/slam/dpslam/level_filter.h"
 #include "server/slam/dpslam/opacity.h"
+#include "server/slam/motion/learnt_motion.h"
 
 namespace cairn::slam {
 
@@ -39,14 +40,23 @@ struct SegmentOptions {
   return high;
 }
 
+// What the low level's particles draw a step from. Gaussian: the front-end's step with low.drift. Eliazar: odometry's
+// own step, as d and b of thesis C (4.46) are; what the front-end matched is left to the weights, and a jump of the
+// odometry takes all particles along; without odometry the front-end's step stands in (4.5.1). Scan matching: the
+// front-end's step, as in Tables 5.1-5.3.
+enum class LowMotion : std::uint8_t { kGaussian = 0, kEliazar, kScanMatching };
+
 struct DpSlamOptions {
   bool hierarchical = true;
+  LowMotion motion = LowMotion::kGaussian;
+  LearntMotion learnt{};  // Shown as slam.motion.
   OpacityOptions opacity;
   LevelOptions low;
   LevelOptions high = HighLevel();
   SegmentOptions segment;
   std::int64_t diverged_after = 20;  // Scans in a row that the map contradicts before the filter says it is lost.
 };
-void Visit(OptionVisitor& visitor, DpSlamOptions& options);
+void Visit(OptionVisitor& visitor, LowMotion& motion);       // The key `motion`.
+void Visit(OptionVisitor& visitor, DpSlamOptions& options);  // All but `learnt`.
 
 }  // namespace cairn::slam

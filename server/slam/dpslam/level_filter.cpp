@@ -42,16 +42,17 @@ LevelFilter::LevelFilter(const LevelOptions& options, const OpacityOptions& opac
   for (GridParticle& particle : particles_) particle.T_map_robot = T_map_robot_start;
 }
 
-void LevelFilter::Move(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev, Rng& rng) {
+void LevelFilter::Move(const std::function<Pose2()>& draw_step, const Pose2& T_mean,
+                       const Eigen::Matrix3d& covariance_prev, Rng& rng) {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
   solver.computeDirect(covariance_prev);
   const Eigen::Matrix3d root = solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
   for (GridParticle& particle : particles_) {
     const Eigen::Vector3d draw(NormalDraw(rng), NormalDraw(rng), NormalDraw(rng));
-    const Eigen::Vector3d step = T_prev_curr.vector() + root * draw;
+    const Eigen::Vector3d step = draw_step().vector() + root * draw;
     particle.T_map_robot = particle.T_map_robot * Pose2{step.x(), step.y(), WrapAngle(step.z())};
   }
-  mean_ = mean_ * T_prev_curr;
+  mean_ = mean_ * T_mean;
 }
 
 void LevelFilter::Observe(const Evidence& evidence, Rng& rng, const ParallelFor& parallel_for) {

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -46,7 +47,12 @@ class LevelFilter {
   LevelFilter(const LevelOptions& options, const OpacityOptions& opacity, const Pose2& T_map_robot_start);
 
   // Moves every particle by the step with noise of this covariance: (x, y, theta) in the frame the step starts from.
-  void Move(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev, Rng& rng);
+  void Move(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev, Rng& rng) {
+    Move([&] { return T_prev_curr; }, T_prev_curr, covariance_prev, rng);
+  }
+  // The same by a step of its own for every particle, drawn in their order; `T_mean` is what the draws scatter about.
+  void Move(const std::function<Pose2()>& draw_step, const Pose2& T_mean, const Eigen::Matrix3d& covariance_prev,
+            Rng& rng);
   // All maps forget what is farther from the robot.
   void KeepNear(double radius_m) { maps_.KeepNear(mean_.translation(), radius_m); }
   // Every particle is weighted, survives or not, and draws the evidence; its last pose is where the particle then is.

@@ -15,9 +15,7 @@ class DeadReckoningFilter final : public Filter {
   DeadReckoningFilter(const BackEndOptions& options, const Pose2& T_map_robot_start)
       : path_(options.drift, T_map_robot_start), max_nis_(options.max_nis), contradictions_(options.diverged_after) {}
 
-  void Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) override {
-    path_.Advance(T_prev_curr, covariance_prev);
-  }
+  void Predict(const StepMotion& step) override { path_.Advance(step.T_prev_curr, step.covariance_prev); }
   bool Observe(const RevisitObservation& revisit) override {
     contradictions_.Add(path_.NisOf(revisit) < max_nis_);
     return false;

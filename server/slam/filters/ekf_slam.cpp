@@ -27,11 +27,11 @@ EkfSlam::EkfSlam(const EkfOptions& options, const BackEndOptions& back_end, cons
       state_(T_map_robot_start),
       contradictions_(back_end.diverged_after) {}
 
-void EkfSlam::Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) {
-  const Eigen::Matrix3d step_covariance = back_end_.drift.Covariance(T_prev_curr) + covariance_prev;
-  state_.Move(T_prev_curr, step_covariance);
-  DeadReckon(since_anchor_.T_anchor_robot, since_anchor_.covariance, T_prev_curr, step_covariance);
-  since_anchor_m_ += T_prev_curr.translation().norm();
+void EkfSlam::Predict(const StepMotion& step) {
+  const Eigen::Matrix3d step_covariance = back_end_.drift.Covariance(step.T_prev_curr) + step.covariance_prev;
+  state_.Move(step.T_prev_curr, step_covariance);
+  DeadReckon(since_anchor_.T_anchor_robot, since_anchor_.covariance, step.T_prev_curr, step_covariance);
+  since_anchor_m_ += step.T_prev_curr.translation().norm();
 }
 
 bool EkfSlam::Observe(const RevisitObservation& revisit) {

@@ -34,11 +34,11 @@ void ErrorEnsemble::Move(const Pose2& T_map_prev, const Pose2& T_prev_curr, cons
   Disturb(T_map_prev * T_prev_curr, J * covariance_prev * J.transpose());
 }
 
-void ErrorEnsemble::MoveBySampling(const Pose2& T_map_prev, const Pose2& T_prev_curr, const MotionSampling& motion) {
-  const Pose2 T_map_curr = T_map_prev * T_prev_curr;
+void ErrorEnsemble::MoveBySampling(const Pose2& T_map_prev, const StepMotion& step, const MotionSampling& motion) {
+  const Pose2 T_map_curr = T_map_prev * step.T_prev_curr;
   const Eigen::Matrix3d J_error_pose = J_pose_error(T_map_curr).inverse();
   for (int j = 0; j < kMembers; ++j) {
-    Eigen::Vector3d d = SampleMotion(T_map_prev, T_prev_curr, motion, rng_).vector() - T_map_curr.vector();
+    Eigen::Vector3d d = SampleMotion(T_map_prev, step, motion, rng_).vector() - T_map_curr.vector();
     d.z() = WrapAngle(d.z());
     robot_.col(j) += (J_error_pose * d).cast<float>();
   }

@@ -21,7 +21,7 @@
 #include "common/geometry/pose2.h"
 #include "server/slam/filters/innovation.h"
 #include "server/slam/filters/resampling.h"
-#include "server/slam/motion/velocity_model.h"
+#include "server/slam/motion/motion_sampling.h"
 
 namespace cairn::slam {
 
@@ -32,7 +32,7 @@ class ErrorEnsemble {
   // A step of the robot; `covariance_prev` of (x, y, theta) in the frame it starts from.
   void Move(const Pose2& T_map_prev, const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev);
   // A step with the noise of the motion model. Besides Move, which adds what comes on top.
-  void MoveBySampling(const Pose2& T_map_prev, const Pose2& T_prev_curr, const MotionSampling& motion);
+  void MoveBySampling(const Pose2& T_map_prev, const StepMotion& step, const MotionSampling& motion);
   // An observation of something first seen from an old keyframe, or of the keyframe itself. REQUIRES: it was kept.
   template <int N>
   void Tie(std::size_t keyframe, const Pose2& T_map_robot, const Innovation<N>& innovation);

@@ -19,9 +19,9 @@ FastSlam<LandmarkModel>::FastSlam(Proposal proposal, const FastSlamOptions& opti
       contradictions_(back_end.diverged_after) {}
 
 template <typename LandmarkModel>
-void FastSlam<LandmarkModel>::Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) {
-  if (proposal_ == Proposal::kMotion) return set_.PredictBySampling(T_prev_curr, covariance_prev);
-  set_.Predict(T_prev_curr, options_.drift.Covariance(T_prev_curr) + covariance_prev);
+void FastSlam<LandmarkModel>::Predict(const StepMotion& step) {
+  if (proposal_ == Proposal::kMotion) return set_.PredictBySampling(step);
+  set_.Predict(step.T_prev_curr, options_.drift.Covariance(step.T_prev_curr) + step.covariance_prev);
 }
 
 template <typename LandmarkModel>

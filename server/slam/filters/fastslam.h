@@ -38,7 +38,7 @@ class FastSlam final : public Filter {
   FastSlam(Proposal proposal, const FastSlamOptions& options, const BackEndOptions& back_end, std::int64_t particles,
            const Pose2& T_map_robot_start, std::uint64_t seed);
 
-  void Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) override;
+  void Predict(const StepMotion& step) override;
   bool Observe(const RevisitObservation& revisit) override;
   void Observe(const KeyframeSight& sight, const ParallelFor& parallel_for) override;
   // Association, proposal and weights, sampling, landmark updates and new landmarks (Tables 4.3-4.8).

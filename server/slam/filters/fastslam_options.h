@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "common/options/option_visitor.h"
-#include "server/slam/motion/velocity_model.h"
+#include "server/slam/motion/motion_sampling.h"
 
 namespace cairn::slam {
 

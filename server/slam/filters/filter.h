@@ -14,6 +14,7 @@
 #include "server/slam/filters/shared_sequence.h"
 #include "server/slam/landmark.h"
 #include "server/slam/matching/scan_view.h"
+#include "server/slam/motion/step_motion.h"
 #include "server/slam/parallel_for.h"
 
 namespace cairn::slam {
@@ -56,8 +57,7 @@ class Filter {
  public:
   virtual ~Filter() = default;
 
-  // `covariance_prev`: of the step's (x, y, theta), in the frame it starts from, besides the filter's own drift model.
-  virtual void Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) = 0;
+  virtual void Predict(const StepMotion& step) = 0;
   // False where it explains nothing or the filter has no use for revisits: nothing changes.
   virtual bool Observe(const RevisitObservation& revisit) = 0;
   virtual void Observe(const KeyframeSight& sight, const ParallelFor& parallel_for) = 0;

@@ -17,8 +17,8 @@ LandmarkCorrection::LandmarkCorrection(const CorrectionOptions& options, const B
       path_(back_end.drift, T_map_robot_start),
       contradictions_(back_end.diverged_after) {}
 
-void LandmarkCorrection::Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) {
-  path_.Advance(T_prev_curr, covariance_prev);
+void LandmarkCorrection::Predict(const StepMotion& step) {
+  path_.Advance(step.T_prev_curr, step.covariance_prev);
 }
 
 bool LandmarkCorrection::Observe(const RevisitObservation& revisit) {

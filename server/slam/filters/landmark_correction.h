@@ -31,7 +31,7 @@ class LandmarkCorrection final : public Filter {
  public:
   LandmarkCorrection(const CorrectionOptions& options, const BackEndOptions& back_end, const Pose2& T_map_robot_start);
 
-  void Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) override;
+  void Predict(const StepMotion& step) override;
   bool Observe(const RevisitObservation& revisit) override;  // False: changes nothing but health().
   void Observe(const KeyframeSight& sight, const ParallelFor& parallel_for) override;
   void Observe(const std::vector<LandmarkSighting>& sightings, double travelled_m);

@@ -25,6 +25,8 @@ void Visit(OptionVisitor& visitor, FilterOptions& options) {
                   "Revisits in a row that contradict the belief before the robot counts as not localized.");
   visitor.Section("drift", "Noise of the matched motion: how far the front-end drifts.",
                   [&] { Visit(visitor, options.back_end.drift); });
+  visitor.Section("motion", "What cairn-calibrate motion learnt, for fastslam.motion.model and dpslam.motion.",
+                  [&] { Visit(visitor, options.motion); });
   visitor.Section("landmarks", "Which features become landmarks, and when one is seen again.",
                   [&] { Visit(visitor, options.back_end.landmarks); });
   visitor.Section("fastslam", "FastSLAM, all variants.", [&] { Visit(visitor, options.fastslam); });
@@ -36,20 +38,23 @@ void Visit(OptionVisitor& visitor, FilterOptions& options) {
 
 std::unique_ptr<Filter> MakeFilter(FilterKind kind, const FilterOptions& options, const Pose2& T_map_robot_start,
                                    std::uint64_t seed) {
-  const auto fastslam = [&]<typename LandmarkModel>(Proposal proposal) -> std::unique_ptr<Filter> {
-    return std::make_unique<FastSlam<LandmarkModel>>(proposal, options.fastslam, options.back_end, options.particles,
+  const auto make_fastslam = [&]<typename LandmarkModel>(Proposal proposal) -> std::unique_ptr<Filter> {
+    FastSlamOptions fastslam = options.fastslam;
+    fastslam.motion.learnt = options.motion;
+    return std::make_unique<FastSlam<LandmarkModel>>(proposal, fastslam, options.back_end, options.particles,
                                                      T_map_robot_start, seed);
   };
   switch (kind) {
     case FilterKind::kFastSlam2Oriented:
-      return fastslam.operator()<LandmarkOriented>(Proposal::kObservation);
+      return make_fastslam.operator()<LandmarkOriented>(Proposal::kObservation);
     case FilterKind::kFastSlam1:
-      return fastslam.operator()<LandmarkPoint>(Proposal::kMotion);
+      return make_fastslam.operator()<LandmarkPoint>(Proposal::kMotion);
     case FilterKind::kEkf:
       return std::make_unique<EkfSlam>(options.ekf, options.back_end, T_map_robot_start);
     case FilterKind::kDpSlam: {
       DpSlamOptions dpslam = options.dpslam;
       dpslam.low.particles = dpslam.high.particles = options.particles;
+      dpslam.learnt = options.motion;
       return std::make_unique<DpSlam>(dpslam, T_map_robot_start, seed);
     }
     case FilterKind::kLandmarkCorrection:
@@ -59,7 +64,7 @@ std::unique_ptr<Filter> MakeFilter(FilterKind kind, const FilterOptions& options
     case FilterKind::kFastSlam2Points:
       break;
   }
-  return fastslam.operator()<LandmarkPair>(Proposal::kObservation);
+  return make_fastslam.operator()<LandmarkPair>(Proposal::kObservation);
 }
 
 }  // namespace cairn::slam

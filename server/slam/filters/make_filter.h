@@ -32,6 +32,7 @@ struct FilterOptions {
   FastSlamOptions fastslam;
   EkfOptions ekf;
   CorrectionOptions correction;
+  LearntMotion motion;   // For fastslam.motion.model and dpslam.motion, in place of the `learnt` they hold.
   DpSlamOptions dpslam;  // `particles` counts on both levels.
 };
 // The fields of the `slam` section that belong to the filter.

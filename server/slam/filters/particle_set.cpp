@@ -32,17 +32,18 @@ void ParticleSet::Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covar
   travelled_ += T_prev_curr.translation().norm();
 }
 
-void ParticleSet::PredictBySampling(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) {
-  errors_.MoveBySampling(best().T_map_robot, T_prev_curr, options_.motion);
-  const bool more = covariance_prev.trace() > 0.0;
-  if (more) errors_.Move(best().T_map_robot, T_prev_curr, covariance_prev);
+void ParticleSet::PredictBySampling(const StepMotion& measured) {
+  const StepMotion step = InputOf(options_.motion.model, measured);
+  errors_.MoveBySampling(best().T_map_robot, step, options_.motion);
+  const bool more = step.covariance_prev.trace() > 0.0;
+  if (more) errors_.Move(best().T_map_robot, step.T_prev_curr, step.covariance_prev);
   for (std::size_t i = 0; i < particles_.size(); ++i) {
     Particle& particle = particles_[i];
     const Pose2 before = particle.T_map_robot;
-    particle.T_map_robot = SampleMotion(before, T_prev_curr, options_.motion, rng_);
+    particle.T_map_robot = SampleMotion(before, step, options_.motion, rng_);
     if (!more) continue;
-    const Eigen::Matrix3d J = J_compose_right(before, T_prev_curr);
-    particle.covariance = J * covariance_prev * J.transpose();
+    const Eigen::Matrix3d J = J_compose_right(before, step.T_prev_curr);
+    particle.covariance = J * step.covariance_prev * J.transpose();
     Sample(i);
   }
 }

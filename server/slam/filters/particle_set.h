@@ -30,7 +30,7 @@ class ParticleSet {
   void Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev);
   // FastSLAM 1.0: moves every particle by a sample of the motion model, and of what comes on top of it, which leaves no
   // uncertainty.
-  void PredictBySampling(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev);
+  void PredictBySampling(const StepMotion& measured);
 
   // Proposal and weight for one revisit. False where no particle explains it: nothing changes.
   bool Observe(const RevisitObservation& revisit);

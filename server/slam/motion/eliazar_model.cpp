@@ -1,25 +1,30 @@
 #include "server/slam/motion/eliazar_model.h"
 
 #include <cmath>
+#include <string>
+
+#include "server/slam/filters/resampling.h"
 
 namespace cairn::slam {
 namespace {
 
-void VisitTerm(OptionVisitor& visitor, MotionTermModel& term) {
-  visitor.Real("mean_d", term.mean_d, "1/m", -10.0, 10.0, "Mean per metre of odometry.");
-  visitor.Real("mean_b", term.mean_b, "1/rad", -10.0, 10.0, "Mean per radian of odometry.");
-  visitor.Real("sigma_d", term.sigma_d, "1/m", 0.0, 10.0, "Standard deviation per metre of odometry.");
-  visitor.Real("sigma_b", term.sigma_b, "1/rad", 0.0, 10.0, "Standard deviation per radian of odometry.");
-  visitor.Real("floor", term.floor, "m or rad", 1e-6, 1.0, "Standard deviation of a step at rest.");
+// `unit`: of the term.
+void VisitTerm(OptionVisitor& visitor, MotionTermModel& term, const std::string& unit) {
+  const std::string per_m = unit + "/m", per_rad = unit + "/rad";
+  visitor.Real("mean_d", term.mean_d, per_m, -10.0, 10.0, "Mean per metre of odometry.");
+  visitor.Real("mean_b", term.mean_b, per_rad, -10.0, 10.0, "Mean per radian of odometry.");
+  visitor.Real("sigma_d", term.sigma_d, per_m, 0.0, 10.0, "Standard deviation per metre of odometry.");
+  visitor.Real("sigma_b", term.sigma_b, per_rad, 0.0, 10.0, "Standard deviation per radian of odometry.");
+  visitor.Real("floor", term.floor, unit, 1e-6, 1.0, "Standard deviation of a step at rest.");
 }
 
 }  // namespace
 
 void Visit(OptionVisitor& visitor, EliazarModel& model) {
   visitor.Section("along", "D: the way along the heading half-way through the turn.",
-                  [&] { VisitTerm(visitor, model.along); });
-  visitor.Section("across", "C: the way across it.", [&] { VisitTerm(visitor, model.across); });
-  visitor.Section("turn", "B: the turn.", [&] { VisitTerm(visitor, model.turn); });
+                  [&] { VisitTerm(visitor, model.along, "m"); });
+  visitor.Section("across", "C: the way across it.", [&] { VisitTerm(visitor, model.across, "m"); });
+  visitor.Section("turn", "B: the turn.", [&] { VisitTerm(visitor, model.turn, "rad"); });
 }
 
 Eigen::Vector3d TermsOf(const Pose2& T_prev_curr) {
@@ -38,12 +43,16 @@ OdometryStep StepOf(const Pose2& T_prev_curr_odom) {
   return {terms(0), terms(2)};
 }
 
+Pose2 MeanMotion(const EliazarModel& model, const OdometryStep& step) {
+  return MotionOf(
+      {model.along.Mean(step.d, step.b), model.across.Mean(step.d, step.b), model.turn.Mean(step.d, step.b)});
+}
+
 Pose2 SampleMotion(const EliazarModel& model, const OdometryStep& step, std::mt19937_64& engine) {
-  std::normal_distribution<double> normal;
   Eigen::Vector3d terms;
   for (int i = 0; i < kMotionTerms; ++i) {
     const MotionTermModel& term = model.term(i);
-    terms(i) = term.Mean(step.d, step.b) + std::sqrt(term.Variance(step.d, step.b)) * normal(engine);
+    terms(i) = term.Mean(step.d, step.b) + std::sqrt(term.Variance(step.d, step.b)) * NormalDraw(engine);
   }
   return MotionOf(terms);
 }

@@ -51,7 +51,8 @@ struct OdometryStep {
 };
 [[nodiscard]] OdometryStep StepOf(const Pose2& T_prev_curr_odom);
 
-// A draw of the true motion.
+// The motion by the mean of each term, and a draw of the true motion.
+[[nodiscard]] Pose2 MeanMotion(const EliazarModel& model, const OdometryStep& step);
 [[nodiscard]] Pose2 SampleMotion(const EliazarModel& model, const OdometryStep& step, std::mt19937_64& engine);
 
 // ln p(terms | step). Variances must be above zero.

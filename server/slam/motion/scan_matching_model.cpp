@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "server/slam/filters/resampling.h"
+
 namespace cairn::slam {
 namespace {
 
@@ -42,26 +44,24 @@ double MatchSpread::Sigma(double reported) const {
 }
 
 void Visit(OptionVisitor& visitor, ScanMatchingModel& model) {
-  const auto spread = [&](std::string_view key, MatchSpread& axis) {
+  const auto spread = [&](std::string_view key, MatchSpread& axis, std::string_view unit) {
     visitor.Section(key, "Standard deviation of the matcher's error on this axis.", [&] {
-      visitor.Real("base", axis.base, "m or rad", 1e-6, 1.0, "Of a step at rest.");
+      visitor.Real("base", axis.base, unit, 1e-6, 1.0, "Of a step at rest.");
       visitor.Real("share", axis.share, "1", 0.0, 2.0, "Of the reported motion.");
     });
   };
-  spread("along", model.along);
-  spread("across", model.across);
-  spread("turn", model.turn);
+  spread("along", model.along, "m");
+  spread("across", model.across, "m");
+  spread("turn", model.turn, "rad");
   visitor.Real("shortfall_share", model.shortfall_share, "1", 0.0, 1.0, "How often the matcher misses the way.");
   visitor.Real("shortfall_max_turn_rad", model.shortfall_max_turn_rad, "rad", 0.0, 3.2,
                "Reported turns above it are never short.");
 }
 
 Pose2 SampleMotion(const ScanMatchingModel& model, const Pose2& T_prev_curr, double lambda_m, std::mt19937_64& engine) {
-  std::normal_distribution<double> normal;
-  std::uniform_real_distribution<double> uniform(0.0, 1.0);
   // The same number of draws whatever comes of them.
-  const bool is_short = uniform(engine) < model.shortfall_share && MayFallShort(model, T_prev_curr, lambda_m);
-  const double forward = normal(engine), sideways = normal(engine), turning = normal(engine);
+  const bool is_short = UniformDraw(engine) < model.shortfall_share && MayFallShort(model, T_prev_curr, lambda_m);
+  const double forward = NormalDraw(engine), sideways = NormalDraw(engine), turning = NormalDraw(engine);
   return {T_prev_curr.x + (is_short ? lambda_m + lambda_m / 2 * forward : model.along.Sigma(T_prev_curr.x) * forward),
           T_prev_curr.y + model.across.Sigma(T_prev_curr.y) * sideways,
           WrapAngle(T_prev_curr.theta + model.turn.Sigma(T_prev_curr.theta) * turning)};

@@ -1,35 +1,8 @@
 #include "server/slam/motion/velocity_model.h"
 
-#include <array>
 #include <cmath>
-#include <string_view>
-
-#include "server/slam/filters/resampling.h"
-#include "server/slam/motion/odometry_model.h"
 
 namespace cairn::slam {
-namespace {
-
-constexpr std::array<std::string_view, 2> kModelNames = {"velocity", "odometry"};
-
-double Noise(double alpha_a, double a, double alpha_b, double b, std::mt19937_64& rng) {
-  return std::sqrt(alpha_a * a * a + alpha_b * b * b) * NormalDraw(rng);
-}
-
-}  // namespace
-
-void Visit(OptionVisitor& visitor, MotionSampling& options) {
-  VisitEnum(visitor, "model", options.model, kModelNames, "How a step is sampled.");
-  const auto alpha = [&](std::string_view key, double& value, std::string_view help) {
-    visitor.Real(key, value, "1", 0.0, 10.0, help);
-  };
-  alpha("alpha_v_v", options.alpha_v_v, "Variance of the distance by the distance squared.");
-  alpha("alpha_v_w", options.alpha_v_w, "... by the turn squared (m^2/rad^2).");
-  alpha("alpha_w_v", options.alpha_w_v, "Variance of the turn by the distance squared (rad^2/m^2).");
-  alpha("alpha_w_w", options.alpha_w_w, "... by the turn squared.");
-  alpha("alpha_g_v", options.alpha_g_v, "Variance of the final turn by the distance squared (rad^2/m^2).");
-  alpha("alpha_g_w", options.alpha_g_w, "... by the turn squared.");
-}
 
 VelocityControl InverseVelocity(const Pose2& T_prev_curr) {
   const double chord = T_prev_curr.translation().norm();
@@ -52,25 +25,6 @@ Pose2 ApplyVelocity(const Pose2& T_map_robot, const VelocityControl& control) {
   const double course = T_map_robot.theta + half;  // Lines 4 and 5 by their chord: no division by a small w.
   return {T_map_robot.x + chord * std::cos(course), T_map_robot.y + chord * std::sin(course),
           WrapAngle(T_map_robot.theta + control.w + control.g)};
-}
-
-Pose2 SampleMotion(const Pose2& T_map_robot, const Pose2& T_prev_curr, const MotionSampling& options,
-                   std::mt19937_64& rng) {
-  const MotionSampling& o = options;
-  if (o.model == MotionModel::kVelocity) {
-    VelocityControl c = InverseVelocity(T_prev_curr);
-    const double v = c.v, w = c.w;
-    c.v += Noise(o.alpha_v_v, v, o.alpha_v_w, T_prev_curr.theta, rng);
-    c.w += Noise(o.alpha_w_v, v, o.alpha_w_w, w, rng);
-    c.g += Noise(o.alpha_g_v, v, o.alpha_g_w, T_prev_curr.theta, rng);
-    return ApplyVelocity(T_map_robot, c);
-  }
-  OdometryControl c = InverseOdometry(T_prev_curr);
-  const OdometryControl mean = c;
-  c.rot1 += Noise(o.alpha_w_v, mean.trans, o.alpha_w_w, mean.rot1, rng);
-  c.trans += Noise(o.alpha_v_v, mean.trans, o.alpha_v_w, std::hypot(mean.rot1, mean.rot2), rng);
-  c.rot2 += Noise(o.alpha_w_v, mean.trans, o.alpha_w_w, mean.rot2, rng);
-  return ApplyControl(T_map_robot, c);
 }
 
 }  // namespace cairn::slam

@@ -4,9 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <fstream>
 #include <sstream>
 
+#include "common/options/config.h"
+#include "server/calibrate/motion_run.h"
 #include "tests/server/calibrate/noisy_drive.h"
 #include "tests/temp_directory.h"
 
@@ -54,6 +57,7 @@ TEST_F(Calibrate, WrongCommandLinesAreUsageErrors) {
       {"motion", "x.log", "--set", "fit.particles=many"},
       {"motion", "x.log", "--set", "slam.matcher=guess"},
       {"motion", "x.log", "--colour", "red"},
+      {"motion", "x.log", "-o", "x.yaml", "--no-matcher"},
   };
   for (const auto& arguments : wrong) {
     const Outcome outcome = Run(arguments);
@@ -149,6 +153,73 @@ TEST_F(Calibrate, MotionPrintsTheSameForTheSameSeedOnAnyThreadCount) {
   const Outcome far = Run({"motion", File("drive.log"), "--truth", Write("far.tum", "1000000 0 0 0 0 0 0 1\n")});
   EXPECT_EQ(far.code, 1);
   EXPECT_THAT(far.err, HasSubstr("no pose at the stamps"));
+}
+
+// From the fit through the file to the filters: what the programs read from it is what was learnt.
+TEST_F(Calibrate, MotionWritesOptionsThatTheFiltersDrawBy) {
+  std::ofstream log(File("drive.log"));
+  static_cast<void>(WriteTum(test::WriteNoisyDrive({.steps = 80}, log), File("drive.tum")));
+  log.close();
+  const std::vector<std::string> line = {"motion", File("drive.log"), "--truth", File("drive.tum"), "--json"};
+  auto writing = line;
+  writing.insert(writing.end(), {"-o", File("learnt.yaml")});
+  const Outcome outcome = Run(writing);
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(outcome.out, Run(line).out);
+
+  MotionRunOptions run;
+  run.log = File("drive.log");
+  run.truth = File("drive.tum");
+  const auto report = RunMotion(run);
+  ASSERT_TRUE(report);
+  slam::MapperOptions options;
+  const auto applied = ApplyYamlFile(File("learnt.yaml"), [&](OptionVisitor& visitor) {
+    visitor.Section("slam", "", [&] { slam::Visit(visitor, options); });
+  });
+  ASSERT_TRUE(applied) << applied.error().message;
+  EXPECT_EQ(options.filter.fastslam.motion.model, slam::MotionModel::kEliazar);
+  EXPECT_EQ(options.filter.dpslam.motion, slam::LowMotion::kEliazar);
+  const slam::ScanMatchingModel &matcher = options.filter.motion.scan_matching, &learnt = report->matcher->model;
+  EXPECT_EQ(matcher.along.base, learnt.along.base);
+  EXPECT_EQ(matcher.across.share, learnt.across.share);
+  EXPECT_EQ(matcher.turn.base, learnt.turn.base);
+  EXPECT_EQ(matcher.shortfall_share, learnt.shortfall_share);
+
+  // One step of the filters made by these options: hypotheses scatter as the model learnt says.
+  const slam::OdometryStep odometry{0.3, 0.1};
+  const slam::StepMotion step{{0.0, 1.0, 1.0}, Eigen::Matrix3d::Zero(), slam::MotionOf({odometry.d, 0.0, odometry.b})};
+  options.filter.particles = 10000;
+  options.filter.dpslam.hierarchical = false;
+  for (const auto kind : {slam::FilterKind::kFastSlam1, slam::FilterKind::kDpSlam}) {
+    const auto filter = slam::MakeFilter(kind, options.filter, {}, 7);
+    filter->Predict(step);
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero(), squares = Eigen::Vector3d::Zero();
+    const auto count = static_cast<double>(filter->hypothesis_count());
+    for (std::size_t i = 0; i < filter->hypothesis_count(); ++i) {
+      const Eigen::Vector3d terms = slam::TermsOf(filter->hypothesis(i).T_map_robot);
+      mean += terms / count;
+      squares += terms.cwiseAbs2() / count;
+    }
+    for (int k = 0; k < slam::kMotionTerms; ++k) {
+      const slam::MotionTermModel& term = report->eliazar.model.term(k);
+      const double sigma = std::sqrt(term.Variance(odometry.d, odometry.b));
+      EXPECT_NEAR(mean(k), term.Mean(odometry.d, odometry.b), 4.0 * sigma / std::sqrt(count)) << k;
+      EXPECT_NEAR(std::sqrt(squares(k) - mean(k) * mean(k)), sigma, 0.04 * sigma) << k;
+    }
+  }
+}
+
+TEST_F(Calibrate, WithoutOdometryTheScanMatchersModelIsChosen) {
+  MotionReport report;
+  EXPECT_FALSE(ReportConfig(report, true)) << "no matcher, nothing to write";
+  report.matcher.emplace();
+  EXPECT_THAT(*ReportConfig(report, true), HasSubstr("model: eliazar"));
+  EXPECT_THAT(*ReportConfig(report, false), HasSubstr("model: scan_matching"));
+  EXPECT_THAT(*ReportConfig(report, false), HasSubstr("motion: scan_matching"));
+  report.eliazar.model.along.sigma_d = 11.0;
+  const auto refused = ReportConfig(report, true);
+  ASSERT_FALSE(refused) << "the programs would refuse it";
+  EXPECT_THAT(refused.error().message, HasSubstr("slam.motion.eliazar.along.sigma_d"));
 }
 
 }  // namespace

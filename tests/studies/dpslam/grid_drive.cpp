@@ -56,7 +56,7 @@ GridRun RunGrid(const std::string& name, const std::vector<GridStep>& steps, con
   const slam::ParallelFor parallel_for = Over(threads);
   for (std::size_t i = 0; i < steps.size(); ++i) {
     Stopwatch watch;
-    if (i > 0) filter.Predict(steps[i].T_prev_curr, Eigen::Matrix3d::Zero());
+    if (i > 0) filter.Predict({steps[i].T_prev_curr});
     filter.Observe(std::make_shared<slam::LaserRays>(RaysOf(*steps[i].scan, options.opacity)), parallel_for);
     filter.Commit();
     run.cpu_ms.push_back(watch.CpuMs());

@@ -8,7 +8,7 @@
 
 #include "server/slam/filters/chi_square.h"
 #include "server/slam/filters/resampling.h"
-#include "server/slam/motion/velocity_model.h"
+#include "server/slam/motion/motion_sampling.h"
 #include "tests/studies/filters/corner_world.h"
 
 namespace cairn::studies {
@@ -135,7 +135,7 @@ Run DriveOnce(const ConsistencyOptions& options, std::uint64_t seed) {
     const Pose2& step = steps[i];
     Pose2 made;
     if (options.kind == slam::FilterKind::kFastSlam1) {
-      made = slam::SampleMotion({}, step, told.fastslam.motion, rng);
+      made = slam::SampleMotion({}, {step}, told.fastslam.motion, rng);
     } else {
       const Eigen::Vector3d d = options.noise_factor * Draw(told.back_end.drift.Covariance(step), rng);
       made = {step.x + d.x(), step.y + d.y(), WrapAngle(step.theta + d.z())};
@@ -143,7 +143,7 @@ Run DriveOnce(const ConsistencyOptions& options, std::uint64_t seed) {
     truth = truth * made;
     track = track * step;
     travelled += step.translation().norm();
-    filter->Predict(step, Eigen::Matrix3d::Zero());
+    filter->Predict({step});
     keyframe();
     if ((i + 1) % kPointEvery != 0) continue;
     const slam::FilterEstimate estimate = filter->estimate();

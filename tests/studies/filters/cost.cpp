@@ -55,7 +55,7 @@ CostPoint StudyCost(slam::FilterKind kind, std::size_t corners, std::uint64_t se
   for (int i = 0; i < 2 * steps; ++i) {
     const slam::ScanView view = SeenCorners(ring, truth, options.back_end.landmarks.noise, 1.0, rng);
     const Stopwatch watch;
-    if (i > 0) filter->Predict(step, Eigen::Matrix3d::Zero());
+    if (i > 0) filter->Predict({step});
     filter->Observe({scan, view, truth, kRingStepM * i}, slam::SerialFor);
     filter->Commit();
     if (i >= steps) point.step_ms += watch.CpuMs() / steps;

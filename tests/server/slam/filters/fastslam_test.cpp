@@ -41,7 +41,7 @@ TYPED_TEST_SUITE(FastSlamVariants, Models);
 // Ten metres out, turn about, ten metres back: the true end is the start, facing back.
 void DriveOutAndBack(Filter& filter) {
   const auto step = [&](const Pose2& T_prev_curr) {
-    filter.Predict(T_prev_curr, Eigen::Matrix3d::Zero());
+    filter.Predict({T_prev_curr});
     filter.Commit();
   };
   filter.Commit();
@@ -56,7 +56,7 @@ TYPED_TEST(FastSlamVariants, UncertaintyGrowsAlongThePathAndARevisitTakesItAway)
   const double before = filter.estimate().covariance.template topLeftCorner<2, 2>().trace();
   const RevisitObservation revisit{0, {0, 0, kPi}, Eigen::Vector3d(0.0025, 0.0025, 0.0004).asDiagonal()};
   for (int i = 0; i < 5; ++i) {
-    filter.Predict({0, 0, 0}, Eigen::Matrix3d::Zero());
+    filter.Predict({{0, 0, 0}});
     ASSERT_TRUE(filter.Observe(revisit));
     filter.Commit();
   }
@@ -93,7 +93,7 @@ TYPED_TEST(FastSlamVariants, LandmarksSeenAgainPullTheRobotBack) {
   // The motion says half a metre back and forth; the noise of it leaves a spread that the landmarks take away.
   double spread = 0.0;
   for (int i = 1; i <= 8; ++i) {
-    for (const double step : {1.0, -1.0, 1.0, -1.0}) filter.Predict({step, 0, 0}, Eigen::Matrix3d::Zero());
+    for (const double step : {1.0, -1.0, 1.0, -1.0}) filter.Predict({{step, 0, 0}});
     filter.Observe(std::vector<LandmarkSighting>{}, i);
     filter.Commit();
     if (i == 4) spread = filter.estimate().covariance.template topLeftCorner<2, 2>().trace();
@@ -113,7 +113,7 @@ TYPED_TEST(FastSlamVariants, EveryParticleDecidesForItselfWhatItSees) {
   filter.Observe(TwoCorners({}), 0.0);
   filter.Commit();
   for (int i = 0; i < 40; ++i) {
-    filter.Predict({i % 2 == 0 ? 2.0 : -2.0, 0, 0}, Eigen::Matrix3d::Zero());
+    filter.Predict({{i % 2 == 0 ? 2.0 : -2.0, 0, 0}});
     filter.Commit();
   }
   filter.Observe(TwoCorners({0.5, 0, 0}, 2), 50.0);

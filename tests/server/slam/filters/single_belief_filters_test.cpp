@@ -16,7 +16,7 @@ BackEndOptions WideDrift() {
 
 void DriveSteps(Filter& filter, const std::vector<Pose2>& steps) {
   for (const Pose2& step : steps) {
-    filter.Predict(step, Eigen::Matrix3d::Zero());
+    filter.Predict({step});
     filter.Commit();
   }
 }
@@ -76,7 +76,7 @@ TEST(EkfSlam, HoldsNoMoreThanItsBoundsAndStaysACovariance) {
   EkfSlam filter(options, WideDrift(), {});
   filter.Commit();
   for (std::size_t i = 0; i < 40; ++i) {
-    filter.Predict({2.0, 0, 0}, Eigen::Matrix3d::Zero());
+    filter.Predict({{2.0, 0, 0}});
     filter.Observe(std::vector<LandmarkSighting>{{i, {true, 1.5}, {1.0, 1.0}, 0.2}}, 2.0 * static_cast<double>(i));
     filter.Commit();
   }

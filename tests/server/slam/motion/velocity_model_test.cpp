@@ -32,34 +32,5 @@ TEST(InverseVelocity, DrivingBackwardsIsNegativeSpeed) {
   EXPECT_NEAR(control.g, 0.0, 1e-12);
 }
 
-class SampledModels : public testing::TestWithParam<MotionModel> {};
-INSTANTIATE_TEST_SUITE_P(Both, SampledModels, testing::Values(MotionModel::kVelocity, MotionModel::kOdometry));
-
-TEST_P(SampledModels, MeanIsTheStepAndTheSpreadIsTheAlphas) {
-  MotionSampling options;
-  options.model = GetParam();
-  options.alpha_v_v = 0.01;  // 0.1 m a metre.
-  options.alpha_w_v = options.alpha_g_v = 0.0004;
-  std::mt19937_64 rng(3);
-  const Pose2 step{1.0, 0.0, 0.0};
-  constexpr int kDraws = 20000;
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero(), squares = Eigen::Vector3d::Zero();
-  for (int i = 0; i < kDraws; ++i) {
-    const Eigen::Vector3d d = Between(step, SampleMotion({}, step, options, rng)).vector();
-    mean += d / kDraws;
-    squares += d.cwiseAbs2() / kDraws;
-  }
-  EXPECT_LT(mean.norm(), 0.005);
-  EXPECT_NEAR(std::sqrt(squares.x()), 0.1, 0.003);
-  EXPECT_NEAR(std::sqrt(squares.z()), std::sqrt(2 * 0.0004), 0.001);  // Two turns, independent.
-}
-
-TEST_P(SampledModels, WithoutNoiseEverySampleIsTheStep) {
-  MotionSampling options{GetParam(), 0, 0, 0, 0, 0, 0};
-  std::mt19937_64 rng(3);
-  const Pose2 end = SampleMotion({1, 2, 0.5}, {0.3, -0.1, 0.4}, options, rng);
-  EXPECT_LT(Between(end, Pose2{1, 2, 0.5} * Pose2{0.3, -0.1, 0.4}).vector().norm(), 1e-9);
-}
-
 }  // namespace
 }  // namespace cairn::slam

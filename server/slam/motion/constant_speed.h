@@ -1,0 +1,34 @@
+// The speed of a robot's last step, and where it would take it in the next one. Not a filter: one step back, no more.
+// Frame: T_prev_curr in the robot frame, x forward; sideways a robot does not go. Not thread-safe.
+// Source: thesis C 5.2 (lambda = |dt V|, by the displacement between the scans before).
+#pragma once
+
+#include <optional>
+
+#include "common/geometry/pose2.h"
+
+namespace cairn::slam {
+
+class ConstantSpeed {
+ public:
+  void Moved(const Pose2& T_prev_curr, double seconds) {
+    speed_.reset();
+    if (seconds > 0.0) speed_ = Speed{T_prev_curr.x / seconds, T_prev_curr.theta / seconds};
+  }
+  void Forget() { speed_.reset(); }
+  // No motion where the speed is not known, or was too long ago to mean anything.
+  [[nodiscard]] Pose2 Forecast(double seconds) const {
+    if (!speed_ || seconds >= kLongest_s) return {};
+    return {speed_->forward_m_s * seconds, 0.0, WrapAngle(speed_->turn_rad_s * seconds)};
+  }
+
+ private:
+  static constexpr double kLongest_s = 10.0;
+  struct Speed {
+    double forward_m_s = 0.0;
+    double turn_rad_s = 0.0;
+  };
+  std::optional<Speed> speed_;
+};
+
+}  // namespace cairn::slam
