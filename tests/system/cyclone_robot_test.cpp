@@ -6,9 +6,9 @@
 #include <csignal>
 #include <cstdlib>
 
+#include "tests/child_process.h"
 #include "tests/loopback.h"
 #include "tests/real_logs.h"
-#include "tests/child_process.h"
 
 namespace cairn {
 namespace {

@@ -158,8 +158,8 @@ bool StudyPauses(StudyContext& context) {
   table.Add({"a scan for its pose", Count(static_cast<long long>(totals.used)),
              Number(sim.at("pose_latency_p50_ms"), 1), Number(sim.at("pose_latency_p99_ms"), 1), Number(slowest, 1),
              Number(kMostPauseMs, 0)});
-  table.Add({"a question for its answer", Count(static_cast<long long>(asked.answer_ms.size())), Number(answers.median, 1),
-             Number(answers.p99, 1), Number(answers.max, 1), Number(kMostPauseMs, 0)});
+  table.Add({"a question for its answer", Count(static_cast<long long>(asked.answer_ms.size())),
+             Number(answers.median, 1), Number(answers.p99, 1), Number(answers.max, 1), Number(kMostPauseMs, 0)});
   report.Add(table, "pauses");
   bool good = Holds(report, "longest wait for a pose in ms", slowest, kMostPauseMs);
   good = Holds(report, "longest wait for an answer in ms", answers.max, kMostPauseMs) && good;
