@@ -75,10 +75,11 @@ cv::Size LegendSize(const Plot& plot) {
   return lines == 0 ? cv::Size() : cv::Size(widest + 52, 20 * lines + 10);
 }
 
-// Maps keep room for their legend on the right: every corner of them shows something.
+// Maps keep room for their legend on the right: every corner of them shows something. So do plots with a long one.
 int RightMargin(const Plot& plot, bool map) {
-  const int legend = LegendSize(plot).width;
-  return map && legend > 0 ? legend + 30 : 24;
+  const cv::Size legend = LegendSize(plot);
+  const bool beside = map || legend.height > plot.height / 3;
+  return beside && legend.width > 0 ? legend.width + 30 : 24;
 }
 
 // Beside the plot where there is room, else in its corner that holds the fewest points.
