@@ -51,6 +51,8 @@ check "exposure as running, at most 2.0" sh -c 'systemd-analyze security --no-pa
 check "two robots drive, no scan is missing" \
   cairn sim --robots 2 --beams 180 --hz 10 --seconds 10 --rate 2 --site hall --watch-pid "$(pid)"
 check "status" cairn status
+check "a second server of the domain is refused" \
+  sh -c 'timeout 10 cairnd 2>&1 | grep -q "another server serves DDS domain"'
 check "smoothing" cairn job smooth --site hall --wait
 check "jobs step back behind the streams" \
   sh -c "cut -d ')' -f 2 /proc/$(pid)/task/*/stat | awk '\$17 > 0 { nice = 1 } END { exit !nice }'"
