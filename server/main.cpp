@@ -17,6 +17,7 @@
 #include "server/egress/egress.h"
 #include "server/ingress/ingress.h"
 #include "server/ingress/other_servers.h"
+#include "server/ops/domain_lock.h"
 #include "server/ops/service_notifier.h"
 #include "server/server.h"
 
@@ -35,10 +36,7 @@ void LogConfig(const CairndOptions& options) {
   }
 }
 
-// Live participants of this machine are discovered within a fifth of it.
-constexpr std::chrono::milliseconds kDiscovery{500};
-
-// Two servers that start at the same moment, or in networks joined later, cannot see each other in time.
+// Servers of other machines are found only once both run.
 void WarnOfOthers(asio::steady_timer& timer, const OtherServers& others, int known) {
   timer.expires_after(std::chrono::seconds(1));
   timer.async_wait([&timer, &others, known](const asio::error_code& error) {
@@ -87,14 +85,12 @@ int Serve(const CairndOptions& options) {
   const ProcessOptions& process = options.server.server;
   Inbound inbound(static_cast<std::size_t>(process.inbound_capacity));
   Outbound outbound(static_cast<std::size_t>(process.outbound_capacity));
+  const auto lock = DomainLock::Take(options.wire.domain, options.wire.interfaces);
+  if (!lock) return failed(lock.error());
   auto bus = wire::Bus::Create(options.wire, "cairnd");
   if (!bus) return failed(bus.error());
   const auto others = OtherServers::Watch(**bus);
   if (!others) return failed(others.error());
-  if ((*others)->FoundWithin(kDiscovery))
-    return failed({StatusCode::kAlreadyExists, "another server serves DDS domain " +
-                                                   std::to_string(options.wire.domain) +
-                                                   "; give one of them another (--domain, CAIRN_DOMAIN)"});
   auto egress = Egress::Open(**bus, outbound);
   if (!egress) return failed(egress.error());
   Server server(options.server, inbound, outbound);

@@ -1,9 +1,10 @@
-// Whether another server answers in this DDS domain. Two would both take every scan and answer every question, each
-// with half the truth. A server is whoever subscribes to requests. Thread rule: one thread.
+// How many other servers answer in this DDS domain: on other machines, or in networks joined later. Two both take every
+// scan and answer every question, each with half the truth. (Of one machine: ops/domain_lock.) A server is whoever
+// subscribes to requests. Thread rule: any thread.
 #pragma once
 
-#include <chrono>
 #include <memory>
+#include <utility>
 
 #include "common/wire/bus.h"
 
@@ -12,10 +13,7 @@ namespace cairn::server {
 class OtherServers {
  public:
   [[nodiscard]] static Result<std::unique_ptr<OtherServers>> Watch(wire::Bus& bus);
-
-  // Waits at most this long for one to be discovered. Before this process subscribes to requests itself.
-  [[nodiscard]] bool FoundWithin(std::chrono::milliseconds time) const;
-  // Once this process subscribes to requests: how many others do.
+  // Once this process subscribes to requests itself.
   [[nodiscard]] int count() const;
 
  private:
