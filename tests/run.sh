@@ -117,11 +117,12 @@ stage_demo() {
   for left in map.png report.md; do [ -s "build/demo/$left" ] || { echo "the demo left no $left"; return 1; }; done
 }
 
-# The same flags as release: the compiler cache hands over every object, only linking and testing is new.
+# The same flags as release: the compiler cache hands over every object. That it builds and links is new; of the tests,
+# which passed as the same objects in release, those of the estimator as a whole.
 stage_nodds() {
   configure release -B build/nodds -DCAIRN_WITH_DDS=OFF
   build nodds
-  run_tests nodds -LE study
+  run_tests nodds -LE study -R '^(slam_mapper|offline|calibrate|client_sim|studies)\.'
 }
 
 stage_asan() {
