@@ -9,6 +9,7 @@
 #include "common/options/config.h"
 #include "common/service/names.h"
 #include "common/version.h"
+#include "server/known_map.h"
 
 namespace cairn::server {
 namespace {
@@ -66,6 +67,10 @@ std::optional<CommandLine> ParseCommandLine(int argc, char** argv, int& exit_cod
   }
   for (const std::string& site : line.options.server.server.site_names()) {
     if (!Complain(ValidateName("server.sites", site))) continue;
+    exit_code = kUsage;
+    return std::nullopt;
+  }
+  if (!print_config && Complain(LoadKnownMap(line.options.server.slam))) {
     exit_code = kUsage;
     return std::nullopt;
   }

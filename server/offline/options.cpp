@@ -7,6 +7,7 @@
 
 #include "common/options/config.h"
 #include "common/version.h"
+#include "server/known_map.h"
 
 namespace cairn::server {
 namespace {
@@ -37,6 +38,8 @@ std::optional<OfflineOptions> ParseOfflineOptions(int argc, char** argv, int& ex
   app.add_flag("--smooth", options.smooth, "Also smooth the whole path and redraw the map from it");
   app.add_option("--smoothed-trajectory", options.smoothed_trajectory, "Write the smoothed trajectory (TUM)");
   app.add_option("--smoothed-map", options.smoothed_map, "Write the map redrawn from it");
+  app.add_option("--map-lines", options.map_lines,
+                 "Write the walls seen, as lines, for slam.line_match.map (along the smoothed path with --smooth)");
   app.add_option("--start", start, "Pose of the robot in the map at the start: x,y,theta (m, rad)")
       ->delimiter(',')
       ->expected(3);
@@ -72,7 +75,8 @@ std::optional<OfflineOptions> ParseOfflineOptions(int argc, char** argv, int& ex
     }
   }
   // On the command line a key of the server is a mistake.
-  const auto applied = ApplySet(assignments, [&](OptionVisitor& visitor) { VisitSlam(visitor, options); });
+  auto applied = ApplySet(assignments, [&](OptionVisitor& visitor) { VisitSlam(visitor, options); });
+  if (applied) applied = LoadKnownMap(options.slam);
   if (!applied) {
     std::cerr << "cairn-offline: " << applied.error().message << '\n';
     exit_code = 2;

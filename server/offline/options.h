@@ -14,6 +14,7 @@ struct OfflineOptions {
   std::filesystem::path log;
   std::filesystem::path trajectory;  // Empty: not written. So with the others.
   std::filesystem::path map;
+  std::filesystem::path map_lines;
   bool smooth = false;
   std::filesystem::path smoothed_trajectory;
   std::filesystem::path smoothed_map;

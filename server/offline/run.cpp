@@ -9,8 +9,10 @@
 #include <numeric>
 #include <sstream>
 
+#include "common/map/map_lines.h"
 #include "server/offline/over_threads.h"
 #include "server/slam/grid/grid_image.h"
+#include "server/slam/matching/keyframe_lines.h"
 #include "server/slam/scan_pipeline.h"
 #include "server/slam/smoothing/smoothed_map.h"
 
@@ -58,9 +60,15 @@ Result<void> WriteResults(const OfflineOptions& options, const Trajectory& onlin
     if (auto written = WriteTum(online, options.trajectory); !written) return written;
   if (!options.map.empty())
     if (auto written = WriteMap(mapper.grid(), options.map); !written) return written;
-  if (!options.smooth) return {};
+  if (!options.smooth && options.map_lines.empty()) return {};
   const slam::MapperSnapshot snapshot = mapper.Snapshot();
+  const auto write_lines = [&](const std::vector<Pose2>& path) {
+    return options.map_lines.empty() ? Result<void>{}
+                                     : WriteMapLines(LinesOfKeyframes(snapshot.keyframes, path), options.map_lines);
+  };
+  if (!options.smooth) return write_lines(snapshot.full_path);
   const auto smoothed = slam::SmoothMap(snapshot, options.slam.grid, [] { return true; });
+  if (auto written = write_lines(smoothed->path); !written) return written;
   if (!options.smoothed_trajectory.empty()) {
     auto written = WriteTum(snapshot.TrajectoryAlong(smoothed->path), options.smoothed_trajectory);
     if (!written) return written;

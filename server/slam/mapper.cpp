@@ -37,6 +37,7 @@ struct Mapper::State {
   void AddKeyframe(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot, ScanView view, const TrackStep& step,
                    const ParallelFor& parallel_for);
   void CloseLargeLoop();
+  void MoveMap();
   void Redraw();
 
   const MapperOptions options;
@@ -116,6 +117,7 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   outcome.covariance = s.filter->estimate().covariance;
   outcome.score = first ? 1.0 : step.match.score;
   outcome.reason = first ? PoseReason::kTracking : ReasonOf(step, s.unmatched_m, s.options.lost_after_m);
+  if (!s.filter->placed()) outcome.reason = PoseReason::kLost;
   if (s.filter->health().diverged || s.self_check.contradicted()) outcome.reason = PoseReason::kDiverged;
   outcome.localized = outcome.reason != PoseReason::kLost && outcome.reason != PoseReason::kDiverged;
   s.level = outcome;
@@ -165,6 +167,7 @@ void Mapper::State::AddKeyframe(std::shared_ptr<const Scan> scan, const Pose2& T
     graph.Append({}, Eigen::Matrix3d::Zero());
     blind_covariance.setZero();
   }
+  const bool placed_before = filter->placed();
   filter->Observe(KeyframeSight{*scan, view, step.T_track_robot, travelled_m}, parallel_for);
   filter->Commit();
   front_end.AddKeyframe(view);
@@ -173,7 +176,8 @@ void Mapper::State::AddKeyframe(std::shared_ptr<const Scan> scan, const Pose2& T
   distances_m = graph.DistancesFromLast();
   CloseLargeLoop();
   self_check.Look(keyframes, shapes, filter->hypothesis(0).path);
-  grid.Draw(*keyframes.back().scan, filter->estimate().T_map_robot);
+  if (!placed_before && filter->placed()) MoveMap();
+  if (filter->placed()) grid.Draw(*keyframes.back().scan, filter->estimate().T_map_robot);
   online_path.push_back(filter->estimate().T_map_robot);
 }
 
@@ -191,6 +195,11 @@ void Mapper::State::CloseLargeLoop() {
   if (!closed.Optimise(path, options.pose_graph).usable || !filter->Rebase(path)) return;
   graph = std::move(closed);
   distances_m = graph.DistancesFromLast();
+  MoveMap();
+}
+
+// The path behind is another one: what was made along the old one goes.
+void Mapper::State::MoveMap() {
   rebased_keyframes = keyframes.size();
   redraw.emplace(options.grid);
   self_check.Forget();
@@ -226,6 +235,7 @@ std::size_t Mapper::keyframe_count() const {
 
 MapperSnapshot Mapper::Snapshot() const {
   MapperSnapshot snapshot;
+  if (!state_->filter->placed()) return snapshot;
   snapshot.keyframes = state_->keyframes;
   snapshot.online_path = state_->online_path;
   snapshot.scans = state_->scans;
@@ -243,7 +253,8 @@ void Mapper::AdoptGrid(OccupancyGrid grid, std::size_t keyframes) {
   const bool outdated = keyframes < s.rebased_keyframes || s.redraw;
   s.redraw.reset();
   const SharedSequence<Pose2> path = s.filter->hypothesis(0).path;
-  for (std::size_t k = keyframes; k < s.keyframes.size(); ++k) s.grid.Draw(*s.keyframes[k].scan, path[k]);
+  for (std::size_t k = keyframes; s.filter->placed() && k < s.keyframes.size(); ++k)
+    s.grid.Draw(*s.keyframes[k].scan, path[k]);
   s.grid.MarkAllDirty();
   if (outdated) s.redraw.emplace(s.options.grid);
 }

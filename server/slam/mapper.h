@@ -47,6 +47,7 @@ class Mapper {
   [[nodiscard]] std::vector<ChunkKey> TakeDirtyChunks();
   [[nodiscard]] std::vector<Landmark> landmarks() const;  // Of the best particle.
   [[nodiscard]] std::size_t keyframe_count() const;
+  // Empty while the robot's place in the map is not known (filter.h: placed).
   [[nodiscard]] MapperSnapshot Snapshot() const;
   // Replaces the grid by one redrawn from the first `keyframes` keyframes (a finished job), then draws the later
   // keyframes onto it along the current best path. Every chunk of the new grid becomes dirty;

@@ -2,8 +2,11 @@
 // the same poses, and a robot with bad wheels kept where it is.
 #include <gtest/gtest.h>
 
+#include "common/map/map_lines.h"
 #include "common/options/config.h"
+#include "server/known_map.h"
 #include "tests/server/support/whole_server.h"
+#include "tests/temp_directory.h"
 
 namespace cairn::server::testing {
 namespace {
@@ -28,6 +31,18 @@ Odometry BadOdometry(int step) {
   return odometry;
 }
 
+// The walls of the room world, as a user would draw them.
+constexpr const char* kRoomLines = R"(cairn-map-lines 1
+side -6 -4  6 -4
+side  6 -4  6  4
+side  6  4 -6  4
+side -6  4 -6 -4
+side 1 1  1 2  # The box, from outside.
+side 1 2  2.5 2
+side 2.5 2  2.5 1
+side 2.5 1  1 1
+)";
+
 class EverySystem : public ::testing::TestWithParam<Choice> {};
 
 TEST_P(EverySystem, KeepsTheRobotWhereItIsInTheServerAsAlone) {
@@ -35,6 +50,9 @@ TEST_P(EverySystem, KeepsTheRobotWhereItIsInTheServerAsAlone) {
   const auto applied = ApplySet({"slam.matcher=" + GetParam().matcher, "slam.filter=" + GetParam().filter},
                                 [&](OptionVisitor& visitor) { Visit(visitor, options); });
   ASSERT_TRUE(applied) << applied.error().message;
+  const TempDirectory directory;
+  options.slam.filter.line_match.file = directory.Write("room.lines", kRoomLines);
+  ASSERT_TRUE(LoadKnownMap(options.slam));
   Trajectory alone;
   slam::ScanPipeline pipeline(options.slam, {}, slam::SerialFor,
                               {.used =
@@ -77,7 +95,8 @@ INSTANTIATE_TEST_SUITE_P(Matchers, EverySystem,
 INSTANTIATE_TEST_SUITE_P(Filters, EverySystem,
                          ::testing::Values(Choice{"voting", "fastslam2_oriented"}, Choice{"voting", "fastslam1"},
                                            Choice{"voting", "ekf"}, Choice{"voting", "dpslam"},
-                                           Choice{"voting", "landmark_correction"}, Choice{"voting", "none"}),
+                                           Choice{"voting", "landmark_correction"}, Choice{"voting", "none"},
+                                           Choice{"voting", "line_match"}),
                          NameOf);
 
 }  // namespace

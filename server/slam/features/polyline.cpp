@@ -86,6 +86,10 @@ void Visit(OptionVisitor& visitor, PolylineOptions& options) {
   visitor.Real("stub_m", options.stub_m, "m", 0.0, 5.0, "Shorter lines outside every chain are dropped.");
 }
 
+std::optional<LineFeature> JoinCollinear(const LineFeature& a, const LineFeature& b, const PolylineOptions& options) {
+  return Collinear(a, b, options) ? std::optional(Join(a, b)) : std::nullopt;
+}
+
 std::vector<LineFeature> MergeCollinear(std::vector<LineFeature> lines, const PolylineOptions& options) {
   // A joined line may reach a further piece, so its row is looked through again; every join removes a line.
   for (std::size_t a = 0; a < lines.size(); ++a) {

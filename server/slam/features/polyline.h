@@ -5,6 +5,7 @@
 // Source: thesis B 3.4.1 (mergeCollinearLines) and 4.2 (polyline structure).
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -28,6 +29,10 @@ struct Polyline {
   std::vector<Eigen::Vector2d> vertices;  // Ends and joints: one more than lines.
   bool closed = false;                    // The last line meets the first: the last vertex is the first again.
 };
+
+// Both as one line, where they are pieces of one.
+[[nodiscard]] std::optional<LineFeature> JoinCollinear(const LineFeature& a, const LineFeature& b,
+                                                       const PolylineOptions& options);
 
 [[nodiscard]] std::vector<LineFeature> MergeCollinear(std::vector<LineFeature> lines, const PolylineOptions& options);
 

@@ -69,6 +69,9 @@ class Filter {
   // takes it, and what it saw moves with the keyframes it was seen from. False where the filter cannot.
   virtual bool Rebase(std::span<const Pose2> /*path*/) { return false; }
 
+  // False: where in `map` the robot is nobody knows yet; its poses are relative to wherever it started. When it is
+  // first placed, the whole path moves.
+  [[nodiscard]] virtual bool placed() const { return true; }
   [[nodiscard]] virtual FilterEstimate estimate() const = 0;
   [[nodiscard]] virtual FilterHealth health() const = 0;
   // Hypothesis 0 is the best one; the others stand for the spread of the belief.

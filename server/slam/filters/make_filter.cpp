@@ -10,8 +10,9 @@
 namespace cairn::slam {
 namespace {
 
-constexpr std::array<std::string_view, 7> kFilterNames = {"fastslam2_points", "fastslam2_oriented",  "fastslam1", "ekf",
-                                                          "dpslam",           "landmark_correction", "none"};
+constexpr std::array<std::string_view, 8> kFilterNames = {
+    "fastslam2_points", "fastslam2_oriented",  "fastslam1", "ekf",
+    "dpslam",           "landmark_correction", "none",      "line_match"};
 
 }  // namespace
 
@@ -32,6 +33,8 @@ void Visit(OptionVisitor& visitor, FilterOptions& options) {
   visitor.Section("fastslam", "FastSLAM, all variants.", [&] { Visit(visitor, options.fastslam); });
   visitor.Section("correction", "landmark_correction: deterministic global localisation.",
                   [&] { Visit(visitor, options.correction); });
+  visitor.Section("line_match", "line_match: localisation in a known map of lines.",
+                  [&] { Visit(visitor, options.line_match); });
   visitor.Section("ekf", "EKF-SLAM.", [&] { Visit(visitor, options.ekf); });
   visitor.Section("dpslam", "DP-SLAM.", [&] { Visit(visitor, options.dpslam); });
 }
@@ -61,6 +64,8 @@ std::unique_ptr<Filter> MakeFilter(FilterKind kind, const FilterOptions& options
       return std::make_unique<LandmarkCorrection>(options.correction, options.back_end, T_map_robot_start);
     case FilterKind::kNone:
       return std::make_unique<DeadReckoningFilter>(options.back_end, T_map_robot_start);
+    case FilterKind::kLineMatch:
+      return std::make_unique<LineLocalization>(options.line_match, options.back_end, T_map_robot_start);
     case FilterKind::kFastSlam2Points:
       break;
   }

@@ -12,6 +12,7 @@
 #include "server/slam/filters/fastslam_options.h"
 #include "server/slam/filters/filter.h"
 #include "server/slam/filters/landmark_correction.h"
+#include "server/slam/filters/line_localization.h"
 
 namespace cairn::slam {
 
@@ -23,6 +24,7 @@ enum class FilterKind : std::uint8_t {
   kDpSlam,               // Thesis C 3.2.3, 4.5: grid maps in the particles' family tree.
   kLandmarkCorrection,   // Thesis A 3.6.2.
   kNone,                 // The front-end's path as it is.
+  kLineMatch,            // Thesis B 2.2.2: localisation in a known map of lines.
 };
 
 struct FilterOptions {
@@ -32,7 +34,8 @@ struct FilterOptions {
   FastSlamOptions fastslam;
   EkfOptions ekf;
   CorrectionOptions correction;
-  LearntMotion motion;   // For fastslam.motion.model and dpslam.motion, in place of the `learnt` they hold.
+  LearntMotion motion;  // For fastslam.motion.model and dpslam.motion, in place of the `learnt` they hold.
+  LocalizationOptions line_match;
   DpSlamOptions dpslam;  // `particles` counts on both levels.
 };
 // The fields of the `slam` section that belong to the filter.

@@ -9,6 +9,12 @@ void ReckonedPath::Advance(const Pose2& T_prev_curr, const Eigen::Matrix3d& cova
   DeadReckon(pose_, covariance_, T_prev_curr, drift_.Covariance(T_prev_curr) + covariance_prev);
 }
 
+void ReckonedPath::MoveTo(const Pose2& T_map_robot) {
+  const Pose2 T_new_old = T_map_robot * pose_.Inverse();
+  for (std::size_t k = 0; k < path_.size(); ++k) path_.Mutable(k) = T_new_old * path_[k];
+  pose_ = T_map_robot;
+}
+
 double ReckonedPath::NisOf(const RevisitObservation& revisit) const {
   Pose2 pose = path_[revisit.keyframe];
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();

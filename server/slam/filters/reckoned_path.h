@@ -21,6 +21,8 @@ class ReckonedPath {
     pose_ = T_map_robot;
     covariance_ = covariance;
   }
+  // The whole path, moved and turned as it is until the pose is this one.
+  void MoveTo(const Pose2& T_map_robot);
 
   // Squared Mahalanobis distance of a revisit (three numbers), were the steps since that keyframe all there is. Changes
   // nothing. Linear in the keyframes since.

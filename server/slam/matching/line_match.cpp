@@ -1,7 +1,6 @@
 #include "server/slam/matching/line_match.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -10,142 +9,233 @@
 namespace cairn::slam {
 namespace {
 
-struct Pair {
-  int map = 0, scan = 0;
+struct Wall {
+  MapLine line;
+  Eigen::Vector2d along, normal;
+  double direction = 0.0, length = 0.0;
+
+  explicit Wall(const MapLine& map_line)
+      : line(map_line),
+        along((map_line.b - map_line.a).normalized()),
+        normal(-along.y(), along.x()),
+        direction(std::atan2(along.y(), along.x())),
+        length((map_line.b - map_line.a).norm()) {}
+  [[nodiscard]] double OffsetOf(const Eigen::Vector2d& p_map) const { return normal.dot(p_map - line.a); }
 };
 
-Eigen::Vector2d Along(const MapLine& line) {
-  return (line.b - line.a).normalized();
+struct Pair {
+  const Wall* wall = nullptr;
+  const LineFeature* line = nullptr;
+};
+
+// Lines whose crossing is a place.
+bool CrossAt(const LineFeature& a, const LineFeature& b) {
+  return std::abs(std::sin(a.slope - b.slope)) > std::sin(Radians(20.0));
 }
+
+// What a set of pairs says of the pose.
+struct Placing {
+  Pose2 T_map_robot;
+  bool placed = false;  // False: from one pair, which gives the heading only.
+};
 
 class Search {
  public:
-  Search(std::span<const MapLine> map, std::span<const LineFeature> scan, const LineMatchOptions& options)
-      : map_(map), scan_(scan), options_(options) {
-    for (std::size_t s = 0; s < scan.size(); ++s) {
-      if (scan[s].length < options.min_line_m) continue;
-      order_.push_back(static_cast<int>(s));
-      all_ += scan[s].length;
+  Search(std::span<const MapLine> map, std::span<const LineFeature> scan, const LineMatchOptions& options,
+         const std::optional<LineMatchWindow>& window)
+      : options_(options), window_(window) {
+    for (const LineFeature& line : scan) {
+      if (line.length < options.min_line_m) continue;
+      order_.push_back(&line);
+      all_m_ += line.length;
     }
-    // SelectScanline: the longest line that is left says most.
-    std::stable_sort(order_.begin(), order_.end(), [&](int a, int b) { return LengthOf(a) > LengthOf(b); });
+    std::ranges::stable_sort(order_, [](const auto* a, const auto* b) { return a->length > b->length; });
+    for (const MapLine& line : map) {
+      const Wall wall(line);
+      if (wall.length + options.overhang_m >= options.min_line_m) walls_.push_back(wall);
+    }
+    std::ranges::stable_sort(walls_, [](const Wall& a, const Wall& b) { return a.direction < b.direction; });
   }
 
   LineMatchAnswer Run() {
-    if (!order_.empty()) Extend(0, 0.0);
-    std::stable_sort(answer_.hypotheses.begin(), answer_.hypotheses.end(),
-                     [](const LineMatchHypothesis& a, const LineMatchHypothesis& b) { return a.share > b.share; });
+    done_.assign(order_.size(), 0);
+    Extend(0.0, {});
+    answer_.complete = comparisons_ <= options_.max_comparisons;
+    std::ranges::stable_sort(answer_.hypotheses, [](const auto& a, const auto& b) { return a.share > b.share; });
     return std::move(answer_);
   }
 
  private:
-  double LengthOf(int s) const { return scan_[static_cast<std::size_t>(s)].length; }
-  void Extend(std::size_t next, double skipped_m);
-  bool Verify(const Pair& added);
-  LineAlignment Solve() const;
-  bool Fits(const Pair& pair, const Pose2& T_map_robot, bool place_known) const;
+  void Extend(double skipped_m, const Placing& placing);
+  [[nodiscard]] std::optional<std::size_t> SelectScanline(const Placing& placing) const;
+  bool Take(const Pair& pair, double skipped_m);  // False: it cannot be.
+  [[nodiscard]] const Wall* BestWall(const LineFeature& line, const Pose2& T_map_robot) const;
+  [[nodiscard]] std::optional<Placing> Verify() const;
+  [[nodiscard]] LineAlignment Solve() const;
+  [[nodiscard]] bool Fits(const Pair& pair, const Placing& placing, double slack) const;
+  [[nodiscard]] bool InWindow(const Pair& first) const;
+  [[nodiscard]] bool InWindow(const Placing& placing) const;
   void Keep(double skipped_m);
+  // Walls that run like this, +-slope_rad; all where nothing is known.
+  template <typename Do>
+  void ForWallsAlong(std::optional<double> direction, double tolerance_rad, const Do& act) const;
 
-  std::span<const MapLine> map_;
-  std::span<const LineFeature> scan_;
   const LineMatchOptions& options_;
-  std::vector<int> order_;
-  double all_ = 0.0;
+  const std::optional<LineMatchWindow>& window_;
+  std::vector<Wall> walls_;                // By direction.
+  std::vector<const LineFeature*> order_;  // The longest first.
+  std::vector<char> done_;                 // Of them: paired or skipped.
+  double all_m_ = 0.0;
   std::vector<Pair> pairs_;
   LineMatchAnswer answer_;
-  std::int64_t verifications_ = 0;
+  mutable std::int64_t comparisons_ = 0;
 };
 
-// LINEMATCH: the next scan line with every map line it can be, or with none.
-void Search::Extend(std::size_t next, double skipped_m) {
-  if (!answer_.complete) return;
-  if (next == order_.size()) {
-    Keep(skipped_m);
+template <typename Do>
+void Search::ForWallsAlong(std::optional<double> direction, double tolerance_rad, const Do& act) const {
+  std::size_t at = 0;
+  if (direction) {
+    const double from = WrapAngle(*direction - tolerance_rad);
+    const auto first = std::ranges::lower_bound(walls_, from, {}, &Wall::direction);
+    at = static_cast<std::size_t>(first - walls_.begin()) % std::max<std::size_t>(walls_.size(), 1);
+  }
+  for (std::size_t k = 0; k < walls_.size() && comparisons_ <= options_.max_comparisons; ++k) {
+    const Wall& wall = walls_[at];
+    if (++at == walls_.size()) at = 0;
+    if (direction && std::abs(AngleDiff(wall.direction, *direction)) > tolerance_rad) return;
+    ++comparisons_;
+    act(wall);
+  }
+}
+
+// The longest line that is left says most; but the second pair has to leave one place.
+std::optional<std::size_t> Search::SelectScanline(const Placing& placing) const {
+  for (std::size_t s = 0; s < order_.size(); ++s) {
+    if (done_[s] != 0) continue;
+    if (pairs_.empty() || placing.placed || CrossAt(*order_[s], *pairs_.front().line)) return s;
+  }
+  return std::nullopt;
+}
+
+// LINEMATCH: the next scan line with every wall it can be, or with none. Once the pairs leave one place, the rest of
+// the scan is no choice any more: each line is the wall it lies on, if it lies on one.
+void Search::Extend(double skipped_m, const Placing& placing) {
+  const auto next = SelectScanline(placing);
+  if (!next) {
+    if (placing.placed) Keep(skipped_m);
     return;
   }
-  const int s = order_[next];
-  for (std::size_t m = 0; m < map_.size(); ++m) {
-    if (++verifications_ > options_.max_verifications) {
-      answer_.complete = false;
-      return;
+  const LineFeature& line = *order_[*next];
+  done_[*next] = 1;
+  bool taken = false;
+  if (placing.placed) {
+    if (const Wall* wall = BestWall(line, placing.T_map_robot)) taken = Take({wall, &line}, skipped_m);
+  } else {
+    std::optional<double> direction;
+    double tolerance = options_.slope_rad;
+    if (!pairs_.empty()) {
+      direction = WrapAngle(placing.T_map_robot.theta + line.slope);
+    } else if (window_) {
+      direction = WrapAngle(window_->T_map_robot.theta + line.slope);
+      tolerance += window_->turn_rad;
     }
-    const Pair pair{static_cast<int>(m), s};
-    pairs_.push_back(pair);
-    if (Verify(pair)) Extend(next + 1, skipped_m);
-    pairs_.pop_back();
+    ForWallsAlong(direction, tolerance, [&](const Wall& wall) {
+      if (line.length > wall.length + options_.overhang_m) return;
+      const Pair pair{&wall, &line};
+      if (InWindow(pair)) Take(pair, skipped_m);
+    });
   }
-  if (skipped_m + LengthOf(s) <= (1.0 - options_.min_share) * all_) Extend(next + 1, skipped_m + LengthOf(s));
+  const double skipped = skipped_m + line.length;
+  if (!taken && skipped <= (1.0 - options_.min_share) * all_m_) Extend(skipped, placing);
+  done_[*next] = 0;
+}
+
+bool Search::Take(const Pair& pair, double skipped_m) {
+  pairs_.push_back(pair);
+  const auto placing = Verify();
+  if (placing) Extend(skipped_m, *placing);
+  pairs_.pop_back();
+  return placing.has_value();
+}
+
+const Wall* Search::BestWall(const LineFeature& line, const Pose2& T_map_robot) const {
+  constexpr double kSlack = 1.5;  // The pose of two pairs is not yet that of all.
+  const Wall* best = nullptr;
+  double least = kSlack * options_.offset_m;
+  const Eigen::Vector2d middle = T_map_robot * line.midpoint();
+  ForWallsAlong(WrapAngle(T_map_robot.theta + line.slope), kSlack * options_.slope_rad, [&](const Wall& wall) {
+    const double offset = std::abs(wall.OffsetOf(middle));
+    if (offset >= least || !Fits({&wall, &line}, {T_map_robot, true}, kSlack)) return;
+    least = offset;
+    best = &wall;
+  });
+  return best;
 }
 
 LineAlignment Search::Solve() const {
   std::vector<WeighedPair> weighed;
   weighed.reserve(pairs_.size());
-  for (const Pair& pair : pairs_) {
-    const MapLine& wall = map_[static_cast<std::size_t>(pair.map)];
-    const LineFeature& line = scan_[static_cast<std::size_t>(pair.scan)];
-    const Eigen::Vector2d along = Along(wall);
-    weighed.push_back({{0.5 * (wall.a + wall.b), {-along.y(), along.x()}}, MidpointAndNormal(line), line.length});
-  }
-  const MapLine& wall = map_[static_cast<std::size_t>(pairs_.front().map)];
-  const LineFeature& line = scan_[static_cast<std::size_t>(pairs_.front().scan)];
-  const Eigen::Vector2d along = Along(wall);
-  const Pose2 turn{0.0, 0.0, AngleDiff(std::atan2(along.y(), along.x()), line.slope)};
-  const Eigen::Vector2d t = 0.5 * (wall.a + wall.b) - turn * line.midpoint();
+  for (const auto& [wall, line] : pairs_)
+    weighed.push_back({{0.5 * (wall->line.a + wall->line.b), wall->normal}, MidpointAndNormal(*line), line->length});
+  const auto& [wall, line] = pairs_.front();
+  const Pose2 turn{0.0, 0.0, AngleDiff(wall->direction, line->slope)};
+  const Eigen::Vector2d t = 0.5 * (wall->line.a + wall->line.b) - turn * line->midpoint();
   LineLeastSquaresOptions solve;
   solve.along_weight = 1e-6;  // Midpoints of a whole wall and of its visible part have nothing in common.
   solve.max_iterations = 6;
+  solve.stop_step = 1e-4;
   return AlignLinePairs(weighed, {t.x(), t.y(), turn.theta}, solve);
 }
 
-bool Search::Fits(const Pair& pair, const Pose2& T_map_robot, bool place_known) const {
-  const MapLine& wall = map_[static_cast<std::size_t>(pair.map)];
-  const LineFeature& line = scan_[static_cast<std::size_t>(pair.scan)];
-  const Eigen::Vector2d along = Along(wall), normal(-along.y(), along.x());
-  const double turn = AngleDiff(std::atan2(along.y(), along.x()), line.slope);
-  if (std::abs(AngleDiff(turn, T_map_robot.theta)) > options_.slope_rad) return false;
-  if (std::abs(normal.dot(T_map_robot * line.midpoint() - wall.a)) > options_.offset_m) return false;
-  if (!place_known) return true;
-  const double from = along.dot(T_map_robot * line.first - wall.a), to = along.dot(T_map_robot * line.last - wall.a);
-  return from >= -options_.overhang_m && to <= (wall.b - wall.a).norm() + options_.overhang_m;
+bool Search::Fits(const Pair& pair, const Placing& placing, double slack) const {
+  const auto& [wall, line] = pair;
+  const Pose2& T = placing.T_map_robot;
+  if (std::abs(AngleDiff(wall->direction, T.theta + line->slope)) > slack * options_.slope_rad) return false;
+  if (std::abs(wall->OffsetOf(T * line->midpoint())) > slack * options_.offset_m) return false;
+  if (!placing.placed) return true;
+  const double from = wall->along.dot(T * line->first - wall->line.a);
+  const double to = wall->along.dot(T * line->last - wall->line.a);
+  return from >= -slack * options_.overhang_m && to <= wall->length + slack * options_.overhang_m;
 }
 
-// VerifyMatch: can all pairs be right at once?
-bool Search::Verify(const Pair& added) {
-  const MapLine& wall = map_[static_cast<std::size_t>(added.map)];
-  if (LengthOf(added.scan) > (wall.b - wall.a).norm() + options_.overhang_m) return false;
-  if (pairs_.size() == 1) return true;
-  // The turn, without solving anything.
-  const auto turn_of = [&](const Pair& pair) {
-    const Eigen::Vector2d along = Along(map_[static_cast<std::size_t>(pair.map)]);
-    return AngleDiff(std::atan2(along.y(), along.x()), scan_[static_cast<std::size_t>(pair.scan)].slope);
-  };
-  if (std::abs(AngleDiff(turn_of(added), turn_of(pairs_.front()))) > options_.slope_rad) return false;
-  const LineAlignment alignment = Solve();
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
-  solver.computeDirect(alignment.H.topLeftCorner<2, 2>());
-  const bool place_known = solver.eigenvalues()(0) > 0.02 * solver.eigenvalues()(1);
-  return std::all_of(pairs_.begin(), pairs_.end(),
-                     [&](const Pair& pair) { return Fits(pair, alignment.T_prev_curr, place_known); });
+bool Search::InWindow(const Pair& first) const {
+  if (!window_) return true;
+  const Eigen::Vector2d middle = first.line->midpoint();
+  const double slack = window_->reach_m + window_->turn_rad * middle.norm() + options_.offset_m;
+  return std::abs(first.wall->OffsetOf(window_->T_map_robot * middle)) <= slack;
+}
+
+bool Search::InWindow(const Placing& placing) const {
+  if (!window_ || !placing.placed) return true;
+  const Pose2 away = Between(window_->T_map_robot, placing.T_map_robot);
+  return away.translation().norm() <= window_->reach_m && std::abs(away.theta) <= window_->turn_rad;
+}
+
+// VerifyMatch: can all pairs be right at once? Then where.
+std::optional<Placing> Search::Verify() const {
+  if (pairs_.size() == 1) {
+    const auto& [wall, line] = pairs_.front();
+    return Placing{{0.0, 0.0, AngleDiff(wall->direction, line->slope)}, false};
+  }
+  const Placing placing{Solve().T_prev_curr, true};  // SelectScanline saw to it.
+  const bool fit = std::ranges::all_of(pairs_, [&](const Pair& pair) { return Fits(pair, placing, 1.0); });
+  return fit && InWindow(placing) ? std::optional(placing) : std::nullopt;
 }
 
 // An assignment becomes a pose where its pairs cross; better than a neighbour, it replaces it.
 void Search::Keep(double skipped_m) {
-  if (pairs_.size() < 2) return;
-  const LineAlignment alignment = Solve();
-  const Pose2 T = alignment.T_prev_curr;
+  const Pose2 T = Solve().T_prev_curr;
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   const double place = 1.0 / (options_.line_sigma_m * options_.line_sigma_m);
-  for (const Pair& pair : pairs_) {
-    const Eigen::Vector2d along = Along(map_[static_cast<std::size_t>(pair.map)]), normal(-along.y(), along.x());
-    const Eigen::Vector2d turned = T.rotation() * scan_[static_cast<std::size_t>(pair.scan)].midpoint();
-    const Eigen::Vector3d J(normal.x(), normal.y(), normal.dot(Eigen::Vector2d(-turned.y(), turned.x())));
+  for (const auto& [wall, line] : pairs_) {
+    const Eigen::Vector2d turned = T.rotation() * line->midpoint();
+    const Eigen::Vector3d J(wall->normal.x(), wall->normal.y(),
+                            wall->normal.dot(Eigen::Vector2d(-turned.y(), turned.x())));
     information += place * J * J.transpose();
     information(2, 2) += 1.0 / (options_.line_slope_sigma_rad * options_.line_slope_sigma_rad);
   }
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(information);
-  if (solver.eigenvalues()(0) < 1e-3 * place) return;  // A corridor is no place.
   LineMatchHypothesis hypothesis{T, information.llt().solve(Eigen::Matrix3d::Identity()),
-                                 all_ > 0.0 ? (all_ - skipped_m) / all_ : 0.0, static_cast<int>(pairs_.size())};
+                                 all_m_ > 0.0 ? (all_m_ - skipped_m) / all_m_ : 0.0, static_cast<int>(pairs_.size())};
   hypothesis.covariance = 0.5 * (hypothesis.covariance + hypothesis.covariance.transpose()).eval();
   for (LineMatchHypothesis& other : answer_.hypotheses) {
     if ((other.T_map_robot.translation() - T.translation()).norm() > options_.same_m ||
@@ -169,12 +259,13 @@ void Visit(OptionVisitor& visitor, LineMatchOptions& options) {
   visitor.Real("same_rad", options.same_rad, "rad", 0.0, kPi, "See same_m.");
   visitor.Real("line_sigma_m", options.line_sigma_m, "m", 1e-4, 1.0, "Of a scan line's place.");
   visitor.Real("line_slope_sigma_rad", options.line_slope_sigma_rad, "rad", 1e-5, 1.0, "Of a scan line's slope.");
-  visitor.Integer("max_verifications", options.max_verifications, "1", 1, 1'000'000'000, "Hard bound on the search.");
+  visitor.Integer("max_comparisons", options.max_comparisons, "1", 1, 1'000'000'000'000,
+                  "Hard bound on the search: of scan lines with map lines.");
 }
 
 LineMatchAnswer MatchLinesWithMap(std::span<const MapLine> map, std::span<const LineFeature> scan,
-                                  const LineMatchOptions& options) {
-  return Search(map, scan, options).Run();
+                                  const LineMatchOptions& options, const std::optional<LineMatchWindow>& window) {
+  return Search(map, scan, options, window).Run();
 }
 
 }  // namespace cairn::slam

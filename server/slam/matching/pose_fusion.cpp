@@ -19,35 +19,20 @@ PoseBelief PoseBelief::Unknown() {
   return {{}, Eigen::Vector3d(1e8, 1e8, 1e4).asDiagonal()};
 }
 
-PoseBelief Predict(const PoseBelief& belief, double distance_m, double turn_rad, const Eigen::Matrix2d& covariance) {
-  const Pose2& T = belief.T_map_robot;
-  const double c = std::cos(T.theta), s = std::sin(T.theta);
-  Eigen::Matrix3d J_pose_pose = Eigen::Matrix3d::Identity();
-  J_pose_pose(0, 2) = -distance_m * s;
-  J_pose_pose(1, 2) = distance_m * c;
-  Eigen::Matrix<double, 3, 2> J_pose_motion;
-  J_pose_motion << c, 0, s, 0, 0, 1;
-  PoseBelief moved{{T.x + distance_m * c, T.y + distance_m * s, WrapAngle(T.theta + turn_rad)},
-                   J_pose_pose * belief.covariance * J_pose_pose.transpose() +
-                       J_pose_motion * covariance * J_pose_motion.transpose()};
-  moved.covariance = 0.5 * (moved.covariance + moved.covariance.transpose()).eval();
-  return moved;
-}
-
 double DistanceOf(const PoseBelief& belief, const LineMatchHypothesis& hypothesis) {
   const Eigen::Vector3d away = From(belief, hypothesis);
   return away.dot((belief.covariance + hypothesis.covariance).ldlt().solve(away));
 }
 
-std::optional<LineMatchHypothesis> Nearest(const PoseBelief& belief, std::span<const LineMatchHypothesis> hypotheses,
-                                           double gate) {
-  std::optional<LineMatchHypothesis> nearest;
+std::optional<std::size_t> Nearest(const PoseBelief& belief, std::span<const LineMatchHypothesis> hypotheses,
+                                   double gate) {
+  std::optional<std::size_t> nearest;
   double best = gate;
-  for (const LineMatchHypothesis& hypothesis : hypotheses) {
-    const double distance = DistanceOf(belief, hypothesis);
+  for (std::size_t h = 0; h < hypotheses.size(); ++h) {
+    const double distance = DistanceOf(belief, hypotheses[h]);
     if (distance >= best) continue;
     best = distance;
-    nearest = hypothesis;
+    nearest = h;
   }
   return nearest;
 }

@@ -1,7 +1,7 @@
-// The Kalman filter of one pose that LineMatch feeds: odometry moves the belief, a hypothesis from the map corrects it.
-// Starting from Unknown(), the first hypothesis is the belief. Frames: T_map_robot. Plain values, thread-safe.
-// Source: thesis B 2.2.2, (2.17)-(2.19). Put right: the third row of (2.17) adds the turn, not the distance; (2.18)
-// fuses the predicted covariance in both lines; headings are fused as differences, wrapped.
+// The Kalman filter of one pose that LineMatch feeds: a hypothesis from the map corrects what the steps led to (2.17:
+// motion/dead_reckoning.h). Starting from Unknown(), the first hypothesis is the belief. Frames: T_map_robot. Plain
+// values, thread-safe. Source: thesis B 2.2.2, (2.18), (2.19). Put right: the third row of (2.17) adds the turn, not
+// the distance; (2.18) fuses the predicted covariance in both lines; headings are fused as differences, wrapped.
 #pragma once
 
 #include <Eigen/Core>
@@ -21,17 +21,13 @@ struct PoseBelief {
   [[nodiscard]] static PoseBelief Unknown();
 };
 
-// (2.17): the robot drove a distance along its heading, then turned. `covariance` of (distance, turn).
-[[nodiscard]] PoseBelief Predict(const PoseBelief& belief, double distance_m, double turn_rad,
-                                 const Eigen::Matrix2d& covariance);
-
 // Squared Mahalanobis distance of a hypothesis from the belief.
 [[nodiscard]] double DistanceOf(const PoseBelief& belief, const LineMatchHypothesis& hypothesis);
 
-// The hypothesis nearest to the belief; nothing where even that is beyond `gate` (chi-square, 3 degrees of freedom).
-[[nodiscard]] std::optional<LineMatchHypothesis> Nearest(const PoseBelief& belief,
-                                                         std::span<const LineMatchHypothesis> hypotheses,
-                                                         double gate = 16.3);
+// Index of the hypothesis nearest to the belief; nothing where even that is beyond `gate` (chi-square, 3 degrees of
+// freedom).
+[[nodiscard]] std::optional<std::size_t> Nearest(const PoseBelief& belief,
+                                                 std::span<const LineMatchHypothesis> hypotheses, double gate = 16.3);
 
 // (2.18)
 [[nodiscard]] PoseBelief Fuse(const PoseBelief& belief, const LineMatchHypothesis& hypothesis);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "server/slam/features/feature_extraction.h"
+#include "server/slam/matching/keyframe_lines.h"
 #include "server/slam/matching/line_least_squares.h"
 #include "tests/studies/scene.h"
 #include "tests/studies/thesis_b/thesis_b.h"
@@ -79,7 +80,7 @@ bool StudyLeastSquares(StudyContext& context, const StudyLog& log) {
       std::vector<slam::WeighedPair> pairs;
       std::vector<LineFeature> moved;
       for (const LineFeature& line : lines) {
-        moved.push_back(SeenFrom(line, T_inverse));
+        moved.push_back(slam::LineIn(T_inverse, line));
         pairs.push_back({slam::MidpointAndNormal(line), slam::MidpointAndNormal(moved.back()), line.length});
       }
       const slam::LineAlignment alignment = slam::AlignLinePairs(pairs, {}, way.options);

@@ -16,14 +16,6 @@ Series LineSeries(std::span<const slam::LineFeature> lines, const Pose2& T, std:
   return series;
 }
 
-slam::LineFeature SeenFrom(const slam::LineFeature& line, const Pose2& T) {
-  slam::LineFeature moved = line;
-  moved.first = T * line.first;
-  moved.last = T * line.last;
-  moved.slope = WrapAngle(line.slope + T.theta);
-  return moved;
-}
-
 namespace {
 
 bool RunThesisB(StudyContext& context) {

@@ -25,9 +25,6 @@ namespace cairn::studies {
 // logs at hand.
 [[nodiscard]] bool StudyLineMatch(StudyContext& context);
 
-// The same line in another frame: its ends and slope (normal_angle and distance keep what they were).
-[[nodiscard]] slam::LineFeature SeenFrom(const slam::LineFeature& line, const Pose2& T);
-
 // The lines as one series of a plot, the pen lifted between them; moved by T.
 [[nodiscard]] Series LineSeries(std::span<const slam::LineFeature> lines, const Pose2& T, std::string label,
                                 int colour);

@@ -1,0 +1,95 @@
+#include "server/slam/filters/line_localization.h"
+
+#include <cmath>
+
+#include "server/slam/matching/pose_fusion.h"
+
+namespace cairn::slam {
+namespace {
+
+// No answer outside of it passes the gate, whatever its own doubt.
+LineMatchWindow WindowOf(const PoseBelief& belief) {
+  constexpr double kSigmas = 4.0, kDoubtM = 0.5, kDoubtRad = Radians(10.0);
+  return {belief.T_map_robot, kDoubtM + kSigmas * std::sqrt(belief.covariance.topLeftCorner<2, 2>().trace()),
+          kDoubtRad + kSigmas * std::sqrt(belief.covariance(2, 2))};
+}
+
+}  // namespace
+
+void Visit(OptionVisitor& visitor, LocalizationOptions& options) {
+  visitor.Text("map", options.file, "File with the lines of the known map; cairn-offline --map-lines writes one.");
+  visitor.Flag("start_known", options.start_known, "The start pose given is about right; else it means nothing.");
+  visitor.Real("start_sigma_m", options.start_sigma_m, "m", 0.001, 100.0, "How right, where start_known.");
+  visitor.Real("start_sigma_rad", options.start_sigma_rad, "rad", 0.001, kPi, "How right, where start_known.");
+  visitor.Real("every_m", options.every_m, "m", 0.0, 100.0, "Way between searches of the whole map.");
+  visitor.Real("reach_m", options.reach_m, "m", 1.0, 1000.0, "Of the lines searched round a known place.");
+  visitor.Real("lost_after_m", options.lost_after_m, "m", 0.1, 1000.0,
+               "Way on which nothing near the belief is found before the robot counts as lost.");
+  visitor.Section("places", "Which of the places found in the whole map is the right one.",
+                  [&] { Visit(visitor, options.places); });
+  visitor.Section("search", "LineMatch.", [&] { Visit(visitor, options.search); });
+}
+
+LineLocalization::LineLocalization(const LocalizationOptions& options, const BackEndOptions& back_end,
+                                   const Pose2& T_map_robot_start)
+    : options_(options),
+      drift_(back_end.drift),
+      path_(back_end.drift, T_map_robot_start),
+      places_(options.places),
+      placed_(options.start_known),
+      tracking_(options.start_known) {
+  if (!options_.map) options_.map = std::make_shared<const std::vector<MapLine>>();
+  if (!options_.start_known) return;
+  const Eigen::Vector3d sigma(options_.start_sigma_m, options_.start_sigma_m, options_.start_sigma_rad);
+  path_.Correct(T_map_robot_start, sigma.cwiseAbs2().asDiagonal());
+}
+
+void LineLocalization::Predict(const StepMotion& step) {
+  path_.Advance(step.T_prev_curr, step.covariance_prev);
+  places_.Predict(step.T_prev_curr, drift_.Covariance(step.T_prev_curr) + step.covariance_prev);
+  nis_ = 0.0;
+  nis_dimension_ = 0;
+}
+
+void LineLocalization::Observe(const KeyframeSight& sight, const ParallelFor& /*parallel_for*/) {
+  Observe(sight.view.features.lines, sight.travelled_m);
+}
+
+void LineLocalization::Observe(std::span<const LineFeature> lines_robot, double travelled_m) {
+  if (tracking_) Follow(lines_robot, travelled_m);
+  if (!tracking_ && travelled_m - searched_at_m_ >= options_.every_m) SearchEverywhere(lines_robot, travelled_m);
+}
+
+void LineLocalization::Follow(std::span<const LineFeature> lines_robot, double travelled_m) {
+  const PoseBelief belief{path_.T_map_robot(), path_.covariance()};
+  const auto near = LinesNear(*options_.map, belief.T_map_robot.translation(), options_.reach_m);
+  const LineMatchAnswer answer = MatchLinesWithMap(near, lines_robot, options_.search, WindowOf(belief));
+  const auto nearest = Nearest(belief, answer.hypotheses);
+  if (!nearest) {
+    tracking_ = travelled_m - found_at_m_ < options_.lost_after_m;
+    return;
+  }
+  found_at_m_ = travelled_m;
+  nis_ = DistanceOf(belief, answer.hypotheses[*nearest]);
+  nis_dimension_ = 3;
+  const PoseBelief fused = Fuse(belief, answer.hypotheses[*nearest]);
+  path_.Correct(fused.T_map_robot, fused.covariance);
+}
+
+void LineLocalization::SearchEverywhere(std::span<const LineFeature> lines_robot, double travelled_m) {
+  searched_at_m_ = travelled_m;
+  places_.Update(MatchLinesWithMap(*options_.map, lines_robot, options_.search));
+  const auto place = places_.settled();
+  if (!place) return;
+  if (!placed_) path_.MoveTo(place->T_map_robot);
+  path_.Correct(place->T_map_robot, place->covariance);
+  placed_ = tracking_ = true;
+  found_at_m_ = travelled_m;
+  places_.Clear();
+}
+
+FilterEstimate LineLocalization::estimate() const {
+  return {path_.T_map_robot(), placed_ ? path_.covariance() : PoseBelief::Unknown().covariance};
+}
+
+}  // namespace cairn::slam
