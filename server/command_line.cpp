@@ -9,7 +9,7 @@
 #include "common/options/config.h"
 #include "common/service/names.h"
 #include "common/version.h"
-#include "server/known_map.h"
+#include "server/setup/known_map.h"
 
 namespace cairn::server {
 namespace {

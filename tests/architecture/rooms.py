@@ -20,7 +20,9 @@ MAY_INCLUDE = {
     "server/inbound.h": COMMON,
     "server/outbound.h": COMMON,
     # Rooms of the server, in the order a scan walks: estimators, the map they feed, work on it, questions about all.
-    "server/offline": SLAM,
+    # Files that options name, read before any estimator is made.
+    "server/setup": SLAM,
+    "server/offline": [*SLAM, "server/setup"],
     "server/calibrate": [*SLAM, "server/offline"],
     "server/ops": [*SLAM, *CHANNELS],
     "server/robots": [*SLAM, *CHANNELS, "server/ops"],
@@ -32,7 +34,7 @@ MAY_INCLUDE = {
     "server/egress": [*SLAM, *CHANNELS, "common/wire", "server/ops"],
     # server.h/.cpp and the programs know every room.
     "server": [*SLAM, *CHANNELS, "common/wire", "server/ops", "server/maps", "server/robots", "server/jobs",
-               "server/queries", "server/ingress", "server/egress"],
+               "server/queries", "server/ingress", "server/egress", "server/setup"],
     "client/lib": [*COMMON, "common/wire"],
     "client/sim": COMMON,
     "client/web": [*COMMON, "client/lib"],
@@ -40,8 +42,7 @@ MAY_INCLUDE = {
     # Tests may look into everything.
     "tests": [*CHANNELS, "common", "common/wire", "server/slam", "server/ops", "server/maps", "server/robots",
               "server/jobs", "server/queries", "server/ingress", "server/egress", "server", "server/offline",
-              "server/calibrate", "client/lib", "client/sim", "client/web",
-              "client/cli"],
+              "server/calibrate", "server/setup", "client/lib", "client/sim", "client/web", "client/cli"],
 }
 
 # The offline programs prove that slam stands alone: single files with less than their room may.

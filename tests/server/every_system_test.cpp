@@ -4,7 +4,7 @@
 
 #include "common/map/map_lines.h"
 #include "common/options/config.h"
-#include "server/known_map.h"
+#include "server/setup/known_map.h"
 #include "tests/server/support/whole_server.h"
 #include "tests/temp_directory.h"
 

@@ -1,4 +1,4 @@
-#include "server/known_map.h"
+#include "server/setup/known_map.h"
 
 #include <memory>
 #include <utility>
