@@ -7,6 +7,8 @@
 namespace cairn::slam {
 namespace {
 
+constexpr int kFoundAgain = 3;  // Keyframes in a row that agree with what was believed before it got lost.
+
 // No answer outside of it passes the gate, whatever its own doubt.
 LineMatchWindow WindowOf(const PoseBelief& belief) {
   constexpr double kSigmas = 4.0, kDoubtM = 0.5, kDoubtRad = Radians(10.0);
@@ -56,24 +58,29 @@ void LineLocalization::Observe(const KeyframeSight& sight, const ParallelFor& /*
 }
 
 void LineLocalization::Observe(std::span<const LineFeature> lines_robot, double travelled_m) {
-  if (tracking_) Follow(lines_robot, travelled_m);
-  if (!tracking_ && travelled_m - searched_at_m_ >= options_.every_m) SearchEverywhere(lines_robot, travelled_m);
+  if (placed_) {
+    found_in_a_row_ = Follow(lines_robot) ? found_in_a_row_ + 1 : 0;
+    if (found_in_a_row_ > 0) found_at_m_ = travelled_m;
+    tracking_ = tracking_ ? travelled_m - found_at_m_ < options_.lost_after_m : found_in_a_row_ >= kFoundAgain;
+  }
+  if (tracking_) {
+    places_.Clear();
+  } else if (travelled_m - searched_at_m_ >= options_.every_m) {
+    SearchEverywhere(lines_robot, travelled_m);
+  }
 }
 
-void LineLocalization::Follow(std::span<const LineFeature> lines_robot, double travelled_m) {
+bool LineLocalization::Follow(std::span<const LineFeature> lines_robot) {
   const PoseBelief belief{path_.T_map_robot(), path_.covariance()};
   const auto near = LinesNear(*options_.map, belief.T_map_robot.translation(), options_.reach_m);
   const LineMatchAnswer answer = MatchLinesWithMap(near, lines_robot, options_.search, WindowOf(belief));
   const auto nearest = Nearest(belief, answer.hypotheses);
-  if (!nearest) {
-    tracking_ = travelled_m - found_at_m_ < options_.lost_after_m;
-    return;
-  }
-  found_at_m_ = travelled_m;
+  if (!nearest) return false;
   nis_ = DistanceOf(belief, answer.hypotheses[*nearest]);
   nis_dimension_ = 3;
   const PoseBelief fused = Fuse(belief, answer.hypotheses[*nearest]);
   path_.Correct(fused.T_map_robot, fused.covariance);
+  return true;
 }
 
 void LineLocalization::SearchEverywhere(std::span<const LineFeature> lines_robot, double travelled_m) {
@@ -85,7 +92,6 @@ void LineLocalization::SearchEverywhere(std::span<const LineFeature> lines_robot
   path_.Correct(place->T_map_robot, place->covariance);
   placed_ = tracking_ = true;
   found_at_m_ = travelled_m;
-  places_.Clear();
 }
 
 FilterEstimate LineLocalization::estimate() const {

@@ -56,7 +56,8 @@ class LineLocalization final : public Filter {
   [[nodiscard]] std::vector<Landmark> landmarks() const override { return {}; }
 
  private:
-  void Follow(std::span<const LineFeature> lines_robot, double travelled_m);
+  // Whether something near the belief was found.
+  bool Follow(std::span<const LineFeature> lines_robot);
   void SearchEverywhere(std::span<const LineFeature> lines_robot, double travelled_m);
 
   LocalizationOptions options_;
@@ -65,6 +66,7 @@ class LineLocalization final : public Filter {
   PlaceHypotheses places_;
   bool placed_ = false;
   bool tracking_ = false;
+  int found_in_a_row_ = 0;       // Keyframes, now.
   double found_at_m_ = 0.0;      // Way at which something near the belief was last found.
   double searched_at_m_ = -1e9;  // The same of the last search of the whole map.
   double nis_ = 0.0;

@@ -17,7 +17,7 @@ namespace cairn::slam {
 
 struct PlaceOptions {
   double memory = 0.8;       // What is left of the evidence at the next search; larger: slower, surer.
-  double settled = 2.5;      // Evidence of the place taken, of at most 1 / (1 - memory) ...
+  double settled = 3.5;      // Evidence of the place taken, of at most 1 / (1 - memory) ...
   double rival_share = 0.6;  // ... and no other place has more than this share of it.
   std::int64_t most = 200;   // Hypotheses kept: those with the most evidence.
 };
