@@ -73,6 +73,14 @@ TEST_F(CommandLine, NonsenseIsAUsageError) {
   }
 }
 
+TEST_F(CommandLine, ADomainOfTheMachineThatIsNoneIsAUsageErrorThatNamesIt) {
+  setenv("CAIRN_DOMAIN", "much", 1);
+  const CommandOutcome outcome = RunLine({"ping"});
+  unsetenv("CAIRN_DOMAIN");
+  EXPECT_EQ(outcome.code, ExitCode::kUsage);
+  EXPECT_THAT(outcome.err, HasSubstr("CAIRN_DOMAIN: wire.domain: 'much'"));
+}
+
 TEST_F(CommandLine, HelpIsNoError) {
   for (const std::vector<std::string>& arguments :
        {std::vector<std::string>{"--help"}, {"replay", "--help"}, {"map", "draw", "--help"}, {"--version"}}) {
