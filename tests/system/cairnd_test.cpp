@@ -251,6 +251,13 @@ TEST_F(Cairnd, BadInputOverTheWireIsCountedAndHarmsNobody) {
   EXPECT_LT(Between(TruePose(19), poses_.values().back().T_map_robot).translation().norm(), 0.1);
 }
 
+// The domain's lock keeps a second cairnd of this machine away; who subscribes to requests is a server of another one.
+TEST_F(Cairnd, SaysWhenAServerOfAnotherMachineJoinsItsDomain) {
+  const auto bus = test::MakeBus("another server");
+  const auto requests = Must(bus->Subscribe<Request>([](Request&&) {}));
+  EXPECT_TRUE(process_->Says("another server serves this DDS domain"));
+}
+
 TEST_F(Cairnd, ASmoothingJobRunsWhileScansStream) {
   Open();
   Drive(0, 30);
