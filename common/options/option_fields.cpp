@@ -147,7 +147,7 @@ std::string ProblemOf(const Assignment& assignment, const Assigner& checked) {
 }
 
 std::string WithUnit(const std::string& text, std::string_view unit) {
-  return unit.empty() ? text : text + " " + std::string(unit);
+  return unit.empty() || unit == "1" ? text : text + " " + std::string(unit);
 }
 
 }  // namespace
