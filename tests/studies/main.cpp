@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "common/version.h"
 #include "tests/studies/study.h"
 
 namespace cairn::studies {
@@ -50,6 +51,7 @@ int Main(int argc, char** argv) {
   bool quick = false;
   std::uint64_t seed = 1;
   CLI::App app{"Measures the estimators and draws the figures: tables, plots, a Markdown report."};
+  app.set_version_flag("--version", std::string("cairn-study ") + kVersion);
   app.add_option("NAME", name, "`list` prints the studies")->required();
   app.add_option("--out", out, "Folder for report.md, tables and pictures; without it only text is printed");
   app.add_flag("--quick", quick, "Seconds instead of minutes");
