@@ -45,22 +45,14 @@ std::optional<CommandLine> ParseCommandLine(int argc, char** argv, int& exit_cod
     return std::nullopt;
   }
 
+  exit_code = kUsage;  // Of whatever is wrong from here on.
   CommandLine line;
   const VisitOptions visit = [&line](OptionVisitor& visitor) { Visit(visitor, line.options); };
-  if (!config.empty() && Complain(ApplyYamlFile(config, visit))) {
-    exit_code = kUsage;
-    return std::nullopt;
-  }
+  if (!config.empty() && Complain(ApplyYamlFile(config, visit))) return std::nullopt;
   if (!log_level.empty()) arguments.assignments.push_back("server.log_level=" + log_level);
-  if (Complain(Apply(arguments, visit))) {
-    exit_code = kUsage;
-    return std::nullopt;
-  }
-  for (const std::string& site : line.options.server.server.site_names()) {
-    if (!Complain(ValidateName("server.sites", site))) continue;
-    exit_code = kUsage;
-    return std::nullopt;
-  }
+  if (Complain(Apply(arguments, visit)) || Complain(Validate(line.options.wire))) return std::nullopt;
+  for (const std::string& site : line.options.server.server.site_names())
+    if (Complain(ValidateName("server.sites", site))) return std::nullopt;
   if (print_config) line.task = Task::kPrintConfig;
   if (check_config) line.task = Task::kCheckConfig;
   return line;

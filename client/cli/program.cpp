@@ -100,8 +100,10 @@ ExitCode RunCairn(const std::vector<std::string>& arguments, std::ostream& out, 
   const VisitOptions visit = [&options = program.options](OptionVisitor& visitor) {
     visitor.Section("wire", "The DDS side.", [&] { Visit(visitor, options.wire); });
   };
-  if (const auto applied = Apply(wire, visit); !applied) {
-    err << "cairn: " << applied.error().message << "\n";
+  auto valid = Apply(wire, visit);
+  if (valid) valid = Validate(program.options.wire);
+  if (!valid) {
+    err << "cairn: " << valid.error().message << "\n";
     return ExitCode::kUsage;
   }
   return program.action();

@@ -64,6 +64,7 @@ TEST_F(CommandLine, NonsenseIsAUsageError) {
       {"ping", "--timeout", "soon"},
       {"ping", "--domain", "233"},
       {"ping", "--set", "wire.colour=red"},
+      {"ping", "--set", "wire.interfaces=eth0"},
       {"ping", "--set", "wire.liveliness_lease_s=-1"}};
   for (const auto& arguments : wrong) {
     const CommandOutcome outcome = RunLine(arguments);
