@@ -29,18 +29,17 @@ int RunNamed(const Study& study, const std::filesystem::path& out, bool quick, s
   StudyContext context{report, quick, seed, logs, only};
   if (!only.empty()) report.Warn("only what is called *" + only + "*");
   if (quick) report.Warn("a quick run: fewer trials and shorter logs than the study is meant for");
-  bool plausible = false;
   try {
-    plausible = study.run(context);
+    study.run(context);
   } catch (const std::exception& error) {
-    report.Warn(std::string("the study ended early: ") + error.what());
+    report.Fault(std::string("the study ended early: ") + error.what());
   }
   if (const auto written = report.Finish(); !written) {
     std::cerr << "cairn-study: " << written.error().message << '\n';
     return 1;
   }
-  if (!plausible) std::cerr << "cairn-study: " << study.name << " FAILED; lines that start with !! say why\n";
-  return plausible ? 0 : 1;
+  if (report.failed()) std::cerr << "cairn-study: " << study.name << " FAILED; lines that start with !! say why\n";
+  return report.failed() ? 1 : 0;
 }
 
 int Main(int argc, char** argv) {

@@ -26,16 +26,16 @@ slam::LineFeature SeenFrom(const slam::LineFeature& line, const Pose2& T) {
 
 namespace {
 
-bool RunThesisB(StudyContext& context) {
+void RunThesisB(StudyContext& context) {
   context.report.Text(
       "Thesis B tests on scans its authors made with the Stage simulator in the map of their own department, which is "
       "**not at hand** (nor are the Jones Farm and Mine logs): one scan of the first log at hand and the simulated "
       "`corridor` and `building` stand in. It prints curves, hardly any numbers; its words stand beside ours.");
   const std::vector<StudyLog> logs = ChooseLogs(context, {"mit-csail", "intel"}, context.Pick(4000, 400));
-  bool plausible = StudyLeastSquares(context, logs.front());
-  plausible = StudyAssociation(context) && plausible;
-  plausible = StudyTracking(context, logs) && plausible;
-  return StudyLineMatch(context) && plausible;
+  StudyLeastSquares(context, logs.front());
+  StudyAssociation(context);
+  StudyTracking(context, logs);
+  StudyLineMatch(context);
 }
 
 const Registration kRegistered{
