@@ -43,8 +43,9 @@ mount -t overlay -o "lowerdir=$tree/root,upperdir=/run/over/upper,workdir=/run/o
 umount -R /sys/fs/cgroup 2>/dev/null || true
 mount -t cgroup2 cgroup2 /sys/fs/cgroup
 
-DESTDIR=/run/root cmake --install "$build" --prefix /usr/local >/run/installed
-DESTDIR=/run/root cmake --install "$build" --prefix /usr/local | grep -q 'cairnd.yaml.default$'
+# Twice: the second keeps the configuration that is there. (Not into a pipe: grep -q would end before cmake has said all.)
+for _ in first second; do DESTDIR=/run/root cmake --install "$build" --prefix /usr/local >/run/installed; done
+grep -q 'cairnd.yaml.default$' /run/installed
 cp "$here/service_checks.sh" /run/root/opt/
 cat >/run/root/etc/systemd/system/checks.service <<'UNIT'
 [Service]
