@@ -1,5 +1,5 @@
 // cairnd's command line: what to do, and with which options. Precedence, lowest first: defaults, --config, --set,
-// --domain, --log-level; CAIRN_DOMAIN stands above the file, below the command line.
+// --domain, --log-level; CAIRN_DOMAIN stands between the file and --set (common/wire/wire_arguments.h).
 #pragma once
 
 #include <optional>

@@ -37,20 +37,19 @@ void LogConfig(const CairndOptions& options) {
 }
 
 // Servers of other machines are found only once both run.
-void WarnOfOthers(asio::steady_timer& timer, const OtherServers& others, int known) {
+void WarnOfOthers(asio::steady_timer& timer, OtherServers& others) {
   timer.expires_after(std::chrono::seconds(1));
-  timer.async_wait([&timer, &others, known](const asio::error_code& error) {
+  timer.async_wait([&timer, &others](const asio::error_code& error) {
     if (error) return;
-    const int count = others.count();
-    if (count > known)
+    if (others.Joined())
       spdlog::error("another server serves this DDS domain: robots and people get half the truth from each; stop one");
-    WarnOfOthers(timer, others, count);
+    WarnOfOthers(timer, others);
   });
 }
 
 // Runs until SIGTERM or SIGINT; feeds the watchdog while the server is healthy.
-void WaitForSignal(asio::io_context& context, asio::signal_set& signals, const Server& server,
-                   const OtherServers& others, const ServiceNotifier& notifier) {
+void WaitForSignal(asio::io_context& context, asio::signal_set& signals, const Server& server, OtherServers& others,
+                   const ServiceNotifier& notifier) {
   signals.async_wait([&context](const asio::error_code& error, int signal) {
     if (!error) spdlog::info("signal {}: stopping", signal);
     context.stop();
@@ -66,7 +65,7 @@ void WaitForSignal(asio::io_context& context, asio::signal_set& signals, const S
   };
   if (watchdog) feed({});
   asio::steady_timer second(context);
-  WarnOfOthers(second, others, 0);
+  WarnOfOthers(second, others);
   context.run();
 }
 
@@ -121,6 +120,9 @@ int Main(int argc, char** argv) {
       std::cout << PrintConfig(line->options);
       return 0;
     case Task::kCheckConfig:
+      // It may be meant for another machine, or for this one with its network up.
+      if (const auto present = wire::RequireInterfaces(line->options.wire); !present)
+        std::cerr << "cairnd: warning: " << present.error().message << "; without it cairnd does not start\n";
       std::cout << "the configuration is valid\n";
       return 0;
     case Task::kServe:

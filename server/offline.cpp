@@ -2,6 +2,7 @@
 // Exit codes: 0 done, 1 failed, 2 wrong command line.
 #include <iostream>
 
+#include "server/offline/json_text.h"
 #include "server/offline/options.h"
 #include "server/offline/run.h"
 
@@ -11,6 +12,7 @@ int main(int argc, char** argv) {
   if (!options) return exit_code;
   const auto report = cairn::server::RunOffline(*options);
   if (!report) {
+    if (options->json) std::cout << cairn::server::ErrorJson(report.error());
     std::cerr << "cairn-offline: " << report.error().message << '\n';
     return 1;
   }

@@ -66,22 +66,22 @@ class ChildProcess {
     return false;
   }
 
+  // Reads on until its output holds the text; false where it ends, or the deadline passes, without.
+  bool Says(const std::string& text, std::chrono::seconds deadline = std::chrono::seconds(60)) {
+    const auto end = std::chrono::steady_clock::now() + deadline;
+    while (said_.find(text) == std::string::npos)
+      if (Read(end) != Output::kMore) return false;
+    return true;
+  }
+
   // Reads to the end of its output, then its exit code; killed where it takes longer than the deadline.
   Outcome Wait(std::chrono::seconds deadline = std::chrono::seconds(60)) {
-    Outcome outcome;
     const auto end = std::chrono::steady_clock::now() + deadline;
-    pollfd readable{.fd = output_, .events = POLLIN, .revents = 0};
-    std::array<char, 4096> buffer{};
-    while (true) {
-      const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
-      if (left.count() <= 0 || poll(&readable, 1, static_cast<int>(left.count())) == 0) {
-        kill(pid_, SIGKILL);
-        break;
-      }
-      const ssize_t count = read(output_, buffer.data(), buffer.size());
-      if (count <= 0) break;
-      outcome.output.append(buffer.data(), static_cast<std::size_t>(count));
-    }
+    Output output = Output::kMore;
+    while (output == Output::kMore) output = Read(end);
+    if (output == Output::kLate) kill(pid_, SIGKILL);
+    Outcome outcome;
+    outcome.output = std::exchange(said_, {});
     int status = 0;
     waitpid(std::exchange(pid_, -1), &status, 0);
     if (WIFEXITED(status)) outcome.exit_code = WEXITSTATUS(status);
@@ -89,8 +89,23 @@ class ChildProcess {
   }
 
  private:
+  enum class Output { kMore, kEnded, kLate };
+
+  // Waits for the next piece of output, and keeps it.
+  Output Read(std::chrono::steady_clock::time_point end) {
+    pollfd readable{.fd = output_, .events = POLLIN, .revents = 0};
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
+    if (left.count() <= 0 || poll(&readable, 1, static_cast<int>(left.count())) == 0) return Output::kLate;
+    std::array<char, 4096> buffer{};
+    const ssize_t count = read(output_, buffer.data(), buffer.size());
+    if (count <= 0) return Output::kEnded;
+    said_.append(buffer.data(), static_cast<std::size_t>(count));
+    return Output::kMore;
+  }
+
   pid_t pid_ = -1;
   int output_ = -1;
+  std::string said_;  // Read, and not yet handed over.
 };
 
 }  // namespace cairn

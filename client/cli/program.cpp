@@ -2,9 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <cstdlib>
 #include <exception>
-#include <optional>
 #include <utility>
 
 #include "client/cli/commands.h"
@@ -12,6 +10,7 @@
 #include "client/cli/quantity_text.h"
 #include "common/options/config.h"
 #include "common/version.h"
+#include "common/wire/wire_arguments.h"
 
 namespace cairn::client {
 
@@ -56,13 +55,7 @@ ExitCode Program::Refuse(const Status& status) {
 
 namespace {
 
-// What may be said of the wire, least first: CAIRN_DOMAIN, --set, --domain.
-struct WireArguments {
-  std::vector<std::string> assignments;
-  std::optional<std::int64_t> domain;
-};
-
-void AddGlobalOptions(CLI::App& app, Program& program, WireArguments& wire) {
+void AddGlobalOptions(CLI::App& app, Program& program, wire::WireArguments& wire) {
   GlobalOptions& options = program.options;
   app.add_option("--domain", wire.domain, "DDS domain of server and robots [CAIRN_DOMAIN, or 0]");
   app.add_option("--set", wire.assignments, "Any option of the wire, e.g. wire.interfaces=192.168.1.5")
@@ -72,23 +65,11 @@ void AddGlobalOptions(CLI::App& app, Program& program, WireArguments& wire) {
   app.add_flag("--json", options.json, "One JSON object on standard output, for machines");
 }
 
-Result<void> ApplyWire(GlobalOptions& options, WireArguments arguments) {
-  const VisitOptions visit = [&options](OptionVisitor& visitor) {
-    visitor.Section("wire", "The DDS side.", [&] { wire::Visit(visitor, options.wire); });
-  };
-  if (const char* of_machine = std::getenv("CAIRN_DOMAIN"); of_machine != nullptr && *of_machine != '\0') {
-    if (const auto applied = ApplySet({std::string("wire.domain=") + of_machine}, visit); !applied)
-      return Fail(applied.error().code, "CAIRN_DOMAIN: " + applied.error().message);
-  }
-  if (arguments.domain) arguments.assignments.push_back("wire.domain=" + std::to_string(*arguments.domain));
-  return ApplySet(arguments.assignments, visit);
-}
-
 }  // namespace
 
 ExitCode RunCairn(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err) {
   Program program(out, err);
-  WireArguments wire;
+  wire::WireArguments wire;
   CLI::App app("Stream robots to a Cairn server, ask it for poses and maps, start its jobs.", "cairn");
   app.set_version_flag("--version", std::string("cairn ") + kVersion);
   app.footer(
@@ -116,8 +97,13 @@ ExitCode RunCairn(const std::vector<std::string>& arguments, std::ostream& out, 
     const int code = app.exit(error, out, err);
     return code == 0 ? ExitCode::kOk : ExitCode::kUsage;
   }
-  if (const auto applied = ApplyWire(program.options, std::move(wire)); !applied) {
-    err << "cairn: " << applied.error().message << "\n";
+  const VisitOptions visit = [&options = program.options](OptionVisitor& visitor) {
+    visitor.Section("wire", "The DDS side.", [&] { Visit(visitor, options.wire); });
+  };
+  auto valid = Apply(wire, visit);
+  if (valid) valid = Validate(program.options.wire);
+  if (!valid) {
+    err << "cairn: " << valid.error().message << "\n";
     return ExitCode::kUsage;
   }
   return program.action();

@@ -6,41 +6,11 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <optional>
 #include <utility>
-#include <vector>
+
+#include "common/options/number_text.h"
 
 namespace cairn::client {
-namespace {
-
-// A finite number at the start of the text, and what follows it.
-std::optional<std::pair<double, std::string>> SplitNumber(const std::string& text) {
-  // strtod's spaces, hexadecimal, inf and nan are not wanted.
-  if (text.empty() || text.find_first_not_of("+-.0123456789eE") == 0) return std::nullopt;
-  if (text.find_first_of("xX") != std::string::npos) return std::nullopt;
-  try {
-    std::size_t used = 0;
-    const double value = std::stod(text, &used);
-    if (!std::isfinite(value)) return std::nullopt;
-    return std::pair(value, text.substr(used));
-  } catch (const std::exception&) {
-    return std::nullopt;
-  }
-}
-
-std::vector<std::string> SplitAtCommas(const std::string& text) {
-  std::vector<std::string> parts(1);
-  for (const char c : text) {
-    if (c == ',') {
-      parts.emplace_back();
-    } else if (c != ' ') {
-      parts.back() += c;
-    }
-  }
-  return parts;
-}
-
-}  // namespace
 
 Result<double> ParseDuration(const std::string& text) {
   static constexpr std::array<std::pair<std::string_view, double>, 5> kUnits = {
@@ -52,27 +22,6 @@ Result<double> ParseDuration(const std::string& text) {
     }
   }
   return Fail(StatusCode::kInvalidArgument, fmt::format("'{}' is not a duration such as 5, 2.5s, 500ms, 3m, 1h", text));
-}
-
-Result<Pose2> ParsePose(const std::string& text) {
-  const auto parts = SplitAtCommas(text);
-  std::array<double, 3> values{};
-  bool good = parts.size() == 3;
-  for (std::size_t i = 0; good && i < 3; ++i) {
-    const auto number = SplitNumber(parts[i]);
-    const bool degrees = i == 2 && number && number->second == "deg";
-    good = number && (number->second.empty() || degrees);
-    if (good) values[i] = degrees ? Radians(number->first) : number->first;
-  }
-  if (!good || std::abs(values[2]) > 1e6) {
-    return Fail(StatusCode::kInvalidArgument,
-                fmt::format("'{}' is not a pose such as 1.5,-2,0.79 (metres, radians) or 1.5,-2,45deg", text));
-  }
-  return Pose2{values[0], values[1], WrapAngle(values[2])};
-}
-
-Result<std::optional<Pose2>> ParseStart(const std::string& text) {
-  return ParsePose(text).map([](const Pose2& pose) { return std::optional(pose); });
 }
 
 Result<Area> ParseArea(const std::string& text) {

@@ -1,10 +1,8 @@
 // What people type on the command line, read strictly: "12x" is an error, not 12. Every error names the text.
 #pragma once
 
-#include <optional>
 #include <string>
 
-#include "common/geometry/pose2.h"
 #include "common/map/tile.h"
 #include "common/service/request.h"
 #include "common/status.h"
@@ -13,11 +11,6 @@ namespace cairn::client {
 
 // Seconds: "5", "2.5s", "500ms", "3m", "1h". Not negative.
 [[nodiscard]] Result<double> ParseDuration(const std::string& text);
-
-// "x,y,theta" in metres and radians, or degrees where the last part ends in "deg": "1.5,-2,90deg".
-[[nodiscard]] Result<Pose2> ParsePose(const std::string& text);
-
-[[nodiscard]] Result<std::optional<Pose2>> ParseStart(const std::string& text);
 
 // "x_min,y_min,x_max,y_max" in metres, with x_min < x_max and y_min < y_max.
 [[nodiscard]] Result<Area> ParseArea(const std::string& text);

@@ -13,6 +13,7 @@
 #include "client/cli/quantity_text.h"
 #include "client/cli/robot_stream.h"
 #include "client/cli/window_option.h"
+#include "common/service/start_pose.h"
 
 namespace cairn::client {
 namespace {

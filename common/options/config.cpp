@@ -1,9 +1,12 @@
 #include "common/options/config.h"
 
+#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include <exception>
+#include <optional>
 #include <set>
+#include <sstream>
 
 #include "common/file/atomic_file.h"
 #include "common/options/option_fields.h"
@@ -16,6 +19,35 @@ constexpr std::size_t kMaxConfigBytes = 1u << 20;
 constexpr int kDeepest = 32;
 constexpr std::size_t kMostValues = 10'000;
 
+// Hears where documents begin; what is in them is not looked at.
+class DocumentStarts final : public YAML::EventHandler {
+ public:
+  [[nodiscard]] int line() const { return line_; }
+
+  void OnDocumentStart(const YAML::Mark& mark) override { line_ = mark.line; }
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
+  void OnMapEnd() override {}
+
+ private:
+  int line_ = 0;
+};
+
+// The line, from 0, where something follows the first document, which is all that YAML::Load reads. (YAML::LoadAll
+// would tell, but on a text such as ", a" it never ends.)
+std::optional<int> LineAfterFirstDocument(const std::string& text) {
+  std::istringstream stream(text);
+  YAML::Parser parser(stream);
+  DocumentStarts starts;
+  const bool follows = parser.HandleNextDocument(starts) && parser.HandleNextDocument(starts);
+  return follows ? std::optional(starts.line()) : std::nullopt;
+}
+
 // Collects the leaves of a YAML tree as assignments. Returns the first problem, or nothing.
 class Flattening {
  public:
@@ -23,7 +55,7 @@ class Flattening {
 
   std::string Take(const YAML::Node& node, const std::string& key, int depth) {
     if (depth > kDeepest || assignments_.size() > kMostValues) return Place(node) + ": nested too deeply or too large";
-    if (node.IsNull()) return {};  // A section with nothing in it.
+    if (node.IsNull()) return {};  // A text with nothing in it.
     if (node.IsSequence()) return Place(node) + ": " + (key.empty() ? "" : key + ": ") + "lists are not used here";
     if (node.IsScalar()) {
       if (key.empty()) return Place(node) + ": not a tree of keys and values";
@@ -36,6 +68,11 @@ class Flattening {
       const std::string& name = entry.first.Scalar();
       const std::string full = key.empty() ? name : key + "." + name;
       if (!names.insert(name).second) return Place(entry.first) + ": " + full + ": given twice";
+      if (entry.second.IsNull() || (entry.second.IsMap() && entry.second.size() == 0)) {
+        // The place of nothing would be that of the next token.
+        assignments_.push_back({Place(entry.first), full, std::nullopt});
+        continue;
+      }
       if (std::string problem = Take(entry.second, full, depth + 1); !problem.empty()) return problem;
     }
     return {};
@@ -60,6 +97,10 @@ Result<void> ApplyYaml(const std::string& text, const std::string& source, const
   try {
     const std::string problem = flat.Take(YAML::Load(text), "", 0);
     if (!problem.empty()) return Fail(StatusCode::kInvalidArgument, problem);
+    if (const auto line = LineAfterFirstDocument(text)) {
+      return Fail(StatusCode::kInvalidArgument,
+                  source + ":" + std::to_string(*line + 1) + ": a second document; all keys belong into one");
+    }
   } catch (const YAML::Exception& error) {
     const int line = error.mark.line;
     return Fail(StatusCode::kInvalidArgument,

@@ -1,6 +1,7 @@
 // Fills an options tree from YAML text and `key=value` overrides, prints it, and lists every key. All keys have
 // defaults; an unknown key, a wrong type or a value out of range is an error that names source, line, full dotted key,
-// the value and the allowed range, and suggests the nearest known key.
+// the value and the allowed range, and suggests the nearest known key. So is a key alone, without a value: only a
+// section may be empty (`slam:` with every line below it commented out). A file is one YAML document.
 #pragma once
 
 #include <filesystem>

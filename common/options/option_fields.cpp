@@ -82,7 +82,9 @@ class Assigner final : public SectionVisitor {
   }
   void Text(std::string_view key, std::string& value, std::string_view /*help*/) override {
     const Assignment* given = Find(key);
-    if (given != nullptr && write_) value = given->text;
+    if (given == nullptr) return;
+    if (!given->text) return Complain(*given, "", "a text; an empty one is \"\"");
+    if (write_) value = *given->text;
   }
   void Choice(std::string_view key, int& value, std::span<const std::string_view> names,
               std::string_view /*help*/) override {
@@ -117,14 +119,16 @@ class Assigner final : public SectionVisitor {
     const Assignment* given = Find(key);
     if (given == nullptr) return;
     Value parsed{};
-    if (!Parse(given->text, parsed)) return Complain(*given, "is not " + what, RangeText(min, max, unit));
+    if (!given->text || !Parse(*given->text, parsed))
+      return Complain(*given, "is not " + what, RangeText(min, max, unit));
     if (!(parsed >= min && parsed <= max)) return Complain(*given, "is out of range", RangeText(min, max, unit));
     if (write_) value = parsed;
   }
 
   void Complain(const Assignment& given, const std::string& problem, const std::string& allowed) {
     constexpr std::size_t kLongest = 60;
-    problems_[given.key] = "'" + given.text.substr(0, kLongest) + "' " + problem + " (allowed: " + allowed + ")";
+    const std::string what = given.text ? "'" + given.text->substr(0, kLongest) + "' " + problem : "has no value";
+    problems_[given.key] = what + " (allowed: " + allowed + ")";
   }
 
   const std::map<std::string, const Assignment*>& assignments_;
@@ -133,16 +137,17 @@ class Assigner final : public SectionVisitor {
   std::map<std::string, std::string> problems_;
 };
 
-std::string ProblemOf(const std::string& key, const Assigner& checked) {
+std::string ProblemOf(const Assignment& assignment, const Assigner& checked) {
+  const std::string& key = assignment.key;
   if (const auto found = checked.problems().find(key); found != checked.problems().end()) return found->second;
   if (checked.keys().count(key) > 0 || checked.IsForeign(key)) return {};
-  if (checked.sections().count(key) > 0) return "is a section, not a single value";
+  if (checked.sections().count(key) > 0) return assignment.text ? "is a section, not a single value" : "";
   const std::string nearest = NearestKey(key, checked.keys());
   return "unknown key" + (nearest.empty() ? "" : " (did you mean " + nearest + "?)");
 }
 
 std::string WithUnit(const std::string& text, std::string_view unit) {
-  return unit.empty() ? text : text + " " + std::string(unit);
+  return unit.empty() || unit == "1" ? text : text + " " + std::string(unit);
 }
 
 }  // namespace
@@ -161,7 +166,7 @@ Result<void> Assign(const std::vector<Assignment>& assignments, const VisitOptio
   Assigner check(by_key, false);
   visit(check);
   for (const Assignment& assignment : assignments) {
-    const std::string problem = ProblemOf(assignment.key, check);
+    const std::string problem = ProblemOf(assignment, check);
     if (!problem.empty()) {
       return Fail(StatusCode::kInvalidArgument, assignment.place + ": " + assignment.key + ": " + problem);
     }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,9 +13,9 @@
 namespace cairn {
 
 struct Assignment {
-  std::string place;  // For errors: "cairnd.yaml:12" or "--set".
-  std::string key;    // Full dotted key.
-  std::string text;
+  std::string place;                // For errors: "cairnd.yaml:12" or "--set".
+  std::string key;                  // Full dotted key.
+  std::optional<std::string> text;  // Nothing: the key stands alone, which only a section may.
 };
 
 // Assigns all, or nothing where one is in error. Later assignments of a key win.

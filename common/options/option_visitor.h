@@ -14,6 +14,7 @@ namespace cairn {
 class OptionVisitor {
  public:
   virtual ~OptionVisitor() = default;
+  // `unit` is "" or "1" where there is none; neither is printed.
   virtual void Section(std::string_view key, std::string_view help, const std::function<void()>& fields) = 0;
   virtual void Real(std::string_view key, double& value, std::string_view unit, double min, double max,
                     std::string_view help) = 0;

@@ -28,8 +28,10 @@ struct WireOptions {
   double liveliness_lease_s = 1.0;
   double participant_lease_s = 3.0;
 };
-// Domain, addresses (IPv4, present on this machine) and leases.
+// Domain, addresses (IPv4, each once) and leases: what is wrong on every machine, and at any time.
 [[nodiscard]] Result<void> Validate(const WireOptions& options);
+// Of valid options: that this machine has the addresses now. kUnavailable where not; a network may be up later.
+[[nodiscard]] Result<void> RequireInterfaces(const WireOptions& options);
 void Visit(OptionVisitor& visitor, WireOptions& options);  // `interfaces` as one comma-separated text.
 
 template <typename Value>

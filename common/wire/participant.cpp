@@ -88,6 +88,7 @@ Status Broken(const std::string& what) {
 
 Result<std::shared_ptr<Participant>> Participant::Create(const WireOptions& options, const std::string& name) {
   if (const Result<void> valid = Validate(options); !valid) return tl::unexpected(valid.error());
+  if (const Result<void> present = RequireInterfaces(options); !present) return tl::unexpected(present.error());
   ConfigureLibraryOnce();
   const std::shared_ptr<Participant> made(new Participant(options));
   made->participant_ = fd::DomainParticipantFactory::get_instance()->create_participant(

@@ -48,21 +48,35 @@ std::vector<std::string> Split(const std::string& text) {
 Result<void> Validate(const WireOptions& options) {
   constexpr std::int64_t kMaxDomain = 232;  // Beyond, ports leave 16 bits (RTPS 9.6.1.1).
   if (options.domain < 0 || options.domain > kMaxDomain) {
-    return Fail(StatusCode::kInvalidArgument, "domain " + std::to_string(options.domain) + " is not in 0..232");
+    return Fail(StatusCode::kInvalidArgument, "wire.domain: " + std::to_string(options.domain) + " is not in 0..232");
   }
   if (options.interfaces.empty()) {
-    return Fail(StatusCode::kInvalidArgument, "interfaces: name at least one IPv4 address of this machine");
+    return Fail(StatusCode::kInvalidArgument, "wire.interfaces: name at least one IPv4 address of this machine");
   }
-  const std::set<std::string> local = LocalAddresses();
+  std::set<std::string> addresses;
   for (const std::string& address : options.interfaces) {
-    // Fast DDS would silently ignore it, and bind nothing.
-    if (local.count(address) == 0) {
-      return Fail(StatusCode::kInvalidArgument, "interfaces: " + address + " is not an IPv4 address of this machine");
+    in_addr bytes{};
+    if (inet_pton(AF_INET, address.c_str(), &bytes) != 1) {
+      return Fail(StatusCode::kInvalidArgument, "wire.interfaces: '" + address + "' is not an IPv4 address");
+    }
+    if (!addresses.insert(address).second) {
+      return Fail(StatusCode::kInvalidArgument, "wire.interfaces: " + address + " is named twice");
     }
   }
   for (const double lease : {options.liveliness_lease_s, options.participant_lease_s}) {
     if (!std::isfinite(lease) || lease < 0.1 || lease > 3600.0) {
-      return Fail(StatusCode::kInvalidArgument, "a lease of " + std::to_string(lease) + " s is not in 0.1..3600");
+      return Fail(StatusCode::kInvalidArgument, "wire: a lease of " + std::to_string(lease) + " s is not in 0.1..3600");
+    }
+  }
+  return {};
+}
+
+Result<void> RequireInterfaces(const WireOptions& options) {
+  const std::set<std::string> local = LocalAddresses();
+  for (const std::string& address : options.interfaces) {
+    // Fast DDS would silently ignore it, and bind nothing.
+    if (local.count(address) == 0) {
+      return Fail(StatusCode::kUnavailable, "wire.interfaces: this machine has no address " + address);
     }
   }
   return {};

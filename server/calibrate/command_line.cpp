@@ -7,9 +7,9 @@
 #include "common/file/atomic_file.h"
 #include "common/options/config.h"
 #include "common/version.h"
-#include "server/calibrate/json_text.h"
 #include "server/calibrate/motion_run.h"
 #include "server/calibrate/odometry_run.h"
+#include "server/offline/json_text.h"
 
 namespace cairn::server {
 namespace {
@@ -21,7 +21,7 @@ struct Shared {
   std::function<int()> action;
 
   int Refuse(const Status& status, int exit_code) {
-    if (json) out << "{\"error\":" << JsonText(status.message) << "}\n";
+    if (json) out << ErrorJson(status);
     err << "cairn-calibrate: " << status.message << '\n';
     return exit_code;
   }

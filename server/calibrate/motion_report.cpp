@@ -1,8 +1,8 @@
 #include <iomanip>
 #include <sstream>
 
-#include "server/calibrate/json_text.h"
 #include "server/calibrate/motion_run.h"
+#include "server/offline/json_text.h"
 
 namespace cairn::server {
 namespace {

@@ -4,8 +4,8 @@
 #include <random>
 #include <sstream>
 
-#include "server/calibrate/json_text.h"
 #include "server/calibrate/square_runs.h"
+#include "server/offline/json_text.h"
 
 namespace cairn::server {
 namespace {

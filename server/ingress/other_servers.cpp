@@ -1,6 +1,7 @@
 #include "server/ingress/other_servers.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace cairn::server {
 
@@ -12,6 +13,11 @@ Result<std::unique_ptr<OtherServers>> OtherServers::Watch(wire::Bus& bus) {
 
 int OtherServers::count() const {
   return std::max(0, requests_->matched() - 1);
+}
+
+bool OtherServers::Joined() {
+  const int now = count();
+  return now > std::exchange(known_, now);
 }
 
 }  // namespace cairn::server

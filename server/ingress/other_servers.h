@@ -1,6 +1,6 @@
 // How many other servers answer in this DDS domain: on other machines, or in networks joined later. Two both take every
 // scan and answer every question, each with half the truth. (Of one machine: ops/domain_lock.) A server is whoever
-// subscribes to requests. Thread rule: any thread.
+// subscribes to requests. Thread rule: one thread.
 #pragma once
 
 #include <memory>
@@ -15,11 +15,14 @@ class OtherServers {
   [[nodiscard]] static Result<std::unique_ptr<OtherServers>> Watch(wire::Bus& bus);
   // Once this process subscribes to requests itself.
   [[nodiscard]] int count() const;
+  // Whether there are more than at the last call.
+  [[nodiscard]] bool Joined();
 
  private:
   explicit OtherServers(std::unique_ptr<wire::Publication<Request>> requests) : requests_(std::move(requests)) {}
 
   const std::unique_ptr<wire::Publication<Request>> requests_;  // Nothing is ever published on it.
+  int known_ = 0;
 };
 
 }  // namespace cairn::server

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/options/config.h"
+#include "common/service/start_pose.h"
 #include "common/version.h"
 #include "server/setup/known_map.h"
 
@@ -22,13 +23,19 @@ void VisitFile(OptionVisitor& visitor, OfflineOptions& options) {
   for (const char* other : {"server", "robots", "maps", "jobs", "wire"}) visitor.Foreign(other);
 }
 
+bool Complain(const Result<void>& result, int& exit_code) {
+  if (result) return false;
+  std::cerr << "cairn-offline: " << result.error().message << '\n';
+  exit_code = 2;
+  return true;
+}
+
 }  // namespace
 
 std::optional<OfflineOptions> ParseOfflineOptions(int argc, char** argv, int& exit_code) {
   OfflineOptions options;
   std::filesystem::path config;
   std::vector<std::string> assignments;
-  std::vector<double> start;
   std::string seed;  // A text: a number too large is an error, not another number.
   CLI::App app{"Runs the estimator over a robot log without a server: the same trajectory as through cairnd."};
   app.set_version_flag("--version", std::string("cairn-offline ") + kVersion);
@@ -40,16 +47,21 @@ std::optional<OfflineOptions> ParseOfflineOptions(int argc, char** argv, int& ex
   app.add_option("--smoothed-map", options.smoothed_map, "Write the map redrawn from it");
   app.add_option("--map-lines", options.map_lines,
                  "Write the walls seen, as lines, for slam.line_match.map (along the smoothed path with --smooth)");
-  app.add_option("--start", start, "Pose of the robot in the map at the start: x,y,theta (m, rad)")
-      ->delimiter(',')
-      ->expected(3);
+  const auto take_start = [&options](const std::string& text) {
+    const auto start = ParseStart(text);
+    if (!start) throw CLI::ValidationError("--start", start.error().message);
+    options.T_map_robot_start = *start;
+  };
+  app.add_option_function<std::string>("--start", take_start, "Where the robot stands at first (m; rad, or 45deg)")
+      ->type_name("X,Y,THETA");
   app.add_option("--config", config, "YAML file; its slam section is used (cairnd's file will do)");
   app.add_option("--set", assignments, "key=value, e.g. slam.particles=100; repeatable, wins over --config")
       ->allow_extra_args(false);
   app.add_option("--seed", seed, "Same as --set slam.seed=N");
   app.add_option("--threads", options.threads, "0: one per core; the output does not depend on it")
       ->check(CLI::Range(0, 256));
-  app.add_option("--no-return", options.reader.no_return_m, "Ranges from here on hit nothing (m); 0: from the log");
+  app.add_option("--no-return", options.reader.no_return_m, "Ranges from here on hit nothing (m); 0: from the log")
+      ->check(CLI::NonNegativeNumber);
   app.add_flag("--json", options.json, "One JSON object on standard output");
   try {
     app.parse(argc, argv);
@@ -57,31 +69,16 @@ std::optional<OfflineOptions> ParseOfflineOptions(int argc, char** argv, int& ex
     exit_code = app.exit(error) == 0 ? 0 : 2;
     return std::nullopt;
   }
-  if (start.size() == 3) options.T_map_robot_start = {start[0], start[1], WrapAngle(start[2])};
-  if (!options.T_map_robot_start.IsFinite()) {
-    std::cerr << "cairn-offline: --start must be three finite numbers\n";
-    exit_code = 2;
-    return std::nullopt;
-  }
   if (!seed.empty()) assignments.push_back("slam.seed=" + seed);
   options.smooth = options.smooth || !options.smoothed_trajectory.empty() || !options.smoothed_map.empty();
 
-  if (!config.empty()) {
-    if (const auto applied = ApplyYamlFile(config, [&](OptionVisitor& visitor) { VisitFile(visitor, options); });
-        !applied) {
-      std::cerr << "cairn-offline: " << applied.error().message << '\n';
-      exit_code = 2;
-      return std::nullopt;
-    }
-  }
-  // On the command line a key of the server is a mistake.
-  auto applied = ApplySet(assignments, [&](OptionVisitor& visitor) { VisitSlam(visitor, options); });
-  if (applied) applied = LoadKnownMap(options.slam);
-  if (!applied) {
-    std::cerr << "cairn-offline: " << applied.error().message << '\n';
-    exit_code = 2;
+  if (!config.empty() &&
+      Complain(ApplyYamlFile(config, [&](OptionVisitor& visitor) { VisitFile(visitor, options); }), exit_code))
     return std::nullopt;
-  }
+  // On the command line a key of the server is a mistake.
+  if (Complain(ApplySet(assignments, [&](OptionVisitor& visitor) { VisitSlam(visitor, options); }), exit_code) ||
+      Complain(LoadKnownMap(options.slam), exit_code))
+    return std::nullopt;
   return options;
 }
 

@@ -1,13 +1,12 @@
 #include "server/robots/roster.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
+
+#include "common/service/start_pose.h"
 
 namespace cairn::server {
 namespace {
-
-constexpr double kMaxStartDistanceM = 1e6;
 
 Result<void> ValidateRequest(const SessionRequest& request) {
   if (auto valid = ValidateName("robot", request.robot); !valid) return valid;
@@ -20,13 +19,7 @@ Result<void> ValidateRequest(const SessionRequest& request) {
   for (const std::string& sensor : request.sensors) {
     if (auto valid = ValidateName("sensor", sensor); !valid) return valid;
   }
-  if (request.has_start) {
-    const Pose2& start = request.T_map_robot_start;
-    if (!start.IsFinite() || std::abs(start.x) > kMaxStartDistanceM || std::abs(start.y) > kMaxStartDistanceM) {
-      return Fail(StatusCode::kInvalidArgument, "the start pose is not finite or more than 1000 km away");
-    }
-  }
-  return {};
+  return request.has_start ? ValidateStart(request.T_map_robot_start) : Result<void>{};
 }
 
 Pose2 StartOf(const SessionRequest& request) {

@@ -30,8 +30,7 @@ if [ "${1:-}" != --inside ]; then
     chroot "$tree/root" /opt/deploy/install-packages.sh run
     touch "$tree/complete"
   fi
-  # The time-out is for the container as a whole; the checks have their own.
-  exec timeout --kill-after=10 300 unshare --mount --pid --net --ipc --uts --fork --kill-child --mount-proc --propagation private \
+  exec unshare --mount --pid --net --ipc --uts --fork --kill-child --mount-proc --propagation private \
     "$0" --inside "$build" "$tree"
 fi
 
@@ -44,8 +43,9 @@ mount -t overlay -o "lowerdir=$tree/root,upperdir=/run/over/upper,workdir=/run/o
 umount -R /sys/fs/cgroup 2>/dev/null || true
 mount -t cgroup2 cgroup2 /sys/fs/cgroup
 
-DESTDIR=/run/root cmake --install "$build" --prefix /usr/local >/run/installed
-DESTDIR=/run/root cmake --install "$build" --prefix /usr/local | grep -q 'cairnd.yaml.default$'
+# Twice: the second keeps the configuration that is there. (Not into a pipe: grep -q would end before cmake has said all.)
+for _ in first second; do DESTDIR=/run/root cmake --install "$build" --prefix /usr/local >/run/installed; done
+grep -q 'cairnd.yaml.default$' /run/installed
 cp "$here/service_checks.sh" /run/root/opt/
 cat >/run/root/etc/systemd/system/checks.service <<'UNIT'
 [Service]
@@ -60,12 +60,12 @@ WantedBy=multi-user.target
 UNIT
 mkdir -p /run/root/etc/systemd/system/multi-user.target.wants
 ln -s ../checks.service /run/root/etc/systemd/system/multi-user.target.wants/
-touch /run/root/opt/said
-tail -f /run/root/opt/said &
+echo "booting; what the checks say follows"
 code=0
-SYSTEMD_NSPAWN_UNIFIED_HIERARCHY=1 systemd-nspawn --boot --quiet --register=no --keep-unit --private-network \
-  --console=pipe --directory=/run/root </dev/null >/run/console 2>&1 || code=$?
-sleep 1  # tail looks once a second.
+# The time-out is for the container as a whole; the checks have their own.
+SYSTEMD_NSPAWN_UNIFIED_HIERARCHY=1 timeout --kill-after=10 300 systemd-nspawn --boot --quiet --register=no --keep-unit \
+  --private-network --console=pipe --directory=/run/root </dev/null >/run/console 2>&1 || code=$?
+cat /run/root/opt/said || true  # Where it did not come to the checks there is none.
 if [ "$code" -ne 0 ]; then
   echo "the container ended with $code; its console and the service's journal:"
   tail -n 20 /run/console

@@ -14,7 +14,7 @@ Trajectory OdometryOf(const StudyLog& log) {
   return path;
 }
 
-bool RunExample(StudyContext& context) {
+void RunExample(StudyContext& context) {
   Report& report = context.report;
   sim::FleetOptions options;
   options.seed = context.seed;
@@ -43,9 +43,8 @@ bool RunExample(StudyContext& context) {
   time.bounds = {{run.time_ms().mean, "mean"}};
   report.Add(time, "time");
 
-  const bool plausible = with.trans_mean_m < without.trans_mean_m && with.trans_mean_m < 0.05;
-  if (!plausible) report.Warn("the estimator is not clearly better than odometry");
-  return plausible;
+  report.Expect(with.trans_mean_m < without.trans_mean_m && with.trans_mean_m < 0.05,
+                "the estimator is not clearly better than odometry");
 }
 
 const Registration kRegistered{"example", "odometry alone beside the estimator, simulated: what a study looks like",

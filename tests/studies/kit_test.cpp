@@ -58,6 +58,19 @@ TEST(StudyReport, WritesMarkdownThatLinksItsPictures) {
   EXPECT_NE(out.str().find("!! nothing there"), std::string::npos);
 }
 
+TEST(StudyReport, FailsWhereAFigureIsNotAsExpectedAndSaysWhy) {
+  std::ostringstream out;
+  Report report({}, "title", out);
+  report.Warn("mind this");
+  report.Expect(true, "what holds");
+  EXPECT_FALSE(report.failed());
+  report.Expect(false, "what does not hold");
+  report.Expect(true, "what holds afterwards");
+  EXPECT_TRUE(report.failed());
+  EXPECT_NE(out.str().find("!! what does not hold"), std::string::npos);
+  EXPECT_EQ(out.str().find("what holds"), std::string::npos);
+}
+
 TEST(StudyReport, SaysWhatItCouldNotWrite) {
   const TempDirectory directory;
   const auto file = directory.Write("file", "");
@@ -132,7 +145,7 @@ TEST(StudyStopwatch, ProcessorTimePassesWhileThisRuns) {
 }
 
 TEST(StudyList, ARegisteredStudyIsFound) {
-  const Registration registration("some-name", "some help", [](StudyContext&) { return true; });
+  const Registration registration("some-name", "some help", [](StudyContext&) {});
   const auto studies = AllStudies();
   ASSERT_EQ(studies.size(), 1u);
   EXPECT_EQ(studies[0].name, "some-name");

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "common/version.h"
 #include "tests/studies/study.h"
 
 namespace cairn::studies {
@@ -28,18 +29,17 @@ int RunNamed(const Study& study, const std::filesystem::path& out, bool quick, s
   StudyContext context{report, quick, seed, logs, only};
   if (!only.empty()) report.Warn("only what is called *" + only + "*");
   if (quick) report.Warn("a quick run: fewer trials and shorter logs than the study is meant for");
-  bool plausible = false;
   try {
-    plausible = study.run(context);
+    study.run(context);
   } catch (const std::exception& error) {
-    report.Warn(std::string("the study ended early: ") + error.what());
+    report.Fault(std::string("the study ended early: ") + error.what());
   }
   if (const auto written = report.Finish(); !written) {
     std::cerr << "cairn-study: " << written.error().message << '\n';
     return 1;
   }
-  if (!plausible) std::cerr << "cairn-study: " << study.name << " FAILED; lines that start with !! say why\n";
-  return plausible ? 0 : 1;
+  if (report.failed()) std::cerr << "cairn-study: " << study.name << " FAILED; lines that start with !! say why\n";
+  return report.failed() ? 1 : 0;
 }
 
 int Main(int argc, char** argv) {
@@ -50,6 +50,7 @@ int Main(int argc, char** argv) {
   bool quick = false;
   std::uint64_t seed = 1;
   CLI::App app{"Measures the estimators and draws the figures: tables, plots, a Markdown report."};
+  app.set_version_flag("--version", std::string("cairn-study ") + kVersion);
   app.add_option("NAME", name, "`list` prints the studies")->required();
   app.add_option("--out", out, "Folder for report.md, tables and pictures; without it only text is printed");
   app.add_flag("--quick", quick, "Seconds instead of minutes");

@@ -41,6 +41,15 @@ void Report::Warn(const std::string& text) {
   out_ << "!! " << text << '\n' << std::flush;
 }
 
+void Report::Fault(const std::string& why) {
+  failed_ = true;
+  Warn(why);
+}
+
+void Report::Expect(bool holds, const std::string& otherwise) {
+  if (!holds) Fault(otherwise);
+}
+
 void Report::Progress(const std::string& text) {
   out_ << "   " << text << '\n' << std::flush;
 }

@@ -1,6 +1,6 @@
 // What a study leaves behind: a Markdown report with its tables and pictures in one folder, and the same words and
-// tables on a stream as they come. report.md links its pictures by name, so the folder can be moved as a whole.
-// Not thread-safe.
+// tables on a stream as they come; and whether what was measured is plausible. report.md links its pictures by name, so
+// the folder can be moved as a whole. Not thread-safe.
 #pragma once
 
 #include <filesystem>
@@ -23,6 +23,11 @@ class Report {
   void Text(const std::string& text);
   // What must not be overlooked: a log that is absent, a figure worse than the printed one.
   void Warn(const std::string& text);
+  // What makes the study fail; shown as a warning.
+  void Fault(const std::string& why);
+  // Fails, saying `otherwise`, where it does not hold.
+  void Expect(bool holds, const std::string& otherwise);
+  [[nodiscard]] bool failed() const { return failed_; }
   // Only for who watches: not part of the report.
   void Progress(const std::string& text);
   // Also written as NAME.csv; blanks in names become underscores.
@@ -44,6 +49,7 @@ class Report {
   std::ostream& out_;
   std::string markdown_;
   Result<void> written_;
+  bool failed_ = false;
 };
 
 }  // namespace cairn::studies

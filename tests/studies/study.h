@@ -33,8 +33,8 @@ struct StudyContext {
   }
 };
 
-// Returns false where a figure is not plausible or the study could not be made; the report says why.
-using RunStudy = std::function<bool(StudyContext&)>;
+// Report::Expect and Report::Fault tell where a figure is not plausible or the study could not be made.
+using RunStudy = std::function<void(StudyContext&)>;
 
 struct Study {
   std::string name;  // As on the command line.

@@ -95,6 +95,22 @@ TEST(CairndCommandLine, AnAddressOfAnotherMachineIsAClearStartUpError) {
   EXPECT_THAT(outcome.output, HasSubstr("203.0.113.7"));
 }
 
+// The first may come up; the others never will.
+TEST(CairndCommandLine, TheCheckWarnsOfAnAddressThatIsNotThereAndRefusesWhatIsNone) {
+  const auto absent = RunCairnd({"--set", "wire.interfaces=203.0.113.7", "--check-config"});
+  EXPECT_EQ(absent.exit_code, 0);
+  EXPECT_THAT(absent.output, HasSubstr("warning: wire.interfaces: this machine has no address 203.0.113.7"));
+  EXPECT_THAT(absent.output, HasSubstr("the configuration is valid"));
+  EXPECT_EQ(RunCairnd({"--check-config"}).output, "the configuration is valid\n");
+  for (const std::string wrong : {"eth0", "127.0.0.1,300.0.0.1", "127.0.0.1,127.0.0.1", ""}) {
+    for (const char* task : {"--check-config", "--domain=3"}) {
+      const auto outcome = RunCairnd({"--set", "wire.interfaces=" + wrong, task});
+      EXPECT_EQ(outcome.exit_code, 2) << wrong;
+      EXPECT_THAT(outcome.output, HasSubstr("wire.interfaces: ")) << wrong;
+    }
+  }
+}
+
 // A robot's and a client's end of the wire, and cairnd at the other.
 class Cairnd : public ::testing::Test {
  protected:
@@ -249,6 +265,13 @@ TEST_F(Cairnd, BadInputOverTheWireIsCountedAndHarmsNobody) {
   }
   EXPECT_EQ(ledger.received, 27U);
   EXPECT_LT(Between(TruePose(19), poses_.values().back().T_map_robot).translation().norm(), 0.1);
+}
+
+// The domain's lock keeps a second cairnd of this machine away; who subscribes to requests is a server of another one.
+TEST_F(Cairnd, SaysWhenAServerOfAnotherMachineJoinsItsDomain) {
+  const auto bus = test::MakeBus("another server");
+  const auto requests = Must(bus->Subscribe<Request>([](Request&&) {}));
+  EXPECT_TRUE(process_->Says("another server serves this DDS domain"));
 }
 
 TEST_F(Cairnd, ASmoothingJobRunsWhileScansStream) {

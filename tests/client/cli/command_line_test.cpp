@@ -64,6 +64,7 @@ TEST_F(CommandLine, NonsenseIsAUsageError) {
       {"ping", "--timeout", "soon"},
       {"ping", "--domain", "233"},
       {"ping", "--set", "wire.colour=red"},
+      {"ping", "--set", "wire.interfaces=eth0"},
       {"ping", "--set", "wire.liveliness_lease_s=-1"}};
   for (const auto& arguments : wrong) {
     const CommandOutcome outcome = RunLine(arguments);
@@ -71,6 +72,14 @@ TEST_F(CommandLine, NonsenseIsAUsageError) {
     EXPECT_NE(outcome.err, "") << ::testing::PrintToString(arguments);
     EXPECT_EQ(outcome.out, "") << ::testing::PrintToString(arguments);
   }
+}
+
+TEST_F(CommandLine, ADomainOfTheMachineThatIsNoneIsAUsageErrorThatNamesIt) {
+  setenv("CAIRN_DOMAIN", "much", 1);
+  const CommandOutcome outcome = RunLine({"ping"});
+  unsetenv("CAIRN_DOMAIN");
+  EXPECT_EQ(outcome.code, ExitCode::kUsage);
+  EXPECT_THAT(outcome.err, HasSubstr("CAIRN_DOMAIN: wire.domain: 'much'"));
 }
 
 TEST_F(CommandLine, HelpIsNoError) {

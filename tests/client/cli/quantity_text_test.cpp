@@ -22,18 +22,6 @@ TEST(ParseDuration, RefusesWhatIsNoneAndNamesIt) {
   }
 }
 
-TEST(ParsePose, ReadsRadiansAndDegrees) {
-  EXPECT_EQ(*ParsePose("1.5,-2,0.5"), (Pose2{1.5, -2, 0.5}));
-  EXPECT_EQ(*ParsePose("1.5, -2, 90deg"), (Pose2{1.5, -2, Radians(90)}));
-  EXPECT_NEAR(ParsePose("0,0,450deg")->theta, Radians(90), 1e-12) << "wrapped";
-}
-
-TEST(ParsePose, RefusesWhatIsNone) {
-  for (const char* text : {"", "1,2", "1,2,3,4", "a,b,c", "1,2,", "1,2,90degrees", "1deg,2,3", "nan,0,0", "0,0,inf"}) {
-    EXPECT_FALSE(ParsePose(text)) << text;
-  }
-}
-
 TEST(ParseArea, NeedsAnAreaWithASize) {
   const auto area = ParseArea("-5,-4,20,10");
   ASSERT_TRUE(area);

@@ -31,7 +31,8 @@ TEST(Config, MissingKeysKeepTheirDefaults) {
 }
 
 TEST(Config, EmptyTextAndEmptySectionsChangeNothing) {
-  for (const char* text : {"", "# only a comment\n", "slam:\n", "slam: {}\n", "---\n"}) {
+  for (const char* text : {"", "# only a comment\n", "slam:\n", "slam: {}\n", "slam:\n  inner:\n", "---\n",
+                           "---\nslam:\n  # particles: 5\n...\n"}) {
     SampleOptions options;
     const auto result = ApplyYaml(text, "test.yaml", VisitorOf(options));
     EXPECT_TRUE(result) << text << ": " << result.error().message;

@@ -25,7 +25,7 @@ inline void Visit(OptionVisitor& visitor, SampleOptions& options) {
   static constexpr std::array<std::string_view, 2> kModels = {"fast", "exact"};
   visitor.Section("slam", "the estimator", [&] {
     visitor.Real("length_m", options.length_m, "m", 0.01, 10.0, "how long");
-    visitor.Integer("particles", options.particles, "", 1, 10000, "how many");
+    visitor.Integer("particles", options.particles, "1", 1, 10000, "how many");
     visitor.Section("inner", "", [&] { visitor.Real("inner_rad", options.inner_rad, "rad", -4.0, 4.0, "turn"); });
     VisitEnum(visitor, "model", options.model, kModels, "which");
   });

@@ -11,14 +11,30 @@ namespace {
 
 TEST(WireOptions, DefaultsAreValid) {
   EXPECT_TRUE(Validate(WireOptions{}));
+  EXPECT_TRUE(RequireInterfaces(WireOptions{}));
 }
 
-TEST(WireOptions, RefuseAnAddressThisMachineDoesNotHave) {
+TEST(WireOptions, TellAnAddressThisMachineDoesNotHaveFromOneThatIsNone) {
   WireOptions options;
   options.interfaces = {"127.0.0.1", "192.0.2.1"};  // TEST-NET-1: nobody's.
-  const Result<void> result = Validate(options);
-  ASSERT_FALSE(result);
-  EXPECT_THAT(result.error().message, ::testing::HasSubstr("192.0.2.1"));
+  EXPECT_TRUE(Validate(options));
+  const Result<void> present = RequireInterfaces(options);
+  ASSERT_FALSE(present);
+  EXPECT_EQ(present.error().code, StatusCode::kUnavailable);
+  EXPECT_THAT(present.error().message, ::testing::HasSubstr("192.0.2.1"));
+  for (const char* none : {"eth0", "localhost", "192.0.2", "192.0.2.256", "::1", "127.0.0.1 "}) {
+    options.interfaces = {"127.0.0.1", none};
+    const Result<void> valid = Validate(options);
+    ASSERT_FALSE(valid) << none;
+    EXPECT_EQ(valid.error().message, "wire.interfaces: '" + std::string(none) + "' is not an IPv4 address");
+  }
+}
+
+// The lock of the domain would take the second for another server's.
+TEST(WireOptions, RefuseAnAddressNamedTwice) {
+  WireOptions options;
+  options.interfaces = {"127.0.0.1", "127.0.0.1"};
+  EXPECT_FALSE(Validate(options));
 }
 
 TEST(WireOptions, RefuseNoAddressAtAll) {
@@ -43,8 +59,10 @@ TEST(WireOptions, RefuseDomainsAndLeasesOutOfRange) {
 
 TEST(WireOptions, ABusWithInvalidOptionsIsNotMade) {
   WireOptions options;
-  options.interfaces = {"not-an-address"};
-  EXPECT_FALSE(Bus::Create(options, "test"));
+  for (const char* address : {"not-an-address", "192.0.2.1"}) {
+    options.interfaces = {address};
+    EXPECT_FALSE(Bus::Create(options, "test")) << address;
+  }
 }
 
 TEST(WireOptions, ReadInterfacesAsOneCommaSeparatedText) {

@@ -99,7 +99,7 @@ TEST_F(Calibrate, FilesThatCannotBeUsedFailWithOneLine) {
   }
   const Outcome json = Run({"odometry", File("absent.csv"), "--json"});
   EXPECT_EQ(json.code, 1);
-  EXPECT_THAT(json.out, HasSubstr("{\"error\":"));
+  EXPECT_THAT(json.out, HasSubstr("{\"error\":{\"code\":\"NOT_FOUND\",\"message\":\""));
 }
 
 TEST_F(Calibrate, RunsOfAFileAreEvaluated) {

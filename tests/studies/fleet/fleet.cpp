@@ -50,19 +50,15 @@ Totals TotalsOf(const json& sim) {
   return totals;
 }
 
-// Warns where `value` is over `most`.
-bool Holds(Report& report, const std::string& what, double value, double most) {
-  if (value <= most) return true;
-  report.Warn(what + ": " + Number(value, 1) + ", wanted at most " + Number(most, 1));
-  return false;
+void ExpectAtMost(Report& report, double most, double value, const std::string& what) {
+  report.Expect(value <= most, what + ": " + Number(value, 1) + ", wanted at most " + Number(most, 1));
 }
 
-bool StudyLatency(StudyContext& context) {
+void StudyLatency(StudyContext& context) {
   Report& report = context.report;
   report.Heading("Scan published to pose received");
   Table table({"robots at 10 Hz, 360 beams", "scans", "used", "dropped", "unexplained", "p50 (ms)", "p99 (ms)",
                "wanted", "max (ms)", "real time", "server, share of a core"});
-  bool good = true;
   for (const int robots : {3, 16}) {
     const LiveServer server;
     const json sim = server.Run(SimArguments(server, robots, context.Pick(120, 5)));
@@ -74,15 +70,12 @@ bool StudyLatency(StudyContext& context) {
                Number(sim.at("pose_latency_max_ms"), 1), "x" + Number(sim.at("rate"), 2),
                Percent(sim.at("watched_cpu_share"))});
     const std::string who = Count(robots) + " robots";
-    if (robots == 3) good = Holds(report, who + ", p99 in ms", p99, kMostLatencyMs) && good;
-    good = Holds(report, who + ", scans not used", static_cast<double>(totals.sent - totals.used), 0.0) && good;
-    if (const double rate = sim.at("rate"); rate < kKeptUp) {
-      report.Warn(who + " were simulated at x" + Number(rate, 2) + " of real time only");
-      good = false;
-    }
+    if (robots == 3) ExpectAtMost(report, kMostLatencyMs, p99, who + ", p99 in ms");
+    ExpectAtMost(report, 0.0, static_cast<double>(totals.sent - totals.used), who + ", scans not used");
+    const double rate = sim.at("rate");
+    report.Expect(rate >= kKeptUp, who + " were simulated at x" + Number(rate, 2) + " of real time only");
   }
   report.Add(table, "latency");
-  return good;
 }
 
 // Something large to smooth: a log where there is one, else a simulated robot's long day.
@@ -138,7 +131,7 @@ Asked AskWhile(LiveServer& server, ChildProcess& robots) {
   return asked;
 }
 
-bool StudyPauses(StudyContext& context) {
+void StudyPauses(StudyContext& context) {
   Report& report = context.report;
   report.Heading("While whole trajectories are smoothed");
   LiveServer server;
@@ -161,11 +154,10 @@ bool StudyPauses(StudyContext& context) {
   table.Add({"a question for its answer", Count(static_cast<long long>(asked.answer_ms.size())),
              Number(answers.median, 1), Number(answers.p99, 1), Number(answers.max, 1), Number(kMostPauseMs, 0)});
   report.Add(table, "pauses");
-  bool good = Holds(report, "longest wait for a pose in ms", slowest, kMostPauseMs);
-  good = Holds(report, "longest wait for an answer in ms", answers.max, kMostPauseMs) && good;
-  good = Holds(report, "scans not used", static_cast<double>(totals.sent - totals.used), 0.0) && good;
-  if (asked.jobs < 2) report.Warn("no more than " + Count(asked.jobs) + " jobs ended meanwhile");
-  return good && asked.jobs >= 2;
+  ExpectAtMost(report, kMostPauseMs, slowest, "longest wait for a pose in ms");
+  ExpectAtMost(report, kMostPauseMs, answers.max, "longest wait for an answer in ms");
+  ExpectAtMost(report, 0.0, static_cast<double>(totals.sent - totals.used), "scans not used");
+  report.Expect(asked.jobs >= 2, "no more than " + Count(asked.jobs) + " jobs ended meanwhile");
 }
 
 std::string BytesOf(const std::filesystem::path& path) {
@@ -173,7 +165,7 @@ std::string BytesOf(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-bool StudyReplay(StudyContext& context) {
+void StudyReplay(StudyContext& context) {
   Report& report = context.report;
   report.Heading("Logs through the middleware, " + Number(kReplayRate, 0) + " times faster than recorded");
   std::vector<std::filesystem::path> logs = context.logs;
@@ -197,7 +189,6 @@ bool StudyReplay(StudyContext& context) {
   report.Progress("all logs at once, each into a site of its own");
   Table table({"log", "scans", "used", "dropped", "unexplained", "took (s)", "p50 (ms)", "p99 (ms)",
                "online path as offline", "smoothed path as offline"});
-  bool good = true;
   for (std::size_t i = 0; i < logs.size(); ++i) {
     const std::string name = logs[i].stem().string();
     const json replay = PrintedBy(replays[i]->Wait(LiveServer::kDeadline));
@@ -218,20 +209,16 @@ bool StudyReplay(StudyContext& context) {
                Number(replay.at("seconds"), 0), Number(replay.at("pose_latency_p50_ms"), 1),
                Number(replay.at("pose_latency_p99_ms"), 1), online_same ? "byte for byte" : "DIFFERS",
                smooth_same ? "byte for byte" : "DIFFERS"});
-    if (!online_same || !smooth_same) report.Warn(name + ": the server's path is not the offline one");
-    good = Holds(report, name + ": scans without a reason", static_cast<double>(totals.unexplained), 0.0) &&
-           online_same && smooth_same && good;
+    report.Expect(online_same && smooth_same, name + ": the server's path is not the offline one");
+    ExpectAtMost(report, 0.0, static_cast<double>(totals.unexplained), name + ": scans without a reason");
   }
   report.Add(table, "replay");
-  return good;
 }
 
-bool RunFleet(StudyContext& context) {
-  bool good = true;
-  if (context.Wants("latency")) good = StudyLatency(context) && good;
-  if (context.Wants("pauses")) good = StudyPauses(context) && good;
-  if (context.Wants("replay")) good = StudyReplay(context) && good;
-  return good;
+void RunFleet(StudyContext& context) {
+  if (context.Wants("latency")) StudyLatency(context);
+  if (context.Wants("pauses")) StudyPauses(context);
+  if (context.Wants("replay")) StudyReplay(context);
 }
 
 const Registration kRegistered{"fleet", "a live server: latency, pauses during jobs, logs at x20 (--only latency ...)",

@@ -36,7 +36,7 @@ struct Tally {
 
 }  // namespace
 
-bool StudyExactness(StudyContext& context, const std::vector<slam::MatcherKind>& kinds) {
+void StudyExactness(StudyContext& context, const std::vector<slam::MatcherKind>& kinds) {
   Report& report = context.report;
   report.Heading("Time, bias, spread");
   report.Text(
@@ -50,7 +50,6 @@ bool StudyExactness(StudyContext& context, const std::vector<slam::MatcherKind>&
   Plot plot{.title = "Error of right answers against range noise",
             .x = {"standard deviation of a range", "cm"},
             .y = {"mean error", "cm", true}};
-  bool plausible = true;
   for (const slam::MatcherKind kind : kinds) {
     Series series{.label = std::string(slam::MatcherName(kind))};
     for (const double noise : {0.0, 0.01, 0.03}) {
@@ -84,16 +83,13 @@ bool StudyExactness(StudyContext& context, const std::vector<slam::MatcherKind>&
         if (std::abs(bias[axis]) > 4 * sigma[axis] / std::sqrt(n) + 1e-3)
           report.Warn(series.label + " is biased by " + Number(1e3 * bias[axis], 1) + " mm in " +
                       (axis == 0 ? "x" : "y"));
-      if (tally.good < tally.cases / 2) {
-        report.Warn(series.label + " is right in less than half of the cases with a good guess");
-        plausible = false;
-      }
+      report.Expect(tally.good >= tally.cases / 2,
+                    series.label + " is right in less than half of the cases with a good guess");
     }
     plot.series.push_back(series);
   }
   report.Add(table, "exactness");
   report.Add(plot, "exactness_plot");
-  return plausible;
 }
 
 }  // namespace cairn::studies

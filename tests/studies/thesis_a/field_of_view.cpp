@@ -40,7 +40,7 @@ struct System {
 
 }  // namespace
 
-bool StudyFieldOfView(StudyContext& context, const std::vector<StudyLog>& logs) {
+void StudyFieldOfView(StudyContext& context, const std::vector<StudyLog>& logs) {
   Report& report = context.report;
   report.Heading("Field of view (5.7.2, Figures 5.47-5.50)");
   report.Text(
@@ -88,8 +88,7 @@ bool StudyFieldOfView(StudyContext& context, const std::vector<StudyLog>& logs) 
     report.Add(metres, "field_of_view_m_" + log.name);
     report.Add(degrees, "field_of_view_deg_" + log.name);
   }
-  if (!plausible) report.Warn("scans of a narrower view were dropped: the cut scans are not valid");
-  return plausible;
+  report.Expect(plausible, "scans of a narrower view were dropped: the cut scans are not valid");
 }
 
 }  // namespace cairn::studies

@@ -136,7 +136,7 @@ void AddComparison(Report& report, const Samples& samples, const std::string& wh
 
 }  // namespace
 
-bool StudyPoseFromPairs(StudyContext& context) {
+void StudyPoseFromPairs(StudyContext& context) {
   Report& report = context.report;
   report.Heading("Rotation and translation from matched lines (3.5.12.2, 3.5.12.3)");
   report.Text(
@@ -173,10 +173,9 @@ bool StudyPoseFromPairs(StudyContext& context) {
   report.Text(as_thesis
                   ? "As the thesis says, distance vectors are better than corner points (95th percentile)."
                   : "Against the thesis, corner points are no worse here than distance vectors (95th percentile).");
-  const bool plausible = p95(rotations, kThesis) < 2.0 && p95(translations, kVectors) < 10.0 &&
-                         p95(rotations, kThesis) <= p95(rotations, kPlain) * 1.05;
-  if (!plausible) report.Warn("errors of matched pairs are too large to be right, or removing outliers does harm");
-  return plausible;
+  report.Expect(p95(rotations, kThesis) < 2.0 && p95(translations, kVectors) < 10.0 &&
+                    p95(rotations, kThesis) <= p95(rotations, kPlain) * 1.05,
+                "errors of matched pairs are too large to be right, or removing outliers does harm");
 }
 
 }  // namespace cairn::studies

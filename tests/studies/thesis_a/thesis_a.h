@@ -1,5 +1,5 @@
 // The parts of `cairn-study thesis-a`, in the order of thesis A (feature-based scan matching with FastSLAM). Each adds
-// its section to the report and returns whether its figures are plausible.
+// its section to the report, and tells it where a figure is not plausible.
 #pragma once
 
 #include <string>
@@ -15,19 +15,19 @@ namespace cairn::studies {
 [[nodiscard]] std::vector<std::string> LinesOnly();
 
 // 2.1.1, Table 2.1: true and false positives and the spread of r and alpha of extracted lines, on simulated scans.
-[[nodiscard]] bool StudyLineExtraction(StudyContext& context);
+void StudyLineExtraction(StudyContext& context);
 
 // 3.5.12.2-3: rotation with and without outlier removal, translation by distance vectors beside corner points.
-[[nodiscard]] bool StudyPoseFromPairs(StudyContext& context);
+void StudyPoseFromPairs(StudyContext& context);
 
 // 5.1-5.6, Tables 5.15-5.17, Figures 5.35-5.37: matching alone, with landmark correction, with FastSLAM in its two
 // forms; time and error of each, online and full maps.
-[[nodiscard]] bool StudySystems(StudyContext& context, const std::vector<StudyLog>& logs);
+void StudySystems(StudyContext& context, const std::vector<StudyLog>& logs);
 
 // 5.7.1, Table 5.18, Figures 5.44-5.46: 50 to 450 particles.
-[[nodiscard]] bool StudyParticles(StudyContext& context, const std::vector<StudyLog>& logs);
+void StudyParticles(StudyContext& context, const std::vector<StudyLog>& logs);
 
 // 5.7.2, Figures 5.47-5.50: 180 to 90 degrees of view.
-[[nodiscard]] bool StudyFieldOfView(StudyContext& context, const std::vector<StudyLog>& logs);
+void StudyFieldOfView(StudyContext& context, const std::vector<StudyLog>& logs);
 
 }  // namespace cairn::studies

@@ -49,15 +49,12 @@ struct Way {
 
 }  // namespace
 
-bool StudyLeastSquares(StudyContext& context, const StudyLog& log) {
+void StudyLeastSquares(StudyContext& context, const StudyLog& log) {
   Report& report = context.report;
   report.Heading("Least squares over known pairs (5.4.2, Table 5.1, Figures 5.7-5.14)");
   std::string from;
   const std::vector<LineFeature> lines = MostLinesOf(log, from);
-  if (lines.size() < 3) {
-    report.Warn("no scan of " + log.name + " shows three lines");
-    return false;
-  }
+  if (lines.size() < 3) return report.Fault("no scan of " + log.name + " shows three lines");
   report.Text("The " + Count(static_cast<long long>(lines.size())) + " lines of " + from +
               ", moved by the inverse of each transform of Table 5.1; least squares start at the identity and know the "
               "pairs. Printed: \"chi, although starting from high values, falls quickly to zero after a few "
@@ -69,7 +66,6 @@ bool StudyLeastSquares(StudyContext& context, const StudyLog& log) {
   for (Way& way : ways) way.options.max_iterations = 100;
   Table table({"figure", "x (m)", "y (m)", "theta (rad)", "weights", "error (m)", "error (deg)", "chi at the start",
                "chi at the end", "steps to 1e-9 of it", "steps"});
-  bool plausible = true;
   for (const Way& way : ways) {
     Plot plot{.title = "chi over the iterations, " + way.name + " (ends where the step vanishes)",
               .x = {"iteration", ""},
@@ -98,10 +94,8 @@ bool StudyLeastSquares(StudyContext& context, const StudyLog& log) {
                  Number(off.translation().norm(), 7), Number(Degrees(std::abs(off.theta)), 7),
                  Number(alignment.chi.front(), 2), Number(alignment.chi.back(), 12),
                  Count(static_cast<long long>(quick)), Count(static_cast<long long>(alignment.chi.size()) - 1)});
-      if (!found) {
-        report.Warn(std::string("the transform of Figure ") + wanted.figure + " is not recovered (" + way.name + ")");
-        plausible = false;
-      }
+      report.Expect(found,
+                    std::string("the transform of Figure ") + wanted.figure + " is not recovered (" + way.name + ")");
       if (&way != &ways.front()) continue;
       Plot figure{.title = std::string("Figure ") + wanted.figure + ": the scan, moved away, and brought back",
                   .x = {"x", "m"},
@@ -116,7 +110,6 @@ bool StudyLeastSquares(StudyContext& context, const StudyLog& log) {
     report.Add(plot, way.options.length_power == 0.0 ? "chi_thesis" : "chi");
   }
   report.Add(table, "table_5_1");
-  return plausible;
 }
 
 }  // namespace cairn::studies

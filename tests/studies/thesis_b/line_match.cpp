@@ -146,11 +146,10 @@ void AddFollowed(Table& table, const std::string& name, const Followed& run, std
 }
 
 // Whoever stands by a wrong place is worse than lost. (Where all rooms look alike, lost is right.)
-bool Keeps(Report& report, const std::string& name, const Followed& run) {
+void ExpectHonest(Report& report, const std::string& name, const Followed& run) {
   const auto wrong = std::ranges::count_if(run.error_m, [](double m) { return m > kWrongM; });
-  if (static_cast<double>(wrong) <= 0.01 * static_cast<double>(run.scans)) return true;
-  report.Warn(name + ": stands by a place more than 1 m off in " + Count(wrong) + " scans");
-  return false;
+  report.Expect(static_cast<double>(wrong) <= 0.01 * static_cast<double>(run.scans),
+                name + ": stands by a place more than 1 m off in " + Count(wrong) + " scans");
 }
 
 Table FollowedTable() {
@@ -208,10 +207,9 @@ std::vector<Pose2> PlacesAlong(const sim::World& world, int count) {
   return places;
 }
 
-bool InSimulation(StudyContext& context, Table& placed, Table& followed) {
+void InSimulation(StudyContext& context, Table& placed, Table& followed) {
   Report& report = context.report;
   int right = 0, wrong = 0;
-  bool keeps = true;
   for (const std::string& name : sim::ShippedWorldNames()) {
     report.Progress("LineMatch in " + name);
     const auto world = sim::OpenWorld(name);
@@ -233,20 +231,19 @@ bool InSimulation(StudyContext& context, Table& placed, Table& followed) {
     const StudyLog log = SimulateLog(name, context.Pick(240.0, 60.0), fleet);
     const Followed run = Follow(context, log, log.truth, std::make_shared<const std::vector<MapLine>>(map));
     AddFollowed(followed, name, run, map.size());
-    keeps = Keeps(report, name, run) && keeps;
+    ExpectHonest(report, name, run);
     DrawFollowed(report, name, map, log.truth, run);
   }
-  if (right < wrong) report.Warn("LineMatch places more scans wrong than right in the simulated worlds");
-  return right >= wrong && keeps;
+  report.Expect(right >= wrong, "LineMatch places more scans wrong than right in the simulated worlds");
 }
 
-bool OnLog(StudyContext& context, const StudyLog& log, Table& placed, Table& followed) {
+void OnLog(StudyContext& context, const StudyLog& log, Table& placed, Table& followed) {
   Report& report = context.report;
   report.Progress("LineMatch on " + log.name);
   const auto options = MapperWith({}, context.seed);
   if (!options) {
-    report.Warn(options.error().message);
-    return false;
+    report.Fault(options.error().message);
+    return;
   }
   const LogRun run = RunOverLog(log, *options);
   const std::vector<Pose2> path = slam::SmoothedPath(run.snapshot);
@@ -282,12 +279,12 @@ bool OnLog(StudyContext& context, const StudyLog& log, Table& placed, Table& fol
               Follow(context, second, truth, std::make_shared<const std::vector<MapLine>>(map_before)),
               map_before.size());
   DrawFollowed(report, log.name, map, truth, along);
-  return Keeps(report, log.name, along);
+  ExpectHonest(report, log.name, along);
 }
 
 }  // namespace
 
-bool StudyLineMatch(StudyContext& context) {
+void StudyLineMatch(StudyContext& context) {
   Report& report = context.report;
   report.Heading("LineMatch: the place in a known map of lines (2.2.2, Algorithm 1, (2.17)-(2.19))");
   report.Text(
@@ -298,9 +295,9 @@ bool StudyLineMatch(StudyContext& context) {
       "merged; the scans are every 50th of those that are no keyframes; the smoothed path is the truth. The thesis "
       "prints no figures.");
   Table placed = PlacingsTable(), followed = FollowedTable();
-  bool plausible = InSimulation(context, placed, followed);
+  InSimulation(context, placed, followed);
   for (const StudyLog& log : ChooseLogs(context, {"mit-csail", "intel"}, context.Pick(0, 400)))
-    plausible = OnLog(context, log, placed, followed) && plausible;
+    OnLog(context, log, placed, followed);
   report.Add(placed, "line_match_placed");
   report.Text(
       "Along a drive, the whole estimator with slam.filter=line_match, the start withheld: from nothing until one "
@@ -308,7 +305,6 @@ bool StudyLineMatch(StudyContext& context) {
       "is left, then (2.18) with the answer nearest to the belief, gate 16.3. Localized: what the robot stood by; the "
       "shares are of all scans. Odometry alone starts at the true pose.");
   report.Add(followed, "line_match_followed");
-  return plausible;
 }
 
 }  // namespace cairn::studies

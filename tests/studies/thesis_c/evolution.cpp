@@ -64,7 +64,7 @@ slam::EvolutionOptions With(int population, int generations) {
 
 }  // namespace
 
-bool StudyEvolution(StudyContext& context) {
+void StudyEvolution(StudyContext& context) {
   Report& report = context.report;
   report.Heading("Parameters of the evolution (5.1.1, Figures 5.1-5.4)");
   const ScanSequence drive = SimulatedDrive(context, 0.015);
@@ -97,9 +97,8 @@ bool StudyEvolution(StudyContext& context) {
   const bool larger_is_surer = by_population.back().lost <= by_population.front().lost &&
                                by_population.back().mean_m < by_population.front().mean_m;
   const bool longer_is_finer = by_generations.back().mean_m < by_generations.front().mean_m;
-  if (!larger_is_surer) report.Warn("a larger population is not surer, against the thesis");
-  if (!longer_is_finer) report.Warn("more generations are not finer, against the thesis");
-  return larger_is_surer && longer_is_finer;
+  report.Expect(larger_is_surer, "a larger population is not surer, against the thesis");
+  report.Expect(longer_is_finer, "more generations are not finer, against the thesis");
 }
 
 }  // namespace cairn::studies

@@ -73,10 +73,35 @@ TEST_F(CairnOffline, PrintsOneObjectForMachines) {
   EXPECT_LE(report["time_ms_p50"], report["time_ms_p99"]);
 }
 
+TEST_F(CairnOffline, StartsWhereItIsTold) {
+  const TempDirectory out;
+  const auto first = [&](const std::string& start) {
+    const std::string path = (out / "t.tum").string();
+    const auto run = Run({Log(), "--trajectory", path, "--start", start});
+    EXPECT_EQ(run.exit_code, 0) << run.output;
+    const auto trajectory = ReadTum(path);
+    return trajectory && !trajectory->empty() ? trajectory->front().T_map_robot : Pose2{};
+  };
+  const Pose2 radians = first("-1.5,2,1.5707963267948966"), degrees = first("-1.5,2,90deg");
+  EXPECT_NEAR(radians.x, -1.5, 0.1);
+  EXPECT_NEAR(radians.y, 2.0, 0.1);
+  EXPECT_NEAR(AngleDiff(radians.theta, Radians(90)), 0.0, 0.05);
+  EXPECT_EQ(degrees, radians);
+  for (const std::string bad : {"1,2", "1,2,x", "nan,0,0", "1e7,0,0", "0,0,90grad"}) {
+    const auto run = Run({Log(), "--start", bad});
+    EXPECT_EQ(run.exit_code, 2) << bad;
+    EXPECT_NE(run.output.find("'" + bad + "'"), std::string::npos) << run.output;
+  }
+}
+
 TEST_F(CairnOffline, SaysWhatIsWrongAndExitsByIt) {
   const auto missing = Run({"/nowhere/at-all.log"});
   EXPECT_EQ(missing.exit_code, 1);
   EXPECT_NE(missing.output.find("at-all.log"), std::string::npos) << missing.output;
+  const std::string json = Run({"/nowhere/at-all.log", "--json"}).output;
+  const auto error = nlohmann::json::parse(json.substr(0, json.find('\n')))["error"];
+  EXPECT_EQ(error["code"], "NOT_FOUND") << json;
+  EXPECT_NE(error["message"].get<std::string>().find("at-all.log"), std::string::npos) << json;
   EXPECT_EQ(Run({}).exit_code, 2);
   EXPECT_EQ(Run({Log(), "--no-such-option"}).exit_code, 2);
   const auto range = Run({Log(), "--set", "slam.grid.resolution_m=5"});

@@ -1,10 +1,13 @@
-// The little JSON that reports are written in: numbers that are none become null, texts are quoted and escaped.
+// The little JSON that reports are written in: numbers that are none become null, texts are quoted and escaped. A
+// failure is the object that `cairn --json` prints.
 #pragma once
 
 #include <cmath>
 #include <cstdio>
 #include <string>
 #include <string_view>
+
+#include "common/status.h"
 
 namespace cairn::server {
 
@@ -23,6 +26,11 @@ namespace cairn::server {
     quoted += printable ? c : '?';
   }
   return quoted + '"';
+}
+
+[[nodiscard]] inline std::string ErrorJson(const Status& status) {
+  return "{\"error\":{\"code\":" + JsonText(StatusCodeName(status.code)) + ",\"message\":" + JsonText(status.message) +
+         "}}\n";
 }
 
 }  // namespace cairn::server
