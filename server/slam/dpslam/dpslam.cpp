@@ -110,13 +110,18 @@ Pose2 DpSlam::JointOf(const GridParticle& low) const {
 
 FilterEstimate DpSlam::estimate() const {
   if (!high_) return {low_.mean(), low_.covariance()};
-  const Pose2 T_map_segment = high_->level().mean(), T_segment_robot = Between(JointOf(low_.best()), low_.mean());
+  // The best one, not the mean of its neighbours: what they drew by chance would show.
+  const LevelFilter& high = high_->level();
+  const Pose2 T_map_segment = high.best().T_map_robot, T_segment_robot = Between(JointOf(low_.best()), low_.mean());
+  Eigen::Vector3d off = high.mean().vector() - T_map_segment.vector();
+  off.z() = WrapAngle(off.z());
+  const Eigen::Matrix3d covariance = high.covariance() + off * off.transpose();
   const Eigen::Matrix3d J_left = J_compose_left(T_map_segment, T_segment_robot);
   // The low level's covariance is in its own frame.
   const Pose2 T_map_low = T_map_segment * JointOf(low_.best()).Inverse();
   const Eigen::Matrix3d J_low = J_compose_right(T_map_low, low_.mean());
   return {T_map_segment * T_segment_robot,
-          J_left * high_->level().covariance() * J_left.transpose() + J_low * low_.covariance() * J_low.transpose()};
+          J_left * covariance * J_left.transpose() + J_low * low_.covariance() * J_low.transpose()};
 }
 
 FilterHealth DpSlam::health() const {

@@ -39,7 +39,10 @@ struct GridParticle {
   std::size_t map = 0;          // Of ParticleMaps.
   double log_weight = 0.0;      // Since the last resampling.
   double log_likelihood = 0.0;  // Of the whole path; survives resampling.
+  double log_prior = 0.0;       // Of the drift at its joints, in the high level.
   SharedSequence<Pose2> path;   // T_map_robot at every scan observed.
+
+  [[nodiscard]] double log_posterior() const { return log_likelihood + log_prior; }
 };
 
 class LevelFilter {

@@ -43,9 +43,15 @@ Evidence Apart(const Evidence& trajectory) {
   return apart;
 }
 
-Eigen::Vector3d Draw(Rng& rng) {
+Eigen::Vector3d Draw(Rng& rng, double spread) {
   const double x = NormalDraw(rng), y = NormalDraw(rng), theta = NormalDraw(rng);
-  return {x, y, theta};
+  return spread * Eigen::Vector3d{x, y, theta};
+}
+
+// Evenly over 0..1, the first 0, and neighbours, who are relatives, far apart (the golden ratio's multiples).
+double SpreadOf(std::size_t particle) {
+  const double turns = 0.6180339887498949 * static_cast<double>(particle);
+  return turns - std::floor(turns);
 }
 
 }  // namespace
@@ -71,7 +77,9 @@ void SegmentFilter::Take(std::vector<Evidence> trajectories, double way_m, Rng& 
   for (std::size_t i = 0; i < joints_.size(); ++i) {
     Candidate candidate{i, {}, level_.particles()[i].log_weight};
     for (std::size_t k = free_; k < joints_[i].size(); ++k) candidate.joints.push_back(joints_[i][k]);
-    Joint joint{Draw(rng), {}, 0};
+    Joint joint;
+    joint.spread = SpreadOf(i);
+    joint.drift = Draw(rng, joint.spread);
     if (const std::size_t choices = taken.trajectories.size(); choices > 1)
       joint.trajectory =
           std::min(choices - 1, static_cast<std::size_t>(UniformDraw(rng) * static_cast<double>(choices)));
@@ -257,8 +265,10 @@ void SegmentFilter::Propose(Rng& rng) {
   const double stride = stride_[moves_left_ % 2], stay = std::sqrt(1.0 - stride * stride);
   for (Candidate& candidate : proposed_) {
     const std::size_t first = moves_left_ % 2 == 0 ? 0 : candidate.joints.size() - 1;
-    for (std::size_t k = first; k < candidate.joints.size(); ++k)
-      candidate.joints[k].drift = stay * candidate.joints[k].drift + stride * Draw(rng);
+    for (std::size_t k = first; k < candidate.joints.size(); ++k) {
+      Joint& joint = candidate.joints[k];
+      joint.drift = stay * joint.drift + stride * Draw(rng, joint.spread);
+    }
     Place(candidate);
   }
 }
@@ -297,8 +307,11 @@ void SegmentFilter::Finish() {
     SharedSequence<Joint> all = joints_[candidate.parent];
     particle.log_weight = candidate.log_weight;
     if (judged) particle.log_likelihood = candidate.before + candidate.settled + candidate.evidence;
+    particle.log_prior = 0.0;
+    for (std::size_t s = 0; s < free_; ++s) particle.log_prior -= 0.5 * all[s].drift.squaredNorm();
     std::size_t scan = first_scan;
     for (std::size_t k = 0; k < candidate.joints.size(); ++k) {
+      particle.log_prior -= 0.5 * candidate.joints[k].drift.squaredNorm();
       const Joint& joint = candidate.joints[k];
       const bool done = free_ + k < all.size();
       if (!done) all.Append(joint);

@@ -61,6 +61,24 @@ double LoopErrorOf(const Segments& segments, const SharedSequence<Pose2>& path) 
       .norm();
 }
 
+// Farthest from the truth that the path goes.
+double WorstError(const Segments& segments, const SharedSequence<Pose2>& path) {
+  double worst = 0.0;
+  for (std::size_t i = 0; i < segments.truth.size(); ++i)
+    worst = std::max(worst, (path[i].translation() - segments.truth[i].translation()).norm());
+  return worst;
+}
+
+SegmentFilter Driven(const Segments& segments, const LevelOptions& options, std::uint64_t seed) {
+  SegmentFilter filter(options, {}, kMemoryM, segments.truth.front());
+  Rng rng(seed);
+  for (const Evidence& trajectory : segments.trajectories) {
+    filter.Take({trajectory}, 8.0, rng);
+    while (filter.at_work()) filter.Work(rng, SerialFor);
+  }
+  return filter;
+}
+
 TEST(SegmentFilter, ClosesALoopThatNoParticleFits) {
   const Segments segments = BentRing(0.015);
   const Pose2 start = segments.truth.front();
@@ -92,6 +110,26 @@ TEST(SegmentFilter, WhereNobodyComesBackNobodyDiesAndNothingIsDrawn) {
     EXPECT_TRUE(filter.level().maps().blank());
   }
   EXPECT_GT(filter.level().covariance().trace(), 1e-3);
+}
+
+// It once was a sample like the others, and jumped by their whole spread at the first joint.
+TEST(SegmentFilter, TheBestOneDoesNotDriftWhereNothingAsksForIt) {
+  const Segments segments = BentRing(0.0, 70.0, 0.35);  // Along one side.
+  const SegmentFilter filter = Driven(segments, High(20), 4);
+  EXPECT_LT(WorstError(segments, filter.level().best().path), 1e-9);
+}
+
+TEST(SegmentFilter, ALoopThatFitsMovesNothingFar) {
+  const Segments segments = BentRing(0.0);
+  for (std::uint64_t seed = 1; seed <= (getenv("SEEDS") ? std::strtoul(getenv("SEEDS"), nullptr, 10) : 3); ++seed)
+    EXPECT_LT(WorstError(segments, Driven(segments, High(60), seed).level().best().path), 0.0) << seed;
+}
+
+TEST(SegmentFilter, SpreadsWhatALoopAsksForOverTheWholeWay) {
+  // Every segment is bent alike, and so is every joint put right.
+  const Segments segments = BentRing(0.015);
+  for (std::uint64_t seed = 1; seed <= (getenv("SEEDS") ? std::strtoul(getenv("SEEDS"), nullptr, 10) : 3); ++seed)
+    EXPECT_LT(WorstError(segments, Driven(segments, High(60), seed).level().best().path), 0.0) << seed;
 }
 
 TEST(SegmentFilter, ChangesNothingOutsideUntilItsWorkIsDone) {
