@@ -43,13 +43,14 @@ Evidence Apart(const Evidence& trajectory) {
   return apart;
 }
 
-Eigen::Vector3d Draw(Rng& rng, double spread) {
+Eigen::Vector3d Draw(Rng& rng) {
   const double x = NormalDraw(rng), y = NormalDraw(rng), theta = NormalDraw(rng);
-  return spread * Eigen::Vector3d{x, y, theta};
+  return {x, y, theta};
 }
 
-// Evenly over 0..1, the first 0, and neighbours, who are relatives, far apart (the golden ratio's multiples).
-double SpreadOf(std::size_t particle) {
+// How much of the drift a particle draws: evenly over 0..1, the first none, neighbours, who are relatives, far apart
+// (multiples of the golden ratio).
+double ShareOfDrift(std::size_t particle) {
   const double turns = 0.6180339887498949 * static_cast<double>(particle);
   return turns - std::floor(turns);
 }
@@ -77,9 +78,7 @@ void SegmentFilter::Take(std::vector<Evidence> trajectories, double way_m, Rng& 
   for (std::size_t i = 0; i < joints_.size(); ++i) {
     Candidate candidate{i, {}, level_.particles()[i].log_weight};
     for (std::size_t k = free_; k < joints_[i].size(); ++k) candidate.joints.push_back(joints_[i][k]);
-    Joint joint;
-    joint.spread = SpreadOf(i);
-    joint.drift = Draw(rng, joint.spread);
+    Joint joint{ShareOfDrift(i) * Draw(rng), {}, 0};
     if (const std::size_t choices = taken.trajectories.size(); choices > 1)
       joint.trajectory =
           std::min(choices - 1, static_cast<std::size_t>(UniformDraw(rng) * static_cast<double>(choices)));
@@ -265,10 +264,8 @@ void SegmentFilter::Propose(Rng& rng) {
   const double stride = stride_[moves_left_ % 2], stay = std::sqrt(1.0 - stride * stride);
   for (Candidate& candidate : proposed_) {
     const std::size_t first = moves_left_ % 2 == 0 ? 0 : candidate.joints.size() - 1;
-    for (std::size_t k = first; k < candidate.joints.size(); ++k) {
-      Joint& joint = candidate.joints[k];
-      joint.drift = stay * joint.drift + stride * Draw(rng, joint.spread);
-    }
+    for (std::size_t k = first; k < candidate.joints.size(); ++k)
+      candidate.joints[k].drift = stay * candidate.joints[k].drift + stride * Draw(rng);
     Place(candidate);
   }
 }

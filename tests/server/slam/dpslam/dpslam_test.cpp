@@ -139,6 +139,22 @@ TEST_P(DpSlamOf, SaysSoWhenTheWorldContradictsItsMap) {
 INSTANTIATE_TEST_SUITE_P(Levels, DpSlamOf, testing::Bool(),
                          [](const auto& levels) { return levels.param ? "Hierarchical" : "Flat"; });
 
+// It was the mean of the high level's particles near the best one once: beside the path and the map it belongs to.
+TEST(DpSlam, ReportsAPoseOnItsBestPath) {
+  const auto drive = DriveRing(30.0, 24.0, 0.4, 61, 16);
+  DpSlamOptions options = Small(true);
+  options.high.particles = 10;
+  options.segment.length_m = 4.0;
+  DpSlam filter(options, drive[0].T_map_robot, 7);
+  for (std::size_t i = 0; i < drive.size(); ++i) {
+    Step(filter, drive[i], i == 0);
+    const Pose2 off = Between(filter.hypothesis(0).T_map_robot, filter.estimate().T_map_robot);
+    const Pose2 off_low = Between(filter.low().best().T_map_robot, filter.low().mean());
+    ASSERT_LT(Between(off, off_low).vector().norm(), 1e-9) << i;
+    ASSERT_TRUE(IsCovariance(filter.estimate().covariance, 1e-6));
+  }
+}
+
 class DpSlamMotion : public testing::TestWithParam<LowMotion> {
  protected:
   // The ring's odometry goes 1 % too far, with 3 % of noise: such a model.
