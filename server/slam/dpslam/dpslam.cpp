@@ -57,6 +57,7 @@ void DpSlam::Observe(std::shared_ptr<const LaserRays> rays, const ParallelFor& p
     if (high_->at_work()) return;
     pending_.erase(pending_.begin(), pending_.begin() + static_cast<std::ptrdiff_t>(at_work_));
     handed_up_ += std::exchange(at_work_, 0);
+    T_low_joint_ = T_low_end_;
   }
   if (const std::size_t count = SegmentEnd(); count > 0) HandUp(count);
 }
@@ -82,9 +83,11 @@ std::size_t DpSlam::SegmentEnd() const {
 }
 
 void DpSlam::HandUp(std::size_t count) {
-  // Trajectories from the distribution the low level has now: its best one first.
+  // Trajectories from the distribution the low level has now: its best one first. From where the last one ended in the
+  // low level's frame, not from where the particle now says that it should have: what the low level has put right since
+  // then is passed on, not lost.
+  const Pose2 T_joint_low = T_low_joint_.Inverse();
   const auto along = [&](const GridParticle& particle) {
-    const Pose2 T_joint_low = JointOf(particle).Inverse();
     Evidence evidence;
     evidence.reserve(count);
     for (std::size_t k = 0; k < count; ++k)
@@ -101,22 +104,24 @@ void DpSlam::HandUp(std::size_t count) {
   for (std::size_t k = 0; k < count; ++k) way_m += pending_[k].step_m;
   high_->Take(std::move(trajectories), way_m, rng_);
   at_work_ = count;
+  T_low_end_ = low_.best().path[handed_up_ + count - 1];
   low_.KeepNear(options_.segment.keep_m);
-}
-
-Pose2 DpSlam::JointOf(const GridParticle& low) const {
-  return handed_up_ > 0 ? low.path[handed_up_ - 1] : Pose2{};
 }
 
 FilterEstimate DpSlam::estimate() const {
   if (!high_) return {low_.mean(), low_.covariance()};
-  const Pose2 T_map_segment = high_->level().mean(), T_segment_robot = Between(JointOf(low_.best()), low_.mean());
+  // The best one, not the mean of its neighbours: what they drew by chance would show.
+  const LevelFilter& high = high_->level();
+  const Pose2 T_map_segment = high.best().T_map_robot, T_segment_robot = Between(T_low_joint_, low_.mean());
+  Eigen::Vector3d off = high.mean().vector() - T_map_segment.vector();
+  off.z() = WrapAngle(off.z());
+  const Eigen::Matrix3d covariance = high.covariance() + off * off.transpose();
   const Eigen::Matrix3d J_left = J_compose_left(T_map_segment, T_segment_robot);
   // The low level's covariance is in its own frame.
-  const Pose2 T_map_low = T_map_segment * JointOf(low_.best()).Inverse();
+  const Pose2 T_map_low = T_map_segment * T_low_joint_.Inverse();
   const Eigen::Matrix3d J_low = J_compose_right(T_map_low, low_.mean());
   return {T_map_segment * T_segment_robot,
-          J_left * high_->level().covariance() * J_left.transpose() + J_low * low_.covariance() * J_low.transpose()};
+          J_left * covariance * J_left.transpose() + J_low * low_.covariance() * J_low.transpose()};
 }
 
 FilterHealth DpSlam::health() const {
@@ -137,7 +142,7 @@ Hypothesis DpSlam::hypothesis(std::size_t index) const {
   if (!high_) return {particle.T_map_robot, particle.path};
   // What is pending goes along rigidly.
   const GridParticle& low = low_.best();
-  const Pose2 T_map_low = particle.T_map_robot * JointOf(low).Inverse();
+  const Pose2 T_map_low = particle.T_map_robot * T_low_joint_.Inverse();
   Hypothesis result{T_map_low * low.T_map_robot, particle.path};
   for (std::size_t k = handed_up_; k < low.path.size(); ++k) result.path.Append(T_map_low * low.path[k]);
   return result;

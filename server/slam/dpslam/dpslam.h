@@ -52,8 +52,6 @@ class DpSlam final : public Filter {
   // Scans of the next segment, once it is long enough and hindsight allows; else 0.
   [[nodiscard]] std::size_t SegmentEnd() const;
   void HandUp(std::size_t count);
-  // Where a low-level particle's pending scans start from.
-  [[nodiscard]] Pose2 JointOf(const GridParticle& low) const;
 
   const DpSlamOptions options_;
   Rng rng_;
@@ -62,6 +60,8 @@ class DpSlam final : public Filter {
   std::vector<PendingScan> pending_;  // Not in the high level yet.
   std::size_t handed_up_ = 0;         // Scans before them.
   std::size_t at_work_ = 0;           // Of the pending, those the high level is working at.
+  Pose2 T_low_joint_;                 // Where those before the pending ended when they were handed up,
+  Pose2 T_low_end_;                   // and those at work. In the low level's frame.
   double step_m_ = 0.0;               // Since the last scan.
   double turn_rad_ = 0.0;
   std::int64_t contradicted_ = 0;  // Scans in a row.

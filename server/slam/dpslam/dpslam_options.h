@@ -23,11 +23,11 @@ struct SegmentOptions {
       1;  // Handed up for the high level to choose from: the best, then others of the low level.
 };
 
-// A rigid trajectory leaves less room for small corrections, hence the larger sigma (Eliazar 2005: 7 cm). The drift is
-// what the low level was seen to err by over segments of 12.7 m of the study's office (150 particles, robots 6-15):
-// 0.10 m and 0.09 m along and across, 0.85 deg; a few segments err by 3 deg. Unseen space is less than neutral here: as
-// good as a known wall, it draws particles to lay a way beside the old one that it should lie on (robot 16: loop
-// error 6.7 m, then 0.15 m).
+// A rigid trajectory leaves less room for small corrections, hence the larger sigma (Eliazar 2005: 7 cm). The drift,
+// the most that particles draw, is what the low level was seen to err by on raw odometry over segments of 12.7 m of the
+// study's office (150 particles, robots 6-15): 0.10 m and 0.09 m along and across, 0.85 deg; a few segments err by 3
+// deg. Unseen space is less than neutral here: as good as a known wall, it draws particles to lay a way beside the old
+// one that it should lie on (robot 16: loop error 6.7 m, then 0.15 m).
 [[nodiscard]] inline LevelOptions HighLevel() {
   LevelOptions high;
   high.sigma_m = 0.07;

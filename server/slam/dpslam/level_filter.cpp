@@ -85,7 +85,7 @@ void LevelFilter::Observe(const Evidence& evidence, Rng& rng, const ParallelFor&
       next.push_back(particles_[static_cast<std::size_t>(parent)]);
       next.back().log_weight = 0.0;
       survivors.push_back(samples[static_cast<std::size_t>(parent)]);
-      if (next.back().log_likelihood > next[best].log_likelihood) best = next.size() - 1;
+      if (next.back().log_posterior() > next[best].log_posterior()) best = next.size() - 1;
     }
     particles_ = std::move(next);
     samples = std::move(survivors);
@@ -146,7 +146,7 @@ std::vector<double> LevelFilter::Summarise() {
   effective_ = EffectiveSampleSize(weights);
   best_ = 0;
   for (std::size_t i = 1; i < particles_.size(); ++i)
-    if (particles_[i].log_likelihood > particles_[best_].log_likelihood) best_ = i;
+    if (particles_[i].log_posterior() > particles_[best_].log_posterior()) best_ = i;
   const Pose2& centre = best().T_map_robot;
   Eigen::Vector3d first = Eigen::Vector3d::Zero();
   Eigen::Matrix3d second = Eigen::Matrix3d::Zero();

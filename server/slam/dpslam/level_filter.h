@@ -28,9 +28,8 @@ struct LevelOptions {
   double give_up_behind =
       12.0;                  // Weighted log likelihood behind the best at which a particle is not looked at further.
   double agreement_m = 0.5;  // Particles this near the best one take part in the reported pose.
-  MotionNoise drift{
-      0.004, 0.05, 0.01,
-      0.001, 0.01, 0.05};  // Low: of a step, on top of what the front-end says. High: of a segment, at its joint.
+  // Low: of a step, on top of what the front-end says. High: of a segment, at its joint; the most that particles draw.
+  MotionNoise drift{0.004, 0.05, 0.01, 0.001, 0.01, 0.05};
 };
 void Visit(OptionVisitor& visitor, LevelOptions& options);  // All but `particles`.
 
@@ -39,7 +38,10 @@ struct GridParticle {
   std::size_t map = 0;          // Of ParticleMaps.
   double log_weight = 0.0;      // Since the last resampling.
   double log_likelihood = 0.0;  // Of the whole path; survives resampling.
+  double log_prior = 0.0;       // Of the drift at its joints, in the high level.
   SharedSequence<Pose2> path;   // T_map_robot at every scan observed.
+
+  [[nodiscard]] double log_posterior() const { return log_likelihood + log_prior; }
 };
 
 class LevelFilter {

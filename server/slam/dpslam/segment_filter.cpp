@@ -48,6 +48,13 @@ Eigen::Vector3d Draw(Rng& rng) {
   return {x, y, theta};
 }
 
+// How much of the drift a particle draws: evenly over 0..1, the first none, neighbours, who are relatives, far apart
+// (multiples of the golden ratio).
+double ShareOfDrift(std::size_t particle) {
+  const double turns = 0.6180339887498949 * static_cast<double>(particle);
+  return turns - std::floor(turns);
+}
+
 }  // namespace
 
 void SegmentFilter::Take(std::vector<Evidence> trajectories, double way_m, Rng& rng) {
@@ -71,7 +78,7 @@ void SegmentFilter::Take(std::vector<Evidence> trajectories, double way_m, Rng& 
   for (std::size_t i = 0; i < joints_.size(); ++i) {
     Candidate candidate{i, {}, level_.particles()[i].log_weight};
     for (std::size_t k = free_; k < joints_[i].size(); ++k) candidate.joints.push_back(joints_[i][k]);
-    Joint joint{Draw(rng), {}, 0};
+    Joint joint{ShareOfDrift(i) * Draw(rng), {}, 0};
     if (const std::size_t choices = taken.trajectories.size(); choices > 1)
       joint.trajectory =
           std::min(choices - 1, static_cast<std::size_t>(UniformDraw(rng) * static_cast<double>(choices)));
@@ -297,8 +304,11 @@ void SegmentFilter::Finish() {
     SharedSequence<Joint> all = joints_[candidate.parent];
     particle.log_weight = candidate.log_weight;
     if (judged) particle.log_likelihood = candidate.before + candidate.settled + candidate.evidence;
+    particle.log_prior = 0.0;
+    for (std::size_t s = 0; s < free_; ++s) particle.log_prior -= 0.5 * all[s].drift.squaredNorm();
     std::size_t scan = first_scan;
     for (std::size_t k = 0; k < candidate.joints.size(); ++k) {
+      particle.log_prior -= 0.5 * candidate.joints[k].drift.squaredNorm();
       const Joint& joint = candidate.joints[k];
       const bool done = free_ + k < all.size();
       if (!done) all.Append(joint);

@@ -139,6 +139,21 @@ TEST_P(DpSlamOf, SaysSoWhenTheWorldContradictsItsMap) {
 INSTANTIATE_TEST_SUITE_P(Levels, DpSlamOf, testing::Bool(),
                          [](const auto& levels) { return levels.param ? "Hierarchical" : "Flat"; });
 
+// Segments once followed each other from where the best particle of the day saw the joint: what the low level had put
+// right since the last one was handed up was lost at every joint. And the pose was the mean of samples.
+TEST(DpSlam, TwoLevelsSayWhatTheLowOneSaysUntilALoopTellsThemMore) {
+  const auto drive = DriveRing(30.0, 24.0, 0.4, 61, 16);
+  DpSlam filter(Small(true), drive[0].T_map_robot, 7);
+  for (std::size_t i = 0; i < drive.size(); ++i) {
+    Step(filter, drive[i], i == 0);
+    const Pose2 expected = drive[0].T_map_robot * filter.low().mean();
+    ASSERT_LT(Between(expected, filter.estimate().T_map_robot).vector().norm(), 1e-9) << i;
+    ASSERT_TRUE(IsCovariance(filter.estimate().covariance, 1e-6));
+  }
+  ASSERT_GT(filter.high()->best().path.size(), 50u);
+  EXPECT_GT(filter.high()->covariance().trace(), 1e-4);
+}
+
 class DpSlamMotion : public testing::TestWithParam<LowMotion> {
  protected:
   // The ring's odometry goes 1 % too far, with 3 % of noise: such a model.
