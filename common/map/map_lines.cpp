@@ -11,7 +11,7 @@
 namespace cairn {
 namespace {
 
-constexpr double kShortest_m = 1e-3, kFarthest_m = 1e6;
+constexpr double kLeastLength_m = 1e-3, kReach_m = 1e6;
 constexpr std::size_t kMaxBytes = 64u << 20;
 constexpr std::string_view kHeader = "cairn-map-lines";
 
@@ -22,8 +22,8 @@ std::string ExactNumber(double value) {
 }
 
 bool IsLine(const MapLine& line) {
-  return line.a.allFinite() && line.b.allFinite() && line.a.cwiseAbs().maxCoeff() <= kFarthest_m &&
-         line.b.cwiseAbs().maxCoeff() <= kFarthest_m && (line.b - line.a).norm() >= kShortest_m;
+  return line.a.allFinite() && line.b.allFinite() && line.a.cwiseAbs().maxCoeff() <= kReach_m &&
+         line.b.cwiseAbs().maxCoeff() <= kReach_m && (line.b - line.a).norm() >= kLeastLength_m;
 }
 
 }  // namespace
