@@ -12,7 +12,8 @@ namespace cairn {
 namespace {
 
 constexpr double kLeastLength_m = 1e-3, kReach_m = 1e6;
-constexpr std::size_t kMaxBytes = 64u << 20;
+constexpr std::size_t kMaxBytes = 4u << 20, kMaxLines = 20'000;
+constexpr const char* kNoLine = "a line is at least a millimetre long and within 1000 km";
 constexpr std::string_view kHeader = "cairn-map-lines";
 
 // Shortest text that reads back to the same double.
@@ -29,6 +30,8 @@ bool IsLine(const MapLine& line) {
 }  // namespace
 
 Result<std::vector<MapLine>> ParseMapLines(std::string_view text, const std::string& source) {
+  constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
   std::vector<MapLine> lines;
   bool header = false;
   for (int number = 1; !text.empty(); ++number) {
@@ -56,10 +59,13 @@ Result<std::vector<MapLine>> ParseMapLines(std::string_view text, const std::str
     line.b.y() = fields.Real("BY");
     fields.End();
     if (!fields.problem().empty()) return fail(fields.problem());
-    if (!IsLine(line)) return fail("a line is at least a millimetre long and within 1000 km");
+    if (!IsLine(line)) return fail(kNoLine);
     lines.push_back(line);
     if (kind == "wall") lines.push_back({line.b, line.a});
+    if (lines.size() > kMaxLines) return fail("more than 20000 lines (a wall is two)");
   }
+  if (!header)
+    return Fail(StatusCode::kInvalidArgument, source + ": empty; the first statement must be `cairn-map-lines 1`");
   if (lines.empty()) return Fail(StatusCode::kInvalidArgument, source + ": no lines");
   return lines;
 }
@@ -71,9 +77,10 @@ Result<std::vector<MapLine>> ReadMapLines(const std::filesystem::path& path) {
 }
 
 Result<void> WriteMapLines(const std::vector<MapLine>& lines, const std::filesystem::path& path) {
+  if (lines.empty()) return Fail(StatusCode::kFailedPrecondition, "the map has no lines");
   std::string text = std::string(kHeader) + " 1\n# Seen from the left of the way from A to B: side AX AY BX BY\n";
   for (const MapLine& line : lines) {
-    if (!IsLine(line)) return Fail(StatusCode::kInvalidArgument, "a line of the map is not finite or has no length");
+    if (!IsLine(line)) return Fail(StatusCode::kInvalidArgument, kNoLine);
     text += "side " + ExactNumber(line.a.x()) + ' ' + ExactNumber(line.a.y()) + ' ' + ExactNumber(line.b.x()) + ' ' +
             ExactNumber(line.b.y()) + '\n';
   }

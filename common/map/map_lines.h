@@ -24,13 +24,15 @@ struct MapLine {
   bool operator==(const MapLine&) const = default;
 };
 
-// kInvalidArgument names `source`, line and reason; a map without lines is one, too.
+// kInvalidArgument names `source`, line and reason; a map without lines is one, too, and one of more than 20,000.
 [[nodiscard]] Result<std::vector<MapLine>> ParseMapLines(std::string_view text, const std::string& source);
+// Besides, kNotFound, and kResourceExhausted beyond 4 MiB.
 [[nodiscard]] Result<std::vector<MapLine>> ReadMapLines(const std::filesystem::path& path);
-// Reads back to the same numbers; written beside the target and renamed (atomic).
+// Reads back to the same numbers; kFailedPrecondition where there are none. Written beside the target and renamed
+// (atomic).
 [[nodiscard]] Result<void> WriteMapLines(const std::vector<MapLine>& lines, const std::filesystem::path& path);
 
-// Lines that come this near.
+// Lines that come nearer than `reach_m` to a point of the map. Looks at every line.
 [[nodiscard]] std::vector<MapLine> LinesNear(const std::vector<MapLine>& map, const Eigen::Vector2d& p_map,
                                              double reach_m);
 

@@ -114,6 +114,7 @@ Result<OfflineReport> RunOffline(const OfflineOptions& options) {
   report.log = *std::move(summary);
   before = Clock::now();
   pipeline.Finish();
+  pipeline.mapper().FinishMap();
   report.landmarks = pipeline.mapper().landmarks().size();
   if (auto written = WriteResults(options, online, pipeline.mapper()); !written)
     return tl::unexpected<Status>(written.error());

@@ -8,7 +8,7 @@
 namespace cairn::server {
 
 // Fills slam.line_match's map from its file where the filter wants one; nothing to do with other filters.
-// kInvalidArgument or kNotFound name the key and the file.
+// The error names the key, the file and what is wrong; so it does where the filter's options contradict each other.
 [[nodiscard]] Result<void> LoadKnownMap(slam::MapperOptions& options);
 
 }  // namespace cairn::server

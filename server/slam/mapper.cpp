@@ -38,6 +38,7 @@ struct Mapper::State {
                    const ParallelFor& parallel_for);
   void CloseLargeLoop();
   void MoveMap();
+  void TakePath();
   void Redraw();
 
   const MapperOptions options;
@@ -176,9 +177,13 @@ void Mapper::State::AddKeyframe(std::shared_ptr<const Scan> scan, const Pose2& T
   distances_m = graph.DistancesFromLast();
   CloseLargeLoop();
   self_check.Look(keyframes, shapes, filter->hypothesis(0).path);
-  if (!placed_before && filter->placed()) MoveMap();
+  if (!placed_before && filter->placed()) {
+    MoveMap();
+    TakePath();
+  } else {
+    online_path.push_back(filter->estimate().T_map_robot);
+  }
   if (filter->placed()) grid.Draw(*keyframes.back().scan, filter->estimate().T_map_robot);
-  online_path.push_back(filter->estimate().T_map_robot);
 }
 
 // No particle may have gone the way a large loop turns out to have gone: then its error is spread over the whole path.
@@ -210,11 +215,16 @@ void Mapper::State::Redraw() {
   const OccupancyGrid::Chunks old = grid.chunks();
   grid = redraw->TakeGrid();
   redraw.reset();
+  TakePath();
+  grid.MarkAllDirty();
+  for (const auto& [key, chunk] : old) grid.MarkDirty(key);
+}
+
+// The map is, or is about to be, drawn along the filter's path of now.
+void Mapper::State::TakePath() {
   online_path.clear();
   const SharedSequence<Pose2> path = filter->hypothesis(0).path;
   for (std::size_t k = 0; k < path.size(); ++k) online_path.push_back(path[k]);
-  grid.MarkAllDirty();
-  for (const auto& [key, chunk] : old) grid.MarkDirty(key);
 }
 
 const OccupancyGrid& Mapper::grid() const {
@@ -244,6 +254,10 @@ MapperSnapshot Mapper::Snapshot() const {
   const SharedSequence<Pose2> path = state_->filter->hypothesis(0).path;
   for (std::size_t k = 0; k < path.size(); ++k) snapshot.full_path.push_back(path[k]);
   return snapshot;
+}
+
+void Mapper::FinishMap() {
+  while (state_->redraw) state_->Redraw();
 }
 
 void Mapper::AdoptGrid(OccupancyGrid grid, std::size_t keyframes) {

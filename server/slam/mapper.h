@@ -23,8 +23,10 @@ namespace cairn::slam {
 // What one scan did.
 struct ScanOutcome {
   Stamp stamp = 0;
-  Pose2 T_map_robot;                                     // Online estimate: the best particle now.
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // (x, y, theta) in map, over the particles.
+  // Online estimate: the best hypothesis now. Relative to the start while nobody knows its place in the map (kLost,
+  // filter.h: placed).
+  Pose2 T_map_robot;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // (x, y, theta) in map.
   Pose2 T_map_odom;
   bool localized = false;
   double score = 0.0;
@@ -49,6 +51,8 @@ class Mapper {
   [[nodiscard]] std::size_t keyframe_count() const;
   // Empty while the robot's place in the map is not known (filter.h: placed).
   [[nodiscard]] MapperSnapshot Snapshot() const;
+  // Nothing more comes: what is still being drawn again since a large loop closed is drawn to its end.
+  void FinishMap();
   // Replaces the grid by one redrawn from the first `keyframes` keyframes (a finished job), then draws the later
   // keyframes onto it along the current best path. Every chunk of the new grid becomes dirty;
   // what only the old one had is the caller's to compare.

@@ -1,5 +1,6 @@
 #include "server/slam/filters/line_localization.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "server/slam/matching/pose_fusion.h"
@@ -9,9 +10,9 @@ namespace {
 
 constexpr int kFoundAgain = 3;  // Keyframes in a row that agree with what was believed before it got lost.
 
-// No answer outside of it passes the gate, whatever its own doubt.
+// What the gate lets through, but for answers that are themselves in doubt by more than a step or two.
 LineMatchWindow WindowOf(const PoseBelief& belief) {
-  constexpr double kSigmas = 4.0, kDoubtM = 0.5, kDoubtRad = Radians(10.0);
+  constexpr double kSigmas = 5.0, kDoubtM = 0.5, kDoubtRad = Radians(10.0);
   return {belief.T_map_robot, kDoubtM + kSigmas * std::sqrt(belief.covariance.topLeftCorner<2, 2>().trace()),
           kDoubtRad + kSigmas * std::sqrt(belief.covariance(2, 2))};
 }
@@ -24,7 +25,8 @@ void Visit(OptionVisitor& visitor, LocalizationOptions& options) {
   visitor.Real("start_sigma_m", options.start_sigma_m, "m", 0.001, 100.0, "How right, where start_known.");
   visitor.Real("start_sigma_rad", options.start_sigma_rad, "rad", 0.001, kPi, "How right, where start_known.");
   visitor.Real("every_m", options.every_m, "m", 0.0, 100.0, "Way between searches of the whole map.");
-  visitor.Real("reach_m", options.reach_m, "m", 1.0, 1000.0, "Of the lines searched round a known place.");
+  visitor.Real("max_reach_m", options.max_reach_m, "m", 1.0, 1000.0,
+               "How far round a known place lines are searched, if the laser sees so far.");
   visitor.Real("lost_after_m", options.lost_after_m, "m", 0.1, 1000.0,
                "Way on which nothing near the belief is found before the robot counts as lost.");
   visitor.Section("places", "Which of the places found in the whole map is the right one.",
@@ -72,8 +74,13 @@ void LineLocalization::Observe(std::span<const LineFeature> lines_robot, double 
 
 bool LineLocalization::Follow(std::span<const LineFeature> lines_robot) {
   const PoseBelief belief{path_.T_map_robot(), path_.covariance()};
-  const auto near = LinesNear(*options_.map, belief.T_map_robot.translation(), options_.reach_m);
-  const LineMatchAnswer answer = MatchLinesWithMap(near, lines_robot, options_.search, WindowOf(belief));
+  const LineMatchWindow window = WindowOf(belief);
+  double seen_m = 0.0;
+  for (const LineFeature& line : lines_robot) seen_m = std::max({seen_m, line.first.norm(), line.last.norm()});
+  const double reach_m = std::min(options_.max_reach_m, seen_m + window.reach_m);
+  const auto near = LinesNear(*options_.map, belief.T_map_robot.translation(), reach_m);
+  const LineMatchAnswer answer = MatchLinesWithMap(near, lines_robot, options_.search, window);
+  if (!answer.complete) return false;  // The nearest may be missing.
   const auto nearest = Nearest(belief, answer.hypotheses);
   if (!nearest) return false;
   nis_ = DistanceOf(belief, answer.hypotheses[*nearest]);

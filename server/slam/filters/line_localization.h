@@ -2,11 +2,11 @@
 // say. From nothing, LineMatch searches the whole map until one place is left (place_hypotheses.h); until then the
 // robot is not placed. From then on it searches the lines within reach, and the answer nearest to the belief is fused
 // with it. Where nothing near it is found for long, the robot says that it is lost and searches the whole map again.
-// Maps nothing itself: no landmarks, no revisits, past poses stay; but when the robot is first placed, the path so far
-// moves with it as a whole. Frames: T_map_robot; before the robot is placed, relative to the start given.
-// Not thread-safe; deterministic, no random numbers.
-// Source: thesis B 2.2.2 (LINEMATCH, (2.17)-(2.19)); Gutmann, Weigel, Nebel, 1999. Beyond: steps by the front-end in
-// place of odometry in (2.17), and several hypotheses at the start in place of waiting for a lucky scan.
+// Maps nothing itself: no landmarks, no revisits, past poses stay, also those of a way that turns out to have been lost
+// (which the mapper has drawn); but when the robot is first placed, the path so far moves with it as a whole. Frames:
+// T_map_robot; before the robot is placed, relative to the start given. Not thread-safe; deterministic, no random
+// numbers. Source: thesis B 2.2.2 (LINEMATCH, (2.17)-(2.19)); Gutmann, Weigel, Nebel, 1999. Beyond: steps by the
+// front-end in place of odometry in (2.17), and several hypotheses at the start in place of waiting for a lucky scan.
 #pragma once
 
 #include <memory>
@@ -27,8 +27,9 @@ struct LocalizationOptions {
   bool start_known = false;  // The start pose given is near the truth, by the two below; else it means nothing.
   double start_sigma_m = 0.5;
   double start_sigma_rad = Radians(10.0);
-  double every_m = 0.5;        // Way between searches of the whole map.
-  double reach_m = 15.0;       // Of the lines searched round a place that is known: what the laser sees.
+  double every_m = 0.5;  // Way between searches of the whole map.
+  double max_reach_m =
+      60.0;  // Round a place that is known lines are searched as far as the laser sees, but not farther.
   double lost_after_m = 10.0;  // Way on which nothing near the belief is found.
   PlaceOptions places;
   LineMatchOptions search;

@@ -60,7 +60,7 @@ class Search {
   LineMatchAnswer Run() {
     done_.assign(order_.size(), 0);
     Extend(0.0, {});
-    answer_.complete = comparisons_ <= options_.max_comparisons;
+    answer_.complete = WithinBounds();
     std::ranges::stable_sort(answer_.hypotheses, [](const auto& a, const auto& b) { return a.share > b.share; });
     return std::move(answer_);
   }
@@ -76,6 +76,10 @@ class Search {
   [[nodiscard]] bool InWindow(const Pair& first) const;
   [[nodiscard]] bool InWindow(const Placing& placing) const;
   void Keep(double skipped_m);
+  [[nodiscard]] bool WithinBounds() const {
+    return comparisons_ <= options_.max_comparisons &&
+           answer_.hypotheses.size() <= static_cast<std::size_t>(options_.max_hypotheses);
+  }
   // Walls that run like this, +-slope_rad; all where nothing is known.
   template <typename Do>
   void ForWallsAlong(std::optional<double> direction, double tolerance_rad, const Do& act) const;
@@ -88,7 +92,7 @@ class Search {
   double all_m_ = 0.0;
   std::vector<Pair> pairs_;
   LineMatchAnswer answer_;
-  mutable std::int64_t comparisons_ = 0;
+  mutable std::int64_t comparisons_ = 0;  // The clock of the search: counts in questions, too.
 };
 
 template <typename Do>
@@ -99,11 +103,14 @@ void Search::ForWallsAlong(std::optional<double> direction, double tolerance_rad
     const auto first = std::ranges::lower_bound(walls_, from, {}, &Wall::direction);
     at = static_cast<std::size_t>(first - walls_.begin()) % std::max<std::size_t>(walls_.size(), 1);
   }
-  for (std::size_t k = 0; k < walls_.size() && comparisons_ <= options_.max_comparisons; ++k) {
+  for (std::size_t k = 0; k < walls_.size() && WithinBounds(); ++k) {
     const Wall& wall = walls_[at];
     if (++at == walls_.size()) at = 0;
-    if (direction && std::abs(AngleDiff(wall.direction, *direction)) > tolerance_rad) return;
     ++comparisons_;
+    if (direction && std::abs(AngleDiff(wall.direction, *direction)) > tolerance_rad) {
+      if (k == 0) continue;  // On the very edge, by rounding.
+      return;
+    }
     act(wall);
   }
 }
@@ -120,6 +127,7 @@ std::optional<std::size_t> Search::SelectScanline(const Placing& placing) const 
 // LINEMATCH: the next scan line with every wall it can be, or with none. Once the pairs leave one place, the rest of
 // the scan is no choice any more: each line is the wall it lies on, if it lies on one.
 void Search::Extend(double skipped_m, const Placing& placing) {
+  if (!WithinBounds()) return;
   const auto next = SelectScanline(placing);
   if (!next) {
     if (placing.placed) Keep(skipped_m);
@@ -173,6 +181,8 @@ const Wall* Search::BestWall(const LineFeature& line, const Pose2& T_map_robot) 
 }
 
 LineAlignment Search::Solve() const {
+  constexpr std::int64_t kWorth = 300;  // Comparisons that take as long.
+  comparisons_ += kWorth;
   std::vector<WeighedPair> weighed;
   weighed.reserve(pairs_.size());
   for (const auto& [wall, line] : pairs_)
@@ -237,6 +247,7 @@ void Search::Keep(double skipped_m) {
   LineMatchHypothesis hypothesis{T, information.llt().solve(Eigen::Matrix3d::Identity()),
                                  all_m_ > 0.0 ? (all_m_ - skipped_m) / all_m_ : 0.0, static_cast<int>(pairs_.size())};
   hypothesis.covariance = 0.5 * (hypothesis.covariance + hypothesis.covariance.transpose()).eval();
+  comparisons_ += static_cast<std::int64_t>(answer_.hypotheses.size());
   for (LineMatchHypothesis& other : answer_.hypotheses) {
     if ((other.T_map_robot.translation() - T.translation()).norm() > options_.same_m ||
         std::abs(AngleDiff(other.T_map_robot.theta, T.theta)) > options_.same_rad)
@@ -260,7 +271,8 @@ void Visit(OptionVisitor& visitor, LineMatchOptions& options) {
   visitor.Real("line_sigma_m", options.line_sigma_m, "m", 1e-4, 1.0, "Of a scan line's place.");
   visitor.Real("line_slope_sigma_rad", options.line_slope_sigma_rad, "rad", 1e-5, 1.0, "Of a scan line's slope.");
   visitor.Integer("max_comparisons", options.max_comparisons, "1", 1, 1'000'000'000'000,
-                  "Hard bound on the search: of scan lines with map lines.");
+                  "Hard bound on the search's work: scan lines compared with map lines, or what takes as long.");
+  visitor.Integer("max_hypotheses", options.max_hypotheses, "1", 1, 100000, "Hard bound on the answers of a search.");
 }
 
 LineMatchAnswer MatchLinesWithMap(std::span<const MapLine> map, std::span<const LineFeature> scan,

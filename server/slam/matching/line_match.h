@@ -31,7 +31,10 @@ struct LineMatchOptions {
   double same_rad = Radians(5.0);              // ... are one.
   double line_sigma_m = 0.02;                  // Of a scan line's place, and ...
   double line_slope_sigma_rad = Radians(0.6);  // ... slope: for the covariance.
-  std::int64_t max_comparisons = 50'000'000;   // Hard bound; a room of 20 lines needs some thousand.
+  // Hard bounds of the search: of its work (a comparison takes some 10 ns; a room of 20 lines needs some ten thousand),
+  // and of its answers, of which a map that looks alike everywhere has any number.
+  std::int64_t max_comparisons = 20'000'000;
+  std::int64_t max_hypotheses = 500;
 };
 void Visit(OptionVisitor& visitor, LineMatchOptions& options);
 
@@ -51,10 +54,10 @@ struct LineMatchHypothesis {
 
 struct LineMatchAnswer {
   std::vector<LineMatchHypothesis> hypotheses;  // The largest share first.
-  bool complete = true;                         // False: max_comparisons ended the search.
+  bool complete = true;                         // False: A bound ended the search.
 };
 
-// A window makes it faster by orders of magnitude.
+// Answers outside of the window are left out, which makes it faster by orders of magnitude.
 [[nodiscard]] LineMatchAnswer MatchLinesWithMap(std::span<const MapLine> map, std::span<const LineFeature> scan,
                                                 const LineMatchOptions& options,
                                                 const std::optional<LineMatchWindow>& window = std::nullopt);

@@ -29,7 +29,7 @@ class PlaceHypotheses {
 
   // The robot moved; `covariance_prev` of the step's (x, y, theta), in the frame it starts from.
   void Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev);
-  // What a search of the whole map said. One that was cut short says nothing.
+  // What a search of the whole map said. One that was cut short, or found no place at all, says nothing.
   void Update(const LineMatchAnswer& answer);
   // The place, if there is one.
   [[nodiscard]] std::optional<PoseBelief> settled() const;

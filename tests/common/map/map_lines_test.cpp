@@ -41,7 +41,25 @@ TEST(MapLines, ErrorsNameTheLineAndWhatIsWrong) {
   EXPECT_EQ(complaint(header + "side 1 1 1 1\n"), "plan:2: a line is at least a millimetre long and within 1000 km");
   EXPECT_EQ(complaint(header + "side 1 1 1e9 1\n"), "plan:2: a line is at least a millimetre long and within 1000 km");
   EXPECT_EQ(complaint(header), "plan: no lines");
+  EXPECT_EQ(complaint(""), "plan: empty; the first statement must be `cairn-map-lines 1`");
+  std::string many = header;
+  for (int k = 0; k < 10001; ++k) many += "wall 1 1 1 2\n";
+  EXPECT_EQ(complaint(many), "plan:10002: more than 20000 lines (a wall is two)");
   EXPECT_EQ(complaint(std::string("\0\xff\n", 3)), "plan:1: the first statement must be `cairn-map-lines 1`");
+}
+
+TEST(MapLines, AByteOrderMarkIsNoPartOfTheHeader) {
+  EXPECT_TRUE(
+      ParseMapLines("\xEF\xBB\xBF"
+                    "cairn-map-lines 1\nside 1 1 1 2\n",
+                    "plan"));
+}
+
+TEST(MapLines, AHugeFileIsRefused) {
+  const TempDirectory directory;
+  const auto read = ReadMapLines(directory.Write("huge", std::string(5u << 20, '#')));
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().code, StatusCode::kResourceExhausted);
 }
 
 TEST(MapLines, AMissingFileIsNotFound) {
@@ -50,6 +68,7 @@ TEST(MapLines, AMissingFileIsNotFound) {
 
 TEST(MapLines, WhatIsNoLineIsNotWritten) {
   const TempDirectory directory;
+  EXPECT_FALSE(WriteMapLines({}, directory / "lines.txt"));
   EXPECT_FALSE(WriteMapLines({{{0, 0}, {0, 0}}}, directory / "lines.txt"));
   EXPECT_FALSE(WriteMapLines({{{0, 0}, {0, NAN}}}, directory / "lines.txt"));
 }

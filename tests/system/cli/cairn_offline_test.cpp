@@ -61,6 +61,23 @@ TEST_F(CairnOffline, SameInputAndSeedGiveTheSameBytesWhateverTheThreads) {
   }
 }
 
+TEST_F(CairnOffline, FindsItselfInTheWallsOfAnEarlierDriveFromAWrongStart) {
+  const TempDirectory out;
+  const std::string lines = (out / "walls.lines").string();
+  ASSERT_EQ(Run({Log(), "--trajectory", (out / "before.tum").string(), "--map-lines", lines}).exit_code, 0);
+  const auto run = Run({Log(), "--set", "slam.filter=line_match", "--set", "slam.line_match.map=" + lines, "--start",
+                        "50,-30,90deg", "--trajectory", (out / "found.tum").string(), "--json"});
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  const auto before = ReadTum(out / "before.tum"), found = ReadTum(out / "found.tum");
+  ASSERT_TRUE(before && found);
+  ASSERT_EQ(before->size(), found->size());
+  EXPECT_GT((found->front().T_map_robot.translation() - before->front().T_map_robot.translation()).norm(), 10.0);
+  EXPECT_LT((found->back().T_map_robot.translation() - before->back().T_map_robot.translation()).norm(), 0.1);
+  const auto report = nlohmann::json::parse(run.output);
+  EXPECT_GT(report["not_localized"], 0);
+  EXPECT_LT(report["not_localized"], report["scans_used"]);
+}
+
 TEST_F(CairnOffline, PrintsOneObjectForMachines) {
   const auto run = Run({Log(), "--json"});
   ASSERT_EQ(run.exit_code, 0) << run.output;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "server/slam/filters/make_filter.h"
+#include "server/slam/grid/grid_image.h"
 #include "server/slam/mapper.h"
 #include "tests/server/slam/worlds.h"
 
@@ -76,7 +77,20 @@ TEST(LineLocalization, FindsItsPlaceFromNothingAndStays) {
   ASSERT_GT(snapshot.full_path.size(), 10U);
   EXPECT_LT((snapshot.full_path.front().translation() - Eigen::Vector2d(0.6, -1.6)).norm(), 0.1);
   EXPECT_EQ(snapshot.online_path.size(), snapshot.full_path.size());
+  EXPECT_LT((snapshot.online_path.front().translation() - snapshot.full_path.front().translation()).norm(), 1e-9);
   EXPECT_FALSE(robot.mapper.grid().chunks().empty());
+}
+
+TEST(LineLocalization, ALogThatEndsWhereItIsPlacedHasItsWholeMap) {
+  LostRobot robot(Options(test::Office()));
+  while (!robot.Step(test::Office()).localized) ASSERT_LT(robot.scans, 60);
+  const MapperSnapshot snapshot = robot.mapper.Snapshot();
+  EXPECT_EQ(snapshot.online_path, snapshot.full_path);
+  robot.mapper.FinishMap();
+  OccupancyGrid whole{GridOptions{}};
+  for (std::size_t k = 0; k < snapshot.keyframes.size(); ++k)
+    whole.Draw(*snapshot.keyframes[k].scan, snapshot.full_path[k]);
+  EXPECT_EQ(ImageOf(robot.mapper.grid()).cells, ImageOf(whole).cells);
 }
 
 TEST(LineLocalization, AKnownStartIsGoodAtOnce) {

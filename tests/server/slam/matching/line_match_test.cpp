@@ -115,6 +115,37 @@ TEST(LineMatch, DegenerateScansGiveNoPlace) {
   EXPECT_TRUE(Locate(corridor, {}, laser).hypotheses.empty());
 }
 
+TEST(LineMatch, AWindowLeavesOutWhatIsOutsideAndNothingElse) {
+  const auto map = MapOf(test::Room(-3, -2, 6, 4));
+  const Pose2 truth{0.8, 0.5, 0.3};
+  const auto lines =
+      ExtractFeatures(test::Look(test::Room(-3, -2, 6, 4), truth, test::FullTurnLaser(360)), FeatureOptions{}).lines;
+  const LineMatchAnswer all = MatchLinesWithMap(map, lines, {});
+  ASSERT_EQ(all.hypotheses.size(), 2U);
+  const LineMatchAnswer near = MatchLinesWithMap(map, lines, {}, LineMatchWindow{{0.5, 0.3, 0.2}, 0.6, 0.3});
+  ASSERT_EQ(near.hypotheses.size(), 1U);
+  EXPECT_LT(Away(near.hypotheses[0].T_map_robot, truth), 0.03);
+  EXPECT_TRUE(MatchLinesWithMap(map, lines, {}, LineMatchWindow{{0.5, 0.3, 0.2}, 0.2, 0.3}).hypotheses.empty());
+  EXPECT_TRUE(MatchLinesWithMap(map, lines, {}, LineMatchWindow{{0.8, 0.5, 0.7}, 0.6, 0.3}).hypotheses.empty());
+}
+
+// A corner fits every crossing of a grid of walls: any number of places, which must cost no time and no memory.
+TEST(LineMatch, AMapThatLooksAlikeEverywhereIsBounded) {
+  std::vector<MapLine> grid;
+  for (int k = 0; k < 1000; ++k) {
+    grid.push_back({{3.0 * k, -5000}, {3.0 * k, 5000}});
+    grid.push_back({{5000, 3.0 * k}, {-5000, 3.0 * k}});
+  }
+  test::World corner;
+  corner.Add({{2, -2}, {2, 2}, {-2, 2}});
+  const auto lines = ExtractFeatures(test::Look(corner, {}, test::FullTurnLaser(360)), FeatureOptions{}).lines;
+  ASSERT_GE(lines.size(), 2U);
+  const LineMatchAnswer answer = MatchLinesWithMap(grid, lines, {});
+  EXPECT_FALSE(answer.complete);
+  EXPECT_GT(answer.hypotheses.size(), 1U);
+  EXPECT_LE(answer.hypotheses.size(), static_cast<std::size_t>(LineMatchOptions{}.max_hypotheses) + 1);
+}
+
 TEST(LineMatch, TheSearchIsBounded) {
   LineMatchOptions options;
   options.max_comparisons = 10;
