@@ -19,9 +19,9 @@ MAY_INCLUDE = {
     "server/slam": COMMON,
     "server/inbound.h": COMMON,
     "server/outbound.h": COMMON,
-    # Rooms of the server, in the order a scan walks: estimators, the map they feed, work on it, questions about all.
     # Files that options name, read before any estimator is made.
     "server/setup": SLAM,
+    # Rooms of the server, in the order a scan walks: estimators, the map they feed, work on it, questions about all.
     "server/offline": [*SLAM, "server/setup"],
     "server/calibrate": [*SLAM, "server/offline"],
     "server/ops": [*SLAM, *CHANNELS],
