@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <optional>
 #include <stop_token>
@@ -46,7 +47,7 @@ class BoundedChannel {
     return PopLocked();
   }
 
-  // As Pop, but at most this long.
+  // Like Pop, but waits at most this long.
   template <typename Rep, typename Period>
   [[nodiscard]] std::optional<T> PopFor(const std::chrono::duration<Rep, Period>& duration) CAIRN_EXCLUDES(mutex_) {
     const auto deadline = std::chrono::steady_clock::now() + duration;
@@ -77,6 +78,11 @@ class BoundedChannel {
     MutexLock lock(mutex_);
     return values_.size();
   }
+  // How many values have left the channel so far: shows that its receivers move.
+  [[nodiscard]] std::uint64_t taken() const CAIRN_EXCLUDES(mutex_) {
+    MutexLock lock(mutex_);
+    return taken_;
+  }
   [[nodiscard]] std::size_t capacity() const { return capacity_; }
 
  private:
@@ -91,6 +97,7 @@ class BoundedChannel {
     if (values_.empty()) return std::nullopt;
     std::optional<T> value(std::move(values_.front()));
     values_.pop_front();
+    ++taken_;
     room_.NotifyOne();
     return value;
   }
@@ -107,6 +114,7 @@ class BoundedChannel {
   CondVar filled_;
   CondVar room_;
   std::deque<T> values_ CAIRN_GUARDED_BY(mutex_);
+  std::uint64_t taken_ CAIRN_GUARDED_BY(mutex_) = 0;
   bool closed_ CAIRN_GUARDED_BY(mutex_) = false;
 };
 

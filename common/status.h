@@ -1,4 +1,4 @@
-// What an operation that depends on the world (wire, disk, configuration) returns: a value or a Status.
+// The result of an operation that depends on the outside (network, disk, configuration): a value or a Status.
 // Codes are gRPC's, so a reply on the wire carries the same number. Thread-safe (plain values).
 #pragma once
 

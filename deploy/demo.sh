@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# The demo: builds Cairn, starts a server on a DDS domain of its own, streams three simulated robots through one
-# building into one map, asks for poses and tiles meanwhile, smooths, and compares with the truth.
-# A robot log given as argument goes into a second site:  deploy/demo.sh [LOG]
-# Leaves demo-out/ (or $DEMO_OUT): report.md, map.png, building.yaml, trajectories, the server's log. Needs no display.
-# DEMO_SECONDS (150) and DEMO_RATE (3) say how long the robots drive and how much faster than real time; on a machine
-# too slow for that they wait for the server.
+# The demo builds Cairn, starts a server on its own DDS domain, and streams three simulated robots in one building
+# into one map. It asks for poses and tiles meanwhile, smooths the paths, and compares them with the truth.
+# Usage: deploy/demo.sh [LOG]. A robot log given as LOG is replayed into a second site. No display is needed.
+# Output in demo-out/ (or $DEMO_OUT): report.md, map.png, building.yaml, trajectories, and the server's log.
+# DEMO_SECONDS (150) sets how long the robots drive, and DEMO_RATE (3) how much faster than real time. On a
+# slow machine they wait for the server.
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -14,7 +14,8 @@ seconds=${DEMO_SECONDS:-150}
 rate=${DEMO_RATE:-3}
 robots=(robot1 robot2 robot3)
 bin=$root/build/release/bin
-# A domain nobody else is likely to use; up to 101 its ports lie below those the kernel gives to others.
+# A domain that other programs are unlikely to use. Up to domain 101, its ports lie below those that the
+# kernel assigns to other programs.
 export CAIRN_DOMAIN=${CAIRN_DOMAIN:-$((60 + $$ % 42))}
 
 if [ $# -gt 1 ] || [ "$log" = --help ]; then
@@ -24,9 +25,9 @@ if [ $# -gt 1 ] || [ "$log" = --help ]; then
 fi
 if [ -n "$log" ] && [ ! -r "$log" ]; then echo "demo: cannot read $log" >&2; exit 2; fi
 if [ -n "$log" ]; then log=$(realpath "$log"); fi
-# It is emptied below.
+# The folder is emptied below, so refuse one that no demo has made.
 if [ -n "$(ls -A "$out" 2>/dev/null)" ] && [ ! -e "$out/cairnd.log" ]; then
-  echo "demo: $out holds something that is not a demo's; name another DEMO_OUT" >&2
+  echo "demo: $out contains files that are not from a demo; set DEMO_OUT to another folder" >&2
   exit 2
 fi
 
@@ -64,13 +65,13 @@ step "starting cairnd on domain $CAIRN_DOMAIN"
 server=$!
 for attempt in $(seq 40); do
   if "$bin/cairn" ping --timeout 500ms >ping.txt 2>/dev/null; then break; fi
-  kill -0 "$server" 2>/dev/null || { cat cairnd.log >&2; fail "the server ended at once"; }
+  kill -0 "$server" 2>/dev/null || { cat cairnd.log >&2; fail "the server ended right after its start; its log is above"; }
   [ "$attempt" -lt 40 ] || fail "the server does not answer; see $out/cairnd.log"
   sleep 0.25
 done
 cat ping.txt
 
-step "three robots drive through one building, $seconds s at $rate times real time"
+step "three robots drive through one building for $seconds s, at $rate times real time"
 "$bin/cairn" sim --world building --robots 3 --beams 360 --hz 10 --seconds "$seconds" --rate "$rate" --window 32 --site building \
   --truth-dir truth --watch-pid "$server" >sim.txt 2>sim-progress.txt &
 sim=$!
@@ -81,11 +82,11 @@ while kill -0 "$sim" 2>/dev/null; do
   for robot in "${robots[@]}"; do "$bin/cairn" pose "$robot" || true; done
   "$bin/cairn" tiles --site building --level 2 | tail -n 1 || true
 done
-wait "$sim" || { sim=; cat sim.txt sim-progress.txt >&2; fail "scans are missing or unexplained"; }
+wait "$sim" || { sim=; cat sim.txt sim-progress.txt >&2; fail "the simulation failed, or scans were lost; see above"; }
 sim=
 cat sim.txt
 
-step "what the server knows"
+step "asking the server for its state and the paths"
 "$bin/cairn" status | tee status.txt
 "$bin/cairn" map info --site building
 for robot in "${robots[@]}"; do "$bin/cairn" path "$robot" -o "$robot.tum"; done
@@ -99,36 +100,38 @@ for robot in "${robots[@]}"; do "$bin/cairn" path "$robot" --smoothed -o "$robot
   --title "Three robots, one building, one map" -o map.png
 
 if [ -n "$log" ]; then
-  step "the log $(basename "$log") into a second site, as fast as the server takes it"
+  step "replaying the log $(basename "$log") into a second site, as fast as the server takes it"
   "$bin/cairn" replay "$log" --site log --robot log --fast | tee replay.txt
   "$bin/cairn" path log -o log.tum
   "$bin/cairn" map export --site log -o log.yaml
   "$bin/cairn" map draw --site log --paths log.tum --title "$(basename "$log")" -o log-map.png
 fi
 
-step "errors against the truth"
+step "computing the errors against the truth"
 quote() { sed 's/^/    /' "$1"; }
 rmse() { "$bin/cairn" eval "$1" "$2" --json | sed -n 's/.*"ate_rmse_m":\([0-9.e+-]*\).*/\1/p'; }
 {
   printf '# Cairn demo, %s\n\n![map](map.png)\n\n' "$(date -u +%F)"
-  printf 'Three simulated robots, one site, %s s at %s times real time; the starts are given, nothing is aligned.\n\n' "$seconds" "$rate"
+  printf 'Three simulated robots in one site, %s s at %s times real time. The start poses are given; the paths are not aligned with the truth.\n\n' "$seconds" "$rate"
   printf '| robot | online: ATE rmse, m | smoothed: ATE rmse, m |\n|---|---|---|\n'
   for robot in "${robots[@]}"; do
     printf '| %s | %.4f | %.4f |\n' "$robot" "$(rmse "$robot.tum" "truth/$robot.tum")" \
       "$(rmse "$robot-smooth.tum" "truth/$robot.tum")"
   done
-  printf '\n## What became of every scan\n\n'; quote sim.txt
+  printf '\n## Scans used and dropped\n\n'; quote sim.txt
   printf '\n## Smoothing\n\n'; quote job.txt
   if [ -n "$log" ]; then
     printf '\n## %s\n\n![map of the log](log-map.png)\n\n' "$(basename "$log")"; quote replay.txt
   fi
-  printf '\n## Files\n\nbuilding.yaml + .png (for Nav2; -online: before smoothing), *.tum (online, -smooth), truth/*.tum, cairnd.log\n'
+  printf '\n## Files\n\n- building.yaml and its .png: the map after smoothing, for Nav2 (building-online.*: before smoothing)\n'
+  printf -- '- *.tum: the online paths (*-smooth.tum: the smoothed paths), truth/*.tum: the true paths\n'
+  printf -- '- cairnd.log: the log of the server\n'
 } >report.md
 sed -n '/^| robot/,/^$/p' report.md
 
-step "stopping"
+step "stopping the server"
 kill -TERM "$server"
 wait "$server" || fail "the server did not stop cleanly; see $out/cairnd.log"
 server=
 rm -f ping.txt sim-progress.txt
-echo "$out: report.md, map.png, trajectories; took $(($(date +%s) - began)) s after the build"
+echo "The report, the map and the trajectories are in $out. The demo took $(($(date +%s) - began)) s after the build."

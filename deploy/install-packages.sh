@@ -1,11 +1,12 @@
 #!/usr/bin/env bash
-# Installs what deploy/packages.txt lists and this machine lacks: install-packages.sh [build|run|test]...
-# Without arguments: build. Asks nothing, is silent and quick when nothing is missing; needs root or sudo otherwise.
-# Exit code: 0 all there, 1 could not install, 2 usage.
+# Installs the packages of deploy/packages.txt that this machine lacks.
+# Usage: install-packages.sh [build|run|test]... The default is build.
+# It asks no questions. It prints nothing if no package is missing; otherwise it needs root or sudo.
+# Exit codes: 0 all packages are installed, 1 the installation failed, 2 wrong usage.
 set -euo pipefail
 
 list="$(dirname "${BASH_SOURCE[0]}")/packages.txt"
-attempts=${CAIRN_APT_ATTEMPTS:-5}       # Each waits up to 120 s for another apt's lock.
+attempts=${CAIRN_APT_ATTEMPTS:-5}       # Each attempt waits up to 120 s for the lock of another apt.
 retry_pause_s=${CAIRN_APT_PAUSE_S:-10}
 
 fail() { echo "install-packages: $*" >&2; exit 1; }
@@ -18,18 +19,18 @@ for section in "$@"; do
   fi
 done
 
-# The lines of the sections asked for, alternatives as `a|b`.
+# The lines of the requested sections, with alternatives as `a|b`.
 wanted=$(awk -v sections=" $* " '/^\[/ { gsub(/[][]/, ""); on = index(sections, " " $0 " "); next }
                                  on && !/^(#|$)/ { gsub(/[ \t]/, ""); print }' "$list" | sort -u)
 
 command -v dpkg-query >/dev/null ||
-  fail "this machine has no dpkg; install by hand what $list names for: $*"
+  fail "this machine has no dpkg; install the packages of these sections of $list by hand: $*"
 
 missing_lines() {
   local installed line
   installed=$(dpkg-query -W -f='${db:Status-Status} ${Package}\n' 2>/dev/null | sed -n 's/^installed //p')
   for line in $wanted; do
-    # An alternative counts when any of its names is installed.
+    # A line with alternatives is complete if one of its packages is installed.
     grep -qxF "${line//|/$'\n'}" <<<"$installed" || echo "$line"
   done
 }
@@ -63,7 +64,7 @@ try() {
 }
 
 echo "installing: ${missing//$'\n'/ }"
-# A failed update may still leave usable lists, so the installation decides.
+# After a failed update the old package lists may still be usable, so try the installation anyway.
 try update || echo "install-packages: the package lists could not be updated; trying with the old ones" >&2
 
 names=()
@@ -72,7 +73,7 @@ for line in $missing; do
   for name in ${line//|/ }; do
     if apt-cache show --no-all-versions "$name" >/dev/null 2>&1; then chosen=$name; break; fi
   done
-  # An update without a network counts as done, with warnings.
+  # Without a network `apt-get update` succeeds with warnings, so show its output here.
   [ -n "$chosen" ] || { cat "$log" >&2; fail "no package source offers ${line//|/ or }"; }
   names+=("$chosen")
 done

@@ -1,7 +1,8 @@
-// Everything cairnd can be told: the server's options and the wire's, as one tree.
+// All options of cairnd, those of the server and those of the wire, as one tree.
 #pragma once
 
 #include "common/options/option_visitor.h"
+#include "common/status.h"
 #include "common/wire/bus.h"
 #include "server/options.h"
 
@@ -12,5 +13,8 @@ struct CairndOptions {
   wire::WireOptions wire;
 };
 void Visit(OptionVisitor& visitor, CairndOptions& options);
+// Checks what does not depend on the machine: fields that contradict each other, names of sites, and
+// addresses. It reads no file.
+[[nodiscard]] Result<void> Validate(const CairndOptions& options);
 
 }  // namespace cairn::server

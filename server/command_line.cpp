@@ -6,10 +6,9 @@
 #include <vector>
 
 #include "common/options/config.h"
-#include "common/service/names.h"
 #include "common/version.h"
 #include "common/wire/wire_arguments.h"
-#include "server/setup/known_map.h"
+#include "server/known_map.h"
 
 namespace cairn::server {
 namespace {
@@ -46,14 +45,12 @@ std::optional<CommandLine> ParseCommandLine(int argc, char** argv, int& exit_cod
     return std::nullopt;
   }
 
-  exit_code = kUsage;  // Of whatever is wrong from here on.
+  exit_code = kUsage;  // The exit code of every error below.
   CommandLine line;
   const VisitOptions visit = [&line](OptionVisitor& visitor) { Visit(visitor, line.options); };
   if (!config.empty() && Complain(ApplyYamlFile(config, visit))) return std::nullopt;
   if (!log_level.empty()) arguments.assignments.push_back("server.log_level=" + log_level);
-  if (Complain(Apply(arguments, visit)) || Complain(Validate(line.options.wire))) return std::nullopt;
-  for (const std::string& site : line.options.server.server.site_names())
-    if (Complain(ValidateName("server.sites", site))) return std::nullopt;
+  if (Complain(Apply(arguments, visit)) || Complain(Validate(line.options))) return std::nullopt;
   if (!print_config && Complain(LoadKnownMap(line.options.server.slam))) return std::nullopt;
   if (print_config) line.task = Task::kPrintConfig;
   if (check_config) line.task = Task::kCheckConfig;

@@ -1,5 +1,5 @@
-// cairnd's command line: what to do, and with which options. Precedence, lowest first: defaults, --config, --set,
-// --domain, --log-level; CAIRN_DOMAIN stands between the file and --set (common/wire/wire_arguments.h).
+// The command line of cairnd: the task and the options. Precedence, lowest first: defaults, --config, the
+// environment variable CAIRN_DOMAIN, --set, --domain, --log-level (see common/wire/wire_arguments.h).
 #pragma once
 
 #include <optional>
@@ -15,8 +15,9 @@ struct CommandLine {
   CairndOptions options;
 };
 
-// Nothing where the program is to end at once with `exit_code`: 0 after --help and --version, 2 for a wrong command
-// line or configuration, which the next start would meet again. What was wrong is on standard error.
+// Returns nothing if the program is to end at once with `exit_code`: 0 after --help and --version, 2 for a
+// wrong command line or configuration (a restart would fail in the same way). The error is written to
+// standard error.
 [[nodiscard]] std::optional<CommandLine> ParseCommandLine(int argc, char** argv, int& exit_code);
 
 }  // namespace cairn::server

@@ -1,5 +1,7 @@
-// cairnd: options -> doors and server -> signals -> exit code. 0: stopped when asked to; 1: could not start, which may
-// pass (an address that is not there yet); 2: wrong command line or configuration, which starting again does not mend.
+// The main function of cairnd. It reads the options, starts the server and its connections to DDS, waits for
+// a signal, and stops. Exit codes: 0 stopped on request; 1 could not start, but a
+// later try may succeed (for example, an address does not exist yet); 2 wrong command line or configuration, so that a
+// restart would fail again.
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -14,6 +16,7 @@
 #include "common/options/config.h"
 #include "common/version.h"
 #include "server/command_line.h"
+#include "server/door_losses.h"
 #include "server/egress/egress.h"
 #include "server/ingress/ingress.h"
 #include "server/ingress/other_servers.h"
@@ -36,19 +39,43 @@ void LogConfig(const CairndOptions& options) {
   }
 }
 
-// Servers of other machines are found only once both run.
-void WarnOfOthers(asio::steady_timer& timer, OtherServers& others) {
+// What the main thread checks while the server runs.
+struct Watched {
+  const Server& server;
+  const Outbound& outbound;
+  const Ingress& ingress;
+  const Egress& egress;
+  OtherServers& others;
+};
+
+DoorCounts LossesOf(const Watched& watched) {
+  return {.inbound_full = watched.ingress.overflow(),
+          .malformed = watched.ingress.malformed(),
+          .uncounted_scans = watched.server.uncounted_scans(),
+          .outbound_full = watched.outbound.refused(),
+          .unpublished = watched.egress.unpublished()};
+}
+
+// Checks once a second for servers on other machines (they are discovered only when both run) and for lost
+// messages.
+void Look(asio::steady_timer& timer, const Watched& watched, DoorLosses& losses, const ServiceNotifier& notifier) {
   timer.expires_after(std::chrono::seconds(1));
-  timer.async_wait([&timer, &others](const asio::error_code& error) {
+  timer.async_wait([&](const asio::error_code& error) {
     if (error) return;
-    if (others.Joined())
-      spdlog::error("another server serves this DDS domain: robots and people get half the truth from each; stop one");
-    WarnOfOthers(timer, others);
+    if (watched.others.Joined()) {
+      spdlog::error("another server serves this DDS domain: clients get answers from both; stop one of them");
+    }
+    const DoorCounts counts = LossesOf(watched);
+    if (const auto line = losses.Check(counts, DoorLosses::Clock::now())) {
+      spdlog::warn("{}", *line);
+      notifier.Status("messages lost between DDS and the server: " + TextOf(counts));
+    }
+    Look(timer, watched, losses, notifier);
   });
 }
 
-// Runs until SIGTERM or SIGINT; feeds the watchdog while the server is healthy.
-void WaitForSignal(asio::io_context& context, asio::signal_set& signals, const Server& server, OtherServers& others,
+// Runs until SIGTERM or SIGINT. Notifies the watchdog while the server is healthy.
+void WaitForSignal(asio::io_context& context, asio::signal_set& signals, const Watched& watched,
                    const ServiceNotifier& notifier) {
   signals.async_wait([&context](const asio::error_code& error, int signal) {
     if (!error) spdlog::info("signal {}: stopping", signal);
@@ -59,19 +86,20 @@ void WaitForSignal(asio::io_context& context, asio::signal_set& signals, const S
   const auto period = watchdog ? *watchdog / 3 : std::chrono::microseconds(0);
   const std::function<void(const asio::error_code&)> feed = [&](const asio::error_code& error) {
     if (error) return;
-    if (server.healthy()) notifier.Alive();
+    if (watched.server.healthy()) notifier.Alive();
     timer.expires_after(period);
     timer.async_wait(feed);
   };
   if (watchdog) feed({});
   asio::steady_timer second(context);
-  WarnOfOthers(second, others);
+  DoorLosses losses;
+  Look(second, watched, losses, notifier);
   context.run();
 }
 
 int Serve(const CairndOptions& options) {
   StartLogging(options.server.server.log_level);
-  // Before any thread starts: signals reach the signal set only.
+  // The signal set is made before any thread starts, so that no thread receives the signals instead.
   asio::io_context context(1);
   asio::signal_set signals(context, SIGTERM, SIGINT);
   spdlog::info("cairnd {} starts in DDS domain {}", kVersion, options.wire.domain);
@@ -100,14 +128,14 @@ int Serve(const CairndOptions& options) {
   const ServiceNotifier notifier;
   notifier.Ready("serving DDS domain " + std::to_string(options.wire.domain));
   spdlog::info("ready");
-  WaitForSignal(context, signals, server, **others, notifier);
+  const Watched watched{server, outbound, **ingress, **egress, **others};
+  WaitForSignal(context, signals, watched, notifier);
   notifier.Stopping();
 
   (*ingress)->Close();
   server.Stop();
   (*egress)->Finish();
-  spdlog::info("stopped; {} values left out at the door, {} malformed, {} not sent", (*ingress)->overflow(),
-               (*ingress)->malformed(), outbound.refused() + (*egress)->unpublished());
+  spdlog::info("stopped; messages lost between DDS and the server since the start: {}", TextOf(LossesOf(watched)));
   return 0;
 }
 
@@ -120,9 +148,9 @@ int Main(int argc, char** argv) {
       std::cout << PrintConfig(line->options);
       return 0;
     case Task::kCheckConfig:
-      // It may be meant for another machine, or for this one with its network up.
+      // Only a warning: the file may be for another machine, or this machine's network may not be up yet.
       if (const auto present = wire::RequireInterfaces(line->options.wire); !present)
-        std::cerr << "cairnd: warning: " << present.error().message << "; without it cairnd does not start\n";
+        std::cerr << "cairnd: warning: " << present.error().message << "; cairnd does not start without it\n";
       std::cout << "the configuration is valid\n";
       return 0;
     case Task::kServe:

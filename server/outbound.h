@@ -2,8 +2,8 @@
 // Three lanes, so that a large answer or a whole map never delays a pose: `live` (session states, poses, ledgers,
 // jobs), `map` (map info, tiles), `replies`. Overflow rule: Send never waits and says false; values that describe a
 // state (session, ledger, map, tile, job) stay marked as unsent with their owner, who sends their newest form later; a
-// pose is superseded by the next; a reply is lost and its client's deadline passes. Every loss is counted. Thread rule:
-// any thread.
+// pose is superseded by the next; a reply is lost and its client's deadline passes. Every refusal is counted, also that
+// of a state that is sent later. Thread rule: any thread.
 #pragma once
 
 #include <array>

@@ -2,14 +2,12 @@
 
 #include <spdlog/spdlog.h>
 
-#include <asio/post.hpp>
+#include <algorithm>
 #include <chrono>
-#include <future>
+#include <map>
 #include <string>
 #include <utility>
 #include <variant>
-
-#include "server/jobs/smooth_job.h"
 
 namespace cairn::server {
 namespace {
@@ -34,112 +32,19 @@ Server::Server(const ServerOptions& options, Inbound& inbound, Outbound& outboun
       outbound_(outbound),
       robots_pool_(ThreadCount(options.server.threads)),
       maps_pool_(1),
-      atlas_(options.maps, options.slam.grid.resolution_m, options.server.create_sites, maps_pool_, MakeSitePorts()),
-      roster_(options.robots, options.slam, robots_pool_, MakeRosterPorts()),
-      jobs_(
-          options.jobs, [this](OutboundValue value) { return outbound_.Send(std::move(value)); }, ServerClock),
-      worker_(options.jobs, jobs_, MakeJobWorks()),
-      desk_(static_cast<std::size_t>(options.server.query_queue), outbound, MakeDeskPorts()),
+      atlas_(options.maps, options.slam.grid.resolution_m, options.server.create_sites, maps_pool_, outbound),
+      roster_(options.robots, options.slam, robots_pool_, outbound, atlas_),
+      jobs_(options.jobs, outbound, ServerClock),
+      smooth_(options.jobs, roster_, atlas_),
+      worker_(
+          options.jobs, jobs_,
+          [this](const Job& job, bool enable, const JobControl& control) { return smooth_.Run(job, enable, control); }),
+      desk_(static_cast<std::size_t>(options.server.query_queue), outbound, roster_, atlas_, jobs_, worker_),
       heartbeat_(
           std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options.server.stall_limit_s))) {}
 
 Server::~Server() {
   Stop();
-}
-
-RosterPorts Server::MakeRosterPorts() {
-  return {.send = [this](OutboundValue value) { return outbound_.Send(std::move(value)); },
-          .enter_site = [this](const std::string& name) -> Result<std::uint32_t> {
-            const auto site = atlas_.Enter(name);
-            if (!site) return tl::unexpected(site.error());
-            return (*site)->snapshot()->info.epoch;
-          },
-          .grid_changed =
-              [this](const std::string& name, GridChange&& change) {
-                if (const auto site = atlas_.Find(name)) site->Change(std::move(change));
-              },
-          .robots_changed =
-              [this](const std::string& name) {
-                const auto site = atlas_.Find(name);
-                if (site) site->SetRobots(static_cast<std::uint32_t>(roster_.InSite(name).size()));
-              }};
-}
-
-SitePorts Server::MakeSitePorts() {
-  return {.send = [this](OutboundValue value) { return outbound_.Send(std::move(value)); },
-          .correct =
-              [this](const std::string& site, SessionId id, Correction&& correction) {
-                for (const auto& session : roster_.InSite(site)) {
-                  if (session->id() != id) continue;
-                  session->Adopt(std::move(correction));
-                  return true;
-                }
-                return false;
-              }};
-}
-
-DeskPorts Server::MakeDeskPorts() {
-  Views views;
-  views.session = [this](const std::string& robot) -> std::optional<SessionSnapshot> {
-    const auto session = roster_.Find(robot);
-    if (session == nullptr) return std::nullopt;
-    return session->record().snapshot();
-  };
-  views.sessions = [this] {
-    std::vector<SessionSnapshot> snapshots;
-    for (const auto& session : roster_.All()) snapshots.push_back(session->record().snapshot());
-    return snapshots;
-  };
-  views.map = [this](const std::string& name) -> std::shared_ptr<const MapSnapshot> {
-    const auto site = atlas_.Find(name);
-    return site ? site->snapshot() : nullptr;
-  };
-  views.maps = [this] {
-    std::vector<std::shared_ptr<const MapSnapshot>> maps;
-    for (const auto& site : atlas_.All()) maps.push_back(site->snapshot());
-    return maps;
-  };
-  views.job = [this](std::uint64_t id) { return jobs_.Find(id); };
-  views.jobs = [this](const std::string& site) { return jobs_.OfSite(site); };
-  return {.views = std::move(views),
-          .submit_job = [this](const std::string& site, JobKind kind, bool enable) -> Result<Job> {
-            if (atlas_.Find(site) == nullptr) return Fail(StatusCode::kNotFound, "no site '" + site + "'");
-            return worker_.Submit(site, kind, enable);
-          },
-          .cancel_job = [this](std::uint64_t id) { return jobs_.Cancel(id); },
-          .end_session = [this](const std::string& robot) { return roster_.End(robot); },
-          .enable_map =
-              [this](const std::string& name, std::uint32_t version, Site::Done done) {
-                const auto site = atlas_.Find(name);
-                if (site == nullptr) return done(Fail(StatusCode::kNotFound, "no site '" + name + "'"));
-                site->Enable(version, std::move(done));
-              }};
-}
-
-std::map<JobKind, JobWork> Server::MakeJobWorks() {
-  const auto smooth = std::make_shared<const SmoothJob>(SmoothPorts{
-      .collect = [this](const std::string& site, const JobControl& control) { return CollectMaterial(site, control); },
-      .add_version =
-          [this](const std::string& name, MapVersion&& version) {
-            return AwaitMap(name, [&version](Site& site, Site::Done done) {
-              site.AddVersion(std::move(version), std::move(done));
-            });
-          },
-      .enable =
-          [this](const std::string& name, std::uint32_t version) {
-            return AwaitMap(name, [version](Site& site, Site::Done done) { site.Enable(version, std::move(done)); });
-          }});
-  return {{JobKind::kSmooth, [smooth](const Job& job, bool enable, const JobControl& control) {
-             spdlog::info("job {}: smoothing site {}", job.id, job.site);
-             auto outcome = smooth->Run(job, enable, control);
-             if (outcome) {
-               spdlog::info("job {}: map version {}, disagreement {:.6f} -> {:.6f} m^2 ({})", job.id,
-                            outcome->map_version, outcome->cost_before, outcome->cost_after, outcome->message);
-             } else {
-               spdlog::info("job {}: {}", job.id, outcome.error().message);
-             }
-             return outcome;
-           }}};
 }
 
 Result<void> Server::Start() {
@@ -199,68 +104,33 @@ void Server::PublishMaps() {
 }
 
 void Server::CheckHealth() {
-  std::map<std::string, Heartbeat::Ask> strands;
+  std::map<std::string, Pulse> pulses;
+  Pulse& robots = pulses["robots"];  // The sum of all sessions: one session may wait while others make progress.
   for (const auto& session : roster_.All()) {
-    strands.emplace("robot " + session->record().state().robot,
-                    [session](std::function<void()> answer) { return session->Post(Probe{std::move(answer)}); });
+    const Pulse pulse = session->pulse();
+    robots.finished += pulse.finished;
+    robots.busy |= session->has_work();
+    pulses.emplace("robot " + session->record().state().robot, pulse);
   }
-  for (const auto& site : atlas_.All()) {
-    strands.emplace("site " + site->snapshot()->info.site, [site](std::function<void()> answer) {
-      site->Probe(std::move(answer));
-      return true;
-    });
+  for (const auto& site : atlas_.All()) pulses.emplace("site " + site->snapshot()->info.site, site->pulse());
+  pulses.emplace("dispatcher", Pulse{inbound_.taken(), inbound_.size() > 0});
+  pulses.emplace("desk", desk_.pulse());
+  for (int lane = 0; lane < Outbound::kLanes; ++lane) {
+    const auto& values = outbound_.lane(static_cast<Outbound::Lane>(lane));
+    pulses.emplace("outbound lane " + std::to_string(lane), Pulse{values.taken(), values.size() > 0});
   }
-  const std::vector<std::string> stalled = heartbeat_.Check(strands, Clock::now());
+  const std::vector<std::string> stalled = heartbeat_.Check(pulses, Clock::now());
   const bool was_healthy = healthy_.exchange(stalled.empty());
-  if (was_healthy && !stalled.empty()) spdlog::error("{} does not move; the watchdog is not fed", stalled.front());
-}
-
-Result<std::vector<SessionMaterial>> Server::CollectMaterial(const std::string& site, const JobControl& control) {
-  const auto sessions = roster_.InSite(site);
-  const auto answers = std::make_shared<BoundedChannel<SessionMaterial>>(std::max<std::size_t>(1, sessions.size()));
-  for (const auto& session : sessions) {
-    // A session that cannot take it now does not answer either, and the deadline names it.
-    static_cast<void>(session->Post(SnapshotWanted{
-        [answers](SessionMaterial&& material) { static_cast<void>(answers->TryPush(std::move(material))); }}));
-  }
-  const auto deadline = Clock::now() + std::chrono::duration<double>(options_.jobs.snapshot_timeout_s);
-  std::map<SessionId, SessionMaterial> material;  // By id: the job's result does not depend on who answers first.
-  while (material.size() < sessions.size()) {
-    if (control.cancelled()) return Fail(StatusCode::kCancelled, "cancelled");
-    if (Clock::now() > deadline) {
-      return Fail(StatusCode::kDeadlineExceeded, std::to_string(sessions.size() - material.size()) +
-                                                     " robots did not show their state (jobs.snapshot_timeout_s)");
-    }
-    if (auto answer = answers->PopFor(std::chrono::milliseconds(50))) material.emplace(answer->session, *answer);
-  }
-  std::vector<SessionMaterial> all;
-  all.reserve(material.size());
-  for (auto& [id, one] : material) all.push_back(std::move(one));
-  return all;
-}
-
-Result<std::uint32_t> Server::AwaitMap(const std::string& name, const std::function<void(Site&, Site::Done)>& ask) {
-  const auto site = atlas_.Find(name);
-  if (site == nullptr) return Fail(StatusCode::kNotFound, "no site '" + name + "'");
-  const auto promise = std::make_shared<std::promise<Result<std::uint32_t>>>();
-  auto answer = promise->get_future();
-  ask(*site, [promise](Result<std::uint32_t> result) { promise->set_value(std::move(result)); });
-  const auto deadline = Clock::now() + std::chrono::duration<double>(options_.jobs.snapshot_timeout_s);
-  while (answer.wait_for(std::chrono::milliseconds(50)) != std::future_status::ready) {
-    if (stopping_) return Fail(StatusCode::kCancelled, "the server is stopping");
-    if (Clock::now() > deadline) {
-      return Fail(StatusCode::kDeadlineExceeded, "the map did not switch in time (jobs.snapshot_timeout_s)");
-    }
-  }
-  return answer.get();
+  if (was_healthy && !stalled.empty())
+    spdlog::error("{} makes no progress; the systemd watchdog is no longer notified", stalled.front());
 }
 
 void Server::Stop() {
   if (stopping_.exchange(true)) return;
   inbound_.Close();
-  // Answers may be large and their readers slow; a goodbye does not wait for them.
+  // Large replies to slow readers must not delay the last state of the sessions.
   outbound_.lane(Outbound::Lane::kReplies).Close();
-  if (dispatcher_.joinable()) dispatcher_.join();  // Routes what the channel still holds.
+  if (dispatcher_.joinable()) dispatcher_.join();  // It first dispatches what the channel still holds.
   housekeeping_ = {};
   worker_.Stop();
   FinishSessions();
@@ -284,7 +154,8 @@ void Server::FinishSessions() {
     if (finished->PopFor(deadline - Clock::now())) ++done;
   }
   if (done == sessions.size()) return;
-  spdlog::warn("{} robots still had scans to finish when the time was up; they are dropped", sessions.size() - done);
+  spdlog::warn("{} robots still had waiting scans after server.stop_timeout_s; these scans are dropped",
+               sessions.size() - done);
   for (const auto& session : sessions) session->Abandon();
   while (done < sessions.size() && finished->PopFor(std::chrono::milliseconds(300))) ++done;
 }

@@ -1,8 +1,9 @@
-// The server: the only file that knows every room. Takes plain values from the inbound channel, routes each to the room
-// it concerns, and lets the rooms speak through the outbound lanes. Knows no DDS: the doors are at the other ends of
-// the two channels, which is how tests run it whole. Threads: a dispatcher (routes, never works), a pool for the
-// robots' strands, one thread for the site maps' strands, the desk's, the job worker's, and housekeeping (publishes
-// what is due, feeds the watchdog). Thread rule: Start and Stop from one thread; the rest from any.
+// The server, and the only file that includes every room. It makes the rooms, passes references between them,
+// and runs two threads of its own. The dispatcher takes values from the inbound channel and gives each to its
+// room. Housekeeping publishes what is due and checks that every strand makes progress. The rooms publish
+// through the outbound lanes. The server does not depend on DDS: Ingress and Egress are at the other ends of
+// the two channels, so tests can run the whole server without them. The other threads are listed in
+// server/README.md. Thread rule: Start and Stop from one thread; the rest from any.
 #pragma once
 
 #include <asio/thread_pool.hpp>
@@ -10,15 +11,15 @@
 #include <cstdint>
 #include <memory>
 #include <thread>
-#include <vector>
 
-#include "server/desk.h"
 #include "server/inbound.h"
 #include "server/jobs/job_worker.h"
+#include "server/jobs/smooth_job.h"
 #include "server/maps/atlas.h"
 #include "server/ops/heartbeat.h"
 #include "server/options.h"
 #include "server/outbound.h"
+#include "server/queries/desk.h"
 #include "server/robots/roster.h"
 
 namespace cairn::server {
@@ -30,37 +31,34 @@ class Server {
 
   // Makes the configured sites and starts the threads.
   Result<void> Start();
-  // Takes nothing more, finishes what was accepted (within server.stop_timeout_s; what is left is dropped and counted),
-  // says goodbye for every session and closes the outbound lanes.
+  // Accepts no more values and finishes the accepted ones within server.stop_timeout_s; the rest is dropped
+  // and counted. Then it publishes the last state of every session and closes the outbound lanes.
   void Stop();
 
-  // Every strand has answered within server.stall_limit_s.
+  // False if a thread or strand that has work has finished nothing for server.stall_limit_s.
   [[nodiscard]] bool healthy() const { return healthy_; }
+  // Scans of streams without a session, beyond the first robots.max_unclaimed streams. They are in no ledger.
+  [[nodiscard]] std::uint64_t uncounted_scans() const { return roster_.unclaimed_overflow(); }
 
  private:
-  RosterPorts MakeRosterPorts();
-  SitePorts MakeSitePorts();
-  DeskPorts MakeDeskPorts();
-  std::map<JobKind, JobWork> MakeJobWorks();
-
   void Dispatch(const std::stop_token& stop);
   void KeepHouse(const std::stop_token& stop);
   void CheckHealth();
-  void FinishSessions();
   void PublishMaps();
-  Result<std::vector<SessionMaterial>> CollectMaterial(const std::string& site, const JobControl& control);
-  Result<std::uint32_t> AwaitMap(const std::string& site, const std::function<void(Site&, Site::Done)>& ask);
+  void FinishSessions();
 
   const ServerOptions options_;
   Inbound& inbound_;
   Outbound& outbound_;
 
-  // The pools come first: sessions and sites hold strands of them and must go before they do.
+  // The pools are declared first: sessions and sites hold strands of the pools and must be destroyed before
+  // them.
   asio::thread_pool robots_pool_;
   asio::thread_pool maps_pool_;
   Atlas atlas_;
   Roster roster_;
   JobList jobs_;
+  const SmoothJob smooth_;
   JobWorker worker_;
   Desk desk_;
   Heartbeat heartbeat_;

@@ -21,7 +21,7 @@ ExitCode CheckLog(Program& program, const CheckArguments& arguments) {
   });
   if (!summary) return program.Refuse(summary.error());
   const LogReport report = check.Finish(*summary);
-  program.Print(FormatLogReport(report), ToJson(report));
+  program.Print(FormatLogReport(report), report);
   return report.has_errors() ? ExitCode::kFailed : ExitCode::kOk;
 }
 
@@ -35,8 +35,7 @@ void AddCheckLog(CLI::App& app, Program& program) {
   auto arguments = std::make_shared<CheckArguments>();
   command->add_option("log", arguments->log, "The log file")->required()->type_name("FILE");
   AddLogOptions(*command, arguments->reader);
-  command->callback(
-      [&program, arguments] { program.action = [&program, arguments] { return CheckLog(program, *arguments); }; });
+  program.OnChosen(*command, arguments, CheckLog);
 }
 
 }  // namespace cairn::client

@@ -19,13 +19,8 @@ struct CloudArguments {
 
 Result<Trajectory> PathOf(Program& program, const CloudArguments& arguments) {
   if (!arguments.trajectory.empty()) return ReadTum(arguments.trajectory);
-  Request request;
-  request.kind = RequestKind::kPath;
-  request.robot = arguments.robot;
-  request.smoothed = arguments.smoothed;
-  auto reply = program.Ask(request);
-  if (!reply) return tl::unexpected(reply.error());
-  return std::move(reply->path);
+  return program.Ask([&](QueryClient& server) { return server.Path(arguments.robot, arguments.smoothed); })
+      .map([](PathAnswer&& path) { return std::move(path.poses); });
 }
 
 ExitCode Export(Program& program, const CloudArguments& arguments) {
@@ -34,7 +29,7 @@ ExitCode Export(Program& program, const CloudArguments& arguments) {
     program.err() << "cairn cloud export: give either --robot (asks the server) or --trajectory\n";
     return ExitCode::kUsage;
   }
-  // Before anything is read: a wrong ending must not cost a pass over the log.
+  // Checked before anything is read, so that a wrong file name is reported at once.
   if (const auto format = CloudFormatOf(options.output, options.text); !format) {
     program.err() << "cairn cloud export: " << format.error().message << "\n";
     return ExitCode::kUsage;
@@ -67,7 +62,8 @@ ExitCode Export(Program& program, const CloudArguments& arguments) {
 }
 
 void AddCloudExport(CLI::App& cloud, Program& program) {
-  auto* command = cloud.add_subcommand("export", "Points in space, from a log with tilted scans and a robot's path");
+  auto* command =
+      cloud.add_subcommand("export", "Write a point cloud, made from a log with tilted scans and a robot's path");
   command->footer(
       "The path comes from the server (--robot) or from a TUM file; scans come from the log, level and tilted ones\n"
       "(TILTLASER1 lines, as `cairn sim --nod` writes them). The file's ending says the format: .ply or .pcd.\n"
@@ -78,10 +74,11 @@ void AddCloudExport(CLI::App& cloud, Program& program) {
   CloudExportOptions& options = arguments->options;
   command->add_option("log", options.log, "CARMEN or DP-SLAM log with the scans")->required();
   command->add_option("-o,--output", options.output, "File to write: .ply or .pcd")->required()->type_name("FILE");
-  command->add_option("--robot", arguments->robot, "Whose path to ask the server for");
-  command->add_flag("--smoothed", arguments->smoothed, "That of the enabled smoothing job instead of the live one");
+  command->add_option("--robot", arguments->robot, "The robot whose path is asked from the server");
+  command->add_flag("--smoothed", arguments->smoothed,
+                    "Take the path of the enabled smoothing job instead of the live one");
   command->add_option("--trajectory", arguments->trajectory, "TUM file with the path")->type_name("FILE");
-  command->add_option("--height", options.cloud.height_m, "Of the scanner above the floor")
+  command->add_option("--height", options.cloud.height_m, "Height of the scanner above the floor")
       ->check(InRange(-1000.0, 1000.0))
       ->type_name("METRES")
       ->capture_default_str();
@@ -92,15 +89,14 @@ void AddCloudExport(CLI::App& cloud, Program& program) {
   command->add_option("--max-range", options.cloud.max_range_m, "Leave out hits farther away")
       ->check(CLI::PositiveNumber)
       ->type_name("METRES");
-  command->add_option("--max-gap", options.cloud.max_pose_gap_s, "Between the two poses around a scan")
+  command->add_option("--max-gap", options.cloud.max_pose_gap_s, "Longest time between the two poses around a scan")
       ->check(CLI::PositiveNumber)
       ->type_name("SECONDS")
       ->capture_default_str();
   command->add_flag("--tilted-only", options.cloud.tilted_only, "Leave out level scans");
   command->add_flag("--text", options.text, "Write numbers as text instead of binary");
   command->add_option("--truth-world", options.truth_world, "Also measure the cloud against this world in space");
-  command->callback(
-      [&program, arguments] { program.action = [&program, arguments] { return Export(program, *arguments); }; });
+  program.OnChosen(*command, arguments, Export);
 }
 
 }  // namespace
@@ -142,7 +138,7 @@ Result<CloudExportReport> ExportCloud(const Trajectory& path, const CloudExportO
 }
 
 void AddCloud(CLI::App& app, Program& program) {
-  auto* cloud = app.add_subcommand("cloud", "Points in space");
+  auto* cloud = app.add_subcommand("cloud", "Point clouds in space, from tilted scans");
   cloud->require_subcommand(1);
   AddCloudExport(*cloud, program);
 }

@@ -1,4 +1,5 @@
-// Every subcommand of `cairn`, one per file: adds its options to the command line and, when chosen, sets the action.
+// The subcommands of `cairn`, one per file. Each function adds the options of its command to the command line and names
+// the work to do when the command is chosen (Program::OnChosen).
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -20,12 +21,12 @@ void AddEval(CLI::App& app, Program& program);
 void AddMap(CLI::App& app, Program& program);  // Adds the four below.
 void AddMapInfo(CLI::App& map, Program& program);
 void AddMapExport(CLI::App& map, Program& program);
-void AddMapEnable(CLI::App& map, Program& program);  // And rollback.
+void AddMapEnable(CLI::App& map, Program& program);  // Adds `map enable` and `map rollback`.
 void AddMapDraw(CLI::App& map, Program& program);
 
 void AddJob(CLI::App& app, Program& program);  // Adds the two below.
 void AddJobSmooth(CLI::App& job, Program& program);
-void AddJobQueries(CLI::App& job, Program& program);  // list, show, cancel.
+void AddJobQueries(CLI::App& job, Program& program);  // Adds `job list`, `job show` and `job cancel`.
 
 void AddCloud(CLI::App& app, Program& program);  // cloud export.
 

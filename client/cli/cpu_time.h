@@ -1,4 +1,4 @@
-// Processor time a process has used, from /proc: what a load test prints as the server's share.
+// The processor time that a process has used, read from /proc. Load tests print it for the server.
 #pragma once
 
 #include <optional>

@@ -21,7 +21,7 @@ ExitCode Evaluate(Program& program, const EvalArguments& arguments) {
   const auto error =
       CompareTrajectories(*estimate, *truth, arguments.align == "se2" ? Alignment::kSe2 : Alignment::kNone);
   if (!error) return program.Refuse(error.error());
-  program.Print(FormatTrajectoryError(*error), ToJson(*error));
+  program.Print(FormatTrajectoryError(*error), *error);
   const bool within = arguments.max_rmse_m == 0.0 || error->rmse_m <= arguments.max_rmse_m;
   return within ? ExitCode::kOk : ExitCode::kFailed;
 }
@@ -31,7 +31,9 @@ ExitCode Evaluate(Program& program, const EvalArguments& arguments) {
 void AddEval(CLI::App& app, Program& program) {
   auto* command = app.add_subcommand("eval", "Error of a trajectory against the truth; needs no server");
   command->footer(
-      "Absolute trajectory error (ATE) at the estimate's stamps, the truth interpolated. Both are TUM files.\n"
+      "Prints the absolute trajectory error (ATE): how far the estimate is from the truth at each stamp of the "
+      "estimate.\n"
+      "The truth is interpolated between its poses. Both are TUM files.\n"
       "EXAMPLES\n  cairn eval robot1.tum truth/robot1.tum\n  cairn eval a.tum b.tum --align se2 --max-rmse 0.1");
   auto arguments = std::make_shared<EvalArguments>();
   command->add_option("estimate", arguments->estimate, "TUM file")->required()->type_name("FILE");
@@ -42,8 +44,7 @@ void AddEval(CLI::App& app, Program& program) {
   command->add_option("--max-rmse", arguments->max_rmse_m, "Exit code 1 where the ATE is larger")
       ->check(CLI::PositiveNumber)
       ->type_name("METRES");
-  command->callback(
-      [&program, arguments] { program.action = [&program, arguments] { return Evaluate(program, *arguments); }; });
+  program.OnChosen(*command, arguments, Evaluate);
 }
 
 }  // namespace cairn::client

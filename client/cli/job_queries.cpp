@@ -6,43 +6,39 @@
 namespace cairn::client {
 namespace {
 
-ExitCode AskJobs(Program& program, const Request& request) {
-  const auto reply = program.Ask(request);
-  if (!reply) return program.Refuse(reply.error());
-  std::string text = reply->jobs.empty() ? "no job\n" : "";
-  nlohmann::json jobs = nlohmann::json::array();
-  for (const Job& job : reply->jobs) {
-    text += FormatJob(job) + "\n";
-    jobs.push_back(ToJson(job));
-  }
-  return program.Print(text, {{"jobs", jobs}});
+ExitCode PrintJobs(Program& program, const Result<std::vector<Job>>& jobs) {
+  if (!jobs) return program.Refuse(jobs.error());
+  std::string text = jobs->empty() ? "no job\n" : "";
+  for (const Job& job : *jobs) text += FormatJob(job) + "\n";
+  return program.Print(text, {{"jobs", *jobs}});
 }
 
-void Run(CLI::App& command, Program& program, const std::shared_ptr<Request>& request) {
-  command.callback(
-      [&program, request] { program.action = [&program, request] { return AskJobs(program, *request); }; });
+ExitCode ListJobs(Program& program, const std::string& site) {
+  return PrintJobs(program, program.Ask([&](QueryClient& server) { return server.Jobs(site); }));
+}
+
+// A command about the job of one number; `ask` is a method of QueryClient.
+void AddJobCommand(CLI::App& job, Program& program, const std::string& name, const std::string& help,
+                   Result<Job> (QueryClient::*ask)(std::uint64_t)) {
+  auto id = std::make_shared<std::uint64_t>();
+  auto* command = job.add_subcommand(name, help);
+  command->add_option("id", *id, "The job's number")->required()->check(InRange(1, 1e15));
+  program.OnChosen(*command, id, [ask](Program& p, std::uint64_t number) {
+    const auto answer = p.Ask([&](QueryClient& server) { return (server.*ask)(number); });
+    return PrintJobs(p, answer.map([](const Job& one) { return std::vector<Job>{one}; }));
+  });
 }
 
 }  // namespace
 
 void AddJobQueries(CLI::App& job, Program& program) {
-  auto list = std::make_shared<Request>();
-  list->kind = RequestKind::kJobList;
-  auto* list_command = job.add_subcommand("list", "All jobs, or one site's");
-  list_command->add_option("--site", list->site, "Only this site's");
-  Run(*list_command, program, list);
-
-  auto show = std::make_shared<Request>();
-  show->kind = RequestKind::kJobGet;
-  auto* show_command = job.add_subcommand("show", "One job");
-  show_command->add_option("id", show->job, "The job's number")->required()->check(InRange(1, 1e15));
-  Run(*show_command, program, show);
-
-  auto cancel = std::make_shared<Request>();
-  cancel->kind = RequestKind::kJobCancel;
-  auto* cancel_command = job.add_subcommand("cancel", "End a job that has not ended; nothing of it is kept");
-  cancel_command->add_option("id", cancel->job, "The job's number")->required()->check(InRange(1, 1e15));
-  Run(*cancel_command, program, cancel);
+  auto site = std::make_shared<std::string>();
+  auto* list = job.add_subcommand("list", "List the jobs of all sites, or of one");
+  list->add_option("--site", *site, "Only this site's jobs");
+  program.OnChosen(*list, site, ListJobs);
+  AddJobCommand(job, program, "show", "Show one job", &QueryClient::GetJob);
+  AddJobCommand(job, program, "cancel", "Cancel a job that has not ended; nothing of its work is kept",
+                &QueryClient::CancelJob);
 }
 
 }  // namespace cairn::client

@@ -1,7 +1,4 @@
-#include <fmt/format.h>
-
 #include <chrono>
-#include <thread>
 
 #include "client/cli/commands.h"
 #include "client/cli/interrupt.h"
@@ -18,48 +15,33 @@ struct SmoothArguments {
   bool no_enable = false;
 };
 
-Result<Job> JobOf(Result<Reply> reply) {
-  if (!reply) return tl::unexpected(reply.error());
-  if (reply->jobs.empty()) return Fail(StatusCode::kInternal, "the server's answer holds no job");
-  return reply->jobs.front();
-}
-
-// Asks now and then: a job takes seconds to hours, and the answer also proves that the server lives.
-Result<Job> WaitForEnd(Program& program, Job job) {
+Result<Job> WaitForEnd(Program& program, const Job& submitted) {
   const auto start = std::chrono::steady_clock::now();
   const auto seconds = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
   ProgressLine progress(program.err(), ErrorIsTerminal(), program.options.json);
-  while (!IsFinal(job.state) && !Interrupted()) {
-    progress.Show(seconds(), job.progress, FormatJob(job));
-    std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    Request request;
-    request.kind = RequestKind::kJobGet;
-    request.job = job.id;
-    auto now = JobOf(program.Ask(request));
-    if (!now) return now;
-    job = *now;
-  }
-  progress.Finish(seconds(), job.progress, FormatJob(job));
+  auto job = program.Ask([&](QueryClient& server) {
+    return server.WaitForJob(submitted.id, [&](const Job& now) {
+      progress.Show(seconds(), now.progress, FormatJob(now));
+      return !Interrupted();
+    });
+  });
+  if (job) progress.Finish(seconds(), job->progress, FormatJob(*job));
   return job;
 }
 
 ExitCode Smooth(Program& program, const SmoothArguments& arguments) {
-  Request request;
-  request.kind = RequestKind::kJobSubmit;
-  request.site = arguments.site;
-  request.job_kind = JobKind::kSmooth;
-  request.enable = !arguments.no_enable;
-  auto job = JobOf(program.Ask(request));
+  auto job = program.Ask(
+      [&](QueryClient& server) { return server.SubmitJob(arguments.site, JobKind::kSmooth, !arguments.no_enable); });
   if (job && arguments.wait) job = WaitForEnd(program, *job);
   if (!job) return program.Refuse(job.error());
-  program.Print(FormatJob(*job) + "\n", ToJson(*job));
+  program.Print(FormatJob(*job) + "\n", *job);
   return !arguments.wait || job->state == JobState::kSucceeded ? ExitCode::kOk : ExitCode::kFailed;
 }
 
 }  // namespace
 
 void AddJob(CLI::App& app, Program& program) {
-  auto* job = app.add_subcommand("job", "Work the server does on the side: submit, list, show, cancel");
+  auto* job = app.add_subcommand("job", "Work that the server does in the background: submit, list, show, cancel");
   job->require_subcommand(1);
   AddJobSmooth(*job, program);
   AddJobQueries(*job, program);
@@ -74,10 +56,9 @@ void AddJobSmooth(CLI::App& job, Program& program) {
       "EXAMPLES\n  cairn job smooth --site hall --wait\n  cairn job smooth --site hall --no-enable --json");
   auto arguments = std::make_shared<SmoothArguments>();
   command->add_option("--site", arguments->site, "The site's name")->required();
-  command->add_flag("--wait", arguments->wait, "Until the job has ended");
+  command->add_flag("--wait", arguments->wait, "Wait until the job has ended");
   command->add_flag("--no-enable", arguments->no_enable, "Only make the version; enable it later by map enable");
-  command->callback(
-      [&program, arguments] { program.action = [&program, arguments] { return Smooth(program, *arguments); }; });
+  program.OnChosen(*command, arguments, Smooth);
 }
 
 }  // namespace cairn::client

@@ -1,12 +1,12 @@
 #include "client/cli/json_output.h"
 
-namespace cairn::client {
+#include <string>
+
+namespace cairn {
 namespace {
 
-using nlohmann::json;
-
-json DropsToJson(const std::array<std::uint64_t, kDropReasonCount>& dropped) {
-  json drops = json::object();
+nlohmann::json DropsToJson(const std::array<std::uint64_t, kDropReasonCount>& dropped) {
+  nlohmann::json drops = nlohmann::json::object();
   for (int i = 0; i < kDropReasonCount; ++i) {
     if (const auto count = dropped[static_cast<std::size_t>(i)]; count > 0) {
       drops[std::string(DropReasonName(static_cast<DropReason>(i)))] = count;
@@ -15,43 +15,31 @@ json DropsToJson(const std::array<std::uint64_t, kDropReasonCount>& dropped) {
   return drops;
 }
 
-json StampsToJson(const StampSummary& stamps) {
-  return {{"count", stamps.count},
-          {"duration_s", stamps.duration_s},
-          {"rate_hz", stamps.rate_hz},
-          {"repeated", stamps.repeated},
-          {"went_back", stamps.went_back},
-          {"gaps", stamps.gaps},
-          {"period_p99_s", stamps.period_p99_s},
-          {"longest_gap_s", stamps.longest_gap_s}};
-}
-
 }  // namespace
 
-json ToJson(const Pose2& pose) {
-  return {{"x", pose.x}, {"y", pose.y}, {"theta", pose.theta}};
+void to_json(nlohmann::json& json, const Status& status) {
+  json = {{"code", StatusCodeName(status.code)}, {"message", status.message}};
 }
 
-json ToJson(const PoseReport& pose) {
-  json covariance = json::array();
+void to_json(nlohmann::json& json, const Pose2& pose) {
+  json = {{"x", pose.x}, {"y", pose.y}, {"theta", pose.theta}};
+}
+
+void to_json(nlohmann::json& json, const PoseReport& pose) {
+  nlohmann::json covariance = nlohmann::json::array();
   for (int row = 0; row < 3; ++row) {
     for (int column = 0; column < 3; ++column) covariance.push_back(pose.covariance(row, column));
   }
-  return {{"robot", pose.robot},
-          {"site", pose.site},
-          {"stamp", pose.stamp},
-          {"scan_sequence", pose.scan_sequence},
-          {"pose", ToJson(pose.T_map_robot)},
-          {"covariance", covariance},
-          {"T_map_odom", ToJson(pose.T_map_odom)},
-          {"localized", pose.localized},
-          {"score", pose.score},
-          {"reason", PoseReasonName(pose.reason)},
+  json = {{"robot", pose.robot},           {"site", pose.site},
+          {"stamp", pose.stamp},           {"scan_sequence", pose.scan_sequence},
+          {"pose", pose.T_map_robot},      {"covariance", covariance},
+          {"T_map_odom", pose.T_map_odom}, {"localized", pose.localized},
+          {"score", pose.score},           {"reason", PoseReasonName(pose.reason)},
           {"map_epoch", pose.map_epoch}};
 }
 
-json ToJson(const Ledger& ledger) {
-  return {{"robot", ledger.robot},
+void to_json(nlohmann::json& json, const Ledger& ledger) {
+  json = {{"robot", ledger.robot},
           {"sensor", ledger.sensor},
           {"site", ledger.site},
           {"received", ledger.received},
@@ -71,25 +59,19 @@ json ToJson(const Ledger& ledger) {
           {"latency_p99_ms", ledger.latency_p99_ms}};
 }
 
-json ToJson(const RobotStatus& robot) {
-  json ledgers = json::array();
-  for (const Ledger& ledger : robot.ledgers) ledgers.push_back(ToJson(ledger));
-  return {{"robot", robot.session.robot},
-          {"site", robot.session.site},
-          {"phase", SessionPhaseName(robot.session.phase)},
-          {"status", StatusToJson(robot.session.status)},
-          {"alive", robot.alive},
-          {"pose", ToJson(robot.pose)},
-          {"ledgers", ledgers}};
+void to_json(nlohmann::json& json, const RobotStatus& robot) {
+  json = {
+      {"robot", robot.session.robot},   {"site", robot.session.site}, {"phase", SessionPhaseName(robot.session.phase)},
+      {"status", robot.session.status}, {"alive", robot.alive},       {"pose", robot.pose},
+      {"ledgers", robot.ledgers}};
 }
 
-json ToJson(const MapInfo& map) {
-  json versions = json::array();
-  for (const MapVersionInfo& version : map.versions) {
-    versions.push_back(
-        {{"version", version.version}, {"enabled", version.enabled}, {"job", version.job}, {"note", version.note}});
-  }
-  return {
+void to_json(nlohmann::json& json, const MapVersionInfo& version) {
+  json = {{"version", version.version}, {"enabled", version.enabled}, {"job", version.job}, {"note", version.note}};
+}
+
+void to_json(nlohmann::json& json, const MapInfo& map) {
+  json = {
       {"site", map.site},
       {"resolution_m", map.resolution_m},
       {"epoch", map.epoch},
@@ -99,11 +81,18 @@ json ToJson(const MapInfo& map) {
       {"bounds_m", {{"x_min", map.x_min_m}, {"y_min", map.y_min_m}, {"x_max", map.x_max_m}, {"y_max", map.y_max_m}}},
       {"robots", map.robots},
       {"enabled_version", map.enabled_version},
-      {"versions", versions}};
+      {"versions", map.versions}};
 }
 
-json ToJson(const Job& job) {
-  return {{"id", job.id},
+void to_json(nlohmann::json& json, const Tile& tile) {
+  json = {{"level", tile.key.level},   {"x", tile.key.x},
+          {"y", tile.key.y},           {"epoch", tile.epoch},
+          {"version", tile.version},   {"encoding", tile.encoding == TileEncoding::kPng ? "png" : "raw"},
+          {"bytes", tile.bytes.size()}};
+}
+
+void to_json(nlohmann::json& json, const Job& job) {
+  json = {{"id", job.id},
           {"site", job.site},
           {"kind", JobKindName(job.kind)},
           {"state", JobStateName(job.state)},
@@ -117,8 +106,14 @@ json ToJson(const Job& job) {
           {"message", job.message}};
 }
 
-json ToJson(const ScanAccount& account) {
-  return {{"sent", account.sent},
+void to_json(nlohmann::json& json, const LogComplaint& complaint) {
+  json = {{"line", complaint.line}, {"reason", complaint.reason}};
+}
+
+namespace client {
+
+void to_json(nlohmann::json& json, const ScanAccount& account) {
+  json = {{"sent", account.sent},
           {"used", account.used},
           {"keyframes", account.keyframes},
           {"waiting", account.waiting},
@@ -127,31 +122,40 @@ json ToJson(const ScanAccount& account) {
           {"unexplained", account.unexplained()}};
 }
 
-json ToJson(const TrajectoryError& error) {
-  return {{"compared", error.compared}, {"skipped", error.skipped}, {"way_m", error.way_m},
+void to_json(nlohmann::json& json, const TrajectoryError& error) {
+  json = {{"compared", error.compared}, {"skipped", error.skipped}, {"way_m", error.way_m},
           {"ate_rmse_m", error.rmse_m}, {"mean_m", error.mean_m},   {"median_m", error.median_m},
           {"max_m", error.max_m},       {"final_m", error.final_m}, {"rmse_rad", error.rmse_rad},
           {"max_rad", error.max_rad}};
 }
 
-json ToJson(const LogReport& report) {
-  json findings = json::array(), complaints = json::array(), beams = json::object();
-  for (const Finding& finding : report.findings) {
-    findings.push_back({{"error", finding.error}, {"what", finding.what}, {"advice", finding.advice}});
-  }
-  for (const LogComplaint& complaint : report.summary.complaints) {
-    complaints.push_back({{"line", complaint.line}, {"reason", complaint.reason}});
-  }
+void to_json(nlohmann::json& json, const StampSummary& stamps) {
+  json = {{"count", stamps.count},
+          {"duration_s", stamps.duration_s},
+          {"rate_hz", stamps.rate_hz},
+          {"repeated", stamps.repeated},
+          {"went_back", stamps.went_back},
+          {"gaps", stamps.gaps},
+          {"period_p99_s", stamps.period_p99_s},
+          {"longest_gap_s", stamps.longest_gap_s}};
+}
+
+void to_json(nlohmann::json& json, const Finding& finding) {
+  json = {{"error", finding.error}, {"what", finding.what}, {"advice", finding.advice}};
+}
+
+void to_json(nlohmann::json& json, const LogReport& report) {
+  nlohmann::json beams = nlohmann::json::object();
   for (const auto& [count, scans] : report.beam_counts) beams[std::to_string(count)] = scans;
-  return {{"good", !report.has_errors()},
-          {"scans", StampsToJson(report.scans)},
-          {"odometry", StampsToJson(report.odometry)},
+  json = {{"good", !report.has_errors()},
+          {"scans", report.scans},
+          {"odometry", report.odometry},
           {"ignored", report.summary.ignored},
           {"beam_counts", beams},
           {"field_of_view_rad", report.field_of_view_rad},
           {"angle_step_rad", report.angle_step_rad},
           {"range_max_m", report.range_max_m},
-          {"T_robot_laser", ToJson(report.T_robot_laser)},
+          {"T_robot_laser", report.T_robot_laser},
           {"hit_share", report.hit_share},
           {"no_return_share", report.no_return_share},
           {"invalid_share", report.invalid_share},
@@ -161,19 +165,9 @@ json ToJson(const LogReport& report) {
           {"refused", report.refused},
           {"notes", report.summary.notes},
           {"complaint_count", report.summary.complaint_count},
-          {"complaints", complaints},
-          {"findings", findings}};
+          {"complaints", report.summary.complaints},
+          {"findings", report.findings}};
 }
 
-json TileToJson(const Tile& tile) {
-  return {{"level", tile.key.level},   {"x", tile.key.x},
-          {"y", tile.key.y},           {"epoch", tile.epoch},
-          {"version", tile.version},   {"encoding", tile.encoding == TileEncoding::kPng ? "png" : "raw"},
-          {"bytes", tile.bytes.size()}};
-}
-
-json StatusToJson(const Status& status) {
-  return {{"code", StatusCodeName(status.code)}, {"message", status.message}};
-}
-
-}  // namespace cairn::client
+}  // namespace client
+}  // namespace cairn

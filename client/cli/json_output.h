@@ -1,5 +1,6 @@
-// The server's values as JSON for machines. Names are the wire's, with units; stamps are integers of nanoseconds;
-// angles radians. Numbers that are not finite come out as null. Stateless.
+// What the program prints as JSON. The functions are those by which nlohmann::json converts values of these types, so
+// that a value can stand wherever a JSON value can. Names are those of the wire, with units; stamps are integers of
+// nanoseconds, angles are radians, and numbers that are not finite become null. Stateless.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -9,19 +10,27 @@
 #include "client/cli/trajectory_error.h"
 #include "common/service/request.h"
 
+namespace cairn {
+
+void to_json(nlohmann::json& json, const Status& status);
+void to_json(nlohmann::json& json, const Pose2& pose);
+void to_json(nlohmann::json& json, const PoseReport& pose);
+void to_json(nlohmann::json& json, const Ledger& ledger);
+void to_json(nlohmann::json& json, const RobotStatus& robot);
+void to_json(nlohmann::json& json, const MapVersionInfo& version);
+void to_json(nlohmann::json& json, const MapInfo& map);
+void to_json(nlohmann::json& json, const Tile& tile);  // Without the tile's bytes, but with their number.
+void to_json(nlohmann::json& json, const Job& job);
+void to_json(nlohmann::json& json, const LogComplaint& complaint);
+
+}  // namespace cairn
+
 namespace cairn::client {
 
-[[nodiscard]] nlohmann::json ToJson(const Pose2& pose);
-[[nodiscard]] nlohmann::json ToJson(const PoseReport& pose);
-[[nodiscard]] nlohmann::json ToJson(const Ledger& ledger);
-[[nodiscard]] nlohmann::json ToJson(const RobotStatus& robot);
-[[nodiscard]] nlohmann::json ToJson(const MapInfo& map);
-[[nodiscard]] nlohmann::json ToJson(const Job& job);
-[[nodiscard]] nlohmann::json ToJson(const ScanAccount& account);
-[[nodiscard]] nlohmann::json ToJson(const TrajectoryError& error);
-[[nodiscard]] nlohmann::json ToJson(const LogReport& report);
-// Without its bytes.
-[[nodiscard]] nlohmann::json TileToJson(const Tile& tile);
-[[nodiscard]] nlohmann::json StatusToJson(const Status& status);
+void to_json(nlohmann::json& json, const ScanAccount& account);
+void to_json(nlohmann::json& json, const TrajectoryError& error);
+void to_json(nlohmann::json& json, const StampSummary& stamps);
+void to_json(nlohmann::json& json, const Finding& finding);
+void to_json(nlohmann::json& json, const LogReport& report);
 
 }  // namespace cairn::client

@@ -56,7 +56,8 @@ void LogCheck::AddScan(const Scan& scan) {
   }
   scans_.Add(scan.stamp);
   ++report_.beam_counts[scan.ranges_m.size()];
-  constexpr std::size_t kMostKinds = 20;  // Of refusals told apart; a wild log must not fill the memory.
+  constexpr std::size_t kMostKinds =
+      20;  // Further reasons are counted together, so that a broken log cannot fill the memory.
   if (const auto valid = ValidateScan(scan); !valid) {
     const bool known = report_.refused.count(valid.error().message) > 0 || report_.refused.size() < kMostKinds;
     ++report_.refused[known ? valid.error().message : "other reasons"];
@@ -86,7 +87,7 @@ void LogCheck::AddOdometry(const Odometry& odometry) {
     constexpr double kImpossible_m_s = 5.0, kImpossibleStep_m = 1.0, kShortestStep_s = 0.02;
     const Pose2 step = Between(last_odometry_->T_odom_robot, odometry.T_odom_robot);
     const double way = step.translation().norm(), seconds = SecondsFromStamp(odometry.stamp - last_odometry_->stamp);
-    // Steps shorter than clocks are exact say nothing of speed.
+    // Over a time shorter than the clock's accuracy, a speed has no meaning.
     const double speed = seconds >= kShortestStep_s ? way / seconds : 0.0;
     if (way > kImpossibleStep_m && way / seconds > kImpossible_m_s) {
       ++jumps_;

@@ -1,6 +1,6 @@
 // Judges whether a robot log is fit for mapping, before anything is sent: counts, layout, stamps, rates, odometry, and
-// what to do about each finding. The same rules the server applies to scans (ValidateScan), and a few it cannot know.
-// Not an estimator. One thread at a time; memory does not grow with the log.
+// what to do about each finding. It applies the rules that the server applies to scans (ValidateScan), and a few that
+// need the whole log. Not an estimator. One thread at a time; memory does not grow with the log.
 #pragma once
 
 #include <cstdint>
@@ -28,7 +28,7 @@ struct StampSummary {
 };
 
 struct Finding {
-  bool error = false;  // Scans will be lost or unusable; else worth knowing.
+  bool error = false;  // True: scans will be lost. False: a warning.
   std::string what;
   std::string advice;
 };
@@ -38,15 +38,15 @@ struct LogReport {
   StampSummary scans;
   StampSummary odometry;
   std::map<std::size_t, std::uint64_t> beam_counts;  // Scans by their number of beams.
-  double field_of_view_rad = 0.0;                    // Of the first scan.
+  double field_of_view_rad = 0.0;                    // As the first scan has it; so are the three values below.
   double angle_step_rad = 0.0;
   double range_max_m = 0.0;
   Pose2 T_robot_laser;
-  double hit_share = 0.0;  // Of all beams.
+  double hit_share = 0.0;  // Shares of all beams.
   double no_return_share = 0.0;
   double invalid_share = 0.0;
   std::map<std::string, std::uint64_t> refused;  // Scans ValidateScan refuses, by its words.
-  double way_m = 0.0;                            // By odometry.
+  double way_m = 0.0;                            // Measured by the odometry, as the two values below.
   double turned_rad = 0.0;
   double fastest_m_s = 0.0;
   std::vector<Finding> findings;
@@ -77,7 +77,7 @@ class LogCheck {
   StampTrack scans_;
   StampTrack odometry_;
   std::optional<Odometry> last_odometry_;
-  std::uint64_t jumps_ = 0;  // Odometry steps no robot drives.
+  std::uint64_t jumps_ = 0;  // Odometry steps that are too fast for a robot.
   std::uint64_t bad_odometry_ = 0;
   std::uint64_t hits_ = 0, no_returns_ = 0, invalid_ = 0;
 };

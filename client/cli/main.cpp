@@ -1,4 +1,4 @@
-// cairn: the command line of the mapping service. Everything is in RunCairn; here only the process's own things.
+// cairn: the command line of the mapping service. RunCairn does all work; this file handles signals and exceptions.
 #include <exception>
 #include <iostream>
 

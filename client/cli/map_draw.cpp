@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include "client/cli/commands.h"
-#include "client/cli/fetch_map.h"
 #include "client/cli/map_picture.h"
 #include "client/cli/quantity_text.h"
 #include "common/file/atomic_file.h"
@@ -22,12 +21,9 @@ struct DrawArguments {
 Result<std::vector<PicturePath>> CollectPaths(Program& program, const DrawArguments& arguments) {
   std::vector<PicturePath> paths;
   for (const std::string& robot : arguments.robots) {
-    Request request;
-    request.kind = RequestKind::kPath;
-    request.robot = robot;
-    auto reply = program.Ask(request);
-    if (!reply) return tl::unexpected(reply.error());
-    paths.push_back({robot, std::move(reply->path), false});
+    auto path = program.Ask([&](QueryClient& server) { return server.Path(robot); });
+    if (!path) return tl::unexpected(path.error());
+    paths.push_back({robot, std::move(path->poses), false});
   }
   for (const bool reference : {false, true}) {
     for (const std::string& text : reference ? arguments.truths : arguments.paths) {
@@ -41,7 +37,9 @@ Result<std::vector<PicturePath>> CollectPaths(Program& program, const DrawArgume
 }
 
 ExitCode DrawMap(Program& program, const DrawArguments& arguments) {
-  const auto map = arguments.map_file.empty() ? FetchMap(program, arguments.site) : LoadMapYaml(arguments.map_file);
+  const auto map = arguments.map_file.empty()
+                       ? program.Ask([&](QueryClient& server) { return server.MapImage(arguments.site); })
+                       : LoadMapYaml(arguments.map_file);
   if (!map) return program.Refuse(map.error());
   const auto paths = CollectPaths(program, arguments);
   if (!paths) return program.Refuse(paths.error());
@@ -66,17 +64,17 @@ void AddMapDraw(CLI::App& map, Program& program) {
   source->add_option("--site", arguments->site, "The site's name: the map the server has now");
   source->add_option("--map", arguments->map_file, "A map.yaml file")->type_name("FILE");
   source->require_option(1);
-  command->add_option("--robots", arguments->robots, "Robots whose paths the server knows");
-  command->add_option("--paths", arguments->paths, "TUM files, each with a label if wanted")->type_name("[LABEL=]FILE");
-  command->add_option("--truth", arguments->truths, "TUM files drawn thin, under the others")
+  command->add_option("--robots", arguments->robots, "Robots whose paths are asked from the server");
+  command->add_option("--paths", arguments->paths, "TUM files, each with a label where wanted")
+      ->type_name("[LABEL=]FILE");
+  command->add_option("--truth", arguments->truths, "TUM files of true paths, drawn thin below the others")
       ->type_name("[LABEL=]FILE");
   command->add_option("-o,--output", arguments->output, "The PNG file to write")->required()->type_name("FILE");
   command->add_option("--width", arguments->picture.width_px, "Pixels across")
       ->check(CLI::Range(200, 8000))
       ->capture_default_str();
-  command->add_option("--title", arguments->picture.title, "A line above the map");
-  command->callback(
-      [&program, arguments] { program.action = [&program, arguments] { return DrawMap(program, *arguments); }; });
+  command->add_option("--title", arguments->picture.title, "Title above the map");
+  program.OnChosen(*command, arguments, DrawMap);
 }
 
 }  // namespace cairn::client

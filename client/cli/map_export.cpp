@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include "client/cli/commands.h"
-#include "client/cli/fetch_map.h"
 
 namespace cairn::client {
 namespace {
@@ -14,7 +13,7 @@ struct ExportArguments {
 };
 
 ExitCode ExportMap(Program& program, const ExportArguments& arguments) {
-  const auto map = FetchMap(program, arguments.site);
+  const auto map = program.Ask([&](QueryClient& server) { return server.MapImage(arguments.site); });
   if (!map) return program.Refuse(map.error());
   MapSaveOptions options;
   options.mode = arguments.mode == "raw"     ? MapImageMode::kRaw
@@ -43,8 +42,7 @@ void AddMapExport(CLI::App& map, Program& program) {
   command->add_option("--mode", arguments->mode, "Meaning of the image's values, as map_server has them")
       ->check(CLI::IsMember({"trinary", "scale", "raw"}))
       ->capture_default_str();
-  command->callback(
-      [&program, arguments] { program.action = [&program, arguments] { return ExportMap(program, *arguments); }; });
+  program.OnChosen(*command, arguments, ExportMap);
 }
 
 }  // namespace cairn::client

@@ -6,18 +6,14 @@ namespace cairn::client {
 namespace {
 
 ExitCode ShowMapInfo(Program& program, const std::string& site) {
-  Request request;
-  request.kind = RequestKind::kMapInfo;
-  request.site = site;
-  const auto reply = program.Ask(request);
-  if (!reply) return program.Refuse(reply.error());
-  std::string text = reply->maps.empty() ? "no map yet\n" : "";
-  nlohmann::json maps = nlohmann::json::array();
-  for (const MapInfo& map : reply->maps) {
-    text += FormatMap(map);
-    maps.push_back(ToJson(map));
-  }
-  return program.Print(text, {{"maps", maps}});
+  const auto maps = program.Ask([&](QueryClient& server) -> Result<std::vector<MapInfo>> {
+    if (site.empty()) return server.Maps();
+    return server.Map(site).map([](MapInfo&& map) { return std::vector<MapInfo>{std::move(map)}; });
+  });
+  if (!maps) return program.Refuse(maps.error());
+  std::string text = maps->empty() ? "no map yet\n" : "";
+  for (const MapInfo& map : *maps) text += FormatMap(map);
+  return program.Print(text, {{"maps", *maps}});
 }
 
 }  // namespace
@@ -35,7 +31,7 @@ void AddMapInfo(CLI::App& map, Program& program) {
   auto* command = map.add_subcommand("info", "Bounds, versions and sizes of all maps, or of one");
   auto site = std::make_shared<std::string>();
   command->add_option("--site", *site, "Only this site");
-  command->callback([&program, site] { program.action = [&program, site] { return ShowMapInfo(program, *site); }; });
+  program.OnChosen(*command, site, ShowMapInfo);
 }
 
 }  // namespace cairn::client

@@ -14,7 +14,7 @@ namespace {
 
 const cv::Scalar kPaper(255, 255, 255), kInk(59, 41, 30), kMuted(139, 116, 100);  // BGR, as OpenCV has it.
 const cv::Vec3f kUnknownColor(243, 239, 235), kFreeColor(255, 255, 255), kWallColor(56, 38, 28);
-// Apart from each other also for most colour-blind eyes (after Okabe, Ito 2008).
+// Most colour-blind people can tell these apart, too (after Okabe, Ito 2008).
 const std::array<cv::Scalar, 8> kPathColors = {
     cv::Scalar(178, 114, 0), cv::Scalar(0, 94, 213),   cv::Scalar(115, 158, 0), cv::Scalar(167, 121, 204),
     cv::Scalar(0, 159, 230), cv::Scalar(233, 180, 86), cv::Scalar(40, 40, 180), cv::Scalar(120, 90, 90)};
@@ -56,7 +56,7 @@ class Canvas {
  public:
   Canvas(const Frame& frame, const PictureOptions& options)
       : frame_(frame),
-        // A long thin map keeps a readable height; a tall one is not endless.
+        // The second bound keeps the picture of a tall map at most twice as high as it is wide.
         px_per_m_(std::min(options.width_px / (frame.x_max - frame.x_min),
                            2.0 * options.width_px / (frame.y_max - frame.y_min))),
         unit_(options.width_px / 1800.0) {
@@ -74,20 +74,20 @@ class Canvas {
       for (int column = 0; column < map.width; ++column) {
         const std::uint8_t cell = map.cells[static_cast<std::size_t>(row) * map.width + column];
         if (cell == kUnknownCell) continue;
-        // What is hardly known looks hardly known: half-free cells fade into unknown, not into grey walls.
+        // Cells of an occupancy near 0.5 are drawn like unknown ones, because grey would look like a thin wall.
         const float occupied = static_cast<float>(std::min<int>(cell, 100)) / 100.0f;
         known.at<float>(row, column) = occupied < 0.5f ? 1.0f - 2.0f * occupied : 0.0f;
         wall.at<float>(row, column) = occupied > 0.5f ? 2.0f * occupied - 1.0f : 0.0f;
       }
     }
-    // Picture pixel -> map cell, through the picture's and the map's places; also right for a shrunk map.
+    // Maps cells of the map to pixels of the picture.
     const double cell_px = map.resolution_m * px_per_m_;
     const double dx = (map.T_map_origin.x - frame_.x_min) * px_per_m_,
                  dy = (frame_.y_max - map.T_map_origin.y) * px_per_m_;
     const cv::Mat to_picture =
         (cv::Mat_<double>(2, 3) << cell_px, 0, dx + 0.5 * cell_px - 0.5, 0, -cell_px, dy - 0.5 * cell_px - 0.5);
     cv::Mat target = image_(drawn_), known_px, wall_px;
-    if (cell_px < 1.0) {  // Shrinking: a wall thinner than a pixel must still show.
+    if (cell_px < 1.0) {  // When the map is shrunk, a wall thinner than a pixel must stay visible.
       const int reach = static_cast<int>(std::ceil(1.0 / cell_px));
       cv::dilate(wall, wall, cv::getStructuringElement(cv::MORPH_RECT, {reach, reach}));
     }
@@ -115,7 +115,8 @@ class Canvas {
       cv::polylines(image_, points, false, color, Pixels(2), cv::LINE_AA, kSubpixelBits);
       return;
     }
-    cv::polylines(image_, points, false, kPaper, Pixels(8), cv::LINE_AA, kSubpixelBits);  // Sets crossings apart.
+    cv::polylines(image_, points, false, kPaper, Pixels(8), cv::LINE_AA,
+                  kSubpixelBits);  // A white rim makes crossings readable.
     cv::polylines(image_, points, false, color, Pixels(4), cv::LINE_AA, kSubpixelBits);
   }
 
@@ -171,7 +172,7 @@ class Canvas {
  private:
   [[nodiscard]] int Pixels(double at_1800) const { return std::max(1, static_cast<int>(std::lround(at_1800 * unit_))); }
 
-  // Interpolated cells, steeper: edges stay about a pixel wide however large a cell is drawn.
+  // Makes interpolated edges steeper, so that they stay about a pixel wide when cells are drawn large.
   [[nodiscard]] float Sharpen(float value) const {
     const auto gain = static_cast<float>(std::clamp(0.25 * px_per_m_ * 0.05, 1.0, 3.0));
     return std::clamp((value - 0.5f) * gain + 0.5f, 0.0f, 1.0f);

@@ -16,12 +16,12 @@ namespace cairn::client {
 struct PicturePath {
   std::string label;
   Trajectory trajectory;
-  bool reference = false;  // The truth: thin and dark, under the others.
+  bool reference = false;  // True for a ground truth: it is drawn thin and grey, below the other paths.
 };
 
 struct PictureOptions {
   int width_px = 1800;    // 200..8000. Of the map; the height follows from it.
-  double margin_m = 0.6;  // Unknown space kept round what is known.
+  double margin_m = 0.6;  // Unknown space kept around what is known.
   std::string title;      // Above the map; empty: none.
 };
 

@@ -1,5 +1,5 @@
-// Turns our parsers (Result<T> of a text) into options of the command line: what does not parse is a usage error that
-// carries the parser's message.
+// Makes options of the command line from functions that read a text and return a Result<T>. A text that cannot be read
+// is a usage error with the message of the Result.
 #pragma once
 
 #include <CLI/CLI.hpp>

@@ -1,5 +1,5 @@
-// Lets time pass as the stamps of a stream do, `rate` times as fast. Stamps that go back or jump ahead by more than
-// `kLongestWait_s` do not hold the stream up: it goes on at once from there.
+// Delays the records of a stream so that they follow each other as their stamps do, `rate` times as fast. Where a stamp
+// goes back, or jumps ahead by more than `kLongestWait_s`, the record is due at once and counts as a new start.
 #pragma once
 
 #include <chrono>

@@ -22,18 +22,15 @@ double LengthOf(const Trajectory& path) {
 }
 
 ExitCode ShowPath(Program& program, const PathArguments& arguments) {
-  Request request;
-  request.kind = RequestKind::kPath;
-  request.robot = arguments.robot;
-  request.smoothed = arguments.smoothed;
-  const auto reply = program.Ask(request);
-  if (!reply) return program.Refuse(reply.error());
-  const Trajectory& path = reply->path;
+  const auto answer =
+      program.Ask([&](QueryClient& server) { return server.Path(arguments.robot, arguments.smoothed); });
+  if (!answer) return program.Refuse(answer.error());
+  const Trajectory& path = answer->poses;
   nlohmann::json object = {{"robot", arguments.robot},
                            {"smoothed", arguments.smoothed},
                            {"poses", path.size()},
                            {"length_m", LengthOf(path)},
-                           {"map_epoch", reply->map_epoch}};
+                           {"map_epoch", answer->map_epoch}};
   std::string text;
   if (!arguments.file.empty()) {
     if (const auto written = WriteTum(path, arguments.file); !written) return program.Refuse(written.error());
@@ -42,7 +39,7 @@ ExitCode ShowPath(Program& program, const PathArguments& arguments) {
   } else {
     object["path"] = nlohmann::json::array();
     for (const StampedPose& pose : path) {
-      object["path"].push_back({{"stamp", pose.stamp}, {"pose", ToJson(pose.T_map_robot)}});
+      object["path"].push_back({{"stamp", pose.stamp}, {"pose", pose.T_map_robot}});
       text += fmt::format("{} {:.6f} {:.6f} {:.6f}\n", FormatStamp(pose.stamp), pose.T_map_robot.x, pose.T_map_robot.y,
                           pose.T_map_robot.theta);
     }
@@ -60,9 +57,9 @@ void AddPath(CLI::App& app, Program& program) {
   auto arguments = std::make_shared<PathArguments>();
   command->add_option("robot", arguments->robot, "The robot's name")->required();
   command->add_option("-o,--output", arguments->file, "TUM file to write")->type_name("FILE");
-  command->add_flag("--smoothed", arguments->smoothed, "The path of the enabled smoothing job instead of the live one");
-  command->callback(
-      [&program, arguments] { program.action = [&program, arguments] { return ShowPath(program, *arguments); }; });
+  command->add_flag("--smoothed", arguments->smoothed,
+                    "Show the path of the enabled smoothing job instead of the live one");
+  program.OnChosen(*command, arguments, ShowPath);
 }
 
 }  // namespace cairn::client

@@ -1,5 +1,5 @@
-// Samples kept for their percentiles. Bounded: from `kMax` on, every sample replaces the oldest.
-// One thread at a time.
+// Keeps samples and computes their percentiles. Memory is bounded: from `kMax` samples on, a new one replaces the
+// oldest. Use it from one thread at a time.
 #pragma once
 
 #include <algorithm>

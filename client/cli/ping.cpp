@@ -14,13 +14,13 @@ ExitCode Ping(Program& program, int count) {
   std::string version;
   for (int i = 0; i < count && !Interrupted(); ++i) {
     const auto start = std::chrono::steady_clock::now();
-    const auto reply = program.Ask(Request{});
+    const auto reply = program.Ask([](QueryClient& server) { return server.Ping(); });
     if (!reply) return program.Refuse(reply.error());
-    // The first answer also pays for discovery.
+    // The first answer includes the time to find the server.
     if (i > 0 || count == 1) {
       round_trips_ms.Add(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
     }
-    version = reply->server_version;
+    version = *reply;
   }
   return program.Print(fmt::format("server {} on domain {}: round trip p50 {:.2f} ms, p99 {:.2f} ms\n", version,
                                    program.options.wire.domain, round_trips_ms.At(0.5), round_trips_ms.At(0.99)),
@@ -35,8 +35,10 @@ ExitCode Ping(Program& program, int count) {
 void AddPing(CLI::App& app, Program& program) {
   auto* command = app.add_subcommand("ping", "Ask the server whether it is there, and how fast it answers");
   auto count = std::make_shared<int>(1);
-  command->add_option("-c,--count", *count, "How many questions")->check(CLI::Range(1, 100'000))->capture_default_str();
-  command->callback([&program, count] { program.action = [&program, count] { return Ping(program, *count); }; });
+  command->add_option("-c,--count", *count, "How many times to ask")
+      ->check(CLI::Range(1, 100'000))
+      ->capture_default_str();
+  program.OnChosen(*command, count, Ping);
 }
 
 }  // namespace cairn::client

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "client/cli/commands.h"
+#include "client/cli/json_output.h"
 #include "client/cli/option_checks.h"
 #include "client/cli/quantity_text.h"
 #include "common/options/config.h"
@@ -23,19 +24,20 @@ Result<wire::Bus*> Program::bus() {
   return bus_.get();
 }
 
-Result<Reply> Program::Ask(const Request& request) {
+Result<QueryClient*> Program::queries() {
   if (!queries_) {
     const auto opened = bus();
     if (!opened) return tl::unexpected(opened.error());
-    auto created = QueryClient::Create(**opened);
+    auto created = QueryClient::Create(**opened, {.timeout_s = options.timeout_s});
     if (!created) return tl::unexpected(created.error());
     queries_ = std::move(*created);
   }
-  return queries_->Ask(request, options.timeout_s);
+  return queries_.get();
 }
 
 ExitCode Program::Print(const std::string& text, const nlohmann::json& object) {
-  // A name from a file or a peer may hold bytes that are no UTF-8; they must not end the program.
+  // A name from a file or from the wire may hold bytes that are not UTF-8. They are replaced, so that dump() does not
+  // throw.
   if (options.json) {
     out_ << object.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) << "\n";
   } else {
@@ -47,7 +49,7 @@ ExitCode Program::Print(const std::string& text, const nlohmann::json& object) {
 
 ExitCode Program::Refuse(const Status& status) {
   if (options.json) {
-    Print("", {{"error", {{"code", StatusCodeName(status.code)}, {"message", status.message}}}});
+    Print("", {{"error", status}});
   }
   err_ << "cairn: " << status.message << " (" << StatusCodeName(status.code) << ")\n";
   return ExitCode::kFailed;
@@ -58,11 +60,11 @@ namespace {
 void AddGlobalOptions(CLI::App& app, Program& program, wire::WireArguments& wire) {
   GlobalOptions& options = program.options;
   app.add_option("--domain", wire.domain, "DDS domain of server and robots [CAIRN_DOMAIN, or 0]");
-  app.add_option("--set", wire.assignments, "Any option of the wire, e.g. wire.interfaces=192.168.1.5")
+  app.add_option("--set", wire.assignments, "Set any option of the section wire, e.g. wire.interfaces=192.168.1.5")
       ->type_name("KEY=VALUE")
       ->allow_extra_args(false);
   AddParsed(app, "--timeout", options.timeout_s, ParseDuration, "How long to wait for an answer [5]", "SECONDS");
-  app.add_flag("--json", options.json, "One JSON object on standard output, for machines");
+  app.add_flag("--json", options.json, "Print JSON on standard output, one object per line");
 }
 
 }  // namespace
@@ -70,7 +72,7 @@ void AddGlobalOptions(CLI::App& app, Program& program, wire::WireArguments& wire
 ExitCode RunCairn(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err) {
   Program program(out, err);
   wire::WireArguments wire;
-  CLI::App app("Stream robots to a Cairn server, ask it for poses and maps, start its jobs.", "cairn");
+  CLI::App app("Stream robots to a Cairn server, ask it for poses and maps, and give it jobs.", "cairn");
   app.set_version_flag("--version", std::string("cairn ") + kVersion);
   app.footer(
       "Options above work with every command, before or after it. `cairn COMMAND --help` tells more.\n"
@@ -106,7 +108,7 @@ ExitCode RunCairn(const std::vector<std::string>& arguments, std::ostream& out, 
     err << "cairn: " << valid.error().message << "\n";
     return ExitCode::kUsage;
   }
-  return program.action();
+  return program.Run();
 }
 
 }  // namespace cairn::client

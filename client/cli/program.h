@@ -1,18 +1,19 @@
-// One run of `cairn`: the options every subcommand shares, where output goes, and the way to the server.
-// A subcommand registers itself with the command line and sets `action`; nothing runs while arguments are parsed, and
-// no DDS participant exists before the first question. One thread.
+// One run of `cairn`: the options that every subcommand shares, where output goes, and the way to the server.
+// A subcommand adds its options to the command line and names, with OnChosen, the function that does its work. Nothing
+// runs while arguments are parsed, and no DDS participant exists before the first question. Use it from one thread.
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <ostream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/cli/exit_code.h"
 #include "client/lib/query_client.h"
-#include "common/service/request.h"
 #include "common/wire/bus.h"
 
 namespace cairn::client {
@@ -28,24 +29,40 @@ class Program {
   Program(std::ostream& out, std::ostream& err) : out_(out), err_(err) {}
 
   GlobalOptions options;
-  std::function<ExitCode()> action;  // What the chosen subcommand does.
+
+  // Where the command line chooses `command`, its work is `run(program, *arguments)`, which returns an ExitCode.
+  // `arguments` are what the command's options fill.
+  template <typename Arguments, typename Run>
+  void OnChosen(CLI::App& command, std::shared_ptr<Arguments> arguments, Run run) {
+    command.callback([this, arguments, run] { action_ = [this, arguments, run] { return run(*this, *arguments); }; });
+  }
+  // Does the work of the chosen command. REQUIRES: the command line was parsed without an error.
+  [[nodiscard]] ExitCode Run() { return action_(); }
 
   [[nodiscard]] std::ostream& out() { return out_; }
   [[nodiscard]] std::ostream& err() { return err_; }
 
   // The domain's bus, opened at the first call.
   [[nodiscard]] Result<wire::Bus*> bus();
-  // The server's whole answer within the timeout; an answer that says no is an error.
-  [[nodiscard]] Result<Reply> Ask(const Request& request);
+  // Asks one question, a function of a QueryClient, and returns its Result.
+  template <typename Question>
+  [[nodiscard]] auto Ask(const Question& question) -> decltype(question(std::declval<QueryClient&>())) {
+    const auto client = queries();
+    if (!client) return tl::unexpected(client.error());
+    return question(**client);
+  }
 
   // Text for people, or the object for machines.
   ExitCode Print(const std::string& text, const nlohmann::json& object);
-  // One clear line on `err`, and under --json an object with `error` on `out`.
+  // Says in one line on `err` why the command failed, and under --json also as an object with `error` on `out`.
   ExitCode Refuse(const Status& status);
 
  private:
+  [[nodiscard]] Result<QueryClient*> queries();
+
   std::ostream& out_;
   std::ostream& err_;
+  std::function<ExitCode()> action_;
   std::unique_ptr<wire::Bus> bus_;
   std::unique_ptr<QueryClient> queries_;
 };

@@ -1,5 +1,5 @@
-// How far a long task is: one line redrawn in place on a terminal, a new line now and then elsewhere.
-// Not a clock: the caller says how much time has passed. One thread at a time.
+// Shows the progress of a long task: on a terminal as one line that is redrawn in place, elsewhere as a new line now
+// and then. It reads no clock: the caller passes the seconds since the start. Use it from one thread at a time.
 #pragma once
 
 #include <ostream>
@@ -9,10 +9,11 @@ namespace cairn::client {
 
 class ProgressLine {
  public:
-  // `terminal`: the stream is one (IsTerminal()); `quiet`: show nothing.
+  // `terminal`: whether the stream is a terminal. `quiet`: nothing is shown.
   ProgressLine(std::ostream& out, bool terminal, bool quiet) : out_(out), terminal_(terminal), quiet_(quiet) {}
 
-  // `share` 0..1, negative where the end is not known. Redraws at most 10 times a second (every 5 s elsewhere).
+  // `share` is the part that is done, 0..1, or negative where the total is not known. Redraws at most 10 times a second
+  // (every 5 s elsewhere).
   void Show(double seconds, double share, const std::string& text);
   // Shows the last state in any case and ends the line.
   void Finish(double seconds, double share, const std::string& text);

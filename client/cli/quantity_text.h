@@ -1,4 +1,5 @@
-// What people type on the command line, read strictly: "12x" is an error, not 12. Every error names the text.
+// Reads quantities that people type on the command line, strictly: "12x" is an error, not 12. Every error quotes the
+// text.
 #pragma once
 
 #include <string>

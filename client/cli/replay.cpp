@@ -61,7 +61,8 @@ Result<LogSummary> StreamLog(Program& program, const ReplayArguments& arguments,
 }
 
 ExitCode Replay(Program& program, const ReplayArguments& arguments) {
-  // Once without sending: a file that cannot be read must not open a session, and the bar needs its end.
+  // The log is read once without sending: a file that cannot be read must not open a session, and the progress line
+  // needs the number of scans.
   const auto survey = ReadLog(arguments.log, arguments.reader, [](LogRecord&&) { return !Interrupted(); });
   if (!survey) return program.Refuse(survey.error());
   if (survey->scans == 0) return program.Refuse({StatusCode::kInvalidArgument, arguments.log + " holds no scan"});
@@ -90,7 +91,7 @@ ExitCode Replay(Program& program, const ReplayArguments& arguments) {
     text += fmt::format("{} lines of the log could not be read, the first: line {}: {}\n", survey->complaint_count,
                         survey->complaints.front().line, survey->complaints.front().reason);
   }
-  nlohmann::json object = ToJson(account);
+  nlohmann::json object = account;
   object.update({{"robot", options.robot},
                  {"site", options.site},
                  {"seconds", seconds},
@@ -101,7 +102,7 @@ ExitCode Replay(Program& program, const ReplayArguments& arguments) {
   Status status = summary ? Status{} : summary.error();
   if (status.ok() && !Interrupted() && account.unexplained() != 0)
     status = {StatusCode::kDataLoss, std::to_string(account.unexplained()) + " scans are not in the server's account"};
-  if (!status.ok()) object["error"] = StatusToJson(status);
+  if (!status.ok()) object["error"] = status;
   program.Print(text, object);
   if (!status.ok())
     program.err() << "cairn: " << status.message << " (" << StatusCodeName(status.code) << ")\n";
@@ -113,11 +114,12 @@ ExitCode Replay(Program& program, const ReplayArguments& arguments) {
 }  // namespace
 
 void AddReplay(CLI::App& app, Program& program) {
-  auto* command = app.add_subcommand("replay", "Stream a robot log to the server, as the robot would have");
+  auto* command = app.add_subcommand("replay", "Stream a robot log to the server, as if the robot were driving now");
   command->footer(
-      "Reads CARMEN logs (ODOM, FLASER, RLASER, ROBOTLASER1, RAWLASER1) and DP-SLAM logs. With --fast the log goes as\n"
-      "fast as the server takes it: at most --window (32) scans are on the way, so none is lost. The summary is the\n"
-      "server's ledger: used, and dropped by reason. Exit code 1 where a scan is unexplained.\n"
+      "Reads CARMEN logs (ODOM, FLASER, RLASER, ROBOTLASER1, RAWLASER1) and DP-SLAM logs. With --fast the log is sent\n"
+      "as fast as the server takes it: at most --window scans wait for an answer, so that none is lost. The summary\n"
+      "says how many scans the server used, and how many it dropped for which reason.\n"
+      "Exit code 1 if the server cannot say what became of a scan.\n"
       "EXAMPLES\n  cairn replay intel.clf --site intel --robot r1 --fast\n"
       "  cairn replay run.log --site hall --robot r2 --rate 2 --start 1.5,-2,90deg");
   auto arguments = std::make_shared<ReplayArguments>();
@@ -130,12 +132,11 @@ void AddReplay(CLI::App& app, Program& program) {
                    ->capture_default_str();
   command->add_flag("--fast", arguments->fast, "As fast as the server takes it, without losing a scan")->excludes(rate);
   AddWindowOption(*command, arguments->stream.window);
-  AddParsed(*command, "--start", arguments->stream.T_map_robot_start, ParseStart, "Where the robot stands at first",
-            "X,Y,THETA");
-  command->add_flag("--end", arguments->end, "End the session afterwards (else it can be resumed)");
+  AddParsed(*command, "--start", arguments->stream.T_map_robot_start, ParseStart,
+            "Where the robot stands in the map when the log begins", "X,Y,THETA");
+  command->add_flag("--end", arguments->end, "End the session afterwards; without this it can be resumed");
   AddLogOptions(*command, arguments->reader);
-  command->callback(
-      [&program, arguments] { program.action = [&program, arguments] { return Replay(program, *arguments); }; });
+  program.OnChosen(*command, arguments, Replay);
 }
 
 }  // namespace cairn::client

@@ -24,7 +24,7 @@ Result<std::unique_ptr<RobotStream>> RobotStream::Open(Program& program, const S
   if (!client) return tl::unexpected(client.error());
   stream->client_ = std::move(*client);
 
-  // Asked for, not awaited: a stream nobody has sent on yet may have no published ledger.
+  // A query and not a subscription: before the first scan of a stream, no ledger of it is published.
   const auto before = stream->AskLedger(program);
   if (!before) return tl::unexpected(before.error());
   stream->before_ = *before;
@@ -32,16 +32,13 @@ Result<std::unique_ptr<RobotStream>> RobotStream::Open(Program& program, const S
 }
 
 Result<Ledger> RobotStream::AskLedger(Program& program) const {
-  Request request;
-  request.kind = RequestKind::kStatus;
-  request.robot = options_.robot;
-  const auto reply = program.Ask(request);
-  if (!reply) return tl::unexpected(reply.error());
+  const auto robots = program.Ask([&](QueryClient& server) { return server.Robots(options_.robot); });
+  if (!robots) return tl::unexpected(robots.error());
   Ledger ledger;
   ledger.sensor = options_.sensor;
-  for (const RobotStatus& robot : reply->robots) {
+  for (const RobotStatus& robot : *robots) {
     for (const Ledger& stream : robot.ledgers) {
-      if (robot.session.robot == options_.robot && stream.sensor == options_.sensor) ledger = stream;
+      if (stream.sensor == options_.sensor) ledger = stream;
     }
   }
   return ledger;
@@ -55,7 +52,7 @@ void RobotStream::OnPose(const PoseReport& pose) {
   latency_ms_.Add(std::chrono::duration<double, std::milli>(now - departure.time).count());
 }
 
-// A robot would wait for its server; who streams a log wants to know.
+// A robot would go on waiting for its server. For a log or a simulation, a lost server is an error.
 Result<void> RobotStream::CheckServer() {
   const SessionState state = client_->session();
   if (state.phase == SessionPhase::kSuspended && state.status.code == StatusCode::kUnavailable)
@@ -79,7 +76,7 @@ Result<void> RobotStream::Send(LogRecord&& record) {
 }
 
 void RobotStream::Settle() {
-  // What is not settled in time shows as waiting or unexplained in the account.
+  // Scans that are not settled in time appear as waiting or unexplained in the account.
   (void)client_->WaitSettled(timeout_s_);
 }
 

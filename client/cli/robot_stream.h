@@ -24,9 +24,10 @@ struct StreamOptions {
   std::string site;
   std::string sensor = "laser";
   std::optional<Pose2> T_map_robot_start;
-  // Scans sent and not yet settled, at most: sending waits for the server. 0: no limit, what is too fast is dropped.
+  // The largest number of scans sent and not yet settled: beyond it, sending waits for the server. 0: no limit; the
+  // server drops scans that come too fast.
   std::uint64_t window = 0;
-  bool measure_latency = true;  // Says nothing where a scan's way begins with waiting for room.
+  bool measure_latency = true;  // Not useful where a scan first waits for room in the window.
 };
 
 class RobotStream {
@@ -64,8 +65,8 @@ class RobotStream {
   const StreamOptions options_;
   const double timeout_s_;
   std::uint64_t sent_ = 0;
-  Clock::time_point connected_ = Clock::now();  // When a server was there last.
-  Ledger before_;  // The stream's account before the first scan; a resumed session has a past.
+  Clock::time_point connected_ = Clock::now();  // The last time at which a server was connected.
+  Ledger before_;                               // The ledger before the first scan; not zero in a resumed session.
 
   mutable std::mutex mutex_;
   std::array<Departure, kRemembered> departures_{};

@@ -1,5 +1,5 @@
-// What became of the scans a client sent, by the server's ledger: nothing may be unexplained.
-// A ledger counts a stream from its beginning, so the one before the first scan is subtracted. Plain values.
+// Accounts for the scans that a client sent, by the server's ledger. A ledger counts a stream from its beginning, so
+// the ledger before the first scan is subtracted. Plain values.
 #pragma once
 
 #include <array>

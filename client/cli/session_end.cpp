@@ -4,22 +4,20 @@ namespace cairn::client {
 namespace {
 
 ExitCode EndSession(Program& program, const std::string& robot) {
-  Request request;
-  request.kind = RequestKind::kSessionEnd;
-  request.robot = robot;
-  if (const auto reply = program.Ask(request); !reply) return program.Refuse(reply.error());
+  const auto ended = program.Ask([&](QueryClient& server) { return server.EndSession(robot); });
+  if (!ended) return program.Refuse(ended.error());
   return program.Print("session of " + robot + " ended\n", {{"robot", robot}, {"ended", true}});
 }
 
 }  // namespace
 
 void AddSession(CLI::App& app, Program& program) {
-  auto* session = app.add_subcommand("session", "Robots' sessions");
+  auto* session = app.add_subcommand("session", "The sessions of robots");
   session->require_subcommand(1);
   auto* end = session->add_subcommand("end", "End a robot's session for good: its trajectory is complete");
   auto robot = std::make_shared<std::string>();
   end->add_option("robot", *robot, "The robot's name")->required();
-  end->callback([&program, robot] { program.action = [&program, robot] { return EndSession(program, *robot); }; });
+  program.OnChosen(*end, robot, EndSession);
 }
 
 }  // namespace cairn::client

@@ -40,12 +40,11 @@ std::string FormatReport(const SimReport& report, bool streamed) {
 nlohmann::json ReportToJson(const SimReport& report) {
   nlohmann::json robots = nlohmann::json::array();
   for (const SimRobotReport& robot : report.robots) {
-    nlohmann::json object = ToJson(robot.account);
+    nlohmann::json& object = robots.emplace_back(robot.account);
     object.update({{"robot", robot.robot},
-                   {"start", ToJson(robot.T_map_robot_start)},
+                   {"start", robot.T_map_robot_start},
                    {"pose_latency_p50_ms", robot.latency_p50_ms},
                    {"pose_latency_p99_ms", robot.latency_p99_ms}});
-    robots.push_back(object);
   }
   nlohmann::json object = {{"robots", robots},
                            {"simulated_s", report.simulated_s},
@@ -58,11 +57,25 @@ nlohmann::json ReportToJson(const SimReport& report) {
   return object;
 }
 
-ExitCode Simulate(Program& program, const SimRunOptions& options) {
+struct SimArguments {
+  SimRunOptions run;
+  std::string laser_model;     // Empty: the options of the laser count one by one.
+  double first_stamp_s = 0.0;  // 0: now.
+};
+
+ExitCode Simulate(Program& program, const SimArguments& arguments) {
+  SimRunOptions options = arguments.run;
   if (options.stream && options.site.empty()) {
     program.err() << "cairn sim: --site is required (or --no-stream)\n";
     return ExitCode::kUsage;
   }
+  if (!arguments.laser_model.empty()) {
+    const auto laser = sim::WithModel(options.fleet.laser, arguments.laser_model);
+    if (!laser) return program.Refuse(laser.error());
+    options.fleet.laser = *laser;
+  }
+  const std::chrono::nanoseconds now = std::chrono::system_clock::now().time_since_epoch();
+  options.fleet.first_stamp = arguments.first_stamp_s > 0.0 ? StampFromSeconds(arguments.first_stamp_s) : now.count();
   const auto report = RunSim(program, options);
   if (!report) return program.Refuse(report.error());
   program.Print(FormatReport(*report, options.stream), ReportToJson(*report));
@@ -72,59 +85,48 @@ ExitCode Simulate(Program& program, const SimRunOptions& options) {
 }  // namespace
 
 void AddSim(CLI::App& app, Program& program) {
-  auto* command = app.add_subcommand("sim", "Stream a simulated fleet into a site");
+  auto* command = app.add_subcommand("sim", "Stream a simulated fleet of robots to the server");
   std::string worlds;
   for (const std::string& name : sim::ShippedWorldNames()) worlds += " " + name;
-  worlds += "; in space:";
-  for (const std::string& name : sim::ShippedWorld3Names()) worlds += " " + name;
   command->footer(
       "Worlds that come with the program:" + worlds +
-      "; the formats of others are in client/sim/README.md.\n"
-      "Robots start at the true poses printed, so poses in the map compare with the truth as they are.\n"
-      "The same seed gives the same scans. Exit code 1 where a scan is unexplained.\n"
+      ". client/sim/README.md explains how to write others.\n"
+      "Each robot tells the server its true start, so the poses in the map can be compared with the truth directly.\n"
+      "The same seed gives the same scans. Exit code 1 if the server cannot say what became of a scan.\n"
       "EXAMPLES\n  cairn sim --world building --robots 3 --site hall --seconds 120 --truth-dir truth\n"
       "  cairn sim --robots 16 --beams 360 --hz 10 --site load --watch-pid $(pidof cairnd)\n"
       "  cairn sim --robots 1 --no-stream --log-dir logs --truth-dir truth\n"
       "  cairn sim --robots 1 --world hall3d --laser-model lms200 --nod=-60,45,36 --site hall --log-dir logs");
-  auto options = std::make_shared<SimRunOptions>();
-  auto start_seconds = std::make_shared<double>(0.0);
-  command->add_option("--world", options->world, "A shipped world, or a world file (in space: .yaml)")
+  auto arguments = std::make_shared<SimArguments>();
+  SimRunOptions* options = &arguments->run;
+  command->add_option("--world", options->world, "A shipped world, or the path of a world file (YAML)")
       ->capture_default_str();
   command->add_option("--site", options->site, "The site to map into");
-  command->add_option("--robots", options->fleet.robots, "How many")->check(CLI::Range(1, 256))->capture_default_str();
+  command->add_option("--robots", options->fleet.robots, "Number of robots")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
   command->add_option("--prefix", options->prefix, "Robots are called PREFIX1, PREFIX2, ...")->capture_default_str();
   command->add_option("--seconds", options->seconds, "Simulated time")->check(InRange(0.1, 1e6))->capture_default_str();
-  command->add_option("--seed", options->fleet.seed, "Of all randomness")->capture_default_str();
-  auto model = AddSensorOptions(*command, options->fleet);
+  command->add_option("--seed", options->fleet.seed, "Seed of all random numbers")->capture_default_str();
+  AddSensorOptions(*command, options->fleet, arguments->laser_model);
   auto* rate = command->add_option("--rate", options->rate, "How many times faster than real time")
                    ->check(InRange(1e-3, 1e4))
                    ->capture_default_str();
   command->add_flag("--fast", options->fast, "As fast as the server takes it, without losing a scan")->excludes(rate);
   AddWindowOption(*command, options->window);
-  command->add_flag("!--no-stream", options->stream, "Need no server: only write the files");
+  command->add_flag("!--no-stream", options->stream, "Only write the files; no server is needed");
   command->add_option("--truth-dir", options->truth_dir, "Write the true poses here (<robot>.tum)")->type_name("DIR");
   command->add_option("--log-dir", options->log_dir, "Write what is streamed here as CARMEN logs (<robot>.log)")
       ->type_name("DIR");
-  command->add_option("--first-stamp", *start_seconds, "Of the first record; 0: now")
+  command->add_option("--first-stamp", arguments->first_stamp_s, "Stamp of the first record; 0: now")
       ->check(CLI::NonNegativeNumber)
       ->type_name("SECONDS");
-  command->add_flag("--end", options->end, "End the sessions afterwards (else they can be resumed)");
-  command->add_option("--watch-pid", options->watched_pid, "Report this process's processor share")
+  command->add_flag("--end", options->end, "End the sessions afterwards; without this they can be resumed");
+  command
+      ->add_option("--watch-pid", options->watched_pid,
+                   "Report how much processor time this process uses (e.g. the server)")
       ->check(CLI::PositiveNumber);
-  command->callback([&program, options, start_seconds, model] {
-    program.action = [&program, options, start_seconds, model] {
-      if (!model->empty()) {
-        const auto laser = sim::WithModel(options->fleet.laser, *model);
-        if (!laser) return program.Refuse(laser.error());
-        options->fleet.laser = *laser;
-      }
-      options->fleet.first_stamp = *start_seconds > 0.0 ? StampFromSeconds(*start_seconds)
-                                                        : std::chrono::duration_cast<std::chrono::nanoseconds>(
-                                                              std::chrono::system_clock::now().time_since_epoch())
-                                                              .count();
-      return Simulate(program, *options);
-    };
-  });
+  program.OnChosen(*command, arguments, Simulate);
 }
 
 }  // namespace cairn::client

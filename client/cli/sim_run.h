@@ -16,15 +16,15 @@ struct SimRunOptions {
   std::string site;
   std::string prefix = "robot";  // Robots are called prefix1, prefix2, ...
   sim::FleetOptions fleet;
-  double seconds = 60.0;  // Of the simulated time.
+  double seconds = 60.0;  // Simulated time.
   double rate = 1.0;
   bool fast = false;
-  std::uint64_t window = 0;  // Scans on the way per robot, at most; 0: no limit, or kFastWindow with `fast`.
+  std::uint64_t window = 0;  // Unsettled scans per robot, at most; 0: no limit, or kFastWindow with `fast`.
   bool stream = true;        // False: no server; only the files are written.
   bool end = false;
   std::string truth_dir;  // <robot>.tum: true poses at the scans' stamps.
   std::string log_dir;    // <robot>.log: CARMEN logs of what was streamed.
-  int watched_pid = 0;    // Whose processor time to report.
+  int watched_pid = 0;    // The process whose processor time is reported; 0: none.
 };
 
 struct SimRobotReport {

@@ -9,11 +9,10 @@
 namespace cairn::client {
 namespace {
 
-std::shared_ptr<std::string> AddLaser(CLI::App& command, sim::LaserOptions& laser) {
-  auto model = std::make_shared<std::string>();
-  auto* named = command.add_option("--laser-model", *model, "Field of view, resolution, range and error of a scanner")
+void AddLaser(CLI::App& command, sim::LaserOptions& laser, std::string& model) {
+  auto* named = command.add_option("--laser-model", model, "Field of view, resolution, range and error of a scanner")
                     ->check(CLI::IsMember(sim::LaserModelNames()));
-  command.add_option("--beams", laser.beams, "Beams of a scan")
+  command.add_option("--beams", laser.beams, "Number of beams in a scan")
       ->check(CLI::Range(1, kMaxBeams))
       ->capture_default_str()
       ->excludes(named);
@@ -44,30 +43,31 @@ std::shared_ptr<std::string> AddLaser(CLI::App& command, sim::LaserOptions& lase
           "How the range error is stated [sigma]")
       ->check(CLI::IsMember(std::vector<std::string>(names.begin(), names.end())))
       ->excludes(named);
-  command.add_option("--error-bound", laser.bound_m, "percent, step: ranges are off by at most this, and")
+  command.add_option("--error-bound", laser.bound_m, "percent and step: largest error of a range")
       ->check(InRange(0.0, 10.0))
       ->type_name("METRES")
       ->capture_default_str()
       ->excludes(named);
   command
-      .add_option("--error-share", laser.bound_share, "... this share of the range (step: instead, beyond the step)")
+      .add_option("--error-share", laser.bound_share,
+                  "percent: this share of the range is added to the bound; step: beyond --error-step it replaces it")
       ->check(InRange(0.0, 1.0))
       ->capture_default_str()
       ->excludes(named);
-  command.add_option("--error-step", laser.step_m, "step: up to here the bound holds, beyond it the share")
+  command
+      .add_option("--error-step", laser.step_m, "step: up to this range --error-bound holds, beyond it --error-share")
       ->check(InRange(0.0, 1000.0))
       ->type_name("METRES")
       ->capture_default_str()
       ->excludes(named);
-  command.add_option("--sweep", laser.sweep_s, "From a scan's first beam to its last")
+  command.add_option("--sweep", laser.sweep_s, "Time from a scan's first beam to its last")
       ->check(InRange(0.0, 1.0))
       ->type_name("SECONDS")
       ->capture_default_str();
-  command.add_option("--laser-height", laser.height_m, "Of the scanner above the floor")
+  command.add_option("--laser-height", laser.height_m, "Height of the scanner above the floor")
       ->check(InRange(0.0, 100.0))
       ->type_name("METRES")
       ->capture_default_str();
-  return model;
 }
 
 void AddTilt(CLI::App& command, sim::TiltOptions& tilt) {
@@ -83,11 +83,12 @@ void AddTilt(CLI::App& command, sim::TiltOptions& tilt) {
                         tilt.last_rad = Radians(values[1]);
                         tilt.scans = static_cast<int>(values[2]);
                       },
-                      "Now and then tilt the scanner: FROM,TO,SCANS, degrees, positive down, e.g. --nod=-60,45,36")
+                      "Tilt the scanner from time to time: first and last tilt in degrees (positive is downwards) and "
+                      "the number of scans, e.g. --nod=-60,45,36")
                   ->delimiter(',')
                   ->expected(3)
                   ->type_name("DEG,DEG,N");
-  command.add_option("--nod-every", tilt.level_scans, "Level scans between nods")
+  command.add_option("--nod-every", tilt.level_scans, "Number of level scans between two nods")
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str()
       ->needs(nod);
@@ -96,25 +97,27 @@ void AddTilt(CLI::App& command, sim::TiltOptions& tilt) {
 
 }  // namespace
 
-std::shared_ptr<std::string> AddSensorOptions(CLI::App& command, sim::FleetOptions& fleet) {
-  auto model = AddLaser(command, fleet.laser);
+void AddSensorOptions(CLI::App& command, sim::FleetOptions& fleet, std::string& laser_model) {
+  AddLaser(command, fleet.laser, laser_model);
   AddTilt(command, fleet.tilt);
-  command.add_option("--hz", fleet.scan_hz, "Scans a second")->check(InRange(0.1, 200.0))->capture_default_str();
-  command.add_option("--odometry-hz", fleet.odometry_hz, "Odometry samples a second")
+  command.add_option("--hz", fleet.scan_hz, "Scans per second")->check(InRange(0.1, 200.0))->capture_default_str();
+  command.add_option("--odometry-hz", fleet.odometry_hz, "Odometry samples per second")
       ->check(InRange(0.1, 500.0))
       ->capture_default_str();
-  command.add_option("--slip", fleet.wheels.slip_m_per_sqrt_m, "Random wheel error after 1 m")
+  command
+      .add_option("--slip", fleet.wheels.slip_m_per_sqrt_m, "Standard deviation of the random wheel error after 1 m")
       ->check(InRange(0.0, 0.2))
       ->type_name("METRES")
       ->capture_default_str();
-  command.add_option("--wheel-spread", fleet.wheel_spread.wheel_share, "Systematic wheel size error, share")
+  command
+      .add_option("--wheel-spread", fleet.wheel_spread.wheel_share,
+                  "Standard deviation of the systematic wheel size error, as a share")
       ->check(InRange(0.0, 0.1))
       ->capture_default_str();
   command.add_option("--speed", fleet.drive.speed_m_s, "How fast robots drive")
       ->check(InRange(0.05, 5.0))
       ->type_name("M/S")
       ->capture_default_str();
-  return model;
 }
 
 }  // namespace cairn::client

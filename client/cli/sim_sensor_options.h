@@ -2,14 +2,13 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <memory>
 #include <string>
 
 #include "client/sim/fleet.h"
 
 namespace cairn::client {
 
-// Answers where the name of a laser model will be after parsing; empty: the single options count.
-[[nodiscard]] std::shared_ptr<std::string> AddSensorOptions(CLI::App& command, sim::FleetOptions& fleet);
+// `laser_model` gets the name given with --laser-model; where it stays empty, the laser's single options count.
+void AddSensorOptions(CLI::App& command, sim::FleetOptions& fleet, std::string& laser_model);
 
 }  // namespace cairn::client

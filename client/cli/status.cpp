@@ -6,18 +6,11 @@ namespace cairn::client {
 namespace {
 
 ExitCode ShowStatus(Program& program, const std::string& robot) {
-  Request request;
-  request.kind = RequestKind::kStatus;
-  request.robot = robot;
-  const auto reply = program.Ask(request);
-  if (!reply) return program.Refuse(reply.error());
-  std::string text = reply->robots.empty() ? "no robot yet\n" : "";
-  nlohmann::json robots = nlohmann::json::array();
-  for (const RobotStatus& status : reply->robots) {
-    text += FormatRobot(status);
-    robots.push_back(ToJson(status));
-  }
-  return program.Print(text, {{"robots", robots}});
+  const auto robots = program.Ask([&](QueryClient& server) { return server.Robots(robot); });
+  if (!robots) return program.Refuse(robots.error());
+  std::string text = robots->empty() ? "no robot yet\n" : "";
+  for (const RobotStatus& status : *robots) text += FormatRobot(status);
+  return program.Print(text, {{"robots", *robots}});
 }
 
 }  // namespace
@@ -29,7 +22,7 @@ void AddStatus(CLI::App& app, Program& program) {
       "EXAMPLES\n  cairn status\n  cairn status robot1 --json");
   auto robot = std::make_shared<std::string>();
   command->add_option("robot", *robot, "Only this robot");
-  command->callback([&program, robot] { program.action = [&program, robot] { return ShowStatus(program, *robot); }; });
+  program.OnChosen(*command, robot, ShowStatus);
 }
 
 }  // namespace cairn::client

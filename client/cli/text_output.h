@@ -1,4 +1,4 @@
-// The server's values as lines for people. Stateless.
+// Formats values of the server as text for people. Stateless.
 #pragma once
 
 #include <string>
@@ -9,11 +9,11 @@
 
 namespace cairn::client {
 
-// One line: where, how sure, why.
+// One line: the pose, its standard deviations, and how it was found.
 [[nodiscard]] std::string FormatPose(const PoseReport& pose);
 // One line: state, progress, costs, message.
 [[nodiscard]] std::string FormatJob(const Job& job);
-// Several lines, each ended.
+// The functions below return several lines, each with its line end.
 [[nodiscard]] std::string FormatRobot(const RobotStatus& robot);
 [[nodiscard]] std::string FormatMap(const MapInfo& map);
 [[nodiscard]] std::string FormatTrajectoryError(const TrajectoryError& error);

@@ -12,7 +12,7 @@ namespace cairn::client {
 namespace {
 
 struct TilesArguments {
-  Request request;
+  TileQuery query;
   std::string directory;
 };
 
@@ -23,29 +23,28 @@ Result<void> SaveTile(const Tile& tile, const std::filesystem::path& directory) 
 }
 
 ExitCode ShowTiles(Program& program, const TilesArguments& arguments) {
-  const auto reply = program.Ask(arguments.request);
-  if (!reply) return program.Refuse(reply.error());
+  const auto answer = program.Ask([&](QueryClient& server) { return server.Tiles(arguments.query); });
+  if (!answer) return program.Refuse(answer.error());
   if (!arguments.directory.empty()) {
     std::error_code error;
     std::filesystem::create_directories(arguments.directory, error);
     if (error) return program.Refuse({StatusCode::kUnavailable, arguments.directory + ": " + error.message()});
-    for (const Tile& tile : reply->tiles) {
+    for (const Tile& tile : answer->tiles) {
       if (const auto saved = SaveTile(tile, arguments.directory); !saved) return program.Refuse(saved.error());
     }
   }
   std::size_t bytes = 0;
   std::string text;
-  nlohmann::json tiles = nlohmann::json::array();
-  for (const Tile& tile : reply->tiles) {
+  for (const Tile& tile : answer->tiles) {
     bytes += tile.bytes.size();
     text += fmt::format("level {}  x {:4d}  y {:4d}  version {:8d}  {:6d} bytes\n", tile.key.level, tile.key.x,
                         tile.key.y, tile.version, tile.bytes.size());
-    tiles.push_back(TileToJson(tile));
   }
-  text += fmt::format("{} tiles, {} bytes, epoch {}, version {}\n", reply->tiles.size(), bytes, reply->map_epoch,
-                      reply->map_version);
+  text += fmt::format("{} tiles, {} bytes, epoch {}, version {}\n", answer->tiles.size(), bytes, answer->epoch,
+                      answer->version);
   return program.Print(
-      text, {{"tiles", tiles}, {"bytes", bytes}, {"map_epoch", reply->map_epoch}, {"map_version", reply->map_version}});
+      text,
+      {{"tiles", answer->tiles}, {"bytes", bytes}, {"map_epoch", answer->epoch}, {"map_version", answer->version}});
 }
 
 }  // namespace
@@ -54,22 +53,20 @@ void AddTiles(CLI::App& app, Program& program) {
   auto* command = app.add_subcommand("tiles", "Tiles of a site's map, by area, level and age");
   command->footer(
       "A tile has 128 x 128 cells; level 0 is the finest, each further level halves the resolution.\n"
-      "With --since-version only tiles that changed later come; a different --since-epoch means all of them.\n"
+      "With --since-version only the tiles that changed after that version are listed. If the map is no longer in the\n"
+      "epoch given by --since-epoch, all tiles are listed.\n"
       "EXAMPLES\n  cairn tiles --site hall --level 2\n  cairn tiles --site hall --area -5,-5,20,10 -o tiles/\n"
       "  cairn tiles --site hall --since-epoch 1 --since-version 420");
   auto arguments = std::make_shared<TilesArguments>();
-  Request& request = arguments->request;
-  request.kind = RequestKind::kTiles;
-  command->add_option("--site", request.site, "The site's name")->required();
-  command->add_option("--level", request.level, "Level of the pyramid")->check(CLI::Range(0, kPyramidLevels - 1));
-  AddParsed(*command, "--area", request.area, ParseArea, "Only tiles that touch this area", "XMIN,YMIN,XMAX,YMAX");
-  auto* version =
-      command->add_option("--since-version", request.since_version, "Only tiles changed after this version");
-  command->add_option("--since-epoch", request.since_epoch, "The epoch that version belongs to")->needs(version);
+  TileQuery& query = arguments->query;
+  command->add_option("--site", query.site, "The site's name")->required();
+  command->add_option("--level", query.level, "Level of the pyramid")->check(CLI::Range(0, kPyramidLevels - 1));
+  AddParsed(*command, "--area", query.area, ParseArea, "Only tiles that touch this area", "XMIN,YMIN,XMAX,YMAX");
+  auto* version = command->add_option("--since-version", query.since_version, "Only tiles changed after this version");
+  command->add_option("--since-epoch", query.since_epoch, "The epoch that version belongs to")->needs(version);
   command->add_option("-o,--output", arguments->directory, "Directory to save the tiles into (L<level>_<x>_<y>.png)")
       ->type_name("DIR");
-  command->callback(
-      [&program, arguments] { program.action = [&program, arguments] { return ShowTiles(program, *arguments); }; });
+  program.OnChosen(*command, arguments, ShowTiles);
 }
 
 }  // namespace cairn::client

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <vector>
 
 #include "client/cli/percentiles.h"
@@ -14,19 +13,6 @@ struct Pair {
   Pose2 estimate;
   Pose2 truth;
 };
-
-std::optional<Pose2> TruthAt(const Trajectory& truth, Stamp stamp) {
-  constexpr Stamp kLongestGap = kNanosPerSecond / 2;
-  const auto after = std::lower_bound(truth.begin(), truth.end(), stamp,
-                                      [](const StampedPose& pose, Stamp wanted) { return pose.stamp < wanted; });
-  if (after == truth.end()) return std::nullopt;
-  if (after->stamp == stamp) return after->T_map_robot;
-  if (after == truth.begin()) return std::nullopt;
-  const auto before = after - 1;
-  if (after->stamp - before->stamp > kLongestGap) return std::nullopt;
-  const double share = static_cast<double>(stamp - before->stamp) / static_cast<double>(after->stamp - before->stamp);
-  return Interpolate(before->T_map_robot, after->T_map_robot, share);
-}
 
 // The rigid motion that brings the estimate's positions nearest to the truth's, in the mean of squares.
 Pose2 BestFit(const std::vector<Pair>& pairs) {
@@ -51,9 +37,11 @@ Pose2 BestFit(const std::vector<Pair>& pairs) {
 }  // namespace
 
 Result<TrajectoryError> CompareTrajectories(const Trajectory& estimate, const Trajectory& truth, Alignment alignment) {
+  constexpr double kLongestGap_s = 0.5;
   std::vector<Pair> pairs;
   for (const StampedPose& pose : estimate) {
-    if (const auto true_pose = TruthAt(truth, pose.stamp)) pairs.push_back({pose.T_map_robot, *true_pose});
+    if (const auto true_pose = PoseOn(truth, pose.stamp, kLongestGap_s))
+      pairs.push_back({pose.T_map_robot, *true_pose});
   }
   if (pairs.empty()) {
     return Fail(StatusCode::kNotFound, "no pose of the estimate lies within the time of the truth");

@@ -16,12 +16,12 @@ enum class Alignment { kNone, kSe2 };
 struct TrajectoryError {
   std::size_t compared = 0;
   std::size_t skipped = 0;
-  double way_m = 0.0;  // Of the truth over the compared time.
+  double way_m = 0.0;  // Length of the true way over the compared time.
   double rmse_m = 0.0;
   double mean_m = 0.0;
   double median_m = 0.0;
   double max_m = 0.0;
-  double final_m = 0.0;  // Of the last pose compared.
+  double final_m = 0.0;  // Error of the last pose compared.
   double rmse_rad = 0.0;
   double max_rad = 0.0;
 };

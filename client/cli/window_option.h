@@ -1,4 +1,5 @@
-// How far a stream may run ahead of the server. A window below the server's queue of 64 scans never loses one.
+// The option that bounds how far a stream may run ahead of the server. With a window below 64, the length of the
+// server's queue, no scan is lost.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -10,8 +11,10 @@ inline constexpr std::uint64_t kFastWindow = 32;
 
 inline void AddWindowOption(CLI::App& command, std::uint64_t& window) {
   command
-      .add_option("--window", window,
-                  "Scans on the way at most: a stream too fast for the server slows down instead of losing scans")
+      .add_option(
+          "--window", window,
+          "Most scans sent and not yet answered [with --fast: 32]; a stream that is too fast for the server waits "
+          "instead of losing scans")
       ->check(CLI::Range(1, 48));
 }
 

@@ -1,4 +1,4 @@
-// Who a client process is on the wire.
+// The identity of a client process on the wire, and the message for a server that is not found.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace cairn::client {
 
-// Random and non-zero; from the operating system, so two processes never share one.
+// A random number, not zero, drawn from the operating system so that two processes do not get the same one.
 [[nodiscard]] ClientId NewClientId();
 
 // "no server answers on domain 0 at 127.0.0.1 within 2 s".

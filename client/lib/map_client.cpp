@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "client/lib/client_id.h"
+#include "client/lib/deadline.h"
 
 namespace cairn::client {
 
@@ -38,8 +39,7 @@ void MapClient::Apply(Value&& value) {
 
 Result<void> MapClient::WaitComplete(double timeout_s) {
   using Clock = std::chrono::steady_clock;
-  const auto deadline =
-      Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(timeout_s));
+  const Deadline deadline = DeadlineAfter(timeout_s);
   const MutexLock lock(mutex_);
   while (!mirror_.complete()) {
     if (Clock::now() >= deadline) {

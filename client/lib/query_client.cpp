@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <thread>
 #include <utility>
 
 #include "client/lib/client_id.h"
@@ -21,9 +22,27 @@ Result<T> Only(std::vector<T>&& list, const char* what) {
   return std::move(list.front());
 }
 
-Request Of(RequestKind kind) {
+Request MakeRequest(RequestKind kind) {
   Request request;
   request.kind = kind;
+  return request;
+}
+
+Request AboutSite(RequestKind kind, const std::string& site) {
+  Request request = MakeRequest(kind);
+  request.site = site;
+  return request;
+}
+
+Request AboutRobot(RequestKind kind, const std::string& robot) {
+  Request request = MakeRequest(kind);
+  request.robot = robot;
+  return request;
+}
+
+Request AboutJob(RequestKind kind, std::uint64_t id) {
+  Request request = MakeRequest(kind);
+  request.job = id;
   return request;
 }
 
@@ -55,44 +74,44 @@ Result<std::unique_ptr<QueryClient>> QueryClient::Create(wire::Bus& bus, const Q
 void QueryClient::OnReply(Reply&& part) {
   const MutexLock lock(mutex_);
   const auto pending = pending_.find(part.sequence);
-  if (pending == pending_.end()) return;  // Too late, or for an earlier life of this id.
+  if (pending == pending_.end()) return;  // The caller has stopped waiting.
   pending->second.Add(std::move(part));
   changed_.NotifyAll();
 }
 
-Result<Reply> QueryClient::Ask(const Request& request, double timeout_s) {
-  const Deadline deadline =
-      Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(timeout_s));
-  if (auto greeted = Greet(deadline, timeout_s); !greeted) return tl::unexpected(greeted.error());
-  Result<Reply> reply = AskOnce(request, deadline, timeout_s);
+Result<Reply> QueryClient::Ask(const Request& request) {
+  const Deadline deadline = DeadlineAfter(options_.timeout_s);
+  if (auto greeted = Greet(deadline); !greeted) return tl::unexpected(greeted.error());
+  Result<Reply> reply = AskOnce(request, deadline);
   if (reply && !reply->status.ok()) return tl::unexpected(reply->status);
   return reply;
 }
 
-// Both sides must have found each other's both ends, and only an answer proves that: without it the reply to the first
-// question would go nowhere. A ping may be asked twice, a job may not.
-Result<void> QueryClient::Greet(Deadline deadline, double timeout_s) {
+// DDS matches the topic of requests and the topic of replies one after the other, on both sides. Until all four ends
+// have found their peers, an answer may be lost. Only an answered ping proves that they have; a ping may be repeated,
+// while a question that starts a job may not.
+Result<void> QueryClient::Greet(Deadline deadline) {
   constexpr std::chrono::milliseconds kPatience{100};
   for (;;) {
     {
       const MutexLock lock(mutex_);
       if (greeted_) return {};
       while (requests_->matched() == 0 || replies_->matched() == 0) {
-        if (Clock::now() >= deadline) return Fail(StatusCode::kUnavailable, NoServer(bus_, timeout_s));
+        if (Clock::now() >= deadline) return Fail(StatusCode::kUnavailable, NoServer(bus_, options_.timeout_s));
         changed_.WaitFor(mutex_, std::chrono::milliseconds(5));
       }
     }
-    const Result<Reply> pong = AskOnce(Of(RequestKind::kPing), std::min(deadline, Clock::now() + kPatience), timeout_s);
+    const Result<Reply> pong = AskOnce(MakeRequest(RequestKind::kPing), std::min(deadline, Clock::now() + kPatience));
     const MutexLock lock(mutex_);
     if (pong) {
       greeted_ = true;
       return {};
     }
-    if (Clock::now() >= deadline) return Fail(StatusCode::kUnavailable, NoServer(bus_, timeout_s));
+    if (Clock::now() >= deadline) return Fail(StatusCode::kUnavailable, NoServer(bus_, options_.timeout_s));
   }
 }
 
-Result<Reply> QueryClient::AskOnce(Request request, Deadline deadline, double timeout_s) {
+Result<Reply> QueryClient::AskOnce(Request request, Deadline deadline) {
   request.client = id_;
   {
     const MutexLock lock(mutex_);
@@ -107,32 +126,47 @@ Result<Reply> QueryClient::AskOnce(Request request, Deadline deadline, double ti
   if (!published) return tl::unexpected(published.error());
   if (node.mapped().complete()) return node.mapped().Take();
   return Fail(StatusCode::kDeadlineExceeded,
-              fmt::format("no {} answer to {} within {:.1f} s", node.mapped().parts() > 0 ? "complete" : "",
-                          RequestKindName(request.kind), timeout_s));
+              fmt::format("no {}answer to {} within {:.1f} s", node.mapped().parts() > 0 ? "complete " : "",
+                          RequestKindName(request.kind), options_.timeout_s));
 }
 
 Result<std::string> QueryClient::Ping() {
-  return Ask(Of(RequestKind::kPing)).map([](Reply&& reply) { return std::move(reply.server_version); });
+  return Ask(MakeRequest(RequestKind::kPing)).map([](Reply&& reply) { return std::move(reply.server_version); });
 }
 
 Result<PoseReport> QueryClient::Pose(const std::string& robot, std::optional<Stamp> at) {
-  Request request = Of(RequestKind::kPose);
-  request.robot = robot;
+  Request request = AboutRobot(RequestKind::kPose, robot);
   request.latest = !at.has_value();
   request.stamp = at.value_or(0);
   return Ask(request).and_then([](Reply&& reply) { return Only(std::move(reply.poses), "poses"); });
 }
 
-Result<Trajectory> QueryClient::Path(const std::string& robot, bool smoothed) {
-  Request request = Of(RequestKind::kPath);
-  request.robot = robot;
+Result<PathAnswer> QueryClient::Path(const std::string& robot, bool smoothed) {
+  Request request = AboutRobot(RequestKind::kPath, robot);
   request.smoothed = smoothed;
-  return Ask(request).map([](Reply&& reply) { return std::move(reply.path); });
+  return Ask(request).map([](Reply&& reply) { return PathAnswer{std::move(reply.path), reply.map_epoch}; });
+}
+
+Result<std::vector<RobotStatus>> QueryClient::Robots(const std::string& robot) {
+  return Ask(AboutRobot(RequestKind::kStatus, robot)).map([](Reply&& reply) { return std::move(reply.robots); });
+}
+
+Result<void> QueryClient::EndSession(const std::string& robot) {
+  return Ask(AboutRobot(RequestKind::kSessionEnd, robot)).map([](Reply&&) {});
+}
+
+Result<std::vector<MapInfo>> QueryClient::Maps() {
+  return Ask(MakeRequest(RequestKind::kMapInfo)).map([](Reply&& reply) { return std::move(reply.maps); });
+}
+
+Result<MapInfo> QueryClient::Map(const std::string& site) {
+  return Ask(AboutSite(RequestKind::kMapInfo, site)).and_then([](Reply&& reply) {
+    return Only(std::move(reply.maps), "maps");
+  });
 }
 
 Result<TileAnswer> QueryClient::Tiles(const TileQuery& query) {
-  Request request = Of(RequestKind::kTiles);
-  request.site = query.site;
+  Request request = AboutSite(RequestKind::kTiles, query.site);
   request.area = query.area;
   request.level = query.level;
   request.since_epoch = query.since_epoch;
@@ -142,64 +176,73 @@ Result<TileAnswer> QueryClient::Tiles(const TileQuery& query) {
   });
 }
 
+Result<OccupancyImage> QueryClient::MapImage(const std::string& site) {
+  auto info = Map(site);
+  if (!info) return tl::unexpected(info.error());
+  TileQuery query;
+  query.site = site;
+  const auto answer = Tiles(query);
+  if (!answer) return tl::unexpected(answer.error());
+  if (answer->tiles.empty()) return Fail(StatusCode::kUnavailable, fmt::format("site '{}' has no tile yet", site));
+  return AssembleTiles(answer->tiles, info->resolution_m);
+}
+
 Result<std::vector<LandmarkReport>> QueryClient::Landmarks(const std::string& site, const Area& area) {
-  Request request = Of(RequestKind::kLandmarks);
-  request.site = site;
+  Request request = AboutSite(RequestKind::kLandmarks, site);
   request.area = area;
   return Ask(request).map([](Reply&& reply) { return std::move(reply.landmarks); });
 }
 
-Result<std::vector<MapInfo>> QueryClient::Maps(const std::string& site) {
-  Request request = Of(RequestKind::kMapInfo);
-  request.site = site;
-  return Ask(request).map([](Reply&& reply) { return std::move(reply.maps); });
+Result<MapInfo> QueryClient::EnableMap(const std::string& site, std::uint32_t map_version) {
+  Request request = AboutSite(RequestKind::kMapEnable, site);
+  request.map_version = map_version;
+  return Ask(request).and_then([&](Reply&&) { return Map(site); });
 }
 
-Result<std::vector<RobotStatus>> QueryClient::Robots(const std::string& robot) {
-  Request request = Of(RequestKind::kStatus);
-  request.robot = robot;
-  return Ask(request).map([](Reply&& reply) { return std::move(reply.robots); });
+Result<MapInfo> QueryClient::RollBackMap(const std::string& site) {
+  auto info = Map(site);
+  if (!info) return info;
+  std::uint32_t before = 0;
+  for (const MapVersionInfo& version : info->versions) {
+    if (version.version < info->enabled_version) before = std::max(before, version.version);
+  }
+  if (before == 0) {
+    return Fail(StatusCode::kFailedPrecondition,
+                fmt::format("site '{}' has no version before {}", site, info->enabled_version));
+  }
+  return EnableMap(site, before);
+}
+
+Result<Job> QueryClient::AskForJob(const Request& request) {
+  return Ask(request).and_then([](Reply&& reply) { return Only(std::move(reply.jobs), "jobs"); });
 }
 
 Result<Job> QueryClient::SubmitJob(const std::string& site, JobKind kind, bool enable) {
-  Request request = Of(RequestKind::kJobSubmit);
-  request.site = site;
+  Request request = AboutSite(RequestKind::kJobSubmit, site);
   request.job_kind = kind;
   request.enable = enable;
-  return Ask(request).and_then([](Reply&& reply) { return Only(std::move(reply.jobs), "jobs"); });
+  return AskForJob(request);
 }
 
 Result<Job> QueryClient::GetJob(std::uint64_t id) {
-  Request request = Of(RequestKind::kJobGet);
-  request.job = id;
-  return Ask(request).and_then([](Reply&& reply) { return Only(std::move(reply.jobs), "jobs"); });
+  return AskForJob(AboutJob(RequestKind::kJobGet, id));
 }
 
 Result<Job> QueryClient::CancelJob(std::uint64_t id) {
-  Request request = Of(RequestKind::kJobCancel);
-  request.job = id;
-  return Ask(request).and_then([](Reply&& reply) { return Only(std::move(reply.jobs), "jobs"); });
+  return AskForJob(AboutJob(RequestKind::kJobCancel, id));
 }
 
 Result<std::vector<Job>> QueryClient::Jobs(const std::string& site) {
-  Request request = Of(RequestKind::kJobList);
-  request.site = site;
-  return Ask(request).map([](Reply&& reply) { return std::move(reply.jobs); });
+  return Ask(AboutSite(RequestKind::kJobList, site)).map([](Reply&& reply) { return std::move(reply.jobs); });
 }
 
-Result<void> QueryClient::EndSession(const std::string& robot) {
-  Request request = Of(RequestKind::kSessionEnd);
-  request.robot = robot;
-  if (const Result<Reply> reply = Ask(request); !reply) return tl::unexpected(reply.error());
-  return {};
-}
-
-Result<void> QueryClient::EnableMap(const std::string& site, std::uint32_t map_version) {
-  Request request = Of(RequestKind::kMapEnable);
-  request.site = site;
-  request.map_version = map_version;
-  if (const Result<Reply> reply = Ask(request); !reply) return tl::unexpected(reply.error());
-  return {};
+Result<Job> QueryClient::WaitForJob(std::uint64_t id, const std::function<bool(const Job&)>& keep_waiting) {
+  constexpr std::chrono::milliseconds kPause{100};
+  for (;;) {
+    Result<Job> job = GetJob(id);
+    if (!job || IsFinal(job->state) || (keep_waiting && !keep_waiting(*job))) return job;
+    std::this_thread::sleep_for(kPause);
+  }
 }
 
 }  // namespace cairn::client

@@ -1,27 +1,36 @@
-// Asks the server and waits for the whole answer. One method per question; each returns the answer, the server's error
-// (its code and message), or why there is none: kUnavailable where no server is there, kDeadlineExceeded where it was
-// too slow. Finding the server counts towards the deadline.
-// Thread rule: any number of threads may ask at once; each waits for its own answer. Not from a wire callback.
+// Asks the server and waits for the whole answer. There is one method per question. Each returns the answer, or the
+// server's error (its code and message), or why there is no answer: kUnavailable where no server was found, and
+// kDeadlineExceeded where the answer was late. The time needed to find the server counts towards the timeout.
+// Thread rule: any number of threads may ask at once, and each waits for its own answer. Do not ask from a callback of
+// the wire: the answer arrives on the thread that the callback would block.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "client/lib/deadline.h"
 #include "client/lib/reply_assembly.h"
+#include "common/map/occupancy_image.h"
 #include "common/mutex.h"
 #include "common/wire/bus.h"
 
 namespace cairn::client {
 
 struct QueryClientOptions {
-  double timeout_s = 2.0;  // Of every question that names no other.
+  double timeout_s = 2.0;  // How long each method waits for its answer.
 };
 
-// The map (or part of it) as of one moment.
+struct PathAnswer {
+  Trajectory poses;             // In the site's map frame, by increasing stamp.
+  std::uint32_t map_epoch = 0;  // The map's epoch that the poses belong to.
+};
+
+// A part of the map as it was at one moment.
 struct TileAnswer {
   std::uint32_t epoch = 0;
   std::uint64_t version = 0;
@@ -30,43 +39,63 @@ struct TileAnswer {
 
 struct TileQuery {
   std::string site;
-  Area area;
-  std::uint32_t level = 0;
+  Area area;                // Only tiles that touch it. The default is the whole map.
+  std::uint32_t level = 0;  // Level of the pyramid; 0 is the finest.
+  // Only tiles that changed after this version of this epoch. Where the map has another epoch by now, all tiles come.
   std::uint32_t since_epoch = 0;
-  std::uint64_t since_version = 0;  // With the map's epoch: only what changed since.
+  std::uint64_t since_version = 0;
 };
 
 class QueryClient {
  public:
+  // `bus` outlives the client.
   [[nodiscard]] static Result<std::unique_ptr<QueryClient>> Create(wire::Bus& bus,
                                                                    const QueryClientOptions& options = {});
   ~QueryClient();
 
-  // Any request, with the parts of its answer put together. Client and sequence are set here.
-  [[nodiscard]] Result<Reply> Ask(const Request& request, double timeout_s);
-  [[nodiscard]] Result<Reply> Ask(const Request& request) { return Ask(request, options_.timeout_s); }
+  // The server's version.
+  [[nodiscard]] Result<std::string> Ping();
 
-  [[nodiscard]] Result<std::string> Ping();  // The server's version.
+  // The newest pose, or the pose at a stamp of the robot's clock, interpolated. kUnavailable: the server has not used a
+  // scan that late yet; kOutOfRange: the stamp is before the robot's first scan.
   [[nodiscard]] Result<PoseReport> Pose(const std::string& robot, std::optional<Stamp> at = {});
-  [[nodiscard]] Result<Trajectory> Path(const std::string& robot, bool smoothed = false);
-  [[nodiscard]] Result<TileAnswer> Tiles(const TileQuery& query);
-  [[nodiscard]] Result<std::vector<LandmarkReport>> Landmarks(const std::string& site, const Area& area = {});
-  [[nodiscard]] Result<std::vector<MapInfo>> Maps(const std::string& site = "");
+  // All poses so far, or those of the smoothing job whose map is enabled (kFailedPrecondition where there is none).
+  [[nodiscard]] Result<PathAnswer> Path(const std::string& robot, bool smoothed = false);
+  // Session, newest pose and ledgers of all robots, or of one (kNotFound where the server does not know it).
   [[nodiscard]] Result<std::vector<RobotStatus>> Robots(const std::string& robot = "");
+  // Ends the robot's session for good.
+  [[nodiscard]] Result<void> EndSession(const std::string& robot);
+
+  // All maps.
+  [[nodiscard]] Result<std::vector<MapInfo>> Maps();
+  // The map of one site. kNotFound where the server has none of that name.
+  [[nodiscard]] Result<MapInfo> Map(const std::string& site);
+  [[nodiscard]] Result<TileAnswer> Tiles(const TileQuery& query);
+  // The whole map at its finest level. kUnavailable where nothing is drawn yet.
+  [[nodiscard]] Result<OccupancyImage> MapImage(const std::string& site);
+  [[nodiscard]] Result<std::vector<LandmarkReport>> Landmarks(const std::string& site, const Area& area = {});
+  // Switches the site to one of its map versions. Returns the map as it is then.
+  [[nodiscard]] Result<MapInfo> EnableMap(const std::string& site, std::uint32_t map_version);
+  // Switches to the highest version below the enabled one; kFailedPrecondition where there is none.
+  [[nodiscard]] Result<MapInfo> RollBackMap(const std::string& site);
+
+  // `enable`: the server switches the site to the job's map version as soon as the job succeeds.
   [[nodiscard]] Result<Job> SubmitJob(const std::string& site, JobKind kind, bool enable = true);
   [[nodiscard]] Result<Job> GetJob(std::uint64_t id);
   [[nodiscard]] Result<Job> CancelJob(std::uint64_t id);
+  // Jobs of all sites, or of one.
   [[nodiscard]] Result<std::vector<Job>> Jobs(const std::string& site = "");
-  [[nodiscard]] Result<void> EndSession(const std::string& robot);
-  [[nodiscard]] Result<void> EnableMap(const std::string& site, std::uint32_t map_version);
+  // Asks for the job ten times a second until it has ended, and returns its last state. The timeout bounds each single
+  // answer and not the whole wait. `keep_waiting` sees every state; where it returns false, the wait ends there.
+  [[nodiscard]] Result<Job> WaitForJob(std::uint64_t id, const std::function<bool(const Job&)>& keep_waiting = {});
 
  private:
-  using Deadline = std::chrono::steady_clock::time_point;
-
   QueryClient(wire::Bus& bus, const QueryClientOptions& options);
   void OnReply(Reply&& part);
-  [[nodiscard]] Result<void> Greet(Deadline deadline, double timeout_s);
-  [[nodiscard]] Result<Reply> AskOnce(Request request, Deadline deadline, double timeout_s);
+  [[nodiscard]] Result<void> Greet(Deadline deadline);
+  [[nodiscard]] Result<Reply> Ask(const Request& request);
+  [[nodiscard]] Result<Job> AskForJob(const Request& request);
+  [[nodiscard]] Result<Reply> AskOnce(Request request, Deadline deadline);
 
   const wire::Bus& bus_;
   const QueryClientOptions options_;
@@ -76,7 +105,7 @@ class QueryClient {
   CondVar changed_;
   bool greeted_ CAIRN_GUARDED_BY(mutex_) = false;
   std::int64_t sequence_ CAIRN_GUARDED_BY(mutex_) = 0;
-  std::map<std::int64_t, ReplyAssembly> pending_ CAIRN_GUARDED_BY(mutex_);  // By sequence; what a caller waits for.
+  std::map<std::int64_t, ReplyAssembly> pending_ CAIRN_GUARDED_BY(mutex_);  // By sequence; what callers wait for.
 
   std::unique_ptr<wire::Publication<Request>> requests_;
   std::unique_ptr<wire::Subscription> replies_;  // Last: its callbacks use everything above.

@@ -18,7 +18,7 @@ class ReplyAssembly {
   [[nodiscard]] Reply Take();
 
  private:
-  static constexpr std::size_t kMaxParts = 65536;  // More is no answer but an attack.
+  static constexpr std::size_t kMaxParts = 65536;  // No honest answer has more.
 
   std::map<std::uint32_t, Reply> parts_;
   bool last_seen_ = false;

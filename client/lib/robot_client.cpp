@@ -5,18 +5,15 @@
 #include <utility>
 
 #include "client/lib/client_id.h"
+#include "client/lib/deadline.h"
 
 namespace cairn::client {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// The name odometry goes by; it belongs to the robot, not to a laser.
+// Odometry belongs to the robot and not to one of its lasers, so its stream has a name of its own.
 constexpr char kOdometrySensor[] = "odometry";
-
-Clock::time_point After(double seconds) {
-  return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
-}
 
 }  // namespace
 
@@ -56,7 +53,7 @@ Result<void> RobotClient::Connect(wire::Bus& bus) {
     subscriptions_.push_back(std::move(*subscription));
     return {};
   };
-  // Answers first, so that none is missed.
+  // Subscriptions first, so that no answer is missed.
   if (auto kept = keep(bus.Subscribe<SessionState>([this](SessionState&& s) { OnSession(std::move(s)); })); !kept) {
     return kept;
   }
@@ -76,9 +73,9 @@ Result<void> RobotClient::Connect(wire::Bus& bus) {
 }
 
 Result<void> RobotClient::AwaitSession(const wire::Bus& bus, double timeout_s) {
-  const auto deadline = After(timeout_s);
+  const auto deadline = DeadlineAfter(timeout_s);
   const MutexLock lock(mutex_);
-  // The streams too must have found the server: what is sent before that goes nowhere.
+  // The streams must have found the server as well: what is sent before that is lost.
   while (!state_ || (state_->phase == SessionPhase::kActive && (scans_->matched() == 0 || odometry_->matched() == 0))) {
     if (Clock::now() >= deadline) return Fail(StatusCode::kUnavailable, NoServer(bus, timeout_s));
     changed_.WaitFor(mutex_, std::chrono::milliseconds(5));
@@ -92,7 +89,7 @@ void RobotClient::OnSession(SessionState&& state) {
   if (state.robot_id != robot_id_ || state.client != request_.client) return;
   {
     const MutexLock lock(mutex_);
-    // Said again means that one of us was away: a new server, or a lease that ran out.
+    // The state is published again after one side was away: a new server, or a lease that ran out.
     if (state.phase == SessionPhase::kActive && state_) resend_ = true;
     state_ = state;
     changed_.NotifyAll();
@@ -125,7 +122,7 @@ void RobotClient::OnPose(PoseReport&& report) {
 }
 
 Result<void> RobotClient::AwaitRoom(const Stream& stream) {
-  const auto deadline = After(options_.send_timeout_s);
+  const auto deadline = DeadlineAfter(options_.send_timeout_s);
   for (;;) {
     const bool over = state_->phase == SessionPhase::kRefused || state_->phase == SessionPhase::kEnded;
     if (over && !state_->status.ok()) return tl::unexpected(state_->status);
@@ -167,8 +164,8 @@ Result<void> RobotClient::Publish(const Scan& scan, const std::string& sensor) {
       kept = window.Add(ScanSample(sample));
     }
     auto published = scans_->Publish(*kept);
-    // It is kept: where the writer was busy, the watcher sends it again. What cannot be sent at all is the caller's
-    // fault.
+    // Where the writer was busy, the watcher sends the scan again, because it is kept. A scan that can never be sent is
+    // the caller's error.
     if (!published && published.error().code != StatusCode::kUnavailable) return published;
     return {};
   }
@@ -185,7 +182,7 @@ Result<void> RobotClient::Publish(const Odometry& odometry) {
 }
 
 Result<void> RobotClient::WaitSettled(double timeout_s) {
-  const auto deadline = After(timeout_s);
+  const auto deadline = DeadlineAfter(timeout_s);
   const MutexLock lock(mutex_);
   for (const auto& [sensor, stream] : streams_) {
     while (!stream.window.settled()) {
@@ -204,7 +201,7 @@ Result<void> RobotClient::End(double timeout_s) {
   SessionRequest end = request_;
   end.end = true;
   if (auto published = session_->Publish(end); !published) return published;
-  const auto deadline = After(timeout_s);
+  const auto deadline = DeadlineAfter(timeout_s);
   const MutexLock lock(mutex_);
   while (state_->phase != SessionPhase::kEnded) {
     if (Clock::now() >= deadline) {
@@ -216,7 +213,8 @@ Result<void> RobotClient::End(double timeout_s) {
   return {};
 }
 
-// Looks after the streams: sends again what was asked for again, or what got stuck.
+// Runs until the client is destroyed: sends kept scans again after the session was resumed, or when none of them was
+// settled for resend_after_s.
 void RobotClient::Watch() {
   for (;;) {
     {
@@ -256,7 +254,7 @@ void RobotClient::Resend() {
     resent_.fetch_add(1, std::memory_order_relaxed);
     if (!scans_->Publish(*sample)) {
       resent_.fetch_sub(1, std::memory_order_relaxed);
-      return;  // Stuck still: Watch tries again.
+      return;  // The writer is still blocked; Watch tries again.
     }
     if (++burst % kBurst == 0) static_cast<void>(scans_->WaitForAcknowledgement(kBurstTime));
   }

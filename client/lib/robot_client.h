@@ -1,6 +1,6 @@
 // A robot's side of its session: opens it, streams scans and odometry no faster than the server settles them, keeps
 // what the server may need again, and sends that again after either side was away. Reports the server's ledger and
-// poses. Not a localiser and not a recorder: what the server refused is in the ledger and not sent again. Thread rule:
+// poses. Scans that the server refused are counted in the ledger and not sent again. Thread rule:
 // every method from any thread; callbacks run on the wire's threads and must return soon. Destroying it without End
 // leaves the session suspended, to be taken up by a client of the same robot.
 #pragma once
@@ -21,7 +21,7 @@
 namespace cairn::client {
 
 struct RobotClientOptions {
-  ScanWindowOptions window;     // Of each sensor.
+  ScanWindowOptions window;     // One window per sensor.
   double send_timeout_s = 5.0;  // How long Publish waits for room before it gives up.
   double resend_after_s = 2.0;  // Without progress of the ledger, unsettled scans are sent again.
 };
@@ -34,8 +34,8 @@ class RobotClient {
     std::function<void(const SessionState&)> session;
   };
 
-  // Sends the request under a client id of its own and waits for the server's word: its refusal is the error, and
-  // kUnavailable says that no server answers. `request.sensors` names at least one stream.
+  // Sends the request under a client id of its own and waits for the server's answer. Where the server refuses,
+  // its reason is the error; kUnavailable means that no server answers. `request.sensors` names at least one stream.
   [[nodiscard]] static Result<std::unique_ptr<RobotClient>> Open(wire::Bus& bus, SessionRequest request,
                                                                  double timeout_s, Callbacks callbacks = {},
                                                                  const RobotClientOptions& options = {});
@@ -50,14 +50,14 @@ class RobotClient {
 
   // Waits until the server has settled every scan sent (kDeadlineExceeded).
   [[nodiscard]] Result<void> WaitSettled(double timeout_s);
-  // Ends the session for good, and waits for the server to say so.
+  // Ends the session for good, and waits until the server confirms it.
   [[nodiscard]] Result<void> End(double timeout_s = 2.0);
 
   [[nodiscard]] ClientId id() const { return request_.client; }
   [[nodiscard]] SessionState session() const;
   [[nodiscard]] bool connected() const { return scans_->matched() > 0; }  // Whether a server listens right now.
   [[nodiscard]] std::optional<PoseReport> pose() const;
-  [[nodiscard]] std::optional<Ledger> ledger() const;  // Of the first sensor.
+  [[nodiscard]] std::optional<Ledger> ledger() const;  // The ledger of the first sensor.
   [[nodiscard]] std::optional<Ledger> ledger(const std::string& sensor) const;
   [[nodiscard]] std::uint64_t resent() const { return resent_.load(std::memory_order_relaxed); }
 

@@ -22,16 +22,16 @@ ScanWindow::Kept ScanWindow::Add(ScanSample&& sample) {
 }
 
 void ScanWindow::OnLedger(const Ledger& ledger) {
-  if (ledger.last_sequence > sent_) return;  // Of an earlier client of this robot; its numbers say nothing of ours.
-  // Not the maximum: a server that lost its memory settles less than before, and must not be overrun on its
-  // predecessor's word.
+  if (ledger.last_sequence > sent_) return;  // The ledger counts the scans of an earlier client.
+  // The newest value and not the maximum: a server that was restarted without its state has settled less than before,
+  // and would otherwise be sent more than the window allows.
   settled_through_ = ledger.settled_through;
   durable_through_ = ledger.durable_through;
   while (!kept_.empty() && kept_.front()->scan.sequence <= safe_through()) kept_.pop_front();
 }
 
 std::uint64_t ScanWindow::safe_through() const {
-  // A server without a store never says durable, and after its death would have nothing to add old scans to.
+  // A server without a store never reports durable scans. After its death old scans would be of no use to it.
   return durable_through_ > 0 ? durable_through_ : settled_through_;
 }
 

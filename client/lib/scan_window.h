@@ -14,10 +14,11 @@
 namespace cairn::client {
 
 struct ScanWindowOptions {
-  std::uint64_t window =
-      32;  // Unsettled scans ahead of the server, at most; 0: no limit. Below 64, the writer's depth.
-  std::size_t kept_scans =
-      1024;  // Kept for sending again; more survive a longer outage of the server, and cost memory.
+  // The largest number of scans that are sent and not yet settled; 0: no limit. It must stay below 64, the depth of the
+  // writer's history.
+  std::uint64_t window = 32;
+  // Scans kept for sending them again. More bridge a longer outage of the server, and need more memory.
+  std::size_t kept_scans = 1024;
 };
 
 class ScanWindow {

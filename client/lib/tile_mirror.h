@@ -1,8 +1,8 @@
 // The tiles of one site as the server has them, built from the map and tile topics in whatever order they come:
-// - a tile of a higher version replaces the whole tile, one of a lower or equal version is old news;
+// - a tile of a higher version replaces the whole tile, one of a lower or equal version is ignored;
 // - a tombstone removes the tile, and is remembered so that no late older tile brings it back;
-// - the first word of a higher epoch, from either topic, makes every tile of the epochs before void.
-// So what it holds is always of one epoch. Pure value; not thread-safe.
+// - the first value of a higher epoch, from either topic, removes every tile of the epochs before.
+// So all its tiles are always of one epoch. Pure value; not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -38,7 +38,7 @@ class TileMirror {
  private:
   struct Entry {
     std::uint64_t version = 0;
-    std::optional<Tile> tile;  // Nothing: tombstone.
+    std::optional<Tile> tile;  // Nothing where the tile was removed.
   };
   // False where the epoch is void.
   bool Enter(std::uint32_t epoch);

@@ -1,4 +1,5 @@
-// A closed polyline measured by the way along it: what walkers walk and robots' starts are spread over.
+// A closed polyline measured by the distance along it. Walkers walk on one, and the starts of robots are spread over
+// one.
 #pragma once
 
 #include <Eigen/Core>

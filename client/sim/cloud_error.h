@@ -1,5 +1,5 @@
 // How far a cloud lies from the rectangles of the world it was taken in: the distance of each point to the nearest of
-// them. Says nothing of what the cloud misses. Frame of both: `map`. Stateless.
+// them. Walls that the cloud does not show are not counted. Frame of both: `map`. Stateless.
 #pragma once
 
 #include "client/sim/rectangle_tree.h"

@@ -14,7 +14,7 @@ Stamp Multiple(std::uint64_t k, double hz) {
   return static_cast<Stamp>(std::llround(static_cast<double>(k) * 1e9 / hz));
 }
 
-// How many scans a robot needs to stop, and one to stand.
+// The number of scans during which a robot brakes, and one more while it stands.
 int HaltScans(const FleetOptions& o) {
   const double seconds =
       std::max(o.drive.speed_m_s / o.drive.acceleration_m_s2, o.drive.turn_rad_s / o.drive.turn_acceleration_rad_s2);
@@ -82,7 +82,7 @@ PathPlace Fleet::FreePlace(const std::vector<Eigen::Vector2d>& waypoints, double
     });
     if (free) return place;
   }
-  return PlaceOnPath(waypoints, way_m);  // A crowd: robots may overlap.
+  return PlaceOnPath(waypoints, way_m);  // There are too many robots for the route: they may overlap.
 }
 
 Stamp Fleet::NextScan(const Member& member) const {
@@ -110,7 +110,6 @@ Scan Fleet::TakeScan(std::size_t index, Stamp since_start) {
                           TiltOf(member.scans, options_.tilt), options_.laser, member.robot.random());
   scan.sequence = ++member.scans;
   member.robot.Halt(HaltsAt(member.scans, options_.tilt, HaltScans(options_)));
-  scan.scan_period_s = 1.0 / options_.scan_hz;
   member.truth.push_back({stamp, member.robot.T_map_robot()});
   return scan;
 }

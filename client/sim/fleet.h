@@ -1,8 +1,8 @@
 // A fleet of simulated robots in one world, as one endless stream of log records in the order of their stamps, with
 // the true poses beside it. Same world, options and seed: same records, bit for bit. Robots' scans are staggered over
 // the scan period, and each scan has an odometry sample before and after it.
-// A scanner on a tilting mount nods as `tilt` says; then the robot halts.
-// Not a clock: the caller decides how fast to ask. One thread at a time.
+// A scanner on a tilting mount nods as `tilt` says, and the robot halts meanwhile.
+// The stream does not wait for real time: it advances as fast as the caller asks. Use it from one thread at a time.
 #pragma once
 
 #include <cstdint>
@@ -29,10 +29,10 @@ struct FleetOptions {
   double odometry_hz = 50.0;
   LaserOptions laser;
   TiltOptions tilt;
-  WheelOptions wheels;  // The make's means; every robot differs by wheel_spread.
+  WheelOptions wheels;  // Means over all robots; each robot differs from them by wheel_spread.
   WheelSpread wheel_spread;
   DriveOptions drive;
-  bool see_each_other = true;  // Robots show in each other's scans as discs.
+  bool see_each_other = true;  // Robots appear in each other's scans as discs.
   double robot_radius_m = 0.22;
   double robot_height_m = 0.5;
   Stamp first_stamp = 1'700'000'000'000'000'000;
@@ -67,7 +67,7 @@ class Fleet {
     std::string name;
     Pose2 T_map_robot_start;
     Robot robot;
-    Stamp scan_phase = 0;  // After first_stamp.
+    Stamp scan_phase = 0;  // From first_stamp to the first scan.
     std::uint64_t scans = 0;
     std::uint64_t odometries = 0;
     Trajectory truth;

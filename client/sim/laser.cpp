@@ -68,7 +68,6 @@ Scan MeasureScan(const Scene& scene, std::span<const Post> posts, const Pose2& T
 
   const RangeError error = ErrorOf(options);
   const double cos_tilt = std::cos(tilt_rad), sin_tilt = std::sin(tilt_rad);
-  std::uniform_real_distribution<double> uniform(0.0, 1.0);
   Pose2 T_map_laser = T_map_robot * options.T_robot_laser;
   for (int i = 0; i < options.beams; ++i) {
     if (scan.beam_period_s > 0.0) {
@@ -87,7 +86,7 @@ Scan MeasureScan(const Scene& scene, std::span<const Post> posts, const Pose2& T
     }
     const Eigen::Vector3d origin(T_map_laser.x, T_map_laser.y, options.height_m);
     double range = std::min(scene.Cast(origin, direction, options.range_max_m), CastAtPosts(posts, origin, direction));
-    if (options.dropout_share > 0.0 && uniform(random) < options.dropout_share) {
+    if (options.dropout_share > 0.0 && Uniform(random) < options.dropout_share) {
       range = 0.0;
     } else if (range < options.range_max_m) {
       range = std::max(0.0, range + DrawError(error, range, random));

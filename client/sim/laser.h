@@ -1,9 +1,9 @@
 // A planar laser scanner in a simulated world: exact ray casts, then noise and dropouts.
-// A range is r plus an error of one of three kinds (range_error.h), normal unless told otherwise. What nothing hits
-// reads +infinity (ROS REP 117); a dropout reads 0, which says nothing. Beams start at the scan's stamp and follow each
-// other within `sweep_s`, while the robot moves. The scan plane may be tilted about the laser's y axis, positive
-// downwards, while all beams of a scan share one tilt. Frames: beams in `laser`, mounted at T_robot_laser, `height_m`
-// above the floor. Source: thesis C 4.3.2, 4.3.3.
+// A range is the true distance plus an error of one of three kinds (range_error.h), by default a normal one. A beam
+// that hits nothing reads +infinity (ROS REP 117); a dropout reads 0, which carries no information. Beams start at the
+// scan's stamp and follow each other within `sweep_s`, while the robot moves. The scan plane may be tilted about the
+// laser's y axis, positive downwards, while all beams of a scan share one tilt. Frames: beams in `laser`, mounted at
+// T_robot_laser, `height_m` above the floor. Source: thesis C 4.3.2, 4.3.3.
 #pragma once
 
 #include <span>
@@ -27,10 +27,10 @@ struct LaserOptions {
   double bound_m = 0.01;       // kPercent, kStep: see range_error.h.
   double bound_share = 0.01;
   double step_m = 1.0;
-  double dropout_share = 0.002;  // Of all beams, 0..1.
+  double dropout_share = 0.002;  // Share of all beams, 0..1.
   double sweep_s = 0.0;          // From the first beam to the last; 0: all at once.
   Pose2 T_robot_laser{0.12, 0.0, 0.0};
-  double height_m = 0.4;  // Of the tilt axis above the floor; flat worlds do not care.
+  double height_m = 0.4;  // Height of the tilt axis above the floor; without effect in a flat world.
 };
 [[nodiscard]] Result<void> Validate(const LaserOptions& options);
 [[nodiscard]] RangeError ErrorOf(const LaserOptions& options);
@@ -48,7 +48,7 @@ struct Twist {
                                const Twist& twist, Stamp stamp, double tilt_rad, const LaserOptions& options,
                                Random& random);
 
-// In a flat world, level. `discs` are obstacles that are not part of the caster's walls.
+// A level scan in a flat world. `discs` are obstacles that are not part of the caster's walls.
 [[nodiscard]] Scan MeasureScan(const RayCaster& walls, std::span<const Disc> discs, const Pose2& T_map_robot,
                                const Twist& twist, Stamp stamp, const LaserOptions& options, Random& random);
 

@@ -34,7 +34,7 @@ double ErrorScale(const RangeError& error, double range_m) {
 double DrawError(const RangeError& error, double range_m, Random& random) {
   const double scale = ErrorScale(error, range_m);
   if (error.kind == RangeErrorKind::kSigma) return Normal(random, scale);
-  return scale > 0.0 ? std::uniform_real_distribution<double>(-scale, scale)(random) : 0.0;
+  return scale > 0.0 ? Uniform(random) * (2.0 * scale) - scale : 0.0;
 }
 
 }  // namespace cairn::sim

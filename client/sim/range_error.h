@@ -1,6 +1,6 @@
 // The three ways in which makers of laser scanners state a range's random error, and draws from them.
-// "+-e" is taken as a bound all errors keep, uniform within it: the makers say no more. Engines are handed in.
-// Source: thesis C 4.3.3.
+// "+-e" is taken as a bound that no error exceeds, with all errors within it equally likely, because the makers state
+// no more than that. Source: thesis C 4.3.3.
 #pragma once
 
 #include <cstdint>

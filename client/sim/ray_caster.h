@@ -1,6 +1,6 @@
 // Distances along rays to a fixed set of segments and to a few discs.
 // Segments lie in a uniform grid that rays walk cell by cell; discs are few and tried one by one. Both sides of a
-// segment stop a ray. A disc that holds the ray's origin does not (a scanner sees out of its own body).
+// segment stop a ray. A disc around the ray's origin does not, so that a scanner sees out of its own robot.
 // Frame: `map`, metres. Immutable after construction: thread-safe.
 // Source: grid walk of Amanatides, Woo, "A fast voxel traversal algorithm for ray tracing", Eurographics 1987.
 #pragma once
@@ -32,11 +32,11 @@ class RayCaster {
                                   const Eigen::Vector2d& direction) const;
 
   std::vector<Segment> segments_;
-  Eigen::Vector2d corner_map_ = Eigen::Vector2d::Zero();  // Of cell (0,0).
+  Eigen::Vector2d corner_map_ = Eigen::Vector2d::Zero();  // The lower left corner of cell (0,0).
   double cell_m_ = 1.0;
   int columns_ = 0;
   int rows_ = 0;
-  std::vector<std::uint32_t> cell_begin_;  // Of cell i in members_; one more at the end.
+  std::vector<std::uint32_t> cell_begin_;  // Where the members of cell i begin in members_; one entry more than cells.
   std::vector<std::uint32_t> members_;     // Segment indices.
 };
 

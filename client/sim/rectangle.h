@@ -14,7 +14,7 @@ struct Rectangle {
   Eigen::Vector3d side_a = Eigen::Vector3d::UnitX();  // From the corner along two sides, at right angles.
   Eigen::Vector3d side_b = Eigen::Vector3d::UnitY();
 
-  [[nodiscard]] Eigen::Vector3d normal() const;  // Of length 1.
+  [[nodiscard]] Eigen::Vector3d normal() const;  // Has length 1.
 };
 
 // Distance along the ray (`direction` of length 1) to the rectangle; kNothingHit where it misses, runs alongside or

@@ -1,5 +1,5 @@
-// The nearest rectangle along a ray, or to a point, among many: a tree of boxes. Exact: it answers what trying every
-// rectangle would. Frame: `map`, metres. Immutable after construction: thread-safe.
+// The nearest rectangle along a ray, or to a point, among many: a tree of boxes. Exact: the answer is the same as
+// that of trying every rectangle. Frame: `map`, metres. Immutable after construction: thread-safe.
 // Source: bounding volume hierarchy with median splits (Kay, Kajiya, SIGGRAPH 1986: slabs).
 #pragma once
 

@@ -1,4 +1,4 @@
-// One simulated robot: drives its route, and keeps its true pose and what its odometry believes.
+// One simulated robot: drives its route, and keeps its true pose and the pose that its odometry computes.
 // Frames: truth in `map`, odometry in `odom`.
 #pragma once
 
@@ -15,10 +15,10 @@ class Robot {
   // Moves to `seconds` after the start, which is not before the time reached so far.
   void DriveUntil(double seconds);
 
-  // From now on brakes and stands, or drives its route again.
+  // Lets the robot brake and stand from now on, or drive its route again.
   void Halt(bool halt) { halt_ = halt; }
 
-  // The true pose at a time a little after the one reached, should the robot keep its velocities.
+  // The true pose at a time a little after the one reached, if the robot kept its velocities.
   [[nodiscard]] Pose2 PoseAt(double seconds) const;
 
   [[nodiscard]] const Pose2& T_map_robot() const { return T_map_robot_; }

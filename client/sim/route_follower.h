@@ -22,7 +22,7 @@ struct DriveOptions {
 
 class RouteFollower {
  public:
-  // A closed route of at least 2 points; `target` is the index of the first waypoint to make for.
+  // A closed route of at least 2 points; `target` is the index of the waypoint to drive to first.
   RouteFollower(std::vector<Eigen::Vector2d> waypoints_map, std::size_t target, const DriveOptions& options);
 
   // The velocities for the next `seconds`.

@@ -19,7 +19,8 @@ class Scene {
                                     double max_m) const = 0;
 };
 
-// Of a flat world's segments: a ray that rises or falls meets a wall where its shadow does.
+// The segments of a flat world as walls without an upper end: a ray that rises or falls meets a wall where its
+// projection onto the floor does.
 class FlatScene : public Scene {
  public:
   explicit FlatScene(const RayCaster& walls) : walls_(walls) {}
@@ -27,7 +28,7 @@ class FlatScene : public Scene {
                             double max_m) const override;
 
  private:
-  const RayCaster& walls_;  // Outlives the scene.
+  const RayCaster& walls_;  // Must outlive the scene.
 };
 
 class SolidScene : public Scene {

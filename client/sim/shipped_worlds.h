@@ -1,5 +1,5 @@
-// The worlds that come with the program, built into it: flat ones (`building`, `office`, `corridor`, `room`:
-// client/sim/worlds/*.world) and ones in space (`hall3d`: *.yaml).
+// Opens worlds: those that are built into the program (client/sim/worlds/*.yaml) by name, others by the path of their
+// file. kNotFound where there is neither; the message lists the shipped names. Thread-safe.
 #pragma once
 
 #include <string>
@@ -12,14 +12,11 @@
 
 namespace cairn::sim {
 
-[[nodiscard]] std::vector<std::string> ShippedWorldNames();   // Flat.
-[[nodiscard]] std::vector<std::string> ShippedWorld3Names();  // In space.
+// Names of the shipped worlds of both kinds.
+[[nodiscard]] std::vector<std::string> ShippedWorldNames();
 
-// A shipped world's name, or the path of a world file.
-[[nodiscard]] Result<World> OpenWorld(const std::string& name_or_path);
-[[nodiscard]] Result<World3> OpenWorld3(const std::string& name_or_path);
-
-// Either kind: a shipped world's name or a file, in space where it ends in .yaml or .yml.
-[[nodiscard]] Result<Surroundings> OpenSurroundings(const std::string& name_or_path);
+[[nodiscard]] Result<World> OpenWorld(const std::string& name_or_path);                // A flat world.
+[[nodiscard]] Result<World3> OpenWorld3(const std::string& name_or_path);              // A world in space.
+[[nodiscard]] Result<Surroundings> OpenSurroundings(const std::string& name_or_path);  // Either kind.
 
 }  // namespace cairn::sim

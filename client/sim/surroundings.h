@@ -1,5 +1,5 @@
-// What a fleet drives in, flat or in space: what stands still, who walks, and where the routes lead. A value: copies
-// share what is immutable.
+// The place in which a fleet drives, flat or in space: obstacles that stand still, people who walk, and routes. A
+// value: copies share what is immutable.
 #pragma once
 
 #include <memory>
@@ -17,7 +17,7 @@ struct Surroundings {
   std::string name;
   std::shared_ptr<const Scene> scene;
   std::vector<Post> posts;      // Round things that stand still.
-  std::vector<Walker> walkers;  // People, of kWalkerHeight_m.
+  std::vector<Walker> walkers;  // People, all of the height kWalkerHeight_m.
   std::vector<Route> routes;
 };
 inline constexpr double kWalkerHeight_m = 1.75;

@@ -18,7 +18,7 @@ Result<void> Validate(const TiltOptions& o, int halt_scans) {
   for (const double tilt : {o.first_rad, o.last_rad}) {
     if (!(std::abs(tilt) < kPi / 2)) return Fail(StatusCode::kInvalidArgument, "tilt: must stay within +-90 deg");
   }
-  // Else the robot would brake for ever.
+  // A pause shorter than the braking would keep the robot braking for ever.
   const int least = o.halt ? 2 * halt_scans : 1;
   if (o.scans > 0 && (o.level_scans < least || o.level_scans > 1'000'000)) {
     return Fail(StatusCode::kInvalidArgument, "tilt: level scans between nods must be " + std::to_string(least) +

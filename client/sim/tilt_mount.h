@@ -11,16 +11,16 @@
 namespace cairn::sim {
 
 struct TiltOptions {
-  int scans = 0;                      // Of one nod; 0: the mount is fixed and level.
-  double first_rad = Radians(-60.0);  // Up ...
-  double last_rad = Radians(45.0);    // ... to down.
-  int level_scans = 60;               // Between nods.
+  int scans = 0;                      // Scans of one nod; 0: the mount is fixed and level.
+  double first_rad = Radians(-60.0);  // Tilt of the first scan of a nod (upwards).
+  double last_rad = Radians(45.0);    // Tilt of the last scan of a nod (downwards).
+  int level_scans = 60;               // Level scans between two nods.
   bool halt = true;                   // The robot stands while the mount moves.
 };
 // `halt_scans`: how many scans the robot needs to stop.
 [[nodiscard]] Result<void> Validate(const TiltOptions& options, int halt_scans);
 
-// Of the scan with this number, counted from 0.
+// The tilt of the scan with this number, counted from 0.
 [[nodiscard]] double TiltOf(std::uint64_t scan, const TiltOptions& options);
 // Whether the robot must brake or stand when this scan is taken.
 [[nodiscard]] bool HaltsAt(std::uint64_t scan, const TiltOptions& options, int halt_scans);

@@ -1,4 +1,4 @@
-// The odometry of a differential drive whose wheels are not what its software believes.
+// The odometry of a differential drive whose wheels differ from what its software assumes.
 // Systematic: each wheel's circumference and the distance between the wheels are wrong by a fixed share. Random: each
 // wheel slips, with a variance that grows with the way it rolls (k^2 * |way|), so the error does not depend on how
 // finely the motion is cut. Frame: `odom`, which starts where the robot starts.
@@ -15,12 +15,12 @@ struct WheelOptions {
   double base_m = 0.45;     // Between the wheels, in truth.
   double left_share = 0.0;  // The left wheel's way reads (1 + left_share) times the truth.
   double right_share = 0.0;
-  double base_share = 0.0;           // The software believes base_m * (1 + base_share).
+  double base_share = 0.0;           // The software assumes base_m * (1 + base_share).
   double slip_m_per_sqrt_m = 0.004;  // k: standard deviation of one wheel's way after 1 m.
 };
 [[nodiscard]] Result<void> Validate(const WheelOptions& options);
 
-// How far apart robots of one make are: standard deviations of the three shares.
+// How much robots of the same make differ: standard deviations of the three shares.
 struct WheelSpread {
   double wheel_share = 0.004;
   double base_share = 0.01;
@@ -31,7 +31,7 @@ class WheelOdometry {
  public:
   explicit WheelOdometry(const WheelOptions& options) : options_(options) {}
 
-  // The robot truly drove `way_m` along an arc and turned by `turn_rad`.
+  // In truth the robot drove `way_m` along an arc and turned by `turn_rad`.
   void Drive(double way_m, double turn_rad, Random& random);
   [[nodiscard]] const Pose2& T_odom_robot() const { return T_odom_robot_; }
 

@@ -18,7 +18,7 @@ struct Disc {
   double radius_m = 0.0;
 };
 
-// A disc (a person) that walks round a closed path for ever.
+// A disc (a person) that walks along a closed path for ever.
 struct Walker {
   double radius_m = 0.0;
   double speed_m_s = 0.0;
@@ -39,7 +39,7 @@ struct World {
   std::vector<Route> routes;
 };
 
-// Where a walker stands after `seconds` (>= 0): at the path's first point at 0.
+// Where a walker stands after `seconds` (>= 0). It starts at the first point of its path.
 [[nodiscard]] Disc WalkerAt(const Walker& walker, double seconds);
 
 }  // namespace cairn::sim

@@ -1,282 +1,371 @@
 #include "client/sim/world_file.h"
 
-#include <algorithm>
-#include <cmath>
-#include <fstream>
-#include <sstream>
-#include <tuple>
-#include <utility>
-#include <vector>
+#include <yaml-cpp/yaml.h>
 
-#include "client/sim/closed_path.h"
+#include <Eigen/Geometry>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <utility>
+
 #include "client/sim/wall.h"
 #include "common/geometry/pose2.h"
+#include "common/options/yaml_documents.h"
 
 namespace cairn::sim {
 namespace {
 
 constexpr double kMaxCoordinate_m = 10'000.0;
+constexpr std::size_t kMaxElements = 1'000'000;  // List elements read; an alias repeats a long list with few letters.
 constexpr std::size_t kMaxSegments = 1'000'000;
+constexpr std::size_t kMaxRectangles = 100'000;
+constexpr double kRequired = std::numeric_limits<double>::quiet_NaN();
+constexpr char kFlat[] = "cairn-world", kSpatial[] = "cairn-world3";
 
-// What a statement complains about; the caller adds source and line.
-using WordComplaint = std::string;
-using Words = std::vector<std::string>;
+// Thrown and caught in this file only, as yaml-cpp's own exceptions are.
+struct Complaint {
+  YAML::Mark mark;
+  std::string why;
+};
 
-class Statement {
+[[noreturn]] void Complain(const YAML::Node& node, const std::string& why) {
+  throw Complaint{node.Mark(), why};
+}
+
+double Metres(const YAML::Node& node, const std::string& what) {
+  double value = 0.0;
+  if (!node.IsScalar() || !YAML::convert<double>::decode(node, value) || !std::isfinite(value) ||
+      std::abs(value) > kMaxCoordinate_m)
+    Complain(node, what + " must be a number from -10000 to 10000");
+  return value;
+}
+
+template <int Size>
+Eigen::Matrix<double, Size, 1> Point(const YAML::Node& node, const std::string& what) {
+  if (!node.IsSequence() || node.size() != Size)
+    Complain(node, what + " must be a list of " + std::to_string(Size) + " numbers");
+  Eigen::Matrix<double, Size, 1> point;
+  for (int i = 0; i < Size; ++i) point(i) = Metres(node[static_cast<std::size_t>(i)], what);
+  return point;
+}
+
+// The keys of one YAML map. Each is taken once; a key that nobody took is a mistake of the file (Finish).
+class Keys {
  public:
-  explicit Statement(Words words) : words_(std::move(words)) {}
-
-  [[nodiscard]] const std::string& keyword() const { return words_.front(); }
-  [[nodiscard]] bool done() const { return next_ >= words_.size(); }
-
-  tl::expected<std::string, WordComplaint> Word(const char* what) {
-    if (done()) return tl::unexpected(std::string(what) + " is missing");
-    return words_[next_++];
+  // `elements_left` counts down over the whole document.
+  Keys(const YAML::Node& node, std::string what, std::size_t* elements_left)
+      : node_(node), what_(std::move(what)), elements_left_(elements_left) {
+    if (!node.IsMap()) Complain(node, what_ + " must be a map of keys and values");
+    for (const auto& entry : node) {
+      if (!entry.first.IsScalar()) Complain(entry.first, what_ + ": a key must be a word");
+      if (!left_.insert(entry.first.Scalar()).second)
+        Complain(entry.first, what_ + ": '" + entry.first.Scalar() + "' is given twice");
+    }
   }
 
-  tl::expected<double, WordComplaint> Number(const char* what) {
-    const auto word = Word(what);
-    if (!word) return tl::unexpected(word.error());
-    std::size_t used = 0;
-    double value = 0.0;
-    try {
-      value = std::stod(*word, &used);
-    } catch (const std::exception&) {
-      used = 0;
-    }
-    if (used != word->size() || !std::isfinite(value) || std::abs(value) > kMaxCoordinate_m) {
-      return tl::unexpected(std::string(what) + " '" + *word + "' is not a number of metres within +-10000");
-    }
+  // The value; undefined where the key is absent.
+  YAML::Node Take(const std::string& key) {
+    left_.erase(key);
+    return node_[key];
+  }
+  YAML::Node Must(const std::string& key) {
+    YAML::Node value = Take(key);
+    if (!value.IsDefined()) Complain(node_, what_ + ": '" + key + "' is missing");
     return value;
   }
-
-  tl::expected<double, WordComplaint> Positive(const char* what) {
-    auto value = Number(what);
-    if (value && *value <= 0.0) return tl::unexpected(std::string(what) + " must be above 0");
+  std::string Word(const std::string& key) {
+    const YAML::Node value = Must(key);
+    if (!value.IsScalar() || value.Scalar().empty()) Complain(value, what_ + ": " + key + " must be a word");
+    return value.Scalar();
+  }
+  double Number(const std::string& key, double default_value = kRequired) {
+    if (std::isnan(default_value)) return Metres(Must(key), what_ + ": " + key);
+    const YAML::Node value = Take(key);
+    return value.IsDefined() ? Metres(value, what_ + ": " + key) : default_value;
+  }
+  double Positive(const std::string& key, double default_value = kRequired) {
+    const double value = Number(key, default_value);
+    if (value <= 0.0) Complain(node_[key], what_ + ": " + key + " must be above 0");
     return value;
   }
-
-  tl::expected<Eigen::Vector2d, WordComplaint> Point() {
-    const auto x = Number("x");
-    if (!x) return tl::unexpected(x.error());
-    const auto y = Number("y");
-    if (!y) return tl::unexpected(y.error());
-    return Eigen::Vector2d(*x, *y);
-  }
-
-  // All the points that are left, at least `least`; neighbours differ.
-  tl::expected<std::vector<Eigen::Vector2d>, WordComplaint> Points(std::size_t least) {
+  Eigen::Vector2d Point2(const std::string& key) { return Point<2>(Must(key), what_ + ": " + key); }
+  // A list of at least `least` points, of which neighbours differ.
+  std::vector<Eigen::Vector2d> Points(std::size_t least) {
+    const YAML::Node nodes = Must("points");
+    if (!nodes.IsSequence() || nodes.size() < least)
+      Complain(nodes, what_ + " needs at least " + std::to_string(least) + " points");
     std::vector<Eigen::Vector2d> points;
-    while (!done()) {
-      const auto point = Point();
-      if (!point) return tl::unexpected(point.error());
-      if (!points.empty() && points.back() == *point) return tl::unexpected(WordComplaint("two equal points in a row"));
-      points.push_back(*point);
+    for (const YAML::Node& node : nodes) {
+      CountElement(node);
+      const Eigen::Vector2d point = Point<2>(node, "a point");
+      if (!points.empty() && points.back() == point) Complain(node, what_ + ": two equal points in a row");
+      points.push_back(point);
     }
-    if (points.size() < least) return tl::unexpected("needs at least " + std::to_string(least) + " points");
     return points;
   }
+  // Every element of a list that may be absent.
+  template <typename TakeElement>
+  void ForEach(const std::string& list, const TakeElement& take) {
+    const YAML::Node nodes = Take(list);
+    if (!nodes.IsDefined()) return;
+    if (!nodes.IsSequence()) Complain(nodes, list + " must be a list");
+    for (const YAML::Node& node : nodes) {
+      CountElement(node);
+      take(node);
+    }
+  }
+  // The same where elements are maps. `what` names one of them in errors.
+  template <typename TakeElement>
+  void ForEachMap(const std::string& list, const std::string& what, const TakeElement& take) {
+    ForEach(list, [&](const YAML::Node& node) {
+      Keys element(node, what, elements_left_);
+      take(element);
+      element.Finish();
+    });
+  }
+  void Finish() const {
+    if (!left_.empty()) Complain(node_, what_ + ": '" + *left_.begin() + "' is not a key of it");
+  }
+
+  [[nodiscard]] const YAML::Node& node() const { return node_; }
 
  private:
-  Words words_;
-  std::size_t next_ = 1;
+  void CountElement(const YAML::Node& node) {
+    if ((*elements_left_)-- == 0) Complain(node, "more than 1000000 list elements");
+  }
+
+  YAML::Node node_;
+  std::string what_;
+  std::size_t* elements_left_;
+  std::set<std::string> left_;
 };
 
-using Outcome = tl::expected<void, WordComplaint>;
+// Centre line and thickness, which walls of both kinds share.
+template <typename AnyWall>
+double TakeWallLine(Keys& keys, AnyWall& wall) {
+  wall.a_map = keys.Point2("from");
+  wall.b_map = keys.Point2("to");
+  wall.thickness_m = keys.Positive("thickness", wall.thickness_m);
+  if (wall.a_map == wall.b_map) Complain(keys.node(), "a wall needs two different ends");
+  return (wall.b_map - wall.a_map).norm();
+}
 
-class WorldText {
- public:
-  Outcome Take(Statement& statement) {
-    static const std::vector<std::pair<std::string, Outcome (WorldText::*)(Statement&)>> kKinds = {
-        {"name", &WorldText::Name},           {"thickness", &WorldText::Thickness}, {"wall", &WorldText::TakeWall},
-        {"segment", &WorldText::TakeSegment}, {"polyline", &WorldText::Polyline},   {"polygon", &WorldText::Polygon},
-        {"rectangle", &WorldText::Rectangle}, {"disc", &WorldText::TakeDisc},       {"walker", &WorldText::TakeWalker},
-        {"route", &WorldText::TakeRoute}};
-    const auto kind = std::find_if(kKinds.begin(), kKinds.end(),
-                                   [&](const auto& entry) { return entry.first == statement.keyword(); });
-    if (kind == kKinds.end()) return tl::unexpected(WordComplaint("not a statement of world files"));
-    if (auto taken = (this->*kind->second)(statement); !taken) return taken;
-    if (!statement.done()) return tl::unexpected(WordComplaint("more words than the statement takes"));
-    if (world_.segments.size() > kMaxSegments) return tl::unexpected(WordComplaint("more than 1000000 segments"));
-    return {};
+Route TakeRoute(Keys& keys) {
+  return {keys.Word("name"), keys.Points(2)};
+}
+
+void CheckRise(const Keys& keys, double bottom, double top) {
+  if (top <= bottom) Complain(keys.node(), "top must be above bottom");
+}
+
+// What stands on the floor as a turned rectangle. In a flat world it has no height.
+Box TakeGroundPlan(Keys& keys) {
+  Box box;
+  box.center_map = keys.Point2("center");
+  box.size_m = keys.Point2("size");
+  box.turn_rad = Radians(keys.Number("degrees", 0.0));
+  if ((box.size_m.array() <= 0.0).any()) Complain(keys.node(), "both sizes of a box must be above 0");
+  return box;
+}
+
+// --- Flat worlds.
+
+Wall TakeWall(Keys& keys) {
+  Wall wall;
+  const double length = TakeWallLine(keys, wall);
+  keys.ForEach("gaps", [&](const YAML::Node& node) {
+    const Eigen::Vector2d gap = Point<2>(node, "a gap");
+    const double after = wall.gaps.empty() ? 0.0 : wall.gaps.back().to_m;
+    if (gap(0) < after || gap(1) <= gap(0) || gap(1) > length)
+      Complain(node, "gaps must be in order, inside the wall, and wider than 0");
+    wall.gaps.push_back({gap(0), gap(1)});
+  });
+  return wall;
+}
+
+void AppendChain(const std::vector<Eigen::Vector2d>& points, bool closed, std::vector<Segment>* segments) {
+  for (std::size_t i = 0; i + 1 < points.size(); ++i) segments->push_back({points[i], points[i + 1]});
+  if (closed) segments->push_back({points.back(), points.front()});
+}
+
+void TakeLine(Keys& keys, std::vector<Segment>* segments) {
+  bool closed = false;
+  if (const YAML::Node value = keys.Take("closed"); value.IsDefined() && !YAML::convert<bool>::decode(value, closed))
+    Complain(value, "closed must be true or false");
+  AppendChain(keys.Points(closed ? 3 : 2), closed, segments);
+}
+
+void TakeFlatBox(Keys& keys, std::vector<Segment>* segments) {
+  const Box box = TakeGroundPlan(keys);
+  const Pose2 T_map_box{box.center_map.x(), box.center_map.y(), WrapAngle(box.turn_rad)};
+  const double w = box.size_m.x() / 2, h = box.size_m.y() / 2;
+  AppendChain({T_map_box * Eigen::Vector2d(-w, -h), T_map_box * Eigen::Vector2d(w, -h),
+               T_map_box * Eigen::Vector2d(w, h), T_map_box * Eigen::Vector2d(-w, h)},
+              true, segments);
+}
+
+World TakeWorld(Keys& keys) {
+  World world;
+  std::vector<Segment>& segments = world.segments;
+  const auto check = [&](const Keys& element) {
+    if (segments.size() > kMaxSegments) Complain(element.node(), "more than 1000000 segments");
+  };
+  keys.ForEachMap("walls", "wall", [&](Keys& k) { AppendWall(TakeWall(k), &segments), check(k); });
+  keys.ForEachMap("lines", "line", [&](Keys& k) { TakeLine(k, &segments), check(k); });
+  keys.ForEachMap("boxes", "box", [&](Keys& k) { TakeFlatBox(k, &segments), check(k); });
+  keys.ForEachMap("pillars", "pillar", [&](Keys& k) {
+    world.discs.push_back({k.Point2("center"), k.Positive("radius")});
+  });
+  keys.ForEachMap("walkers", "walker", [&](Keys& k) {
+    world.walkers.push_back({k.Positive("radius"), k.Positive("speed"), k.Points(2)});
+  });
+  return world;
+}
+
+// --- Worlds in space.
+
+Rectangle TakeRectangle(Keys& keys) {
+  const YAML::Node corners = keys.Must("corners");
+  if (!corners.IsSequence() || corners.size() < 3 || corners.size() > 4)
+    Complain(corners, "a rectangle has three corners in a row, or all four");
+  const auto p = [&](std::size_t i) { return Point<3>(corners[i], "a corner"); };
+  const Eigen::Vector3d a = p(0), b = p(1), c = p(2);
+  Rectangle rectangle{b, a - b, c - b};
+  const double area = rectangle.side_a.cross(rectangle.side_b).norm();
+  if (area < 1e-9) Complain(corners, "a rectangle needs an area");
+  if (std::abs(rectangle.side_a.dot(rectangle.side_b)) > 1e-6 * area)
+    Complain(corners, "the sides of a rectangle must be at right angles");
+  if (corners.size() == 4 && (p(3) - (a + c - b)).norm() > 1e-6)
+    Complain(corners, "the fourth corner does not close the rectangle");
+  return rectangle;
+}
+
+Rectangle TakeSlab(Keys& keys) {
+  const Eigen::Vector2d from = keys.Point2("from"), to = keys.Point2("to");
+  if (from.x() == to.x() || from.y() == to.y()) Complain(keys.node(), "a slab needs an area");
+  return Slab(from, to, keys.Number("height"));
+}
+
+Box TakeBox(Keys& keys) {
+  Box box = TakeGroundPlan(keys);
+  box.bottom_m = keys.Number("bottom", 0.0);
+  box.top_m = keys.Number("top");
+  CheckRise(keys, box.bottom_m, box.top_m);
+  return box;
+}
+
+Wall3 TakeWall3(Keys& keys) {
+  Wall3 wall;
+  const double length = TakeWallLine(keys, wall);
+  wall.bottom_m = keys.Number("bottom", wall.bottom_m);
+  wall.top_m = keys.Number("top", wall.top_m);
+  CheckRise(keys, wall.bottom_m, wall.top_m);
+  keys.ForEachMap("openings", "opening", [&](Keys& k) {
+    const Opening opening{k.Number("from"), k.Number("to"), k.Number("bottom", wall.bottom_m), k.Number("top")};
+    const double after = wall.openings.empty() ? 0.0 : wall.openings.back().to_m;
+    if (opening.from_m < after || opening.to_m <= opening.from_m || opening.to_m > length ||
+        opening.bottom_m < wall.bottom_m || opening.top_m <= opening.bottom_m || opening.top_m > wall.top_m)
+      Complain(k.node(), "openings must be in order, inside the wall, and larger than nothing");
+    wall.openings.push_back(opening);
+  });
+  return wall;
+}
+
+Pillar TakePillar(Keys& keys) {
+  Pillar pillar;
+  pillar.center_map = keys.Point2("center");
+  pillar.radius_m = keys.Positive("radius");
+  pillar.bottom_m = keys.Number("bottom", pillar.bottom_m);
+  pillar.top_m = keys.Number("top", pillar.top_m);
+  CheckRise(keys, pillar.bottom_m, pillar.top_m);
+  const double sides = keys.Number("sides", pillar.sides);
+  if (sides < 3 || sides > 360 || sides != std::floor(sides))
+    Complain(keys.node(), "sides must be a whole number from 3 to 360");
+  pillar.sides = static_cast<int>(sides);
+  return pillar;
+}
+
+World3 TakeWorld3(Keys& keys) {
+  World3 world;
+  std::vector<Rectangle>& rectangles = world.rectangles;
+  const auto check = [&](const Keys& element) {
+    if (rectangles.size() > kMaxRectangles) Complain(element.node(), "more than 100000 rectangles");
+  };
+  keys.ForEachMap("rectangles", "rectangle", [&](Keys& k) { rectangles.push_back(TakeRectangle(k)), check(k); });
+  keys.ForEachMap("slabs", "slab", [&](Keys& k) { rectangles.push_back(TakeSlab(k)), check(k); });
+  keys.ForEachMap("boxes", "box", [&](Keys& k) { AppendBox(TakeBox(k), &rectangles), check(k); });
+  keys.ForEachMap("walls", "wall", [&](Keys& k) { AppendWall(TakeWall3(k), &rectangles), check(k); });
+  keys.ForEachMap("pillars", "pillar", [&](Keys& k) { AppendPillar(TakePillar(k), &rectangles), check(k); });
+  return world;
+}
+
+// --- Both kinds.
+
+bool IsEmpty(const World& world) {
+  return world.segments.empty() && world.discs.empty();
+}
+
+bool IsEmpty(const World3& world) {
+  return world.rectangles.empty();
+}
+
+template <typename AnyWorld>
+AnyWorld TakeDocument(const YAML::Node& root, const char* kind, AnyWorld (*take)(Keys&)) {
+  std::size_t elements_left = kMaxElements;
+  Keys keys(root, "world", &elements_left);
+  if (keys.Word(kind) != "1") Complain(root, std::string("the file must say `") + kind + ": 1`");
+  std::string name;
+  if (root["name"].IsDefined()) name = keys.Word("name");
+  AnyWorld world = take(keys);
+  keys.ForEachMap("routes", "route", [&](Keys& k) { world.routes.push_back(TakeRoute(k)); });
+  keys.Finish();
+  if (IsEmpty(world)) Complain(root, "the world is empty");
+  world.name = name;
+  return world;
+}
+
+template <typename Value, typename Read>
+Result<Value> ReadDocument(const std::string& text, const std::string& source, const Read& read) {
+  const auto fail = [&](const YAML::Mark& mark, const std::string& why) {
+    const bool known = mark.line >= 0;
+    const std::string place =
+        known ? ":" + std::to_string(mark.line + 1) + ":" + std::to_string(mark.column + 1) : std::string();
+    return Fail(StatusCode::kInvalidArgument, source + place + ": " + why);
+  };
+  if (text.size() > kMaxWorldBytes) return fail(YAML::Mark::null_mark(), "longer than 1 MiB");
+  try {
+    const YAML::Node root = YAML::Load(text);
+    if (!root.IsMap())
+      Complain(root, "a world must begin with `cairn-world: 1` (flat) or `cairn-world3: 1` (in space)");
+    Value value = read(root);
+    if (const auto line = LineAfterFirstDocument(text))
+      return Fail(StatusCode::kInvalidArgument,
+                  source + ":" + std::to_string(*line + 1) + ":1: a world file holds one YAML document");
+    return value;
+  } catch (const Complaint& complaint) {
+    return fail(complaint.mark, complaint.why);
+  } catch (const YAML::Exception& error) {
+    return fail(error.mark, "not YAML: " + error.msg);
   }
-
-  World& world() { return world_; }
-
- private:
-  Outcome Name(Statement& s) {
-    auto name = s.Word("name");
-    if (!name) return tl::unexpected(name.error());
-    world_.name = *name;
-    return {};
-  }
-
-  Outcome Thickness(Statement& s) {
-    const auto thickness = s.Positive("thickness");
-    if (!thickness) return tl::unexpected(thickness.error());
-    thickness_m_ = *thickness;
-    return {};
-  }
-
-  Outcome TakeWall(Statement& s) {
-    const auto a = s.Point();
-    if (!a) return tl::unexpected(a.error());
-    const auto b = s.Point();
-    if (!b) return tl::unexpected(b.error());
-    Wall wall{*a, *b, thickness_m_, {}};
-    if (*a == *b) return tl::unexpected(WordComplaint("a wall needs two different ends"));
-    while (!s.done()) {
-      if (*s.Word("gap") != "gap") return tl::unexpected(WordComplaint("after a wall's ends come only `gap FROM TO`"));
-      const auto from = s.Number("gap's start");
-      if (!from) return tl::unexpected(from.error());
-      const auto to = s.Number("gap's end");
-      if (!to) return tl::unexpected(to.error());
-      const double after = wall.gaps.empty() ? 0.0 : wall.gaps.back().to_m;
-      if (*from < after || *to <= *from || *to > (*b - *a).norm()) {
-        return tl::unexpected(WordComplaint("gaps must be in order, inside the wall, and wider than 0"));
-      }
-      wall.gaps.push_back({*from, *to});
-    }
-    AppendWall(wall, &world_.segments);
-    return {};
-  }
-
-  Outcome TakeSegment(Statement& s) {
-    const auto points = s.Points(2);
-    if (!points) return tl::unexpected(points.error());
-    if (points->size() != 2) return tl::unexpected(WordComplaint("a segment has two points"));
-    AppendChain(*points, false);
-    return {};
-  }
-
-  Outcome Polyline(Statement& s) {
-    const auto points = s.Points(2);
-    if (!points) return tl::unexpected(points.error());
-    AppendChain(*points, false);
-    return {};
-  }
-
-  Outcome Polygon(Statement& s) {
-    const auto points = s.Points(3);
-    if (!points) return tl::unexpected(points.error());
-    AppendChain(*points, true);
-    return {};
-  }
-
-  // rectangle CENTER_X CENTER_Y WIDTH HEIGHT [DEGREES]
-  Outcome Rectangle(Statement& s) {
-    const auto center = s.Point();
-    if (!center) return tl::unexpected(center.error());
-    const auto width = s.Positive("width");
-    if (!width) return tl::unexpected(width.error());
-    const auto height = s.Positive("height");
-    if (!height) return tl::unexpected(height.error());
-    double degrees = 0.0;
-    if (!s.done()) {
-      const auto turn = s.Number("degrees");
-      if (!turn) return tl::unexpected(turn.error());
-      degrees = *turn;
-    }
-    const Pose2 T_map_box{center->x(), center->y(), WrapAngle(Radians(degrees))};
-    const double w = *width / 2, h = *height / 2;
-    AppendChain({T_map_box * Eigen::Vector2d(-w, -h), T_map_box * Eigen::Vector2d(w, -h),
-                 T_map_box * Eigen::Vector2d(w, h), T_map_box * Eigen::Vector2d(-w, h)},
-                true);
-    return {};
-  }
-
-  Outcome TakeDisc(Statement& s) {
-    const auto center = s.Point();
-    if (!center) return tl::unexpected(center.error());
-    const auto radius = s.Positive("radius");
-    if (!radius) return tl::unexpected(radius.error());
-    world_.discs.push_back({*center, *radius});
-    return {};
-  }
-
-  // walker RADIUS SPEED x y x y ...
-  Outcome TakeWalker(Statement& s) {
-    const auto radius = s.Positive("radius");
-    if (!radius) return tl::unexpected(radius.error());
-    const auto speed = s.Positive("speed");
-    if (!speed) return tl::unexpected(speed.error());
-    auto path = s.Points(2);
-    if (!path) return tl::unexpected(path.error());
-    world_.walkers.push_back({*radius, *speed, std::move(*path)});
-    return {};
-  }
-
-  Outcome TakeRoute(Statement& s) {
-    auto name = s.Word("name");
-    if (!name) return tl::unexpected(name.error());
-    auto waypoints = s.Points(2);
-    if (!waypoints) return tl::unexpected(waypoints.error());
-    world_.routes.push_back({*name, std::move(*waypoints)});
-    return {};
-  }
-
-  void AppendChain(const std::vector<Eigen::Vector2d>& points, bool closed) {
-    for (std::size_t i = 0; i + 1 < points.size(); ++i) world_.segments.push_back({points[i], points[i + 1]});
-    if (closed) world_.segments.push_back({points.back(), points.front()});
-  }
-
-  World world_;
-  double thickness_m_ = 0.12;
-};
-
-Words SplitWords(std::string line) {
-  if (const auto comment = line.find('#'); comment != std::string::npos) line.erase(comment);
-  std::istringstream stream(line);
-  Words words;
-  for (std::string word; stream >> word;) words.push_back(word);
-  return words;
 }
 
 }  // namespace
 
-Result<World> ParseWorld(std::string_view text, const std::string& source) {
-  std::istringstream stream{std::string(text)};
-  WorldText reader;
-  Words words;
-  int line_number = 0, first_line = 0;
-  bool header = false;
-  const auto fail = [&](const std::string& why) {
-    return Fail(StatusCode::kInvalidArgument, source + ":" + std::to_string(first_line) + ": " + why);
-  };
-  for (std::string line; std::getline(stream, line);) {
-    ++line_number;
-    Words more = SplitWords(line);
-    if (words.empty()) first_line = line_number;
-    const bool joins = !more.empty() && more.back() == "\\";
-    if (joins) more.pop_back();
-    words.insert(words.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
-    if (joins || words.empty()) continue;
-    if (!header) {
-      if (words != Words{"cairn-world", "1"}) return fail("the first statement must be `cairn-world 1`");
-      header = true;
-    } else {
-      Statement statement(std::move(words));
-      if (const auto taken = reader.Take(statement); !taken) return fail(statement.keyword() + ": " + taken.error());
-    }
-    words.clear();
-  }
-  first_line = line_number;
-  if (!words.empty()) return fail("the text ends within a joined line");
-  if (!header) return fail("the first statement must be `cairn-world 1`");
-  if (reader.world().segments.empty() && reader.world().discs.empty()) return fail("the world is empty");
-  return std::move(reader.world());
+Result<World> ParseWorld(const std::string& text, const std::string& source) {
+  return ReadDocument<World>(text, source,
+                             [](const YAML::Node& root) { return TakeDocument(root, kFlat, &TakeWorld); });
 }
 
-Result<World> ReadWorldFile(const std::filesystem::path& path) {
-  std::ifstream file(path);
-  std::ostringstream text;
-  if (file) text << file.rdbuf();
-  if (!file || std::filesystem::is_directory(path)) {
-    return Fail(StatusCode::kNotFound, path.string() + ": cannot be read");
-  }
-  auto world = ParseWorld(text.str(), path.string());
-  if (world && world->name.empty()) world->name = path.stem().string();
-  return world;
+Result<World3> ParseWorld3(const std::string& text, const std::string& source) {
+  return ReadDocument<World3>(text, source,
+                              [](const YAML::Node& root) { return TakeDocument(root, kSpatial, &TakeWorld3); });
+}
+
+Result<Surroundings> ParseSurroundings(const std::string& text, const std::string& source) {
+  return ReadDocument<Surroundings>(text, source, [](const YAML::Node& root) {
+    return root[kSpatial].IsDefined() ? SurroundingsOf(TakeDocument(root, kSpatial, &TakeWorld3))
+                                      : SurroundingsOf(TakeDocument(root, kFlat, &TakeWorld));
+  });
 }
 
 }  // namespace cairn::sim

@@ -1,6 +1,6 @@
 // Gathers a cloud from scans and the path a robot took: each scan is placed at the path's pose at its stamp, between
-// two poses that are near enough in time. Thinned to one point per cube of `voxel_m`, so memory grows with what was
-// seen, not with how long. Bounded. Deterministic. Not thread-safe.
+// two poses that are near enough in time. Thinned to one point per cube of `voxel_m`, so that memory grows with the
+// space that was seen and not with the time. Bounded. Deterministic. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -13,11 +13,11 @@
 namespace cairn {
 
 struct CloudOptions {
-  double height_m = 0.0;                 // Of the scanner above the floor.
-  double max_range_m = 1e4;              // Farther hits are left out.
-  double voxel_m = 0.0;                  // 0: every point is kept.
-  double max_pose_gap_s = 1.0;           // Between the two poses around a scan; more: the scan has no place.
-  bool tilted_only = false;              // Leave out level scans.
+  double height_m = 0.0;        // Height of the scanner above the floor.
+  double max_range_m = 1e4;     // Farther hits are left out.
+  double voxel_m = 0.0;         // 0: every point is kept.
+  double max_pose_gap_s = 1.0;  // Longest time between the two poses around a scan; with more, the scan is left out.
+  bool tilted_only = false;     // Leave out level scans.
   std::size_t max_points = 100'000'000;  // 1.2 GB.
 };
 [[nodiscard]] Result<void> Validate(const CloudOptions& options);
@@ -33,7 +33,7 @@ class CloudBuilder {
 
   [[nodiscard]] const PointCloud& cloud() const { return cloud_; }
   [[nodiscard]] std::int64_t scans_used() const { return used_; }
-  [[nodiscard]] std::int64_t scans_tilted() const { return tilted_; }  // Of those used.
+  [[nodiscard]] std::int64_t scans_tilted() const { return tilted_; }  // Among the scans used.
   [[nodiscard]] std::int64_t scans_level() const { return level_; }    // Left out by tilted_only.
   [[nodiscard]] std::int64_t scans_invalid() const { return invalid_; }
   [[nodiscard]] std::int64_t scans_without_pose() const { return without_pose_; }

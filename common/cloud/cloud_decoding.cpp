@@ -56,8 +56,8 @@ struct Layout {
   std::size_t points = 0;
   int fields = 0;                              // Numbers of a point in text.
   std::size_t stride = 0;                      // Bytes of a point in binary.
-  std::array<int, 3> column{-1, -1, -1};       // Of x, y, z in text ...
-  std::array<std::size_t, 3> offset{0, 0, 0};  // ... and in binary.
+  std::array<int, 3> column{-1, -1, -1};       // Where x, y and z are among the numbers of a line (text).
+  std::array<std::size_t, 3> offset{0, 0, 0};  // Where they are among the bytes of a point (binary).
 
   // Takes one field in turn; false where there are too many.
   bool AddField(std::string_view name, std::size_t bytes, bool is_float) {
@@ -99,7 +99,8 @@ Result<Layout> PlyHeader(Text& text) {
       format = true;
     } else if (key == "element") {
       in_vertex = Word(&rest) == "vertex";
-      if (in_vertex == vertex) return Bad("PLY: the vertices must come first");  // Else they are not where we look.
+      if (in_vertex == vertex)
+        return Bad("PLY: the vertices must come first");  // They are read from the start of the body.
       if (!in_vertex) continue;
       const auto count = NumberOf<std::size_t>(Word(&rest));
       if (!count || *count > kMaxPoints) return Bad("PLY: number of vertices");

@@ -1,11 +1,10 @@
 #include "common/cloud/cloud_file.h"
 
-#include <array>
 #include <bit>
-#include <charconv>
 #include <cstring>
 
 #include "common/file/atomic_file.h"
+#include "common/options/number_text.h"
 
 namespace cairn {
 namespace {
@@ -29,12 +28,7 @@ std::string HeaderOf(std::size_t points, CloudFormat format) {
 }
 
 void AppendText(const Eigen::Vector3f& point, std::string* text) {
-  std::array<char, 48> number{};
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto end = std::to_chars(number.data(), number.data() + number.size(), point(axis)).ptr;
-    text->append(number.data(), end);
-    *text += axis < 2 ? ' ' : '\n';
-  }
+  for (int axis = 0; axis < 3; ++axis) *text += ExactText(point(axis)) + (axis < 2 ? ' ' : '\n');
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 // Clouds as files other programs open: PLY (Stanford, 1994) and PCD (Point Cloud Library, version 0.7), each as text
-// and as little-endian binary; x, y, z as 32-bit floats. Written beside the target and renamed (atomic). Text holds
-// what reads back to the same float. Reading takes what this writes, and what other programs write of the same kind:
+// and as little-endian binary; x, y, z as 32-bit floats. Written beside the target and renamed (atomic). Numbers in
+// text read back to the same float. Reading takes what this writes, and what other programs write of the same kind:
 // binary little-endian or text, x, y, z among float properties; anything else is refused with a reason.
 #pragma once
 

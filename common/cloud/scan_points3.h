@@ -11,7 +11,7 @@ namespace cairn {
 
 struct ScanPlacing {
   Pose2 T_map_robot;
-  double height_m = 0.0;  // Of the laser's tilt axis above the floor.
+  double height_m = 0.0;  // Height of the laser's tilt axis above the floor.
 };
 
 // Appends one point per hit within `max_range_m`, in the order of the beams.

@@ -31,7 +31,7 @@ int WriteAll(int descriptor, std::string_view content) {
   return ::fsync(descriptor) == 0 ? 0 : errno;
 }
 
-// Makes the rename itself durable. A file system without directory sync has nothing better to offer: not an error.
+// Makes the rename itself durable. Where the file system cannot sync a directory, this is not an error.
 void SyncDirectory(const std::filesystem::path& directory) {
   const int descriptor = ::open(directory.empty() ? "." : directory.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) return;

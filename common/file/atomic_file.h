@@ -1,5 +1,5 @@
-// Files that are there whole or not at all: written beside the target, flushed to the disk, then renamed over it.
-// Not for files two writers share: the last rename wins. Thread-safe.
+// Writes files so that they are complete or absent: beside the target, flushed to the disk, then renamed over it.
+// Not for a file that two programs write at once: the last rename wins. Thread-safe.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
-# OpenCV as targets opencv_<component>. Its own configuration where it is installed; else header and libraries of the
-# single packages (Debian's libopencv-{core,imgproc,imgcodecs}-dev carry no configuration, and libopencv-dev pulls in
-# a graphical desktop).
+# Finds OpenCV as targets opencv_<component>. It uses OpenCV's own CMake configuration if it is installed, and
+# otherwise searches for the header and the libraries. (Debian's libopencv-{core,imgproc,imgcodecs}-dev
+# contain no configuration, and libopencv-dev would install a graphical desktop.)
 find_package(OpenCV QUIET CONFIG COMPONENTS ${OpenCV_FIND_COMPONENTS})
 if(OpenCV_FOUND)
   return()

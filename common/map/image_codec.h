@@ -26,7 +26,7 @@ struct ImageSize {
   std::int64_t height = 0;
 };
 
-// What the header of a PNG, PNM or BMP file claims; nothing for other bytes.
+// The size that the header of a PNG, PNM or BMP file states; nothing for other bytes.
 [[nodiscard]] std::optional<ImageSize> DeclaredSize(const std::vector<std::uint8_t>& bytes);
 
 // `extension` is ".png", ".pgm" (grey only) or ".bmp". `png_level` 0 (fast) to 9 (small).

@@ -1,11 +1,10 @@
 #include "common/map/map_lines.h"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <cmath>
 
 #include "common/file/atomic_file.h"
+#include "common/options/number_text.h"
 #include "common/sensor/log_fields.h"
 
 namespace cairn {
@@ -15,12 +14,6 @@ constexpr double kLeastLength_m = 1e-3, kReach_m = 1e6;
 constexpr std::size_t kMaxBytes = 4u << 20, kMaxLines = 20'000;
 constexpr const char* kNoLine = "a line is at least a millimetre long and within 1000 km";
 constexpr std::string_view kHeader = "cairn-map-lines";
-
-// Shortest text that reads back to the same double.
-std::string ExactNumber(double value) {
-  std::array<char, 48> text{};
-  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
-}
 
 bool IsLine(const MapLine& line) {
   return line.a.allFinite() && line.b.allFinite() && line.a.cwiseAbs().maxCoeff() <= kReach_m &&
@@ -81,8 +74,8 @@ Result<void> WriteMapLines(const std::vector<MapLine>& lines, const std::filesys
   std::string text = std::string(kHeader) + " 1\n# Seen from the left of the way from A to B: side AX AY BX BY\n";
   for (const MapLine& line : lines) {
     if (!IsLine(line)) return Fail(StatusCode::kInvalidArgument, kNoLine);
-    text += "side " + ExactNumber(line.a.x()) + ' ' + ExactNumber(line.a.y()) + ' ' + ExactNumber(line.b.x()) + ' ' +
-            ExactNumber(line.b.y()) + '\n';
+    text += "side " + ExactText(line.a.x()) + ' ' + ExactText(line.a.y()) + ' ' + ExactText(line.b.x()) + ' ' +
+            ExactText(line.b.y()) + '\n';
   }
   return WriteFileAtomically(path, text);
 }

@@ -24,7 +24,7 @@ struct MapLine {
   bool operator==(const MapLine&) const = default;
 };
 
-// kInvalidArgument names `source`, line and reason; a map without lines is one, too, and one of more than 20,000.
+// kInvalidArgument names `source`, line and reason. Maps without lines and maps with more than 20,000 are refused.
 [[nodiscard]] Result<std::vector<MapLine>> ParseMapLines(std::string_view text, const std::string& source);
 // Besides, kNotFound, and kResourceExhausted beyond 4 MiB.
 [[nodiscard]] Result<std::vector<MapLine>> ReadMapLines(const std::filesystem::path& path);

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <exception>
 #include <optional>
@@ -13,6 +12,7 @@
 #include "common/file/atomic_file.h"
 #include "common/map/image_codec.h"
 #include "common/map/occupancy_image.h"
+#include "common/options/number_text.h"
 
 namespace cairn {
 namespace {
@@ -21,13 +21,6 @@ constexpr std::array<const char*, 3> kModeNames = {"trinary", "scale", "raw"};
 constexpr std::uint8_t kFreePixel = 254, kUnknownPixel = 205, kOccupiedPixel = 0;
 constexpr std::size_t kMaxYamlBytes = 1u << 20;
 constexpr std::size_t kMaxImageBytes = 1u << 30;
-
-// Shortest text that reads back to the same double. (Nav2 itself prints three digits and moves far origins: its PR
-// 5398.)
-std::string Exact(double value) {
-  std::array<char, 48> text{};
-  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
-}
 
 bool IsShare(double value) {
   return std::isfinite(value) && value >= 0.0 && value <= 1.0;
@@ -66,6 +59,7 @@ RasterImage DrawImage(const OccupancyImage& map, const MapSaveOptions& options) 
   return image;
 }
 
+// Numbers are exact. (Nav2 itself prints three digits and so moves far origins: its PR 5398.)
 std::string YamlText(const OccupancyImage& image, const std::string& image_name, const MapSaveOptions& options) {
   double free_thresh = options.free_thresh, occupied_thresh = options.occupied_thresh;
   if (options.mode == MapImageMode::kTrinary) {
@@ -79,9 +73,10 @@ std::string YamlText(const OccupancyImage& image, const std::string& image_name,
   const Pose2& origin = image.T_map_origin;
   std::string text = std::string("image: ") + name.c_str() + "\n";
   text += std::string("mode: ") + kModeNames[static_cast<std::size_t>(options.mode)] + "\n";
-  text += "resolution: " + Exact(image.resolution_m) + "\n";
-  text += "origin: [" + Exact(origin.x) + ", " + Exact(origin.y) + ", " + Exact(origin.theta) + "]\n";
-  text += "negate: 0\noccupied_thresh: " + Exact(occupied_thresh) + "\nfree_thresh: " + Exact(free_thresh) + "\n";
+  text += "resolution: " + ExactText(image.resolution_m) + "\n";
+  text += "origin: [" + ExactText(origin.x) + ", " + ExactText(origin.y) + ", " + ExactText(origin.theta) + "]\n";
+  text +=
+      "negate: 0\noccupied_thresh: " + ExactText(occupied_thresh) + "\nfree_thresh: " + ExactText(free_thresh) + "\n";
   return text;
 }
 

@@ -8,7 +8,7 @@
 namespace cairn {
 namespace {
 
-// 0..100 or unknown: nothing else may reach whoever draws or plans on the map.
+// Other values than 0..100 and unknown are refused: programs that draw or plan rely on it.
 bool IsCell(std::uint8_t value) {
   return value <= 100 || value == kUnknownCell;
 }

@@ -1,15 +1,14 @@
 #include "common/options/config.h"
 
-#include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
 #include <exception>
 #include <optional>
 #include <set>
-#include <sstream>
 
 #include "common/file/atomic_file.h"
 #include "common/options/option_fields.h"
+#include "common/options/yaml_documents.h"
 
 namespace cairn {
 namespace {
@@ -18,35 +17,8 @@ constexpr std::size_t kMaxConfigBytes = 1u << 20;
 // Aliases can make a small text an endless or exponentially large tree.
 constexpr int kDeepest = 32;
 constexpr std::size_t kMostValues = 10'000;
-
-// Hears where documents begin; what is in them is not looked at.
-class DocumentStarts final : public YAML::EventHandler {
- public:
-  [[nodiscard]] int line() const { return line_; }
-
-  void OnDocumentStart(const YAML::Mark& mark) override { line_ = mark.line; }
-  void OnDocumentEnd() override {}
-  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
-  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
-  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t, const std::string&) override {}
-  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
-  void OnSequenceEnd() override {}
-  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t, YAML::EmitterStyle::value) override {}
-  void OnMapEnd() override {}
-
- private:
-  int line_ = 0;
-};
-
-// The line, from 0, where something follows the first document, which is all that YAML::Load reads. (YAML::LoadAll
-// would tell, but on a text such as ", a" it never ends.)
-std::optional<int> LineAfterFirstDocument(const std::string& text) {
-  std::istringstream stream(text);
-  YAML::Parser parser(stream);
-  DocumentStarts starts;
-  const bool follows = parser.HandleNextDocument(starts) && parser.HandleNextDocument(starts);
-  return follows ? std::optional(starts.line()) : std::nullopt;
-}
+// PrintYaml writes most keys below this heading; their names do not contain it.
+constexpr const char* kHeading = "expert";
 
 // Collects the leaves of a YAML tree as assignments. Returns the first problem, or nothing.
 class Flattening {
@@ -67,8 +39,17 @@ class Flattening {
       if (!entry.first.IsScalar()) return Place(entry.first) + ": a key must be a plain word";
       const std::string& name = entry.first.Scalar();
       const std::string full = key.empty() ? name : key + "." + name;
-      if (!names.insert(name).second) return Place(entry.first) + ": " + full + ": given twice";
-      if (entry.second.IsNull() || (entry.second.IsMap() && entry.second.size() == 0)) {
+      const bool alone = entry.second.IsNull() || (entry.second.IsMap() && entry.second.size() == 0);
+      // Once with and once without the heading is twice as well. Only a section may stand alone in several places.
+      const bool again = entry.second.IsScalar() ? alone_.contains(full) || !given_.insert(full).second
+                                                 : alone && given_.contains(full);
+      if (!names.insert(name).second || again) return Place(entry.first) + ": " + full + ": given twice";
+      if (depth == 0 && name == kHeading && !entry.second.IsScalar()) {
+        if (std::string problem = Take(entry.second, "", depth + 1); !problem.empty()) return problem;
+        continue;
+      }
+      if (alone) {
+        alone_.insert(full);
         // The place of nothing would be that of the next token.
         assignments_.push_back({Place(entry.first), full, std::nullopt});
         continue;
@@ -88,6 +69,7 @@ class Flattening {
 
   std::string source_;
   std::vector<Assignment> assignments_;
+  std::set<std::string> given_, alone_;  // Full keys with a value, and without one.
 };
 
 }  // namespace

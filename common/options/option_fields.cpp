@@ -1,7 +1,6 @@
 #include "common/options/option_fields.h"
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <numeric>
@@ -66,28 +65,28 @@ class Assigner final : public SectionVisitor {
       : assignments_(assignments), write_(write) {}
 
   void Real(std::string_view key, double& value, std::string_view unit, double min, double max,
-            std::string_view /*help*/) override {
+            const Help& /*help*/) override {
     Number(key, value, "a number", min, max, unit);
   }
   void Integer(std::string_view key, std::int64_t& value, std::string_view unit, std::int64_t min, std::int64_t max,
-               std::string_view /*help*/) override {
+               const Help& /*help*/) override {
     Number(key, value, "a whole number", min, max, unit);
   }
-  void Flag(std::string_view key, bool& value, std::string_view /*help*/) override {
+  void Flag(std::string_view key, bool& value, const Help& /*help*/) override {
     const Assignment* given = Find(key);
     if (given == nullptr) return;
     if (given->text != "true" && given->text != "false")
       return Complain(*given, "is not a truth value", "true or false");
     if (write_) value = given->text == "true";
   }
-  void Text(std::string_view key, std::string& value, std::string_view /*help*/) override {
+  void Text(std::string_view key, std::string& value, const Help& /*help*/) override {
     const Assignment* given = Find(key);
     if (given == nullptr) return;
     if (!given->text) return Complain(*given, "", "a text; an empty one is \"\"");
     if (write_) value = *given->text;
   }
   void Choice(std::string_view key, int& value, std::span<const std::string_view> names,
-              std::string_view /*help*/) override {
+              const Help& /*help*/) override {
     const Assignment* given = Find(key);
     if (given == nullptr) return;
     const auto found = std::find(names.begin(), names.end(), given->text);
@@ -174,11 +173,6 @@ Result<void> Assign(const std::vector<Assignment>& assignments, const VisitOptio
   Assigner write(by_key, true);
   visit(write);
   return {};
-}
-
-std::string ExactText(double value) {
-  std::array<char, 48> text{};
-  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
 }
 
 std::string RangeText(double min, double max, std::string_view unit) {

@@ -9,13 +9,14 @@
 #include <vector>
 
 #include "common/options/config.h"
+#include "common/options/number_text.h"
 
 namespace cairn {
 
 struct Assignment {
   std::string place;                // For errors: "cairnd.yaml:12" or "--set".
   std::string key;                  // Full dotted key.
-  std::optional<std::string> text;  // Nothing: the key stands alone, which only a section may.
+  std::optional<std::string> text;  // Nothing where the key has no value, which is allowed for sections only.
 };
 
 // Assigns all, or nothing where one is in error. Later assignments of a key win.
@@ -26,10 +27,7 @@ struct Assignment {
 [[nodiscard]] std::string RangeText(std::int64_t min, std::int64_t max, std::string_view unit);
 [[nodiscard]] std::string NamesText(std::span<const std::string_view> names);
 
-// The shortest text that reads back to the same double.
-[[nodiscard]] std::string ExactText(double value);
-
-// Where the tree's sections are: a visitor that keeps the dotted prefix.
+// A visitor that keeps the dotted prefix of the section it is in.
 class SectionVisitor : public OptionVisitor {
  public:
   void Section(std::string_view key, std::string_view help, const std::function<void()>& fields) override;

@@ -1,22 +1,17 @@
 #include "common/sensor/carmen_writer.h"
 
-#include <array>
-#include <charconv>
 #include <cmath>
 #include <string>
 
+#include "common/options/number_text.h"
 #include "common/sensor/stamp_text.h"
 
 namespace cairn {
 namespace {
 
-// The shortest text that reads back to the same number.
 template <typename Real>
 void Append(std::string& line, Real value) {
-  std::array<char, 48> text{};
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
-  line += ' ';
-  line.append(text.data(), end);
+  line += ' ' + ExactText(value);
 }
 
 void Append(std::string& line, const Pose2& pose) {

@@ -1,5 +1,5 @@
 // The blank-separated fields of one log line, read strictly in order. The first field that does not fit sets the
-// problem; all later reads answer zero, so a parser reads straight through and asks once at the end.
+// problem; all later reads return zero, so that a parser can read all fields and check once at the end.
 #pragma once
 
 #include <string>

@@ -19,7 +19,7 @@ class LogLines {
   [[nodiscard]] bool Next(std::string_view& line);
   [[nodiscard]] int number() const { return number_; }       // 1-based, of the line last returned.
   [[nodiscard]] bool too_long() const { return too_long_; }  // The line last returned was cut: do not parse it.
-  [[nodiscard]] bool failed() const { return failed_; }      // The disk refused, e.g. the path is a directory.
+  [[nodiscard]] bool failed() const { return failed_; }      // Reading failed, e.g. because the path is a directory.
 
  private:
   bool Fill();

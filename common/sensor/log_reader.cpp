@@ -29,7 +29,7 @@ std::string Metres(double value) {
   return text.data();
 }
 
-// What the first pass found out about one kind of laser message.
+// Findings of the first pass about one kind of laser message.
 struct LaserFacts {
   std::int64_t scans = 0;
   std::optional<double> no_return;
@@ -167,7 +167,6 @@ class LogEmitter {
     scan.range_max_m = RangeMax(laser, facts);
     scan.tilt_rad = laser.tilt_rad;
     scan.T_robot_laser = facts.T_robot_laser;
-    if (facts_.dpslam) scan.scan_period_s = options_.dpslam_scan_period_s;
     scan.ranges_m = std::move(laser.ranges_m);
     ++summary_.scans;
     return sink_(std::move(scan));

@@ -13,7 +13,7 @@ namespace cairn {
 
 using LogRecord = std::variant<Odometry, Scan>;
 
-// A line that could not be read: skipped, counted, and named.
+// A line that could not be read. It is skipped and counted.
 struct LogComplaint {
   int line = 0;  // 1-based.
   std::string reason;
@@ -25,7 +25,7 @@ struct LogSummary {
   int ignored = 0;                       // Messages of kinds that carry neither (PARAM, SYNC, ...).
   std::vector<LogComplaint> complaints;  // The first 100.
   int complaint_count = 0;
-  std::vector<std::string> notes;  // What was concluded from the content: range limit, mounting.
+  std::vector<std::string> notes;  // Conclusions from the content: range limit, mounting.
 };
 
 }  // namespace cairn

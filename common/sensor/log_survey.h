@@ -1,11 +1,11 @@
-// What only a whole log can tell about its scanner, gathered in a first pass over the file: from which range on it
-// means "nothing hit", and how it is mounted.
+// Two properties of a scanner that only its whole log shows, found in a first pass over the file: the range from which
+// on a reading means "nothing hit", and how the scanner is mounted.
 //
 // No return: scanners report one of a few saturated values (SICK LMS: 81.83 or 81.91 m; in MIT Killian Court 51.0 to
-// 51.2 m). Such readings pile up at the top of the range histogram. The pile is believed where, around the most
+// 51.2 m). Such readings pile up at the top of the range histogram. The pile counts where, around the most
 // frequent centimetre of the upper half of the ranges seen, it holds at least 100 readings and 0.1 % of all, ten times
 // what lies in the band just below it, almost nothing lies above it, and it is seen in at least a quarter of all beam
-// directions (a wall stared at is seen in few).
+// directions (a wall in front of a standing robot is seen in few).
 //
 // Mounting: the median of the laser's pose seen from the robot's, where nine tenths of all messages agree with it
 // (logs rewritten by a mapping program carry corrected laser poses, which are no mounting).

@@ -2,24 +2,27 @@
 
 #include <cmath>
 #include <string>
+#include <utility>
 
 namespace cairn {
 namespace {
 
 constexpr double kMaxMountingDistance = 100.0;  // m
-constexpr double kMaxPeriod = 1e4;              // s, of a beam or a scan.
+constexpr double kMaxBeamPeriod = 1e4;          // s
 // A full turn computed as step * (beams - 1) in floating point may exceed 2 pi by rounding alone.
 constexpr double kSpanSlack = 1e-6;
 
-tl::unexpected<Status> Bad(const std::string& what, double value) {
-  return Fail(StatusCode::kInvalidArgument, what + " (" + std::to_string(value) + ")");
+using Validity = tl::expected<void, ScanRefusal>;
+
+tl::unexpected<ScanRefusal> Refuse(ScanFault fault, std::string message) {
+  return tl::unexpected(ScanRefusal{fault, std::move(message)});
 }
 
-bool IsPeriod(double seconds) {
-  return std::isfinite(seconds) && seconds >= 0.0 && seconds <= kMaxPeriod;
+tl::unexpected<ScanRefusal> Bad(const std::string& what, double value) {
+  return Refuse(ScanFault::kBadGeometry, what + " (" + std::to_string(value) + ")");
 }
 
-Result<void> ValidateGeometry(const Scan& scan) {
+Validity ValidateGeometry(const Scan& scan) {
   if (!std::isfinite(scan.angle_first_rad)) return Bad("angle of the first beam is not finite", scan.angle_first_rad);
   if (std::abs(scan.angle_first_rad) > 4.0 * kPi) return Bad("angle of the first beam", scan.angle_first_rad);
   if (!std::isfinite(scan.angle_step_rad) || scan.angle_step_rad == 0.0) {
@@ -31,9 +34,11 @@ Result<void> ValidateGeometry(const Scan& scan) {
   if (!std::isfinite(scan.range_max_m)) return Bad("range_max is not finite", scan.range_max_m);
   if (scan.range_max_m <= scan.range_min_m) return Bad("range_max is not above range_min", scan.range_max_m);
   if (!std::isfinite(scan.tilt_rad) || std::abs(scan.tilt_rad) >= kPi / 2) return Bad("tilt", scan.tilt_rad);
-  if (!scan.T_robot_laser.IsFinite()) return Fail(StatusCode::kInvalidArgument, "mounting is not finite");
+  if (!scan.T_robot_laser.IsFinite()) return Refuse(ScanFault::kBadGeometry, "mounting is not finite");
   const double distance = scan.T_robot_laser.translation().norm();
   if (!(distance <= kMaxMountingDistance)) return Bad("mounting is too far from the robot, in m", distance);
+  const double period = scan.beam_period_s;
+  if (!std::isfinite(period) || period < 0.0 || period > kMaxBeamPeriod) return Bad("beam period", period);
   return {};
 }
 
@@ -45,19 +50,17 @@ BeamClass ClassifyRange(float range_m, double range_min_m, double range_max_m) {
   return range >= range_max_m ? BeamClass::kNoReturn : BeamClass::kHit;
 }
 
-Result<void> ValidateScan(const Scan& scan) {
-  if (scan.ranges_m.empty()) return Fail(StatusCode::kInvalidArgument, "no beams");
+Validity ValidateScan(const Scan& scan) {
+  if (scan.ranges_m.empty()) return Refuse(ScanFault::kEmpty, "no beams");
   if (scan.ranges_m.size() > kMaxBeams) {
-    return Fail(StatusCode::kInvalidArgument,
-                std::to_string(scan.ranges_m.size()) + " beams, at most " + std::to_string(kMaxBeams));
+    return Refuse(ScanFault::kTooManyBeams,
+                  std::to_string(scan.ranges_m.size()) + " beams, at most " + std::to_string(kMaxBeams));
   }
   if (auto geometry = ValidateGeometry(scan); !geometry) return geometry;
-  if (!IsPeriod(scan.beam_period_s)) return Bad("beam period", scan.beam_period_s);
-  if (!IsPeriod(scan.scan_period_s)) return Bad("scan period", scan.scan_period_s);
   for (const float range : scan.ranges_m) {
     if (ClassifyRange(range, scan.range_min_m, scan.range_max_m) != BeamClass::kInvalid) return {};
   }
-  return Fail(StatusCode::kInvalidArgument, "no beam has a usable range");
+  return Refuse(ScanFault::kEmpty, "no beam has a usable range");
 }
 
 }  // namespace cairn

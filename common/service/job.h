@@ -1,4 +1,4 @@
-// Work the server does on the side: it has an id, a state, a progress and a result, and can be cancelled.
+// Work that the server does in the background: it has an id, a state, a progress and a result, and can be cancelled.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace cairn {
 
-enum class JobKind : std::uint8_t { kSmooth = 0, kExport, kRelocalise };
+enum class JobKind : std::uint8_t { kSmooth = 0 };
 enum class JobState : std::uint8_t { kQueued = 0, kRunning, kSucceeded, kFailed, kCancelled };
 [[nodiscard]] std::string_view JobKindName(JobKind kind);
 [[nodiscard]] std::string_view JobStateName(JobState state);
@@ -26,7 +26,7 @@ struct Job {
   double progress = 0.0;     // 0..1.
   double cost_before = 0.0;  // Meaning per kind; smoothing: mean squared disagreement of scans and map, m^2.
   double cost_after = 0.0;
-  std::uint32_t map_version = 0;  // What it published; 0 while none.
+  std::uint32_t map_version = 0;  // The map version that it published; 0 while there is none.
   Stamp submitted = 0;            // Server clock.
   Stamp started = 0;
   Stamp ended = 0;

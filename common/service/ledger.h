@@ -7,29 +7,33 @@
 #include <string>
 #include <string_view>
 
+#include "common/sensor/scan.h"
 #include "common/sensor/stamp.h"
 #include "common/service/names.h"
 
 namespace cairn {
 
 enum class DropReason : std::uint8_t {
-  kNoOdometry = 0,  // None near its stamp, before or after.
+  kNoOdometry = 0,  // No odometry near the scan's stamp, before or after.
   kDuplicateStamp,  // Same stamp as the scan before.
   kStampWentBack,   // Older than the scan before.
   kStampJump,       // Too far ahead of the scan before; a clock that stays there is accepted after a few scans.
-  kBadGeometry,     // Angles, range limits, mounting or times that describe no scanner.
+  kBadGeometry,     // These three: ScanFault.
   kTooManyBeams,
-  kEmpty,       // No beam, or none with a usable range.
+  kEmpty,
   kNoSession,   // The robot has not opened a session, or was refused one.
   kNotOwner,    // Another client owns the robot's session.
   kQueueFull,   // Back-pressure: the oldest waiting scan gives way.
   kLostOnWire,  // Sequence numbers that never arrived.
   kSessionEnded,
+  kSessionFull,  // The session has as many keyframes, or as large a map, as the server allows.
 };
-inline constexpr int kDropReasonCount = 12;
+inline constexpr int kDropReasonCount = 13;
 
 // snake_case, as metrics and JSON show it.
 [[nodiscard]] std::string_view DropReasonName(DropReason reason);
+// The account that a refused scan goes to.
+[[nodiscard]] DropReason DropReasonOf(ScanFault fault);
 
 struct Ledger {
   NameId robot_id = 0;
@@ -48,7 +52,7 @@ struct Ledger {
   std::uint64_t last_sequence = 0;     // Highest scan sequence received.
   std::uint64_t settled_through = 0;   // Every scan up to here is used or dropped.
   std::uint64_t durable_through = 0;   // Every scan up to here survives the server's death; 0 without a store.
-  Stamp last_stamp = 0;                // Of the last scan used.
+  Stamp last_stamp = 0;                // Stamp of the last scan used.
   double latency_p50_ms = 0.0;         // Scan received to pose published, over the last 256.
   double latency_p99_ms = 0.0;
 

@@ -1,4 +1,4 @@
-// What a site's map is at one moment, and the versions it can be switched to.
+// A summary of a site's map at one moment, and the versions to which it can be switched.
 #pragma once
 
 #include <cstdint>
@@ -19,7 +19,7 @@ struct MapVersionInfo {
 struct MapInfo {
   NameId site_id = 0;
   std::string site;
-  double resolution_m = 0.05;  // Of level 0.
+  double resolution_m = 0.05;  // Cell size of level 0.
   std::uint32_t epoch = 0;     // Wholesale changes so far; tiles of older epochs are void.
   std::uint64_t version = 0;   // Highest tile version.
   std::uint32_t levels = 0;

@@ -29,7 +29,7 @@ struct PoseReport {
   Stamp stamp = 0;
   std::uint64_t scan_sequence = 0;  // The scan this pose belongs to; 0 for an interpolated answer.
   Pose2 T_map_robot;
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // Of (x, y, theta) in map.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // For (x, y, theta) in the frame map.
   Pose2 T_map_odom;
   bool localized = false;
   double score = 0.0;  // 0..1: share of the scan explained by the map.

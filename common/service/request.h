@@ -1,4 +1,4 @@
-// A question to the server and its answer, as plain values: what queries/ answers and what wire/ carries.
+// A question to the server and its answer, as plain values.
 #pragma once
 
 #include <cstdint>
@@ -61,7 +61,7 @@ struct Request {
 struct LandmarkReport {
   std::uint64_t id = 0;
   std::string robot;
-  bool corner = false;  // Else the midpoint of a line ended on both sides.
+  bool corner = false;  // False: the midpoint of a line that ends on both sides.
   Eigen::Vector2d p_map = Eigen::Vector2d::Zero();
   double direction_rad = 0.0;
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();

@@ -1,4 +1,4 @@
-// Where a robot stands in the map when its run begins: what peers say, and what people type. Metres and radians.
+// Where a robot stands in the map when its run begins: as peers send it and as people type it. Metres and radians.
 #pragma once
 
 #include <string>

@@ -7,7 +7,8 @@
 #include "common/wire/limits.h"
 
 namespace cairn::wire {
-// The parts of the values above. In the namespace itself, so that Bounds::Each looks all overloads up together.
+// Checks of nested values. They are in the namespace cairn::wire, not in an unnamed one, so that Bounds::Each
+// finds all overloads.
 static Result<void> CheckBounds(const v1::MapVersion& version);
 static Result<void> CheckBounds(const v1::TileContent& content);
 static Result<void> CheckBounds(const v1::TileRecord& tile);
@@ -25,7 +26,7 @@ class Bounds {
   }
   Bounds& Name(std::string_view field, const std::string& text) { return AtMost(field, text.size(), kMaxNameBytes); }
   Bounds& Text(std::string_view field, const std::string& text) { return AtMost(field, text.size(), kMaxTextBytes); }
-  // Enums come as 32 bits from the wire, whatever the IDL names.
+  // A received enum may have any 32-bit value, not only those of the IDL.
   template <typename Enum>
   Bounds& Known(std::string_view field, Enum value, Enum last) {
     if (static_cast<std::uint32_t>(value) > static_cast<std::uint32_t>(last)) {
@@ -106,7 +107,7 @@ Result<void> CheckBounds(const v1::SessionRequest& request) {
   bounds.AtMost("sensors", request.sensors().size(), kMaxSensors);
   for (const std::string& sensor : request.sensors()) bounds.Name("sensors", sensor);
   if (bounds.result() && request.robot_id() != HashName(request.robot())) {
-    return Fail(StatusCode::kInvalidArgument, "robot_id: not the hash of robot \"" + request.robot() + "\"");
+    return Fail(StatusCode::kInvalidArgument, "robot_id: is not the hash of robot \"" + request.robot() + "\"");
   }
   return bounds.result();
 }
@@ -125,7 +126,7 @@ Result<void> CheckBounds(const v1::Scan& scan) {
 }
 
 Result<void> CheckBounds(const v1::Odometry&) {
-  return {};  // Fixed size, numbers only.
+  return {};  // All members are numbers, so there is nothing to check.
 }
 
 Result<void> CheckBounds(const v1::PoseReport& report) {
@@ -159,7 +160,7 @@ Result<void> CheckBounds(const v1::Tile& tile) {
 Result<void> CheckBounds(const v1::Job& job) {
   return Bounds()
       .Name("site", job.site())
-      .Known("kind", job.kind(), v1::JOB_RELOCALISE)
+      .Known("kind", job.kind(), v1::JOB_SMOOTH)
       .Known("state", job.state(), v1::JOB_CANCELLED)
       .Text("message", job.message())
       .result();
@@ -171,7 +172,7 @@ Result<void> CheckBounds(const v1::Request& request) {
       .Name("site", request.site())
       .Name("robot", request.robot())
       .Within("level", request.level(), 0, kMaxTileLevel)
-      .Known("job_kind", request.job_kind(), v1::JOB_RELOCALISE)
+      .Known("job_kind", request.job_kind(), v1::JOB_SMOOTH)
       .result();
 }
 

@@ -1,6 +1,7 @@
-// Checks that an IDL value keeps within limits.h and names only known enum values, before it is converted or sent.
-// Not the meaning: a NaN range or an unknown site is for the receiver to judge. Each returns why not, with the field.
-// Middleware neither enforces the bounds of sequences nor the range of enums on receive (measured, idl/README.md).
+// Checks that an IDL value keeps within limits.h and names only known enum values, before it is converted or
+// sent. The meaning is not checked: the receiver decides about a NaN range or an unknown site. Errors name
+// the field. Middleware neither enforces the bounds of sequences nor the range of enums on receive (measured,
+// idl/README.md).
 #pragma once
 
 #include "cairn/job.h"

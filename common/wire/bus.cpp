@@ -18,7 +18,7 @@ class DdsBus final : public Bus {
   const std::shared_ptr<Participant> participant_;
 };
 
-// Create makes nothing else.
+// The cast is safe because Create makes no other class.
 const std::shared_ptr<Participant>& ParticipantOf(const Bus& bus) {
   return static_cast<const DdsBus&>(bus).participant();
 }
@@ -46,7 +46,7 @@ Result<std::unique_ptr<Subscription>> Bus::SubscribeReplies(ClientId client, std
   return DdsSubscription<Reply>::Make(ParticipantOf(*this), std::move(on_value), std::move(events), client);
 }
 
-// A type in parentheses is no type. NOLINTBEGIN(bugprone-macro-parentheses)
+// The macro's argument is a type and cannot be in parentheses. NOLINTBEGIN(bugprone-macro-parentheses)
 #define CAIRN_WIRE_VALUE(Value)                                                                       \
   template Result<std::unique_ptr<Publication<Value>>> Bus::Advertise<Value>();                       \
   template Result<std::unique_ptr<Subscription>> Bus::Subscribe<Value>(std::function<void(Value &&)>, \

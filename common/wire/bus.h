@@ -1,10 +1,10 @@
-// The DDS domain as typed publications and subscriptions of Cairn's plain values: participants, topics, QoS and the
-// conversion from and to IDL types live behind this header, and nothing else of the project includes a DDS header.
-// What arrives is only converted: lengths and enums are bounded (out of range: the sample is dropped and counted under
-// refused()), contents are validated by the receiver.
-// Thread rule: a Bus and what it makes may be used from any thread; Publish may be called concurrently. Subscription
-// callbacks and events run on a thread of the subscription's own, one at a time and in order; while one runs, its topic
-// waits, so they only convert, push and return.
+// The DDS domain as typed publications and subscriptions of Cairn's plain values: participants, topics, QoS
+// and the conversion from and to IDL types live behind this header, and nothing else of the project includes
+// a DDS header. Received samples are only converted. A sample whose lengths or enums are out of range is
+// dropped and counted by refused(); the contents are validated by the receiver.
+// Thread rule: a Bus and what it makes may be used from any thread; Publish may be called concurrently.
+// Subscription callbacks and events run on a thread of the subscription's own, one at a time and in order;
+// while one runs, its topic waits, so they only convert, push and return.
 // Source of the choices: the measured notes on Fast DDS 2.9 in idl/README.md.
 #pragma once
 
@@ -24,13 +24,14 @@ namespace cairn::wire {
 
 struct WireOptions {
   std::int64_t domain = 0;
-  std::vector<std::string> interfaces = {"127.0.0.1"};  // Addresses to bind; never all of them by accident.
+  std::vector<std::string> interfaces = {"127.0.0.1"};  // Addresses to bind. They must be named one by one.
   double liveliness_lease_s = 1.0;
   double participant_lease_s = 3.0;
 };
-// Domain, addresses (IPv4, each once) and leases: what is wrong on every machine, and at any time.
+// Checks domain, addresses (IPv4, each once) and leases, independently of the machine.
 [[nodiscard]] Result<void> Validate(const WireOptions& options);
-// Of valid options: that this machine has the addresses now. kUnavailable where not; a network may be up later.
+// Checks that this machine has the addresses now. REQUIRES: Validate(options). kUnavailable: an address is
+// missing; it may appear later.
 [[nodiscard]] Result<void> RequireInterfaces(const WireOptions& options);
 void Visit(OptionVisitor& visitor, WireOptions& options);  // `interfaces` as one comma-separated text.
 
@@ -39,19 +40,19 @@ class Publication {
  public:
   using ValueType = Value;
   virtual ~Publication() = default;
-  // kOutOfRange where the value exceeds the wire's limits (limits.h), kUnavailable where the middleware did not take it
-  // within its bounded blocking time.
+  // kOutOfRange: the value exceeds the wire's limits (limits.h). kUnavailable: the middleware did not accept
+  // it within its bounded blocking time.
   [[nodiscard]] virtual Result<void> Publish(const Value& value) = 0;
   // Waits until every matched subscription has acknowledged everything, or the deadline passes (false).
   [[nodiscard]] virtual bool WaitForAcknowledgement(std::chrono::milliseconds deadline) = 0;
-  // Peers of the same topic, type name and QoS. Says nothing of their data representation.
+  // Peers of the same topic, type name and QoS. Their data representation is not compared.
   [[nodiscard]] virtual int matched() const = 0;
 };
 
 struct SubscriptionEvents {
   std::function<void(int lost_total)> lost;  // Samples lost on the wire.
-  // SessionRequest only: the writer whose last request named `client` let its lease run out or went away (false), or is
-  // heard again (true).
+  // For SessionRequest only: the lease of the writer whose last request named `client` has run out, or the
+  // writer has left (false); or the writer is heard again (true).
   std::function<void(ClientId client, bool alive)> liveliness;
   std::function<void(const std::string& policy)> incompatible_qos;  // A peer that will never match.
   std::function<void(int matched)> matched;                         // The number of publications changed.
@@ -61,11 +62,11 @@ class Subscription {
  public:
   virtual ~Subscription() = default;  // Returns after the last callback; not to be called from one.
   [[nodiscard]] virtual int matched() const = 0;
-  [[nodiscard]] virtual std::uint64_t refused() const = 0;  // Samples that did not decode or exceed the limits.
+  [[nodiscard]] virtual std::uint64_t refused() const = 0;  // Samples not decoded or over the limits.
 };
 
-// Value is one of: SessionRequest, SessionState, ScanSample, OdometrySample, PoseReport, Ledger, MapInfo, TileSample,
-// Job, Request, Reply.
+// Value is one of: SessionRequest, SessionState, ScanSample, OdometrySample, PoseReport, Ledger, MapInfo,
+// TileSample, Job, Request, Reply.
 // Publications and subscriptions may outlive the Bus that made them.
 class Bus {
  public:
@@ -77,13 +78,13 @@ class Bus {
   template <typename Value>
   [[nodiscard]] Result<std::unique_ptr<Subscription>> Subscribe(std::function<void(Value&&)> on_value,
                                                                 SubscriptionEvents events = {});
-  // As Subscribe<Reply>, but replies to other clients are skipped before they are decoded.
+  // Like Subscribe<Reply>, but replies to other clients are skipped before they are decoded.
   [[nodiscard]] Result<std::unique_ptr<Subscription>> SubscribeReplies(ClientId client,
                                                                        std::function<void(Reply&&)> on_value,
                                                                        SubscriptionEvents events = {});
 
   [[nodiscard]] virtual const WireOptions& options() const = 0;
-  // Datagrams that were no sound RTPS and were kept from the middleware.
+  // Number of datagrams that were not valid RTPS and were therefore not passed to the middleware.
   [[nodiscard]] virtual std::uint64_t datagrams_refused() const = 0;
 
  protected:

@@ -1,6 +1,7 @@
-// Cairn's values as IDL types and back, every field. FromWire expects a value that passed CheckBounds; it cannot fail.
-// ToWire cannot fail either: what does not fit the wire is caught by CheckBounds before it is sent. The exception is a
-// tile beyond the key's 16 bits, so ToWire of a TileSample needs FitsTileKey.
+// Converts Cairn's values to IDL types and back, every field. FromWire requires a value that passed
+// CheckBounds, and cannot fail. ToWire cannot fail either: CheckBounds finds values that do not fit the wire
+// before they are sent. Only the coordinates of a tile must be checked before: ToWire of a TileSample
+// requires FitsTileKey.
 #pragma once
 
 #include "cairn/job.h"
@@ -29,7 +30,7 @@ namespace cairn::wire {
 [[nodiscard]] v1::Request ToWire(const Request& value);
 [[nodiscard]] v1::Reply ToWire(const Reply& value);
 
-// Reads move what is large (ranges, bytes) out of the argument.
+// FromWire moves the large members (ranges, bytes) out of its argument.
 [[nodiscard]] SessionRequest FromWire(v1::SessionRequest&& wire);
 [[nodiscard]] SessionState FromWire(v1::SessionState&& wire);
 [[nodiscard]] ScanSample FromWire(v1::Scan&& wire);
@@ -42,7 +43,7 @@ namespace cairn::wire {
 [[nodiscard]] Request FromWire(v1::Request&& wire);
 [[nodiscard]] Reply FromWire(v1::Reply&& wire);
 
-// The parts several values share.
+// The parts that several values share.
 [[nodiscard]] v1::Pose2 ToWire(const Pose2& value);
 [[nodiscard]] Pose2 FromWire(const v1::Pose2& wire);
 [[nodiscard]] v1::Status ToWire(const Status& value);
@@ -50,7 +51,8 @@ namespace cairn::wire {
 [[nodiscard]] v1::TileContent ContentToWire(const Tile& value);
 void ContentFromWire(v1::TileContent&& wire, Tile& value);
 
-// Tile coordinates are 16 bits in the key (with an 8-byte site it must stay within 16 bytes): +-209 km at 5 cm.
+// Tile coordinates are 16 bits in the key (with an 8-byte site it must stay within 16 bytes): +-209 km at 5
+// cm.
 [[nodiscard]] bool FitsTileKey(const TileKey& key);
 
 }  // namespace cairn::wire

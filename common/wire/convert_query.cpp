@@ -3,7 +3,8 @@
 #include "common/wire/convert.h"
 
 namespace cairn::wire {
-// The parts of a reply. In the namespace itself, not an unnamed one: the lists below look all overloads up together.
+// Conversions of the parts of a reply. They are in the namespace cairn::wire, not in an unnamed one, so that
+// the list conversions below find all overloads.
 static v1::StampedPose ToWire(const StampedPose& value) {
   v1::StampedPose wire;
   wire.stamp_ns(value.stamp);
@@ -71,7 +72,7 @@ static RobotStatus FromWire(v1::RobotStatus&& wire) {
   return value;
 }
 
-// Both directions of a list, element by element.
+// Convert a list element by element, in both directions.
 template <typename Wires, typename Values>
 static void ListToWire(const Values& values, Wires& wires) {
   wires.reserve(values.size());

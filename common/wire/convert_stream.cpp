@@ -17,7 +17,6 @@ v1::Scan ToWire(const ScanSample& value) {
   wire.range_min_m(scan.range_min_m);
   wire.range_max_m(scan.range_max_m);
   wire.beam_period_s(scan.beam_period_s);
-  wire.scan_period_s(scan.scan_period_s);
   wire.tilt_rad(scan.tilt_rad);
   wire.T_robot_laser(ToWire(scan.T_robot_laser));
   wire.ranges_m(scan.ranges_m);
@@ -35,7 +34,6 @@ ScanSample FromWire(v1::Scan&& wire) {
   scan.range_min_m = wire.range_min_m();
   scan.range_max_m = wire.range_max_m();
   scan.beam_period_s = wire.beam_period_s();
-  scan.scan_period_s = wire.scan_period_s();
   scan.tilt_rad = wire.tilt_rad();
   scan.T_robot_laser = FromWire(wire.T_robot_laser());
   scan.ranges_m = std::move(wire.ranges_m());

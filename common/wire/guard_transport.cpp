@@ -56,7 +56,8 @@ transport::TransportInterface* GuardDescriptor::create_transport() const {
 
 std::shared_ptr<transport::TransportDescriptorInterface> MakeGuardedUdp(
     const std::vector<std::string>& interfaces, std::shared_ptr<std::atomic<std::uint64_t>> refused) {
-  // Bursts of tiles and replies outrun a default socket buffer; the kernel caps this at its own limit.
+  // A burst of tiles or replies overflows a socket buffer of default size. The kernel limits this size if it
+  // is too large.
   constexpr std::uint32_t kSocketBufferBytes = 4 * 1024 * 1024;
   auto udp = std::make_shared<transport::UDPv4TransportDescriptor>();
   udp->interfaceWhiteList = interfaces;

@@ -1,5 +1,6 @@
-// UDPv4 with a guard: every datagram passes InspectDatagram before the participant sees it; what does not pass is
-// dropped and counted. Fast DDS 2.x transport API, so this header stays inside common/wire.
+// A UDPv4 transport that checks every datagram with InspectDatagram before the participant sees it. Datagrams
+// that fail the check are dropped and counted. This header uses the Fast DDS 2.x transport API; include it
+// only inside common/wire.
 #pragma once
 
 #include <fastdds/rtps/transport/ChainingTransportDescriptor.h>
@@ -12,7 +13,8 @@
 
 namespace cairn::wire {
 
-// Binds sockets to the given IPv4 addresses only. `refused` counts, and outlives the transport by shared ownership.
+// Binds sockets to the given IPv4 addresses only. `refused` counts the dropped datagrams; it is shared
+// because it must outlive the transport.
 [[nodiscard]] std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> MakeGuardedUdp(
     const std::vector<std::string>& interfaces, std::shared_ptr<std::atomic<std::uint64_t>> refused);
 

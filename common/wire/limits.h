@@ -1,5 +1,5 @@
-// How long anything on the wire may be. What is longer is refused unread and counted; idl/README.md repeats the numbers
-// for people who write clients.
+// Limits of length for all values on the wire. Longer values are dropped unread and counted. idl/README.md
+// repeats the numbers for people who write clients.
 #pragma once
 
 #include <cstddef>
@@ -12,14 +12,15 @@ namespace cairn::wire {
 inline constexpr std::size_t kMaxNameBytes = 64;
 inline constexpr std::size_t kMaxTextBytes = 1024;  // Messages and notes for people.
 inline constexpr std::size_t kMaxSensors = 16;
-// An honest scan of too many beams still reaches the ledger, which counts it; only the absurd is refused here.
+// Above the limit of ValidateScan, so that a scan with somewhat too many beams still reaches the ledger and
+// is counted.
 inline constexpr std::size_t kMaxRangesRead = 4 * static_cast<std::size_t>(kMaxBeams);
 inline constexpr std::size_t kMaxTileBytes = 65535;
 inline constexpr std::size_t kMaxDropReasons = 64;
 inline constexpr std::size_t kMaxMapVersions = 1024;
 inline constexpr int kMaxTileLevel = 15;
 
-// Per part of a reply.
+// The limits for one part of a reply.
 inline constexpr std::size_t kMaxReplyPoses = 1024;
 inline constexpr std::size_t kMaxReplyPath = 4096;
 inline constexpr std::size_t kMaxReplyTiles = 1024;
@@ -28,7 +29,7 @@ inline constexpr std::size_t kMaxReplyMaps = 256;
 inline constexpr std::size_t kMaxReplyRobots = 256;
 inline constexpr std::size_t kMaxReplyJobs = 1024;
 
-// Of one serialised sample. Bounds what a datagram can make the middleware allocate.
+// The size of one serialised sample. It bounds what a datagram can make the middleware allocate.
 inline constexpr std::uint32_t kMaxSampleBytes = 256 * 1024;
 
 }  // namespace cairn::wire

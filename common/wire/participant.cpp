@@ -11,9 +11,9 @@
 #include "common/wire/guard_transport.h"
 
 #ifdef CAIRN_ADDRESS_SANITIZER
-// Fast DDS 2.9 deletes an object of its own under another size (RTPSWriter::~RTPSWriter); the address sanitizer would
-// end every program at the end of its first publication. All other checks stay on; ASAN_OPTIONS can switch this one
-// back.
+// Fast DDS 2.9 deletes one of its own objects with the wrong size (RTPSWriter::~RTPSWriter). With this check,
+// the address sanitizer would stop every program at the end of its first publication. All other checks stay
+// on, and ASAN_OPTIONS can switch this one on again.
 extern "C" const char* __asan_default_options() {  // NOLINT(readability-identifier-naming): the sanitizer's name.
   return "new_delete_type_mismatch=0";
 }
@@ -26,17 +26,19 @@ namespace rtps = eprosima::fastrtps::rtps;
 using eprosima::fastrtps::Duration_t;
 using eprosima::fastrtps::types::ReturnCode_t;
 
-// Two programs that start together on a busy machine may miss each other's first announcements; however long the lease,
-// they find each other a few seconds later.
+// Two programs that start together on a busy machine may miss each other's first announcements. With this
+// period they find each other a few seconds later, even if the lease is long.
 constexpr double kMaxAnnouncementPeriodS = 3.0;
 
-// A library of its own must not print; and what peers can provoke must not fill a disk. Errors become values below.
+// A library must not print, and messages that peers can provoke must not fill a disk. Errors are returned as
+// values.
 void ConfigureLibraryOnce() {
   static std::once_flag once;
   std::call_once(once, [] {
     fd::Log::ClearConsumers();
     fd::Log::SetVerbosity(fd::Log::Kind::Error);
-    // Within one process a full reader would lose samples for good (measured): always go through the socket.
+    // Delivery within a process would lose samples for good when a reader is full (measured), so samples
+    // always go through the socket.
     eprosima::fastrtps::LibrarySettingsAttributes settings;
     settings.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;
     eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
@@ -58,7 +60,8 @@ fd::DomainParticipantQos ParticipantQos(const WireOptions& options, const std::s
   return qos;
 }
 
-// What both ends of a topic share. Every limit is set: the defaults hold 10 instances and refuse the next in silence.
+// The QoS that both ends of a topic share. Every limit is set, because the default allows only 10 instances
+// and refuses the next without an error.
 template <typename Qos>
 void SetCommon(const TopicProfile& profile, int depth, const WireOptions& options, Qos& qos) {
   qos.reliability().kind = fd::RELIABLE_RELIABILITY_QOS;
@@ -71,7 +74,8 @@ void SetCommon(const TopicProfile& profile, int depth, const WireOptions& option
   qos.resource_limits().max_samples = profile.max_instances * depth;
   qos.resource_limits().allocated_samples = 1;
   qos.data_sharing().off();
-  // Samples differ much in size; the other policies would keep the largest for each slot (measured: 7 times as much).
+  // The sizes of samples differ much. Other memory policies would reserve the largest size for every slot
+  // (measured: 7 times as much memory).
   qos.endpoint().history_memory_policy = rtps::DYNAMIC_RESERVE_MEMORY_MODE;
   if (profile.leased) {
     qos.liveliness().kind = fd::AUTOMATIC_LIVELINESS_QOS;

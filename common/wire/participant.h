@@ -1,6 +1,6 @@
-// The one file that makes DDS entities: the participant of a Bus, and the topics, writers and readers on it, with every
-// transport and QoS choice of idl/README.md. Nothing of it is left to a default or to a profile file.
-// Thread-safe. Fast DDS 2.x API: stays inside common/wire.
+// The one file that makes DDS entities: the participant of a Bus, and the topics, writers and readers on it,
+// with every transport and QoS choice of idl/README.md. Nothing of it is left to a default or to a profile
+// file. Thread-safe. This header uses the Fast DDS 2.x API; include it only inside common/wire.
 #pragma once
 
 #include <atomic>

@@ -59,7 +59,7 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
 
   std::atomic<int> matched_ = 0;
   const fd::TypeSupport type_{new typename Topic<Value>::Type()};
-  Participant::Writer writer_;  // Last: it calls the listener until it is gone.
+  Participant::Writer writer_;  // The last member: it calls the listener until it is destroyed.
 };
 
 }  // namespace cairn::wire

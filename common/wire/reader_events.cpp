@@ -54,7 +54,7 @@ void ReaderEvents::on_subscription_matched(Reader*, const fd::SubscriptionMatche
   matched_.store(status.current_count);
   const MutexLock lock(mutex_);
   news_.matched = status.current_count;
-  // A writer that leaves in good order may not run through its lease.
+  // A writer that leaves normally may be removed before its lease runs out, without a change of liveliness.
   if (status.current_count_change < 0) news_.liveliness.push_back({status.last_publication_handle, false, true});
   pending_ = true;
   wake_.NotifyOne();

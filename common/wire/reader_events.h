@@ -1,5 +1,5 @@
-// Collects what the middleware says about one reader and hands it to the subscription's thread: the listener side never
-// blocks, takes or calls back. Thread-safe; one waiting thread.
+// Collects the events that the middleware reports for one reader and hands it to the subscription's thread:
+// the listener side never blocks, takes or calls back. Thread-safe; one waiting thread.
 #pragma once
 
 #include <atomic>
@@ -14,7 +14,7 @@
 
 namespace cairn::wire {
 
-// Since the last Wait. Data may be waiting in any case.
+// The events since the last Wait. Data may be waiting whether or not there are events.
 struct ReaderNews {
   std::optional<int> matched;
   std::optional<int> lost_total;
@@ -24,7 +24,7 @@ struct ReaderNews {
 
 class ReaderEvents final : public eprosima::fastdds::dds::DataReaderListener {
  public:
-  // Blocks until there is data or news; nothing after Stop.
+  // Blocks until there are data or events. Returns nothing after Stop.
   [[nodiscard]] std::optional<ReaderNews> Wait();
   void Stop();
   [[nodiscard]] int matched() const { return matched_.load(); }

@@ -29,7 +29,7 @@ enum SubmessageId : std::uint8_t {
   kEprosimaStatistics = 0x80,
 };
 
-// Reads numbers of one submessage's byte order. The caller checks the size first.
+// Reads numbers in the byte order of one submessage. The caller must check the size first.
 struct Reader {
   Bytes bytes;
   bool little;
@@ -82,14 +82,16 @@ std::size_t EndOfParameters(const Reader& body, std::size_t at) {
   return 0;
 }
 
-// `base` at `at`, then the bit count and its words; `tail` bytes must follow.
+// Whether a sequence number set fits: its bit count stands at `at`, then come the words of bits, and `tail`
+// more bytes.
 bool SetFits(const Submessage& m, std::size_t at, std::size_t tail) {
   if (m.size() < at + 4) return false;
   const std::uint32_t bits = m.body.U32(at);
   return bits <= kMaxSetBits && m.size() >= at + 4 + (bits + 31) / 32 * 4 + tail;
 }
 
-// Inline QoS of DATA and DATA_FRAG. `fixed` bytes come before it; returns the payload's start, 0 where broken.
+// Steps over the inline QoS of DATA and DATA_FRAG, which follows `fixed` bytes. Returns where the payload
+// starts, or 0 if the inline QoS is broken.
 std::size_t PayloadStart(const Submessage& m, std::size_t fixed) {
   constexpr std::uint8_t kInlineQos = 0x02;
   const std::size_t qos = 4 + static_cast<std::size_t>(m.body.U16(2));
@@ -97,7 +99,7 @@ std::size_t PayloadStart(const Submessage& m, std::size_t fixed) {
   return (m.flags & kInlineQos) != 0 ? EndOfParameters(m.body, qos) : qos;
 }
 
-// Of participants, writers and readers (RTPS 9.3.1.5).
+// Entity ids of the built-in participants, writers and readers (RTPS 9.3.1.5).
 bool IsDiscoveryWriter(Bytes entity) {
   constexpr std::array<std::uint8_t, 3> kParticipants = {0x00, 0x01, 0x00};
   constexpr std::array<std::uint8_t, 3> kWriters = {0x00, 0x00, 0x03};
@@ -117,8 +119,8 @@ DatagramFault InspectData(const Submessage& m, SequenceGate& gate) {
   if (payload == 0) return DatagramFault::kParameterList;
   if ((m.flags & (kHasData | kHasKey)) == 0) return DatagramFault::kNone;
   if (m.size() < payload + 4) return DatagramFault::kFraming;
-  // Discovery data is a parameter list, parsed by the library itself. Other built-in data only claims to be one: Fast
-  // DDS sends its liveliness messages so.
+  // Discovery data are parameter lists, which the library itself parses. Other built-in data may be labelled
+  // as a parameter list without being one, such as the liveliness messages of Fast DDS.
   const std::uint8_t encoding = m.body.bytes[payload + 1];
   if (IsDiscoveryWriter(m.body.bytes.subspan(8, 4)) && (encoding & 0xfe) == kParameterListEncoding) {
     const Reader list{m.body.bytes.subspan(payload + 4), (encoding & 1) != 0};
@@ -150,7 +152,7 @@ DatagramFault InspectHeartbeat(const Submessage& m, SequenceGate& gate) {
   const std::int64_t first = m.body.Sequence(8);
   const std::int64_t last = m.body.Sequence(16);
   if (first < 0 || last < first - 1) return DatagramFault::kSequence;
-  // An empty history says first = last + 1; the gate counts what was written.
+  // In the heartbeat of an empty history first = last + 1. The gate gets the larger of the two numbers.
   return gate.Accept(m.Writer(4), std::max(last, first)) ? DatagramFault::kNone : DatagramFault::kSequence;
 }
 
@@ -159,7 +161,7 @@ DatagramFault InspectGap(const Submessage& m, SequenceGate& gate) {
   if (!SetFits(m, 24, 0)) return DatagramFault::kSequenceSet;
   const std::int64_t start = m.body.Sequence(8);
   const std::int64_t base = m.body.Sequence(16);
-  // The library walks from start to base one by one.
+  // The library loops over every number from start to base.
   if (start <= 0 || base < start || base - start > SequenceGate::kMaxJump) return DatagramFault::kSequence;
   return gate.Accept(m.Writer(4), base) ? DatagramFault::kNone : DatagramFault::kSequence;
 }
@@ -201,7 +203,7 @@ DatagramFault InspectSubmessage(const Submessage& m, SequenceGate& gate) {
     case kInfoDestination:
       return at_least(12);
     default:
-      return DatagramFault::kNone;  // Receivers skip what they do not know.
+      return DatagramFault::kNone;  // Receivers skip unknown submessages.
   }
 }
 
@@ -226,7 +228,7 @@ bool SequenceGate::Accept(const WriterKey& writer, std::int64_t sequence) {
     known->second = std::max(known->second, sequence);
     return true;
   }
-  // First word of a writer: it may have been up for years, not for ages.
+  // The limit for the first number of a writer. A writer that has run for years stays far below it.
   constexpr std::int64_t kMaxFirst = std::int64_t{1} << 40;
   if (sequence > kMaxFirst) return false;
   if (highest_.size() >= kMaxWriters) highest_.clear();
@@ -246,7 +248,7 @@ DatagramFault InspectDatagram(Bytes datagram, SequenceGate& gate) {
     const std::uint8_t flags = datagram[at + 1];
     const bool little = (flags & 1) != 0;
     const std::size_t length = Reader{datagram, little}.U16(at + 2);
-    // Length 0 means "to the end of the datagram", but for the two that may be empty.
+    // Length 0 means "to the end of the datagram", except for the two kinds of submessage that may be empty.
     const bool to_the_end = length == 0 && id != kPad && id != kInfoTimestamp;
     const std::size_t end = to_the_end ? datagram.size() : at + 4 + length;
     if (end > datagram.size()) return DatagramFault::kFraming;
@@ -254,7 +256,7 @@ DatagramFault InspectDatagram(Bytes datagram, SequenceGate& gate) {
     const Submessage submessage{id, flags, {datagram.subspan(at + 4, end - at - 4), little}, prefix};
     const DatagramFault fault = InspectSubmessage(submessage, gate);
     if (fault != DatagramFault::kNone) return fault;
-    if (id == kInfoSource) prefix = submessage.body.bytes.subspan(8, 12);  // Who the rest speaks for.
+    if (id == kInfoSource) prefix = submessage.body.bytes.subspan(8, 12);  // The sender of what follows.
     at = end;
   }
   return DatagramFault::kNone;

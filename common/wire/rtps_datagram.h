@@ -1,7 +1,8 @@
-// Looks at one UDP datagram before the middleware does and says whether it is safe to hand on. Debian's Fast DDS 2.9 is
-// built with asserts: some malformed datagrams abort the process, and absurd sequence numbers make it loop for minutes
-// (idl/README.md). Checks the framing of RTPS 2.x submessages and their fixed parts; not the meaning, not the sender.
-// Mitigation, not a cure: whoever may send to the port of a participant must be trusted not to attack it.
+// Checks one UDP datagram and decides whether it is safe to pass to the middleware. Debian's Fast DDS 2.9 is
+// built with asserts: some malformed datagrams abort the process, and sequence numbers that are far too large
+// make it loop for minutes (idl/README.md). The check covers the framing of RTPS 2.x submessages and their
+// fixed parts, but neither their meaning nor their sender. It reduces the risk but does not remove it: every
+// machine that can send to a participant's port must be trusted.
 // Source: OMG DDSI-RTPS 2.3, sections 8.3 and 9.4.
 #pragma once
 
@@ -18,25 +19,26 @@ namespace cairn::wire {
 
 enum class DatagramFault : std::uint8_t {
   kNone = 0,
-  kNotRtps,        // Header.
+  kNotRtps,        // The header is not that of RTPS 2.
   kFraming,        // A submessage longer than the datagram, or shorter than its fixed part.
-  kStatistics,     // eProsima's statistics submessage where its assert would fire.
-  kSequence,       // A sequence number that is not possible or jumps absurdly far.
+  kStatistics,     // A statistics submessage of eProsima that would trigger an assert.
+  kSequence,       // A sequence number that is impossible or far ahead of the previous one.
   kSequenceSet,    // More bits than a set can have, or than the submessage holds.
   kFragment,       // Fragment numbers that describe no sample, or a sample over the limit.
   kParameterList,  // A parameter longer than its list, or a list without end.
 };
 [[nodiscard]] std::string_view DatagramFaultName(DatagramFault fault);
 
-// Remembers how far each remote writer's sequence numbers have come, so that absurd jumps are told from long uptimes.
-// Thread-safe. Forgets everything when its table is full, which only costs the next jump of each writer its check.
+// Stores the highest sequence number of each remote writer, to tell jumps that are too large from the large
+// numbers of writers that have run for long. When its table is full, it forgets all writers; then only the
+// next number of each writer is not compared. Thread-safe.
 class SequenceGate {
  public:
   using WriterKey = std::array<std::uint8_t, 16>;  // GUID.
   static constexpr std::int64_t kMaxJump = std::int64_t{1} << 30;
   static constexpr std::size_t kMaxWriters = 16384;
 
-  // Accepts and remembers a sequence number of a writer, or refuses it.
+  // Accepts and stores a sequence number of a writer, or refuses it.
   [[nodiscard]] bool Accept(const WriterKey& writer, std::int64_t sequence);
 
  private:

@@ -1,10 +1,11 @@
 // The one type support of all topics: wraps a generated one, so that
-// - nothing thrown by decoding reaches the middleware (an unknown encapsulation would end the process): a sample that
-//   does not decode is delivered as such, and the reader counts it;
-// - keys are computed under a lock (the generated ones share a buffer: wrong keys from two threads, measured);
+// - nothing thrown by decoding reaches the middleware (an unknown encapsulation would end the process): a
+//   sample that does not decode is delivered as such, and the reader counts it;
+// - keys are computed under a lock (the generated ones share a buffer: wrong keys from two threads,
+//   measured);
 // - no type objects are announced (Cyclone DDS would refuse the topic);
 // - replies to other clients are skipped by their first eight bytes.
-// Fast DDS 2.x API: stays inside common/wire.
+// This header uses the Fast DDS 2.x API; include it only inside common/wire.
 #pragma once
 
 #include <exception>
@@ -25,10 +26,11 @@ template <typename Wire>
 struct Sample {
   Wire value;
   Decoding decoding = Decoding::kDecoded;
-  std::optional<ClientId> only;  // Set by a reader of replies before it takes: whose are wanted.
+  std::optional<ClientId> only;  // Set by a reader of replies: the client whose replies it wants.
 };
 
-// The client id that leads a serialised reply; nothing where it is too short or not plain CDR.
+// Returns the client id at the start of a serialised reply; nothing if the reply is too short or not plain
+// CDR.
 [[nodiscard]] inline std::optional<ClientId> PeekClient(const std::uint8_t* payload, std::uint32_t size) {
   constexpr std::uint8_t kCdrLittleEndian = 1;
   constexpr std::uint32_t kEncapsulationBytes = 4;
@@ -63,7 +65,7 @@ class SampleType : public eprosima::fastdds::dds::TopicDataType {
     }
   }
 
-  // Always true: what did not decode says so itself.
+  // Always returns true: a sample that cannot be decoded is marked and delivered.
   bool deserialize(Payload* payload, void* data) override {
     Sample<Wire>& sample = Of(data);
     sample.decoding = Decoding::kUndecodable;
@@ -78,7 +80,7 @@ class SampleType : public eprosima::fastdds::dds::TopicDataType {
     try {
       if (generated_.deserialize(payload, &sample.value)) sample.decoding = Decoding::kDecoded;
     } catch (const std::exception&) {
-      // Counted by the reader.
+      // The sample stays marked as undecodable, and the reader counts it.
     }
     return true;
   }
@@ -92,7 +94,8 @@ class SampleType : public eprosima::fastdds::dds::TopicDataType {
   bool getKey(void* data, Handle* handle, bool force_md5) override {
     if (!m_isGetKeyDefined) return false;
     if (Of(data).decoding != Decoding::kDecoded) {
-      // One instance for all garbage. Refusing the sample instead would have it sent again for ever.
+      // All samples that cannot be decoded share one instance. If they were refused, the sender would repeat
+      // them for ever.
       for (int i = 0; i < 16; ++i) handle->value[i] = 0xff;
       return true;
     }

@@ -1,5 +1,6 @@
-// A typed reader of one topic with a thread of its own. The middleware's threads only wake it: it takes, checks bounds,
-// converts and calls back with no lock of the middleware held, so a slow callback holds up its topic and nothing else.
+// A typed reader of one topic with a thread of its own. The middleware's threads only wake this thread. It
+// takes the samples, checks their bounds, converts them and runs the callback without holding a lock of the
+// middleware, so a slow callback delays only its own topic.
 #pragma once
 
 #include <atomic>
@@ -95,9 +96,9 @@ class DdsSubscription final : public Subscription {
   const std::optional<ClientId> only_;
   std::atomic<std::uint64_t> refused_ = 0;
   const fd::TypeSupport type_{new typename Topic<Value>::Type()};
-  WriterClients clients_;  // Only the thread's.
+  WriterClients clients_;  // Used only on the subscription's thread.
   ReaderEvents listener_;
-  Participant::Reader reader_;  // After the listener: it calls it until it is gone.
+  Participant::Reader reader_;  // After the listener, which it calls until it is destroyed.
   std::thread thread_;
 };
 

@@ -1,5 +1,5 @@
-// Every topic of Cairn's wire: its name, its type, and what its two ends promise. idl/README.md is the prose of this
-// table.
+// All topics of Cairn's wire, with their names, their types and their QoS. idl/README.md describes the same
+// table in words.
 #pragma once
 
 #include "cairn/jobPubSubTypes.h"
@@ -17,20 +17,20 @@
 
 namespace cairn::wire {
 
-// All topics are reliable with bounded histories; the rest differs.
+// The QoS of a topic. All topics are reliable and have bounded histories; the members hold what differs.
 struct TopicProfile {
   const char* name;
   bool transient_local;       // Late joiners get the last samples of each instance.
-  int writer_depth;           // Samples kept per instance until acknowledged; the oldest gives way.
-  int reader_depth;           // Samples waiting per instance for the callback; the oldest gives way.
-  int max_instances;          // Per end. 1: no key.
-  double deadline_s;          // 0: none. Offered only.
-  bool leased;                // Offers, and asks for, the liveliness lease.
-  std::uint8_t heartbeat_ms;  // While something is unacknowledged.
+  int writer_depth;           // Samples kept per instance until acknowledged; a new one replaces the oldest.
+  int reader_depth;           // Samples per instance waiting for the callback; a new one replaces the oldest.
+  int max_instances;          // For the writer and for the reader. 1: the topic has no key.
+  double deadline_s;          // Offered by writers, not requested by readers. 0: none.
+  bool leased;                // Whether both ends use the liveliness lease.
+  std::uint8_t heartbeat_ms;  // Period of heartbeats while a sample is unacknowledged.
 };
 
-// Readers of streams, sessions, requests and replies must not lose to a busy callback what has been acknowledged, so
-// they wait in a longer queue than the writer's.
+// Samples of streams, sessions, requests and replies that have been acknowledged must not be lost while a
+// callback is busy. Therefore the reader's queue is longer than the writer's.
 template <typename Value>
 struct Topic;
 

@@ -1,4 +1,5 @@
-// What is said of the wire beside the configuration file, and in which order: one rule for every program with a bus.
+// Settings of the wire that do not come from the configuration file, and their order of precedence. All
+// programs use the same order.
 #pragma once
 
 #include <cstdint>
@@ -12,12 +13,13 @@
 namespace cairn::wire {
 
 struct WireArguments {
-  std::vector<std::string> assignments;  // --set KEY=VALUE, of any section the program has.
+  std::vector<std::string> assignments;  // --set KEY=VALUE, with keys of all sections that the program has.
   std::optional<std::int64_t> domain;    // --domain
 };
 
-// Least first: CAIRN_DOMAIN of the environment (empty says nothing), --set, --domain. The tree must have `wire.domain`;
-// a file is to be applied before. An error names its source; what came before it stays applied.
+// Applies the settings in this order, so that the last one wins: the environment variable CAIRN_DOMAIN
+// (ignored if empty), --set, --domain. The options must have a key `wire.domain`, and a configuration file
+// must be applied before. An error names its source; the settings before it stay applied.
 [[nodiscard]] Result<void> Apply(const WireArguments& arguments, const VisitOptions& visit);
 
 }  // namespace cairn::wire

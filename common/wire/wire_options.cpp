@@ -46,7 +46,7 @@ std::vector<std::string> Split(const std::string& text) {
 }  // namespace
 
 Result<void> Validate(const WireOptions& options) {
-  constexpr std::int64_t kMaxDomain = 232;  // Beyond, ports leave 16 bits (RTPS 9.6.1.1).
+  constexpr std::int64_t kMaxDomain = 232;  // A larger domain would need ports beyond 16 bits (RTPS 9.6.1.1).
   if (options.domain < 0 || options.domain > kMaxDomain) {
     return Fail(StatusCode::kInvalidArgument, "wire.domain: " + std::to_string(options.domain) + " is not in 0..232");
   }
@@ -74,7 +74,7 @@ Result<void> Validate(const WireOptions& options) {
 Result<void> RequireInterfaces(const WireOptions& options) {
   const std::set<std::string> local = LocalAddresses();
   for (const std::string& address : options.interfaces) {
-    // Fast DDS would silently ignore it, and bind nothing.
+    // Without this check Fast DDS would ignore the address and bind nothing, without an error.
     if (local.count(address) == 0) {
       return Fail(StatusCode::kUnavailable, "wire.interfaces: this machine has no address " + address);
     }
@@ -84,15 +84,19 @@ Result<void> RequireInterfaces(const WireOptions& options) {
 
 void Visit(OptionVisitor& visitor, WireOptions& options) {
   visitor.Integer("domain", options.domain, "", 0, 232,
-                  "DDS domain; robots, server and clients of one fleet share it.");
+                  ForOperators("DDS domain. The robots, the server and the clients of one fleet use the same one."));
   std::string interfaces = Join(options.interfaces);
   visitor.Text("interfaces", interfaces,
-               "IPv4 addresses to bind, comma-separated. Only these: the network behind them is trusted.");
+               ForOperators("IPv4 addresses of this machine that the server uses, separated by commas. Only these are "
+                            "bound: everybody in the networks behind them is trusted."));
   options.interfaces = Split(interfaces);
   visitor.Real("liveliness_lease_s", options.liveliness_lease_s, "s", 0.1, 3600.0,
-               "A client silent for longer is away. All of a fleet use the same value, or robots a shorter one.");
+               ForOperators("A robot or client that is silent for longer counts as away. The whole fleet uses the same "
+                            "value, or the robots a smaller one."));
   visitor.Real("participant_lease_s", options.participant_lease_s, "s", 0.1, 3600.0,
-               "A process silent for longer is forgotten, and greeted anew when it is back.");
+               "A process that is silent for longer is forgotten, and is discovered anew when it returns.");
+  visitor.Require(options.liveliness_lease_s <= options.participant_lease_s, "liveliness_lease_s", "must not exceed",
+                  "participant_lease_s");
 }
 
 }  // namespace cairn::wire

@@ -1,4 +1,5 @@
-// Which client stands behind each remote writer of sessions: the last one its requests named. Used by one thread.
+// The client that each remote writer of session requests belongs to: the one that its last request named. Not
+// thread-safe: one owner.
 #pragma once
 
 #include <fastdds/dds/common/InstanceHandle.hpp>
@@ -12,21 +13,21 @@ namespace cairn::wire {
 struct LivelinessChange {
   eprosima::fastdds::dds::InstanceHandle_t writer;
   bool alive = false;
-  bool gone = false;  // Unmatched: it will not come back under this handle.
+  bool gone = false;  // The writer is no longer matched; it will not return under this handle.
 };
 
 class WriterClients {
  public:
   using Writer = eprosima::fastdds::dds::InstanceHandle_t;
 
-  // A request came from the writer. Returns whether its lease holds.
+  // Records a request of the writer. Returns whether the writer's lease is valid.
   bool Heard(const Writer& writer, ClientId client) {
     Entry& entry = entries_[writer];
     entry.client = client;
     return entry.alive;
   }
 
-  // Returns the client to tell about, where one is known and its state has changed.
+  // Returns the client whose state has changed, if the writer's client is known.
   std::optional<ClientId> Changed(const LivelinessChange& change) {
     const auto known = entries_.find(change.writer);
     if (known == entries_.end()) {

@@ -1,4 +1,5 @@
-# Run by `cmake --install`: the unit and the configuration it names, for the prefix of that moment (--prefix, DESTDIR).
+# Run by `cmake --install`. Installs the unit and its configuration for the prefix of this call (--prefix,
+# DESTDIR).
 set(bindir ${CMAKE_INSTALL_PREFIX}/bin)
 set(docdir ${CMAKE_INSTALL_PREFIX}/share/doc/cairn)
 set(sysconfdir ${CMAKE_INSTALL_PREFIX}/etc)
@@ -6,13 +7,13 @@ if(CMAKE_INSTALL_PREFIX STREQUAL "/usr")
   set(sysconfdir /etc)
 endif()
 
-# Whoever has changed the configuration keeps it; the defaults of this version then lie beside it.
+# An existing configuration is kept; the defaults of this version are then installed beside it.
 set(name cairnd.yaml)
 if(EXISTS $ENV{DESTDIR}${sysconfdir}/cairn/cairnd.yaml)
   set(name cairnd.yaml.default)
 endif()
 file(INSTALL ${CMAKE_CURRENT_LIST_DIR}/../cairnd.yaml DESTINATION ${sysconfdir}/cairn RENAME ${name})
-# The service's user reads it: whatever root's umask is, the folder can be entered.
+# The service's user must be able to read the configuration, whatever the umask of root is.
 file(CHMOD $ENV{DESTDIR}${sysconfdir}/cairn PERMISSIONS
   OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
 

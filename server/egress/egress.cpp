@@ -27,7 +27,7 @@ struct Egress::Publications {
     return {};
   }
 
-  // All of them, ending at the first that fails.
+  // Advertises all topics; stops at the first failure.
   template <typename... Values>
   Result<void> AdvertiseAll(wire::Bus& bus, std::tuple<Of<Values>...>& /*types*/) {
     Result<void> result;
@@ -58,7 +58,7 @@ Egress::~Egress() {
 void Egress::Finish() {
   if (threads_.empty()) return;
   threads_.clear();
-  // The goodbye is heard by whoever still listens; nobody who does not holds up the end.
+  // Readers that still listen get the last states; one that does not answer may not delay the end for long.
   const auto deadline = std::chrono::steady_clock::now() + kGoodbyePatience;
   const auto heard = [&deadline](auto& publication) {
     const auto left = deadline - std::chrono::steady_clock::now();
@@ -79,7 +79,7 @@ void Egress::Run(BoundedChannel<OutboundValue>& lane) {
         *value);
     if (published) continue;
     unpublished_.fetch_add(1, std::memory_order_relaxed);
-    // When the server stops, a reader that takes nothing does not hold up the end.
+    // While the server stops, it does not wait for a reader that takes nothing.
     if (lane.closed()) return;
   }
 }

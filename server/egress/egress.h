@@ -1,7 +1,8 @@
-// The DDS door outwards: one thread per outbound lane takes plain values and publishes them, so that a client that
-// reads a large answer slowly delays neither poses nor tiles. A value the middleware does not take within its bounded
-// blocking time is counted and left behind. Thread rule: Open starts the threads; Finish (after Outbound::Close)
-// returns when everything left is published or not taken.
+// Publishes the server's values on DDS. Each outbound lane has its own thread, so that a client that reads a
+// large answer slowly delays neither poses nor tiles. A value that the middleware does not accept within its
+// bounded blocking time is counted and dropped; the room that sent it is not told. Thread rule: Open starts
+// the threads; Finish (after Outbound::Close) returns when each remaining value has been published or
+// dropped.
 #pragma once
 
 #include <atomic>
@@ -19,7 +20,7 @@ namespace cairn::server {
 class Egress {
  public:
   [[nodiscard]] static Result<std::unique_ptr<Egress>> Open(wire::Bus& bus, Outbound& outbound);
-  // REQUIRES: Finish was called, or Outbound::Close.
+  // REQUIRES: Finish or Outbound::Close was called.
   ~Egress();
 
   void Finish();
@@ -34,7 +35,7 @@ class Egress {
   Outbound& outbound_;
   const std::unique_ptr<Publications> publications_;
   std::atomic<std::uint64_t> unpublished_{0};
-  std::vector<std::jthread> threads_;  // Last: they use everything above.
+  std::vector<std::jthread> threads_;  // The last member, because the threads use the members above.
 };
 
 }  // namespace cairn::server

@@ -3,14 +3,12 @@
 #include <memory>
 #include <utility>
 
-#include "server/slam/scan_pipeline.h"
-
 namespace cairn::server {
 
 ScanArrival Admit(ScanSample&& sample, std::chrono::steady_clock::time_point received) {
-  ScanArrival arrival{
-      .stream = sample.stream, .scan = nullptr, .refused = slam::RefusalOf(sample.scan), .received = received};
-  if (arrival.refused) {
+  ScanArrival arrival{.stream = sample.stream, .scan = nullptr, .refused = {}, .received = received};
+  if (const auto valid = ValidateScan(sample.scan); !valid) {
+    arrival.refused = DropReasonOf(valid.error().fault);
     Scan stub;
     stub.sequence = sample.scan.sequence;
     stub.stamp = sample.scan.stamp;

@@ -1,5 +1,5 @@
-// What a door decides about a sample before it becomes an event: valid or refused, and why. The only place where
-// contents of the wire are checked. Stateless, thread-safe.
+// Decides whether a received sample is valid or refused, and why. The contents of scans and odometry are
+// checked only here. Stateless, thread-safe.
 #pragma once
 
 #include <chrono>
@@ -9,7 +9,7 @@
 
 namespace cairn::server {
 
-// A refused scan keeps its sequence and stamp only.
+// A refused scan keeps only its sequence and its stamp.
 [[nodiscard]] ScanArrival Admit(ScanSample&& sample, std::chrono::steady_clock::time_point received);
 [[nodiscard]] OdometryArrival Admit(OdometrySample&& sample);
 

@@ -20,18 +20,20 @@ Ingress::~Ingress() {
 }
 
 void Ingress::Close() {
+  malformed_until_closed_ = malformed();
   subscriptions_.clear();
 }
 
 std::uint64_t Ingress::malformed() const {
-  return std::accumulate(subscriptions_.begin(), subscriptions_.end(), std::uint64_t{0},
+  return std::accumulate(subscriptions_.begin(), subscriptions_.end(), malformed_until_closed_,
                          [](std::uint64_t sum, const auto& subscription) { return sum + subscription->refused(); });
 }
 
 template <typename Value>
 Result<void> Ingress::Add(wire::Bus& bus, void (Ingress::*take)(Value&&), wire::SubscriptionEvents events) {
   events.incompatible_qos = [](const std::string& policy) {
-    spdlog::warn("a client's endpoint will never match: its {} is incompatible (see idl/README.md)", policy);
+    spdlog::warn("a client cannot connect: its QoS policy {} is incompatible with the server's (see idl/README.md)",
+                 policy);
   };
   auto subscription =
       bus.Subscribe<Value>([this, take](Value&& value) { (this->*take)(std::move(value)); }, std::move(events));
@@ -43,11 +45,23 @@ Result<void> Ingress::Add(wire::Bus& bus, void (Ingress::*take)(Value&&), wire::
 Result<void> Ingress::Subscribe(wire::Bus& bus) {
   wire::SubscriptionEvents session_events;
   session_events.liveliness = [this](ClientId client, bool alive) { Push(ClientLiveliness{client, alive}); };
-  // Streams first: a robot that is told its session is open may rely on being heard.
+  // Streams come first: once a robot learns that its session is open, its scans must arrive.
   if (auto added = Add<ScanSample>(bus, &Ingress::Take); !added) return added;
   if (auto added = Add<OdometrySample>(bus, &Ingress::Take); !added) return added;
   if (auto added = Add<Request>(bus, &Ingress::Take); !added) return added;
   return Add<SessionRequest>(bus, &Ingress::Take, std::move(session_events));
+}
+
+void Ingress::Take(SessionRequest&& request) {
+  SessionState busy{.robot_id = HashName(request.robot),
+                    .client = request.client,
+                    .robot = request.robot,
+                    .site = request.site,
+                    .phase = SessionPhase::kRefused,
+                    .status = {StatusCode::kResourceExhausted, "the server is busy; try again"}};
+  if (inbound_.TryPush(std::move(request))) return;
+  overflow_.fetch_add(1, std::memory_order_relaxed);
+  outbound_.Send(std::move(busy));
 }
 
 void Ingress::Take(ScanSample&& sample) {
@@ -64,7 +78,7 @@ void Ingress::Take(Request&& request) {
   busy.sequence = request.sequence;
   if (inbound_.TryPush(std::move(request))) return;
   overflow_.fetch_add(1, std::memory_order_relaxed);
-  busy.status = {StatusCode::kResourceExhausted, "the server is busy; try again"};
+  busy.status = {StatusCode::kResourceExhausted, "the server is busy; try again later"};
   outbound_.Send(std::move(busy));
 }
 

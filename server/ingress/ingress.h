@@ -1,9 +1,9 @@
-// The DDS door inwards: subscribes to what robots and clients send, validates, and pushes plain values into the inbound
-// channel. Callbacks never wait; what does not fit is left out and counted, a request is answered "busy".
-// Thread rule: callbacks run on DDS threads; Close returns after the last one.
+// Subscribes to what robots and clients send over DDS, validates it, and pushes plain values into the inbound
+// channel. Callbacks never wait: when the channel is full, values are dropped and counted, and requests are
+// answered RESOURCE_EXHAUSTED. Thread rule: callbacks run on DDS threads. Close returns after the last
+// callback; the counts stay readable. Call Close and malformed from one thread.
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <cstdint>
 #include <memory>
@@ -22,9 +22,9 @@ class Ingress {
   ~Ingress();
 
   void Close();
-  // Values left out because the channel was full.
+  // Values dropped because the channel was full.
   [[nodiscard]] std::uint64_t overflow() const { return overflow_.load(std::memory_order_relaxed); }
-  // Samples that were no values: lengths or enums out of range.
+  // Samples dropped because lengths or enums were out of range.
   [[nodiscard]] std::uint64_t malformed() const;
 
  private:
@@ -32,7 +32,7 @@ class Ingress {
   Result<void> Subscribe(wire::Bus& bus);
   template <typename Value>
   Result<void> Add(wire::Bus& bus, void (Ingress::*take)(Value&&), wire::SubscriptionEvents events = {});
-  void Take(SessionRequest&& request) { Push(std::move(request)); }
+  void Take(SessionRequest&& request);
   void Take(ScanSample&& sample);
   void Take(OdometrySample&& sample);
   void Take(Request&& request);
@@ -41,6 +41,7 @@ class Ingress {
   Inbound& inbound_;
   Outbound& outbound_;
   std::atomic<std::uint64_t> overflow_{0};
+  std::uint64_t malformed_until_closed_ = 0;
   std::vector<std::unique_ptr<wire::Subscription>> subscriptions_;
 };
 

@@ -1,6 +1,6 @@
-// How many other servers answer in this DDS domain: on other machines, or in networks joined later. Two both take every
-// scan and answer every question, each with half the truth. (Of one machine: ops/domain_lock.) A server is whoever
-// subscribes to requests. Thread rule: one thread.
+// How many other servers answer in this DDS domain: on other machines, or in networks joined later. Two servers both
+// take every scan and answer every question, and each knows only a part. (A second server on the same machine is
+// refused by ops/domain_lock.) A server is whoever subscribes to requests. Thread rule: one thread.
 #pragma once
 
 #include <memory>
@@ -13,9 +13,9 @@ namespace cairn::server {
 class OtherServers {
  public:
   [[nodiscard]] static Result<std::unique_ptr<OtherServers>> Watch(wire::Bus& bus);
-  // Once this process subscribes to requests itself.
+  // Valid after this process itself has subscribed to requests.
   [[nodiscard]] int count() const;
-  // Whether there are more than at the last call.
+  // Returns whether there are more servers than at the last call.
   [[nodiscard]] bool Joined();
 
  private:

@@ -1,5 +1,6 @@
-// What running work sees of its job: whether to go on, and where to say how far it is.
-// Thread rule: the worker calls; Cancel may come from any thread.
+// The interface of a job for its running work: it tells whether the job was cancelled and takes reports of
+// progress.
+// Thread rule: used on the worker's thread; Cancel may be called from any thread.
 #pragma once
 
 #include <atomic>
@@ -16,7 +17,7 @@ class JobControl {
 
   void Cancel() { cancelled_.store(true, std::memory_order_relaxed); }
   [[nodiscard]] bool cancelled() const { return cancelled_.load(std::memory_order_relaxed); }
-  // 0..1.
+  // Reports the progress, 0..1.
   void Progress(double progress) const { on_progress_(progress); }
 
  private:
@@ -24,7 +25,7 @@ class JobControl {
   std::atomic<bool> cancelled_{false};
 };
 
-// What finished work leaves on its job.
+// The result of finished work, stored in its job.
 struct JobOutcome {
   double cost_before = 0.0;
   double cost_after = 0.0;

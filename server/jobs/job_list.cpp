@@ -4,14 +4,20 @@
 #include <utility>
 
 namespace cairn::server {
+namespace {
 
-JobList::JobList(const JobsOptions& options, std::function<bool(OutboundValue)> send, std::function<Stamp()> now)
-    : options_(options), send_(std::move(send)), now_(std::move(now)) {}
+// Shortest time between two progress messages of one job. People do not need them more often.
+constexpr auto kProgressPeriod = std::chrono::milliseconds(200);
+
+}  // namespace
+
+JobList::JobList(const JobsOptions& options, Outbound& outbound, std::function<Stamp()> now)
+    : options_(options), outbound_(outbound), now_(std::move(now)) {}
 
 Result<Job> JobList::Add(const std::string& site, JobKind kind) {
   const MutexLock lock(mutex_);
   if (!MakeRoom()) {
-    return cairn::Fail(StatusCode::kResourceExhausted, "too many jobs are waiting (jobs.max_kept)");
+    return cairn::Fail(StatusCode::kResourceExhausted, "too many jobs are unfinished (jobs.max_kept); try again later");
   }
   const std::uint64_t id = next_++;
   Entry& entry = jobs_[id];
@@ -67,7 +73,7 @@ Result<Job> JobList::Cancel(std::uint64_t id) {
   Job& job = found->second.job;
   if (IsFinal(job.state)) {
     return cairn::Fail(StatusCode::kFailedPrecondition,
-                       "job " + std::to_string(id) + " is over: " + std::string(JobStateName(job.state)));
+                       "job " + std::to_string(id) + " has already ended: " + std::string(JobStateName(job.state)));
   }
   found->second.control->Cancel();
   if (job.state == JobState::kQueued) {
@@ -121,13 +127,13 @@ void JobList::Progress(std::uint64_t id, double progress) {
   Entry& entry = found->second;
   entry.job.progress = std::clamp(progress, entry.job.progress, 1.0);
   const auto now = std::chrono::steady_clock::now();
-  if (now - entry.progress_sent < std::chrono::duration<double>(1.0 / options_.progress_rate_hz)) return;
+  if (now - entry.progress_sent < kProgressPeriod) return;
   entry.progress_sent = now;
   SendLocked(entry);
 }
 
 void JobList::SendLocked(Entry& entry) {
-  entry.unsent = !send_(entry.job);
+  entry.unsent = !outbound_.Send(entry.job);
 }
 
 bool JobList::MakeRoom() {

@@ -1,6 +1,6 @@
-// Every job the server remembers, and the publication of each change. Bounded: the oldest finished job is forgotten
-// first; when nothing finished is left to forget, a new one is refused. Ids are unique for the server's life.
-// Thread rule: any thread.
+// All jobs that the server keeps; every change of a job is published. The list is bounded: a new job replaces
+// the oldest finished one, and is refused if no job is finished. Ids are unique while the server runs. Thread
+// rule: any thread.
 #pragma once
 
 #include <chrono>
@@ -20,24 +20,26 @@ namespace cairn::server {
 
 class JobList {
  public:
-  // `send` publishes and never waits; `now` is the server's clock.
-  JobList(const JobsOptions& options, std::function<bool(OutboundValue)> send, std::function<Stamp()> now);
+  // `now` is the server's clock.
+  JobList(const JobsOptions& options, Outbound& outbound, std::function<Stamp()> now);
 
-  // A new job, queued. RESOURCE_EXHAUSTED.
+  // Adds a queued job. RESOURCE_EXHAUSTED: the list is full of unfinished jobs.
   Result<Job> Add(const std::string& site, JobKind kind);
-  // False where it was cancelled meanwhile. From then on Cancel reaches the running work through its control.
+  // Marks the job as running. Returns false if it was cancelled meanwhile. From now on Cancel sets the flag
+  // in the job's JobControl.
   bool Start(std::uint64_t id);
   void Succeed(std::uint64_t id, const JobOutcome& outcome);
-  // kCancelled where the status is CANCELLED, else kFailed.
+  // Ends the job as kCancelled if the status is CANCELLED, else as kFailed.
   void Fail(std::uint64_t id, const Status& status);
-  // NOT_FOUND; FAILED_PRECONDITION where it is over. Running work ends when it next looks.
+  // NOT_FOUND: no such job. FAILED_PRECONDITION: the job has already ended. Running work ends at its next
+  // check.
   Result<Job> Cancel(std::uint64_t id);
   void CancelAll();
 
   [[nodiscard]] Result<Job> Find(std::uint64_t id) const;
-  [[nodiscard]] std::vector<Job> OfSite(const std::string& site) const;  // Of all sites where empty.
+  [[nodiscard]] std::vector<Job> OfSite(const std::string& site) const;  // An empty name: the jobs of all sites.
   [[nodiscard]] std::shared_ptr<const JobControl> ControlOf(std::uint64_t id) const;
-  // Publishes what could not be published before.
+  // Publishes the changes that could not be published before.
   void Tick();
 
  private:
@@ -53,7 +55,7 @@ class JobList {
   void End(std::uint64_t id, JobState state, const std::function<void(Job&)>& fill);
 
   const JobsOptions options_;
-  const std::function<bool(OutboundValue)> send_;
+  Outbound& outbound_;
   const std::function<Stamp()> now_;
   mutable Mutex mutex_;
   std::map<std::uint64_t, Entry> jobs_ CAIRN_GUARDED_BY(mutex_);

@@ -1,22 +1,24 @@
 #include "server/jobs/job_worker.h"
 
+#include <spdlog/spdlog.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <exception>
 #include <utility>
 
 namespace cairn::server {
 namespace {
 
-// On Linux, niceness belongs to the thread. Failing is harmless: the job is only less polite.
+// On Linux the nice value is set per thread. A failure is ignored: the job then runs at normal priority.
 void LowerOwnPriority(std::int64_t nice) {
   static_cast<void>(setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), static_cast<int>(nice)));
 }
 
 }  // namespace
 
-JobWorker::JobWorker(const JobsOptions& options, JobList& list, std::map<JobKind, JobWork> works)
-    : options_(options), list_(list), works_(std::move(works)), queue_(static_cast<std::size_t>(options.max_queued)) {}
+JobWorker::JobWorker(const JobsOptions& options, JobList& list, JobWork work)
+    : options_(options), list_(list), work_(std::move(work)), queue_(static_cast<std::size_t>(options.max_queued)) {}
 
 JobWorker::~JobWorker() {
   Stop();
@@ -27,12 +29,9 @@ void JobWorker::Start() {
 }
 
 Result<Job> JobWorker::Submit(const std::string& site, JobKind kind, bool enable) {
-  if (!works_.contains(kind)) {
-    return Fail(StatusCode::kUnimplemented, "no job of kind '" + std::string(JobKindName(kind)) + "' is offered");
-  }
   auto job = list_.Add(site, kind);
   if (job && !queue_.TryPush(Ticket{job->id, enable})) {
-    const Status full{StatusCode::kResourceExhausted, "too many jobs are waiting (jobs.max_queued)"};
+    const Status full{StatusCode::kResourceExhausted, "too many jobs are waiting (jobs.max_queued); try again later"};
     list_.Fail(job->id, full);
     return tl::unexpected(full);
   }
@@ -54,12 +53,25 @@ void JobWorker::Run(const std::stop_token& stop) {
     if (!list_.Start(ticket->id)) continue;
     const auto job = list_.Find(ticket->id);
     const auto control = list_.ControlOf(ticket->id);
-    const auto outcome = works_.at(job->kind)(*job, ticket->enable, *control);
+    spdlog::info("job {}: started, {} of site {}", job->id, JobKindName(job->kind), job->site);
+    const auto outcome = Work(*job, ticket->enable, *control);
     if (outcome) {
+      spdlog::info("job {}: succeeded, map version {}, disagreement {:.6f} -> {:.6f} m^2 ({})", job->id,
+                   outcome->map_version, outcome->cost_before, outcome->cost_after, outcome->message);
       list_.Succeed(ticket->id, *outcome);
     } else {
+      spdlog::info("job {}: ended without a result: {}", job->id, outcome.error().message);
       list_.Fail(ticket->id, outcome.error());
     }
+  }
+}
+
+Result<JobOutcome> JobWorker::Work(const Job& job, bool enable, const JobControl& control) const {
+  try {
+    return work_(job, enable, control);
+  } catch (const std::exception& error) {
+    spdlog::error("job {} of site {} failed with an exception: {}", job.id, job.site, error.what());
+    return Fail(StatusCode::kInternal, std::string("the job failed with an exception: ") + error.what());
   }
 }
 

@@ -1,10 +1,11 @@
-// The thread that does jobs, one after the other, at low priority, so that streaming and queries go on. Bounded queue:
-// a full one refuses. What a kind of job does is handed in as a function.
+// A thread that runs jobs one after the other at low priority, so that they do not slow down streams and
+// queries. The queue is bounded; jobs are refused when it is full. The work of a job is passed in as a
+// function. If the work ends with an exception, its job fails and the worker continues with the next job. The
+// start and the end of each job are logged.
 // Thread rule: Submit from any thread; the work runs on the worker's thread.
 #pragma once
 
 #include <functional>
-#include <map>
 #include <string>
 #include <thread>
 
@@ -13,18 +14,19 @@
 
 namespace cairn::server {
 
-// `enable`: make the map version it publishes the enabled one. Status CANCELLED where it found itself cancelled.
+// The work of a job. `enable`: whether to enable the map version that the job publishes. Returns CANCELLED if
+// the work ended because the job was cancelled.
 using JobWork = std::function<Result<JobOutcome>(const Job& job, bool enable, const JobControl& control)>;
 
 class JobWorker {
  public:
-  JobWorker(const JobsOptions& options, JobList& list, std::map<JobKind, JobWork> works);
+  JobWorker(const JobsOptions& options, JobList& list, JobWork work);
   ~JobWorker();
 
   void Start();
-  // UNIMPLEMENTED for a kind without work; RESOURCE_EXHAUSTED where the queue is full.
+  // RESOURCE_EXHAUSTED: the queue is full.
   Result<Job> Submit(const std::string& site, JobKind kind, bool enable);
-  // Cancels what runs and waits; returns when the thread has ended.
+  // Cancels the running and the waiting jobs. Returns when the thread has ended.
   void Stop();
 
  private:
@@ -33,12 +35,13 @@ class JobWorker {
     bool enable = false;
   };
   void Run(const std::stop_token& stop);
+  Result<JobOutcome> Work(const Job& job, bool enable, const JobControl& control) const;
 
   const JobsOptions options_;
   JobList& list_;
-  const std::map<JobKind, JobWork> works_;
+  const JobWork work_;
   BoundedChannel<Ticket> queue_;
-  std::jthread thread_;  // Last: stops before anything it uses goes.
+  std::jthread thread_;  // The last member: it stops before the members it uses are destroyed.
 };
 
 }  // namespace cairn::server

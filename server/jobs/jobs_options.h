@@ -1,4 +1,4 @@
-// How much work on the side the server takes.
+// Options of the server's background jobs.
 #pragma once
 
 #include <cstdint>
@@ -8,11 +8,10 @@
 namespace cairn::server {
 
 struct JobsOptions {
-  std::int64_t max_queued = 16;    // Waiting; more are refused (RESOURCE_EXHAUSTED).
-  std::int64_t max_kept = 256;     // Jobs remembered; the oldest finished one is forgotten first.
-  double progress_rate_hz = 5.0;   // Progress published per job.
-  std::int64_t nice = 10;          // Of the worker thread: higher yields more to streaming, and jobs take longer.
-  double snapshot_timeout_s = 10;  // A robot that has not shown its state to a job by then fails the job.
+  std::int64_t max_queued = 16;
+  std::int64_t max_kept = 256;
+  std::int64_t nice = 10;
+  double snapshot_timeout_s = 10;
 };
 void Visit(OptionVisitor& visitor, JobsOptions& options);
 

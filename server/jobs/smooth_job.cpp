@@ -1,17 +1,28 @@
 #include "server/jobs/smooth_job.h"
 
+#include <algorithm>
+#include <chrono>
+#include <future>
+#include <map>
 #include <memory>
 #include <utility>
 
+#include "common/bounded_channel.h"
 #include "server/slam/smoothing/smoothed_map.h"
 
 namespace cairn::server {
+namespace {
 
-Result<JobOutcome> SmoothJob::Run(const Job& job, bool enable, const JobControl& control) const {
-  const auto material = ports_.collect(job.site, control);
-  if (!material) return tl::unexpected(material.error());
+using Clock = std::chrono::steady_clock;
+// A waiting job checks this often whether it was cancelled or its time has passed.
+constexpr auto kLook = std::chrono::milliseconds(50);
+
+}  // namespace
+
+Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMaterial>& material,
+                                const JobControl& control) {
   std::size_t keyframes = 0, scans = 0;
-  for (const SessionMaterial& session : *material) {
+  for (const SessionMaterial& session : material) {
     keyframes += session.snapshot.keyframes.size();
     scans += session.snapshot.scans.size();
   }
@@ -25,28 +36,86 @@ Result<JobOutcome> SmoothJob::Run(const Job& job, bool enable, const JobControl&
     return !control.cancelled();
   };
   slam::Disagreement before, after;
-  MapVersion version;
-  version.info.job = job.id;
-  for (const SessionMaterial& session : *material) {
+  SmoothedSite smoothed;
+  smoothed.version.info.job = job.id;
+  for (const SessionMaterial& session : material) {
     const slam::MapperSnapshot& snapshot = session.snapshot;
-    const auto map = slam::SmoothMap(snapshot, session.grid_options, next);
+    auto map = slam::SmoothMap(snapshot, session.grid_options, next, [&control] { return !control.cancelled(); });
     if (!map) return Fail(StatusCode::kCancelled, "cancelled");
     before.Add(map->before);
     after.Add(map->after);
-    version.parts[session.session] = {map->grid.chunks(), snapshot.keyframes.size()};
-    version.smoothed[session.robot] = std::make_shared<const Trajectory>(snapshot.TrajectoryAlong(map->path));
+    smoothed.version.parts[session.session] = {map->grid.Share(), snapshot.keyframes.size()};
+    smoothed.version.smoothed[session.robot] = std::make_shared<const Trajectory>(snapshot.TrajectoryAlong(map->path));
   }
-  const std::string summary = std::to_string(material->size()) + " robots, " + std::to_string(keyframes) +
+  const std::string summary = std::to_string(material.size()) + " robots, " + std::to_string(keyframes) +
                               " keyframes, " + std::to_string(scans) + " scans";
-  version.info.note = "smoothed: " + summary;
+  smoothed.version.info.note = "smoothed: " + summary;
+  smoothed.outcome = {
+      .cost_before = before.mean_m2(), .cost_after = after.mean_m2(), .map_version = 0, .message = summary};
+  return smoothed;
+}
 
-  const auto number = ports_.add_version(job.site, std::move(version));
+Result<JobOutcome> SmoothJob::Run(const Job& job, bool enable, const JobControl& control) const {
+  const auto material = Collect(job.site, control);
+  if (!material) return tl::unexpected(material.error());
+  auto smoothed = SmoothSite(job, *material, control);
+  if (!smoothed) return tl::unexpected(smoothed.error());
+  JobOutcome outcome = std::move(smoothed->outcome);
+  const auto number = Await(job.site, control, [&](Site& site, Site::Done done) {
+    site.AddVersion(std::move(smoothed->version), std::move(done));
+  });
   if (!number) return tl::unexpected(number.error());
-  JobOutcome outcome{
-      .cost_before = before.mean_m2(), .cost_after = after.mean_m2(), .map_version = *number, .message = summary};
+  outcome.map_version = *number;
   if (!enable || control.cancelled()) return outcome;
-  if (const auto enabled = ports_.enable(job.site, *number); !enabled) return tl::unexpected(enabled.error());
+  const auto enabled = Await(
+      job.site, control, [version = *number](Site& site, Site::Done done) { site.Enable(version, std::move(done)); });
+  if (!enabled) return tl::unexpected(enabled.error());
   return outcome;
+}
+
+Result<std::vector<SessionMaterial>> SmoothJob::Collect(const std::string& site, const JobControl& control) const {
+  const auto sessions = roster_.InSite(site);
+  const auto answers = std::make_shared<BoundedChannel<SessionMaterial>>(std::max<std::size_t>(1, sessions.size()));
+  for (const auto& session : sessions) {
+    // If the session's queue is full, it does not answer, and the job fails at the deadline.
+    static_cast<void>(session->Post(SnapshotWanted{
+        [answers](SessionMaterial&& material) { static_cast<void>(answers->TryPush(std::move(material))); }}));
+  }
+  const auto deadline = Clock::now() + std::chrono::duration<double>(options_.snapshot_timeout_s);
+  std::map<SessionId, SessionMaterial> material;  // Ordered by id: the result must not depend on the order of answers.
+  while (material.size() < sessions.size()) {
+    if (control.cancelled()) return Fail(StatusCode::kCancelled, "cancelled");
+    if (Clock::now() > deadline) {
+      return Fail(StatusCode::kDeadlineExceeded,
+                  std::to_string(sessions.size() - material.size()) +
+                      " robots did not hand over their state in time (jobs.snapshot_timeout_s)");
+    }
+    if (auto answer = answers->PopFor(kLook)) {
+      const SessionId session = answer->session;
+      material.emplace(session, *std::move(answer));
+    }
+  }
+  std::vector<SessionMaterial> all;
+  all.reserve(material.size());
+  for (auto& [id, one] : material) all.push_back(std::move(one));
+  return all;
+}
+
+Result<std::uint32_t> SmoothJob::Await(const std::string& name, const JobControl& control,
+                                       const std::function<void(Site&, Site::Done)>& ask) const {
+  const auto site = atlas_.Find(name);
+  if (site == nullptr) return Fail(StatusCode::kNotFound, "no site '" + name + "'");
+  const auto promise = std::make_shared<std::promise<Result<std::uint32_t>>>();
+  auto answer = promise->get_future();
+  ask(*site, [promise](Result<std::uint32_t> result) { promise->set_value(std::move(result)); });
+  const auto deadline = Clock::now() + std::chrono::duration<double>(options_.snapshot_timeout_s);
+  while (answer.wait_for(kLook) != std::future_status::ready) {
+    if (control.cancelled()) return Fail(StatusCode::kCancelled, "cancelled");
+    if (Clock::now() > deadline) {
+      return Fail(StatusCode::kDeadlineExceeded, "the site did not answer in time (jobs.snapshot_timeout_s)");
+    }
+  }
+  return answer.get();
 }
 
 }  // namespace cairn::server

@@ -1,35 +1,50 @@
-// Full SLAM as a job: takes what every session of the site knows at one moment, smooths each robot's path (that of its
-// best particle, fitted to all steps, revisits and loops: slam/smoothing), with its grid drawn along it, and publishes
-// the result as a new map version, disabled until it is enabled. Robots are smoothed each by itself: relations between
-// them are not sought. Source: thesis A 5.4 (full-SLAM path of the best particle). Thread rule: runs on the job
-// worker's thread; it may wait for sessions, nobody waits for it.
+// Full SLAM as a job. It takes a snapshot of every session of the site, smooths the path of each robot's best
+// particle (fitted to all steps, revisits and loops: slam/smoothing) and draws the robot's grid along the
+// smoothed path. The result is published as a new map version, which is disabled at first. Each robot is
+// smoothed separately; relations between robots are not searched. Source: thesis A 5.4 (full-SLAM path of the
+// best particle). Thread rule: runs on the job worker's thread. It waits for the sessions and for the site,
+// at most jobs.snapshot_timeout_s each; no other thread waits for it.
 #pragma once
 
 #include <functional>
-#include <optional>
 #include <string>
 #include <vector>
 
-#include "server/jobs/job_worker.h"
-#include "server/maps/map_versions.h"
+#include "server/jobs/job_control.h"
+#include "server/jobs/jobs_options.h"
+#include "server/maps/atlas.h"
+#include "server/robots/roster.h"
 
 namespace cairn::server {
 
-// What the job needs of the house; each may wait, bounded.
-struct SmoothPorts {
-  std::function<Result<std::vector<SessionMaterial>>(const std::string& site, const JobControl&)> collect;
-  std::function<Result<std::uint32_t>(const std::string& site, MapVersion&&)> add_version;
-  std::function<Result<std::uint32_t>(const std::string& site, std::uint32_t version)> enable;
+// The result of smoothing a site, before it is published.
+struct SmoothedSite {
+  MapVersion version;
+  JobOutcome outcome;  // Its map_version is still 0.
 };
+
+// A pure function: the same material gives the same result. Progress is reported from 0 to 1.
+// FAILED_PRECONDITION: there are no scans. CANCELLED: the job was cancelled.
+[[nodiscard]] Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMaterial>& material,
+                                              const JobControl& control);
 
 class SmoothJob {
  public:
-  explicit SmoothJob(SmoothPorts ports) : ports_(std::move(ports)) {}
+  SmoothJob(const JobsOptions& options, const Roster& roster, const Atlas& atlas)
+      : options_(options), roster_(roster), atlas_(atlas) {}
 
+  // `enable`: whether to enable the new map version.
   Result<JobOutcome> Run(const Job& job, bool enable, const JobControl& control) const;
 
  private:
-  SmoothPorts ports_;
+  Result<std::vector<SessionMaterial>> Collect(const std::string& site, const JobControl& control) const;
+  // Sends `ask` to the site and waits for its answer, a map version.
+  Result<std::uint32_t> Await(const std::string& site, const JobControl& control,
+                              const std::function<void(Site&, Site::Done)>& ask) const;
+
+  const JobsOptions options_;
+  const Roster& roster_;
+  const Atlas& atlas_;
 };
 
 }  // namespace cairn::server

@@ -5,50 +5,65 @@
 namespace cairn::server {
 
 Atlas::Atlas(const MapsOptions& options, double resolution_m, bool create_sites, asio::thread_pool& pool,
-             SitePorts ports)
-    : options_(options),
-      resolution_m_(resolution_m),
-      create_sites_(create_sites),
-      pool_(pool),
-      ports_(std::move(ports)) {}
+             Outbound& outbound)
+    : options_(options), resolution_m_(resolution_m), create_sites_(create_sites), pool_(pool), outbound_(outbound) {}
 
 Result<std::shared_ptr<Site>> Atlas::Enter(const std::string& name) {
   if (auto site = Find(name)) return site;
   if (!create_sites_) {
     return Fail(StatusCode::kNotFound, "site '" + name + "' is not served here (server.sites, server.create_sites)");
   }
-  return Create(name);
+  return Make(name, false);
 }
 
 Result<std::shared_ptr<Site>> Atlas::Create(const std::string& name) {
+  return Make(name, true);
+}
+
+Result<std::shared_ptr<Site>> Atlas::Make(const std::string& name, bool configured) {
   if (auto valid = ValidateName("site", name); !valid) return tl::unexpected(valid.error());
   const MutexLock lock(mutex_);
   const auto found = sites_.find(name);
-  if (found != sites_.end()) return found->second;
-  if (sites_.size() >= static_cast<std::size_t>(options_.max_sites)) {
+  if (found != sites_.end()) return found->second.site;
+  for (const auto& [other, place] : sites_) {
+    if (HashName(other) == HashName(name)) {
+      return Fail(StatusCode::kAlreadyExists,
+                  "the names '" + name + "' and '" + other + "' have the same id; choose another name");
+    }
+  }
+  if (!MakeRoom()) {
     return Fail(StatusCode::kResourceExhausted,
                 std::to_string(sites_.size()) + " sites are open; the limit is maps.max_sites");
   }
-  for (const auto& [other, site] : sites_) {
-    if (HashName(other) == HashName(name)) {
-      return Fail(StatusCode::kAlreadyExists, "the names '" + name + "' and '" + other + "' share an id");
-    }
-  }
-  auto site = std::make_shared<Site>(name, resolution_m_, options_, pool_, ports_);
-  sites_.emplace(name, site);
+  auto site = std::make_shared<Site>(name, resolution_m_, options_, pool_, outbound_);
+  sites_.emplace(name, Place{site, configured});
   return site;
+}
+
+bool Atlas::MakeRoom() {
+  if (sites_.size() < static_cast<std::size_t>(options_.max_sites)) return true;
+  for (auto it = sites_.begin(); it != sites_.end(); ++it) {
+    const Place& place = it->second;
+    // Every session and every waiting piece of work holds its site. With a use count of one, only this map
+    // holds it.
+    const bool idle = !place.configured && place.site.use_count() == 1 && place.site->snapshot()->tiles.empty();
+    if (!idle) continue;
+    sites_.erase(it);
+    return true;
+  }
+  return false;
 }
 
 std::shared_ptr<Site> Atlas::Find(const std::string& name) const {
   const MutexLock lock(mutex_);
   const auto found = sites_.find(name);
-  return found == sites_.end() ? nullptr : found->second;
+  return found == sites_.end() ? nullptr : found->second.site;
 }
 
 std::vector<std::shared_ptr<Site>> Atlas::All() const {
   const MutexLock lock(mutex_);
   std::vector<std::shared_ptr<Site>> all;
-  for (const auto& [name, site] : sites_) all.push_back(site);
+  for (const auto& [name, place] : sites_) all.push_back(place.site);
   return all;
 }
 

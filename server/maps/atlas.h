@@ -1,5 +1,6 @@
-// All sites by name. Sites are created when the first robot enters, if the server may create them, and stay.
-// Thread rule: any thread.
+// All sites by name. A site is created when the first robot enters it, if the server may create sites, and is
+// kept. When maps.max_sites is reached, a new site replaces one that is empty (no tile, no session) and not
+// configured, so that misspelt names do not use up the sites. Thread rule: any thread.
 #pragma once
 
 #include <asio/thread_pool.hpp>
@@ -15,24 +16,33 @@ namespace cairn::server {
 
 class Atlas {
  public:
-  Atlas(const MapsOptions& options, double resolution_m, bool create_sites, asio::thread_pool& pool, SitePorts ports);
+  Atlas(const MapsOptions& options, double resolution_m, bool create_sites, asio::thread_pool& pool,
+        Outbound& outbound);
 
-  // The site; made where it does not exist yet and may. NOT_FOUND, RESOURCE_EXHAUSTED, INVALID_ARGUMENT.
+  // Returns the site; creates it if it does not exist and the server may create it. NOT_FOUND: the server may
+  // not. RESOURCE_EXHAUSTED: too many sites. INVALID_ARGUMENT: not a valid name.
   Result<std::shared_ptr<Site>> Enter(const std::string& name);
-  // As Enter, whatever `create_sites` says: for the configured sites.
+  // For the configured sites: like Enter, but independent of `create_sites`, and the site is never replaced.
   Result<std::shared_ptr<Site>> Create(const std::string& name);
   [[nodiscard]] std::shared_ptr<Site> Find(const std::string& name) const;
   [[nodiscard]] std::vector<std::shared_ptr<Site>> All() const;
 
  private:
+  struct Place {
+    std::shared_ptr<Site> site;
+    bool configured = false;
+  };
+  Result<std::shared_ptr<Site>> Make(const std::string& name, bool configured);
+  bool MakeRoom() CAIRN_REQUIRES(mutex_);
+
   const MapsOptions options_;
   const double resolution_m_;
   const bool create_sites_;
   asio::thread_pool& pool_;
-  const SitePorts ports_;
+  Outbound& outbound_;
 
   mutable Mutex mutex_;
-  std::map<std::string, std::shared_ptr<Site>> sites_ CAIRN_GUARDED_BY(mutex_);
+  std::map<std::string, Place> sites_ CAIRN_GUARDED_BY(mutex_);
 };
 
 }  // namespace cairn::server

@@ -1,8 +1,9 @@
-// The joint occupancy map of a site: per chunk the grids of all its sessions, summed as log odds into the cells of one
-// tile (independent evidence adds), and the pyramid above. Robots share the map frame through their start poses.
-// Not a publisher: Render says which tiles' cells changed, and nothing here knows epochs, versions or encodings.
-// Invariant: after Render, cells() equals what a map built from scratch from the same chunks would hold.
-// Not thread-safe: belongs to the site's strand.
+// The joint occupancy map of a site, and its pyramid of coarser levels. For each chunk, the log odds of all
+// sessions' grids are summed into the cells of one tile, because log odds of independent evidence add up. The
+// robots' start poses place them in one map frame. This class does not publish: Render returns the tiles
+// whose cells changed; epochs, versions and encodings are handled by Site.
+// Invariant: after Render, cells() equals a map that is built from the same chunks from scratch.
+// Not thread-safe: used on the site's strand only.
 #pragma once
 
 #include <map>
@@ -11,7 +12,7 @@
 #include <vector>
 
 #include "common/map/tile.h"
-#include "server/robots/robot_event.h"
+#include "server/maps/robot_grid.h"
 #include "server/slam/grid/occupancy_grid.h"
 
 namespace cairn::server {
@@ -20,13 +21,13 @@ class JointMap {
  public:
   using Cells = std::shared_ptr<const TileCells>;
 
-  // One session's chunks that changed (null: gone).
+  // Applies the changed chunks of one session (null: removed).
   void Apply(const GridChange& change);
-  // One session's whole grid is now this.
+  // Replaces the whole grid of one session.
   void Replace(SessionId session, const slam::OccupancyGrid::Chunks& chunks);
   [[nodiscard]] slam::OccupancyGrid::Chunks ChunksOf(SessionId session) const;
 
-  // Brings cells() up to date; returns the tiles of all levels whose cells changed, appeared or vanished.
+  // Updates cells(). Returns the tiles of all levels that changed, were added or were removed.
   std::vector<TileKey> Render();
   [[nodiscard]] const std::map<TileKey, Cells>& cells() const { return cells_; }
   [[nodiscard]] bool dirty() const { return !dirty_.empty(); }
@@ -35,7 +36,7 @@ class JointMap {
   using Layers = std::map<SessionId, std::shared_ptr<const slam::GridChunk>>;
 
   void SetLayer(slam::ChunkKey key, SessionId session, std::shared_ptr<const slam::GridChunk> chunk);
-  // Stores the cells if they differ; true where they do. Null means unknown throughout.
+  // Stores the cells if they differ, and returns whether they did. Null means that every cell is unknown.
   bool Store(TileKey key, Cells cells);
   Cells Sum(slam::ChunkKey key) const;
   Cells Reduce(TileKey parent) const;

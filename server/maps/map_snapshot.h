@@ -1,5 +1,5 @@
-// A site's published map at one moment: immutable, shared, safe to read anywhere. Successive snapshots share the tiles
-// that did not change.
+// The published map of a site at one moment. It is immutable and may be read on any thread. Successive
+// snapshots share the tiles that did not change.
 #pragma once
 
 #include <map>
@@ -15,7 +15,8 @@ namespace cairn::server {
 struct MapSnapshot {
   MapInfo info;
   std::map<TileKey, std::shared_ptr<const Tile>> tiles;  // All levels.
-  // Smoothed paths by robot: of the enabled map version, or of the newest that has any.
+  // Smoothed paths by robot, from the enabled map version; if it has none, from the newest version that has
+  // some.
   std::map<std::string, std::shared_ptr<const Trajectory>> smoothed;
 };
 

@@ -8,13 +8,13 @@ MapVersions::MapVersions(std::size_t max_versions) : max_versions_(max_versions)
   versions_[1].info = {.version = 1, .enabled = true, .job = 0, .note = "live"};
 }
 
-std::uint32_t MapVersions::Add(MapVersion version) {
+std::uint32_t MapVersions::Add(MapVersion version, std::uint32_t wanted) {
   const std::uint32_t number = next_++;
   version.info.version = number;
   version.info.enabled = false;
   versions_.emplace(number, std::move(version));
   for (auto it = versions_.begin(); versions_.size() > max_versions_ && it != versions_.end();) {
-    const bool needed = it->first == 1 || it->first == enabled_ || it->first == number;
+    const bool needed = it->first == 1 || it->first == enabled_ || it->first == wanted || it->first == number;
     it = needed ? std::next(it) : versions_.erase(it);
   }
   return number;

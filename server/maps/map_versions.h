@@ -1,7 +1,9 @@
-// The versions of a site's map: what each consists of and which one is enabled. Version 1 is the live map since the
-// site began; every job adds one, disabled. Enabling stores the parts that the outgoing version gives up, so that it
-// can be enabled again (rolled back to). Bounded: the oldest that is neither version 1 nor enabled is forgotten. Not
-// thread-safe: belongs to the site's strand.
+// The versions of a site's map, their content, and which one is enabled. Version 1 is the live map since the
+// site was created. Every job adds a version, which is disabled at first. When another version is enabled,
+// the sessions' grids of the version enabled so far are stored, so that it can be enabled again (rolled back
+// to). The number of versions is bounded: the oldest is removed, except version 1, the enabled one, the
+// newest one, and the one that a switch under way will enable. Not thread-safe: used on the site's strand
+// only.
 #pragma once
 
 #include <map>
@@ -11,7 +13,7 @@
 
 #include "common/sensor/trajectory.h"
 #include "common/service/map_info.h"
-#include "server/robots/robot_event.h"
+#include "server/maps/robot_grid.h"
 
 namespace cairn::server {
 
@@ -27,15 +29,16 @@ class MapVersions {
  public:
   explicit MapVersions(std::size_t max_versions);
 
-  // Its number; disabled.
-  std::uint32_t Add(MapVersion version);
+  // Adds a disabled version and returns its number. `wanted` is the version that a switch under way will
+  // enable; 0: none.
+  std::uint32_t Add(MapVersion version, std::uint32_t wanted = 0);
   [[nodiscard]] const MapVersion* Find(std::uint32_t version) const;
-  // `displaced` are the parts that the version enabled so far gives up.
+  // REQUIRES: Find(version). `displaced`: the sessions' grids of the version that has been enabled so far.
   void Enable(std::uint32_t version, std::map<SessionId, RobotGrid> displaced);
 
   [[nodiscard]] std::uint32_t enabled() const { return enabled_; }
   [[nodiscard]] std::vector<MapVersionInfo> infos() const;
-  // Of the enabled version, or of the newest that has any.
+  // The paths of the enabled version; if it has none, those of the newest version that has some.
   [[nodiscard]] const SmoothedPaths& smoothed() const;
 
  private:

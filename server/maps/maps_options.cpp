@@ -4,10 +4,14 @@ namespace cairn::server {
 
 void Visit(OptionVisitor& visitor, MapsOptions& options) {
   visitor.Real("publish_rate_hz", options.publish_rate_hz, "Hz", 0.05, 20.0,
-               "How often a site's changed tiles are rendered and published.");
-  visitor.Integer("max_sites", options.max_sites, "", 1, 4096, "Sites served at one time; more are refused.");
+               ForOperators("How often the changed tiles of a site are published. A higher rate gives fresher maps and "
+                            "takes more computing time and network traffic."));
+  visitor.Integer("max_sites", options.max_sites, "", 1, 4096,
+                  ForOperators("Sites that may exist at one time. Further ones are refused."));
   visitor.Integer("max_versions", options.max_versions, "", 2, 64,
-                  "Map versions kept per site; when full the oldest that is neither live nor enabled is forgotten.");
+                  ForOperators("Versions of the map that are kept for each site. When there are more, the oldest one "
+                               "that is neither published nor enabled is forgotten. Each one takes memory for the "
+                               "parts in which it differs from the present map."));
 }
 
 }  // namespace cairn::server

@@ -1,4 +1,4 @@
-// How the joint maps are published and how many versions are kept.
+// Options of the joint maps: how often they are published and how many versions are kept.
 #pragma once
 
 #include <cstdint>
@@ -8,9 +8,9 @@
 namespace cairn::server {
 
 struct MapsOptions {
-  double publish_rate_hz = 2.0;   // Changed tiles per site; higher: fresher tiles, more encoding and traffic.
-  std::int64_t max_sites = 64;    // More are refused.
-  std::int64_t max_versions = 8;  // Kept per site to roll back to; each costs the chunks that differ from the live map.
+  double publish_rate_hz = 2.0;
+  std::int64_t max_sites = 64;
+  std::int64_t max_versions = 8;
 };
 void Visit(OptionVisitor& visitor, MapsOptions& options);
 

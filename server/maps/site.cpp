@@ -1,16 +1,43 @@
 #include "server/maps/site.h"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <asio/post.hpp>
-#include <cmath>
+#include <exception>
 #include <utility>
 
 #include "server/maps/tile_encoding.h"
 
 namespace cairn::server {
+namespace {
 
-// One session's answer to a correction. A session that goes away without answering drops the ticket, and its destructor
-// answers instead: a switch never waits for ever.
+// Calls `done` exactly once: with the result, or with an error from the destructor if there was no result
+// because the work ended with an exception.
+class Answer {
+ public:
+  explicit Answer(Site::Done done) : done_(std::move(done)) {}
+  Answer(const Answer&) = delete;
+  Answer& operator=(const Answer&) = delete;
+  ~Answer() {
+    if (done_) done_(Fail(StatusCode::kInternal, "internal error of the server; see its log for the cause"));
+  }
+  void Give(Result<std::uint32_t> result) { std::exchange(done_, nullptr)(std::move(result)); }
+
+ private:
+  Site::Done done_;
+};
+
+Site::Done Once(Site::Done done) {
+  return [answer = std::make_shared<Answer>(std::move(done))](Result<std::uint32_t> result) {
+    answer->Give(std::move(result));
+  };
+}
+
+}  // namespace
+
+// One session's answer to a correction. If a session ends without an answer, it drops the ticket, and the
+// destructor answers instead. So a version switch never waits for ever.
 class Site::Ticket {
  public:
   Ticket(std::shared_ptr<Site> site, std::uint32_t version, SessionId session)
@@ -35,11 +62,11 @@ class Site::Ticket {
 };
 
 Site::Site(const std::string& name, double resolution_m, const MapsOptions& options, asio::thread_pool& pool,
-           SitePorts ports)
+           Outbound& outbound)
     : name_(name),
       site_id_(HashName(name)),
       resolution_m_(resolution_m),
-      ports_(std::move(ports)),
+      outbound_(outbound),
       strand_(asio::make_strand(pool)),
       versions_(static_cast<std::size_t>(options.max_versions)) {
   auto empty = std::make_shared<MapSnapshot>();
@@ -50,7 +77,15 @@ Site::Site(const std::string& name, double resolution_m, const MapsOptions& opti
 
 template <typename Act>
 void Site::Run(Act act) {
-  asio::post(strand_, [self = shared_from_this(), act = std::move(act)]() mutable { act(*self); });
+  ++asked_;
+  asio::post(strand_, [self = shared_from_this(), act = std::move(act)]() mutable {
+    try {
+      act(*self);
+    } catch (const std::exception& error) {
+      spdlog::error("site {}: a piece of work failed with an exception and was dropped: {}", self->name_, error.what());
+    }
+    ++self->handled_;
+  });
 }
 
 void Site::Change(GridChange&& change) {
@@ -69,16 +104,17 @@ void Site::Change(GridChange&& change) {
   });
 }
 
-void Site::SetRobots(std::uint32_t robots) {
-  Run([robots](Site& site) {
-    site.robots_ = robots;
+void Site::Join(NameId robot, SessionId session, std::weak_ptr<GridOwner> owner) {
+  Run([robot, session, owner = std::move(owner)](Site& site) {
+    site.members_[robot] = {session, owner};
+    std::erase_if(site.members_, [](const auto& member) { return member.second.owner.expired(); });
     site.info_changed_ = true;
   });
 }
 
 void Site::AddVersion(MapVersion&& version, Done done) {
-  Run([version = std::move(version), done = std::move(done)](Site& site) mutable {
-    const std::uint32_t number = site.versions_.Add(std::move(version));
+  Run([version = std::move(version), done = Once(std::move(done))](Site& site) mutable {
+    const std::uint32_t number = site.versions_.Add(std::move(version), site.switch_ ? site.switch_->version : 0);
     site.Refresh({}, false);
     site.Send();
     done(number);
@@ -86,7 +122,17 @@ void Site::AddVersion(MapVersion&& version, Done done) {
 }
 
 void Site::Enable(std::uint32_t version, Done done) {
-  Run([version, done = std::move(done)](Site& site) mutable { site.Begin(version, std::move(done)); });
+  Run([version, done = Once(std::move(done))](Site& site) mutable {
+    if (site.switch_) {
+      return done(Fail(StatusCode::kUnavailable, "another map version is being enabled; try again later"));
+    }
+    try {
+      site.Begin(version, std::move(done));
+    } catch (...) {
+      site.switch_.reset();  // Otherwise no other switch could ever begin.
+      throw;
+    }
+  });
 }
 
 void Site::Publish() {
@@ -106,9 +152,6 @@ std::shared_ptr<const MapSnapshot> Site::snapshot() const {
 }
 
 void Site::Begin(std::uint32_t version, Done done) {
-  if (switch_) {
-    return done(Fail(StatusCode::kUnavailable, "another map version is being enabled; try again"));
-  }
   const MapVersion* const wanted = versions_.Find(version);
   if (wanted == nullptr) {
     return done(Fail(StatusCode::kNotFound, "site '" + name_ + "' has no map version " + std::to_string(version)));
@@ -122,10 +165,17 @@ void Site::Begin(std::uint32_t version, Done done) {
     const auto ticket = std::make_shared<Ticket>(shared_from_this(), version, session);
     Correction correction{
         .epoch = epoch_ + 1, .grid = part, .done = [ticket](Adopted&& adopted) { ticket->Answer(std::move(adopted)); }};
-    // A session that is gone drops the correction, and with it the ticket.
-    static_cast<void>(ports_.correct(name_, session, std::move(correction)));
+    // If the session has ended, the correction and its ticket are dropped here.
+    if (const auto owner = OwnerOf(session)) owner->Adopt(std::move(correction));
   }
   CommitIfComplete();
+}
+
+std::shared_ptr<GridOwner> Site::OwnerOf(SessionId session) const {
+  for (const auto& [robot, member] : members_) {
+    if (member.session == session) return member.owner.lock();
+  }
+  return nullptr;
 }
 
 void Site::Settle(std::uint32_t version, SessionId session, std::optional<Adopted>&& adopted) {
@@ -198,7 +248,7 @@ void Site::Refresh(const std::vector<TileKey>& changed, bool all) {
 
 void Site::Send() {
   const std::shared_ptr<const MapSnapshot> now = snapshot();
-  if (info_changed_) info_changed_ = !ports_.send(now->info);
+  if (info_changed_) info_changed_ = !outbound_.Send(now->info);
   while (!unsent_.empty()) {
     const TileKey key = *unsent_.begin();
     const auto tile = now->tiles.find(key);
@@ -209,7 +259,7 @@ void Site::Send() {
     } else {
       sample.tile = *tile->second;
     }
-    if (!ports_.send(std::move(sample))) return;  // The lane is full: the rest at the next turn.
+    if (!outbound_.Send(std::move(sample))) return;  // The lane is full; the rest is sent at the next call.
     unsent_.erase(unsent_.begin());
   }
 }
@@ -222,7 +272,7 @@ MapInfo Site::InfoOf(const std::map<TileKey, std::shared_ptr<const Tile>>& tiles
   info.epoch = epoch_;
   info.version = tile_version_;
   info.levels = kPyramidLevels;
-  info.robots = robots_;
+  for (const auto& [robot, member] : members_) info.robots += member.owner.expired() ? 0U : 1U;
   info.enabled_version = versions_.enabled();
   info.versions = versions_.infos();
   const double tile_m = kTileCells * resolution_m_;

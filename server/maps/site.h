@@ -1,72 +1,82 @@
-// One site: its joint map, its map versions, and what is published of them. Robots hand in changed chunks; twice a
-// second (option) changed tiles are rendered, encoded, given the next version and published.
+// One site: its joint map, its map versions, and their publication. Robots pass their changed chunks to the
+// site. At maps.publish_rate_hz the changed tiles are rendered, encoded, given the next version number and
+// published.
 //
-// Switching to another map version is atomic for readers: every session gets a correction through its own queue and
-// continues on its part of that version; what they hand in meanwhile is kept aside; when all have answered, the whole
-// map changes at once under epoch + 1, every tile is published again and tiles that are gone get tombstones.
-// Thread rule: any thread may call; the work happens on the site's strand; readers get immutable snapshots.
+// A switch to another map version is atomic for readers. Every session gets a correction through its own
+// queue and continues with its part of that version. Changes that the sessions send meanwhile are stored
+// apart. When all sessions have answered, the whole map changes at once under epoch + 1: every tile is
+// published again, and removed tiles are published as deleted.
+// Thread rule: any thread may call; the work runs on the site's strand; readers get immutable snapshots. Work
+// that ends with an exception is logged and dropped, and the site continues.
 #pragma once
 
 #include <asio/strand.hpp>
 #include <asio/thread_pool.hpp>
+#include <atomic>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
 #include <string>
 
 #include "common/mutex.h"
+#include "common/service/names.h"
 #include "server/maps/joint_map.h"
 #include "server/maps/map_snapshot.h"
 #include "server/maps/map_versions.h"
 #include "server/maps/maps_options.h"
+#include "server/ops/heartbeat.h"
 #include "server/outbound.h"
 
 namespace cairn::server {
 
-struct SitePorts {
-  std::function<bool(OutboundValue)> send;  // Never waits.
-  // Hands a correction to a session; false (and no call to `done`) where the server no longer knows the session.
-  std::function<bool(const std::string& site, SessionId, Correction&&)> correct;
-};
-
-// A switch of versions under way: complete when no session is awaited.
+// A version switch under way. It is complete when no session is awaited.
 struct VersionSwitch {
   std::uint32_t version = 0;
   std::set<SessionId> awaited;
-  std::map<SessionId, slam::OccupancyGrid::Chunks> staged;  // The adopted sessions' new grids.
+  std::map<SessionId, slam::OccupancyGrid::Chunks> staged;  // The new grids of the sessions that have answered.
   std::map<SessionId, RobotGrid> displaced;
   std::function<void(Result<std::uint32_t>)> done;
 };
 
 class Site : public std::enable_shared_from_this<Site> {
  public:
-  using Done = std::function<void(Result<std::uint32_t>)>;  // Gets a map version; called on the site's strand.
+  // Receives a map version; called once, on the site's strand. INTERNAL if the work ended with an exception.
+  using Done = std::function<void(Result<std::uint32_t>)>;
 
   Site(const std::string& name, double resolution_m, const MapsOptions& options, asio::thread_pool& pool,
-       SitePorts ports);
+       Outbound& outbound);
 
+  // From now on this session of the robot draws here, in place of the robot's previous session. A session
+  // that has ended is kept while its GridOwner exists, because its part of the map can still be corrected.
+  void Join(NameId robot, SessionId session, std::weak_ptr<GridOwner> owner);
   void Change(GridChange&& change);
-  void SetRobots(std::uint32_t robots);
-  // Adds a version, disabled; `done` gets its number.
+  // Adds a disabled version; `done` receives its number.
   void AddVersion(MapVersion&& version, Done done);
-  // UNAVAILABLE while another switch is under way; NOT_FOUND for a version that does not exist (any more).
+  // UNAVAILABLE: another switch is under way. NOT_FOUND: the version does not exist or has been removed.
   void Enable(std::uint32_t version, Done done);
   // Renders and publishes what changed.
   void Publish();
-  // A no-op on the strand.
+  // Does nothing but call `done` on the strand, to show that the strand makes progress.
   void Probe(std::function<void()> done);
 
   [[nodiscard]] std::shared_ptr<const MapSnapshot> snapshot() const;
+  [[nodiscard]] Pulse pulse() const { return {handled_, handled_ != asked_}; }
 
  private:
   class Ticket;
+  struct Member {
+    SessionId session = 0;
+    std::weak_ptr<GridOwner> owner;
+  };
 
   template <typename Act>
   void Run(Act act);
-  // Strand only from here.
+  // The functions below run on the strand only.
   void Begin(std::uint32_t version, Done done);
   void Settle(std::uint32_t version, SessionId session, std::optional<Adopted>&& adopted);
+  std::shared_ptr<GridOwner> OwnerOf(SessionId session) const;
   void StageGone(SessionId session);
   void CommitIfComplete();
   void Render();
@@ -78,19 +88,20 @@ class Site : public std::enable_shared_from_this<Site> {
   const std::string name_;
   const NameId site_id_;
   const double resolution_m_;
-  const SitePorts ports_;
+  Outbound& outbound_;
   asio::strand<asio::thread_pool::executor_type> strand_;
 
-  // Strand only.
+  // The members below are used on the strand only.
   JointMap joint_;
   MapVersions versions_;
   std::uint32_t epoch_ = 0;
   std::uint64_t tile_version_ = 0;
-  std::uint32_t robots_ = 0;
+  std::map<NameId, Member> members_;
   bool info_changed_ = true;
   std::optional<VersionSwitch> switch_;
   std::set<TileKey> unsent_;  // Tiles (or tombstones) to publish.
 
+  std::atomic<std::uint64_t> asked_{0}, handled_{0};  // Pieces of work posted to the strand, and finished on it.
   mutable Mutex mutex_;
   std::shared_ptr<const MapSnapshot> snapshot_ CAIRN_GUARDED_BY(mutex_);
 };

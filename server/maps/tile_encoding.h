@@ -1,4 +1,5 @@
-// Makes the published form of a tile's cells: PNG, or raw where that is smaller. Stateless, thread-safe.
+// Encodes the cells of a tile for publication: as PNG, or as raw bytes if PNG is not smaller. Stateless,
+// thread-safe.
 #pragma once
 
 #include <memory>

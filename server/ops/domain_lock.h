@@ -1,6 +1,7 @@
-// That no other server of this machine serves the same DDS domain on the same address: two would share scans and
-// questions without knowing. Names in the kernel (abstract Unix sockets) that go with the process, however it ends; a
-// network namespace has its own. Source: unix(7). Thread rule: any thread.
+// Ensures that no other server on this machine serves the same DDS domain on the same address: both would
+// receive all scans and requests of the domain. The lock is one abstract Unix socket per address. The kernel
+// releases it when the process ends, also after a crash. Each network namespace has its own names. Source:
+// unix(7). Thread rule: any thread.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +15,7 @@ namespace cairn::server {
 
 class DomainLock {
  public:
-  // kAlreadyExists where another holds one of the addresses.
+  // kAlreadyExists: another server holds the lock for one of the addresses.
   [[nodiscard]] static Result<DomainLock> Take(std::int64_t domain, const std::vector<std::string>& addresses);
   DomainLock(DomainLock&& other) noexcept : sockets_(std::move(other.sockets_)) { other.sockets_.clear(); }
   DomainLock& operator=(DomainLock&&) = delete;

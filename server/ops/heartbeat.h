@@ -1,34 +1,37 @@
-// Tells whether the strands move: each is asked for a sign of life, and asked again once it has answered. One that has
-// not answered for longer than the limit is stalled, and the service manager's watchdog is then left unfed.
-// Not a metric: how long answers take is the ledgers' business.
-// Thread rule: Check from one thread; answers come from any.
+// Tells whether the server's threads make progress. Each strand and channel reports how many pieces of work
+// it has finished and whether any wait. One that has work and finishes nothing for longer than the limit is
+// stalled; the server then stops notifying the systemd watchdog, and is restarted. An overloaded server still
+// finishes work, so it is slow but not stalled, and a restart would not help. Latencies are measured in the
+// ledgers, not here. Thread rule: one thread.
 #pragma once
 
-#include <atomic>
 #include <chrono>
-#include <functional>
+#include <cstdint>
 #include <map>
-#include <memory>
 #include <string>
 #include <vector>
 
 namespace cairn::server {
 
+// What a strand or a channel reports.
+struct Pulse {
+  std::uint64_t finished = 0;  // Pieces of work finished so far.
+  bool busy = false;           // Work is under way or waits.
+};
+
 class Heartbeat {
  public:
   using Clock = std::chrono::steady_clock;
-  // Makes the strand call the answer once; false where the strand takes nothing just now.
-  using Ask = std::function<bool(std::function<void()> answer)>;
 
   explicit Heartbeat(Clock::duration limit) : limit_(limit) {}
 
-  // The names of those that are stalled at `now`. Strands no longer named are forgotten.
-  std::vector<std::string> Check(const std::map<std::string, Ask>& strands, Clock::time_point now);
+  // Returns the names of the stalled ones at `now`. Names that are missing in this call are forgotten.
+  std::vector<std::string> Check(const std::map<std::string, Pulse>& pulses, Clock::time_point now);
 
  private:
   struct Beat {
-    std::shared_ptr<std::atomic<bool>> answered;
-    Clock::time_point asked;
+    std::uint64_t finished = 0;
+    Clock::time_point moved;  // The last time it was idle or had finished more work.
   };
   const Clock::duration limit_;
   std::map<std::string, Beat> beats_;

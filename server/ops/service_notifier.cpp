@@ -14,6 +14,10 @@ void ServiceNotifier::Alive() const {
   static_cast<void>(sd_notify(0, "WATCHDOG=1"));
 }
 
+void ServiceNotifier::Status(const std::string& text) const {
+  static_cast<void>(sd_notify(0, ("STATUS=" + text).c_str()));
+}
+
 void ServiceNotifier::Stopping() const {
   static_cast<void>(sd_notify(0, "STOPPING=1"));
 }

@@ -1,5 +1,5 @@
-// What the service manager (systemd) is told: ready, alive, stopping. Says nothing where there is no service manager.
-// Thread rule: any thread.
+// Sends the server's state to the service manager (systemd): ready, alive, stopping. Does nothing if no
+// service manager started the process. Thread rule: any thread.
 #pragma once
 
 #include <chrono>
@@ -12,8 +12,10 @@ class ServiceNotifier {
  public:
   void Ready(const std::string& status) const;
   void Alive() const;
+  // One line that the service manager shows beside the service (systemctl status).
+  void Status(const std::string& text) const;
   void Stopping() const;
-  // How often Alive is wanted at least; nothing where no watchdog is set.
+  // The longest allowed time between two calls of Alive; nothing if no watchdog is configured.
   [[nodiscard]] std::optional<std::chrono::microseconds> watchdog() const;
 };
 

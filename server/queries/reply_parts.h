@@ -1,6 +1,6 @@
-// Cuts an answer into parts that fit the wire (< 64 KB each, idl/README.md): every part repeats the header and status,
-// items keep their order, parts count from 0 and the one with `last` ends the answer. An answer without items is one
-// part. Stateless, thread-safe.
+// Cuts an answer into parts that fit the wire (less than 64 KB each, idl/README.md). Every part repeats the
+// header and the status. Items keep their order. Parts are numbered from 0, and the last one has `last` set.
+// An answer without items is one part. Stateless, thread-safe.
 #pragma once
 
 #include <cstddef>

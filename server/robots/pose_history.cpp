@@ -4,6 +4,8 @@
 
 namespace cairn::server {
 
+static_assert(sizeof(PathPose) == 104);  // The text of robots.max_path_poses names this size.
+
 std::size_t PathView::size() const {
   std::size_t size = 0;
   for (const Block& block : blocks_) size += block->size();

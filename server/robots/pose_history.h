@@ -22,7 +22,7 @@ struct PathPose {
   float score = 0.0F;
   bool localized = false;
   PoseReason reason = PoseReason::kWaiting;
-  Eigen::Matrix3f covariance = Eigen::Matrix3f::Zero();  // Of (x, y, theta) in map.
+  Eigen::Matrix3f covariance = Eigen::Matrix3f::Zero();  // Covariance of (x, y, theta) in the map frame.
   Pose2 T_map_odom;
 };
 

@@ -41,11 +41,16 @@ std::optional<Correction> RobotQueue::Push(Correction correction) {
   return superseded;
 }
 
-bool RobotQueue::PushControl(RobotEvent event) {
+bool RobotQueue::Push(SnapshotWanted wanted) {
   const MutexLock lock(mutex_);
   if (control_.size() >= kMaxControl) return false;
-  control_.push_back({next_++, std::move(event)});
+  control_.push_back({next_++, std::move(wanted)});
   return true;
+}
+
+void RobotQueue::Push(Finish finish) {
+  const MutexLock lock(mutex_);
+  control_.push_back({next_++, std::move(finish)});
 }
 
 std::optional<RobotEvent> RobotQueue::Pop() {

@@ -1,9 +1,11 @@
-// The one front door of a robot's estimator: events in order of arrival, three lanes, each with a bound and a rule.
+// The queue in front of a robot's estimator. Events leave in the order of their arrival; scans, odometry and everything
+// else have a lane each, with a bound and an overflow rule of its own.
 // Overflow rules:
 //  - scans: the oldest waiting one gives way and is returned, for the ledger (queue_full);
 //  - odometry: the two oldest become one; poses in `odom` are absolute, so leaving out the older keeps all motion;
 //  - corrections: the newest wins; one displaced is returned and never adopted;
-//  - snapshots, finish, probes: at most kMaxControl wait; more are refused.
+//  - snapshots: refused while kMaxControl control events wait;
+//  - the end of the session: never refused. It is asked for once, and once more when the server stops.
 // Thread rule: any thread.
 #pragma once
 
@@ -28,8 +30,9 @@ class RobotQueue {
   std::optional<OdometryArrival> Push(OdometryArrival odometry);
   // The correction that was superseded, if any.
   std::optional<Correction> Push(Correction correction);
-  // Snapshot, finish or probe; false where too many wait.
-  bool PushControl(RobotEvent event);
+  // False where too many wait.
+  bool Push(SnapshotWanted wanted);
+  void Push(Finish finish);
 
   // The event that arrived first.
   [[nodiscard]] std::optional<RobotEvent> Pop();

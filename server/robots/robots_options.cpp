@@ -3,19 +3,30 @@
 namespace cairn::server {
 
 void Visit(OptionVisitor& visitor, RobotsOptions& options) {
-  visitor.Integer("max_robots", options.max_robots, "", 1, 4096, "Sessions at one time; more are refused.");
+  visitor.Integer(
+      "max_robots", options.max_robots, "", 1, 4096,
+      ForOperators("Robots that may be served at one time. When there are more, the session that ended first "
+                   "is forgotten, then the one whose robot has been away for longest; then further robots "
+                   "are refused. Each one takes the memory of an estimator."));
   visitor.Integer("queue_scans", options.queue_scans, "scans", 4, 4096,
-                  "Scans waiting per robot; when full the oldest is dropped (queue_full).");
+                  ForOperators("Scans of a robot that may wait. When the queue is full, the oldest scan is dropped. A "
+                               "longer queue survives longer interruptions, and poses come later after one."));
   visitor.Integer("queue_odometry", options.queue_odometry, "samples", 16, 65536,
-                  "Odometry waiting per robot; when full the two oldest become one, so no motion is lost.");
-  visitor.Integer("max_path_poses", options.max_path_poses, "poses", 1024, 100000000,
-                  "Poses remembered per session; beyond, the older half is thinned to every second pose.");
-  visitor.Integer("max_unclaimed", options.max_unclaimed, "streams", 1, 65536,
-                  "Streams without a session that are counted one by one; more are counted together.");
+                  "Odometry samples of a robot that may wait. When the queue is full, the two oldest become one, so "
+                  "that no motion is lost.");
+  visitor.Integer(
+      "max_path_poses", options.max_path_poses, "poses", 1024, 100000000,
+      ForOperators("Poses of a robot that are remembered, 104 bytes each. When there are more, every second "
+                   "pose of the older half is removed."));
+  visitor.Integer(
+      "max_unclaimed", options.max_unclaimed, "streams", 1, 65536,
+      "Streams of unknown robots that are counted one by one. The messages of further streams are counted together.");
+  visitor.Real("suspended_expiry_s", options.suspended_expiry_s, "s", 1.0, 1e8,
+               ForOperators("A session whose robot stays away for longer than this is ended. With a longer time robots "
+                            "may come back later, and vanished ones take memory for longer."));
   visitor.Real("ledger_rate_hz", options.ledger_rate_hz, "Hz", 0.1, 100.0,
-               "Ledgers published per stream; every 8 settled scans and every drained queue publish at once.");
-  visitor.Real("landmark_rate_hz", options.landmark_rate_hz, "Hz", 0.01, 20.0,
-               "How often a session's landmarks are refreshed for queries.");
+               "How often the counters of a robot are published while scans arrive. They are published at once after "
+               "every eight scans and when its queue becomes empty.");
 }
 
 }  // namespace cairn::server

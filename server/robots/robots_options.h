@@ -8,15 +8,13 @@
 namespace cairn::server {
 
 struct RobotsOptions {
-  std::int64_t max_robots = 256;          // Sessions at one time; more are refused. Each costs an estimator's memory.
-  std::int64_t queue_scans = 64;          // Scans waiting per robot; more: the oldest is dropped. Larger rides out
-                                          // longer stalls, and poses come later when it happens.
-  std::int64_t queue_odometry = 1024;     // Odometry waiting per robot; more: the two oldest become one.
-  std::int64_t max_path_poses = 1000000;  // Poses remembered per session (32 bytes each); beyond, the older half is
-                                          // thinned to every second pose.
-  std::int64_t max_unclaimed = 256;       // Streams without a session that are counted one by one.
-  double ledger_rate_hz = 10.0;           // Ledgers published per stream while nothing settles in bulk.
-  double landmark_rate_hz = 2.0;          // Landmarks refreshed for queries.
+  std::int64_t max_robots = 256;
+  std::int64_t queue_scans = 64;
+  std::int64_t queue_odometry = 1024;
+  std::int64_t max_path_poses = 1000000;
+  std::int64_t max_unclaimed = 256;
+  double suspended_expiry_s = 86400.0;
+  double ledger_rate_hz = 10.0;
 };
 void Visit(OptionVisitor& visitor, RobotsOptions& options);
 

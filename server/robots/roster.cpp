@@ -1,12 +1,14 @@
 #include "server/robots/roster.h"
 
-#include <algorithm>
+#include <chrono>
 #include <utility>
 
 #include "common/service/start_pose.h"
 
 namespace cairn::server {
 namespace {
+
+constexpr std::size_t kMaxUnsent = 256;  // Refusals kept until they can be sent; beyond, the oldest is forgotten.
 
 Result<void> ValidateRequest(const SessionRequest& request) {
   if (auto valid = ValidateName("robot", request.robot); !valid) return valid;
@@ -32,14 +34,22 @@ Pose2 StartOf(const SessionRequest& request) {
 }  // namespace
 
 Roster::Roster(const RobotsOptions& options, const slam::MapperOptions& mapper, asio::thread_pool& pool,
-               RosterPorts ports)
+               Outbound& outbound, Atlas& atlas)
     : options_(options),
       mapper_(mapper),
       pool_(pool),
-      ports_(std::move(ports)),
+      outbound_(outbound),
+      atlas_(atlas),
       unclaimed_(static_cast<std::size_t>(options.max_unclaimed)) {}
 
 void Roster::Take(const SessionRequest& request) {
+  {
+    // A refusal that could not be sent yet is outdated by the answer to this request.
+    const MutexLock lock(mutex_);
+    std::erase_if(unsent_, [&request](const SessionState& state) {
+      return state.client == request.client && state.robot == request.robot;
+    });
+  }
   if (request.end) {
     const std::shared_ptr<Session> session = Find(request.robot);
     if (session == nullptr) {
@@ -63,13 +73,13 @@ Result<void> Roster::Admit(const SessionRequest& request) {
     if (found != sessions_.end()) session = found->second;
   }
   if (session == nullptr || session->record().phase() == SessionPhase::kEnded) return Open(request);
-  if (session->ending()) {
-    return Fail(StatusCode::kUnavailable, "the last session of '" + request.robot + "' is still ending; try again");
-  }
   return Resume(*session, request);
 }
 
 Result<void> Roster::Resume(Session& session, const SessionRequest& request) {
+  const Status ending{StatusCode::kUnavailable,
+                      "the last session of '" + request.robot + "' is still ending; try again"};
+  if (session.ending()) return tl::unexpected(ending);
   const SessionState state = session.record().state();
   if (state.robot != request.robot) {
     return Fail(StatusCode::kAlreadyExists,
@@ -85,64 +95,91 @@ Result<void> Roster::Resume(Session& session, const SessionRequest& request) {
   if (!session.record().AddSensors(request.sensors)) {
     return Fail(StatusCode::kResourceExhausted, "more than 16 sensors in one session");
   }
-  session.Resume(request.client);
+  if (!session.Resume(request.client)) return tl::unexpected(ending);
+  if (state.client != request.client) {
+    SessionRequest displaced = request;
+    displaced.client = state.client;
+    Refuse(displaced, {StatusCode::kAlreadyExists, "another client has taken over the session of '" + state.robot +
+                                                       "' while this one was not alive"});
+  }
   return {};
 }
 
 Result<void> Roster::Open(const SessionRequest& request) {
-  const auto epoch = ports_.enter_site(request.site);
-  if (!epoch) return tl::unexpected(epoch.error());
   const NameId robot_id = HashName(request.robot);
-  std::shared_ptr<Session> session;
+  std::shared_ptr<Session> session, gone;  // The memory of the one that goes is freed without the lock.
+  std::shared_ptr<Site> site;
   {
     const MutexLock lock(mutex_);
-    sessions_.erase(robot_id);
-    if (auto room = MakeRoom(); !room) return room;
+    // First the limit, then the site: a robot that is refused leaves no site behind.
+    auto giving_way = GivesWay(robot_id);
+    if (!giving_way) return tl::unexpected(giving_way.error());
+    auto entered = atlas_.Enter(request.site);
+    if (!entered) return tl::unexpected(entered.error());
+    site = *std::move(entered);
+    gone = *std::move(giving_way);
+    if (gone != nullptr) sessions_.erase(HashName(gone->record().state().robot));
     const SessionSetup setup{.id = next_id_++,
                              .request = request,
-                             .map_epoch = *epoch,
+                             .map_epoch = site->snapshot()->info.epoch,
                              .estimator = {.mapper = mapper_, .T_map_robot_start = StartOf(request)}};
     session = std::make_shared<Session>(
         setup, options_, pool_,
-        SessionOutputs{.send = ports_.send, .grid_changed = [this, site = request.site](GridChange&& change) {
-                         ports_.grid_changed(site, std::move(change));
-                       }});
+        SessionOutputs{.send = [this](OutboundValue value) { return outbound_.Send(std::move(value)); },
+                       .grid_changed = [site](GridChange&& change) { site->Change(std::move(change)); }});
     session->record().AddSensors(request.sensors);
     for (const std::string& sensor : request.sensors) {
-      if (auto account = unclaimed_.Claim(robot_id, HashName(sensor))) {
+      if (auto account = unclaimed_.Claim({robot_id, HashName(sensor), request.client})) {
         session->record().Inherit(HashName(sensor), std::move(*account));
       }
     }
     sessions_.emplace(robot_id, session);
   }
   session->Resume(request.client);
-  ports_.robots_changed(request.site);
+  site->Join(robot_id, session->id(), session);
+  if (gone != nullptr && !gone->ending()) {
+    gone->End({StatusCode::kResourceExhausted, "its robot stayed away, and its place was needed for another"});
+  }
   return {};
 }
 
-Result<void> Roster::MakeRoom() {
-  if (sessions_.size() < static_cast<std::size_t>(options_.max_robots)) return {};
-  auto oldest = sessions_.end();
-  for (auto it = sessions_.begin(); it != sessions_.end(); ++it) {
-    if (it->second->record().phase() != SessionPhase::kEnded) continue;
-    if (oldest == sessions_.end() || it->second->id() < oldest->second->id()) oldest = it;
+Result<std::shared_ptr<Session>> Roster::GivesWay(NameId robot_id) const {
+  const auto own = sessions_.find(robot_id);
+  if (own != sessions_.end()) return own->second;
+  if (sessions_.size() < static_cast<std::size_t>(options_.max_robots)) return nullptr;
+  const auto now = SessionRecord::Clock::now();
+  std::shared_ptr<Session> ended, suspended;
+  for (const auto& [id, session] : sessions_) {
+    const SessionRecord& record = session->record();
+    const bool is_ended = record.phase() == SessionPhase::kEnded;
+    if (is_ended && (ended == nullptr || session->id() < ended->id())) ended = session;
+    const auto away = record.SuspendedFor(now);
+    if (away > (suspended == nullptr ? away.zero() : suspended->record().SuspendedFor(now))) suspended = session;
   }
-  if (oldest == sessions_.end()) {
-    return Fail(StatusCode::kResourceExhausted,
-                std::to_string(sessions_.size()) + " robots have open sessions; the limit is robots.max_robots");
-  }
-  sessions_.erase(oldest);
-  return {};
+  if (ended != nullptr) return ended;
+  if (suspended != nullptr) return suspended;
+  return Fail(StatusCode::kResourceExhausted,
+              std::to_string(sessions_.size()) + " robots have open sessions; the limit is robots.max_robots");
 }
 
 void Roster::Refuse(const SessionRequest& request, Status status) {
   const NameId robot_id = HashName(request.robot);
-  ports_.send(SessionState{.robot_id = robot_id,
-                           .client = request.client,
-                           .robot = request.robot,
-                           .site = request.site,
-                           .phase = SessionPhase::kRefused,
-                           .status = std::move(status)});
+  {
+    const MutexLock lock(mutex_);
+    if (unsent_.size() >= kMaxUnsent) unsent_.pop_front();
+    unsent_.push_back({.robot_id = robot_id,
+                       .client = request.client,
+                       .robot = request.robot,
+                       .site = request.site,
+                       .phase = SessionPhase::kRefused,
+                       .status = std::move(status)});
+  }
+  SendRefusals();
+}
+
+void Roster::SendRefusals() {
+  const MutexLock lock(mutex_);
+  while (!unsent_.empty() && outbound_.Send(unsent_.front())) unsent_.pop_front();
 }
 
 void Roster::Take(ScanArrival&& arrival) {
@@ -185,9 +222,15 @@ Result<void> Roster::End(const std::string& robot) {
 }
 
 void Roster::Tick() {
-  for (const auto& session : All()) session->Tick();
+  const std::chrono::duration<double> expiry(options_.suspended_expiry_s);
+  for (const auto& session : All()) {
+    session->Tick();
+    if (session->record().SuspendedFor(SessionRecord::Clock::now()) > expiry)
+      session->End({StatusCode::kDeadlineExceeded, "its robot stayed away for longer than robots.suspended_expiry_s"});
+  }
+  SendRefusals();
   const MutexLock lock(mutex_);
-  for (Ledger& ledger : unclaimed_.TakeChanged()) ports_.send(std::move(ledger));
+  for (Ledger& ledger : unclaimed_.TakeChanged()) outbound_.Send(std::move(ledger));
 }
 
 std::shared_ptr<Session> Roster::Find(const std::string& robot) const {

@@ -1,37 +1,34 @@
 // Who is here: every session by robot, and who may open one. The door's events are routed from here to the session they
 // belong to; scans without one are counted as unclaimed.
 // Rules of opening: a robot has one session; its owner, or anyone once the owner's liveliness lease is gone, resumes
-// it; another live client is refused (ALREADY_EXISTS). An ended session gives way to a new one. When max_robots is
-// reached, the ended session that is oldest is forgotten first (its part of the map stays). Thread rule: any thread;
-// nothing here waits for an estimator.
+// it, and a client whose session is taken over is told; another live client is refused (ALREADY_EXISTS). An ended
+// session gives way to a new one. When max_robots is reached, the ended session that is oldest is forgotten first (its
+// part of the map stays), then the one suspended for longest. A session suspended for too long is ended.
+// Thread rule: any thread; nothing here waits for an estimator.
 #pragma once
 
 #include <asio/thread_pool.hpp>
 #include <cstdint>
-#include <functional>
+#include <deque>
 #include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "common/mutex.h"
+#include "server/maps/atlas.h"
+#include "server/outbound.h"
 #include "server/robots/robots_options.h"
 #include "server/robots/session.h"
 #include "server/robots/unclaimed_streams.h"
 
 namespace cairn::server {
 
-struct RosterPorts {
-  std::function<bool(OutboundValue)> send;
-  // The site's map epoch; NOT_FOUND for a site the server does not serve.
-  std::function<Result<std::uint32_t>(const std::string& site)> enter_site;
-  std::function<void(const std::string& site, GridChange&&)> grid_changed;
-  std::function<void(const std::string& site)> robots_changed;  // Sessions came or went.
-};
-
 class Roster {
  public:
-  Roster(const RobotsOptions& options, const slam::MapperOptions& mapper, asio::thread_pool& pool, RosterPorts ports);
+  // Sessions draw the sites of the atlas; a robot that opens a session enters its site there.
+  Roster(const RobotsOptions& options, const slam::MapperOptions& mapper, asio::thread_pool& pool, Outbound& outbound,
+         Atlas& atlas);
 
   // Opens, resumes, refuses or ends; the answer goes out as a SessionState.
   void Take(const SessionRequest& request);
@@ -40,7 +37,7 @@ class Roster {
   void Take(const ClientLiveliness& liveliness);
   // NOT_FOUND without such a session.
   Result<void> End(const std::string& robot);
-  // Publishes what is due.
+  // Publishes what is due, and ends sessions whose robots stayed away for too long.
   void Tick();
 
   [[nodiscard]] std::shared_ptr<Session> Find(const std::string& robot) const;
@@ -52,17 +49,21 @@ class Roster {
   Result<void> Admit(const SessionRequest& request);
   Result<void> Resume(Session& session, const SessionRequest& request);
   Result<void> Open(const SessionRequest& request);
-  Result<void> MakeRoom() CAIRN_REQUIRES(mutex_);
+  // The session that has to be removed before this robot can have a new one; null where there is room.
+  Result<std::shared_ptr<Session>> GivesWay(NameId robot_id) const CAIRN_REQUIRES(mutex_);
   void Refuse(const SessionRequest& request, Status status);
+  void SendRefusals();
 
   const RobotsOptions options_;
   const slam::MapperOptions mapper_;
   asio::thread_pool& pool_;
-  const RosterPorts ports_;
+  Outbound& outbound_;
+  Atlas& atlas_;
 
   mutable Mutex mutex_;
   std::map<NameId, std::shared_ptr<Session>> sessions_ CAIRN_GUARDED_BY(mutex_);
   UnclaimedStreams unclaimed_ CAIRN_GUARDED_BY(mutex_);
+  std::deque<SessionState> unsent_ CAIRN_GUARDED_BY(mutex_);  // Refusals the outbound lane had no room for.
   SessionId next_id_ CAIRN_GUARDED_BY(mutex_) = 1;
 };
 

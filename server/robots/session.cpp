@@ -1,6 +1,9 @@
 #include "server/robots/session.h"
 
+#include <spdlog/spdlog.h>
+
 #include <asio/post.hpp>
+#include <exception>
 #include <utility>
 
 namespace cairn::server {
@@ -17,7 +20,7 @@ Session::Session(const SessionSetup& setup, const RobotsOptions& options, asio::
             record_.SetEpoch(setup.map_epoch);
             return setup.estimator;
           }(),
-          options, record_, outputs_) {}
+          record_, outputs_) {}
 
 bool Session::Take(ScanArrival&& arrival) {
   const NameId sensor = arrival.stream.sensor_id;
@@ -57,8 +60,8 @@ void Session::Adopt(Correction&& correction) {
   Schedule();
 }
 
-bool Session::Post(RobotEvent&& control) {
-  if (!queue_.PushControl(std::move(control))) return false;
+bool Session::Post(SnapshotWanted&& wanted) {
+  if (!queue_.Push(std::move(wanted))) return false;
   Schedule();
   return true;
 }
@@ -67,37 +70,37 @@ void Session::SetLiveliness(bool alive) {
   record_.SetAlive(alive);
   const SessionPhase wanted = alive ? SessionPhase::kActive : SessionPhase::kSuspended;
   if (ending_ || record_.phase() == wanted) return;
-  record_.SetPhase(wanted, alive ? Status{} : Status{StatusCode::kUnavailable, "the robot's client is not alive"});
-  AnnounceState();
+  Status status = alive ? Status{} : Status{StatusCode::kUnavailable, "the robot's client is not alive"};
+  if (record_.SetPhase(wanted, std::move(status))) AnnounceState();
 }
 
-void Session::Resume(ClientId client) {
-  record_.Resume(client);
+bool Session::Resume(ClientId client) {
+  if (!record_.Resume(client)) return false;
   AnnounceState();
+  return true;
 }
 
-void Session::End() {
+void Session::End(Status reason) {
   if (ending_.exchange(true)) {
     if (record_.phase() == SessionPhase::kEnded) AnnounceState();  // Whoever asks again gets the answer again.
     return;
   }
-  // The end must not be refused by a full control lane: it is asked for once and outlives a burst of snapshots.
-  const bool posted =
-      Post(Finish{.final = true, .done = [self = shared_from_this()] { self->Finished(SessionPhase::kEnded, {}); }});
-  if (!posted) ending_ = false;
+  queue_.Push(Finish{.final = true, .done = [self = shared_from_this(), reason = std::move(reason)] {
+                       self->Finished(SessionPhase::kEnded, reason);
+                     }});
+  Schedule();
 }
 
 void Session::Suspend(const std::function<void()>& done) {
-  if (ending_.exchange(true)) {
-    if (!Post(Probe{done})) done();
-    return;
-  }
-  const bool posted =
-      Post(Finish{.final = false, .done = [self = shared_from_this(), done] {
-                    self->Finished(SessionPhase::kSuspended, {StatusCode::kUnavailable, "the server is stopping"});
-                    done();
-                  }});
-  if (!posted) done();
+  // Where the end was asked for before, it is handled first and nothing is left to be suspended.
+  const bool ended_before = ending_.exchange(true);
+  queue_.Push(Finish{.final = false, .done = [self = shared_from_this(), done, ended_before] {
+                       if (!ended_before) {
+                         self->Finished(SessionPhase::kSuspended, {StatusCode::kUnavailable, "the server is stopping"});
+                       }
+                       done();
+                     }});
+  Schedule();
 }
 
 void Session::Abandon() {
@@ -139,13 +142,49 @@ void Session::Drain() {
   for (int i = 0; i < kEventsPerTurn; ++i) {
     std::optional<RobotEvent> event = queue_.Pop();
     if (!event) break;
-    estimator_.Handle(std::move(*event));
+    handling_ = true;
+    Handle(std::move(*event));
+    ++handled_;
+    handling_ = false;
   }
   const bool drained = queue_.empty();
-  PublishLedgers(drained ? SessionRecord::Urgency::kDrained : SessionRecord::Urgency::kWhenDue);
+  Throws([&] { PublishLedgers(drained ? SessionRecord::Urgency::kDrained : SessionRecord::Urgency::kWhenDue); });
   scheduled_ = false;
   // An event that came between the last Pop and the line above found `scheduled_` set and relies on this turn.
   if (!queue_.empty()) Schedule();
+}
+
+void Session::Handle(RobotEvent&& event) {
+  if (!failed_ && !Throws([&] { estimator_.Handle(std::move(event)); })) return;
+  Throws([&] { estimator_.Discard(std::move(event)); });
+}
+
+template <typename Act>
+bool Session::Throws(Act act) noexcept {
+  try {
+    act();
+    return false;
+  } catch (const std::exception& error) {
+    Fail(error.what());
+  } catch (...) {
+    Fail("an exception without a name");
+  }
+  return true;
+}
+
+void Session::Fail(const char* what) noexcept {
+  const bool first = !std::exchange(failed_, true);
+  ending_ = true;
+  try {
+    if (!first) return;
+    const std::string robot = record_.state().robot;
+    spdlog::error("robot '{}': its session ends because of an exception: {}", robot, what);
+    estimator_.DropWaiting();
+    state_unsent_ = true;  // Should the next line fail as well, housekeeping tries again.
+    Finished(SessionPhase::kEnded, {StatusCode::kInternal, "the estimator of '" + robot + "' failed: " + what});
+  } catch (...) {
+    // Whatever it was, the first exception is the one to know about; housekeeping announces the end later.
+  }
 }
 
 }  // namespace cairn::server

@@ -1,7 +1,8 @@
 // One run of a robot in a site: its owner, its queue, its strand and its estimator. Survives disconnection; ends on
 // request. What arrives is admitted or refused at once (owner, phase, duplicate), queued, and handled on the strand in
-// order of arrival; sessions run in parallel on one thread pool.
-// Thread rule: any thread may call; nothing here waits for the estimator.
+// order of arrival; sessions run in parallel on one thread pool. An exception in the estimator, or in what it calls,
+// ends this session with the reason in its state and in the log; all others go on. Thread rule: any thread may call;
+// nothing here waits for the estimator.
 #pragma once
 
 #include <asio/strand.hpp>
@@ -10,6 +11,7 @@
 #include <memory>
 
 #include "common/mutex.h"
+#include "server/ops/heartbeat.h"
 #include "server/robots/robot_queue.h"
 #include "server/robots/session_estimator.h"
 #include "server/robots/session_record.h"
@@ -23,7 +25,7 @@ struct SessionSetup {
   EstimatorSetup estimator;
 };
 
-class Session : public std::enable_shared_from_this<Session> {
+class Session : public GridOwner, public std::enable_shared_from_this<Session> {
  public:
   Session(const SessionSetup& setup, const RobotsOptions& options, asio::thread_pool& pool, SessionOutputs outputs);
 
@@ -31,16 +33,17 @@ class Session : public std::enable_shared_from_this<Session> {
   bool Take(ScanArrival&& arrival);
   void Take(OdometryArrival&& arrival);
   // The newest correction wins; one still waiting is dropped without a call to its `done`.
-  void Adopt(Correction&& correction);
-  // Snapshot or probe; false where too many wait.
-  bool Post(RobotEvent&& control);
+  void Adopt(Correction&& correction) override;
+  // Asks for a snapshot; false where too many wait.
+  bool Post(SnapshotWanted&& wanted);
 
   // The owner's liveliness lease was lost or came back: kSuspended or kActive.
   void SetLiveliness(bool alive);
-  void Resume(ClientId client);
-  // Scans that arrived are finished, then the session has ended for good.
-  void End();
-  // As End, but the session is only suspended, because the server stops; `done` is called on the strand.
+  // False where the session has ended meanwhile.
+  bool Resume(ClientId client);
+  // Scans that arrived are finished, then the session has ended for good; `reason` stands in its state.
+  void End(Status reason = {});
+  // As End, but the session is only suspended, because the server stops; `done` is called on the strand, in any case.
   void Suspend(const std::function<void()>& done);
   // Drops the scans still waiting; what is being estimated is finished.
   void Abandon();
@@ -52,12 +55,21 @@ class Session : public std::enable_shared_from_this<Session> {
   [[nodiscard]] SessionId id() const { return id_; }
   // Its end was asked for; it may still have scans to finish.
   [[nodiscard]] bool ending() const { return ending_; }
+  // Busy while an event is being handled; waiting for a thread of the pool is not this session's doing.
+  [[nodiscard]] Pulse pulse() const { return {handled_, handling_}; }
+  // Events wait or are being handled.
+  [[nodiscard]] bool has_work() const { return scheduled_; }
 
  private:
   static constexpr int kEventsPerTurn = 8;  // Then the strand makes room for the pool's other work.
 
   void Schedule();
   void Drain();
+  void Handle(RobotEvent&& event);
+  // Calls `act`; whether it threw. The session has then failed.
+  template <typename Act>
+  bool Throws(Act act) noexcept;
+  void Fail(const char* what) noexcept;
   void AnnounceState();
   void PublishLedgers(SessionRecord::Urgency urgency);
   void Finished(SessionPhase phase, Status status);
@@ -69,10 +81,14 @@ class Session : public std::enable_shared_from_this<Session> {
   std::atomic<bool> ending_{false};  // An end was asked for: nothing new is taken.
   std::atomic<bool> state_unsent_{false};
   std::atomic<bool> scheduled_{false};
+  std::atomic<bool> handling_{false};
+  std::atomic<std::uint64_t> handled_{0};
   // Held from the reading of a state to its sending: an older state must not overtake a newer one on its way out.
   Mutex publishing_;
   asio::strand<asio::thread_pool::executor_type> strand_;
-  SessionEstimator estimator_;  // Strand only.
+  // Strand only.
+  bool failed_ = false;  // An exception has left the estimator in an unknown state: it is not asked any more.
+  SessionEstimator estimator_;
 };
 
 }  // namespace cairn::server

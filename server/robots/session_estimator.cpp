@@ -8,14 +8,17 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-PoseReport ReportOf(const slam::ScanOutcome& outcome, const SessionState& session, std::uint32_t epoch,
-                    std::uint64_t sequence) {
+// How often landmarks are copied for queries: a landmark hardly moves in less time.
+constexpr auto kLandmarkPeriod = std::chrono::milliseconds(500);
+
+PoseReport ReportOf(const Scan& scan, const slam::ScanOutcome& outcome, const SessionState& session,
+                    std::uint32_t epoch) {
   PoseReport report;
   report.robot_id = session.robot_id;
   report.robot = session.robot;
   report.site = session.site;
-  report.stamp = outcome.stamp;
-  report.scan_sequence = sequence;
+  report.stamp = scan.stamp;
+  report.scan_sequence = scan.sequence;
   report.T_map_robot = outcome.T_map_robot;
   report.covariance = outcome.covariance;
   report.T_map_odom = outcome.T_map_odom;
@@ -43,10 +46,8 @@ std::vector<LandmarkReport> ReportsOf(const std::vector<slam::Landmark>& landmar
 
 }  // namespace
 
-SessionEstimator::SessionEstimator(const EstimatorSetup& setup, const RobotsOptions& options, SessionRecord& record,
-                                   SessionOutputs outputs)
-    : landmark_period_(1.0 / options.landmark_rate_hz),
-      record_(record),
+SessionEstimator::SessionEstimator(const EstimatorSetup& setup, SessionRecord& record, SessionOutputs outputs)
+    : record_(record),
       outputs_(std::move(outputs)),
       identity_(record.snapshot()),
       epoch_(record.epoch()),
@@ -58,25 +59,58 @@ void SessionEstimator::Handle(RobotEvent&& event) {
   std::visit([this](auto&& alternative) { On(std::move(alternative)); }, std::move(event));
 }
 
-void SessionEstimator::On(ScanArrival&& arrival) {
-  if (ended_) {
-    record_.ScanDropped(arrival.stream.sensor_id, arrival.scan->sequence, DropReason::kSessionEnded);
-    return;
+void SessionEstimator::Discard(RobotEvent&& event) {
+  if (const auto* const arrival = std::get_if<ScanArrival>(&event)) {
+    // A scan that has moved on into the estimator is one of those that wait there.
+    if (arrival->scan != nullptr)
+      record_.ScanDropped(arrival->stream.sensor_id, arrival->scan->sequence, DropReason::kSessionEnded);
+  } else if (std::holds_alternative<OdometryArrival>(event)) {
+    record_.OdometryDropped();
+  } else if (auto* const wanted = std::get_if<SnapshotWanted>(&event)) {
+    wanted->done({.session = identity_.id,
+                  .robot = identity_.status.session.robot,
+                  .snapshot = {},
+                  .grid_options = pipeline_.mapper().grid().options()});
+  } else if (auto* const finish = std::get_if<Finish>(&event)) {
+    if (finish->done) finish->done();
   }
-  waiting_.emplace(arrival.scan.get(), Waiting{arrival.stream.sensor_id, arrival.received});
+}
+
+void SessionEstimator::DropWaiting() {
+  for (const auto& [scan, waiting] : waiting_)
+    record_.ScanDropped(waiting.sensor_id, waiting.sequence, DropReason::kSessionEnded);
+  waiting_.clear();
+}
+
+void SessionEstimator::On(ScanArrival&& arrival) {
+  if (ended_) return Discard(std::move(arrival));
+  ComesFrom(arrival.stream.client);
+  waiting_.emplace(arrival.scan.get(), Waiting{arrival.stream.sensor_id, arrival.scan->sequence, arrival.received});
   pipeline_.Add(std::move(arrival.scan));
 }
 
 void SessionEstimator::On(OdometryArrival&& arrival) {
-  if (ended_ || !pipeline_.Add(arrival.odometry)) record_.OdometryDropped();
+  if (ended_) return Discard(std::move(arrival));
+  ComesFrom(arrival.stream.client);
+  pipeline_.Add(arrival.odometry);
+  CountRefusedOdometry();
+}
+
+void SessionEstimator::ComesFrom(ClientId client) {
+  if (std::exchange(client_, client) != client) pipeline_.NewClient();
+}
+
+void SessionEstimator::CountRefusedOdometry() {
+  for (; odometry_refused_ < pipeline_.odometry_refused(); ++odometry_refused_) record_.OdometryDropped();
 }
 
 void SessionEstimator::Used(const Scan& scan, const slam::ScanOutcome& outcome) {
-  const Waiting waiting = TakeWaiting(scan);
-  const PoseReport report = ReportOf(outcome, identity_.status.session, epoch_, scan.sequence);
+  const auto waiting = waiting_.find(&scan);
+  const PoseReport report = ReportOf(scan, outcome, identity_.status.session, epoch_);
   outputs_.send(report);
-  const std::chrono::duration<double, std::milli> latency = Clock::now() - waiting.received;
-  record_.ScanUsed(waiting.sensor_id, report, outcome.keyframe, latency.count());
+  const std::chrono::duration<double, std::milli> latency = Clock::now() - waiting->second.received;
+  record_.ScanUsed(waiting->second.sensor_id, report, outcome.stamp, outcome.keyframe, latency.count());
+  waiting_.erase(waiting);  // Only now: whatever fails before leaves it among those to be dropped.
   if (outcome.keyframe) {
     GridChange change = TakeGridChange();
     if (!change.chunks.empty()) outputs_.grid_changed(std::move(change));
@@ -85,34 +119,25 @@ void SessionEstimator::Used(const Scan& scan, const slam::ScanOutcome& outcome) 
 }
 
 void SessionEstimator::Dropped(const Scan& scan, DropReason reason) {
-  record_.ScanDropped(TakeWaiting(scan).sensor_id, scan.sequence, reason);
-}
-
-SessionEstimator::Waiting SessionEstimator::TakeWaiting(const Scan& scan) {
-  const auto node = waiting_.extract(&scan);
-  return node.empty() ? Waiting{} : node.mapped();
+  const auto waiting = waiting_.find(&scan);
+  record_.ScanDropped(waiting->second.sensor_id, scan.sequence, reason);
+  waiting_.erase(waiting);
 }
 
 GridChange SessionEstimator::TakeGridChange() {
-  GridChange change{.session = identity_.id, .chunks = {}};
-  const auto& chunks = pipeline_.mapper().grid().chunks();
-  for (const slam::ChunkKey& key : pipeline_.mapper().TakeDirtyChunks()) {
-    const auto found = chunks.find(key);
-    change.chunks.emplace_back(key, found == chunks.end() ? nullptr : found->second);
-  }
-  return change;
+  return {.session = identity_.id, .chunks = pipeline_.mapper().TakeGridChange()};
 }
 
 slam::OccupancyGrid::Chunks SessionEstimator::PublishedChunks() {
-  // Chunks may be shared only after they were taken as changed: from then on the mapper writes to copies.
+  // What changed since the last time must be told before.
   GridChange change = TakeGridChange();
   if (!change.chunks.empty()) outputs_.grid_changed(std::move(change));
-  return pipeline_.mapper().grid().chunks();
+  return pipeline_.mapper().ShareGrid();
 }
 
 void SessionEstimator::RefreshLandmarks(bool at_once) {
   const auto now = Clock::now();
-  if (!at_once && now - landmarks_refreshed_ < landmark_period_) return;
+  if (!at_once && now - landmarks_refreshed_ < kLandmarkPeriod) return;
   landmarks_refreshed_ = now;
   record_.SetLandmarks(ReportsOf(pipeline_.mapper().landmarks(), identity_.status.session.robot));
 }
@@ -122,13 +147,8 @@ void SessionEstimator::On(Correction&& correction) {
   Adopted adopted{.session = identity_.id,
                   .displaced = {PublishedChunks(), mapper.keyframe_count()},
                   .change = {.session = identity_.id, .chunks = {}}};
-  mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), std::move(correction.grid.chunks)),
-                   correction.grid.keyframes);
-  static_cast<void>(mapper.TakeDirtyChunks());  // From here on the mapper writes to copies.
-  for (const auto& [key, chunk] : mapper.grid().chunks()) adopted.change.chunks.emplace_back(key, chunk);
-  for (const auto& [key, chunk] : adopted.displaced.chunks) {
-    if (!mapper.grid().chunks().contains(key)) adopted.change.chunks.emplace_back(key, nullptr);
-  }
+  mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), correction.grid.chunks), correction.grid.keyframes);
+  adopted.change.chunks = mapper.TakeGridChange();
   epoch_ = correction.epoch;
   record_.SetEpoch(epoch_);
   correction.done(std::move(adopted));
@@ -144,14 +164,11 @@ void SessionEstimator::On(SnapshotWanted&& wanted) {
 void SessionEstimator::On(Finish&& finish) {
   if (!ended_) {
     pipeline_.Finish();
+    CountRefusedOdometry();
     RefreshLandmarks(true);
     ended_ = finish.final;
   }
   if (finish.done) finish.done();
-}
-
-void SessionEstimator::On(Probe&& probe) {
-  probe.done();
 }
 
 }  // namespace cairn::server

@@ -1,4 +1,5 @@
 // The strand's side of a session: takes one event after the other and moves the estimator, the record and the map.
+// An exception may leave Handle and then leaves the estimator in any state: from then on only Discard may be called.
 // Not a queue and not an owner: it never asks who sent an event. After Finish it still answers snapshots and adopts
 // corrections, so that a finished robot's part of the map can be smoothed.
 // Thread rule: one thread at a time (the session's strand).
@@ -15,7 +16,7 @@
 
 namespace cairn::server {
 
-// How a session speaks to the rest of the house. Both never wait.
+// Where a session sends its results. Neither function waits.
 struct SessionOutputs {
   std::function<bool(OutboundValue)> send;
   std::function<void(GridChange&&)> grid_changed;
@@ -28,14 +29,19 @@ struct EstimatorSetup {
 
 class SessionEstimator {
  public:
-  SessionEstimator(const EstimatorSetup& setup, const RobotsOptions& options, SessionRecord& record,
-                   SessionOutputs outputs);
+  SessionEstimator(const EstimatorSetup& setup, SessionRecord& record, SessionOutputs outputs);
 
   void Handle(RobotEvent&& event);
+  // Settles an event without the estimator, also the one that failed: scans and odometry are counted as dropped,
+  // whoever waits for an answer gets an empty one, and a correction is dropped.
+  void Discard(RobotEvent&& event);
+  // Drops the scans inside the estimator.
+  void DropWaiting();
 
  private:
   struct Waiting {
     NameId sensor_id = 0;
+    std::uint64_t sequence = 0;
     std::chrono::steady_clock::time_point received;
   };
 
@@ -44,20 +50,21 @@ class SessionEstimator {
   void On(Correction&& correction);
   void On(SnapshotWanted&& wanted);
   void On(Finish&& finish);
-  void On(Probe&& probe);
   void Used(const Scan& scan, const slam::ScanOutcome& outcome);
   void Dropped(const Scan& scan, DropReason reason);
-  Waiting TakeWaiting(const Scan& scan);
+  void ComesFrom(ClientId client);
+  void CountRefusedOdometry();
   GridChange TakeGridChange();
   slam::OccupancyGrid::Chunks PublishedChunks();
   void RefreshLandmarks(bool at_once);
 
-  const std::chrono::duration<double> landmark_period_;
   SessionRecord& record_;
   const SessionOutputs outputs_;
   const SessionSnapshot identity_;  // Names and id; its other parts are empty.
   std::uint32_t epoch_ = 0;
   bool ended_ = false;
+  ClientId client_ = 0;  // The last one that sent.
+  std::uint64_t odometry_refused_ = 0;
   std::unordered_map<const Scan*, Waiting> waiting_;  // Scans inside the pipeline; its pairing bounds them.
   std::chrono::steady_clock::time_point landmarks_refreshed_{};
   slam::ScanPipeline pipeline_;

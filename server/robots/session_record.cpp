@@ -77,10 +77,11 @@ void SessionRecord::ScanDropped(NameId sensor_id, std::uint64_t sequence, DropRe
   }
 }
 
-void SessionRecord::ScanUsed(NameId sensor_id, const PoseReport& pose, bool keyframe, double latency_ms) {
+void SessionRecord::ScanUsed(NameId sensor_id, const PoseReport& pose, Stamp path_stamp, bool keyframe,
+                             double latency_ms) {
   const MutexLock lock(mutex_);
   status_.pose = pose;
-  history_.Append({pose.stamp, pose.T_map_robot, static_cast<float>(pose.score), pose.localized, pose.reason,
+  history_.Append({path_stamp, pose.T_map_robot, static_cast<float>(pose.score), pose.localized, pose.reason,
                    pose.covariance.cast<float>(), pose.T_map_odom});
   if (Stream* const stream = Find(sensor_id)) {
     stream->account.Used(pose.scan_sequence, pose.stamp, keyframe, latency_ms);
@@ -128,14 +129,18 @@ void SessionRecord::SetAlive(bool alive) {
   status_.alive = alive;
 }
 
-void SessionRecord::SetPhase(SessionPhase phase, Status status) {
+bool SessionRecord::SetPhase(SessionPhase phase, Status status) {
   const MutexLock lock(mutex_);
+  if (status_.session.phase == SessionPhase::kEnded) return false;
+  if (phase == SessionPhase::kSuspended && status_.session.phase != phase) suspended_ = Clock::now();
   status_.session.phase = phase;
   status_.session.status = std::move(status);
+  return true;
 }
 
-void SessionRecord::Resume(ClientId client) {
+bool SessionRecord::Resume(ClientId client) {
   const MutexLock lock(mutex_);
+  if (status_.session.phase == SessionPhase::kEnded) return false;
   if (status_.session.client != client) {
     for (auto& [sensor_id, stream] : streams_) stream.account.NewClient();
   }
@@ -143,6 +148,7 @@ void SessionRecord::Resume(ClientId client) {
   status_.session.phase = SessionPhase::kActive;
   status_.session.status = {};
   status_.alive = true;
+  return true;
 }
 
 ClientId SessionRecord::owner() const {
@@ -163,6 +169,11 @@ SessionPhase SessionRecord::phase() const {
 SessionState SessionRecord::state() const {
   const MutexLock lock(mutex_);
   return status_.session;
+}
+
+SessionRecord::Clock::duration SessionRecord::SuspendedFor(Clock::time_point now) const {
+  const MutexLock lock(mutex_);
+  return status_.session.phase == SessionPhase::kSuspended ? now - suspended_ : Clock::duration::zero();
 }
 
 std::uint32_t SessionRecord::epoch() const {

@@ -36,7 +36,9 @@ class SessionRecord {
   enum class Arrival { kNew, kDuplicate, kUnknownSensor };
   Arrival ScanReceived(NameId sensor_id, std::uint64_t sequence);
   void ScanDropped(NameId sensor_id, std::uint64_t sequence, DropReason reason);
-  void ScanUsed(NameId sensor_id, const PoseReport& pose, bool keyframe, double latency_ms);
+  // `path_stamp` is the estimator's time, which grows also where the robot's clock was set back: the path is kept by
+  // it.
+  void ScanUsed(NameId sensor_id, const PoseReport& pose, Stamp path_stamp, bool keyframe, double latency_ms);
   // A scan of a client that does not own the session.
   Arrival ForeignScan(NameId sensor_id, DropReason reason);
 
@@ -48,14 +50,17 @@ class SessionRecord {
   // Another epoch of the map: the newest pose belongs to it from now on.
   void SetEpoch(std::uint32_t epoch);
   void SetAlive(bool alive);
-  void SetPhase(SessionPhase phase, Status status);
+  // Both leave a session that has ended as it is, and say false: whoever asks may have looked before it ended.
+  bool SetPhase(SessionPhase phase, Status status);
   // The robot is back, perhaps as another client process.
-  void Resume(ClientId client);
+  bool Resume(ClientId client);
 
   [[nodiscard]] ClientId owner() const;
   [[nodiscard]] bool alive() const;
   [[nodiscard]] SessionPhase phase() const;
   [[nodiscard]] SessionState state() const;
+  // How long the session has been suspended at `now`; zero where it is not.
+  [[nodiscard]] Clock::duration SuspendedFor(Clock::time_point now) const;
   [[nodiscard]] std::uint32_t epoch() const;
   [[nodiscard]] SessionSnapshot snapshot() const;
 
@@ -79,7 +84,8 @@ class SessionRecord {
   const Clock::duration ledger_period_;
 
   mutable Mutex mutex_;
-  RobotStatus status_ CAIRN_GUARDED_BY(mutex_);  // Its `ledgers` stay empty: they are made on demand.
+  RobotStatus status_ CAIRN_GUARDED_BY(mutex_);           // Its `ledgers` stay empty: they are made on demand.
+  Clock::time_point suspended_ CAIRN_GUARDED_BY(mutex_);  // Since when, where it is suspended.
   std::map<NameId, Stream> streams_ CAIRN_GUARDED_BY(mutex_);
   std::uint64_t odometry_received_ CAIRN_GUARDED_BY(mutex_) = 0;
   std::uint64_t odometry_dropped_ CAIRN_GUARDED_BY(mutex_) = 0;

@@ -1,5 +1,5 @@
 // What the world may know of a session at one moment: plain values, copied under the session's lock and never changed
-// after. Queries answer from this; nobody else locks an estimator.
+// after. Queries answer from this, so that they never lock an estimator.
 #pragma once
 
 #include <memory>

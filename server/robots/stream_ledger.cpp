@@ -13,11 +13,11 @@ std::uint64_t& Count(Ledger& ledger, DropReason reason) {
 }  // namespace
 
 bool StreamLedger::Received(std::uint64_t sequence) {
-  const bool first_of_client = std::exchange(new_client_, false);
   if (sequence > 0) {
-    if (first_of_client && sequence <= ledger_.last_sequence) Restart(0);
-    if (sequence > ledger_.last_sequence && sequence - ledger_.last_sequence > kMaxStep) Restart(sequence - 1);
-    if (sequence > ledger_.last_sequence) {
+    const bool first = !std::exchange(begun_, true);
+    if (first || (sequence > ledger_.last_sequence && sequence - ledger_.last_sequence > kMaxStep)) {
+      BeginAt(sequence);
+    } else if (sequence > ledger_.last_sequence) {
       Advance(sequence);
     } else if (!FillGap(sequence)) {
       return false;
@@ -86,15 +86,17 @@ bool StreamLedger::FillGap(std::uint64_t sequence) {
   gaps_.erase(gap);
   if (first < sequence) gaps_.emplace(first, sequence - 1);
   if (sequence < last) gaps_.emplace(sequence + 1, last);
-  --Count(ledger_, DropReason::kLostOnWire);
+  if (sequence > first_sequence_) --Count(ledger_, DropReason::kLostOnWire);
   return true;
 }
 
-void StreamLedger::Restart(std::uint64_t last_sequence) {
+void StreamLedger::BeginAt(std::uint64_t sequence) {
   gaps_.clear();
+  if (sequence > 1) gaps_.emplace(1, sequence - 1);
   waiting_.clear();
-  ledger_.last_sequence = last_sequence;
-  ledger_.settled_through = last_sequence;
+  first_sequence_ = sequence;
+  ledger_.last_sequence = sequence;
+  ledger_.settled_through = sequence - 1;
 }
 
 void StreamLedger::Settle(std::uint64_t sequence) {

@@ -4,9 +4,10 @@
 // Numbers: scans carry sequences from 1. A gap counts as lost_on_wire and settles at once, so a client's window never
 // hangs on it; a late arrival takes its number back out of the lost. A number seen before (a resend of something
 // already received) is ignored and counted nowhere. At most kMaxGaps separate gaps are remembered; older ones stay lost
-// for good. A new client whose first number is not beyond the last one starts the numbering anew; counts go on. A
-// number more than kMaxStep ahead starts the numbering anew as well: no client loses a million scans at once. Thread
-// rule: none of its own; the session's lock guards it.
+// for good. Numbers before the first one of a client may have gone to an earlier session or to the server before its
+// last restart. They do not count as lost, and are taken if they come late. The counts go on. A number
+// more than kMaxStep ahead begins anew in the same way: no client loses a million scans at once.
+// Thread rule: none of its own; the session's lock guards it.
 #pragma once
 
 #include <array>
@@ -36,7 +37,7 @@ class StreamLedger {
 
   void Rename(const Ledger& names);
   // The next scan comes from another client process.
-  void NewClient() { new_client_ = true; }
+  void NewClient() { begun_ = false; }
 
   // Scans used or dropped so far, for deciding when to publish.
   [[nodiscard]] std::uint64_t settled_count() const { return settled_count_; }
@@ -47,11 +48,12 @@ class StreamLedger {
 
   void Advance(std::uint64_t sequence);
   bool FillGap(std::uint64_t sequence);
-  void Restart(std::uint64_t last_sequence);
+  void BeginAt(std::uint64_t sequence);
   void Settle(std::uint64_t sequence);
 
   Ledger ledger_;
-  bool new_client_ = false;
+  bool begun_ = false;                // The client has sent a number before.
+  std::uint64_t first_sequence_ = 0;  // The first number of the client; numbers missing before it are not lost.
   std::uint64_t settled_count_ = 0;
   std::set<std::uint64_t> waiting_;              // Numbers received and not settled; bounded by the robot's queue.
   std::map<std::uint64_t, std::uint64_t> gaps_;  // First missing number -> last missing number, disjoint.

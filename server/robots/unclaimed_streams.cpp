@@ -13,20 +13,22 @@ void UnclaimedStreams::Count(const StreamId& stream, std::uint64_t sequence, Dro
     Ledger names;
     names.robot_id = stream.robot_id;
     names.sensor_id = stream.sensor_id;
-    found = accounts_.emplace(key, Account{StreamLedger(names)}).first;
+    found = accounts_.emplace(key, Account{StreamLedger(names), stream.client}).first;
   }
   Account& account = found->second;
   account.changed = true;
   if (reason == DropReason::kNotOwner) {
     account.ledger.DroppedForeign(reason);
-  } else if (account.ledger.Received(sequence)) {
-    account.ledger.Dropped(sequence, reason);
+    return;
   }
+  account.NextFrom(stream.client);
+  if (account.ledger.Received(sequence)) account.ledger.Dropped(sequence, reason);
 }
 
-std::optional<StreamLedger> UnclaimedStreams::Claim(NameId robot_id, NameId sensor_id) {
-  auto node = accounts_.extract({robot_id, sensor_id});
+std::optional<StreamLedger> UnclaimedStreams::Claim(const StreamId& stream) {
+  auto node = accounts_.extract({stream.robot_id, stream.sensor_id});
   if (node.empty()) return std::nullopt;
+  node.mapped().NextFrom(stream.client);
   return std::move(node.mapped().ledger);
 }
 

@@ -1,6 +1,6 @@
-// Scans that belong to no session, counted per stream as no_session, in a table with a bound: a stranger who invents
-// stream ids costs a fixed amount of memory. Streams beyond the bound are counted together in overflow().
-// Not thread-safe: the roster's lock guards it.
+// Scans that belong to no session, counted per stream as no_session. The table is bounded, so that a client that
+// invents stream ids costs a fixed amount of memory. Streams beyond the bound are counted together in overflow(). Not
+// thread-safe: the roster's lock guards it.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,9 @@ class UnclaimedStreams {
   explicit UnclaimedStreams(std::size_t max_streams) : max_streams_(max_streams) {}
 
   void Count(const StreamId& stream, std::uint64_t sequence, DropReason reason);
-  // The account of a stream whose session has just been opened, if it sent before.
-  [[nodiscard]] std::optional<StreamLedger> Claim(NameId robot_id, NameId sensor_id);
+  // The account of a stream whose session `client` has just opened, if anything was sent under its name before. Where
+  // the last sender was another client, the owner's numbers start anew.
+  [[nodiscard]] std::optional<StreamLedger> Claim(const StreamId& stream);
   // Accounts that changed since the last call.
   [[nodiscard]] std::vector<Ledger> TakeChanged();
   [[nodiscard]] std::uint64_t overflow() const { return overflow_; }
@@ -28,7 +29,12 @@ class UnclaimedStreams {
  private:
   struct Account {
     StreamLedger ledger;
+    ClientId client = 0;  // The last sender.
     bool changed = true;
+
+    void NextFrom(ClientId sender) {
+      if (std::exchange(client, sender) != sender) ledger.NewClient();
+    }
   };
   const std::size_t max_streams_;
   std::map<std::pair<NameId, NameId>, Account> accounts_;

@@ -1,80 +1,68 @@
 #include "server/slam/mapper.h"
 
 #include <cmath>
+#include <utility>
 
-#include "server/slam/filters/make_filter.h"
-#include "server/slam/front_end.h"
-#include "server/slam/grid/grid_redraw.h"
-#include "server/slam/matching/loop_search.h"
-#include "server/slam/matching/revisit_search.h"
-#include "server/slam/matching/self_check.h"
+#include "server/slam/blind_motion.h"
+#include "server/slam/loops/loop_search.h"
+#include "server/slam/loops/revisit_search.h"
+#include "server/slam/loops/self_check.h"
+#include "server/slam/map_drawing.h"
+#include "server/slam/methods.h"
 #include "server/slam/motion/constant_speed.h"
 #include "server/slam/scan/tilt.h"
-#include "server/slam/smoothing/keyframe_graph.h"
+#include "server/slam/tracking/front_end.h"
+#include "server/slam/trail/trail.h"
 
 namespace cairn::slam {
-
 namespace {
 
-// Keyframes drawn again with every scan after a large loop: a few milliseconds' worth.
-constexpr std::size_t kRedrawnPerScan = 20;
+bool IsLocalized(PoseReason reason) {
+  return reason != PoseReason::kLost && reason != PoseReason::kDiverged;
+}
 
 }  // namespace
 
 struct Mapper::State {
   State(const MapperOptions& given, const Pose2& T_map_robot_start, std::uint64_t seed)
       : options(given),
-        front_end(given.front_end, given.matcher, given.matching),
+        front_end(given.front_end, MakeMatcher(given.matcher, given.matching)),
+        blind(given.blind, given.front_end.use_odometry, given.lost_after_m),
+        trail(given.filter.back_end.drift),
         revisits(given.revisit, given.front_end.refine),
+        filter(MakeFilter(given.filter.kind, given.filter, T_map_robot_start, seed)),
         loops(given.loop, given.front_end.refine),
         self_check(given.self_check),
-        graph(given.filter.back_end.drift),
-        filter(MakeFilter(given.filter.kind, given.filter, T_map_robot_start, seed)),
-        grid(given.grid) {}
+        drawing(given.grid) {}
 
-  // A scan that looks out of the plane: where odometry has taken the robot since the last level one.
   ScanOutcome Coast(Stamp stamp, const Pose2& T_odom_robot);
-  void AddKeyframe(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot, ScanView view, const TrackStep& step,
-                   const ParallelFor& parallel_for);
+  void AddKeyframe(Keyframe keyframe, ScanView view, const TrackStep& step, const ParallelFor& parallel_for);
+  StepMotion MotionTo(const Keyframe& keyframe, const TrackStep& step, const Eigen::Matrix3d& covariance);
   void CloseLargeLoop();
-  void MoveMap();
-  void TakePath();
-  void Redraw();
+  void Draw(const TrackStep& step, bool placed_before);
+  ScanOutcome Report(Stamp stamp, const Pose2& T_odom_robot, const TrackStep& step, bool keyframe);
+  [[nodiscard]] PoseReason ReasonOf(const TrackStep& step) const;
+  [[nodiscard]] SharedSequence<Pose2> believed_path() const { return filter->hypothesis(0).path; }
+
+  // The last scan that was not tilted.
+  struct LevelScan {
+    ScanOutcome outcome;
+    Pose2 T_keyframe_robot;
+    Pose2 T_odom_robot;
+  };
 
   const MapperOptions options;
   FrontEnd front_end;
+  BlindMotion blind;
+  ConstantSpeed speed;  // Speed of the motion from keyframe to keyframe.
+  Trail trail;
   RevisitSearch revisits;
+  std::unique_ptr<Filter> filter;
   LoopSearch loops;
   SelfCheck self_check;
-  ConstantSpeed speed;  // From keyframe to keyframe.
-  KeyframeGraph graph;
-  std::vector<double> distances_m;  // Along the graph, from the last keyframe to each.
-  std::unique_ptr<Filter> filter;
-  OccupancyGrid grid;
-  std::optional<GridRedraw> redraw;   // Under way since a large loop was closed ...
-  std::size_t rebased_keyframes = 0;  // ... when there were so many keyframes.
-
-  std::vector<Keyframe> keyframes;
-  std::vector<KeyframeShape> shapes;  // One per keyframe.
-  std::vector<Pose2> online_path;     // One per keyframe.
-  std::vector<MapperSnapshot::ScanPlace> scans;
-  ScanOutcome level;  // Of the last scan that was not tilted ...
-  MapperSnapshot::ScanPlace level_place;
-  Pose2 T_odom_level;        // ... and odometry there.
-  double travelled_m = 0.0;  // Up to the last keyframe.
-  double unmatched_m = 0.0;  // Travelled by odometry alone since the last match.
-  // Of what was travelled by odometry or a forecast alone since the last keyframe, in that keyframe.
-  Eigen::Matrix3d blind_covariance = Eigen::Matrix3d::Zero();
+  MapDrawing drawing;
+  LevelScan level;
 };
-
-namespace {
-
-PoseReason ReasonOf(const TrackStep& step, double unmatched_m, double lost_after_m) {
-  if (!step.matched) return unmatched_m > lost_after_m ? PoseReason::kLost : PoseReason::kOdometryOnly;
-  return step.match.degenerate ? PoseReason::kDegenerate : PoseReason::kTracking;
-}
-
-}  // namespace
 
 Mapper::Mapper(const MapperOptions& options, const Pose2& T_map_robot_start, std::uint64_t seed)
     : state_(std::make_unique<State>(options, T_map_robot_start, seed)) {}
@@ -85,154 +73,151 @@ Mapper& Mapper::operator=(Mapper&&) noexcept = default;
 ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot,
                             const ParallelFor& parallel_for) {
   State& s = *state_;
-  if (IsTilted(*scan, s.options.max_tilt_rad)) return s.Coast(scan->stamp, T_odom_robot);
-  ScanOutcome outcome;
-  outcome.stamp = scan->stamp;
+  const Stamp stamp = scan->stamp;
+  if (IsTilted(*scan, s.options.max_tilt_rad)) return s.Coast(stamp, T_odom_robot);
 
-  s.Redraw();
+  if (s.drawing.redrawing()) s.drawing.Continue(s.trail.keyframes(), s.believed_path());
 
-  // Where the front-end sees the robot, and how far that is from the last keyframe.
   ScanView view = Look(*scan, s.options.front_end);
+
   const TrackStep step = s.front_end.Track(view, T_odom_robot, parallel_for);
-  s.unmatched_m = step.matched || s.keyframes.empty() ? 0.0 : s.unmatched_m + step.moved_m;
-  if (!step.matched && s.options.front_end.use_odometry)
-    s.blind_covariance += s.options.blind.Covariance({step.moved_m, 0.0, 0.0});
-  if (!s.shapes.empty()) {
-    Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-    R.topLeftCorner<2, 2>() = s.shapes.back().T_track_robot.rotation().transpose();
-    s.blind_covariance += R * step.forecast_covariance * R.transpose();
-  }
-  const bool first = s.keyframes.empty();
-  Pose2 T_keyframe_robot = first ? Pose2{} : Between(s.shapes.back().T_track_robot, step.T_track_robot);
+  s.blind.Add(step, s.trail.empty() ? Pose2{} : s.trail.shapes().back().T_track_robot);
 
-  // A scan that shows enough new updates filter and map.
-  if (first || MovedEnough(T_keyframe_robot, s.options.gate)) {
-    s.AddKeyframe(std::move(scan), T_odom_robot, std::move(view), step, parallel_for);
-    T_keyframe_robot = {};
-    outcome.keyframe = true;
-  }
-  s.scans.push_back({outcome.stamp, s.keyframes.size() - 1, T_keyframe_robot});
+  const bool keyframe = s.trail.empty() || MovedEnough(s.trail.FromLast(step.T_track_robot), s.options.gate);
+  if (keyframe) s.AddKeyframe({std::move(scan), T_odom_robot}, std::move(view), step, parallel_for);
 
-  outcome.T_map_robot = s.filter->estimate().T_map_robot * T_keyframe_robot;
+  return s.Report(stamp, T_odom_robot, step, keyframe);
+}
+
+// Adds a scan with enough new content to the filter, the loops and the map.
+void Mapper::State::AddKeyframe(Keyframe keyframe, ScanView view, const TrackStep& step,
+                                const ParallelFor& parallel_for) {
+  const double travelled_m = trail.TravelledTo(step.T_track_robot);
+  const Eigen::Matrix3d step_covariance = blind.TakeCovariance();
+  const bool placed_before = filter->placed();
+
+  std::optional<RevisitObservation> revisit;
+  if (!trail.empty()) {
+    filter->Predict(MotionTo(keyframe, step, step_covariance));
+    revisit = revisits.Find(view.points_robot, trail, travelled_m, *filter, parallel_for);
+    if (revisit && !filter->Observe(*revisit)) revisit.reset();
+  }
+  filter->Observe(KeyframeSight{*keyframe.scan, view, step.T_track_robot, travelled_m}, parallel_for);
+  filter->Commit();
+
+  front_end.AddKeyframe(view);
+  trail.Append(std::move(keyframe), step.T_track_robot, std::move(view.points_robot), step_covariance, revisit);
+
+  CloseLargeLoop();
+  self_check.Look(trail, believed_path());
+  Draw(step, placed_before);
+}
+
+// The measured step from the last keyframe to this one. `covariance` is that of the part of the step that no
+// scan measured.
+StepMotion Mapper::State::MotionTo(const Keyframe& keyframe, const TrackStep& step, const Eigen::Matrix3d& covariance) {
+  const Keyframe& last = trail.keyframes().back();
+  const double seconds = SecondsFromStamp(keyframe.scan->stamp - last.scan->stamp);
+  StepMotion motion{trail.FromLast(step.T_track_robot), covariance};
+  if (options.front_end.use_odometry) motion.T_prev_curr_odom = Between(last.T_odom_robot, keyframe.T_odom_robot);
+  motion.lambda_m = std::abs(speed.Forecast(seconds).x);
+  speed.Moved(motion.T_prev_curr, seconds);
+  return motion;
+}
+
+// Possibly no particle agrees with the large loop: then the loop's error is distributed over the whole path.
+void Mapper::State::CloseLargeLoop() {
+  if (!filter->rebases()) return;
+  const SharedSequence<Pose2> believed = believed_path();
+  const auto loop = loops.Find(trail, believed);
+  if (!loop) return;
+  const auto path = trail.PathWithLoop(loop->relation(), believed.values(), options.pose_graph);
+  // The loop is stored only after the filter has taken over the new path. A loop that the filter did not take
+  // over must be searched for again.
+  if (!path || !filter->Rebase(*path)) return;
+  trail.AddLoop(loop->relation());
+  trail.TrustDoubted();
+  drawing.StartAgain(trail.size());
+  self_check.Forget();
+}
+
+// A robot that does not know where it is would draw noise over its map, and the map would grow without end.
+void Mapper::State::Draw(const TrackStep& step, bool placed_before) {
+  const bool begins = filter->placed() && !placed_before;
+  if (begins) {
+    self_check.Forget();
+    trail.TrustDoubted();
+  }
+  trail.JudgeLast(IsLocalized(ReasonOf(step)), !blind.Lost());
+  if (begins) {
+    drawing.Begin(trail.keyframes(), believed_path());
+  } else if (filter->placed()) {
+    drawing.Add(trail.keyframes().back(), filter->estimate().T_map_robot);
+  }
+}
+
+ScanOutcome Mapper::State::Report(Stamp stamp, const Pose2& T_odom_robot, const TrackStep& step, bool keyframe) {
+  const Pose2 T_keyframe_robot = keyframe ? Pose2{} : trail.FromLast(step.T_track_robot);
+  trail.AddScan(stamp, T_keyframe_robot);
+  const FilterEstimate estimate = filter->estimate();
+  ScanOutcome outcome;
+  outcome.stamp = stamp;
+  outcome.T_map_robot = estimate.T_map_robot * T_keyframe_robot;
   outcome.T_map_odom = outcome.T_map_robot * T_odom_robot.Inverse();
-  outcome.covariance = s.filter->estimate().covariance;
-  outcome.score = first ? 1.0 : step.match.score;
-  outcome.reason = first ? PoseReason::kTracking : ReasonOf(step, s.unmatched_m, s.options.lost_after_m);
-  if (!s.filter->placed()) outcome.reason = PoseReason::kLost;
-  if (s.filter->health().diverged || s.self_check.contradicted()) outcome.reason = PoseReason::kDiverged;
-  outcome.localized = outcome.reason != PoseReason::kLost && outcome.reason != PoseReason::kDiverged;
-  s.level = outcome;
-  s.level_place = s.scans.back();
-  s.T_odom_level = T_odom_robot;
+  outcome.covariance = estimate.covariance;
+  outcome.score = step.score;
+  outcome.reason = ReasonOf(step);
+  outcome.localized = IsLocalized(outcome.reason);
+  outcome.keyframe = keyframe;
+  level = {outcome, T_keyframe_robot, T_odom_robot};
   return outcome;
 }
 
+PoseReason Mapper::State::ReasonOf(const TrackStep& step) const {
+  if (filter->health().diverged || self_check.contradicted()) return PoseReason::kDiverged;
+  if (!filter->placed()) return PoseReason::kLost;
+  if (!step.matched) return blind.Lost() ? PoseReason::kLost : PoseReason::kOdometryOnly;
+  return step.degenerate ? PoseReason::kDegenerate : PoseReason::kTracking;
+}
+
+// A tilted scan is not matched: its pose is the one to which odometry has taken the robot since the last
+// level scan.
 ScanOutcome Mapper::State::Coast(Stamp stamp, const Pose2& T_odom_robot) {
-  ScanOutcome outcome = level;
+  ScanOutcome outcome = level.outcome;
   outcome.stamp = stamp;
   outcome.keyframe = false;
-  if (keyframes.empty()) {  // The first level scan will stand at the start; until then nobody knows.
+  if (trail.empty()) {  // The first level scan will define the start; until then the pose is not known.
     outcome.T_map_robot = filter->estimate().T_map_robot;
     outcome.T_map_odom = outcome.T_map_robot * T_odom_robot.Inverse();
     return outcome;
   }
-  const Pose2 moved = options.front_end.use_odometry ? Between(T_odom_level, T_odom_robot) : Pose2{};
-  scans.push_back({stamp, level_place.keyframe, level_place.T_keyframe_robot * moved});
-  outcome.T_map_robot = level.T_map_robot * moved;
-  const Eigen::Matrix3d J = J_compose_right(level.T_map_robot, moved);
+  const Pose2 moved = options.front_end.use_odometry ? Between(level.T_odom_robot, T_odom_robot) : Pose2{};
+  trail.AddScan(stamp, level.T_keyframe_robot * moved);
+  outcome.T_map_robot = level.outcome.T_map_robot * moved;
+  const Eigen::Matrix3d J = J_compose_right(level.outcome.T_map_robot, moved);
   outcome.covariance += J * options.blind.Covariance(moved) * J.transpose();
   if (!outcome.localized) return outcome;
-  outcome.localized = unmatched_m + moved.translation().norm() <= options.lost_after_m;
+  outcome.localized = !blind.Lost(moved.translation().norm());
   outcome.reason = outcome.localized ? PoseReason::kOdometryOnly : PoseReason::kLost;
   return outcome;
 }
 
-void Mapper::State::AddKeyframe(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot, ScanView view,
-                                const TrackStep& step, const ParallelFor& parallel_for) {
-  if (!keyframes.empty()) {
-    const Pose2 motion = Between(shapes.back().T_track_robot, step.T_track_robot);
-    travelled_m += motion.translation().norm();
-    const double seconds = SecondsFromStamp(scan->stamp - keyframes.back().scan->stamp);
-    StepMotion measured{motion, blind_covariance};
-    if (options.front_end.use_odometry)
-      measured.T_prev_curr_odom = Between(keyframes.back().T_odom_robot, T_odom_robot);
-    measured.lambda_m = std::abs(speed.Forecast(seconds).x);
-    filter->Predict(measured);
-    speed.Moved(motion, seconds);
-    graph.Append(motion, blind_covariance);
-    blind_covariance.setZero();
-    const auto revisit = revisits.Find(view.points_robot, shapes, distances_m, travelled_m, *filter, parallel_for);
-    if (revisit && filter->Observe(*revisit))
-      graph.AddLoop(revisit->keyframe, keyframes.size(), revisit->T_keyframe_robot, revisit->covariance);
-  } else {
-    graph.Append({}, Eigen::Matrix3d::Zero());
-    blind_covariance.setZero();
-  }
-  const bool placed_before = filter->placed();
-  filter->Observe(KeyframeSight{*scan, view, step.T_track_robot, travelled_m}, parallel_for);
-  filter->Commit();
-  front_end.AddKeyframe(view);
-  keyframes.push_back({std::move(scan), T_odom_robot});
-  shapes.push_back({step.T_track_robot, travelled_m, std::move(view.points_robot)});
-  distances_m = graph.DistancesFromLast();
-  CloseLargeLoop();
-  self_check.Look(keyframes, shapes, filter->hypothesis(0).path);
-  if (!placed_before && filter->placed()) {
-    MoveMap();
-    TakePath();
-  } else {
-    online_path.push_back(filter->estimate().T_map_robot);
-  }
-  if (filter->placed()) grid.Draw(*keyframes.back().scan, filter->estimate().T_map_robot);
-}
-
-// No particle may have gone the way a large loop turns out to have gone: then its error is spread over the whole path.
-void Mapper::State::CloseLargeLoop() {
-  if (!filter->rebases()) return;
-  const SharedSequence<Pose2> believed = filter->hypothesis(0).path;
-  const auto loop = loops.Find(keyframes, shapes, believed, distances_m);
-  if (!loop) return;
-  KeyframeGraph closed = graph;
-  closed.AddLoop(loop->keyframe, keyframes.size() - 1, loop->T_keyframe_robot, loop->covariance);
-  std::vector<Pose2> path;
-  for (std::size_t k = 0; k < believed.size(); ++k) path.push_back(believed[k]);
-  // Known only once the filter goes on from it: a loop nobody followed must be looked for again.
-  if (!closed.Optimise(path, options.pose_graph).usable || !filter->Rebase(path)) return;
-  graph = std::move(closed);
-  distances_m = graph.DistancesFromLast();
-  MoveMap();
-}
-
-// The path behind is another one: what was made along the old one goes.
-void Mapper::State::MoveMap() {
-  rebased_keyframes = keyframes.size();
-  redraw.emplace(options.grid);
-  self_check.Forget();
-}
-
-void Mapper::State::Redraw() {
-  if (!redraw || !redraw->Advance(keyframes, filter->hypothesis(0).path, kRedrawnPerScan)) return;
-  const OccupancyGrid::Chunks old = grid.chunks();
-  grid = redraw->TakeGrid();
-  redraw.reset();
-  TakePath();
-  grid.MarkAllDirty();
-  for (const auto& [key, chunk] : old) grid.MarkDirty(key);
-}
-
-// The map is, or is about to be, drawn along the filter's path of now.
-void Mapper::State::TakePath() {
-  online_path.clear();
-  const SharedSequence<Pose2> path = filter->hypothesis(0).path;
-  for (std::size_t k = 0; k < path.size(); ++k) online_path.push_back(path[k]);
+bool Mapper::full() const {
+  const State& s = *state_;
+  return s.trail.size() >= static_cast<std::size_t>(s.options.max_keyframes) ||
+         s.drawing.grid().chunk_count() >= static_cast<std::size_t>(s.options.max_chunks);
 }
 
 const OccupancyGrid& Mapper::grid() const {
-  return state_->grid;
+  return state_->drawing.grid();
 }
 
-std::vector<ChunkKey> Mapper::TakeDirtyChunks() {
-  return state_->grid.TakeDirty();
+OccupancyGrid::Chunks Mapper::ShareGrid() {
+  return state_->drawing.Share();
+}
+
+OccupancyGrid::Change Mapper::TakeGridChange() {
+  return state_->drawing.TakeChange();
 }
 
 std::vector<Landmark> Mapper::landmarks() const {
@@ -240,37 +225,31 @@ std::vector<Landmark> Mapper::landmarks() const {
 }
 
 std::size_t Mapper::keyframe_count() const {
-  return state_->keyframes.size();
+  return state_->trail.size();
 }
 
 MapperSnapshot Mapper::Snapshot() const {
-  MapperSnapshot snapshot;
-  if (!state_->filter->placed()) return snapshot;
-  snapshot.keyframes = state_->keyframes;
-  snapshot.online_path = state_->online_path;
-  snapshot.scans = state_->scans;
-  snapshot.pose_graph = state_->options.pose_graph;
-  if (state_->graph.has_loops()) snapshot.relations = state_->graph.relations();
-  const SharedSequence<Pose2> path = state_->filter->hypothesis(0).path;
-  for (std::size_t k = 0; k < path.size(); ++k) snapshot.full_path.push_back(path[k]);
-  return snapshot;
+  const State& s = *state_;
+  if (!s.filter->placed()) return {};
+  // Smoothing puts the path right, and with it what was doubted on the way.
+  const bool put_right = s.level.outcome.localized;
+  return {.keyframes = put_right ? s.trail.TrustedKeyframes() : s.trail.keyframes(),
+          .online_path = s.drawing.path(),
+          .full_path = s.believed_path().values(),
+          .relations = s.trail.relations(),
+          .pose_graph = s.options.pose_graph,
+          .scans = s.trail.scans()};
 }
 
 void Mapper::FinishMap() {
-  while (state_->redraw) state_->Redraw();
+  state_->drawing.Finish(state_->trail.keyframes(), state_->believed_path());
 }
 
 void Mapper::AdoptGrid(OccupancyGrid grid, std::size_t keyframes) {
   State& s = *state_;
-  s.grid = std::move(grid);
-  // A grid from before a large loop was closed shows the old way; one being drawn again is thrown away for it.
-  const bool outdated = keyframes < s.rebased_keyframes || s.redraw;
-  s.redraw.reset();
-  const SharedSequence<Pose2> path = s.filter->hypothesis(0).path;
-  for (std::size_t k = keyframes; s.filter->placed() && k < s.keyframes.size(); ++k)
-    s.grid.Draw(*s.keyframes[k].scan, path[k]);
-  s.grid.MarkAllDirty();
-  if (outdated) s.redraw.emplace(s.options.grid);
+  // While the robot's place in the map is not known, there is nothing to draw on the map.
+  const std::span<const Keyframe> drawable = s.filter->placed() ? s.trail.keyframes() : std::span<const Keyframe>{};
+  s.drawing.Adopt(std::move(grid), keyframes, drawable, s.believed_path());
 }
 
 }  // namespace cairn::slam

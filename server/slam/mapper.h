@@ -1,8 +1,8 @@
-// The estimator of one robot: scans and odometry in, pose, landmarks and an occupancy grid out. The recipe of
-// server/slam, top to bottom. A machine of values: same options, seed, start and inputs give the same bytes out, on any
-// thread count. Not thread-safe: one session owns one mapper. Inputs must be validated (ValidateScan) and paired
-// (OdometryPairing) first.
-// Source: thesis A, chapters 3 and 4 (feature-based scan matching feeding FastSLAM 2.0).
+// The estimator of one robot: its inputs are scans and odometry, its results are the pose, landmarks and an
+// occupancy grid. `mapper.cpp` calls the parts of server/slam in their order. The same options, seed, start
+// and inputs give the same bytes, on any number of threads. Not thread-safe: one session owns one mapper.
+// Inputs must be validated (ValidateScan) and paired (OdometryPairing) first.
+// Source: thesis A, chapters 3 and 4 (feature-based scan matching with FastSLAM 2.0).
 #pragma once
 
 #include <cstdint>
@@ -13,25 +13,25 @@
 #include "common/sensor/scan.h"
 #include "common/service/pose_report.h"
 #include "server/slam/grid/occupancy_grid.h"
-#include "server/slam/keyframe.h"
-#include "server/slam/landmark.h"
+#include "server/slam/landmarks/landmark.h"
 #include "server/slam/mapper_options.h"
 #include "server/slam/parallel_for.h"
+#include "server/slam/trail/keyframe.h"
 
 namespace cairn::slam {
 
-// What one scan did.
+// The result of one scan.
 struct ScanOutcome {
   Stamp stamp = 0;
-  // Online estimate: the best hypothesis now. Relative to the start while nobody knows its place in the map (kLost,
-  // filter.h: placed).
+  // Online estimate of the best hypothesis. While the robot's place in the map is not known (kLost, filter.h:
+  // placed), it is relative to the start.
   Pose2 T_map_robot;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // (x, y, theta) in map.
   Pose2 T_map_odom;
   bool localized = false;
   double score = 0.0;
   PoseReason reason = PoseReason::kWaiting;
-  bool keyframe = false;  // The scan updated filter and map.
+  bool keyframe = false;  // True if the scan updated filter and map.
 };
 
 class Mapper {
@@ -41,21 +41,24 @@ class Mapper {
   Mapper(Mapper&&) noexcept;
   Mapper& operator=(Mapper&&) noexcept;
 
-  // `T_odom_robot` is the odometry at the scan's stamp.
+  // `T_odom_robot` is the odometry at the scan's stamp. A scan whose pose is not localized is drawn into no map.
   ScanOutcome Process(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot, const ParallelFor& parallel_for);
 
+  // It has as many keyframes, or its map as many chunks, as the options allow: it takes no more scans.
+  [[nodiscard]] bool full() const;
+
   [[nodiscard]] const OccupancyGrid& grid() const;
-  // Chunks of the grid changed since the last call.
-  [[nodiscard]] std::vector<ChunkKey> TakeDirtyChunks();
-  [[nodiscard]] std::vector<Landmark> landmarks() const;  // Of the best particle.
+  // The whole grid, and its changes since the last call (occupancy_grid.h: Share, TakeChange).
+  [[nodiscard]] OccupancyGrid::Chunks ShareGrid();
+  [[nodiscard]] OccupancyGrid::Change TakeGridChange();
+  [[nodiscard]] std::vector<Landmark> landmarks() const;  // The landmarks of the best hypothesis.
   [[nodiscard]] std::size_t keyframe_count() const;
   // Empty while the robot's place in the map is not known (filter.h: placed).
   [[nodiscard]] MapperSnapshot Snapshot() const;
-  // Nothing more comes: what is still being drawn again since a large loop closed is drawn to its end.
+  // Ends the mapping: if the map is still being drawn again after a large loop, draws the rest.
   void FinishMap();
-  // Replaces the grid by one redrawn from the first `keyframes` keyframes (a finished job), then draws the later
-  // keyframes onto it along the current best path. Every chunk of the new grid becomes dirty;
-  // what only the old one had is the caller's to compare.
+  // Replaces the grid by the result of a finished job, drawn from the first `keyframes` keyframes. Then draws
+  // the later keyframes onto it along the present best path. Every chunk of both grids counts as changed.
   void AdoptGrid(OccupancyGrid grid, std::size_t keyframes);
 
  private:

@@ -2,30 +2,54 @@
 
 #include <limits>
 
+#include "common/options/config.h"
+
 namespace cairn::slam {
 
 void Visit(OptionVisitor& visitor, MapperOptions& options) {
   visitor.Integer("seed", options.seed, "1", 0, std::numeric_limits<std::int64_t>::max(),
-                  "Of every robot's random engine.");
+                  ForOperators("Seed of the random numbers. Every robot starts from the same one, so that it computes "
+                               "the same alone and in a fleet."));
   Visit(visitor, options.filter);
   visitor.Real("lost_after_m", options.lost_after_m, "m", 0.0, 1000.0,
-               "Travelled by odometry alone before the robot counts as lost.");
-  visitor.Section("blind", "Noise of motion known by odometry alone, besides the drift.",
+               "A robot that has travelled farther than this by odometry alone counts as lost.");
+  visitor.Integer("max_keyframes", options.max_keyframes, "keyframes", 1, 100000000,
+                  ForOperators("Keyframes of one session, some 20 KiB each. When it has as many, its scans are dropped "
+                               "as session_full."));
+  visitor.Integer("max_chunks", options.max_chunks, "chunks", 1, 10000000,
+                  ForOperators("Pieces of the map of one session, 32 KiB each. When it has as many, its scans are "
+                               "dropped as session_full."));
+  visitor.Section("blind", "Uncertainty of a motion that is known from odometry alone. It is added to slam.drift.",
                   [&] { Visit(visitor, options.blind); });
   visitor.Real("max_tilt_rad", options.max_tilt_rad, "rad", 0.0, 1.58,
-               "Scans tilted further get a pose from odometry but are not matched or drawn.");
-  VisitEnum(visitor, "matcher", options.matcher, MatcherNames(), "What compares a scan with the last keyframe.");
-  visitor.Section("matching", "The matchers; the chosen one's options count.",
+               ForOperators("A scan of a robot that is tilted by more than this is neither matched nor drawn; its pose "
+                            "comes from odometry."));
+  VisitEnum(visitor, "matcher", options.matcher, MatcherNames(),
+            ForOperators("The method that estimates the motion between two scans."));
+  visitor.Section("matching",
+                  "The methods that estimate the motion between scans. Only the one that slam.matcher names is used.",
                   [&] { Visit(visitor, options.matching); });
-  visitor.Section("front_end", "From scan to scan.", [&] { Visit(visitor, options.front_end); });
-  visitor.Section("gate", "When a scan is worth an update of filter and map.", [&] { Visit(visitor, options.gate); });
-  visitor.Section("revisit", "Recognising places seen before.", [&] { Visit(visitor, options.revisit); });
+  visitor.Section("front_end", "Tracking from scan to scan.", [&] { Visit(visitor, options.front_end); });
+  visitor.Section("gate", "After which motion a scan becomes a keyframe, which updates filter and map.",
+                  [&] { Visit(visitor, options.gate); });
+  visitor.Section("revisit", "Recognising places that were seen before.", [&] { Visit(visitor, options.revisit); });
   visitor.Section("loop", "Finding large loops.", [&] { Visit(visitor, options.loop); });
-  visitor.Section("self_check", "Noticing that scans and map contradict each other.",
+  visitor.Section("self_check", "Noticing that the scans contradict the map.",
                   [&] { Visit(visitor, options.self_check); });
-  visitor.Section("pose_graph", "The path that fits all loops best.", [&] { Visit(visitor, options.pose_graph); });
+  visitor.Section("pose_graph", "Least squares over the whole path, for smoothing.",
+                  [&] { Visit(visitor, options.pose_graph); });
   visitor.Section("grid", "The occupancy grid.", [&] { Visit(visitor, options.grid); });
-  visitor.Section("pairing", "Joining scans and odometry by their stamps.", [&] { Visit(visitor, options.pairing); });
+  visitor.Section("pairing", "Finding the odometry at the time of each scan.",
+                  [&] { Visit(visitor, options.pairing); });
+  // Otherwise places between the two distances would be found by neither search.
+  visitor.Require(
+      !options.revisit.enabled || !options.loop.enabled || options.loop.min_way_m <= options.revisit.max_way_m,
+      "loop.min_way_m", "must not exceed", "revisit.max_way_m");
+}
+
+Result<void> Validate(const MapperOptions& options) {
+  MapperOptions copy = options;
+  return CheckRules([&copy](OptionVisitor& visitor) { visitor.Section("slam", "", [&] { Visit(visitor, copy); }); });
 }
 
 }  // namespace cairn::slam

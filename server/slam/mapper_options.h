@@ -1,28 +1,31 @@
-// Every option of the estimator, nested as the code is. Defaults serve all logs; Visit names unit, range, meaning.
+// All options of the estimator, nested as its parts are. The defaults are used for all logs. Visit gives the
+// unit, range and meaning of each.
 #pragma once
 
 #include <cstdint>
 
 #include "common/options/option_visitor.h"
-#include "server/slam/filters/make_filter.h"
-#include "server/slam/front_end.h"
+#include "common/status.h"
+#include "server/slam/graph/pose_graph.h"
 #include "server/slam/grid/occupancy_grid.h"
-#include "server/slam/matching/loop_search.h"
-#include "server/slam/matching/revisit_search.h"
-#include "server/slam/matching/scan_matching.h"
-#include "server/slam/matching/self_check.h"
+#include "server/slam/loops/loop_search.h"
+#include "server/slam/loops/revisit_search.h"
+#include "server/slam/loops/self_check.h"
+#include "server/slam/methods.h"
 #include "server/slam/motion/motion_gate.h"
 #include "server/slam/scan/odometry_pairing.h"
-#include "server/slam/smoothing/pose_graph.h"
+#include "server/slam/tracking/front_end.h"
 
 namespace cairn::slam {
 
 struct MapperOptions {
-  std::int64_t seed = 1;        // Of every robot's random engine: the same robot alone or in a fleet maps alike.
-  double lost_after_m = 2.0;    // Travelled by odometry alone before the robot counts as lost.
-  double max_tilt_rad = 0.035;  // Two degrees; scans tilted further get a pose but are not evidence (scan/tilt.h).
-  MotionNoise blind{0.002, 0.2, 0.0, 0.001, 0.05, 0.0};  // Of motion known by odometry alone, besides the drift.
-  MatcherKind matcher = MatcherKind::kVoting;            // What compares a scan with the last keyframe.
+  std::int64_t seed = 1;
+  double lost_after_m = 2.0;
+  double max_tilt_rad = 0.035;          // Two degrees (scan/tilt.h).
+  std::int64_t max_keyframes = 200000;  // A day's drive, 4 GiB.
+  std::int64_t max_chunks = 16384;      // 0.67 km^2 at 5 cm a cell, 512 MiB.
+  MotionNoise blind{0.002, 0.2, 0.0, 0.001, 0.05, 0.0};
+  MatcherKind matcher = MatcherKind::kVoting;
   MatcherOptions matching;
   FrontEndOptions front_end;
   MotionGateOptions gate;
@@ -35,5 +38,8 @@ struct MapperOptions {
   PairingOptions pairing;
 };
 void Visit(OptionVisitor& visitor, MapperOptions& options);
+// Checks the rules between fields that Visit declares. The error names both keys as in a configuration file,
+// beginning with `slam.`.
+[[nodiscard]] Result<void> Validate(const MapperOptions& options);
 
 }  // namespace cairn::slam

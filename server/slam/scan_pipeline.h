@@ -1,23 +1,21 @@
-// One robot's way from streams to estimates: validated scans and odometry in any interleaving go in, get paired by
-// stamp, and reach the mapper in order. cairnd's sessions and cairn-offline both drive this class, so the same streams
-// give the same trajectory with and without DDS. Not thread-safe: one owner.
+// Processes the streams of one robot: takes validated scans and odometry in any interleaving, pairs them by
+// stamp, and passes them to the mapper in order. Both cairnd's sessions and cairn-offline use this class, so
+// the same streams give the same trajectory with and without DDS. Not thread-safe: one owner.
 #pragma once
 
 #include <functional>
 #include <memory>
-#include <optional>
 
 #include "server/slam/mapper.h"
 #include "server/slam/scan/odometry_pairing.h"
 
 namespace cairn::slam {
 
-// Why a scan must not reach an estimator (ValidateScan's verdict as a ledger reason); nothing where it may.
-[[nodiscard]] std::optional<DropReason> RefusalOf(const Scan& scan);
-
 class ScanPipeline {
  public:
-  // Called from within Add and Finish, in stamp order; every scan added ends in exactly one of the two.
+  // Called within Add and Finish. For every added scan exactly one of the two is called; `used` is called in the order
+  // of the stamps. The stamp of the outcome is the estimator's time: the stamp of the scan, plus what the robot's clock
+  // was set back by since the start.
   struct Sink {
     std::function<void(const Scan&, const ScanOutcome&)> used;
     std::function<void(const Scan&, DropReason)> dropped;
@@ -28,13 +26,17 @@ class ScanPipeline {
   ScanPipeline(const ScanPipeline&) = delete;
   ScanPipeline& operator=(const ScanPipeline&) = delete;
 
-  // REQUIRES: RefusalOf(*scan) is empty.
+  // REQUIRES: ValidateScan accepts it.
   void Add(std::shared_ptr<const Scan> scan);
-  // REQUIRES: ValidateOdometry accepts it. False where its stamp is refused.
-  bool Add(const Odometry& odometry);
-  // No more odometry will come: scans still waiting for it are settled.
+  // REQUIRES: ValidateOdometry accepts it.
+  void Add(const Odometry& odometry);
+  // From now on both streams come from another client, which numbers from the beginning.
+  void NewClient() { pairing_.NewClient(); }
+  // Ends the streams: scans that still wait for odometry are used or dropped.
   void Finish();
 
+  // Odometry samples refused so far for their stamps.
+  [[nodiscard]] std::uint64_t odometry_refused() const { return pairing_.odometry_refused(); }
   [[nodiscard]] Mapper& mapper() { return mapper_; }
   [[nodiscard]] const Mapper& mapper() const { return mapper_; }
 

@@ -3,7 +3,7 @@
 import unittest
 
 import rooms
-from include_direction import Tree, check
+from include_direction import Tree, check, check_plan
 
 HEADER = "#pragma once\n"
 
@@ -27,13 +27,26 @@ class Breaks(unittest.TestCase):
         self.assertTrue(found[0].startswith(path), found)
         self.assertIn(expected, found[0])
 
+    def test_rooms_of_slam_link_what_they_may_include(self):
+        def build_file(change):
+            lists = {room: list(others) for room, others in rooms.SLAM_ROOMS.items()}
+            change(lists)
+            return "\n".join(f"slam_room(NAME {room}{' ROOMS ' + ' '.join(links) if links else ''} SOURCES\n  x)"
+                             for room, links in lists.items())
+        for change in (lambda lists: lists["tracking"].append("voting"), lambda lists: lists["tracking"].pop(),
+                       lambda lists: lists.pop("voting")):
+            found = wrongs({"server/slam/CMakeLists.txt": build_file(change)})
+            self.assertEqual(len(found), 1, found)
+            self.assertIn("SLAM_ROOMS", found[0])
+        self.assertEqual(wrongs({"server/slam/CMakeLists.txt": build_file(lambda lists: None)}), [])
+
     def test_arrows_between_rooms(self):
         for path, target in (("common/sensor/scan.h", "server/slam/mapper.h"),
                              ("common/sensor/scan.h", "common/wire/bus.h"),
                              ("common/wire/topic.h", "server/robots/roster.h"),
                              ("server/slam/grid/cells.h", "common/wire/bus.h"),
                              ("server/slam/grid/cells.h", "server/maps/tiles.h"),
-                             ("server/robots/queue.h", "server/maps/tiles.h"),
+                             ("server/maps/tiles.h", "server/robots/roster.h"),
                              ("server/robots/queue.h", "common/wire/bus.h"),
                              ("server/robots/queue.h", "server/server.h"),
                              ("server/outbound.h", "server/robots/roster.h"),
@@ -49,9 +62,13 @@ class Breaks(unittest.TestCase):
             with self.subTest(path=path, target=target):
                 self.assert_wrong(path, f'{HEADER}#include "{target}"\n', "may not include")
 
-    def test_the_offline_programs_know_slam_alone(self):
-        self.assert_wrong("server/offline.cpp", '#include "server/robots/roster.h"\n', "may not include")
-        self.assert_wrong("server/offline.cpp", '#include "server/server.h"\n', "may not include")
+    def test_the_tools_know_slam_alone(self):
+        for target in ("server/robots/roster.h", "server/server.h"):
+            self.assert_wrong("server/tools/offline/main.cpp", f'#include "{target}"\n', "may not include")
+
+    def test_a_file_in_a_room_that_is_planned_only(self):
+        for room in rooms.PLANNED:
+            self.assert_wrong(f"{room}/thing.h", f'{HEADER}#include "common/status.h"\n', "planned room")
 
     def test_only_tests_include_tests(self):
         self.assert_wrong("common/sensor/scan.cpp", '#include "tests/common/fake.h"\n', "may not include tests")
@@ -120,6 +137,14 @@ class Breaks(unittest.TestCase):
         self.assertTrue(wrongs(files)[0].startswith("server/slam/mapper.cpp:4: "))
 
 
+class Plan(unittest.TestCase):
+    def test_a_room_without_a_file_is_reported_unless_it_is_planned(self):
+        files = {f"{room}/a.h" if "." not in room else room: HEADER for room in rooms.MAY_INCLUDE}
+        self.assertEqual(list(check_plan(Tree(files))), [])
+        del files["server/jobs/a.h"]
+        self.assertEqual(len(list(check_plan(Tree(files)))), 1)
+
+
 class BuildLists(unittest.TestCase):
     def test_a_body_that_nothing_compiles(self):
         files = {"common/CMakeLists.txt": "add_library(c a.cpp # b.cpp\n)", "common/a.cpp": "", "common/b.cpp": ""}
@@ -148,7 +173,7 @@ class Keeps(unittest.TestCase):
             "server/ingress/door.h": f'{HEADER}#include "common/wire/bus.h"\n#include "server/inbound.h"\n',
             "client/sim/worlds.cpp": '#include "client/sim/worlds.inc"\n',
             "server/server.cpp": '#include "server/ingress/door.h"\n#include "server/robots/queue.h"\n#include "common/version.h"\n',
-            "server/offline.cpp": '#include "server/slam/mapper.h"\n',
+            "server/tools/offline/main.cpp": '#include "server/slam/mapper.h"\n',
             "client/cli/main.cpp": '#include <CLI/CLI.hpp>\n#include "common/wire/bus.h"\nauto* d = std::getenv("D");\n',
             "tests/server/slam/mapper_test.cpp": '#include <ceres/ceres.h>\n#include "server/slam/mapper.h"\n',
         }), [])

@@ -5,8 +5,8 @@
 #include <optional>
 #include <sstream>
 
-#include "server/slam/front_end.h"
 #include "server/slam/motion/motion_gate.h"
+#include "server/slam/tracking/front_end.h"
 #include "tests/real_log_path.h"
 #include "tests/studies/logs.h"
 #include "tests/studies/scene.h"

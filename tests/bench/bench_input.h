@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/sensor/scan.h"
-#include "server/slam/matching/scan_view.h"
+#include "server/slam/features/scan_view.h"
 
 namespace cairn::bench {
 

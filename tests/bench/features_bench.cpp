@@ -1,7 +1,7 @@
 // Lines, corners and patterns of one scan; and its surface points.
 #include "server/slam/features/feature_extraction.h"
-#include "server/slam/matching/surface_points.h"
 #include "server/slam/scan/beam_points.h"
+#include "server/slam/scan/surface_points.h"
 #include "tests/bench/bench_input.h"
 
 namespace cairn::bench {

@@ -1,7 +1,7 @@
 // One step of FastSLAM 2.0 over a drive: predict, the keyframe's landmarks, commit; by number of particles.
 #include <memory>
 
-#include "server/slam/filters/make_filter.h"
+#include "server/slam/methods.h"
 #include "tests/bench/bench_input.h"
 
 namespace cairn::bench {

@@ -14,7 +14,7 @@ void OccupancyDraw(benchmark::State& state) {
     const BenchKeyframe& keyframe = input->keyframes[next++ % input->keyframes.size()];
     grid.Draw(keyframe.scan, keyframe.T_odom_robot);
   }
-  state.counters["chunks"] = static_cast<double>(grid.chunks().size());
+  state.counters["chunks"] = static_cast<double>(grid.chunk_count());
 }
 BENCHMARK(OccupancyDraw)->Apply(AllInputs);
 
@@ -27,7 +27,7 @@ void OccupancyShareAndDraw(benchmark::State& state) {
   std::size_t next = 0;
   for (auto _ : state) {
     const BenchKeyframe& keyframe = input->keyframes[next++ % input->keyframes.size()];
-    slam::OccupancyGrid copy = grid.Share();
+    slam::OccupancyGrid copy(grid.options(), grid.Share());
     copy.Draw(keyframe.scan, keyframe.T_odom_robot);
     benchmark::DoNotOptimize(copy);
   }

@@ -1,9 +1,9 @@
 // Matching of neighbouring keyframes: from odometry's guess by voting over lines and by aligning points with lines, and
 // without a guess by the evolution of thesis C.
-#include "server/offline/over_threads.h"
-#include "server/slam/matching/icp.h"
-#include "server/slam/matching/ndt_de.h"
-#include "server/slam/matching/voting.h"
+#include "server/slam/matchers/icp.h"
+#include "server/slam/matchers/ndt_de.h"
+#include "server/slam/voting/voting.h"
+#include "server/tools/log_run/over_threads.h"
 #include "tests/bench/bench_input.h"
 
 namespace cairn::bench {

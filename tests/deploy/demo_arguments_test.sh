@@ -20,9 +20,9 @@ refuses() { # what, words it says, command
 
 mkdir "$world/mine"
 echo dear >"$world/mine/letter"
-refuses "a folder with something of somebody's" "not a demo's" env DEMO_OUT="$world/mine" "$demo"
-refuses "the same by a relative name" "not a demo's" env -C "$world" DEMO_OUT=mine "$demo"
+refuses "a folder with files of another kind" "not from a demo" env DEMO_OUT="$world/mine" "$demo"
+refuses "the same by a relative name" "not from a demo" env -C "$world" DEMO_OUT=mine "$demo"
 [ "$(cat "$world/mine/letter")" = dear ] || { echo "FAILED: the letter is gone"; status=1; }
 refuses "a log that is not there" "cannot read" "$demo" "$world/absent.log"
-refuses "two logs" "A robot log given as argument" "$demo" a b
+refuses "two logs" "A robot log given as LOG" "$demo" a b
 exit $status

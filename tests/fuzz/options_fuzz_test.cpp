@@ -13,9 +13,9 @@ TEST(OptionsFuzz, DamagedConfigurationsAreRefusedOrWithinRange) {
   std::mt19937_64 random(7);
   int accepted = 0;
   for (int i = 0; i < 5000; ++i) {
-    const std::string bad = Mutate(
-        good, random,
-        {"nan", "inf", "&a ", "*a", "<<: ", "[", "]", "{", "}", "- ", ": ", "\n", "\t", "? ", "|", ">", "!!map "});
+    const std::string bad = Mutate(good, random,
+                                   {"nan", "inf", "expert: ", "&a ", "*a", "<<: ", "[", "]", "{", "}", "- ", ": ", "\n",
+                                    "\t", "? ", "|", ">", "!!map "});
     SampleOptions options;
     const auto result = ApplyYaml(bad, "fuzz", VisitorOf(options));
     if (!result) {

@@ -189,6 +189,30 @@ TEST_F(BadInput, ScansWithoutASessionAreCountedInABoundedTable) {
   EXPECT_EQ(Dropped(house_.LastLedger("stranger"), DropReason::kNoSession), 1U);
 }
 
+// Whoever used the robot's name before it opened its session must not use up its numbers.
+TEST(BadSession, AStrangersNumbersAreNotTheOwners) {
+  WholeServer house;
+  for (int step = 0; step < 40; ++step) house.SendScan("r1", 99, RoomScan(step));
+  ASSERT_TRUE(house.WaitFor([&] { return Dropped(house.LastLedger("r1"), DropReason::kNoSession) == 40; }));
+  house.Open("r1", kSender);
+  house.Drive("r1", kSender, 0, 20);
+  EXPECT_TRUE(house.WaitFor([&] { return house.LastLedger("r1").used == 20; }));
+  EXPECT_EQ(house.LastLedger("r1").settled_through, 20U);
+}
+
+// A robot that outlived the server goes on counting; what the server before had used is not lost.
+TEST(BadSession, ARobotThatWasThereBeforeTheServerHasLostNothing) {
+  WholeServer house;
+  house.Open("r1", kSender);
+  for (int step = 165; step < 180; ++step) {
+    house.SendOdometry("r1", kSender, RoomOdometry(step));
+    house.SendScan("r1", kSender, RoomScan(step));
+  }
+  house.WaitSettled("r1", 180);
+  EXPECT_EQ(house.LastLedger("r1").used, 15U);
+  EXPECT_EQ(Dropped(house.LastLedger("r1"), DropReason::kLostOnWire), 0U);
+}
+
 TEST(BadSession, UnknownSitesAreRefusedWhereTheServerMakesNone) {
   ServerOptions options = TestOptions();
   options.server.create_sites = false;

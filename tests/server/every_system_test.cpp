@@ -1,10 +1,11 @@
 // Every matcher and every filter, chosen by its name as users choose it: through the server and in the pipeline alone
-// the same poses, and a robot with bad wheels kept where it is.
+// the same poses, and a robot with bad wheels kept where it is; and every matcher keeps it there without anything else
+// to help it.
 #include <gtest/gtest.h>
 
 #include "common/map/map_lines.h"
 #include "common/options/config.h"
-#include "server/setup/known_map.h"
+#include "server/known_map.h"
 #include "tests/server/support/whole_server.h"
 #include "tests/temp_directory.h"
 
@@ -43,28 +44,44 @@ side 2.5 2  2.5 1
 side 2.5 1  1 1
 )";
 
+ServerOptions OptionsWith(const std::vector<std::string>& assignments) {
+  ServerOptions options = TestOptions();
+  const auto applied = ApplySet(assignments, [&](OptionVisitor& visitor) { Visit(visitor, options); });
+  EXPECT_TRUE(applied) << applied.error().message;
+  return options;
+}
+
+// The whole drive in the pipeline alone.
+std::vector<slam::ScanOutcome> RunAlone(const slam::MapperOptions& options) {
+  std::vector<slam::ScanOutcome> outcomes;
+  slam::ScanPipeline pipeline(
+      options, {}, slam::SerialFor,
+      {.used = [&](const Scan&, const slam::ScanOutcome& outcome) { outcomes.push_back(outcome); },
+       .dropped = [](const Scan&, DropReason) { FAIL(); }});
+  for (int step = 0; step < kDriven; ++step) {
+    pipeline.Add(BadOdometry(step));
+    pipeline.Add(std::make_shared<const Scan>(RoomScan(step)));
+  }
+  return outcomes;
+}
+
+void ExpectNearTruth(const Pose2& T_map_robot, double metres, double radians) {
+  const Pose2 error = Between(TruePose(kDriven - 1), T_map_robot);
+  EXPECT_LT(error.translation().norm(), metres);
+  EXPECT_LT(std::abs(error.theta), radians);
+}
+
 class EverySystem : public ::testing::TestWithParam<Choice> {};
 
 TEST_P(EverySystem, KeepsTheRobotWhereItIsInTheServerAsAlone) {
-  ServerOptions options = TestOptions();
-  const auto applied = ApplySet({"slam.matcher=" + GetParam().matcher, "slam.filter=" + GetParam().filter},
-                                [&](OptionVisitor& visitor) { Visit(visitor, options); });
-  ASSERT_TRUE(applied) << applied.error().message;
+  ServerOptions options = OptionsWith({"slam.matcher=" + GetParam().matcher, "slam.filter=" + GetParam().filter});
   const TempDirectory directory;
   options.slam.filter.line_match.file = directory.Write("room.lines", kRoomLines);
   ASSERT_TRUE(LoadKnownMap(options.slam));
-  Trajectory alone;
-  slam::ScanPipeline pipeline(options.slam, {}, slam::SerialFor,
-                              {.used =
-                                   [&](const Scan& scan, const slam::ScanOutcome& outcome) {
-                                     alone.push_back({scan.stamp, outcome.T_map_robot});
-                                   },
-                               .dropped = [](const Scan&, DropReason) { FAIL(); }});
+  const auto alone = RunAlone(options.slam);
   WholeServer house(options);
   house.Open("r1", kOwner);
   for (int step = 0; step < kDriven; ++step) {
-    EXPECT_TRUE(pipeline.Add(BadOdometry(step)));
-    pipeline.Add(std::make_shared<const Scan>(RoomScan(step)));
     house.SendOdometry("r1", kOwner, BadOdometry(step));
     house.SendScan("r1", kOwner, RoomScan(step));
     if (step % 16 == 15) house.WaitSettled("r1", static_cast<std::uint64_t>(step) + 1);
@@ -76,9 +93,21 @@ TEST_P(EverySystem, KeepsTheRobotWhereItIsInTheServerAsAlone) {
 
   const Pose2 wheels = Between(TruePose(kDriven - 1), BadOdometry(kDriven - 1).T_odom_robot);
   EXPECT_GT(wheels.translation().norm(), 0.3);
-  const Pose2 error = Between(TruePose(kDriven - 1), alone.back().T_map_robot);
-  EXPECT_LT(error.translation().norm(), 0.06);
-  EXPECT_LT(std::abs(error.theta), Radians(1.5));
+  ExpectNearTruth(alone.back().T_map_robot, 0.06, Radians(1.5));
+}
+
+// With the refinement, or with a filter that corrects, a matcher that never converges goes unnoticed.
+class EveryMatcher : public ::testing::TestWithParam<Choice> {};
+
+TEST_P(EveryMatcher, KeepsTheRobotWhereItIsWithoutRefinementAndFilter) {
+  const ServerOptions options = OptionsWith({"slam.matcher=" + GetParam().matcher, "slam.filter=none",
+                                             "slam.front_end.refine.enabled=false", "slam.revisit.enabled=false"});
+  const auto outcomes = RunAlone(options.slam);
+  ASSERT_EQ(outcomes.size(), static_cast<std::size_t>(kDriven));
+  int tracking = 0;
+  for (const slam::ScanOutcome& outcome : outcomes) tracking += outcome.reason == PoseReason::kTracking ? 1 : 0;
+  EXPECT_GT(tracking, kDriven * 9 / 10);
+  ExpectNearTruth(outcomes.back().T_map_robot, 0.03, Radians(0.5));
 }
 
 std::string NameOf(const ::testing::TestParamInfo<Choice>& info) {
@@ -97,6 +126,11 @@ INSTANTIATE_TEST_SUITE_P(Filters, EverySystem,
                                            Choice{"voting", "ekf"}, Choice{"voting", "dpslam"},
                                            Choice{"voting", "landmark_correction"}, Choice{"voting", "none"},
                                            Choice{"voting", "line_match"}),
+                         NameOf);
+INSTANTIATE_TEST_SUITE_P(Alone, EveryMatcher,
+                         ::testing::Values(Choice{"voting", "none"}, Choice{"line_lsq", "none"},
+                                           Choice{"hough", "none"}, Choice{"ndt", "none"}, Choice{"ndt_de", "none"},
+                                           Choice{"icp", "none"}, Choice{"correlative", "none"}),
                          NameOf);
 
 }  // namespace

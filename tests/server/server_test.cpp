@@ -68,7 +68,7 @@ TEST(Server, GivesTheTrajectoryThePipelineGivesAlone) {
                                    },
                                .dropped = [](const Scan&, DropReason) { FAIL(); }});
   for (int step = 0; step < 50; ++step) {
-    EXPECT_TRUE(pipeline.Add(RoomOdometry(step)));
+    pipeline.Add(RoomOdometry(step));
     pipeline.Add(std::make_shared<const Scan>(RoomScan(step)));
   }
   WholeServer house(options);
@@ -199,6 +199,100 @@ TEST(Server, RequestsThatCannotBeServedSayWhy) {
   const Job job = house.WaitJob(house.Ask(Of(RequestKind::kJobSubmit)).jobs.at(0).id);
   EXPECT_EQ(job.state, JobState::kFailed);
   EXPECT_THAT(job.message, ::testing::HasSubstr("no scans"));
+}
+
+// Six robots on one thread with a full queue each. The watchdog was starved once in such a case, and the server killed
+// for being busy: the sign of life that was asked of a robot waited behind all its scans, and those of the others.
+TEST(Server, IsHealthyUnderOverloadAsLongAsItMoves) {
+  ServerOptions options = TestOptions();
+  options.server.threads = 1;
+  options.server.stall_limit_s = 0.3;
+  options.slam.filter.particles = 6000;
+  options.slam.gate = {.distance_m = 0.0, .turn_rad = 0.0};  // Every scan updates the filter.
+  WholeServer house(options);
+  std::vector<std::string> robots;
+  for (int i = 0; i < 6; ++i) robots.push_back("r" + std::to_string(i));
+  for (const std::string& robot : robots) house.Open(robot, kClient);
+  const auto begin = std::chrono::steady_clock::now();
+  for (int step = 0; step < 60; ++step) {
+    for (const std::string& robot : robots) {
+      house.SendOdometry(robot, kClient, RoomOdometry(step));
+      house.SendScan(robot, kClient, RoomScan(step));
+    }
+  }
+  ASSERT_TRUE(house.WaitFor([&] {
+    EXPECT_TRUE(house.server().healthy());
+    return std::all_of(robots.begin(), robots.end(),
+                       [&](const std::string& robot) { return house.LastLedger(robot).settled_through == 60; });
+  }));
+  // Otherwise the work was too little to show anything.
+  EXPECT_GT(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(600));
+}
+
+TEST(Server, EveryKindOfRequestIsAnsweredToTheOneWhoAsked) {
+  WholeServer house;
+  for (int kind = 0; kind < kRequestKindCount; ++kind) {
+    const Reply reply = house.Ask(Of(static_cast<RequestKind>(kind)));
+    EXPECT_NE(reply.status.code, StatusCode::kDeadlineExceeded) << RequestKindName(static_cast<RequestKind>(kind));
+    EXPECT_NE(reply.status.code, StatusCode::kInternal) << RequestKindName(static_cast<RequestKind>(kind));
+  }
+  // A question about one robot or site without its name is not a question about all.
+  house.Open("r1", kClient);
+  ASSERT_TRUE(house.WaitPhase("r1", kClient, SessionPhase::kActive));
+  Request unnamed = Of(RequestKind::kPose);
+  unnamed.robot.clear();
+  EXPECT_EQ(house.Ask(unnamed).status.code, StatusCode::kNotFound);
+  unnamed = Of(RequestKind::kTiles);
+  unnamed.site.clear();
+  EXPECT_EQ(house.Ask(unnamed).status.code, StatusCode::kNotFound);
+}
+
+// A robot that is refused because all are taken left its site behind, and so did every misspelt name.
+TEST(Server, NamesThatCameToNothingDoNotUseUpTheSites) {
+  ServerOptions options = TestOptions();
+  options.robots.max_robots = 1;
+  options.maps.max_sites = 2;
+  WholeServer house(options);
+  house.Open("r1", kClient, "first");
+  ASSERT_TRUE(house.WaitPhase("r1", kClient, SessionPhase::kActive));
+  for (const char* site : {"a", "b", "c"}) house.Open("r2", 8, site);
+  ASSERT_TRUE(house.WaitFor([&] { return house.LastState("r2", 8).site == "c"; }));
+  EXPECT_EQ(house.LastState("r2", 8).status.code, StatusCode::kResourceExhausted);
+  Request all = Of(RequestKind::kMapInfo);
+  all.site.clear();
+  EXPECT_EQ(house.Ask(all).maps.size(), 1U);
+  // One robot with five names for its site, each of which it gives up.
+  for (const std::string site : {"lba", "lbb", "lbc", "lbd", "lab"}) {
+    ASSERT_TRUE(house.Ask(Of(RequestKind::kSessionEnd)).status.ok());
+    ASSERT_TRUE(house.WaitPhase("r1", kClient, SessionPhase::kEnded));
+    ASSERT_TRUE(house.WaitFor([&] {
+      house.Open("r1", kClient, site);
+      return house.WaitFor([&] { return house.LastState("r1", kClient).site == site; }) &&
+             house.LastState("r1", kClient).phase == SessionPhase::kActive;
+    })) << site;
+  }
+}
+
+TEST(Server, JobsAreFoundByIdAndAsAList) {
+  WholeServer house;
+  house.Open("r1", kClient);
+  ASSERT_TRUE(house.WaitPhase("r1", kClient, SessionPhase::kActive));
+  Request ask = Of(RequestKind::kJobGet);
+  ask.job = house.Ask(Of(RequestKind::kJobSubmit)).jobs.at(0).id;
+  EXPECT_EQ(house.Ask(ask).jobs.at(0).id, ask.job);
+  EXPECT_EQ(house.Ask(Of(RequestKind::kJobList)).jobs.size(), 1U);
+  Request elsewhere = Of(RequestKind::kJobList);
+  elsewhere.site = "hall";
+  EXPECT_TRUE(house.Ask(elsewhere).jobs.empty());
+  ++ask.job;
+  EXPECT_EQ(house.Ask(ask).status.code, StatusCode::kNotFound);
+}
+
+// An exception in an answer ended the process. Of what can be asked nothing throws, so the test asks what cannot be.
+TEST(Server, AnExceptionEndsTheAnswerAndNotTheServer) {
+  WholeServer house;
+  EXPECT_EQ(house.Ask(Of(static_cast<RequestKind>(200))).status.code, StatusCode::kInternal);
+  EXPECT_TRUE(house.Ask(Of(RequestKind::kPing)).status.ok());
 }
 
 TEST(Server, EndFinishesWhatWasQueued) {

@@ -1,5 +1,5 @@
-// The smallest whole study, and a smoke test of everything a study may use: how far odometry alone drifts on a
-// simulated drive, and one map. Copy this file to begin a new one.
+// The smallest whole study, and a smoke test of everything a study may use: how far odometry alone drifts on
+// a simulated drive, and one map. Copy this file to begin a new one.
 #include "tests/studies/log_run.h"
 #include "tests/studies/study.h"
 

@@ -9,7 +9,8 @@
 namespace cairn::studies {
 namespace {
 
-// Viridis from a few of its points, as blue green red: dark purple is low, yellow high. Grey where there is no value.
+// Viridis from a few of its points, as blue green red: dark purple is low, yellow high. Grey where there is
+// no value.
 cv::Scalar HeatColour(double share) {
   if (!std::isfinite(share)) return {205, 205, 205};
   static const cv::Scalar points[] = {{84, 1, 68}, {139, 82, 59}, {140, 145, 33}, {98, 201, 94}, {37, 231, 253}};

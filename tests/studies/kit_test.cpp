@@ -104,7 +104,7 @@ TEST(StudyLogs, ASimulatedLogRepeatsAndItsTruthKeepsItsRelations) {
 
 TEST(StudyRelations, MeasuresWhatIsOff) {
   const std::vector<Relation> relations{{0, kNanosPerSecond, {1, 0, 0}}, {0, 9 * kNanosPerSecond, {1, 0, 0}}};
-  // Moved as a whole, the trajectory is as good as ever; 0.3 m too long, it is not.
+  // A trajectory that is moved as a whole has no error; one that is 0.3 m too long has.
   const Pose2 T_any{5, 6, 1};
   const Trajectory good{{0, T_any}, {kNanosPerSecond, T_any * Pose2{1, 0, 0}}};
   const Trajectory longer{{0, T_any}, {kNanosPerSecond, T_any * Pose2{1.3, 0, Radians(2)}}};

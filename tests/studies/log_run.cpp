@@ -33,7 +33,7 @@ LogRun RunOverLog(const StudyLog& log, const slam::MapperOptions& options) {
     }
     auto scan = std::make_shared<const Scan>(std::get<Scan>(record));
     watch.Restart();
-    if (slam::RefusalOf(*scan))
+    if (!ValidateScan(*scan))
       ++run.scans_dropped;
     else
       pipeline.Add(std::move(scan));

@@ -1,5 +1,5 @@
-// cairn-study: measures for people: `cairn-study list`, `cairn-study NAME [--out DIR] [--quick] [--seed N] [--log F]
-// [--only TEXT]`.
+// cairn-study runs measurements for people: `cairn-study list`, `cairn-study NAME [--out DIR] [--quick]
+// [--seed N] [--log F] [--only TEXT]`.
 // Exit codes: 0 done and plausible, 1 the study failed or a figure is not plausible, 2 wrong command line.
 #include <CLI/CLI.hpp>
 #include <exception>

@@ -22,12 +22,11 @@ class ChoiceFinder final : public SectionVisitor {
   explicit ChoiceFinder(std::string key) : key_(std::move(key)) {}
   [[nodiscard]] const std::vector<std::string>& names() const { return names_; }
 
-  void Real(std::string_view, double&, std::string_view, double, double, std::string_view) override {}
-  void Integer(std::string_view, std::int64_t&, std::string_view, std::int64_t, std::int64_t,
-               std::string_view) override {}
-  void Flag(std::string_view, bool&, std::string_view) override {}
-  void Text(std::string_view, std::string&, std::string_view) override {}
-  void Choice(std::string_view key, int&, std::span<const std::string_view> names, std::string_view) override {
+  void Real(std::string_view, double&, std::string_view, double, double, const Help&) override {}
+  void Integer(std::string_view, std::int64_t&, std::string_view, std::int64_t, std::int64_t, const Help&) override {}
+  void Flag(std::string_view, bool&, const Help&) override {}
+  void Text(std::string_view, std::string&, const Help&) override {}
+  void Choice(std::string_view key, int&, std::span<const std::string_view> names, const Help&) override {
     if (FullKey(key) == key_) names_.assign(names.begin(), names.end());
   }
 

@@ -75,7 +75,8 @@ cv::Size LegendSize(const Plot& plot) {
   return lines == 0 ? cv::Size() : cv::Size(widest + 52, 20 * lines + 10);
 }
 
-// Maps keep room for their legend on the right: every corner of them shows something. So do plots with a long one.
+// Maps keep room for their legend on the right: every corner of them shows something. So do plots with a long
+// one.
 int RightMargin(const Plot& plot, bool map) {
   const cv::Size legend = LegendSize(plot);
   const bool beside = map || legend.height > plot.height / 3;
@@ -175,7 +176,7 @@ RasterImage DrawPlot(const Plot& plot) {
 
 namespace {
 
-// Without the rows and columns at its edges that nothing is known of: grids grow in whole chunks.
+// Cuts off rows and columns at the edges that are unknown, because grids grow in whole chunks.
 OccupancyImage Cropped(const OccupancyImage& map) {
   int left = map.width, right = -1, low = map.height, high = -1;
   for (int row = 0; row < map.height; ++row)

@@ -1,6 +1,6 @@
-// Plots as plain values, and functions that draw them as pictures: lines and points with error bars and bands over
-// labelled axes, heat maps, and map images with paths over them. For people to look at; nothing reads them back.
-// Data units are whatever the axis label says. Stateless, thread-safe.
+// Plots as plain values, and functions that draw them as pictures: lines and points with error bars and bands
+// over labelled axes, heat maps, and map images with paths over them. For people to look at; nothing reads
+// them back. Data units are whatever the axis label says. Stateless, thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -47,7 +47,7 @@ struct Plot {
   Axis x{}, y{};
   std::vector<Series> series{};
   std::vector<Bound> bounds{};
-  bool equal_scale = false;  // One unit is as long on both axes: maps.
+  bool equal_scale = false;  // One unit has the same length on both axes, as in maps.
   int width = 1000;
   int height = 620;
 };

@@ -1,5 +1,5 @@
-// The paper of a plot: a white picture with axes, ticks and labels, and the way from data to pixels. Used by the plots
-// of this folder only.
+// The frame of a plot: a white picture with axes, ticks and labels, and the conversion from data to pixels.
+// Used by the plots of this folder only.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -19,7 +19,7 @@ struct AxisRange {
 [[nodiscard]] std::vector<double> TicksOf(AxisRange range, bool logarithmic, int wanted);
 [[nodiscard]] std::string TickText(double value);
 
-// The axis' own ends, else the values' with a little air; never empty.
+// The given ends of the axis, otherwise those of the values with a small margin; never empty.
 [[nodiscard]] AxisRange RangeOf(const Axis& axis, const std::vector<double>& values);
 
 [[nodiscard]] cv::Scalar PaletteColour(int index);

@@ -1,6 +1,7 @@
-// How well a trajectory keeps the true motions between its poses, without aligning it to anything: the same measure as
-// tests/accuracy/relations_metric.py, in the process.
-// Source: Kuemmerle et al., "On Measuring the Accuracy of SLAM Algorithms", Autonomous Robots 27(4), 2009, (3)-(5).
+// Measures how well a trajectory keeps the true motions between its poses, without aligning it. The same
+// measure as tests/accuracy/relations_metric.py, in this process.
+// Source: Kuemmerle et al., "On Measuring the Accuracy of SLAM Algorithms", Autonomous Robots 27(4), 2009,
+// (3)-(5).
 #pragma once
 
 #include <cstddef>
@@ -21,7 +22,7 @@ struct Relation {
 // `stamp1 stamp2 x y z roll pitch yaw` a line, seconds, `#` starts a comment.
 [[nodiscard]] Result<std::vector<Relation>> ReadRelations(const std::filesystem::path& path);
 
-// How far off one relation is in a trajectory.
+// The error of a trajectory in one relation.
 struct RelationResidual {
   Stamp from = 0;
   Stamp to = 0;
@@ -29,7 +30,7 @@ struct RelationResidual {
   double rot_deg = 0.0;
 };
 
-// Of the relations whose stamps the trajectory has, in their order.
+// The errors of the relations whose stamps the trajectory has, in order.
 [[nodiscard]] std::vector<RelationResidual> ResidualsOf(const Trajectory& trajectory,
                                                         const std::vector<Relation>& relations);
 
@@ -44,7 +45,7 @@ struct RelationError {
   double rot_max_deg = 0.0;
 };
 
-// NaN means where nothing could be compared.
+// Means are NaN if nothing could be compared.
 [[nodiscard]] RelationError ErrorOf(const Trajectory& trajectory, const std::vector<Relation>& relations);
 
 }  // namespace cairn::studies

@@ -1,6 +1,6 @@
-// What a study leaves behind: a Markdown report with its tables and pictures in one folder, and the same words and
-// tables on a stream as they come; and whether what was measured is plausible. report.md links its pictures by name, so
-// the folder can be moved as a whole. Not thread-safe.
+// The output of a study: a Markdown report with tables and pictures in one folder, and the same text and
+// tables on a stream while the study runs. It also records whether the figures are plausible. report.md links
+// its pictures by relative names, so the folder can be moved. Not thread-safe.
 #pragma once
 
 #include <filesystem>
@@ -15,20 +15,20 @@ namespace cairn::studies {
 
 class Report {
  public:
-  // An empty directory: nothing is written, only `out` gets to see it.
+  // An empty directory name: no file is written; the output goes only to `out`.
   Report(std::filesystem::path directory, const std::string& title, std::ostream& out);
 
   void Heading(const std::string& text);
   // A paragraph; Markdown.
   void Text(const std::string& text);
-  // What must not be overlooked: a log that is absent, a figure worse than the printed one.
+  // Adds a warning, for example that a log is absent or that a figure is worse than the printed one.
   void Warn(const std::string& text);
-  // What makes the study fail; shown as a warning.
+  // Records a failure of the study, shown as a warning.
   void Fault(const std::string& why);
-  // Fails, saying `otherwise`, where it does not hold.
+  // Records the failure `otherwise` if the condition does not hold.
   void Expect(bool holds, const std::string& otherwise);
   [[nodiscard]] bool failed() const { return failed_; }
-  // Only for who watches: not part of the report.
+  // Prints progress on the stream only; it is not part of the report.
   void Progress(const std::string& text);
   // Also written as NAME.csv; blanks in names become underscores.
   void Add(const Table& table, const std::string& name);
@@ -38,7 +38,7 @@ class Report {
   void AddMap(const OccupancyImage& map, const Plot& plot, const std::string& name);
   void AddPicture(const RasterImage& picture, const std::string& caption, const std::string& name);
 
-  // Writes report.md. Says the first thing that could not be written, if any.
+  // Writes report.md. Returns the first file that could not be written, if any.
   [[nodiscard]] Result<void> Finish();
   [[nodiscard]] const std::filesystem::path& directory() const { return directory_; }
 

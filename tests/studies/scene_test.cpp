@@ -8,7 +8,9 @@
 namespace cairn::studies {
 namespace {
 
-constexpr char kBox[] = "cairn-world 1\nname box\npolygon -4 -3  6 -3  6 5  -4 5\nroute round -1 0  2 0  2 2\n";
+constexpr char kBox[] =
+    "cairn-world: 1\nname: box\nlines: [{points: [[-4, -3], [6, -3], [6, 5], [-4, 5]], closed: true}]\n"
+    "routes: [{name: round, points: [[-1, 0], [2, 0], [2, 2]]}]\n";
 
 TEST(StudyScene, ShowsTheWallsAScanHits) {
   const Scene scene(kBox);
@@ -25,7 +27,7 @@ TEST(StudyScene, ShowsTheWallsAScanHits) {
   EXPECT_EQ(hits, laser.beams);
   EXPECT_NEAR(ahead, 8.0, 0.5);
   EXPECT_NEAR(aside, 12.0, 1.0);
-  // In the robot's frame: seen from elsewhere the same wall lies elsewhere.
+  // The result is in the robot's frame, so from another pose the same wall has other coordinates.
   bool seen = false;
   for (const VisibleWall& wall : scene.VisibleWalls({1, 1, kPi / 2}, laser)) {
     seen = seen || (std::abs(wall.a_robot.x() - 4.0) < 1e-3 && std::abs(wall.b_robot.x() - 4.0) < 1e-3);
@@ -54,7 +56,7 @@ TEST(StudyScene, DiscsStandInOneScanOnly) {
 
 TEST(StudyScene, AWorldThatIsNoneIsAnError) {
   EXPECT_THROW(Scene("no such world"), std::invalid_argument);
-  EXPECT_THROW(Scene("cairn-world 1\nname empty\n"), std::invalid_argument);
+  EXPECT_THROW(Scene("cairn-world: 1\nname: empty\n"), std::invalid_argument);
 }
 
 }  // namespace

@@ -6,7 +6,8 @@
 namespace cairn::studies {
 namespace {
 
-// Filled before main by the Registrations of the studies linked in; a map, so that their order does not matter.
+// Filled before main by the Registrations of the studies linked in; a map, so that their order does not
+// matter.
 std::map<std::string, Study>& Registered() {
   static std::map<std::string, Study> studies;
   return studies;

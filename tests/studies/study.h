@@ -1,6 +1,6 @@
-// What a study is and where the program finds it. A study measures something for people: it prints tables, writes plots
-// and a Markdown report, and says whether what it measured is plausible. Not a test: it may take minutes, and nothing
-// waits for it. Each study's file ends with one line that registers it:
+// What a study is and where the program finds it. A study measures something for people: it prints tables,
+// writes plots and a Markdown report, and says whether what it measured is plausible. Not a test: it may take
+// minutes, and nothing waits for it. Each study's file ends with one line that registers it:
 //
 //   const Registration kRegistered{"thesis-a", "line extraction, matching, FastSLAM beside thesis A", RunThesisA};
 #pragma once

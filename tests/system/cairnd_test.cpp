@@ -5,6 +5,7 @@
 #include <csignal>
 #include <fstream>
 #include <random>
+#include <sstream>
 
 #include "common/wire/bus.h"
 #include "tests/child_process.h"
@@ -87,6 +88,41 @@ TEST(CairndCommandLine, WrongUsageAndABadFileEndWithTwoNamingTheLine) {
   EXPECT_THAT(outcome.output, HasSubstr("bad.yaml:2"));
   EXPECT_THAT(outcome.output, HasSubstr("maps.publish_rate_hz"));
   EXPECT_EQ(RunCairnd({"--config", (directory / "absent.yaml").string()}).exit_code, 2);
+}
+
+TEST(CairndCommandLine, OptionsThatContradictEachOtherEndWithTwoAndOneLine) {
+  const std::vector<std::pair<std::string, std::string>> wrong = {
+      {"slam.grid.no_return_free_m=26", "slam.grid.no_return_free_m (26) must not exceed slam.grid.max_ray_m (25)"},
+      {"server.inbound_capacity=100", "server.inbound_capacity (100) must be at least robots.max_robots (256)"},
+      {"wire.liveliness_lease_s=4", "wire.liveliness_lease_s (4) must not exceed wire.participant_lease_s (3)"}};
+  for (const auto& [assignment, message] : wrong) {
+    for (const char* task : {"--check-config", "--domain=3"}) {
+      const auto outcome = RunCairnd({"--set", assignment, task});
+      EXPECT_EQ(outcome.exit_code, 2) << assignment;
+      EXPECT_EQ(outcome.output, "cairnd: " + message + "\n");
+    }
+  }
+}
+
+// Whoever runs a server finds what there is to set on the first page, and nothing has two places.
+TEST(CairndCommandLine, TheFirstPageIsForOperators) {
+  const std::string output = RunCairnd({"--print-config"}).output;
+  const std::string first = output.substr(0, output.find("\nexpert:\n"));
+  ASSERT_LT(first.size(), output.size());
+  int keys = 0;
+  std::istringstream lines(first);
+  for (std::string line; std::getline(lines, line);) {
+    const auto text = line.find_first_not_of(' ');
+    if (text == std::string::npos || line[text] == '#') continue;
+    const std::string value = line.substr(line.find(':') + 1);
+    keys += value.empty() || value.starts_with("  #") ? 0 : 1;
+  }
+  EXPECT_GE(keys, 25);
+  EXPECT_LE(keys, 35);
+  for (const char* wanted : {"domain:", "interfaces:", "log_level:", "threads:", "max_robots:", "particles:", "filter:",
+                             "matcher:", "use_odometry:", "max_tilt_rad:", "resolution_m:"})
+    EXPECT_THAT(first, HasSubstr(wanted));
+  EXPECT_EQ(first.find("doubt_m"), std::string::npos);
 }
 
 TEST(CairndCommandLine, AnAddressOfAnotherMachineIsAClearStartUpError) {

@@ -42,14 +42,14 @@ void Ancestry::RemoveChildless(Id id) {
     const Id parent = nodes_[id].parent;
     nodes_[id] = {};
     free_.push_back(id);
-    --nodes_[parent].child_count;  // The line ends at the latest where a living particle branches off.
+    --nodes_[parent].child_count;  // The loop ends at the latest where a living particle branches off.
     nodes_[parent].child_sum -= id;
     id = parent;
   }
   if (nodes_[id].child_count == 1) JoinOnlyChild(id);
 }
 
-// The child takes the parent's place and keeps its own id, by which the living are known.
+// The child takes the parent's place and keeps its own id, because living particles are referred to by id.
 void Ancestry::JoinOnlyChild(Id id) {
   const Id child = static_cast<Id>(nodes_[id].child_sum);
   Node& old = nodes_[id];

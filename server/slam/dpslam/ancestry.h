@@ -1,8 +1,9 @@
-// The family tree of the particles: every one that lives is a leaf and holds what it changed of its parent's map; its
-// map is the sum along its line of ancestors. Who leaves no descendants is removed; who has one child only becomes one
-// with it. So every inner particle has at least two children, the tree holds fewer than twice as many particles as
-// live, and no line is longer than their number, however long the robot drives. Not thread-safe for writing. Source:
-// Eliazar, Parr 2003; thesis C 3.2.3.2, Figure 3.10.
+// The ancestry tree of the particles. Every living particle is a leaf and holds the changes that it made to
+// its parent's map; its map is the sum of the changes along its line of ancestors. A particle without
+// descendants is removed, and a particle with only one child is merged with that child. So every inner node
+// has at least two children, the tree has fewer than twice as many nodes as there are living particles, and
+// no line is longer than their number, however long the robot drives. Not thread-safe for writing.
+// Source: Eliazar, Parr 2003; thesis C 3.2.3.2, Figure 3.10.
 #pragma once
 
 #include <cstddef>
@@ -24,11 +25,12 @@ class Ancestry {
     MapChanges changes;
   };
 
-  Ancestry();  // One particle with nothing on its map.
+  Ancestry();  // Starts with one particle whose map is empty.
 
-  // The births become the living. REQUIRES: at least one, ordered by parent; that keeps relatives side by side.
+  // The births become the living particles. REQUIRES: at least one birth, ordered by parent; thereby
+  // relatives are neighbours.
   void NextGeneration(std::vector<Birth> births);
-  // All maps forget what lies outside [low, high].
+  // Removes from all maps the tiles outside [low, high].
   void KeepOnly(const ChangeTileKey& low, const ChangeTileKey& high);
 
   [[nodiscard]] std::span<const Id> living() const { return living_; }
@@ -36,17 +38,17 @@ class Ancestry {
   [[nodiscard]] Id parent(Id id) const { return nodes_[id].parent; }
   [[nodiscard]] int children(Id id) const { return static_cast<int>(nodes_[id].child_count); }
 
-  // From the oldest ancestor down to `id`.
+  // The line of ancestors from the oldest down to `id`.
   void LineTo(Id id, std::vector<Id>& line) const;
   [[nodiscard]] std::size_t size() const { return nodes_.size() - free_.size(); }
-  [[nodiscard]] std::size_t depth() const;  // Of the longest line.
-  [[nodiscard]] std::size_t bytes() const;  // All changes of all particles.
+  [[nodiscard]] std::size_t depth() const;  // Number of particles in the longest line.
+  [[nodiscard]] std::size_t bytes() const;  // Memory of all changes of all particles.
 
  private:
   struct Node {
     Id parent = kNobody;
     std::uint32_t child_count = 0;
-    std::uint64_t child_sum = 0;  // Of the children's ids: the only child's, where there is one.
+    std::uint64_t child_sum = 0;  // Sum of the children's ids: with one child, its id.
     MapChanges changes;
   };
   Id Add(Id parent, MapChanges changes);

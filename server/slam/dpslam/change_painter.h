@@ -1,6 +1,7 @@
-// Draws scans taken at given poses and hands back what they change: per cell, how far laser travelled in it and how
-// often it was stopped. Scratch memory is kept between drawings. Not thread-safe. Frames: poses are T_map_robot,
-// finite. Source: thesis C 3.2.3.1.
+// Draws scans taken at given poses and returns the resulting changes of the map: per cell, how far laser
+// beams travelled in it and how often they were stopped. Scratch memory is kept between calls. Not
+// thread-safe.
+// Frames: poses are T_map_robot, finite. Source: thesis C 3.2.3.1.
 #pragma once
 
 #include <array>
@@ -20,14 +21,14 @@ class ChangePainter {
   explicit ChangePainter(double resolution_m) : resolution_m_(resolution_m) {}
 
   void Draw(const LaserRays& rays, const Pose2& T_map_robot);
-  // Everything drawn since the last call.
+  // Returns all changes since the last call.
   [[nodiscard]] MapChanges Take();
 
  private:
   struct Sheet {
-    std::array<float, kChangeTileArea> travel{};  // In cells.
+    std::array<float, kChangeTileArea> travel{};  // Travel in cells.
     std::array<std::uint32_t, kChangeTileArea> stops{};
-    std::array<std::uint64_t, kChangeTileSide> touched{};  // A bit a cell, a word a row.
+    std::array<std::uint64_t, kChangeTileSide> touched{};  // One bit per cell, one word per row.
   };
   Sheet& SheetAt(const ChangeTileKey& key);
 

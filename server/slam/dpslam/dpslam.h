@@ -1,10 +1,13 @@
-// DP-SLAM: a particle filter whose particles own whole grid maps, stored as changes in their family tree. Flat, or
-// hierarchical: the low level maps the surroundings only and forgets what is far; the high level (segment_filter.h)
-// joins the segments of trajectory it hands up, each particle with drift of its own at every joint, and judges a
-// segment's scans on what the low level had forgotten. No landmarks, no revisits: loops close because some particle's
-// map agrees with what is seen again. Frames: poses are T_map_robot; the low level's are in a frame of its own, which
-// drifts. Not thread-safe; deterministic for a seed, on any number of threads. Source: Eliazar, Parr 2003-2005; thesis
-// C 3.2.3, 4.5.
+// DP-SLAM: a particle filter whose particles have complete grid maps, stored as changes in their ancestry
+// tree. It is flat or hierarchical. The low level maps the surroundings only and forgets what is far away.
+// The high level (segment_filter.h) joins the segments of trajectory from the low level. Each of its
+// particles draws its own drift at every joint, and a segment's scans are compared only with what the low
+// level had forgotten. With `high_level=plain` the high level is that of the thesis: a second filter like the
+// low one, in which one step is a whole segment with drift, computed at once.
+// It uses neither landmarks nor revisits: loops close because the map of some particle agrees with what is
+// seen again. Frames: poses are T_map_robot; those of the low level are in a frame of its own, which drifts.
+// Not thread-safe; deterministic for a seed, on any number of threads.
+// Source: Eliazar, Parr 2003-2005; thesis C 3.2.3, 4.5.
 #pragma once
 
 #include <memory>
@@ -23,9 +26,9 @@ class DpSlam final : public Filter {
 
   void Predict(const StepMotion& step) override;
   bool Observe(const RevisitObservation& /*revisit*/) override { return false; }
-  // REQUIRES: at most once a step.
+  // REQUIRES: at most one call per step.
   void Observe(const KeyframeSight& sight, const ParallelFor& parallel_for) override;
-  // The same with rays at hand.
+  // The same with rays that are already prepared.
   void Observe(std::shared_ptr<const LaserRays> rays, const ParallelFor& parallel_for);
   void Commit() override;
 
@@ -35,37 +38,46 @@ class DpSlam final : public Filter {
   [[nodiscard]] Hypothesis hypothesis(std::size_t index) const override;
   [[nodiscard]] std::vector<Landmark> landmarks() const override { return {}; }
 
-  // The low level knows the surroundings only where there is a high level.
-  [[nodiscard]] const LevelFilter& low() const { return low_; }
-  [[nodiscard]] const LevelFilter* high() const { return high_ ? &high_->level() : nullptr; }
-  // The best particle's map, without the scans still pending where there is a high level.
+  // The map of the low level covers only the surroundings if there is a high level.
+  [[nodiscard]] const LevelFilter& low() const { return *low_; }
+  [[nodiscard]] const LevelFilter* high() const { return plain_ ? &*plain_ : high_ ? &high_->level() : nullptr; }
+  // The best particle's map; if there is a high level, without the scans that are still pending.
   [[nodiscard]] OccupancyImage MapImage() const;
-  // Of all maps.
+  // Memory of all maps.
   [[nodiscard]] std::size_t bytes() const;
 
  private:
   struct PendingScan {
     std::shared_ptr<const LaserRays> rays;
-    double step_m = 0.0;  // From the scan before.
+    double step_m = 0.0;  // Distance from the previous scan.
     double turn_rad = 0.0;
   };
-  // Scans of the next segment, once it is long enough and hindsight allows; else 0.
+  // Number of scans of the next segment once it is long enough and followed by enough later scans; otherwise
+  // 0.
   [[nodiscard]] std::size_t SegmentEnd() const;
   void HandUp(std::size_t count);
+  // The whole step of the plain high level, with all pending scans.
+  void JoinPlainly(const ParallelFor& parallel_for);
+  // The next scans of a particle of the low level, from the joint on.
+  [[nodiscard]] Evidence Along(const GridParticle& particle, std::size_t count) const;
+  [[nodiscard]] double WayOf(std::size_t count) const;  // Distance over the first `count` pending scans.
 
   const DpSlamOptions options_;
   Rng rng_;
-  LevelFilter low_;
-  std::optional<SegmentFilter> high_;
-  std::vector<PendingScan> pending_;  // Not in the high level yet.
-  std::size_t handed_up_ = 0;         // Scans before them.
-  std::size_t at_work_ = 0;           // Of the pending, those the high level is working at.
-  Pose2 T_low_joint_;                 // Where those before the pending ended when they were handed up,
-  Pose2 T_low_end_;                   // and those at work. In the low level's frame.
-  double step_m_ = 0.0;               // Since the last scan.
+  std::optional<LevelFilter> low_;     // Never empty; replaced at every joint of the plain high level.
+  std::optional<SegmentFilter> high_;  // At most one of high_ and plain_ has a value.
+  std::optional<LevelFilter> plain_;
+  std::vector<PendingScan> pending_;  // Scans that are not in the high level yet.
+  std::size_t handed_up_ = 0;         // Number of scans before the pending ones.
+  std::size_t at_work_ = 0;           // Number of pending scans that the high level is processing.
+  // End poses in the low level's frame: of the scans before the pending ones, when they were passed on, and
+  // of the scans that the high level is processing.
+  Pose2 T_low_joint_;
+  Pose2 T_low_end_;
+  double step_m_ = 0.0;  // Distance since the last scan.
   double turn_rad_ = 0.0;
-  std::int64_t contradicted_ = 0;  // Scans in a row.
-  bool observed_ = false;          // In this step.
+  std::int64_t contradicted_ = 0;  // Number of scans in a row that contradicted the map.
+  bool observed_ = false;          // Whether this step has had a scan.
 };
 
 }  // namespace cairn::slam

@@ -1,6 +1,7 @@
-// One scan as rays in the robot frame, prepared once for a thousand particles: beams that say nothing are left out,
-// long ones cut, and where there are too many they are evenly picked. A tilted scan plane is projected on the ground as
-// in scan/beam_points.h. Immutable. Precondition: the scan passed ValidateScan. Metres.
+// One scan as rays in the robot frame, prepared once for all particles: beams without information are left
+// out, long ones are cut, and if there are too many, they are thinned evenly. A tilted scan plane is
+// projected on the ground as in scan/beam_points.h. Immutable. Precondition: the scan passed ValidateScan.
+// Metres.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,9 +13,9 @@
 namespace cairn::slam {
 
 struct LaserRay {
-  Eigen::Vector2d direction = Eigen::Vector2d::UnitX();  // Of length 1, in robot.
+  Eigen::Vector2d direction = Eigen::Vector2d::UnitX();  // Unit vector in the robot frame.
   double length_m = 0.0;
-  bool hit = false;  // False: it passed this far, and nothing is known beyond.
+  bool hit = false;  // False: the ray passed at least this far, and the space beyond is unknown.
 };
 
 struct LaserRays {

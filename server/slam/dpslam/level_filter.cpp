@@ -5,8 +5,14 @@
 #include <cmath>
 #include <utility>
 
+#include "common/geometry/pose_difference.h"
+
 namespace cairn::slam {
 namespace {
+
+// Only particles this near to the best one take part in the reported pose, so that other hypotheses do not
+// distort it.
+constexpr double kAgreementM = 0.5;
 
 bool ShowsRays(const Evidence& evidence) {
   return std::any_of(evidence.begin(), evidence.end(),
@@ -16,21 +22,25 @@ bool ShowsRays(const Evidence& evidence) {
 }  // namespace
 
 void Visit(OptionVisitor& visitor, LevelOptions& options) {
-  visitor.Real("sigma_m", options.sigma_m, "m", 0.005, 1.0, "Of a range against the map. More: more particles agree.");
+  visitor.Real("sigma_m", options.sigma_m, "m", 0.005, 1.0,
+               "Standard deviation of a range against the map. With a larger value more particles agree with a scan.");
   visitor.Real("evidence_share", options.evidence_share, "1", 0.001, 1.0,
-               "Of a ray's log likelihood: neighbouring rays err alike. 1: all rays are independent.");
+               "Share of the log likelihood of a ray that counts, because neighbouring rays have similar errors. 1 "
+               "treats all rays as independent.");
   visitor.Real("unseen_per_m", options.unseen_per_m, "1/m", 0.001, 100.0,
-               "Density of ray ends in unseen space. Less: maps shrink; more: walls are not found again.");
-  visitor.Real("outlier_share", options.outlier_share, "1", 0.0001, 0.99, "Rays that say nothing about the map.");
+               "Density of the ends of rays in space that was not seen before. With a smaller value maps shrink; with "
+               "a larger one known walls are not found again.");
+  visitor.Real("outlier_share", options.outlier_share, "1", 0.0001, 0.99,
+               "Share of the rays that end on something that is not in the map, such as people.");
   visitor.Real("resample_below", options.resample_below, "1", 0.0, 1.0,
-               "Share of particles that still count below which the set is resampled; 1: always.");
-  visitor.Integer("ray_stride", options.ray_stride, "1", 1, 1000, "Every n-th ray judges particles; all are drawn.");
-  visitor.Real(
-      "give_up_behind", options.give_up_behind, "1", 0.0, 1000.0,
-      "Weighted log likelihood behind the best, by a quarter of the rays, at which a particle dies; 0: never.");
-  visitor.Real("agreement_m", options.agreement_m, "m", 0.0, 100.0,
-               "Particles this near the best one take part in the reported pose.");
-  visitor.Section("drift", "Noise of a move.", [&] { Visit(visitor, options.drift); });
+               "The particles are resampled when the effective sample size falls below this share of their number. 1 "
+               "resamples after every step.");
+  visitor.Integer("ray_stride", options.ray_stride, "1", 1, 1000,
+                  "Only every n-th ray weighs the particles. All rays are drawn into the maps.");
+  visitor.Real("give_up_behind", options.give_up_behind, "1", 0.0, 1000.0,
+               "A particle is given up when its weighted log likelihood is this far below the best after a quarter of "
+               "the rays. 0 keeps all.");
+  visitor.Section("drift", "Uncertainty of a motion.", [&] { Visit(visitor, options.drift); });
 }
 
 LevelFilter::LevelFilter(const LevelOptions& options, const OpacityOptions& opacity, const Pose2& T_map_robot_start)
@@ -48,7 +58,7 @@ void LevelFilter::Move(const std::function<Pose2()>& draw_step, const Pose2& T_m
   solver.computeDirect(covariance_prev);
   const Eigen::Matrix3d root = solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
   for (GridParticle& particle : particles_) {
-    const Eigen::Vector3d draw(NormalDraw(rng), NormalDraw(rng), NormalDraw(rng));
+    const Eigen::Vector3d draw = ThreeNormalDraws(rng);
     const Eigen::Vector3d step = draw_step().vector() + root * draw;
     particle.T_map_robot = particle.T_map_robot * Pose2{step.x(), step.y(), WrapAngle(step.z())};
   }
@@ -75,21 +85,16 @@ void LevelFilter::Observe(const Evidence& evidence, Rng& rng, const ParallelFor&
   const std::vector<double> weights = Summarise();
   if (!sees) return;
 
-  // Who survives, and how often.
+  // Number of heirs of each particle.
   if (effective_ <= options_.resample_below * static_cast<double>(particles_.size())) {
-    std::vector<GridParticle> next;
-    std::vector<MapSample> survivors;
-    next.reserve(particles_.size());
-    std::size_t best = 0;
-    for (const int parent : StratifiedSurvivors(weights, rng)) {
-      next.push_back(particles_[static_cast<std::size_t>(parent)]);
-      next.back().log_weight = 0.0;
-      survivors.push_back(samples[static_cast<std::size_t>(parent)]);
-      if (next.back().log_posterior() > next[best].log_posterior()) best = next.size() - 1;
+    const std::vector<int> parents = StratifiedSurvivors(weights, rng);
+    particles_ = HeirsOf(particles_, parents);
+    samples = HeirsOf(samples, parents);
+    best_ = 0;
+    for (std::size_t i = 0; i < particles_.size(); ++i) {
+      particles_[i].log_weight = 0.0;
+      if (particles_[i].log_posterior() > particles_[best_].log_posterior()) best_ = i;
     }
-    particles_ = std::move(next);
-    samples = std::move(survivors);
-    best_ = best;
   }
   const Drawings drawings = Distinct(samples);
   Adopt(drawings, maps_.Draw(drawings.distinct, {&evidence, 1}, parallel_for));
@@ -152,9 +157,8 @@ std::vector<double> LevelFilter::Summarise() {
   Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
   double sum = 0.0;
   for (std::size_t i = 0; i < particles_.size(); ++i) {
-    Eigen::Vector3d d = particles_[i].T_map_robot.vector() - centre.vector();
-    d.z() = WrapAngle(d.z());
-    if (weights[i] <= 0.0 || d.head<2>().norm() > options_.agreement_m) continue;
+    const Eigen::Vector3d d = Minus(particles_[i].T_map_robot, centre);
+    if (weights[i] <= 0.0 || d.head<2>().norm() > kAgreementM) continue;
     first += weights[i] * d;
     second += weights[i] * d * d.transpose();
     sum += weights[i];
@@ -163,7 +167,7 @@ std::vector<double> LevelFilter::Summarise() {
   covariance_.setZero();
   if (!(sum > 0.0)) return weights;
   const Eigen::Vector3d shift = first / sum;
-  mean_ = {centre.x + shift.x(), centre.y + shift.y(), WrapAngle(centre.theta + shift.z())};
+  mean_ = Plus(centre, shift);
   covariance_ = second / sum - shift * shift.transpose();
   return weights;
 }

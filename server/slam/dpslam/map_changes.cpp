@@ -6,7 +6,7 @@
 namespace cairn::slam {
 namespace {
 
-// From here on a list takes more memory than all cells do.
+// Longest list: a longer one takes more memory than the array of all cells.
 constexpr std::size_t kLongestList = sizeof(ChangeTile::Counts) * kChangeTileArea / sizeof(CellChange);
 
 ChangeTile::Counts Sum(std::uint32_t travel, std::uint32_t stops) {

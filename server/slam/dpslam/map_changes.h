@@ -1,9 +1,12 @@
-// What one particle changed of the map it inherited: per cell, laser travel and stops to be added to its ancestors'.
-// Kept as increments (not as new totals), so an ancestor and its only child merge by adding, whichever is the smaller
-// into the larger, and a map is the sum along a line of ancestors, in any order.
-// In square tiles of 64 x 64 cells: a short sorted list where little was changed, all cells where much was.
-// Counts of one cell in one particle stay below 65536; where they would not, travel and stops are both halved (evidence
-// ages, the opacity stays). So the sum over 10,000 ancestors cannot overflow 32 bits.
+// The changes that one particle made to the map it inherited: per cell, laser travel and stops to be added to
+// those of its ancestors. They are increments, not new totals. Therefore an ancestor and its only child can
+// be merged by adding the smaller set to the larger, and a map is the sum along a line of ancestors, in any
+// order.
+// The changes are stored in square tiles of 64 x 64 cells: as a short sorted list if few cells changed, as an
+// array of all cells if many did.
+// Counts of one cell in one particle stay below 65536: before they reach it, travel and stops are both
+// halved, which reduces the weight of old evidence and keeps the opacity. So the sum over 10,000 ancestors
+// cannot overflow 32 bits.
 // Cell (0,0) has its lower-left corner at the map origin. Not thread-safe for writing.
 // Source: thesis C 3.2.3.2; Eliazar, Parr 2003, 2004.
 #pragma once
@@ -33,7 +36,7 @@ struct CellChange {
   std::uint16_t stops = 0;
 };
 
-// Changes of one tile. Either `list`, ascending by cell, or `all`, 4096 entries.
+// Changes of one tile: either in `list`, ascending by cell, or in `all`, which has 4096 entries.
 struct ChangeTile {
   struct Counts {
     std::uint16_t travel = 0;
@@ -43,10 +46,10 @@ struct ChangeTile {
   std::vector<CellChange> list;
   std::vector<Counts> all;
 
-  void Add(ChangeTile&& other);  // Of the same key.
+  void Add(ChangeTile&& other);  // REQUIRES: the same key.
   [[nodiscard]] std::size_t bytes() const;
 
-  // visit(cell, travel, stops) for every changed cell, ascending.
+  // Calls visit(cell, travel, stops) for every changed cell in ascending order.
   template <typename Visit>
   void ForEach(Visit&& visit) const {
     for (const CellChange& change : list) visit(change.cell, change.travel, change.stops);
@@ -60,17 +63,17 @@ class MapChanges {
  public:
   // REQUIRES: tiles are appended in ascending order of their keys.
   void Append(ChangeTile tile) { tiles_.push_back(std::move(tile)); }
-  // Takes over the other's changes.
+  // Adds the other's changes to these.
   void Add(MapChanges&& other);
-  // Forgets what lies outside [low, high].
+  // Removes the tiles outside [low, high].
   void KeepOnly(const ChangeTileKey& low, const ChangeTileKey& high);
 
   [[nodiscard]] const std::vector<ChangeTile>& tiles() const { return tiles_; }
   [[nodiscard]] bool empty() const { return tiles_.empty(); }
-  [[nodiscard]] std::size_t bytes() const;  // On the heap.
+  [[nodiscard]] std::size_t bytes() const;  // Memory on the heap.
 
  private:
-  std::vector<ChangeTile> tiles_;  // Ascending by key.
+  std::vector<ChangeTile> tiles_;  // The tiles, ascending by key.
 };
 
 }  // namespace cairn::slam

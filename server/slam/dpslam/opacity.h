@@ -1,11 +1,13 @@
-// The opacity model of a grid cell: a laser that travels x through a cell of opacity rho is stopped there with
-// probability 1 - exp(-x / rho). A cell holds how far laser has travelled in it and how often it was stopped; opacity
-// is their ratio, the maximum likelihood estimate, with a small prior so that cells never seen stop a ray now and then.
-// This file is the textbook: the fast walk through a map is ray_likelihood.h, tested against it.
+// The opacity model of a grid cell: a laser beam that travels x through a cell of opacity rho is stopped
+// there with probability 1 - exp(-x / rho). A cell holds how far beams have travelled in it and how often
+// they were stopped. Its opacity is the ratio of the two, the maximum likelihood estimate, with a small prior
+// so that unseen cells sometimes stop a ray.
+// This file is the textbook form. The fast computation along a ray is in ray_likelihood.h and is tested
+// against this file.
 // Metres. Stateless, thread-safe. Source: Eliazar, Parr 2004 (DP-SLAM 2.0); thesis C 3.2.3.1, (3.35)-(3.39).
-// Put right: the sum of (3.36) is over i with the reach of i - 1; and "the weight of an entire scan is the sum of all
-// ray weights" is a slip: rays are independent given pose and map, so their likelihoods multiply (their logarithms add
-// up).
+// Corrected: the sum of (3.36) is over i with the probability of reaching cell i - 1. "The weight of an
+// entire scan is the sum of all ray weights" is wrong: rays are independent given pose and map, so their
+// likelihoods multiply (their logarithms are added).
 #pragma once
 
 #include <cstdint>
@@ -17,15 +19,16 @@ namespace cairn::slam {
 
 struct OpacityOptions {
   double resolution_m = 0.05;
-  double max_ray_m = 20.0;         // Rays are cut here: what is hit farther away only says "passed".
-  double no_return_m = 20.0;       // How far a beam that hit nothing is believed to have passed; 0: it says nothing.
-  double prior_stops = 0.02;       // Stops and distance a cell has before it is seen. Their ratio is how often
-  double prior_distance_m = 0.06;  // unknown space stops a ray per metre; both larger: slower learning.
-  std::int64_t max_rays = 361;     // Of a scan, evenly picked where it has more.
+  double max_ray_m = 20.0;
+  double no_return_m = 20.0;
+  double prior_stops = 0.02;
+  // prior_stops / prior_distance_m is the number of stops per metre in unknown space.
+  double prior_distance_m = 0.06;
+  std::int64_t max_rays = 361;
 };
 void Visit(OptionVisitor& visitor, OpacityOptions& options);
 
-// Cell-widths of travel are counted in steps of 1/32.
+// Travel is counted in steps of 1/32 of a cell's width.
 inline constexpr double kTravelPerCell = 32.0;
 
 struct CellCounts {
@@ -45,11 +48,11 @@ struct StopRate {
   float prior_cells;
 };
 
-// What a ray meets on its way, cell by cell.
+// The part of a ray in one cell.
 struct RaySpan {
-  double length_m = 0.0;   // x_i
-  double opacity_m = 0.0;  // rho_i
-  double delta_m = 0.0;    // From the measured end to the cell, along the ray.
+  double length_m = 0.0;   // x_i: length in the cell.
+  double opacity_m = 0.0;  // rho_i: opacity of the cell.
+  double delta_m = 0.0;    // Distance from the measured end to the cell, along the ray.
 };
 
 [[nodiscard]] double StopProbability(double length_m, double opacity_m);                // (3.35)

@@ -35,7 +35,7 @@ void OpacityWindow::Apply(const MapChanges& changes) {
     float* const rates = rates_.data() + corner;
     tile->ForEach([&](std::uint16_t cell, std::uint16_t travel, std::uint16_t stops) {
       const std::size_t at = (cell >> kTileBits) * stride + (cell & (kChangeTileSide - 1));
-      CellCounts sum = counts[at];  // Unsigned: what was added comes off again exactly.
+      CellCounts sum = counts[at];  // Unsigned arithmetic: subtraction undoes addition exactly.
       if constexpr (Sign > 0) {
         sum = {sum.travel + travel, sum.stops + stops};
       } else {

@@ -1,8 +1,9 @@
-// The part of one particle's map that rays can reach, as a plain raster of stop rates, so that a look-up costs one
-// load. Going from one particle to a relative undoes and applies only what lies between them in the family tree:
-// walking over all living particles applies each change of the tree once, however many particles inherit it.
-// (DP-SLAM 2.0 reaches the same bound, area swept times particles, with a cache per grid cell.) Cells outside are taken
-// for never seen. Not thread-safe; one window per thread. Source: Eliazar, Parr 2004 (local maps); thesis C 3.2.3.2.
+// The part of one particle's map that rays can reach, as a raster of stop rates, so that a look-up needs one
+// memory access. Changing from one particle to a relative removes and adds only the changes between them in
+// the ancestry tree. A walk over all living particles thus applies each change of the tree once, however many
+// particles inherit it. (DP-SLAM 2.0 reaches the same bound, area swept times particles, with a cache per
+// grid cell.) Cells outside of the window count as unseen. Not thread-safe; one window per thread.
+// Source: Eliazar, Parr 2004 (local maps); thesis C 3.2.3.2.
 #pragma once
 
 #include <vector>
@@ -11,7 +12,7 @@
 
 namespace cairn::slam {
 
-// Whole tiles of the map, [low, low + size).
+// A box of whole tiles of the map, [low, low + size).
 struct TileBox {
   int low_x = 0, low_y = 0;
   int width = 0, height = 0;
@@ -22,15 +23,15 @@ class OpacityWindow {
  public:
   OpacityWindow(const Ancestry& ancestry, const TileBox& box, const StopRate& rate);
 
-  // Shows the map of this particle.
+  // Loads the map of this particle.
   void Show(Ancestry::Id id);
 
-  // Of the window's first cell in the map's cells, and its size in cells.
+  // The window's first cell in cells of the map, and its size in cells.
   [[nodiscard]] int low_x() const { return box_.low_x << kTileBits; }
   [[nodiscard]] int low_y() const { return box_.low_y << kTileBits; }
   [[nodiscard]] int width() const { return box_.width << kTileBits; }
   [[nodiscard]] int height() const { return box_.height << kTileBits; }
-  // Stops per cell-width of travel, row by row; 0 (which no cell seen has) where nothing has been seen.
+  // Stops per cell-width of travel, row by row; 0 where nothing has been seen (a seen cell is never 0).
   [[nodiscard]] const float* rates() const { return rates_.data(); }
   [[nodiscard]] const std::vector<CellCounts>& counts() const { return counts_; }
 

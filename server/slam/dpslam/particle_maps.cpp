@@ -10,15 +10,16 @@ namespace cairn::slam {
 namespace {
 
 constexpr double kGivenUp = -std::numeric_limits<double>::infinity();
-constexpr std::size_t kFirstLook = 4;  // One ray in so many.
-constexpr int kMaxBoxTiles = 32;       // 2048 cells: 17 MB of rates. Farther apart, particles see unknown space.
+constexpr std::size_t kFirstLook = 4;  // The first evaluation uses one ray in this many.
+// 2048 cells, 17 MB of rates. If the particles are farther apart, cells outside count as unknown.
+constexpr int kMaxBoxTiles = 32;
 
 int TileOf(double metres, double resolution_m) {
   const double tiles = std::floor(metres / resolution_m / kChangeTileSide);
   return static_cast<int>(std::clamp(tiles, -3e7, 3e7));
 }
 
-// All that the rays of the samples can reach.
+// The box of all cells that the rays of the samples can reach.
 TileBox BoxOf(std::span<const MapSample> samples, std::span<const Evidence> evidence, double sigma_m,
               double resolution_m) {
   Eigen::Vector2d low = Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity()), high = -low;
@@ -53,7 +54,7 @@ std::vector<double> ParticleMaps::LogLikelihoods(std::span<const MapSample> samp
   std::vector<double> result(samples.size(), 0.0);
   const TileBox box = BoxOf(samples, evidence, options.model.sigma_m, options_.resolution_m);
   if (box.width == 0) return result;
-  // Of every scan those rays whose index modulo `step` is in [first, last).
+  // Evaluates the rays of every scan whose index modulo `step` is in [first, last).
   const auto look = [&](std::size_t first, std::size_t last, std::size_t step) {
     parallel_for(static_cast<int>(samples.size()), [&](int begin, int end) {
       OpacityWindow window(ancestry_, box, rate_);
@@ -120,7 +121,7 @@ OccupancyImage ParticleMaps::Image(std::size_t map, std::span<const PlacedRays> 
   }
   OccupancyImage image;
   image.resolution_m = options_.resolution_m;
-  // Bounded like every picture here (kMaxImagePixels): a map wider than that is not drawn.
+  // Images have at most kMaxImagePixels: a wider map is not drawn.
   if (box.low_x > high_x || std::int64_t{high_x} - box.low_x >= 256 || std::int64_t{high_y} - box.low_y >= 256)
     return image;
   box.width = high_x - box.low_x + 1, box.height = high_y - box.low_y + 1;

@@ -1,8 +1,10 @@
-// The maps of all particles, in their family tree: how well evidence agrees with each, and drawing it there. Evidence
-// is a piece of trajectory with its scans: one scan in the low level, a whole segment in the high level. A particle is
-// judged by a quarter of the rays first; who then is hopelessly behind the best sees no more of them. Frames: `map` of
-// the particles; evidence is placed by T_map_start. Not thread-safe; spreads its work by ParallelFor, with the same
-// result on any number of threads. Source: Eliazar, Parr 2003, 2004; thesis C 3.2.3.2-4.
+// The maps of all particles, in their ancestry tree: computes how well evidence agrees with each map, and
+// draws evidence into them. Evidence is a piece of trajectory with its scans: one scan in the low level, a
+// whole segment in the high level. A particle is first evaluated with a quarter of the rays; if it is then
+// hopelessly behind the best, the other rays are skipped.
+// Frames: `map` of the particles; evidence is placed by T_map_start. Not thread-safe; distributes its work by
+// ParallelFor, with the same result on any number of threads.
+// Source: Eliazar, Parr 2003, 2004; thesis C 3.2.3.2-4.
 #pragma once
 
 #include <memory>
@@ -24,36 +26,39 @@ struct PlacedRays {
 };
 using Evidence = std::vector<PlacedRays>;
 
-// A particle as its maps see it.
+// One placement of evidence in one map.
 struct MapSample {
   Pose2 T_map_start;
-  std::size_t map = 0;       // Which of the maps it has inherited.
-  std::size_t evidence = 0;  // Which of the alternatives it has experienced.
+  std::size_t map = 0;       // Index of the inherited map.
+  std::size_t evidence = 0;  // Index of the evidence among the alternatives.
   bool operator==(const MapSample&) const = default;
 };
 
 struct JudgeOptions {
   RayModel model;
-  std::size_t ray_stride = 1;     // Every n-th ray takes part.
-  double give_up_behind = 100.0;  // Log likelihood behind the best, by a quarter of the rays; <= 0: never.
+  std::size_t ray_stride = 1;  // Every n-th ray is used.
+  // A sample is given up if its log likelihood by the first quarter of the rays is this far behind the best;
+  // <= 0: never.
+  double give_up_behind = 100.0;
 };
 
 class ParticleMaps {
  public:
   explicit ParticleMaps(const OpacityOptions& options) : options_(options), rate_(options) {}
 
-  // Of each sample; minus infinity for those given up. REQUIRES: samples ordered by map.
+  // Log likelihood of each sample; minus infinity for those that were given up. REQUIRES: samples ordered by
+  // map.
   [[nodiscard]] std::vector<double> LogLikelihoods(std::span<const MapSample> samples,
                                                    std::span<const Evidence> evidence, const JudgeOptions& options,
                                                    const ParallelFor& parallel_for) const;
-  // What each of them would add to its map by drawing its evidence.
+  // The changes by which each survivor extends its map when its evidence is drawn.
   [[nodiscard]] std::vector<Ancestry::Birth> Draw(std::span<const MapSample> survivors,
                                                   std::span<const Evidence> evidence,
                                                   const ParallelFor& parallel_for) const;
-  // From now on there is a map for each birth, in their order. REQUIRES: ordered by parent, at least one.
+  // Replaces the maps by one for each birth, in their order. REQUIRES: at least one birth, ordered by parent.
   void NextGeneration(std::vector<Ancestry::Birth> births) { ancestry_.NextGeneration(std::move(births)); }
 
-  // All maps forget what is farther away, in whole tiles.
+  // Removes from all maps the tiles that are farther away.
   void KeepNear(const Eigen::Vector2d& p_map, double radius_m);
 
   [[nodiscard]] std::size_t count() const { return ancestry_.living().size(); }
@@ -61,8 +66,8 @@ class ParticleMaps {
   [[nodiscard]] const Ancestry& ancestry() const { return ancestry_; }
   [[nodiscard]] const OpacityOptions& options() const { return options_; }
   [[nodiscard]] const StopRate& rate() const { return rate_; }
-  // How likely a ray straight through each cell of one map, and what is still to be drawn in it, is stopped there,
-  // 0..100; unknown where none has been.
+  // Probability (0..100) that a ray straight through a cell is stopped there, for one map together with the
+  // scans `undrawn`; unknown in cells that no ray has crossed.
   [[nodiscard]] OccupancyImage Image(std::size_t map, std::span<const PlacedRays> undrawn = {}) const;
 
  private:

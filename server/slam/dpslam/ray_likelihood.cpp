@@ -8,9 +8,9 @@
 namespace cairn::slam {
 namespace {
 
-constexpr double kBeamReach = 4.0;  // Sigmas.
+constexpr double kBeamReach = 4.0;  // In units of sigma.
 
-// Rates of a window by cell: without bounds checks, and with.
+// Access to the rates of a window by cell, without and with bounds checks.
 struct Inside {
   const float* rates;
   std::ptrdiff_t stride;
@@ -24,7 +24,7 @@ struct Anywhere {
   }
 };
 
-// Lengths in cells. Returns the density per cell of the hit, or the chance to pass.
+// Lengths are in cells. Returns the density of the hit per cell, or the probability to pass.
 template <typename Rates>
 float Walk(const Rates& rates, const Eigen::Vector2d& origin, const Eigen::Vector2d& along, double length, bool hit,
            float sigma, float unseen) {
@@ -35,7 +35,8 @@ float Walk(const Rates& rates, const Eigen::Vector2d& origin, const Eigen::Vecto
   auto next_x = static_cast<float>(walk.next_x), next_y = static_cast<float>(walk.next_y);
   const auto per_x = static_cast<float>(walk.per_x), per_y = static_cast<float>(walk.per_y);
   float from = 0.0F, depth = 0.0F;
-  // The way there: optical depth only. Written without branches, which the course of a ray would mispredict.
+  // The part before the end needs the optical depth only. It has no branches, because the processor could not
+  // predict them along a ray.
   float to = std::min(next_x, next_y);
   while (to < near) {
     depth += (to - from) * rates(walk.x, walk.y);
@@ -48,7 +49,7 @@ float Walk(const Rates& rates, const Eigen::Vector2d& origin, const Eigen::Vecto
     to = std::min(next_x, next_y);
   }
   if (!hit) return std::exp(-depth - (near - from) * rates(walk.x, walk.y));
-  // Around the end: every cell may have been what stopped it.
+  // Around the end any of the cells may have stopped the ray.
   const float far = end + reach, inverse = 1.0F / sigma;
   float passed = std::exp(-depth), density = 0.0F;
   for (;;) {
@@ -93,7 +94,7 @@ double LikelihoodAt(const OpacityWindow& window, const Eigen::Vector2d& origin, 
   return WithOutliers(ray, walked, model);
 }
 
-// Keeps a product of likelihoods in range and takes few logarithms.
+// Multiplies likelihoods, keeps the product in range and needs few logarithms.
 class LogProduct {
  public:
   void Multiply(double factor) {

@@ -1,5 +1,5 @@
-// The cells a ray crosses, one by one, with the exact way it travels in each. Coordinates and lengths in cells.
-// Source: Amanatides, Woo, "A fast voxel traversal algorithm for ray tracing", Eurographics 1987.
+// The cells that a ray crosses, one by one, with the exact length of the ray in each. Coordinates and lengths
+// in cells. Source: Amanatides, Woo, "A fast voxel traversal algorithm for ray tracing", Eurographics 1987.
 #pragma once
 
 #include <Eigen/Core>
@@ -7,7 +7,7 @@
 
 namespace cairn::slam {
 
-// The state of a walk: next_* is the way along the ray to the next column or row of cells.
+// The state of a walk: next_* is the distance along the ray to the next column or row of cells.
 struct RayWalk {
   // `direction` has length 1.
   RayWalk(const Eigen::Vector2d& origin, const Eigen::Vector2d& direction)
@@ -18,19 +18,20 @@ struct RayWalk {
 
   int x, y;
   int step_x = 1, step_y = 1;
-  double per_x = 0.0, per_y = 0.0;  // Way along the ray per column, row.
+  double per_x = 0.0, per_y = 0.0;  // Distance along the ray per column and row.
   double next_x = 0.0, next_y = 0.0;
 
  private:
   static void Axis(double origin, double direction, int cell, int& step, double& per, double& next) {
-    // A ray along the other axis never leaves its column: one step of it is farther than any ray.
+    // A ray along the other axis never leaves its column: one step along this axis is longer than any ray.
     per = std::abs(direction) > 1e-9 ? 1.0 / std::abs(direction) : 1e9;
     step = direction < -1e-9 ? -1 : 1;
     next = (step > 0 ? cell + 1 - origin : origin - cell) * per;
   }
 };
 
-// Calls visit(x, y, from, to): the ray is in cell (x, y) between these ways along it. `length` >= 0 and below 1e8.
+// Calls visit(x, y, from, to) for every cell (x, y); `from` and `to` are the distances along the ray at which
+// it enters and leaves the cell. REQUIRES: 0 <= length < 1e8.
 template <typename Visit>
 void WalkRay(const Eigen::Vector2d& origin, const Eigen::Vector2d& direction, double length, Visit&& visit) {
   RayWalk walk(origin, direction);

@@ -8,18 +8,21 @@
 namespace cairn::slam {
 namespace {
 
-// All rays of all scans are drawn; a fraction judges.
+// Cost of drawing relative to evaluating: all rays of all scans are drawn, but only a part is evaluated.
 constexpr std::size_t kDrawingCost = 4;
-// Scans so far apart judge: more show the same walls from the same places.
+// Distance between scans used for the comparison: more scans would show the same walls from the same places.
 constexpr double kJudgedApartM = 2.0;
 constexpr double kJudgedApartRad = 0.5;
-constexpr int kMoves = 4;             // After each resampling.
-constexpr double kLeastLetIn = 0.01;  // Of the evidence at a time: bounds the work.
+constexpr int kMoves = 4;  // Moves after each resampling.
+// Smallest share of the evidence introduced at a time; bounds the work.
+constexpr double kLeastLetIn = 0.01;
 constexpr double kFirstStride = 0.5;
-constexpr double kTells = 1.0;              // Log likelihood between best and worst: less is no evidence.
-constexpr std::size_t kOpen = 3;            // Segments that are judged again with the next one.
-constexpr double kKeep = 0.25;              // Of the particles count after each time evidence is let in.
-constexpr std::size_t kUsualJudgings = 24;  // Where there is something to judge on.
+// If the log likelihoods of best and worst differ by less, there is no evidence.
+constexpr double kTells = 1.0;
+constexpr std::size_t kOpen = 3;  // Segments that are evaluated again with the next one.
+// Effective share of the particles after each introduction of evidence.
+constexpr double kKeep = 0.25;
+constexpr std::size_t kUsualJudgings = 24;  // Usual number of evaluations of a segment with evidence.
 
 Eigen::AlignedBox2d SeenFrom(const Evidence& trajectory) {
   Eigen::AlignedBox2d box;
@@ -48,8 +51,8 @@ Eigen::Vector3d Draw(Rng& rng) {
   return {x, y, theta};
 }
 
-// How much of the drift a particle draws: evenly over 0..1, the first none, neighbours, who are relatives, far apart
-// (multiples of the golden ratio).
+// The share of the drift that a particle draws: evenly distributed over 0..1 and 0 for the first. Multiples
+// of the golden ratio give neighbours, which are relatives, very different shares.
 double ShareOfDrift(std::size_t particle) {
   const double turns = 0.6180339887498949 * static_cast<double>(particle);
   return turns - std::floor(turns);
@@ -66,7 +69,8 @@ void SegmentFilter::Take(std::vector<Evidence> trajectories, double way_m, Rng& 
     segment.T_start_end.push_back(trajectory.back().T_start_robot);
     segment.judged.push_back(Apart(trajectory));
   }
-  // The drift of a whole segment, at the joint where it begins (thesis C 4.5.2); where it all begins there is none.
+  // The drift of a whole segment is added at the joint where it begins (thesis C 4.5.2); the first segment
+  // has none.
   if (!segments_.empty())
     segment.drift_sigma = level_.options().drift.Covariance({way_m, 0.0, 0.0}).diagonal().cwiseSqrt();
   segments_.push_back(std::move(segment));
@@ -95,7 +99,7 @@ void SegmentFilter::Take(std::vector<Evidence> trajectories, double way_m, Rng& 
     for (std::size_t i = 0; i < starts.size(); ++i) starts[i] = joints_[i][s].T_map_start;
     if (SeenBy(segments_[s], starts).intersects(seen)) to_draw_.push_back(s);
   }
-  // What is drawn moves no more.
+  // Segments that are drawn can no longer move.
   if (!to_draw_.empty() && to_draw_.back() >= free_) {
     const auto fixed = static_cast<std::ptrdiff_t>(to_draw_.back() + 1 - free_);
     free_ = to_draw_.back() + 1;
@@ -116,10 +120,10 @@ void SegmentFilter::Take(std::vector<Evidence> trajectories, double way_m, Rng& 
   StartDrawing();
 }
 
-// From the joint before the free ones on.
+// Computes the placements from the first free joint on.
 void SegmentFilter::Place(Candidate& candidate) const {
   const GridParticle& parent = level_.particles()[candidate.parent];
-  Pose2 T_map_joint = parent.T_map_robot;  // Where nothing is done yet.
+  Pose2 T_map_joint = parent.T_map_robot;  // Start if there are no joints yet.
   if (free_ > 0 && !joints_[candidate.parent].empty()) {
     const Joint& before = joints_[candidate.parent][free_ - 1];
     T_map_joint = before.T_map_start * segments_[free_ - 1].T_start_end[before.trajectory];
@@ -223,7 +227,8 @@ void SegmentFilter::Enter(std::vector<Candidate>& subjects) {
   log_likelihoods_.clear();
 }
 
-// As much more of it as leaves enough particles that count; where that is not all, the set is resampled and moves.
+// Introduces as much more of the evidence as leaves enough effective particles. If that is not all of it, the
+// particles are resampled and moved.
 void SegmentFilter::LetInEvidence(Rng& rng) {
   const auto size = static_cast<double>(candidates_.size());
   const auto weights_with = [&](double more) {
@@ -247,20 +252,16 @@ void SegmentFilter::LetInEvidence(Rng& rng) {
     for (Candidate& candidate : candidates_) candidate.log_weight += more * candidate.evidence;
     return;
   }
-  std::vector<Candidate> survivors;
-  survivors.reserve(candidates_.size());
-  for (const int parent : StratifiedSurvivors(weights_with(more), rng)) {
-    survivors.push_back(candidates_[static_cast<std::size_t>(parent)]);
-    survivors.back().log_weight = 0.0;
-  }
-  candidates_ = std::move(survivors);
+  candidates_ = HeirsOf(candidates_, StratifiedSurvivors(weights_with(more), rng));
+  for (Candidate& candidate : candidates_) candidate.log_weight = 0.0;
   moves_left_ = kMoves;
   moved_ = true;
 }
 
 void SegmentFilter::Propose(Rng& rng) {
   proposed_ = candidates_;
-  // In turn all joints and the last one only, which the segments judged before do not hang on.
+  // Moves alternate between all free joints and only the last one, on which the segments evaluated before do
+  // not depend.
   const double stride = stride_[moves_left_ % 2], stay = std::sqrt(1.0 - stride * stride);
   for (Candidate& candidate : proposed_) {
     const std::size_t first = moves_left_ % 2 == 0 ? 0 : candidate.joints.size() - 1;
@@ -280,7 +281,7 @@ void SegmentFilter::Accept(Rng& rng) {
     ++accepted;
   }
   proposed_.clear();
-  // A quarter or so should arrive (Roberts et al. 1997).
+  // About a quarter of the proposals should be accepted (Roberts et al. 1997).
   const double rate = static_cast<double>(accepted) / static_cast<double>(candidates_.size());
   double& stride = stride_[moves_left_ % 2];
   stride = std::min(1.0, stride * (rate < 0.15 ? 0.5 : rate > 0.4 ? 1.5 : 1.0));
@@ -338,7 +339,7 @@ void SegmentFilter::Finish() {
     open_.erase(open_.begin());
   }
 
-  // Maps without an owner go.
+  // Removes maps that no particle owns.
   std::vector<MapSample> maps;
   for (const GridParticle& particle : level_.particles()) maps.push_back({{}, particle.map, 0});
   const LevelFilter::Drawings owned = LevelFilter::Distinct(maps);
@@ -349,7 +350,8 @@ void SegmentFilter::Finish() {
   at_work_ = false;
 }
 
-// What has come to lie wholly beyond the low level's memory is drawn when somebody comes near.
+// Marks the segments that now lie wholly beyond the low level's memory: they are drawn when the robot comes
+// near them.
 void SegmentFilter::Forget() {
   const Eigen::Vector2d here = level_.best().T_map_robot.translation();
   for (std::size_t s = 0; s < segments_.size(); ++s) {

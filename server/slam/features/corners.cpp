@@ -61,10 +61,15 @@ std::vector<CornerFeature> ExtractCorners(const ScanFeatures& features, const Co
 }
 
 void Visit(OptionVisitor& visitor, CornerOptions& options) {
-  visitor.Real("min_angle_rad", options.min_angle_rad, "rad", 0.01, 1.5, "least angle between two lines of a corner");
-  visitor.Real("real_gap_m", options.real_gap_m, "m", 0.0, 5.0, "how near ends must come to the corner of a real one");
-  visitor.Real("long_line_m", options.long_line_m, "m", 0.0, 100.0, "lines from this length on are long");
-  visitor.Real("max_distance_m", options.max_distance_m, "m", 0.1, 1000.0, "farthest virtual corner kept");
+  visitor.Real("min_angle_rad", options.min_angle_rad, "rad", 0.01, 1.5,
+               "Smallest angle between the two lines of a corner.");
+  visitor.Real("real_gap_m", options.real_gap_m, "m", 0.0, 5.0,
+               "Two lines form a real corner if their ends are this near to it, in addition to the spacing of two "
+               "beams. A larger value gives more and less accurate corners.");
+  visitor.Real("long_line_m", options.long_line_m, "m", 0.0, 100.0,
+               "Lines of at least this length are long. All pairs of long lines have virtual corners.");
+  visitor.Real("max_distance_m", options.max_distance_m, "m", 0.1, 1000.0,
+               "Virtual corners farther away from the robot are dropped.");
 }
 
 }  // namespace cairn::slam

@@ -21,8 +21,8 @@ ScanFeatures ExtractFeatures(std::span<const BeamPoint> points, const Scan& scan
 }
 
 void Visit(OptionVisitor& visitor, FeatureOptions& options) {
-  visitor.Section("lines", "Split-and-merge line extraction", [&] { Visit(visitor, options.lines); });
-  visitor.Section("corners", "Corners between lines", [&] { Visit(visitor, options.corners); });
+  visitor.Section("lines", "Extraction of lines by split and merge.", [&] { Visit(visitor, options.lines); });
+  visitor.Section("corners", "Corners between lines.", [&] { Visit(visitor, options.corners); });
 }
 
 }  // namespace cairn::slam

@@ -1,4 +1,4 @@
-// Everything the matcher and the filters want to know of one scan, in one call: lines, corners, patterns.
+// Extracts all features of one scan that matchers and filters use, in one call: lines, corners, patterns.
 // Robot frame. Stateless, thread-safe, deterministic. Precondition: the scan passed ValidateScan.
 // Source: thesis A 3.3, 3.4.
 #pragma once
@@ -17,7 +17,7 @@ void Visit(OptionVisitor& visitor, FeatureOptions& options);
 
 [[nodiscard]] ScanFeatures ExtractFeatures(const Scan& scan, const FeatureOptions& options);
 
-// The same for points the caller has already made, and perhaps thinned or deskewed.
+// The same for given points of the scan, which may be thinned or deskewed.
 [[nodiscard]] ScanFeatures ExtractFeatures(std::span<const BeamPoint> points, const Scan& scan,
                                            const FeatureOptions& options);
 

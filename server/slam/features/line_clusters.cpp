@@ -11,12 +11,13 @@ constexpr int kMinClusterHits = 3;
 struct Chain {
   int cluster = 0;
   double range = 0.0;
-  int position = 0;    // Of its last hit, in beams.
-  int no_returns = 0;  // Seen up to there.
+  int position = 0;    // Position of its last hit, in beams from the first hit of the walk.
+  int no_returns = 0;  // Beams without an echo between the first hit of the walk and its last hit.
 };
 
-// Where to begin in a full turn, so that no corner is cut: after the largest jump, or where there is none at the
-// nearest hit, which is amid a wall (whose halves are joined later).
+// The hit at which the clustering of a full turn begins, so that no corner is cut. It is the hit after the
+// largest jump or, if there is no jump, the nearest hit, which lies in the middle of a wall (the two halves
+// of that wall are joined later).
 int FirstHit(const Sweep& sweep, const LineOptions& options) {
   if (!sweep.full_turn()) return 0;
   int nearest = 0, after_jump = 0;
@@ -38,7 +39,7 @@ int FirstHit(const Sweep& sweep, const LineOptions& options) {
 HitClusters ClusterHits(const Sweep& sweep, const LineOptions& options) {
   const double spread = sweep.step() / std::tan(options.grazing_rad);
   const int max_gap = sweep.BeamsIn(options.max_gap_rad, 2) + 1;
-  std::vector<Chain> chains;  // Those that may still go on; never more than max_gap.
+  std::vector<Chain> chains;  // Clusters that may still grow; there are never more than max_gap.
   std::vector<int> cluster_of(static_cast<std::size_t>(sweep.size()));
   std::vector<int> sizes;
   int position = 0, no_returns = 0;
@@ -70,7 +71,7 @@ HitClusters ClusterHits(const Sweep& sweep, const LineOptions& options) {
   }
 
   HitClusters clusters;
-  std::vector<int> next(sizes.size());  // Where in `order` each cluster's next hit goes.
+  std::vector<int> next(sizes.size());  // Per cluster: position in `order` of its next hit.
   int begin = 0;
   for (std::size_t c = 0; c < sizes.size(); ++c) {
     next[c] = begin;

@@ -1,6 +1,7 @@
-// Step 1 of split-and-merge: hits that may belong to one surface, by their range (3-3). A hit continues a cluster that
-// ended up to max_gap_rad before it, not only at its neighbour: behind glass, fences and chair legs two surfaces take
-// turns from beam to beam, and single stray returns do not break a wall. Clusters may therefore interleave.
+// Step 1 of split-and-merge: groups the hits that may belong to one surface by their range (3-3). A hit may
+// continue any cluster whose last hit lies up to max_gap_rad before it, not only the cluster of the
+// neighbouring hit: behind glass, fences and chair legs the beams hit two surfaces in turn, and single stray
+// returns must not break a wall. Clusters may therefore interleave.
 // Source: thesis A 3.3, step 1.
 #pragma once
 
@@ -13,14 +14,14 @@
 namespace cairn::slam {
 
 struct HitClusters {
-  std::vector<int> order;  // Hits, cluster after cluster, each in sweep order.
-  std::vector<std::pair<int, int>>
-      runs;  // [begin, end) of each cluster in `order`; those of fewer than 3 hits left out.
+  std::vector<int> order;  // Indices of the hits, cluster after cluster, each in sweep order.
+  // Range [begin, end) of each cluster in `order`. Clusters of fewer than 3 hits are left out.
+  std::vector<std::pair<int, int>> runs;
 };
 
 [[nodiscard]] HitClusters ClusterHits(const Sweep& sweep, const LineOptions& options);
 
-// Lost beams in a row that do not break a wall (dark paint, glass).
+// Largest number of consecutive beams without an echo that does not break a wall (dark paint, glass).
 inline constexpr int kToleratedDropouts = 2;
 
 }  // namespace cairn::slam

@@ -6,7 +6,8 @@
 namespace cairn::slam {
 namespace {
 
-// The point where the beam `beams` steps outward from hit `at` would meet the line; false where it does not.
+// Computes the point `p` at which the ray from the laser to `end_point`, turned by `turn`, meets the line.
+// False if they do not meet.
 bool Continuation(const Sweep& sweep, const FittedLine& line, const Eigen::Vector2d& end_point, double turn,
                   Eigen::Vector2d& p) {
   const Eigen::Vector2d ray = end_point - sweep.laser();
@@ -26,7 +27,7 @@ bool Ended(const Sweep& sweep, const LineSegment& segment, int direction, const 
   if (gap.to_edge && gap.beams == 0) return false;
   const BeamPoint& end_hit = sweep.hit(at);
 
-  // The end of the line as the next beam would have shown it, had it gone on.
+  // The point that the next beam would have hit if the line had continued.
   Eigen::Vector2d next_on_line;
   if (!Continuation(sweep, segment.line, end_hit.p_robot, direction * sweep.step(), next_on_line)) return false;
   const double spacing = (next_on_line - end_hit.p_robot).norm();

@@ -42,26 +42,48 @@ std::vector<LineFeature> ExtractLines(std::span<const BeamPoint> points, const S
 }
 
 void Visit(OptionVisitor& visitor, LineOptions& options) {
-  visitor.Real("jump_m", options.jump_m, "m", 0.0, 5.0, "range jump between neighbouring beams that parts clusters");
-  visitor.Real("grazing_rad", options.grazing_rad, "rad", 0.01, 1.5, "flattest view under which a wall stays whole");
-  visitor.Real("max_gap_rad", options.max_gap_rad, "rad", 0.0, 1.0, "invalid beams tolerated inside a cluster");
-  visitor.Real("split_m", options.split_m, "m", 0.001, 1.0, "distance of a point that splits its line");
-  visitor.Real("split_per_m", options.split_per_m, "m/m", 0.0, 0.1, "added to split_m per metre of range");
-  visitor.Real("merge_angle_rad", options.merge_angle_rad, "rad", 0.0, 1.0, "neighbours turned more are never joined");
-  visitor.Real("occlusion_rad", options.occlusion_rad, "rad", 0.0, 3.0, "nearer points a line may go on behind");
-  visitor.Real("occlusion_m", options.occlusion_m, "m", 0.0, 20.0, "hidden length a line may go on over");
-  visitor.Real("min_length_m", options.min_length_m, "m", 0.01, 10.0, "shortest line kept");
-  visitor.Integer("min_points", options.min_points, "points", 3, 1000, "fewest points of a line, far or edge-on");
-  visitor.Integer("max_points_needed", options.max_points_needed, "points", 3, 1000, "points asked of a near line");
-  visitor.Real("max_deviation_m", options.max_deviation_m, "m", 0.001, 1.0, "largest RMS of points about their line");
-  visitor.Real("min_aspect", options.min_aspect, "", 0.0, 1000.0, "least length over deviation");
+  visitor.Real("jump_m", options.jump_m, "m", 0.0, 5.0,
+               "Neighbouring points whose ranges differ by more belong to different clusters. A larger value joins "
+               "separate things; a smaller one breaks rough walls.");
+  visitor.Real("grazing_rad", options.grazing_rad, "rad", 0.01, 1.5,
+               "Smallest angle between a beam and a wall at which the wall stays one cluster. A smaller value keeps "
+               "walls whole that are seen from the side, and joins more separate things.");
+  visitor.Real("max_gap_rad", options.max_gap_rad, "rad", 0.0, 1.0,
+               "Largest gap of invalid beams within a cluster, at least two beams.");
+  visitor.Real("split_m", options.split_m, "m", 0.001, 1.0,
+               "A point farther than this from its line splits the line. A larger value smooths over steps and posts.");
+  visitor.Real("split_per_m", options.split_per_m, "m/m", 0.0, 0.1, "Added to split_m per metre of range.");
+  visitor.Real("merge_angle_rad", options.merge_angle_rad, "rad", 0.0, 1.0,
+               "Neighbouring lines with a larger angle between them are never joined.");
+  visitor.Real(
+      "occlusion_rad", options.occlusion_rad, "rad", 0.0, 3.0,
+      "Largest angle that nearer things may hide of a line, at least three beams. A larger value bridges wider posts.");
+  visitor.Real("occlusion_m", options.occlusion_m, "m", 0.0, 20.0, "Longest hidden part of a line.");
+  visitor.Real("min_length_m", options.min_length_m, "m", 0.01, 10.0,
+               "Shortest line that is kept. A larger value keeps only walls.");
+  visitor.Integer("min_points", options.min_points, "points", 3, 1000,
+                  "Fewest points of a line, however far away it is or however flat it is seen.");
+  visitor.Integer("max_points_needed", options.max_points_needed, "points", 3, 1000,
+                  "Most points that are asked of a line, however near it is.");
+  visitor.Real(
+      "max_deviation_m", options.max_deviation_m, "m", 0.001, 1.0,
+      "Largest root mean square distance of the points from their line. A larger value accepts plants and people.");
+  visitor.Real(
+      "min_aspect", options.min_aspect, "", 0.0, 1000.0,
+      "Smallest ratio of the length of a line to the deviation of its points. A larger value drops short rough lines.");
   visitor.Integer("correct_below_points", options.correct_below_points, "points", 0, 1000,
-                  "lines of at most so many points between parallels are straightened; 0: never");
-  visitor.Real("range_sigma_m", options.range_sigma_m, "m", 0.0001, 1.0, "noise of one range");
-  visitor.Real("end_gap_m", options.end_gap_m, "m", 0.0, 5.0, "what follows so close closes an end");
+                  "A line with at most so many points between two parallel ones is turned to be perpendicular to them. "
+                  "0 does this never.");
+  visitor.Real("range_sigma_m", options.range_sigma_m, "m", 0.0001, 1.0, "Standard deviation of a range of the laser.");
+  visitor.Real("end_gap_m", options.end_gap_m, "m", 0.0, 5.0,
+               "An end of a line is closed if the next point lies within this distance, in addition to the spacing of "
+               "the beams.");
   visitor.Real("corner_incidence_rad", options.corner_incidence_rad, "rad", 0.01, 1.5,
-               "flattest view of a wall that closes an end");
-  visitor.Real("end_uncertainty_m", options.end_uncertainty_m, "m", 0.0, 20.0, "an end known worse than this is open");
+               "A wall closes the end of another line only if it is seen at a larger angle than this.");
+  visitor.Real("end_uncertainty_m", options.end_uncertainty_m, "m", 0.0, 20.0,
+               "An end of a line whose place is less certain than this counts as open.");
+  visitor.Require(options.min_points <= options.max_points_needed, "min_points", "must not exceed",
+                  "max_points_needed");
 }
 
 }  // namespace cairn::slam

@@ -1,7 +1,8 @@
-// What split-and-merge extracts from one scan: lines with what is known of their ends, corners between them, and the
-// patterns lines and corners form. All in the `robot` frame of that scan, metres and radians. Plain values.
-// Lines are ordered anticlockwise as seen from the laser, whichever way the scanner turns, so that signs of angles mean
-// the same for every scanner. In a full-turn scan the last line is followed by the first.
+// The features that are extracted from one scan: lines with the class of their ends, corners between lines,
+// and patterns of lines and corners. All are in the `robot` frame of that scan, in metres and radians. Plain
+// values.
+// Lines are ordered anticlockwise as seen from the laser, whichever way the scanner turns, so that the signs
+// of angles mean the same for every scanner. In a full-turn scan the last line is followed by the first.
 // Source: thesis A (feature-based scan matching with FastSLAM), 3.4.1-3.4.3.
 #pragma once
 
@@ -13,20 +14,21 @@
 
 namespace cairn::slam {
 
-// Which ends of a line are true ends rather than where the view was blocked or the scan ended (3-10, 3-11).
-// "Right" is the end an anticlockwise sweep meets first.
+// Which ends of a line are true ends, in contrast to ends where the view was blocked or the scan ended (3-10,
+// 3-11). "Right" is the end that an anticlockwise sweep reaches first.
 enum class EndClass : std::uint8_t { kOpen = 0, kLeftEnded, kRightEnded, kBothEnded };
 
 struct LineFeature {
   Eigen::Vector2d first = Eigen::Vector2d::Zero();  // Right end: the first point, projected on the line.
-  Eigen::Vector2d last = Eigen::Vector2d::Zero();   // Left end.
-  double normal_angle = 0.0;                        // alpha of x cos(alpha) + y sin(alpha) = r, (-pi, pi].
-  double distance = 0.0;                            // r >= 0 from the robot's origin.
+  Eigen::Vector2d last = Eigen::Vector2d::Zero();   // Left end: the last point, projected on the line.
+  double normal_angle = 0.0;                        // alpha in x cos(alpha) + y sin(alpha) = r, (-pi, pi].
+  double distance = 0.0;                            // r >= 0: distance of the line from the robot's origin.
   double slope = 0.0;                               // Direction from first to last, (-pi, pi].
   double length = 0.0;
-  double deviation = 0.0;  // RMS distance of the points (3-12).
-  int first_beam = 0;      // Beam ids of the two ends; first > last for a clockwise scanner and across the seam of a
-  int last_beam = 0;       // full-turn scan.
+  double deviation = 0.0;  // Root mean square distance of the points from the line (3-12).
+  int first_beam = 0;      // Index of the beam at the right end.
+  // Index of the beam at the left end; below first_beam for a clockwise scanner and across the seam.
+  int last_beam = 0;
   int point_count = 0;
   EndClass ends = EndClass::kOpen;
 
@@ -43,30 +45,36 @@ struct LineFeature {
 
 struct CornerFeature {
   Eigen::Vector2d position = Eigen::Vector2d::Zero();
-  bool real = false;        // Two following lines that meet; else the meeting point of their extensions.
-  double angle = 0.0;       // From line a's slope to line b's, (-pi, pi]. > 0: the room's inside corner (concave),
-                            // < 0: an edge that stands out (convex).
+  bool real = false;  // True: two consecutive lines meet here. False: only their extensions do.
+  // From the slope of line_a to that of line_b, (-pi, pi]: > 0 in an inside corner of a room (concave), < 0
+  // at an edge that stands out (convex).
+  double angle = 0.0;
   bool long_lines = false;  // Both lines count as long (3.4.2, category 1).
-  int line_a = 0;           // Indices into ScanFeatures::lines, a before b in the sweep: line_a < line_b but for the
-  int line_b = 0;           // real corner across the seam of a full-turn scan.
+  // Indices into ScanFeatures::lines. line_a < line_b, except for the real corner across the seam of a
+  // full-turn scan.
+  int line_a = 0;
+  int line_b = 0;
 };
 
-// Blank entries are NaN: the line, or the corner, does not exist.
+// A pattern compares a line with this many following lines. An entry is NaN if its line or corner does not
+// exist.
 inline constexpr int kPatternSize = 5;
 struct LinePattern {
-  std::array<double, kPatternSize> angle{};            // Slope of this line minus that of the following five (Table
-                                                       // 3.1), wrapped.
-  std::array<double, kPatternSize> corner_distance{};  // From this line's corner to those of the following five
-                                                       // (Table 3.2).
-  int count = 0;                                       // How many of the five following lines exist.
-  int corner_with = -1;  // The line this line's corner is with: the first following one not parallel to it; -1: none.
+  // Slope of this line minus that of the five following lines, wrapped (Table 3.1).
+  std::array<double, kPatternSize> angle{};
+  // Distance from this line's corner to those of the five following lines (Table 3.2).
+  std::array<double, kPatternSize> corner_distance{};
+  int count = 0;  // Number of the five following lines that exist.
+  // Index of the line with which this line forms its corner: the first following line that is not parallel to
+  // it; -1 if there is none.
+  int corner_with = -1;
 };
 
 struct ScanFeatures {
   std::vector<LineFeature> lines;
   std::vector<CornerFeature> corners;
   std::vector<LinePattern> patterns;  // One per line.
-  double angle_step_rad = 0.0;        // Between beams, > 0: how sharply ends are seen.
+  double angle_step_rad = 0.0;        // Angle between beams, > 0; limits how exactly ends of lines are seen.
   bool full_turn = false;             // The last line is followed by the first.
 };
 

@@ -11,8 +11,8 @@ FittedLine FitLine(const PointSums& sums) {
   const double sxx = sums.xx - sums.x * line.centroid.x();
   const double sxy = sums.xy - sums.x * line.centroid.y();
   const double syy = sums.yy - sums.y * line.centroid.y();
-  // (3-8) is tan(2 alpha) = -2 sxy / (syy - sxx). Halving the angle by its cosine spares the trigonometry, which is
-  // most of the cost of a fit.
+  // (3-8) is tan(2 alpha) = -2 sxy / (syy - sxx). The half-angle formulas avoid trigonometric functions,
+  // which would take most of the time of a fit.
   const double numerator = -2.0 * sxy, denominator = syy - sxx;
   const double root = std::hypot(numerator, denominator);
   if (root > 0.0) {

@@ -1,5 +1,6 @@
-// The least-squares line through points, from running sums: adding points or joining two sets costs a few additions.
-// Orthogonal distances are minimised. Any frame; metres. Plain values, thread-safe. Source: thesis A (3-4)..(3-9).
+// The least-squares line through points, computed from running sums, so that adding a point or joining two
+// sets costs a few additions. Orthogonal distances are minimised. Any frame; metres. Plain values,
+// thread-safe. Source: thesis A (3-4)..(3-9).
 #pragma once
 
 #include <Eigen/Core>
@@ -20,7 +21,7 @@ struct PointSums {
   }
 };
 
-// normal . p = offset; `deviation` is the RMS distance of the points (3-12).
+// The line normal . p = offset. `deviation` is the root mean square distance of the points from it (3-12).
 struct FittedLine {
   Eigen::Vector2d normal = Eigen::Vector2d::UnitX();
   Eigen::Vector2d centroid = Eigen::Vector2d::Zero();

@@ -11,7 +11,8 @@ namespace cairn::slam {
 namespace {
 
 constexpr int kUnowned = -1;
-constexpr int kMaxSkippedSegments = 4;  // Segments of one post or person between two parts of a wall.
+// Most segments between two parts of a wall, for instance those of a person.
+constexpr int kMaxSkippedSegments = 4;
 
 enum class Side { kNearer, kOn, kFarther };
 
@@ -40,7 +41,7 @@ class Merger {
   const Sweep& sweep_;
   const LineOptions& options_;
   std::vector<LineSegment> segments_;
-  std::vector<int> owner_;  // Per hit: index into segments_.
+  std::vector<int> owner_;  // Per hit: index of its segment in segments_, or kUnowned.
   const int max_occluded_;
 };
 
@@ -50,7 +51,8 @@ Side Merger::SideOf(const FittedLine& line, const BeamPoint& hit) const {
   return (distance > 0.0) == (line.DistanceOf(sweep_.laser()) > 0.0) ? Side::kNearer : Side::kFarther;
 }
 
-// Whether everything the laser saw between hits `from` and `to` lies on the line or before it, and not too much of it.
+// True if everything that the laser saw between the hits `from` and `to` lies on the line or in front of it,
+// and if at most max_occluded_ beams are hidden or lost.
 bool Merger::OnlyOccluded(const FittedLine& line, int from, int to) const {
   int occluded = 0;
   for (int i = from; i < to; ++i) {
@@ -68,9 +70,11 @@ bool Merger::OnlyOccluded(const FittedLine& line, int from, int to) const {
 bool Merger::Join(int a, int b) {
   LineSegment& first = segments_[static_cast<std::size_t>(a)];
   LineSegment& second = segments_[static_cast<std::size_t>(b)];
-  const int shift = second.begin < first.begin ? sweep_.size() : 0;  // Across the seam.
+  // Not zero if the two segments lie on either side of the seam.
+  const int shift = second.begin < first.begin ? sweep_.size() : 0;
   if (second.begin + shift < first.end || second.end + shift - first.begin > sweep_.size()) return false;
-  // Two stubs agree with nearly anything; one of them must be a line by itself.
+  // Two very short segments fit nearly any line, so at least one of them must have enough points for a line
+  // of its own.
   if (std::max(first.count(), second.count()) < options_.min_points) return false;
   const double cos_angle = std::abs(first.line.normal.dot(second.line.normal));
   const bool slope_counts = std::min(first.count(), second.count()) >= options_.min_points;
@@ -86,8 +90,7 @@ bool Merger::Join(int a, int b) {
     if (SideOf(joined.line, sweep_.hit(i)) != Side::kOn) return false;
   }
   if (!OnlyOccluded(joined.line, first.end - 1, second.begin + shift)) return false;
-  // Parts that are each straight but step away from each other show in the joint deviation before they show in the
-  // largest distance.
+  // A step between two straight parts raises the joint deviation before it raises the largest distance.
   const double apart = std::max({first.line.deviation, second.line.deviation, options_.range_sigma_m});
   if (slope_counts && joined.line.deviation > 1.5 * apart) return false;
 
@@ -117,7 +120,8 @@ void Merger::JoinCollinear() {
   }
 }
 
-// How many points a wall of the least length would get here: few when far or seen edge-on, many when near.
+// True if the segment is long and straight enough, and has as many points as a wall of the shortest accepted
+// length would have here: few if it is far away or seen edge-on, many if it is near.
 bool Merger::IsStrong(const LineSegment& segment) const {
   const Eigen::Vector2d first = sweep_.hit(segment.begin).p_robot, last = sweep_.hit(segment.end - 1).p_robot;
   const double length = (last - first).norm();
@@ -135,7 +139,7 @@ void Merger::Claim(int k, int i, int direction) {
   LineSegment& segment = segments_[static_cast<std::size_t>(k)];
   const int previous = Owner(i);
   if (previous != kUnowned) {
-    // The hit was at the facing end of a stub: the stub shrinks.
+    // The hit was at the end of a weaker segment, which loses it.
     LineSegment& stub = segments_[static_cast<std::size_t>(previous)];
     if (stub.count() <= 2) {
       stub.alive = false;
@@ -164,8 +168,9 @@ void Merger::Claim(int k, int i, int direction) {
   if (direction < 0) segment.begin = i;
 }
 
-// "Points continued from the end of the line": those on it are added, those before it are passed over, one behind it
-// ends it. Beyond something passed over, one hit alone on the line may be chance: two in a row are asked for.
+// Adds the "points continued from the end of the line": points on the line are added, points in front of it
+// are skipped, and a point behind it ends the search. After a skipped point a single hit on the line may be
+// chance, so two in a row are required.
 void Merger::LengthenEnd(int k, int direction) {
   LineSegment& segment = segments_[static_cast<std::size_t>(k)];
   int end = direction > 0 ? segment.end - 1 : segment.begin;
@@ -176,7 +181,7 @@ void Merger::LengthenEnd(int k, int direction) {
     if (gap.to_edge || gap.no_returns > kToleratedDropouts) return;
     const BeamPoint& hit = sweep_.hit(at += direction);
     const int owner = Owner(at);
-    if (owner == k) return;  // All the way round.
+    if (owner == k) return;  // The search has gone all the way round.
     occluded += gap.beams - 1;
     const Side side = SideOf(segment.line, hit);
     const double spacing = SpacingAt(segment.line, sweep_.laser(), hit.p_robot, sweep_.step());
@@ -225,7 +230,7 @@ std::vector<LineSegment> MergeSegments(const Sweep& sweep, const LineOptions& op
   merger.JoinCollinear();
   merger.Lengthen();
   std::vector<LineSegment> segments = merger.StrongOnes();
-  // Lengthening backwards may have led across the seam.
+  // Lengthening may have moved a segment across the seam; `begin` is brought back into [0, size()).
   for (LineSegment& segment : segments) {
     if (segment.begin < 0) segment.begin += sweep.size(), segment.end += sweep.size();
     if (segment.begin >= sweep.size()) segment.begin -= sweep.size(), segment.end -= sweep.size();

@@ -1,6 +1,6 @@
-// Step 4 of split-and-merge: neighbours on one line are joined across whatever stands in front of it, lines are
-// lengthened by stray hits, lines too short for what they stand on are dropped, and short lines between parallel ones
-// are straightened. Source: thesis A 3.3, step 4.
+// Step 4 of split-and-merge: segments on one line are joined across the things that stand in front of it,
+// lines are lengthened by hits that continue them, segments that are too short or have too few points are
+// dropped, and short lines between parallel ones are straightened. Source: thesis A 3.3, step 4.
 #pragma once
 
 #include <vector>
@@ -9,7 +9,7 @@
 
 namespace cairn::slam {
 
-// The lines that remain, in sweep order by their first hit.
+// The remaining segments, in sweep order of their first hits.
 [[nodiscard]] std::vector<LineSegment> MergeSegments(const Sweep& sweep, const LineOptions& options, SplitResult split);
 
 }  // namespace cairn::slam

@@ -1,5 +1,5 @@
-// A line while it is being found: the hits that belong to it, by index into a Sweep, and the line fitted through them.
-// Frames and units as in Sweep. Used inside line extraction only.
+// A line during extraction: the hits that belong to it, as indices into a Sweep, and the line fitted through
+// them. Frames and units are those of Sweep. Used only inside line extraction.
 #pragma once
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace cairn::slam {
 
 struct LineSegment {
   int begin = 0;  // First hit; in [0, size()).
-  int end = 0;    // One past the last hit; beyond size() across the seam of a full turn.
+  int end = 0;    // One past the last hit; above size() if the segment crosses the seam of a full turn.
   PointSums sums;
   FittedLine line;
   bool alive = true;
@@ -22,18 +22,19 @@ struct LineSegment {
   [[nodiscard]] int count() const { return static_cast<int>(sums.n); }
 };
 
-// How far a hit may lie from a line it belongs to.
+// Largest distance of a hit from the line to which it belongs.
 [[nodiscard]] inline double SplitDistance(double range_m, const LineOptions& options) {
   return options.split_m + options.split_per_m * range_m;
 }
 
-// How far a hit at the end of a line may lie from the line through the others. Tighter than SplitDistance: a hit of the
-// next wall just round a corner has all the leverage on the slope of this one.
+// Largest distance of a hit at the end of a line from the line through its other hits. It is smaller than
+// SplitDistance, because a hit on the next wall just behind a corner would change the slope of this line
+// most.
 [[nodiscard]] inline double EndDistance(const FittedLine& others, double range_m, const LineOptions& options) {
   return std::min(SplitDistance(range_m, options), std::max(3.0 * others.deviation, 2.0 * options.range_sigma_m));
 }
 
-// Distance of neighbouring beams' hits on the line around p.
+// Distance between the hits of neighbouring beams on the line near `p`.
 [[nodiscard]] inline double SpacingAt(const FittedLine& line, const Eigen::Vector2d& laser, const Eigen::Vector2d& p,
                                       double step) {
   const Eigen::Vector2d ray = p - laser;

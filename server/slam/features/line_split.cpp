@@ -8,7 +8,7 @@
 namespace cairn::slam {
 namespace {
 
-// A run of hits within one cluster, [begin, end) in the clusters' order, and the line through them.
+// A run of hits within one cluster, [begin, end) in clusters_.order, and the line fitted through them.
 struct Run {
   int begin = 0;
   int end = 0;
@@ -65,9 +65,9 @@ class Splitter {
     return true;
   }
 
-  // The hit strictly inside the run farthest from the chord between its ends. The least-squares line decides *whether*
-  // to split; its own farthest point would not do to say *where*: the line through an L has the L's ends as far away as
-  // its corner.
+  // The inner hit of the run that is farthest from the chord between its ends. The least-squares line decides
+  // only whether to split. The hit farthest from that line would be a wrong place to split at: the line
+  // through an L is as far from the ends of the L as from its corner.
   [[nodiscard]] int FarthestFromChord(int begin, int end) const {
     const Eigen::Vector2d first = At(begin).p_robot, chord = At(end - 1).p_robot - first;
     const bool closed = chord.squaredNorm() < 1e-12;
@@ -98,7 +98,7 @@ class Splitter {
     }
   }
 
-  // Two lines that share a corner compete for the hits around it: each goes to the line it is nearer to.
+  // Gives each hit around the common corner of two lines to the line to which it is nearer.
   void SettleBoundary(Run& before, Run& after) const {
     if (before.end != after.begin) return;
     const auto nearer_to = [&](const Run& a, const Run& b, int i) {
@@ -116,7 +116,7 @@ class Splitter {
     after.line = FitLine(SumsOf(after.begin, after.end));
   }
 
-  // Lets go of hits at the ends that the others do not vouch for.
+  // Removes hits at the ends that lie too far from the line through the other hits.
   void TrimEnds(Run& run) const {
     constexpr int kLeastOthers = 4;
     for (const bool at_end : {false, true}) {
@@ -133,7 +133,7 @@ class Splitter {
   const Sweep& sweep_;
   const LineOptions& options_;
   const HitClusters clusters_;
-  std::vector<PointSums> prefix_;  // Over clusters_.order.
+  std::vector<PointSums> prefix_;  // Prefix sums of the hits in the order of clusters_.order.
   std::vector<Run> runs_;
 };
 

@@ -9,8 +9,8 @@
 namespace cairn::slam {
 
 struct SplitResult {
-  std::vector<LineSegment> segments;  // By first hit; at least 2 hits each.
-  std::vector<int> owner;             // Per hit: its segment, or -1 where it is in none.
+  std::vector<LineSegment> segments;  // In the order of their first hits; each has at least 2 hits.
+  std::vector<int> owner;             // Per hit: index of its segment, or -1 if it has none.
 };
 
 [[nodiscard]] SplitResult SplitIntoSegments(const Sweep& sweep, const LineOptions& options);

@@ -29,13 +29,13 @@ void StraightenBetweenParallels(const Sweep& sweep, const LineOptions& options, 
 
     Eigen::Vector2d along = before.line.normal * before.sums.n;
     along += after.line.normal * (before.line.normal.dot(after.line.normal) < 0 ? -after.sums.n : after.sums.n);
-    along.normalize();  // The mean normal of the parallels is the direction of the line between them ...
+    along.normalize();  // The mean normal of the parallel lines is the new direction of the line.
     const Eigen::Vector2d normal(-along.y(), along.x());
     const double sin_off = std::abs(line.line.normal.dot(along));
     const double sigma = std::max(line.line.deviation, options.range_sigma_m);
     const double slope_sigma = sigma * std::sqrt(12.0 / line.sums.n) / std::max(LengthOf(sweep, line), 1e-3);
     if (sin_off > std::sin(std::min(3.0 * slope_sigma, Radians(25.0)))) continue;
-    line.line.normal = normal;  // ... about its own middle.
+    line.line.normal = normal;  // The line turns about its own centroid.
     line.line.offset = normal.dot(line.line.centroid);
   }
 }

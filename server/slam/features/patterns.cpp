@@ -33,7 +33,7 @@ std::vector<LinePattern> PatternsOf(const std::vector<LineFeature>& lines, bool 
     LinePattern& pattern = patterns[static_cast<std::size_t>(i)];
     pattern.corner_distance.fill(kBlank);
     for (int j = 1; j <= pattern.count; ++j) {
-      // NaN where either corner is blank.
+      // The distance is NaN if either corner is blank.
       pattern.corner_distance[static_cast<std::size_t>(j) - 1] =
           (corners[static_cast<std::size_t>((i + j) % count)] - corners[static_cast<std::size_t>(i)]).norm();
     }

@@ -1,5 +1,5 @@
-// Counts how often in a row the world contradicts a belief. A filter that cannot explain several revisits one after the
-// other means nothing any more and says so; one that is explained ends the count.
+// Counts the consecutive revisits that a filter cannot explain. When their number reaches the limit, the
+// filter counts as diverged. A revisit that the filter explains resets the count.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,5 @@
-// Sums the squared Mahalanobis distances of a step's innovations; what the last step came to stays readable.
+// Sums the squared Mahalanobis distances of one step's innovations. After EndStep the sum of the last step
+// can be read until the next step adds or ends.
 #pragma once
 
 namespace cairn::slam {

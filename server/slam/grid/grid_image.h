@@ -1,4 +1,4 @@
-// The occupancy grid as one image with its place in the map frame. Stateless, thread-safe.
+// Converts the occupancy grid to one image with its pose in the map frame. Stateless, thread-safe.
 #pragma once
 
 #include "common/map/occupancy_image.h"
@@ -6,7 +6,7 @@
 
 namespace cairn::slam {
 
-// The bounding box of all chunks; 0 x 0 for an empty grid.
+// The image covers the bounding box of all chunks. It is 0 x 0 for an empty grid.
 [[nodiscard]] OccupancyImage ImageOf(const OccupancyGrid& grid);
 
 }  // namespace cairn::slam

@@ -26,88 +26,116 @@ std::uint8_t OccupancyOf(std::int16_t log_odds) {
 }
 
 void Visit(OptionVisitor& visitor, GridOptions& options) {
-  static constexpr std::string_view kModels[] = {"probabilistic", "deterministic"};
-  VisitEnum(visitor, "model", options.model, kModels,
-            "Evidence adds up (probabilistic) or the last scan decides (deterministic).");
-  visitor.Real("resolution_m", options.resolution_m, "m", 0.01, 1.0, "Side of a cell of level 0.");
-  visitor.Real("hit_probability", options.hit_probability, "1", 0.51, 0.99, "Nearer 1: one hit makes a wall.");
-  visitor.Real("miss_probability", options.miss_probability, "1", 0.01, 0.49, "Nearer 0: one ray through clears it.");
+  static constexpr std::string_view kModels[] = {"probabilistic", "deterministic", "triangular", "degrading"};
+  VisitEnum(
+      visitor, "model", options.model, kModels,
+      "What a cell adds up. probabilistic adds the evidence of all scans, and triangular spreads each hit over "
+      "hit_spread_m; deterministic believes the last scan, and degrading frees an occupied cell by degrees only.");
+  visitor.Real("resolution_m", options.resolution_m, "m", 0.01, 1.0,
+               ForOperators("Side of a cell of the map. Smaller cells show more detail and take more time and memory, "
+                            "which grow with the square."));
+  visitor.Real("hit_probability", options.hit_probability, "1", 0.51, 0.99,
+               "Probability that a cell is occupied after one hit. Nearer to 1, one hit is enough for a wall.");
+  visitor.Real("miss_probability", options.miss_probability, "1", 0.01, 0.49,
+               "Probability that a cell is occupied after one beam has passed it. Nearer to 0, one beam is enough to "
+               "clear a wall.");
   visitor.Real("clamp_probability", options.clamp_probability, "1", 0.6, 0.999,
-               "Nearer 1: more contrary evidence is needed to change a cell.");
-  visitor.Real(
-      "max_ray_m", options.max_ray_m, "m", 1.0, 100.0,
-      "Rays are cut here; what is hit farther away is not drawn. Takes (2 max_ray_m / resolution_m)^2 bytes a robot.");
+               "Largest probability of a cell. Nearer to 1, more contrary evidence is needed to change a cell.");
+  visitor.Real("max_ray_m", options.max_ray_m, "m", 1.0, 100.0,
+               ForOperators("Beams are drawn up to this length; what is hit farther away is not drawn. A robot takes "
+                            "(2 max_ray_m / resolution_m)^2 bytes."));
   visitor.Real("no_return_free_m", options.no_return_free_m, "m", 0.0, 100.0,
-               "How far a beam that hit nothing clears.");
+               ForOperators("Length up to which a beam without an echo clears the map. 0 ignores such beams."));
+  visitor.Real("hit_spread_m", options.hit_spread_m, "m", 0.01, 1.0,
+               "With model triangular, the distance from a hit at which its density has fallen to zero. A larger value "
+               "draws thicker walls.");
+  visitor.Require(options.hit_probability <= options.clamp_probability, "hit_probability", "must not exceed",
+                  "clamp_probability");
+  visitor.Require(options.miss_probability >= 1.0 - options.clamp_probability, "miss_probability",
+                  "must be at least 1 minus", "clamp_probability");
+  visitor.Require(options.no_return_free_m <= options.max_ray_m, "no_return_free_m", "must not exceed", "max_ray_m");
 }
 
 OccupancyGrid::OccupancyGrid(const GridOptions& options)
     : options_(options), clamp_(LogOdds(options.clamp_probability)) {
-  const bool deterministic = options.model == GridModel::kDeterministic;
-  // One observation of a deterministic grid outweighs anything a cell can hold.
-  hit_ = deterministic ? static_cast<std::int16_t>(2 * clamp_) : LogOdds(options.hit_probability);
-  miss_ = deterministic ? static_cast<std::int16_t>(-2 * clamp_) : LogOdds(options.miss_probability);
+  // If one observation decides, its step is larger than the range of values that a cell can hold.
+  const auto decides = static_cast<std::int16_t>(2 * clamp_);
+  const bool hit_decides = options.model == GridModel::kDeterministic || options.model == GridModel::kDegrading;
+  hit_ = hit_decides ? decides : LogOdds(options.hit_probability);
+  miss_ = options.model == GridModel::kDeterministic ? static_cast<std::int16_t>(-decides)
+                                                     : LogOdds(options.miss_probability);
 }
 
-OccupancyGrid::OccupancyGrid(const GridOptions& options, Chunks published) : OccupancyGrid(options) {
-  chunks_ = std::move(published);
+OccupancyGrid::OccupancyGrid(const GridOptions& options, const Chunks& shared) : OccupancyGrid(options) {
+  for (const auto& [key, chunk] : shared) slots_[key].shared = chunk;
 }
 
 void OccupancyGrid::Draw(const Scan& scan, const Pose2& T_map_robot) {
-  const RasterOptions raster{options_.resolution_m, options_.max_ray_m, options_.no_return_free_m};
+  const RasterOptions raster{options_.resolution_m, options_.max_ray_m, options_.no_return_free_m,
+                             options_.model == GridModel::kTriangular ? options_.hit_spread_m : 0.0};
   ChunkKey current{std::numeric_limits<int>::min(), 0};
   GridChunk* chunk = nullptr;
-  raster_.Rasterise(scan, T_map_robot, raster, [&](GridCell cell, bool hit) {
+  raster_.Rasterise(scan, T_map_robot, raster, [&](GridCell cell, double hit) {
     const ChunkKey key{FloorDiv(cell.x, kTileCells), FloorDiv(cell.y, kTileCells)};
     if (key != current) {
       chunk = &Writable(key);
       current = key;
     }
     std::int16_t& value = chunk->log_odds[IndexInChunk(cell, key)];
-    const int before = value == kUnseen ? 0 : value;
-    value = static_cast<std::int16_t>(std::clamp<int>(before + (hit ? hit_ : miss_), -clamp_, clamp_));
+    value = After(value, hit);
   });
 }
 
-OccupancyGrid OccupancyGrid::Share() {
-  OccupancyGrid copy(options_);
-  copy.chunks_ = Publish();
-  return copy;
+std::int16_t OccupancyGrid::After(std::int16_t before, double hit) const {
+  const int held = before == kUnseen ? 0 : before;
+  int next = held + (hit > 0.0 ? static_cast<int>(std::lround(hit * hit_)) : miss_);
+  if (options_.model == GridModel::kDegrading && hit == 0.0 && next <= 0) next = -clamp_;
+  return static_cast<std::int16_t>(std::clamp<int>(next, -clamp_, clamp_));
 }
 
-const OccupancyGrid::Chunks& OccupancyGrid::Publish() {
-  owned_.clear();
-  return chunks_;
+void OccupancyGrid::ReplaceBy(OccupancyGrid&& other) {
+  for (const auto& [key, slot] : slots_) changed_.insert(key);
+  slots_ = std::move(other.slots_);
+  for (const auto& [key, slot] : slots_) changed_.insert(key);
 }
 
-std::vector<ChunkKey> OccupancyGrid::TakeDirty() {
-  owned_.clear();
-  std::vector<ChunkKey> keys(dirty_.begin(), dirty_.end());
-  dirty_.clear();
-  return keys;
+OccupancyGrid::Chunks OccupancyGrid::Share() {
+  Chunks chunks;
+  for (auto& [key, slot] : slots_) chunks.emplace_hint(chunks.end(), key, slot.Share());
+  return chunks;
 }
 
-void OccupancyGrid::MarkAllDirty() {
-  for (const auto& [key, chunk] : chunks_) dirty_.insert(key);
+OccupancyGrid::Change OccupancyGrid::TakeChange() {
+  Change change;
+  change.reserve(changed_.size());
+  for (const ChunkKey& key : changed_) {
+    const auto found = slots_.find(key);
+    change.emplace_back(key, found == slots_.end() ? nullptr : found->second.Share());
+  }
+  changed_.clear();
+  return change;
 }
 
 std::uint8_t OccupancyGrid::OccupancyAt(const Eigen::Vector2d& p_map) const {
   const GridCell cell{static_cast<int>(std::floor(p_map.x() / options_.resolution_m)),
                       static_cast<int>(std::floor(p_map.y() / options_.resolution_m))};
   const ChunkKey key{FloorDiv(cell.x, kTileCells), FloorDiv(cell.y, kTileCells)};
-  const auto found = chunks_.find(key);
-  return found == chunks_.end() ? kUnknownCell : OccupancyOf(found->second->log_odds[IndexInChunk(cell, key)]);
+  const auto found = slots_.find(key);
+  return found == slots_.end() ? kUnknownCell : OccupancyOf(found->second.chunk().log_odds[IndexInChunk(cell, key)]);
 }
 
 GridChunk& OccupancyGrid::Writable(const ChunkKey& key) {
-  dirty_.insert(key);
-  std::shared_ptr<const GridChunk>& chunk = chunks_[key];
-  if (owned_.insert(key).second) {
-    auto fresh = chunk ? std::make_shared<GridChunk>(*chunk) : std::make_shared<GridChunk>();
-    if (!chunk) fresh->log_odds.fill(kUnseen);
-    chunk = std::move(fresh);
+  changed_.insert(key);
+  Slot& slot = slots_[key];
+  if (slot.own) return *slot.own;
+  if (slot.shared) {
+    slot.own = std::make_unique<GridChunk>(*slot.shared);
+    slot.shared.reset();
+  } else {
+    slot.own = std::make_unique<GridChunk>();
+    slot.own->log_odds.fill(kUnseen);
   }
-  return const_cast<GridChunk&>(*chunk);  // Owned: made by this grid as non-const, not handed out yet.
+  return *slot.own;
 }
 
 }  // namespace cairn::slam

@@ -9,9 +9,9 @@
 namespace cairn::slam {
 namespace {
 
-constexpr std::uint8_t kPassed = 1, kHit = 2;
+constexpr std::uint8_t kPassed = 1, kHit = 255;
 
-// A pose may be anything finite: where cells can not be counted any more, the last one stands for all.
+// A pose may have any finite coordinates. Beyond kFarthest cells, all points fall into the last cell.
 int CellAlong(double coordinate_m, double resolution_m) {
   constexpr double kFarthest = 1e9;
   return static_cast<int>(std::clamp(std::floor(coordinate_m / resolution_m), -kFarthest, kFarthest));
@@ -24,10 +24,11 @@ GridCell CellOf(const Eigen::Vector2d& p_map, double resolution_m) {
 }  // namespace
 
 void ScanRaster::Rasterise(const Scan& scan, const Pose2& T_map_robot, const RasterOptions& options,
-                           const std::function<void(GridCell, bool)>& visit) {
+                           const std::function<void(GridCell, double)>& visit) {
   const Pose2 T_map_laser = T_map_robot * scan.T_robot_laser;
   const GridCell from = CellOf(T_map_laser.translation(), options.resolution_m);
-  const int reach = static_cast<int>(std::ceil(options.max_ray_m / options.resolution_m)) + 2;
+  const double spread_cells = options.hit_spread_m / options.resolution_m;
+  const int reach = static_cast<int>(std::ceil(options.max_ray_m / options.resolution_m) + std::ceil(spread_cells)) + 2;
   low_ = {from.x - reach, from.y - reach};
   width_ = height_ = 2 * reach + 1;
   marks_.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), 0);
@@ -47,10 +48,11 @@ void ScanRaster::Rasterise(const Scan& scan, const Pose2& T_map_robot, const Ras
     const double bearing = scan.angle_first_rad + static_cast<double>(beam) * scan.angle_step_rad;
     const Eigen::Vector2d end = T_map_laser * OnGround(range, bearing, cos_tilt);
     MarkRay(from, CellOf(end, options.resolution_m), hit);
+    if (hit && spread_cells > 0.0) MarkAround(CellOf(end, options.resolution_m), spread_cells);
   }
   for (const std::uint32_t index : touched_) {
     const int x = static_cast<int>(index) % width_, y = static_cast<int>(index) / width_;
-    visit({low_.x + x, low_.y + y}, marks_[index] == kHit);
+    visit({low_.x + x, low_.y + y}, static_cast<double>(marks_[index] - kPassed) / (kHit - kPassed));
     marks_[index] = 0;
   }
   touched_.clear();
@@ -67,6 +69,17 @@ void ScanRaster::MarkRay(GridCell from, GridCell to, bool hit) {
     if (twice <= dx) error += dx, y += step_y;
   }
   Mark(to.x, to.y, hit ? kHit : kPassed);
+}
+
+// The share falls linearly with the distance from the cell that was hit.
+void ScanRaster::MarkAround(GridCell hit, double spread_cells) {
+  const int reach = static_cast<int>(std::ceil(spread_cells));
+  for (int dy = -reach; dy <= reach; ++dy) {
+    for (int dx = -reach; dx <= reach; ++dx) {
+      const double share = 1.0 - std::sqrt(static_cast<double>(dx * dx + dy * dy)) / spread_cells;
+      if (share > 0.0) Mark(hit.x + dx, hit.y + dy, static_cast<std::uint8_t>(kPassed + share * (kHit - kPassed)));
+    }
+  }
 }
 
 void ScanRaster::Mark(int x, int y, std::uint8_t mark) {

@@ -22,8 +22,8 @@ Eigen::Vector2d TakeAlongFromPrior(const Eigen::Vector2d& measured, const Eigen:
 void TakeAlongFromPrior(const MatchPrior& prior, MatchResult& result) {
   if (!result.degenerate) return;
   const Eigen::Vector2d u = result.degenerate_direction;
-  const Eigen::Vector2d t = TakeAlongFromPrior(result.T_prev_curr.translation(), prior.T_prev_curr.translation(), u);
-  result.T_prev_curr = {t.x(), t.y(), result.T_prev_curr.theta};
+  const Eigen::Vector2d t = TakeAlongFromPrior(result.T_ref_curr.translation(), prior.T_ref_curr.translation(), u);
+  result.T_ref_curr = {t.x(), t.y(), result.T_ref_curr.theta};
   Eigen::Matrix3d across = Eigen::Matrix3d::Identity();
   across.topLeftCorner<2, 2>() -= u * u.transpose();
   result.covariance = across * result.covariance * across.transpose();

@@ -12,62 +12,62 @@ struct LineVariance {
   double slope = 0.0;
 };
 
-LineVariance VarianceOf(const LineFeature& line, const VotingOptions& options) {
-  const double sigma = std::max(line.deviation, 2.0 * options.line_sigma_floor_m);
+LineVariance VarianceOf(const LineFeature& line, const LineNoiseFloor& floor) {
+  const double sigma = std::max(line.deviation, 2.0 * floor.offset_m);
   const double points = std::max(line.point_count, 2);
   const double length = std::max(line.length, 0.05);
-  const double place_floor = options.line_sigma_floor_m, slope_floor = options.line_slope_sigma_floor_rad;
-  return {sigma * sigma / points + place_floor * place_floor,
-          12.0 * sigma * sigma / (points * length * length) + slope_floor * slope_floor};
+  return {sigma * sigma / points + floor.offset_m * floor.offset_m,
+          12.0 * sigma * sigma / (points * length * length) + floor.slope_rad * floor.slope_rad};
 }
 
 }  // namespace
 
-Eigen::Matrix3d OdometryCovariance(const Pose2& T_prev_curr_odometry, const OdometryTrustOptions& options) {
-  const double distance = T_prev_curr_odometry.translation().norm();
+Eigen::Matrix3d OdometryCovariance(const Pose2& T_ref_curr_odometry, const OdometryTrustOptions& options) {
+  const double distance = T_ref_curr_odometry.translation().norm();
   const double translation = options.translation_floor_m + options.translation_share * distance;
   const double rotation = options.rotation_floor_rad + options.rotation_per_m * distance +
-                          options.rotation_share * std::abs(T_prev_curr_odometry.theta);
+                          options.rotation_share * std::abs(T_ref_curr_odometry.theta);
   return Eigen::Vector3d(translation * translation, translation * translation, rotation * rotation).asDiagonal();
 }
 
-Eigen::Matrix3d PairsCovariance(const ScanFeatures& prev, const ScanFeatures& curr, std::span<const LinePair> pairs,
-                                const MatchResult& result, const Pose2& T_prev_curr_odometry,
-                                const VotingOptions& options) {
-  Eigen::Matrix3d odometry = OdometryCovariance(T_prev_curr_odometry, options.odometry);
+Eigen::Matrix3d PairsCovariance(const ScanFeatures& ref, const ScanFeatures& curr, std::span<const LinePair> pairs,
+                                const MatchResult& result, const Eigen::Matrix3d& odometry_covariance,
+                                const LineNoiseFloor& floor) {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   double chi2 = 0.0;
   int residuals = 0;
   for (const LinePair& pair : pairs) {
     if (!pair.inlier) continue;
-    const LineFeature& line_prev = prev.lines[static_cast<std::size_t>(pair.prev)];
+    const LineFeature& line_ref = ref.lines[static_cast<std::size_t>(pair.ref)];
     const LineFeature& line_curr = curr.lines[static_cast<std::size_t>(pair.curr)];
-    const LineVariance a = VarianceOf(line_prev, options), b = VarianceOf(line_curr, options);
-    const Eigen::Vector2d mid = result.T_prev_curr * line_curr.midpoint();
-    const Eigen::Vector2d normal = line_prev.left_normal();
-    // The middles lie apart along the wall; a wrong slope of either line carries over that distance.
-    const double apart = (mid - line_prev.midpoint()).norm();
+    const LineVariance a = VarianceOf(line_ref, floor), b = VarianceOf(line_curr, floor);
+    const Eigen::Vector2d mid = result.T_ref_curr * line_curr.midpoint();
+    const Eigen::Vector2d normal = line_ref.left_normal();
+    // The two midpoints lie apart along the wall, and an error in the slope of either line acts over that
+    // distance.
+    const double apart = (mid - line_ref.midpoint()).norm();
     const double offset_variance = a.offset + b.offset + 0.25 * apart * apart * (a.slope + b.slope);
     const double slope_variance = a.slope + b.slope;
 
     Eigen::RowVector3d J_offset;
     J_offset << normal.transpose(),
-        normal.dot(Eigen::Vector2d(result.T_prev_curr.y - mid.y(), mid.x() - result.T_prev_curr.x));
+        normal.dot(Eigen::Vector2d(result.T_ref_curr.y - mid.y(), mid.x() - result.T_ref_curr.x));
     information += J_offset.transpose() * J_offset / offset_variance;
     information(2, 2) += 1.0 / slope_variance;
-    const double offset = line_prev.OffsetOf(mid);
-    const double turn = AngleDiff(AngleDiff(line_prev.slope, line_curr.slope), result.T_prev_curr.theta);
+    const double offset = line_ref.OffsetOf(mid);
+    const double turn = AngleDiff(AngleDiff(line_ref.slope, line_curr.slope), result.T_ref_curr.theta);
     chi2 += offset * offset / offset_variance + turn * turn / slope_variance;
     residuals += 2;
   }
-  if (residuals == 0) return odometry;
+  if (residuals == 0) return odometry_covariance;
   information /= std::max(1.0, chi2 / std::max(1, residuals - 3));
-  // Odometry closes what is open. Elsewhere it must not narrow the answer: the filter uses it in its own right.
+  // The odometry supplies the information that is missing along a corridor. Elsewhere it must not reduce the
+  // covariance, because the filter uses the odometry separately.
   if (result.degenerate) {
     const Eigen::Vector2d u = result.degenerate_direction;
-    information.topLeftCorner<2, 2>() += u * u.transpose() / odometry(0, 0);
+    information.topLeftCorner<2, 2>() += u * u.transpose() / odometry_covariance(0, 0);
   }
-  information.diagonal() += Eigen::Vector3d(1e-2, 1e-2, 1e-2);  // Invertible whatever the pairs.
+  information.diagonal() += Eigen::Vector3d(1e-2, 1e-2, 1e-2);  // Keeps the matrix invertible for any pairs.
   const Eigen::Matrix3d covariance = information.ldlt().solve(Eigen::Matrix3d::Identity());
   return 0.5 * (covariance + covariance.transpose());
 }

@@ -1,4 +1,4 @@
-// What is believed of a motion between two scans before they are matched, from odometry or a forecast.
+// The estimate of the motion between two scans before they are matched, from odometry or a forecast.
 #pragma once
 
 #include <Eigen/Core>
@@ -8,8 +8,8 @@
 namespace cairn::slam {
 
 struct MatchPrior {
-  Pose2 T_prev_curr;  // Where a matcher starts; the identity where nothing is known.
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  // Of (x, y, theta), in prev.
+  Pose2 T_ref_curr;                                          // Start of a matcher; the identity if unknown.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  // Covariance of (x, y, theta), in ref.
 };
 
 }  // namespace cairn::slam

@@ -4,15 +4,17 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/geometry/pose_difference.h"
 #include "server/slam/matching/degeneracy.h"
 
 namespace cairn::slam {
 namespace {
 
-// Normal equations of the linearised point-to-line errors at one pose, with what the pairs look like.
+// Normal equations of the linearised point-to-line errors at one pose, and the numbers of pairs and inliers.
 struct Linearisation {
   Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
-  Eigen::Matrix3d H_surfaces = Eigen::Matrix3d::Zero();  // Of the pairs with a surface direction alone.
+  // H from only the pairs whose reference point has a surface direction.
+  Eigen::Matrix3d H_surfaces = Eigen::Matrix3d::Zero();
   Eigen::Vector3d g = Eigen::Vector3d::Zero();
   int pairs = 0;
   int inliers = 0;
@@ -22,7 +24,7 @@ Linearisation Linearise(std::span<const SurfacePoint> points_robot, const PointI
                         const Pose2& T_ref_robot, double gate_m, const PointToLineOptions& options) {
   Linearisation sum;
   const double c = std::cos(T_ref_robot.theta), s = std::sin(T_ref_robot.theta);
-  const double scale = std::max(options.residual_sigma_m, 0.25 * gate_m);
+  const double scale = std::max(options.residual_sigma_m, options.cauchy_share * gate_m);
   for (const SurfacePoint& point : points_robot) {
     const Eigen::Vector2d turned(c * point.p.x() - s * point.p.y(), s * point.p.x() + c * point.p.y());
     const Eigen::Vector2d p_ref = turned + T_ref_robot.translation();
@@ -32,19 +34,20 @@ Linearisation Linearise(std::span<const SurfacePoint> points_robot, const PointI
     Eigen::Vector2d normal = nearest->normal;
     double trust = 1.0;
     if (nearest->smooth() && point.smooth()) {
-      // Two sides of a thin wall are different surfaces.
+      // The two sides of a thin wall are different surfaces, so their points are not paired.
       const Eigen::Vector2d own(c * point.normal.x() - s * point.normal.y(),
                                 s * point.normal.x() + c * point.normal.y());
-      if (own.dot(normal) < 0.5) continue;
+      if (own.dot(normal) < options.same_side) continue;
     } else if (!nearest->smooth()) {
-      // A rough reference point only says how far it is.
+      // A reference point without a surface direction constrains only the distance to it.
       const double distance = offset.norm();
       if (distance < 1e-6) continue;
       normal = offset / distance;
-      trust = 0.2;
+      trust = options.rough_trust;
     }
     const double residual = normal.dot(offset);
-    const double weight = trust / (1.0 + (residual / scale) * (residual / scale));  // Cauchy.
+    // Weight of the Cauchy loss.
+    const double weight = trust / (1.0 + (residual / scale) * (residual / scale));
     const Eigen::Vector3d J(normal.x(), normal.y(), normal.dot(Eigen::Vector2d(-turned.y(), turned.x())));
     sum.H.noalias() += weight * J * J.transpose();
     if (nearest->smooth()) sum.H_surfaces.noalias() += weight * J * J.transpose();
@@ -58,53 +61,76 @@ Linearisation Linearise(std::span<const SurfacePoint> points_robot, const PointI
 }  // namespace
 
 void Visit(OptionVisitor& visitor, PointToLineOptions& options) {
-  visitor.Integer("max_iterations", options.max_iterations, "1", 1, 200, "Hard bound; typical scans stop below 8.");
+  visitor.Integer("max_iterations", options.max_iterations, "1", 1, 200,
+                  "Most iterations. A typical scan needs fewer than 8.");
   visitor.Real("first_pair_distance_m", options.first_pair_distance_m, "m", 0.05, 2.0,
-               "Larger tolerates worse guesses and accepts more wrong pairs.");
+               "Largest distance between a point and its surface at first. A larger value tolerates worse guesses, and "
+               "accepts more wrong pairs.");
   visitor.Real("last_pair_distance_m", options.last_pair_distance_m, "m", 0.02, 2.0,
-               "The gate shrinks to this over the iterations.");
+               "Largest distance between a point and its surface in the last iterations.");
   visitor.Real("residual_sigma_m", options.residual_sigma_m, "m", 0.001, 1.0,
-               "Of a point's distance to its surface; smaller: the scan outweighs odometry more.");
-  visitor.Real("effective_points", options.effective_points, "1", 0.001, 100.0,
-               "Share of points that count as independent; smaller: more cautious.");
-  visitor.Real("stop_step_m", options.stop_step_m, "m", 1e-7, 0.1, "Stops when steps are smaller than both.");
-  visitor.Real("stop_step_rad", options.stop_step_rad, "rad", 1e-7, 0.1, "See stop_step_m.");
+               "Standard deviation of the distance of a point from its surface. With a smaller value the scan counts "
+               "more against the prior.");
+  visitor.Real("stop_step_m", options.stop_step_m, "m", 1e-7, 0.1,
+               "The iteration stops when a step is shorter than this and turns by less than stop_step_rad.");
+  visitor.Real("stop_step_rad", options.stop_step_rad, "rad", 1e-7, 0.1,
+               "The iteration stops when a step turns by less than this and is shorter than stop_step_m.");
   visitor.Real("inlier_distance_m", options.inlier_distance_m, "m", 0.01, 1.0,
-               "A point nearer to its surface counts as explained.");
-  visitor.Real("min_score", options.min_score, "1", 0.0, 1.0, "Fewer explained points: not converged.");
+               "A point that is nearer to its surface counts as explained.");
+  visitor.Real("min_score", options.min_score, "1", 0.0, 1.0,
+               "Share of the points that must be explained. With fewer there is no match.");
   visitor.Real("degenerate_ratio", options.degenerate_ratio, "1", 0.0, 1.0,
-               "Weakest over strongest hold on translation below which it is a corridor.");
+               "The scan counts as a corridor when the smallest eigenvalue of the information on the translation is "
+               "below this share of the largest.");
+  visitor.Real(
+      "rough_trust", options.rough_trust, "1", 0.0, 1.0,
+      "Weight of a pair whose reference point has no surface direction. Half of it makes the error in a simulated "
+      "corridor an eighth and the error of another log 1.5 times as large; twice of it makes the corridor 1.5 "
+      "times worse.");
+  visitor.Real(
+      "same_side", options.same_side, "1", -1.0, 1.0,
+      "Cosine between the directions of two surface points below which they lie on two sides of a wall and are "
+      "not paired. Half of it makes the error in one real corridor 1.5 times as large.");
+  visitor.Real(
+      "cauchy_share", options.cauchy_share, "1", 0.0, 10.0,
+      "Scale of the Cauchy weights as a share of the largest pair distance, at least residual_sigma_m. Half of "
+      "it draws thinner walls on one log and makes the online error on mit-csail 1.1 times as large.");
+  visitor.Integer(
+      "shrink_iterations", options.shrink_iterations, "1", 1, 200,
+      "Iterations over which the largest pair distance shrinks from the first to the last. Half or twice of "
+      "it changes the walls of one log by a fifth.");
+  visitor.Require(options.last_pair_distance_m <= options.first_pair_distance_m, "last_pair_distance_m",
+                  "must not exceed", "first_pair_distance_m");
 }
 
 MatchResult AlignPointsToSurfaces(std::span<const SurfacePoint> points_robot, const PointIndex& reference,
                                   const AlignmentGuess& guess, const PointToLineOptions& options) {
   MatchResult result;
-  result.T_prev_curr = guess.T_ref_robot_prior;
+  result.T_ref_curr = guess.T_ref_robot_prior;
   result.covariance = guess.prior_covariance;
   if (points_robot.size() < 5 || reference.size() < 5) {
     result.failure = MatchFailure::kTooFewFeatures;
     return result;
   }
   const Eigen::Matrix3d prior_information = guess.prior_covariance.llt().solve(Eigen::Matrix3d::Identity());
-  const double per_point = options.effective_points / (options.residual_sigma_m * options.residual_sigma_m);
+  const double per_point = 1.0 / (options.residual_sigma_m * options.residual_sigma_m);
   Pose2 T = guess.T_ref_robot_start;
   Linearisation sum;
   bool settled = false;
   for (int iteration = 0; iteration < options.max_iterations && !settled; ++iteration) {
-    const double shrink = std::min(1.0, iteration / 6.0);
+    const double shrink = std::min(1.0, iteration / static_cast<double>(options.shrink_iterations));
     const double gate =
         options.first_pair_distance_m + shrink * (options.last_pair_distance_m - options.first_pair_distance_m);
     sum = Linearise(points_robot, reference, T, gate, options);
     if (sum.pairs < 5) break;
-    Eigen::Vector3d from_prior = T.vector() - guess.T_ref_robot_prior.vector();
-    from_prior.z() = WrapAngle(from_prior.z());
+    const Eigen::Vector3d from_prior = Minus(T, guess.T_ref_robot_prior);
     const Eigen::Matrix3d H = per_point * sum.H + prior_information;
     const Eigen::Vector3d step = -H.ldlt().solve(per_point * sum.g + prior_information * from_prior);
     if (!step.allFinite()) {
       result.failure = MatchFailure::kNotConverged;
       return result;
     }
-    T = {T.x + step.x(), T.y + step.y(), WrapAngle(T.theta + step.z())};
+    T = Plus(T, step);
     result.iterations = iteration + 1;
     settled =
         shrink >= 1.0 && step.head<2>().norm() < options.stop_step_m && std::abs(step.z()) < options.stop_step_rad;
@@ -116,11 +142,12 @@ MatchResult AlignPointsToSurfaces(std::span<const SurfacePoint> points_robot, co
     result.failure = MatchFailure::kNotConverged;
     return result;
   }
-  result.T_prev_curr = T;
+  result.T_ref_curr = T;
   result.converged = true;
   result.covariance = (per_point * sum.H + prior_information).llt().solve(Eigen::Matrix3d::Identity());
   result.covariance = 0.5 * (result.covariance + result.covariance.transpose()).eval();
-  // A rough point holds in every direction by its nature; only surfaces tell whether the place does.
+  // A reference point without a surface direction seems to constrain all directions, so only surfaces are
+  // used to judge degeneracy.
   JudgeDegeneracy(sum.H_surfaces, options.degenerate_ratio, result);
   return result;
 }

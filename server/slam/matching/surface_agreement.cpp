@@ -6,18 +6,19 @@
 namespace cairn::slam {
 
 SurfaceAgreement CompareSurfaces(std::span<const SurfacePoint> points_curr, const PointIndex& reference,
-                                 const Pose2& T_prev_curr, double distance_m) {
+                                 const Pose2& T_ref_curr, double distance_m) {
   SurfaceAgreement sum;
-  const Eigen::Matrix2d R = T_prev_curr.rotation();
+  const Eigen::Matrix2d R = T_ref_curr.rotation();
   double squares = 0.0;
   for (const SurfacePoint& point : points_curr) {
-    const Eigen::Vector2d turned = R * point.p, p_prev = turned + T_prev_curr.translation();
-    const SurfacePoint* nearest = reference.Nearest(p_prev, distance_m);
+    const Eigen::Vector2d turned = R * point.p, p_ref = turned + T_ref_curr.translation();
+    const SurfacePoint* nearest = reference.Nearest(p_ref, distance_m);
     if (nearest == nullptr) continue;
     const bool directed = nearest->smooth() && point.smooth();
-    if (directed && nearest->normal.dot(R * point.normal) < 0.5) continue;  // The other side of a thin wall.
+    // The point lies on the other side of a thin wall.
+    if (directed && nearest->normal.dot(R * point.normal) < 0.5) continue;
     ++sum.inliers;
-    const Eigen::Vector2d offset = p_prev - nearest->p;
+    const Eigen::Vector2d offset = p_ref - nearest->p;
     const double across = nearest->smooth() ? nearest->normal.dot(offset) : offset.norm();
     squares += across * across;
     if (!directed) continue;

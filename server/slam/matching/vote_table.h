@@ -1,5 +1,6 @@
-// The matching table: one number of votes for every pair of a line of the previous scan (row) and one of the current
-// scan (column). Also used for the sub-tables of the single criteria. Plain value. Source: thesis A 3.5.1, Table 3.3.
+// The matching table: the number of votes for every pair of a line of the reference scan (row) and a line of
+// the current scan (column). The sub-tables of the single criteria have the same type. Plain value. Source:
+// thesis A 3.5.1, Table 3.3.
 #pragma once
 
 #include <algorithm>
@@ -18,8 +19,8 @@ class VoteTable {
 
   [[nodiscard]] int rows() const { return rows_; }
   [[nodiscard]] int columns() const { return columns_; }
-  [[nodiscard]] double& At(int prev, int curr) { return votes_[Index(prev, curr)]; }
-  [[nodiscard]] double At(int prev, int curr) const { return votes_[Index(prev, curr)]; }
+  [[nodiscard]] double& At(int ref, int curr) { return votes_[Index(ref, curr)]; }
+  [[nodiscard]] double At(int ref, int curr) const { return votes_[Index(ref, curr)]; }
 
   void Clear() { std::fill(votes_.begin(), votes_.end(), 0.0); }
 
@@ -29,8 +30,8 @@ class VoteTable {
   }
 
  private:
-  [[nodiscard]] std::size_t Index(int prev, int curr) const {
-    return static_cast<std::size_t>(prev) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(curr);
+  [[nodiscard]] std::size_t Index(int ref, int curr) const {
+    return static_cast<std::size_t>(ref) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(curr);
   }
 
   int rows_ = 0;
@@ -38,12 +39,13 @@ class VoteTable {
   std::vector<double> votes_;
 };
 
-// A line of the previous scan and the line of the current one taken for the same wall; indices into their lines.
+// A line of the reference scan and a line of the current scan that are taken for the same wall, as indices
+// into the lines of their scans.
 struct LinePair {
-  int prev = 0;
+  int ref = 0;
   int curr = 0;
   double votes = 0.0;
-  bool inlier = false;  // Agrees with the final answer.
+  bool inlier = false;  // The pair agrees with the final result.
 };
 
 }  // namespace cairn::slam

@@ -1,6 +1,7 @@
-// The speed of a robot's last step, and where it would take it in the next one. Not a filter: one step back, no more.
-// Frame: T_prev_curr in the robot frame, x forward; sideways a robot does not go. Not thread-safe.
-// Source: thesis C 5.2 (lambda = |dt V|, by the displacement between the scans before).
+// The speed of the robot's last step, and the motion that this speed forecasts for the next step. Not a
+// filter: only the last step counts. Frame: T_prev_curr in the robot frame, x forward; the sideways speed is
+// taken as zero. Not thread-safe.
+// Source: thesis C 5.2 (lambda = |dt V|, there from the displacement between the previous scans).
 #pragma once
 
 #include <optional>
@@ -16,7 +17,7 @@ class ConstantSpeed {
     if (seconds > 0.0) speed_ = Speed{T_prev_curr.x / seconds, T_prev_curr.theta / seconds};
   }
   void Forget() { speed_.reset(); }
-  // No motion where the speed is not known, or was too long ago to mean anything.
+  // The identity if the speed is not known, or if `seconds` is too long for the speed to mean anything.
   [[nodiscard]] Pose2 Forecast(double seconds) const {
     if (!speed_ || seconds >= kLongest_s) return {};
     return {speed_->forward_m_s * seconds, 0.0, WrapAngle(speed_->turn_rad_s * seconds)};

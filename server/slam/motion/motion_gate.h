@@ -1,4 +1,5 @@
-// Decides when a scan is worth an update of filter and map: when the robot has moved or turned enough since the last.
+// Decides whether a scan becomes a keyframe, which updates filter and map: it does if the robot has moved or
+// turned enough since the last keyframe.
 // Source: the linearUpdate / angularUpdate rule of GMapping (Grisetti 2007).
 #pragma once
 
@@ -8,7 +9,7 @@
 namespace cairn::slam {
 
 struct MotionGateOptions {
-  double distance_m = 0.25;  // Larger: fewer keyframes, less time and memory, coarser map.
+  double distance_m = 0.25;
   double turn_rad = 0.2;
 };
 void Visit(OptionVisitor& visitor, MotionGateOptions& options);

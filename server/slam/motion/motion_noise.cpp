@@ -13,12 +13,18 @@ Eigen::Matrix3d MotionNoise::Covariance(const Pose2& T_prev_curr) const {
 }
 
 void Visit(OptionVisitor& visitor, MotionNoise& options) {
-  visitor.Real("trans_base_m", options.trans_base_m, "m", 0.0, 1.0, "Position noise of a step at rest.");
-  visitor.Real("trans_per_m", options.trans_per_m, "m/m", 0.0, 2.0, "Position noise per metre travelled.");
-  visitor.Real("trans_per_rad", options.trans_per_rad, "m/rad", 0.0, 2.0, "Position noise per radian turned.");
-  visitor.Real("rot_base_rad", options.rot_base_rad, "rad", 0.0, 1.0, "Heading noise of a step at rest.");
-  visitor.Real("rot_per_m", options.rot_per_m, "rad/m", 0.0, 2.0, "Heading noise per metre travelled.");
-  visitor.Real("rot_per_rad", options.rot_per_rad, "rad/rad", 0.0, 2.0, "Heading noise per radian turned.");
+  visitor.Real("trans_base_m", options.trans_base_m, "m", 0.0, 1.0,
+               "Standard deviation of x and of y after a step without motion.");
+  visitor.Real("trans_per_m", options.trans_per_m, "m/m", 0.0, 2.0,
+               "Standard deviation of x and of y per metre travelled.");
+  visitor.Real("trans_per_rad", options.trans_per_rad, "m/rad", 0.0, 2.0,
+               "Standard deviation of x and of y per radian turned.");
+  visitor.Real("rot_base_rad", options.rot_base_rad, "rad", 0.0, 1.0,
+               "Standard deviation of the heading after a step without motion.");
+  visitor.Real("rot_per_m", options.rot_per_m, "rad/m", 0.0, 2.0,
+               "Standard deviation of the heading per metre travelled.");
+  visitor.Real("rot_per_rad", options.rot_per_rad, "rad/rad", 0.0, 2.0,
+               "Standard deviation of the heading per radian turned.");
 }
 
 }  // namespace cairn::slam

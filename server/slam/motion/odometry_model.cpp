@@ -9,7 +9,8 @@ OdometryControl InverseOdometry(const Pose2& T_prev_curr) {
   control.trans = T_prev_curr.translation().norm();
   if (control.trans > 1e-4) {
     control.rot1 = std::atan2(T_prev_curr.y, T_prev_curr.x);
-    if (std::abs(control.rot1) > kPi / 2) {  // Backwards, not turn about and forwards.
+    // The robot drove backwards; it did not turn round and drive forwards.
+    if (std::abs(control.rot1) > kPi / 2) {
       control.rot1 = WrapAngle(control.rot1 + kPi);
       control.trans = -control.trans;
     }

@@ -1,7 +1,7 @@
-// The inverse odometry motion model: a step as rotation, straight line, rotation, and how a pose and its uncertainty go
-// along with it. Stateless, thread-safe.
-// Source: thesis A (4-5)..(4-12), Table 4.2. Corrected: (4-5) needs atan2; Table 4.2 propagates the pose covariance
-// where the control noise belongs: pv = Gv pv Gv' + Gu R_u Gu'.
+// The inverse odometry motion model. It describes a step as a rotation, a straight line and a second
+// rotation, and moves a pose and its covariance along the step. Stateless, thread-safe.
+// Source: thesis A (4-5)..(4-12), Table 4.2. Corrected: (4-5) needs atan2; Table 4.2 propagates the pose
+// covariance in the term where the covariance of the control belongs. Correct is pv = Gv pv Gv' + Gu R_u Gu'.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,19 +11,19 @@
 namespace cairn::slam {
 
 struct OdometryControl {
-  double rot1 = 0.0;   // Turn towards the line of travel; driving backwards it stays the smaller turn.
-  double trans = 0.0;  // Signed: negative backwards.
+  double rot1 = 0.0;   // First turn, onto the line of travel: at most a right angle either way.
+  double trans = 0.0;  // Length of the straight line; negative if the robot drives backwards.
   double rot2 = 0.0;
 };
 
-// The control that leads from one pose to the other. Where the robot hardly moves the direction of travel means
-// nothing: then rot1 = 0.
+// The control that leads from one pose to the other. If the robot hardly moves, the direction of travel is
+// not defined, and rot1 = 0.
 [[nodiscard]] OdometryControl InverseOdometry(const Pose2& T_prev_curr);
 
-// (4-8)..(4-10).
+// The pose after the control, (4-8)..(4-10).
 [[nodiscard]] Pose2 ApplyControl(const Pose2& T_map_robot, const OdometryControl& control);
 
-// Gv (4-11) and Gu (4-12) at a pose.
+// Derivatives of ApplyControl by the pose, Gv (4-11), and by the control, Gu (4-12).
 [[nodiscard]] Eigen::Matrix3d J_pose_pose(const Pose2& T_map_robot, const OdometryControl& control);
 [[nodiscard]] Eigen::Matrix3d J_pose_control(const Pose2& T_map_robot, const OdometryControl& control);
 

@@ -1,6 +1,7 @@
-// The hits of one scan as points in the robot frame, in the order of the beams. Beams that hit nothing or say nothing
-// are left out; who needs them asks ClassifyRange. A tilted scan plane is projected on the ground: lengths along the
-// laser's x axis shrink by cos(tilt). Not thinned, not deskewed. Metres and radians. Stateless, thread-safe.
+// The hits of one scan as points in the robot frame, in the order of the beams. Beams without an echo and
+// invalid beams are left out; ClassifyRange tells them apart. A tilted scan plane is projected on the ground:
+// lengths along the laser's x axis shrink by cos(tilt). The points are neither thinned nor deskewed. Metres
+// and radians. Stateless, thread-safe.
 // Precondition: the scan passed ValidateScan.
 #pragma once
 
@@ -21,7 +22,7 @@ struct BeamPoint {
 
 [[nodiscard]] std::vector<BeamPoint> PointsOf(const Scan& scan);
 
-// True where the beam after the last would be the first again, or nearly so.
+// True if the beam after the last one would reach the first one again, to within half a step.
 [[nodiscard]] bool IsFullTurn(const Scan& scan);
 
 }  // namespace cairn::slam

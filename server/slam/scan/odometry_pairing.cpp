@@ -6,10 +6,9 @@
 namespace cairn::slam {
 namespace {
 
-// later - earlier without overflow, for stamps a broken clock may place anywhere in int64.
-std::uint64_t NanosBetween(Stamp earlier, Stamp later) {
-  return static_cast<std::uint64_t>(later) - static_cast<std::uint64_t>(earlier);
-}
+// The time assumed between the last scan of a clock and the first one after the clock was set back, because the true
+// time is not known.
+constexpr Stamp kIntervalNs = kNanosPerSecond / 10;
 
 std::uint64_t Nanos(double seconds) {
   return static_cast<std::uint64_t>(seconds * 1e9);
@@ -25,41 +24,49 @@ Pose2 PoseAt(Stamp stamp, const Odometry& before, const Odometry& after) {
 
 void Visit(OptionVisitor& visitor, PairingOptions& options) {
   visitor.Real("max_gap_s", options.max_gap_s, "s", 0.01, 60.0,
-               "odometry samples around a scan may be this far apart; longer gaps drop the scan");
-  visitor.Real("max_stamp_jump_s", options.max_stamp_jump_s, "s", 1.0, 1e7,
-               "a stamp further ahead of the last is refused until the clock proves itself");
-  visitor.Integer("jump_confirmations", options.jump_confirmations, "stamps", 1, 1000,
-                  "consecutive stamps near a new time that prove a changed clock");
+               "Longest time between the two odometry samples around a scan. With a longer one the scan is dropped.");
+  visitor.Real(
+      "max_stamp_jump_s", options.max_stamp_jump_s, "s", 0.1, 1e7,
+      "A time stamp that is farther ahead of the last one is held back until jump_confirmations of them agree.");
+  visitor.Integer(
+      "jump_confirmations", options.jump_confirmations, "stamps", 2, 1000,
+      "Number of time stamps in a row that agree on a new time, ahead or back, after which the clock counts "
+      "as changed.");
   visitor.Integer("max_waiting_scans", options.max_waiting_scans, "scans", 1, 10000,
-                  "scans that may wait for odometry; more: the oldest is dropped");
+                  "Scans that may wait for odometry. When there are more, the oldest is dropped.");
   visitor.Integer("max_odometry", options.max_odometry, "samples", 2, 100000,
-                  "odometry samples kept for scans to come; more: the oldest goes");
-}
-
-std::optional<DropReason> OdometryPairing::StampGate::Check(Stamp stamp, const PairingOptions& options) {
-  if (has_last && stamp == last) return DropReason::kDuplicateStamp;
-  if (has_last && stamp < last) return DropReason::kStampWentBack;
-  const std::uint64_t max_jump = Nanos(options.max_stamp_jump_s);
-  if (has_last && NanosBetween(last, stamp) > max_jump) {
-    const bool agrees = agreeing > 0 && stamp > candidate && NanosBetween(candidate, stamp) <= max_jump;
-    agreeing = agrees ? agreeing + 1 : 1;
-    candidate = stamp;
-    if (agreeing < options.jump_confirmations) return DropReason::kStampJump;
-  }
-  has_last = true;
-  last = stamp;
-  agreeing = 0;
-  return std::nullopt;
+                  "Odometry samples that are kept for later scans. When there are more, the oldest is dropped.");
+  visitor.Require(options.max_gap_s <= options.max_stamp_jump_s, "max_gap_s", "must not exceed", "max_stamp_jump_s");
 }
 
 OdometryPairing::OdometryPairing(const PairingOptions& options, Sink sink)
-    : options_(options), sink_(std::move(sink)) {}
+    : options_(options),
+      sink_(std::move(sink)),
+      scan_gate_(Nanos(options.max_stamp_jump_s), static_cast<std::size_t>(options.jump_confirmations),
+                 {.pass = [this](std::shared_ptr<const Scan>&& scan) { Take(std::move(scan)); },
+                  .refuse = [this](const std::shared_ptr<const Scan>& scan,
+                                   DropReason reason) { sink_.dropped(*scan, reason); },
+                  .set_back = [this] { ClockSetBack(); }}),
+      odometry_gate_(Nanos(options.max_stamp_jump_s), static_cast<std::size_t>(options.jump_confirmations),
+                     {.pass = [this](Odometry&& odometry) { Take(odometry); },
+                      .refuse = [this](const Odometry&, DropReason) { ++odometry_refused_; },
+                      .set_back = [this] { ClockSetBack(); }}) {}
 
 void OdometryPairing::Add(std::shared_ptr<const Scan> scan) {
-  if (const auto reason = scan_gate_.Check(scan->stamp, options_)) {
-    sink_.dropped(*scan, *reason);
-    return;
-  }
+  const Scan& sample = *scan;
+  scan_gate_.Add(sample.stamp, sample.sequence, std::move(scan));
+}
+
+void OdometryPairing::Add(const Odometry& odometry) {
+  odometry_gate_.Add(odometry.stamp, odometry.sequence, Odometry(odometry));
+}
+
+void OdometryPairing::NewClient() {
+  scan_gate_.NewClient();
+  odometry_gate_.NewClient();
+}
+
+void OdometryPairing::Take(std::shared_ptr<const Scan>&& scan) {
   scans_.push_back(std::move(scan));
   Flush();
   if (scans_.size() > static_cast<std::size_t>(options_.max_waiting_scans)) {
@@ -69,14 +76,29 @@ void OdometryPairing::Add(std::shared_ptr<const Scan> scan) {
   }
 }
 
-bool OdometryPairing::Add(const Odometry& odometry) {
-  if (odometry_gate_.Check(odometry.stamp, options_)) return false;
+void OdometryPairing::Take(const Odometry& odometry) {
   odometry_.push_back(odometry);
-  // Before anything is let go: the oldest samples are those a waiting scan may need.
+  // Flush runs before a sample is dropped, because a waiting scan may need the oldest samples.
   Flush();
-  // Poses are absolute, so leaving out the oldest loses no motion.
+  // Poses are absolute, so no motion is lost when the oldest sample is dropped.
   if (odometry_.size() > static_cast<std::size_t>(options_.max_odometry)) odometry_.pop_front();
-  return true;
+}
+
+void OdometryPairing::ClockSetBack() {
+  for (const auto& scan : std::exchange(scans_, {})) sink_.dropped(*scan, DropReason::kNoOdometry);
+  odometry_.clear();
+}
+
+void OdometryPairing::Pair(const std::shared_ptr<const Scan>& scan, const Pose2& T_odom_robot) {
+  // Unsigned, because a broken clock may be anywhere in int64.
+  const auto robot_time = static_cast<std::uint64_t>(scan->stamp);
+  auto stamp = static_cast<Stamp>(robot_time + set_back_ns_);
+  if (last_paired_ && stamp <= *last_paired_) {
+    stamp = *last_paired_ + kIntervalNs;
+    set_back_ns_ = static_cast<std::uint64_t>(stamp) - robot_time;
+  }
+  last_paired_ = stamp;
+  sink_.paired({scan, T_odom_robot, stamp});
 }
 
 void OdometryPairing::Flush() {
@@ -86,10 +108,10 @@ void OdometryPairing::Flush() {
     const auto after = std::lower_bound(odometry_.begin(), odometry_.end(), scan->stamp,
                                         [](const Odometry& odometry, Stamp stamp) { return odometry.stamp < stamp; });
     if (after->stamp == scan->stamp) {
-      // Scans still to come are later: nothing before this sample is needed any more.
+      // Later scans have later stamps, so nothing before this sample is needed any more.
       const Pose2 T_odom_robot = after->T_odom_robot;
       odometry_.erase(odometry_.begin(), after);
-      sink_.paired({scan, T_odom_robot});
+      Pair(scan, T_odom_robot);
       continue;
     }
     if (after == odometry_.begin()) {
@@ -103,19 +125,21 @@ void OdometryPairing::Flush() {
     if (too_far) {
       sink_.dropped(*scan, DropReason::kNoOdometry);
     } else {
-      sink_.paired({scan, T_odom_robot});
+      Pair(scan, T_odom_robot);
     }
   }
 }
 
 void OdometryPairing::Finish() {
+  odometry_gate_.Finish();
+  scan_gate_.Finish();
   Flush();
   while (!scans_.empty()) {
     const auto scan = std::move(scans_.front());
     scans_.pop_front();
-    // Flush has left only scans later than the last odometry.
+    // After Flush only scans later than the last odometry sample are left.
     if (!odometry_.empty() && NanosBetween(odometry_.back().stamp, scan->stamp) <= Nanos(options_.max_gap_s)) {
-      sink_.paired({scan, odometry_.back().T_odom_robot});
+      Pair(scan, odometry_.back().T_odom_robot);
     } else {
       sink_.dropped(*scan, DropReason::kNoOdometry);
     }

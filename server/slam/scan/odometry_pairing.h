@@ -1,6 +1,9 @@
-// Gives every scan the odometry at its stamp, whatever the order in which the two streams arrive: scans wait until
-// odometry at or after their stamp is there, then get it by interpolation. Decides from stamps alone, so the same two
-// streams give the same pairs however they interleave, as long as no bound is hit. Bounded. Not thread-safe.
+// Gives every scan the odometry pose at its stamp, independently of the order in which the two streams
+// arrive: a scan waits until there is a sample at or after its stamp, and then gets an interpolated pose. All
+// decisions depend on stamps alone, so the same two streams give the same pairs however they interleave, as
+// long as no bound is reached and no clock is set back. When a clock is set back, waiting scans are dropped, because
+// scans and odometry of two clocks cannot be joined; the time of the estimator still grows (PairedScan::stamp).
+// Memory is bounded. Not thread-safe.
 #pragma once
 
 #include <deque>
@@ -12,21 +15,23 @@
 #include "common/sensor/odometry.h"
 #include "common/sensor/scan.h"
 #include "common/service/ledger.h"
+#include "server/slam/scan/stamp_gate.h"
 
 namespace cairn::slam {
 
 struct PairingOptions {
-  double max_gap_s = 2.0;          // Between the two odometry samples around a scan; longer: the scan is dropped.
-  double max_stamp_jump_s = 3600;  // Ahead of the stream's last stamp; larger: refused until the clock proves itself.
-  std::int64_t jump_confirmations = 10;  // Consecutive stamps near the new time that prove a changed clock.
-  std::int64_t max_waiting_scans = 64;   // Scans without odometry yet; more: the oldest is dropped.
-  std::int64_t max_odometry = 1024;      // Samples kept; more: the oldest goes (poses are absolute: no motion is lost).
+  double max_gap_s = 2.0;
+  double max_stamp_jump_s = 10.0;
+  std::int64_t jump_confirmations = 5;
+  std::int64_t max_waiting_scans = 64;
+  std::int64_t max_odometry = 1024;  // Poses are absolute, so no motion is lost with a dropped sample.
 };
 void Visit(OptionVisitor& visitor, PairingOptions& options);
 
 struct PairedScan {
   std::shared_ptr<const Scan> scan;
   Pose2 T_odom_robot;
+  Stamp stamp = 0;  // The scan's, plus what the robot's clock was set back by: grows from pair to pair.
 };
 
 class OdometryPairing {
@@ -37,34 +42,38 @@ class OdometryPairing {
   };
 
   OdometryPairing(const PairingOptions& options, Sink sink);
+  OdometryPairing(const OdometryPairing&) = delete;
+  OdometryPairing& operator=(const OdometryPairing&) = delete;
 
-  // Both may call the sink, for this scan or for ones that waited, in stamp order.
+  // Both functions may call the sink, for this scan or for waiting ones, in the order of their stamps.
   void Add(std::shared_ptr<const Scan> scan);
-  // False where the sample is refused (stamp not after the last one's, or a jump).
-  bool Add(const Odometry& odometry);
-  // No more odometry will come: scans still waiting are used with the last odometry where it is at most max_gap_s old,
-  // else dropped.
+  void Add(const Odometry& odometry);
+  // From now on both streams come from another client, which numbers from the beginning.
+  void NewClient();
+  // Call this when no more odometry will come. A waiting scan is paired with the last sample if that is at
+  // most max_gap_s old, and is dropped otherwise.
   void Finish();
 
   [[nodiscard]] std::size_t waiting() const { return scans_.size(); }
+  // Odometry samples refused so far for their stamps.
+  [[nodiscard]] std::uint64_t odometry_refused() const { return odometry_refused_; }
 
  private:
-  // Refuses stamps that repeat, go back or jump ahead; learns a clock that was set ahead. One set back for good needs
-  // a new session: poses already given out cannot be followed by earlier ones.
-  struct StampGate {
-    bool has_last = false;
-    Stamp last = 0;
-    std::int64_t agreeing = 0;  // Consecutive stamps that agree on a new time, `candidate` the last of them.
-    Stamp candidate = 0;
-    std::optional<DropReason> Check(Stamp stamp, const PairingOptions& options);
-  };
+  void Take(std::shared_ptr<const Scan>&& scan);
+  void Take(const Odometry& odometry);
+  void ClockSetBack();
   void Flush();
+  void Pair(const std::shared_ptr<const Scan>& scan, const Pose2& T_odom_robot);
 
   PairingOptions options_;
   Sink sink_;
-  StampGate scan_gate_, odometry_gate_;
   std::deque<std::shared_ptr<const Scan>> scans_;
   std::deque<Odometry> odometry_;
+  std::optional<Stamp> last_paired_;  // In the estimator's time.
+  std::uint64_t set_back_ns_ = 0;     // The estimator's time less the robot's, modulo 2^64.
+  std::uint64_t odometry_refused_ = 0;
+  StampGate<std::shared_ptr<const Scan>> scan_gate_;
+  StampGate<Odometry> odometry_gate_;
 };
 
 }  // namespace cairn::slam

@@ -8,13 +8,14 @@
 namespace cairn::slam {
 namespace {
 
-// Readings that have become one point.
+// Several readings that were replaced by one point.
 struct Cloud {
   Eigen::Vector2d centre;
   double readings;
 };
 
-// The clouds sorted by squares of one window's side, so that those within a window lie in nine squares.
+// The clouds sorted into squares with the side of a window. All clouds within a window of a point lie in the
+// nine squares around it.
 class Squares {
  public:
   Squares(const std::vector<Cloud>& clouds, double side_m) : side_m_(side_m) {
@@ -23,7 +24,7 @@ class Squares {
     std::sort(order_.begin(), order_.end());
   }
 
-  // The clouds in the squares around a point, in their own order.
+  // Finds the clouds in the nine squares around a point, in ascending order of their indices.
   void Near(const Eigen::Vector2d& p, std::vector<std::size_t>& found) const {
     found.clear();
     const auto [x, y] = SquareOf(p);
@@ -36,7 +37,7 @@ class Squares {
   }
 
  private:
-  // Whole numbers kept as double: a far point does not overflow.
+  // Whole numbers, stored as double so that the square of a distant point does not overflow.
   using Square = std::array<double, 2>;
   struct Entry {
     Square square;
@@ -53,7 +54,7 @@ class Squares {
   std::vector<Entry> order_;
 };
 
-// Places a window on every cloud that no earlier window took.
+// Places a window around every cloud that no earlier window contains, and merges the clouds in it.
 std::vector<Cloud> MoveWindow(const std::vector<Cloud>& clouds, double window_m) {
   const Squares squares(clouds, window_m);
   std::vector<char> taken(clouds.size(), 0);
@@ -78,8 +79,9 @@ std::vector<Cloud> MoveWindow(const std::vector<Cloud>& clouds, double window_m)
 }  // namespace
 
 void Visit(OptionVisitor& visitor, ThinningOptions& options) {
-  visitor.Real("window_m", options.window_m, "m", 0.0, 1.0,
-               "Points nearer than this become their centre of gravity; 0: none.");
+  visitor.Real(
+      "window_m", options.window_m, "m", 0.0, 1.0,
+      "Points within this distance are replaced by their mean. A larger value leaves fewer points; 0 keeps all.");
 }
 
 std::vector<Eigen::Vector2d> ThinByCentreOfGravity(std::span<const Eigen::Vector2d> points,
@@ -88,8 +90,8 @@ std::vector<Eigen::Vector2d> ThinByCentreOfGravity(std::span<const Eigen::Vector
   clouds.reserve(points.size());
   for (const Eigen::Vector2d& p : points)
     if (p.allFinite()) clouds.push_back({p, 1.0});
-  // Centres of neighbouring windows can come nearer to each other than the window; one pass is nearly always enough,
-  // and each one more leaves fewer clouds, so it ends.
+  // After a pass the centres of neighbouring windows can be nearer to each other than the window. Passes are
+  // repeated until the number of clouds no longer falls; one pass is nearly always enough.
   for (std::size_t before = clouds.size() + 1; options.window_m > 0.0 && clouds.size() < before;) {
     before = clouds.size();
     clouds = MoveWindow(clouds, options.window_m);

@@ -1,6 +1,7 @@
-// Scans whose plane is turned about the laser's y axis. A scanner that nods sees floor, ceiling and the tops of things:
-// for the planar estimator such a scan is no evidence, however well its points project. Small tilts (a bumpy floor, a
-// mount a degree off) are projected on the ground. Stateless, thread-safe.
+// Scans whose plane is turned about the laser's y axis. A nodding scanner also sees the floor, the ceiling
+// and the tops of things. The planar estimator does not use such a scan, however well its points project.
+// Small tilts (a bumpy floor, a mount that is a degree off) are projected on the ground. Stateless,
+// thread-safe.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,7 +15,8 @@ namespace cairn::slam {
   return std::abs(scan.tilt_rad) > max_tilt_rad;
 }
 
-// Where a beam of `range_m` ends, in the laser's frame seen from above: lengths along its x axis shrink.
+// The end of a beam of length `range_m`, in the laser frame seen from above. Lengths along the laser's x axis
+// shrink by `cos_tilt`.
 [[nodiscard]] inline Eigen::Vector2d OnGround(double range_m, double bearing_rad, double cos_tilt) {
   return {range_m * std::cos(bearing_rad) * cos_tilt, range_m * std::sin(bearing_rad)};
 }

@@ -1,30 +1,33 @@
-// What smoothing answers for one robot: its whole path, and the grid drawn anew along it, beside how well its scans
-// agree with that and with what the robot was told at the time. Where no place was seen again there is nothing to fit:
-// the best particle's path is one sample of many, the online path their mean, and the one the scans agree with better
-// is the answer. With `pose_graph.enabled` off it is the best particle's in any case (thesis A 5.4). Stateless,
-// thread-safe, deterministic. May take seconds on long paths.
+// The result of smoothing one robot's data: its whole path, the grid drawn anew along that path, and how well
+// the scans agree with this grid and with the grid along the online path. If no place was seen again there is
+// nothing to optimise. Then two paths are compared, the best particle's (one sample of many) and the online
+// path (their mean), and the result is the one with which the scans agree better. With `pose_graph.enabled`
+// off it is always the best particle's path (thesis A 5.4).
+// Stateless, thread-safe, deterministic. May take seconds on long paths.
 #pragma once
 
 #include <functional>
 #include <optional>
 #include <vector>
 
-#include "server/slam/keyframe.h"
-#include "server/slam/smoothing/disagreement.h"
+#include "server/slam/grid/disagreement.h"
+#include "server/slam/trail/keyframe.h"
 
 namespace cairn::slam {
 
 struct SmoothedMap {
   std::vector<Pose2> path;  // T_map_robot, one per keyframe.
   OccupancyGrid grid;       // Drawn along `path`.
-  Disagreement before;      // Of the online path with the grid drawn along it,
-  Disagreement after;       // and of `path` with `grid`.
+  Disagreement before;      // The scans along the online path against the grid drawn along it.
+  Disagreement after;       // The scans along `path` against `grid`.
 };
 
-inline constexpr int kSmoothingStepsPerKeyframe = 4;  // Two paths, each drawn and compared.
+inline constexpr int kSmoothingStepsPerKeyframe = 4;  // Two paths are each drawn and compared.
 
-// `next` is called before each step, and ends the work where it answers false; then there is no answer.
+// `next` is called before each step, and `go_on` between the iterations of the optimisation. If either
+// returns false, the work ends and there is no result.
 [[nodiscard]] std::optional<SmoothedMap> SmoothMap(const MapperSnapshot& snapshot, const GridOptions& options,
-                                                   const std::function<bool()>& next);
+                                                   const std::function<bool()>& next,
+                                                   const std::function<bool()>& go_on = {});
 
 }  // namespace cairn::slam

@@ -59,7 +59,7 @@ TEST(LogCheck, AGoodLogIsGood) {
   EXPECT_GT(report.way_m, 5.0);
   EXPECT_LT(report.fastest_m_s, 1.2);
   EXPECT_THAT(FormatLogReport(report), HasSubstr("good for mapping"));
-  EXPECT_EQ(ToJson(report)["good"], true);
+  EXPECT_EQ(nlohmann::json(report)["good"], true);
 }
 
 TEST(LogCheck, StampsThatRepeatOrGoBackAreErrors) {

@@ -41,7 +41,7 @@ TEST(ScanAccount, NamesTheReasons) {
   const ScanAccount account = AccountScans(13, {}, MakeLedger(13, 10, 2));
   EXPECT_EQ(FormatAccount(account),
             "sent 13, used 10 (0 keyframes), dropped 2 (no_odometry 2), waiting 0, unexplained 1");
-  const nlohmann::json json = ToJson(account);
+  const nlohmann::json json = nlohmann::json(account);
   EXPECT_EQ(json["dropped"], (nlohmann::json{{"no_odometry", 2}}));
   EXPECT_EQ(json["unexplained"], 1);
 }

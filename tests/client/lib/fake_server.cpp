@@ -149,6 +149,11 @@ void FakeServer::OnRequest(Request&& request) {
       reply.map_epoch = 3;
       reply.map_version = 9;
       reply.tiles.resize(1);
+      if (request.site == "drawn") {
+        reply.tiles[0].encoding = TileEncoding::kRaw;
+        reply.tiles[0].bytes.assign(kTileArea, 100);
+        break;
+      }
       reply.tiles[0].bytes.resize(50000);
       reply.last = false;
       for (; reply.part + 1 < kTileParts; ++reply.part) {
@@ -164,13 +169,17 @@ void FakeServer::OnRequest(Request&& request) {
       reply.jobs.resize(1);
       reply.jobs[0].id = request.kind == RequestKind::kJobSubmit ? 42 : request.job;
       reply.jobs[0].site = request.site;
+      if (request.kind == RequestKind::kJobGet) {
+        const MutexLock lock(mutex_);
+        const bool ended = ++asked_for_job_[request.job] >= kAnswersUntilJobEnds;
+        reply.jobs[0].state = ended ? JobState::kSucceeded : JobState::kRunning;
+      }
       break;
     case RequestKind::kLandmarks:
       reply.landmarks.resize(2);
       break;
     case RequestKind::kMapInfo:
-      reply.maps.resize(1);
-      reply.maps[0].site = request.site;
+      reply.maps.push_back(MapOf(request.site));
       break;
     case RequestKind::kStatus:
       reply.robots.resize(3);
@@ -181,10 +190,27 @@ void FakeServer::OnRequest(Request&& request) {
     case RequestKind::kSessionEnd:
       break;
     case RequestKind::kMapEnable:
-      reply.status = {StatusCode::kNotFound, "no version " + std::to_string(request.map_version)};
+      if (request.map_version > kMapVersions) {
+        reply.status = {StatusCode::kNotFound, "no version " + std::to_string(request.map_version)};
+      } else {
+        const MutexLock lock(mutex_);
+        enabled_version_ = request.map_version;
+      }
       break;
   }
   Must(replies_->Publish(reply));
+}
+
+MapInfo FakeServer::MapOf(const std::string& site) {
+  const MutexLock lock(mutex_);
+  MapInfo info;
+  info.site = site;
+  info.resolution_m = 0.1;
+  info.enabled_version = enabled_version_;
+  for (std::uint32_t version = 1; version <= kMapVersions; ++version) {
+    info.versions.push_back({version, version == enabled_version_, 0, ""});
+  }
+  return info;
 }
 
 }  // namespace cairn::test

@@ -34,12 +34,18 @@ class FakeServer {
   [[nodiscard]] std::vector<RequestKind> asked() const;
   [[nodiscard]] std::uint64_t datagrams_refused() const { return bus_->datagrams_refused(); }
 
-  static constexpr std::uint32_t kTileParts = 40;  // Of the answer to every tile query, one tile of 50 KB each.
+  // Tile queries are answered with so many parts of one tile of 50 KB each, which hold no image; those about the site
+  // `drawn` with one tile of occupied cells.
+  static constexpr std::uint32_t kTileParts = 40;
+  // Sites have map versions 1 to kMapVersions. The last one is enabled at first.
+  static constexpr std::uint32_t kMapVersions = 3;
+  static constexpr int kAnswersUntilJobEnds = 3;  // A job runs until it was asked for so often.
 
  private:
   void OnSession(SessionRequest&& request);
   void OnScan(ScanSample&& sample);
   void OnRequest(Request&& request);
+  [[nodiscard]] MapInfo MapOf(const std::string& site);
   void Report(const StreamId& stream) CAIRN_REQUIRES(mutex_);
 
   struct Account {
@@ -59,6 +65,8 @@ class FakeServer {
   ScanSample last_scan_ CAIRN_GUARDED_BY(mutex_);
   int odometry_received_ CAIRN_GUARDED_BY(mutex_) = 0;
   std::vector<RequestKind> asked_ CAIRN_GUARDED_BY(mutex_);
+  std::uint32_t enabled_version_ CAIRN_GUARDED_BY(mutex_) = kMapVersions;
+  std::map<std::uint64_t, int> asked_for_job_ CAIRN_GUARDED_BY(mutex_);
 
   std::unique_ptr<wire::Bus> bus_;
   std::unique_ptr<wire::Publication<SessionState>> sessions_;

@@ -24,17 +24,17 @@ TEST_F(QueryClientTest, AsksEveryKindOfQuestion) {
   EXPECT_EQ(Must(client_->Ping()), "fake");
   EXPECT_EQ(Must(client_->Pose("r1")).stamp, -1);
   EXPECT_EQ(Must(client_->Pose("r1", 77)).stamp, 77);
-  EXPECT_EQ(Must(client_->Path("r1")).size(), 1U);
-  EXPECT_EQ(Must(client_->Path("r1", true)).size(), 2U);
+  EXPECT_EQ(Must(client_->Path("r1")).poses.size(), 1U);
+  EXPECT_EQ(Must(client_->Path("r1", true)).poses.size(), 2U);
   EXPECT_EQ(Must(client_->Landmarks("hall")).size(), 2U);
-  EXPECT_EQ(Must(client_->Maps("hall")).at(0).site, "hall");
+  EXPECT_EQ(Must(client_->Maps()).size(), 1U);
+  EXPECT_EQ(Must(client_->Map("hall")).site, "hall");
   EXPECT_EQ(Must(client_->Robots()).size(), 3U);
   EXPECT_EQ(Must(client_->SubmitJob("hall", JobKind::kSmooth)).id, 42U);
   EXPECT_EQ(Must(client_->GetJob(5)).id, 5U);
   EXPECT_EQ(Must(client_->CancelJob(6)).id, 6U);
   EXPECT_EQ(Must(client_->Jobs()).size(), 2U);
   EXPECT_TRUE(client_->EndSession("r1"));
-  EXPECT_FALSE(client_->EnableMap("hall", 3));
 }
 
 TEST_F(QueryClientTest, PutsThePartsOfAnAnswerTogether) {
@@ -47,22 +47,50 @@ TEST_F(QueryClientTest, PutsThePartsOfAnAnswerTogether) {
   for (std::size_t i = 0; i < answer.tiles.size(); ++i) EXPECT_EQ(answer.tiles[i].key.x, static_cast<int>(i));
 }
 
+TEST_F(QueryClientTest, AMapImageIsTheTilesOfTheFinestLevelPutTogether) {
+  const OccupancyImage image = Must(client_->MapImage("drawn"));
+  EXPECT_EQ(image.width, kTileCells);
+  EXPECT_EQ(image.height, kTileCells);
+  EXPECT_EQ(image.resolution_m, 0.1) << "the map's, not the default";
+  EXPECT_EQ(image.cells.at(0), 100);
+}
+
+TEST_F(QueryClientTest, SwitchesToAMapVersionAndBack) {
+  EXPECT_EQ(Must(client_->RollBackMap("hall")).enabled_version, 2U);
+  EXPECT_EQ(Must(client_->RollBackMap("hall")).enabled_version, 1U);
+  const Result<MapInfo> none = client_->RollBackMap("hall");
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().code, StatusCode::kFailedPrecondition);
+  EXPECT_EQ(Must(client_->EnableMap("hall", 3)).enabled_version, 3U);
+}
+
+TEST_F(QueryClientTest, WaitsForAJobUntilItEndsOrTheCallerHasEnough) {
+  int running = 0;
+  const Job ended = Must(client_->WaitForJob(5, [&](const Job& job) { return ++running, !IsFinal(job.state); }));
+  EXPECT_EQ(ended.state, JobState::kSucceeded);
+  EXPECT_EQ(running, FakeServer::kAnswersUntilJobEnds - 1);
+  EXPECT_EQ(Must(client_->WaitForJob(6, [](const Job&) { return false; })).state, JobState::kRunning);
+  server_.SetAnswering(false);
+  const auto impatient = Must(QueryClient::Create(*bus_, {.timeout_s = 0.2}));
+  EXPECT_FALSE(impatient->WaitForJob(7)) << "a server that does not answer ends the wait";
+}
+
 TEST_F(QueryClientTest, PassesTheServersErrorOn) {
-  const Result<void> enabled = client_->EnableMap("hall", 3);
+  const Result<MapInfo> enabled = client_->EnableMap("hall", 7);
   ASSERT_FALSE(enabled);
   EXPECT_EQ(enabled.error().code, StatusCode::kNotFound);
-  EXPECT_EQ(enabled.error().message, "no version 3");
+  EXPECT_EQ(enabled.error().message, "no version 7");
 }
 
 TEST_F(QueryClientTest, SaysWhatWasNotAnsweredInTime) {
-  ASSERT_TRUE(client_->Ping());
+  const auto impatient = Must(QueryClient::Create(*bus_, {.timeout_s = 0.2}));
+  int asked = 0;  // Until the two have found each other, which takes as long as the machine is busy.
+  while (!impatient->Ping()) ASSERT_LT(++asked, 100);
   server_.SetAnswering(false);
-  Request request;
-  request.kind = RequestKind::kPath;
-  const Result<Reply> reply = client_->Ask(request, 0.2);
-  ASSERT_FALSE(reply);
-  EXPECT_EQ(reply.error().code, StatusCode::kDeadlineExceeded);
-  EXPECT_THAT(reply.error().message, ::testing::HasSubstr("path"));
+  const Result<PathAnswer> path = impatient->Path("r1");
+  ASSERT_FALSE(path);
+  EXPECT_EQ(path.error().code, StatusCode::kDeadlineExceeded);
+  EXPECT_EQ(path.error().message, "no answer to path within 0.2 s");
 }
 
 // A question that does something must not be asked twice, however slowly the two sides find each other.

@@ -208,7 +208,7 @@ TEST_P(ShippedWorld, RobotsDriveItsRoutesClearOfEverything) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, ShippedWorld, ::testing::ValuesIn(ShippedWorldNames()),
+INSTANTIATE_TEST_SUITE_P(All, ShippedWorld, ::testing::Values("building", "office", "corridor", "room"),
                          [](const auto& param) { return param.param; });
 
 TEST(Fleet, RefusesWhatCannotBe) {

@@ -78,13 +78,19 @@ TEST(Config, PrintsMeaningUnitAndRange) {
   SampleOptions options;
   EXPECT_EQ(PrintYaml(VisitorOf(options)),
             "slam:  # the estimator\n"
-            "  length_m: 0.1  # how long [0.01..10 m]\n"
-            "  particles: 200  # how many [1..10000]\n"
+            "  # how long\n"
+            "  length_m: 0.1  # [0.01..10 m]\n"
+            "  # how many\n"
+            "  particles: 200  # [1..10000]\n"
             "  inner:\n"
-            "    inner_rad: 0.3333333333333333  # turn [-4..4 rad]\n"
-            "  model: fast  # which [fast or exact]\n"
-            "enabled: true  # whether\n"
-            "name: \"floor\"  # what it is called\n");
+            "    # turn\n"
+            "    inner_rad: 0.3333333333333333  # [-4..4 rad]\n"
+            "  # which\n"
+            "  model: fast  # [fast or exact]\n"
+            "# whether\n"
+            "enabled: true\n"
+            "# what it is called\n"
+            "name: \"floor\"\n");
 }
 
 TEST(Config, ReadsAFile) {

@@ -25,7 +25,6 @@ TEST(DpslamReader, OptionsGiveOffsetRangeAndPeriod) {
   EXPECT_EQ(log.scans.at(0).T_robot_laser, (Pose2{0.1, 0, 0}));
   EXPECT_EQ(log.scans[0].range_max_m, 5.0);
   EXPECT_EQ(log.scans[0].stamp, 500'000'000);
-  EXPECT_EQ(log.scans[0].scan_period_s, 0.5);
   EXPECT_DOUBLE_EQ(log.scans[0].angle_step_rad, kPi / 2);
 }
 

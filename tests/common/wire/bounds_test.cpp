@@ -54,7 +54,7 @@ TEST(Bounds, RefuseUnknownEnumValues) {
   pose.reason(static_cast<v1::PoseReason>(0xffffffffU));
   ExpectRefused(pose, "reason");
   v1::Job job = ToWire(ExtremeJob());
-  job.kind(static_cast<v1::JobKind>(3));
+  job.kind(static_cast<v1::JobKind>(1));
   ExpectRefused(job, "kind");
   job = ToWire(ExtremeJob());
   job.state(static_cast<v1::JobState>(5));

@@ -68,9 +68,10 @@ TEST(Convert, NumbersOfTheIdlEnumsAreThoseOfTheValues) {
   EXPECT_EQ(static_cast<int>(v1::SESSION_SUSPENDED), static_cast<int>(SessionPhase::kSuspended));
   EXPECT_EQ(static_cast<int>(v1::POSE_WAITING), static_cast<int>(PoseReason::kWaiting));
   EXPECT_EQ(static_cast<int>(v1::DROP_SESSION_ENDED), static_cast<int>(DropReason::kSessionEnded));
-  EXPECT_EQ(static_cast<int>(v1::DROP_SESSION_ENDED) + 1, kDropReasonCount);
+  EXPECT_EQ(static_cast<int>(v1::DROP_SESSION_FULL), static_cast<int>(DropReason::kSessionFull));
+  EXPECT_EQ(static_cast<int>(v1::DROP_SESSION_FULL) + 1, kDropReasonCount);
   EXPECT_EQ(static_cast<int>(v1::TILE_PNG), static_cast<int>(TileEncoding::kPng));
-  EXPECT_EQ(static_cast<int>(v1::JOB_RELOCALISE), static_cast<int>(JobKind::kRelocalise));
+  EXPECT_EQ(static_cast<int>(v1::JOB_SMOOTH), static_cast<int>(JobKind::kSmooth));
   EXPECT_EQ(static_cast<int>(v1::JOB_CANCELLED), static_cast<int>(JobState::kCancelled));
   EXPECT_EQ(static_cast<int>(v1::REQUEST_SESSION_END), static_cast<int>(RequestKind::kSessionEnd));
   EXPECT_EQ(static_cast<int>(v1::REQUEST_MAP_ENABLE) + 1, kRequestKindCount);

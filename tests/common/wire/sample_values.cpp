@@ -97,7 +97,6 @@ ScanSample ExtremeScan(std::size_t beams) {
                 .range_min_m = -0.0,
                 .range_max_m = kInf,
                 .beam_period_s = std::numeric_limits<double>::quiet_NaN(),
-                .scan_period_s = 1e-9,
                 .tilt_rad = -1.25,
                 .T_robot_laser = {1, -2, 3},
                 .ranges_m = {}};
@@ -180,7 +179,7 @@ TileSample ExtremeTile(std::size_t bytes) {
 Job ExtremeJob() {
   return {.id = kMax64,
           .site = Name('s'),
-          .kind = JobKind::kRelocalise,
+          .kind = JobKind::kSmooth,
           .state = JobState::kCancelled,
           .progress = 1.0,
           .cost_before = kMax,
@@ -207,7 +206,7 @@ Request ExtremeRequest() {
   value.since_epoch = kMax32;
   value.since_version = kMax64;
   value.job = kMax64 - 1;
-  value.job_kind = JobKind::kRelocalise;
+  value.job_kind = JobKind::kSmooth;
   value.enable = false;
   value.map_version = kMax32;
   return value;
@@ -256,8 +255,7 @@ bool Same(const ScanSample& a, const ScanSample& b) {
   return Eq(a.stream, b.stream) && s.sequence == t.sequence && s.stamp == t.stamp &&
          Eq(s.angle_first_rad, t.angle_first_rad) && Eq(s.angle_step_rad, t.angle_step_rad) &&
          Eq(s.range_min_m, t.range_min_m) && Eq(s.range_max_m, t.range_max_m) && Eq(s.beam_period_s, t.beam_period_s) &&
-         Eq(s.scan_period_s, t.scan_period_s) && Eq(s.tilt_rad, t.tilt_rad) && Eq(s.T_robot_laser, t.T_robot_laser) &&
-         s.ranges_m.size() == t.ranges_m.size() &&
+         Eq(s.tilt_rad, t.tilt_rad) && Eq(s.T_robot_laser, t.T_robot_laser) && s.ranges_m.size() == t.ranges_m.size() &&
          (s.ranges_m.empty() || std::memcmp(s.ranges_m.data(), t.ranges_m.data(), s.ranges_m.size() * 4) == 0);
 }
 bool Same(const OdometrySample& a, const OdometrySample& b) {

@@ -51,6 +51,12 @@ TEST(Admission, TellsEmptyFromTooManyFromBadGeometry) {
   scan = RoomScan(3);
   scan.beam_period_s = -1.0;
   EXPECT_EQ(RefusalOf(scan), DropReason::kBadGeometry);
+  // Limits that make every range unusable are bad geometry, not an empty scan.
+  scan = RoomScan(3);
+  scan.ranges_m.assign(50, 1.0F);
+  scan.range_min_m = 5.0;
+  scan.range_max_m = 4.0;
+  EXPECT_EQ(RefusalOf(scan), DropReason::kBadGeometry);
 }
 
 TEST(Admission, OdometryThatIsNoPoseIsRefused) {

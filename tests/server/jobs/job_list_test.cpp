@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <stdexcept>
+
 #include "server/jobs/job_worker.h"
 
 namespace cairn::server {
@@ -10,16 +12,17 @@ namespace {
 class JobListTest : public ::testing::Test {
  protected:
   JobsOptions options_{.max_kept = 3};
-  bool full_ = false;
-  std::vector<Job> sent_;
+  // What was published since the last call.
+  std::vector<Job> TakeSent() {
+    std::vector<Job> sent;
+    while (auto value = outbound_.lane(Outbound::Lane::kLive).TryPop()) sent.push_back(std::get<Job>(*value));
+    return sent;
+  }
+
+  static constexpr std::size_t kLane = 32;
+  Outbound outbound_{kLane};
   Stamp now_ = 100;
-  JobList list_{options_,
-                [this](OutboundValue value) {
-                  if (full_) return false;
-                  sent_.push_back(std::get<Job>(value));
-                  return true;
-                },
-                [this] { return now_; }};
+  JobList list_{options_, outbound_, [this] { return now_; }};
 };
 
 TEST_F(JobListTest, EveryChangeOfStateIsPublishedWithItsTime) {
@@ -29,25 +32,26 @@ TEST_F(JobListTest, EveryChangeOfStateIsPublishedWithItsTime) {
   EXPECT_TRUE(list_.Start(job->id));
   now_ = 300;
   list_.Succeed(job->id, {.cost_before = 2.0, .cost_after = 1.0, .map_version = 4, .message = "fine"});
-  ASSERT_EQ(sent_.size(), 3U);
-  EXPECT_EQ(sent_[0].state, JobState::kQueued);
-  EXPECT_EQ(sent_[0].submitted, 100);
-  EXPECT_EQ(sent_[1].state, JobState::kRunning);
-  EXPECT_EQ(sent_[1].started, 200);
-  EXPECT_EQ(sent_[2].state, JobState::kSucceeded);
-  EXPECT_EQ(sent_[2].ended, 300);
-  EXPECT_EQ(sent_[2].map_version, 4U);
+  const std::vector<Job> sent = TakeSent();
+  ASSERT_EQ(sent.size(), 3U);
+  EXPECT_EQ(sent[0].state, JobState::kQueued);
+  EXPECT_EQ(sent[0].submitted, 100);
+  EXPECT_EQ(sent[1].state, JobState::kRunning);
+  EXPECT_EQ(sent[1].started, 200);
+  EXPECT_EQ(sent[2].state, JobState::kSucceeded);
+  EXPECT_EQ(sent[2].ended, 300);
+  EXPECT_EQ(sent[2].map_version, 4U);
 }
 
 TEST_F(JobListTest, ProgressOnlyGrowsAndIsThrottled) {
   const auto job = list_.Add("lab", JobKind::kSmooth);
   EXPECT_TRUE(list_.Start(job->id));
   const auto control = list_.ControlOf(job->id);
-  const std::size_t before = sent_.size();
+  TakeSent();
   for (int i = 1; i <= 1000; ++i) control->Progress(i / 1000.0);
   control->Progress(0.5);
   EXPECT_EQ(list_.Find(job->id)->progress, 1.0);
-  EXPECT_LT(sent_.size() - before, 20U);
+  EXPECT_LT(TakeSent().size(), 20U);
 }
 
 TEST_F(JobListTest, AQueuedJobIsCancelledAtOnceARunningOneWhenItLooks) {
@@ -77,30 +81,29 @@ TEST_F(JobListTest, ForgetsTheOldestFinishedJobAndRefusesWhenNoneIs) {
 }
 
 TEST_F(JobListTest, WhatCouldNotBeSentIsSentLater) {
-  full_ = true;
+  for (std::size_t i = 0; i < kLane; ++i) ASSERT_TRUE(outbound_.Send(Job{}));
   const auto job = list_.Add("lab", JobKind::kSmooth);
-  EXPECT_TRUE(sent_.empty());
-  full_ = false;
+  EXPECT_EQ(TakeSent().size(), kLane);
   list_.Tick();
-  ASSERT_EQ(sent_.size(), 1U);
-  EXPECT_EQ(sent_[0].id, job->id);
+  const std::vector<Job> sent = TakeSent();
+  ASSERT_EQ(sent.size(), 1U);
+  EXPECT_EQ(sent[0].id, job->id);
   list_.Tick();
-  EXPECT_EQ(sent_.size(), 1U);
+  EXPECT_TRUE(TakeSent().empty());
 }
 
 TEST(JobWorker, RunsOneAfterTheOtherRefusesWhenFullAndStopsByCancelling) {
   JobsOptions options;
   options.max_queued = 1;
-  JobList list(
-      options, [](OutboundValue) { return true; }, [] { return Stamp{0}; });
+  Outbound outbound(32);
+  JobList list(options, outbound, [] { return Stamp{0}; });
   BoundedChannel<std::uint64_t> started(8);
-  JobWorker worker(options, list, {{JobKind::kSmooth, [&](const Job& job, bool, const JobControl& control) {
-                                      EXPECT_TRUE(started.TryPush(std::uint64_t{job.id}));
-                                      while (!control.cancelled()) std::this_thread::yield();
-                                      return Result<JobOutcome>(Fail(StatusCode::kCancelled, "cancelled"));
-                                    }}});
+  JobWorker worker(options, list, [&](const Job& job, bool, const JobControl& control) {
+    EXPECT_TRUE(started.TryPush(std::uint64_t{job.id}));
+    while (!control.cancelled()) std::this_thread::yield();
+    return Result<JobOutcome>(Fail(StatusCode::kCancelled, "cancelled"));
+  });
   worker.Start();
-  EXPECT_EQ(worker.Submit("lab", JobKind::kExport, true).error().code, StatusCode::kUnimplemented);
   const auto first = worker.Submit("lab", JobKind::kSmooth, true);
   ASSERT_TRUE(first);
   EXPECT_EQ(started.Pop(), first->id);
@@ -112,6 +115,29 @@ TEST(JobWorker, RunsOneAfterTheOtherRefusesWhenFullAndStopsByCancelling) {
   worker.Stop();
   EXPECT_EQ(list.Find(first->id)->state, JobState::kCancelled);
   EXPECT_EQ(list.Find(second->id)->state, JobState::kCancelled);
+}
+
+// An exception in a job (no memory, a bug in a library) ended the process and with it every robot's session.
+TEST(JobWorker, AnExceptionFailsTheJobAndTheNextOneIsDone) {
+  const JobsOptions options;
+  Outbound outbound(32);
+  JobList list(options, outbound, [] { return Stamp{0}; });
+  JobWorker worker(options, list, [](const Job& job, bool, const JobControl&) -> Result<JobOutcome> {
+    if (job.site == "bad") throw std::runtime_error("out of luck");
+    return JobOutcome{};
+  });
+  const auto bad = worker.Submit("bad", JobKind::kSmooth, true);
+  const auto good = worker.Submit("good", JobKind::kSmooth, true);
+  worker.Start();
+  const auto over = [&](std::uint64_t id) {
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(10);
+    while (!IsFinal(list.Find(id)->state) && std::chrono::steady_clock::now() < deadline) std::this_thread::yield();
+    return *list.Find(id);
+  };
+  EXPECT_EQ(over(bad->id).state, JobState::kFailed);
+  EXPECT_NE(over(bad->id).message.find("out of luck"), std::string::npos);
+  EXPECT_EQ(over(good->id).state, JobState::kSucceeded);
+  worker.Stop();
 }
 
 }  // namespace

@@ -26,26 +26,8 @@ SessionMaterial Material() {
   return material;
 }
 
-class SmoothJobTest : public ::testing::Test {
+class SmoothSiteTest : public ::testing::Test {
  protected:
-  SmoothPorts Ports() {
-    return {.collect = [this](const std::string&, const JobControl&) -> Result<std::vector<SessionMaterial>> {
-              return material_;
-            },
-            .add_version =
-                [this](const std::string&, MapVersion&& version) {
-                  added_ = std::move(version);
-                  return Result<std::uint32_t>(2U);
-                },
-            .enable =
-                [this](const std::string&, std::uint32_t version) {
-                  enabled_ = version;
-                  return Result<std::uint32_t>(version);
-                }};
-  }
-  std::vector<SessionMaterial> material_ = {Material()};
-  MapVersion added_;
-  std::uint32_t enabled_ = 0;
   std::vector<double> progress_;
   JobControl control_{[this](double progress) { progress_.push_back(progress); }};
   Job job_ = [] {
@@ -56,47 +38,40 @@ class SmoothJobTest : public ::testing::Test {
   }();
 };
 
-TEST_F(SmoothJobTest, RedrawsTheMapAlongTheFullPathAndSaysHowMuchBetterItFits) {
-  const auto outcome = SmoothJob(Ports()).Run(job_, true, control_);
-  ASSERT_TRUE(outcome);
-  EXPECT_LT(outcome->cost_after, outcome->cost_before);
-  EXPECT_EQ(outcome->map_version, 2U);
-  EXPECT_EQ(enabled_, 2U);
-  EXPECT_EQ(added_.info.job, 9U);
+TEST_F(SmoothSiteTest, RedrawsTheMapAlongTheFullPathAndSaysHowMuchBetterItFits) {
+  const auto smoothed = SmoothSite(job_, {Material()}, control_);
+  ASSERT_TRUE(smoothed);
+  EXPECT_LT(smoothed->outcome.cost_after, smoothed->outcome.cost_before);
+  EXPECT_EQ(smoothed->version.info.job, 9U);
   slam::OccupancyGrid expected{slam::GridOptions{}};
   for (int k = 0; k < kKeyframes; ++k) expected.Draw(RoomScan(4 * k), TruePose(4 * k));
-  const auto& chunks = added_.parts.at(5).chunks;
-  ASSERT_EQ(chunks.size(), expected.chunks().size());
-  for (const auto& [key, chunk] : expected.chunks()) EXPECT_EQ(chunks.at(key)->log_odds, chunk->log_odds);
-  EXPECT_EQ(added_.parts.at(5).keyframes, static_cast<std::size_t>(kKeyframes));
-  EXPECT_EQ(added_.smoothed.at("r1")->size(), static_cast<std::size_t>(kKeyframes));
+  const RobotGrid& part = smoothed->version.parts.at(5);
+  ASSERT_EQ(part.chunks.size(), expected.chunk_count());
+  expected.ForEachChunk([&](const slam::ChunkKey& key, const slam::GridChunk& chunk) {
+    EXPECT_EQ(part.chunks.at(key)->log_odds, chunk.log_odds);
+  });
+  EXPECT_EQ(part.keyframes, static_cast<std::size_t>(kKeyframes));
+  EXPECT_EQ(smoothed->version.smoothed.at("r1")->size(), static_cast<std::size_t>(kKeyframes));
 }
 
-TEST_F(SmoothJobTest, ProgressGoesFromNothingToAll) {
-  ASSERT_TRUE(SmoothJob(Ports()).Run(job_, true, control_));
+TEST_F(SmoothSiteTest, ProgressGoesFromNothingToAll) {
+  ASSERT_TRUE(SmoothSite(job_, {Material()}, control_));
   ASSERT_EQ(progress_.size(), 4U * kKeyframes);
   EXPECT_TRUE(std::is_sorted(progress_.begin(), progress_.end()));
   EXPECT_EQ(progress_.front(), 0.0);
   EXPECT_GT(progress_.back(), 0.95);
 }
 
-TEST_F(SmoothJobTest, LeavesTheVersionDisabledWhereAskedTo) {
-  ASSERT_TRUE(SmoothJob(Ports()).Run(job_, false, control_));
-  EXPECT_EQ(enabled_, 0U);
-}
-
-TEST_F(SmoothJobTest, CancellingEndsItWithoutAVersion) {
+TEST_F(SmoothSiteTest, CancellingEndsItAtTheNextStep) {
   control_.Cancel();
-  const auto outcome = SmoothJob(Ports()).Run(job_, true, control_);
-  ASSERT_FALSE(outcome);
-  EXPECT_EQ(outcome.error().code, StatusCode::kCancelled);
-  EXPECT_TRUE(added_.parts.empty());
+  const auto smoothed = SmoothSite(job_, {Material()}, control_);
+  ASSERT_FALSE(smoothed);
+  EXPECT_EQ(smoothed.error().code, StatusCode::kCancelled);
   EXPECT_EQ(progress_.size(), 1U);
 }
 
-TEST_F(SmoothJobTest, ASiteWithoutScansFailsWithAReason) {
-  material_.clear();
-  EXPECT_EQ(SmoothJob(Ports()).Run(job_, true, control_).error().code, StatusCode::kFailedPrecondition);
+TEST_F(SmoothSiteTest, ASiteWithoutScansFailsWithAReason) {
+  EXPECT_EQ(SmoothSite(job_, {}, control_).error().code, StatusCode::kFailedPrecondition);
 }
 
 }  // namespace

@@ -47,6 +47,17 @@ TEST(MapVersions, TheOldestThatNobodyNeedsIsForgotten) {
   EXPECT_NE(versions.Find(4), nullptr);
 }
 
+// A job that ended while an older version was being enabled pushed that version out, and the switch ended the process.
+TEST(MapVersions, TheOneThatIsBeingSwitchedToIsNotForgotten) {
+  MapVersions versions(2);
+  EXPECT_EQ(versions.Add({}), 2U);
+  for (int i = 0; i < 3; ++i) versions.Add({}, 2);
+  ASSERT_NE(versions.Find(2), nullptr);
+  versions.Enable(2, {});
+  EXPECT_EQ(versions.enabled(), 2U);
+  EXPECT_EQ(versions.infos().size(), 3U);  // 1, 2 and the newest.
+}
+
 TEST(MapVersions, SmoothedPathsAreTheEnabledOnesOrTheNewest) {
   MapVersions versions(8);
   EXPECT_TRUE(versions.smoothed().empty());

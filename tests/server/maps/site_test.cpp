@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <future>
+#include <stdexcept>
 
 #include "server/maps/atlas.h"
 
@@ -16,22 +17,26 @@ std::shared_ptr<const slam::GridChunk> UniformChunk(std::int16_t log_odds) {
   return chunk;
 }
 
+using Corrections = std::vector<std::pair<SessionId, Correction>>;
+
+// A session that keeps its corrections and leaves the answers to the test.
+class FakeSession : public GridOwner {
+ public:
+  FakeSession(SessionId id, Corrections& corrections) : id_(id), corrections_(corrections) {}
+  void Adopt(Correction&& correction) override { corrections_.emplace_back(id_, std::move(correction)); }
+
+ private:
+  const SessionId id_;
+  Corrections& corrections_;
+};
+
 class SiteTest : public ::testing::Test {
  protected:
-  SiteTest() : pool_(1) {
-    SitePorts ports;
-    ports.send = [this](OutboundValue value) {
-      const MutexLock lock(mutex_);
-      if (full_) return false;
-      if (auto* tile = std::get_if<TileSample>(&value)) tiles_.push_back(std::move(*tile));
-      return true;
-    };
-    ports.correct = [this](const std::string&, SessionId session, Correction&& correction) {
-      if (gone_) return false;
-      corrections_.emplace_back(session, std::move(correction));
-      return true;
-    };
-    site_ = std::make_shared<Site>("lab", 0.05, MapsOptions{}, pool_, std::move(ports));
+  SiteTest() {
+    for (const SessionId id : {SessionId{1}, SessionId{2}}) {
+      sessions_[id] = std::make_shared<FakeSession>(id, corrections_);
+      site_->Join(100 + id, id, sessions_[id]);
+    }
   }
   ~SiteTest() override { pool_.join(); }
 
@@ -43,8 +48,11 @@ class SiteTest : public ::testing::Test {
   std::vector<TileSample> TakeTiles() {
     site_->Publish();
     Settle();
-    const MutexLock lock(mutex_);
-    return std::exchange(tiles_, {});
+    std::vector<TileSample> tiles;
+    while (auto value = outbound_.lane(Outbound::Lane::kMap).TryPop()) {
+      if (auto* tile = std::get_if<TileSample>(&*value)) tiles.push_back(std::move(*tile));
+    }
+    return tiles;
   }
   std::future<Result<std::uint32_t>> Enable(std::uint32_t version) {
     const auto promise = std::make_shared<std::promise<Result<std::uint32_t>>>();
@@ -60,13 +68,12 @@ class SiteTest : public ::testing::Test {
     return number.get_future().get();
   }
 
-  asio::thread_pool pool_;
-  Mutex mutex_;
-  bool full_ = false;
-  bool gone_ = false;
-  std::vector<TileSample> tiles_;
-  std::vector<std::pair<SessionId, Correction>> corrections_;
-  std::shared_ptr<Site> site_;
+  static constexpr std::size_t kLane = 64;
+  asio::thread_pool pool_{1};
+  Outbound outbound_{kLane};
+  Corrections corrections_;  // Written on the site's strand: read after Settle.
+  std::map<SessionId, std::shared_ptr<FakeSession>> sessions_;
+  std::shared_ptr<Site> site_ = std::make_shared<Site>("lab", 0.05, MapsOptions{.max_versions = 3}, pool_, outbound_);
 };
 
 TEST_F(SiteTest, PublishesOnlyWhatChanged) {
@@ -82,13 +89,9 @@ TEST_F(SiteTest, PublishesOnlyWhatChanged) {
 }
 
 TEST_F(SiteTest, TilesThatCouldNotBeSentGoOutLater) {
-  full_ = true;
+  for (std::size_t i = 0; i < kLane; ++i) ASSERT_TRUE(outbound_.Send(MapInfo{}));
   site_->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(100)}}});
   EXPECT_TRUE(TakeTiles().empty());
-  {
-    const MutexLock lock(mutex_);
-    full_ = false;
-  }
   EXPECT_EQ(TakeTiles().size(), 4U);
 }
 
@@ -136,7 +139,7 @@ TEST_F(SiteTest, ASwitchIsSeenAllAtOnceWithTombstones) {
 TEST_F(SiteTest, SessionsTheServerForgotAreSwitchedWithoutThem) {
   site_->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(100)}}});
   TakeTiles();
-  gone_ = true;
+  sessions_.clear();
   const std::uint32_t version = AddVersion({{1, {{{{0, 0}, UniformChunk(-100)}}, 3}}});
   EXPECT_TRUE(Enable(version).get());
   TakeTiles();
@@ -162,6 +165,36 @@ TEST_F(SiteTest, ASessionThatGoesWithoutAnsweringDoesNotHoldUpTheSwitch) {
   EXPECT_TRUE(enabled.get());
 }
 
+// The bound is three versions. Jobs end while version 2 is being enabled: it used to be forgotten, and the last answer
+// of the switch crashed the process.
+TEST_F(SiteTest, NewVersionsDoNotPushOutTheOneThatIsBeingEnabled) {
+  const std::uint32_t version = AddVersion({{1, {{{{0, 0}, UniformChunk(-100)}}, 3}}});
+  auto enabled = Enable(version);
+  ASSERT_EQ(corrections_.size(), 1U);
+  for (int job = 0; job < 4; ++job) AddVersion({});
+  corrections_.clear();  // The session goes without an answer.
+  const auto result = enabled.get();
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_EQ(site_->snapshot()->info.enabled_version, version);
+}
+
+// An exception on a site's strand ended the process and with it every robot's session.
+TEST_F(SiteTest, AnExceptionEndsThePieceOfWorkAndNotTheSite) {
+  site_->Probe([] { throw std::runtime_error("out of luck"); });
+  site_->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(100)}}});
+  EXPECT_EQ(TakeTiles().size(), 4U);
+  // Who waits for an answer gets one, and the next switch can begin.
+  class Thrower : public GridOwner {
+    void Adopt(Correction&&) override { throw std::runtime_error("out of luck"); }
+  };
+  const auto thrower = std::make_shared<Thrower>();
+  site_->Join(103, 3, thrower);
+  const std::uint32_t bad = AddVersion({{3, {{}, 1}}});
+  EXPECT_EQ(Enable(bad).get().error().code, StatusCode::kInternal);
+  const std::uint32_t good = AddVersion({});
+  EXPECT_EQ(*Enable(good).get(), good);
+}
+
 TEST_F(SiteTest, OneSwitchAtATime) {
   const std::uint32_t version = AddVersion({{1, {{{{0, 0}, UniformChunk(-100)}}, 3}}});
   auto first = Enable(version);
@@ -176,11 +209,29 @@ TEST_F(SiteTest, EnablingWhatIsEnabledOrMissing) {
   EXPECT_EQ(Enable(77).get().error().code, StatusCode::kNotFound);
 }
 
+// A robot has one session at a time; the one before is not counted and not corrected any more.
+TEST_F(SiteTest, ARobotsNewSessionTakesThePlaceOfTheOld) {
+  Settle();
+  site_->Publish();
+  Settle();
+  const auto next = std::make_shared<FakeSession>(3, corrections_);
+  site_->Join(101, 3, next);
+  site_->AddVersion({}, [](Result<std::uint32_t>) {});
+  Settle();
+  EXPECT_EQ(site_->snapshot()->info.robots, 2U);
+  const std::uint32_t version = AddVersion({{1, {{}, 1}}, {3, {{}, 1}}});
+  const auto enabled = Enable(version);
+  ASSERT_EQ(corrections_.size(), 1U);
+  EXPECT_EQ(corrections_[0].first, 3U);
+  corrections_.clear();
+}
+
 TEST(Atlas, RefusesSitesItDoesNotServeAndTooMany) {
   asio::thread_pool pool(1);
+  Outbound outbound(64);
   MapsOptions options;
   options.max_sites = 2;
-  Atlas closed(options, 0.05, false, pool, {});
+  Atlas closed(options, 0.05, false, pool, outbound);
   EXPECT_EQ(closed.Enter("a").error().code, StatusCode::kNotFound);
   EXPECT_TRUE(closed.Create("a"));
   EXPECT_TRUE(closed.Enter("a"));
@@ -188,6 +239,31 @@ TEST(Atlas, RefusesSitesItDoesNotServeAndTooMany) {
   EXPECT_TRUE(closed.Create("b"));
   EXPECT_EQ(closed.Create("c").error().code, StatusCode::kResourceExhausted);
   pool.join();
+}
+
+// Misspelt names used up the sites for good.
+TEST(Atlas, ASiteThatHoldsNothingGivesWay) {
+  asio::thread_pool pool(1);
+  Outbound outbound(64);
+  MapsOptions options;
+  options.max_sites = 3;
+  Atlas atlas(options, 0.05, true, pool, outbound);
+  EXPECT_TRUE(atlas.Create("configured"));
+  auto drawn = *atlas.Enter("drawn");
+  drawn->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(100)}}});
+  drawn->Publish();
+  auto used = *atlas.Enter("used");
+  EXPECT_EQ(atlas.Enter("next").error().code, StatusCode::kResourceExhausted);
+  used.reset();
+  EXPECT_TRUE(atlas.Enter("next"));
+  EXPECT_EQ(atlas.Find("used"), nullptr);
+  EXPECT_TRUE(atlas.Enter("one.after"));
+  pool.join();
+  EXPECT_EQ(drawn->snapshot()->info.tile_count, 1U);
+  drawn.reset();
+  EXPECT_TRUE(atlas.Enter("another"));
+  EXPECT_NE(atlas.Find("configured"), nullptr);
+  EXPECT_NE(atlas.Find("drawn"), nullptr);
 }
 
 }  // namespace

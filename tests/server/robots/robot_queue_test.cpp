@@ -21,7 +21,7 @@ TEST(RobotQueue, EventsOfAllKindsLeaveInOrderOfArrival) {
   RobotQueue queue(8, 8);
   EXPECT_FALSE(queue.Push(OdometryOf(1)));
   EXPECT_FALSE(queue.Push(ScanOf(1)));
-  EXPECT_TRUE(queue.PushControl(Finish{.final = true, .done = {}}));
+  queue.Push(Finish{.final = true, .done = {}});
   EXPECT_FALSE(queue.Push(ScanOf(2)));
   EXPECT_TRUE(std::holds_alternative<OdometryArrival>(*queue.Pop()));
   EXPECT_TRUE(std::holds_alternative<ScanArrival>(*queue.Pop()));
@@ -61,10 +61,15 @@ TEST(RobotQueue, TheNewestCorrectionWins) {
   EXPECT_TRUE(queue.empty());
 }
 
-TEST(RobotQueue, TooManyControlEventsAreRefused) {
+// A burst of snapshots was able to push the end of a session aside once; its robot was told it had ended all the same.
+TEST(RobotQueue, TooManySnapshotsAreRefusedAndTheEndNever) {
   RobotQueue queue(2, 2);
-  for (std::size_t i = 0; i < RobotQueue::kMaxControl; ++i) EXPECT_TRUE(queue.PushControl(Probe{}));
-  EXPECT_FALSE(queue.PushControl(Probe{}));
+  for (std::size_t i = 0; i < RobotQueue::kMaxControl; ++i) EXPECT_TRUE(queue.Push(SnapshotWanted{}));
+  EXPECT_FALSE(queue.Push(SnapshotWanted{}));
+  queue.Push(Finish{.final = true, .done = {}});
+  for (std::size_t i = 0; i < RobotQueue::kMaxControl; ++i)
+    EXPECT_TRUE(std::holds_alternative<SnapshotWanted>(*queue.Pop()));
+  EXPECT_TRUE(std::holds_alternative<Finish>(*queue.Pop()));
 }
 
 TEST(RobotQueue, TakeScansLeavesTheRest) {

@@ -17,11 +17,48 @@ TEST(UnclaimedStreams, AClaimTakesTheAccountAway) {
   UnclaimedStreams unclaimed(2);
   unclaimed.Count({1, 1, 9}, 1, DropReason::kNoSession);
   unclaimed.Count({1, 1, 9}, 2, DropReason::kNoSession);
-  auto account = unclaimed.Claim(1, 1);
+  auto account = unclaimed.Claim({1, 1, 9});
   ASSERT_TRUE(account);
   EXPECT_EQ(account->ledger().received, 2U);
   EXPECT_EQ(account->ledger().last_sequence, 2U);
-  EXPECT_FALSE(unclaimed.Claim(1, 1));
+  EXPECT_FALSE(unclaimed.Claim({1, 1, 9}));
+}
+
+// A stranger who had sent scan 40 under the robot's name made the owner's first forty scans look like duplicates; they
+// were never settled, and the owner waited at its window for ever.
+TEST(UnclaimedStreams, TheOwnersNumbersStartAnewAfterAStranger) {
+  UnclaimedStreams unclaimed(2);
+  unclaimed.Count({1, 1, 9}, 40, DropReason::kNoSession);
+  auto account = unclaimed.Claim({1, 1, 7});
+  ASSERT_TRUE(account);
+  EXPECT_TRUE(account->Received(1));
+  account->Used(1, 1, false, 1.0);
+  EXPECT_EQ(account->ledger().settled_through, 1U);
+  EXPECT_EQ(account->ledger().received, 2U);
+}
+
+TEST(UnclaimedStreams, TheOwnersOwnNumbersGoOn) {
+  UnclaimedStreams unclaimed(2);
+  unclaimed.Count({1, 1, 7}, 1, DropReason::kNoSession);
+  unclaimed.Count({1, 1, 7}, 2, DropReason::kNoSession);
+  auto account = unclaimed.Claim({1, 1, 7});
+  ASSERT_TRUE(account);
+  EXPECT_FALSE(account->Received(2));
+  EXPECT_TRUE(account->Received(3));
+}
+
+TEST(UnclaimedStreams, EachOfTwoStrangersHasNumbersOfItsOwn) {
+  UnclaimedStreams unclaimed(2);
+  unclaimed.Count({1, 1, 8}, 500, DropReason::kNoSession);
+  unclaimed.Count({1, 1, 9}, 1, DropReason::kNoSession);
+  unclaimed.Count({1, 1, 9}, 1, DropReason::kNoSession);  // Sent again: no news.
+  unclaimed.Count({1, 1, 9}, 77, DropReason::kNotOwner);
+  const Ledger ledger = unclaimed.Claim({1, 1, 7})->ledger();
+  EXPECT_EQ(ledger.received, 3U);
+  EXPECT_EQ(ledger.dropped[static_cast<std::size_t>(DropReason::kNoSession)], 2U);
+  EXPECT_EQ(ledger.dropped[static_cast<std::size_t>(DropReason::kNotOwner)], 1U);
+  EXPECT_EQ(ledger.dropped[static_cast<std::size_t>(DropReason::kLostOnWire)], 0U);
+  EXPECT_EQ(ledger.waiting, 0U);
 }
 
 }  // namespace

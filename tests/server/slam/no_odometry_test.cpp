@@ -1,8 +1,9 @@
 // The front-end with the odometry withheld (slam.front_end.use_odometry=false).
 #include <gtest/gtest.h>
 
-#include "server/slam/front_end.h"
-#include "tests/server/slam/matching/ndt_worlds.h"
+#include "server/slam/methods.h"
+#include "server/slam/tracking/front_end.h"
+#include "tests/server/slam/matchers/ndt_worlds.h"
 
 namespace cairn::slam {
 namespace {
@@ -11,10 +12,11 @@ FrontEnd WithoutOdometry(MatcherKind matcher, bool refined) {
   FrontEndOptions options;
   options.use_odometry = false;
   options.refine_enabled = refined;
-  return FrontEnd(options, matcher, MatcherOptions{});
+  return FrontEnd(options, MakeMatcher(matcher, {}));
 }
 
-// A drive through the office, eight centimetres and two degrees a scan. `odometry` is what the wheels claim a step.
+// A drive through the office, with steps of eight centimetres and two degrees per scan. `odometry` is the
+// odometry of one step.
 std::vector<Pose2> Track(FrontEnd front_end, const Pose2& odometry) {
   std::vector<Pose2> track;
   Pose2 T_world_robot, T_odom_robot;
@@ -46,8 +48,9 @@ TEST(NoOdometry, WhatTheWheelsClaimChangesNothing) {
   EXPECT_EQ(still, wild);
 }
 
-// The known weakness (README of slam): beams land on bare walls alike wherever the robot stands, so the way through
-// comes out short. It must be flagged, go on, and neither jump nor turn back.
+// The known weakness (server/slam/tracking/README.md): on bare walls the beams look the same wherever the
+// robot stands, so the estimated path is too short. It must be reported as degenerate, continue, and neither
+// jump nor turn back.
 TEST(NoOdometry, ABareCorridorIsFlaggedAndComesOutShortNotWild) {
   FrontEnd front_end = WithoutOdometry(MatcherKind::kNdt, true);
   test::World hall = test::LongCorridor();
@@ -61,21 +64,21 @@ TEST(NoOdometry, ABareCorridorIsFlaggedAndComesOutShortNotWild) {
     EXPECT_GT(step.T_track_robot.x, x_track - 0.02) << i;
     EXPECT_LT(step.T_track_robot.x, x_track + 0.15) << i;
     EXPECT_NEAR(step.T_track_robot.y, 0.0, 0.05) << i;
-    flagged = flagged || (step.matched && step.match.degenerate);
+    flagged = flagged || (step.matched && step.degenerate);
     x_track = step.T_track_robot.x;
   }
   EXPECT_TRUE(flagged);
   EXPECT_LT(x_track, 2.1);
 }
 
-// The last keyframe alone saw nothing; those before it did.
+// The last keyframe saw nothing, but those before it did.
 TEST(NoOdometry, TheMatcherSeesWhatTheLastKeyframesSaw) {
   for (const bool merged : {true, false}) {
     FrontEndOptions options;
     options.use_odometry = false;
     options.refine_enabled = false;
     options.no_odometry.merged_keyframes = merged ? 8 : 1;
-    FrontEnd front_end(options, MatcherKind::kNdt, MatcherOptions{});
+    FrontEnd front_end(options, MakeMatcher(MatcherKind::kNdt, {}));
     const ScanView view = test::ViewFrom(test::Office(), {});
     front_end.Track(view, {}, SerialFor);
     front_end.AddKeyframe(view);

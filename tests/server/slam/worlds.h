@@ -1,5 +1,5 @@
-// Small worlds of straight walls and a laser that sees them exactly, for tests of the pure library. Frame `world`;
-// metres and radians. Noise only where an engine is passed in.
+// Small worlds of straight walls, and a laser that measures them exactly, for tests of slam. Frame `world`;
+// metres and radians. There is noise only if a random engine is passed in.
 #pragma once
 
 #include <algorithm>
@@ -56,7 +56,7 @@ struct Laser {
   double first_rad = -kPi / 2;
   double step_rad = Radians(1.0);
   double range_max_m = 30.0;
-  double sigma_m = 0.0;  // Of the ranges, where an engine is given.
+  double sigma_m = 0.0;  // Standard deviation of the ranges, used if an engine is given.
   Pose2 T_robot_laser = {};
 };
 
@@ -87,7 +87,8 @@ inline Scan Look(const World& world, const Pose2& T_world_robot, const Laser& la
   scan.range_max_m = laser.range_max_m;
   scan.T_robot_laser = laser.T_robot_laser;
   const Pose2 T_world_laser = T_world_robot * laser.T_robot_laser;
-  std::normal_distribution<double> noise(0.0, std::max(laser.sigma_m, 1e-12));  // Must be above 0, used or not.
+  // The distribution requires a value above 0 even if it is not used.
+  std::normal_distribution<double> noise(0.0, std::max(laser.sigma_m, 1e-12));
   for (int beam = 0; beam < laser.beams; ++beam) {
     const double angle = T_world_laser.theta + laser.first_rad + beam * laser.step_rad;
     double range = RayLength(world, T_world_laser.translation(), {std::cos(angle), std::sin(angle)});

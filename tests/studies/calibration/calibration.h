@@ -1,5 +1,5 @@
-// The parts of `cairn-study calibration`: what was put in beside what came out. Each adds its tables and plots to the
-// report, and tells it where a figure does not keep the bound it states.
+// The parts of `cairn-study calibration`: they compare what was put in with what came out. Each part adds its
+// tables and plots to the report, and reports a failure if a figure exceeds its stated bound.
 #pragma once
 
 #include "tests/studies/study.h"

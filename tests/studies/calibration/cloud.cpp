@@ -49,8 +49,8 @@ PointCloud CloudOf(const Drive& drive, const Trajectory& path, double height_m) 
   return builder.cloud();
 }
 
-// Mean size of the range errors that the laser's maker states, over the hits of a drive. With true poses a point is
-// never farther from the walls than its range is wrong.
+// Mean size of the range errors that the maker of the laser states, over the hits of a drive. With true
+// poses, the distance of a point from the walls is never larger than the error of its range.
 double StatedError(const Drive& drive, const sim::RangeError& error) {
   const double mean_share = error.kind == sim::RangeErrorKind::kSigma ? std::sqrt(2.0 / kPi) : 0.5;
   double sum = 0.0, hits = 0.0;

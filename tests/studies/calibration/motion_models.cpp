@@ -3,9 +3,9 @@
 #include <filesystem>
 #include <fstream>
 
-#include "server/calibrate/motion_run.h"
+#include "server/tools/calibrate/motion_run.h"
 #include "tests/real_logs.h"
-#include "tests/server/calibrate/noisy_drive.h"
+#include "tests/server/tools/calibrate/noisy_drive.h"
 #include "tests/studies/calibration/calibration.h"
 #include "tests/temp_directory.h"
 
@@ -30,7 +30,7 @@ void AddMatcher(Table& table, const std::string& name, const server::MotionRepor
                Percent(report.matcher->failure_share)});
 }
 
-// Means within 0.03, standard deviations within 0.012 or 20 %: as the test states them.
+// Means within 0.03, and standard deviations within 0.012 or 20 %, as in the test.
 bool Recovers(const slam::EliazarModel& fit, const slam::EliazarModel& truth) {
   bool close = true;
   for (int k = 0; k < slam::kMotionTerms; ++k) {

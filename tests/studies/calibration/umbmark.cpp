@@ -1,7 +1,7 @@
 #include <cmath>
 #include <random>
 
-#include "server/slam/motion/square_run.h"
+#include "server/slam/calibration/square_run.h"
 #include "tests/studies/calibration/calibration.h"
 
 namespace cairn::studies {
@@ -18,7 +18,8 @@ void StudyUmbmark(StudyContext& context) {
   const slam::UmbmarkOptions square;
   const int trials = context.Pick(500, 50);
   bool plausible = true;
-  double by_slip = 0.0;  // E_sys of perfect wheels: no calibration from as many runs can do better.
+  // E_sys of perfect wheels: no calibration from the same number of runs can do better.
+  double by_slip = 0.0;
   Series before_cw{.label = "clockwise", .mark = Mark::kPoints},
       before_ccw{.label = "counter-clockwise", .mark = Mark::kPoints};
   for (const slam::WheelErrors injected :
@@ -41,7 +42,7 @@ void StudyUmbmark(StudyContext& context) {
       d += result->errors.E_d / trials, dd += std::pow(result->errors.E_d - injected.E_d, 2) / trials;
       b += result->errors.E_b / trials, bb += std::pow(result->errors.E_b - injected.E_b, 2) / trials;
       sys += result->E_sys_m / trials;
-      // The corrected robot: what is left of the true errors after the correction.
+      // The robot after the correction: the remaining part of the true errors.
       const slam::WheelErrors left{injected.E_d / result->errors.E_d, injected.E_b / result->errors.E_b};
       after += std::max(SquareEnd(true, left, square).translation().norm(),
                         SquareEnd(false, left, square).translation().norm()) /

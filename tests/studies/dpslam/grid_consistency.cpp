@@ -8,7 +8,7 @@
 #include "client/sim/closed_path.h"
 #include "client/sim/shipped_worlds.h"
 #include "server/slam/dpslam/dpslam.h"
-#include "server/slam/filters/chi_square.h"
+#include "server/slam/landmarks/chi_square.h"
 #include "tests/studies/scene.h"
 
 namespace cairn::studies {
@@ -19,7 +19,7 @@ constexpr int kPointEvery = 8;  // Steps.
 constexpr double kRounds = 2.0;
 constexpr slam::MotionNoise kWheels{0.004, 0.04, 0.02, 0.002, 0.02, 0.05};
 
-// Round the room, turning on the spot where the way bends.
+// Drives round the room and turns on the spot at its corners.
 std::vector<Pose2> TruePoses(const sim::Route& route) {
   std::vector<Pose2> poses;
   const double length = sim::ClosedLength(route.waypoints_map);

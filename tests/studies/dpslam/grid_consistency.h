@@ -1,6 +1,7 @@
-// Whether DP-SLAM knows how wrong it is: driven through a simulated room whose odometry errs exactly as the filter is
-// told, many times with different seeds, scans with noise. The landmark filters' study (filters/consistency.h) has no
-// ranges. Source: Bar-Shalom, Li, Kirubarajan 2001, 5.4 (NEES and its bounds).
+// Tests whether DP-SLAM's stated uncertainty is right. The robot drives many times through a simulated room,
+// with different seeds and noisy scans, and the errors of its odometry are exactly those of the filter's
+// model. (The study of the landmark filters, filters/consistency.h, has no ranges.) Source: Bar-Shalom, Li,
+// Kirubarajan 2001, 5.4 (NEES and its bounds).
 #pragma once
 
 #include <cstdint>
@@ -18,7 +19,8 @@ struct GridConsistencyOptions {
 // Averages over all runs at one place of the way.
 struct GridConsistencyPoint {
   double travelled_m = 0.0;
-  double nees = 0.0;  // Of (x, y, theta): 3 where the filter is consistent, more where it is too sure.
+  // NEES of (x, y, theta): 3 if the filter is consistent, more if it states too small an uncertainty.
+  double nees = 0.0;
   double effective_sample_size = 0.0;
   double position_error_m = 0.0;  // Root mean square ...
   double odometry_error_m = 0.0;  // ... and of odometry alone.

@@ -1,5 +1,5 @@
-// A log as steps for DP-SLAM (odometry motion, scan) and a run of the filter over them with every figure at hand: time,
-// memory, shape of the family tree, path and map. Studies only; two threads where asked.
+// A log as steps for DP-SLAM (odometry motion, scan) and a run of the filter over them with every figure at
+// hand: time, memory, shape of the family tree, path and map. Studies only; two threads where asked.
 #pragma once
 
 #include <memory>
@@ -18,7 +18,7 @@ struct GridStep {
   std::shared_ptr<const Scan> scan;
 };
 
-// Scans at least so far apart by odometry; all where both are 0.
+// Scans that are at least this far apart by odometry; all scans if both are 0.
 [[nodiscard]] std::vector<GridStep> GridSteps(const StudyLog& log, double gate_m, double gate_rad);
 
 struct GridRun {
@@ -30,10 +30,10 @@ struct GridRun {
   std::size_t longest_line = 0;
   bool bounds_hold = true;      // Fewer than two nodes a living particle, no line longer than their number.
   int diverged = 0;             // Scans after which the filter called itself lost.
-  double log_likelihood = 0.0;  // Of the best particle.
-  Trajectory path;              // Of the best particle, at the end.
-  OccupancyImage map;           // Opacity, of the best particle.
-  double naive_mib = 0.0;       // What one copy of the map for every particle takes (4 bytes a cell).
+  double log_likelihood = 0.0;  // The log likelihood of the best particle.
+  Trajectory path;              // The path of the best particle at the end.
+  OccupancyImage map;           // The opacity map of the best particle.
+  double naive_mib = 0.0;       // Memory if each particle had its own copy of the map (4 bytes per cell).
 
   [[nodiscard]] double PeakMib() const;
 };
@@ -42,8 +42,8 @@ struct GridRun {
                               const Pose2& T_map_robot_start, const slam::DpSlamOptions& options, std::uint64_t seed,
                               int threads);
 
-// How far apart the path puts two visits of one place, against the truth: means over all pairs of poses in the same
-// place (1 m) more than `apart_m` of way apart.
+// The error of the path between two visits of one place, against the truth: means over all pairs of poses at
+// the same place (within 1 m) that are more than `apart_m` of path apart.
 struct LoopError {
   int pairs = 0;
   double trans_m = 0.0;

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <random>
 
-#include "server/slam/filters/chi_square.h"
-#include "server/slam/filters/resampling.h"
-#include "server/slam/motion/motion_sampling.h"
+#include "server/slam/landmarks/chi_square.h"
+#include "server/slam/motion_models/motion_sampling.h"
+#include "server/slam/random/resampling.h"
 #include "tests/studies/filters/corner_world.h"
 
 namespace cairn::studies {
@@ -45,7 +45,7 @@ std::vector<Pose2> TrueSteps(int rounds) {
 }
 
 Eigen::Vector3d Draw(const Eigen::Matrix3d& covariance, slam::Rng& rng) {
-  const Eigen::Vector3d unit(NormalDraw(rng), NormalDraw(rng), NormalDraw(rng));
+  const Eigen::Vector3d unit = slam::ThreeNormalDraws(rng);
   return covariance.llt().matrixL() * unit;
 }
 
@@ -54,7 +54,7 @@ std::size_t AncestryDepth(const slam::Filter& filter) {
   std::vector<slam::Hypothesis> all;
   for (std::size_t i = 1; i < filter.hypothesis_count(); ++i) all.push_back(filter.hypothesis(i));
   const std::size_t size = all.front().path.size();
-  // Once two paths have parted they stay apart, so the keyframes all agree on come first.
+  // Once two paths have parted they stay apart, so the keyframes on which all paths agree come first.
   std::size_t low = 0, high = size;
   while (low < high) {
     const std::size_t middle = (low + high) / 2;
@@ -72,7 +72,8 @@ slam::FilterOptions Told(const ConsistencyOptions& options) {
   told.back_end.landmarks.enabled = options.landmarks;
   told.back_end.landmarks.noise = {0.04, 0.01, 0.02};
   told.correction.min_travel_m = 12.0;
-  // Old poses far apart make one error of their keyframes count as many: at 5 m the EKF is a little too sure
+  // Old poses that are far apart make one error of their keyframes count several times: at 5 m the EKF states
+  // too small an uncertainty (NEES 4.4).
   // (NEES 4.4).
   told.ekf.anchor_distance_m = 1.0;
   return told;
@@ -131,11 +132,11 @@ Run DriveOnce(const ConsistencyOptions& options, std::uint64_t seed) {
   keyframe();
   const std::vector<Pose2> steps = TrueSteps(options.rounds);
   for (std::size_t i = 0; i < steps.size(); ++i) {
-    // The filter is given the nominal step; the robot makes it with noise.
+    // The filter gets the nominal step; the robot moves by this step with noise.
     const Pose2& step = steps[i];
     Pose2 made;
     if (options.kind == slam::FilterKind::kFastSlam1) {
-      made = slam::SampleMotion({}, {step}, told.fastslam.motion, rng);
+      made = slam::SampleMotion({}, {step}, told.sampling, rng);
     } else {
       const Eigen::Vector3d d = options.noise_factor * Draw(told.back_end.drift.Covariance(step), rng);
       made = {step.x + d.x(), step.y + d.y(), WrapAngle(step.theta + d.z())};
@@ -161,7 +162,7 @@ Run DriveOnce(const ConsistencyOptions& options, std::uint64_t seed) {
   return run;
 }
 
-// 95 % bounds of the mean of `count` numbers' squares.
+// 95 % bounds of the mean of the squares of `count` numbers.
 void Bounds(double count, double& low, double& high) {
   if (!(count > 0.0)) return;
   low = slam::ChiSquareQuantile(0.025, count) / count;

@@ -1,14 +1,15 @@
-// Whether a filter knows how wrong it is: drives it through its interface in a simulated world whose noise is exactly
-// what the filter is told, many times with different seeds, and compares its errors with the uncertainty it claims.
-// The world is a loop driven several times past corners with known places; what the front-end would do (steps,
-// features, revisits) is drawn, not computed. FastSLAM 1.0 gets steps drawn from its own motion model, the others from
-// the drift. Source: Bar-Shalom, Li, Kirubarajan 2001, 5.4 (NEES, NIS and their bounds); Bailey et al. 2006 (FastSLAM).
+// Whether a filter knows how wrong it is: drives it through its interface in a simulated world whose noise is
+// exactly what the filter is told, many times with different seeds, and compares its errors with the
+// uncertainty it claims. The world is a loop driven several times past corners with known places; what the
+// front-end would do (steps, features, revisits) is drawn, not computed. FastSLAM 1.0 gets steps drawn from
+// its own motion model, the others from the drift. Source: Bar-Shalom, Li, Kirubarajan 2001, 5.4 (NEES, NIS
+// and their bounds); Bailey et al. 2006 (FastSLAM).
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
-#include "server/slam/filters/make_filter.h"
+#include "server/slam/methods.h"
 
 namespace cairn::studies {
 
@@ -20,16 +21,19 @@ struct ConsistencyOptions {
   bool landmarks = true;
   bool revisits = false;
   std::uint64_t first_seed = 1;
-  // How much larger the world's noise is than the filter is told; 1: as told. What shows that the check can fail.
+  // How much larger the world's noise is than the filter is told; 1: as told. What shows that the check can
+  // fail.
   double noise_factor = 1.0;
 };
 
 // Averages over all runs at one place of the way.
 struct ConsistencyPoint {
   double travelled_m = 0.0;
-  double nees = 0.0;            // Of (x, y, theta): 3 where the filter is consistent, more where it is too sure.
-  double nis_per_number = 0.0;  // Of the keyframes since the point before: 1 where consistent.
-  double nis_low = 0.0;         // 95 % of consistent filters lie between.
+  // NEES of (x, y, theta): 3 if the filter is consistent, more if it states too small an uncertainty.
+  double nees = 0.0;
+  // NIS of the keyframes since the previous point: 1 if the filter is consistent.
+  double nis_per_number = 0.0;
+  double nis_low = 0.0;  // 95 % of consistent filters lie between.
   double nis_high = 0.0;
   double effective_sample_size = 0.0;
   double ancestry_depth = 0.0;    // Keyframes back to the last one all particles agree on; 0 for one hypothesis.
@@ -52,7 +56,8 @@ struct ConsistencyResult {
 };
 
 [[nodiscard]] std::size_t ConsistencyLandmarks();
-// Deterministic. Takes about 10 ms a run with 200 particles. Not for dpslam, which needs ranges rather than features.
+// Deterministic. Takes about 10 ms a run with 200 particles. Not for dpslam, which needs ranges rather than
+// features.
 [[nodiscard]] ConsistencyResult StudyConsistency(const ConsistencyOptions& options);
 
 }  // namespace cairn::studies

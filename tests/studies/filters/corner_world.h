@@ -1,19 +1,20 @@
-// A world of corners for studies of filters: what a front-end would see of it is drawn, not computed. Frame `map`.
+// A world of corners for studies of filters. What a front-end would see of it is drawn at random, not
+// computed. Frame `map`.
 #pragma once
 
 #include <vector>
 
 #include "common/geometry/pose2.h"
-#include "server/slam/filters/landmark_options.h"
-#include "server/slam/filters/resampling.h"
-#include "server/slam/matching/scan_view.h"
+#include "server/slam/features/scan_view.h"
+#include "server/slam/landmarks/landmark_options.h"
+#include "server/slam/random/resampling.h"
 
 namespace cairn::studies {
 
 struct Corner {
   Eigen::Vector2d p_map;
-  double slope = 0.0;  // Of its first line, rad.
-  double angle = 1.5;  // Between its lines, signed, rad.
+  double slope = 0.0;  // Slope of the corner's first line, rad.
+  double angle = 1.5;  // Angle between the corner's lines, signed, rad.
 };
 
 // The corners in the front half-circle of kCornerSightM around the robot, with `factor` times the noise.

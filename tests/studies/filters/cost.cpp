@@ -38,10 +38,10 @@ double CostExponent(const std::vector<CostPoint>& points) {
 
 CostPoint StudyCost(slam::FilterKind kind, std::size_t corners, std::uint64_t seed) {
   slam::FilterOptions options;
-  // So little drift that what was seen a round ago is known again, however large the ring.
+  // The drift is so small that landmarks of the previous round are recognised, however large the ring is.
   options.back_end.drift = {0.0001, 0.001, 0.0002, 0.00002, 0.0002, 0.0005};
   options.back_end.landmarks.noise = {0.04, 0.01, 0.02};
-  options.ekf.max_landmarks = static_cast<std::int64_t>(2 * corners);  // None is left out.
+  options.ekf.max_landmarks = static_cast<std::int64_t>(2 * corners);  // No landmark is left out.
   const auto filter = slam::MakeFilter(kind, options, {}, seed);
   slam::Rng rng(seed);
   const double round_m = kCornerApartM * static_cast<double>((corners + 1) / 2);

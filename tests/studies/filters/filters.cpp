@@ -1,5 +1,6 @@
-// cairn-study filters: is each filter as sure as it may be? NEES and NIS with the bounds of consistent filters, how
-// many particles count, and how far back their common ancestor lies, over many simulated runs.
+// cairn-study filters tests whether the stated uncertainty of each filter is right. It prints NEES and NIS
+// with the bounds of consistent filters, the effective number of particles, and the age of their common
+// ancestor, over many simulated runs.
 #include <algorithm>
 
 #include "tests/studies/filters/consistency.h"
@@ -45,12 +46,12 @@ std::string VerdictOf(const ConsistencyResult& result, double nees) {
   return nees < result.nees_low ? "too doubtful" : "consistent";
 }
 
-// Few runs may miss by chance.
+// With few runs, some may miss by chance.
 void FailUnlessQuick(StudyContext& context, const std::string& why) {
   context.quick ? context.report.Warn(why) : context.report.Fault(why);
 }
 
-// One world for all filters; fails where those that must be consistent are not.
+// One world for all filters. Fails if a filter that must be consistent is not.
 void StudyWorld(StudyContext& context, const std::string& name, bool landmarks, bool revisits) {
   Report& report = context.report;
   report.Heading(name);
@@ -91,7 +92,8 @@ void StudyWorld(StudyContext& context, const std::string& name, bool landmarks, 
       effective.series.push_back(SeriesOf(result, contender.name, &ConsistencyPoint::effective_sample_size));
       depth.series.push_back(SeriesOf(result, contender.name, &ConsistencyPoint::ancestry_depth));
     }
-    // landmark_correction replaces what it corrects and is not held to a Gaussian's bounds.
+    // landmark_correction replaces the poses that it corrects, and is not tested against the bounds of a
+    // Gaussian.
     const bool must = contender.kind != slam::FilterKind::kLandmarkCorrection;
     const auto judge = [&](double figure, const std::string& where) {
       const std::string verdict = VerdictOf(result, figure), what = contender.name + " is " + verdict + where;
@@ -107,7 +109,8 @@ void StudyWorld(StudyContext& context, const std::string& name, bool landmarks, 
   report.Add(depth, name + " ancestry depth");
 }
 
-// Depletion shows in how the error falls with the number of particles; the doubt has to follow.
+// The number of particles is sufficient when the error no longer falls with more of them; the stated
+// uncertainty must follow the error.
 void StudyParticles(StudyContext& context) {
   context.report.Heading("Particles");
   Table table({"filter", "particles", "NEES before the loop (3)", "after", "95 % bounds", "error at end (m)"});
@@ -123,7 +126,8 @@ void StudyParticles(StudyContext& context) {
   context.report.Add(table, "particles");
 }
 
-// Thesis C 3.1.2: what a step of EKF-SLAM costs grows with the square of the landmarks; FastSLAM was made against that.
+// Thesis C 3.1.2: the cost of one step of EKF-SLAM grows with the square of the number of landmarks. FastSLAM
+// was developed to avoid this.
 void StudyLandmarkCost(StudyContext& context) {
   Report& report = context.report;
   report.Heading("Cost against landmarks");

@@ -1,6 +1,7 @@
-// cairn-study fleet: what robots and people see of a live server. Scan to pose for fleets of simulated robots, the
-// longest wait while whole trajectories are smoothed, and logs streamed twenty times faster than they were recorded
-// beside the same logs offline. Times are wall-clock: the machine should do nothing else.
+// cairn-study fleet measures a live server from outside: the time from scan to pose for fleets of simulated
+// robots, the longest delay while whole trajectories are smoothed, and logs that are streamed twenty times
+// faster than they were recorded, compared with the same logs offline. Times are wall-clock times, so no
+// other program should run on the machine.
 #include <algorithm>
 #include <fstream>
 #include <iterator>
@@ -21,7 +22,7 @@ using nlohmann::json;
 constexpr double kMostLatencyMs = 30.0;  // Scan published to pose received, of 99 in 100 scans.
 constexpr double kMostPauseMs = 100.0;
 constexpr double kReplayRate = 20.0;
-constexpr double kKeptUp = 0.99;  // Of real time.
+constexpr double kKeptUp = 0.99;  // Share of real time.
 
 double MsSince(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
@@ -78,7 +79,7 @@ void StudyLatency(StudyContext& context) {
   report.Add(table, "latency");
 }
 
-// Something large to smooth: a log where there is one, else a simulated robot's long day.
+// Something large to smooth: a log if there is one, otherwise a long drive of a simulated robot.
 std::string FillLargeSite(StudyContext& context, const LiveServer& server) {
   const auto log = context.logs.empty() ? RealLog("mit-killian.clf") : context.logs.front();
   if (std::filesystem::exists(log) && !context.quick) {
@@ -91,7 +92,7 @@ std::string FillLargeSite(StudyContext& context, const LiveServer& server) {
   return "a simulated robot";
 }
 
-// Asks all that people ask, over and over, and smooths both sites by turns, until `robots` is done.
+// Sends all kinds of request again and again, and smooths both sites in turn, until `robots` is done.
 struct Asked {
   int jobs = 0;
   double longest_job_s = 0.0;
@@ -108,12 +109,12 @@ Asked AskWhile(LiveServer& server, ChildProcess& robots) {
   client::QueryClient& queries = server.queries();
   std::optional<Job> job;
   auto job_began = Clock::now();
-  // Ten rounds a second are many askers; more would only measure the asking.
+  // Ten rounds per second stand for many clients. With more, the study would only measure the requests.
   while (robots.RunningAfter(std::chrono::milliseconds(100))) {
     const auto sites = timed(queries.Maps(), Clock::now());
     const bool streaming =
         std::any_of(sites.begin(), sites.end(), [](const MapInfo& info) { return info.site == "load"; });
-    if (!streaming) continue;  // The fleet has not begun.
+    if (!streaming) continue;  // The fleet has not started yet.
     if (job) job = timed(queries.GetJob(job->id), Clock::now());
     if (job && IsFinal(job->state)) {
       if (job->state != JobState::kSucceeded) throw std::runtime_error("a job failed: " + job->message);

@@ -30,7 +30,7 @@ std::string ProgramPath(const std::string& name) {
 }
 
 nlohmann::json PrintedBy(const ChildProcess::Outcome& outcome) {
-  // Progress and complaints stand around it, a line each.
+  // The output also contains progress and error messages, one per line.
   const std::size_t start = outcome.output.rfind("\n{");
   const std::size_t begin = start == std::string::npos ? 0 : start + 1;
   const std::string line = outcome.output.substr(begin, outcome.output.find('\n', begin) - begin);

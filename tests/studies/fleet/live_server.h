@@ -1,6 +1,7 @@
-// The programs a user runs, as processes: a cairnd on a DDS domain of this study's own, `cairn` commands to it, and a
-// connection of this process beside them. The programs are those in the folder of the study's own executable. Throws
-// std::runtime_error where one cannot be started or fails; the server is killed at the end.
+// Runs the programs as a user does, as processes: a cairnd on a DDS domain of its own, `cairn` commands that
+// connect to it, and a connection from this process. The programs are taken from the folder of the study's
+// own executable. Throws std::runtime_error if a program cannot be started or fails. The server is killed at
+// the end.
 #pragma once
 
 #include <chrono>
@@ -15,10 +16,10 @@
 
 namespace cairn::studies {
 
-// The whole path of a program that was built with this one.
+// The full path of a program that was built with this one.
 [[nodiscard]] std::string ProgramPath(const std::string& name);
 
-// The object that a command run with --json printed. Throws where it printed none or its exit code is not 0.
+// The JSON object that a command with --json printed. Throws if there is none or if the exit code is not 0.
 [[nodiscard]] nlohmann::json PrintedBy(const ChildProcess::Outcome& outcome);
 
 class LiveServer {
@@ -26,13 +27,13 @@ class LiveServer {
   LiveServer();  // Returns once it answers.
 
   [[nodiscard]] client::QueryClient& queries() { return *queries_; }
-  // `cairn ARGUMENTS --json`, started; PrintedBy(its outcome) is what it says.
+  // Starts `cairn ARGUMENTS --json`. PrintedBy(its outcome) is its output.
   [[nodiscard]] std::unique_ptr<ChildProcess> Start(std::vector<std::string> arguments) const;
-  // The same, waited for.
+  // Does the same and waits for the end.
   nlohmann::json Run(std::vector<std::string> arguments) const;
   [[nodiscard]] std::string pid() const { return std::to_string(server_.pid()); }
 
-  // No command takes longer than any study's.
+  // The time limit of a command; no command of a study takes longer.
   static constexpr std::chrono::seconds kDeadline{3600};
 
  private:

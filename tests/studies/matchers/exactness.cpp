@@ -78,7 +78,7 @@ void StudyExactness(StudyContext& context, const std::vector<slam::MatcherKind>&
       series.x.push_back(100 * noise);
       series.y.push_back(100 * metres.mean);
       if (noise > 0.02) continue;
-      // A bias beyond four standard errors of the mean and a millimetre is no chance.
+      // A bias beyond four standard errors of the mean and a millimetre is not due to chance.
       for (const int axis : {0, 1})
         if (std::abs(bias[axis]) > 4 * sigma[axis] / std::sqrt(n) + 1e-3)
           report.Warn(series.label + " is biased by " + Number(1e3 * bias[axis], 1) + " mm in " +

@@ -5,13 +5,13 @@
 #include <cstddef>
 #include <stdexcept>
 
-#include "server/slam/front_end.h"
+#include "server/slam/tracking/front_end.h"
 #include "tests/studies/stopwatch.h"
 
 namespace cairn::studies {
 namespace {
 
-// Discs round the robot until so many beams end on them.
+// Adds discs round the robot until this share of the beams ends on them.
 std::vector<sim::Disc> CrowdOf(const Pose2& T_map_robot, const CaseOptions& options, sim::Random& random) {
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   std::vector<sim::Disc> crowd;
@@ -49,15 +49,15 @@ MatchCase DrawCase(const Scene& scene, const CaseOptions& options, sim::Random& 
 
 MatchTrial TryMatch(const MatchCase& match_case, const Pose2& off, double sigma_m, double sigma_rad,
                     slam::MatcherKind kind, const slam::MatcherOptions& options) {
-  const Pose2& truth = match_case.T_prev_curr;
+  const Pose2& truth = match_case.T_ref_curr;
   slam::MatchPrior prior;
-  prior.T_prev_curr = {truth.x + off.x, truth.y + off.y, WrapAngle(truth.theta + off.theta)};
+  prior.T_ref_curr = {truth.x + off.x, truth.y + off.y, WrapAngle(truth.theta + off.theta)};
   prior.covariance = Eigen::Vector3d(sigma_m * sigma_m, sigma_m * sigma_m, sigma_rad * sigma_rad).asDiagonal();
   MatchTrial trial;
   const Stopwatch watch;
-  trial.result = slam::MatchScans(match_case.prev, match_case.curr, prior, kind, options, slam::SerialFor);
+  trial.result = slam::MakeMatcher(kind, options).match(match_case.prev, match_case.curr, prior, slam::SerialFor);
   trial.cpu_ms = watch.CpuMs();
-  const Pose2& answer = trial.result.T_prev_curr;
+  const Pose2& answer = trial.result.T_ref_curr;
   trial.error = {answer.x - truth.x, answer.y - truth.y, AngleDiff(answer.theta, truth.theta)};
   return trial;
 }

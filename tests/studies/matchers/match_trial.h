@@ -1,12 +1,12 @@
-// One comparison of two simulated scans by one matcher, with the truth beside it: what all parts of `cairn-study
-// matchers` count.
+// One comparison of two simulated scans by one matcher, with the truth. All parts of `cairn-study matchers`
+// use it.
 #pragma once
 
 #include <cmath>
 #include <string>
 #include <vector>
 
-#include "server/slam/matching/scan_matching.h"
+#include "server/slam/methods.h"
 #include "tests/studies/scene.h"
 
 namespace cairn::studies {
@@ -14,7 +14,7 @@ namespace cairn::studies {
 struct MatchCase {
   slam::ScanView prev;
   slam::ScanView curr;
-  Pose2 T_prev_curr;  // The truth.
+  Pose2 T_ref_curr;  // The truth.
   Pose2 T_map_prev;
 };
 
@@ -22,10 +22,10 @@ struct CaseOptions {
   sim::LaserOptions laser = Sick(0.01);
   double max_step_m = 0.3;
   double max_turn_rad = Radians(12.0);
-  double moving_share = 0.0;  // Of the beams, that end on discs which stand elsewhere in the other scan.
+  double moving_share = 0.0;  // Share of the beams that end on discs which are elsewhere in the other scan.
 };
 
-// From a random place on the scene's routes.
+// Draws a trial at a random place on the scene's routes.
 [[nodiscard]] MatchCase DrawCase(const Scene& scene, const CaseOptions& options, sim::Random& random);
 
 struct MatchTrial {
@@ -40,12 +40,12 @@ struct MatchTrial {
   }  // ... without knowing.
 };
 
-// The prior is the truth moved by `off` (x, y, theta), believed with these standard deviations.
+// The prior is the truth plus `off` (x, y, theta), with these standard deviations.
 [[nodiscard]] MatchTrial TryMatch(const MatchCase& match_case, const Pose2& off, double sigma_m, double sigma_rad,
                                   slam::MatcherKind kind, const slam::MatcherOptions& options);
 
-// The kinds this build has: those that align two identical scans from the right guess. `missing` gets the others'
-// names.
+// The kinds this build has: those that align two identical scans from the right guess. `missing` gets the
+// others' names.
 [[nodiscard]] std::vector<slam::MatcherKind> BuiltMatchers(std::vector<std::string>& missing);
 
 }  // namespace cairn::studies

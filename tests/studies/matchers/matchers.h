@@ -1,10 +1,10 @@
-// The parts of `cairn-study matchers`. Each adds its section to the report, and tells it where a figure is not
-// plausible.
+// The parts of `cairn-study matchers`. Each adds its section to the report, and tells it where a figure is
+// not plausible.
 #pragma once
 
 #include <vector>
 
-#include "server/slam/matching/scan_matching.h"
+#include "server/slam/methods.h"
 #include "tests/studies/study.h"
 
 namespace cairn::studies {

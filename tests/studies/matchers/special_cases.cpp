@@ -11,8 +11,12 @@ namespace cairn::studies {
 namespace {
 
 constexpr char kCorridor[] =
-    "cairn-world 1\nname endless-corridor\nsegment -60 -1.2 60 -1.2\nsegment -60 1.2 60 1.2\nroute r -8 0 8 0\n";
-constexpr char kOneWall[] = "cairn-world 1\nname one-wall\nsegment -60 1.5 60 1.5\nroute r -8 0 8 0\n";
+    "cairn-world: 1\nname: endless-corridor\n"
+    "lines: [{points: [[-60, -1.2], [60, -1.2]]}, {points: [[-60, 1.2], [60, 1.2]]}]\n"
+    "routes: [{name: r, points: [[-8, 0], [8, 0]]}]\n";
+constexpr char kOneWall[] =
+    "cairn-world: 1\nname: one-wall\nlines: [{points: [[-60, 1.5], [60, 1.5]]}]\n"
+    "routes: [{name: r, points: [[-8, 0], [8, 0]]}]\n";
 
 sim::LaserOptions Wide(double degrees) {
   sim::LaserOptions laser = Sick(0.01);
@@ -21,7 +25,8 @@ sim::LaserOptions Wide(double degrees) {
   return laser;
 }
 
-// Walls run along the map's x axis: what a matcher says across it, of the turn, and how far it slides along.
+// The walls run along the map's x axis. The study measures the result across it, the heading, and how far the
+// answer slides along it.
 struct WallTally {
   int cases = 0, flagged = 0, unmatched = 0;
   std::vector<double> across_cm, turn_deg, slid_cm;
@@ -36,7 +41,8 @@ struct WallTally {
                           off_map = turn * Eigen::Vector2d(off.x, off.y);
     across_cm.push_back(100 * std::abs(in_map.y()));
     turn_deg.push_back(Degrees(std::abs(trial.error.z())));
-    slid_cm.push_back(100 * std::abs(in_map.x() - off_map.x()));  // Away from the guess, the only thing known there.
+    // Distance from the guess, which is the only information in this direction.
+    slid_cm.push_back(100 * std::abs(in_map.x() - off_map.x()));
   }
 };
 

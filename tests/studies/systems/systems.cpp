@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "server/slam/matching/keyframe_lines.h"
+#include "server/slam/localisation/keyframe_lines.h"
 #include "server/slam/smoothing/smoothed_path.h"
 #include "tests/studies/log_run.h"
 #include "tests/studies/mapper_choice.h"
@@ -24,8 +24,8 @@ struct System {
   std::vector<std::string> more;
 };
 
-// All filters with the first matcher; all matchers with the first filter, with the refinement and alone. The slowest
-// matcher comes last, so that who watches has the rest.
+// All filters with the first matcher; all matchers with the first filter, with the refinement and alone. The
+// slowest matcher comes last, so that who watches has the rest.
 std::vector<System> AllSystems() {
   const auto matchers = ChoicesOf("slam.matcher"), filters = ChoicesOf("slam.filter");
   std::vector<System> systems;
@@ -48,14 +48,15 @@ std::string Reasons(const LogRun& run) {
   return text;
 }
 
-// A run has diverged where what the robot was told is off by half a metre in the mean, or somewhere by more than a
-// room: then it drew something twice. It may, but not silently.
+// A run has diverged where what the robot was told is off by half a metre in the mean, or somewhere by more
+// than a room: then it drew something twice. It may, but not silently.
 constexpr double kDivergedMeanM = 0.5;
 constexpr double kDivergedMaxM = 5.0;
 // A relation wrong by more than this is one the mapper should not have stood by at both its ends.
 constexpr double kWrongM = 1.0;
 
-// From the first pose on that the mapper stood by: before, a robot that knows nothing of its place has none in the map.
+// From the first pose on that the mapper stood by: before, a robot that knows nothing of its place has none
+// in the map.
 Trajectory SincePlaced(const LogRun& run) {
   const auto first = std::find(run.localized.begin(), run.localized.end(), std::uint8_t{1}) - run.localized.begin();
   return {run.online.begin() + first, run.online.end()};

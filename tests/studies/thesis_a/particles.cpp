@@ -64,6 +64,8 @@ void SweepLog(StudyContext& context, const StudyLog& log, bool lines_only) {
                   {.label = "thesis, mean", .mark = Mark::kDashed},
                   {.label = "thesis, max", .mark = Mark::kDashed}};
   double first_mean = 0.0, last_mean = 0.0;
+  const auto limits = AccuracyLimitsOf(log);
+  std::vector<double> full_means_m;
   for (const Printed& printed : kPrinted) {
     if (context.quick && printed.particles % 200 != 50) continue;
     Trials mean_s, max_s, online_m, online_deg, full_m, full_deg;
@@ -81,6 +83,12 @@ void SweepLog(StudyContext& context, const StudyLog& log, bool lines_only) {
       online_m.Add(online.trans_mean_m), online_deg.Add(online.rot_mean_deg);
       full_m.Add(full.trans_mean_m), full_deg.Add(full.rot_mean_deg);
     }
+    full_means_m.push_back(full_m.distribution().mean);
+    const double worst_m = std::max(online_m.distribution().mean, full_m.distribution().mean);
+    const double allowed_m = !limits ? 0.0 : lines_only ? limits->lines_only_m : limits->shipped_m;
+    report.Expect(!limits || worst_m <= allowed_m, log.name + ", " + system + ", " + Count(printed.particles) +
+                                                       " particles: the mean error is " + Number(worst_m, 3) +
+                                                       " m, more than " + Number(allowed_m, 3));
     const double n = printed.particles;
     table.Add({Count(printed.particles), Number(printed.mean_s, 4), Number(printed.max_s, 4),
                Number(mean_s.distribution().mean, 5), Number(max_s.distribution().mean, 4), Spread(online_m, 3),
@@ -97,6 +105,8 @@ void SweepLog(StudyContext& context, const StudyLog& log, bool lines_only) {
   report.Add(metres, "particles_m_" + log.name + tag);
   report.Add(degrees, "particles_deg_" + log.name + tag);
   report.Add(times, "particles_time_" + log.name + tag);
+  report.Expect(full_means_m.back() < 1.5 * full_means_m.front() + 0.02,
+                log.name + ", " + system + ": the most particles are clearly less exact than the fewest");
   if (last_mean < 0.9 * first_mean) report.Warn("more particles cost less time: the machine was too busy to measure");
 }
 

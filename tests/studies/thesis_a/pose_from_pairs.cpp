@@ -1,6 +1,6 @@
 // Rotation and translation from the same selected pairs of lines, computed in several ways. Poses half-way: see
-// matching/pose_from_pairs.h.
-#include "server/slam/matching/pose_from_pairs.h"
+// server/slam/voting/pose_from_pairs.h.
+#include "server/slam/voting/pose_from_pairs.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,8 +13,8 @@
 
 #include "server/slam/features/corners.h"
 #include "server/slam/features/feature_extraction.h"
-#include "server/slam/matching/robust_mean.h"
-#include "server/slam/matching/voting.h"
+#include "server/slam/voting/robust_mean.h"
+#include "server/slam/voting/voting.h"
 #include "tests/studies/scene.h"
 #include "tests/studies/stopwatch.h"
 #include "tests/studies/thesis_a/thesis_a.h"
@@ -30,8 +30,8 @@ const LineFeature& Line(const ScanFeatures& features, int index) {
   return features.lines[static_cast<std::size_t>(index)];
 }
 
-// The way the thesis advises against (3.5.12.3, Figure 3.29): where two matched lines meet in one scan and in the
-// other.
+// The way the thesis advises against (3.5.12.3, Figure 3.29): where two matched lines meet in one scan and in
+// the other.
 std::optional<Eigen::Vector2d> TranslationFromCorners(const ScanFeatures& prev, const ScanFeatures& curr,
                                                       const std::vector<LinePair>& pairs, double rotation_rad,
                                                       bool real_only, const slam::PoseOptions& options) {
@@ -39,7 +39,7 @@ std::optional<Eigen::Vector2d> TranslationFromCorners(const ScanFeatures& prev, 
   std::vector<slam::WeightedVector> candidates;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     for (std::size_t j = i + 1; j < pairs.size(); ++j) {
-      const LineFeature &a = Line(prev, pairs[i].prev), &b = Line(prev, pairs[j].prev);
+      const LineFeature &a = Line(prev, pairs[i].ref), &b = Line(prev, pairs[j].ref);
       const LineFeature &c = Line(curr, pairs[i].curr), &d = Line(curr, pairs[j].curr);
       const auto in_prev = slam::MeetingPoint(a, b, options.crossing_rad),
                  in_curr = slam::MeetingPoint(c, d, options.crossing_rad);
@@ -50,7 +50,7 @@ std::optional<Eigen::Vector2d> TranslationFromCorners(const ScanFeatures& prev, 
                  ((corner.line_a == m && corner.line_b == n) || (corner.line_a == n && corner.line_b == m));
         });
       };
-      if (real_only && !(is_real(prev, pairs[i].prev, pairs[j].prev) && is_real(curr, pairs[i].curr, pairs[j].curr)))
+      if (real_only && !(is_real(prev, pairs[i].ref, pairs[j].ref) && is_real(curr, pairs[i].curr, pairs[j].curr)))
         continue;
       candidates.push_back({*in_prev - R * *in_curr, std::sqrt(std::sqrt(a.length * b.length * c.length * d.length))});
     }
@@ -105,7 +105,7 @@ void CompareOnce(const ScanFeatures& prev, const ScanFeatures& curr, const Pose2
   translations[kVectors].push_back(error(vectors->translation));
   translations[kAllCorners].push_back(error(*corners));
   translations[kRealCorners].push_back(error(*real));
-  translations[kMatcher].push_back(error(match.result.T_prev_curr.translation()));
+  translations[kMatcher].push_back(error(match.result.T_ref_curr.translation()));
 }
 
 Series Cumulative(const std::string& label, std::vector<double> samples) {

@@ -57,8 +57,8 @@ std::string ErrorText(const RelationError& error) {
   return Number(error.trans_mean_m, 3) + " / " + Number(error.rot_mean_deg, 2);
 }
 
-// Time of keyframes and of the scans between them: the thesis' split by landmark re-observation needs its own filter
-// step timed; a keyframe is where ours does all filter work.
+// Time of keyframes and of the scans between them: the thesis' split by landmark re-observation needs its own
+// filter step timed; a keyframe is where ours does all filter work.
 struct Split {
   Distribution all, keyframes, others;
 };

@@ -6,6 +6,12 @@ std::vector<std::string> LinesOnly() {
   return {"slam.front_end.refine.enabled=false", "slam.revisit.enabled=false", "slam.loop.enabled=false"};
 }
 
+std::optional<AccuracyLimits> AccuracyLimitsOf(const StudyLog& log) {
+  if (log.name == "mit-csail") return AccuracyLimits{.shipped_m = 0.065, .lines_only_m = 0.6};
+  if (log.name == "intel") return AccuracyLimits{.shipped_m = 0.055, .lines_only_m = 1.4};
+  return std::nullopt;
+}
+
 namespace {
 
 void RunThesisA(StudyContext& context) {
@@ -16,6 +22,7 @@ void RunThesisA(StudyContext& context) {
       "in Matlab on a 2 GHz Core 2 Duo: they stand beside ours for the shape of the curves, not as a race.");
   if (context.Wants("lines")) StudyLineExtraction(context);
   if (context.Wants("pairs")) StudyPoseFromPairs(context);
+  if (context.Wants("grid")) StudyGridModels(context);
   const std::vector<StudyLog> logs = ChooseLogs(context, {"intel", "mit-csail"}, context.Pick(0, 2500));
   if (context.Wants("systems")) StudySystems(context, logs);
   if (context.Wants("particles")) StudyParticles(context, logs);

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "server/slam/features/feature_extraction.h"
-#include "server/slam/matching/line_lsq.h"
+#include "server/slam/matchers/line_lsq.h"
 #include "tests/studies/scene.h"
 #include "tests/studies/stopwatch.h"
 #include "tests/studies/thesis_b/thesis_b.h"
@@ -22,7 +22,7 @@ using slam::ScanFeatures;
 
 struct CorridorPair {
   ScanFeatures prev, curr;
-  Pose2 T_prev_curr;
+  Pose2 T_ref_curr;
   Pose2 T_map_prev;
 };
 
@@ -44,8 +44,9 @@ CorridorPair DrawPair(const Scene& scene, double share, sim::Random& random) {
   }
 }
 
-// Least squares once, over pairs formed once at the identity: the thesis' first test. It does not say by what; by
-// normals alone ("the closest one comparing the normals", 4.3.2), or the nearest midpoint of those with like normals.
+// Least squares once, over pairs formed once at the identity: the thesis' first test. It does not say by
+// what; by normals alone ("the closest one comparing the normals", 4.3.2), or the nearest midpoint of those
+// with like normals.
 enum class Couples : std::uint8_t { kClosestNormal, kNearestMidpoint };
 std::optional<Pose2> LeastSquaresAlone(const CorridorPair& pair, Couples couples, const slam::LineLsqOptions& options) {
   std::vector<slam::WeighedPair> weighed;
@@ -65,10 +66,11 @@ std::optional<Pose2> LeastSquaresAlone(const CorridorPair& pair, Couples couples
       weighed.push_back({slam::MidpointAndNormal(*nearest), curr, std::min(nearest->length, line.length)});
   }
   if (weighed.empty()) return std::nullopt;
-  return slam::AlignLinePairs(weighed, {}, options.least_squares).T_prev_curr;
+  return slam::AlignLinePairs(weighed, {}, options.least_squares).T_ref_curr;
 }
 
-// The gates and weights thesis B prints (5.4.3). MP_THRESHOLD is printed as 0.1^2: of the square of the distance.
+// The gates and weights thesis B prints (5.4.3). MP_THRESHOLD is printed as 0.1^2: of the square of the
+// distance.
 slam::LineLsqOptions AsPrinted(int rounds) {
   slam::LineLsqOptions options;
   options.association.max_across_m = options.association.max_along_m = options.association.first_across_m = 0.1;
@@ -117,14 +119,14 @@ void DrawFigures(StudyContext& context, const CorridorPair& pair) {
   if (alone)
     context.report.Add(figure("Figure 5.15: least squares alone", *alone, "p2, moved by least squares"), "figure_5_15");
   context.report.Add(
-      figure("Figure 5.16: with data association", match.result.T_prev_curr, "p2, moved with association"),
+      figure("Figure 5.16: with data association", match.result.T_ref_curr, "p2, moved with association"),
       "figure_5_16");
-  Plot plot = figure("Figure 5.17: the associations", match.result.T_prev_curr, "p2, moved with association");
+  Plot plot = figure("Figure 5.17: the associations", match.result.T_ref_curr, "p2, moved with association");
   const auto prev = slam::PolylineLines(pair.prev.lines, options.polylines),
              curr = slam::PolylineLines(pair.curr.lines, options.polylines);
   Series links{.label = "associated", .mark = Mark::kLine, .colour = 6};
   for (const slam::LinePair& link : match.pairs) {
-    const Eigen::Vector2d a = pair.T_map_prev * prev[static_cast<std::size_t>(link.prev)].midpoint();
+    const Eigen::Vector2d a = pair.T_map_prev * prev[static_cast<std::size_t>(link.ref)].midpoint();
     const Eigen::Vector2d b = pair.T_map_prev * curr[static_cast<std::size_t>(link.curr)].midpoint();
     links.x.insert(links.x.end(), {a.x(), b.x(), NAN});
     links.y.insert(links.y.end(), {a.y(), b.y(), NAN});
@@ -186,21 +188,21 @@ void StudyAssociation(StudyContext& context) {
     for (int i = 0; i < cases; ++i) {
       const CorridorPair pair = DrawPair(scene, place.share, random);
       const auto start = LeastSquaresAlone(pair, Couples::kNearestMidpoint, {});
-      const bool alone_right = alone.Add(start, pair.T_prev_curr);
+      const bool alone_right = alone.Add(start, pair.T_ref_curr);
       by_normals_against.Add(alone_right,
-                             by_normals.Add(LeastSquaresAlone(pair, Couples::kClosestNormal, {}), pair.T_prev_curr));
-      slam::MatchPrior odometry{pair.T_prev_curr, 0.01 * Eigen::Matrix3d::Identity()};
-      odometry.T_prev_curr.x += sim::Normal(random, 0.05);
-      odometry.T_prev_curr.y += sim::Normal(random, 0.05);
-      odometry.T_prev_curr.theta = WrapAngle(odometry.T_prev_curr.theta + sim::Normal(random, Radians(2)));
+                             by_normals.Add(LeastSquaresAlone(pair, Couples::kClosestNormal, {}), pair.T_ref_curr));
+      slam::MatchPrior odometry{pair.T_ref_curr, 0.01 * Eigen::Matrix3d::Identity()};
+      odometry.T_ref_curr.x += sim::Normal(random, 0.05);
+      odometry.T_ref_curr.y += sim::Normal(random, 0.05);
+      odometry.T_ref_curr.theta = WrapAngle(odometry.T_ref_curr.theta + sim::Normal(random, Radians(2)));
       bool shipped_right = false;
       for (Way& way : ways) {
         slam::MatchPrior prior;
         if (way.guess == Guess::kOdometry) prior = odometry;
-        if (way.guess == Guess::kLeastSquares && start) prior.T_prev_curr = *start;
+        if (way.guess == Guess::kLeastSquares && start) prior.T_ref_curr = *start;
         const slam::LineLsqMatch match = slam::MatchLinesByLeastSquares(pair.prev, pair.curr, prior, way.options);
         const bool right = way.errors.Add(
-            match.result.converged ? std::optional(match.result.T_prev_curr) : std::nullopt, pair.T_prev_curr);
+            match.result.converged ? std::optional(match.result.T_ref_curr) : std::nullopt, pair.T_ref_curr);
         way.against.Add(alone_right, right);
         if (match.result.converged) way.rounds.push_back(match.result.iterations);
         shipped_right = right;  // The last way's.
@@ -209,7 +211,7 @@ void StudyAssociation(StudyContext& context) {
         for (std::size_t r = 0; r < 50; ++r) way.sums[r] += match.errors[std::min(r, match.errors.size() - 1)];
       }
       if (!drawn && world == "corridor" && shipped_right && !alone_right &&
-          pair.T_prev_curr.translation().norm() > 0.25 && pair.curr.lines.size() > 6) {
+          pair.T_ref_curr.translation().norm() > 0.25 && pair.curr.lines.size() > 6) {
         DrawFigures(context, pair);
         drawn = true;
       }

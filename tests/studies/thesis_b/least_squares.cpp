@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "server/slam/features/feature_extraction.h"
-#include "server/slam/matching/keyframe_lines.h"
-#include "server/slam/matching/line_least_squares.h"
+#include "server/slam/localisation/keyframe_lines.h"
+#include "server/slam/matchers/line_least_squares.h"
 #include "tests/studies/scene.h"
 #include "tests/studies/thesis_b/thesis_b.h"
 
@@ -80,7 +80,7 @@ void StudyLeastSquares(StudyContext& context, const StudyLog& log) {
         pairs.push_back({slam::MidpointAndNormal(line), slam::MidpointAndNormal(moved.back()), line.length});
       }
       const slam::LineAlignment alignment = slam::AlignLinePairs(pairs, {}, way.options);
-      const Pose2 off = Between(T, alignment.T_prev_curr);
+      const Pose2 off = Between(T, alignment.T_ref_curr);
       Series series{.label = std::string("Figure ") + wanted.figure, .mark = Mark::kLine};
       std::size_t quick = alignment.chi.size();
       for (std::size_t i = 0; i < alignment.chi.size(); ++i) {
@@ -104,7 +104,7 @@ void StudyLeastSquares(StudyContext& context, const StudyLog& log) {
                   .width = 800,
                   .height = 700};
       figure.series = {LineSeries(lines, {}, "before", 2), LineSeries(moved, {}, "after the inverse transform", 9),
-                       LineSeries(moved, alignment.T_prev_curr, "after least squares", 5)};
+                       LineSeries(moved, alignment.T_ref_curr, "after least squares", 5)};
       report.Add(figure, std::string("figure_") + wanted.figure);
     }
     report.Add(plot, way.options.length_power == 0.0 ? "chi_thesis" : "chi");

@@ -1,5 +1,5 @@
-// The parts of `cairn-study thesis-b` (fast position tracking with lines). Each adds its section to the report, and
-// tells it where a figure is not plausible.
+// The parts of `cairn-study thesis-b` (fast position tracking with lines). Each adds its section to the
+// report, and tells it where a figure is not plausible.
 #pragma once
 
 #include <span>
@@ -12,7 +12,8 @@
 
 namespace cairn::studies {
 
-// 5.4.2, Table 5.1, Figures 5.7-5.14: the eight transforms recovered by least squares over known pairs; chi curves.
+// 5.4.2, Table 5.1, Figures 5.7-5.14: the eight transforms recovered by least squares over known pairs; chi
+// curves.
 void StudyLeastSquares(StudyContext& context, const StudyLog& log);
 
 // 5.4.3, Figures 5.15-5.18: two poses of a corridor, least squares alone and with association; rounds needed.
@@ -21,8 +22,8 @@ void StudyAssociation(StudyContext& context);
 // Scan after scan of the logs at hand, from odometry's guess, beside point-to-line ICP.
 void StudyTracking(StudyContext& context, const std::vector<StudyLog>& logs);
 
-// 2.2.2: the place in a known map of lines from nothing, and followed with odometry, in the simulated worlds and on the
-// logs at hand.
+// 2.2.2: the place in a known map of lines from nothing, and followed with odometry, in the simulated worlds
+// and on the logs at hand.
 void StudyLineMatch(StudyContext& context);
 
 // The lines as one series of a plot, the pen lifted between them; moved by T.

@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "server/slam/front_end.h"
-#include "server/slam/matching/scan_matching.h"
+#include "server/slam/methods.h"
+#include "server/slam/tracking/front_end.h"
 #include "tests/studies/stopwatch.h"
 #include "tests/studies/thesis_b/thesis_b.h"
 
@@ -61,18 +61,18 @@ void StudyTracking(StudyContext& context, const std::vector<StudyLog>& logs) {
       ++pairs;
       Stopwatch watch;
       const slam::MatchResult lines =
-          slam::MatchScans(step.prev, step.curr, step.prior, slam::MatcherKind::kLineLsq, {}, slam::SerialFor);
+          slam::MakeMatcher(slam::MatcherKind::kLineLsq, {}).match(step.prev, step.curr, step.prior, slam::SerialFor);
       time.push_back(watch.CpuMs());
       watch.Restart();
       const slam::MatchResult icp =
-          slam::MatchScans(step.prev, step.curr, step.prior, slam::MatcherKind::kIcp, {}, slam::SerialFor);
+          slam::MakeMatcher(slam::MatcherKind::kIcp, {}).match(step.prev, step.curr, step.prior, slam::SerialFor);
       icp_time.push_back(watch.CpuMs());
       if (!lines.converged) return;
       ++converged;
       degenerate += lines.degenerate;
       rounds.push_back(lines.iterations);
       if (!icp.converged || icp.degenerate || lines.degenerate) return;
-      const Pose2 apart = Between(icp.T_prev_curr, lines.T_prev_curr);
+      const Pose2 apart = Between(icp.T_ref_curr, lines.T_ref_curr);
       cm.push_back(100 * apart.translation().norm());
       deg.push_back(Degrees(std::abs(apart.theta)));
     });

@@ -15,7 +15,7 @@ ScanSequence SequenceOf(const StudyLog& log) {
   sequence.name = log.name;
   for (const LogRecord& record : log.records) {
     const auto* scan = std::get_if<Scan>(&record);
-    if (scan == nullptr || slam::RefusalOf(*scan)) continue;
+    if (scan == nullptr || !ValidateScan(*scan)) continue;
     const auto truth = std::lower_bound(log.truth.begin(), log.truth.end(), scan->stamp,
                                         [](const auto& pose, Stamp stamp) { return pose.stamp < stamp; });
     if (!log.truth.empty() && (truth == log.truth.end() || truth->stamp != scan->stamp)) continue;
@@ -35,7 +35,7 @@ SequenceErrors MatchSequence(const ScanSequence& sequence, const slam::NdtDeOpti
   for (std::size_t i = 1; i < sequence.points.size(); ++i) {
     StepError step;
     step.match = slam::SearchNdt(sequence.points[i - 1], sequence.points[i], nothing_known, options, slam::SerialFor);
-    step.T_prev_curr = options.climb ? step.match.result.T_prev_curr : step.match.T_evolved;
+    step.T_prev_curr = options.climb ? step.match.result.T_ref_curr : step.match.T_evolved;
     if (!sequence.T_map_robot.empty()) {
       const Pose2 truth = Between(sequence.T_map_robot[i - 1], sequence.T_map_robot[i]);
       step.error = step.T_prev_curr.vector() - truth.vector();

@@ -1,5 +1,6 @@
-// Scan matching by NDT and differential evolution along a sequence of scans, as thesis C measures it (5.1): every scan
-// against the one before, nothing known of the motion; with the truth beside it where there is one.
+// Scan matching by NDT and differential evolution along a sequence of scans, as thesis C measures it (5.1):
+// every scan against the one before, nothing known of the motion; with the truth beside it where there is
+// one.
 #pragma once
 
 #include <cmath>
@@ -7,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "server/slam/matching/ndt_de.h"
+#include "server/slam/matchers/ndt_de.h"
 #include "tests/studies/logs.h"
 #include "tests/studies/study.h"
 
@@ -25,8 +26,8 @@ struct ScanSequence {
 // One step of the sequence. Errors in the axes of ours: x ahead, y to the left (the thesis' y and -x).
 struct StepError {
   slam::NdtDeMatch match;
-  // The evolution's own answer, or where it is climbed from there. Not the join with what was believed before: where an
-  // evolution ended far from a maximum that would say "nothing known: stand still".
+  // The evolution's own answer, or where it is climbed from there. Not the join with what was believed
+  // before: where an evolution ended far from a maximum that would say "nothing known: stand still".
   Pose2 T_prev_curr;
   Eigen::Vector3d error = Eigen::Vector3d::Zero();  // Zero where the truth is not known.
   [[nodiscard]] double metres() const { return error.head<2>().norm(); }
@@ -50,8 +51,8 @@ struct SequenceErrors {
 // The poses that follow from the steps, from the identity; as many as scans.
 [[nodiscard]] std::vector<Pose2> ChainOf(const SequenceErrors& errors);
 
-// The simulated drive of 5.1: 366 scans of 181 beams, 8 m range or more, a given noise. The thesis' world is not given
-// in numbers; a shipped one stands in.
+// The simulated drive of 5.1: 366 scans of 181 beams, 8 m range or more, a given noise. The thesis' world is
+// not given in numbers; a shipped one stands in.
 [[nodiscard]] ScanSequence SimulatedDrive(StudyContext& context, double noise_m);
 
 }  // namespace cairn::studies

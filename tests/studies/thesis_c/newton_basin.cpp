@@ -2,8 +2,8 @@
 #include <string>
 #include <vector>
 
-#include "server/slam/front_end.h"
-#include "server/slam/matching/ndt.h"
+#include "server/slam/matchers/ndt.h"
+#include "server/slam/tracking/front_end.h"
 #include "tests/studies/scene.h"
 #include "tests/studies/thesis_c/thesis_c.h"
 
@@ -61,8 +61,8 @@ void StudyNewtonBasin(StudyContext& context) {
             slam::MatchPrior prior{pair.truth * error, Eigen::Vector3d(4.0, 4.0, 1.0).asDiagonal()};
             const slam::MatchResult match = slam::MatchByNdt(pair.prev, pair.curr, prior, options, slam::SerialFor);
             const bool right = match.converged &&
-                               (match.T_prev_curr.translation() - pair.truth.translation()).norm() < 0.05 &&
-                               std::abs(AngleDiff(match.T_prev_curr.theta, pair.truth.theta)) < Radians(1.0);
+                               (match.T_ref_curr.translation() - pair.truth.translation()).norm() < 0.05 &&
+                               std::abs(AngleDiff(match.T_ref_curr.theta, pair.truth.theta)) < Radians(1.0);
             home += right ? 1 : 0;
           }
         }

@@ -124,6 +124,10 @@ TEST_F(CairnOffline, SaysWhatIsWrongAndExitsByIt) {
   const auto range = Run({Log(), "--set", "slam.grid.resolution_m=5"});
   EXPECT_NE(range.exit_code, 0);
   EXPECT_NE(range.output.find("resolution_m"), std::string::npos) << range.output;
+  const auto contradiction = Run({Log(), "--set", "slam.grid.no_return_free_m=26"});
+  EXPECT_EQ(contradiction.exit_code, 2);
+  EXPECT_EQ(contradiction.output,
+            "cairn-offline: slam.grid.no_return_free_m (26) must not exceed slam.grid.max_ray_m (25)\n");
 }
 
 }  // namespace

@@ -156,7 +156,7 @@ TEST_F(CairnProgram, AReplayAsFastAsTheServerTakesItLosesNothing) {
   EXPECT_EQ(account["unexplained"], 0);
 }
 
-TEST_F(CairnProgram, AnEndedSessionCanBeReplayedAgainAndAResumedOneDropsThePast) {
+TEST_F(CairnProgram, AnEndedSessionCanBeReplayedAgainAndAResumedOneTakesTheClockAsSetBack) {
   ASSERT_NO_FATAL_FAILURE(StartServer());
   WriteLog("5");
   const std::vector<std::string> replay = {"replay", File("robot1.log"), "--site", "hall", "--robot", "r1", "--fast"};
@@ -165,8 +165,11 @@ TEST_F(CairnProgram, AnEndedSessionCanBeReplayedAgainAndAResumedOneDropsThePast)
   EXPECT_EQ(MustJson(and_end)["used"], 50);
   EXPECT_EQ(MustJson(replay)["used"], 50) << "a new session";
   const auto again = MustJson(replay);
-  EXPECT_EQ(again["used"], 0) << "the same stamps in the same session";
-  EXPECT_EQ(again["dropped_total"], 50);
+  // The same stamps in the same session look like a clock that was set back: the first ones are dropped, and the others
+  // are used. How many are dropped depends on how the two streams interleave.
+  EXPECT_GT(again["dropped_total"], 4);
+  EXPECT_GT(again["used"], 20);
+  EXPECT_EQ(again["used"].get<int>() + again["dropped_total"].get<int>(), 50);
   EXPECT_EQ(again["unexplained"], 0);
   MustJson({"session", "end", "r1"});
   EXPECT_EQ(MustJson({"status", "r1"})["robots"][0]["phase"], "ended");

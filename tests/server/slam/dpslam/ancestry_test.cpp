@@ -48,7 +48,7 @@ FullMap MapOf(const Ancestry& ancestry, Ancestry::Id id) {
   return map;
 }
 
-// Every particle that is somebody's ancestor has two children or more; none is left over.
+// Every particle that is an ancestor has at least two children, and no node is left over.
 void ExpectMinimal(const Ancestry& ancestry) {
   std::map<Ancestry::Id, int> children;
   std::vector<Ancestry::Id> line;
@@ -71,7 +71,7 @@ void ExpectMinimal(const Ancestry& ancestry) {
 
 struct Resampling {
   int particles;
-  int favourites;  // Survivors come from about so many parents.
+  int favourites;  // The survivors have about this many parents.
 };
 
 class AncestryUnder : public testing::TestWithParam<Resampling> {};
@@ -98,7 +98,7 @@ TEST_P(AncestryUnder, RandomResamplingEqualsCopyingMaps) {
     ExpectMinimal(ancestry);
     if (HasFatalFailure()) return;
     for (std::size_t i = 0; i < oracle.size(); ++i) ASSERT_EQ(MapOf(ancestry, ancestry.living()[i]), oracle[i]);
-    // As the rays see it: from relative to relative, each change applied and undone exactly.
+    // As the rays use the maps: from one relative to the next, each change is applied and undone exactly.
     if (generation % 10 != 0) continue;
     OpacityWindow window(ancestry, {0, 0, 3, 1}, StopRate(OpacityOptions{}));
     for (std::size_t i = 0; i < oracle.size(); ++i) {

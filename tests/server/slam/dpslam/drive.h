@@ -1,4 +1,5 @@
-// A robot driven round a building ring for the tests of DP-SLAM: true poses, odometry steps with errors, and scans.
+// A robot driven round a building ring for the tests of DP-SLAM: true poses, odometry steps with errors, and
+// scans.
 #pragma once
 
 #include <vector>
@@ -20,7 +21,8 @@ inline void AddBox(double x0, double y0, double x1, double y1, std::vector<sim::
   segments.insert(segments.end(), {{a, b}, {b, c}, {c, d}, {d, a}});
 }
 
-// A corridor 2 m wide round a core, with pillars on the way so that its length shows; counter-clockwise from (2, 1).
+// A corridor 2 m wide round a core, with pillars on the way so that its length shows; counter-clockwise from
+// (2, 1).
 inline std::vector<DriveStep> DriveRing(double width, double height, double laps, int beams, std::uint64_t seed) {
   std::vector<sim::Segment> segments;
   AddBox(0, 0, width, height, segments);
@@ -65,7 +67,7 @@ inline std::vector<DriveStep> DriveRing(double width, double height, double laps
   return steps;
 }
 
-// Blocks in the calling thread, last first: what threads may do to the order.
+// Runs the blocks in the calling thread, the last one first. With threads, any order is possible.
 inline ParallelFor InBlocks(int blocks) {
   return [blocks](int count, const std::function<void(int, int)>& body) {
     for (int b = blocks - 1; b >= 0; --b)

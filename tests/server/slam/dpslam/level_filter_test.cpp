@@ -26,7 +26,8 @@ Evidence One(const Scan& scan) {
   return {{std::make_shared<LaserRays>(RaysOf(scan, {})), Pose2{}}};
 }
 
-// The filter as one would write it without a family tree: every particle a whole map of its own, copied on resampling.
+// A reference filter without a family tree: every particle has a whole map of its own, which is copied on
+// resampling.
 class CopyTheMap {
  public:
   CopyTheMap(const LevelOptions& options, const Pose2& start) : options_(options) {
@@ -43,7 +44,7 @@ class CopyTheMap {
   void Move(const Pose2& step, const Eigen::Matrix3d& covariance, Rng& rng) {
     const Eigen::Vector3d sigma = covariance.diagonal().cwiseSqrt();  // Diagonal, and its eigenvectors come in order.
     for (Owner& particle : particles_) {
-      const Eigen::Vector3d draw(NormalDraw(rng), NormalDraw(rng), NormalDraw(rng));
+      const Eigen::Vector3d draw = ThreeNormalDraws(rng);
       const Eigen::Vector3d noisy = step.vector() + sigma.cwiseProduct(draw);
       particle.pose = particle.pose * Pose2{noisy.x(), noisy.y(), WrapAngle(noisy.z())};
     }
@@ -101,7 +102,7 @@ TEST(LevelFilter, IsTheFilterThatCopiesMaps) {
     naive.Observe(*seen[0].rays, naive_rng);
     for (std::size_t p = 0; p < filter.particles().size(); ++p) {
       ASSERT_EQ(filter.particles()[p].T_map_robot, naive.particles()[p].pose) << "step " << i;
-      // The whole map, as the rays would see it.
+      // The whole map, as the rays read it.
       if (i % 8 != 7 || p % 5 != 0) continue;
       const Ancestry& ancestry = filter.maps().ancestry();
       OpacityWindow tree(ancestry, {-5, -5, 10, 10}, filter.maps().rate());
@@ -144,7 +145,7 @@ TEST(LevelFilter, SameBytesOnAnyNumberOfThreads) {
   }
 }
 
-// Giving up on the hopeless changes nothing that matters: who is given up had a weight of nothing.
+// Giving up particles does not change the result: their weight was zero.
 TEST(LevelFilter, GivingUpEarlySparesTheSurvivors) {
   const auto drive = DriveRing(8.0, 6.0, 0.2, 91, 4);
   LevelOptions options = SmallLevel();
@@ -179,7 +180,8 @@ TEST(LevelFilter, ParticlesCostWhatTheyChange) {
     ASSERT_LE(ancestry.size(), 2 * ancestry.living().size() - 1);
     ASSERT_LE(ancestry.living().size(), 60u);
     ASSERT_LE(ancestry.depth(), ancestry.living().size());
-    // One whole map, and for every other node at most what a few scans touch (45 rays of at most 8 m: 45 * 230 cells).
+    // One whole map, and for every other node at most what a few scans touch (45 rays of at most 8 m: 45 *
+    // 230 cells).
     const std::size_t map_bytes = 40 * kChangeTileArea * sizeof(ChangeTile::Counts);
     ASSERT_LE(ancestry.bytes(), map_bytes + ancestry.size() * 3 * 45 * 230 * sizeof(CellChange));
   }
@@ -195,7 +197,7 @@ TEST(LevelFilter, AScanThatSaysNothingOnlyLengthensPaths) {
   const Evidence first = One(drive[0].scan);
   filter.Observe(first, rng, SerialFor);
   EXPECT_FALSE(filter.maps().blank());
-  EXPECT_EQ(filter.maps().count(), 1u);  // All particles alike: one map.
+  EXPECT_EQ(filter.maps().count(), 1u);  // All particles are alike, so there is only one map.
   filter.Move({0.2, 0.0, 0.0}, Noise(), rng);
   filter.Observe(nothing, rng, SerialFor);
   EXPECT_EQ(filter.maps().count(), 1u);
@@ -215,7 +217,7 @@ TEST(LevelFilter, SurvivesScatteredParticlesAndFarPlaces) {
     EXPECT_TRUE(filter.mean().IsFinite());
     EXPECT_TRUE(filter.covariance().allFinite());
   }
-  EXPECT_EQ(filter.maps().Image(0).width, 0);  // Too wide for a picture.
+  EXPECT_EQ(filter.maps().Image(0).width, 0);  // The map is too wide for a picture.
 }
 
 }  // namespace

@@ -14,7 +14,8 @@ TEST(Opacity, ALaserIsStoppedOnceInAMeanFreePath) {
   EXPECT_EQ(StopProbability(0.0, 0.05), 0.0);
 }
 
-// Two halves of a way stop as much as the whole: what makes the model independent of how a ray cuts a cell.
+// Two halves of a way through a cell stop as many rays as the whole. So the model does not depend on how a
+// ray cuts a cell.
 TEST(Opacity, AWayMayBeCutAnywhere) {
   const std::vector<RaySpan> cut{{0.02, 0.4, 0.0}, {0.03, 0.4, 0.0}};
   EXPECT_NEAR(StoppedProbability(cut), StopProbability(0.05, 0.4), 1e-12);
@@ -35,7 +36,8 @@ TEST(Opacity, StopsAddUpToNotHavingPassed) {  // (3.36) telescopes.
   EXPECT_NEAR(StoppedProbability(spans), 1.0 - std::exp(-depth), 1e-12);
 }
 
-// Over all ranges a laser may report, a ray's density sums to the chance that it was stopped at all.
+// Over all ranges that a laser may report, the density of a ray sums to the probability that it was stopped
+// at all.
 TEST(Opacity, DensityOverAllRangesIsTheChanceToBeStopped) {
   std::vector<RaySpan> spans;
   for (int i = 0; i < 40; ++i) spans.push_back({0.05, i == 30 ? 0.02 : 2.0, 0.0});

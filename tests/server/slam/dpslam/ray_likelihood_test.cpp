@@ -42,7 +42,7 @@ class RayInAMap : public testing::Test {
     return static_cast<double>(window.rates()[row * window.width() + column]);
   }
 
-  // (3.39), word by word, over the cells seen; from unseen ones rays come back with the same density everywhere.
+  // (3.39) written out over the seen cells. From unseen cells, rays return with the same density everywhere.
   [[nodiscard]] double Textbook(const OpacityWindow& window, const Pose2& pose, const LaserRay& ray) const {
     std::vector<RaySpan> spans;
     double unseen = 0.0;
@@ -76,7 +76,8 @@ TEST_F(RayInAMap, EqualsTheTextbook) {
     const double bearing = turn(rng);
     const LaserRay ray{{std::cos(bearing), std::sin(bearing)}, range(rng), i % 4 != 0};
     const double fast = RayLikelihood(window, pose, Eigen::Vector2d::Zero(), ray, model_);
-    // 4 sigma instead of 6: below 1e-4 of the peak's 8 per metre. The cell that straddles it falls out as a whole.
+    // With 4 sigma in place of 6, the density is below 1e-4 of the peak's 8 per metre. A cell across the
+    // limit is left out as a whole.
     EXPECT_NEAR(fast, Textbook(window, pose, ray), 4e-3 + 1e-4 * fast);
   }
 }
@@ -86,9 +87,9 @@ TEST_F(RayInAMap, IsBestWhereTheWallIs) {
   const auto at = [&](double range) {
     return RayLikelihood(window, {}, {0.0, 0.0}, {{1.0, 0.0}, range, true}, model_);
   };
-  EXPECT_GT(at(3.02), 30.0 * at(2.5));  // Where the map says free.
+  EXPECT_GT(at(3.02), 30.0 * at(2.5));  // Where the map says that the space is free.
   EXPECT_GT(at(3.02), 5.0 * at(3.2));
-  // Passing through the wall is unlikely, up to it certain.
+  // Passing through the wall is unlikely; up to the wall it is certain.
   const auto passes = [&](double range) {
     return RayLikelihood(window, {}, {0.0, 0.0}, {{1.0, 0.0}, range, false}, model_);
   };
@@ -103,7 +104,7 @@ TEST_F(RayInAMap, OutsideTheWindowIsUnseenSpace) {
   LaserRays one;
   one.rays.push_back(ray);
   EXPECT_NEAR(std::log(seen), UnseenLogLikelihood(one, 1, model_), 0.05);
-  // A ray that leaves the window and one that starts outside.
+  // One ray leaves the window, and one starts outside it.
   EXPECT_TRUE(std::isfinite(RayLikelihood(small, {1.0, 1.0, 0.0}, {0.0, 0.0}, ray, model_)));
   EXPECT_TRUE(std::isfinite(RayLikelihood(small, {-5.0, -6.0, 0.0}, {0.0, 0.0}, ray, model_)));
 }

@@ -22,9 +22,10 @@ LevelOptions High(std::int64_t particles) {
   return options;
 }
 
-// A ring driven past its start in segments of eight scans a metre apart, every one of them bent the same way.
+// A ring driven beyond its start, in segments of eight scans that are a metre apart. Every segment is bent in
+// the same direction.
 struct Segments {
-  std::vector<Pose2> truth;  // Of every scan.
+  std::vector<Pose2> truth;  // The true pose of every scan.
   std::vector<Evidence> trajectories;
 };
 Segments BentRing(double bend_rad, double width_m = 24.0, double laps = 1.25) {
@@ -48,7 +49,7 @@ Segments BentRing(double bend_rad, double width_m = 24.0, double laps = 1.25) {
   return segments;
 }
 
-// How far the path puts the last scan from where it stands to the first scan near it, against the truth.
+// The error of the path between the last scan and the first scan near it, against the truth.
 double LoopErrorOf(const Segments& segments, const SharedSequence<Pose2>& path) {
   const std::size_t last = segments.truth.size() - 1;
   std::size_t near = 0;
@@ -61,7 +62,7 @@ double LoopErrorOf(const Segments& segments, const SharedSequence<Pose2>& path) 
       .norm();
 }
 
-// Farthest from the truth that the path goes.
+// The largest distance of the path from the truth.
 double WorstError(const Segments& segments, const SharedSequence<Pose2>& path) {
   double worst = 0.0;
   for (std::size_t i = 0; i < segments.truth.size(); ++i)
@@ -108,14 +109,14 @@ TEST(SegmentFilter, WhereNobodyComesBackNobodyDiesAndNothingIsDrawn) {
   EXPECT_GT(filter.level().covariance().trace(), 1e-3);
 }
 
-// It once was a sample like the others, and jumped by their whole spread at the first joint.
+// This path used to be a sample like the others, and jumped by their whole spread at the first joint.
 TEST(SegmentFilter, TheBestOneDoesNotDriftWhereNothingAsksForIt) {
   const Segments segments = BentRing(0.0, 70.0, 0.35);  // Along one side.
   const SegmentFilter filter = Driven(segments, High(20), 4);
   EXPECT_LT(WorstError(segments, filter.level().best().path), 1e-9);
 }
 
-// It was bent by 0.15 to 0.5 m when all particles drew the whole drift at every joint.
+// This path used to be bent by 0.15 to 0.5 m, when all particles drew the whole drift at every joint.
 TEST(SegmentFilter, ALoopThatFitsBendsNothing) {
   const Segments segments = BentRing(0.0);
   for (std::uint64_t seed = 1; seed <= 6; ++seed)

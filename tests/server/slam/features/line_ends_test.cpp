@@ -21,11 +21,11 @@ LineFeature WallAt(const Scan& scan, double x) {
   return {};
 }
 
-// Figure 3.11, line 1: its right end is where the scan ends, its left end vanishes behind something nearer.
+// Figure 3.11, line 1: its right end is the end of the scan, and its left end is hidden by a nearer object.
 TEST(LineEnds, OpenWhereTheScanEndsAndWhereSomethingNearerHides) {
   World world;
-  world.Add({{0.0, -2.0}, {12.0, -2.0}});  // Runs out of the field of view on the right ...
-  world.Add({{2.5, -0.6}, {2.5, 0.6}});    // ... and behind this on the left.
+  world.Add({{0.0, -2.0}, {12.0, -2.0}});  // The wall extends beyond the field of view on the right.
+  world.Add({{2.5, -0.6}, {2.5, 0.6}});    // A nearer object hides its left part.
   const Scan scan = Look(world, {0.5, 0, 0}, Laser{});
   for (const LineFeature& line : ExtractLines(PointsOf(scan), scan, LineOptions{})) {
     if (std::abs(line.distance - 2.0) < 0.01 && line.length > 1.0) {
@@ -36,7 +36,8 @@ TEST(LineEnds, OpenWhereTheScanEndsAndWhereSomethingNearerHides) {
   FAIL() << "the wall was not found";
 }
 
-// Figure 3.11, line 2: nearer points beyond the right end, and on the left nearer points that start right at the end.
+// Figure 3.11, line 2: nearer points beyond the right end, and on the left nearer points that start right at
+// the end.
 TEST(LineEnds, LeftEndedWhereAWallTurnsTowardsTheLaser) {
   World world;
   world.Add({{4, -2}, {4, 1}, {3, 1}});  // Concave corner on the left.
@@ -44,7 +45,8 @@ TEST(LineEnds, LeftEndedWhereAWallTurnsTowardsTheLaser) {
   EXPECT_EQ(WallAt(Look(world, {}, Laser{}), 4.0).ends, EndClass::kLeftEnded);
 }
 
-// Figure 3.11, line 3: what lies beyond the right end is farther away, on the left a wall starts right at the end.
+// Figure 3.11, line 3: what lies beyond the right end is farther away, on the left a wall starts right at the
+// end.
 TEST(LineEnds, BothEndedBetweenAnOpeningAndACorner) {
   World world;
   world.Add({{3, -1}, {3, 1}, {2.2, 1}});
@@ -90,7 +92,7 @@ TEST(LineEnds, InvalidBeamsBeyondAnEndLeaveItOpen) {
   world.Add({{3, -0.7}, {3, 0.9}});
   Scan scan = Look(world, {}, Laser{});
   for (float& range : scan.ranges_m) {
-    if (std::isinf(range)) range = 0.0F;  // A scanner that answers nonsense instead of "nothing there".
+    if (std::isinf(range)) range = 0.0F;  // Some scanners return a wrong value when the beam hits nothing.
   }
   EXPECT_EQ(WallAt(scan, 3.0).ends, EndClass::kOpen);
 }

@@ -1,7 +1,8 @@
-// How good the extracted lines are on noisy scans of known walls, beside thesis A, Table 2.1 (Nguyen et al. 2005),
-// where Split-Merge + Clus. reaches 86.0 % true and 8.9 % false positives, sigma of r 1.95 cm and of alpha 0.74 deg.
-// Their scans are real and less kind than ours, so ours must be better than these figures. As there, lines of at least
-// 9 points count for the sigmas; that all lines are as exact as their points allow is checked apart from it.
+// How good the extracted lines are on noisy scans of known walls, beside thesis A, Table 2.1 (Nguyen et al.
+// 2005), where Split-Merge + Clus. reaches 86.0 % true and 8.9 % false positives, sigma of r 1.95 cm and of
+// alpha 0.74 deg. Their scans are real and less kind than ours, so ours must be better than these figures. As
+// there, lines of at least 9 points count for the sigmas; that all lines are as exact as their points allow
+// is checked apart from it.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -22,7 +23,7 @@ struct Quality {
   double sum_r2 = 0.0, sum_alpha2 = 0.0, sum_normalised = 0.0;
 };
 
-// Walls of which at least 0.5 m and 8 beams are hit, told from the noise-free ray cast.
+// The walls of which at least 0.5 m and 8 beams are hit, found by noise-free ray casting.
 std::vector<std::size_t> VisibleWalls(const World& world, const Pose2& pose, const Laser& laser) {
   std::vector<std::size_t> visible;
   for (std::size_t w = 0; w < world.walls.size(); ++w) {
@@ -99,7 +100,8 @@ TEST(LineQuality, BeatsTheComparisonOfExtractorsOnSimulatedScans) {
     const double false_positive = 1.0 * quality.wrong / quality.extracted;
     const double sigma_r = std::sqrt(quality.sum_r2 / quality.measured);
     const double sigma_alpha = Degrees(std::sqrt(quality.sum_alpha2 / quality.measured));
-    // Of slopes, by what least squares can do with so many points over such a length: 1 is perfect.
+    // Errors of slopes relative to the best that least squares can reach with so many points over such a
+    // length; 1 is perfect.
     const double normalised = quality.sum_normalised / (quality.extracted - quality.wrong);
     std::printf(
         "%4d beams: true positives %.1f %%, false positives %.1f %%, sigma r %.2f cm, sigma alpha %.2f deg, normalised "

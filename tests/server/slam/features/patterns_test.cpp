@@ -18,7 +18,7 @@ LineFeature Line(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   return line;
 }
 
-// Lines with the given slope differences from the first, anywhere.
+// Lines at arbitrary places with the given differences of slope from the first.
 std::vector<LineFeature> LinesWithSlopes(const std::vector<double>& degrees) {
   std::vector<LineFeature> lines;
   for (std::size_t i = 0; i < degrees.size(); ++i) {
@@ -42,8 +42,8 @@ TEST(Patterns, AnglesAreSlopeDifferencesToTheFollowingFive) {
   EXPECT_EQ(patterns[6].count, 0);
 }
 
-// The slopes of Tables 3.13 and 3.14 (first column summed up): which lines have corners decides how many entries each
-// row of Tables 3.19 and 3.20 has.
+// The slopes of Tables 3.13 and 3.14 (first column summed up): which lines have corners decides how many
+// entries each row of Tables 3.19 and 3.20 has.
 TEST(Patterns, PrintedSlopesGiveCornerTablesOfThePrintedShape) {
   const auto entries = [](const LinePattern& pattern) {
     int count = 0;

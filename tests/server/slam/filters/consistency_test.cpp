@@ -1,4 +1,4 @@
-// A few runs of the consistency study: filters that claim a Gaussian keep to it, and the check can fail.
+// A few runs of the consistency study: filters that claim a Gaussian are consistent, and the check can fail.
 #include "tests/studies/filters/consistency.h"
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ TEST(Consistency, TheEkfIsAsSureAsItMayBeWithRevisits) {
 }
 
 TEST(Consistency, DriftAloneIsAsLargeAsToldWhichNeitherCorrectionNorParticlesMayChange) {
-  // Without anything to see every filter is the drift model.
+  // Without any features, every filter equals the drift model.
   for (const FilterKind kind : {FilterKind::kNone, FilterKind::kLandmarkCorrection, FilterKind::kEkf,
                                 FilterKind::kFastSlam2Points, FilterKind::kFastSlam1}) {
     const ConsistencyResult result = StudyConsistency({.kind = kind, .runs = 30, .landmarks = false});
@@ -46,7 +46,7 @@ TEST(Consistency, ParticleFiltersAreAsSureAsTheyMayBeWithLandmarksBeforeAndAfter
   }
 }
 
-// Here the loop closes at once: of 200 paths one is left, whose error no spread shows any more (NEES 62 by it).
+// Here the loop closes at once: of 200 paths one is left, and the spread no longer shows its error (NEES 62).
 TEST(Consistency, ParticleFiltersAreAsSureAsTheyMayBeWithRevisitsBeforeAndAfterTheLoop) {
   for (const FilterKind kind : {FilterKind::kFastSlam2Points, FilterKind::kFastSlam1}) {
     const ConsistencyResult result = StudyConsistency({.kind = kind, .runs = 30, .landmarks = false, .revisits = true});

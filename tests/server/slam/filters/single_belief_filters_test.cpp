@@ -1,9 +1,9 @@
-// The filters with one hypothesis: EKF-SLAM, deterministic landmark correction, none.
+// The filters with one hypothesis: EKF-SLAM, deterministic landmark correction, and none.
 #include <gtest/gtest.h>
 
-#include "server/slam/filters/dead_reckoning_filter.h"
-#include "server/slam/filters/ekf_slam.h"
-#include "server/slam/filters/landmark_correction.h"
+#include "server/slam/ekf/ekf_slam.h"
+#include "server/slam/reckoning/dead_reckoning_filter.h"
+#include "server/slam/reckoning/landmark_correction.h"
 
 namespace cairn::slam {
 namespace {
@@ -21,7 +21,8 @@ void DriveSteps(Filter& filter, const std::vector<Pose2>& steps) {
   }
 }
 
-// Ten metres out, turn about, ten metres back, as the wheels tell it: half a metre to the left of the truth at the end.
+// Ten metres out, a turn, and ten metres back according to the odometry, which ends half a metre to the left
+// of the truth.
 std::vector<Pose2> OutTurnAndBack() {
   std::vector<Pose2> steps(20, {0.5, 0, 0});
   steps.push_back({0, 0, kPi});

@@ -33,8 +33,8 @@ TEST(PointToLine, FindsTheWayBackFromSeveralStartingErrors) {
     const Pose2 guess = truth * error;
     const MatchResult match = AlignPointsToSurfaces(points, reference, {guess, guess, kPrior}, {});
     ASSERT_TRUE(match.converged);
-    EXPECT_LT((match.T_prev_curr.translation() - truth.translation()).norm(), 0.01);
-    EXPECT_LT(std::abs(AngleDiff(match.T_prev_curr.theta, truth.theta)), 0.004);
+    EXPECT_LT((match.T_ref_curr.translation() - truth.translation()).norm(), 0.01);
+    EXPECT_LT(std::abs(AngleDiff(match.T_ref_curr.theta, truth.theta)), 0.004);
     EXPECT_TRUE(IsCovariance(match.covariance));
     EXPECT_FALSE(match.degenerate);
   }
@@ -43,7 +43,7 @@ TEST(PointToLine, FindsTheWayBackFromSeveralStartingErrors) {
 TEST(PointToLine, SaysThatACorridorHoldsOnlyOneDirection) {
   World corridor;
   corridor.Add({{-50, 1}, {50, 1}}).Add({{-50, -1}, {50, -1}});
-  // Far hits lie a metre apart on these walls: their direction shows only in how they line up.
+  // Far hits are a metre apart on these walls, so a wall's direction is visible only from several of them.
   const Laser laser{.beams = 361, .step_rad = Radians(0.5)};
   PointIndex reference(PointToLineOptions{}.first_pair_distance_m);
   for (const SurfacePoint& point : SurfaceOf(Look(corridor, {}, laser))) reference.Add(point);
@@ -53,10 +53,11 @@ TEST(PointToLine, SaysThatACorridorHoldsOnlyOneDirection) {
   ASSERT_TRUE(match.converged);
   EXPECT_TRUE(match.degenerate);
   EXPECT_GT(std::abs(match.degenerate_direction.x()), 0.99);
-  EXPECT_NEAR(match.T_prev_curr.y, 0.05, 0.01);  // The walls do.
-  EXPECT_NEAR(match.T_prev_curr.theta, 0.03, 0.005);
-  // Nothing does, so the answer stays by guess and truth, which are 0.1 m apart, and says how unsure it is.
-  EXPECT_NEAR(match.T_prev_curr.x, 0.35, 0.1);
+  EXPECT_NEAR(match.T_ref_curr.y, 0.05, 0.01);  // The walls determine y.
+  EXPECT_NEAR(match.T_ref_curr.theta, 0.03, 0.005);
+  // Nothing determines x, so the answer stays near guess and truth, which are 0.1 m apart, and reports a
+  // large uncertainty.
+  EXPECT_NEAR(match.T_ref_curr.x, 0.35, 0.1);
   EXPECT_GT(match.covariance(0, 0), 20.0 * match.covariance(1, 1));
 }
 
@@ -65,7 +66,7 @@ TEST(PointToLine, WithoutPointsTheAnswerIsThePrior) {
   const MatchResult match = AlignPointsToSurfaces({}, reference, {{1, 0, 0}, {2, 0, 0}, kPrior}, {});
   EXPECT_FALSE(match.converged);
   EXPECT_EQ(match.failure, MatchFailure::kTooFewFeatures);
-  EXPECT_EQ(match.T_prev_curr, (Pose2{2, 0, 0}));
+  EXPECT_EQ(match.T_ref_curr, (Pose2{2, 0, 0}));
 }
 
 TEST(PointToLine, ScansOfDifferentPlacesDoNotConverge) {

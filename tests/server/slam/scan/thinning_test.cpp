@@ -33,8 +33,8 @@ TEST(Thinning, ACloudBecomesItsCentreOfGravity) {
   EXPECT_EQ(thinned[1], Eigen::Vector2d(1, 1));
 }
 
-// Figure 4.18 of the thesis: a robot close to the wall on its right, 181 beams, 59 points left. The drawn room is not
-// given in numbers; this one is like it.
+// Figure 4.18 of the thesis: a robot close to the wall on its right, 181 beams, 59 points left. The drawn
+// room is not given in numbers; this one is like it.
 TEST(Thinning, AScanBesideAWallKeepsAThirdOfItsPoints) {
   const Scan scan = test::Look(test::Room(-1, -0.35, 4.0, 2.6), {}, {});
   const Points hits = HitsOf(scan);

@@ -1,5 +1,5 @@
-// Tilted scans among level ones, from a robot that nods in a world with floor and ceiling: they must not change what
-// the planar estimator says, they get poses, and the cloud they make lies on the walls.
+// Tilted scans among level ones, from a robot that nods in a world with floor and ceiling. They must not
+// change the planar estimate, they get poses, and the cloud made of them lies on the walls.
 #include "server/slam/scan/tilt.h"
 
 #include <gtest/gtest.h>
@@ -45,7 +45,7 @@ const Drive& NoddingDrive() {
 
 struct Answers {
   std::vector<ScanOutcome> level, tilted;
-  Trajectory path;  // Of all scans used.
+  Trajectory path;  // Poses of all scans used.
   MapperSnapshot snapshot;
 };
 
@@ -101,7 +101,7 @@ TEST(TiltedScans, GetAPoseFromOdometryAndSaySo) {
   EXPECT_EQ(run.snapshot.FullTrajectory().size(), run.level.size() + run.tilted.size());
 }
 
-// The story behind the limit: let tilted scans through, and the floor and ceiling they see are taken for walls.
+// The reason for the limit: without it, the floor and the ceiling that tilted scans see are taken for walls.
 TEST(TiltedScans, WouldMisleadTheEstimatorWithoutTheLimit) {
   const Drive& drive = NoddingDrive();
   const auto worst = [&](double max_tilt_rad) {
@@ -148,7 +148,8 @@ TEST(TiltedScans, StayWhereTheLevelOneWasIfOdometryIsWithheld) {
   EXPECT_EQ(outcome.T_map_robot, (Pose2{1, 2, 0.5}));
 }
 
-// Stated bounds: with true poses the cloud's error is the laser's noise; with the estimator's, under 3 cm on average.
+// Stated bounds: with true poses the cloud's error is the laser's noise; with the estimator's, under 3 cm on
+// average.
 TEST(Cloud, LiesOnTheWallsOfTheSimulatedBuilding) {
   const Drive& drive = NoddingDrive();
   const sim::RectangleTree truth(sim::OpenWorld3("hall3d")->rectangles);

@@ -37,14 +37,31 @@ MapperSnapshot Snapshot(std::vector<Pose2> online, std::vector<Pose2> full) {
 const auto kGoOn = [] { return true; };
 
 TEST(SmoothedMap, IsDrawnAlongTheSmoothedPathAndSaysHowMuchBetterItFits) {
-  const auto map = SmoothMap(Snapshot(BrokenPath(), TruePath()), {}, kGoOn);
+  auto map = SmoothMap(Snapshot(BrokenPath(), TruePath()), {}, kGoOn);
   ASSERT_TRUE(map);
   EXPECT_EQ(map->path, TruePath());
   EXPECT_LT(map->after.mean_m2(), map->before.mean_m2());
   OccupancyGrid expected{GridOptions{}};
   for (int k = 0; k < kLooks; ++k) expected.Draw(RoomScan(4 * k), TruePose(4 * k));
-  ASSERT_EQ(map->grid.chunks().size(), expected.chunks().size());
-  for (const auto& [key, chunk] : expected.chunks()) EXPECT_EQ(map->grid.chunks().at(key)->log_odds, chunk->log_odds);
+  const OccupancyGrid::Chunks drawn = map->grid.Share();
+  ASSERT_EQ(drawn.size(), expected.chunk_count());
+  expected.ForEachChunk(
+      [&](const ChunkKey& key, const GridChunk& chunk) { EXPECT_EQ(drawn.at(key)->log_odds, chunk.log_odds); });
+}
+
+TEST(SmoothedMap, AKeyframeThatIsNotLocalizedIsDrawnIntoNoMap) {
+  MapperSnapshot snapshot = Snapshot(TruePath(), TruePath());
+  // Nobody knows where this one was taken: it would be drawn far away from everything else.
+  snapshot.keyframes[7].localized = false;
+  snapshot.online_path[7] = snapshot.full_path[7] = {300.0, 0.0, 0.0};
+  const auto map = SmoothMap(snapshot, {}, kGoOn);
+  ASSERT_TRUE(map);
+  EXPECT_EQ(map->path.size(), snapshot.keyframes.size());
+  OccupancyGrid expected{GridOptions{}};
+  for (int k = 0; k < kLooks; ++k) {
+    if (k != 7) expected.Draw(RoomScan(4 * k), TruePose(4 * k));
+  }
+  EXPECT_EQ(map->grid.chunk_count(), expected.chunk_count());
 }
 
 // A robot that saw no place twice: the best particle's path is one sample, worse than what the robot was told.
@@ -83,11 +100,25 @@ TEST(SmoothedMap, EndsAtOnceWhenToldTo) {
   EXPECT_EQ(asked, kSmoothingStepsPerKeyframe * kLooks);
 }
 
+// The fit of a long path takes minutes and draws nothing meanwhile: it needs its own way to be told to end.
+TEST(SmoothedMap, TheFitCanBeEndedToo) {
+  auto snapshot = Snapshot(BrokenPath(), BrokenPath());
+  for (std::size_t k = 1; k < kLooks; ++k) {
+    snapshot.relations.push_back(
+        {k - 1, k, TruePath()[k - 1].Inverse() * TruePath()[k], Eigen::Matrix3d::Identity() * 1e-4, false});
+  }
+  int drawn = 0;
+  const auto next = [&drawn] { return ++drawn > 0; };
+  EXPECT_FALSE(SmoothMap(snapshot, {}, next, [] { return false; }));
+  EXPECT_EQ(drawn, 2 * kLooks);  // The online map was drawn and compared, the smoothed one was not begun.
+  EXPECT_TRUE(SmoothMap(snapshot, {}, next, kGoOn));
+}
+
 TEST(SmoothedMap, OfNothingIsEmpty) {
   const auto map = SmoothMap({}, {}, kGoOn);
   ASSERT_TRUE(map);
   EXPECT_TRUE(map->path.empty());
-  EXPECT_TRUE(map->grid.chunks().empty());
+  EXPECT_EQ(map->grid.chunk_count(), 0U);
 }
 
 }  // namespace

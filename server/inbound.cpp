@@ -1,0 +1,94 @@
+#include "server/inbound.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace cairn::server {
+
+bool Inbound::TryPush(InboundValue&& value) {
+  const MutexLock lock(mutex_);
+  return PushLocked(value);
+}
+
+bool Inbound::Push(InboundValue value) {
+  const MutexLock lock(mutex_);
+  while (!closed_) {
+    if (PushLocked(value)) return true;
+    room_.Wait(mutex_);
+  }
+  return false;
+}
+
+bool Inbound::PushLocked(InboundValue& value) {
+  if (closed_) return false;
+  Lane& lane = LaneOf(value);
+  if (const auto* const news = std::get_if<ClientLiveliness>(&value)) {
+    ForgetOlder(*news);
+  } else if (lane.size() >= (&lane == &control_ ? kMaxControl : capacity_)) {
+    return false;
+  }
+  lane.push_back({next_++, std::move(value)});
+  filled_.NotifyOne();
+  return true;
+}
+
+Inbound::Lane& Inbound::LaneOf(const InboundValue& value) {
+  if (std::holds_alternative<Request>(value)) return questions_;
+  if (std::holds_alternative<ScanArrival>(value) || std::holds_alternative<OdometryArrival>(value)) return streams_;
+  return control_;
+}
+
+void Inbound::ForgetOlder(const ClientLiveliness& news) {
+  const auto older = std::find_if(control_.begin(), control_.end(), [&news](const Arrived& waiting) {
+    const auto* const liveliness = std::get_if<ClientLiveliness>(&waiting.value);
+    return liveliness != nullptr && liveliness->client == news.client;
+  });
+  if (older != control_.end()) control_.erase(older);
+}
+
+std::optional<InboundValue> Inbound::Pop(const std::stop_token& stop) {
+  // Under the mutex, so that a stop cannot slip in between the check and the wait.
+  const std::stop_callback wake(stop, [this] {
+    const MutexLock lock(mutex_);
+    filled_.NotifyAll();
+  });
+  const MutexLock lock(mutex_);
+  for (;;) {
+    if (stop.stop_requested()) return std::nullopt;
+    if (auto value = PopLocked()) return value;
+    if (closed_) return std::nullopt;
+    filled_.Wait(mutex_);
+  }
+}
+
+std::optional<InboundValue> Inbound::PopLocked() {
+  Lane* first = nullptr;
+  for (Lane* const lane : {&control_, &questions_, &streams_}) {
+    if (!lane->empty() && (first == nullptr || lane->front().number < first->front().number)) first = lane;
+  }
+  if (first == nullptr) return std::nullopt;
+  std::optional<InboundValue> value(std::move(first->front().value));
+  first->pop_front();
+  ++taken_;
+  room_.NotifyAll();
+  return value;
+}
+
+void Inbound::Close() {
+  const MutexLock lock(mutex_);
+  closed_ = true;
+  filled_.NotifyAll();
+  room_.NotifyAll();
+}
+
+std::size_t Inbound::size() const {
+  const MutexLock lock(mutex_);
+  return control_.size() + questions_.size() + streams_.size();
+}
+
+std::uint64_t Inbound::taken() const {
+  const MutexLock lock(mutex_);
+  return taken_;
+}
+
+}  // namespace cairn::server

@@ -1,0 +1,50 @@
+// The values that a site's map and the sessions that draw it exchange, and the interface through which a site
+// calls a session (GridOwner). Chunks are shared, immutable, and in the map frame.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+
+#include "server/slam/grid/occupancy_grid.h"
+
+namespace cairn::server {
+
+using SessionId = std::uint64_t;  // Unique while the server runs; later sessions have larger ids.
+
+// A robot's grid, drawn from its first `keyframes` keyframes.
+struct RobotGrid {
+  slam::OccupancyGrid::Chunks chunks;
+  std::size_t keyframes = 0;
+};
+
+// The changed chunks of one session's grid (null: removed).
+struct GridChange {
+  SessionId session = 0;
+  slam::OccupancyGrid::Change chunks;
+};
+
+// A session's answer to a correction: its previous grid, and the change to the grid with which it continues.
+struct Adopted {
+  SessionId session = 0;
+  RobotGrid displaced;
+  GridChange change;  // Contains every chunk of both grids.
+};
+
+// The grid with which a session is to continue, from a finished job or an older map version. It is valid from
+// map epoch `epoch` on. `done` is called once, on any thread. It is never called if the session drops the
+// correction without adopting it.
+struct Correction {
+  std::uint32_t epoch = 0;
+  RobotGrid grid;
+  std::function<void(Adopted&&)> done;
+};
+
+// The interface of a session for its site. Thread rule: any thread; must not block.
+class GridOwner {
+ public:
+  virtual ~GridOwner() = default;
+  virtual void Adopt(Correction&& correction) = 0;
+};
+
+}  // namespace cairn::server

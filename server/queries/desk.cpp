@@ -1,0 +1,139 @@
+#include "server/queries/desk.h"
+
+#include <spdlog/spdlog.h>
+
+#include <exception>
+#include <stdexcept>
+#include <utility>
+
+#include "common/version.h"
+#include "server/queries/reply_parts.h"
+
+namespace cairn::server {
+namespace {
+
+Reply JobReply(const Request& request, Result<Job> job) {
+  if (!job) return ReplyTo(request, job.error());
+  Reply reply = ReplyTo(request);
+  reply.jobs.push_back(*std::move(job));
+  return reply;
+}
+
+}  // namespace
+
+Desk::Desk(std::size_t capacity, Outbound& outbound, Roster& roster, Atlas& atlas, JobList& jobs, JobWorker& worker)
+    : outbound_(outbound), roster_(roster), atlas_(atlas), jobs_(jobs), worker_(worker), requests_(capacity) {}
+
+Desk::~Desk() {
+  Stop();
+}
+
+void Desk::Start() {
+  thread_ = std::jthread([this] {
+    while (const auto request = requests_.Pop()) Serve(*request);
+  });
+}
+
+void Desk::Take(Request&& request) {
+  Reply busy = ReplyTo(request, {StatusCode::kResourceExhausted, "too many requests are waiting; try again later"});
+  if (!requests_.TryPush(std::move(request))) outbound_.Send(std::move(busy));
+}
+
+void Desk::Stop() {
+  requests_.Close();
+  if (thread_.joinable()) thread_.join();
+}
+
+void Desk::Serve(const Request& request) {
+  try {
+    auto reply = Answer(request);
+    if (!reply) return;
+    for (Reply& part : SplitReply(*std::move(reply))) outbound_.SendPatiently(std::move(part));
+  } catch (const std::exception& error) {
+    spdlog::error("a request of kind {} failed with an exception: {}", RequestKindName(request.kind), error.what());
+    outbound_.Send(
+        ReplyTo(request, {StatusCode::kInternal, "internal error of the server; see its log for the cause"}));
+  }
+}
+
+std::optional<Reply> Desk::Answer(const Request& request) {
+  switch (request.kind) {
+    case RequestKind::kPing: {
+      Reply reply = ReplyTo(request);
+      reply.server_version = kVersion;
+      return reply;
+    }
+    case RequestKind::kPose:
+      return AnswerPose(request, SessionOf(request.robot));
+    case RequestKind::kPath: {
+      const Sessions sessions = SessionOf(request.robot);
+      return AnswerPath(request, sessions, sessions.empty() ? Maps{} : MapOf(sessions.front().status.session.site));
+    }
+    case RequestKind::kTiles:
+      return AnswerTiles(request, MapOf(request.site));
+    case RequestKind::kLandmarks:
+      return AnswerLandmarks(request, AllSessions(), MapOf(request.site));
+    case RequestKind::kMapInfo:
+      return AnswerMapInfo(request, request.site.empty() ? AllMaps() : MapOf(request.site));
+    case RequestKind::kStatus:
+      return AnswerStatus(request, request.robot.empty() ? AllSessions() : SessionOf(request.robot));
+    case RequestKind::kJobSubmit:
+      return JobReply(request, SubmitJob(request));
+    case RequestKind::kJobGet:
+      return JobReply(request, jobs_.Find(request.job));
+    case RequestKind::kJobCancel:
+      return JobReply(request, jobs_.Cancel(request.job));
+    case RequestKind::kJobList: {
+      Reply reply = ReplyTo(request);
+      reply.jobs = jobs_.OfSite(request.site);
+      return reply;
+    }
+    case RequestKind::kSessionEnd: {
+      const auto ended = roster_.End(request.robot);
+      return ReplyTo(request, ended ? Status{} : ended.error());
+    }
+    case RequestKind::kMapEnable:
+      return EnableMap(request);
+  }
+  throw std::logic_error("the request has an unknown kind");
+}
+
+Result<Job> Desk::SubmitJob(const Request& request) {
+  if (atlas_.Find(request.site) == nullptr) return Fail(StatusCode::kNotFound, "no site '" + request.site + "'");
+  return worker_.Submit(request.site, request.job_kind, request.enable);
+}
+
+std::optional<Reply> Desk::EnableMap(const Request& request) {
+  const auto site = atlas_.Find(request.site);
+  if (site == nullptr) return ReplyTo(request, {StatusCode::kNotFound, "no site '" + request.site + "'"});
+  site->Enable(request.map_version, [&outbound = outbound_, request](Result<std::uint32_t> enabled) {
+    Reply reply = ReplyTo(request, enabled ? Status{} : enabled.error());
+    if (enabled) spdlog::info("site {}: map version {} is enabled", request.site, *enabled);
+    outbound.Send(std::move(reply));
+  });
+  return std::nullopt;
+}
+
+Sessions Desk::SessionOf(const std::string& robot) const {
+  const auto session = roster_.Find(robot);
+  return session ? Sessions{session->record().snapshot()} : Sessions{};
+}
+
+Sessions Desk::AllSessions() const {
+  Sessions snapshots;
+  for (const auto& session : roster_.All()) snapshots.push_back(session->record().snapshot());
+  return snapshots;
+}
+
+Maps Desk::MapOf(const std::string& name) const {
+  const auto site = atlas_.Find(name);
+  return site ? Maps{site->snapshot()} : Maps{};
+}
+
+Maps Desk::AllMaps() const {
+  Maps snapshots;
+  for (const auto& site : atlas_.All()) snapshots.push_back(site->snapshot());
+  return snapshots;
+}
+
+}  // namespace cairn::server

@@ -1,0 +1,57 @@
+// Handles all requests on one thread: it answers queries from snapshots and passes commands (submit, cancel,
+// end, enable) to their room. The switch over all kinds of request is only here. The queue is bounded: when
+// it is full, further requests are answered RESOURCE_EXHAUSTED at once. A request to enable a map version is
+// answered when the switch is complete; the thread does not wait for it. If handling a request ends with an
+// exception, the request is answered INTERNAL and the thread continues. Thread rule: Take from any thread;
+// Start and Stop from one.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "common/bounded_channel.h"
+#include "server/jobs/job_worker.h"
+#include "server/maps/atlas.h"
+#include "server/ops/heartbeat.h"
+#include "server/outbound.h"
+#include "server/queries/answers.h"
+#include "server/robots/roster.h"
+
+namespace cairn::server {
+
+class Desk {
+ public:
+  Desk(std::size_t capacity, Outbound& outbound, Roster& roster, Atlas& atlas, JobList& jobs, JobWorker& worker);
+  ~Desk();
+
+  void Start();
+  void Take(Request&& request);
+  // Answers the waiting requests, then returns.
+  void Stop();
+  // Thread rule: any thread.
+  [[nodiscard]] Pulse pulse() const { return {requests_.taken(), requests_.size() > 0}; }
+
+ private:
+  void Serve(const Request& request);
+  // Returns nothing if the answer is sent later.
+  std::optional<Reply> Answer(const Request& request);
+  Result<Job> SubmitJob(const Request& request);
+  std::optional<Reply> EnableMap(const Request& request);
+  // Both return one snapshot, or none if there is no such robot or site.
+  [[nodiscard]] Sessions SessionOf(const std::string& robot) const;
+  [[nodiscard]] Maps MapOf(const std::string& site) const;
+  [[nodiscard]] Sessions AllSessions() const;
+  [[nodiscard]] Maps AllMaps() const;
+
+  Outbound& outbound_;
+  Roster& roster_;
+  Atlas& atlas_;
+  JobList& jobs_;
+  JobWorker& worker_;
+  BoundedChannel<Request> requests_;
+  std::jthread thread_;  // The last member, because it uses the members above.
+};
+
+}  // namespace cairn::server

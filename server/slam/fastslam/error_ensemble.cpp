@@ -1,0 +1,82 @@
+#include "server/slam/fastslam/error_ensemble.h"
+
+#include <cmath>
+
+#include "common/geometry/pose_difference.h"
+
+namespace cairn::slam {
+namespace {
+
+// Resampling does not change keyframes whose particles spread over less than this share of the variance.
+constexpr double kNothingLeft = 0.02;
+
+}  // namespace
+
+Eigen::Matrix3d ErrorEnsemble::J_pose_error(const Pose2& T_map_robot) {
+  Eigen::Matrix3d J = Eigen::Matrix3d::Identity();
+  J(0, 2) = -T_map_robot.y;
+  J(1, 2) = T_map_robot.x;
+  return J;
+}
+
+void ErrorEnsemble::Disturb(const Pose2& T_map_robot, const Eigen::Matrix3d& covariance) {
+  // The covariance may be singular: a direction may be without noise.
+  const Eigen::LDLT<Eigen::Matrix3d> ldlt(covariance);
+  Eigen::Matrix3d root = ldlt.matrixL();
+  root = ldlt.transpositionsP().transpose() * root;
+  root = (root * ldlt.vectorD().cwiseMax(0.0).cwiseSqrt().asDiagonal()).eval();
+  const Eigen::Matrix3f errors_of = (J_pose_error(T_map_robot).inverse() * root).cast<float>();
+  for (int j = 0; j < kMembers; ++j) {
+    const Eigen::Vector3d draw = ThreeNormalDraws(rng_);
+    robot_.col(j) += errors_of * draw.cast<float>();
+  }
+}
+
+void ErrorEnsemble::Move(const Pose2& T_map_prev, const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) {
+  const Eigen::Matrix3d J = J_compose_right(T_map_prev, T_prev_curr);
+  Disturb(T_map_prev * T_prev_curr, J * covariance_prev * J.transpose());
+}
+
+void ErrorEnsemble::MoveBySampling(const Pose2& T_map_prev, const StepMotion& step, const MotionSampler& sampler) {
+  const Pose2 T_map_curr = T_map_prev * step.T_prev_curr;
+  const Eigen::Matrix3d J_error_pose = J_pose_error(T_map_curr).inverse();
+  for (int j = 0; j < kMembers; ++j) {
+    const Eigen::Vector3d d = Minus(sampler.draw(T_map_prev, step, rng_), T_map_curr);
+    robot_.col(j) += (J_error_pose * d).cast<float>();
+  }
+}
+
+void ErrorEnsemble::Resample(double lost) {
+  const int partner = 1 + static_cast<int>(UniformDraw(rng_) * (kMembers - 1));
+  const double robot_share = path_.empty() ? 0.0 : path_.back().spread_share;
+  LoseAncestors(robot_, lost * robot_share, partner);
+  for (auto kept = path_.rbegin(); kept != path_.rend() && kept->spread_share > kNothingLeft; ++kept) {
+    LoseAncestors(kept->errors, lost * kept->spread_share, partner);
+    kept->spread_share *= 1.0 - lost;
+  }
+}
+
+// Resampling moves the mean of the particles to that of the ancestors that are left, which are a random draw
+// from the spread of the set. Each member gets such a draw: the scaled deviation of another member. The
+// partner is the same for every pose, because a path is inherited as a whole.
+void ErrorEnsemble::LoseAncestors(Errors& errors, double share, int partner) const {
+  const auto scale = static_cast<float>(std::sqrt(share));
+  const Errors drawn = scale * Centred(errors);
+  errors.leftCols(kMembers - partner) += drawn.rightCols(kMembers - partner);
+  errors.rightCols(partner) += drawn.leftCols(partner);
+}
+
+void ErrorEnsemble::Rebase(std::size_t keyframes, const Pose2& T_map_robot, const Eigen::Matrix3d& covariance) {
+  path_.assign(keyframes, {Errors::Zero(), 0.0});
+  robot_.setZero();
+  Disturb(T_map_robot, covariance);
+}
+
+Eigen::Matrix3d ErrorEnsemble::covariance(const Pose2& T_map_robot) const {
+  const auto centred = Centred(robot_);
+  const Eigen::Matrix3d errors = (centred * centred.transpose()).cast<double>() / (kMembers - 1.0);
+  const Eigen::Matrix3d J = J_pose_error(T_map_robot);
+  return J * errors * J.transpose();
+}
+
+}  // namespace cairn::slam

@@ -1,0 +1,168 @@
+#include "server/slam/fastslam/particle_set.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "common/geometry/pose_difference.h"
+#include "server/slam/filters/revisit_innovation.h"
+#include "server/slam/motion/dead_reckoning.h"
+
+namespace cairn::slam {
+
+ParticleSet::ParticleSet(const FastSlamOptions& options, double max_nis, std::int64_t count,
+                         const Pose2& T_map_robot_start, std::uint64_t seed, MotionSampler sampler)
+    : options_(options),
+      sampler_(std::move(sampler)),
+      max_nis_(max_nis),
+      rng_(seed),
+      particles_(static_cast<std::size_t>(count)),
+      errors_(~seed) {
+  for (Particle& particle : particles_) particle.T_map_robot = T_map_robot_start;
+  effective_ = static_cast<double>(particles_.size());
+  estimate_.T_map_robot = T_map_robot_start;
+}
+
+void ParticleSet::Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) {
+  errors_.Move(best().T_map_robot, T_prev_curr, covariance_prev);
+  for (Particle& particle : particles_)
+    DeadReckon(particle.T_map_robot, particle.covariance, T_prev_curr, covariance_prev);
+  travelled_ += T_prev_curr.translation().norm();
+}
+
+void ParticleSet::PredictBySampling(const StepMotion& measured) {
+  const StepMotion step = sampler_.input(measured);
+  errors_.MoveBySampling(best().T_map_robot, step, sampler_);
+  const bool more = step.covariance_prev.trace() > 0.0;
+  if (more) errors_.Move(best().T_map_robot, step.T_prev_curr, step.covariance_prev);
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    Particle& particle = particles_[i];
+    const Pose2 before = particle.T_map_robot;
+    particle.T_map_robot = sampler_.draw(before, step, rng_);
+    if (!more) continue;
+    const Eigen::Matrix3d J = J_compose_right(before, step.T_prev_curr);
+    particle.covariance = J * step.covariance_prev * J.transpose();
+    Sample(i);
+  }
+}
+
+bool ParticleSet::Observe(const RevisitObservation& revisit) {
+  std::vector<Innovation<3>> innovations;
+  innovations.reserve(particles_.size());
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const Particle& particle : particles_) {
+    innovations.push_back(InnovateRevisit(particle.path[revisit.keyframe], particle.T_map_robot, revisit));
+    nearest = std::min(nearest, Nis<3>(innovations.back().v, innovations.back().S(particle.covariance)));
+  }
+  if (!(nearest < max_nis_)) return false;
+  MixtureInnovation<3> mixture;
+  const std::vector<double> before = weights();
+  for (std::size_t i = 0; i < particles_.size(); ++i)
+    mixture.Add(before[i], innovations[i].v, innovations[i].S(particles_[i].covariance));
+  Judge(mixture);
+  Tie<3>(revisit.keyframe, innovations[best_]);
+  for (std::size_t i = 0; i < particles_.size(); ++i) Fuse<3>(i, innovations[i]);
+  sample_due_ = true;
+  return true;
+}
+
+std::vector<int> ParticleSet::Commit() {
+  if (sample_due_ || travelled_ >= options_.sample_distance_m) {
+    for (std::size_t i = 0; i < particles_.size(); ++i) Sample(i);
+    travelled_ = 0.0;
+    sample_due_ = false;
+  }
+  for (Particle& particle : particles_) particle.path.Append(particle.T_map_robot);
+  errors_.Keep(spread_share_);
+  std::vector<double> left;
+  std::vector<int> parents = Resample(left);
+  Summarise(left);
+  nis_.EndStep();
+  return parents;
+}
+
+void ParticleSet::Rebase(std::span<const Pose2> path) {
+  Particle particle;
+  particle.T_map_robot = path.back();
+  // The pose keeps some uncertainty, because a closed loop does not make it exact.
+  particle.covariance.diagonal() << options_.loop_sigma_m * options_.loop_sigma_m,
+      options_.loop_sigma_m * options_.loop_sigma_m, options_.loop_sigma_rad * options_.loop_sigma_rad;
+  particle.log_likelihood = best().log_likelihood;
+  for (const Pose2& pose : path) particle.path.Append(pose);
+  std::fill(particles_.begin(), particles_.end(), particle);
+  best_ = 0;
+  travelled_ = 0.0;
+  sample_due_ = false;
+  errors_.Rebase(path.size(), path.back(), particle.covariance);
+  effective_ = static_cast<double>(particles_.size());
+  estimate_ = {particle.T_map_robot, particle.covariance};
+}
+
+void ParticleSet::Summarise(const std::vector<double>& shares) {
+  best_ = 0;
+  for (std::size_t i = 1; i < particles_.size(); ++i)
+    if (particles_[i].log_likelihood > particles_[best_].log_likelihood) best_ = i;
+  const Pose2& centre = best().T_map_robot;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  double sum = 0.0;
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    const Eigen::Vector3d d = Minus(particles_[i].T_map_robot, centre);
+    if (d.head<2>().norm() > options_.agreement_m) continue;
+    mean += shares[i] * d;
+    sum += shares[i];
+  }
+  if (sum > 0.0) mean /= sum;
+  estimate_.T_map_robot = Plus(centre, mean);
+  const Eigen::Matrix3d covariance = errors_.covariance(estimate_.T_map_robot);
+  const Eigen::LDLT<Eigen::Matrix3d> whiten(covariance);
+  Eigen::Vector3d spread = Eigen::Vector3d::Zero();
+  estimate_.covariance = covariance;
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    const Eigen::Vector3d d = Minus(particles_[i].T_map_robot, centre) - mean;
+    spread += shares[i] * d.cwiseAbs2();
+    if (d.dot(whiten.solve(d)) > max_nis_) estimate_.covariance += shares[i] * d * d.transpose();
+  }
+  const Eigen::Vector3d variance = covariance.diagonal().cwiseMax(1e-12);
+  spread_share_ = std::min(1.0, spread.cwiseQuotient(variance).mean());
+}
+
+void ParticleSet::Sample(std::size_t index) {
+  Particle& particle = particles_[index];
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+  solver.computeDirect(particle.covariance);
+  const Eigen::Vector3d spread = solver.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+  const Eigen::Vector3d draw = ThreeNormalDraws(rng_);
+  const Eigen::Vector3d step = solver.eigenvectors() * spread.cwiseProduct(draw);
+  particle.T_map_robot = Plus(particle.T_map_robot, step);
+  particle.covariance.setZero();
+}
+
+std::vector<double> ParticleSet::weights() const {
+  std::vector<double> log_weights;
+  log_weights.reserve(particles_.size());
+  for (const Particle& particle : particles_) log_weights.push_back(particle.log_weight);
+  return NormalisedWeights(log_weights);
+}
+
+// `left` receives the weights of the set after resampling.
+std::vector<int> ParticleSet::Resample(std::vector<double>& left) {
+  left = weights();
+  effective_ = EffectiveSampleSize(left);
+  if (effective_ >= options_.resample_below * static_cast<double>(particles_.size())) return {};
+  std::vector<int> parents = StratifiedSurvivors(left, rng_);
+  particles_ = HeirsOf(particles_, parents);
+  for (Particle& particle : particles_) particle.log_weight = 0.0;
+  errors_.Resample(ShareOfSiblings(parents));
+  left.assign(particles_.size(), 1.0 / static_cast<double>(particles_.size()));
+  return parents;
+}
+
+FilterHealth ParticleSet::health() const {
+  const bool finite = estimate_.T_map_robot.IsFinite() && estimate_.covariance.allFinite();
+  return {effective_, nis_.sum(), nis_.numbers(), !finite};
+}
+
+}  // namespace cairn::slam

@@ -1,0 +1,108 @@
+// The poses and weights of the particles: prediction, the proposal from an observation, sampling, resampling,
+// and the reported estimate. The filter stores their landmarks. Frames: T_map_robot; revisits in the robot
+// frame of the old keyframe. Between observations a particle moves along the matched motion and only its
+// covariance grows; its pose is sampled when an observation arrives or when `sample_distance_m` has been
+// travelled. Not thread-safe. Deterministic for a given seed. Source: thesis A 4.3, Tables 4.2, 4.6, 4.8,
+// 4.9; Montemerlo 2003.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/slam/fastslam/error_ensemble.h"
+#include "server/slam/fastslam/fastslam_options.h"
+#include "server/slam/fastslam/motion_sampler.h"
+#include "server/slam/fastslam/particle.h"
+#include "server/slam/filters/filter.h"
+#include "server/slam/filters/step_nis.h"
+#include "server/slam/landmarks/innovation.h"
+#include "server/slam/random/resampling.h"
+
+namespace cairn::slam {
+
+class ParticleSet {
+ public:
+  // `sampler` is needed for PredictBySampling only. REQUIRES: count > 0.
+  ParticleSet(const FastSlamOptions& options, double max_nis, std::int64_t count, const Pose2& T_map_robot_start,
+              std::uint64_t seed, MotionSampler sampler = {});
+
+  // Moves every particle along the step and increases its covariance (Table 4.2). `covariance_prev` is in the
+  // frame in which the step starts.
+  void Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev);
+  // FastSLAM 1.0: moves every particle by a sample of the motion model and of any further noise of the step,
+  // so that no covariance remains. REQUIRES: samples_motion().
+  void PredictBySampling(const StepMotion& measured);
+  [[nodiscard]] bool samples_motion() const { return sampler_.draw != nullptr; }
+
+  // Proposal and weight for one revisit. False if no particle explains it; then nothing changes.
+  bool Observe(const RevisitObservation& revisit);
+  // Proposal and weight for one innovation of a landmark. Its squared Mahalanobis distance counts at most as
+  // `max_nis` in the weight.
+  template <int N>
+  void Fuse(std::size_t index, const Innovation<N>& innovation) {
+    Particle& particle = particles_[index];
+    const Eigen::Matrix<double, N, N> S = innovation.S(particle.covariance);
+    const double nis = Nis<N>(innovation.v, S);
+    Weigh(index, LogDensity<N>(std::min(nis, max_nis_), S));
+    if (nis < max_nis_) CorrectPose<N>(particle.T_map_robot, particle.covariance, innovation);
+  }
+  // Updates the error ensemble with an observation of something first seen from `keyframe`. `innovation` is
+  // that of the best particle.
+  template <int N>
+  void Tie(std::size_t keyframe, const Innovation<N>& innovation) {
+    errors_.Tie<N>(keyframe, best().T_map_robot, innovation);
+  }
+  void Weigh(std::size_t index, double log_likelihood) {
+    particles_[index].log_weight += log_likelihood;
+    particles_[index].log_likelihood += log_likelihood;
+  }
+  // Adds the innovation of the whole set to the sum that health() returns.
+  template <int N>
+  void Judge(const MixtureInnovation<N>& innovation) {
+    if (!innovation.empty()) nis_.Add(innovation.nis(), N);
+  }
+  [[nodiscard]] std::vector<double> weights() const;  // Normalised weights.
+  // Draws the pose of a particle from N(xv, pv) and sets its covariance to zero.
+  void Sample(std::size_t index);
+  void SampledAll() { travelled_ = 0.0; }
+
+  // Ends the step: samples the particles if that is due, appends the pose to every path, and resamples if the
+  // effective sample size is too small. Returns the parents of the new set in order; empty if there was no
+  // resampling.
+  [[nodiscard]] std::vector<int> Commit();
+  // Replaces the path of every particle by this one. All particles are equal afterwards.
+  void Rebase(std::span<const Pose2> path);
+
+  [[nodiscard]] const std::vector<Particle>& particles() const { return particles_; }
+  [[nodiscard]] const Particle& operator[](std::size_t index) const { return particles_[index]; }
+  [[nodiscard]] std::size_t size() const { return particles_.size(); }
+  [[nodiscard]] std::size_t best_index() const { return best_; }
+  [[nodiscard]] const Particle& best() const { return particles_[best_]; }
+  // The weighted mean pose of the particles near the best one, which changes less from step to step than the
+  // best particle does, because another particle may become the best. Its covariance is larger than the
+  // spread of the particles (error_ensemble.h). Particles too far away to be covered by it add their distance
+  // to the covariance.
+  [[nodiscard]] const FilterEstimate& estimate() const { return estimate_; }
+  [[nodiscard]] FilterHealth health() const;
+
+ private:
+  std::vector<int> Resample(std::vector<double>& left);
+  void Summarise(const std::vector<double>& shares);
+
+  FastSlamOptions options_;
+  MotionSampler sampler_;
+  double max_nis_;
+  Rng rng_;
+  std::vector<Particle> particles_;
+  ErrorEnsemble errors_;
+  double spread_share_ = 1.0;  // Share of the pose's variance over which the particles spread.
+  std::size_t best_ = 0;
+  double travelled_ = 0.0;  // Distance since the last sampling.
+  bool sample_due_ = false;
+  double effective_ = 0.0;
+  StepNis nis_;
+  FilterEstimate estimate_;
+};
+
+}  // namespace cairn::slam

@@ -1,0 +1,17 @@
+// One scan as the matchers and filters use it: the features and surface points that were extracted from it,
+// in the robot frame of the scan.
+#pragma once
+
+#include <vector>
+
+#include "server/slam/features/line_feature.h"
+#include "server/slam/scan/surface_points.h"
+
+namespace cairn::slam {
+
+struct ScanView {
+  ScanFeatures features;
+  std::vector<SurfacePoint> points_robot;
+};
+
+}  // namespace cairn::slam

@@ -1,0 +1,53 @@
+// The possible places of the robot in a known map while its place is not known: every result of LineMatch is
+// a hypothesis, which is predicted with the steps and fused with later results near it. The evidence of a
+// hypothesis is the share of the scans that it explained, where old scans count less and less. In places that
+// look alike several hypotheses collect evidence, and only further motion distinguishes them. The place is
+// settled once one hypothesis has clearly more evidence than any other. The number of hypotheses is bounded.
+// Frames: T_map_robot. Not thread-safe; deterministic.
+// Source: thesis B 2.2.2 ((2.17)-(2.19) for each hypothesis); several Gaussians at once: Jensfelt, Kristensen
+// 2001.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "common/options/option_visitor.h"
+#include "server/slam/localisation/line_match.h"
+#include "server/slam/localisation/pose_fusion.h"
+
+namespace cairn::slam {
+
+struct PlaceOptions {
+  double memory = 0.8;
+  double settled = 3.5;
+  double rival_share = 0.6;
+  std::int64_t most = 200;
+};
+void Visit(OptionVisitor& visitor, PlaceOptions& options);
+
+class PlaceHypotheses {
+ public:
+  explicit PlaceHypotheses(const PlaceOptions& options) : options_(options) {}
+
+  // Prediction with a step; `covariance_prev` is the covariance of its (x, y, theta) in the frame in which it
+  // starts.
+  void Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev);
+  // Update with the result of a search of the whole map. A search that was cut short, or found no place, is
+  // ignored.
+  void Update(const LineMatchAnswer& answer);
+  // The place, if it is settled.
+  [[nodiscard]] std::optional<PoseBelief> settled() const;
+  void Clear() { places_.clear(); }
+  [[nodiscard]] std::size_t size() const { return places_.size(); }
+
+ private:
+  struct Place {
+    PoseBelief belief;
+    double evidence = 0.0;
+  };
+  PlaceOptions options_;
+  std::vector<Place> places_;  // The hypotheses, ordered by evidence, the most first.
+};
+
+}  // namespace cairn::slam

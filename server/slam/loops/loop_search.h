@@ -1,0 +1,90 @@
+// Finds large loops: places seen so long ago that their position relative to the robot is very uncertain. It
+// compares the surfaces seen over the last metres (not one scan) with the surroundings of old keyframes, over
+// a search window as wide as the uncertainty. A match is accepted only if no other pose fits nearly as well,
+// if no surface lies where beams passed, and if a second comparison some metres later agrees. It prefers a
+// late closure to a wrong one. Small loops are found by RevisitSearch. Not thread-safe.
+// Source: matching by branch and bound as in Hess et al., ICRA 2016; confirmation by agreement between
+// closures as in Olson 2009 (Recognizing places using spectrally clustered local matches), in its simplest
+// form.
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "common/options/option_visitor.h"
+#include "server/slam/loops/region.h"
+#include "server/slam/matching/point_to_line.h"
+#include "server/slam/trail/shared_sequence.h"
+
+namespace cairn::slam {
+
+struct LoopOptions {
+  bool enabled = true;
+  double min_way_m = 60.0;
+  double every_m = 1.0;
+  double recent_m = 15.0;
+  double around_m = 15.0;
+  double doubt_m = 1.5;
+  double doubt_per_m = 0.02;
+  double doubt_rad = 0.1;
+  double doubt_rad_per_m = 0.001;
+  double max_doubt_m = 12.0;
+  double max_doubt_rad = 0.6;
+  double min_score = 0.5;
+  double max_rival = 0.9;
+  double min_explained = 0.5;
+  double max_conflict = 0.10;
+  double confirm_after_m = 1.5;
+  double confirm_within_m = 10.0;
+  double agree_m = 0.5;
+  double agree_rad = 0.06;
+  double sigma_m = 0.1;
+  double sigma_rad = 0.01;
+  double search_cell_m = 0.1;         // Cell of the raster for the search.
+  double likelihood_reach_m = 0.3;    // At this distance from a surface the likelihood is zero.
+  std::int64_t candidate_stride = 4;  // Only every candidate_stride-th old keyframe is used.
+  // A pose is a rival of the best one if it is farther away than this, or if its heading differs by more.
+  double rival_beyond_m = 1.0;
+  double rival_beyond_rad = 0.3;
+  Eigen::Vector3d align_variances{0.25, 0.25, 0.01};  // Variances (x, y, theta) before alignment.
+  double near_share = 2.0;                            // Tolerance for a surface, in inlier distances.
+  FreeSpaceOptions free_space;
+};
+void Visit(OptionVisitor& visitor, LoopOptions& options);
+
+// The pose of the last keyframe `recent` relative to an old one.
+struct LoopClosure {
+  std::size_t old = 0;
+  std::size_t recent = 0;
+  Pose2 T_old_recent;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  // (x, y, theta) of T_old_recent.
+
+  [[nodiscard]] PoseRelation relation() const { return {old, recent, T_old_recent, covariance, true}; }
+};
+
+class LoopSearch {
+ public:
+  explicit LoopSearch(const LoopOptions& options, const PointToLineOptions& align);
+
+  // Returns a large loop that the last keyframe closes, once it is confirmed. `path` is the believed path,
+  // one pose T_map_robot per keyframe.
+  [[nodiscard]] std::optional<LoopClosure> Find(const Trail& trail, const SharedSequence<Pose2>& path);
+
+ private:
+  [[nodiscard]] std::vector<std::size_t> Candidates(const Trail& trail, const SharedSequence<Pose2>& path) const;
+  // Compares the surroundings of the last keyframe with those of `old`.
+  [[nodiscard]] std::optional<LoopClosure> Compare(const Trail& trail, std::size_t old,
+                                                   const Pose2& T_old_recent_guess) const;
+  [[nodiscard]] bool Agree(const LoopClosure& a, const LoopClosure& b, std::span<const KeyframeShape> shapes) const;
+  [[nodiscard]] double Reach(double way_m) const;
+  [[nodiscard]] Eigen::Matrix3d Covariance() const;
+
+  LoopOptions options_;
+  PointToLineOptions align_;
+  double searched_at_m_ = 0.0;
+  std::deque<LoopClosure> unconfirmed_;
+};
+
+}  // namespace cairn::slam

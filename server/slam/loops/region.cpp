@@ -1,0 +1,86 @@
+#include "server/slam/loops/region.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <unordered_set>
+
+namespace cairn::slam {
+
+Stretch StretchAround(std::span<const KeyframeShape> shapes, std::size_t centre, double way_m) {
+  // Bound to either side: turning on the spot makes many keyframes.
+  constexpr std::size_t kMaxKeyframes = 200;
+  Stretch stretch{centre, centre, centre};
+  const double here = shapes[centre].travelled_m;
+  while (stretch.first > 0 && centre - stretch.first < kMaxKeyframes &&
+         here - shapes[stretch.first - 1].travelled_m <= way_m)
+    --stretch.first;
+  while (stretch.last + 1 < shapes.size() && stretch.last - centre < kMaxKeyframes &&
+         shapes[stretch.last + 1].travelled_m - here <= way_m)
+    ++stretch.last;
+  return stretch;
+}
+
+std::vector<SurfacePoint> SurfacesOf(std::span<const KeyframeShape> shapes, const Stretch& stretch, double cell_m) {
+  std::vector<SurfacePoint> surfaces;
+  std::unordered_set<std::int64_t> taken;
+  ForEachSurface(shapes, stretch, [&](const SurfacePoint& surface) {
+    const auto x = static_cast<std::int64_t>(std::floor(surface.p.x() / cell_m));
+    const auto y = static_cast<std::int64_t>(std::floor(surface.p.y() / cell_m));
+    if (taken.insert((x << 32) ^ (y & 0xffffffff)).second) surfaces.push_back(surface);
+  });
+  return surfaces;
+}
+
+FreeSpace::FreeSpace(const Trail& trail, const Stretch& stretch, const FreeSpaceOptions& given) : options_(given) {
+  const std::span<const Keyframe> keyframes = trail.keyframes();
+  const std::span<const KeyframeShape> shapes = trail.shapes();
+  struct Drawn {
+    std::size_t keyframe;
+    Pose2 T_anchor_robot;
+  };
+  std::vector<Drawn> drawn;
+  Eigen::AlignedBox2d box;
+  double drawn_m = -options_.every_m;
+  for (std::size_t k = stretch.first; k <= stretch.last; ++k) {
+    if (shapes[k].travelled_m - drawn_m < options_.every_m && k != stretch.last) continue;
+    drawn_m = shapes[k].travelled_m;
+    drawn.push_back({k, Between(shapes[stretch.anchor].T_track_robot, shapes[k].T_track_robot)});
+    // A ray starts at the laser, which may sit some way from the robot's origin.
+    const double reach =
+        options_.max_ray_m + keyframes[k].scan->T_robot_laser.translation().norm() + 2.0 * options_.cell_m;
+    box.extend(drawn.back().T_anchor_robot.translation() - Eigen::Vector2d::Constant(reach));
+    box.extend(drawn.back().T_anchor_robot.translation() + Eigen::Vector2d::Constant(reach));
+  }
+  low_x_ = static_cast<int>(std::floor(box.min().x() / options_.cell_m));
+  low_y_ = static_cast<int>(std::floor(box.min().y() / options_.cell_m));
+  width_ = static_cast<int>(std::ceil(box.max().x() / options_.cell_m)) - low_x_ + 1;
+  height_ = static_cast<int>(std::ceil(box.max().y() / options_.cell_m)) - low_y_ + 1;
+  cells_.assign(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), Seen::kNot);
+
+  ScanRaster raster;
+  const RasterOptions raster_options{
+      .resolution_m = options_.cell_m, .max_ray_m = options_.max_ray_m, .no_return_free_m = 0.0};
+  for (const Drawn& one : drawn) {
+    raster.Rasterise(*keyframes[one.keyframe].scan, one.T_anchor_robot, raster_options, [&](GridCell cell, double hit) {
+      const int x = cell.x - low_x_, y = cell.y - low_y_;
+      if (x < 0 || y < 0 || x >= width_ || y >= height_) return;
+      Seen& seen = cells_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)];
+      seen = std::max(seen, hit > 0.0 ? Seen::kHit : Seen::kThrough);
+    });
+  }
+}
+
+bool FreeSpace::Contradicts(const Eigen::Vector2d& p_anchor) const {
+  const int x = static_cast<int>(std::floor(p_anchor.x() / options_.cell_m)) - low_x_,
+            y = static_cast<int>(std::floor(p_anchor.y() / options_.cell_m)) - low_y_;
+  if (x < 1 || y < 1 || x + 1 >= width_ || y + 1 >= height_) return false;
+  for (int row = y - 1; row <= y + 1; ++row)
+    for (int column = x - 1; column <= x + 1; ++column)
+      if (cells_[static_cast<std::size_t>(row) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(column)] !=
+          Seen::kThrough)
+        return false;
+  return true;
+}
+
+}  // namespace cairn::slam

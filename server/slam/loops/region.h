@@ -1,0 +1,65 @@
+// The surroundings of a keyframe (the anchor) as seen from the keyframes around it, in the robot frame of the
+// anchor: surfaces, and free space where beams passed. Its errors are those of the front-end over the
+// stretch. Made for one comparison. Not thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/slam/grid/scan_raster.h"
+#include "server/slam/scan/surface_points.h"
+#include "server/slam/trail/trail.h"
+
+namespace cairn::slam {
+
+// The keyframes [first, last], with poses relative to `anchor`.
+struct Stretch {
+  std::size_t first = 0;
+  std::size_t last = 0;
+  std::size_t anchor = 0;
+};
+
+// Returns the keyframes within a travelled distance of `way_m` before and after `centre`.
+[[nodiscard]] Stretch StretchAround(std::span<const KeyframeShape> shapes, std::size_t centre, double way_m);
+
+// Calls visit(point) for every surface point of the stretch, in the frame of the anchor and in the order of
+// the keyframes.
+template <typename Visit>
+void ForEachSurface(std::span<const KeyframeShape> shapes, const Stretch& stretch, const Visit& visit) {
+  for (std::size_t k = stretch.first; k <= stretch.last; ++k) {
+    const Pose2 T_anchor_k = Between(shapes[stretch.anchor].T_track_robot, shapes[k].T_track_robot);
+    const Eigen::Matrix2d R = T_anchor_k.rotation();
+    for (const SurfacePoint& point : shapes[k].points)
+      visit(SurfacePoint{R * point.p + T_anchor_k.translation(), R * point.normal});
+  }
+}
+
+// Returns the surface points of the stretch, one per cell of `cell_m`, in the order of the keyframes.
+[[nodiscard]] std::vector<SurfacePoint> SurfacesOf(std::span<const KeyframeShape> shapes, const Stretch& stretch,
+                                                   double cell_m);
+
+struct FreeSpaceOptions {
+  double cell_m = 0.2;
+  double max_ray_m = 15.0;  // Beyond this range neighbouring beams leave gaps.
+  double every_m = 0.75;    // Distance between the keyframes drawn.
+};
+
+// The space through which beams of a stretch passed and in which none ended.
+class FreeSpace {
+ public:
+  FreeSpace(const Trail& trail, const Stretch& stretch, const FreeSpaceOptions& options = {});
+
+  // True if beams passed this point and none ended within a cell of it.
+  [[nodiscard]] bool Contradicts(const Eigen::Vector2d& p_anchor) const;
+
+ private:
+  FreeSpaceOptions options_;
+  enum class Seen : std::uint8_t { kNot = 0, kThrough, kHit };
+
+  int low_x_ = 0, low_y_ = 0;
+  int width_ = 0, height_ = 0;
+  std::vector<Seen> cells_;
+};
+
+}  // namespace cairn::slam

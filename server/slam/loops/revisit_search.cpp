@@ -1,0 +1,119 @@
+#include "server/slam/loops/revisit_search.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace cairn::slam {
+namespace {
+
+// The old keyframe that most likely shows the same surroundings: near, and with a similar heading.
+std::optional<std::size_t> NearestKeyframe(const Hypothesis& belief, const Trail& trail, double travelled_m,
+                                           const RevisitOptions& options) {
+  std::optional<std::size_t> nearest;
+  double best = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < trail.size(); ++k) {
+    if (travelled_m - trail.shapes()[k].travelled_m < options.min_travel_m) break;
+    if (trail.distances_m()[k] > options.max_way_m) continue;
+    const Pose2& T_map_k = belief.path[k];
+    const double distance = (T_map_k.translation() - belief.T_map_robot.translation()).norm();
+    if (distance > options.max_distance_m) continue;
+    const double turn = std::abs(AngleDiff(T_map_k.theta, belief.T_map_robot.theta));
+    if (turn > options.max_turn_rad) continue;
+    const double cost = distance + options.max_distance_m * turn / options.max_turn_rad;
+    if (cost < best) {
+      best = cost;
+      nearest = k;
+    }
+  }
+  return nearest;
+}
+
+}  // namespace
+
+void Visit(OptionVisitor& visitor, RevisitOptions& options) {
+  visitor.Flag("enabled", options.enabled, "Whether scans are matched with places that were seen before.");
+  visitor.Real("min_travel_m", options.min_travel_m, "m", 0.0, 1000.0,
+               "Way between two visits of a place. After a shorter way it is still the same visit.");
+  visitor.Real("max_way_m", options.max_way_m, "m", 0.0, 1e9,
+               "Longest way along the known relations between the robot and the old place. Beyond it a large loop must "
+               "be found first.");
+  visitor.Real("max_distance_m", options.max_distance_m, "m", 0.1, 20.0,
+               "Largest distance between the robot and an old keyframe.");
+  visitor.Real("max_turn_rad", options.max_turn_rad, "rad", 0.05, 3.2,
+               "Largest difference between the headings of the robot and of an old keyframe.");
+  visitor.Integer("neighbours", options.neighbours, "1", 0, 100,
+                  "Number of keyframes before and after the old one whose surfaces are used as well.");
+  visitor.Integer("guesses", options.guesses, "1", 0, 100,
+                  "Number of further particles whose poses are tried if that of the best one fails.");
+  visitor.Real(
+      "guess_sigma_m", options.guess_sigma_m, "m", 0.01, 10.0,
+      "Standard deviation of the position of a guess. With a larger value the match may move farther away from it.");
+  visitor.Real("guess_sigma_rad", options.guess_sigma_rad, "rad", 0.001, 3.2,
+               "Standard deviation of the heading of a guess.");
+  visitor.Real("min_score", options.min_score, "1", 0.0, 1.0,
+               "Share of the points of the scan that must be explained.");
+  visitor.Real(
+      "sigma_m", options.sigma_m, "m", 0.0, 5.0,
+      "Standard deviation that is added to the position of a match, because neighbouring matches have similar errors.");
+  visitor.Real("sigma_rad", options.sigma_rad, "rad", 0.0, 1.0,
+               "Standard deviation that is added to the heading of a match.");
+}
+
+RevisitSearch::RevisitSearch(const RevisitOptions& options, const PointToLineOptions& align)
+    : options_(options), align_(align), reference_(align.first_pair_distance_m) {
+  align_.min_score = options.min_score;
+}
+
+std::optional<RevisitObservation> RevisitSearch::Find(std::span<const SurfacePoint> points_robot, const Trail& trail,
+                                                      double travelled_m, const Filter& filter,
+                                                      const ParallelFor& parallel_for) {
+  if (!options_.enabled) return std::nullopt;
+  const Hypothesis best = filter.hypothesis(0);
+  const std::optional<std::size_t> centre = NearestKeyframe(best, trail, travelled_m, options_);
+  if (!centre) return std::nullopt;
+  BuildReference(trail.shapes(), *centre);
+  const Eigen::Matrix3d prior =
+      Eigen::Vector3d(options_.guess_sigma_m * options_.guess_sigma_m, options_.guess_sigma_m * options_.guess_sigma_m,
+                      options_.guess_sigma_rad * options_.guess_sigma_rad)
+          .asDiagonal();
+  const auto align = [&](const Hypothesis& belief) {
+    const Pose2 guess = Between(belief.path[*centre], belief.T_map_robot);
+    return AlignPointsToSurfaces(points_robot, reference_, {guess, guess, prior}, align_);
+  };
+  MatchResult match = align(best);
+  if (!match.converged) match = AlignFromOthers(filter, align, parallel_for);
+  if (!match.converged) return std::nullopt;
+  RevisitObservation revisit{*centre, match.T_ref_curr, match.covariance};
+  revisit.covariance.diagonal() +=
+      Eigen::Vector3d(options_.sigma_m * options_.sigma_m, options_.sigma_m * options_.sigma_m,
+                      options_.sigma_rad * options_.sigma_rad);
+  return revisit;
+}
+
+// Aligns with other hypotheses of the filter, and returns the result that explains most.
+MatchResult RevisitSearch::AlignFromOthers(const Filter& filter,
+                                           const std::function<MatchResult(const Hypothesis&)>& align,
+                                           const ParallelFor& parallel_for) const {
+  const std::size_t size = filter.hypothesis_count() - 1;  // Hypotheses other than the best.
+  const std::size_t guesses = std::min(size, static_cast<std::size_t>(options_.guesses));
+  std::vector<MatchResult> matches(guesses);
+  parallel_for(static_cast<int>(guesses), [&](int begin, int end) {
+    for (int i = begin; i < end; ++i) {
+      const auto guess = static_cast<std::size_t>(i);
+      matches[guess] = align(filter.hypothesis(1 + guess * size / guesses));
+    }
+  });
+  MatchResult best;
+  for (const MatchResult& match : matches)
+    if (match.converged && (!best.converged || match.score > best.score)) best = match;
+  return best;
+}
+
+void RevisitSearch::BuildReference(std::span<const KeyframeShape> shapes, std::size_t centre) {
+  reference_.Clear();
+  const auto reach = static_cast<std::size_t>(options_.neighbours);
+  const Stretch around{centre > reach ? centre - reach : 0, std::min(shapes.size() - 1, centre + reach), centre};
+  ForEachSurface(shapes, around, [&](const SurfacePoint& surface) { reference_.Add(surface); });
+}
+
+}  // namespace cairn::slam

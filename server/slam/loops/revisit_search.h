@@ -1,0 +1,57 @@
+// Recognises places seen before: selects the old keyframe nearest to the believed pose and aligns the scan
+// with the surfaces seen around that keyframe. It searches only near the given guesses and is not a global
+// search. The result, the pose of the robot relative to the keyframe, does not depend on any particle. Not
+// thread-safe (scratch memory).
+// Source: loop detection by scan alignment as in Gutmann and Konolige 1999 (local registration, global
+// correlation).
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <span>
+
+#include "server/slam/filters/filter.h"
+#include "server/slam/loops/region.h"
+#include "server/slam/matching/point_to_line.h"
+#include "server/slam/parallel_for.h"
+
+namespace cairn::slam {
+
+struct RevisitOptions {
+  bool enabled = true;
+  double min_travel_m = 12.0;
+  double max_way_m = 60.0;
+  double max_distance_m = 3.0;
+  double max_turn_rad = 1.2;  // A laser with a half circle sees nothing in common beyond this.
+  std::int64_t neighbours = 8;
+  std::int64_t guesses = 6;
+  double guess_sigma_m = 0.5;
+  double guess_sigma_rad = 0.15;
+  double min_score = 0.6;
+  double sigma_m = 0.1;
+  double sigma_rad = 0.02;
+};
+void Visit(OptionVisitor& visitor, RevisitOptions& options);
+
+class RevisitSearch {
+ public:
+  RevisitSearch(const RevisitOptions& options, const PointToLineOptions& align);
+
+  // Searches with the scan of the next keyframe, which is not yet part of the trail: its points and the
+  // travelled distance.
+  [[nodiscard]] std::optional<RevisitObservation> Find(std::span<const SurfacePoint> points_robot, const Trail& trail,
+                                                       double travelled_m, const Filter& filter,
+                                                       const ParallelFor& parallel_for);
+
+ private:
+  MatchResult AlignFromOthers(const Filter& filter, const std::function<MatchResult(const Hypothesis&)>& align,
+                              const ParallelFor& parallel_for) const;
+  // Collects the surfaces around keyframe `centre`, in its robot frame.
+  void BuildReference(std::span<const KeyframeShape> shapes, std::size_t centre);
+
+  RevisitOptions options_;
+  PointToLineOptions align_;
+  PointIndex reference_;  // Scratch memory.
+};
+
+}  // namespace cairn::slam

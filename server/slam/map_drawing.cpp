@@ -1,0 +1,57 @@
+#include "server/slam/map_drawing.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace cairn::slam {
+namespace {
+
+// Keyframes drawn again with every scan, which takes a few milliseconds.
+constexpr std::size_t kRedrawnPerScan = 20;
+
+void DrawOnto(OccupancyGrid& grid, const Keyframe& keyframe, const Pose2& T_map_robot) {
+  if (keyframe.localized) grid.Draw(*keyframe.scan, T_map_robot);
+}
+
+}  // namespace
+
+void MapDrawing::Add(const Keyframe& keyframe, const Pose2& T_map_robot) {
+  path_.push_back(T_map_robot);
+  DrawOnto(grid_, keyframe, T_map_robot);
+}
+
+void MapDrawing::StartAgain(std::size_t keyframes) {
+  changed_at_ = keyframes;
+  redraw_ = Redraw{OccupancyGrid(grid_.options()), 0};
+}
+
+void MapDrawing::Begin(std::span<const Keyframe> keyframes, const SharedSequence<Pose2>& path) {
+  StartAgain(keyframes.size());
+  path_ = path.values();
+  DrawOnto(grid_, keyframes.back(), path_.back());
+}
+
+void MapDrawing::Continue(std::span<const Keyframe> keyframes, const SharedSequence<Pose2>& path) {
+  if (!redraw_) return;
+  const std::size_t end = std::min(keyframes.size(), redraw_->drawn + kRedrawnPerScan);
+  for (std::size_t& k = redraw_->drawn; k < end; ++k) DrawOnto(redraw_->grid, keyframes[k], path[k]);
+  if (redraw_->drawn < keyframes.size()) return;
+  grid_.ReplaceBy(std::move(redraw_->grid));
+  redraw_.reset();
+  path_ = path.values();
+}
+
+void MapDrawing::Finish(std::span<const Keyframe> keyframes, const SharedSequence<Pose2>& path) {
+  while (redraw_) Continue(keyframes, path);
+}
+
+void MapDrawing::Adopt(OccupancyGrid grid, std::size_t drawn, std::span<const Keyframe> keyframes,
+                       const SharedSequence<Pose2>& path) {
+  const bool outdated = drawn < changed_at_ || redraw_;
+  redraw_.reset();
+  grid_.ReplaceBy(std::move(grid));
+  for (std::size_t k = drawn; k < keyframes.size(); ++k) DrawOnto(grid_, keyframes[k], path[k]);
+  if (outdated) redraw_ = Redraw{OccupancyGrid(grid_.options()), 0};
+}
+
+}  // namespace cairn::slam

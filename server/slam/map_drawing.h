@@ -1,0 +1,58 @@
+// The growing map of one robot: every keyframe is drawn onto the grid at the filter's estimate of its pose at
+// that time, except keyframes that are not localized (Keyframe::localized): they are part of the path only.
+// When the past path changes (a large loop), the whole map is drawn again along the new path, some
+// keyframes with every scan, so that no scan has to wait. Until that is finished the old map is kept. Frames:
+// `map`. Not thread-safe.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "server/slam/grid/occupancy_grid.h"
+#include "server/slam/trail/keyframe.h"
+#include "server/slam/trail/shared_sequence.h"
+
+namespace cairn::slam {
+
+class MapDrawing {
+ public:
+  explicit MapDrawing(const GridOptions& options) : grid_(options) {}
+
+  // Draws the next keyframe at this pose.
+  void Add(const Keyframe& keyframe, const Pose2& T_map_robot);
+  // The poses of the first `keyframes` keyframes have changed: begins to draw all of them again.
+  void StartAgain(std::size_t keyframes);
+  // For keyframes that could not be drawn before, because their place in the map was not known, and that now
+  // lie along `path`: draws the last of them, and then begins to draw all of them.
+  void Begin(std::span<const Keyframe> keyframes, const SharedSequence<Pose2>& path);
+  // Draws some more keyframes at their poses in `path`. Once all are drawn, the new map replaces the old one.
+  void Continue(std::span<const Keyframe> keyframes, const SharedSequence<Pose2>& path);
+  // Like Continue, but draws all remaining keyframes.
+  void Finish(std::span<const Keyframe> keyframes, const SharedSequence<Pose2>& path);
+  // Replaces the map by one that a job drew from the first `drawn` keyframes, and draws the other keyframes
+  // onto it. A map from before a change of the path is also taken, and then drawn again.
+  void Adopt(OccupancyGrid grid, std::size_t drawn, std::span<const Keyframe> keyframes,
+             const SharedSequence<Pose2>& path);
+
+  [[nodiscard]] bool redrawing() const { return redraw_.has_value(); }
+  [[nodiscard]] const OccupancyGrid& grid() const { return grid_; }
+  [[nodiscard]] OccupancyGrid::Chunks Share() { return grid_.Share(); }
+  [[nodiscard]] OccupancyGrid::Change TakeChange() { return grid_.TakeChange(); }
+  // T_map_robot of every keyframe in the drawing.
+  [[nodiscard]] const std::vector<Pose2>& path() const { return path_; }
+
+ private:
+  struct Redraw {
+    OccupancyGrid grid;
+    std::size_t drawn = 0;  // Number of keyframes drawn.
+  };
+
+  OccupancyGrid grid_;
+  std::vector<Pose2> path_;
+  std::optional<Redraw> redraw_;  // The new map, while it is being drawn after a change of the path.
+  std::size_t changed_at_ = 0;    // Number of keyframes when the path changed.
+};
+
+}  // namespace cairn::slam

@@ -1,0 +1,24 @@
+#include "server/slam/matchers/icp.h"
+
+#include "server/slam/matching/degeneracy.h"
+#include "server/slam/matching/surface_agreement.h"
+
+namespace cairn::slam {
+
+MatchResult MatchByIcp(const ScanView& ref, const ScanView& curr, const MatchPrior& prior,
+                       const PointToLineOptions& options) {
+  PointIndex reference(options.first_pair_distance_m);
+  for (const SurfacePoint& point : ref.points_robot) reference.Add(point);
+  MatchResult result = AlignPointsToSurfaces(curr.points_robot, reference,
+                                             {prior.T_ref_curr, prior.T_ref_curr, prior.covariance}, options);
+  if (!result.converged) return result;
+  // Points without a surface direction, as at the far ends of a corridor, must not hide that the scan shows a
+  // corridor.
+  const SurfaceAgreement agreement =
+      CompareSurfaces(curr.points_robot, reference, result.T_ref_curr, options.inlier_distance_m);
+  JudgeDegeneracy(agreement.H, options.degenerate_ratio, result);
+  TakeAlongFromPrior(prior, result);
+  return result;
+}
+
+}  // namespace cairn::slam

@@ -1,0 +1,18 @@
+// The bare positions of a scan's points, for matchers that do not use surface directions. In the robot frame
+// of the scan.
+#pragma once
+
+#include <vector>
+
+#include "server/slam/features/scan_view.h"
+
+namespace cairn::slam {
+
+[[nodiscard]] inline std::vector<Eigen::Vector2d> PositionsOf(const ScanView& view) {
+  std::vector<Eigen::Vector2d> positions;
+  positions.reserve(view.points_robot.size());
+  for (const SurfacePoint& point : view.points_robot) positions.push_back(point.p);
+  return positions;
+}
+
+}  // namespace cairn::slam

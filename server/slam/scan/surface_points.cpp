@@ -1,0 +1,122 @@
+#include "server/slam/scan/surface_points.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "server/slam/scan/beam_points.h"
+
+namespace cairn::slam {
+namespace {
+
+// Bounds on the work that one scan can cause. The scans of usual scanners among walls stay far below them.
+constexpr std::size_t kMaxPoints = 2048;
+constexpr std::size_t kMaxNeighbours = 512;  // Neighbours on either side of a point.
+
+// Largest distance between the hits of two neighbouring beams on one surface.
+double AllowedGap(const BeamPoint& hit, double step, const SurfaceOptions& options) {
+  return std::max(options.neighbour_gap_m * 0.5,
+                  std::min(options.neighbour_gap_m * 2.0, options.gap_steps * hit.range_m * step));
+}
+
+// The consecutive hits around `centre` that lie on its surface: near to it, and without a jump in between.
+std::pair<std::size_t, std::size_t> Neighbourhood(const std::vector<BeamPoint>& hits, std::size_t centre, double step,
+                                                  const SurfaceOptions& options) {
+  // Distant points lie far apart, so they need a wider span to have neighbours at all.
+  const double span = std::max(options.neighbour_span_m, options.span_steps * hits[centre].range_m * step);
+  const double gap = AllowedGap(hits[centre], step, options);
+  const auto connected = [&](std::size_t a, std::size_t b) {
+    return (hits[a].p_robot - hits[b].p_robot).norm() < gap &&
+           std::abs(hits[a].beam - hits[b].beam) <= options.skipped_beams;
+  };
+  std::size_t first = centre, last = centre;
+  while (first > 0 && centre - first < kMaxNeighbours && connected(first, first - 1) &&
+         (hits[first - 1].p_robot - hits[centre].p_robot).norm() < span)
+    --first;
+  while (last + 1 < hits.size() && last - centre < kMaxNeighbours && connected(last, last + 1) &&
+         (hits[last + 1].p_robot - hits[centre].p_robot).norm() < span)
+    ++last;
+  return {first, last};
+}
+
+Eigen::Vector2d NormalOf(const std::vector<BeamPoint>& hits, std::size_t first, std::size_t last,
+                         const Eigen::Vector2d& p_sensor, double max_flatness) {
+  if (last - first + 1 < 3) return Eigen::Vector2d::Zero();
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (std::size_t i = first; i <= last; ++i) mean += hits[i].p_robot;
+  mean /= static_cast<double>(last - first + 1);
+  Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
+  for (std::size_t i = first; i <= last; ++i) {
+    const Eigen::Vector2d d = hits[i].p_robot - mean;
+    scatter += d * d.transpose();
+  }
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
+  solver.computeDirect(scatter);
+  if (!(solver.eigenvalues()(0) < max_flatness * solver.eigenvalues()(1))) return Eigen::Vector2d::Zero();
+  Eigen::Vector2d normal = solver.eigenvectors().col(0).normalized();
+  if (normal.dot(p_sensor - mean) < 0) normal = -normal;
+  return normal;
+}
+
+// The normal of a wall that is seen at a grazing angle: the hits of neighbouring beams lie far apart, but on
+// one line.
+Eigen::Vector2d GrazingNormalOf(const std::vector<BeamPoint>& hits, std::size_t centre, const Eigen::Vector2d& p_sensor,
+                                const SurfaceOptions& options) {
+  const auto each_side = static_cast<std::size_t>(options.grazing_beams);
+  std::size_t first = centre, last = centre;
+  while (first > 0 && centre - first < each_side && hits[first].beam - hits[first - 1].beam == 1) --first;
+  while (last + 1 < hits.size() && last - centre < each_side && hits[last + 1].beam - hits[last].beam == 1) ++last;
+  if (last - first < 3) return Eigen::Vector2d::Zero();
+  const Eigen::Vector2d along = (hits[last].p_robot - hits[first].p_robot).normalized();
+  const Eigen::Vector2d across(-along.y(), along.x());
+  for (std::size_t i = first; i < last; ++i) {
+    const Eigen::Vector2d step = hits[i + 1].p_robot - hits[i].p_robot;
+    if (step.norm() > options.grazing_gap_m || step.dot(along) < 0.0) return Eigen::Vector2d::Zero();
+    if (std::abs(across.dot(hits[i].p_robot - hits[first].p_robot)) > options.grazing_flat_m)
+      return Eigen::Vector2d::Zero();
+  }
+  return across.dot(p_sensor - hits[centre].p_robot) < 0 ? Eigen::Vector2d(-across) : across;
+}
+
+}  // namespace
+
+void Visit(OptionVisitor& visitor, SurfaceOptions& options) {
+  visitor.Real("max_range_m", options.max_range_m, "m", 1.0, 200.0,
+               ForOperators("Points farther away than this are not matched. Larger values help in wide halls, if the "
+                            "laser is accurate so far."));
+  visitor.Real("min_spacing_m", options.min_spacing_m, "m", 0.0, 1.0,
+               "Smallest distance between two points that are used. A larger value is faster and coarser.");
+  visitor.Real("neighbour_span_m", options.neighbour_span_m, "m", 0.02, 2.0,
+               "Points within this distance determine the direction of a surface. A larger value is smoother, and "
+               "rounds corners.");
+  visitor.Real("neighbour_gap_m", options.neighbour_gap_m, "m", 0.05, 5.0,
+               "A larger jump between neighbouring beams ends a surface. The limit grows with the range.");
+  visitor.Real("max_flatness", options.max_flatness, "1", 0.001, 1.0,
+               "A point has a direction only if the variance of its neighbours across the surface is below this share "
+               "of that along it.");
+  visitor.Real("grazing_gap_m", options.grazing_gap_m, "m", 0.0, 20.0,
+               "Points of neighbouring beams that are farther apart do not lie on one wall.");
+  visitor.Real("grazing_flat_m", options.grazing_flat_m, "m", 0.0, 1.0,
+               "Points of a wall that is seen at a small angle deviate at most by this from a line.");
+}
+
+std::vector<SurfacePoint> SurfacePointsOf(std::span<const BeamPoint> points, const Scan& scan,
+                                          const SurfaceOptions& options) {
+  std::vector<BeamPoint> hits(points.begin(), points.end());
+  std::erase_if(hits, [&](const BeamPoint& hit) { return hit.range_m > options.max_range_m; });
+  const double step = std::abs(scan.angle_step_rad);
+  const Eigen::Vector2d p_sensor = scan.T_robot_laser.translation();
+  std::vector<SurfacePoint> surface;
+  const std::size_t stride = hits.size() / kMaxPoints + 1;
+  surface.reserve(hits.size() / stride + 1);
+  for (std::size_t i = 0; i < hits.size(); i += stride) {
+    if (!surface.empty() && (hits[i].p_robot - surface.back().p).norm() < options.min_spacing_m) continue;
+    const auto [first, last] = Neighbourhood(hits, i, step, options);
+    Eigen::Vector2d normal = NormalOf(hits, first, last, p_sensor, options.max_flatness);
+    if (normal.isZero()) normal = GrazingNormalOf(hits, i, p_sensor, options);
+    surface.push_back({hits[i].p_robot, normal});
+  }
+  return surface;
+}
+
+}  // namespace cairn::slam

@@ -1,0 +1,44 @@
+// The points of a scan with the direction of the surface on which they lie, thinned to a bounded number.
+// Point-to-line matching works with them. Points are in the robot frame of the scan. Stateless, thread-safe.
+// Source: point-to-line metric of Censi, ICRA 2008; thinning after thesis C 4.4.3.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/options/option_visitor.h"
+#include "common/sensor/scan.h"
+#include "server/slam/scan/beam_points.h"
+
+namespace cairn::slam {
+
+struct SurfacePoint {
+  Eigen::Vector2d p = Eigen::Vector2d::Zero();
+  // Unit vector towards the sensor; zero if the surface is not smooth.
+  Eigen::Vector2d normal = Eigen::Vector2d::Zero();
+  [[nodiscard]] bool smooth() const { return normal != Eigen::Vector2d::Zero(); }
+};
+
+struct SurfaceOptions {
+  double max_range_m = 30.0;  // Farther hits are too sparse to show a surface.
+  double min_spacing_m = 0.04;
+  double neighbour_span_m = 0.15;
+  double neighbour_gap_m = 0.35;
+  double max_flatness = 0.12;
+  double grazing_gap_m = 2.0;  // Without these two the far ends of corridors hold the robot back.
+  double grazing_flat_m = 0.04;
+  // Only the study of sensitivity sets these.
+  double gap_steps = 6.0;          // Gap of far points, in distances between neighbouring beams there.
+  double span_steps = 3.0;         // Span of far points, likewise.
+  std::int64_t skipped_beams = 3;  // Beams without a hit that may lie between two hits of one surface.
+  std::int64_t grazing_beams = 2;  // Beams on either side of a hit that may be on a wall seen at a grazing angle.
+};
+void Visit(OptionVisitor& visitor, SurfaceOptions& options);
+
+// `points` must be PointsOf(scan).
+[[nodiscard]] std::vector<SurfacePoint> SurfacePointsOf(std::span<const BeamPoint> points, const Scan& scan,
+                                                        const SurfaceOptions& options);
+
+}  // namespace cairn::slam

@@ -1,0 +1,291 @@
+#include "server/slam/tracking/front_end.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "common/geometry/pose_difference.h"
+#include "server/slam/matching/degeneracy.h"
+#include "server/slam/matching/surface_agreement.h"
+
+namespace cairn::slam {
+namespace {
+
+// Odometry is also tried from this many scans back. Where it froze and then caught up, or came late, the step
+// since the last scan is wrong although the motion over several scans is right. With half as many scans or twice as
+// many, no error changes more than with another seed.
+constexpr std::array<std::size_t, 3> kLookBack = {3, 6, 12};
+constexpr int kTurns = 4;  // Turns to either side that are tried.
+// An unusual guess must explain this share of the scan more than the best one so far. With half or twice
+// of it, no error changes more than with another seed.
+constexpr double kClearly = 0.05;
+
+// Distance between an answer and the odometry in standard deviations.
+double JumpOf(const Pose2& T_track_robot, const Pose2& guess, const Eigen::Matrix3d& covariance) {
+  const Eigen::Vector3d jump = Minus(T_track_robot, guess);
+  return std::sqrt(std::max(0.0, jump.dot(covariance.ldlt().solve(jump))));
+}
+
+// Transforms points from frame b to frame a and appends them.
+void AppendMoved(const Pose2& T_a_b, const std::vector<SurfacePoint>& points_b, std::vector<SurfacePoint>& points_a) {
+  const Eigen::Matrix2d R = T_a_b.rotation();
+  points_a.reserve(points_a.size() + points_b.size());
+  for (const SurfacePoint& point : points_b) points_a.push_back({T_a_b * point.p, R * point.normal});
+}
+
+}  // namespace
+
+void Visit(OptionVisitor& visitor, NoOdometryOptions& options) {
+  visitor.Flag(
+      "constant_velocity", options.constant_velocity,
+      "Whether the robot is expected to move on as between the last two scans. If not, it is expected to stand still.");
+  visitor.Real("sigma_m", options.sigma_m, "m", 0.001, 100.0,
+               "Standard deviation of the expected position. With a larger value the scan decides more.");
+  visitor.Real("sigma_rad", options.sigma_rad, "rad", 0.001, kPi, "Standard deviation of the expected heading.");
+  visitor.Real("unmatched_step_m", options.unmatched_step_m, "m", 0.0, 100.0,
+               "Way that a scan without a match counts for slam.lost_after_m.");
+  visitor.Integer("merged_keyframes", options.merged_keyframes, "1", 1, 1000,
+                  "Number of the reference keyframes whose points the matcher sees as one scan. With more the estimate "
+                  "is less drawn towards standing still.");
+}
+
+void Visit(OptionVisitor& visitor, RetryOptions& options) {
+  visitor.Real(
+      "turn_step_rad", options.turn_step_rad, "rad", 0.01, 0.75,
+      "Turns of one to four times this angle to either side are tried, because odometry may have frozen during "
+      "a turn. Twice the angle makes the online error on mit-csail 1.8 times as large.");
+  visitor.Real("sigma_m", options.sigma_m, "m", 0.01, 10.0,
+               "Standard deviation of the position of such a guess. Half of it makes the online error on mit-csail 1.3 "
+               "times as large.");
+  visitor.Real("sigma_rad", options.sigma_rad, "rad", 0.01, kPi,
+               "Standard deviation of the heading of such a guess. Half of it makes the walls of one small robot 12 % "
+               "thicker.");
+}
+
+void Visit(OptionVisitor& visitor, FrontEndOptions& options) {
+  visitor.Section("features", "Lines and corners of a scan.", [&] { Visit(visitor, options.features); });
+  visitor.Section("surface", "Points of a scan with the directions of their surfaces.",
+                  [&] { Visit(visitor, options.surface); });
+  visitor.Section("refine", "Point-to-line alignment with the reference keyframes after the matcher.", [&] {
+    visitor.Flag("enabled", options.refine_enabled,
+                 "Whether the answer of the matcher is refined. If not, it is the pose.");
+    Visit(visitor, options.refine);
+  });
+  visitor.Section("odometry", "Uncertainty of the odometry between two scans.",
+                  [&] { Visit(visitor, options.odometry); });
+  visitor.Flag("use_odometry", options.use_odometry,
+               ForOperators("Whether odometry is used. If not, the motion comes from the scans alone."));
+  visitor.Section("no_odometry", "What replaces the odometry if use_odometry is false.",
+                  [&] { Visit(visitor, options.no_odometry); });
+  visitor.Integer("reference_keyframes", options.reference_keyframes, "1", 1, 1000,
+                  "Number of the last keyframes against which a scan is aligned. With more the tracking is steadier, "
+                  "until drift blurs them.");
+  visitor.Real("retry_below", options.retry_below, "1", 0.0, 1.0,
+               "With a lower score, other guesses than the odometry are tried.");
+  visitor.Section("retry", "The other guesses. They come from older odometry, standing still, and turns on the spot.",
+                  [&] { Visit(visitor, options.retry); });
+  visitor.Real("keep_above", options.keep_above, "1", 0.0, 1.0,
+               "Without refinement: from this score on icp and correlative keep their reference scan. A lower value "
+               "gives less drift while the reference lasts, and poorer matches.");
+  visitor.Real("max_jump_sigma", options.max_jump_sigma, "1", 0.5, 1000.0,
+               "Without refinement: a match that is more standard deviations away from the odometry is refused.");
+  visitor.Require(options.use_odometry || options.no_odometry.merged_keyframes <= options.reference_keyframes,
+                  "no_odometry.merged_keyframes", "must not exceed", "reference_keyframes");
+}
+
+FrontEnd::FrontEnd(const FrontEndOptions& options, ScanMatcher matcher)
+    : options_(options),
+      matcher_(std::move(matcher)),
+      keyframe_index_(options.refine.inlier_distance_m),
+      index_(options.refine.first_pair_distance_m) {}
+
+ScanView Look(const Scan& scan, const FrontEndOptions& options) {
+  const std::vector<BeamPoint> points = PointsOf(scan);
+  return {ExtractFeatures(points, scan, options.features), SurfacePointsOf(points, scan, options.surface)};
+}
+
+TrackStep FrontEnd::Track(const ScanView& view, const Pose2& T_odom_robot, const ParallelFor& parallel_for) {
+  TrackStep step{.T_track_robot = {}, .score = 1.0, .matched = true};
+  if (!history_.empty()) step = Follow(view, T_odom_robot, parallel_for);
+  score_ = step.score;
+  history_.push_back({step.T_track_robot, T_odom_robot});
+  if (history_.size() > kLookBack.back()) history_.pop_front();
+  return step;
+}
+
+TrackStep FrontEnd::Follow(const ScanView& view, const Pose2& T_odom_robot, const ParallelFor& parallel_for) const {
+  const Guess guess = Predict(T_odom_robot);
+  MatchResult coarse = MatchLastKeyframe(view, guess, parallel_for);
+  // Along a corridor the alignment moves the points only slowly. If they show nothing in that direction, the
+  // refinement must therefore begin at the pose where it is to stay.
+  if (!options_.use_odometry && options_.refine_enabled)
+    TakeAlongFromPrior({guess.T_track_robot, guess.covariance}, coarse);
+  const MatchResult match = options_.refine_enabled ? Refine(view, T_odom_robot, guess, coarse)
+                                                    : MatchAlone(view, T_odom_robot, guess, coarse, parallel_for);
+  TrackStep step{.T_track_robot = match.T_ref_curr,
+                 .score = match.score,
+                 .matched = match.converged,
+                 .degenerate = match.degenerate};
+  step.moved_m = Between(history_.back().T_track_robot, step.T_track_robot).translation().norm();
+  if (!options_.use_odometry) {
+    if (!step.matched) step.moved_m = std::max(step.moved_m, options_.no_odometry.unmatched_step_m);
+    step.forecast_covariance = ForecastShare(match);
+  }
+  return step;
+}
+
+FrontEnd::Guess FrontEnd::Predict(const Pose2& T_odom_robot) const {
+  const Sight& last = history_.back();
+  if (options_.use_odometry) {
+    const Pose2 motion = Between(last.T_odom_robot, T_odom_robot);
+    const Eigen::Matrix3d J = J_compose_right(last.T_track_robot, motion);
+    return {last.T_track_robot * motion, J * options_.odometry.Covariance(motion) * J.transpose()};
+  }
+  const NoOdometryOptions& expected = options_.no_odometry;
+  Pose2 motion;
+  if (expected.constant_velocity && history_.size() > 1)
+    motion = Between(history_[history_.size() - 2].T_track_robot, last.T_track_robot);
+  const Eigen::Vector3d sigma(expected.sigma_m, expected.sigma_m, expected.sigma_rad);
+  return {last.T_track_robot * motion, sigma.cwiseAbs2().asDiagonal()};
+}
+
+Eigen::Matrix3d FrontEnd::ForecastShare(const MatchResult& match) const {
+  if (match.converged && !match.degenerate) return Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d unseen = match.covariance;
+  if (match.converged) {
+    const Eigen::Vector2d u = match.degenerate_direction;
+    const double along = u.dot(unseen.topLeftCorner<2, 2>() * u);
+    unseen.setZero();
+    unseen.topLeftCorner<2, 2>() = along * u * u.transpose();
+  }
+  return unseen;
+}
+
+// The result is in `track`; the matcher itself works in the keyframe's frame.
+MatchResult FrontEnd::MatchLastKeyframe(const ScanView& view, const Guess& guess,
+                                        const ParallelFor& parallel_for) const {
+  const Pose2& T_track_keyframe = keyframe_.T_track_robot;
+  Eigen::Matrix3d R_track_keyframe = Eigen::Matrix3d::Identity();
+  R_track_keyframe.topLeftCorner<2, 2>() = T_track_keyframe.rotation();
+  const MatchPrior prior{Between(T_track_keyframe, guess.T_track_robot),
+                         R_track_keyframe.transpose() * guess.covariance * R_track_keyframe};
+  MatchResult match = matcher_.match(keyframe_view_, view, prior, parallel_for);
+  match.T_ref_curr = T_track_keyframe * match.T_ref_curr;
+  match.covariance = R_track_keyframe * match.covariance * R_track_keyframe.transpose();
+  match.degenerate_direction = T_track_keyframe.rotation() * match.degenerate_direction;
+  return match;
+}
+
+MatchResult FrontEnd::MatchAlone(const ScanView& view, const Pose2& T_odom_robot, const Guess& guess,
+                                 const MatchResult& coarse, const ParallelFor& parallel_for) const {
+  MatchResult best = coarse;
+  // Only odometry can reveal a fault of the match; a forecast is too uncertain for that.
+  if (options_.use_odometry && best.converged &&
+      JumpOf(best.T_ref_curr, guess.T_track_robot, guess.covariance) > options_.max_jump_sigma) {
+    best.converged = false;
+    best.failure = MatchFailure::kFault;
+  }
+  // Not every matcher keeps to the prior along a corridor.
+  if (options_.use_odometry) TakeAlongFromPrior({guess.T_track_robot, guess.covariance}, best);
+  double explained = Explained(view, best.converged ? best.T_ref_curr : guess.T_track_robot);
+  const auto enough = [&] { return best.converged && explained >= options_.retry_below; };
+  const auto consider = [&](const Pose2& other) {
+    const MatchResult match = MatchLastKeyframe(view, {other, options_.retry.Covariance()}, parallel_for);
+    if (!match.converged) return;
+    const double share = Explained(view, match.T_ref_curr);
+    if (share <= explained + kClearly) return;
+    best = match;
+    explained = share;
+  };
+  const bool retry = !matcher_.searches_wide;
+  if (retry && !enough())
+    for (const Pose2& other : UnusualGuesses(T_odom_robot)) consider(other);
+  for (int k = 1; retry && k <= kTurns && !enough(); ++k) {
+    consider(guess.T_track_robot * Pose2{0, 0, k * options_.retry.turn_step_rad});
+    consider(guess.T_track_robot * Pose2{0, 0, -k * options_.retry.turn_step_rad});
+  }
+  best.score = explained;
+  if (best.converged && explained >= options_.refine.min_score) return best;
+  if (best.converged) best.failure = MatchFailure::kInconsistent;
+  best.converged = false;
+  best.degenerate = false;
+  best.T_ref_curr = guess.T_track_robot;
+  best.covariance = guess.covariance;
+  return best;
+}
+
+double FrontEnd::Explained(const ScanView& view, const Pose2& T_track_robot) const {
+  return CompareSurfaces(view.points_robot, keyframe_index_, Between(keyframe_.T_track_robot, T_track_robot),
+                         options_.refine.inlier_distance_m)
+      .score;
+}
+
+std::vector<Pose2> FrontEnd::UnusualGuesses(const Pose2& T_odom_robot) const {
+  std::vector<Pose2> guesses = {history_.back().T_track_robot};
+  for (const std::size_t back : kLookBack) {
+    if (!options_.use_odometry || history_.size() < back) continue;
+    const Sight& sight = history_[history_.size() - back];
+    guesses.push_back(sight.T_track_robot * Between(sight.T_odom_robot, T_odom_robot));
+  }
+  return guesses;
+}
+
+MatchResult FrontEnd::Refine(const ScanView& view, const Pose2& T_odom_robot, const Guess& guess,
+                             const MatchResult& coarse) const {
+  const auto align = [&](const Pose2& start) {
+    return AlignPointsToSurfaces(view.points_robot, index_, {start, guess.T_track_robot, guess.covariance},
+                                 options_.refine);
+  };
+
+  // The refinement starts at the matcher's answer or, if there is none, at the prediction.
+  MatchResult best = align(coarse.converged ? coarse.T_ref_curr : guess.T_track_robot);
+  if (best.converged && best.score >= options_.retry_below) return best;
+  if (coarse.converged) {
+    const MatchResult match = align(guess.T_track_robot);
+    if (match.converged && (!best.converged || match.score > best.score)) best = match;
+    if (best.converged && best.score >= options_.retry_below) return best;
+  }
+
+  // An unusual guess is taken only if it explains clearly more of the scan.
+  const auto consider = [&](const Pose2& other) {
+    const MatchResult match =
+        AlignPointsToSurfaces(view.points_robot, index_, {other, other, options_.retry.Covariance()}, options_.refine);
+    if (match.converged && (!best.converged || match.score > best.score + kClearly)) best = match;
+  };
+  for (const Pose2& other : UnusualGuesses(T_odom_robot)) consider(other);
+  for (int k = 1; k <= kTurns; ++k) {
+    if (best.converged && best.score >= options_.retry_below) break;
+    consider(guess.T_track_robot * Pose2{0, 0, k * options_.retry.turn_step_rad});
+    consider(guess.T_track_robot * Pose2{0, 0, -k * options_.retry.turn_step_rad});
+  }
+  return best;
+}
+
+void FrontEnd::AddKeyframe(const ScanView& view) {
+  const bool matcher_alone = !options_.refine_enabled && !reference_.empty();
+  if (matcher_alone && matcher_.keeps_reference && score_ >= options_.keep_above) return;
+  keyframe_ = history_.back();
+  AppendMoved(keyframe_.T_track_robot, view.points_robot, reference_.emplace_back());
+  if (reference_.size() > static_cast<std::size_t>(options_.reference_keyframes)) reference_.pop_front();
+  index_.Clear();
+  for (const auto& points : reference_)
+    for (const SurfacePoint& point : points) index_.Add(point);
+
+  keyframe_view_ = view;
+  if (!options_.use_odometry)
+    keyframe_view_.points_robot = MergedPoints(static_cast<std::size_t>(options_.no_odometry.merged_keyframes));
+  keyframe_index_.Clear();
+  for (const SurfacePoint& point : keyframe_view_.points_robot) keyframe_index_.Add(point);
+}
+
+std::vector<SurfacePoint> FrontEnd::MergedPoints(std::size_t keyframes) const {
+  const Pose2 T_keyframe_track = keyframe_.T_track_robot.Inverse();
+  std::vector<SurfacePoint> merged;
+  for (std::size_t k = reference_.size() - std::min(keyframes, reference_.size()); k < reference_.size(); ++k)
+    AppendMoved(T_keyframe_track, reference_[k], merged);
+  return merged;
+}
+
+}  // namespace cairn::slam

@@ -1,0 +1,130 @@
+// Follows the robot from scan to scan. The chosen matcher compares every scan with the last keyframe, and an
+// alignment with the points of the last keyframes refines its answer. Odometry gives the pose where neither
+// finds one. The result is the motion and its uncertainty. Without the refinement the matcher's own answer is
+// used, unless it jumps against the odometry or explains too little of the scan. Matchers of points then keep
+// a keyframe as reference while it explains the next ones.
+// Frame: `track` is smooth and drifts slowly, like very good odometry. Loops are not closed here but in the
+// filter.
+// Not thread-safe. Deterministic.
+// Source: thesis A 3.5 (voting), 3.5.13 and 3.6.1 (fall-backs, fault check); Censi 2008 (refinement).
+#pragma once
+
+#include <deque>
+#include <vector>
+
+#include "server/slam/features/feature_extraction.h"
+#include "server/slam/features/scan_view.h"
+#include "server/slam/matching/point_to_line.h"
+#include "server/slam/matching/scan_matcher.h"
+#include "server/slam/motion/motion_noise.h"
+
+namespace cairn::slam {
+
+// The forecast of the next scan's pose while the odometry is not used: the robot either stands still or keeps
+// its velocity.
+struct NoOdometryOptions {
+  bool constant_velocity = true;  // Per scan, not per second: the stamps of real logs come in bursts.
+  double sigma_m = 0.03;
+  double sigma_rad = 0.15;
+  double unmatched_step_m = 0.3;
+  std::int64_t merged_keyframes = 8;
+};
+void Visit(OptionVisitor& visitor, NoOdometryOptions& options);
+
+// Other guesses that are tried if the first guess does not explain the scan.
+struct RetryOptions {
+  double turn_step_rad = 0.25;
+  double sigma_m = 0.5;
+  double sigma_rad = 0.31622776601683794;  // Its square is 0.1.
+
+  // Covariance of the error of such a guess.
+  [[nodiscard]] Eigen::Matrix3d Covariance() const {
+    return Eigen::Vector3d(sigma_m * sigma_m, sigma_m * sigma_m, sigma_rad * sigma_rad).asDiagonal();
+  }
+};
+void Visit(OptionVisitor& visitor, RetryOptions& options);
+
+struct FrontEndOptions {
+  FeatureOptions features;
+  SurfaceOptions surface;
+  bool refine_enabled = true;
+  PointToLineOptions refine;
+  // Generous: real odometry freezes, jumps and comes late.
+  MotionNoise odometry{0.05, 0.8, 0.0, 0.04, 0.4, 1.2};
+  bool use_odometry = true;  // False: no odometry, as in thesis C 4.4.
+  NoOdometryOptions no_odometry;
+  std::int64_t reference_keyframes = 40;
+  double retry_below = 0.65;
+  RetryOptions retry;
+  double keep_above = 0.75;     // See ScanMatcher::keeps_reference.
+  double max_jump_sigma = 5.0;  // Fault check of thesis A 3.6.1.
+};
+void Visit(OptionVisitor& visitor, FrontEndOptions& options);
+
+[[nodiscard]] ScanView Look(const Scan& scan, const FrontEndOptions& options);
+
+// The pose that the front-end finds for one scan, and its evidence.
+struct TrackStep {
+  Pose2 T_track_robot;
+  double score = 0.0;       // Share of the scan that agrees with the last keyframes, 0..1.
+  bool matched = false;     // False if the pose comes from odometry or from the forecast.
+  bool degenerate = false;  // True in a corridor: the scan does not show the position along it.
+  double moved_m = 0.0;     // Distance travelled since the previous scan.
+  // Covariance of the part of the step that neither a scan nor odometry measured (the direction along a
+  // corridor, or a scan without a match), along the axes of `track`. It is zero if odometry is used:
+  // BlindMotion accounts for that case.
+  Eigen::Matrix3d forecast_covariance = Eigen::Matrix3d::Zero();
+};
+
+class FrontEnd {
+ public:
+  FrontEnd(const FrontEndOptions& options, ScanMatcher matcher);
+
+  // Returns the pose at this scan. The first scan is at the identity and counts as matched.
+  TrackStep Track(const ScanView& view, const Pose2& T_odom_robot, const ParallelFor& parallel_for);
+  // Makes the scan just tracked part of the reference.
+  void AddKeyframe(const ScanView& view);
+
+ private:
+  struct Sight {
+    Pose2 T_track_robot;
+    Pose2 T_odom_robot;
+  };
+  // The pose predicted from the last scan, in `track`: by odometry, or by the forecast if odometry is not
+  // used.
+  struct Guess {
+    Pose2 T_track_robot;
+    Eigen::Matrix3d covariance;
+  };
+  [[nodiscard]] TrackStep Follow(const ScanView& view, const Pose2& T_odom_robot,
+                                 const ParallelFor& parallel_for) const;
+  [[nodiscard]] Guess Predict(const Pose2& T_odom_robot) const;
+  // In the results of the next three functions the reference frame is `track`.
+  [[nodiscard]] MatchResult MatchLastKeyframe(const ScanView& view, const Guess& guess,
+                                              const ParallelFor& parallel_for) const;
+  [[nodiscard]] MatchResult Refine(const ScanView& view, const Pose2& T_odom_robot, const Guess& guess,
+                                   const MatchResult& coarse) const;
+  [[nodiscard]] MatchResult MatchAlone(const ScanView& view, const Pose2& T_odom_robot, const Guess& guess,
+                                       const MatchResult& coarse, const ParallelFor& parallel_for) const;
+  // Guesses that do not use the odometry since the last scan, for odometry that stood still or came late. One
+  // of them is taken only if it explains clearly more of the scan.
+  [[nodiscard]] std::vector<Pose2> UnusualGuesses(const Pose2& T_odom_robot) const;
+  [[nodiscard]] Eigen::Matrix3d ForecastShare(const MatchResult& match) const;
+  // Share of the scan's points that lie on the surfaces of the last keyframe.
+  [[nodiscard]] double Explained(const ScanView& view, const Pose2& T_track_robot) const;
+  // Points of the last keyframes, in the robot frame of the newest of them.
+  [[nodiscard]] std::vector<SurfacePoint> MergedPoints(std::size_t keyframes) const;
+
+  FrontEndOptions options_;
+  ScanMatcher matcher_;
+  double score_ = 0.0;  // Score of the last match.
+  // The reference of the matcher, which mostly is the last keyframe, and its points in its robot frame.
+  Sight keyframe_;
+  ScanView keyframe_view_;
+  PointIndex keyframe_index_;
+  std::deque<Sight> history_;                        // The poses of the last scans, newest last.
+  std::deque<std::vector<SurfacePoint>> reference_;  // Points of the last keyframes in `track`, newest last.
+  PointIndex index_;
+};
+
+}  // namespace cairn::slam

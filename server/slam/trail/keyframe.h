@@ -1,0 +1,63 @@
+// A keyframe is a scan that is kept because the robot moved enough since the last one. Keyframes are numbered
+// from 0 in the order of time; a number means the same keyframe everywhere in slam. Plain values.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "common/geometry/pose2.h"
+#include "common/sensor/scan.h"
+#include "common/sensor/trajectory.h"
+#include "server/slam/graph/pose_graph.h"
+#include "server/slam/scan/surface_points.h"
+
+namespace cairn::slam {
+
+struct Keyframe {
+  std::shared_ptr<const Scan> scan;
+  Pose2 T_odom_robot;
+  bool localized = true;  // Otherwise nobody knows where it was taken, and it is drawn into no map.
+  // Not localized because the path contradicts the scans. Where it lies along the path is known, so that it counts as
+  // localized once the path has been corrected.
+  bool doubted = false;
+};
+
+// The part of a keyframe that matching uses.
+struct KeyframeShape {
+  // Pose in the front-end's frame: exact relative to neighbours, but it drifts over the whole path.
+  Pose2 T_track_robot;
+  double travelled_m = 0.0;          // Distance travelled along the path up to this keyframe.
+  std::vector<SurfacePoint> points;  // Surface points in the robot frame of this keyframe.
+};
+
+// The pose of the robot relative to the old keyframe `keyframe`, measured by scan matching.
+struct RevisitObservation {
+  std::size_t keyframe = 0;
+  Pose2 T_keyframe_robot;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
+};
+
+// The state of a mapper at one moment as jobs use it, shared without locks: the keyframes, the path of the
+// best particle through them (full SLAM), the relations between them, and the pose of every scan relative to
+// the last keyframe before it.
+struct MapperSnapshot {
+  std::vector<Keyframe> keyframes;
+  std::vector<Pose2> online_path;  // T_map_robot per keyframe with which it was drawn into the grid.
+  std::vector<Pose2> full_path;    // T_map_robot per keyframe along the best particle's ancestry.
+  // Steps, revisits and loops; empty if the filter uses none of them, or if no place was seen again.
+  std::vector<PoseRelation> relations;
+  PoseGraphOptions pose_graph;
+  struct ScanPlace {
+    Stamp stamp = 0;
+    std::size_t keyframe = 0;  // Index of the last keyframe at or before the scan.
+    Pose2 T_keyframe_robot;
+  };
+  std::vector<ScanPlace> scans;
+
+  // Converts a path with one pose per keyframe to a trajectory with one pose per scan.
+  [[nodiscard]] Trajectory TrajectoryAlong(std::span<const Pose2> path) const;
+  [[nodiscard]] Trajectory FullTrajectory() const { return TrajectoryAlong(full_path); }
+};
+
+}  // namespace cairn::slam

@@ -1,0 +1,88 @@
+// A sequence that copies share until one of them changes it. Copying takes O(1) time; reading, changing and
+// appending take O(log16 n). A change clones only those nodes on the way to the element that another copy
+// also holds. This allows 200 particles to carry 200 maps and 200 paths at the cost of their differences.
+// Not thread-safe. Copies may be used from different threads if each copy stays with one thread and no
+// sequence is changed while it is being copied. (A node's use count is relied on only when it shows a single
+// owner.)
+// Source: the shared landmark trees of Montemerlo's FastSLAM (2002, 3.4), as a radix-16 trie.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <utility>
+#include <vector>
+
+namespace cairn::slam {
+
+template <typename Value>
+class SharedSequence {
+ public:
+  [[nodiscard]] std::size_t size() const { return size_; }
+  [[nodiscard]] bool empty() const { return size_ == 0; }
+
+  // REQUIRES: index < size().
+  [[nodiscard]] const Value& operator[](std::size_t index) const {
+    const void* node = root_.get();
+    for (int shift = shift_; shift > 0; shift -= kBits)
+      node = static_cast<const Branch*>(node)->children[Slot(index, shift)].get();
+    return static_cast<const Leaf*>(node)->values[Slot(index, 0)];
+  }
+
+  // A reference for writing. Afterwards only this sequence holds the element's node. REQUIRES: index <
+  // size().
+  [[nodiscard]] Value& Mutable(std::size_t index) {
+    std::shared_ptr<void>* link = &root_;
+    for (int shift = shift_; shift > 0; shift -= kBits) link = &Own<Branch>(*link).children[Slot(index, shift)];
+    return Own<Leaf>(*link).values[Slot(index, 0)];
+  }
+
+  // A copy of all values in order.
+  [[nodiscard]] std::vector<Value> values() const {
+    std::vector<Value> values;
+    values.reserve(size_);
+    for (std::size_t i = 0; i < size_; ++i) values.push_back((*this)[i]);
+    return values;
+  }
+
+  void Append(Value value) {
+    if (!root_) root_ = std::make_shared<Leaf>();
+    if (size_ == (std::size_t{kWidth} << shift_)) {  // The tree is full and gets one more level.
+      auto level = std::make_shared<Branch>();
+      level->children[0] = std::move(root_);
+      root_ = std::move(level);
+      shift_ += kBits;
+    }
+    const std::size_t index = size_++;
+    std::shared_ptr<void>* link = &root_;
+    for (int shift = shift_; shift > 0; shift -= kBits) {
+      link = &Own<Branch>(*link).children[Slot(index, shift)];
+      if (!*link) *link = shift == kBits ? std::shared_ptr<void>(std::make_shared<Leaf>()) : std::make_shared<Branch>();
+    }
+    Own<Leaf>(*link).values[Slot(index, 0)] = std::move(value);
+  }
+
+ private:
+  static constexpr int kBits = 4;
+  static constexpr int kWidth = 1 << kBits;
+  struct Leaf {
+    std::array<Value, kWidth> values{};
+  };
+  struct Branch {
+    std::array<std::shared_ptr<void>, kWidth> children{};
+  };
+
+  static std::size_t Slot(std::size_t index, int shift) { return (index >> shift) & (kWidth - 1); }
+
+  template <typename Node>
+  static Node& Own(std::shared_ptr<void>& link) {
+    if (link.use_count() > 1) link = std::make_shared<Node>(*static_cast<const Node*>(link.get()));
+    return *static_cast<Node*>(link.get());
+  }
+
+  std::shared_ptr<void> root_;
+  std::size_t size_ = 0;
+  int shift_ = 0;  // Number of index bits below the root's slot.
+};
+
+}  // namespace cairn::slam

@@ -1,0 +1,65 @@
+// The keyframes along the way of one robot: the keyframes themselves, their shapes, the relations between
+// them (KeyframeGraph), the distances along these relations, and the place of every scan between them. It is
+// the only owner of all this; searches and checks read it. It does not contain the poses of the keyframes in
+// the map: these are the filter's path. Not thread-safe.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "server/slam/graph/keyframe_graph.h"
+#include "server/slam/trail/keyframe.h"
+
+namespace cairn::slam {
+
+class Trail {
+ public:
+  // `drift` gives the covariance of a matched step.
+  explicit Trail(const MotionNoise& drift) : graph_(drift) {}
+
+  // Appends the next keyframe. `step_covariance` is the covariance of the step to it, in the frame in which
+  // the step starts, in addition to the drift; it is ignored for the first keyframe. `revisit` is an old
+  // keyframe that was seen again from this one.
+  void Append(Keyframe keyframe, const Pose2& T_track_robot, std::vector<SurfacePoint> points_robot,
+              const Eigen::Matrix3d& step_covariance, const std::optional<RevisitObservation>& revisit);
+  // Says whether the last keyframe may be drawn (Keyframe::localized), and if not, whether its place along the path is
+  // known all the same (Keyframe::doubted). REQUIRES: not empty.
+  void JudgeLast(bool localized, bool on_the_path);
+  // The path has been corrected: doubted keyframes count as localized.
+  void TrustDoubted();
+  // The keyframes as they would be after TrustDoubted.
+  [[nodiscard]] std::vector<Keyframe> TrustedKeyframes() const;
+  // Appends a scan with its pose relative to the last keyframe. REQUIRES: not empty.
+  void AddScan(Stamp stamp, const Pose2& T_keyframe_robot);
+  // Adds a large loop that was used to correct the path.
+  void AddLoop(const PoseRelation& loop);
+  // The path that fits all relations and `loop` best; the search starts at `path` (one pose per keyframe).
+  // Nothing if the result is not usable. The loop is not added to the relations.
+  [[nodiscard]] std::optional<std::vector<Pose2>> PathWithLoop(const PoseRelation& loop, std::vector<Pose2> path,
+                                                               const PoseGraphOptions& options) const;
+
+  [[nodiscard]] bool empty() const { return keyframes_.empty(); }
+  [[nodiscard]] std::size_t size() const { return keyframes_.size(); }
+  // A pose in the front-end's frame relative to the last keyframe; the identity before the first keyframe.
+  [[nodiscard]] Pose2 FromLast(const Pose2& T_track_robot) const;
+  // The distance that the robot has travelled when it is at this pose in the front-end's frame.
+  [[nodiscard]] double TravelledTo(const Pose2& T_track_robot) const;
+
+  [[nodiscard]] const std::vector<Keyframe>& keyframes() const { return keyframes_; }
+  [[nodiscard]] std::span<const KeyframeShape> shapes() const { return shapes_; }
+  // Per keyframe: length of the shortest path along the relations from the last keyframe, in metres.
+  [[nodiscard]] std::span<const double> distances_m() const { return distances_m_; }
+  [[nodiscard]] const std::vector<MapperSnapshot::ScanPlace>& scans() const { return scans_; }
+  // Steps, revisits and loops; empty as long as no place was seen again.
+  [[nodiscard]] std::vector<PoseRelation> relations() const;
+
+ private:
+  std::vector<Keyframe> keyframes_;
+  std::vector<KeyframeShape> shapes_;  // One per keyframe.
+  KeyframeGraph graph_;
+  std::vector<double> distances_m_;
+  std::vector<MapperSnapshot::ScanPlace> scans_;
+};
+
+}  // namespace cairn::slam

@@ -1,0 +1,35 @@
+// `cairn-calibrate odometry`: UMBmark over a file of runs, or over simulated runs with known errors.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "common/status.h"
+#include "server/slam/calibration/square_run.h"
+#include "server/slam/calibration/umbmark.h"
+
+namespace cairn::server {
+
+struct OdometryRunOptions {
+  std::filesystem::path runs;
+  bool simulate = false;   // Use simulated runs in place of a file.
+  int simulated_runs = 5;  // Runs in each direction. If bumps are simulated, as many again over bumps.
+  std::uint64_t seed = 1;
+  slam::SquareRunOptions run;
+  slam::UmbmarkOptions square;
+};
+
+struct OdometryReport {
+  slam::UmbmarkOptions square;
+  slam::UmbmarkResult result;
+  std::optional<double> non_systematic_rad;   // (3.11); set if there are runs over bumps.
+  std::optional<slam::WheelErrors> injected;  // The true errors of a simulation.
+};
+
+[[nodiscard]] Result<OdometryReport> RunOdometry(const OdometryRunOptions& options);
+[[nodiscard]] std::string ReportText(const OdometryReport& report);
+[[nodiscard]] std::string ReportJson(const OdometryReport& report);
+
+}  // namespace cairn::server

@@ -1,0 +1,174 @@
+#include "server/tools/offline/run.h"
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <iomanip>
+#include <numeric>
+#include <sstream>
+
+#include "common/map/map_lines.h"
+#include "server/slam/grid/grid_image.h"
+#include "server/slam/localisation/keyframe_lines.h"
+#include "server/slam/scan_pipeline.h"
+#include "server/slam/smoothing/smoothed_map.h"
+#include "server/tools/log_run/json_line.h"
+#include "server/tools/log_run/over_threads.h"
+
+namespace cairn::server {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+double Percentile(std::vector<double> values, double share) {
+  if (values.empty()) return 0.0;
+  const auto rank = static_cast<std::size_t>(std::ceil(share * static_cast<double>(values.size())));
+  const auto nth = values.begin() + static_cast<std::ptrdiff_t>(std::clamp<std::size_t>(rank, 1, values.size()) - 1);
+  std::nth_element(values.begin(), nth, values.end());
+  return *nth;
+}
+
+double Mean(const std::vector<double>& values) {
+  return values.empty() ? 0.0 : std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+
+std::uint64_t Total(const std::array<std::uint64_t, kDropReasonCount>& dropped) {
+  return std::accumulate(dropped.begin(), dropped.end(), std::uint64_t{0});
+}
+
+void AddUsage(OfflineReport& report) {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  const auto seconds = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + static_cast<double>(t.tv_usec) * 1e-6;
+  };
+  report.cpu_s = seconds(usage.ru_utime) + seconds(usage.ru_stime);
+  report.peak_rss_mib = static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+Result<void> WriteMap(const slam::OccupancyGrid& grid, const std::filesystem::path& path) {
+  return SaveMapYaml(slam::ImageOf(grid), path, ".png", MapSaveOptions{});
+}
+
+Result<void> WriteResults(const OfflineOptions& options, const Trajectory& online, const slam::Mapper& mapper) {
+  if (!options.trajectory.empty())
+    if (auto written = WriteTum(online, options.trajectory); !written) return written;
+  if (!options.map.empty())
+    if (auto written = WriteMap(mapper.grid(), options.map); !written) return written;
+  if (!options.smooth && options.map_lines.empty()) return {};
+  const slam::MapperSnapshot snapshot = mapper.Snapshot();
+  const auto write_lines = [&](const std::vector<Pose2>& path) {
+    return options.map_lines.empty() ? Result<void>{}
+                                     : WriteMapLines(LinesOfKeyframes(snapshot.keyframes, path), options.map_lines);
+  };
+  if (!options.smooth) return write_lines(snapshot.full_path);
+  const auto smoothed = slam::SmoothMap(snapshot, options.slam.grid, [] { return true; });
+  if (auto written = write_lines(smoothed->path); !written) return written;
+  if (!options.smoothed_trajectory.empty()) {
+    auto written = WriteTum(snapshot.TrajectoryAlong(smoothed->path), options.smoothed_trajectory);
+    if (!written) return written;
+  }
+  return options.smoothed_map.empty() ? Result<void>{} : WriteMap(smoothed->grid, options.smoothed_map);
+}
+
+}  // namespace
+
+Result<OfflineReport> RunOffline(const OfflineOptions& options) {
+  const Clock::time_point start = Clock::now();
+  OfflineReport report;
+  Trajectory online;
+  Clock::time_point before;
+  slam::ScanPipeline pipeline(
+      options.slam, options.T_map_robot_start, OverThreads(options.threads),
+      {[&](const Scan&, const slam::ScanOutcome& outcome) {
+         report.scan_ms.push_back(SecondsSince(before) * 1e3);
+         before = Clock::now();
+         ++report.scans_used;
+         report.keyframes += outcome.keyframe ? 1 : 0;
+         report.not_localized += outcome.localized ? 0 : 1;
+         online.push_back({outcome.stamp, outcome.T_map_robot});
+       },
+       [&](const Scan&, DropReason reason) { ++report.dropped[static_cast<std::size_t>(reason)]; }});
+
+  const auto add = [&](LogRecord&& record) {
+    before = Clock::now();
+    if (const auto* odometry = std::get_if<Odometry>(&record)) {
+      if (ValidateOdometry(*odometry)) {
+        pipeline.Add(*odometry);
+      } else {
+        ++report.odometry_dropped;
+      }
+      return true;
+    }
+    auto scan = std::make_shared<const Scan>(std::move(std::get<Scan>(record)));
+    if (const auto valid = ValidateScan(*scan); !valid) {
+      ++report.dropped[static_cast<std::size_t>(DropReasonOf(valid.error().fault))];
+    } else {
+      pipeline.Add(std::move(scan));
+    }
+    return true;
+  };
+  auto summary = ReadLog(options.log, options.reader, add);
+  if (!summary) return tl::unexpected<Status>(summary.error());
+  report.log = *std::move(summary);
+  before = Clock::now();
+  pipeline.Finish();
+  report.odometry_dropped += pipeline.odometry_refused();
+  pipeline.mapper().FinishMap();
+  report.landmarks = pipeline.mapper().landmarks().size();
+  if (auto written = WriteResults(options, online, pipeline.mapper()); !written)
+    return tl::unexpected<Status>(written.error());
+  report.wall_s = SecondsSince(start);
+  AddUsage(report);
+  return report;
+}
+
+std::string ReportText(const OfflineReport& report) {
+  std::ostringstream out;
+  out << std::fixed << std::setprecision(2);
+  out << "scans      " << report.scans_used << " used (" << report.keyframes << " keyframes, " << report.not_localized
+      << " not localized), " << Total(report.dropped) << " dropped\n";
+  for (std::size_t i = 0; i < report.dropped.size(); ++i)
+    if (report.dropped[i] > 0)
+      out << "           " << report.dropped[i] << ' ' << DropReasonName(static_cast<DropReason>(i)) << '\n';
+  if (report.odometry_dropped > 0) out << "odometry   " << report.odometry_dropped << " samples dropped\n";
+  if (report.log.complaint_count > 0) {
+    out << "log        " << report.log.complaint_count << " lines could not be read\n";
+    for (const LogComplaint& complaint : report.log.complaints)
+      out << "           line " << complaint.line << ": " << complaint.reason << '\n';
+  }
+  out << "time       " << Mean(report.scan_ms) << " ms a scan, median " << Percentile(report.scan_ms, 0.5) << ", p99 "
+      << Percentile(report.scan_ms, 0.99) << ", max " << Percentile(report.scan_ms, 1.0) << '\n';
+  out << "           " << report.wall_s << " s in all, " << report.cpu_s << " s of processor time\n";
+  out << "landmarks  " << report.landmarks << '\n';
+  out << "memory     " << report.peak_rss_mib << " MiB at the most\n";
+  return out.str();
+}
+
+std::string ReportJson(const OfflineReport& report) {
+  Json dropped = Json::object();
+  for (std::size_t i = 0; i < report.dropped.size(); ++i)
+    if (report.dropped[i] > 0) dropped[std::string(DropReasonName(static_cast<DropReason>(i)))] = report.dropped[i];
+  return JsonLine({{"time_ms_mean", Mean(report.scan_ms)},
+                   {"time_ms_p50", Percentile(report.scan_ms, 0.5)},
+                   {"time_ms_p99", Percentile(report.scan_ms, 0.99)},
+                   {"time_ms_max", Percentile(report.scan_ms, 1.0)},
+                   {"cpu_s", report.cpu_s},
+                   {"wall_s", report.wall_s},
+                   {"scans_used", report.scans_used},
+                   {"scans_dropped", Total(report.dropped)},
+                   {"landmarks", report.landmarks},
+                   {"peak_rss_mib", report.peak_rss_mib},
+                   {"keyframes", report.keyframes},
+                   {"not_localized", report.not_localized},
+                   {"dropped", std::move(dropped)},
+                   {"log_complaints", report.log.complaint_count}});
+}
+
+}  // namespace cairn::server

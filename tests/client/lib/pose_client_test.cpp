@@ -1,0 +1,67 @@
+#include "client/lib/pose_client.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/loopback.h"
+
+namespace cairn::client {
+namespace {
+
+using namespace test;
+
+class PoseClientTest : public ::testing::Test {
+ protected:
+  // Publishes a pose of the robot, as the server does, as soon as somebody listens.
+  void Publish(const std::string& robot, std::uint64_t scan) {
+    PoseReport pose;
+    pose.robot = robot;
+    pose.robot_id = HashName(robot);
+    pose.scan_sequence = scan;
+    Must(poses_->Publish(pose));
+  }
+
+  const std::unique_ptr<wire::Bus> server_ = MakeBus("server");
+  const std::unique_ptr<wire::Bus> bus_ = MakeBus("client");
+  const std::unique_ptr<wire::Publication<PoseReport>> poses_ = Must(server_->Advertise<PoseReport>());
+  const std::unique_ptr<PoseClient> client_ = Must(PoseClient::Create(*bus_, "r1"));
+};
+
+TEST_F(PoseClientTest, HearsThePosesOfItsRobotInOrder) {
+  // Poses that are published before the two have found each other are lost.
+  std::optional<PoseReport> first;
+  std::uint64_t scan = 0;
+  while (!first && scan < 1000) {
+    Publish("r2", 5000);
+    Publish("r1", ++scan);
+    first = client_->Next(0.02);
+  }
+  ASSERT_TRUE(first);
+  Publish("r2", 5000);
+  const std::uint64_t last = ++scan;
+  Publish("r1", last);
+  std::uint64_t before = first->scan_sequence;
+  while (before < last) {
+    const auto pose = client_->Next(20.0);
+    ASSERT_TRUE(pose);
+    EXPECT_EQ(pose->robot, "r1");
+    EXPECT_GT(pose->scan_sequence, before);
+    before = pose->scan_sequence;
+  }
+  EXPECT_EQ(before, last);
+  EXPECT_FALSE(client_->Next(0.0));
+  EXPECT_EQ(client_->dropped(), 0U);
+}
+
+TEST_F(PoseClientTest, ASlowReaderLosesTheOldestPoses) {
+  ASSERT_TRUE(Eventually([&] { return poses_->matched() > 0; }));
+  std::uint64_t published = 0;
+  while (client_->dropped() == 0 && published < 50 * PoseClient::kMaxWaiting) Publish("r1", ++published);
+  EXPECT_GT(client_->dropped(), 0U);
+  EXPECT_GT(published, PoseClient::kMaxWaiting);
+  const auto pose = client_->Next(0.0);
+  ASSERT_TRUE(pose);
+  EXPECT_GT(pose->scan_sequence, 1U);
+}
+
+}  // namespace
+}  // namespace cairn::client

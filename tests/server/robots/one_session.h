@@ -1,0 +1,134 @@
+// One session on a thread pool of its own. Everything it sends is kept; `on_send` may look at a value first, refuse it,
+// throw, or hold the sender up. Waits are on conditions with deadlines.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <functional>
+#include <future>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/mutex.h"
+#include "server/robots/session.h"
+#include "tests/server/support/room_world.h"
+
+namespace cairn::server::testing {
+
+inline constexpr ClientId kOwner = 7;
+
+inline SessionRequest RequestOf(const std::string& robot, ClientId client = kOwner) {
+  return {.robot = robot,
+          .site = "lab",
+          .sensors = {"laser"},
+          .client = client,
+          .has_start = false,
+          .T_map_robot_start = {},
+          .end = false};
+}
+
+inline ScanArrival ScanOf(const std::string& robot, Scan scan, ClientId client = kOwner) {
+  return {.stream = {HashName(robot), HashName("laser"), client},
+          .scan = std::make_shared<const Scan>(std::move(scan)),
+          .refused = std::nullopt,
+          .received = std::chrono::steady_clock::now()};
+}
+
+inline OdometryArrival OdometryOf(const std::string& robot, const Odometry& odometry, ClientId client = kOwner) {
+  return {.stream = {HashName(robot), HashName("odometry"), client}, .odometry = odometry, .refused = false};
+}
+
+inline std::uint64_t Dropped(const Ledger& ledger, DropReason reason) {
+  return ledger.dropped[static_cast<std::size_t>(reason)];
+}
+
+// What was sent, in order, and the means to wait for more.
+class Sent {
+ public:
+  bool Keep(OutboundValue&& value) {
+    const MutexLock lock(mutex_);
+    values_.push_back(std::move(value));
+    came_.NotifyAll();
+    return true;
+  }
+  template <typename Value>
+  std::vector<Value> All() const {
+    const MutexLock lock(mutex_);
+    std::vector<Value> all;
+    for (const OutboundValue& value : values_) {
+      if (const Value* const one = std::get_if<Value>(&value)) all.push_back(*one);
+    }
+    return all;
+  }
+  bool WaitFor(const std::function<bool()>& condition) const {
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (!condition()) {
+      const MutexLock lock(mutex_);
+      if (std::chrono::steady_clock::now() > deadline) return false;
+      came_.WaitFor(mutex_, std::chrono::milliseconds(5));
+    }
+    return true;
+  }
+
+ private:
+  mutable Mutex mutex_;
+  mutable CondVar came_;
+  std::vector<OutboundValue> values_ CAIRN_GUARDED_BY(mutex_);
+};
+
+class OneSession {
+ public:
+  explicit OneSession(const RobotsOptions& options = {}, const std::string& robot = "r1") : robot_(robot) {
+    EstimatorSetup estimator;
+    estimator.mapper.filter.particles = 20;
+    session_ = std::make_shared<Session>(
+        SessionSetup{.id = 1, .request = RequestOf(robot), .map_epoch = 3, .estimator = estimator}, options, pool_,
+        SessionOutputs{.send =
+                           [this](OutboundValue value) {
+                             const bool taken = !on_send || on_send(value);
+                             return taken && sent_.Keep(std::move(value));
+                           },
+                       .grid_changed = [](GridChange&&) {}});
+    EXPECT_TRUE(session_->record().AddSensors({"laser"}));
+  }
+  ~OneSession() { pool_.join(); }
+
+  // Steps [first, last) of the room world.
+  void Drive(int first, int last) {
+    for (int step = first; step < last; ++step) {
+      session_->Take(OdometryOf(robot_, RoomOdometry(step)));
+      EXPECT_TRUE(session_->Take(ScanOf(robot_, RoomScan(step))));
+    }
+  }
+  // Occupies the session's strand until the promise is kept.
+  [[nodiscard]] std::shared_ptr<std::promise<void>> HoldStrand() {
+    auto release = std::make_shared<std::promise<void>>();
+    EXPECT_TRUE(
+        session_->Post(SnapshotWanted{[release, held = std::make_shared<std::future<void>>(release->get_future())](
+                                          SessionMaterial&&) { held->wait(); }}));
+    return release;
+  }
+  [[nodiscard]] Ledger ledger() const { return session_->record().snapshot().status.ledgers.at(0); }
+  [[nodiscard]] SessionPhase phase() const { return session_->record().phase(); }
+  [[nodiscard]] bool WaitPhase(SessionPhase wanted) const {
+    return sent_.WaitFor([&] { return phase() == wanted; });
+  }
+  [[nodiscard]] bool WaitSettled(std::uint64_t sequence) const {
+    return sent_.WaitFor([&] { return ledger().settled_through >= sequence; });
+  }
+
+  Session& session() { return *session_; }
+  const Sent& sent() const { return sent_; }
+  std::function<bool(const OutboundValue&)> on_send;  // Set before anything arrives.
+
+ private:
+  const std::string robot_;
+  asio::thread_pool pool_{2};
+  Sent sent_;
+  std::shared_ptr<Session> session_;
+};
+
+}  // namespace cairn::server::testing

@@ -1,0 +1,175 @@
+#include "server/robots/session_estimator.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/server/robots/one_session.h"
+
+namespace cairn::server {
+namespace {
+
+using testing::Dropped;
+using testing::kOwner;
+using testing::OdometryOf;
+using testing::RequestOf;
+using testing::RoomOdometry;
+using testing::RoomScan;
+using testing::ScanOf;
+
+class SessionEstimatorTest : public ::testing::Test {
+ protected:
+  SessionEstimatorTest() { EXPECT_TRUE(record_.AddSensors({"laser"})); }
+
+  static EstimatorSetup FewParticles() {
+    EstimatorSetup setup;
+    setup.mapper.filter.particles = 20;
+    return setup;
+  }
+  void HandleScan(Scan scan, ClientId client = kOwner) {
+    record_.ScanReceived(HashName("laser"), scan.sequence);
+    estimator_.Handle(ScanOf("r1", std::move(scan), client));
+  }
+  void Drive(int first, int last) {
+    for (int step = first; step < last; ++step) {
+      estimator_.Handle(OdometryOf("r1", RoomOdometry(step)));
+      HandleScan(RoomScan(step));
+    }
+  }
+  SessionMaterial Snapshot() {
+    SessionMaterial taken;
+    estimator_.Handle(SnapshotWanted{[&taken](SessionMaterial&& material) { taken = std::move(material); }});
+    return taken;
+  }
+  Ledger ledger() const { return record_.snapshot().status.ledgers.at(0); }
+
+  std::vector<PoseReport> poses_;
+  std::vector<GridChange> changes_;
+  SessionRecord record_{4, RequestOf("r1"), RobotsOptions{}};
+  SessionEstimator estimator_{FewParticles(),
+                              record_,
+                              {.send =
+                                   [this](OutboundValue value) {
+                                     poses_.push_back(std::get<PoseReport>(std::move(value)));
+                                     return true;
+                                   },
+                               .grid_changed = [this](GridChange&& change) { changes_.push_back(std::move(change)); }}};
+};
+
+TEST_F(SessionEstimatorTest, EveryKeyframeChangesTheMapAndEveryScanGivesAPose) {
+  Drive(0, 20);
+  EXPECT_EQ(poses_.size(), 20U);
+  EXPECT_EQ(ledger().used, 20U);
+  EXPECT_EQ(changes_.size(), ledger().keyframes);
+  EXPECT_GT(changes_.size(), 1U);
+  for (const GridChange& change : changes_) EXPECT_EQ(change.session, 4U);
+}
+
+TEST_F(SessionEstimatorTest, TheLandmarksAreThoseOfTheEndWhateverTheirPeriod) {
+  Drive(0, 80);
+  estimator_.Handle(Finish{.final = false, .done = {}});
+  ASSERT_FALSE(record_.snapshot().landmarks->empty());
+  EXPECT_EQ(record_.snapshot().landmarks->front().robot, "r1");
+}
+
+TEST_F(SessionEstimatorTest, ASnapshotNamesItsSessionAndHoldsWhatWasUsed) {
+  Drive(0, 20);
+  const SessionMaterial material = Snapshot();
+  EXPECT_EQ(material.session, 4U);
+  EXPECT_EQ(material.robot, "r1");
+  EXPECT_EQ(material.snapshot.keyframes.size(), ledger().keyframes);
+  EXPECT_EQ(material.snapshot.scans.size(), 20U);
+}
+
+TEST_F(SessionEstimatorTest, OdometryWithABadStampIsCounted) {
+  Drive(0, 3);
+  estimator_.Handle(OdometryOf("r1", RoomOdometry(1)));
+  EXPECT_EQ(ledger().odometry_dropped, 1U);
+}
+
+// The scan that waits for odometry when the session ends is used with the last there was; after it nothing is used.
+TEST_F(SessionEstimatorTest, TheEndSettlesWhatWaitsAndNothingIsUsedAfterIt) {
+  Drive(0, 5);
+  Scan late = RoomScan(5);
+  late.stamp -= testing::kScanPeriod / 2;
+  HandleScan(late);
+  EXPECT_EQ(ledger().waiting, 1U);
+  bool done = false;
+  estimator_.Handle(Finish{.final = true, .done = [&done] { done = true; }});
+  EXPECT_TRUE(done);
+  EXPECT_EQ(ledger().used, 6U);
+  HandleScan(RoomScan(7));
+  estimator_.Handle(OdometryOf("r1", RoomOdometry(7)));
+  EXPECT_EQ(Dropped(ledger(), DropReason::kSessionEnded), 1U);
+  EXPECT_EQ(ledger().odometry_dropped, 1U);
+  EXPECT_EQ(ledger().waiting, 0U);
+  EXPECT_EQ(Snapshot().snapshot.scans.size(), 6U);  // Its part of the map can still be smoothed.
+}
+
+TEST_F(SessionEstimatorTest, ASuspensionIsNoEnd) {
+  Drive(0, 5);
+  estimator_.Handle(Finish{.final = false, .done = {}});
+  Drive(5, 8);
+  EXPECT_EQ(ledger().used, 8U);
+}
+
+TEST_F(SessionEstimatorTest, ACorrectionReplacesTheGridAndTellsWhatItGaveUp) {
+  Drive(0, 10);
+  const std::size_t keyframes = ledger().keyframes;
+  RobotGrid smoothed;
+  smoothed.keyframes = keyframes;
+  smoothed.chunks.emplace(slam::ChunkKey{50, 50}, std::make_shared<const slam::GridChunk>());
+  std::optional<Adopted> adopted;
+  estimator_.Handle(
+      Correction{.epoch = 9, .grid = smoothed, .done = [&adopted](Adopted&& answer) { adopted = std::move(answer); }});
+  ASSERT_TRUE(adopted);
+  EXPECT_EQ(adopted->session, 4U);
+  EXPECT_EQ(adopted->displaced.keyframes, keyframes);
+  EXPECT_FALSE(adopted->displaced.chunks.contains({50, 50}));
+  // Every chunk of both: what only the old grid had is gone.
+  EXPECT_EQ(adopted->change.chunks.size(), adopted->displaced.chunks.size() + 1);
+  for (const auto& [key, chunk] : adopted->change.chunks) EXPECT_EQ(chunk != nullptr, key == (slam::ChunkKey{50, 50}));
+  EXPECT_EQ(record_.epoch(), 9U);
+  Drive(10, 11);
+  EXPECT_EQ(poses_.back().map_epoch, 9U);
+}
+
+// The clock of a robot was set back by an hour: it is heard again after a few scans, its poses carry its own stamps,
+// and the path goes on growing.
+TEST_F(SessionEstimatorTest, AClockThatIsSetBackCostsAFewScans) {
+  Drive(0, 10);
+  for (int step = 10; step < 40; ++step) {
+    Odometry odometry = RoomOdometry(step);
+    Scan scan = RoomScan(step);
+    odometry.stamp -= 3600 * kNanosPerSecond;
+    scan.stamp -= 3600 * kNanosPerSecond;
+    estimator_.Handle(OdometryOf("r1", odometry));
+    HandleScan(std::move(scan));
+  }
+  EXPECT_GE(ledger().used, 34U);
+  EXPECT_GE(Dropped(ledger(), DropReason::kStampWentBack), 1U);
+  EXPECT_EQ(ledger().received, 40U);
+  EXPECT_EQ(ledger().waiting, 0U);
+  EXPECT_EQ(poses_.back().stamp, RoomScan(39).stamp - 3600 * kNanosPerSecond);
+  EXPECT_EQ(record_.snapshot().path.size(), ledger().used);
+  EXPECT_LT(Between(testing::TruePose(39), poses_.back().T_map_robot).translation().norm(), 0.1);
+}
+
+TEST_F(SessionEstimatorTest, DiscardAnswersWithoutTheEstimator) {
+  Drive(0, 3);
+  record_.ScanReceived(HashName("laser"), 4);
+  estimator_.Discard(ScanOf("r1", RoomScan(3)));
+  estimator_.Discard(OdometryOf("r1", RoomOdometry(3)));
+  bool done = false;
+  estimator_.Discard(Finish{.final = true, .done = [&done] { done = true; }});
+  estimator_.Discard(Finish{});
+  EXPECT_TRUE(done);
+  SessionMaterial material;
+  estimator_.Discard(SnapshotWanted{[&material](SessionMaterial&& answer) { material = std::move(answer); }});
+  EXPECT_EQ(material.session, 4U);
+  EXPECT_TRUE(material.snapshot.keyframes.empty());
+  EXPECT_EQ(Dropped(ledger(), DropReason::kSessionEnded), 1U);
+  EXPECT_EQ(ledger().odometry_dropped, 1U);
+  EXPECT_EQ(ledger().used, 3U);
+}
+
+}  // namespace
+}  // namespace cairn::server

@@ -1,0 +1,160 @@
+#include "server/robots/session_record.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/server/robots/one_session.h"
+
+namespace cairn::server {
+namespace {
+
+using std::chrono::milliseconds;
+using testing::Dropped;
+using testing::kOwner;
+using testing::RequestOf;
+using Urgency = SessionRecord::Urgency;
+
+const NameId kLaser = HashName("laser");
+
+class SessionRecordTest : public ::testing::Test {
+ protected:
+  SessionRecordTest() {
+    EXPECT_TRUE(record_.AddSensors({"laser"}));
+    Take(0, Urgency::kNow);  // The first word of a stream is due at once.
+  }
+  std::vector<Ledger> Take(int at_ms, Urgency urgency = Urgency::kWhenDue) {
+    return record_.TakeDueLedgers(start_ + milliseconds(at_ms), urgency);
+  }
+  void Receive(std::uint64_t sequence) {
+    EXPECT_EQ(record_.ScanReceived(kLaser, sequence), SessionRecord::Arrival::kNew);
+  }
+  void Settle(std::uint64_t sequence) { record_.ScanDropped(kLaser, sequence, DropReason::kEmpty); }
+  Ledger ledger() const { return record_.snapshot().status.ledgers.at(0); }
+
+  const SessionRecord::Clock::time_point start_ = SessionRecord::Clock::now();
+  SessionRecord record_{1, RequestOf("r1"), RobotsOptions{}};  // Ledgers at 10 Hz.
+};
+
+TEST_F(SessionRecordTest, ALedgerIsDueAtTheRateAndOnlyWhereSomethingChanged) {
+  EXPECT_TRUE(Take(500).empty());
+  Receive(1);
+  EXPECT_TRUE(Take(50).empty());
+  ASSERT_EQ(Take(100).size(), 1U);
+  EXPECT_TRUE(Take(300).empty());
+}
+
+TEST_F(SessionRecordTest, ABurstOfSettledScansIsDueAtOnce) {
+  for (std::uint64_t n = 1; n <= SessionRecord::kSettledBurst; ++n) {
+    EXPECT_TRUE(Take(1).empty());
+    Receive(n);
+    Settle(n);
+  }
+  const auto due = Take(1);
+  ASSERT_EQ(due.size(), 1U);
+  EXPECT_EQ(due[0].settled_through, SessionRecord::kSettledBurst);
+  EXPECT_EQ(due[0].sensor, "laser");
+  EXPECT_EQ(due[0].site, "lab");
+}
+
+// A client that replays a log waits for the ledger before it sends more; the end of a burst must not wait for the
+// clock.
+TEST_F(SessionRecordTest, ADrainedQueueIsDueAtOnceWhereAScanWasSettled) {
+  Receive(1);
+  EXPECT_TRUE(Take(1, Urgency::kDrained).empty());
+  Settle(1);
+  EXPECT_EQ(Take(1, Urgency::kDrained).size(), 1U);
+  EXPECT_TRUE(Take(1, Urgency::kDrained).empty());
+  EXPECT_EQ(Take(1, Urgency::kNow).size(), 1U);
+}
+
+TEST_F(SessionRecordTest, ALedgerThatCouldNotBeSentIsDueAgain) {
+  Receive(1);
+  ASSERT_EQ(Take(200).size(), 1U);
+  record_.MarkUnsent(kLaser);
+  record_.MarkUnsent(HashName("sonar"));  // Nobody's stream: no matter.
+  EXPECT_EQ(Take(400).size(), 1U);
+}
+
+TEST_F(SessionRecordTest, CountsWhatBecameOfScansAndOdometry) {
+  Receive(1);
+  Receive(2);
+  EXPECT_EQ(record_.ScanReceived(kLaser, 2), SessionRecord::Arrival::kDuplicate);
+  EXPECT_EQ(record_.ScanReceived(HashName("sonar"), 1), SessionRecord::Arrival::kUnknownSensor);
+  EXPECT_EQ(record_.ForeignScan(HashName("sonar"), DropReason::kNotOwner), SessionRecord::Arrival::kUnknownSensor);
+  EXPECT_EQ(record_.ForeignScan(kLaser, DropReason::kNotOwner), SessionRecord::Arrival::kNew);
+  PoseReport pose;
+  pose.stamp = 10;
+  pose.scan_sequence = 1;
+  pose.score = 0.75;
+  record_.ScanUsed(kLaser, pose, 1010, true, 2.5);
+  Settle(2);
+  for (int i = 0; i < 3; ++i) record_.OdometryReceived();
+  for (int i = 0; i < 2; ++i) record_.OdometryDropped();
+  record_.OdometryMerged();
+  const Ledger counted = ledger();
+  EXPECT_EQ(counted.received, 3U);
+  EXPECT_EQ(counted.used, 1U);
+  EXPECT_EQ(counted.keyframes, 1U);
+  EXPECT_EQ(counted.waiting, 0U);
+  EXPECT_EQ(counted.last_stamp, 10);
+  EXPECT_EQ(counted.latency_p50_ms, 2.5);
+  EXPECT_EQ(Dropped(counted, DropReason::kNotOwner), 1U);
+  EXPECT_EQ(Dropped(counted, DropReason::kEmpty), 1U);
+  EXPECT_EQ(counted.odometry_received, 3U);
+  EXPECT_EQ(counted.odometry_dropped, 2U);
+  EXPECT_EQ(counted.odometry_merged, 1U);
+  // The pose is shown by the robot's clock, the path kept by the estimator's.
+  EXPECT_EQ(record_.snapshot().status.pose.stamp, 10);
+  EXPECT_EQ(record_.snapshot().path.last_stamp(), 1010);
+  EXPECT_EQ(record_.snapshot().path.At(1010)->score, 0.75F);
+}
+
+TEST_F(SessionRecordTest, OnlyAnotherClientNumbersAnew) {
+  Receive(5);
+  record_.Resume(kOwner);
+  EXPECT_EQ(record_.ScanReceived(kLaser, 5), SessionRecord::Arrival::kDuplicate);
+  EXPECT_EQ(record_.owner(), kOwner);
+  record_.SetAlive(false);
+  record_.Resume(9);
+  EXPECT_EQ(record_.owner(), 9U);
+  EXPECT_TRUE(record_.alive());
+  Receive(1);
+  EXPECT_EQ(Dropped(ledger(), DropReason::kLostOnWire), 0U);
+}
+
+TEST_F(SessionRecordTest, SensorsAreBounded) {
+  std::vector<std::string> many;
+  for (std::size_t i = 1; i < SessionRecord::kMaxSensors; ++i) many.push_back("s" + std::to_string(i));
+  EXPECT_TRUE(record_.AddSensors(many));
+  EXPECT_TRUE(record_.AddSensors({"laser", "s3"}));  // Both there already.
+  EXPECT_FALSE(record_.AddSensors({"one_more"}));
+  EXPECT_EQ(record_.snapshot().status.ledgers.size(), SessionRecord::kMaxSensors);
+}
+
+TEST_F(SessionRecordTest, TheTimeAwayBeginsWithTheSuspension) {
+  const auto later = SessionRecord::Clock::now() + std::chrono::hours(1);
+  EXPECT_EQ(record_.SuspendedFor(later), SessionRecord::Clock::duration::zero());
+  EXPECT_TRUE(record_.SetPhase(SessionPhase::kSuspended, {StatusCode::kUnavailable, "away"}));
+  EXPECT_EQ(record_.state().status.message, "away");
+  const auto away = record_.SuspendedFor(later);
+  EXPECT_GT(away, std::chrono::minutes(59));
+  EXPECT_TRUE(record_.SetPhase(SessionPhase::kSuspended, {}));  // Said twice: the time goes on.
+  EXPECT_EQ(record_.SuspendedFor(later), away);
+  EXPECT_TRUE(record_.Resume(kOwner));
+  EXPECT_EQ(record_.SuspendedFor(later), SessionRecord::Clock::duration::zero());
+  EXPECT_EQ(record_.phase(), SessionPhase::kActive);
+  EXPECT_TRUE(record_.state().status.ok());
+}
+
+TEST_F(SessionRecordTest, AnInheritedAccountGoesOnUnderTheStreamsNames) {
+  StreamLedger before{Ledger{}};
+  EXPECT_TRUE(before.Received(3));
+  before.Dropped(3, DropReason::kNoSession);
+  record_.Inherit(kLaser, std::move(before));
+  EXPECT_EQ(record_.ScanReceived(kLaser, 3), SessionRecord::Arrival::kDuplicate);
+  EXPECT_EQ(ledger().robot, "r1");
+  EXPECT_EQ(ledger().sensor, "laser");
+  EXPECT_EQ(Dropped(ledger(), DropReason::kNoSession), 1U);
+}
+
+}  // namespace
+}  // namespace cairn::server

@@ -1,0 +1,189 @@
+#include "server/slam/fastslam/fastslam.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "server/slam/landmark_variants/landmark_oriented.h"
+#include "server/slam/landmark_variants/landmark_point.h"
+#include "server/slam/landmarks/landmark_pair.h"
+#include "server/slam/motion_models/motion_sampling.h"
+
+namespace cairn::slam {
+namespace {
+
+constexpr std::int64_t kParticles = 100;
+
+BackEndOptions Wide() {
+  BackEndOptions options;
+  options.drift = {0.0, 0.05, 0.0, 0.0, 0.02, 0.0};
+  options.landmarks.min_travel_m = 0.0;
+  return options;
+}
+
+// The noise of FastSLAM 1.0 that corresponds to Wide().
+MotionSampler Sampler() {
+  MotionSampling sampling;
+  sampling.alpha_v_v = 0.0025;
+  sampling.alpha_g_v = sampling.alpha_w_v = 0.0002;
+  sampling.alpha_g_w = sampling.alpha_w_w = 0.0;
+  return {.input = [](const StepMotion& step) { return step; },
+          .draw = [sampling](const Pose2& T_map_robot, const StepMotion& step,
+                             Rng& rng) { return SampleMotion(T_map_robot, step, sampling, rng); }};
+}
+
+template <typename Model>
+struct Make {
+  static FastSlam<Model> Filter(std::uint64_t seed, BackEndOptions options = Wide()) {
+    return {{}, options, kParticles, {}, seed, std::is_same_v<Model, LandmarkPoint> ? Sampler() : MotionSampler{}};
+  }
+};
+
+template <typename Model>
+class FastSlamVariants : public testing::Test {};
+using Models = testing::Types<LandmarkPair, LandmarkOriented, LandmarkPoint>;
+TYPED_TEST_SUITE(FastSlamVariants, Models);
+
+// Ten metres out, a turn, and ten metres back. The true end is the start, facing back.
+void DriveOutAndBack(Filter& filter) {
+  const auto step = [&](const Pose2& T_prev_curr) {
+    filter.Predict({T_prev_curr});
+    filter.Commit();
+  };
+  filter.Commit();
+  for (int i = 0; i < 20; ++i) step({0.5, 0, 0});
+  step({0, 0, kPi});
+  for (int i = 0; i < 20; ++i) step({0.5, 0, 0});
+}
+
+TYPED_TEST(FastSlamVariants, UncertaintyGrowsAlongThePathAndARevisitTakesItAway) {
+  auto filter = Make<TypeParam>::Filter(1);
+  DriveOutAndBack(filter);
+  const double before = filter.estimate().covariance.template topLeftCorner<2, 2>().trace();
+  const RevisitObservation revisit{0, {0, 0, kPi}, Eigen::Vector3d(0.0025, 0.0025, 0.0004).asDiagonal()};
+  for (int i = 0; i < 5; ++i) {
+    filter.Predict({{0, 0, 0}});
+    ASSERT_TRUE(filter.Observe(revisit));
+    filter.Commit();
+  }
+  EXPECT_LT((filter.estimate().covariance.template topLeftCorner<2, 2>().trace()), 0.3 * before);
+  EXPECT_LT(filter.estimate().T_map_robot.translation().norm(), 0.2);
+}
+
+TYPED_TEST(FastSlamVariants, ARevisitNoParticleExplainsChangesNothingAndManyMeanDiverged) {
+  auto filter = Make<TypeParam>::Filter(1);
+  DriveOutAndBack(filter);
+  const Pose2 before = filter.particles().best().T_map_robot;
+  for (int i = 0; i < 10; ++i) {
+    EXPECT_FALSE(filter.health().diverged);
+    EXPECT_FALSE(filter.Observe({0, {50, 0, 0}, Eigen::Matrix3d::Identity() * 1e-4}));
+  }
+  EXPECT_EQ(filter.particles().best().T_map_robot, before);
+  EXPECT_TRUE(filter.health().diverged);
+  EXPECT_TRUE(filter.Observe({0, Between({}, before), Eigen::Matrix3d::Identity() * 0.01}));
+  EXPECT_FALSE(filter.health().diverged) << "explained again";
+}
+
+// Two corners as the robot sees them from T_map_robot, exactly.
+std::vector<LandmarkSighting> TwoCorners(const Pose2& T_map_robot, std::size_t first_slot = 0) {
+  const Pose2 T_robot_map = T_map_robot.Inverse();
+  return {{first_slot, {true, 1.5}, T_robot_map * Eigen::Vector2d(2.0, 1.0), WrapAngle(0.3 - T_map_robot.theta)},
+          {first_slot + 1, {true, -1.5}, T_robot_map * Eigen::Vector2d(1.0, -2.0), WrapAngle(1.2 - T_map_robot.theta)}};
+}
+
+TYPED_TEST(FastSlamVariants, LandmarksSeenAgainPullTheRobotBack) {
+  auto filter = Make<TypeParam>::Filter(3);
+  filter.Observe(TwoCorners({}), 0.0);
+  filter.Commit();
+  ASSERT_EQ(filter.landmarks().size(), 2U);
+  // The motion is uncertain by half a metre forwards and back; the landmarks remove this spread.
+  double spread = 0.0;
+  for (int i = 1; i <= 8; ++i) {
+    for (const double step : {1.0, -1.0, 1.0, -1.0}) filter.Predict({{step, 0, 0}});
+    filter.Observe(std::vector<LandmarkSighting>{}, i);
+    filter.Commit();
+    if (i == 4) spread = filter.estimate().covariance.template topLeftCorner<2, 2>().trace();
+    if (i < 4) continue;
+    filter.Observe(TwoCorners({}), i);
+    filter.Commit();
+  }
+  EXPECT_LT((filter.estimate().covariance.template topLeftCorner<2, 2>().trace()), 0.7 * spread);
+  EXPECT_LT(filter.estimate().T_map_robot.translation().norm(), 0.15);
+  EXPECT_EQ(filter.landmarks().size(), 2U) << "seen again, not new";
+  EXPECT_GT(filter.landmarks()[0].sightings, 3U);
+}
+
+TYPED_TEST(FastSlamVariants, EveryParticleDecidesForItselfWhatItSees) {
+  // Particles spread over metres see a corner of another slot, and only some of them have a landmark there.
+  auto filter = Make<TypeParam>::Filter(5);
+  filter.Observe(TwoCorners({}), 0.0);
+  filter.Commit();
+  for (int i = 0; i < 40; ++i) {
+    filter.Predict({{i % 2 == 0 ? 2.0 : -2.0, 0, 0}});
+    filter.Commit();
+  }
+  filter.Observe(TwoCorners({0.5, 0, 0}, 2), 50.0);
+  std::size_t knew = 0, found_new = 0;
+  for (std::size_t i = 0; i < filter.particles().size(); ++i) {
+    knew += filter.LandmarkCount(i) == 2 ? 1 : 0;
+    found_new += filter.LandmarkCount(i) == 4 ? 1 : 0;
+  }
+  EXPECT_GT(knew, 10U);
+  EXPECT_GT(found_new, 10U);
+  filter.Commit();
+}
+
+TYPED_TEST(FastSlamVariants, ALandmarkInViewCountsOnce) {
+  BackEndOptions options = Wide();
+  options.landmarks.min_travel_m = 5.0;
+  auto filter = Make<TypeParam>::Filter(7, options);
+  for (const double travelled : {0.0, 1.0, 4.9, 5.1, 6.0}) {
+    filter.Observe(TwoCorners({}), travelled);
+    filter.Commit();
+  }
+  ASSERT_EQ(filter.landmarks().size(), 2U);
+  EXPECT_EQ(filter.landmarks()[0].sightings, 2U);
+}
+
+TYPED_TEST(FastSlamVariants, OneLandmarkIsNotTwoFeaturesOfOneScan) {
+  auto filter = Make<TypeParam>::Filter(9);
+  filter.Observe(TwoCorners({}), 0.0);
+  filter.Commit();
+  std::vector<LandmarkSighting> twice = TwoCorners({});
+  twice.push_back(twice[0]);
+  twice.back().slot = 2;
+  filter.Observe(twice, 10.0);
+  filter.Commit();
+  EXPECT_EQ(filter.landmarks()[0].sightings, 2U);
+  EXPECT_EQ(filter.landmarks().size(), 2U);
+}
+
+TYPED_TEST(FastSlamVariants, SameSeedSameParticles) {
+  auto a = Make<TypeParam>::Filter(42), b = Make<TypeParam>::Filter(42);
+  DriveOutAndBack(a);
+  DriveOutAndBack(b);
+  for (std::size_t i = 0; i < a.particles().size(); ++i)
+    ASSERT_EQ(a.particles()[i].T_map_robot, b.particles()[i].T_map_robot);
+}
+
+TYPED_TEST(FastSlamVariants, EveryParticleKeepsItsWholePath) {
+  auto filter = Make<TypeParam>::Filter(5);
+  DriveOutAndBack(filter);
+  for (const Particle& particle : filter.particles().particles()) {
+    ASSERT_EQ(particle.path.size(), 42U);
+    EXPECT_EQ(particle.path[0], Pose2{});
+  }
+}
+
+TYPED_TEST(FastSlamVariants, StandsAnEmptyScan) {
+  auto filter = Make<TypeParam>::Filter(5);
+  const Scan scan;
+  const ScanView view;
+  filter.Observe({scan, view, {}, 0.0}, SerialFor);
+  filter.Commit();
+  EXPECT_TRUE(filter.landmarks().empty());
+  EXPECT_EQ(filter.estimate().T_map_robot, Pose2{});
+}
+
+}  // namespace
+}  // namespace cairn::slam

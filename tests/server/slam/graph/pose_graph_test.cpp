@@ -1,0 +1,131 @@
+#include "server/slam/graph/pose_graph.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "tests/numerical_derivative.h"
+
+namespace cairn::slam {
+namespace {
+
+const Eigen::Matrix3d kStepCovariance = Eigen::Vector3d(1e-4, 1e-4, 1e-4).asDiagonal();
+const Eigen::Matrix3d kLoopCovariance = Eigen::Vector3d(1e-4, 1e-4, 1e-5).asDiagonal();
+
+// A square of 40 steps: the true steps, and the measured ones, which all turn too far by the same angle.
+struct Square {
+  std::vector<Pose2> truth, measured;
+  std::vector<PoseRelation> relations;
+
+  Square() {
+    Pose2 pose{1, 2, 0.5}, drifted = pose;
+    truth.push_back(pose), measured.push_back(pose);
+    for (std::size_t k = 0; k < 40; ++k) {
+      const Pose2 step{0.5, 0.0, k % 10 == 9 ? kPi / 2 : 0.0};
+      const Pose2 seen{0.5, 0.0, WrapAngle(step.theta + 0.01)};
+      pose = pose * step;
+      drifted = drifted * seen;
+      truth.push_back(pose), measured.push_back(drifted);
+      relations.push_back({k, k + 1, seen, kStepCovariance, false});
+    }
+  }
+  [[nodiscard]] double Error(const std::vector<Pose2>& path) const {
+    double worst = 0.0;
+    for (std::size_t k = 0; k < path.size(); ++k)
+      worst = std::max(worst, (path[k].translation() - truth[k].translation()).norm());
+    return worst;
+  }
+};
+
+TEST(PoseGraph, JacobiansAreTheDerivatives) {
+  std::mt19937_64 rng(5);
+  std::uniform_real_distribution<double> any(-2.0, 2.0);
+  for (int run = 0; run < 20; ++run) {
+    const PoseRelation relation{0, 1, {any(rng), any(rng), any(rng)}, kStepCovariance, false};
+    const Eigen::Vector3d a(any(rng), any(rng), any(rng));
+    // Near the relation, so that the error's angle does not wrap.
+    const Pose2 T_map_from{a.x(), a.y(), a.z()};
+    const Eigen::Vector3d b = (T_map_from * relation.T_from_to * Pose2{0.3, -0.2, 0.1}).vector();
+    const auto error = [&](const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+      return ErrorOf(relation, {from.x(), from.y(), from.z()}, {to.x(), to.y(), to.z()}).error;
+    };
+    const PoseRelationError at = ErrorOf(relation, T_map_from, {b.x(), b.y(), b.z()});
+    EXPECT_LT((at.J_error_from - NumericalDerivative<3, 3>([&](const auto& x) { return error(x, b); }, a)).norm(),
+              1e-6);
+    EXPECT_LT((at.J_error_to - NumericalDerivative<3, 3>([&](const auto& x) { return error(a, x); }, b)).norm(), 1e-6);
+  }
+}
+
+// Cancelling a job or stopping the server used to wait for the whole fit, which takes minutes on a long path.
+TEST(PoseGraph, EndsBetweenTwoIterationsWhereItIsToldTo) {
+  Square square;
+  square.relations.push_back({0, 40, Between(square.truth[0], square.truth[40]), kStepCovariance, true});
+  std::vector<Pose2> path = square.measured;
+  int asked = 0;
+  const auto told = OptimisePoses(path, square.relations, {}, [&asked] { return ++asked < 3; });
+  EXPECT_TRUE(told.cancelled);
+  EXPECT_FALSE(told.usable);
+  EXPECT_EQ(asked, 3);
+  EXPECT_EQ(path, square.measured);
+  // A callback that never cancels must not change the result: the same bytes as without it.
+  std::vector<Pose2> alone = square.measured;
+  EXPECT_FALSE(OptimisePoses(path, square.relations, {}, [] { return true; }).cancelled);
+  OptimisePoses(alone, square.relations, {});
+  EXPECT_EQ(path, alone);
+}
+
+TEST(PoseGraph, AChainIsAlreadyTheBest) {
+  const Square square;
+  std::vector<Pose2> path = square.measured;
+  const PoseGraphSummary summary = OptimisePoses(path, square.relations, {});
+  EXPECT_TRUE(summary.usable);
+  EXPECT_NEAR(summary.cost_after, 0.0, 1e-12);
+  for (std::size_t k = 0; k < path.size(); ++k) EXPECT_NEAR(Between(path[k], square.measured[k]).x, 0.0, 1e-9);
+}
+
+TEST(PoseGraph, OneLoopStraightensTheSquare) {
+  Square square;
+  const double before = square.Error(square.measured);
+  EXPECT_GT(before, 0.5);
+  square.relations.push_back({0, 40, Between(square.truth[0], square.truth[40]), kLoopCovariance, true});
+  std::vector<Pose2> path = square.measured;
+  const PoseGraphSummary summary = OptimisePoses(path, square.relations, {});
+  ASSERT_TRUE(summary.usable);
+  EXPECT_LT(summary.cost_after, summary.cost_before);
+  EXPECT_LT(square.Error(path), 0.25 * before);
+  EXPECT_EQ(path.front(), square.measured.front());
+}
+
+TEST(PoseGraph, AWrongLoopIsOutvoted) {
+  Square square;
+  for (const std::size_t k : {36U, 37U, 38U, 39U, 40U})
+    square.relations.push_back({40 - k, k, Between(square.truth[40 - k], square.truth[k]), kLoopCovariance, true});
+  std::vector<Pose2> right = square.measured;
+  ASSERT_TRUE(OptimisePoses(right, square.relations, {}).usable);
+  square.relations.push_back(
+      {5, 25, {0.0, 0.0, 0.0}, kLoopCovariance, true});  // Two places 7 m apart are one, it says.
+  std::vector<Pose2> path = square.measured;
+  ASSERT_TRUE(OptimisePoses(path, square.relations, {}).usable);
+  EXPECT_LT(square.Error(path), square.Error(right) + 0.3);
+}
+
+TEST(PoseGraph, TurningTheWholeProblemTurnsTheAnswer) {
+  Square square;
+  square.relations.push_back({0, 40, Between(square.truth[0], square.truth[40]), kLoopCovariance, true});
+  std::vector<Pose2> path = square.measured, turned;
+  const Pose2 T{-3, 4, 2.5};
+  for (const Pose2& pose : path) turned.push_back(T * pose);
+  ASSERT_TRUE(OptimisePoses(path, square.relations, {}).usable);
+  ASSERT_TRUE(OptimisePoses(turned, square.relations, {}).usable);
+  for (std::size_t k = 0; k < path.size(); ++k)
+    EXPECT_LT(Between(T * path[k], turned[k]).translation().norm(), 1e-3) << k;
+}
+
+TEST(PoseGraph, NothingToDoIsNoImprovement) {
+  std::vector<Pose2> path = {{1, 2, 3}};
+  EXPECT_FALSE(OptimisePoses(path, {}, {}).usable);
+  EXPECT_EQ(path.front(), (Pose2{1, 2, 3}));
+}
+
+}  // namespace
+}  // namespace cairn::slam

@@ -1,0 +1,30 @@
+#include "server/slam/landmarks/chi_square.h"
+
+#include <gtest/gtest.h>
+
+namespace cairn::slam {
+namespace {
+
+TEST(ChiSquareQuantile, MatchesTheTables) {  // Abramowitz and Stegun 1964, Table 26.8.
+  EXPECT_NEAR(ChiSquareQuantile(0.95, 1), 3.84146, 1e-4);
+  EXPECT_NEAR(ChiSquareQuantile(0.95, 2), 5.99146, 1e-4);
+  EXPECT_NEAR(ChiSquareQuantile(0.975, 3), 9.34840, 1e-4);
+  EXPECT_NEAR(ChiSquareQuantile(0.025, 10), 3.24697, 1e-4);
+  EXPECT_NEAR(ChiSquareQuantile(0.025, 100), 74.2219, 1e-3);
+  EXPECT_NEAR(ChiSquareQuantile(0.975, 100), 129.561, 1e-3);
+}
+
+TEST(ChiSquareQuantile, UndoesTheShareAlsoForManyNumbers) {
+  for (const double numbers : {1.0, 7.0, 300.0, 30000.0})
+    for (const double share : {0.025, 0.5, 0.975})
+      EXPECT_NEAR(ChiSquareShare(ChiSquareQuantile(share, numbers), numbers), share, 1e-6);
+}
+
+TEST(ChiSquareShare, IsNothingBelowNothing) {
+  EXPECT_EQ(ChiSquareShare(0.0, 3), 0.0);
+  EXPECT_EQ(ChiSquareShare(-1.0, 3), 0.0);
+  EXPECT_NEAR(ChiSquareShare(1e9, 3), 1.0, 1e-12);
+}
+
+}  // namespace
+}  // namespace cairn::slam

@@ -1,0 +1,139 @@
+#include "server/slam/loops/loop_search.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/server/slam/ring_world.h"
+
+namespace cairn::slam {
+namespace {
+
+using test::Laser;
+using test::RingCorridor;
+using test::RingSteps;
+using test::World;
+
+// A robot that drives round the ring, tracked by a front-end that turns a little too far with every metre.
+struct Drive {
+  Trail trail{MotionNoise{0.002, 0.01, 0.005, 0.0005, 0.002, 0.005}};
+  std::vector<Pose2> truth;
+  SharedSequence<Pose2> believed;
+
+  void Step(const World& world, const Pose2& motion, double drift_rad, std::mt19937_64& rng, double slip_m = 0.0) {
+    const Pose2 seen = motion * Pose2{slip_m, 0, drift_rad};
+    const bool first = truth.empty();
+    truth.push_back(first ? Pose2{} : truth.back() * motion);
+    const Pose2 T_track_robot = first ? Pose2{} : trail.shapes().back().T_track_robot * seen;
+    auto scan = std::make_shared<const Scan>(
+        Look(world, truth.back(), Laser{.first_rad = -kPi / 2, .range_max_m = 12.0, .sigma_m = 0.01}, &rng));
+    trail.Append({scan, T_track_robot}, T_track_robot, SurfacePointsOf(PointsOf(*scan), *scan, {}),
+                 Eigen::Matrix3d::Zero(), std::nullopt);
+    believed.Append(T_track_robot);
+  }
+};
+
+// The drives differ in the noise of the laser, in how much the front-end turns too far and to which side, and
+// in how far it slips forwards or back on the far long side. The error of the believed pose stays within the
+// search region.
+struct Ride {
+  std::uint64_t seed = 0;
+  double drift_rad_per_m = 0.0;
+  double slip_m = 0.0;
+};
+constexpr Ride kRides[] = {{1, 0.0015, 0.0}, {2, -0.0015, 0.0}, {3, 0.0005, 2.0}, {4, -0.0005, -2.0}};
+
+// Drives `metres` along the ring and searches from `from_m` on.
+std::optional<LoopClosure> DriveUntilFound(Drive& drive, const World& world, double metres, const Ride& ride,
+                                           double from_m = 0.0) {
+  LoopSearch search({}, {});
+  std::mt19937_64 rng(ride.seed);
+  double way_m = 0.0;
+  for (const Pose2& step : RingSteps(metres, 0.4)) {
+    drive.Step(world, step, ride.drift_rad_per_m * step.x, rng,
+               way_m < 70.0 && way_m + step.x >= 70.0 ? ride.slip_m : 0.0);
+    way_m += step.x;
+    if (way_m < from_m) continue;
+    if (const auto loop = search.Find(drive.trail, drive.believed)) return loop;
+  }
+  return std::nullopt;
+}
+
+void ExpectRight(const Drive& drive, const LoopClosure& found) {
+  const Pose2 truth = Between(drive.truth[found.old], drive.truth[found.recent]);
+  EXPECT_LT((found.T_old_recent.translation() - truth.translation()).norm(), 0.15);
+  EXPECT_LT(std::abs(AngleDiff(found.T_old_recent.theta, truth.theta)), 0.02);
+  EXPECT_TRUE(IsCovariance(found.covariance));
+}
+
+TEST(LoopSearch, FindsTheStartAfterTheRoundAlthoughItSeemsFarAway) {
+  double farthest_m = 0.0;
+  for (const Ride& ride : kRides) {
+    SCOPED_TRACE(ride.seed);
+    Drive drive;
+    const auto found = DriveUntilFound(drive, RingCorridor(true, 10 + ride.seed), 150.0, ride);
+    ASSERT_TRUE(found);
+    ExpectRight(drive, *found);
+    const Pose2 truth = Between(drive.truth[found->old], drive.truth[found->recent]);
+    const Pose2 believed = Between(drive.believed[found->old], drive.believed[found->recent]);
+    farthest_m = std::max(farthest_m, (believed.translation() - truth.translation()).norm());
+  }
+  EXPECT_GT(farthest_m, 1.5) << "the drift must be worth a search";
+}
+
+TEST(LoopSearch, FindsNothingWhereTheRobotHasNotBeen) {
+  for (const Ride& ride : kRides) {
+    Drive drive;
+    EXPECT_FALSE(DriveUntilFound(drive, RingCorridor(true, 10 + ride.seed), 100.0, ride)) << ride.seed;
+  }
+}
+
+// After one round, the metres 130 to 148 of the path lie on the first side again, and the last 15 m show no
+// corner.
+constexpr double kOnTheFirstSideM = 130.0, kBeforeTheNextCornerM = 146.0;
+
+TEST(LoopSearch, ABareCorridorFitsAnywhereAndIsNotBelieved) {
+  for (const Ride& ride : kRides) {
+    Drive drive;
+    EXPECT_FALSE(DriveUntilFound(drive, RingCorridor(false), kBeforeTheNextCornerM, ride, kOnTheFirstSideM))
+        << ride.seed;
+  }
+}
+
+// A corner of the bare corridor, or the end of the row of equal rooms, determines where the robot is. An
+// accepted loop must be right there, although nearly everything also fits one room further on, 4 m beside the
+// right place.
+TEST(LoopSearch, ClosesNoLoopAtTheWrongCornerOrTheWrongOneOfEqualRooms) {
+  for (const Ride& ride : kRides) {
+    for (const bool rooms : {false, true}) {
+      SCOPED_TRACE(std::to_string(ride.seed) + (rooms ? " rooms" : " bare"));
+      Drive drive;
+      const auto found = DriveUntilFound(drive, rooms ? test::RingOfEqualRooms() : RingCorridor(false), 190.0, ride);
+      ASSERT_TRUE(found) << "a search that finds nothing would close no wrong loop either";
+      ExpectRight(drive, *found);
+    }
+  }
+}
+
+TEST(LoopSearch, CanBeSwitchedOff) {
+  Drive drive;
+  LoopOptions off;
+  off.enabled = false;
+  LoopSearch search(off, {});
+  std::mt19937_64 rng(1);
+  drive.Step(RingCorridor(true), {}, 0.0, rng);
+  EXPECT_FALSE(search.Find(drive.trail, drive.believed));
+}
+
+TEST(FreeSpace, ContradictsOnlyWhatBeamsWentThrough) {
+  Drive drive;
+  std::mt19937_64 rng(1);
+  drive.Step(test::Room(-4, -4, 8, 8), {}, 0.0, rng);
+  const FreeSpace space(drive.trail, {0, 0, 0});
+  EXPECT_TRUE(space.Contradicts({2.0, 0.0}));
+  EXPECT_FALSE(space.Contradicts({4.0, 0.0}));   // The wall itself.
+  EXPECT_FALSE(space.Contradicts({6.0, 0.0}));   // Behind it.
+  EXPECT_FALSE(space.Contradicts({-2.0, 0.0}));  // Behind the robot: never seen.
+  EXPECT_FALSE(space.Contradicts({1e6, -1e6}));
+}
+
+}  // namespace
+}  // namespace cairn::slam

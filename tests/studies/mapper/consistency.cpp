@@ -1,0 +1,75 @@
+// cairn-study consistency tests whether the stated uncertainty of the whole mapper is right. It prints the
+// NEES of the reported poses over 100 runs in each of four simulated worlds, whatever the result is.
+#include "tests/studies/mapper/mapper_consistency.h"
+#include "tests/studies/study.h"
+
+namespace cairn::studies {
+namespace {
+
+std::string VerdictOf(const MapperConsistency& result) {
+  if (result.whole.nees > result.nees_high) return "too sure";
+  return result.whole.nees < result.nees_low ? "too doubtful" : "consistent";
+}
+
+using Figure = double MapperConsistencyPoint::*;
+
+Series SeriesOf(const MapperConsistency& result, const std::string& label, Figure figure) {
+  Series series{.label = label, .mark = Mark::kLine};
+  for (const MapperConsistencyPoint& point : result.points) {
+    series.x.push_back(point.travelled_m);
+    series.y.push_back(point.*figure);
+  }
+  return series;
+}
+
+void RunConsistency(StudyContext& context) {
+  Report& report = context.report;
+  const int runs = context.Pick(100, 4);
+  report.Text(
+      "The default mapper, " + Count(runs) +
+      " runs a world with other wheels, slip, laser noise and seeds each, compared every 3 m of the way. A consistent "
+      "mapper has NEES 3 on average, median 2.37, and 95 % of its single poses inside the 95 % region. More means that "
+      "it is surer than it may be. The bounds are those of the mean of independent runs at one place of the way.");
+  Table table({"world", "way (m)", "NEES (3)", "95 % bounds", "median (2.37)", "inside 95 %", "of (x, y) (2)",
+               "of heading (1)", "error (m)", "reported (m)", "error (deg)", "reported (deg)", "singular",
+               "not localized", ""});
+  const Axis way{.label = "travelled", .unit = "m"};
+  Plot nees{.title = "NEES of the mapper's pose", .x = way, .y = {"NEES of (x, y, heading)", "", true}};
+  Plot inside{
+      .title = "Single poses inside the 95 % region", .x = way, .y = {"share of the runs", "", false, 0.0, 1.0}};
+  inside.bounds = {{0.95, "consistent"}};
+  for (const ConsistencyDrive& drive : ConsistencyDrives(context.Pick(90.0, 40.0))) {
+    const std::string& name = drive.world.name;
+    if (!context.Wants(name)) continue;
+    MapperConsistencyOptions options;
+    options.runs = runs;
+    options.first_seed = context.seed;
+    const MapperConsistency result = StudyMapperConsistency(drive, options, [&](int done) {
+      if (done % 20 == 0) report.Progress(name + ": " + Count(done) + " runs");
+    });
+    if (result.points.empty()) {
+      report.Fault(name + ": no pose could be compared");
+      continue;
+    }
+    const MapperConsistencyPoint& whole = result.whole;
+    table.Add({name, Number(result.points.back().travelled_m, 0), Number(whole.nees, 2),
+               Number(result.nees_low, 2) + " .. " + Number(result.nees_high, 2), Number(whole.nees_median, 2),
+               Percent(whole.inside), Number(whole.position_nees, 2), Number(whole.heading_nees, 2),
+               Number(whole.position_error_m, 3), Number(whole.position_sigma_m, 3),
+               Number(Degrees(whole.heading_error_rad), 3), Number(Degrees(whole.heading_sigma_rad), 3),
+               Percent(whole.singular), Percent(whole.not_localized), VerdictOf(result)});
+    nees.series.push_back(SeriesOf(result, name, &MapperConsistencyPoint::nees));
+    nees.bounds = {{result.nees_low, "95 %"}, {result.nees_high, "95 %"}};
+    inside.series.push_back(SeriesOf(result, name, &MapperConsistencyPoint::inside));
+    if (VerdictOf(result) != "consistent") report.Warn("the mapper is " + VerdictOf(result) + " in " + name + ".");
+  }
+  report.Add(table, "mapper consistency");
+  report.Add(nees, "mapper nees");
+  report.Add(inside, "mapper inside");
+}
+
+const Registration kRegistered{"consistency", "NEES of the whole mapper over 100 runs in each of four worlds",
+                               RunConsistency};
+
+}  // namespace
+}  // namespace cairn::studies
