@@ -167,7 +167,7 @@ TEST_F(CairnProgram, AnEndedSessionCanBeReplayedAgainAndAResumedOneTakesTheClock
   const auto again = MustJson(replay);
   // The same stamps in the same session look like a clock that was set back: the first ones are dropped, and the others
   // are used. How many are dropped depends on how the two streams interleave.
-  EXPECT_GT(again["dropped_total"], 4);
+  EXPECT_GE(again["dropped_total"], 4);
   EXPECT_GT(again["used"], 20);
   EXPECT_EQ(again["used"].get<int>() + again["dropped_total"].get<int>(), 50);
   EXPECT_EQ(again["unexplained"], 0);
