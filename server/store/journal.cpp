@@ -168,21 +168,15 @@ std::optional<Journal::Group> Journal::Next(const std::stop_token& stop) {
 Journal::Prepared Journal::Prepare(Group&& group) {
   Prepared prepared;
   std::map<RecordKey, std::string> put;
-  struct Batch {
-    std::uint64_t first = 0;
-    std::vector<JournalEntry> entries;
-  };
-  std::map<std::uint64_t, Batch> batches;
+  auto& batches = prepared.batches;
   for (Change& change : group.changes) {
     if (auto* const appended = std::get_if<Appended>(&change)) {
       Batch& batch = batches[appended->session];
       if (batch.entries.empty()) batch.first = appended->position;
       batch.entries.push_back(std::move(appended->entry));
-      prepared.durable[appended->session] = appended->position;
-      ++prepared.entries;
     } else if (const auto* const written = std::get_if<Written>(&change)) {
       put[written->key] = written->bytes();
-      if (written->key.kind == RecordKind::kSession) prepared.durable.emplace(written->key.owner, 0);
+      if (written->key.kind == RecordKind::kSession) batches.try_emplace(written->key.owner);
     } else if (const auto* const range = std::get_if<RecordRange>(&change)) {
       std::erase_if(put, [range](const auto& one) {
         const RecordKey& key = one.first;
@@ -194,6 +188,7 @@ Journal::Prepared Journal::Prepare(Group&& group) {
     }
   }
   for (const auto& [session, batch] : batches) {
+    if (batch.entries.empty()) continue;
     put[{RecordKind::kJournal, session, batch.first + batch.entries.size() - 1}] = BytesOf(batch.first, batch.entries);
   }
   for (auto& [key, bytes] : put) prepared.changes.put.push_back({key, std::move(bytes)});
@@ -231,19 +226,19 @@ bool Journal::CommitPatiently(const RecordChanges& changes, const std::stop_toke
 }
 
 void Journal::Tell(const Prepared& prepared, Clock::time_point oldest) {
-  std::vector<std::pair<Durable, std::uint64_t>> told;
+  std::vector<std::pair<Durable, const Batch*>> told;
   {
     const MutexLock lock(mutex_);
     committing_bytes_ = 0;
-    counts_.entries += prepared.entries;
     delays_ms_.push_back(std::chrono::duration<float, std::milli>(Clock::now() - oldest).count());
     if (delays_ms_.size() > kMaxDelays) delays_ms_.pop_front();
-    for (const auto& [session, position] : prepared.durable) {
+    for (const auto& [session, batch] : prepared.batches) {
+      counts_.entries += batch.entries.size();
       const auto line = lines_.find(session);
-      if (line != lines_.end() && line->second.durable) told.emplace_back(line->second.durable, position);
+      if (line != lines_.end() && line->second.durable) told.emplace_back(line->second.durable, &batch);
     }
   }
-  for (const auto& [durable, position] : told) durable(position);
+  for (const auto& [durable, batch] : told) durable(batch->entries);
 }
 
 void Journal::EndCheckpoint() {

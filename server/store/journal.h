@@ -44,8 +44,9 @@ struct JournalCounts {
 
 class Journal {
  public:
-  // Called on the journal's thread: every entry of the session up to this position is on the disk.
-  using Durable = std::function<void(std::uint64_t position)>;
+  // Called on the journal's thread with the entries of the session that are on the disk now, in order; first with none,
+  // when the session itself is.
+  using Durable = std::function<void(const std::vector<JournalEntry>& entries)>;
   // Called on the journal's thread to make a record's bytes.
   using Bytes = std::function<std::string()>;
 
@@ -56,7 +57,7 @@ class Journal {
   // Tries once to write what waits, and ends the thread.
   void Stop();
 
-  // A new session (stored at once, `durable` is called with 0 when it is), or one that was restored up to `last`.
+  // A new session, which is stored at once, or one that was restored up to `last`.
   void Open(const StoredSession& session, Durable durable);
   void Reopen(std::uint64_t session, std::uint64_t last, Durable durable);
   // The position of the entry, from 1; 0 where it is not stored. `session` must be open.
@@ -97,11 +98,13 @@ class Journal {
     std::deque<Change> changes;
     Clock::time_point oldest;
   };
-  // What a commit tells when it has succeeded.
+  struct Batch {
+    std::uint64_t first = 0;
+    std::vector<JournalEntry> entries;
+  };
   struct Prepared {
     RecordChanges changes;
-    std::map<std::uint64_t, std::uint64_t> durable;  // Session -> position.
-    std::uint64_t entries = 0;
+    std::map<std::uint64_t, Batch> batches;  // By session; empty where only the session itself is new.
   };
   struct WantedCheckpoint {
     std::uint64_t session = 0;

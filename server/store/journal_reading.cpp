@@ -7,6 +7,30 @@
 
 namespace cairn::server {
 
+namespace {
+
+// Reads this many records at a time, so that the store is not locked while their entries are used.
+constexpr std::size_t kPage = 64;
+
+struct Page {
+  std::vector<std::pair<std::uint64_t, std::string>> records;
+  bool last = true;
+};
+
+Result<Page> ReadPage(Store& store, const RecordRange& range) {
+  Page page;
+  const auto take = [&page](std::uint64_t number, std::string_view bytes) -> Result<void> {
+    page.last = page.records.size() < kPage;
+    if (!page.last) return Fail(StatusCode::kCancelled, "the page is full");
+    page.records.emplace_back(number, bytes);
+    return {};
+  };
+  if (auto read = store.Read(range, take); !read && page.last) return tl::unexpected(read.error());
+  return page;
+}
+
+}  // namespace
+
 Result<std::uint64_t> ReadJournal(
     Store& store, std::uint64_t session, std::uint64_t position,
     const std::function<Result<void>(std::uint64_t position, JournalEntry&& entry)>& visit) {
@@ -25,9 +49,14 @@ Result<std::uint64_t> ReadJournal(
     }
     return {};
   };
-  const RecordRange later{.kind = RecordKind::kJournal, .owner = session, .first = position + 1, .last = UINT64_MAX};
-  if (auto read = store.Read(later, take); !read) return tl::unexpected(read.error());
-  return last;
+  for (;;) {
+    const auto page = ReadPage(store, {.kind = RecordKind::kJournal, .owner = session, .first = last + 1});
+    if (!page) return tl::unexpected(page.error());
+    for (const auto& [number, bytes] : page->records) {
+      if (auto taken = take(number, bytes); !taken) return tl::unexpected(taken.error());
+    }
+    if (page->last) return last;
+  }
 }
 
 Result<std::uint64_t> NextGeneration(Store& store, std::uint64_t milliseconds) {
