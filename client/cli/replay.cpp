@@ -6,13 +6,11 @@
 #include "client/cli/commands.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/json_output.h"
-#include "client/cli/log_options.h"
 #include "client/cli/option_checks.h"
 #include "client/cli/pacer.h"
 #include "client/cli/progress_line.h"
 #include "client/cli/quantity_text.h"
 #include "client/cli/robot_stream.h"
-#include "client/cli/window_option.h"
 #include "common/service/start_pose.h"
 
 namespace cairn::client {

@@ -6,10 +6,10 @@
 #include "client/cli/json_output.h"
 #include "client/cli/option_checks.h"
 #include "client/cli/quantity_text.h"
+#include "client/cli/robot_stream.h"
 #include "client/cli/sim_run.h"
 #include "client/cli/sim_sensor_options.h"
-#include "client/cli/window_option.h"
-#include "client/sim/laser_models.h"
+#include "client/sim/laser.h"
 #include "client/sim/shipped_worlds.h"
 
 namespace cairn::client {

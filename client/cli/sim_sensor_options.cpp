@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "client/cli/option_checks.h"
-#include "client/sim/laser_models.h"
+#include "client/sim/laser.h"
 
 namespace cairn::client {
 namespace {
@@ -27,7 +27,7 @@ void AddLaser(CLI::App& command, sim::LaserOptions& laser, std::string& model) {
       ->type_name("METRES")
       ->capture_default_str()
       ->excludes(named);
-  command.add_option("--noise", laser.noise_m, "Standard deviation of a range, where --error is sigma")
+  command.add_option("--noise", laser.error.sigma_m, "Standard deviation of a range, where --error is sigma")
       ->check(InRange(0.0, 1.0))
       ->type_name("METRES")
       ->capture_default_str()
@@ -38,24 +38,25 @@ void AddLaser(CLI::App& command, sim::LaserOptions& laser, std::string& model) {
           "--error",
           [&laser, names](const std::string& name) {
             for (std::size_t i = 0; i < names.size(); ++i)
-              if (names[i] == name) laser.error = static_cast<sim::RangeErrorKind>(i);
+              if (names[i] == name) laser.error.kind = static_cast<sim::RangeErrorKind>(i);
           },
           "How the range error is stated [sigma]")
       ->check(CLI::IsMember(std::vector<std::string>(names.begin(), names.end())))
       ->excludes(named);
-  command.add_option("--error-bound", laser.bound_m, "percent and step: largest error of a range")
+  command.add_option("--error-bound", laser.error.bound_m, "percent and step: largest error of a range")
       ->check(InRange(0.0, 10.0))
       ->type_name("METRES")
       ->capture_default_str()
       ->excludes(named);
   command
-      .add_option("--error-share", laser.bound_share,
+      .add_option("--error-share", laser.error.bound_share,
                   "percent: this share of the range is added to the bound; step: beyond --error-step it replaces it")
       ->check(InRange(0.0, 1.0))
       ->capture_default_str()
       ->excludes(named);
   command
-      .add_option("--error-step", laser.step_m, "step: up to this range --error-bound holds, beyond it --error-share")
+      .add_option("--error-step", laser.error.step_m,
+                  "step: up to this range --error-bound holds, beyond it --error-share")
       ->check(InRange(0.0, 1000.0))
       ->type_name("METRES")
       ->capture_default_str()

@@ -1,8 +1,7 @@
-// The answers to requests about robots (robot_answers.cpp) and maps (map_answers.cpp). Each is a pure
-// function of snapshots, which were copied under short locks, so no answer waits for an estimator. If a
-// request names a robot or site that the server does not know, the snapshots are empty and the answer is
-// NOT_FOUND. Answers may be large: SplitReply (reply_parts.h) cuts them into parts for the wire. Stateless,
-// thread-safe.
+// The answers to requests about robots and maps. Each is a pure function of snapshots, which were copied under
+// short locks, so no answer waits for an estimator. If a request names a robot or site that the server does not
+// know, the snapshots are empty and the answer is NOT_FOUND. Answers may be large: SplitReply (reply_parts.h)
+// cuts them into parts for the wire. Stateless, thread-safe.
 #pragma once
 
 #include <memory>
