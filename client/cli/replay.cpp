@@ -125,9 +125,7 @@ void AddReplay(CLI::App& app, Program& program) {
   command->add_option("--site", arguments->stream.site, "The site to map into")->required();
   command->add_option("--robot", arguments->stream.robot, "The robot's name")->required();
   command->add_option("--sensor", arguments->stream.sensor, "The scanner's name")->capture_default_str();
-  auto* rate = command->add_option("--rate", arguments->rate, "How many times faster than the log's stamps")
-                   ->check(InRange(1e-3, 1e6))
-                   ->capture_default_str();
+  auto* rate = AddNumber(*command, "--rate", arguments->rate, 1e-3, 1e6, "How many times faster than the log's stamps");
   command->add_flag("--fast", arguments->fast, "As fast as the server takes it, without losing a scan")->excludes(rate);
   AddWindowOption(*command, arguments->stream.window);
   AddParsed(*command, "--start", arguments->stream.T_map_robot_start, ParseStart,

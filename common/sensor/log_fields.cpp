@@ -1,20 +1,11 @@
 #include "common/sensor/log_fields.h"
 
-#include <charconv>
+#include <algorithm>
 #include <cmath>
 
-#include "common/sensor/stamp.h"
+#include "common/options/number_text.h"
 
 namespace cairn {
-namespace {
-
-template <typename Number>
-bool Parse(std::string_view text, Number& value) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size();
-}
-
-}  // namespace
 
 LogLines::LogLines(const std::filesystem::path& path) : file_(path, std::ios::binary) {}
 
@@ -86,7 +77,7 @@ double LogFields::Real(std::string_view what) {
   if (!problem_.empty()) return 0.0;
   const std::string_view word = Word(what);
   double value = 0.0;
-  if (Parse(word, value) && std::isfinite(value)) return value;
+  if (ParseNumber(word, value) && std::isfinite(value)) return value;
   Complain(what, word);
   return 0.0;
 }
@@ -95,7 +86,7 @@ float LogFields::Range() {
   if (!problem_.empty()) return 0.0F;
   const std::string_view word = Word("a range");
   float value = 0.0F;
-  if (Parse(word, value)) return value;
+  if (ParseNumber(word, value)) return value;
   Complain("a range", word);
   return 0.0F;
 }
@@ -104,7 +95,7 @@ int LogFields::Count(std::string_view what, int min, int max) {
   if (!problem_.empty()) return 0;
   const std::string_view word = Word(what);
   int value = 0;
-  if (Parse(word, value) && value >= min && value <= max) return value;
+  if (ParseNumber(word, value) && value >= min && value <= max) return value;
   Complain(what, word);
   return 0;
 }

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "server/slam/loops/region.h"
 
 namespace cairn::slam {
 namespace {
@@ -66,11 +69,7 @@ void SelfCheck::Forget() {
 // Old keyframes near the believed pose, those with the most overlap first, and only one per place and visit.
 std::vector<std::size_t> SelfCheck::KeyframesToCompare(std::span<const KeyframeShape> shapes,
                                                        const SharedSequence<Pose2>& path) const {
-  struct Candidate {
-    std::size_t keyframe;
-    double cost_m;
-  };
-  std::vector<Candidate> all;
+  std::vector<KeyframeCost> all;
   const KeyframeShape& last = shapes.back();
   const Pose2 here = path[shapes.size() - 1];
   for (std::size_t k = 0; k < shapes.size() && last.travelled_m - shapes[k].travelled_m >= options_.min_travel_m; ++k) {
@@ -79,16 +78,7 @@ std::vector<std::size_t> SelfCheck::KeyframesToCompare(std::span<const KeyframeS
     if (distance_m > options_.max_distance_m) continue;
     all.push_back({k, distance_m + kTurnCostM * std::abs(AngleDiff(there.theta, here.theta))});
   }
-  std::stable_sort(all.begin(), all.end(), [](const Candidate& a, const Candidate& b) { return a.cost_m < b.cost_m; });
-  std::vector<std::size_t> chosen;
-  for (const Candidate& candidate : all) {
-    const bool same_place = std::any_of(chosen.begin(), chosen.end(), [&](std::size_t other) {
-      return std::abs(shapes[candidate.keyframe].travelled_m - shapes[other].travelled_m) < kSamePlaceM;
-    });
-    if (!same_place) chosen.push_back(candidate.keyframe);
-    if (chosen.size() == kMaxCompared) break;
-  }
-  return chosen;
+  return BestPlaces(std::move(all), shapes, kSamePlaceM, kMaxCompared);
 }
 
 void SelfCheck::Judge() {

@@ -70,7 +70,7 @@ class PreparedScan {
 }  // namespace
 
 VisibilityCounts CompareVisibility(const Scan& scan, const Pose2& T_scan_points, std::span<const SurfacePoint> points,
-                  double near_m, double max_range_m) {
+                                   double near_m, double max_range_m) {
   if (scan.tilt_rad != 0.0) return {};  // The ranges of a tilted scan are not distances on the ground.
   const Pose2 T_laser_points = scan.T_robot_laser.Inverse() * T_scan_points;
   const Eigen::Matrix2d R = T_laser_points.rotation();

@@ -1,7 +1,6 @@
 #include "server/tools/calibrate/odometry_run.h"
 
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <iomanip>
 #include <random>
@@ -9,6 +8,7 @@
 #include <string>
 
 #include "common/file/atomic_file.h"
+#include "common/options/number_text.h"
 #include "server/tools/log_run/json_line.h"
 
 namespace cairn::server {
@@ -36,8 +36,7 @@ std::vector<std::string_view> Fields(std::string_view line) {
 
 tl::expected<double, std::string> Number(std::string_view text) {
   double value = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !std::isfinite(value) || std::abs(value) > kMaxValue)
+  if (!ParseNumber(text, value) || !std::isfinite(value) || std::abs(value) > kMaxValue)
     return tl::unexpected("'" + std::string(text.substr(0, 40)) + "' is not a number within +-10000");
   return value;
 }
