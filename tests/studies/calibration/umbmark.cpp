@@ -1,7 +1,8 @@
+#include "server/slam/calibration/umbmark.h"
+
 #include <cmath>
 #include <random>
 
-#include "server/slam/calibration/square_run.h"
 #include "tests/studies/calibration/calibration.h"
 
 namespace cairn::studies {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "server/slam/landmarks/chi_square.h"
+#include "server/slam/landmarks/innovation.h"
 #include "server/slam/motion_models/motion_sampling.h"
 #include "server/slam/random/resampling.h"
 #include "tests/studies/filters/corner_world.h"

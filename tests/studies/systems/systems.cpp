@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "server/slam/localisation/keyframe_lines.h"
-#include "server/slam/smoothing/smoothed_path.h"
+#include "server/slam/smoothing/smoothed_map.h"
 #include "tests/studies/log_run.h"
 #include "tests/studies/mapper_choice.h"
 #include "tests/studies/study.h"

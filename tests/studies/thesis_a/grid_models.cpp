@@ -105,7 +105,7 @@ void StudyGridModels(StudyContext& context) {
   sim::FleetOptions fleet;
   fleet.seed = context.seed;
   fleet.scan_hz = 5.0;
-  fleet.laser.noise_m = 0.02;
+  fleet.laser.error.sigma_m = 0.02;
   const auto world = sim::OpenWorld("building");
   const std::vector<MapLine> walls = KnownMapOf(*world);
   const StudyLog log = SimulateLog("building", context.Pick(240.0, 60.0), fleet);

@@ -111,7 +111,7 @@ void StudyLineExtraction(StudyContext& context) {
     sim::Random random(context.seed);
     Quality quality;
     for (int i = 0; i < context.Pick(400, 60); ++i) Judge(scene, scene.DrawPose(random), row.laser, random, quality);
-    table.Add({"simulated", row.world, Count(row.laser.beams), Number(100 * row.laser.noise_m, 1),
+    table.Add({"simulated", row.world, Count(row.laser.beams), Number(100 * row.laser.error.sigma_m, 1),
                Number(100.0 * quality.extracted / quality.scans, 0), Percent(quality.true_positive()),
                Percent(quality.false_positive()), Number(quality.sigma_r_cm(), 2), Number(quality.sigma_alpha_deg(), 2),
                Number(1e3 * quality.scans / quality.cpu_ms, 0)});
@@ -119,20 +119,20 @@ void StudyLineExtraction(StudyContext& context) {
       const auto add = [&](Plot& to, const std::string& label, double y) {
         auto it = std::find_if(to.series.begin(), to.series.end(), [&](const Series& s) { return s.label == label; });
         if (it == to.series.end()) it = to.series.insert(it, Series{.label = label});
-        it->x.push_back(100 * row.laser.noise_m), it->y.push_back(y);
+        it->x.push_back(100 * row.laser.error.sigma_m), it->y.push_back(y);
       };
       add(plot, row.world + ": true positives", 100 * quality.true_positive());
       add(plot, row.world + ": false positives", 100 * quality.false_positive());
       add(spread, row.world + ": sigma r (cm)", quality.sigma_r_cm());
       add(spread, row.world + ": sigma alpha (deg)", quality.sigma_alpha_deg());
     }
-    if (row.laser.noise_m > 0.011) continue;
+    if (row.laser.error.sigma_m > 0.011) continue;
     plausible = plausible && quality.true_positive() > 0.75 && quality.false_positive() < 0.2;
     const bool this_worse = quality.true_positive() < 0.86 || quality.false_positive() > 0.089 ||
                             quality.sigma_r_cm() > 1.95 || quality.sigma_alpha_deg() > 0.74;
     if (this_worse)
       report.Warn("worse than the printed row in at least one figure: " + row.world + ", " + Count(row.laser.beams) +
-                  " beams, sigma " + Number(100 * row.laser.noise_m, 1) + " cm");
+                  " beams, sigma " + Number(100 * row.laser.error.sigma_m, 1) + " cm");
     worse = worse || this_worse;
   }
   report.Add(table, "table_2_1");

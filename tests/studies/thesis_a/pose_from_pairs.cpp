@@ -13,7 +13,6 @@
 
 #include "server/slam/features/corners.h"
 #include "server/slam/features/feature_extraction.h"
-#include "server/slam/voting/robust_mean.h"
 #include "server/slam/voting/voting.h"
 #include "tests/studies/scene.h"
 #include "tests/studies/stopwatch.h"

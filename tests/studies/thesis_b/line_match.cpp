@@ -9,12 +9,12 @@
 #include <utility>
 #include <vector>
 
-#include "client/sim/closed_path.h"
 #include "client/sim/shipped_worlds.h"
+#include "client/sim/world.h"
 #include "server/slam/features/feature_extraction.h"
 #include "server/slam/localisation/keyframe_lines.h"
-#include "server/slam/localisation/pose_fusion.h"
-#include "server/slam/smoothing/smoothed_path.h"
+#include "server/slam/localisation/place_hypotheses.h"
+#include "server/slam/smoothing/smoothed_map.h"
 #include "tests/studies/dpslam/grid_drive.h"
 #include "tests/studies/log_run.h"
 #include "tests/studies/mapper_choice.h"

@@ -6,7 +6,7 @@
 #include "server/slam/grid/grid_image.h"
 #include "server/slam/grid/occupancy_grid.h"
 #include "server/slam/motion/motion_gate.h"
-#include "server/slam/smoothing/smoothed_path.h"
+#include "server/slam/smoothing/smoothed_map.h"
 #include "tests/studies/log_run.h"
 #include "tests/studies/mapper_choice.h"
 #include "tests/studies/stopwatch.h"
