@@ -175,7 +175,7 @@ INSTANTIATE_TEST_SUITE_P(Filters, EverySystem,
 INSTANTIATE_TEST_SUITE_P(Blind, EveryFilter,
                          ::testing::Values(kDefaultFilter, "fastslam2_oriented", "fastslam1", "ekf", "dpslam",
                                            "landmark_correction", "line_match"),
-                         [](const ::testing::TestParamInfo<std::string>& info) { return info.param; });
+                         [](const ::testing::TestParamInfo<std::string>& row) { return row.param; });
 INSTANTIATE_TEST_SUITE_P(Alone, EveryMatcher,
                          ::testing::Values(Choice{"voting", "none"}, Choice{"line_lsq", "none"},
                                            Choice{"hough", "none"}, Choice{"ndt", "none"}, Choice{"ndt_de", "none"},
