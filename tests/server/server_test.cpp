@@ -3,6 +3,9 @@
 
 #include <gmock/gmock.h>
 
+#include <map>
+#include <vector>
+
 #include "tests/server/support/whole_server.h"
 
 namespace cairn::server::testing {
@@ -362,6 +365,23 @@ TEST(Server, StopFinishesAcceptedScansAndSaysGoodbye) {
   const SessionState state = house.LastState("r1", kClient);
   EXPECT_EQ(state.phase, SessionPhase::kSuspended);
   EXPECT_THAT(state.status.message, ::testing::HasSubstr("stopping"));
+}
+
+// A server that smooths, with more jobs waiting, was stopped: it must not finish them first.
+TEST(Server, StopCancelsTheRunningJobAndThoseThatWait) {
+  WholeServer house;
+  house.Open("r1", kClient);
+  house.Drive("r1", kClient, 0, 60);
+  std::vector<std::uint64_t> jobs;
+  for (int i = 0; i < 12; ++i) jobs.push_back(house.Ask(Of(RequestKind::kJobSubmit)).jobs.at(0).id);
+  const auto begin = std::chrono::steady_clock::now();
+  house.Stop();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5));
+  std::map<std::uint64_t, JobState> last;
+  for (const Job& job : house.All<Job>()) last[job.id] = job.state;
+  for (const std::uint64_t id : jobs) EXPECT_TRUE(IsFinal(last.at(id))) << id;
+  EXPECT_EQ(last.at(jobs.back()), JobState::kCancelled);
+  EXPECT_EQ(house.LastState("r1", kClient).phase, SessionPhase::kSuspended);
 }
 
 TEST(Server, StopDropsAndCountsWhatItHasNoTimeFor) {
