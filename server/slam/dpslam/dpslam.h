@@ -55,7 +55,8 @@ class DpSlam final : public Filter {
   // Number of scans of the next segment once it is long enough and followed by enough later scans; otherwise
   // 0.
   [[nodiscard]] std::size_t SegmentEnd() const;
-  void HandUp(std::size_t count);
+  // Begins the next segment of the high level with the first `count` pending scans.
+  void PassToHighLevel(std::size_t count);
   // The whole step of the plain high level, with all pending scans.
   void JoinPlainly(const ParallelFor& parallel_for);
   // The next scans of a particle of the low level, from the joint on.
@@ -68,7 +69,7 @@ class DpSlam final : public Filter {
   std::optional<SegmentFilter> high_;  // At most one of high_ and plain_ has a value.
   std::optional<LevelFilter> plain_;
   std::vector<PendingScan> pending_;  // Scans that are not in the high level yet.
-  std::size_t handed_up_ = 0;         // Number of scans before the pending ones.
+  std::size_t passed_on_ = 0;         // Number of scans before the pending ones.
   std::size_t at_work_ = 0;           // Number of pending scans that the high level is processing.
   // End poses in the low level's frame: of the scans before the pending ones, when they were passed on, and
   // of the scans that the high level is processing.
