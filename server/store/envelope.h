@@ -14,7 +14,7 @@ namespace cairn::server {
 // The newest version of the messages in idl/cairn/record.proto that this server can read; it writes this version.
 inline constexpr std::uint32_t kRecordFormat = 1;
 // Longer records are refused when they are read: the size is a number in a file.
-inline constexpr std::uint64_t kMaxRecordBytes = std::uint64_t{256} << 20;
+inline constexpr std::uint64_t kMaxRecordBytes = std::uint64_t{1} << 30;
 
 class EnvelopeCodec {
  public:

@@ -11,13 +11,11 @@ constexpr auto kRetry = std::chrono::seconds(1);
 constexpr auto kBudgetPeriod = std::chrono::seconds(10);
 constexpr std::size_t kMaxDelays = 4096;
 
+// The cells of a grid are not counted: they are shared with the map.
 std::size_t SizeOf(const JournalEntry& entry) {
   constexpr std::size_t kSmall = 256;
   if (const auto* const scan = std::get_if<ScanTaken>(&entry)) {
     return kSmall + sizeof(float) * scan->scan->ranges_m.size();
-  }
-  if (const auto* const correction = std::get_if<CorrectionTaken>(&entry)) {
-    return kSmall + correction->grid.chunks.size() * sizeof(std::int16_t) * static_cast<std::size_t>(kTileArea);
   }
   return kSmall;
 }

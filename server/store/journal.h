@@ -71,6 +71,7 @@ class Journal {
   void Put(const RecordKey& key, Bytes bytes, std::size_t size = 1024);
   void Remove(const RecordRange& range);
 
+  [[nodiscard]] Store& store() { return store_; }
   [[nodiscard]] JournalHealth health() const;
   [[nodiscard]] JournalCounts counts() const;
 

@@ -39,6 +39,7 @@ void FillEntry(record::Entry& to, const OdometryTaken& from) {
 
 void FillEntry(record::Entry& to, const OwnerChanged& from) {
   to.mutable_owner()->set_client(from.client);
+  to.mutable_owner()->set_session(from.session);
   for (const std::string& sensor : from.sensors) to.mutable_owner()->add_sensors(sensor);
 }
 
@@ -97,7 +98,9 @@ Result<JournalEntry> EntryOf(const record::Entry& from) {
     case record::Entry::kOdometry:
       return OdometryOf(from.odometry());
     case record::Entry::kOwner:
-      return OwnerChanged{from.owner().client(), {from.owner().sensors().begin(), from.owner().sensors().end()}};
+      return OwnerChanged{from.owner().client(),
+                          from.owner().session(),
+                          {from.owner().sensors().begin(), from.owner().sensors().end()}};
     case record::Entry::kCorrection:
       return CorrectionOf(from.correction());
     case record::Entry::kFinish:

@@ -23,7 +23,7 @@ void Fill(record::Pose& to, const Pose2& from) {
 void Fill(record::Stream& to, const StreamId& from) {
   to.set_robot_id(from.robot_id);
   to.set_sensor_id(from.sensor_id);
-  to.set_client(from.client);
+  to.set_session(from.session);
 }
 
 void Fill(record::Status& to, const Status& from) {
@@ -38,6 +38,7 @@ void Fill(record::SessionRequest& to, const SessionRequest& from) {
   to.set_client(from.client);
   to.set_has_start(from.has_start);
   Fill(*to.mutable_t_map_robot_start(), from.T_map_robot_start);
+  to.set_session(from.session);
 }
 
 void Fill(record::Grid& to, const StoredGrid& from) {
@@ -55,7 +56,7 @@ Pose2 ValueOf(const record::Pose& from) {
 }
 
 StreamId ValueOf(const record::Stream& from) {
-  return {.robot_id = from.robot_id(), .sensor_id = from.sensor_id(), .client = from.client()};
+  return {.robot_id = from.robot_id(), .sensor_id = from.sensor_id(), .session = from.session()};
 }
 
 Status ValueOf(const record::Status& from) {
@@ -70,6 +71,7 @@ SessionRequest ValueOf(const record::SessionRequest& from) {
   request.client = from.client();
   request.has_start = from.has_start();
   request.T_map_robot_start = ValueOf(from.t_map_robot_start());
+  request.session = from.session();
   return request;
 }
 

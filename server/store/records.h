@@ -49,9 +49,10 @@ struct OdometryTaken {
   Odometry odometry;
   OdometryFate fate = OdometryFate::kTaken;
 };
-// From now on this client owns the session and streams these sensors, and those named before.
+// From now on this client owns the session and streams these sensors, and those named before, under its token.
 struct OwnerChanged {
   ClientId client = 0;
+  SessionToken session = 0;
   std::vector<std::string> sensors;
 };
 // A grid from a finished job was adopted. Kept as data, because the job is not run again when a journal is replayed.

@@ -12,9 +12,6 @@ void Visit(OptionVisitor& visitor, StoreOptions& options) {
       "queue_mib", options.queue_mib, "MiB", 1, 65536,
       "Memory for what waits to be written. While the disk fails, sessions whose data does not fit any more "
       "are no longer stored.");
-  visitor.Real("gap_wait_s", options.gap_wait_s, "s", 0.1, 3600.0,
-               "After a restart the server waits this long for scans that a robot must send again. Then it goes on "
-               "without them, and counts them as lost.");
 }
 
 }  // namespace cairn::server

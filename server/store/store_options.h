@@ -11,7 +11,6 @@ struct StoreOptions {
   std::int64_t commit_delay_ms = 100;
   std::int64_t queue_mib = 64;
   double max_gib = 20.0;
-  double gap_wait_s = 10.0;
 };
 void Visit(OptionVisitor& visitor, StoreOptions& options);
 

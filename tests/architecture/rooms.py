@@ -126,7 +126,7 @@ IMPURE_WORDS = (r"std::(this_thread|j?thread|mutex|async)\b", r"\b(system|steady
 
 # Settings come through options; the environment is read where a program starts, and in the one function that ranks
 # CAIRN_DOMAIN among them.
-READS_ENVIRONMENT = ("common/wire/wire_arguments.cpp", "server/tools/offline/main.cpp",
+READS_ENVIRONMENT = ("common/wire/wire_arguments.cpp", "server/state_directory.cpp", "server/tools/offline/main.cpp",
                      "server/tools/calibrate/main.cpp", "client/cli", "client/web",
                      "tests")
 

@@ -54,7 +54,7 @@ inline StoredGrid SampleGrid(int seed) {
 }
 
 inline std::vector<JournalEntry> OneOfEach() {
-  return {OwnerChanged{77, {"laser", "rear"}},
+  return {OwnerChanged{77, 78, {"laser", "rear"}},
           SampleScan(1),
           ScanRefused{SampleStream(), 2, DropReason::kQueueFull},
           SampleOdometry(3),
@@ -70,7 +70,9 @@ inline StoredSession SampleSession(std::uint64_t id) {
                       .client = 77,
                       .has_start = true,
                       .T_map_robot_start = {1, 2, 0.5},
-                      .end = false},
+                      .end = false,
+                      .session = 78,
+                      .started = false},
           .map_epoch = 3};
 }
 
