@@ -140,10 +140,7 @@ void Session::Lost(const Status& why) {
 
 void Session::Durable(const std::vector<JournalEntry>& entries) {
   record_.Durable(entries);
-  if (entries.empty()) {
-    unannounced_ = false;
-    AnnounceState();
-  }
+  if (unannounced_.exchange(false)) AnnounceState();
   PublishLedgers(SessionRecord::Urgency::kWhenDue);
 }
 

@@ -52,7 +52,7 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   // Publishes the state once more.
   void Announce() { AnnounceState(); }
   // The journal's side. Expected: the session's record is on its way to the disk, and its opening is announced when it
-  // is there (Durable without entries). Lost: nothing of it is stored any more.
+  // is there (the first Durable). Lost: nothing of it is stored any more.
   void ExpectDurable();
   void Durable(const std::vector<JournalEntry>& entries);
   void Lost(const Status& why);

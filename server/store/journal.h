@@ -44,8 +44,8 @@ struct JournalCounts {
 
 class Journal {
  public:
-  // Called on the journal's thread with the entries of the session that are on the disk now, in order; first with none,
-  // when the session itself is.
+  // Called on the journal's thread with the entries of the session that are on the disk now, in order; there may be none
+  // in the first call, which tells that the session itself is.
   using Durable = std::function<void(const std::vector<JournalEntry>& entries)>;
   // Called on the journal's thread to make a record's bytes.
   using Bytes = std::function<std::string()>;

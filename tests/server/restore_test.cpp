@@ -252,14 +252,15 @@ TEST(Restore, TheMapOfAnEarlierSessionStaysAndSoDoesAnEndedOne) {
     first->Drive("r1", kDriver, 0, 60);
     first->End("r1", kDriver);
     ASSERT_TRUE(first->WaitPhase("r1", kDriver, SessionPhase::kEnded));
-    ASSERT_TRUE(first->WaitFor([&] { return first->CurrentTiles().size() >= 4; }));
-    tiles = first->CurrentTiles().size();
     first->Open("r1", kDriver);  // A new session, which has drawn nothing yet.
     ASSERT_TRUE(first->WaitPhase("r1", kDriver, SessionPhase::kActive));
     first->Open("r2", 9);
     first->End("r2", 9);
     ASSERT_TRUE(first->WaitPhase("r2", 9, SessionPhase::kEnded));
+    first->Stop();
+    tiles = first->CurrentTiles().size();
   }
+  ASSERT_GE(tiles, 4U);
   StoredServer second(directory / "0");
   ASSERT_TRUE(second->WaitFor([&] { return second->CurrentTiles().size() == tiles; }))
       << second->CurrentTiles().size() << " of " << tiles;

@@ -17,7 +17,7 @@ TEST(Kill, TwentyKillsChangeNothing) {
   options.cairn = CAIRN_PATH;
   options.directory = directory.path();
   options.robots = 2;
-  options.seconds = 60.0;
+  options.seconds = 45.0;
   options.kills = 20;
   const KilledFleetOutcome outcome = RunKilledFleet(options);
   EXPECT_GE(outcome.kills, 15);
