@@ -17,6 +17,11 @@ struct Particle {
   double log_weight = 0.0;      // Sum since the last resampling.
   double log_likelihood = 0.0;  // Log likelihood of the whole path; resampling keeps it.
   SharedSequence<Pose2> path;   // T_map_robot at every keyframe.
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.T_map_robot, self.covariance, self.log_weight, self.log_likelihood, self.path);
+  }
 };
 
 }  // namespace cairn::slam

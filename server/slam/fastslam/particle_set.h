@@ -86,6 +86,14 @@ class ParticleSet {
   [[nodiscard]] const FilterEstimate& estimate() const { return estimate_; }
   [[nodiscard]] FilterHealth health() const;
 
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    const std::size_t count = self.size();
+    archive(self.rng_, self.particles_, self.errors_, self.spread_share_, self.best_, self.travelled_, self.sample_due_,
+            self.effective_, self.nis_, self.estimate_);
+    archive.Require(self.size() == count && self.best_ < count, "the particles");
+  }
+
  private:
   std::vector<int> Resample(std::vector<double>& left);
   void Summarise(const std::vector<double>& shares);

@@ -12,6 +12,11 @@ class Contradictions {
   void Add(bool explained) { streak_ = explained ? 0 : streak_ + 1; }
   [[nodiscard]] bool diverged() const { return streak_ >= limit_; }
 
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.streak_);
+  }
+
  private:
   std::int64_t limit_;
   std::int64_t streak_ = 0;

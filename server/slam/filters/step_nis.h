@@ -19,6 +19,11 @@ class StepNis {
   [[nodiscard]] double sum() const { return sum_; }
   [[nodiscard]] int numbers() const { return numbers_; }
 
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.sum_, self.numbers_, self.open_);
+  }
+
  private:
   double sum_ = 0.0;
   int numbers_ = 0;

@@ -36,10 +36,26 @@ class KeyframeGraph {
   [[nodiscard]] bool has_loops() const { return size() > 0 && relations_.size() + 1 > size(); }
   [[nodiscard]] const std::vector<PoseRelation>& relations() const { return relations_; }
 
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.relations_, self.travelled_m_, self.loops_);
+    const std::size_t size = self.size();
+    bool sound = self.loops_.size() == size;
+    for (const PoseRelation& relation : self.relations_) sound = sound && relation.from < size && relation.to < size;
+    for (const auto& loops : self.loops_)
+      for (const Loop& loop : loops) sound = sound && loop.other < size && loop.way_m >= 0.0;
+    archive.Require(sound, "the relations between keyframes");
+  }
+
  private:
   struct Loop {
     std::size_t other = 0;
     double way_m = 0.0;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.other, self.way_m);
+    }
   };
 
   MotionNoise drift_;

@@ -41,10 +41,20 @@ class PlaceHypotheses {
   void Clear() { places_.clear(); }
   [[nodiscard]] std::size_t size() const { return places_.size(); }
 
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.places_);
+  }
+
  private:
   struct Place {
     PoseBelief belief;
     double evidence = 0.0;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.belief, self.evidence);
+    }
   };
   PlaceOptions options_;
   std::vector<Place> places_;  // The hypotheses, ordered by evidence, the most first.

@@ -20,6 +20,11 @@ struct PoseBelief {
 
   // The unknown pose (2.19), with 10^4 m and 10^2 rad for infinity.
   [[nodiscard]] static PoseBelief Unknown();
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.T_map_robot, self.covariance);
+  }
 };
 
 // Squared Mahalanobis distance of a hypothesis from the belief.

@@ -46,10 +46,20 @@ class SelfCheck {
   // True from the stretch that contradicts the map until a stretch agrees with it again.
   [[nodiscard]] bool contradicted() const { return contradicted_; }
 
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.looked_at_m_, self.looks_, self.contradicted_);
+  }
+
  private:
   struct Looked {
     double travelled_m = 0.0;
     Testimony testimony;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.travelled_m, self.testimony.borne_out, self.testimony.contradicted);
+    }
   };
   [[nodiscard]] std::vector<std::size_t> Witnesses(std::span<const KeyframeShape> shapes,
                                                    const SharedSequence<Pose2>& path) const;

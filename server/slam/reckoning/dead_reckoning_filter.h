@@ -31,6 +31,12 @@ class DeadReckoningFilter final : public Filter {
     return {path_.T_map_robot(), path_.path()};
   }
   [[nodiscard]] std::vector<Landmark> landmarks() const override { return {}; }
+  void Save(StateWriter& archive) const override { archive(*this); }
+  void Load(StateReader& archive) override { archive(*this); }
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.path_, self.contradictions_);
+  }
 
  private:
   ReckonedPath path_;

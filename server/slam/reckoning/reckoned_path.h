@@ -32,6 +32,11 @@ class ReckonedPath {
   [[nodiscard]] const Eigen::Matrix3d& covariance() const { return covariance_; }
   [[nodiscard]] const SharedSequence<Pose2>& path() const { return path_; }
 
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.pose_, self.covariance_, self.path_);
+  }
+
  private:
   MotionNoise drift_;
   Pose2 pose_;

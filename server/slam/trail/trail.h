@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "server/slam/graph/keyframe_graph.h"
+#include "server/slam/parallel_for.h"
 #include "server/slam/trail/keyframe.h"
 
 namespace cairn::slam {
@@ -53,6 +54,17 @@ class Trail {
   [[nodiscard]] const std::vector<MapperSnapshot::ScanPlace>& scans() const { return scans_; }
   // Steps, revisits and loops; empty as long as no place was seen again.
   [[nodiscard]] std::vector<PoseRelation> relations() const;
+
+  // Without the points of the shapes and the distances, which follow from the rest: after reading, call RestorePoints.
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.keyframes_, self.shapes_, self.graph_, self.scans_);
+    archive.SetKeyframes(self.size());
+    archive.Require(self.shapes_.size() == self.size() && self.graph_.size() == self.size(), "the number of keyframes");
+    for (const auto& scan : self.scans_) archive.RequireKeyframe(scan.keyframe);
+  }
+  // Computes what is not stored; `options` are those of the front-end that gave the points.
+  void RestorePoints(const SurfaceOptions& options, const ParallelFor& parallel_for);
 
  private:
   std::vector<Keyframe> keyframes_;
