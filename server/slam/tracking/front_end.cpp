@@ -269,13 +269,17 @@ void FrontEnd::AddKeyframe(const ScanView& view) {
   keyframe_ = history_.back();
   AppendMoved(keyframe_.T_track_robot, view.points_robot, reference_.emplace_back());
   if (reference_.size() > static_cast<std::size_t>(options_.reference_keyframes)) reference_.pop_front();
-  index_.Clear();
-  for (const auto& points : reference_)
-    for (const SurfacePoint& point : points) index_.Add(point);
 
   keyframe_view_ = view;
   if (!options_.use_odometry)
     keyframe_view_.points_robot = MergedPoints(static_cast<std::size_t>(options_.no_odometry.merged_keyframes));
+  BuildIndices();
+}
+
+void FrontEnd::BuildIndices() {
+  index_.Clear();
+  for (const auto& points : reference_)
+    for (const SurfacePoint& point : points) index_.Add(point);
   keyframe_index_.Clear();
   for (const SurfacePoint& point : keyframe_view_.points_robot) keyframe_index_.Add(point);
 }
