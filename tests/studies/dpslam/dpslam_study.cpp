@@ -243,8 +243,8 @@ void StudyConsistencyOfGrids(StudyContext& context) {
       of_nees.x.push_back(point.travelled_m), of_nees.y.push_back(point.nees);
       of_error.x.push_back(point.travelled_m), of_error.y.push_back(point.position_error_m);
     }
-    const std::string verdict = result.nees_mean > result.nees_high  ? "uncertainty too small"
-                                : result.nees_mean < result.nees_low ? "uncertainty too large"
+    const std::string verdict = result.nees_mean > result.nees_high  ? "overconfident"
+                                : result.nees_mean < result.nees_low ? "underconfident"
                                                                      : "consistent";
     table.Add({name, Number(result.nees_mean, 2), Number(result.nees_low, 2) + " .. " + Number(result.nees_high, 2),
                Percent(1.0 * inside / static_cast<double>(result.points.size()), 0),
