@@ -97,6 +97,13 @@ void WaitForSignal(asio::io_context& context, asio::signal_set& signals, const W
   context.run();
 }
 
+// Later than that of every start before, as long as the clock was not set back in between: nothing is stored.
+Generation NextGeneration() {
+  const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
+  return static_cast<Generation>(
+      std::max<std::int64_t>(1, std::chrono::duration_cast<std::chrono::milliseconds>(since_1970).count()));
+}
+
 int Serve(const CairndOptions& options) {
   StartLogging(options.server.server.log_level);
   // The signal set is made before any thread starts, so that no thread receives the signals instead.
@@ -118,9 +125,10 @@ int Serve(const CairndOptions& options) {
   if (!bus) return failed(bus.error());
   const auto others = OtherServers::Watch(**bus);
   if (!others) return failed(others.error());
-  auto egress = Egress::Open(**bus, outbound);
+  const Generation generation = NextGeneration();
+  auto egress = Egress::Open(**bus, outbound, generation);
   if (!egress) return failed(egress.error());
-  Server server(options.server, inbound, outbound);
+  Server server(options.server, inbound, outbound, generation);
   if (auto started = server.Start(); !started) return failed(started.error());
   auto ingress = Ingress::Open(**bus, inbound, outbound);
   if (!ingress) return failed(ingress.error());

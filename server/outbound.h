@@ -1,9 +1,10 @@
 // What the rooms hand to the doors: plain values over bounded lanes. The only way out.
-// Three lanes, so that a large answer or a whole map never delays a pose: `live` (session states, poses, ledgers,
-// jobs), `map` (map info, tiles), `replies`. Overflow rule: Send never waits and says false; values that describe a
-// state (session, ledger, map, tile, job) stay marked as unsent with their owner, who sends their newest form later; a
-// pose is superseded by the next; a reply is lost and its client's deadline passes. Every refusal is counted, also that
-// of a state that is sent later. Thread rule: any thread.
+// Three lanes, so that a large answer or a whole map never delays a pose: `live` (session states, refusals, poses,
+// ledgers, jobs), `map` (map info, tiles), `replies`. Overflow rule: Send never waits and says false; values that
+// describe a state (session, ledger, map, tile, job) stay marked as unsent with their owner, who sends their newest
+// form later; a pose is superseded by the next; a reply is lost and its client's deadline passes. What was accepted
+// belongs to the door: it sends a state again that DDS did not take. Every refusal is counted, also that of a state
+// that is sent later. Thread rule: any thread.
 #pragma once
 
 #include <array>
@@ -17,7 +18,13 @@
 
 namespace cairn::server {
 
-using OutboundValue = std::variant<SessionState, PoseReport, Ledger, Job, MapInfo, TileSample, Reply>;
+// What the keys of `of` name exists no more: nothing is sent under them until it exists again.
+struct Retired {
+  std::variant<SessionState, PoseReport, Ledger, Job> of;
+};
+
+using OutboundValue =
+    std::variant<SessionState, SessionRefusal, PoseReport, Ledger, Job, Retired, MapInfo, TileSample, Reply>;
 
 class Outbound {
  public:

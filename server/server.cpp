@@ -26,7 +26,7 @@ Stamp ServerClock() {
 
 }  // namespace
 
-Server::Server(const ServerOptions& options, Inbound& inbound, Outbound& outbound)
+Server::Server(const ServerOptions& options, Inbound& inbound, Outbound& outbound, Generation generation)
     : options_(options),
       inbound_(inbound),
       outbound_(outbound),
@@ -39,7 +39,8 @@ Server::Server(const ServerOptions& options, Inbound& inbound, Outbound& outboun
       worker_(
           options.jobs, jobs_,
           [this](const Job& job, bool enable, const JobControl& control) { return smooth_.Run(job, enable, control); }),
-      desk_(static_cast<std::size_t>(options.server.query_queue), outbound, roster_, atlas_, jobs_, worker_),
+      desk_(static_cast<std::size_t>(options.server.query_queue), outbound, roster_, atlas_, jobs_, worker_,
+            generation),
       heartbeat_(
           std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options.server.stall_limit_s))) {}
 

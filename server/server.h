@@ -26,7 +26,8 @@ namespace cairn::server {
 
 class Server {
  public:
-  Server(const ServerOptions& options, Inbound& inbound, Outbound& outbound);
+  // `generation`: of this start of the server; the egress stamps the same one.
+  Server(const ServerOptions& options, Inbound& inbound, Outbound& outbound, Generation generation);
   ~Server();
 
   // Makes the configured sites and starts the threads.

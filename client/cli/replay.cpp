@@ -58,6 +58,20 @@ Result<LogSummary> StreamLog(Program& program, const ReplayArguments& arguments,
   return summary;
 }
 
+// What a server that came and went has cost.
+std::string FormatInterruptions(const RobotStream& stream) {
+  std::string text;
+  if (stream.restarted() > 0) {
+    text += fmt::format("the server lost the session {} times; a new one went on where the robot was\n",
+                        stream.restarted());
+  }
+  if (stream.displaced() > 0) {
+    text += fmt::format("{} samples were given up, because too many waited for the server{}{}\n", stream.displaced(),
+                        stream.spill_error().empty() ? "" : ": ", stream.spill_error());
+  }
+  return text;
+}
+
 ExitCode Replay(Program& program, const ReplayArguments& arguments) {
   // The log is read once without sending: a file that cannot be read must not open a session, and the progress line
   // needs the number of scans.
@@ -89,10 +103,13 @@ ExitCode Replay(Program& program, const ReplayArguments& arguments) {
     text += fmt::format("{} lines of the log could not be read, the first: line {}: {}\n", survey->complaint_count,
                         survey->complaints.front().line, survey->complaints.front().reason);
   }
+  text += FormatInterruptions(**stream);
   nlohmann::json object = account;
   object.update({{"robot", options.robot},
                  {"site", options.site},
                  {"seconds", seconds},
+                 {"restarted", (*stream)->restarted()},
+                 {"displaced", (*stream)->displaced()},
                  {"complaint_count", survey->complaint_count}});
   if (latency.count() > 0) {
     object.update({{"pose_latency_p50_ms", latency.At(0.5)}, {"pose_latency_p99_ms", latency.At(0.99)}});
@@ -130,6 +147,10 @@ void AddReplay(CLI::App& app, Program& program) {
   AddWindowOption(*command, arguments->stream.window);
   AddParsed(*command, "--start", arguments->stream.T_map_robot_start, ParseStart,
             "Where the robot stands in the map when the log begins", "X,Y,THETA");
+  command
+      ->add_option("--spill", arguments->stream.spill_file,
+                   "A new file for what waits for a server that is away, beyond 64 MiB; deleted at the end")
+      ->type_name("FILE");
   command->add_flag("--end", arguments->end, "End the session afterwards; without this it can be resumed");
   AddLogOptions(*command, arguments->reader);
   program.OnChosen(*command, arguments, Replay);

@@ -16,10 +16,13 @@ Result<std::unique_ptr<RobotStream>> RobotStream::Open(Program& program, const S
   request.has_start = options.T_map_robot_start.has_value();
   request.T_map_robot_start = options.T_map_robot_start.value_or(Pose2{});
   RobotClientOptions client_options;
-  client_options.window.window = options.window;
+  client_options.window = options.window;
+  client_options.spill_file = options.spill_file;
   client_options.send_timeout_s = program.options.timeout_s;
   RobotClient::Callbacks callbacks;
   callbacks.pose = [self = stream.get()](const PoseReport& pose) { self->OnPose(pose); };
+  callbacks.ledger = [self = stream.get()](const Ledger& ledger) { self->OnLedger(ledger); };
+  callbacks.restarted = [self = stream.get()](SessionToken session, const Pose2&) { self->OnRestart(session); };
   auto client = RobotClient::Open(**bus, request, program.options.timeout_s, std::move(callbacks), client_options);
   if (!client) return tl::unexpected(client.error());
   stream->client_ = std::move(*client);
@@ -27,7 +30,11 @@ Result<std::unique_ptr<RobotStream>> RobotStream::Open(Program& program, const S
   // A query and not a subscription: before the first scan of a stream, no ledger of it is published.
   const auto before = stream->AskLedger(program);
   if (!before) return tl::unexpected(before.error());
-  stream->before_ = *before;
+  const std::lock_guard lock(stream->mutex_);
+  if (stream->restarted_ == 0) {
+    stream->session_ = stream->client_->session().session;
+    stream->before_ = *before;
+  }
   return stream;
 }
 
@@ -47,9 +54,31 @@ Result<Ledger> RobotStream::AskLedger(Program& program) const {
 void RobotStream::OnPose(const PoseReport& pose) {
   const auto now = Clock::now();
   const std::lock_guard lock(mutex_);
-  const Departure& departure = departures_[pose.scan_sequence % kRemembered];
-  if (pose.scan_sequence == 0 || departure.sequence != pose.scan_sequence) return;
+  Departure& departure = DepartureOf(pose.stamp);
+  if (!departure.waiting || departure.stamp != pose.stamp) return;
+  departure.waiting = false;
   latency_ms_.Add(std::chrono::duration<double, std::milli>(now - departure.time).count());
+}
+
+// By stamp, because a new session numbers the scans anew.
+RobotStream::Departure& RobotStream::DepartureOf(Stamp stamp) {
+  return departures_[static_cast<std::uint64_t>(stamp) * 0x9E3779B97F4A7C15ULL % kRemembered];
+}
+
+void RobotStream::OnLedger(const Ledger& ledger) {
+  const std::lock_guard lock(mutex_);
+  if (ledger.sensor_id == HashName(options_.sensor) && ledger.session == session_) last_ = ledger;
+}
+
+// What the old session settled stays counted; what it did not is sent again in the new one.
+void RobotStream::OnRestart(SessionToken session) {
+  const std::lock_guard lock(mutex_);
+  closed_.Add(AccountScans(0, before_, last_.value_or(before_)));
+  closed_.waiting = 0;
+  before_ = {};
+  last_.reset();
+  session_ = session;
+  ++restarted_;
 }
 
 // A robot would go on waiting for its server. For a log or a simulation, a lost server is an error.
@@ -66,11 +95,11 @@ Result<void> RobotStream::CheckServer() {
 Result<void> RobotStream::Send(LogRecord&& record) {
   if (auto there = CheckServer(); !there) return there;
   if (const auto* odometry = std::get_if<Odometry>(&record)) return client_->Publish(*odometry);
-  auto& scan = std::get<Scan>(record);
-  scan.sequence = ++sent_;
+  const auto& scan = std::get<Scan>(record);
+  ++sent_;
   if (options_.measure_latency) {
     const std::lock_guard lock(mutex_);
-    departures_[sent_ % kRemembered] = {sent_, Clock::now()};
+    DepartureOf(scan.stamp) = {scan.stamp, Clock::now(), true};
   }
   return client_->Publish(scan);
 }
@@ -85,7 +114,15 @@ Result<void> RobotStream::End() {
 }
 
 ScanAccount RobotStream::account() const {
-  return AccountScans(sent_, before_, client_->ledger(options_.sensor).value_or(before_));
+  const std::lock_guard lock(mutex_);
+  ScanAccount account = AccountScans(sent_, before_, last_.value_or(before_));
+  account.Add(closed_);
+  return account;
+}
+
+int RobotStream::restarted() const {
+  const std::lock_guard lock(mutex_);
+  return restarted_;
 }
 
 Percentiles RobotStream::latency_ms() const {

@@ -29,6 +29,7 @@ struct StreamOptions {
   // server drops scans that come too fast.
   std::uint64_t window = 0;
   bool measure_latency = true;  // Not useful where a scan first waits for room in the window.
+  std::string spill_file = {};  // For samples that have to wait for the server, beyond what fits into memory.
 };
 
 class RobotStream {
@@ -46,6 +47,10 @@ class RobotStream {
 
   [[nodiscard]] std::uint64_t sent() const { return sent_; }
   [[nodiscard]] ScanAccount account() const;
+  // New sessions that a server which had lost the one before made necessary.
+  [[nodiscard]] int restarted() const;
+  [[nodiscard]] std::uint64_t displaced() const { return client_->displaced(); }
+  [[nodiscard]] std::string spill_error() const { return client_->spill_error(); }
   // Publication to pose, milliseconds.
   [[nodiscard]] Percentiles latency_ms() const;
 
@@ -54,22 +59,30 @@ class RobotStream {
   static constexpr std::size_t kRemembered = 4096;  // Scans whose time of sending is kept.
 
   struct Departure {
-    std::uint64_t sequence = 0;
+    Stamp stamp = 0;
     Clock::time_point time;
+    bool waiting = false;
   };
 
   RobotStream(const StreamOptions& options, double timeout_s) : options_(options), timeout_s_(timeout_s) {}
   [[nodiscard]] Result<Ledger> AskLedger(Program& program) const;
   void OnPose(const PoseReport& pose);
+  void OnLedger(const Ledger& ledger);
+  void OnRestart(SessionToken session);
+  [[nodiscard]] Departure& DepartureOf(Stamp stamp);
   [[nodiscard]] Result<void> CheckServer();
 
   const StreamOptions options_;
   const double timeout_s_;
   std::uint64_t sent_ = 0;
   Clock::time_point connected_ = Clock::now();  // The last time at which a server was connected.
-  Ledger before_;                               // The ledger before the first scan; not zero in a resumed session.
 
   mutable std::mutex mutex_;
+  SessionToken session_ = 0;
+  Ledger before_;               // The ledger before the session's first scan; not zero where a session is resumed.
+  std::optional<Ledger> last_;  // The newest one of the session.
+  ScanAccount closed_;          // Of sessions that a restarted server did not know.
+  int restarted_ = 0;
   std::array<Departure, kRemembered> departures_{};
   Percentiles latency_ms_;
 

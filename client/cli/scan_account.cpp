@@ -6,6 +6,14 @@
 
 namespace cairn::client {
 
+void ScanAccount::Add(const ScanAccount& other) {
+  sent += other.sent;
+  used += other.used;
+  keyframes += other.keyframes;
+  waiting += other.waiting;
+  for (std::size_t i = 0; i < dropped.size(); ++i) dropped[i] += other.dropped[i];
+}
+
 std::uint64_t ScanAccount::dropped_total() const {
   return std::accumulate(dropped.begin(), dropped.end(), std::uint64_t{0});
 }

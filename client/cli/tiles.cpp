@@ -40,11 +40,13 @@ ExitCode ShowTiles(Program& program, const TilesArguments& arguments) {
     text += fmt::format("level {}  x {:4d}  y {:4d}  version {:8d}  {:6d} bytes\n", tile.key.level, tile.key.x,
                         tile.key.y, tile.version, tile.bytes.size());
   }
-  text += fmt::format("{} tiles, {} bytes, epoch {}, version {}\n", answer->tiles.size(), bytes, answer->epoch,
-                      answer->version);
-  return program.Print(
-      text,
-      {{"tiles", answer->tiles}, {"bytes", bytes}, {"map_epoch", answer->epoch}, {"map_version", answer->version}});
+  text += fmt::format("{} tiles, {} bytes, generation {}, epoch {}, version {}\n", answer->tiles.size(), bytes,
+                      answer->generation, answer->epoch, answer->version);
+  return program.Print(text, {{"tiles", answer->tiles},
+                              {"bytes", bytes},
+                              {"generation", answer->generation},
+                              {"map_epoch", answer->epoch},
+                              {"map_version", answer->version}});
 }
 
 }  // namespace
@@ -54,9 +56,9 @@ void AddTiles(CLI::App& app, Program& program) {
   command->footer(
       "A tile has 128 x 128 cells; level 0 is the finest, each further level halves the resolution.\n"
       "With --since-version only the tiles that changed after that version are listed. If the map is no longer in the\n"
-      "epoch given by --since-epoch, all tiles are listed.\n"
+      "epoch given by --since-epoch, or the server was started since (--since-generation), all tiles are listed.\n"
       "EXAMPLES\n  cairn tiles --site hall --level 2\n  cairn tiles --site hall --area -5,-5,20,10 -o tiles/\n"
-      "  cairn tiles --site hall --since-epoch 1 --since-version 420");
+      "  cairn tiles --site hall --since-generation 1700000000000 --since-epoch 1 --since-version 420");
   auto arguments = std::make_shared<TilesArguments>();
   TileQuery& query = arguments->query;
   command->add_option("--site", query.site, "The site's name")->required();
@@ -64,6 +66,8 @@ void AddTiles(CLI::App& app, Program& program) {
   AddParsed(*command, "--area", query.area, ParseArea, "Only tiles that touch this area", "XMIN,YMIN,XMAX,YMAX");
   auto* version = command->add_option("--since-version", query.since_version, "Only tiles changed after this version");
   command->add_option("--since-epoch", query.since_epoch, "The epoch that version belongs to")->needs(version);
+  command->add_option("--since-generation", query.since_generation, "The server's generation that both belong to")
+      ->needs(version);
   command->add_option("-o,--output", arguments->directory, "Directory to save the tiles into (L<level>_<x>_<y>.png)")
       ->type_name("DIR");
   program.OnChosen(*command, arguments, ShowTiles);

@@ -14,7 +14,8 @@ Result<std::unique_ptr<PoseClient>> PoseClient::Create(wire::Bus& bus, const std
 }
 
 void PoseClient::OnPose(PoseReport&& pose) {
-  if (pose.robot_id != robot_id_) return;
+  if (pose.robot_id != robot_id_ || pose.generation < generation_) return;
+  generation_ = pose.generation;
   // A refused value is not moved from (BoundedChannel::TryPush).
   while (!waiting_.TryPush(std::move(pose))) {  // NOLINT(bugprone-use-after-move)
     if (waiting_.TryPop()) ++dropped_;

@@ -1,5 +1,6 @@
 // Follows the poses that the server publishes for one robot. Not a history: it hears only what is published while it
-// exists, and where the reader is slow, the oldest waiting poses are dropped. (QueryClient::Path has all poses.)
+// exists, and where the reader is slow, the oldest waiting poses are dropped. Poses of an earlier generation of the
+// server than one heard before are ignored. (QueryClient::Path has all poses.)
 // Thread rule: every method from any thread, but Next not from a callback of the wire.
 #pragma once
 
@@ -33,6 +34,7 @@ class PoseClient {
   const NameId robot_id_;
   BoundedChannel<PoseReport> waiting_{kMaxWaiting};
   std::atomic<std::uint64_t> dropped_ = 0;
+  Generation generation_ = 0;                  // Callbacks come one at a time.
   std::unique_ptr<wire::Subscription> poses_;  // Last: its callback uses everything above.
 };
 

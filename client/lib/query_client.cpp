@@ -169,10 +169,11 @@ Result<TileAnswer> QueryClient::Tiles(const TileQuery& query) {
   Request request = AboutSite(RequestKind::kTiles, query.site);
   request.area = query.area;
   request.level = query.level;
+  request.since_generation = query.since_generation;
   request.since_epoch = query.since_epoch;
   request.since_version = query.since_version;
   return Ask(request).map([](Reply&& reply) {
-    return TileAnswer{reply.map_epoch, reply.map_version, std::move(reply.tiles)};
+    return TileAnswer{reply.generation, reply.map_epoch, reply.map_version, std::move(reply.tiles)};
   });
 }
 

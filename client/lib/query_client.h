@@ -32,6 +32,7 @@ struct PathAnswer {
 
 // A part of the map as it was at one moment.
 struct TileAnswer {
+  Generation generation = 0;  // Of the server; epoch and version belong to it.
   std::uint32_t epoch = 0;
   std::uint64_t version = 0;
   std::vector<Tile> tiles;
@@ -41,7 +42,9 @@ struct TileQuery {
   std::string site;
   Area area;                // Only tiles that touch it. The default is the whole map.
   std::uint32_t level = 0;  // Level of the pyramid; 0 is the finest.
-  // Only tiles that changed after this version of this epoch. Where the map has another epoch by now, all tiles come.
+  // Only tiles that changed after this version of this epoch of this generation. Where the map has another epoch by
+  // now, or the server another generation, all tiles come.
+  Generation since_generation = 0;
   std::uint32_t since_epoch = 0;
   std::uint64_t since_version = 0;
 };

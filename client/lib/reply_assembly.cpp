@@ -14,6 +14,12 @@ void Append(std::vector<T>& all, std::vector<T>&& more) {
 }  // namespace
 
 void ReplyAssembly::Add(Reply&& part) {
+  if (part.generation < generation_) return;
+  if (part.generation > generation_) {
+    generation_ = part.generation;
+    parts_.clear();
+    last_seen_ = false;
+  }
   if (part.part >= kMaxParts || (last_seen_ && part.part > last_part_)) return;
   if (part.last) {
     last_seen_ = true;
@@ -37,6 +43,7 @@ Reply ReplyAssembly::Take() {
   whole.client = last.client;
   whole.sequence = last.sequence;
   whole.status = std::move(last.status);
+  whole.generation = last.generation;
   whole.map_epoch = last.map_epoch;
   whole.map_version = last.map_version;
   whole.server_version = std::move(last.server_version);

@@ -10,7 +10,8 @@ namespace cairn::client {
 
 class ReplyAssembly {
  public:
-  // A part, in whatever order. A part seen before is ignored.
+  // A part, in whatever order. A part seen before is ignored. Parts of two generations are never put together: those of
+  // the lower one are dropped.
   void Add(Reply&& part);
   [[nodiscard]] bool complete() const { return last_seen_ && parts_.size() == last_part_ + std::size_t{1}; }
   [[nodiscard]] std::size_t parts() const { return parts_.size(); }
@@ -21,6 +22,7 @@ class ReplyAssembly {
   static constexpr std::size_t kMaxParts = 65536;  // No honest answer has more.
 
   std::map<std::uint32_t, Reply> parts_;
+  Generation generation_ = 0;
   bool last_seen_ = false;
   std::uint32_t last_part_ = 0;
 };

@@ -12,25 +12,43 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Odometry belongs to the robot and not to one of its lasers, so its stream has a name of its own.
-constexpr char kOdometrySensor[] = "odometry";
+constexpr std::chrono::seconds kAskPeriod{1};  // Between two requests without an answer.
+// How long a new session waits for odometry after its first scan, which tells exactly where the robot was.
+constexpr std::chrono::milliseconds kOdometryPatience{500};
+
+// Errors that may be gone when the client asks again.
+bool IsTemporary(StatusCode code) {
+  return code == StatusCode::kUnavailable || code == StatusCode::kResourceExhausted;
+}
 
 }  // namespace
 
 RobotClient::RobotClient(SessionRequest request, Callbacks callbacks, const RobotClientOptions& options)
-    : request_(std::move(request)),
-      robot_id_(HashName(request_.robot)),
+    : client_(NewClientId()),
+      robot_id_(HashName(request.robot)),
       callbacks_(std::move(callbacks)),
       options_(options),
+      request_(std::move(request)),
+      backlog_(options.max_kept_bytes),
       progress_(Clock::now()) {
-  request_.client = NewClientId();
+  const MutexLock lock(mutex_);
+  request_.client = client_;
+  request_.session = NewClientId();
+  request_.started = request_.end = false;
   for (const std::string& sensor : request_.sensors) streams_.try_emplace(HashName(sensor), options.window);
+  streams_.try_emplace(HashName(kOdometrySensor), 0);
 }
 
 Result<std::unique_ptr<RobotClient>> RobotClient::Open(wire::Bus& bus, SessionRequest request, double timeout_s,
                                                        Callbacks callbacks, const RobotClientOptions& options) {
   if (request.sensors.empty()) return Fail(StatusCode::kInvalidArgument, "a session needs at least one sensor");
   std::unique_ptr<RobotClient> client(new RobotClient(std::move(request), std::move(callbacks), options));
+  if (!options.spill_file.empty()) {
+    auto file = SpillFile::Create(options.spill_file);
+    if (!file) return tl::unexpected(file.error());
+    const MutexLock lock(client->mutex_);
+    client->backlog_.SpillTo(std::move(*file));
+  }
   if (auto connected = client->Connect(bus); !connected) return tl::unexpected(connected.error());
   if (auto opened = client->AwaitSession(bus, timeout_s); !opened) return tl::unexpected(opened.error());
   client->watcher_ = std::thread([self = client.get()] { self->Watch(); });
@@ -53,12 +71,6 @@ Result<void> RobotClient::Connect(wire::Bus& bus) {
     subscriptions_.push_back(std::move(*subscription));
     return {};
   };
-  // Subscriptions first, so that no answer is missed.
-  if (auto kept = keep(bus.Subscribe<SessionState>([this](SessionState&& s) { OnSession(std::move(s)); })); !kept) {
-    return kept;
-  }
-  if (auto kept = keep(bus.Subscribe<Ledger>([this](Ledger&& l) { OnLedger(std::move(l)); })); !kept) return kept;
-  if (auto kept = keep(bus.Subscribe<PoseReport>([this](PoseReport&& p) { OnPose(std::move(p)); })); !kept) return kept;
   const auto advertise = [&bus](auto& publication) -> Result<void> {
     using Value = typename std::remove_reference_t<decltype(*publication)>::ValueType;
     auto made = bus.Advertise<Value>();
@@ -69,29 +81,107 @@ Result<void> RobotClient::Connect(wire::Bus& bus) {
   if (auto made = advertise(scans_); !made) return made;
   if (auto made = advertise(odometry_); !made) return made;
   if (auto made = advertise(session_); !made) return made;
-  return session_->Publish(request_);  // Kept for a server that comes later.
+  // Subscriptions before the request, so that no answer is missed.
+  wire::SubscriptionEvents events;
+  events.matched = [this](int servers) { OnMatched(servers); };
+  if (auto kept = keep(bus.Subscribe<SessionState>([this](SessionState&& s) { OnSession(std::move(s)); }, events));
+      !kept) {
+    return kept;
+  }
+  if (auto kept = keep(bus.Subscribe<SessionRefusal>([this](SessionRefusal&& r) { OnRefusal(std::move(r)); })); !kept) {
+    return kept;
+  }
+  if (auto kept = keep(bus.Subscribe<Ledger>([this](Ledger&& l) { OnLedger(std::move(l)); })); !kept) return kept;
+  if (auto kept = keep(bus.Subscribe<PoseReport>([this](PoseReport&& p) { OnPose(std::move(p)); })); !kept) return kept;
+  Ask();  // Kept by the middleware for a server that comes later.
+  return {};
 }
 
 Result<void> RobotClient::AwaitSession(const wire::Bus& bus, double timeout_s) {
   const auto deadline = DeadlineAfter(timeout_s);
-  const MutexLock lock(mutex_);
-  // The streams must have found the server as well: what is sent before that is lost.
-  while (!state_ || (state_->phase == SessionPhase::kActive && (scans_->matched() == 0 || odometry_->matched() == 0))) {
-    if (Clock::now() >= deadline) return Fail(StatusCode::kUnavailable, NoServer(bus, timeout_s));
-    changed_.WaitFor(mutex_, std::chrono::milliseconds(5));
+  for (;;) {
+    {
+      const MutexLock lock(mutex_);
+      if (over_) return tl::unexpected(*over_);
+      if (state_ && state_->phase == SessionPhase::kEnded)
+        return Fail(StatusCode::kFailedPrecondition, fmt::format("the session of '{}' is not active", request_.robot));
+      // The streams must have found the server as well: what is sent before that is lost.
+      if (Streaming()) return {};
+      if (Clock::now() >= deadline) return Fail(StatusCode::kUnavailable, NoServer(bus, timeout_s));
+      changed_.WaitFor(mutex_, std::chrono::milliseconds(5));
+      if (Answered() || Clock::now() - asked_ < kAskPeriod) continue;
+    }
+    Ask();
   }
-  if (state_->phase == SessionPhase::kActive) return {};
-  if (!state_->status.ok()) return tl::unexpected(state_->status);
-  return Fail(StatusCode::kFailedPrecondition, fmt::format("the session of '{}' is not active", request_.robot));
+}
+
+// Publishes the request as it is now.
+void RobotClient::Ask() {
+  SessionRequest request;
+  {
+    const MutexLock lock(mutex_);
+    request = request_;
+    asked_ = Clock::now();
+  }
+  static_cast<void>(session_->Publish(request));  // What was not accepted is asked again.
+}
+
+bool RobotClient::Answered() const {
+  return answered_ && state_->phase != SessionPhase::kSuspended && state_->generation == generation_;
+}
+
+bool RobotClient::Streaming() const {
+  return Answered() && !over_ && !reopening_ && state_->phase == SessionPhase::kActive && scans_->matched() > 0 &&
+         odometry_->matched() > 0;
+}
+
+void RobotClient::OnMatched(int servers) {
+  const MutexLock lock(mutex_);
+  if (servers == 0) answered_ = false;
+  changed_.NotifyAll();
 }
 
 void RobotClient::OnSession(SessionState&& state) {
-  if (state.robot_id != robot_id_ || state.client != request_.client) return;
+  if (state.robot_id != robot_id_) return;
   {
     const MutexLock lock(mutex_);
-    // The state is published again after one side was away: a new server, or a lease that ran out.
-    if (state.phase == SessionPhase::kActive && state_) resend_ = true;
+    if (state.generation < generation_) return;
+    if (state.session != request_.session) {
+      // In the place of an opened session there is another one.
+      if (Answered() && state.generation == generation_ && state.phase == SessionPhase::kActive) {
+        over_ = {StatusCode::kAlreadyExists,
+                 fmt::format("another client has taken over the session of '{}'", request_.robot)};
+        changed_.NotifyAll();
+      }
+      return;
+    }
+    generation_ = state.generation;
+    // The server or this client was away: what is not safe goes again.
+    if (!Answered()) {
+      sent_before_ = backlog_.size() - backlog_.unsent();
+      backlog_.Rewind();
+      progress_ = Clock::now();
+    }
     state_ = state;
+    answered_ = true;
+    changed_.NotifyAll();
+  }
+  if (callbacks_.session) callbacks_.session(state);
+}
+
+void RobotClient::OnRefusal(SessionRefusal&& refusal) {
+  SessionState& state = refusal.state;
+  if (state.robot_id != robot_id_ || state.client != client_) return;
+  {
+    const MutexLock lock(mutex_);
+    if (state.generation < generation_ || state.session != request_.session) return;
+    generation_ = state.generation;
+    if (state_ && IsTemporary(state.status.code)) return;
+    if (request_.started && !request_.end && state.status.code == StatusCode::kFailedPrecondition) {
+      if (!std::exchange(reopening_, true)) refused_ = Clock::now();
+    } else {
+      over_ = state.status;
+    }
     changed_.NotifyAll();
   }
   if (callbacks_.session) callbacks_.session(state);
@@ -101,12 +191,17 @@ void RobotClient::OnLedger(Ledger&& ledger) {
   if (ledger.robot_id != robot_id_) return;
   {
     const MutexLock lock(mutex_);
-    const auto stream = streams_.find(ledger.sensor_id);
-    if (stream == streams_.end()) return;
-    const std::uint64_t before = stream->second.window.settled_through();
-    stream->second.window.OnLedger(ledger);
-    if (stream->second.window.settled_through() != before) progress_ = Clock::now();
-    stream->second.ledger = ledger;
+    const auto found = streams_.find(ledger.sensor_id);
+    // A ledger of another session counts other samples, and one that came before the session's state waits for it.
+    if (found == streams_.end() || !state_ || ledger.session != request_.session || ledger.generation < generation_)
+      return;
+    generation_ = ledger.generation;
+    Stream& stream = found->second;
+    const std::uint64_t before = stream.window.settled_through();
+    stream.window.OnLedger(ledger);
+    if (stream.window.settled_through() != before) progress_ = Clock::now();
+    stream.ledger = ledger;
+    backlog_.Safe(ledger.sensor_id, state_->durable ? ledger.durable_through : ledger.settled_through);
     changed_.NotifyAll();
   }
   if (callbacks_.ledger) callbacks_.ledger(ledger);
@@ -116,75 +211,17 @@ void RobotClient::OnPose(PoseReport&& report) {
   if (report.robot_id != robot_id_) return;
   {
     const MutexLock lock(mutex_);
+    if (report.generation < generation_ || !state_) return;
     pose_ = report;
   }
   if (callbacks_.pose) callbacks_.pose(report);
-}
-
-Result<void> RobotClient::AwaitRoom(const Stream& stream) {
-  const auto deadline = DeadlineAfter(options_.send_timeout_s);
-  for (;;) {
-    const bool over = state_->phase == SessionPhase::kRefused || state_->phase == SessionPhase::kEnded;
-    if (over && !state_->status.ok()) return tl::unexpected(state_->status);
-    if (over)
-      return Fail(StatusCode::kFailedPrecondition, fmt::format("the session of '{}' has ended", request_.robot));
-    if (stream.window.HasRoom()) return {};
-    if (Clock::now() >= deadline) {
-      return Fail(StatusCode::kUnavailable,
-                  fmt::format("the server settled no scan of '{}' for {:.1f} s ({} sent, {} settled)", request_.robot,
-                              options_.send_timeout_s, stream.window.sent(), stream.window.settled_through()));
-    }
-    changed_.WaitUntil(mutex_, deadline);
-  }
-}
-
-Result<void> RobotClient::Publish(const Scan& scan) {
-  return Publish(scan, request_.sensors.front());
-}
-
-Result<void> RobotClient::Publish(const Scan& scan, const std::string& sensor) {
-  const NameId sensor_id = HashName(sensor);
-  const ScanSample sample{{robot_id_, sensor_id, request_.client}, scan};
-  for (;;) {
-    {
-      const MutexLock lock(mutex_);
-      const auto stream = streams_.find(sensor_id);
-      if (stream == streams_.end()) {
-        return Fail(StatusCode::kInvalidArgument, fmt::format("sensor '{}' is not part of the session", sensor));
-      }
-      if (auto room = AwaitRoom(stream->second); !room) return room;
-    }
-    const MutexLock sending(sending_);
-    ScanWindow::Kept kept;
-    {
-      const MutexLock lock(mutex_);
-      ScanWindow& window = streams_.find(sensor_id)->second.window;
-      if (!window.HasRoom()) continue;  // Another thread was faster.
-      if (window.settled()) progress_ = Clock::now();
-      kept = window.Add(ScanSample(sample));
-    }
-    auto published = scans_->Publish(*kept);
-    // Where the writer was busy, the watcher sends the scan again, because it is kept. A scan that can never be sent is
-    // the caller's error.
-    if (!published && published.error().code != StatusCode::kUnavailable) return published;
-    return {};
-  }
-}
-
-Result<void> RobotClient::Publish(const Odometry& odometry) {
-  OdometrySample sample{{robot_id_, HashName(kOdometrySensor), request_.client}, odometry};
-  {
-    const MutexLock lock(mutex_);
-    if (sample.odometry.sequence == 0) sample.odometry.sequence = odometry_sequence_ + 1;
-    odometry_sequence_ = sample.odometry.sequence;
-  }
-  return odometry_->Publish(sample);
 }
 
 Result<void> RobotClient::WaitSettled(double timeout_s) {
   const auto deadline = DeadlineAfter(timeout_s);
   const MutexLock lock(mutex_);
   for (const auto& [sensor, stream] : streams_) {
+    if (sensor == HashName(kOdometrySensor)) continue;
     while (!stream.window.settled()) {
       if (Clock::now() >= deadline) {
         return Fail(StatusCode::kDeadlineExceeded,
@@ -198,71 +235,113 @@ Result<void> RobotClient::WaitSettled(double timeout_s) {
 }
 
 Result<void> RobotClient::End(double timeout_s) {
-  SessionRequest end = request_;
-  end.end = true;
-  if (auto published = session_->Publish(end); !published) return published;
-  const auto deadline = DeadlineAfter(timeout_s);
-  const MutexLock lock(mutex_);
-  while (state_->phase != SessionPhase::kEnded) {
-    if (Clock::now() >= deadline) {
-      return Fail(StatusCode::kDeadlineExceeded,
-                  fmt::format("the server did not end the session of '{}' within {:.1f} s", request_.robot, timeout_s));
-    }
-    changed_.WaitUntil(mutex_, deadline);
+  {
+    const MutexLock lock(mutex_);
+    request_.end = true;
   }
-  return {};
-}
-
-// Runs until the client is destroyed: sends kept scans again after the session was resumed, or when none of them was
-// settled for resend_after_s.
-void RobotClient::Watch() {
+  const auto deadline = DeadlineAfter(timeout_s);
+  Ask();
   for (;;) {
     {
       const MutexLock lock(mutex_);
-      changed_.WaitFor(mutex_, std::chrono::milliseconds(100));
-      if (stopping_) return;
-      bool waiting = false;
-      for (const auto& [sensor, stream] : streams_) waiting = waiting || !stream.window.settled();
-      const bool stuck = waiting && Clock::now() - progress_ > std::chrono::duration<double>(options_.resend_after_s);
-      if (state_->phase != SessionPhase::kActive || !(resend_ || stuck)) continue;
-      resend_ = false;
-      progress_ = Clock::now();
+      if (state_->phase == SessionPhase::kEnded) return {};
+      if (over_) return tl::unexpected(*over_);
+      if (Clock::now() >= deadline) {
+        return Fail(
+            StatusCode::kDeadlineExceeded,
+            fmt::format("the server did not end the session of '{}' within {:.1f} s", request_.robot, timeout_s));
+      }
+      changed_.WaitUntil(mutex_, std::min(deadline, asked_ + kAskPeriod));
+      if (Clock::now() - asked_ < kAskPeriod) continue;
     }
-    if (session_->matched() > 0 && scans_->matched() > 0) Resend();
+    Ask();
   }
 }
 
-void RobotClient::Resend() {
-  // Less than the writer's depth, so that nothing is overwritten before it has arrived.
-  constexpr int kBurst = 32;
-  constexpr std::chrono::milliseconds kBurstTime{1000};
-  const MutexLock sending(sending_);
-  std::vector<ScanWindow::Kept> kept;
-  {
-    const MutexLock lock(mutex_);
-    for (const auto& [sensor, stream] : streams_) {
-      for (ScanWindow::Kept& sample : stream.window.kept()) kept.push_back(std::move(sample));
-    }
-  }
-  int burst = 0;
-  for (const ScanWindow::Kept& sample : kept) {
+// Runs until the client is destroyed: repeats the request until it is answered, opens a new session where the server
+// does not know this one, and sends what has not been sent, or was not settled for resend_after_s.
+void RobotClient::Watch() {
+  for (;;) {
+    bool ask = false;
+    bool reopen = false;
     {
       const MutexLock lock(mutex_);
+      if (!stopping_) changed_.WaitFor(mutex_, std::chrono::milliseconds(100));
       if (stopping_) return;
+      const auto now = Clock::now();
+      bool waiting = false;
+      for (const auto& [sensor, stream] : streams_) waiting = waiting || !stream.window.settled();
+      if (waiting && Streaming() && now - progress_ > std::chrono::duration<double>(options_.resend_after_s)) {
+        sent_before_ = backlog_.size() - backlog_.unsent();
+        backlog_.Rewind();
+        progress_ = now;
+        ask = true;  // The server may have forgotten the session, too.
+      }
+      reopen = reopening_ && ReadyToReopen();
+      const bool over = over_ || state_->phase == SessionPhase::kEnded || reopening_;
+      ask = ask || (!Answered() && !over && session_->matched() > 0 && now - asked_ >= kAskPeriod);
     }
-    // Counted first: the server may settle the sample before Publish returns.
-    resent_.fetch_add(1, std::memory_order_relaxed);
-    if (!scans_->Publish(*sample)) {
-      resent_.fetch_sub(1, std::memory_order_relaxed);
-      return;  // The writer is still blocked; Watch tries again.
-    }
-    if (++burst % kBurst == 0) static_cast<void>(scans_->WaitForAcknowledgement(kBurstTime));
+    if (reopen) Reopen();
+    if (ask) Ask();
+    Pump();
   }
+}
+
+// A new session begins with its first scan: only then it is known where the robot is at its start.
+bool RobotClient::ReadyToReopen() const {
+  if (!backlog_.HasScan()) return false;
+  const auto odometry = backlog_.OdometryAtFirstScan();
+  return (odometry && odometry->complete) || Clock::now() - refused_ > kOdometryPatience;
+}
+
+// The last reported pose, or else the first start, carried on by the odometry since.
+Pose2 RobotClient::StartOfNextSession() const {
+  const Pose2 first = request_.has_start ? request_.T_map_robot_start : Pose2{};
+  const auto odometry = backlog_.OdometryAtFirstScan();
+  if (!odometry) return pose_ ? pose_->T_map_robot : first;
+  if (pose_) return pose_->T_map_odom * odometry->T_odom_robot;
+  if (!T_odom_robot_start_) return first;
+  return first * Between(*T_odom_robot_start_, odometry->T_odom_robot);
+}
+
+void RobotClient::Reopen() {
+  SessionToken session = 0;
+  Pose2 start;
+  {
+    const MutexLock sending(sending_);
+    const MutexLock lock(mutex_);
+    start = StartOfNextSession();
+    session = NewClientId();
+    request_.session = session;
+    request_.has_start = true;
+    request_.T_map_robot_start = start;
+    request_.started = false;
+    // Should this session be lost before its first pose, the next one goes on from here.
+    if (const auto odometry = backlog_.OdometryAtFirstScan()) T_odom_robot_start_ = odometry->T_odom_robot;
+    pose_.reset();
+    sent_before_ = backlog_.size() - backlog_.unsent();
+    const std::map<NameId, std::uint64_t> highest = backlog_.MoveTo(session);
+    for (auto& [sensor_id, stream] : streams_) {
+      const auto sent = highest.find(sensor_id);
+      stream.window.Restart(sent == highest.end() ? 0 : sent->second);
+    }
+    answered_ = false;
+    reopening_ = false;
+    restarted_.fetch_add(1, std::memory_order_relaxed);
+  }
+  if (callbacks_.restarted) callbacks_.restarted(session, start);
+  Ask();
 }
 
 SessionState RobotClient::session() const {
   const MutexLock lock(mutex_);
-  return *state_;
+  SessionState state = *state_;
+  state.session = request_.session;
+  if (over_) {
+    state.phase = SessionPhase::kRefused;
+    state.status = *over_;
+  }
+  return state;
 }
 
 std::optional<PoseReport> RobotClient::pose() const {
@@ -271,13 +350,24 @@ std::optional<PoseReport> RobotClient::pose() const {
 }
 
 std::optional<Ledger> RobotClient::ledger() const {
-  return ledger(request_.sensors.front());
+  const MutexLock lock(mutex_);
+  return streams_.find(HashName(request_.sensors.front()))->second.ledger;
 }
 
 std::optional<Ledger> RobotClient::ledger(const std::string& sensor) const {
   const MutexLock lock(mutex_);
   const auto stream = streams_.find(HashName(sensor));
   return stream == streams_.end() ? std::nullopt : stream->second.ledger;
+}
+
+std::uint64_t RobotClient::displaced() const {
+  const MutexLock lock(mutex_);
+  return backlog_.displaced();
+}
+
+std::string RobotClient::spill_error() const {
+  const MutexLock lock(mutex_);
+  return backlog_.spill_error();
 }
 
 }  // namespace cairn::client

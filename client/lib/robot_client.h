@@ -1,8 +1,10 @@
 // A robot's side of its session: opens it, streams scans and odometry no faster than the server settles them, keeps
 // what the server may need again, and sends that again after either side was away. Reports the server's ledger and
-// poses. Scans that the server refused are counted in the ledger and not sent again. Thread rule:
-// every method from any thread; callbacks run on the wire's threads and must return soon. Destroying it without End
-// leaves the session suspended, to be taken up by a client of the same robot.
+// poses. Scans that the server refused are counted in the ledger and not sent again.
+// Where the server no longer knows the session (it was started anew without its state), the client opens a new one by
+// itself, where the robot is by then, and sends again in it what was not safe. Thread rule:
+// every method from any thread; callbacks run on the wire's threads or the client's own and must return soon.
+// Destroying it without End leaves the session suspended, to be taken up by a client of the same robot.
 #pragma once
 
 #include <atomic>
@@ -13,6 +15,7 @@
 #include <string>
 #include <thread>
 
+#include "client/lib/backlog.h"
 #include "client/lib/scan_window.h"
 #include "common/mutex.h"
 #include "common/service/pose_report.h"
@@ -21,9 +24,11 @@
 namespace cairn::client {
 
 struct RobotClientOptions {
-  ScanWindowOptions window;     // One window per sensor.
-  double send_timeout_s = 5.0;  // How long Publish waits for room before it gives up.
-  double resend_after_s = 2.0;  // Without progress of the ledger, unsettled scans are sent again.
+  std::uint64_t window = 32;                            // Of each sensor (ScanWindow).
+  double send_timeout_s = 5.0;                          // How long Publish waits for room before it gives up.
+  double resend_after_s = 2.0;                          // Without progress of the ledger, unsettled samples go again.
+  std::size_t max_kept_bytes = std::size_t{64} << 20U;  // Of samples that the server may need again.
+  std::string spill_file;                               // Takes what is beyond that; empty: the oldest are given up.
 };
 
 class RobotClient {
@@ -32,18 +37,21 @@ class RobotClient {
     std::function<void(const Ledger&)> ledger;
     std::function<void(const PoseReport&)> pose;
     std::function<void(const SessionState&)> session;
+    // A new session replaces the one that the server no longer knows.
+    std::function<void(SessionToken session, const Pose2& T_map_robot_start)> restarted;
   };
 
-  // Sends the request under a client id of its own and waits for the server's answer. Where the server refuses,
+  // Draws a client id and a session, and repeats the request until the server answers. Where it refuses,
   // its reason is the error; kUnavailable means that no server answers. `request.sensors` names at least one stream.
   [[nodiscard]] static Result<std::unique_ptr<RobotClient>> Open(wire::Bus& bus, SessionRequest request,
                                                                  double timeout_s, Callbacks callbacks = {},
                                                                  const RobotClientOptions& options = {});
   ~RobotClient();
 
-  // Waits for room in the stream's window. A scan without sequence gets the next one. kUnavailable: no room within
-  // send_timeout_s, try the same scan again; kFailedPrecondition: the session is over. The sensor is the request's
-  // first, or the one named.
+  // Waits for room in the stream's window. The client numbers the samples itself. While no server listens, the sample
+  // is kept and sent later. kUnavailable: no room within send_timeout_s, try the same scan again; kFailedPrecondition:
+  // the session is over; kAlreadyExists: another client has taken it over. The sensor is the request's first, or the
+  // one named.
   [[nodiscard]] Result<void> Publish(const Scan& scan);
   [[nodiscard]] Result<void> Publish(const Scan& scan, const std::string& sensor);
   [[nodiscard]] Result<void> Publish(const Odometry& odometry);
@@ -53,46 +61,73 @@ class RobotClient {
   // Ends the session for good, and waits until the server confirms it.
   [[nodiscard]] Result<void> End(double timeout_s = 2.0);
 
-  [[nodiscard]] ClientId id() const { return request_.client; }
+  [[nodiscard]] ClientId id() const { return client_; }
   [[nodiscard]] SessionState session() const;
   [[nodiscard]] bool connected() const { return scans_->matched() > 0; }  // Whether a server listens right now.
   [[nodiscard]] std::optional<PoseReport> pose() const;
   [[nodiscard]] std::optional<Ledger> ledger() const;  // The ledger of the first sensor.
   [[nodiscard]] std::optional<Ledger> ledger(const std::string& sensor) const;
   [[nodiscard]] std::uint64_t resent() const { return resent_.load(std::memory_order_relaxed); }
+  [[nodiscard]] int restarted() const { return restarted_.load(std::memory_order_relaxed); }  // New sessions opened.
+  // Samples given up before they were safe, because too many had to be kept; and why the spill file did not take them.
+  [[nodiscard]] std::uint64_t displaced() const;
+  [[nodiscard]] std::string spill_error() const;
 
  private:
   struct Stream {
-    explicit Stream(const ScanWindowOptions& options) : window(options) {}
+    explicit Stream(std::uint64_t size) : window(size) {}
     ScanWindow window;
     std::optional<Ledger> ledger;
   };
+  using Clock = std::chrono::steady_clock;
+  // Odometry belongs to the robot and not to one of its lasers, so its stream has a name of its own.
+  static constexpr char kOdometrySensor[] = "odometry";
 
   RobotClient(SessionRequest request, Callbacks callbacks, const RobotClientOptions& options);
   [[nodiscard]] Result<void> Connect(wire::Bus& bus);
   [[nodiscard]] Result<void> AwaitSession(const wire::Bus& bus, double timeout_s);
   void OnSession(SessionState&& state);
+  void OnRefusal(SessionRefusal&& refusal);
   void OnLedger(Ledger&& ledger);
   void OnPose(PoseReport&& report);
+  void OnMatched(int servers);
+
   [[nodiscard]] Result<void> AwaitRoom(const Stream& stream) CAIRN_REQUIRES(mutex_);
-  void Resend();
+  [[nodiscard]] bool Answered() const CAIRN_REQUIRES(mutex_);
+  [[nodiscard]] bool Streaming() const CAIRN_REQUIRES(mutex_);
+  [[nodiscard]] bool ReadyToReopen() const CAIRN_REQUIRES(mutex_);
+  [[nodiscard]] Pose2 StartOfNextSession() const CAIRN_REQUIRES(mutex_);
+  Result<void> SendNow(const StreamedSample& sample) CAIRN_REQUIRES(sending_);
+  Result<void> AddAndSend(StreamedSample&& sample, Stream& stream) CAIRN_REQUIRES(sending_);
+  void Ask();
+  void Reopen();
+  void Pump();
   void Watch();
 
-  SessionRequest request_;
+  const ClientId client_;
   const NameId robot_id_;
   const Callbacks callbacks_;
   const RobotClientOptions options_;
   std::atomic<std::uint64_t> resent_ = 0;
+  std::atomic<int> restarted_ = 0;
 
-  Mutex sending_;  // Held while scans are sent, so that resent ones do not overtake new ones. Taken before mutex_.
+  Mutex sending_;  // Held while samples are sent, so that they leave in order. Taken before mutex_.
   mutable Mutex mutex_;
   CondVar changed_;
-  std::map<NameId, Stream> streams_ CAIRN_GUARDED_BY(mutex_);  // By sensor; fixed after construction.
+  SessionRequest request_ CAIRN_GUARDED_BY(mutex_);            // As it was last published.
+  std::map<NameId, Stream> streams_ CAIRN_GUARDED_BY(mutex_);  // By sensor, and the odometry; fixed after construction.
+  Backlog backlog_ CAIRN_GUARDED_BY(mutex_);
+  std::size_t sent_before_ CAIRN_GUARDED_BY(mutex_) = 0;  // So many of the next samples were sent once already.
+  Generation generation_ CAIRN_GUARDED_BY(mutex_) = 0;    // The highest heard of.
   std::optional<SessionState> state_ CAIRN_GUARDED_BY(mutex_);
+  bool answered_ CAIRN_GUARDED_BY(mutex_) = false;  // By a server that has not gone since.
+  bool reopening_ CAIRN_GUARDED_BY(mutex_) = false;
+  std::optional<Status> over_ CAIRN_GUARDED_BY(mutex_);  // Why the session was refused or taken over, for good.
   std::optional<PoseReport> pose_ CAIRN_GUARDED_BY(mutex_);
-  std::uint64_t odometry_sequence_ CAIRN_GUARDED_BY(mutex_) = 0;
-  std::chrono::steady_clock::time_point progress_ CAIRN_GUARDED_BY(mutex_);
-  bool resend_ CAIRN_GUARDED_BY(mutex_) = false;
+  std::optional<Pose2> T_odom_robot_start_ CAIRN_GUARDED_BY(mutex_);  // Odometry when the session was opened.
+  Clock::time_point asked_ CAIRN_GUARDED_BY(mutex_);
+  Clock::time_point refused_ CAIRN_GUARDED_BY(mutex_);  // Since when it is reopening.
+  Clock::time_point progress_ CAIRN_GUARDED_BY(mutex_);
   bool stopping_ CAIRN_GUARDED_BY(mutex_) = false;
 
   std::unique_ptr<wire::Publication<SessionRequest>> session_;

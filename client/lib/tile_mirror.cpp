@@ -5,9 +5,11 @@
 
 namespace cairn::client {
 
-bool TileMirror::Enter(std::uint32_t epoch) {
-  if (epoch < epoch_) return false;
-  if (epoch > epoch_) {
+bool TileMirror::Enter(Generation generation, std::uint32_t epoch) {
+  if (generation < generation_ || (generation == generation_ && epoch < epoch_)) return false;
+  if (generation > generation_) info_.reset();
+  if (generation > generation_ || epoch > epoch_) {
+    generation_ = generation;
     epoch_ = epoch;
     version_ = 0;
     entries_.clear();
@@ -16,7 +18,7 @@ bool TileMirror::Enter(std::uint32_t epoch) {
 }
 
 bool TileMirror::Apply(MapInfo&& info) {
-  if (info.site_id != site_id_ || !Enter(info.epoch)) return false;
+  if (info.site_id != site_id_ || !Enter(info.generation, info.epoch)) return false;
   if (info_ && info_->epoch == info.epoch && info.version < info_->version) return false;
   info_ = std::move(info);
   return true;
@@ -24,7 +26,7 @@ bool TileMirror::Apply(MapInfo&& info) {
 
 bool TileMirror::Apply(TileSample&& sample) {
   Tile& tile = sample.tile;
-  if (sample.site_id != site_id_ || !Enter(tile.epoch)) return false;
+  if (sample.site_id != site_id_ || !Enter(sample.generation, tile.epoch)) return false;
   const auto known = entries_.find(tile.key);
   if (known == entries_.end() && entries_.size() >= kMaxTiles) {
     ++ignored_;

@@ -1,8 +1,9 @@
 // The tiles of one site as the server has them, built from the map and tile topics in whatever order they come:
 // - a tile of a higher version replaces the whole tile, one of a lower or equal version is ignored;
 // - a tombstone removes the tile, and is remembered so that no late older tile brings it back;
-// - the first value of a higher epoch, from either topic, removes every tile of the epochs before.
-// So all its tiles are always of one epoch. Pure value; not thread-safe.
+// - the first value of a higher epoch, from either topic, removes every tile of the epochs before;
+// - the first value of a higher generation of the server removes everything, because epochs and versions begin anew.
+// So all its tiles are always of one generation and one epoch. Pure value; not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -28,6 +29,7 @@ class TileMirror {
 
   // Everything the last map info announces is here.
   [[nodiscard]] bool complete() const;
+  [[nodiscard]] Generation generation() const { return generation_; }
   [[nodiscard]] std::uint32_t epoch() const { return epoch_; }
   [[nodiscard]] std::uint64_t version() const { return version_; }  // Highest of the tiles here.
   [[nodiscard]] const std::optional<MapInfo>& info() const { return info_; }
@@ -40,10 +42,11 @@ class TileMirror {
     std::uint64_t version = 0;
     std::optional<Tile> tile;  // Nothing where the tile was removed.
   };
-  // False where the epoch is void.
-  bool Enter(std::uint32_t epoch);
+  // False where the generation or the epoch is void.
+  bool Enter(Generation generation, std::uint32_t epoch);
 
   const NameId site_id_;
+  Generation generation_ = 0;
   std::uint32_t epoch_ = 0;
   std::uint64_t version_ = 0;
   std::optional<MapInfo> info_;

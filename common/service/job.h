@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "common/sensor/stamp.h"
+#include "common/service/generation.h"
 #include "common/service/names.h"
 
 namespace cairn {
@@ -31,6 +32,7 @@ struct Job {
   Stamp started = 0;
   Stamp ended = 0;
   std::string message;
+  Generation generation = 0;  // Stamped by the server's egress.
 };
 
 }  // namespace cairn

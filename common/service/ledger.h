@@ -1,5 +1,5 @@
-// What became of every scan of one stream (robot, sensor): received + dropped[kLostOnWire] = used + sum(dropped) +
-// waiting. No scan vanishes.
+// What became of every sample of one stream (robot, sensor), scans or odometry: received + dropped[kLostOnWire] = used
+// + sum(dropped) + waiting. No scan vanishes.
 #pragma once
 
 #include <array>
@@ -9,6 +9,7 @@
 
 #include "common/sensor/scan.h"
 #include "common/sensor/stamp.h"
+#include "common/service/generation.h"
 #include "common/service/names.h"
 
 namespace cairn {
@@ -49,12 +50,14 @@ struct Ledger {
   std::uint64_t odometry_received = 0;
   std::uint64_t odometry_dropped = 0;  // Refused by validation or stamp order.
   std::uint64_t odometry_merged = 0;   // Composed into a neighbour by the full queue; motion is kept.
-  std::uint64_t last_sequence = 0;     // Highest scan sequence received.
-  std::uint64_t settled_through = 0;   // Every scan up to here is used or dropped.
-  std::uint64_t durable_through = 0;   // Every scan up to here survives the server's death; 0 without a store.
+  std::uint64_t last_sequence = 0;     // Highest sequence received.
+  std::uint64_t settled_through = 0;   // Every sample up to here is used or dropped.
+  std::uint64_t durable_through = 0;   // Every sample up to here survives the server's death; 0 without a store.
   Stamp last_stamp = 0;                // Stamp of the last scan used.
   double latency_p50_ms = 0.0;         // Scan received to pose published, over the last 256.
   double latency_p99_ms = 0.0;
+  std::uint64_t session = 0;  // Whose sequences are counted (SessionToken); 0 where nobody has opened it.
+  Generation generation = 0;  // Stamped by the server's egress.
 
   [[nodiscard]] std::uint64_t dropped_total() const;
 };

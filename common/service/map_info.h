@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "common/service/generation.h"
 #include "common/service/names.h"
 
 namespace cairn {
@@ -28,6 +29,7 @@ struct MapInfo {
   std::uint32_t robots = 0;                                   // Sessions in the site.
   std::uint32_t enabled_version = 1;
   std::vector<MapVersionInfo> versions;
+  Generation generation = 0;  // Stamped by the server's egress.
 };
 
 }  // namespace cairn

@@ -8,6 +8,7 @@
 
 #include "common/geometry/pose2.h"
 #include "common/sensor/stamp.h"
+#include "common/service/generation.h"
 #include "common/service/names.h"
 
 namespace cairn {
@@ -35,6 +36,7 @@ struct PoseReport {
   double score = 0.0;  // 0..1: share of the scan explained by the map.
   PoseReason reason = PoseReason::kWaiting;
   std::uint32_t map_epoch = 0;
+  Generation generation = 0;  // Stamped by the server's egress.
 };
 
 }  // namespace cairn

@@ -52,6 +52,7 @@ struct Request {
   std::uint32_t level = 0;        // kTiles.
   std::uint32_t since_epoch = 0;  // kTiles: a different epoch than the map's means "send all".
   std::uint64_t since_version = 0;
+  Generation since_generation = 0;  // The generation that both belong to; of another one all are sent.
   std::uint64_t job = 0;
   JobKind job_kind = JobKind::kSmooth;
   bool enable = true;             // kJobSubmit: enable the map version it makes.
@@ -93,6 +94,7 @@ struct Reply {
   std::vector<RobotStatus> robots;
   std::vector<Job> jobs;
   std::string server_version;  // kPing.
+  Generation generation = 0;   // Stamped by the server's egress.
 };
 
 }  // namespace cairn

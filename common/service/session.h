@@ -7,12 +7,15 @@
 #include <vector>
 
 #include "common/geometry/pose2.h"
+#include "common/service/generation.h"
 #include "common/service/names.h"
 #include "common/status.h"
 
 namespace cairn {
 
 using ClientId = std::uint64_t;  // Random, non-zero, one per client process; tells two robots of one name apart.
+// Random, non-zero, drawn by a client when it opens a session anew. Streams carry it: it says whose sequences they are.
+using SessionToken = std::uint64_t;
 
 struct SessionRequest {
   std::string robot;
@@ -22,6 +25,8 @@ struct SessionRequest {
   bool has_start = false;   // False: the site's origin for its first robot.
   Pose2 T_map_robot_start;  // Where the robot stands when it opens the session.
   bool end = false;         // Ends the session for good: its trajectory is complete.
+  SessionToken session = 0;
+  bool started = false;  // Samples were sent in this session before: it can be resumed, but not opened again.
 };
 
 enum class SessionPhase : std::uint8_t { kActive = 0, kRefused = 1, kEnded = 2, kSuspended = 3 };
@@ -29,11 +34,19 @@ enum class SessionPhase : std::uint8_t { kActive = 0, kRefused = 1, kEnded = 2, 
 
 struct SessionState {
   NameId robot_id = 0;
-  ClientId client = 0;
+  ClientId client = 0;  // The owner, or the client that is refused.
   std::string robot;
   std::string site;
   SessionPhase phase = SessionPhase::kActive;
   Status status;  // Why refused.
+  SessionToken session = 0;
+  bool durable = false;       // The server stores what it receives.
+  Generation generation = 0;  // Stamped by the server's egress.
+};
+
+// The answer to a refused request: the request's client and session, phase kRefused and the reason.
+struct SessionRefusal {
+  SessionState state;
 };
 
 }  // namespace cairn

@@ -13,7 +13,7 @@ namespace cairn {
 struct StreamId {
   NameId robot_id = 0;
   NameId sensor_id = 0;
-  ClientId client = 0;  // Must own the robot's session.
+  SessionToken session = 0;  // Must be the robot's session.
 };
 
 struct ScanSample {
@@ -29,7 +29,8 @@ struct OdometrySample {
 struct TileSample {
   NameId site_id = 0;
   Tile tile;
-  bool deleted = false;  // The tile is no longer part of the map (tombstone; DDS dispose is not used).
+  bool deleted = false;       // The tile is no longer part of the map (tombstone; DDS dispose is not used).
+  Generation generation = 0;  // Stamped by the server's egress.
 };
 
 }  // namespace cairn

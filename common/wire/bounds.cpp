@@ -121,6 +121,10 @@ Result<void> CheckBounds(const v1::SessionState& state) {
       .result();
 }
 
+Result<void> CheckBounds(const v1::SessionRefusal& refusal) {
+  return CheckBounds(refusal.state());
+}
+
 Result<void> CheckBounds(const v1::Scan& scan) {
   return Bounds().AtMost("ranges_m", scan.ranges_m().size(), kMaxRangesRead).result();
 }

@@ -19,6 +19,7 @@ namespace cairn::wire {
 
 [[nodiscard]] Result<void> CheckBounds(const v1::SessionRequest& request);
 [[nodiscard]] Result<void> CheckBounds(const v1::SessionState& state);
+[[nodiscard]] Result<void> CheckBounds(const v1::SessionRefusal& refusal);
 [[nodiscard]] Result<void> CheckBounds(const v1::Scan& scan);
 [[nodiscard]] Result<void> CheckBounds(const v1::Odometry& odometry);
 [[nodiscard]] Result<void> CheckBounds(const v1::PoseReport& report);

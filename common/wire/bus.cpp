@@ -54,6 +54,7 @@ Result<std::unique_ptr<Subscription>> Bus::SubscribeReplies(ClientId client, std
 // NOLINTEND(bugprone-macro-parentheses)
 CAIRN_WIRE_VALUE(SessionRequest);
 CAIRN_WIRE_VALUE(SessionState);
+CAIRN_WIRE_VALUE(SessionRefusal);
 CAIRN_WIRE_VALUE(ScanSample);
 CAIRN_WIRE_VALUE(OdometrySample);
 CAIRN_WIRE_VALUE(PoseReport);

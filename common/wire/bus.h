@@ -43,6 +43,10 @@ class Publication {
   // kOutOfRange: the value exceeds the wire's limits (limits.h). kUnavailable: the middleware did not accept
   // it within its bounded blocking time.
   [[nodiscard]] virtual Result<void> Publish(const Value& value) = 0;
+  // The instance that `value`'s key names will get no sample any more: late joiners no longer get its last one, and its
+  // place among the topic's instances is free again, here and at every subscription that keeps up. A later Publish of
+  // the same key begins a new instance. Not for topics without a key. kNotFound: nothing of that key was published.
+  [[nodiscard]] virtual Result<void> Retire(const Value& value) = 0;
   // Waits until every matched subscription has acknowledged everything, or the deadline passes (false).
   [[nodiscard]] virtual bool WaitForAcknowledgement(std::chrono::milliseconds deadline) = 0;
   // Peers of the same topic, type name and QoS. Their data representation is not compared.
@@ -65,9 +69,8 @@ class Subscription {
   [[nodiscard]] virtual std::uint64_t refused() const = 0;  // Samples not decoded or over the limits.
 };
 
-// Value is one of: SessionRequest, SessionState, ScanSample, OdometrySample, PoseReport, Ledger, MapInfo,
-// TileSample, Job, Request, Reply.
-// Publications and subscriptions may outlive the Bus that made them.
+// Value is one of: SessionRequest, SessionState, SessionRefusal, ScanSample, OdometrySample, PoseReport, Ledger,
+// MapInfo, TileSample, Job, Request, Reply. Publications and subscriptions may outlive the Bus that made them.
 class Bus {
  public:
   virtual ~Bus() = default;

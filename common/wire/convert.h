@@ -20,6 +20,7 @@ namespace cairn::wire {
 
 [[nodiscard]] v1::SessionRequest ToWire(const SessionRequest& value);
 [[nodiscard]] v1::SessionState ToWire(const SessionState& value);
+[[nodiscard]] v1::SessionRefusal ToWire(const SessionRefusal& value);
 [[nodiscard]] v1::Scan ToWire(const ScanSample& value);
 [[nodiscard]] v1::Odometry ToWire(const OdometrySample& value);
 [[nodiscard]] v1::PoseReport ToWire(const PoseReport& value);
@@ -33,6 +34,7 @@ namespace cairn::wire {
 // FromWire moves the large members (ranges, bytes) out of its argument.
 [[nodiscard]] SessionRequest FromWire(v1::SessionRequest&& wire);
 [[nodiscard]] SessionState FromWire(v1::SessionState&& wire);
+[[nodiscard]] SessionRefusal FromWire(v1::SessionRefusal&& wire);
 [[nodiscard]] ScanSample FromWire(v1::Scan&& wire);
 [[nodiscard]] OdometrySample FromWire(v1::Odometry&& wire);
 [[nodiscard]] PoseReport FromWire(v1::PoseReport&& wire);

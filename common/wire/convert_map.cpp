@@ -8,6 +8,7 @@ namespace cairn::wire {
 v1::MapInfo ToWire(const MapInfo& value) {
   v1::MapInfo wire;
   wire.site_id(value.site_id);
+  wire.generation(value.generation);
   wire.site(value.site);
   wire.resolution_m(value.resolution_m);
   wire.epoch(value.epoch);
@@ -33,6 +34,7 @@ v1::MapInfo ToWire(const MapInfo& value) {
 MapInfo FromWire(v1::MapInfo&& wire) {
   MapInfo value;
   value.site_id = wire.site_id();
+  value.generation = wire.generation();
   value.site = std::move(wire.site());
   value.resolution_m = wire.resolution_m();
   value.epoch = wire.epoch();
@@ -82,6 +84,7 @@ v1::Tile ToWire(const TileSample& value) {
   wire.y(static_cast<std::int16_t>(value.tile.key.y));
   wire.level(static_cast<std::uint8_t>(value.tile.key.level));
   wire.deleted(value.deleted);
+  wire.generation(value.generation);
   wire.content(ContentToWire(value.tile));
   return wire;
 }
@@ -91,6 +94,7 @@ TileSample FromWire(v1::Tile&& wire) {
   value.site_id = wire.site_id();
   value.tile.key = {wire.level(), wire.x(), wire.y()};
   value.deleted = wire.deleted();
+  value.generation = wire.generation();
   ContentFromWire(std::move(wire.content()), value.tile);
   return value;
 }

@@ -99,6 +99,7 @@ v1::Request ToWire(const Request& value) {
   wire.area().x_max_m(value.area.x_max_m);
   wire.area().y_max_m(value.area.y_max_m);
   wire.level(value.level);
+  wire.since_generation(value.since_generation);
   wire.since_epoch(value.since_epoch);
   wire.since_version(value.since_version);
   wire.job(value.job);
@@ -120,6 +121,7 @@ Request FromWire(v1::Request&& wire) {
   value.smoothed = wire.smoothed();
   value.area = {wire.area().x_min_m(), wire.area().y_min_m(), wire.area().x_max_m(), wire.area().y_max_m()};
   value.level = wire.level();
+  value.since_generation = wire.since_generation();
   value.since_epoch = wire.since_epoch();
   value.since_version = wire.since_version();
   value.job = wire.job();
@@ -136,6 +138,7 @@ v1::Reply ToWire(const Reply& value) {
   wire.part(value.part);
   wire.last(value.last);
   wire.status(ToWire(value.status));
+  wire.generation(value.generation);
   wire.map_epoch(value.map_epoch);
   wire.map_version(value.map_version);
   ListToWire(value.poses, wire.poses());
@@ -156,6 +159,7 @@ Reply FromWire(v1::Reply&& wire) {
   value.part = wire.part();
   value.last = wire.last();
   value.status = FromWire(std::move(wire.status()));
+  value.generation = wire.generation();
   value.map_epoch = wire.map_epoch();
   value.map_version = wire.map_version();
   ListFromWire(wire.poses(), value.poses);

@@ -8,6 +8,7 @@ namespace cairn::wire {
 v1::PoseReport ToWire(const PoseReport& value) {
   v1::PoseReport wire;
   wire.robot_id(value.robot_id);
+  wire.generation(value.generation);
   wire.robot(value.robot);
   wire.site(value.site);
   wire.stamp_ns(value.stamp);
@@ -29,6 +30,7 @@ v1::PoseReport ToWire(const PoseReport& value) {
 PoseReport FromWire(v1::PoseReport&& wire) {
   PoseReport value;
   value.robot_id = wire.robot_id();
+  value.generation = wire.generation();
   value.robot = std::move(wire.robot());
   value.site = std::move(wire.site());
   value.stamp = wire.stamp_ns();
@@ -51,6 +53,7 @@ v1::Ledger ToWire(const Ledger& value) {
   v1::Ledger wire;
   wire.robot_id(value.robot_id);
   wire.sensor_id(value.sensor_id);
+  wire.generation(value.generation);
   wire.robot(value.robot);
   wire.sensor(value.sensor);
   wire.site(value.site);
@@ -62,6 +65,7 @@ v1::Ledger ToWire(const Ledger& value) {
   wire.odometry_received(value.odometry_received);
   wire.odometry_dropped(value.odometry_dropped);
   wire.odometry_merged(value.odometry_merged);
+  wire.session(value.session);
   wire.last_sequence(value.last_sequence);
   wire.settled_through(value.settled_through);
   wire.durable_through(value.durable_through);
@@ -75,6 +79,7 @@ Ledger FromWire(v1::Ledger&& wire) {
   Ledger value;
   value.robot_id = wire.robot_id();
   value.sensor_id = wire.sensor_id();
+  value.generation = wire.generation();
   value.robot = std::move(wire.robot());
   value.sensor = std::move(wire.sensor());
   value.site = std::move(wire.site());
@@ -87,6 +92,7 @@ Ledger FromWire(v1::Ledger&& wire) {
   value.odometry_received = wire.odometry_received();
   value.odometry_dropped = wire.odometry_dropped();
   value.odometry_merged = wire.odometry_merged();
+  value.session = wire.session();
   value.last_sequence = wire.last_sequence();
   value.settled_through = wire.settled_through();
   value.durable_through = wire.durable_through();
@@ -99,6 +105,7 @@ Ledger FromWire(v1::Ledger&& wire) {
 v1::Job ToWire(const Job& value) {
   v1::Job wire;
   wire.id(value.id);
+  wire.generation(value.generation);
   wire.site(value.site);
   wire.kind(static_cast<v1::JobKind>(value.kind));
   wire.state(static_cast<v1::JobState>(value.state));
@@ -116,6 +123,7 @@ v1::Job ToWire(const Job& value) {
 Job FromWire(v1::Job&& wire) {
   Job value;
   value.id = wire.id();
+  value.generation = wire.generation();
   value.site = std::move(wire.site());
   value.kind = static_cast<JobKind>(wire.kind());
   value.state = static_cast<JobState>(wire.state());

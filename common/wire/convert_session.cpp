@@ -31,11 +31,13 @@ v1::SessionRequest ToWire(const SessionRequest& value) {
   v1::SessionRequest wire;
   wire.robot_id(HashName(value.robot));
   wire.client(value.client);
+  wire.session(value.session);
   wire.robot(value.robot);
   wire.site(value.site);
   wire.sensors(value.sensors);
   wire.has_start(value.has_start);
   wire.T_map_robot_start(ToWire(value.T_map_robot_start));
+  wire.started(value.started);
   wire.end(value.end);
   return wire;
 }
@@ -46,8 +48,10 @@ SessionRequest FromWire(v1::SessionRequest&& wire) {
   value.site = std::move(wire.site());
   value.sensors = std::move(wire.sensors());
   value.client = wire.client();
+  value.session = wire.session();
   value.has_start = wire.has_start();
   value.T_map_robot_start = FromWire(wire.T_map_robot_start());
+  value.started = wire.started();
   value.end = wire.end();
   return value;
 }
@@ -55,10 +59,13 @@ SessionRequest FromWire(v1::SessionRequest&& wire) {
 v1::SessionState ToWire(const SessionState& value) {
   v1::SessionState wire;
   wire.robot_id(value.robot_id);
+  wire.generation(value.generation);
   wire.client(value.client);
+  wire.session(value.session);
   wire.robot(value.robot);
   wire.site(value.site);
   wire.phase(static_cast<v1::SessionPhase>(value.phase));
+  wire.durable(value.durable);
   wire.status(ToWire(value.status));
   return wire;
 }
@@ -66,12 +73,25 @@ v1::SessionState ToWire(const SessionState& value) {
 SessionState FromWire(v1::SessionState&& wire) {
   SessionState value;
   value.robot_id = wire.robot_id();
+  value.generation = wire.generation();
   value.client = wire.client();
+  value.session = wire.session();
   value.robot = std::move(wire.robot());
   value.site = std::move(wire.site());
   value.phase = static_cast<SessionPhase>(wire.phase());
+  value.durable = wire.durable();
   value.status = FromWire(std::move(wire.status()));
   return value;
+}
+
+v1::SessionRefusal ToWire(const SessionRefusal& value) {
+  v1::SessionRefusal wire;
+  wire.state(ToWire(value.state));
+  return wire;
+}
+
+SessionRefusal FromWire(v1::SessionRefusal&& wire) {
+  return {FromWire(std::move(wire.state()))};
 }
 
 }  // namespace cairn::wire

@@ -9,7 +9,7 @@ v1::Scan ToWire(const ScanSample& value) {
   v1::Scan wire;
   wire.robot_id(value.stream.robot_id);
   wire.sensor_id(value.stream.sensor_id);
-  wire.client(value.stream.client);
+  wire.session(value.stream.session);
   wire.seq(scan.sequence);
   wire.stamp_ns(scan.stamp);
   wire.angle_first_rad(scan.angle_first_rad);
@@ -25,7 +25,7 @@ v1::Scan ToWire(const ScanSample& value) {
 
 ScanSample FromWire(v1::Scan&& wire) {
   ScanSample value;
-  value.stream = {wire.robot_id(), wire.sensor_id(), wire.client()};
+  value.stream = {wire.robot_id(), wire.sensor_id(), wire.session()};
   Scan& scan = value.scan;
   scan.sequence = wire.seq();
   scan.stamp = wire.stamp_ns();
@@ -44,7 +44,7 @@ v1::Odometry ToWire(const OdometrySample& value) {
   v1::Odometry wire;
   wire.robot_id(value.stream.robot_id);
   wire.sensor_id(value.stream.sensor_id);
-  wire.client(value.stream.client);
+  wire.session(value.stream.session);
   wire.seq(value.odometry.sequence);
   wire.stamp_ns(value.odometry.stamp);
   wire.T_odom_robot(ToWire(value.odometry.T_odom_robot));
@@ -53,7 +53,7 @@ v1::Odometry ToWire(const OdometrySample& value) {
 
 OdometrySample FromWire(v1::Odometry&& wire) {
   OdometrySample value;
-  value.stream = {wire.robot_id(), wire.sensor_id(), wire.client()};
+  value.stream = {wire.robot_id(), wire.sensor_id(), wire.session()};
   value.odometry.sequence = wire.seq();
   value.odometry.stamp = wire.stamp_ns();
   value.odometry.T_odom_robot = FromWire(wire.T_odom_robot());

@@ -45,6 +45,18 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
     return {};
   }
 
+  Result<void> Retire(const Value& value) override {
+    Sample<Wire> sample;
+    sample.value = ToWire(value);
+    const fd::InstanceHandle_t instance = writer_->lookup_instance(&sample);
+    const std::string name = Topic<Value>::kProfile.name;
+    if (!instance.isDefined()) return Fail(StatusCode::kNotFound, name + ": no such instance");
+    if (writer_->unregister_instance(&sample, instance) != eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
+      return Fail(StatusCode::kUnavailable, name + ": the instance was not unregistered");
+    }
+    return {};
+  }
+
   bool WaitForAcknowledgement(std::chrono::milliseconds deadline) override {
     return writer_->wait_for_acknowledgments(eprosima::fastrtps::Duration_t(deadline.count() * 1e-3L)) ==
            eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;

@@ -23,7 +23,7 @@ struct TopicProfile {
   bool transient_local;       // Late joiners get the last samples of each instance.
   int writer_depth;           // Samples kept per instance until acknowledged; a new one replaces the oldest.
   int reader_depth;           // Samples per instance waiting for the callback; a new one replaces the oldest.
-  int max_instances;          // For the writer and for the reader. 1: the topic has no key.
+  int max_instances;          // At one time, for the writer and for the reader. 1: the topic has no key.
   double deadline_s;          // Offered by writers, not requested by readers. 0: none.
   bool leased;                // Whether both ends use the liveliness lease.
   std::uint8_t heartbeat_ms;  // Period of heartbeats while a sample is unacknowledged.
@@ -44,7 +44,13 @@ template <>
 struct Topic<SessionState> {
   using Wire = v1::SessionState;
   using Type = SampleType<Wire, v1::SessionStatePubSubType>;
-  static constexpr TopicProfile kProfile{"cairn/v1/session_state", true, 1, 4, 16384, 0.0, false, 20};
+  static constexpr TopicProfile kProfile{"cairn/v1/session_state", true, 1, 4, 4096, 0.0, false, 20};
+};
+template <>
+struct Topic<SessionRefusal> {
+  using Wire = v1::SessionRefusal;
+  using Type = SampleType<Wire, v1::SessionRefusalPubSubType>;
+  static constexpr TopicProfile kProfile{"cairn/v1/session_refusal", false, 64, 256, 1, 0.0, false, 20};
 };
 template <>
 struct Topic<ScanSample> {

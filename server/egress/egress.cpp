@@ -2,9 +2,15 @@
 
 #include <algorithm>
 #include <chrono>
+#include <deque>
+#include <map>
+#include <optional>
 #include <tuple>
 #include <utility>
 #include <variant>
+
+#include "server/egress/generation_stamp.h"
+#include "server/egress/unsent.h"
 
 namespace cairn::server {
 namespace {
@@ -17,7 +23,9 @@ struct Egress::Publications {
   template <typename Value>
   using Of = std::unique_ptr<wire::Publication<Value>>;
 
-  std::tuple<Of<SessionState>, Of<PoseReport>, Of<Ledger>, Of<Job>, Of<MapInfo>, Of<TileSample>, Of<Reply>> of;
+  std::tuple<Of<SessionState>, Of<SessionRefusal>, Of<PoseReport>, Of<Ledger>, Of<Job>, Of<MapInfo>, Of<TileSample>,
+             Of<Reply>>
+      of;
 
   template <typename Value>
   Result<void> Advertise(wire::Bus& bus) {
@@ -34,18 +42,88 @@ struct Egress::Publications {
     static_cast<void>((... && (result = Advertise<Values>(bus)).has_value()));
     return result;
   }
+
+  template <typename Value>
+  Result<void> Publish(const Value& value) {
+    return std::get<Of<Value>>(of)->Publish(value);
+  }
+  template <typename Value>
+  Result<void> Retire(const Value& value) {
+    return std::get<Of<Value>>(of)->Retire(value);
+  }
+  Result<void> Publish(const Retired& retired) {
+    Result<void> result = std::visit([this](const auto& value) { return Retire(value); }, retired.of);
+    if (!result && result.error().code == StatusCode::kNotFound) return {};
+    return result;
+  }
 };
 
-Result<std::unique_ptr<Egress>> Egress::Open(wire::Bus& bus, Outbound& outbound) {
+// One lane's way out: what its thread does with each value, and what it remembers for it.
+class Egress::Door {
+ public:
+  Door(Publications& publications, Generation generation) : publications_(publications), generation_(generation) {}
+
+  [[nodiscard]] bool waiting() const { return !unsent_.empty(); }
+
+  bool Send(OutboundValue value) {
+    Stamp(value, generation_);
+    const Result<void> published = std::visit([this](const auto& one) { return publications_.Publish(one); }, value);
+    if (const auto* const sample = std::get_if<TileSample>(&value)) Bury(*sample);
+    // A value beyond the wire's limits will never be accepted.
+    if (!published && published.error().code == StatusCode::kUnavailable) {
+      unsent_.Keep(std::move(value));
+    } else {
+      unsent_.Forget(value);
+    }
+    return published.has_value();
+  }
+
+  // The kept states, until kMaxFailures of them are refused again: each may block the lane for a while.
+  void SendAgain() {
+    constexpr int kMaxFailures = 4;
+    int failures = 0;
+    while (failures < kMaxFailures) {
+      std::optional<OutboundValue> value = unsent_.After(last_tried_);
+      last_tried_ = value ? Unsent::KeyOf(*value) : std::nullopt;
+      if (!value) return;
+      failures += Send(*std::move(value)) ? 0 : 1;
+    }
+  }
+
+ private:
+  void Bury(const TileSample& sample) {
+    const Unsent::Key key = *Unsent::KeyOf(sample);
+    if (!sample.deleted) {
+      buried_.erase(key);
+      return;
+    }
+    if (buried_.insert_or_assign(key, sample).second) order_.push_back(key);
+    while (order_.size() > kTombstones) {
+      if (const auto oldest = buried_.extract(order_.front()); !oldest.empty()) {
+        static_cast<void>(publications_.Retire(oldest.mapped()));
+      }
+      order_.pop_front();
+    }
+  }
+
+  Publications& publications_;
+  const Generation generation_;
+  Unsent unsent_;
+  std::optional<Unsent::Key> last_tried_;     // Nothing: the next round begins with the first one.
+  std::map<Unsent::Key, TileSample> buried_;  // Removed tiles whose last sample DDS still keeps.
+  std::deque<Unsent::Key> order_;             // In the order of their removal.
+};
+
+Result<std::unique_ptr<Egress>> Egress::Open(wire::Bus& bus, Outbound& outbound, Generation generation) {
   auto publications = std::make_unique<Publications>();
   if (auto advertised = publications->AdvertiseAll(bus, publications->of); !advertised) {
     return tl::unexpected(advertised.error());
   }
-  return std::unique_ptr<Egress>(new Egress(outbound, std::move(publications)));
+  return std::unique_ptr<Egress>(new Egress(outbound, std::move(publications), generation));
 }
 
-Egress::Egress(Outbound& outbound, std::unique_ptr<Publications> publications)
-    : outbound_(outbound), publications_(std::move(publications)) {
+Egress::Egress(Outbound& outbound, std::unique_ptr<Publications> publications, Generation generation)
+    : outbound_(outbound), generation_(generation), publications_(std::move(publications)) {
   for (const auto lane : {Outbound::Lane::kLive, Outbound::Lane::kMap, Outbound::Lane::kReplies}) {
     threads_.emplace_back([this, lane] { Run(outbound_.lane(lane)); });
   }
@@ -70,17 +148,19 @@ void Egress::Finish() {
 }
 
 void Egress::Run(BoundedChannel<OutboundValue>& lane) {
-  while (const auto value = lane.Pop()) {
-    const bool published = std::visit(
-        [this](const auto& alternative) {
-          using Value = std::decay_t<decltype(alternative)>;
-          return std::get<Publications::Of<Value>>(publications_->of)->Publish(alternative).has_value();
-        },
-        *value);
-    if (published) continue;
-    unpublished_.fetch_add(1, std::memory_order_relaxed);
-    // While the server stops, it does not wait for a reader that takes nothing.
-    if (lane.closed()) return;
+  Door door(*publications_, generation_);
+  auto next_retry = std::chrono::steady_clock::now();
+  for (;;) {
+    std::optional<OutboundValue> value = door.waiting() ? lane.PopFor(kRetryPeriod) : lane.Pop();
+    if (!value && (lane.closed() || !door.waiting())) return;
+    if (value && !door.Send(*std::move(value))) {
+      unpublished_.fetch_add(1, std::memory_order_relaxed);
+      // While the server stops, it does not wait for a reader that takes nothing.
+      if (lane.closed()) return;
+    }
+    if (!door.waiting() || std::chrono::steady_clock::now() < next_retry) continue;
+    door.SendAgain();
+    next_retry = std::chrono::steady_clock::now() + kRetryPeriod;
   }
 }
 

@@ -53,12 +53,13 @@ Result<void> Ingress::Subscribe(wire::Bus& bus) {
 }
 
 void Ingress::Take(SessionRequest&& request) {
-  SessionState busy{.robot_id = HashName(request.robot),
-                    .client = request.client,
-                    .robot = request.robot,
-                    .site = request.site,
-                    .phase = SessionPhase::kRefused,
-                    .status = {StatusCode::kResourceExhausted, "the server is busy; try again"}};
+  SessionRefusal busy{{.robot_id = HashName(request.robot),
+                       .client = request.client,
+                       .robot = request.robot,
+                       .site = request.site,
+                       .phase = SessionPhase::kRefused,
+                       .status = {StatusCode::kResourceExhausted, "the server is busy; try again"},
+                       .session = request.session}};
   if (inbound_.TryPush(std::move(request))) return;
   overflow_.fetch_add(1, std::memory_order_relaxed);
   outbound_.Send(std::move(busy));

@@ -118,6 +118,7 @@ void JobList::Tick() {
   for (auto& [id, entry] : jobs_) {
     if (entry.unsent) SendLocked(entry);
   }
+  RetireReplaced();
 }
 
 void JobList::Progress(std::uint64_t id, double progress) {
@@ -141,8 +142,14 @@ bool JobList::MakeRoom() {
   const auto oldest =
       std::find_if(jobs_.begin(), jobs_.end(), [](const auto& entry) { return IsFinal(entry.second.job.state); });
   if (oldest == jobs_.end()) return false;
+  replaced_.push_back(std::move(oldest->second.job));
   jobs_.erase(oldest);
+  RetireReplaced();
   return true;
+}
+
+void JobList::RetireReplaced() {
+  while (!replaced_.empty() && outbound_.Send(Retired{replaced_.back()})) replaced_.pop_back();
 }
 
 }  // namespace cairn::server

@@ -52,6 +52,7 @@ class JobList {
   void Progress(std::uint64_t id, double progress);
   void SendLocked(Entry& entry) CAIRN_REQUIRES(mutex_);
   bool MakeRoom() CAIRN_REQUIRES(mutex_);
+  void RetireReplaced() CAIRN_REQUIRES(mutex_);
   void End(std::uint64_t id, JobState state, const std::function<void(Job&)>& fill);
 
   const JobsOptions options_;
@@ -59,6 +60,7 @@ class JobList {
   const std::function<Stamp()> now_;
   mutable Mutex mutex_;
   std::map<std::uint64_t, Entry> jobs_ CAIRN_GUARDED_BY(mutex_);
+  std::vector<Job> replaced_ CAIRN_GUARDED_BY(mutex_);  // Not retired on the wire yet.
   std::uint64_t next_ CAIRN_GUARDED_BY(mutex_) = 1;
 };
 

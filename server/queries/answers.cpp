@@ -197,7 +197,7 @@ Reply AnswerLandmarks(const Request& request, const Sessions& sessions, const Ma
   return reply;
 }
 
-Reply AnswerTiles(const Request& request, const Maps& maps) {
+Reply AnswerTiles(const Request& request, const Maps& maps, Generation generation) {
   if (maps.empty()) return NoSite(request);
   const MapSnapshot& map = *maps.front();
   if (request.level >= map.info.levels) {
@@ -210,7 +210,7 @@ Reply AnswerTiles(const Request& request, const Maps& maps) {
   reply.map_epoch = map.info.epoch;
   reply.map_version = map.info.version;
   const int level = static_cast<int>(request.level);
-  const bool all = request.since_epoch != map.info.epoch;
+  const bool all = request.since_generation != generation || request.since_epoch != map.info.epoch;
   constexpr int kLowest = INT32_MIN;
   for (auto it = map.tiles.lower_bound({level, kLowest, kLowest}); it != map.tiles.end(); ++it) {
     const auto& [key, tile] = *it;

@@ -40,9 +40,10 @@ using Maps = std::vector<std::shared_ptr<const MapSnapshot>>;
 [[nodiscard]] Reply AnswerLandmarks(const Request& request, const Sessions& sessions, const Maps& maps);
 
 // The tiles of a level in an area that changed since a version. An area of all zeros means everywhere. If
-// since_epoch is not the map's epoch, the client's tiles are no longer valid, and all tiles of the area are
-// sent. INVALID_ARGUMENT: the level or the area is not valid. `maps`: the map of the site, if any.
-[[nodiscard]] Reply AnswerTiles(const Request& request, const Maps& maps);
+// since_epoch is not the map's epoch, or since_generation not the server's `generation`, the client's tiles are no
+// longer valid, and all tiles of the area are sent. INVALID_ARGUMENT: the level or the area is not valid. `maps`: the
+// map of the site, if any.
+[[nodiscard]] Reply AnswerTiles(const Request& request, const Maps& maps, Generation generation);
 
 // The state and the versions of a site's map, or of all maps. `maps`: all maps, or the site's if the request
 // names a site.

@@ -21,8 +21,15 @@ Reply JobReply(const Request& request, Result<Job> job) {
 
 }  // namespace
 
-Desk::Desk(std::size_t capacity, Outbound& outbound, Roster& roster, Atlas& atlas, JobList& jobs, JobWorker& worker)
-    : outbound_(outbound), roster_(roster), atlas_(atlas), jobs_(jobs), worker_(worker), requests_(capacity) {}
+Desk::Desk(std::size_t capacity, Outbound& outbound, Roster& roster, Atlas& atlas, JobList& jobs, JobWorker& worker,
+           Generation generation)
+    : outbound_(outbound),
+      roster_(roster),
+      atlas_(atlas),
+      jobs_(jobs),
+      worker_(worker),
+      generation_(generation),
+      requests_(capacity) {}
 
 Desk::~Desk() {
   Stop();
@@ -70,7 +77,7 @@ std::optional<Reply> Desk::Answer(const Request& request) {
       return AnswerPath(request, sessions, sessions.empty() ? Maps{} : MapOf(sessions.front().status.session.site));
     }
     case RequestKind::kTiles:
-      return AnswerTiles(request, MapOf(request.site));
+      return AnswerTiles(request, MapOf(request.site), generation_);
     case RequestKind::kLandmarks:
       return AnswerLandmarks(request, AllSessions(), MapOf(request.site));
     case RequestKind::kMapInfo:

@@ -23,7 +23,8 @@ namespace cairn::server {
 
 class Desk {
  public:
-  Desk(std::size_t capacity, Outbound& outbound, Roster& roster, Atlas& atlas, JobList& jobs, JobWorker& worker);
+  Desk(std::size_t capacity, Outbound& outbound, Roster& roster, Atlas& atlas, JobList& jobs, JobWorker& worker,
+       Generation generation);
   ~Desk();
 
   void Start();
@@ -50,6 +51,7 @@ class Desk {
   Atlas& atlas_;
   JobList& jobs_;
   JobWorker& worker_;
+  const Generation generation_;
   BoundedChannel<Request> requests_;
   std::jthread thread_;  // The last member, because it uses the members above.
 };

@@ -13,6 +13,7 @@ constexpr std::size_t kMaxUnsent = 256;  // Refusals kept until they can be sent
 Result<void> ValidateRequest(const SessionRequest& request) {
   if (auto valid = ValidateName("robot", request.robot); !valid) return valid;
   if (auto valid = ValidateName("site", request.site); !valid) return valid;
+  if (request.session == 0) return Fail(StatusCode::kInvalidArgument, "session 0 is none");
   if (request.client == 0) return Fail(StatusCode::kInvalidArgument, "client id 0 names nobody");
   if (request.sensors.empty()) return Fail(StatusCode::kInvalidArgument, "no sensor is named");
   if (request.sensors.size() > SessionRecord::kMaxSensors) {
@@ -20,6 +21,8 @@ Result<void> ValidateRequest(const SessionRequest& request) {
   }
   for (const std::string& sensor : request.sensors) {
     if (auto valid = ValidateName("sensor", sensor); !valid) return valid;
+    if (sensor == SessionRecord::kOdometry)
+      return Fail(StatusCode::kInvalidArgument, "no sensor can be named 'odometry': the robot's odometry is");
   }
   return request.has_start ? ValidateStart(request.T_map_robot_start) : Result<void>{};
 }
@@ -46,8 +49,8 @@ void Roster::Take(const SessionRequest& request) {
   {
     // A refusal that could not be sent yet is outdated by the answer to this request.
     const MutexLock lock(mutex_);
-    std::erase_if(unsent_, [&request](const SessionState& state) {
-      return state.client == request.client && state.robot == request.robot;
+    std::erase_if(unsent_, [&request](const SessionRefusal& refusal) {
+      return refusal.state.client == request.client && refusal.state.robot == request.robot;
     });
   }
   if (request.end) {
@@ -72,6 +75,15 @@ Result<void> Roster::Admit(const SessionRequest& request) {
     const auto found = sessions_.find(HashName(request.robot));
     if (found != sessions_.end()) session = found->second;
   }
+  if (session != nullptr && session->record().token() == request.session) {
+    if (session->record().phase() != SessionPhase::kEnded) return Resume(*session, request);
+    session->End();  // Says again that it has ended.
+    return {};
+  }
+  if (request.started) {
+    return Fail(StatusCode::kFailedPrecondition,
+                "the server does not know this session of '" + request.robot + "'; open a new one");
+  }
   if (session == nullptr || session->record().phase() == SessionPhase::kEnded) return Open(request);
   return Resume(*session, request);
 }
@@ -95,10 +107,11 @@ Result<void> Roster::Resume(Session& session, const SessionRequest& request) {
   if (!session.record().AddSensors(request.sensors)) {
     return Fail(StatusCode::kResourceExhausted, "more than 16 sensors in one session");
   }
-  if (!session.Resume(request.client)) return tl::unexpected(ending);
+  if (!session.Resume(request.client, request.session)) return tl::unexpected(ending);
   if (state.client != request.client) {
     SessionRequest displaced = request;
     displaced.client = state.client;
+    displaced.session = state.session;
     Refuse(displaced, {StatusCode::kAlreadyExists, "another client has taken over the session of '" + state.robot +
                                                        "' while this one was not alive"});
   }
@@ -118,7 +131,10 @@ Result<void> Roster::Open(const SessionRequest& request) {
     if (!entered) return tl::unexpected(entered.error());
     site = *std::move(entered);
     gone = *std::move(giving_way);
-    if (gone != nullptr) sessions_.erase(HashName(gone->record().state().robot));
+    if (gone != nullptr) {
+      sessions_.erase(gone->record().state().robot_id);
+      gone_.push_back(gone);
+    }
     const SessionSetup setup{.id = next_id_++,
                              .request = request,
                              .map_epoch = site->snapshot()->info.epoch,
@@ -129,13 +145,13 @@ Result<void> Roster::Open(const SessionRequest& request) {
                        .grid_changed = [site](GridChange&& change) { site->Change(std::move(change)); }});
     session->record().AddSensors(request.sensors);
     for (const std::string& sensor : request.sensors) {
-      if (auto account = unclaimed_.Claim({robot_id, HashName(sensor), request.client})) {
+      if (auto account = unclaimed_.Claim({robot_id, HashName(sensor), request.session})) {
         session->record().Inherit(HashName(sensor), std::move(*account));
       }
     }
     sessions_.emplace(robot_id, session);
   }
-  session->Resume(request.client);
+  session->Resume(request.client, request.session);
   site->Join(robot_id, session->id(), session);
   if (gone != nullptr && !gone->ending()) {
     gone->End({StatusCode::kResourceExhausted, "its robot stayed away, and its place was needed for another"});
@@ -167,12 +183,13 @@ void Roster::Refuse(const SessionRequest& request, Status status) {
   {
     const MutexLock lock(mutex_);
     if (unsent_.size() >= kMaxUnsent) unsent_.pop_front();
-    unsent_.push_back({.robot_id = robot_id,
-                       .client = request.client,
-                       .robot = request.robot,
-                       .site = request.site,
-                       .phase = SessionPhase::kRefused,
-                       .status = std::move(status)});
+    unsent_.push_back({{.robot_id = robot_id,
+                        .client = request.client,
+                        .robot = request.robot,
+                        .site = request.site,
+                        .phase = SessionPhase::kRefused,
+                        .status = std::move(status),
+                        .session = request.session}});
   }
   SendRefusals();
 }
@@ -191,8 +208,8 @@ void Roster::Take(ScanArrival&& arrival) {
     const auto found = sessions_.find(stream.robot_id);
     if (found != sessions_.end()) session = found->second;
   }
-  const DropReason reason =
-      session != nullptr && session->record().owner() != stream.client ? DropReason::kNotOwner : DropReason::kNoSession;
+  const DropReason reason = session != nullptr && session->record().token() != stream.session ? DropReason::kNotOwner
+                                                                                              : DropReason::kNoSession;
   if (session != nullptr && session->Take(std::move(arrival))) return;
   const MutexLock lock(mutex_);
   unclaimed_.Count(stream, sequence, reason);
@@ -229,8 +246,36 @@ void Roster::Tick() {
       session->End({StatusCode::kDeadlineExceeded, "its robot stayed away for longer than robots.suspended_expiry_s"});
   }
   SendRefusals();
+  RetireGone();
   const MutexLock lock(mutex_);
   for (Ledger& ledger : unclaimed_.TakeChanged()) outbound_.Send(std::move(ledger));
+}
+
+// Once a session that was removed has said its last word, the keys that nobody uses any more are given back.
+void Roster::RetireGone() {
+  const MutexLock lock(mutex_);
+  std::erase_if(gone_, [this](const std::shared_ptr<Session>& gone) CAIRN_REQUIRES(mutex_) {
+    const auto heir = sessions_.find(gone->record().state().robot_id);
+    if (heir == sessions_.end()) gone->Tick();
+    if (gone->record().phase() != SessionPhase::kEnded || gone->has_work()) return false;
+    const RobotStatus status = gone->record().snapshot().status;
+    bool retired = true;
+    const auto retire = [&](auto&& of) { retired = retired && outbound_.Send(Retired{std::move(of)}); };
+    for (const Ledger& ledger : status.ledgers) {
+      if (heir == sessions_.end() || !heir->second->record().Has(ledger.sensor_id)) retire(Ledger(ledger));
+    }
+    if (heir != sessions_.end()) {
+      heir->second->Announce();  // The end of the one before may have been said later.
+      return retired;
+    }
+    Ledger odometry;
+    odometry.robot_id = status.session.robot_id;
+    odometry.sensor_id = HashName(SessionRecord::kOdometry);
+    retire(std::move(odometry));
+    retire(PoseReport(status.pose));
+    retire(SessionState(status.session));
+    return retired;
+  });
 }
 
 std::shared_ptr<Session> Roster::Find(const std::string& robot) const {

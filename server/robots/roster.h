@@ -1,10 +1,12 @@
 // Who is here: every session by robot, and who may open one. The door's events are routed from here to the session they
 // belong to; scans without one are counted as unclaimed.
-// Rules of opening: a robot has one session; its owner, or anyone once the owner's liveliness lease is gone, resumes
-// it, and a client whose session is taken over is told; another live client is refused (ALREADY_EXISTS). An ended
-// session gives way to a new one. When max_robots is reached, the ended session that is oldest is forgotten first (its
-// part of the map stays), then the one suspended for longest. A session suspended for too long is ended.
-// Thread rule: any thread; nothing here waits for an estimator.
+// Rules of opening: a robot has one session. Whoever names it (its token) resumes it, where its owner is the same
+// client or is not alive; its start pose is then ignored. A session that was started elsewhere and is not known here is
+// refused (FAILED_PRECONDITION): its start pose is out of date. A new session of a robot whose owner is not alive goes
+// on with the one it has, and the client that loses it is told; another live client is refused (ALREADY_EXISTS). An
+// ended session gives way to a new one. When max_robots is reached, the ended session that is oldest is forgotten first
+// (its part of the map stays), then the one suspended for longest. A session suspended for too long is ended. Thread
+// rule: any thread; nothing here waits for an estimator.
 #pragma once
 
 #include <asio/thread_pool.hpp>
@@ -52,6 +54,7 @@ class Roster {
   // The session that has to be removed before this robot can have a new one; null where there is room.
   Result<std::shared_ptr<Session>> GivesWay(NameId robot_id) const CAIRN_REQUIRES(mutex_);
   void Refuse(const SessionRequest& request, Status status);
+  void RetireGone();
   void SendRefusals();
 
   const RobotsOptions options_;
@@ -63,7 +66,8 @@ class Roster {
   mutable Mutex mutex_;
   std::map<NameId, std::shared_ptr<Session>> sessions_ CAIRN_GUARDED_BY(mutex_);
   UnclaimedStreams unclaimed_ CAIRN_GUARDED_BY(mutex_);
-  std::deque<SessionState> unsent_ CAIRN_GUARDED_BY(mutex_);  // Refusals the outbound lane had no room for.
+  std::deque<SessionRefusal> unsent_ CAIRN_GUARDED_BY(mutex_);           // Refusals the outbound lane had no room for.
+  std::vector<std::shared_ptr<Session>> gone_ CAIRN_GUARDED_BY(mutex_);  // Removed, and not retired on the wire yet.
   SessionId next_id_ CAIRN_GUARDED_BY(mutex_) = 1;
 };
 

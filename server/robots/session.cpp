@@ -25,7 +25,7 @@ Session::Session(const SessionSetup& setup, const RobotsOptions& options, asio::
 bool Session::Take(ScanArrival&& arrival) {
   const NameId sensor = arrival.stream.sensor_id;
   const std::uint64_t sequence = arrival.scan->sequence;
-  if (arrival.stream.client != record_.owner()) {
+  if (arrival.stream.session != record_.token()) {
     const bool known = record_.ForeignScan(sensor, DropReason::kNotOwner) != SessionRecord::Arrival::kUnknownSensor;
     PublishLedgers(SessionRecord::Urgency::kWhenDue);
     return known;
@@ -45,13 +45,14 @@ bool Session::Take(ScanArrival&& arrival) {
 }
 
 void Session::Take(OdometryArrival&& arrival) {
-  if (arrival.stream.client != record_.owner()) return;
-  record_.OdometryReceived();
+  const std::uint64_t sequence = arrival.odometry.sequence;
+  if (arrival.stream.session != record_.token() || !record_.OdometryReceived(sequence)) return;
   if (arrival.refused || ending_) {
-    record_.OdometryDropped();
+    record_.OdometryDropped(sequence, arrival.refused ? DropReason::kBadGeometry : DropReason::kSessionEnded);
     return;
   }
-  if (queue_.Push(std::move(arrival))) record_.OdometryMerged();
+  if (const auto merged = queue_.Push(std::move(arrival)))
+    record_.OdometryDropped(merged->odometry.sequence, DropReason::kQueueFull);
   Schedule();
 }
 
@@ -74,8 +75,8 @@ void Session::SetLiveliness(bool alive) {
   if (record_.SetPhase(wanted, std::move(status))) AnnounceState();
 }
 
-bool Session::Resume(ClientId client) {
-  if (!record_.Resume(client)) return false;
+bool Session::Resume(ClientId client, SessionToken session) {
+  if (!record_.Resume(client, session)) return false;
   AnnounceState();
   return true;
 }

@@ -40,13 +40,15 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   // The owner's liveliness lease was lost or came back: kSuspended or kActive.
   void SetLiveliness(bool alive);
   // False where the session has ended meanwhile.
-  bool Resume(ClientId client);
+  bool Resume(ClientId client, SessionToken session);
   // Scans that arrived are finished, then the session has ended for good; `reason` stands in its state.
   void End(Status reason = {});
   // As End, but the session is only suspended, because the server stops; `done` is called on the strand, in any case.
   void Suspend(const std::function<void()>& done);
   // Drops the scans still waiting; what is being estimated is finished.
   void Abandon();
+  // Publishes the state once more.
+  void Announce() { AnnounceState(); }
   // Publishes ledgers that are due and whatever could not be sent before.
   void Tick();
 

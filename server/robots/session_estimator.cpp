@@ -65,7 +65,7 @@ void SessionEstimator::Discard(RobotEvent&& event) {
     if (arrival->scan != nullptr)
       record_.ScanDropped(arrival->stream.sensor_id, arrival->scan->sequence, DropReason::kSessionEnded);
   } else if (std::holds_alternative<OdometryArrival>(event)) {
-    record_.OdometryDropped();
+    record_.OdometryDropped(std::get<OdometryArrival>(event).odometry.sequence, DropReason::kSessionEnded);
   } else if (auto* const wanted = std::get_if<SnapshotWanted>(&event)) {
     wanted->done({.session = identity_.id,
                   .robot = identity_.status.session.robot,
@@ -84,24 +84,26 @@ void SessionEstimator::DropWaiting() {
 
 void SessionEstimator::On(ScanArrival&& arrival) {
   if (ended_) return Discard(std::move(arrival));
-  ComesFrom(arrival.stream.client);
+  ComesFrom(arrival.stream.session);
   waiting_.emplace(arrival.scan.get(), Waiting{arrival.stream.sensor_id, arrival.scan->sequence, arrival.received});
   pipeline_.Add(std::move(arrival.scan));
 }
 
 void SessionEstimator::On(OdometryArrival&& arrival) {
   if (ended_) return Discard(std::move(arrival));
-  ComesFrom(arrival.stream.client);
+  ComesFrom(arrival.stream.session);
+  const std::uint64_t refused_before = pipeline_.odometry_refused();
   pipeline_.Add(arrival.odometry);
-  CountRefusedOdometry();
+  const Odometry& odometry = arrival.odometry;
+  if (pipeline_.odometry_refused() == refused_before) {
+    record_.OdometryUsed(odometry.sequence, odometry.stamp);
+  } else {
+    record_.OdometryDropped(odometry.sequence, DropReason::kStampWentBack);
+  }
 }
 
-void SessionEstimator::ComesFrom(ClientId client) {
-  if (std::exchange(client_, client) != client) pipeline_.NewClient();
-}
-
-void SessionEstimator::CountRefusedOdometry() {
-  for (; odometry_refused_ < pipeline_.odometry_refused(); ++odometry_refused_) record_.OdometryDropped();
+void SessionEstimator::ComesFrom(SessionToken session) {
+  if (std::exchange(session_, session) != session) pipeline_.NewClient();
 }
 
 void SessionEstimator::Used(const Scan& scan, const slam::ScanOutcome& outcome) {
@@ -164,7 +166,6 @@ void SessionEstimator::On(SnapshotWanted&& wanted) {
 void SessionEstimator::On(Finish&& finish) {
   if (!ended_) {
     pipeline_.Finish();
-    CountRefusedOdometry();
     RefreshLandmarks(true);
     ended_ = finish.final;
   }

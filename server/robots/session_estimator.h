@@ -52,8 +52,7 @@ class SessionEstimator {
   void On(Finish&& finish);
   void Used(const Scan& scan, const slam::ScanOutcome& outcome);
   void Dropped(const Scan& scan, DropReason reason);
-  void ComesFrom(ClientId client);
-  void CountRefusedOdometry();
+  void ComesFrom(SessionToken session);
   GridChange TakeGridChange();
   slam::OccupancyGrid::Chunks PublishedChunks();
   void RefreshLandmarks(bool at_once);
@@ -63,8 +62,7 @@ class SessionEstimator {
   const SessionSnapshot identity_;  // Names and id; its other parts are empty.
   std::uint32_t epoch_ = 0;
   bool ended_ = false;
-  ClientId client_ = 0;  // The last one that sent.
-  std::uint64_t odometry_refused_ = 0;
+  SessionToken session_ = 0;                          // Of the last sample.
   std::unordered_map<const Scan*, Waiting> waiting_;  // Scans inside the pipeline; its pairing bounds them.
   std::chrono::steady_clock::time_point landmarks_refreshed_{};
   slam::ScanPipeline pipeline_;

@@ -17,12 +17,14 @@ SessionRecord::SessionRecord(SessionId id, const SessionRequest& request, const 
                      .robot = request.robot,
                      .site = request.site,
                      .phase = SessionPhase::kActive,
-                     .status = {}};
+                     .status = {},
+                     .session = request.session};
   status_.alive = true;
   status_.pose.robot_id = robot_id;
   status_.pose.robot = request.robot;
   status_.pose.site = request.site;
   if (request.has_start) status_.pose.T_map_robot = request.T_map_robot_start;
+  odometry_.account.Rename(NamesOf(HashName(kOdometry), kOdometry));
 }
 
 Ledger SessionRecord::NamesOf(NameId sensor_id, const std::string& sensor) const {
@@ -58,6 +60,11 @@ void SessionRecord::Inherit(NameId sensor_id, StreamLedger&& account) {
 SessionRecord::Stream* SessionRecord::Find(NameId sensor_id) {
   const auto found = streams_.find(sensor_id);
   return found == streams_.end() ? nullptr : &found->second;
+}
+
+bool SessionRecord::Has(NameId sensor_id) const {
+  const MutexLock lock(mutex_);
+  return streams_.contains(sensor_id);
 }
 
 SessionRecord::Arrival SessionRecord::ScanReceived(NameId sensor_id, std::uint64_t sequence) {
@@ -98,19 +105,23 @@ SessionRecord::Arrival SessionRecord::ForeignScan(NameId sensor_id, DropReason r
   return Arrival::kNew;
 }
 
-void SessionRecord::OdometryReceived() {
+bool SessionRecord::OdometryReceived(std::uint64_t sequence) {
   const MutexLock lock(mutex_);
-  ++odometry_received_;
+  if (!odometry_.account.Received(sequence)) return false;
+  odometry_.changed = true;
+  return true;
 }
 
-void SessionRecord::OdometryDropped() {
+void SessionRecord::OdometryUsed(std::uint64_t sequence, Stamp stamp) {
   const MutexLock lock(mutex_);
-  ++odometry_dropped_;
+  odometry_.account.Used(sequence, stamp);
+  odometry_.changed = true;
 }
 
-void SessionRecord::OdometryMerged() {
+void SessionRecord::OdometryDropped(std::uint64_t sequence, DropReason reason) {
   const MutexLock lock(mutex_);
-  ++odometry_merged_;
+  odometry_.account.Dropped(sequence, reason);
+  odometry_.changed = true;
 }
 
 void SessionRecord::SetLandmarks(std::vector<LandmarkReport> landmarks) {
@@ -138,13 +149,15 @@ bool SessionRecord::SetPhase(SessionPhase phase, Status status) {
   return true;
 }
 
-bool SessionRecord::Resume(ClientId client) {
+bool SessionRecord::Resume(ClientId client, SessionToken session) {
   const MutexLock lock(mutex_);
   if (status_.session.phase == SessionPhase::kEnded) return false;
-  if (status_.session.client != client) {
+  if (status_.session.session != session) {
     for (auto& [sensor_id, stream] : streams_) stream.account.NewClient();
+    odometry_.account.NewClient();
   }
   status_.session.client = client;
+  status_.session.session = session;
   status_.session.phase = SessionPhase::kActive;
   status_.session.status = {};
   status_.alive = true;
@@ -154,6 +167,11 @@ bool SessionRecord::Resume(ClientId client) {
 ClientId SessionRecord::owner() const {
   const MutexLock lock(mutex_);
   return status_.session.client;
+}
+
+SessionToken SessionRecord::token() const {
+  const MutexLock lock(mutex_);
+  return status_.session.session;
 }
 
 bool SessionRecord::alive() const {
@@ -183,9 +201,12 @@ std::uint32_t SessionRecord::epoch() const {
 
 Ledger SessionRecord::LedgerOf(const Stream& stream) const {
   Ledger ledger = stream.account.ledger();
-  ledger.odometry_received = odometry_received_;
-  ledger.odometry_dropped = odometry_dropped_;
-  ledger.odometry_merged = odometry_merged_;
+  const Ledger odometry = odometry_.account.ledger();
+  const auto count = [&odometry](DropReason reason) { return odometry.dropped[static_cast<std::size_t>(reason)]; };
+  ledger.session = status_.session.session;
+  ledger.odometry_received = odometry.received;
+  ledger.odometry_merged = count(DropReason::kQueueFull);
+  ledger.odometry_dropped = odometry.dropped_total() - ledger.odometry_merged - count(DropReason::kLostOnWire);
   return ledger;
 }
 
@@ -196,19 +217,28 @@ SessionSnapshot SessionRecord::snapshot() const {
   return snapshot;
 }
 
+bool SessionRecord::IsDue(const Stream& stream, Clock::time_point now, Urgency urgency, Clock::duration period) {
+  const std::uint64_t settled = stream.account.settled_count();
+  const bool burst = settled - stream.settled_when_taken >= kSettledBurst;
+  const bool drained = urgency == Urgency::kDrained && settled != stream.settled_when_taken;
+  return urgency == Urgency::kNow || (stream.changed && (burst || drained || now - stream.taken >= period));
+}
+
+Ledger SessionRecord::TakeLedger(Stream& stream, Clock::time_point now) const {
+  stream.changed = false;
+  stream.settled_when_taken = stream.account.settled_count();
+  stream.taken = now;
+  return LedgerOf(stream);
+}
+
 std::vector<Ledger> SessionRecord::TakeDueLedgers(Clock::time_point now, Urgency urgency) {
   const MutexLock lock(mutex_);
   std::vector<Ledger> due;
+  // Nobody waits for the odometry's ledger: however much comes, it is not due more often.
+  if (urgency == Urgency::kNow || (odometry_.changed && now - odometry_.taken >= ledger_period_))
+    due.push_back(TakeLedger(odometry_, now));
   for (auto& [sensor_id, stream] : streams_) {
-    const std::uint64_t settled = stream.account.settled_count();
-    const bool burst = settled - stream.settled_when_taken >= kSettledBurst;
-    const bool drained = urgency == Urgency::kDrained && settled != stream.settled_when_taken;
-    const bool rested = now - stream.taken >= ledger_period_;
-    if (urgency != Urgency::kNow && !(stream.changed && (burst || drained || rested))) continue;
-    due.push_back(LedgerOf(stream));
-    stream.changed = false;
-    stream.settled_when_taken = settled;
-    stream.taken = now;
+    if (IsDue(stream, now, urgency, ledger_period_)) due.push_back(TakeLedger(stream, now));
   }
   return due;
 }
@@ -216,6 +246,7 @@ std::vector<Ledger> SessionRecord::TakeDueLedgers(Clock::time_point now, Urgency
 void SessionRecord::MarkUnsent(NameId sensor_id) {
   const MutexLock lock(mutex_);
   if (Stream* const stream = Find(sensor_id)) stream->changed = true;
+  if (sensor_id == HashName(kOdometry)) odometry_.changed = true;
 }
 
 }  // namespace cairn::server

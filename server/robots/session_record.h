@@ -1,4 +1,5 @@
-// What is known of one session and shown to the world: phase, owner, newest pose, the ledgers of its streams, its path.
+// What is known of one session and shown to the world: phase, owner, newest pose, the ledgers of its streams (one per
+// sensor, and one of the odometry), its path.
 // Written by the door's side (arrivals) and by the estimator's strand (outcomes); read by queries through snapshot().
 // Decides when a ledger is due: at most `ledger_rate_hz`, but at once every 8 settled scans and when the queue drains,
 // because a client that replays a log waits for the ledger before it sends more.
@@ -23,6 +24,7 @@ class SessionRecord {
  public:
   using Clock = std::chrono::steady_clock;
   static constexpr std::size_t kMaxSensors = 16;
+  static constexpr char kOdometry[] = "odometry";  // The name of the odometry's stream; no sensor may have it.
   static constexpr std::uint64_t kSettledBurst = 8;
 
   SessionRecord(SessionId id, const SessionRequest& request, const RobotsOptions& options);
@@ -31,6 +33,8 @@ class SessionRecord {
   bool AddSensors(const std::vector<std::string>& sensors);
   // Goes on with the account of a stream that sent before its session was open.
   void Inherit(NameId sensor_id, StreamLedger&& account);
+
+  [[nodiscard]] bool Has(NameId sensor_id) const;
 
   // A scan of the owner. kDuplicate and kUnknownSensor leave no trace here.
   enum class Arrival { kNew, kDuplicate, kUnknownSensor };
@@ -42,9 +46,11 @@ class SessionRecord {
   // A scan of a client that does not own the session.
   Arrival ForeignScan(NameId sensor_id, DropReason reason);
 
-  void OdometryReceived();
-  void OdometryDropped();
-  void OdometryMerged();
+  // Odometry of the owner; false for a number that was received before, which leaves no trace.
+  [[nodiscard]] bool OdometryReceived(std::uint64_t sequence);
+  void OdometryUsed(std::uint64_t sequence, Stamp stamp);
+  // kQueueFull: the sample was merged into its successor.
+  void OdometryDropped(std::uint64_t sequence, DropReason reason);
 
   void SetLandmarks(std::vector<LandmarkReport> landmarks);
   // Another epoch of the map: the newest pose belongs to it from now on.
@@ -52,10 +58,11 @@ class SessionRecord {
   void SetAlive(bool alive);
   // Both leave a session that has ended as it is, and say false: whoever asks may have looked before it ended.
   bool SetPhase(SessionPhase phase, Status status);
-  // The robot is back, perhaps as another client process.
-  bool Resume(ClientId client);
+  // The robot is back, perhaps as another client process, whose session goes on with this one.
+  bool Resume(ClientId client, SessionToken session);
 
   [[nodiscard]] ClientId owner() const;
+  [[nodiscard]] SessionToken token() const;  // The session of the owner; streams of others are not taken.
   [[nodiscard]] bool alive() const;
   [[nodiscard]] SessionPhase phase() const;
   [[nodiscard]] SessionState state() const;
@@ -71,12 +78,14 @@ class SessionRecord {
 
  private:
   struct Stream {
-    StreamLedger account;
+    StreamLedger account{Ledger{}};
     bool changed = true;
     std::uint64_t settled_when_taken = 0;
     Clock::time_point taken{};
   };
   Ledger NamesOf(NameId sensor_id, const std::string& sensor) const CAIRN_REQUIRES(mutex_);
+  static bool IsDue(const Stream& stream, Clock::time_point now, Urgency urgency, Clock::duration period);
+  Ledger TakeLedger(Stream& stream, Clock::time_point now) const CAIRN_REQUIRES(mutex_);
   Ledger LedgerOf(const Stream& stream) const CAIRN_REQUIRES(mutex_);
   Stream* Find(NameId sensor_id) CAIRN_REQUIRES(mutex_);
 
@@ -87,9 +96,7 @@ class SessionRecord {
   RobotStatus status_ CAIRN_GUARDED_BY(mutex_);           // Its `ledgers` stay empty: they are made on demand.
   Clock::time_point suspended_ CAIRN_GUARDED_BY(mutex_);  // Since when, where it is suspended.
   std::map<NameId, Stream> streams_ CAIRN_GUARDED_BY(mutex_);
-  std::uint64_t odometry_received_ CAIRN_GUARDED_BY(mutex_) = 0;
-  std::uint64_t odometry_dropped_ CAIRN_GUARDED_BY(mutex_) = 0;
-  std::uint64_t odometry_merged_ CAIRN_GUARDED_BY(mutex_) = 0;
+  Stream odometry_ CAIRN_GUARDED_BY(mutex_);
   PoseHistory history_ CAIRN_GUARDED_BY(mutex_);
   std::shared_ptr<const std::vector<LandmarkReport>> landmarks_ CAIRN_GUARDED_BY(mutex_);
 };

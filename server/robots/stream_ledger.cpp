@@ -37,6 +37,12 @@ void StreamLedger::Used(std::uint64_t sequence, Stamp stamp, bool keyframe, doub
   Settle(sequence);
 }
 
+void StreamLedger::Used(std::uint64_t sequence, Stamp stamp) {
+  ++ledger_.used;
+  ledger_.last_stamp = stamp;
+  Settle(sequence);
+}
+
 void StreamLedger::Dropped(std::uint64_t sequence, DropReason reason) {
   ++Count(ledger_, reason);
   Settle(sequence);

@@ -1,7 +1,7 @@
-// The account of one stream (robot, sensor): what became of every scan. `received + lost_on_wire` =
+// The account of one stream (robot, sensor): what became of every sample, scan or odometry. `received + lost_on_wire` =
 // `used + dropped + waiting` at every moment.
 //
-// Numbers: scans carry sequences from 1. A gap counts as lost_on_wire and settles at once, so a client's window never
+// Numbers: samples carry sequences from 1. A gap counts as lost_on_wire and settles at once, so a client's window never
 // hangs on it; a late arrival takes its number back out of the lost. A number seen before (a resend of something
 // already received) is ignored and counted nowhere. At most kMaxGaps separate gaps are remembered; older ones stay lost
 // for good. Numbers before the first one of a client may have gone to an earlier session or to the server before its
@@ -31,12 +31,14 @@ class StreamLedger {
   // A scan arrived; false for a duplicate number, which the caller forgets. Otherwise Used or Dropped must follow.
   bool Received(std::uint64_t sequence);
   void Used(std::uint64_t sequence, Stamp stamp, bool keyframe, double latency_ms);
+  // As above, for odometry: no latency is measured.
+  void Used(std::uint64_t sequence, Stamp stamp);
   void Dropped(std::uint64_t sequence, DropReason reason);
   // A scan of someone else's client under this stream's name: counted, its number means nothing here.
   void DroppedForeign(DropReason reason);
 
   void Rename(const Ledger& names);
-  // The next scan comes from another client process.
+  // The next sample belongs to another session of the robot's client.
   void NewClient() { begun_ = false; }
 
   // Scans used or dropped so far, for deciding when to publish.

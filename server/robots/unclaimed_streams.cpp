@@ -13,7 +13,7 @@ void UnclaimedStreams::Count(const StreamId& stream, std::uint64_t sequence, Dro
     Ledger names;
     names.robot_id = stream.robot_id;
     names.sensor_id = stream.sensor_id;
-    found = accounts_.emplace(key, Account{StreamLedger(names), stream.client}).first;
+    found = accounts_.emplace(key, Account{StreamLedger(names), stream.session}).first;
   }
   Account& account = found->second;
   account.changed = true;
@@ -21,14 +21,14 @@ void UnclaimedStreams::Count(const StreamId& stream, std::uint64_t sequence, Dro
     account.ledger.DroppedForeign(reason);
     return;
   }
-  account.NextFrom(stream.client);
+  account.NextIn(stream.session);
   if (account.ledger.Received(sequence)) account.ledger.Dropped(sequence, reason);
 }
 
 std::optional<StreamLedger> UnclaimedStreams::Claim(const StreamId& stream) {
   auto node = accounts_.extract({stream.robot_id, stream.sensor_id});
   if (node.empty()) return std::nullopt;
-  node.mapped().NextFrom(stream.client);
+  node.mapped().NextIn(stream.session);
   return std::move(node.mapped().ledger);
 }
 

@@ -19,8 +19,8 @@ class UnclaimedStreams {
   explicit UnclaimedStreams(std::size_t max_streams) : max_streams_(max_streams) {}
 
   void Count(const StreamId& stream, std::uint64_t sequence, DropReason reason);
-  // The account of a stream whose session `client` has just opened, if anything was sent under its name before. Where
-  // the last sender was another client, the owner's numbers start anew.
+  // The account of a stream whose session has just been opened, if anything was sent under its name before. Where that
+  // was sent in another session, the numbers start anew.
   [[nodiscard]] std::optional<StreamLedger> Claim(const StreamId& stream);
   // Accounts that changed since the last call.
   [[nodiscard]] std::vector<Ledger> TakeChanged();
@@ -29,11 +29,11 @@ class UnclaimedStreams {
  private:
   struct Account {
     StreamLedger ledger;
-    ClientId client = 0;  // The last sender.
+    SessionToken session = 0;  // Of the last sample.
     bool changed = true;
 
-    void NextFrom(ClientId sender) {
-      if (std::exchange(client, sender) != sender) ledger.NewClient();
+    void NextIn(SessionToken next) {
+      if (std::exchange(session, next) != next) ledger.NewClient();
     }
   };
   const std::size_t max_streams_;

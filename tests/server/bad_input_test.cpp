@@ -234,14 +234,15 @@ TEST(BadSession, RequestsThatMakeNoSenseAreRefusedWithAReason) {
                             .client = kSender,
                             .has_start = true,
                             .T_map_robot_start = {},
-                            .end = false};
+                            .end = false,
+                            .session = kSender};
   const auto expect_refused = [&house](SessionRequest request) {
     const std::string robot = request.robot;
     const ClientId client = request.client;
     const auto count = [&] {
-      const auto states = house.All<SessionState>();
-      return std::count_if(states.begin(), states.end(), [&](const SessionState& state) {
-        return state.phase == SessionPhase::kRefused && state.status.code == StatusCode::kInvalidArgument;
+      const auto refusals = house.All<SessionRefusal>();
+      return std::count_if(refusals.begin(), refusals.end(), [&](const SessionRefusal& refusal) {
+        return refusal.state.status.code == StatusCode::kInvalidArgument;
       });
     };
     const auto before = count();
@@ -256,6 +257,12 @@ TEST(BadSession, RequestsThatMakeNoSenseAreRefusedWithAReason) {
   expect_refused(bad);
   bad = good;
   bad.client = 0;
+  expect_refused(bad);
+  bad = good;
+  bad.session = 0;
+  expect_refused(bad);
+  bad = good;
+  bad.sensors = {"odometry"};
   expect_refused(bad);
   bad = good;
   bad.sensors.clear();

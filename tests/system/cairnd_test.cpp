@@ -175,7 +175,8 @@ class Cairnd : public ::testing::Test {
                                  .client = kClient,
                                  .has_start = false,
                                  .T_map_robot_start = {},
-                                 .end = false};
+                                 .end = false,
+                                 .session = kClient};
     ASSERT_TRUE(sessions_->Publish(request));
     ASSERT_TRUE(Eventually([&] {
       const auto states = states_.values();

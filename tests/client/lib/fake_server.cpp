@@ -1,13 +1,16 @@
 #include "tests/client/lib/fake_server.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "tests/loopback.h"
 
 namespace cairn::test {
 
-FakeServer::FakeServer(const wire::WireOptions& options) : bus_(MakeBus("fake server", options)) {
+FakeServer::FakeServer(const wire::WireOptions& options, Generation generation)
+    : generation_(generation), bus_(MakeBus("fake server", options)) {
   sessions_ = Must(bus_->Advertise<SessionState>());
+  refusals_ = Must(bus_->Advertise<SessionRefusal>());
   ledgers_ = Must(bus_->Advertise<Ledger>());
   poses_ = Must(bus_->Advertise<PoseReport>());
   maps_ = Must(bus_->Advertise<MapInfo>());
@@ -15,9 +18,13 @@ FakeServer::FakeServer(const wire::WireOptions& options) : bus_(MakeBus("fake se
   replies_ = Must(bus_->Advertise<Reply>());
   const auto add = [this](auto subscription) { subscriptions_.push_back(Must(std::move(subscription))); };
   add(bus_->Subscribe<ScanSample>([this](ScanSample&& sample) { OnScan(std::move(sample)); }));
-  add(bus_->Subscribe<OdometrySample>([this](OdometrySample&&) {
+  add(bus_->Subscribe<OdometrySample>([this](OdometrySample&& sample) {
     const MutexLock lock(mutex_);
     ++odometry_received_;
+    Account& account = accounts_[sample.stream.sensor_id];
+    account.stream = sample.stream;
+    account.seen.insert(sample.odometry.sequence);
+    if (settling_) Report(sample.stream);
   }));
   add(bus_->Subscribe<Request>([this](Request&& request) { OnRequest(std::move(request)); }));
   add(bus_->Subscribe<SessionRequest>([this](SessionRequest&& request) { OnSession(std::move(request)); }));
@@ -39,6 +46,27 @@ void FakeServer::SetDurable(bool durable) {
   durable_ = durable;
 }
 
+void FakeServer::SetDurableThrough(std::uint64_t sequence) {
+  const MutexLock lock(mutex_);
+  durable_through_ = sequence;
+  for (const auto& [sensor, account] : accounts_) Report(account.stream);
+}
+
+void FakeServer::Restart(Generation generation) {
+  std::vector<SessionRequest> sessions;
+  {
+    const MutexLock lock(mutex_);
+    generation_ = generation;
+    received_.clear();
+    for (auto& [sensor, account] : accounts_) {
+      account.seen.erase(account.seen.upper_bound(durable_through_), account.seen.end());
+      account.settled = std::min(account.settled, durable_through_);
+    }
+    for (const auto& [robot, request] : owners_) sessions.push_back(request);
+  }
+  for (SessionRequest& request : sessions) OnSession(std::move(request));
+}
+
 void FakeServer::SetAnswering(bool answering) {
   const MutexLock lock(mutex_);
   answering_ = answering;
@@ -55,6 +83,21 @@ void FakeServer::Publish(const MapInfo& info) {
 
 void FakeServer::Publish(const TileSample& sample) {
   Must(tiles_->Publish(sample));
+}
+
+void FakeServer::SetGeneration(Generation generation) {
+  const MutexLock lock(mutex_);
+  generation_ = generation;
+}
+
+void FakeServer::IgnoreSessions(int count) {
+  const MutexLock lock(mutex_);
+  sessions_to_ignore_ = count;
+}
+
+std::vector<SessionRequest> FakeServer::sessions() const {
+  const MutexLock lock(mutex_);
+  return asked_sessions_;
 }
 
 std::vector<std::uint64_t> FakeServer::received() const {
@@ -78,18 +121,36 @@ std::vector<RequestKind> FakeServer::asked() const {
 }
 
 void FakeServer::OnSession(SessionRequest&& request) {
-  SessionState state{HashName(request.robot), request.client, request.robot, request.site, SessionPhase::kActive, {}};
+  SessionState state{.robot_id = HashName(request.robot),
+                     .client = request.client,
+                     .robot = request.robot,
+                     .site = request.site,
+                     .phase = SessionPhase::kActive,
+                     .status = {},
+                     .session = request.session};
   {
     const MutexLock lock(mutex_);
-    const ClientId owner = owners_.try_emplace(request.robot, request.client).first->second;
-    if (owner != request.client) {
+    asked_sessions_.push_back(request);
+    if (sessions_to_ignore_ > 0 && sessions_to_ignore_-- > 0) return;
+    state.generation = generation_;
+    state.durable = durable_;
+    const bool known = owners_.contains(request.robot);
+    if (!known && request.started) {
+      state.phase = SessionPhase::kRefused;
+      state.status = {StatusCode::kFailedPrecondition, "the server does not know this session"};
+    } else if (known && owners_[request.robot].client != request.client) {
       state.phase = SessionPhase::kRefused;
       state.status = {StatusCode::kAlreadyExists, "robot '" + request.robot + "' is connected already"};
-    } else if (request.end) {
-      state.phase = SessionPhase::kEnded;
+    } else {
+      owners_[request.robot] = request;
+      if (request.end) state.phase = SessionPhase::kEnded;
     }
   }
-  Must(sessions_->Publish(state));
+  if (state.phase == SessionPhase::kRefused) {
+    Must(refusals_->Publish({state}));
+  } else {
+    Must(sessions_->Publish(state));
+  }
 }
 
 void FakeServer::OnScan(ScanSample&& sample) {
@@ -106,6 +167,7 @@ void FakeServer::OnScan(ScanSample&& sample) {
   pose.robot_id = sample.stream.robot_id;
   pose.stamp = sample.scan.stamp;
   pose.scan_sequence = sample.scan.sequence;
+  pose.generation = generation_;
   pose.reason = PoseReason::kTracking;
   Must(poses_->Publish(pose));
 }
@@ -118,9 +180,11 @@ void FakeServer::Report(const StreamId& stream) {
   ledger.robot_id = stream.robot_id;
   ledger.sensor_id = stream.sensor_id;
   ledger.received = ledger.used = account.seen.size();
+  ledger.session = stream.session;
+  ledger.generation = generation_;
   ledger.last_sequence = account.seen.empty() ? 0 : *account.seen.rbegin();
   ledger.settled_through = account.settled;
-  ledger.durable_through = durable_ ? account.settled : 0;
+  ledger.durable_through = durable_through_;
   Must(ledgers_->Publish(ledger));
 }
 

@@ -15,19 +15,28 @@ namespace cairn::test {
 
 class FakeServer {
  public:
-  explicit FakeServer(const wire::WireOptions& options);
+  explicit FakeServer(const wire::WireOptions& options, Generation generation = 1);
   ~FakeServer();
 
   // A stopped server receives scans but settles none; resuming settles all it has.
   void SetSettling(bool settling);
-  void SetDurable(bool durable);  // Settled scans are also called durable.
+  // The server says that it stores; nothing is on disk until SetDurableThrough.
+  void SetDurable(bool durable);
+  void SetDurableThrough(std::uint64_t sequence);
+  // Begins a later generation that knows its sessions and the scans that were durable, and nothing else.
+  void Restart(Generation generation);
   void SetAnswering(bool answering);
+  // Of all that is sent from now on; 1 at first.
+  void SetGeneration(Generation generation);
+  void IgnoreSessions(int count);  // So many session requests are not answered.
   // Scans with this number are lost on their way, once.
   void LoseOnce(std::uint64_t sequence);
 
   void Publish(const MapInfo& info);
   void Publish(const TileSample& sample);
 
+  // The sessions asked for, in order of the requests.
+  [[nodiscard]] std::vector<SessionRequest> sessions() const;
   [[nodiscard]] std::vector<std::uint64_t> received() const;  // Numbers in order of arrival, duplicates left out.
   [[nodiscard]] ScanSample last_scan() const;
   [[nodiscard]] int odometry_received() const;
@@ -57,9 +66,13 @@ class FakeServer {
   mutable Mutex mutex_;
   bool settling_ CAIRN_GUARDED_BY(mutex_) = true;
   bool durable_ CAIRN_GUARDED_BY(mutex_) = false;
+  std::uint64_t durable_through_ CAIRN_GUARDED_BY(mutex_) = 0;
   bool answering_ CAIRN_GUARDED_BY(mutex_) = true;
   std::set<std::uint64_t> to_lose_ CAIRN_GUARDED_BY(mutex_);
-  std::map<std::string, ClientId> owners_ CAIRN_GUARDED_BY(mutex_);
+  Generation generation_ CAIRN_GUARDED_BY(mutex_);
+  int sessions_to_ignore_ CAIRN_GUARDED_BY(mutex_) = 0;
+  std::vector<SessionRequest> asked_sessions_ CAIRN_GUARDED_BY(mutex_);
+  std::map<std::string, SessionRequest> owners_ CAIRN_GUARDED_BY(mutex_);
   std::map<NameId, Account> accounts_ CAIRN_GUARDED_BY(mutex_);
   std::vector<std::uint64_t> received_ CAIRN_GUARDED_BY(mutex_);
   ScanSample last_scan_ CAIRN_GUARDED_BY(mutex_);
@@ -70,6 +83,7 @@ class FakeServer {
 
   std::unique_ptr<wire::Bus> bus_;
   std::unique_ptr<wire::Publication<SessionState>> sessions_;
+  std::unique_ptr<wire::Publication<SessionRefusal>> refusals_;
   std::unique_ptr<wire::Publication<Ledger>> ledgers_;
   std::unique_ptr<wire::Publication<PoseReport>> poses_;
   std::unique_ptr<wire::Publication<MapInfo>> maps_;

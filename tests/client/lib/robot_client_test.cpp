@@ -115,22 +115,116 @@ TEST_F(RobotClientTest, SendsAgainWhatGotStuck) {
   EXPECT_THAT(server_->received(), ::testing::UnorderedElementsAreArray(OneTo(10)));
 }
 
-// What the old server had not settled, the new one gets; the robot notices nothing but a pause.
-TEST_F(RobotClientTest, GoesOnWithARestartedServer) {
+TEST_F(RobotClientTest, GoesOnAfterAServerThatNobodyHeardOfForAWhile) {
   RobotClientOptions options;
-  options.resend_after_s = 100.0;  // Only the reconnection may cause it.
-  options.send_timeout_s = 20.0;
+  options.window = 0;
   const auto client = Open(options);
   for (int i = 0; i < 10; ++i) ASSERT_TRUE(client->Publish(SomeScan()));
   ASSERT_TRUE(client->WaitSettled(20.0));
+  server_.reset();
+  ASSERT_TRUE(Eventually([&] { return !client->connected(); }));
+  for (int i = 0; i < 100; ++i) ASSERT_TRUE(client->Publish(SomeScan()));  // Kept.
+  server_ = std::make_unique<FakeServer>(LoopbackOptions(), 2);
+  ASSERT_TRUE(client->WaitSettled(20.0));
+  EXPECT_EQ(server_->received(), OneTo(100));
+}
+
+// A server that began anew put the robot where it had once begun.
+TEST_F(RobotClientTest, OpensANewSessionWhereTheRobotIsIfTheServerForgotIt) {
+  SessionRequest request = Robot("r1");
+  request.has_start = true;
+  request.T_map_robot_start = {10, 0, 0};
+  std::atomic<int> told = 0;
+  RobotClient::Callbacks callbacks;
+  callbacks.restarted = [&](SessionToken, const Pose2&) { ++told; };
+  const auto client = Must(RobotClient::Open(*bus_, request, 20.0, std::move(callbacks)));
+  const auto drive = [&](int step) {
+    ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = step * 10, .T_odom_robot = {0.1 * step, 0, 0}}));
+    Scan scan = SomeScan();
+    scan.stamp = step * 10;
+    ASSERT_TRUE(client->Publish(scan));
+  };
+  for (int step = 0; step < 10; ++step) drive(step);
+  ASSERT_TRUE(client->WaitSettled(20.0));
+  const SessionToken before = client->session().session;
   server_->SetSettling(false);
-  for (int i = 0; i < 5; ++i) ASSERT_TRUE(client->Publish(SomeScan()));
+  for (int step = 10; step < 15; ++step) drive(step);
   ASSERT_TRUE(Eventually([&] { return server_->received().size() == 15; }));
   server_.reset();
-  ASSERT_TRUE(client->Publish(SomeScan()));  // Into the void.
-  server_ = std::make_unique<FakeServer>(LoopbackOptions());
-  EXPECT_TRUE(Eventually([&] { return server_->received().size() >= 6; }));
-  EXPECT_THAT(server_->received(), ::testing::ElementsAre(11, 12, 13, 14, 15, 16));
+  server_ = std::make_unique<FakeServer>(LoopbackOptions(), 2);
+  drive(15);
+  ASSERT_TRUE(client->WaitSettled(20.0));
+  EXPECT_EQ(client->restarted(), 1);
+  EXPECT_EQ(told, 1);
+  // Numbered anew, what was not settled before.
+  EXPECT_EQ(server_->received(), OneTo(6));
+  EXPECT_EQ(server_->last_scan().scan.stamp, 150);
+  const SessionRequest first = server_->sessions().front();
+  EXPECT_TRUE(first.started);
+  EXPECT_EQ(first.session, before);
+  const SessionRequest last = server_->sessions().back();
+  EXPECT_NE(last.session, before);
+  EXPECT_EQ(client->session().session, last.session);
+  EXPECT_EQ(client->session().generation, 2U);
+  // The fake server's poses say that the frames `map` and `odom` are the same. The first scan sent again is the
+  // eleventh, one metre along the way.
+  EXPECT_NEAR(last.T_map_robot_start.x, 1.0, 1e-9);
+}
+
+TEST_F(RobotClientTest, WithoutAPoseTheFirstStartIsCarriedOnByTheOdometry) {
+  SessionRequest request = Robot("r1");
+  request.has_start = true;
+  request.T_map_robot_start = {10, 0, 0};
+  server_->SetSettling(false);  // No poses either.
+  const auto client = Must(RobotClient::Open(*bus_, request, 20.0));
+  ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = 0, .T_odom_robot = {5, 0, 0}}));
+  ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = 100, .T_odom_robot = {7, 0, 0}}));
+  Scan scan = SomeScan();
+  scan.stamp = 200;
+  ASSERT_TRUE(client->Publish(scan));
+  ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = 300, .T_odom_robot = {9, 0, 0}}));
+  ASSERT_TRUE(Eventually([&] { return server_->received().size() == 1; }));
+  server_.reset();
+  server_ = std::make_unique<FakeServer>(LoopbackOptions(), 2);
+  ASSERT_TRUE(client->WaitSettled(20.0));
+  EXPECT_NEAR(server_->sessions().back().T_map_robot_start.x, 13.0, 1e-9);
+}
+
+TEST_F(RobotClientTest, AsksAgainUntilItIsAnswered) {
+  server_->IgnoreSessions(1);
+  const auto client = Open();
+  EXPECT_EQ(server_->sessions().size(), 2U);
+  EXPECT_EQ(server_->sessions()[0].session, server_->sessions()[1].session);
+}
+
+// It went on streaming into a session that was another's by then.
+TEST_F(RobotClientTest, IsToldThatAnotherClientHasTakenTheRobotOver) {
+  const auto client = Open();
+  SessionState taken = client->session();
+  taken.client = 99;
+  taken.session = 99;
+  const auto other_server = Must(bus_->Advertise<SessionState>());
+  ASSERT_TRUE(Eventually([&] { return other_server->matched() > 0; }));
+  ASSERT_TRUE(other_server->Publish(taken));
+  ASSERT_TRUE(Eventually([&] { return !client->Publish(SomeScan()); }));
+  EXPECT_EQ(client->Publish(SomeScan()).error().code, StatusCode::kAlreadyExists);
+  EXPECT_EQ(client->session().phase, SessionPhase::kRefused);
+}
+
+// A server that stores: what is settled but not on disk goes again, and only that.
+TEST_F(RobotClientTest, SendsAgainWhatIsNotDurable) {
+  server_->SetDurable(true);
+  const auto client = Open();
+  for (int i = 0; i < 10; ++i) ASSERT_TRUE(client->Publish(SomeScan()));
+  ASSERT_TRUE(client->WaitSettled(20.0));
+  server_->SetDurableThrough(6);
+  ASSERT_TRUE(Eventually([&] { return client->ledger()->durable_through == 6; }));
+  server_->Restart(2);  // It knows the session, and what it had stored.
+  EXPECT_TRUE(Eventually([&] { return server_->received().size() == 4; }));
+  EXPECT_EQ(server_->received(), (std::vector<std::uint64_t>{7, 8, 9, 10}));
+  ASSERT_TRUE(client->WaitSettled(20.0));
+  EXPECT_EQ(client->restarted(), 0);
+  EXPECT_EQ(client->resent(), 4U);
 }
 
 TEST_F(RobotClientTest, EndsItsSession) {

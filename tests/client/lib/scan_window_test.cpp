@@ -5,83 +5,58 @@
 namespace cairn::client {
 namespace {
 
-Ledger Settled(std::uint64_t through, std::uint64_t durable = 0) {
+Ledger Settled(std::uint64_t through) {
   Ledger ledger;
   ledger.last_sequence = through;
   ledger.settled_through = through;
-  ledger.durable_through = durable;
   return ledger;
 }
 
-void AddScans(ScanWindow& window, int count) {
-  for (int i = 0; i < count; ++i) window.Add({});
+void Give(ScanWindow& window, int count) {
+  for (int i = 0; i < count; ++i) static_cast<void>(window.Next());
 }
 
-TEST(ScanWindow, NumbersScansFromOne) {
-  ScanWindow window({});
-  EXPECT_EQ(window.Add({})->scan.sequence, 1U);
-  EXPECT_EQ(window.Add({})->scan.sequence, 2U);
-  ScanSample numbered;
-  numbered.scan.sequence = 10;
-  EXPECT_EQ(window.Add(std::move(numbered))->scan.sequence, 10U);
-  EXPECT_EQ(window.Add({})->scan.sequence, 11U);
+TEST(ScanWindow, NumbersFromOne) {
+  ScanWindow window(0);
+  EXPECT_EQ(window.Next(), 1U);
+  EXPECT_EQ(window.Next(), 2U);
+  window.TakeBack();
+  EXPECT_EQ(window.Next(), 2U);
 }
 
 TEST(ScanWindow, IsFullAtItsLimitUntilTheServerSettles) {
-  ScanWindow window({.window = 4});
-  AddScans(window, 4);
+  ScanWindow window(4);
+  Give(window, 4);
   EXPECT_FALSE(window.HasRoom());
   window.OnLedger(Settled(1));
   EXPECT_TRUE(window.HasRoom());
-  AddScans(window, 1);
+  Give(window, 1);
   EXPECT_FALSE(window.HasRoom());
 }
 
 TEST(ScanWindow, WithoutALimitAlwaysHasRoom) {
-  ScanWindow window({.window = 0, .kept_scans = 8});
-  AddScans(window, 100);
+  ScanWindow window(0);
+  Give(window, 100);
   EXPECT_TRUE(window.HasRoom());
 }
 
-TEST(ScanWindow, KeepsWhatIsNotSettledOfAServerWithoutAStore) {
-  ScanWindow window({});
-  AddScans(window, 10);
-  window.OnLedger(Settled(7));
-  ASSERT_EQ(window.kept().size(), 3U);
-  EXPECT_EQ(window.kept()[0]->scan.sequence, 8U);
-}
-
-TEST(ScanWindow, KeepsWhatIsSettledButNotDurableOfAServerWithAStore) {
-  ScanWindow window({});
-  AddScans(window, 10);
-  window.OnLedger(Settled(8, 5));
-  ASSERT_EQ(window.kept().size(), 5U);
-  EXPECT_EQ(window.kept()[0]->scan.sequence, 6U);
-}
-
-TEST(ScanWindow, ForgetsTheOldestBeyondItsBoundAndSaysSo) {
-  ScanWindow window({.window = 0, .kept_scans = 4});
-  AddScans(window, 6);
-  EXPECT_EQ(window.kept().size(), 4U);
-  EXPECT_EQ(window.forgotten(), 2U);
-}
-
-TEST(ScanWindow, IgnoresTheLedgerOfAnEarlierClient) {
-  ScanWindow window({.window = 4});
-  AddScans(window, 4);
-  window.OnLedger(Settled(500));
-  EXPECT_FALSE(window.HasRoom());
-  EXPECT_EQ(window.kept().size(), 4U);
-}
-
 TEST(ScanWindow, ClosesForAServerThatLostItsMemory) {
-  ScanWindow window({.window = 4});
-  AddScans(window, 4);
+  ScanWindow window(4);
+  Give(window, 4);
   window.OnLedger(Settled(4));
   EXPECT_TRUE(window.settled());
   window.OnLedger(Settled(0));
   EXPECT_FALSE(window.HasRoom());
   EXPECT_FALSE(window.settled());
+}
+
+TEST(ScanWindow, BeginsANewSessionWithWhatIsKept) {
+  ScanWindow window(4);
+  Give(window, 100);
+  window.OnLedger(Settled(98));
+  window.Restart(2);
+  EXPECT_EQ(window.settled_through(), 0U);
+  EXPECT_EQ(window.Next(), 3U);
 }
 
 }  // namespace

@@ -36,6 +36,32 @@ TEST(TileMirror, ANewerVersionReplacesTheTile) {
   EXPECT_EQ(mirror.tiles()[0].version, 6U);
 }
 
+// A mirror that lived through a restart of the server rejected every tile of the new one.
+TEST(TileMirror, AHigherGenerationStartsOver) {
+  TileMirror mirror(kSite);
+  MapInfo info = Announce(4, 100, 1);
+  info.generation = 1;
+  EXPECT_TRUE(mirror.Apply(std::move(info)));
+  TileSample old = MirroredTile(1, 4, 100);
+  old.generation = 1;
+  EXPECT_TRUE(mirror.Apply(TileSample(old)));
+  EXPECT_TRUE(mirror.complete());
+  TileSample first = MirroredTile(2, 0, 1);
+  first.generation = 2;
+  EXPECT_TRUE(mirror.Apply(std::move(first)));
+  EXPECT_FALSE(mirror.info());
+  EXPECT_FALSE(mirror.complete());
+  EXPECT_EQ(mirror.epoch(), 0U);
+  EXPECT_EQ(mirror.generation(), 2U);
+  ASSERT_EQ(mirror.tiles().size(), 1U);
+  EXPECT_EQ(mirror.tiles()[0].key.x, 2);
+  old.tile.version = 101;
+  EXPECT_FALSE(mirror.Apply(TileSample(old)));
+  MapInfo late = Announce(5, 200, 1);
+  late.generation = 1;
+  EXPECT_FALSE(mirror.Apply(std::move(late)));
+}
+
 TEST(TileMirror, ATombstoneRemovesTheTileForGood) {
   TileMirror mirror(kSite);
   mirror.Apply(MirroredTile(1, 0, 5));

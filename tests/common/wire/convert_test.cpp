@@ -23,6 +23,9 @@ TEST(Convert, KeepsEveryFieldOfASessionRequest) {
 TEST(Convert, KeepsEveryFieldOfASessionState) {
   ExpectRoundTrip(ExtremeSessionState());
 }
+TEST(Convert, KeepsEveryFieldOfARefusal) {
+  ExpectRoundTrip(ExtremeSessionRefusal());
+}
 TEST(Convert, KeepsEveryFieldOfAScan) {
   ExpectRoundTrip(ExtremeScan(1081));
 }

@@ -39,7 +39,7 @@ bool Eq(const Tile& a, const Tile& b) {
          a.bytes == b.bytes;
 }
 bool Eq(const StreamId& a, const StreamId& b) {
-  return a.robot_id == b.robot_id && a.sensor_id == b.sensor_id && a.client == b.client;
+  return a.robot_id == b.robot_id && a.sensor_id == b.sensor_id && a.session == b.session;
 }
 bool Eq(const StampedPose& a, const StampedPose& b) {
   return a.stamp == b.stamp && Eq(a.T_map_robot, b.T_map_robot);
@@ -79,12 +79,26 @@ SessionRequest ExtremeSessionRequest() {
   value.client = kMax64;
   value.has_start = true;
   value.T_map_robot_start = {kMax, -kTiny, -kMax};
+  value.session = kMax64 - 4;
+  value.started = true;
   value.end = true;
   return value;
 }
 
 SessionState ExtremeSessionState() {
-  return {kMax64, kMax64 - 1, Name('r'), Name('s'), SessionPhase::kSuspended, {StatusCode::kDataLoss, Text('m')}};
+  return {.robot_id = kMax64,
+          .client = kMax64 - 1,
+          .robot = Name('r'),
+          .site = Name('s'),
+          .phase = SessionPhase::kSuspended,
+          .status = {StatusCode::kDataLoss, Text('m')},
+          .session = kMax64 - 2,
+          .durable = true,
+          .generation = kMax64 - 3};
+}
+
+SessionRefusal ExtremeSessionRefusal() {
+  return {ExtremeSessionState()};
 }
 
 ScanSample ExtremeScan(std::size_t beams) {
@@ -128,6 +142,7 @@ PoseReport ExtremePose() {
   value.score = 1.0;
   value.reason = PoseReason::kWaiting;
   value.map_epoch = kMax32;
+  value.generation = kMax64;
   return value;
 }
 
@@ -141,7 +156,7 @@ Ledger ExtremeLedger() {
   std::uint64_t next = kMax64;
   for (std::uint64_t* field : {&value.received, &value.used, &value.keyframes, &value.waiting, &value.odometry_received,
                                &value.odometry_dropped, &value.odometry_merged, &value.last_sequence,
-                               &value.settled_through, &value.durable_through}) {
+                               &value.settled_through, &value.durable_through, &value.session, &value.generation}) {
     *field = next--;
   }
   for (std::uint64_t& count : value.dropped) count = next--;
@@ -166,12 +181,13 @@ MapInfo ExtremeMapInfo() {
   value.y_max_m = 2;
   value.robots = 7;
   value.enabled_version = kMax32 - 3;
+  value.generation = kMax64;
   value.versions = {{1, true, 0, ""}, {kMax32, false, kMax64, Text('n')}};
   return value;
 }
 
 TileSample ExtremeTile(std::size_t bytes) {
-  TileSample value{kMax64, ExtremeTileContent(bytes), true};
+  TileSample value{kMax64, ExtremeTileContent(bytes), true, kMax64 - 1};
   value.tile.key = {15, -32768, 32767};
   return value;
 }
@@ -188,7 +204,8 @@ Job ExtremeJob() {
           .submitted = kMin64,
           .started = -1,
           .ended = -2,
-          .message = Text('m')};
+          .message = Text('m'),
+          .generation = kMax64 - 1};
 }
 
 Request ExtremeRequest() {
@@ -205,6 +222,7 @@ Request ExtremeRequest() {
   value.level = 15;
   value.since_epoch = kMax32;
   value.since_version = kMax64;
+  value.since_generation = kMax64 - 2;
   value.job = kMax64 - 1;
   value.job_kind = JobKind::kSmooth;
   value.enable = false;
@@ -221,6 +239,7 @@ Reply ExtremeReply() {
   value.status = {StatusCode::kDataLoss, Text('m')};
   value.map_epoch = kMax32;
   value.map_version = kMax64;
+  value.generation = kMax64;
   value.poses = {ExtremePose(), PoseReport{}};
   value.path = {{kMin64, {kMax, -kMax, kTiny}}, {1, {}}};
   value.tiles = {ExtremeTileContent(16384), ExtremeTileContent(0)};
@@ -243,11 +262,16 @@ Reply ExtremeReply() {
 
 bool Same(const SessionRequest& a, const SessionRequest& b) {
   return a.robot == b.robot && a.site == b.site && a.sensors == b.sensors && a.client == b.client &&
-         a.has_start == b.has_start && Eq(a.T_map_robot_start, b.T_map_robot_start) && a.end == b.end;
+         a.session == b.session && a.started == b.started && a.has_start == b.has_start &&
+         Eq(a.T_map_robot_start, b.T_map_robot_start) && a.end == b.end;
 }
 bool Same(const SessionState& a, const SessionState& b) {
   return a.robot_id == b.robot_id && a.client == b.client && a.robot == b.robot && a.site == b.site &&
-         a.phase == b.phase && Eq(a.status, b.status);
+         a.phase == b.phase && Eq(a.status, b.status) && a.session == b.session && a.durable == b.durable &&
+         a.generation == b.generation;
+}
+bool Same(const SessionRefusal& a, const SessionRefusal& b) {
+  return Same(a.state, b.state);
 }
 bool Same(const ScanSample& a, const ScanSample& b) {
   const Scan& s = a.scan;
@@ -266,7 +290,7 @@ bool Same(const PoseReport& a, const PoseReport& b) {
   return a.robot_id == b.robot_id && a.robot == b.robot && a.site == b.site && a.stamp == b.stamp &&
          a.scan_sequence == b.scan_sequence && Eq(a.T_map_robot, b.T_map_robot) &&
          EqMatrix(a.covariance, b.covariance) && Eq(a.T_map_odom, b.T_map_odom) && a.localized == b.localized &&
-         Eq(a.score, b.score) && a.reason == b.reason && a.map_epoch == b.map_epoch;
+         Eq(a.score, b.score) && a.reason == b.reason && a.map_epoch == b.map_epoch && a.generation == b.generation;
 }
 bool Same(const Ledger& a, const Ledger& b) {
   return a.robot_id == b.robot_id && a.sensor_id == b.sensor_id && a.robot == b.robot && a.sensor == b.sensor &&
@@ -274,31 +298,34 @@ bool Same(const Ledger& a, const Ledger& b) {
          a.waiting == b.waiting && a.dropped == b.dropped && a.odometry_received == b.odometry_received &&
          a.odometry_dropped == b.odometry_dropped && a.odometry_merged == b.odometry_merged &&
          a.last_sequence == b.last_sequence && a.settled_through == b.settled_through &&
-         a.durable_through == b.durable_through && a.last_stamp == b.last_stamp &&
-         Eq(a.latency_p50_ms, b.latency_p50_ms) && Eq(a.latency_p99_ms, b.latency_p99_ms);
+         a.durable_through == b.durable_through && a.last_stamp == b.last_stamp && a.session == b.session &&
+         a.generation == b.generation && Eq(a.latency_p50_ms, b.latency_p50_ms) &&
+         Eq(a.latency_p99_ms, b.latency_p99_ms);
 }
 bool Same(const MapInfo& a, const MapInfo& b) {
   return a.site_id == b.site_id && a.site == b.site && Eq(a.resolution_m, b.resolution_m) && a.epoch == b.epoch &&
          a.version == b.version && a.levels == b.levels && a.tile_count == b.tile_count && Eq(a.x_min_m, b.x_min_m) &&
          Eq(a.y_min_m, b.y_min_m) && Eq(a.x_max_m, b.x_max_m) && Eq(a.y_max_m, b.y_max_m) && a.robots == b.robots &&
-         a.enabled_version == b.enabled_version &&
+         a.enabled_version == b.enabled_version && a.generation == b.generation &&
          EqList(a.versions, b.versions, [](const auto& x, const auto& y) { return Eq(x, y); });
 }
 bool Same(const TileSample& a, const TileSample& b) {
-  return a.site_id == b.site_id && Eq(a.tile, b.tile) && a.deleted == b.deleted;
+  return a.site_id == b.site_id && Eq(a.tile, b.tile) && a.deleted == b.deleted && a.generation == b.generation;
 }
 bool Same(const Job& a, const Job& b) {
   return a.id == b.id && a.site == b.site && a.kind == b.kind && a.state == b.state && Eq(a.progress, b.progress) &&
          Eq(a.cost_before, b.cost_before) && Eq(a.cost_after, b.cost_after) && a.map_version == b.map_version &&
-         a.submitted == b.submitted && a.started == b.started && a.ended == b.ended && a.message == b.message;
+         a.submitted == b.submitted && a.started == b.started && a.ended == b.ended && a.message == b.message &&
+         a.generation == b.generation;
 }
 bool Same(const Request& a, const Request& b) {
   return a.client == b.client && a.sequence == b.sequence && a.kind == b.kind && a.site == b.site &&
          a.robot == b.robot && a.latest == b.latest && a.stamp == b.stamp && a.smoothed == b.smoothed &&
          Eq(a.area.x_min_m, b.area.x_min_m) && Eq(a.area.y_min_m, b.area.y_min_m) &&
          Eq(a.area.x_max_m, b.area.x_max_m) && Eq(a.area.y_max_m, b.area.y_max_m) && a.level == b.level &&
-         a.since_epoch == b.since_epoch && a.since_version == b.since_version && a.job == b.job &&
-         a.job_kind == b.job_kind && a.enable == b.enable && a.map_version == b.map_version;
+         a.since_epoch == b.since_epoch && a.since_version == b.since_version &&
+         a.since_generation == b.since_generation && a.job == b.job && a.job_kind == b.job_kind &&
+         a.enable == b.enable && a.map_version == b.map_version;
 }
 bool Same(const Reply& a, const Reply& b) {
   const auto same = [](const auto& x, const auto& y) { return Same(x, y); };
@@ -309,8 +336,8 @@ bool Same(const Reply& a, const Reply& b) {
   };
   return a.client == b.client && a.sequence == b.sequence && a.part == b.part && a.last == b.last &&
          Eq(a.status, b.status) && a.map_epoch == b.map_epoch && a.map_version == b.map_version &&
-         EqList(a.poses, b.poses, same) && EqList(a.path, b.path, eq) && EqList(a.tiles, b.tiles, eq) &&
-         EqList(a.landmarks, b.landmarks, eq) && EqList(a.maps, b.maps, same) &&
+         a.generation == b.generation && EqList(a.poses, b.poses, same) && EqList(a.path, b.path, eq) &&
+         EqList(a.tiles, b.tiles, eq) && EqList(a.landmarks, b.landmarks, eq) && EqList(a.maps, b.maps, same) &&
          EqList(a.robots, b.robots, same_robot) && EqList(a.jobs, b.jobs, same) && a.server_version == b.server_version;
 }
 

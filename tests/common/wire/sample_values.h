@@ -8,6 +8,7 @@ namespace cairn::wire {
 
 [[nodiscard]] SessionRequest ExtremeSessionRequest();
 [[nodiscard]] SessionState ExtremeSessionState();
+[[nodiscard]] SessionRefusal ExtremeSessionRefusal();
 [[nodiscard]] ScanSample ExtremeScan(std::size_t beams);
 [[nodiscard]] OdometrySample ExtremeOdometry();
 [[nodiscard]] PoseReport ExtremePose();
@@ -21,6 +22,7 @@ namespace cairn::wire {
 // Field by field, bit by bit (NaN equals itself).
 [[nodiscard]] bool Same(const SessionRequest& a, const SessionRequest& b);
 [[nodiscard]] bool Same(const SessionState& a, const SessionState& b);
+[[nodiscard]] bool Same(const SessionRefusal& a, const SessionRefusal& b);
 [[nodiscard]] bool Same(const ScanSample& a, const ScanSample& b);
 [[nodiscard]] bool Same(const OdometrySample& a, const OdometrySample& b);
 [[nodiscard]] bool Same(const PoseReport& a, const PoseReport& b);

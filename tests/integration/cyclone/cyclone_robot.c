@@ -22,10 +22,11 @@ static const dds_duration_t kPatience = DDS_SECS(20); /* Of each step. */
 
 struct Robot {
   dds_entity_t participant;
-  dds_entity_t session, scan, odometry, request;              /* Writers. */
-  dds_entity_t session_state, pose, ledger, map, tile, reply; /* Readers. */
+  dds_entity_t session, scan, odometry, request;                              /* Writers. */
+  dds_entity_t session_state, refusal_reader, pose, ledger, map, tile, reply; /* Readers. */
   const char *site, *name;
-  uint64_t robot_id, sensor_id, client;
+  uint64_t robot_id, sensor_id, client, opened_session;
+  bool started;
   /* What came back. */
   bool answered;
   cairn_v1_SessionPhase phase;
@@ -86,6 +87,8 @@ static void Join(struct Robot* robot, dds_domainid_t domain) {
   robot->participant = dds_create_participant(domain, NULL, NULL);
   if (robot->participant < 0) Die("the domain cannot be joined");
   robot->session_state = MakeReader(robot, &cairn_v1_SessionState_desc, "cairn/v1/session_state", MakeQos(true, 16));
+  robot->refusal_reader =
+      MakeReader(robot, &cairn_v1_SessionRefusal_desc, "cairn/v1/session_refusal", MakeQos(false, 16));
   robot->pose = MakeReader(robot, &cairn_v1_PoseReport_desc, "cairn/v1/pose", MakeQos(false, 64));
   robot->ledger = MakeReader(robot, &cairn_v1_Ledger_desc, "cairn/v1/ledger", MakeQos(true, 1));
   robot->map = MakeReader(robot, &cairn_v1_MapInfo_desc, "cairn/v1/map", MakeQos(true, 1));
@@ -106,6 +109,8 @@ static void SendSession(struct Robot* robot, bool end) {
   memset(&request, 0, sizeof(request));
   request.robot_id = robot->robot_id;
   request.client = robot->client;
+  request.session = robot->opened_session;
+  request.started = robot->started;
   request.robot = (char*)robot->name;
   request.site = (char*)robot->site;
   request.sensors._length = request.sensors._maximum = 1;
@@ -142,13 +147,19 @@ static void TakeReplies(struct Robot* robot) {
 
 static void TakeAll(struct Robot* robot) {
   TAKE_ALL(robot->session_state, cairn_v1_SessionState, state, {
-    if (state->client != robot->client) continue;
+    if (state->robot_id != robot->robot_id || state->session != robot->opened_session) continue;
     robot->answered = true;
     robot->phase = state->phase;
-    snprintf(robot->refusal, sizeof(robot->refusal), "%s", state->status.message);
+  })
+  TAKE_ALL(robot->refusal_reader, cairn_v1_SessionRefusal, refusal, {
+    if (refusal->state.client != robot->client || refusal->state.session != robot->opened_session) continue;
+    robot->answered = true;
+    robot->phase = refusal->state.phase;
+    snprintf(robot->refusal, sizeof(robot->refusal), "%s", refusal->state.status.message);
   })
   TAKE_ALL(robot->ledger, cairn_v1_Ledger, ledger, {
-    if (ledger->robot_id == robot->robot_id && ledger->sensor_id == robot->sensor_id) {
+    if (ledger->robot_id == robot->robot_id && ledger->sensor_id == robot->sensor_id &&
+        ledger->session == robot->opened_session) {
       robot->settled_through = ledger->settled_through;
     }
   })
@@ -180,10 +191,24 @@ static bool Matched(dds_entity_t writer) {
   return dds_get_publication_matched_status(writer, &status) == DDS_RETCODE_OK && status.current_count > 0;
 }
 
+/* Repeats the request every second until it is answered. */
+static void Request(struct Robot* robot, bool end, cairn_v1_SessionPhase wanted) {
+  robot->answered = false;
+  dds_time_t asked = 0;
+  for (const dds_time_t deadline = dds_time() + kPatience; !robot->answered || robot->phase != wanted;) {
+    if (dds_time() - asked > DDS_SECS(1)) {
+      SendSession(robot, end);
+      asked = dds_time();
+    }
+    TakeAll(robot);
+    if (robot->answered && robot->phase == cairn_v1_SESSION_REFUSED) Die(robot->refusal);
+    if (dds_time() > deadline) Die("no server answers the session");
+    dds_sleepfor(DDS_MSECS(1));
+  }
+}
+
 static void Open(struct Robot* robot) {
-  SendSession(robot, false);
-  WAIT_FOR(robot, robot->answered, "no server answers the session")
-  if (robot->phase != cairn_v1_SESSION_ACTIVE) Die(robot->refusal);
+  Request(robot, false, cairn_v1_SESSION_ACTIVE);
   WAIT_FOR(robot, Matched(robot->scan) && Matched(robot->odometry) && Matched(robot->request),
            "the server's readers are not there")
 }
@@ -193,7 +218,7 @@ static void SendScan(struct Robot* robot, struct FlaserScan* from, uint64_t numb
   memset(&odometry, 0, sizeof(odometry));
   odometry.robot_id = robot->robot_id;
   odometry.sensor_id = HashName("odometry");
-  odometry.client = robot->client;
+  odometry.session = robot->opened_session;
   odometry.seq = number;
   odometry.stamp_ns = from->stamp_ns;
   odometry.T_odom_robot.x = from->T_odom_robot.x;
@@ -205,7 +230,7 @@ static void SendScan(struct Robot* robot, struct FlaserScan* from, uint64_t numb
   memset(&scan, 0, sizeof(scan));
   scan.robot_id = robot->robot_id;
   scan.sensor_id = robot->sensor_id;
-  scan.client = robot->client;
+  scan.session = robot->opened_session;
   scan.seq = number;
   scan.stamp_ns = from->stamp_ns;
   scan.angle_first_rad = -kPi / 2;
@@ -224,6 +249,9 @@ static uint64_t Stream(struct Robot* robot, const char* path, uint64_t scans) {
   static struct FlaserScan scan;
   FILE* log = fopen(path, "r");
   if (log == NULL) Die("the log cannot be read");
+  /* A server that comes later and does not know the session must not open it where it began. */
+  robot->started = true;
+  SendSession(robot, false);
   uint64_t sent = 0;
   while (sent < scans && ReadFlaser(log, &scan)) {
     WAIT_FOR(robot, sent < robot->settled_through + kWindow, "the server settles no scan")
@@ -275,6 +303,7 @@ int main(int argc, char** argv) {
   robot.robot_id = HashName(robot.name);
   robot.sensor_id = HashName("laser");
   robot.client = ((uint64_t)getpid() << 32) ^ (uint64_t)dds_time();
+  robot.opened_session = robot.client ^ HashName(robot.name);
   Join(&robot, (dds_domainid_t)atoi(argv[1]));
   Open(&robot);
   const uint64_t sent = Stream(&robot, argv[2], scans);
@@ -295,8 +324,7 @@ int main(int argc, char** argv) {
   const bool tiles_ok = Ask(&robot, request, kPatience) && robot.reply_code == 0 && robot.reply_tiles >= 1;
   const int reply_tiles = robot.reply_tiles;
 
-  SendSession(&robot, true);
-  WAIT_FOR(&robot, robot.phase == cairn_v1_SESSION_ENDED, "the session did not end")
+  Request(&robot, true, cairn_v1_SESSION_ENDED);
   const bool ok = sent == scans && pose_ok && tiles_ok;
   printf(
       "{\"ok\":%s,\"scans_sent\":%llu,\"settled\":%llu,\"poses\":%d,\"tiles\":%d,\"pose_reply_ok\":%s,"

@@ -45,6 +45,9 @@ TEST_F(BusPair, CarriesSessionRequests) {
 TEST_F(BusPair, CarriesSessionStates) {
   ExpectArrives(ExtremeSessionState());
 }
+TEST_F(BusPair, CarriesRefusals) {
+  ExpectArrives(ExtremeSessionRefusal());
+}
 TEST_F(BusPair, CarriesScans) {
   ExpectArrives(ExtremeScan(1081));
 }
@@ -93,20 +96,6 @@ TEST_F(BusPair, ALateJoinerGetsTheWholeMap) {
   const std::vector<TileSample> tiles = inbox.values();
   ASSERT_EQ(tiles.size(), static_cast<std::size_t>(kTiles));
   for (const TileSample& sample : tiles) EXPECT_EQ(sample.tile.version, 2U);
-}
-
-TEST_F(BusPair, AnswersTwoClientsOfOneNameEach) {
-  SessionState owner = ExtremeSessionState();
-  owner.phase = SessionPhase::kActive;
-  SessionState refused = owner;
-  refused.client = 2;
-  refused.phase = SessionPhase::kRefused;
-  const auto publication = Must(sender_->Advertise<SessionState>());
-  ASSERT_TRUE(publication->Publish(owner));
-  ASSERT_TRUE(publication->Publish(refused));
-  Inbox<SessionState> inbox;
-  const auto subscription = Must(receiver_->Subscribe<SessionState>(inbox.Sink()));
-  ASSERT_TRUE(inbox.WaitFor(2));
 }
 
 TEST_F(BusPair, AClientSeesOnlyItsOwnReplies) {

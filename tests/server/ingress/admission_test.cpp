@@ -21,7 +21,7 @@ TEST(Admission, AGoodScanPassesWhole) {
   const ScanArrival arrival = Admit(ScanSample{{1, 2, 3}, scan}, std::chrono::steady_clock::time_point{});
   EXPECT_FALSE(arrival.refused);
   EXPECT_EQ(arrival.scan->ranges_m, scan.ranges_m);
-  EXPECT_EQ(arrival.stream.client, 3U);
+  EXPECT_EQ(arrival.stream.session, 3U);
 }
 
 TEST(Admission, ARefusedScanKeepsNumberAndStampOnly) {

@@ -6,6 +6,8 @@
 namespace cairn::server {
 namespace {
 
+constexpr Generation kGeneration = 5;
+
 class Queries : public ::testing::Test {
  protected:
   Queries() {
@@ -51,7 +53,7 @@ class Queries : public ::testing::Test {
       case RequestKind::kPath:
         return AnswerPath(request_, Robot(), Site());
       case RequestKind::kTiles:
-        return AnswerTiles(request_, Site());
+        return AnswerTiles(request_, Site(), kGeneration);
       case RequestKind::kLandmarks:
         return AnswerLandmarks(request_, {session_}, Site());
       case RequestKind::kMapInfo:
@@ -123,10 +125,14 @@ TEST_F(Queries, TilesByAreaLevelAndVersion) {
   EXPECT_EQ(Ask(RequestKind::kTiles).tiles.at(0).key, (TileKey{0, 1, 0}));
   EXPECT_EQ(Ask(RequestKind::kTiles).tiles.size(), 1U);
   request_.area = {};
+  request_.since_generation = kGeneration;
   request_.since_epoch = 3;
   request_.since_version = 8;
   EXPECT_EQ(Ask(RequestKind::kTiles).tiles.size(), 1U);
   request_.since_epoch = 2;  // Another epoch: what the asker has is void.
+  EXPECT_EQ(Ask(RequestKind::kTiles).tiles.size(), 3U);
+  request_.since_epoch = 3;
+  request_.since_generation = kGeneration - 1;  // As is what it has of another start of the server.
   EXPECT_EQ(Ask(RequestKind::kTiles).tiles.size(), 3U);
   request_.level = 2;
   EXPECT_EQ(Ask(RequestKind::kTiles).tiles.size(), 1U);

@@ -20,6 +20,7 @@ namespace cairn::server::testing {
 
 inline constexpr ClientId kOwner = 7;
 
+// A client has one session, whose token is the client's id.
 inline SessionRequest RequestOf(const std::string& robot, ClientId client = kOwner) {
   return {.robot = robot,
           .site = "lab",
@@ -27,7 +28,8 @@ inline SessionRequest RequestOf(const std::string& robot, ClientId client = kOwn
           .client = client,
           .has_start = false,
           .T_map_robot_start = {},
-          .end = false};
+          .end = false,
+          .session = client};
 }
 
 inline ScanArrival ScanOf(const std::string& robot, Scan scan, ClientId client = kOwner) {
@@ -53,6 +55,10 @@ class Sent {
     values_.push_back(std::move(value));
     came_.NotifyAll();
     return true;
+  }
+  void ForEach(const std::function<void(const OutboundValue&)>& see) const {
+    const MutexLock lock(mutex_);
+    for (const OutboundValue& value : values_) see(value);
   }
   template <typename Value>
   std::vector<Value> All() const {

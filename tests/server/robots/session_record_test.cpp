@@ -87,9 +87,12 @@ TEST_F(SessionRecordTest, CountsWhatBecameOfScansAndOdometry) {
   pose.score = 0.75;
   record_.ScanUsed(kLaser, pose, 1010, true, 2.5);
   Settle(2);
-  for (int i = 0; i < 3; ++i) record_.OdometryReceived();
-  for (int i = 0; i < 2; ++i) record_.OdometryDropped();
-  record_.OdometryMerged();
+  for (std::uint64_t i = 1; i <= 4; ++i) EXPECT_TRUE(record_.OdometryReceived(i));
+  EXPECT_FALSE(record_.OdometryReceived(2));
+  record_.OdometryDropped(1, DropReason::kStampWentBack);
+  record_.OdometryDropped(2, DropReason::kBadGeometry);
+  record_.OdometryDropped(3, DropReason::kQueueFull);
+  record_.OdometryUsed(4, 40);
   const Ledger counted = ledger();
   EXPECT_EQ(counted.received, 3U);
   EXPECT_EQ(counted.used, 1U);
@@ -110,11 +113,11 @@ TEST_F(SessionRecordTest, CountsWhatBecameOfScansAndOdometry) {
 
 TEST_F(SessionRecordTest, OnlyAnotherClientNumbersAnew) {
   Receive(5);
-  record_.Resume(kOwner);
+  record_.Resume(kOwner, kOwner);
   EXPECT_EQ(record_.ScanReceived(kLaser, 5), SessionRecord::Arrival::kDuplicate);
   EXPECT_EQ(record_.owner(), kOwner);
   record_.SetAlive(false);
-  record_.Resume(9);
+  record_.Resume(9, 9);
   EXPECT_EQ(record_.owner(), 9U);
   EXPECT_TRUE(record_.alive());
   Receive(1);
@@ -139,7 +142,7 @@ TEST_F(SessionRecordTest, TheTimeAwayBeginsWithTheSuspension) {
   EXPECT_GT(away, std::chrono::minutes(59));
   EXPECT_TRUE(record_.SetPhase(SessionPhase::kSuspended, {}));  // Said twice: the time goes on.
   EXPECT_EQ(record_.SuspendedFor(later), away);
-  EXPECT_TRUE(record_.Resume(kOwner));
+  EXPECT_TRUE(record_.Resume(kOwner, kOwner));
   EXPECT_EQ(record_.SuspendedFor(later), SessionRecord::Clock::duration::zero());
   EXPECT_EQ(record_.phase(), SessionPhase::kActive);
   EXPECT_TRUE(record_.state().status.ok());

@@ -69,7 +69,8 @@ TEST(Session, AnOlderLedgerNeverOvertakesANewerOne) {
                                .client = 7,
                                .has_start = false,
                                .T_map_robot_start = {},
-                               .end = false};
+                               .end = false,
+                               .session = 7};
   const auto session = std::make_shared<Session>(
       SessionSetup{.id = 1, .request = request, .map_epoch = 1, .estimator = {}}, options, pool,
       SessionOutputs{.send = [&sent](const OutboundValue& value) { return sent.Keep(value); },
@@ -202,7 +203,7 @@ TEST(Session, NothingWakesASessionThatHasEnded) {
   one.session().SetLiveliness(false);
   one.session().SetLiveliness(true);
   EXPECT_EQ(one.phase(), SessionPhase::kEnded);
-  EXPECT_FALSE(one.session().Resume(9));
+  EXPECT_FALSE(one.session().Resume(9, 9));
   EXPECT_EQ(one.session().record().owner(), kOwner);
   EXPECT_FALSE(one.session().record().SetPhase(SessionPhase::kSuspended, {}));
   EXPECT_EQ(one.phase(), SessionPhase::kEnded);

@@ -27,10 +27,12 @@ inline ServerOptions TestOptions() {
 
 class WholeServer {
  public:
+  static constexpr Generation kGeneration = 7;
+
   explicit WholeServer(const ServerOptions& options = TestOptions())
       : inbound_(static_cast<std::size_t>(options.server.inbound_capacity)),
         outbound_(static_cast<std::size_t>(options.server.outbound_capacity)),
-        server_(options, inbound_, outbound_) {
+        server_(options, inbound_, outbound_, kGeneration) {
     for (const auto lane : {Outbound::Lane::kLive, Outbound::Lane::kMap, Outbound::Lane::kReplies}) {
       readers_.emplace_back([this, lane] {
         while (auto value = outbound_.lane(lane).Pop()) Keep(std::move(*value));
@@ -48,13 +50,16 @@ class WholeServer {
   void Push(InboundValue value) { ASSERT_TRUE(inbound_.Push(std::move(value))); }
 
   void Open(const std::string& robot, ClientId client, const std::string& site = "lab", const Pose2& start = {}) {
+    SessionToken& token = tokens_[{robot, client}];
+    if (token == 0 || LastState(robot, client).phase == SessionPhase::kEnded) token += client;
     Push(SessionRequest{.robot = robot,
                         .site = site,
                         .sensors = {"laser"},
                         .client = client,
                         .has_start = true,
                         .T_map_robot_start = start,
-                        .end = false});
+                        .end = false,
+                        .session = TokenOf(robot, client)});
   }
   void End(const std::string& robot, ClientId client) {
     Push(SessionRequest{.robot = robot,
@@ -63,14 +68,20 @@ class WholeServer {
                         .client = client,
                         .has_start = false,
                         .T_map_robot_start = {},
-                        .end = true});
+                        .end = true,
+                        .session = TokenOf(robot, client)});
+  }
+  // The session that the client opened last for the robot.
+  SessionToken TokenOf(const std::string& robot, ClientId client) const {
+    const auto known = tokens_.find({robot, client});
+    return known == tokens_.end() ? client : known->second;
   }
   void SendScan(const std::string& robot, ClientId client, Scan scan) {
-    Push(Admit(ScanSample{{HashName(robot), HashName("laser"), client}, std::move(scan)},
+    Push(Admit(ScanSample{{HashName(robot), HashName("laser"), TokenOf(robot, client)}, std::move(scan)},
                std::chrono::steady_clock::now()));
   }
   void SendOdometry(const std::string& robot, ClientId client, const Odometry& odometry) {
-    Push(Admit(OdometrySample{{HashName(robot), HashName("laser"), client}, odometry}));
+    Push(Admit(OdometrySample{{HashName(robot), HashName("odometry"), TokenOf(robot, client)}, odometry}));
   }
   // Steps [first, last) of the room world, in order, never more than 16 scans ahead of the server.
   void Drive(const std::string& robot, ClientId client, int first, int last) {
@@ -117,15 +128,18 @@ class WholeServer {
   Ledger LastLedger(const std::string& robot) const {
     Ledger last;
     for (const Ledger& ledger : All<Ledger>()) {
-      if (ledger.robot_id == HashName(robot)) last = ledger;
+      if (ledger.robot_id == HashName(robot) && ledger.sensor_id != HashName("odometry")) last = ledger;
     }
     return last;
   }
   // The newest state of a robot's session as one client sees it.
   SessionState LastState(const std::string& robot, ClientId client) const {
     SessionState last;
-    for (const SessionState& state : All<SessionState>()) {
-      if (state.robot == robot && state.client == client) last = state;
+    const MutexLock lock(mutex_);
+    for (const OutboundValue& value : kept_) {
+      const auto* const refusal = std::get_if<SessionRefusal>(&value);
+      const SessionState* const state = refusal != nullptr ? &refusal->state : std::get_if<SessionState>(&value);
+      if (state != nullptr && state->robot == robot && state->client == client) last = *state;
     }
     return last;
   }
@@ -194,6 +208,7 @@ class WholeServer {
   Outbound outbound_;
   Server server_;
   std::int64_t requests_ = 0;
+  std::map<std::pair<std::string, ClientId>, SessionToken> tokens_;
   mutable Mutex mutex_;
   mutable CondVar arrived_;
   std::vector<OutboundValue> kept_ CAIRN_GUARDED_BY(mutex_);

@@ -1,0 +1,151 @@
+// The part of RobotClient that sends: new samples, and what has to be sent later or again.
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "client/lib/deadline.h"
+#include "client/lib/robot_client.h"
+
+namespace cairn::client {
+namespace {
+
+// Scans sent again and not yet settled: less than the server's queue and the writer's history hold.
+constexpr std::uint64_t kPace = 32;
+
+}  // namespace
+
+Result<void> RobotClient::AwaitRoom(const Stream& stream) {
+  const auto deadline = DeadlineAfter(options_.send_timeout_s);
+  for (;;) {
+    if (over_) return tl::unexpected(*over_);
+    if (state_->phase == SessionPhase::kEnded) {
+      if (!state_->status.ok()) return tl::unexpected(state_->status);
+      return Fail(StatusCode::kFailedPrecondition, fmt::format("the session of '{}' has ended", request_.robot));
+    }
+    if (stream.window.HasRoom()) return {};
+    if (Clock::now() >= deadline) {
+      return Fail(StatusCode::kUnavailable,
+                  fmt::format("the server settled no scan of '{}' for {:.1f} s ({} sent, {} settled)", request_.robot,
+                              options_.send_timeout_s, stream.window.sent(), stream.window.settled_through()));
+    }
+    changed_.WaitUntil(mutex_, deadline);
+  }
+}
+
+Result<void> RobotClient::Publish(const Scan& scan) {
+  std::string sensor;
+  {
+    const MutexLock lock(mutex_);
+    sensor = request_.sensors.front();
+  }
+  return Publish(scan, sensor);
+}
+
+Result<void> RobotClient::Publish(const Scan& scan, const std::string& sensor) {
+  const NameId sensor_id = HashName(sensor);
+  for (;;) {
+    Stream* stream = nullptr;
+    {
+      const MutexLock lock(mutex_);
+      const auto found = streams_.find(sensor_id);
+      if (found == streams_.end() || sensor == kOdometrySensor) {
+        return Fail(StatusCode::kInvalidArgument, fmt::format("sensor '{}' is not part of the session", sensor));
+      }
+      stream = &found->second;
+      if (auto room = AwaitRoom(*stream); !room) return room;
+    }
+    const MutexLock sending(sending_);
+    {
+      const MutexLock lock(mutex_);
+      if (!stream->window.HasRoom()) continue;  // Another thread was faster.
+    }
+    return AddAndSend(ScanSample{{robot_id_, sensor_id, 0}, scan}, *stream);
+  }
+}
+
+Result<void> RobotClient::Publish(const Odometry& odometry) {
+  const NameId sensor_id = HashName(kOdometrySensor);
+  const MutexLock sending(sending_);
+  Stream* stream = nullptr;
+  {
+    const MutexLock lock(mutex_);
+    if (over_) return tl::unexpected(*over_);
+    stream = &streams_.find(sensor_id)->second;
+    if (!T_odom_robot_start_) T_odom_robot_start_ = odometry.T_odom_robot;
+  }
+  return AddAndSend(OdometrySample{{robot_id_, sensor_id, 0}, odometry}, *stream);
+}
+
+// Numbers and keeps the sample, and sends it at once where nothing is before it.
+Result<void> RobotClient::AddAndSend(StreamedSample&& sample, Stream& stream) {
+  std::shared_ptr<const StreamedSample> next;
+  {
+    const MutexLock lock(mutex_);
+    if (stream.window.settled()) progress_ = Clock::now();
+    const SessionToken session = request_.session;
+    std::visit([session](auto& one) { one.stream.session = session; }, sample);
+    if (auto* const scan = std::get_if<ScanSample>(&sample)) {
+      scan->scan.sequence = stream.window.Next();
+    } else {
+      std::get<OdometrySample>(sample).odometry.sequence = stream.window.Next();
+    }
+    const bool behind = backlog_.unsent() > 0 || !Streaming();
+    backlog_.Add(std::move(sample));
+    changed_.NotifyAll();  // The watcher sends what is behind.
+    if (behind) return {};
+    next = backlog_.Next();
+  }
+  const Result<void> sent = SendNow(*next);
+  if (sent) return {};
+  const MutexLock lock(mutex_);
+  if (sent.error().code == StatusCode::kUnavailable) {
+    backlog_.StepBack();  // The writer was busy; the watcher sends the sample again.
+    return {};
+  }
+  backlog_.TakeBack();  // It can never be sent: the caller's error.
+  stream.window.TakeBack();
+  return sent;
+}
+
+Result<void> RobotClient::SendNow(const StreamedSample& sample) {
+  bool first = false;
+  {
+    const MutexLock lock(mutex_);
+    first = !std::exchange(request_.started, true);
+  }
+  // Before the first sample, so that no server that comes later opens the session again where it began.
+  if (first) Ask();
+  if (const auto* const scan = std::get_if<ScanSample>(&sample)) return scans_->Publish(*scan);
+  return odometry_->Publish(std::get<OdometrySample>(sample));
+}
+
+// Sends what is before the backlog's cursor, as fast as the server settles it.
+void RobotClient::Pump() {
+  const MutexLock sending(sending_);
+  for (;;) {
+    std::shared_ptr<const StreamedSample> sample;
+    bool again = false;
+    {
+      const MutexLock lock(mutex_);
+      if (stopping_ || !Streaming()) return;
+      if (const auto scan = backlog_.next_scan()) {
+        const ScanWindow& window = streams_.find(scan->first)->second.window;
+        if (scan->second > window.settled_through() + kPace) return;  // The next ledger wakes the watcher.
+      }
+      sample = backlog_.Next();
+      if (sample == nullptr) return;
+      again = sent_before_ > 0;
+      if (again) --sent_before_;
+    }
+    // Counted first: the server may settle the sample before it returns.
+    again = again && std::holds_alternative<ScanSample>(*sample);
+    if (again) resent_.fetch_add(1, std::memory_order_relaxed);
+    if (SendNow(*sample)) continue;
+    if (again) resent_.fetch_sub(1, std::memory_order_relaxed);
+    const MutexLock lock(mutex_);
+    backlog_.StepBack();
+    return;
+  }
+}
+
+}  // namespace cairn::client

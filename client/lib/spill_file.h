@@ -1,0 +1,39 @@
+// A file that takes what does not fit into memory: records of bytes, each after its length (32 bits, in this machine's
+// order). It belongs to one process and means nothing to another: it is made empty, and deleted at the end.
+// Not thread-safe: one owner.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "common/status.h"
+
+namespace cairn::client {
+
+class SpillFile {
+ public:
+  // kUnavailable: the file cannot be made. kAlreadyExists: there is a file of that name; nobody's file is overwritten.
+  [[nodiscard]] static Result<std::unique_ptr<SpillFile>> Create(const std::string& path);
+  ~SpillFile();
+  SpillFile(const SpillFile&) = delete;
+  SpillFile& operator=(const SpillFile&) = delete;
+
+  // Where the record is. kUnavailable: it was not written, for example because the disk is full.
+  [[nodiscard]] Result<std::uint64_t> Append(std::string_view record);
+  // kDataLoss: there is no whole record at this place.
+  [[nodiscard]] Result<std::string> Read(std::uint64_t place) const;
+  // Removes all records.
+  void Clear();
+  [[nodiscard]] std::uint64_t size() const { return size_; }  // Bytes.
+
+ private:
+  SpillFile(std::string path, int file) : path_(std::move(path)), file_(file) {}
+
+  const std::string path_;
+  const int file_;
+  std::uint64_t size_ = 0;
+};
+
+}  // namespace cairn::client
