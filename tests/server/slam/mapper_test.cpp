@@ -69,6 +69,11 @@ MapperRun RunMapper(const Drive& drive, const ParallelFor& parallel_for,
   MapperRun run;
   for (std::size_t i = 0; i < drive.scans.size(); ++i) {
     const ScanOutcome outcome = mapper.Process(drive.scans[i], drive.odometry[i], parallel_for);
+    const Pose2 by_odometry = outcome.T_map_odom * drive.odometry[i];
+    EXPECT_LT((by_odometry.translation() - outcome.T_map_robot.translation()).norm(), 1e-9) << i;
+    EXPECT_LT(std::abs(AngleDiff(by_odometry.theta, outcome.T_map_robot.theta)), 1e-9) << i;
+    EXPECT_GT(outcome.score, 0.0) << i;
+    EXPECT_LE(outcome.score, 1.0) << i;
     run.online.push_back({outcome.stamp, outcome.T_map_robot});
     run.keyframes += outcome.keyframe ? 1 : 0;
     run.worst_m = std::max(run.worst_m, Between(drive.truth[i], outcome.T_map_robot).translation().norm());
