@@ -12,7 +12,7 @@
 namespace cairn::server::testing {
 namespace {
 
-constexpr ClientId kClient = 7;
+constexpr ClientId kOverloadClient = 7;
 
 ServerOptions SlowOnOneThread() {
   ServerOptions options = TestOptions();
@@ -28,12 +28,12 @@ double SecondsFor(const ServerOptions& options, int robot_count, int steps,
   WholeServer house(options);
   std::vector<std::string> robots;
   for (int i = 0; i < robot_count; ++i) robots.push_back("r" + std::to_string(i));
-  for (const std::string& robot : robots) house.Open(robot, kClient);
+  for (const std::string& robot : robots) house.Open(robot, kOverloadClient);
   const auto begin = std::chrono::steady_clock::now();
   for (int step = 0; step < steps; ++step) {
     for (const std::string& robot : robots) {
-      house.SendOdometry(robot, kClient, RoomOdometry(step));
-      house.SendScan(robot, kClient, RoomScan(step));
+      house.SendOdometry(robot, kOverloadClient, RoomOdometry(step));
+      house.SendScan(robot, kOverloadClient, RoomScan(step));
     }
   }
   EXPECT_TRUE(house.WaitFor([&] {

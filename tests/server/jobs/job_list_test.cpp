@@ -18,12 +18,16 @@ class JobListTest : public ::testing::Test {
   // What was published since the last call.
   std::vector<Job> TakeSent() {
     std::vector<Job> sent;
-    while (auto value = outbound_.lane(Outbound::Lane::kLive).TryPop()) sent.push_back(std::get<Job>(*value));
+    while (auto value = outbound_.lane(Outbound::Lane::kLive).TryPop()) {
+      if (const auto* const job = std::get_if<Job>(&*value)) sent.push_back(*job);
+      if (const auto* const retired = std::get_if<Retired>(&*value)) retired_.push_back(std::get<Job>(retired->of).id);
+    }
     return sent;
   }
 
   static constexpr std::size_t kLane = 32;
   Outbound outbound_{kLane};
+  std::vector<std::uint64_t> retired_;  // Jobs whose key was given back.
   Stamp now_ = 100;
   JobList list_{options_, outbound_, [this] { return now_; }};
 };
@@ -113,6 +117,8 @@ TEST_F(JobListTest, ForgetsTheOldestFinishedJobAndRefusesWhenNoneIs) {
   EXPECT_TRUE(list_.Cancel(first->id));
   EXPECT_TRUE(list_.Add("lab", JobKind::kSmooth));
   EXPECT_FALSE(list_.Find(first->id));
+  TakeSent();
+  EXPECT_EQ(retired_, std::vector<std::uint64_t>{first->id});
   EXPECT_EQ(list_.OfSite("lab").size(), 2U);
   EXPECT_EQ(list_.OfSite("").size(), 3U);
 }
