@@ -21,7 +21,6 @@ Result<std::unique_ptr<RobotStream>> RobotStream::Open(Program& program, const S
   client_options.send_timeout_s = program.options.timeout_s;
   RobotClient::Callbacks callbacks;
   callbacks.pose = [self = stream.get()](const PoseReport& pose) { self->OnPose(pose); };
-  callbacks.ledger = [self = stream.get()](const Ledger& ledger) { self->OnLedger(ledger); };
   callbacks.restarted = [self = stream.get()](SessionToken session, const Pose2&) { self->OnRestart(session); };
   auto client = RobotClient::Open(**bus, request, program.options.timeout_s, std::move(callbacks), client_options);
   if (!client) return tl::unexpected(client.error());
@@ -65,26 +64,26 @@ RobotStream::Departure& RobotStream::DepartureOf(Stamp stamp) {
   return departures_[static_cast<std::uint64_t>(stamp) * 0x9E3779B97F4A7C15ULL % kRemembered];
 }
 
-void RobotStream::OnLedger(const Ledger& ledger) {
-  const std::lock_guard lock(mutex_);
-  if (ledger.sensor_id == HashName(options_.sensor) && ledger.session == session_) last_ = ledger;
+ScanAccount RobotStream::AccountOfSession(std::uint64_t sent) const {
+  const std::optional<Ledger> ledger = client_->ledger(options_.sensor);
+  return AccountScans(sent, before_, ledger && ledger->session == session_ ? *ledger : before_);
 }
 
 // What the old session settled stays counted; what it did not is sent again in the new one.
 void RobotStream::OnRestart(SessionToken session) {
   const std::lock_guard lock(mutex_);
-  closed_.Add(AccountScans(0, before_, last_.value_or(before_)));
+  closed_.Add(AccountOfSession(0));
   closed_.waiting = 0;
   before_ = {};
-  last_.reset();
   session_ = session;
   ++restarted_;
 }
 
-// A robot would go on waiting for its server. For a log or a simulation, a lost server is an error.
+// A robot would go on waiting for its server. For a log or a simulation, a lost server is an error, unless the next one
+// will go on with the session.
 Result<void> RobotStream::CheckServer() {
   const SessionState state = client_->session();
-  if (state.phase == SessionPhase::kSuspended && state.status.code == StatusCode::kUnavailable)
+  if (state.phase == SessionPhase::kSuspended && state.status.code == StatusCode::kUnavailable && !state.durable)
     return Fail(StatusCode::kUnavailable, "the session is suspended: " + state.status.message);
   const auto now = Clock::now();
   if (client_->connected()) connected_ = now;
@@ -115,7 +114,7 @@ Result<void> RobotStream::End() {
 
 ScanAccount RobotStream::account() const {
   const std::lock_guard lock(mutex_);
-  ScanAccount account = AccountScans(sent_, before_, last_.value_or(before_));
+  ScanAccount account = AccountOfSession(sent_);
   account.Add(closed_);
   return account;
 }

@@ -67,9 +67,9 @@ class RobotStream {
   RobotStream(const StreamOptions& options, double timeout_s) : options_(options), timeout_s_(timeout_s) {}
   [[nodiscard]] Result<Ledger> AskLedger(Program& program) const;
   void OnPose(const PoseReport& pose);
-  void OnLedger(const Ledger& ledger);
   void OnRestart(SessionToken session);
   [[nodiscard]] Departure& DepartureOf(Stamp stamp);
+  [[nodiscard]] ScanAccount AccountOfSession(std::uint64_t sent) const;
   [[nodiscard]] Result<void> CheckServer();
 
   const StreamOptions options_;
@@ -80,7 +80,6 @@ class RobotStream {
   mutable std::mutex mutex_;
   SessionToken session_ = 0;
   Ledger before_;               // The ledger before the session's first scan; not zero where a session is resumed.
-  std::optional<Ledger> last_;  // The newest one of the session.
   ScanAccount closed_;          // Of sessions that a restarted server did not know.
   int restarted_ = 0;
   std::array<Departure, kRemembered> departures_{};

@@ -77,7 +77,7 @@ std::optional<StreamedSample> Decode(bool is_scan, const std::string& bytes) {
                      .ranges_m = std::move(ranges_m)}};
 }
 
-Pose2 Between(const Odometry& before, const Odometry& after, Stamp stamp) {
+Pose2 PoseAt(const Odometry& before, const Odometry& after, Stamp stamp) {
   if (after.stamp <= before.stamp) return after.T_odom_robot;
   const double share = static_cast<double>(stamp - before.stamp) / static_cast<double>(after.stamp - before.stamp);
   return Interpolate(before.T_odom_robot, after.T_odom_robot, share);
@@ -219,7 +219,7 @@ std::optional<Backlog::AtFirstScan> Backlog::OdometryAtFirstScan() const {
     }
     const Odometry& odometry = std::get<OdometrySample>(*sample).odometry;
     if (stamp && odometry.stamp >= *stamp) {
-      return AtFirstScan{before ? Between(*before, odometry, *stamp) : odometry.T_odom_robot, true};
+      return AtFirstScan{before ? PoseAt(*before, odometry, *stamp) : odometry.T_odom_robot, true};
     }
     before = odometry;
   }

@@ -19,7 +19,7 @@ class ReplyAssembly {
   [[nodiscard]] Reply Take();
 
  private:
-  static constexpr std::size_t kMaxParts = 65536;  // No honest answer has more.
+  static constexpr std::size_t kMaxParts = 65536;  // A server sends fewer.
 
   std::map<std::uint32_t, Reply> parts_;
   Generation generation_ = 0;

@@ -48,13 +48,13 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
   Result<void> Retire(const Value& value) override {
     Sample<Wire> sample;
     sample.value = ToWire(value);
-    const fd::InstanceHandle_t instance = writer_->lookup_instance(&sample);
+    using eprosima::fastrtps::types::ReturnCode_t;
+    const ReturnCode_t done = writer_->unregister_instance(&sample, fd::HANDLE_NIL);
+    if (done == ReturnCode_t::RETCODE_OK) return {};
     const std::string name = Topic<Value>::kProfile.name;
-    if (!instance.isDefined()) return Fail(StatusCode::kNotFound, name + ": no such instance");
-    if (writer_->unregister_instance(&sample, instance) != eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
-      return Fail(StatusCode::kUnavailable, name + ": the instance was not unregistered");
-    }
-    return {};
+    if (done == ReturnCode_t::RETCODE_PRECONDITION_NOT_MET)
+      return Fail(StatusCode::kNotFound, name + ": no such instance");
+    return Fail(StatusCode::kUnavailable, name + ": the instance was not unregistered");
   }
 
   bool WaitForAcknowledgement(std::chrono::milliseconds deadline) override {

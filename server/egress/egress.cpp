@@ -68,7 +68,7 @@ class Egress::Door {
   bool Send(OutboundValue value) {
     Stamp(value, generation_);
     const Result<void> published = std::visit([this](const auto& one) { return publications_.Publish(one); }, value);
-    if (const auto* const sample = std::get_if<TileSample>(&value)) Bury(*sample);
+    if (const auto* const sample = std::get_if<TileSample>(&value)) Bury(*sample, *Unsent::KeyOf(value));
     // A value beyond the wire's limits will never be accepted.
     if (!published && published.error().code == StatusCode::kUnavailable) {
       unsent_.Keep(std::move(value));
@@ -91,8 +91,7 @@ class Egress::Door {
   }
 
  private:
-  void Bury(const TileSample& sample) {
-    const Unsent::Key key = *Unsent::KeyOf(sample);
+  void Bury(const TileSample& sample, const Unsent::Key& key) {
     if (!sample.deleted) {
       buried_.erase(key);
       return;

@@ -158,6 +158,7 @@ Result<void> Roster::Open(const SessionRequest& request) {
   if (gone != nullptr && !gone->ending()) {
     gone->End({StatusCode::kResourceExhausted, "its robot stayed away, and its place was needed for another"});
   }
+  RetireGone();
   return {};
 }
 
@@ -287,8 +288,9 @@ void Roster::Tick() {
 
 // Once a session that was removed has said its last word, the keys that nobody uses any more are given back.
 void Roster::RetireGone() {
+  std::vector<std::shared_ptr<Session>> freed;  // Without the lock.
   const MutexLock lock(mutex_);
-  std::erase_if(gone_, [this](const std::shared_ptr<Session>& gone) CAIRN_REQUIRES(mutex_) {
+  std::erase_if(gone_, [&](const std::shared_ptr<Session>& gone) CAIRN_REQUIRES(mutex_) {
     const auto heir = sessions_.find(gone->record().state().robot_id);
     if (heir == sessions_.end()) gone->Tick();
     if (gone->record().phase() != SessionPhase::kEnded || gone->has_work()) return false;
@@ -300,14 +302,15 @@ void Roster::RetireGone() {
     }
     if (heir != sessions_.end()) {
       heir->second->Announce();  // The end of the one before may have been said later.
-      return retired;
+    } else {
+      Ledger odometry;
+      odometry.robot_id = status.session.robot_id;
+      odometry.sensor_id = HashName(SessionRecord::kOdometry);
+      retire(std::move(odometry));
+      retire(PoseReport(status.pose));
+      retire(SessionState(status.session));
     }
-    Ledger odometry;
-    odometry.robot_id = status.session.robot_id;
-    odometry.sensor_id = HashName(SessionRecord::kOdometry);
-    retire(std::move(odometry));
-    retire(PoseReport(status.pose));
-    retire(SessionState(status.session));
+    if (retired) freed.push_back(gone);
     return retired;
   });
 }

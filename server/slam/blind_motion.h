@@ -32,6 +32,11 @@ class BlindMotion {
   // Whether the robot has travelled too far since the last match, counting `more_m` in addition.
   [[nodiscard]] bool Lost(double more_m = 0.0) const { return unmatched_m_ + more_m > lost_after_m_; }
 
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.unmatched_m_, self.covariance_);
+  }
+
  private:
   MotionNoise noise_;
   bool use_odometry_;

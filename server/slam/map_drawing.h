@@ -43,6 +43,17 @@ class MapDrawing {
   // T_map_robot of every keyframe in the drawing.
   [[nodiscard]] const std::vector<Pose2>& path() const { return path_; }
 
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    bool redrawing = self.redrawing();
+    archive(self.grid_, self.path_, redrawing, self.changed_at_);
+    if constexpr (Archive::kReads) {
+      self.redraw_.reset();
+      if (redrawing) self.redraw_.emplace(Redraw{OccupancyGrid(self.grid_.options()), 0});
+    }
+    if (redrawing) archive(self.redraw_->grid, self.redraw_->drawn);
+  }
+
  private:
   struct Redraw {
     OccupancyGrid grid;

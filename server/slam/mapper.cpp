@@ -44,12 +44,26 @@ struct Mapper::State {
   [[nodiscard]] PoseReason ReasonOf(const TrackStep& step) const;
   [[nodiscard]] SharedSequence<Pose2> believed_path() const { return filter->hypothesis(0).path; }
 
+  // All but the filter, which is behind an interface.
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.trail, self.front_end, self.blind, self.speed, self.loops, self.self_check, self.drawing, self.level);
+  }
+
   // The last scan that was not tilted.
   struct LevelScan {
     ScanOutcome outcome;
     Pose2 T_keyframe_robot;
     Pose2 T_odom_robot;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.outcome, self.T_keyframe_robot, self.T_odom_robot);
+    }
   };
+
+  // Whether the parts fit together after reading.
+  [[nodiscard]] bool Sound() const;
 
   const MapperOptions options;
   FrontEnd front_end;
@@ -250,6 +264,26 @@ void Mapper::AdoptGrid(OccupancyGrid grid, std::size_t keyframes) {
   // While the robot's place in the map is not known, there is nothing to draw on the map.
   const std::span<const Keyframe> drawable = s.filter->placed() ? s.trail.keyframes() : std::span<const Keyframe>{};
   s.drawing.Adopt(std::move(grid), keyframes, drawable, s.believed_path());
+}
+
+void Mapper::Save(StateWriter& archive) const {
+  archive(*state_);
+  state_->filter->Save(archive);
+}
+
+void Mapper::Load(StateReader& archive, const ParallelFor& parallel_for) {
+  auto loaded = std::make_unique<State>(state_->options, Pose2{}, 0);
+  archive(*loaded);
+  if (archive.ok()) loaded->filter->Load(archive);
+  if (!archive.ok() || !archive.Require(loaded->Sound(), "the paths")) return;
+  loaded->trail.RestorePoints(loaded->options.front_end.surface, parallel_for);
+  state_ = std::move(loaded);
+}
+
+bool Mapper::State::Sound() const {
+  for (std::size_t i = 0; i < filter->hypothesis_count(); ++i)
+    if (filter->hypothesis(i).path.size() != trail.size()) return false;
+  return drawing.path().size() == (filter->placed() ? trail.size() : 0);
 }
 
 }  // namespace cairn::slam

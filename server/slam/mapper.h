@@ -32,6 +32,13 @@ struct ScanOutcome {
   double score = 0.0;
   PoseReason reason = PoseReason::kWaiting;
   bool keyframe = false;  // True if the scan updated filter and map.
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.stamp, self.T_map_robot, self.covariance, self.T_map_odom, self.localized, self.score, self.reason,
+            self.keyframe);
+    archive.Require(self.reason <= PoseReason::kWaiting, "the reason of a pose");
+  }
 };
 
 class Mapper {
@@ -60,6 +67,11 @@ class Mapper {
   // Replaces the grid by the result of a finished job, drawn from the first `keyframes` keyframes. Then draws
   // the later keyframes onto it along the present best path. Every chunk of both grids counts as changed.
   void AdoptGrid(OccupancyGrid grid, std::size_t keyframes);
+
+  // Writes the whole state, and replaces it by one of a mapper with the same options (state/archive.h). If reading
+  // fails, nothing changes.
+  void Save(StateWriter& archive) const;
+  void Load(StateReader& archive, const ParallelFor& parallel_for);
 
  private:
   struct State;

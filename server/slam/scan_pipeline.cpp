@@ -6,7 +6,8 @@ namespace cairn::slam {
 
 ScanPipeline::ScanPipeline(const MapperOptions& options, const Pose2& T_map_robot_start, ParallelFor parallel_for,
                            Sink sink)
-    : parallel_for_(std::move(parallel_for)),
+    : options_(options),
+      parallel_for_(std::move(parallel_for)),
       sink_(std::move(sink)),
       mapper_(options, T_map_robot_start, static_cast<std::uint64_t>(options.seed)),
       pairing_(options.pairing,
@@ -34,6 +35,31 @@ void ScanPipeline::Add(const Odometry& odometry) {
 
 void ScanPipeline::Finish() {
   pairing_.Finish();
+}
+
+Checkpoint ScanPipeline::Save() const {
+  StateWriter archive;
+  mapper_.Save(archive);
+  archive(pairing_);
+  return {options_, std::move(archive)};
+}
+
+Result<void> ScanPipeline::Load(std::string_view bytes) {
+  const Result<std::string_view> state = OpenCheckpoint(bytes, options_);
+  if (!state) return tl::unexpected(state.error());
+  StateReader archive(*state);
+  Mapper mapper(options_, {}, 0);
+  mapper.Load(archive, parallel_for_);
+  // The pairing is read twice, at first into one that is not used, so that a failure changes nothing.
+  StateReader again = archive;
+  OdometryPairing trial(options_.pairing, {});
+  archive(trial);
+  if (!archive.done())
+    return Fail(StatusCode::kDataLoss,
+                std::string("the checkpoint is damaged: ") + (archive.ok() ? "more than the state" : archive.failed()));
+  again(pairing_);
+  mapper_ = std::move(mapper);
+  return {};
 }
 
 }  // namespace cairn::slam

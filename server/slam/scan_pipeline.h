@@ -5,7 +5,11 @@
 
 #include <functional>
 #include <memory>
+#include <string>
+#include <string_view>
 
+#include "common/status.h"
+#include "server/slam/checkpoint.h"
 #include "server/slam/mapper.h"
 #include "server/slam/scan/odometry_pairing.h"
 
@@ -35,12 +39,22 @@ class ScanPipeline {
   // Ends the streams: scans that still wait for odometry are used or dropped.
   void Finish();
 
+  // The whole state, so that a pipeline with the same options that loads it goes on exactly as this one would: the same
+  // poses, maps and random numbers. Takes a few milliseconds: what only grows (scans) is shared with the checkpoint,
+  // and the time is spent in Checkpoint::Bytes, which may run on another thread.
+  [[nodiscard]] Checkpoint Save() const;
+  void Save(std::string& bytes) const { bytes = Save().Bytes(); }
+  // Replaces the state by a saved one, which may come from a pipeline with another start pose. Where the bytes are
+  // damaged (kDataLoss), of another format or made with other options (kFailedPrecondition), nothing changes.
+  [[nodiscard]] Result<void> Load(std::string_view bytes);
+
   // Odometry samples refused so far for their stamps.
   [[nodiscard]] std::uint64_t odometry_refused() const { return pairing_.odometry_refused(); }
   [[nodiscard]] Mapper& mapper() { return mapper_; }
   [[nodiscard]] const Mapper& mapper() const { return mapper_; }
 
  private:
+  const MapperOptions options_;
   ParallelFor parallel_for_;
   Sink sink_;
   Mapper mapper_;

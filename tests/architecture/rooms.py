@@ -7,10 +7,11 @@ and the README together.
 
 COMMON = ["common"]
 
-# The rooms of the pure library, from the ground up: a room may include `common`, the file `parallel_for.h` and the rooms
-# named here, nothing else; so no arrow runs back up. The second part holds the methods of the theses that the default
+# The rooms of the pure library, from the ground up: a room may include `common`, the file `parallel_for.h`, the room
+# `state` and the rooms named here, nothing else; so no arrow runs back up. The second part holds the methods of the theses that the default
 # configuration does not use.
 SLAM_ROOMS = {
+    "state": [],  # How a state is written as bytes and read.
     "random": [],  # Draws and resampling.
     "scan": [],  # What a scan is: points, surfaces, tilt, its odometry.
     "features": ["scan"],  # Lines and corners of a scan.
@@ -48,7 +49,7 @@ MAY_INCLUDE = {
     "common/wire": COMMON,
     # The pure library: its rooms, and at the top the recipe and the choice of methods, which may use them all.
     PARALLEL: [],
-    **{f"server/slam/{room}": [PARALLEL, *(f"server/slam/{below}" for below in rooms), *COMMON]
+    **{f"server/slam/{room}": [PARALLEL, "server/slam/state", *(f"server/slam/{below}" for below in rooms), *COMMON]
        for room, rooms in SLAM_ROOMS.items()},
     "server/slam": SLAM,
     "server/inbound.h": COMMON,

@@ -204,48 +204,6 @@ TEST(Server, RequestsThatCannotBeServedSayWhy) {
   EXPECT_THAT(job.message, ::testing::HasSubstr("no scans"));
 }
 
-ServerOptions SlowOnOneThread() {
-  ServerOptions options = TestOptions();
-  options.server.threads = 1;
-  options.slam.filter.particles = 6000;
-  options.slam.gate = {.distance_m = 0.0, .turn_rad = 0.0};  // Every scan updates the filter.
-  return options;
-}
-
-// How long the server took for `steps` scans of each robot, all sent at once; `meanwhile` is called while it works.
-double SecondsFor(const ServerOptions& options, int robot_count, int steps,
-                  const std::function<void(WholeServer&)>& meanwhile) {
-  WholeServer house(options);
-  std::vector<std::string> robots;
-  for (int i = 0; i < robot_count; ++i) robots.push_back("r" + std::to_string(i));
-  for (const std::string& robot : robots) house.Open(robot, kClient);
-  const auto begin = std::chrono::steady_clock::now();
-  for (int step = 0; step < steps; ++step) {
-    for (const std::string& robot : robots) {
-      house.SendOdometry(robot, kClient, RoomOdometry(step));
-      house.SendScan(robot, kClient, RoomScan(step));
-    }
-  }
-  EXPECT_TRUE(house.WaitFor([&] {
-    meanwhile(house);
-    return std::all_of(robots.begin(), robots.end(), [&](const std::string& robot) {
-      return house.LastLedger(robot).settled_through == static_cast<std::uint64_t>(steps);
-    });
-  }));
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-}
-
-// Six robots on one thread with a full queue each. The watchdog was starved once in such a case, and the server killed
-// for being busy: the sign of life that was asked of a robot waited behind all its scans, and those of the others.
-TEST(Server, IsHealthyUnderOverloadAsLongAsItMoves) {
-  ServerOptions options = SlowOnOneThread();
-  // A limit that no single scan reaches on this machine, sanitized or not, but a whole queue does.
-  const double seconds_per_scan = SecondsFor(options, 1, 10, [](WholeServer&) {}) / 10.0;
-  options.server.stall_limit_s = std::max(0.3, 30.0 * seconds_per_scan);
-  const double seconds = SecondsFor(options, 6, 60, [](WholeServer& house) { EXPECT_TRUE(house.server().healthy()); });
-  EXPECT_GT(seconds, 2.0 * options.server.stall_limit_s) << "the work was too little to show anything";
-}
-
 TEST(Server, EveryKindOfRequestIsAnsweredToTheOneWhoAsked) {
   WholeServer house;
   for (int kind = 0; kind < kRequestKindCount; ++kind) {

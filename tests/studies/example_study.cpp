@@ -47,8 +47,8 @@ void RunExample(StudyContext& context) {
                 "the estimator is not clearly better than odometry");
 }
 
-const Registration kRegistered{"example", "odometry alone beside the estimator, simulated: what a study looks like",
-                               RunExample};
+const Registration kRegistered{
+    "example", "an example of a study: odometry alone compared with the estimator, simulated", RunExample};
 
 }  // namespace
 }  // namespace cairn::studies

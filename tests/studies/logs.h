@@ -29,7 +29,7 @@ struct StudyLog {
 };
 
 // The published log NAME.clf or NAME.log with NAME.relations, at most `max_scans` (0: all) of its scans.
-// If it is absent, the report says so and nothing is returned.
+// If it is absent, the report contains a warning, and nothing is returned.
 [[nodiscard]] std::optional<StudyLog> OpenRealLog(StudyContext& context, const std::string& name, int max_scans = 0);
 
 // Reads a log by its path, and FILE.relations beside it if that exists. Errors are reported.

@@ -1,6 +1,6 @@
 // Plots as plain values, and functions that draw them as pictures: lines and points with error bars and bands
 // over labelled axes, heat maps, and map images with paths over them. For people to look at; nothing reads
-// them back. Data units are whatever the axis label says. Stateless, thread-safe.
+// them back. The unit of the data is that of the axis label. Stateless, thread-safe.
 #pragma once
 
 #include <cstdint>

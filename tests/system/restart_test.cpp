@@ -86,7 +86,8 @@ class Restart : public ::testing::Test {
       }
       Must(client.Publish(std::get<Scan>(next.record)));
       ++sent_[next.robot];
-      if (served) ASSERT_TRUE(HasPoses(next.robot, sent_[next.robot] - std::min<std::size_t>(sent_[next.robot], 16)));
+      if (!served) continue;
+      ASSERT_TRUE(HasPoses(next.robot, sent_[next.robot] - std::min<std::size_t>(sent_[next.robot], 16)));
     }
   }
   // Whether the server has given so many poses, of all servers.
@@ -133,6 +134,7 @@ TEST_F(Restart, TwoRobotsGoOnWhereTheyAreThoughTheServerForgotThem) {
     // The robot has moved so far that its first start would be wrong.
     const double moved_m = (truth[60].T_map_robot.translation() - truth.front().T_map_robot.translation()).norm();
     EXPECT_GT(moved_m, 2.0);
+    { const auto poses = rider.poses(); for (std::size_t k = 0; k < truth.size(); k += 3) { const auto told = poses.find(truth[k].stamp); if (told != poses.end()) std::cerr << "DBG " << i << " " << k << " err " << (told->second.T_map_robot.translation() - truth[k].T_map_robot.translation()).norm() << " gen " << told->second.generation % 100000 << " seq " << told->second.scan_sequence << " score " << told->second.score << "\n"; } }
     EXPECT_LT(WorstError(i, truth.front().stamp), 0.3);
     // What was scanned while no server was there is not lost.
     EXPECT_GE(rider.poses().size(), 178U);

@@ -23,6 +23,37 @@ void Ancestry::KeepOnly(const ChangeTileKey& low, const ChangeTileKey& high) {
   for (Node& node : nodes_) node.changes.KeepOnly(low, high);
 }
 
+bool Ancestry::IsTree() const {
+  std::vector<std::uint32_t> count(nodes_.size()), visits(nodes_.size());
+  std::vector<std::uint64_t> sum(nodes_.size());
+  std::size_t reached = 0;
+  for (const Id living : living_) {
+    if (living >= nodes_.size() || visits[living] > 0 || nodes_[living].child_count > 0) return false;
+    // Towards the root, as far as no other living particle has led. A circle would visit a node again.
+    for (Id id = living;;) {
+      if (++visits[id] > 1) break;
+      ++reached;
+      const Id parent = nodes_[id].parent;
+      if (parent == kNobody) break;
+      if (parent >= nodes_.size() || parent == id) return false;
+      ++count[parent];
+      sum[parent] += id;
+      id = parent;
+    }
+  }
+  std::size_t roots = 0;
+  for (Id id = 0; id < nodes_.size(); ++id) {
+    const Node& node = nodes_[id];
+    if (visits[id] == 0) continue;
+    roots += node.parent == kNobody ? 1 : 0;
+    if (node.child_count != count[id] || node.child_sum != sum[id] || visits[id] > node.child_count + 1) return false;
+  }
+  for (const Id id : free_) {
+    if (id >= nodes_.size() || visits[id]++ > 0) return false;
+  }
+  return !living_.empty() && roots == 1 && reached + free_.size() == nodes_.size();
+}
+
 Ancestry::Id Ancestry::Add(Id parent, MapChanges changes) {
   Id id = static_cast<Id>(nodes_.size());
   if (free_.empty()) {

@@ -23,6 +23,11 @@ class Ancestry {
   struct Birth {
     std::size_t parent = 0;  // Index in living().
     MapChanges changes;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.parent, self.changes);
+    }
   };
 
   Ancestry();  // Starts with one particle whose map is empty.
@@ -44,13 +49,26 @@ class Ancestry {
   [[nodiscard]] std::size_t depth() const;  // Number of particles in the longest line.
   [[nodiscard]] std::size_t bytes() const;  // Memory of all changes of all particles.
 
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.nodes_, self.free_, self.living_);
+    if constexpr (Archive::kReads) archive.Require(self.IsTree(), "the ancestry of the particles");
+  }
+
  private:
   struct Node {
     Id parent = kNobody;
     std::uint32_t child_count = 0;
     std::uint64_t child_sum = 0;  // Sum of the children's ids: with one child, its id.
     MapChanges changes;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.parent, self.child_count, self.child_sum, self.changes);
+    }
   };
+  // Whether every node is either free or an ancestor of a living one, and knows its children.
+  [[nodiscard]] bool IsTree() const;
   Id Add(Id parent, MapChanges changes);
   void RemoveChildless(Id id);
   void JoinOnlyChild(Id id);

@@ -27,6 +27,15 @@ DpSlam::DpSlam(const DpSlamOptions& options, const Pose2& T_map_robot_start, std
   }
 }
 
+bool DpSlam::Sound(std::size_t keyframes) const {
+  const std::size_t low = low_->best().path.size();
+  if (!options_.hierarchical) return low == keyframes && pending_.empty();
+  const std::size_t high = this->high()->best().path.size();
+  const bool at_work = high_ && high_->at_work();
+  return low == passed_on_ + pending_.size() && at_work == (at_work_ > 0) && at_work_ <= pending_.size() &&
+         high + pending_.size() == keyframes;
+}
+
 void DpSlam::Predict(const StepMotion& step) {
   switch (options_.motion) {
     case LowMotion::kGaussian:

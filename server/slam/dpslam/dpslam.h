@@ -37,6 +37,16 @@ class DpSlam final : public Filter {
   [[nodiscard]] std::size_t hypothesis_count() const override;
   [[nodiscard]] Hypothesis hypothesis(std::size_t index) const override;
   [[nodiscard]] std::vector<Landmark> landmarks() const override { return {}; }
+  void Save(StateWriter& archive) const override { archive(*this); }
+  void Load(StateReader& archive) override { archive(*this); }
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.rng_, *self.low_, self.pending_, self.passed_on_, self.at_work_, self.T_low_joint_, self.T_low_end_,
+            self.step_m_, self.turn_rad_, self.contradicted_, self.observed_);
+    if (self.high_) archive(*self.high_);
+    if (self.plain_) archive(*self.plain_);
+    if constexpr (Archive::kReads) archive.Require(self.Sound(archive.keyframes()), "the scans of the low level");
+  }
 
   // The map of the low level covers only the surroundings if there is a high level.
   [[nodiscard]] const LevelFilter& low() const { return *low_; }
@@ -51,7 +61,14 @@ class DpSlam final : public Filter {
     std::shared_ptr<const LaserRays> rays;
     double step_m = 0.0;  // Distance from the previous scan.
     double turn_rad = 0.0;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.rays, self.step_m, self.turn_rad);
+    }
   };
+  // Whether the numbers of scans agree with each other and with the number of keyframes.
+  [[nodiscard]] bool Sound(std::size_t keyframes) const;
   // Number of scans of the next segment once it is long enough and followed by enough later scans; otherwise
   // 0.
   [[nodiscard]] std::size_t SegmentEnd() const;

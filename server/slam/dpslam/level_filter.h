@@ -42,6 +42,11 @@ struct GridParticle {
   SharedSequence<Pose2> path;   // T_map_robot at every observed scan.
 
   [[nodiscard]] double log_posterior() const { return log_likelihood + log_prior; }
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.T_map_robot, self.map, self.log_weight, self.log_likelihood, self.log_prior, self.path);
+  }
 };
 
 class LevelFilter {
@@ -73,6 +78,11 @@ class LevelFilter {
   struct Drawings {
     std::vector<MapSample> distinct;
     std::vector<std::size_t> of_particle;  // Index in `distinct` for each particle.
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.distinct, self.of_particle);
+    }
   };
   [[nodiscard]] static Drawings Distinct(std::span<const MapSample> samples);
   // Replaces the particles by those after a step, with weights; their maps are still the old ones. REQUIRES:
@@ -93,6 +103,20 @@ class LevelFilter {
   // Log likelihood per ray of the last evidence at its best placement, minus that in unseen space: well below
   // 0 if the map contradicts the evidence. 0 if there was nothing to compare.
   [[nodiscard]] double gain() const { return gain_; }
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    const std::size_t count = self.particles_.size();
+    archive(self.maps_, self.particles_, self.best_, self.mean_, self.covariance_, self.effective_, self.gain_);
+    bool sound = self.particles_.size() == count && self.best_ < count;
+    std::size_t map = 0;
+    for (const GridParticle& particle : self.particles_) {
+      sound = sound && map <= particle.map && particle.map < self.maps_.count() &&
+              particle.path.size() == self.particles_.front().path.size();
+      map = particle.map;
+    }
+    archive.Require(sound, "the particles with maps");
+  }
 
  private:
   [[nodiscard]] RayModel Model() const;

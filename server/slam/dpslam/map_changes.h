@@ -15,6 +15,7 @@
 #include <compare>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <map>
 #include <memory>
 #include <vector>
@@ -33,12 +34,22 @@ struct ChangeTileKey {
   int y = 0;
   int x = 0;
   auto operator<=>(const ChangeTileKey&) const = default;
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.y, self.x);
+  }
 };
 
 struct CellChange {
   std::uint16_t cell = 0;  // y * 64 + x within the tile.
   std::uint16_t travel = 0;
   std::uint16_t stops = 0;
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.cell, self.travel, self.stops);
+  }
 };
 
 // Changes of one tile: either in `list`, ascending by cell, or in `all`, which has 4096 entries.
@@ -46,6 +57,11 @@ struct ChangeTile {
   struct Counts {
     std::uint16_t travel = 0;
     std::uint16_t stops = 0;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.travel, self.stops);
+    }
   };
   ChangeTileKey key;
   std::vector<CellChange> list;
@@ -62,6 +78,17 @@ struct ChangeTile {
       if ((all[cell].travel | all[cell].stops) != 0)
         visit(static_cast<std::uint16_t>(cell), all[cell].travel, all[cell].stops);
   }
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.key, self.list, self.all);
+    constexpr int kMostRead = 1 << 24;  // Tiles to each side of the origin.
+    bool sound = std::abs(self.key.x) < kMostRead && std::abs(self.key.y) < kMostRead;
+    sound = sound && (self.all.empty() || (self.all.size() == kChangeTileArea && self.list.empty()));
+    for (std::size_t i = 0; i < self.list.size(); ++i)
+      sound = sound && self.list[i].cell < kChangeTileArea && (i == 0 || self.list[i - 1].cell < self.list[i].cell);
+    archive.Require(sound, "a tile of changes");
+  }
 };
 
 class MapChanges {
@@ -76,6 +103,14 @@ class MapChanges {
   [[nodiscard]] const std::vector<ChangeTile>& tiles() const { return tiles_; }
   [[nodiscard]] bool empty() const { return tiles_.empty(); }
   [[nodiscard]] std::size_t bytes() const;  // Memory on the heap.
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.tiles_);
+    bool sound = true;
+    for (std::size_t i = 1; i < self.tiles_.size(); ++i) sound = sound && self.tiles_[i - 1].key < self.tiles_[i].key;
+    archive.Require(sound, "the tiles of a map");
+  }
 
  private:
   std::vector<ChangeTile> tiles_;  // The tiles, ascending by key.

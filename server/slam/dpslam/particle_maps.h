@@ -23,6 +23,11 @@ namespace cairn::slam {
 struct PlacedRays {
   std::shared_ptr<const LaserRays> rays;
   Pose2 T_start_robot;
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.rays, self.T_start_robot);
+  }
 };
 using Evidence = std::vector<PlacedRays>;
 
@@ -32,6 +37,11 @@ struct MapSample {
   std::size_t map = 0;       // Index of the inherited map.
   std::size_t evidence = 0;  // Index of the evidence among the alternatives.
   bool operator==(const MapSample&) const = default;
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.T_map_start, self.map, self.evidence);
+  }
 };
 
 struct JudgeOptions {
@@ -69,6 +79,11 @@ class ParticleMaps {
   // Probability (0..100) that a ray straight through a cell is stopped there, for one map together with the
   // scans `undrawn`; unknown in cells that no ray has crossed.
   [[nodiscard]] OccupancyImage Image(std::size_t map, std::span<const PlacedRays> undrawn = {}) const;
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.ancestry_);
+  }
 
  private:
   OpacityOptions options_;

@@ -13,7 +13,6 @@ constexpr std::size_t kDrawingCost = 4;
 // Distance between scans used for the comparison: more scans would show the same walls from the same places.
 constexpr double kJudgedApartM = 2.0;
 constexpr double kJudgedApartRad = 0.5;
-constexpr int kMoves = 4;  // Moves after each resampling.
 // Smallest share of the evidence introduced at a time; bounds the work.
 constexpr double kLeastTemperingStep = 0.01;
 constexpr double kFirstStride = 0.5;

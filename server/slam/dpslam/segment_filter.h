@@ -55,7 +55,17 @@ class SegmentFilter {
   // Memory of all maps and of the scans that are kept until they are drawn.
   [[nodiscard]] std::size_t bytes() const;
 
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.level_, self.segments_, self.joints_, self.fixed_, self.open_, self.at_work_, self.share_, self.free_,
+            self.candidates_, self.proposed_, self.log_likelihoods_, self.tempering_, self.stride_, self.moves_left_,
+            self.moved_, self.to_draw_, self.drawings_, self.births_);
+    if constexpr (Archive::kReads) archive.Require(self.Sound(), "the segments");
+  }
+
  private:
+  static constexpr int kMoves = 4;  // Moves after each resampling.
+
   struct Segment {
     std::vector<Evidence> trajectories;  // Empty once the segment is drawn.
     std::vector<Pose2> T_start_end;      // End of each trajectory in the frame of its start.
@@ -66,6 +76,12 @@ class SegmentFilter {
     std::size_t scans = 0;
     bool forgotten = false;  // Whether the low level has forgotten it.
     bool drawn = false;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.trajectories, self.T_start_end, self.judged, self.seen_start, self.drift_sigma, self.scans,
+              self.forgotten, self.drawn);
+    }
   };
   // The placement of a segment by a particle: the drift in standard deviations, the resulting start, and the
   // trajectory chosen.
@@ -73,6 +89,11 @@ class SegmentFilter {
     Eigen::Vector3d drift = Eigen::Vector3d::Zero();
     Pose2 T_map_start;
     std::size_t trajectory = 0;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.drift, self.T_map_start, self.trajectory);
+    }
   };
   // A particle during the work: its new joints from `free_` on.
   struct Candidate {
@@ -83,7 +104,16 @@ class SegmentFilter {
     double settled = 0.0;
     double evidence = 0.0;  // Log likelihood of this segment.
     double before = 0.0;    // Log likelihood of all that is not open.
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.parent, self.joints, self.log_weight, self.settled, self.evidence, self.before);
+    }
   };
+  // Whether all indices lie within what they count.
+  [[nodiscard]] bool Sound() const;
+  [[nodiscard]] bool SoundSegments() const;
+  [[nodiscard]] bool SoundCandidates(const std::vector<Candidate>& candidates) const;
   [[nodiscard]] Eigen::AlignedBox2d SeenBy(const Segment& segment, const std::vector<Pose2>& starts) const;
   [[nodiscard]] std::vector<MapSample> SamplesOf(std::size_t segment) const;
   [[nodiscard]] MapSample SampleOf(const Candidate& candidate, std::size_t segment) const;

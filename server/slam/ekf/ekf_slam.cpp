@@ -82,6 +82,16 @@ void EkfSlam::Observe(const std::vector<LandmarkSighting>& sightings, double tra
   for (const LandmarkSighting& sighting : fresh) AddLandmark(sighting, travelled_m);
 }
 
+bool EkfSlam::Sound(std::size_t keyframes) const {
+  bool sound = keyframes_.size() == keyframes && (keyframes == 0 || since_anchor_.anchor < anchors_.size());
+  for (const Entry& entry : landmarks_)
+    sound = sound && 3 <= entry.at && entry.at + 2 <= state_.size() && entry.first_keyframe < keyframes;
+  for (const Anchor& anchor : anchors_)
+    sound = sound && 3 <= anchor.at && anchor.at + 3 <= state_.size() && anchor.keyframe < keyframes;
+  for (const Hung& hung : keyframes_) sound = sound && hung.anchor < anchors_.size();
+  return sound;
+}
+
 Association EkfSlam::Associate(const LandmarkSighting& sighting, double travelled_m) const {
   const LandmarkOptions& options = back_end_.landmarks;
   const Pose2 T_map_robot = state_.robot();

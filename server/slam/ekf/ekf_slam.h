@@ -49,6 +49,15 @@ class EkfSlam final : public Filter {
 
   [[nodiscard]] const JointState& state() const { return state_; }
 
+  void Save(StateWriter& archive) const override { archive(*this); }
+  void Load(StateReader& archive) override { archive(*this); }
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.candidates_, self.state_, self.landmarks_, self.anchors_, self.keyframes_, self.since_anchor_,
+            self.since_anchor_m_, self.moved_path_, self.path_, self.contradictions_, self.nis_);
+    if constexpr (Archive::kReads) archive.Require(self.Sound(archive.keyframes()), "the landmarks and anchors");
+  }
+
  private:
   struct Entry {
     Eigen::Index at = 0;
@@ -58,6 +67,12 @@ class EkfSlam final : public Filter {
     double last_observed_m = 0.0;
     std::uint32_t sightings = 1;
     std::size_t first_keyframe = 0;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.at, self.slot, self.signature, self.slope_map, self.last_observed_m, self.sightings,
+              self.first_keyframe);
+    }
   };
   // A keyframe as a pose relative to its anchor.
   struct Hung {
@@ -65,7 +80,14 @@ class EkfSlam final : public Filter {
     Pose2 T_anchor_robot;
     // Covariance of T_anchor_robot, in the anchor's frame.
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.anchor, self.T_anchor_robot, self.covariance);
+    }
   };
+  // Whether all indices lie within what they count, with this many keyframes.
+  [[nodiscard]] bool Sound(std::size_t keyframes) const;
 
   [[nodiscard]] Association Associate(const LandmarkSighting& sighting, double travelled_m) const;
   void AddLandmark(const LandmarkSighting& sighting, double travelled_m);
@@ -80,6 +102,11 @@ class EkfSlam final : public Filter {
   struct Anchor {
     Eigen::Index at = 0;  // First index in the state.
     std::size_t keyframe = 0;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.at, self.keyframe);
+    }
   };
   std::vector<Anchor> anchors_;
   std::vector<Hung> keyframes_;

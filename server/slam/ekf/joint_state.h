@@ -64,7 +64,28 @@ class JointState {
     Learn(PHt, Eigen::MatrixXd(S), Eigen::VectorXd(v));
   }
 
+  // The capacity is part of the state: products of matrices round by how these lie in memory.
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    std::int64_t capacity = self.mean_.size();
+    archive(self.size_, capacity, self.headings_);
+    bool sound = 3 <= self.size_ && self.size_ <= capacity && capacity <= 4 * self.size_ && capacity <= kMostRead;
+    for (const Eigen::Index heading : self.headings_) sound = sound && 0 <= heading && heading < self.size_;
+    if (!archive.Require(sound, "the size of the joint state")) return;
+    if constexpr (Archive::kReads) {
+      self.mean_.setZero(capacity);
+      self.covariance_.setZero(capacity, capacity);
+    }
+    for (Eigen::Index i = 0; i < self.size_; ++i) archive(self.mean_(i));
+    for (Eigen::Index column = 0; column < self.size_; ++column)
+      for (Eigen::Index row = 0; row < self.size_; ++row) archive(self.covariance_(row, column));
+    if constexpr (Archive::kReads)
+      archive.Require(self.mean_.allFinite() && self.covariance_.allFinite(), "the joint state");
+  }
+
  private:
+  static constexpr std::int64_t kMostRead = 60000;
+
   void Grow(Eigen::Index count);
   void Learn(const Eigen::MatrixXd& PHt, const Eigen::MatrixXd& S, const Eigen::VectorXd& v);
 

@@ -1,6 +1,7 @@
 #include "server/slam/fastslam/error_ensemble.h"
 
 #include <cmath>
+#include <utility>
 
 #include "common/geometry/pose_difference.h"
 
@@ -48,11 +49,13 @@ void ErrorEnsemble::MoveBySampling(const Pose2& T_map_prev, const StepMotion& st
 
 void ErrorEnsemble::Resample(double lost) {
   const int partner = 1 + static_cast<int>(UniformDraw(rng_) * (kMembers - 1));
-  const double robot_share = path_.empty() ? 0.0 : path_.back().spread_share;
+  const double robot_share = path_.empty() ? 0.0 : path_.back()->spread_share;
   LoseAncestors(robot_, lost * robot_share, partner);
-  for (auto kept = path_.rbegin(); kept != path_.rend() && kept->spread_share > kNothingLeft; ++kept) {
+  for (auto at = path_.rbegin(); at != path_.rend() && (*at)->spread_share > kNothingLeft; ++at) {
+    auto kept = std::make_shared<Kept>(**at);
     LoseAncestors(kept->errors, lost * kept->spread_share, partner);
     kept->spread_share *= 1.0 - lost;
+    *at = std::move(kept);
   }
 }
 
@@ -67,7 +70,7 @@ void ErrorEnsemble::LoseAncestors(Errors& errors, double share, int partner) con
 }
 
 void ErrorEnsemble::Rebase(std::size_t keyframes, const Pose2& T_map_robot, const Eigen::Matrix3d& covariance) {
-  path_.assign(keyframes, {Errors::Zero(), 0.0});
+  path_.assign(keyframes, std::make_shared<const Kept>());
   robot_.setZero();
   Disturb(T_map_robot, covariance);
 }

@@ -20,6 +20,7 @@
 #include <Eigen/LU>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "common/geometry/pose2.h"
@@ -47,7 +48,7 @@ class ErrorEnsemble {
   void Resample(double lost);
   // Appends the robot's error to the path. `spread_share` is the share of its variance over which the
   // particles still spread.
-  void Keep(double spread_share) { path_.push_back({robot_, spread_share}); }
+  void Keep(double spread_share) { path_.push_back(std::make_shared<const Kept>(Kept{robot_, spread_share})); }
   // Sets the errors of all past keyframes to zero, and gives the robot's error this covariance of the pose,
   // (x, y, theta) in map.
   void Rebase(std::size_t keyframes, const Pose2& T_map_robot, const Eigen::Matrix3d& covariance);
@@ -55,13 +56,24 @@ class ErrorEnsemble {
   // The covariance of the robot's pose, (x, y, theta) in map.
   [[nodiscard]] Eigen::Matrix3d covariance(const Pose2& T_map_robot) const;
 
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.rng_, self.robot_, self.path_);
+    if constexpr (Archive::kReads) archive.Require(self.path_.size() == archive.keyframes(), "the errors of the path");
+  }
+
  private:
   static constexpr int kMembers = 100;
   static constexpr int kHalf = kMembers / 2;
   using Errors = Eigen::Matrix<float, 3, kMembers>;
   struct Kept {
-    Errors errors;
+    Errors errors = Errors::Zero();
     double spread_share = 0.0;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.errors, self.spread_share);
+    }
   };
 
   // Derivative of a pose, (x, y, theta) in map, with respect to an error.
@@ -75,7 +87,7 @@ class ErrorEnsemble {
 
   Rng rng_;
   Errors robot_ = Errors::Zero();
-  std::vector<Kept> path_;
+  std::vector<std::shared_ptr<const Kept>> path_;  // Immutable, so that a checkpoint shares them.
 };
 
 template <int N>
@@ -84,7 +96,7 @@ void ErrorEnsemble::Tie(std::size_t keyframe, const Pose2& T_map_robot, const In
   const Eigen::Matrix<float, N, 3> J_z_error = (innovation.J_z_pose * J_pose_error(T_map_robot)).template cast<float>();
   const Matrix R = innovation.S_known_pose.template cast<float>();
   const Matrix root = R.llt().matrixL();
-  const Errors since = robot_ - path_[keyframe].errors;
+  const Errors since = robot_ - path_[keyframe]->errors;
   const Eigen::Matrix<float, N, kMembers> z = J_z_error * since;
   const auto gain = [&](int begin) -> Eigen::Matrix<float, 3, N> {
     const auto spread = Centred(z.template middleCols<kHalf>(begin));

@@ -50,6 +50,15 @@ class FastSlam final : public Filter {
   [[nodiscard]] std::size_t hypothesis_count() const override { return set_.size() + 1; }
   [[nodiscard]] Hypothesis hypothesis(std::size_t index) const override;
   [[nodiscard]] std::vector<Landmark> landmarks() const override;
+  void Save(StateWriter& archive) const override { archive(*this); }
+  void Load(StateReader& archive) override { archive(*this); }
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.candidates_, self.index_, self.set_, self.maps_, self.contradictions_);
+    bool sound = self.maps_.size() == self.set_.size() && self.candidates_.slots() <= self.index_.size();
+    for (const Map& map : self.maps_) sound = sound && map.size() <= self.index_.size();
+    archive.Require(sound, "the maps of the particles");
+  }
 
   [[nodiscard]] const ParticleSet& particles() const { return set_; }
   [[nodiscard]] std::size_t LandmarkCount(std::size_t particle) const;
@@ -61,6 +70,12 @@ class FastSlam final : public Filter {
     double last_observed_m = 0.0;
     std::uint32_t sightings = 0;       // 0 if this particle does not have the landmark.
     std::uint32_t first_keyframe = 0;  // Keyframe from which the landmark was first seen.
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.landmark, self.last_observed_m, self.sightings, self.first_keyframe);
+      if (self.sightings > 0) archive.RequireKeyframe(self.first_keyframe);
+    }
   };
   using Map = SharedSequence<Entry>;  // Indexed by slot.
 

@@ -43,6 +43,11 @@ struct Particle {
   double log_weight = 0.0;      // Sum since the last resampling.
   double log_likelihood = 0.0;  // Log likelihood of the whole path; resampling keeps it.
   SharedSequence<Pose2> path;   // T_map_robot at every keyframe.
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.T_map_robot, self.covariance, self.log_weight, self.log_likelihood, self.path);
+  }
 };
 
 class ParticleSet {
@@ -109,6 +114,14 @@ class ParticleSet {
   // to the covariance.
   [[nodiscard]] const FilterEstimate& estimate() const { return estimate_; }
   [[nodiscard]] FilterHealth health() const;
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    const std::size_t count = self.size();
+    archive(self.rng_, self.particles_, self.errors_, self.spread_share_, self.best_, self.travelled_, self.sample_due_,
+            self.effective_, self.nis_, self.estimate_);
+    archive.Require(self.size() == count && self.best_ < count, "the particles");
+  }
 
  private:
   std::vector<int> Resample(std::vector<double>& left);

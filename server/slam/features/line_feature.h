@@ -32,6 +32,13 @@ struct LineFeature {
   int point_count = 0;
   EndClass ends = EndClass::kOpen;
 
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.first, self.last, self.normal_angle, self.distance, self.slope, self.length, self.deviation,
+            self.first_beam, self.last_beam, self.point_count, self.ends);
+    archive.Require(self.ends <= EndClass::kBothEnded, "the ends of a line");
+  }
+
   [[nodiscard]] Eigen::Vector2d midpoint() const { return 0.5 * (first + last); }
   [[nodiscard]] Eigen::Vector2d direction() const { return (last - first) / std::max(length, 1e-9); }
   // Unit normal on the left of the direction; the laser sees the line from this side.
@@ -54,6 +61,11 @@ struct CornerFeature {
   // full-turn scan.
   int line_a = 0;
   int line_b = 0;
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.position, self.real, self.angle, self.long_lines, self.line_a, self.line_b);
+  }
 };
 
 // A pattern compares a line with this many following lines. An entry is NaN if its line or corner does not
@@ -68,6 +80,11 @@ struct LinePattern {
   // Index of the line with which this line forms its corner: the first following line that is not parallel to
   // it; -1 if there is none.
   int corner_with = -1;
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.angle, self.corner_distance, self.count, self.corner_with);
+  }
 };
 
 struct ScanFeatures {
@@ -76,6 +93,18 @@ struct ScanFeatures {
   std::vector<LinePattern> patterns;  // One per line.
   double angle_step_rad = 0.0;        // Angle between beams, > 0; limits how exactly ends of lines are seen.
   bool full_turn = false;             // The last line is followed by the first.
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.lines, self.corners, self.patterns, self.angle_step_rad, self.full_turn);
+    const auto lines = static_cast<int>(self.lines.size());
+    bool sound = self.patterns.size() == self.lines.size();
+    for (const CornerFeature& c : self.corners)
+      sound = sound && 0 <= c.line_a && c.line_a < lines && 0 <= c.line_b && c.line_b < lines;
+    for (const LinePattern& p : self.patterns)
+      sound = sound && 0 <= p.count && p.count <= kPatternSize && -1 <= p.corner_with && p.corner_with < lines;
+    archive.Require(sound, "the features of a scan");
+  }
 };
 
 }  // namespace cairn::slam

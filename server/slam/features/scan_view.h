@@ -12,6 +12,11 @@ namespace cairn::slam {
 struct ScanView {
   ScanFeatures features;
   std::vector<SurfacePoint> points_robot;
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.features, self.points_robot);
+  }
 };
 
 // The bare positions of a scan's points, for matchers that do not use surface directions. In the robot frame

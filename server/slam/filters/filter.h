@@ -17,6 +17,7 @@
 #include "server/slam/landmarks/landmark_options.h"
 #include "server/slam/motion/step_motion.h"
 #include "server/slam/parallel_for.h"
+#include "server/slam/state/archive.h"
 #include "server/slam/trail/keyframe.h"
 #include "server/slam/trail/shared_sequence.h"
 
@@ -49,6 +50,11 @@ struct Hypothesis {
 struct FilterEstimate {
   Pose2 T_map_robot;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // Covariance of (x, y, theta) in map.
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.T_map_robot, self.covariance);
+  }
 };
 
 // Indicators for the consistency study, and for reporting that the robot is lost.
@@ -86,6 +92,11 @@ class Filter {
   [[nodiscard]] virtual std::size_t hypothesis_count() const = 0;
   [[nodiscard]] virtual Hypothesis hypothesis(std::size_t index) const = 0;
   [[nodiscard]] virtual std::vector<Landmark> landmarks() const = 0;  // Landmarks of the best hypothesis.
+
+  // Writes the whole state, and replaces it (state/archive.h). REQUIRES: called between steps. If reading fails, the
+  // filter must not be used any more.
+  virtual void Save(StateWriter& archive) const = 0;
+  virtual void Load(StateReader& archive) = 0;
 };
 
 }  // namespace cairn::slam

@@ -13,6 +13,11 @@ class Contradictions {
   void Add(bool explained) { streak_ = explained ? 0 : streak_ + 1; }
   [[nodiscard]] bool diverged() const { return streak_ >= limit_; }
 
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.streak_);
+  }
+
  private:
   std::int64_t limit_;
   std::int64_t streak_ = 0;
@@ -34,6 +39,11 @@ class StepNis {
   }
   [[nodiscard]] double sum() const { return sum_; }
   [[nodiscard]] int numbers() const { return numbers_; }
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.sum_, self.numbers_, self.open_);
+  }
 
  private:
   double sum_ = 0.0;

@@ -25,6 +25,11 @@ struct PoseRelation {
   // Covariance of (x, y, theta) of T_from_to; positive definite.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
   bool loop = false;  // True for a loop, which may be wrong and therefore has the robust loss.
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.from, self.to, self.T_from_to, self.covariance, self.loop);
+  }
 };
 
 struct PoseGraphOptions {

@@ -8,6 +8,7 @@
 #include <array>
 #include <compare>
 #include <cstdint>
+#include <cstdlib>
 #include <map>
 #include <memory>
 #include <set>
@@ -26,12 +27,24 @@ namespace cairn::slam {
 inline constexpr std::int16_t kUnseen = INT16_MIN;
 struct GridChunk {
   std::array<std::int16_t, kTileArea> log_odds;
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.log_odds);
+  }
 };
 
 struct ChunkKey {
   int x = 0;
   int y = 0;
   auto operator<=>(const ChunkKey&) const = default;
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.x, self.y);
+    archive.Require(std::abs(self.x) < kMostRead && std::abs(self.y) < kMostRead, "the place of a chunk");
+  }
+  static constexpr int kMostRead = 1 << 22;
 };
 
 // Converts log odds to an occupancy of 0..100 %, or kUnseen to kUnknownCell.
@@ -98,6 +111,23 @@ class OccupancyGrid {
   // Occupancy at a point: 0..100 %, or kUnknownCell.
   [[nodiscard]] std::uint8_t OccupancyAt(const Eigen::Vector2d& p_map) const;
   [[nodiscard]] const GridOptions& options() const { return options_; }
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    std::uint64_t chunks = self.slots_.size();
+    archive(chunks, self.changed_);
+    if constexpr (Archive::kReads) {
+      self.slots_.clear();
+      for (ChunkKey key; archive.ok() && self.slots_.size() < chunks;) {
+        SharedChunk chunk;
+        archive(key, chunk);
+        archive.Require(self.slots_.emplace(key, Slot{nullptr, std::move(chunk)}).second, "the chunks of the map");
+      }
+    } else {
+      for (const auto& [key, slot] : self.slots_)
+        archive(key, slot.own ? std::make_shared<const GridChunk>(*slot.own) : slot.shared);
+    }
+  }
 
  private:
   // Either a chunk that only this grid uses and may write to, or one that others may read.

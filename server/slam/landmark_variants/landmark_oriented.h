@@ -49,6 +49,11 @@ struct LandmarkOriented {
   [[nodiscard]] Eigen::Vector2d p_map() const { return mean.head<2>(); }
   [[nodiscard]] double slope() const { return mean.z(); }
   [[nodiscard]] Eigen::Matrix2d covariance() const { return P.topLeftCorner<2, 2>(); }
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.mean, self.P);
+  }
 };
 
 }  // namespace cairn::slam

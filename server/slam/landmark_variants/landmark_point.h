@@ -53,6 +53,11 @@ struct LandmarkPoint {
   [[nodiscard]] const Eigen::Vector2d& p_map() const { return position.mean; }
   [[nodiscard]] double slope() const { return first_slope; }
   [[nodiscard]] Eigen::Matrix2d covariance() const { return position.covariance; }
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.position, self.first_slope);
+  }
 };
 
 }  // namespace cairn::slam

@@ -33,10 +33,20 @@ class LandmarkIndex {
   [[nodiscard]] const LandmarkSignature& signature(std::size_t slot) const { return places_[slot].signature; }
   [[nodiscard]] std::size_t size() const { return places_.size(); }
 
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.places_);
+  }
+
  private:
   struct Place {
     LandmarkSignature signature;
     Eigen::AlignedBox2d box;  // Empty if no particle has the landmark.
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.signature, self.box);
+    }
   };
   std::vector<Place> places_;  // Indexed by slot.
 };

@@ -26,6 +26,16 @@ class LandmarkCandidates {
   // `min_travel_m`.
   [[nodiscard]] std::vector<LandmarkSighting> Observe(const ScanFeatures& features, const Pose2& T_track_robot,
                                                       double travelled_m);
+  // Number of slots given so far.
+  [[nodiscard]] std::size_t slots() const { return static_cast<std::size_t>(slots_); }
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.candidates_, self.slots_);
+    bool sound = self.slots_ >= 0;
+    for (const Candidate& candidate : self.candidates_) sound = sound && candidate.slot < self.slots_;
+    archive.Require(sound, "the candidates for landmarks");
+  }
 
  private:
   struct Feature {
@@ -35,12 +45,18 @@ class LandmarkCandidates {
   };
   struct Candidate {
     LandmarkSignature signature;
-    Eigen::Vector2d p_track;
+    Eigen::Vector2d p_track = Eigen::Vector2d::Zero();
     double slope_track = 0.0;
     int sightings = 0;
     double last_seen_m = 0.0;
     std::ptrdiff_t slot = -1;  // -1 before the candidate is stable.
     double last_shown_m = 0.0;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.signature, self.p_track, self.slope_track, self.sightings, self.last_seen_m, self.slot,
+              self.last_shown_m);
+    }
   };
 
   [[nodiscard]] std::vector<Feature> UsableFeatures(const ScanFeatures& features) const;

@@ -20,6 +20,11 @@ namespace cairn::slam {
 struct LandmarkPosition {
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();        // Position in `map`; xf in the thesis.
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();  // Covariance in `map`; pf in the thesis.
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.mean, self.covariance);
+  }
 };
 
 // The innovation of a measured range and bearing `z` against those that are expected for a position.
@@ -69,6 +74,11 @@ struct LandmarkPair {
   [[nodiscard]] const Eigen::Vector2d& p_map() const { return position.mean; }
   [[nodiscard]] double slope() const;
   [[nodiscard]] Eigen::Matrix2d covariance() const { return position.covariance; }
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.position, self.extension);
+  }
 };
 
 }  // namespace cairn::slam

@@ -16,6 +16,11 @@ namespace cairn::slam {
 struct LandmarkSignature {
   bool corner = false;
   double shape = 0.0;  // Corner: signed angle between its lines, rad. Line: length, m.
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.corner, self.shape);
+  }
 };
 
 // True if both are of the same kind, and their angles differ by less than `same_angle_rad` or their lengths

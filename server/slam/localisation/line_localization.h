@@ -58,6 +58,13 @@ class LineLocalization final : public Filter {
     return {path_.T_map_robot(), path_.path()};
   }
   [[nodiscard]] std::vector<Landmark> landmarks() const override { return {}; }
+  void Save(StateWriter& archive) const override { archive(*this); }
+  void Load(StateReader& archive) override { archive(*this); }
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.path_, self.places_, self.placed_, self.tracking_, self.found_in_a_row_, self.found_at_m_,
+            self.searched_at_m_, self.nis_, self.nis_dimension_);
+  }
 
  private:
   // Returns whether a hypothesis near the belief was found.

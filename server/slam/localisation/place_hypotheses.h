@@ -31,6 +31,11 @@ struct PoseBelief {
 
   // The unknown pose (2.19), with 10^4 m and 10^2 rad for infinity.
   [[nodiscard]] static PoseBelief Unknown();
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.T_map_robot, self.covariance);
+  }
 };
 
 // Squared Mahalanobis distance of a hypothesis from the belief.
@@ -67,10 +72,20 @@ class PlaceHypotheses {
   void Clear() { places_.clear(); }
   [[nodiscard]] std::size_t size() const { return places_.size(); }
 
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.places_);
+  }
+
  private:
   struct Place {
     PoseBelief belief;
     double evidence = 0.0;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.belief, self.evidence);
+    }
   };
   PlaceOptions options_;
   std::vector<Place> places_;  // The hypotheses, ordered by evidence, the most first.

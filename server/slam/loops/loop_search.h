@@ -62,6 +62,13 @@ struct LoopClosure {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  // (x, y, theta) of T_old_recent.
 
   [[nodiscard]] PoseRelation relation() const { return {old, recent, T_old_recent, covariance, true}; }
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.old, self.recent, self.T_old_recent, self.covariance);
+    archive.RequireKeyframe(self.old);
+    archive.RequireKeyframe(self.recent);
+  }
 };
 
 class LoopSearch {
@@ -71,6 +78,11 @@ class LoopSearch {
   // Returns a large loop that the last keyframe closes, once it is confirmed. `path` is the believed path,
   // one pose T_map_robot per keyframe.
   [[nodiscard]] std::optional<LoopClosure> Find(const Trail& trail, const SharedSequence<Pose2>& path);
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.searched_at_m_, self.unconfirmed_);
+  }
 
  private:
   [[nodiscard]] std::vector<std::size_t> Candidates(const Trail& trail, const SharedSequence<Pose2>& path) const;

@@ -46,10 +46,20 @@ class SelfCheck {
   // True from the stretch that contradicts the map until a stretch agrees with it again.
   [[nodiscard]] bool contradicted() const { return contradicted_; }
 
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.compared_at_m_, self.comparisons_, self.contradicted_);
+  }
+
  private:
   struct Comparison {
     double travelled_m = 0.0;
     VisibilityCounts counts;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.travelled_m, self.counts.confirmed, self.counts.contradicted);
+    }
   };
   [[nodiscard]] std::vector<std::size_t> KeyframesToCompare(std::span<const KeyframeShape> shapes,
                                                             const SharedSequence<Pose2>& path) const;

@@ -60,11 +60,21 @@ class ConstantSpeed {
     return {speed_->forward_m_s * seconds, 0.0, WrapAngle(speed_->turn_rad_s * seconds)};
   }
 
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.speed_);
+  }
+
  private:
   static constexpr double kLongest_s = 10.0;
   struct Speed {
     double forward_m_s = 0.0;
     double turn_rad_s = 0.0;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.forward_m_s, self.turn_rad_s);
+    }
   };
   std::optional<Speed> speed_;
 };

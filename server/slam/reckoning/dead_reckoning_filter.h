@@ -37,6 +37,11 @@ class ReckonedPath {
   [[nodiscard]] const Eigen::Matrix3d& covariance() const { return covariance_; }
   [[nodiscard]] const SharedSequence<Pose2>& path() const { return path_; }
 
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.pose_, self.covariance_, self.path_);
+  }
+
  private:
   MotionNoise drift_;
   Pose2 pose_;
@@ -64,6 +69,12 @@ class DeadReckoningFilter final : public Filter {
     return {path_.T_map_robot(), path_.path()};
   }
   [[nodiscard]] std::vector<Landmark> landmarks() const override { return {}; }
+  void Save(StateWriter& archive) const override { archive(*this); }
+  void Load(StateReader& archive) override { archive(*this); }
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.path_, self.contradictions_);
+  }
 
  private:
   ReckonedPath path_;

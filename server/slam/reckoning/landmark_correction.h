@@ -44,16 +44,27 @@ class LandmarkCorrection final : public Filter {
     return {path_.T_map_robot(), path_.path()};
   }
   [[nodiscard]] std::vector<Landmark> landmarks() const override;
+  void Save(StateWriter& archive) const override { archive(*this); }
+  void Load(StateReader& archive) override { archive(*this); }
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.candidates_, self.path_, self.memory_, self.contradictions_);
+  }
 
  private:
   struct Memory {
     std::size_t slot = 0;
     LandmarkSignature signature;
-    Eigen::Vector2d p_map;
+    Eigen::Vector2d p_map = Eigen::Vector2d::Zero();
     double slope_map = 0.0;
-    Eigen::Matrix3d covariance;  // Covariance of the robot's pose at the first sighting.
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // Covariance of the robot's pose at the first sighting.
     double last_used_m = 0.0;
     std::uint32_t sightings = 1;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.slot, self.signature, self.p_map, self.slope_map, self.covariance, self.last_used_m, self.sightings);
+    }
   };
   struct Found {
     LandmarkSighting sighting;

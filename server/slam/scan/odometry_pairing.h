@@ -58,6 +58,12 @@ class OdometryPairing {
   // Odometry samples refused so far for their stamps.
   [[nodiscard]] std::uint64_t odometry_refused() const { return odometry_refused_; }
 
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.scans_, self.odometry_, self.last_paired_, self.set_back_ns_, self.odometry_refused_, self.scan_gate_,
+            self.odometry_gate_);
+  }
+
  private:
   void Take(std::shared_ptr<const Scan>&& scan);
   void Take(const Odometry& odometry);

@@ -57,11 +57,21 @@ class StampGate {
   // The next sample comes from another client, which numbers from the beginning.
   void NewClient() { last_sequence_ = 0; }
 
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.has_last_, self.last_, self.last_sequence_, self.held_, self.returning_, self.returned_);
+  }
+
  private:
   struct Held {
     Stamp stamp = 0;
     std::uint64_t sequence = 0;
     Sample sample;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.stamp, self.sequence, self.sample);
+    }
   };
 
   [[nodiscard]] bool Follows(Stamp before, Stamp stamp) const {

@@ -19,6 +19,10 @@ struct SurfacePoint {
   // Unit vector towards the sensor; zero if the surface is not smooth.
   Eigen::Vector2d normal = Eigen::Vector2d::Zero();
   [[nodiscard]] bool smooth() const { return normal != Eigen::Vector2d::Zero(); }
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.p, self.normal);
+  }
 };
 
 struct SurfaceOptions {

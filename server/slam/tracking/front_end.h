@@ -85,10 +85,21 @@ class FrontEnd {
   // Makes the scan just tracked part of the reference.
   void AddKeyframe(const ScanView& view);
 
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.score_, self.keyframe_, self.keyframe_view_, self.history_, self.reference_);
+    if constexpr (Archive::kReads) self.BuildIndices();
+  }
+
  private:
   struct Sight {
     Pose2 T_track_robot;
     Pose2 T_odom_robot;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.T_track_robot, self.T_odom_robot);
+    }
   };
   // The pose predicted from the last scan, in `track`: by odometry, or by the forecast if odometry is not
   // used.
@@ -112,6 +123,7 @@ class FrontEnd {
   [[nodiscard]] Eigen::Matrix3d ForecastShare(const MatchResult& match) const;
   // Share of the scan's points that lie on the surfaces of the last keyframe.
   [[nodiscard]] double Explained(const ScanView& view, const Pose2& T_track_robot) const;
+  void BuildIndices();
   // Points of the last keyframes, in the robot frame of the newest of them.
   [[nodiscard]] std::vector<SurfacePoint> MergedPoints(std::size_t keyframes) const;
 

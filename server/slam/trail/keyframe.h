@@ -21,6 +21,11 @@ struct Keyframe {
   // Not localized because the path contradicts the scans. Where it lies along the path is known, so that it counts as
   // localized once the path has been corrected.
   bool doubted = false;
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.scan, self.T_odom_robot, self.localized, self.doubted);
+  }
 };
 
 // The part of a keyframe that matching uses.
@@ -29,6 +34,12 @@ struct KeyframeShape {
   Pose2 T_track_robot;
   double travelled_m = 0.0;          // Distance travelled along the path up to this keyframe.
   std::vector<SurfacePoint> points;  // Surface points in the robot frame of this keyframe.
+
+  // Without the points, which follow from the scan (Trail::RestorePoints).
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.T_track_robot, self.travelled_m);
+  }
 };
 
 // The pose of the robot relative to the old keyframe `keyframe`, measured by scan matching.
@@ -52,6 +63,11 @@ struct MapperSnapshot {
     Stamp stamp = 0;
     std::size_t keyframe = 0;  // Index of the last keyframe at or before the scan.
     Pose2 T_keyframe_robot;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.stamp, self.keyframe, self.T_keyframe_robot);
+    }
   };
   std::vector<ScanPlace> scans;
 

@@ -7,8 +7,10 @@
 // Source: the shared landmark trees of Montemerlo's FastSLAM (2002, 3.4), as a radix-16 trie.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -62,9 +64,24 @@ class SharedSequence {
     Own<Leaf>(*link).values[Slot(index, 0)] = std::move(value);
   }
 
+  // The state, for archives (state/archive.h). Copies that share nodes share them again when they are read.
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    std::uint64_t size = self.size_;
+    archive(size);
+    if constexpr (Archive::kReads) {
+      self = {};
+      if (!archive.Require(size <= kMostRead, "the size of a sequence")) return;
+      self.size_ = size;
+      while (self.size_ > (std::size_t{kWidth} << self.shift_)) self.shift_ += kBits;
+    }
+    if (self.size_ > 0) NodeMembers(archive, self.root_, self.size_, self.shift_);
+  }
+
  private:
   static constexpr int kBits = 4;
   static constexpr int kWidth = 1 << kBits;
+  static constexpr std::uint64_t kMostRead = 1 << 24;
   struct Leaf {
     std::array<Value, kWidth> values{};
   };
@@ -73,6 +90,25 @@ class SharedSequence {
   };
 
   static std::size_t Slot(std::size_t index, int shift) { return (index >> shift) & (kWidth - 1); }
+
+  // A node with the first `count` elements below it.
+  template <typename Archive>
+  static void NodeMembers(Archive& archive, auto& link, std::size_t count, int shift) {
+    const std::uint64_t shape = (std::uint64_t{count} << 8) | static_cast<std::uint64_t>(shift);
+    if (shift == 0) {
+      if (!archive.template Shared<Leaf>(link, shape)) return;
+      auto& leaf = *static_cast<Leaf*>(link.get());
+      for (std::size_t i = 0; i < count && archive.ok(); ++i) archive(leaf.values[i]);
+      return;
+    }
+    if (!archive.template Shared<Branch>(link, shape)) return;
+    auto& branch = *static_cast<Branch*>(link.get());
+    for (std::size_t i = 0, left = count; left > 0 && archive.ok(); ++i) {
+      const std::size_t below = std::min(left, std::size_t{1} << shift);
+      NodeMembers(archive, branch.children[i], below, shift - kBits);
+      left -= below;
+    }
+  }
 
   template <typename Node>
   static Node& Own(std::shared_ptr<void>& link) {

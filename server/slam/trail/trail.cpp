@@ -52,6 +52,16 @@ std::vector<Keyframe> Trail::TrustedKeyframes() const {
   return trusted;
 }
 
+void Trail::RestorePoints(const SurfaceOptions& options, const ParallelFor& parallel_for) {
+  parallel_for(static_cast<int>(size()), [&](int begin, int end) {
+    for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
+      const Scan& scan = *keyframes_[k].scan;
+      shapes_[k].points = SurfacePointsOf(PointsOf(scan), scan, options);
+    }
+  });
+  distances_m_ = DistancesFromLast();
+}
+
 void Trail::AddScan(Stamp stamp, const Pose2& T_keyframe_robot) {
   scans_.push_back({stamp, size() - 1, T_keyframe_robot});
 }

@@ -12,6 +12,7 @@
 
 #include "server/slam/graph/pose_graph.h"
 #include "server/slam/motion/step_motion.h"
+#include "server/slam/parallel_for.h"
 #include "server/slam/trail/keyframe.h"
 
 namespace cairn::slam {
@@ -57,10 +58,31 @@ class Trail {
   // Steps, revisits and loops; empty as long as no place was seen again.
   [[nodiscard]] std::vector<PoseRelation> relations() const;
 
+  // Without the points of the shapes and the distances, which follow from the rest: after reading, call RestorePoints.
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.keyframes_, self.shapes_, self.relations_, self.loops_, self.scans_);
+    const std::size_t size = self.size();
+    archive.SetKeyframes(size);
+    bool sound = self.shapes_.size() == size && self.loops_.size() == size;
+    for (const PoseRelation& relation : self.relations_) sound = sound && relation.from < size && relation.to < size;
+    for (const auto& loops : self.loops_)
+      for (const Loop& loop : loops) sound = sound && loop.other < size && loop.way_m >= 0.0;
+    archive.Require(sound, "the relations between keyframes");
+    for (const auto& scan : self.scans_) archive.RequireKeyframe(scan.keyframe);
+  }
+  // Computes what is not stored; `options` are those of the front-end that gave the points.
+  void RestorePoints(const SurfaceOptions& options, const ParallelFor& parallel_for);
+
  private:
   struct Loop {
     std::size_t other = 0;
     double way_m = 0.0;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.other, self.way_m);
+    }
   };
   [[nodiscard]] std::vector<double> DistancesFromLast() const;
 

@@ -35,8 +35,8 @@ std::string ReportText(const MotionReport& report) {
     out << "            " << std::left << std::setw(10) << kTermNames[k] << std::right << std::setw(9) << term.mean_d
         << std::setw(10) << term.mean_b << std::setw(10) << term.sigma_d << std::setw(10) << term.sigma_b << '\n';
   }
-  if (report.match_honesty)
-    out << "matches     errors are " << std::setprecision(2) << *report.match_honesty << " times what they state\n"
+  if (report.match_error_ratio)
+    out << "matches     errors are " << std::setprecision(2) << *report.match_error_ratio << " times what they state\n"
         << std::setprecision(4);
   if (report.matcher) {
     const slam::ScanMatchingModel& m = report.matcher->model;
@@ -73,7 +73,7 @@ std::string ReportJson(const MotionReport& report) {
                  {"mean_step_m", report.mean_step_m},
                  {"mean_step_rad", report.mean_step_rad},
                  {"eliazar", std::move(eliazar)}};
-  if (report.match_honesty) object["match_honesty"] = *report.match_honesty;
+  if (report.match_error_ratio) object["match_error_ratio"] = *report.match_error_ratio;
   if (report.matcher) {
     const slam::ScanMatchingModel& m = report.matcher->model;
     object["matcher"] = {{"name", report.matcher_name},

@@ -82,13 +82,13 @@ Result<MotionReport> RunMotion(const MotionRunOptions& options) {
   const Result<Trajectory> truth = report.truth_given ? ReadTum(options.truth) : PathOfEstimator(options, parallel_for);
   if (!truth) return tl::unexpected(truth.error());
   std::vector<slam::MatchSample> samples;
-  double honesty = 0.0;
+  double squared_ratio = 0.0;
   int compared = 0;
   for (const LogStep& step : measured->steps) {
     const auto motion = MotionBetween(*truth, step);
     if (!motion) continue;
     if (IsMeasured(step)) {
-      honesty += SquaredSigmas(step.match, *motion) / 3.0;
+      squared_ratio += SquaredSigmas(step.match, *motion) / 3.0;
       ++compared;
     }
     if (!step.blind.converged) {
@@ -101,7 +101,7 @@ Result<MotionReport> RunMotion(const MotionRunOptions& options) {
     return Fail(StatusCode::kFailedPrecondition,
                 report.truth_given ? options.truth.string() + ": no pose at the stamps of the log's steps"
                                    : options.log.string() + ": the matcher converged on no step");
-  if (report.truth_given && compared > 0) report.match_honesty = std::sqrt(honesty / compared);
+  if (report.truth_given && compared > 0) report.match_error_ratio = std::sqrt(squared_ratio / compared);
   report.matcher = slam::FitScanMatching(samples, {});
   report.matcher_name = slam::MatcherName(options.slam.matcher);
   return report;

@@ -39,7 +39,7 @@ struct MotionReport {
   int unmatched_blind = 0;  // Steps on which the matcher without odometry failed.
   // Set if the truth is given: root mean square of match error / stated sigma. It is 1 if the stated sigmas
   // are right.
-  std::optional<double> match_honesty;
+  std::optional<double> match_error_ratio;
 };
 
 [[nodiscard]] Result<MotionReport> RunMotion(const MotionRunOptions& options);

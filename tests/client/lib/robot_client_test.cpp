@@ -58,7 +58,7 @@ TEST_F(RobotClientTest, HandsOutPosesAndLedgers) {
   std::atomic<int> ledgers = 0;
   std::atomic<std::uint64_t> pose_of = 0;
   const auto client =
-      Open({}, {[&](const Ledger&) { ++ledgers; }, [&](const PoseReport& pose) { pose_of = pose.scan_sequence; }, {}});
+      Open({}, {[&](const Ledger&) { ++ledgers; }, [&](const PoseReport& pose) { pose_of = pose.scan_sequence; }, {}, {}});
   ASSERT_TRUE(client->Publish(SomeScan()));
   EXPECT_TRUE(Eventually([&] { return ledgers > 0 && pose_of == 1; }));
   EXPECT_TRUE(Eventually([&] { return client->pose() && client->pose()->reason == PoseReason::kTracking; }));

@@ -54,7 +54,7 @@ TYPED_TEST(Keys, ThatAreRetiredMakeRoomForOthers) {
     ASSERT_TRUE(publication->Publish(value)) << robot;
     // A sample that nobody has acknowledged yet would be lost with its instance.
     if (robot % 64 == 0) {
-      ASSERT_TRUE(publication->WaitForAcknowledgement(kDeadline));
+      ASSERT_TRUE(publication->WaitForAcknowledgement(kDeadline)) << robot << " " << received;
       for (std::uint64_t old = robot - 63; old <= robot; ++old)
         ASSERT_TRUE(publication->Retire(OfRobot<TypeParam>(old))) << old;
     }
@@ -67,7 +67,8 @@ TYPED_TEST(Keys, ThatAreRetiredAreNotTheirsWhoComeLate) {
   const auto publication = Must(this->sender_->template Advertise<TypeParam>());
   ASSERT_TRUE(publication->Publish(OfRobot<TypeParam>(1)));
   ASSERT_TRUE(publication->Publish(OfRobot<TypeParam>(2)));
-  ASSERT_TRUE(publication->Retire(OfRobot<TypeParam>(1)));
+  const auto first = publication->Retire(OfRobot<TypeParam>(1));
+  ASSERT_TRUE(first) << first.error().message;
   EXPECT_EQ(publication->Retire(OfRobot<TypeParam>(3)).error().code, StatusCode::kNotFound);
   Inbox<TypeParam> inbox;
   const auto subscription = Must(this->receiver_->template Subscribe<TypeParam>(inbox.Sink()));

@@ -1,7 +1,10 @@
 #include "server/jobs/job_list.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "server/jobs/job_worker.h"
@@ -15,12 +18,16 @@ class JobListTest : public ::testing::Test {
   // What was published since the last call.
   std::vector<Job> TakeSent() {
     std::vector<Job> sent;
-    while (auto value = outbound_.lane(Outbound::Lane::kLive).TryPop()) sent.push_back(std::get<Job>(*value));
+    while (auto value = outbound_.lane(Outbound::Lane::kLive).TryPop()) {
+      if (const auto* const job = std::get_if<Job>(&*value)) sent.push_back(*job);
+      if (const auto* const retired = std::get_if<Retired>(&*value)) retired_.push_back(std::get<Job>(retired->of).id);
+    }
     return sent;
   }
 
   static constexpr std::size_t kLane = 32;
   Outbound outbound_{kLane};
+  std::vector<std::uint64_t> retired_;  // Jobs whose key was given back.
   Stamp now_ = 100;
   JobList list_{options_, outbound_, [this] { return now_; }};
 };
@@ -41,6 +48,36 @@ TEST_F(JobListTest, EveryChangeOfStateIsPublishedWithItsTime) {
   EXPECT_EQ(sent[2].state, JobState::kSucceeded);
   EXPECT_EQ(sent[2].ended, 300);
   EXPECT_EQ(sent[2].map_version, 4U);
+  EXPECT_EQ(sent[2].cost_before, 2.0);
+  EXPECT_EQ(sent[2].cost_after, 1.0);
+  EXPECT_EQ(sent[2].message, "fine");
+  EXPECT_EQ(sent[2].progress, 1.0);
+}
+
+TEST_F(JobListTest, NothingChangesAJobThatHasEnded) {
+  const auto job = list_.Add("lab", JobKind::kSmooth);
+  EXPECT_TRUE(list_.Start(job->id));
+  const auto control = list_.ControlOf(job->id);
+  control->Progress(0.25);
+  list_.Fail(job->id, {StatusCode::kInternal, "no memory"});
+  TakeSent();
+  list_.Succeed(job->id, {});
+  control->Progress(0.75);
+  EXPECT_FALSE(list_.Start(job->id));
+  EXPECT_EQ(list_.Find(job->id)->state, JobState::kFailed);
+  EXPECT_EQ(list_.Find(job->id)->message, "no memory");
+  EXPECT_EQ(list_.Find(job->id)->progress, 0.25);
+  EXPECT_TRUE(TakeSent().empty());
+}
+
+TEST_F(JobListTest, TheFirstProgressIsPublishedAtOnce) {
+  const auto job = list_.Add("lab", JobKind::kSmooth);
+  EXPECT_TRUE(list_.Start(job->id));
+  TakeSent();
+  list_.ControlOf(job->id)->Progress(0.25);
+  const std::vector<Job> sent = TakeSent();
+  ASSERT_EQ(sent.size(), 1U);
+  EXPECT_EQ(sent[0].progress, 0.25);
 }
 
 TEST_F(JobListTest, ProgressOnlyGrowsAndIsThrottled) {
@@ -56,7 +93,11 @@ TEST_F(JobListTest, ProgressOnlyGrowsAndIsThrottled) {
 
 TEST_F(JobListTest, AQueuedJobIsCancelledAtOnceARunningOneWhenItLooks) {
   const auto queued = list_.Add("lab", JobKind::kSmooth);
-  EXPECT_EQ(list_.Cancel(queued->id)->state, JobState::kCancelled);
+  now_ = 150;
+  const auto cancelled = list_.Cancel(queued->id);
+  EXPECT_EQ(cancelled->state, JobState::kCancelled);
+  EXPECT_EQ(cancelled->ended, 150);
+  EXPECT_EQ(cancelled->message, "cancelled before it started");
   EXPECT_FALSE(list_.Start(queued->id));
   EXPECT_EQ(list_.Cancel(queued->id).error().code, StatusCode::kFailedPrecondition);
   const auto running = list_.Add("lab", JobKind::kSmooth);
@@ -76,6 +117,8 @@ TEST_F(JobListTest, ForgetsTheOldestFinishedJobAndRefusesWhenNoneIs) {
   EXPECT_TRUE(list_.Cancel(first->id));
   EXPECT_TRUE(list_.Add("lab", JobKind::kSmooth));
   EXPECT_FALSE(list_.Find(first->id));
+  TakeSent();
+  EXPECT_EQ(retired_, std::vector<std::uint64_t>{first->id});
   EXPECT_EQ(list_.OfSite("lab").size(), 2U);
   EXPECT_EQ(list_.OfSite("").size(), 3U);
 }
@@ -110,11 +153,30 @@ TEST(JobWorker, RunsOneAfterTheOtherRefusesWhenFullAndStopsByCancelling) {
   const auto second = worker.Submit("lab", JobKind::kSmooth, true);
   ASSERT_TRUE(second);
   EXPECT_EQ(worker.Submit("lab", JobKind::kSmooth, true).error().code, StatusCode::kResourceExhausted);
+  EXPECT_EQ(list.OfSite("lab").back().state, JobState::kFailed) << "a refused job must not look as if it waited";
   EXPECT_TRUE(list.Cancel(first->id));
   EXPECT_EQ(started.Pop(), second->id);
   worker.Stop();
   EXPECT_EQ(list.Find(first->id)->state, JobState::kCancelled);
   EXPECT_EQ(list.Find(second->id)->state, JobState::kCancelled);
+}
+
+TEST(JobWorker, RunsJobsAtTheConfiguredPriority) {
+  JobsOptions options;
+  options.nice = 7;
+  Outbound outbound(32);
+  JobList list(options, outbound, [] { return Stamp{0}; });
+  BoundedChannel<int> nice(1);
+  JobWorker worker(options, list, [&](const Job&, bool, const JobControl&) {
+    EXPECT_TRUE(nice.TryPush(getpriority(PRIO_PROCESS, static_cast<id_t>(gettid()))));
+    return Result<JobOutcome>(JobOutcome{});
+  });
+  const int own = getpriority(PRIO_PROCESS, static_cast<id_t>(gettid()));
+  worker.Start();
+  ASSERT_TRUE(worker.Submit("lab", JobKind::kSmooth, true));
+  EXPECT_EQ(nice.Pop(), std::max(7, own));  // A thread cannot raise a priority that was lowered before.
+  EXPECT_EQ(getpriority(PRIO_PROCESS, static_cast<id_t>(gettid())), own);
+  worker.Stop();
 }
 
 // An exception in a job (no memory, a bug in a library) ended the process and with it every robot's session.

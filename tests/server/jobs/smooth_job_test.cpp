@@ -3,13 +3,17 @@
 #include <gtest/gtest.h>
 #include <pthread.h>
 
+#include <asio/post.hpp>
+#include <atomic>
 #include <chrono>
 #include <ctime>
 #include <future>
 #include <random>
 #include <thread>
+#include <utility>
 
 #include "server/jobs/job_worker.h"
+#include "tests/server/robots/one_session.h"
 #include "tests/server/support/room_world.h"
 
 namespace cairn::server {
@@ -50,7 +54,10 @@ TEST_F(SmoothSiteTest, RedrawsTheMapAlongTheFullPathAndSaysHowMuchBetterItFits) 
   const auto smoothed = SmoothSite(job_, {Material()}, control_);
   ASSERT_TRUE(smoothed);
   EXPECT_LT(smoothed->outcome.cost_after, smoothed->outcome.cost_before);
+  EXPECT_GT(smoothed->outcome.cost_after, 0.0);
   EXPECT_EQ(smoothed->version.info.job, 9U);
+  EXPECT_EQ(smoothed->version.info.note, "smoothed: 1 robots, 20 keyframes, 20 scans");
+  EXPECT_EQ(smoothed->outcome.message, "1 robots, 20 keyframes, 20 scans");
   slam::OccupancyGrid expected{slam::GridOptions{}};
   for (int k = 0; k < kKeyframes; ++k) expected.Draw(RoomScan(4 * k), TruePose(4 * k));
   const RobotGrid& part = smoothed->version.parts.at(5);
@@ -60,6 +67,14 @@ TEST_F(SmoothSiteTest, RedrawsTheMapAlongTheFullPathAndSaysHowMuchBetterItFits) 
   });
   EXPECT_EQ(part.keyframes, static_cast<std::size_t>(kKeyframes));
   EXPECT_EQ(smoothed->version.smoothed.at("r1")->size(), static_cast<std::size_t>(kKeyframes));
+}
+
+TEST_F(SmoothSiteTest, TheSmoothedPathIsTheOneAlongWhichTheMapIsDrawn) {
+  SessionMaterial material = Material();
+  std::swap(material.snapshot.online_path, material.snapshot.full_path);  // Now the online path is right.
+  const auto smoothed = SmoothSite(job_, {material}, control_);
+  ASSERT_TRUE(smoothed);
+  EXPECT_EQ(smoothed->version.smoothed.at("r1")->back().T_map_robot, TruePose(4 * (kKeyframes - 1)));
 }
 
 TEST_F(SmoothSiteTest, ProgressGoesFromNothingToAll) {
@@ -76,6 +91,91 @@ TEST_F(SmoothSiteTest, CancellingEndsItAtTheNextStep) {
   ASSERT_FALSE(smoothed);
   EXPECT_EQ(smoothed.error().code, StatusCode::kCancelled);
   EXPECT_EQ(progress_.size(), 1U);
+}
+
+// A robot in a site, and a job that asks both. The sites have a pool of their own.
+class SmoothJobTest : public SmoothSiteTest {
+ protected:
+  SmoothJobTest() {
+    roster_.Take(testing::RequestOf("r1"));
+    for (int step = 0; step < 10; ++step) {
+      roster_.Take(testing::OdometryOf("r1", testing::RoomOdometry(step)));
+      roster_.Take(testing::ScanOf("r1", RoomScan(step)));
+    }
+  }
+  ~SmoothJobTest() override {
+    release_.set_value();
+    robots_pool_.join();
+    maps_pool_.join();
+  }
+  // Lets the robot or the site answer nothing until the end of the test.
+  void HoldRobot() {
+    EXPECT_TRUE(roster_.Find("r1")->Post(SnapshotWanted{[held = held_](SessionMaterial&&) { held.wait(); }}));
+  }
+  void HoldSite() {
+    asio::post(maps_pool_, [held = held_] { held.wait(); });
+  }
+  Result<JobOutcome> Run(double timeout_s) {
+    JobsOptions options;
+    options.snapshot_timeout_s = timeout_s;
+    return SmoothJob(options, roster_, atlas_).Run(job_, true, control_);
+  }
+
+  std::promise<void> release_;
+  std::shared_future<void> held_{release_.get_future()};
+  asio::thread_pool robots_pool_{1}, maps_pool_{1};
+  Outbound outbound_{256};
+  Atlas atlas_{MapsOptions{}, 0.05, true, maps_pool_, outbound_};
+  Roster roster_{RobotsOptions{}, FewParticles(), robots_pool_, outbound_, atlas_};
+
+ private:
+  static slam::MapperOptions FewParticles() {
+    slam::MapperOptions options;
+    options.filter.particles = 10;
+    return options;
+  }
+};
+
+TEST_F(SmoothJobTest, PublishesAndEnablesANewVersion) {
+  const auto outcome = Run(20.0);
+  ASSERT_TRUE(outcome) << outcome.error().message;
+  EXPECT_EQ(outcome->map_version, 2U);
+  EXPECT_EQ(atlas_.Find("lab")->snapshot()->info.enabled_version, 2U);
+}
+
+TEST_F(SmoothJobTest, FailsIfARobotDoesNotHandOverItsStateInTime) {
+  HoldRobot();
+  EXPECT_EQ(Run(0.1).error().code, StatusCode::kDeadlineExceeded);
+}
+
+TEST_F(SmoothJobTest, FailsIfTheSiteDoesNotAnswerInTime) {
+  HoldSite();
+  EXPECT_EQ(Run(5.0).error().code, StatusCode::kDeadlineExceeded);
+}
+
+TEST_F(SmoothJobTest, ACancelledJobWaitsForNobody) {
+  HoldRobot();
+  control_.Cancel();
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(Run(60.0).error().code, StatusCode::kCancelled);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(20));
+}
+
+TEST_F(SmoothJobTest, AJobThatIsCancelledWhileItWaitsForItsSiteEndsAtOnce) {
+  HoldSite();
+  std::atomic<bool> nearly_drawn{false};
+  // With one keyframe, the last of its four steps begins at three quarters.
+  JobControl control([&nearly_drawn](double progress) { nearly_drawn = nearly_drawn || progress >= 0.75; });
+  std::jthread cancels([&] {
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (!nearly_drawn && std::chrono::steady_clock::now() < deadline) std::this_thread::yield();
+    control.Cancel();
+  });
+  JobsOptions options;
+  options.snapshot_timeout_s = 60.0;
+  const auto begin = std::chrono::steady_clock::now();
+  EXPECT_EQ(SmoothJob(options, roster_, atlas_).Run(job_, true, control).error().code, StatusCode::kCancelled);
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
 }
 
 // A robot with a fit of some ten seconds: loops between random keyframes contradict each other and leave no sparse

@@ -249,7 +249,9 @@ TEST_F(RosterTest, TheKeysOfASessionThatIsGoneAreGivenBack) {
     kinds.push_back(retired.of.index());
     std::visit(
         [](const auto& of) {
-          if constexpr (!std::is_same_v<std::decay_t<decltype(of)>, Job>) EXPECT_EQ(of.robot_id, HashName("r1"));
+          if constexpr (!std::is_same_v<std::decay_t<decltype(of)>, Job>) {
+            EXPECT_EQ(of.robot_id, HashName("r1"));
+          }
         },
         retired.of);
   }

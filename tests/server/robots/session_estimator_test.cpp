@@ -159,7 +159,7 @@ TEST_F(SessionEstimatorTest, ANewClientMayNumberFromTheBeginningWithAnEarlierClo
   constexpr ClientId kRestarted = 9;
   constexpr int kBefore = 30, kAfter = 20;
   Drive(0, kBefore);
-  ASSERT_TRUE(record_.Resume(kRestarted));
+  ASSERT_TRUE(record_.Resume(kRestarted, 1));
   for (int step = kBefore; step < kBefore + kAfter; ++step) {
     Odometry odometry = RoomOdometry(step);
     Scan scan = RoomScan(step);

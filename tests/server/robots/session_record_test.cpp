@@ -63,7 +63,7 @@ TEST_F(SessionRecordTest, ADrainedQueueIsDueAtOnceWhereAScanWasSettled) {
   Settle(1);
   EXPECT_EQ(Take(1, Urgency::kDrained).size(), 1U);
   EXPECT_TRUE(Take(1, Urgency::kDrained).empty());
-  EXPECT_EQ(Take(1, Urgency::kNow).size(), 1U);
+  EXPECT_EQ(Take(1, Urgency::kNow).size(), 2U);  // That of the odometry, too.
 }
 
 TEST_F(SessionRecordTest, ALedgerThatCouldNotBeSentIsDueAgain) {
@@ -102,7 +102,7 @@ TEST_F(SessionRecordTest, CountsWhatBecameOfScansAndOdometry) {
   EXPECT_EQ(counted.latency_p50_ms, 2.5);
   EXPECT_EQ(Dropped(counted, DropReason::kNotOwner), 1U);
   EXPECT_EQ(Dropped(counted, DropReason::kEmpty), 1U);
-  EXPECT_EQ(counted.odometry_received, 3U);
+  EXPECT_EQ(counted.odometry_received, 4U);
   EXPECT_EQ(counted.odometry_dropped, 2U);
   EXPECT_EQ(counted.odometry_merged, 1U);
   // The pose is shown by the robot's clock, the path kept by the estimator's.

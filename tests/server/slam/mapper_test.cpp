@@ -60,13 +60,20 @@ struct MapperRun {
   double worst_m = 0.0;
 };
 
-MapperRun RunMapper(const Drive& drive, const ParallelFor& parallel_for) {
+MapperRun RunMapper(const Drive& drive, const ParallelFor& parallel_for,
+                    FilterKind filter = FilterKind::kFastSlam2Points) {
   MapperOptions options;
+  options.filter.kind = filter;
   options.filter.particles = 50;
   Mapper mapper(options, drive.truth.front(), 1);
   MapperRun run;
   for (std::size_t i = 0; i < drive.scans.size(); ++i) {
     const ScanOutcome outcome = mapper.Process(drive.scans[i], drive.odometry[i], parallel_for);
+    const Pose2 by_odometry = outcome.T_map_odom * drive.odometry[i];
+    EXPECT_LT((by_odometry.translation() - outcome.T_map_robot.translation()).norm(), 1e-9) << i;
+    EXPECT_LT(std::abs(AngleDiff(by_odometry.theta, outcome.T_map_robot.theta)), 1e-9) << i;
+    EXPECT_GT(outcome.score, 0.0) << i;
+    EXPECT_LE(outcome.score, 1.0) << i;
     run.online.push_back({outcome.stamp, outcome.T_map_robot});
     run.keyframes += outcome.keyframe ? 1 : 0;
     run.worst_m = std::max(run.worst_m, Between(drive.truth[i], outcome.T_map_robot).translation().norm());
@@ -82,6 +89,36 @@ TEST(Mapper, FollowsTheRobotTwiceRoundALoop) {
       Between(drive.truth.back(), drive.truth.front() * Between(drive.odometry.front(), drive.odometry.back()));
   EXPECT_GT(odometry_error.translation().norm(), 0.5) << "the world must need correcting";
   EXPECT_LT(run.worst_m, 0.25);
+}
+
+TEST(Mapper, PlacesSeenAgainBecomeRelationsIfTheFilterUsesThem) {
+  const Drive drive = DriveRound();
+  const auto revisits = [&drive](FilterKind filter) {
+    const MapperSnapshot snapshot = RunMapper(drive, SerialFor, filter).snapshot;
+    return std::count_if(snapshot.relations.begin(), snapshot.relations.end(),
+                         [](const PoseRelation& relation) { return relation.loop; });
+  };
+  EXPECT_GT(revisits(FilterKind::kFastSlam2Points), 10);
+  EXPECT_EQ(revisits(FilterKind::kNone), 0);
+}
+
+// FastSLAM 1.0 with a model of the odometry draws steps around what odometry reports; the match only weighs them. Here
+// odometry is 20 % too long and there is nothing to weigh by.
+TEST(Mapper, AModelOfTheOdometryGetsTheOdometryAndNotTheMatch) {
+  MapperOptions options;
+  options.filter.kind = FilterKind::kFastSlam1;
+  options.filter.particles = 10;
+  options.filter.sampling.model = MotionModel::kEliazar;
+  options.filter.back_end.landmarks.enabled = false;
+  options.revisit.enabled = options.loop.enabled = false;
+  Mapper mapper(options, {}, 1);
+  ScanOutcome outcome;
+  for (int i = 0; i <= 20; ++i) {
+    auto scan = std::make_shared<Scan>(Look(test::Office(), {0.05 * i, 0, 0}, {}));
+    scan->stamp = (i + 1) * 100'000'000;
+    outcome = mapper.Process(std::move(scan), {0.06 * i, 0, 0}, SerialFor);
+  }
+  EXPECT_NEAR(outcome.T_map_robot.x, 1.2, 0.1);
 }
 
 // Once round a large ring, and 28 m more. For `blind_m` metres from `blind_from_m` on, the robot sees nothing
@@ -131,6 +168,18 @@ TEST(Mapper, ClosesALargeLoopAndDrawsTheMapAgain) {
   EXPECT_GT(without, 0.4) << "the drift must need correcting";  // 1.0 with gcc, 0.6 with clang: particles differ.
   EXPECT_LT(with, 0.3);
   EXPECT_LT(middle_of_first_side, 50);
+}
+
+TEST(Mapper, ALargeLoopStaysARelation) {
+  const Drive drive = DriveLargeRing(70.0, 3.0);
+  MapperOptions options = SlipOptions(true);
+  options.revisit.enabled = false;  // So that no other relation is a loop.
+  Mapper mapper(options, {}, 1);
+  for (std::size_t i = 0; i < drive.scans.size(); ++i)
+    static_cast<void>(mapper.Process(drive.scans[i], drive.odometry[i], SerialFor));
+  const MapperSnapshot snapshot = mapper.Snapshot();
+  EXPECT_TRUE(std::any_of(snapshot.relations.begin(), snapshot.relations.end(),
+                          [](const PoseRelation& relation) { return relation.loop; }));
 }
 
 // The share of the occupied cells of `grid` that have no occupied cell of `other` beside them.

@@ -78,7 +78,7 @@ double PoseError(const Trajectory& path, const Trajectory& truth) {
   return poses > 0.0 ? sum / poses : 0.0;
 }
 
-constexpr double kPosesM = 0.025;  // What the estimator's poses may add on average ...
+constexpr double kPosesM = 0.025;  // The mean error that the poses of the estimator may add ...
 constexpr double kFarM = 8.0;      // ... with a scanner of at least this range.
 
 }  // namespace
@@ -87,17 +87,18 @@ void StudyCloud(StudyContext& context) {
   Report& report = context.report;
   report.Heading("Clouds of a simulated building");
   report.Text(
-      "A robot drives through hall3d, halts and nods its scanner from 60 deg up to 45 deg down. Distance of the "
-      "cloud's points "
-      "to the nearest true rectangle, with true poses (the laser's error alone) and with the estimator's online poses. "
-      "Bounds of the mean: with true poses, for every scanner, the mean size of its stated range error over the ranges "
-      "it measured; with the estimator's 2.5 cm more, for scanners of 8 m range or more. The URG-04LX (4 m) and its "
-      "UG01 (5.6 m) lose sight of the hall's walls, and their poses drift: no error stated for the laser bounds that, "
-      "so "
-      "their clouds with estimated poses are printed beside the poses' own error, not checked.");
+      "A robot drives through hall3d, stops from time to time, and then tilts its scanner step by step "
+      "from 60 deg up to 45 deg down. The table shows the distance of the points of the cloud from the "
+      "nearest true rectangle, once with the true poses, so that only the laser has errors, and once "
+      "with the online poses of the estimator. With the true poses the mean distance must not be "
+      "larger than the mean range error that the maker of the scanner states. With the poses of the "
+      "estimator it may be 2.5 cm more, for scanners with a range of at least 8 m. The URG-04LX (4 m) "
+      "and its variant UG01 (5.6 m) do not always see the walls of the hall, so their poses drift, and "
+      "the stated error of the laser gives no bound. Their clouds with estimated poses are therefore "
+      "printed beside the error of the poses and are not checked.");
   const sim::RectangleTree truth(sim::OpenWorld3("hall3d")->rectangles);
   Table table({"scanner", "poses", "points", "mean (m)", "rms (m)", "median (m)", "p95 (m)", "max (m)",
-               "bound of the mean (m)", "poses off by, mean (m)"});
+               "bound of the mean (m)", "mean error of the poses (m)"});
   for (const std::string model : {"thesis", "lms200", "lms291-s05", "urg-04lx", "urg-04lx-ug01"}) {
     sim::FleetOptions options;
     options.robots = 1;
@@ -118,7 +119,7 @@ void StudyCloud(StudyContext& context) {
                  Number(e.median_m, 4), Number(e.p95_m, 4), Number(e.max_m, 3), Number(bound, 4),
                  Number(PoseError(*path, drive.truth), 3)});
       report.Expect(std::isnan(bound) || e.mean_m <= bound,
-                    model + ", " + name + " poses: the cloud lies farther from the walls than its bound");
+                    model + ", " + name + " poses: the mean distance of the cloud from the walls exceeds its bound");
       if (model == "lms200" && estimated) {
         if (!report.directory().empty())
           if (const auto written = WriteCloud(cloud, CloudFormat::kPly, report.directory() / "hall3d.ply"); !written)

@@ -81,7 +81,7 @@ void StudyMotionModels(StudyContext& context) {
   for (const std::string name : {"intel", "mit-csail"}) {
     const auto path = RealLog(name + ".clf");
     if (!std::filesystem::exists(path)) {
-      report.Warn(name + ".clf is not at hand");
+      report.Warn(name + ".clf is not available");
       continue;
     }
     server::MotionRunOptions real;
@@ -99,12 +99,12 @@ void StudyMotionModels(StudyContext& context) {
   }
   report.Add(models, "eliazar");
   report.Text(
-      "The scan matcher's errors without odometry (Tables 5.1-5.3), in m and rad. Ours: NDT climbed by Newton's method "
-      "(slam.matcher ndt); the thesis' table is of NDT by evolution, which differs in the search, not in what it "
-      "maximises.");
+      "The table shows the errors of scan matching without odometry (Tables 5.1-5.3), in m and rad. "
+      "Cairn uses NDT with Newton's method (slam.matcher=ndt). The table of the thesis is that of NDT "
+      "with evolution, which searches in another way but maximises the same function.");
   report.Add(matchers, "scan-matching");
   report.Expect(Recovers(simulated->eliazar.model, drive.model),
-                "the injected odometry model is not recovered within the stated bounds");
+                "the recovered odometry model differs from the injected one by more than the stated bounds");
 }
 
 }  // namespace cairn::studies

@@ -66,7 +66,7 @@ void CheckBounds(Report& report, const GridRun& run) {
   report.Expect(run.bounds_hold, run.name + ": the family tree broke its bounds");
 }
 
-// C7: cost, and a map without doubled walls.
+// Cost, and a map without doubled walls.
 void StudyCost(StudyContext& context, const StudyLog& log) {
   Report& report = context.report;
   report.Heading("Cost on " + log.name);
@@ -116,7 +116,7 @@ Loops& Of(LoopsOfAll& all, Levels levels) {
   return all[static_cast<std::size_t>(levels)];
 }
 
-// C8: one round of the ring corridor of the 60 x 40 m office, and 60 m more.
+// One round of the ring corridor of the 60 x 40 m office, and 60 m more.
 LoopsOfAll StudyLoop(StudyContext& context, std::int64_t size, int trials) {
   Report& report = context.report;
   report.Heading("A loop of 160 m, " + std::to_string(2 * size) + " particles");
@@ -243,8 +243,8 @@ void StudyConsistencyOfGrids(StudyContext& context) {
       of_nees.x.push_back(point.travelled_m), of_nees.y.push_back(point.nees);
       of_error.x.push_back(point.travelled_m), of_error.y.push_back(point.position_error_m);
     }
-    const std::string verdict = result.nees_mean > result.nees_high  ? "uncertainty too small"
-                                : result.nees_mean < result.nees_low ? "uncertainty too large"
+    const std::string verdict = result.nees_mean > result.nees_high  ? "overconfident"
+                                : result.nees_mean < result.nees_low ? "underconfident"
                                                                      : "consistent";
     table.Add({name, Number(result.nees_mean, 2), Number(result.nees_low, 2) + " .. " + Number(result.nees_high, 2),
                Percent(1.0 * inside / static_cast<double>(result.points.size()), 0),
@@ -271,7 +271,7 @@ void RunDpSlam(StudyContext& context) {
   for (const StudyLog& log : ChooseLogs(context, {})) StudyCost(context, log);
 }
 
-const Registration kRegistered{"dpslam", "DP-SLAM: memory and time beside copied maps, and a loop of 160 m (C7, C8)",
+const Registration kRegistered{"dpslam", "DP-SLAM: memory and time compared with copied maps, and a loop of 160 m",
                                RunDpSlam};
 
 }  // namespace

@@ -75,7 +75,6 @@ slam::FilterOptions Told(const ConsistencyOptions& options) {
   told.correction.min_travel_m = 12.0;
   // Old poses that are far apart make one error of their keyframes count several times: at 5 m the EKF states
   // too small an uncertainty (NEES 4.4).
-  // (NEES 4.4).
   told.ekf.anchor_distance_m = 1.0;
   return told;
 }

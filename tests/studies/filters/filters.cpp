@@ -42,8 +42,8 @@ std::string Range(double low, double high) {
 }
 
 std::string VerdictOf(const ConsistencyResult& result, double nees) {
-  if (nees > result.nees_high) return "uncertainty too small";
-  return nees < result.nees_low ? "uncertainty too large" : "consistent";
+  if (nees > result.nees_high) return "overconfident";
+  return nees < result.nees_low ? "underconfident" : "consistent";
 }
 
 // With few runs, some may miss by chance.

@@ -39,7 +39,7 @@ struct MapperConsistencyPoint {
   double travelled_m = 0.0;
   // NEES of (x, y, theta): 3 if the mapper is consistent, more if it states too small an uncertainty.
   double nees = 0.0;
-  double nees_median = 0.0;       // 2.37 where consistent. Far below the mean: few runs are far too sure.
+  double nees_median = 0.0;       // 2.37 if consistent. If it is far below the mean, a few runs are very overconfident.
   double position_nees = 0.0;     // NEES of (x, y): 2 if the mapper is consistent.
   double heading_nees = 0.0;      // 1 where consistent.
   double position_error_m = 0.0;  // Root mean square, of both axes together.

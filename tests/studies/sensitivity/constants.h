@@ -1,5 +1,5 @@
 // The constants whose influence the study measures: options and fields that are not options, each with a name
-// and a way to change it. What a constant is for stands beside its field. Stateless.
+// and a way to change it. The comment of each field says what it is for. Stateless.
 #pragma once
 
 #include <cstdint>

@@ -66,8 +66,8 @@ class Sensitivity {
     [[nodiscard]] bool measured() const { return !effects[0].groups.empty() || !effects[1].groups.empty(); }
   };
 
-  // As `measure` says, unless it was measured before. With --log, only these logs are run; the others show
-  // what is known, if anything (no figures).
+  // The figures that `measure` returns, unless they were measured before. With --log, only these logs are run; the
+  // others show what is known, if anything (no figures).
   template <typename Measure>
   Figures Once(const Case& one, const std::string& what, const Measure& measure) {
     const std::string key = KindOf(one.runs) + " | " + one.name + " | " + what;

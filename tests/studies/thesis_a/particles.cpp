@@ -46,8 +46,8 @@ void SweepLog(StudyContext& context, const StudyLog& log, bool lines_only) {
   Report& report = context.report;
   const int seeds = context.Pick(log.scans() > 5000 ? 3 : 5, 1);
   const std::string system = lines_only ? "lines only" : "as shipped", tag = lines_only ? "_lines" : "";
-  Table table({"particles (" + log.name + ", " + system + ")", "thesis mean (s)", "thesis max (s)", "ours mean (s)",
-               "ours max (s)", "online error (m)", "online (deg)", "full error (m)", "full (deg)"});
+  Table table({"particles (" + log.name + ", " + system + ")", "thesis mean (s)", "thesis max (s)", "Cairn mean (s)",
+               "Cairn max (s)", "online error (m)", "online (deg)", "full error (m)", "full (deg)"});
   Plot metres{
       .title = "Mean position error against particles, " + log.name + ", " + system + " (band: worst and best trial)",
       .x = {"particles", ""},
@@ -59,8 +59,8 @@ void SweepLog(StudyContext& context, const StudyLog& log, bool lines_only) {
   Plot times{.title = "Time per scan against particles, " + log.name + ", " + system + " (thesis: Table 5.18)",
              .x = {"particles", ""},
              .y = {"time", "s", true}};
-  times.series = {{.label = "ours, mean"},
-                  {.label = "ours, max"},
+  times.series = {{.label = "Cairn, mean"},
+                  {.label = "Cairn, max"},
                   {.label = "thesis, mean", .mark = Mark::kDashed},
                   {.label = "thesis, max", .mark = Mark::kDashed}};
   double first_mean = 0.0, last_mean = 0.0;

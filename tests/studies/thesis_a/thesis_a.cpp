@@ -32,8 +32,8 @@ void RunThesisA(StudyContext& context) {
   if (context.Wants("view")) StudyFieldOfView(context, logs);
 }
 
-const Registration kRegistered{"thesis-a", "lines, matching and FastSLAM beside the tables and figures of thesis A",
-                               RunThesisA};
+const Registration kRegistered{
+    "thesis-a", "lines, matching and FastSLAM, compared with the tables and figures of thesis A", RunThesisA};
 
 }  // namespace
 }  // namespace cairn::studies

@@ -33,7 +33,7 @@ void StudyLineExtraction(StudyContext& context);
 // points.
 void StudyPoseFromPairs(StudyContext& context);
 
-// 3.7: the ways to draw an occupancy grid, printed and ours, along a simulated robot's true path.
+// 3.7: the ways of the thesis and of Cairn to draw an occupancy grid, along a simulated robot's true path.
 void StudyGridModels(StudyContext& context);
 
 // 5.1-5.6, Tables 5.15-5.17, Figures 5.35-5.37: matching alone, with landmark correction, with FastSLAM in

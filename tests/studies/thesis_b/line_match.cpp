@@ -73,15 +73,15 @@ struct Placings {
 
 // The two ways to pair over the same scans.
 struct BothPlacings {
-  Placings ours, printed;
+  Placings usual, printed;
 
   BothPlacings() { printed.options.pairing = slam::LineMatchPairing::kRecursive; }
   void Add(const std::vector<MapLine>& map, const Scan& scan, const Pose2& truth) {
-    ours.Add(map, scan, truth);
+    usual.Add(map, scan, truth);
     printed.Add(map, scan, truth);
   }
   void AddTo(Table& table, const std::string& name, std::size_t map_lines) const {
-    ours.AddTo(table, name, map_lines);
+    usual.AddTo(table, name, map_lines);
     printed.AddTo(table, name + ", as printed", map_lines);
   }
 };
@@ -238,8 +238,8 @@ void InSimulation(StudyContext& context, Table& placed, Table& followed) {
     for (const Pose2& place : PlacesAlong(*world, context.Pick(80, 16)))
       placings.Add(map, scene.Look(place, Sick(0.01), random), place);
     placings.AddTo(placed, name, map.size());
-    right += placings.ours.right;
-    wrong += placings.ours.wrong;
+    right += placings.usual.right;
+    wrong += placings.usual.wrong;
 
     sim::FleetOptions fleet;
     fleet.seed = context.seed;
@@ -285,7 +285,7 @@ void OnLog(StudyContext& context, const StudyLog& log, Table& placed, Table& fol
   }
   nothing_known.AddTo(placed, log.name + ", longest lines", longest.size());
   region_known.AddTo(placed, log.name + ", lines within 15 m",
-                     static_cast<std::size_t>(region_lines / std::max(region_known.ours.queries, 1)));
+                     static_cast<std::size_t>(region_lines / std::max(region_known.usual.queries, 1)));
   const Followed along = Follow(context, log, truth, std::make_shared<const std::vector<MapLine>>(map));
   AddFollowed(followed, log.name, along, map.size());
   // The map was made from the first half only, so it does not contain what only the second half shows.

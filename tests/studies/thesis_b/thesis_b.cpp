@@ -34,7 +34,7 @@ void RunThesisB(StudyContext& context) {
 }
 
 const Registration kRegistered{
-    "thesis-b", "the line matcher by least squares beside Table 5.1 and the figures of thesis B", RunThesisB};
+    "thesis-b", "matching of lines by least squares, compared with Table 5.1 and the figures of thesis B", RunThesisB};
 
 }  // namespace
 }  // namespace cairn::studies

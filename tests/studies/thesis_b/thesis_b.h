@@ -24,7 +24,7 @@ void StudyAssociation(StudyContext& context);
 void StudyTracking(StudyContext& context, const std::vector<StudyLog>& logs);
 
 // 2.2.2: the place in a known map of lines from nothing, and followed with odometry, in the simulated worlds
-// and on the logs at hand.
+// and on the available logs.
 void StudyLineMatch(StudyContext& context);
 
 // The lines as one series of a plot, the pen lifted between them; moved by T.

@@ -23,7 +23,8 @@ void RunThesisC(StudyContext& context) {
     if (context.Wants(part.name)) part.run(context);
 }
 
-const Registration kRegistered{"thesis-c", "NDT and differential evolution beside the figures of thesis C", RunThesisC};
+const Registration kRegistered{"thesis-c", "NDT and differential evolution, compared with the figures of thesis C",
+                               RunThesisC};
 
 }  // namespace
 }  // namespace cairn::studies

@@ -40,8 +40,9 @@ TEST(LineLsq, AlignsTwoPlacesOfACorridorWhereTheFirstPairsAloneFail) {
   once.max_rounds = 1;
   const LineLsqMatch first = MatchLinesByLeastSquares(prev, curr, nothing_known, once);
   const LineLsqMatch match = MatchLinesByLeastSquares(prev, curr, nothing_known, {});
-  std::printf("B1 alone: error %.3f; with association in %d rounds: %.4f\n", ErrorOf(first.result.T_ref_curr, motion),
-              match.result.iterations, ErrorOf(match.result.T_ref_curr, motion));
+  std::printf("one round of association: error %.3f; with association in %d rounds: %.4f\n",
+              ErrorOf(first.result.T_ref_curr, motion), match.result.iterations,
+              ErrorOf(match.result.T_ref_curr, motion));
   EXPECT_GT(ErrorOf(first.result.T_ref_curr, motion), 0.1);
   ASSERT_TRUE(match.result.converged);
   EXPECT_LT(ErrorOf(match.result.T_ref_curr, motion), 0.02);

@@ -2,6 +2,7 @@
 // change the planar estimate, they get poses, and the cloud made of them lies on the walls.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <iostream>
 
 #include "client/sim/cloud_error.h"
@@ -92,6 +93,11 @@ TEST(TiltedScans, GetAPoseFromOdometryAndSaySo) {
     EXPECT_TRUE(outcome.localized);
     EXPECT_EQ(outcome.reason, PoseReason::kOdometryOnly);
     EXPECT_TRUE(IsCovariance(outcome.covariance));
+    // The uncertainty of the odometry since the last level scan is added.
+    const auto level = std::find_if(run.level.rbegin(), run.level.rend(),
+                                    [&outcome](const ScanOutcome& o) { return o.stamp < outcome.stamp; });
+    ASSERT_NE(level, run.level.rend());
+    EXPECT_GT(outcome.covariance.trace(), level->covariance.trace());
     const auto truth = PoseOn(drive.truth, outcome.stamp, 1.0);
     ASSERT_TRUE(truth);
     EXPECT_LT((outcome.T_map_robot.translation() - truth->translation()).norm(), 0.1);

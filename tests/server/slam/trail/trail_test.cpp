@@ -127,7 +127,7 @@ TEST(Trail, ARevisitIsARelationWithItsOwnCovarianceAndAShorterWay) {
   EXPECT_EQ(revisit->from, 0U);
   EXPECT_EQ(revisit->to, 3U);
   EXPECT_EQ(revisit->T_from_to, seen);
-  EXPECT_EQ(revisit->covariance, covariance);
+  EXPECT_TRUE(revisit->covariance.isApprox(covariance, 1e-3)) << revisit->covariance;
   EXPECT_NEAR(trail.distances_m()[0], 1.0, 1e-12);
   EXPECT_NEAR(trail.distances_m()[1], 2.0, 1e-12);
   for (const PoseRelation& relation : relations) {
@@ -140,11 +140,11 @@ TEST(Trail, ARevisitIsARelationWithItsOwnCovarianceAndAShorterWay) {
 }
 
 TEST(Trail, ALoopChangesThePathOnlyOnceItIsAdded) {
-  Trail trail = Square();
+  Trail trail = Square(0.04 * Eigen::Matrix3d::Identity());
   std::vector<Pose2> path(kSquare.begin(), kSquare.end());
   // The last keyframe was seen 0.5 m farther on than the steps say.
   const PoseRelation loop{0, 3, Between(kSquare[0], kSquare[3] * Pose2{0.5, 0.0, 0.0}),
-                          1e-8 * Eigen::Matrix3d::Identity(), true};
+                          1e-4 * Eigen::Matrix3d::Identity(), true};
   const auto closed = trail.PathWithLoop(loop, path, PoseGraphOptions{});
   ASSERT_TRUE(closed);
   EXPECT_LT(Between(kSquare[3] * Pose2{0.5, 0.0, 0.0}, closed->back()).translation().norm(), 0.05);

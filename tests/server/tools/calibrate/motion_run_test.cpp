@@ -42,8 +42,8 @@ TEST(MotionRun, RecoversTheInjectedModelFromALog) {
     EXPECT_NEAR(fit.sigma_d, truth.sigma_d, std::max(0.012, 0.2 * truth.sigma_d)) << k;
     EXPECT_NEAR(fit.sigma_b, truth.sigma_b, std::max(0.012, 0.2 * truth.sigma_b)) << k;
   }
-  ASSERT_TRUE(report->match_honesty);
-  EXPECT_LT(*report->match_honesty, 1.5) << "a match that overstates itself would make the robot look bad";
+  ASSERT_TRUE(report->match_error_ratio);
+  EXPECT_LT(*report->match_error_ratio, 1.5) << "a match that overstates itself would make the robot look bad";
   ASSERT_TRUE(report->matcher);
   EXPECT_LT(report->matcher->model.along.Sigma(0.3), 0.02);
   EXPECT_LT(report->matcher->model.turn.Sigma(0.1), 0.005);

@@ -1,0 +1,67 @@
+// Bytes: the length of the main part and the main part; then, until the end, the length and the bytes of each shared
+// value, in the order of their numbers.
+#include "server/slam/state/archive.h"
+
+namespace cairn::slam {
+namespace {
+
+void AppendPart(std::string& bytes, const std::string& part) {
+  const std::uint64_t size = part.size();
+  bytes.append(reinterpret_cast<const char*>(&size), sizeof(size));
+  bytes += part;
+}
+
+}  // namespace
+
+std::string StateWriter::Bytes() const {
+  std::string bytes;
+  AppendPart(bytes, bytes_);
+  StateWriter writer;
+  for (const Immutable& shared : immutable_) {
+    writer.bytes_.clear();
+    shared.write(writer, shared.value.get());
+    AppendPart(bytes, writer.bytes_);
+  }
+  return bytes;
+}
+
+StateReader::StateReader(std::string_view bytes) : rest_(bytes) {
+  const auto part = [this] {
+    std::uint64_t size = 0;
+    Get(size);
+    Require(size <= rest_.size(), "a length");
+    const std::string_view read = rest_.substr(0, ok() ? size : 0);
+    rest_.remove_prefix(read.size());
+    return read;
+  };
+  const std::string_view main = part();
+  while (ok() && !rest_.empty()) immutable_.push_back({part(), nullptr, nullptr});
+  rest_ = ok() ? main : std::string_view{};
+}
+
+bool StateReader::Require(bool holds, const char* what) {
+  if (!holds && ok()) {
+    failed_ = what;
+    rest_ = {};
+  }
+  return ok();
+}
+
+void StateReader::Raw(void* data, std::size_t size) {
+  if (size == 0) return;
+  if (size > rest_.size()) {
+    std::memset(data, 0, size);
+    Require(false, "the length");
+    return;
+  }
+  std::memcpy(data, rest_.data(), size);
+  rest_.remove_prefix(size);
+}
+
+std::size_t StateReader::Size(std::size_t bytes_per_element) {
+  std::uint64_t size = 0;
+  Get(size);
+  return Require(size <= rest_.size() / bytes_per_element, "a number of elements") ? static_cast<std::size_t>(size) : 0;
+}
+
+}  // namespace cairn::slam

@@ -1,0 +1,347 @@
+// Writes the state of the estimator as bytes, and reads it back. Every class that has a state names its members once,
+//
+//   template <typename Archive>
+//   static void Members(Archive& archive, auto& self) { archive(self.pose_, self.path_); }
+//
+// and this list is used for both directions, so that they cannot disagree. Options are not part of the state: a state
+// is read into an object that was made with the same options (scan_pipeline.h checks that). `archive.Require` states
+// what the rest of the class relies on: indices, sizes. While reading, the first requirement that does not hold ends
+// the reading; what has been read by then must not be used.
+// Values that never change (std::shared_ptr<const T>: scans, parts of the map) are only noted by the writer; it shares
+// them until they are written in Bytes(), which another thread may do. Other shared nodes (SharedSequence) are written
+// once, and are shared again after reading. A value that never changes may not contain shared ones.
+// All numbers are little-endian. The same state gives the same bytes. Not thread-safe.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <concepts>
+#include <cstdint>
+#include <cstring>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <random>
+#include <set>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "common/geometry/pose2.h"
+#include "common/sensor/odometry.h"
+#include "common/sensor/scan.h"
+
+namespace cairn::slam {
+
+static_assert(std::endian::native == std::endian::little, "archives copy numbers as they are in memory");
+
+template <typename T>
+concept Number = std::is_arithmetic_v<T> || std::is_enum_v<T>;
+// Every element of a sequence of these may be copied as it is: any bits are a value.
+template <typename T>
+concept PlainNumber = std::is_arithmetic_v<T> && !std::same_as<T, bool>;
+template <typename T>
+concept FixedMatrix = std::is_base_of_v<Eigen::PlainObjectBase<T>, T> && T::SizeAtCompileTime != Eigen::Dynamic;
+template <typename T, typename Of>
+concept MaybeConst = std::same_as<std::remove_const_t<T>, Of>;
+
+// The members of values of `common`. A pose must be finite and within the bounds of odometry.
+template <typename Archive, MaybeConst<Pose2> Self>
+void MembersOf(Archive& archive, Self& pose) {
+  archive(pose.x, pose.y, pose.theta);
+  if constexpr (Archive::kReads)
+    archive.Require(pose.IsFinite() && std::abs(pose.x) <= 2e7 && std::abs(pose.y) <= 2e7, "a pose");
+}
+template <typename Archive, MaybeConst<Odometry> Self>
+void MembersOf(Archive& archive, Self& odometry) {
+  archive(odometry.sequence, odometry.stamp, odometry.T_odom_robot);
+}
+template <typename Archive, MaybeConst<Scan> Self>
+void MembersOf(Archive& archive, Self& scan) {
+  archive(scan.sequence, scan.stamp, scan.angle_first_rad, scan.angle_step_rad, scan.range_min_m, scan.range_max_m,
+          scan.beam_period_s, scan.tilt_rad, scan.T_robot_laser, scan.ranges_m);
+  if constexpr (Archive::kReads) archive.Require(ValidateScan(scan).has_value(), "a scan");
+}
+// The standard defines the text of a random engine.
+template <typename Archive, MaybeConst<std::mt19937_64> Self>
+void MembersOf(Archive& archive, Self& engine) {
+  std::stringstream stream;
+  std::string text;
+  if constexpr (!Archive::kReads) {
+    stream << engine;
+    text = stream.str();
+  }
+  archive(text);
+  if constexpr (Archive::kReads) {
+    stream.str(text);
+    stream >> engine;
+    archive.Require(!stream.fail(), "a random engine");
+  }
+}
+template <typename Archive, MaybeConst<Eigen::AlignedBox2d> Self>
+void MembersOf(Archive& archive, Self& box) {
+  archive(box.min(), box.max());
+}
+
+// The address of kKindOf<T> stands for the type T.
+template <typename T>
+inline constexpr char kKindOf = 0;
+
+class StateWriter {
+ public:
+  static constexpr bool kReads = false;
+
+  template <typename... Values>
+  void operator()(const Values&... values) {
+    (Put(values), ...);
+  }
+  bool Require(bool /*holds*/, const char* /*what*/) { return true; }
+  [[nodiscard]] static constexpr bool ok() { return true; }
+  void SetKeyframes(std::size_t /*count*/) {}
+  void RequireKeyframe(std::size_t /*index*/) {}
+
+  // Writes which of the shared nodes this is; `shape` (not 0) is what is known of its content. True if it is new: its
+  // content must follow.
+  template <typename Node>
+  bool Shared(const std::shared_ptr<void>& node, std::uint64_t shape) {
+    NodeSeen& seen = nodes_[node.get()];
+    const bool fresh = seen.shape != shape;
+    if (fresh) seen = {next_node_++, shape};
+    Put(seen.id);
+    return fresh;
+  }
+
+  // Everything written so far, with the immutable values that it shares. They are written here, so that the time is
+  // spent by whoever calls this. May be called from any thread, if nothing is written any more.
+  [[nodiscard]] std::string Bytes() const;
+
+ private:
+  struct NodeSeen {
+    std::uint32_t id = 0;
+    std::uint64_t shape = 0;
+  };
+  struct Immutable {
+    std::shared_ptr<const void> value;
+    void (*write)(StateWriter& writer, const void* value);
+  };
+
+  void Raw(const void* data, std::size_t size) { bytes_.append(static_cast<const char*>(data), size); }
+
+  template <typename T>
+  void Put(const T& value) {
+    if constexpr (Number<T>) {
+      Raw(&value, sizeof(value));
+    } else if constexpr (FixedMatrix<T>) {
+      Raw(value.data(), sizeof(typename T::Scalar) * T::SizeAtCompileTime);
+    } else if constexpr (requires { T::Members(*this, value); }) {
+      T::Members(*this, value);
+    } else {
+      MembersOf(*this, value);
+    }
+  }
+  template <typename T>
+  void Put(const std::shared_ptr<const T>& value) {
+    const auto [seen, fresh] = immutable_ids_.try_emplace(value.get(), static_cast<std::uint32_t>(immutable_.size()));
+    if (fresh)
+      immutable_.push_back(
+          {value, [](StateWriter& writer, const void* data) { writer.Put(*static_cast<const T*>(data)); }});
+    Put(seen->second);
+  }
+  template <typename T>
+  void Put(const std::optional<T>& value) {
+    Put(value.has_value());
+    if (value) Put(*value);
+  }
+  template <typename T, std::size_t N>
+  void Put(const std::array<T, N>& values) {
+    if constexpr (PlainNumber<T>) return Raw(values.data(), sizeof(values));
+    for (const T& value : values) Put(value);
+  }
+  template <typename T>
+  void Put(const std::vector<T>& values) {
+    if constexpr (PlainNumber<T>) {
+      Put(static_cast<std::uint64_t>(values.size()));
+      Raw(values.data(), values.size() * sizeof(T));
+    } else {
+      PutEach(values);
+    }
+  }
+  template <typename T>
+  void Put(const std::deque<T>& values) {
+    PutEach(values);
+  }
+  template <typename T>
+  void Put(const std::set<T>& values) {
+    PutEach(values);
+  }
+  void Put(const std::string& text) {
+    Put(static_cast<std::uint64_t>(text.size()));
+    Raw(text.data(), text.size());
+  }
+  template <typename Values>
+  void PutEach(const Values& values) {
+    Put(static_cast<std::uint64_t>(values.size()));
+    for (const auto& value : values) Put(value);
+  }
+
+  std::string bytes_;
+  std::unordered_map<const void*, NodeSeen> nodes_;
+  std::uint32_t next_node_ = 0;
+  std::unordered_map<const void*, std::uint32_t> immutable_ids_;
+  std::vector<Immutable> immutable_;
+};
+
+class StateReader {
+ public:
+  static constexpr bool kReads = true;
+
+  // `bytes` are the result of StateWriter::Bytes, or anything else; they must outlive the reader.
+  explicit StateReader(std::string_view bytes);
+
+  template <typename... Values>
+  void operator()(Values&... values) {
+    (Get(values), ...);
+  }
+  // Fails if `holds` is false; `what` names what is wrong. Returns whether nothing has failed so far.
+  bool Require(bool holds, const char* what);
+  [[nodiscard]] bool ok() const { return failed_ == nullptr; }
+  // What is wrong, if something is.
+  [[nodiscard]] const char* failed() const { return failed_; }
+  // Whether everything has been read.
+  [[nodiscard]] bool done() const { return ok() && rest_.empty(); }
+
+  // The number of keyframes, to which the indices that follow must belong.
+  void SetKeyframes(std::size_t count) { keyframes_ = count; }
+  void RequireKeyframe(std::size_t index) { Require(index < keyframes_, "the number of a keyframe"); }
+  [[nodiscard]] std::size_t keyframes() const { return keyframes_; }
+
+  // Sets the node to the one that was written. True if it is new: its content must follow.
+  template <typename Node>
+  bool Shared(std::shared_ptr<void>& node, std::uint64_t shape) {
+    std::uint32_t id = 0;
+    Get(id);
+    if (!Require(id <= nodes_.size(), "a shared node")) return false;
+    if (id < nodes_.size()) {
+      if (Require(nodes_[id].kind == &kKindOf<Node> && nodes_[id].shape == shape, "the kind of a shared node"))
+        node = nodes_[id].node;
+      return false;
+    }
+    node = std::make_shared<Node>();
+    nodes_.push_back({node, &kKindOf<Node>, shape});
+    return true;
+  }
+
+ private:
+  struct NodeRead {
+    std::shared_ptr<void> node;
+    const char* kind = nullptr;
+    std::uint64_t shape = 0;
+  };
+  struct Immutable {
+    std::string_view bytes;
+    std::shared_ptr<const void> value;  // Null until it is needed for the first time.
+    const char* kind = nullptr;
+  };
+
+  void Raw(void* data, std::size_t size);
+  // The size of a sequence whose elements take at least one byte each.
+  [[nodiscard]] std::size_t Size(std::size_t bytes_per_element);
+
+  template <typename T>
+  void Get(T& value) {
+    if constexpr (std::same_as<T, bool>) {
+      std::uint8_t byte = 0;
+      Raw(&byte, 1);
+      Require(byte <= 1, "a flag");
+      value = byte == 1;
+    } else if constexpr (Number<T>) {
+      Raw(&value, sizeof(value));
+    } else if constexpr (FixedMatrix<T>) {
+      Raw(value.data(), sizeof(typename T::Scalar) * T::SizeAtCompileTime);
+      Require(value.allFinite(), "a matrix");
+    } else if constexpr (requires { T::Members(*this, value); }) {
+      T::Members(*this, value);
+    } else {
+      MembersOf(*this, value);
+    }
+  }
+  template <typename T>
+  void Get(std::shared_ptr<const T>& value) {
+    std::uint32_t id = 0;
+    Get(id);
+    if (!Require(id < immutable_.size(), "a shared value")) return;
+    Immutable& shared = immutable_[id];
+    if (!shared.value) {
+      auto read = std::make_shared<T>();
+      const std::string_view rest = std::exchange(rest_, shared.bytes);
+      Get(*read);
+      Require(rest_.empty(), "the length of a shared value");
+      rest_ = ok() ? rest : std::string_view{};
+      if (!ok()) return;
+      shared.value = std::move(read);
+      shared.kind = &kKindOf<T>;
+    }
+    if (Require(shared.kind == &kKindOf<T>, "the kind of a shared value"))
+      value = std::static_pointer_cast<const T>(shared.value);
+  }
+  template <typename T>
+  void Get(std::optional<T>& value) {
+    bool has = false;
+    Get(has);
+    value.reset();
+    if (has) Get(value.emplace());
+  }
+  template <typename T, std::size_t N>
+  void Get(std::array<T, N>& values) {
+    if constexpr (PlainNumber<T>) return Raw(values.data(), sizeof(values));
+    for (T& value : values) Get(value);
+  }
+  template <typename T>
+  void Get(std::vector<T>& values) {
+    if constexpr (PlainNumber<T>) {
+      values.resize(Size(sizeof(T)));
+      Raw(values.data(), values.size() * sizeof(T));
+    } else {
+      GetEach(values);
+    }
+  }
+  template <typename T>
+  void Get(std::deque<T>& values) {
+    GetEach(values);
+  }
+  template <typename T>
+  void Get(std::set<T>& values) {
+    values.clear();
+    const std::size_t size = Size(1);
+    for (std::size_t i = 0; i < size && ok(); ++i) {
+      T value{};
+      Get(value);
+      values.insert(value);
+    }
+  }
+  void Get(std::string& text) {
+    text.resize(Size(1));
+    Raw(text.data(), text.size());
+  }
+  template <typename Values>
+  void GetEach(Values& values) {
+    values.clear();
+    const std::size_t size = Size(1);
+    for (std::size_t i = 0; i < size && ok(); ++i) Get(values.emplace_back());
+  }
+
+  std::string_view rest_;
+  const char* failed_ = nullptr;
+  std::size_t keyframes_ = 0;
+  std::vector<NodeRead> nodes_;
+  std::vector<Immutable> immutable_;
+};
+
+}  // namespace cairn::slam
