@@ -54,7 +54,7 @@ TYPED_TEST(Keys, ThatAreRetiredMakeRoomForOthers) {
     ASSERT_TRUE(publication->Publish(value)) << robot;
     // A sample that nobody has acknowledged yet would be lost with its instance.
     if (robot % 64 == 0) {
-      ASSERT_TRUE(publication->WaitForAcknowledgement(kDeadline)) << robot << " " << received;
+      ASSERT_TRUE(publication->WaitForAcknowledgement(kDeadline)) << robot << " " << received << " refused " << this->receiver_->datagrams_refused() << " " << this->sender_->datagrams_refused();
       for (std::uint64_t old = robot - 63; old <= robot; ++old)
         ASSERT_TRUE(publication->Retire(OfRobot<TypeParam>(old))) << old;
     }
