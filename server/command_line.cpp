@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/options/config.h"
+#include "common/service/names.h"
 #include "common/version.h"
 #include "common/wire/wire_arguments.h"
 #include "server/known_map.h"
@@ -22,6 +23,19 @@ bool Complain(const Result<void>& result) {
 }
 
 }  // namespace
+
+void Visit(OptionVisitor& visitor, CairndOptions& options) {
+  Visit(visitor, options.server);
+  visitor.Section("wire", "The DDS network.", [&] { wire::Visit(visitor, options.wire); });
+}
+
+Result<void> Validate(const CairndOptions& options) {
+  if (auto valid = wire::Validate(options.wire); !valid) return valid;
+  for (const std::string& site : options.server.server.site_names())
+    if (auto valid = ValidateName("server.sites", site); !valid) return valid;
+  CairndOptions copy = options;
+  return CheckRules([&copy](OptionVisitor& visitor) { Visit(visitor, copy); });
+}
 
 std::optional<CommandLine> ParseCommandLine(int argc, char** argv, int& exit_code) {
   CLI::App app("Cairn's server: takes laser scans of robots over DDS, answers with poses and the map they share.",

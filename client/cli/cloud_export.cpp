@@ -78,14 +78,10 @@ void AddCloudExport(CLI::App& cloud, Program& program) {
   command->add_flag("--smoothed", arguments->smoothed,
                     "Take the path of the enabled smoothing job instead of the live one");
   command->add_option("--trajectory", arguments->trajectory, "TUM file with the path")->type_name("FILE");
-  command->add_option("--height", options.cloud.height_m, "Height of the scanner above the floor")
-      ->check(InRange(-1000.0, 1000.0))
-      ->type_name("METRES")
-      ->capture_default_str();
-  command->add_option("--voxel", options.cloud.voxel_m, "Keep one point per cube of this size; 0: all")
-      ->check(InRange(0.0, 100.0))
-      ->type_name("METRES")
-      ->capture_default_str();
+  AddNumber(*command, "--height", options.cloud.height_m, -1000.0, 1000.0, "Height of the scanner above the floor",
+            "METRES");
+  AddNumber(*command, "--voxel", options.cloud.voxel_m, 0.0, 100.0, "Keep one point per cube of this size; 0: all",
+            "METRES");
   command->add_option("--max-range", options.cloud.max_range_m, "Leave out hits farther away")
       ->check(CLI::PositiveNumber)
       ->type_name("METRES");

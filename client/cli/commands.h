@@ -1,5 +1,5 @@
-// The subcommands of `cairn`, one per file. Each function adds the options of its command to the command line and names
-// the work to do when the command is chosen (Program::OnChosen).
+// The subcommands of `cairn`, one file per thing they are about. Each function adds the options of its command to the
+// command line and names the work to do when the command is chosen (Program::OnChosen).
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -18,18 +18,10 @@ void AddPing(CLI::App& app, Program& program);
 void AddCheckLog(CLI::App& app, Program& program);
 void AddEval(CLI::App& app, Program& program);
 
-void AddMap(CLI::App& app, Program& program);  // Adds the four below.
-void AddMapInfo(CLI::App& map, Program& program);
-void AddMapExport(CLI::App& map, Program& program);
-void AddMapEnable(CLI::App& map, Program& program);  // Adds `map enable` and `map rollback`.
+void AddMap(CLI::App& app, Program& program);  // All commands of maps; `map draw` is a file of its own.
 void AddMapDraw(CLI::App& map, Program& program);
-
-void AddJob(CLI::App& app, Program& program);  // Adds the two below.
-void AddJobSmooth(CLI::App& job, Program& program);
-void AddJobQueries(CLI::App& job, Program& program);  // Adds `job list`, `job show` and `job cancel`.
-
-void AddCloud(CLI::App& app, Program& program);  // cloud export.
-
+void AddJob(CLI::App& app, Program& program);
+void AddCloud(CLI::App& app, Program& program);
 void AddSession(CLI::App& app, Program& program);
 
 }  // namespace cairn::client

@@ -3,11 +3,12 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
-#include <charconv>
 #include <functional>
 #include <sstream>
 #include <string>
 
+#include "common/options/number_text.h"
+#include "common/sensor/log_reader.h"
 #include "common/status.h"
 
 namespace cairn::client {
@@ -38,11 +39,37 @@ inline CLI::Validator InRange(double least, double most) {
   return CLI::Validator(
       [=](std::string& text) {
         double value = 0.0;
-        const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-        const bool good = error == std::errc() && end == text.data() + text.size() && value >= least && value <= most;
+        const bool good = ParseNumber(text, value) && value >= least && value <= most;
         return good ? std::string() : "'" + text + "' is not a number from " + range;
       },
       "");
+}
+
+// An option that takes a number of the range and shows its default; `unit` stands for the number in the help.
+template <typename Number>
+CLI::Option* AddNumber(CLI::App& app, const std::string& name, Number& value, double least, double most,
+                       const std::string& help, const std::string& unit = CLI::detail::type_name<Number>()) {
+  return app.add_option(name, value, help)->check(InRange(least, most))->type_name(unit)->capture_default_str();
+}
+
+// The options of commands that read a log. They tell what the file itself does not contain.
+inline void AddLogOptions(CLI::App& command, LogReaderOptions& options) {
+  command
+      .add_option("--no-return", options.no_return_m,
+                  "A range of this length or more hit nothing; 0: find the limit from the log")
+      ->check(CLI::NonNegativeNumber)
+      ->type_name("METRES");
+  command
+      .add_option("--laser-forward", options.dpslam_laser_forward_m,
+                  "DP-SLAM logs: distance of the laser ahead of the pivot")
+      ->type_name("METRES")
+      ->capture_default_str();
+  command
+      .add_option("--scan-period", options.dpslam_scan_period_s,
+                  "DP-SLAM logs, which have no stamps: time between two scans")
+      ->check(CLI::PositiveNumber)
+      ->type_name("SECONDS")
+      ->capture_default_str();
 }
 
 }  // namespace cairn::client

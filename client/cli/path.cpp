@@ -2,7 +2,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/json_output.h"
-#include "common/sensor/stamp_text.h"
+#include "common/sensor/stamp.h"
 
 namespace cairn::client {
 namespace {

@@ -8,7 +8,7 @@
 #include "client/cli/option_checks.h"
 #include "client/cli/text_output.h"
 #include "client/lib/pose_client.h"
-#include "common/sensor/stamp_text.h"
+#include "common/sensor/stamp.h"
 
 namespace cairn::client {
 namespace {

@@ -12,11 +12,17 @@
 #include <utility>
 #include <vector>
 
-#include "client/cli/exit_code.h"
 #include "client/lib/query_client.h"
 #include "common/wire/bus.h"
 
 namespace cairn::client {
+
+// The exit codes of the program. Scripts may rely on these numbers.
+enum class ExitCode : int {
+  kOk = 0,
+  kFailed = 1,  // The command was understood but failed: refused, not found, no server, unexplained scans.
+  kUsage = 2,   // The command line is wrong.
+};
 
 struct GlobalOptions {
   wire::WireOptions wire;

@@ -6,13 +6,11 @@
 #include "client/cli/commands.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/json_output.h"
-#include "client/cli/log_options.h"
 #include "client/cli/option_checks.h"
 #include "client/cli/pacer.h"
 #include "client/cli/progress_line.h"
 #include "client/cli/quantity_text.h"
 #include "client/cli/robot_stream.h"
-#include "client/cli/window_option.h"
 #include "common/service/start_pose.h"
 
 namespace cairn::client {
@@ -127,9 +125,7 @@ void AddReplay(CLI::App& app, Program& program) {
   command->add_option("--site", arguments->stream.site, "The site to map into")->required();
   command->add_option("--robot", arguments->stream.robot, "The robot's name")->required();
   command->add_option("--sensor", arguments->stream.sensor, "The scanner's name")->capture_default_str();
-  auto* rate = command->add_option("--rate", arguments->rate, "How many times faster than the log's stamps")
-                   ->check(InRange(1e-3, 1e6))
-                   ->capture_default_str();
+  auto* rate = AddNumber(*command, "--rate", arguments->rate, 1e-3, 1e6, "How many times faster than the log's stamps");
   command->add_flag("--fast", arguments->fast, "As fast as the server takes it, without losing a scan")->excludes(rate);
   AddWindowOption(*command, arguments->stream.window);
   AddParsed(*command, "--start", arguments->stream.T_map_robot_start, ParseStart,

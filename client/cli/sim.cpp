@@ -6,10 +6,9 @@
 #include "client/cli/json_output.h"
 #include "client/cli/option_checks.h"
 #include "client/cli/quantity_text.h"
+#include "client/cli/robot_stream.h"
 #include "client/cli/sim_run.h"
-#include "client/cli/sim_sensor_options.h"
-#include "client/cli/window_option.h"
-#include "client/sim/laser_models.h"
+#include "client/sim/laser.h"
 #include "client/sim/shipped_worlds.h"
 
 namespace cairn::client {
@@ -106,12 +105,10 @@ void AddSim(CLI::App& app, Program& program) {
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
   command->add_option("--prefix", options->prefix, "Robots are called PREFIX1, PREFIX2, ...")->capture_default_str();
-  command->add_option("--seconds", options->seconds, "Simulated time")->check(InRange(0.1, 1e6))->capture_default_str();
+  AddNumber(*command, "--seconds", options->seconds, 0.1, 1e6, "Simulated time");
   command->add_option("--seed", options->fleet.seed, "Seed of all random numbers")->capture_default_str();
   AddSensorOptions(*command, options->fleet, arguments->laser_model);
-  auto* rate = command->add_option("--rate", options->rate, "How many times faster than real time")
-                   ->check(InRange(1e-3, 1e4))
-                   ->capture_default_str();
+  auto* rate = AddNumber(*command, "--rate", options->rate, 1e-3, 1e4, "How many times faster than real time");
   command->add_flag("--fast", options->fast, "As fast as the server takes it, without losing a scan")->excludes(rate);
   AddWindowOption(*command, options->window);
   command->add_flag("!--no-stream", options->stream, "Only write the files; no server is needed");

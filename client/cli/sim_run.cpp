@@ -1,18 +1,19 @@
 #include "client/cli/sim_run.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
+#include <string>
 
-#include "client/cli/cpu_time.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/pacer.h"
 #include "client/cli/progress_line.h"
 #include "client/cli/robot_stream.h"
-#include "client/cli/window_option.h"
 #include "client/sim/shipped_worlds.h"
 #include "common/sensor/carmen_writer.h"
 
@@ -168,6 +169,21 @@ Result<SimReport> RunSim(Program& program, const SimRunOptions& options) {
   report.latency_max_ms = latency_ms.At(1.0);
   if (auto written = WriteTruth(options, *fleet, *outlets); !written) return tl::unexpected(written.error());
   return report;
+}
+
+std::optional<double> CpuSecondsOf(int pid) {
+  std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
+  std::string line;
+  if (!std::getline(file, line)) return std::nullopt;
+  // The second field is the name in parentheses and may hold spaces; utime and stime are the 14th and 15th (proc(5)).
+  const auto name_end = line.rfind(')');
+  if (name_end == std::string::npos) return std::nullopt;
+  std::istringstream fields(line.substr(name_end + 1));
+  std::string skipped;
+  for (int i = 3; i < 14; ++i) fields >> skipped;
+  double user = 0.0, system = 0.0;
+  if (!(fields >> user >> system)) return std::nullopt;
+  return (user + system) / static_cast<double>(sysconf(_SC_CLK_TCK));
 }
 
 }  // namespace cairn::client

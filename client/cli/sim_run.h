@@ -1,6 +1,7 @@
 // Streams a simulated fleet into one site: paces it, keeps the truth, and reports what became of every scan.
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -49,5 +50,13 @@ struct SimReport {
 };
 
 [[nodiscard]] Result<SimReport> RunSim(Program& program, const SimRunOptions& options);
+
+// The processor time that a process has used, read from /proc; load tests print it for the server. Seconds of all its
+// threads, user and system; nothing where there is no such process.
+[[nodiscard]] std::optional<double> CpuSecondsOf(int pid);
+
+// The options of `cairn sim` that say what the robots carry: laser, tilting mount, wheels.
+// `laser_model` gets the name given with --laser-model; where it stays empty, the laser's single options count.
+void AddSensorOptions(CLI::App& command, sim::FleetOptions& fleet, std::string& laser_model);
 
 }  // namespace cairn::client

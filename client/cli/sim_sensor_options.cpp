@@ -1,10 +1,9 @@
-#include "client/cli/sim_sensor_options.h"
-
 #include <cmath>
 #include <vector>
 
 #include "client/cli/option_checks.h"
-#include "client/sim/laser_models.h"
+#include "client/cli/sim_run.h"
+#include "client/sim/laser.h"
 
 namespace cairn::client {
 namespace {
@@ -22,15 +21,9 @@ void AddLaser(CLI::App& command, sim::LaserOptions& laser, std::string& model) {
       ->check(InRange(1.0, 360.0))
       ->type_name("DEGREES")
       ->excludes(named);
-  command.add_option("--range", laser.range_max_m, "How far the scanner sees")
-      ->check(InRange(0.5, 1000.0))
-      ->type_name("METRES")
-      ->capture_default_str()
-      ->excludes(named);
-  command.add_option("--noise", laser.noise_m, "Standard deviation of a range, where --error is sigma")
-      ->check(InRange(0.0, 1.0))
-      ->type_name("METRES")
-      ->capture_default_str()
+  AddNumber(command, "--range", laser.range_max_m, 0.5, 1000.0, "How far the scanner sees", "METRES")->excludes(named);
+  AddNumber(command, "--noise", laser.error.sigma_m, 0.0, 1.0, "Standard deviation of a range, where --error is sigma",
+            "METRES")
       ->excludes(named);
   const auto names = sim::RangeErrorNames();
   command
@@ -38,36 +31,22 @@ void AddLaser(CLI::App& command, sim::LaserOptions& laser, std::string& model) {
           "--error",
           [&laser, names](const std::string& name) {
             for (std::size_t i = 0; i < names.size(); ++i)
-              if (names[i] == name) laser.error = static_cast<sim::RangeErrorKind>(i);
+              if (names[i] == name) laser.error.kind = static_cast<sim::RangeErrorKind>(i);
           },
           "How the range error is stated [sigma]")
       ->check(CLI::IsMember(std::vector<std::string>(names.begin(), names.end())))
       ->excludes(named);
-  command.add_option("--error-bound", laser.bound_m, "percent and step: largest error of a range")
-      ->check(InRange(0.0, 10.0))
-      ->type_name("METRES")
-      ->capture_default_str()
+  AddNumber(command, "--error-bound", laser.error.bound_m, 0.0, 10.0, "percent and step: largest error of a range",
+            "METRES")
       ->excludes(named);
-  command
-      .add_option("--error-share", laser.bound_share,
-                  "percent: this share of the range is added to the bound; step: beyond --error-step it replaces it")
-      ->check(InRange(0.0, 1.0))
-      ->capture_default_str()
+  AddNumber(command, "--error-share", laser.error.bound_share, 0.0, 1.0,
+            "percent: this share of the range is added to the bound; step: beyond --error-step it replaces it")
       ->excludes(named);
-  command
-      .add_option("--error-step", laser.step_m, "step: up to this range --error-bound holds, beyond it --error-share")
-      ->check(InRange(0.0, 1000.0))
-      ->type_name("METRES")
-      ->capture_default_str()
+  AddNumber(command, "--error-step", laser.error.step_m, 0.0, 1000.0,
+            "step: up to this range --error-bound holds, beyond it --error-share", "METRES")
       ->excludes(named);
-  command.add_option("--sweep", laser.sweep_s, "Time from a scan's first beam to its last")
-      ->check(InRange(0.0, 1.0))
-      ->type_name("SECONDS")
-      ->capture_default_str();
-  command.add_option("--laser-height", laser.height_m, "Height of the scanner above the floor")
-      ->check(InRange(0.0, 100.0))
-      ->type_name("METRES")
-      ->capture_default_str();
+  AddNumber(command, "--sweep", laser.sweep_s, 0.0, 1.0, "Time from a scan's first beam to its last", "SECONDS");
+  AddNumber(command, "--laser-height", laser.height_m, 0.0, 100.0, "Height of the scanner above the floor", "METRES");
 }
 
 void AddTilt(CLI::App& command, sim::TiltOptions& tilt) {
@@ -100,24 +79,13 @@ void AddTilt(CLI::App& command, sim::TiltOptions& tilt) {
 void AddSensorOptions(CLI::App& command, sim::FleetOptions& fleet, std::string& laser_model) {
   AddLaser(command, fleet.laser, laser_model);
   AddTilt(command, fleet.tilt);
-  command.add_option("--hz", fleet.scan_hz, "Scans per second")->check(InRange(0.1, 200.0))->capture_default_str();
-  command.add_option("--odometry-hz", fleet.odometry_hz, "Odometry samples per second")
-      ->check(InRange(0.1, 500.0))
-      ->capture_default_str();
-  command
-      .add_option("--slip", fleet.wheels.slip_m_per_sqrt_m, "Standard deviation of the random wheel error after 1 m")
-      ->check(InRange(0.0, 0.2))
-      ->type_name("METRES")
-      ->capture_default_str();
-  command
-      .add_option("--wheel-spread", fleet.wheel_spread.wheel_share,
-                  "Standard deviation of the systematic wheel size error, as a share")
-      ->check(InRange(0.0, 0.1))
-      ->capture_default_str();
-  command.add_option("--speed", fleet.drive.speed_m_s, "How fast robots drive")
-      ->check(InRange(0.05, 5.0))
-      ->type_name("M/S")
-      ->capture_default_str();
+  AddNumber(command, "--hz", fleet.scan_hz, 0.1, 200.0, "Scans per second");
+  AddNumber(command, "--odometry-hz", fleet.odometry_hz, 0.1, 500.0, "Odometry samples per second");
+  AddNumber(command, "--slip", fleet.wheels.slip_m_per_sqrt_m, 0.0, 0.2,
+            "Standard deviation of the random wheel error after 1 m", "METRES");
+  AddNumber(command, "--wheel-spread", fleet.wheel_spread.wheel_share, 0.0, 0.1,
+            "Standard deviation of the systematic wheel size error, as a share");
+  AddNumber(command, "--speed", fleet.drive.speed_m_s, 0.05, 5.0, "How fast robots drive", "M/S");
 }
 
 }  // namespace cairn::client

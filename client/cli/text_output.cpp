@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "client/cli/quantity_text.h"
-#include "common/sensor/stamp_text.h"
+#include "common/sensor/stamp.h"
 
 namespace cairn::client {
 namespace {

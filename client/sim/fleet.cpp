@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "client/sim/closed_path.h"
+#include "client/sim/world.h"
 
 namespace cairn::sim {
 namespace {

@@ -9,11 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "client/sim/closed_path.h"
 #include "client/sim/laser.h"
 #include "client/sim/robot.h"
 #include "client/sim/route_follower.h"
-#include "client/sim/surroundings.h"
+#include "client/sim/scene.h"
 #include "client/sim/tilt_mount.h"
 #include "client/sim/wheels.h"
 #include "client/sim/world.h"

@@ -1,40 +1,62 @@
 // A planar laser scanner in a simulated world: exact ray casts, then noise and dropouts.
-// A range is the true distance plus an error of one of three kinds (range_error.h), by default a normal one. A beam
+// A range is the true distance plus an error of one of three kinds (RangeErrorKind), by default a normal one. A beam
 // that hits nothing reads +infinity (ROS REP 117); a dropout reads 0, which carries no information. Beams start at the
 // scan's stamp and follow each other within `sweep_s`, while the robot moves. The scan plane may be tilted about the
 // laser's y axis, positive downwards, while all beams of a scan share one tilt. Frames: beams in `laser`, mounted at
 // T_robot_laser, `height_m` above the floor. Source: thesis C 4.3.2, 4.3.3.
 #pragma once
 
+#include <cstdint>
 #include <span>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "client/sim/random.h"
-#include "client/sim/range_error.h"
 #include "client/sim/ray_caster.h"
 #include "client/sim/scene.h"
 #include "common/sensor/scan.h"
+#include "common/status.h"
 
 namespace cairn::sim {
+
+// The three ways in which makers of laser scanners state a range's random error, and draws from them.
+// "+-e" is taken as a bound that no error exceeds, with all errors within it equally likely, because the makers state
+// no more than that. Source: thesis C 4.3.3.
+enum class RangeErrorKind : std::uint8_t {
+  kSigma = 0,  // Normal, standard deviation sigma_m + sigma_share * range.
+  kPercent,    // Within +-(bound_m + bound_share * range): a fixed number or a percentage, the other being 0.
+  kStep,       // Within +-bound_m up to step_m, within +-bound_share * range beyond.
+};
+// In the order of the enum: sigma, percent, step.
+[[nodiscard]] std::span<const std::string_view> RangeErrorNames();
+
+struct RangeError {
+  RangeErrorKind kind = RangeErrorKind::kSigma;
+  double sigma_m = 0.01;
+  double sigma_share = 0.001;  // Added per metre of range.
+  double bound_m = 0.01;
+  double bound_share = 0.01;
+  double step_m = 1.0;
+};
+[[nodiscard]] Result<void> Validate(const RangeError& error);
+
+// The half-width of what a draw may be, or its standard deviation for kSigma.
+[[nodiscard]] double ErrorScale(const RangeError& error, double range_m);
+[[nodiscard]] double DrawError(const RangeError& error, double range_m, Random& random);
 
 struct LaserOptions {
   int beams = 360;                            // 1..8192.
   double field_of_view_rad = Radians(270.0);  // Centred on the laser's x axis; a full turn has no beam twice.
   double range_min_m = 0.05;
   double range_max_m = 30.0;  // Farther walls are not seen.
-  RangeErrorKind error = RangeErrorKind::kSigma;
-  double noise_m = 0.01;       // kSigma: standard deviation at any range...
-  double noise_share = 0.001;  // ... and what is added to it per metre of range.
-  double bound_m = 0.01;       // kPercent, kStep: see range_error.h.
-  double bound_share = 0.01;
-  double step_m = 1.0;
+  RangeError error;
   double dropout_share = 0.002;  // Share of all beams, 0..1.
   double sweep_s = 0.0;          // From the first beam to the last; 0: all at once.
   Pose2 T_robot_laser{0.12, 0.0, 0.0};
   double height_m = 0.4;  // Height of the tilt axis above the floor; without effect in a flat world.
 };
 [[nodiscard]] Result<void> Validate(const LaserOptions& options);
-[[nodiscard]] RangeError ErrorOf(const LaserOptions& options);
-void SetError(const RangeError& error, LaserOptions* options);
 
 // How a robot moves during a sweep.
 struct Twist {
@@ -51,5 +73,14 @@ struct Twist {
 // A level scan in a flat world. `discs` are obstacles that are not part of the caster's walls.
 [[nodiscard]] Scan MeasureScan(const RayCaster& walls, std::span<const Disc> discs, const Pose2& T_map_robot,
                                const Twist& twist, Stamp stamp, const LaserOptions& options, Random& random);
+
+// The scanners of the thesis by name: field of view, resolution, range and error. Mounting, dropouts and sweep are
+// those of LaserOptions' defaults. Source: thesis C 4.3.2 (the simulator's own: +-90 deg in steps of 1 deg), 4.3.3
+// (errors); makers' data sheets for field of view, resolution and range: SICK LMS200/291, Hokuyo URG-04LX and
+// URG-04LX-UG01.
+[[nodiscard]] std::vector<std::string> LaserModelNames();
+
+// `laser` with the model's field of view, resolution, range and error.
+[[nodiscard]] Result<LaserOptions> WithModel(const LaserOptions& laser, const std::string& name);
 
 }  // namespace cairn::sim

@@ -139,10 +139,4 @@ double CastAtDisc(const Disc& disc, const Eigen::Vector2d& origin_map, const Eig
   return rim2 / (along + std::sqrt(inside2));  // The smaller root, without the difference of near equals.
 }
 
-double CastAtDiscs(std::span<const Disc> discs, const Eigen::Vector2d& origin_map, const Eigen::Vector2d& direction) {
-  double nearest = kNothingHit;
-  for (const Disc& disc : discs) nearest = std::min(nearest, CastAtDisc(disc, origin_map, direction));
-  return nearest;
-}
-
 }  // namespace cairn::sim

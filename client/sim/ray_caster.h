@@ -8,7 +8,6 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <limits>
-#include <span>
 #include <vector>
 
 #include "client/sim/world.h"
@@ -42,7 +41,5 @@ class RayCaster {
 
 // Distance along the ray to the disc's rim; kNothingHit where it misses or starts inside.
 [[nodiscard]] double CastAtDisc(const Disc& disc, const Eigen::Vector2d& origin_map, const Eigen::Vector2d& direction);
-[[nodiscard]] double CastAtDiscs(std::span<const Disc> discs, const Eigen::Vector2d& origin_map,
-                                 const Eigen::Vector2d& direction);
 
 }  // namespace cairn::sim

@@ -1,5 +1,6 @@
 #include "client/sim/rectangle_tree.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -36,6 +37,32 @@ double Enter(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& origin, cons
 
 }  // namespace
 
+Eigen::Vector3d Rectangle::normal() const {
+  return side_a.cross(side_b).normalized();
+}
+
+double CastAtRectangle(const Rectangle& rectangle, const Eigen::Vector3d& origin_map,
+                       const Eigen::Vector3d& direction) {
+  constexpr double kRim_m = 1e-9;
+  const Eigen::Vector3d normal = rectangle.normal();
+  const double approach = normal.dot(direction);
+  if (std::abs(approach) < 1e-12) return kNothingHit;
+  const double range = normal.dot(rectangle.corner_map - origin_map) / approach;
+  if (!(range > 0.0)) return kNothingHit;
+  const Eigen::Vector3d p = origin_map + range * direction - rectangle.corner_map;
+  const double a = rectangle.side_a.norm(), b = rectangle.side_b.norm();
+  const double u = p.dot(rectangle.side_a) / a, v = p.dot(rectangle.side_b) / b;
+  const bool inside = u >= -kRim_m && u <= a + kRim_m && v >= -kRim_m && v <= b + kRim_m;
+  return inside ? range : kNothingHit;
+}
+
+double DistanceTo(const Rectangle& rectangle, const Eigen::Vector3d& p_map) {
+  const Eigen::Vector3d p = p_map - rectangle.corner_map;
+  const double u = std::clamp(p.dot(rectangle.side_a) / rectangle.side_a.squaredNorm(), 0.0, 1.0);
+  const double v = std::clamp(p.dot(rectangle.side_b) / rectangle.side_b.squaredNorm(), 0.0, 1.0);
+  return (p - u * rectangle.side_a - v * rectangle.side_b).norm();
+}
+
 RectangleTree::RectangleTree(std::vector<Rectangle> rectangles) : rectangles_(std::move(rectangles)) {
   if (!rectangles_.empty()) Build(0, static_cast<std::int32_t>(rectangles_.size()));
 }
@@ -62,7 +89,8 @@ void RectangleTree::Build(std::int32_t begin, std::int32_t end) {
   Build(middle, end);
 }
 
-double RectangleTree::Cast(const Eigen::Vector3d& origin_map, const Eigen::Vector3d& direction, double max_m) const {
+template <typename BoxDistance, typename RectangleDistance>
+double RectangleTree::Nearest(const BoxDistance& at_least, const RectangleDistance& distance) const {
   double nearest = kNothingHit;
   if (nodes_.empty()) return nearest;
   std::array<std::int32_t, kMaxDepth> stack;
@@ -71,37 +99,29 @@ double RectangleTree::Cast(const Eigen::Vector3d& origin_map, const Eigen::Vecto
   while (depth > 0) {
     const std::int32_t index = stack[--depth];
     const Node& node = nodes_[static_cast<std::size_t>(index)];
-    if (!(Enter(node.box, origin_map, direction, max_m) <= std::min(nearest, max_m))) continue;
+    const double least = at_least(node.box);
+    if (least == kNothingHit || least > nearest) continue;
     if (node.right > 0) {
       stack[depth++] = node.right;
       stack[depth++] = index + 1;
       continue;
     }
     for (std::int32_t i = node.begin; i < node.end; ++i)
-      nearest = std::min(nearest, CastAtRectangle(rectangles_[static_cast<std::size_t>(i)], origin_map, direction));
+      nearest = std::min(nearest, distance(rectangles_[static_cast<std::size_t>(i)]));
   }
+  return nearest;
+}
+
+double RectangleTree::Cast(const Eigen::Vector3d& origin_map, const Eigen::Vector3d& direction, double max_m) const {
+  const double nearest =
+      Nearest([&](const Eigen::AlignedBox3d& box) { return Enter(box, origin_map, direction, max_m); },
+              [&](const Rectangle& rectangle) { return CastAtRectangle(rectangle, origin_map, direction); });
   return nearest <= max_m ? nearest : kNothingHit;
 }
 
 double RectangleTree::Distance(const Eigen::Vector3d& p_map) const {
-  double nearest = kNothingHit;
-  if (nodes_.empty()) return nearest;
-  std::array<std::int32_t, kMaxDepth> stack;
-  std::size_t depth = 0;
-  stack[depth++] = 0;
-  while (depth > 0) {
-    const std::int32_t index = stack[--depth];
-    const Node& node = nodes_[static_cast<std::size_t>(index)];
-    if (node.box.exteriorDistance(p_map) > nearest) continue;
-    if (node.right > 0) {
-      stack[depth++] = node.right;
-      stack[depth++] = index + 1;
-      continue;
-    }
-    for (std::int32_t i = node.begin; i < node.end; ++i)
-      nearest = std::min(nearest, DistanceTo(rectangles_[static_cast<std::size_t>(i)], p_map));
-  }
-  return nearest;
+  return Nearest([&](const Eigen::AlignedBox3d& box) { return box.exteriorDistance(p_map); },
+                 [&](const Rectangle& rectangle) { return DistanceTo(rectangle, p_map); });
 }
 
 }  // namespace cairn::sim

@@ -3,13 +3,33 @@
 // Source: bounding volume hierarchy with median splits (Kay, Kajiya, SIGGRAPH 1986: slabs).
 #pragma once
 
+#include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <vector>
 
-#include "client/sim/rectangle.h"
+#include "client/sim/ray_caster.h"
 
 namespace cairn::sim {
+
+// A flat rectangle in space: what three-dimensional worlds are made of. Both sides stop a ray.
+// Frame: `map`, metres, z up. Plain value; functions are exact up to rounding and stateless.
+// Source: thesis C 4.3.1 (4.38)-(4.39): a rectangle by its points; 4.3.2 (4.40)-(4.41): where a ray meets its plane.
+struct Rectangle {
+  Eigen::Vector3d corner_map = Eigen::Vector3d::Zero();
+  Eigen::Vector3d side_a = Eigen::Vector3d::UnitX();  // From the corner along two sides, at right angles.
+  Eigen::Vector3d side_b = Eigen::Vector3d::UnitY();
+
+  [[nodiscard]] Eigen::Vector3d normal() const;  // Has length 1.
+};
+
+// Distance along the ray (`direction` of length 1) to the rectangle; kNothingHit where it misses, runs alongside or
+// lies behind. The rim counts as hit: rectangles that share an edge leave no gap.
+[[nodiscard]] double CastAtRectangle(const Rectangle& rectangle, const Eigen::Vector3d& origin_map,
+                                     const Eigen::Vector3d& direction);
+
+// Distance from a point to the nearest point of the rectangle.
+[[nodiscard]] double DistanceTo(const Rectangle& rectangle, const Eigen::Vector3d& p_map);
 
 class RectangleTree {
  public:
@@ -31,6 +51,9 @@ class RectangleTree {
     std::int32_t end = 0;
   };
   void Build(std::int32_t begin, std::int32_t end);
+  // The least distance of any rectangle. `at_least` gives a lower bound for all rectangles in a box.
+  template <typename BoxDistance, typename RectangleDistance>
+  [[nodiscard]] double Nearest(const BoxDistance& at_least, const RectangleDistance& distance) const;
 
   std::vector<Rectangle> rectangles_;
   std::vector<Node> nodes_;

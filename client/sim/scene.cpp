@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace cairn::sim {
 namespace {
@@ -39,6 +40,24 @@ double CastAtPosts(std::span<const Post> posts, const Eigen::Vector3d& origin_ma
   double nearest = kNothingHit;
   for (const Post& post : posts) nearest = std::min(nearest, CastAtPost(post, origin_map, direction));
   return nearest;
+}
+
+Surroundings SurroundingsOf(World world) {
+  Surroundings surroundings;
+  surroundings.name = std::move(world.name);
+  surroundings.scene = std::make_shared<FlatScene>(RayCaster(std::move(world.segments)));
+  for (const Disc& disc : world.discs) surroundings.posts.push_back({disc});
+  surroundings.walkers = std::move(world.walkers);
+  surroundings.routes = std::move(world.routes);
+  return surroundings;
+}
+
+Surroundings SurroundingsOf(World3 world) {
+  Surroundings surroundings;
+  surroundings.name = std::move(world.name);
+  surroundings.scene = std::make_shared<SolidScene>(std::move(world.rectangles));
+  surroundings.routes = std::move(world.routes);
+  return surroundings;
 }
 
 }  // namespace cairn::sim

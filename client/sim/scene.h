@@ -5,9 +5,13 @@
 #include <limits>
 #include <memory>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "client/sim/rectangle_tree.h"
 #include "client/sim/world.h"
+#include "client/sim/world3.h"
+#include "common/status.h"
 
 namespace cairn::sim {
 
@@ -23,12 +27,12 @@ class Scene {
 // projection onto the floor does.
 class FlatScene : public Scene {
  public:
-  explicit FlatScene(const RayCaster& walls) : walls_(walls) {}
+  explicit FlatScene(RayCaster walls) : walls_(std::move(walls)) {}
   [[nodiscard]] double Cast(const Eigen::Vector3d& origin_map, const Eigen::Vector3d& direction,
                             double max_m) const override;
 
  private:
-  const RayCaster& walls_;  // Must outlive the scene.
+  RayCaster walls_;
 };
 
 class SolidScene : public Scene {
@@ -53,5 +57,19 @@ struct Post {
 [[nodiscard]] double CastAtPost(const Post& post, const Eigen::Vector3d& origin_map, const Eigen::Vector3d& direction);
 [[nodiscard]] double CastAtPosts(std::span<const Post> posts, const Eigen::Vector3d& origin_map,
                                  const Eigen::Vector3d& direction);
+
+// The place in which a fleet drives, flat or in space: obstacles that stand still, people who walk, and routes. A
+// value: copies share what is immutable.
+struct Surroundings {
+  std::string name;
+  std::shared_ptr<const Scene> scene;
+  std::vector<Post> posts;      // Round things that stand still.
+  std::vector<Walker> walkers;  // People, all of the height kWalkerHeight_m.
+  std::vector<Route> routes;
+};
+inline constexpr double kWalkerHeight_m = 1.75;
+
+[[nodiscard]] Surroundings SurroundingsOf(World world);
+[[nodiscard]] Surroundings SurroundingsOf(World3 world);
 
 }  // namespace cairn::sim

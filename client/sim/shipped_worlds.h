@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "client/sim/surroundings.h"
+#include "client/sim/scene.h"
 #include "client/sim/world.h"
 #include "client/sim/world3.h"
 #include "common/status.h"

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -41,5 +42,35 @@ struct World {
 
 // Where a walker stands after `seconds` (>= 0). It starts at the first point of its path.
 [[nodiscard]] Disc WalkerAt(const Walker& walker, double seconds);
+
+// A closed polyline measured by the distance along it. Walkers walk on one, and the starts of robots are spread over
+// one.
+[[nodiscard]] double ClosedLength(const std::vector<Eigen::Vector2d>& points);
+
+struct PathPlace {
+  Eigen::Vector2d p_map = Eigen::Vector2d::Zero();
+  double heading_rad = 0.0;  // Towards the next point.
+  std::size_t next = 0;      // Index of the next point.
+};
+
+// `way_m` from the first point, taken modulo the length. Needs two points and a length above zero.
+[[nodiscard]] PathPlace PlaceOnPath(const std::vector<Eigen::Vector2d>& points, double way_m);
+
+// A wall with a thickness and doorways: the solid strip around a centre line, cut where its gaps are.
+// The strip reaches half a thickness beyond both ends, so walls that share an end close the corner.
+struct WallGap {
+  double from_m = 0.0;  // Along the centre line, from its first end.
+  double to_m = 0.0;
+};
+
+struct Wall {
+  Eigen::Vector2d a_map;
+  Eigen::Vector2d b_map;
+  double thickness_m = 0.12;
+  std::vector<WallGap> gaps;  // In order, apart, within the wall.
+};
+
+// Adds the outlines of the wall's solid pieces. The ends must differ.
+void AppendWall(const Wall& wall, std::vector<Segment>* segments);
 
 }  // namespace cairn::sim

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "client/sim/rectangle.h"
+#include "client/sim/rectangle_tree.h"
 #include "client/sim/world.h"
 
 namespace cairn::sim {
@@ -38,8 +38,8 @@ struct Opening {
   double top_m = 2.0;
 };
 
-// An upright wall around a centre line, as thick walls of flat worlds (wall.h): it reaches half a thickness beyond both
-// ends. Openings are in order, apart and inside the wall.
+// An upright wall around a centre line, as thick walls of flat worlds (world.h): it reaches half a thickness beyond
+// both ends. Openings are in order, apart and inside the wall.
 struct Wall3 {
   Eigen::Vector2d a_map = Eigen::Vector2d::Zero();
   Eigen::Vector2d b_map = Eigen::Vector2d::UnitX();

@@ -8,9 +8,9 @@
 #include <set>
 #include <utility>
 
-#include "client/sim/wall.h"
+#include "client/sim/world.h"
 #include "common/geometry/pose2.h"
-#include "common/options/yaml_documents.h"
+#include "common/options/config.h"
 
 namespace cairn::sim {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <string>
 
-#include "client/sim/surroundings.h"
+#include "client/sim/scene.h"
 #include "client/sim/world.h"
 #include "client/sim/world3.h"
 #include "common/status.h"

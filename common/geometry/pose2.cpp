@@ -64,13 +64,6 @@ Eigen::Matrix3d J_inverse(const Pose2& T_a_b) {
   return J;
 }
 
-Eigen::Matrix<double, 2, 3> J_transform(const Pose2& T_a_b, const Eigen::Vector2d& p_b) {
-  const double c = std::cos(T_a_b.theta), s = std::sin(T_a_b.theta);
-  Eigen::Matrix<double, 2, 3> J;
-  J << 1, 0, -s * p_b.x() - c * p_b.y(), 0, 1, c * p_b.x() - s * p_b.y();
-  return J;
-}
-
 bool IsCovariance(const Eigen::Matrix3d& matrix, double tolerance) {
   if (!matrix.allFinite()) return false;
   const double scale = std::max(1e-300, matrix.cwiseAbs().maxCoeff());

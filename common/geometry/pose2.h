@@ -39,9 +39,6 @@ struct Pose2 {
 // d(T^-1) / d(T).
 [[nodiscard]] Eigen::Matrix3d J_inverse(const Pose2& T_a_b);
 
-// d(T * p) / d(T).
-[[nodiscard]] Eigen::Matrix<double, 2, 3> J_transform(const Pose2& T_a_b, const Eigen::Vector2d& p_b);
-
 // True where the matrix is finite, symmetric within `tolerance` of its scale, and positive semi-definite.
 [[nodiscard]] bool IsCovariance(const Eigen::Matrix3d& matrix, double tolerance = 1e-9);
 

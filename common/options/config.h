@@ -7,6 +7,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,10 @@
 #include "common/status.h"
 
 namespace cairn {
+
+// The line, counted from 0, where a second document begins, which YAML::Load would not read. Throws YAML::Exception
+// where the text is not YAML. (YAML::LoadAll would tell as well, but it never ends on a text such as ", a".)
+[[nodiscard]] std::optional<int> LineAfterFirstDocument(const std::string& text);
 
 using VisitOptions = std::function<void(OptionVisitor&)>;
 

@@ -1,26 +1,12 @@
 #include "common/options/option_fields.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <numeric>
 #include <set>
-#include <system_error>
 
 namespace cairn {
 namespace {
-
-template <typename Number>
-bool Parse(const std::string& text, Number& value) {
-  const char* begin = text.data();
-  const char* end = begin + text.size();
-  if (text.size() > 1 && *begin == '+') ++begin;
-  Number parsed{};
-  const auto [stop, error] = std::from_chars(begin, end, parsed);
-  if (error != std::errc() || stop != end) return false;
-  value = parsed;
-  return true;
-}
 
 // Levenshtein's distance: insertions, deletions and replacements that lead from a to b.
 std::size_t EditDistance(std::string_view a, std::string_view b) {
@@ -118,8 +104,9 @@ class Assigner final : public SectionVisitor {
     const Assignment* given = Find(key);
     if (given == nullptr) return;
     Value parsed{};
-    if (!given->text || !Parse(*given->text, parsed))
-      return Complain(*given, "is not " + what, RangeText(min, max, unit));
+    std::string_view text = given->text ? std::string_view(*given->text) : "";
+    if (text.size() > 1 && text.front() == '+') text.remove_prefix(1);
+    if (!ParseNumber(text, parsed)) return Complain(*given, "is not " + what, RangeText(min, max, unit));
     if (!(parsed >= min && parsed <= max)) return Complain(*given, "is out of range", RangeText(min, max, unit));
     if (write_) value = parsed;
   }

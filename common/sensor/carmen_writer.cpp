@@ -4,7 +4,7 @@
 #include <string>
 
 #include "common/options/number_text.h"
-#include "common/sensor/stamp_text.h"
+#include "common/sensor/stamp.h"
 
 namespace cairn {
 namespace {

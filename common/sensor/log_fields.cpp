@@ -1,20 +1,55 @@
 #include "common/sensor/log_fields.h"
 
-#include <charconv>
+#include <algorithm>
 #include <cmath>
 
-#include "common/sensor/stamp_text.h"
+#include "common/options/number_text.h"
 
 namespace cairn {
-namespace {
 
-template <typename Number>
-bool Parse(std::string_view text, Number& value) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size();
+LogLines::LogLines(const std::filesystem::path& path) : file_(path, std::ios::binary) {}
+
+// Appends one block to the buffer; false at the end of the file.
+bool LogLines::Fill() {
+  constexpr std::size_t kBlock = 256u << 10;
+  buffer_.erase(0, begin_);
+  begin_ = 0;
+  const std::size_t old_size = buffer_.size();
+  buffer_.resize(old_size + kBlock);
+  file_.read(buffer_.data() + old_size, kBlock);
+  const auto count = static_cast<std::size_t>(file_.gcount());
+  buffer_.resize(old_size + count);
+  failed_ = failed_ || file_.bad();
+  return count > 0;
 }
 
-}  // namespace
+bool LogLines::Next(std::string_view& line) {
+  too_long_ = false;
+  std::size_t searched = begin_;
+  for (;;) {
+    const std::size_t end = buffer_.find('\n', searched);
+    if (end != std::string::npos) {
+      line = std::string_view(buffer_).substr(begin_, end - begin_);
+      begin_ = end + 1;
+      break;
+    }
+    if (buffer_.size() - begin_ > kMaxLength) {
+      too_long_ = true;
+      begin_ = buffer_.size();  // Forget what was read; go on to the line's end.
+    }
+    const std::size_t pending = buffer_.size() - begin_;
+    if (!Fill()) {
+      if (pending == 0 && !too_long_) return false;
+      line = std::string_view(buffer_).substr(begin_);
+      begin_ = buffer_.size();
+      break;
+    }
+    searched = pending;
+  }
+  if (too_long_) line = {};
+  ++number_;
+  return true;
+}
 
 std::string Shown(std::string_view text) {
   constexpr std::size_t kLongest = 24;
@@ -42,7 +77,7 @@ double LogFields::Real(std::string_view what) {
   if (!problem_.empty()) return 0.0;
   const std::string_view word = Word(what);
   double value = 0.0;
-  if (Parse(word, value) && std::isfinite(value)) return value;
+  if (ParseNumber(word, value) && std::isfinite(value)) return value;
   Complain(what, word);
   return 0.0;
 }
@@ -51,7 +86,7 @@ float LogFields::Range() {
   if (!problem_.empty()) return 0.0F;
   const std::string_view word = Word("a range");
   float value = 0.0F;
-  if (Parse(word, value)) return value;
+  if (ParseNumber(word, value)) return value;
   Complain("a range", word);
   return 0.0F;
 }
@@ -60,7 +95,7 @@ int LogFields::Count(std::string_view what, int min, int max) {
   if (!problem_.empty()) return 0;
   const std::string_view word = Word(what);
   int value = 0;
-  if (Parse(word, value) && value >= min && value <= max) return value;
+  if (ParseNumber(word, value) && value >= min && value <= max) return value;
   Complain(what, word);
   return 0;
 }

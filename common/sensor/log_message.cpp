@@ -100,6 +100,7 @@ bool LooksLikeMessageName(std::string_view word) {
                      [](char c) { return (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_'; });
 }
 
+// The message, or what is wrong with it. `message` was read from `fields` before this looks at their problem.
 template <typename Message>
 LogMessage Checked(const LogFields& fields, Message message) {
   if (!fields.problem().empty()) return BadMessage{true, fields.problem()};
@@ -112,31 +113,14 @@ LogMessage ParseLogLine(std::string_view line) {
   LogFields fields(line);
   const std::string_view kind = fields.Word("message name");
   if (kind.empty() || kind.front() == '#') return NoMessage{};
-  // One statement each: the fields must be read before their problem is looked at.
-  if (kind == "FLASER" || kind == "RLASER") {
-    auto laser = ReadOldLaser(fields, kind == "FLASER" ? LaserKind::kFront : LaserKind::kRear);
-    return Checked(fields, std::move(laser));
-  }
-  if (kind == "ROBOTLASER1" || kind == "RAWLASER1") {
-    auto laser = ReadNewLaser(fields, kind == "ROBOTLASER1" ? LaserKind::kRobot : LaserKind::kRaw);
-    return Checked(fields, std::move(laser));
-  }
-  if (kind == "TILTLASER1") {
-    auto laser = ReadNewLaser(fields, LaserKind::kTilted);
-    return Checked(fields, std::move(laser));
-  }
-  if (kind == "Laser") {
-    auto laser = ReadDpslamLaser(fields);
-    return Checked(fields, std::move(laser));
-  }
-  if (kind == "ODOM") {
-    const auto odometry = ReadOdometry(fields);
-    return Checked(fields, odometry);
-  }
-  if (kind == "Odometry") {
-    const auto odometry = ReadDpslamOdometry(fields);
-    return Checked(fields, odometry);
-  }
+  if (kind == "FLASER") return Checked(fields, ReadOldLaser(fields, LaserKind::kFront));
+  if (kind == "RLASER") return Checked(fields, ReadOldLaser(fields, LaserKind::kRear));
+  if (kind == "ROBOTLASER1") return Checked(fields, ReadNewLaser(fields, LaserKind::kRobot));
+  if (kind == "RAWLASER1") return Checked(fields, ReadNewLaser(fields, LaserKind::kRaw));
+  if (kind == "TILTLASER1") return Checked(fields, ReadNewLaser(fields, LaserKind::kTilted));
+  if (kind == "Laser") return Checked(fields, ReadDpslamLaser(fields));
+  if (kind == "ODOM") return Checked(fields, ReadOdometry(fields));
+  if (kind == "Odometry") return Checked(fields, ReadDpslamOdometry(fields));
   if (LooksLikeMessageName(kind)) return IgnoredMessage{};
   return BadMessage{false, "unknown message '" + Shown(kind) + "'"};
 }

@@ -7,7 +7,7 @@
 #include <system_error>
 #include <utility>
 
-#include "common/sensor/log_lines.h"
+#include "common/sensor/log_fields.h"
 #include "common/sensor/log_message.h"
 #include "common/sensor/log_survey.h"
 

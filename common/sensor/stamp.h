@@ -2,6 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
 
 namespace cairn {
 
@@ -16,5 +19,12 @@ inline constexpr Stamp kNanosPerSecond = 1'000'000'000;
 [[nodiscard]] constexpr double SecondsFromStamp(Stamp stamp) {
   return static_cast<double>(stamp) * 1e-9;
 }
+
+// Stamps as decimal seconds in text, exact to the nanosecond: no detour through double, which cannot hold one.
+// "[-]digits[.digits]"; further decimals than nine are rounded. Nothing for other text or a value beyond int64.
+[[nodiscard]] std::optional<Stamp> ParseStamp(std::string_view seconds);
+
+// Seconds with nine decimals; ParseStamp reads it back to the same stamp.
+[[nodiscard]] std::string FormatStamp(Stamp stamp);
 
 }  // namespace cairn

@@ -8,8 +8,7 @@
 
 #include "common/file/atomic_file.h"
 #include "common/sensor/log_fields.h"
-#include "common/sensor/log_lines.h"
-#include "common/sensor/stamp_text.h"
+#include "common/sensor/stamp.h"
 
 namespace cairn {
 namespace {

@@ -1,10 +1,10 @@
-// The answers to requests about robots (robot_answers.cpp) and maps (map_answers.cpp). Each is a pure
-// function of snapshots, which were copied under short locks, so no answer waits for an estimator. If a
-// request names a robot or site that the server does not know, the snapshots are empty and the answer is
-// NOT_FOUND. Answers may be large: SplitReply (reply_parts.h) cuts them into parts for the wire. Stateless,
-// thread-safe.
+// The answers to requests about robots and maps. Each is a pure function of snapshots, which were copied under
+// short locks, so no answer waits for an estimator. If a request names a robot or site that the server does not
+// know, the snapshots are empty and the answer is NOT_FOUND. Answers may be large: SplitReply
+// cuts them into parts for the wire. Stateless, thread-safe.
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <vector>
 
@@ -47,5 +47,11 @@ using Maps = std::vector<std::shared_ptr<const MapSnapshot>>;
 // The state and the versions of a site's map, or of all maps. `maps`: all maps, or the site's if the request
 // names a site.
 [[nodiscard]] Reply AnswerMapInfo(const Request& request, const Maps& maps);
+
+// Cuts an answer into parts that fit the wire (less than 64 KB each, idl/README.md). Every part repeats the
+// header and the status. Items keep their order. Parts are numbered from 0, and the last one has `last` set.
+// An answer without items is one part.
+inline constexpr std::size_t kPartBudgetBytes = 48 * 1024;
+[[nodiscard]] std::vector<Reply> SplitReply(Reply&& reply);
 
 }  // namespace cairn::server

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "common/version.h"
-#include "server/queries/reply_parts.h"
+#include "server/queries/answers.h"
 
 namespace cairn::server {
 namespace {

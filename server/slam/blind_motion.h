@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 #include <utility>
 
-#include "server/slam/motion/motion_noise.h"
+#include "server/slam/motion/step_motion.h"
 #include "server/slam/tracking/front_end.h"
 
 namespace cairn::slam {

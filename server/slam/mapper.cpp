@@ -9,8 +9,8 @@
 #include "server/slam/loops/self_check.h"
 #include "server/slam/map_drawing.h"
 #include "server/slam/methods.h"
-#include "server/slam/motion/constant_speed.h"
-#include "server/slam/scan/tilt.h"
+#include "server/slam/motion/step_motion.h"
+#include "server/slam/scan/beam_points.h"
 #include "server/slam/tracking/front_end.h"
 #include "server/slam/trail/trail.h"
 

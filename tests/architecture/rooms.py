@@ -16,9 +16,9 @@ SLAM_ROOMS = {
     "scan": [],  # What a scan is: points, surfaces, tilt, its odometry.
     "features": ["scan"],  # Lines and corners of a scan.
     "motion": [],  # What a step is, and its noise.
-    "graph": ["motion"],  # Relations between keyframes, and the path that fits them best.
+    "graph": [],  # Relations between keyframes, and the path that fits them best.
     "grid": ["scan"],  # Cells and rays.
-    "trail": ["graph", "scan"],  # Keyframes and the path through them.
+    "trail": ["graph", "motion", "scan"],  # Keyframes and the path through them.
     "matching": ["features", "scan"],  # One scan against another: answers, point-to-line.
     "voting": ["matching", "features"],  # The default's matcher.
     "landmarks": ["features"],  # Which features become landmarks, and their estimates.

@@ -3,6 +3,9 @@
 
 #include <gmock/gmock.h>
 
+#include <map>
+#include <vector>
+
 #include "tests/server/support/whole_server.h"
 
 namespace cairn::server::testing {
@@ -201,32 +204,46 @@ TEST(Server, RequestsThatCannotBeServedSayWhy) {
   EXPECT_THAT(job.message, ::testing::HasSubstr("no scans"));
 }
 
-// Six robots on one thread with a full queue each. The watchdog was starved once in such a case, and the server killed
-// for being busy: the sign of life that was asked of a robot waited behind all its scans, and those of the others.
-TEST(Server, IsHealthyUnderOverloadAsLongAsItMoves) {
+ServerOptions SlowOnOneThread() {
   ServerOptions options = TestOptions();
   options.server.threads = 1;
-  options.server.stall_limit_s = 0.3;
   options.slam.filter.particles = 6000;
   options.slam.gate = {.distance_m = 0.0, .turn_rad = 0.0};  // Every scan updates the filter.
+  return options;
+}
+
+// How long the server took for `steps` scans of each robot, all sent at once; `meanwhile` is called while it works.
+double SecondsFor(const ServerOptions& options, int robot_count, int steps,
+                  const std::function<void(WholeServer&)>& meanwhile) {
   WholeServer house(options);
   std::vector<std::string> robots;
-  for (int i = 0; i < 6; ++i) robots.push_back("r" + std::to_string(i));
+  for (int i = 0; i < robot_count; ++i) robots.push_back("r" + std::to_string(i));
   for (const std::string& robot : robots) house.Open(robot, kClient);
   const auto begin = std::chrono::steady_clock::now();
-  for (int step = 0; step < 60; ++step) {
+  for (int step = 0; step < steps; ++step) {
     for (const std::string& robot : robots) {
       house.SendOdometry(robot, kClient, RoomOdometry(step));
       house.SendScan(robot, kClient, RoomScan(step));
     }
   }
-  ASSERT_TRUE(house.WaitFor([&] {
-    EXPECT_TRUE(house.server().healthy());
-    return std::all_of(robots.begin(), robots.end(),
-                       [&](const std::string& robot) { return house.LastLedger(robot).settled_through == 60; });
+  EXPECT_TRUE(house.WaitFor([&] {
+    meanwhile(house);
+    return std::all_of(robots.begin(), robots.end(), [&](const std::string& robot) {
+      return house.LastLedger(robot).settled_through == static_cast<std::uint64_t>(steps);
+    });
   }));
-  // Otherwise the work was too little to show anything.
-  EXPECT_GT(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(600));
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+}
+
+// Six robots on one thread with a full queue each. The watchdog was starved once in such a case, and the server killed
+// for being busy: the sign of life that was asked of a robot waited behind all its scans, and those of the others.
+TEST(Server, IsHealthyUnderOverloadAsLongAsItMoves) {
+  ServerOptions options = SlowOnOneThread();
+  // A limit that no single scan reaches on this machine, sanitized or not, but a whole queue does.
+  const double seconds_per_scan = SecondsFor(options, 1, 10, [](WholeServer&) {}) / 10.0;
+  options.server.stall_limit_s = std::max(0.3, 30.0 * seconds_per_scan);
+  const double seconds = SecondsFor(options, 6, 60, [](WholeServer& house) { EXPECT_TRUE(house.server().healthy()); });
+  EXPECT_GT(seconds, 2.0 * options.server.stall_limit_s) << "the work was too little to show anything";
 }
 
 TEST(Server, EveryKindOfRequestIsAnsweredToTheOneWhoAsked) {
@@ -348,6 +365,23 @@ TEST(Server, StopFinishesAcceptedScansAndSaysGoodbye) {
   const SessionState state = house.LastState("r1", kClient);
   EXPECT_EQ(state.phase, SessionPhase::kSuspended);
   EXPECT_THAT(state.status.message, ::testing::HasSubstr("stopping"));
+}
+
+// A server that smooths, with more jobs waiting, was stopped: it must not finish them first.
+TEST(Server, StopCancelsTheRunningJobAndThoseThatWait) {
+  WholeServer house;
+  house.Open("r1", kClient);
+  house.Drive("r1", kClient, 0, 60);
+  std::vector<std::uint64_t> jobs;
+  for (int i = 0; i < 12; ++i) jobs.push_back(house.Ask(Of(RequestKind::kJobSubmit)).jobs.at(0).id);
+  const auto begin = std::chrono::steady_clock::now();
+  house.Stop();
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(5));
+  std::map<std::uint64_t, JobState> last;
+  for (const Job& job : house.All<Job>()) last[job.id] = job.state;
+  for (const std::uint64_t id : jobs) EXPECT_TRUE(IsFinal(last.at(id))) << id;
+  EXPECT_EQ(last.at(jobs.back()), JobState::kCancelled);
+  EXPECT_EQ(house.LastState("r1", kClient).phase, SessionPhase::kSuspended);
 }
 
 TEST(Server, StopDropsAndCountsWhatItHasNoTimeFor) {

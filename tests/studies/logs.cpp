@@ -121,7 +121,8 @@ std::vector<StudyLog> ChooseLogs(StudyContext& context, const std::vector<std::s
   for (const std::string& name : names) keep(OpenRealLog(context, name, max_scans));
   if (logs.empty()) {
     context.report.Warn(
-        "no published log is at hand: SIMULATED building instead; its figures say nothing about real ones");
+        "no published log is available: a SIMULATED building is used instead, and its figures say "
+        "nothing about real logs");
     sim::FleetOptions options;
     options.seed = context.seed;
     logs.push_back(SimulateLog("building", max_scans > 0 ? max_scans / options.scan_hz : 400.0, options));

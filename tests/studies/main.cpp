@@ -53,10 +53,10 @@ int Main(int argc, char** argv) {
   app.set_version_flag("--version", std::string("cairn-study ") + kVersion);
   app.add_option("NAME", name, "`list` prints the studies")->required();
   app.add_option("--out", out, "Folder for report.md, tables and pictures; without it only text is printed");
-  app.add_flag("--quick", quick, "Seconds instead of minutes");
-  app.add_option("--seed", seed, "Of every random engine");
+  app.add_flag("--quick", quick, "Fewer trials and shorter logs: takes seconds instead of minutes");
+  app.add_option("--seed", seed, "Seed of every random engine");
   app.add_option("--log", logs, "A log instead of the study's own choice; repeatable")->check(CLI::ExistingFile);
-  app.add_option("--only", only, "Of a study in parts, those whose name contains this");
+  app.add_option("--only", only, "For a study with several parts: run only those whose name contains this text");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "client/sim/closed_path.h"
 #include "client/sim/shipped_worlds.h"
+#include "client/sim/world.h"
 #include "client/sim/world_file.h"
 
 namespace cairn::studies {
@@ -54,7 +54,7 @@ Scan Scene::Look(const Pose2& T_map_robot, const sim::LaserOptions& laser, sim::
 
 std::vector<VisibleWall> Scene::VisibleWalls(const Pose2& T_map_robot, const sim::LaserOptions& laser) const {
   sim::LaserOptions perfect = laser;
-  perfect.noise_m = perfect.noise_share = perfect.dropout_share = perfect.sweep_s = 0.0;
+  perfect.error.sigma_m = perfect.error.sigma_share = perfect.dropout_share = perfect.sweep_s = 0.0;
   sim::Random unused(0);
   const Scan scan = Look(T_map_robot, perfect, unused);
   const Pose2 T_map_laser = T_map_robot * laser.T_robot_laser;
@@ -86,8 +86,8 @@ sim::LaserOptions Sick(double noise_m) {
   sim::LaserOptions laser;
   laser.beams = 181;
   laser.field_of_view_rad = kPi;
-  laser.noise_m = noise_m;
-  laser.noise_share = 0.0;
+  laser.error.sigma_m = noise_m;
+  laser.error.sigma_share = 0.0;
   laser.dropout_share = 0.0;
   laser.T_robot_laser = {};
   return laser;

@@ -1,5 +1,5 @@
-// Time used, on the wall and by the processor. Studies are run on machines that do other work besides: the
-// processor time of this process is the honest figure then, and both are printed.
+// Time used, as wall-clock time and as processor time. Studies are often run on machines that do other work at the same
+// time; then only the processor time of this process can be compared, so both are printed.
 #pragma once
 
 #include <chrono>

@@ -1,6 +1,6 @@
 // What a study is and where the program finds it. A study measures something for people: it prints tables,
-// writes plots and a Markdown report, and says whether what it measured is plausible. Not a test: it may take
-// minutes, and nothing waits for it. Each study's file ends with one line that registers it:
+// writes plots and a Markdown report, and says whether what it measured is plausible. It is not a test: it may take
+// minutes and is not part of the normal test run. Each study's file ends with one line that registers it:
 //
 //   const Registration kRegistered{"thesis-a", "line extraction, matching, FastSLAM beside thesis A", RunThesisA};
 #pragma once
@@ -16,9 +16,9 @@
 namespace cairn::studies {
 
 struct StudyContext {
-  Report& report;                             // Tables, plots and words go here; also printed as they come.
-  bool quick = false;                         // Seconds instead of minutes: fewer trials, shorter logs, same tables.
-  std::uint64_t seed = 1;                     // Of every random engine: same seed, same figures (times excepted).
+  Report& report;          // Tables, plots and words go here; also printed as they come.
+  bool quick = false;      // Seconds instead of minutes: fewer trials, shorter logs, same tables.
+  std::uint64_t seed = 1;  // Seed of every random engine. The same seed gives the same figures (except times).
   std::vector<std::filesystem::path> logs{};  // --log: instead of the study's own choice.
 
   std::string

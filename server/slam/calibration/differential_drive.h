@@ -1,14 +1,11 @@
-// The odometry of a differential drive: from encoder pulses to wheel travel to the robot's motion, and from a
-// motion back to wheel travel. Not a dynamic model: it has no slip and no limits.
-// Metres and radians. Motions are T_prev_curr in the robot frame, whose origin lies midway between the
-// wheels. Stateless, thread-safe.
-// Source: thesis B 3.3, (3.2)..(3.6). (3.6) advances along the heading after the step; here the step is the
-// exact arc of constant wheel speeds (Siegwart et al. 2011, 5.2.4), which does not depend on how finely the
-// motion is cut.
+// The odometry of a differential drive: from wheel travel to the robot's motion and back. Not a dynamic model: it has
+// no slip and no limits. Metres and radians. Motions are T_prev_curr in the robot frame, whose origin lies midway
+// between the wheels. Stateless, thread-safe. Source: thesis B 3.3, (3.4)..(3.6). (3.6) advances along the heading
+// after the step; here the step is the exact arc of constant wheel speeds (Siegwart et al. 2011, 5.2.4), which does not
+// depend on how finely the motion is cut.
 #pragma once
 
 #include "common/geometry/pose2.h"
-#include "common/options/option_visitor.h"
 
 namespace cairn::slam {
 
@@ -17,17 +14,12 @@ struct DifferentialDrive {
   double base_m = 0.34;
   double left_diameter_m = 0.20;   // D_L: diameter of the left wheel.
   double right_diameter_m = 0.20;  // D_R: diameter of the right wheel.
-  double pulses_per_turn = 2048;   // n * C_e: encoder pulses per revolution of a wheel.
 };
-void Visit(OptionVisitor& visitor, DifferentialDrive& drive);
 
 struct WheelTravel {
   double left_m = 0.0;
   double right_m = 0.0;
 };
-
-// Wheel travel from encoder pulses, (3.2) and (3.3).
-[[nodiscard]] WheelTravel TravelOfPulses(double left_pulses, double right_pulses, const DifferentialDrive& drive);
 
 // Motion T_prev_curr from wheel travel, (3.4)..(3.6).
 [[nodiscard]] Pose2 MotionOfTravel(const WheelTravel& travel, double base_m);

@@ -12,6 +12,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <random>
 #include <span>
 
 #include "common/status.h"
@@ -33,7 +34,6 @@ struct UmbmarkOptions {
   double side_m = 4.0;      // L: side of the square.
   DifferentialDrive drive;  // The nominal parameters, which the odometry assumes.
 };
-void Visit(OptionVisitor& visitor, UmbmarkOptions& options);
 
 // Wheel errors as ratios: E_d = D_R / D_L and E_b = b_actual / b_nominal. Both are 1 without error. E_d comes
 // in addition to a difference of the nominal diameters.
@@ -73,5 +73,21 @@ struct UmbmarkResult {
 // bumps has no counterpart among the smooth ones, and Borenstein and Feng use the mean. Error
 // kInvalidArgument: a direction has runs of one kind only, or there are no runs.
 [[nodiscard]] Result<double> NonSystematicError(std::span<const SquareRun> smooth, std::span<const SquareRun> bumpy);
+
+// Simulated runs round the UMBmark square, with which the calibration is tested. The robot has known wheel
+// errors and drives what its odometry takes for the exact square, with random slip and, if wanted, bumps
+// under its inner wheel.
+// Frame: `start`, the first leg along x. The same engine state gives the same run. Stateless.
+// Source: Borenstein, Feng 1996 (ten bumps along the path, under the wheel inside the square).
+struct SquareRunOptions {
+  WheelErrors errors;
+  double slip_m_per_sqrt_m = 0.002;
+  std::int64_t bumps = 0;
+  double bump_m = 0.004;
+};
+void Visit(OptionVisitor& visitor, SquareRunOptions& options);
+
+[[nodiscard]] SquareRun SimulateSquareRun(bool clockwise, const SquareRunOptions& run, const UmbmarkOptions& square,
+                                          std::mt19937_64& engine);
 
 }  // namespace cairn::slam

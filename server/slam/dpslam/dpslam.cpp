@@ -32,7 +32,7 @@ bool DpSlam::Sound(std::size_t keyframes) const {
   if (!options_.hierarchical) return low == keyframes && pending_.empty();
   const std::size_t high = this->high()->best().path.size();
   const bool at_work = high_ && high_->at_work();
-  return low == handed_up_ + pending_.size() && at_work == (at_work_ > 0) && at_work_ <= pending_.size() &&
+  return low == passed_on_ + pending_.size() && at_work == (at_work_ > 0) && at_work_ <= pending_.size() &&
          high + pending_.size() == keyframes;
 }
 
@@ -77,10 +77,10 @@ void DpSlam::Observe(std::shared_ptr<const LaserRays> rays, const ParallelFor& p
     high_->Work(rng_, parallel_for);
     if (high_->at_work()) return;
     pending_.erase(pending_.begin(), pending_.begin() + static_cast<std::ptrdiff_t>(at_work_));
-    handed_up_ += std::exchange(at_work_, 0);
+    passed_on_ += std::exchange(at_work_, 0);
     T_low_joint_ = T_low_end_;
   }
-  if (const std::size_t count = SegmentEnd(); count > 0) HandUp(count);
+  if (const std::size_t count = SegmentEnd(); count > 0) PassToHighLevel(count);
 }
 
 void DpSlam::Commit() {
@@ -115,7 +115,7 @@ Evidence DpSlam::Along(const GridParticle& particle, std::size_t count) const {
   Evidence evidence;
   evidence.reserve(count);
   for (std::size_t k = 0; k < count; ++k)
-    evidence.push_back({pending_[k].rays, T_joint_low * particle.path[handed_up_ + k]});
+    evidence.push_back({pending_[k].rays, T_joint_low * particle.path[passed_on_ + k]});
   return evidence;
 }
 
@@ -130,11 +130,11 @@ void DpSlam::JoinPlainly(const ParallelFor& parallel_for) {
   low_.emplace(options_.low, options_.opacity, Pose2{});
   low_->Observe({{segment.back().rays, Pose2{}}}, rng_, parallel_for);
   pending_.clear();
-  handed_up_ = 1;
+  passed_on_ = 1;
   T_low_joint_ = Pose2{};
 }
 
-void DpSlam::HandUp(std::size_t count) {
+void DpSlam::PassToHighLevel(std::size_t count) {
   // Trajectories sampled from the present distribution of the low level, its best one first.
   std::vector<Evidence> trajectories{Along(low_->best(), count)};
   const auto alternatives = static_cast<std::size_t>(options_.segment.trajectories);
@@ -144,7 +144,7 @@ void DpSlam::HandUp(std::size_t count) {
 
   high_->Take(std::move(trajectories), WayOf(count), rng_);
   at_work_ = count;
-  T_low_end_ = low_->best().path[handed_up_ + count - 1];
+  T_low_end_ = low_->best().path[passed_on_ + count - 1];
   low_->KeepNear(options_.segment.keep_m);
 }
 
@@ -184,7 +184,7 @@ Hypothesis DpSlam::hypothesis(std::size_t index) const {
   const GridParticle& low = low_->best();
   const Pose2 T_map_low = particle.T_map_robot * T_low_joint_.Inverse();
   Hypothesis result{T_map_low * low.T_map_robot, particle.path};
-  for (std::size_t k = handed_up_; k < low.path.size(); ++k) result.path.Append(T_map_low * low.path[k]);
+  for (std::size_t k = passed_on_; k < low.path.size(); ++k) result.path.Append(T_map_low * low.path[k]);
   return result;
 }
 

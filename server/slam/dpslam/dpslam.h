@@ -41,7 +41,7 @@ class DpSlam final : public Filter {
   void Load(StateReader& archive) override { archive(*this); }
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
-    archive(self.rng_, *self.low_, self.pending_, self.handed_up_, self.at_work_, self.T_low_joint_, self.T_low_end_,
+    archive(self.rng_, *self.low_, self.pending_, self.passed_on_, self.at_work_, self.T_low_joint_, self.T_low_end_,
             self.step_m_, self.turn_rad_, self.contradicted_, self.observed_);
     if (self.high_) archive(*self.high_);
     if (self.plain_) archive(*self.plain_);
@@ -72,7 +72,8 @@ class DpSlam final : public Filter {
   // Number of scans of the next segment once it is long enough and followed by enough later scans; otherwise
   // 0.
   [[nodiscard]] std::size_t SegmentEnd() const;
-  void HandUp(std::size_t count);
+  // Begins the next segment of the high level with the first `count` pending scans.
+  void PassToHighLevel(std::size_t count);
   // The whole step of the plain high level, with all pending scans.
   void JoinPlainly(const ParallelFor& parallel_for);
   // The next scans of a particle of the low level, from the joint on.
@@ -85,7 +86,7 @@ class DpSlam final : public Filter {
   std::optional<SegmentFilter> high_;  // At most one of high_ and plain_ has a value.
   std::optional<LevelFilter> plain_;
   std::vector<PendingScan> pending_;  // Scans that are not in the high level yet.
-  std::size_t handed_up_ = 0;         // Number of scans before the pending ones.
+  std::size_t passed_on_ = 0;         // Number of scans before the pending ones.
   std::size_t at_work_ = 0;           // Number of pending scans that the high level is processing.
   // End poses in the low level's frame: of the scans before the pending ones, when they were passed on, and
   // of the scans that the high level is processing.

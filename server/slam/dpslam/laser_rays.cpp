@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/slam/scan/tilt.h"
+#include "server/slam/scan/beam_points.h"
 
 namespace cairn::slam {
 

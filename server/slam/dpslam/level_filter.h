@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "server/slam/dpslam/particle_maps.h"
-#include "server/slam/motion/motion_noise.h"
+#include "server/slam/motion/step_motion.h"
 #include "server/slam/random/resampling.h"
 #include "server/slam/trail/shared_sequence.h"
 

@@ -11,12 +11,16 @@
 // Source: thesis C 3.2.3.2; Eliazar, Parr 2003, 2004.
 #pragma once
 
+#include <array>
 #include <compare>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
+#include <map>
+#include <memory>
 #include <vector>
 
+#include "common/geometry/pose2.h"
+#include "server/slam/dpslam/laser_rays.h"
 #include "server/slam/dpslam/opacity.h"
 
 namespace cairn::slam {
@@ -77,8 +81,9 @@ struct ChangeTile {
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     archive(self.key, self.list, self.all);
-    constexpr int kMostRead = 1 << 24;  // Tiles to each side of the origin.
-    bool sound = std::abs(self.key.x) < kMostRead && std::abs(self.key.y) < kMostRead;
+    constexpr int kMost = 1 << 24;  // Tiles to each side of the origin.
+    const ChangeTileKey& key = self.key;
+    bool sound = -kMost < key.x && key.x < kMost && -kMost < key.y && key.y < kMost;
     sound = sound && (self.all.empty() || (self.all.size() == kChangeTileArea && self.list.empty()));
     for (std::size_t i = 0; i < self.list.size(); ++i)
       sound = sound && self.list[i].cell < kChangeTileArea && (i == 0 || self.list[i - 1].cell < self.list[i].cell);
@@ -109,6 +114,31 @@ class MapChanges {
 
  private:
   std::vector<ChangeTile> tiles_;  // The tiles, ascending by key.
+};
+
+// Draws scans taken at given poses and returns the resulting changes of the map: per cell, how far laser
+// beams travelled in it and how often they were stopped. Scratch memory is kept between calls. Not
+// thread-safe.
+// Frames: poses are T_map_robot, finite. Source: thesis C 3.2.3.1.
+class ChangePainter {
+ public:
+  explicit ChangePainter(double resolution_m) : resolution_m_(resolution_m) {}
+
+  void Draw(const LaserRays& rays, const Pose2& T_map_robot);
+  // Returns all changes since the last call.
+  [[nodiscard]] MapChanges Take();
+
+ private:
+  struct Sheet {
+    std::array<float, kChangeTileArea> travel{};  // Travel in cells.
+    std::array<std::uint32_t, kChangeTileArea> stops{};
+    std::array<std::uint64_t, kChangeTileSide> touched{};  // One bit per cell, one word per row.
+  };
+  Sheet& SheetAt(const ChangeTileKey& key);
+
+  double resolution_m_;
+  std::map<ChangeTileKey, std::unique_ptr<Sheet>> sheets_;
+  std::vector<std::unique_ptr<Sheet>> blank_;
 };
 
 }  // namespace cairn::slam

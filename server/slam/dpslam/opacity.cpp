@@ -30,28 +30,4 @@ double StopProbability(double length_m, double opacity_m) {
   return -std::expm1(-length_m / opacity_m);
 }
 
-double StoppedProbability(std::span<const RaySpan> spans) {
-  double stopped = 0.0;
-  for (std::size_t i = 0; i < spans.size(); ++i) stopped += StopProbabilityAt(spans, i);
-  return stopped;
-}
-
-double StopProbabilityAt(std::span<const RaySpan> spans, std::size_t j) {
-  double reach = 1.0;
-  for (std::size_t i = 0; i < j; ++i) reach *= 1.0 - StopProbability(spans[i].length_m, spans[i].opacity_m);
-  return reach * StopProbability(spans[j].length_m, spans[j].opacity_m);
-}
-
-double MeasurementDensity(double delta_m, double sigma_m) {
-  const double z = delta_m / sigma_m;
-  return std::exp(-0.5 * z * z) / (sigma_m * std::sqrt(2.0 * kPi));
-}
-
-double RayDensity(std::span<const RaySpan> spans, double sigma_m) {
-  double density = 0.0;
-  for (std::size_t i = 0; i < spans.size(); ++i)
-    density += MeasurementDensity(spans[i].delta_m, sigma_m) * StopProbabilityAt(spans, i);
-  return density;
-}
-
 }  // namespace cairn::slam

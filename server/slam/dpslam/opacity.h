@@ -2,8 +2,7 @@
 // there with probability 1 - exp(-x / rho). A cell holds how far beams have travelled in it and how often
 // they were stopped. Its opacity is the ratio of the two, the maximum likelihood estimate, with a small prior
 // so that unseen cells sometimes stop a ray.
-// This file is the textbook form. The fast computation along a ray is in ray_likelihood.h and is tested
-// against this file.
+// The computation along a ray is in ray_likelihood.h; its test contains the textbook form, (3.36)-(3.39).
 // Metres. Stateless, thread-safe. Source: Eliazar, Parr 2004 (DP-SLAM 2.0); thesis C 3.2.3.1, (3.35)-(3.39).
 // Corrected: the sum of (3.36) is over i with the probability of reaching cell i - 1. "The weight of an
 // entire scan is the sum of all ray weights" is wrong: rays are independent given pose and map, so their
@@ -11,7 +10,6 @@
 #pragma once
 
 #include <cstdint>
-#include <span>
 
 #include "common/options/option_visitor.h"
 
@@ -48,17 +46,7 @@ struct StopRate {
   float prior_cells;
 };
 
-// The part of a ray in one cell.
-struct RaySpan {
-  double length_m = 0.0;   // x_i: length in the cell.
-  double opacity_m = 0.0;  // rho_i: opacity of the cell.
-  double delta_m = 0.0;    // Distance from the measured end to the cell, along the ray.
-};
-
-[[nodiscard]] double StopProbability(double length_m, double opacity_m);                // (3.35)
-[[nodiscard]] double StoppedProbability(std::span<const RaySpan> spans);                // (3.36)
-[[nodiscard]] double StopProbabilityAt(std::span<const RaySpan> spans, std::size_t j);  // (3.37)
-[[nodiscard]] double MeasurementDensity(double delta_m, double sigma_m);                // (3.38)
-[[nodiscard]] double RayDensity(std::span<const RaySpan> spans, double sigma_m);        // (3.39)
+// The probability that a ray is stopped within a cell in which it travels this far, (3.35).
+[[nodiscard]] double StopProbability(double length_m, double opacity_m);
 
 }  // namespace cairn::slam

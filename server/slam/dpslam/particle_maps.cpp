@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "server/slam/dpslam/change_painter.h"
+#include "server/slam/dpslam/map_changes.h"
 
 namespace cairn::slam {
 namespace {

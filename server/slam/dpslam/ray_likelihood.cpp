@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/slam/dpslam/ray_walk.h"
+#include "server/slam/dpslam/laser_rays.h"
 
 namespace cairn::slam {
 namespace {

@@ -6,7 +6,7 @@
 // lower likelihood than one on a known wall, which should favour poses that lag behind; the size of this
 // effect has not been measured.) Cells farther than 4 sigma from the measured end cannot explain it: before
 // them only the probability to pass counts, and behind them the ray is not followed.
-// Stateless, thread-safe. Source: thesis C 3.2.3.1; the textbook form is in opacity.h.
+// Stateless, thread-safe. Source: thesis C 3.2.3.1; the textbook form is the oracle of its test.
 #pragma once
 
 #include <cstddef>

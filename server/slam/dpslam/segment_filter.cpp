@@ -14,7 +14,7 @@ constexpr std::size_t kDrawingCost = 4;
 constexpr double kJudgedApartM = 2.0;
 constexpr double kJudgedApartRad = 0.5;
 // Smallest share of the evidence introduced at a time; bounds the work.
-constexpr double kLeastLetIn = 0.01;
+constexpr double kLeastTemperingStep = 0.01;
 constexpr double kFirstStride = 0.5;
 // If the log likelihoods of best and worst differ by less, there is no evidence.
 constexpr double kTells = 1.0;
@@ -110,7 +110,7 @@ void SegmentFilter::Take(std::vector<Evidence> trajectories, double way_m, Rng& 
   open_.push_back(segments_.size() - 1);
   log_likelihoods_.clear();
   proposed_.clear();
-  let_in_ = 0.0;
+  tempering_ = 0.0;
   std::fill(stride_.begin(), stride_.end(), kFirstStride);
   moved_ = false;
   moves_left_ = 0;
@@ -190,12 +190,12 @@ void SegmentFilter::Work(Rng& rng, const ParallelFor& parallel_for) {
     if (level_.maps().blank()) return Finish();
     left -= JudgeSome(left, parallel_for);
     if (log_likelihoods_.size() < candidates_.size() * open_.size()) continue;
-    const bool first = let_in_ == 0.0 && proposed_.empty();
+    const bool first = tempering_ == 0.0 && proposed_.empty();
     Enter(proposed_.empty() ? candidates_ : proposed_);
     for (std::size_t i = 0; first && i < candidates_.size(); ++i)
       candidates_[i].before = level_.particles()[i].log_likelihood - candidates_[i].settled;
     if (!proposed_.empty()) Accept(rng);
-    if (moves_left_ == 0) LetInEvidence(rng);
+    if (moves_left_ == 0) RaiseTempering(rng);
     if (moves_left_ > 0) {
       Propose(rng);
     } else {
@@ -228,7 +228,7 @@ void SegmentFilter::Enter(std::vector<Candidate>& subjects) {
 
 // Introduces as much more of the evidence as leaves enough effective particles. If that is not all of it, the
 // particles are resampled and moved.
-void SegmentFilter::LetInEvidence(Rng& rng) {
+void SegmentFilter::RaiseTempering(Rng& rng) {
   const auto size = static_cast<double>(candidates_.size());
   const auto weights_with = [&](double more) {
     std::vector<double> log_weights;
@@ -236,7 +236,7 @@ void SegmentFilter::LetInEvidence(Rng& rng) {
       log_weights.push_back(candidate.log_weight + more * candidate.evidence);
     return NormalisedWeights(log_weights);
   };
-  double more = 1.0 - let_in_;
+  double more = 1.0 - tempering_;
   const bool all = EffectiveSampleSize(weights_with(more)) >= level_.options().resample_below * size;
   if (!all) {
     double low = 0.0, high = more;
@@ -244,9 +244,9 @@ void SegmentFilter::LetInEvidence(Rng& rng) {
       const double middle = 0.5 * (low + high);
       (EffectiveSampleSize(weights_with(middle)) >= kKeep * size ? low : high) = middle;
     }
-    more = std::min(more, std::max(low, kLeastLetIn));
+    more = std::min(more, std::max(low, kLeastTemperingStep));
   }
-  let_in_ += more;
+  tempering_ += more;
   if (all) {
     for (Candidate& candidate : candidates_) candidate.log_weight += more * candidate.evidence;
     return;
@@ -274,7 +274,7 @@ void SegmentFilter::Accept(Rng& rng) {
   std::size_t accepted = 0;
   for (std::size_t i = 0; i < candidates_.size(); ++i) {
     const double gain =
-        proposed_[i].settled - candidates_[i].settled + let_in_ * (proposed_[i].evidence - candidates_[i].evidence);
+        proposed_[i].settled - candidates_[i].settled + tempering_ * (proposed_[i].evidence - candidates_[i].evidence);
     if (!(std::log(UniformDraw(rng)) < gain)) continue;
     candidates_[i] = std::move(proposed_[i]);
     ++accepted;

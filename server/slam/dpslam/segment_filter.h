@@ -58,7 +58,7 @@ class SegmentFilter {
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     archive(self.level_, self.segments_, self.joints_, self.fixed_, self.open_, self.at_work_, self.share_, self.free_,
-            self.candidates_, self.proposed_, self.log_likelihoods_, self.let_in_, self.stride_, self.moves_left_,
+            self.candidates_, self.proposed_, self.log_likelihoods_, self.tempering_, self.stride_, self.moves_left_,
             self.moved_, self.to_draw_, self.drawings_, self.births_);
     if constexpr (Archive::kReads) archive.Require(self.Sound(), "the segments");
   }
@@ -123,7 +123,7 @@ class SegmentFilter {
   [[nodiscard]] std::size_t DrawSome(std::size_t count, const ParallelFor& parallel_for);
   [[nodiscard]] std::size_t JudgeSome(std::size_t count, const ParallelFor& parallel_for);
   void Enter(std::vector<Candidate>& subjects);
-  void LetInEvidence(Rng& rng);
+  void RaiseTempering(Rng& rng);
   void Propose(Rng& rng);
   void Accept(Rng& rng);
   void Finish();
@@ -145,7 +145,7 @@ class SegmentFilter {
   // The proposals of the move in evaluation; empty while the candidates themselves are evaluated.
   std::vector<Candidate> proposed_;
   std::vector<double> log_likelihoods_;  // Results so far, by open segment.
-  double let_in_ = 0.0;                  // Share of the evidence introduced so far, 0..1.
+  double tempering_ = 0.0;               // Share of the evidence introduced so far, 0..1.
   // Relative size of the moves of all joints and of the last joint: 0 does not move, 1 is independent of the
   // old value.
   std::array<double, 2> stride_{};

@@ -5,8 +5,8 @@
 
 #include "server/slam/filters/revisit_innovation.h"
 #include "server/slam/landmark_variants/landmark_point.h"
-#include "server/slam/landmarks/chi_square.h"
-#include "server/slam/motion/dead_reckoning.h"
+#include "server/slam/landmarks/innovation.h"
+#include "server/slam/motion/odometry_model.h"
 
 namespace cairn::slam {
 

@@ -14,10 +14,8 @@
 #include <vector>
 
 #include "server/slam/ekf/joint_state.h"
-#include "server/slam/filters/back_end_options.h"
-#include "server/slam/filters/contradictions.h"
 #include "server/slam/filters/filter.h"
-#include "server/slam/filters/step_nis.h"
+#include "server/slam/filters/filter_health.h"
 #include "server/slam/landmarks/association.h"
 #include "server/slam/landmarks/landmark_candidates.h"
 

@@ -20,13 +20,11 @@
 #include <vector>
 
 #include "server/slam/fastslam/particle_set.h"
-#include "server/slam/filters/back_end_options.h"
-#include "server/slam/filters/contradictions.h"
 #include "server/slam/filters/filter.h"
+#include "server/slam/filters/filter_health.h"
 #include "server/slam/landmarks/association.h"
-#include "server/slam/landmarks/chi_square.h"
+#include "server/slam/landmarks/innovation.h"
 #include "server/slam/landmarks/landmark_candidates.h"
-#include "server/slam/landmarks/landmark_index.h"
 
 namespace cairn::slam {
 

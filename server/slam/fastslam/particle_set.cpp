@@ -9,9 +9,16 @@
 
 #include "common/geometry/pose_difference.h"
 #include "server/slam/filters/revisit_innovation.h"
-#include "server/slam/motion/dead_reckoning.h"
+#include "server/slam/motion/odometry_model.h"
 
 namespace cairn::slam {
+
+void Visit(OptionVisitor& visitor, FastSlamOptions& options) {
+  visitor.Real("sample_distance_m", options.sample_distance_m, "m", 0.0, 1000.0,
+               "FastSLAM 2.0 draws the motion of a particle without an observation after this way.");
+  visitor.Real("resample_below", options.resample_below, "1", 0.0, 1.0,
+               "The particles are resampled when the effective sample size falls below this share of their number.");
+}
 
 ParticleSet::ParticleSet(const FastSlamOptions& options, double max_nis, std::int64_t count,
                          const Pose2& T_map_robot_start, std::uint64_t seed, MotionSampler sampler)

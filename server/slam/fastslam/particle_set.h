@@ -6,20 +6,49 @@
 // 4.9; Montemerlo 2003.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <span>
 #include <vector>
 
+#include "common/geometry/pose2.h"
+#include "common/options/option_visitor.h"
 #include "server/slam/fastslam/error_ensemble.h"
-#include "server/slam/fastslam/fastslam_options.h"
 #include "server/slam/fastslam/motion_sampler.h"
-#include "server/slam/fastslam/particle.h"
 #include "server/slam/filters/filter.h"
-#include "server/slam/filters/step_nis.h"
+#include "server/slam/filters/filter_health.h"
 #include "server/slam/landmarks/innovation.h"
 #include "server/slam/random/resampling.h"
+#include "server/slam/trail/shared_sequence.h"
 
 namespace cairn::slam {
+
+struct FastSlamOptions {
+  double sample_distance_m = 1.0;
+  double resample_below = 0.5;
+  // Only the study of sensitivity sets these.
+  double agreement_m = 0.5;    // Particles this near to the best one take part in the reported pose.
+  double loop_sigma_m = 0.05;  // Standard deviation of the pose after a large loop, which does not make it exact.
+  double loop_sigma_rad = 0.01;
+};
+void Visit(OptionVisitor& visitor, FastSlamOptions& options);
+
+// One hypothesis of a particle filter: the pose of the robot and the path to it. The filter stores the
+// landmarks of each particle separately. Copies share the path until they differ. Poses in `map`.
+// Source: thesis A 4.1, (4-1); Montemerlo 2003 (FastSLAM 2.0).
+struct Particle {
+  Pose2 T_map_robot;  // Pose of the robot; xv in the thesis.
+  // pv: covariance of the motion not yet sampled, (x, y, theta) in map.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  double log_weight = 0.0;      // Sum since the last resampling.
+  double log_likelihood = 0.0;  // Log likelihood of the whole path; resampling keeps it.
+  SharedSequence<Pose2> path;   // T_map_robot at every keyframe.
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.T_map_robot, self.covariance, self.log_weight, self.log_likelihood, self.path);
+  }
+};
 
 class ParticleSet {
  public:

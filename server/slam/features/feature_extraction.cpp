@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "server/slam/features/patterns.h"
+#include "server/slam/features/corners.h"
 
 namespace cairn::slam {
 

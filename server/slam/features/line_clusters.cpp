@@ -1,7 +1,7 @@
-#include "server/slam/features/line_clusters.h"
-
 #include <algorithm>
 #include <cmath>
+
+#include "server/slam/features/split_and_merge.h"
 
 namespace cairn::slam {
 namespace {

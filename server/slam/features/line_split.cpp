@@ -1,9 +1,7 @@
-#include "server/slam/features/line_split.h"
-
 #include <algorithm>
 #include <cmath>
 
-#include "server/slam/features/line_clusters.h"
+#include "server/slam/features/split_and_merge.h"
 
 namespace cairn::slam {
 namespace {

@@ -19,4 +19,13 @@ struct ScanView {
   }
 };
 
+// The bare positions of a scan's points, for matchers that do not use surface directions. In the robot frame
+// of the scan.
+[[nodiscard]] inline std::vector<Eigen::Vector2d> PositionsOf(const ScanView& view) {
+  std::vector<Eigen::Vector2d> positions;
+  positions.reserve(view.points_robot.size());
+  for (const SurfacePoint& point : view.points_robot) positions.push_back(point.p);
+  return positions;
+}
+
 }  // namespace cairn::slam

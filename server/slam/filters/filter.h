@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "common/sensor/scan.h"
 #include "server/slam/features/scan_view.h"
 #include "server/slam/landmarks/landmark.h"
+#include "server/slam/landmarks/landmark_options.h"
 #include "server/slam/motion/step_motion.h"
 #include "server/slam/parallel_for.h"
 #include "server/slam/state/archive.h"
@@ -20,6 +22,15 @@
 #include "server/slam/trail/shared_sequence.h"
 
 namespace cairn::slam {
+
+// Options that all filters of the mapper share: the drift of the motion that they receive, landmarks, and
+// when a filter counts as diverged.
+struct BackEndOptions {
+  MotionNoise drift{0.002, 0.01, 0.005, 0.0005, 0.002, 0.005};
+  LandmarkOptions landmarks;
+  double max_nis = 16.0;
+  std::int64_t diverged_after = 10;
+};
 
 // The content of a keyframe: filters with landmarks use the features, filters with grids the ranges.
 struct KeyframeSight {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "server/slam/scan/tilt.h"
+#include "server/slam/scan/beam_points.h"
 
 namespace cairn::slam {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "server/slam/localisation/pose_fusion.h"
+#include "server/slam/localisation/place_hypotheses.h"
 
 namespace cairn::slam {
 namespace {

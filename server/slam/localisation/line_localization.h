@@ -18,11 +18,10 @@
 #include <vector>
 
 #include "common/map/map_lines.h"
-#include "server/slam/filters/back_end_options.h"
 #include "server/slam/filters/filter.h"
 #include "server/slam/localisation/line_match.h"
 #include "server/slam/localisation/place_hypotheses.h"
-#include "server/slam/reckoning/reckoned_path.h"
+#include "server/slam/reckoning/dead_reckoning_filter.h"
 
 namespace cairn::slam {
 

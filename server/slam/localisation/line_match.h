@@ -1,6 +1,6 @@
 // Finds the robot in a known map of straight walls without a prior: every consistent assignment of the scan's
 // lines to the map's lines is a hypothesis of the pose. Not a front-end matcher: it compares a scan with a
-// map, not with a scan, and returns several poses; pose_fusion.h fuses one of them with odometry,
+// map, not with a scan, and returns several poses; place_hypotheses.h fuses one of them with odometry,
 // line_localization.h is the filter.
 // The recursion assigns one scan line after the other and abandons a branch at the first impossible pair.
 // There are two ways to assign (LineMatchPairing): the algorithm as printed, and ours, in which a scan line

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "server/slam/loops/region_search.h"
 
@@ -142,27 +143,15 @@ std::optional<LoopClosure> LoopSearch::Find(const Trail& trail, const SharedSequ
 std::vector<std::size_t> LoopSearch::Candidates(const Trail& trail, const SharedSequence<Pose2>& path) const {
   const std::span<const KeyframeShape> shapes = trail.shapes();
   const std::span<const double> distances_m = trail.distances_m();
-  struct Candidate {
-    std::size_t old;
-    double cost;  // Distance divided by the reach.
-  };
-  std::vector<Candidate> all;
+  std::vector<KeyframeCost> all;
   const Pose2& here = path[shapes.size() - 1];
   for (std::size_t k = 0; k < shapes.size(); k += static_cast<std::size_t>(options_.candidate_stride)) {
     if (distances_m[k] < options_.min_way_m) continue;
+    // Distance divided by the reach.
     const double cost = (path[k].translation() - here.translation()).norm() / Reach(distances_m[k]);
     if (cost < 1.0) all.push_back({k, cost});
   }
-  std::stable_sort(all.begin(), all.end(), [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
-  std::vector<std::size_t> chosen;
-  for (const Candidate& candidate : all) {
-    const bool same_place = std::any_of(chosen.begin(), chosen.end(), [&](std::size_t other) {
-      return std::abs(shapes[candidate.old].travelled_m - shapes[other].travelled_m) < options_.around_m;
-    });
-    if (!same_place) chosen.push_back(candidate.old);
-    if (chosen.size() == kMaxCandidates) break;
-  }
-  return chosen;
+  return BestPlaces(std::move(all), shapes, options_.around_m, kMaxCandidates);
 }
 
 std::optional<LoopClosure> LoopSearch::Compare(const Trail& trail, std::size_t old,

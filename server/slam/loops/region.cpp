@@ -32,6 +32,21 @@ std::vector<SurfacePoint> SurfacesOf(std::span<const KeyframeShape> shapes, cons
   return surfaces;
 }
 
+std::vector<std::size_t> BestPlaces(std::vector<KeyframeCost> all, std::span<const KeyframeShape> shapes,
+                                    double apart_m, std::size_t most) {
+  std::stable_sort(all.begin(), all.end(),
+                   [](const KeyframeCost& a, const KeyframeCost& b) { return a.cost < b.cost; });
+  std::vector<std::size_t> chosen;
+  for (const KeyframeCost& candidate : all) {
+    const bool same_place = std::any_of(chosen.begin(), chosen.end(), [&](std::size_t other) {
+      return std::abs(shapes[candidate.keyframe].travelled_m - shapes[other].travelled_m) < apart_m;
+    });
+    if (!same_place) chosen.push_back(candidate.keyframe);
+    if (chosen.size() == most) break;
+  }
+  return chosen;
+}
+
 FreeSpace::FreeSpace(const Trail& trail, const Stretch& stretch, const FreeSpaceOptions& given) : options_(given) {
   const std::span<const Keyframe> keyframes = trail.keyframes();
   const std::span<const KeyframeShape> shapes = trail.shapes();

@@ -39,6 +39,17 @@ void ForEachSurface(std::span<const KeyframeShape> shapes, const Stretch& stretc
 [[nodiscard]] std::vector<SurfacePoint> SurfacesOf(std::span<const KeyframeShape> shapes, const Stretch& stretch,
                                                    double cell_m);
 
+// An old keyframe that a search may use; those of the lowest cost come first.
+struct KeyframeCost {
+  std::size_t keyframe = 0;
+  double cost = 0.0;
+};
+
+// Returns at most `most` keyframes in the order of their costs, and only one per place: no two are nearer to each
+// other along the path than `apart_m`.
+[[nodiscard]] std::vector<std::size_t> BestPlaces(std::vector<KeyframeCost> all, std::span<const KeyframeShape> shapes,
+                                                  double apart_m, std::size_t most);
+
 struct FreeSpaceOptions {
   double cell_m = 0.2;
   double max_ray_m = 15.0;  // Beyond this range neighbouring beams leave gaps.

@@ -5,13 +5,46 @@
 // Source: branch and bound of Hess et al., ICRA 2016, section V.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "common/geometry/pose2.h"
-#include "server/slam/loops/likelihood_pyramid.h"
+#include "server/slam/scan/surface_points.h"
 
 namespace cairn::slam {
+
+// The likelihood of points, given the surfaces of a reference set, for fast evaluation of many poses: a
+// raster of 0..255 (255 on a reference point, falling to 0 at `reach_m`), and coarser rasters that hold the
+// maximum of every block. The value of a coarse cell is an upper bound for every pose inside it, so that a
+// search can skip most poses.
+// Frame: that of the reference points. Immutable after construction; any thread may read.
+// Source: multi-resolution correlative matching of Olson, ICRA 2009; bounds as in Hess et al., ICRA 2016,
+// section V.
+class LikelihoodPyramid {
+ public:
+  // Points that a pose moves out of the raster score 0. REQUIRES: 2^(levels - 1) <= 64 cells.
+  LikelihoodPyramid(std::span<const SurfacePoint> reference, double cell_m, double reach_m, int levels);
+
+  // The maximum over the 2^level x 2^level cells with (x, y) as the lower left one, in cells of level 0.
+  [[nodiscard]] std::uint8_t Best(int level, int x, int y) const {
+    const int column = x + kPad - low_x_, row = y + kPad - low_y_;
+    if (column < 0 || row < 0 || column >= width_ || row >= height_) return 0;
+    return levels_[static_cast<std::size_t>(level)][static_cast<std::size_t>(row * width_ + column)];
+  }
+  [[nodiscard]] double cell_m() const { return cell_m_; }
+  [[nodiscard]] int levels() const { return static_cast<int>(levels_.size()); }
+
+ private:
+  // Border in cells: blocks that begin left of or below the points still contain some of them.
+  static constexpr int kPad = 64;
+
+  double cell_m_;
+  int low_x_ = 0, low_y_ = 0;  // Lowest cell of the points.
+  int width_ = 0, height_ = 0;
+  std::vector<std::vector<std::uint8_t>> levels_;  // Rasters by level, each row-major, width_ x height_.
+};
 
 struct SearchWindow {
   Pose2 T_ref_curr_centre;

@@ -2,17 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "server/slam/loops/region.h"
 
 namespace cairn::slam {
 namespace {
 
 // Half or twice of any of these changes the share of noticed errors by less than a tenth (study `sensitivity`).
-constexpr std::size_t kMaxWitnesses = 3;
-constexpr std::size_t kMinLooks = 5;  // Comparisons of a stretch needed for a decision.
-constexpr int kMinKnown = 20;         // Points that must be compared for a comparison to count.
-constexpr double kTurnCostM = 1.0;    // Cost per radian: scans in other directions overlap less.
-constexpr double kSamePlaceM = 3.0;   // Least distance along the path between two keyframes used.
-constexpr std::size_t kMaxLooks =
+constexpr std::size_t kMaxCompared = 3;
+constexpr std::size_t kMinComparisons = 5;  // Comparisons of a stretch needed for a decision.
+constexpr int kMinKnown = 20;               // Points that must be compared for a comparison to count.
+constexpr double kTurnCostM = 1.0;          // Cost per radian: scans in other directions overlap less.
+constexpr double kSamePlaceM = 3.0;         // Least distance along the path between two keyframes used.
+constexpr std::size_t kMaxComparisons =
     500;  // Bound for a robot that turns on the spot and makes comparisons without travelling.
 
 }  // namespace
@@ -41,36 +44,32 @@ void SelfCheck::Look(const Trail& trail, const SharedSequence<Pose2>& path) {
   const std::span<const KeyframeShape> shapes = trail.shapes();
   const double here_m = shapes.back().travelled_m;
   // A stretch must contain enough comparisons for a decision.
-  const double every_m = std::min(options_.every_m, options_.stretch_m / static_cast<double>(kMinLooks));
-  if (!options_.enabled || here_m - looked_at_m_ < every_m) return;
-  looked_at_m_ = here_m;
+  const double every_m = std::min(options_.every_m, options_.stretch_m / static_cast<double>(kMinComparisons));
+  if (!options_.enabled || here_m - compared_at_m_ < every_m) return;
+  compared_at_m_ = here_m;
   const std::size_t now = shapes.size() - 1;
-  Looked look{here_m, {}};
-  for (const std::size_t old : Witnesses(shapes, path)) {
+  Comparison comparison{here_m, {}};
+  for (const std::size_t old : KeyframesToCompare(shapes, path)) {
     const Pose2 T_old_now = Between(path[old], path[now]);
-    look.testimony +=
-        Testify(*keyframes[old].scan, T_old_now, shapes[now].points, options_.near_m, options_.max_range_m);
-    look.testimony +=
-        Testify(*keyframes[now].scan, T_old_now.Inverse(), shapes[old].points, options_.near_m, options_.max_range_m);
+    comparison.counts +=
+        CompareVisibility(*keyframes[old].scan, T_old_now, shapes[now].points, options_.near_m, options_.max_range_m);
+    comparison.counts += CompareVisibility(*keyframes[now].scan, T_old_now.Inverse(), shapes[old].points,
+                                           options_.near_m, options_.max_range_m);
   }
-  if (look.testimony.known() < kMinKnown) return;
-  looks_.push_back(look);
+  if (comparison.counts.known() < kMinKnown) return;
+  comparisons_.push_back(comparison);
   Judge();
 }
 
 void SelfCheck::Forget() {
-  looks_.clear();
+  comparisons_.clear();
   contradicted_ = false;
 }
 
 // Old keyframes near the believed pose, those with the most overlap first, and only one per place and visit.
-std::vector<std::size_t> SelfCheck::Witnesses(std::span<const KeyframeShape> shapes,
-                                              const SharedSequence<Pose2>& path) const {
-  struct Candidate {
-    std::size_t keyframe;
-    double cost_m;
-  };
-  std::vector<Candidate> all;
+std::vector<std::size_t> SelfCheck::KeyframesToCompare(std::span<const KeyframeShape> shapes,
+                                                       const SharedSequence<Pose2>& path) const {
+  std::vector<KeyframeCost> all;
   const KeyframeShape& last = shapes.back();
   const Pose2 here = path[shapes.size() - 1];
   for (std::size_t k = 0; k < shapes.size() && last.travelled_m - shapes[k].travelled_m >= options_.min_travel_m; ++k) {
@@ -79,24 +78,16 @@ std::vector<std::size_t> SelfCheck::Witnesses(std::span<const KeyframeShape> sha
     if (distance_m > options_.max_distance_m) continue;
     all.push_back({k, distance_m + kTurnCostM * std::abs(AngleDiff(there.theta, here.theta))});
   }
-  std::stable_sort(all.begin(), all.end(), [](const Candidate& a, const Candidate& b) { return a.cost_m < b.cost_m; });
-  std::vector<std::size_t> chosen;
-  for (const Candidate& candidate : all) {
-    const bool same_place = std::any_of(chosen.begin(), chosen.end(), [&](std::size_t other) {
-      return std::abs(shapes[candidate.keyframe].travelled_m - shapes[other].travelled_m) < kSamePlaceM;
-    });
-    if (!same_place) chosen.push_back(candidate.keyframe);
-    if (chosen.size() == kMaxWitnesses) break;
-  }
-  return chosen;
+  return BestPlaces(std::move(all), shapes, kSamePlaceM, kMaxCompared);
 }
 
 void SelfCheck::Judge() {
-  while (looks_.back().travelled_m - looks_.front().travelled_m > options_.stretch_m || looks_.size() > kMaxLooks)
-    looks_.pop_front();
-  if (looks_.size() < kMinLooks) return;
-  Testimony sum;
-  for (const Looked& look : looks_) sum += look.testimony;
+  while (comparisons_.back().travelled_m - comparisons_.front().travelled_m > options_.stretch_m ||
+         comparisons_.size() > kMaxComparisons)
+    comparisons_.pop_front();
+  if (comparisons_.size() < kMinComparisons) return;
+  VisibilityCounts sum;
+  for (const Comparison& comparison : comparisons_) sum += comparison.counts;
   const double conflict = static_cast<double>(sum.contradicted) / static_cast<double>(sum.known());
   contradicted_ = conflict > (contradicted_ ? 0.5 : 1.0) * options_.max_conflict;
 }

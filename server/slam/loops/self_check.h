@@ -1,6 +1,6 @@
 // Checks whether the present scans agree with the map that the robot itself has drawn. About every half metre
 // the scan at the believed pose is compared with old keyframes nearby at their believed poses. Points of
-// either that lie where beams of the other passed are contradictions (witness.h). Only keyframes from an
+// either that lie where beams of the other passed are contradictions (visibility.h). Only keyframes from an
 // earlier visit are compared, because those of the last metres have drifted together with the robot and
 // always agree. If contradictions prevail over a stretch (people, doors and a moved chair do not cause that),
 // the belief is wrong, whatever the filter's covariance is.
@@ -15,7 +15,7 @@
 
 #include "common/options/option_visitor.h"
 #include "common/sensor/scan.h"
-#include "server/slam/loops/witness.h"
+#include "server/slam/loops/visibility.h"
 #include "server/slam/trail/shared_sequence.h"
 #include "server/slam/trail/trail.h"
 
@@ -48,26 +48,26 @@ class SelfCheck {
 
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
-    archive(self.looked_at_m_, self.looks_, self.contradicted_);
+    archive(self.compared_at_m_, self.comparisons_, self.contradicted_);
   }
 
  private:
-  struct Looked {
+  struct Comparison {
     double travelled_m = 0.0;
-    Testimony testimony;
+    VisibilityCounts counts;
 
     template <typename Archive>
     static void Members(Archive& archive, auto& self) {
-      archive(self.travelled_m, self.testimony.borne_out, self.testimony.contradicted);
+      archive(self.travelled_m, self.counts.confirmed, self.counts.contradicted);
     }
   };
-  [[nodiscard]] std::vector<std::size_t> Witnesses(std::span<const KeyframeShape> shapes,
-                                                   const SharedSequence<Pose2>& path) const;
+  [[nodiscard]] std::vector<std::size_t> KeyframesToCompare(std::span<const KeyframeShape> shapes,
+                                                            const SharedSequence<Pose2>& path) const;
   void Judge();
 
   SelfCheckOptions options_;
-  double looked_at_m_ = 0.0;
-  std::deque<Looked> looks_;  // The comparisons over the last stretch with enough points.
+  double compared_at_m_ = 0.0;
+  std::deque<Comparison> comparisons_;  // The comparisons over the last stretch with enough points.
   bool contradicted_ = false;
 };
 

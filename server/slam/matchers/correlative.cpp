@@ -1,8 +1,8 @@
 #include "server/slam/matchers/correlative.h"
 
 #include "server/slam/matchers/correlative_search.h"
-#include "server/slam/matching/degeneracy.h"
-#include "server/slam/matching/surface_agreement.h"
+#include "server/slam/matching/match_result.h"
+#include "server/slam/matching/point_to_line.h"
 
 namespace cairn::slam {
 

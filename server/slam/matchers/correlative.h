@@ -16,7 +16,6 @@
 #include "common/geometry/angle.h"
 #include "common/options/option_visitor.h"
 #include "server/slam/features/scan_view.h"
-#include "server/slam/matching/match_prior.h"
 #include "server/slam/matching/match_result.h"
 #include "server/slam/parallel_for.h"
 

@@ -8,8 +8,8 @@
 
 #include "common/geometry/pose_difference.h"
 #include "server/slam/matchers/hough_transform.h"
-#include "server/slam/matching/degeneracy.h"
-#include "server/slam/matching/surface_agreement.h"
+#include "server/slam/matching/match_result.h"
+#include "server/slam/matching/point_to_line.h"
 
 namespace cairn::slam {
 namespace {

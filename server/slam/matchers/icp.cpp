@@ -1,7 +1,7 @@
 #include "server/slam/matchers/icp.h"
 
-#include "server/slam/matching/degeneracy.h"
-#include "server/slam/matching/surface_agreement.h"
+#include "server/slam/matching/match_result.h"
+#include "server/slam/matching/point_to_line.h"
 
 namespace cairn::slam {
 

@@ -9,7 +9,7 @@
 #pragma once
 
 #include "server/slam/features/scan_view.h"
-#include "server/slam/matching/match_prior.h"
+#include "server/slam/matching/match_result.h"
 #include "server/slam/matching/point_to_line.h"
 
 namespace cairn::slam {

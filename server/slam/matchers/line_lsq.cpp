@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "server/slam/matching/degeneracy.h"
 #include "server/slam/matching/match_covariance.h"
+#include "server/slam/matching/match_result.h"
 
 namespace cairn::slam {
 namespace {

@@ -14,7 +14,6 @@
 #include "server/slam/matchers/line_association.h"
 #include "server/slam/matchers/line_least_squares.h"
 #include "server/slam/matchers/polyline.h"
-#include "server/slam/matching/match_prior.h"
 #include "server/slam/matching/match_result.h"
 
 namespace cairn::slam {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "common/geometry/pose_difference.h"
-#include "server/slam/matchers/scan_points.h"
+#include "server/slam/features/scan_view.h"
 
 namespace cairn::slam {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "server/slam/matchers/scan_points.h"
+#include "server/slam/features/scan_view.h"
 
 namespace cairn::slam {
 

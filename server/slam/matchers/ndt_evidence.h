@@ -8,7 +8,6 @@
 #include <span>
 
 #include "server/slam/matchers/ndt_map.h"
-#include "server/slam/matching/match_prior.h"
 #include "server/slam/matching/match_result.h"
 
 namespace cairn::slam {

@@ -1,5 +1,6 @@
 // The result of every scan matcher: the motion of the robot between two scans, its uncertainty, and the
-// reason if there is no match.
+// reason if there is no match. Also what follows if the scans leave one direction of the plane free (a
+// corridor, a single wall). Plain values and functions without state.
 // T_ref_curr maps coordinates in the robot frame of the current scan to the robot frame of the reference
 // scan.
 #pragma once
@@ -25,5 +26,30 @@ struct MatchResult {
   Eigen::Vector2d degenerate_direction = Eigen::Vector2d::Zero();  // That direction: a unit vector, in ref.
   MatchFailure failure = MatchFailure::kNone;
 };
+
+// The estimate of the motion between two scans before they are matched, from odometry or a forecast.
+struct MatchPrior {
+  Pose2 T_ref_curr;                                          // Start of a matcher; the identity if unknown.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  // Covariance of (x, y, theta), in ref.
+};
+
+// A value of `ratio` for JudgeDegeneracy that suits all matchers of points and lines: a room is far above it,
+// a corridor far below.
+inline constexpr double kCorridorRatio = 0.02;
+
+// Sets `degenerate` and `degenerate_direction`. H is the information on (x, y, theta). The match is
+// degenerate if, with the heading left free, the smallest eigenvalue of the information on the translation is
+// below `ratio` times the largest. The direction is the eigenvector of the smallest.
+void JudgeDegeneracy(const Eigen::Matrix3d& H, double ratio, MatchResult& result);
+
+// Combines two translations: across `along` the result is `measured`, along it `prior`. Both are in one
+// frame; `along` is a unit vector.
+[[nodiscard]] Eigen::Vector2d TakeAlongFromPrior(const Eigen::Vector2d& measured, const Eigen::Vector2d& prior,
+                                                 const Eigen::Vector2d& along);
+
+// The same for a whole result, if it is degenerate: position and uncertainty along the degenerate direction
+// are replaced by those of the prior. Apparent evidence along a corridor is only the end of the view, which
+// moves with the robot.
+void TakeAlongFromPrior(const MatchPrior& prior, MatchResult& result);
 
 }  // namespace cairn::slam

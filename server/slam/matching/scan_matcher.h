@@ -10,7 +10,6 @@
 #include <functional>
 
 #include "server/slam/features/scan_view.h"
-#include "server/slam/matching/match_prior.h"
 #include "server/slam/matching/match_result.h"
 #include "server/slam/parallel_for.h"
 

@@ -35,13 +35,13 @@ Eigen::Matrix3d J_pose_pose(const Pose2& T_map_robot, const OdometryControl& con
   return Gv;
 }
 
-Eigen::Matrix3d J_pose_control(const Pose2& T_map_robot, const OdometryControl& control) {
-  const double course = T_map_robot.theta + control.rot1;
-  Eigen::Matrix3d Gu;
-  Gu << -control.trans * std::sin(course), std::cos(course), 0,  //
-      control.trans * std::cos(course), std::sin(course), 0,     //
-      1, 0, 1;
-  return Gu;
+void DeadReckon(Pose2& T_map_robot, Eigen::Matrix3d& covariance, const Pose2& T_prev_curr,
+                const Eigen::Matrix3d& step_covariance_prev) {
+  const OdometryControl control = InverseOdometry(T_prev_curr);
+  const Eigen::Matrix3d Gv = J_pose_pose(T_map_robot, control);
+  const Eigen::Matrix3d J_step = J_compose_right(T_map_robot, T_prev_curr);
+  covariance = Gv * covariance * Gv.transpose() + J_step * step_covariance_prev * J_step.transpose();
+  T_map_robot = ApplyControl(T_map_robot, control);
 }
 
 }  // namespace cairn::slam

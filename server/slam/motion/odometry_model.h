@@ -23,8 +23,12 @@ struct OdometryControl {
 // The pose after the control, (4-8)..(4-10).
 [[nodiscard]] Pose2 ApplyControl(const Pose2& T_map_robot, const OdometryControl& control);
 
-// Derivatives of ApplyControl by the pose, Gv (4-11), and by the control, Gu (4-12).
+// Derivative of ApplyControl by the pose, Gv (4-11).
 [[nodiscard]] Eigen::Matrix3d J_pose_pose(const Pose2& T_map_robot, const OdometryControl& control);
-[[nodiscard]] Eigen::Matrix3d J_pose_control(const Pose2& T_map_robot, const OdometryControl& control);
+
+// Moves a pose and its covariance (in `map`) along a measured step. `step_covariance_prev` is the covariance
+// of the step's (x, y, theta), in the frame in which the step starts; it takes the place of Gu R_u Gu'.
+void DeadReckon(Pose2& T_map_robot, Eigen::Matrix3d& covariance, const Pose2& T_prev_curr,
+                const Eigen::Matrix3d& step_covariance_prev);
 
 }  // namespace cairn::slam

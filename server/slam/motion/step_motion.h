@@ -1,13 +1,31 @@
-// The measured motion of a robot from one keyframe to the next, from which a filter predicts. Metres and
-// radians.
+// The measured motion of a robot from one keyframe to the next, from which a filter predicts, and the noise of
+// such a step. Metres and radians.
 #pragma once
 
 #include <Eigen/Core>
 #include <optional>
+#include <string_view>
 
 #include "common/geometry/pose2.h"
+#include "common/options/option_visitor.h"
 
 namespace cairn::slam {
+
+// The uncertainty of a matched or dead-reckoned step: noise of (x, y, theta) that grows with the distance and
+// the turn.
+// Source: the proportional model of thesis A (4-3), in the manner of Thrun et al. 2005, 5.4.
+struct MotionNoise {
+  double trans_base_m = 0.0;
+  double trans_per_m = 0.0;
+  double trans_per_rad = 0.0;
+  double rot_base_rad = 0.0;
+  double rot_per_m = 0.0;
+  double rot_per_rad = 0.0;
+
+  // Diagonal covariance of (x, y, theta) of a step, in the frame in which the step starts.
+  [[nodiscard]] Eigen::Matrix3d Covariance(const Pose2& T_prev_curr) const;
+};
+void Visit(OptionVisitor& visitor, MotionNoise& options);
 
 struct StepMotion {
   Pose2 T_prev_curr;  // Result of the front-end: matched, or odometry or a forecast if nothing matched.
@@ -23,6 +41,42 @@ struct StepMotion {
     return T_prev_curr_odom ? StepMotion{*T_prev_curr_odom, Eigen::Matrix3d::Zero(), T_prev_curr_odom, lambda_m}
                             : *this;
   }
+};
+
+// The speed of the robot's last step, and the motion that this speed forecasts for the next step. Not a
+// filter: only the last step counts. Frame: T_prev_curr in the robot frame, x forward; the sideways speed is
+// taken as zero. Not thread-safe.
+// Source: thesis C 5.2 (lambda = |dt V|, there from the displacement between the previous scans).
+class ConstantSpeed {
+ public:
+  void Moved(const Pose2& T_prev_curr, double seconds) {
+    speed_.reset();
+    if (seconds > 0.0) speed_ = Speed{T_prev_curr.x / seconds, T_prev_curr.theta / seconds};
+  }
+  void Forget() { speed_.reset(); }
+  // The identity if the speed is not known, or if `seconds` is too long for the speed to mean anything.
+  [[nodiscard]] Pose2 Forecast(double seconds) const {
+    if (!speed_ || seconds >= kLongest_s) return {};
+    return {speed_->forward_m_s * seconds, 0.0, WrapAngle(speed_->turn_rad_s * seconds)};
+  }
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.speed_);
+  }
+
+ private:
+  static constexpr double kLongest_s = 10.0;
+  struct Speed {
+    double forward_m_s = 0.0;
+    double turn_rad_s = 0.0;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.forward_m_s, self.turn_rad_s);
+    }
+  };
+  std::optional<Speed> speed_;
 };
 
 }  // namespace cairn::slam

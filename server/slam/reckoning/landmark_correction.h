@@ -15,11 +15,10 @@
 
 #include <vector>
 
-#include "server/slam/filters/back_end_options.h"
-#include "server/slam/filters/contradictions.h"
 #include "server/slam/filters/filter.h"
+#include "server/slam/filters/filter_health.h"
 #include "server/slam/landmarks/landmark_candidates.h"
-#include "server/slam/reckoning/reckoned_path.h"
+#include "server/slam/reckoning/dead_reckoning_filter.h"
 
 namespace cairn::slam {
 

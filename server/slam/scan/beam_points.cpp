@@ -2,8 +2,6 @@
 
 #include <cmath>
 
-#include "server/slam/scan/tilt.h"
-
 namespace cairn::slam {
 
 std::vector<BeamPoint> PointsOf(const Scan& scan) {

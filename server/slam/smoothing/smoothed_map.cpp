@@ -2,8 +2,6 @@
 
 #include <utility>
 
-#include "server/slam/smoothing/smoothed_path.h"
-
 namespace cairn::slam {
 namespace {
 
@@ -27,6 +25,18 @@ std::optional<Drawing> DrawAlong(const std::vector<Pose2>& path, const MapperSna
 }
 
 }  // namespace
+
+std::optional<std::vector<Pose2>> SmoothedPath(const MapperSnapshot& snapshot, const std::function<bool()>& go_on) {
+  std::vector<Pose2> path = snapshot.full_path;
+  // If the optimisation finds nothing better, it leaves the path as it is.
+  if (snapshot.pose_graph.enabled && OptimisePoses(path, snapshot.relations, snapshot.pose_graph, go_on).cancelled)
+    return std::nullopt;
+  return path;
+}
+
+std::vector<Pose2> SmoothedPath(const MapperSnapshot& snapshot) {
+  return *SmoothedPath(snapshot, {});
+}
 
 std::optional<SmoothedMap> SmoothMap(const MapperSnapshot& snapshot, const GridOptions& options,
                                      const std::function<bool()>& next, const std::function<bool()>& go_on) {

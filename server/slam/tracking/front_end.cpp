@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "common/geometry/pose_difference.h"
-#include "server/slam/matching/degeneracy.h"
-#include "server/slam/matching/surface_agreement.h"
+#include "server/slam/matching/match_result.h"
+#include "server/slam/matching/point_to_line.h"
 
 namespace cairn::slam {
 namespace {

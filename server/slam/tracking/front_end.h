@@ -16,7 +16,7 @@
 #include "server/slam/features/scan_view.h"
 #include "server/slam/matching/point_to_line.h"
 #include "server/slam/matching/scan_matcher.h"
-#include "server/slam/motion/motion_noise.h"
+#include "server/slam/motion/step_motion.h"
 
 namespace cairn::slam {
 

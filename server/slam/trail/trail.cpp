@@ -1,16 +1,37 @@
 #include "server/slam/trail/trail.h"
 
+#include <functional>
+#include <limits>
+#include <queue>
 #include <utility>
 
 namespace cairn::slam {
+namespace {
+
+// Added to every covariance: options may set all noise to zero, but the least squares need positive definite
+// covariances.
+PoseRelation PositiveDefinite(PoseRelation relation) {
+  relation.covariance += 1e-10 * Eigen::Matrix3d::Identity();
+  return relation;
+}
+
+}  // namespace
 
 void Trail::Append(Keyframe keyframe, const Pose2& T_track_robot, std::vector<SurfacePoint> points_robot,
                    const Eigen::Matrix3d& step_covariance, const std::optional<RevisitObservation>& revisit) {
-  graph_.Append(FromLast(T_track_robot), step_covariance);
-  if (revisit) graph_.AddLoop(revisit->keyframe, size(), revisit->T_keyframe_robot, revisit->covariance);
+  const std::size_t node = size();
+  const Pose2 T_prev_curr = FromLast(T_track_robot);
+  if (node > 0)
+    relations_.push_back(
+        PositiveDefinite({node - 1, node, T_prev_curr, drift_.Covariance(T_prev_curr) + step_covariance, false}));
   shapes_.push_back({T_track_robot, TravelledTo(T_track_robot), std::move(points_robot)});
   keyframes_.push_back(std::move(keyframe));
-  distances_m_ = graph_.DistancesFromLast();
+  loops_.emplace_back();
+  if (revisit) {
+    AddLoop({revisit->keyframe, node, revisit->T_keyframe_robot, revisit->covariance, true});
+  } else {
+    distances_m_ = DistancesFromLast();
+  }
 }
 
 void Trail::JudgeLast(bool localized, bool on_the_path) {
@@ -38,7 +59,7 @@ void Trail::RestorePoints(const SurfaceOptions& options, const ParallelFor& para
       shapes_[k].points = SurfacePointsOf(PointsOf(scan), scan, options);
     }
   });
-  distances_m_ = graph_.DistancesFromLast();
+  if (!empty()) distances_m_ = DistancesFromLast();
 }
 
 void Trail::AddScan(Stamp stamp, const Pose2& T_keyframe_robot) {
@@ -46,15 +67,39 @@ void Trail::AddScan(Stamp stamp, const Pose2& T_keyframe_robot) {
 }
 
 void Trail::AddLoop(const PoseRelation& loop) {
-  graph_.AddLoop(loop.from, loop.to, loop.T_from_to, loop.covariance);
-  distances_m_ = graph_.DistancesFromLast();
+  relations_.push_back(PositiveDefinite(loop));
+  const double way_m = loop.T_from_to.translation().norm();
+  loops_[loop.from].push_back({loop.to, way_m});
+  loops_[loop.to].push_back({loop.from, way_m});
+  distances_m_ = DistancesFromLast();
+}
+
+std::vector<double> Trail::DistancesFromLast() const {
+  std::vector<double> distance(size(), std::numeric_limits<double>::infinity());
+  using Reached = std::pair<double, std::size_t>;
+  std::priority_queue<Reached, std::vector<Reached>, std::greater<>> open;
+  const auto reach = [&](std::size_t node, double way_m) {
+    if (way_m >= distance[node]) return;
+    distance[node] = way_m;
+    open.emplace(way_m, node);
+  };
+  reach(size() - 1, 0.0);
+  while (!open.empty()) {
+    const auto [way_m, node] = open.top();
+    open.pop();
+    if (way_m > distance[node]) continue;
+    if (node > 0) reach(node - 1, way_m + shapes_[node].travelled_m - shapes_[node - 1].travelled_m);
+    if (node + 1 < size()) reach(node + 1, way_m + shapes_[node + 1].travelled_m - shapes_[node].travelled_m);
+    for (const Loop& loop : loops_[node]) reach(loop.other, way_m + loop.way_m);
+  }
+  return distance;
 }
 
 std::optional<std::vector<Pose2>> Trail::PathWithLoop(const PoseRelation& loop, std::vector<Pose2> path,
                                                       const PoseGraphOptions& options) const {
-  KeyframeGraph closed = graph_;
-  closed.AddLoop(loop.from, loop.to, loop.T_from_to, loop.covariance);
-  if (!closed.Optimise(path, options).usable) return std::nullopt;
+  std::vector<PoseRelation> relations = relations_;
+  relations.push_back(PositiveDefinite(loop));
+  if (!OptimisePoses(path, relations, options).usable) return std::nullopt;
   return path;
 }
 
@@ -67,7 +112,8 @@ double Trail::TravelledTo(const Pose2& T_track_robot) const {
 }
 
 std::vector<PoseRelation> Trail::relations() const {
-  return graph_.has_loops() ? graph_.relations() : std::vector<PoseRelation>{};
+  // Without a loop there is one relation less than there are keyframes.
+  return !empty() && relations_.size() + 1 > size() ? relations_ : std::vector<PoseRelation>{};
 }
 
 }  // namespace cairn::slam

@@ -1,14 +1,17 @@
 // The keyframes along the way of one robot: the keyframes themselves, their shapes, the relations between
-// them (KeyframeGraph), the distances along these relations, and the place of every scan between them. It is
-// the only owner of all this; searches and checks read it. It does not contain the poses of the keyframes in
-// the map: these are the filter's path. Not thread-safe.
+// them (the motion from each keyframe to the next, and the relative poses of keyframes whose place was seen
+// again: loops), the distances along these relations, which bound the error of two keyframes' relative pose,
+// and the place of every scan between them. It is the only owner of all this; searches and checks read it. It
+// does not contain the poses of the keyframes in the map: these are the filter's path. Not thread-safe.
+// Source: Lu and Milios 1997; distance along the graph as a measure of uncertainty: Bosse et al. 2004 (Atlas).
 #pragma once
 
 #include <optional>
 #include <span>
 #include <vector>
 
-#include "server/slam/graph/keyframe_graph.h"
+#include "server/slam/graph/pose_graph.h"
+#include "server/slam/motion/step_motion.h"
 #include "server/slam/parallel_for.h"
 #include "server/slam/trail/keyframe.h"
 
@@ -17,7 +20,7 @@ namespace cairn::slam {
 class Trail {
  public:
   // `drift` gives the covariance of a matched step.
-  explicit Trail(const MotionNoise& drift) : graph_(drift) {}
+  explicit Trail(const MotionNoise& drift) : drift_(drift) {}
 
   // Appends the next keyframe. `step_covariance` is the covariance of the step to it, in the frame in which
   // the step starts, in addition to the drift; it is ignored for the first keyframe. `revisit` is an old
@@ -58,18 +61,38 @@ class Trail {
   // Without the points of the shapes and the distances, which follow from the rest: after reading, call RestorePoints.
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
-    archive(self.keyframes_, self.shapes_, self.graph_, self.scans_);
-    archive.SetKeyframes(self.size());
-    archive.Require(self.shapes_.size() == self.size() && self.graph_.size() == self.size(), "the number of keyframes");
-    for (const auto& scan : self.scans_) archive.RequireKeyframe(scan.keyframe);
+    archive(self.keyframes_, self.shapes_, self.relations_, self.loops_, self.scans_);
+    const std::size_t size = self.size();
+    archive.SetKeyframes(size);
+    archive.Require(self.shapes_.size() == size && self.loops_.size() == size, "the number of keyframes");
+    for (const PoseRelation& relation : self.relations_)
+      archive.Require(relation.from < size && relation.to < size, "a relation between keyframes");
+    for (const auto& loops : self.loops_)
+      for (const Loop& loop : loops) archive.Require(loop.other < size && loop.way_m >= 0.0, "a loop");
+    for (std::size_t k = 1; k < size && archive.ok(); ++k)
+      archive.Require(self.shapes_[k - 1].travelled_m <= self.shapes_[k].travelled_m, "the way to a keyframe");
+    for (const auto& scan : self.scans_) archive.Require(scan.keyframe < size, "the keyframe of a scan");
   }
   // Computes what is not stored; `options` are those of the front-end that gave the points.
   void RestorePoints(const SurfaceOptions& options, const ParallelFor& parallel_for);
 
  private:
+  struct Loop {
+    std::size_t other = 0;
+    double way_m = 0.0;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.other, self.way_m);
+    }
+  };
+  [[nodiscard]] std::vector<double> DistancesFromLast() const;
+
+  MotionNoise drift_;
   std::vector<Keyframe> keyframes_;
   std::vector<KeyframeShape> shapes_;  // One per keyframe.
-  KeyframeGraph graph_;
+  std::vector<PoseRelation> relations_;
+  std::vector<std::vector<Loop>> loops_;  // One list per keyframe. A loop is stored at both of its keyframes.
   std::vector<double> distances_m_;
   std::vector<MapperSnapshot::ScanPlace> scans_;
 };

@@ -6,12 +6,29 @@
 // Lines are in the robot frames of their scans. Stateless, thread-safe. Source: thesis A 3.5.2-3.5.8.
 #pragma once
 
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
 #include "common/geometry/pose2.h"
 #include "server/slam/features/line_feature.h"
 #include "server/slam/matching/vote_table.h"
 #include "server/slam/voting/voting_options.h"
 
 namespace cairn::slam {
+
+// The position of line b along the direction of line a: beside it, wholly beyond its last end, or wholly
+// before its first end. Source: thesis A 3.5.5 (Table 3.10, Figure 3.21).
+enum class OverlapType : std::uint8_t { kOverlap, kBeyondLast, kBeforeFirst };
+[[nodiscard]] OverlapType OverlapTypeOf(const LineFeature& a, const LineFeature& b);
+
+// Goes through `walked` in order and takes for each entry the first later entry of `other` that differs by at
+// most `tolerance`, as in the printed Tables 3.16 and 3.22. Blanks (NaN) are skipped. Differences of angles
+// are wrapped. If `taken` is given, it receives the positions (in walked, in other). Returns the number of
+// entries that agree.
+[[nodiscard]] int PatternOverlap(std::span<const double> walked, std::span<const double> other, double tolerance,
+                                 bool angles, std::vector<std::pair<int, int>>* taken = nullptr);
 
 // The pairs of lines that are possible: rows for the previous scan, columns for the current one.
 class CandidateTable {

@@ -39,6 +39,25 @@ std::vector<WeightedVector> CandidatesOf(std::span<const PairOffset> offsets, do
 
 }  // namespace
 
+RobustMean MeanWithoutOutliers(std::vector<WeightedVector> values, double spread, int keep) {
+  std::erase_if(values, [](const WeightedVector& v) { return !(v.weight > 0.0) || !v.value.allFinite(); });
+  RobustMean result;
+  while (!values.empty()) {
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+    double weight = 0.0;
+    for (const WeightedVector& v : values) sum += v.weight * v.value, weight += v.weight;
+    result.mean = sum / weight;
+    const auto farthest = std::max_element(values.begin(), values.end(), [&](const auto& a, const auto& b) {
+      return (a.value - result.mean).squaredNorm() < (b.value - result.mean).squaredNorm();
+    });
+    result.spread = (farthest->value - result.mean).norm();
+    result.kept = static_cast<int>(values.size());
+    if (result.spread <= spread || result.kept <= keep) break;
+    values.erase(farthest);
+  }
+  return result;
+}
+
 std::optional<RotationEstimate> RotationFromPairs(const ScanFeatures& ref, const ScanFeatures& curr,
                                                   std::span<const LinePair> pairs, const PoseOptions& options) {
   if (pairs.empty()) return std::nullopt;
@@ -57,7 +76,7 @@ std::optional<RotationEstimate> RotationFromPairs(const ScanFeatures& ref, const
   const RobustMean mean =
       MeanWithoutOutliers(std::move(values), options.rotation_spread_rad, static_cast<int>(options.rotation_keep));
   if (mean.kept == 0) return std::nullopt;
-  return RotationEstimate{WrapAngle(origin + mean.mean.x()), mean.spread, mean.kept};
+  return RotationEstimate{WrapAngle(origin + mean.mean.x()), mean.kept};
 }
 
 std::vector<PairOffset> OffsetsOf(const ScanFeatures& ref, const ScanFeatures& curr, std::span<const LinePair> pairs,

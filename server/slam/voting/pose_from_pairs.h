@@ -13,6 +13,7 @@
 // neither scan is preferred.
 #pragma once
 
+#include <Eigen/Core>
 #include <optional>
 #include <span>
 #include <vector>
@@ -20,10 +21,26 @@
 #include "common/geometry/pose2.h"
 #include "server/slam/features/line_feature.h"
 #include "server/slam/matching/vote_table.h"
-#include "server/slam/voting/robust_mean.h"
 #include "server/slam/voting/voting_options.h"
 
 namespace cairn::slam {
+
+// The weighted mean of Tables 3.27 and 3.31: the value farthest from the mean is removed, one at a time,
+// until all remaining values lie within `spread` of their mean, or only `keep` values remain. Stateless,
+// thread-safe.
+// For plain numbers the second component is 0. Source: thesis A 3.5.12.2-3.5.12.3.
+struct WeightedVector {
+  Eigen::Vector2d value = Eigen::Vector2d::Zero();
+  double weight = 0.0;
+};
+
+struct RobustMean {
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  double spread = 0.0;  // Largest distance from the mean among the values kept.
+  int kept = 0;         // 0 if there were no values of positive weight.
+};
+
+[[nodiscard]] RobustMean MeanWithoutOutliers(std::vector<WeightedVector> values, double spread, int keep);
 
 // The equation that one pair gives for the translation t when the rotation is known: normal . t = offset, in
 // the frame of ref.
@@ -36,7 +53,6 @@ struct PairOffset {
 
 struct RotationEstimate {
   double rotation_rad = 0.0;
-  double spread_rad = 0.0;
   int kept = 0;
 };
 

@@ -4,9 +4,9 @@
 #include <memory>
 #include <optional>
 
-#include "server/slam/motion/constant_speed.h"
+#include "server/slam/motion/step_motion.h"
+#include "server/slam/scan/beam_points.h"
 #include "server/slam/scan/odometry_pairing.h"
-#include "server/slam/scan/tilt.h"
 #include "server/slam/scan_pipeline.h"
 #include "server/slam/tracking/front_end.h"
 

@@ -11,8 +11,12 @@ namespace cairn::server {
 
 using Json = nlohmann::ordered_json;  // Members are printed in the order in which they were added.
 
-[[nodiscard]] std::string JsonLine(const Json& object);
+[[nodiscard]] inline std::string JsonLine(const Json& object) {
+  return object.dump(-1, ' ', false, Json::error_handler_t::replace) + '\n';
+}
 // The object for a failure, the same as that of `cairn --json`: {"error":{"code":...,"message":...}}.
-[[nodiscard]] std::string ErrorJson(const Status& status);
+[[nodiscard]] inline std::string ErrorJson(const Status& status) {
+  return JsonLine({{"error", {{"code", StatusCodeName(status.code)}, {"message", status.message}}}});
+}
 
 }  // namespace cairn::server

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "client/cli/cpu_time.h"
+#include "client/cli/sim_run.h"
 
 namespace cairn::client {
 namespace {

@@ -165,7 +165,7 @@ TEST(Fleet, RobotsSeeEachOther) {
   FleetOptions options;
   options.robots = 2;
   options.laser.range_max_m = 60;
-  options.laser.noise_m = options.laser.noise_share = options.laser.dropout_share = 0;
+  options.laser.error.sigma_m = options.laser.error.sigma_share = options.laser.dropout_share = 0;
   options.wheels.slip_m_per_sqrt_m = 0;  // No random draws: both fleets drive alike.
   Fleet seeing = Make("corridor", options);
   options.see_each_other = false;

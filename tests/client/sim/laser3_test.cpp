@@ -5,7 +5,6 @@
 
 #include "client/sim/fleet.h"
 #include "client/sim/laser.h"
-#include "client/sim/laser_models.h"
 #include "client/sim/shipped_worlds.h"
 #include "client/sim/tilt_mount.h"
 
@@ -14,7 +13,7 @@ namespace {
 
 LaserOptions Perfect() {
   LaserOptions options;
-  options.noise_m = options.noise_share = options.dropout_share = 0.0;
+  options.error.sigma_m = options.error.sigma_share = options.dropout_share = 0.0;
   options.range_max_m = 100.0;
   return options;
 }
@@ -139,7 +138,7 @@ TEST(RangeError, ReachesTheScans) {
   LaserOptions options = Perfect();
   options.beams = 1;
   options.T_robot_laser = {};
-  SetError({RangeErrorKind::kStep, 0, 0, 0.01, 0.02, 1.0}, &options);
+  options.error = {RangeErrorKind::kStep, 0, 0, 0.01, 0.02, 1.0};
   double largest = 0.0, squares = 0.0;
   for (int i = 0; i < 20000; ++i) {
     const double e = MeasureScan(scene, {}, {}, {}, 5, 0.0, options, random).ranges_m[0] - 6.0;

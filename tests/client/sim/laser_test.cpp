@@ -14,7 +14,7 @@ const RayCaster& Room() {  // x -4..6, y -3..5.
 
 LaserOptions Perfect() {
   LaserOptions options;
-  options.noise_m = options.noise_share = options.dropout_share = 0.0;
+  options.error.sigma_m = options.error.sigma_share = options.dropout_share = 0.0;
   options.T_robot_laser = {};
   return options;
 }
@@ -64,8 +64,8 @@ TEST(SimLaser, NoiseGrowsWithRangeAsStated) {
   LaserOptions options = Perfect();
   options.beams = 2;
   options.field_of_view_rad = kPi;  // Beams to -y (3 m) and +y (5 m) from the origin.
-  options.noise_m = 0.02;
-  options.noise_share = 0.004;
+  options.error.sigma_m = 0.02;
+  options.error.sigma_share = 0.004;
   double sum[2] = {}, squares[2] = {};
   const int n = 20000;
   for (int k = 0; k < n; ++k) {
@@ -153,7 +153,7 @@ TEST(SimLaser, RefusesImpossibleOptions) {
   EXPECT_TRUE(refuses([](auto& o) { o.beams = 8193; }));
   EXPECT_TRUE(refuses([](auto& o) { o.field_of_view_rad = 7.0; }));
   EXPECT_TRUE(refuses([](auto& o) { o.range_max_m = o.range_min_m; }));
-  EXPECT_TRUE(refuses([](auto& o) { o.noise_m = std::nan(""); }));
+  EXPECT_TRUE(refuses([](auto& o) { o.error.sigma_m = std::nan(""); }));
   EXPECT_TRUE(refuses([](auto& o) { o.dropout_share = 1.1; }));
   EXPECT_TRUE(refuses([](auto& o) { o.sweep_s = -1; }));
   EXPECT_TRUE(refuses([](auto& o) { o.T_robot_laser.x = std::nan(""); }));

@@ -82,8 +82,6 @@ TEST(RayCaster, HitsADiscAtItsRimUnlessInside) {
   EXPECT_EQ(CastAtDisc(disc, {0, 1.51}, {1, 0}), kNothingHit);
   EXPECT_EQ(CastAtDisc(disc, {0, 1}, {-1, 0}), kNothingHit);
   EXPECT_EQ(CastAtDisc(disc, {4.2, 1}, {1, 0}), kNothingHit);
-  const Disc discs[] = {{{9, 0}, 1}, {{5, 0}, 1}};
-  EXPECT_NEAR(CastAtDiscs(discs, {0, 0}, {1, 0}), 4.0, 1e-12);
 }
 
 TEST(RayCaster, ClearanceIsTheDistanceToTheNearestWall) {

@@ -1,5 +1,3 @@
-#include "client/sim/rectangle.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>

@@ -42,13 +42,6 @@ TEST_P(Pose2Jacobian, Inverse) {
   EXPECT_NEAR((J - J_inverse(a_)).cwiseAbs().maxCoeff(), 0.0, 1e-7);
 }
 
-TEST_P(Pose2Jacobian, TransformOfAPoint) {
-  const Eigen::Vector2d p = b_.translation();
-  const auto f = [&](const Eigen::Vector3d& v) { return Eigen::Vector2d(ToPose(v) * p); };
-  const auto J = NumericalDerivative<2, 3>(f, a_.vector());
-  EXPECT_NEAR((J - J_transform(a_, p)).cwiseAbs().maxCoeff(), 0.0, 1e-7);
-}
-
 INSTANTIATE_TEST_SUITE_P(Poses, Pose2Jacobian, testing::Range(1, 13));
 
 TEST(NumericalDerivative, FindsTheSlopeOfACubic) {

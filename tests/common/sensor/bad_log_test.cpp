@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/sensor/log_lines.h"
+#include "common/sensor/log_fields.h"
 #include "tests/common/sensor/read_log.h"
 
 namespace cairn {

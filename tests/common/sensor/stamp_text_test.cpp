@@ -1,8 +1,8 @@
-#include "common/sensor/stamp_text.h"
-
 #include <gtest/gtest.h>
 
 #include <limits>
+
+#include "common/sensor/stamp.h"
 
 namespace cairn {
 namespace {

@@ -1,7 +1,15 @@
 #include "server/jobs/smooth_job.h"
 
 #include <gtest/gtest.h>
+#include <pthread.h>
 
+#include <chrono>
+#include <ctime>
+#include <future>
+#include <random>
+#include <thread>
+
+#include "server/jobs/job_worker.h"
 #include "tests/server/support/room_world.h"
 
 namespace cairn::server {
@@ -68,6 +76,75 @@ TEST_F(SmoothSiteTest, CancellingEndsItAtTheNextStep) {
   ASSERT_FALSE(smoothed);
   EXPECT_EQ(smoothed.error().code, StatusCode::kCancelled);
   EXPECT_EQ(progress_.size(), 1U);
+}
+
+// A robot with a fit of some ten seconds: loops between random keyframes contradict each other and leave no sparse
+// order for the elimination. Its scans have one beam each, so that drawing them takes no time.
+SessionMaterial MaterialWithALongFit() {
+  constexpr std::size_t kCount = 400;
+  SessionMaterial material{.session = 5, .robot = "r1", .snapshot = {}, .grid_options = {}};
+  slam::MapperSnapshot& snapshot = material.snapshot;
+  Scan one_beam = RoomScan(0);
+  one_beam.ranges_m.resize(1);
+  const auto scan = std::make_shared<const Scan>(one_beam);
+  std::mt19937_64 random(1);
+  const Eigen::Matrix3d covariance = 1e-4 * Eigen::Matrix3d::Identity();
+  for (std::size_t k = 0; k < kCount; ++k) {
+    snapshot.keyframes.push_back({scan, {}});
+    snapshot.full_path.push_back({0.01 * static_cast<double>(k), 0.0, 0.0});
+    if (k == 0) continue;
+    snapshot.relations.push_back({k - 1, k, {0.01, 0.0, 0.0}, covariance, false});
+    for (int loop = 0; loop < 3; ++loop)
+      snapshot.relations.push_back(
+          {random() % k, k, {0.1 * static_cast<double>(random() % 40), 1.0, 1.0}, covariance, true});
+  }
+  snapshot.online_path = snapshot.full_path;
+  snapshot.pose_graph.max_iterations = 1000;
+  snapshot.pose_graph.tolerance = 0.0;
+  return material;
+}
+
+// Drawing asks before each step whether the job was cancelled, but the fit draws nothing for minutes. A server that
+// was told to stop meanwhile waited for its end.
+TEST(JobWorker, StopEndsALongFitAtItsNextIteration) {
+  const SessionMaterial material = MaterialWithALongFit();
+  const JobsOptions options;
+  Outbound outbound(32);
+  JobList list(options, outbound, [] { return Stamp{0}; });
+  std::promise<clockid_t> clock_of_worker;
+  JobWorker worker(options, list, [&](const Job& job, bool, const JobControl& control) -> Result<JobOutcome> {
+    clockid_t clock{};
+    pthread_getcpuclockid(pthread_self(), &clock);
+    clock_of_worker.set_value(clock);
+    auto smoothed = SmoothSite(job, {material}, control);
+    if (!smoothed) return tl::unexpected(smoothed.error());
+    return smoothed->outcome;
+  });
+  worker.Start();
+  const auto job = worker.Submit("lab", JobKind::kSmooth, false);
+  ASSERT_TRUE(job);
+  const clockid_t clock = clock_of_worker.get_future().get();
+  const auto worked_s = [clock] {
+    timespec time{};
+    clock_gettime(clock, &time);
+    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+  };
+  const auto wait_until = [](const auto& condition) {
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (!condition() && std::chrono::steady_clock::now() < deadline) std::this_thread::yield();
+    return condition();
+  };
+  // The first half of the progress is drawing along the online path; then the fit begins.
+  const double before_fit = (2.0 * static_cast<double>(material.snapshot.keyframes.size()) - 1.0) /
+                            (4.0 * static_cast<double>(material.snapshot.keyframes.size()));
+  ASSERT_TRUE(wait_until([&] { return list.Find(job->id)->progress >= before_fit - 1e-9; }));
+  const double begun_s = worked_s();
+  ASSERT_TRUE(wait_until([&] { return worked_s() > begun_s + 0.05; }));
+  const auto stopped = std::chrono::steady_clock::now();
+  worker.Stop();
+  EXPECT_LT(std::chrono::steady_clock::now() - stopped, std::chrono::seconds(5));
+  EXPECT_EQ(list.Find(job->id)->state, JobState::kCancelled);
+  EXPECT_LT(list.Find(job->id)->progress, 0.5) << "the drawing after the fit has begun";
 }
 
 TEST_F(SmoothSiteTest, ASiteWithoutScansFailsWithAReason) {

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include "server/queries/answers.h"
-#include "server/queries/reply_parts.h"
 
 namespace cairn::server {
 namespace {

@@ -5,6 +5,7 @@
 
 #include <future>
 #include <memory>
+#include <set>
 #include <utility>
 
 #include "tests/server/robots/one_session.h"
@@ -130,6 +131,27 @@ TEST_F(RosterTest, ARefusalThatWasNotSentIsForgottenWhenTheClientIsLetIn) {
   roster().Take(RequestOf("r1", 8));
   roster().Tick();
   EXPECT_EQ(LastState("r1", 8).phase, SessionPhase::kActive);
+}
+
+// Clients that are refused again and again while nothing can be sent must not use up the memory.
+TEST_F(RosterTest, RefusalsThatCannotBeSentAreBoundedAndTheNewestAreKept) {
+  constexpr ClientId kFirst = 1000, kRefused = 300, kKept = 256;
+  roster().Take(RequestOf("r1", 7));
+  sent();
+  FillLane();
+  for (ClientId client = kFirst; client < kFirst + kRefused; ++client) roster().Take(RequestOf("r1", client));
+  // Each round empties the lane and fills it again with what waits.
+  for (int round = 0; round < 4; ++round) {
+    sent();
+    roster().Tick();
+  }
+  std::set<ClientId> told;
+  for (const SessionState& state : sent().All<SessionState>())
+    if (state.phase == SessionPhase::kRefused) told.insert(state.client);
+  EXPECT_EQ(told.size(), kKept);
+  EXPECT_FALSE(told.contains(kFirst + kRefused - kKept - 1));
+  EXPECT_TRUE(told.contains(kFirst + kRefused - kKept));
+  EXPECT_TRUE(told.contains(kFirst + kRefused - 1));
 }
 
 TEST_F(RosterTest, AnOpenSessionStaysInItsSiteAndHasABoundOnSensors) {

@@ -153,6 +153,26 @@ TEST_F(SessionEstimatorTest, AClockThatIsSetBackCostsAFewScans) {
   EXPECT_LT(Between(testing::TruePose(39), poses_.back().T_map_robot).translation().norm(), 0.1);
 }
 
+// A robot's computer was started again: its new client numbers from 1, and its clock is an hour behind. Scans with
+// small numbers were taken for late ones, and none was used until the numbers had caught up.
+TEST_F(SessionEstimatorTest, ANewClientMayNumberFromTheBeginningWithAnEarlierClock) {
+  constexpr ClientId kRestarted = 9;
+  constexpr int kBefore = 30, kAfter = 20;
+  Drive(0, kBefore);
+  ASSERT_TRUE(record_.Resume(kRestarted));
+  for (int step = kBefore; step < kBefore + kAfter; ++step) {
+    Odometry odometry = RoomOdometry(step);
+    Scan scan = RoomScan(step);
+    odometry.stamp -= 3600 * kNanosPerSecond;
+    scan.stamp -= 3600 * kNanosPerSecond;
+    odometry.sequence = scan.sequence = static_cast<std::uint64_t>(step - kBefore) + 1;
+    estimator_.Handle(OdometryOf("r1", odometry, kRestarted));
+    HandleScan(std::move(scan), kRestarted);
+  }
+  // The clock that went back is believed after slam.pairing.jump_confirmations samples of each stream.
+  EXPECT_GE(ledger().used, kBefore + kAfter - 6U);
+}
+
 TEST_F(SessionEstimatorTest, DiscardAnswersWithoutTheEstimator) {
   Drive(0, 3);
   record_.ScanReceived(HashName("laser"), 4);

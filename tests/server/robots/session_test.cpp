@@ -279,6 +279,45 @@ TEST(Session, AnExceptionEndsItWithAReasonAndNothingElse) {
   EXPECT_EQ(healthy.ledger().used, 10U);
 }
 
+// A session that had failed went on taking scans, and each one waited for a turn of the strand only to be dropped
+// there.
+TEST(Session, AFailedSessionRefusesNewSamplesAtOnce) {
+  OneSession one;
+  one.on_send = [](const OutboundValue& value) {
+    if (std::holds_alternative<PoseReport>(value)) throw std::runtime_error("no memory");
+    return true;
+  };
+  one.Drive(0, 1);
+  ASSERT_TRUE(one.WaitPhase(SessionPhase::kEnded));
+  EXPECT_TRUE(one.session().ending());
+  // While the strand is held, only the arrival itself can have counted these as dropped.
+  const auto release = one.HoldStrand();
+  const std::uint64_t dropped = one.ledger().dropped_total();
+  const std::uint64_t odometry_dropped = one.ledger().odometry_dropped;
+  EXPECT_TRUE(one.session().Take(ScanOf("r1", RoomScan(1))));
+  one.session().Take(OdometryOf("r1", RoomOdometry(1)));
+  EXPECT_EQ(one.ledger().dropped_total(), dropped + 1);
+  EXPECT_EQ(one.ledger().odometry_dropped, odometry_dropped + 1);
+  EXPECT_EQ(one.ledger().waiting, 0U);
+  release->set_value();
+}
+
+// The last ledger of a robot that fell silent was lost when the lane was full: its client waited for it for ever.
+TEST(Session, ALedgerThatCouldNotBeSentIsSentAtALaterTick) {
+  RobotsOptions options;
+  options.ledger_rate_hz = 1000.0;
+  OneSession one(options);
+  bool full = true;
+  one.on_send = [&full](const OutboundValue& value) { return !full || !std::holds_alternative<Ledger>(value); };
+  one.session().Tick();
+  EXPECT_TRUE(one.sent().All<Ledger>().empty());
+  full = false;
+  EXPECT_TRUE(one.sent().WaitFor([&] {
+    one.session().Tick();
+    return one.sent().All<Ledger>().size() == 1;
+  }));
+}
+
 TEST(Session, AnExceptionAtItsEndStillEndsIt) {
   OneSession one;
   one.on_send = [thrown = false](const OutboundValue& value) mutable {

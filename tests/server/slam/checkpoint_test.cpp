@@ -192,7 +192,7 @@ TEST_P(Checkpoints, StoppingChangesNothing) {
 
 TEST_P(Checkpoints, StoppingChangesNothingOnARealLog) {
   CAIRN_NEED_LOG(log, "mit-csail.clf");
-  const Drive drive = Csail(log, kFast ? 300 : 60);
+  const Drive drive = Csail(log, kFast ? 200 : 60);
   ExpectNothingChangedByStopping(drive, GetParam().options(drive));
 }
 
@@ -236,7 +236,7 @@ TEST_P(Checkpoints, ADamagedStateIsRefusedOrHarmless) {
       }
   };
   const std::string bytes = archive.Bytes();
-  Damage(bytes, kFast ? 300 : 60, try_one);
+  Damage(bytes, kFast ? 150 : 60, try_one);
   EXPECT_GT(refused, 0);
   for (std::size_t size = 0; size < bytes.size(); size += 1 + bytes.size() / 50) {
     refused = 0;

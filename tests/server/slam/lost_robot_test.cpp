@@ -71,9 +71,9 @@ TEST(LostRobot, DrawsNothingUntilItIsLocalizedAgain) {
   ASSERT_FALSE(robot.last.localized);
   const std::size_t chunks = robot.chunks();
   const std::size_t keyframes = robot.mapper().keyframe_count();
-  robot.Drive(200, true);
+  robot.Drive(80, true);
   EXPECT_FALSE(robot.last.localized);
-  EXPECT_GT(robot.mapper().keyframe_count(), keyframes + 100);
+  EXPECT_GT(robot.mapper().keyframe_count(), keyframes + 40);
   EXPECT_EQ(robot.chunks(), chunks);
   const MapperSnapshot snapshot = robot.mapper().Snapshot();
   EXPECT_FALSE(snapshot.keyframes.back().localized);

@@ -61,5 +61,106 @@ TEST(MapDrawing, DrawsNoKeyframeThatIsNotLocalized) {
   EXPECT_EQ(begun.path().size(), kKeyframes);
 }
 
+// Where the path goes after a correction: the same keyframes far to the north.
+Pose2 CorrectedPlaceOf(std::size_t k) {
+  return PlaceOf(k) * Pose2{0.0, 1280.0, 0.0};
+}
+
+class RedrawnMap : public ::testing::Test {
+ protected:
+  static constexpr std::size_t kMany = 45;  // Three calls of Continue, at 20 keyframes each.
+
+  RedrawnMap() {
+    for (std::size_t k = 0; k < kMany; ++k) {
+      keyframes_.push_back({std::make_shared<const Scan>(RoomScan(0)), {}});
+      drawing_.Add(keyframes_.back(), PlaceOf(k));
+      corrected_.Append(CorrectedPlaceOf(k));
+    }
+  }
+  bool DrawnAt(const Pose2& place) const {
+    // The wall 6 m ahead of the scan's place.
+    const std::uint8_t cell = drawing_.grid().OccupancyAt(place * Eigen::Vector2d(6.0, 0.0));
+    return cell != kUnknownCell && cell > 50;
+  }
+  // The grid of a job that has drawn the first `count` keyframes along `place_of`.
+  OccupancyGrid GridOf(std::size_t count, Pose2 (*place_of)(std::size_t)) const {
+    OccupancyGrid grid{GridOptions{}};
+    for (std::size_t k = 0; k < count; ++k) grid.Draw(*keyframes_[k].scan, place_of(k));
+    return grid;
+  }
+
+  std::vector<Keyframe> keyframes_;
+  SharedSequence<Pose2> corrected_;
+  MapDrawing drawing_{GridOptions{}};
+};
+
+TEST_F(RedrawnMap, TakesSeveralScansAndTheOldMapStaysUntilTheNewOneIsComplete) {
+  drawing_.StartAgain(kMany);
+  for (int scan = 0; scan < 2; ++scan) {
+    drawing_.Continue(keyframes_, corrected_);
+    EXPECT_TRUE(drawing_.redrawing());
+    EXPECT_TRUE(DrawnAt(PlaceOf(0)));
+    EXPECT_FALSE(DrawnAt(CorrectedPlaceOf(0)));
+    EXPECT_EQ(drawing_.path()[0], PlaceOf(0));
+  }
+  drawing_.Continue(keyframes_, corrected_);
+  EXPECT_FALSE(drawing_.redrawing());
+  for (const std::size_t k : {std::size_t{0}, kMany - 1}) {
+    EXPECT_FALSE(DrawnAt(PlaceOf(k)));
+    EXPECT_TRUE(DrawnAt(CorrectedPlaceOf(k)));
+    EXPECT_EQ(drawing_.path()[k], CorrectedPlaceOf(k));
+  }
+}
+
+TEST_F(RedrawnMap, FinishDrawsAllTheRestAtOnce) {
+  drawing_.StartAgain(kMany);
+  drawing_.Finish(keyframes_, corrected_);
+  EXPECT_FALSE(drawing_.redrawing());
+  EXPECT_TRUE(DrawnAt(CorrectedPlaceOf(kMany - 1)));
+  EXPECT_FALSE(DrawnAt(PlaceOf(kMany - 1)));
+}
+
+TEST_F(RedrawnMap, BeginDrawsTheLastKeyframeAtOnceAndTheOthersLater) {
+  MapDrawing begun{GridOptions{}};
+  begun.Begin(keyframes_, corrected_);
+  EXPECT_EQ(begun.path().size(), kMany);
+  EXPECT_EQ(begun.grid().chunk_count(), ChunksOfOne());
+  const std::uint8_t cell = begun.grid().OccupancyAt(CorrectedPlaceOf(kMany - 1) * Eigen::Vector2d(6.0, 0.0));
+  EXPECT_TRUE(cell != kUnknownCell && cell > 50);
+  EXPECT_TRUE(begun.redrawing());
+  begun.Finish(keyframes_, corrected_);
+  EXPECT_EQ(begun.grid().chunk_count(), kMany * ChunksOfOne());
+}
+
+TEST_F(RedrawnMap, AnAdoptedGridGetsTheKeyframesThatTheJobDidNotHave) {
+  drawing_.Adopt(GridOf(40, CorrectedPlaceOf), 40, keyframes_, corrected_);
+  EXPECT_FALSE(drawing_.redrawing());
+  EXPECT_EQ(drawing_.grid().chunk_count(), kMany * ChunksOfOne());
+  for (const std::size_t k : {std::size_t{39}, std::size_t{40}, kMany - 1}) EXPECT_TRUE(DrawnAt(CorrectedPlaceOf(k)));
+}
+
+TEST_F(RedrawnMap, AGridFromBeforeTheLastChangeOfThePathIsDrawnAgain) {
+  drawing_.StartAgain(40);  // The path changed when there were 40 keyframes.
+  drawing_.Finish(keyframes_, corrected_);
+  drawing_.Adopt(GridOf(40, CorrectedPlaceOf), 40, keyframes_, corrected_);
+  EXPECT_FALSE(drawing_.redrawing()) << "the job had all keyframes whose poses changed";
+  drawing_.Adopt(GridOf(39, PlaceOf), 39, keyframes_, corrected_);
+  EXPECT_TRUE(drawing_.redrawing());
+  EXPECT_TRUE(DrawnAt(PlaceOf(0))) << "it is adopted first, so that the job is answered";
+  drawing_.Finish(keyframes_, corrected_);
+  EXPECT_FALSE(DrawnAt(PlaceOf(0)));
+  EXPECT_TRUE(DrawnAt(CorrectedPlaceOf(0)));
+}
+
+TEST_F(RedrawnMap, AGridThatComesWhileTheMapIsDrawnAgainDoesNotEndThat) {
+  drawing_.StartAgain(40);
+  drawing_.Continue(keyframes_, corrected_);
+  drawing_.Adopt(GridOf(kMany, PlaceOf), kMany, keyframes_, corrected_);
+  EXPECT_TRUE(drawing_.redrawing());
+  drawing_.Finish(keyframes_, corrected_);
+  EXPECT_EQ(drawing_.grid().chunk_count(), kMany * ChunksOfOne());
+  EXPECT_TRUE(DrawnAt(CorrectedPlaceOf(0)));
+}
+
 }  // namespace
 }  // namespace cairn::slam

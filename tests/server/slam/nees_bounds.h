@@ -3,7 +3,7 @@
 // 2001, 5.4.
 #pragma once
 
-#include "server/slam/landmarks/chi_square.h"
+#include "server/slam/landmarks/innovation.h"
 
 namespace cairn::slam::test {
 

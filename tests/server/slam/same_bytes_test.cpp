@@ -19,7 +19,7 @@
 #include "client/sim/shipped_worlds.h"
 #include "common/sensor/log_reader.h"
 #include "server/slam/scan_pipeline.h"
-#include "server/slam/smoothing/smoothed_path.h"
+#include "server/slam/smoothing/smoothed_map.h"
 #include "tests/real_logs.h"
 
 namespace cairn::slam {

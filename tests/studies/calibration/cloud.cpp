@@ -3,7 +3,7 @@
 
 #include "client/sim/cloud_error.h"
 #include "client/sim/fleet.h"
-#include "client/sim/laser_models.h"
+#include "client/sim/laser.h"
 #include "client/sim/shipped_worlds.h"
 #include "common/cloud/cloud_builder.h"
 #include "common/cloud/cloud_file.h"
@@ -107,7 +107,7 @@ void StudyCloud(StudyContext& context) {
     options.tilt = {
         .scans = 36, .first_rad = Radians(-60.0), .last_rad = Radians(45.0), .level_scans = 60, .halt = true};
     const Drive drive = NodThrough(options, context.Pick(300.0, 40.0));
-    const double stated = StatedError(drive, sim::ErrorOf(options.laser));
+    const double stated = StatedError(drive, options.laser.error);
     for (const auto& [name, path] : {std::pair{"true", &drive.truth}, std::pair{"estimated", &drive.estimate}}) {
       const PointCloud cloud = CloudOf(drive, *path, options.laser.height_m);
       const sim::CloudError e = sim::MeasureCloud(cloud, truth);

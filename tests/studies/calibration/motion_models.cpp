@@ -48,7 +48,8 @@ void StudyMotionModels(StudyContext& context) {
   Report& report = context.report;
   report.Heading("Motion models learnt from logs");
   report.Text(
-      "Eliazar's model (4.46) by expectation maximisation. First a simulated log whose odometry errs as injected.");
+      "The parameters of Eliazar's model (4.46) are learnt by expectation maximisation, first from a "
+      "simulated log with known odometry errors.");
   const TempDirectory directory;
   server::test::NoisyDrive drive;
   drive.steps = context.Pick(4000, 1000);

@@ -1,7 +1,8 @@
+#include "server/slam/calibration/umbmark.h"
+
 #include <cmath>
 #include <random>
 
-#include "server/slam/calibration/square_run.h"
 #include "tests/studies/calibration/calibration.h"
 
 namespace cairn::studies {
@@ -10,10 +11,10 @@ void StudyUmbmark(StudyContext& context) {
   Report& report = context.report;
   report.Heading("UMBmark: wheel errors from square runs");
   report.Text(
-      "Five runs each way round a square of 4 m, slip of 2 mm after 1 m; mean and spread of what is recovered. The "
-      "bound is "
-      "0.001 on E_d and 0.004 on E_b for the mean error, and a corrected robot must not miss its start by more than "
-      "perfect wheels do through slip alone (first row, plus a tenth).");
+      "The robot makes five runs in each direction round a square of 4 m, with a slip of 2 mm after 1 "
+      "m. The table shows the mean and the spread of the recovered errors. The mean error must be at "
+      "most 0.001 for E_d and 0.004 for E_b. After the correction the robot must not end farther from "
+      "its start than a robot with perfect wheels does because of slip alone (first row), plus a tenth.");
   Table table({"injected E_d", "E_b", "recovered E_d", "+-", "E_b", "+-", "E_sys (m)", "after correction (m)"});
   const slam::UmbmarkOptions square;
   const int trials = context.Pick(500, 50);
@@ -42,7 +43,7 @@ void StudyUmbmark(StudyContext& context) {
       d += result->errors.E_d / trials, dd += std::pow(result->errors.E_d - injected.E_d, 2) / trials;
       b += result->errors.E_b / trials, bb += std::pow(result->errors.E_b - injected.E_b, 2) / trials;
       sys += result->E_sys_m / trials;
-      // The robot after the correction: the remaining part of the true errors.
+      // The robot after the correction still has the part of the true errors that was not recovered.
       const slam::WheelErrors left{injected.E_d / result->errors.E_d, injected.E_b / result->errors.E_b};
       after += std::max(SquareEnd(true, left, square).translation().norm(),
                         SquareEnd(false, left, square).translation().norm()) /
@@ -59,7 +60,9 @@ void StudyUmbmark(StudyContext& context) {
   plot.series = {before_cw, before_ccw};
   plot.equal_scale = true;
   report.Add(plot, "umbmark-runs");
-  report.Expect(plausible, "UMBmark does not recover what was injected within the stated bounds");
+  report.Expect(plausible,
+                "the wheel errors recovered by UMBmark differ from the injected ones by more than the stated "
+                "bounds");
 }
 
 }  // namespace cairn::studies

@@ -71,9 +71,9 @@ void StudyCost(StudyContext& context, const StudyLog& log) {
   Report& report = context.report;
   report.Heading("Cost on " + log.name);
   report.Text(
-      "Raw odometry (the front-end takes no part), every scan used. \"Copied maps\" is what the same particles would "
-      "take "
-      "if each owned a copy of the final map (4 bytes a cell), and what resampling would move about every scan.");
+      "The filter uses raw odometry, without the front-end, and every scan. \"Copied maps\" is the "
+      "memory that the same particles would need if each had its own copy of the final map (4 bytes "
+      "per cell); resampling would copy about as much for every scan.");
   const bool dpslam_log = log.name.find("loop5") != std::string::npos;
   const std::vector<GridStep> steps = dpslam_log ? GridSteps(log, 0.0, 0.0) : GridSteps(log, 0.1, 0.1);
   Table table = CostTable();
@@ -121,12 +121,14 @@ LoopsOfAll StudyLoop(StudyContext& context, std::int64_t size, int trials) {
   Report& report = context.report;
   report.Heading("A loop of 160 m, " + std::to_string(2 * size) + " particles");
   report.Text(
-      "The simulated office, 60 x 40 m, once round its ring corridor and some way on, a 180 degree laser of 8 m range, "
-      "the simulator's ordinary odometry. Scans are a metre apart, as in the thesis' loop of this size (183 scans, "
-      "Figure 3.11). The flat filter gets as many particles as both levels of the others together. *Plain* is the high "
-      "level as printed (4.5.2, slam.dpslam.high_level=plain). Ours was "
-      "developed on robots 6-17; the robots here begin after those. *Loop error*: how far apart the path puts two "
-      "visits of one place, against the truth. A loop counts as closed below 0.3 m.");
+      "A robot drives once round the ring corridor of the simulated office (60 x 40 m) and some way "
+      "on, with a laser of 180 degrees and 8 m and the default odometry of the simulator. Scans are "
+      "one metre apart, as in the loop of this size in the thesis (183 scans, Figure 3.11). The filter "
+      "with one level (*flat*) gets as many particles as both levels of the others together. *Plain* "
+      "is the high level as printed (4.5.2, slam.dpslam.high_level=plain). The default was developed "
+      "on robots 6 to 17; this study uses robots with higher numbers. *Loop error* is the error of the "
+      "distance, along the estimated path, between two visits of one place. A loop counts as closed "
+      "below 0.3 m.");
   const std::int64_t particles = size;
   Table table({"robot", "filter", "odometry's loop error (m)", "loop error (m)", "(deg)", "closed"});
   Table cost = CostTable();
@@ -200,12 +202,12 @@ void StudyLoops(StudyContext& context) {
     for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += loops[k].closed;
   }
   const auto [flat, moving, plain] = sum;
-  context.report.Text("Of all thirty: flat " + std::to_string(flat) + ", two levels " + std::to_string(moving) +
-                      ", two levels as printed " + std::to_string(plain) + ".");
-  context.report.Expect(moving > flat, "two levels did not close more loops than one");
+  context.report.Text("Loops closed in all thirty runs: flat " + std::to_string(flat) + ", two levels " +
+                      std::to_string(moving) + ", two levels as printed " + std::to_string(plain) + ".");
+  context.report.Expect(moving > flat, "two levels did not close more loops than one level");
 }
 
-// With as many particles as the filter of the thesis, both close the loop, and the cost decides.
+// With as many particles as in the thesis, both filters close the loop, so that the cost decides between them.
 void StudyManyParticles(StudyContext& context) {
   const std::int64_t size = context.Pick(1000, 100);
   const int trials = context.Pick(2, 1);
@@ -220,11 +222,10 @@ void StudyConsistencyOfGrids(StudyContext& context) {
   Report& report = context.report;
   report.Heading("Consistency");
   report.Text(
-      "100 seeded runs, twice round the simulated room, odometry that errs exactly as the low level is told, 61 beams "
-      "with "
-      "2 cm of noise, 100 particles a level. NEES of (x, y, heading) against the covariance that the filter reports; "
-      "the "
-      "innovation of a grid has no dimension, hence no NIS.");
+      "The robot drives 100 times, with different seeds, twice round the simulated room, with 61 "
+      "beams, 2 cm of noise and 100 particles per level. The odometry errors are exactly those that "
+      "the low level assumes. NEES is that of (x, y, heading) with the covariance that the filter "
+      "reports. There is no NIS, because a grid has no innovation with a dimension.");
   Table table({"filter", "NEES (3)", "95 % bounds", "points inside", "error at end (m)", "odometry's (m)",
                "effective sample size", "verdict"});
   Plot nees{.title = "NEES of DP-SLAM", .x = {"travelled", "m"}, .y = {"NEES of (x, y, heading)", "", true}};
@@ -242,8 +243,8 @@ void StudyConsistencyOfGrids(StudyContext& context) {
       of_nees.x.push_back(point.travelled_m), of_nees.y.push_back(point.nees);
       of_error.x.push_back(point.travelled_m), of_error.y.push_back(point.position_error_m);
     }
-    const std::string verdict = result.nees_mean > result.nees_high  ? "too sure"
-                                : result.nees_mean < result.nees_low ? "too doubtful"
+    const std::string verdict = result.nees_mean > result.nees_high  ? "uncertainty too small"
+                                : result.nees_mean < result.nees_low ? "uncertainty too large"
                                                                      : "consistent";
     table.Add({name, Number(result.nees_mean, 2), Number(result.nees_low, 2) + " .. " + Number(result.nees_high, 2),
                Percent(1.0 * inside / static_cast<double>(result.points.size()), 0),

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <memory>
 
-#include "client/sim/closed_path.h"
 #include "client/sim/shipped_worlds.h"
+#include "client/sim/world.h"
 #include "server/slam/dpslam/dpslam.h"
-#include "server/slam/landmarks/chi_square.h"
+#include "server/slam/landmarks/innovation.h"
 #include "tests/studies/scene.h"
 
 namespace cairn::studies {

@@ -1,5 +1,5 @@
-// A log as steps for DP-SLAM (odometry motion, scan) and a run of the filter over them with every figure at
-// hand: time, memory, shape of the family tree, path and map. Studies only; two threads where asked.
+// Converts a log to steps for DP-SLAM (odometry motion, scan), and runs the filter over them with all figures: time,
+// memory, size of the ancestry tree, path and map. For studies only. Uses two threads if asked to.
 #pragma once
 
 #include <memory>
@@ -29,7 +29,7 @@ struct GridRun {
   std::size_t most_nodes = 0;   // Of the low level's family tree, and its longest line.
   std::size_t longest_line = 0;
   bool bounds_hold = true;      // Fewer than two nodes a living particle, no line longer than their number.
-  int diverged = 0;             // Scans after which the filter called itself lost.
+  int diverged = 0;             // Scans after which the filter reported that it has diverged.
   double log_likelihood = 0.0;  // The log likelihood of the best particle.
   Trajectory path;              // The path of the best particle at the end.
   OccupancyImage map;           // The opacity map of the best particle.

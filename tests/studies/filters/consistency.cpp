@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-#include "server/slam/landmarks/chi_square.h"
+#include "server/slam/landmarks/innovation.h"
 #include "server/slam/motion_models/motion_sampling.h"
 #include "server/slam/random/resampling.h"
 #include "tests/studies/filters/corner_world.h"
@@ -20,7 +20,7 @@ constexpr double kStepM = 0.25;
 constexpr int kPointEvery = 8;  // Keyframes.
 constexpr double kRoundM = 40.0;
 
-// Around the loop, inside and outside, nowhere two alike close together.
+// Corners inside and outside the loop; similar corners are never close to each other.
 std::vector<Corner> Corners() {
   std::vector<Corner> corners;
   double turn = 0.0;
@@ -54,7 +54,8 @@ std::size_t AncestryDepth(const slam::Filter& filter) {
   std::vector<slam::Hypothesis> all;
   for (std::size_t i = 1; i < filter.hypothesis_count(); ++i) all.push_back(filter.hypothesis(i));
   const std::size_t size = all.front().path.size();
-  // Once two paths have parted they stay apart, so the keyframes on which all paths agree come first.
+  // Two paths that differ at one keyframe differ at all later ones, so the keyframes on which all paths agree come
+  // first.
   std::size_t low = 0, high = size;
   while (low < high) {
     const std::size_t middle = (low + high) / 2;

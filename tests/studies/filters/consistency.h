@@ -1,6 +1,6 @@
-// Whether a filter knows how wrong it is: drives it through its interface in a simulated world whose noise is
-// exactly what the filter is told, many times with different seeds, and compares its errors with the
-// uncertainty it claims. The world is a loop driven several times past corners with known places; what the
+// Tests whether the uncertainty that a filter states is right. The filter runs many times, with different seeds, in a
+// simulated world whose noise is exactly the noise that the filter assumes, and its errors are compared with its stated
+// uncertainty. The world is a loop driven several times past corners with known places; what the
 // front-end would do (steps, features, revisits) is drawn, not computed. FastSLAM 1.0 gets steps drawn from
 // its own motion model, the others from the drift. Source: Bar-Shalom, Li, Kirubarajan 2001, 5.4 (NEES, NIS
 // and their bounds); Bailey et al. 2006 (FastSLAM).
@@ -21,7 +21,7 @@ struct ConsistencyOptions {
   bool landmarks = true;
   bool revisits = false;
   std::uint64_t first_seed = 1;
-  // How much larger the world's noise is than the filter is told; 1: as told. What shows that the check can
+  // Ratio of the noise of the world to the noise that the filter assumes. A ratio other than 1 shows that the test can
   // fail.
   double noise_factor = 1.0;
 };
@@ -51,7 +51,7 @@ struct ConsistencyResult {
   double nis_per_number = 0.0;
   double nis_low = 0.0, nis_high = 0.0;  // Of the whole.
   double position_error_m = 0.0;         // At the end, root mean square.
-  int diverged = 0;                      // Runs that ended saying so.
+  int diverged = 0;                      // Runs whose last report was "diverged".
   std::size_t landmarks = 0;             // Of the last run; the world has ConsistencyLandmarks().
 };
 

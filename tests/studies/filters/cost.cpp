@@ -9,7 +9,8 @@ namespace cairn::studies {
 namespace {
 
 constexpr double kRingStepM = 0.25;
-constexpr double kCornerApartM = 1.5;  // Along the way; one on either side, nowhere two alike close together.
+constexpr double kCornerApartM =
+    1.5;  // Distance along the way between two pairs of corners, one on each side; similar corners are never close.
 constexpr double kBesideM = 1.7;
 
 std::vector<Corner> Ring(std::size_t count, double radius_m) {

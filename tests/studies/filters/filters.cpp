@@ -42,8 +42,8 @@ std::string Range(double low, double high) {
 }
 
 std::string VerdictOf(const ConsistencyResult& result, double nees) {
-  if (nees > result.nees_high) return "too sure";
-  return nees < result.nees_low ? "too doubtful" : "consistent";
+  if (nees > result.nees_high) return "uncertainty too small";
+  return nees < result.nees_low ? "uncertainty too large" : "consistent";
 }
 
 // With few runs, some may miss by chance.
@@ -160,22 +160,24 @@ void StudyLandmarkCost(StudyContext& context) {
     if (contender.kind == slam::FilterKind::kFastSlam2Points) fastslam = exponent;
   }
   report.Text(
-      "The robot drives twice round a ring of corners, two every 1.5 m, and sees some eight at a time; the second "
-      "round is timed. The exponent is of the power of the landmarks that the cost grows with.");
+      "The robot drives twice round a ring of corners, two for every 1.5 m of the way, and sees about "
+      "eight at a time. The second round is timed. The cost grows with a power of the number of "
+      "landmarks; the table shows the exponent.");
   report.Add(table, "cost");
   report.Add(plot, "cost");
   if (!(ekf > 1.5 && ekf < 2.5 && fastslam < 1.0))
-    FailUnlessQuick(context, "expected: about 2 for the EKF, clearly less for FastSLAM; found " + Number(ekf, 2) +
-                                 " and " + Number(fastslam, 2));
+    FailUnlessQuick(context, "the exponent should be about 2 for the EKF and clearly less for FastSLAM, but it is " +
+                                 Number(ekf, 2) + " and " + Number(fastslam, 2));
 }
 
 void RunFilters(StudyContext& context) {
   context.report.Text(
-      "A loop of 40 m is driven twice past 23 corners; the world's noise is exactly what the filter is told. A "
-      "consistent filter has NEES 3 and NIS 1 a number on average. Particle filters by their spread become too sure "
-      "once the loop closes and their particles descend from few ancestors (Bailey et al. 2006); what they report is "
-      "therefore kept beside the particles and remembers what resampling forgets. NEES is shown before anything of "
-      "the loop's beginning is seen again (34 m), and after. dpslam needs ranges and has its own study.");
+      "A loop of 40 m is driven twice past 23 corners. The noise of the world is exactly the noise "
+      "that the filter assumes. A consistent filter has a mean NEES of 3 and a mean NIS of 1 per "
+      "number. The spread of the particles alone is too small after the loop closes, because all "
+      "particles then descend from few ancestors (Bailey et al. 2006). Particle filters therefore "
+      "report a covariance that is kept in addition to the particles. NEES is shown before anything is "
+      "seen a second time (34 m) and after. The filter dpslam needs ranges and has a study of its own.");
   if (context.Wants("landmarks")) StudyWorld(context, "landmarks", true, false);
   if (context.Wants("revisits")) StudyWorld(context, "revisits", false, true);
   if (context.Wants("particles")) StudyParticles(context);

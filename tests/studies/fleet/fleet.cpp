@@ -109,7 +109,7 @@ Asked AskWhile(LiveServer& server, ChildProcess& robots) {
   client::QueryClient& queries = server.queries();
   std::optional<Job> job;
   auto job_began = Clock::now();
-  // Ten rounds per second stand for many clients. With more, the study would only measure the requests.
+  // Ten rounds per second, as many clients together would make. With more, the study would measure only the requests.
   while (robots.RunningAfter(std::chrono::milliseconds(100))) {
     const auto sites = timed(queries.Maps(), Clock::now());
     const bool streaming =
@@ -143,11 +143,11 @@ void StudyPauses(StudyContext& context) {
   const Totals totals = TotalsOf(sim);
   const Distribution answers = DistributionOf(asked.answer_ms);
   report.Text(
-      "Three robots stream, somebody asks for status, tiles, maps and jobs ten times a second, and jobs smooth "
-      "their site and a large one (" +
-      large + ") by turns, " + Count(asked.jobs) + " in all, the longest " + Number(asked.longest_job_s, 1) +
-      " s. Every smoothed map is enabled at once.");
-  Table table({"what waits", "times", "p50 (ms)", "p99 (ms)", "max (ms)", "wanted at most"});
+      "Three robots stream. At the same time a client asks for status, tiles, maps and jobs ten times "
+      "a second, and jobs smooth the site of the robots and a large site (" +
+      large + ") in turn: " + Count(asked.jobs) + " jobs in all, of which the longest took " +
+      Number(asked.longest_job_s, 1) + " s. Every smoothed map is enabled immediately.");
+  Table table({"delay", "times", "p50 (ms)", "p99 (ms)", "max (ms)", "wanted at most"});
   const double slowest = sim.at("pose_latency_max_ms");
   table.Add({"a scan for its pose", Count(static_cast<long long>(totals.used)),
              Number(sim.at("pose_latency_p50_ms"), 1), Number(sim.at("pose_latency_p99_ms"), 1), Number(slowest, 1),
@@ -158,7 +158,7 @@ void StudyPauses(StudyContext& context) {
   ExpectAtMost(report, kMostPauseMs, slowest, "longest wait for a pose in ms");
   ExpectAtMost(report, kMostPauseMs, answers.max, "longest wait for an answer in ms");
   ExpectAtMost(report, 0.0, static_cast<double>(totals.sent - totals.used), "scans not used");
-  report.Expect(asked.jobs >= 2, "no more than " + Count(asked.jobs) + " jobs ended meanwhile");
+  report.Expect(asked.jobs >= 2, "too few jobs ended while the robots were streaming: " + Count(asked.jobs) + "");
 }
 
 std::string BytesOf(const std::filesystem::path& path) {
@@ -210,8 +210,9 @@ void StudyReplay(StudyContext& context) {
                Number(replay.at("seconds"), 0), Number(replay.at("pose_latency_p50_ms"), 1),
                Number(replay.at("pose_latency_p99_ms"), 1), online_same ? "byte for byte" : "DIFFERS",
                smooth_same ? "byte for byte" : "DIFFERS"});
-    report.Expect(online_same && smooth_same, name + ": the server's path is not the offline one");
-    ExpectAtMost(report, 0.0, static_cast<double>(totals.unexplained), name + ": scans without a reason");
+    report.Expect(online_same && smooth_same, name + ": the path from the server differs from the offline path");
+    ExpectAtMost(report, 0.0, static_cast<double>(totals.unexplained),
+                 name + ": scans that are neither used nor dropped for a stated reason");
   }
   report.Add(table, "replay");
 }

@@ -7,8 +7,8 @@ namespace cairn::studies {
 namespace {
 
 std::string VerdictOf(const MapperConsistency& result) {
-  if (result.whole.nees > result.nees_high) return "too sure";
-  return result.whole.nees < result.nees_low ? "too doubtful" : "consistent";
+  if (result.whole.nees > result.nees_high) return "uncertainty too small";
+  return result.whole.nees < result.nees_low ? "uncertainty too large" : "consistent";
 }
 
 using Figure = double MapperConsistencyPoint::*;
@@ -25,11 +25,12 @@ Series SeriesOf(const MapperConsistency& result, const std::string& label, Figur
 void RunConsistency(StudyContext& context) {
   Report& report = context.report;
   const int runs = context.Pick(100, 4);
-  report.Text(
-      "The default mapper, " + Count(runs) +
-      " runs a world with other wheels, slip, laser noise and seeds each, compared every 3 m of the way. A consistent "
-      "mapper has NEES 3 on average, median 2.37, and 95 % of its single poses inside the 95 % region. More means that "
-      "it is surer than it may be. The bounds are those of the mean of independent runs at one place of the way.");
+  report.Text("This study tests the uncertainty that the mapper states: " + Count(runs) +
+              " runs of the default mapper in each world, with different wheels, slip, laser noise and seeds, "
+              "are compared with the truth every 3 m of the way. A consistent mapper has a mean NEES of 3 and "
+              "a median of 2.37, and 95 % of its single poses lie inside the 95 % region. A larger NEES means "
+              "that the stated uncertainty is too small. The bounds are those of the mean of independent runs "
+              "at one place of the way.");
   Table table({"world", "way (m)", "NEES (3)", "95 % bounds", "median (2.37)", "inside 95 %", "of (x, y) (2)",
                "of heading (1)", "error (m)", "reported (m)", "error (deg)", "reported (deg)", "singular",
                "not localized", ""});

@@ -7,7 +7,7 @@
 
 #include "client/sim/fleet.h"
 #include "client/sim/shipped_worlds.h"
-#include "server/slam/landmarks/chi_square.h"
+#include "server/slam/landmarks/innovation.h"
 #include "server/slam/scan_pipeline.h"
 
 namespace cairn::studies {
@@ -24,7 +24,7 @@ sim::FleetOptions RobotOf(std::uint64_t seed) {
   robot.odometry_hz = 20.0;
   robot.laser.beams = 180;
   robot.laser.range_max_m = 10.0;
-  robot.laser.noise_m = 0.02;
+  robot.laser.error.sigma_m = 0.02;
   robot.seed = seed;
   return robot;
 }

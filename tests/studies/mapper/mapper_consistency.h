@@ -1,9 +1,8 @@
-// Whether the whole mapper knows how wrong its pose is: a simulated robot drives the same way through a world
-// many times, each time with other wheels, other slip, other noise of the laser and another seed of the
-// filter. At places along the way the error of the reported pose is compared with the reported covariance.
-// Frames: poses in `map`; errors are differences of (x, y, theta) along the axes of the map, as the
-// covariance is. Deterministic: the same options give the same figures. Source: Bar-Shalom, Li, Kirubarajan
-// 2001, 5.4 (NEES).
+// Tests whether the covariance that the whole mapper reports is right. A simulated robot drives the same way through a
+// world many times, each time with other wheels, other slip, other noise of the laser and another seed of the filter.
+// At places along the way the error of the reported pose is compared with the reported covariance. Frames: poses in
+// `map`; errors are differences of (x, y, theta) along the axes of the map, as the covariance is. Deterministic: the
+// same options give the same figures. Source: Bar-Shalom, Li, Kirubarajan 2001, 5.4 (NEES).
 #pragma once
 
 #include <cstdint>

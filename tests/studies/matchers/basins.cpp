@@ -25,11 +25,13 @@ void StudyBasins(StudyContext& context, const std::vector<slam::MatcherKind>& ki
   Report& report = context.report;
   report.Heading("Convergence basins");
   report.Text(
-      "Share of right answers (converged, within 0.10 m and 2 deg) when the guess is off by a given distance, in any "
-      "direction, and a given turn, to either side. Worlds `building` and `room`, 181 beams, ranges of 1 cm noise. The "
-      "matcher is told a standard deviation of 1 m and 45 deg, so that the guess does not hold it. What a configured "
-      "limit would cut off is opened: voting's check against odometry is off and its candidates reach as far as the "
-      "largest error; hough, correlative and ndt_de search 1.6 m and 95 deg. As shipped they stop at their limits.");
+      "The figures are the share of right answers (converged, within 0.10 m and 2 deg) if the guess is "
+      "wrong by a given distance in any direction and by a given turn to either side. The worlds are "
+      "`building` and `room`, with 181 beams and a range noise of 1 cm. The matcher is given a "
+      "standard deviation of 1 m and 45 deg, so that the guess has little weight. Limits of the "
+      "options that would exclude large errors are widened: the check of voting against odometry is "
+      "off, and its candidates reach as far as the largest error; hough, correlative and ndt_de search "
+      "1.6 m and 95 deg. With their default options they stop at their limits.");
   const std::vector<double> metres = context.quick
                                          ? std::vector<double>{0, 0.2, 0.5, 1.0, 1.5}
                                          : std::vector<double>{0, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0, 1.25, 1.5};

@@ -40,11 +40,13 @@ void StudyExactness(StudyContext& context, const std::vector<slam::MatcherKind>&
   Report& report = context.report;
   report.Heading("Time, bias, spread");
   report.Text(
-      "Pairs of scans from the routes of the shipped worlds, up to 0.3 m and 12 deg apart, 181 beams; the guess is off "
-      "by 0.05 m and 2 deg (standard deviations, which the matcher is told). Right: converged within 0.10 m and 2 deg "
-      "of the truth. Wrong: converged, not flagged degenerate, and farther off than that: the dangerous kind. Bias and "
-      "spread are of right answers that are not flagged; NEES is 3 where the covariance is honest, above where it "
-      "promises too much. Time is processor time, one thread.");
+      "The pairs of scans come from the routes of the shipped worlds, are at most 0.3 m and 12 deg "
+      "apart and have 181 beams. The guess is wrong by 0.05 m and 2 deg (standard deviations, which "
+      "the matcher is given). An answer is *right* if it converged within 0.10 m and 2 deg of the "
+      "truth. It is *wrong* if it converged farther off and was not flagged as degenerate; such "
+      "answers are dangerous, because nothing marks them. Bias and spread are those of right answers "
+      "that are not flagged. NEES is 3 if the stated covariance is right, and larger if it is too "
+      "small. Times are processor time with one thread.");
   Table table({"matcher", "noise (cm)", "time mean (ms)", "p99 (ms)", "right", "wrong", "flagged degenerate",
                "bias x, y (mm)", "bias theta (mdeg)", "sigma x, y (mm)", "sigma theta (mdeg)", "p95 (cm)", "NEES"});
   Plot plot{.title = "Error of right answers against range noise",

@@ -37,15 +37,15 @@ struct MatchTrial {
   [[nodiscard]] bool good() const { return result.converged && near(); }
   [[nodiscard]] bool wrong() const {
     return result.converged && !result.degenerate && !near();
-  }  // ... without knowing.
+  }  // Wrong, and not flagged.
 };
 
 // The prior is the truth plus `off` (x, y, theta), with these standard deviations.
 [[nodiscard]] MatchTrial TryMatch(const MatchCase& match_case, const Pose2& off, double sigma_m, double sigma_rad,
                                   slam::MatcherKind kind, const slam::MatcherOptions& options);
 
-// The kinds this build has: those that align two identical scans from the right guess. `missing` gets the
-// others' names.
+// The matchers of this build: those that align two identical scans from the right guess. The names of the others are
+// added to `missing`.
 [[nodiscard]] std::vector<slam::MatcherKind> BuiltMatchers(std::vector<std::string>& missing);
 
 }  // namespace cairn::studies

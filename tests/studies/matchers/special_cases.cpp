@@ -69,7 +69,7 @@ void StudyWalls(StudyContext& context, const std::vector<slam::MatcherKind>& kin
                  Number(DistributionOf(tally.slid_cm).p95, 1)});
       if (const double slid = DistributionOf(tally.slid_cm).p95; slid > 5.0)
         context.report.Warn(std::string(slam::MatcherName(kind)) + " leaves the guess along the " + name +
-                            " by up to " + Number(slid, 0) + " cm, where nothing is to be seen");
+                            " by up to " + Number(slid, 0) + " cm, although the scans show nothing in that direction");
       if (converged > 0 && tally.flagged < converged * 9 / 10)
         context.report.Warn(std::string(slam::MatcherName(kind)) + " does not flag " + name + " as degenerate in " +
                             Percent(1.0 - 1.0 * tally.flagged / converged, 0) + " of its answers");
@@ -140,13 +140,16 @@ void StudyEmptyScans(StudyContext& context, const std::vector<slam::MatcherKind>
       const bool prior_kept = (trial.error - Eigen::Vector3d(0.1, 0.05, 0.02)).norm() < 1e-9;
       if (!trial.result.converged && prior_kept) continue;
       context.report.Fault(std::string(slam::MatcherName(kind)) +
-                           " does not give the prior back, unconverged, for an empty scan");
+                           " does not report an empty scan as not converged, or does not return the prior");
       kept = false;
     }
     if (kept) silent += (silent.empty() ? "" : ", ") + std::string(slam::MatcherName(kind));
   }
   if (!silent.empty())
-    context.report.Text("Empty scan, on either side: " + silent + " say not converged and give the prior back.");
+    context.report.Text(
+        "With an empty scan as either of the two, these matchers report that they have not converged, "
+        "and return the prior: " +
+        silent + ".");
 }
 
 }  // namespace
@@ -154,9 +157,11 @@ void StudyEmptyScans(StudyContext& context, const std::vector<slam::MatcherKind>
 void StudySpecialCases(StudyContext& context, const std::vector<slam::MatcherKind>& kinds) {
   context.report.Heading("Corridor, one wall, empty scan, narrow views, crowds");
   context.report.Text(
-      "Where walls run one way only, the place along them is not to be seen: a matcher should say so and stay at the "
-      "guess along them (slid: how far it left it). Crowds are discs that stand elsewhere in the other scan, over half "
-      "of the beams. Guess and yardstick as above.");
+      "If all walls have one direction, the scan does not show the position along them. A matcher "
+      "should then flag its answer as degenerate and keep the position of the guess along the walls "
+      "(*slid along* is the distance from it). In a crowd, half of the beams end on discs that are at "
+      "other places in the other scan. The errors of the guess and the limits of a right answer are "
+      "those of the section above.");
   StudyWalls(context, kinds);
   StudyViews(context, kinds);
   StudyEmptyScans(context, kinds);

@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "server/slam/smoothing/smoothed_map.h"
-#include "server/slam/smoothing/smoothed_path.h"
 #include "tests/studies/log_run.h"
 #include "tests/studies/sensitivity/map_crispness.h"
 
@@ -73,7 +72,7 @@ std::vector<Drive> SimulatedDrives(std::uint64_t seed) {
   cheap.scan_hz = 5.5;
   cheap.laser.field_of_view_rad = Radians(360.0);
   cheap.laser.range_max_m = 6.0;
-  cheap.laser.noise_m = 0.02;
+  cheap.laser.error.sigma_m = 0.02;
   return {{"building", 100.0, usual},
           {"office", 120.0, slipping},
           {"corridor", 60.0, short_sighted},

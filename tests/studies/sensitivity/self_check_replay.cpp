@@ -5,7 +5,7 @@
 
 #include "server/slam/loops/self_check.h"
 #include "server/slam/scan/beam_points.h"
-#include "server/slam/smoothing/smoothed_path.h"
+#include "server/slam/smoothing/smoothed_map.h"
 #include "tests/studies/log_run.h"
 
 namespace cairn::studies {

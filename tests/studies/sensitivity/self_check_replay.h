@@ -1,6 +1,6 @@
-// The self check's verdicts along paths that are given: what its constants do, without running the estimator
-// again for each. Differs from the mapper where a path was put right on the way: here it is the same path
-// throughout. Deterministic.
+// The results of the self-check along given paths. This shows the influence of its constants without running the
+// estimator again for each. In the mapper a path may be corrected on the way; here it stays the same throughout.
+// Deterministic.
 #pragma once
 
 #include <vector>

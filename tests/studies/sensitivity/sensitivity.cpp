@@ -98,7 +98,7 @@ class Sensitivity {
         options.seed += seed;
         AddNoise(usual, run("seed " + Count(options.seed), options), noise);
       }
-      // Some drives turn on the smallest difference, which no seed of the filter makes for the front-end.
+      // On some drives the smallest difference in the front-end changes the result, and a seed changes only the filter.
       for (const double nudge : kNudges) {
         slam::MapperOptions options = one.options;
         options.front_end.refine.residual_sigma_m *= nudge;
@@ -195,7 +195,7 @@ class Sensitivity {
         }
       }
     }
-    context_.report.Heading("The self check's verdicts");
+    context_.report.Heading("Results of the self-check");
     context_.report.Add(table, "sensitivity_self_check");
   }
 
@@ -206,13 +206,15 @@ class Sensitivity {
 
 void RunSensitivity(StudyContext& context) {
   context.report.Text(
-      "Each constant halved and doubled, one at a time. A cell is the error over the default's, halved / doubled: of a "
-      "group of several logs or figures, the ratio farthest from 1. A constant matters where some figure of some log "
-      "changes by more than 10 % and 2 mm, and by more than four other seeds and two nudges of residual_sigma_m by 1 % "
-      "change it. Logs with "
-      "relations: mean relation error. Simulated worlds: mean distance from the true positions. Small robots: blur "
-      "and thickness of the walls, and for the corridor the mean distance from its odometry, which is the best there "
-      "is. Each online and smoothed.");
+      "Each constant is halved and doubled, one at a time. A cell shows the error divided by the error "
+      "with the default value, halved / doubled; for a group of several logs or figures it is the "
+      "ratio farthest from 1. A constant *matters* if some figure of some log changes by more than 10 "
+      "% and by more than 2 mm, and by more than it changes with four other seeds and with "
+      "residual_sigma_m changed by 1 % in either direction. The error of logs with relations is the "
+      "mean relation error; in simulated worlds it is the mean distance from the true positions. Small "
+      "robots have no truth: their figures are the blur and the thickness of the walls, and for the "
+      "corridor log the mean distance from its odometry, which is the best reference there is. Every "
+      "figure is measured for the online and for the smoothed path.");
   Sensitivity(context).Run();
 }
 

@@ -14,7 +14,7 @@ namespace cairn::studies {
 namespace {
 
 constexpr int kOccupied = 65;     // Percent, as map images count.
-constexpr double kOnWallM = 0.1;  // From a true wall, an occupied cell's middle.
+constexpr double kOnWallM = 0.1;  // A cell whose middle is nearer to a true wall than this lies on the wall.
 
 double DistanceTo(const MapLine& line, const Eigen::Vector2d& p) {
   const Eigen::Vector2d along = line.b - line.a;
@@ -23,10 +23,10 @@ double DistanceTo(const MapLine& line, const Eigen::Vector2d& p) {
 }
 
 struct Drawing {
-  double wall_found = 0.0;   // Share of the walls ever hit that are occupied,
-  double thickness_m = 0.0;  // occupied area over the length of those found,
-  double off_walls = 0.0;    // share of occupied cells that lie on no wall: what was there for a moment.
-  double cpu_ms = 0.0;       // A scan.
+  double wall_found = 0.0;   // Share of the hit length of all walls that is occupied.
+  double thickness_m = 0.0;  // Occupied area at the walls divided by the occupied length.
+  double off_walls = 0.0;    // Share of the occupied cells that lie on no wall.
+  double cpu_ms = 0.0;       // Processor time per scan.
   OccupancyImage image;
 };
 
@@ -57,7 +57,7 @@ Drawing Draw(const StudyLog& log, const std::vector<MapLine>& walls, const std::
     const std::uint8_t percent = grid.OccupancyAt(p);
     return percent != kUnknownCell && percent >= kOccupied;
   };
-  // A wall lies on the border of cells as often as not: either side will do.
+  // A wall often lies on the border between two cells; then either cell may be the occupied one.
   const double half = 0.5 * options.resolution_m;
   std::size_t found = 0;
   for (const Eigen::Vector2d& p : seen)
@@ -94,18 +94,19 @@ void StudyGridModels(StudyContext& context) {
   Report& report = context.report;
   report.Heading("Occupancy grids (3.7)");
   report.Text(
-      "One robot drives through the simulated building, where people walk; every scan is drawn at its true pose, so "
-      "that what differs is the way to draw. The thesis spread hits by a triangular density, found its walls too "
-      "thick, "
-      "and went down to deterministic cells of which an occupied one is hard to free (triangular and degrading here); "
-      "probabilistic is our default, deterministic lets the last scan decide. *Walls found*: share of the walls' "
-      "length "
-      "ever hit that is occupied. *Thickness*: occupied area at walls by that length. *On no wall*: occupied cells "
-      "where no wall is: posts, which are the same in every row, and what people have left behind.");
+      "One robot drives through the simulated building, in which people walk. Every scan is drawn at "
+      "its true pose, so that only the way of drawing differs. The thesis first spread each hit with a "
+      "triangular density (here *triangular*), found that walls became too thick, and then used "
+      "deterministic cells in which an occupied cell is hard to free (here *degrading*). "
+      "*Probabilistic* is the default of Cairn; with *deterministic* the last scan decides. *Walls "
+      "found* is the share of the hit length of all walls that is occupied. *Thickness* is the "
+      "occupied area at the walls divided by that length. *On no wall* is the share of occupied cells "
+      "where there is no wall: these are posts, which are the same in every row, and traces of people "
+      "who have moved on.");
   sim::FleetOptions fleet;
   fleet.seed = context.seed;
   fleet.scan_hz = 5.0;
-  fleet.laser.noise_m = 0.02;
+  fleet.laser.error.sigma_m = 0.02;
   const auto world = sim::OpenWorld("building");
   const std::vector<MapLine> walls = KnownMapOf(*world);
   const StudyLog log = SimulateLog("building", context.Pick(240.0, 60.0), fleet);
@@ -115,7 +116,7 @@ void StudyGridModels(StudyContext& context) {
                                                               {GridModel::kDeterministic, "deterministic"},
                                                               {GridModel::kTriangular, "triangular (printed first)"},
                                                               {GridModel::kDegrading, "degrading (printed)"}};
-  // What was hit at all: a grid that never forgets.
+  // The parts of the walls that were hit at least once, from a grid whose cells practically never become free again.
   slam::GridOptions never;
   never.model = GridModel::kDegrading;
   never.miss_probability = 0.4999;
@@ -130,7 +131,7 @@ void StudyGridModels(StudyContext& context) {
     return percent == kUnknownCell || percent < kOccupied;
   });
 
-  Table table({"model", "walls found", "thickness (m)", "on no wall", "CPU a scan (ms)"});
+  Table table({"model", "walls found", "thickness (m)", "on no wall", "processor time per scan (ms)"});
   for (const auto& [model, name] : models) {
     slam::GridOptions options;
     options.model = model;

@@ -26,7 +26,8 @@ struct Quality {
   [[nodiscard]] double sigma_alpha_deg() const { return Degrees(std::sqrt(sum_alpha2 / std::max(measured, 1))); }
 };
 
-// A line shows a wall where it runs along it, near it, and the two overlap over half of the shorter.
+// Whether a line lies on a wall: nearly the same direction, near it, and overlapping with it over at least half of the
+// shorter of the two.
 bool Shows(const LineFeature& line, const VisibleWall& wall) {
   if (wall.length() < 1e-6) return false;
   const Eigen::Vector2d along = (wall.b_robot - wall.a_robot).normalized();
@@ -54,7 +55,7 @@ void Judge(const Scene& scene, const Pose2& pose, const sim::LaserOptions& laser
         std::any_of(lines.begin(), lines.end(), [&](const LineFeature& line) { return Shows(line, wall); });
   }
   for (const LineFeature& line : lines) {
-    // Of the walls a line shows, the one it overlaps most says what it should be.
+    // A line may lie on several walls; the one with the longest overlap is taken as the truth.
     const VisibleWall* best = nullptr;
     for (const VisibleWall& wall : walls)
       if (Shows(line, wall) && (best == nullptr || wall.length() > best->length())) best = &wall;
@@ -82,10 +83,11 @@ void StudyLineExtraction(StudyContext& context) {
   Report& report = context.report;
   report.Heading("Line extraction (2.1.1, Table 2.1; 3.3)");
   report.Text(
-      "Simulated scans from random places on the robots' routes. A wall counts as visible where a perfect scan hits it "
-      "at least 9 times over 0.5 m; a line is right where it shows any wall of the world. The printed row comes from "
-      "real scans of an office, judged by hand (Nguyen et al. 2005): not the same yardstick. Worlds with furniture and "
-      "pillars are the harder ones.");
+      "The scans are simulated at random places on the robots' routes. A wall counts as visible if a "
+      "scan without noise hits it at least 9 times over at least 0.5 m. A line is right if it lies on "
+      "any wall of the world. The row of the thesis comes from real scans of an office that were "
+      "judged by hand (Nguyen et al. 2005), so its figures are not measured in the same way. Worlds "
+      "with furniture and pillars are harder than those without.");
   Table table({"scans", "world", "beams", "sigma range (cm)", "lines/100 scans", "true pos.", "false pos.",
                "sigma r (cm)", "sigma alpha (deg)", "speed (Hz)"});
   table.Add({"thesis, Table 2.1", "real office", "181", "-", "641", "86.0 %", "8.9 %", "1.95", "0.74", "1470"});
@@ -111,7 +113,7 @@ void StudyLineExtraction(StudyContext& context) {
     sim::Random random(context.seed);
     Quality quality;
     for (int i = 0; i < context.Pick(400, 60); ++i) Judge(scene, scene.DrawPose(random), row.laser, random, quality);
-    table.Add({"simulated", row.world, Count(row.laser.beams), Number(100 * row.laser.noise_m, 1),
+    table.Add({"simulated", row.world, Count(row.laser.beams), Number(100 * row.laser.error.sigma_m, 1),
                Number(100.0 * quality.extracted / quality.scans, 0), Percent(quality.true_positive()),
                Percent(quality.false_positive()), Number(quality.sigma_r_cm(), 2), Number(quality.sigma_alpha_deg(), 2),
                Number(1e3 * quality.scans / quality.cpu_ms, 0)});
@@ -119,28 +121,30 @@ void StudyLineExtraction(StudyContext& context) {
       const auto add = [&](Plot& to, const std::string& label, double y) {
         auto it = std::find_if(to.series.begin(), to.series.end(), [&](const Series& s) { return s.label == label; });
         if (it == to.series.end()) it = to.series.insert(it, Series{.label = label});
-        it->x.push_back(100 * row.laser.noise_m), it->y.push_back(y);
+        it->x.push_back(100 * row.laser.error.sigma_m), it->y.push_back(y);
       };
       add(plot, row.world + ": true positives", 100 * quality.true_positive());
       add(plot, row.world + ": false positives", 100 * quality.false_positive());
       add(spread, row.world + ": sigma r (cm)", quality.sigma_r_cm());
       add(spread, row.world + ": sigma alpha (deg)", quality.sigma_alpha_deg());
     }
-    if (row.laser.noise_m > 0.011) continue;
+    if (row.laser.error.sigma_m > 0.011) continue;
     plausible = plausible && quality.true_positive() > 0.75 && quality.false_positive() < 0.2;
     const bool this_worse = quality.true_positive() < 0.86 || quality.false_positive() > 0.089 ||
                             quality.sigma_r_cm() > 1.95 || quality.sigma_alpha_deg() > 0.74;
     if (this_worse)
-      report.Warn("worse than the printed row in at least one figure: " + row.world + ", " + Count(row.laser.beams) +
-                  " beams, sigma " + Number(100 * row.laser.noise_m, 1) + " cm");
+      report.Warn("at least one figure is worse than in the row of the thesis: " + row.world + ", " +
+                  Count(row.laser.beams) + " beams, sigma " + Number(100 * row.laser.error.sigma_m, 1) + " cm");
     worse = worse || this_worse;
   }
   report.Add(table, "table_2_1");
   report.Add(plot, "line_rates");
   report.Add(spread, "line_spread");
-  if (!worse) report.Text("Ours is better than the printed row in every figure for ranges of up to 1 cm noise.");
+  if (!worse)
+    report.Text("All figures are better than in the row of the thesis if the ranges have a noise of at most 1 cm.");
   report.Expect(plausible,
-                "rates below 75 % or above 20 % on scans of 1 cm noise: the extractor or this study is broken");
+                "with a noise of 1 cm, fewer than 75 % of the walls are found or more than 20 % of the lines are "
+                "wrong: the line extraction or this study must be broken");
 }
 
 }  // namespace cairn::studies

@@ -106,8 +106,10 @@ void SweepLog(StudyContext& context, const StudyLog& log, bool lines_only) {
   report.Add(degrees, "particles_deg_" + log.name + tag);
   report.Add(times, "particles_time_" + log.name + tag);
   report.Expect(full_means_m.back() < 1.5 * full_means_m.front() + 0.02,
-                log.name + ", " + system + ": the most particles are clearly less exact than the fewest");
-  if (last_mean < 0.9 * first_mean) report.Warn("more particles cost less time: the machine was too busy to measure");
+                log.name + ", " + system +
+                    ": the error with the largest number of particles is clearly larger than with the smallest");
+  if (last_mean < 0.9 * first_mean)
+    report.Warn("more particles took less time, so the machine was too busy for measuring times");
 }
 
 }  // namespace

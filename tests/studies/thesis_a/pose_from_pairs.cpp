@@ -13,7 +13,6 @@
 
 #include "server/slam/features/corners.h"
 #include "server/slam/features/feature_extraction.h"
-#include "server/slam/voting/robust_mean.h"
 #include "server/slam/voting/voting.h"
 #include "tests/studies/scene.h"
 #include "tests/studies/stopwatch.h"
@@ -30,8 +29,8 @@ const LineFeature& Line(const ScanFeatures& features, int index) {
   return features.lines[static_cast<std::size_t>(index)];
 }
 
-// The way the thesis advises against (3.5.12.3, Figure 3.29): where two matched lines meet in one scan and in
-// the other.
+// The way that the thesis advises against (3.5.12.3, Figure 3.29): it compares the points in which two matched lines
+// meet in one scan and in the other.
 std::optional<Eigen::Vector2d> TranslationFromCorners(const ScanFeatures& prev, const ScanFeatures& curr,
                                                       const std::vector<LinePair>& pairs, double rotation_rad,
                                                       bool real_only, const slam::PoseOptions& options) {
@@ -65,10 +64,11 @@ std::optional<Eigen::Vector2d> TranslationFromCorners(const ScanFeatures& prev, 
 using Samples = std::map<std::string, std::vector<double>>;
 
 constexpr char kPlain[] = "1 plain mean", kWeighted[] = "2 length-weighted mean (3.5.12.2, first step)",
-               kThesis[] = "3 + outliers removed (Table 3.27)", kOurs[] = "4 + weight by length squared (ours)";
+               kThesis[] = "3 as 2, outliers removed (Table 3.27)",
+               kOurs[] = "4 as 3, weighted by the square of the length (Cairn)";
 constexpr char kVectors[] = "1 distance vectors of lines (Tables 3.28-3.31)", kAllCorners[] = "2 corner points, all",
                kRealCorners[] = "3 corner points, real corners only",
-               kMatcher[] = "4 whole matcher (jumps against odometry dropped)";
+               kMatcher[] = "4 whole matcher (pairs that contradict the odometry are dropped)";
 
 void CompareOnce(const ScanFeatures& prev, const ScanFeatures& curr, const Pose2& motion, const Pose2& odometry,
                  Samples& rotations, Samples& translations, int& unmatched) {
@@ -93,7 +93,7 @@ void CompareOnce(const ScanFeatures& prev, const ScanFeatures& curr, const Pose2
   const double rotation = rotation_with(options.pose.rotation_length_power, options.pose.rotation_spread_rad);
   note(kOurs, rotation);
 
-  // All ways get the same rotation and the same pairs; a case counts where every way has an answer.
+  // All ways get the same rotation and the same pairs. Only cases in which every way has an answer are counted.
   const auto offsets = slam::OffsetsOf(prev, curr, match.pairs, rotation, options.pose);
   const auto vectors = slam::TranslationFromOffsets(offsets, rotation, odometry.translation(), options.pose);
   const auto corners = TranslationFromCorners(prev, curr, match.pairs, rotation, false, options.pose);
@@ -140,10 +140,12 @@ void StudyPoseFromPairs(StudyContext& context) {
   Report& report = context.report;
   report.Heading("Rotation and translation from matched lines (3.5.12.2, 3.5.12.3)");
   report.Text(
-      "Two simulated scans of 181 beams, up to 0.3 m and 15 deg apart, ranges of 1 cm noise, odometry wrong by about 3 "
-      "cm and 2 deg; worlds `room`, `building`, `office`. Every way starts from the same pairs the vote selected, "
-      "wrong ones included. The thesis argues (Figure 3.29) that distance vectors between lines beat corner points, "
-      "whose place suffers from the lines' slopes.");
+      "Each case consists of two simulated scans with 181 beams, at most 0.3 m and 15 deg apart, with "
+      "a range noise of 1 cm and an odometry error of about 3 cm and 2 deg, in the worlds `room`, "
+      "`building` and `office`. All ways of computing get the same pairs of lines, as the voting "
+      "matcher selected them, including wrong ones. The thesis states (Figure 3.29) that distance "
+      "vectors between lines are more exact than corner points, because errors of the slopes of the "
+      "lines move the corner points.");
   Samples rotations, translations;
   int unmatched = 0;
   const int pairs = context.Pick(1500, 200);
@@ -165,17 +167,19 @@ void StudyPoseFromPairs(StudyContext& context) {
     }
   }
   report.Text(Count(unmatched) + " of " + Count(3 * pairs) +
-              " pairs of scans are left out: no match, corridor, or fewer than three pairs.");
+              " pairs of scans are left out because they did not match, show a corridor, or have fewer than "
+              "three pairs of lines.");
   AddComparison(report, rotations, "Rotation", "deg", "rotation");
   AddComparison(report, translations, "Translation", "cm", "translation");
   const auto p95 = [](const Samples& samples, const char* way) { return DistributionOf(samples.at(way)).p95; };
   const bool as_thesis = p95(translations, kVectors) < p95(translations, kAllCorners);
-  report.Text(as_thesis
-                  ? "As the thesis says, distance vectors are better than corner points (95th percentile)."
-                  : "Against the thesis, corner points are no worse here than distance vectors (95th percentile).");
+  report.Text(as_thesis ? "The 95th percentile is smaller with distance vectors than with corner points, as the thesis "
+                          "states."
+                        : "The 95th percentile is no larger with corner points than with distance vectors, which the "
+                          "thesis does not expect.");
   report.Expect(p95(rotations, kThesis) < 2.0 && p95(translations, kVectors) < 10.0 &&
                     p95(rotations, kThesis) <= p95(rotations, kPlain) * 1.05,
-                "errors of matched pairs are too large to be right, or removing outliers does harm");
+                "the errors are too large for correctly matched pairs, or removing outliers increases them");
 }
 
 }  // namespace cairn::studies

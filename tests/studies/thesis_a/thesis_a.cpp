@@ -16,10 +16,13 @@ namespace {
 
 void RunThesisA(StudyContext& context) {
   context.report.Text(
-      "Thesis A tests on the logs of Aselsan, Ancona and Intel Jones Farms and measures errors by hand in their maps. "
-      "**None of the three is at hand**: the published logs that are (Intel Research Lab Seattle, MIT CSAIL) stand in, "
-      "and errors are those of verified relations between poses. Printed figures are the thesis' own, from its logs, "
-      "in Matlab on a 2 GHz Core 2 Duo: they stand beside ours for the shape of the curves, not as a race.");
+      "Thesis A (A. Özgür, A Novel Mobile Robot Navigation Method Based on Combined Feature Based Scan "
+      "Matching and FastSLAM Algorithm, METU 2010) tests on logs of Aselsan, Ancona and Intel Jones "
+      "Farms, and measures errors by hand in their maps. **None of these three logs is available "
+      "here.** Instead this study uses two published logs, Intel Research Lab Seattle and MIT CSAIL, "
+      "and measures errors with verified relations between poses. The columns named `thesis` repeat "
+      "the figures that the thesis prints for its own logs, measured in Matlab on a 2 GHz Core 2 Duo. "
+      "Compare the shapes of the curves with them, not the absolute values.");
   if (context.Wants("lines")) StudyLineExtraction(context);
   if (context.Wants("pairs")) StudyPoseFromPairs(context);
   if (context.Wants("grid")) StudyGridModels(context);

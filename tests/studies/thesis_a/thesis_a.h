@@ -1,5 +1,6 @@
-// The parts of `cairn-study thesis-a`, in the order of thesis A (feature-based scan matching with FastSLAM).
-// Each adds its section to the report, and tells it where a figure is not plausible.
+// The parts of `cairn-study thesis-a`, in the order of thesis A: Ayhan Özgür, "A Novel Mobile Robot Navigation Method
+// Based on Combined Feature Based Scan Matching and FastSLAM Algorithm", Middle East Technical University, 2010. Each
+// part adds a section to the report, and reports figures that are not plausible.
 #pragma once
 
 #include <optional>
@@ -11,17 +12,17 @@
 
 namespace cairn::studies {
 
-// What makes the estimator the thesis' own: the voting matcher's answer is the step, no refinement, no
-// revisits, no large loops; landmarks are all a filter sees. Assignments for MapperWith.
+// Assignments for MapperWith that make the estimator that of the thesis: the answer of the voting matcher is the step,
+// and the filter uses nothing but landmarks (no refinement, no revisits, no large loops).
 [[nodiscard]] std::vector<std::string> LinesOnly();
 
-// What the study holds a published log to, in metres of mean relation error: about half as much again as is
-// measured on the whole log.
+// The largest mean relation error, in metres, that the study accepts on a published log: about 1.5 times the error that
+// was measured on the whole log.
 struct AccuracyLimits {
   double shipped_m = 0.0;     // The mapper as it is shipped, any number of particles from 50 on.
   double lines_only_m = 0.0;  // LinesOnly(), at 180 degrees of view.
 };
-// Nothing for logs that were never measured; the first scans of a log are held to the limits of the whole.
+// Returns nothing for a log that was never measured. The limits of a whole log also apply to its first scans alone.
 [[nodiscard]] std::optional<AccuracyLimits> AccuracyLimitsOf(const StudyLog& log);
 
 // 2.1.1, Table 2.1: true and false positives and the spread of r and alpha of extracted lines, on simulated

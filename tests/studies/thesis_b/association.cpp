@@ -35,7 +35,8 @@ CorridorPair DrawPair(const Scene& scene, double share, sim::Random& random) {
     if (scene.Clearance(from * motion) < 0.3) continue;
     const auto see = [&](const Pose2& pose) {
       sim::LaserOptions laser = Sick(0.01);
-      laser.field_of_view_rad = Radians(270);  // Doors behind the robot tell the place along the corridor as well.
+      laser.field_of_view_rad =
+          Radians(270);  // With doors behind the robot, the position along the corridor is determined better.
       laser.beams = 541;
       return slam::ExtractFeatures(scene.Look(pose, laser, random), slam::FeatureOptions{});
     };
@@ -44,9 +45,9 @@ CorridorPair DrawPair(const Scene& scene, double share, sim::Random& random) {
   }
 }
 
-// Least squares once, over pairs formed once at the identity: the thesis' first test. It does not say by
-// what; by normals alone ("the closest one comparing the normals", 4.3.2), or the nearest midpoint of those
-// with like normals.
+// Least squares once, over pairs that are formed once at the identity: the first test of the thesis. The thesis does
+// not say how these pairs are formed. Here they have the most similar normals (the first step of 4.3.2), or the nearest
+// midpoints among lines with similar normals.
 enum class Couples : std::uint8_t { kClosestNormal, kNearestMidpoint };
 std::optional<Pose2> LeastSquaresAlone(const CorridorPair& pair, Couples couples, const slam::LineLsqOptions& options) {
   std::vector<slam::WeighedPair> weighed;
@@ -69,7 +70,7 @@ std::optional<Pose2> LeastSquaresAlone(const CorridorPair& pair, Couples couples
   return slam::AlignLinePairs(weighed, {}, options.least_squares).T_ref_curr;
 }
 
-// The gates and weights thesis B prints (5.4.3). MP_THRESHOLD is printed as 0.1^2: of the square of the
+// The limits and weights that thesis B prints (5.4.3). MP_THRESHOLD is printed as 0.1^2, the limit of the square of the
 // distance.
 slam::LineLsqOptions AsPrinted(int rounds) {
   slam::LineLsqOptions options;
@@ -142,12 +143,15 @@ void StudyAssociation(StudyContext& context) {
   Report& report = context.report;
   report.Heading("Data association (5.4.3, Figures 5.15-5.18)");
   report.Text(
-      "Pairs of poses in the simulated corridor and building, up to 0.4 m, 0.2 m aside and 14 deg apart, no guess "
-      "(identity). Printed: least squares by itself \"is not able to furnish a good transformation\"; with association "
-      "repeated 50 times it is, and E (5.5) stays up until the 50th round. \"As printed\": normals 0.8, midpoints 0.1 "
-      "m, slopes 5 deg, all lines weigh the same. Right: within 10 cm and 2 deg. *Gained*, *lost*: pairs right where "
-      "least squares alone (nearest midpoints) is wrong, and the reverse. *Close*: a fifth of these motions, inside "
-      "the printed gates.");
+      "Each case is a pair of poses in the simulated worlds `corridor` and `building`, at most 0.4 m "
+      "ahead, 0.2 m aside and 14 deg apart, matched without a guess (the search starts at the "
+      "identity). The thesis states that least squares alone find no good transformation, that they do "
+      "when the association is repeated 50 times, and that E (5.5) stays high until the 50th round. "
+      "\"As printed\" uses the limits of the thesis: 0.8 for normals, 0.1 m for midpoints, 5 deg for "
+      "slopes, and the same weight for all lines. An answer is right within 10 cm and 2 deg. *Gained* "
+      "counts pairs that are right where least squares alone (with the nearest midpoints) are wrong; "
+      "*lost* counts the reverse. *Close* motions are a fifth as large, within the limits of the "
+      "thesis.");
   const int cases = context.Pick(400, 60);
   Table table({"world", "way", "right", "gained", "lost", "median (cm)", "p95 (cm)", "median (deg)", "rounds mean",
                "rounds p95"});
@@ -205,7 +209,7 @@ void StudyAssociation(StudyContext& context) {
             match.result.converged ? std::optional(match.result.T_ref_curr) : std::nullopt, pair.T_ref_curr);
         way.against.Add(alone_right, right);
         if (match.result.converged) way.rounds.push_back(match.result.iterations);
-        shipped_right = right;  // The last way's.
+        shipped_right = right;  // Of the last row.
         if (!right || match.errors.empty()) continue;
         ++way.counted;
         for (std::size_t r = 0; r < 50; ++r) way.sums[r] += match.errors[std::min(r, match.errors.size() - 1)];
@@ -238,26 +242,29 @@ void StudyAssociation(StudyContext& context) {
                 Count(shipped.against.gained) + " of " + Count(cases) + " pairs, the reverse on " +
                 Count(shipped.against.lost) + ".");
     report.Expect(shipped.against.gained > shipped.against.lost && shipped.errors.right >= shipped.errors.cases / 2,
-                  "association is no gain over least squares alone: " + world);
+                  "association gains no more pairs than it loses, compared with least squares alone: " + world);
     const Way& printed = ways[1];
     report.Expect(place.share >= 1.0 || printed.errors.right >= printed.errors.cases / 2,
-                  "association as printed fails on close pairs, against the thesis");
-    if (DistributionOf(shipped.rounds).p95 > 50) report.Warn("more than the thesis' 50 rounds are needed");
+                  "association with the limits of the thesis fails on close pairs, which contradicts the thesis");
+    if (DistributionOf(shipped.rounds).p95 > 50) report.Warn("more rounds are needed than the 50 of the thesis");
   }
   report.Add(table, "association");
   report.Add(curve, "figure_5_18");
   report.Text(
-      "Against the printed curve, ours needs a few rounds, not 50: least squares run to their end in every round. E "
-      "does not fall to zero, because the visible parts of long walls differ from place to place; it may rise in the "
-      "second round, when more pairs join.");
+      "Unlike the curve of the thesis, Cairn needs a few rounds instead of 50, because the least "
+      "squares run until they converge in every round. E does not fall to zero, because different "
+      "parts of long walls are visible from different places. E may rise in the second round, when "
+      "more pairs are used.");
   report.Text(
-      "The printed gates are read rightly (MP_THRESHOLD = 0.1^2 bounds a squared distance; ours, across and along the "
-      "wall by itself, are if anything wider): they presuppose the thesis' \"two close robot poses\". From the "
-      "identity "
-      "no wall passes them after 5 deg or 0.1 m of motion, however many the rounds; on close pairs they do what is "
-      "printed, and least squares over pairs by normals alone, as 4.3.2 begins, fail as in Figure 5.15. With a guess "
-      "(least squares' own, or odometry) they serve the wide pairs too. The shipped gates start wide and shrink "
-      "instead. Pairs by nearest midpoints, which the thesis has not, are the harder opponent.");
+      "The limits of the thesis presuppose two poses that are close to each other (MP_THRESHOLD = "
+      "0.1^2 limits a squared distance; the limits used here, which apply across and along the wall "
+      "separately, are at most wider). When the search starts at the identity, no wall passes these "
+      "limits after a motion of 5 deg or 0.1 m, in any number of rounds. For close pairs they work as "
+      "the thesis states, and least squares over pairs with the most similar normals, the first step "
+      "of 4.3.2, fail as in Figure 5.15. With a guess, from least squares or from odometry, the limits "
+      "also work for the wide pairs. The limits of Cairn start wide and shrink. Least squares over "
+      "pairs with the nearest midpoints, which the thesis does not use, are the stronger method to "
+      "compare with.");
 }
 
 }  // namespace cairn::studies

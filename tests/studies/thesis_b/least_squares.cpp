@@ -56,12 +56,12 @@ void StudyLeastSquares(StudyContext& context, const StudyLog& log) {
   const std::vector<LineFeature> lines = MostLinesOf(log, from);
   if (lines.size() < 3) return report.Fault("no scan of " + log.name + " shows three lines");
   report.Text("The " + Count(static_cast<long long>(lines.size())) + " lines of " + from +
-              ", moved by the inverse of each transform of Table 5.1; least squares start at the identity and know the "
-              "pairs. Printed: \"chi, although starting from high values, falls quickly to zero after a few "
-              "iterations\" (the thesis runs 100).");
+              ", are moved by the inverse of each transform of Table 5.1. The least squares start at the "
+              "identity and are given the pairs. The thesis states that chi starts high and falls to zero "
+              "within a few iterations (it runs 100).");
   std::vector<Way> ways(2);
   ways[0].name = "as shipped";
-  ways[1].name = "thesis (all lines weigh the same)";
+  ways[1].name = "as printed (all lines have the same weight)";
   ways[1].options.length_power = 0.0;
   for (Way& way : ways) way.options.max_iterations = 100;
   Table table({"figure", "x (m)", "y (m)", "theta (rad)", "weights", "error (m)", "error (deg)", "chi at the start",

@@ -9,12 +9,12 @@
 #include <utility>
 #include <vector>
 
-#include "client/sim/closed_path.h"
 #include "client/sim/shipped_worlds.h"
+#include "client/sim/world.h"
 #include "server/slam/features/feature_extraction.h"
 #include "server/slam/localisation/keyframe_lines.h"
-#include "server/slam/localisation/pose_fusion.h"
-#include "server/slam/smoothing/smoothed_path.h"
+#include "server/slam/localisation/place_hypotheses.h"
+#include "server/slam/smoothing/smoothed_map.h"
 #include "tests/studies/dpslam/grid_drive.h"
 #include "tests/studies/log_run.h"
 #include "tests/studies/mapper_choice.h"
@@ -39,7 +39,7 @@ std::vector<slam::LineFeature> LinesOf(const Scan& scan) {
   return slam::ExtractFeatures(scan, slam::FeatureOptions{}).lines;
 }
 
-// Single scans, nothing known of the place.
+// Counts over single scans, matched without any knowledge of the pose.
 struct Placings {
   slam::LineMatchOptions options;
   int queries = 0, right = 0, wrong = 0, nowhere = 0, among = 0, alone = 0, alone_right = 0, bounded = 0;
@@ -94,21 +94,21 @@ Table PlacingsTable() {
 using KnownMap = std::shared_ptr<const std::vector<MapLine>>;
 
 struct Followed {
-  Trajectory localized, odometry;           // What the robot stood by; odometry from the true start.
+  Trajectory localized, odometry;           // Poses reported as localized; odometry from the true start.
   std::vector<double> error_m, odometry_m;  // Of all scans of the two, against the truth.
   std::vector<double> error_way_m, odometry_way_m;
   std::size_t scans = 0;        // With a truth.
-  double placed_after_m = NAN;  // Way until it first stood by a place.
+  double placed_after_m = NAN;  // Distance travelled before the first pose reported as localized.
   Distribution cpu_ms;
 };
 
-// The whole estimator with slam.filter=line_match over a log, the start withheld.
+// Runs the whole estimator with slam.filter=line_match over a log, without telling it the start pose.
 Followed Follow(StudyContext& context, const StudyLog& log, const Trajectory& truth, const KnownMap& map) {
   auto options = MapperWith({"slam.filter=line_match"}, context.seed);
   if (!options) throw std::invalid_argument(options.error().message);
   options->filter.line_match.map = map;
   StudyLog lost = log;
-  lost.T_map_robot_start = {50.0, -30.0, 2.0};  // Means nothing.
+  lost.T_map_robot_start = {50.0, -30.0, 2.0};  // An arbitrary wrong start pose.
   const LogRun run = RunOverLog(lost, *options);
   Followed followed;
   followed.cpu_ms = run.time_ms();
@@ -161,11 +161,12 @@ void AddFollowed(Table& table, const std::string& name, const Followed& run, std
              Number(run.cpu_ms.p99, 1), Number(run.cpu_ms.max, 1)});
 }
 
-// Whoever stands by a wrong place is worse than lost. (Where all rooms look alike, lost is right.)
+// A wrong pose that is reported as localized is worse than the report that the robot is lost. (Where all rooms look
+// alike, "lost" is the right report.)
 void ExpectHonest(Report& report, const std::string& name, const Followed& run) {
   const auto wrong = std::ranges::count_if(run.error_m, [](double m) { return m > kWrongM; });
   report.Expect(static_cast<double>(wrong) <= 0.01 * static_cast<double>(run.scans),
-                name + ": stands by a place more than 1 m off in " + Count(wrong) + " scans");
+                name + ": reports a pose that is more than 1 m wrong as localized in " + Count(wrong) + " scans");
 }
 
 Table FollowedTable() {
@@ -250,7 +251,7 @@ void InSimulation(StudyContext& context, Table& placed, Table& followed) {
     ExpectHonest(report, name, run);
     DrawFollowed(report, name, map, log.truth, run);
   }
-  report.Expect(right >= wrong, "LineMatch places more scans wrong than right in the simulated worlds");
+  report.Expect(right >= wrong, "LineMatch gives more wrong than right places in the simulated worlds");
 }
 
 void OnLog(StudyContext& context, const StudyLog& log, Table& placed, Table& followed) {
@@ -287,7 +288,7 @@ void OnLog(StudyContext& context, const StudyLog& log, Table& placed, Table& fol
                      static_cast<std::size_t>(region_lines / std::max(region_known.ours.queries, 1)));
   const Followed along = Follow(context, log, truth, std::make_shared<const std::vector<MapLine>>(map));
   AddFollowed(followed, log.name, along, map.size());
-  // What was not seen when the map was made.
+  // The map was made from the first half only, so it does not contain what only the second half shows.
   const auto [first, second] = Halves(log);
   const slam::MapperSnapshot earlier = RunOverLog(first, *options).snapshot;
   const auto map_before = slam::LinesOfKeyframes(earlier.keyframes, slam::SmoothedPath(earlier));
@@ -304,25 +305,26 @@ void StudyLineMatch(StudyContext& context) {
   Report& report = context.report;
   report.Heading("LineMatch: the place in a known map of lines (2.2.2, Algorithm 1, (2.17)-(2.19))");
   report.Text(
-      "Each scan's lines against the map's, nothing known of the pose; the answer that pairs the largest share of the "
-      "scan is taken. *As printed*: Algorithm 1 (pairing=recursive), in which no scan line may stay unpaired; the "
-      "other "
-      "rows are the default. Right: within 0.2 m and 5 deg. *Right among the answers*: what odometry could choose. "
-      "Simulated "
-      "worlds: their walls are the map, scans along the robots' routes (180 deg, 1 cm noise), posts and people are not "
-      "in it. Logs: the map is every keyframe's lines along the smoothed path of the whole log, collinear ones "
-      "merged; the scans are every 50th of those that are no keyframes; the smoothed path is the truth. The thesis "
-      "prints no figures.");
+      "The lines of single scans are matched with the lines of the map, without any knowledge of the "
+      "pose. The answer that pairs the largest share of the scan is taken. *As printed* is Algorithm 1 "
+      "(pairing=recursive), in which every line of the scan must be paired; the other rows are the "
+      "default. An answer is right within 0.2 m and 5 deg. *Right among the answers* counts scans for "
+      "which odometry could choose the right answer. In the simulated worlds the map consists of the "
+      "walls, without posts and people, and the scans are taken along the robots' routes (180 deg, 1 "
+      "cm of noise). For logs the map consists of the lines of all keyframes along the smoothed path "
+      "of the whole log, with collinear lines merged; every 50th scan that is not a keyframe is "
+      "matched, and the smoothed path is taken as the truth. The thesis prints no figures.");
   Table placed = PlacingsTable(), followed = FollowedTable();
   InSimulation(context, placed, followed);
   for (const StudyLog& log : ChooseLogs(context, {"mit-csail", "intel"}, context.Pick(0, 400)))
     OnLog(context, log, placed, followed);
   report.Add(placed, "line_match_placed");
   report.Text(
-      "Along a drive, the whole estimator with slam.filter=line_match, the start withheld: from nothing until one "
-      "place "
-      "is left, then (2.18) with the answer nearest to the belief, gate 16.3. Localized: what the robot stood by; the "
-      "shares are of all scans. Odometry alone starts at the true pose.");
+      "The whole estimator runs along a drive with slam.filter=line_match and is not given the start "
+      "pose. It searches the whole map until one place is left, and then corrects the pose by (2.18) "
+      "with the answer nearest to it, if that lies within a gate of 16.3. *Scans localized* is the "
+      "share of all scans for which it reported a pose in the map as localized, and the errors are "
+      "those of these scans. Odometry alone starts at the true pose.");
   report.Add(followed, "line_match_followed");
 }
 

@@ -20,9 +20,12 @@ namespace {
 
 void RunThesisB(StudyContext& context) {
   context.report.Text(
-      "Thesis B tests on scans its authors made with the Stage simulator in the map of their own department, which is "
-      "**not at hand** (nor are the Jones Farm and Mine logs): one scan of the first log at hand and the simulated "
-      "`corridor` and `building` stand in. It prints curves, hardly any numbers; its words stand beside ours.");
+      "Thesis B is about fast position tracking by scan matching with lines (no earlier than 2011; the "
+      "copy used here has no title page, so its author and title are not known). It tests on scans "
+      "that were made with the Stage simulator in a map of its department. **That map is not available "
+      "here**, and neither are the logs Jones Farm and Mine. Instead this study uses one scan of the "
+      "first available log, and the simulated worlds `corridor` and `building`. The thesis prints "
+      "curves and hardly any numbers; what it states in words is repeated beside the figures of Cairn.");
   const std::vector<StudyLog> logs = ChooseLogs(context, {"mit-csail", "intel"}, context.Pick(4000, 400));
   if (context.Wants("least_squares")) StudyLeastSquares(context, logs.front());
   if (context.Wants("association")) StudyAssociation(context);

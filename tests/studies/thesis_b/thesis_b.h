@@ -1,5 +1,6 @@
-// The parts of `cairn-study thesis-b` (fast position tracking with lines). Each adds its section to the
-// report, and tells it where a figure is not plausible.
+// The parts of `cairn-study thesis-b`. Thesis B is about fast position tracking by scan matching with lines (no earlier
+// than 2011; the copy used here has no title page). Each part adds a section to the report, and reports figures that
+// are not plausible.
 #pragma once
 
 #include <span>
@@ -19,7 +20,7 @@ void StudyLeastSquares(StudyContext& context, const StudyLog& log);
 // 5.4.3, Figures 5.15-5.18: two poses of a corridor, least squares alone and with association; rounds needed.
 void StudyAssociation(StudyContext& context);
 
-// Scan after scan of the logs at hand, from odometry's guess, beside point-to-line ICP.
+// Consecutive scans of the available logs, with odometry as the guess, compared with point-to-line ICP.
 void StudyTracking(StudyContext& context, const std::vector<StudyLog>& logs);
 
 // 2.2.2: the place in a known map of lines from nothing, and followed with odometry, in the simulated worlds

@@ -47,10 +47,11 @@ void ForEachStep(const StudyLog& log, int most, const Visit& visit) {
 
 void StudyTracking(StudyContext& context, const std::vector<StudyLog>& logs) {
   Report& report = context.report;
-  report.Heading("Scan after scan on the logs at hand");
+  report.Heading("Consecutive scans of the available logs");
   report.Text(
-      "Pairs of scans at least 0.25 m or 10 deg apart, odometry as the guess. No truth exists for single steps: the "
-      "answer is compared with point-to-line ICP where both converge.");
+      "Pairs of scans that are at least 0.25 m or 10 deg apart are matched with odometry as the guess. "
+      "The true step is not known. The answer is therefore compared with that of point-to-line ICP, if "
+      "both converge.");
   Table table({"log", "pairs", "converged", "flagged degenerate", "rounds mean", "rounds p95",
                "apart from ICP median (cm)", "p95 (cm)", "median (deg)", "p95 (deg)", "time mean (ms)", "p99 (ms)",
                "ICP mean (ms)"});
@@ -83,7 +84,9 @@ void StudyTracking(StudyContext& context, const std::vector<StudyLog>& logs) {
                Number(d.median, 2), Number(d.p95, 1), Number(a.median, 3), Number(a.p95, 2), Number(t.mean, 3),
                Number(t.p99, 3), Number(DistributionOf(icp_time).mean, 3)});
     report.Expect(pairs > 0 && converged >= pairs / 2 && d.median <= 5.0,
-                  "the line matcher converges on less than half of " + log.name + ", or is 5 cm apart from ICP");
+                  "the line matcher converges for less than half of the pairs, or differs from ICP by more than 5 "
+                  "cm, on " +
+                      log.name + ", or is 5 cm apart from ICP");
   }
   report.Add(table, "tracking");
 }

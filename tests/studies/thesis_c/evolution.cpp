@@ -9,7 +9,7 @@
 namespace cairn::studies {
 namespace {
 
-// What is varied, and what the thesis says of it in words: its figures are curves without numbers.
+// The parameter that is varied, and what the thesis states about it in words (its curves have no numbers).
 struct Setting {
   std::string label;
   std::string printed;
@@ -69,8 +69,9 @@ void StudyEvolution(StudyContext& context) {
   report.Heading("Parameters of the evolution (5.1.1, Figures 5.1-5.4)");
   const ScanSequence drive = SimulatedDrive(context, 0.015);
   report.Text("A simulated drive of " + Count(static_cast<long long>(drive.scans.size())) +
-              " poses, range noise 15 mm (thesis: 366 poses in a world of its own, drawn but not given in numbers). "
-              "Evolution alone, F = 1, CR = 0.95, search space of Table 4.4.");
+              " poses with a range noise of 15 mm. (The thesis uses 366 poses in a world that it shows in a "
+              "drawing, without its measures.) The evolution works alone, with F = 1, CR = 0.95 and the search "
+              "space of Table 4.4.");
 
   const std::vector<Outcome> by_population = Sweep(context, drive,
                                                    {{"20", "does not converge", With(20, 50)},
@@ -85,7 +86,7 @@ void StudyEvolution(StudyContext& context) {
                                                      {"75", "refined further", With(100, 75)}},
                                                     "generations", "figures_5_3_5_4_generations");
   report.Heading("The ten strategies (2.4.6)");
-  report.Text("The thesis lists them and does not say which one it used.");
+  report.Text("The thesis lists the strategies but does not say which one it used.");
   std::vector<Setting> strategies;
   for (std::size_t i = 0; i < slam::kEvolutionStrategyNames.size(); ++i) {
     slam::EvolutionOptions evolution;
@@ -97,8 +98,8 @@ void StudyEvolution(StudyContext& context) {
   const bool larger_is_surer = by_population.back().lost <= by_population.front().lost &&
                                by_population.back().mean_m < by_population.front().mean_m;
   const bool longer_is_finer = by_generations.back().mean_m < by_generations.front().mean_m;
-  report.Expect(larger_is_surer, "a larger population is not surer, against the thesis");
-  report.Expect(longer_is_finer, "more generations are not finer, against the thesis");
+  report.Expect(larger_is_surer, "a larger population does not lead to fewer failures, which contradicts the thesis");
+  report.Expect(longer_is_finer, "more generations do not lead to smaller errors, which contradicts the thesis");
 }
 
 }  // namespace cairn::studies

@@ -6,7 +6,7 @@
 #include "server/slam/grid/grid_image.h"
 #include "server/slam/grid/occupancy_grid.h"
 #include "server/slam/motion/motion_gate.h"
-#include "server/slam/smoothing/smoothed_path.h"
+#include "server/slam/smoothing/smoothed_map.h"
 #include "tests/studies/log_run.h"
 #include "tests/studies/mapper_choice.h"
 #include "tests/studies/stopwatch.h"
@@ -16,7 +16,7 @@
 namespace cairn::studies {
 namespace {
 
-constexpr double kPeak = 30.0;  // "Values below 30 have a greater probability of convergence" (5.1.3).
+constexpr double kPeak = 30.0;  // Below this fitness a match has probably converged (5.1.3).
 
 // The map along the chained steps, as Figures 5.11, 5.13 and 5.15 draw it.
 OccupancyImage ChainMap(const ScanSequence& sequence, const std::vector<Pose2>& chain) {
@@ -37,7 +37,7 @@ Trajectory TrajectoryOf(const ScanSequence& sequence, const std::vector<Pose2>& 
   return trajectory;
 }
 
-// The highest peaks, as the thesis looks at them one by one.
+// The highest peaks; the thesis examines them one by one.
 void ListPeaks(Report& report, const std::vector<double>& fitness, const SequenceErrors& errors,
                const std::string& name) {
   std::vector<std::size_t> order(fitness.size());
@@ -53,11 +53,11 @@ void ListPeaks(Report& report, const std::vector<double>& fitness, const Sequenc
   report.Add(table, "peaks_" + name);
 }
 
-// The whole estimator with the odometry withheld, with and without the refinement that the thesis has not.
+// The whole estimator without odometry, with and without the refinement (the thesis has no refinement).
 void MapWithoutOdometry(StudyContext& context, const StudyLog& log, Table& table) {
   for (const bool refined : {true, false}) {
     context.report.Progress(log.name + " without odometry" + (refined ? ", refined" : ""));
-    // The page of slam names these for mapping without odometry, for every log.
+    // server/slam/tracking/README.md recommends these options for mapping without odometry, for every log.
     const auto options = MapperWith(
         {"slam.matcher=ndt_de", "slam.front_end.use_odometry=false", "slam.revisit.max_distance_m=6",
          "slam.revisit.neighbours=20", std::string("slam.front_end.refine.enabled=") + (refined ? "true" : "false")},
@@ -87,16 +87,17 @@ void StudyFitness(StudyContext& context) {
   Report& report = context.report;
   report.Heading("Real data without odometry (5.1.3, Figures 5.10-5.18)");
   report.Text(
-      "Every scan against the one before by evolution alone, nothing known of the motion. Of the thesis' four logs "
-      "only D-Wing (duke-loop5) is at hand; **C-Wing, Diiga (Ancona) and the Kvarntorp mine are missing**. Intel and "
-      "CSAIL stand in; CSAIL turns by more than the search space's 20 degrees at some steps.");
-  Table peaks({"log", "steps", "above 30", "highest", "mean", "cpu (ms) a match"});
+      "Every scan is matched with the one before it by evolution alone, without any knowledge of the "
+      "motion. Of the four logs of the thesis only D-Wing (duke-loop5) is available here; **C-Wing, "
+      "Diiga (Ancona) and the Kvarntorp mine are missing**. The logs of Intel and CSAIL are used "
+      "instead. Some steps of CSAIL turn by more than the 20 degrees of the search space.");
+  Table peaks({"log", "steps", "above 30", "highest", "mean", "processor time per match (ms)"});
   peaks.Add({"thesis: D-Wing (= duke-loop5)", "550", "0", "below 30", "-", "-"});
   peaks.Add({"thesis: C-Wing", "1105", "12", "-", "-", "-"});
   peaks.Add({"thesis: Diiga, every 5th scan", "1874", "50", "-", "-", "-"});
   peaks.Add({"thesis: Mine", "94", "36", "-", "-", "-"});
-  Table accuracy({"log", "system (odometry withheld)", "online (m)", "online (deg)", "full (m)", "full (deg)",
-                  "smoothed (m)", "not localized", "cpu (ms) a scan"});
+  Table accuracy({"log", "system (without odometry)", "online (m)", "online (deg)", "full (m)", "full (deg)",
+                  "smoothed (m)", "not localized", "processor time per scan (ms)"});
   for (const StudyLog& log : ChooseLogs(context, {"duke-loop5", "mit-csail", "intel"}, context.Pick(0, 150))) {
     report.Progress(log.name);
     const ScanSequence sequence = SequenceOf(log);
@@ -109,7 +110,7 @@ void StudyFitness(StudyContext& context) {
     Plot plot{.title = "Fitness A - score along " + log.name + " (Figure 5.10 and following)",
               .x = {"step", ""},
               .y = {"fitness", ""},
-              .bounds = {{kPeak, "the thesis' threshold"}}};
+              .bounds = {{kPeak, "threshold of the thesis"}}};
     Series series{.mark = Mark::kLine};
     for (std::size_t i = 0; i < fitness.size(); ++i) series.x.push_back(static_cast<double>(i + 1));
     series.y = fitness;
@@ -127,12 +128,12 @@ void StudyFitness(StudyContext& context) {
     report.AddMap(ChainMap(sequence, chain), picture, "map_" + log.name + "_chained");
     MapWithoutOdometry(context, log, accuracy);
     // The thesis' D-Wing has no peak; one more or less depends on the seed.
-    report.Expect(log.name != "duke-loop5" || above <= 5, "many peaks on duke-loop5, where the thesis has none");
+    report.Expect(log.name != "duke-loop5" || above <= 5, "duke-loop5 has more than 5 peaks, but none in the thesis");
   }
   report.Add(peaks, "fitness_peaks");
   report.Text(
-      "Errors of verified relations where the log has them. The thesis judges its maps by eye: loops stay open "
-      "by the sum of many small errors.");
+      "The errors are those of verified relations, for logs that have them. The thesis judges its maps "
+      "by eye: loops do not close, because many small errors add up.");
   report.Add(accuracy, "without_odometry");
 }
 

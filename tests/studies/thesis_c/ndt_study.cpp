@@ -73,7 +73,7 @@ slam::NdtDeOptions ThesisOptions(std::uint64_t seed) {
   slam::NdtDeOptions options;
   options.seed = static_cast<std::int64_t>(seed);
   options.climb = false;
-  // The thesis takes what the evolution gives, good or bad.
+  // The thesis accepts every answer of the evolution.
   options.evidence.min_score = 0.0;
   options.evidence.min_inliers = 1;
   return options;
@@ -92,7 +92,7 @@ ScanSequence SimulatedDrive(StudyContext& context, double noise_m) {
   options.seed = context.seed;
   options.laser = Sick(noise_m);
   options.drive.speed_m_s = 0.9;
-  // At most 17 degrees a scan: inside Table 4.4.
+  // At most 17 degrees between two scans, which lies within the search space of Table 4.4.
   options.drive.turn_rad_s = 1.2;
   const int scans = context.Pick(366, 80);
   return SequenceOf(SimulateLog("office", scans / options.scan_hz, options));

@@ -1,6 +1,6 @@
-// Scan matching by NDT and differential evolution along a sequence of scans, as thesis C measures it (5.1):
-// every scan against the one before, nothing known of the motion; with the truth beside it where there is
-// one.
+// Scan matching with NDT and differential evolution along a sequence of scans, as thesis C measures it (5.1): every
+// scan is matched with the one before, without any knowledge of the motion. The answer is compared with the truth if
+// that is known.
 #pragma once
 
 #include <cmath>
@@ -23,21 +23,23 @@ struct ScanSequence {
 };
 [[nodiscard]] ScanSequence SequenceOf(const StudyLog& log);
 
-// One step of the sequence. Errors in the axes of ours: x ahead, y to the left (the thesis' y and -x).
+// One step of the sequence. Errors are along the axes of Cairn: x ahead, y to the left (y and -x of the thesis).
 struct StepError {
   slam::NdtDeMatch match;
-  // The evolution's own answer, or where it is climbed from there. Not the join with what was believed
-  // before: where an evolution ended far from a maximum that would say "nothing known: stand still".
+  // The answer of the evolution, or of Newton's method that started there. It is not joined with the prior, because an
+  // evolution that ended far from a maximum would then give the prior, that is, no motion.
   Pose2 T_prev_curr;
   Eigen::Vector3d error = Eigen::Vector3d::Zero();  // Zero where the truth is not known.
   [[nodiscard]] double metres() const { return error.head<2>().norm(); }
   [[nodiscard]] double degrees() const { return std::abs(Degrees(error.z())); }
-  [[nodiscard]] bool lost() const { return metres() > 0.1 || degrees() > 2.0; }  // Not converged, in the thesis' words.
+  [[nodiscard]] bool lost() const {
+    return metres() > 0.1 || degrees() > 2.0;
+  }  // The thesis calls this "not converged".
 };
 
 struct SequenceErrors {
   std::vector<StepError> steps;  // One less than scans.
-  double cpu_ms = 0.0;           // A match.
+  double cpu_ms = 0.0;           // Processor time per match.
   [[nodiscard]] std::vector<double> metres() const;
   [[nodiscard]] std::vector<double> degrees() const;
   [[nodiscard]] std::vector<double> fitness() const;
@@ -45,14 +47,14 @@ struct SequenceErrors {
 };
 [[nodiscard]] SequenceErrors MatchSequence(const ScanSequence& sequence, const slam::NdtDeOptions& options);
 
-// The thesis' own method: the evolution's answer as it is.
+// The method of the thesis: the answer of the evolution is not improved.
 [[nodiscard]] slam::NdtDeOptions ThesisOptions(std::uint64_t seed);
 
 // The poses that follow from the steps, from the identity; as many as scans.
 [[nodiscard]] std::vector<Pose2> ChainOf(const SequenceErrors& errors);
 
-// The simulated drive of 5.1: 366 scans of 181 beams, 8 m range or more, a given noise. The thesis' world is
-// not given in numbers; a shipped one stands in.
+// The simulated drive of 5.1: 366 scans of 181 beams, 8 m range or more, a given noise. The measures of
+// the world of the thesis are not printed, so a shipped world is used.
 [[nodiscard]] ScanSequence SimulatedDrive(StudyContext& context, double noise_m);
 
 }  // namespace cairn::studies

@@ -22,7 +22,7 @@ Series AccumulatedError(const ScanSequence& drive, const SequenceErrors& errors,
   return series;
 }
 
-// Spread of the bulk (1.48 times the median distance from the median), and what lies beyond three of it.
+// A robust standard deviation (1.48 times the median distance from the median), and the errors beyond three of it.
 struct Shape {
   double middle = 0.0, sigma = 0.0, tail_share = 0.0, tail_mean = 0.0;
 };
@@ -62,7 +62,7 @@ void ReportDistribution(Report& report, const SequenceErrors& errors) {
     aside.push_back(step.error.y());
     turn.push_back(Degrees(step.error.z()));
   }
-  Table table({"error", "thesis", "middle", "sigma of the bulk", "share beyond 3 sigma", "mean of these"});
+  Table table({"error", "thesis", "median", "robust sigma", "share beyond 3 sigma", "mean of these"});
   const auto add = [&](const std::string& name, const std::string& printed, const std::vector<double>& values) {
     const Shape shape = ShapeOf(values);
     table.Add({name, printed, Number(shape.middle, 4), Number(shape.sigma, 4), Percent(shape.tail_share),
@@ -85,7 +85,8 @@ void StudyRangeNoise(StudyContext& context) {
   Report& report = context.report;
   report.Heading("Noise of the ranges (5.1.2, Figures 5.5-5.9)");
   report.Text(
-      "Population 100, 50 generations. `climb`: Newton's algorithm after the evolution, which the thesis has not.");
+      "The population is 100, with 50 generations. `climb` means that Newton's method follows the "
+      "evolution, which the thesis does not do.");
   Table table({"sigma (mm)", "thesis", "mean (m)", "max (m)", "mean (deg)", "max (deg)", "off by > 0.1 m or 2 deg",
                "climb: mean (m)", "climb: mean (deg)", "climb: off"});
   Plot metres{.title = "Error of the displacement by range noise (Figures 5.5, 5.6)",
@@ -104,7 +105,7 @@ void StudyRangeNoise(StudyContext& context) {
     options.climb = true;
     const SequenceErrors climbed = MatchSequence(drive, options);
     const Distribution m = DistributionOf(errors.metres()), deg = DistributionOf(errors.degrees());
-    table.Add({Number(noise_mm, 0), noise_mm < 80.0 ? "robust" : "worse, still robust", Number(m.mean, 4),
+    table.Add({Number(noise_mm, 0), noise_mm < 80.0 ? "robust" : "larger errors, still robust", Number(m.mean, 4),
                Number(m.max, 3), Number(deg.mean, 3), Number(deg.max, 2), Count(errors.lost()),
                Number(DistributionOf(climbed.metres()).mean, 4), Number(DistributionOf(climbed.degrees()).mean, 3),
                Count(climbed.lost())});
@@ -121,13 +122,15 @@ void StudyRangeNoise(StudyContext& context) {
   }
   report.Add(table, "figures_5_5_5_6_noise");
   report.Add(metres, "figures_5_5_5_6_noise_m");
-  report.Text("The thesis: the accumulated error grows with the way, its Figure 5.7; ours at the end: " +
-              Number(accumulated.series[0].y.back(), 2) + " m by evolution alone, " +
-              Number(accumulated.series[1].y.back(), 2) + " m with the climb.");
+  report.Text(
+      "The thesis shows in Figure 5.7 that the accumulated error grows with the distance travelled. At "
+      "the end it is " +
+      Number(accumulated.series[0].y.back(), 2) + " m here with evolution alone, and " +
+      Number(accumulated.series[1].y.back(), 2) + " m with the climb.");
   report.Add(accumulated, "figure_5_7_accumulated");
   ReportDistribution(report, at_15_mm);
   report.Expect(means.back() > means.front() && std::isfinite(means.back()),
-                "more noise is not worse, against the thesis");
+                "more noise does not lead to larger errors, which contradicts the thesis");
 }
 
 }  // namespace cairn::studies

@@ -5,10 +5,11 @@ namespace {
 
 void RunThesisC(StudyContext& context) {
   context.report.Text(
-      "Scan matching by NDT and differential evolution beside chapter 5 of thesis C. Its figures are curves without "
-      "numbers: what it says of them in words stands in the column `thesis`. DP-SLAM's memory and loops (3.2.3, 4.5) "
-      "and "
-      "the 3D maps (5.4) are measured by the studies of those systems.");
+      "This study repeats chapter 5 of thesis C (L. E. Ynoquio Herrera, Mobile Robot Simultaneous "
+      "Localization and Mapping Using DP-SLAM with a Single Laser Range Finder, PUC-Rio 2011): scan "
+      "matching with NDT and differential evolution. The thesis prints curves without numbers; the "
+      "column `thesis` contains what it states about them in words. DP-SLAM's memory and loops (3.2.3, "
+      "4.5) ");
   struct Part {
     const char* name;
     void (*run)(StudyContext&);

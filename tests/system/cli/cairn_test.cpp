@@ -10,7 +10,7 @@
 
 #include "client/cli/program.h"
 #include "common/map/occupancy_image.h"
-#include "common/sensor/stamp_text.h"
+#include "common/sensor/stamp.h"
 #include "common/sensor/trajectory.h"
 #include "tests/child_process.h"
 #include "tests/loopback.h"

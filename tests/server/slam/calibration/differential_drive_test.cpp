@@ -7,13 +7,6 @@
 namespace cairn::slam {
 namespace {
 
-TEST(DifferentialDrive, PulsesBecomeTravel) {
-  const DifferentialDrive drive{.base_m = 0.4, .left_diameter_m = 0.2, .right_diameter_m = 0.1, .pulses_per_turn = 100};
-  const WheelTravel travel = TravelOfPulses(100, 50, drive);
-  EXPECT_NEAR(travel.left_m, kPi * 0.2, 1e-15);
-  EXPECT_NEAR(travel.right_m, kPi * 0.05, 1e-15);
-}
-
 TEST(DifferentialDrive, EqualWheelsGoStraightOppositeOnesTurnOnTheSpot) {
   const Pose2 straight = MotionOfTravel({0.7, 0.7}, 0.4);
   EXPECT_EQ(straight, (Pose2{0.7, 0.0, 0.0}));

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "client/sim/wheels.h"
-#include "server/slam/calibration/square_run.h"
 
 namespace cairn::slam {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "server/slam/dpslam/change_painter.h"
+#include "server/slam/dpslam/map_changes.h"
 #include "tests/server/slam/dpslam/drive.h"
 
 namespace cairn::slam {

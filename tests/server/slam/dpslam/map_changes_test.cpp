@@ -7,8 +7,6 @@
 #include <random>
 #include <utility>
 
-#include "server/slam/dpslam/change_painter.h"
-
 namespace cairn::slam {
 namespace {
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "tests/server/slam/dpslam/textbook_opacity.h"
+
 namespace cairn::slam {
 namespace {
 

@@ -6,8 +6,9 @@
 #include <random>
 #include <vector>
 
-#include "server/slam/dpslam/change_painter.h"
-#include "server/slam/dpslam/ray_walk.h"
+#include "server/slam/dpslam/laser_rays.h"
+#include "server/slam/dpslam/map_changes.h"
+#include "tests/server/slam/dpslam/textbook_opacity.h"
 
 namespace cairn::slam {
 namespace {

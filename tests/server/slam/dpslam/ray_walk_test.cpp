@@ -1,11 +1,10 @@
-#include "server/slam/dpslam/ray_walk.h"
-
 #include <gtest/gtest.h>
 
 #include <random>
 #include <vector>
 
 #include "common/geometry/angle.h"
+#include "server/slam/dpslam/laser_rays.h"
 
 namespace cairn::slam {
 namespace {

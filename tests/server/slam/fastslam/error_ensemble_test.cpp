@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "server/slam/filters/revisit_innovation.h"
-#include "server/slam/motion/dead_reckoning.h"
+#include "server/slam/motion/odometry_model.h"
 
 namespace cairn::slam {
 namespace {

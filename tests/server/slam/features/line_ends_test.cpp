@@ -1,8 +1,7 @@
-#include "server/slam/features/line_ends.h"
-
 #include <gtest/gtest.h>
 
 #include "server/slam/features/line_extraction.h"
+#include "server/slam/features/split_and_merge.h"
 #include "tests/server/slam/worlds.h"
 
 namespace cairn::slam {

@@ -1,7 +1,6 @@
-#include "server/slam/features/patterns.h"
-
 #include <gtest/gtest.h>
 
+#include "server/slam/features/corners.h"
 #include "tests/server/slam/worlds.h"
 
 namespace cairn::slam {

@@ -1,6 +1,6 @@
-#include "server/slam/landmarks/chi_square.h"
-
 #include <gtest/gtest.h>
+
+#include "server/slam/landmarks/innovation.h"
 
 namespace cairn::slam {
 namespace {

@@ -6,8 +6,8 @@
 #include <algorithm>
 
 #include "server/slam/features/feature_extraction.h"
-#include "server/slam/localisation/pose_fusion.h"
-#include "server/slam/motion/dead_reckoning.h"
+#include "server/slam/localisation/place_hypotheses.h"
+#include "server/slam/motion/odometry_model.h"
 #include "tests/server/slam/worlds.h"
 
 namespace cairn::slam {

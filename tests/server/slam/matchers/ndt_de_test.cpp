@@ -4,7 +4,7 @@
 
 #include <thread>
 
-#include "server/slam/matchers/scan_points.h"
+#include "server/slam/features/scan_view.h"
 #include "tests/server/slam/matchers/ndt_worlds.h"
 
 namespace cairn::slam {

@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "server/slam/matchers/scan_points.h"
+#include "server/slam/features/scan_view.h"
 #include "tests/numerical_derivative.h"
 #include "tests/server/slam/matchers/ndt_worlds.h"
 

@@ -4,7 +4,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "server/slam/matchers/scan_points.h"
+#include "server/slam/features/scan_view.h"
 #include "tests/server/slam/matchers/ndt_worlds.h"
 #include "tests/server/slam/nees_bounds.h"
 
@@ -30,22 +30,20 @@ TEST(Ndt, FindsTheMotionWithoutNoise) {
 }
 
 // The region of initial errors from which the climb reaches the answer; `cairn-study thesis-c` draws it.
-TEST(Ndt, TheBasinIsAThirdOfACellAndTenDegrees) {
+TEST(Ndt, ConvergesFromThirtyCentimetresAndTenDegrees) {
   const ScanView prev = ViewFrom(test::Office(), {});
   const Pose2 truth{0.2, 0.1, 0.05};
   const ScanView curr = ViewFrom(test::Office(), truth);
-  int home = 0, tried = 0;
   for (int direction = 0; direction < 8; ++direction) {
     const double angle = direction * kPi / 4;
     for (const double turn : {-Radians(10), 0.0, Radians(10)}) {
       const Pose2 error{0.3 * std::cos(angle), 0.3 * std::sin(angle), turn};
       const MatchResult match = MatchByNdt(prev, curr, WidePrior(truth * error), {}, SerialFor);
-      const bool right = match.converged && OffsetOf(match, truth) < 0.03 && TurnOf(match, truth) < 0.01;
-      home += right ? 1 : 0;
-      ++tried;
+      EXPECT_TRUE(match.converged) << angle << ' ' << turn;
+      EXPECT_LT(OffsetOf(match, truth), 0.03) << angle << ' ' << turn;
+      EXPECT_LT(TurnOf(match, truth), 0.01) << angle << ' ' << turn;
     }
   }
-  EXPECT_GE(home, tried - 2) << home << " of " << tried;
 }
 
 // With noise of 1.5 cm on every range, over 200 pairs, the errors are as large on average as the covariance
@@ -125,13 +123,19 @@ TEST(Ndt, ScansOfDifferentPlacesDoNotConverge) {
   EXPECT_LT(match.score, 0.5);
 }
 
-TEST(Ndt, TheClimbEndsHigherThanItBegan) {
+TEST(Ndt, TheClimbEndsHigherThanItBeganWhereThereIsSomethingToClimb) {
   const NdtMap map(PositionsOf(ViewFrom(test::Office(), {})), {});
   const std::vector<Eigen::Vector2d> points = PositionsOf(ViewFrom(test::Office(), {0.2, 0.1, 0.1}));
   for (const Pose2& start : {Pose2{}, Pose2{0.5, 0.5, 0.5}, Pose2{-1, 1, 2}, Pose2{30, 30, 0}}) {
     const NewtonResult climb = ClimbNdt(map, points, start, {});
     EXPECT_TRUE(climb.settled);
-    EXPECT_GE(map.Derivatives(points, climb.T_map_points).score, map.Derivatives(points, start).score);
+    const double before = map.Derivatives(points, start).score,
+                 after = map.Derivatives(points, climb.T_map_points).score;
+    if (before > 0.0) {
+      EXPECT_GT(after, before);
+    } else {  // Too far from the map: every density is zero.
+      EXPECT_EQ(after, before);
+    }
   }
 }
 

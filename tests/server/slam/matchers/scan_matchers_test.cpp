@@ -1,12 +1,13 @@
-// Tests every scan matcher in the same worlds. The table below lists what each can do; if a matcher cannot do
-// something, its result must report it. NDT slides along a corridor, because its cells at the end of the view
-// move with the robot. It reports this (degenerate), and the front-end takes the position along the corridor
-// from odometry.
+// Tests every scan matcher in the same worlds. The table below lists the limits of each; server/slam/matchers/README.md
+// shows the same numbers. If a matcher cannot do something, its result must report it. NDT slides along a corridor,
+// because its cells at the end of the view move with the robot. It reports this (degenerate), and the front-end takes
+// the position along the corridor from odometry.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <thread>
 
 #include "server/slam/features/feature_extraction.h"
 #include "server/slam/methods.h"
@@ -170,7 +171,7 @@ TEST_P(ScanMatchers, ConvergeFromEverywhereInTheirBasin) {
   EXPECT_LE(1.0 * silent / std::max(1, far), GetParam().silent_share);
 }
 
-TEST_P(ScanMatchers, ACorridorIsFlaggedAndDoesNotMoveTheAnswerAlong) {
+TEST_P(ScanMatchers, ACorridorIsFlaggedAndTheAnswerMovesAlongItAtMostAsFarAsStated) {
   World corridor;
   corridor.Add({{-50, -1}, {50, -1}}).Add({{-50, 1.2}, {50, 1.2}});
   Laser laser = kLaser;
@@ -193,7 +194,7 @@ TEST_P(ScanMatchers, ACorridorIsFlaggedAndDoesNotMoveTheAnswerAlong) {
   EXPECT_GT(along.dot(spread * along), 2.0 * across.dot(spread * across));
 }
 
-TEST_P(ScanMatchers, OneWallNeverMovesTheRobotAlongIt) {
+TEST_P(ScanMatchers, OneWallIsFlaggedAndTheAnswerMovesAlongItAtMostAsFarAsStated) {
   World wall;
   wall.Add({{3, -30}, {3, 30}});
   Laser laser = kLaser;
@@ -202,7 +203,10 @@ TEST_P(ScanMatchers, OneWallNeverMovesTheRobotAlongIt) {
   const MatchResult match = Match(ViewFrom(wall, {}, laser), ViewFrom(wall, motion, laser), guess,
                                   Eigen::Vector3d(0.01, 0.01, 0.01).asDiagonal());
   EXPECT_LT(std::abs(match.T_ref_curr.y - guess.y), GetParam().slide_m);
-  if (!match.converged) return;
+  if (!match.converged) {  // Also allowed: one wall is too little for some matchers. Then the prior is the answer.
+    EXPECT_EQ(match.T_ref_curr, guess);
+    return;
+  }
   EXPECT_TRUE(match.degenerate);
   EXPECT_NEAR(match.T_ref_curr.x, motion.x, 0.04);
 }
@@ -226,7 +230,7 @@ TEST_P(ScanMatchers, WithoutAScanThePriorIsTheAnswer) {
   }
 }
 
-TEST_P(ScanMatchers, EnoughOfTheViewIsEnough) {
+TEST_P(ScanMatchers, AViewAsWideAsStatedIsSufficientAndANarrowerOneIsNeverSilentlyWrong) {
   const Pose2 motion{0.2, 0.05, 0.1};
   for (const double degrees : {90.0, 120.0, 180.0, 270.0, 360.0}) {
     const double view = Radians(degrees);
@@ -261,7 +265,7 @@ Scan Crowded(Scan scan, std::mt19937_64& engine) {
   return scan;
 }
 
-TEST_P(ScanMatchers, ACrowdIsSeenThroughOrOwnedUpTo) {
+TEST_P(ScanMatchers, InACrowdMostAnswersAreRightAndAtMostOneInTwentyIsSilentlyWrong) {
   std::mt19937_64 engine(8);
   const Laser laser = test::FullTurnLaser(720);
   const Pose2 motion{0.15, 0.05, 0.08};
@@ -282,19 +286,26 @@ TEST_P(ScanMatchers, ACrowdIsSeenThroughOrOwnedUpTo) {
   }
 }
 
-TEST_P(ScanMatchers, TheThreadsDoNotMatter) {
+TEST_P(ScanMatchers, NeitherThreadsNorTheirOrderChangeTheAnswer) {
   const Pose2 motion{0.25, 0.05, 0.12};
   const ScanView prev = ViewFrom(test::Office(), kStart, kLaser),
                  curr = ViewFrom(test::Office(), kStart * motion, kLaser);
+  const MatchResult a = Match(prev, curr, {0.2, 0, 0.1});
+  const ParallelFor three_threads = [](int count, const std::function<void(int, int)>& body) {
+    std::jthread first([&] { body(0, count / 3); }), second([&] { body(count / 3, 2 * count / 3); });
+    body(2 * count / 3, count);
+  };
   const ParallelFor backwards = [](int count, const std::function<void(int, int)>& body) {
     for (int end = count; end > 0; end -= 3) body(std::max(0, end - 3), end);
   };
-  const MatchResult a = Match(prev, curr, {0.2, 0, 0.1});
-  const MatchResult b = MakeMatcher(GetParam().kind, kOptions).match(prev, curr, {{0.2, 0, 0.1}, kVague}, backwards);
-  EXPECT_EQ(a.T_ref_curr, b.T_ref_curr);
-  EXPECT_EQ(a.covariance, b.covariance);
-  EXPECT_EQ(a.score, b.score);
-  EXPECT_EQ(a.inliers, b.inliers);
+  for (const ParallelFor& parallel_for : {three_threads, backwards}) {
+    const MatchResult b =
+        MakeMatcher(GetParam().kind, kOptions).match(prev, curr, {{0.2, 0, 0.1}, kVague}, parallel_for);
+    EXPECT_EQ(a.T_ref_curr, b.T_ref_curr);
+    EXPECT_EQ(a.covariance, b.covariance);
+    EXPECT_EQ(a.score, b.score);
+    EXPECT_EQ(a.inliers, b.inliers);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(All, ScanMatchers, testing::ValuesIn(kCapabilities),

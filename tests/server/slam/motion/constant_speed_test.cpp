@@ -1,6 +1,6 @@
-#include "server/slam/motion/constant_speed.h"
-
 #include <gtest/gtest.h>
+
+#include "server/slam/motion/step_motion.h"
 
 namespace cairn::slam {
 namespace {

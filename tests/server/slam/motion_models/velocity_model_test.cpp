@@ -1,6 +1,6 @@
-#include "server/slam/motion_models/velocity_model.h"
-
 #include <gtest/gtest.h>
+
+#include "server/slam/motion_models/motion_sampling.h"
 
 namespace cairn::slam {
 namespace {

@@ -31,9 +31,9 @@ struct Pairing {
     pairing.Add(std::move(scan));
   }
   // False where this sample, or one held back before it, was refused.
-  bool OdometryAt(Stamp stamp, double x) {
+  bool OdometryAt(Stamp stamp, double x, std::uint64_t sequence = 0) {
     const std::uint64_t refused = pairing.odometry_refused();
-    pairing.Add(Odometry{0, stamp, {x, 0, 0}});
+    pairing.Add(Odometry{sequence, stamp, {x, 0, 0}});
     return pairing.odometry_refused() == refused;
   }
 
@@ -74,6 +74,17 @@ TEST(OdometryPairing, InterpolatesBetweenItsNeighbours) {
   EXPECT_NEAR(p.pairs[0].T_odom_robot.x, 2.0, 1e-12);
 }
 
+// The sample that belongs to one scan exactly is also the one before the next scan.
+TEST(OdometryPairing, AnExactPairLeavesItsSampleForTheNextScan) {
+  Pairing p;
+  p.OdometryAt(1 * kSecond, 1);
+  p.ScanAt(1 * kSecond);
+  p.ScanAt(1 * kSecond + kSecond / 2);
+  p.OdometryAt(2 * kSecond, 2);
+  ASSERT_EQ(p.pairs.size(), 2u);
+  EXPECT_NEAR(p.pairs[1].T_odom_robot.x, 1.5, 1e-12);
+}
+
 TEST(OdometryPairing, ScansBeforeTheFirstOdometryAreDropped) {
   Pairing p;
   p.ScanAt(1 * kSecond);
@@ -100,6 +111,7 @@ TEST(OdometryPairing, FinishUsesTheLastOdometryWhileItIsFresh) {
   PairingOptions options;
   options.max_gap_s = 1.0;
   Pairing p(options);
+  p.OdometryAt(kSecond / 2, 3);
   p.OdometryAt(1 * kSecond, 7);
   p.ScanAt(2 * kSecond);
   p.ScanAt(2 * kSecond + 1);
@@ -238,6 +250,89 @@ TEST(OdometryPairing, AClockSetBackIsBelievedAfterAFewStampsAndTimeGrowsAllTheSa
   }
 }
 
+// The clock is set back by two seconds and then passes through the same stamps a second time.
+TEST(OdometryPairing, OdometryOfBeforeTheClockWasSetBackIsForgotten) {
+  for (const bool scans_first : {true, false}) {
+    Pairing p;
+    const auto both = [&](Stamp stamp, double x) {
+      if (scans_first) p.ScanAt(stamp);
+      p.OdometryAt(stamp + kSecond / 25, x);
+      if (!scans_first) p.ScanAt(stamp);
+    };
+    for (int i = 0; i < 50; ++i) both(100 * kSecond + i * kSecond / 10, 0.0);
+    const std::size_t before = p.pairs.size();
+    for (int i = 0; i < 60; ++i) both(103 * kSecond + i * kSecond / 10, 1000.0);
+    EXPECT_GE(p.pairs.size(), before + 50);
+    for (std::size_t i = before; i < p.pairs.size(); ++i) {
+      // The last scan of the old clock may still get the odometry of its own time.
+      if (p.pairs[i].stamp < 104 * kSecond) {
+        EXPECT_EQ(p.pairs[i].T_odom_robot.x, 1000.0) << p.pairs[i].stamp;
+      }
+    }
+  }
+}
+
+TEST(OdometryPairing, ScansThatWaitWhenTheOdometrysClockIsSetBackAreDropped) {
+  PairingOptions options;
+  options.jump_confirmations = 3;
+  Pairing p(options);
+  p.OdometryAt(100 * kSecond, 0);
+  p.ScanAt(100 * kSecond);
+  p.ScanAt(101 * kSecond);
+  EXPECT_EQ(p.pairing.waiting(), 1u);
+  for (const Stamp t : {50, 51, 52}) p.OdometryAt(t * kSecond, 0);
+  EXPECT_EQ(p.pairing.waiting(), 0u);
+  EXPECT_THAT(p.drops, ElementsAre(Pair(101 * kSecond, DropReason::kNoOdometry)));
+}
+
+TEST(OdometryPairing, AfterAClockWasSetBackTimeGrowsAsFastAsTheRobotsClock) {
+  Pairing p;
+  for (int i = 0; i < 10; ++i) {
+    p.OdometryAt((1000 + i) * kSecond, 0);
+    p.ScanAt((1000 + i) * kSecond);
+  }
+  for (int i = 0; i < 10; ++i) {
+    p.OdometryAt(i * kSecond, 0);
+    p.ScanAt(i * kSecond);
+  }
+  const Stamp estimator_time = p.estimator_time;
+  p.OdometryAt(10 * kSecond, 0);
+  p.ScanAt(10 * kSecond);
+  EXPECT_EQ(p.estimator_time, estimator_time + kSecond);
+}
+
+// Between the last pair and the change of the clock, scans had found no odometry; the clock was set back to exactly the
+// stamp of the last pair.
+TEST(OdometryPairing, AClockSetBackToTheLastPairGivesALaterTimeAllTheSame) {
+  PairingOptions options;
+  options.jump_confirmations = 3;
+  Pairing p(options);
+  p.OdometryAt(10 * kSecond, 0);
+  for (const Stamp t : {10, 11, 12}) p.ScanAt(t * kSecond);
+  ASSERT_EQ(p.pairs.size(), 1u);
+  for (const Stamp t : {7, 8, 9}) p.OdometryAt(t * kSecond, 0);
+  for (const Stamp t : {8, 9, 10}) p.ScanAt(t * kSecond);
+  p.OdometryAt(10 * kSecond, 0);
+  ASSERT_EQ(p.pairs.size(), 2u);
+  EXPECT_EQ(p.pairs[1].stamp, 10 * kSecond);
+  EXPECT_TRUE(p.grows);
+}
+
+// Odometry, too, is sent again after a pause of the network.
+TEST(OdometryPairing, LateOdometryIsNoClockSetBack) {
+  Pairing p;
+  for (int i = 1; i <= 60; ++i) {
+    p.OdometryAt(i * kSecond, 0, static_cast<std::uint64_t>(i));
+    p.ScanAt(i * kSecond, static_cast<std::uint64_t>(i));
+  }
+  for (int i = 20; i <= 40; ++i) p.OdometryAt(i * kSecond + 1, 0, static_cast<std::uint64_t>(i));
+  EXPECT_EQ(p.pairing.odometry_refused(), 21u);
+  p.OdometryAt(61 * kSecond, 0, 61);
+  p.ScanAt(61 * kSecond, 61);
+  EXPECT_EQ(p.pairs.size(), 61u);
+  EXPECT_EQ(p.estimator_time, 61 * kSecond);
+}
+
 // Scans sent again after a pause of the network are behind in their numbers, too: no clock has changed.
 TEST(OdometryPairing, LateScansAreNoClockSetBack) {
   Pairing p;
@@ -257,12 +352,12 @@ TEST(OdometryPairing, LateScansAreNoClockSetBack) {
 TEST(OdometryPairing, ANewClientMayBringAnEarlierClockAndNumbersOfItsOwn) {
   Pairing p;
   for (int i = 1; i <= 30; ++i) {
-    p.OdometryAt((1000 + i) * kSecond, 0);
+    p.OdometryAt((1000 + i) * kSecond, 0, static_cast<std::uint64_t>(i));
     p.ScanAt((1000 + i) * kSecond, static_cast<std::uint64_t>(i));
   }
   p.pairing.NewClient();
   for (int i = 1; i <= 20; ++i) {
-    p.OdometryAt(i * kSecond, 0);
+    p.OdometryAt(i * kSecond, 0, static_cast<std::uint64_t>(i));
     p.ScanAt(i * kSecond, static_cast<std::uint64_t>(i));
   }
   EXPECT_GE(p.pairs.size(), 40u);
@@ -305,6 +400,15 @@ TEST(OdometryPairing, WaitingScansAreBounded) {
 }
 
 TEST(OdometryPairing, OdometryIsBoundedAndTheNewestIsKept) {
+  PairingOptions two;
+  two.max_odometry = 2;
+  Pairing least(two);
+  least.OdometryAt(1 * kSecond, 1);
+  least.OdometryAt(2 * kSecond, 2);
+  least.ScanAt(1 * kSecond + kSecond / 2);
+  ASSERT_EQ(least.pairs.size(), 1u);  // Two samples are kept, not one.
+  EXPECT_NEAR(least.pairs[0].T_odom_robot.x, 1.5, 1e-9);
+
   PairingOptions options;
   options.max_odometry = 10;
   Pairing p(options);

@@ -1,10 +1,10 @@
-#include "server/slam/scan/point_index.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <random>
 #include <vector>
+
+#include "server/slam/scan/surface_points.h"
 
 namespace cairn::slam {
 namespace {

@@ -1,7 +1,5 @@
 // Tilted scans among level ones, from a robot that nods in a world with floor and ceiling. They must not
 // change the planar estimate, they get poses, and the cloud made of them lies on the walls.
-#include "server/slam/scan/tilt.h"
-
 #include <gtest/gtest.h>
 
 #include <iostream>
@@ -10,6 +8,7 @@
 #include "client/sim/fleet.h"
 #include "client/sim/shipped_worlds.h"
 #include "common/cloud/cloud_builder.h"
+#include "server/slam/scan/beam_points.h"
 #include "server/slam/scan_pipeline.h"
 
 namespace cairn::slam {

@@ -1,6 +1,6 @@
-#include "server/slam/smoothing/smoothed_path.h"
-
 #include <gtest/gtest.h>
+
+#include "server/slam/smoothing/smoothed_map.h"
 
 namespace cairn::slam {
 namespace {

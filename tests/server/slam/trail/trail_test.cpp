@@ -2,8 +2,53 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <utility>
+
 namespace cairn::slam {
 namespace {
+
+constexpr MotionNoise kDrift{0.01, 0.0, 0.0, 0.01, 0.0, 0.0};
+
+// Keyframes on a straight line, 2 m apart.
+Trail Chain(std::size_t keyframes) {
+  Trail trail(kDrift);
+  for (std::size_t k = 0; k < keyframes; ++k)
+    trail.Append({std::make_shared<const Scan>(), {}}, {2.0 * static_cast<double>(k), 0.0, 0.0}, {},
+                 Eigen::Matrix3d::Zero(), std::nullopt);
+  return trail;
+}
+
+TEST(Trail, DistancesFollowTheChain) {
+  const Trail trail = Chain(5);
+  const std::span<const double> distances = trail.distances_m();
+  EXPECT_EQ(std::vector<double>(distances.begin(), distances.end()), (std::vector<double>{8, 6, 4, 2, 0}));
+  EXPECT_TRUE(trail.relations().empty());  // Nothing was seen again.
+}
+
+TEST(Trail, ALoopIsAShortCutBothWays) {
+  Trail trail = Chain(11);
+  trail.AddLoop({1, 9, {0.5, 0.0, 0.0}, Eigen::Matrix3d::Identity(), true});
+  const std::span<const double> distance = trail.distances_m();
+  EXPECT_DOUBLE_EQ(distance[9], 2.0);
+  EXPECT_DOUBLE_EQ(distance[1], 2.5);
+  EXPECT_DOUBLE_EQ(distance[0], 4.5);
+  EXPECT_DOUBLE_EQ(distance[2], 4.5);
+  EXPECT_DOUBLE_EQ(distance[5], 10.0);  // The farthest keyframe: both ways round have the same length.
+  EXPECT_EQ(trail.relations().size(), 11U);
+}
+
+TEST(Trail, ARevisitIsALoopOfTheKeyframeThatSawIt) {
+  Trail trail = Chain(10);
+  trail.Append({std::make_shared<const Scan>(), {}}, {20.0, 0.0, 0.0}, {}, Eigen::Matrix3d::Zero(),
+               RevisitObservation{2, {0.0, 1.0, 0.0}, Eigen::Matrix3d::Identity()});
+  EXPECT_DOUBLE_EQ(trail.distances_m()[2], 1.0);
+  const std::vector<PoseRelation> relations = trail.relations();
+  ASSERT_EQ(relations.size(), 11U);
+  EXPECT_TRUE(relations.back().loop);
+  EXPECT_EQ(relations.back().to, 10U);
+}
 
 TEST(Trail, WhatWasDoubtedCountsOnceThePathIsCorrectedAndBlindMotionNever) {
   Trail trail(MotionNoise{});
@@ -24,7 +69,115 @@ TEST(Trail, WhatWasDoubtedCountsOnceThePathIsCorrectedAndBlindMotionNever) {
   EXPECT_FALSE(trail.keyframes()[1].localized);  // Only asked, not done.
   trail.TrustDoubted();
   append(false, true);
+  EXPECT_FALSE(trail.keyframes()[1].doubted);
   EXPECT_EQ(localized(trail.keyframes()), (std::vector<bool>{true, true, false, false}));
+}
+
+const Eigen::Matrix3d kNoCovariance = Eigen::Matrix3d::Zero();
+
+// Keyframes at the corners of a square of 1 m, in the front-end's frame; the robot turns left before each new side.
+constexpr std::array<Pose2, 4> kSquare = {Pose2{0, 0, kPi / 2}, Pose2{0, 1, kPi}, Pose2{-1, 1, -kPi / 2},
+                                          Pose2{-1, 0, 0}};
+
+Trail Square(const Eigen::Matrix3d& step_covariance = kNoCovariance,
+             const std::optional<RevisitObservation>& last_revisit = std::nullopt) {
+  Trail trail(MotionNoise{});
+  for (std::size_t k = 0; k < kSquare.size(); ++k) {
+    std::vector<SurfacePoint> points(k + 1);
+    trail.Append({std::make_shared<const Scan>(), kSquare[k]}, kSquare[k], std::move(points), step_covariance,
+                 k + 1 == kSquare.size() ? last_revisit : std::nullopt);
+  }
+  return trail;
+}
+
+TEST(Trail, AnEmptyOneHasNoDistanceAndNoLastPose) {
+  const Trail trail(MotionNoise{});
+  EXPECT_TRUE(trail.empty());
+  EXPECT_EQ(trail.FromLast({3, 4, 1}), Pose2{});
+  EXPECT_EQ(trail.TravelledTo({3, 4, 1}), 0.0);
+}
+
+TEST(Trail, KeepsThePointsTheWayAndTheDistances) {
+  const Trail trail = Square();
+  ASSERT_EQ(trail.size(), 4U);
+  for (std::size_t k = 0; k < 4; ++k) {
+    EXPECT_EQ(trail.shapes()[k].T_track_robot, kSquare[k]);
+    EXPECT_EQ(trail.shapes()[k].points.size(), k + 1);
+    EXPECT_NEAR(trail.shapes()[k].travelled_m, static_cast<double>(k), 1e-12);
+    EXPECT_NEAR(trail.distances_m()[k], 3.0 - static_cast<double>(k), 1e-12);  // Back along the steps.
+  }
+  const Pose2 ahead = trail.FromLast(kSquare[3] * Pose2{0.5, 0.1, 0.2});
+  EXPECT_NEAR(ahead.x, 0.5, 1e-12);
+  EXPECT_NEAR(ahead.y, 0.1, 1e-12);
+  EXPECT_NEAR(ahead.theta, 0.2, 1e-12);
+  EXPECT_NEAR(trail.TravelledTo(kSquare[3] * Pose2{0.5, 0.0, 0.0}), 3.5, 1e-12);
+  EXPECT_TRUE(trail.relations().empty()) << "no place was seen again";
+}
+
+TEST(Trail, ARevisitIsARelationWithItsOwnCovarianceAndAShorterWay) {
+  const Eigen::Matrix3d covariance = Eigen::Vector3d(0.01, 0.02, 0.03).asDiagonal();
+  const Eigen::Matrix3d step_covariance = Eigen::Vector3d(0.4, 0.5, 0.6).asDiagonal();
+  const Pose2 seen{0.0, 1.0, -kPi / 2};
+  const Trail trail = Square(step_covariance, RevisitObservation{0, seen, covariance});
+  const std::vector<PoseRelation> relations = trail.relations();
+  ASSERT_EQ(relations.size(), 4U);
+  const auto revisit =
+      std::find_if(relations.begin(), relations.end(), [](const PoseRelation& relation) { return relation.loop; });
+  ASSERT_NE(revisit, relations.end());
+  EXPECT_EQ(revisit->from, 0U);
+  EXPECT_EQ(revisit->to, 3U);
+  EXPECT_EQ(revisit->T_from_to, seen);
+  EXPECT_EQ(revisit->covariance, covariance);
+  EXPECT_NEAR(trail.distances_m()[0], 1.0, 1e-12);
+  EXPECT_NEAR(trail.distances_m()[1], 2.0, 1e-12);
+  for (const PoseRelation& relation : relations) {
+    if (relation.loop) continue;
+    EXPECT_EQ(relation.to, relation.from + 1);
+    EXPECT_NEAR(relation.T_from_to.translation().norm(), 1.0, 1e-12);
+    EXPECT_GE(relation.covariance(0, 0), 0.4);
+    EXPECT_GE(relation.covariance(2, 2), 0.6);
+  }
+}
+
+TEST(Trail, ALoopChangesThePathOnlyOnceItIsAdded) {
+  Trail trail = Square();
+  std::vector<Pose2> path(kSquare.begin(), kSquare.end());
+  // The last keyframe was seen 0.5 m farther on than the steps say.
+  const PoseRelation loop{0, 3, Between(kSquare[0], kSquare[3] * Pose2{0.5, 0.0, 0.0}),
+                          1e-8 * Eigen::Matrix3d::Identity(), true};
+  const auto closed = trail.PathWithLoop(loop, path, PoseGraphOptions{});
+  ASSERT_TRUE(closed);
+  EXPECT_LT(Between(kSquare[3] * Pose2{0.5, 0.0, 0.0}, closed->back()).translation().norm(), 0.05);
+  EXPECT_EQ(closed->front(), kSquare[0]);
+  EXPECT_TRUE(trail.relations().empty());
+  EXPECT_NEAR(trail.distances_m()[0], 3.0, 1e-12);
+  trail.AddLoop(loop);
+  EXPECT_EQ(trail.relations().size(), 4U);
+  EXPECT_LT(trail.distances_m()[0], 2.0);
+}
+
+TEST(Trail, APathThatCannotBeFittedIsNoPath) {
+  Trail trail(MotionNoise{});
+  trail.Append({std::make_shared<const Scan>(), {}}, {}, {}, kNoCovariance, std::nullopt);
+  EXPECT_FALSE(trail.PathWithLoop({0, 0, {}, Eigen::Matrix3d::Identity(), true}, {Pose2{}}, PoseGraphOptions{}));
+}
+
+TEST(Trail, ScansLieBehindTheLastKeyframeAndFollowWhereItsPathGoes) {
+  Trail trail(MotionNoise{});
+  trail.Append({std::make_shared<const Scan>(), {}}, {}, {}, kNoCovariance, std::nullopt);
+  trail.AddScan(10, {});
+  trail.Append({std::make_shared<const Scan>(), {}}, {1, 0, 0}, {}, kNoCovariance, std::nullopt);
+  trail.AddScan(20, {});
+  trail.AddScan(30, {0.5, 0, 0});
+  MapperSnapshot snapshot;
+  snapshot.scans = trail.scans();
+  const Trajectory trajectory = snapshot.TrajectoryAlong(std::vector<Pose2>{{}, {1, 2, kPi / 2}});
+  ASSERT_EQ(trajectory.size(), 3U);
+  EXPECT_EQ(trajectory[0].T_map_robot, Pose2{});
+  EXPECT_EQ(trajectory[1].T_map_robot, (Pose2{1, 2, kPi / 2}));
+  EXPECT_EQ(trajectory[2].stamp, 30);
+  EXPECT_NEAR(trajectory[2].T_map_robot.x, 1.0, 1e-12);
+  EXPECT_NEAR(trajectory[2].T_map_robot.y, 2.5, 1e-12);
 }
 
 }  // namespace

@@ -1,11 +1,10 @@
 // The printed tables of thesis A as oracles for the overlap measures.
-#include "server/slam/voting/overlap.h"
-
 #include <gtest/gtest.h>
 
 #include <limits>
 
 #include "common/geometry/angle.h"
+#include "server/slam/voting/criteria.h"
 #include "tests/server/slam/voting/printed_patterns.h"
 
 namespace cairn::slam {

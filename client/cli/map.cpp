@@ -1,0 +1,103 @@
+#include <fmt/format.h>
+
+#include "client/cli/commands.h"
+#include "client/cli/json_output.h"
+#include "client/cli/option_checks.h"
+#include "client/cli/text_output.h"
+
+namespace cairn::client {
+namespace {
+
+ExitCode ShowMapInfo(Program& program, const std::string& site) {
+  const auto maps = program.Ask([&](QueryClient& server) -> Result<std::vector<MapInfo>> {
+    if (site.empty()) return server.Maps();
+    return server.Map(site).map([](MapInfo&& map) { return std::vector<MapInfo>{std::move(map)}; });
+  });
+  if (!maps) return program.Refuse(maps.error());
+  std::string text = maps->empty() ? "no map yet\n" : "";
+  for (const MapInfo& map : *maps) text += FormatMap(map);
+  return program.Print(text, {{"maps", *maps}});
+}
+
+struct ExportArguments {
+  std::string site;
+  std::string file;
+  std::string image = "png";
+  std::string mode = "trinary";
+};
+
+ExitCode ExportMap(Program& program, const ExportArguments& arguments) {
+  const auto map = program.Ask([&](QueryClient& server) { return server.MapImage(arguments.site); });
+  if (!map) return program.Refuse(map.error());
+  MapSaveOptions options;
+  options.mode = arguments.mode == "raw"     ? MapImageMode::kRaw
+                 : arguments.mode == "scale" ? MapImageMode::kScale
+                                             : MapImageMode::kTrinary;
+  if (const auto saved = SaveMapYaml(*map, arguments.file, "." + arguments.image, options); !saved) {
+    return program.Refuse(saved.error());
+  }
+  return program.Print(
+      fmt::format("{}: {} x {} cells of {} m\n", arguments.file, map->width, map->height, map->resolution_m),
+      {{"file", arguments.file}, {"width", map->width}, {"height", map->height}, {"resolution_m", map->resolution_m}});
+}
+
+struct EnableArguments {
+  std::string site;
+  std::uint32_t version = 0;  // 0: the version before the enabled one.
+};
+
+ExitCode Enable(Program& program, const EnableArguments& arguments) {
+  const auto map = program.Ask([&](QueryClient& server) {
+    return arguments.version == 0 ? server.RollBackMap(arguments.site)
+                                  : server.EnableMap(arguments.site, arguments.version);
+  });
+  if (!map) return program.Refuse(map.error());
+  return program.Print(FormatMap(*map), *map);
+}
+
+void AddMapInfo(CLI::App& map, Program& program) {
+  auto* command = map.add_subcommand("info", "Bounds, versions and sizes of all maps, or of one");
+  auto site = std::make_shared<std::string>();
+  command->add_option("--site", *site, "Only this site");
+  program.OnChosen(*command, site, ShowMapInfo);
+}
+
+void AddMapExport(CLI::App& map, Program& program) {
+  auto* command = map.add_subcommand("export", "Write the map for Nav2 and others: map.yaml and an image beside it");
+  command->footer(
+      "EXAMPLES\n  cairn map export --site hall -o hall.yaml\n  cairn map export --site hall -o hall.yaml --image pgm");
+  auto arguments = std::make_shared<ExportArguments>();
+  command->add_option("--site", arguments->site, "The site's name")->required();
+  command->add_option("-o,--output", arguments->file, "The yaml file to write")->required()->type_name("FILE");
+  command->add_option("--image", arguments->image, "Format of the image")
+      ->check(CLI::IsMember({"png", "pgm"}))
+      ->capture_default_str();
+  command->add_option("--mode", arguments->mode, "Meaning of the image's values, as map_server has them")
+      ->check(CLI::IsMember({"trinary", "scale", "raw"}))
+      ->capture_default_str();
+  program.OnChosen(*command, arguments, ExportMap);
+}
+
+void AddMapEnable(CLI::App& map, Program& program) {
+  auto arguments = std::make_shared<EnableArguments>();
+  auto* enable = map.add_subcommand("enable", "Switch the site to one of its map versions (see `cairn map info`)");
+  enable->add_option("--site", arguments->site, "The site's name")->required();
+  enable->add_option("--version", arguments->version, "The version to enable")->required()->check(InRange(1, 4e9));
+  program.OnChosen(*enable, arguments, Enable);
+  auto* rollback = map.add_subcommand("rollback", "Switch the site to the map version before the enabled one");
+  rollback->add_option("--site", arguments->site, "The site's name")->required();
+  program.OnChosen(*rollback, arguments, Enable);
+}
+
+}  // namespace
+
+void AddMap(CLI::App& app, Program& program) {
+  auto* map = app.add_subcommand("map", "A site's map: what it is, export, versions, pictures");
+  map->require_subcommand(1);
+  AddMapInfo(*map, program);
+  AddMapExport(*map, program);
+  AddMapEnable(*map, program);
+  AddMapDraw(*map, program);
+}
+
+}  // namespace cairn::client

@@ -1,0 +1,189 @@
+// The desk with the rooms behind it: which snapshots each kind of request gets, and what becomes of commands. The
+// contents of the answers are tested in queries_test.cpp.
+#include "server/queries/desk.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+#include <utility>
+
+#include "tests/server/robots/one_session.h"
+
+namespace cairn::server {
+namespace {
+
+using testing::RequestOf;
+
+constexpr std::size_t kCapacity = 2;
+
+class DeskTest : public ::testing::Test {
+ protected:
+  DeskTest() {
+    for (const char* robot : {"r1", "r2"}) {
+      SessionRequest request = RequestOf(robot);
+      request.site = robot == std::string("r1") ? "lab" : "hall";
+      roster_.Take(request);
+    }
+  }
+  ~DeskTest() override {
+    desk_.Stop();
+    worker_.Stop();
+    pool_.join();
+  }
+
+  static Request Of(RequestKind kind) {
+    Request request;
+    request.client = 42;
+    request.kind = kind;
+    request.site = "lab";
+    request.robot = "r1";
+    return request;
+  }
+  std::optional<Reply> NextReply() {
+    auto value = outbound_.lane(Outbound::Lane::kReplies).PopFor(std::chrono::seconds(20));
+    if (!value) return std::nullopt;
+    return std::get<Reply>(*std::move(value));
+  }
+  Reply Ask(Request request) {
+    if (!std::exchange(started_, true)) desk_.Start();
+    request.sequence = ++sequence_;
+    desk_.Take(std::move(request));
+    Reply reply = NextReply().value_or(Reply{});
+    EXPECT_EQ(reply.sequence, sequence_);
+    EXPECT_EQ(reply.client, 42U);
+    return reply;
+  }
+
+  asio::thread_pool pool_{2};
+  Outbound outbound_{64};
+  Atlas atlas_{MapsOptions{}, 0.05, true, pool_, outbound_};
+  Roster roster_{RobotsOptions{}, slam::MapperOptions{}, pool_, outbound_, atlas_};
+  JobList jobs_{JobsOptions{}, outbound_, [] { return Stamp{0}; }};
+  std::optional<bool> enable_;  // As the work of the last job got it; read after the worker has stopped.
+  JobWorker worker_{JobsOptions{}, jobs_, [this](const Job&, bool enable, const JobControl&) {
+                      enable_ = enable;
+                      return Result<JobOutcome>(JobOutcome{});
+                    }};
+  Desk desk_{kCapacity, outbound_, roster_, atlas_, jobs_, worker_};
+  bool started_ = false;
+  std::int64_t sequence_ = 0;
+};
+
+TEST_F(DeskTest, ARequestBeyondTheQueueIsAnsweredBusyAtOnceAndTheOthersLater) {
+  for (std::int64_t sequence = 1; sequence <= 3; ++sequence) {  // Nobody serves yet.
+    Request ping = Of(RequestKind::kPing);
+    ping.sequence = sequence;
+    desk_.Take(std::move(ping));
+  }
+  const auto busy = NextReply();
+  ASSERT_TRUE(busy);
+  EXPECT_EQ(busy->sequence, 3);
+  EXPECT_EQ(busy->status.code, StatusCode::kResourceExhausted);
+  desk_.Start();
+  desk_.Stop();  // It answers what waits before it ends.
+  for (std::int64_t sequence = 1; sequence <= 2; ++sequence) {
+    const auto reply = NextReply();
+    ASSERT_TRUE(reply);
+    EXPECT_EQ(reply->sequence, sequence);
+    EXPECT_TRUE(reply->status.ok());
+  }
+}
+
+TEST_F(DeskTest, AMapInfoIsThatOfTheSiteOrOfAllSites) {
+  const Reply one = Ask(Of(RequestKind::kMapInfo));
+  ASSERT_EQ(one.maps.size(), 1U);
+  EXPECT_EQ(one.maps[0].site, "lab");
+  Request all = Of(RequestKind::kMapInfo);
+  all.site.clear();
+  EXPECT_EQ(Ask(all).maps.size(), 2U);
+}
+
+TEST_F(DeskTest, AStatusIsThatOfTheRobotOrOfAllRobots) {
+  Request one = Of(RequestKind::kStatus);
+  one.site.clear();
+  const Reply reply = Ask(one);
+  ASSERT_EQ(reply.robots.size(), 1U);
+  EXPECT_EQ(reply.robots[0].session.robot, "r1");
+  one.robot.clear();
+  EXPECT_EQ(Ask(one).robots.size(), 2U);
+}
+
+TEST_F(DeskTest, LandmarksAreThoseOfTheRobotsOfTheSite) {
+  LandmarkReport landmark;
+  landmark.p_map = {1, 2};
+  roster_.Find("r1")->record().SetLandmarks({landmark, landmark});
+  roster_.Find("r2")->record().SetLandmarks({landmark});
+  EXPECT_EQ(Ask(Of(RequestKind::kLandmarks)).landmarks.size(), 2U);
+}
+
+TEST_F(DeskTest, ALargeAnswerComesInNumberedParts) {
+  constexpr std::size_t kCount = 3000;
+  roster_.Find("r1")->record().SetLandmarks(std::vector<LandmarkReport>(kCount));
+  Reply part = Ask(Of(RequestKind::kLandmarks));
+  std::size_t landmarks = part.landmarks.size();
+  EXPECT_FALSE(part.last);
+  for (std::uint32_t number = 1; !part.last; ++number) {
+    const auto next = NextReply();
+    ASSERT_TRUE(next);
+    part = *next;
+    EXPECT_EQ(part.part, number);
+    landmarks += part.landmarks.size();
+  }
+  EXPECT_EQ(landmarks, kCount);
+}
+
+TEST_F(DeskTest, AJobGetsTheWishToEnableItsMap) {
+  for (const bool enable : {true, false}) {
+    Request submit = Of(RequestKind::kJobSubmit);
+    submit.enable = enable;
+    const Reply reply = Ask(submit);
+    ASSERT_EQ(reply.jobs.size(), 1U);
+    EXPECT_EQ(reply.jobs[0].site, "lab");
+    if (enable) worker_.Start();
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (!IsFinal(jobs_.Find(reply.jobs[0].id)->state) && std::chrono::steady_clock::now() < deadline)
+      std::this_thread::yield();
+    ASSERT_EQ(jobs_.Find(reply.jobs[0].id)->state, JobState::kSucceeded);
+    EXPECT_EQ(enable_, enable);
+  }
+}
+
+TEST_F(DeskTest, JobsAreFoundListedAndCancelled) {
+  Request job = Of(RequestKind::kJobSubmit);
+  job.job = Ask(job).jobs.at(0).id;
+  Request elsewhere = Of(RequestKind::kJobSubmit);
+  elsewhere.site = "hall";
+  EXPECT_EQ(Ask(elsewhere).jobs.size(), 1U);
+  EXPECT_EQ(Ask(Of(RequestKind::kJobList)).jobs.size(), 1U);
+  job.kind = RequestKind::kJobGet;
+  EXPECT_EQ(Ask(job).jobs.at(0).state, JobState::kQueued);
+  job.kind = RequestKind::kJobCancel;
+  EXPECT_EQ(Ask(job).jobs.at(0).state, JobState::kCancelled);
+  EXPECT_EQ(Ask(job).status.code, StatusCode::kFailedPrecondition);
+  job.job = 999;
+  EXPECT_EQ(Ask(job).status.code, StatusCode::kNotFound);
+  Request nowhere = Of(RequestKind::kJobSubmit);
+  nowhere.site = "moon";
+  EXPECT_EQ(Ask(nowhere).status.code, StatusCode::kNotFound);
+}
+
+TEST_F(DeskTest, EndingASessionSaysWhetherThereIsOne) {
+  EXPECT_TRUE(Ask(Of(RequestKind::kSessionEnd)).status.ok());
+  EXPECT_TRUE(roster_.Find("r1")->ending());
+  Request nobody = Of(RequestKind::kSessionEnd);
+  nobody.robot = "r9";
+  EXPECT_EQ(Ask(nobody).status.code, StatusCode::kNotFound);
+}
+
+TEST_F(DeskTest, AMapVersionOrASiteThatDoesNotExistCannotBeEnabled) {
+  Request enable = Of(RequestKind::kMapEnable);
+  enable.map_version = 77;
+  EXPECT_FALSE(Ask(enable).status.ok());
+  enable.site = "moon";
+  EXPECT_EQ(Ask(enable).status.code, StatusCode::kNotFound);
+}
+
+}  // namespace
+}  // namespace cairn::server
