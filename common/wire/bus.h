@@ -43,9 +43,9 @@ class Publication {
   // kOutOfRange: the value exceeds the wire's limits (limits.h). kUnavailable: the middleware did not accept
   // it within its bounded blocking time.
   [[nodiscard]] virtual Result<void> Publish(const Value& value) = 0;
-  // The instance that `value`'s key names will get no sample any more: late joiners no longer get its last one, and its
-  // place among the topic's instances is free again, here and at every subscription that keeps up. A later Publish of
-  // the same key begins a new instance. Not for topics without a key. kNotFound: nothing of that key was published.
+  // The key of `value` is not needed any more: when the topic's instances run out, its place is given to another key,
+  // and late joiners no longer get its last sample. A later Publish of the same key takes a place again. Only for
+  // SessionState, PoseReport, Ledger and Job. kNotFound: nothing of that key was published.
   [[nodiscard]] virtual Result<void> Retire(const Value& value) = 0;
   // Waits until every matched subscription has acknowledged everything, or the deadline passes (false).
   [[nodiscard]] virtual bool WaitForAcknowledgement(std::chrono::milliseconds deadline) = 0;

@@ -133,7 +133,6 @@ Result<Participant::Writer> Participant::MakeWriter(const TopicProfile& profile,
   fd::DataWriterQos qos;
   SetCommon(profile, profile.writer_depth, options_, qos);
   qos.publish_mode().kind = fd::SYNCHRONOUS_PUBLISH_MODE;
-  qos.writer_data_lifecycle().autodispose_unregistered_instances = false;  // No dispose (idl/README.md).
   auto& times = qos.reliable_writer_qos().times;
   times.initialHeartbeatDelay = Duration_t(0.01);
   times.heartbeatPeriod = Duration_t(profile.heartbeat_ms * 1e-3);

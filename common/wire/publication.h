@@ -1,8 +1,12 @@
 // A typed writer of one topic. Thread-safe.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <atomic>
+#include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <type_traits>
 
@@ -22,6 +26,7 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
     auto made = std::make_unique<DdsPublication>();
     Result<Participant::Writer> writer = participant->MakeWriter(Topic<Value>::kProfile, made->type_, made.get());
     if (!writer) return tl::unexpected(writer.error());
+    made->participant_ = participant;
     made->writer_ = std::move(*writer);
     return made;
   }
@@ -38,7 +43,8 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
       return Fail(StatusCode::kOutOfRange, std::string(Topic<Value>::kProfile.name) + ": " + std::to_string(bytes) +
                                                " bytes, at most " + std::to_string(kMaxSampleBytes));
     }
-    if (!writer_->write(&sample)) {
+    const MutexLock lock(mutex_);
+    if (!Write(sample)) {
       return Fail(StatusCode::kUnavailable,
                   std::string(Topic<Value>::kProfile.name) + ": the writer's history is full");
     }
@@ -48,16 +54,13 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
   Result<void> Retire(const Value& value) override {
     Sample<Wire> sample;
     sample.value = ToWire(value);
-    using eprosima::fastrtps::types::ReturnCode_t;
-    const ReturnCode_t done = writer_->unregister_instance(&sample, fd::HANDLE_NIL);
-    if (done == ReturnCode_t::RETCODE_OK) return {};
-    const std::string name = Topic<Value>::kProfile.name;
-    if (done == ReturnCode_t::RETCODE_PRECONDITION_NOT_MET)
-      return Fail(StatusCode::kNotFound, name + ": no such instance");
-    return Fail(StatusCode::kUnavailable, name + ": the instance was not unregistered");
+    const MutexLock lock(mutex_);
+    if (live_.erase(KeyOf(sample)) > 0) return {};
+    return Fail(StatusCode::kNotFound, std::string(Topic<Value>::kProfile.name) + ": no such key");
   }
 
   bool WaitForAcknowledgement(std::chrono::milliseconds deadline) override {
+    const MutexLock lock(mutex_);
     return writer_->wait_for_acknowledgments(eprosima::fastrtps::Duration_t(deadline.count() * 1e-3L)) ==
            eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
   }
@@ -65,12 +68,58 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
   int matched() const override { return matched_.load(); }
 
  private:
+  using Key = std::array<std::uint8_t, 16>;
+  // The topics whose keys come and go for as long as a server runs.
+  static constexpr bool kRetires = std::is_same_v<Value, SessionState> || std::is_same_v<Value, PoseReport> ||
+                                   std::is_same_v<Value, Ledger> || std::is_same_v<Value, Job>;
+
+  Key KeyOf(Sample<Wire>& sample) {
+    fd::InstanceHandle_t handle;
+    Key key{};
+    if (kRetires && type_.get_key(&sample, &handle))
+      std::copy_n(static_cast<const std::uint8_t*>(handle.value), 16, key.begin());
+    return key;
+  }
+
+  bool Write(Sample<Wire>& sample) CAIRN_REQUIRES(mutex_) {
+    if constexpr (!kRetires) {
+      return writer_->write(&sample);
+    } else {
+      const Key key = KeyOf(sample);
+      const auto places = static_cast<std::size_t>(Topic<Value>::kProfile.max_instances);
+      if (used_.size() >= places && !used_.contains(key) && live_.size() < used_.size()) Renew();
+      if (!writer_->write(&sample)) return false;
+      used_.insert(key);
+      live_.insert_or_assign(key, sample);
+      return true;
+    }
+  }
+
+  // A writer never gives back the place of a key: unregistering it stops the flow to the readers (idl/README.md). A new
+  // writer takes over with the keys that live.
+  void Renew() CAIRN_REQUIRES(mutex_) {
+    Result<Participant::Writer> writer = participant_->MakeWriter(Topic<Value>::kProfile, type_, this);
+    if (!writer) return;  // The caller's sample finds no place and is sent again later.
+    constexpr long double kPatienceS = 0.1L;
+    static_cast<void>(writer_->wait_for_acknowledgments(eprosima::fastrtps::Duration_t(kPatienceS)));
+    used_.clear();
+    for (auto& [key, sample] : live_) {
+      // Late joiners get the last sample of each key from the writer that knows it.
+      if (!Topic<Value>::kProfile.transient_local || (*writer)->write(&sample)) used_.insert(key);
+    }
+    writer_ = std::move(*writer);
+  }
+
   void on_publication_matched(fd::DataWriter*, const fd::PublicationMatchedStatus& status) override {
     matched_.store(status.current_count);
   }
 
   std::atomic<int> matched_ = 0;
-  const fd::TypeSupport type_{new typename Topic<Value>::Type()};
+  std::shared_ptr<Participant> participant_;
+  fd::TypeSupport type_{new typename Topic<Value>::Type()};
+  Mutex mutex_;
+  std::map<Key, Sample<Wire>> live_ CAIRN_GUARDED_BY(mutex_);  // Where keys are retired: the last sample of each.
+  std::set<Key> used_ CAIRN_GUARDED_BY(mutex_);                // Keys that have a place in the writer.
   Participant::Writer writer_;  // The last member: it calls the listener until it is destroyed.
 };
 

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <deque>
-#include <map>
 #include <optional>
 #include <tuple>
 #include <utility>
@@ -68,7 +66,6 @@ class Egress::Door {
   bool Send(OutboundValue value) {
     Stamp(value, generation_);
     const Result<void> published = std::visit([this](const auto& one) { return publications_.Publish(one); }, value);
-    if (const auto* const sample = std::get_if<TileSample>(&value)) Bury(*sample, *Unsent::KeyOf(value));
     // A value beyond the wire's limits will never be accepted.
     if (!published && published.error().code == StatusCode::kUnavailable) {
       unsent_.Keep(std::move(value));
@@ -91,26 +88,10 @@ class Egress::Door {
   }
 
  private:
-  void Bury(const TileSample& sample, const Unsent::Key& key) {
-    if (!sample.deleted) {
-      buried_.erase(key);
-      return;
-    }
-    if (buried_.insert_or_assign(key, sample).second) order_.push_back(key);
-    while (order_.size() > kTombstones) {
-      if (const auto oldest = buried_.extract(order_.front()); !oldest.empty()) {
-        static_cast<void>(publications_.Retire(oldest.mapped()));
-      }
-      order_.pop_front();
-    }
-  }
-
   Publications& publications_;
   const Generation generation_;
   Unsent unsent_;
-  std::optional<Unsent::Key> last_tried_;     // Nothing: the next round begins with the first one.
-  std::map<Unsent::Key, TileSample> buried_;  // Removed tiles whose last sample DDS still keeps.
-  std::deque<Unsent::Key> order_;             // In the order of their removal.
+  std::optional<Unsent::Key> last_tried_;  // Nothing: the next round begins with the first one.
 };
 
 Result<std::unique_ptr<Egress>> Egress::Open(wire::Bus& bus, Outbound& outbound, Generation generation) {

@@ -1,15 +1,13 @@
 // Publishes the server's values on DDS. Each outbound lane has its own thread, so that a client that reads a
 // large answer slowly delays neither poses nor tiles. A value that the middleware does not accept within its
 // bounded blocking time is counted; a state is kept and published again every kRetryPeriod, in its newest form, and any
-// other value is dropped. Every value gets the server's generation here. The place that a removed tile takes in the
-// middleware is freed when kTombstones others were removed after it, and all subscribers have heard of it long since.
+// other value is dropped. Every value gets the server's generation here.
 // Thread rule: Open starts the threads; Finish (after Outbound::Close) returns when each remaining value has been
 // published or dropped.
 #pragma once
 
 #include <atomic>
 #include <chrono>
-#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <thread>
@@ -25,7 +23,6 @@ namespace cairn::server {
 class Egress {
  public:
   static constexpr std::chrono::milliseconds kRetryPeriod{100};
-  static constexpr std::size_t kTombstones = 4096;
 
   [[nodiscard]] static Result<std::unique_ptr<Egress>> Open(wire::Bus& bus, Outbound& outbound, Generation generation);
   // REQUIRES: Finish or Outbound::Close was called.

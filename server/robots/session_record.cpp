@@ -234,12 +234,14 @@ Ledger SessionRecord::TakeLedger(Stream& stream, Clock::time_point now) const {
 std::vector<Ledger> SessionRecord::TakeDueLedgers(Clock::time_point now, Urgency urgency) {
   const MutexLock lock(mutex_);
   std::vector<Ledger> due;
-  // Nobody waits for the odometry's ledger: however much comes, it is not due more often.
-  if (urgency == Urgency::kNow || (odometry_.changed && now - odometry_.taken >= ledger_period_))
-    due.push_back(TakeLedger(odometry_, now));
   for (auto& [sensor_id, stream] : streams_) {
     if (IsDue(stream, now, urgency, ledger_period_)) due.push_back(TakeLedger(stream, now));
   }
+  // Nobody waits for the odometry's ledger alone, however much of it settles. It goes with those of the scans, before
+  // them: what a client keeps of both is then the same stretch of time.
+  const bool rested = now - odometry_.taken >= ledger_period_;
+  if (urgency == Urgency::kNow || (odometry_.changed && (rested || !due.empty())))
+    due.insert(due.begin(), TakeLedger(odometry_, now));
   return due;
 }
 

@@ -104,8 +104,11 @@ TEST_F(BadInput, AStampThatJumpsAYearIsRefused) {
 TEST_F(BadInput, BadOdometryIsCountedAndLeftOut) {
   Odometry wild = RoomOdometry(10);
   wild.T_odom_robot.y = std::numeric_limits<double>::infinity();
+  wild.sequence = 0;  // Without a number nothing is taken for a duplicate.
   house_.SendOdometry("r1", kSender, wild);
   Odometry old = RoomOdometry(3);
+  house_.SendOdometry("r1", kSender, old);  // Sent again: not counted.
+  old.sequence = 0;
   house_.SendOdometry("r1", kSender, old);
   house_.SendOdometry("r1", kSender, RoomOdometry(10));
   house_.SendScan("r1", kSender, RoomScan(10));

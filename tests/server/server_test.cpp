@@ -124,6 +124,7 @@ TEST(Server, TileQueriesAnswerByAreaLevelAndVersion) {
   Request since = Of(RequestKind::kTiles);
   EXPECT_TRUE(house.WaitFor([&] {
     const Reply newest = house.Ask(Of(RequestKind::kTiles));
+    since.since_generation = WholeServer::kGeneration;
     since.since_epoch = newest.map_epoch;
     since.since_version = newest.map_version;
     return house.Ask(since).tiles.empty();

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <atomic>
+#include <algorithm>
 
 #include "tests/loopback.h"
 
@@ -73,24 +73,6 @@ TEST_F(EgressTest, AStateThatFindsNoRoomIsSentWhenThereIsSome) {
                        [](const SessionState& value) { return value.robot_id == kPlaces + 1; });
   }));
   EXPECT_EQ(egress_->unpublished(), 1U);
-}
-
-// Tiles that were removed kept their places for ever.
-TEST_F(EgressTest, RemovedTilesGiveTheirPlacesBack) {
-  std::atomic<int> deleted = 0;
-  const auto subscription = Must(client_->Subscribe<TileSample>([&](TileSample&& tile) { deleted += tile.deleted; }));
-  constexpr int kTiles = 280000;  // The topic has 262,144 places.
-  TileSample sample;
-  sample.site_id = 1;
-  for (int i = 0; i < kTiles; ++i) {
-    sample.tile.key = {i >> 16, i & 0xff, (i >> 8) & 0xff};
-    sample.deleted = false;
-    ASSERT_TRUE(outbound_.SendPatiently(sample));
-    sample.deleted = true;
-    ASSERT_TRUE(outbound_.SendPatiently(sample));
-  }
-  EXPECT_TRUE(Eventually([&] { return outbound_.lane(Outbound::Lane::kMap).size() == 0; }, std::chrono::seconds(60)));
-  EXPECT_EQ(egress_->unpublished(), 0U);
 }
 
 }  // namespace
