@@ -61,7 +61,7 @@ cd "$out"
 began=$(date +%s)
 
 step "starting cairnd on domain $CAIRN_DOMAIN"
-"$bin/cairnd" >cairnd.log 2>&1 &
+"$bin/cairnd" --state none >cairnd.log 2>&1 &
 server=$!
 for attempt in $(seq 40); do
   if "$bin/cairn" ping --timeout 500ms >ping.txt 2>/dev/null; then break; fi

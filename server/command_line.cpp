@@ -10,6 +10,7 @@
 #include "common/version.h"
 #include "common/wire/wire_arguments.h"
 #include "server/known_map.h"
+#include "server/state_directory.h"
 
 namespace cairn::server {
 namespace {
@@ -40,7 +41,7 @@ Result<void> Validate(const CairndOptions& options) {
 std::optional<CommandLine> ParseCommandLine(int argc, char** argv, int& exit_code) {
   CLI::App app("Cairn's server: takes laser scans of robots over DDS, answers with poses and the map they share.",
                "cairnd");
-  std::string config, log_level;
+  std::string config, log_level, state;
   wire::WireArguments arguments;
   bool print_config = false, check_config = false;
   app.add_option("--config", config, "Configuration file (YAML); every key has a default");
@@ -49,6 +50,9 @@ std::optional<CommandLine> ParseCommandLine(int argc, char** argv, int& exit_cod
   app.add_option("--domain", arguments.domain,
                  "DDS domain (wire.domain); CAIRN_DOMAIN stands below --set and above the file");
   app.add_option("--log-level", log_level, "trace, debug, info, warn, error, critical or off (server.log_level)");
+  app.add_option("--state", state,
+                 "Directory in which the server keeps its state; \"none\" keeps nothing. Default: CAIRN_STATE, the "
+                 "StateDirectory of systemd, or cairn/domain-N in XDG_STATE_HOME or ~/.local/state");
   app.add_flag("--print-config", print_config, "Print the whole configuration with comments, and end");
   app.add_flag("--check-config", check_config, "Check the configuration, and end");
   app.set_version_flag("--version", std::string("cairnd ") + kVersion);
@@ -66,6 +70,12 @@ std::optional<CommandLine> ParseCommandLine(int argc, char** argv, int& exit_cod
   if (!log_level.empty()) arguments.assignments.push_back("server.log_level=" + log_level);
   if (Complain(Apply(arguments, visit)) || Complain(Validate(line.options))) return std::nullopt;
   if (!print_config && Complain(LoadKnownMap(line.options.server.slam))) return std::nullopt;
+  if (auto place = StateDirectory(state, line.options.wire.domain)) {
+    line.state = std::move(*place);
+  } else if (!print_config && !check_config) {
+    std::cerr << "cairnd: " << place.error().message << "\n";
+    return std::nullopt;
+  }
   if (print_config) line.task = Task::kPrintConfig;
   if (check_config) line.task = Task::kCheckConfig;
   return line;

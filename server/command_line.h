@@ -2,6 +2,7 @@
 // environment variable CAIRN_DOMAIN, --set, --domain, --log-level (see common/wire/wire_arguments.h).
 #pragma once
 
+#include <filesystem>
 #include <optional>
 
 #include "common/options/option_visitor.h"
@@ -26,6 +27,7 @@ enum class Task { kServe, kPrintConfig, kCheckConfig };
 struct CommandLine {
   Task task = Task::kServe;
   CairndOptions options;
+  std::filesystem::path state;  // server/state_directory.h; kInMemory: nothing outlives the process.
 };
 
 // Returns nothing if the program is to end at once with `exit_code`: 0 after --help and --version, 2 for a

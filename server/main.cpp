@@ -1,7 +1,8 @@
 // The main function of cairnd. It reads the options, starts the server and its connections to DDS, waits for
 // a signal, and stops. Exit codes: 0 stopped on request; 1 could not start, but a
 // later try may succeed (for example, an address does not exist yet); 2 wrong command line or configuration, so that a
-// restart would fail again.
+// restart would fail again, also because of a store that a newer server has written or that is damaged; 3 stopped on
+// request, but the store had failed and the last data is lost.
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -23,6 +24,8 @@
 #include "server/ops/domain_lock.h"
 #include "server/ops/service_notifier.h"
 #include "server/server.h"
+#include "server/state_directory.h"
+#include "server/store/sqlite_store.h"
 
 namespace cairn::server {
 namespace {
@@ -46,6 +49,7 @@ struct Watched {
   const Ingress& ingress;
   const Egress& egress;
   OtherServers& others;
+  const Journal* journal;  // Null where nothing is stored.
 };
 
 DoorCounts LossesOf(const Watched& watched) {
@@ -70,6 +74,8 @@ void Look(asio::steady_timer& timer, const Watched& watched, DoorLosses& losses,
       spdlog::warn("{}", *line);
       notifier.Status("messages lost between DDS and the server: " + TextOf(counts));
     }
+    const JournalHealth health = watched.journal == nullptr ? JournalHealth{} : watched.journal->health();
+    if (health.degraded) notifier.Status("degraded, what arrives now is not durable: " + health.reason);
     Look(timer, watched, losses, notifier);
   });
 }
@@ -97,14 +103,53 @@ void WaitForSignal(asio::io_context& context, asio::signal_set& signals, const W
   context.run();
 }
 
-// Later than that of every start before, as long as the clock was not set back in between: nothing is stored.
-Generation NextGeneration() {
+constexpr int kDegraded = 3;
+
+std::uint64_t MillisecondsSince1970() {
   const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
-  return static_cast<Generation>(
+  return static_cast<std::uint64_t>(
       std::max<std::int64_t>(1, std::chrono::duration_cast<std::chrono::milliseconds>(since_1970).count()));
 }
 
-int Serve(const CairndOptions& options) {
+// A later start may find the store free or the disk repaired; a newer or damaged store stays as it is.
+int ExitCodeOf(const Status& status) {
+  return status.code == StatusCode::kFailedPrecondition || status.code == StatusCode::kDataLoss ? 2 : 1;
+}
+
+// What outlives the process, and the number of this start.
+struct KeptState {
+  std::unique_ptr<Store> store;
+  std::unique_ptr<Journal> journal;  // Null where nothing is stored.
+  Generation generation = MillisecondsSince1970();
+};
+
+Result<KeptState> OpenState(const StoreOptions& options, const std::filesystem::path& place) {
+  KeptState kept;
+  if (place == kNoState) return kept;
+  auto store = OpenStore(place);
+  if (!store) return tl::unexpected(store.error());
+  kept.store = std::move(*store);
+  const auto generation = NextGeneration(*kept.store, kept.generation);
+  if (!generation) return tl::unexpected(generation.error());
+  kept.generation = *generation;
+  kept.journal = std::make_unique<Journal>(*kept.store, options);
+  spdlog::info("generation {}, state in {}", kept.generation, place.string());
+  return kept;
+}
+
+// Writes what still waits. The exit code of a server that stops on request.
+int StopJournal(Journal& journal) {
+  journal.Stop();
+  const JournalCounts counts = journal.counts();
+  spdlog::info("store: {} entries in {} commits, {} failed; on the disk after {:.1f} ms (median), {:.1f} ms (p99)",
+               counts.entries, counts.commits, counts.failed_commits, counts.delay_p50_ms, counts.delay_p99_ms);
+  const JournalHealth health = journal.health();
+  if (!health.degraded) return 0;
+  spdlog::critical("stopped while degraded; the last data is not stored: {}", health.reason);
+  return kDegraded;
+}
+
+int Serve(const CairndOptions& options, const std::filesystem::path& state) {
   StartLogging(options.server.server.log_level);
   // The signal set is made before any thread starts, so that no thread receives the signals instead.
   asio::io_context context(1);
@@ -114,37 +159,40 @@ int Serve(const CairndOptions& options) {
 
   const auto failed = [](const Status& status) {
     spdlog::critical("cannot start: {}", status.message);
-    return 1;
+    return ExitCodeOf(status);
   };
   const ProcessOptions& process = options.server.server;
   Inbound inbound(static_cast<std::size_t>(process.inbound_capacity));
   Outbound outbound(static_cast<std::size_t>(process.outbound_capacity));
   const auto lock = DomainLock::Take(options.wire.domain, options.wire.interfaces);
   if (!lock) return failed(lock.error());
+  auto kept = OpenState(options.server.store, state);
+  if (!kept) return failed(kept.error());
   auto bus = wire::Bus::Create(options.wire, "cairnd");
   if (!bus) return failed(bus.error());
   const auto others = OtherServers::Watch(**bus);
   if (!others) return failed(others.error());
-  const Generation generation = NextGeneration();
-  auto egress = Egress::Open(**bus, outbound, generation);
+  auto egress = Egress::Open(**bus, outbound, kept->generation);
   if (!egress) return failed(egress.error());
-  Server server(options.server, inbound, outbound, generation);
+  Server server(options.server, inbound, outbound, kept->generation, kept->journal.get());
   if (auto started = server.Start(); !started) return failed(started.error());
+  if (kept->journal != nullptr) kept->journal->Start();
   auto ingress = Ingress::Open(**bus, inbound, outbound);
   if (!ingress) return failed(ingress.error());
 
   const ServiceNotifier notifier;
   notifier.Ready("serving DDS domain " + std::to_string(options.wire.domain));
   spdlog::info("ready");
-  const Watched watched{server, outbound, **ingress, **egress, **others};
+  const Watched watched{server, outbound, **ingress, **egress, **others, kept->journal.get()};
   WaitForSignal(context, signals, watched, notifier);
   notifier.Stopping();
 
   (*ingress)->Close();
   server.Stop();
   (*egress)->Finish();
+  const int exit_code = kept->journal == nullptr ? 0 : StopJournal(*kept->journal);
   spdlog::info("stopped; messages lost between DDS and the server since the start: {}", TextOf(LossesOf(watched)));
-  return 0;
+  return exit_code;
 }
 
 int Main(int argc, char** argv) {
@@ -164,7 +212,7 @@ int Main(int argc, char** argv) {
     case Task::kServe:
       break;
   }
-  return Serve(line->options);
+  return Serve(line->options, line->state);
 }
 
 }  // namespace

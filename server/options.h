@@ -10,6 +10,7 @@
 #include "server/ops/logging.h"
 #include "server/robots/robots_options.h"
 #include "server/slam/mapper_options.h"
+#include "server/store/store_options.h"
 
 namespace cairn::server {
 
@@ -34,6 +35,7 @@ struct ServerOptions {
   RobotsOptions robots;
   MapsOptions maps;
   JobsOptions jobs;
+  StoreOptions store;
 };
 void Visit(OptionVisitor& visitor, ServerOptions& options);
 

@@ -26,15 +26,18 @@ Stamp ServerClock() {
 
 }  // namespace
 
-Server::Server(const ServerOptions& options, Inbound& inbound, Outbound& outbound, Generation generation)
+Server::Server(const ServerOptions& options, Inbound& inbound, Outbound& outbound, Generation generation,
+               Journal* journal)
     : options_(options),
       inbound_(inbound),
       outbound_(outbound),
+      journal_(journal),
       robots_pool_(ThreadCount(options.server.threads)),
       maps_pool_(1),
-      atlas_(options.maps, options.slam.grid.resolution_m, options.server.create_sites, maps_pool_, outbound),
-      roster_(options.robots, options.slam, robots_pool_, outbound, atlas_),
-      jobs_(options.jobs, outbound, ServerClock),
+      atlas_(options.maps, options.slam.grid.resolution_m, options.server.create_sites, maps_pool_, outbound, journal,
+             generation),
+      roster_(options.robots, options.slam, robots_pool_, outbound, atlas_, journal),
+      jobs_(options.jobs, outbound, ServerClock, journal),
       smooth_(options.jobs, roster_, atlas_),
       worker_(
           options.jobs, jobs_,
@@ -48,7 +51,17 @@ Server::~Server() {
   Stop();
 }
 
+Result<void> Server::Restore() {
+  if (auto sites = atlas_.Restore(); !sites) return sites;
+  if (auto sessions = roster_.Restore(); !sessions) return sessions;
+  const auto unfinished = jobs_.Restore();
+  if (!unfinished) return tl::unexpected(unfinished.error());
+  for (const StoredJob& job : *unfinished) worker_.Requeue(job.job.id, job.enable);
+  return {};
+}
+
 Result<void> Server::Start() {
+  if (auto restored = Restore(); !restored) return restored;
   for (const std::string& name : options_.server.site_names()) {
     if (const auto site = atlas_.Create(name); !site) return tl::unexpected(site.error());
   }
@@ -93,6 +106,7 @@ void Server::KeepHouse(const std::stop_token& stop) {
       next_publish = std::max(next_publish + publish_period, Clock::now());
     }
     CheckHealth();
+    CheckJournal();
     next = std::max(next + kHousekeepingPeriod, Clock::now());
     const MutexLock lock(mutex);
     while (!stop.stop_requested() && tick.WaitUntil(mutex, std::min(next, next_publish))) {
@@ -124,6 +138,17 @@ void Server::CheckHealth() {
   const bool was_healthy = healthy_.exchange(stalled.empty());
   if (was_healthy && !stalled.empty())
     spdlog::error("{} makes no progress; the systemd watchdog is no longer notified", stalled.front());
+}
+
+void Server::CheckJournal() {
+  if (journal_ == nullptr) return;
+  const JournalHealth health = journal_->health();
+  if (health.degraded == std::exchange(journal_degraded_, health.degraded)) return;
+  if (health.degraded) {
+    spdlog::error("degraded, what arrives now is not durable: {}", health.reason);
+  } else {
+    spdlog::info("the store works again; everything is durable");
+  }
 }
 
 void Server::Stop() {

@@ -27,10 +27,13 @@ namespace cairn::server {
 class Server {
  public:
   // `generation`: of this start of the server; the egress stamps the same one.
-  Server(const ServerOptions& options, Inbound& inbound, Outbound& outbound, Generation generation);
+  // `journal` makes the state durable, and holds that of the servers before; null: nothing is stored. The caller stops
+  // it after the server.
+  Server(const ServerOptions& options, Inbound& inbound, Outbound& outbound, Generation generation,
+         Journal* journal = nullptr);
   ~Server();
 
-  // Makes the configured sites and starts the threads.
+  // Takes up what is stored, makes the configured sites and starts the threads.
   Result<void> Start();
   // Accepts no more values and finishes the accepted ones within server.stop_timeout_s; the rest is dropped
   // and counted. Then it publishes the last state of every session and closes the outbound lanes.
@@ -44,13 +47,16 @@ class Server {
  private:
   void Dispatch(const std::stop_token& stop);
   void KeepHouse(const std::stop_token& stop);
+  Result<void> Restore();
   void CheckHealth();
+  void CheckJournal();
   void PublishMaps();
   void FinishSessions();
 
   const ServerOptions options_;
   Inbound& inbound_;
   Outbound& outbound_;
+  Journal* const journal_;
 
   // The pools are declared first: sessions and sites hold strands of the pools and must be destroyed before
   // them.
@@ -63,6 +69,7 @@ class Server {
   JobWorker worker_;
   Desk desk_;
   Heartbeat heartbeat_;
+  bool journal_degraded_ = false;  // As it was last logged.
   std::atomic<bool> healthy_{true};
   std::atomic<bool> stopping_{false};
   std::jthread housekeeping_;

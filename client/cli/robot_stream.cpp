@@ -79,10 +79,11 @@ void RobotStream::OnRestart(SessionToken session) {
   ++restarted_;
 }
 
-// A robot would go on waiting for its server. For a log or a simulation, a lost server is an error.
+// A robot would go on waiting for its server. For a log or a simulation, a lost server is an error, unless the next one
+// will go on with the session.
 Result<void> RobotStream::CheckServer() {
   const SessionState state = client_->session();
-  if (state.phase == SessionPhase::kSuspended && state.status.code == StatusCode::kUnavailable)
+  if (state.phase == SessionPhase::kSuspended && state.status.code == StatusCode::kUnavailable && !state.durable)
     return Fail(StatusCode::kUnavailable, "the session is suspended: " + state.status.message);
   const auto now = Clock::now();
   if (client_->connected()) connected_ = now;

@@ -11,10 +11,39 @@ constexpr auto kProgressPeriod = std::chrono::milliseconds(200);
 
 }  // namespace
 
-JobList::JobList(const JobsOptions& options, Outbound& outbound, std::function<Stamp()> now)
-    : options_(options), outbound_(outbound), now_(std::move(now)) {}
+JobList::JobList(const JobsOptions& options, Outbound& outbound, std::function<Stamp()> now, Journal* journal)
+    : options_(options), outbound_(outbound), now_(std::move(now)), journal_(journal) {}
 
-Result<Job> JobList::Add(const std::string& site, JobKind kind) {
+Result<std::vector<StoredJob>> JobList::Restore() {
+  std::vector<StoredJob> unfinished;
+  if (journal_ == nullptr) return unfinished;
+  const auto ids = journal_->store().Owners(RecordKind::kJob);
+  if (!ids) return tl::unexpected(ids.error());
+  const MutexLock lock(mutex_);
+  for (const std::uint64_t id : *ids) {
+    const auto take = [&](std::uint64_t, std::string_view bytes) CAIRN_NO_THREAD_SAFETY_ANALYSIS -> Result<void> {
+      auto stored = JobOf(bytes);
+      if (!stored) return tl::unexpected(stored.error());
+      if (!IsFinal(stored->job.state)) {
+        stored->job.state = JobState::kQueued;
+        stored->job.progress = 0.0;
+        unfinished.push_back(*stored);
+      }
+      Entry& entry = jobs_[id];
+      entry.job = stored->job;
+      entry.enable = stored->enable;
+      entry.control = std::make_shared<JobControl>([this, id](double progress) { Progress(id, progress); });
+      entry.unsent = true;
+      next_ = id + 1;
+      return {};
+    };
+    if (auto read = journal_->store().Read({.kind = RecordKind::kJob, .owner = id}, take); !read)
+      return tl::unexpected(read.error());
+  }
+  return unfinished;
+}
+
+Result<Job> JobList::Add(const std::string& site, JobKind kind, bool enable) {
   const MutexLock lock(mutex_);
   if (!MakeRoom()) {
     return cairn::Fail(StatusCode::kResourceExhausted, "too many jobs are unfinished (jobs.max_kept); try again later");
@@ -25,8 +54,9 @@ Result<Job> JobList::Add(const std::string& site, JobKind kind) {
   entry.job.site = site;
   entry.job.kind = kind;
   entry.job.submitted = now_();
+  entry.enable = enable;
   entry.control = std::make_shared<JobControl>([this, id](double progress) { Progress(id, progress); });
-  SendLocked(entry);
+  ChangedLocked(entry);
   return entry.job;
 }
 
@@ -36,7 +66,7 @@ bool JobList::Start(std::uint64_t id) {
   if (found == jobs_.end() || found->second.job.state != JobState::kQueued) return false;
   found->second.job.state = JobState::kRunning;
   found->second.job.started = now_();
-  SendLocked(found->second);
+  ChangedLocked(found->second);
   return true;
 }
 
@@ -63,7 +93,7 @@ void JobList::End(std::uint64_t id, JobState state, const std::function<void(Job
   job.state = state;
   job.ended = now_();
   fill(job);
-  SendLocked(found->second);
+  ChangedLocked(found->second);
 }
 
 Result<Job> JobList::Cancel(std::uint64_t id) {
@@ -80,12 +110,16 @@ Result<Job> JobList::Cancel(std::uint64_t id) {
     job.state = JobState::kCancelled;
     job.ended = now_();
     job.message = "cancelled before it started";
-    SendLocked(found->second);
+    ChangedLocked(found->second);
   }
   return job;
 }
 
 void JobList::CancelAll() {
+  {
+    const MutexLock lock(mutex_);
+    stopping_ = true;
+  }
   for (const Job& job : OfSite({})) {
     if (!IsFinal(job.state)) static_cast<void>(Cancel(job.id));
   }
@@ -133,6 +167,13 @@ void JobList::Progress(std::uint64_t id, double progress) {
   SendLocked(entry);
 }
 
+void JobList::ChangedLocked(Entry& entry) {
+  SendLocked(entry);
+  if (journal_ == nullptr || stopping_) return;
+  journal_->Put({RecordKind::kJob, entry.job.id, 0},
+                [stored = StoredJob{entry.job, entry.enable}] { return BytesOf(stored); });
+}
+
 void JobList::SendLocked(Entry& entry) {
   entry.unsent = !outbound_.Send(entry.job);
 }
@@ -142,6 +183,7 @@ bool JobList::MakeRoom() {
   const auto oldest =
       std::find_if(jobs_.begin(), jobs_.end(), [](const auto& entry) { return IsFinal(entry.second.job.state); });
   if (oldest == jobs_.end()) return false;
+  if (journal_ != nullptr) journal_->Remove({.kind = RecordKind::kJob, .owner = oldest->first});
   replaced_.push_back(std::move(oldest->second.job));
   jobs_.erase(oldest);
   RetireReplaced();

@@ -15,16 +15,19 @@
 #include "server/jobs/job_control.h"
 #include "server/jobs/jobs_options.h"
 #include "server/outbound.h"
+#include "server/store/journal.h"
 
 namespace cairn::server {
 
 class JobList {
  public:
-  // `now` is the server's clock.
-  JobList(const JobsOptions& options, Outbound& outbound, std::function<Stamp()> now);
+  // `now` is the server's clock. `journal`: null where nothing is stored.
+  JobList(const JobsOptions& options, Outbound& outbound, std::function<Stamp()> now, Journal* journal = nullptr);
 
-  // Adds a queued job. RESOURCE_EXHAUSTED: the list is full of unfinished jobs.
-  Result<Job> Add(const std::string& site, JobKind kind);
+  // The jobs of the servers before this one. Those that had not ended are queued again and returned, in order.
+  Result<std::vector<StoredJob>> Restore();
+  // Adds a queued job. RESOURCE_EXHAUSTED: the list is full of unfinished jobs. `enable`: see JobWorker.
+  Result<Job> Add(const std::string& site, JobKind kind, bool enable = true);
   // Marks the job as running. Returns false if it was cancelled meanwhile. From now on Cancel sets the flag
   // in the job's JobControl.
   bool Start(std::uint64_t id);
@@ -34,6 +37,7 @@ class JobList {
   // NOT_FOUND: no such job. FAILED_PRECONDITION: the job has already ended. Running work ends at its next
   // check.
   Result<Job> Cancel(std::uint64_t id);
+  // The server stops. Where jobs are stored, the next server starts them again.
   void CancelAll();
 
   [[nodiscard]] Result<Job> Find(std::uint64_t id) const;
@@ -45,12 +49,14 @@ class JobList {
  private:
   struct Entry {
     Job job;
+    bool enable = true;
     std::shared_ptr<JobControl> control;
     bool unsent = false;
     std::chrono::steady_clock::time_point progress_sent{};
   };
   void Progress(std::uint64_t id, double progress);
   void SendLocked(Entry& entry) CAIRN_REQUIRES(mutex_);
+  void ChangedLocked(Entry& entry) CAIRN_REQUIRES(mutex_);
   bool MakeRoom() CAIRN_REQUIRES(mutex_);
   void RetireReplaced() CAIRN_REQUIRES(mutex_);
   void End(std::uint64_t id, JobState state, const std::function<void(Job&)>& fill);
@@ -58,7 +64,9 @@ class JobList {
   const JobsOptions options_;
   Outbound& outbound_;
   const std::function<Stamp()> now_;
+  Journal* const journal_;
   mutable Mutex mutex_;
+  bool stopping_ CAIRN_GUARDED_BY(mutex_) = false;
   std::map<std::uint64_t, Entry> jobs_ CAIRN_GUARDED_BY(mutex_);
   std::vector<Job> replaced_ CAIRN_GUARDED_BY(mutex_);  // Not retired on the wire yet.
   std::uint64_t next_ CAIRN_GUARDED_BY(mutex_) = 1;

@@ -29,13 +29,18 @@ void JobWorker::Start() {
 }
 
 Result<Job> JobWorker::Submit(const std::string& site, JobKind kind, bool enable) {
-  auto job = list_.Add(site, kind);
+  auto job = list_.Add(site, kind, enable);
   if (job && !queue_.TryPush(Ticket{job->id, enable})) {
     const Status full{StatusCode::kResourceExhausted, "too many jobs are waiting (jobs.max_queued); try again later"};
     list_.Fail(job->id, full);
     return tl::unexpected(full);
   }
   return job;
+}
+
+void JobWorker::Requeue(std::uint64_t id, bool enable) {
+  if (!queue_.TryPush(Ticket{id, enable}))
+    list_.Fail(id, {StatusCode::kResourceExhausted, "too many jobs are waiting (jobs.max_queued); try again later"});
 }
 
 void JobWorker::Stop() {

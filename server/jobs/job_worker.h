@@ -26,6 +26,8 @@ class JobWorker {
   void Start();
   // RESOURCE_EXHAUSTED: the queue is full.
   Result<Job> Submit(const std::string& site, JobKind kind, bool enable);
+  // A job that is queued in the list already: one of a server before this one.
+  void Requeue(std::uint64_t id, bool enable);
   // Cancels the running and the waiting jobs. Returns when the thread has ended.
   void Stop();
 

@@ -11,13 +11,19 @@
 
 #include "common/mutex.h"
 #include "server/maps/site.h"
+#include "server/store/journal.h"
 
 namespace cairn::server {
 
 class Atlas {
  public:
-  Atlas(const MapsOptions& options, double resolution_m, bool create_sites, asio::thread_pool& pool,
-        Outbound& outbound);
+  // `journal`: null where nothing is stored. `generation`: of this start of the server.
+  Atlas(const MapsOptions& options, double resolution_m, bool create_sites, asio::thread_pool& pool, Outbound& outbound,
+        Journal* journal = nullptr, Generation generation = 0);
+
+  // The sites of the servers before this one. Before anything else is called. DATA_LOSS: a record is damaged.
+  // FAILED_PRECONDITION: a newer server has written it.
+  Result<void> Restore();
 
   // Returns the site; creates it if it does not exist and the server may create it. NOT_FOUND: the server may
   // not. RESOURCE_EXHAUSTED: too many sites. INVALID_ARGUMENT: not a valid name.
@@ -40,6 +46,8 @@ class Atlas {
   const bool create_sites_;
   asio::thread_pool& pool_;
   Outbound& outbound_;
+  Journal* const journal_;
+  const Generation generation_;
 
   mutable Mutex mutex_;
   std::map<std::string, Place> sites_ CAIRN_GUARDED_BY(mutex_);

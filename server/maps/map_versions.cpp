@@ -33,6 +33,13 @@ void MapVersions::Enable(std::uint32_t version, std::map<SessionId, RobotGrid> d
   versions_.at(version).info.enabled = true;
 }
 
+void MapVersions::Restore(std::map<std::uint32_t, MapVersion> versions, std::uint32_t next, std::uint32_t enabled) {
+  versions_ = std::move(versions);
+  next_ = next;
+  enabled_ = enabled;
+  for (auto& [number, version] : versions_) version.info.enabled = number == enabled;
+}
+
 std::vector<MapVersionInfo> MapVersions::infos() const {
   std::vector<MapVersionInfo> infos;
   for (const auto& [number, version] : versions_) infos.push_back(version.info);

@@ -62,11 +62,13 @@ class Site::Ticket {
 };
 
 Site::Site(const std::string& name, double resolution_m, const MapsOptions& options, asio::thread_pool& pool,
-           Outbound& outbound)
+           Outbound& outbound, Journal* journal, Generation generation)
     : name_(name),
       site_id_(HashName(name)),
       resolution_m_(resolution_m),
       outbound_(outbound),
+      journal_(journal),
+      generation_(generation),
       strand_(asio::make_strand(pool)),
       versions_(static_cast<std::size_t>(options.max_versions)) {
   auto empty = std::make_shared<MapSnapshot>();
@@ -109,12 +111,16 @@ void Site::Join(NameId robot, SessionId session, std::weak_ptr<GridOwner> owner)
     site.members_[robot] = {session, owner};
     std::erase_if(site.members_, [](const auto& member) { return member.second.owner.expired(); });
     site.info_changed_ = true;
+    site.StoreSite();
   });
 }
 
 void Site::AddVersion(MapVersion&& version, Done done) {
   Run([version = std::move(version), done = Once(std::move(done))](Site& site) mutable {
     const std::uint32_t number = site.versions_.Add(std::move(version), site.switch_ ? site.switch_->version : 0);
+    site.StoreVersion(number);
+    site.RemoveOldVersions();
+    site.StoreSite();
     site.Refresh({}, false);
     site.Send();
     done(number);
@@ -164,7 +170,9 @@ void Site::Begin(std::uint32_t version, Done done) {
     switch_->awaited.insert(session);
     const auto ticket = std::make_shared<Ticket>(shared_from_this(), version, session);
     Correction correction{
-        .epoch = epoch_ + 1, .grid = part, .done = [ticket](Adopted&& adopted) { ticket->Answer(std::move(adopted)); }};
+        .epoch = epoch_ + 1, .generation = generation_, .grid = part, .done = [ticket](Adopted&& adopted) {
+          ticket->Answer(std::move(adopted));
+        }};
     // If the session has ended, the correction and its ticket are dropped here.
     if (const auto owner = OwnerOf(session)) owner->Adopt(std::move(correction));
   }
@@ -202,9 +210,14 @@ void Site::CommitIfComplete() {
   if (!switch_->awaited.empty()) return;
   VersionSwitch complete = std::move(*switch_);
   switch_.reset();
-  for (const auto& [session, chunks] : complete.staged) joint_.Replace(session, chunks);
+  for (const auto& [session, chunks] : complete.staged) {
+    joint_.Replace(session, chunks);
+    if (layers_.contains(session)) StoreLayer(session);
+  }
+  const std::uint32_t before = versions_.enabled();
   versions_.Enable(complete.version, std::move(complete.displaced));
-  ++epoch_;
+  switches_[++epoch_] = generation_;
+  StoreVersion(before);
   RenderAll();
   Send();
   complete.done(complete.version);
@@ -224,7 +237,10 @@ void Site::Refresh(const std::vector<TileKey>& changed, bool all) {
   auto after = std::make_shared<MapSnapshot>();
   after->tiles = before->tiles;
   after->smoothed = versions_.smoothed();
-  if (!changed.empty() || all) ++tile_version_;
+  if (!changed.empty() || all) {
+    ++tile_version_;
+    StoreSite();
+  }
   for (const TileKey& key : changed) {
     unsent_.insert(key);
     const auto cells = joint_.cells().find(key);

@@ -21,6 +21,7 @@
 #include <string>
 
 #include "common/mutex.h"
+#include "common/service/generation.h"
 #include "common/service/names.h"
 #include "server/maps/joint_map.h"
 #include "server/maps/map_snapshot.h"
@@ -28,6 +29,7 @@
 #include "server/maps/maps_options.h"
 #include "server/ops/heartbeat.h"
 #include "server/outbound.h"
+#include "server/store/journal.h"
 
 namespace cairn::server {
 
@@ -45,13 +47,22 @@ class Site : public std::enable_shared_from_this<Site> {
   // Receives a map version; called once, on the site's strand. INTERNAL if the work ended with an exception.
   using Done = std::function<void(Result<std::uint32_t>)>;
 
+  // `journal`: null where nothing is stored. `generation`: of this start of the server.
   Site(const std::string& name, double resolution_m, const MapsOptions& options, asio::thread_pool& pool,
-       Outbound& outbound);
+       Outbound& outbound, Journal* journal = nullptr, Generation generation = 0);
+
+  // Goes on from what a server before this one has stored: epoch, versions, and the parts of sessions that exist no
+  // more. Before anything else is called.
+  Result<void> Restore(const StoredSite& stored);
+  // Whether the server of this generation completed the switch that led to this epoch. Before the threads start.
+  [[nodiscard]] bool Switched(std::uint32_t epoch, Generation generation) const;
 
   // From now on this session of the robot draws here, in place of the robot's previous session. A session
   // that has ended is kept while its GridOwner exists, because its part of the map can still be corrected.
   void Join(NameId robot, SessionId session, std::weak_ptr<GridOwner> owner);
   void Change(GridChange&& change);
+  // The session exists no more. Its part of the map stays, and is stored as such instead of the session.
+  void Leave(SessionId session);
   // Adds a disabled version; `done` receives its number.
   void AddVersion(MapVersion&& version, Done done);
   // UNAVAILABLE: another switch is under way. NOT_FOUND: the version does not exist or has been removed.
@@ -83,12 +94,20 @@ class Site : public std::enable_shared_from_this<Site> {
   void RenderAll();
   void Refresh(const std::vector<TileKey>& changed, bool all);
   void Send();
+  void StoreSite();
+  void StoreVersion(std::uint32_t version);
+  void StoreLayer(SessionId session);
+  void RemoveOldVersions();
+  Result<void> RestoreVersions(const StoredSite& stored);
+  Result<void> RestoreLayers();
   MapInfo InfoOf(const std::map<TileKey, std::shared_ptr<const Tile>>& tiles) const;
 
   const std::string name_;
   const NameId site_id_;
   const double resolution_m_;
   Outbound& outbound_;
+  Journal* const journal_;
+  const Generation generation_;
   asio::strand<asio::thread_pool::executor_type> strand_;
 
   // The members below are used on the strand only.
@@ -97,6 +116,9 @@ class Site : public std::enable_shared_from_this<Site> {
   std::uint32_t epoch_ = 0;
   std::uint64_t tile_version_ = 0;
   std::map<NameId, Member> members_;
+  std::map<std::uint32_t, Generation> switches_;  // Epoch -> the server that switched the map to it.
+  std::set<SessionId> layers_;                    // Sessions that exist no more, whose parts are stored.
+  std::set<std::uint32_t> stored_versions_;
   bool info_changed_ = true;
   std::optional<VersionSwitch> switch_;
   std::set<TileKey> unsent_;  // Tiles (or tombstones) to publish.

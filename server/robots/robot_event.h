@@ -31,6 +31,7 @@ struct SnapshotWanted {
 // false where the server stops and the session could go on later.
 struct Finish {
   bool final = true;
+  Status reason = {};
   std::function<void()> done;
 };
 

@@ -27,6 +27,10 @@ void Visit(OptionVisitor& visitor, RobotsOptions& options) {
   visitor.Real("ledger_rate_hz", options.ledger_rate_hz, "Hz", 0.1, 100.0,
                "How often the counters of a robot are published while scans arrive. They are published at once after "
                "every eight scans and when its queue becomes empty.");
+  visitor.Real(
+      "gap_wait_s", options.gap_wait_s, "s", 0.1, 3600.0,
+      "After a restart the server leaves samples aside for this long while a robot sends those again that came "
+      "before them and were not stored. Then it goes on without them, and counts them as lost.");
 }
 
 }  // namespace cairn::server

@@ -15,6 +15,7 @@ struct RobotsOptions {
   std::int64_t max_unclaimed = 256;
   double suspended_expiry_s = 86400.0;
   double ledger_rate_hz = 10.0;
+  double gap_wait_s = 10.0;
 };
 void Visit(OptionVisitor& visitor, RobotsOptions& options);
 

@@ -37,13 +37,18 @@ Pose2 StartOf(const SessionRequest& request) {
 }  // namespace
 
 Roster::Roster(const RobotsOptions& options, const slam::MapperOptions& mapper, asio::thread_pool& pool,
-               Outbound& outbound, Atlas& atlas)
+               Outbound& outbound, Atlas& atlas, Journal* journal)
     : options_(options),
       mapper_(mapper),
       pool_(pool),
       outbound_(outbound),
       atlas_(atlas),
+      journal_(journal),
       unclaimed_(static_cast<std::size_t>(options.max_unclaimed)) {}
+
+Roster::~Roster() {
+  *closing_ = true;
+}
 
 void Roster::Take(const SessionRequest& request) {
   {
@@ -135,14 +140,7 @@ Result<void> Roster::Open(const SessionRequest& request) {
       sessions_.erase(gone->record().state().robot_id);
       gone_.push_back(gone);
     }
-    const SessionSetup setup{.id = next_id_++,
-                             .request = request,
-                             .map_epoch = site->snapshot()->info.epoch,
-                             .estimator = {.mapper = mapper_, .T_map_robot_start = StartOf(request)}};
-    session = std::make_shared<Session>(
-        setup, options_, pool_,
-        SessionOutputs{.send = [this](OutboundValue value) { return outbound_.Send(std::move(value)); },
-                       .grid_changed = [site](GridChange&& change) { site->Change(std::move(change)); }});
+    session = Make(next_id_++, request, site->snapshot()->info.epoch, site);
     session->record().AddSensors(request.sensors);
     for (const std::string& sensor : request.sensors) {
       if (auto account = unclaimed_.Claim({robot_id, HashName(sensor), request.session})) {
@@ -151,6 +149,10 @@ Result<void> Roster::Open(const SessionRequest& request) {
     }
     sessions_.emplace(robot_id, session);
   }
+  if (journal_ != nullptr) {
+    session->ExpectDurable();
+    journal_->Open({session->id(), request, session->record().epoch()}, DurableFor(session));
+  }
   session->Resume(request.client, request.session);
   site->Join(robot_id, session->id(), session);
   if (gone != nullptr && !gone->ending()) {
@@ -158,6 +160,38 @@ Result<void> Roster::Open(const SessionRequest& request) {
   }
   RetireGone();
   return {};
+}
+
+std::shared_ptr<Session> Roster::Make(SessionId id, const SessionRequest& request, std::uint32_t map_epoch,
+                                      const std::shared_ptr<Site>& site) const {
+  const SessionSetup setup{.id = id,
+                           .request = request,
+                           .map_epoch = map_epoch,
+                           .estimator = {.mapper = mapper_, .T_map_robot_start = StartOf(request)}};
+  SessionOutputs outputs{.send = [this](OutboundValue value) { return outbound_.Send(std::move(value)); },
+                         .grid_changed = [site](GridChange&& change) { site->Change(std::move(change)); },
+                         .store = {},
+                         .gone =
+                             [site, id, closing = closing_] {
+                               if (!*closing) site->Leave(id);
+                             }};
+  const auto self = std::make_shared<std::weak_ptr<Session>>();
+  if (journal_ != nullptr) {
+    outputs.store = [journal = journal_, id, self](JournalEntry entry) {
+      if (journal->Append(id, std::move(entry)) != 0) return true;
+      if (const auto session = self->lock()) session->Lost({StatusCode::kUnavailable, journal->health().reason});
+      return false;
+    };
+  }
+  auto session = std::make_shared<Session>(setup, options_, pool_, std::move(outputs));
+  *self = session;
+  return session;
+}
+
+Journal::Durable Roster::DurableFor(const std::shared_ptr<Session>& session) const {
+  return [weak = std::weak_ptr(session)](const std::vector<JournalEntry>& entries) {
+    if (const auto known = weak.lock()) known->Durable(entries);
+  };
 }
 
 Result<std::shared_ptr<Session>> Roster::GivesWay(NameId robot_id) const {

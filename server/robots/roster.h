@@ -10,6 +10,7 @@
 #pragma once
 
 #include <asio/thread_pool.hpp>
+#include <atomic>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -23,14 +24,23 @@
 #include "server/robots/robots_options.h"
 #include "server/robots/session.h"
 #include "server/robots/unclaimed_streams.h"
+#include "server/store/journal.h"
 
 namespace cairn::server {
 
 class Roster {
  public:
   // Sessions draw the sites of the atlas; a robot that opens a session enters its site there.
+  // `journal`: null where nothing is stored.
   Roster(const RobotsOptions& options, const slam::MapperOptions& mapper, asio::thread_pool& pool, Outbound& outbound,
-         Atlas& atlas);
+         Atlas& atlas, Journal* journal = nullptr);
+
+  ~Roster();
+
+  // The sessions of the servers before this one, taken up where their journals end, in parallel on the pool; the sites
+  // must have been restored. Before anything else is called. FAILED_PRECONDITION: a newer server has written them. A
+  // session whose records are damaged is left out, with the reason in the log.
+  Result<void> Restore();
 
   // Opens, resumes, refuses or ends; the answer goes out as a SessionState.
   void Take(const SessionRequest& request);
@@ -51,6 +61,10 @@ class Roster {
   Result<void> Admit(const SessionRequest& request);
   Result<void> Resume(Session& session, const SessionRequest& request);
   Result<void> Open(const SessionRequest& request);
+  std::shared_ptr<Session> Make(SessionId id, const SessionRequest& request, std::uint32_t map_epoch,
+                                const std::shared_ptr<Site>& site) const;
+  Journal::Durable DurableFor(const std::shared_ptr<Session>& session) const;
+  Result<std::shared_ptr<Session>> RestoreOne(SessionId id);
   // The session that has to be removed before this robot can have a new one; null where there is room.
   Result<std::shared_ptr<Session>> GivesWay(NameId robot_id) const CAIRN_REQUIRES(mutex_);
   void Refuse(const SessionRequest& request, Status status);
@@ -62,6 +76,9 @@ class Roster {
   asio::thread_pool& pool_;
   Outbound& outbound_;
   Atlas& atlas_;
+  Journal* const journal_;
+  // The roster is being destroyed: sessions that go now have not left.
+  const std::shared_ptr<std::atomic<bool>> closing_ = std::make_shared<std::atomic<bool>>(false);
 
   mutable Mutex mutex_;
   std::map<NameId, std::shared_ptr<Session>> sessions_ CAIRN_GUARDED_BY(mutex_);

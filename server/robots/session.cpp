@@ -7,6 +7,11 @@
 #include <utility>
 
 namespace cairn::server {
+namespace {
+
+constexpr std::chrono::seconds kOpeningPatience{1};  // A robot waits this long for the disk when it opens a session.
+
+}  // namespace
 
 Session::Session(const SessionSetup& setup, const RobotsOptions& options, asio::thread_pool& pool,
                  SessionOutputs outputs)
@@ -22,6 +27,10 @@ Session::Session(const SessionSetup& setup, const RobotsOptions& options, asio::
           }(),
           record_, outputs_) {}
 
+Session::~Session() {
+  if (outputs_.gone) outputs_.gone();
+}
+
 bool Session::Take(ScanArrival&& arrival) {
   const NameId sensor = arrival.stream.sensor_id;
   const std::uint64_t sequence = arrival.scan->sequence;
@@ -31,13 +40,16 @@ bool Session::Take(ScanArrival&& arrival) {
     return known;
   }
   const SessionRecord::Arrival kind = record_.ScanReceived(sensor, sequence);
-  if (kind != SessionRecord::Arrival::kNew) return kind == SessionRecord::Arrival::kDuplicate;
+  if (kind != SessionRecord::Arrival::kNew) return kind != SessionRecord::Arrival::kUnknownSensor;
   if (ending_ || arrival.refused) {
-    record_.ScanDropped(sensor, sequence, arrival.refused.value_or(DropReason::kSessionEnded));
+    const DropReason reason = arrival.refused.value_or(DropReason::kSessionEnded);
+    Store(ScanRefused{arrival.stream, sequence, reason});
+    record_.ScanDropped(sensor, sequence, reason);
     PublishLedgers(SessionRecord::Urgency::kWhenDue);
     return true;
   }
   if (const auto displaced = queue_.Push(std::move(arrival))) {
+    Store(ScanRefused{displaced->stream, displaced->scan->sequence, DropReason::kQueueFull});
     record_.ScanDropped(displaced->stream.sensor_id, displaced->scan->sequence, DropReason::kQueueFull);
   }
   Schedule();
@@ -48,11 +60,14 @@ void Session::Take(OdometryArrival&& arrival) {
   const std::uint64_t sequence = arrival.odometry.sequence;
   if (arrival.stream.session != record_.token() || !record_.OdometryReceived(sequence)) return;
   if (arrival.refused || ending_) {
+    Store(OdometryTaken{arrival.stream, arrival.odometry, OdometryFate::kRefused});
     record_.OdometryDropped(sequence, arrival.refused ? DropReason::kBadGeometry : DropReason::kSessionEnded);
     return;
   }
-  if (const auto merged = queue_.Push(std::move(arrival)))
+  if (const auto merged = queue_.Push(std::move(arrival))) {
+    Store(OdometryTaken{merged->stream, merged->odometry, OdometryFate::kMerged});
     record_.OdometryDropped(merged->odometry.sequence, DropReason::kQueueFull);
+  }
   Schedule();
 }
 
@@ -77,6 +92,7 @@ void Session::SetLiveliness(bool alive) {
 
 bool Session::Resume(ClientId client, SessionToken session) {
   if (!record_.Resume(client, session)) return false;
+  Store(OwnerChanged{client, session, record_.sensors()});
   AnnounceState();
   return true;
 }
@@ -86,21 +102,25 @@ void Session::End(Status reason) {
     if (record_.phase() == SessionPhase::kEnded) AnnounceState();  // Whoever asks again gets the answer again.
     return;
   }
-  queue_.Push(Finish{.final = true, .done = [self = shared_from_this(), reason = std::move(reason)] {
-                       self->Finished(SessionPhase::kEnded, reason);
-                     }});
+  Finish finish;
+  finish.reason = reason;
+  finish.done = [self = shared_from_this(), reason] { self->Finished(SessionPhase::kEnded, reason); };
+  queue_.Push(std::move(finish));
   Schedule();
 }
 
 void Session::Suspend(const std::function<void()>& done) {
   // Where the end was asked for before, it is handled first and nothing is left to be suspended.
   const bool ended_before = ending_.exchange(true);
-  queue_.Push(Finish{.final = false, .done = [self = shared_from_this(), done, ended_before] {
-                       if (!ended_before) {
-                         self->Finished(SessionPhase::kSuspended, {StatusCode::kUnavailable, "the server is stopping"});
-                       }
-                       done();
-                     }});
+  Finish finish;
+  finish.final = false;
+  finish.done = [self = shared_from_this(), done, ended_before] {
+    if (!ended_before) {
+      self->Finished(SessionPhase::kSuspended, {StatusCode::kUnavailable, "the server is stopping"});
+    }
+    done();
+  };
+  queue_.Push(std::move(finish));
   Schedule();
 }
 
@@ -110,7 +130,43 @@ void Session::Abandon() {
   }
 }
 
+void Session::Store(JournalEntry entry) {
+  if (outputs_.store) static_cast<void>(outputs_.store(std::move(entry)));
+}
+
+void Session::Lost(const Status& why) {
+  if (record_.SetStored(false, why)) AnnounceState();
+}
+
+void Session::Durable(const std::vector<JournalEntry>& entries) {
+  record_.Durable(entries);
+  if (unannounced_.exchange(false)) AnnounceState();
+  PublishLedgers(SessionRecord::Urgency::kWhenDue);
+}
+
+void Session::ExpectDurable() {
+  static_cast<void>(record_.SetStored(true));
+  unannounced_ = true;
+  opened_ = SessionRecord::Clock::now();
+}
+
+void Session::Replay(JournalEntry&& entry, const SessionEstimator::Switched& switched) {
+  if (!failed_) Throws([&] { estimator_.Replay(std::move(entry), switched); });
+}
+
+void Session::Replayed() {
+  if (!failed_) Throws([this] { estimator_.Replayed(); });
+  record_.Restored();
+  if (record_.phase() == SessionPhase::kEnded) ending_ = true;
+  state_unsent_ = true;
+}
+
 void Session::Tick() {
+  // The disk takes long: the robot need not wait for it, its scans count as durable only when they are.
+  if (unannounced_ && SessionRecord::Clock::now() - opened_ > kOpeningPatience) {
+    unannounced_ = false;
+    AnnounceState();
+  }
   if (state_unsent_) AnnounceState();
   PublishLedgers(SessionRecord::Urgency::kWhenDue);
 }
@@ -122,6 +178,7 @@ void Session::Finished(SessionPhase phase, Status status) {
 }
 
 void Session::AnnounceState() {
+  if (unannounced_) return;
   const MutexLock lock(publishing_);
   state_unsent_ = !outputs_.send(record_.state());
 }

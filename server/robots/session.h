@@ -29,6 +29,8 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
  public:
   Session(const SessionSetup& setup, const RobotsOptions& options, asio::thread_pool& pool, SessionOutputs outputs);
 
+  ~Session() override;
+
   // False where the stream is not this session's: an undeclared sensor.
   bool Take(ScanArrival&& arrival);
   void Take(OdometryArrival&& arrival);
@@ -49,6 +51,14 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   void Abandon();
   // Publishes the state once more.
   void Announce() { AnnounceState(); }
+  // The journal's side. Expected: the session's record is on its way to the disk, and its opening is announced when it
+  // is there (the first Durable). Lost: nothing of it is stored any more.
+  void ExpectDurable();
+  void Durable(const std::vector<JournalEntry>& entries);
+  void Lost(const Status& why);
+  // As SessionEstimator, before the session is known to anybody: from one thread.
+  void Replay(JournalEntry&& entry, const SessionEstimator::Switched& switched);
+  void Replayed();
   // Publishes ledgers that are due and whatever could not be sent before.
   void Tick();
 
@@ -72,6 +82,7 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   template <typename Act>
   bool Throws(Act act) noexcept;
   void Fail(const char* what) noexcept;
+  void Store(JournalEntry entry);
   void AnnounceState();
   void PublishLedgers(SessionRecord::Urgency urgency);
   void Finished(SessionPhase phase, Status status);
@@ -82,6 +93,8 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   RobotQueue queue_;
   std::atomic<bool> ending_{false};  // An end was asked for: nothing new is taken.
   std::atomic<bool> state_unsent_{false};
+  std::atomic<bool> unannounced_{false};  // Its opening waits for the disk.
+  SessionRecord::Clock::time_point opened_{};
   std::atomic<bool> scheduled_{false};
   std::atomic<bool> handling_{false};
   std::atomic<std::uint64_t> handled_{0};

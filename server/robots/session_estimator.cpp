@@ -3,6 +3,8 @@
 #include <utility>
 #include <variant>
 
+#include "server/maps/stored_grid.h"
+
 namespace cairn::server {
 namespace {
 
@@ -62,8 +64,10 @@ void SessionEstimator::Handle(RobotEvent&& event) {
 void SessionEstimator::Discard(RobotEvent&& event) {
   if (const auto* const arrival = std::get_if<ScanArrival>(&event)) {
     // A scan that has moved on into the estimator is one of those that wait there.
-    if (arrival->scan != nullptr)
+    if (arrival->scan != nullptr) {
+      Store(ScanRefused{arrival->stream, arrival->scan->sequence, DropReason::kSessionEnded});
       record_.ScanDropped(arrival->stream.sensor_id, arrival->scan->sequence, DropReason::kSessionEnded);
+    }
   } else if (std::holds_alternative<OdometryArrival>(event)) {
     record_.OdometryDropped(std::get<OdometryArrival>(event).odometry.sequence, DropReason::kSessionEnded);
   } else if (auto* const wanted = std::get_if<SnapshotWanted>(&event)) {
@@ -84,6 +88,7 @@ void SessionEstimator::DropWaiting() {
 
 void SessionEstimator::On(ScanArrival&& arrival) {
   if (ended_) return Discard(std::move(arrival));
+  Store(ScanTaken{arrival.stream, arrival.scan});
   ComesFrom(arrival.stream.session);
   waiting_.emplace(arrival.scan.get(), Waiting{arrival.stream.sensor_id, arrival.scan->sequence, arrival.received});
   pipeline_.Add(std::move(arrival.scan));
@@ -91,6 +96,7 @@ void SessionEstimator::On(ScanArrival&& arrival) {
 
 void SessionEstimator::On(OdometryArrival&& arrival) {
   if (ended_) return Discard(std::move(arrival));
+  Store(OdometryTaken{arrival.stream, arrival.odometry, OdometryFate::kTaken});
   ComesFrom(arrival.stream.session);
   const std::uint64_t refused_before = pipeline_.odometry_refused();
   pipeline_.Add(arrival.odometry);
@@ -106,14 +112,58 @@ void SessionEstimator::ComesFrom(SessionToken session) {
   if (std::exchange(session_, session) != session) pipeline_.NewClient();
 }
 
+void SessionEstimator::Store(JournalEntry entry) {
+  if (replaying_ || !outputs_.store) return;
+  static_cast<void>(outputs_.store(std::move(entry)));
+}
+
+void SessionEstimator::Replay(JournalEntry&& entry, const Switched& switched) {
+  replaying_ = true;
+  if (auto* const scan = std::get_if<ScanTaken>(&entry)) {
+    if (record_.ScanReceived(scan->stream.sensor_id, scan->scan->sequence) == SessionRecord::Arrival::kNew)
+      On(ScanArrival{scan->stream, std::move(scan->scan), std::nullopt, Clock::now()});
+  } else if (const auto* const refused = std::get_if<ScanRefused>(&entry)) {
+    if (record_.ScanReceived(refused->stream.sensor_id, refused->sequence) == SessionRecord::Arrival::kNew)
+      record_.ScanDropped(refused->stream.sensor_id, refused->sequence, refused->reason);
+  } else if (const auto* const odometry = std::get_if<OdometryTaken>(&entry)) {
+    ReplayOdometry(*odometry);
+  } else if (const auto* const owner = std::get_if<OwnerChanged>(&entry)) {
+    static_cast<void>(record_.AddSensors(owner->sensors));
+    static_cast<void>(record_.Resume(owner->client, owner->session));
+  } else if (const auto* const correction = std::get_if<CorrectionTaken>(&entry)) {
+    // A switch that was not completed before the server ended never happened.
+    if (switched(correction->epoch, correction->generation)) AdoptGrid(correction->epoch, FromStored(correction->grid));
+  } else if (const auto* const finished = std::get_if<SessionFinished>(&entry)) {
+    Finish finish;
+    finish.final = finished->final;
+    On(std::move(finish));
+    static_cast<void>(record_.SetPhase(SessionPhase::kEnded, finished->status));
+  }
+}
+
+void SessionEstimator::ReplayOdometry(const OdometryTaken& odometry) {
+  const std::uint64_t sequence = odometry.odometry.sequence;
+  if (!record_.OdometryReceived(sequence)) return;
+  if (odometry.fate == OdometryFate::kTaken) return On(OdometryArrival{odometry.stream, odometry.odometry, false});
+  record_.OdometryDropped(sequence,
+                          odometry.fate == OdometryFate::kMerged ? DropReason::kQueueFull : DropReason::kBadGeometry);
+}
+
+void SessionEstimator::Replayed() {
+  replaying_ = false;
+  GridChange change = TakeGridChange();
+  if (!change.chunks.empty()) outputs_.grid_changed(std::move(change));
+  RefreshLandmarks(true);
+}
+
 void SessionEstimator::Used(const Scan& scan, const slam::ScanOutcome& outcome) {
   const auto waiting = waiting_.find(&scan);
   const PoseReport report = ReportOf(scan, outcome, identity_.status.session, epoch_);
-  outputs_.send(report);
+  if (!replaying_) outputs_.send(report);
   const std::chrono::duration<double, std::milli> latency = Clock::now() - waiting->second.received;
   record_.ScanUsed(waiting->second.sensor_id, report, outcome.stamp, outcome.keyframe, latency.count());
   waiting_.erase(waiting);  // Only now: whatever fails before leaves it among those to be dropped.
-  if (outcome.keyframe) {
+  if (outcome.keyframe && !replaying_) {
     GridChange change = TakeGridChange();
     if (!change.chunks.empty()) outputs_.grid_changed(std::move(change));
     RefreshLandmarks(false);
@@ -145,15 +195,21 @@ void SessionEstimator::RefreshLandmarks(bool at_once) {
 }
 
 void SessionEstimator::On(Correction&& correction) {
-  slam::Mapper& mapper = pipeline_.mapper();
+  Store(CorrectionTaken{correction.epoch, correction.generation,
+                        ToStored(correction.grid.chunks, correction.grid.keyframes)});
   Adopted adopted{.session = identity_.id,
-                  .displaced = {PublishedChunks(), mapper.keyframe_count()},
+                  .displaced = {PublishedChunks(), pipeline_.mapper().keyframe_count()},
                   .change = {.session = identity_.id, .chunks = {}}};
-  mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), correction.grid.chunks), correction.grid.keyframes);
-  adopted.change.chunks = mapper.TakeGridChange();
-  epoch_ = correction.epoch;
-  record_.SetEpoch(epoch_);
+  AdoptGrid(correction.epoch, correction.grid);
+  adopted.change = TakeGridChange();
   correction.done(std::move(adopted));
+}
+
+void SessionEstimator::AdoptGrid(std::uint32_t epoch, const RobotGrid& grid) {
+  slam::Mapper& mapper = pipeline_.mapper();
+  mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), grid.chunks), grid.keyframes);
+  epoch_ = epoch;
+  record_.SetEpoch(epoch_);
 }
 
 void SessionEstimator::On(SnapshotWanted&& wanted) {
@@ -164,7 +220,10 @@ void SessionEstimator::On(SnapshotWanted&& wanted) {
 }
 
 void SessionEstimator::On(Finish&& finish) {
-  if (!ended_) {
+  // A session that is stored goes on with the next server where this one leaves it, as after a crash.
+  const bool goes_on = !finish.final && record_.state().durable;
+  if (!ended_ && !goes_on) {
+    if (finish.final) Store(SessionFinished{true, finish.reason});
     pipeline_.Finish();
     RefreshLandmarks(true);
     ended_ = finish.final;

@@ -16,10 +16,14 @@
 
 namespace cairn::server {
 
-// Where a session sends its results. Neither function waits.
+// Where a session sends its results. None of the functions waits.
 struct SessionOutputs {
   std::function<bool(OutboundValue)> send;
   std::function<void(GridChange&&)> grid_changed;
+  // Writes what the session consumes into its journal; whether it will be on the disk. Empty: nothing is stored.
+  std::function<bool(JournalEntry)> store = {};
+  // The session exists no more, and all of its changes were told. Empty: nobody wants to know.
+  std::function<void()> gone = {};
 };
 
 struct EstimatorSetup {
@@ -37,6 +41,13 @@ class SessionEstimator {
   void Discard(RobotEvent&& event);
   // Drops the scans inside the estimator.
   void DropWaiting();
+
+  // Takes what a server before this one has taken, in the same order: the estimator and the record become what they
+  // were, and nothing is sent. `switched` tells whether a switch of the map was completed (epoch, generation).
+  using Switched = std::function<bool(std::uint32_t epoch, std::uint64_t generation)>;
+  void Replay(JournalEntry&& entry, const Switched& switched);
+  // After the last entry: what was drawn goes to the map.
+  void Replayed();
 
  private:
   struct Waiting {
@@ -56,12 +67,16 @@ class SessionEstimator {
   GridChange TakeGridChange();
   slam::OccupancyGrid::Chunks PublishedChunks();
   void RefreshLandmarks(bool at_once);
+  void Store(JournalEntry entry);
+  void ReplayOdometry(const OdometryTaken& odometry);
+  void AdoptGrid(std::uint32_t epoch, const RobotGrid& grid);
 
   SessionRecord& record_;
   const SessionOutputs outputs_;
   const SessionSnapshot identity_;  // Names and id; its other parts are empty.
   std::uint32_t epoch_ = 0;
   bool ended_ = false;
+  bool replaying_ = false;
   SessionToken session_ = 0;                          // Of the last sample.
   std::unordered_map<const Scan*, Waiting> waiting_;  // Scans inside the pipeline; its pairing bounds them.
   std::chrono::steady_clock::time_point landmarks_refreshed_{};

@@ -8,6 +8,7 @@ SessionRecord::SessionRecord(SessionId id, const SessionRequest& request, const 
     : id_(id),
       ledger_period_(
           std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / options.ledger_rate_hz))),
+      gap_wait_(std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options.gap_wait_s))),
       history_(static_cast<std::size_t>(options.max_path_poses)),
       landmarks_(std::make_shared<const std::vector<LandmarkReport>>()) {
   const MutexLock lock(mutex_);
@@ -45,6 +46,7 @@ bool SessionRecord::AddSensors(const std::vector<std::string>& sensors) {
     if (!streams_.contains(sensor_id)) added.emplace(sensor_id, Stream{StreamLedger(NamesOf(sensor_id, sensor))});
   }
   if (streams_.size() + added.size() > kMaxSensors) return false;
+  for (auto& [sensor_id, stream] : added) stream.account.SetStored(status_.session.durable);
   streams_.merge(added);
   return true;
 }
@@ -54,6 +56,7 @@ void SessionRecord::Inherit(NameId sensor_id, StreamLedger&& account) {
   Stream* const stream = Find(sensor_id);
   if (stream == nullptr) return;
   account.Rename(stream->account.ledger());
+  account.SetStored(status_.session.durable);
   stream->account = std::move(account);
 }
 
@@ -71,6 +74,7 @@ SessionRecord::Arrival SessionRecord::ScanReceived(NameId sensor_id, std::uint64
   const MutexLock lock(mutex_);
   Stream* const stream = Find(sensor_id);
   if (stream == nullptr) return Arrival::kUnknownSensor;
+  if (LeftAside(*stream, sequence)) return Arrival::kAside;
   if (!stream->account.Received(sequence)) return Arrival::kDuplicate;
   stream->changed = true;
   return Arrival::kNew;
@@ -107,7 +111,7 @@ SessionRecord::Arrival SessionRecord::ForeignScan(NameId sensor_id, DropReason r
 
 bool SessionRecord::OdometryReceived(std::uint64_t sequence) {
   const MutexLock lock(mutex_);
-  if (!odometry_.account.Received(sequence)) return false;
+  if (LeftAside(odometry_, sequence) || !odometry_.account.Received(sequence)) return false;
   odometry_.changed = true;
   return true;
 }
@@ -122,6 +126,74 @@ void SessionRecord::OdometryDropped(std::uint64_t sequence, DropReason reason) {
   const MutexLock lock(mutex_);
   odometry_.account.Dropped(sequence, reason);
   odometry_.changed = true;
+}
+
+bool SessionRecord::LeftAside(Stream& stream, std::uint64_t sequence) const {
+  if (!stream.resuming) return false;
+  if (!stream.account.NextIs(sequence)) {
+    const auto now = Clock::now();
+    if (stream.aside == Clock::time_point{}) stream.aside = now;
+    if (now - stream.aside < gap_wait_) return true;
+    stream.resuming = false;
+  } else if (!stream.account.NextIs(sequence + 1)) {  // The awaited one, and no duplicate.
+    stream.resuming = false;
+  }
+  return false;
+}
+
+bool SessionRecord::SetStored(bool stored, const Status& why) {
+  const MutexLock lock(mutex_);
+  if (status_.session.durable == stored) return false;
+  status_.session.durable = stored;
+  if (!stored && status_.session.status.ok()) status_.session.status = why;
+  for (auto& [sensor_id, stream] : streams_) stream.account.SetStored(stored);
+  odometry_.account.SetStored(stored);
+  return true;
+}
+
+void SessionRecord::Durable(const std::vector<JournalEntry>& entries) {
+  const MutexLock lock(mutex_);
+  const auto scan = [this](const StreamId& of, std::uint64_t sequence) CAIRN_NO_THREAD_SAFETY_ANALYSIS {
+    Stream* const stream = of.session == status_.session.session ? Find(of.sensor_id) : nullptr;
+    if (stream == nullptr) return;
+    stream->account.Durable(sequence);
+    stream->changed = true;
+  };
+  for (const JournalEntry& entry : entries) {
+    if (const auto* const taken = std::get_if<ScanTaken>(&entry)) {
+      scan(taken->stream, taken->scan->sequence);
+    } else if (const auto* const refused = std::get_if<ScanRefused>(&entry)) {
+      scan(refused->stream, refused->sequence);
+    } else if (const auto* const odometry = std::get_if<OdometryTaken>(&entry)) {
+      if (odometry->stream.session != status_.session.session) continue;
+      odometry_.account.Durable(odometry->odometry.sequence);
+      odometry_.changed = true;
+    }
+  }
+}
+
+void SessionRecord::Restored() {
+  const MutexLock lock(mutex_);
+  status_.session.durable = true;
+  status_.alive = false;
+  if (status_.session.phase != SessionPhase::kEnded) {
+    status_.session.phase = SessionPhase::kSuspended;
+    status_.session.status = {StatusCode::kUnavailable, "the server was started again, and the robot is not back yet"};
+    suspended_ = Clock::now();
+  }
+  const auto restore = [](Stream& stream) {
+    stream.account.Restored();
+    stream.resuming = stream.changed = true;
+  };
+  for (auto& [sensor_id, stream] : streams_) restore(stream);
+  restore(odometry_);
+}
+
+std::vector<std::string> SessionRecord::sensors() const {
+  const MutexLock lock(mutex_);
+  std::vector<std::string> names;
+  for (const auto& [sensor_id, stream] : streams_) names.push_back(stream.account.ledger().sensor);
+  return names;
 }
 
 void SessionRecord::SetLandmarks(std::vector<LandmarkReport> landmarks) {
@@ -155,6 +227,8 @@ bool SessionRecord::Resume(ClientId client, SessionToken session) {
   if (status_.session.session != session) {
     for (auto& [sensor_id, stream] : streams_) stream.account.NewClient();
     odometry_.account.NewClient();
+    for (auto& [sensor_id, stream] : streams_) stream.resuming = false;
+    odometry_.resuming = false;
   }
   status_.session.client = client;
   status_.session.session = session;

@@ -17,6 +17,7 @@
 #include "server/robots/robots_options.h"
 #include "server/robots/session_snapshot.h"
 #include "server/robots/stream_ledger.h"
+#include "server/store/records.h"
 
 namespace cairn::server {
 
@@ -36,8 +37,9 @@ class SessionRecord {
 
   [[nodiscard]] bool Has(NameId sensor_id) const;
 
-  // A scan of the owner. kDuplicate and kUnknownSensor leave no trace here.
-  enum class Arrival { kNew, kDuplicate, kUnknownSensor };
+  // A scan of the owner. All but kNew leave no trace here. kAside: after a restart, earlier ones have to be sent again
+  // first (robots.gap_wait_s); this one will come again after them.
+  enum class Arrival { kNew, kDuplicate, kAside, kUnknownSensor };
   Arrival ScanReceived(NameId sensor_id, std::uint64_t sequence);
   void ScanDropped(NameId sensor_id, std::uint64_t sequence, DropReason reason);
   // `path_stamp` is the estimator's time, which grows also where the robot's clock was set back: the path is kept by
@@ -46,11 +48,19 @@ class SessionRecord {
   // A scan of a client that does not own the session.
   Arrival ForeignScan(NameId sensor_id, DropReason reason);
 
-  // Odometry of the owner; false for a number that was received before, which leaves no trace.
+  // Odometry of the owner; false for a number that was received before or is left aside, which leaves no trace.
   [[nodiscard]] bool OdometryReceived(std::uint64_t sequence);
   void OdometryUsed(std::uint64_t sequence, Stamp stamp);
   // kQueueFull: the sample was merged into its successor.
   void OdometryDropped(std::uint64_t sequence, DropReason reason);
+
+  // What was received is written to the disk, or is no longer, and then why. Says whether this is news.
+  bool SetStored(bool stored, const Status& why = {});
+  // These entries of the session's journal are on the disk.
+  void Durable(const std::vector<JournalEntry>& entries);
+  // Everything here was read from the disk; the robot is not back yet.
+  void Restored();
+  [[nodiscard]] std::vector<std::string> sensors() const;
 
   void SetLandmarks(std::vector<LandmarkReport> landmarks);
   // Another epoch of the map: the newest pose belongs to it from now on.
@@ -82,7 +92,10 @@ class SessionRecord {
     bool changed = true;
     std::uint64_t settled_when_taken = 0;
     Clock::time_point taken{};
+    bool resuming = false;      // After a restart, until the number after the last one comes.
+    Clock::time_point aside{};  // When the first sample was left aside.
   };
+  bool LeftAside(Stream& stream, std::uint64_t sequence) const;
   Ledger NamesOf(NameId sensor_id, const std::string& sensor) const CAIRN_REQUIRES(mutex_);
   static bool IsDue(const Stream& stream, Clock::time_point now, Urgency urgency, Clock::duration period);
   Ledger TakeLedger(Stream& stream, Clock::time_point now) const CAIRN_REQUIRES(mutex_);
@@ -91,6 +104,7 @@ class SessionRecord {
 
   const SessionId id_;
   const Clock::duration ledger_period_;
+  const Clock::duration gap_wait_;
 
   mutable Mutex mutex_;
   RobotStatus status_ CAIRN_GUARDED_BY(mutex_);           // Its `ledgers` stay empty: they are made on demand.

@@ -23,6 +23,7 @@ bool StreamLedger::Received(std::uint64_t sequence) {
       return false;
     }
     waiting_.insert(sequence);
+    if (stored_) undurable_.insert(sequence);
   }
   ++ledger_.received;
   ++ledger_.waiting;
@@ -52,6 +53,30 @@ void StreamLedger::DroppedForeign(DropReason reason) {
   ++ledger_.received;
   ++Count(ledger_, reason);
   ++settled_count_;
+}
+
+void StreamLedger::SetStored(bool stored) {
+  stored_ = stored;
+  if (!stored) undurable_.clear();
+}
+
+void StreamLedger::Durable(std::uint64_t sequence) {
+  if (stored_ && undurable_.erase(sequence) > 0) AdvanceDurable();
+}
+
+void StreamLedger::Restored() {
+  stored_ = true;
+  undurable_.clear();
+  AdvanceDurable();
+}
+
+bool StreamLedger::NextIs(std::uint64_t sequence) const {
+  return sequence <= ledger_.last_sequence + 1;
+}
+
+void StreamLedger::AdvanceDurable() {
+  const std::uint64_t through = undurable_.empty() ? ledger_.last_sequence : *undurable_.begin() - 1;
+  ledger_.durable_through = std::max(ledger_.durable_through, through);
 }
 
 void StreamLedger::Rename(const Ledger& names) {
@@ -103,6 +128,8 @@ void StreamLedger::BeginAt(std::uint64_t sequence) {
   first_sequence_ = sequence;
   ledger_.last_sequence = sequence;
   ledger_.settled_through = sequence - 1;
+  undurable_.clear();
+  ledger_.durable_through = stored_ ? sequence - 1 : 0;
 }
 
 void StreamLedger::Settle(std::uint64_t sequence) {

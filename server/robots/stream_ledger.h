@@ -37,6 +37,15 @@ class StreamLedger {
   // A scan of someone else's client under this stream's name: counted, its number means nothing here.
   void DroppedForeign(DropReason reason);
 
+  // Whether what is received from here on becomes durable; without, durable_through stands still.
+  void SetStored(bool stored);
+  // The sample is on the disk, and so is what became of it.
+  void Durable(std::uint64_t sequence);
+  // The account was restored from the disk: everything in it is durable, and what comes next should be the number after
+  // the last one (NextIs), because the client sends the rest again, in order.
+  void Restored();
+  [[nodiscard]] bool NextIs(std::uint64_t sequence) const;
+
   void Rename(const Ledger& names);
   // The next sample belongs to another session of the robot's client.
   void NewClient() { begun_ = false; }
@@ -52,12 +61,15 @@ class StreamLedger {
   bool FillGap(std::uint64_t sequence);
   void BeginAt(std::uint64_t sequence);
   void Settle(std::uint64_t sequence);
+  void AdvanceDurable();
 
   Ledger ledger_;
+  bool stored_ = false;
   bool begun_ = false;                // The client has sent a number before.
   std::uint64_t first_sequence_ = 0;  // The first number of the client; numbers missing before it are not lost.
   std::uint64_t settled_count_ = 0;
   std::set<std::uint64_t> waiting_;              // Numbers received and not settled; bounded by the robot's queue.
+  std::set<std::uint64_t> undurable_;            // Numbers received and not yet on the disk, where stored.
   std::map<std::uint64_t, std::uint64_t> gaps_;  // First missing number -> last missing number, disjoint.
   std::array<float, kLatencies> latencies_ms_{};
   std::size_t latency_count_ = 0;

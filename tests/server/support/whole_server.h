@@ -29,10 +29,12 @@ class WholeServer {
  public:
   static constexpr Generation kGeneration = 7;
 
-  explicit WholeServer(const ServerOptions& options = TestOptions())
+  // `journal`: the server takes up what its store holds, and stores its own state there.
+  explicit WholeServer(const ServerOptions& options = TestOptions(), Journal* journal = nullptr,
+                       Generation generation = kGeneration)
       : inbound_(static_cast<std::size_t>(options.server.inbound_capacity)),
         outbound_(static_cast<std::size_t>(options.server.outbound_capacity)),
-        server_(options, inbound_, outbound_, kGeneration) {
+        server_(options, inbound_, outbound_, generation, journal) {
     for (const auto lane : {Outbound::Lane::kLive, Outbound::Lane::kMap, Outbound::Lane::kReplies}) {
       readers_.emplace_back([this, lane] {
         while (auto value = outbound_.lane(lane).Pop()) Keep(std::move(*value));

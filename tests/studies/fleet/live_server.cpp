@@ -41,8 +41,8 @@ nlohmann::json PrintedBy(const ChildProcess::Outcome& outcome) {
 }
 
 LiveServer::LiveServer()
-    : server_(
-          {ProgramPath("cairnd"), "--domain", std::to_string(test::TestDomain()), "--set", "server.log_level=warn"}),
+    : server_({ProgramPath("cairnd"), "--domain", std::to_string(test::TestDomain()), "--state", ":memory:", "--set",
+               "server.log_level=warn"}),
       bus_(JoinDomain()),
       queries_(OrThrow(client::QueryClient::Create(*bus_, {.timeout_s = 20.0}))) {
   if (const auto version = queries_->Ping(); !version) throw std::runtime_error("cairnd: " + version.error().message);

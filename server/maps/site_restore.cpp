@@ -1,0 +1,120 @@
+// What a site stores and how it takes it up again (site.h).
+#include <memory>
+#include <utility>
+
+#include "server/maps/site.h"
+#include "server/maps/stored_grid.h"
+
+namespace cairn::server {
+namespace {
+
+StoredVersion StoredOf(const MapVersion& version) {
+  StoredVersion stored{.version = version.info.version,
+                       .job = version.info.job,
+                       .note = version.info.note,
+                       .parts = {},
+                       .smoothed = version.smoothed};
+  for (const auto& [session, part] : version.parts) stored.parts[session] = ToStored(part.chunks, part.keyframes);
+  return stored;
+}
+
+MapVersion VersionFrom(StoredVersion&& stored) {
+  MapVersion version;
+  version.info = {.version = stored.version, .enabled = false, .job = stored.job, .note = std::move(stored.note)};
+  for (const auto& [session, grid] : stored.parts) version.parts[session] = FromStored(grid);
+  version.smoothed = std::move(stored.smoothed);
+  return version;
+}
+
+}  // namespace
+
+void Site::StoreSite() {
+  if (journal_ == nullptr) return;
+  StoredSite stored{.name = name_,
+                    .epoch = epoch_,
+                    .tile_version = tile_version_,
+                    .next_version = versions_.next(),
+                    .enabled_version = versions_.enabled(),
+                    .switches = switches_,
+                    .members = {}};
+  for (const auto& [robot, member] : members_) stored.members[robot] = member.session;
+  journal_->Put({RecordKind::kSite, site_id_, 0}, [stored = std::move(stored)] { return BytesOf(stored); });
+}
+
+void Site::StoreVersion(std::uint32_t number) {
+  const MapVersion* const version = versions_.Find(number);
+  if (journal_ == nullptr || version == nullptr) return;
+  stored_versions_.insert(number);
+  journal_->Put({RecordKind::kMapVersion, site_id_, number}, [stored = StoredOf(*version)] { return BytesOf(stored); });
+}
+
+void Site::RemoveOldVersions() {
+  if (journal_ == nullptr) return;
+  std::erase_if(stored_versions_, [this](std::uint32_t number) {
+    if (versions_.Find(number) != nullptr) return false;
+    journal_->Remove({.kind = RecordKind::kMapVersion, .owner = site_id_, .first = number, .last = number});
+    return true;
+  });
+}
+
+void Site::StoreLayer(SessionId session) {
+  journal_->Put({RecordKind::kLayer, site_id_, session},
+                [layer = StoredLayer{session, ToStored(joint_.ChunksOf(session), 0)}] { return BytesOf(layer); });
+}
+
+void Site::Leave(SessionId session) {
+  if (journal_ == nullptr) return;
+  Run([session](Site& site) {
+    site.layers_.insert(session);
+    site.StoreLayer(session);
+    site.journal_->Forget(session);
+  });
+}
+
+bool Site::Switched(std::uint32_t epoch, Generation generation) const {
+  const auto made = switches_.find(epoch);
+  return made != switches_.end() && made->second == generation;
+}
+
+Result<void> Site::Restore(const StoredSite& stored) {
+  epoch_ = stored.epoch;
+  tile_version_ = stored.tile_version;
+  switches_ = stored.switches;
+  if (auto restored = RestoreVersions(stored); !restored) return restored;
+  if (auto restored = RestoreLayers(); !restored) return restored;
+  Render();
+  return {};
+}
+
+Result<void> Site::RestoreVersions(const StoredSite& stored) {
+  std::map<std::uint32_t, MapVersion> versions;
+  versions[1].info = {.version = 1, .enabled = false, .job = 0, .note = "live"};
+  const auto take = [&versions](std::uint64_t, std::string_view bytes) -> Result<void> {
+    auto version = VersionOf(bytes);
+    if (!version) return tl::unexpected(version.error());
+    const std::uint32_t number = version->version;
+    versions[number] = VersionFrom(std::move(*version));
+    return {};
+  };
+  auto read = journal_->store().Read({.kind = RecordKind::kMapVersion, .owner = site_id_}, take);
+  if (!read) return read;
+  if (!versions.contains(stored.enabled_version) || versions.rbegin()->first >= stored.next_version) {
+    return Fail(StatusCode::kDataLoss, "the store misses a map version of site '" + name_ + "'");
+  }
+  for (const auto& [number, version] : versions) stored_versions_.insert(number);
+  versions_.Restore(std::move(versions), stored.next_version, stored.enabled_version);
+  return {};
+}
+
+Result<void> Site::RestoreLayers() {
+  const auto take = [this](std::uint64_t, std::string_view bytes) -> Result<void> {
+    const auto layer = LayerOf(bytes);
+    if (!layer) return tl::unexpected(layer.error());
+    layers_.insert(layer->session);
+    joint_.Replace(layer->session, FromStored(layer->grid).chunks);
+    return {};
+  };
+  return journal_->store().Read({.kind = RecordKind::kLayer, .owner = site_id_}, take);
+}
+
+}  // namespace cairn::server

@@ -1,0 +1,26 @@
+#include "server/maps/stored_grid.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace cairn::server {
+
+StoredGrid ToStored(const slam::OccupancyGrid::Chunks& chunks, std::size_t keyframes) {
+  StoredGrid stored{.keyframes = keyframes, .chunks = {}};
+  for (const auto& [key, chunk] : chunks) {
+    stored.chunks.push_back({key.x, key.y, std::shared_ptr<const std::int16_t>(chunk, chunk->log_odds.data())});
+  }
+  return stored;
+}
+
+RobotGrid FromStored(const StoredGrid& stored) {
+  RobotGrid grid{.chunks = {}, .keyframes = static_cast<std::size_t>(stored.keyframes)};
+  for (const StoredChunk& one : stored.chunks) {
+    auto chunk = std::make_shared<slam::GridChunk>();
+    std::copy_n(one.cells.get(), chunk->log_odds.size(), chunk->log_odds.begin());
+    grid.chunks.emplace(slam::ChunkKey{one.x, one.y}, std::move(chunk));
+  }
+  return grid;
+}
+
+}  // namespace cairn::server

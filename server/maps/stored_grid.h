@@ -1,0 +1,13 @@
+// Grids as the store keeps them (server/store/records.h), and back. The cells are shared, not copied, on the way into
+// the store. Stateless, thread-safe.
+#pragma once
+
+#include "server/maps/robot_grid.h"
+#include "server/store/records.h"
+
+namespace cairn::server {
+
+[[nodiscard]] StoredGrid ToStored(const slam::OccupancyGrid::Chunks& chunks, std::size_t keyframes);
+[[nodiscard]] RobotGrid FromStored(const StoredGrid& stored);
+
+}  // namespace cairn::server

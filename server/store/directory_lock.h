@@ -1,0 +1,28 @@
+// Keeps a second process away from a directory: a lock on its file `lock`, which the kernel releases when the process
+// ends in whatever way. Source: flock(2). Thread rule: any thread.
+#pragma once
+
+#include <filesystem>
+#include <utility>
+
+#include "common/status.h"
+
+namespace cairn::server {
+
+class DirectoryLock {
+ public:
+  // ALREADY_EXISTS: another process holds it.
+  [[nodiscard]] static Result<DirectoryLock> Take(const std::filesystem::path& directory);
+  DirectoryLock() = default;  // Holds nothing.
+  DirectoryLock(DirectoryLock&& other) noexcept : file_(std::exchange(other.file_, -1)) {}
+  DirectoryLock& operator=(DirectoryLock&& other) noexcept {
+    std::swap(file_, other.file_);
+    return *this;
+  }
+  ~DirectoryLock();
+
+ private:
+  int file_ = -1;
+};
+
+}  // namespace cairn::server

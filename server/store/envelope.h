@@ -1,0 +1,36 @@
+// The bytes around every record: format version, packing and checksum. Stateless except for the compressor's memory,
+// which is reused. Not thread-safe.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "common/status.h"
+#include "server/store/store.h"
+
+namespace cairn::server {
+
+// The newest version of the messages in idl/cairn/record.proto that this server can read; it writes this version.
+inline constexpr std::uint32_t kRecordFormat = 1;
+// Longer records are refused when they are read: the size is a number in a file.
+inline constexpr std::uint64_t kMaxRecordBytes = std::uint64_t{1} << 30;
+
+class EnvelopeCodec {
+ public:
+  EnvelopeCodec();
+  ~EnvelopeCodec();
+  EnvelopeCodec(const EnvelopeCodec&) = delete;
+  EnvelopeCodec& operator=(const EnvelopeCodec&) = delete;
+
+  // `format` is a parameter for tests only.
+  [[nodiscard]] std::string Seal(const RecordKey& key, std::string_view content, std::uint32_t format = kRecordFormat);
+  // DATA_LOSS: the bytes are not what was sealed under this key. FAILED_PRECONDITION: a newer format.
+  [[nodiscard]] Result<std::string> Open(const RecordKey& key, std::string_view sealed);
+
+ private:
+  struct Compressor;
+  const std::unique_ptr<Compressor> compressor_;
+};
+
+}  // namespace cairn::server

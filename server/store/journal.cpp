@@ -1,0 +1,270 @@
+#include "server/store/journal.h"
+
+#include <algorithm>
+#include <exception>
+#include <utility>
+
+namespace cairn::server {
+namespace {
+
+constexpr auto kRetry = std::chrono::seconds(1);
+constexpr auto kBudgetPeriod = std::chrono::seconds(10);
+constexpr std::size_t kMaxDelays = 4096;
+
+// The cells of a grid are not counted: they are shared with the map.
+std::size_t SizeOf(const JournalEntry& entry) {
+  constexpr std::size_t kSmall = 256;
+  if (const auto* const scan = std::get_if<ScanTaken>(&entry)) {
+    return kSmall + sizeof(float) * scan->scan->ranges_m.size();
+  }
+  return kSmall;
+}
+
+RecordRange AllOf(RecordKind kind, std::uint64_t owner) {
+  return {.kind = kind, .owner = owner};
+}
+
+}  // namespace
+
+Journal::Journal(Store& store, const StoreOptions& options) : store_(store), options_(options) {}
+
+Journal::~Journal() {
+  Stop();
+}
+
+void Journal::Start() {
+  thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
+}
+
+void Journal::Stop() {
+  if (!thread_.joinable()) return;
+  thread_.request_stop();
+  {
+    const MutexLock lock(mutex_);
+    arrived_.NotifyAll();
+  }
+  thread_.join();
+}
+
+void Journal::Open(const StoredSession& session, Durable durable) {
+  const MutexLock lock(mutex_);
+  lines_[session.id] = Line{.next = 1, .durable = std::move(durable)};
+  const RecordKey key{RecordKind::kSession, session.id, 0};
+  // Position 0 of the session's line: whoever opened it is told as soon as it is on the disk.
+  if (!Push(Written{key, [session] { return BytesOf(session); }}, 1024)) lines_[session.id].lost = true;
+  urgent_ = true;
+}
+
+void Journal::Reopen(std::uint64_t session, std::uint64_t last, Durable durable) {
+  const MutexLock lock(mutex_);
+  lines_[session] = Line{.next = last + 1, .durable = std::move(durable)};
+}
+
+std::uint64_t Journal::Append(std::uint64_t session, JournalEntry entry) {
+  const std::size_t size = SizeOf(entry);
+  const MutexLock lock(mutex_);
+  const auto line = lines_.find(session);
+  if (line == lines_.end() || line->second.lost) return 0;
+  if (!Push(Appended{session, line->second.next, std::move(entry)}, size)) {
+    line->second.lost = true;
+    return 0;
+  }
+  return line->second.next++;
+}
+
+bool Journal::Checkpoint(std::uint64_t session, std::uint64_t position, Bytes bytes) {
+  const MutexLock lock(mutex_);
+  const auto line = lines_.find(session);
+  if (line == lines_.end() || line->second.lost || line->second.checkpointing) return false;
+  line->second.checkpointing = true;
+  checkpoints_.push_back({session, position, std::move(bytes)});
+  arrived_.NotifyAll();
+  return true;
+}
+
+void Journal::Forget(std::uint64_t session) {
+  const MutexLock lock(mutex_);
+  lines_.erase(session);
+  std::erase_if(checkpoints_, [session](const WantedCheckpoint& wanted) { return wanted.session == session; });
+  for (const RecordKind kind : {RecordKind::kSession, RecordKind::kJournal, RecordKind::kCheckpoint}) {
+    Push(AllOf(kind, session), 64);
+  }
+}
+
+void Journal::Put(const RecordKey& key, Bytes bytes, std::size_t size) {
+  const MutexLock lock(mutex_);
+  Push(Written{key, std::move(bytes)}, size);
+}
+
+void Journal::Remove(const RecordRange& range) {
+  const MutexLock lock(mutex_);
+  Push(range, 64);
+}
+
+bool Journal::Push(Change change, std::size_t size) {
+  if (queued_bytes_ + committing_bytes_ + size > static_cast<std::size_t>(options_.queue_mib) << 20) {
+    lost_ = "the disk was too slow or failed for too long, and a part of the state is no longer stored";
+    return false;
+  }
+  if (queue_.empty()) oldest_ = Clock::now();
+  queue_.push_back(std::move(change));
+  queued_bytes_ += size;
+  arrived_.NotifyAll();
+  return true;
+}
+
+JournalHealth Journal::health() const {
+  const MutexLock lock(mutex_);
+  const std::string& reason = disk_fault_.empty() ? lost_ : disk_fault_;
+  return {.degraded = !reason.empty(), .reason = reason};
+}
+
+JournalCounts Journal::counts() const {
+  const MutexLock lock(mutex_);
+  JournalCounts counts = counts_;
+  if (delays_ms_.empty()) return counts;
+  std::vector<float> sorted(delays_ms_.begin(), delays_ms_.end());
+  std::sort(sorted.begin(), sorted.end());
+  counts.delay_p50_ms = sorted[(sorted.size() - 1) / 2];
+  counts.delay_p99_ms = sorted[(sorted.size() - 1) * 99 / 100];
+  return counts;
+}
+
+void Journal::Run(const std::stop_token& stop) {
+  while (auto group = Next(stop)) {
+    const Clock::time_point oldest = group->oldest;
+    try {
+      Prepared prepared = Prepare(std::move(*group));
+      if (!stop.stop_requested()) BeginCheckpoint();
+      if (writing_) writing_->AddTo(prepared.changes);
+      if (!CommitPatiently(prepared.changes, stop)) return;
+      Tell(prepared, oldest);
+      if (writing_ && writing_->complete()) EndCheckpoint();
+      KeepBudget();
+    } catch (const std::exception& error) {  // For example, not enough memory for the group: the journal ends here.
+      const MutexLock lock(mutex_);
+      lost_ = std::string("the journal ended with an exception: ") + error.what();
+      for (auto& [session, line] : lines_) line.lost = true;
+      return;
+    }
+  }
+}
+
+std::optional<Journal::Group> Journal::Next(const std::stop_token& stop) {
+  const auto delay = std::chrono::milliseconds(options_.commit_delay_ms);
+  const MutexLock lock(mutex_);
+  while (queue_.empty() && checkpoints_.empty() && !writing_ && !stop.stop_requested()) arrived_.Wait(mutex_);
+  if (queue_.empty() && stop.stop_requested()) return std::nullopt;
+  const auto due = oldest_ + delay;
+  while (!queue_.empty() && !urgent_ && !writing_ && !stop.stop_requested() && Clock::now() < due)
+    arrived_.WaitUntil(mutex_, due);
+  urgent_ = false;
+  committing_bytes_ = std::exchange(queued_bytes_, 0);
+  return Group{std::exchange(queue_, {}), oldest_};
+}
+
+Journal::Prepared Journal::Prepare(Group&& group) {
+  Prepared prepared;
+  std::map<RecordKey, std::string> put;
+  auto& batches = prepared.batches;
+  for (Change& change : group.changes) {
+    if (auto* const appended = std::get_if<Appended>(&change)) {
+      Batch& batch = batches[appended->session];
+      if (batch.entries.empty()) batch.first = appended->position;
+      batch.entries.push_back(std::move(appended->entry));
+    } else if (const auto* const written = std::get_if<Written>(&change)) {
+      put[written->key] = written->bytes();
+      if (written->key.kind == RecordKind::kSession) batches.try_emplace(written->key.owner);
+    } else if (const auto* const range = std::get_if<RecordRange>(&change)) {
+      std::erase_if(put, [range](const auto& one) {
+        const RecordKey& key = one.first;
+        return key.kind == range->kind && key.owner == range->owner && key.number >= range->first &&
+               key.number <= range->last;
+      });
+      if (range->kind == RecordKind::kJournal) batches.erase(range->owner);
+      prepared.changes.removed.push_back(*range);
+    }
+  }
+  for (const auto& [session, batch] : batches) {
+    if (batch.entries.empty()) continue;
+    put[{RecordKind::kJournal, session, batch.first + batch.entries.size() - 1}] = BytesOf(batch.first, batch.entries);
+  }
+  for (auto& [key, bytes] : put) prepared.changes.put.push_back({key, std::move(bytes)});
+  return prepared;
+}
+
+void Journal::BeginCheckpoint() {
+  if (writing_) return;
+  WantedCheckpoint wanted;
+  {
+    const MutexLock lock(mutex_);
+    if (checkpoints_.empty()) return;
+    wanted = std::move(checkpoints_.front());
+    checkpoints_.pop_front();
+  }
+  writing_.emplace(wanted.session, wanted.position, wanted.bytes());
+}
+
+bool Journal::CommitOnce(const RecordChanges& changes) {
+  const auto committed = store_.Commit(changes);
+  const MutexLock lock(mutex_);
+  disk_fault_ = committed ? std::string() : committed.error().message;
+  ++(committed ? counts_.commits : counts_.failed_commits);
+  return committed.has_value();
+}
+
+bool Journal::CommitPatiently(const RecordChanges& changes, const std::stop_token& stop) {
+  while (!CommitOnce(changes)) {
+    const auto again = Clock::now() + kRetry;
+    const MutexLock lock(mutex_);
+    while (!stop.stop_requested() && Clock::now() < again) arrived_.WaitUntil(mutex_, again);
+    if (stop.stop_requested()) return false;
+  }
+  return true;
+}
+
+void Journal::Tell(const Prepared& prepared, Clock::time_point oldest) {
+  std::vector<std::pair<Durable, const Batch*>> told;
+  {
+    const MutexLock lock(mutex_);
+    committing_bytes_ = 0;
+    delays_ms_.push_back(std::chrono::duration<float, std::milli>(Clock::now() - oldest).count());
+    if (delays_ms_.size() > kMaxDelays) delays_ms_.pop_front();
+    for (const auto& [session, batch] : prepared.batches) {
+      counts_.entries += batch.entries.size();
+      const auto line = lines_.find(session);
+      if (line != lines_.end() && line->second.durable) told.emplace_back(line->second.durable, &batch);
+    }
+  }
+  for (const auto& [durable, batch] : told) durable(batch->entries);
+}
+
+void Journal::EndCheckpoint() {
+  const MutexLock lock(mutex_);
+  const auto line = lines_.find(writing_->session());
+  if (line != lines_.end()) {
+    line->second.checkpointing = false;
+    line->second.checkpointed = writing_->position();
+  }
+  writing_.reset();
+}
+
+void Journal::KeepBudget() {
+  if (Clock::now() - budget_checked_ < kBudgetPeriod) return;
+  budget_checked_ = Clock::now();
+  const auto limit = static_cast<std::uint64_t>(options_.max_gib * 1024.0 * 1024.0 * 1024.0);
+  std::map<std::uint64_t, std::uint64_t> checkpointed;
+  {
+    const MutexLock lock(mutex_);
+    for (const auto& [session, line] : lines_) checkpointed.emplace(session, line.checkpointed);
+  }
+  for (const auto& [session, position] : checkpointed) {
+    const auto used = store_.bytes_used();
+    if (!used || *used <= limit) return;
+    if (position == 0) continue;
+    CommitOnce(
+        {.removed = {{.kind = RecordKind::kJournal, .owner = session, .first = 0, .last = position}}, .put = {}});
+  }
+}
+
+}  // namespace cairn::server

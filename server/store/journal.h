@@ -1,0 +1,161 @@
+// Makes durable what the rooms hand over, in the order in which they do, without ever letting them wait for the disk.
+// A thread gathers what arrives within store.commit_delay_ms and commits it as one group; so the disk always holds
+// everything up to some moment and nothing after it. Only then are those who wait for it told.
+//
+// Overflow rule: the queue is bounded by bytes. While the disk fails, the group is tried again every second and the
+// queue fills. A session whose entry finds it full is no longer stored from there on, because a journal with a hole
+// could not be replayed; what was accepted before stays valid. The state is then `degraded` with the reason.
+// Thread rule: any thread; Start and Stop from one.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <thread>
+#include <variant>
+#include <vector>
+
+#include "common/mutex.h"
+#include "server/store/checkpoint_writer.h"
+#include "server/store/records.h"
+#include "server/store/store.h"
+#include "server/store/store_options.h"
+
+namespace cairn::server {
+
+struct JournalHealth {
+  bool degraded = false;
+  std::string reason;
+};
+
+// Since the start.
+struct JournalCounts {
+  std::uint64_t commits = 0;
+  std::uint64_t entries = 0;
+  std::uint64_t failed_commits = 0;
+  // From the arrival of the oldest change of a group until it was on the disk, over the last 4,096 groups.
+  double delay_p50_ms = 0.0;
+  double delay_p99_ms = 0.0;
+};
+
+class Journal {
+ public:
+  // Called on the journal's thread with the entries of the session that are on the disk now, in order; there may be none
+  // in the first call, which tells that the session itself is.
+  using Durable = std::function<void(const std::vector<JournalEntry>& entries)>;
+  // Called on the journal's thread to make a record's bytes.
+  using Bytes = std::function<std::string()>;
+
+  Journal(Store& store, const StoreOptions& options);
+  ~Journal();
+
+  void Start();
+  // Tries once to write what waits, and ends the thread.
+  void Stop();
+
+  // A new session, which is stored at once, or one that was restored up to `last`.
+  void Open(const StoredSession& session, Durable durable);
+  void Reopen(std::uint64_t session, std::uint64_t last, Durable durable);
+  // The position of the entry, from 1; 0 where it is not stored. `session` must be open.
+  std::uint64_t Append(std::uint64_t session, JournalEntry entry);
+  // The session's state as bytes, after exactly the entries up to `position`. False where one is being written.
+  bool Checkpoint(std::uint64_t session, std::uint64_t position, Bytes bytes);
+  // Removes everything of a session that will never be restored.
+  void Forget(std::uint64_t session);
+
+  // `size` is about what the bytes need, for the bound of the queue.
+  void Put(const RecordKey& key, Bytes bytes, std::size_t size = 1024);
+  void Remove(const RecordRange& range);
+
+  [[nodiscard]] Store& store() { return store_; }
+  [[nodiscard]] JournalHealth health() const;
+  [[nodiscard]] JournalCounts counts() const;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  struct Line {  // Of one open session.
+    std::uint64_t next = 1;
+    bool lost = false;
+    bool checkpointing = false;
+    std::uint64_t checkpointed = 0;  // Position of the newest complete checkpoint of this start.
+    Durable durable;
+  };
+  struct Appended {
+    std::uint64_t session = 0;
+    std::uint64_t position = 0;
+    JournalEntry entry;
+  };
+  struct Written {
+    RecordKey key;
+    Bytes bytes;
+  };
+  using Change = std::variant<Appended, Written, RecordRange>;
+  // What was taken from the queue to be committed together.
+  struct Group {
+    std::deque<Change> changes;
+    Clock::time_point oldest;
+  };
+  struct Batch {
+    std::uint64_t first = 0;
+    std::vector<JournalEntry> entries;
+  };
+  struct Prepared {
+    RecordChanges changes;
+    std::map<std::uint64_t, Batch> batches;  // By session; empty where only the session itself is new.
+  };
+  struct WantedCheckpoint {
+    std::uint64_t session = 0;
+    std::uint64_t position = 0;
+    Bytes bytes;
+  };
+
+  bool Push(Change change, std::size_t size) CAIRN_REQUIRES(mutex_);
+  void Run(const std::stop_token& stop);
+  std::optional<Group> Next(const std::stop_token& stop);
+  static Prepared Prepare(Group&& group);
+  void BeginCheckpoint() CAIRN_EXCLUDES(mutex_);
+  bool CommitOnce(const RecordChanges& changes);
+  bool CommitPatiently(const RecordChanges& changes, const std::stop_token& stop);
+  void Tell(const Prepared& prepared, Clock::time_point oldest);
+  void EndCheckpoint();
+  void KeepBudget();
+
+  Store& store_;
+  const StoreOptions options_;
+
+  mutable Mutex mutex_;
+  CondVar arrived_;
+  std::map<std::uint64_t, Line> lines_ CAIRN_GUARDED_BY(mutex_);
+  std::deque<Change> queue_ CAIRN_GUARDED_BY(mutex_);
+  std::size_t queued_bytes_ CAIRN_GUARDED_BY(mutex_) = 0;      // Of queue_.
+  std::size_t committing_bytes_ CAIRN_GUARDED_BY(mutex_) = 0;  // Of the group that is being committed.
+  Clock::time_point oldest_ CAIRN_GUARDED_BY(mutex_);
+  bool urgent_ CAIRN_GUARDED_BY(mutex_) = false;
+  std::string disk_fault_ CAIRN_GUARDED_BY(mutex_);  // Why the last commit failed; empty after one that succeeded.
+  std::string lost_ CAIRN_GUARDED_BY(mutex_);        // What can not be stored any more.
+  JournalCounts counts_ CAIRN_GUARDED_BY(mutex_);
+  std::deque<float> delays_ms_ CAIRN_GUARDED_BY(mutex_);
+  std::deque<WantedCheckpoint> checkpoints_ CAIRN_GUARDED_BY(mutex_);
+
+  // The thread's.
+  std::optional<CheckpointWriter> writing_;
+  Clock::time_point budget_checked_{};
+
+  std::jthread thread_;  // The last member: it stops before the members it uses are destroyed.
+};
+
+// Calls `visit` with every entry of the session's journal after `position`, in order. DATA_LOSS: an entry is damaged or
+// missing. Returns the last position.
+[[nodiscard]] Result<std::uint64_t> ReadJournal(
+    Store& store, std::uint64_t session, std::uint64_t position,
+    const std::function<Result<void>(std::uint64_t position, JournalEntry&& entry)>& visit);
+
+// The number of this start: larger than that of every start before on this store, at least `milliseconds` since 1970.
+// It is on the disk when this returns.
+[[nodiscard]] Result<std::uint64_t> NextGeneration(Store& store, std::uint64_t milliseconds);
+
+}  // namespace cairn::server

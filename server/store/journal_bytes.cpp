@@ -1,0 +1,137 @@
+// The bytes of a batch of journal entries (records.h).
+#include <utility>
+
+#include "server/store/record_values.h"
+
+namespace cairn::server {
+namespace {
+
+void FillEntry(record::Entry& to, const ScanTaken& from) {
+  record::Scan& scan = *to.mutable_scan();
+  Fill(*scan.mutable_stream(), from.stream);
+  scan.set_sequence(from.scan->sequence);
+  scan.set_stamp(from.scan->stamp);
+  scan.set_angle_first_rad(from.scan->angle_first_rad);
+  scan.set_angle_step_rad(from.scan->angle_step_rad);
+  scan.set_range_min_m(from.scan->range_min_m);
+  scan.set_range_max_m(from.scan->range_max_m);
+  scan.set_beam_period_s(from.scan->beam_period_s);
+  scan.set_tilt_rad(from.scan->tilt_rad);
+  Fill(*scan.mutable_t_robot_laser(), from.scan->T_robot_laser);
+  scan.mutable_ranges_m()->Add(from.scan->ranges_m.begin(), from.scan->ranges_m.end());
+}
+
+void FillEntry(record::Entry& to, const ScanRefused& from) {
+  record::RefusedScan& refused = *to.mutable_refused();
+  Fill(*refused.mutable_stream(), from.stream);
+  refused.set_sequence(from.sequence);
+  refused.set_reason(static_cast<std::uint32_t>(from.reason));
+}
+
+void FillEntry(record::Entry& to, const OdometryTaken& from) {
+  record::Odometry& odometry = *to.mutable_odometry();
+  Fill(*odometry.mutable_stream(), from.stream);
+  odometry.set_sequence(from.odometry.sequence);
+  odometry.set_stamp(from.odometry.stamp);
+  Fill(*odometry.mutable_t_odom_robot(), from.odometry.T_odom_robot);
+  odometry.set_fate(static_cast<std::uint32_t>(from.fate));
+}
+
+void FillEntry(record::Entry& to, const OwnerChanged& from) {
+  to.mutable_owner()->set_client(from.client);
+  to.mutable_owner()->set_session(from.session);
+  for (const std::string& sensor : from.sensors) to.mutable_owner()->add_sensors(sensor);
+}
+
+void FillEntry(record::Entry& to, const CorrectionTaken& from) {
+  to.mutable_correction()->set_epoch(from.epoch);
+  to.mutable_correction()->set_generation(from.generation);
+  Fill(*to.mutable_correction()->mutable_grid(), from.grid);
+}
+
+void FillEntry(record::Entry& to, const SessionFinished& from) {
+  to.mutable_finish()->set_final(from.final);
+  Fill(*to.mutable_finish()->mutable_status(), from.status);
+}
+
+Result<JournalEntry> ScanOf(const record::Scan& from) {
+  auto scan = std::make_shared<Scan>();
+  scan->sequence = from.sequence();
+  scan->stamp = from.stamp();
+  scan->angle_first_rad = from.angle_first_rad();
+  scan->angle_step_rad = from.angle_step_rad();
+  scan->range_min_m = from.range_min_m();
+  scan->range_max_m = from.range_max_m();
+  scan->beam_period_s = from.beam_period_s();
+  scan->tilt_rad = from.tilt_rad();
+  scan->T_robot_laser = ValueOf(from.t_robot_laser());
+  scan->ranges_m.assign(from.ranges_m().begin(), from.ranges_m().end());
+  // The estimator relies on it.
+  if (!ValidateScan(*scan)) return Unreadable("a scan");
+  return ScanTaken{ValueOf(from.stream()), std::move(scan)};
+}
+
+Result<JournalEntry> OdometryOf(const record::Odometry& from) {
+  const OdometryTaken taken{
+      ValueOf(from.stream()),
+      {.sequence = from.sequence(), .stamp = from.stamp(), .T_odom_robot = ValueOf(from.t_odom_robot())},
+      static_cast<OdometryFate>(from.fate())};
+  if (from.fate() > static_cast<std::uint32_t>(OdometryFate::kMerged)) return Unreadable("odometry");
+  if (taken.fate == OdometryFate::kTaken && !ValidateOdometry(taken.odometry)) return Unreadable("odometry");
+  return taken;
+}
+
+Result<JournalEntry> CorrectionOf(const record::Correction& from) {
+  auto grid = ValueOf(from.grid());
+  if (!grid) return tl::unexpected(grid.error());
+  return CorrectionTaken{from.epoch(), from.generation(), std::move(*grid)};
+}
+
+Result<JournalEntry> EntryOf(const record::Entry& from) {
+  switch (from.content_case()) {
+    case record::Entry::kScan:
+      return ScanOf(from.scan());
+    case record::Entry::kRefused:
+      if (from.refused().reason() >= static_cast<std::uint32_t>(kDropReasonCount)) return Unreadable("a refused scan");
+      return ScanRefused{ValueOf(from.refused().stream()), from.refused().sequence(),
+                         static_cast<DropReason>(from.refused().reason())};
+    case record::Entry::kOdometry:
+      return OdometryOf(from.odometry());
+    case record::Entry::kOwner:
+      return OwnerChanged{from.owner().client(),
+                          from.owner().session(),
+                          {from.owner().sensors().begin(), from.owner().sensors().end()}};
+    case record::Entry::kCorrection:
+      return CorrectionOf(from.correction());
+    case record::Entry::kFinish:
+      return SessionFinished{from.finish().final(), ValueOf(from.finish().status())};
+    case record::Entry::CONTENT_NOT_SET:
+      break;
+  }
+  return Unreadable("a journal entry");
+}
+
+}  // namespace
+
+std::string BytesOf(std::uint64_t first, const std::vector<JournalEntry>& entries) {
+  record::Batch batch;
+  batch.set_first(first);
+  for (const JournalEntry& entry : entries) {
+    std::visit([&added = *batch.add_entries()](const auto& content) { FillEntry(added, content); }, entry);
+  }
+  return batch.SerializeAsString();
+}
+
+Result<StoredBatch> BatchOf(std::string_view bytes) {
+  record::Batch from;
+  if (!from.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return Unreadable("a journal");
+  StoredBatch batch{.first = from.first(), .entries = {}};
+  for (const record::Entry& one : from.entries()) {
+    auto entry = EntryOf(one);
+    if (!entry) return tl::unexpected(entry.error());
+    batch.entries.push_back(std::move(*entry));
+  }
+  return batch;
+}
+
+}  // namespace cairn::server

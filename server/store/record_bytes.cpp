@@ -1,0 +1,183 @@
+// The bytes of all records but the journal (records.h).
+#include <cmath>
+#include <utility>
+
+#include "common/service/start_pose.h"
+#include "server/store/record_values.h"
+
+namespace cairn::server {
+namespace {
+
+template <typename Message>
+bool Parse(Message& message, std::string_view bytes) {
+  return message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+}
+
+void FillPath(record::MapVersion::SmoothedPath& to, const std::string& robot, const Trajectory& path) {
+  to.set_robot(robot);
+  for (const StampedPose& pose : path) {
+    to.add_stamps(pose.stamp);
+    to.add_poses(pose.T_map_robot.x);
+    to.add_poses(pose.T_map_robot.y);
+    to.add_poses(pose.T_map_robot.theta);
+  }
+}
+
+Result<std::shared_ptr<const Trajectory>> PathOf(const record::MapVersion::SmoothedPath& from) {
+  if (from.poses_size() != 3 * from.stamps_size()) return Unreadable("a path");
+  auto path = std::make_shared<Trajectory>();
+  for (int i = 0; i < from.stamps_size(); ++i) {
+    path->push_back({from.stamps(i), {from.poses(3 * i), from.poses(3 * i + 1), from.poses(3 * i + 2)}});
+  }
+  return path;
+}
+
+}  // namespace
+
+std::string BytesOf(const StoredSession& session) {
+  record::Session to;
+  to.set_id(session.id);
+  Fill(*to.mutable_request(), session.request);
+  to.set_map_epoch(session.map_epoch);
+  return to.SerializeAsString();
+}
+
+Result<StoredSession> SessionOf(std::string_view bytes) {
+  record::Session from;
+  if (!Parse(from, bytes)) return Unreadable("a session");
+  StoredSession session{.id = from.id(), .request = ValueOf(from.request()), .map_epoch = from.map_epoch()};
+  const bool valid = session.id != 0 && ValidateName("robot", session.request.robot) &&
+                     ValidateName("site", session.request.site) &&
+                     (!session.request.has_start || ValidateStart(session.request.T_map_robot_start));
+  if (!valid) return Unreadable("a session");
+  return session;
+}
+
+std::string BytesOf(const StoredVersion& version) {
+  record::MapVersion to;
+  to.set_version(version.version);
+  to.set_job(version.job);
+  to.set_note(version.note);
+  for (const auto& [session, grid] : version.parts) {
+    record::MapVersion::Part& part = *to.add_parts();
+    part.set_session(session);
+    Fill(*part.mutable_grid(), grid);
+  }
+  for (const auto& [robot, path] : version.smoothed) FillPath(*to.add_paths(), robot, *path);
+  return to.SerializeAsString();
+}
+
+Result<StoredVersion> VersionOf(std::string_view bytes) {
+  record::MapVersion from;
+  if (!Parse(from, bytes) || from.version() == 0) return Unreadable("a map version");
+  StoredVersion version;
+  version.version = from.version();
+  version.job = from.job();
+  version.note = from.note();
+  for (const record::MapVersion::Part& part : from.parts()) {
+    auto grid = ValueOf(part.grid());
+    if (!grid) return tl::unexpected(grid.error());
+    version.parts.emplace(part.session(), std::move(*grid));
+  }
+  for (const record::MapVersion::SmoothedPath& one : from.paths()) {
+    auto path = PathOf(one);
+    if (!path) return tl::unexpected(path.error());
+    version.smoothed.emplace(one.robot(), std::move(*path));
+  }
+  return version;
+}
+
+std::string BytesOf(const StoredSite& site) {
+  record::Site to;
+  to.set_name(site.name);
+  to.set_epoch(site.epoch);
+  to.set_tile_version(site.tile_version);
+  to.set_next_version(site.next_version);
+  to.set_enabled_version(site.enabled_version);
+  for (const auto& [epoch, generation] : site.switches) {
+    record::Site::Switch& made = *to.add_switches();
+    made.set_epoch(epoch);
+    made.set_generation(generation);
+  }
+  for (const auto& [robot_id, session] : site.members) {
+    record::Site::Member& member = *to.add_members();
+    member.set_robot_id(robot_id);
+    member.set_session(session);
+  }
+  return to.SerializeAsString();
+}
+
+Result<StoredSite> SiteOf(std::string_view bytes) {
+  record::Site from;
+  if (!Parse(from, bytes) || !ValidateName("site", from.name())) return Unreadable("a site");
+  if (from.enabled_version() == 0 || from.enabled_version() >= from.next_version()) return Unreadable("a site");
+  StoredSite site{.name = from.name(),
+                  .epoch = from.epoch(),
+                  .tile_version = from.tile_version(),
+                  .next_version = from.next_version(),
+                  .enabled_version = from.enabled_version(),
+                  .switches = {},
+                  .members = {}};
+  for (const auto& made : from.switches()) site.switches[made.epoch()] = made.generation();
+  for (const auto& member : from.members()) site.members[member.robot_id()] = member.session();
+  return site;
+}
+
+std::string BytesOf(const StoredLayer& layer) {
+  record::Layer to;
+  to.set_session(layer.session);
+  Fill(*to.mutable_grid(), layer.grid);
+  return to.SerializeAsString();
+}
+
+Result<StoredLayer> LayerOf(std::string_view bytes) {
+  record::Layer from;
+  if (!Parse(from, bytes)) return Unreadable("a part of a map");
+  auto grid = ValueOf(from.grid());
+  if (!grid) return tl::unexpected(grid.error());
+  return StoredLayer{from.session(), std::move(*grid)};
+}
+
+std::string BytesOf(const StoredJob& stored) {
+  const Job& job = stored.job;
+  record::Job to;
+  to.set_id(job.id);
+  to.set_site(job.site);
+  to.set_kind(static_cast<std::uint32_t>(job.kind));
+  to.set_state(static_cast<std::uint32_t>(job.state));
+  to.set_progress(job.progress);
+  to.set_cost_before(job.cost_before);
+  to.set_cost_after(job.cost_after);
+  to.set_map_version(job.map_version);
+  to.set_submitted(job.submitted);
+  to.set_started(job.started);
+  to.set_ended(job.ended);
+  to.set_message(job.message);
+  to.set_enable(stored.enable);
+  return to.SerializeAsString();
+}
+
+Result<StoredJob> JobOf(std::string_view bytes) {
+  record::Job from;
+  if (!Parse(from, bytes) || from.id() == 0) return Unreadable("a job");
+  if (from.kind() > static_cast<std::uint32_t>(JobKind::kSmooth)) return Unreadable("a job");
+  if (from.state() > static_cast<std::uint32_t>(JobState::kCancelled)) return Unreadable("a job");
+  StoredJob stored;
+  Job& job = stored.job;
+  job.id = from.id();
+  job.site = from.site();
+  job.kind = static_cast<JobKind>(from.kind());
+  job.state = static_cast<JobState>(from.state());
+  job.progress = from.progress();
+  job.cost_before = from.cost_before();
+  job.cost_after = from.cost_after();
+  job.map_version = from.map_version();
+  job.submitted = from.submitted();
+  job.started = from.started();
+  job.ended = from.ended();
+  job.message = from.message();
+  stored.enable = from.enable();
+  return stored;
+}
+
+}  // namespace cairn::server

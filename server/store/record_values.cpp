@@ -1,0 +1,91 @@
+#include "server/store/record_values.h"
+
+#include <bit>
+#include <cstring>
+#include <utility>
+
+#include "common/map/tile.h"
+
+namespace cairn::server {
+namespace {
+
+constexpr std::size_t kChunkBytes = sizeof(std::int16_t) * static_cast<std::size_t>(kTileArea);
+static_assert(std::endian::native == std::endian::little, "cells are stored as they lie in memory");
+
+}  // namespace
+
+void Fill(record::Pose& to, const Pose2& from) {
+  to.set_x(from.x);
+  to.set_y(from.y);
+  to.set_theta(from.theta);
+}
+
+void Fill(record::Stream& to, const StreamId& from) {
+  to.set_robot_id(from.robot_id);
+  to.set_sensor_id(from.sensor_id);
+  to.set_session(from.session);
+}
+
+void Fill(record::Status& to, const Status& from) {
+  to.set_code(static_cast<int>(from.code));
+  to.set_message(from.message);
+}
+
+void Fill(record::SessionRequest& to, const SessionRequest& from) {
+  to.set_robot(from.robot);
+  to.set_site(from.site);
+  for (const std::string& sensor : from.sensors) to.add_sensors(sensor);
+  to.set_client(from.client);
+  to.set_has_start(from.has_start);
+  Fill(*to.mutable_t_map_robot_start(), from.T_map_robot_start);
+  to.set_session(from.session);
+}
+
+void Fill(record::Grid& to, const StoredGrid& from) {
+  to.set_keyframes(from.keyframes);
+  for (const StoredChunk& chunk : from.chunks) {
+    record::GridChunk& added = *to.add_chunks();
+    added.set_x(chunk.x);
+    added.set_y(chunk.y);
+    added.set_log_odds(chunk.cells.get(), kChunkBytes);
+  }
+}
+
+Pose2 ValueOf(const record::Pose& from) {
+  return {from.x(), from.y(), from.theta()};
+}
+
+StreamId ValueOf(const record::Stream& from) {
+  return {.robot_id = from.robot_id(), .sensor_id = from.sensor_id(), .session = from.session()};
+}
+
+Status ValueOf(const record::Status& from) {
+  return {static_cast<StatusCode>(from.code()), from.message()};
+}
+
+SessionRequest ValueOf(const record::SessionRequest& from) {
+  SessionRequest request;
+  request.robot = from.robot();
+  request.site = from.site();
+  request.sensors.assign(from.sensors().begin(), from.sensors().end());
+  request.client = from.client();
+  request.has_start = from.has_start();
+  request.T_map_robot_start = ValueOf(from.t_map_robot_start());
+  request.session = from.session();
+  return request;
+}
+
+Result<StoredGrid> ValueOf(const record::Grid& from) {
+  StoredGrid grid;
+  grid.keyframes = from.keyframes();
+  for (const record::GridChunk& chunk : from.chunks()) {
+    if (chunk.log_odds().size() != kChunkBytes) return Unreadable("a part of a grid");
+    auto cells = std::make_shared<std::vector<std::int16_t>>(static_cast<std::size_t>(kTileArea));
+    std::memcpy(cells->data(), chunk.log_odds().data(), kChunkBytes);
+    const std::int16_t* const first = cells->data();
+    grid.chunks.push_back({chunk.x(), chunk.y(), std::shared_ptr<const std::int16_t>(std::move(cells), first)});
+  }
+  return grid;
+}
+
+}  // namespace cairn::server

@@ -1,0 +1,124 @@
+// What the server keeps, as values of the rooms' language, and their bytes (idl/cairn/record.proto). This room knows no
+// estimator: grids are shared arrays of cells, checkpoints are bytes. Reading checks what the rooms rely on, because a
+// file may contain anything. Stateless, thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "common/sensor/trajectory.h"
+#include "common/service/job.h"
+#include "common/service/ledger.h"
+#include "common/service/session.h"
+#include "common/service/stream.h"
+
+namespace cairn::server {
+
+// A robot's grid: for each chunk its place and kTileArea cells of log odds. The cells are immutable and shared.
+struct StoredChunk {
+  int x = 0;
+  int y = 0;
+  std::shared_ptr<const std::int16_t> cells;
+};
+struct StoredGrid {
+  std::uint64_t keyframes = 0;
+  std::vector<StoredChunk> chunks;
+};
+
+// The entries of a session's journal: what its strand consumed, in this order.
+struct ScanTaken {
+  StreamId stream;
+  std::shared_ptr<const Scan> scan;
+};
+// Counted, never estimated.
+struct ScanRefused {
+  StreamId stream;
+  std::uint64_t sequence = 0;
+  DropReason reason = DropReason::kNoOdometry;
+};
+enum class OdometryFate : std::uint8_t { kTaken = 0, kRefused = 1, kMerged = 2 };
+struct OdometryTaken {
+  StreamId stream;
+  Odometry odometry;
+  OdometryFate fate = OdometryFate::kTaken;
+};
+// From now on this client owns the session and streams these sensors, and those named before, under its token.
+struct OwnerChanged {
+  ClientId client = 0;
+  SessionToken session = 0;
+  std::vector<std::string> sensors;
+};
+// A grid from a finished job was adopted. Kept as data, because the job is not run again when a journal is replayed.
+struct CorrectionTaken {
+  std::uint32_t epoch = 0;
+  std::uint64_t generation = 0;
+  StoredGrid grid;
+};
+struct SessionFinished {
+  bool final = true;
+  Status status;
+};
+using JournalEntry =
+    std::variant<ScanTaken, ScanRefused, OdometryTaken, OwnerChanged, CorrectionTaken, SessionFinished>;
+
+struct StoredSession {
+  std::uint64_t id = 0;
+  SessionRequest request;
+  std::uint32_t map_epoch = 0;
+};
+
+struct StoredVersion {
+  std::uint32_t version = 0;
+  std::uint64_t job = 0;
+  std::string note;
+  std::map<std::uint64_t, StoredGrid> parts;  // By session id.
+  std::map<std::string, std::shared_ptr<const Trajectory>> smoothed;
+};
+
+struct StoredSite {
+  std::string name;
+  std::uint32_t epoch = 0;
+  std::uint64_t tile_version = 0;
+  std::uint32_t next_version = 2;
+  std::uint32_t enabled_version = 1;
+  std::map<std::uint32_t, std::uint64_t> switches;  // Epoch -> generation of the server that began it.
+  std::map<NameId, std::uint64_t> members;          // Robot -> the session that draws for it.
+};
+
+struct StoredLayer {
+  std::uint64_t session = 0;
+  StoredGrid grid;
+};
+
+struct StoredJob {
+  Job job;
+  bool enable = true;  // Whether to enable the map version that it makes.
+};
+
+[[nodiscard]] std::string BytesOf(std::uint64_t first, const std::vector<JournalEntry>& entries);
+[[nodiscard]] std::string BytesOf(const StoredSession& session);
+[[nodiscard]] std::string BytesOf(const StoredVersion& version);
+[[nodiscard]] std::string BytesOf(const StoredSite& site);
+[[nodiscard]] std::string BytesOf(const StoredLayer& layer);
+[[nodiscard]] std::string BytesOf(const StoredJob& job);
+
+// DATA_LOSS: the bytes are no such record, or hold values that no server writes.
+struct StoredBatch {
+  std::uint64_t first = 0;
+  std::vector<JournalEntry> entries;
+};
+[[nodiscard]] Result<StoredBatch> BatchOf(std::string_view bytes);
+[[nodiscard]] Result<StoredSession> SessionOf(std::string_view bytes);
+[[nodiscard]] Result<StoredVersion> VersionOf(std::string_view bytes);
+[[nodiscard]] Result<StoredSite> SiteOf(std::string_view bytes);
+[[nodiscard]] Result<StoredLayer> LayerOf(std::string_view bytes);
+[[nodiscard]] Result<StoredJob> JobOf(std::string_view bytes);
+
+}  // namespace cairn::server

@@ -1,0 +1,23 @@
+// The embedded store: one SQLite database in a directory, `cairn.db`, with a write-ahead log beside it. Every commit is
+// flushed to the disk. One process at a time: the directory is locked while the store is open, and the kernel takes the
+// lock back when the process ends, also by SIGKILL. Sources: sqlite.org/wal.html, flock(2). Thread rule: any thread.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "server/store/store.h"
+
+namespace cairn::server {
+
+// The place of a store that lives in memory and ends with the process.
+inline constexpr std::string_view kInMemory = ":memory:";
+
+// Makes the directory where it is missing. ALREADY_EXISTS: another process uses it. FAILED_PRECONDITION: a newer server
+// has written it. DATA_LOSS: it is not a store, or it is damaged. UNAVAILABLE: it cannot be written.
+// `vfs` names the file system of SQLite, for tests that make it fail; empty: the default.
+[[nodiscard]] Result<std::unique_ptr<Store>> OpenStore(const std::filesystem::path& directory,
+                                                       const std::string& vfs = {});
+
+}  // namespace cairn::server

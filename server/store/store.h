@@ -1,0 +1,76 @@
+// Records on disk: bytes under a key, written in groups that are on the disk completely or not at all. What the bytes
+// mean is said in records.h. Every record carries its format version and a checksum over key and content, so that
+// damaged bytes are an error and never wrong data. This is the one interface of the store; the embedded one is SQLite
+// (sqlite_store.h), and keys are plain numbers so that another database can take its place. Thread rule: any thread;
+// Commit waits for the disk, so nothing that must not wait calls it (journal.h).
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/status.h"
+
+namespace cairn::server {
+
+// Numbers on disk: never renumber.
+enum class RecordKind : std::uint8_t {
+  kServer = 0,      // Owner 0, number 0.
+  kSession = 1,     // Owner: session id.
+  kJournal = 2,     // Owner: session id; number: position of the last entry.
+  kCheckpoint = 3,  // Owner: session id; number: see checkpoint_writer.h.
+  kSite = 4,        // Owner: HashName of the site.
+  kMapVersion = 5,  // Owner: HashName of the site; number: the version.
+  kLayer = 6,       // Owner: HashName of the site; number: session id.
+  kJob = 7,         // Owner: job id.
+};
+
+struct RecordKey {
+  RecordKind kind = RecordKind::kServer;
+  std::uint64_t owner = 0;
+  std::uint64_t number = 0;
+  auto operator<=>(const RecordKey&) const = default;
+};
+
+struct Record {
+  RecordKey key;
+  std::string bytes;
+};
+
+// The records of one kind and owner with numbers first..last.
+struct RecordRange {
+  RecordKind kind = RecordKind::kServer;
+  std::uint64_t owner = 0;
+  std::uint64_t first = 0;
+  std::uint64_t last = UINT64_MAX;
+};
+
+// What one commit changes: first the removals, then the new or replaced records.
+struct RecordChanges {
+  std::vector<RecordRange> removed;
+  std::vector<Record> put;
+};
+
+class Store {
+ public:
+  // Called with a number and the record's bytes; an error ends the reading and is returned.
+  using Visit = std::function<Result<void>(std::uint64_t number, std::string_view bytes)>;
+
+  virtual ~Store() = default;
+
+  // Returns when all changes are on the disk. After an error none of them is visible; the same changes may be tried
+  // again. RESOURCE_EXHAUSTED: the disk is full. UNAVAILABLE: any other failure of the disk.
+  virtual Result<void> Commit(const RecordChanges& changes) = 0;
+  // Visits records in the order of their numbers. DATA_LOSS: a record is damaged. FAILED_PRECONDITION: a newer server
+  // has written it.
+  virtual Result<void> Read(const RecordRange& range, const Visit& visit) = 0;
+  // Who owns records of this kind, ascending.
+  virtual Result<std::vector<std::uint64_t>> Owners(RecordKind kind) = 0;
+  // What the records use on the disk.
+  virtual Result<std::uint64_t> bytes_used() = 0;
+};
+
+}  // namespace cairn::server

@@ -1,0 +1,17 @@
+// Options of the store. Where it is kept is said on the command line (--state), because it belongs to the machine.
+#pragma once
+
+#include <cstdint>
+
+#include "common/options/option_visitor.h"
+
+namespace cairn::server {
+
+struct StoreOptions {
+  std::int64_t commit_delay_ms = 100;
+  std::int64_t queue_mib = 64;
+  double max_gib = 20.0;
+};
+void Visit(OptionVisitor& visitor, StoreOptions& options);
+
+}  // namespace cairn::server

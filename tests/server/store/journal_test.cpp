@@ -1,0 +1,242 @@
+#include "server/store/journal.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <thread>
+
+#include "server/store/sqlite_store.h"
+#include "tests/server/store/faulty_vfs.h"
+#include "tests/server/store/sample_entries.h"
+#include "tests/temp_directory.h"
+
+namespace cairn::server {
+namespace {
+
+using testing::DiskFault;
+using testing::FaultyVfs;
+using testing::SampleOdometry;
+using testing::SampleScan;
+using testing::SampleSession;
+
+template <typename Condition>
+bool Soon(const Condition& condition) {
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (std::chrono::steady_clock::now() < deadline) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return false;
+}
+
+// The positions of a session's entries in the store.
+std::uint64_t StoredEntries(Store& store, std::uint64_t session) {
+  std::uint64_t count = 0;
+  const auto last = ReadJournal(store, session, 0, [&count](std::uint64_t position, JournalEntry&&) -> Result<void> {
+    EXPECT_EQ(position, ++count);
+    return {};
+  });
+  EXPECT_TRUE(last) << last.error().message;
+  return count;
+}
+
+struct Followed {
+  std::atomic<std::int64_t> through{-1};  // -1: not even the session itself.
+  Journal::Durable durable() {
+    return [this](const std::vector<JournalEntry>& entries) {
+      through = std::max<std::int64_t>(through, 0) + static_cast<std::int64_t>(entries.size());
+    };
+  }
+};
+
+TEST(Journal, TellsOnlyWhatIsOnTheDisk) {
+  const auto store = *OpenStore(std::string(kInMemory));
+  Followed first, second;
+  Journal journal(*store, {.commit_delay_ms = 5});
+  journal.Start();
+  journal.Open(SampleSession(1), first.durable());
+  journal.Open(SampleSession(2), second.durable());
+  for (std::uint64_t i = 1; i <= 300; ++i) {
+    EXPECT_EQ(journal.Append(1, SampleScan(i)), i);
+    EXPECT_TRUE(i % 3 != 0 || journal.Append(2, SampleOdometry(i)) == i / 3);
+    if (i % 50 == 0) {
+      const auto told = first.through.load();
+      EXPECT_GE(static_cast<std::int64_t>(StoredEntries(*store, 1)), told);
+    }
+  }
+  EXPECT_TRUE(Soon([&] { return first.through == 300 && second.through == 100; }));
+  EXPECT_EQ(StoredEntries(*store, 1), 300U);
+  EXPECT_EQ(StoredEntries(*store, 2), 100U);
+  EXPECT_FALSE(journal.health().degraded);
+  EXPECT_EQ(journal.counts().entries, 400U);
+  EXPECT_EQ(journal.Append(3, SampleOdometry(1)), 0U);  // No such session.
+}
+
+TEST(Journal, GathersWhatComesWithinTheDelayIntoOneCommit) {
+  const auto store = *OpenStore(std::string(kInMemory));
+  Journal journal(*store, {.commit_delay_ms = 10000});
+  journal.Start();
+  Followed told;
+  journal.Open(SampleSession(1), told.durable());
+  EXPECT_TRUE(Soon([&] { return told.through == 0; }));  // A new session does not wait for the delay.
+  for (std::uint64_t i = 1; i <= 100; ++i) journal.Append(1, SampleOdometry(i));
+  journal.Stop();  // What waits is written.
+  EXPECT_EQ(told.through, 100);
+  EXPECT_EQ(journal.counts().commits, 2U);
+  EXPECT_EQ(StoredEntries(*store, 1), 100U);
+}
+
+TEST(Journal, TheSessionGoesOnAfterTheLastPositionWhenItIsOpenedAgain) {
+  const TempDirectory directory;
+  for (std::uint64_t start = 0; start < 3; ++start) {
+    const auto store = *OpenStore(directory.path());
+    Journal journal(*store, {});
+    journal.Start();
+    if (start == 0) {
+      journal.Open(SampleSession(1), {});
+    } else {
+      journal.Reopen(1, StoredEntries(*store, 1), {});
+    }
+    for (std::uint64_t i = 1; i <= 10; ++i) EXPECT_EQ(journal.Append(1, SampleScan(i)), 10 * start + i);
+    journal.Stop();
+    EXPECT_EQ(StoredEntries(*store, 1), 10 * (start + 1));
+  }
+}
+
+TEST(Journal, AHoleInAJournalIsFound) {
+  const auto store = *OpenStore(std::string(kInMemory));
+  for (const std::uint64_t first : {1, 4}) {
+    ASSERT_TRUE(store->Commit(
+        {.removed = {},
+         .put = {{{RecordKind::kJournal, 1, first + 1}, BytesOf(first, {SampleScan(1), SampleScan(2)})}}}));
+  }
+  std::uint64_t visited = 0;
+  const auto read = ReadJournal(*store, 1, 0, [&](std::uint64_t, JournalEntry&&) -> Result<void> {
+    ++visited;
+    return {};
+  });
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().code, StatusCode::kDataLoss);
+  EXPECT_NE(read.error().message.find("misses entries 3 to 3"), std::string::npos) << read.error().message;
+  EXPECT_EQ(visited, 2U);
+}
+
+TEST(Journal, WhileTheDiskFailsItIsDegradedAndGoesOnWhenTheDiskDoes) {
+  for (const DiskFault fault : {DiskFault::kFull, DiskFault::kSyncError, DiskFault::kReadOnly}) {
+    const TempDirectory directory;
+    FaultyVfs vfs;
+    const auto store = *OpenStore(directory.path(), FaultyVfs::name());
+    Journal journal(*store, {.commit_delay_ms = 1});
+    journal.Start();
+    Followed told;
+    journal.Open(SampleSession(1), told.durable());
+    journal.Append(1, SampleScan(1));
+    ASSERT_TRUE(Soon([&] { return told.through == 1; }));
+    vfs.Set(fault);
+    EXPECT_EQ(journal.Append(1, SampleScan(2)), 2U);
+    ASSERT_TRUE(Soon([&] { return journal.health().degraded; }));
+    EXPECT_FALSE(journal.health().reason.empty());
+    EXPECT_EQ(journal.Append(1, SampleScan(3)), 3U);  // Nobody waits for the disk.
+    EXPECT_EQ(told.through, 1);
+    vfs.Set(DiskFault::kNone);
+    ASSERT_TRUE(Soon([&] { return told.through == 3; }));
+    EXPECT_FALSE(journal.health().degraded);
+    EXPECT_EQ(StoredEntries(*store, 1), 3U);
+  }
+}
+
+TEST(Journal, ASessionThatFindsTheQueueFullIsNotStoredFromThereOn) {
+  const TempDirectory directory;
+  FaultyVfs vfs;
+  std::uint64_t accepted = 0;
+  {
+    const auto store = *OpenStore(directory.path(), FaultyVfs::name());
+    Journal journal(*store, {.commit_delay_ms = 1, .queue_mib = 1});
+    journal.Start();
+    Followed told;
+    journal.Open(SampleSession(1), told.durable());
+    ASSERT_TRUE(Soon([&] { return told.through == 0; }));
+    vfs.Set(DiskFault::kFull);
+    for (std::uint64_t i = 1; i < 3000; ++i) {
+      const std::uint64_t position = journal.Append(1, SampleScan(i));
+      if (position == 0) break;
+      accepted = position;
+    }
+    ASSERT_LT(accepted, 2000U);
+    ASSERT_GT(accepted, 500U);
+    vfs.Set(DiskFault::kNone);
+    ASSERT_TRUE(Soon([&] { return told.through == static_cast<std::int64_t>(accepted); }));
+    // There is room again, but the session has a hole.
+    EXPECT_EQ(journal.Append(1, SampleScan(9000)), 0U);
+    EXPECT_TRUE(journal.health().degraded);
+    EXPECT_NE(journal.health().reason.find("no longer stored"), std::string::npos) << journal.health().reason;
+  }
+  EXPECT_EQ(StoredEntries(**OpenStore(directory.path()), 1), accepted);
+}
+
+std::string LargeState(std::uint64_t seed, std::size_t size) {
+  std::string bytes(size, '\0');
+  std::uint64_t x = seed;
+  for (char& c : bytes) {
+    x = x * 6364136223846793005ULL + 1442695040888963407ULL;
+    c = static_cast<char>(x >> 56);
+  }
+  return bytes;
+}
+
+TEST(Journal, ACheckpointIsWholeOrTheOneBeforeIsTaken) {
+  const TempDirectory directory;
+  const auto store = *OpenStore(directory.path());
+  Journal journal(*store, {.commit_delay_ms = 1});
+  journal.Start();
+  journal.Open(SampleSession(1), {});
+  for (std::uint64_t i = 1; i <= 5; ++i) journal.Append(1, SampleScan(i));
+  EXPECT_FALSE(*ReadCheckpoint(*store, 1));
+  const auto checkpoint_at = [&](std::uint64_t position, std::size_t size) {
+    ASSERT_TRUE(journal.Checkpoint(1, position, [position, size] { return LargeState(position, size); }));
+    EXPECT_TRUE(Soon([&] {
+      const auto newest = ReadCheckpoint(*store, 1);
+      return newest && *newest && (*newest)->position == position;
+    }));
+    EXPECT_EQ((*ReadCheckpoint(*store, 1))->bytes, LargeState(position, size));
+  };
+  checkpoint_at(2, 9'500'000);
+  ASSERT_TRUE(Soon([&] { return journal.Checkpoint(1, 4, [] { return LargeState(4, 100); }); }));
+  ASSERT_TRUE(Soon([&] { return (*ReadCheckpoint(*store, 1))->position == 4; }));
+  // A crash in the middle of a third one leaves parts of it.
+  CheckpointWriter torn(1, 5, LargeState(5, 9'000'000));
+  RecordChanges changes;
+  torn.AddTo(changes);
+  ASSERT_FALSE(torn.complete());
+  ASSERT_TRUE(store->Commit(changes));
+  EXPECT_EQ((*ReadCheckpoint(*store, 1))->position, 4U);
+  EXPECT_EQ((*ReadCheckpoint(*store, 1))->bytes, LargeState(4, 100));
+  journal.Stop();
+  // What comes after a checkpoint is read from there on.
+  std::vector<std::uint64_t> after;
+  ASSERT_TRUE(ReadJournal(*store, 1, 4, [&](std::uint64_t position, JournalEntry&&) -> Result<void> {
+    after.push_back(position);
+    return {};
+  }));
+  EXPECT_EQ(after, std::vector<std::uint64_t>{5});
+}
+
+TEST(Journal, WhatIsForgottenIsGone) {
+  const auto store = *OpenStore(std::string(kInMemory));
+  Journal journal(*store, {.commit_delay_ms = 10000});
+  journal.Start();
+  journal.Open(SampleSession(1), {});
+  journal.Append(1, SampleScan(1));
+  journal.Forget(1);
+  journal.Put({RecordKind::kSite, 4, 0}, [] { return std::string("new"); });
+  journal.Remove({.kind = RecordKind::kSite, .owner = 4});
+  journal.Put({RecordKind::kSite, 5, 0}, [] { return std::string("new"); });
+  journal.Stop();
+  EXPECT_TRUE(store->Owners(RecordKind::kSession)->empty());
+  EXPECT_TRUE(store->Owners(RecordKind::kJournal)->empty());
+  EXPECT_EQ(*store->Owners(RecordKind::kSite), std::vector<std::uint64_t>{5});
+}
+
+}  // namespace
+}  // namespace cairn::server

@@ -1,0 +1,114 @@
+#include "server/store/records.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+
+#include "tests/server/store/sample_entries.h"
+
+namespace cairn::server {
+namespace {
+
+using testing::OneOfEach;
+using testing::SampleGrid;
+using testing::SampleSession;
+
+TEST(Records, AJournalComesBackWithTheSameBytes) {
+  const std::vector<JournalEntry> entries = OneOfEach();
+  const std::string bytes = BytesOf(41, entries);
+  const auto batch = BatchOf(bytes);
+  ASSERT_TRUE(batch) << batch.error().message;
+  EXPECT_EQ(batch->first, 41U);
+  ASSERT_EQ(batch->entries.size(), entries.size());
+  for (std::size_t i = 0; i < entries.size(); ++i) EXPECT_EQ(batch->entries[i].index(), entries[i].index());
+  EXPECT_EQ(BytesOf(41, batch->entries), bytes);
+}
+
+TEST(Records, EveryFieldOfAScanAndOfOdometryIsKept) {
+  const auto batch = BatchOf(BytesOf(1, {testing::SampleScan(8), testing::SampleOdometry(9)}));
+  ASSERT_TRUE(batch);
+  const ScanTaken wanted = testing::SampleScan(8);
+  const auto& got = std::get<ScanTaken>(batch->entries[0]);
+  EXPECT_EQ(got.stream.robot_id, wanted.stream.robot_id);
+  EXPECT_EQ(got.stream.sensor_id, wanted.stream.sensor_id);
+  EXPECT_EQ(got.scan->sequence, 8U);
+  EXPECT_EQ(got.scan->stamp, wanted.scan->stamp);
+  EXPECT_EQ(got.scan->angle_first_rad, wanted.scan->angle_first_rad);
+  EXPECT_EQ(got.scan->angle_step_rad, wanted.scan->angle_step_rad);
+  EXPECT_EQ(got.scan->range_min_m, wanted.scan->range_min_m);
+  EXPECT_EQ(got.scan->range_max_m, wanted.scan->range_max_m);
+  EXPECT_EQ(got.scan->beam_period_s, wanted.scan->beam_period_s);
+  EXPECT_EQ(got.scan->tilt_rad, wanted.scan->tilt_rad);
+  EXPECT_EQ(got.scan->T_robot_laser.theta, 0.3);
+  ASSERT_EQ(got.scan->ranges_m.size(), wanted.scan->ranges_m.size());
+  EXPECT_EQ(std::memcmp(got.scan->ranges_m.data(), wanted.scan->ranges_m.data(), 4 * got.scan->ranges_m.size()), 0);
+  const auto& odometry = std::get<OdometryTaken>(batch->entries[1]).odometry;
+  EXPECT_EQ(odometry.sequence, 9U);
+  EXPECT_EQ(odometry.T_odom_robot.x, 1.0);
+  EXPECT_TRUE(std::signbit(odometry.T_odom_robot.y));
+}
+
+TEST(Records, SessionsSitesVersionsLayersAndJobsComeBack) {
+  const auto session = SessionOf(BytesOf(SampleSession(5)));
+  ASSERT_TRUE(session);
+  EXPECT_EQ(session->request.robot, "r5");
+  EXPECT_EQ(session->request.T_map_robot_start.y, 2.0);
+  EXPECT_EQ(session->map_epoch, 3U);
+
+  const StoredSite site{.name = "lab",
+                        .epoch = 2,
+                        .tile_version = 90,
+                        .next_version = 4,
+                        .enabled_version = 3,
+                        .switches = {{1, 100}, {2, 101}},
+                        .members = {{HashName("r5"), 5}}};
+  const auto site_back = SiteOf(BytesOf(site));
+  ASSERT_TRUE(site_back);
+  EXPECT_EQ(site_back->switches, site.switches);
+  EXPECT_EQ(site_back->members, site.members);
+  EXPECT_EQ(site_back->tile_version, 90U);
+
+  StoredVersion version{.version = 3, .job = 8, .note = "smoothed", .parts = {{5, SampleGrid(1)}}, .smoothed = {}};
+  version.smoothed["r5"] = std::make_shared<const Trajectory>(Trajectory{{10, {1, 2, 3}}, {20, {4, 5, 6}}});
+  const auto version_back = VersionOf(BytesOf(version));
+  ASSERT_TRUE(version_back);
+  EXPECT_EQ(version_back->note, "smoothed");
+  EXPECT_EQ(version_back->parts.at(5).keyframes, 12U);
+  EXPECT_EQ(version_back->parts.at(5).chunks.at(1).cells.get()[5], 2);
+  EXPECT_EQ(version_back->smoothed.at("r5")->at(1).T_map_robot.y, 5.0);
+
+  const auto layer = LayerOf(BytesOf(StoredLayer{6, SampleGrid(2)}));
+  ASSERT_TRUE(layer);
+  EXPECT_EQ(layer->session, 6U);
+  EXPECT_EQ(layer->grid.chunks.size(), 2U);
+
+  StoredJob job;
+  job.job = {.id = 4, .site = "lab", .state = JobState::kRunning, .progress = 0.5, .message = "m"};
+  job.enable = false;
+  const auto job_back = JobOf(BytesOf(job));
+  ASSERT_TRUE(job_back);
+  EXPECT_EQ(job_back->job.state, JobState::kRunning);
+  EXPECT_FALSE(job_back->enable);
+}
+
+// A file may contain anything; the estimator relies on valid scans.
+TEST(Records, ValuesThatNoServerWritesAreRefused) {
+  auto scan = std::make_shared<Scan>(*testing::SampleScan(1).scan);
+  scan->angle_step_rad = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(BatchOf(BytesOf(1, {ScanTaken{testing::SampleStream(), scan}})));
+  OdometryTaken odometry = testing::SampleOdometry(1);
+  odometry.odometry.T_odom_robot.x = std::numeric_limits<double>::infinity();
+  EXPECT_FALSE(BatchOf(BytesOf(1, {odometry})));
+  StoredSession nameless = SampleSession(1);
+  nameless.request.robot = "a/b";
+  EXPECT_FALSE(SessionOf(BytesOf(nameless)));
+  StoredSite impossible;
+  impossible.name = "lab";
+  impossible.enabled_version = impossible.next_version;
+  EXPECT_FALSE(SiteOf(BytesOf(impossible)));
+  EXPECT_FALSE(VersionOf("\xff\xff\xff"));
+}
+
+}  // namespace
+}  // namespace cairn::server

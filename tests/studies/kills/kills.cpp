@@ -1,0 +1,126 @@
+// cairn-study kills ends a cairnd with SIGKILL a thousand times under robots that drive, and compares what they were
+// told with a server that nobody kills. Then it measures what being durable costs. Times are wall-clock times, so no
+// other program should run on the machine.
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+
+#include "tests/studies/fleet/live_server.h"
+#include "tests/studies/study.h"
+#include "tests/system/killed_fleet.h"
+#include "tests/temp_directory.h"
+#include "tests/test_domain.h"
+
+namespace cairn::studies {
+namespace {
+
+double At(std::vector<double> values, double share) {
+  if (values.empty()) return 0.0;
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+}
+
+void Add(test::KilledFleetOutcome& all, const test::KilledFleetOutcome& one) {
+  all.kills += one.kills;
+  all.sent += one.sent;
+  all.lost += one.lost;
+  all.doubled += one.doubled;
+  all.poses += one.poses;
+  all.wrongly_localized += one.wrongly_localized;
+  all.paths_that_differ += one.paths_that_differ;
+  all.ready_s.insert(all.ready_s.end(), one.ready_s.begin(), one.ready_s.end());
+  all.tracking_s.insert(all.tracking_s.end(), one.tracking_s.begin(), one.tracking_s.end());
+}
+
+void StudyKills(StudyContext& context) {
+  const int wanted = context.Pick(1000, 20);
+  test::KilledFleetOutcome all;
+  for (std::uint64_t round = 0; all.kills < wanted; ++round) {
+    const TempDirectory directory;
+    test::KilledFleetOptions options;
+    options.cairnd = ProgramPath("cairnd");
+    options.cairn = ProgramPath("cairn");
+    options.directory = directory.path();
+    options.robots = 4;
+    options.seconds = context.Pick(180.0, 40.0);
+    options.kills = wanted - all.kills;
+    options.seed = context.seed + round;
+    const test::KilledFleetOutcome one = test::RunKilledFleet(options);
+    if (one.kills == 0) return context.report.Fault("no kill was possible");
+    Add(all, one);
+    context.report.Progress(Count(all.kills) + " kills, " + Count(static_cast<long long>(all.lost)) + " scans lost");
+  }
+  Report& report = context.report;
+  report.Heading("SIGKILL under four robots");
+  Table table({"kills", "scans sent", "lost", "doubled", "poses told", "wrongly localized", "paths that differ",
+               "answers after p50 (s)", "p99 (s)", "all robots have poses after p50 (s)", "p99 (s)"});
+  table.Add({Count(all.kills), Count(static_cast<long long>(all.sent)), Count(static_cast<long long>(all.lost)),
+             Count(static_cast<long long>(all.doubled)), Count(static_cast<long long>(all.poses)),
+             Count(static_cast<long long>(all.wrongly_localized)), Count(all.paths_that_differ),
+             Number(At(all.ready_s, 0.5), 2), Number(At(all.ready_s, 0.99), 2), Number(At(all.tracking_s, 0.5), 2),
+             Number(At(all.tracking_s, 0.99), 2)});
+  report.Add(table, "kills");
+  report.Expect(all.lost == 0 && all.doubled == 0, "scans were lost or used twice");
+  report.Expect(all.wrongly_localized == 0, "a robot was localized at a wrong place");
+  report.Expect(all.paths_that_differ == 0, "paths differ from those of an undisturbed server");
+}
+
+// Processor time that a process has used, in seconds: fields 14 and 15 of /proc/PID/stat (proc(5)).
+double CpuSeconds(pid_t pid) {
+  std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
+  std::string text((std::istreambuf_iterator<char>(file)), {});
+  std::istringstream fields(text.substr(text.rfind(')') + 2));
+  std::string skipped;
+  for (int i = 3; i < 14; ++i) fields >> skipped;
+  double user = 0.0, system = 0.0;
+  fields >> user >> system;
+  return (user + system) / static_cast<double>(sysconf(_SC_CLK_TCK));
+}
+
+struct Cost {
+  double cpu_s = 0.0;
+  std::string store_line;  // What the server says of its store at the end.
+};
+
+Cost CostOf(const std::string& state, int seconds) {
+  const std::string domain = std::to_string(test::TestDomain());
+  ChildProcess server({ProgramPath("cairnd"), "--domain", domain, "--state", state});
+  if (!server.Says(" ready")) throw std::runtime_error("cairnd does not start: " + server.Wait().output);
+  const double before = CpuSeconds(server.pid());
+  ChildProcess fleet({ProgramPath("cairn"), "sim", "--site", "cost", "--robots", "4", "--beams", "360", "--hz", "10",
+                      "--world", "building", "--seconds", std::to_string(seconds), "--domain", domain, "--json"});
+  static_cast<void>(PrintedBy(fleet.Wait(LiveServer::kDeadline)));
+  Cost cost{CpuSeconds(server.pid()) - before, {}};
+  server.Signal(SIGTERM);
+  const std::string output = server.Wait().output;
+  if (const auto found = output.find("store: "); found != std::string::npos)
+    cost.store_line = output.substr(found, output.find('\n', found) - found);
+  return cost;
+}
+
+void StudyCost(StudyContext& context) {
+  Report& report = context.report;
+  report.Heading("What being durable costs: four robots at 10 Hz, 360 beams");
+  const int seconds = context.Pick(120, 10);
+  Table table({"state", "processor time (s)", "store"});
+  const TempDirectory directory;
+  const Cost without = CostOf("none", seconds);
+  const Cost with = CostOf((directory / "state").string(), seconds);
+  table.Add({"none", Number(without.cpu_s, 2), "-"});
+  table.Add({"on disk", Number(with.cpu_s, 2), with.store_line});
+  report.Add(table, "cost");
+  report.Text("Being durable costs " + Percent(with.cpu_s / without.cpu_s - 1.0) + " more processor time.");
+}
+
+void StudyAll(StudyContext& context) {
+  if (context.Wants("kills")) StudyKills(context);
+  if (context.Wants("cost")) StudyCost(context);
+}
+
+const Registration kKills("kills", "SIGKILL a thousand times under robots that drive, and the cost of being durable",
+                          StudyAll);
+
+}  // namespace
+}  // namespace cairn::studies

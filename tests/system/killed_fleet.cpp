@@ -1,0 +1,233 @@
+#include "tests/system/killed_fleet.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <stdexcept>
+
+#include "common/mutex.h"
+#include "common/sensor/trajectory.h"
+#include "common/service/pose_report.h"
+#include "common/wire/bus.h"
+#include "tests/child_process.h"
+#include "tests/test_domain.h"
+
+namespace cairn::test {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using nlohmann::json;
+
+constexpr double kWrong_m = 0.5;
+constexpr std::chrono::seconds kLongest{600};
+
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+json ObjectPrintedBy(const ChildProcess::Outcome& outcome) {
+  const std::size_t start = outcome.output.rfind("\n{");
+  const std::size_t begin = start == std::string::npos ? 0 : start + 1;
+  json object = json::parse(outcome.output.substr(begin, outcome.output.find('\n', begin) - begin), nullptr, false);
+  if (outcome.exit_code != 0 || !object.is_object())
+    throw std::runtime_error(fmt::format("exit code {}: {}", outcome.exit_code, outcome.output));
+  return object;
+}
+
+template <typename T>
+T OrThrow(Result<T> result) {
+  if (!result) throw std::runtime_error(result.error().message);
+  return std::move(*result);
+}
+
+// Everything that is told of the robots' poses, compared with the truth.
+class Witness {
+ public:
+  explicit Witness(std::map<std::string, Trajectory> truth) : truth_(std::move(truth)) {
+    wire::WireOptions options;
+    options.domain = TestDomain();
+    bus_ = OrThrow(wire::Bus::Create(options, "witness"));
+    poses_ = OrThrow(bus_->Subscribe<PoseReport>([this](PoseReport&& pose) { Take(pose); }, {}));
+  }
+  ~Witness() { poses_.reset(); }
+
+  void CountInto(KilledFleetOutcome& outcome) {
+    const MutexLock lock(mutex_);
+    outcome.poses += seen_;
+    outcome.wrongly_localized += wrong_;
+  }
+  // How many robots have had a pose of the newest generation.
+  [[nodiscard]] int RobotsWithPoses() {
+    const MutexLock lock(mutex_);
+    return static_cast<int>(
+        std::count_if(newest_.begin(), newest_.end(), [this](const auto& one) { return one.second == generation_; }));
+  }
+  // From now on only poses of a later generation count.
+  void Killed() {
+    const MutexLock lock(mutex_);
+    ++generation_;
+  }
+
+ private:
+  void Take(const PoseReport& pose) {
+    const MutexLock lock(mutex_);
+    ++seen_;
+    generation_ = std::max(generation_, pose.generation);
+    newest_[pose.robot] = std::max(newest_[pose.robot], pose.generation);
+    const auto truth = PoseOn(truth_.at(pose.robot), pose.stamp, 1.0);
+    if (!pose.localized || !truth) return;
+    if ((pose.T_map_robot.translation() - truth->translation()).norm() > kWrong_m) ++wrong_;
+  }
+
+  const std::map<std::string, Trajectory> truth_;
+  Mutex mutex_;
+  std::uint64_t seen_ CAIRN_GUARDED_BY(mutex_) = 0, wrong_ CAIRN_GUARDED_BY(mutex_) = 0;
+  Generation generation_ CAIRN_GUARDED_BY(mutex_) = 0;
+  std::map<std::string, Generation> newest_ CAIRN_GUARDED_BY(mutex_);
+  std::unique_ptr<wire::Bus> bus_;
+  std::unique_ptr<wire::Subscription> poses_;
+};
+
+class Drive {
+ public:
+  explicit Drive(const KilledFleetOptions& options) : options_(options), random_(options.seed) {
+    MakeLogs();
+    for (int i = 1; i <= options.robots; ++i) {
+      const std::string robot = "robot" + std::to_string(i);
+      truth_[robot] = OrThrow(ReadTum(options_.directory / "truth" / (robot + ".tum")));
+    }
+  }
+
+  KilledFleetOutcome Run() {
+    KilledFleetOutcome outcome;
+    const auto undisturbed = Replay("undisturbed", nullptr);
+    const auto killed = Replay("killed", &outcome);
+    for (const auto& [robot, calm] : undisturbed) {
+      const Result& other = killed.at(robot);
+      outcome.sent += other.sent;
+      outcome.lost += calm.used > other.used ? calm.used - other.used : 0;
+      outcome.doubled += other.used > calm.used ? other.used - calm.used : 0;
+      outcome.lost += static_cast<std::uint64_t>(std::max<std::int64_t>(0, other.unexplained));
+      outcome.doubled += static_cast<std::uint64_t>(std::max<std::int64_t>(0, -other.unexplained));
+      outcome.paths_that_differ += SamePath(calm.path, other.path) ? 0 : 1;
+    }
+    return outcome;
+  }
+
+ private:
+  struct Result {
+    std::uint64_t sent = 0, used = 0;
+    std::int64_t unexplained = 0;  // Scans sent and in no account; negative where more were counted than sent.
+    Trajectory path;
+  };
+
+  static bool SamePath(const Trajectory& a, const Trajectory& b) {
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const StampedPose& x, const StampedPose& y) {
+      return x.stamp == y.stamp && x.T_map_robot == y.T_map_robot;
+    });
+  }
+
+  [[nodiscard]] std::string Domain() const { return std::to_string(TestDomain()); }
+  std::unique_ptr<ChildProcess> Start(std::vector<std::string> arguments) const {
+    arguments.insert(arguments.begin(), options_.cairn);
+    arguments.insert(arguments.end(), {"--domain", Domain(), "--json"});
+    return std::make_unique<ChildProcess>(std::move(arguments));
+  }
+
+  void MakeLogs() const {
+    static_cast<void>(ObjectPrintedBy(
+        Start({"sim", "--no-stream", "--world", "office", "--robots", std::to_string(options_.robots), "--hz", "10",
+               "--beams", "181", "--seconds", fmt::format("{}", options_.seconds), "--log-dir",
+               (options_.directory / "logs").string(), "--truth-dir", (options_.directory / "truth").string()})
+            ->Wait(kLongest)));
+  }
+
+  void StartServer(const std::string& state) {
+    server_ = std::make_unique<ChildProcess>(std::vector<std::string>{options_.cairnd, "--domain", Domain(), "--state",
+                                                                      (options_.directory / state).string(), "--set",
+                                                                      "slam.particles=20"});
+    if (!server_->Says(" ready")) throw std::runtime_error("cairnd does not start: " + server_->Wait().output);
+  }
+
+  std::vector<std::unique_ptr<ChildProcess>> StartRobots(bool at_once) {
+    std::vector<std::unique_ptr<ChildProcess>> robots;
+    for (const auto& [robot, truth] : truth_) {
+      const Pose2& start = truth.front().T_map_robot;
+      std::vector<std::string> replay = {"replay",  (options_.directory / "logs" / (robot + ".log")).string(),
+                                         "--site",  "office",
+                                         "--robot", robot,
+                                         "--start", fmt::format("{:.9f},{:.9f},{:.9f}", start.x, start.y, start.theta)};
+      // How fast the scans come changes nothing.
+      if (at_once) replay.push_back("--fast");
+      if (!at_once) replay.insert(replay.end(), {"--rate", fmt::format("{}", options_.rate)});
+      robots.push_back(Start(std::move(replay)));
+    }
+    return robots;
+  }
+
+  static int Driving(const std::vector<std::unique_ptr<ChildProcess>>& robots) {
+    return static_cast<int>(std::count_if(robots.begin(), robots.end(), [](const auto& robot) {
+      return robot->RunningAfter(std::chrono::milliseconds(0));
+    }));
+  }
+
+  void Kill(const std::vector<std::unique_ptr<ChildProcess>>& robots, Witness& witness, KilledFleetOutcome& outcome) {
+    std::uniform_real_distribution<double> up_s(0.0, options_.most_up_s);
+    const auto end = Clock::now() + std::chrono::duration<double>(up_s(random_));
+    while (Clock::now() < end && Driving(robots) > 0) usleep(1000);
+    server_->Signal(SIGKILL);
+    server_->Wait();
+    witness.Killed();
+    ++outcome.kills;
+    const auto start = Clock::now();
+    StartServer("killed");
+    outcome.ready_s.push_back(SecondsSince(start));
+    if (outcome.kills % 4 != 0) return;  // Most kills do not wait until everybody is back.
+    const auto patience = Clock::now() + std::chrono::seconds(20);
+    while (witness.RobotsWithPoses() < Driving(robots) && Clock::now() < patience) usleep(1000);
+    if (Driving(robots) == options_.robots) outcome.tracking_s.push_back(SecondsSince(start));
+  }
+
+  // Kills where there is an outcome to count into.
+  std::map<std::string, Result> Replay(const std::string& state, KilledFleetOutcome* outcome) {
+    Witness witness(truth_);
+    StartServer(state);
+    const auto robots = StartRobots(outcome == nullptr);
+    while (outcome != nullptr && outcome->kills < options_.kills && Driving(robots) == options_.robots)
+      Kill(robots, witness, *outcome);
+    std::map<std::string, Result> results;
+    auto process = robots.begin();
+    for (const auto& [robot, truth] : truth_) {
+      const json account = ObjectPrintedBy((*process++)->Wait(kLongest));
+      Result& result = results[robot];
+      result.sent = account.at("sent");
+      result.used = account.at("used");
+      result.unexplained = account.at("unexplained");
+      const std::string file = (options_.directory / (state + "-" + robot + ".tum")).string();
+      static_cast<void>(ObjectPrintedBy(Start({"path", robot, "-o", file})->Wait(kLongest)));
+      result.path = OrThrow(ReadTum(file));
+    }
+    if (outcome != nullptr) witness.CountInto(*outcome);
+    server_->Signal(SIGTERM);
+    if (const auto ended = server_->Wait(); ended.exit_code != 0) throw std::runtime_error("cairnd: " + ended.output);
+    return results;
+  }
+
+  const KilledFleetOptions options_;
+  std::mt19937_64 random_;
+  std::map<std::string, Trajectory> truth_;
+  std::unique_ptr<ChildProcess> server_;
+};
+
+}  // namespace
+
+KilledFleetOutcome RunKilledFleet(const KilledFleetOptions& options) {
+  return Drive(options).Run();
+}
+
+}  // namespace cairn::test

@@ -1,0 +1,39 @@
+// Robots that replay simulated logs to a cairnd which is killed with SIGKILL at random moments and started again on its
+// state, beside the same robots and a cairnd that nobody kills. For the test (20 kills) and the study (1,000).
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace cairn::test {
+
+struct KilledFleetOptions {
+  std::string cairnd;  // Paths of the programs.
+  std::string cairn;
+  std::filesystem::path directory;  // Exists; everything is written there.
+  int robots = 2;
+  double seconds = 30.0;   // Of each log.
+  double rate = 1.0;       // How much faster than the robots drove.
+  int kills = 20;          // At most: no robot is left to be disturbed when the logs are at their ends.
+  double most_up_s = 1.2;  // A server lives at most this long after it is ready.
+  std::uint64_t seed = 1;
+};
+
+struct KilledFleetOutcome {
+  int kills = 0;
+  std::uint64_t sent = 0;
+  std::uint64_t lost = 0;               // Scans that the undisturbed server used and the killed one did not.
+  std::uint64_t doubled = 0;            // Scans that were used or counted more than once.
+  std::uint64_t poses = 0;              // Poses told while the fleet drove.
+  std::uint64_t wrongly_localized = 0;  // Of these, called localized and more than 0.5 m beside the truth.
+  int paths_that_differ = 0;            // Robots whose path is not the undisturbed one to the last bit.
+  std::vector<double> ready_s;          // From each start after a kill until the server answers.
+  std::vector<double> tracking_s;       // ... until all robots that still drive get poses from it.
+};
+
+// Throws std::runtime_error where a program cannot be started or fails.
+[[nodiscard]] KilledFleetOutcome RunKilledFleet(const KilledFleetOptions& options);
+
+}  // namespace cairn::test
