@@ -103,9 +103,9 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
     constexpr long double kPatienceS = 0.1L;
     static_cast<void>(writer_->wait_for_acknowledgments(eprosima::fastrtps::Duration_t(kPatienceS)));
     used_.clear();
+    // Late joiners get the last sample of each key from the writer that knows it.
     for (auto& [key, sample] : live_) {
-      // Late joiners get the last sample of each key from the writer that knows it.
-      if (!Topic<Value>::kProfile.transient_local || (*writer)->write(&sample)) used_.insert(key);
+      if (Topic<Value>::kProfile.transient_local && (*writer)->write(&sample)) used_.insert(key);
     }
     writer_ = std::move(*writer);
   }

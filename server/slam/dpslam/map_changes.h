@@ -82,8 +82,9 @@ struct ChangeTile {
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     archive(self.key, self.list, self.all);
-    constexpr int kMostRead = 1 << 24;  // Tiles to each side of the origin.
-    bool sound = std::abs(self.key.x) < kMostRead && std::abs(self.key.y) < kMostRead;
+    constexpr int kMost = 1 << 24;  // Tiles to each side of the origin.
+    const ChangeTileKey& key = self.key;
+    bool sound = -kMost < key.x && key.x < kMost && -kMost < key.y && key.y < kMost;
     sound = sound && (self.all.empty() || (self.all.size() == kChangeTileArea && self.list.empty()));
     for (std::size_t i = 0; i < self.list.size(); ++i)
       sound = sound && self.list[i].cell < kChangeTileArea && (i == 0 || self.list[i - 1].cell < self.list[i].cell);

@@ -8,7 +8,6 @@
 #include <array>
 #include <compare>
 #include <cstdint>
-#include <cstdlib>
 #include <map>
 #include <memory>
 #include <set>
@@ -42,9 +41,9 @@ struct ChunkKey {
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     archive(self.x, self.y);
-    archive.Require(std::abs(self.x) < kMostRead && std::abs(self.y) < kMostRead, "the place of a chunk");
+    constexpr int kMost = 1 << 22;
+    archive.Require(-kMost < self.x && self.x < kMost && -kMost < self.y && self.y < kMost, "the place of a chunk");
   }
-  static constexpr int kMostRead = 1 << 22;
 };
 
 // Converts log odds to an occupancy of 0..100 %, or kUnseen to kUnknownCell.

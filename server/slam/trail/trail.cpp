@@ -59,7 +59,7 @@ void Trail::RestorePoints(const SurfaceOptions& options, const ParallelFor& para
       shapes_[k].points = SurfacePointsOf(PointsOf(scan), scan, options);
     }
   });
-  distances_m_ = DistancesFromLast();
+  if (!empty()) distances_m_ = DistancesFromLast();
 }
 
 void Trail::AddScan(Stamp stamp, const Pose2& T_keyframe_robot) {

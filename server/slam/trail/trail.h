@@ -64,12 +64,14 @@ class Trail {
     archive(self.keyframes_, self.shapes_, self.relations_, self.loops_, self.scans_);
     const std::size_t size = self.size();
     archive.SetKeyframes(size);
-    bool sound = self.shapes_.size() == size && self.loops_.size() == size;
-    for (const PoseRelation& relation : self.relations_) sound = sound && relation.from < size && relation.to < size;
+    archive.Require(self.shapes_.size() == size && self.loops_.size() == size, "the number of keyframes");
+    for (const PoseRelation& relation : self.relations_)
+      archive.Require(relation.from < size && relation.to < size, "a relation between keyframes");
     for (const auto& loops : self.loops_)
-      for (const Loop& loop : loops) sound = sound && loop.other < size && loop.way_m >= 0.0;
-    archive.Require(sound, "the relations between keyframes");
-    for (const auto& scan : self.scans_) archive.RequireKeyframe(scan.keyframe);
+      for (const Loop& loop : loops) archive.Require(loop.other < size && loop.way_m >= 0.0, "a loop");
+    for (std::size_t k = 1; k < size && archive.ok(); ++k)
+      archive.Require(self.shapes_[k - 1].travelled_m <= self.shapes_[k].travelled_m, "the way to a keyframe");
+    for (const auto& scan : self.scans_) archive.Require(scan.keyframe < size, "the keyframe of a scan");
   }
   // Computes what is not stored; `options` are those of the front-end that gave the points.
   void RestorePoints(const SurfaceOptions& options, const ParallelFor& parallel_for);

@@ -156,8 +156,8 @@ TEST(LaserModels, AreTheScannersOfTheThesis) {
     EXPECT_TRUE(Validate(*laser)) << name;
   }
   const auto sick = WithModel({}, "lms200"), hokuyo = WithModel({}, "urg-04lx");
-  EXPECT_EQ(ErrorScale(ErrorOf(*sick), 20.0), 0.005);
-  EXPECT_EQ(hokuyo->error, RangeErrorKind::kStep);
+  EXPECT_EQ(ErrorScale(sick->error, 20.0), 0.005);
+  EXPECT_EQ(hokuyo->error.kind, RangeErrorKind::kStep);
   EXPECT_NEAR(hokuyo->field_of_view_rad / (hokuyo->beams - 1), 2 * kPi / 1024, 1e-12);
   EXPECT_FALSE(WithModel({}, "lms9000"));
 }

@@ -86,7 +86,8 @@ TYPED_TEST(Keys, ThatLiveKeepTheirPlaces) {
   EXPECT_FALSE(publication->Publish(OfRobot<TypeParam>(robot)));
   ASSERT_TRUE(publication->Retire(OfRobot<TypeParam>(robot / 2)));
   EXPECT_TRUE(publication->Publish(OfRobot<TypeParam>(robot)));
-  EXPECT_FALSE(publication->Publish(OfRobot<TypeParam>(robot / 2)));
+  // A new writer of a topic without history begins empty.
+  EXPECT_EQ(publication->Publish(OfRobot<TypeParam>(robot / 2)).has_value(), (std::is_same_v<TypeParam, PoseReport>));
 }
 
 }  // namespace

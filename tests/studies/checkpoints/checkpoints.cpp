@@ -1,0 +1,159 @@
+// cairn-study checkpoints: how large the saved state of an estimator is and how long saving and loading it take, over
+// an hour of one robot and over a published log; and, for every filter on mit-csail, whether an estimator that is
+// stopped and loaded again at every tenth scan gives the same bytes as one that was never stopped.
+#include <algorithm>
+#include <memory>
+
+#include "server/slam/localisation/keyframe_lines.h"
+#include "server/slam/scan_pipeline.h"
+#include "tests/studies/logs.h"
+#include "tests/studies/mapper_choice.h"
+#include "tests/studies/stopwatch.h"
+#include "tests/studies/study.h"
+
+namespace cairn::studies {
+namespace {
+
+constexpr double kLongestPauseMs = 20.0;
+
+slam::ScanPipeline::Sink Ignoring() {
+  return {.used = [](const Scan&, const slam::ScanOutcome&) {}, .dropped = [](const Scan&, DropReason) {}};
+}
+
+void Add(slam::ScanPipeline& pipeline, const LogRecord& record) {
+  if (const auto* odometry = std::get_if<Odometry>(&record)) {
+    if (ValidateOdometry(*odometry)) pipeline.Add(*odometry);
+  } else if (auto scan = std::make_shared<const Scan>(std::get<Scan>(record)); ValidateScan(*scan)) {
+    pipeline.Add(std::move(scan));
+  }
+}
+
+// Saves several times and returns the longest pause. Other programs on the machine may lengthen a pause: the processor
+// time is measured.
+double MeasureSaving(slam::ScanPipeline& pipeline, const slam::MapperOptions& options, const StudyLog& log,
+                     std::size_t scans, StudyContext& context, Table& table) {
+  Stopwatch watch;
+  double pause_ms = 0.0;
+  for (int i = 0; i < 5; ++i) {
+    watch.Restart();
+    const slam::Checkpoint checkpoint = pipeline.Save();
+    pause_ms = std::max(pause_ms, watch.CpuMs());
+  }
+  const slam::Checkpoint checkpoint = pipeline.Save();
+  watch.Restart();
+  const std::string bytes = checkpoint.Bytes();
+  const double bytes_ms = watch.CpuMs();
+  slam::ScanPipeline other(options, {}, slam::SerialFor, Ignoring());
+  watch.Restart();
+  const Result<void> loaded = other.Load(bytes);
+  const double load_ms = watch.CpuMs();
+  context.report.Expect(loaded.has_value(), loaded ? "" : loaded.error().message);
+  std::string again;
+  other.Save(again);
+  context.report.Expect(again == bytes, "what was loaded is saved as other bytes");
+  table.Add({log.name, Count(static_cast<long long>(scans)),
+             Count(static_cast<long long>(pipeline.mapper().keyframe_count())),
+             Number(static_cast<double>(bytes.size()) / 1e6, 2), Number(pause_ms, 2), Number(bytes_ms, 1),
+             Number(load_ms, 1)});
+  return pause_ms;
+}
+
+void StudyCost(StudyContext& context) {
+  Report& report = context.report;
+  report.Heading("Size and time");
+  report.Text(
+      "The default estimator. The pause is the time that the estimator waits (the longest of five); the bytes are "
+      "written by another thread. Processor time.");
+  Table table({"log", "scans", "keyframes", "size (MB)", "pause (ms)", "bytes (ms)", "loading (ms)"});
+  std::vector<StudyLog> logs;
+  sim::FleetOptions options;
+  options.seed = context.seed;
+  logs.push_back(SimulateLog("building", context.Pick(3600.0, 60.0), options));
+  if (auto intel = OpenRealLog(context, "intel", context.Pick(0, 500))) logs.push_back(std::move(*intel));
+  double longest_ms = 0.0;
+  for (const StudyLog& log : logs) {
+    slam::MapperOptions mapper;
+    slam::ScanPipeline pipeline(mapper, log.T_map_robot_start, slam::SerialFor, Ignoring());
+    const std::size_t all = log.scans(), part = all / 4;
+    std::size_t scans = 0;
+    for (const LogRecord& record : log.records) {
+      Add(pipeline, record);
+      if (!std::holds_alternative<Scan>(record)) continue;
+      // A server publishes the map once a second.
+      if (++scans % 10 == 0) (void)pipeline.mapper().TakeGridChange();
+      if (scans % part == 0 || scans == all)
+        longest_ms = std::max(longest_ms, MeasureSaving(pipeline, mapper, log, scans, context, table));
+    }
+  }
+  report.Add(table, "cost");
+  report.Expect(longest_ms <= kLongestPauseMs, "saving makes the estimator wait for more than 20 ms");
+}
+
+struct Course {
+  std::vector<Pose2> path;
+  std::string state;
+};
+
+Course Run(const StudyLog& log, const slam::MapperOptions& options, std::size_t stop_every) {
+  Course course;
+  const slam::ScanPipeline::Sink sink{
+      .used = [&](const Scan&, const slam::ScanOutcome& outcome) { course.path.push_back(outcome.T_map_robot); },
+      .dropped = [](const Scan&, DropReason) {}};
+  auto pipeline = std::make_unique<slam::ScanPipeline>(options, log.T_map_robot_start, slam::SerialFor, sink);
+  std::size_t scans = 0;
+  for (const LogRecord& record : log.records) {
+    Add(*pipeline, record);
+    if (!std::holds_alternative<Scan>(record) || stop_every == 0 || ++scans % stop_every != 0) continue;
+    std::string bytes;
+    pipeline->Save(bytes);
+    pipeline = std::make_unique<slam::ScanPipeline>(options, Pose2{}, slam::SerialFor, sink);
+    if (!pipeline->Load(bytes)) return {};
+  }
+  pipeline->Finish();
+  pipeline->Save(course.state);
+  return course;
+}
+
+void StudySameBytes(StudyContext& context) {
+  Report& report = context.report;
+  report.Heading("Stopping at every tenth scan");
+  const auto log = OpenRealLog(context, "mit-csail", context.Pick(0, 100));
+  if (!log) return;
+  Table table({"filter", "scans", "poses", "state at the end"});
+  const auto study = [&](const std::string& name, const std::vector<std::string>& assignments) {
+    auto options = MapperWith(assignments, context.seed);
+    if (!options) return report.Fault(options.error().message);
+    if (options->filter.kind == slam::FilterKind::kLineMatch) {
+      slam::MapperOptions drawing;
+      slam::ScanPipeline pipeline(drawing, log->T_map_robot_start, slam::SerialFor, Ignoring());
+      for (const LogRecord& record : log->records) Add(pipeline, record);
+      const slam::MapperSnapshot snapshot = pipeline.mapper().Snapshot();
+      options->filter.line_match.map =
+          std::make_shared<const std::vector<MapLine>>(slam::LinesOfKeyframes(snapshot.keyframes, snapshot.full_path));
+    }
+    const Course whole = Run(*log, *options, 0), stopped = Run(*log, *options, 10);
+    const bool poses = whole.path == stopped.path, state = whole.state == stopped.state;
+    table.Add({name, Count(static_cast<long long>(log->scans())), poses ? "the same" : "different",
+               state ? "the same" : "different"});
+    report.Expect(poses && state, name + ": stopping changes the result");
+    report.Progress(name);
+  };
+  for (const std::string& filter : ChoicesOf("slam.filter"))
+    if (context.Wants(filter)) study(filter, {"slam.filter=" + filter, "slam.particles=50"});
+  if (context.Wants("dpslam")) {
+    study("dpslam, flat", {"slam.filter=dpslam", "slam.particles=50", "slam.dpslam.hierarchical=false"});
+    study("dpslam, plain high level", {"slam.filter=dpslam", "slam.particles=50", "slam.dpslam.high_level=plain"});
+  }
+  report.Add(table, "same_bytes");
+}
+
+void RunCheckpoints(StudyContext& context) {
+  if (context.Wants("cost")) StudyCost(context);
+  StudySameBytes(context);
+}
+
+const Registration kRegistered{"checkpoints", "saving and loading the estimator: size, time, and the same bytes after",
+                               RunCheckpoints};
+
+}  // namespace
+}  // namespace cairn::studies
