@@ -24,6 +24,12 @@ struct PathPose {
   PoseReason reason = PoseReason::kWaiting;
   Eigen::Matrix3f covariance = Eigen::Matrix3f::Zero();  // Covariance of (x, y, theta) in the map frame.
   Pose2 T_map_odom;
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.stamp, self.T_map_robot, self.score, self.localized, self.reason, self.covariance, self.T_map_odom);
+    archive.Require(self.reason <= PoseReason::kWaiting, "the reason of a pose");
+  }
 };
 
 class PathView {
@@ -54,6 +60,19 @@ class PoseHistory {
   void Append(const PathPose& pose);
   [[nodiscard]] PathView view() const;
   [[nodiscard]] std::size_t size() const { return size_; }
+
+  // For checkpoints (slam/state/archive.h), which share the full blocks.
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.full_, self.tail_);
+    if constexpr (Archive::kReads) {
+      self.size_ = self.tail_.size();
+      for (const PathView::Block& block : self.full_) {
+        if (!archive.Require(block != nullptr && !block->empty(), "a block of a path")) return;
+        self.size_ += block->size();
+      }
+    }
+  }
 
  private:
   static constexpr std::size_t kBlockPoses = 256;

@@ -182,6 +182,11 @@ std::shared_ptr<Session> Roster::Make(SessionId id, const SessionRequest& reques
       if (const auto session = self->lock()) session->Lost({StatusCode::kUnavailable, journal->health().reason});
       return false;
     };
+    outputs.position = [journal = journal_, id] { return journal->position(id); };
+    outputs.checkpoint = [journal = journal_, id](std::uint64_t position, Journal::Bytes bytes) {
+      return journal->Checkpoint(id, position, std::move(bytes));
+    };
+    outputs.checkpoint_entries = static_cast<std::uint64_t>(options_.checkpoint_entries);
   }
   auto session = std::make_shared<Session>(setup, options_, pool_, std::move(outputs));
   *self = session;

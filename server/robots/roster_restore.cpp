@@ -67,16 +67,36 @@ Result<std::shared_ptr<Session>> Roster::RestoreOne(SessionId id) {
   Result<std::shared_ptr<Site>> site = atlas_.Find(stored->request.site);
   if (*site == nullptr) site = atlas_.Enter(stored->request.site);
   if (!site) return tl::unexpected(site.error());
-  std::shared_ptr<Session> session = Make(id, stored->request, stored->map_epoch, *site);
-  static_cast<void>(session->record().AddSensors(stored->request.sensors));
+  const auto make = [&] {
+    auto made = Make(id, stored->request, stored->map_epoch, *site);
+    static_cast<void>(made->record().AddSensors(stored->request.sensors));
+    return made;
+  };
+  std::shared_ptr<Session> session = make();
+  const auto checkpoint = ReadCheckpoint(journal_->store(), id);
+  std::uint64_t position = 0;
+  if (checkpoint && *checkpoint) {
+    if (const auto loaded = session->Load((*checkpoint)->bytes)) {
+      position = (*checkpoint)->position;
+    } else {
+      // For example, other options of the estimator. The whole journal, where it is still there, does as well.
+      spdlog::warn("the checkpoint of session {} is not used: {}", id, loaded.error().message);
+      session->Disown();
+      session = make();
+    }
+  }
   const auto switched = [&site](std::uint32_t epoch, std::uint64_t generation) {
     return (*site)->Switched(epoch, generation);
   };
-  const auto last = ReadJournal(journal_->store(), id, 0, [&](std::uint64_t, JournalEntry&& entry) -> Result<void> {
-    session->Replay(std::move(entry), switched);
-    return {};
-  });
-  if (!last) return tl::unexpected(last.error());
+  const auto last =
+      ReadJournal(journal_->store(), id, position, [&](std::uint64_t, JournalEntry&& entry) -> Result<void> {
+        session->Replay(std::move(entry), switched);
+        return {};
+      });
+  if (!last) {
+    session->Disown();
+    return tl::unexpected(last.error());
+  }
   session->Replayed();
   journal_->Reopen(id, *last, DurableFor(session));
   return session;

@@ -28,7 +28,7 @@ Session::Session(const SessionSetup& setup, const RobotsOptions& options, asio::
           record_, outputs_) {}
 
 Session::~Session() {
-  if (outputs_.gone) outputs_.gone();
+  if (outputs_.gone && !disowned_) outputs_.gone();
 }
 
 bool Session::Take(ScanArrival&& arrival) {
@@ -206,10 +206,21 @@ void Session::Drain() {
     handling_ = false;
   }
   const bool drained = queue_.empty();
+  if (drained) Throws([this] { TakeCheckpoint(); });
   Throws([&] { PublishLedgers(drained ? SessionRecord::Urgency::kDrained : SessionRecord::Urgency::kWhenDue); });
   scheduled_ = false;
   // An event that came between the last Pop and the line above found `scheduled_` set and relies on this turn.
   if (!queue_.empty()) Schedule();
+}
+
+void Session::TakeCheckpoint() {
+  if (failed_ || !outputs_.position || !outputs_.checkpoint) return;
+  const std::uint64_t position = outputs_.position();
+  if (position < checkpointed_ + outputs_.checkpoint_entries) return;
+  auto bytes = estimator_.Save();
+  // What came in meanwhile is in the record, but maybe not before this position of the journal.
+  if (!bytes || outputs_.position() != position) return;
+  if (outputs_.checkpoint(position, std::move(bytes))) checkpointed_ = position;
 }
 
 void Session::Handle(RobotEvent&& event) {

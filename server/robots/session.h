@@ -59,6 +59,9 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   // As SessionEstimator, before the session is known to anybody: from one thread.
   void Replay(JournalEntry&& entry, const SessionEstimator::Switched& switched);
   void Replayed();
+  // It is not taken up after all: what is stored of it stays.
+  void Disown() { disowned_ = true; }
+  [[nodiscard]] Result<void> Load(std::string_view bytes) { return estimator_.Load(bytes); }
   // Publishes ledgers that are due and whatever could not be sent before.
   void Tick();
 
@@ -78,6 +81,7 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   void Schedule();
   void Drain();
   void Handle(RobotEvent&& event);
+  void TakeCheckpoint();
   // Calls `act`; whether it threw. The session has then failed.
   template <typename Act>
   bool Throws(Act act) noexcept;
@@ -93,6 +97,7 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   RobotQueue queue_;
   std::atomic<bool> ending_{false};  // An end was asked for: nothing new is taken.
   std::atomic<bool> state_unsent_{false};
+  std::atomic<bool> disowned_{false};
   std::atomic<bool> unannounced_{false};  // Its opening waits for the disk.
   SessionRecord::Clock::time_point opened_{};
   std::atomic<bool> scheduled_{false};
@@ -102,6 +107,7 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   Mutex publishing_;
   asio::strand<asio::thread_pool::executor_type> strand_;
   // Strand only.
+  std::uint64_t checkpointed_ = 0;  // Position of the last one that was asked for.
   bool failed_ = false;  // An exception has left the estimator in an unknown state: it is not asked any more.
   SessionEstimator estimator_;
 };

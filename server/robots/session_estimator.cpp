@@ -149,10 +149,38 @@ void SessionEstimator::ReplayOdometry(const OdometryTaken& odometry) {
                           odometry.fate == OdometryFate::kMerged ? DropReason::kQueueFull : DropReason::kBadGeometry);
 }
 
+std::function<std::string()> SessionEstimator::Save() const {
+  auto writer = std::make_shared<slam::StateWriter>();
+  if (ended_ || !waiting_.empty()) return nullptr;
+  (*writer)(epoch_, session_);
+  if (!record_.Save(*writer)) return nullptr;
+  return [writer, pipeline = pipeline_.Save()] {
+    const std::string own = writer->Bytes();
+    std::string bytes;
+    for (int i = 0; i < 8; ++i) bytes.push_back(static_cast<char>(own.size() >> (8 * i)));
+    return bytes + own + pipeline.Bytes();
+  };
+}
+
+Result<void> SessionEstimator::Load(std::string_view bytes) {
+  std::uint64_t size = 0;
+  for (std::size_t i = 0; i < 8 && i < bytes.size(); ++i)
+    size |= std::uint64_t{static_cast<unsigned char>(bytes[i])} << (8 * i);
+  if (bytes.size() < 8 || size > bytes.size() - 8) return Fail(StatusCode::kDataLoss, "a checkpoint is too short");
+  // The estimator's part first: it leaves everything as it is where it does not fit.
+  if (auto loaded = pipeline_.Load(bytes.substr(8 + size)); !loaded) return loaded;
+  slam::StateReader reader(bytes.substr(8, size));
+  reader(epoch_, session_);
+  if (auto loaded = record_.Load(reader); !loaded) return loaded;
+  return {};
+}
+
 void SessionEstimator::Replayed() {
   replaying_ = false;
-  GridChange change = TakeGridChange();
-  if (!change.chunks.empty()) outputs_.grid_changed(std::move(change));
+  static_cast<void>(TakeGridChange());  // The whole grid is told instead.
+  GridChange whole{.session = identity_.id, .chunks = {}};
+  for (const auto& [key, chunk] : pipeline_.mapper().ShareGrid()) whole.chunks.emplace_back(key, chunk);
+  if (!whole.chunks.empty()) outputs_.grid_changed(std::move(whole));
   RefreshLandmarks(true);
 }
 

@@ -22,6 +22,11 @@ struct SessionOutputs {
   std::function<void(GridChange&&)> grid_changed;
   // Writes what the session consumes into its journal; whether it will be on the disk. Empty: nothing is stored.
   std::function<bool(JournalEntry)> store = {};
+  // The position of the last entry that `store` took, and a checkpoint of everything up to there, which is due after so
+  // many entries. Empty: none are taken.
+  std::function<std::uint64_t()> position = {};
+  std::function<bool(std::uint64_t position, std::function<std::string()> bytes)> checkpoint = {};
+  std::uint64_t checkpoint_entries = 0;
   // The session exists no more, and all of its changes were told. Empty: nobody wants to know.
   std::function<void()> gone = {};
 };
@@ -48,6 +53,10 @@ class SessionEstimator {
   void Replay(JournalEntry&& entry, const Switched& switched);
   // After the last entry: what was drawn goes to the map.
   void Replayed();
+  // Everything that the entries so far have made, as a function that makes its bytes, which may take long and run on
+  // any thread; nothing while something waits. Load takes it up before the first entry that follows it.
+  [[nodiscard]] std::function<std::string()> Save() const;
+  [[nodiscard]] Result<void> Load(std::string_view bytes);
 
  private:
   struct Waiting {

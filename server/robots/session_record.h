@@ -17,6 +17,7 @@
 #include "server/robots/robots_options.h"
 #include "server/robots/session_snapshot.h"
 #include "server/robots/stream_ledger.h"
+#include "server/slam/state/archive.h"
 #include "server/store/records.h"
 
 namespace cairn::server {
@@ -58,6 +59,10 @@ class SessionRecord {
   bool SetStored(bool stored, const Status& why = {});
   // These entries of the session's journal are on the disk.
   void Durable(const std::vector<JournalEntry>& entries);
+  // The part of a checkpoint that is kept here, where nothing waits in any stream; false where something does.
+  [[nodiscard]] bool Save(slam::StateWriter& writer) const;
+  // DATA_LOSS: the bytes are damaged; the record must then not be used.
+  [[nodiscard]] Result<void> Load(slam::StateReader& reader);
   // Everything here was read from the disk; the robot is not back yet.
   void Restored();
   [[nodiscard]] std::vector<std::string> sensors() const;
@@ -95,6 +100,8 @@ class SessionRecord {
     bool resuming = false;      // After a restart, until the number after the last one comes.
     Clock::time_point aside{};  // When the first sample was left aside.
   };
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self);
   bool LeftAside(Stream& stream, std::uint64_t sequence) const;
   Ledger NamesOf(NameId sensor_id, const std::string& sensor) const CAIRN_REQUIRES(mutex_);
   static bool IsDue(const Stream& stream, Clock::time_point now, Urgency urgency, Clock::duration period);

@@ -16,6 +16,7 @@
 #include <optional>
 #include <set>
 #include <utility>
+#include <vector>
 
 #include "common/service/ledger.h"
 
@@ -37,6 +38,23 @@ class StreamLedger {
   // A scan of someone else's client under this stream's name: counted, its number means nothing here.
   void DroppedForeign(DropReason reason);
 
+  // Nothing waits: the account can be part of a checkpoint.
+  [[nodiscard]] bool idle() const { return ledger_.waiting == 0; }
+  // For checkpoints (slam/state/archive.h). The names, the latencies and what is on the disk are not part of it.
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    auto& ledger = self.ledger_;
+    archive(ledger.received, ledger.used, ledger.keyframes, ledger.dropped, ledger.last_sequence,
+            ledger.settled_through, ledger.last_stamp, self.begun_, self.first_sequence_, self.settled_count_);
+    std::vector<std::uint64_t> gaps;  // First and last missing number of each.
+    for (const auto& [first, last] : self.gaps_) gaps.insert(gaps.end(), {first, last});
+    archive(gaps);
+    if constexpr (Archive::kReads) {
+      self.gaps_.clear();
+      if (!archive.Require(gaps.size() % 2 == 0, "gaps of a stream")) return;
+      for (std::size_t i = 0; i < gaps.size(); i += 2) self.gaps_.emplace(gaps[i], gaps[i + 1]);
+    }
+  }
   // Whether what is received from here on becomes durable; without, durable_through stands still.
   void SetStored(bool stored);
   // The sample is on the disk, and so is what became of it.

@@ -72,6 +72,12 @@ std::uint64_t Journal::Append(std::uint64_t session, JournalEntry entry) {
   return line->second.next++;
 }
 
+std::uint64_t Journal::position(std::uint64_t session) const {
+  const MutexLock lock(mutex_);
+  const auto line = lines_.find(session);
+  return line == lines_.end() || line->second.lost ? 0 : line->second.next - 1;
+}
+
 bool Journal::Checkpoint(std::uint64_t session, std::uint64_t position, Bytes bytes) {
   const MutexLock lock(mutex_);
   const auto line = lines_.find(session);

@@ -44,8 +44,8 @@ struct JournalCounts {
 
 class Journal {
  public:
-  // Called on the journal's thread with the entries of the session that are on the disk now, in order; there may be none
-  // in the first call, which tells that the session itself is.
+  // Called on the journal's thread with the entries of the session that are on the disk now, in order; there may be
+  // none in the first call, which tells that the session itself is.
   using Durable = std::function<void(const std::vector<JournalEntry>& entries)>;
   // Called on the journal's thread to make a record's bytes.
   using Bytes = std::function<std::string()>;
@@ -62,6 +62,8 @@ class Journal {
   void Reopen(std::uint64_t session, std::uint64_t last, Durable durable);
   // The position of the entry, from 1; 0 where it is not stored. `session` must be open.
   std::uint64_t Append(std::uint64_t session, JournalEntry entry);
+  // Of the last entry of the session; 0 where there is none, or it is not stored.
+  [[nodiscard]] std::uint64_t position(std::uint64_t session) const;
   // The session's state as bytes, after exactly the entries up to `position`. False where one is being written.
   bool Checkpoint(std::uint64_t session, std::uint64_t position, Bytes bytes);
   // Removes everything of a session that will never be restored.

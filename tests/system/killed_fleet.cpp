@@ -148,9 +148,9 @@ class Drive {
   }
 
   void StartServer(const std::string& state) {
-    server_ = std::make_unique<ChildProcess>(std::vector<std::string>{options_.cairnd, "--domain", Domain(), "--state",
-                                                                      (options_.directory / state).string(), "--set",
-                                                                      "slam.particles=20"});
+    server_ = std::make_unique<ChildProcess>(std::vector<std::string>{
+        options_.cairnd, "--domain", Domain(), "--state", (options_.directory / state).string(), "--set",
+        "slam.particles=20", "--set", "robots.checkpoint_entries=100"});
     if (!server_->Says(" ready")) throw std::runtime_error("cairnd does not start: " + server_->Wait().output);
   }
 

@@ -95,7 +95,7 @@ Cost CostOf(const std::string& state, int seconds) {
   Cost cost{CpuSeconds(server.pid()) - before, {}};
   server.Signal(SIGTERM);
   const std::string output = server.Wait().output;
-  if (const auto found = output.find("store: "); found != std::string::npos)
+  if (const auto found = output.find("store: ", output.find(" ready")); found != std::string::npos)
     cost.store_line = output.substr(found, output.find('\n', found) - found);
   return cost;
 }
