@@ -135,6 +135,7 @@ class StateWriter {
   static constexpr std::size_t kBlockSize = 1 << 20;
 
   void Raw(const void* data, std::size_t size) {
+    if (size == 0) return;  // `data` may be null then.
     if (size > free_) return RawAcrossBlocks(static_cast<const char*>(data), size);
     std::memcpy(end_, data, size);
     end_ += size;
