@@ -22,6 +22,7 @@ struct SurfacePoint {
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     archive(self.p, self.normal);
+    archive.Require(self.p.cwiseAbs().maxCoeff() <= 2e7, "a point of a surface");
   }
 };
 

@@ -2,25 +2,51 @@
 // value, in the order of their numbers.
 #include "server/slam/state/archive.h"
 
-namespace cairn::slam {
-namespace {
+#include <algorithm>
 
-void AppendPart(std::string& bytes, const std::string& part) {
-  const std::uint64_t size = part.size();
-  bytes.append(reinterpret_cast<const char*>(&size), sizeof(size));
-  bytes += part;
+namespace cairn::slam {
+
+void StateWriter::RawAcrossBlocks(const char* data, std::size_t size) {
+  while (size > 0) {
+    if (free_ == 0) {
+      blocks_.push_back(std::make_unique_for_overwrite<char[]>(kBlockSize));
+      end_ = blocks_.back().get();
+      free_ = kBlockSize;
+    }
+    const std::size_t part = std::min(size, free_);
+    std::memcpy(end_, data, part);
+    end_ += part;
+    free_ -= part;
+    data += part;
+    size -= part;
+  }
 }
 
-}  // namespace
+void StateWriter::Clear() {
+  if (blocks_.empty()) return;
+  blocks_.resize(1);
+  end_ = blocks_.front().get();
+  free_ = kBlockSize;
+}
+
+void StateWriter::AppendTo(std::string& bytes) const {
+  std::uint64_t left = size();
+  bytes.append(reinterpret_cast<const char*>(&left), sizeof(left));
+  for (const auto& block : blocks_) {
+    const std::size_t part = std::min<std::size_t>(left, kBlockSize);
+    bytes.append(block.get(), part);
+    left -= part;
+  }
+}
 
 std::string StateWriter::Bytes() const {
   std::string bytes;
-  AppendPart(bytes, bytes_);
+  AppendTo(bytes);
   StateWriter writer;
   for (const Immutable& shared : immutable_) {
-    writer.bytes_.clear();
+    writer.Clear();
     shared.write(writer, shared.value.get());
-    AppendPart(bytes, writer.bytes_);
+    writer.AppendTo(bytes);
   }
   return bytes;
 }

@@ -132,7 +132,20 @@ class StateWriter {
     void (*write)(StateWriter& writer, const void* value);
   };
 
-  void Raw(const void* data, std::size_t size) { bytes_.append(static_cast<const char*>(data), size); }
+  static constexpr std::size_t kBlockSize = 1 << 20;
+
+  void Raw(const void* data, std::size_t size) {
+    if (size == 0) return;  // `data` may be null then.
+    if (size > free_) return RawAcrossBlocks(static_cast<const char*>(data), size);
+    std::memcpy(end_, data, size);
+    end_ += size;
+    free_ -= size;
+  }
+  void RawAcrossBlocks(const char* data, std::size_t size);
+  // Forgets what was written, but keeps the memory.
+  void Clear();
+  [[nodiscard]] std::size_t size() const { return blocks_.size() * kBlockSize - free_; }
+  void AppendTo(std::string& bytes) const;
 
   template <typename T>
   void Put(const T& value) {
@@ -191,7 +204,10 @@ class StateWriter {
     for (const auto& value : values) Put(value);
   }
 
-  std::string bytes_;
+  // What was written, in blocks that never move: growing memory would be copied, which takes longer than all the rest.
+  std::vector<std::unique_ptr<char[]>> blocks_;
+  char* end_ = nullptr;   // Where the last block goes on,
+  std::size_t free_ = 0;  // and how much of it is left.
   std::unordered_map<const void*, NodeSeen> nodes_;
   std::uint32_t next_node_ = 0;
   std::unordered_map<const void*, std::uint32_t> immutable_ids_;
@@ -296,7 +312,9 @@ class StateReader {
     bool has = false;
     Get(has);
     value.reset();
-    if (has) Get(value.emplace());
+    if (!has) return;
+    value = T{};
+    Get(*value);
   }
   template <typename T, std::size_t N>
   void Get(std::array<T, N>& values) {

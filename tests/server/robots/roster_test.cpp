@@ -8,70 +8,21 @@
 #include <set>
 #include <utility>
 
-#include "tests/server/robots/one_session.h"
+#include "tests/server/robots/roster_fixture.h"
 
 namespace cairn::server {
 namespace {
 
 using testing::Dropped;
 using ::testing::HasSubstr;
+using testing::kLane;
 using testing::OdometryOf;
 using testing::RequestOf;
 using testing::RoomOdometry;
 using testing::RoomScan;
+using testing::RosterTest;
 using testing::ScanOf;
 using testing::Sent;
-
-constexpr std::size_t kLane = 256;
-
-// A roster with an atlas. What it sends stays in the lane until somebody asks for it.
-class RosterTest : public ::testing::Test {
- protected:
-  ~RosterTest() override { pool_.join(); }
-
-  Roster& roster(const RobotsOptions& options = {}, bool create_sites = true) {
-    if (roster_ != nullptr) return *roster_;
-    slam::MapperOptions mapper;
-    mapper.filter.particles = 20;
-    atlas_ = std::make_unique<Atlas>(MapsOptions{}, 0.05, create_sites, pool_, outbound_);
-    EXPECT_TRUE(atlas_->Create("lab"));
-    roster_ = std::make_unique<Roster>(options, mapper, pool_, outbound_, *atlas_);
-    return *roster_;
-  }
-  // Nothing more can be sent until the next call of sent().
-  void FillLane() {
-    while (outbound_.Send(PoseReport{})) {
-    }
-  }
-  Sent& sent() {
-    while (auto value = outbound_.lane(Outbound::Lane::kLive).TryPop()) sent_.Keep(std::move(*value));
-    return sent_;
-  }
-  SessionState LastState(const std::string& robot, ClientId client) {
-    SessionState last;
-    const auto look = [&](const SessionState& state) {
-      if (state.robot == robot && state.client == client) last = state;
-    };
-    sent().ForEach([&](const OutboundValue& value) {
-      if (const auto* const refusal = std::get_if<SessionRefusal>(&value)) look(refusal->state);
-      if (const auto* const state = std::get_if<SessionState>(&value)) look(*state);
-    });
-    return last;
-  }
-  bool WaitPhase(const std::string& robot, ClientId client, SessionPhase phase) {
-    return sent_.WaitFor([&] {
-      const SessionState state = LastState(robot, client);
-      return state.robot == robot && state.phase == phase;
-    });
-  }
-  void Suspend(ClientId client) { roster().Take(ClientLiveliness{client, false}); }
-
-  asio::thread_pool pool_{2};
-  Outbound outbound_{kLane};
-  Sent sent_;
-  std::unique_ptr<Atlas> atlas_;
-  std::unique_ptr<Roster> roster_;
-};
 
 TEST_F(RosterTest, OpensASessionInItsSite) {
   roster().Take(RequestOf("r1", 7));
@@ -201,63 +152,6 @@ TEST_F(RosterTest, AnEndedSessionGivesWayToANewOneOfItsRobot) {
   roster().Take(anew);
   EXPECT_GT(roster().Find("r1")->id(), first);
   EXPECT_EQ(LastState("r1", 7).phase, SessionPhase::kActive);  // And no word of the old one after it.
-}
-
-// After a restart of the server, robots were put where they had once begun.
-TEST_F(RosterTest, ASessionThatWasStartedElsewhereIsNotOpenedAtItsOldStart) {
-  SessionRequest started = RequestOf("r1", 7);
-  started.started = true;
-  roster().Take(started);
-  EXPECT_EQ(roster().Find("r1"), nullptr);
-  EXPECT_EQ(LastState("r1", 7).phase, SessionPhase::kRefused);
-  EXPECT_EQ(LastState("r1", 7).status.code, StatusCode::kFailedPrecondition);
-  EXPECT_THAT(LastState("r1", 7).status.message, HasSubstr("does not know this session"));
-  started.session = 70;
-  started.started = false;
-  roster().Take(started);
-  EXPECT_EQ(LastState("r1", 7).phase, SessionPhase::kActive);
-  EXPECT_EQ(LastState("r1", 7).session, 70U);
-  started.started = true;  // Known here.
-  roster().Take(started);
-  EXPECT_EQ(LastState("r1", 7).phase, SessionPhase::kActive);
-}
-
-TEST_F(RosterTest, AnotherProcessMayTakeUpASessionThatItKnows) {
-  roster().Take(RequestOf("r1", 7));
-  Suspend(7);
-  SessionRequest same = RequestOf("r1", 8);
-  same.session = 7;
-  same.started = true;
-  roster().Take(same);
-  EXPECT_EQ(LastState("r1", 8).phase, SessionPhase::kActive);
-  EXPECT_EQ(roster().Find("r1")->record().owner(), 8U);
-}
-
-TEST_F(RosterTest, TheKeysOfASessionThatIsGoneAreGivenBack) {
-  RobotsOptions options;
-  options.max_robots = 1;
-  roster(options).Take(RequestOf("r1", 7));
-  ASSERT_TRUE(roster().End("r1"));
-  ASSERT_TRUE(WaitPhase("r1", 7, SessionPhase::kEnded));
-  roster().Take(RequestOf("r2", 8));
-  std::vector<std::size_t> kinds;
-  ASSERT_TRUE(sent_.WaitFor([&] {
-    roster().Tick();
-    return sent().All<Retired>().size() >= 4;
-  }));
-  for (const Retired& retired : sent().All<Retired>()) {
-    kinds.push_back(retired.of.index());
-    std::visit(
-        [](const auto& of) {
-          if constexpr (!std::is_same_v<std::decay_t<decltype(of)>, Job>) {
-            EXPECT_EQ(of.robot_id, HashName("r1"));
-          }
-        },
-        retired.of);
-  }
-  EXPECT_THAT(kinds, ::testing::UnorderedElementsAre(0, 1, 2, 2));  // State, pose, the ledgers of laser and odometry.
-  roster().Tick();
-  EXPECT_EQ(sent().All<Retired>().size(), 4U);
 }
 
 TEST_F(RosterTest, ASessionWhoseRobotStaysAwayIsEnded) {

@@ -1,0 +1,67 @@
+// A roster with an atlas, for its tests.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "server/robots/roster.h"
+#include "tests/server/robots/one_session.h"
+
+namespace cairn::server::testing {
+
+constexpr std::size_t kLane = 256;
+
+// A roster with an atlas. What it sends stays in the lane until somebody asks for it.
+class RosterTest : public ::testing::Test {
+ protected:
+  ~RosterTest() override { pool_.join(); }
+
+  Roster& roster(const RobotsOptions& options = {}, bool create_sites = true) {
+    if (roster_ != nullptr) return *roster_;
+    slam::MapperOptions mapper;
+    mapper.filter.particles = 20;
+    atlas_ = std::make_unique<Atlas>(MapsOptions{}, 0.05, create_sites, pool_, outbound_);
+    EXPECT_TRUE(atlas_->Create("lab"));
+    roster_ = std::make_unique<Roster>(options, mapper, pool_, outbound_, *atlas_);
+    return *roster_;
+  }
+  // Nothing more can be sent until the next call of sent().
+  void FillLane() {
+    while (outbound_.Send(PoseReport{})) {
+    }
+  }
+  Sent& sent() {
+    while (auto value = outbound_.lane(Outbound::Lane::kLive).TryPop()) sent_.Keep(std::move(*value));
+    return sent_;
+  }
+  SessionState LastState(const std::string& robot, ClientId client) {
+    SessionState last;
+    const auto look = [&](const SessionState& state) {
+      if (state.robot == robot && state.client == client) last = state;
+    };
+    sent().ForEach([&](const OutboundValue& value) {
+      if (const auto* const refusal = std::get_if<SessionRefusal>(&value)) look(refusal->state);
+      if (const auto* const state = std::get_if<SessionState>(&value)) look(*state);
+    });
+    return last;
+  }
+  bool WaitPhase(const std::string& robot, ClientId client, SessionPhase phase) {
+    return sent_.WaitFor([&] {
+      const SessionState state = LastState(robot, client);
+      return state.robot == robot && state.phase == phase;
+    });
+  }
+  void Suspend(ClientId client) { roster().Take(ClientLiveliness{client, false}); }
+
+  asio::thread_pool pool_{2};
+  Outbound outbound_{kLane};
+  Sent sent_;
+  std::unique_ptr<Atlas> atlas_;
+  std::unique_ptr<Roster> roster_;
+};
+
+}  // namespace cairn::server::testing
