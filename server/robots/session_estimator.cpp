@@ -154,11 +154,11 @@ std::function<std::string()> SessionEstimator::Save() const {
   if (ended_ || !waiting_.empty()) return nullptr;
   (*writer)(epoch_, session_);
   if (!record_.Save(*writer)) return nullptr;
-  return [writer, pipeline = pipeline_.Save()] {
+  return [writer, pipeline = std::make_shared<const slam::Checkpoint>(pipeline_.Save())] {
     const std::string own = writer->Bytes();
     std::string bytes;
     for (int i = 0; i < 8; ++i) bytes.push_back(static_cast<char>(own.size() >> (8 * i)));
-    return bytes + own + pipeline.Bytes();
+    return bytes + own + pipeline->Bytes();
   };
 }
 
