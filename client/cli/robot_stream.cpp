@@ -88,7 +88,9 @@ Result<void> RobotStream::CheckServer() {
   const auto now = Clock::now();
   if (client_->connected()) connected_ = now;
   if (std::chrono::duration<double>(now - connected_).count() < timeout_s_) return {};
-  return Fail(StatusCode::kUnavailable, "the server went away while '" + options_.robot + "' was streaming");
+  std::string reason = "the server went away while '" + options_.robot + "' was streaming";
+  if (state.phase == SessionPhase::kSuspended && !state.status.ok()) reason += ": " + state.status.message;
+  return Fail(StatusCode::kUnavailable, reason);
 }
 
 Result<void> RobotStream::Send(LogRecord&& record) {

@@ -118,7 +118,7 @@ TEST(CairndCommandLine, TheFirstPageIsForOperators) {
     keys += value.empty() || value.starts_with("  #") ? 0 : 1;
   }
   EXPECT_GE(keys, 25);
-  EXPECT_LE(keys, 35);
+  EXPECT_LE(keys, 40);
   for (const char* wanted : {"domain:", "interfaces:", "log_level:", "threads:", "max_robots:", "particles:", "filter:",
                              "matcher:", "use_odometry:", "max_tilt_rad:", "resolution_m:"})
     EXPECT_THAT(first, HasSubstr(wanted));

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <optional>
 #include <string_view>
 
@@ -74,6 +75,7 @@ class ConstantSpeed {
     template <typename Archive>
     static void Members(Archive& archive, auto& self) {
       archive(self.forward_m_s, self.turn_rad_s);
+      archive.Require(std::abs(self.forward_m_s) <= 1e4 && std::abs(self.turn_rad_s) <= 1e4, "a speed");
     }
   };
   std::optional<Speed> speed_;

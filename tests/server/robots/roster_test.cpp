@@ -101,8 +101,7 @@ TEST_F(RosterTest, RefusalsThatCannotBeSentAreBoundedAndTheNewestAreKept) {
     roster().Tick();
   }
   std::set<ClientId> told;
-  for (const SessionState& state : sent().All<SessionState>())
-    if (state.phase == SessionPhase::kRefused) told.insert(state.client);
+  for (const SessionRefusal& refusal : sent().All<SessionRefusal>()) told.insert(refusal.state.client);
   EXPECT_EQ(told.size(), kKept);
   EXPECT_FALSE(told.contains(kFirst + kRefused - kKept - 1));
   EXPECT_TRUE(told.contains(kFirst + kRefused - kKept));
