@@ -59,8 +59,8 @@ TEST_F(RobotClientTest, HandsOutPosesAndLedgers) {
   std::atomic<std::uint64_t> pose_of = 0;
   const auto client =
       Open({}, {[&](const Ledger&) { ++ledgers; }, [&](const PoseReport& pose) { pose_of = pose.scan_sequence; }, {}, {}});
-  ASSERT_TRUE(client->Publish(SomeScan()));
-  EXPECT_TRUE(Eventually([&] { return ledgers > 0 && pose_of == 1; }));
+  // Poses are not kept for late readers, and the server may find this one only after the first scans.
+  EXPECT_TRUE(Eventually([&] { return client->Publish(SomeScan()) && ledgers > 0 && pose_of > 0; }));
   EXPECT_TRUE(Eventually([&] { return client->pose() && client->pose()->reason == PoseReason::kTracking; }));
 }
 
