@@ -57,8 +57,8 @@ TEST_F(RobotClientTest, StreamsEverythingInOrderAndSeesItSettled) {
 TEST_F(RobotClientTest, HandsOutPosesAndLedgers) {
   std::atomic<int> ledgers = 0;
   std::atomic<std::uint64_t> pose_of = 0;
-  const auto client =
-      Open({}, {[&](const Ledger&) { ++ledgers; }, [&](const PoseReport& pose) { pose_of = pose.scan_sequence; }, {}, {}});
+  const auto client = Open(
+      {}, {[&](const Ledger&) { ++ledgers; }, [&](const PoseReport& pose) { pose_of = pose.scan_sequence; }, {}, {}});
   // Poses are not kept for late readers, and the server may find this one only after the first scans.
   EXPECT_TRUE(Eventually([&] { return client->Publish(SomeScan()) && ledgers > 0 && pose_of > 0; }));
   EXPECT_TRUE(Eventually([&] { return client->pose() && client->pose()->reason == PoseReason::kTracking; }));
