@@ -79,8 +79,8 @@ class RobotStream {
 
   mutable std::mutex mutex_;
   SessionToken session_ = 0;
-  Ledger before_;               // The ledger before the session's first scan; not zero where a session is resumed.
-  ScanAccount closed_;          // Of sessions that a restarted server did not know.
+  Ledger before_;       // The ledger before the session's first scan; not zero where a session is resumed.
+  ScanAccount closed_;  // Of sessions that a restarted server did not know.
   int restarted_ = 0;
   std::array<Departure, kRemembered> departures_{};
   Percentiles latency_ms_;

@@ -125,10 +125,10 @@ TEST_F(CairnProgram, TheMapComesAsTilesFilesAndPicture) {
   EXPECT_TRUE(test::Eventually([&] {
     const auto before = MustJson({"map", "info", "--site", "hall"})["maps"][0];
     all = MustJson({"tiles", "--site", "hall", "-o", File("tiles")});
-    none = MustJson({"tiles", "--site", "hall", "--since-generation",
-                     std::to_string(all["generation"].get<Generation>()), "--since-epoch",
-                     std::to_string(all["map_epoch"].get<int>()), "--since-version",
-                     std::to_string(all["map_version"].get<int>())});
+    none =
+        MustJson({"tiles", "--site", "hall", "--since-generation", std::to_string(all["generation"].get<Generation>()),
+                  "--since-epoch", std::to_string(all["map_epoch"].get<int>()), "--since-version",
+                  std::to_string(all["map_version"].get<int>())});
     return before["tile_count"] > 4 && all["tiles"].size() == before["tile_count"] &&
            all["map_version"] == before["version"] && none["map_version"] == all["map_version"];
   }));
