@@ -100,8 +100,9 @@ class SessionRecord {
     bool resuming = false;      // After a restart, until the number after the last one comes.
     Clock::time_point aside{};  // When the first sample was left aside.
   };
+  // Both callers hold the lock of `self`, which the analysis can not see.
   template <typename Archive>
-  static void Members(Archive& archive, auto& self);
+  static void Members(Archive& archive, auto& self) CAIRN_NO_THREAD_SAFETY_ANALYSIS;
   bool LeftAside(Stream& stream, std::uint64_t sequence) const;
   Ledger NamesOf(NameId sensor_id, const std::string& sensor) const CAIRN_REQUIRES(mutex_);
   static bool IsDue(const Stream& stream, Clock::time_point now, Urgency urgency, Clock::duration period);
