@@ -64,8 +64,8 @@ class Witness {
   // How many robots have had a pose of the newest generation.
   [[nodiscard]] int RobotsWithPoses() {
     const MutexLock lock(mutex_);
-    return static_cast<int>(
-        std::count_if(newest_.begin(), newest_.end(), [this](const auto& one) { return one.second == generation_; }));
+    return static_cast<int>(std::count_if(newest_.begin(), newest_.end(),
+                                          [now = generation_](const auto& one) { return one.second == now; }));
   }
   // From now on only poses of a later generation count.
   void Killed() {
