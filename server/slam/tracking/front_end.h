@@ -88,7 +88,8 @@ class FrontEnd {
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     archive(self.score_, self.keyframe_, self.keyframe_view_, self.history_, self.reference_);
-    if constexpr (Archive::kReads) self.BuildIndices();
+    if constexpr (Archive::kReads)
+      if (archive.ok()) self.BuildIndices();
   }
 
  private:
