@@ -237,7 +237,8 @@ TEST_P(Checkpoints, ADamagedStateIsRefusedOrHarmless) {
   };
   const std::string bytes = archive.Bytes();
   Damage(bytes, kFast ? 150 : 60, try_one);
-  if (kFast) EXPECT_GT(refused, 0);  // With fewer bytes damaged, each may be a number that can be anything.
+  // With fewer bytes damaged, each may be a number that can be anything.
+  EXPECT_GE(refused, kFast ? 1 : 0);
   for (std::size_t size = 0; size < bytes.size(); size += 1 + bytes.size() / 50) {
     refused = 0;
     try_one(std::string_view(bytes).substr(0, size));
