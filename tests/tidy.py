@@ -67,6 +67,7 @@ def main():
         sys.exit(f"{args.build}/compile_commands.json names no source of ours")
     read = {name: len([s for s in sources(pathlib.Path(entry["file"]), set()) if s.suffix == ".cpp"])
             for name, entry in entries.items()}
+    entries = {name: entry for name, entry in entries.items() if read[name] > 0}  # Not what is generated.
     database = args.build / "clang-tidy"
     database.mkdir(exist_ok=True)
     (database / "compile_commands.json").write_text(json.dumps(list(entries.values())), encoding="utf-8")

@@ -95,7 +95,7 @@ Result<void> RobotClient::AddAndSend(StreamedSample&& sample, Stream& stream) {
     if (behind) return {};
     next = backlog_.Next();
   }
-  const Result<void> sent = SendNow(*next);
+  Result<void> sent = SendNow(*next);
   if (sent) return {};
   const MutexLock lock(mutex_);
   if (sent.error().code == StatusCode::kUnavailable) {

@@ -97,7 +97,7 @@ bool Session::Resume(ClientId client, SessionToken session) {
   return true;
 }
 
-void Session::End(Status reason) {
+void Session::End(const Status& reason) {
   if (ending_.exchange(true)) {
     if (record_.phase() == SessionPhase::kEnded) AnnounceState();  // Whoever asks again gets the answer again.
     return;

@@ -44,7 +44,7 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   // False where the session has ended meanwhile.
   bool Resume(ClientId client, SessionToken session);
   // Scans that arrived are finished, then the session has ended for good; `reason` stands in its state.
-  void End(Status reason = {});
+  void End(const Status& reason = {});
   // As End, but the session is only suspended, because the server stops; `done` is called on the strand, in any case.
   void Suspend(const std::function<void()>& done);
   // Drops the scans still waiting; what is being estimated is finished.

@@ -15,6 +15,7 @@
 #include <random>
 #include <span>
 
+#include "common/options/option_visitor.h"
 #include "common/status.h"
 #include "server/slam/calibration/differential_drive.h"
 
