@@ -141,6 +141,15 @@ void Site::Enable(std::uint32_t version, Done done) {
   });
 }
 
+void Site::Leave(SessionId session) {
+  if (journal_ == nullptr) return;
+  Run([session](Site& site) {
+    site.layers_.insert(session);
+    site.StoreLayer(session);
+    site.journal_->Forget(session);
+  });
+}
+
 void Site::Publish() {
   Run([](Site& site) {
     site.Render();

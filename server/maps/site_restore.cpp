@@ -62,15 +62,6 @@ void Site::StoreLayer(SessionId session) {
                 [layer = StoredLayer{session, ToStored(joint_.ChunksOf(session), 0)}] { return BytesOf(layer); });
 }
 
-void Site::Leave(SessionId session) {
-  if (journal_ == nullptr) return;
-  Run([session](Site& site) {
-    site.layers_.insert(session);
-    site.StoreLayer(session);
-    site.journal_->Forget(session);
-  });
-}
-
 bool Site::Switched(std::uint32_t epoch, Generation generation) const {
   const auto made = switches_.find(epoch);
   return made != switches_.end() && made->second == generation;
