@@ -135,7 +135,7 @@ class Drive {
   [[nodiscard]] std::string Domain() const { return std::to_string(TestDomain()); }
   std::unique_ptr<ChildProcess> Start(std::vector<std::string> arguments) const {
     arguments.insert(arguments.begin(), options_.cairn);
-    arguments.insert(arguments.end(), {"--domain", Domain(), "--json"});
+    arguments.insert(arguments.end(), {"--domain", Domain(), "--json", "--timeout", "30"});
     return std::make_unique<ChildProcess>(std::move(arguments));
   }
 

