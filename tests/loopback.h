@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "common/wire/bus.h"
+#include "tests/eventually.h"
 #include "tests/test_domain.h"
 
 namespace cairn::test {
@@ -41,18 +42,6 @@ template <typename T>
 T Must(Result<T> result) {
   if (!result) throw std::runtime_error(result.error().message);
   return std::move(*result);
-}
-
-inline constexpr std::chrono::seconds kDeadline{20};  // Generous: sanitizers, a busy machine. Never waited for in full.
-
-// Polls; for conditions no callback announces.
-inline bool Eventually(const std::function<bool()>& condition, std::chrono::milliseconds deadline = kDeadline) {
-  const auto end = std::chrono::steady_clock::now() + deadline;
-  while (!condition()) {
-    if (std::chrono::steady_clock::now() > end) return false;
-    usleep(2000);
-  }
-  return true;
 }
 
 // Collects what a subscription receives.

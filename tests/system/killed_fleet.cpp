@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -15,6 +16,7 @@
 #include "common/service/pose_report.h"
 #include "common/wire/bus.h"
 #include "tests/child_process.h"
+#include "tests/eventually.h"
 #include "tests/test_domain.h"
 
 namespace cairn::test {
@@ -46,15 +48,15 @@ T OrThrow(Result<T> result) {
 }
 
 // Everything that is told of the robots' poses, compared with the truth.
-class Witness {
+class PoseWatcher {
  public:
-  explicit Witness(std::map<std::string, Trajectory> truth) : truth_(std::move(truth)) {
+  explicit PoseWatcher(std::map<std::string, Trajectory> truth) : truth_(std::move(truth)) {
     wire::WireOptions options;
     options.domain = TestDomain();
-    bus_ = OrThrow(wire::Bus::Create(options, "witness"));
+    bus_ = OrThrow(wire::Bus::Create(options, "watcher"));
     poses_ = OrThrow(bus_->Subscribe<PoseReport>([this](PoseReport&& pose) { Take(pose); }, {}));
   }
-  ~Witness() { poses_.reset(); }
+  ~PoseWatcher() { poses_.reset(); }
 
   void CountInto(KilledFleetOutcome& outcome) {
     const MutexLock lock(mutex_);
@@ -176,30 +178,31 @@ class Drive {
     }));
   }
 
-  void Kill(const std::vector<std::unique_ptr<ChildProcess>>& robots, Witness& witness, KilledFleetOutcome& outcome) {
+  void Kill(const std::vector<std::unique_ptr<ChildProcess>>& robots, PoseWatcher& watcher,
+            KilledFleetOutcome& outcome) {
     std::uniform_real_distribution<double> up_s(0.0, options_.most_up_s);
-    const auto end = Clock::now() + std::chrono::duration<double>(up_s(random_));
-    while (Clock::now() < end && Driving(robots) > 0) usleep(1000);
+    // The moment of the kill is random; it is not a wait for anything but the end of the drive.
+    static_cast<void>(Eventually([&] { return Driving(robots) == 0; },
+                                 std::chrono::milliseconds(std::lround(1000.0 * up_s(random_)))));
     server_->Signal(SIGKILL);
     server_->Wait();
-    witness.Killed();
+    watcher.Killed();
     ++outcome.kills;
     const auto start = Clock::now();
     StartServer("killed");
     outcome.ready_s.push_back(SecondsSince(start));
     if (outcome.kills % 4 != 0) return;  // Most kills do not wait until everybody is back.
-    const auto patience = Clock::now() + std::chrono::seconds(20);
-    while (witness.RobotsWithPoses() < Driving(robots) && Clock::now() < patience) usleep(1000);
+    static_cast<void>(Eventually([&] { return watcher.RobotsWithPoses() >= Driving(robots); }));
     if (Driving(robots) == options_.robots) outcome.tracking_s.push_back(SecondsSince(start));
   }
 
   // Kills where there is an outcome to count into.
   std::map<std::string, Result> Replay(const std::string& state, KilledFleetOutcome* outcome) {
-    Witness witness(truth_);
+    PoseWatcher watcher(truth_);
     StartServer(state);
     const auto robots = StartRobots(outcome == nullptr);
     while (outcome != nullptr && outcome->kills < options_.kills && Driving(robots) == options_.robots)
-      Kill(robots, witness, *outcome);
+      Kill(robots, watcher, *outcome);
     std::map<std::string, Result> results;
     auto process = robots.begin();
     for (const auto& [robot, truth] : truth_) {
@@ -212,7 +215,7 @@ class Drive {
       static_cast<void>(ObjectPrintedBy(Start({"path", robot, "-o", file})->Wait(kLongest)));
       result.path = OrThrow(ReadTum(file));
     }
-    if (outcome != nullptr) witness.CountInto(*outcome);
+    if (outcome != nullptr) watcher.CountInto(*outcome);
     server_->Signal(SIGTERM);
     if (const auto ended = server_->Wait(); ended.exit_code != 0) throw std::runtime_error("cairnd: " + ended.output);
     return results;

@@ -19,6 +19,7 @@
 #include "server/slam/localisation/keyframe_lines.h"
 #include "server/slam/scan_pipeline.h"
 #include "tests/real_logs.h"
+#include "tests/server/slam/simulated_drive.h"
 
 namespace cairn::slam {
 namespace {
@@ -29,26 +30,7 @@ constexpr bool kFast = true;
 constexpr bool kFast = false;
 #endif
 
-struct Drive {
-  Pose2 T_map_robot_start;
-  std::vector<LogRecord> records;
-};
-
-Drive Simulated(double seconds) {
-  sim::FleetOptions options;
-  options.robots = 1;
-  options.scan_hz = 5.0;
-  options.laser.beams = 181;
-  options.laser.dropout_share = 0.01;
-  auto fleet = sim::Fleet::Create(*sim::OpenWorld("building"), options);
-  Drive drive{fleet->T_map_robot_start(0), {}};
-  const Stamp end = options.first_stamp + StampFromSeconds(seconds);
-  for (Stamp stamp = 0; stamp < end;) {
-    drive.records.push_back(fleet->Next().record);
-    stamp = std::visit([](const auto& record) { return record.stamp; }, drive.records.back());
-  }
-  return drive;
-}
+using test::Drive;
 
 Drive Csail(const std::filesystem::path& log, int scans) {
   Drive drive;
@@ -186,7 +168,7 @@ const Case kCases[] = {
 class Checkpoints : public testing::TestWithParam<Case> {};
 
 TEST_P(Checkpoints, StoppingChangesNothing) {
-  const Drive drive = Simulated(kFast ? GetParam().seconds : 15.0);
+  const Drive drive = test::SimulatedDrive(kFast ? GetParam().seconds : 15.0);
   ExpectNothingChangedByStopping(drive, GetParam().options(drive));
 }
 
@@ -215,7 +197,7 @@ void Damage(const std::string& bytes, int times, const Try& try_one) {
 // The checksum finds accidents. A stranger can write a right one, so the state itself is read with care, too: what is
 // read either is refused or can be gone on from.
 TEST_P(Checkpoints, ADamagedStateIsRefusedOrHarmless) {
-  const Drive drive = Simulated(kFast ? 20.0 : 10.0);
+  const Drive drive = test::SimulatedDrive(kFast ? 20.0 : 10.0);
   const MapperOptions options = GetParam().options(drive);
   ScanPipeline pipeline(options, drive.T_map_robot_start, SerialFor, Ignoring());
   for (const LogRecord& record : drive.records) Add(pipeline, record);
@@ -254,7 +236,7 @@ struct Saved {
     for (const LogRecord& record : drive.records) Add(pipeline, record);
     pipeline.Save(bytes);
   }
-  Drive drive = Simulated(10.0);
+  Drive drive = test::SimulatedDrive(10.0);
   MapperOptions options = With(FilterKind::kFastSlam2Points);
   Course course;
   ScanPipeline pipeline{options, drive.T_map_robot_start, SerialFor, course.sink()};
@@ -294,7 +276,7 @@ TEST(Checkpoint, OfOtherOptionsIsRefusedByName) {
 }
 
 TEST(Checkpoint, OfAnotherKnownMapIsRefused) {
-  const Drive drive = Simulated(10.0);
+  const Drive drive = test::SimulatedDrive(10.0);
   MapperOptions options = WithMapOf(drive);
   std::string bytes;
   ScanPipeline(options, {}, SerialFor, Ignoring()).Save(bytes);
@@ -317,7 +299,7 @@ TEST(Checkpoint, OfANewerFormatIsRefused) {
 TEST(Checkpoint, IsOfTheMomentWhenItWasTaken) {
   Saved saved;
   const Checkpoint checkpoint = saved.pipeline.Save();
-  const auto more = Simulated(20.0).records;
+  const auto more = test::SimulatedDrive(20.0).records;
   for (std::size_t i = saved.drive.records.size(); i < more.size(); ++i) Add(saved.pipeline, more[i]);
   (void)saved.pipeline.mapper().TakeGridChange();
   std::string later;

@@ -21,6 +21,7 @@
 #include "server/slam/scan_pipeline.h"
 #include "server/slam/smoothing/smoothed_map.h"
 #include "tests/real_logs.h"
+#include "tests/server/slam/simulated_drive.h"
 
 namespace cairn::slam {
 namespace {
@@ -111,28 +112,7 @@ class Estimate {
   ScanPipeline pipeline_;
 };
 
-struct Drive {
-  Pose2 T_map_robot_start;
-  std::vector<LogRecord> records;
-};
-
-Drive SimulatedDrive(double seconds) {
-  sim::FleetOptions options;
-  options.robots = 1;
-  options.scan_hz = 5.0;
-  options.laser.beams = 181;
-  options.laser.dropout_share = 0.01;
-  auto fleet = sim::Fleet::Create(*sim::OpenWorld("building"), options);
-  Drive drive{fleet->T_map_robot_start(0), {}};
-  const Stamp end = options.first_stamp + StampFromSeconds(seconds);
-  for (Stamp stamp = 0; stamp < end;) {
-    drive.records.push_back(fleet->Next().record);
-    stamp = std::visit([](const auto& record) { return record.stamp; }, drive.records.back());
-  }
-  return drive;
-}
-
-std::uint64_t Driven(const MapperOptions& options, const Drive& drive) {
+std::uint64_t Driven(const MapperOptions& options, const test::Drive& drive) {
   Estimate estimate(options, drive.T_map_robot_start);
   for (const LogRecord& record : drive.records) estimate.Take(record);
   return estimate.Finish();
@@ -140,7 +120,7 @@ std::uint64_t Driven(const MapperOptions& options, const Drive& drive) {
 
 TEST(SameBytes, OfASimulatedWorld) {
   Hash hash;
-  for (const LogRecord& record : SimulatedDrive(60.0).records) {
+  for (const LogRecord& record : test::SimulatedDrive(60.0).records) {
     if (const auto* odometry = std::get_if<Odometry>(&record)) {
       hash.Add(odometry->T_odom_robot);
     } else {
@@ -151,7 +131,7 @@ TEST(SameBytes, OfASimulatedWorld) {
 }
 
 TEST(SameBytes, OfASimulatedDrive) {
-  Check("drive", &Expected::drive, Driven({}, SimulatedDrive(60.0)));
+  Check("drive", &Expected::drive, Driven({}, test::SimulatedDrive(60.0)));
 }
 
 TEST(SameBytes, OfParticlesWithMaps) {
@@ -159,7 +139,7 @@ TEST(SameBytes, OfParticlesWithMaps) {
   options.filter.kind = FilterKind::kDpSlam;
   options.filter.particles = 15;
   options.filter.dpslam.segment.length_m = 3.0;
-  Check("particles", &Expected::particles, Driven(options, SimulatedDrive(20.0)));
+  Check("particles", &Expected::particles, Driven(options, test::SimulatedDrive(20.0)));
 }
 
 // The whole log is used only if that takes seconds; builds with sanitizers use only its beginning.

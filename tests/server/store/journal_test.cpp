@@ -3,10 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
-#include <chrono>
-#include <thread>
 
 #include "server/store/sqlite_store.h"
+#include "tests/eventually.h"
 #include "tests/server/store/faulty_vfs.h"
 #include "tests/server/store/sample_entries.h"
 #include "tests/temp_directory.h"
@@ -19,16 +18,6 @@ using testing::FaultyVfs;
 using testing::SampleOdometry;
 using testing::SampleScan;
 using testing::SampleSession;
-
-template <typename Condition>
-bool Soon(const Condition& condition) {
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-  while (std::chrono::steady_clock::now() < deadline) {
-    if (condition()) return true;
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
-  return false;
-}
 
 // The positions of a session's entries in the store.
 std::uint64_t StoredEntries(Store& store, std::uint64_t session) {
@@ -65,7 +54,7 @@ TEST(Journal, TellsOnlyWhatIsOnTheDisk) {
       EXPECT_GE(static_cast<std::int64_t>(StoredEntries(*store, 1)), told);
     }
   }
-  EXPECT_TRUE(Soon([&] { return first.through == 300 && second.through == 100; }));
+  EXPECT_TRUE(test::Eventually([&] { return first.through == 300 && second.through == 100; }));
   EXPECT_EQ(StoredEntries(*store, 1), 300U);
   EXPECT_EQ(StoredEntries(*store, 2), 100U);
   EXPECT_FALSE(journal.health().degraded);
@@ -79,7 +68,7 @@ TEST(Journal, GathersWhatComesWithinTheDelayIntoOneCommit) {
   journal.Start();
   Followed told;
   journal.Open(SampleSession(1), told.durable());
-  EXPECT_TRUE(Soon([&] { return told.through == 0; }));  // A new session does not wait for the delay.
+  EXPECT_TRUE(test::Eventually([&] { return told.through == 0; }));  // A new session does not wait for the delay.
   for (std::uint64_t i = 1; i <= 100; ++i) journal.Append(1, SampleOdometry(i));
   journal.Stop();  // What waits is written.
   EXPECT_EQ(told.through, 100);
@@ -132,15 +121,15 @@ TEST(Journal, WhileTheDiskFailsItIsDegradedAndGoesOnWhenTheDiskDoes) {
     Followed told;
     journal.Open(SampleSession(1), told.durable());
     journal.Append(1, SampleScan(1));
-    ASSERT_TRUE(Soon([&] { return told.through == 1; }));
+    ASSERT_TRUE(test::Eventually([&] { return told.through == 1; }));
     vfs.Set(fault);
     EXPECT_EQ(journal.Append(1, SampleScan(2)), 2U);
-    ASSERT_TRUE(Soon([&] { return journal.health().degraded; }));
+    ASSERT_TRUE(test::Eventually([&] { return journal.health().degraded; }));
     EXPECT_FALSE(journal.health().reason.empty());
     EXPECT_EQ(journal.Append(1, SampleScan(3)), 3U);  // Nobody waits for the disk.
     EXPECT_EQ(told.through, 1);
     vfs.Set(DiskFault::kNone);
-    ASSERT_TRUE(Soon([&] { return told.through == 3; }));
+    ASSERT_TRUE(test::Eventually([&] { return told.through == 3; }));
     EXPECT_FALSE(journal.health().degraded);
     EXPECT_EQ(StoredEntries(*store, 1), 3U);
   }
@@ -156,7 +145,7 @@ TEST(Journal, ASessionThatFindsTheQueueFullIsNotStoredFromThereOn) {
     journal.Start();
     Followed told;
     journal.Open(SampleSession(1), told.durable());
-    ASSERT_TRUE(Soon([&] { return told.through == 0; }));
+    ASSERT_TRUE(test::Eventually([&] { return told.through == 0; }));
     vfs.Set(DiskFault::kFull);
     for (std::uint64_t i = 1; i < 3000; ++i) {
       const std::uint64_t position = journal.Append(1, SampleScan(i));
@@ -166,7 +155,7 @@ TEST(Journal, ASessionThatFindsTheQueueFullIsNotStoredFromThereOn) {
     ASSERT_LT(accepted, 2000U);
     ASSERT_GT(accepted, 500U);
     vfs.Set(DiskFault::kNone);
-    ASSERT_TRUE(Soon([&] { return told.through == static_cast<std::int64_t>(accepted); }));
+    ASSERT_TRUE(test::Eventually([&] { return told.through == static_cast<std::int64_t>(accepted); }));
     // There is room again, but the session has a hole.
     EXPECT_EQ(journal.Append(1, SampleScan(9000)), 0U);
     EXPECT_TRUE(journal.health().degraded);
@@ -195,15 +184,15 @@ TEST(Journal, ACheckpointIsWholeOrTheOneBeforeIsTaken) {
   EXPECT_FALSE(*ReadCheckpoint(*store, 1));
   const auto checkpoint_at = [&](std::uint64_t position, std::size_t size) {
     ASSERT_TRUE(journal.Checkpoint(1, position, [position, size] { return LargeState(position, size); }));
-    EXPECT_TRUE(Soon([&] {
+    EXPECT_TRUE(test::Eventually([&] {
       const auto newest = ReadCheckpoint(*store, 1);
       return newest && *newest && (*newest)->position == position;
     }));
     EXPECT_EQ((*ReadCheckpoint(*store, 1))->bytes, LargeState(position, size));
   };
   checkpoint_at(2, 9'500'000);
-  ASSERT_TRUE(Soon([&] { return journal.Checkpoint(1, 4, [] { return LargeState(4, 100); }); }));
-  ASSERT_TRUE(Soon([&] { return (*ReadCheckpoint(*store, 1))->position == 4; }));
+  ASSERT_TRUE(test::Eventually([&] { return journal.Checkpoint(1, 4, [] { return LargeState(4, 100); }); }));
+  ASSERT_TRUE(test::Eventually([&] { return (*ReadCheckpoint(*store, 1))->position == 4; }));
   // A crash in the middle of a third one leaves parts of it.
   CheckpointWriter torn(1, 5, LargeState(5, 9'000'000));
   RecordChanges changes;

@@ -1,0 +1,22 @@
+// Waiting in tests for what no callback announces.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <thread>
+
+namespace cairn::test {
+
+inline constexpr std::chrono::seconds kDeadline{20};  // Generous: sanitizers, a busy machine. Never waited for in full.
+
+// Polls; for conditions no callback announces.
+inline bool Eventually(const std::function<bool()>& condition, std::chrono::milliseconds deadline = kDeadline) {
+  const auto end = std::chrono::steady_clock::now() + deadline;
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > end) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  return true;
+}
+
+}  // namespace cairn::test
