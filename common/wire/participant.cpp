@@ -63,15 +63,15 @@ fd::DomainParticipantQos ParticipantQos(const WireOptions& options, const std::s
 // The QoS that both ends of a topic share. Every limit is set, because the default allows only 10 instances
 // and refuses the next without an error.
 template <typename Qos>
-void SetCommon(const TopicProfile& profile, int depth, const WireOptions& options, Qos& qos) {
+void SetCommon(const TopicProfile& profile, int depth, int instances, const WireOptions& options, Qos& qos) {
   qos.reliability().kind = fd::RELIABLE_RELIABILITY_QOS;
   qos.reliability().max_blocking_time = Duration_t(0.1);
   qos.durability().kind = profile.transient_local ? fd::TRANSIENT_LOCAL_DURABILITY_QOS : fd::VOLATILE_DURABILITY_QOS;
   qos.history().kind = fd::KEEP_LAST_HISTORY_QOS;
   qos.history().depth = depth;
-  qos.resource_limits().max_instances = profile.max_instances;
+  qos.resource_limits().max_instances = instances;
   qos.resource_limits().max_samples_per_instance = depth;
-  qos.resource_limits().max_samples = profile.max_instances * depth;
+  qos.resource_limits().max_samples = instances * depth;
   qos.resource_limits().allocated_samples = 1;
   qos.data_sharing().off();
   // The sizes of samples differ much. Other memory policies would reserve the largest size for every slot
@@ -131,7 +131,7 @@ Result<Participant::Writer> Participant::MakeWriter(const TopicProfile& profile,
   const Result<fd::Topic*> topic = FindTopic(profile, type);
   if (!topic) return tl::unexpected(topic.error());
   fd::DataWriterQos qos;
-  SetCommon(profile, profile.writer_depth, options_, qos);
+  SetCommon(profile, profile.writer_depth, profile.max_instances, options_, qos);
   qos.publish_mode().kind = fd::SYNCHRONOUS_PUBLISH_MODE;
   auto& times = qos.reliable_writer_qos().times;
   times.initialHeartbeatDelay = Duration_t(0.01);
@@ -148,7 +148,10 @@ Result<Participant::Reader> Participant::MakeReader(const TopicProfile& profile,
   const Result<fd::Topic*> topic = FindTopic(profile, type);
   if (!topic) return tl::unexpected(topic.error());
   fd::DataReaderQos qos;
-  SetCommon(profile, profile.reader_depth, options_, qos);
+  // For a moment the reader knows the keys of two writers, one that is full and the one that takes over from it
+  // (publication.h). A sample that finds no place among the instances is lost, also on a reliable topic.
+  const int instances = profile.max_instances == 1 ? 1 : 2 * profile.max_instances;
+  SetCommon(profile, profile.reader_depth, instances, options_, qos);
   qos.reliable_reader_qos().times.heartbeatResponseDelay = Duration_t(0.001);
   fd::DataReader* reader = subscriber_->create_datareader(*topic, qos, listener);
   if (reader == nullptr) return tl::unexpected(Broken(std::string("a reader of ") + profile.name));

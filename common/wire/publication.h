@@ -87,7 +87,10 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
     } else {
       const Key key = KeyOf(sample);
       const auto places = static_cast<std::size_t>(Topic<Value>::kProfile.max_instances);
-      if (used_.size() >= places && !used_.contains(key) && live_.size() < used_.size()) Renew();
+      if (used_.size() >= places && !used_.contains(key)) {
+        // The samples of keys that are new wait until the writer has room.
+        if (live_.size() >= used_.size() || !Renew()) return false;
+      }
       if (!writer_->write(&sample)) return false;
       used_.insert(key);
       live_.insert_or_assign(key, sample);
@@ -96,18 +99,34 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
   }
 
   // A writer never gives back the place of a key: unregistering it stops the flow to the readers (idl/README.md). A new
-  // writer takes over with the keys that live.
-  void Renew() CAIRN_REQUIRES(mutex_) {
-    Result<Participant::Writer> writer = participant_->MakeWriter(Topic<Value>::kProfile, type_, this);
-    if (!writer) return;  // The caller's sample finds no place and is sent again later.
+  // writer takes over with the keys that live, as soon as it has found the readers of the old one: what it writes
+  // before that reaches nobody where the topic keeps nothing for late joiners. False: it does not have them yet.
+  bool Renew() CAIRN_REQUIRES(mutex_) {
+    constexpr std::chrono::seconds kLongestSearch{2};  // A reader whose host was lost never answers the new writer.
+    const auto now = std::chrono::steady_clock::now();
+    if (!successor_) {
+      Result<Participant::Writer> writer = participant_->MakeWriter(Topic<Value>::kProfile, type_, this);
+      if (!writer) return false;
+      successor_ = std::move(*writer);
+      successor_made_ = now;
+    }
+    if (ReadersOf(*successor_) < ReadersOf(*writer_) && now - successor_made_ < kLongestSearch) return false;
     constexpr long double kPatienceS = 0.1L;
     static_cast<void>(writer_->wait_for_acknowledgments(eprosima::fastrtps::Duration_t(kPatienceS)));
     used_.clear();
     // Late joiners get the last sample of each key from the writer that knows it.
     for (auto& [key, sample] : live_) {
-      if (Topic<Value>::kProfile.transient_local && (*writer)->write(&sample)) used_.insert(key);
+      if (Topic<Value>::kProfile.transient_local && successor_->write(&sample)) used_.insert(key);
     }
-    writer_ = std::move(*writer);
+    writer_ = std::move(successor_);
+    matched_.store(ReadersOf(*writer_));
+    return true;
+  }
+
+  static int ReadersOf(fd::DataWriter& writer) {
+    fd::PublicationMatchedStatus status;
+    static_cast<void>(writer.get_publication_matched_status(status));
+    return status.current_count;
   }
 
   void on_publication_matched(fd::DataWriter*, const fd::PublicationMatchedStatus& status) override {
@@ -120,7 +139,10 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
   Mutex mutex_;
   std::map<Key, Sample<Wire>> live_ CAIRN_GUARDED_BY(mutex_);  // Where keys are retired: the last sample of each.
   std::set<Key> used_ CAIRN_GUARDED_BY(mutex_);                // Keys that have a place in the writer.
-  Participant::Writer writer_;  // The last member: it calls the listener until it is destroyed.
+  // The last members: they call the listener until they are destroyed.
+  Participant::Writer writer_;
+  Participant::Writer successor_ CAIRN_GUARDED_BY(mutex_);  // From the first sample without a place until it takes over.
+  std::chrono::steady_clock::time_point successor_made_ CAIRN_GUARDED_BY(mutex_);
 };
 
 }  // namespace cairn::wire

@@ -23,7 +23,7 @@ struct TopicProfile {
   bool transient_local;       // Late joiners get the last samples of each instance.
   int writer_depth;           // Samples kept per instance until acknowledged; a new one replaces the oldest.
   int reader_depth;           // Samples per instance waiting for the callback; a new one replaces the oldest.
-  int max_instances;          // At one time, for the writer and for the reader. 1: the topic has no key.
+  int max_instances;          // At one time, for a writer. 1: the topic has no key.
   double deadline_s;          // Offered by writers, not requested by readers. 0: none.
   bool leased;                // Whether both ends use the liveliness lease.
   std::uint8_t heartbeat_ms;  // Period of heartbeats while a sample is unacknowledged.

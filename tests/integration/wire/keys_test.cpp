@@ -56,17 +56,15 @@ TYPED_TEST(Keys, ThatAreRetiredMakeRoomForOthers) {
   std::uint64_t robot = 1;
   for (; robot <= kRobots; ++robot) {
     const TypeParam value = OfRobot<TypeParam>(robot);
-    // A new writer has to be found by the readers.
-    ASSERT_TRUE(Eventually([&] { return publication->matched() == 1; }));
-    ASSERT_TRUE(publication->Publish(value)) << robot;
+    // A new writer takes over as soon as it has found the reader.
+    ASSERT_TRUE(Eventually([&] { return publication->Publish(value).has_value(); })) << robot;
     if (robot % 64 == 0) {
       ASSERT_TRUE(publication->WaitForAcknowledgement(kDeadline));
     }
     ASSERT_TRUE(publication->Retire(value)) << robot;
   }
   EXPECT_EQ(publication->Retire(OfRobot<TypeParam>(robot)).error().code, StatusCode::kNotFound);
-  // A volatile sample that is published while the new writer is looked for is lost, as it is for any late joiner.
-  EXPECT_TRUE(Eventually([&] { return received + 100 >= kRobots; })) << received;
+  EXPECT_TRUE(Eventually([&] { return received >= kRobots; })) << received;
   EXPECT_EQ(subscription->refused(), 0U);
   if constexpr (!std::is_same_v<TypeParam, PoseReport>) {
     Inbox<TypeParam> late;
@@ -85,7 +83,7 @@ TYPED_TEST(Keys, ThatLiveKeepTheirPlaces) {
   ASSERT_LT(robot, kRobots);
   EXPECT_FALSE(publication->Publish(OfRobot<TypeParam>(robot)));
   ASSERT_TRUE(publication->Retire(OfRobot<TypeParam>(robot / 2)));
-  EXPECT_TRUE(publication->Publish(OfRobot<TypeParam>(robot)));
+  EXPECT_TRUE(Eventually([&] { return publication->Publish(OfRobot<TypeParam>(robot)).has_value(); }));
   // A new writer of a topic without history begins empty.
   EXPECT_EQ(publication->Publish(OfRobot<TypeParam>(robot / 2)).has_value(), (std::is_same_v<TypeParam, PoseReport>));
 }
