@@ -115,7 +115,10 @@ void Server::KeepHouse(const std::stop_token& stop) {
 }
 
 void Server::PublishMaps() {
-  for (const auto& site : atlas_.All()) site->Publish();
+  // Another site is the first each time, because the first one may fill the lane.
+  const auto sites = atlas_.All();
+  ++first_site_;
+  for (std::size_t i = 0; i < sites.size(); ++i) sites[(first_site_ + i) % sites.size()]->Publish();
 }
 
 void Server::CheckHealth() {

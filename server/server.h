@@ -69,6 +69,7 @@ class Server {
   JobWorker worker_;
   Desk desk_;
   Heartbeat heartbeat_;
+  std::size_t first_site_ = 0;     // Of the next publication; used by housekeeping only.
   bool journal_degraded_ = false;  // As it was last logged.
   std::atomic<bool> healthy_{true};
   std::atomic<bool> stopping_{false};

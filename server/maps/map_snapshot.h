@@ -6,15 +6,15 @@
 #include <memory>
 #include <string>
 
-#include "common/map/tile.h"
 #include "common/sensor/trajectory.h"
 #include "common/service/map_info.h"
+#include "server/maps/tile_set.h"
 
 namespace cairn::server {
 
 struct MapSnapshot {
   MapInfo info;
-  std::map<TileKey, std::shared_ptr<const Tile>> tiles;  // All levels.
+  TileSet tiles;  // All levels.
   // Smoothed paths by robot, from the enabled map version; if it has none, from the newest version that has
   // some.
   std::map<std::string, std::shared_ptr<const Trajectory>> smoothed;

@@ -79,6 +79,13 @@ Site::Site(const std::string& name, double resolution_m, const MapsOptions& opti
 
 template <typename Act>
 void Site::Run(Act act) {
+  const MutexLock lock(mutex_);
+  waiting_.reset();  // What changes from now on comes after `act`.
+  Post(std::move(act));
+}
+
+template <typename Act>
+void Site::Post(Act act) {
   ++asked_;
   asio::post(strand_, [self = shared_from_this(), act = std::move(act)]() mutable {
     try {
@@ -91,19 +98,34 @@ void Site::Run(Act act) {
 }
 
 void Site::Change(GridChange&& change) {
-  Run([change = std::move(change)](Site& site) {
-    if (site.switch_) {
-      const auto staged = site.switch_->staged.find(change.session);
-      if (staged != site.switch_->staged.end()) {
-        for (const auto& [key, chunk] : change.chunks) {
-          if (chunk != nullptr) staged->second.insert_or_assign(key, chunk);
-          if (chunk == nullptr) staged->second.erase(key);
-        }
-        return;
-      }
+  const MutexLock lock(mutex_);
+  const bool first = waiting_ == nullptr;
+  if (first) waiting_ = std::make_shared<Changes>();
+  slam::OccupancyGrid::Chunks& newest = (*waiting_)[change.session];
+  for (auto& [key, chunk] : change.chunks) newest.insert_or_assign(key, std::move(chunk));
+  if (!first) return;
+  Post([changes = waiting_](Site& site) {
+    {
+      const MutexLock reading(site.mutex_);
+      if (site.waiting_ == changes) site.waiting_.reset();
     }
-    site.joint_.Apply(change);
+    // Nobody adds to `changes` any more.
+    for (const auto& [session, chunks] : *changes) site.Apply(session, chunks);
   });
+}
+
+void Site::Apply(SessionId session, const slam::OccupancyGrid::Chunks& chunks) {
+  if (switch_) {
+    const auto staged = switch_->staged.find(session);
+    if (staged != switch_->staged.end()) {
+      for (const auto& [key, chunk] : chunks) {
+        if (chunk != nullptr) staged->second.insert_or_assign(key, chunk);
+        if (chunk == nullptr) staged->second.erase(key);
+      }
+      return;
+    }
+  }
+  joint_.Apply({session, {chunks.begin(), chunks.end()}});
 }
 
 void Site::Join(NameId robot, SessionId session, std::weak_ptr<GridOwner> owner) {
@@ -151,7 +173,9 @@ void Site::Leave(SessionId session) {
 }
 
 void Site::Publish() {
+  if (publish_waits_.exchange(true)) return;
   Run([](Site& site) {
+    site.publish_waits_ = false;
     site.Render();
     site.Send();
   });
@@ -244,27 +268,24 @@ void Site::RenderAll() {
 void Site::Refresh(const std::vector<TileKey>& changed, bool all) {
   const std::shared_ptr<const MapSnapshot> before = snapshot();
   auto after = std::make_shared<MapSnapshot>();
-  after->tiles = before->tiles;
   after->smoothed = versions_.smoothed();
   if (!changed.empty() || all) {
     ++tile_version_;
     StoreSite();
   }
+  std::map<TileKey, TileSet::TilePtr> tiles;
   for (const TileKey& key : changed) {
-    unsent_.insert(key);
     const auto cells = joint_.cells().find(key);
-    if (cells == joint_.cells().end()) {
-      after->tiles.erase(key);
-    } else {
-      after->tiles[key] = EncodeTile(key, *cells->second, epoch_, tile_version_);
-    }
+    const bool gone = cells == joint_.cells().end();
+    tiles[key] = gone ? nullptr : EncodeTile(key, *cells->second, epoch_, tile_version_);
   }
-  if (all) {
-    for (auto& [key, tile] : after->tiles) {
-      unsent_.insert(key);
-      if (tile->epoch != epoch_) tile = Restamp(*tile, epoch_, tile_version_);
-    }
+  for (int level = 0; all && level < kPyramidLevels; ++level) {
+    before->tiles.ForEach(level, [&](const TileSet::TilePtr& tile) {
+      if (!tiles.contains(tile->key)) tiles[tile->key] = Restamp(*tile, epoch_, tile_version_);
+    });
   }
+  for (const auto& [key, tile] : tiles) unsent_.insert(key);
+  after->tiles = before->tiles.With(tiles);
   after->info = InfoOf(after->tiles);
   info_changed_ = true;
   const MutexLock lock(mutex_);
@@ -276,20 +297,20 @@ void Site::Send() {
   if (info_changed_) info_changed_ = !outbound_.Send(now->info);
   while (!unsent_.empty()) {
     const TileKey key = *unsent_.begin();
-    const auto tile = now->tiles.find(key);
-    TileSample sample{.site_id = site_id_, .tile = {}, .deleted = tile == now->tiles.end()};
+    const TileSet::TilePtr tile = now->tiles.Find(key);
+    TileSample sample{.site_id = site_id_, .tile = {}, .deleted = tile == nullptr};
     if (sample.deleted) {
       sample.tile = {
           .key = key, .epoch = epoch_, .version = tile_version_, .encoding = TileEncoding::kRaw, .bytes = {}};
     } else {
-      sample.tile = *tile->second;
+      sample.tile = *tile;
     }
     if (!outbound_.Send(std::move(sample))) return;  // The lane is full; the rest is sent at the next call.
     unsent_.erase(unsent_.begin());
   }
 }
 
-MapInfo Site::InfoOf(const std::map<TileKey, std::shared_ptr<const Tile>>& tiles) const {
+MapInfo Site::InfoOf(const TileSet& tiles) const {
   MapInfo info;
   info.site_id = site_id_;
   info.site = name_;
@@ -300,15 +321,13 @@ MapInfo Site::InfoOf(const std::map<TileKey, std::shared_ptr<const Tile>>& tiles
   for (const auto& [robot, member] : members_) info.robots += member.owner.expired() ? 0U : 1U;
   info.enabled_version = versions_.enabled();
   info.versions = versions_.infos();
-  const double tile_m = kTileCells * resolution_m_;
-  for (const auto& [key, tile] : tiles) {
-    if (key.level != 0) break;  // Keys are ordered by level.
-    const double x_min = key.x * tile_m, y_min = key.y * tile_m;
-    const bool first = info.tile_count++ == 0;
-    info.x_min_m = first ? x_min : std::min(info.x_min_m, x_min);
-    info.y_min_m = first ? y_min : std::min(info.y_min_m, y_min);
-    info.x_max_m = first ? x_min + tile_m : std::max(info.x_max_m, x_min + tile_m);
-    info.y_max_m = first ? y_min + tile_m : std::max(info.y_max_m, y_min + tile_m);
+  if (const auto box = tiles.BoxOf(0)) {
+    const double tile_m = kTileCells * resolution_m_;
+    info.tile_count = static_cast<std::uint32_t>(box->count);
+    info.x_min_m = box->x_min * tile_m;
+    info.y_min_m = box->y_min * tile_m;
+    info.x_max_m = (box->x_max + 1) * tile_m;
+    info.y_max_m = (box->y_max + 1) * tile_m;
   }
   return info;
 }

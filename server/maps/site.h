@@ -60,6 +60,8 @@ class Site : public std::enable_shared_from_this<Site> {
   // From now on this session of the robot draws here, in place of the robot's previous session. A session
   // that has ended is kept while its GridOwner exists, because its part of the map can still be corrected.
   void Join(NameId robot, SessionId session, std::weak_ptr<GridOwner> owner);
+  // Changes that wait for the strand are merged: the newest form of each chunk is kept, so that a site that is slow
+  // holds at most the chunks that its sessions have.
   void Change(GridChange&& change);
   // The session exists no more. Its part of the map stays, and is stored as such instead of the session.
   void Leave(SessionId session);
@@ -67,7 +69,7 @@ class Site : public std::enable_shared_from_this<Site> {
   void AddVersion(MapVersion&& version, Done done);
   // UNAVAILABLE: another switch is under way. NOT_FOUND: the version does not exist or has been removed.
   void Enable(std::uint32_t version, Done done);
-  // Renders and publishes what changed.
+  // Renders and publishes what changed, soon; does nothing where an earlier call still waits for the strand.
   void Publish();
   // Does nothing but call `done` on the strand, to show that the strand makes progress.
   void Probe(std::function<void()> done);
@@ -82,9 +84,15 @@ class Site : public std::enable_shared_from_this<Site> {
     std::weak_ptr<GridOwner> owner;
   };
 
+  using Changes = std::map<SessionId, slam::OccupancyGrid::Chunks>;  // A null chunk: removed.
+
+  // Does `act` on the strand, after everything that was asked for before.
   template <typename Act>
-  void Run(Act act);
+  void Run(Act act) CAIRN_EXCLUDES(mutex_);
+  template <typename Act>
+  void Post(Act act) CAIRN_REQUIRES(mutex_);
   // The functions below run on the strand only.
+  void Apply(SessionId session, const slam::OccupancyGrid::Chunks& chunks);
   void Begin(std::uint32_t version, Done done);
   void Settle(std::uint32_t version, SessionId session, std::optional<Adopted>&& adopted);
   std::shared_ptr<GridOwner> OwnerOf(SessionId session) const;
@@ -100,7 +108,7 @@ class Site : public std::enable_shared_from_this<Site> {
   void RemoveOldVersions();
   Result<void> RestoreVersions(const StoredSite& stored);
   Result<void> RestoreLayers();
-  MapInfo InfoOf(const std::map<TileKey, std::shared_ptr<const Tile>>& tiles) const;
+  MapInfo InfoOf(const TileSet& tiles) const;
 
   const std::string name_;
   const NameId site_id_;
@@ -126,6 +134,8 @@ class Site : public std::enable_shared_from_this<Site> {
   std::atomic<std::uint64_t> asked_{0}, handled_{0};  // Pieces of work posted to the strand, and finished on it.
   mutable Mutex mutex_;
   std::shared_ptr<const MapSnapshot> snapshot_ CAIRN_GUARDED_BY(mutex_);
+  std::shared_ptr<Changes> waiting_ CAIRN_GUARDED_BY(mutex_);  // To be added to, until the strand takes them.
+  std::atomic<bool> publish_waits_ = false;
 };
 
 }  // namespace cairn::server

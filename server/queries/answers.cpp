@@ -53,66 +53,6 @@ Area AreaOf(const TileKey& key, double resolution_m) {
   return {key.x * side_m, key.y * side_m, (key.x + 1) * side_m, (key.y + 1) * side_m};
 }
 
-// Upper estimates of an item's bytes on the wire.
-std::size_t BytesOf(const PoseReport&) {
-  return 384;
-}
-std::size_t BytesOf(const StampedPose&) {
-  return 32;
-}
-std::size_t BytesOf(const Tile& tile) {
-  return tile.bytes.size() + 64;
-}
-std::size_t BytesOf(const LandmarkReport&) {
-  return 192;
-}
-std::size_t BytesOf(const MapInfo& info) {
-  std::size_t bytes = 256;
-  for (const MapVersionInfo& version : info.versions) bytes += version.note.size() + 48;
-  return bytes;
-}
-std::size_t BytesOf(const RobotStatus& robot) {
-  return 1024 + robot.session.status.message.size() + robot.ledgers.size() * 512;
-}
-std::size_t BytesOf(const Job& job) {
-  return job.message.size() + job.site.size() + 160;
-}
-
-class Parts {
- public:
-  explicit Parts(Reply header) : header_(std::move(header)), current_(header_) {}
-
-  template <typename Item>
-  void AddAll(std::vector<Item>&& items, std::vector<Item> Reply::*list) {
-    for (Item& item : items) {
-      const std::size_t bytes = BytesOf(item);
-      if (used_ > 0 && used_ + bytes > kPartBudgetBytes) Next();
-      used_ += bytes;
-      (current_.*list).push_back(std::move(item));
-    }
-  }
-
-  std::vector<Reply> Finish() {
-    Next();
-    parts_.back().last = true;
-    return std::move(parts_);
-  }
-
- private:
-  void Next() {
-    current_.part = static_cast<std::uint32_t>(parts_.size());
-    current_.last = false;
-    parts_.push_back(std::move(current_));
-    current_ = header_;
-    used_ = 0;
-  }
-
-  const Reply header_;
-  Reply current_;
-  std::size_t used_ = 0;
-  std::vector<Reply> parts_;
-};
-
 }  // namespace
 
 Reply ReplyTo(const Request& request, Status status) {
@@ -197,7 +137,7 @@ Reply AnswerLandmarks(const Request& request, const Sessions& sessions, const Ma
   return reply;
 }
 
-Reply AnswerTiles(const Request& request, const Maps& maps, Generation generation) {
+Answer AnswerTiles(const Request& request, const Maps& maps, Generation generation) {
   if (maps.empty()) return NoSite(request);
   const MapSnapshot& map = *maps.front();
   if (request.level >= map.info.levels) {
@@ -211,14 +151,12 @@ Reply AnswerTiles(const Request& request, const Maps& maps, Generation generatio
   reply.map_version = map.info.version;
   const int level = static_cast<int>(request.level);
   const bool all = request.since_generation != generation || request.since_epoch != map.info.epoch;
-  constexpr int kLowest = INT32_MIN;
-  for (auto it = map.tiles.lower_bound({level, kLowest, kLowest}); it != map.tiles.end(); ++it) {
-    const auto& [key, tile] = *it;
-    if (key.level != level) break;
-    if (!all && tile->version <= request.since_version) continue;
-    if (Overlap(request.area, AreaOf(key, map.info.resolution_m))) reply.tiles.push_back(*tile);
-  }
-  return reply;
+  std::vector<std::shared_ptr<const Tile>> tiles;
+  map.tiles.ForEach(level, [&](const std::shared_ptr<const Tile>& tile) {
+    if (!all && tile->version <= request.since_version) return;
+    if (Overlap(request.area, AreaOf(tile->key, map.info.resolution_m))) tiles.push_back(tile);
+  });
+  return {std::move(reply), std::move(tiles)};
 }
 
 Reply AnswerMapInfo(const Request& request, const Maps& maps) {
@@ -230,25 +168,6 @@ Reply AnswerMapInfo(const Request& request, const Maps& maps) {
     reply.map_version = maps.front()->info.version;
   }
   return reply;
-}
-
-std::vector<Reply> SplitReply(Reply&& reply) {
-  auto poses = std::exchange(reply.poses, {});
-  auto path = std::exchange(reply.path, {});
-  auto tiles = std::exchange(reply.tiles, {});
-  auto landmarks = std::exchange(reply.landmarks, {});
-  auto maps = std::exchange(reply.maps, {});
-  auto robots = std::exchange(reply.robots, {});
-  auto jobs = std::exchange(reply.jobs, {});
-  Parts parts(std::move(reply));
-  parts.AddAll(std::move(poses), &Reply::poses);
-  parts.AddAll(std::move(path), &Reply::path);
-  parts.AddAll(std::move(tiles), &Reply::tiles);
-  parts.AddAll(std::move(landmarks), &Reply::landmarks);
-  parts.AddAll(std::move(maps), &Reply::maps);
-  parts.AddAll(std::move(robots), &Reply::robots);
-  parts.AddAll(std::move(jobs), &Reply::jobs);
-  return parts.Finish();
 }
 
 }  // namespace cairn::server

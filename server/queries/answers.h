@@ -1,6 +1,6 @@
 // The answers to requests about robots and maps. Each is a pure function of snapshots, which were copied under
 // short locks, so no answer waits for an estimator. If a request names a robot or site that the server does not
-// know, the snapshots are empty and the answer is NOT_FOUND. Answers may be large: SplitReply
+// know, the snapshots are empty and the answer is NOT_FOUND. Answers may be large: ReplyParts
 // cuts them into parts for the wire. Stateless, thread-safe.
 #pragma once
 
@@ -10,6 +10,7 @@
 
 #include "common/service/request.h"
 #include "server/maps/map_snapshot.h"
+#include "server/queries/reply_parts.h"
 #include "server/robots/session_snapshot.h"
 
 namespace cairn::server {
@@ -43,16 +44,10 @@ using Maps = std::vector<std::shared_ptr<const MapSnapshot>>;
 // since_epoch is not the map's epoch, or since_generation not the server's `generation`, the client's tiles are no
 // longer valid, and all tiles of the area are sent. INVALID_ARGUMENT: the level or the area is not valid. `maps`: the
 // map of the site, if any.
-[[nodiscard]] Reply AnswerTiles(const Request& request, const Maps& maps, Generation generation);
+[[nodiscard]] Answer AnswerTiles(const Request& request, const Maps& maps, Generation generation);
 
 // The state and the versions of a site's map, or of all maps. `maps`: all maps, or the site's if the request
 // names a site.
 [[nodiscard]] Reply AnswerMapInfo(const Request& request, const Maps& maps);
-
-// Cuts an answer into parts that fit the wire (less than 64 KB each, idl/README.md). Every part repeats the
-// header and the status. Items keep their order. Parts are numbered from 0, and the last one has `last` set.
-// An answer without items is one part.
-inline constexpr std::size_t kPartBudgetBytes = 48 * 1024;
-[[nodiscard]] std::vector<Reply> SplitReply(Reply&& reply);
 
 }  // namespace cairn::server

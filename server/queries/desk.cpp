@@ -37,13 +37,14 @@ Desk::~Desk() {
 
 void Desk::Start() {
   thread_ = std::jthread([this] {
-    while (const auto request = requests_.Pop()) Serve(*request);
+    while (auto open = requests_.Pop()) Serve(*std::move(open));
   });
 }
 
 void Desk::Take(Request&& request) {
-  Reply busy = ReplyTo(request, {StatusCode::kResourceExhausted, "too many requests are waiting; try again later"});
-  if (!requests_.TryPush(std::move(request))) outbound_.Send(std::move(busy));
+  const auto refused = requests_.Push(std::move(request));
+  if (!refused) return;
+  outbound_.Send(ReplyTo(*refused, {StatusCode::kResourceExhausted, "too many requests are waiting; try again later"}));
 }
 
 void Desk::Stop() {
@@ -51,19 +52,35 @@ void Desk::Stop() {
   if (thread_.joinable()) thread_.join();
 }
 
-void Desk::Serve(const Request& request) {
+void Desk::Serve(OpenRequest&& open) {
   try {
-    auto reply = Answer(request);
-    if (!reply) return;
-    for (Reply& part : SplitReply(*std::move(reply))) outbound_.SendPatiently(std::move(part));
+    if (!open.rest) {
+      auto answer = AnswerTo(open.request);
+      if (!answer) return;
+      open.rest.emplace(*std::move(answer));
+    }
+    Send(open);
   } catch (const std::exception& error) {
-    spdlog::error("a request of kind {} failed with an exception: {}", RequestKindName(request.kind), error.what());
+    spdlog::error("a request of kind {} failed with an exception: {}", RequestKindName(open.request.kind),
+                  error.what());
     outbound_.Send(
-        ReplyTo(request, {StatusCode::kInternal, "internal error of the server; see its log for the cause"}));
+        ReplyTo(open.request, {StatusCode::kInternal, "internal error of the server; see its log for the cause"}));
   }
 }
 
-std::optional<Reply> Desk::Answer(const Request& request) {
+void Desk::Send(OpenRequest& open) {
+  constexpr int kPartsPerTurn = 4;
+  for (int i = 0; i < kPartsPerTurn; ++i) {
+    auto part = open.rest->Next();
+    if (!part) return;
+    const bool last = part->last;
+    outbound_.SendPatiently(*std::move(part));
+    if (last) return;
+  }
+  requests_.PutBack(std::move(open));
+}
+
+std::optional<Answer> Desk::AnswerTo(const Request& request) {
   switch (request.kind) {
     case RequestKind::kPing: {
       Reply reply = ReplyTo(request);
@@ -110,7 +127,7 @@ Result<Job> Desk::SubmitJob(const Request& request) {
   return worker_.Submit(request.site, request.job_kind, request.enable);
 }
 
-std::optional<Reply> Desk::EnableMap(const Request& request) {
+std::optional<Answer> Desk::EnableMap(const Request& request) {
   const auto site = atlas_.Find(request.site);
   if (site == nullptr) return ReplyTo(request, {StatusCode::kNotFound, "no site '" + request.site + "'"});
   site->Enable(request.map_version, [&outbound = outbound_, request](Result<std::uint32_t> enabled) {

@@ -1,9 +1,9 @@
 // Handles all requests on one thread: it answers queries from snapshots and passes commands (submit, cancel,
-// end, enable) to their room. The switch over all kinds of request is only here. The queue is bounded: when
-// it is full, further requests are answered RESOURCE_EXHAUSTED at once. A request to enable a map version is
-// answered when the switch is complete; the thread does not wait for it. If handling a request ends with an
-// exception, the request is answered INTERNAL and the thread continues. Thread rule: Take from any thread;
-// Start and Stop from one.
+// end, enable) to their room. The switch over all kinds of request is only here. Clients take turns, also with the
+// parts of large answers. The queue is bounded: when it is full, requests are answered RESOURCE_EXHAUSTED at once,
+// first those of the client that has most waiting. A request to enable a map version is answered when the switch is
+// complete; the thread does not wait for it. If handling a request ends with an exception, the request is answered
+// INTERNAL and the thread continues. Thread rule: Take from any thread; Start and Stop from one.
 #pragma once
 
 #include <cstddef>
@@ -11,12 +11,12 @@
 #include <string>
 #include <thread>
 
-#include "common/bounded_channel.h"
 #include "server/jobs/job_worker.h"
 #include "server/maps/atlas.h"
 #include "server/ops/heartbeat.h"
 #include "server/outbound.h"
 #include "server/queries/answers.h"
+#include "server/queries/request_queue.h"
 #include "server/robots/roster.h"
 
 namespace cairn::server {
@@ -35,11 +35,13 @@ class Desk {
   [[nodiscard]] Pulse pulse() const { return {requests_.taken(), requests_.size() > 0}; }
 
  private:
-  void Serve(const Request& request);
+  // Sends a few parts of the answer; what is left waits for the client's next turn.
+  void Serve(OpenRequest&& open);
+  void Send(OpenRequest& open);
   // Returns nothing if the answer is sent later.
-  std::optional<Reply> Answer(const Request& request);
+  std::optional<Answer> AnswerTo(const Request& request);
   Result<Job> SubmitJob(const Request& request);
-  std::optional<Reply> EnableMap(const Request& request);
+  std::optional<Answer> EnableMap(const Request& request);
   // Both return one snapshot, or none if there is no such robot or site.
   [[nodiscard]] Sessions SessionOf(const std::string& robot) const;
   [[nodiscard]] Maps MapOf(const std::string& site) const;
@@ -52,7 +54,7 @@ class Desk {
   JobList& jobs_;
   JobWorker& worker_;
   const Generation generation_;
-  BoundedChannel<Request> requests_;
+  RequestQueue requests_;
   std::jthread thread_;  // The last member, because it uses the members above.
 };
 

@@ -7,19 +7,21 @@ namespace cairn::server {
 static_assert(sizeof(PathPose) == 104);  // The text of robots.max_path_poses names this size.
 
 std::size_t PathView::size() const {
-  std::size_t size = 0;
-  for (const Block& block : blocks_) size += block->size();
+  std::size_t size = tail_->size();
+  for (const Block& block : *full_) size += block->size();
   return size;
 }
 
 std::optional<PathPose> PathView::At(Stamp stamp) const {
   if (empty() || stamp < first_stamp() || stamp > last_stamp()) return std::nullopt;
-  const auto block = std::find_if(blocks_.begin(), blocks_.end(),
-                                  [stamp](const Block& candidate) { return candidate->back().stamp >= stamp; });
-  const auto after = std::lower_bound((*block)->begin(), (*block)->end(), stamp,
+  const auto block = std::lower_bound(full_->begin(), full_->end(), stamp, [](const Block& candidate, Stamp value) {
+    return candidate->back().stamp < value;
+  });
+  const std::vector<PathPose>& poses = block == full_->end() ? *tail_ : **block;
+  const auto after = std::lower_bound(poses.begin(), poses.end(), stamp,
                                       [](const PathPose& pose, Stamp value) { return pose.stamp < value; });
   if (after->stamp == stamp) return *after;
-  const PathPose& before = after == (*block)->begin() ? (*std::prev(block))->back() : *std::prev(after);
+  const PathPose& before = after == poses.begin() ? (*std::prev(block))->back() : *std::prev(after);
   const double fraction = static_cast<double>(stamp - before.stamp) / static_cast<double>(after->stamp - before.stamp);
   const PathPose& worse = before.score < after->score ? before : *after;
   const auto share = static_cast<float>(fraction);
@@ -35,46 +37,47 @@ std::optional<PathPose> PathView::At(Stamp stamp) const {
 Trajectory PathView::ToTrajectory() const {
   Trajectory all;
   all.reserve(size());
-  for (const Block& block : blocks_) {
+  const auto add = [&all](const Block& block) {
     for (const PathPose& pose : *block) all.push_back({pose.stamp, pose.T_map_robot});
-  }
+  };
+  for (const Block& block : *full_) add(block);
+  add(tail_);
   return all;
 }
 
 void PoseHistory::Append(const PathPose& pose) {
-  const bool none_yet = tail_.empty() && full_.empty();
-  const Stamp last = none_yet ? 0 : tail_.empty() ? full_.back()->back().stamp : tail_.back().stamp;
-  if (!none_yet && pose.stamp <= last) return;
+  if (size_ > 0 && pose.stamp <= (tail_.empty() ? full_->back()->back() : tail_.back()).stamp) return;
   tail_.push_back(pose);
   ++size_;
   if (tail_.size() == kBlockPoses) {
-    full_.push_back(std::make_shared<const std::vector<PathPose>>(std::move(tail_)));
+    std::vector<PathView::Block> full = *full_;
+    full.push_back(std::make_shared<const std::vector<PathPose>>(std::move(tail_)));
+    full_ = std::make_shared<const std::vector<PathView::Block>>(std::move(full));
     tail_.clear();
   }
   if (size_ > max_poses_) ThinOlderHalf();
 }
 
 PathView PoseHistory::view() const {
-  std::vector<PathView::Block> blocks = full_;
-  if (!tail_.empty()) blocks.push_back(std::make_shared<const std::vector<PathPose>>(tail_));
-  return PathView(std::move(blocks));
+  return {full_, std::make_shared<const std::vector<PathPose>>(tail_)};
 }
 
 void PoseHistory::ThinOlderHalf() {
   // Pairs of blocks become one, so blocks stay full and their number halves with the poses.
+  const std::vector<PathView::Block>& full = *full_;
   std::vector<PathView::Block> thinned;
-  const std::size_t half = full_.size() / 2;
+  const std::size_t half = full.size() / 2;
   for (std::size_t i = 0; i < half; i += 2) {
     std::vector<PathPose> kept;
     for (std::size_t j = i; j < std::min(i + 2, half); ++j) {
-      for (std::size_t k = 0; k < full_[j]->size(); k += 2) kept.push_back((*full_[j])[k]);
+      for (std::size_t k = 0; k < full[j]->size(); k += 2) kept.push_back((*full[j])[k]);
     }
     thinned.push_back(std::make_shared<const std::vector<PathPose>>(std::move(kept)));
   }
-  thinned.insert(thinned.end(), full_.begin() + static_cast<std::ptrdiff_t>(half), full_.end());
-  full_ = std::move(thinned);
+  thinned.insert(thinned.end(), full.begin() + static_cast<std::ptrdiff_t>(half), full.end());
   size_ = tail_.size();
-  for (const auto& block : full_) size_ += block->size();
+  for (const auto& block : thinned) size_ += block->size();
+  full_ = std::make_shared<const std::vector<PathView::Block>>(std::move(thinned));
 }
 
 }  // namespace cairn::server

@@ -1,6 +1,6 @@
 // The poses of one session as they were published, for `path` and for poses at past stamps. Append-only in increasing
-// stamps; readers get a PathView that never changes. Blocks of 256 poses are shared, so a view costs one pointer per
-// block. Bounded: beyond `max_poses` the older half keeps every second pose.
+// stamps; readers get a PathView that never changes. Blocks of 256 poses and their list are shared, so a view costs the
+// same for a long path as for a short one. Bounded: beyond `max_poses` the older half keeps every second pose.
 // Thread rule: PoseHistory belongs to the session's lock; a PathView may be read anywhere.
 #pragma once
 
@@ -36,20 +36,25 @@ class PathView {
  public:
   using Block = std::shared_ptr<const std::vector<PathPose>>;
 
-  PathView() = default;
-  explicit PathView(std::vector<Block> blocks) : blocks_(std::move(blocks)) {}
+  using Blocks = std::shared_ptr<const std::vector<Block>>;
 
-  [[nodiscard]] bool empty() const { return blocks_.empty(); }
+  PathView() = default;
+  // Neither is null; no block is empty; `tail` continues the blocks and may be empty. Stamps increase through all.
+  PathView(Blocks full, Block tail) : full_(std::move(full)), tail_(std::move(tail)) {}
+
+  [[nodiscard]] bool empty() const { return tail_->empty() && full_->empty(); }
   [[nodiscard]] std::size_t size() const;
-  [[nodiscard]] Stamp first_stamp() const { return blocks_.front()->front().stamp; }
-  [[nodiscard]] Stamp last_stamp() const { return blocks_.back()->back().stamp; }
+  // REQUIRES of both: not empty().
+  [[nodiscard]] Stamp first_stamp() const { return (full_->empty() ? tail_ : full_->front())->front().stamp; }
+  [[nodiscard]] Stamp last_stamp() const { return (tail_->empty() ? full_->back() : tail_)->back().stamp; }
   // Interpolated between the two poses around `stamp`, covariance too, with the worse one's score and reason; nothing
   // outside first_stamp()..last_stamp().
   [[nodiscard]] std::optional<PathPose> At(Stamp stamp) const;
   [[nodiscard]] Trajectory ToTrajectory() const;
 
  private:
-  std::vector<Block> blocks_;  // None empty; stamps increase through all of them.
+  Blocks full_ = std::make_shared<const std::vector<Block>>();
+  Block tail_ = std::make_shared<const std::vector<PathPose>>();
 };
 
 class PoseHistory {
@@ -64,13 +69,17 @@ class PoseHistory {
   // For checkpoints (slam/state/archive.h), which share the full blocks.
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
-    archive(self.full_, self.tail_);
     if constexpr (Archive::kReads) {
+      std::vector<PathView::Block> full;
+      archive(full, self.tail_);
       self.size_ = self.tail_.size();
-      for (const PathView::Block& block : self.full_) {
+      for (const PathView::Block& block : full) {
         if (!archive.Require(block != nullptr && !block->empty(), "a block of a path")) return;
         self.size_ += block->size();
       }
+      self.full_ = std::make_shared<const std::vector<PathView::Block>>(std::move(full));
+    } else {
+      archive(*self.full_, self.tail_);
     }
   }
 
@@ -81,8 +90,8 @@ class PoseHistory {
 
   const std::size_t max_poses_;
   std::size_t size_ = 0;
-  std::vector<PathView::Block> full_;  // Immutable from here on.
-  std::vector<PathPose> tail_;         // Fewer than kBlockPoses.
+  PathView::Blocks full_ = std::make_shared<const std::vector<PathView::Block>>();
+  std::vector<PathPose> tail_;  // Fewer than kBlockPoses.
 };
 
 }  // namespace cairn::server

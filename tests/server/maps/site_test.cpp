@@ -85,7 +85,7 @@ TEST_F(SiteTest, PublishesOnlyWhatChanged) {
   for (const TileSample& tile : changed) EXPECT_EQ(tile.tile.version, 2U);
   EXPECT_TRUE(TakeTiles().empty());
   EXPECT_EQ(site_->snapshot()->info.version, 2U);
-  EXPECT_EQ(site_->snapshot()->tiles.at({0, 9, 9})->version, 1U);
+  EXPECT_EQ(site_->snapshot()->tiles.Find({0, 9, 9})->version, 1U);
 }
 
 TEST_F(SiteTest, TilesThatCouldNotBeSentGoOutLater) {
@@ -136,6 +136,43 @@ TEST_F(SiteTest, ASwitchIsSeenAllAtOnceWithTombstones) {
   EXPECT_TRUE(corrections_[1].second.grid.chunks.contains({20, 20}));
 }
 
+// Changes that wait are merged, but not with those before the session's answer to a correction.
+TEST_F(SiteTest, AChangeStaysBehindTheAnswerBeforeIt) {
+  const std::uint32_t version = AddVersion({{1, {{{{0, 0}, UniformChunk(-100)}}, 3}}});
+  auto enabled = Enable(version);
+  ASSERT_EQ(corrections_.size(), 1U);
+  std::promise<void> gate;
+  site_->Probe([&] { gate.get_future().wait(); });
+  site_->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(100)}}});
+  site_->Change({.session = 1, .chunks = {{{5, 5}, UniformChunk(100)}}});
+  corrections_[0].second.done({.session = 1,
+                               .displaced = {{{{0, 0}, UniformChunk(100)}, {{5, 5}, UniformChunk(100)}}, 5},
+                               .change = {.session = 1, .chunks = {{{0, 0}, UniformChunk(-100)}, {{5, 5}, nullptr}}}});
+  site_->Change({.session = 1, .chunks = {{{0, 1}, UniformChunk(-50)}}});
+  gate.set_value();
+  EXPECT_TRUE(enabled.get());
+  TakeTiles();
+  const TileSet& tiles = site_->snapshot()->tiles;
+  EXPECT_NE(tiles.Find({0, 0, 1}), nullptr);
+  EXPECT_EQ(tiles.Find({0, 5, 5}), nullptr);
+}
+
+TEST_F(SiteTest, ChangesThatWaitAreOnePieceOfWork) {
+  std::promise<void> gate;
+  site_->Probe([&] { gate.get_future().wait(); });
+  for (int i = 0; i < 1000; ++i) {
+    site_->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(i % 2 == 0 ? 100 : -100)}}});
+    site_->Publish();
+  }
+  const std::uint64_t before = site_->pulse().finished;
+  gate.set_value();
+  TakeTiles();
+  TakeTiles();
+  EXPECT_LE(site_->pulse().finished - before, 10U);
+  const auto tile = site_->snapshot()->tiles.Find({0, 0, 0});
+  EXPECT_EQ((*DecodeCells(tile->bytes, tile->encoding))[0], slam::OccupancyOf(-100));
+}
+
 TEST_F(SiteTest, SessionsTheServerForgotAreSwitchedWithoutThem) {
   site_->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(100)}}});
   TakeTiles();
@@ -145,12 +182,12 @@ TEST_F(SiteTest, SessionsTheServerForgotAreSwitchedWithoutThem) {
   TakeTiles();
   EXPECT_EQ(site_->snapshot()->info.epoch, 1U);
   const auto cells =
-      DecodeCells(site_->snapshot()->tiles.at({0, 0, 0})->bytes, site_->snapshot()->tiles.at({0, 0, 0})->encoding);
+      DecodeCells(site_->snapshot()->tiles.Find({0, 0, 0})->bytes, site_->snapshot()->tiles.Find({0, 0, 0})->encoding);
   EXPECT_EQ((*cells)[0], slam::OccupancyOf(-100));
   EXPECT_TRUE(Enable(1).get());
   TakeTiles();
   const auto again =
-      DecodeCells(site_->snapshot()->tiles.at({0, 0, 0})->bytes, site_->snapshot()->tiles.at({0, 0, 0})->encoding);
+      DecodeCells(site_->snapshot()->tiles.Find({0, 0, 0})->bytes, site_->snapshot()->tiles.Find({0, 0, 0})->encoding);
   EXPECT_EQ((*again)[0], slam::OccupancyOf(100));
 }
 

@@ -134,6 +134,30 @@ TEST_F(DeskTest, ALargeAnswerComesInNumberedParts) {
   EXPECT_EQ(landmarks, kCount);
 }
 
+TEST_F(DeskTest, ALargeAnswerLetsOtherClientsIn) {
+  roster_.Find("r1")->record().SetLandmarks(std::vector<LandmarkReport>(10000));
+  Request large = Of(RequestKind::kLandmarks);
+  Request small = Of(RequestKind::kPing);
+  small.client = 43;
+  desk_.Take(std::move(large));
+  desk_.Take(std::move(small));
+  desk_.Start();
+  int before = 0, after = 0;
+  bool answered = false, last = false;
+  while (!last) {
+    const auto reply = NextReply();
+    ASSERT_TRUE(reply);
+    if (reply->client == 43) {
+      answered = true;
+      continue;
+    }
+    ++(answered ? after : before);
+    last = reply->last;
+  }
+  EXPECT_LE(before, 4);
+  EXPECT_GT(after, 20);
+}
+
 TEST_F(DeskTest, AJobGetsTheWishToEnableItsMap) {
   for (const bool enable : {true, false}) {
     Request submit = Of(RequestKind::kJobSubmit);

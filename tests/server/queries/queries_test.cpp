@@ -8,6 +8,19 @@ namespace {
 
 constexpr Generation kGeneration = 5;
 
+Reply Whole(Answer&& answer) {
+  Reply reply = std::move(answer.reply);
+  for (const auto& tile : answer.tiles) reply.tiles.push_back(*tile);
+  return reply;
+}
+
+std::vector<Reply> AllParts(Answer&& answer) {
+  ReplyParts rest(std::move(answer));
+  std::vector<Reply> parts;
+  while (auto part = rest.Next()) parts.push_back(*std::move(part));
+  return parts;
+}
+
 class Queries : public ::testing::Test {
  protected:
   Queries() {
@@ -42,7 +55,7 @@ class Queries : public ::testing::Test {
     tile->key = key;
     tile->epoch = 3;
     tile->version = version;
-    map_.tiles[key] = tile;
+    map_.tiles = map_.tiles.With({{key, tile}});
   }
   Sessions Robot() { return request_.robot == "r1" ? Sessions{session_} : Sessions{}; }
   Maps Site() { return request_.site == "lab" ? Maps{std::make_shared<const MapSnapshot>(map_)} : Maps{}; }
@@ -53,7 +66,7 @@ class Queries : public ::testing::Test {
       case RequestKind::kPath:
         return AnswerPath(request_, Robot(), Site());
       case RequestKind::kTiles:
-        return AnswerTiles(request_, Site(), kGeneration);
+        return Whole(AnswerTiles(request_, Site(), kGeneration));
       case RequestKind::kLandmarks:
         return AnswerLandmarks(request_, {session_}, Site());
       case RequestKind::kMapInfo:
@@ -186,7 +199,7 @@ TEST_F(Queries, StatusOfOneRobotOrAll) {
 TEST(ReplyParts, AnEmptyAnswerIsOnePart) {
   Reply reply;
   reply.status = {StatusCode::kNotFound, "nothing"};
-  const auto parts = SplitReply(std::move(reply));
+  const auto parts = AllParts(std::move(reply));
   ASSERT_EQ(parts.size(), 1U);
   EXPECT_TRUE(parts[0].last);
   EXPECT_EQ(parts[0].status.code, StatusCode::kNotFound);
@@ -197,13 +210,14 @@ TEST(ReplyParts, LargeAnswersKeepOrderAndStaySmall) {
   reply.client = 3;
   reply.map_version = 9;
   for (int i = 0; i < 10000; ++i) reply.path.push_back({i, {}});
+  std::vector<std::shared_ptr<const Tile>> tiles;
   for (int i = 0; i < 40; ++i) {
-    Tile tile;
-    tile.key = {0, i, 0};
-    tile.bytes.resize(16384);
-    reply.tiles.push_back(tile);
+    auto tile = std::make_shared<Tile>();
+    tile->key = {0, i, 0};
+    tile->bytes.resize(16384);
+    tiles.push_back(std::move(tile));
   }
-  const auto parts = SplitReply(std::move(reply));
+  const auto parts = AllParts({std::move(reply), std::move(tiles)});
   Stamp next_stamp = 0;
   int next_tile = 0;
   for (std::size_t i = 0; i < parts.size(); ++i) {

@@ -1,0 +1,88 @@
+#include "server/queries/reply_parts.h"
+
+#include <utility>
+
+namespace cairn::server {
+namespace {
+
+// Upper estimates of an item's bytes on the wire.
+std::size_t BytesOf(const PoseReport&) {
+  return 384;
+}
+std::size_t BytesOf(const StampedPose&) {
+  return 32;
+}
+std::size_t BytesOf(const std::shared_ptr<const Tile>& tile) {
+  return tile->bytes.size() + 64;
+}
+std::size_t BytesOf(const LandmarkReport&) {
+  return 192;
+}
+std::size_t BytesOf(const MapInfo& info) {
+  std::size_t bytes = 256;
+  for (const MapVersionInfo& version : info.versions) bytes += version.note.size() + 48;
+  return bytes;
+}
+std::size_t BytesOf(const RobotStatus& robot) {
+  return 1024 + robot.session.status.message.size() + robot.ledgers.size() * 512;
+}
+std::size_t BytesOf(const Job& job) {
+  return job.message.size() + job.site.size() + 160;
+}
+
+template <typename Item>
+Item Content(Item&& item) {
+  return std::forward<Item>(item);
+}
+Tile Content(std::shared_ptr<const Tile>&& tile) {
+  return *tile;
+}
+
+}  // namespace
+
+// The part under way and the bytes that it holds so far.
+class ReplyParts::Part {
+ public:
+  // Moves items from `items[taken]` on into `list`; false where the part is full before the last one.
+  template <typename From, typename To>
+  bool Take(std::vector<From>& items, std::size_t& taken, std::vector<To>& list) {
+    for (; taken < items.size(); ++taken) {
+      const std::size_t bytes = BytesOf(items[taken]);
+      if (used_ > 0 && used_ + bytes > kPartBudgetBytes) return false;
+      used_ += bytes;
+      list.push_back(Content(std::move(items[taken])));
+    }
+    return true;
+  }
+
+ private:
+  std::size_t used_ = 0;
+};
+
+ReplyParts::ReplyParts(Answer&& answer) : tiles_(std::move(answer.tiles)), header_(std::move(answer.reply)) {
+  items_.poses = std::exchange(header_.poses, {});
+  items_.path = std::exchange(header_.path, {});
+  items_.landmarks = std::exchange(header_.landmarks, {});
+  items_.maps = std::exchange(header_.maps, {});
+  items_.robots = std::exchange(header_.robots, {});
+  items_.jobs = std::exchange(header_.jobs, {});
+}
+
+std::optional<Reply> ReplyParts::Next() {
+  if (done_) return std::nullopt;
+  Reply part = header_;
+  ++header_.part;
+  done_ = Fill(part);
+  part.last = done_;
+  return part;
+}
+
+bool ReplyParts::Fill(Reply& part) {
+  Part full;
+  return full.Take(items_.poses, taken_.poses, part.poses) && full.Take(items_.path, taken_.path, part.path) &&
+         full.Take(tiles_, taken_.tiles, part.tiles) && full.Take(items_.landmarks, taken_.landmarks, part.landmarks) &&
+         full.Take(items_.maps, taken_.maps, part.maps) && full.Take(items_.robots, taken_.robots, part.robots) &&
+         full.Take(items_.jobs, taken_.jobs, part.jobs);
+}
+
+}  // namespace cairn::server

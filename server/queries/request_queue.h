@@ -1,0 +1,57 @@
+// The requests that wait for the desk. Clients take turns, so a client with many requests, or with one whose answer is
+// large, delays the others by one turn at most. Bounded: where the queue is full, the newest request of the client that
+// has most waiting gives way to one of a client that has fewer. Thread-safe.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+
+#include "common/mutex.h"
+#include "common/service/request.h"
+#include "server/queries/reply_parts.h"
+
+namespace cairn::server {
+
+// A request, and what is still to be sent of its answer.
+struct OpenRequest {
+  Request request;
+  std::optional<ReplyParts> rest;  // Nothing: not answered yet.
+};
+
+class RequestQueue {
+ public:
+  // `capacity` must be at least 1.
+  explicit RequestQueue(std::size_t capacity) : capacity_(capacity) {}
+
+  // Returns the request that found no place: this one or another. Nothing where there was room.
+  [[nodiscard]] std::optional<Request> Push(Request&& request) CAIRN_EXCLUDES(mutex_);
+  // Waits for the next client's turn. Nothing where the queue is closed and empty.
+  [[nodiscard]] std::optional<OpenRequest> Pop() CAIRN_EXCLUDES(mutex_);
+  // A request from Pop whose answer is not sent whole: it goes on at its client's next turn, before the client's
+  // others.
+  void PutBack(OpenRequest&& open) CAIRN_EXCLUDES(mutex_);
+  // Nothing more comes in, what is inside still goes out.
+  void Close() CAIRN_EXCLUDES(mutex_);
+
+  [[nodiscard]] std::size_t size() const CAIRN_EXCLUDES(mutex_);
+  // How many values have left the queue so far.
+  [[nodiscard]] std::uint64_t taken() const CAIRN_EXCLUDES(mutex_);
+
+ private:
+  using Waiting = std::deque<OpenRequest>;
+  Waiting& QueueOf(ClientId client) CAIRN_REQUIRES(mutex_);
+
+  const std::size_t capacity_;
+  mutable Mutex mutex_;
+  CondVar filled_;
+  std::map<ClientId, Waiting> clients_ CAIRN_GUARDED_BY(mutex_);  // None is empty.
+  std::deque<ClientId> turns_ CAIRN_GUARDED_BY(mutex_);           // Those of `clients_`, the next one first.
+  std::size_t size_ CAIRN_GUARDED_BY(mutex_) = 0;
+  std::uint64_t taken_ CAIRN_GUARDED_BY(mutex_) = 0;
+  bool closed_ CAIRN_GUARDED_BY(mutex_) = false;
+};
+
+}  // namespace cairn::server
