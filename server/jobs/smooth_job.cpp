@@ -1,10 +1,12 @@
 #include "server/jobs/smooth_job.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <future>
 #include <map>
 #include <memory>
+#include <optional>
 #include <utility>
 
 #include "common/bounded_channel.h"
@@ -16,6 +18,15 @@ namespace {
 using Clock = std::chrono::steady_clock;
 // A waiting job checks this often whether it was cancelled or its time has passed.
 constexpr auto kLook = std::chrono::milliseconds(50);
+
+// Who comes first decides: the site, which then begins, or the job, which then no longer wants it.
+class Decision {
+ public:
+  bool Take() { return !taken_.exchange(true); }
+
+ private:
+  std::atomic<bool> taken_ = false;
+};
 
 }  // namespace
 
@@ -61,14 +72,15 @@ Result<JobOutcome> SmoothJob::Run(const Job& job, bool enable, const JobControl&
   auto smoothed = SmoothSite(job, *material, control);
   if (!smoothed) return tl::unexpected(smoothed.error());
   JobOutcome outcome = std::move(smoothed->outcome);
-  const auto number = Await(job.site, control, [&](Site& site, Site::Done done) {
-    site.AddVersion(std::move(smoothed->version), std::move(done));
+  const auto number = Await(job.site, control, [&](Site& site, Site::Done done, Site::Wanted wanted) {
+    site.AddVersion(std::move(smoothed->version), std::move(done), std::move(wanted));
   });
   if (!number) return tl::unexpected(number.error());
   outcome.map_version = *number;
   if (!enable || control.cancelled()) return outcome;
-  const auto enabled = Await(
-      job.site, control, [version = *number](Site& site, Site::Done done) { site.Enable(version, std::move(done)); });
+  const auto enabled = Await(job.site, control, [version = *number](Site& site, Site::Done done, Site::Wanted wanted) {
+    site.Enable(version, std::move(done), std::move(wanted));
+  });
   if (!enabled) return tl::unexpected(enabled.error());
   return outcome;
 }
@@ -101,18 +113,28 @@ Result<std::vector<SessionMaterial>> SmoothJob::Collect(const std::string& site,
   return all;
 }
 
-Result<std::uint32_t> SmoothJob::Await(const std::string& name, const JobControl& control,
-                                       const std::function<void(Site&, Site::Done)>& ask) const {
+Result<std::uint32_t> SmoothJob::Await(const std::string& name, const JobControl& control, const Ask& ask) const {
   const auto site = atlas_.Find(name);
   if (site == nullptr) return Fail(StatusCode::kNotFound, "no site '" + name + "'");
   const auto promise = std::make_shared<std::promise<Result<std::uint32_t>>>();
   auto answer = promise->get_future();
-  ask(*site, [promise](Result<std::uint32_t> result) { promise->set_value(std::move(result)); });
-  const auto deadline = Clock::now() + std::chrono::duration<double>(options_.snapshot_timeout_s);
+  const auto decision = std::make_shared<Decision>();
+  ask(
+      *site, [promise](Result<std::uint32_t> result) { promise->set_value(std::move(result)); },
+      [decision] { return decision->Take(); });
+  const auto timeout = std::chrono::duration<double>(options_.snapshot_timeout_s);
+  const auto deadline = Clock::now() + timeout;
+  std::optional<Clock::time_point> cancelled;
   while (answer.wait_for(kLook) != std::future_status::ready) {
-    if (control.cancelled()) return Fail(StatusCode::kCancelled, "cancelled");
-    if (Clock::now() > deadline) {
+    const auto now = Clock::now();
+    if (control.cancelled() && !cancelled) cancelled = now;
+    if (cancelled && decision->Take()) return Fail(StatusCode::kCancelled, "cancelled");
+    if (now > deadline && decision->Take()) {
       return Fail(StatusCode::kDeadlineExceeded, "the site did not answer in time (jobs.snapshot_timeout_s)");
+    }
+    if (cancelled && now > *cancelled + timeout) {
+      return Fail(StatusCode::kCancelled,
+                  "cancelled while the site was at work; it may still complete the new version");
     }
   }
   return answer.get();

@@ -2,8 +2,9 @@
 // particle (fitted to all steps, revisits and loops: slam/smoothing) and draws the robot's grid along the
 // smoothed path. The result is published as a new map version, which is disabled at first. Each robot is
 // smoothed separately; relations between robots are not searched. Source: thesis A 5.4 (full-SLAM path of the
-// best particle). Thread rule: runs on the job worker's thread. It waits for the sessions and for the site,
-// at most jobs.snapshot_timeout_s each; no other thread waits for it.
+// best particle). Thread rule: runs on the job worker's thread. It waits for the sessions and for
+// the site, at most jobs.snapshot_timeout_s each, and for a switch of versions that has begun until it is complete; no
+// other thread waits for it.
 #pragma once
 
 #include <functional>
@@ -38,9 +39,10 @@ class SmoothJob {
 
  private:
   Result<std::vector<SessionMaterial>> Collect(const std::string& site, const JobControl& control) const;
-  // Sends `ask` to the site and waits for its answer, a map version.
-  Result<std::uint32_t> Await(const std::string& site, const JobControl& control,
-                              const std::function<void(Site&, Site::Done)>& ask) const;
+  using Ask = std::function<void(Site&, Site::Done, Site::Wanted)>;
+  // Sends `ask` to the site and waits for its answer, a map version. DEADLINE_EXCEEDED, CANCELLED: the site had not
+  // begun by then, and will not. What it has begun is waited for, because it can not be taken back.
+  Result<std::uint32_t> Await(const std::string& site, const JobControl& control, const Ask& ask) const;
 
   const JobsOptions options_;
   const Roster& roster_;

@@ -137,8 +137,9 @@ void Site::Join(NameId robot, SessionId session, std::weak_ptr<GridOwner> owner)
   });
 }
 
-void Site::AddVersion(MapVersion&& version, Done done) {
-  Run([version = std::move(version), done = Once(std::move(done))](Site& site) mutable {
+void Site::AddVersion(MapVersion&& version, Done done, Wanted wanted) {
+  Run([version = std::move(version), done = Once(std::move(done)), wanted = std::move(wanted)](Site& site) mutable {
+    if (wanted && !wanted()) return done(Fail(StatusCode::kCancelled, "no longer wanted"));
     const std::uint32_t number = site.versions_.Add(std::move(version), site.switch_ ? site.switch_->version : 0);
     site.StoreVersion(number);
     site.RemoveOldVersions();
@@ -149,8 +150,9 @@ void Site::AddVersion(MapVersion&& version, Done done) {
   });
 }
 
-void Site::Enable(std::uint32_t version, Done done) {
-  Run([version, done = Once(std::move(done))](Site& site) mutable {
+void Site::Enable(std::uint32_t version, Done done, Wanted wanted) {
+  Run([version, done = Once(std::move(done)), wanted = std::move(wanted)](Site& site) mutable {
+    if (wanted && !wanted()) return done(Fail(StatusCode::kCancelled, "no longer wanted"));
     if (site.switch_) {
       return done(Fail(StatusCode::kUnavailable, "another map version is being enabled; try again later"));
     }

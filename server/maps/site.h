@@ -46,6 +46,8 @@ class Site : public std::enable_shared_from_this<Site> {
  public:
   // Receives a map version; called once, on the site's strand. INTERNAL if the work ended with an exception.
   using Done = std::function<void(Result<std::uint32_t>)>;
+  // Asked once, on the site's strand, before the work begins; false: the work is not done, and the answer is CANCELLED.
+  using Wanted = std::function<bool()>;
 
   // `journal`: null where nothing is stored. `generation`: of this start of the server.
   Site(const std::string& name, double resolution_m, const MapsOptions& options, asio::thread_pool& pool,
@@ -66,9 +68,9 @@ class Site : public std::enable_shared_from_this<Site> {
   // The session exists no more. Its part of the map stays, and is stored as such instead of the session.
   void Leave(SessionId session);
   // Adds a disabled version; `done` receives its number.
-  void AddVersion(MapVersion&& version, Done done);
+  void AddVersion(MapVersion&& version, Done done, Wanted wanted = {});
   // UNAVAILABLE: another switch is under way. NOT_FOUND: the version does not exist or has been removed.
-  void Enable(std::uint32_t version, Done done);
+  void Enable(std::uint32_t version, Done done, Wanted wanted = {});
   // Renders and publishes what changed, soon; does nothing where an earlier call still waits for the strand.
   void Publish();
   // Does nothing but call `done` on the strand, to show that the strand makes progress.

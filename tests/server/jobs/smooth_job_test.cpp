@@ -178,6 +178,28 @@ TEST_F(SmoothJobTest, AJobThatIsCancelledWhileItWaitsForItsSiteEndsAtOnce) {
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
 }
 
+// The job said failed, and the switch was completed later.
+TEST_F(SmoothJobTest, ASwitchThatHasBegunIsWaitedFor) {
+  std::promise<void> release;
+  const std::shared_future<void> robot_held = release.get_future().share();
+  bool holds = false;
+  // The robot has handed over its state by the last step, and answers the correction late.
+  JobControl control([&](double progress) {
+    if (progress < 0.75 || std::exchange(holds, true)) return;
+    EXPECT_TRUE(roster_.Find("r1")->Post(SnapshotWanted{[robot_held](SessionMaterial&&) { robot_held.wait(); }}));
+  });
+  constexpr double kTimeoutS = 3.0;
+  JobsOptions options;
+  options.snapshot_timeout_s = kTimeoutS;
+  auto job =
+      std::async(std::launch::async, [&] { return SmoothJob(options, roster_, atlas_).Run(job_, true, control); });
+  EXPECT_EQ(job.wait_for(std::chrono::duration<double>(1.5 * kTimeoutS)), std::future_status::timeout);
+  release.set_value();
+  const auto outcome = job.get();
+  ASSERT_TRUE(outcome) << outcome.error().message;
+  EXPECT_EQ(atlas_.Find("lab")->snapshot()->info.enabled_version, outcome->map_version);
+}
+
 // A robot with a fit of some ten seconds: loops between random keyframes contradict each other and leave no sparse
 // order for the elimination. Its scans have one beam each, so that drawing them takes no time.
 SessionMaterial MaterialWithALongFit() {
