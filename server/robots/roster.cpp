@@ -252,7 +252,7 @@ void Roster::Take(ScanArrival&& arrival) {
                                                                                               : DropReason::kNoSession;
   if (session != nullptr && session->Take(std::move(arrival))) return;
   const MutexLock lock(mutex_);
-  unclaimed_.Count(stream, sequence, reason);
+  unclaimed_.Count(stream, sequence, reason, UnclaimedStreams::Clock::now());
 }
 
 void Roster::Take(OdometryArrival&& arrival) {
@@ -289,6 +289,11 @@ void Roster::Tick() {
   RetireGone();
   const MutexLock lock(mutex_);
   for (Ledger& ledger : unclaimed_.TakeChanged()) outbound_.Send(std::move(ledger));
+  unclaimed_.ForgetSilent(UnclaimedStreams::Clock::now(), [this](const Ledger& ledger) CAIRN_REQUIRES(mutex_) {
+    const auto session = sessions_.find(ledger.robot_id);
+    const bool used = session != sessions_.end() && session->second->record().Has(ledger.sensor_id);
+    return used || outbound_.Send(Retired{ledger});
+  });
 }
 
 // Once a session that was removed has said its last word, the keys that nobody uses any more are given back.

@@ -2,7 +2,7 @@
 
 namespace cairn::server {
 
-void UnclaimedStreams::Count(const StreamId& stream, std::uint64_t sequence, DropReason reason) {
+void UnclaimedStreams::Count(const StreamId& stream, std::uint64_t sequence, DropReason reason, Clock::time_point now) {
   const std::pair key(stream.robot_id, stream.sensor_id);
   auto found = accounts_.find(key);
   if (found == accounts_.end()) {
@@ -17,6 +17,7 @@ void UnclaimedStreams::Count(const StreamId& stream, std::uint64_t sequence, Dro
   }
   Account& account = found->second;
   account.changed = true;
+  account.counted = now;
   if (reason == DropReason::kNotOwner) {
     account.ledger.DroppedForeign(reason);
     return;
@@ -40,6 +41,12 @@ std::vector<Ledger> UnclaimedStreams::TakeChanged() {
     changed.push_back(account.ledger.ledger());
   }
   return changed;
+}
+
+void UnclaimedStreams::ForgetSilent(Clock::time_point now, const std::function<bool(const Ledger&)>& retire) {
+  std::erase_if(accounts_, [&](const auto& stream) {
+    return now - stream.second.counted > kForgottenAfter && retire(stream.second.ledger.ledger());
+  });
 }
 
 }  // namespace cairn::server

@@ -1,9 +1,11 @@
 // Scans that belong to no session, counted per stream as no_session. The table is bounded, so that a client that
-// invents stream ids costs a fixed amount of memory. Streams beyond the bound are counted together in overflow(). Not
-// thread-safe: the roster's lock guards it.
+// invents stream ids costs a fixed amount of memory. Streams beyond the bound are counted together in overflow(). A
+// stream that has been silent for kForgottenAfter is forgotten. Not thread-safe: the roster's lock guards it.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <utility>
@@ -16,20 +18,26 @@ namespace cairn::server {
 
 class UnclaimedStreams {
  public:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::minutes kForgottenAfter{10};
+
   explicit UnclaimedStreams(std::size_t max_streams) : max_streams_(max_streams) {}
 
-  void Count(const StreamId& stream, std::uint64_t sequence, DropReason reason);
+  void Count(const StreamId& stream, std::uint64_t sequence, DropReason reason, Clock::time_point now);
   // The account of a stream whose session has just been opened, if anything was sent under its name before. Where that
   // was sent in another session, the numbers start anew.
   [[nodiscard]] std::optional<StreamLedger> Claim(const StreamId& stream);
   // Accounts that changed since the last call.
   [[nodiscard]] std::vector<Ledger> TakeChanged();
+  // Forgets the silent streams whose account `retire` accepts (it gives back the key on the wire; false: later).
+  void ForgetSilent(Clock::time_point now, const std::function<bool(const Ledger&)>& retire);
   [[nodiscard]] std::uint64_t overflow() const { return overflow_; }
 
  private:
   struct Account {
     StreamLedger ledger;
     SessionToken session = 0;  // Of the last sample.
+    Clock::time_point counted{};
     bool changed = true;
 
     void NextIn(SessionToken next) {
