@@ -368,22 +368,6 @@ TEST(Mapper, TakesOnlyTheWayAlongABareCorridorFromOdometryAndSaysSo) {
   EXPECT_NEAR(std::sqrt(outcome.covariance(0, 0)), 0.045, 0.02);
 }
 
-TEST(Mapper, IsFullWithTheLastChunkThatTheOptionsAllow) {
-  const auto scan = std::make_shared<const Scan>(Look(test::Office(), {}, {}));
-  Mapper unbounded({}, {}, 1);
-  static_cast<void>(unbounded.Process(scan, {}, SerialFor));
-  const auto chunks = static_cast<std::int64_t>(unbounded.grid().chunk_count());
-  ASSERT_GT(chunks, 0);
-  for (const std::int64_t more : {0, 1}) {
-    MapperOptions options;
-    options.max_chunks = chunks + more;
-    Mapper mapper(options, {}, 1);
-    EXPECT_FALSE(mapper.full());
-    static_cast<void>(mapper.Process(scan, {}, SerialFor));
-    EXPECT_EQ(mapper.full(), more == 0);
-  }
-}
-
 TEST(Mapper, StandingStillAddsNoKeyframes) {
   MapperOptions options;
   Mapper mapper(options, {}, 1);
