@@ -23,14 +23,14 @@ class BoundedChannel {
   BoundedChannel(const BoundedChannel&) = delete;
   BoundedChannel& operator=(const BoundedChannel&) = delete;
 
-  // False where the channel is full or closed: `value` is then untouched.
+  // False if the channel is full or closed: `value` is then untouched.
   [[nodiscard]] bool TryPush(T&& value) CAIRN_EXCLUDES(mutex_) {
     MutexLock lock(mutex_);
     return PushLocked(std::move(value));
   }
   [[nodiscard]] bool TryPush(const T& value) CAIRN_EXCLUDES(mutex_) { return TryPush(T(value)); }
 
-  // Waits for room. False where the channel is or becomes closed, or a stop is requested.
+  // Waits for room. False if the channel is or becomes closed, or a stop is requested.
   [[nodiscard]] bool Push(T value, std::stop_token stop = {}) CAIRN_EXCLUDES(mutex_) {
     const std::stop_callback wake(stop, [this] { Wake(); });
     MutexLock lock(mutex_);
@@ -38,7 +38,7 @@ class BoundedChannel {
     return !stop.stop_requested() && PushLocked(std::move(value));
   }
 
-  // Waits for a value. Nothing where the channel is closed and empty, or a stop is requested (values may remain).
+  // Waits for a value. Nothing if the channel is closed and empty, or a stop is requested (values may remain).
   [[nodiscard]] std::optional<T> Pop(std::stop_token stop = {}) CAIRN_EXCLUDES(mutex_) {
     const std::stop_callback wake(stop, [this] { Wake(); });
     MutexLock lock(mutex_);

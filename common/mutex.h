@@ -63,7 +63,7 @@ class CondVar {
     lock.release();
   }
 
-  // False where the time is up.
+  // False if the time is up.
   template <typename Clock, typename Duration>
   bool WaitUntil(Mutex& mutex, const std::chrono::time_point<Clock, Duration>& deadline) CAIRN_REQUIRES(mutex) {
     std::unique_lock<std::mutex> lock(mutex.mutex_, std::adopt_lock);

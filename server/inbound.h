@@ -54,11 +54,11 @@ class Inbound {
   // At most `capacity` values of streams wait, as many questions, and kMaxControl session requests.
   explicit Inbound(std::size_t capacity) : capacity_(capacity) {}
 
-  // False where the value's lane is full or the channel is closed: `value` is then untouched.
+  // False if the value's lane is full or the channel is closed: `value` is then untouched.
   [[nodiscard]] bool TryPush(InboundValue&& value) CAIRN_EXCLUDES(mutex_);
-  // Waits for room; false where the channel is or becomes closed.
+  // Waits for room; false if the channel is or becomes closed.
   [[nodiscard]] bool Push(InboundValue value) CAIRN_EXCLUDES(mutex_);
-  // The value that came first; waits for one. Nothing where the channel is closed and empty, or a stop is requested.
+  // The value that came first; waits for one. Nothing if the channel is closed and empty, or a stop is requested.
   [[nodiscard]] std::optional<InboundValue> Pop(const std::stop_token& stop = {}) CAIRN_EXCLUDES(mutex_);
   // Nothing more comes in, what is inside still goes out.
   void Close() CAIRN_EXCLUDES(mutex_);

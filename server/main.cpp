@@ -49,7 +49,7 @@ struct Watched {
   const Ingress& ingress;
   const Egress& egress;
   OtherServers& others;
-  const Journal* journal;  // Null where nothing is stored.
+  const Journal* journal;  // Null if nothing is stored.
 };
 
 DoorCounts LossesOf(const Watched& watched) {
@@ -75,7 +75,7 @@ void Look(asio::steady_timer& timer, const Watched& watched, DoorLosses& losses,
       notifier.Status("messages lost between DDS and the server: " + TextOf(counts));
     }
     const JournalHealth health = watched.journal == nullptr ? JournalHealth{} : watched.journal->health();
-    if (health.degraded) notifier.Status("degraded, what arrives now is not durable: " + health.reason);
+    if (health.degraded) notifier.Status("degraded, new data is not stored: " + health.reason);
     Look(timer, watched, losses, notifier);
   });
 }
@@ -111,15 +111,15 @@ std::uint64_t MillisecondsSince1970() {
       std::max<std::int64_t>(1, std::chrono::duration_cast<std::chrono::milliseconds>(since_1970).count()));
 }
 
-// A later start may find the store free or the disk repaired; a newer or damaged store stays as it is.
+// A later start may succeed if another server used the store or the disk failed. A newer or damaged store stays so.
 int ExitCodeOf(const Status& status) {
   return status.code == StatusCode::kFailedPrecondition || status.code == StatusCode::kDataLoss ? 2 : 1;
 }
 
-// What outlives the process, and the number of this start.
+// The store and its journal, and the number of this start.
 struct KeptState {
   std::unique_ptr<Store> store;
-  std::unique_ptr<Journal> journal;  // Null where nothing is stored.
+  std::unique_ptr<Journal> journal;  // Null if nothing is stored.
   Generation generation = MillisecondsSince1970();
 };
 
@@ -137,7 +137,7 @@ Result<KeptState> OpenState(const StoreOptions& options, const std::filesystem::
   return kept;
 }
 
-// Writes what still waits. The exit code of a server that stops on request.
+// Writes what still waits. Returns the exit code of a server that stops on request.
 int StopJournal(Journal& journal) {
   journal.Stop();
   const JournalCounts counts = journal.counts();

@@ -52,7 +52,8 @@ void Visit(OptionVisitor& visitor, ServerOptions& options) {
   visitor.Section("robots", "Robots and their queues.", [&] { Visit(visitor, options.robots); });
   visitor.Section("maps", "The joint map of each site.", [&] { Visit(visitor, options.maps); });
   visitor.Section("jobs", "Work in the background, such as smoothing.", [&] { Visit(visitor, options.jobs); });
-  visitor.Section("store", "What outlives the server. The option --state of cairnd says where it is.",
+  visitor.Section("store",
+                  "The state that outlives the server. Its directory is given by the option --state of cairnd.",
                   [&] { Visit(visitor, options.store); });
   const ProcessOptions& process = options.server;
   const auto sites = static_cast<std::int64_t>(process.site_names().size());

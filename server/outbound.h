@@ -1,10 +1,10 @@
-// What the rooms hand to the doors: plain values over bounded lanes. The only way out.
+// The values that the rooms of the server send to clients, in bounded lanes. There is no other way out.
 // Three lanes, so that a large answer or a whole map never delays a pose: `live` (session states, refusals, poses,
-// ledgers, jobs), `map` (map info, tiles), `replies`. Overflow rule: Send never waits and says false; values that
-// describe a state (session, ledger, map, tile, job) stay marked as unsent with their owner, who sends their newest
-// form later; a pose is superseded by the next; a reply is lost and its client's deadline passes. What was accepted
-// belongs to the door: it sends a state again that DDS did not take. Every refusal is counted, also that of a state
-// that is sent later. Thread rule: any thread.
+// ledgers, jobs), `map` (map info, tiles), `replies`. Overflow rule: Send never waits and returns false if its lane
+// is full. The owner of a state (session, ledger, map, tile, job) then marks it as unsent and sends its newest form
+// later; a lost pose is replaced by the next one; if a reply is lost, its client's deadline passes. Once Send has
+// accepted a value, the egress is responsible for it: it sends a state again that DDS did not accept. Every refusal is
+// counted, also that of a state which is sent later. Thread rule: any thread.
 #pragma once
 
 #include <array>
@@ -18,7 +18,7 @@
 
 namespace cairn::server {
 
-// What the keys of `of` name exists no more: nothing is sent under them until it exists again.
+// The object that the keys of `of` name no longer exists. Nothing is sent under these keys until it exists again.
 struct Retired {
   std::variant<SessionState, PoseReport, Ledger, Job> of;
 };

@@ -148,7 +148,7 @@ void Server::CheckJournal() {
   const JournalHealth health = journal_->health();
   if (health.degraded == std::exchange(journal_degraded_, health.degraded)) return;
   if (health.degraded) {
-    spdlog::error("degraded, what arrives now is not durable: {}", health.reason);
+    spdlog::error("degraded, new data is not stored: {}", health.reason);
   } else {
     spdlog::info("the store works again; everything is durable");
   }

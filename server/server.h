@@ -26,14 +26,14 @@ namespace cairn::server {
 
 class Server {
  public:
-  // `generation`: of this start of the server; the egress stamps the same one.
-  // `journal` makes the state durable, and holds that of the servers before; null: nothing is stored. The caller stops
-  // it after the server.
+  // `generation`: the number of this start of the server, the same as that of the egress.
+  // `journal` stores the state and contains that of earlier servers; null: nothing is stored. The caller stops it after
+  // the server.
   Server(const ServerOptions& options, Inbound& inbound, Outbound& outbound, Generation generation,
          Journal* journal = nullptr);
   ~Server();
 
-  // Takes up what is stored, makes the configured sites and starts the threads.
+  // Restores what is stored, creates the configured sites and starts the threads.
   Result<void> Start();
   // Accepts no more values and finishes the accepted ones within server.stop_timeout_s; the rest is dropped
   // and counted. Then it publishes the last state of every session and closes the outbound lanes.
@@ -70,7 +70,7 @@ class Server {
   Desk desk_;
   Heartbeat heartbeat_;
   std::size_t first_site_ = 0;     // Of the next publication; used by housekeeping only.
-  bool journal_degraded_ = false;  // As it was last logged.
+  bool journal_degraded_ = false;  // As last logged.
   std::atomic<bool> healthy_{true};
   std::atomic<bool> stopping_{false};
   std::jthread housekeeping_;

@@ -66,7 +66,7 @@ class ChildProcess {
     return false;
   }
 
-  // Reads on until its output holds the text; false where it ends, or the deadline passes, without.
+  // Reads on until its output holds the text; false if it ends, or the deadline passes, without.
   bool Says(const std::string& text, std::chrono::seconds deadline = std::chrono::seconds(60)) {
     const auto end = std::chrono::steady_clock::now() + deadline;
     while (said_.find(text) == std::string::npos)

@@ -30,7 +30,7 @@ struct CloudExportReport {
   std::optional<sim::CloudError> wall_error;
 };
 
-// Writes the file. Fails where no scan of the log has a pose on the path.
+// Writes the file. Fails if no scan of the log has a pose on the path.
 [[nodiscard]] Result<CloudExportReport> ExportCloud(const Trajectory& path, const CloudExportOptions& options);
 
 }  // namespace cairn::client

@@ -135,11 +135,11 @@ LogReport LogCheck::Finish(const LogSummary& summary) {
     report_.no_return_share = static_cast<double>(no_returns_) / beams;
     report_.invalid_share = static_cast<double>(invalid_) / beams;
   }
-  Judge();
+  CollectFindings();
   return report_;
 }
 
-void LogCheck::Judge() {
+void LogCheck::CollectFindings() {
   const auto error = [this](std::string what, std::string advice) {
     report_.findings.push_back({true, std::move(what), std::move(advice)});
   };

@@ -1,4 +1,4 @@
-// Judges whether a robot log is fit for mapping, before anything is sent: counts, layout, stamps, rates, odometry, and
+// Checks whether a robot log is fit for mapping, before anything is sent: counts, layout, stamps, rates, odometry, and
 // what to do about each finding. It applies the rules that the server applies to scans (ValidateScan), and a few that
 // need the whole log. Not an estimator. One thread at a time; memory does not grow with the log.
 #pragma once
@@ -71,7 +71,7 @@ class LogCheck {
 
   void AddScan(const Scan& scan);
   void AddOdometry(const Odometry& odometry);
-  void Judge();
+  void CollectFindings();
 
   LogReport report_;
   StampTrack scans_;

@@ -12,7 +12,7 @@ class ProgressLine {
   // `terminal`: whether the stream is a terminal. `quiet`: nothing is shown.
   ProgressLine(std::ostream& out, bool terminal, bool quiet) : out_(out), terminal_(terminal), quiet_(quiet) {}
 
-  // `share` is the part that is done, 0..1, or negative where the total is not known. Redraws at most 10 times a second
+  // `share` is the part that is done, 0..1, or negative if the total is not known. Redraws at most 10 times a second
   // (every 5 s elsewhere).
   void Show(double seconds, double share, const std::string& text);
   // Shows the last state in any case and ends the line.

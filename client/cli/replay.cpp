@@ -58,15 +58,15 @@ Result<LogSummary> StreamLog(Program& program, const ReplayArguments& arguments,
   return summary;
 }
 
-// What a server that came and went has cost.
+// The effects of a server that was not reachable for a while.
 std::string FormatInterruptions(const RobotStream& stream) {
   std::string text;
   if (stream.restarted() > 0) {
-    text += fmt::format("the server lost the session {} times; a new one went on where the robot was\n",
+    text += fmt::format("the server lost the session {} times; a new session continued at the robot's pose\n",
                         stream.restarted());
   }
   if (stream.displaced() > 0) {
-    text += fmt::format("{} samples were given up, because too many waited for the server{}{}\n", stream.displaced(),
+    text += fmt::format("{} samples were dropped, because too many waited for the server{}{}\n", stream.displaced(),
                         stream.spill_error().empty() ? "" : ": ", stream.spill_error());
   }
   return text;
@@ -149,7 +149,7 @@ void AddReplay(CLI::App& app, Program& program) {
             "Where the robot stands in the map when the log begins", "X,Y,THETA");
   command
       ->add_option("--spill", arguments->stream.spill_file,
-                   "A new file for what waits for a server that is away, beyond 64 MiB; deleted at the end")
+                   "A new file for samples beyond 64 MiB that wait for a server; deleted at the end")
       ->type_name("FILE");
   command->add_flag("--end", arguments->end, "End the session afterwards; without this it can be resumed");
   AddLogOptions(*command, arguments->reader);

@@ -59,7 +59,7 @@ void RobotStream::OnPose(const PoseReport& pose) {
   latency_ms_.Add(std::chrono::duration<double, std::milli>(now - departure.time).count());
 }
 
-// By stamp, because a new session numbers the scans anew.
+// Keyed by stamp, because a new session numbers the scans from 1 again.
 RobotStream::Departure& RobotStream::DepartureOf(Stamp stamp) {
   return departures_[static_cast<std::uint64_t>(stamp) * 0x9E3779B97F4A7C15ULL % kRemembered];
 }
@@ -69,7 +69,7 @@ ScanAccount RobotStream::AccountOfSession(std::uint64_t sent) const {
   return AccountScans(sent, before_, ledger && ledger->session == session_ ? *ledger : before_);
 }
 
-// What the old session settled stays counted; what it did not is sent again in the new one.
+// The samples that the old session settled stay counted. The others are sent again in the new session.
 void RobotStream::OnRestart(SessionToken session) {
   const std::lock_guard lock(mutex_);
   closed_.Add(AccountOfSession(0));
@@ -79,8 +79,8 @@ void RobotStream::OnRestart(SessionToken session) {
   ++restarted_;
 }
 
-// A robot would go on waiting for its server. For a log or a simulation, a lost server is an error, unless the next one
-// will go on with the session.
+// A robot would wait for its server. For a log or a simulation, a lost server is an error, unless the session is durable,
+// so that the next server continues it.
 Result<void> RobotStream::CheckServer() {
   const SessionState state = client_->session();
   if (state.phase == SessionPhase::kSuspended && state.status.code == StatusCode::kUnavailable && !state.durable)

@@ -28,16 +28,16 @@ struct StreamOptions {
   // The largest number of scans sent and not yet settled: beyond it, sending waits for the server. 0: no limit; the
   // server drops scans that come too fast.
   std::uint64_t window = 0;
-  bool measure_latency = true;  // Not useful where a scan first waits for room in the window.
+  bool measure_latency = true;  // Not useful if a scan first waits for room in the window.
   std::string spill_file = {};  // For samples that have to wait for the server, beyond what fits into memory.
 };
 
 class RobotStream {
  public:
-  // Opens the session; fails where no server answers or it refuses the robot. `program` outlives the stream.
+  // Opens the session; fails if no server answers or it refuses the robot. `program` outlives the stream.
   [[nodiscard]] static Result<std::unique_ptr<RobotStream>> Open(Program& program, const StreamOptions& options);
 
-  // Waits for room in the window; fails where the server settles nothing within the program's timeout, says that it
+  // Waits for room in the window; fails if the server settles nothing within the program's timeout, says that it
   // stops, or has been away for that long.
   [[nodiscard]] Result<void> Send(LogRecord&& record);
   // Waits until everything sent is settled, or the program's timeout has passed: account() tells what is left.
@@ -79,8 +79,8 @@ class RobotStream {
 
   mutable std::mutex mutex_;
   SessionToken session_ = 0;
-  Ledger before_;       // The ledger before the session's first scan; not zero where a session is resumed.
-  ScanAccount closed_;  // Of sessions that a restarted server did not know.
+  Ledger before_;       // The ledger before the session's first scan; not zero if a session is resumed.
+  ScanAccount closed_;  // The counts of sessions that a restarted server did not know.
   int restarted_ = 0;
   std::array<Departure, kRemembered> departures_{};
   Percentiles latency_ms_;

@@ -20,7 +20,7 @@ struct ScanAccount {
   // Adds what another account says became of scans; `sent` too.
   void Add(const ScanAccount& other);
   [[nodiscard]] std::uint64_t dropped_total() const;
-  // Sent scans that are neither used nor dropped nor waiting; negative where the server counts more than were sent.
+  // Sent scans that are neither used nor dropped nor waiting; negative if the server counts more than were sent.
   [[nodiscard]] std::int64_t unexplained() const;
 };
 

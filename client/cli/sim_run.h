@@ -52,7 +52,7 @@ struct SimReport {
 [[nodiscard]] Result<SimReport> RunSim(Program& program, const SimRunOptions& options);
 
 // The processor time that a process has used, read from /proc; load tests print it for the server. Seconds of all its
-// threads, user and system; nothing where there is no such process.
+// threads, user and system; nothing if there is no such process.
 [[nodiscard]] std::optional<double> CpuSecondsOf(int pid);
 
 // The options of `cairn sim` that say what the robots carry: laser, tilting mount, wheels.

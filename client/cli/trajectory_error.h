@@ -26,7 +26,7 @@ struct TrajectoryError {
   double max_rad = 0.0;
 };
 
-// Fails where no pose can be compared.
+// Fails if no pose can be compared.
 [[nodiscard]] Result<TrajectoryError> CompareTrajectories(const Trajectory& estimate, const Trajectory& truth,
                                                           Alignment alignment);
 

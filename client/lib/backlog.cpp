@@ -19,7 +19,7 @@ std::uint64_t& SequenceOf(StreamedSample& sample) {
 }
 
 std::size_t BytesOf(const StreamedSample& sample) {
-  constexpr std::size_t kOverhead = 128;  // Of an entry and its allocations.
+  constexpr std::size_t kOverhead = 128;  // Memory of an entry and its allocations.
   const auto* const scan = std::get_if<ScanSample>(&sample);
   return sizeof(StreamedSample) + kOverhead + (scan != nullptr ? scan->scan.ranges_m.size() * sizeof(float) : 0);
 }
@@ -179,7 +179,7 @@ bool Backlog::HasScan() const {
 
 std::map<NameId, std::uint64_t> Backlog::MoveTo(SessionToken session) {
   if (last_odometry_) {
-    // In memory in front of what may be in the spill file: it counts as one of those.
+    // It is in memory, but in front of samples that may be in the spill file, so it counts as one of those.
     Entry entry;
     entry.sensor_id = last_odometry_->stream.sensor_id;
     entry.sample = std::make_shared<StreamedSample>(*std::exchange(last_odometry_, std::nullopt));

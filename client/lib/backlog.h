@@ -1,8 +1,9 @@
-// What a robot has given to its client and the server may need, or need again: scans and odometry in the order in which
-// they were given. It is cut off at the front as the server says what is safe, and walked through by a cursor: what is
-// behind the cursor was sent, what is before it was not yet.
-// Bounded: beyond `max_bytes` the oldest samples move into the spill file, where there is one; otherwise they are given
-// up and counted. Pure bookkeeping but for that file: no wire, no clock. Not thread-safe.
+// The queue of samples (scans and odometry, in the order in which the robot's program gave them) that the server may
+// need to receive, or to receive again. A sample is removed from the front when the server reports that it is safe
+// (durable, or settled if the server stores nothing). A cursor divides the queue: samples before the cursor were sent,
+// the sample at the cursor is the next one to send. Bounded: above `max_bytes` the oldest samples are moved into the
+// spill file if there is one. Otherwise they are dropped and counted. Does no other I/O and uses no clock. Not
+// thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -27,40 +28,41 @@ class Backlog {
   explicit Backlog(std::size_t max_bytes) : max_bytes_(max_bytes) {}
   void SpillTo(std::unique_ptr<SpillFile> file) { spill_ = std::move(file); }
 
-  // At the end. REQUIRES: the sample has its number.
+  // Adds a sample at the end. REQUIRES: the sample has its sequence number.
   void Add(StreamedSample&& sample);
-  // Removes the newest again: it can never be sent.
+  // Removes the newest sample, because it can never be sent.
   void TakeBack();
-  // What the server has of a stream up to this number will not be needed again. Only what was sent can be safe.
+  // The samples of this stream up to this number are safe on the server and are removed. Samples that were not sent yet
+  // stay.
   void Safe(NameId sensor_id, std::uint64_t through);
 
-  // The sample at the cursor, which then moves on. Nothing where all were sent.
+  // Returns the sample at the cursor and moves the cursor on. Null if all were sent.
   [[nodiscard]] std::shared_ptr<const StreamedSample> Next();
-  // Its number; nothing where all were sent or it is odometry.
+  // Stream and number of the sample at the cursor. Nothing if all were sent or if it is odometry.
   [[nodiscard]] std::optional<std::pair<NameId, std::uint64_t>> next_scan() const;
-  void StepBack();  // The last one from Next was not sent.
+  void StepBack();  // The last sample from Next was not sent.
   void Rewind() { cursor_ = 0; }
   [[nodiscard]] std::size_t unsent() const { return entries_.size() - cursor_; }
   [[nodiscard]] std::size_t size() const { return entries_.size(); }
   [[nodiscard]] bool HasScan() const;
 
-  // All that is kept moves into another session: numbers begin at 1 again, and the last odometry that was safe comes
-  // first, because the first scan needs some before it. Returns the highest number of each stream.
+  // Assigns all samples to another session. Their numbers begin at 1 again. The last odometry sample that was removed
+  // is put in front, because the first scan needs odometry before it. Returns the highest number of each stream.
   std::map<NameId, std::uint64_t> MoveTo(SessionToken session);
 
-  // The odometry at the first kept scan, interpolated; the nearest one where there is none before or none after.
-  // Nothing without a scan or without odometry. `complete`: whether there is odometry at or after the scan.
+  // The odometry at the stamp of the first scan in the queue, interpolated; the nearest sample if there is none before
+  // or none after it. Nothing if there is no scan or no odometry. `complete`: there is odometry at or after the scan.
   struct AtFirstScan {
     Pose2 T_odom_robot;
     bool complete = false;
   };
   [[nodiscard]] std::optional<AtFirstScan> OdometryAtFirstScan() const;
 
-  // Samples given up before they were safe.
+  // Number of samples that were dropped before they were safe.
   [[nodiscard]] std::uint64_t displaced() const { return displaced_; }
-  // Why the spill file is no longer used; empty while it is.
+  // Why the spill file is no longer used; empty while it is used.
   [[nodiscard]] const std::string& spill_error() const { return spill_error_; }
-  [[nodiscard]] std::size_t bytes() const { return bytes_; }  // In memory.
+  [[nodiscard]] std::size_t bytes() const { return bytes_; }  // Memory used.
 
  private:
   struct Entry {
@@ -68,7 +70,7 @@ class Backlog {
     std::uint64_t sequence = 0;
     bool is_scan = false;
     std::size_t bytes = 0;
-    std::shared_ptr<StreamedSample> sample;  // Null where it is in the spill file.
+    std::shared_ptr<StreamedSample> sample;  // Null if it is in the spill file.
     std::uint64_t place = 0;
   };
 
@@ -79,12 +81,12 @@ class Backlog {
 
   const std::size_t max_bytes_;
   std::deque<Entry> entries_;
-  std::size_t cursor_ = 0;   // Into entries_.
-  std::size_t spilled_ = 0;  // So many at the front are in the spill file.
+  std::size_t cursor_ = 0;   // Index in entries_.
+  std::size_t spilled_ = 0;  // Number of entries at the front that are in the spill file.
   std::size_t bytes_ = 0;
   std::map<NameId, std::uint64_t> safe_;
-  std::optional<OdometrySample> last_odometry_;  // The last one that left at the front.
-  SessionToken session_ = 0;                     // What spilled samples belong to by now; 0: as they were given.
+  std::optional<OdometrySample> last_odometry_;  // The last one removed at the front.
+  SessionToken session_ = 0;                     // Session that the spilled samples now belong to; 0: as given.
   std::uint64_t displaced_ = 0;
   std::unique_ptr<SpillFile> spill_;
   std::string spill_error_;

@@ -22,7 +22,7 @@ class PoseClient {
 
   [[nodiscard]] static Result<std::unique_ptr<PoseClient>> Create(wire::Bus& bus, const std::string& robot);
 
-  // The oldest pose that waits, or the next one that arrives; nothing where none arrives within the timeout.
+  // The oldest pose that waits, or the next one that arrives; nothing if none arrives within the timeout.
   [[nodiscard]] std::optional<PoseReport> Next(double timeout_s);
   // Poses dropped because kMaxWaiting others were waiting.
   [[nodiscard]] std::uint64_t dropped() const { return dropped_; }

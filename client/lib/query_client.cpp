@@ -58,7 +58,7 @@ Result<std::unique_ptr<QueryClient>> QueryClient::Create(wire::Bus& bus, const Q
   wire::SubscriptionEvents events;
   events.matched = [self = client.get()](int matched) {
     const MutexLock lock(self->mutex_);
-    if (matched == 0) self->greeted_ = false;
+    if (matched == 0) self->server_found_ = false;
     self->changed_.NotifyAll();
   };
   auto replies = bus.SubscribeReplies(
@@ -81,7 +81,7 @@ void QueryClient::OnReply(Reply&& part) {
 
 Result<Reply> QueryClient::Ask(const Request& request) {
   const Deadline deadline = DeadlineAfter(options_.timeout_s);
-  if (auto greeted = Greet(deadline); !greeted) return tl::unexpected(greeted.error());
+  if (auto found = WaitForServer(deadline); !found) return tl::unexpected(found.error());
   Result<Reply> reply = AskOnce(request, deadline);
   if (reply && !reply->status.ok()) return tl::unexpected(reply->status);
   return reply;
@@ -90,12 +90,12 @@ Result<Reply> QueryClient::Ask(const Request& request) {
 // DDS matches the topic of requests and the topic of replies one after the other, on both sides. Until all four ends
 // have found their peers, an answer may be lost. Only an answered ping proves that they have; a ping may be repeated,
 // while a question that starts a job may not.
-Result<void> QueryClient::Greet(Deadline deadline) {
+Result<void> QueryClient::WaitForServer(Deadline deadline) {
   constexpr std::chrono::milliseconds kPatience{100};
   for (;;) {
     {
       const MutexLock lock(mutex_);
-      if (greeted_) return {};
+      if (server_found_) return {};
       while (requests_->matched() == 0 || replies_->matched() == 0) {
         if (Clock::now() >= deadline) return Fail(StatusCode::kUnavailable, NoServer(bus_, options_.timeout_s));
         changed_.WaitFor(mutex_, std::chrono::milliseconds(5));
@@ -104,7 +104,7 @@ Result<void> QueryClient::Greet(Deadline deadline) {
     const Result<Reply> pong = AskOnce(MakeRequest(RequestKind::kPing), std::min(deadline, Clock::now() + kPatience));
     const MutexLock lock(mutex_);
     if (pong) {
-      greeted_ = true;
+      server_found_ = true;
       return {};
     }
     if (Clock::now() >= deadline) return Fail(StatusCode::kUnavailable, NoServer(bus_, options_.timeout_s));

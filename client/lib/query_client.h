@@ -1,6 +1,6 @@
 // Asks the server and waits for the whole answer. There is one method per question. Each returns the answer, or the
 // server's error (its code and message), or why there is no answer: kUnavailable where no server was found, and
-// kDeadlineExceeded where the answer was late. The time needed to find the server counts towards the timeout.
+// kDeadlineExceeded if the answer was late. The time needed to find the server counts towards the timeout.
 // Thread rule: any number of threads may ask at once, and each waits for its own answer. Do not ask from a callback of
 // the wire: the answer arrives on the thread that the callback would block.
 #pragma once
@@ -32,7 +32,7 @@ struct PathAnswer {
 
 // A part of the map as it was at one moment.
 struct TileAnswer {
-  Generation generation = 0;  // Of the server; epoch and version belong to it.
+  Generation generation = 0;  // The server's; epoch and version count within it.
   std::uint32_t epoch = 0;
   std::uint64_t version = 0;
   std::vector<Tile> tiles;
@@ -62,16 +62,16 @@ class QueryClient {
   // The newest pose, or the pose at a stamp of the robot's clock, interpolated. kUnavailable: the server has not used a
   // scan that late yet; kOutOfRange: the stamp is before the robot's first scan.
   [[nodiscard]] Result<PoseReport> Pose(const std::string& robot, std::optional<Stamp> at = {});
-  // All poses so far, or those of the smoothing job whose map is enabled (kFailedPrecondition where there is none).
+  // All poses so far, or those of the smoothing job whose map is enabled (kFailedPrecondition if there is none).
   [[nodiscard]] Result<PathAnswer> Path(const std::string& robot, bool smoothed = false);
-  // Session, newest pose and ledgers of all robots, or of one (kNotFound where the server does not know it).
+  // Session, newest pose and ledgers of all robots, or of one (kNotFound if the server does not know it).
   [[nodiscard]] Result<std::vector<RobotStatus>> Robots(const std::string& robot = "");
   // Ends the robot's session for good.
   [[nodiscard]] Result<void> EndSession(const std::string& robot);
 
   // All maps.
   [[nodiscard]] Result<std::vector<MapInfo>> Maps();
-  // The map of one site. kNotFound where the server has none of that name.
+  // The map of one site. kNotFound if the server has none of that name.
   [[nodiscard]] Result<MapInfo> Map(const std::string& site);
   [[nodiscard]] Result<TileAnswer> Tiles(const TileQuery& query);
   // The whole map at its finest level. kUnavailable where nothing is drawn yet.
@@ -79,7 +79,7 @@ class QueryClient {
   [[nodiscard]] Result<std::vector<LandmarkReport>> Landmarks(const std::string& site, const Area& area = {});
   // Switches the site to one of its map versions. Returns the map as it is then.
   [[nodiscard]] Result<MapInfo> EnableMap(const std::string& site, std::uint32_t map_version);
-  // Switches to the highest version below the enabled one; kFailedPrecondition where there is none.
+  // Switches to the highest version below the enabled one; kFailedPrecondition if there is none.
   [[nodiscard]] Result<MapInfo> RollBackMap(const std::string& site);
 
   // `enable`: the server switches the site to the job's map version as soon as the job succeeds.
@@ -95,7 +95,7 @@ class QueryClient {
  private:
   QueryClient(wire::Bus& bus, const QueryClientOptions& options);
   void OnReply(Reply&& part);
-  [[nodiscard]] Result<void> Greet(Deadline deadline);
+  [[nodiscard]] Result<void> WaitForServer(Deadline deadline);
   [[nodiscard]] Result<Reply> Ask(const Request& request);
   [[nodiscard]] Result<Job> AskForJob(const Request& request);
   [[nodiscard]] Result<Reply> AskOnce(Request request, Deadline deadline);
@@ -106,7 +106,7 @@ class QueryClient {
 
   Mutex mutex_;
   CondVar changed_;
-  bool greeted_ CAIRN_GUARDED_BY(mutex_) = false;
+  bool server_found_ CAIRN_GUARDED_BY(mutex_) = false;
   std::int64_t sequence_ CAIRN_GUARDED_BY(mutex_) = 0;
   std::map<std::int64_t, ReplyAssembly> pending_ CAIRN_GUARDED_BY(mutex_);  // By sequence; what callers wait for.
 

@@ -93,7 +93,7 @@ Result<void> RobotClient::Connect(wire::Bus& bus) {
   }
   if (auto kept = keep(bus.Subscribe<Ledger>([this](Ledger&& l) { OnLedger(std::move(l)); })); !kept) return kept;
   if (auto kept = keep(bus.Subscribe<PoseReport>([this](PoseReport&& p) { OnPose(std::move(p)); })); !kept) return kept;
-  Ask();  // Kept by the middleware for a server that comes later.
+  Ask();  // The middleware keeps the request for a server that starts later.
   return {};
 }
 
@@ -105,7 +105,7 @@ Result<void> RobotClient::AwaitSession(const wire::Bus& bus, double timeout_s) {
       if (over_) return tl::unexpected(*over_);
       if (state_ && state_->phase == SessionPhase::kEnded)
         return Fail(StatusCode::kFailedPrecondition, fmt::format("the session of '{}' is not active", request_.robot));
-      // The streams must have found the server as well: what is sent before that is lost.
+      // The writers of the streams must have matched too: samples sent before are lost.
       if (Streaming()) return {};
       if (Clock::now() >= deadline) return Fail(StatusCode::kUnavailable, NoServer(bus, timeout_s));
       changed_.WaitFor(mutex_, std::chrono::milliseconds(5));
@@ -123,7 +123,7 @@ void RobotClient::Ask() {
     request = request_;
     asked_ = Clock::now();
   }
-  static_cast<void>(session_->Publish(request));  // What was not accepted is asked again.
+  static_cast<void>(session_->Publish(request));  // If it is not accepted, Watch asks again.
 }
 
 bool RobotClient::Answered() const {
@@ -147,7 +147,7 @@ void RobotClient::OnSession(SessionState&& state) {
     const MutexLock lock(mutex_);
     if (state.generation < generation_) return;
     if (state.session != request_.session) {
-      // In the place of an opened session there is another one.
+      // The robot now has another session than the one that was open.
       if (Answered() && state.generation == generation_ && state.phase == SessionPhase::kActive) {
         over_ = {StatusCode::kAlreadyExists,
                  fmt::format("another client has taken over the session of '{}'", request_.robot)};
@@ -156,7 +156,7 @@ void RobotClient::OnSession(SessionState&& state) {
       return;
     }
     generation_ = state.generation;
-    // The server or this client was away: what is not safe goes again.
+    // The server or this client was not reachable: samples that are not safe are sent again.
     if (!Answered()) {
       sent_before_ = backlog_.size() - backlog_.unsent();
       backlog_.Rewind();
@@ -258,8 +258,8 @@ Result<void> RobotClient::End(double timeout_s) {
   }
 }
 
-// Runs until the client is destroyed: repeats the request until it is answered, opens a new session where the server
-// does not know this one, and sends what has not been sent, or was not settled for resend_after_s.
+// Runs until the client is destroyed. It repeats the request until it is answered, opens a new session if the server
+// does not know this one, and sends samples that were not sent yet or that did not settle within resend_after_s.
 void RobotClient::Watch() {
   for (;;) {
     bool ask = false;
@@ -294,7 +294,7 @@ bool RobotClient::ReadyToReopen() const {
   return (odometry && odometry->complete) || Clock::now() - refused_ > kOdometryPatience;
 }
 
-// The last reported pose, or else the first start, carried on by the odometry since.
+// The last reported pose (or, if there is none, the start of the session), moved on by the odometry since then.
 Pose2 RobotClient::StartOfNextSession() const {
   const Pose2 first = request_.has_start ? request_.T_map_robot_start : Pose2{};
   const auto odometry = backlog_.OdometryAtFirstScan();
@@ -316,7 +316,7 @@ void RobotClient::Reopen() {
     request_.has_start = true;
     request_.T_map_robot_start = start;
     request_.started = false;
-    // Should this session be lost before its first pose, the next one goes on from here.
+    // If this session is lost before its first pose, the next one starts from here.
     if (const auto odometry = backlog_.OdometryAtFirstScan()) T_odom_robot_start_ = odometry->T_odom_robot;
     pose_.reset();
     sent_before_ = backlog_.size() - backlog_.unsent();

@@ -1,10 +1,12 @@
-// A robot's side of its session: opens it, streams scans and odometry no faster than the server settles them, keeps
-// what the server may need again, and sends that again after either side was away. Reports the server's ledger and
-// poses. Scans that the server refused are counted in the ledger and not sent again.
-// Where the server no longer knows the session (it was started anew without its state), the client opens a new one by
-// itself, where the robot is by then, and sends again in it what was not safe. Thread rule:
-// every method from any thread; callbacks run on the wire's threads or the client's own and must return soon.
-// Destroying it without End leaves the session suspended, to be taken up by a client of the same robot.
+// A robot's connection to the server: opens a session, sends scans and odometry no faster than the server settles them,
+// and reports the server's ledgers and poses. It keeps the samples that are not safe on the server yet, and sends them
+// again after the server or the client was not reachable. Scans that the server refused are counted in the ledger and
+// not sent again.
+// If the server does not know the session (for example because it was started again without its state), the client
+// opens a new session by itself. This begins at the robot's present pose, and the samples that were not safe are sent
+// again in it. Thread rule: every method from any thread; callbacks run on threads of the wire or of the client and
+// must return soon. If the client is destroyed without End, the session is suspended, and another client of the same
+// robot can continue it.
 #pragma once
 
 #include <atomic>
@@ -24,11 +26,11 @@
 namespace cairn::client {
 
 struct RobotClientOptions {
-  std::uint64_t window = 32;                            // Of each sensor (ScanWindow).
+  std::uint64_t window = 32;                            // For each sensor (ScanWindow).
   double send_timeout_s = 5.0;                          // How long Publish waits for room before it gives up.
-  double resend_after_s = 2.0;                          // Without progress of the ledger, unsettled samples go again.
-  std::size_t max_kept_bytes = std::size_t{64} << 20U;  // Of samples that the server may need again.
-  std::string spill_file;                               // Takes what is beyond that; empty: the oldest are given up.
+  double resend_after_s = 2.0;                          // If the ledger stands still for so long, sends again.
+  std::size_t max_kept_bytes = std::size_t{64} << 20U;  // Memory for samples that are not safe yet.
+  std::string spill_file;                               // For samples beyond this; if empty, the oldest are dropped.
 };
 
 class RobotClient {
@@ -37,21 +39,21 @@ class RobotClient {
     std::function<void(const Ledger&)> ledger;
     std::function<void(const PoseReport&)> pose;
     std::function<void(const SessionState&)> session;
-    // A new session replaces the one that the server no longer knows.
+    // A new session has replaced one that the server no longer knows.
     std::function<void(SessionToken session, const Pose2& T_map_robot_start)> restarted;
   };
 
-  // Draws a client id and a session, and repeats the request until the server answers. Where it refuses,
-  // its reason is the error; kUnavailable means that no server answers. `request.sensors` names at least one stream.
+  // Draws a client id and a session, and repeats the request until the server answers. If the server refuses, its
+  // reason is the error. kUnavailable: no server answers. `request.sensors` names at least one stream.
   [[nodiscard]] static Result<std::unique_ptr<RobotClient>> Open(wire::Bus& bus, SessionRequest request,
                                                                  double timeout_s, Callbacks callbacks = {},
                                                                  const RobotClientOptions& options = {});
   ~RobotClient();
 
   // Waits for room in the stream's window. The client numbers the samples itself. While no server listens, the sample
-  // is kept and sent later. kUnavailable: no room within send_timeout_s, try the same scan again; kFailedPrecondition:
-  // the session is over; kAlreadyExists: another client has taken it over. The sensor is the request's first, or the
-  // one named.
+  // is kept and sent later. kUnavailable: no room within send_timeout_s; try the same scan again. kFailedPrecondition:
+  // the session has ended. kAlreadyExists: another client has taken it over. The default sensor is the first one of the
+  // request.
   [[nodiscard]] Result<void> Publish(const Scan& scan);
   [[nodiscard]] Result<void> Publish(const Scan& scan, const std::string& sensor);
   [[nodiscard]] Result<void> Publish(const Odometry& odometry);
@@ -69,7 +71,8 @@ class RobotClient {
   [[nodiscard]] std::optional<Ledger> ledger(const std::string& sensor) const;
   [[nodiscard]] std::uint64_t resent() const { return resent_.load(std::memory_order_relaxed); }
   [[nodiscard]] int restarted() const { return restarted_.load(std::memory_order_relaxed); }  // New sessions opened.
-  // Samples given up before they were safe, because too many had to be kept; and why the spill file did not take them.
+  // Number of samples that were dropped before they were safe, because too many had to be kept; and why the spill file
+  // did not take them.
   [[nodiscard]] std::uint64_t displaced() const;
   [[nodiscard]] std::string spill_error() const;
 
@@ -114,19 +117,19 @@ class RobotClient {
   Mutex sending_;  // Held while samples are sent, so that they leave in order. Taken before mutex_.
   mutable Mutex mutex_;
   CondVar changed_;
-  SessionRequest request_ CAIRN_GUARDED_BY(mutex_);            // As it was last published.
-  std::map<NameId, Stream> streams_ CAIRN_GUARDED_BY(mutex_);  // By sensor, and the odometry; fixed after construction.
+  SessionRequest request_ CAIRN_GUARDED_BY(mutex_);            // The one last published.
+  std::map<NameId, Stream> streams_ CAIRN_GUARDED_BY(mutex_);  // Sensors and odometry; fixed after construction.
   Backlog backlog_ CAIRN_GUARDED_BY(mutex_);
-  std::size_t sent_before_ CAIRN_GUARDED_BY(mutex_) = 0;  // So many of the next samples were sent once already.
-  Generation generation_ CAIRN_GUARDED_BY(mutex_) = 0;    // The highest heard of.
+  std::size_t sent_before_ CAIRN_GUARDED_BY(mutex_) = 0;  // How many of the next samples were sent before.
+  Generation generation_ CAIRN_GUARDED_BY(mutex_) = 0;    // The highest received.
   std::optional<SessionState> state_ CAIRN_GUARDED_BY(mutex_);
-  bool answered_ CAIRN_GUARDED_BY(mutex_) = false;  // By a server that has not gone since.
+  bool answered_ CAIRN_GUARDED_BY(mutex_) = false;  // The server that answered is still there.
   bool reopening_ CAIRN_GUARDED_BY(mutex_) = false;
-  std::optional<Status> over_ CAIRN_GUARDED_BY(mutex_);  // Why the session was refused or taken over, for good.
+  std::optional<Status> over_ CAIRN_GUARDED_BY(mutex_);  // Why the session ended for good.
   std::optional<PoseReport> pose_ CAIRN_GUARDED_BY(mutex_);
   std::optional<Pose2> T_odom_robot_start_ CAIRN_GUARDED_BY(mutex_);  // Odometry when the session was opened.
   Clock::time_point asked_ CAIRN_GUARDED_BY(mutex_);
-  Clock::time_point refused_ CAIRN_GUARDED_BY(mutex_);  // Since when it is reopening.
+  Clock::time_point refused_ CAIRN_GUARDED_BY(mutex_);  // When reopening began.
   Clock::time_point progress_ CAIRN_GUARDED_BY(mutex_);
   bool stopping_ CAIRN_GUARDED_BY(mutex_) = false;
 

@@ -1,4 +1,4 @@
-// The part of RobotClient that sends: new samples, and what has to be sent later or again.
+// The part of RobotClient that sends samples: new ones, and those that must be sent later or again.
 #include <fmt/format.h>
 
 #include <utility>
@@ -9,7 +9,8 @@
 namespace cairn::client {
 namespace {
 
-// Scans sent again and not yet settled: less than the server's queue and the writer's history hold.
+// Largest number of scans that were sent again and have not settled: fewer than fit into the server's queue and the
+// writer's history.
 constexpr std::uint64_t kPace = 32;
 
 }  // namespace
@@ -76,7 +77,7 @@ Result<void> RobotClient::Publish(const Odometry& odometry) {
   return AddAndSend(OdometrySample{{robot_id_, sensor_id, 0}, odometry}, *stream);
 }
 
-// Numbers and keeps the sample, and sends it at once where nothing is before it.
+// Numbers and keeps the sample, and sends it at once if no other sample waits before it.
 Result<void> RobotClient::AddAndSend(StreamedSample&& sample, Stream& stream) {
   std::shared_ptr<const StreamedSample> next;
   {
@@ -91,7 +92,7 @@ Result<void> RobotClient::AddAndSend(StreamedSample&& sample, Stream& stream) {
     }
     const bool behind = backlog_.unsent() > 0 || !Streaming();
     backlog_.Add(std::move(sample));
-    changed_.NotifyAll();  // The watcher sends what is behind.
+    changed_.NotifyAll();  // Watch sends the samples that wait.
     if (behind) return {};
     next = backlog_.Next();
   }
@@ -99,7 +100,7 @@ Result<void> RobotClient::AddAndSend(StreamedSample&& sample, Stream& stream) {
   if (sent) return {};
   const MutexLock lock(mutex_);
   if (sent.error().code == StatusCode::kUnavailable) {
-    backlog_.StepBack();  // The writer was busy; the watcher sends the sample again.
+    backlog_.StepBack();  // The writer was busy; Watch sends the sample again.
     return {};
   }
   backlog_.TakeBack();  // It can never be sent: the caller's error.
@@ -113,13 +114,13 @@ Result<void> RobotClient::SendNow(const StreamedSample& sample) {
     const MutexLock lock(mutex_);
     first = !std::exchange(request_.started, true);
   }
-  // Before the first sample, so that no server that comes later opens the session again where it began.
+  // Published before the first sample, so that a server that starts later does not open the session at its old start.
   if (first) Ask();
   if (const auto* const scan = std::get_if<ScanSample>(&sample)) return scans_->Publish(*scan);
   return odometry_->Publish(std::get<OdometrySample>(sample));
 }
 
-// Sends what is before the backlog's cursor, as fast as the server settles it.
+// Sends the samples from the backlog's cursor on, as fast as the server settles them.
 void RobotClient::Pump() {
   const MutexLock sending(sending_);
   for (;;) {
@@ -130,7 +131,7 @@ void RobotClient::Pump() {
       if (stopping_ || !Streaming()) return;
       if (const auto scan = backlog_.next_scan()) {
         const ScanWindow& window = streams_.find(scan->first)->second.window;
-        if (scan->second > window.settled_through() + kPace) return;  // The next ledger wakes the watcher.
+        if (scan->second > window.settled_through() + kPace) return;  // Watch continues with the next ledger.
       }
       sample = backlog_.Next();
       if (sample == nullptr) return;

@@ -1,5 +1,5 @@
-// The numbers of one stream (robot, sensor) of a session: the next one to give, how far the server has come, and
-// whether the next sample must wait. Pure bookkeeping: no wire, no clock. Not thread-safe.
+// Numbers the samples of one stream (robot, sensor) of a session, and tells whether the next sample must wait until the
+// server has settled earlier ones. Does no I/O and uses no clock. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -18,12 +18,12 @@ class ScanWindow {
   [[nodiscard]] bool HasRoom() const { return window_ == 0 || sent_ < settled_through_ + window_; }
   // The number of the next sample: 1, 2, 3, ...
   [[nodiscard]] std::uint64_t Next() { return ++sent_; }
-  // The last number is given back.
+  // Makes the last number free again.
   void TakeBack() { --sent_; }
-  // The newest ledger counts, and not the highest: a server that was restarted without its state has settled less than
-  // before, and would otherwise be sent more than the window allows.
+  // The newest ledger counts, not the highest one: a server that was restarted without its state has settled less than
+  // before, and must not be sent more than the window allows.
   void OnLedger(const Ledger& ledger) { settled_through_ = ledger.settled_through; }
-  // A new session, in which `sent` numbers are given already.
+  // Begins a new session in which the numbers up to `sent` are already used.
   void Restart(std::uint64_t sent) {
     sent_ = sent;
     settled_through_ = 0;

@@ -1,5 +1,5 @@
 // A file that takes what does not fit into memory: records of bytes, each after its length (32 bits, in this machine's
-// order). It belongs to one process and means nothing to another: it is made empty, and deleted at the end.
+// order). It belongs to one process and cannot be read by another one: it is created empty and deleted at the end.
 // Not thread-safe: one owner.
 #pragma once
 
@@ -14,13 +14,13 @@ namespace cairn::client {
 
 class SpillFile {
  public:
-  // kUnavailable: the file cannot be made. kAlreadyExists: there is a file of that name; nobody's file is overwritten.
+  // kUnavailable: the file cannot be created. kAlreadyExists: there is a file of that name; it is never overwritten.
   [[nodiscard]] static Result<std::unique_ptr<SpillFile>> Create(const std::string& path);
   ~SpillFile();
   SpillFile(const SpillFile&) = delete;
   SpillFile& operator=(const SpillFile&) = delete;
 
-  // Where the record is. kUnavailable: it was not written, for example because the disk is full.
+  // Returns the place of the record. kUnavailable: it was not written, for example because the disk is full.
   [[nodiscard]] Result<std::uint64_t> Append(std::string_view record);
   // kDataLoss: there is no whole record at this place.
   [[nodiscard]] Result<std::string> Read(std::uint64_t place) const;

@@ -23,7 +23,7 @@ class TileMirror {
 
   explicit TileMirror(NameId site_id) : site_id_(site_id) {}
 
-  // True where it changed the mirror. Other sites' values are ignored.
+  // True if it changed the mirror. Other sites' values are ignored.
   bool Apply(MapInfo&& info);
   bool Apply(TileSample&& sample);
 
@@ -40,9 +40,9 @@ class TileMirror {
  private:
   struct Entry {
     std::uint64_t version = 0;
-    std::optional<Tile> tile;  // Nothing where the tile was removed.
+    std::optional<Tile> tile;  // Empty if the tile was removed.
   };
-  // False where the generation or the epoch is void.
+  // False if the generation or the epoch is void.
   bool Enter(Generation generation, std::uint32_t epoch);
 
   const NameId site_id_;

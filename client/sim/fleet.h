@@ -46,7 +46,7 @@ struct FleetRecord {
 
 class Fleet {
  public:
-  // Fails where the options are out of range or the world has no route.
+  // Fails if the options are out of range or the world has no route.
   [[nodiscard]] static Result<Fleet> Create(Surroundings surroundings, const FleetOptions& options);
   [[nodiscard]] static Result<Fleet> Create(World world, const FleetOptions& options) {
     return Create(SurroundingsOf(std::move(world)), options);

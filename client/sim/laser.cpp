@@ -149,14 +149,6 @@ Scan MeasureScan(const Scene& scene, std::span<const Post> posts, const Pose2& T
   return scan;
 }
 
-Scan MeasureScan(const RayCaster& walls, std::span<const Disc> discs, const Pose2& T_map_robot, const Twist& twist,
-                 Stamp stamp, const LaserOptions& options, Random& random) {
-  std::vector<Post> posts;
-  posts.reserve(discs.size());
-  for (const Disc& disc : discs) posts.push_back({disc});
-  return MeasureScan(FlatScene(walls), posts, T_map_robot, twist, stamp, 0.0, options, random);
-}
-
 std::vector<std::string> LaserModelNames() {
   std::vector<std::string> names;
   for (const Model& model : kModels) names.emplace_back(model.name);

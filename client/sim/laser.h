@@ -70,10 +70,6 @@ struct Twist {
                                const Twist& twist, Stamp stamp, double tilt_rad, const LaserOptions& options,
                                Random& random);
 
-// A level scan in a flat world. `discs` are obstacles that are not part of the caster's walls.
-[[nodiscard]] Scan MeasureScan(const RayCaster& walls, std::span<const Disc> discs, const Pose2& T_map_robot,
-                               const Twist& twist, Stamp stamp, const LaserOptions& options, Random& random);
-
 // The scanners of the thesis by name: field of view, resolution, range and error. Mounting, dropouts and sweep are
 // those of LaserOptions' defaults. Source: thesis C 4.3.2 (the simulator's own: +-90 deg in steps of 1 deg), 4.3.3
 // (errors); makers' data sheets for field of view, resolution and range: SICK LMS200/291, Hokuyo URG-04LX and

@@ -118,17 +118,6 @@ double RayCaster::Cast(const Eigen::Vector2d& origin_map, const Eigen::Vector2d&
   return kNothingHit;
 }
 
-double RayCaster::Clearance(const Eigen::Vector2d& p_map) const {
-  double nearest = kNothingHit;
-  for (const Segment& s : segments_) {
-    const Eigen::Vector2d edge = s.b_map - s.a_map;
-    const double length2 = edge.squaredNorm();
-    const double share = length2 > 0.0 ? std::clamp((p_map - s.a_map).dot(edge) / length2, 0.0, 1.0) : 0.0;
-    nearest = std::min(nearest, (s.a_map + edge * share - p_map).norm());
-  }
-  return nearest;
-}
-
 double CastAtDisc(const Disc& disc, const Eigen::Vector2d& origin_map, const Eigen::Vector2d& direction) {
   const Eigen::Vector2d to_center = disc.center_map - origin_map;
   const double rim2 = to_center.squaredNorm() - disc.radius_m * disc.radius_m;

@@ -23,9 +23,6 @@ class RayCaster {
   // Distance to the nearest segment within `max_m`, else kNothingHit. `direction` has length 1.
   [[nodiscard]] double Cast(const Eigen::Vector2d& origin_map, const Eigen::Vector2d& direction, double max_m) const;
 
-  // Distance from a point to the nearest segment: the clearance a robot has there.
-  [[nodiscard]] double Clearance(const Eigen::Vector2d& p_map) const;
-
  private:
   [[nodiscard]] double CastInCell(std::size_t cell, const Eigen::Vector2d& origin,
                                   const Eigen::Vector2d& direction) const;
@@ -39,7 +36,7 @@ class RayCaster {
   std::vector<std::uint32_t> members_;     // Segment indices.
 };
 
-// Distance along the ray to the disc's rim; kNothingHit where it misses or starts inside.
+// Distance along the ray to the disc's rim; kNothingHit if it misses or starts inside.
 [[nodiscard]] double CastAtDisc(const Disc& disc, const Eigen::Vector2d& origin_map, const Eigen::Vector2d& direction);
 
 }  // namespace cairn::sim

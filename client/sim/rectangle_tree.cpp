@@ -18,7 +18,7 @@ Eigen::AlignedBox3d BoxOf(const Rectangle& r) {
   return box;
 }
 
-// The distance at which the ray enters the box (0 where it starts inside); more than `max_m` where it misses.
+// The distance at which the ray enters the box (0 if it starts inside); more than `max_m` where it misses.
 double Enter(const Eigen::AlignedBox3d& box, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
              double max_m) {
   double enter = 0.0, leave = max_m;

@@ -23,7 +23,7 @@ struct Rectangle {
   [[nodiscard]] Eigen::Vector3d normal() const;  // Has length 1.
 };
 
-// Distance along the ray (`direction` of length 1) to the rectangle; kNothingHit where it misses, runs alongside or
+// Distance along the ray (`direction` of length 1) to the rectangle; kNothingHit if it misses, runs alongside or
 // lies behind. The rim counts as hit: rectangles that share an edge leave no gap.
 [[nodiscard]] double CastAtRectangle(const Rectangle& rectangle, const Eigen::Vector3d& origin_map,
                                      const Eigen::Vector3d& direction);
@@ -38,7 +38,7 @@ class RectangleTree {
   // Distance to the nearest rectangle within `max_m`, else kNothingHit. `direction` has length 1.
   [[nodiscard]] double Cast(const Eigen::Vector3d& origin_map, const Eigen::Vector3d& direction, double max_m) const;
 
-  // Distance from a point to the nearest rectangle; kNothingHit where there is none.
+  // Distance from a point to the nearest rectangle; kNothingHit if there is none.
   [[nodiscard]] double Distance(const Eigen::Vector3d& p_map) const;
 
   [[nodiscard]] const std::vector<Rectangle>& rectangles() const { return rectangles_; }

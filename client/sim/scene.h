@@ -53,7 +53,7 @@ struct Post {
   double height_m = std::numeric_limits<double>::infinity();
 };
 
-// Distance along the ray to the post's side or top; kNothingHit where it misses or starts inside.
+// Distance along the ray to the post's side or top; kNothingHit if it misses or starts inside.
 [[nodiscard]] double CastAtPost(const Post& post, const Eigen::Vector3d& origin_map, const Eigen::Vector3d& direction);
 [[nodiscard]] double CastAtPosts(std::span<const Post> posts, const Eigen::Vector3d& origin_map,
                                  const Eigen::Vector3d& direction);

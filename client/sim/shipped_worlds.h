@@ -1,5 +1,5 @@
 // Opens worlds: those that are built into the program (client/sim/worlds/*.yaml) by name, others by the path of their
-// file. kNotFound where there is neither; the message lists the shipped names. Thread-safe.
+// file. kNotFound if there is neither; the message lists the shipped names. Thread-safe.
 #pragma once
 
 #include <string>

@@ -59,7 +59,7 @@ struct Layout {
   std::array<int, 3> column{-1, -1, -1};       // Where x, y and z are among the numbers of a line (text).
   std::array<std::size_t, 3> offset{0, 0, 0};  // Where they are among the bytes of a point (binary).
 
-  // Takes one field in turn; false where there are too many.
+  // Takes one field in turn; false if there are too many.
   bool AddField(std::string_view name, std::size_t bytes, bool is_float) {
     if (fields >= kMaxFields) return false;
     if (name.size() == 1 && name[0] >= 'x' && name[0] <= 'z' && is_float && bytes == 4) {

@@ -15,7 +15,7 @@ namespace cairn {
 // behind on failure. The directory must exist.
 [[nodiscard]] Result<void> WriteFileAtomically(const std::filesystem::path& path, std::string_view content);
 
-// The whole content; kNotFound, or kResourceExhausted where it is longer than `max_bytes`.
+// The whole content; kNotFound, or kResourceExhausted if it is longer than `max_bytes`.
 [[nodiscard]] Result<std::vector<std::uint8_t>> ReadWholeFile(const std::filesystem::path& path, std::size_t max_bytes);
 
 }  // namespace cairn

@@ -39,7 +39,7 @@ struct Pose2 {
 // d(T^-1) / d(T).
 [[nodiscard]] Eigen::Matrix3d J_inverse(const Pose2& T_a_b);
 
-// True where the matrix is finite, symmetric within `tolerance` of its scale, and positive semi-definite.
+// True if the matrix is finite, symmetric within `tolerance` of its scale, and positive semi-definite.
 [[nodiscard]] bool IsCovariance(const Eigen::Matrix3d& matrix, double tolerance = 1e-9);
 
 }  // namespace cairn

@@ -28,7 +28,7 @@ struct MapLine {
 [[nodiscard]] Result<std::vector<MapLine>> ParseMapLines(std::string_view text, const std::string& source);
 // Besides, kNotFound, and kResourceExhausted beyond 4 MiB.
 [[nodiscard]] Result<std::vector<MapLine>> ReadMapLines(const std::filesystem::path& path);
-// Reads back to the same numbers; kFailedPrecondition where there are none. Written beside the target and renamed
+// Reads back to the same numbers; kFailedPrecondition if there are none. Written beside the target and renamed
 // (atomic).
 [[nodiscard]] Result<void> WriteMapLines(const std::vector<MapLine>& lines, const std::filesystem::path& path);
 

@@ -16,10 +16,10 @@ namespace cairn {
 struct Assignment {
   std::string place;                // For errors: "cairnd.yaml:12" or "--set".
   std::string key;                  // Full dotted key.
-  std::optional<std::string> text;  // Nothing where the key has no value, which is allowed for sections only.
+  std::optional<std::string> text;  // Nothing if the key has no value, which is allowed for sections only.
 };
 
-// Assigns all, or nothing where one is in error. Later assignments of a key win.
+// Assigns all, or nothing if one is in error. Later assignments of a key win.
 [[nodiscard]] Result<void> Assign(const std::vector<Assignment>& assignments, const VisitOptions& visit);
 
 // "2..10 m", "true or false", "a, b or c".

@@ -116,7 +116,7 @@ class LogEmitter {
     summary_.notes = facts_.notes;
   }
 
-  // False where the sink wants no more.
+  // False if the sink wants no more.
   bool Take(int line, LogMessage&& message) {
     if (auto* laser = std::get_if<LaserMessage>(&message)) return TakeLaser(line, std::move(*laser));
     if (const auto* odometry = std::get_if<OdometryMessage>(&message)) return TakeOdometry(line, *odometry);

@@ -25,7 +25,7 @@ class LaserSurvey {
   void Add(const LaserMessage& laser);
 
   [[nodiscard]] std::int64_t scans() const { return scans_; }
-  // The lowest saturated range; nothing where no pile is found.
+  // The lowest saturated range; nothing if no pile is found.
   [[nodiscard]] std::optional<double> NoReturn() const;
   // T_robot_laser rounded to 1 mm and 0.1 mrad; nothing where poses are missing or follow no fixed mounting.
   [[nodiscard]] std::optional<Pose2> Mounting() const;

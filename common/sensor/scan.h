@@ -22,7 +22,7 @@ struct Scan {
   double angle_step_rad = 0.0;   // Between beams; negative for a scanner that turns clockwise.
   double range_min_m = 0.0;      // Shorter ranges are not measurements.
   double range_max_m = 0.0;      // Ranges at or above it mean "nothing hit" up to there.
-  double beam_period_s = 0.0;    // Between beams; 0 where the whole scan is taken at once.
+  double beam_period_s = 0.0;    // Between beams; 0 if the whole scan is taken at once.
   double tilt_rad = 0.0;         // Turn of the scan plane about the laser's y axis: positive looks down.
   Pose2 T_robot_laser;
   std::vector<float> ranges_m;  // NaN, negative, zero, infinite allowed: see BeamClass.

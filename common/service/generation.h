@@ -5,9 +5,9 @@
 
 namespace cairn {
 
-// Grows from start to start of a server, whichever way the one before ended, and is never 0. Epochs, versions and
-// numbers of two generations must not be compared: a receiver that hears of a higher generation begins anew, and
-// ignores values of a lower one.
+// Each start of a server has a higher generation than the one before, however that ended; 0 is not used. Epochs,
+// versions and numbers of different generations must not be compared: a receiver of a higher generation discards what
+// it had, and ignores values of lower ones.
 using Generation = std::uint64_t;
 
 }  // namespace cairn

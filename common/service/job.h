@@ -32,7 +32,7 @@ struct Job {
   Stamp started = 0;
   Stamp ended = 0;
   std::string message;
-  Generation generation = 0;  // Stamped by the server's egress.
+  Generation generation = 0;  // Set by the server's egress.
 };
 
 }  // namespace cairn

@@ -1,5 +1,6 @@
-// What became of every sample of one stream (robot, sensor), scans or odometry: received + dropped[kLostOnWire] = used
-// + sum(dropped) + waiting. No scan vanishes.
+// Counts what happened to every sample (scan or odometry) of one stream (robot, sensor): received +
+// dropped[kLostOnWire] = used
+// + sum(dropped) + waiting. No sample is uncounted.
 #pragma once
 
 #include <array>
@@ -52,12 +53,12 @@ struct Ledger {
   std::uint64_t odometry_merged = 0;   // Composed into a neighbour by the full queue; motion is kept.
   std::uint64_t last_sequence = 0;     // Highest sequence received.
   std::uint64_t settled_through = 0;   // Every sample up to here is used or dropped.
-  std::uint64_t durable_through = 0;   // Every sample up to here survives the server's death; 0 without a store.
+  std::uint64_t durable_through = 0;   // Every sample up to here is on the disk; 0 without a store.
   Stamp last_stamp = 0;                // Stamp of the last scan used.
   double latency_p50_ms = 0.0;         // Scan received to pose published, over the last 256.
   double latency_p99_ms = 0.0;
-  std::uint64_t session = 0;  // Whose sequences are counted (SessionToken); 0 where nobody has opened it.
-  Generation generation = 0;  // Stamped by the server's egress.
+  std::uint64_t session = 0;  // The session of the numbers (SessionToken); 0 if none is open.
+  Generation generation = 0;  // Set by the server's egress.
 
   [[nodiscard]] std::uint64_t dropped_total() const;
 };

@@ -29,7 +29,7 @@ struct MapInfo {
   std::uint32_t robots = 0;                                   // Sessions in the site.
   std::uint32_t enabled_version = 1;
   std::vector<MapVersionInfo> versions;
-  Generation generation = 0;  // Stamped by the server's egress.
+  Generation generation = 0;  // Set by the server's egress.
 };
 
 }  // namespace cairn

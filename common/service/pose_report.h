@@ -36,7 +36,7 @@ struct PoseReport {
   double score = 0.0;  // 0..1: share of the scan explained by the map.
   PoseReason reason = PoseReason::kWaiting;
   std::uint32_t map_epoch = 0;
-  Generation generation = 0;  // Stamped by the server's egress.
+  Generation generation = 0;  // Set by the server's egress.
 };
 
 }  // namespace cairn

@@ -52,7 +52,7 @@ struct Request {
   std::uint32_t level = 0;        // kTiles.
   std::uint32_t since_epoch = 0;  // kTiles: a different epoch than the map's means "send all".
   std::uint64_t since_version = 0;
-  Generation since_generation = 0;  // The generation that both belong to; of another one all are sent.
+  Generation since_generation = 0;  // The generation of both. If it is not the server's, all tiles are sent.
   std::uint64_t job = 0;
   JobKind job_kind = JobKind::kSmooth;
   bool enable = true;             // kJobSubmit: enable the map version it makes.
@@ -94,7 +94,7 @@ struct Reply {
   std::vector<RobotStatus> robots;
   std::vector<Job> jobs;
   std::string server_version;  // kPing.
-  Generation generation = 0;   // Stamped by the server's egress.
+  Generation generation = 0;   // Set by the server's egress.
 };
 
 }  // namespace cairn

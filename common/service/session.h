@@ -14,7 +14,8 @@
 namespace cairn {
 
 using ClientId = std::uint64_t;  // Random, non-zero, one per client process; tells two robots of one name apart.
-// Random, non-zero, drawn by a client when it opens a session anew. Streams carry it: it says whose sequences they are.
+// Identifies a session: random and non-zero, drawn by the client that opens it. Every sample contains it, because
+// sequence numbers are counted within a session.
 using SessionToken = std::uint64_t;
 
 struct SessionRequest {
@@ -40,8 +41,8 @@ struct SessionState {
   SessionPhase phase = SessionPhase::kActive;
   Status status;  // Why refused.
   SessionToken session = 0;
-  bool durable = false;       // The server stores what it receives.
-  Generation generation = 0;  // Stamped by the server's egress.
+  bool durable = false;       // The server stores the samples.
+  Generation generation = 0;  // Set by the server's egress.
 };
 
 // The answer to a refused request: the request's client and session, phase kRefused and the reason.

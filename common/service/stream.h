@@ -30,7 +30,7 @@ struct TileSample {
   NameId site_id = 0;
   Tile tile;
   bool deleted = false;       // The tile is no longer part of the map (tombstone; DDS dispose is not used).
-  Generation generation = 0;  // Stamped by the server's egress.
+  Generation generation = 0;  // Set by the server's egress.
 };
 
 }  // namespace cairn

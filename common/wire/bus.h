@@ -43,8 +43,8 @@ class Publication {
   // kOutOfRange: the value exceeds the wire's limits (limits.h). kUnavailable: the middleware did not accept
   // it within its bounded blocking time.
   [[nodiscard]] virtual Result<void> Publish(const Value& value) = 0;
-  // The key of `value` is not needed any more: when the topic's instances run out, its place is given to another key,
-  // and late joiners no longer get its last sample. A later Publish of the same key takes a place again. Only for
+  // Marks the key of `value` as no longer needed. When the topic's instances are used up, its place is given to another
+  // key, and late joiners no longer get its last sample. A later Publish of the same key takes a new place. Only for
   // SessionState, PoseReport, Ledger and Job. kNotFound: nothing of that key was published.
   [[nodiscard]] virtual Result<void> Retire(const Value& value) = 0;
   // Waits until every matched subscription has acknowledged everything, or the deadline passes (false).

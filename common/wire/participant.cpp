@@ -148,7 +148,7 @@ Result<Participant::Reader> Participant::MakeReader(const TopicProfile& profile,
   const Result<fd::Topic*> topic = FindTopic(profile, type);
   if (!topic) return tl::unexpected(topic.error());
   fd::DataReaderQos qos;
-  // For a moment the reader knows the keys of two writers, one that is full and the one that takes over from it
+  // For a moment the reader has the keys of two writers: one that is full, and the one that replaces it
   // (publication.h). A sample that finds no place among the instances is lost, also on a reliable topic.
   const int instances = profile.max_instances == 1 ? 1 : 2 * profile.max_instances;
   SetCommon(profile, profile.reader_depth, instances, options_, qos);

@@ -69,7 +69,7 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
 
  private:
   using Key = std::array<std::uint8_t, 16>;
-  // The topics whose keys come and go for as long as a server runs.
+  // The topics whose keys change while a server runs: sessions and jobs begin and end.
   static constexpr bool kRetires = std::is_same_v<Value, SessionState> || std::is_same_v<Value, PoseReport> ||
                                    std::is_same_v<Value, Ledger> || std::is_same_v<Value, Job>;
 
@@ -98,11 +98,12 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
     }
   }
 
-  // A writer never gives back the place of a key: unregistering it stops the flow to the readers (idl/README.md). A new
-  // writer takes over with the keys that live, as soon as it has found the readers of the old one: what it writes
-  // before that reaches nobody where the topic keeps nothing for late joiners. False: it does not have them yet.
+  // The place of a key in a writer cannot be freed, because unregistering a key stops the data to the readers
+  // (idl/README.md). Instead a new writer, which has only the keys that still exist, replaces the old one as soon as it
+  // has matched the same readers. Before that, samples of topics without history would be lost. Returns false if it has
+  // not matched them yet.
   bool Renew() CAIRN_REQUIRES(mutex_) {
-    constexpr std::chrono::seconds kLongestSearch{2};  // A reader whose host was lost never answers the new writer.
+    constexpr std::chrono::seconds kLongestSearch{2};  // A reader on a host that was lost never matches the new writer.
     const auto now = std::chrono::steady_clock::now();
     if (!successor_) {
       Result<Participant::Writer> writer = participant_->MakeWriter(Topic<Value>::kProfile, type_, this);
@@ -141,7 +142,8 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
   std::set<Key> used_ CAIRN_GUARDED_BY(mutex_);                // Keys that have a place in the writer.
   // The last members: they call the listener until they are destroyed.
   Participant::Writer writer_;
-  Participant::Writer successor_ CAIRN_GUARDED_BY(mutex_);  // From the first sample without a place until it takes over.
+  Participant::Writer successor_
+      CAIRN_GUARDED_BY(mutex_);  // From the first sample without a place until it takes over.
   std::chrono::steady_clock::time_point successor_made_ CAIRN_GUARDED_BY(mutex_);
 };
 

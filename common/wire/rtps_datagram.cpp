@@ -64,7 +64,7 @@ struct Submessage {
   }
 };
 
-// Steps over a parameter list; returns where it ends, or 0 where it is broken.
+// Steps over a parameter list; returns where it ends, or 0 if it is broken.
 std::size_t EndOfParameters(const Reader& body, std::size_t at) {
   constexpr std::uint16_t kSentinel = 1;
   constexpr std::uint16_t kKeyHash = 0x70;

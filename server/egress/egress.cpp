@@ -13,7 +13,7 @@
 namespace cairn::server {
 namespace {
 
-constexpr auto kGoodbyePatience = std::chrono::milliseconds(200);
+constexpr auto kLastMessagesPatience = std::chrono::milliseconds(200);
 
 }  // namespace
 
@@ -56,7 +56,7 @@ struct Egress::Publications {
   }
 };
 
-// One lane's way out: what its thread does with each value, and what it remembers for it.
+// The sender of one lane: what its thread does with each value, and the state that it needs for this.
 class Egress::Door {
  public:
   Door(Publications& publications, Generation generation) : publications_(publications), generation_(generation) {}
@@ -91,7 +91,7 @@ class Egress::Door {
   Publications& publications_;
   const Generation generation_;
   Unsent unsent_;
-  std::optional<Unsent::Key> last_tried_;  // Nothing: the next round begins with the first one.
+  std::optional<Unsent::Key> last_tried_;  // Empty: the next round begins with the first one.
 };
 
 Result<std::unique_ptr<Egress>> Egress::Open(wire::Bus& bus, Outbound& outbound, Generation generation) {
@@ -117,7 +117,7 @@ void Egress::Finish() {
   if (threads_.empty()) return;
   threads_.clear();
   // Readers that still listen get the last states; one that does not answer may not delay the end for long.
-  const auto deadline = std::chrono::steady_clock::now() + kGoodbyePatience;
+  const auto deadline = std::chrono::steady_clock::now() + kLastMessagesPatience;
   const auto heard = [&deadline](auto& publication) {
     const auto left = deadline - std::chrono::steady_clock::now();
     static_cast<void>(publication->WaitForAcknowledgement(

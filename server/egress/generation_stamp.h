@@ -1,5 +1,5 @@
-// Writes the server's generation into a value on its way out, and into everything nested in it: the only place that
-// does. Stateless, thread-safe.
+// Writes the server's generation into a value that is about to be sent, and into everything nested in it. No other
+// place does this. Stateless, thread-safe.
 #pragma once
 
 #include "common/service/generation.h"

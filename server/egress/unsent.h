@@ -1,6 +1,6 @@
-// The states that DDS did not accept, each in its newest form, until they can be sent again. A pose, a refusal and a
-// reply are no states: they are superseded or asked for again. At most kMax states are kept. Not thread-safe: one
-// owner.
+// Keeps the states that DDS did not accept, each in its newest form, until they can be sent again. Poses, refusals and
+// replies are not states and are not kept: the next pose follows, and clients repeat their requests. At most kMax
+// states are kept. Not thread-safe: one owner.
 #pragma once
 
 #include <cstddef>
@@ -17,16 +17,17 @@ class Unsent {
  public:
   static constexpr std::size_t kMax = 65536;
 
-  // What a state is keyed by on the wire: the place in OutboundValue of its type, and at most 16 bytes. A retired state
-  // has the key of what it was. Nothing for values that are no states.
+  // The key of a state on the wire: the index of its type in OutboundValue, and at most 16 bytes. A retired state has
+  // the key that it had before. Empty for values that are not states.
   using Key = std::tuple<std::size_t, std::uint64_t, std::uint64_t>;
   [[nodiscard]] static std::optional<Key> KeyOf(const OutboundValue& value);
 
-  // The value was not accepted; false where it is not kept.
+  // Keeps a value that was not accepted. Returns false if it is not kept.
   bool Keep(OutboundValue&& value);
-  // A newer form of the state is on its way.
+  // Removes the kept form, because a newer one is being sent.
   void Forget(const OutboundValue& value);
-  // The kept state after this key, in the order of the keys; to walk through all of them while they change.
+  // The kept state after this key, in the order of the keys. With it a caller can go through all states while they
+  // change.
   [[nodiscard]] std::optional<OutboundValue> After(const std::optional<Key>& key) const;
   [[nodiscard]] bool empty() const { return values_.empty(); }
   [[nodiscard]] std::size_t size() const { return values_.size(); }

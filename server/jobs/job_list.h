@@ -21,10 +21,11 @@ namespace cairn::server {
 
 class JobList {
  public:
-  // `now` is the server's clock. `journal`: null where nothing is stored.
+  // `now` is the server's clock. `journal`: null if nothing is stored.
   JobList(const JobsOptions& options, Outbound& outbound, std::function<Stamp()> now, Journal* journal = nullptr);
 
-  // The jobs of the servers before this one. Those that had not ended are queued again and returned, in order.
+  // Restores the jobs of earlier servers. Those that had not ended are queued again and returned in the order of their
+  // ids. REQUIRES: no other function was called before.
   Result<std::vector<StoredJob>> Restore();
   // Adds a queued job. RESOURCE_EXHAUSTED: the list is full of unfinished jobs. `enable`: see JobWorker.
   Result<Job> Add(const std::string& site, JobKind kind, bool enable = true);
@@ -37,7 +38,7 @@ class JobList {
   // NOT_FOUND: no such job. FAILED_PRECONDITION: the job has already ended. Running work ends at its next
   // check.
   Result<Job> Cancel(std::uint64_t id);
-  // The server stops. Where jobs are stored, the next server starts them again.
+  // Cancels all jobs because the server stops. If jobs are stored, the next server starts them again.
   void CancelAll();
 
   [[nodiscard]] Result<Job> Find(std::uint64_t id) const;
@@ -68,7 +69,7 @@ class JobList {
   mutable Mutex mutex_;
   bool stopping_ CAIRN_GUARDED_BY(mutex_) = false;
   std::map<std::uint64_t, Entry> jobs_ CAIRN_GUARDED_BY(mutex_);
-  std::vector<Job> replaced_ CAIRN_GUARDED_BY(mutex_);  // Not retired on the wire yet.
+  std::vector<Job> replaced_ CAIRN_GUARDED_BY(mutex_);  // Their keys are not retired yet.
   std::uint64_t next_ CAIRN_GUARDED_BY(mutex_) = 1;
 };
 

@@ -25,7 +25,7 @@ JobWorker::~JobWorker() {
 }
 
 void JobWorker::Start() {
-  thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
+  thread_ = std::jthread([this] { Run(); });
 }
 
 Result<Job> JobWorker::Submit(const std::string& site, JobKind kind, bool enable) {
@@ -46,15 +46,12 @@ void JobWorker::Requeue(std::uint64_t id, bool enable) {
 void JobWorker::Stop() {
   queue_.Close();
   list_.CancelAll();
-  if (thread_.joinable()) {
-    thread_.request_stop();
-    thread_.join();
-  }
+  if (thread_.joinable()) thread_.join();
 }
 
-void JobWorker::Run(const std::stop_token& stop) {
+void JobWorker::Run() {
   LowerOwnPriority(options_.nice);
-  while (const auto ticket = queue_.Pop(stop)) {
+  while (const auto ticket = queue_.Pop()) {
     if (!list_.Start(ticket->id)) continue;
     const auto job = list_.Find(ticket->id);
     const auto control = list_.ControlOf(ticket->id);

@@ -26,7 +26,7 @@ class JobWorker {
   void Start();
   // RESOURCE_EXHAUSTED: the queue is full.
   Result<Job> Submit(const std::string& site, JobKind kind, bool enable);
-  // A job that is queued in the list already: one of a server before this one.
+  // Queues a restored job, which is in the list already.
   void Requeue(std::uint64_t id, bool enable);
   // Cancels the running and the waiting jobs. Returns when the thread has ended.
   void Stop();
@@ -36,7 +36,7 @@ class JobWorker {
     std::uint64_t id = 0;
     bool enable = false;
   };
-  void Run(const std::stop_token& stop);
+  void Run();  // Until the queue is closed and empty.
   Result<JobOutcome> Work(const Job& job, bool enable, const JobControl& control) const;
 
   const JobsOptions options_;

@@ -17,12 +17,12 @@ namespace cairn::server {
 
 class Atlas {
  public:
-  // `journal`: null where nothing is stored. `generation`: of this start of the server.
+  // `journal`: null if nothing is stored. `generation`: the number of this start of the server.
   Atlas(const MapsOptions& options, double resolution_m, bool create_sites, asio::thread_pool& pool, Outbound& outbound,
         Journal* journal = nullptr, Generation generation = 0);
 
-  // The sites of the servers before this one. Before anything else is called. DATA_LOSS: a record is damaged.
-  // FAILED_PRECONDITION: a newer server has written it.
+  // Restores the sites of earlier servers. REQUIRES: no other function was called before. DATA_LOSS: a record is
+  // damaged. FAILED_PRECONDITION: a newer server has written it.
   Result<void> Restore();
 
   // Returns the site; creates it if it does not exist and the server may create it. NOT_FOUND: the server may

@@ -36,7 +36,7 @@ class MapVersions {
   // REQUIRES: Find(version). `displaced`: the sessions' grids of the version that has been enabled so far.
   void Enable(std::uint32_t version, std::map<SessionId, RobotGrid> displaced);
 
-  // Goes on from what was stored. REQUIRES: `enabled` is one of the versions, and all are below `next`.
+  // Restores the stored versions. REQUIRES: `enabled` is one of the versions, and all are below `next`.
   void Restore(std::map<std::uint32_t, MapVersion> versions, std::uint32_t next, std::uint32_t enabled);
 
   [[nodiscard]] std::uint32_t enabled() const { return enabled_; }

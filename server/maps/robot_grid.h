@@ -36,7 +36,7 @@ struct Adopted {
 // correction without adopting it.
 struct Correction {
   std::uint32_t epoch = 0;
-  std::uint64_t generation = 0;  // Of the server that switches the map.
+  std::uint64_t generation = 0;  // Start of the server that switches the map.
   RobotGrid grid;
   std::function<void(Adopted&&)> done;
 };

@@ -49,14 +49,15 @@ class Site : public std::enable_shared_from_this<Site> {
   // Asked once, on the site's strand, before the work begins; false: the work is not done, and the answer is CANCELLED.
   using Wanted = std::function<bool()>;
 
-  // `journal`: null where nothing is stored. `generation`: of this start of the server.
+  // `journal`: null if nothing is stored. `generation`: the number of this start of the server.
   Site(const std::string& name, double resolution_m, const MapsOptions& options, asio::thread_pool& pool,
        Outbound& outbound, Journal* journal = nullptr, Generation generation = 0);
 
-  // Goes on from what a server before this one has stored: epoch, versions, and the parts of sessions that exist no
-  // more. Before anything else is called.
+  // Restores what an earlier server has stored: the epoch, the versions, and the parts of the map that were drawn by
+  // sessions that no longer exist. REQUIRES: no other function was called before.
   Result<void> Restore(const StoredSite& stored);
-  // Whether the server of this generation completed the switch that led to this epoch. Before the threads start.
+  // Whether the server of this generation completed the switch that began this epoch. REQUIRES: called before the
+  // threads start.
   [[nodiscard]] bool Switched(std::uint32_t epoch, Generation generation) const;
 
   // From now on this session of the robot draws here, in place of the robot's previous session. A session
@@ -65,7 +66,7 @@ class Site : public std::enable_shared_from_this<Site> {
   // Changes that wait for the strand are merged: the newest form of each chunk is kept, so that a site that is slow
   // holds at most the chunks that its sessions have.
   void Change(GridChange&& change);
-  // The session exists no more. Its part of the map stays, and is stored as such instead of the session.
+  // Called when the session is removed. Its part of the map stays and is stored, because the session no longer is.
   void Leave(SessionId session);
   // Adds a disabled version; `done` receives its number.
   void AddVersion(MapVersion&& version, Done done, Wanted wanted = {});
@@ -127,7 +128,7 @@ class Site : public std::enable_shared_from_this<Site> {
   std::uint64_t tile_version_ = 0;
   std::map<NameId, Member> members_;
   std::map<std::uint32_t, Generation> switches_;  // Epoch -> the server that switched the map to it.
-  std::set<SessionId> layers_;                    // Sessions that exist no more, whose parts are stored.
+  std::set<SessionId> layers_;                    // Removed sessions whose parts are stored.
   std::set<std::uint32_t> stored_versions_;
   bool info_changed_ = true;
   std::optional<VersionSwitch> switch_;

@@ -1,4 +1,4 @@
-// What a site stores and how it takes it up again (site.h).
+// What a site stores, and how it is restored (site.h).
 #include <memory>
 #include <utility>
 
@@ -90,7 +90,7 @@ Result<void> Site::RestoreVersions(const StoredSite& stored) {
   auto read = journal_->store().Read({.kind = RecordKind::kMapVersion, .owner = site_id_}, take);
   if (!read) return read;
   if (!versions.contains(stored.enabled_version) || versions.rbegin()->first >= stored.next_version) {
-    return Fail(StatusCode::kDataLoss, "the store misses a map version of site '" + name_ + "'");
+    return Fail(StatusCode::kDataLoss, "the store lacks a map version of site '" + name_ + "'");
   }
   for (const auto& [number, version] : versions) stored_versions_.insert(number);
   versions_.Restore(std::move(versions), stored.next_version, stored.enabled_version);

@@ -27,8 +27,8 @@ struct SnapshotWanted {
   std::function<void(SessionMaterial&&)> done;  // Called on the session's strand.
 };
 
-// The end of a session. Scans that arrived before it are finished first. `final` is true where the session is over, and
-// false where the server stops and the session could go on later.
+// The end of a session. Scans that arrived before it are finished first. `final` is true if the session is over, and
+// false if the server stops and the session could go on later.
 struct Finish {
   bool final = true;
   Status reason = {};

@@ -27,13 +27,14 @@ void Visit(OptionVisitor& visitor, RobotsOptions& options) {
   visitor.Real("ledger_rate_hz", options.ledger_rate_hz, "Hz", 0.1, 100.0,
                "How often the counters of a robot are published while scans arrive. They are published at once after "
                "every eight scans and when its queue becomes empty.");
-  visitor.Integer("checkpoint_entries", options.checkpoint_entries, "entries", 10, 1000000000,
-                  "Scans and odometry samples of a robot after which its whole state is written to the disk. A larger "
-                  "value writes less, and a server that starts again has more of them to estimate anew.");
+  visitor.Integer(
+      "checkpoint_entries", options.checkpoint_entries, "entries", 10, 1000000000,
+      "Scans and odometry samples of a robot after which its whole state is written to the disk. With a larger "
+      "value less is written, and a server that starts again has more samples to process again.");
   visitor.Real(
       "gap_wait_s", options.gap_wait_s, "s", 0.1, 3600.0,
-      "After a restart the server leaves samples aside for this long while a robot sends those again that came "
-      "before them and were not stored. Then it goes on without them, and counts them as lost.");
+      "After a restart a robot sends again the samples that were not stored. For this long the server accepts no "
+      "later samples of the robot. Then it accepts them, and counts the missing ones as lost.");
 }
 
 }  // namespace cairn::server

@@ -13,8 +13,8 @@ constexpr std::size_t kMaxUnsent = 256;  // Refusals kept until they can be sent
 Result<void> ValidateRequest(const SessionRequest& request) {
   if (auto valid = ValidateName("robot", request.robot); !valid) return valid;
   if (auto valid = ValidateName("site", request.site); !valid) return valid;
-  if (request.session == 0) return Fail(StatusCode::kInvalidArgument, "session 0 is none");
-  if (request.client == 0) return Fail(StatusCode::kInvalidArgument, "client id 0 names nobody");
+  if (request.session == 0) return Fail(StatusCode::kInvalidArgument, "the session must not be 0");
+  if (request.client == 0) return Fail(StatusCode::kInvalidArgument, "the client id must not be 0");
   if (request.sensors.empty()) return Fail(StatusCode::kInvalidArgument, "no sensor is named");
   if (request.sensors.size() > SessionRecord::kMaxSensors) {
     return Fail(StatusCode::kInvalidArgument, std::to_string(request.sensors.size()) + " sensors; at most 16");
@@ -22,7 +22,7 @@ Result<void> ValidateRequest(const SessionRequest& request) {
   for (const std::string& sensor : request.sensors) {
     if (auto valid = ValidateName("sensor", sensor); !valid) return valid;
     if (sensor == SessionRecord::kOdometry)
-      return Fail(StatusCode::kInvalidArgument, "no sensor can be named 'odometry': the robot's odometry is");
+      return Fail(StatusCode::kInvalidArgument, "no sensor may be named 'odometry': this is the name of the robot's odometry stream");
   }
   return request.has_start ? ValidateStart(request.T_map_robot_start) : Result<void>{};
 }
@@ -82,7 +82,7 @@ Result<void> Roster::Admit(const SessionRequest& request) {
   }
   if (session != nullptr && session->record().token() == request.session) {
     if (session->record().phase() != SessionPhase::kEnded) return Resume(*session, request);
-    session->End();  // Says again that it has ended.
+    session->End();  // Announces again that it has ended.
     return {};
   }
   if (request.started) {
@@ -296,22 +296,22 @@ void Roster::Tick() {
   });
 }
 
-// Once a session that was removed has said its last word, the keys that nobody uses any more are given back.
+// Once a removed session has published its last state, its keys on the wire that no other session uses are retired.
 void Roster::RetireGone() {
-  std::vector<std::shared_ptr<Session>> freed;  // Without the lock.
+  std::vector<std::shared_ptr<Session>> freed;  // Destroyed after the lock is released.
   const MutexLock lock(mutex_);
   std::erase_if(gone_, [&](const std::shared_ptr<Session>& gone) CAIRN_REQUIRES(mutex_) {
-    const auto heir = sessions_.find(gone->record().state().robot_id);
-    if (heir == sessions_.end()) gone->Tick();
+    const auto successor = sessions_.find(gone->record().state().robot_id);
+    if (successor == sessions_.end()) gone->Tick();
     if (gone->record().phase() != SessionPhase::kEnded || gone->has_work()) return false;
     const RobotStatus status = gone->record().snapshot().status;
     bool retired = true;
     const auto retire = [&](auto&& of) { retired = retired && outbound_.Send(Retired{std::move(of)}); };
     for (const Ledger& ledger : status.ledgers) {
-      if (heir == sessions_.end() || !heir->second->record().Has(ledger.sensor_id)) retire(Ledger(ledger));
+      if (successor == sessions_.end() || !successor->second->record().Has(ledger.sensor_id)) retire(Ledger(ledger));
     }
-    if (heir != sessions_.end()) {
-      heir->second->Announce();  // The end of the one before may have been said later.
+    if (successor != sessions_.end()) {
+      successor->second->Announce();  // The end of the removed session may have been published after its state.
     } else {
       Ledger odometry;
       odometry.robot_id = status.session.robot_id;

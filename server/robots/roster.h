@@ -1,12 +1,15 @@
-// Who is here: every session by robot, and who may open one. The door's events are routed from here to the session they
-// belong to; scans without one are counted as unclaimed.
-// Rules of opening: a robot has one session. Whoever names it (its token) resumes it, where its owner is the same
-// client or is not alive; its start pose is then ignored. A session that was started elsewhere and is not known here is
-// refused (FAILED_PRECONDITION): its start pose is out of date. A new session of a robot whose owner is not alive goes
-// on with the one it has, and the client that loses it is told; another live client is refused (ALREADY_EXISTS). An
-// ended session gives way to a new one. When max_robots is reached, the ended session that is oldest is forgotten first
-// (its part of the map stays), then the one suspended for longest. A session suspended for too long is ended. Thread
-// rule: any thread; nothing here waits for an estimator.
+// All sessions by robot, and the rules by which they are opened. Incoming events are passed to the session to which
+// they belong; scans without a session are counted as unclaimed. Rules: a robot has one session.
+// - A request that names the robot's session (its token) resumes it if it comes from the owner, or if the owner is not
+//   alive. The start pose of the request is then ignored.
+// - A request that is `started` and names a session that the server does not know is refused (FAILED_PRECONDITION),
+//   because its start pose is out of date.
+// - A request for a new session continues the robot's present session if the owner is not alive; the former owner is
+//   told. If another client that is alive owns it, the request is refused (ALREADY_EXISTS).
+// - A session that has ended is replaced by a new one.
+// When max_robots is reached, the oldest ended session is removed first (its part of the map stays), then the one that
+// has been suspended for longest. A session that has been suspended for too long is ended. Thread rule: any thread;
+// nothing here waits for an estimator.
 #pragma once
 
 #include <asio/thread_pool.hpp>
@@ -31,15 +34,15 @@ namespace cairn::server {
 class Roster {
  public:
   // Sessions draw the sites of the atlas; a robot that opens a session enters its site there.
-  // `journal`: null where nothing is stored.
+  // `journal`: null if nothing is stored.
   Roster(const RobotsOptions& options, const slam::MapperOptions& mapper, asio::thread_pool& pool, Outbound& outbound,
          Atlas& atlas, Journal* journal = nullptr);
 
   ~Roster();
 
-  // The sessions of the servers before this one, taken up where their journals end, in parallel on the pool; the sites
-  // must have been restored. Before anything else is called. FAILED_PRECONDITION: a newer server has written them. A
-  // session whose records are damaged is left out, with the reason in the log.
+  // Restores the sessions of earlier servers from their checkpoints and journals, in parallel on the pool. REQUIRES:
+  // the sites were restored before, and no other function was called. FAILED_PRECONDITION: a newer server has written
+  // the records. A session whose records are damaged is left out, and the reason is logged.
   Result<void> Restore();
 
   // Opens, resumes, refuses or ends; the answer goes out as a SessionState.
@@ -65,7 +68,7 @@ class Roster {
                                 const std::shared_ptr<Site>& site) const;
   Journal::Durable DurableFor(const std::shared_ptr<Session>& session) const;
   Result<std::shared_ptr<Session>> RestoreOne(SessionId id);
-  // The session that has to be removed before this robot can have a new one; null where there is room.
+  // The session that has to be removed before this robot can have a new one; null if there is room.
   Result<std::shared_ptr<Session>> GivesWay(NameId robot_id) const CAIRN_REQUIRES(mutex_);
   void Refuse(const SessionRequest& request, Status status);
   void RetireGone();
@@ -77,14 +80,14 @@ class Roster {
   Outbound& outbound_;
   Atlas& atlas_;
   Journal* const journal_;
-  // The roster is being destroyed: sessions that go now have not left.
+  // The roster is being destroyed. Sessions that are destroyed now stay in the store.
   const std::shared_ptr<std::atomic<bool>> closing_ = std::make_shared<std::atomic<bool>>(false);
 
   mutable Mutex mutex_;
   std::map<NameId, std::shared_ptr<Session>> sessions_ CAIRN_GUARDED_BY(mutex_);
   UnclaimedStreams unclaimed_ CAIRN_GUARDED_BY(mutex_);
-  std::deque<SessionRefusal> unsent_ CAIRN_GUARDED_BY(mutex_);           // Refusals the outbound lane had no room for.
-  std::vector<std::shared_ptr<Session>> gone_ CAIRN_GUARDED_BY(mutex_);  // Removed, and not retired on the wire yet.
+  std::deque<SessionRefusal> unsent_ CAIRN_GUARDED_BY(mutex_);           // Refusals not sent yet: the lane was full.
+  std::vector<std::shared_ptr<Session>> gone_ CAIRN_GUARDED_BY(mutex_);  // Removed sessions whose keys are not retired.
   SessionId next_id_ CAIRN_GUARDED_BY(mutex_) = 1;
 };
 

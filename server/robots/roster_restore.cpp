@@ -1,4 +1,4 @@
-// How the roster takes up the sessions of the servers before this one (roster.h).
+// How the roster restores the sessions of earlier servers (roster.h).
 #include <spdlog/spdlog.h>
 
 #include <asio/post.hpp>
@@ -79,9 +79,10 @@ Result<std::shared_ptr<Session>> Roster::RestoreOne(SessionId id) {
     if (const auto loaded = session->Load((*checkpoint)->bytes)) {
       position = (*checkpoint)->position;
     } else {
-      // For example, other options of the estimator. The whole journal, where it is still there, does as well.
+      // For example, the estimator has other options now. The whole journal can be replayed instead, if it is still
+      // there.
       spdlog::warn("the checkpoint of session {} is not used: {}", id, loaded.error().message);
-      session->Disown();
+      session->KeepStored();
       session = make();
     }
   }
@@ -94,7 +95,7 @@ Result<std::shared_ptr<Session>> Roster::RestoreOne(SessionId id) {
         return {};
       });
   if (!last) {
-    session->Disown();
+    session->KeepStored();
     return tl::unexpected(last.error());
   }
   session->Replayed();

@@ -28,7 +28,7 @@ Session::Session(const SessionSetup& setup, const RobotsOptions& options, asio::
           record_, outputs_) {}
 
 Session::~Session() {
-  if (outputs_.gone && !disowned_) outputs_.gone();
+  if (outputs_.gone && !keep_stored_) outputs_.gone();
 }
 
 bool Session::Take(ScanArrival&& arrival) {
@@ -60,12 +60,12 @@ void Session::Take(OdometryArrival&& arrival) {
   const std::uint64_t sequence = arrival.odometry.sequence;
   if (arrival.stream.session != record_.token() || !record_.OdometryReceived(sequence)) return;
   if (arrival.refused || ending_) {
-    Store(OdometryTaken{arrival.stream, arrival.odometry, OdometryFate::kRefused});
+    Store(OdometryTaken{arrival.stream, arrival.odometry, OdometryUse::kRefused});
     record_.OdometryDropped(sequence, arrival.refused ? DropReason::kBadGeometry : DropReason::kSessionEnded);
     return;
   }
   if (const auto merged = queue_.Push(std::move(arrival))) {
-    Store(OdometryTaken{merged->stream, merged->odometry, OdometryFate::kMerged});
+    Store(OdometryTaken{merged->stream, merged->odometry, OdometryUse::kMerged});
     record_.OdometryDropped(merged->odometry.sequence, DropReason::kQueueFull);
   }
   Schedule();
@@ -99,7 +99,7 @@ bool Session::Resume(ClientId client, SessionToken session) {
 
 void Session::End(const Status& reason) {
   if (ending_.exchange(true)) {
-    if (record_.phase() == SessionPhase::kEnded) AnnounceState();  // Whoever asks again gets the answer again.
+    if (record_.phase() == SessionPhase::kEnded) AnnounceState();  // A repeated request gets the same answer.
     return;
   }
   Finish finish;
@@ -110,7 +110,7 @@ void Session::End(const Status& reason) {
 }
 
 void Session::Suspend(const std::function<void()>& done) {
-  // Where the end was asked for before, it is handled first and nothing is left to be suspended.
+  // If the end was requested before, it is handled first, and there is nothing left to suspend.
   const bool ended_before = ending_.exchange(true);
   Finish finish;
   finish.final = false;
@@ -162,7 +162,7 @@ void Session::Replayed() {
 }
 
 void Session::Tick() {
-  // The disk takes long: the robot need not wait for it, its scans count as durable only when they are.
+  // If the disk is slow, the robot need not wait for it: a scan counts as durable only once it is on the disk.
   if (unannounced_ && SessionRecord::Clock::now() - opened_ > kOpeningPatience) {
     unannounced_ = false;
     AnnounceState();
@@ -218,7 +218,7 @@ void Session::TakeCheckpoint() {
   const std::uint64_t position = outputs_.position();
   if (position < checkpointed_ + outputs_.checkpoint_entries) return;
   auto bytes = estimator_.Save();
-  // What came in meanwhile is in the record, but maybe not before this position of the journal.
+  // Samples that arrived meanwhile are in the record, but perhaps not in the journal before this position.
   if (!bytes || outputs_.position() != position) return;
   if (outputs_.checkpoint(position, std::move(bytes))) checkpointed_ = position;
 }

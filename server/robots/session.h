@@ -31,7 +31,7 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
 
   ~Session() override;
 
-  // False where the stream is not this session's: an undeclared sensor.
+  // False if the stream is not this session's: an undeclared sensor.
   bool Take(ScanArrival&& arrival);
   void Take(OdometryArrival&& arrival);
   // The newest correction wins; one still waiting is dropped without a call to its `done`.
@@ -41,26 +41,26 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
 
   // The owner's liveliness lease was lost or came back: kSuspended or kActive.
   void SetLiveliness(bool alive);
-  // False where the session has ended meanwhile.
+  // Returns false if the session has ended meanwhile.
   bool Resume(ClientId client, SessionToken session);
-  // Scans that arrived are finished, then the session has ended for good; `reason` stands in its state.
+  // The session finishes the scans that have arrived and then ends for good. Its state contains `reason`.
   void End(const Status& reason = {});
-  // As End, but the session is only suspended, because the server stops; `done` is called on the strand, in any case.
+  // Like End, but the session is only suspended, because the server stops. `done` is always called, on the strand.
   void Suspend(const std::function<void()>& done);
   // Drops the scans still waiting; what is being estimated is finished.
   void Abandon();
   // Publishes the state once more.
   void Announce() { AnnounceState(); }
-  // The journal's side. Expected: the session's record is on its way to the disk, and its opening is announced when it
-  // is there (the first Durable). Lost: nothing of it is stored any more.
+  // Called for the journal. ExpectDurable: the session's record is being written; the session is announced as open when
+  // Durable is called for the first time. Lost: from now on nothing of the session is stored.
   void ExpectDurable();
   void Durable(const std::vector<JournalEntry>& entries);
   void Lost(const Status& why);
-  // As SessionEstimator, before the session is known to anybody: from one thread.
+  // See SessionEstimator. Called from one thread, before any other thread knows the session.
   void Replay(JournalEntry&& entry, const SessionEstimator::Switched& switched);
   void Replayed();
-  // It is not taken up after all: what is stored of it stays.
-  void Disown() { disowned_ = true; }
+  // This restored session is not used after all. Its records stay in the store when it is destroyed.
+  void KeepStored() { keep_stored_ = true; }
   [[nodiscard]] Result<void> Load(std::string_view bytes) { return estimator_.Load(bytes); }
   // Publishes ledgers that are due and whatever could not be sent before.
   void Tick();
@@ -68,15 +68,15 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   [[nodiscard]] SessionRecord& record() { return record_; }
   [[nodiscard]] const SessionRecord& record() const { return record_; }
   [[nodiscard]] SessionId id() const { return id_; }
-  // Its end was asked for; it may still have scans to finish.
+  // Whether the end was requested; the session may still have scans to finish.
   [[nodiscard]] bool ending() const { return ending_; }
-  // Busy while an event is being handled; waiting for a thread of the pool is not this session's doing.
+  // Busy while an event is being handled; while it waits for a thread of the pool it does not count as busy.
   [[nodiscard]] Pulse pulse() const { return {handled_, handling_}; }
   // Events wait or are being handled.
   [[nodiscard]] bool has_work() const { return scheduled_; }
 
  private:
-  static constexpr int kEventsPerTurn = 8;  // Then the strand makes room for the pool's other work.
+  static constexpr int kEventsPerTurn = 8;  // After so many, the pool may do other work first.
 
   void Schedule();
   void Drain();
@@ -97,8 +97,8 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   RobotQueue queue_;
   std::atomic<bool> ending_{false};  // An end was asked for: nothing new is taken.
   std::atomic<bool> state_unsent_{false};
-  std::atomic<bool> disowned_{false};
-  std::atomic<bool> unannounced_{false};  // Its opening waits for the disk.
+  std::atomic<bool> keep_stored_{false};
+  std::atomic<bool> unannounced_{false};  // Not announced as open until its record is on the disk.
   SessionRecord::Clock::time_point opened_{};
   std::atomic<bool> scheduled_{false};
   std::atomic<bool> handling_{false};
@@ -107,7 +107,7 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   Mutex publishing_;
   asio::strand<asio::thread_pool::executor_type> strand_;
   // Strand only.
-  std::uint64_t checkpointed_ = 0;  // Position of the last one that was asked for.
+  std::uint64_t checkpointed_ = 0;  // Journal position of the last checkpoint that was requested.
   bool failed_ = false;  // An exception has left the estimator in an unknown state: it is not asked any more.
   SessionEstimator estimator_;
 };

@@ -96,7 +96,7 @@ void SessionEstimator::On(ScanArrival&& arrival) {
 
 void SessionEstimator::On(OdometryArrival&& arrival) {
   if (ended_) return Discard(std::move(arrival));
-  Store(OdometryTaken{arrival.stream, arrival.odometry, OdometryFate::kTaken});
+  Store(OdometryTaken{arrival.stream, arrival.odometry, OdometryUse::kTaken});
   ComesFrom(arrival.stream.session);
   const std::uint64_t refused_before = pipeline_.odometry_refused();
   pipeline_.Add(arrival.odometry);
@@ -131,7 +131,7 @@ void SessionEstimator::Replay(JournalEntry&& entry, const Switched& switched) {
     static_cast<void>(record_.AddSensors(owner->sensors));
     static_cast<void>(record_.Resume(owner->client, owner->session));
   } else if (const auto* const correction = std::get_if<CorrectionTaken>(&entry)) {
-    // A switch that was not completed before the server ended never happened.
+    // A switch that was not completed before the server ended has no effect.
     if (switched(correction->epoch, correction->generation)) AdoptGrid(correction->epoch, FromStored(correction->grid));
   } else if (const auto* const finished = std::get_if<SessionFinished>(&entry)) {
     Finish finish;
@@ -144,9 +144,9 @@ void SessionEstimator::Replay(JournalEntry&& entry, const Switched& switched) {
 void SessionEstimator::ReplayOdometry(const OdometryTaken& odometry) {
   const std::uint64_t sequence = odometry.odometry.sequence;
   if (!record_.OdometryReceived(sequence)) return;
-  if (odometry.fate == OdometryFate::kTaken) return On(OdometryArrival{odometry.stream, odometry.odometry, false});
+  if (odometry.use == OdometryUse::kTaken) return On(OdometryArrival{odometry.stream, odometry.odometry, false});
   record_.OdometryDropped(sequence,
-                          odometry.fate == OdometryFate::kMerged ? DropReason::kQueueFull : DropReason::kBadGeometry);
+                          odometry.use == OdometryUse::kMerged ? DropReason::kQueueFull : DropReason::kBadGeometry);
 }
 
 std::function<std::string()> SessionEstimator::Save() const {
@@ -167,7 +167,7 @@ Result<void> SessionEstimator::Load(std::string_view bytes) {
   for (std::size_t i = 0; i < 8 && i < bytes.size(); ++i)
     size |= std::uint64_t{static_cast<unsigned char>(bytes[i])} << (8 * i);
   if (bytes.size() < 8 || size > bytes.size() - 8) return Fail(StatusCode::kDataLoss, "a checkpoint is too short");
-  // The estimator's part first: it leaves everything as it is where it does not fit.
+  // The estimator is loaded first: if that fails, nothing has changed.
   if (auto loaded = pipeline_.Load(bytes.substr(8 + size)); !loaded) return loaded;
   slam::StateReader reader(bytes.substr(8, size));
   reader(epoch_, session_);
@@ -177,7 +177,7 @@ Result<void> SessionEstimator::Load(std::string_view bytes) {
 
 void SessionEstimator::Replayed() {
   replaying_ = false;
-  static_cast<void>(TakeGridChange());  // The whole grid is told instead.
+  static_cast<void>(TakeGridChange());  // The whole grid is reported instead.
   GridChange whole{.session = identity_.id, .chunks = {}};
   for (const auto& [key, chunk] : pipeline_.mapper().ShareGrid()) whole.chunks.emplace_back(key, chunk);
   if (!whole.chunks.empty()) outputs_.grid_changed(std::move(whole));
@@ -209,7 +209,7 @@ GridChange SessionEstimator::TakeGridChange() {
 }
 
 slam::OccupancyGrid::Chunks SessionEstimator::PublishedChunks() {
-  // What changed since the last time must be told before.
+  // The changes since the last report must be reported first.
   GridChange change = TakeGridChange();
   if (!change.chunks.empty()) outputs_.grid_changed(std::move(change));
   return pipeline_.mapper().ShareGrid();
@@ -248,7 +248,7 @@ void SessionEstimator::On(SnapshotWanted&& wanted) {
 }
 
 void SessionEstimator::On(Finish&& finish) {
-  // A session that is stored goes on with the next server where this one leaves it, as after a crash.
+  // A stored session is continued by the next server, as after a crash.
   const bool goes_on = !finish.final && record_.state().durable;
   if (!ended_ && !goes_on) {
     if (finish.final) Store(SessionFinished{true, finish.reason});

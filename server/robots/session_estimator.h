@@ -20,14 +20,15 @@ namespace cairn::server {
 struct SessionOutputs {
   std::function<bool(OutboundValue)> send;
   std::function<void(GridChange&&)> grid_changed;
-  // Writes what the session consumes into its journal; whether it will be on the disk. Empty: nothing is stored.
+  // Writes an event that the session used into its journal. Returns whether it will be stored. Empty function: nothing
+  // is stored.
   std::function<bool(JournalEntry)> store = {};
-  // The position of the last entry that `store` took, and a checkpoint of everything up to there, which is due after so
-  // many entries. Empty: none are taken.
+  // `position` returns the position of the last entry that `store` accepted, and `checkpoint` stores the state after
+  // this entry. A checkpoint is due after every `checkpoint_entries` entries. Empty functions: no checkpoints.
   std::function<std::uint64_t()> position = {};
   std::function<bool(std::uint64_t position, std::function<std::string()> bytes)> checkpoint = {};
   std::uint64_t checkpoint_entries = 0;
-  // The session exists no more, and all of its changes were told. Empty: nobody wants to know.
+  // Called when the session has been destroyed, after all of its changes were reported. May be empty.
   std::function<void()> gone = {};
 };
 
@@ -47,14 +48,15 @@ class SessionEstimator {
   // Drops the scans inside the estimator.
   void DropWaiting();
 
-  // Takes what a server before this one has taken, in the same order: the estimator and the record become what they
-  // were, and nothing is sent. `switched` tells whether a switch of the map was completed (epoch, generation).
+  // Repeats what an earlier server did with this entry. After all entries, in their order, the estimator and the record
+  // are in the same state as then. Nothing is sent. `switched` tells whether a switch of the map was completed (epoch,
+  // generation).
   using Switched = std::function<bool(std::uint32_t epoch, std::uint64_t generation)>;
   void Replay(JournalEntry&& entry, const Switched& switched);
-  // After the last entry: what was drawn goes to the map.
+  // Called after the last entry: gives the drawn grid to the map.
   void Replayed();
-  // Everything that the entries so far have made, as a function that makes its bytes, which may take long and run on
-  // any thread; nothing while something waits. Load takes it up before the first entry that follows it.
+  // Saves the state after the entries so far. The result is a function that makes the bytes; it may take long and may
+  // run on any thread. Empty while a sample waits. Load restores this state; then the entries that follow are replayed.
   [[nodiscard]] std::function<std::string()> Save() const;
   [[nodiscard]] Result<void> Load(std::string_view bytes);
 
@@ -86,7 +88,7 @@ class SessionEstimator {
   std::uint32_t epoch_ = 0;
   bool ended_ = false;
   bool replaying_ = false;
-  SessionToken session_ = 0;                          // Of the last sample.
+  SessionToken session_ = 0;                          // The session of the last sample.
   std::unordered_map<const Scan*, Waiting> waiting_;  // Scans inside the pipeline; its pairing bounds them.
   std::chrono::steady_clock::time_point landmarks_refreshed_{};
   slam::ScanPipeline pipeline_;

@@ -135,7 +135,7 @@ bool SessionRecord::LeftAside(Stream& stream, std::uint64_t sequence) const {
     if (stream.aside == Clock::time_point{}) stream.aside = now;
     if (now - stream.aside < gap_wait_) return true;
     stream.resuming = false;
-  } else if (!stream.account.NextIs(sequence + 1)) {  // The awaited one, and no duplicate.
+  } else if (!stream.account.NextIs(sequence + 1)) {  // `sequence` is expected and no duplicate.
     stream.resuming = false;
   }
   return false;
@@ -349,8 +349,8 @@ std::vector<Ledger> SessionRecord::TakeDueLedgers(Clock::time_point now, Urgency
   for (auto& [sensor_id, stream] : streams_) {
     if (IsDue(stream, now, urgency, ledger_period_)) due.push_back(TakeLedger(stream, now));
   }
-  // Nobody waits for the odometry's ledger alone, however much of it settles. It goes with those of the scans, before
-  // them: what a client keeps of both is then the same stretch of time.
+  // No client waits for the ledger of the odometry alone, however many samples settle. It is sent just before those of
+  // the scans, so that a client removes odometry and scans of the same time.
   const bool rested = now - odometry_.taken >= ledger_period_;
   if (urgency == Urgency::kNow || (odometry_.changed && (rested || !due.empty())))
     due.insert(due.begin(), TakeLedger(odometry_, now));

@@ -1,4 +1,4 @@
-// What is known of one session and shown to the world: phase, owner, newest pose, the ledgers of its streams (one per
+// What the server reports about one session: phase, owner, newest pose, the ledgers of its streams (one per
 // sensor, and one of the odometry), its path.
 // Written by the door's side (arrivals) and by the estimator's strand (outcomes); read by queries through snapshot().
 // Decides when a ledger is due: at most `ledger_rate_hz`, but at once every 8 settled scans and when the queue drains,
@@ -31,15 +31,15 @@ class SessionRecord {
 
   SessionRecord(SessionId id, const SessionRequest& request, const RobotsOptions& options);
 
-  // Sensors the session does not have yet; false where that would be too many.
+  // Adds the sensors that the session does not have yet. Returns false if there would be too many.
   bool AddSensors(const std::vector<std::string>& sensors);
-  // Goes on with the account of a stream that sent before its session was open.
+  // Continues the ledger of a stream that sent samples before its session was open.
   void Inherit(NameId sensor_id, StreamLedger&& account);
 
   [[nodiscard]] bool Has(NameId sensor_id) const;
 
-  // A scan of the owner. All but kNew leave no trace here. kAside: after a restart, earlier ones have to be sent again
-  // first (robots.gap_wait_s); this one will come again after them.
+  // A scan of the owner. Only kNew changes the record. kAside: after a restart, scans before this one must be sent
+  // again first (robots.gap_wait_s). The client will send this one again after them.
   enum class Arrival { kNew, kDuplicate, kAside, kUnknownSensor };
   Arrival ScanReceived(NameId sensor_id, std::uint64_t sequence);
   void ScanDropped(NameId sensor_id, std::uint64_t sequence, DropReason reason);
@@ -49,21 +49,23 @@ class SessionRecord {
   // A scan of a client that does not own the session.
   Arrival ForeignScan(NameId sensor_id, DropReason reason);
 
-  // Odometry of the owner; false for a number that was received before or is left aside, which leaves no trace.
+  // Odometry of the owner. Returns false, and changes nothing, if the number was received before or must be sent again
+  // later (see kAside).
   [[nodiscard]] bool OdometryReceived(std::uint64_t sequence);
   void OdometryUsed(std::uint64_t sequence, Stamp stamp);
   // kQueueFull: the sample was merged into its successor.
   void OdometryDropped(std::uint64_t sequence, DropReason reason);
 
-  // What was received is written to the disk, or is no longer, and then why. Says whether this is news.
+  // Sets whether received samples are stored, and if not, the reason. Returns whether this is a change.
   bool SetStored(bool stored, const Status& why = {});
   // These entries of the session's journal are on the disk.
   void Durable(const std::vector<JournalEntry>& entries);
-  // The part of a checkpoint that is kept here, where nothing waits in any stream; false where something does.
+  // Writes the record's part of a checkpoint. Returns false if a sample waits in any stream; then there can be no
+  // checkpoint.
   [[nodiscard]] bool Save(slam::StateWriter& writer) const;
   // DATA_LOSS: the bytes are damaged; the record must then not be used.
   [[nodiscard]] Result<void> Load(slam::StateReader& reader);
-  // Everything here was read from the disk; the robot is not back yet.
+  // Called after the record was read from the disk, while the robot is not connected yet.
   void Restored();
   [[nodiscard]] std::vector<std::string> sensors() const;
 
@@ -71,24 +73,24 @@ class SessionRecord {
   // Another epoch of the map: the newest pose belongs to it from now on.
   void SetEpoch(std::uint32_t epoch);
   void SetAlive(bool alive);
-  // Both leave a session that has ended as it is, and say false: whoever asks may have looked before it ended.
+  // Both return false and change nothing if the session has ended. It may have ended after the caller last looked.
   bool SetPhase(SessionPhase phase, Status status);
-  // The robot is back, perhaps as another client process, whose session goes on with this one.
+  // The robot is connected again, perhaps by another client process. Its session continues this one.
   bool Resume(ClientId client, SessionToken session);
 
   [[nodiscard]] ClientId owner() const;
-  [[nodiscard]] SessionToken token() const;  // The session of the owner; streams of others are not taken.
+  [[nodiscard]] SessionToken token() const;  // The owner's; samples of other sessions are dropped.
   [[nodiscard]] bool alive() const;
   [[nodiscard]] SessionPhase phase() const;
   [[nodiscard]] SessionState state() const;
-  // How long the session has been suspended at `now`; zero where it is not.
+  // How long the session has been suspended at `now`; zero if it is not suspended.
   [[nodiscard]] Clock::duration SuspendedFor(Clock::time_point now) const;
   [[nodiscard]] std::uint32_t epoch() const;
   [[nodiscard]] SessionSnapshot snapshot() const;
 
   enum class Urgency { kWhenDue, kDrained, kNow };
   [[nodiscard]] std::vector<Ledger> TakeDueLedgers(Clock::time_point now, Urgency urgency);
-  // A ledger taken that could not be sent: due again.
+  // A ledger that was taken could not be sent. It is due again.
   void MarkUnsent(NameId sensor_id);
 
  private:
@@ -97,10 +99,10 @@ class SessionRecord {
     bool changed = true;
     std::uint64_t settled_when_taken = 0;
     Clock::time_point taken{};
-    bool resuming = false;      // After a restart, until the number after the last one comes.
-    Clock::time_point aside{};  // When the first sample was left aside.
+    bool resuming = false;      // After a restart, until the next expected number comes.
+    Clock::time_point aside{};  // When the first sample was rejected as kAside.
   };
-  // Both callers hold the lock of `self`, which the analysis can not see.
+  // Both callers hold the lock of `self`. The thread-safety analysis cannot see that.
   template <typename Archive>
   static void Members(Archive& archive, auto& self) CAIRN_NO_THREAD_SAFETY_ANALYSIS;
   bool LeftAside(Stream& stream, std::uint64_t sequence) const;
@@ -116,7 +118,7 @@ class SessionRecord {
 
   mutable Mutex mutex_;
   RobotStatus status_ CAIRN_GUARDED_BY(mutex_);           // Its `ledgers` stay empty: they are made on demand.
-  Clock::time_point suspended_ CAIRN_GUARDED_BY(mutex_);  // Since when, where it is suspended.
+  Clock::time_point suspended_ CAIRN_GUARDED_BY(mutex_);  // Start of the suspension, if suspended.
   std::map<NameId, Stream> streams_ CAIRN_GUARDED_BY(mutex_);
   Stream odometry_ CAIRN_GUARDED_BY(mutex_);
   PoseHistory history_ CAIRN_GUARDED_BY(mutex_);

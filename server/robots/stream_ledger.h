@@ -1,13 +1,13 @@
-// The account of one stream (robot, sensor): what became of every sample, scan or odometry. `received + lost_on_wire` =
+// Counts what happened to every sample (scan or odometry) of one stream (robot, sensor). `received + lost_on_wire` =
 // `used + dropped + waiting` at every moment.
 //
-// Numbers: samples carry sequences from 1. A gap counts as lost_on_wire and settles at once, so a client's window never
-// hangs on it; a late arrival takes its number back out of the lost. A number seen before (a resend of something
-// already received) is ignored and counted nowhere. At most kMaxGaps separate gaps are remembered; older ones stay lost
-// for good. Numbers before the first one of a client may have gone to an earlier session or to the server before its
-// last restart. They do not count as lost, and are taken if they come late. The counts go on. A number
-// more than kMaxStep ahead begins anew in the same way: no client loses a million scans at once.
-// Thread rule: none of its own; the session's lock guards it.
+// Numbers: samples carry sequences from 1. A gap counts as lost_on_wire and settles at once, so that a
+// client's window never waits for it. If a missing sample arrives late, it no longer counts as lost. A number seen
+// before (a resend of something already received) is ignored and counted nowhere. At most kMaxGaps separate gaps are
+// remembered; older ones stay lost for good. Numbers before the first one of a client may have gone to an earlier
+// session or to the server before its last restart. They do not count as lost, and are taken if they come late. The
+// counts go on. A number more than kMaxStep ahead begins a new count in the same way, because no client loses a million
+// scans at once. Thread rule: none of its own; the session's lock guards it.
 #pragma once
 
 #include <array>
@@ -29,24 +29,25 @@ class StreamLedger {
 
   explicit StreamLedger(Ledger names) : ledger_(std::move(names)) {}
 
-  // A scan arrived; false for a duplicate number, which the caller forgets. Otherwise Used or Dropped must follow.
+  // A sample arrived. Returns false for a duplicate number, which the caller must ignore. Otherwise Used or Dropped
+  // must follow.
   bool Received(std::uint64_t sequence);
   void Used(std::uint64_t sequence, Stamp stamp, bool keyframe, double latency_ms);
-  // As above, for odometry: no latency is measured.
+  // The same for odometry, whose latency is not measured.
   void Used(std::uint64_t sequence, Stamp stamp);
   void Dropped(std::uint64_t sequence, DropReason reason);
-  // A scan of someone else's client under this stream's name: counted, its number means nothing here.
+  // A sample that another client sent under this stream's name. It is counted; its number is ignored.
   void DroppedForeign(DropReason reason);
 
-  // Nothing waits: the account can be part of a checkpoint.
+  // Whether no sample waits. Only then a checkpoint can contain this ledger.
   [[nodiscard]] bool idle() const { return ledger_.waiting == 0; }
-  // For checkpoints (slam/state/archive.h). The names, the latencies and what is on the disk are not part of it.
+  // For checkpoints (slam/state/archive.h). Names, latencies and durability are not part of a checkpoint.
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     auto& ledger = self.ledger_;
     archive(ledger.received, ledger.used, ledger.keyframes, ledger.dropped, ledger.last_sequence,
             ledger.settled_through, ledger.last_stamp, self.begun_, self.first_sequence_, self.settled_count_);
-    std::vector<std::uint64_t> gaps;  // First and last missing number of each.
+    std::vector<std::uint64_t> gaps;  // First and last missing number of each gap.
     for (const auto& [first, last] : self.gaps_) gaps.insert(gaps.end(), {first, last});
     archive(gaps);
     if constexpr (Archive::kReads) {
@@ -55,17 +56,17 @@ class StreamLedger {
       for (std::size_t i = 0; i < gaps.size(); i += 2) self.gaps_.emplace(gaps[i], gaps[i + 1]);
     }
   }
-  // Whether what is received from here on becomes durable; without, durable_through stands still.
+  // Whether samples that are received from now on are stored. If not, durable_through stays where it is.
   void SetStored(bool stored);
-  // The sample is on the disk, and so is what became of it.
+  // The sample, and whether it was used or dropped, is on the disk.
   void Durable(std::uint64_t sequence);
-  // The account was restored from the disk: everything in it is durable, and what comes next should be the number after
-  // the last one (NextIs), because the client sends the rest again, in order.
+  // The ledger was restored from the disk, so everything in it is durable. The next sample should have the number after
+  // the last one (NextIs), because the client sends all later samples again, in order.
   void Restored();
   [[nodiscard]] bool NextIs(std::uint64_t sequence) const;
 
   void Rename(const Ledger& names);
-  // The next sample belongs to another session of the robot's client.
+  // The next sample belongs to another session of the robot.
   void NewClient() { begun_ = false; }
 
   // Scans used or dropped so far, for deciding when to publish.
@@ -87,7 +88,7 @@ class StreamLedger {
   std::uint64_t first_sequence_ = 0;  // The first number of the client; numbers missing before it are not lost.
   std::uint64_t settled_count_ = 0;
   std::set<std::uint64_t> waiting_;              // Numbers received and not settled; bounded by the robot's queue.
-  std::set<std::uint64_t> undurable_;            // Numbers received and not yet on the disk, where stored.
+  std::set<std::uint64_t> undurable_;            // Numbers received and not yet on the disk.
   std::map<std::uint64_t, std::uint64_t> gaps_;  // First missing number -> last missing number, disjoint.
   std::array<float, kLatencies> latencies_ms_{};
   std::size_t latency_count_ = 0;

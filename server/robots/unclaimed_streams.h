@@ -24,8 +24,8 @@ class UnclaimedStreams {
   explicit UnclaimedStreams(std::size_t max_streams) : max_streams_(max_streams) {}
 
   void Count(const StreamId& stream, std::uint64_t sequence, DropReason reason, Clock::time_point now);
-  // The account of a stream whose session has just been opened, if anything was sent under its name before. Where that
-  // was sent in another session, the numbers start anew.
+  // The counts of a stream whose session has just been opened, if samples arrived under its name before. If they
+  // belonged to another session, the numbers begin again.
   [[nodiscard]] std::optional<StreamLedger> Claim(const StreamId& stream);
   // Accounts that changed since the last call.
   [[nodiscard]] std::vector<Ledger> TakeChanged();
@@ -36,7 +36,7 @@ class UnclaimedStreams {
  private:
   struct Account {
     StreamLedger ledger;
-    SessionToken session = 0;  // Of the last sample.
+    SessionToken session = 0;  // Session of the last sample.
     Clock::time_point counted{};
     bool changed = true;
 

@@ -1,9 +1,9 @@
-// A checkpoint is the state of one estimator (ScanPipeline) as bytes, with what a reader must know of it: the version
-// of the format, a checksum, and the options of the estimator, which must be the same in the one that loads it.
+// A checkpoint is the state of one estimator (ScanPipeline) as bytes. It also contains the version of the format, a
+// checksum, and the options of the estimator. An estimator can load it only if it has the same options.
 //
 // Bytes, little-endian: "CAIRNEST", format (uint32), checksum (uint64) of all that follows; length (uint64) and text of
 // the options, one `key value` a line; the state (state/archive.h). The list of members of every class is part of the
-// format: who changes one raises kCheckpointFormat.
+// format: if one changes, kCheckpointFormat must be raised.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +22,7 @@ class Checkpoint {
  public:
   Checkpoint(const MapperOptions& options, StateWriter state);
 
-  // May take long. May be called from any thread, whatever the estimator does meanwhile.
+  // May take long. May be called from any thread, even while the estimator runs.
   [[nodiscard]] std::string Bytes() const;
 
  private:
@@ -30,8 +30,8 @@ class Checkpoint {
   StateWriter state_;
 };
 
-// The part of the bytes that is the state. kDataLoss if they are damaged or no checkpoint; kFailedPrecondition if they
-// are of another format, or of an estimator with other options: the message names the first that differs.
+// Returns the part of the bytes that is the state. kDataLoss: they are damaged or no checkpoint. kFailedPrecondition:
+// they have another format, or come from an estimator with other options; the message names the first one that differs.
 [[nodiscard]] Result<std::string_view> OpenCheckpoint(std::string_view bytes, const MapperOptions& options);
 
 }  // namespace cairn::slam

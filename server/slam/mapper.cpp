@@ -63,7 +63,7 @@ struct Mapper::State {
   };
 
   // Whether the parts fit together after reading.
-  [[nodiscard]] bool Sound() const;
+  [[nodiscard]] bool IsConsistent() const;
 
   const MapperOptions options;
   FrontEnd front_end;
@@ -146,11 +146,10 @@ void Mapper::State::CloseLargeLoop() {
   const auto loop = loops.Find(trail, believed);
   if (!loop) return;
   const auto path = trail.PathWithLoop(loop->relation(), believed.values(), options.pose_graph);
-  // The loop is stored only after the filter has taken over the new path. A loop that the filter did not take
-  // over must be searched for again.
-  if (!path || !filter->Rebase(*path)) return;
+  if (!path) return;  // The loop is not stored, so that it will be searched for again.
+  filter->Rebase(*path);
   trail.AddLoop(loop->relation());
-  trail.TrustDoubted();
+  trail.ConfirmTentative();
   drawing.StartAgain(trail.size());
   self_check.Forget();
 }
@@ -160,9 +159,9 @@ void Mapper::State::Draw(const TrackStep& step, bool placed_before) {
   const bool begins = filter->placed() && !placed_before;
   if (begins) {
     self_check.Forget();
-    trail.TrustDoubted();
+    trail.ConfirmTentative();
   }
-  trail.JudgeLast(IsLocalized(ReasonOf(step)), !blind.Lost());
+  trail.MarkLast(IsLocalized(ReasonOf(step)), !blind.Lost());
   if (begins) {
     drawing.Begin(trail.keyframes(), believed_path());
   } else if (filter->placed()) {
@@ -245,9 +244,9 @@ std::size_t Mapper::keyframe_count() const {
 MapperSnapshot Mapper::Snapshot() const {
   const State& s = *state_;
   if (!s.filter->placed()) return {};
-  // Smoothing puts the path right, and with it what was doubted on the way.
-  const bool put_right = s.level.outcome.localized;
-  return {.keyframes = put_right ? s.trail.TrustedKeyframes() : s.trail.keyframes(),
+  // Smoothing corrects the path, so that tentative keyframes count as localized.
+  const bool corrected = s.level.outcome.localized;
+  return {.keyframes = corrected ? s.trail.ConfirmedKeyframes() : s.trail.keyframes(),
           .online_path = s.drawing.path(),
           .full_path = s.believed_path().values(),
           .relations = s.trail.relations(),
@@ -261,9 +260,7 @@ void Mapper::FinishMap() {
 
 void Mapper::AdoptGrid(OccupancyGrid grid, std::size_t keyframes) {
   State& s = *state_;
-  // While the robot's place in the map is not known, there is nothing to draw on the map.
-  const std::span<const Keyframe> drawable = s.filter->placed() ? s.trail.keyframes() : std::span<const Keyframe>{};
-  s.drawing.Adopt(std::move(grid), keyframes, drawable, s.believed_path());
+  s.drawing.Adopt(std::move(grid), keyframes, s.trail.keyframes(), s.believed_path());
 }
 
 void Mapper::Save(StateWriter& archive) const {
@@ -275,12 +272,12 @@ void Mapper::Load(StateReader& archive, const ParallelFor& parallel_for) {
   auto loaded = std::make_unique<State>(state_->options, Pose2{}, 0);
   archive(*loaded);
   if (archive.ok()) loaded->filter->Load(archive);
-  if (!archive.ok() || !archive.Require(loaded->Sound(), "the paths")) return;
+  if (!archive.ok() || !archive.Require(loaded->IsConsistent(), "the paths")) return;
   loaded->trail.RestorePoints(loaded->options.front_end.surface, parallel_for);
   state_ = std::move(loaded);
 }
 
-bool Mapper::State::Sound() const {
+bool Mapper::State::IsConsistent() const {
   for (std::size_t i = 0; i < filter->hypothesis_count(); ++i)
     if (filter->hypothesis(i).path.size() != trail.size()) return false;
   return drawing.path().size() == (filter->placed() ? trail.size() : 0);

@@ -98,7 +98,7 @@ void Visit(OptionVisitor& visitor, FilterOptions& options) {
                                "take proportionally more time and memory."));
   visitor.Real("max_nis", options.back_end.max_nis, "1", 1.0, 1000.0,
                "Largest squared Mahalanobis distance that an observation may count for. A larger value lets "
-               "contradicting observations raise the doubt about the pose further.");
+               "contradicting observations increase the uncertainty of the pose further.");
   visitor.Integer(
       "diverged_after", options.back_end.diverged_after, "1", 1, 100000,
       "Number of revisits in a row that contradict the estimate after which the robot counts as not localized.");

@@ -44,8 +44,8 @@ class ScanPipeline {
   // and the time is spent in Checkpoint::Bytes, which may run on another thread.
   [[nodiscard]] Checkpoint Save() const;
   void Save(std::string& bytes) const { bytes = Save().Bytes(); }
-  // Replaces the state by a saved one, which may come from a pipeline with another start pose. Where the bytes are
-  // damaged (kDataLoss), of another format or made with other options (kFailedPrecondition), nothing changes.
+  // Replaces the state by a saved one, which may come from a pipeline with another start pose. If the bytes are damaged
+  // (kDataLoss), have another format or were made with other options (kFailedPrecondition), nothing changes.
   [[nodiscard]] Result<void> Load(std::string_view bytes);
 
   // Odometry samples refused so far for their stamps.

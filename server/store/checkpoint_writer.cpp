@@ -8,7 +8,7 @@
 namespace cairn::server {
 namespace {
 
-constexpr std::uint64_t kParts = 65536;  // Numbers of one checkpoint.
+constexpr std::uint64_t kParts = 65536;  // Record numbers for each checkpoint.
 
 }  // namespace
 

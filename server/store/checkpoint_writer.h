@@ -1,6 +1,6 @@
-// Writes the checkpoint of a session in parts over several commits, so that a large one does not delay what others wait
-// for. Part 0 comes last and makes the checkpoint complete; older ones are removed with it. The record number is
-// position * 65,536 + part. Not thread-safe.
+// Writes the checkpoint of a session in parts, over several commits, so that a large one does not delay other commits.
+// Part 0 (the head) is written last and completes the checkpoint; older checkpoints are removed in the same commit. The
+// record number is position * 65,536 + part. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -21,7 +21,7 @@ class CheckpointWriter {
 
   // Adds the next parts to a commit that is about to be made.
   void AddTo(RecordChanges& changes);
-  // All parts are in commits, the head too.
+  // Whether all parts, including the head, have been added to commits.
   [[nodiscard]] bool complete() const { return complete_; }
   [[nodiscard]] std::uint64_t session() const { return session_; }
   [[nodiscard]] std::uint64_t position() const { return position_; }

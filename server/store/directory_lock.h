@@ -1,5 +1,5 @@
-// Keeps a second process away from a directory: a lock on its file `lock`, which the kernel releases when the process
-// ends in whatever way. Source: flock(2). Thread rule: any thread.
+// A lock on the file `lock` of a directory, so that only one process uses the directory. The kernel releases it when
+// the process ends in any way. Source: flock(2). Thread rule: any thread.
 #pragma once
 
 #include <filesystem>

@@ -50,7 +50,7 @@ void Journal::Open(const StoredSession& session, Durable durable) {
   const MutexLock lock(mutex_);
   lines_[session.id] = Line{.next = 1, .durable = std::move(durable)};
   const RecordKey key{RecordKind::kSession, session.id, 0};
-  // Position 0 of the session's line: whoever opened it is told as soon as it is on the disk.
+  // Position 0 stands for the session itself; the caller is told as soon as it is on the disk.
   if (!Push(Written{key, [session] { return BytesOf(session); }}, 1024)) lines_[session.id].lost = true;
   urgent_ = true;
 }

@@ -1,11 +1,12 @@
-// Makes durable what the rooms hand over, in the order in which they do, without ever letting them wait for the disk.
-// A thread gathers what arrives within store.commit_delay_ms and commits it as one group; so the disk always holds
-// everything up to some moment and nothing after it. Only then are those who wait for it told.
+// Writes the changes of all sessions, sites and jobs to the store, in the order in which they are handed over. No
+// caller waits for the disk: a thread collects what arrives within store.commit_delay_ms and commits it as one group.
+// So the disk always contains all changes up to some moment and none after it. Callbacks report a change only after it
+// is on the disk.
 //
 // Overflow rule: the queue is bounded by bytes. While the disk fails, the group is tried again every second and the
-// queue fills. A session whose entry finds it full is no longer stored from there on, because a journal with a hole
-// could not be replayed; what was accepted before stays valid. The state is then `degraded` with the reason.
-// Thread rule: any thread; Start and Stop from one.
+// queue fills. If there is no room for an entry, its session is no longer stored from there on, because a journal with
+// a gap could not be replayed. The entries before stay valid. The state is then `degraded` with the reason. Thread
+// rule: any thread; Start and Stop from one.
 #pragma once
 
 #include <chrono>
@@ -44,8 +45,8 @@ struct JournalCounts {
 
 class Journal {
  public:
-  // Called on the journal's thread with the entries of the session that are on the disk now, in order; there may be
-  // none in the first call, which tells that the session itself is.
+  // Called on the journal's thread with the entries of the session that are on the disk now, in order. The first call
+  // may have none; it reports that the session itself is on the disk.
   using Durable = std::function<void(const std::vector<JournalEntry>& entries)>;
   // Called on the journal's thread to make a record's bytes.
   using Bytes = std::function<std::string()>;
@@ -54,22 +55,23 @@ class Journal {
   ~Journal();
 
   void Start();
-  // Tries once to write what waits, and ends the thread.
+  // Tries once to write what still waits, and ends the thread.
   void Stop();
 
-  // A new session, which is stored at once, or one that was restored up to `last`.
+  // Open: a new session, which is stored at once. Reopen: a session that was restored up to position `last`.
   void Open(const StoredSession& session, Durable durable);
   void Reopen(std::uint64_t session, std::uint64_t last, Durable durable);
-  // The position of the entry, from 1; 0 where it is not stored. `session` must be open.
+  // Returns the position of the entry, counted from 1; 0 if it is not stored, also because `session` is not open.
   std::uint64_t Append(std::uint64_t session, JournalEntry entry);
-  // Of the last entry of the session; 0 where there is none, or it is not stored.
+  // The position of the session's last entry; 0 if there is none, or if the session is not stored.
   [[nodiscard]] std::uint64_t position(std::uint64_t session) const;
-  // The session's state as bytes, after exactly the entries up to `position`. False where one is being written.
+  // Stores the session's state after exactly the entries up to `position`. Returns false if another checkpoint of the
+  // session is still being written.
   bool Checkpoint(std::uint64_t session, std::uint64_t position, Bytes bytes);
-  // Removes everything of a session that will never be restored.
+  // Removes all records of a session that will not be restored.
   void Forget(std::uint64_t session);
 
-  // `size` is about what the bytes need, for the bound of the queue.
+  // Writes or replaces a record. `size` is an estimate of its bytes, for the bound of the queue.
   void Put(const RecordKey& key, Bytes bytes, std::size_t size = 1024);
   void Remove(const RecordRange& range);
 
@@ -79,7 +81,7 @@ class Journal {
 
  private:
   using Clock = std::chrono::steady_clock;
-  struct Line {  // Of one open session.
+  struct Line {  // One open session.
     std::uint64_t next = 1;
     bool lost = false;
     bool checkpointing = false;
@@ -96,7 +98,7 @@ class Journal {
     Bytes bytes;
   };
   using Change = std::variant<Appended, Written, RecordRange>;
-  // What was taken from the queue to be committed together.
+  // Changes that are committed together.
   struct Group {
     std::deque<Change> changes;
     Clock::time_point oldest;
@@ -133,17 +135,17 @@ class Journal {
   CondVar arrived_;
   std::map<std::uint64_t, Line> lines_ CAIRN_GUARDED_BY(mutex_);
   std::deque<Change> queue_ CAIRN_GUARDED_BY(mutex_);
-  std::size_t queued_bytes_ CAIRN_GUARDED_BY(mutex_) = 0;      // Of queue_.
-  std::size_t committing_bytes_ CAIRN_GUARDED_BY(mutex_) = 0;  // Of the group that is being committed.
+  std::size_t queued_bytes_ CAIRN_GUARDED_BY(mutex_) = 0;      // Bytes in queue_.
+  std::size_t committing_bytes_ CAIRN_GUARDED_BY(mutex_) = 0;  // Bytes of the group being committed.
   Clock::time_point oldest_ CAIRN_GUARDED_BY(mutex_);
   bool urgent_ CAIRN_GUARDED_BY(mutex_) = false;
-  std::string disk_fault_ CAIRN_GUARDED_BY(mutex_);  // Why the last commit failed; empty after one that succeeded.
-  std::string lost_ CAIRN_GUARDED_BY(mutex_);        // What can not be stored any more.
+  std::string disk_fault_ CAIRN_GUARDED_BY(mutex_);  // Why the last commit failed; empty if it did not.
+  std::string lost_ CAIRN_GUARDED_BY(mutex_);        // Which session is no longer stored.
   JournalCounts counts_ CAIRN_GUARDED_BY(mutex_);
   std::deque<float> delays_ms_ CAIRN_GUARDED_BY(mutex_);
   std::deque<WantedCheckpoint> checkpoints_ CAIRN_GUARDED_BY(mutex_);
 
-  // The thread's.
+  // Used by the thread only.
   std::optional<CheckpointWriter> writing_;
   Clock::time_point budget_checked_{};
 
@@ -156,8 +158,8 @@ class Journal {
     Store& store, std::uint64_t session, std::uint64_t position,
     const std::function<Result<void>(std::uint64_t position, JournalEntry&& entry)>& visit);
 
-// The number of this start: larger than that of every start before on this store, at least `milliseconds` since 1970.
-// It is on the disk when this returns.
+// Returns the number of this start: larger than that of every earlier start on this store, and at least `milliseconds`
+// (since 1970). It is on the disk when this returns.
 [[nodiscard]] Result<std::uint64_t> NextGeneration(Store& store, std::uint64_t milliseconds);
 
 }  // namespace cairn::server

@@ -34,7 +34,7 @@ void FillEntry(record::Entry& to, const OdometryTaken& from) {
   odometry.set_sequence(from.odometry.sequence);
   odometry.set_stamp(from.odometry.stamp);
   Fill(*odometry.mutable_t_odom_robot(), from.odometry.T_odom_robot);
-  odometry.set_fate(static_cast<std::uint32_t>(from.fate));
+  odometry.set_use(static_cast<std::uint32_t>(from.use));
 }
 
 void FillEntry(record::Entry& to, const OwnerChanged& from) {
@@ -75,9 +75,9 @@ Result<JournalEntry> OdometryOf(const record::Odometry& from) {
   const OdometryTaken taken{
       ValueOf(from.stream()),
       {.sequence = from.sequence(), .stamp = from.stamp(), .T_odom_robot = ValueOf(from.t_odom_robot())},
-      static_cast<OdometryFate>(from.fate())};
-  if (from.fate() > static_cast<std::uint32_t>(OdometryFate::kMerged)) return Unreadable("odometry");
-  if (taken.fate == OdometryFate::kTaken && !ValidateOdometry(taken.odometry)) return Unreadable("odometry");
+      static_cast<OdometryUse>(from.use())};
+  if (from.use() > static_cast<std::uint32_t>(OdometryUse::kMerged)) return Unreadable("odometry");
+  if (taken.use == OdometryUse::kTaken && !ValidateOdometry(taken.odometry)) return Unreadable("odometry");
   return taken;
 }
 

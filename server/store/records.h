@@ -1,6 +1,6 @@
-// What the server keeps, as values of the rooms' language, and their bytes (idl/cairn/record.proto). This room knows no
-// estimator: grids are shared arrays of cells, checkpoints are bytes. Reading checks what the rooms rely on, because a
-// file may contain anything. Stateless, thread-safe.
+// The stored records as C++ values, and their bytes (idl/cairn/record.proto). This folder does not depend on the
+// estimator: grids are shared arrays of cells, and checkpoints are bytes. Functions that read check everything on which
+// the rest of the server relies, because a file may contain anything. Stateless, thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -32,24 +32,24 @@ struct StoredGrid {
   std::vector<StoredChunk> chunks;
 };
 
-// The entries of a session's journal: what its strand consumed, in this order.
+// The entries of a session's journal: the events that its strand processed, in this order.
 struct ScanTaken {
   StreamId stream;
   std::shared_ptr<const Scan> scan;
 };
-// Counted, never estimated.
+// A scan that was counted in the ledger but not given to the estimator.
 struct ScanRefused {
   StreamId stream;
   std::uint64_t sequence = 0;
   DropReason reason = DropReason::kNoOdometry;
 };
-enum class OdometryFate : std::uint8_t { kTaken = 0, kRefused = 1, kMerged = 2 };
+enum class OdometryUse : std::uint8_t { kTaken = 0, kRefused = 1, kMerged = 2 };
 struct OdometryTaken {
   StreamId stream;
   Odometry odometry;
-  OdometryFate fate = OdometryFate::kTaken;
+  OdometryUse use = OdometryUse::kTaken;
 };
-// From now on this client owns the session and streams these sensors, and those named before, under its token.
+// From now on this client owns the session. It streams these sensors, and those named before, under its token.
 struct OwnerChanged {
   ClientId client = 0;
   SessionToken session = 0;

@@ -1,8 +1,8 @@
-// Records on disk: bytes under a key, written in groups that are on the disk completely or not at all. What the bytes
-// mean is said in records.h. Every record carries its format version and a checksum over key and content, so that
-// damaged bytes are an error and never wrong data. This is the one interface of the store; the embedded one is SQLite
-// (sqlite_store.h), and keys are plain numbers so that another database can take its place. Thread rule: any thread;
-// Commit waits for the disk, so nothing that must not wait calls it (journal.h).
+// Records on disk: bytes under a key, written in groups. Of each group either all or nothing is on the disk. records.h
+// defines what the bytes mean. Every record carries its format version and a checksum over key and content, so that
+// damaged bytes are an error and never wrong data. This is the interface of every store. The only one so far is SQLite
+// (sqlite_store.h). Keys are plain numbers, so that another database can replace it. Thread rule: any thread;
+// Commit waits for the disk; code that must not wait uses the journal (journal.h).
 #pragma once
 
 #include <compare>
@@ -67,9 +67,9 @@ class Store {
   // Visits records in the order of their numbers. DATA_LOSS: a record is damaged. FAILED_PRECONDITION: a newer server
   // has written it.
   virtual Result<void> Read(const RecordRange& range, const Visit& visit) = 0;
-  // Who owns records of this kind, ascending.
+  // The owners of records of this kind, in ascending order.
   virtual Result<std::vector<std::uint64_t>> Owners(RecordKind kind) = 0;
-  // What the records use on the disk.
+  // Disk space that the records use.
   virtual Result<std::uint64_t> bytes_used() = 0;
 };
 

@@ -1,4 +1,4 @@
-// Options of the store. Where it is kept is said on the command line (--state), because it belongs to the machine.
+// Options of the store. Its directory is an argument of the command line (--state), because it depends on the machine.
 #pragma once
 
 #include <cstdint>

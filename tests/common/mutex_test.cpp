@@ -15,7 +15,7 @@ class Counter {
     ++count_;
     changed_.NotifyAll();
   }
-  // False where the count is not reached in time.
+  // False if the count is not reached in time.
   bool WaitFor(int count, std::chrono::seconds longest) {
     const auto deadline = std::chrono::steady_clock::now() + longest;
     MutexLock lock(mutex_);

@@ -64,7 +64,7 @@ int ColourIndex(const Series& series, std::size_t position) {
   return series.colour.value_or(static_cast<int>(position));
 }
 
-// 0 x 0 where no series has a label.
+// 0 x 0 if no series has a label.
 cv::Size LegendSize(const Plot& plot) {
   int widest = 0, lines = 0;
   for (const Series& series : plot.series) {

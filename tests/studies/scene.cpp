@@ -9,6 +9,7 @@
 #include "client/sim/shipped_worlds.h"
 #include "client/sim/world.h"
 #include "client/sim/world_file.h"
+#include "tests/flat_world.h"
 
 namespace cairn::studies {
 namespace {
@@ -49,7 +50,7 @@ Scan Scene::Look(const Pose2& T_map_robot, const sim::LaserOptions& laser, sim::
                  std::span<const sim::Disc> moved) const {
   std::vector<sim::Disc> discs = world_.discs;
   discs.insert(discs.end(), moved.begin(), moved.end());
-  return sim::MeasureScan(walls_, discs, T_map_robot, {}, 0, laser, random);
+  return sim::MeasureFlatScan(walls_, discs, T_map_robot, {}, 0, laser, random);
 }
 
 std::vector<VisibleWall> Scene::VisibleWalls(const Pose2& T_map_robot, const sim::LaserOptions& laser) const {

@@ -10,6 +10,7 @@
 #include "client/sim/random.h"
 #include "client/sim/ray_caster.h"
 #include "client/sim/world.h"
+#include "tests/flat_world.h"
 
 namespace cairn::studies {
 
@@ -31,7 +32,9 @@ class Scene {
 
   // A random pose on a route, up to `aside_m` beside it, with any heading; at least 0.35 m from walls.
   [[nodiscard]] Pose2 DrawPose(sim::Random& random, double aside_m = 0.3) const;
-  [[nodiscard]] double Clearance(const Pose2& T_map_robot) const { return walls_.Clearance(T_map_robot.translation()); }
+  [[nodiscard]] double Clearance(const Pose2& T_map_robot) const {
+    return sim::DistanceToWalls(world_.segments, T_map_robot.translation());
+  }
 
   // `moved`: discs that are in this scan in addition to those of the world.
   [[nodiscard]] Scan Look(const Pose2& T_map_robot, const sim::LaserOptions& laser, sim::Random& random,

@@ -60,7 +60,7 @@ Eigen::Matrix<double, 4, 2> J_ends_errors(const Eigen::Vector2d& parameters, con
   return J;
 }
 
-bool Believable(const Eigen::Vector2d& parameters) {
+bool IsPlausible(const Eigen::Vector2d& parameters) {
   return parameters.allFinite() && (parameters.array() > 0.8).all() && (parameters.array() < 1.25).all();
 }
 
@@ -115,7 +115,7 @@ Result<UmbmarkResult> EvaluateUmbmark(std::span<const SquareRun> runs, const Umb
                 "in metres, with the first leg along x?");
   };
   Eigen::Vector2d x(result.small_angle.E_d, result.small_angle.E_b);
-  if (!Believable(x)) return beyond();
+  if (!IsPlausible(x)) return beyond();
   Eigen::Vector4d centers;
   centers << cw.center, ccw.center;
   Eigen::Matrix<double, 4, 2> J;
@@ -123,7 +123,7 @@ Result<UmbmarkResult> EvaluateUmbmark(std::span<const SquareRun> runs, const Umb
     J = J_ends_errors(x, options);
     const Eigen::Vector2d step = (J.transpose() * J).ldlt().solve(J.transpose() * (centers - EndsOf(x, options)));
     x += step;
-    if (!Believable(x)) return beyond();
+    if (!IsPlausible(x)) return beyond();
     if (step.norm() < 1e-12) break;
   }
   result.errors = {x(0), x(1)};

@@ -7,10 +7,10 @@ namespace cairn::slam {
 
 Ancestry::Ancestry() : nodes_(1), living_{0} {}
 
-void Ancestry::NextGeneration(std::vector<Birth> births) {
+void Ancestry::NextGeneration(std::vector<Child> children) {
   const std::vector<Id> parents = std::exchange(living_, {});
-  living_.reserve(births.size());
-  for (Birth& birth : births) living_.push_back(Add(parents[birth.parent], std::move(birth.changes)));
+  living_.reserve(children.size());
+  for (Child& child : children) living_.push_back(Add(parents[child.parent], std::move(child.changes)));
   for (const Id id : parents) {
     if (nodes_[id].child_count == 0)
       RemoveChildless(id);

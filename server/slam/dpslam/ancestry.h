@@ -20,7 +20,7 @@ class Ancestry {
   using Id = std::uint32_t;
   static constexpr Id kNobody = UINT32_MAX;
 
-  struct Birth {
+  struct Child {
     std::size_t parent = 0;  // Index in living().
     MapChanges changes;
 
@@ -32,9 +32,9 @@ class Ancestry {
 
   Ancestry();  // Starts with one particle whose map is empty.
 
-  // The births become the living particles. REQUIRES: at least one birth, ordered by parent; thereby
-  // relatives are neighbours.
-  void NextGeneration(std::vector<Birth> births);
+  // The children become the living particles. REQUIRES: at least one child, ordered by parent, so that children
+  // of one parent are neighbours.
+  void NextGeneration(std::vector<Child> children);
   // Removes from all maps the tiles outside [low, high].
   void KeepOnly(const ChangeTileKey& low, const ChangeTileKey& high);
 

@@ -27,7 +27,7 @@ DpSlam::DpSlam(const DpSlamOptions& options, const Pose2& T_map_robot_start, std
   }
 }
 
-bool DpSlam::Sound(std::size_t keyframes) const {
+bool DpSlam::IsConsistent(std::size_t keyframes) const {
   const std::size_t low = low_->best().path.size();
   if (!options_.hierarchical) return low == keyframes && pending_.empty();
   const std::size_t high = this->high()->best().path.size();

@@ -45,7 +45,8 @@ class DpSlam final : public Filter {
             self.step_m_, self.turn_rad_, self.contradicted_, self.observed_);
     if (self.high_) archive(*self.high_);
     if (self.plain_) archive(*self.plain_);
-    if constexpr (Archive::kReads) archive.Require(self.Sound(archive.keyframes()), "the scans of the low level");
+    if constexpr (Archive::kReads)
+      archive.Require(self.IsConsistent(archive.keyframes()), "the scans of the low level");
   }
 
   // The map of the low level covers only the surroundings if there is a high level.
@@ -68,7 +69,7 @@ class DpSlam final : public Filter {
     }
   };
   // Whether the numbers of scans agree with each other and with the number of keyframes.
-  [[nodiscard]] bool Sound(std::size_t keyframes) const;
+  [[nodiscard]] bool IsConsistent(std::size_t keyframes) const;
   // Number of scans of the next segment once it is long enough and followed by enough later scans; otherwise
   // 0.
   [[nodiscard]] std::size_t SegmentEnd() const;

@@ -36,7 +36,7 @@ void Visit(OptionVisitor& visitor, LevelOptions& options) {
                "The particles are resampled when the effective sample size falls below this share of their number. 1 "
                "resamples after every step.");
   visitor.Integer("ray_stride", options.ray_stride, "1", 1, 1000,
-                  "Only every n-th ray weighs the particles. All rays are drawn into the maps.");
+                  "Only every n-th ray is used for the weights of the particles. All rays are drawn into the maps.");
   visitor.Real("give_up_behind", options.give_up_behind, "1", 0.0, 1000.0,
                "A particle is given up when its weighted log likelihood is this far below the best after a quarter of "
                "the rays. 0 keeps all.");
@@ -72,7 +72,7 @@ void LevelFilter::Observe(const Evidence& evidence, Rng& rng, const ParallelFor&
   const bool sees = ShowsRays(evidence);
   gain_ = 0.0;
   if (sees && !maps_.blank()) {
-    const std::vector<double> log_likelihoods = Judge(samples, {&evidence, 1}, parallel_for);
+    const std::vector<double> log_likelihoods = LogLikelihoods(samples, {&evidence, 1}, parallel_for);
     for (std::size_t i = 0; i < particles_.size(); ++i) {
       particles_[i].log_weight += options_.evidence_share * log_likelihoods[i];
       particles_[i].log_likelihood += options_.evidence_share * log_likelihoods[i];
@@ -85,11 +85,10 @@ void LevelFilter::Observe(const Evidence& evidence, Rng& rng, const ParallelFor&
   const std::vector<double> weights = Summarise();
   if (!sees) return;
 
-  // Number of heirs of each particle.
   if (effective_ <= options_.resample_below * static_cast<double>(particles_.size())) {
     const std::vector<int> parents = StratifiedSurvivors(weights, rng);
-    particles_ = HeirsOf(particles_, parents);
-    samples = HeirsOf(samples, parents);
+    particles_ = Resampled(particles_, parents);
+    samples = Resampled(samples, parents);
     best_ = 0;
     for (std::size_t i = 0; i < particles_.size(); ++i) {
       particles_[i].log_weight = 0.0;
@@ -105,8 +104,9 @@ RayModel LevelFilter::Model() const {
   return {options_.sigma_m, options_.outlier_share, opacity.max_ray_m, opacity.resolution_m, options_.unseen_per_m};
 }
 
-std::vector<double> LevelFilter::Judge(std::span<const MapSample> samples, std::span<const Evidence> alternatives,
-                                       const ParallelFor& parallel_for) const {
+std::vector<double> LevelFilter::LogLikelihoods(std::span<const MapSample> samples,
+                                                std::span<const Evidence> alternatives,
+                                                const ParallelFor& parallel_for) const {
   return maps_.LogLikelihoods(
       samples, alternatives,
       {Model(), static_cast<std::size_t>(options_.ray_stride), options_.give_up_behind / options_.evidence_share},
@@ -138,8 +138,8 @@ void LevelFilter::Replace(std::vector<GridParticle> particles) {
   (void)Summarise();
 }
 
-void LevelFilter::Adopt(const Drawings& drawings, std::vector<Ancestry::Birth> births) {
-  maps_.NextGeneration(std::move(births));
+void LevelFilter::Adopt(const Drawings& drawings, std::vector<Ancestry::Child> children) {
+  maps_.NextGeneration(std::move(children));
   for (std::size_t i = 0; i < particles_.size(); ++i) particles_[i].map = drawings.of_particle[i];
 }
 

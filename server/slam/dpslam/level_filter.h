@@ -72,8 +72,9 @@ class LevelFilter {
   // are in the order of the particles.
 
   // Returns the log likelihood of each sample. The samples may belong to some of the particles only.
-  [[nodiscard]] std::vector<double> Judge(std::span<const MapSample> samples, std::span<const Evidence> alternatives,
-                                          const ParallelFor& parallel_for) const;
+  [[nodiscard]] std::vector<double> LogLikelihoods(std::span<const MapSample> samples,
+                                                   std::span<const Evidence> alternatives,
+                                                   const ParallelFor& parallel_for) const;
   // Equal samples are drawn once and share the map.
   struct Drawings {
     std::vector<MapSample> distinct;
@@ -88,8 +89,8 @@ class LevelFilter {
   // Replaces the particles by those after a step, with weights; their maps are still the old ones. REQUIRES:
   // the same number of particles, ordered by map.
   void Replace(std::vector<GridParticle> particles);
-  // Gives the particles the new maps of `births`. REQUIRES: one birth for each distinct sample.
-  void Adopt(const Drawings& drawings, std::vector<Ancestry::Birth> births);
+  // Gives the particles the new maps of `children`. REQUIRES: one child for each distinct sample.
+  void Adopt(const Drawings& drawings, std::vector<Ancestry::Child> children);
 
   [[nodiscard]] const std::vector<GridParticle>& particles() const { return particles_; }
   [[nodiscard]] const GridParticle& best() const { return particles_[best_]; }

@@ -31,7 +31,7 @@ class OpacityWindow {
   [[nodiscard]] int low_y() const { return box_.low_y << kTileBits; }
   [[nodiscard]] int width() const { return box_.width << kTileBits; }
   [[nodiscard]] int height() const { return box_.height << kTileBits; }
-  // Stops per cell-width of travel, row by row; 0 where nothing has been seen (a seen cell is never 0).
+  // Stops per cell-width of travel, row by row; 0 if nothing has been seen (a seen cell is never 0).
   [[nodiscard]] const float* rates() const { return rates_.data(); }
   [[nodiscard]] const std::vector<CellCounts>& counts() const { return counts_; }
 

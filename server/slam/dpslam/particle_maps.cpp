@@ -50,7 +50,8 @@ TileBox BoxOf(std::span<const MapSample> samples, std::span<const Evidence> evid
 }  // namespace
 
 std::vector<double> ParticleMaps::LogLikelihoods(std::span<const MapSample> samples, std::span<const Evidence> evidence,
-                                                 const JudgeOptions& options, const ParallelFor& parallel_for) const {
+                                                 const LikelihoodOptions& options,
+                                                 const ParallelFor& parallel_for) const {
   std::vector<double> result(samples.size(), 0.0);
   const TileBox box = BoxOf(samples, evidence, options.model.sigma_m, options_.resolution_m);
   if (box.width == 0) return result;
@@ -83,20 +84,20 @@ std::vector<double> ParticleMaps::LogLikelihoods(std::span<const MapSample> samp
   return result;
 }
 
-std::vector<Ancestry::Birth> ParticleMaps::Draw(std::span<const MapSample> survivors,
+std::vector<Ancestry::Child> ParticleMaps::Draw(std::span<const MapSample> survivors,
                                                 std::span<const Evidence> evidence,
                                                 const ParallelFor& parallel_for) const {
-  std::vector<Ancestry::Birth> births(survivors.size());
+  std::vector<Ancestry::Child> children(survivors.size());
   parallel_for(static_cast<int>(survivors.size()), [&](int begin, int end) {
     ChangePainter painter(options_.resolution_m);
     for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i) {
       const MapSample& survivor = survivors[i];
       for (const PlacedRays& placed : evidence[survivor.evidence])
         painter.Draw(*placed.rays, survivor.T_map_start * placed.T_start_robot);
-      births[i] = {survivor.map, painter.Take()};
+      children[i] = {survivor.map, painter.Take()};
     }
   });
-  return births;
+  return children;
 }
 
 void ParticleMaps::KeepNear(const Eigen::Vector2d& p_map, double radius_m) {
@@ -126,7 +127,7 @@ OccupancyImage ParticleMaps::Image(std::size_t map, std::span<const PlacedRays> 
     return image;
   box.width = high_x - box.low_x + 1, box.height = high_y - box.low_y + 1;
   Ancestry alone;
-  std::vector<Ancestry::Birth> only;
+  std::vector<Ancestry::Child> only;
   only.push_back({0, std::move(whole)});
   alone.NextGeneration(std::move(only));
   OpacityWindow window(alone, box, rate_);

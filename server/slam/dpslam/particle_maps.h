@@ -1,7 +1,7 @@
 // The maps of all particles, in their ancestry tree: computes how well evidence agrees with each map, and
 // draws evidence into them. Evidence is a piece of trajectory with its scans: one scan in the low level, a
 // whole segment in the high level. A particle is first evaluated with a quarter of the rays; if it is then
-// hopelessly behind the best, the other rays are skipped.
+// too far behind the best, the other rays are skipped.
 // Frames: `map` of the particles; evidence is placed by T_map_start. Not thread-safe; distributes its work by
 // ParallelFor, with the same result on any number of threads.
 // Source: Eliazar, Parr 2003, 2004; thesis C 3.2.3.2-4.
@@ -44,7 +44,7 @@ struct MapSample {
   }
 };
 
-struct JudgeOptions {
+struct LikelihoodOptions {
   RayModel model;
   std::size_t ray_stride = 1;  // Every n-th ray is used.
   // A sample is given up if its log likelihood by the first quarter of the rays is this far behind the best;
@@ -59,14 +59,14 @@ class ParticleMaps {
   // Log likelihood of each sample; minus infinity for those that were given up. REQUIRES: samples ordered by
   // map.
   [[nodiscard]] std::vector<double> LogLikelihoods(std::span<const MapSample> samples,
-                                                   std::span<const Evidence> evidence, const JudgeOptions& options,
+                                                   std::span<const Evidence> evidence, const LikelihoodOptions& options,
                                                    const ParallelFor& parallel_for) const;
   // The changes by which each survivor extends its map when its evidence is drawn.
-  [[nodiscard]] std::vector<Ancestry::Birth> Draw(std::span<const MapSample> survivors,
+  [[nodiscard]] std::vector<Ancestry::Child> Draw(std::span<const MapSample> survivors,
                                                   std::span<const Evidence> evidence,
                                                   const ParallelFor& parallel_for) const;
-  // Replaces the maps by one for each birth, in their order. REQUIRES: at least one birth, ordered by parent.
-  void NextGeneration(std::vector<Ancestry::Birth> births) { ancestry_.NextGeneration(std::move(births)); }
+  // Replaces the maps by those of `children`, in their order. REQUIRES: at least one child, ordered by parent.
+  void NextGeneration(std::vector<Ancestry::Child> children) { ancestry_.NextGeneration(std::move(children)); }
 
   // Removes from all maps the tiles that are farther away.
   void KeepNear(const Eigen::Vector2d& p_map, double radius_m);

@@ -11,17 +11,17 @@ namespace {
 // Cost of drawing relative to evaluating: all rays of all scans are drawn, but only a part is evaluated.
 constexpr std::size_t kDrawingCost = 4;
 // Distance between scans used for the comparison: more scans would show the same walls from the same places.
-constexpr double kJudgedApartM = 2.0;
-constexpr double kJudgedApartRad = 0.5;
+constexpr double kComparedApartM = 2.0;
+constexpr double kComparedApartRad = 0.5;
 // Smallest share of the evidence introduced at a time; bounds the work.
 constexpr double kLeastTemperingStep = 0.01;
 constexpr double kFirstStride = 0.5;
 // If the log likelihoods of best and worst differ by less, there is no evidence.
-constexpr double kTells = 1.0;
+constexpr double kDecisive = 1.0;
 constexpr std::size_t kOpen = 3;  // Segments that are evaluated again with the next one.
 // Effective share of the particles after each introduction of evidence.
 constexpr double kKeep = 0.25;
-constexpr std::size_t kUsualJudgings = 24;  // Usual number of evaluations of a segment with evidence.
+constexpr std::size_t kUsualEvaluations = 24;  // Usual number of evaluations of a segment with evidence.
 
 Eigen::AlignedBox2d SeenFrom(const Evidence& trajectory) {
   Eigen::AlignedBox2d box;
@@ -38,7 +38,7 @@ Evidence Apart(const Evidence& trajectory) {
   for (const PlacedRays& placed : trajectory) {
     if (!apart.empty()) {
       const Pose2 away = Between(apart.back().T_start_robot, placed.T_start_robot);
-      if (away.translation().norm() < kJudgedApartM && std::abs(away.theta) < kJudgedApartRad) continue;
+      if (away.translation().norm() < kComparedApartM && std::abs(away.theta) < kComparedApartRad) continue;
     }
     apart.push_back(placed);
   }
@@ -66,7 +66,7 @@ void SegmentFilter::Take(std::vector<Evidence> trajectories, double way_m, Rng& 
   segment.scans = segment.trajectories.front().size();
   for (const Evidence& trajectory : segment.trajectories) {
     segment.T_start_end.push_back(trajectory.back().T_start_robot);
-    segment.judged.push_back(Apart(trajectory));
+    segment.compared.push_back(Apart(trajectory));
   }
   // The drift of a whole segment is added at the joint where it begins (thesis C 4.5.2); the first segment
   // has none.
@@ -106,7 +106,7 @@ void SegmentFilter::Take(std::vector<Evidence> trajectories, double way_m, Rng& 
       candidate.joints.erase(candidate.joints.begin(), candidate.joints.begin() + fixed);
   }
   std::erase_if(open_, [&](std::size_t s) { return s < free_; });
-  for (std::size_t s = 0; s < free_; ++s) segments_[s].judged = {};
+  for (std::size_t s = 0; s < free_; ++s) segments_[s].compared = {};
   open_.push_back(segments_.size() - 1);
   log_likelihoods_.clear();
   proposed_.clear();
@@ -115,7 +115,8 @@ void SegmentFilter::Take(std::vector<Evidence> trajectories, double way_m, Rng& 
   moved_ = false;
   moves_left_ = 0;
   at_work_ = true;
-  share_ = 2 * candidates_.size() * (kUsualJudgings * open_.size() + kDrawingCost * to_draw_.size()) / taken.scans + 1;
+  share_ =
+      2 * candidates_.size() * (kUsualEvaluations * open_.size() + kDrawingCost * to_draw_.size()) / taken.scans + 1;
   StartDrawing();
 }
 
@@ -160,18 +161,18 @@ MapSample SegmentFilter::SampleOf(const Candidate& candidate, std::size_t segmen
 }
 
 void SegmentFilter::StartDrawing() {
-  births_.clear();
+  children_.clear();
   if (!to_draw_.empty()) drawings_ = LevelFilter::Distinct(SamplesOf(to_draw_.back()));
 }
 
 std::size_t SegmentFilter::DrawSome(std::size_t count, const ParallelFor& parallel_for) {
   Segment& segment = segments_[to_draw_.back()];
-  count = std::min(count, drawings_.distinct.size() - births_.size());
-  std::vector<Ancestry::Birth> more = level_.maps().Draw(std::span(drawings_.distinct).subspan(births_.size(), count),
+  count = std::min(count, drawings_.distinct.size() - children_.size());
+  std::vector<Ancestry::Child> more = level_.maps().Draw(std::span(drawings_.distinct).subspan(children_.size(), count),
                                                          segment.trajectories, parallel_for);
-  std::move(more.begin(), more.end(), std::back_inserter(births_));
-  if (births_.size() == drawings_.distinct.size()) {
-    level_.Adopt(drawings_, std::exchange(births_, {}));
+  std::move(more.begin(), more.end(), std::back_inserter(children_));
+  if (children_.size() == drawings_.distinct.size()) {
+    level_.Adopt(drawings_, std::exchange(children_, {}));
     segment.trajectories.clear();
     segment.drawn = true;
     to_draw_.pop_back();
@@ -188,7 +189,7 @@ void SegmentFilter::Work(Rng& rng, const ParallelFor& parallel_for) {
       continue;
     }
     if (level_.maps().blank()) return Finish();
-    left -= JudgeSome(left, parallel_for);
+    left -= EvaluateSome(left, parallel_for);
     if (log_likelihoods_.size() < candidates_.size() * open_.size()) continue;
     const bool first = tempering_ == 0.0 && proposed_.empty();
     Enter(proposed_.empty() ? candidates_ : proposed_);
@@ -204,13 +205,13 @@ void SegmentFilter::Work(Rng& rng, const ParallelFor& parallel_for) {
   }
 }
 
-std::size_t SegmentFilter::JudgeSome(std::size_t count, const ParallelFor& parallel_for) {
+std::size_t SegmentFilter::EvaluateSome(std::size_t count, const ParallelFor& parallel_for) {
   const std::vector<Candidate>& subjects = proposed_.empty() ? candidates_ : proposed_;
   const std::size_t segment = open_[log_likelihoods_.size() / subjects.size()];
   std::vector<MapSample> samples;
   for (std::size_t i = log_likelihoods_.size() % subjects.size(); i < subjects.size() && samples.size() < count; ++i)
     samples.push_back(SampleOf(subjects[i], segment));
-  const std::vector<double> more = level_.Judge(samples, segments_[segment].judged, parallel_for);
+  const std::vector<double> more = level_.LogLikelihoods(samples, segments_[segment].compared, parallel_for);
   log_likelihoods_.insert(log_likelihoods_.end(), more.begin(), more.end());
   return samples.size();
 }
@@ -251,7 +252,7 @@ void SegmentFilter::RaiseTempering(Rng& rng) {
     for (Candidate& candidate : candidates_) candidate.log_weight += more * candidate.evidence;
     return;
   }
-  candidates_ = HeirsOf(candidates_, StratifiedSurvivors(weights_with(more), rng));
+  candidates_ = Resampled(candidates_, StratifiedSurvivors(weights_with(more), rng));
   for (Candidate& candidate : candidates_) candidate.log_weight = 0.0;
   moves_left_ = kMoves;
   moved_ = true;
@@ -291,7 +292,7 @@ void SegmentFilter::Finish() {
   const auto [least, most] =
       std::minmax_element(candidates_.begin(), candidates_.end(),
                           [](const Candidate& a, const Candidate& b) { return a.evidence < b.evidence; });
-  const bool judged = most->evidence - least->evidence > kTells || moved_;
+  const bool decisive = most->evidence - least->evidence > kDecisive || moved_;
   const std::size_t first_scan = [&] {
     std::size_t scans = 0;
     for (std::size_t s = 0; s < free_; ++s) scans += segments_[s].scans;
@@ -303,7 +304,7 @@ void SegmentFilter::Finish() {
     GridParticle particle = level_.particles()[candidate.parent];
     SharedSequence<Joint> all = joints_[candidate.parent];
     particle.log_weight = candidate.log_weight;
-    if (judged) particle.log_likelihood = candidate.before + candidate.settled + candidate.evidence;
+    if (decisive) particle.log_likelihood = candidate.before + candidate.settled + candidate.evidence;
     particle.log_prior = 0.0;
     for (std::size_t s = 0; s < free_; ++s) particle.log_prior -= 0.5 * all[s].drift.squaredNorm();
     std::size_t scan = first_scan;
@@ -312,8 +313,8 @@ void SegmentFilter::Finish() {
       const Joint& joint = candidate.joints[k];
       const bool done = free_ + k < all.size();
       if (!done) all.Append(joint);
-      if (done && judged) all.Mutable(free_ + k) = joint;
-      if (done && !judged) {
+      if (done && decisive) all.Mutable(free_ + k) = joint;
+      if (done && !decisive) {
         scan += segments_[free_ + k].scans;
         continue;
       }
@@ -332,7 +333,7 @@ void SegmentFilter::Finish() {
   joints_ = std::move(joints);
   level_.Replace(std::move(particles));
   fixed_ = std::max(fixed_, free_);
-  if (!judged) open_.pop_back();
+  if (!decisive) open_.pop_back();
   if (open_.size() > kOpen) {
     fixed_ = open_.front() + 1;
     open_.erase(open_.begin());
@@ -342,9 +343,9 @@ void SegmentFilter::Finish() {
   std::vector<MapSample> maps;
   for (const GridParticle& particle : level_.particles()) maps.push_back({{}, particle.map, 0});
   const LevelFilter::Drawings owned = LevelFilter::Distinct(maps);
-  std::vector<Ancestry::Birth> births;
-  for (const MapSample& sample : owned.distinct) births.push_back({sample.map, {}});
-  level_.Adopt(owned, std::move(births));
+  std::vector<Ancestry::Child> children;
+  for (const MapSample& sample : owned.distinct) children.push_back({sample.map, {}});
+  level_.Adopt(owned, std::move(children));
   Forget();
   at_work_ = false;
 }

@@ -59,8 +59,8 @@ class SegmentFilter {
   static void Members(Archive& archive, auto& self) {
     archive(self.level_, self.segments_, self.joints_, self.fixed_, self.open_, self.at_work_, self.share_, self.free_,
             self.candidates_, self.proposed_, self.log_likelihoods_, self.tempering_, self.stride_, self.moves_left_,
-            self.moved_, self.to_draw_, self.drawings_, self.births_);
-    if constexpr (Archive::kReads) archive.Require(self.Sound(), "the segments");
+            self.moved_, self.to_draw_, self.drawings_, self.children_);
+    if constexpr (Archive::kReads) archive.Require(self.IsConsistent(), "the segments");
   }
 
  private:
@@ -69,7 +69,7 @@ class SegmentFilter {
   struct Segment {
     std::vector<Evidence> trajectories;  // Empty once the segment is drawn.
     std::vector<Pose2> T_start_end;      // End of each trajectory in the frame of its start.
-    std::vector<Evidence> judged;        // For each trajectory, the scans used for the comparison.
+    std::vector<Evidence> compared;      // For each trajectory, the scans used for the comparison.
     // The area that the most likely trajectory passed and saw, in the frame of its start.
     Eigen::AlignedBox2d seen_start;
     Eigen::Vector3d drift_sigma = Eigen::Vector3d::Zero();
@@ -79,7 +79,7 @@ class SegmentFilter {
 
     template <typename Archive>
     static void Members(Archive& archive, auto& self) {
-      archive(self.trajectories, self.T_start_end, self.judged, self.seen_start, self.drift_sigma, self.scans,
+      archive(self.trajectories, self.T_start_end, self.compared, self.seen_start, self.drift_sigma, self.scans,
               self.forgotten, self.drawn);
     }
   };
@@ -111,9 +111,9 @@ class SegmentFilter {
     }
   };
   // Whether all indices lie within what they count.
-  [[nodiscard]] bool Sound() const;
-  [[nodiscard]] bool SoundSegments() const;
-  [[nodiscard]] bool SoundCandidates(const std::vector<Candidate>& candidates) const;
+  [[nodiscard]] bool IsConsistent() const;
+  [[nodiscard]] bool SegmentsAreConsistent() const;
+  [[nodiscard]] bool CandidatesAreConsistent(const std::vector<Candidate>& candidates) const;
   [[nodiscard]] Eigen::AlignedBox2d SeenBy(const Segment& segment, const std::vector<Pose2>& starts) const;
   [[nodiscard]] std::vector<MapSample> SamplesOf(std::size_t segment) const;
   [[nodiscard]] MapSample SampleOf(const Candidate& candidate, std::size_t segment) const;
@@ -121,7 +121,7 @@ class SegmentFilter {
   void StartDrawing();
   // Draw into the maps of at most `count` particles, or evaluate them; return the number done.
   [[nodiscard]] std::size_t DrawSome(std::size_t count, const ParallelFor& parallel_for);
-  [[nodiscard]] std::size_t JudgeSome(std::size_t count, const ParallelFor& parallel_for);
+  [[nodiscard]] std::size_t EvaluateSome(std::size_t count, const ParallelFor& parallel_for);
   void Enter(std::vector<Candidate>& subjects);
   void RaiseTempering(Rng& rng);
   void Propose(Rng& rng);
@@ -152,9 +152,9 @@ class SegmentFilter {
   int moves_left_ = 0;
   bool moved_ = false;
   std::vector<std::size_t> to_draw_;  // Near segments to be drawn, from the back.
-  // Drawings of the segment at the back of to_draw_, and the births finished so far.
+  // Drawings of the segment at the back of to_draw_, and the children finished so far.
   LevelFilter::Drawings drawings_;
-  std::vector<Ancestry::Birth> births_;
+  std::vector<Ancestry::Child> children_;
 };
 
 }  // namespace cairn::slam

@@ -65,8 +65,8 @@ void EkfSlam::Observe(const std::vector<LandmarkSighting>& sightings, double tra
   std::vector<LandmarkSighting> fresh;
   for (const LandmarkSighting& sighting : sightings) {
     const Association association = Associate(sighting, travelled_m);
-    if (association.verdict == Verdict::kNew) fresh.push_back(sighting);
-    if (association.verdict != Verdict::kKnown) continue;
+    if (association.decision == AssociationDecision::kNew) fresh.push_back(sighting);
+    if (association.decision != AssociationDecision::kKnown) continue;
     Entry& entry = landmarks_[association.slot];
     const auto measured = LandmarkPoint::Measure(sighting, back_end_.landmarks.noise);
     const RangeBearing expected = PredictRangeBearing(state_.robot(), state_.point(entry.at));
@@ -82,7 +82,7 @@ void EkfSlam::Observe(const std::vector<LandmarkSighting>& sightings, double tra
   for (const LandmarkSighting& sighting : fresh) AddLandmark(sighting, travelled_m);
 }
 
-bool EkfSlam::Sound(std::size_t keyframes) const {
+bool EkfSlam::IsConsistent(std::size_t keyframes) const {
   bool sound = keyframes_.size() == keyframes && (keyframes == 0 || since_anchor_.anchor < anchors_.size());
   for (const Entry& entry : landmarks_)
     sound = sound && 3 <= entry.at && entry.at + 2 <= state_.size() && entry.first_keyframe < keyframes;
@@ -152,7 +152,7 @@ void EkfSlam::Commit() {
   nis_.EndStep();
 }
 
-bool EkfSlam::Rebase(std::span<const Pose2> path) {
+void EkfSlam::Rebase(std::span<const Pose2> path) {
   for (Entry& entry : landmarks_) {
     const Pose2 correction = path[entry.first_keyframe] * path_[entry.first_keyframe].Inverse();
     state_.SetPoint(entry.at, correction * state_.point(entry.at));
@@ -165,7 +165,6 @@ bool EkfSlam::Rebase(std::span<const Pose2> path) {
     path_.Mutable(k) = path[k];
   }
   since_anchor_.T_anchor_robot = keyframes_.back().T_anchor_robot;
-  return true;
 }
 
 FilterHealth EkfSlam::health() const {

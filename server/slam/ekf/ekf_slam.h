@@ -39,7 +39,7 @@ class EkfSlam final : public Filter {
   void Commit() override;
   // Moves the means only. The covariance is unchanged and thus larger than necessary.
   [[nodiscard]] bool rebases() const override { return true; }
-  bool Rebase(std::span<const Pose2> path) override;
+  void Rebase(std::span<const Pose2> path) override;
 
   [[nodiscard]] FilterEstimate estimate() const override { return {state_.robot(), state_.covariance<3, 3>(0, 0)}; }
   [[nodiscard]] FilterHealth health() const override;
@@ -55,7 +55,7 @@ class EkfSlam final : public Filter {
   static void Members(Archive& archive, auto& self) {
     archive(self.candidates_, self.state_, self.landmarks_, self.anchors_, self.keyframes_, self.since_anchor_,
             self.since_anchor_m_, self.moved_path_, self.path_, self.contradictions_, self.nis_);
-    if constexpr (Archive::kReads) archive.Require(self.Sound(archive.keyframes()), "the landmarks and anchors");
+    if constexpr (Archive::kReads) archive.Require(self.IsConsistent(archive.keyframes()), "the landmarks and anchors");
   }
 
  private:
@@ -87,7 +87,7 @@ class EkfSlam final : public Filter {
     }
   };
   // Whether all indices lie within what they count, with this many keyframes.
-  [[nodiscard]] bool Sound(std::size_t keyframes) const;
+  [[nodiscard]] bool IsConsistent(std::size_t keyframes) const;
 
   [[nodiscard]] Association Associate(const LandmarkSighting& sighting, double travelled_m) const;
   void AddLandmark(const LandmarkSighting& sighting, double travelled_m);

@@ -1,8 +1,8 @@
 // The error of a particle filter's path, estimated apart from its particles. Resampling reduces the spread of
 // a particle set but not its error: all its paths may share a mistake. Therefore a hundred samples of that
 // error (the members of the ensemble) are carried along. They drift as the robot does, and a copy is stored
-// with every keyframe. When an observation ties the robot to an old keyframe, the robot's error is corrected
-// towards that of the keyframe. Resampling adds an error of its own, because the mean is then taken over
+// with every keyframe. When an observation constrains the robot relative to an old keyframe, the robot's error is
+// corrected towards that of the keyframe. Resampling adds an error of its own, because the mean is then taken over
 // fewer ancestors.
 // An observation does not change the stored errors of past poses. That is right for a filter whose particles
 // share one path there; where they still have many paths, the estimated error is a little too large.
@@ -42,7 +42,7 @@ class ErrorEnsemble {
   // Corrects the robot's error by an observation of an old keyframe, or of something first seen from it.
   // REQUIRES: Keep was called for that keyframe.
   template <int N>
-  void Tie(std::size_t keyframe, const Pose2& T_map_robot, const Innovation<N>& innovation);
+  void Constrain(std::size_t keyframe, const Pose2& T_map_robot, const Innovation<N>& innovation);
   // Adds the error of resampling, in which the particles lost the share `lost` of their spread to common
   // parents.
   void Resample(double lost);
@@ -91,7 +91,7 @@ class ErrorEnsemble {
 };
 
 template <int N>
-void ErrorEnsemble::Tie(std::size_t keyframe, const Pose2& T_map_robot, const Innovation<N>& innovation) {
+void ErrorEnsemble::Constrain(std::size_t keyframe, const Pose2& T_map_robot, const Innovation<N>& innovation) {
   using Matrix = Eigen::Matrix<float, N, N>;
   const Eigen::Matrix<float, N, 3> J_z_error = (innovation.J_z_pose * J_pose_error(T_map_robot)).template cast<float>();
   const Matrix R = innovation.S_known_pose.template cast<float>();

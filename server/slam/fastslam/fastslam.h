@@ -42,7 +42,7 @@ class FastSlam final : public Filter {
   void Observe(std::span<const LandmarkSighting> sightings, double travelled_m);
   void Commit() override;
   [[nodiscard]] bool rebases() const override { return true; }
-  bool Rebase(std::span<const Pose2> path) override;
+  void Rebase(std::span<const Pose2> path) override;
 
   [[nodiscard]] FilterEstimate estimate() const override { return set_.estimate(); }
   [[nodiscard]] FilterHealth health() const override;
@@ -145,32 +145,33 @@ void FastSlam<LandmarkModel>::Observe(std::span<const LandmarkSighting> sighting
       associations[s] = Associate(i, sightings[s], measurements[s], slots[s], travelled_m);
       // Two features of one scan cannot show the same landmark.
       for (std::size_t other = 0; other < s; ++other)
-        if (associations[s].verdict == Verdict::kKnown && associations[other].verdict == Verdict::kKnown &&
+        if (associations[s].decision == AssociationDecision::kKnown &&
+            associations[other].decision == AssociationDecision::kKnown &&
             associations[s].slot == associations[other].slot)
-          associations[s].verdict = Verdict::kIgnored;
+          associations[s].decision = AssociationDecision::kIgnored;
     }
     for (std::size_t s = 0; s < sightings.size(); ++s) {
-      if (associations[s].verdict != Verdict::kKnown) continue;
+      if (associations[s].decision != AssociationDecision::kKnown) continue;
       const auto innovation =
           maps_[i][associations[s].slot].landmark.GateInnovation(set_[i].T_map_robot, measurements[s]);
       mixtures[s].Add(before[i], innovation.v, innovation.S(set_[i].covariance));
     }
     for (std::size_t s = 0; s < sightings.size(); ++s) {
-      if (associations[s].verdict == Verdict::kKnown) {
+      if (associations[s].decision == AssociationDecision::kKnown) {
         const Entry& entry = maps_[i][associations[s].slot];
         entry.landmark.ForEachInnovation(set_[i].T_map_robot, measurements[s], [&](const auto& innovation) {
-          if (i == set_.best_index()) set_.Tie(entry.first_keyframe, innovation);
+          if (i == set_.best_index()) set_.Constrain(entry.first_keyframe, innovation);
           set_.Fuse(i, innovation);
         });
       } else {
-        set_.Weigh(i, LandmarkModel::LogDensityAt(new_nis_, measurements[s]));
+        set_.AddLogLikelihood(i, LandmarkModel::LogDensityAt(new_nis_, measurements[s]));
       }
     }
     if (!set_.samples_motion()) set_.Sample(i);
     for (std::size_t s = 0; s < sightings.size(); ++s)
       Remember(i, sightings[s], measurements[s], associations[s], travelled_m);
   }
-  for (const auto& mixture : mixtures) set_.Judge(mixture);
+  for (const auto& mixture : mixtures) set_.AddInnovation(mixture);
   set_.SampledAll();
 }
 
@@ -213,10 +214,10 @@ void FastSlam<LandmarkModel>::Remember(std::size_t particle, const LandmarkSight
   Map& map = maps_[particle];
   const Pose2& T_map_robot = set_[particle].T_map_robot;
   while (map.size() <= sighting.slot) map.Append({});
-  const std::size_t slot = association.verdict == Verdict::kKnown ? association.slot : sighting.slot;
-  if (association.verdict == Verdict::kKnown) {
+  const std::size_t slot = association.decision == AssociationDecision::kKnown ? association.slot : sighting.slot;
+  if (association.decision == AssociationDecision::kKnown) {
     map.Mutable(slot).landmark.Learn(T_map_robot, measurement);
-  } else if (association.verdict == Verdict::kNew && map[slot].sightings == 0) {
+  } else if (association.decision == AssociationDecision::kNew && map[slot].sightings == 0) {
     map.Mutable(slot).landmark = LandmarkModel::Initial(T_map_robot, measurement);
     map.Mutable(slot).first_keyframe = static_cast<std::uint32_t>(set_[particle].path.size());
   } else {
@@ -232,11 +233,11 @@ template <typename LandmarkModel>
 void FastSlam<LandmarkModel>::Commit() {
   const std::vector<int> parents = set_.Commit();
   if (parents.empty()) return;
-  maps_ = HeirsOf(maps_, parents);
+  maps_ = Resampled(maps_, parents);
 }
 
 template <typename LandmarkModel>
-bool FastSlam<LandmarkModel>::Rebase(std::span<const Pose2> path) {
+void FastSlam<LandmarkModel>::Rebase(std::span<const Pose2> path) {
   Map map = maps_[set_.best_index()];
   for (std::size_t slot = 0; slot < map.size(); ++slot) {
     if (map[slot].sightings == 0) continue;
@@ -246,7 +247,6 @@ bool FastSlam<LandmarkModel>::Rebase(std::span<const Pose2> path) {
   }
   set_.Rebase(path);
   std::fill(maps_.begin(), maps_.end(), map);
-  return true;
 }
 
 template <typename LandmarkModel>

@@ -69,8 +69,8 @@ bool ParticleSet::Observe(const RevisitObservation& revisit) {
   const std::vector<double> before = weights();
   for (std::size_t i = 0; i < particles_.size(); ++i)
     mixture.Add(before[i], innovations[i].v, innovations[i].S(particles_[i].covariance));
-  Judge(mixture);
-  Tie<3>(revisit.keyframe, innovations[best_]);
+  AddInnovation(mixture);
+  Constrain<3>(revisit.keyframe, innovations[best_]);
   for (std::size_t i = 0; i < particles_.size(); ++i) Fuse<3>(i, innovations[i]);
   sample_due_ = true;
   return true;
@@ -160,9 +160,9 @@ std::vector<int> ParticleSet::Resample(std::vector<double>& left) {
   effective_ = EffectiveSampleSize(left);
   if (effective_ >= options_.resample_below * static_cast<double>(particles_.size())) return {};
   std::vector<int> parents = StratifiedSurvivors(left, rng_);
-  particles_ = HeirsOf(particles_, parents);
+  particles_ = Resampled(particles_, parents);
   for (Particle& particle : particles_) particle.log_weight = 0.0;
-  errors_.Resample(ShareOfSiblings(parents));
+  errors_.Resample(SharedParentFraction(parents));
   left.assign(particles_.size(), 1.0 / static_cast<double>(particles_.size()));
   return parents;
 }

@@ -73,22 +73,22 @@ class ParticleSet {
     Particle& particle = particles_[index];
     const Eigen::Matrix<double, N, N> S = innovation.S(particle.covariance);
     const double nis = Nis<N>(innovation.v, S);
-    Weigh(index, LogDensity<N>(std::min(nis, max_nis_), S));
+    AddLogLikelihood(index, LogDensity<N>(std::min(nis, max_nis_), S));
     if (nis < max_nis_) CorrectPose<N>(particle.T_map_robot, particle.covariance, innovation);
   }
   // Updates the error ensemble with an observation of something first seen from `keyframe`. `innovation` is
   // that of the best particle.
   template <int N>
-  void Tie(std::size_t keyframe, const Innovation<N>& innovation) {
-    errors_.Tie<N>(keyframe, best().T_map_robot, innovation);
+  void Constrain(std::size_t keyframe, const Innovation<N>& innovation) {
+    errors_.Constrain<N>(keyframe, best().T_map_robot, innovation);
   }
-  void Weigh(std::size_t index, double log_likelihood) {
+  void AddLogLikelihood(std::size_t index, double log_likelihood) {
     particles_[index].log_weight += log_likelihood;
     particles_[index].log_likelihood += log_likelihood;
   }
   // Adds the innovation of the whole set to the sum that health() returns.
   template <int N>
-  void Judge(const MixtureInnovation<N>& innovation) {
+  void AddInnovation(const MixtureInnovation<N>& innovation) {
     if (!innovation.empty()) nis_.Add(innovation.nis(), N);
   }
   [[nodiscard]] std::vector<double> weights() const;  // Normalised weights.

@@ -190,9 +190,9 @@ void Merger::LengthenEnd(int k, int direction) {
     const double spacing = SpacingAt(segment.line, sweep_.laser(), hit.p_robot, sweep_.step());
     const double reach = (hit.p_robot - sweep_.hit(end).p_robot).norm();
     if (side == Side::kFarther || reach > std::max(options_.occlusion_m, 4.0 * spacing)) return;
-    const bool vouched =
+    const bool supported =
         std::abs(segment.line.DistanceOf(hit.p_robot)) <= EndDistance(segment.line, hit.range_m, options_);
-    if (side == Side::kNearer || !vouched ||
+    if (side == Side::kNearer || !supported ||
         (owner != kUnowned && IsStrong(segments_[static_cast<std::size_t>(owner)]))) {
       has_pending = false;
       if (++occluded > max_occluded_) return;

@@ -80,8 +80,8 @@ class Filter {
   [[nodiscard]] virtual bool rebases() const { return false; }
   // Replaces the path after a large loop was closed; `path` has one pose per committed keyframe. Every
   // hypothesis takes this path, and its landmarks move with the keyframes from which they were seen.
-  // REQUIRES: called between steps. False if the filter does not support it.
-  virtual bool Rebase(std::span<const Pose2> /*path*/) { return false; }
+  // REQUIRES: rebases(), and called between steps.
+  virtual void Rebase(std::span<const Pose2> /*path*/) {}
 
   // False as long as the pose of the robot in `map` is not known; its poses are then relative to its start.
   // When the robot is placed for the first time, the whole path moves.

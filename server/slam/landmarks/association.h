@@ -51,7 +51,7 @@ class LandmarkIndex {
   std::vector<Place> places_;  // Indexed by slot.
 };
 
-enum class Verdict : std::uint8_t {
+enum class AssociationDecision : std::uint8_t {
   kNew = 0,  // No similar landmark is near.
   kKnown,    // Exactly one landmark passes all gates.
   // A similar landmark is near but fails a gate, several pass, or the one was counted too recently.
@@ -59,8 +59,8 @@ enum class Verdict : std::uint8_t {
 };
 
 struct Association {
-  Verdict verdict = Verdict::kNew;
-  std::size_t slot = 0;  // Slot of the landmark if the verdict is kKnown.
+  AssociationDecision decision = AssociationDecision::kNew;
+  std::size_t slot = 0;  // Slot of the landmark if the decision is kKnown.
 };
 
 // The result of comparing the sighting with one landmark of the hypothesis.
@@ -78,8 +78,9 @@ class AssociationVote {
     lately_ = counted_lately;
   }
   [[nodiscard]] Association result() const {
-    if (!near_) return {Verdict::kNew, 0};
-    return matches_ == 1 && !lately_ ? Association{Verdict::kKnown, slot_} : Association{Verdict::kIgnored, 0};
+    if (!near_) return {AssociationDecision::kNew, 0};
+    return matches_ == 1 && !lately_ ? Association{AssociationDecision::kKnown, slot_}
+                                     : Association{AssociationDecision::kIgnored, 0};
   }
 
  private:

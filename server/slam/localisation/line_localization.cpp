@@ -14,9 +14,9 @@ constexpr int kFoundAgain = 3;
 // The poses that the gate accepts, except hypotheses whose own uncertainty is larger than that of a step or
 // two.
 LineMatchWindow WindowOf(const PoseBelief& belief) {
-  constexpr double kSigmas = 5.0, kDoubtM = 0.5, kDoubtRad = Radians(10.0);
-  return {belief.T_map_robot, kDoubtM + kSigmas * std::sqrt(belief.covariance.topLeftCorner<2, 2>().trace()),
-          kDoubtRad + kSigmas * std::sqrt(belief.covariance(2, 2))};
+  constexpr double kSigmas = 5.0, kMarginM = 0.5, kMarginRad = Radians(10.0);
+  return {belief.T_map_robot, kMarginM + kSigmas * std::sqrt(belief.covariance.topLeftCorner<2, 2>().trace()),
+          kMarginRad + kSigmas * std::sqrt(belief.covariance(2, 2))};
 }
 
 }  // namespace

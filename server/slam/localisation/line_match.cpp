@@ -196,10 +196,10 @@ const Wall* Search::BestWall(const LineFeature& line, const Pose2& T_map_robot) 
 LineAlignment Search::Solve() const {
   constexpr std::int64_t kWorth = 300;  // Comparisons that take as long as one least squares.
   comparisons_ += kWorth;
-  std::vector<WeighedPair> weighed;
-  weighed.reserve(pairs_.size());
+  std::vector<WeightedPair> weighted;
+  weighted.reserve(pairs_.size());
   for (const auto& [wall, line] : pairs_)
-    weighed.push_back({{0.5 * (wall->line.a + wall->line.b), wall->normal}, MidpointAndNormal(*line), line->length});
+    weighted.push_back({{0.5 * (wall->line.a + wall->line.b), wall->normal}, MidpointAndNormal(*line), line->length});
   const auto& [wall, line] = pairs_.front();
   const Pose2 turn{0.0, 0.0, AngleDiff(wall->direction, line->slope)};
   const Eigen::Vector2d t = 0.5 * (wall->line.a + wall->line.b) - turn * line->midpoint();
@@ -208,7 +208,7 @@ LineAlignment Search::Solve() const {
   solve.along_weight = 1e-6;
   solve.max_iterations = 6;
   solve.stop_step = 1e-4;
-  return AlignLinePairs(weighed, {t.x(), t.y(), turn.theta}, solve);
+  return AlignLinePairs(weighted, {t.x(), t.y(), turn.theta}, solve);
 }
 
 bool Search::Fits(const Pair& pair, const Placing& placing, double slack) const {

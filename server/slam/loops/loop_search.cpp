@@ -36,8 +36,8 @@ struct Agreement {
   }
 };
 
-Agreement Weigh(const std::vector<SurfacePoint>& surfaces, const Pose2& T, const PointIndex& other,
-                const FreeSpace& other_free, double near_m) {
+Agreement AgreementOf(const std::vector<SurfacePoint>& surfaces, const Pose2& T, const PointIndex& other,
+                      const FreeSpace& other_free, double near_m) {
   Agreement agreement;
   for (const SurfacePoint& surface : surfaces) {
     const Eigen::Vector2d p = T * surface.p;
@@ -184,8 +184,8 @@ std::optional<LoopClosure> LoopSearch::Compare(const Trail& trail, std::size_t o
       recent_free(trail, recent_stretch, options_.free_space);
   const PointIndex recent_index = IndexOf(recent, align_.first_pair_distance_m);
   const double near_m = options_.near_share * align_.inlier_distance_m;
-  const Agreement ours = Weigh(recent, aligned.T_ref_curr, before_index, before_free, near_m);
-  const Agreement theirs = Weigh(before, aligned.T_ref_curr.Inverse(), recent_index, recent_free, near_m);
+  const Agreement ours = AgreementOf(recent, aligned.T_ref_curr, before_index, before_free, near_m);
+  const Agreement theirs = AgreementOf(before, aligned.T_ref_curr.Inverse(), recent_index, recent_free, near_m);
   if (ours.explained < options_.min_explained * static_cast<double>(recent.size())) return std::nullopt;
   if (std::max(ours.conflict(), theirs.conflict()) > options_.max_conflict) return std::nullopt;
   return LoopClosure{old, now, aligned.T_ref_curr, Covariance()};

@@ -29,7 +29,7 @@ void Visit(OptionVisitor& visitor, SelfCheckOptions& options) {
   visitor.Real("every_m", options.every_m, "m", 0.0, 100.0,
                "Way between two comparisons. Smaller values notice errors sooner and take more time.");
   visitor.Real("stretch_m", options.stretch_m, "m", 0.5, 100.0,
-               "Length of the path that is judged. Longer is more reliable and later.");
+               "Length of the path over which the comparisons are counted. Longer is more reliable and later.");
   visitor.Real("near_m", options.near_m, "m", 0.02, 5.0,
                "Error of poses and points that is tolerated. Walls that are doubled by less are not noticed.");
   visitor.Real("max_range_m", options.max_range_m, "m", 1.0, 100.0, "Points farther away are not compared.");
@@ -58,7 +58,7 @@ void SelfCheck::Look(const Trail& trail, const SharedSequence<Pose2>& path) {
   }
   if (comparison.counts.known() < kMinKnown) return;
   comparisons_.push_back(comparison);
-  Judge();
+  UpdateContradicted();
 }
 
 void SelfCheck::Forget() {
@@ -81,7 +81,7 @@ std::vector<std::size_t> SelfCheck::KeyframesToCompare(std::span<const KeyframeS
   return BestPlaces(std::move(all), shapes, kSamePlaceM, kMaxCompared);
 }
 
-void SelfCheck::Judge() {
+void SelfCheck::UpdateContradicted() {
   while (comparisons_.back().travelled_m - comparisons_.front().travelled_m > options_.stretch_m ||
          comparisons_.size() > kMaxComparisons)
     comparisons_.pop_front();

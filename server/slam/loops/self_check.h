@@ -63,7 +63,7 @@ class SelfCheck {
   };
   [[nodiscard]] std::vector<std::size_t> KeyframesToCompare(std::span<const KeyframeShape> shapes,
                                                             const SharedSequence<Pose2>& path) const;
-  void Judge();
+  void UpdateContradicted();
 
   SelfCheckOptions options_;
   double compared_at_m_ = 0.0;

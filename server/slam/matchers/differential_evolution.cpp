@@ -93,8 +93,8 @@ double Mirrored(double value, double min, double max) {
   return std::clamp(min + (along <= width ? along : 2.0 * width - along), min, max);
 }
 
-void Judge(std::vector<Individual>& individuals, const std::function<double(const Eigen::Vector3d&)>& cost,
-           const ParallelFor& parallel_for) {
+void EvaluateCosts(std::vector<Individual>& individuals, const std::function<double(const Eigen::Vector3d&)>& cost,
+                   const ParallelFor& parallel_for) {
   parallel_for(static_cast<int>(individuals.size()), [&](int begin, int end) {
     for (int i = begin; i < end; ++i) {
       Individual& individual = individuals[static_cast<std::size_t>(i)];
@@ -134,7 +134,7 @@ EvolutionResult Evolve(const std::function<double(const Eigen::Vector3d&)>& cost
       population[i].x(n) = box.min(n) + share * (box.max(n) - box.min(n));
     }
   }
-  Judge(population, cost, parallel_for);
+  EvaluateCosts(population, cost, parallel_for);
   Individual best = BestOf(population);
 
   EvolutionResult result;
@@ -150,7 +150,7 @@ EvolutionResult Evolve(const std::function<double(const Eigen::Vector3d&)>& cost
             taken[static_cast<std::size_t>(n)] ? Mirrored(perturbed(n), box.min(n), box.max(n)) : population[i].x(n);
       }
     }
-    Judge(trials, cost, parallel_for);
+    EvaluateCosts(trials, cost, parallel_for);
     for (std::size_t i = 0; i < size; ++i)
       if (trials[i].cost <= population[i].cost) population[i] = trials[i];
     best = BestOf(population);

@@ -210,7 +210,7 @@ MatchResult MatchByHough(const ScanView& ref, const ScanView& curr, const MatchP
   result.inliers = best.agreement.inliers;
   result.iterations = 1;
   result.converged = true;
-  JudgeDegeneracy(best.agreement.H, kCorridorRatio, result);
+  DetectDegeneracy(best.agreement.H, kCorridorRatio, result);
   result.T_ref_curr = best.T_ref_curr;
   result.covariance = Eigen::Vector3d(kSigmaM * kSigmaM, kSigmaM * kSigmaM, kSigmaRad * kSigmaRad).asDiagonal();
   TakeAlongFromPrior(prior, result);

@@ -14,10 +14,10 @@ struct System {
   double chi = 0.0;
 };
 
-System Linearise(std::span<const WeighedPair> pairs, const Pose2& T, double along_weight,
+System Linearise(std::span<const WeightedPair> pairs, const Pose2& T, double along_weight,
                  const LineLeastSquaresOptions& options) {
   System sum;
-  for (const WeighedPair& pair : pairs) {
+  for (const WeightedPair& pair : pairs) {
     const PointNormal moved = Transform(T, pair.curr);
     const Eigen::Vector4d e = LineError(moved, pair.ref);
     const Eigen::Matrix<double, 4, 3> J = J_error_step(moved);
@@ -77,7 +77,7 @@ Eigen::Matrix4d LineInformation(const Eigen::Vector2d& normal_ref, double along_
   return omega;
 }
 
-LineAlignment AlignLinePairs(std::span<const WeighedPair> pairs, const Pose2& T_ref_curr_start,
+LineAlignment AlignLinePairs(std::span<const WeightedPair> pairs, const Pose2& T_ref_curr_start,
                              const LineLeastSquaresOptions& options) {
   LineAlignment answer;
   answer.T_ref_curr = T_ref_curr_start;

@@ -51,7 +51,7 @@ void Visit(OptionVisitor& visitor, LineLeastSquaresOptions& options);
                                               double normal_weight);
 
 // A pair of lines with its weight.
-struct WeighedPair {
+struct WeightedPair {
   PointNormal ref, curr;
   double length = 1.0;  // Length of the shorter line, m.
 };
@@ -64,7 +64,7 @@ struct LineAlignment {
   bool converged = false;  // True if the steps became shorter than stop_step.
 };
 
-[[nodiscard]] LineAlignment AlignLinePairs(std::span<const WeighedPair> pairs, const Pose2& T_ref_curr_start,
+[[nodiscard]] LineAlignment AlignLinePairs(std::span<const WeightedPair> pairs, const Pose2& T_ref_curr_start,
                                            const LineLeastSquaresOptions& options);
 
 }  // namespace cairn::slam

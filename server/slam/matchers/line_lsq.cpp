@@ -8,17 +8,17 @@
 namespace cairn::slam {
 namespace {
 
-std::vector<WeighedPair> Weigh(std::span<const LineFeature> ref, std::span<const LineFeature> curr,
-                               std::span<const LinePair> pairs) {
-  std::vector<WeighedPair> weighed;
-  weighed.reserve(pairs.size());
+std::vector<WeightedPair> WeightedPairs(std::span<const LineFeature> ref, std::span<const LineFeature> curr,
+                                        std::span<const LinePair> pairs) {
+  std::vector<WeightedPair> weighted;
+  weighted.reserve(pairs.size());
   for (const LinePair& pair : pairs) {
     const LineFeature& line_ref = ref[static_cast<std::size_t>(pair.ref)];
     const LineFeature& line_curr = curr[static_cast<std::size_t>(pair.curr)];
-    weighed.push_back(
+    weighted.push_back(
         {MidpointAndNormal(line_ref), MidpointAndNormal(line_curr), std::min(line_ref.length, line_curr.length)});
   }
-  return weighed;
+  return weighted;
 }
 
 bool SamePairs(std::span<const LinePair> a, std::span<const LinePair> b) {
@@ -84,11 +84,11 @@ LineLsqMatch MatchLinesByLeastSquares(const ScanFeatures& ref_scan, const ScanFe
     const bool same = SamePairs(pairs, match.pairs);
     match.pairs = std::move(pairs);
     const LineAlignment alignment =
-        AlignLinePairs(Weigh(ref.lines, curr.lines, match.pairs), result.T_ref_curr, options.least_squares);
+        AlignLinePairs(WeightedPairs(ref.lines, curr.lines, match.pairs), result.T_ref_curr, options.least_squares);
     match.errors.push_back(alignment.chi.back() / static_cast<double>(match.pairs.size()));
     result.T_ref_curr = alignment.T_ref_curr;
     result.iterations = round + 1;
-    JudgeDegeneracy(InformationOfPose(alignment.H, result.T_ref_curr), kCorridorRatio, result);
+    DetectDegeneracy(InformationOfPose(alignment.H, result.T_ref_curr), kCorridorRatio, result);
     if (result.degenerate) {
       // Along the wall the midpoints only show where its visible part ends.
       const Eigen::Vector2d t = TakeAlongFromPrior(result.T_ref_curr.translation(), prior.T_ref_curr.translation(),

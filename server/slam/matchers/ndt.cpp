@@ -105,7 +105,7 @@ MatchResult MatchByNdt(const ScanView& ref, const ScanView& curr, const MatchPri
     iterations = climb.iterations;
   }
   const NewtonResult climb = ClimbNdt(map, points, T_start, options.newton);
-  MatchResult result = JudgeNdtPose(map, points, climb.T_map_points, climb.settled, prior, options.evidence);
+  MatchResult result = EvaluateNdtPose(map, points, climb.T_map_points, climb.settled, prior, options.evidence);
   result.iterations = iterations + climb.iterations;
   return result;
 }

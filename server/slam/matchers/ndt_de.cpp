@@ -60,7 +60,7 @@ NdtDeMatch SearchNdt(std::span<const Eigen::Vector2d> points_ref, std::span<cons
     T_ref_curr = climb.T_map_points;
     iterations += climb.iterations;
   }
-  match.result = JudgeNdtPose(map, points, T_ref_curr, true, prior, options.evidence);
+  match.result = EvaluateNdtPose(map, points, T_ref_curr, true, prior, options.evidence);
   match.result.iterations = iterations;
   return match;
 }

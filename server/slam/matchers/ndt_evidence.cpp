@@ -18,7 +18,7 @@ constexpr double kOpenSigmaM = 0.05;
 // Finds the direction in which the scan determines the translation least, if the heading is free to follow.
 // If that direction is open, its apparent information comes mostly from cell boundaries and sampling, and is
 // limited to that of a standard deviation of kOpenSigmaM.
-void JudgeDegeneracy(Eigen::Matrix3d& information, MatchResult& result) {
+void DetectDegeneracy(Eigen::Matrix3d& information, MatchResult& result) {
   const Eigen::Matrix2d translation = information.topLeftCorner<2, 2>() - information.topRightCorner<2, 1>() *
                                                                               information.bottomLeftCorner<1, 2>() /
                                                                               std::max(information(2, 2), 1e-12);
@@ -58,8 +58,8 @@ MatchResult UnmatchedNdt(const MatchPrior& prior, MatchFailure failure) {
   return result;
 }
 
-MatchResult JudgeNdtPose(const NdtMap& map, std::span<const Eigen::Vector2d> points_curr, const Pose2& T_ref_curr,
-                         bool settled, const MatchPrior& prior, const NdtEvidenceOptions& options) {
+MatchResult EvaluateNdtPose(const NdtMap& map, std::span<const Eigen::Vector2d> points_curr, const Pose2& T_ref_curr,
+                            bool settled, const MatchPrior& prior, const NdtEvidenceOptions& options) {
   MatchResult result = UnmatchedNdt(prior, MatchFailure::kNotConverged);
   const NdtDerivatives at_pose = map.Derivatives(points_curr, T_ref_curr);
   result.inliers = at_pose.inliers;
@@ -69,7 +69,7 @@ MatchResult JudgeNdtPose(const NdtMap& map, std::span<const Eigen::Vector2d> poi
   if (!settled || result.score < options.min_score || result.inliers < options.min_inliers || !information.allFinite())
     return result;
 
-  JudgeDegeneracy(information, result);
+  DetectDegeneracy(information, result);
   const Eigen::LLT<Eigen::Matrix3d> prior_factor(prior.covariance);
   if (prior_factor.info() != Eigen::Success) return result;
   const Eigen::Matrix3d prior_information = prior_factor.solve(Eigen::Matrix3d::Identity());

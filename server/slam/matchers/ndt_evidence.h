@@ -26,9 +26,9 @@ void Visit(OptionVisitor& visitor, NdtEvidenceOptions& options);
 
 // The result for pose T_ref_curr. `settled`: the search itself converged. If the evidence is too weak the
 // result is the prior, not converged. In a direction that the scan leaves open the prior decides.
-[[nodiscard]] MatchResult JudgeNdtPose(const NdtMap& map, std::span<const Eigen::Vector2d> points_curr,
-                                       const Pose2& T_ref_curr, bool settled, const MatchPrior& prior,
-                                       const NdtEvidenceOptions& options);
+[[nodiscard]] MatchResult EvaluateNdtPose(const NdtMap& map, std::span<const Eigen::Vector2d> points_curr,
+                                          const Pose2& T_ref_curr, bool settled, const MatchPrior& prior,
+                                          const NdtEvidenceOptions& options);
 
 // The prior as a result that did not converge, with the reason.
 [[nodiscard]] MatchResult UnmatchedNdt(const MatchPrior& prior, MatchFailure failure);

@@ -22,7 +22,7 @@ LineVariance VarianceOf(const LineFeature& line, const LineNoiseFloor& floor) {
 
 }  // namespace
 
-Eigen::Matrix3d OdometryCovariance(const Pose2& T_ref_curr_odometry, const OdometryTrustOptions& options) {
+Eigen::Matrix3d OdometryCovariance(const Pose2& T_ref_curr_odometry, const OdometryNoiseOptions& options) {
   const double distance = T_ref_curr_odometry.translation().norm();
   const double translation = options.translation_floor_m + options.translation_share * distance;
   const double rotation = options.rotation_floor_rad + options.rotation_per_m * distance +

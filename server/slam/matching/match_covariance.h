@@ -16,7 +16,7 @@
 namespace cairn::slam {
 
 // Standard deviations of the odometry where it replaces the lines: sigma = floor + share * motion.
-struct OdometryTrustOptions {
+struct OdometryNoiseOptions {
   double translation_floor_m = 0.02;
   double translation_share = 0.10;
   double rotation_floor_rad = Radians(1.0);
@@ -30,7 +30,7 @@ struct LineNoiseFloor {
   double slope_rad = Radians(0.15);
 };
 
-[[nodiscard]] Eigen::Matrix3d OdometryCovariance(const Pose2& T_ref_curr_odometry, const OdometryTrustOptions& options);
+[[nodiscard]] Eigen::Matrix3d OdometryCovariance(const Pose2& T_ref_curr_odometry, const OdometryNoiseOptions& options);
 
 // Computed from the inliers among `pairs` at result.T_ref_curr. Residuals that are larger than the scatter of
 // the lines explains increase the covariance. Along `degenerate_direction` it has the variance of the

@@ -5,7 +5,7 @@
 
 namespace cairn::slam {
 
-void JudgeDegeneracy(const Eigen::Matrix3d& H, double ratio, MatchResult& result) {
+void DetectDegeneracy(const Eigen::Matrix3d& H, double ratio, MatchResult& result) {
   const Eigen::Matrix2d H_translation =
       H.topLeftCorner<2, 2>() - H.topRightCorner<2, 1>() * H.bottomLeftCorner<1, 2>() / std::max(H(2, 2), 1e-12);
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;

@@ -174,7 +174,7 @@ MatchResult AlignPointsToSurfaces(std::span<const SurfacePoint> points_robot, co
   result.covariance = 0.5 * (result.covariance + result.covariance.transpose()).eval();
   // A reference point without a surface direction seems to constrain all directions, so only surfaces are
   // used to judge degeneracy.
-  JudgeDegeneracy(sum.H_surfaces, options.degenerate_ratio, result);
+  DetectDegeneracy(sum.H_surfaces, options.degenerate_ratio, result);
   return result;
 }
 

@@ -43,12 +43,12 @@ std::vector<int> StratifiedSurvivors(std::span<const double> weights, Rng& rng) 
   return survivors;
 }
 
-double ShareOfSiblings(std::span<const int> parents) {
+double SharedParentFraction(std::span<const int> parents) {
   const auto n = static_cast<double>(parents.size());
-  double pairs = 0.0, elder = 0.0;  // `elder` counts the earlier survivors of the same parent.
+  double pairs = 0.0, earlier = 0.0;  // `earlier` counts the earlier survivors of the same parent.
   for (std::size_t i = 1; i < parents.size(); ++i) {
-    elder = parents[i] == parents[i - 1] ? elder + 1.0 : 0.0;
-    pairs += elder;
+    earlier = parents[i] == parents[i - 1] ? earlier + 1.0 : 0.0;
+    pairs += earlier;
   }
   return n > 1.0 ? 2.0 * pairs / (n * (n - 1.0)) : 1.0;
 }

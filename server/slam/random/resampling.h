@@ -22,16 +22,16 @@ namespace cairn::slam {
 
 // Returns the set after resampling: a copy of each survivor's parent, in order.
 template <typename Item>
-[[nodiscard]] std::vector<Item> HeirsOf(const std::vector<Item>& items, std::span<const int> parents) {
-  std::vector<Item> heirs;
-  heirs.reserve(parents.size());
-  for (const int parent : parents) heirs.push_back(items[static_cast<std::size_t>(parent)]);
-  return heirs;
+[[nodiscard]] std::vector<Item> Resampled(const std::vector<Item>& items, std::span<const int> parents) {
+  std::vector<Item> resampled;
+  resampled.reserve(parents.size());
+  for (const int parent : parents) resampled.push_back(items[static_cast<std::size_t>(parent)]);
+  return resampled;
 }
 
 // The share of all pairs of survivors that have the same parent. It is the share of the spread of a set that
 // resampling removes.
 // REQUIRES: parents ascending.
-[[nodiscard]] double ShareOfSiblings(std::span<const int> parents);
+[[nodiscard]] double SharedParentFraction(std::span<const int> parents);
 
 }  // namespace cairn::slam

@@ -45,12 +45,12 @@ void LandmarkCorrection::Observe(const std::vector<LandmarkSighting>& sightings,
       if (!SlopesAgree(sighting, T_map_robot.theta, old.slope_map, old.signature, back_end_.landmarks)) continue;
       vote.Add(m, Likeness::kMatch, travelled_m - old.last_used_m < options_.min_travel_m);
     }
-    const Association verdict = vote.result();
-    if (verdict.verdict == Verdict::kNew) fresh.push_back(sighting);
-    if (verdict.verdict != Verdict::kKnown) continue;
-    found.push_back({sighting, verdict.slot});
-    memory_[verdict.slot].last_used_m = travelled_m;
-    ++memory_[verdict.slot].sightings;
+    const Association association = vote.result();
+    if (association.decision == AssociationDecision::kNew) fresh.push_back(sighting);
+    if (association.decision != AssociationDecision::kKnown) continue;
+    found.push_back({sighting, association.slot});
+    memory_[association.slot].last_used_m = travelled_m;
+    ++memory_[association.slot].sightings;
   }
   if (!found.empty()) Correct(found);
   for (const LandmarkSighting& sighting : fresh)

@@ -1,16 +1,16 @@
-// Writes the state of the estimator as bytes, and reads it back. Every class that has a state names its members once,
+// Writes the state of the estimator as bytes, and reads it back. Every class with a state lists its members once:
 //
 //   template <typename Archive>
 //   static void Members(Archive& archive, auto& self) { archive(self.pose_, self.path_); }
 //
-// and this list is used for both directions, so that they cannot disagree. Options are not part of the state: a state
-// is read into an object that was made with the same options (scan_pipeline.h checks that). `archive.Require` states
-// what the rest of the class relies on: indices, sizes. While reading, the first requirement that does not hold ends
-// the reading; what has been read by then must not be used.
-// Values that never change (std::shared_ptr<const T>: scans, parts of the map) are only noted by the writer; it shares
-// them until they are written in Bytes(), which another thread may do. Other shared nodes (SharedSequence) are written
-// once, and are shared again after reading. A value that never changes may not contain shared ones.
-// All numbers are little-endian. The same state gives the same bytes. Not thread-safe.
+// This list is used for writing and for reading, so that both always agree. Options are not part of the state: a state
+// is read into an object that was made with the same options (scan_pipeline.h checks that). `archive.Require` checks
+// the conditions on which the rest of the class relies, such as valid indices and sizes. If one does not hold while
+// reading, the reading fails, and the values read so far must not be used. Immutable values (std::shared_ptr<const T>:
+// scans, parts of the map) are not written at once. The writer shares them until Bytes() writes them, which may be
+// called on another thread. Other shared nodes (SharedSequence) are written once, and are shared again after reading.
+// An immutable value must not contain shared nodes. All numbers are little-endian. The same state gives the same bytes.
+// Not thread-safe.
 #pragma once
 
 #include <Eigen/Core>

@@ -17,14 +17,14 @@ namespace cairn::slam {
 struct Keyframe {
   std::shared_ptr<const Scan> scan;
   Pose2 T_odom_robot;
-  bool localized = true;  // Otherwise nobody knows where it was taken, and it is drawn into no map.
-  // Not localized because the path contradicts the scans. Where it lies along the path is known, so that it counts as
+  bool localized = true;  // Otherwise its pose is not known, and it is drawn into no map.
+  // Not localized, because the path contradicts the scans; but where it lies along the path is known. It counts as
   // localized once the path has been corrected.
-  bool doubted = false;
+  bool tentative = false;
 
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
-    archive(self.scan, self.T_odom_robot, self.localized, self.doubted);
+    archive(self.scan, self.T_odom_robot, self.localized, self.tentative);
   }
 };
 

@@ -34,20 +34,20 @@ void Trail::Append(Keyframe keyframe, const Pose2& T_track_robot, std::vector<Su
   }
 }
 
-void Trail::JudgeLast(bool localized, bool on_the_path) {
+void Trail::MarkLast(bool localized, bool on_the_path) {
   keyframes_.back().localized = localized;
-  keyframes_.back().doubted = !localized && on_the_path;
+  keyframes_.back().tentative = !localized && on_the_path;
 }
 
-void Trail::TrustDoubted() {
-  keyframes_ = TrustedKeyframes();
+void Trail::ConfirmTentative() {
+  keyframes_ = ConfirmedKeyframes();
 }
 
-std::vector<Keyframe> Trail::TrustedKeyframes() const {
+std::vector<Keyframe> Trail::ConfirmedKeyframes() const {
   std::vector<Keyframe> trusted = keyframes_;
   for (Keyframe& keyframe : trusted) {
-    keyframe.localized = keyframe.localized || keyframe.doubted;
-    keyframe.doubted = false;
+    keyframe.localized = keyframe.localized || keyframe.tentative;
+    keyframe.tentative = false;
   }
   return trusted;
 }

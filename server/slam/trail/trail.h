@@ -27,13 +27,13 @@ class Trail {
   // keyframe that was seen again from this one.
   void Append(Keyframe keyframe, const Pose2& T_track_robot, std::vector<SurfacePoint> points_robot,
               const Eigen::Matrix3d& step_covariance, const std::optional<RevisitObservation>& revisit);
-  // Says whether the last keyframe may be drawn (Keyframe::localized), and if not, whether its place along the path is
-  // known all the same (Keyframe::doubted). REQUIRES: not empty.
-  void JudgeLast(bool localized, bool on_the_path);
-  // The path has been corrected: doubted keyframes count as localized.
-  void TrustDoubted();
-  // The keyframes as they would be after TrustDoubted.
-  [[nodiscard]] std::vector<Keyframe> TrustedKeyframes() const;
+  // Sets whether the last keyframe is localized, so that it may be drawn, and if not, whether its place along the path
+  // is known (Keyframe::tentative). REQUIRES: not empty.
+  void MarkLast(bool localized, bool on_the_path);
+  // The path has been corrected: tentative keyframes count as localized.
+  void ConfirmTentative();
+  // The keyframes as they would be after ConfirmTentative.
+  [[nodiscard]] std::vector<Keyframe> ConfirmedKeyframes() const;
   // Appends a scan with its pose relative to the last keyframe. REQUIRES: not empty.
   void AddScan(Stamp stamp, const Pose2& T_keyframe_robot);
   // Adds a large loop that was used to correct the path.

@@ -15,14 +15,14 @@ std::vector<int> StandingOut(const std::vector<LineFeature>& lines, const Tolera
   std::vector<int> found;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     if (lines[i].length < options.long_line_m) continue;
-    bool rivalled = false;
-    for (std::size_t k = 0; k < lines.size() && !rivalled; ++k) {
+    bool has_rival = false;
+    for (std::size_t k = 0; k < lines.size() && !has_rival; ++k) {
       if (k == i || lines[k].length < options.long_line_ratio * lines[i].length) continue;
       constexpr double kSameSlope = Radians(15.0);
       if (std::abs(AngleDiff(lines[k].slope, lines[i].slope)) > kSameSlope) continue;
-      rivalled = std::abs(lines[i].OffsetOf(lines[k].midpoint())) < options.long_line_apart_m;
+      has_rival = std::abs(lines[i].OffsetOf(lines[k].midpoint())) < options.long_line_apart_m;
     }
-    if (!rivalled) found.push_back(static_cast<int>(i));
+    if (!has_rival) found.push_back(static_cast<int>(i));
   }
   return found;
 }

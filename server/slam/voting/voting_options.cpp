@@ -94,7 +94,7 @@ void Visit(OptionVisitor& visitor, FaultOptions& options) {
                "Largest difference between the turn of an answer and the odometry.");
 }
 
-void Visit(OptionVisitor& visitor, OdometryTrustOptions& options) {
+void Visit(OptionVisitor& visitor, OdometryNoiseOptions& options) {
   visitor.Real("translation_floor_m", options.translation_floor_m, "m", 1e-4, 10.0,
                "Standard deviation of the translation of the odometry without motion.");
   visitor.Real("translation_share", options.translation_share, "m/m", 0.0, 10.0,

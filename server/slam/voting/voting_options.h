@@ -84,7 +84,7 @@ struct VotingOptions {
   SelectionOptions selection;
   PoseOptions pose;
   FaultOptions fault;
-  OdometryTrustOptions odometry;
+  OdometryNoiseOptions odometry;
 };
 void Visit(OptionVisitor& visitor, VotingOptions& options);
 

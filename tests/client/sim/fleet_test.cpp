@@ -7,6 +7,7 @@
 #include <map>
 
 #include "client/sim/shipped_worlds.h"
+#include "tests/flat_world.h"
 
 namespace cairn::sim {
 namespace {
@@ -189,7 +190,6 @@ TEST_P(ShippedWorld, RobotsDriveItsRoutesClearOfEverything) {
   auto world = OpenWorld(GetParam());
   ASSERT_TRUE(world) << world.error().message;
   EXPECT_EQ(world->name, GetParam());
-  const RayCaster walls(world->segments);
   FleetOptions options;
   options.robots = static_cast<int>(world->routes.size());
   options.laser.beams = 1;
@@ -198,7 +198,7 @@ TEST_P(ShippedWorld, RobotsDriveItsRoutesClearOfEverything) {
   Take(fleet, 400.0);
   for (int robot = 0; robot < fleet.robots(); ++robot) {
     for (const StampedPose& pose : fleet.truth(robot)) {
-      double clearance = walls.Clearance(pose.T_map_robot.translation());
+      double clearance = DistanceToWalls(world->segments, pose.T_map_robot.translation());
       for (const Disc& disc : world->discs) {
         clearance = std::min(clearance, (disc.center_map - pose.T_map_robot.translation()).norm() - disc.radius_m);
       }

@@ -7,6 +7,7 @@
 #include "client/sim/laser.h"
 #include "client/sim/shipped_worlds.h"
 #include "client/sim/tilt_mount.h"
+#include "tests/flat_world.h"
 
 namespace cairn::sim {
 namespace {
@@ -73,7 +74,7 @@ TEST(LaserInSpace, ALevelScanIsTheFlatWorlds) {
   const SolidScene scene(RoomRectangles());
   const RayCaster walls({{{-4, -3}, {6, -3}}, {{6, -3}, {6, 5}}, {{6, 5}, {-4, 5}}, {{-4, 5}, {-4, -3}}});
   Random random(1);
-  const Scan flat = MeasureScan(walls, {}, {1, 1, 0.4}, {}, 5, Perfect(), random);
+  const Scan flat = MeasureFlatScan(walls, {}, {1, 1, 0.4}, {}, 5, Perfect(), random);
   const Scan solid = MeasureScan(scene, {}, {1, 1, 0.4}, {}, 5, 0.0, Perfect(), random);
   for (std::size_t i = 0; i < flat.ranges_m.size(); ++i) EXPECT_NEAR(flat.ranges_m[i], solid.ranges_m[i], 1e-5);
 }

@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "tests/flat_world.h"
+
 namespace cairn::sim {
 namespace {
 
@@ -21,7 +23,7 @@ LaserOptions Perfect() {
 
 Scan Measure(const Pose2& T_map_robot, const LaserOptions& options, Random& random, const Twist& twist = {},
              std::span<const Disc> discs = {}) {
-  return MeasureScan(Room(), discs, T_map_robot, twist, 1000, options, random);
+  return MeasureFlatScan(Room(), discs, T_map_robot, twist, 1000, options, random);
 }
 
 TEST(SimLaser, PerfectRangesEndOnTheWalls) {

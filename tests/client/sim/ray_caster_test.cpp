@@ -84,11 +84,5 @@ TEST(RayCaster, HitsADiscAtItsRimUnlessInside) {
   EXPECT_EQ(CastAtDisc(disc, {4.2, 1}, {1, 0}), kNothingHit);
 }
 
-TEST(RayCaster, ClearanceIsTheDistanceToTheNearestWall) {
-  const RayCaster walls(Square(3.0));
-  EXPECT_NEAR(walls.Clearance({2.5, 0}), 0.5, 1e-12);
-  EXPECT_NEAR(walls.Clearance({6, 7}), 5.0, 1e-12) << "to a corner";
-}
-
 }  // namespace
 }  // namespace cairn::sim

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "server/jobs/job_worker.h"
+#include "tests/eventually.h"
 
 namespace cairn::server {
 namespace {
@@ -87,6 +88,7 @@ TEST_F(JobListTest, ProgressOnlyGrowsAndIsThrottled) {
   TakeSent();
   for (int i = 1; i <= 1000; ++i) control->Progress(i / 1000.0);
   control->Progress(0.5);
+  control->Progress(2.0);
   EXPECT_EQ(list_.Find(job->id)->progress, 1.0);
   EXPECT_LT(TakeSent().size(), 20U);
 }
@@ -121,6 +123,61 @@ TEST_F(JobListTest, ForgetsTheOldestFinishedJobAndRefusesWhenNoneIs) {
   EXPECT_EQ(retired_, std::vector<std::uint64_t>{first->id});
   EXPECT_EQ(list_.OfSite("lab").size(), 2U);
   EXPECT_EQ(list_.OfSite("").size(), 3U);
+}
+
+TEST_F(JobListTest, OfSeveralFinishedJobsTheOldestIsForgottenFirst) {
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(list_.Add("lab", JobKind::kSmooth));
+  ASSERT_TRUE(list_.Cancel(3));
+  ASSERT_TRUE(list_.Cancel(2));
+  ASSERT_TRUE(list_.Add("lab", JobKind::kSmooth));
+  EXPECT_FALSE(list_.Find(2));
+  EXPECT_TRUE(list_.Find(3));
+}
+
+TEST_F(JobListTest, AJobThatIsForgottenOrWasNeverThereIsNotFound) {
+  const auto job = list_.Add("lab", JobKind::kSmooth);
+  ASSERT_TRUE(list_.Start(job->id));
+  const auto control = list_.ControlOf(job->id);
+  list_.Succeed(job->id, {});
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(list_.Add("lab", JobKind::kSmooth));
+  TakeSent();
+  control->Progress(0.5);  // Of the forgotten job.
+  for (const std::uint64_t id : {job->id, std::uint64_t{999}}) {
+    EXPECT_FALSE(list_.Start(id));
+    list_.Succeed(id, {});
+    EXPECT_EQ(list_.Find(id).error().code, StatusCode::kNotFound);
+    EXPECT_EQ(list_.Cancel(id).error().code, StatusCode::kNotFound);
+    EXPECT_EQ(list_.ControlOf(id), nullptr);
+  }
+  EXPECT_TRUE(TakeSent().empty());
+}
+
+TEST_F(JobListTest, KeysThatCouldNotBeGivenBackAreGivenBackLater) {
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(list_.Add("lab", JobKind::kSmooth));
+  ASSERT_TRUE(list_.Cancel(1));
+  ASSERT_TRUE(list_.Cancel(2));
+  TakeSent();
+  for (std::size_t i = 0; i < kLane; ++i) ASSERT_TRUE(outbound_.Send(Job{}));
+  for (int i = 0; i < 2; ++i) ASSERT_TRUE(list_.Add("lab", JobKind::kSmooth));
+  TakeSent();
+  EXPECT_TRUE(retired_.empty());
+  list_.Tick();
+  TakeSent();
+  std::sort(retired_.begin(), retired_.end());
+  EXPECT_EQ(retired_, (std::vector<std::uint64_t>{1, 2}));
+}
+
+TEST_F(JobListTest, ProgressIsPublishedAgainAfterAWhile) {
+  const auto job = list_.Add("lab", JobKind::kSmooth);
+  ASSERT_TRUE(list_.Start(job->id));
+  TakeSent();
+  std::size_t published = 0;
+  double progress = 0.0;
+  EXPECT_TRUE(test::Eventually([&] {
+    list_.ControlOf(job->id)->Progress(progress += 1e-6);
+    published += TakeSent().size();
+    return published == 3;
+  }));
 }
 
 TEST_F(JobListTest, WhatCouldNotBeSentIsSentLater) {
@@ -159,6 +216,69 @@ TEST(JobWorker, RunsOneAfterTheOtherRefusesWhenFullAndStopsByCancelling) {
   worker.Stop();
   EXPECT_EQ(list.Find(first->id)->state, JobState::kCancelled);
   EXPECT_EQ(list.Find(second->id)->state, JobState::kCancelled);
+}
+
+TEST(JobWorker, AJobThatWasCancelledWhileItWaitedIsNotRun) {
+  Outbound outbound(32);
+  JobList list({}, outbound, [] { return Stamp{0}; });
+  BoundedChannel<std::uint64_t> ran(8);
+  JobWorker worker({}, list, [&](const Job& job, bool, const JobControl&) {
+    EXPECT_TRUE(ran.TryPush(std::uint64_t{job.id}));
+    return Result<JobOutcome>(JobOutcome{});
+  });
+  ASSERT_TRUE(worker.Submit("lab", JobKind::kSmooth, true));
+  ASSERT_TRUE(worker.Submit("lab", JobKind::kSmooth, true));
+  ASSERT_TRUE(list.Cancel(1));
+  worker.Start();
+  EXPECT_EQ(ran.Pop(), 2U);
+  worker.Stop();
+}
+
+TEST(JobWorker, PassesOnWhetherToEnableTheResult) {
+  Outbound outbound(32);
+  JobList list({}, outbound, [] { return Stamp{0}; });
+  BoundedChannel<bool> enabled(2);
+  JobWorker worker({}, list, [&](const Job&, bool enable, const JobControl&) {
+    EXPECT_TRUE(enabled.TryPush(bool{enable}));
+    return Result<JobOutcome>(JobOutcome{});
+  });
+  ASSERT_TRUE(worker.Submit("lab", JobKind::kSmooth, false));
+  ASSERT_TRUE(worker.Submit("lab", JobKind::kSmooth, true));
+  worker.Start();
+  EXPECT_EQ(enabled.Pop(), false);
+  EXPECT_EQ(enabled.Pop(), true);
+  worker.Stop();
+}
+
+TEST(JobWorker, RefusesAJobForWhichTheListHasNoRoomAndEveryJobOnceItHasStopped) {
+  const JobsOptions options{.max_queued = 1, .max_kept = 2};
+  Outbound outbound(32);
+  JobList list(options, outbound, [] { return Stamp{0}; });
+  ASSERT_TRUE(list.Add("lab", JobKind::kSmooth));
+  ASSERT_TRUE(list.Add("lab", JobKind::kSmooth));
+  JobWorker worker(options, list, [](const Job&, bool, const JobControl&) -> Result<JobOutcome> { return {}; });
+  const auto refused = worker.Submit("lab", JobKind::kSmooth, true);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("jobs.max_kept"), std::string::npos);
+  worker.Stop();
+  EXPECT_FALSE(worker.Submit("lab", JobKind::kSmooth, true));
+}
+
+TEST(JobWorker, ItsEndCancelsTheRunningJob) {
+  Outbound outbound(32);
+  JobList list({}, outbound, [] { return Stamp{0}; });
+  {
+    BoundedChannel<int> started(1);
+    JobWorker worker({}, list, [&](const Job&, bool, const JobControl& control) {
+      EXPECT_TRUE(started.TryPush(1));
+      while (!control.cancelled()) std::this_thread::yield();
+      return Result<JobOutcome>(Fail(StatusCode::kCancelled, "cancelled"));
+    });
+    ASSERT_TRUE(worker.Submit("lab", JobKind::kSmooth, true));
+    worker.Start();
+    EXPECT_EQ(started.Pop(), 1);
+  }
+  EXPECT_EQ(list.Find(1)->state, JobState::kCancelled);
 }
 
 TEST(JobWorker, RunsJobsAtTheConfiguredPriority) {

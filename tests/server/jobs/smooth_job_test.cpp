@@ -69,6 +69,20 @@ TEST_F(SmoothSiteTest, RedrawsTheMapAlongTheFullPathAndSaysHowMuchBetterItFits) 
   EXPECT_EQ(smoothed->version.smoothed.at("r1")->size(), static_cast<std::size_t>(kKeyframes));
 }
 
+TEST_F(SmoothSiteTest, TheResultIsTheSumOverAllRobots) {
+  SessionMaterial other = Material();
+  other.session = 6;
+  other.robot = "r2";
+  const auto one = SmoothSite(job_, {Material()}, control_);
+  const auto both = SmoothSite(job_, {Material(), other}, control_);
+  ASSERT_TRUE(one && both);
+  EXPECT_EQ(both->outcome.message, "2 robots, 40 keyframes, 40 scans");
+  EXPECT_EQ(both->version.parts.size(), 2U);
+  EXPECT_EQ(both->version.smoothed.size(), 2U);
+  EXPECT_DOUBLE_EQ(both->outcome.cost_before, one->outcome.cost_before);  // A mean over equal robots.
+  EXPECT_DOUBLE_EQ(both->outcome.cost_after, one->outcome.cost_after);
+}
+
 TEST_F(SmoothSiteTest, TheSmoothedPathIsTheOneAlongWhichTheMapIsDrawn) {
   SessionMaterial material = Material();
   std::swap(material.snapshot.online_path, material.snapshot.full_path);  // Now the online path is right.
@@ -115,10 +129,10 @@ class SmoothJobTest : public SmoothSiteTest {
   void HoldSite() {
     asio::post(maps_pool_, [held = held_] { held.wait(); });
   }
-  Result<JobOutcome> Run(double timeout_s) {
+  Result<JobOutcome> Run(double timeout_s, bool enable = true) {
     JobsOptions options;
     options.snapshot_timeout_s = timeout_s;
-    return SmoothJob(options, roster_, atlas_).Run(job_, true, control_);
+    return SmoothJob(options, roster_, atlas_).Run(job_, enable, control_);
   }
 
   std::promise<void> release_;
@@ -141,6 +155,30 @@ TEST_F(SmoothJobTest, PublishesAndEnablesANewVersion) {
   ASSERT_TRUE(outcome) << outcome.error().message;
   EXPECT_EQ(outcome->map_version, 2U);
   EXPECT_EQ(atlas_.Find("lab")->snapshot()->info.enabled_version, 2U);
+}
+
+TEST_F(SmoothJobTest, DoesNotEnableTheNewVersionUnlessAsked) {
+  const auto outcome = Run(20.0, false);
+  ASSERT_TRUE(outcome) << outcome.error().message;
+  EXPECT_EQ(outcome->map_version, 2U);
+  EXPECT_EQ(atlas_.Find("lab")->snapshot()->info.enabled_version, 1U);
+}
+
+TEST_F(SmoothJobTest, AsksEveryRobotOfTheSite) {
+  roster_.Take(testing::RequestOf("r2"));
+  roster_.Take(testing::OdometryOf("r2", testing::RoomOdometry(0)));
+  roster_.Take(testing::ScanOf("r2", RoomScan(0)));
+  const auto outcome = Run(20.0);
+  ASSERT_TRUE(outcome) << outcome.error().message;
+  EXPECT_EQ(outcome->message.substr(0, 8), "2 robots");
+}
+
+TEST_F(SmoothJobTest, ASiteWithoutRobotsOrThatIsGoneFailsWithAReason) {
+  job_.site = "hall";
+  EXPECT_EQ(Run(20.0).error().code, StatusCode::kFailedPrecondition);
+  job_.site = "lab";
+  const Atlas without_it(MapsOptions{}, 0.05, true, maps_pool_, outbound_);
+  EXPECT_EQ(SmoothJob({}, roster_, without_it).Run(job_, true, control_).error().code, StatusCode::kNotFound);
 }
 
 TEST_F(SmoothJobTest, FailsIfARobotDoesNotHandOverItsStateInTime) {

@@ -100,6 +100,22 @@ TEST(LostRobot, AFullSessionRefusesScansAndCountsThem) {
   EXPECT_GE(robot.full, 75);
 }
 
+TEST(LostRobot, ASessionIsFullWithTheLastChunkThatTheOptionsAllow) {
+  const auto scan = std::make_shared<const Scan>(Look(test::Office(), {}, {}));
+  Mapper unbounded({}, {}, 1);
+  static_cast<void>(unbounded.Process(scan, {}, SerialFor));
+  const auto chunks = static_cast<std::int64_t>(unbounded.grid().chunk_count());
+  ASSERT_GT(chunks, 0);
+  for (const std::int64_t more : {0, 1}) {
+    MapperOptions options;
+    options.max_chunks = chunks + more;
+    Mapper mapper(options, {}, 1);
+    EXPECT_FALSE(mapper.full());
+    static_cast<void>(mapper.Process(scan, {}, SerialFor));
+    EXPECT_EQ(mapper.full(), more == 0);
+  }
+}
+
 TEST(LostRobot, TheMapOfOneSessionIsBounded) {
   MapperOptions options = FewParticles();
   options.lost_after_m = 1000.0;  // It believes in whatever it sees.

@@ -7,6 +7,7 @@
 #include <random>
 #include <thread>
 
+#include "server/slam/grid/grid_image.h"
 #include "tests/server/slam/ring_world.h"
 
 namespace cairn::slam {
@@ -275,6 +276,33 @@ TEST(Mapper, SaysSoWhereItDrawsTheMapBesideItself) {
   }
   EXPECT_LT(error_m(closed.back()), 0.3);
   EXPECT_TRUE(closed.back().localized);
+}
+
+// A loop corrects the path of a robot that has noticed a contradiction. From this scan on it is localized again, and
+// the map that is drawn again has also the keyframes that were left out before.
+TEST(Mapper, AfterALargeLoopTheRobotIsLocalizedAtOnceAndTheWholeMapIsDrawn) {
+  const Drive drive = DriveLargeRing(42.0, 1.2);
+  MapperOptions options;
+  options.filter.particles = 50;
+  options.self_check.max_conflict = 0.1;
+  options.revisit.enabled = false;  // So that every loop among the relations is a large one.
+  Mapper mapper(options, {}, 1);
+  const auto loops = [&mapper] { return mapper.Snapshot().relations.size(); };  // There are none without a loop.
+  bool was_lost = false, found = false;
+  for (std::size_t i = 0; i < drive.scans.size(); ++i) {
+    const ScanOutcome outcome = mapper.Process(drive.scans[i], drive.odometry[i], SerialFor);
+    was_lost = was_lost || !outcome.localized;
+    if (!was_lost || found || !outcome.keyframe || loops() == 0) continue;
+    found = true;
+    EXPECT_TRUE(outcome.localized) << i;
+  }
+  ASSERT_TRUE(found);
+  mapper.FinishMap();
+  const MapperSnapshot snapshot = mapper.Snapshot();
+  OccupancyGrid whole{GridOptions{}};
+  for (std::size_t k = 0; k < snapshot.keyframes.size(); ++k)
+    whole.Draw(*snapshot.keyframes[k].scan, snapshot.online_path[k]);
+  EXPECT_EQ(ImageOf(mapper.grid()).cells, ImageOf(whole).cells);
 }
 
 TEST(Mapper, TheFullPathHasAPoseForEveryScan) {

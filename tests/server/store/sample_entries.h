@@ -38,7 +38,7 @@ inline ScanTaken SampleScan(std::uint64_t sequence, int beams = 181) {
 inline OdometryTaken SampleOdometry(std::uint64_t sequence) {
   return {SampleStream(),
           {.sequence = sequence, .stamp = static_cast<Stamp>(sequence) * 50'000'000, .T_odom_robot = {1.0, -0.0, 0.5}},
-          OdometryFate::kTaken};
+          OdometryUse::kTaken};
 }
 
 inline StoredGrid SampleGrid(int seed) {

@@ -44,7 +44,7 @@ class KilledStore {
   [[nodiscard]] const std::string& database() const { return database_; }
   [[nodiscard]] const std::string& log() const { return log_; }
 
-  // How many commits are there after a start on these files; nothing where it is refused.
+  // How many commits are there after a start on these files; nothing if it is refused.
   std::optional<std::uint64_t> CommitsIn(const std::string& database, const std::string& log) {
     const fs::path place = directory_ / "copy";
     fs::remove_all(place);

@@ -28,8 +28,8 @@ void Add(slam::ScanPipeline& pipeline, const LogRecord& record) {
   }
 }
 
-// Saves several times and returns the longest pause. Other programs on the machine may lengthen a pause: the processor
-// time is measured.
+// Saves several times and returns the longest pause. It is measured in processor time, because other programs on the
+// machine would lengthen it otherwise.
 double MeasureSaving(slam::ScanPipeline& pipeline, const slam::MapperOptions& options, const StudyLog& log,
                      std::size_t scans, StudyContext& context, Table& table) {
   Stopwatch watch;

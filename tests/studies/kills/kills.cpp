@@ -1,6 +1,6 @@
-// cairn-study kills ends a cairnd with SIGKILL a thousand times under robots that drive, and compares what they were
-// told with a server that nobody kills. Then it measures what being durable costs. Times are wall-clock times, so no
-// other program should run on the machine.
+// cairn-study kills ends cairnd with SIGKILL a thousand times while robots drive, and compares the results with those
+// of a server that is not killed. Then it measures the processor time that the store needs. Times are wall-clock times,
+// so no other program should run on the machine.
 #include <unistd.h>
 
 #include <algorithm>
@@ -81,7 +81,7 @@ double CpuSeconds(pid_t pid) {
 
 struct Cost {
   double cpu_s = 0.0;
-  std::string store_line;  // What the server says of its store at the end.
+  std::string store_line;  // What the server logs about its store at the end.
 };
 
 Cost CostOf(const std::string& state, int seconds) {

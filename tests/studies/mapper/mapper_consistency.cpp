@@ -103,7 +103,7 @@ struct Place {
   bool singular = false;  // Reported as certain in some direction, so there is no NEES.
 };
 
-Place Judge(const slam::ScanOutcome& outcome, const Pose2& T_map_robot_true, double doubt_factor) {
+Place PlaceOf(const slam::ScanOutcome& outcome, const Pose2& T_map_robot_true, double doubt_factor) {
   Eigen::Vector3d error = outcome.T_map_robot.vector() - T_map_robot_true.vector();
   error.z() = WrapAngle(error.z());
   const Eigen::Matrix3d P = doubt_factor * doubt_factor * outcome.covariance;
@@ -159,7 +159,7 @@ std::vector<Place> DriveOnce(const ConsistencyDrive& drive, const MapperConsiste
     if (used == outcomes.size()) break;
     if (outcomes[used].stamp != truth[i].stamp) continue;
     if (travelled_m < kPointEveryM * static_cast<double>(places.size() + 1)) continue;
-    places.push_back(Judge(outcomes[used], truth[i].T_map_robot, options.doubt_factor));
+    places.push_back(PlaceOf(outcomes[used], truth[i].T_map_robot, options.doubt_factor));
     places.back().travelled_m = travelled_m;
   }
   return places;

@@ -39,8 +39,8 @@ bool Shows(const LineFeature& line, const VisibleWall& wall) {
   return overlap >= 0.5 * std::min(line.length, wall.length());
 }
 
-void Judge(const Scene& scene, const Pose2& pose, const sim::LaserOptions& laser, sim::Random& random,
-           Quality& quality) {
+void AddMeasured(const Scene& scene, const Pose2& pose, const sim::LaserOptions& laser, sim::Random& random,
+                 Quality& quality) {
   const Scan scan = scene.Look(pose, laser, random);
   const Stopwatch watch;
   const std::vector<LineFeature> lines = slam::ExtractLines(slam::PointsOf(scan), scan, {});
@@ -112,7 +112,8 @@ void StudyLineExtraction(StudyContext& context) {
     const Scene scene(row.world);
     sim::Random random(context.seed);
     Quality quality;
-    for (int i = 0; i < context.Pick(400, 60); ++i) Judge(scene, scene.DrawPose(random), row.laser, random, quality);
+    for (int i = 0; i < context.Pick(400, 60); ++i)
+      AddMeasured(scene, scene.DrawPose(random), row.laser, random, quality);
     table.Add({"simulated", row.world, Count(row.laser.beams), Number(100 * row.laser.error.sigma_m, 1),
                Number(100.0 * quality.extracted / quality.scans, 0), Percent(quality.true_positive()),
                Percent(quality.false_positive()), Number(quality.sigma_r_cm(), 2), Number(quality.sigma_alpha_deg(), 2),

@@ -50,7 +50,7 @@ CorridorPair DrawPair(const Scene& scene, double share, sim::Random& random) {
 // midpoints among lines with similar normals.
 enum class Couples : std::uint8_t { kClosestNormal, kNearestMidpoint };
 std::optional<Pose2> LeastSquaresAlone(const CorridorPair& pair, Couples couples, const slam::LineLsqOptions& options) {
-  std::vector<slam::WeighedPair> weighed;
+  std::vector<slam::WeightedPair> weighed;
   for (const LineFeature& line : pair.curr.lines) {
     const slam::PointNormal curr = slam::MidpointAndNormal(line);
     const LineFeature* nearest = nullptr;

@@ -73,7 +73,7 @@ void StudyLeastSquares(StudyContext& context, const StudyLog& log) {
     for (const Transform& wanted : kTable) {
       const Pose2 T{wanted.x, wanted.y, WrapAngle(-wanted.theta)};
       const Pose2 T_inverse = T.Inverse();
-      std::vector<slam::WeighedPair> pairs;
+      std::vector<slam::WeightedPair> pairs;
       std::vector<LineFeature> moved;
       for (const LineFeature& line : lines) {
         moved.push_back(slam::LineIn(T_inverse, line));

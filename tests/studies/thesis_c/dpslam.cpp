@@ -55,7 +55,7 @@ std::string Spread(const std::vector<double>& values, int decimals) {
   return Number(d.mean, decimals) + " +- " + Number(d.deviation, decimals);
 }
 
-// Empty where the options do not exist in this build.
+// Empty if the options do not exist in this build.
 std::optional<LogRun> RunAndDraw(StudyContext& context, const StudyLog& log, const WithoutOdometry& system) {
   context.report.Progress("5.3: " + system.name + " on " + log.name);
   std::vector<std::string> assignments{"slam.matcher=" + system.matcher, "slam.filter=" + system.filter,

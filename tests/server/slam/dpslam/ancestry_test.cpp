@@ -88,12 +88,12 @@ TEST_P(AncestryUnder, RandomResamplingEqualsCopyingMaps) {
     }
     std::sort(parents.begin(), parents.end());
     std::vector<FullMap> next;
-    std::vector<Ancestry::Birth> births;
+    std::vector<Ancestry::Child> children;
     for (const std::size_t parent : parents) {
       next.push_back(oracle[parent]);
-      births.push_back({parent, Scribble(rng, next.back())});
+      children.push_back({parent, Scribble(rng, next.back())});
     }
-    ancestry.NextGeneration(std::move(births));
+    ancestry.NextGeneration(std::move(children));
     oracle = std::move(next);
     ExpectMinimal(ancestry);
     if (HasFatalFailure()) return;
@@ -122,14 +122,14 @@ TEST(Ancestry, NoPressureKeepsOneParticleEach) {
   std::mt19937_64 rng(5);
   Ancestry ancestry;
   FullMap unused;
-  std::vector<Ancestry::Birth> births;
-  for (int i = 0; i < 10; ++i) births.push_back({0, Scribble(rng, unused)});
-  ancestry.NextGeneration(std::move(births));
+  std::vector<Ancestry::Child> children;
+  for (int i = 0; i < 10; ++i) children.push_back({0, Scribble(rng, unused)});
+  ancestry.NextGeneration(std::move(children));
   EXPECT_EQ(ancestry.size(), 11u);
   for (int generation = 0; generation < 50; ++generation) {
-    births.clear();
-    for (std::size_t i = 0; i < 10; ++i) births.push_back({i, Scribble(rng, unused)});
-    ancestry.NextGeneration(std::move(births));
+    children.clear();
+    for (std::size_t i = 0; i < 10; ++i) children.push_back({i, Scribble(rng, unused)});
+    ancestry.NextGeneration(std::move(children));
     EXPECT_EQ(ancestry.size(), 11u);
     EXPECT_EQ(ancestry.depth(), 2u);
   }

@@ -7,6 +7,7 @@
 #include "client/sim/laser.h"
 #include "client/sim/ray_caster.h"
 #include "server/slam/parallel_for.h"
+#include "tests/flat_world.h"
 
 namespace cairn::slam {
 
@@ -62,7 +63,7 @@ inline std::vector<DriveStep> DriveRing(double width, double height, double laps
     step = {step.x * 1.01 + sim::Normal(random, 0.03 * way), step.y + sim::Normal(random, 0.02 * way),
             step.theta * 1.01 + sim::Normal(random, 0.03 * way)};
     const auto stamp = static_cast<Stamp>(i) * 200'000'000;
-    steps.push_back({poses[i], step, sim::MeasureScan(walls, {}, poses[i], {}, stamp, laser, random)});
+    steps.push_back({poses[i], step, sim::MeasureFlatScan(walls, {}, poses[i], {}, stamp, laser, random)});
   }
   return steps;
 }

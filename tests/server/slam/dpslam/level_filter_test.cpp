@@ -57,9 +57,9 @@ class CopyTheMap {
     const bool blank = particles_[0].map.empty();
     for (Owner& particle : particles_) {
       Ancestry alone;
-      std::vector<Ancestry::Birth> births;
-      births.push_back({0, particle.map});
-      alone.NextGeneration(std::move(births));
+      std::vector<Ancestry::Child> children;
+      children.push_back({0, particle.map});
+      alone.NextGeneration(std::move(children));
       OpacityWindow window(alone, {-10, -10, 20, 20}, StopRate(opacity));
       window.Show(alone.living()[0]);
       if (!blank)
@@ -108,9 +108,9 @@ TEST(LevelFilter, IsTheFilterThatCopiesMaps) {
       OpacityWindow tree(ancestry, {-5, -5, 10, 10}, filter.maps().rate());
       tree.Show(ancestry.living()[filter.particles()[p].map]);
       Ancestry alone;
-      std::vector<Ancestry::Birth> births;
-      births.push_back({0, naive.particles()[p].map});
-      alone.NextGeneration(std::move(births));
+      std::vector<Ancestry::Child> children;
+      children.push_back({0, naive.particles()[p].map});
+      alone.NextGeneration(std::move(children));
       OpacityWindow copy(alone, {-5, -5, 10, 10}, filter.maps().rate());
       copy.Show(alone.living()[0]);
       ASSERT_EQ(tree.counts(), copy.counts());

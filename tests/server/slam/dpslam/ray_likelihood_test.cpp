@@ -28,9 +28,9 @@ class RayInAMap : public testing::Test {
       }
       painter.Draw(rays, {});
     }
-    std::vector<Ancestry::Birth> births;
-    births.push_back({0, painter.Take()});
-    ancestry_.NextGeneration(std::move(births));
+    std::vector<Ancestry::Child> children;
+    children.push_back({0, painter.Take()});
+    ancestry_.NextGeneration(std::move(children));
   }
 
   [[nodiscard]] OpacityWindow Window(TileBox box = {-2, -2, 4, 4}) const {

@@ -35,7 +35,7 @@ const Eigen::Matrix3d kSight = Eigen::Vector3d(1e-4, 1e-4, 1e-6).asDiagonal();
 // The true pose of the robot equals the believed one, seen from a keyframe.
 void SeeAgain(ErrorEnsemble& errors, const Drive& drive, std::size_t keyframe) {
   const RevisitObservation revisit{keyframe, Between(drive.path[keyframe], drive.T_map_robot), kSight};
-  errors.Tie<3>(keyframe, drive.T_map_robot, InnovateRevisit(drive.path[keyframe], drive.T_map_robot, revisit));
+  errors.Constrain<3>(keyframe, drive.T_map_robot, InnovateRevisit(drive.path[keyframe], drive.T_map_robot, revisit));
 }
 
 TEST(ErrorEnsemble, DriftsAsDeadReckoningDoes) {

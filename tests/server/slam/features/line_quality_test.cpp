@@ -46,7 +46,7 @@ std::vector<std::size_t> VisibleWalls(const World& world, const Pose2& pose, con
   return visible;
 }
 
-void Judge(const World& world, const Pose2& pose, const Laser& laser, std::mt19937_64& engine, Quality& quality) {
+void AddMeasured(const World& world, const Pose2& pose, const Laser& laser, std::mt19937_64& engine, Quality& quality) {
   const Scan scan = Look(world, pose, laser, &engine);
   const std::vector<LineFeature> lines = ExtractLines(PointsOf(scan), scan, LineOptions{});
   const Pose2 T_robot_world = pose.Inverse();
@@ -94,7 +94,7 @@ TEST(LineQuality, BeatsTheComparisonOfExtractorsOnSimulatedScans) {
     laser.sigma_m = 0.01;
     Quality quality;
     for (int run = 0; run < 150; ++run) {
-      Judge(test::Office(), {x(engine), y(engine), theta(engine)}, laser, engine, quality);
+      AddMeasured(test::Office(), {x(engine), y(engine), theta(engine)}, laser, engine, quality);
     }
     const double true_positive = 1.0 * quality.found / quality.visible;
     const double false_positive = 1.0 * quality.wrong / quality.extracted;

@@ -93,6 +93,43 @@ TEST(LineLocalization, ALogThatEndsWhereItIsPlacedHasItsWholeMap) {
   EXPECT_EQ(ImageOf(robot.mapper.grid()).cells, ImageOf(whole).cells);
 }
 
+TEST(LineLocalization, AGridThatComesBeforeTheRobotIsPlacedStaysAsItIs) {
+  const test::World room = test::Room(-3, -3, 8, 6);
+  LostRobot robot(Options(room));
+  for (int step = 0; step < 20; ++step) ASSERT_FALSE(robot.Step(room).localized);
+  robot.mapper.AdoptGrid(OccupancyGrid(GridOptions{}), 0);
+  EXPECT_EQ(robot.mapper.grid().chunk_count(), 0U);
+}
+
+TEST(LineLocalization, AStateFromBeforeTheRobotIsPlacedCanBeLoaded) {
+  LostRobot robot(Options(test::Office())), loaded(Options(test::Office()));
+  for (int step = 0; step < 3; ++step) ASSERT_FALSE(robot.Step(test::Office()).localized);
+  StateWriter writer;
+  robot.mapper.Save(writer);
+  const std::string bytes = writer.Bytes();
+  StateReader reader(bytes);
+  loaded.mapper.Load(reader, SerialFor);
+  ASSERT_TRUE(reader.done()) << reader.failed();
+  EXPECT_EQ(loaded.mapper.keyframe_count(), robot.mapper.keyframe_count());
+}
+
+// Before the robot is placed, its path may contradict its scans. Once it is placed, this no longer counts.
+TEST(LineLocalization, ContradictionsFromBeforeTheRobotIsPlacedAreForgotten) {
+  MapperOptions options = Options(test::Office());
+  // Nearly every difference between scans is a contradiction.
+  options.self_check = {.min_travel_m = 0.1, .every_m = 0.1, .stretch_m = 5.0, .near_m = 0.001, .max_conflict = 0.01};
+  options.filter.line_match.every_m = 2.0;  // So that finding the place takes longer.
+  LostRobot robot(options);
+  bool contradicted = false;
+  ScanOutcome outcome = robot.Step(test::Office());
+  while (!outcome.localized && robot.scans < 150) {
+    contradicted = contradicted || outcome.reason == PoseReason::kDiverged;
+    outcome = robot.Step(test::Office());
+  }
+  EXPECT_TRUE(contradicted);
+  EXPECT_TRUE(outcome.localized);
+}
+
 TEST(LineLocalization, AKnownStartIsGoodAtOnce) {
   MapperOptions options = Options(test::Office());
   options.filter.line_match.start_known = true;

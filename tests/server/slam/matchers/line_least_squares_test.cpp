@@ -14,8 +14,8 @@ std::vector<LineFeature> OfficeLines() {
 }
 
 // Pairs every line with itself; the current line is seen from T_ref_curr.
-std::vector<WeighedPair> PairsMovedBy(const std::vector<LineFeature>& lines, const Pose2& T_ref_curr) {
-  std::vector<WeighedPair> pairs;
+std::vector<WeightedPair> PairsMovedBy(const std::vector<LineFeature>& lines, const Pose2& T_ref_curr) {
+  std::vector<WeightedPair> pairs;
   for (const LineFeature& line : lines) {
     const PointNormal wall = MidpointAndNormal(line);
     pairs.push_back({wall, Transform(T_ref_curr.Inverse(), wall), line.length});

@@ -26,10 +26,10 @@ TEST(EffectiveSampleSize, RunsFromOneToAll) {
   EXPECT_DOUBLE_EQ(EffectiveSampleSize(std::vector<double>{0.25, 0.25, 0.25, 0.25}), 4.0);
 }
 
-TEST(ShareOfSiblings, CountsPairsOfOneParent) {
-  EXPECT_DOUBLE_EQ(ShareOfSiblings(std::vector<int>{0, 1, 2, 3}), 0.0);
-  EXPECT_DOUBLE_EQ(ShareOfSiblings(std::vector<int>{2, 2, 2, 2}), 1.0);
-  EXPECT_DOUBLE_EQ(ShareOfSiblings(std::vector<int>{0, 0, 0, 3}), 3.0 / 6.0);
+TEST(SharedParentFraction, CountsPairsOfOneParent) {
+  EXPECT_DOUBLE_EQ(SharedParentFraction(std::vector<int>{0, 1, 2, 3}), 0.0);
+  EXPECT_DOUBLE_EQ(SharedParentFraction(std::vector<int>{2, 2, 2, 2}), 1.0);
+  EXPECT_DOUBLE_EQ(SharedParentFraction(std::vector<int>{0, 0, 0, 3}), 3.0 / 6.0);
 }
 
 TEST(StratifiedSurvivors, OneInEachStratumOfTheCumulativeWeight) {

@@ -24,7 +24,7 @@ struct Pairing {
     scan->sequence = sequence;
     pairing.Add(std::move(scan));
   }
-  // False where this sample, or one held back before it, was refused.
+  // False if this sample, or one held back before it, was refused.
   bool OdometryAt(Stamp stamp, double x, std::uint64_t sequence = 0) {
     const std::uint64_t refused = pairing.odometry_refused();
     pairing.Add(Odometry{sequence, stamp, {x, 0, 0}});

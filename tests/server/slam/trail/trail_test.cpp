@@ -50,11 +50,11 @@ TEST(Trail, ARevisitIsALoopOfTheKeyframeThatSawIt) {
   EXPECT_EQ(relations.back().to, 10U);
 }
 
-TEST(Trail, WhatWasDoubtedCountsOnceThePathIsCorrectedAndBlindMotionNever) {
+TEST(Trail, TentativeKeyframesCountOnceThePathIsCorrectedAndBlindMotionNever) {
   Trail trail(MotionNoise{});
   const auto append = [&trail](bool localized, bool on_the_path) {
     trail.Append({std::make_shared<const Scan>(), {}}, {}, {}, Eigen::Matrix3d::Identity(), std::nullopt);
-    trail.JudgeLast(localized, on_the_path);
+    trail.MarkLast(localized, on_the_path);
   };
   const auto localized = [](const std::vector<Keyframe>& keyframes) {
     std::vector<bool> all;
@@ -65,11 +65,11 @@ TEST(Trail, WhatWasDoubtedCountsOnceThePathIsCorrectedAndBlindMotionNever) {
   append(false, true);
   append(false, false);
   EXPECT_EQ(localized(trail.keyframes()), (std::vector<bool>{true, false, false}));
-  EXPECT_EQ(localized(trail.TrustedKeyframes()), (std::vector<bool>{true, true, false}));
+  EXPECT_EQ(localized(trail.ConfirmedKeyframes()), (std::vector<bool>{true, true, false}));
   EXPECT_FALSE(trail.keyframes()[1].localized);  // Only asked, not done.
-  trail.TrustDoubted();
+  trail.ConfirmTentative();
   append(false, true);
-  EXPECT_FALSE(trail.keyframes()[1].doubted);
+  EXPECT_FALSE(trail.keyframes()[1].tentative);
   EXPECT_EQ(localized(trail.keyframes()), (std::vector<bool>{true, true, false, false}));
 }
 

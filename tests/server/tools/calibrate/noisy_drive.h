@@ -12,6 +12,7 @@
 #include "common/sensor/carmen_writer.h"
 #include "common/sensor/trajectory.h"
 #include "server/slam/motion_models/eliazar_model.h"
+#include "tests/flat_world.h"
 
 namespace cairn::server::test {
 
@@ -40,7 +41,7 @@ inline Trajectory WriteNoisyDrive(const NoisyDrive& drive, std::ostream& log) {
     const Stamp stamp = (i + 1) * (kNanosPerSecond / 2);
     path.push_back({stamp, truth});
     writer.Write(Odometry{0, stamp, T_odom_robot});
-    writer.Write(sim::MeasureScan(walls, world->discs, truth, {}, stamp, drive.laser, engine), T_odom_robot);
+    writer.Write(sim::MeasureFlatScan(walls, world->discs, truth, {}, stamp, drive.laser, engine), T_odom_robot);
     Eigen::Vector2d way = route[target] - truth.translation();
     if (way.norm() < 0.4) {
       target = (target + 1) % route.size();
