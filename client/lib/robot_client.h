@@ -24,7 +24,7 @@
 namespace cairn::client {
 
 struct RobotClientOptions {
-  std::uint64_t window = 32;                            // Of each sensor (ScanWindow).
+  std::uint64_t window = 32;                            // Of each sensor (ScanWindow); 0: Publish never waits.
   double send_timeout_s = 5.0;                          // How long Publish waits for room before it gives up.
   double resend_after_s = 2.0;                          // Without progress of the ledger, unsettled samples go again.
   std::size_t max_kept_bytes = std::size_t{64} << 20U;  // Of samples that the server may need again.
@@ -48,10 +48,10 @@ class RobotClient {
                                                                  const RobotClientOptions& options = {});
   ~RobotClient();
 
-  // Waits for room in the stream's window. The client numbers the samples itself. While no server listens, the sample
-  // is kept and sent later. kUnavailable: no room within send_timeout_s, try the same scan again; kFailedPrecondition:
-  // the session is over; kAlreadyExists: another client has taken it over. The sensor is the request's first, or the
-  // one named.
+  // Takes the sample, numbers it, and keeps it until it is safe; while no server listens, it is sent later. With a
+  // window, a scan first waits for room in it, also while no server listens. kUnavailable: no room within
+  // send_timeout_s, and the scan was not taken: try the same scan again; kFailedPrecondition: the session is over;
+  // kAlreadyExists: another client has taken it over. The sensor is the request's first, or the one named.
   [[nodiscard]] Result<void> Publish(const Scan& scan);
   [[nodiscard]] Result<void> Publish(const Scan& scan, const std::string& sensor);
   [[nodiscard]] Result<void> Publish(const Odometry& odometry);
