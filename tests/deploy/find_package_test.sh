@@ -16,6 +16,7 @@ find_package(cairn 0.1 REQUIRED)
 add_executable(robot robot.cpp drivers.cpp)
 target_link_libraries(robot PRIVATE cairn::client)
 PROJECT
+# shellcheck disable=SC2016  # The backquotes are Markdown.
 sed -n '/^```cpp$/,/^```$/p' "$source_dir/client/lib/README.md" | grep -v '^```' >"$world/robot/robot.cpp"
 grep -q 'RobotClient::Open' "$world/robot/robot.cpp"
 cat >"$world/robot/drivers.cpp" <<'DRIVERS'
@@ -25,7 +26,7 @@ DRIVERS
 cmake -S "$world/robot" -B "$world/build" -DCMAKE_PREFIX_PATH="$world/installed" -DCMAKE_CXX_COMPILER="$compiler"
 cmake --build "$world/build"
 # Nothing of the source or the build tree is needed any more.
-if grep -rlF -e "$source_dir" "$world/installed/lib/cmake"; then
+if grep -rlF --include="*.cmake" -e "$source_dir" "$world/installed"; then
   echo "FAILED: the package names the tree it was built in"
   exit 1
 fi
