@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs the packages of deploy/packages.txt that this machine lacks.
-# Usage: install-packages.sh [build|run|test]... The default is build.
+# Usage: install-packages.sh [build|run|test|boot]... The default is build.
 # It asks no questions. It prints nothing if no package is missing; otherwise it needs root or sudo.
 # Exit codes: 0 all packages are installed, 1 the installation failed, 2 wrong usage.
 set -euo pipefail

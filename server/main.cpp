@@ -60,9 +60,9 @@ DoorCounts LossesOf(const Watched& watched) {
           .unpublished = watched.egress.unpublished()};
 }
 
-// Checks once a second for servers on other machines (they are discovered only when both run) and for lost
-// messages.
-void Look(asio::steady_timer& timer, const Watched& watched, DoorLosses& losses, const ServiceNotifier& notifier) {
+// Checks once a second for servers on other machines (they are discovered only when both run), for lost messages
+// and whether the store works.
+void Look(asio::steady_timer& timer, const Watched& watched, DoorLosses& losses, ServiceStatus& status) {
   timer.expires_after(std::chrono::seconds(1));
   timer.async_wait([&](const asio::error_code& error) {
     if (error) return;
@@ -72,17 +72,16 @@ void Look(asio::steady_timer& timer, const Watched& watched, DoorLosses& losses,
     const DoorCounts counts = LossesOf(watched);
     if (const auto line = losses.Check(counts, DoorLosses::Clock::now())) {
       spdlog::warn("{}", *line);
-      notifier.Status("messages lost between DDS and the server: " + TextOf(counts));
+      status.Losses(TextOf(counts));
     }
-    const JournalHealth health = watched.journal == nullptr ? JournalHealth{} : watched.journal->health();
-    if (health.degraded) notifier.Status("degraded, new data is not stored: " + health.reason);
-    Look(timer, watched, losses, notifier);
+    if (watched.journal != nullptr) status.Degraded(watched.journal->health().reason);
+    Look(timer, watched, losses, status);
   });
 }
 
 // Runs until SIGTERM or SIGINT. Notifies the watchdog while the server is healthy.
 void WaitForSignal(asio::io_context& context, asio::signal_set& signals, const Watched& watched,
-                   const ServiceNotifier& notifier) {
+                   const ServiceNotifier& notifier, ServiceStatus& status) {
   signals.async_wait([&context](const asio::error_code& error, int signal) {
     if (!error) spdlog::info("signal {}: stopping", signal);
     context.stop();
@@ -99,7 +98,7 @@ void WaitForSignal(asio::io_context& context, asio::signal_set& signals, const W
   if (watchdog) feed({});
   asio::steady_timer second(context);
   DoorLosses losses;
-  Look(second, watched, losses, notifier);
+  Look(second, watched, losses, status);
   context.run();
 }
 
@@ -181,10 +180,12 @@ int Serve(const CairndOptions& options, const std::filesystem::path& state) {
   if (!ingress) return failed(ingress.error());
 
   const ServiceNotifier notifier;
-  notifier.Ready("serving DDS domain " + std::to_string(options.wire.domain));
+  const std::string serving = "serving DDS domain " + std::to_string(options.wire.domain);
+  ServiceStatus service_status(notifier, serving);
+  notifier.Ready(serving);
   spdlog::info("ready");
   const Watched watched{server, outbound, **ingress, **egress, **others, kept->journal.get()};
-  WaitForSignal(context, signals, watched, notifier);
+  WaitForSignal(context, signals, watched, notifier, service_status);
   notifier.Stopping();
 
   (*ingress)->Close();

@@ -26,7 +26,7 @@
 namespace cairn::client {
 
 struct RobotClientOptions {
-  std::uint64_t window = 32;                            // For each sensor (ScanWindow).
+  std::uint64_t window = 32;                            // For each sensor (ScanWindow); 0: Publish never waits.
   double send_timeout_s = 5.0;                          // How long Publish waits for room before it gives up.
   double resend_after_s = 2.0;                          // If the ledger stands still for so long, sends again.
   std::size_t max_kept_bytes = std::size_t{64} << 20U;  // Memory for samples that are not safe yet.
@@ -50,10 +50,10 @@ class RobotClient {
                                                                  const RobotClientOptions& options = {});
   ~RobotClient();
 
-  // Waits for room in the stream's window. The client numbers the samples itself. While no server listens, the sample
-  // is kept and sent later. kUnavailable: no room within send_timeout_s; try the same scan again. kFailedPrecondition:
-  // the session has ended. kAlreadyExists: another client has taken it over. The default sensor is the first one of the
-  // request.
+  // Numbers the sample and keeps it until the server has stored it; while no server listens, it is sent later. With a
+  // window, a scan first waits for room in the stream's window. kUnavailable: no room within send_timeout_s, and the
+  // scan was not taken; try the same scan again. kFailedPrecondition: the session has ended. kAlreadyExists: another
+  // client has taken it over. The default sensor is the first one of the request.
   [[nodiscard]] Result<void> Publish(const Scan& scan);
   [[nodiscard]] Result<void> Publish(const Scan& scan, const std::string& sensor);
   [[nodiscard]] Result<void> Publish(const Odometry& odometry);

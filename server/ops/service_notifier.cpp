@@ -3,6 +3,7 @@
 #include <systemd/sd-daemon.h>
 
 #include <cstdint>
+#include <utility>
 
 namespace cairn::server {
 
@@ -26,6 +27,28 @@ std::optional<std::chrono::microseconds> ServiceNotifier::watchdog() const {
   std::uint64_t microseconds = 0;
   if (sd_watchdog_enabled(0, &microseconds) <= 0) return std::nullopt;
   return std::chrono::microseconds(microseconds);
+}
+
+ServiceStatus::ServiceStatus(const ServiceNotifier& notifier, std::string serving)
+    : notifier_(notifier), serving_(std::move(serving)), shown_(serving_) {}
+
+void ServiceStatus::Losses(const std::string& text) {
+  losses_ = text;
+  Show();
+}
+
+void ServiceStatus::Degraded(const std::string& reason) {
+  degraded_ = reason;
+  Show();
+}
+
+void ServiceStatus::Show() {
+  std::string line = serving_;
+  if (!losses_.empty()) line = "messages lost between DDS and the server: " + losses_;
+  if (!degraded_.empty()) line = "degraded, what arrives now is not durable: " + degraded_;
+  if (line == shown_) return;
+  notifier_.Status(line);
+  shown_ = std::move(line);
 }
 
 }  // namespace cairn::server

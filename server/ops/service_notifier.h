@@ -19,4 +19,25 @@ class ServiceNotifier {
   [[nodiscard]] std::optional<std::chrono::microseconds> watchdog() const;
 };
 
+// The line beside the service: that the store fails, else what was lost, else what the service does. It is sent when it
+// changes. Not thread-safe: one owner.
+class ServiceStatus {
+ public:
+  // `serving` is the line that Ready has sent.
+  ServiceStatus(const ServiceNotifier& notifier, std::string serving);
+  // Shown from now on; empty: nothing was lost.
+  void Losses(const std::string& text);
+  // Shown until the reason is empty again, because the store works.
+  void Degraded(const std::string& reason);
+
+ private:
+  void Show();
+
+  const ServiceNotifier& notifier_;
+  const std::string serving_;
+  std::string losses_;
+  std::string degraded_;
+  std::string shown_;
+};
+
 }  // namespace cairn::server

@@ -82,7 +82,7 @@ std::string TextOf(MapperOptions options) {
   std::string numbers;
   for (const MapLine& line : *options.filter.line_match.map)
     for (const double number : {line.a.x(), line.a.y(), line.b.x(), line.b.y()}) AppendNumber(numbers, number);
-  return text + "slam.line_match.file with the checksum " + std::to_string(Checksum(numbers)) + '\n';
+  return text + "slam.line_match.map with the checksum " + std::to_string(Checksum(numbers)) + '\n';
 }
 
 // The first line that differs. REQUIRES: the texts are different.

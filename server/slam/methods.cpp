@@ -14,11 +14,11 @@
 namespace cairn::slam {
 namespace {
 
-constexpr std::array<std::string_view, 7> kMatcherNames = {"voting", "line_lsq", "hough",      "ndt",
-                                                           "ndt_de", "icp",      "correlative"};
-constexpr std::array<std::string_view, 8> kFilterNames = {
-    "fastslam2_points", "fastslam2_oriented",  "fastslam1", "ekf",
-    "dpslam",           "landmark_correction", "none",      "line_match"};
+constexpr auto kMatcherNames =
+    std::to_array<std::string_view>({"voting", "line_lsq", "hough", "ndt", "ndt_de", "icp", "correlative"});
+constexpr auto kFilterNames =
+    std::to_array<std::string_view>({"fastslam2_points", "fastslam2_oriented", "fastslam1", "ekf", "dpslam",
+                                     "landmark_correction", "none", "line_match"});
 
 // The motion sampler of FastSLAM 1.0: its input from the step, and how it samples.
 MotionSampler SamplerOf(const FilterOptions& options) {

@@ -159,13 +159,14 @@ std::string NameOf(const ::testing::TestParamInfo<Choice>& info) {
   return info.param.matcher + "_" + info.param.filter;
 }
 
+std::vector<Choice> EveryMatcherWith(const std::string& filter) {
+  std::vector<Choice> choices;
+  for (const std::string_view matcher : slam::MatcherNames()) choices.push_back({std::string(matcher), filter});
+  return choices;
+}
+
 constexpr const char* kDefaultFilter = "fastslam2_points";
-INSTANTIATE_TEST_SUITE_P(Matchers, EverySystem,
-                         ::testing::Values(Choice{"voting", kDefaultFilter}, Choice{"line_lsq", kDefaultFilter},
-                                           Choice{"hough", kDefaultFilter}, Choice{"ndt", kDefaultFilter},
-                                           Choice{"ndt_de", kDefaultFilter}, Choice{"icp", kDefaultFilter},
-                                           Choice{"correlative", kDefaultFilter}),
-                         NameOf);
+INSTANTIATE_TEST_SUITE_P(Matchers, EverySystem, ::testing::ValuesIn(EveryMatcherWith(kDefaultFilter)), NameOf);
 INSTANTIATE_TEST_SUITE_P(Filters, EverySystem,
                          ::testing::Values(Choice{"voting", "fastslam2_oriented"}, Choice{"voting", "fastslam1"},
                                            Choice{"voting", "ekf"}, Choice{"voting", "dpslam"},
@@ -176,11 +177,7 @@ INSTANTIATE_TEST_SUITE_P(Blind, EveryFilter,
                          ::testing::Values(kDefaultFilter, "fastslam2_oriented", "fastslam1", "ekf", "dpslam",
                                            "landmark_correction", "line_match"),
                          [](const ::testing::TestParamInfo<std::string>& row) { return row.param; });
-INSTANTIATE_TEST_SUITE_P(Alone, EveryMatcher,
-                         ::testing::Values(Choice{"voting", "none"}, Choice{"line_lsq", "none"},
-                                           Choice{"hough", "none"}, Choice{"ndt", "none"}, Choice{"ndt_de", "none"},
-                                           Choice{"icp", "none"}, Choice{"correlative", "none"}),
-                         NameOf);
+INSTANTIATE_TEST_SUITE_P(Alone, EveryMatcher, ::testing::ValuesIn(EveryMatcherWith("none")), NameOf);
 
 }  // namespace
 }  // namespace cairn::server::testing

@@ -10,6 +10,7 @@
 #include "server/tools/calibrate/motion_run.h"
 #include "server/tools/calibrate/odometry_run.h"
 #include "server/tools/log_run/json_line.h"
+#include "server/tools/log_run/server_sections.h"
 
 namespace cairn::server {
 namespace {
@@ -133,7 +134,7 @@ void AddMotion(CLI::App& app, Shared& shared) {
       const VisitOptions visit = [&](OptionVisitor& visitor) {
         visitor.Section("slam", "The estimator.", [&] { slam::Visit(visitor, options->slam); });
         visitor.Section("fit", "Expectation maximisation.", [&] { slam::Visit(visitor, options->fit); });
-        for (const char* other : {"server", "robots", "maps", "jobs", "wire"}) visitor.Foreign(other);
+        IgnoreServerSections(visitor);
       };
       if (*seed) {
         assignments->push_back("fit.seed=" + std::to_string(**seed));

@@ -9,6 +9,7 @@
 #include "common/service/start_pose.h"
 #include "common/version.h"
 #include "server/known_map.h"
+#include "server/tools/log_run/server_sections.h"
 
 namespace cairn::server {
 namespace {
@@ -20,7 +21,7 @@ void VisitSlam(OptionVisitor& visitor, OfflineOptions& options) {
 // The sections of cairnd.yaml. The same file can be used for both programs; this one reads only `slam`.
 void VisitFile(OptionVisitor& visitor, OfflineOptions& options) {
   VisitSlam(visitor, options);
-  for (const char* other : {"server", "robots", "maps", "jobs", "wire"}) visitor.Foreign(other);
+  IgnoreServerSections(visitor);
 }
 
 bool Complain(const Result<void>& result, int& exit_code) {

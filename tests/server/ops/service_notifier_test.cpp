@@ -32,7 +32,7 @@ class ServiceNotifierTest : public ::testing::Test {
   }
   std::string Receive() const {
     std::array<char, 256> text{};
-    const ssize_t length = recv(socket_, text.data(), text.size(), 0);
+    const ssize_t length = recv(socket_, text.data(), text.size(), MSG_DONTWAIT);  // What was sent is there at once.
     return {text.data(), static_cast<std::size_t>(std::max<ssize_t>(0, length))};
   }
 
@@ -48,6 +48,28 @@ TEST_F(ServiceNotifierTest, SaysReadyAliveAndStopping) {
   EXPECT_EQ(Receive(), "WATCHDOG=1");
   notifier_.Stopping();
   EXPECT_EQ(Receive(), "STOPPING=1");
+}
+
+// The status once said `degraded` for ever after one failure of the disk.
+TEST_F(ServiceNotifierTest, TheStatusIsDegradedOnlyWhileTheStoreFails) {
+  ServiceStatus status(notifier_, "serving");
+  status.Degraded("disk full");
+  EXPECT_EQ(Receive(), "STATUS=degraded, what arrives now is not durable: disk full");
+  status.Degraded("");
+  EXPECT_EQ(Receive(), "STATUS=serving");
+}
+
+TEST_F(ServiceNotifierTest, TheStatusIsSentWhenItChangesAndTheStoreComesBeforeLosses) {
+  ServiceStatus status(notifier_, "serving");
+  status.Degraded("");
+  status.Losses("1 malformed");
+  EXPECT_EQ(Receive(), "STATUS=messages lost between DDS and the server: 1 malformed");
+  status.Degraded("disk full");
+  EXPECT_EQ(Receive(), "STATUS=degraded, what arrives now is not durable: disk full");
+  status.Degraded("disk full");
+  status.Losses("2 malformed");
+  status.Degraded("");
+  EXPECT_EQ(Receive(), "STATUS=messages lost between DDS and the server: 2 malformed");
 }
 
 TEST_F(ServiceNotifierTest, KnowsWhetherAWatchdogIsSet) {

@@ -284,7 +284,10 @@ TEST(Checkpoint, OfAnotherKnownMapIsRefused) {
   std::vector<MapLine> other = *options.filter.line_match.map;
   other.front().a.x() += 0.1;
   options.filter.line_match.map = std::make_shared<const std::vector<MapLine>>(std::move(other));
-  EXPECT_FALSE(ScanPipeline(options, {}, SerialFor, Ignoring()).Load(bytes));
+  const Result<void> loaded = ScanPipeline(options, {}, SerialFor, Ignoring()).Load(bytes);
+  ASSERT_FALSE(loaded);
+  EXPECT_NE(loaded.error().message.find("slam.line_match.map with the checksum"), std::string::npos)
+      << loaded.error().message;
 }
 
 TEST(Checkpoint, OfANewerFormatIsRefused) {

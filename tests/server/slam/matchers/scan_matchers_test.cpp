@@ -33,7 +33,7 @@ struct Capability {
   double slide_m;        // Largest motion of the answer from the prior along a corridor.
   bool crowd;            // Whether it finds the motion although half of the view moves.
 };
-constexpr std::array<Capability, 7> kCapabilities = {{
+constexpr auto kCapabilities = std::to_array<Capability>({
     {MatcherKind::kVoting, 0.002, 0.002, 0.004, 0.2, Radians(20), 0.02, Radians(90), 0.01, true},
     {MatcherKind::kLineLsq, 0.002, 0.001, 0.003, 0.3, Radians(5), 0.02, Radians(90), 0.01, true},
     {MatcherKind::kHough, 0.012, 0.006, 0.008, 0.7, Radians(30), 0.01, Radians(90), 0.01, true},
@@ -41,7 +41,7 @@ constexpr std::array<Capability, 7> kCapabilities = {{
     {MatcherKind::kCorrelative, 0.012, 0.004, 0.006, 0.4, Radians(15), 0.01, Radians(90), 0.01, true},
     {MatcherKind::kNdt, 0.002, 0.001, 0.004, 0.4, Radians(10), 0.01, Radians(90), 0.25, true},
     {MatcherKind::kNdtDe, 0.002, 0.001, 0.004, 0.5, Radians(20), 0.01, Radians(90), 0.25, true},
-}};
+});
 
 void PrintTo(const Capability& row, std::ostream* out) {
   *out << MatcherName(row.kind);
@@ -314,8 +314,8 @@ INSTANTIATE_TEST_SUITE_P(All, ScanMatchers, testing::ValuesIn(kCapabilities),
                          });
 
 TEST(ScanMatching, EveryKindHasANameAndARow) {
-  EXPECT_EQ(MatcherNames().size(), 7U);
-  for (int k = 0; k < 7; ++k) {
+  EXPECT_EQ(MatcherNames().size(), kCapabilities.size());
+  for (std::size_t k = 0; k < MatcherNames().size(); ++k) {
     const auto kind = static_cast<MatcherKind>(k);
     EXPECT_FALSE(MatcherName(kind).empty());
     EXPECT_TRUE(std::any_of(kCapabilities.begin(), kCapabilities.end(),
