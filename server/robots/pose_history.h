@@ -71,6 +71,7 @@ class PoseHistory {
         if (!archive.Require(block != nullptr && !block->empty(), "a block of a path")) return;
         self.size_ += block->size();
       }
+      archive.Require(self.Grows(), "the stamps of a path");
     }
   }
 
@@ -78,6 +79,7 @@ class PoseHistory {
   static constexpr std::size_t kBlockPoses = 256;
 
   void ThinOlderHalf();
+  [[nodiscard]] bool Grows() const;  // Every stamp is later than the one before it.
 
   const std::size_t max_poses_;
   std::size_t size_ = 0;

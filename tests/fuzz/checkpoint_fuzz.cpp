@@ -163,7 +163,12 @@ std::string SeedOfServer(int scans) {
   server::SessionRecord record(5, server::testing::SampleSession(5).request, {});
   slam::StateWriter writer;
   writer(std::uint32_t{3}, std::uint64_t{kTokenBefore});
-  Must(record.AddSensors({"laser"}) && record.Save(writer), "the account of a session");
+  Must(record.AddSensors({"laser"}), "a session with a sensor");
+  for (std::uint64_t sequence = 1; sequence <= 2; ++sequence) {
+    static_cast<void>(record.ScanReceived(HashName("laser"), sequence));
+    record.ScanUsed(HashName("laser"), {}, static_cast<Stamp>(10 * sequence), true, 1.0);
+  }
+  Must(record.Save(writer), "the account of a session");
   return std::string(1, static_cast<char>(kServer)) + Piece(writer.Bytes()) + StateOf(saved);
 }
 
