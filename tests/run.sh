@@ -11,7 +11,7 @@ set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
-all=(packages format architecture release accuracy demo nodds plain tidy asan tsan)
+all=(packages format architecture release accuracy demo nodds plain tidy asan fuzz tsan)
 full=(systemd)
 stages=()
 studies=()
@@ -137,7 +137,14 @@ stage_plain() {
 stage_asan() {
   configure asan
   build asan
-  run_tests asan -LE study
+  run_tests asan -LE 'study|fuzz'
+}
+
+# Finds what asan built.
+stage_fuzz() {
+  configure asan
+  build asan --target fuzzers
+  run_tests asan -L fuzz
 }
 
 stage_tsan() {

@@ -24,8 +24,8 @@ class Bounds {
     if (size > limit) Refuse(field, std::to_string(size) + " elements, at most " + std::to_string(limit));
     return *this;
   }
-  Bounds& Name(std::string_view field, const std::string& text) { return AtMost(field, text.size(), kMaxNameBytes); }
-  Bounds& Text(std::string_view field, const std::string& text) { return AtMost(field, text.size(), kMaxTextBytes); }
+  Bounds& Name(std::string_view field, const std::string& text) { return Characters(field, text, kMaxNameBytes); }
+  Bounds& Text(std::string_view field, const std::string& text) { return Characters(field, text, kMaxTextBytes); }
   // A received enum may have any 32-bit value, not only those of the IDL.
   template <typename Enum>
   Bounds& Known(std::string_view field, Enum value, Enum last) {
@@ -63,6 +63,11 @@ class Bounds {
   [[nodiscard]] const Result<void>& result() const { return result_; }
 
  private:
+  // A string of the IDL has no zero inside. Fast CDR delivers one that has, and would send only what is before it.
+  Bounds& Characters(std::string_view field, const std::string& text, std::size_t limit) {
+    if (text.find('\0') != std::string::npos) Refuse(field, "has a zero byte inside");
+    return AtMost(field, text.size(), limit);
+  }
   void Refuse(std::string_view field, const std::string& why) {
     if (result_) result_ = Fail(StatusCode::kOutOfRange, std::string(field) + ": " + why);
   }

@@ -1,6 +1,9 @@
 #include "server/robots/pose_history.h"
 
 #include <algorithm>
+#include <functional>
+
+#include "server/slam/scan/stamp_gate.h"
 
 namespace cairn::server {
 
@@ -22,7 +25,8 @@ std::optional<PathPose> PathView::At(Stamp stamp) const {
                                       [](const PathPose& pose, Stamp value) { return pose.stamp < value; });
   if (after->stamp == stamp) return *after;
   const PathPose& before = after == poses.begin() ? (*std::prev(block))->back() : *std::prev(after);
-  const double fraction = static_cast<double>(stamp - before.stamp) / static_cast<double>(after->stamp - before.stamp);
+  const double fraction = static_cast<double>(slam::NanosBetween(before.stamp, stamp)) /
+                          static_cast<double>(slam::NanosBetween(before.stamp, after->stamp));
   const PathPose& worse = before.score < after->score ? before : *after;
   const auto share = static_cast<float>(fraction);
   return PathPose{stamp,
@@ -60,6 +64,22 @@ void PoseHistory::Append(const PathPose& pose) {
 
 PathView PoseHistory::view() const {
   return {full_, std::make_shared<const std::vector<PathPose>>(tail_)};
+}
+
+bool PoseHistory::Grows() const {
+  const auto later = [](const PathPose& a, const PathPose& b) { return a.stamp < b.stamp; };
+  const auto sorted = [&later](const std::vector<PathPose>& poses) {
+    return std::adjacent_find(poses.begin(), poses.end(), std::not_fn(later)) == poses.end();
+  };
+  const PathPose* last = nullptr;
+  const auto goes_on = [&](const std::vector<PathPose>& poses) {
+    if (poses.empty()) return true;
+    if ((last != nullptr && !later(*last, poses.front())) || !sorted(poses)) return false;
+    last = &poses.back();
+    return true;
+  };
+  return std::all_of(full_->begin(), full_->end(), [&](const PathView::Block& block) { return goes_on(*block); }) &&
+         goes_on(tail_);
 }
 
 void PoseHistory::ThinOlderHalf() {

@@ -78,6 +78,7 @@ class PoseHistory {
         self.size_ += block->size();
       }
       self.full_ = std::make_shared<const std::vector<PathView::Block>>(std::move(full));
+      archive.Require(self.Grows(), "the stamps of a path");
     } else {
       archive(*self.full_, self.tail_);
     }
@@ -87,6 +88,7 @@ class PoseHistory {
   static constexpr std::size_t kBlockPoses = 256;
 
   void ThinOlderHalf();
+  [[nodiscard]] bool Grows() const;  // Every stamp is later than the one before it.
 
   const std::size_t max_poses_;
   std::size_t size_ = 0;

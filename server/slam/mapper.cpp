@@ -11,6 +11,7 @@
 #include "server/slam/methods.h"
 #include "server/slam/motion/step_motion.h"
 #include "server/slam/scan/beam_points.h"
+#include "server/slam/scan/stamp_gate.h"
 #include "server/slam/tracking/front_end.h"
 #include "server/slam/trail/trail.h"
 
@@ -131,7 +132,7 @@ void Mapper::State::AddKeyframe(Keyframe keyframe, ScanView view, const TrackSte
 // scan measured.
 StepMotion Mapper::State::MotionTo(const Keyframe& keyframe, const TrackStep& step, const Eigen::Matrix3d& covariance) {
   const Keyframe& last = trail.keyframes().back();
-  const double seconds = SecondsFromStamp(keyframe.scan->stamp - last.scan->stamp);
+  const double seconds = 1e-9 * static_cast<double>(NanosBetween(last.scan->stamp, keyframe.scan->stamp));
   StepMotion motion{trail.FromLast(step.T_track_robot), covariance};
   if (options.front_end.use_odometry) motion.T_prev_curr_odom = Between(last.T_odom_robot, keyframe.T_odom_robot);
   motion.lambda_m = std::abs(speed.Forecast(seconds).x);

@@ -92,6 +92,8 @@ Result<std::string> EnvelopeCodec::Open(const RecordKey& key, std::string_view s
   }
   if (envelope.packing() == kPlain) return std::move(*envelope.mutable_payload());
   if (envelope.packing() != kZstd || envelope.size() > kMaxRecordBytes) return damaged();
+  // Before memory is taken for it: a block of zstd has at least four bytes (RFC 8878, 3.1.1.2).
+  if (envelope.size() / (ZSTD_BLOCKSIZE_MAX / 4) > envelope.payload().size()) return damaged();
   std::string content(envelope.size(), '\0');
   const std::size_t size = ZSTD_decompressDCtx(compressor_->unpack.get(), content.data(), content.size(),
                                                envelope.payload().data(), envelope.payload().size());

@@ -2,6 +2,7 @@
 
 #include <bit>
 #include <cstring>
+#include <limits>
 #include <utility>
 
 #include "common/map/tile.h"
@@ -10,6 +11,8 @@ namespace cairn::server {
 namespace {
 
 constexpr std::size_t kChunkBytes = sizeof(std::int16_t) * static_cast<std::size_t>(kTileArea);
+// The numbers of its cells are of type int.
+constexpr int kFarthestChunk = std::numeric_limits<int>::max() / kTileCells - 1;
 static_assert(std::endian::native == std::endian::little, "cells are stored as they lie in memory");
 
 }  // namespace
@@ -79,7 +82,9 @@ Result<StoredGrid> ValueOf(const record::Grid& from) {
   StoredGrid grid;
   grid.keyframes = from.keyframes();
   for (const record::GridChunk& chunk : from.chunks()) {
-    if (chunk.log_odds().size() != kChunkBytes) return Unreadable("a part of a grid");
+    const auto is_near = [](int place) { return -kFarthestChunk <= place && place <= kFarthestChunk; };
+    if (chunk.log_odds().size() != kChunkBytes || !is_near(chunk.x()) || !is_near(chunk.y()))
+      return Unreadable("a part of a grid");
     auto cells = std::make_shared<std::vector<std::int16_t>>(static_cast<std::size_t>(kTileArea));
     std::memcpy(cells->data(), chunk.log_odds().data(), kChunkBytes);
     const std::int16_t* const first = cells->data();

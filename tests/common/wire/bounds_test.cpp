@@ -11,6 +11,7 @@ namespace cairn::wire {
 namespace {
 
 using ::testing::HasSubstr;
+using namespace std::string_literals;
 
 template <typename Wire>
 void ExpectRefused(const Wire& wire, const std::string& field) {
@@ -26,6 +27,16 @@ TEST(Bounds, RefuseNamesOverTheLimit) {
   v1::SessionRequest request = ToWire(ExtremeSessionRequest());
   request.sensors()[15] += 'x';
   ExpectRefused(request, "sensors");
+}
+
+// Found by a fuzz target: Fast CDR delivers the whole text, and would send only what is before the zero.
+TEST(Bounds, RefuseAZeroInsideAText) {
+  v1::SessionState state = ToWire(ExtremeSessionState());
+  state.site("lab\0oratory"s);
+  ExpectRefused(state, "site");
+  v1::Job job = ToWire(ExtremeJob());
+  job.message("\0"s);
+  ExpectRefused(job, "message");
 }
 
 TEST(Bounds, RefuseTooManySensors) {

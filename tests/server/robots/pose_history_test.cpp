@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
+#include "server/slam/state/archive.h"
+
 namespace cairn::server {
 namespace {
 
@@ -22,6 +26,32 @@ TEST(PoseHistory, InterpolatesBetweenPosesAcrossBlocks) {
   }
   EXPECT_FALSE(view.At(-1));
   EXPECT_FALSE(view.At(1999));
+}
+
+// Stamps are the robot's, and the difference of two may not fit one.
+TEST(PoseHistory, InterpolatesBetweenStampsThatAreFarApart) {
+  PoseHistory history(100);
+  PathPose first = PoseAt(0), last = PoseAt(10);
+  first.stamp = std::numeric_limits<Stamp>::min();
+  last.stamp = std::numeric_limits<Stamp>::max();
+  history.Append(first);
+  history.Append(last);
+  const auto pose = history.view().At(0);
+  ASSERT_TRUE(pose);
+  EXPECT_NEAR(pose->T_map_robot.x, 0.5, 1e-9);
+}
+
+TEST(PoseHistory, StampsThatDoNotGrowAreNotReadFromACheckpoint) {
+  for (const Stamp second : {5, 4}) {
+    slam::StateWriter writer;
+    writer(std::vector<std::shared_ptr<const std::vector<PathPose>>>{},
+           std::vector<PathPose>{PoseAt(4), PoseAt(second)});
+    const std::string bytes = writer.Bytes();
+    slam::StateReader reader(bytes);
+    PoseHistory history(100);
+    reader(history);
+    EXPECT_EQ(reader.ok(), second == 5);
+  }
 }
 
 TEST(PoseHistory, AViewDoesNotChangeAsThePathGrows) {

@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <spdlog/sinks/ringbuffer_sink.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <chrono>
@@ -278,6 +280,24 @@ TEST(Session, AnExceptionEndsItWithAReasonAndNothingElse) {
   healthy.Drive(0, 10);
   EXPECT_TRUE(healthy.WaitSettled(10));
   EXPECT_EQ(healthy.ledger().used, 10U);
+}
+
+// This room was compiled with a logger of its own, which server.log_level did not reach.
+TEST(Session, LogsToTheLoggerOfTheProcess) {
+  const auto kept = std::make_shared<spdlog::sinks::ringbuffer_sink_mt>(8);
+  const auto before = spdlog::default_logger();
+  spdlog::set_default_logger(std::make_shared<spdlog::logger>("test", kept));
+  {
+    OneSession one;
+    one.on_send = [](const OutboundValue& value) {
+      if (std::holds_alternative<PoseReport>(value)) throw std::runtime_error("no memory");
+      return true;
+    };
+    one.Drive(0, 1);
+    EXPECT_TRUE(one.WaitPhase(SessionPhase::kEnded));
+  }
+  spdlog::set_default_logger(before);
+  EXPECT_THAT(kept->last_formatted(), ::testing::Contains(::testing::HasSubstr("no memory")));
 }
 
 // A session that had failed went on taking scans, and each one waited for a turn of the strand only to be dropped

@@ -108,6 +108,10 @@ TEST(Records, ValuesThatNoServerWritesAreRefused) {
   impossible.enabled_version = impossible.next_version;
   EXPECT_FALSE(SiteOf(BytesOf(impossible)));
   EXPECT_FALSE(VersionOf("\xff\xff\xff"));
+  StoredLayer far{6, SampleGrid(1)};
+  EXPECT_TRUE(LayerOf(BytesOf(far)));
+  far.grid.chunks[1].y = std::numeric_limits<int>::min();  // Its cells have no numbers.
+  EXPECT_FALSE(LayerOf(BytesOf(far)));
 }
 
 }  // namespace
