@@ -73,6 +73,9 @@ class SessionRecord {
   void SetAlive(bool alive);
   // Both leave a session that has ended as it is, and say false: whoever asks may have looked before it ended.
   bool SetPhase(SessionPhase phase, Status status);
+  // Notices that nothing arrives of a stream although the robot's client is alive, and that it arrives again. Says
+  // whether this is news; state() and snapshot() show it as `stale`.
+  bool LookForSilence(Clock::time_point now);
   // The robot is back, perhaps as another client process, whose session goes on with this one.
   bool Resume(ClientId client, SessionToken session);
 
@@ -97,8 +100,9 @@ class SessionRecord {
     bool changed = true;
     std::uint64_t settled_when_taken = 0;
     Clock::time_point taken{};
-    bool resuming = false;      // After a restart, until the number after the last one comes.
-    Clock::time_point aside{};  // When the first sample was left aside.
+    Clock::time_point arrived{};  // The last sample, whatever became of it.
+    bool resuming = false;        // After a restart, until the number after the last one comes.
+    Clock::time_point aside{};    // When the first sample was left aside.
   };
   // Both callers hold the lock of `self`, which the analysis can not see.
   template <typename Archive>
@@ -107,6 +111,7 @@ class SessionRecord {
   Ledger NamesOf(NameId sensor_id, const std::string& sensor) const CAIRN_REQUIRES(mutex_);
   static bool IsDue(const Stream& stream, Clock::time_point now, Urgency urgency, Clock::duration period);
   Ledger TakeLedger(Stream& stream, Clock::time_point now) const CAIRN_REQUIRES(mutex_);
+  SessionState StateNow() const CAIRN_REQUIRES(mutex_);
   Ledger LedgerOf(const Stream& stream) const CAIRN_REQUIRES(mutex_);
   Stream* Find(NameId sensor_id) CAIRN_REQUIRES(mutex_);
 
@@ -116,6 +121,8 @@ class SessionRecord {
 
   mutable Mutex mutex_;
   RobotStatus status_ CAIRN_GUARDED_BY(mutex_);           // Its `ledgers` stay empty: they are made on demand.
+  std::string silence_ CAIRN_GUARDED_BY(mutex_);          // What is stale; empty: nothing.
+  Clock::time_point active_ CAIRN_GUARDED_BY(mutex_);     // Since when, where it is active.
   Clock::time_point suspended_ CAIRN_GUARDED_BY(mutex_);  // Since when, where it is suspended.
   std::map<NameId, Stream> streams_ CAIRN_GUARDED_BY(mutex_);
   Stream odometry_ CAIRN_GUARDED_BY(mutex_);
