@@ -72,43 +72,6 @@ RobotClient::~RobotClient() {
   if (last != nullptr) last->subscriptions.clear();
 }
 
-Result<void> RobotClient::Advertise(Wire& wire) {
-  const auto advertise = [&wire](auto& publication) -> Result<void> {
-    using Value = typename std::remove_reference_t<decltype(*publication)>::ValueType;
-    auto made = wire.bus->Advertise<Value>();
-    if (!made) return tl::unexpected(made.error());
-    publication = std::move(*made);
-    return {};
-  };
-  if (auto made = advertise(wire.scans); !made) return made;
-  if (auto made = advertise(wire.odometry); !made) return made;
-  return advertise(wire.session);
-}
-
-// Only the values of the current wire count.
-template <typename Value>
-Result<void> RobotClient::Hear(Wire& wire, void (RobotClient::*on_value)(Value&&), wire::SubscriptionEvents events) {
-  auto subscription = wire.bus->Subscribe<Value>(
-      [this, on_value, number = wire.number](Value&& value) {
-        if (current_ == number) (this->*on_value)(std::move(value));
-      },
-      std::move(events));
-  if (!subscription) return tl::unexpected(subscription.error());
-  wire.subscriptions.push_back(std::move(*subscription));
-  return {};
-}
-
-Result<void> RobotClient::Subscribe(Wire& wire) {
-  wire::SubscriptionEvents events;
-  events.matched = [this, number = wire.number](int servers) {
-    if (current_ == number) OnMatched(servers);
-  };
-  if (auto heard = Hear(wire, &RobotClient::OnSession, std::move(events)); !heard) return heard;
-  if (auto heard = Hear(wire, &RobotClient::OnRefusal); !heard) return heard;
-  if (auto heard = Hear(wire, &RobotClient::OnLedger); !heard) return heard;
-  return Hear(wire, &RobotClient::OnPose);
-}
-
 Result<void> RobotClient::Connect(wire::Bus& bus) {
   const auto wire = std::make_shared<Wire>();
   wire->bus = &bus;
@@ -231,7 +194,7 @@ void RobotClient::OnLedger(Ledger&& ledger) {
     stream.window.OnLedger(ledger);
     if (stream.window.settled_through() != before) progress_ = Clock::now();
     stream.ledger = ledger;
-    if (std::exchange(stream.arrived, ledger.last_sequence) != ledger.last_sequence) stream.moved = Clock::now();
+    Arrived(stream, ledger.last_sequence);
     backlog_.Safe(ledger.sensor_id, state_->durable ? ledger.durable_through : ledger.settled_through);
     changed_.NotifyAll();
   }

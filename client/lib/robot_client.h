@@ -86,9 +86,11 @@ class RobotClient {
     explicit Stream(std::uint64_t size) : window(size) {}
     ScanWindow window;
     std::optional<Ledger> ledger;
-    std::uint64_t sent = 0;                         // The highest number that was put on the wire.
-    std::uint64_t arrived = 0;                      // The highest one that the server says it has received.
-    std::chrono::steady_clock::time_point moved{};  // When `arrived` changed, or had been all that was sent.
+    std::uint64_t sent = 0;                            // The highest number that was put on the wire.
+    std::uint64_t arrived = 0;                         // The highest one that the server says it has received.
+    std::chrono::steady_clock::time_point moved{};     // When `arrived` changed, or had been all that was sent.
+    std::chrono::steady_clock::time_point advanced{};  // When `arrived` changed.
+    bool first = false;                                // The next ledger is the first one since the client joined anew.
   };
   using Clock = std::chrono::steady_clock;
   // What connects the client with the servers of the domain.
@@ -132,6 +134,7 @@ class RobotClient {
   // robot_client_recovery.cpp.
   [[nodiscard]] std::shared_ptr<Wire> CurrentWire() const;
   void Sent(NameId sensor_id, std::uint64_t number) CAIRN_REQUIRES(mutex_);
+  static void Arrived(Stream& stream, std::uint64_t through);
   [[nodiscard]] std::string Silence(Clock::time_point now) CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool Moving() const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool RenewalDue(Clock::time_point now) CAIRN_REQUIRES(mutex_);

@@ -1,6 +1,6 @@
-// The part of RobotClient that notices that a session stands still although a server is there, and joins the domain
-// anew. All that a reader or a writer believes about its peer belongs to the two participants: a new one begins
-// without it.
+// The part of RobotClient that joins the domain, notices that a session stands still although a server is there, and
+// joins the domain anew. All that a reader or a writer believes about its peer belongs to the two participants: a new
+// one begins without it.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -23,6 +23,43 @@ constexpr std::chrono::milliseconds kResendPause{500};  // While stale: what was
 
 }  // namespace
 
+Result<void> RobotClient::Advertise(Wire& wire) {
+  const auto advertise = [&wire](auto& publication) -> Result<void> {
+    using Value = typename std::remove_reference_t<decltype(*publication)>::ValueType;
+    auto made = wire.bus->Advertise<Value>();
+    if (!made) return tl::unexpected(made.error());
+    publication = std::move(*made);
+    return {};
+  };
+  if (auto made = advertise(wire.scans); !made) return made;
+  if (auto made = advertise(wire.odometry); !made) return made;
+  return advertise(wire.session);
+}
+
+// Only the values of the current wire count.
+template <typename Value>
+Result<void> RobotClient::Hear(Wire& wire, void (RobotClient::*on_value)(Value&&), wire::SubscriptionEvents events) {
+  auto subscription = wire.bus->Subscribe<Value>(
+      [this, on_value, number = wire.number](Value&& value) {
+        if (current_ == number) (this->*on_value)(std::move(value));
+      },
+      std::move(events));
+  if (!subscription) return tl::unexpected(subscription.error());
+  wire.subscriptions.push_back(std::move(*subscription));
+  return {};
+}
+
+Result<void> RobotClient::Subscribe(Wire& wire) {
+  wire::SubscriptionEvents events;
+  events.matched = [this, number = wire.number](int servers) {
+    if (current_ == number) OnMatched(servers);
+  };
+  if (auto heard = Hear(wire, &RobotClient::OnSession, std::move(events)); !heard) return heard;
+  if (auto heard = Hear(wire, &RobotClient::OnRefusal); !heard) return heard;
+  if (auto heard = Hear(wire, &RobotClient::OnLedger); !heard) return heard;
+  return Hear(wire, &RobotClient::OnPose);
+}
+
 std::shared_ptr<RobotClient::Wire> RobotClient::CurrentWire() const {
   const MutexLock lock(mutex_);
   return wire_;
@@ -38,6 +75,12 @@ void RobotClient::Sent(NameId sensor_id, std::uint64_t number) {
   Stream& stream = streams_.find(sensor_id)->second;
   if (stream.sent <= stream.arrived) stream.moved = now;
   stream.sent = std::max(stream.sent, number);
+}
+
+void RobotClient::Arrived(Stream& stream, std::uint64_t through) {
+  const bool news = std::exchange(stream.arrived, through) != through;
+  if (std::exchange(stream.first, false) || !news) return;
+  stream.moved = stream.advanced = Clock::now();
 }
 
 // Why the session stands still; empty where it does not.
@@ -64,11 +107,11 @@ std::string RobotClient::Silence(Clock::time_point now) {
 bool RobotClient::Moving() const {
   if (!Answered() || state_->stale) return false;
   const auto moves = [&](const auto& entry)
-                         CAIRN_NO_THREAD_SAFETY_ANALYSIS { return entry.second.moved > renewed_at_; };
+                         CAIRN_NO_THREAD_SAFETY_ANALYSIS { return entry.second.advanced > renewed_at_; };
   if (backlog_.unsent() > 0 && std::none_of(streams_.begin(), streams_.end(), moves)) return false;
   return std::all_of(streams_.begin(), streams_.end(), [&](const auto& entry) CAIRN_NO_THREAD_SAFETY_ANALYSIS {
     const Stream& stream = entry.second;
-    return stream.sent <= stream.arrived || (stream.arrived > 0 && stream.moved > renewed_at_);
+    return stream.sent <= stream.arrived || stream.advanced > renewed_at_;
   });
 }
 
@@ -94,6 +137,7 @@ void RobotClient::StartOver(Clock::time_point now) {
   for (auto& [sensor_id, stream] : streams_) {
     stream.sent = stream.arrived = 0;
     stream.moved = now;
+    stream.first = true;
   }
 }
 
