@@ -13,6 +13,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+constexpr std::chrono::seconds kFirstPatience{2};  // For the first part of an answer; then the question is repeated.
+
 // The answer's only element, which a server that says OK must give.
 template <typename T>
 Result<T> Only(std::vector<T>&& list, const char* what) {
@@ -122,10 +124,14 @@ void QueryClient::OnReply(Reply&& part) {
 
 Result<Reply> QueryClient::Ask(const Request& request) {
   const Deadline deadline = DeadlineAfter(options_.timeout_s);
-  if (auto greeted = Greet(deadline); !greeted) return tl::unexpected(greeted.error());
-  Result<Reply> reply = AskOnce(request, deadline);
-  if (reply && !reply->status.ok()) return tl::unexpected(reply->status);
-  return reply;
+  const bool repeatable = request.kind != RequestKind::kJobSubmit;
+  for (Clock::duration patience = kFirstPatience;; patience *= 2) {
+    if (auto greeted = Greet(deadline); !greeted) return tl::unexpected(greeted.error());
+    const Deadline begun = repeatable ? std::min(deadline, Clock::now() + patience) : deadline;
+    Result<Reply> reply = AskOnce(request, begun, deadline);
+    if (reply && !reply->status.ok()) return tl::unexpected(reply->status);
+    if (reply || reply.error().code != StatusCode::kDeadlineExceeded || Clock::now() >= deadline) return reply;
+  }
 }
 
 // DDS matches the topic of requests and the topic of replies one after the other, on both sides. Until all four ends
@@ -144,7 +150,8 @@ Result<void> QueryClient::Greet(Deadline deadline) {
         changed_.WaitFor(mutex_, std::chrono::milliseconds(5));
       }
     }
-    const Result<Reply> pong = AskOnce(MakeRequest(RequestKind::kPing), std::min(deadline, Clock::now() + kPatience));
+    const Deadline soon = std::min(deadline, Clock::now() + kPatience);
+    const Result<Reply> pong = AskOnce(MakeRequest(RequestKind::kPing), soon, soon);
     if (!pong) RenewIfDeaf(began);
     const MutexLock lock(mutex_);
     if (pong) {
@@ -156,7 +163,7 @@ Result<void> QueryClient::Greet(Deadline deadline) {
   }
 }
 
-Result<Reply> QueryClient::AskOnce(Request request, Deadline deadline) {
+Result<Reply> QueryClient::AskOnce(Request request, Deadline begun, Deadline deadline) {
   request.client = id_;
   {
     const MutexLock lock(mutex_);
@@ -166,7 +173,8 @@ Result<Reply> QueryClient::AskOnce(Request request, Deadline deadline) {
   const Result<void> published = CurrentWire()->requests->Publish(request);
   const MutexLock lock(mutex_);
   const auto pending = pending_.find(request.sequence);
-  while (published && !pending->second.complete() && Clock::now() < deadline) changed_.WaitUntil(mutex_, deadline);
+  const auto until = [&] { return pending->second.parts() > 0 ? deadline : begun; };
+  while (published && !pending->second.complete() && Clock::now() < until()) changed_.WaitUntil(mutex_, until());
   auto node = pending_.extract(pending);
   if (!published) return tl::unexpected(published.error());
   if (node.mapped().complete()) return node.mapped().Take();

@@ -1,9 +1,10 @@
 // Asks the server and waits for the whole answer. There is one method per question. Each returns the answer, or the
 // server's error (its code and message), or why there is no answer: kUnavailable where no server was found, and
 // kDeadlineExceeded where the answer was late. The time needed to find the server counts towards the timeout.
-// After a question without an answer, the next one first waits for an answered ping. Where none is answered for a
-// second although a server is there, the client joins the domain anew: forged messages may have made it deaf
-// (RobotClient). Thread rule: any number of threads may ask at once, and each waits for its own answer. Do not ask from
+// A question without an answer is asked again within the timeout, except one that starts a job, after an answered ping.
+// Where no ping is answered for a second although a server is there, the client joins the domain anew: forged messages
+// may have made it deaf (RobotClient).
+// Thread rule: any number of threads may ask at once, and each waits for its own answer. Do not ask from
 // a callback of the wire: the answer arrives on the thread that the callback would block.
 #pragma once
 
@@ -108,7 +109,8 @@ class QueryClient {
   [[nodiscard]] Result<void> Greet(Deadline deadline);
   [[nodiscard]] Result<Reply> Ask(const Request& request);
   [[nodiscard]] Result<Job> AskForJob(const Request& request);
-  [[nodiscard]] Result<Reply> AskOnce(Request request, Deadline deadline);
+  // `begun`: until when the first part must be here.
+  [[nodiscard]] Result<Reply> AskOnce(Request request, Deadline begun, Deadline deadline);
 
   wire::Bus& bus_;
   const QueryClientOptions options_;

@@ -172,9 +172,15 @@ TEST_F(Hostile, AStreamThatIsDeafIsStaleAndFlowsAgainWithinFiveSeconds) {
   const auto observer_bus = MakeBus("observer");
   const auto observer = Must(observer_bus->Subscribe<SessionState>(states.Sink()));
   const auto said = [](const SessionState& state) { return state.stale && !state.status.ok(); };
-  for (const auto& robot : robots_) {
-    EXPECT_TRUE(Eventually([&] { return said(robot->client().session()); }, milliseconds(2500)));
-  }
+  std::set<const StreamingRobot*> saying;
+  EXPECT_TRUE(Eventually(
+      [&] {
+        for (const auto& robot : robots_) {
+          if (said(robot->client().session())) saying.insert(robot.get());
+        }
+        return saying.size() == robots_.size();
+      },
+      milliseconds(2500)));
   EXPECT_TRUE(Eventually([&] { return AllFlow(milliseconds(500)); }, milliseconds(5000)));
   EXPECT_LT(std::chrono::steady_clock::now() - end, seconds(5));
   EXPECT_TRUE(Eventually([&] {
