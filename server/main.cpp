@@ -192,6 +192,7 @@ int Serve(const CairndOptions& options, const std::filesystem::path& state) {
   server.Stop();
   (*egress)->Finish();
   const int exit_code = kept->journal == nullptr ? 0 : StopJournal(*kept->journal);
+  spdlog::info("datagrams refused by reason: {}", (*bus)->refused_by_reason());
   spdlog::info("stopped; messages lost between DDS and the server since the start: {}", TextOf(LossesOf(watched)));
   return exit_code;
 }

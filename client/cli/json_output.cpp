@@ -60,10 +60,14 @@ void to_json(nlohmann::json& json, const Ledger& ledger) {
 }
 
 void to_json(nlohmann::json& json, const RobotStatus& robot) {
-  json = {
-      {"robot", robot.session.robot},   {"site", robot.session.site}, {"phase", SessionPhaseName(robot.session.phase)},
-      {"status", robot.session.status}, {"alive", robot.alive},       {"pose", robot.pose},
-      {"ledgers", robot.ledgers}};
+  json = {{"robot", robot.session.robot},
+          {"site", robot.session.site},
+          {"phase", SessionPhaseName(robot.session.phase)},
+          {"stale", robot.session.stale},
+          {"status", robot.session.status},
+          {"alive", robot.alive},
+          {"pose", robot.pose},
+          {"ledgers", robot.ledgers}};
 }
 
 void to_json(nlohmann::json& json, const MapVersionInfo& version) {

@@ -61,6 +61,9 @@ Result<LogSummary> StreamLog(Program& program, const ReplayArguments& arguments,
 // The effects of a server that was not reachable for a while.
 std::string FormatInterruptions(const RobotStream& stream) {
   std::string text;
+  if (stream.renewed() > 0) {
+    text += fmt::format("the stream stood still and was made anew {} times\n", stream.renewed());
+  }
   if (stream.restarted() > 0) {
     text += fmt::format("the server lost the session {} times; a new session continued at the robot's pose\n",
                         stream.restarted());
@@ -109,6 +112,7 @@ ExitCode Replay(Program& program, const ReplayArguments& arguments) {
                  {"site", options.site},
                  {"seconds", seconds},
                  {"restarted", (*stream)->restarted()},
+                 {"renewed", (*stream)->renewed()},
                  {"displaced", (*stream)->displaced()},
                  {"complaint_count", survey->complaint_count}});
   if (latency.count() > 0) {

@@ -49,6 +49,7 @@ class RobotStream {
   [[nodiscard]] ScanAccount account() const;
   // New sessions that a server which had lost the one before made necessary.
   [[nodiscard]] int restarted() const;
+  [[nodiscard]] int renewed() const { return client_->renewed(); }  // Times it joined the domain anew.
   [[nodiscard]] std::uint64_t displaced() const { return client_->displaced(); }
   [[nodiscard]] std::string spill_error() const { return client_->spill_error(); }
   // Publication to pose, milliseconds.

@@ -1,14 +1,18 @@
 // Follows the map of one site: a TileMirror kept up to date by the wire. Gets the whole current map on joining, then
-// what changes. Thread rule: every method from any thread; `on_change` runs on the wire's threads, may call the
-// methods, and must return soon.
+// what changes. After two silent seconds it asks the server for the map's version: where the mirror is behind it and
+// stays so, forged messages have made it deaf or wrong, and it joins the domain anew (RobotClient). Thread rule: every
+// method from any thread; `on_change` runs on the wire's threads, may call the methods, and must return soon.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
+#include "client/lib/query_client.h"
 #include "client/lib/tile_mirror.h"
 #include "common/mutex.h"
 #include "common/wire/bus.h"
@@ -31,20 +35,36 @@ class MapClient {
   [[nodiscard]] std::optional<MapInfo> info() const;
   [[nodiscard]] std::uint32_t epoch() const;
   [[nodiscard]] std::uint64_t version() const;
+  [[nodiscard]] int renewed() const;  // Times it joined anew.
 
  private:
+  using Clock = std::chrono::steady_clock;
+  struct Wire {
+    std::unique_ptr<wire::Bus> own;  // Null for the first, which uses the caller's.
+    std::unique_ptr<wire::Subscription> map;
+    std::unique_ptr<wire::Subscription> tiles;
+  };
+
   MapClient(wire::Bus& bus, const std::string& site, std::function<void()> on_change);
   template <typename Value>
-  void Apply(Value&& value);
+  void Apply(int number, Value&& value);
+  [[nodiscard]] Result<std::unique_ptr<Wire>> Connect(wire::Bus& bus, int number);
+  void Watch();
+  [[nodiscard]] bool Behind(const MapInfo& asked) const CAIRN_REQUIRES(mutex_);
+  void Renew();
 
-  const wire::Bus& bus_;
+  wire::Bus& bus_;
   const std::string site_;
   const std::function<void()> on_change_;
   mutable Mutex mutex_;
   CondVar changed_;
-  TileMirror mirror_ CAIRN_GUARDED_BY(mutex_);
-  std::unique_ptr<wire::Subscription> map_;
-  std::unique_ptr<wire::Subscription> tiles_;
+  std::optional<TileMirror> mirror_ CAIRN_GUARDED_BY(mutex_);
+  Clock::time_point heard_ CAIRN_GUARDED_BY(mutex_);  // Last value of the site.
+  int number_ CAIRN_GUARDED_BY(mutex_) = 0;           // Of the wire whose values count.
+  bool stopping_ CAIRN_GUARDED_BY(mutex_) = false;
+  std::unique_ptr<QueryClient> queries_;  // The watcher's, from the first silence on.
+  std::unique_ptr<Wire> wire_ CAIRN_GUARDED_BY(mutex_);
+  std::thread watcher_;
 };
 
 }  // namespace cairn::client

@@ -13,6 +13,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+constexpr std::chrono::seconds kFirstPatience{2};  // For the first part of an answer; then the question is repeated.
+
 // The answer's only element, which a server that says OK must give.
 template <typename T>
 Result<T> Only(std::vector<T>&& list, const char* what) {
@@ -51,28 +53,69 @@ Request AboutJob(RequestKind kind, std::uint64_t id) {
 QueryClient::QueryClient(wire::Bus& bus, const QueryClientOptions& options)
     : bus_(bus), options_(options), id_(NewClientId()) {}
 
-QueryClient::~QueryClient() = default;
+QueryClient::~QueryClient() {
+  const std::shared_ptr<Wire> last = CurrentWire();
+  if (last != nullptr) last->replies.reset();
+}
 
 Result<std::unique_ptr<QueryClient>> QueryClient::Create(wire::Bus& bus, const QueryClientOptions& options) {
   std::unique_ptr<QueryClient> client(new QueryClient(bus, options));
+  auto wire = client->Connect(bus);
+  if (!wire) return tl::unexpected(wire.error());
+  const MutexLock lock(client->mutex_);
+  client->wire_ = std::move(*wire);
+  return client;
+}
+
+Result<std::shared_ptr<QueryClient::Wire>> QueryClient::Connect(wire::Bus& bus) {
+  auto wire = std::make_shared<Wire>();
   wire::SubscriptionEvents events;
-  events.matched = [self = client.get()](int matched) {
-    const MutexLock lock(self->mutex_);
-    if (matched == 0) self->server_found_ = false;
-    self->changed_.NotifyAll();
+  events.matched = [this](int matched) {
+    const MutexLock lock(mutex_);
+    if (matched == 0) server_found_ = false;
+    changed_.NotifyAll();
   };
   auto replies = bus.SubscribeReplies(
-      client->id_, [self = client.get()](Reply&& part) { self->OnReply(std::move(part)); }, std::move(events));
+      id_, [this](Reply&& part) { OnReply(std::move(part)); }, std::move(events));
   if (!replies) return tl::unexpected(replies.error());
-  client->replies_ = std::move(*replies);
+  wire->replies = std::move(*replies);
   auto requests = bus.Advertise<Request>();
   if (!requests) return tl::unexpected(requests.error());
-  client->requests_ = std::move(*requests);
-  return client;
+  wire->requests = std::move(*requests);
+  return wire;
+}
+
+std::shared_ptr<QueryClient::Wire> QueryClient::CurrentWire() {
+  const MutexLock lock(mutex_);
+  return wire_;
+}
+
+// `began`: since when pings have not been answered.
+void QueryClient::RenewIfDeaf(Deadline began) {
+  constexpr std::chrono::seconds kPatience{1};
+  constexpr std::chrono::seconds kLongestPause{60};  // A server may be silent for another reason.
+  {
+    const MutexLock lock(mutex_);
+    const auto now = Clock::now();
+    if (now - std::max(began, heard_) < kPatience || now - renewed_ < renewal_pause_) return;
+    renewed_ = now;
+    renewal_pause_ = std::min(2 * renewal_pause_, kLongestPause);
+  }
+  auto bus = wire::Bus::Create(bus_.options(), "questions");
+  if (!bus) return;
+  auto wire = Connect(**bus);
+  if (!wire) return;
+  (*wire)->own = std::move(*bus);
+  std::shared_ptr<Wire> before;  // Its callbacks take the mutex: it goes when the lock is released.
+  {
+    const MutexLock lock(mutex_);
+    before = std::exchange(wire_, std::move(*wire));
+  }
 }
 
 void QueryClient::OnReply(Reply&& part) {
   const MutexLock lock(mutex_);
+  heard_ = Clock::now();
   const auto pending = pending_.find(part.sequence);
   if (pending == pending_.end()) return;  // The caller has stopped waiting.
   pending->second.Add(std::move(part));
@@ -81,10 +124,14 @@ void QueryClient::OnReply(Reply&& part) {
 
 Result<Reply> QueryClient::Ask(const Request& request) {
   const Deadline deadline = DeadlineAfter(options_.timeout_s);
-  if (auto found = WaitForServer(deadline); !found) return tl::unexpected(found.error());
-  Result<Reply> reply = AskOnce(request, deadline);
-  if (reply && !reply->status.ok()) return tl::unexpected(reply->status);
-  return reply;
+  const bool repeatable = request.kind != RequestKind::kJobSubmit;
+  for (Clock::duration patience = kFirstPatience;; patience *= 2) {
+    if (auto found = WaitForServer(deadline); !found) return tl::unexpected(found.error());
+    const Deadline begun = repeatable ? std::min(deadline, Clock::now() + patience) : deadline;
+    Result<Reply> reply = AskOnce(request, begun, deadline);
+    if (reply && !reply->status.ok()) return tl::unexpected(reply->status);
+    if (reply || reply.error().code != StatusCode::kDeadlineExceeded || Clock::now() >= deadline) return reply;
+  }
 }
 
 // DDS matches the topic of requests and the topic of replies one after the other, on both sides. Until all four ends
@@ -92,39 +139,46 @@ Result<Reply> QueryClient::Ask(const Request& request) {
 // while a question that starts a job may not.
 Result<void> QueryClient::WaitForServer(Deadline deadline) {
   constexpr std::chrono::milliseconds kPatience{100};
+  Deadline began = Clock::now();
   for (;;) {
     {
       const MutexLock lock(mutex_);
       if (server_found_) return {};
-      while (requests_->matched() == 0 || replies_->matched() == 0) {
+      while (wire_->requests->matched() == 0 || wire_->replies->matched() == 0) {
+        began = Clock::now();
         if (Clock::now() >= deadline) return Fail(StatusCode::kUnavailable, NoServer(bus_, options_.timeout_s));
         changed_.WaitFor(mutex_, std::chrono::milliseconds(5));
       }
     }
-    const Result<Reply> pong = AskOnce(MakeRequest(RequestKind::kPing), std::min(deadline, Clock::now() + kPatience));
+    const Deadline soon = std::min(deadline, Clock::now() + kPatience);
+    const Result<Reply> pong = AskOnce(MakeRequest(RequestKind::kPing), soon, soon);
+    if (!pong) RenewIfDeaf(began);
     const MutexLock lock(mutex_);
     if (pong) {
       server_found_ = true;
+      renewal_pause_ = std::chrono::seconds(1);
       return {};
     }
     if (Clock::now() >= deadline) return Fail(StatusCode::kUnavailable, NoServer(bus_, options_.timeout_s));
   }
 }
 
-Result<Reply> QueryClient::AskOnce(Request request, Deadline deadline) {
+Result<Reply> QueryClient::AskOnce(Request request, Deadline begun, Deadline deadline) {
   request.client = id_;
   {
     const MutexLock lock(mutex_);
     request.sequence = ++sequence_;
     pending_.try_emplace(request.sequence);
   }
-  const Result<void> published = requests_->Publish(request);
+  const Result<void> published = CurrentWire()->requests->Publish(request);
   const MutexLock lock(mutex_);
   const auto pending = pending_.find(request.sequence);
-  while (published && !pending->second.complete() && Clock::now() < deadline) changed_.WaitUntil(mutex_, deadline);
+  const auto until = [&] { return pending->second.parts() > 0 ? deadline : begun; };
+  while (published && !pending->second.complete() && Clock::now() < until()) changed_.WaitUntil(mutex_, until());
   auto node = pending_.extract(pending);
   if (!published) return tl::unexpected(published.error());
   if (node.mapped().complete()) return node.mapped().Take();
+  server_found_ = false;
   return Fail(StatusCode::kDeadlineExceeded,
               fmt::format("no {}answer to {} within {:.1f} s", node.mapped().parts() > 0 ? "complete " : "",
                           RequestKindName(request.kind), options_.timeout_s));

@@ -1,6 +1,9 @@
 // Asks the server and waits for the whole answer. There is one method per question. Each returns the answer, or the
 // server's error (its code and message), or why there is no answer: kUnavailable where no server was found, and
 // kDeadlineExceeded if the answer was late. The time needed to find the server counts towards the timeout.
+// A question without an answer is asked again within the timeout, except one that starts a job, after an answered ping.
+// If no ping is answered for a second although a server is there, the client joins the domain again: forged messages
+// may have made it deaf (RobotClient).
 // Thread rule: any number of threads may ask at once, and each waits for its own answer. Do not ask from a callback of
 // the wire: the answer arrives on the thread that the callback would block.
 #pragma once
@@ -95,12 +98,21 @@ class QueryClient {
  private:
   QueryClient(wire::Bus& bus, const QueryClientOptions& options);
   void OnReply(Reply&& part);
+  struct Wire {
+    std::unique_ptr<wire::Bus> own;  // Null for the first, which uses the caller's.
+    std::unique_ptr<wire::Publication<Request>> requests;
+    std::unique_ptr<wire::Subscription> replies;
+  };
+  [[nodiscard]] Result<std::shared_ptr<Wire>> Connect(wire::Bus& bus);
+  [[nodiscard]] std::shared_ptr<Wire> CurrentWire();
+  void RenewIfDeaf(Deadline began);
   [[nodiscard]] Result<void> WaitForServer(Deadline deadline);
   [[nodiscard]] Result<Reply> Ask(const Request& request);
   [[nodiscard]] Result<Job> AskForJob(const Request& request);
-  [[nodiscard]] Result<Reply> AskOnce(Request request, Deadline deadline);
+  // `begun`: until when the first part must be here.
+  [[nodiscard]] Result<Reply> AskOnce(Request request, Deadline begun, Deadline deadline);
 
-  const wire::Bus& bus_;
+  wire::Bus& bus_;
   const QueryClientOptions options_;
   const ClientId id_;
 
@@ -109,9 +121,10 @@ class QueryClient {
   bool server_found_ CAIRN_GUARDED_BY(mutex_) = false;
   std::int64_t sequence_ CAIRN_GUARDED_BY(mutex_) = 0;
   std::map<std::int64_t, ReplyAssembly> pending_ CAIRN_GUARDED_BY(mutex_);  // By sequence; what callers wait for.
-
-  std::unique_ptr<wire::Publication<Request>> requests_;
-  std::unique_ptr<wire::Subscription> replies_;  // Last: its callbacks use everything above.
+  Deadline heard_ CAIRN_GUARDED_BY(mutex_);                                 // Last answer, however late.
+  Deadline renewed_ CAIRN_GUARDED_BY(mutex_);                               // Last time it joined anew, or began to,
+  std::chrono::seconds renewal_pause_ CAIRN_GUARDED_BY(mutex_){1};          // and how long until it may again.
+  std::shared_ptr<Wire> wire_ CAIRN_GUARDED_BY(mutex_);                     // Last: its callbacks use everything above.
 };
 
 }  // namespace cairn::client

@@ -12,7 +12,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::seconds kAskPeriod{1};  // Between two requests without an answer.
+constexpr std::chrono::seconds kAskPeriod{1};               // Between two requests without an answer.
+constexpr std::chrono::milliseconds kUrgentAskPeriod{300};  // The same while the session is stale.
 // How long a new session waits for odometry after its first scan, which tells exactly where the robot was.
 constexpr std::chrono::milliseconds kOdometryPatience{500};
 
@@ -30,7 +31,10 @@ RobotClient::RobotClient(SessionRequest request, Callbacks callbacks, const Robo
       options_(options),
       request_(std::move(request)),
       backlog_(options.max_kept_bytes),
-      progress_(Clock::now()) {
+      progress_(Clock::now()),
+      answered_at_(progress_),
+      connected_at_(progress_),
+      renewal_pause_(0) {
   const MutexLock lock(mutex_);
   request_.client = client_;
   request_.session = NewClientId();
@@ -56,43 +60,28 @@ Result<std::unique_ptr<RobotClient>> RobotClient::Open(wire::Bus& bus, SessionRe
 }
 
 RobotClient::~RobotClient() {
+  std::shared_ptr<Wire> last;  // Its callbacks take the mutex.
   {
     const MutexLock lock(mutex_);
     stopping_ = true;
+    last = wire_;
     changed_.NotifyAll();
   }
   if (watcher_.joinable()) watcher_.join();
-  subscriptions_.clear();
+  retired_.clear();
+  if (last != nullptr) last->subscriptions.clear();
 }
 
 Result<void> RobotClient::Connect(wire::Bus& bus) {
-  const auto keep = [this](auto subscription) -> Result<void> {
-    if (!subscription) return tl::unexpected(subscription.error());
-    subscriptions_.push_back(std::move(*subscription));
-    return {};
-  };
-  const auto advertise = [&bus](auto& publication) -> Result<void> {
-    using Value = typename std::remove_reference_t<decltype(*publication)>::ValueType;
-    auto made = bus.Advertise<Value>();
-    if (!made) return tl::unexpected(made.error());
-    publication = std::move(*made);
-    return {};
-  };
-  if (auto made = advertise(scans_); !made) return made;
-  if (auto made = advertise(odometry_); !made) return made;
-  if (auto made = advertise(session_); !made) return made;
+  const auto wire = std::make_shared<Wire>();
+  wire->bus = &bus;
+  if (auto advertised = Advertise(*wire); !advertised) return advertised;
+  {
+    const MutexLock lock(mutex_);
+    wire_ = wire;
+  }
   // Subscriptions before the request, so that no answer is missed.
-  wire::SubscriptionEvents events;
-  events.matched = [this](int servers) { OnMatched(servers); };
-  if (auto kept = keep(bus.Subscribe<SessionState>([this](SessionState&& s) { OnSession(std::move(s)); }, events));
-      !kept) {
-    return kept;
-  }
-  if (auto kept = keep(bus.Subscribe<SessionRefusal>([this](SessionRefusal&& r) { OnRefusal(std::move(r)); })); !kept) {
-    return kept;
-  }
-  if (auto kept = keep(bus.Subscribe<Ledger>([this](Ledger&& l) { OnLedger(std::move(l)); })); !kept) return kept;
-  if (auto kept = keep(bus.Subscribe<PoseReport>([this](PoseReport&& p) { OnPose(std::move(p)); })); !kept) return kept;
+  if (auto subscribed = Subscribe(*wire); !subscribed) return subscribed;
   Ask();  // The middleware keeps the request for a server that starts later.
   return {};
 }
@@ -118,12 +107,14 @@ Result<void> RobotClient::AwaitSession(const wire::Bus& bus, double timeout_s) {
 // Publishes the request as it is now.
 void RobotClient::Ask() {
   SessionRequest request;
+  std::shared_ptr<Wire> wire;
   {
     const MutexLock lock(mutex_);
     request = request_;
     asked_ = Clock::now();
+    wire = wire_;
   }
-  static_cast<void>(session_->Publish(request));  // If it is not accepted, Watch asks again.
+  static_cast<void>(wire->session->Publish(request));  // If it is not accepted, Watch asks again.
 }
 
 bool RobotClient::Answered() const {
@@ -131,8 +122,8 @@ bool RobotClient::Answered() const {
 }
 
 bool RobotClient::Streaming() const {
-  return Answered() && !over_ && !reopening_ && state_->phase == SessionPhase::kActive && scans_->matched() > 0 &&
-         odometry_->matched() > 0;
+  return Answered() && !over_ && !reopening_ && state_->phase == SessionPhase::kActive && wire_->scans->matched() > 0 &&
+         wire_->odometry->matched() > 0;
 }
 
 void RobotClient::OnMatched(int servers) {
@@ -162,6 +153,7 @@ void RobotClient::OnSession(SessionState&& state) {
       backlog_.Rewind();
       progress_ = Clock::now();
     }
+    if (state.stale && !(state_ && state_->stale)) called_stale_ = Clock::now();
     state_ = state;
     answered_ = true;
     changed_.NotifyAll();
@@ -176,6 +168,7 @@ void RobotClient::OnRefusal(SessionRefusal&& refusal) {
     const MutexLock lock(mutex_);
     if (state.generation < generation_ || state.session != request_.session) return;
     generation_ = state.generation;
+    answered_at_ = Clock::now();
     if (state_ && IsTemporary(state.status.code)) return;
     if (request_.started && !request_.end && state.status.code == StatusCode::kFailedPrecondition) {
       if (!std::exchange(reopening_, true)) refused_ = Clock::now();
@@ -201,6 +194,7 @@ void RobotClient::OnLedger(Ledger&& ledger) {
     stream.window.OnLedger(ledger);
     if (stream.window.settled_through() != before) progress_ = Clock::now();
     stream.ledger = ledger;
+    Arrived(stream, ledger.last_sequence);
     backlog_.Safe(ledger.sensor_id, state_->durable ? ledger.durable_through : ledger.settled_through);
     changed_.NotifyAll();
   }
@@ -279,8 +273,10 @@ void RobotClient::Watch() {
       }
       reopen = reopening_ && ReadyToReopen();
       const bool over = over_ || state_->phase == SessionPhase::kEnded || reopening_;
-      ask = ask || (!Answered() && !over && session_->matched() > 0 && now - asked_ >= kAskPeriod);
+      const auto period = stale_.empty() ? std::chrono::milliseconds(kAskPeriod) : kUrgentAskPeriod;
+      ask = ask || (!Answered() && !over && wire_->session->matched() > 0 && now - asked_ >= period);
     }
+    Recover();
     if (reopen) Reopen();
     if (ask) Ask();
     Pump();
@@ -322,6 +318,7 @@ void RobotClient::Reopen() {
     sent_before_ = backlog_.size() - backlog_.unsent();
     const std::map<NameId, std::uint64_t> highest = backlog_.MoveTo(session);
     for (auto& [sensor_id, stream] : streams_) {
+      stream.sent = stream.arrived = 0;
       const auto sent = highest.find(sensor_id);
       stream.window.Restart(sent == highest.end() ? 0 : sent->second);
     }
@@ -337,6 +334,8 @@ SessionState RobotClient::session() const {
   const MutexLock lock(mutex_);
   SessionState state = *state_;
   state.session = request_.session;
+  state.stale = state.stale || !stale_.empty();
+  if (!stale_.empty()) state.status = {StatusCode::kUnavailable, "stale: " + stale_};
   if (over_) {
     state.phase = SessionPhase::kRefused;
     state.status = *over_;

@@ -4,9 +4,14 @@
 // not sent again.
 // If the server does not know the session (for example because it was started again without its state), the client
 // opens a new session by itself. This begins at the robot's present pose, and the samples that were not safe are sent
-// again in it. Thread rule: every method from any thread; callbacks run on threads of the wire or of the client and
-// must return soon. If the client is destroyed without End, the session is suspended, and another client of the same
-// robot can continue it.
+// again in it.
+// If what the client sends does not arrive for two seconds although a server is there, or nothing is received from that
+// server, the session is `stale`: damaged or forged messages can make a reader or a writer ignore its peer for good.
+// The client then joins the domain again, as another participant, and continues the same session; what had arrived is
+// not counted twice. An overloaded server does not make a session stale: its ledger says what has arrived, and it
+// answers requests, however late it settles scans. Thread rule: every method from any thread; callbacks run on threads
+// of the wire or of the client and must return soon. If the client is destroyed without End, the session is suspended,
+// and another client of the same robot can continue it.
 #pragma once
 
 #include <atomic>
@@ -43,8 +48,9 @@ class RobotClient {
     std::function<void(SessionToken session, const Pose2& T_map_robot_start)> restarted;
   };
 
-  // Draws a client id and a session, and repeats the request until the server answers. If the server refuses, its
-  // reason is the error. kUnavailable: no server answers. `request.sensors` names at least one stream.
+  // `bus` must outlive the client. Draws a client id and a session, and repeats the request until the server answers.
+  // If the server refuses, its reason is the error. kUnavailable: no server answers. `request.sensors` names at least
+  // one stream.
   [[nodiscard]] static Result<std::unique_ptr<RobotClient>> Open(wire::Bus& bus, SessionRequest request,
                                                                  double timeout_s, Callbacks callbacks = {},
                                                                  const RobotClientOptions& options = {});
@@ -64,13 +70,15 @@ class RobotClient {
   [[nodiscard]] Result<void> End(double timeout_s = 2.0);
 
   [[nodiscard]] ClientId id() const { return client_; }
+  // `stale` and the reason in `status` where the session stands still; see above.
   [[nodiscard]] SessionState session() const;
-  [[nodiscard]] bool connected() const { return scans_->matched() > 0; }  // Whether a server listens right now.
+  [[nodiscard]] bool connected() const;  // Whether a server listens right now.
   [[nodiscard]] std::optional<PoseReport> pose() const;
   [[nodiscard]] std::optional<Ledger> ledger() const;  // The ledger of the first sensor.
   [[nodiscard]] std::optional<Ledger> ledger(const std::string& sensor) const;
   [[nodiscard]] std::uint64_t resent() const { return resent_.load(std::memory_order_relaxed); }
   [[nodiscard]] int restarted() const { return restarted_.load(std::memory_order_relaxed); }  // New sessions opened.
+  [[nodiscard]] int renewed() const { return renewed_.load(std::memory_order_relaxed); }      // Times it joined again.
   // Number of samples that were dropped before they were safe, because too many had to be kept; and why the spill file
   // did not take them.
   [[nodiscard]] std::uint64_t displaced() const;
@@ -81,12 +89,32 @@ class RobotClient {
     explicit Stream(std::uint64_t size) : window(size) {}
     ScanWindow window;
     std::optional<Ledger> ledger;
+    std::uint64_t sent = 0;                            // The highest number that was put on the wire.
+    std::uint64_t arrived = 0;                         // The highest one that the server says it has received.
+    std::chrono::steady_clock::time_point moved{};     // When `arrived` changed, or had been all that was sent.
+    std::chrono::steady_clock::time_point advanced{};  // When `arrived` changed.
+    bool first = false;                                // The next ledger is the first one since the client joined anew.
   };
   using Clock = std::chrono::steady_clock;
+  // What connects the client with the servers of the domain.
+  struct Wire {
+    int number = 0;                  // Of the wires of this client.
+    std::unique_ptr<wire::Bus> own;  // Null for the first, which uses the caller's.
+    wire::Bus* bus = nullptr;
+    std::unique_ptr<wire::Publication<SessionRequest>> session;
+    std::unique_ptr<wire::Publication<ScanSample>> scans;
+    std::unique_ptr<wire::Publication<OdometrySample>> odometry;
+    std::vector<std::unique_ptr<wire::Subscription>> subscriptions;
+  };
   // Odometry belongs to the robot and not to one of its lasers, so its stream has a name of its own.
   static constexpr char kOdometrySensor[] = "odometry";
 
   RobotClient(SessionRequest request, Callbacks callbacks, const RobotClientOptions& options);
+  [[nodiscard]] Result<void> Advertise(Wire& wire);
+  [[nodiscard]] Result<void> Subscribe(Wire& wire);
+  template <typename Value>
+  [[nodiscard]] Result<void> Hear(Wire& wire, void (RobotClient::*on_value)(Value&&),
+                                  wire::SubscriptionEvents events = {});
   [[nodiscard]] Result<void> Connect(wire::Bus& bus);
   [[nodiscard]] Result<void> AwaitSession(const wire::Bus& bus, double timeout_s);
   void OnSession(SessionState&& state);
@@ -106,6 +134,17 @@ class RobotClient {
   void Reopen();
   void Pump();
   void Watch();
+  // robot_client_recovery.cpp.
+  [[nodiscard]] std::shared_ptr<Wire> CurrentWire() const;
+  void Sent(NameId sensor_id, std::uint64_t number) CAIRN_REQUIRES(mutex_);
+  static void Arrived(Stream& stream, std::uint64_t through);
+  [[nodiscard]] std::string Silence(Clock::time_point now) CAIRN_REQUIRES(mutex_);
+  [[nodiscard]] bool Moving() const CAIRN_REQUIRES(mutex_);
+  [[nodiscard]] bool RenewalDue(Clock::time_point now) CAIRN_REQUIRES(mutex_);
+  void StartOver(Clock::time_point now) CAIRN_REQUIRES(mutex_);
+  void Recover();
+  void Renew();
+  void DropRetired();
 
   const ClientId client_;
   const NameId robot_id_;
@@ -113,6 +152,7 @@ class RobotClient {
   const RobotClientOptions options_;
   std::atomic<std::uint64_t> resent_ = 0;
   std::atomic<int> restarted_ = 0;
+  std::atomic<int> renewed_ = 0;
 
   Mutex sending_;  // Held while samples are sent, so that they leave in order. Taken before mutex_.
   mutable Mutex mutex_;
@@ -133,10 +173,20 @@ class RobotClient {
   Clock::time_point progress_ CAIRN_GUARDED_BY(mutex_);
   bool stopping_ CAIRN_GUARDED_BY(mutex_) = false;
 
-  std::unique_ptr<wire::Publication<SessionRequest>> session_;
-  std::unique_ptr<wire::Publication<ScanSample>> scans_;
-  std::unique_ptr<wire::Publication<OdometrySample>> odometry_;
-  std::vector<std::unique_ptr<wire::Subscription>> subscriptions_;
+  // Recovery.
+  std::string stale_ CAIRN_GUARDED_BY(mutex_);                // Why the session stands still; empty: it does not.
+  Clock::time_point answered_at_ CAIRN_GUARDED_BY(mutex_);    // Last time the session was open, or no server was there.
+  Clock::time_point connected_at_ CAIRN_GUARDED_BY(mutex_);   // Last time a server was there.
+  Clock::time_point sent_at_ CAIRN_GUARDED_BY(mutex_);        // Last sample put on the wire,
+  Clock::time_point sending_since_ CAIRN_GUARDED_BY(mutex_);  // and the first one after which there was no pause.
+  Clock::time_point called_stale_ CAIRN_GUARDED_BY(mutex_);   // By the server, since when.
+  Clock::time_point renewed_at_ CAIRN_GUARDED_BY(mutex_);
+  Clock::duration renewal_pause_ CAIRN_GUARDED_BY(mutex_){};
+  std::uint64_t refused_at_renewal_ CAIRN_GUARDED_BY(mutex_) = 0;
+
+  std::atomic<int> current_ = 0;  // The wire whose values count.
+  std::shared_ptr<Wire> wire_ CAIRN_GUARDED_BY(mutex_);
+  std::vector<std::shared_ptr<Wire>> retired_;  // Those before, until the server has answered. The watcher's.
   std::thread watcher_;
 };
 

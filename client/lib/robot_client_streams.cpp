@@ -110,14 +110,25 @@ Result<void> RobotClient::AddAndSend(StreamedSample&& sample, Stream& stream) {
 
 Result<void> RobotClient::SendNow(const StreamedSample& sample) {
   bool first = false;
+  std::shared_ptr<Wire> wire;
   {
     const MutexLock lock(mutex_);
     first = !std::exchange(request_.started, true);
+    wire = wire_;
   }
   // Published before the first sample, so that a server that starts later does not open the session at its old start.
   if (first) Ask();
-  if (const auto* const scan = std::get_if<ScanSample>(&sample)) return scans_->Publish(*scan);
-  return odometry_->Publish(std::get<OdometrySample>(sample));
+  const auto* const scan = std::get_if<ScanSample>(&sample);
+  const auto* const odometry = std::get_if<OdometrySample>(&sample);
+  const Result<void> published = scan != nullptr ? wire->scans->Publish(*scan) : wire->odometry->Publish(*odometry);
+  if (!published) return published;
+  const MutexLock lock(mutex_);
+  if (scan != nullptr) {
+    Sent(scan->stream.sensor_id, scan->scan.sequence);
+  } else {
+    Sent(odometry->stream.sensor_id, odometry->odometry.sequence);
+  }
+  return {};
 }
 
 // Sends the samples from the backlog's cursor on, as fast as the server settles them.

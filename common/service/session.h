@@ -42,6 +42,7 @@ struct SessionState {
   Status status;  // Why refused.
   SessionToken session = 0;
   bool durable = false;       // The server stores the samples.
+  bool stale = false;         // A stream stands still although the robot's client is alive; `status` says which.
   Generation generation = 0;  // Set by the server's egress.
 };
 

@@ -1,5 +1,7 @@
 #include "common/wire/bus.h"
 
+#include <numeric>
+
 #include "common/wire/participant.h"
 #include "common/wire/publication.h"
 #include "common/wire/subscription.h"
@@ -12,7 +14,20 @@ class DdsBus final : public Bus {
   explicit DdsBus(std::shared_ptr<Participant> participant) : participant_(std::move(participant)) {}
   [[nodiscard]] const std::shared_ptr<Participant>& participant() const { return participant_; }
   const WireOptions& options() const override { return participant_->options(); }
-  std::uint64_t datagrams_refused() const override { return participant_->datagrams_refused(); }
+  std::uint64_t datagrams_refused() const override {
+    const RefusedDatagrams& refused = participant_->datagrams_refused();
+    return std::accumulate(refused.begin(), refused.end(), std::uint64_t{0});
+  }
+  std::string refused_by_reason() const override {
+    const RefusedDatagrams& refused = participant_->datagrams_refused();
+    std::string text;
+    for (std::size_t fault = 0; fault < refused.size(); ++fault) {
+      if (refused[fault] == 0) continue;
+      text += (text.empty() ? "" : ", ") + std::to_string(refused[fault]) + ' ';
+      text += DatagramFaultName(static_cast<DatagramFault>(fault));
+    }
+    return text.empty() ? "none" : text;
+  }
 
  private:
   const std::shared_ptr<Participant> participant_;

@@ -87,8 +87,10 @@ class Bus {
                                                                        SubscriptionEvents events = {});
 
   [[nodiscard]] virtual const WireOptions& options() const = 0;
-  // Number of datagrams that were not valid RTPS and were therefore not passed to the middleware.
+  // Number of datagrams that were not valid or not plausible RTPS and were therefore not passed to the middleware.
   [[nodiscard]] virtual std::uint64_t datagrams_refused() const = 0;
+  // The same by reason, for people: "12 framing, 3 sequence"; "none" where there are none.
+  [[nodiscard]] virtual std::string refused_by_reason() const = 0;
 
  protected:
   Bus() = default;

@@ -66,6 +66,7 @@ v1::SessionState ToWire(const SessionState& value) {
   wire.site(value.site);
   wire.phase(static_cast<v1::SessionPhase>(value.phase));
   wire.durable(value.durable);
+  wire.stale(value.stale);
   wire.status(ToWire(value.status));
   return wire;
 }
@@ -80,6 +81,7 @@ SessionState FromWire(v1::SessionState&& wire) {
   value.site = std::move(wire.site());
   value.phase = static_cast<SessionPhase>(wire.phase());
   value.durable = wire.durable();
+  value.stale = wire.stale();
   value.status = FromWire(std::move(wire.status()));
   return value;
 }

@@ -4,8 +4,6 @@
 #include <fastdds/rtps/transport/ChainingTransport.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 
-#include "common/wire/rtps_datagram.h"
-
 namespace cairn::wire {
 namespace {
 
@@ -14,11 +12,11 @@ namespace rtps = eprosima::fastrtps::rtps;
 
 struct GuardDescriptor : transport::ChainingTransportDescriptor {
   GuardDescriptor(std::shared_ptr<transport::TransportDescriptorInterface> udp,
-                  std::shared_ptr<std::atomic<std::uint64_t>> counter)
+                  std::shared_ptr<RefusedDatagrams> counter)
       : ChainingTransportDescriptor(std::move(udp)), refused(std::move(counter)) {}
   transport::TransportInterface* create_transport() const override;
 
-  std::shared_ptr<std::atomic<std::uint64_t>> refused;
+  std::shared_ptr<RefusedDatagrams> refused;
 };
 
 class GuardTransport : public transport::ChainingTransport {
@@ -30,21 +28,23 @@ class GuardTransport : public transport::ChainingTransport {
 
   bool send(rtps::SenderResource* udp, const rtps::octet* bytes, std::uint32_t size, transport::LocatorsIterator* begin,
             transport::LocatorsIterator* end, const std::chrono::steady_clock::time_point& timeout) override {
+    NoteSent({bytes, size}, gate_);
     return udp->send(bytes, size, begin, end, timeout);
   }
 
   void receive(transport::TransportReceiverInterface* next, const rtps::octet* bytes, std::uint32_t size,
                const rtps::Locator_t& local, const rtps::Locator_t& remote) override {
-    if (InspectDatagram({bytes, size}, gate_) == DatagramFault::kNone) {
+    const DatagramFault fault = InspectDatagram({bytes, size}, gate_);
+    if (fault == DatagramFault::kNone) {
       next->OnDataReceived(bytes, size, local, remote);
     } else {
-      refused_->fetch_add(1, std::memory_order_relaxed);
+      (*refused_)[static_cast<std::size_t>(fault)].fetch_add(1, std::memory_order_relaxed);
     }
   }
 
  private:
   GuardDescriptor descriptor_;
-  std::shared_ptr<std::atomic<std::uint64_t>> refused_;
+  std::shared_ptr<RefusedDatagrams> refused_;
   SequenceGate gate_;
 };
 
@@ -54,8 +54,8 @@ transport::TransportInterface* GuardDescriptor::create_transport() const {
 
 }  // namespace
 
-std::shared_ptr<transport::TransportDescriptorInterface> MakeGuardedUdp(
-    const std::vector<std::string>& interfaces, std::shared_ptr<std::atomic<std::uint64_t>> refused) {
+std::shared_ptr<transport::TransportDescriptorInterface> MakeGuardedUdp(const std::vector<std::string>& interfaces,
+                                                                        std::shared_ptr<RefusedDatagrams> refused) {
   // A burst of tiles or replies overflows a socket buffer of default size. The kernel limits this size if it
   // is too large.
   constexpr std::uint32_t kSocketBufferBytes = 4 * 1024 * 1024;

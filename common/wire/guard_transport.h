@@ -5,17 +5,22 @@
 
 #include <fastdds/rtps/transport/ChainingTransportDescriptor.h>
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "common/wire/rtps_datagram.h"
+
 namespace cairn::wire {
 
-// Binds sockets to the given IPv4 addresses only. `refused` counts the dropped datagrams; it is shared
-// because it must outlive the transport.
+// Of each fault, how many datagrams were dropped.
+using RefusedDatagrams = std::array<std::atomic<std::uint64_t>, kDatagramFaults>;
+
+// Binds sockets to the given IPv4 addresses only. `refused` is shared because it must outlive the transport.
 [[nodiscard]] std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> MakeGuardedUdp(
-    const std::vector<std::string>& interfaces, std::shared_ptr<std::atomic<std::uint64_t>> refused);
+    const std::vector<std::string>& interfaces, std::shared_ptr<RefusedDatagrams> refused);
 
 }  // namespace cairn::wire

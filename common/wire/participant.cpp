@@ -8,8 +8,6 @@
 #include <fastdds/dds/log/Log.hpp>
 #include <mutex>
 
-#include "common/wire/guard_transport.h"
-
 #ifdef CAIRN_ADDRESS_SANITIZER
 // Fast DDS 2.9 deletes one of its own objects with the wrong size (RTPSWriter::~RTPSWriter). With this check,
 // the address sanitizer would stop every program at the end of its first publication. All other checks stay
@@ -46,7 +44,7 @@ void ConfigureLibraryOnce() {
 }
 
 fd::DomainParticipantQos ParticipantQos(const WireOptions& options, const std::string& name,
-                                        const std::shared_ptr<std::atomic<std::uint64_t>>& refused) {
+                                        const std::shared_ptr<RefusedDatagrams>& refused) {
   fd::DomainParticipantQos qos;
   qos.name(name);
   qos.transport().use_builtin_transports = false;

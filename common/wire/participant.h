@@ -3,7 +3,6 @@
 // file. Thread-safe. This header uses the Fast DDS 2.x API; include it only inside common/wire.
 #pragma once
 
-#include <atomic>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
@@ -19,6 +18,7 @@
 
 #include "common/mutex.h"
 #include "common/wire/bus.h"
+#include "common/wire/guard_transport.h"
 #include "common/wire/topics.h"
 
 namespace cairn::wire {
@@ -50,15 +50,14 @@ class Participant : public std::enable_shared_from_this<Participant> {
                                           fd::DataReaderListener* listener);
 
   [[nodiscard]] const WireOptions& options() const { return options_; }
-  [[nodiscard]] std::uint64_t datagrams_refused() const { return datagrams_refused_->load(std::memory_order_relaxed); }
+  [[nodiscard]] const RefusedDatagrams& datagrams_refused() const { return *datagrams_refused_; }
 
  private:
   explicit Participant(const WireOptions& options) : options_(options) {}
   [[nodiscard]] Result<fd::Topic*> FindTopic(const TopicProfile& profile, const fd::TypeSupport& type);
 
   const WireOptions options_;
-  const std::shared_ptr<std::atomic<std::uint64_t>> datagrams_refused_ =
-      std::make_shared<std::atomic<std::uint64_t>>(0);
+  const std::shared_ptr<RefusedDatagrams> datagrams_refused_ = std::make_shared<RefusedDatagrams>();
   fd::DomainParticipant* participant_ = nullptr;  // Set once by Create.
   fd::Publisher* publisher_ = nullptr;
   fd::Subscriber* subscriber_ = nullptr;

@@ -48,18 +48,26 @@ struct Reader {
   }
 };
 
+// A submessage, who sent it, and to whom.
 struct Submessage {
   std::uint8_t id;
   std::uint8_t flags;
   Reader body;
-  Bytes guid_prefix;
+  SequenceGate::GuidPrefix from;
+  SequenceGate::GuidPrefix to;  // All zero: everybody.
 
   [[nodiscard]] std::size_t size() const { return body.bytes.size(); }
-  // The GUID of the writer whose entity id stands at `at`.
-  [[nodiscard]] SequenceGate::WriterKey Writer(std::size_t at) const {
-    SequenceGate::WriterKey key;
-    std::copy(guid_prefix.begin(), guid_prefix.end(), key.begin());
+  [[nodiscard]] SequenceGate::EntityId Entity(std::size_t at) const {
+    SequenceGate::EntityId entity = 0;
+    std::memcpy(&entity, body.bytes.data() + at, sizeof(entity));
+    return entity;
+  }
+  // The numbers of the sender's entity whose id stands at `at`; of what it numbers, where there are several things.
+  [[nodiscard]] SequenceGate::Key Numbers(std::size_t at, SequenceGate::EntityId what = 0) const {
+    SequenceGate::Key key;
+    std::copy(from.begin(), from.end(), key.begin());
     std::copy_n(body.bytes.begin() + static_cast<std::ptrdiff_t>(at), 4, key.begin() + 12);
+    std::memcpy(key.data() + 16, &what, sizeof(what));
     return key;
   }
 };
@@ -82,12 +90,29 @@ std::size_t EndOfParameters(const Reader& body, std::size_t at) {
   return 0;
 }
 
+SequenceGate::GuidPrefix PrefixAt(Bytes bytes, std::size_t at) {
+  SequenceGate::GuidPrefix prefix;
+  std::copy_n(bytes.begin() + static_cast<std::ptrdiff_t>(at), prefix.size(), prefix.begin());
+  return prefix;
+}
+
 // Whether a sequence number set fits: its bit count stands at `at`, then come the words of bits, and `tail`
 // more bytes.
 bool SetFits(const Submessage& m, std::size_t at, std::size_t tail) {
   if (m.size() < at + 4) return false;
   const std::uint32_t bits = m.body.U32(at);
   return bits <= kMaxSetBits && m.size() >= at + 4 + (bits + 31) / 32 * 4 + tail;
+}
+
+// The highest number in the set whose base stands at `base`, 0 where it is empty. REQUIRES: it fits.
+std::int64_t HighestOf(const Submessage& m, std::size_t base) {
+  const std::uint32_t bits = m.body.U32(base + 8);
+  for (std::uint32_t i = bits; i-- > 0;) {
+    if ((m.body.U32(base + 12 + i / 32 * 4) & (std::uint32_t{1} << (31 - i % 32))) != 0) {
+      return m.body.Sequence(base) + i;
+    }
+  }
+  return 0;
 }
 
 // Steps over the inline QoS of DATA and DATA_FRAG, which follows `fixed` bytes. Returns where the payload
@@ -109,12 +134,23 @@ bool IsDiscoveryWriter(Bytes entity) {
   return entity[3] == kBuiltinWriterWithKey && (is(kParticipants) || is(kWriters) || is(kReaders));
 }
 
-DatagramFault InspectData(const Submessage& m, SequenceGate& gate) {
+// What arrives is inspected with these.
+struct Inspection {
+  SequenceGate& gate;
+  SequenceGate::Clock::time_point now;
+
+  [[nodiscard]] bool Accepts(const SequenceGate::Key& whose, std::int64_t number) const {
+    return gate.Accept(whose, number, now);
+  }
+};
+
+DatagramFault InspectData(const Submessage& m, const Inspection& with) {
   constexpr std::uint8_t kHasData = 0x04;
   constexpr std::uint8_t kHasKey = 0x08;
   constexpr std::uint8_t kParameterListEncoding = 0x02;  // PL_CDR_BE; PL_CDR_LE is one more.
   if (m.size() < 20) return DatagramFault::kFraming;
-  if (!gate.Accept(m.Writer(8), m.body.Sequence(12))) return DatagramFault::kSequence;
+  const std::int64_t sequence = m.body.Sequence(12);
+  if (sequence <= 0 || !with.Accepts(m.Numbers(8), sequence)) return DatagramFault::kSequence;
   const std::size_t payload = PayloadStart(m, 20);
   if (payload == 0) return DatagramFault::kParameterList;
   if ((m.flags & (kHasData | kHasKey)) == 0) return DatagramFault::kNone;
@@ -129,9 +165,10 @@ DatagramFault InspectData(const Submessage& m, SequenceGate& gate) {
   return DatagramFault::kNone;
 }
 
-DatagramFault InspectDataFrag(const Submessage& m, SequenceGate& gate) {
+DatagramFault InspectDataFrag(const Submessage& m, const Inspection& with) {
   if (m.size() < 32) return DatagramFault::kFraming;
-  if (!gate.Accept(m.Writer(8), m.body.Sequence(12))) return DatagramFault::kSequence;
+  const std::int64_t sequence = m.body.Sequence(12);
+  if (sequence <= 0 || !with.Accepts(m.Numbers(8), sequence)) return DatagramFault::kSequence;
   const std::uint64_t start = m.body.U32(20);
   const std::uint64_t count = m.body.U16(24);
   const std::uint64_t fragment_bytes = m.body.U16(26);
@@ -147,53 +184,69 @@ DatagramFault InspectDataFrag(const Submessage& m, SequenceGate& gate) {
   return DatagramFault::kNone;
 }
 
-DatagramFault InspectHeartbeat(const Submessage& m, SequenceGate& gate) {
+DatagramFault InspectHeartbeat(const Submessage& m, const Inspection& with) {
+  constexpr SequenceGate::EntityId kCounts = 1;
   if (m.size() < 28) return DatagramFault::kFraming;
   const std::int64_t first = m.body.Sequence(8);
   const std::int64_t last = m.body.Sequence(16);
-  if (first < 0 || last < first - 1) return DatagramFault::kSequence;
-  // In the heartbeat of an empty history first = last + 1. The gate gets the larger of the two numbers.
-  return gate.Accept(m.Writer(4), std::max(last, first)) ? DatagramFault::kNone : DatagramFault::kSequence;
+  // In the heartbeat of an empty history first = last + 1.
+  if (first <= 0 || last < first - 1 || !with.Accepts(m.Numbers(4), last)) return DatagramFault::kSequence;
+  return with.Accepts(m.Numbers(4, kCounts), m.body.U32(24)) ? DatagramFault::kNone : DatagramFault::kCount;
 }
 
-DatagramFault InspectGap(const Submessage& m, SequenceGate& gate) {
+DatagramFault InspectGap(const Submessage& m, const Inspection& with) {
+  constexpr std::int64_t kLongest = std::int64_t{1} << 30;  // The library loops over every number from start to base.
   if (m.size() < 28) return DatagramFault::kFraming;
   if (!SetFits(m, 24, 0)) return DatagramFault::kSequenceSet;
   const std::int64_t start = m.body.Sequence(8);
   const std::int64_t base = m.body.Sequence(16);
-  // The library loops over every number from start to base.
-  if (start <= 0 || base < start || base - start > SequenceGate::kMaxJump) return DatagramFault::kSequence;
-  return gate.Accept(m.Writer(4), base) ? DatagramFault::kNone : DatagramFault::kSequence;
+  if (start <= 0 || base < start || base - start > kLongest) return DatagramFault::kSequence;
+  const std::int64_t last = std::max(base - 1, HighestOf(m, 16));
+  return with.Accepts(m.Numbers(4), last) ? DatagramFault::kNone : DatagramFault::kSequence;
 }
 
-DatagramFault InspectAck(const Submessage& m) {
+DatagramFault InspectAck(const Submessage& m, const Inspection& with) {
   if (m.size() < 24) return DatagramFault::kFraming;
-  if (m.body.Sequence(8) < 0) return DatagramFault::kSequence;
-  return SetFits(m, 16, 4) ? DatagramFault::kNone : DatagramFault::kSequenceSet;
+  const std::int64_t base = m.body.Sequence(8);
+  if (base < 0) return DatagramFault::kSequence;
+  if (!SetFits(m, 16, 4)) return DatagramFault::kSequenceSet;
+  const auto sent = with.gate.LastSent(m.to, m.Entity(4));
+  if (!sent) return DatagramFault::kNone;  // For another participant.
+  if (base > *sent + 1 || HighestOf(m, 8) > *sent) return DatagramFault::kUnsent;
+  const std::size_t count = 20 + (m.body.U32(16) + 31) / 32 * 4;
+  return with.Accepts(m.Numbers(0, m.Entity(4)), m.body.U32(count)) ? DatagramFault::kNone : DatagramFault::kCount;
 }
 
-DatagramFault InspectNackFrag(const Submessage& m) {
+DatagramFault InspectNackFrag(const Submessage& m, const Inspection& with) {
+  constexpr SequenceGate::EntityId kFragments = 0xffffffff;
   if (m.size() < 28) return DatagramFault::kFraming;
-  if (m.body.Sequence(8) <= 0) return DatagramFault::kSequence;
-  return SetFits(m, 20, 4) ? DatagramFault::kNone : DatagramFault::kSequenceSet;
+  const std::int64_t sequence = m.body.Sequence(8);
+  if (sequence <= 0) return DatagramFault::kSequence;
+  if (!SetFits(m, 20, 4)) return DatagramFault::kSequenceSet;
+  const auto sent = with.gate.LastSent(m.to, m.Entity(4));
+  if (!sent) return DatagramFault::kNone;
+  if (sequence > *sent) return DatagramFault::kUnsent;
+  const std::size_t count = 24 + (m.body.U32(20) + 31) / 32 * 4;
+  return with.Accepts(m.Numbers(0, m.Entity(4) ^ kFragments), m.body.U32(count)) ? DatagramFault::kNone
+                                                                                 : DatagramFault::kCount;
 }
 
-DatagramFault InspectSubmessage(const Submessage& m, SequenceGate& gate) {
+DatagramFault InspectSubmessage(const Submessage& m, const Inspection& with) {
   constexpr std::uint8_t kNoTimestamp = 0x02;
   const auto at_least = [&](std::size_t n) { return m.size() >= n ? DatagramFault::kNone : DatagramFault::kFraming; };
   switch (m.id) {
     case kData:
-      return InspectData(m, gate);
+      return InspectData(m, with);
     case kDataFrag:
-      return InspectDataFrag(m, gate);
+      return InspectDataFrag(m, with);
     case kHeartbeat:
-      return InspectHeartbeat(m, gate);
+      return InspectHeartbeat(m, with);
     case kGap:
-      return InspectGap(m, gate);
+      return InspectGap(m, with);
     case kAckNack:
-      return InspectAck(m);
+      return InspectAck(m, with);
     case kNackFrag:
-      return InspectNackFrag(m);
+      return InspectNackFrag(m, with);
     case kHeartbeatFrag:
       return at_least(24);
     case kInfoTimestamp:
@@ -207,40 +260,14 @@ DatagramFault InspectSubmessage(const Submessage& m, SequenceGate& gate) {
   }
 }
 
-}  // namespace
-
-std::string_view DatagramFaultName(DatagramFault fault) {
-  static constexpr std::array<std::string_view, 8> kNames = {"none",     "not_rtps",     "framing",  "statistics",
-                                                             "sequence", "sequence_set", "fragment", "parameter_list"};
-  return kNames[static_cast<std::size_t>(fault)];
-}
-
-std::size_t SequenceGate::Hash::operator()(const WriterKey& key) const {
-  return std::hash<std::string_view>()({reinterpret_cast<const char*>(key.data()), key.size()});
-}
-
-bool SequenceGate::Accept(const WriterKey& writer, std::int64_t sequence) {
-  if (sequence < 0) return false;
-  const MutexLock lock(mutex_);
-  const auto known = highest_.find(writer);
-  if (known != highest_.end()) {
-    if (sequence > known->second + kMaxJump) return false;
-    known->second = std::max(known->second, sequence);
-    return true;
-  }
-  // The limit for the first number of a writer. A writer that has run for years stays far below it.
-  constexpr std::int64_t kMaxFirst = std::int64_t{1} << 40;
-  if (sequence > kMaxFirst) return false;
-  if (highest_.size() >= kMaxWriters) highest_.clear();
-  highest_.emplace(writer, sequence);
-  return true;
-}
-
-DatagramFault InspectDatagram(Bytes datagram, SequenceGate& gate) {
+// Gives each submessage to `inspect` until one has a fault.
+template <typename Inspect>
+DatagramFault Walk(Bytes datagram, Inspect inspect) {
   constexpr std::uint8_t kMajorVersion = 2;
   if (datagram.size() < kHeaderBytes || std::memcmp(datagram.data(), "RTPS", 4) != 0) return DatagramFault::kNotRtps;
   if (datagram[4] != kMajorVersion) return DatagramFault::kNotRtps;
-  Bytes prefix = datagram.subspan(kGuidPrefixOffset, 12);
+  SequenceGate::GuidPrefix from = PrefixAt(datagram, kGuidPrefixOffset);
+  SequenceGate::GuidPrefix to{};
   std::size_t at = kHeaderBytes;
   while (at < datagram.size()) {
     if (datagram.size() - at < 4) return DatagramFault::kFraming;
@@ -253,13 +280,37 @@ DatagramFault InspectDatagram(Bytes datagram, SequenceGate& gate) {
     const std::size_t end = to_the_end ? datagram.size() : at + 4 + length;
     if (end > datagram.size()) return DatagramFault::kFraming;
     if (id == kEprosimaStatistics && end != datagram.size()) return DatagramFault::kStatistics;
-    const Submessage submessage{id, flags, {datagram.subspan(at + 4, end - at - 4), little}, prefix};
-    const DatagramFault fault = InspectSubmessage(submessage, gate);
+    const Submessage submessage{id, flags, {datagram.subspan(at + 4, end - at - 4), little}, from, to};
+    const DatagramFault fault = inspect(submessage);
     if (fault != DatagramFault::kNone) return fault;
-    if (id == kInfoSource) prefix = submessage.body.bytes.subspan(8, 12);  // The sender of what follows.
+    if (id == kInfoSource) from = PrefixAt(submessage.body.bytes, 8);  // The sender of what follows.
+    if (id == kInfoDestination) to = PrefixAt(submessage.body.bytes, 0);
     at = end;
   }
   return DatagramFault::kNone;
+}
+
+}  // namespace
+
+std::string_view DatagramFaultName(DatagramFault fault) {
+  static constexpr std::array<std::string_view, kDatagramFaults> kNames = {
+      "none",  "not_rtps", "framing",      "statistics", "sequence",
+      "count", "unsent",   "sequence_set", "fragment",   "parameter_list"};
+  return kNames[static_cast<std::size_t>(fault)];
+}
+
+DatagramFault InspectDatagram(Bytes datagram, SequenceGate& gate, SequenceGate::Clock::time_point now) {
+  const Inspection with{gate, now};
+  return Walk(datagram, [&](const Submessage& submessage) { return InspectSubmessage(submessage, with); });
+}
+
+void NoteSent(Bytes datagram, SequenceGate& gate) {
+  static_cast<void>(Walk(datagram, [&](const Submessage& m) {
+    if (m.id == kData || m.id == kDataFrag) gate.Sent(m.from, m.Entity(8), m.body.Sequence(12));
+    if (m.id == kHeartbeat) gate.Sent(m.from, m.Entity(4), m.body.Sequence(16));
+    if (m.id == kGap) gate.Sent(m.from, m.Entity(4), std::max(m.body.Sequence(16) - 1, HighestOf(m, 16)));
+    return DatagramFault::kNone;
+  }));
 }
 
 }  // namespace cairn::wire

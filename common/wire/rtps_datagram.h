@@ -6,14 +6,12 @@
 // Source: OMG DDSI-RTPS 2.3, sections 8.3 and 9.4.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string_view>
-#include <unordered_map>
 
-#include "common/mutex.h"
+#include "common/wire/sequence_gate.h"
 
 namespace cairn::wire {
 
@@ -23,32 +21,19 @@ enum class DatagramFault : std::uint8_t {
   kFraming,        // A submessage longer than the datagram, or shorter than its fixed part.
   kStatistics,     // A statistics submessage of eProsima that would trigger an assert.
   kSequence,       // A sequence number that is impossible or far ahead of the previous one.
+  kCount,          // A heartbeat or acknowledgement whose own number is far ahead of the previous one.
+  kUnsent,         // An acknowledgement of samples that were never sent, or a request for them.
   kSequenceSet,    // More bits than a set can have, or than the submessage holds.
   kFragment,       // Fragment numbers that describe no sample, or a sample over the limit.
   kParameterList,  // A parameter longer than its list, or a list without end.
 };
+inline constexpr std::size_t kDatagramFaults = 10;
 [[nodiscard]] std::string_view DatagramFaultName(DatagramFault fault);
 
-// Stores the highest sequence number of each remote writer, to tell jumps that are too large from the large
-// numbers of writers that have run for long. When its table is full, it forgets all writers; then only the
-// next number of each writer is not compared. Thread-safe.
-class SequenceGate {
- public:
-  using WriterKey = std::array<std::uint8_t, 16>;  // GUID.
-  static constexpr std::int64_t kMaxJump = std::int64_t{1} << 30;
-  static constexpr std::size_t kMaxWriters = 16384;
-
-  // Accepts and stores a sequence number of a writer, or refuses it.
-  [[nodiscard]] bool Accept(const WriterKey& writer, std::int64_t sequence);
-
- private:
-  struct Hash {
-    std::size_t operator()(const WriterKey& key) const;
-  };
-  Mutex mutex_;
-  std::unordered_map<WriterKey, std::int64_t, Hash> highest_ CAIRN_GUARDED_BY(mutex_);
-};
-
-[[nodiscard]] DatagramFault InspectDatagram(std::span<const std::uint8_t> datagram, SequenceGate& gate);
+// A datagram that arrived at `now`. The gate keeps what must be known of the ones before.
+[[nodiscard]] DatagramFault InspectDatagram(std::span<const std::uint8_t> datagram, SequenceGate& gate,
+                                            SequenceGate::Clock::time_point now = SequenceGate::Clock::now());
+// A datagram that the participant itself sends: tells the gate its numbers.
+void NoteSent(std::span<const std::uint8_t> datagram, SequenceGate& gate);
 
 }  // namespace cairn::wire

@@ -1,7 +1,9 @@
-// The client that each remote writer of session requests belongs to: the one that its last request named. Not
-// thread-safe: one owner.
+// The client that each remote writer of session requests belongs to: the one that its last request named. A client may
+// have several writers for a while, because it joins the domain anew where its streams stand still: it is alive while
+// one of them is. Not thread-safe: one owner.
 #pragma once
 
+#include <algorithm>
 #include <fastdds/dds/common/InstanceHandle.hpp>
 #include <map>
 #include <optional>
@@ -20,24 +22,24 @@ class WriterClients {
  public:
   using Writer = eprosima::fastdds::dds::InstanceHandle_t;
 
-  // Records a request of the writer. Returns whether the writer's lease is valid.
+  // Records a request of the writer. Returns whether the lease of one of the client's writers is valid.
   bool Heard(const Writer& writer, ClientId client) {
-    Entry& entry = entries_[writer];
-    entry.client = client;
-    return entry.alive;
+    entries_[writer].client = client;
+    return Alive(client);
   }
 
-  // Returns the client whose state has changed, if the writer's client is known.
+  // Returns the client that is alive or not from now on, if that changed and the writer's client is known.
   std::optional<ClientId> Changed(const LivelinessChange& change) {
     const auto known = entries_.find(change.writer);
     if (known == entries_.end()) {
       if (!change.gone) entries_[change.writer].alive = change.alive;
       return std::nullopt;
     }
-    const bool changed = known->second.alive != change.alive;
-    const std::optional<ClientId> client = changed ? known->second.client : std::nullopt;
+    const std::optional<ClientId> client = known->second.client;
+    const bool before = client && Alive(*client);
     known->second.alive = change.alive;
     if (change.gone) entries_.erase(known);
+    if (!client || Alive(*client) == before) return std::nullopt;
     return client;
   }
 
@@ -46,6 +48,11 @@ class WriterClients {
     std::optional<ClientId> client;
     bool alive = true;
   };
+  [[nodiscard]] bool Alive(ClientId client) const {
+    return std::any_of(entries_.begin(), entries_.end(),
+                       [client](const auto& entry) { return entry.second.client == client && entry.second.alive; });
+  }
+
   std::map<Writer, Entry> entries_;
 };
 

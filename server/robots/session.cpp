@@ -167,6 +167,7 @@ void Session::Tick() {
     unannounced_ = false;
     AnnounceState();
   }
+  if (record_.LookForSilence(SessionRecord::Clock::now())) state_unsent_ = true;
   if (state_unsent_) AnnounceState();
   PublishLedgers(SessionRecord::Urgency::kWhenDue);
 }

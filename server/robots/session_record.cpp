@@ -1,5 +1,6 @@
 #include "server/robots/session_record.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace cairn::server {
@@ -74,6 +75,7 @@ SessionRecord::Arrival SessionRecord::ScanReceived(NameId sensor_id, std::uint64
   const MutexLock lock(mutex_);
   Stream* const stream = Find(sensor_id);
   if (stream == nullptr) return Arrival::kUnknownSensor;
+  stream->arrived = Clock::now();
   if (LeftAside(*stream, sequence)) return Arrival::kAside;
   if (!stream->account.Received(sequence)) return Arrival::kDuplicate;
   stream->changed = true;
@@ -111,6 +113,7 @@ SessionRecord::Arrival SessionRecord::ForeignScan(NameId sensor_id, DropReason r
 
 bool SessionRecord::OdometryReceived(std::uint64_t sequence) {
   const MutexLock lock(mutex_);
+  odometry_.arrived = Clock::now();
   if (LeftAside(odometry_, sequence) || !odometry_.account.Received(sequence)) return false;
   odometry_.changed = true;
   return true;
@@ -253,10 +256,27 @@ void SessionRecord::SetAlive(bool alive) {
 bool SessionRecord::SetPhase(SessionPhase phase, Status status) {
   const MutexLock lock(mutex_);
   if (status_.session.phase == SessionPhase::kEnded) return false;
+  if (phase == SessionPhase::kActive && status_.session.phase != phase) active_ = Clock::now();
   if (phase == SessionPhase::kSuspended && status_.session.phase != phase) suspended_ = Clock::now();
   status_.session.phase = phase;
   status_.session.status = std::move(status);
   return true;
+}
+
+bool SessionRecord::LookForSilence(Clock::time_point now) {
+  constexpr std::chrono::milliseconds kPatience{1800};  // With the period of the housekeeping below 2 s.
+  const MutexLock lock(mutex_);
+  std::string silence;
+  const auto look = [&](const Stream& stream) CAIRN_NO_THREAD_SAFETY_ANALYSIS {
+    // A stream that was never heard is one that the robot may not have begun.
+    if (stream.arrived == Clock::time_point{} || now - std::max(stream.arrived, active_) <= kPatience) return;
+    silence += (silence.empty() ? "'" : ", '") + stream.account.ledger().sensor + "'";
+  };
+  if (status_.session.phase == SessionPhase::kActive && status_.alive) {
+    for (const auto& [sensor_id, stream] : streams_) look(stream);
+    look(odometry_);
+  }
+  return std::exchange(silence_, silence) != silence;
 }
 
 bool SessionRecord::Resume(ClientId client, SessionToken session) {
@@ -268,6 +288,7 @@ bool SessionRecord::Resume(ClientId client, SessionToken session) {
     for (auto& [sensor_id, stream] : streams_) stream.resuming = false;
     odometry_.resuming = false;
   }
+  if (status_.session.phase != SessionPhase::kActive) active_ = Clock::now();
   status_.session.client = client;
   status_.session.session = session;
   status_.session.phase = SessionPhase::kActive;
@@ -298,7 +319,17 @@ SessionPhase SessionRecord::phase() const {
 
 SessionState SessionRecord::state() const {
   const MutexLock lock(mutex_);
-  return status_.session;
+  return StateNow();
+}
+
+SessionState SessionRecord::StateNow() const {
+  SessionState state = status_.session;
+  state.stale = !silence_.empty();
+  if (state.stale && state.status.ok()) {
+    state.status = {StatusCode::kUnavailable,
+                    "stale: nothing arrives of " + silence_ + ", although the robot's client is alive"};
+  }
+  return state;
 }
 
 SessionRecord::Clock::duration SessionRecord::SuspendedFor(Clock::time_point now) const {
@@ -325,6 +356,7 @@ Ledger SessionRecord::LedgerOf(const Stream& stream) const {
 SessionSnapshot SessionRecord::snapshot() const {
   const MutexLock lock(mutex_);
   SessionSnapshot snapshot{.id = id_, .status = status_, .path = history_.view(), .landmarks = landmarks_};
+  snapshot.status.session = StateNow();
   for (const auto& [sensor_id, stream] : streams_) snapshot.status.ledgers.push_back(LedgerOf(stream));
   return snapshot;
 }

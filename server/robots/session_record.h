@@ -75,6 +75,9 @@ class SessionRecord {
   void SetAlive(bool alive);
   // Both return false and change nothing if the session has ended. It may have ended after the caller last looked.
   bool SetPhase(SessionPhase phase, Status status);
+  // Notices that nothing arrives of a stream although the robot's client is alive, and that it arrives again. Says
+  // whether this is news; state() and snapshot() show it as `stale`.
+  bool LookForSilence(Clock::time_point now);
   // The robot is connected again, perhaps by another client process. Its session continues this one.
   bool Resume(ClientId client, SessionToken session);
 
@@ -99,8 +102,9 @@ class SessionRecord {
     bool changed = true;
     std::uint64_t settled_when_taken = 0;
     Clock::time_point taken{};
-    bool resuming = false;      // After a restart, until the next expected number comes.
-    Clock::time_point aside{};  // When the first sample was rejected as kAside.
+    Clock::time_point arrived{};  // The last sample, whatever became of it.
+    bool resuming = false;        // Set after a restart, until the number after the last one arrives.
+    Clock::time_point aside{};    // When the first sample was rejected as kAside.
   };
   // Both callers hold the lock of `self`. The thread-safety analysis cannot see that.
   template <typename Archive>
@@ -109,6 +113,7 @@ class SessionRecord {
   Ledger NamesOf(NameId sensor_id, const std::string& sensor) const CAIRN_REQUIRES(mutex_);
   static bool IsDue(const Stream& stream, Clock::time_point now, Urgency urgency, Clock::duration period);
   Ledger TakeLedger(Stream& stream, Clock::time_point now) const CAIRN_REQUIRES(mutex_);
+  SessionState StateNow() const CAIRN_REQUIRES(mutex_);
   Ledger LedgerOf(const Stream& stream) const CAIRN_REQUIRES(mutex_);
   Stream* Find(NameId sensor_id) CAIRN_REQUIRES(mutex_);
 
@@ -118,6 +123,8 @@ class SessionRecord {
 
   mutable Mutex mutex_;
   RobotStatus status_ CAIRN_GUARDED_BY(mutex_);           // Its `ledgers` stay empty: they are made on demand.
+  std::string silence_ CAIRN_GUARDED_BY(mutex_);          // What is stale; empty: nothing.
+  Clock::time_point active_ CAIRN_GUARDED_BY(mutex_);     // Start of the activity, if active.
   Clock::time_point suspended_ CAIRN_GUARDED_BY(mutex_);  // Start of the suspension, if suspended.
   std::map<NameId, Stream> streams_ CAIRN_GUARDED_BY(mutex_);
   Stream odometry_ CAIRN_GUARDED_BY(mutex_);

@@ -1,5 +1,5 @@
 // cairn-study runs measurements for people: `cairn-study list`, `cairn-study NAME [--out DIR] [--quick]
-// [--seed N] [--log F] [--only TEXT]`.
+// [--seed N] [--log F] [--only TEXT] [--seconds S] [--runs N]`.
 // Exit codes: 0 done and plausible, 1 the study failed or a figure is not plausible, 2 wrong command line.
 #include <CLI/CLI.hpp>
 #include <exception>
@@ -23,10 +23,10 @@ int ListStudies() {
   return 0;
 }
 
-int RunNamed(const Study& study, const std::filesystem::path& out, bool quick, std::uint64_t seed,
-             const std::vector<std::filesystem::path>& logs, const std::string& only) {
-  Report report(out, "cairn-study " + study.name, std::cout);
-  StudyContext context{report, quick, seed, logs, only};
+int RunNamed(const Study& study, StudyContext context) {
+  Report& report = context.report;
+  const std::string& only = context.only;
+  const bool quick = context.quick;
   if (!only.empty()) report.Warn("only what is called *" + only + "*");
   if (quick) report.Warn("a quick run: fewer trials and shorter logs than the study is meant for");
   try {
@@ -49,6 +49,8 @@ int Main(int argc, char** argv) {
   std::string only;
   bool quick = false;
   std::uint64_t seed = 1;
+  double seconds = 0.0;
+  int runs = 0;
   CLI::App app{"Measures the estimators and draws the figures: tables, plots, a Markdown report."};
   app.set_version_flag("--version", std::string("cairn-study ") + kVersion);
   app.add_option("NAME", name, "`list` prints the studies")->required();
@@ -57,14 +59,21 @@ int Main(int argc, char** argv) {
   app.add_option("--seed", seed, "Seed of every random engine");
   app.add_option("--log", logs, "A log instead of the study's own choice; repeatable")->check(CLI::ExistingFile);
   app.add_option("--only", only, "For a study with several parts: run only those whose name contains this text");
+  app.add_option("--seconds", seconds, "How long to measure, for a study that lets you choose")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--runs", runs, "How often to measure, for a study that lets you choose")
+      ->check(CLI::NonNegativeNumber);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
   if (name == "list") return ListStudies();
-  for (const Study& study : AllStudies())
-    if (study.name == name) return RunNamed(study, out, quick, seed, logs, only);
+  for (const Study& study : AllStudies()) {
+    if (study.name != name) continue;
+    Report report(out, "cairn-study " + name, std::cout);
+    return RunNamed(study, {report, quick, seed, logs, only, seconds, runs});
+  }
   std::cerr << "cairn-study: no study is called '" << name << "'; `cairn-study list` prints them\n";
   return 2;
 }

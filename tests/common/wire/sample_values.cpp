@@ -94,6 +94,7 @@ SessionState ExtremeSessionState() {
           .status = {StatusCode::kDataLoss, Text('m')},
           .session = kMax64 - 2,
           .durable = true,
+          .stale = true,
           .generation = kMax64 - 3};
 }
 
@@ -268,7 +269,7 @@ bool Same(const SessionRequest& a, const SessionRequest& b) {
 bool Same(const SessionState& a, const SessionState& b) {
   return a.robot_id == b.robot_id && a.client == b.client && a.robot == b.robot && a.site == b.site &&
          a.phase == b.phase && Eq(a.status, b.status) && a.session == b.session && a.durable == b.durable &&
-         a.generation == b.generation;
+         a.stale == b.stale && a.generation == b.generation;
 }
 bool Same(const SessionRefusal& a, const SessionRefusal& b) {
   return Same(a.state, b.state);

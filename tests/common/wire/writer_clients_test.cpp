@@ -40,6 +40,16 @@ TEST(WriterClients, ForgetWritersThatAreGone) {
   EXPECT_EQ(clients.Changed({Handle(1), true, false}), std::nullopt);
 }
 
+// A client that joined the domain anew was taken for gone when its first participant left.
+TEST(WriterClients, AClientIsAliveWhileOneOfItsWritersIs) {
+  WriterClients clients;
+  EXPECT_TRUE(clients.Heard(Handle(1), 11));
+  EXPECT_TRUE(clients.Heard(Handle(2), 11));
+  EXPECT_EQ(clients.Changed({Handle(1), false, true}), std::nullopt);
+  EXPECT_EQ(clients.Changed({Handle(2), false, false}), ClientId{11});
+  EXPECT_TRUE(clients.Heard(Handle(3), 11));
+}
+
 TEST(WriterClients, FollowTheLastClientAWriterNamed) {
   WriterClients clients;
   EXPECT_TRUE(clients.Heard(Handle(1), 11));

@@ -1,0 +1,203 @@
+// The part of RobotClient that joins the domain, notices that a session stands still although a server is there, and
+// joins the domain anew. All that a reader or a writer believes about its peer belongs to the two participants: a new
+// one begins without it.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "client/lib/robot_client.h"
+
+namespace cairn::client {
+namespace {
+
+constexpr std::chrono::milliseconds kPatience{1800};  // Stale after that; with the watcher's period below 2 s.
+constexpr std::chrono::seconds kLostServer{3};        // Longer than a server that goes away is remembered.
+constexpr std::chrono::milliseconds kLoop{700};       // Until the server's word of a stream follows its samples.
+constexpr std::chrono::seconds kRetire{3};
+// Pauses between two renewals: they double, because a server may be silent for another reason, except while the guard
+// drops datagrams, when each new participant may be made deaf like the one before.
+constexpr std::chrono::seconds kShortestPause{2};
+constexpr std::chrono::seconds kLongestPause{60};
+constexpr std::chrono::milliseconds kResendPause{500};  // While stale: what was sent before the server's match is lost.
+
+}  // namespace
+
+Result<void> RobotClient::Advertise(Wire& wire) {
+  const auto advertise = [&wire](auto& publication) -> Result<void> {
+    using Value = typename std::remove_reference_t<decltype(*publication)>::ValueType;
+    auto made = wire.bus->Advertise<Value>();
+    if (!made) return tl::unexpected(made.error());
+    publication = std::move(*made);
+    return {};
+  };
+  if (auto made = advertise(wire.scans); !made) return made;
+  if (auto made = advertise(wire.odometry); !made) return made;
+  return advertise(wire.session);
+}
+
+// Only the values of the current wire count.
+template <typename Value>
+Result<void> RobotClient::Hear(Wire& wire, void (RobotClient::*on_value)(Value&&), wire::SubscriptionEvents events) {
+  auto subscription = wire.bus->Subscribe<Value>(
+      [this, on_value, number = wire.number](Value&& value) {
+        if (current_ == number) (this->*on_value)(std::move(value));
+      },
+      std::move(events));
+  if (!subscription) return tl::unexpected(subscription.error());
+  wire.subscriptions.push_back(std::move(*subscription));
+  return {};
+}
+
+Result<void> RobotClient::Subscribe(Wire& wire) {
+  wire::SubscriptionEvents events;
+  events.matched = [this, number = wire.number](int servers) {
+    if (current_ == number) OnMatched(servers);
+  };
+  if (auto heard = Hear(wire, &RobotClient::OnSession, std::move(events)); !heard) return heard;
+  if (auto heard = Hear(wire, &RobotClient::OnRefusal); !heard) return heard;
+  if (auto heard = Hear(wire, &RobotClient::OnLedger); !heard) return heard;
+  return Hear(wire, &RobotClient::OnPose);
+}
+
+std::shared_ptr<RobotClient::Wire> RobotClient::CurrentWire() const {
+  const MutexLock lock(mutex_);
+  return wire_;
+}
+
+bool RobotClient::connected() const {
+  return CurrentWire()->scans->matched() > 0;
+}
+
+void RobotClient::Sent(NameId sensor_id, std::uint64_t number) {
+  const auto now = Clock::now();
+  if (now - std::exchange(sent_at_, now) > kLoop) sending_since_ = now;
+  Stream& stream = streams_.find(sensor_id)->second;
+  if (stream.sent <= stream.arrived) stream.moved = now;
+  stream.sent = std::max(stream.sent, number);
+}
+
+void RobotClient::Arrived(Stream& stream, std::uint64_t through) {
+  const bool news = std::exchange(stream.arrived, through) != through;
+  if (std::exchange(stream.first, false) || !news) return;
+  stream.moved = stream.advanced = Clock::now();
+}
+
+// Why the session stands still; empty where it does not.
+std::string RobotClient::Silence(Clock::time_point now) {
+  const bool server = wire_->session->matched() > 0;
+  if (server) connected_at_ = now;
+  if (Answered() || !server) answered_at_ = now;
+  if (over_ || reopening_ || state_->phase == SessionPhase::kEnded) return {};
+  if (now - answered_at_ > kPatience) return "the server does not answer the session's request";
+  const bool hostile = wire_->bus->datagrams_refused() > refused_at_renewal_;
+  if (hostile && now - connected_at_ > kLostServer) return "no server is found any more";
+  for (const auto& [sensor_id, stream] : streams_) {
+    if (!Answered() || !server || stream.sent <= stream.arrived || now - stream.moved <= kPatience) continue;
+    return fmt::format("nothing that was sent has arrived at the server for {:.1f} s ({} of {} samples {})",
+                       std::chrono::duration<double>(now - stream.moved).count(), stream.arrived, stream.sent,
+                       sensor_id == HashName(kOdometrySensor) ? "of odometry" : "of scans");
+  }
+  const bool sending = now - sent_at_ < kLoop && now - sending_since_ > kLoop;
+  if (sending && state_->stale && now - called_stale_ > kLoop) return "the server says that nothing arrives";
+  return {};
+}
+
+// Whether everything that stood still goes on.
+bool RobotClient::Moving() const {
+  if (!Answered() || state_->stale) return false;
+  const auto moves = [&](const auto& entry)
+                         CAIRN_NO_THREAD_SAFETY_ANALYSIS { return entry.second.advanced > renewed_at_; };
+  if (backlog_.unsent() > 0 && std::none_of(streams_.begin(), streams_.end(), moves)) return false;
+  return std::all_of(streams_.begin(), streams_.end(), [&](const auto& entry) CAIRN_NO_THREAD_SAFETY_ANALYSIS {
+    const Stream& stream = entry.second;
+    return stream.sent <= stream.arrived || stream.advanced > renewed_at_;
+  });
+}
+
+bool RobotClient::RenewalDue(Clock::time_point now) {
+  const std::uint64_t refused = wire_->bus->datagrams_refused();
+  const bool hostile = refused > refused_at_renewal_;
+  const auto since = now - renewed_at_;
+  if (since < (hostile ? kShortestPause : renewal_pause_)) return false;
+  const bool long_ago = since > 2 * kLongestPause;
+  renewal_pause_ = hostile || long_ago ? kShortestPause
+                                       : std::clamp<Clock::duration>(2 * renewal_pause_, kShortestPause, kLongestPause);
+  return true;
+}
+
+// Nothing that was heard before counts any more, not even a generation: it may have been forged.
+void RobotClient::StartOver(Clock::time_point now) {
+  answered_ = false;
+  generation_ = 0;
+  answered_at_ = connected_at_ = renewed_at_ = now;
+  refused_at_renewal_ = wire_->bus->datagrams_refused();
+  sent_before_ = backlog_.size() - backlog_.unsent();
+  backlog_.Rewind();
+  for (auto& [sensor_id, stream] : streams_) {
+    stream.sent = stream.arrived = 0;
+    stream.moved = now;
+    stream.first = true;
+  }
+}
+
+// Called by the watcher again and again.
+void RobotClient::Recover() {
+  bool renew = false;
+  {
+    const MutexLock lock(mutex_);
+    const auto now = Clock::now();
+    std::string silence = Silence(now);
+    if (!silence.empty()) {
+      renew = RenewalDue(now);
+      stale_ = std::move(silence);
+      changed_.NotifyAll();
+    } else if (!stale_.empty() && Moving()) {
+      stale_.clear();
+      changed_.NotifyAll();
+    } else if (!stale_.empty() && Streaming() && backlog_.unsent() == 0 && now - sent_at_ > kResendPause) {
+      sent_before_ = backlog_.size();
+      backlog_.Rewind();
+    }
+  }
+  if (renew) Renew();
+  DropRetired();
+}
+
+// Another participant goes on with the session. Where none can be made, the one before stays.
+void RobotClient::Renew() {
+  const std::shared_ptr<Wire> before = CurrentWire();
+  auto bus = wire::Bus::Create(before->bus->options(), "robot");
+  if (!bus) return;
+  const auto wire = std::make_shared<Wire>();
+  wire->own = std::move(*bus);
+  wire->bus = wire->own.get();
+  wire->number = before->number + 1;
+  if (!Advertise(*wire)) return;
+  current_ = wire->number;
+  if (!Subscribe(*wire)) {
+    current_ = before->number;
+    return;
+  }
+  {
+    const MutexLock sending(sending_);
+    const MutexLock lock(mutex_);
+    wire_ = wire;
+    StartOver(Clock::now());
+  }
+  retired_.push_back(before);
+  renewed_.fetch_add(1, std::memory_order_relaxed);
+  Ask();
+}
+
+// Those before leave when the server knows their successor, so that it does not take the robot for gone.
+void RobotClient::DropRetired() {
+  if (retired_.empty()) return;
+  {
+    const MutexLock lock(mutex_);
+    if (!Answered() && Clock::now() - renewed_at_ < kRetire) return;
+  }
+  std::erase_if(retired_, [](const auto& wire) { return wire.use_count() == 1; });  // Others are just sending.
+}
+
+}  // namespace cairn::client

@@ -1,0 +1,56 @@
+#include "common/wire/sequence_gate.h"
+
+#include <algorithm>
+#include <functional>
+#include <string_view>
+
+namespace cairn::wire {
+
+std::size_t SequenceGate::Hash::operator()(const Key& key) const {
+  return std::hash<std::string_view>()({reinterpret_cast<const char*>(key.data()), key.size()});
+}
+
+bool SequenceGate::Accept(const Key& whose, std::int64_t number, Clock::time_point now) {
+  if (number < 0) return false;
+  const MutexLock lock(mutex_);
+  const auto known = peers_.find(whose);
+  if (known == peers_.end()) {
+    if (number > kMaxFirst) return false;
+    if (peers_.size() >= kMaxPeers) MakeRoom();
+    peers_.emplace(whose, Peer{number, static_cast<double>(kStep), now, now});
+    return true;
+  }
+  Peer& peer = known->second;
+  if (number <= peer.highest) return true;
+  const double silent_s = std::chrono::duration<double>(now - peer.raised).count();
+  const double allowed = peer.skips + static_cast<double>(kRate) * silent_s;
+  const auto skipped = static_cast<double>(number - peer.highest - 1);
+  if (skipped > allowed) return false;
+  peer.highest = number;
+  peer.skips = std::min(allowed - skipped, static_cast<double>(kStep));
+  peer.raised = now;
+  return true;
+}
+
+// Peers with invented names are heard once. Those that are known for longer stay.
+void SequenceGate::MakeRoom() {
+  constexpr std::chrono::seconds kKnown{1};
+  std::erase_if(peers_, [&](const auto& entry) { return entry.second.raised - entry.second.first < kKnown; });
+  if (peers_.size() >= kMaxPeers) peers_.clear();
+}
+
+void SequenceGate::Sent(const GuidPrefix& own, EntityId writer, std::int64_t number) {
+  const MutexLock lock(mutex_);
+  own_ = own;
+  std::int64_t& highest = sent_[writer];
+  highest = std::max(highest, number);
+}
+
+std::optional<std::int64_t> SequenceGate::LastSent(const GuidPrefix& to, EntityId writer) const {
+  const MutexLock lock(mutex_);
+  if (!own_ || (to != *own_ && to != GuidPrefix{})) return std::nullopt;
+  const auto known = sent_.find(writer);
+  return known == sent_.end() ? 0 : known->second;
+}
+
+}  // namespace cairn::wire

@@ -1,0 +1,65 @@
+// Decides whether the numbers in RTPS submessages are plausible: a forged one that is far ahead makes a reader or a
+// writer ignore everything up to it, so that a stream is deaf for as long as it takes to get there.
+//
+// What a peer numbers (samples, heartbeats, acknowledgements) may grow by one from datagram to datagram without limit.
+// It may skip numbers, because datagrams are lost and the first contact is late, but not more than kStep at once and
+// kRate a second: so many samples no writer of Cairn makes, not even while a network is silent for hours. The first
+// number of a peer may be any. What a peer acknowledges is compared with what the participant itself has sent.
+// Not a proof: a number that is a little too large passes, and a stream that stands still is noticed and made
+// anew elsewhere (client/lib/robot_client.h).
+// When its table is full, it forgets the peers that it has known for less than a second. Thread-safe.
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <unordered_map>
+
+#include "common/mutex.h"
+
+namespace cairn::wire {
+
+class SequenceGate {
+ public:
+  using Clock = std::chrono::steady_clock;
+  // Whose numbers: a GUID, and what it numbers (four bytes).
+  using Key = std::array<std::uint8_t, 20>;
+  using GuidPrefix = std::array<std::uint8_t, 12>;
+  using EntityId = std::uint32_t;  // As its four bytes stand in a datagram.
+
+  static constexpr std::int64_t kStep = 512;
+  static constexpr std::int64_t kRate = 5000;  // Per second.
+  // Limit of a first number. A writer that has run for years stays far below it.
+  static constexpr std::int64_t kMaxFirst = std::int64_t{1} << 40;
+  static constexpr std::size_t kMaxPeers = 16384;
+
+  // Accepts and stores a number of a peer, or refuses it. Lower numbers than before are always accepted.
+  [[nodiscard]] bool Accept(const Key& whose, std::int64_t number, Clock::time_point now);
+
+  // The participant's own: its GUID prefix, and the highest number that each of its writers has sent.
+  void Sent(const GuidPrefix& own, EntityId writer, std::int64_t number);
+  // The highest number sent by one of its writers, 0 where it has sent nothing; nothing where `to` (all zero:
+  // everybody) is another participant, or this one has not sent anything yet.
+  [[nodiscard]] std::optional<std::int64_t> LastSent(const GuidPrefix& to, EntityId writer) const;
+
+ private:
+  struct Hash {
+    std::size_t operator()(const Key& key) const;
+  };
+  struct Peer {
+    std::int64_t highest = 0;
+    double skips = 0.0;  // How many numbers it may skip at `raised`.
+    Clock::time_point first{};
+    Clock::time_point raised{};
+  };
+  void MakeRoom() CAIRN_REQUIRES(mutex_);
+
+  mutable Mutex mutex_;
+  std::unordered_map<Key, Peer, Hash> peers_ CAIRN_GUARDED_BY(mutex_);
+  std::optional<GuidPrefix> own_ CAIRN_GUARDED_BY(mutex_);
+  std::unordered_map<EntityId, std::int64_t> sent_ CAIRN_GUARDED_BY(mutex_);
+};
+
+}  // namespace cairn::wire

@@ -1,0 +1,245 @@
+// cairn-study hostile sends mutated and generated datagrams, from three senders as fast as they can, to a cairnd and
+// two robots that stream: whether a process dies, what the guard drops, whether streams become deaf and how soon they
+// flow again. Everything is on loopback in a domain of its own. Recording the traffic needs CAP_NET_RAW.
+// --seconds: of the long part (600); --runs: of the short ones (100).
+#include <algorithm>
+#include <map>
+#include <thread>
+
+#include "tests/studies/fleet/live_server.h"
+#include "tests/studies/study.h"
+#include "tests/system/hostile_traffic.h"
+#include "tests/temp_directory.h"
+#include "tests/test_domain.h"
+
+namespace cairn::studies {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using test::TestDomain;
+
+constexpr int kRobots = 2;
+constexpr int kSenders = 3;
+constexpr double kFlowTarget_s = 5.0;
+
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+double Share(std::vector<double> values, double share) {
+  if (values.empty()) return 0.0;
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+}
+
+// A cairnd and robots, each a process that is started again where it dies.
+class HostileFleet {
+ public:
+  HostileFleet() {
+    StartServer();
+    for (int i = 0; i < kRobots; ++i) robots_.push_back(StartRobot(i));
+  }
+
+  // What the server says of each robot: scans and odometry received, and whether it is stale. Nothing where it does not
+  // answer. Each answer comes to a process of its own, because nobody here should be heard by the senders.
+  struct RobotFlow {
+    std::uint64_t scans = 0;
+    std::uint64_t odometry = 0;
+    bool stale = false;
+  };
+  using Flow = std::map<std::string, RobotFlow>;
+  [[nodiscard]] static Flow Look() {
+    ChildProcess status({ProgramPath("cairn"), "status", "--timeout", "2", "--json", "--domain", DomainText()});
+    const auto outcome = status.Wait(std::chrono::seconds(20));
+    Flow flow;
+    const auto object = nlohmann::json::parse(outcome.output, nullptr, false);
+    if (outcome.exit_code != 0 || !object.is_object()) return flow;
+    for (const auto& robot : object["robots"]) {
+      RobotFlow& one = flow[robot["robot"]];
+      one.stale = robot["stale"];
+      for (const auto& ledger : robot["ledgers"]) {
+        one.scans = ledger["received"];
+        one.odometry = ledger["odometry_received"];
+      }
+    }
+    return flow;
+  }
+
+  // Starts again who has died; returns who.
+  std::vector<std::string> Bury() {
+    std::vector<std::string> dead;
+    if (!server_->RunningAfter(std::chrono::milliseconds(0))) {
+      dead.push_back("cairnd: " + LastWords(*server_));
+      StartServer();
+    }
+    for (int i = 0; i < kRobots; ++i) {
+      auto& robot = robots_[static_cast<std::size_t>(i)];
+      if (robot->RunningAfter(std::chrono::milliseconds(0))) continue;
+      dead.push_back("robot " + std::to_string(i + 1) + ": " + LastWords(*robot));
+      robot = StartRobot(i);
+    }
+    return dead;
+  }
+
+  // Seconds until scans and odometry of all robots arrive again; what it took to ask is included.
+  [[nodiscard]] double AwaitFlow(double patience_s) const {
+    const auto start = Clock::now();
+    Flow before;
+    while (SecondsSince(start) < patience_s) {
+      const Flow now = Look();
+      if (before.size() < kRobots) {
+        before = now;
+        continue;
+      }
+      const bool flows = std::all_of(before.begin(), before.end(), [&](const auto& entry) {
+        const auto found = now.find(entry.first);
+        return found != now.end() && found->second.scans > entry.second.scans &&
+               found->second.odometry > entry.second.odometry;
+      });
+      if (flows) return SecondsSince(start);
+    }
+    return patience_s;
+  }
+
+  // The server's log after it was asked to stop.
+  [[nodiscard]] std::string StopServer() {
+    server_->Signal(SIGTERM);
+    return server_->Wait().output;
+  }
+
+ private:
+  static std::string DomainText() { return std::to_string(TestDomain()); }
+
+  static std::string LastWords(ChildProcess& process) {
+    const auto outcome = process.Wait();
+    return (outcome.exit_code < 0 ? "by a signal: " : "exit code " + std::to_string(outcome.exit_code) + ": ") +
+           outcome.output.substr(outcome.output.size() - std::min<std::size_t>(outcome.output.size(), 600));
+  }
+
+  void StartServer() {
+    server_ = std::make_unique<ChildProcess>(std::vector<std::string>{ProgramPath("cairnd"), "--domain", DomainText(),
+                                                                      "--state", (directory_ / "state").string()});
+    if (!server_->Says(" ready")) throw std::runtime_error("cairnd does not start");
+  }
+  [[nodiscard]] static std::unique_ptr<ChildProcess> StartRobot(int i) {
+    return std::make_unique<ChildProcess>(std::vector<std::string>{ProgramPath("cairn"),
+                                                                   "sim",
+                                                                   "--site",
+                                                                   "hostile",
+                                                                   "--robots",
+                                                                   "1",
+                                                                   "--prefix",
+                                                                   "r" + std::to_string(i + 1) + "-",
+                                                                   "--beams",
+                                                                   "180",
+                                                                   "--hz",
+                                                                   "10",
+                                                                   "--world",
+                                                                   "building",
+                                                                   "--seconds",
+                                                                   "100000",
+                                                                   "--timeout",
+                                                                   "600",
+                                                                   "--domain",
+                                                                   DomainText(),
+                                                                   "--json"});
+  }
+
+  const TempDirectory directory_;
+  std::unique_ptr<ChildProcess> server_;
+  std::vector<std::unique_ptr<ChildProcess>> robots_;
+};
+
+struct Outcome {
+  std::uint64_t sent = 0;
+  double seconds = 0.0;
+  std::vector<std::string> deaths;
+  std::vector<double> silence_s;  // From each death until all flows again.
+  int looks = 0;                  // How often the server was asked during the traffic,
+  int unanswered = 0;             // without an answer,
+  int stale = 0;                  // or with a stale robot.
+  std::vector<double> flows_s;    // From the end of the traffic until everything flows.
+};
+
+// One run: traffic for so long, then the time until everything flows.
+void Attack(HostileFleet& fleet, double seconds, std::uint64_t seed, Outcome& outcome) {
+  auto recorded = test::RecordDatagrams(TestDomain(), std::chrono::seconds(2));
+  if (recorded.empty()) throw std::runtime_error("the traffic on loopback cannot be recorded (CAP_NET_RAW)");
+  const auto start = Clock::now();
+  {
+    test::HostileSenders senders(TestDomain(), std::move(recorded), kSenders, seed);
+    while (SecondsSince(start) < seconds) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+      for (std::string& dead : fleet.Bury()) {
+        const auto death = Clock::now();
+        outcome.deaths.push_back(std::move(dead));
+        static_cast<void>(fleet.AwaitFlow(60.0));
+        outcome.silence_s.push_back(SecondsSince(death));
+      }
+      const HostileFleet::Flow flow = HostileFleet::Look();
+      ++outcome.looks;
+      outcome.unanswered += flow.empty() ? 1 : 0;
+      outcome.stale += std::any_of(flow.begin(), flow.end(), [](const auto& one) { return one.second.stale; }) ? 1 : 0;
+    }
+    senders.Stop();
+    outcome.sent += senders.sent();
+  }
+  outcome.seconds += SecondsSince(start);
+  outcome.flows_s.push_back(fleet.AwaitFlow(120.0));
+  for (std::string& dead : fleet.Bury()) outcome.deaths.push_back(std::move(dead));
+}
+
+void Print(Report& report, const std::string& name, const Outcome& outcome) {
+  Table table({"traffic (s)", "datagrams", "deaths", "deaths per 10^6", "longest silence after a death (s)", "asked",
+               "no answer", "stale", "flows again p50 (s)", "p99 (s)", "longest (s)", "within 5 s"});
+  const auto longest = [](const std::vector<double>& values) {
+    return values.empty() ? 0.0 : *std::max_element(values.begin(), values.end());
+  };
+  const auto within = std::count_if(outcome.flows_s.begin(), outcome.flows_s.end(),
+                                    [](double value) { return value <= kFlowTarget_s; });
+  table.Add({Number(outcome.seconds, 0), Count(static_cast<long long>(outcome.sent)),
+             Count(static_cast<long long>(outcome.deaths.size())),
+             Number(1e6 * static_cast<double>(outcome.deaths.size()) / static_cast<double>(outcome.sent), 3),
+             Number(longest(outcome.silence_s), 2), Count(outcome.looks), Count(outcome.unanswered),
+             Count(outcome.stale), Number(Share(outcome.flows_s, 0.5), 2), Number(Share(outcome.flows_s, 0.99), 2),
+             Number(longest(outcome.flows_s), 2),
+             Count(within) + " of " + Count(static_cast<long long>(outcome.flows_s.size()))});
+  report.Add(table, name);
+  for (const std::string& death : outcome.deaths) report.Text("Died: " + death);
+  report.Expect(outcome.deaths.empty(), "a process died");
+  report.Expect(within == static_cast<long>(outcome.flows_s.size()), "a stream did not flow again within 5 s");
+}
+
+void StudyHostile(StudyContext& context) {
+  Report& report = context.report;
+  HostileFleet fleet;
+  if (fleet.AwaitFlow(30.0) >= 30.0) return report.Fault("the robots do not stream");
+  if (context.Wants("long")) {
+    report.Heading("Traffic without a pause");
+    Outcome outcome;
+    Attack(fleet, context.seconds > 0 ? context.seconds : context.Pick(600.0, 10.0), context.seed, outcome);
+    Print(report, "long", outcome);
+  }
+  if (context.Wants("runs")) {
+    report.Heading("Short runs: the time until everything flows again");
+    const int runs = context.runs > 0 ? context.runs : context.Pick(100, 3);
+    Outcome outcome;
+    for (int run = 0; run < runs; ++run) {
+      Attack(fleet, 5.0, context.seed + 7 + static_cast<std::uint64_t>(run), outcome);
+      report.Progress("run " + Count(run + 1) + ": flows again after " + Number(outcome.flows_s.back(), 2) + " s, " +
+                      Count(static_cast<long long>(outcome.deaths.size())) + " deaths so far");
+    }
+    Print(report, "runs", outcome);
+  }
+  const std::string log = fleet.StopServer();
+  const auto refused = log.find("datagrams refused");
+  report.Text("cairnd's last participant: " + (refused == std::string::npos
+                                                   ? "it did not say what it refused"
+                                                   : log.substr(refused, log.find('\n', refused) - refused)));
+}
+
+const Registration kHostile("hostile", "mutated and forged datagrams at full rate against a server and two robots",
+                            StudyHostile);
+
+}  // namespace
+}  // namespace cairn::studies
