@@ -64,6 +64,10 @@ Eigen::Matrix3d J_inverse(const Pose2& T_a_b) {
   return J;
 }
 
+Eigen::Matrix3d PoseCovariance(double sigma_m, double sigma_rad) {
+  return Eigen::Vector3d(sigma_m * sigma_m, sigma_m * sigma_m, sigma_rad * sigma_rad).asDiagonal();
+}
+
 bool IsCovariance(const Eigen::Matrix3d& matrix, double tolerance) {
   if (!matrix.allFinite()) return false;
   const double scale = std::max(1e-300, matrix.cwiseAbs().maxCoeff());

@@ -39,6 +39,9 @@ struct Pose2 {
 // d(T^-1) / d(T).
 [[nodiscard]] Eigen::Matrix3d J_inverse(const Pose2& T_a_b);
 
+// The covariance of (x, y, theta) with these standard deviations of x and of y, and of theta, without correlation.
+[[nodiscard]] Eigen::Matrix3d PoseCovariance(double sigma_m, double sigma_rad);
+
 // True if the matrix is finite, symmetric within `tolerance` of its scale, and positive semi-definite.
 [[nodiscard]] bool IsCovariance(const Eigen::Matrix3d& matrix, double tolerance = 1e-9);
 

@@ -41,10 +41,6 @@ void Visit(OptionVisitor& visitor, MapperOptions& options) {
   visitor.Section("grid", "The occupancy grid.", [&] { Visit(visitor, options.grid); });
   visitor.Section("pairing", "Finding the odometry at the time of each scan.",
                   [&] { Visit(visitor, options.pairing); });
-  // Otherwise places between the two distances would be found by neither search.
-  visitor.Require(
-      !options.revisit.enabled || !options.loop.enabled || options.loop.min_way_m <= options.revisit.max_way_m,
-      "loop.min_way_m", "must not exceed", "revisit.max_way_m");
 }
 
 Result<void> Validate(const MapperOptions& options) {

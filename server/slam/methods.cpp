@@ -96,9 +96,6 @@ void Visit(OptionVisitor& visitor, FilterOptions& options) {
   visitor.Integer("particles", options.particles, "1", 1, 10000,
                   ForOperators("Number of particles of FastSLAM and DP-SLAM. More particles close larger loops, and "
                                "take proportionally more time and memory."));
-  visitor.Real("max_nis", options.back_end.max_nis, "1", 1.0, 1000.0,
-               "Largest squared Mahalanobis distance that an observation may count for. A larger value lets "
-               "contradicting observations increase the uncertainty of the pose further.");
   visitor.Integer(
       "diverged_after", options.back_end.diverged_after, "1", 1, 100000,
       "Number of revisits in a row that contradict the estimate after which the robot counts as not localized.");

@@ -60,7 +60,7 @@ enum class FilterKind : std::uint8_t {
 struct FilterOptions {
   FilterKind kind = FilterKind::kFastSlam2Points;
   std::int64_t particles = 200;
-  // In the configuration: slam.drift, slam.landmarks, slam.max_nis, slam.diverged_after.
+  // In the configuration: slam.drift, slam.landmarks, slam.diverged_after.
   BackEndOptions back_end;
   FastSlamOptions fastslam;
   MotionSampling sampling;  // How FastSLAM 1.0 samples a step; in the configuration: slam.fastslam.motion.

@@ -45,8 +45,8 @@ TEST(ServerOptions, MoreJobsAreKeptThanWait) {
 }
 
 TEST(ServerOptions, RulesOfTheEstimatorCountToo) {
-  EXPECT_EQ(Contradiction({"slam.loop.doubt_m=13"}),
-            "slam.loop.doubt_m (13) must not exceed slam.loop.max_doubt_m (12)");
+  EXPECT_EQ(Contradiction({"slam.grid.hit_probability=0.985"}),
+            "slam.grid.hit_probability (0.985) must not exceed slam.grid.clamp_probability (0.98)");
 }
 
 }  // namespace

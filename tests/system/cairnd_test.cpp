@@ -122,7 +122,7 @@ TEST(CairndCommandLine, TheFirstPageIsForOperators) {
   for (const char* wanted : {"domain:", "interfaces:", "log_level:", "threads:", "max_robots:", "particles:", "filter:",
                              "matcher:", "use_odometry:", "max_tilt_rad:", "resolution_m:"})
     EXPECT_THAT(first, HasSubstr(wanted));
-  EXPECT_EQ(first.find("doubt_m"), std::string::npos);
+  EXPECT_EQ(first.find("max_rival"), std::string::npos);
 }
 
 TEST(CairndCommandLine, AnAddressOfAnotherMachineIsAClearStartUpError) {

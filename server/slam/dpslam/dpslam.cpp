@@ -13,6 +13,12 @@ namespace {
 // space that the map shows as free.
 constexpr double kContradiction = -1.0;
 
+// The low level continues for so many scans before it hands a segment up, because the best particle becomes clear only
+// later. With robot 3 of the study `dpslam` and 60 + 60 particles, the heading after 100 m is 8.5 deg off without
+// hindsight and 0.2 deg with it (one robot only). Half or twice the value changes the error on the first 600 scans of
+// mit-csail by 1 % (study `sensitivity`).
+constexpr std::size_t kHindsightScans = 10;
+
 }  // namespace
 
 DpSlam::DpSlam(const DpSlamOptions& options, const Pose2& T_map_robot_start, std::uint64_t seed)
@@ -89,7 +95,7 @@ void DpSlam::Commit() {
 }
 
 std::size_t DpSlam::SegmentEnd() const {
-  const auto hindsight = plain_ ? 0 : static_cast<std::size_t>(options_.segment.hindsight_scans);
+  const auto hindsight = plain_ ? 0 : kHindsightScans;
   if (pending_.size() <= hindsight) return 0;
   const std::size_t count = pending_.size() - hindsight;
   if (count >= static_cast<std::size_t>(options_.segment.max_scans)) return count;

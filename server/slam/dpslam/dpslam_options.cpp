@@ -36,9 +36,6 @@ void Visit(OptionVisitor& visitor, DpSlamOptions& options) {
     visitor.Real("straight_rad", segment.straight_rad, "rad", 0.0, 3.2,
                  "A segment does not end in a step with a larger turn, unless it has max_scans.");
     visitor.Integer("max_scans", segment.max_scans, "1", 1, 10000, "A segment ends at the latest after so many scans.");
-    visitor.Integer("hindsight_scans", segment.hindsight_scans, "1", 0, 1000,
-                    "The lower level continues for so many scans before it hands a segment up, because the best "
-                    "particle becomes clear only later.");
     visitor.Real("keep_m", segment.keep_m, "m", 1.0, 1000.0,
                  "The lower level forgets the map beyond this distance. It must be farther than the laser sees.");
     visitor.Integer("trajectories", segment.trajectories, "1", 1, 1000,

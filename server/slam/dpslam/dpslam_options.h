@@ -14,9 +14,6 @@ struct SegmentOptions {
   double length_m = 12.0;
   double straight_rad = 0.15;
   std::int64_t max_scans = 150;
-  // Evidence: with robot 3 of the study's loop and 60 + 60 particles, the heading after 100 m is 8.5 deg off
-  // without hindsight and 0.2 deg with it. This is one robot only.
-  std::int64_t hindsight_scans = 10;
   double keep_m = 25.0;
   std::int64_t trajectories = 1;
 };
@@ -54,8 +51,8 @@ enum class HighLevelKind : std::uint8_t {
   kMoving = 0,
   // The method of thesis C 4.5.2: at every joint each particle draws all of the drift, is weighted by the
   // whole
-  // segment in its own map, resampled, and draws the segment. The low level then begins a new map at the
-  // joint. `segment.hindsight_scans`, `keep_m` and `trajectories` have no effect.
+  // segment in its own map, resampled, and draws the segment. The low level then begins a new map at the joint.
+  // There is no hindsight, and `segment.keep_m` and `trajectories` have no effect.
   kPlain,
 };
 

@@ -27,9 +27,6 @@ void Visit(OptionVisitor& visitor, LevelOptions& options) {
   visitor.Real("evidence_share", options.evidence_share, "1", 0.001, 1.0,
                "Share of the log likelihood of a ray that counts, because neighbouring rays have similar errors. 1 "
                "treats all rays as independent.");
-  visitor.Real("unseen_per_m", options.unseen_per_m, "1/m", 0.001, 100.0,
-               "Density of the ends of rays in space that was not seen before. With a smaller value maps shrink; with "
-               "a larger one known walls are not found again.");
   visitor.Real("outlier_share", options.outlier_share, "1", 0.0001, 0.99,
                "Share of the rays that end on something that is not in the map, such as people.");
   visitor.Real("resample_below", options.resample_below, "1", 0.0, 1.0,

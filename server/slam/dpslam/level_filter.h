@@ -23,7 +23,7 @@ struct LevelOptions {
   double sigma_m = 0.05;
   double evidence_share = 0.15;
   double outlier_share = 0.05;
-  double unseen_per_m = 2.0;    // About the density of a well explained ray.
+  double unseen_per_m = 2.0;    // Density of the ends of rays in unseen space: that of a well explained ray.
   double resample_below = 1.0;  // Resample after every scan, as in the source.
   std::int64_t ray_stride = 1;
   double give_up_behind = 12.0;
@@ -31,7 +31,7 @@ struct LevelOptions {
   // segment at its joint that particles draw.
   MotionNoise drift{0.004, 0.05, 0.01, 0.001, 0.01, 0.05};
 };
-void Visit(OptionVisitor& visitor, LevelOptions& options);  // Reads all fields but `particles`.
+void Visit(OptionVisitor& visitor, LevelOptions& options);  // Reads all fields but `particles` and `unseen_per_m`.
 
 struct GridParticle {
   Pose2 T_map_robot;

@@ -48,7 +48,7 @@ bool EkfSlam::Observe(const RevisitObservation& revisit) {
   const Eigen::Matrix3d J_z_hung = J_z_keyframe * J_compose_right(T_map_anchor, hung.T_anchor_robot);
   const Eigen::Matrix3d R = revisit.covariance + J_z_hung * hung.covariance * J_z_hung.transpose();
   const double nis = Nis<3>(innovation.v, state_.InnovationCovariance<3, 3>(innovation.J_z_pose, at, J_z_anchor, R));
-  const bool explained = nis < back_end_.max_nis;
+  const bool explained = nis < kMaxNis;
   contradictions_.Add(explained);
   if (!explained) return false;
   nis_.Add(nis, 3);
@@ -101,7 +101,7 @@ Association EkfSlam::Associate(const LandmarkSighting& sighting, double travelle
   for (std::size_t l = 0; l < landmarks_.size(); ++l) {
     const Entry& entry = landmarks_[l];
     if (!Alike(entry.signature, sighting.signature, options)) continue;
-    if ((state_.point(entry.at) - p_map).norm() > options.match_distance_m) continue;
+    if ((state_.point(entry.at) - p_map).norm() > kMatchDistanceM) continue;
     if (!SlopesAgree(sighting, T_map_robot.theta, entry.slope_map, entry.signature, options)) continue;
     const RangeBearing expected = PredictRangeBearing(T_map_robot, state_.point(entry.at));
     Eigen::Vector2d v = measured.z - expected.z;

@@ -104,7 +104,7 @@ FastSlam<LandmarkModel>::FastSlam(const FastSlamOptions& options, const BackEndO
       gate_(ChiSquareQuantile(back_end.landmarks.match_share, LandmarkModel::kGateNumbers)),
       new_nis_(ChiSquareQuantile(back_end.landmarks.match_share, LandmarkModel::kNumbers)),
       candidates_(back_end.landmarks),
-      set_(options, back_end.max_nis, particles, T_map_robot_start, seed, std::move(sampler)),
+      set_(options, particles, T_map_robot_start, seed, std::move(sampler)),
       maps_(static_cast<std::size_t>(particles)),
       contradictions_(back_end.diverged_after) {}
 
@@ -180,7 +180,7 @@ template <typename LandmarkModel>
 std::vector<std::size_t> FastSlam<LandmarkModel>::SlotsInReach(const LandmarkSighting& sighting) const {
   Eigen::AlignedBox2d box;
   for (const Particle& particle : set_.particles()) box.extend(particle.T_map_robot * sighting.p_robot);
-  const Eigen::Vector2d reach = Eigen::Vector2d::Constant(options_.landmarks.match_distance_m);
+  const Eigen::Vector2d reach = Eigen::Vector2d::Constant(kMatchDistanceM);
   return index_.Near(sighting.signature, {box.min() - reach, box.max() + reach}, options_.landmarks);
 }
 
@@ -195,7 +195,7 @@ Association FastSlam<LandmarkModel>::Associate(std::size_t particle, const Landm
   for (const std::size_t slot : slots) {
     if (slot >= map.size() || map[slot].sightings == 0) continue;
     const Entry& entry = map[slot];
-    if ((entry.landmark.p_map() - p_map).norm() > options_.landmarks.match_distance_m) continue;
+    if ((entry.landmark.p_map() - p_map).norm() > kMatchDistanceM) continue;
     if (!SlopesAgree(sighting, belief.T_map_robot.theta, entry.landmark.slope(), index_.signature(slot),
                      options_.landmarks))
       continue;

@@ -26,10 +26,6 @@ namespace cairn::slam {
 struct FastSlamOptions {
   double sample_distance_m = 1.0;
   double resample_below = 0.5;
-  // Only the study of sensitivity sets these.
-  double agreement_m = 0.5;    // Particles this near to the best one take part in the reported pose.
-  double loop_sigma_m = 0.05;  // Standard deviation of the pose after a large loop, which does not make it exact.
-  double loop_sigma_rad = 0.01;
 };
 void Visit(OptionVisitor& visitor, FastSlamOptions& options);
 
@@ -53,8 +49,8 @@ struct Particle {
 class ParticleSet {
  public:
   // `sampler` is needed for PredictBySampling only. REQUIRES: count > 0.
-  ParticleSet(const FastSlamOptions& options, double max_nis, std::int64_t count, const Pose2& T_map_robot_start,
-              std::uint64_t seed, MotionSampler sampler = {});
+  ParticleSet(const FastSlamOptions& options, std::int64_t count, const Pose2& T_map_robot_start, std::uint64_t seed,
+              MotionSampler sampler = {});
 
   // Moves every particle along the step and increases its covariance (Table 4.2). `covariance_prev` is in the
   // frame in which the step starts.
@@ -67,14 +63,14 @@ class ParticleSet {
   // Proposal and weight for one revisit. False if no particle explains it; then nothing changes.
   bool Observe(const RevisitObservation& revisit);
   // Proposal and weight for one innovation of a landmark. Its squared Mahalanobis distance counts at most as
-  // `max_nis` in the weight.
+  // kMaxNis in the weight.
   template <int N>
   void Fuse(std::size_t index, const Innovation<N>& innovation) {
     Particle& particle = particles_[index];
     const Eigen::Matrix<double, N, N> S = innovation.S(particle.covariance);
     const double nis = Nis<N>(innovation.v, S);
-    AddLogLikelihood(index, LogDensity<N>(std::min(nis, max_nis_), S));
-    if (nis < max_nis_) CorrectPose<N>(particle.T_map_robot, particle.covariance, innovation);
+    AddLogLikelihood(index, LogDensity<N>(std::min(nis, kMaxNis), S));
+    if (nis < kMaxNis) CorrectPose<N>(particle.T_map_robot, particle.covariance, innovation);
   }
   // Updates the error ensemble with an observation of something first seen from `keyframe`. `innovation` is
   // that of the best particle.
@@ -129,7 +125,6 @@ class ParticleSet {
 
   FastSlamOptions options_;
   MotionSampler sampler_;
-  double max_nis_;
   Rng rng_;
   std::vector<Particle> particles_;
   ErrorEnsemble errors_;

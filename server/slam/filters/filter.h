@@ -23,12 +23,15 @@
 
 namespace cairn::slam {
 
+// Largest squared Mahalanobis distance that an observation may count for. With a larger value contradicting
+// observations raise the doubt about the pose further. Half or twice the value changes no error (study `sensitivity`).
+inline constexpr double kMaxNis = 16.0;
+
 // Options that all filters of the mapper share: the drift of the motion that they receive, landmarks, and
 // when a filter counts as diverged.
 struct BackEndOptions {
   MotionNoise drift{0.002, 0.01, 0.005, 0.0005, 0.002, 0.005};
   LandmarkOptions landmarks;
-  double max_nis = 16.0;
   std::int64_t diverged_after = 10;
 };
 

@@ -35,10 +35,7 @@ struct PoseRelation {
 struct PoseGraphOptions {
   bool enabled = true;  // False: thesis A 5.4.
   std::int64_t max_iterations = 20;
-  // Only the study of sensitivity sets these two.
-  double widening = 10.0;   // Ratio of the width of the loss in one of its three steps to the width in the next.
-  double tolerance = 1e-4;  // Relative change of the cost at which the least squares stop.
-  double loop_loss = 3.0;
+  double tolerance = 1e-4;  // Relative change of the cost at which the least squares stop; not in the configuration.
 };
 void Visit(OptionVisitor& visitor, PoseGraphOptions& options);
 

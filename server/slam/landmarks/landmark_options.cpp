@@ -25,8 +25,6 @@ void Visit(OptionVisitor& visitor, LandmarkOptions& options) {
   visitor.Real("forget_m", options.forget_m, "m", 0.1, 1000.0,
                "A feature that is not yet a landmark is forgotten when the robot has travelled this far since it was "
                "last seen.");
-  visitor.Real("match_distance_m", options.match_distance_m, "m", 0.01, 10.0,
-               "A feature and the landmark that it may be lie at most this far apart.");
   visitor.Real("match_slope_rad", options.match_slope_rad, "rad", 0.001, 1.6,
                "A feature and the landmark that it may be differ at most by this in direction.");
   visitor.Real("match_share", options.match_share, "1", 0.5, 0.999999,

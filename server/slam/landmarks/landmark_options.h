@@ -16,6 +16,10 @@ struct LandmarkNoise {
   double slope_rad = 0.05;
 };
 
+// A feature and the landmark that it may be lie at most this far apart. Half or twice the value changes the errors no
+// more than another seed (study `sensitivity`).
+inline constexpr double kMatchDistanceM = 0.8;
+
 struct LandmarkOptions {
   bool enabled = true;
   LandmarkNoise noise;
@@ -27,7 +31,6 @@ struct LandmarkOptions {
   double crowded_m = 0.6;
   double forget_m = 10.0;
   // From candidate to landmark.
-  double match_distance_m = 0.8;
   double match_slope_rad = Radians(12.0);
   double match_share = 0.9975;
   double min_travel_m = 5.0;

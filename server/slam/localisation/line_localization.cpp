@@ -56,8 +56,7 @@ LineLocalization::LineLocalization(const LocalizationOptions& options, const Bac
       tracking_(options.start_known) {
   if (!options_.map) options_.map = std::make_shared<const std::vector<MapLine>>();
   if (!options_.start_known) return;
-  const Eigen::Vector3d sigma(options_.start_sigma_m, options_.start_sigma_m, options_.start_sigma_rad);
-  path_.Correct(T_map_robot_start, sigma.cwiseAbs2().asDiagonal());
+  path_.Correct(T_map_robot_start, PoseCovariance(options_.start_sigma_m, options_.start_sigma_rad));
 }
 
 void LineLocalization::Predict(const StepMotion& step) {

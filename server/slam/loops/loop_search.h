@@ -22,35 +22,15 @@ namespace cairn::slam {
 
 struct LoopOptions {
   bool enabled = true;
-  double min_way_m = 60.0;
   double every_m = 1.0;
-  double recent_m = 15.0;
-  double around_m = 15.0;
-  double doubt_m = 1.5;
   double doubt_per_m = 0.02;
-  double doubt_rad = 0.1;
   double doubt_rad_per_m = 0.001;
   double max_doubt_m = 12.0;
-  double max_doubt_rad = 0.6;
-  double min_score = 0.5;
   double max_rival = 0.9;
-  double min_explained = 0.5;
   double max_conflict = 0.10;
   double confirm_after_m = 1.5;
-  double confirm_within_m = 10.0;
-  double agree_m = 0.5;
-  double agree_rad = 0.06;
   double sigma_m = 0.1;
-  double sigma_rad = 0.01;
-  double search_cell_m = 0.1;         // Cell of the raster for the search.
-  double likelihood_reach_m = 0.3;    // At this distance from a surface the likelihood is zero.
-  std::int64_t candidate_stride = 4;  // Only every candidate_stride-th old keyframe is used.
-  // A pose is a rival of the best one if it is farther away than this, or if its heading differs by more.
-  double rival_beyond_m = 1.0;
-  double rival_beyond_rad = 0.3;
-  Eigen::Vector3d align_variances{0.25, 0.25, 0.01};  // Variances (x, y, theta) before alignment.
-  double near_share = 2.0;                            // Tolerance for a surface, in inlier distances.
-  FreeSpaceOptions free_space;
+  double free_cell_m = 0.2;
 };
 void Visit(OptionVisitor& visitor, LoopOptions& options);
 
@@ -91,7 +71,6 @@ class LoopSearch {
                                                    const Pose2& T_old_recent_guess) const;
   [[nodiscard]] bool Agree(const LoopClosure& a, const LoopClosure& b, std::span<const KeyframeShape> shapes) const;
   [[nodiscard]] double Reach(double way_m) const;
-  [[nodiscard]] Eigen::Matrix3d Covariance() const;
 
   LoopOptions options_;
   PointToLineOptions align_;

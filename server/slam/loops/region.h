@@ -13,6 +13,11 @@
 
 namespace cairn::slam {
 
+// An old place that is farther away along the known relations belongs to a large loop (LoopSearch), and a nearer one to
+// a revisit (RevisitSearch), so that no place lies between the two searches. Half or twice the value changes the
+// results no more than another seed (study `sensitivity`).
+inline constexpr double kLargeLoopM = 60.0;
+
 // The keyframes [first, last], with poses relative to `anchor`.
 struct Stretch {
   std::size_t first = 0;
@@ -50,24 +55,18 @@ struct KeyframeCost {
 [[nodiscard]] std::vector<std::size_t> BestPlaces(std::vector<KeyframeCost> all, std::span<const KeyframeShape> shapes,
                                                   double apart_m, std::size_t most);
 
-struct FreeSpaceOptions {
-  double cell_m = 0.2;
-  double max_ray_m = 15.0;  // Beyond this range neighbouring beams leave gaps.
-  double every_m = 0.75;    // Distance between the keyframes drawn.
-};
-
 // The space through which beams of a stretch passed and in which none ended.
 class FreeSpace {
  public:
-  FreeSpace(const Trail& trail, const Stretch& stretch, const FreeSpaceOptions& options = {});
+  FreeSpace(const Trail& trail, const Stretch& stretch, double cell_m);
 
   // True if beams passed this point and none ended within a cell of it.
   [[nodiscard]] bool Contradicts(const Eigen::Vector2d& p_anchor) const;
 
  private:
-  FreeSpaceOptions options_;
   enum class Seen : std::uint8_t { kNot = 0, kThrough, kHit };
 
+  double cell_m_;
   int low_x_ = 0, low_y_ = 0;
   int width_ = 0, height_ = 0;
   std::vector<Seen> cells_;

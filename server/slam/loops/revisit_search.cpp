@@ -6,14 +6,22 @@
 namespace cairn::slam {
 namespace {
 
+// Half or twice of each of these changes the errors no more than another seed (study `sensitivity`).
+constexpr double kMinRevisitTravelM = 12.0;  // After a shorter way it is still the same visit of a place.
+constexpr std::size_t kGuesses = 6;          // Further particles whose poses are tried if that of the best one fails.
+constexpr double kGuessSigmaM = 0.5;         // Standard deviation of the position of a guess.
+constexpr double kGuessSigmaRad = 0.15;      // Standard deviation of its heading.
+constexpr double kMinRevisitScore = 0.6;     // Share of the points of the scan that must be explained.
+constexpr double kRevisitSigmaRad = 0.02;    // Standard deviation that is added to the heading of a match.
+
 // The old keyframe that most likely shows the same surroundings: near, and with a similar heading.
 std::optional<std::size_t> NearestKeyframe(const Hypothesis& belief, const Trail& trail, double travelled_m,
                                            const RevisitOptions& options) {
   std::optional<std::size_t> nearest;
   double best = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < trail.size(); ++k) {
-    if (travelled_m - trail.shapes()[k].travelled_m < options.min_travel_m) break;
-    if (trail.distances_m()[k] > options.max_way_m) continue;
+    if (travelled_m - trail.shapes()[k].travelled_m < kMinRevisitTravelM) break;
+    if (trail.distances_m()[k] > kLargeLoopM) continue;
     const Pose2& T_map_k = belief.path[k];
     const double distance = (T_map_k.translation() - belief.T_map_robot.translation()).norm();
     if (distance > options.max_distance_m) continue;
@@ -32,36 +40,20 @@ std::optional<std::size_t> NearestKeyframe(const Hypothesis& belief, const Trail
 
 void Visit(OptionVisitor& visitor, RevisitOptions& options) {
   visitor.Flag("enabled", options.enabled, "Whether scans are matched with places that were seen before.");
-  visitor.Real("min_travel_m", options.min_travel_m, "m", 0.0, 1000.0,
-               "Way between two visits of a place. After a shorter way it is still the same visit.");
-  visitor.Real("max_way_m", options.max_way_m, "m", 0.0, 1e9,
-               "Longest way along the known relations between the robot and the old place. Beyond it a large loop must "
-               "be found first.");
   visitor.Real("max_distance_m", options.max_distance_m, "m", 0.1, 20.0,
                "Largest distance between the robot and an old keyframe.");
   visitor.Real("max_turn_rad", options.max_turn_rad, "rad", 0.05, 3.2,
                "Largest difference between the headings of the robot and of an old keyframe.");
   visitor.Integer("neighbours", options.neighbours, "1", 0, 100,
                   "Number of keyframes before and after the old one whose surfaces are used as well.");
-  visitor.Integer("guesses", options.guesses, "1", 0, 100,
-                  "Number of further particles whose poses are tried if that of the best one fails.");
-  visitor.Real(
-      "guess_sigma_m", options.guess_sigma_m, "m", 0.01, 10.0,
-      "Standard deviation of the position of a guess. With a larger value the match may move farther away from it.");
-  visitor.Real("guess_sigma_rad", options.guess_sigma_rad, "rad", 0.001, 3.2,
-               "Standard deviation of the heading of a guess.");
-  visitor.Real("min_score", options.min_score, "1", 0.0, 1.0,
-               "Share of the points of the scan that must be explained.");
   visitor.Real(
       "sigma_m", options.sigma_m, "m", 0.0, 5.0,
       "Standard deviation that is added to the position of a match, because neighbouring matches have similar errors.");
-  visitor.Real("sigma_rad", options.sigma_rad, "rad", 0.0, 1.0,
-               "Standard deviation that is added to the heading of a match.");
 }
 
 RevisitSearch::RevisitSearch(const RevisitOptions& options, const PointToLineOptions& align)
     : options_(options), align_(align), reference_(align.first_pair_distance_m) {
-  align_.min_score = options.min_score;
+  align_.min_score = kMinRevisitScore;
 }
 
 std::optional<RevisitObservation> RevisitSearch::Find(std::span<const SurfacePoint> points_robot, const Trail& trail,
@@ -72,10 +64,7 @@ std::optional<RevisitObservation> RevisitSearch::Find(std::span<const SurfacePoi
   const std::optional<std::size_t> centre = NearestKeyframe(best, trail, travelled_m, options_);
   if (!centre) return std::nullopt;
   BuildReference(trail.shapes(), *centre);
-  const Eigen::Matrix3d prior =
-      Eigen::Vector3d(options_.guess_sigma_m * options_.guess_sigma_m, options_.guess_sigma_m * options_.guess_sigma_m,
-                      options_.guess_sigma_rad * options_.guess_sigma_rad)
-          .asDiagonal();
+  const Eigen::Matrix3d prior = PoseCovariance(kGuessSigmaM, kGuessSigmaRad);
   const auto align = [&](const Hypothesis& belief) {
     const Pose2 guess = Between(belief.path[*centre], belief.T_map_robot);
     return AlignPointsToSurfaces(points_robot, reference_, {guess, guess, prior}, align_);
@@ -83,11 +72,9 @@ std::optional<RevisitObservation> RevisitSearch::Find(std::span<const SurfacePoi
   MatchResult match = align(best);
   if (!match.converged) match = AlignFromOthers(filter, align, parallel_for);
   if (!match.converged) return std::nullopt;
-  RevisitObservation revisit{*centre, match.T_ref_curr, match.covariance};
-  revisit.covariance.diagonal() +=
-      Eigen::Vector3d(options_.sigma_m * options_.sigma_m, options_.sigma_m * options_.sigma_m,
-                      options_.sigma_rad * options_.sigma_rad);
-  return revisit;
+  // Neighbouring matches have similar errors.
+  return RevisitObservation{*centre, match.T_ref_curr,
+                            match.covariance + PoseCovariance(options_.sigma_m, kRevisitSigmaRad)};
 }
 
 // Aligns with other hypotheses of the filter, and returns the result that explains most.
@@ -95,7 +82,7 @@ MatchResult RevisitSearch::AlignFromOthers(const Filter& filter,
                                            const std::function<MatchResult(const Hypothesis&)>& align,
                                            const ParallelFor& parallel_for) const {
   const std::size_t size = filter.hypothesis_count() - 1;  // Hypotheses other than the best.
-  const std::size_t guesses = std::min(size, static_cast<std::size_t>(options_.guesses));
+  const std::size_t guesses = std::min(size, kGuesses);
   std::vector<MatchResult> matches(guesses);
   parallel_for(static_cast<int>(guesses), [&](int begin, int end) {
     for (int i = begin; i < end; ++i) {

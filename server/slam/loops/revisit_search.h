@@ -19,17 +19,10 @@ namespace cairn::slam {
 
 struct RevisitOptions {
   bool enabled = true;
-  double min_travel_m = 12.0;
-  double max_way_m = 60.0;
   double max_distance_m = 3.0;
   double max_turn_rad = 1.2;  // A laser with a half circle sees nothing in common beyond this.
   std::int64_t neighbours = 8;
-  std::int64_t guesses = 6;
-  double guess_sigma_m = 0.5;
-  double guess_sigma_rad = 0.15;
-  double min_score = 0.6;
   double sigma_m = 0.1;
-  double sigma_rad = 0.02;
 };
 void Visit(OptionVisitor& visitor, RevisitOptions& options);
 

@@ -11,6 +11,10 @@ namespace {
 
 // Half or twice of any of these changes the share of noticed errors by less than a tenth (study `sensitivity`).
 constexpr std::size_t kMaxCompared = 3;
+constexpr double kMaxDistanceM = 4.0;       // Largest distance between the robot and an old keyframe.
+constexpr double kMaxRangeM = 10.0;         // Errors of the heading displace farther points too much.
+constexpr double kCompareEveryM = 0.5;      // Way between two comparisons.
+constexpr double kStretchM = 5.0;           // Length of the path over which the comparisons are counted.
 constexpr std::size_t kMinComparisons = 5;  // Comparisons of a stretch needed for a decision.
 constexpr int kMinKnown = 20;               // Points that must be compared for a comparison to count.
 constexpr double kTurnCostM = 1.0;          // Cost per radian: scans in other directions overlap less.
@@ -24,37 +28,27 @@ void Visit(OptionVisitor& visitor, SelfCheckOptions& options) {
   visitor.Flag("enabled", options.enabled, "Whether scans are compared with the map of earlier visits.");
   visitor.Real("min_travel_m", options.min_travel_m, "m", 0.0, 1000.0,
                "Way between the two visits that are compared. After a shorter way both may have the same drift.");
-  visitor.Real("max_distance_m", options.max_distance_m, "m", 0.1, 50.0,
-               "Largest distance between the robot and an old keyframe. Larger values compare more and less reliably.");
-  visitor.Real("every_m", options.every_m, "m", 0.0, 100.0,
-               "Way between two comparisons. Smaller values notice errors sooner and take more time.");
-  visitor.Real("stretch_m", options.stretch_m, "m", 0.5, 100.0,
-               "Length of the path over which the comparisons are counted. Longer is more reliable and later.");
   visitor.Real("near_m", options.near_m, "m", 0.02, 5.0,
                "Error of poses and points that is tolerated. Walls that are doubled by less are not noticed.");
-  visitor.Real("max_range_m", options.max_range_m, "m", 1.0, 100.0, "Points farther away are not compared.");
   visitor.Real("max_conflict", options.max_conflict, "1", 0.05, 1.0,
                "The pose counts as wrong when a larger share of the comparisons is a contradiction, and as right again "
                "below half of this.");
-  visitor.Require(options.every_m <= options.stretch_m, "every_m", "must not exceed", "stretch_m");
 }
 
 void SelfCheck::Look(const Trail& trail, const SharedSequence<Pose2>& path) {
   const std::span<const Keyframe> keyframes = trail.keyframes();
   const std::span<const KeyframeShape> shapes = trail.shapes();
   const double here_m = shapes.back().travelled_m;
-  // A stretch must contain enough comparisons for a decision.
-  const double every_m = std::min(options_.every_m, options_.stretch_m / static_cast<double>(kMinComparisons));
-  if (!options_.enabled || here_m - compared_at_m_ < every_m) return;
+  if (!options_.enabled || here_m - compared_at_m_ < kCompareEveryM) return;
   compared_at_m_ = here_m;
   const std::size_t now = shapes.size() - 1;
   Comparison comparison{here_m, {}};
   for (const std::size_t old : KeyframesToCompare(shapes, path)) {
     const Pose2 T_old_now = Between(path[old], path[now]);
     comparison.counts +=
-        CompareVisibility(*keyframes[old].scan, T_old_now, shapes[now].points, options_.near_m, options_.max_range_m);
-    comparison.counts += CompareVisibility(*keyframes[now].scan, T_old_now.Inverse(), shapes[old].points,
-                                           options_.near_m, options_.max_range_m);
+        CompareVisibility(*keyframes[old].scan, T_old_now, shapes[now].points, options_.near_m, kMaxRangeM);
+    comparison.counts +=
+        CompareVisibility(*keyframes[now].scan, T_old_now.Inverse(), shapes[old].points, options_.near_m, kMaxRangeM);
   }
   if (comparison.counts.known() < kMinKnown) return;
   comparisons_.push_back(comparison);
@@ -75,14 +69,14 @@ std::vector<std::size_t> SelfCheck::KeyframesToCompare(std::span<const KeyframeS
   for (std::size_t k = 0; k < shapes.size() && last.travelled_m - shapes[k].travelled_m >= options_.min_travel_m; ++k) {
     const Pose2& there = path[k];
     const double distance_m = (there.translation() - here.translation()).norm();
-    if (distance_m > options_.max_distance_m) continue;
+    if (distance_m > kMaxDistanceM) continue;
     all.push_back({k, distance_m + kTurnCostM * std::abs(AngleDiff(there.theta, here.theta))});
   }
   return BestPlaces(std::move(all), shapes, kSamePlaceM, kMaxCompared);
 }
 
 void SelfCheck::UpdateContradicted() {
-  while (comparisons_.back().travelled_m - comparisons_.front().travelled_m > options_.stretch_m ||
+  while (comparisons_.back().travelled_m - comparisons_.front().travelled_m > kStretchM ||
          comparisons_.size() > kMaxComparisons)
     comparisons_.pop_front();
   if (comparisons_.size() < kMinComparisons) return;

@@ -24,11 +24,7 @@ namespace cairn::slam {
 struct SelfCheckOptions {
   bool enabled = true;
   double min_travel_m = 15.0;
-  double max_distance_m = 4.0;
-  double every_m = 0.5;
-  double stretch_m = 5.0;
   double near_m = 0.25;
-  double max_range_m = 10.0;  // Errors of the heading displace farther points too much.
   double max_conflict = 0.4;
 };
 void Visit(OptionVisitor& visitor, SelfCheckOptions& options);

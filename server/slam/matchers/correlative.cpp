@@ -58,7 +58,7 @@ MatchResult MatchByCorrelation(const ScanView& ref, const ScanView& curr, const 
   result.T_ref_curr = answer.mean;
   result.covariance = 0.5 * (answer.covariance + answer.covariance.transpose());
   result.converged = true;
-  DetectDegeneracy(agreement.H, kCorridorRatio, result);
+  DetectDegeneracy(agreement.H, result);
   TakeAlongFromPrior(prior, result);
   return result;
 }

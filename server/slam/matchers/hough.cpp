@@ -210,9 +210,9 @@ MatchResult MatchByHough(const ScanView& ref, const ScanView& curr, const MatchP
   result.inliers = best.agreement.inliers;
   result.iterations = 1;
   result.converged = true;
-  DetectDegeneracy(best.agreement.H, kCorridorRatio, result);
+  DetectDegeneracy(best.agreement.H, result);
   result.T_ref_curr = best.T_ref_curr;
-  result.covariance = Eigen::Vector3d(kSigmaM * kSigmaM, kSigmaM * kSigmaM, kSigmaRad * kSigmaRad).asDiagonal();
+  result.covariance = PoseCovariance(kSigmaM, kSigmaRad);
   TakeAlongFromPrior(prior, result);
   return result;
 }

@@ -16,7 +16,7 @@ MatchResult MatchByIcp(const ScanView& ref, const ScanView& curr, const MatchPri
   // corridor.
   const SurfaceAgreement agreement =
       CompareSurfaces(curr.points_robot, reference, result.T_ref_curr, options.inlier_distance_m);
-  DetectDegeneracy(agreement.H, options.degenerate_ratio, result);
+  DetectDegeneracy(agreement.H, result);
   TakeAlongFromPrior(prior, result);
   return result;
 }

@@ -88,7 +88,7 @@ LineLsqMatch MatchLinesByLeastSquares(const ScanFeatures& ref_scan, const ScanFe
     match.errors.push_back(alignment.chi.back() / static_cast<double>(match.pairs.size()));
     result.T_ref_curr = alignment.T_ref_curr;
     result.iterations = round + 1;
-    DetectDegeneracy(InformationOfPose(alignment.H, result.T_ref_curr), kCorridorRatio, result);
+    DetectDegeneracy(InformationOfPose(alignment.H, result.T_ref_curr), result);
     if (result.degenerate) {
       // Along the wall the midpoints only show where its visible part ends.
       const Eigen::Vector2d t = TakeAlongFromPrior(result.T_ref_curr.translation(), prior.T_ref_curr.translation(),

@@ -27,7 +27,7 @@ Eigen::Matrix3d OdometryCovariance(const Pose2& T_ref_curr_odometry, const Odome
   const double translation = options.translation_floor_m + options.translation_share * distance;
   const double rotation = options.rotation_floor_rad + options.rotation_per_m * distance +
                           options.rotation_share * std::abs(T_ref_curr_odometry.theta);
-  return Eigen::Vector3d(translation * translation, translation * translation, rotation * rotation).asDiagonal();
+  return PoseCovariance(translation, rotation);
 }
 
 Eigen::Matrix3d PairsCovariance(const ScanFeatures& ref, const ScanFeatures& curr, std::span<const LinePair> pairs,

@@ -5,12 +5,15 @@
 
 namespace cairn::slam {
 
-void DetectDegeneracy(const Eigen::Matrix3d& H, double ratio, MatchResult& result) {
+void DetectDegeneracy(const Eigen::Matrix3d& H, MatchResult& result) {
+  // A room is far above this ratio and a corridor far below: half or twice the value changes nothing (study
+  // `sensitivity`).
+  constexpr double kCorridorRatio = 0.02;
   const Eigen::Matrix2d H_translation =
       H.topLeftCorner<2, 2>() - H.topRightCorner<2, 1>() * H.bottomLeftCorner<1, 2>() / std::max(H(2, 2), 1e-12);
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
   solver.computeDirect(H_translation);
-  result.degenerate = solver.eigenvalues()(0) < ratio * solver.eigenvalues()(1);
+  result.degenerate = solver.eigenvalues()(0) < kCorridorRatio * solver.eigenvalues()(1);
   if (result.degenerate) result.degenerate_direction = solver.eigenvectors().col(0);
 }
 

@@ -33,14 +33,10 @@ struct MatchPrior {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  // Covariance of (x, y, theta), in ref.
 };
 
-// A value of `ratio` for DetectDegeneracy that suits all matchers of points and lines: a room is far above it,
-// a corridor far below.
-inline constexpr double kCorridorRatio = 0.02;
-
 // Sets `degenerate` and `degenerate_direction`. H is the information on (x, y, theta). The match is
 // degenerate if, with the heading left free, the smallest eigenvalue of the information on the translation is
-// below `ratio` times the largest. The direction is the eigenvector of the smallest.
-void DetectDegeneracy(const Eigen::Matrix3d& H, double ratio, MatchResult& result);
+// below 0.02 times the largest. The direction is the eigenvector of the smallest.
+void DetectDegeneracy(const Eigen::Matrix3d& H, MatchResult& result);
 
 // Combines two translations: across `along` the result is `measured`, along it `prior`. Both are in one
 // frame; `along` is a unit vector.

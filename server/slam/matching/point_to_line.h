@@ -41,10 +41,8 @@ struct PointToLineOptions {
   double last_pair_distance_m = 0.2;
   double residual_sigma_m = 0.04;
   double stop_step_m = 5e-4;
-  double stop_step_rad = 2e-4;
   double inlier_distance_m = 0.12;
-  double min_score = 0.4;
-  double degenerate_ratio = 0.02;
+  double min_score = 0.4;  // Not in the configuration: share of the points that must be explained for a match.
   double rough_trust = 0.2;
   double same_side = 0.5;
   double cauchy_share = 0.25;

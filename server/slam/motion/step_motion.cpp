@@ -9,7 +9,7 @@ Eigen::Matrix3d MotionNoise::Covariance(const Pose2& T_prev_curr) const {
   const double turn = std::abs(T_prev_curr.theta);
   const double trans = trans_base_m + trans_per_m * distance + trans_per_rad * turn;
   const double rot = rot_base_rad + rot_per_m * distance + rot_per_rad * turn;
-  return Eigen::Vector3d(trans * trans, trans * trans, rot * rot).asDiagonal();
+  return PoseCovariance(trans, rot);
 }
 
 void Visit(OptionVisitor& visitor, MotionNoise& options) {

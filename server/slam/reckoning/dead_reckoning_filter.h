@@ -52,11 +52,11 @@ class ReckonedPath {
 class DeadReckoningFilter final : public Filter {
  public:
   DeadReckoningFilter(const BackEndOptions& options, const Pose2& T_map_robot_start)
-      : path_(options.drift, T_map_robot_start), max_nis_(options.max_nis), contradictions_(options.diverged_after) {}
+      : path_(options.drift, T_map_robot_start), contradictions_(options.diverged_after) {}
 
   void Predict(const StepMotion& step) override { path_.Advance(step.T_prev_curr, step.covariance_prev); }
   bool Observe(const RevisitObservation& revisit) override {
-    contradictions_.Add(path_.NisOf(revisit) < max_nis_);
+    contradictions_.Add(path_.NisOf(revisit) < kMaxNis);
     return false;
   }
   void Observe(const KeyframeSight& /*sight*/, const ParallelFor& /*parallel_for*/) override {}
@@ -78,7 +78,6 @@ class DeadReckoningFilter final : public Filter {
 
  private:
   ReckonedPath path_;
-  double max_nis_;
   Contradictions contradictions_;
 };
 

@@ -23,7 +23,7 @@ void LandmarkCorrection::Predict(const StepMotion& step) {
 }
 
 bool LandmarkCorrection::Observe(const RevisitObservation& revisit) {
-  contradictions_.Add(path_.NisOf(revisit) < back_end_.max_nis);
+  contradictions_.Add(path_.NisOf(revisit) < kMaxNis);
   return false;
 }
 
@@ -41,7 +41,7 @@ void LandmarkCorrection::Observe(const std::vector<LandmarkSighting>& sightings,
     for (std::size_t m = 0; m < memory_.size(); ++m) {
       const Memory& old = memory_[m];
       if (!Alike(old.signature, sighting.signature, back_end_.landmarks)) continue;
-      if ((old.p_map - p_map).norm() > back_end_.landmarks.match_distance_m) continue;
+      if ((old.p_map - p_map).norm() > kMatchDistanceM) continue;
       if (!SlopesAgree(sighting, T_map_robot.theta, old.slope_map, old.signature, back_end_.landmarks)) continue;
       vote.Add(m, Likeness::kMatch, travelled_m - old.last_used_m < options_.min_travel_m);
     }
@@ -71,7 +71,7 @@ void LandmarkCorrection::Correct(const std::vector<Found>& found) {
   }
   // Both sightings, the first and the present one, have the landmark noise.
   const double turn_variance = first(2, 2) + 2.0 * noise.slope_rad * noise.slope_rad / count;
-  bool plausible = turn * turn < back_end_.max_nis * (covariance(2, 2) + turn_variance);
+  bool plausible = turn * turn < kMaxNis * (covariance(2, 2) + turn_variance);
   if (plausible && turn_variance < covariance(2, 2)) {
     pose.theta = WrapAngle(pose.theta + turn);
     covariance.row(2).setZero();
@@ -95,7 +95,7 @@ void LandmarkCorrection::Correct(const std::vector<Found>& found) {
     const double measured = 2.0 * (noise.range_m * noise.range_m / corners + sideways * range2);
     const Eigen::Matrix2d shift_covariance = first.topLeftCorner<2, 2>() + measured * Eigen::Matrix2d::Identity();
     const Eigen::Matrix2d before = covariance.topLeftCorner<2, 2>();
-    plausible = Nis<2>(shift, before + shift_covariance) < back_end_.max_nis;
+    plausible = Nis<2>(shift, before + shift_covariance) < kMaxNis;
     if (plausible && shift_covariance.trace() < before.trace()) {
       pose.x += shift.x();
       pose.y += shift.y();

@@ -30,15 +30,12 @@ struct SurfaceOptions {
   double max_range_m = 30.0;  // Farther hits are too sparse to show a surface.
   double min_spacing_m = 0.04;
   double neighbour_span_m = 0.15;
-  double neighbour_gap_m = 0.35;
   double max_flatness = 0.12;
   double grazing_gap_m = 2.0;  // Without these two the far ends of corridors hold the robot back.
   double grazing_flat_m = 0.04;
-  // Only the study of sensitivity sets these.
-  double gap_steps = 6.0;          // Gap of far points, in distances between neighbouring beams there.
-  double span_steps = 3.0;         // Span of far points, likewise.
-  std::int64_t skipped_beams = 3;  // Beams without a hit that may lie between two hits of one surface.
-  std::int64_t grazing_beams = 2;  // Beams on either side of a hit that may be on a wall seen at a grazing angle.
+  double span_steps = 3.0;
+  std::int64_t skipped_beams = 3;
+  std::int64_t grazing_beams = 2;
 };
 void Visit(OptionVisitor& visitor, SurfaceOptions& options);
 

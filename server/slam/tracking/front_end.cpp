@@ -149,8 +149,7 @@ FrontEnd::Guess FrontEnd::Predict(const Pose2& T_odom_robot) const {
   Pose2 motion;
   if (expected.constant_velocity && history_.size() > 1)
     motion = Between(history_[history_.size() - 2].T_track_robot, last.T_track_robot);
-  const Eigen::Vector3d sigma(expected.sigma_m, expected.sigma_m, expected.sigma_rad);
-  return {last.T_track_robot * motion, sigma.cwiseAbs2().asDiagonal()};
+  return {last.T_track_robot * motion, PoseCovariance(expected.sigma_m, expected.sigma_rad)};
 }
 
 Eigen::Matrix3d FrontEnd::ForecastShare(const MatchResult& match) const {
@@ -194,7 +193,8 @@ MatchResult FrontEnd::MatchAlone(const ScanView& view, const Pose2& T_odom_robot
   double explained = Explained(view, best.converged ? best.T_ref_curr : guess.T_track_robot);
   const auto enough = [&] { return best.converged && explained >= options_.retry_below; };
   const auto consider = [&](const Pose2& other) {
-    const MatchResult match = MatchLastKeyframe(view, {other, options_.retry.Covariance()}, parallel_for);
+    const MatchResult match = MatchLastKeyframe(
+        view, {other, PoseCovariance(options_.retry.sigma_m, options_.retry.sigma_rad)}, parallel_for);
     if (!match.converged) return;
     const double share = Explained(view, match.T_ref_curr);
     if (share <= explained + kClearly) return;
@@ -252,8 +252,9 @@ MatchResult FrontEnd::Refine(const ScanView& view, const Pose2& T_odom_robot, co
 
   // An unusual guess is taken only if it explains clearly more of the scan.
   const auto consider = [&](const Pose2& other) {
-    const MatchResult match =
-        AlignPointsToSurfaces(view.points_robot, index_, {other, other, options_.retry.Covariance()}, options_.refine);
+    const MatchResult match = AlignPointsToSurfaces(
+        view.points_robot, index_, {other, other, PoseCovariance(options_.retry.sigma_m, options_.retry.sigma_rad)},
+        options_.refine);
     if (match.converged && (!best.converged || match.score > best.score + kClearly)) best = match;
   };
   for (const Pose2& other : UnusualGuesses(T_odom_robot)) consider(other);

@@ -36,11 +36,6 @@ struct RetryOptions {
   double turn_step_rad = 0.25;
   double sigma_m = 0.5;
   double sigma_rad = 0.31622776601683794;  // Its square is 0.1.
-
-  // Covariance of the error of such a guess.
-  [[nodiscard]] Eigen::Matrix3d Covariance() const {
-    return Eigen::Vector3d(sigma_m * sigma_m, sigma_m * sigma_m, sigma_rad * sigma_rad).asDiagonal();
-  }
 };
 void Visit(OptionVisitor& visitor, RetryOptions& options);
 

@@ -33,20 +33,6 @@ Constant Share(std::string name, Runs runs, Field field) {
           }};
 }
 
-// A standard deviation whose square is stored. `last` applies to the heading only, otherwise to x and y.
-template <typename Field>
-Constant Sigma(std::string name, Runs runs, bool heading, Field field) {
-  return {std::move(name), runs, [field, heading](Options& options, int direction) {
-            Eigen::Vector3d& variances = field(options);
-            const double factor = std::ldexp(1.0, 2 * direction);
-            if (heading)
-              variances.z() *= factor;
-            else
-              variances.head<2>() *= factor;
-            return std::sqrt(heading ? variances.z() : variances.x());
-          }};
-}
-
 #define CAIRN_FIELD(path)    \
   [](Options & o) -> auto& { \
     return o.path;           \
@@ -77,10 +63,8 @@ void AddRefinement(std::vector<Constant>& all) {
   all.push_back(Of("refine: residual_sigma_m", runs, CAIRN_FIELD(front_end.refine.residual_sigma_m)));
   all.push_back(Of("refine: inlier_distance_m", runs, CAIRN_FIELD(front_end.refine.inlier_distance_m)));
   all.push_back(Share("refine: min_score", runs, CAIRN_FIELD(front_end.refine.min_score)));
-  all.push_back(Share("refine: degenerate_ratio", runs, CAIRN_FIELD(front_end.refine.degenerate_ratio)));
   all.push_back(Of("refine: max_iterations", runs, CAIRN_FIELD(front_end.refine.max_iterations)));
   all.push_back(Of("refine: stop_step_m", runs, CAIRN_FIELD(front_end.refine.stop_step_m)));
-  all.push_back(Of("refine: stop_step_rad", runs, CAIRN_FIELD(front_end.refine.stop_step_rad)));
 }
 
 void AddSurface(std::vector<Constant>& all) {
@@ -88,9 +72,7 @@ void AddSurface(std::vector<Constant>& all) {
   all.push_back(Of("surface: max_range_m", runs, CAIRN_FIELD(front_end.surface.max_range_m)));
   all.push_back(Of("surface: min_spacing_m", runs, CAIRN_FIELD(front_end.surface.min_spacing_m)));
   all.push_back(Of("surface: neighbour_span_m", runs, CAIRN_FIELD(front_end.surface.neighbour_span_m)));
-  all.push_back(Of("surface: neighbour_gap_m", runs, CAIRN_FIELD(front_end.surface.neighbour_gap_m)));
   all.push_back(Share("surface: max_flatness", runs, CAIRN_FIELD(front_end.surface.max_flatness)));
-  all.push_back(Of("surface: gap_steps", runs, CAIRN_FIELD(front_end.surface.gap_steps)));
   all.push_back(Of("surface: span_steps", runs, CAIRN_FIELD(front_end.surface.span_steps)));
   all.push_back(Of("surface: skipped_beams", runs, CAIRN_FIELD(front_end.surface.skipped_beams)));
   all.push_back(Of("surface: grazing_gap_m", runs, CAIRN_FIELD(front_end.surface.grazing_gap_m)));
@@ -117,7 +99,6 @@ void AddFeatures(std::vector<Constant>& all) {
 void AddFilter(std::vector<Constant>& all) {
   const Runs runs = Runs::kUsual;
   all.push_back(Of("filter: particles", runs, CAIRN_FIELD(filter.particles)));
-  all.push_back(Of("filter: max_nis", runs, CAIRN_FIELD(filter.back_end.max_nis)));
   all.push_back(Of("filter: drift.trans_base_m", runs, CAIRN_FIELD(filter.back_end.drift.trans_base_m)));
   all.push_back(Of("filter: drift.trans_per_m", runs, CAIRN_FIELD(filter.back_end.drift.trans_per_m)));
   all.push_back(Of("filter: drift.trans_per_rad", runs, CAIRN_FIELD(filter.back_end.drift.trans_per_rad)));
@@ -126,7 +107,6 @@ void AddFilter(std::vector<Constant>& all) {
   all.push_back(Of("filter: drift.rot_per_rad", runs, CAIRN_FIELD(filter.back_end.drift.rot_per_rad)));
   all.push_back(Of("filter: sample_distance_m", runs, CAIRN_FIELD(filter.fastslam.sample_distance_m)));
   all.push_back(Share("filter: resample_below", runs, CAIRN_FIELD(filter.fastslam.resample_below)));
-  all.push_back(Of("filter: agreement_m", runs, CAIRN_FIELD(filter.fastslam.agreement_m)));
   all.push_back(Of("filter: gate.distance_m", runs, CAIRN_FIELD(gate.distance_m)));
   all.push_back(Of("filter: gate.turn_rad", runs, CAIRN_FIELD(gate.turn_rad)));
   all.push_back(Of("filter: blind.trans_per_m", runs, CAIRN_FIELD(blind.trans_per_m)));
@@ -143,63 +123,29 @@ void AddLandmarks(std::vector<Constant>& all) {
   all.push_back(Of("landmarks: same_length_m", runs, CAIRN_FIELD(filter.back_end.landmarks.same_length_m)));
   all.push_back(Of("landmarks: crowded_m", runs, CAIRN_FIELD(filter.back_end.landmarks.crowded_m)));
   all.push_back(Of("landmarks: forget_m", runs, CAIRN_FIELD(filter.back_end.landmarks.forget_m)));
-  all.push_back(Of("landmarks: match_distance_m", runs, CAIRN_FIELD(filter.back_end.landmarks.match_distance_m)));
   all.push_back(Of("landmarks: match_slope_rad", runs, CAIRN_FIELD(filter.back_end.landmarks.match_slope_rad)));
   all.push_back(Of("landmarks: min_travel_m", runs, CAIRN_FIELD(filter.back_end.landmarks.min_travel_m)));
 }
 
 void AddRevisits(std::vector<Constant>& all) {
   const Runs runs = Runs::kUsual;
-  all.push_back(Of("revisit: min_travel_m", runs, CAIRN_FIELD(revisit.min_travel_m)));
-  all.push_back(Of("revisit: max_way_m", Runs::kLoops, CAIRN_FIELD(revisit.max_way_m)));
   all.push_back(Of("revisit: max_distance_m", runs, CAIRN_FIELD(revisit.max_distance_m)));
   all.push_back(Of("revisit: max_turn_rad", runs, CAIRN_FIELD(revisit.max_turn_rad)));
   all.push_back(Of("revisit: neighbours", runs, CAIRN_FIELD(revisit.neighbours)));
-  all.push_back(Of("revisit: guesses", runs, CAIRN_FIELD(revisit.guesses)));
-  all.push_back(Of("revisit: guess_sigma_m", runs, CAIRN_FIELD(revisit.guess_sigma_m)));
-  all.push_back(Of("revisit: guess_sigma_rad", runs, CAIRN_FIELD(revisit.guess_sigma_rad)));
-  all.push_back(Share("revisit: min_score", runs, CAIRN_FIELD(revisit.min_score)));
   all.push_back(Of("revisit: sigma_m", runs, CAIRN_FIELD(revisit.sigma_m)));
-  all.push_back(Of("revisit: sigma_rad", runs, CAIRN_FIELD(revisit.sigma_rad)));
 }
 
 void AddLoops(std::vector<Constant>& all) {
   const Runs runs = Runs::kLoops;
-  all.push_back(Of("loop: min_way_m", runs, CAIRN_FIELD(loop.min_way_m)));
   all.push_back(Of("loop: every_m", runs, CAIRN_FIELD(loop.every_m)));
-  all.push_back(Of("loop: recent_m", runs, CAIRN_FIELD(loop.recent_m)));
-  all.push_back(Of("loop: around_m", runs, CAIRN_FIELD(loop.around_m)));
-  all.push_back(Of("loop: doubt_m", runs, CAIRN_FIELD(loop.doubt_m)));
   all.push_back(Of("loop: doubt_per_m", runs, CAIRN_FIELD(loop.doubt_per_m)));
-  all.push_back(Of("loop: doubt_rad", runs, CAIRN_FIELD(loop.doubt_rad)));
   all.push_back(Of("loop: doubt_rad_per_m", runs, CAIRN_FIELD(loop.doubt_rad_per_m)));
   all.push_back(Of("loop: max_doubt_m", runs, CAIRN_FIELD(loop.max_doubt_m)));
-  all.push_back(Of("loop: max_doubt_rad", runs, CAIRN_FIELD(loop.max_doubt_rad)));
-  all.push_back(Share("loop: min_score", runs, CAIRN_FIELD(loop.min_score)));
   all.push_back(Share("loop: max_rival", runs, CAIRN_FIELD(loop.max_rival)));
-  all.push_back(Share("loop: min_explained", runs, CAIRN_FIELD(loop.min_explained)));
   all.push_back(Share("loop: max_conflict", runs, CAIRN_FIELD(loop.max_conflict)));
   all.push_back(Of("loop: confirm_after_m", runs, CAIRN_FIELD(loop.confirm_after_m)));
-  all.push_back(Of("loop: confirm_within_m", runs, CAIRN_FIELD(loop.confirm_within_m)));
-  all.push_back(Of("loop: agree_m", runs, CAIRN_FIELD(loop.agree_m)));
-  all.push_back(Of("loop: agree_rad", runs, CAIRN_FIELD(loop.agree_rad)));
   all.push_back(Of("loop: sigma_m", runs, CAIRN_FIELD(loop.sigma_m)));
-  all.push_back(Of("loop: sigma_rad", runs, CAIRN_FIELD(loop.sigma_rad)));
-  all.push_back(Of("loop: search_cell_m", runs, CAIRN_FIELD(loop.search_cell_m)));
-  all.push_back(Of("loop: likelihood_reach_m", runs, CAIRN_FIELD(loop.likelihood_reach_m)));
-  all.push_back(Of("loop: candidate_stride", runs, CAIRN_FIELD(loop.candidate_stride)));
-  all.push_back(Of("loop: rival_beyond_m", runs, CAIRN_FIELD(loop.rival_beyond_m)));
-  all.push_back(Of("loop: rival_beyond_rad", runs, CAIRN_FIELD(loop.rival_beyond_rad)));
-  all.push_back(Sigma("loop: align_variances, position", runs, false, CAIRN_FIELD(loop.align_variances)));
-  all.push_back(Sigma("loop: align_variances, heading", runs, true, CAIRN_FIELD(loop.align_variances)));
-  all.push_back(Of("loop: near_share", runs, CAIRN_FIELD(loop.near_share)));
-  all.push_back(Of("loop: free_space.cell_m", runs, CAIRN_FIELD(loop.free_space.cell_m)));
-  all.push_back(Of("loop: free_space.max_ray_m", runs, CAIRN_FIELD(loop.free_space.max_ray_m)));
-  all.push_back(Of("loop: free_space.every_m", runs, CAIRN_FIELD(loop.free_space.every_m)));
-  all.push_back(Of("rebase: loop_sigma_m", runs, CAIRN_FIELD(filter.fastslam.loop_sigma_m)));
-  all.push_back(Of("rebase: loop_sigma_rad", runs, CAIRN_FIELD(filter.fastslam.loop_sigma_rad)));
-  all.push_back(Of("pose_graph: loop_loss", runs, CAIRN_FIELD(pose_graph.loop_loss)));
-  all.push_back(Of("pose_graph: widening", runs, CAIRN_FIELD(pose_graph.widening)));
+  all.push_back(Of("loop: free_cell_m", runs, CAIRN_FIELD(loop.free_cell_m)));
   all.push_back(Of("pose_graph: tolerance", runs, CAIRN_FIELD(pose_graph.tolerance)));
   all.push_back(Of("pose_graph: max_iterations", runs, CAIRN_FIELD(pose_graph.max_iterations)));
 }
@@ -207,17 +153,11 @@ void AddLoops(std::vector<Constant>& all) {
 void AddSelfCheck(std::vector<Constant>& all) {
   const Runs runs = Runs::kSelfCheck;
   all.push_back(Of("self_check: min_travel_m", runs, CAIRN_FIELD(self_check.min_travel_m)));
-  all.push_back(Of("self_check: max_distance_m", runs, CAIRN_FIELD(self_check.max_distance_m)));
-  all.push_back(Of("self_check: every_m", runs, CAIRN_FIELD(self_check.every_m)));
-  all.push_back(Of("self_check: stretch_m", runs, CAIRN_FIELD(self_check.stretch_m)));
   all.push_back(Of("self_check: near_m", runs, CAIRN_FIELD(self_check.near_m)));
-  all.push_back(Of("self_check: max_range_m", runs, CAIRN_FIELD(self_check.max_range_m)));
   all.push_back(Share("self_check: max_conflict", runs, CAIRN_FIELD(self_check.max_conflict)));
 }
 
 void AddTheses(std::vector<Constant>& all) {
-  all.push_back(
-      Of("dpslam: segment.hindsight_scans", Runs::kDpSlam, CAIRN_FIELD(filter.dpslam.segment.hindsight_scans)));
   all.push_back(Of("dpslam: low.unseen_per_m", Runs::kDpSlam, CAIRN_FIELD(filter.dpslam.low.unseen_per_m)));
   all.push_back(Of("dpslam: high.unseen_per_m", Runs::kDpSlam, CAIRN_FIELD(filter.dpslam.high.unseen_per_m)));
 }

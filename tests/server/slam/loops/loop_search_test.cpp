@@ -127,7 +127,7 @@ TEST(FreeSpace, ContradictsOnlyWhatBeamsWentThrough) {
   Drive drive;
   std::mt19937_64 rng(1);
   drive.Step(test::Room(-4, -4, 8, 8), {}, 0.0, rng);
-  const FreeSpace space(drive.trail, {0, 0, 0});
+  const FreeSpace space(drive.trail, {0, 0, 0}, 0.2);
   EXPECT_TRUE(space.Contradicts({2.0, 0.0}));
   EXPECT_FALSE(space.Contradicts({4.0, 0.0}));   // The wall itself.
   EXPECT_FALSE(space.Contradicts({6.0, 0.0}));   // Behind it.

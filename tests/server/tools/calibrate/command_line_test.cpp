@@ -57,7 +57,7 @@ TEST_F(Calibrate, WrongCommandLinesAreUsageErrors) {
       {"motion", "x.log", "--seed", "-3"},
       {"motion", "x.log", "--set", "fit.particles=many"},
       {"motion", "x.log", "--set", "slam.matcher=guess"},
-      {"motion", "x.log", "--set", "slam.loop.doubt_m=13"},
+      {"motion", "x.log", "--set", "slam.grid.hit_probability=0.985"},
       {"motion", "x.log", "--colour", "red"},
       {"motion", "x.log", "-o", "x.yaml", "--no-matcher"},
   };
