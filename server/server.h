@@ -9,6 +9,7 @@
 #include <asio/thread_pool.hpp>
 #include <atomic>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <thread>
 
@@ -29,8 +30,9 @@ class Server {
   // `generation`: of this start of the server; the egress stamps the same one.
   // `journal` makes the state durable, and holds that of the servers before; null: nothing is stored. The caller stops
   // it after the server.
+  // `saved`: the directory of saved sites; empty: none are kept.
   Server(const ServerOptions& options, Inbound& inbound, Outbound& outbound, Generation generation,
-         Journal* journal = nullptr);
+         Journal* journal = nullptr, const std::filesystem::path& saved = {});
   ~Server();
 
   // Takes up what is stored, makes the configured sites and starts the threads.
@@ -67,6 +69,7 @@ class Server {
   JobList jobs_;
   const SmoothJob smooth_;
   JobWorker worker_;
+  SiteShelf shelf_;
   Desk desk_;
   Heartbeat heartbeat_;
   bool journal_degraded_ = false;  // As it was last logged.

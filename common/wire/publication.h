@@ -141,7 +141,8 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
   std::set<Key> used_ CAIRN_GUARDED_BY(mutex_);                // Keys that have a place in the writer.
   // The last members: they call the listener until they are destroyed.
   Participant::Writer writer_;
-  Participant::Writer successor_ CAIRN_GUARDED_BY(mutex_);  // From the first sample without a place until it takes over.
+  Participant::Writer successor_
+      CAIRN_GUARDED_BY(mutex_);  // From the first sample without a place until it takes over.
   std::chrono::steady_clock::time_point successor_made_ CAIRN_GUARDED_BY(mutex_);
 };
 

@@ -47,9 +47,16 @@ class Site : public std::enable_shared_from_this<Site> {
   // Receives a map version; called once, on the site's strand. INTERNAL if the work ended with an exception.
   using Done = std::function<void(Result<std::uint32_t>)>;
 
+  // Where the site stands among those of its name that were deleted since the start: its epoch and its versions go on
+  // above theirs, because a client may still know them.
+  struct Beginning {
+    std::uint32_t epoch = 0;
+    std::uint64_t tile_version = 0;
+  };
+
   // `journal`: null where nothing is stored. `generation`: of this start of the server.
   Site(const std::string& name, double resolution_m, const MapsOptions& options, asio::thread_pool& pool,
-       Outbound& outbound, Journal* journal = nullptr, Generation generation = 0);
+       Outbound& outbound, Journal* journal = nullptr, Generation generation = 0, const Beginning& beginning = {0, 0});
 
   // Goes on from what a server before this one has stored: epoch, versions, and the parts of sessions that exist no
   // more. Before anything else is called.
@@ -63,6 +70,12 @@ class Site : public std::enable_shared_from_this<Site> {
   void Change(GridChange&& change);
   // The session exists no more. Its part of the map stays, and is stored as such instead of the session.
   void Leave(SessionId session);
+  // The highest number of a session that exists no more and has a part here; 0: none. Before the threads start.
+  [[nodiscard]] SessionId last_layer() const { return layers_.empty() ? 0 : *layers_.rbegin(); }
+  // The site is deleted: from now on it stores nothing and publishes nothing. `done` receives what it had published
+  // last, on the strand, when everything that was asked before is finished. A switch of the map version under way
+  // fails.
+  void Retire(std::function<void(std::shared_ptr<const MapSnapshot>)> done);
   // Adds a disabled version; `done` receives its number.
   void AddVersion(MapVersion&& version, Done done);
   // UNAVAILABLE: another switch is under way. NOT_FOUND: the version does not exist or has been removed.
@@ -106,11 +119,12 @@ class Site : public std::enable_shared_from_this<Site> {
   const NameId site_id_;
   const double resolution_m_;
   Outbound& outbound_;
-  Journal* const journal_;
   const Generation generation_;
   asio::strand<asio::thread_pool::executor_type> strand_;
 
   // The members below are used on the strand only.
+  Journal* journal_;  // Null where nothing is stored.
+  bool retired_ = false;
   JointMap joint_;
   MapVersions versions_;
   std::uint32_t epoch_ = 0;

@@ -74,6 +74,9 @@ std::size_t BytesOf(const MapInfo& info) {
 std::size_t BytesOf(const RobotStatus& robot) {
   return 1024 + robot.session.status.message.size() + robot.ledgers.size() * 512;
 }
+std::size_t BytesOf(const SavedSite&) {
+  return 192;
+}
 std::size_t BytesOf(const Job& job) {
   return job.message.size() + job.site.size() + 160;
 }
@@ -240,6 +243,7 @@ std::vector<Reply> SplitReply(Reply&& reply) {
   auto maps = std::exchange(reply.maps, {});
   auto robots = std::exchange(reply.robots, {});
   auto jobs = std::exchange(reply.jobs, {});
+  auto saved = std::exchange(reply.saved, {});
   Parts parts(std::move(reply));
   parts.AddAll(std::move(poses), &Reply::poses);
   parts.AddAll(std::move(path), &Reply::path);
@@ -248,6 +252,7 @@ std::vector<Reply> SplitReply(Reply&& reply) {
   parts.AddAll(std::move(maps), &Reply::maps);
   parts.AddAll(std::move(robots), &Reply::robots);
   parts.AddAll(std::move(jobs), &Reply::jobs);
+  parts.AddAll(std::move(saved), &Reply::saved);
   return parts.Finish();
 }
 

@@ -66,12 +66,20 @@ class Journal {
   [[nodiscard]] std::uint64_t position(std::uint64_t session) const;
   // The session's state as bytes, after exactly the entries up to `position`. False where one is being written.
   bool Checkpoint(std::uint64_t session, std::uint64_t position, Bytes bytes);
+  // Nothing of the session is written any more, and what is stored of it stays.
+  void Close(std::uint64_t session);
   // Removes everything of a session that will never be restored.
   void Forget(std::uint64_t session);
 
   // `size` is about what the bytes need, for the bound of the queue.
   void Put(const RecordKey& key, Bytes bytes, std::size_t size = 1024);
   void Remove(const RecordRange& range);
+
+  // Calls `work` on the journal's thread when everything that was handed over before is on the disk. Nothing else is
+  // written until it returns, so it sees the store at one moment, and its own commit is the only one. What comes
+  // meanwhile waits. `work` is destroyed without a call if the journal stops before.
+  using Work = std::function<void(Store&)>;
+  void Between(Work work);
 
   [[nodiscard]] Store& store() { return store_; }
   [[nodiscard]] JournalHealth health() const;
@@ -99,6 +107,7 @@ class Journal {
   // What was taken from the queue to be committed together.
   struct Group {
     std::deque<Change> changes;
+    std::vector<Work> works;  // After the commit.
     Clock::time_point oldest;
   };
   struct Batch {
@@ -115,10 +124,12 @@ class Journal {
     Bytes bytes;
   };
 
+  void CloseLocked(std::uint64_t session) CAIRN_REQUIRES(mutex_);
   bool Push(Change change, std::size_t size) CAIRN_REQUIRES(mutex_);
   void Run(const std::stop_token& stop);
   std::optional<Group> Next(const std::stop_token& stop);
   static Prepared Prepare(Group&& group);
+  void DropForgottenCheckpoint() CAIRN_EXCLUDES(mutex_);
   void BeginCheckpoint() CAIRN_EXCLUDES(mutex_);
   bool CommitOnce(const RecordChanges& changes);
   bool CommitPatiently(const RecordChanges& changes, const std::stop_token& stop);
@@ -142,6 +153,7 @@ class Journal {
   JournalCounts counts_ CAIRN_GUARDED_BY(mutex_);
   std::deque<float> delays_ms_ CAIRN_GUARDED_BY(mutex_);
   std::deque<WantedCheckpoint> checkpoints_ CAIRN_GUARDED_BY(mutex_);
+  std::vector<Work> works_ CAIRN_GUARDED_BY(mutex_);
 
   // The thread's.
   std::optional<CheckpointWriter> writing_;

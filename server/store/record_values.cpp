@@ -1,6 +1,7 @@
 #include "server/store/record_values.h"
 
 #include <bit>
+#include <cstdlib>
 #include <cstring>
 #include <utility>
 
@@ -9,6 +10,7 @@
 namespace cairn::server {
 namespace {
 
+constexpr int kFarthestChunk = 1 << 22;  // No estimator draws farther from the origin.
 constexpr std::size_t kChunkBytes = sizeof(std::int16_t) * static_cast<std::size_t>(kTileArea);
 static_assert(std::endian::native == std::endian::little, "cells are stored as they lie in memory");
 
@@ -79,7 +81,9 @@ Result<StoredGrid> ValueOf(const record::Grid& from) {
   StoredGrid grid;
   grid.keyframes = from.keyframes();
   for (const record::GridChunk& chunk : from.chunks()) {
-    if (chunk.log_odds().size() != kChunkBytes) return Unreadable("a part of a grid");
+    const bool near =
+        std::abs(std::int64_t{chunk.x()}) < kFarthestChunk && std::abs(std::int64_t{chunk.y()}) < kFarthestChunk;
+    if (chunk.log_odds().size() != kChunkBytes || !near) return Unreadable("a part of a grid");
     auto cells = std::make_shared<std::vector<std::int16_t>>(static_cast<std::size_t>(kTileArea));
     std::memcpy(cells->data(), chunk.log_odds().data(), kChunkBytes);
     const std::int16_t* const first = cells->data();
