@@ -32,12 +32,6 @@ Trajectory PathOf(WholeServer& house, const std::string& robot = "r1") {
   return house.Ask(About(RequestKind::kPath, robot)).path;
 }
 
-bool SamePath(const Trajectory& a, const Trajectory& b) {
-  return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), [](const auto& x, const auto& y) {
-           return x.stamp == y.stamp && x.T_map_robot == y.T_map_robot;
-         });
-}
-
 std::uint64_t DurableScans(WholeServer& house) {
   const Reply status = house.Ask(About(RequestKind::kStatus));
   return status.robots.empty() || status.robots[0].ledgers.empty() ? 0 : status.robots[0].ledgers[0].durable_through;

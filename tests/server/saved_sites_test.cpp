@@ -15,9 +15,9 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr ClientId kDriver = 7;
+constexpr ClientId kRider = 7;
 
-Request Of(RequestKind kind, const std::string& site = "lab", const std::string& robot = "r1") {
+Request AboutSite(RequestKind kind, const std::string& site = "lab", const std::string& robot = "r1") {
   Request request;
   request.kind = kind;
   request.site = site;
@@ -25,8 +25,8 @@ Request Of(RequestKind kind, const std::string& site = "lab", const std::string&
   return request;
 }
 
-Request OfFile(RequestKind kind, const std::string& site, const std::string& name) {
-  Request request = Of(kind, site);
+Request AboutFile(RequestKind kind, const std::string& site, const std::string& name) {
+  Request request = AboutSite(kind, site);
   request.saved = name;
   return request;
 }
@@ -40,29 +40,23 @@ struct View {
   std::uint32_t enabled = 0;
 };
 
-bool SamePath(const Trajectory& a, const Trajectory& b) {
-  return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), [](const auto& x, const auto& y) {
-           return x.stamp == y.stamp && x.T_map_robot == y.T_map_robot;
-         });
-}
-
 View ViewOf(WholeServer& house, const std::string& site = "lab") {
   View view;
   for (std::uint32_t level = 0; level < kPyramidLevels; ++level) {
-    Request tiles = Of(RequestKind::kTiles, site);
+    Request tiles = AboutSite(RequestKind::kTiles, site);
     tiles.level = level;
     for (const Tile& tile : house.Ask(tiles).tiles) view.tiles[tile.key] = *DecodeCells(tile.bytes, tile.encoding);
   }
-  for (const RobotStatus& robot : house.Ask(Of(RequestKind::kStatus, site, "")).robots) {
+  for (const RobotStatus& robot : house.Ask(AboutSite(RequestKind::kStatus, site, "")).robots) {
     const std::string& name = robot.session.robot;
     if (robot.session.site != site) continue;
-    Request path = Of(RequestKind::kPath, site, name);
+    Request path = AboutSite(RequestKind::kPath, site, name);
     view.paths[name] = house.Ask(path).path;
     path.smoothed = true;
     view.smoothed[name] = house.Ask(path).path;
     view.used[name] = robot.ledgers.empty() ? 0 : robot.ledgers[0].used;
   }
-  for (const MapInfo& map : house.Ask(Of(RequestKind::kMapInfo, site)).maps) {
+  for (const MapInfo& map : house.Ask(AboutSite(RequestKind::kMapInfo, site)).maps) {
     view.enabled = map.enabled_version;
     for (const MapVersionInfo& version : map.versions) view.notes.push_back(version.note);
   }
@@ -82,14 +76,14 @@ void ExpectSame(const View& a, const View& b) {
 }
 
 Job Smooth(WholeServer& house, const std::string& site = "lab") {
-  const Reply submitted = house.Ask(Of(RequestKind::kJobSubmit, site));
+  const Reply submitted = house.Ask(AboutSite(RequestKind::kJobSubmit, site));
   EXPECT_EQ(submitted.jobs.size(), 1U) << submitted.status.message;
   return submitted.jobs.empty() ? Job{} : house.WaitJob(submitted.jobs[0].id);
 }
 
 bool Stored(WholeServer& house, const std::string& robot, std::uint64_t scans) {
   return house.WaitFor([&] {
-    const Reply status = house.Ask(Of(RequestKind::kStatus, "lab", robot));
+    const Reply status = house.Ask(AboutSite(RequestKind::kStatus, "lab", robot));
     return !status.robots.empty() && !status.robots[0].ledgers.empty() &&
            status.robots[0].ledgers[0].durable_through == scans;
   });
@@ -103,17 +97,17 @@ void MakeSite(WholeServer& house) {
   ASSERT_TRUE(house.WaitPhase("r0", 9, SessionPhase::kEnded));
   house.Open("r0", 9);
   ASSERT_TRUE(house.WaitPhase("r0", 9, SessionPhase::kActive));
-  house.Open("r1", kDriver);
-  house.Drive("r1", kDriver, 0, 60);
+  house.Open("r1", kRider);
+  house.Drive("r1", kRider, 0, 60);
   ASSERT_EQ(Smooth(house).state, JobState::kSucceeded);
-  house.Drive("r1", kDriver, 60, 80);
+  house.Drive("r1", kRider, 60, 80);
   ASSERT_TRUE(Stored(house, "r1", 80));
 }
 
 void Leave(WholeServer& house) {
-  for (const ClientId client : {ClientId{9}, kDriver}) house.Push(ClientLiveliness{client, false});
+  for (const ClientId client : {ClientId{9}, kRider}) house.Push(ClientLiveliness{client, false});
   ASSERT_TRUE(house.WaitPhase("r0", 9, SessionPhase::kSuspended));
-  ASSERT_TRUE(house.WaitPhase("r1", kDriver, SessionPhase::kSuspended));
+  ASSERT_TRUE(house.WaitPhase("r1", kRider, SessionPhase::kSuspended));
 }
 
 void WriteText(const std::filesystem::path& path, const std::string& text) {
@@ -126,7 +120,7 @@ TEST(SavedSites, InAnotherServerEverythingIsAsItWas) {
   {
     StoredServer first(directory / "0");
     ASSERT_NO_FATAL_FAILURE(MakeSite(*first.operator->()));
-    const Reply saved = first->Ask(OfFile(RequestKind::kSiteSave, "lab", "monday"));
+    const Reply saved = first->Ask(AboutFile(RequestKind::kSiteSave, "lab", "monday"));
     ASSERT_TRUE(saved.status.ok()) << saved.status.message;
     ASSERT_EQ(saved.saved.size(), 1U);
     EXPECT_EQ(saved.saved[0].site, "lab");
@@ -162,20 +156,20 @@ TEST(SavedSites, ARunningServerDeletesASiteAndTakesItUpAgain) {
     ASSERT_NO_FATAL_FAILURE(MakeSite(house));
     house.Open("r5", 55, "hall");
     house.Drive("r5", 55, 0, 20);
-    const Reply active = house.Ask(Of(RequestKind::kSiteDelete));
+    const Reply active = house.Ask(AboutSite(RequestKind::kSiteDelete));
     EXPECT_EQ(active.status.code, StatusCode::kFailedPrecondition);
     EXPECT_THAT(active.status.message, HasSubstr("is active"));
     ASSERT_NO_FATAL_FAILURE(Leave(house));
-    ASSERT_TRUE(house.Ask(Of(RequestKind::kSiteSave)).status.ok());
+    ASSERT_TRUE(house.Ask(AboutSite(RequestKind::kSiteSave)).status.ok());
     before = ViewOf(house);
-    const std::uint32_t epoch = house.Ask(Of(RequestKind::kMapInfo)).maps.at(0).epoch;
-    ASSERT_EQ(house.Ask(OfFile(RequestKind::kSiteLoad, "", "lab")).status.code, StatusCode::kAlreadyExists);
+    const std::uint32_t epoch = house.Ask(AboutSite(RequestKind::kMapInfo)).maps.at(0).epoch;
+    ASSERT_EQ(house.Ask(AboutFile(RequestKind::kSiteLoad, "", "lab")).status.code, StatusCode::kAlreadyExists);
 
-    const Reply deleted = house.Ask(Of(RequestKind::kSiteDelete));
+    const Reply deleted = house.Ask(AboutSite(RequestKind::kSiteDelete));
     ASSERT_TRUE(deleted.status.ok()) << deleted.status.message;
-    EXPECT_EQ(house.Ask(Of(RequestKind::kMapInfo)).status.code, StatusCode::kNotFound);
-    EXPECT_EQ(house.Ask(Of(RequestKind::kPath)).status.code, StatusCode::kNotFound);
-    EXPECT_TRUE(house.Ask(Of(RequestKind::kJobList)).jobs.empty());
+    EXPECT_EQ(house.Ask(AboutSite(RequestKind::kMapInfo)).status.code, StatusCode::kNotFound);
+    EXPECT_EQ(house.Ask(AboutSite(RequestKind::kPath)).status.code, StatusCode::kNotFound);
+    EXPECT_TRUE(house.Ask(AboutSite(RequestKind::kJobList)).jobs.empty());
     EXPECT_EQ(ReadSite(server.store(), "lab").error().code, StatusCode::kNotFound);
     EXPECT_EQ(ReadSessions(server.store())->size(), 1U) << "only the other site's is left";
     // Whoever has a copy of the map is told that nothing of it is left; the hall is.
@@ -187,24 +181,25 @@ TEST(SavedSites, ARunningServerDeletesASiteAndTakesItUpAgain) {
     }));
     EXPECT_EQ(ViewOf(house, "hall").used["r5"], 20U);
 
-    const Reply loaded = house.Ask(OfFile(RequestKind::kSiteLoad, "", "lab"));
+    const Reply loaded = house.Ask(AboutFile(RequestKind::kSiteLoad, "", "lab"));
     ASSERT_TRUE(loaded.status.ok()) << loaded.status.message;
-    ASSERT_TRUE(house.WaitFor([&] { return house.Ask(Of(RequestKind::kTiles)).tiles.size() > 0; }));
+    ASSERT_TRUE(house.WaitFor([&] { return house.Ask(AboutSite(RequestKind::kTiles)).tiles.size() > 0; }));
     ASSERT_TRUE(house.WaitFor([&] { return ViewOf(house).tiles == before.tiles; }));
     ExpectSame(before, ViewOf(house));
-    EXPECT_GT(house.Ask(Of(RequestKind::kMapInfo)).maps.at(0).epoch, epoch) << "an epoch that clients know is over";
+    EXPECT_GT(house.Ask(AboutSite(RequestKind::kMapInfo)).maps.at(0).epoch, epoch)
+        << "an epoch that clients know is over";
     // The robot goes on in it.
     house.Push(SessionRequest{.robot = "r1",
                               .site = "lab",
                               .sensors = {"laser"},
-                              .client = kDriver,
+                              .client = kRider,
                               .has_start = true,
                               .T_map_robot_start = {},
                               .end = false,
-                              .session = house.TokenOf("r1", kDriver),
+                              .session = house.TokenOf("r1", kRider),
                               .started = true});
-    ASSERT_TRUE(house.WaitPhase("r1", kDriver, SessionPhase::kActive));
-    house.Drive("r1", kDriver, 80, 90);
+    ASSERT_TRUE(house.WaitPhase("r1", kRider, SessionPhase::kActive));
+    house.Drive("r1", kRider, 80, 90);
     EXPECT_EQ(ViewOf(house).used["r1"], 90U);
     before = ViewOf(house);
     ASSERT_TRUE(Stored(house, "r1", 90));
@@ -218,12 +213,12 @@ TEST(SavedSites, WhatCannotBeSavedOrLoadedIsRefusedAndNothingChanges) {
   const TempDirectory directory;
   StoredServer server(directory / "0");
   WholeServer& house = *server.operator->();
-  house.Open("r1", kDriver);
-  house.Drive("r1", kDriver, 0, 20);
+  house.Open("r1", kRider);
+  house.Drive("r1", kRider, 0, 20);
   ASSERT_TRUE(Stored(house, "r1", 20));
   ASSERT_TRUE(house.WaitFor([&] { return ReadSite(server.store(), "lab").has_value(); }));
   const auto refused = [&](RequestKind kind, const std::string& site, const std::string& name) {
-    return house.Ask(OfFile(kind, site, name)).status;
+    return house.Ask(AboutFile(kind, site, name)).status;
   };
   EXPECT_EQ(refused(RequestKind::kSiteSave, "nowhere", "").code, StatusCode::kNotFound);
   for (const char* name : {"../lab", "/tmp/lab", "a/b", ".lab", "..", "saved\\..", "a b"}) {
@@ -240,7 +235,7 @@ TEST(SavedSites, WhatCannotBeSavedOrLoadedIsRefusedAndNothingChanges) {
   EXPECT_THAT(twice.message, HasSubstr("'r1'"));
   WriteText(directory / "0" / "saved" / "bad.site", "cairnste, or what is left of it");
   EXPECT_NE(refused(RequestKind::kSiteLoad, "copy", "bad").code, StatusCode::kOk);
-  const auto listed = house.Ask(Of(RequestKind::kSavedList)).saved;
+  const auto listed = house.Ask(AboutSite(RequestKind::kSavedList)).saved;
   ASSERT_EQ(listed.size(), 2U);
   EXPECT_EQ(listed[0].name, "bad");
   EXPECT_EQ(listed[0].site, "");
@@ -249,8 +244,8 @@ TEST(SavedSites, WhatCannotBeSavedOrLoadedIsRefusedAndNothingChanges) {
   EXPECT_EQ(ViewOf(house).used["r1"], 20U);
   // Without a place for files there are none.
   WholeServer forgetful;
-  EXPECT_EQ(forgetful.Ask(Of(RequestKind::kSiteSave)).status.code, StatusCode::kFailedPrecondition);
-  EXPECT_EQ(forgetful.Ask(Of(RequestKind::kSiteDelete)).status.code, StatusCode::kFailedPrecondition);
+  EXPECT_EQ(forgetful.Ask(AboutSite(RequestKind::kSiteSave)).status.code, StatusCode::kFailedPrecondition);
+  EXPECT_EQ(forgetful.Ask(AboutSite(RequestKind::kSiteDelete)).status.code, StatusCode::kFailedPrecondition);
 }
 
 // Two robots that have each mapped the same room from where they stood: with the right transform it is one room.
@@ -260,8 +255,8 @@ TEST(SavedSites, TwoSitesAreMergedIntoOneMap) {
   const Pose2 T_lab_annex = TruePose(30);  // The second robot has called the place of step 30 its origin.
   {
     StoredServer server(directory / "0");
-    server->Open("r1", kDriver, "lab");
-    server->Drive("r1", kDriver, 0, kScans);
+    server->Open("r1", kRider, "lab");
+    server->Drive("r1", kRider, 0, kScans);
     server->Open("r2", 9, "annex", T_lab_annex.Inverse());
     server->Drive("r2", 9, 0, kScans);
     ASSERT_TRUE(Stored(*server.operator->(), "r2", kScans));
@@ -274,7 +269,7 @@ TEST(SavedSites, TwoSitesAreMergedIntoOneMap) {
   }
   StoredServer server(directory / "0");
   WholeServer& house = *server.operator->();
-  EXPECT_EQ(house.Ask(Of(RequestKind::kMapInfo, "annex")).status.code, StatusCode::kNotFound);
+  EXPECT_EQ(house.Ask(AboutSite(RequestKind::kMapInfo, "annex")).status.code, StatusCode::kNotFound);
   View view = ViewOf(house);
   for (const char* robot : {"r1", "r2"}) {
     EXPECT_EQ(view.used[robot], static_cast<std::uint64_t>(kScans)) << robot;
@@ -309,7 +304,7 @@ TEST(SavedSites, TwoSitesAreMergedIntoOneMap) {
   EXPECT_EQ(job.state, JobState::kSucceeded);
   EXPECT_THAT(job.message, HasSubstr("2 robots"));
   // And back to the map before the job, with the grids of both.
-  Request back = Of(RequestKind::kMapEnable);
+  Request back = AboutSite(RequestKind::kMapEnable);
   back.map_version = 1;
   EXPECT_TRUE(house.Ask(back).status.ok());
 }
@@ -326,7 +321,7 @@ TEST(SavedSites, TheGoldenFileOfEveryVersionLoads) {
     ASSERT_TRUE(std::filesystem::copy_file(golden, directory / "0" / "saved" / "golden.site")) << golden;
     StoredServer server(directory / "0");
     WholeServer& house = *server.operator->();
-    const Reply loaded = house.Ask(OfFile(RequestKind::kSiteLoad, "lab", "golden"));
+    const Reply loaded = house.Ask(AboutFile(RequestKind::kSiteLoad, "lab", "golden"));
     ASSERT_TRUE(loaded.status.ok()) << loaded.status.message;
     View view = ViewOf(house);
     EXPECT_EQ(view.used, (std::map<std::string, std::uint64_t>{{"robot1", 40U}, {"robot2", 40U}}));
@@ -335,7 +330,7 @@ TEST(SavedSites, TheGoldenFileOfEveryVersionLoads) {
     EXPECT_EQ(view.enabled, 2U);
     EXPECT_THAT(view.notes, ::testing::ElementsAre("live", HasSubstr("smoothed: 2 robots")));
     EXPECT_GE(view.tiles.size(), 8U);
-    EXPECT_EQ(house.Ask(Of(RequestKind::kJobList)).jobs.at(0).state, JobState::kSucceeded);
+    EXPECT_EQ(house.Ask(AboutSite(RequestKind::kJobList)).jobs.at(0).state, JobState::kSucceeded);
     EXPECT_EQ(Smooth(house).state, JobState::kSucceeded);
   }
 }

@@ -1,6 +1,7 @@
 // The whole server on a store in a directory, as cairnd has it: the next one on the same directory goes on.
 #pragma once
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 
@@ -32,5 +33,11 @@ class StoredServer {
   const Generation generation_;
   WholeServer house_;
 };
+
+inline bool SamePath(const Trajectory& a, const Trajectory& b) {
+  return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), [](const auto& x, const auto& y) {
+           return x.stamp == y.stamp && x.T_map_robot == y.T_map_robot;
+         });
+}
 
 }  // namespace cairn::server::testing
