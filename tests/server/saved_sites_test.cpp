@@ -83,7 +83,7 @@ Job Smooth(WholeServer& house, const std::string& site = "lab") {
 
 bool Stored(WholeServer& house, const std::string& robot, std::uint64_t scans) {
   return house.WaitFor([&] {
-    const Reply status = house.Ask(AboutSite(RequestKind::kStatus, "lab", robot));
+    const Reply status = house.Ask(AboutSite(RequestKind::kStatus, "", robot));
     return !status.robots.empty() && !status.robots[0].ledgers.empty() &&
            status.robots[0].ledgers[0].durable_through == scans;
   });
