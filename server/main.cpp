@@ -173,7 +173,8 @@ int Serve(const CairndOptions& options, const std::filesystem::path& state) {
   if (!others) return failed(others.error());
   auto egress = Egress::Open(**bus, outbound, kept->generation);
   if (!egress) return failed(egress.error());
-  Server server(options.server, inbound, outbound, kept->generation, kept->journal.get());
+  const auto saved = state == kNoState || state == kInMemory ? std::filesystem::path() : state / "saved";
+  Server server(options.server, inbound, outbound, kept->generation, kept->journal.get(), saved);
   if (auto started = server.Start(); !started) return failed(started.error());
   if (kept->journal != nullptr) kept->journal->Start();
   auto ingress = Ingress::Open(**bus, inbound, outbound);

@@ -27,7 +27,7 @@ Stamp ServerClock() {
 }  // namespace
 
 Server::Server(const ServerOptions& options, Inbound& inbound, Outbound& outbound, Generation generation,
-               Journal* journal)
+               Journal* journal, const std::filesystem::path& saved)
     : options_(options),
       inbound_(inbound),
       outbound_(outbound),
@@ -42,7 +42,8 @@ Server::Server(const ServerOptions& options, Inbound& inbound, Outbound& outboun
       worker_(
           options.jobs, jobs_,
           [this](const Job& job, bool enable, const JobControl& control) { return smooth_.Run(job, enable, control); }),
-      desk_(static_cast<std::size_t>(options.server.query_queue), outbound, roster_, atlas_, jobs_, worker_,
+      shelf_(saved, journal, {outbound, roster_, atlas_, jobs_, worker_}),
+      desk_(static_cast<std::size_t>(options.server.query_queue), outbound, roster_, atlas_, jobs_, worker_, shelf_,
             generation),
       heartbeat_(
           std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options.server.stall_limit_s))) {}
@@ -65,6 +66,7 @@ Result<void> Server::Start() {
   for (const std::string& name : options_.server.site_names()) {
     if (const auto site = atlas_.Create(name); !site) return tl::unexpected(site.error());
   }
+  shelf_.Start();
   desk_.Start();
   worker_.Start();
   dispatcher_ = std::jthread([this](const std::stop_token& stop) { Dispatch(stop); });
@@ -161,6 +163,7 @@ void Server::Stop() {
   outbound_.lane(Outbound::Lane::kReplies).Close();
   if (dispatcher_.joinable()) dispatcher_.join();  // It first dispatches what the channel still holds.
   housekeeping_ = {};
+  shelf_.Stop();
   worker_.Stop();
   FinishSessions();
   PublishMaps();

@@ -9,6 +9,7 @@
 #include <asio/thread_pool.hpp>
 #include <atomic>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <thread>
 
@@ -28,9 +29,9 @@ class Server {
  public:
   // `generation`: the number of this start of the server, the same as that of the egress.
   // `journal` stores the state and contains that of earlier servers; null: nothing is stored. The caller stops it after
-  // the server.
+  // the server. `saved`: the directory of saved sites; empty: none are kept.
   Server(const ServerOptions& options, Inbound& inbound, Outbound& outbound, Generation generation,
-         Journal* journal = nullptr);
+         Journal* journal = nullptr, const std::filesystem::path& saved = {});
   ~Server();
 
   // Restores what is stored, creates the configured sites and starts the threads.
@@ -67,6 +68,7 @@ class Server {
   JobList jobs_;
   const SmoothJob smooth_;
   JobWorker worker_;
+  SiteShelf shelf_;
   Desk desk_;
   Heartbeat heartbeat_;
   std::size_t first_site_ = 0;     // Of the next publication; used by housekeeping only.

@@ -22,6 +22,9 @@ void AddMap(CLI::App& app, Program& program);  // All commands of maps; `map dra
 void AddMapDraw(CLI::App& map, Program& program);
 void AddJob(CLI::App& app, Program& program);
 void AddCloud(CLI::App& app, Program& program);
+void AddSite(CLI::App& app, Program& program);  // All commands of sites; those that need no server have their own file.
+void AddStoredSites(CLI::App& site, Program& program);
+ExitCode ListSites(Program& program);  // Of the running server.
 void AddSession(CLI::App& app, Program& program);
 
 }  // namespace cairn::client

@@ -88,6 +88,10 @@ void to_json(nlohmann::json& json, const MapInfo& map) {
       {"versions", map.versions}};
 }
 
+void to_json(nlohmann::json& json, const SavedSite& saved) {
+  json = {{"name", saved.name}, {"site", saved.site}, {"bytes", saved.bytes}, {"saved", saved.saved}};
+}
+
 void to_json(nlohmann::json& json, const Tile& tile) {
   json = {{"level", tile.key.level},   {"x", tile.key.x},
           {"y", tile.key.y},           {"epoch", tile.epoch},

@@ -268,6 +268,26 @@ Result<MapInfo> QueryClient::RollBackMap(const std::string& site) {
   return EnableMap(site, before);
 }
 
+Result<std::vector<SavedSite>> QueryClient::SavedSites() {
+  return Ask(MakeRequest(RequestKind::kSavedList)).map([](Reply&& reply) { return std::move(reply.saved); });
+}
+
+Result<SavedSite> QueryClient::SaveSite(const std::string& site, const std::string& name) {
+  Request request = AboutSite(RequestKind::kSiteSave, site);
+  request.saved = name;
+  return Ask(request).and_then([](Reply&& reply) { return Only(std::move(reply.saved), "saved sites"); });
+}
+
+Result<void> QueryClient::LoadSite(const std::string& name, const std::string& site) {
+  Request request = AboutSite(RequestKind::kSiteLoad, site);
+  request.saved = name;
+  return Ask(request).map([](Reply&&) {});
+}
+
+Result<void> QueryClient::DeleteSite(const std::string& site) {
+  return Ask(AboutSite(RequestKind::kSiteDelete, site)).map([](Reply&&) {});
+}
+
 Result<Job> QueryClient::AskForJob(const Request& request) {
   return Ask(request).and_then([](Reply&& reply) { return Only(std::move(reply.jobs), "jobs"); });
 }

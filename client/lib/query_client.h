@@ -85,6 +85,17 @@ class QueryClient {
   // Switches to the highest version below the enabled one; kFailedPrecondition if there is none.
   [[nodiscard]] Result<MapInfo> RollBackMap(const std::string& site);
 
+  // The sites that the server keeps as files.
+  [[nodiscard]] Result<std::vector<SavedSite>> SavedSites();
+  // Writes everything that the server has stored of the site into the file of this name, in place of one that is there;
+  // an empty name is the site's. kNotFound: nothing is stored of such a site.
+  [[nodiscard]] Result<SavedSite> SaveSite(const std::string& site, const std::string& name = "");
+  // Takes up a saved site; an empty site is named as in the file. kAlreadyExists: there is such a site, or one of its
+  // robots has a session. kDataLoss: the file is damaged. kFailedPrecondition: a newer server has written it.
+  [[nodiscard]] Result<void> LoadSite(const std::string& name, const std::string& site = "");
+  // With all that is stored of it. kFailedPrecondition: a robot is active in it, or a job has not ended.
+  [[nodiscard]] Result<void> DeleteSite(const std::string& site);
+
   // `enable`: the server switches the site to the job's map version as soon as the job succeeds.
   [[nodiscard]] Result<Job> SubmitJob(const std::string& site, JobKind kind, bool enable = true);
   [[nodiscard]] Result<Job> GetJob(std::uint64_t id);

@@ -38,6 +38,7 @@ Reply ReplyAssembly::Take() {
     Append(whole.maps, std::move(part.maps));
     Append(whole.robots, std::move(part.robots));
     Append(whole.jobs, std::move(part.jobs));
+    Append(whole.saved, std::move(part.saved));
   }
   Reply& last = parts_.at(last_part_);
   whole.client = last.client;

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <string>
 #include <system_error>
+#include <utility>
 
 namespace cairn {
 namespace {
@@ -28,7 +29,7 @@ int WriteAll(int descriptor, std::string_view content) {
     if (count < 0) return errno;
     content.remove_prefix(static_cast<std::size_t>(count));
   }
-  return ::fsync(descriptor) == 0 ? 0 : errno;
+  return 0;
 }
 
 // Makes the rename itself durable. Where the file system cannot sync a directory, this is not an error.
@@ -41,21 +42,55 @@ void SyncDirectory(const std::filesystem::path& directory) {
 
 }  // namespace
 
-Result<void> WriteFileAtomically(const std::filesystem::path& path, std::string_view content) {
+AtomicFile::AtomicFile(std::filesystem::path path, std::filesystem::path temporary, int descriptor)
+    : path_(std::move(path)), temporary_(std::move(temporary)), descriptor_(descriptor) {}
+
+AtomicFile::AtomicFile(AtomicFile&& other) noexcept
+    : path_(std::move(other.path_)),
+      temporary_(std::move(other.temporary_)),
+      descriptor_(std::exchange(other.descriptor_, -1)) {}
+
+AtomicFile::~AtomicFile() {
+  if (descriptor_ < 0) return;
+  Close();
+  ::unlink(temporary_.c_str());
+}
+
+Result<AtomicFile> AtomicFile::Create(const std::filesystem::path& path) {
   static std::atomic<std::uint64_t> counter{0};
   std::filesystem::path temporary = path;
   temporary += ".tmp." + std::to_string(::getpid()) + "." + std::to_string(counter.fetch_add(1));
   const int descriptor = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
   if (descriptor < 0) return FailErrno(path, "cannot create", errno);
-  int error = WriteAll(descriptor, content);
-  if (::close(descriptor) != 0 && error == 0) error = errno;
-  if (error == 0 && std::rename(temporary.c_str(), path.c_str()) != 0) error = errno;
-  if (error != 0) {
-    ::unlink(temporary.c_str());
-    return FailErrno(path, "cannot write", error);
-  }
-  SyncDirectory(path.parent_path());
+  return AtomicFile(path, std::move(temporary), descriptor);
+}
+
+int AtomicFile::Close() {
+  return ::close(std::exchange(descriptor_, -1)) == 0 ? 0 : errno;
+}
+
+Result<void> AtomicFile::Append(std::string_view content) {
+  if (const int error = WriteAll(descriptor_, content); error != 0) return FailErrno(path_, "cannot write", error);
   return {};
+}
+
+Result<void> AtomicFile::Commit() {
+  int error = ::fsync(descriptor_) == 0 ? 0 : errno;
+  if (const int closed = Close(); error == 0) error = closed;
+  if (error == 0 && std::rename(temporary_.c_str(), path_.c_str()) != 0) error = errno;
+  if (error != 0) {
+    ::unlink(temporary_.c_str());
+    return FailErrno(path_, "cannot write", error);
+  }
+  SyncDirectory(path_.parent_path());
+  return {};
+}
+
+Result<void> WriteFileAtomically(const std::filesystem::path& path, std::string_view content) {
+  auto file = AtomicFile::Create(path);
+  if (!file) return tl::unexpected(file.error());
+  if (auto written = file->Append(content); !written) return written;
+  return file->Commit();
 }
 
 Result<std::vector<std::uint8_t>> ReadWholeFile(const std::filesystem::path& path, std::size_t max_bytes) {

@@ -31,8 +31,12 @@ enum class RequestKind : std::uint8_t {
   kJobList,     // site or all.
   kSessionEnd,  // robot.
   kMapEnable,   // site, map_version (an older version: roll back).
+  kSavedList,   // The files of saved sites.
+  kSiteSave,    // site, saved (the file's name; empty: the site's).
+  kSiteLoad,    // saved, site (empty: as in the file).
+  kSiteDelete,  // site.
 };
-inline constexpr int kRequestKindCount = 13;
+inline constexpr int kRequestKindCount = 17;
 [[nodiscard]] std::string_view RequestKindName(RequestKind kind);
 
 struct Area {
@@ -57,6 +61,7 @@ struct Request {
   JobKind job_kind = JobKind::kSmooth;
   bool enable = true;             // kJobSubmit: enable the map version it makes.
   std::uint32_t map_version = 0;  // kMapEnable.
+  std::string saved;              // kSiteSave, kSiteLoad: the name of a file in the server's directory of saved sites.
 };
 
 struct LandmarkReport {
@@ -77,6 +82,14 @@ struct RobotStatus {
   std::vector<Ledger> ledgers;  // One per sensor.
 };
 
+// A site as a file in the server's directory of saved sites.
+struct SavedSite {
+  std::string name;
+  std::string site;  // Empty where the file cannot be read.
+  std::uint64_t bytes = 0;
+  Stamp saved = 0;  // Of the server's clock.
+};
+
 // Large answers come in parts of < 64 KB each, `part` from 0; the one with `last` ends them.
 struct Reply {
   ClientId client = 0;
@@ -93,8 +106,9 @@ struct Reply {
   std::vector<MapInfo> maps;
   std::vector<RobotStatus> robots;
   std::vector<Job> jobs;
-  std::string server_version;  // kPing.
-  Generation generation = 0;   // Set by the server's egress.
+  std::string server_version;    // kPing.
+  std::vector<SavedSite> saved;  // kSavedList; kSiteSave: the file that was written.
+  Generation generation = 0;     // Set by the server's egress.
 };
 
 }  // namespace cairn

@@ -14,6 +14,7 @@ static Result<void> CheckBounds(const v1::TileContent& content);
 static Result<void> CheckBounds(const v1::TileRecord& tile);
 static Result<void> CheckBounds(const v1::Landmark& landmark);
 static Result<void> CheckBounds(const v1::RobotStatus& robot);
+static Result<void> CheckBounds(const v1::SavedSite& saved);
 
 namespace {
 
@@ -106,6 +107,10 @@ static Result<void> CheckBounds(const v1::RobotStatus& robot) {
       .result();
 }
 
+static Result<void> CheckBounds(const v1::SavedSite& saved) {
+  return Bounds().Name("name", saved.name()).Name("site", saved.site()).result();
+}
+
 Result<void> CheckBounds(const v1::SessionRequest& request) {
   Bounds bounds;
   bounds.Name("robot", request.robot()).Name("site", request.site());
@@ -177,11 +182,12 @@ Result<void> CheckBounds(const v1::Job& job) {
 
 Result<void> CheckBounds(const v1::Request& request) {
   return Bounds()
-      .Known("kind", request.kind(), v1::REQUEST_MAP_ENABLE)
+      .Known("kind", request.kind(), v1::REQUEST_SITE_DELETE)
       .Name("site", request.site())
       .Name("robot", request.robot())
       .Within("level", request.level(), 0, kMaxTileLevel)
       .Known("job_kind", request.job_kind(), v1::JOB_SMOOTH)
+      .Name("saved", request.saved())
       .result();
 }
 
@@ -196,6 +202,7 @@ Result<void> CheckBounds(const v1::Reply& reply) {
       .Each("robots", reply.robots(), kMaxReplyRobots)
       .Each("jobs", reply.jobs(), kMaxReplyJobs)
       .Text("server_version", reply.server_version())
+      .Each("saved", reply.saved(), kMaxReplySaved)
       .result();
 }
 

@@ -72,6 +72,18 @@ static RobotStatus FromWire(v1::RobotStatus&& wire) {
   return value;
 }
 
+static v1::SavedSite ToWire(const SavedSite& value) {
+  v1::SavedSite wire;
+  wire.name(value.name);
+  wire.site(value.site);
+  wire.bytes(value.bytes);
+  wire.saved_ns(value.saved);
+  return wire;
+}
+static SavedSite FromWire(v1::SavedSite&& wire) {
+  return {std::move(wire.name()), std::move(wire.site()), wire.bytes(), wire.saved_ns()};
+}
+
 // Convert a list element by element, in both directions.
 template <typename Wires, typename Values>
 static void ListToWire(const Values& values, Wires& wires) {
@@ -106,6 +118,7 @@ v1::Request ToWire(const Request& value) {
   wire.job_kind(static_cast<v1::JobKind>(value.job_kind));
   wire.enable(value.enable);
   wire.map_version(value.map_version);
+  wire.saved(value.saved);
   return wire;
 }
 
@@ -128,6 +141,7 @@ Request FromWire(v1::Request&& wire) {
   value.job_kind = static_cast<JobKind>(wire.job_kind());
   value.enable = wire.enable();
   value.map_version = wire.map_version();
+  value.saved = std::move(wire.saved());
   return value;
 }
 
@@ -148,6 +162,7 @@ v1::Reply ToWire(const Reply& value) {
   ListToWire(value.maps, wire.maps());
   ListToWire(value.robots, wire.robots());
   ListToWire(value.jobs, wire.jobs());
+  ListToWire(value.saved, wire.saved());
   wire.server_version(value.server_version);
   return wire;
 }
@@ -169,6 +184,7 @@ Reply FromWire(v1::Reply&& wire) {
   ListFromWire(wire.maps(), value.maps);
   ListFromWire(wire.robots(), value.robots);
   ListFromWire(wire.jobs(), value.jobs);
+  ListFromWire(wire.saved(), value.saved);
   value.server_version = std::move(wire.server_version());
   return value;
 }

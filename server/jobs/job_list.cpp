@@ -15,32 +15,58 @@ JobList::JobList(const JobsOptions& options, Outbound& outbound, std::function<S
     : options_(options), outbound_(outbound), now_(std::move(now)), journal_(journal) {}
 
 Result<std::vector<StoredJob>> JobList::Restore() {
-  std::vector<StoredJob> unfinished;
-  if (journal_ == nullptr) return unfinished;
+  if (journal_ == nullptr) return std::vector<StoredJob>{};
   const auto ids = journal_->store().Owners(RecordKind::kJob);
   if (!ids) return tl::unexpected(ids.error());
+  return TakeUp(*ids);
+}
+
+Result<std::vector<StoredJob>> JobList::TakeUp(const std::vector<std::uint64_t>& ids) {
+  std::vector<StoredJob> unfinished;
   const MutexLock lock(mutex_);
-  for (const std::uint64_t id : *ids) {
-    const auto take = [&](std::uint64_t, std::string_view bytes) CAIRN_NO_THREAD_SAFETY_ANALYSIS -> Result<void> {
-      auto stored = JobOf(bytes);
-      if (!stored) return tl::unexpected(stored.error());
-      if (!IsFinal(stored->job.state)) {
-        stored->job.state = JobState::kQueued;
-        stored->job.progress = 0.0;
-        unfinished.push_back(*stored);
-      }
-      Entry& entry = jobs_[id];
-      entry.job = stored->job;
-      entry.enable = stored->enable;
-      entry.control = std::make_shared<JobControl>([this, id](double progress) { Progress(id, progress); });
-      entry.unsent = true;
-      next_ = id + 1;
-      return {};
-    };
-    if (auto read = journal_->store().Read({.kind = RecordKind::kJob, .owner = id}, take); !read)
-      return tl::unexpected(read.error());
+  for (const std::uint64_t id : ids) {
+    if (auto restored = RestoreOne(id, unfinished); !restored) return tl::unexpected(restored.error());
   }
   return unfinished;
+}
+
+Result<void> JobList::RestoreOne(std::uint64_t id, std::vector<StoredJob>& unfinished) {
+  const auto take = [&](std::uint64_t, std::string_view bytes) CAIRN_NO_THREAD_SAFETY_ANALYSIS -> Result<void> {
+    auto stored = JobOf(bytes);
+    if (!stored) return tl::unexpected(stored.error());
+    if (!IsFinal(stored->job.state)) {
+      stored->job.state = JobState::kQueued;
+      stored->job.progress = 0.0;
+      unfinished.push_back(*stored);
+    }
+    Entry& entry = jobs_[id];
+    entry.job = stored->job;
+    entry.enable = stored->enable;
+    entry.control = std::make_shared<JobControl>([this, id](double progress) { Progress(id, progress); });
+    entry.unsent = true;
+    next_ = std::max(next_, id + 1);
+    return {};
+  };
+  return journal_->store().Read({.kind = RecordKind::kJob, .owner = id}, take);
+}
+
+std::uint64_t JobList::ReserveIds(std::uint64_t count) {
+  const MutexLock lock(mutex_);
+  return std::exchange(next_, next_ + count);
+}
+
+void JobList::RemoveSite(const std::string& site) {
+  const MutexLock lock(mutex_);
+  for (auto it = jobs_.begin(); it != jobs_.end();) {
+    const Job& job = it->second.job;
+    if (job.site != site || !IsFinal(job.state)) {
+      ++it;
+      continue;
+    }
+    replaced_.push_back(job);
+    it = jobs_.erase(it);
+  }
+  RetireReplaced();
 }
 
 Result<Job> JobList::Add(const std::string& site, JobKind kind, bool enable) {

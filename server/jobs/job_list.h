@@ -27,6 +27,12 @@ class JobList {
   // Restores the jobs of earlier servers. Those that had not ended are queued again and returned in the order of their
   // ids. REQUIRES: no other function was called before.
   Result<std::vector<StoredJob>> Restore();
+  // Jobs that are loaded while the server runs: the first of so many numbers that no other job gets, and then the jobs
+  // themselves, as Restore takes them.
+  [[nodiscard]] std::uint64_t ReserveIds(std::uint64_t count);
+  Result<std::vector<StoredJob>> TakeUp(const std::vector<std::uint64_t>& ids);
+  // The site is deleted: its jobs that have ended are gone, what is stored of them stays.
+  void RemoveSite(const std::string& site);
   // Adds a queued job. RESOURCE_EXHAUSTED: the list is full of unfinished jobs. `enable`: see JobWorker.
   Result<Job> Add(const std::string& site, JobKind kind, bool enable = true);
   // Marks the job as running. Returns false if it was cancelled meanwhile. From now on Cancel sets the flag
@@ -58,6 +64,7 @@ class JobList {
   void Progress(std::uint64_t id, double progress);
   void SendLocked(Entry& entry) CAIRN_REQUIRES(mutex_);
   void ChangedLocked(Entry& entry) CAIRN_REQUIRES(mutex_);
+  Result<void> RestoreOne(std::uint64_t id, std::vector<StoredJob>& unfinished) CAIRN_REQUIRES(mutex_);
   bool MakeRoom() CAIRN_REQUIRES(mutex_);
   void RetireReplaced() CAIRN_REQUIRES(mutex_);
   void End(std::uint64_t id, JobState state, const std::function<void(Job&)>& fill);

@@ -1,5 +1,6 @@
 #include "server/maps/atlas.h"
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -15,25 +16,77 @@ Atlas::Atlas(const MapsOptions& options, double resolution_m, bool create_sites,
       journal_(journal),
       generation_(generation) {}
 
+Result<StoredSite> Atlas::Stored(NameId owner) const {
+  std::optional<StoredSite> stored;
+  const auto take = [&stored](std::uint64_t, std::string_view bytes) -> Result<void> {
+    auto site = SiteOf(bytes);
+    if (!site) return tl::unexpected(site.error());
+    stored = std::move(*site);
+    return {};
+  };
+  if (auto read = journal_->store().Read({.kind = RecordKind::kSite, .owner = owner}, take); !read)
+    return tl::unexpected(read.error());
+  if (!stored) return Fail(StatusCode::kNotFound, "the store has no such site");
+  return *std::move(stored);
+}
+
 Result<void> Atlas::Restore() {
   if (journal_ == nullptr) return {};
-  Store& store = journal_->store();
-  const auto owners = store.Owners(RecordKind::kSite);
+  const auto owners = journal_->store().Owners(RecordKind::kSite);
   if (!owners) return tl::unexpected(owners.error());
   for (const std::uint64_t owner : *owners) {
-    std::optional<StoredSite> stored;
-    const auto take = [&stored](std::uint64_t, std::string_view bytes) -> Result<void> {
-      auto site = SiteOf(bytes);
-      if (!site) return tl::unexpected(site.error());
-      stored = std::move(*site);
-      return {};
-    };
-    if (auto read = store.Read({.kind = RecordKind::kSite, .owner = owner}, take); !read) return read;
+    const auto stored = Stored(owner);
+    if (!stored) return tl::unexpected(stored.error());
     const auto site = Make(stored->name, false);
     if (!site) return tl::unexpected(site.error());
     if (auto restored = (*site)->Restore(*stored); !restored) return restored;
   }
   return {};
+}
+
+Result<void> Atlas::Reserve(const std::string& name) {
+  const MutexLock lock(mutex_);
+  if (const auto found = sites_.find(name); found != sites_.end()) {
+    if (!Idle(found->second))
+      return Fail(StatusCode::kAlreadyExists,
+                  "there is a site '" + name + "' already; delete it, or load as another one");
+    Erase(found);
+  }
+  if (auto free = CheckName(name); !free) return free;
+  if (!MakeRoom()) return Fail(StatusCode::kResourceExhausted, "the limit maps.max_sites is reached");
+  reserved_.insert(name);
+  return {};
+}
+
+void Atlas::Release(const std::string& name) {
+  const MutexLock lock(mutex_);
+  reserved_.erase(name);
+}
+
+Result<void> Atlas::TakeUp(const std::string& name) {
+  const auto stored = Stored(HashName(name));
+  if (!stored) return tl::unexpected(stored.error());
+  std::shared_ptr<Site> site;
+  {
+    const MutexLock lock(mutex_);
+    site = NewSite(name);
+  }
+  if (auto restored = site->Restore(*stored); !restored) return restored;
+  const MutexLock lock(mutex_);
+  sites_.emplace(name, Place{std::move(site), false});
+  reserved_.erase(name);
+  return {};
+}
+
+void Atlas::Remove(const std::string& name) {
+  const MutexLock lock(mutex_);
+  const auto found = sites_.find(name);
+  if (found == sites_.end()) return;
+  const MapInfo last = found->second.site->snapshot()->info;
+  // Two above: the site says under the next epoch that nothing is left of it.
+  beginning_.epoch = std::max(beginning_.epoch, last.epoch + 2);
+  beginning_.tile_version = std::max(beginning_.tile_version, last.version + 2);
+  sites_.erase(found);
 }
 
 Result<std::shared_ptr<Site>> Atlas::Enter(const std::string& name) {
@@ -56,31 +109,51 @@ Result<std::shared_ptr<Site>> Atlas::Make(const std::string& name, bool configur
     found->second.configured |= configured;
     return found->second.site;
   }
-  for (const auto& [other, place] : sites_) {
-    if (HashName(other) == HashName(name)) {
-      return Fail(StatusCode::kAlreadyExists,
-                  "the names '" + name + "' and '" + other + "' have the same id; choose another name");
-    }
-  }
+  if (auto free = CheckName(name); !free) return tl::unexpected(free.error());
   if (!MakeRoom()) {
     return Fail(StatusCode::kResourceExhausted,
                 std::to_string(sites_.size()) + " sites are open; the limit is maps.max_sites");
   }
-  auto site = std::make_shared<Site>(name, resolution_m_, options_, pool_, outbound_, journal_, generation_);
+  auto site = NewSite(name);
   sites_.emplace(name, Place{site, configured});
   return site;
 }
 
+std::shared_ptr<Site> Atlas::NewSite(const std::string& name) const {
+  return std::make_shared<Site>(name, resolution_m_, options_, pool_, outbound_, journal_, generation_, beginning_);
+}
+
+Result<void> Atlas::CheckName(const std::string& name) const {
+  if (reserved_.contains(name))
+    return Fail(StatusCode::kUnavailable, "site '" + name + "' is being loaded; try again later");
+  const auto same_id = [&name](const std::string& other) {
+    return Fail(StatusCode::kAlreadyExists,
+                "the names '" + name + "' and '" + other + "' have the same id; choose another name");
+  };
+  for (const std::string& other : reserved_) {
+    if (HashName(other) == HashName(name)) return same_id(other);
+  }
+  for (const auto& [other, place] : sites_) {
+    if (HashName(other) == HashName(name)) return same_id(other);
+  }
+  return {};
+}
+
+bool Atlas::Idle(const Place& place) const {
+  // Every session and every waiting piece of work holds its site. With a use count of one, only this map holds it.
+  return place.site.use_count() == 1 && place.site->snapshot()->tiles.empty();
+}
+
+void Atlas::Erase(std::map<std::string, Place>::iterator place) {
+  if (journal_ != nullptr) journal_->Remove({.kind = RecordKind::kSite, .owner = HashName(place->first)});
+  sites_.erase(place);
+}
+
 bool Atlas::MakeRoom() {
-  if (sites_.size() < static_cast<std::size_t>(options_.max_sites)) return true;
+  if (sites_.size() + reserved_.size() < static_cast<std::size_t>(options_.max_sites)) return true;
   for (auto it = sites_.begin(); it != sites_.end(); ++it) {
-    const Place& place = it->second;
-    // Every session and every waiting piece of work holds its site. With a use count of one, only this map
-    // holds it.
-    const bool idle = !place.configured && place.site.use_count() == 1 && place.site->snapshot()->tiles.empty();
-    if (!idle) continue;
-    if (journal_ != nullptr) journal_->Remove({.kind = RecordKind::kSite, .owner = HashName(it->first)});
-    sites_.erase(it);
+    if (it->second.configured || !Idle(it->second)) continue;
+    Erase(it);
     return true;
   }
   return false;

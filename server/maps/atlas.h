@@ -6,6 +6,7 @@
 #include <asio/thread_pool.hpp>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,17 @@ class Atlas {
   // damaged. FAILED_PRECONDITION: a newer server has written it.
   Result<void> Restore();
 
+  // Takes up one site more that was stored by now, under a name that was reserved; then the name is free again. Not for
+  // the dispatcher: it reads the store.
+  Result<void> TakeUp(const std::string& name);
+  // Nobody else can make a site of this name until it is taken up or released. A site that holds nothing gives way.
+  // ALREADY_EXISTS: there is one. RESOURCE_EXHAUSTED: too many sites.
+  Result<void> Reserve(const std::string& name);
+  void Release(const std::string& name);
+  // The site is not found any more. Those who have it keep it. Sites that are made from now on begin above its epoch.
+  void Remove(const std::string& name);
+  [[nodiscard]] double resolution_m() const { return resolution_m_; }
+
   // Returns the site; creates it if it does not exist and the server may create it. NOT_FOUND: the server may
   // not. RESOURCE_EXHAUSTED: too many sites. INVALID_ARGUMENT: not a valid name.
   Result<std::shared_ptr<Site>> Enter(const std::string& name);
@@ -39,6 +51,11 @@ class Atlas {
     bool configured = false;
   };
   Result<std::shared_ptr<Site>> Make(const std::string& name, bool configured);
+  std::shared_ptr<Site> NewSite(const std::string& name) const CAIRN_REQUIRES(mutex_);
+  Result<StoredSite> Stored(NameId owner) const;
+  Result<void> CheckName(const std::string& name) const CAIRN_REQUIRES(mutex_);
+  [[nodiscard]] bool Idle(const Place& place) const;
+  void Erase(std::map<std::string, Place>::iterator place) CAIRN_REQUIRES(mutex_);
   bool MakeRoom() CAIRN_REQUIRES(mutex_);
 
   const MapsOptions options_;
@@ -51,6 +68,8 @@ class Atlas {
 
   mutable Mutex mutex_;
   std::map<std::string, Place> sites_ CAIRN_GUARDED_BY(mutex_);
+  std::set<std::string> reserved_ CAIRN_GUARDED_BY(mutex_);
+  Site::Beginning beginning_ CAIRN_GUARDED_BY(mutex_);  // Of the next site.
 };
 
 }  // namespace cairn::server

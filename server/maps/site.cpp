@@ -62,15 +62,17 @@ class Site::Ticket {
 };
 
 Site::Site(const std::string& name, double resolution_m, const MapsOptions& options, asio::thread_pool& pool,
-           Outbound& outbound, Journal* journal, Generation generation)
+           Outbound& outbound, Journal* journal, Generation generation, const Beginning& beginning)
     : name_(name),
       site_id_(HashName(name)),
       resolution_m_(resolution_m),
       outbound_(outbound),
-      journal_(journal),
       generation_(generation),
       strand_(asio::make_strand(pool)),
-      versions_(static_cast<std::size_t>(options.max_versions)) {
+      journal_(journal),
+      versions_(static_cast<std::size_t>(options.max_versions)),
+      epoch_(beginning.epoch),
+      tile_version_(beginning.tile_version) {
   auto empty = std::make_shared<MapSnapshot>();
   empty->info = InfoOf({});
   const MutexLock lock(mutex_);
@@ -165,9 +167,22 @@ void Site::Enable(std::uint32_t version, Done done, Wanted wanted) {
   });
 }
 
+void Site::Retire(std::function<void(std::shared_ptr<const MapSnapshot>)> done) {
+  Run([done = std::move(done)](Site& site) {
+    if (site.switch_) {
+      const Done waiting = std::move(site.switch_->done);
+      site.switch_.reset();
+      waiting(Fail(StatusCode::kNotFound, "site '" + site.name_ + "' was deleted"));
+    }
+    site.journal_ = nullptr;
+    site.retired_ = true;
+    done(site.snapshot());
+  });
+}
+
 void Site::Leave(SessionId session) {
-  if (journal_ == nullptr) return;
   Run([session](Site& site) {
+    if (site.journal_ == nullptr) return;
     site.layers_.insert(session);
     site.StoreLayer(session);
     site.journal_->Forget(session);
@@ -295,6 +310,7 @@ void Site::Refresh(const std::vector<TileKey>& changed, bool all) {
 }
 
 void Site::Send() {
+  if (retired_) return;
   const std::shared_ptr<const MapSnapshot> now = snapshot();
   if (info_changed_) info_changed_ = !outbound_.Send(now->info);
   while (!unsent_.empty()) {

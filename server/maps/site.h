@@ -49,9 +49,16 @@ class Site : public std::enable_shared_from_this<Site> {
   // Asked once, on the site's strand, before the work begins; false: the work is not done, and the answer is CANCELLED.
   using Wanted = std::function<bool()>;
 
+  // The epoch and the version with which the map begins: above those of a deleted site of the same name, because a
+  // client may still know them.
+  struct Beginning {
+    std::uint32_t epoch = 0;
+    std::uint64_t tile_version = 0;
+  };
+
   // `journal`: null if nothing is stored. `generation`: the number of this start of the server.
   Site(const std::string& name, double resolution_m, const MapsOptions& options, asio::thread_pool& pool,
-       Outbound& outbound, Journal* journal = nullptr, Generation generation = 0);
+       Outbound& outbound, Journal* journal = nullptr, Generation generation = 0, const Beginning& beginning = {0, 0});
 
   // Restores what an earlier server has stored: the epoch, the versions, and the parts of the map that were drawn by
   // sessions that no longer exist. REQUIRES: no other function was called before.
@@ -68,6 +75,12 @@ class Site : public std::enable_shared_from_this<Site> {
   void Change(GridChange&& change);
   // Called when the session is removed. Its part of the map stays and is stored, because the session no longer is.
   void Leave(SessionId session);
+  // The highest number of a session that exists no more and has a part here; 0: none. Before the threads start.
+  [[nodiscard]] SessionId last_layer() const { return layers_.empty() ? 0 : *layers_.rbegin(); }
+  // The site is deleted: from now on it stores nothing and publishes nothing. `done` receives what it had published
+  // last, on the strand, when everything that was asked before is finished. A switch of the map version under way
+  // fails.
+  void Retire(std::function<void(std::shared_ptr<const MapSnapshot>)> done);
   // Adds a disabled version; `done` receives its number.
   void AddVersion(MapVersion&& version, Done done, Wanted wanted = {});
   // UNAVAILABLE: another switch is under way. NOT_FOUND: the version does not exist or has been removed.
@@ -117,11 +130,12 @@ class Site : public std::enable_shared_from_this<Site> {
   const NameId site_id_;
   const double resolution_m_;
   Outbound& outbound_;
-  Journal* const journal_;
   const Generation generation_;
   asio::strand<asio::thread_pool::executor_type> strand_;
 
   // The members below are used on the strand only.
+  Journal* journal_;  // Null where nothing is stored.
+  bool retired_ = false;
   JointMap joint_;
   MapVersions versions_;
   std::uint32_t epoch_ = 0;

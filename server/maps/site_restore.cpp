@@ -1,4 +1,5 @@
 // What a site stores, and how it is restored (site.h).
+#include <algorithm>
 #include <memory>
 #include <utility>
 
@@ -36,7 +37,8 @@ void Site::StoreSite() {
                     .next_version = versions_.next(),
                     .enabled_version = versions_.enabled(),
                     .switches = switches_,
-                    .members = {}};
+                    .members = {},
+                    .resolution_m = resolution_m_};
   for (const auto& [robot, member] : members_) stored.members[robot] = member.session;
   journal_->Put({RecordKind::kSite, site_id_, 0}, [stored = std::move(stored)] { return BytesOf(stored); });
 }
@@ -58,6 +60,7 @@ void Site::RemoveOldVersions() {
 }
 
 void Site::StoreLayer(SessionId session) {
+  if (journal_ == nullptr) return;
   journal_->Put({RecordKind::kLayer, site_id_, session},
                 [layer = StoredLayer{session, ToStored(joint_.ChunksOf(session), 0)}] { return BytesOf(layer); });
 }
@@ -68,8 +71,13 @@ bool Site::Switched(std::uint32_t epoch, Generation generation) const {
 }
 
 Result<void> Site::Restore(const StoredSite& stored) {
-  epoch_ = stored.epoch;
-  tile_version_ = stored.tile_version;
+  if (stored.resolution_m != 0.0 && stored.resolution_m != resolution_m_) {
+    return Fail(StatusCode::kFailedPrecondition, "site '" + name_ + "' is stored with cells of " +
+                                                     std::to_string(stored.resolution_m) +
+                                                     " m; slam.grid.resolution_m is " + std::to_string(resolution_m_));
+  }
+  epoch_ = std::max(epoch_, stored.epoch);
+  tile_version_ = std::max(tile_version_, stored.tile_version);
   switches_ = stored.switches;
   if (auto restored = RestoreVersions(stored); !restored) return restored;
   if (auto restored = RestoreLayers(); !restored) return restored;

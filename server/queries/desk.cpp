@@ -22,12 +22,13 @@ Reply JobReply(const Request& request, Result<Job> job) {
 }  // namespace
 
 Desk::Desk(std::size_t capacity, Outbound& outbound, Roster& roster, Atlas& atlas, JobList& jobs, JobWorker& worker,
-           Generation generation)
+           SiteShelf& shelf, Generation generation)
     : outbound_(outbound),
       roster_(roster),
       atlas_(atlas),
       jobs_(jobs),
       worker_(worker),
+      shelf_(shelf),
       generation_(generation),
       requests_(capacity) {}
 
@@ -118,6 +119,12 @@ std::optional<Answer> Desk::AnswerTo(const Request& request) {
     }
     case RequestKind::kMapEnable:
       return EnableMap(request);
+    case RequestKind::kSavedList:
+    case RequestKind::kSiteSave:
+    case RequestKind::kSiteLoad:
+    case RequestKind::kSiteDelete:
+      shelf_.Take(Request(request));
+      return std::nullopt;
   }
   throw std::logic_error("the request has an unknown kind");
 }

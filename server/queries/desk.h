@@ -17,6 +17,7 @@
 #include "server/outbound.h"
 #include "server/queries/answers.h"
 #include "server/queries/request_queue.h"
+#include "server/queries/site_shelf.h"
 #include "server/robots/roster.h"
 
 namespace cairn::server {
@@ -24,7 +25,7 @@ namespace cairn::server {
 class Desk {
  public:
   Desk(std::size_t capacity, Outbound& outbound, Roster& roster, Atlas& atlas, JobList& jobs, JobWorker& worker,
-       Generation generation);
+       SiteShelf& shelf, Generation generation);
   ~Desk();
 
   void Start();
@@ -53,6 +54,7 @@ class Desk {
   Atlas& atlas_;
   JobList& jobs_;
   JobWorker& worker_;
+  SiteShelf& shelf_;
   const Generation generation_;
   RequestQueue requests_;
   std::jthread thread_;  // The last member, because it uses the members above.

@@ -26,6 +26,9 @@ std::size_t BytesOf(const MapInfo& info) {
 std::size_t BytesOf(const RobotStatus& robot) {
   return 1024 + robot.session.status.message.size() + robot.ledgers.size() * 512;
 }
+std::size_t BytesOf(const SavedSite&) {
+  return 192;
+}
 std::size_t BytesOf(const Job& job) {
   return job.message.size() + job.site.size() + 160;
 }
@@ -66,6 +69,7 @@ ReplyParts::ReplyParts(Answer&& answer) : tiles_(std::move(answer.tiles)), heade
   items_.maps = std::exchange(header_.maps, {});
   items_.robots = std::exchange(header_.robots, {});
   items_.jobs = std::exchange(header_.jobs, {});
+  items_.saved = std::exchange(header_.saved, {});
 }
 
 std::optional<Reply> ReplyParts::Next() {
@@ -82,7 +86,8 @@ bool ReplyParts::Fill(Reply& part) {
   return full.Take(items_.poses, taken_.poses, part.poses) && full.Take(items_.path, taken_.path, part.path) &&
          full.Take(tiles_, taken_.tiles, part.tiles) && full.Take(items_.landmarks, taken_.landmarks, part.landmarks) &&
          full.Take(items_.maps, taken_.maps, part.maps) && full.Take(items_.robots, taken_.robots, part.robots) &&
-         full.Take(items_.jobs, taken_.jobs, part.jobs);
+         full.Take(items_.jobs, taken_.jobs, part.jobs) &&
+         full.Take(items_.saved, taken_.saved, part.saved);
 }
 
 }  // namespace cairn::server

@@ -40,7 +40,7 @@ class ReplyParts {
   Reply header_;  // Without items.
   Reply items_;   // Only the lists of it are used.
   struct {
-    std::size_t poses = 0, path = 0, tiles = 0, landmarks = 0, maps = 0, robots = 0, jobs = 0;
+    std::size_t poses = 0, path = 0, tiles = 0, landmarks = 0, maps = 0, robots = 0, jobs = 0, saved = 0;
   } taken_;  // Items in the parts so far.
   bool done_ = false;
 };

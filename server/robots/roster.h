@@ -45,6 +45,18 @@ class Roster {
   // the records. A session whose records are damaged is left out, and the reason is logged.
   Result<void> Restore();
 
+  // Sessions that are loaded while the server runs. `first` of so many numbers that no other session gets.
+  [[nodiscard]] SessionId ReserveIds(std::uint64_t count);
+  // RESOURCE_EXHAUSTED: so many sessions more are too many (robots.max_robots). ALREADY_EXISTS: one of the robots has
+  // one.
+  [[nodiscard]] Result<void> HasRoomFor(const std::vector<std::string>& robots) const;
+  // Takes them up as Restore does; their site is open. Where a robot has opened a session meanwhile, that one stays and
+  // the loaded one has ended. Returns how many were taken up.
+  std::size_t TakeUp(const std::vector<SessionId>& ids);
+  // All sessions of the site are ended and gone, what is stored of them stays, and the site is not found any more.
+  // FAILED_PRECONDITION: a robot is active in it. NOT_FOUND: no such site.
+  Result<std::shared_ptr<Site>> RemoveSite(const std::string& site);
+
   // Opens, resumes, refuses or ends; the answer goes out as a SessionState.
   void Take(const SessionRequest& request);
   void Take(ScanArrival&& arrival);
@@ -67,6 +79,8 @@ class Roster {
   std::shared_ptr<Session> Make(SessionId id, const SessionRequest& request, std::uint32_t map_epoch,
                                 const std::shared_ptr<Site>& site) const;
   Journal::Durable DurableFor(const std::shared_ptr<Session>& session) const;
+  using Restored = std::vector<Result<std::shared_ptr<Session>>>;
+  Restored RestoreEach(const std::vector<SessionId>& ids);
   Result<std::shared_ptr<Session>> RestoreOne(SessionId id);
   // The session that has to be removed before this robot can have a new one; null if there is room.
   Result<std::shared_ptr<Session>> GivesWay(NameId robot_id) const CAIRN_REQUIRES(mutex_);

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "cairn/record.pb.h"
+#include "server/store/checksum.h"
 
 namespace cairn::server {
 namespace {
@@ -19,25 +20,6 @@ std::string NameOf(const RecordKey& key) {
   return "record " + std::to_string(static_cast<int>(key.kind)) + "/" + std::to_string(key.owner) + "/" +
          std::to_string(key.number);
 }
-
-// FNV-1a, 64 bits (Fowler, Noll, Vo 1991): every step is invertible, so one changed byte always changes the sum.
-class Checksum {
- public:
-  void Add(std::uint64_t number) {
-    for (int i = 0; i < 8; ++i) Add(static_cast<unsigned char>(number >> (8 * i)));
-  }
-  void Add(std::string_view bytes) {
-    for (const char c : bytes) Add(static_cast<unsigned char>(c));
-  }
-  [[nodiscard]] std::uint64_t value() const { return sum_; }
-
- private:
-  void Add(unsigned char byte) {
-    sum_ ^= byte;
-    sum_ *= 1099511628211ULL;
-  }
-  std::uint64_t sum_ = 14695981039346656037ULL;
-};
 
 std::uint64_t ChecksumOf(const RecordKey& key, const record::Envelope& envelope) {
   Checksum sum;

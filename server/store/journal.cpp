@@ -88,10 +88,26 @@ bool Journal::Checkpoint(std::uint64_t session, std::uint64_t position, Bytes by
   return true;
 }
 
-void Journal::Forget(std::uint64_t session) {
+void Journal::Close(std::uint64_t session) {
   const MutexLock lock(mutex_);
+  CloseLocked(session);
+}
+
+void Journal::CloseLocked(std::uint64_t session) {
   lines_.erase(session);
   std::erase_if(checkpoints_, [session](const WantedCheckpoint& wanted) { return wanted.session == session; });
+}
+
+void Journal::Between(Work work) {
+  const MutexLock lock(mutex_);
+  works_.push_back(std::move(work));
+  urgent_ = true;
+  arrived_.NotifyAll();
+}
+
+void Journal::Forget(std::uint64_t session) {
+  const MutexLock lock(mutex_);
+  CloseLocked(session);
   for (const RecordKind kind : {RecordKind::kSession, RecordKind::kJournal, RecordKind::kCheckpoint}) {
     Push(AllOf(kind, session), 64);
   }
@@ -140,12 +156,15 @@ void Journal::Run(const std::stop_token& stop) {
   while (auto group = Next(stop)) {
     const Clock::time_point oldest = group->oldest;
     try {
+      const std::vector<Work> works = std::move(group->works);
       Prepared prepared = Prepare(std::move(*group));
+      DropForgottenCheckpoint();
       if (!stop.stop_requested()) BeginCheckpoint();
       if (writing_) writing_->AddTo(prepared.changes);
       if (!CommitPatiently(prepared.changes, stop)) return;
       Tell(prepared, oldest);
       if (writing_ && writing_->complete()) EndCheckpoint();
+      for (const Work& work : works) work(store_);
       KeepBudget();
     } catch (const std::exception& error) {  // For example, not enough memory for the group: the journal ends here.
       const MutexLock lock(mutex_);
@@ -159,14 +178,15 @@ void Journal::Run(const std::stop_token& stop) {
 std::optional<Journal::Group> Journal::Next(const std::stop_token& stop) {
   const auto delay = std::chrono::milliseconds(options_.commit_delay_ms);
   const MutexLock lock(mutex_);
-  while (queue_.empty() && checkpoints_.empty() && !writing_ && !stop.stop_requested()) arrived_.Wait(mutex_);
+  while (queue_.empty() && checkpoints_.empty() && works_.empty() && !writing_ && !stop.stop_requested())
+    arrived_.Wait(mutex_);
   if (queue_.empty() && stop.stop_requested()) return std::nullopt;
   const auto due = oldest_ + delay;
   while (!queue_.empty() && !urgent_ && !writing_ && !stop.stop_requested() && Clock::now() < due)
     arrived_.WaitUntil(mutex_, due);
   urgent_ = false;
   committing_bytes_ = std::exchange(queued_bytes_, 0);
-  return Group{std::exchange(queue_, {}), oldest_};
+  return Group{std::exchange(queue_, {}), std::exchange(works_, {}), oldest_};
 }
 
 Journal::Prepared Journal::Prepare(Group&& group) {
@@ -197,6 +217,12 @@ Journal::Prepared Journal::Prepare(Group&& group) {
   }
   for (auto& [key, bytes] : put) prepared.changes.put.push_back({key, std::move(bytes)});
   return prepared;
+}
+
+// The parts of a checkpoint that are written already are removed with the session.
+void Journal::DropForgottenCheckpoint() {
+  const MutexLock lock(mutex_);
+  if (writing_ && !lines_.contains(writing_->session())) writing_.reset();
 }
 
 void Journal::BeginCheckpoint() {

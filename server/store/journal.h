@@ -68,12 +68,20 @@ class Journal {
   // Stores the session's state after exactly the entries up to `position`. Returns false if another checkpoint of the
   // session is still being written.
   bool Checkpoint(std::uint64_t session, std::uint64_t position, Bytes bytes);
+  // Nothing of the session is written any more, and what is stored of it stays.
+  void Close(std::uint64_t session);
   // Removes all records of a session that will not be restored.
   void Forget(std::uint64_t session);
 
   // Writes or replaces a record. `size` is an estimate of its bytes, for the bound of the queue.
   void Put(const RecordKey& key, Bytes bytes, std::size_t size = 1024);
   void Remove(const RecordRange& range);
+
+  // Calls `work` on the journal's thread when everything that was handed over before is on the disk. Nothing else is
+  // written until it returns, so it sees the store at one moment, and its own commit is the only one. What comes
+  // meanwhile waits. `work` is destroyed without a call if the journal stops before.
+  using Work = std::function<void(Store&)>;
+  void Between(Work work);
 
   [[nodiscard]] Store& store() { return store_; }
   [[nodiscard]] JournalHealth health() const;
@@ -101,6 +109,7 @@ class Journal {
   // Changes that are committed together.
   struct Group {
     std::deque<Change> changes;
+    std::vector<Work> works;  // After the commit.
     Clock::time_point oldest;
   };
   struct Batch {
@@ -117,10 +126,12 @@ class Journal {
     Bytes bytes;
   };
 
+  void CloseLocked(std::uint64_t session) CAIRN_REQUIRES(mutex_);
   bool Push(Change change, std::size_t size) CAIRN_REQUIRES(mutex_);
   void Run(const std::stop_token& stop);
   std::optional<Group> Next(const std::stop_token& stop);
   static Prepared Prepare(Group&& group);
+  void DropForgottenCheckpoint() CAIRN_EXCLUDES(mutex_);
   void BeginCheckpoint() CAIRN_EXCLUDES(mutex_);
   bool CommitOnce(const RecordChanges& changes);
   bool CommitPatiently(const RecordChanges& changes, const std::stop_token& stop);
@@ -144,6 +155,7 @@ class Journal {
   JournalCounts counts_ CAIRN_GUARDED_BY(mutex_);
   std::deque<float> delays_ms_ CAIRN_GUARDED_BY(mutex_);
   std::deque<WantedCheckpoint> checkpoints_ CAIRN_GUARDED_BY(mutex_);
+  std::vector<Work> works_ CAIRN_GUARDED_BY(mutex_);
 
   // Used by the thread only.
   std::optional<CheckpointWriter> writing_;

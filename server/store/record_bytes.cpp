@@ -104,6 +104,7 @@ std::string BytesOf(const StoredSite& site) {
     member.set_robot_id(robot_id);
     member.set_session(session);
   }
+  to.set_resolution_m(site.resolution_m);
   return to.SerializeAsString();
 }
 
@@ -117,7 +118,9 @@ Result<StoredSite> SiteOf(std::string_view bytes) {
                   .next_version = from.next_version(),
                   .enabled_version = from.enabled_version(),
                   .switches = {},
-                  .members = {}};
+                  .members = {},
+                  .resolution_m = from.resolution_m()};
+  if (!(site.resolution_m >= 0.0 && site.resolution_m <= 10.0)) return Unreadable("a site");
   for (const auto& made : from.switches()) site.switches[made.epoch()] = made.generation();
   for (const auto& member : from.members()) site.members[member.robot_id()] = member.session();
   return site;

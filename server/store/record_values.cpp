@@ -2,7 +2,6 @@
 
 #include <bit>
 #include <cstring>
-#include <limits>
 #include <utility>
 
 #include "common/map/tile.h"
@@ -10,9 +9,8 @@
 namespace cairn::server {
 namespace {
 
+constexpr int kFarthestChunk = 1 << 22;  // No estimator draws farther from the origin.
 constexpr std::size_t kChunkBytes = sizeof(std::int16_t) * static_cast<std::size_t>(kTileArea);
-// The numbers of its cells are of type int.
-constexpr int kFarthestChunk = std::numeric_limits<int>::max() / kTileCells - 1;
 static_assert(std::endian::native == std::endian::little, "cells are stored as they lie in memory");
 
 }  // namespace

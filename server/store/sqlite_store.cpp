@@ -123,6 +123,23 @@ class SqliteStore : public Store {
     }
   }
 
+  Result<void> CommitEach(const Next& next) override {
+    const MutexLock lock(mutex_);
+    try {
+      SQLite::Transaction transaction(database_, SQLite::TransactionBehavior::IMMEDIATE);
+      for (;;) {
+        const auto record = next();
+        if (!record) return tl::unexpected(record.error());  // The transaction is rolled back.
+        if (!*record) break;
+        Put(**record);
+      }
+      transaction.commit();
+      return {};
+    } catch (const SQLite::Exception& error) {
+      return tl::unexpected(StatusOf(error, "cannot write to the store"));
+    }
+  }
+
   Result<void> Read(const RecordRange& range, const Visit& visit) override {
     const MutexLock lock(mutex_);
     try {

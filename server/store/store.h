@@ -8,6 +8,7 @@
 #include <compare>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -64,6 +65,10 @@ class Store {
   // Returns when all changes are on the disk. After an error none of them is visible; the same changes may be tried
   // again. RESOURCE_EXHAUSTED: the disk is full. UNAVAILABLE: any other failure of the disk.
   virtual Result<void> Commit(const RecordChanges& changes) = 0;
+  // As Commit, of records that are too many for the memory: `next` gives one after the other, nothing at the end, or an
+  // error, after which none of them is there and which is returned. `next` must not use the store.
+  using Next = std::function<Result<std::optional<Record>>()>;
+  virtual Result<void> CommitEach(const Next& next) = 0;
   // Visits records in the order of their numbers. DATA_LOSS: a record is damaged. FAILED_PRECONDITION: a newer server
   // has written it.
   virtual Result<void> Read(const RecordRange& range, const Visit& visit) = 0;

@@ -77,6 +77,9 @@ MAY_INCLUDE = {
     "client/lib": [*COMMON, "common/wire"],
     "client/sim": COMMON,
     "client/cli": [*COMMON, "common/wire", "client/lib", "client/sim"],
+    # The commands on a stopped server's state and on saved sites: they read and write the store's records, and know
+    # nothing else of the server.
+    "client/cli/site_stored.cpp": [*COMMON, "client/cli", "client/lib", "server/store"],
     # Tests may look into everything.
     "tests": [*CHANNELS, *SLAM, "common/wire", "server/store", "server/ops", "server/maps", "server/robots", "server/jobs",
               "server/queries", "server/ingress", "server/egress", "server", "server/tools", "server/known_map.h",

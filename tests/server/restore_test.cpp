@@ -5,8 +5,7 @@
 #include <filesystem>
 #include <map>
 
-#include "server/store/sqlite_store.h"
-#include "tests/server/support/whole_server.h"
+#include "tests/server/support/stored_server.h"
 #include "tests/temp_directory.h"
 
 namespace cairn::server::testing {
@@ -14,29 +13,6 @@ namespace {
 
 constexpr ClientId kDriver = 7;
 constexpr int kSteps = 120;
-
-// A server with a store in a directory.
-class StoredServer {
- public:
-  explicit StoredServer(const std::filesystem::path& directory, ServerOptions options = TestOptions())
-      : store_(*OpenStore(directory)),
-        journal_(*store_, {.commit_delay_ms = 5}),
-        generation_(*NextGeneration(*store_, 1)),
-        house_(options, &journal_, generation_) {
-    journal_.Start();
-  }
-  ~StoredServer() {
-    house_.Stop();
-    journal_.Stop();
-  }
-  WholeServer* operator->() { return &house_; }
-
- private:
-  const std::unique_ptr<Store> store_;
-  Journal journal_;
-  const Generation generation_;
-  WholeServer house_;
-};
 
 // What a kill at this moment leaves.
 void CopyState(const std::filesystem::path& from, const std::filesystem::path& to) {
@@ -54,12 +30,6 @@ Request About(RequestKind kind, const std::string& robot = "r1") {
 
 Trajectory PathOf(WholeServer& house, const std::string& robot = "r1") {
   return house.Ask(About(RequestKind::kPath, robot)).path;
-}
-
-bool SamePath(const Trajectory& a, const Trajectory& b) {
-  return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), [](const auto& x, const auto& y) {
-           return x.stamp == y.stamp && x.T_map_robot == y.T_map_robot;
-         });
 }
 
 std::uint64_t DurableScans(WholeServer& house) {

@@ -54,6 +54,14 @@ TEST_F(CommandLine, NonsenseIsAUsageError) {
       {"sim"},
       {"sim", "--site", "s", "--beams", "0"},
       {"sim", "--site", "s", "--robots", "many"},
+      {"site"},
+      {"site", "save"},
+      {"site", "merge", "a.site", "b.site"},
+      {"site", "merge", "a.site", "-o", "c.site"},
+      {"site", "merge", "a", "b", "--state", "d", "-o", "c.site"},
+      {"site", "merge", "a", "b", "--state", "d", "--transform", "1,2"},
+      {"site", "split", "a", "--to", "b", "--state", "d"},
+      {"site", "export", "a", "-o", "a.site"},
       {"map"},
       {"map", "export", "--site", "s"},
       {"map", "draw", "-o", "x.png"},
@@ -154,6 +162,19 @@ TEST_F(CommandLine, AnErrorIsAnObjectForMachines) {
   const CommandOutcome outcome = RunLine({"--json", "check-log", File("none.log")});
   EXPECT_EQ(outcome.code, ExitCode::kFailed);
   EXPECT_THAT(nlohmann::json::parse(outcome.out)["error"]["message"].get<std::string>(), HasSubstr("none.log"));
+}
+
+TEST_F(CommandLine, SitesOfAStoppedServerAreFoundOrMissingAndNoDirectoryIsMadeByASlip) {
+  const CommandOutcome listed = RunLine({"site", "list", "--state", File("nothing")});
+  EXPECT_EQ(listed.code, ExitCode::kFailed);
+  EXPECT_THAT(listed.err, HasSubstr("NOT_FOUND"));
+  EXPECT_FALSE(std::filesystem::exists(File("nothing")));
+  EXPECT_EQ(RunLine({"site", "import", File("none.site"), "--state", File("made")}).code, ExitCode::kFailed);
+  std::ofstream(File("text.site")) << "no site";
+  const CommandOutcome text = RunLine({"site", "merge", File("text.site"), File("text.site"), "-o", File("o.site")});
+  EXPECT_EQ(text.code, ExitCode::kFailed);
+  EXPECT_THAT(text.err, HasSubstr("is not a saved site"));
+  EXPECT_FALSE(std::filesystem::exists(File("o.site")));
 }
 
 }  // namespace

@@ -251,6 +251,19 @@ void FakeServer::OnRequest(Request&& request) {
     case RequestKind::kJobList:
       reply.jobs.resize(2);
       break;
+    case RequestKind::kSavedList:
+      reply.saved.resize(2);
+      break;
+    case RequestKind::kSiteSave:
+      reply.saved.push_back({request.saved, request.site, 77, -1});
+      break;
+    case RequestKind::kSiteLoad:
+      if (request.saved != "monday" || request.site != "hall")
+        reply.status = {StatusCode::kNotFound, "no file " + request.saved};
+      break;
+    case RequestKind::kSiteDelete:
+      if (request.site != "hall") reply.status = {StatusCode::kNotFound, "no site " + request.site};
+      break;
     case RequestKind::kSessionEnd:
       break;
     case RequestKind::kMapEnable:

@@ -93,6 +93,18 @@ TEST_F(QueryClientTest, SaysWhatWasNotAnsweredInTime) {
   EXPECT_EQ(path.error().message, "no answer to path within 0.2 s");
 }
 
+TEST_F(QueryClientTest, SavesLoadsAndDeletesSites) {
+  EXPECT_EQ(Must(client_->SavedSites()).size(), 2U);
+  const SavedSite saved = Must(client_->SaveSite("hall", "monday"));
+  EXPECT_EQ(saved.site, "hall");
+  EXPECT_EQ(saved.name, "monday");
+  EXPECT_EQ(saved.bytes, 77U);
+  EXPECT_TRUE(client_->LoadSite("monday", "hall"));
+  EXPECT_EQ(client_->LoadSite("tuesday", "hall").error().code, StatusCode::kNotFound);
+  EXPECT_TRUE(client_->DeleteSite("hall"));
+  EXPECT_EQ(client_->DeleteSite("annex").error().code, StatusCode::kNotFound);
+}
+
 // A question that does something must not be asked twice, however slowly the two sides find each other.
 TEST_F(QueryClientTest, SubmitsAJobOnce) {
   ASSERT_TRUE(client_->SubmitJob("hall", JobKind::kSmooth));

@@ -213,7 +213,7 @@ Request ExtremeRequest() {
   Request value;
   value.client = kMax64;
   value.sequence = kMin64;
-  value.kind = RequestKind::kMapEnable;
+  value.kind = RequestKind::kSiteDelete;
   value.site = Name('s');
   value.robot = Name('r');
   value.latest = false;
@@ -228,6 +228,7 @@ Request ExtremeRequest() {
   value.job_kind = JobKind::kSmooth;
   value.enable = false;
   value.map_version = kMax32;
+  value.saved = Name('f');
   return value;
 }
 
@@ -258,6 +259,7 @@ Reply ExtremeReply() {
   value.robots = {{ExtremeSessionState(), true, ExtremePose(), {ExtremeLedger(), Ledger{}}}};
   value.jobs = {ExtremeJob(), Job{}};
   value.server_version = Text('v');
+  value.saved = {{Name('f'), Name('s'), kMax64, kMin64}, SavedSite{}};
   return value;
 }
 
@@ -326,7 +328,7 @@ bool Same(const Request& a, const Request& b) {
          Eq(a.area.x_max_m, b.area.x_max_m) && Eq(a.area.y_max_m, b.area.y_max_m) && a.level == b.level &&
          a.since_epoch == b.since_epoch && a.since_version == b.since_version &&
          a.since_generation == b.since_generation && a.job == b.job && a.job_kind == b.job_kind &&
-         a.enable == b.enable && a.map_version == b.map_version;
+         a.enable == b.enable && a.map_version == b.map_version && a.saved == b.saved;
 }
 bool Same(const Reply& a, const Reply& b) {
   const auto same = [](const auto& x, const auto& y) { return Same(x, y); };
@@ -339,7 +341,10 @@ bool Same(const Reply& a, const Reply& b) {
          Eq(a.status, b.status) && a.map_epoch == b.map_epoch && a.map_version == b.map_version &&
          a.generation == b.generation && EqList(a.poses, b.poses, same) && EqList(a.path, b.path, eq) &&
          EqList(a.tiles, b.tiles, eq) && EqList(a.landmarks, b.landmarks, eq) && EqList(a.maps, b.maps, same) &&
-         EqList(a.robots, b.robots, same_robot) && EqList(a.jobs, b.jobs, same) && a.server_version == b.server_version;
+         EqList(a.robots, b.robots, same_robot) && EqList(a.jobs, b.jobs, same) &&
+         a.server_version == b.server_version && EqList(a.saved, b.saved, [](const SavedSite& x, const SavedSite& y) {
+           return x.name == y.name && x.site == y.site && x.bytes == y.bytes && x.saved == y.saved;
+         });
 }
 
 }  // namespace cairn::wire

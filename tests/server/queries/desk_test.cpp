@@ -66,7 +66,8 @@ class DeskTest : public ::testing::Test {
                       enable_ = enable;
                       return Result<JobOutcome>(JobOutcome{});
                     }};
-  Desk desk_{kCapacity, outbound_, roster_, atlas_, jobs_, worker_, 1};
+  SiteShelf shelf_{{}, nullptr, {outbound_, roster_, atlas_, jobs_, worker_}};
+  Desk desk_{kCapacity, outbound_, roster_, atlas_, jobs_, worker_, shelf_, 1};
   bool started_ = false;
   std::int64_t sequence_ = 0;
 };

@@ -227,5 +227,56 @@ TEST(Journal, WhatIsForgottenIsGone) {
   EXPECT_EQ(*store->Owners(RecordKind::kSite), std::vector<std::uint64_t>{5});
 }
 
+TEST(Journal, WorkBetweenTwoCommitsSeesEverythingBeforeAndNothingElseIsWrittenMeanwhile) {
+  const auto store = *OpenStore(std::string(kInMemory));
+  Journal journal(*store, {.commit_delay_ms = 10000});
+  journal.Start();
+  journal.Open(SampleSession(1), {});
+  for (std::uint64_t i = 1; i <= 20; ++i) journal.Append(1, SampleScan(i));
+  std::atomic<std::uint64_t> seen{0}, later{0};
+  std::atomic<bool> done{false};
+  journal.Between([&](Store& of) {
+    seen = StoredEntries(of, 1);
+    for (std::uint64_t i = 21; i <= 25; ++i) journal.Append(1, SampleScan(i));
+    journal.Put({RecordKind::kSite, 5, 0}, [] { return std::string("new"); });
+    later = StoredEntries(of, 1) + of.Owners(RecordKind::kSite)->size();
+    done = true;
+  });
+  ASSERT_TRUE(test::Eventually([&] { return done.load(); }));
+  EXPECT_EQ(seen, 20U);
+  EXPECT_EQ(later, 20U);
+  journal.Stop();
+  EXPECT_EQ(StoredEntries(*store, 1), 25U);
+}
+
+// Its parts would be found by a later session of the same number.
+TEST(Journal, ACheckpointOfASessionThatIsClosedMeanwhileIsNotFinished) {
+  const auto store = *OpenStore(std::string(kInMemory));
+  Journal journal(*store, {.commit_delay_ms = 1});
+  journal.Start();
+  journal.Open(SampleSession(1), {});
+  journal.Append(1, SampleScan(1));
+  std::atomic<bool> begun{false}, closed{false}, removed{false};
+  ASSERT_TRUE(journal.Checkpoint(1, 1, [&] {
+    begun = true;
+    EXPECT_TRUE(test::Eventually([&] { return closed.load(); }));
+    return LargeState(1, 20'000'000);
+  }));
+  ASSERT_TRUE(test::Eventually([&] { return begun.load(); }));
+  journal.Close(1);
+  EXPECT_EQ(journal.Append(1, SampleScan(2)), 0U);
+  journal.Between([&](Store& of) {
+    EXPECT_TRUE(of.Commit({.removed = {{.kind = RecordKind::kCheckpoint, .owner = 1}}, .put = {}}));
+    removed = true;
+  });
+  closed = true;
+  ASSERT_TRUE(test::Eventually([&] { return removed.load(); }));
+  journal.Put({RecordKind::kSite, 5, 0}, [] { return std::string("new"); });
+  ASSERT_TRUE(test::Eventually([&] { return store->Owners(RecordKind::kSite)->size() == 1; }));
+  journal.Stop();
+  EXPECT_TRUE(store->Owners(RecordKind::kCheckpoint)->empty());
+  EXPECT_EQ(StoredEntries(*store, 1), 1U) << "what was stored stays";
+}
+
 }  // namespace
 }  // namespace cairn::server

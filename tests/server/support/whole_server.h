@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <filesystem>
 #include <functional>
+#include <map>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -29,12 +31,13 @@ class WholeServer {
  public:
   static constexpr Generation kGeneration = 7;
 
-  // `journal`: the server takes up what its store holds, and stores its own state there.
+  // `journal`: the server takes up what its store holds, and stores its own state there. `saved`: the directory of
+  // saved sites.
   explicit WholeServer(const ServerOptions& options = TestOptions(), Journal* journal = nullptr,
-                       Generation generation = kGeneration)
+                       Generation generation = kGeneration, const std::filesystem::path& saved = {})
       : inbound_(static_cast<std::size_t>(options.server.inbound_capacity)),
         outbound_(static_cast<std::size_t>(options.server.outbound_capacity)),
-        server_(options, inbound_, outbound_, generation, journal) {
+        server_(options, inbound_, outbound_, generation, journal, saved) {
     for (const auto lane : {Outbound::Lane::kLive, Outbound::Lane::kMap, Outbound::Lane::kReplies}) {
       readers_.emplace_back([this, lane] {
         while (auto value = outbound_.lane(lane).Pop()) Keep(std::move(*value));

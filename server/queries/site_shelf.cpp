@@ -1,0 +1,228 @@
+#include "server/queries/site_shelf.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <future>
+#include <memory>
+#include <system_error>
+#include <utility>
+
+#include "server/queries/answers.h"
+
+namespace cairn::server {
+namespace {
+
+constexpr const char* kExtension = ".site";
+constexpr std::size_t kMostListed = 4096;
+constexpr auto kLook = std::chrono::milliseconds(50);  // How often a wait checks whether the server stops.
+
+Stamp ModifiedAt(const std::filesystem::path& path) {
+  std::error_code error;
+  const auto time = std::filesystem::last_write_time(path, error);
+  if (error) return 0;
+  const auto system = std::chrono::file_clock::to_sys(time);
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(system.time_since_epoch()).count();
+}
+
+// What stands at the beginning of the file; the rest is not read, so a file that is listed may still be damaged.
+SavedSite SavedAt(const std::filesystem::path& path) {
+  SavedSite saved;
+  std::error_code error;
+  saved.name = path.stem().string();
+  saved.bytes = std::filesystem::file_size(path, error);
+  if (error) saved.bytes = 0;
+  saved.saved = ModifiedAt(path);
+  auto reader = SiteFileReader::Open(path);
+  if (!reader) return saved;
+  const auto first = reader->Next();
+  if (!first || !*first) return saved;
+  if (const auto site = SiteOf((*first)->bytes)) saved.site = site->name;
+  return saved;
+}
+
+}  // namespace
+
+SiteShelf::SiteShelf(std::filesystem::path directory, Journal* journal, const Rooms& rooms)
+    : directory_(std::move(directory)), journal_(journal), rooms_(rooms) {}
+
+SiteShelf::~SiteShelf() {
+  Stop();
+}
+
+void SiteShelf::Start() {
+  thread_ = std::jthread([this] {
+    while (const auto request = requests_.Pop()) Serve(*request);
+  });
+}
+
+void SiteShelf::Take(Request&& request) {
+  Reply busy = ReplyTo(request, {StatusCode::kResourceExhausted, "too many requests are waiting; try again later"});
+  if (!requests_.TryPush(std::move(request))) rooms_.outbound.Send(std::move(busy));
+}
+
+void SiteShelf::Stop() {
+  stopping_ = true;
+  requests_.Close();
+  if (thread_.joinable()) thread_.join();
+}
+
+void SiteShelf::Serve(const Request& request) {
+  Reply reply = ReplyTo(request);
+  try {
+    auto answer = Answer(request);
+    if (answer) reply.saved = *std::move(answer);
+    if (!answer) reply.status = answer.error();
+    spdlog::info("{} of site '{}', file '{}': {}", RequestKindName(request.kind), request.site, request.saved,
+                 answer ? "done" : answer.error().message);
+  } catch (const std::exception& error) {
+    spdlog::error("a request of kind {} failed with an exception: {}", RequestKindName(request.kind), error.what());
+    reply = ReplyTo(request, {StatusCode::kInternal, "internal error of the server; see its log for the cause"});
+  }
+  ReplyParts parts(std::move(reply));
+  while (auto part = parts.Next()) rooms_.outbound.SendPatiently(*std::move(part));
+}
+
+Result<std::vector<SavedSite>> SiteShelf::Answer(const Request& request) {
+  if (journal_ == nullptr || directory_.empty())
+    return Fail(StatusCode::kFailedPrecondition, "the server keeps no state (--state none), so it has no saved sites");
+  if (stopping_) return Fail(StatusCode::kUnavailable, "the server is stopping");
+  const auto nothing = [] { return std::vector<SavedSite>{}; };
+  if (request.kind == RequestKind::kSavedList) return List();
+  if (request.kind == RequestKind::kSiteSave) return Save(request);
+  if (request.kind == RequestKind::kSiteLoad) return Load(request).map(nothing);
+  return Delete(request.site).map(nothing);
+}
+
+Result<std::filesystem::path> SiteShelf::PathOf(const std::string& name) const {
+  // A name has no separator and does not begin with a dot.
+  if (auto valid = ValidateName("saved site", name); !valid) return tl::unexpected(valid.error());
+  return directory_ / (name + kExtension);
+}
+
+template <typename Value>
+Result<Value> SiteShelf::Between(std::function<Result<Value>(Store&)> work) {
+  const auto promise = std::make_shared<std::promise<Result<Value>>>();
+  auto answer = promise->get_future();
+  journal_->Between([promise, work = std::move(work)](Store& store) {
+    try {
+      promise->set_value(work(store));
+    } catch (...) {  // No exception may reach the journal; it goes on in the thread that waits.
+      promise->set_exception(std::current_exception());
+    }
+  });
+  while (answer.wait_for(kLook) != std::future_status::ready) {
+    if (stopping_) return Fail(StatusCode::kUnavailable, "the server is stopping");
+  }
+  return answer.get();
+}
+
+Result<std::vector<SavedSite>> SiteShelf::List() const {
+  std::vector<SavedSite> all;
+  std::error_code error;
+  for (auto entry = std::filesystem::directory_iterator(directory_, error);
+       !error && entry != std::filesystem::directory_iterator() && all.size() < kMostListed; entry.increment(error)) {
+    const auto path = PathOf(entry->path().stem().string());
+    if (path && *path == entry->path()) all.push_back(SavedAt(*path));
+  }
+  std::sort(all.begin(), all.end(), [](const SavedSite& a, const SavedSite& b) { return a.name < b.name; });
+  return all;
+}
+
+Result<std::vector<SavedSite>> SiteShelf::Save(const Request& request) {
+  const auto path = PathOf(request.saved.empty() ? request.site : request.saved);
+  if (!path) return tl::unexpected(path.error());
+  std::error_code error;
+  std::filesystem::create_directories(directory_, error);  // Where it fails, so does the file.
+  const auto written = Between<SiteFileSummary>(
+      [site = request.site, path = *path](Store& store) { return WriteSiteFile(store, site, path); });
+  if (!written) return tl::unexpected(written.error());
+  return std::vector<SavedSite>{SavedAt(*path)};
+}
+
+Result<void> SiteShelf::Load(const Request& request) {
+  const auto path = PathOf(request.saved);
+  if (!path) return tl::unexpected(path.error());
+  const auto file = SurveySiteFile(*path);
+  if (!file) return tl::unexpected(file.error());
+  if (file->site.resolution_m != 0.0 && file->site.resolution_m != rooms_.atlas.resolution_m()) {
+    return Fail(StatusCode::kFailedPrecondition, "the saved site has cells of " +
+                                                     std::to_string(file->site.resolution_m) +
+                                                     " m, this server those of slam.grid.resolution_m");
+  }
+  std::vector<std::string> robots;
+  for (const auto& [id, robot] : file->sessions) robots.push_back(robot);
+  if (auto room = rooms_.roster.HasRoomFor(robots); !room) return room;
+  ImportOptions options;
+  options.site = request.site.empty() ? file->site.name : request.site;
+  if (auto valid = ValidateName("site", options.site); !valid) return valid;
+  if (auto reserved = rooms_.atlas.Reserve(options.site); !reserved) return reserved;
+  options.first_session = rooms_.roster.ReserveIds(file->last_session);
+  options.first_job = rooms_.jobs.ReserveIds(file->last_job);
+  const auto loaded =
+      Between<SiteFileSummary>([path = *path, options](Store& store) { return ImportSite(store, path, options); });
+  const auto taken = loaded ? TakeUp(*loaded) : Result<void>(tl::unexpected(loaded.error()));
+  rooms_.atlas.Release(options.site);
+  return taken;
+}
+
+Result<void> SiteShelf::TakeUp(const SiteFileSummary& loaded) {
+  const std::string& site = loaded.site.name;
+  if (auto open = rooms_.atlas.TakeUp(site); !open) {
+    const auto removed = Between<bool>(
+        [site](Store& store) -> Result<bool> { return DeleteSite(store, site).map([] { return true; }); });
+    if (!removed) spdlog::error("site '{}' is stored and not loaded: {}", site, removed.error().message);
+    return open;
+  }
+  const auto unfinished = rooms_.jobs.TakeUp({loaded.jobs.begin(), loaded.jobs.end()});
+  if (!unfinished) spdlog::error("the jobs of site '{}' are not loaded: {}", site, unfinished.error().message);
+  std::vector<SessionId> ids;
+  for (const auto& [id, robot] : loaded.sessions) ids.push_back(id);
+  const std::size_t taken = rooms_.roster.TakeUp(ids);
+  if (unfinished) {
+    for (const StoredJob& job : *unfinished) rooms_.worker.Requeue(job.job.id, job.enable);
+  }
+  spdlog::info("site '{}' is loaded with {} of {} sessions", site, taken, ids.size());
+  return {};
+}
+
+Result<void> SiteShelf::Delete(const std::string& name) {
+  for (const Job& job : rooms_.jobs.OfSite(name)) {
+    if (name.empty() || IsFinal(job.state)) continue;
+    return Fail(StatusCode::kFailedPrecondition,
+                "job " + std::to_string(job.id) + " of site '" + name + "' has not ended; cancel it first");
+  }
+  const auto site = rooms_.roster.RemoveSite(name);
+  if (!site) return tl::unexpected(site.error());
+  rooms_.jobs.RemoveSite(name);
+  const auto promise = std::make_shared<std::promise<std::shared_ptr<const MapSnapshot>>>();
+  auto retired = promise->get_future();
+  (*site)->Retire([promise](std::shared_ptr<const MapSnapshot> last) { promise->set_value(std::move(last)); });
+  const std::shared_ptr<const MapSnapshot> last = retired.get();
+  const auto removed =
+      Between<bool>([name](Store& store) -> Result<bool> { return DeleteSite(store, name).map([] { return true; }); });
+  for (const auto& [key, tile] : last->tiles) {
+    TileSample gone{.site_id = last->info.site_id, .tile = {}, .deleted = true};
+    gone.tile = {.key = key,
+                 .epoch = last->info.epoch + 1,
+                 .version = last->info.version + 1,
+                 .encoding = TileEncoding::kRaw,
+                 .bytes = {}};
+    rooms_.outbound.SendPatiently(std::move(gone));
+  }
+  MapInfo empty;
+  empty.site_id = last->info.site_id;
+  empty.site = name;
+  empty.resolution_m = last->info.resolution_m;
+  empty.epoch = last->info.epoch + 1;
+  empty.version = last->info.version + 1;
+  empty.levels = last->info.levels;
+  rooms_.outbound.SendPatiently(std::move(empty));
+  // A site that has stored nothing yet is deleted without a trace.
+  if (!removed && removed.error().code != StatusCode::kNotFound) return tl::unexpected(removed.error());
+  return {};
+}
+
+}  // namespace cairn::server

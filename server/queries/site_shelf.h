@@ -1,0 +1,68 @@
+// Keeps sites as files while the server runs, and takes them up again: the requests to list, save, load and delete. The
+// files are NAME.site in one directory, and no name leads out of it. Each change of the store is one commit between two
+// of the journal, so a server that is killed meanwhile has done all of it or nothing. One request after the other; the
+// queue is bounded, and a request that finds it full is answered RESOURCE_EXHAUSTED at once.
+// Thread rule: Take from any thread; Start and Stop from one.
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <thread>
+
+#include "common/bounded_channel.h"
+#include "server/jobs/job_worker.h"
+#include "server/maps/atlas.h"
+#include "server/outbound.h"
+#include "server/robots/roster.h"
+#include "server/store/site_edit.h"
+
+namespace cairn::server {
+
+class SiteShelf {
+ public:
+  struct Rooms {
+    Outbound& outbound;
+    Roster& roster;
+    Atlas& atlas;
+    JobList& jobs;
+    JobWorker& worker;
+  };
+
+  // `journal`: null, or `directory` empty, where nothing is stored: then every request is refused.
+  SiteShelf(std::filesystem::path directory, Journal* journal, const Rooms& rooms);
+  ~SiteShelf();
+
+  void Start();
+  // REQUIRES: the kind is one of the four.
+  void Take(Request&& request);
+  // Does not wait for a request that waits for the disk.
+  void Stop();
+  // Thread rule: any thread.
+  [[nodiscard]] Pulse pulse() const { return {requests_.taken(), requests_.size() > 0}; }
+
+ private:
+  static constexpr std::size_t kCapacity = 16;
+
+  void Serve(const Request& request);
+  Result<std::vector<SavedSite>> Answer(const Request& request);
+  Result<std::vector<SavedSite>> List() const;
+  Result<std::vector<SavedSite>> Save(const Request& request);
+  Result<void> Load(const Request& request);
+  Result<void> TakeUp(const SiteFileSummary& loaded);
+  Result<void> Delete(const std::string& site);
+  [[nodiscard]] Result<std::filesystem::path> PathOf(const std::string& name) const;
+  // Calls `work` between two commits of the journal, and waits for it.
+  template <typename Value>
+  Result<Value> Between(std::function<Result<Value>(Store&)> work);
+
+  const std::filesystem::path directory_;
+  Journal* const journal_;
+  const Rooms rooms_;
+  BoundedChannel<Request> requests_{kCapacity};
+  std::atomic<bool> stopping_{false};
+  std::jthread thread_;  // The last member, because it uses the members above.
+};
+
+}  // namespace cairn::server

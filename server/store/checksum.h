@@ -1,0 +1,28 @@
+// The checksum of records and of saved sites: FNV-1a, 64 bits (Fowler, Noll, Vo 1991). Every step is invertible, so one
+// changed byte always changes the sum. Not thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+namespace cairn::server {
+
+class Checksum {
+ public:
+  void Add(std::uint64_t number) {
+    for (int i = 0; i < 8; ++i) Add(static_cast<unsigned char>(number >> (8 * i)));
+  }
+  void Add(std::string_view bytes) {
+    for (const char c : bytes) Add(static_cast<unsigned char>(c));
+  }
+  [[nodiscard]] std::uint64_t value() const { return sum_; }
+
+ private:
+  void Add(unsigned char byte) {
+    sum_ ^= byte;
+    sum_ *= 1099511628211ULL;
+  }
+  std::uint64_t sum_ = 14695981039346656037ULL;
+};
+
+}  // namespace cairn::server

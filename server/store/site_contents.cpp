@@ -1,0 +1,121 @@
+#include "server/store/site_contents.h"
+
+#include <algorithm>
+#include <charconv>
+#include <utility>
+
+namespace cairn::server {
+namespace {
+
+// Calls `take` with every record of this kind and owner, as a value.
+template <typename Of, typename Take>
+Result<void> ForEach(Store& store, RecordKind kind, std::uint64_t owner, Of of, Take take) {
+  return store.Read({.kind = kind, .owner = owner}, [&](std::uint64_t, std::string_view bytes) -> Result<void> {
+    auto value = of(bytes);
+    if (!value) return tl::unexpected(value.error());
+    take(std::move(*value));
+    return {};
+  });
+}
+
+// All values of the kind, by owner.
+template <typename Value, typename Of>
+Result<std::map<std::uint64_t, Value>> ReadAll(Store& store, RecordKind kind, Of of) {
+  const auto owners = store.Owners(kind);
+  if (!owners) return tl::unexpected(owners.error());
+  std::map<std::uint64_t, Value> all;
+  for (const std::uint64_t owner : *owners) {
+    const auto keep = [&all, owner](Value&& value) { all.insert_or_assign(owner, std::move(value)); };
+    if (auto read = ForEach(store, kind, owner, of, keep); !read) return tl::unexpected(read.error());
+  }
+  return all;
+}
+
+}  // namespace
+
+Result<std::vector<std::string>> SiteNames(Store& store) {
+  const auto sites = ReadAll<StoredSite>(store, RecordKind::kSite, SiteOf);
+  if (!sites) return tl::unexpected(sites.error());
+  std::vector<std::string> names;
+  for (const auto& [owner, site] : *sites) names.push_back(site.name);
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+Result<std::map<std::uint64_t, StoredSession>> ReadSessions(Store& store) {
+  return ReadAll<StoredSession>(store, RecordKind::kSession, SessionOf);
+}
+
+Result<std::map<std::uint32_t, StoredVersion>> ReadVersions(Store& store, NameId site) {
+  std::map<std::uint32_t, StoredVersion> versions;
+  const auto keep = [&versions](StoredVersion&& version) {
+    const std::uint32_t number = version.version;
+    versions.insert_or_assign(number, std::move(version));
+  };
+  if (auto read = ForEach(store, RecordKind::kMapVersion, site, VersionOf, keep); !read)
+    return tl::unexpected(read.error());
+  return versions;
+}
+
+Result<std::vector<StoredLayer>> ReadLayers(Store& store, NameId site) {
+  std::vector<StoredLayer> layers;
+  const auto keep = [&layers](StoredLayer&& layer) { layers.push_back(std::move(layer)); };
+  if (auto read = ForEach(store, RecordKind::kLayer, site, LayerOf, keep); !read) return tl::unexpected(read.error());
+  return layers;
+}
+
+Result<SiteContents> ReadSite(Store& store, const std::string& name) {
+  SiteContents contents;
+  bool found = false;
+  const auto keep = [&](StoredSite&& site) {
+    found = site.name == name;
+    contents.site = std::move(site);
+  };
+  if (auto read = ForEach(store, RecordKind::kSite, HashName(name), SiteOf, keep); !read)
+    return tl::unexpected(read.error());
+  if (!found) return Fail(StatusCode::kNotFound, "there is no site '" + name + "'");
+  const auto layers = ReadLayers(store, HashName(name));
+  if (!layers) return tl::unexpected(layers.error());
+  for (const StoredLayer& layer : *layers) contents.layers.push_back(layer.session);
+  auto sessions = ReadSessions(store);
+  if (!sessions) return tl::unexpected(sessions.error());
+  std::erase_if(*sessions, [&name](const auto& one) { return one.second.request.site != name; });
+  contents.sessions = std::move(*sessions);
+  auto jobs = ReadAll<StoredJob>(store, RecordKind::kJob, JobOf);
+  if (!jobs) return tl::unexpected(jobs.error());
+  std::erase_if(*jobs, [&name](const auto& one) { return one.second.job.site != name; });
+  contents.jobs = std::move(*jobs);
+  return contents;
+}
+
+std::vector<RecordRange> RangesOfSession(std::uint64_t session) {
+  return {{.kind = RecordKind::kSession, .owner = session},
+          {.kind = RecordKind::kCheckpoint, .owner = session},
+          {.kind = RecordKind::kJournal, .owner = session}};
+}
+
+std::vector<RecordRange> RangesOf(const SiteContents& contents) {
+  std::vector<RecordRange> ranges;
+  for (const RecordKind kind : {RecordKind::kSite, RecordKind::kMapVersion, RecordKind::kLayer})
+    ranges.push_back({.kind = kind, .owner = HashName(contents.site.name)});
+  for (const auto& [id, job] : contents.jobs) ranges.push_back({.kind = RecordKind::kJob, .owner = id});
+  for (const auto& [id, session] : contents.sessions) {
+    for (const RecordRange& range : RangesOfSession(id)) ranges.push_back(range);
+  }
+  return ranges;
+}
+
+Result<std::uint64_t> FindSession(const SiteContents& contents, const std::string& robot_or_number) {
+  for (const auto& [id, session] : contents.sessions) {
+    if (session.request.robot == robot_or_number) return id;
+  }
+  std::uint64_t number = 0;
+  const char* const end = robot_or_number.data() + robot_or_number.size();
+  const auto [stopped, error] = std::from_chars(robot_or_number.data(), end, number);
+  const bool known = contents.sessions.contains(number) ||
+                     std::find(contents.layers.begin(), contents.layers.end(), number) != contents.layers.end();
+  if (error == std::errc() && stopped == end && known) return number;
+  return Fail(StatusCode::kNotFound, "site '" + contents.site.name + "' has no session of '" + robot_or_number + "'");
+}
+
+}  // namespace cairn::server

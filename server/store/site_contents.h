@@ -1,0 +1,38 @@
+// What a store holds of one site: the site itself, its map versions, the parts of its map whose sessions exist no more
+// (layers), its jobs, and its sessions with their checkpoints and journals. Stateless, thread-safe.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "server/store/records.h"
+#include "server/store/store.h"
+
+namespace cairn::server {
+
+struct SiteContents {
+  StoredSite site;
+  std::map<std::uint64_t, StoredSession> sessions;  // By id.
+  std::vector<std::uint64_t> layers;                // Sessions that exist no more.
+  std::map<std::uint64_t, StoredJob> jobs;          // By id.
+};
+
+// The names of all sites, sorted.
+[[nodiscard]] Result<std::vector<std::string>> SiteNames(Store& store);
+// NOT_FOUND: no such site. DATA_LOSS: a record is damaged.
+[[nodiscard]] Result<SiteContents> ReadSite(Store& store, const std::string& name);
+// All sessions of all sites, by id.
+[[nodiscard]] Result<std::map<std::uint64_t, StoredSession>> ReadSessions(Store& store);
+[[nodiscard]] Result<std::map<std::uint32_t, StoredVersion>> ReadVersions(Store& store, NameId site);
+[[nodiscard]] Result<std::vector<StoredLayer>> ReadLayers(Store& store, NameId site);
+
+// Every record of the site, the site itself first; every record of one session, the session itself first.
+[[nodiscard]] std::vector<RecordRange> RangesOf(const SiteContents& contents);
+[[nodiscard]] std::vector<RecordRange> RangesOfSession(std::uint64_t session);
+
+// The session of the robot of this name, else the session of this number; sessions that exist no more have only a
+// number. NOT_FOUND: the site has no such session.
+[[nodiscard]] Result<std::uint64_t> FindSession(const SiteContents& contents, const std::string& robot_or_number);
+
+}  // namespace cairn::server

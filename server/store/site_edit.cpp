@@ -1,0 +1,125 @@
+#include "server/store/site_edit.h"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+namespace cairn::server {
+namespace {
+
+Result<void> CheckNewSite(Store& store, const std::string& name) {
+  if (auto valid = ValidateName("site", name); !valid) return valid;
+  const auto sites = store.Owners(RecordKind::kSite);
+  if (!sites) return tl::unexpected(sites.error());
+  if (std::find(sites->begin(), sites->end(), HashName(name)) == sites->end()) return {};
+  return Fail(StatusCode::kAlreadyExists, "there is a site '" + name + "' already");
+}
+
+// Divides values by the session that they belong to: what `chosen` says goes into the result.
+template <typename Values, typename Chosen>
+Values TakeOut(Values& values, Chosen chosen) {
+  Values taken;
+  for (auto it = values.begin(); it != values.end();) {
+    if (chosen(*it)) {
+      taken.insert(values.extract(it++));
+    } else {
+      ++it;
+    }
+  }
+  return taken;
+}
+
+// A site that is divided: the part that stays, and the part that goes.
+struct Division {
+  SiteContents contents;
+  std::set<std::uint64_t> going;  // Sessions.
+  std::set<std::string> robots;   // Of these sessions.
+  std::vector<StoredVersion> staying_versions, going_versions;
+  StoredSite going_site;
+};
+
+Result<Division> Divide(Store& store, const std::string& site, const std::vector<std::uint64_t>& sessions) {
+  auto contents = ReadSite(store, site);
+  if (!contents) return tl::unexpected(contents.error());
+  Division division;
+  division.contents = std::move(*contents);
+  division.going = {sessions.begin(), sessions.end()};
+  const std::vector<std::uint64_t>& layers = division.contents.layers;
+  for (const std::uint64_t id : division.going) {
+    const auto session = division.contents.sessions.find(id);
+    if (session != division.contents.sessions.end()) {
+      division.robots.insert(session->second.request.robot);
+    } else if (std::find(layers.begin(), layers.end(), id) == layers.end()) {
+      return Fail(StatusCode::kNotFound, "site '" + site + "' has no session " + std::to_string(id));
+    }
+  }
+  auto versions = ReadVersions(store, HashName(site));
+  if (!versions) return tl::unexpected(versions.error());
+  for (auto& [number, version] : *versions) {
+    StoredVersion gone{.version = number, .job = version.job, .note = version.note, .parts = {}, .smoothed = {}};
+    gone.parts = TakeOut(version.parts, [&](const auto& part) { return division.going.contains(part.first); });
+    gone.smoothed = TakeOut(version.smoothed, [&](const auto& path) { return division.robots.contains(path.first); });
+    division.staying_versions.push_back(std::move(version));
+    division.going_versions.push_back(std::move(gone));
+  }
+  StoredSite& stays = division.contents.site;
+  division.going_site = stays;
+  division.going_site.members =
+      TakeOut(stays.members, [&](const auto& member) { return division.going.contains(member.second); });
+  ++stays.tile_version;
+  return division;
+}
+
+void PutStaying(const Division& division, RecordChanges& changes) {
+  const NameId site = HashName(division.contents.site.name);
+  changes.put.push_back({{RecordKind::kSite, site, 0}, BytesOf(division.contents.site)});
+  for (const StoredVersion& version : division.staying_versions)
+    changes.put.push_back({{RecordKind::kMapVersion, site, version.version}, BytesOf(version)});
+  for (const std::uint64_t id : division.going)
+    changes.removed.push_back({.kind = RecordKind::kLayer, .owner = site, .first = id, .last = id});
+}
+
+}  // namespace
+
+Result<void> DeleteSite(Store& store, const std::string& site) {
+  const auto contents = ReadSite(store, site);
+  if (!contents) return tl::unexpected(contents.error());
+  return store.Commit({.removed = RangesOf(*contents), .put = {}});
+}
+
+Result<void> DeleteSession(Store& store, const std::string& site, std::uint64_t session) {
+  const auto division = Divide(store, site, {session});
+  if (!division) return tl::unexpected(division.error());
+  RecordChanges changes;
+  PutStaying(*division, changes);
+  for (const RecordRange& range : RangesOfSession(session)) changes.removed.push_back(range);
+  return store.Commit(changes);
+}
+
+Result<void> SplitSite(Store& store, const std::string& site, const std::vector<std::uint64_t>& sessions,
+                       const std::string& new_site) {
+  if (auto fresh = CheckNewSite(store, new_site); !fresh) return fresh;
+  auto division = Divide(store, site, sessions);
+  if (!division) return tl::unexpected(division.error());
+  RecordChanges changes;
+  PutStaying(*division, changes);
+  const NameId to = HashName(new_site);
+  division->going_site.name = new_site;
+  changes.put.push_back({{RecordKind::kSite, to, 0}, BytesOf(division->going_site)});
+  for (const StoredVersion& version : division->going_versions)
+    changes.put.push_back({{RecordKind::kMapVersion, to, version.version}, BytesOf(version)});
+  const auto layers = ReadLayers(store, HashName(site));
+  if (!layers) return tl::unexpected(layers.error());
+  for (const StoredLayer& layer : *layers) {
+    if (division->going.contains(layer.session))
+      changes.put.push_back({{RecordKind::kLayer, to, layer.session}, BytesOf(layer)});
+  }
+  for (auto& [id, session] : division->contents.sessions) {
+    if (!division->going.contains(id)) continue;
+    session.request.site = new_site;
+    changes.put.push_back({{RecordKind::kSession, id, 0}, BytesOf(session)});
+  }
+  return store.Commit(changes);
+}
+
+}  // namespace cairn::server

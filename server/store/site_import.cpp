@@ -1,0 +1,210 @@
+// How a saved site is taken into a store (site_edit.h).
+#include <algorithm>
+#include <utility>
+
+#include "server/store/site_edit.h"
+
+namespace cairn::server {
+namespace {
+
+// How numbers and names of the file become those of the store.
+class Renaming {
+ public:
+  Renaming(const SiteFileSummary& file, const ImportOptions& options, std::uint64_t session_offset,
+           std::uint64_t job_offset)
+      : site_(options.site.empty() ? file.site.name : options.site),
+        robots_(options.robots),
+        session_offset_(session_offset),
+        job_offset_(job_offset) {
+    for (const auto& [from, to] : robots_) ids_[HashName(from)] = HashName(to);
+  }
+
+  [[nodiscard]] const std::string& site() const { return site_; }
+  [[nodiscard]] std::uint64_t Session(std::uint64_t id) const { return id + session_offset_; }
+  [[nodiscard]] std::uint64_t Job(std::uint64_t id) const { return id + job_offset_; }
+  [[nodiscard]] const std::string& Robot(const std::string& name) const {
+    const auto found = robots_.find(name);
+    return found == robots_.end() ? name : found->second;
+  }
+
+  // The file was surveyed before, so every record can be read. A value that cannot be is an error all the same.
+  [[nodiscard]] Result<Record> Apply(Record&& record) const {
+    switch (record.key.kind) {
+      case RecordKind::kSite:
+        return As(SiteOf(record.bytes), HashName(site_), 0, [this](StoredSite& site) { Rename(site); });
+      case RecordKind::kMapVersion:
+        return As(VersionOf(record.bytes), HashName(site_), record.key.number,
+                  [this](StoredVersion& version) { Rename(version); });
+      case RecordKind::kLayer:
+        return As(LayerOf(record.bytes), HashName(site_), Session(record.key.number),
+                  [this](StoredLayer& layer) { layer.session = Session(layer.session); });
+      case RecordKind::kJob:
+        return As(JobOf(record.bytes), record.key.owner + job_offset_, 0, [this](StoredJob& stored) {
+          stored.job.id += job_offset_;
+          stored.job.site = site_;
+        });
+      case RecordKind::kSession:
+        return As(SessionOf(record.bytes), Session(record.key.owner), 0, [this](StoredSession& session) {
+          session.id = Session(session.id);
+          session.request.site = site_;
+          session.request.robot = Robot(session.request.robot);
+        });
+      case RecordKind::kJournal:
+        return Journal(std::move(record));
+      case RecordKind::kCheckpoint:
+      case RecordKind::kServer:
+        break;
+    }
+    record.key.owner = Session(record.key.owner);
+    return std::move(record);
+  }
+
+ private:
+  template <typename Value, typename Change>
+  Result<Record> As(Result<Value>&& value, std::uint64_t owner, std::uint64_t number, Change change) const {
+    if (!value) return tl::unexpected(value.error());
+    change(*value);
+    return Record{{KindOf(*value), owner, number}, BytesOf(*value)};
+  }
+  static RecordKind KindOf(const StoredSite&) { return RecordKind::kSite; }
+  static RecordKind KindOf(const StoredVersion&) { return RecordKind::kMapVersion; }
+  static RecordKind KindOf(const StoredLayer&) { return RecordKind::kLayer; }
+  static RecordKind KindOf(const StoredJob&) { return RecordKind::kJob; }
+  static RecordKind KindOf(const StoredSession&) { return RecordKind::kSession; }
+
+  void Rename(StoredSite& site) const {
+    site.name = site_;
+    std::map<NameId, std::uint64_t> members;
+    for (const auto& [robot, session] : site.members) members[Id(robot)] = Session(session);
+    site.members = std::move(members);
+  }
+  void Rename(StoredVersion& version) const {
+    if (version.job != 0) version.job += job_offset_;
+    std::map<std::uint64_t, StoredGrid> parts;
+    for (auto& [session, grid] : version.parts) parts.emplace(Session(session), std::move(grid));
+    version.parts = std::move(parts);
+    decltype(version.smoothed) smoothed;
+    for (auto& [robot, path] : version.smoothed) smoothed.emplace(Robot(robot), std::move(path));
+    version.smoothed = std::move(smoothed);
+  }
+  Result<Record> Journal(Record&& record) const {
+    record.key.owner = Session(record.key.owner);
+    if (ids_.empty()) return std::move(record);
+    auto batch = BatchOf(record.bytes);
+    if (!batch) return tl::unexpected(batch.error());
+    for (JournalEntry& entry : batch->entries) {
+      if (auto* const scan = std::get_if<ScanTaken>(&entry)) scan->stream.robot_id = Id(scan->stream.robot_id);
+      if (auto* const refused = std::get_if<ScanRefused>(&entry))
+        refused->stream.robot_id = Id(refused->stream.robot_id);
+      if (auto* const odometry = std::get_if<OdometryTaken>(&entry))
+        odometry->stream.robot_id = Id(odometry->stream.robot_id);
+    }
+    record.bytes = BytesOf(batch->first, batch->entries);
+    return std::move(record);
+  }
+  [[nodiscard]] NameId Id(NameId robot) const {
+    const auto found = ids_.find(robot);
+    return found == ids_.end() ? robot : found->second;
+  }
+
+  const std::string site_;
+  const std::map<std::string, std::string> robots_;
+  std::map<NameId, NameId> ids_;
+  const std::uint64_t session_offset_;
+  const std::uint64_t job_offset_;
+};
+
+Result<void> CheckNames(const SiteFileSummary& file, const ImportOptions& options) {
+  if (!options.site.empty()) {
+    if (auto valid = ValidateName("site", options.site); !valid) return valid;
+  }
+  for (const auto& [from, to] : options.robots) {
+    const auto is = [&from = from](const auto& session) { return session.second == from; };
+    if (std::none_of(file.sessions.begin(), file.sessions.end(), is))
+      return Fail(StatusCode::kInvalidArgument, "the file has no robot '" + from + "'");
+    if (auto valid = ValidateName("robot", to); !valid) return valid;
+  }
+  return {};
+}
+
+// Whether everything of the file can be beside what the store holds.
+Result<void> CheckRoom(Store& store, const std::map<std::uint64_t, StoredSession>& stored, const SiteFileSummary& file,
+                       const Renaming& renaming) {
+  const auto sites = SiteNames(store);
+  if (!sites) return tl::unexpected(sites.error());
+  for (const std::string& site : *sites) {
+    if (HashName(site) == HashName(renaming.site()))
+      return Fail(StatusCode::kAlreadyExists,
+                  "there is a site '" + site + "' already; delete it, or give this one another name");
+  }
+  std::map<NameId, std::string> taken;  // Robot -> its site.
+  for (const auto& [id, session] : stored) taken[HashName(session.request.robot)] = session.request.site;
+  for (const auto& [id, robot] : file.sessions) {
+    const std::string& name = renaming.Robot(robot);
+    const auto [other, fresh] = taken.emplace(HashName(name), renaming.site());
+    if (!fresh)
+      return Fail(StatusCode::kAlreadyExists, "robot '" + name + "' has a session in site '" + other->second +
+                                                  "', and a robot has one session; give this one another name");
+  }
+  return {};
+}
+
+struct LastNumbers {
+  std::uint64_t session = 0;
+  std::uint64_t job = 0;
+};
+
+Result<LastNumbers> LastNumbersOf(Store& store, const std::map<std::uint64_t, StoredSession>& sessions) {
+  LastNumbers last;
+  if (!sessions.empty()) last.session = sessions.rbegin()->first;
+  const auto sites = store.Owners(RecordKind::kLayer);
+  if (!sites) return tl::unexpected(sites.error());
+  for (const std::uint64_t site : *sites) {
+    const auto layers = ReadLayers(store, site);
+    if (!layers) return tl::unexpected(layers.error());
+    for (const StoredLayer& layer : *layers) last.session = std::max(last.session, layer.session);
+  }
+  const auto jobs = store.Owners(RecordKind::kJob);
+  if (!jobs) return tl::unexpected(jobs.error());
+  if (!jobs->empty()) last.job = jobs->back();
+  return last;
+}
+
+SiteFileSummary Renamed(SiteFileSummary&& file, const Renaming& renaming) {
+  file.site.name = renaming.site();
+  std::map<std::uint64_t, std::string> sessions;
+  for (const auto& [id, robot] : file.sessions) sessions[renaming.Session(id)] = renaming.Robot(robot);
+  file.sessions = std::move(sessions);
+  std::set<std::uint64_t> jobs;
+  for (const std::uint64_t id : file.jobs) jobs.insert(renaming.Job(id));
+  file.jobs = std::move(jobs);
+  return std::move(file);
+}
+
+}  // namespace
+
+Result<SiteFileSummary> ImportSite(Store& store, const std::filesystem::path& path, const ImportOptions& options) {
+  auto file = SurveySiteFile(path);
+  if (!file) return file;
+  if (auto named = CheckNames(*file, options); !named) return tl::unexpected(named.error());
+  const auto sessions = ReadSessions(store);
+  if (!sessions) return tl::unexpected(sessions.error());
+  const auto last = LastNumbersOf(store, *sessions);
+  if (!last) return tl::unexpected(last.error());
+  const Renaming renaming(*file, options, std::max(last->session, options.first_session - 1),
+                          std::max(last->job, options.first_job - 1));
+  if (auto room = CheckRoom(store, *sessions, *file, renaming); !room) return tl::unexpected(room.error());
+  auto reader = SiteFileReader::Open(path);
+  if (!reader) return tl::unexpected(reader.error());
+  const auto next = [&]() -> Result<std::optional<Record>> {
+    auto record = reader->Next();
+    if (!record || !*record) return record;
+    auto renamed = renaming.Apply(std::move(**record));
+    if (!renamed) return tl::unexpected(renamed.error());
+    return std::move(*renamed);
+  };
+  if (auto committed = store.CommitEach(next); !committed) return tl::unexpected(committed.error());
+  return Renamed(std::move(*file), renaming);
+}
+
+}  // namespace cairn::server

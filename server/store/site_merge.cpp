@@ -1,0 +1,199 @@
+// How two sites of a store become one (site_edit.h).
+#include <algorithm>
+#include <utility>
+
+#include "common/service/start_pose.h"
+#include "server/store/grid_transform.h"
+#include "server/store/site_edit.h"
+
+namespace cairn::server {
+namespace {
+
+using Smoothed = decltype(StoredVersion::smoothed);
+using Versions = std::map<std::uint32_t, StoredVersion>;
+
+// The paths that a site shows: those of the enabled version; if it has none, of the newest version that has some.
+Smoothed Shown(const Versions& versions, std::uint32_t enabled) {
+  const auto found = versions.find(enabled);
+  if (found != versions.end() && !found->second.smoothed.empty()) return found->second.smoothed;
+  for (auto it = versions.rbegin(); it != versions.rend(); ++it) {
+    if (!it->second.smoothed.empty()) return it->second.smoothed;
+  }
+  return {};
+}
+
+class Merge {
+ public:
+  Merge(Store& store, SiteContents into, SiteContents from, const Pose2& T_into_from)
+      : store_(store),
+        into_(std::move(into)),
+        from_(std::move(from)),
+        T_into_from_(T_into_from),
+        moves_(!(T_into_from == Pose2{})),
+        epoch_shift_(into_.site.epoch) {}
+
+  Result<RecordChanges> Changes() {
+    for (auto step : {&Merge::Check, &Merge::Sessions, &Merge::Layers, &Merge::MapVersions}) {
+      if (auto done = (this->*step)(); !done) return tl::unexpected(done.error());
+    }
+    for (auto& [id, stored] : from_.jobs) {
+      stored.job.site = into_.site.name;
+      if (stored.job.map_version > 1) stored.job.map_version += version_shift_;
+      Put({RecordKind::kJob, id, 0}, BytesOf(stored));
+    }
+    Site();
+    return std::move(changes_);
+  }
+
+ private:
+  void Put(const RecordKey& key, std::string bytes) { changes_.put.push_back({key, std::move(bytes)}); }
+
+  Result<void> Check() {
+    const double into_m = into_.site.resolution_m, from_m = from_.site.resolution_m;
+    if (into_m != from_m) {
+      return Fail(StatusCode::kFailedPrecondition,
+                  "the sites have cells of different sizes: " + std::to_string(into_m) + " m and " +
+                      std::to_string(from_m) + " m");
+    }
+    if (!moves_) return {};
+    if (auto valid = ValidateStart(T_into_from_); !valid) return valid;
+    if (from_m == 0.0) {
+      return Fail(StatusCode::kFailedPrecondition,
+                  "site '" + from_.site.name + "' does not say the size of its cells, which a transform needs");
+    }
+    return {};
+  }
+
+  // Corrections name epochs, and a switch that was not completed may not look completed among those of both sites.
+  Result<void> Journals(const SiteContents& of, std::uint32_t shift, bool moves) {
+    for (const auto& [id, session] : of.sessions) {
+      std::uint64_t first = 0;
+      const auto take = [&, id = id](std::uint64_t number, std::string_view bytes) -> Result<void> {
+        auto batch = BatchOf(bytes);
+        if (!batch) return tl::unexpected(batch.error());
+        if (first == 0) first = batch->first;
+        bool changed = false;
+        for (JournalEntry& entry : batch->entries) {
+          auto* const correction = std::get_if<CorrectionTaken>(&entry);
+          if (correction == nullptr) continue;
+          changed = true;
+          const auto made = of.site.switches.find(correction->epoch);
+          const bool completed = made != of.site.switches.end() && made->second == correction->generation;
+          correction->epoch = completed ? correction->epoch + shift : 0;
+          if (moves) correction->grid = Transformed(correction->grid, T_into_from_, of.site.resolution_m);
+        }
+        if (changed) Put({RecordKind::kJournal, id, number}, BytesOf(batch->first, batch->entries));
+        return {};
+      };
+      if (auto read = store_.Read({.kind = RecordKind::kJournal, .owner = id}, take); !read) return read;
+      if (moves && first > 1) {
+        return Fail(StatusCode::kFailedPrecondition,
+                    "the journal of session " + std::to_string(id) + " begins at entry " + std::to_string(first) +
+                        ", because older ones were removed (store.max_gib); such a session cannot be moved");
+      }
+    }
+    return {};
+  }
+
+  Result<void> Sessions() {
+    if (auto rewritten = Journals(into_, 0, false); !rewritten) return rewritten;
+    if (auto rewritten = Journals(from_, epoch_shift_, moves_); !rewritten) return rewritten;
+    for (auto& [id, session] : from_.sessions) {
+      session.request.site = into_.site.name;
+      session.map_epoch += epoch_shift_;
+      if (moves_) {
+        Pose2& start = session.request.T_map_robot_start;
+        start = session.request.has_start ? T_into_from_ * start : T_into_from_;
+        session.request.has_start = true;
+        if (auto valid = ValidateStart(start); !valid) return valid;
+        changes_.removed.push_back({.kind = RecordKind::kCheckpoint, .owner = id});
+      }
+      Put({RecordKind::kSession, id, 0}, BytesOf(session));
+    }
+    return {};
+  }
+
+  StoredGrid Moved(const StoredGrid& grid) const {
+    return moves_ ? Transformed(grid, T_into_from_, from_.site.resolution_m) : grid;
+  }
+
+  Result<void> Layers() {
+    const auto layers = ReadLayers(store_, HashName(from_.site.name));
+    if (!layers) return tl::unexpected(layers.error());
+    for (const StoredLayer& layer : *layers) {
+      Put({RecordKind::kLayer, HashName(into_.site.name), layer.session},
+          BytesOf(StoredLayer{layer.session, Moved(layer.grid)}));
+    }
+    return {};
+  }
+
+  // The versions of `into` keep their numbers, those of `from` follow. Version 1, the live map, is one of both. A new
+  // version is enabled, because what the sessions draw now is neither of those that were.
+  Result<void> MapVersions() {
+    auto into = ReadVersions(store_, HashName(into_.site.name));
+    if (!into) return tl::unexpected(into.error());
+    auto from = ReadVersions(store_, HashName(from_.site.name));
+    if (!from) return tl::unexpected(from.error());
+    version_shift_ = into_.site.next_version - 2;
+    Smoothed shown = Shown(*into, into_.site.enabled_version);
+    Versions merged = std::move(*into);
+    const auto Path = [this](const std::shared_ptr<const Trajectory>& path) {
+      return moves_ ? Transformed(*path, T_into_from_) : path;
+    };
+    for (const auto& [robot, path] : Shown(*from, from_.site.enabled_version)) shown.emplace(robot, Path(path));
+    for (auto& [number, version] : *from) {
+      const std::uint32_t renumbered = number == 1 ? 1 : number + version_shift_;
+      StoredVersion& to = merged[renumbered];
+      if (to.version == 0)
+        to = {.version = renumbered, .job = version.job, .note = version.note, .parts = {}, .smoothed = {}};
+      for (const auto& [session, grid] : version.parts) to.parts.emplace(session, Moved(grid));
+      for (const auto& [robot, path] : version.smoothed) to.smoothed.emplace(robot, Path(path));
+    }
+    const std::uint32_t both = from_.site.next_version + version_shift_;
+    merged[both] = {.version = both,
+                    .job = 0,
+                    .note = "merged: " + into_.site.name + " and " + from_.site.name,
+                    .parts = {},
+                    .smoothed = std::move(shown)};
+    for (const auto& [number, version] : merged)
+      Put({RecordKind::kMapVersion, HashName(into_.site.name), number}, BytesOf(version));
+    into_.site.enabled_version = both;
+    into_.site.next_version = both + 1;
+    return {};
+  }
+
+  void Site() {
+    StoredSite& site = into_.site;
+    site.epoch += from_.site.epoch;
+    site.tile_version = std::max(site.tile_version, from_.site.tile_version) + 1;
+    for (const auto& [epoch, generation] : from_.site.switches) site.switches[epoch + epoch_shift_] = generation;
+    site.members.insert(from_.site.members.begin(), from_.site.members.end());
+    Put({RecordKind::kSite, HashName(site.name), 0}, BytesOf(site));
+    for (const RecordKind kind : {RecordKind::kSite, RecordKind::kMapVersion, RecordKind::kLayer})
+      changes_.removed.push_back({.kind = kind, .owner = HashName(from_.site.name)});
+  }
+
+  Store& store_;
+  SiteContents into_;
+  SiteContents from_;
+  const Pose2 T_into_from_;
+  const bool moves_;
+  const std::uint32_t epoch_shift_;
+  std::uint32_t version_shift_ = 0;
+  RecordChanges changes_;
+};
+
+}  // namespace
+
+Result<void> MergeSites(Store& store, const std::string& into, const std::string& from, const Pose2& T_into_from) {
+  if (into == from) return Fail(StatusCode::kInvalidArgument, "a site cannot be merged with itself");
+  auto first = ReadSite(store, into);
+  if (!first) return tl::unexpected(first.error());
+  auto second = ReadSite(store, from);
+  if (!second) return tl::unexpected(second.error());
+  const auto changes = Merge(store, std::move(*first), std::move(*second), T_into_from).Changes();
+  if (!changes) return tl::unexpected(changes.error());
+  return store.Commit(*changes);
+}
+
+}  // namespace cairn::server

@@ -1,0 +1,136 @@
+// `cairn site` against cairnd as a process and against its state directory: what operators do with whole sites.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <optional>
+#include <sstream>
+
+#include "client/cli/program.h"
+#include "tests/child_process.h"
+#include "tests/loopback.h"
+#include "tests/temp_directory.h"
+
+namespace cairn::client {
+namespace {
+
+using ::testing::HasSubstr;
+
+struct SiteOutcome {
+  ExitCode code;
+  std::string out;
+  std::string err;
+};
+
+class CairnSite : public ::testing::Test {
+ protected:
+  void StartServer(const std::string& state) {
+    server_.emplace(std::vector<std::string>{CAIRND_PATH, "--domain", std::to_string(test::TestDomain()), "--state",
+                                             File(state), "--set", "slam.particles=20", "--log-level", "warn"});
+    ASSERT_EQ(Cairn({"ping"}).code, ExitCode::kOk) << "cairnd does not answer";
+  }
+  void StopServer() {
+    server_->Signal(SIGTERM);
+    EXPECT_EQ(server_->Wait().exit_code, 0);
+    server_.reset();
+  }
+  static SiteOutcome Cairn(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"--domain", std::to_string(test::TestDomain()), "--timeout", "20s"});
+    std::ostringstream out, err;
+    const ExitCode code = RunCairn(arguments, out, err);
+    return {code, out.str(), err.str()};
+  }
+  static nlohmann::json MustJson(std::vector<std::string> arguments) {
+    arguments.push_back("--json");
+    const SiteOutcome outcome = Cairn(std::move(arguments));
+    EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
+    return outcome.out.empty() ? nlohmann::json() : nlohmann::json::parse(outcome.out);
+  }
+  // Two robots, 8 s each.
+  void Stream(const std::string& site, const std::string& prefix) {
+    MustJson({"sim", "--robots", "2", "--prefix", prefix, "--seconds", "8", "--fast", "--beams", "121", "--site", site,
+              "--first-stamp", "1000", "--end"});
+  }
+  std::string PathOf(const std::string& robot) {
+    MustJson({"path", robot, "-o", File("path.tum")});
+    return directory_.Read("path.tum");
+  }
+  [[nodiscard]] std::string File(const std::string& name) const { return (directory_ / name).string(); }
+
+  TempDirectory directory_;
+  std::optional<ChildProcess> server_;
+};
+
+TEST_F(CairnSite, IsSavedDeletedLoadedAndMovedToAnotherServer) {
+  ASSERT_NO_FATAL_FAILURE(StartServer("a"));
+  Stream("hall", "robot");
+  const std::string path = PathOf("robot2");
+  EXPECT_EQ(MustJson({"site", "save", "hall", "monday"})["site"], "hall");
+  MustJson({"site", "delete", "hall"});
+  EXPECT_TRUE(MustJson({"site", "list"})["sites"].empty());
+  MustJson({"site", "load", "monday"});
+  const auto listed = MustJson({"site", "list"});
+  EXPECT_EQ(listed["sites"][0]["site"], "hall");
+  EXPECT_EQ(listed["saved"][0]["name"], "monday");
+  EXPECT_EQ(PathOf("robot2"), path);
+  const SiteOutcome again = Cairn({"site", "load", "monday"});
+  EXPECT_EQ(again.code, ExitCode::kFailed);
+  EXPECT_THAT(again.err, HasSubstr("ALREADY_EXISTS"));
+  // A directory that is in use is not touched.
+  const SiteOutcome in_use = Cairn({"site", "export", "hall", "--state", File("a"), "-o", File("no.site")});
+  EXPECT_EQ(in_use.code, ExitCode::kFailed);
+  EXPECT_THAT(in_use.err, HasSubstr("another server uses"));
+  StopServer();
+
+  MustJson({"site", "export", "hall", "--state", File("a"), "-o", File("hall.site")});
+  const auto imported = MustJson({"site", "import", File("hall.site"), "--state", File("b"), "--as", "annex"});
+  EXPECT_EQ(imported["site"], "annex");
+  EXPECT_EQ(imported["sessions"].size(), 2u);
+  ASSERT_NO_FATAL_FAILURE(StartServer("b"));
+  EXPECT_EQ(PathOf("robot2"), path);
+  const auto job = MustJson({"job", "smooth", "--site", "annex", "--wait"});
+  EXPECT_EQ(job["state"], "succeeded");
+  StopServer();
+}
+
+TEST_F(CairnSite, FilesAreMergedSplitAndShortened) {
+  for (const std::string site : {"hall", "annex"}) {
+    ASSERT_NO_FATAL_FAILURE(StartServer(site));
+    Stream(site, site == "hall" ? "h" : "a");
+    StopServer();
+    MustJson({"site", "export", site, "--state", File(site), "-o", File(site + ".site")});
+  }
+  const auto merged = MustJson(
+      {"site", "merge", File("hall.site"), File("annex.site"), "--transform", "30,0,90deg", "-o", File("both.site")});
+  EXPECT_EQ(merged["sessions"].size(), 4u);
+  MustJson({"site", "split", File("both.site"), "a1", "h2", "--to", "half", "-o", File("half.site"), "--rest",
+            File("rest.site")});
+  const auto shorter = MustJson({"site", "delete-session", File("half.site"), "h2", "-o", File("shorter.site")});
+  EXPECT_EQ(shorter["sessions"].size(), 1u);
+  EXPECT_EQ(shorter["sessions"][0]["robot"], "a1");
+  // The same in a state directory, and a server on it.
+  MustJson({"site", "import", File("half.site"), "--state", File("c")});
+  MustJson({"site", "import", File("rest.site"), "--state", File("c")});
+  MustJson({"site", "merge", "half", "hall", "--state", File("c")});
+  MustJson({"site", "delete-session", "half", "h1", "--state", File("c")});
+  MustJson({"site", "split", "half", "a1", "a2", "--to", "moved", "--state", File("c")});
+  const auto listed = MustJson({"site", "list", "--state", File("c")});
+  ASSERT_EQ(listed["sites"].size(), 2u);
+  EXPECT_EQ(listed["sites"][0]["sessions"].size(), 1u);
+  EXPECT_EQ(listed["sites"][1]["sessions"].size(), 2u);
+  ASSERT_NO_FATAL_FAILURE(StartServer("c"));
+  // The annex was moved by 30 m and turned: its robots are there now.
+  const double x = MustJson({"pose", "a1"})["pose"]["x"].get<double>();
+  StopServer();
+  ASSERT_NO_FATAL_FAILURE(StartServer("annex"));
+  EXPECT_NEAR(x, 30.0 - MustJson({"pose", "a1"})["pose"]["y"].get<double>(), 0.3);
+  StopServer();
+  EXPECT_EQ(Cairn({"site", "merge", File("hall.site"), File("annex.site")}).code, ExitCode::kUsage);
+  directory_.Write("bad.site", directory_.Read("hall.site").substr(0, 5000));
+  const SiteOutcome bad = Cairn({"site", "import", File("bad.site"), "--state", File("d")});
+  EXPECT_EQ(bad.code, ExitCode::kFailed);
+  EXPECT_THAT(bad.err, HasSubstr("DATA_LOSS"));
+}
+
+}  // namespace
+}  // namespace cairn::client
