@@ -203,14 +203,16 @@ Result<void> SiteShelf::Delete(const std::string& name) {
   const std::shared_ptr<const MapSnapshot> last = retired.get();
   const auto removed =
       Between<bool>([name](Store& store) -> Result<bool> { return DeleteSite(store, name).map([] { return true; }); });
-  for (const auto& [key, tile] : last->tiles) {
-    TileSample gone{.site_id = last->info.site_id, .tile = {}, .deleted = true};
-    gone.tile = {.key = key,
-                 .epoch = last->info.epoch + 1,
-                 .version = last->info.version + 1,
-                 .encoding = TileEncoding::kRaw,
-                 .bytes = {}};
-    rooms_.outbound.SendPatiently(std::move(gone));
+  for (int level = 0; level < kPyramidLevels; ++level) {
+    last->tiles.ForEach(level, [&](const TileSet::TilePtr& tile) {
+      TileSample gone{.site_id = last->info.site_id, .tile = {}, .deleted = true};
+      gone.tile = {.key = tile->key,
+                   .epoch = last->info.epoch + 1,
+                   .version = last->info.version + 1,
+                   .encoding = TileEncoding::kRaw,
+                   .bytes = {}};
+      rooms_.outbound.SendPatiently(std::move(gone));
+    });
   }
   MapInfo empty;
   empty.site_id = last->info.site_id;

@@ -121,7 +121,7 @@ Result<std::shared_ptr<Site>> Roster::RemoveSite(const std::string& name) {
       removed.push_back(session);
     }
     for (const auto& session : removed) {
-      session->Disown();
+      session->KeepStored();
       if (journal_ != nullptr) journal_->Close(session->id());
       sessions_.erase(session->record().state().robot_id);
       gone_.push_back(session);

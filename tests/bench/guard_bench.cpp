@@ -36,7 +36,8 @@ struct ScanDatagram {
 
  private:
   void Begin(std::uint8_t id, std::uint16_t length, std::uint8_t flags = 0x01) {
-    bytes.insert(bytes.end(), {id, flags, static_cast<std::uint8_t>(length), static_cast<std::uint8_t>(length >> 8)});
+    for (const unsigned byte : {unsigned{id}, unsigned{flags}, length & 0xffU, unsigned{length} >> 8U})
+      bytes.push_back(static_cast<std::uint8_t>(byte));
   }
   void Zeros(std::size_t n) { bytes.resize(bytes.size() + n); }
 };

@@ -32,8 +32,11 @@ class Body {
   bool little_;
 };
 
+// More than the numbers of a peer may skip while one input is read.
+constexpr std::int64_t kLongestSkip = std::int64_t{1} << 30;
+
 void MustBePlausible(std::int64_t sequence) {
-  Must(sequence >= 0 && sequence <= (std::int64_t{1} << 40) + wire::SequenceGate::kMaxJump,
+  Must(sequence >= 0 && sequence <= wire::SequenceGate::kMaxFirst + kLongestSkip,
        "the first numbers of a writer are plausible");
 }
 
@@ -78,7 +81,7 @@ void ReadSubmessage(std::uint8_t id, std::uint8_t flags, const Body& body) {
       return static_cast<void>(body.Number(24, 4));
     case 0x08: {  // GAP
       const std::int64_t first = body.Sequence(8), base = body.Sequence(16);
-      Must(first > 0 && base >= first && base - first <= wire::SequenceGate::kMaxJump, "a gap that can be walked");
+      Must(first > 0 && base >= first && base - first <= kLongestSkip, "a gap that can be walked");
       return ReadSet(body, 24);
     }
     case 0x12:  // NACK_FRAG

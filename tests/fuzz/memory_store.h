@@ -19,6 +19,14 @@ class MemoryStore : public server::Store {
     for (const server::Record& record : changes.put) records_[record.key] = record.bytes;
     return {};
   }
+  Result<void> CommitEach(const Next& next) override {
+    for (;;) {
+      auto record = next();
+      if (!record) return tl::unexpected(record.error());
+      if (!*record) return {};
+      records_[(*record)->key] = (*record)->bytes;
+    }
+  }
   Result<void> Read(const server::RecordRange& range, const Visit& visit) override {
     for (const auto& [key, bytes] : records_) {
       if (!Within(range, key)) continue;

@@ -31,7 +31,7 @@ bool RunBatch(std::string_view bytes) {
   for (const JournalEntry& entry : batch->entries) {
     if (const auto* scan = std::get_if<ScanTaken>(&entry)) Must(ValidateScan(*scan->scan).has_value(), "a valid scan");
     if (const auto* odometry = std::get_if<OdometryTaken>(&entry))
-      Must(odometry->fate != OdometryFate::kTaken || ValidateOdometry(odometry->odometry), "valid odometry");
+      Must(odometry->use != OdometryUse::kTaken || ValidateOdometry(odometry->odometry), "valid odometry");
   }
   const std::string written = BytesOf(batch->first, batch->entries);
   const auto again = BatchOf(written);

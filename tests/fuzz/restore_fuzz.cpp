@@ -29,7 +29,7 @@ std::string StoredDrive() {
   std::vector<JournalEntry> entries = {OwnerChanged{kReturning, kTokenBefore, {"laser"}}};
   for (int step = 0; step < 4; ++step) {
     entries.push_back(
-        OdometryTaken{{robot, HashName("odometry"), kTokenBefore}, testing::RoomOdometry(step), OdometryFate::kTaken});
+        OdometryTaken{{robot, HashName("odometry"), kTokenBefore}, testing::RoomOdometry(step), OdometryUse::kTaken});
     entries.push_back(
         ScanTaken{{robot, HashName("laser"), kTokenBefore}, std::make_shared<const Scan>(SmallScan(step))});
   }

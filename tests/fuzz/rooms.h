@@ -39,7 +39,8 @@ class Rooms {
                 [](const Job&, bool, const server::JobControl&) {
                   return Result<server::JobOutcome>(server::JobOutcome{});
                 }),
-        desk_(64, outbound_, roster_, atlas_, jobs_, worker_, kGeneration) {
+        shelf_({}, nullptr, {outbound_, roster_, atlas_, jobs_, worker_}),
+        desk_(64, outbound_, roster_, atlas_, jobs_, worker_, shelf_, kGeneration) {
     spdlog::set_level(spdlog::level::off);  // Every damaged record is an error in the log.
     desk_.Start();
   }
@@ -91,6 +92,7 @@ class Rooms {
   server::Roster roster_;
   server::JobList jobs_;
   server::JobWorker worker_;
+  server::SiteShelf shelf_;
   server::Desk desk_;
 };
 

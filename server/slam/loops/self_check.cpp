@@ -14,7 +14,7 @@ constexpr std::size_t kMaxCompared = 3;
 constexpr double kMaxDistanceM = 4.0;       // Largest distance between the robot and an old keyframe.
 constexpr double kMaxRangeM = 10.0;         // Errors of the heading displace farther points too much.
 constexpr double kCompareEveryM = 0.5;      // Way between two comparisons.
-constexpr double kStretchM = 5.0;           // Length of the path over which the comparisons are counted.
+constexpr double kCountedM = 5.0;           // Length of the path over which the comparisons are counted.
 constexpr std::size_t kMinComparisons = 5;  // Comparisons of a stretch needed for a decision.
 constexpr int kMinKnown = 20;               // Points that must be compared for a comparison to count.
 constexpr double kTurnCostM = 1.0;          // Cost per radian: scans in other directions overlap less.
@@ -76,7 +76,7 @@ std::vector<std::size_t> SelfCheck::KeyframesToCompare(std::span<const KeyframeS
 }
 
 void SelfCheck::UpdateContradicted() {
-  while (comparisons_.back().travelled_m - comparisons_.front().travelled_m > kStretchM ||
+  while (comparisons_.back().travelled_m - comparisons_.front().travelled_m > kCountedM ||
          comparisons_.size() > kMaxComparisons)
     comparisons_.pop_front();
   if (comparisons_.size() < kMinComparisons) return;

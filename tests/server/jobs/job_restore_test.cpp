@@ -144,6 +144,7 @@ TEST_F(JobRestore, ADamagedRecordIsAnErrorAndNotAMissingJob) {
 // A store whose list of owners cannot be read.
 struct BrokenStore final : Store {
   Result<void> Commit(const RecordChanges& /*changes*/) override { return {}; }
+  Result<void> CommitEach(const Next& /*next*/) override { return {}; }
   Result<void> Read(const RecordRange& /*range*/, const Visit& /*visit*/) override { return {}; }
   Result<std::vector<std::uint64_t>> Owners(RecordKind /*kind*/) override {
     return Fail(StatusCode::kUnavailable, "the disk does not answer");

@@ -117,7 +117,7 @@ TEST(LineLocalization, AStateFromBeforeTheRobotIsPlacedCanBeLoaded) {
 TEST(LineLocalization, ContradictionsFromBeforeTheRobotIsPlacedAreForgotten) {
   MapperOptions options = Options(test::Office());
   // Nearly every difference between scans is a contradiction.
-  options.self_check = {.min_travel_m = 0.1, .every_m = 0.1, .stretch_m = 5.0, .near_m = 0.001, .max_conflict = 0.01};
+  options.self_check = {.min_travel_m = 0.1, .near_m = 0.001, .max_conflict = 0.01};
   options.filter.line_match.every_m = 2.0;  // So that finding the place takes longer.
   LostRobot robot(options);
   bool contradicted = false;
