@@ -75,6 +75,14 @@ void ExpectSame(const View& a, const View& b) {
   }
 }
 
+// A site is drawn a moment after its sessions were restored.
+bool WaitTiles(WholeServer& house, const std::map<TileKey, TileCells>& tiles) {
+  return house.WaitFor([&] { return ViewOf(house).tiles == tiles; });
+}
+bool WaitDrawn(WholeServer& house) {
+  return house.WaitFor([&] { return !ViewOf(house).tiles.empty(); });
+}
+
 Job Smooth(WholeServer& house, const std::string& site = "lab") {
   const Reply submitted = house.Ask(AboutSite(RequestKind::kJobSubmit, site));
   EXPECT_EQ(submitted.jobs.size(), 1U) << submitted.status.message;
@@ -117,6 +125,7 @@ void WriteText(const std::filesystem::path& path, const std::string& text) {
 TEST(SavedSites, InAnotherServerEverythingIsAsItWas) {
   const TempDirectory directory;
   View before, later;
+  std::map<TileKey, TileCells> drawn;
   {
     StoredServer first(directory / "0");
     ASSERT_NO_FATAL_FAILURE(MakeSite(*first.operator->()));
@@ -125,9 +134,12 @@ TEST(SavedSites, InAnotherServerEverythingIsAsItWas) {
     ASSERT_EQ(saved.saved.size(), 1U);
     EXPECT_EQ(saved.saved[0].site, "lab");
     EXPECT_EQ(saved.saved[0].bytes, std::filesystem::file_size(directory / "0" / "saved" / "monday.site"));
+    first->Stop();
+    for (const auto& [key, tile] : first->CurrentTiles()) drawn[key] = *DecodeCells(tile.bytes, tile.encoding);
   }
   {
     StoredServer again(directory / "0");
+    ASSERT_TRUE(WaitTiles(*again.operator->(), drawn));
     before = ViewOf(*again.operator->());
     ASSERT_EQ(Smooth(*again.operator->()).state, JobState::kSucceeded);
     later = ViewOf(*again.operator->());
@@ -141,6 +153,7 @@ TEST(SavedSites, InAnotherServerEverythingIsAsItWas) {
     ASSERT_TRUE(imported) << imported.error().message;
   }
   StoredServer second(directory / "1");
+  ASSERT_TRUE(WaitTiles(*second.operator->(), drawn));
   ExpectSame(before, ViewOf(*second.operator->()));
   // Also what a job makes of it.
   ASSERT_EQ(Smooth(*second.operator->()).state, JobState::kSucceeded);
@@ -270,6 +283,7 @@ TEST(SavedSites, TwoSitesAreMergedIntoOneMap) {
   StoredServer server(directory / "0");
   WholeServer& house = *server.operator->();
   EXPECT_EQ(house.Ask(AboutSite(RequestKind::kMapInfo, "annex")).status.code, StatusCode::kNotFound);
+  ASSERT_TRUE(WaitDrawn(house));
   View view = ViewOf(house);
   for (const char* robot : {"r1", "r2"}) {
     EXPECT_EQ(view.used[robot], static_cast<std::uint64_t>(kScans)) << robot;
@@ -323,6 +337,7 @@ TEST(SavedSites, TheGoldenFileOfEveryVersionLoads) {
     WholeServer& house = *server.operator->();
     const Reply loaded = house.Ask(AboutFile(RequestKind::kSiteLoad, "lab", "golden"));
     ASSERT_TRUE(loaded.status.ok()) << loaded.status.message;
+    ASSERT_TRUE(WaitDrawn(house));
     View view = ViewOf(house);
     EXPECT_EQ(view.used, (std::map<std::string, std::uint64_t>{{"robot1", 40U}, {"robot2", 40U}}));
     EXPECT_EQ(view.paths["robot1"].size(), 40U);
