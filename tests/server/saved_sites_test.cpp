@@ -83,6 +83,14 @@ bool WaitDrawn(WholeServer& house) {
   return house.WaitFor([&] { return !ViewOf(house).tiles.empty(); });
 }
 
+// All that a server has drawn of its one site, for which it must end: only then the last of it is published.
+std::map<TileKey, TileCells> StopAndGetTiles(WholeServer& house) {
+  house.Stop();
+  std::map<TileKey, TileCells> drawn;
+  for (const auto& [key, tile] : house.CurrentTiles()) drawn[key] = *DecodeCells(tile.bytes, tile.encoding);
+  return drawn;
+}
+
 Job Smooth(WholeServer& house, const std::string& site = "lab") {
   const Reply submitted = house.Ask(AboutSite(RequestKind::kJobSubmit, site));
   EXPECT_EQ(submitted.jobs.size(), 1U) << submitted.status.message;
@@ -134,8 +142,7 @@ TEST(SavedSites, InAnotherServerEverythingIsAsItWas) {
     ASSERT_EQ(saved.saved.size(), 1U);
     EXPECT_EQ(saved.saved[0].site, "lab");
     EXPECT_EQ(saved.saved[0].bytes, std::filesystem::file_size(directory / "0" / "saved" / "monday.site"));
-    first->Stop();
-    for (const auto& [key, tile] : first->CurrentTiles()) drawn[key] = *DecodeCells(tile.bytes, tile.encoding);
+    drawn = StopAndGetTiles(*first.operator->());
   }
   {
     StoredServer again(directory / "0");
@@ -174,6 +181,8 @@ TEST(SavedSites, ARunningServerDeletesASiteAndTakesItUpAgain) {
     EXPECT_THAT(active.status.message, HasSubstr("is active"));
     ASSERT_NO_FATAL_FAILURE(Leave(house));
     ASSERT_TRUE(house.Ask(AboutSite(RequestKind::kSiteSave)).status.ok());
+    ASSERT_TRUE(ImportSite(*OpenStore(directory / "1").value(), directory / "0" / "saved" / "lab.site"));
+    ASSERT_TRUE(WaitTiles(house, StopAndGetTiles(*StoredServer(directory / "1").operator->())));
     before = ViewOf(house);
     const std::uint32_t epoch = house.Ask(AboutSite(RequestKind::kMapInfo)).maps.at(0).epoch;
     ASSERT_EQ(house.Ask(AboutFile(RequestKind::kSiteLoad, "", "lab")).status.code, StatusCode::kAlreadyExists);
@@ -196,8 +205,7 @@ TEST(SavedSites, ARunningServerDeletesASiteAndTakesItUpAgain) {
 
     const Reply loaded = house.Ask(AboutFile(RequestKind::kSiteLoad, "", "lab"));
     ASSERT_TRUE(loaded.status.ok()) << loaded.status.message;
-    ASSERT_TRUE(house.WaitFor([&] { return house.Ask(AboutSite(RequestKind::kTiles)).tiles.size() > 0; }));
-    ASSERT_TRUE(house.WaitFor([&] { return ViewOf(house).tiles == before.tiles; }));
+    ASSERT_TRUE(WaitTiles(house, before.tiles));
     ExpectSame(before, ViewOf(house));
     EXPECT_GT(house.Ask(AboutSite(RequestKind::kMapInfo)).maps.at(0).epoch, epoch)
         << "an epoch that clients know is over";
