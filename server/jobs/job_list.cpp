@@ -194,10 +194,12 @@ void JobList::Progress(std::uint64_t id, double progress) {
 }
 
 void JobList::ChangedLocked(Entry& entry) {
+  // First to the journal: who hears of the change may save the site at once, and the change must be in the file.
+  if (journal_ != nullptr && !stopping_) {
+    journal_->Put({RecordKind::kJob, entry.job.id, 0},
+                  [stored = StoredJob{entry.job, entry.enable}] { return BytesOf(stored); });
+  }
   SendLocked(entry);
-  if (journal_ == nullptr || stopping_) return;
-  journal_->Put({RecordKind::kJob, entry.job.id, 0},
-                [stored = StoredJob{entry.job, entry.enable}] { return BytesOf(stored); });
 }
 
 void JobList::SendLocked(Entry& entry) {

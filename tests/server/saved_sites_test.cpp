@@ -75,6 +75,22 @@ void ExpectSame(const View& a, const View& b) {
   }
 }
 
+// A site is drawn a moment after its sessions were restored.
+bool WaitTiles(WholeServer& house, const std::map<TileKey, TileCells>& tiles) {
+  return house.WaitFor([&] { return ViewOf(house).tiles == tiles; });
+}
+bool WaitDrawn(WholeServer& house) {
+  return house.WaitFor([&] { return !ViewOf(house).tiles.empty(); });
+}
+
+// All that a server has drawn of its one site, for which it must end: only then the last of it is published.
+std::map<TileKey, TileCells> StopAndGetTiles(WholeServer& house) {
+  house.Stop();
+  std::map<TileKey, TileCells> drawn;
+  for (const auto& [key, tile] : house.CurrentTiles()) drawn[key] = *DecodeCells(tile.bytes, tile.encoding);
+  return drawn;
+}
+
 Job Smooth(WholeServer& house, const std::string& site = "lab") {
   const Reply submitted = house.Ask(AboutSite(RequestKind::kJobSubmit, site));
   EXPECT_EQ(submitted.jobs.size(), 1U) << submitted.status.message;
@@ -117,6 +133,7 @@ void WriteText(const std::filesystem::path& path, const std::string& text) {
 TEST(SavedSites, InAnotherServerEverythingIsAsItWas) {
   const TempDirectory directory;
   View before, later;
+  std::map<TileKey, TileCells> drawn;
   {
     StoredServer first(directory / "0");
     ASSERT_NO_FATAL_FAILURE(MakeSite(*first.operator->()));
@@ -125,9 +142,11 @@ TEST(SavedSites, InAnotherServerEverythingIsAsItWas) {
     ASSERT_EQ(saved.saved.size(), 1U);
     EXPECT_EQ(saved.saved[0].site, "lab");
     EXPECT_EQ(saved.saved[0].bytes, std::filesystem::file_size(directory / "0" / "saved" / "monday.site"));
+    drawn = StopAndGetTiles(*first.operator->());
   }
   {
     StoredServer again(directory / "0");
+    ASSERT_TRUE(WaitTiles(*again.operator->(), drawn));
     before = ViewOf(*again.operator->());
     ASSERT_EQ(Smooth(*again.operator->()).state, JobState::kSucceeded);
     later = ViewOf(*again.operator->());
@@ -141,6 +160,7 @@ TEST(SavedSites, InAnotherServerEverythingIsAsItWas) {
     ASSERT_TRUE(imported) << imported.error().message;
   }
   StoredServer second(directory / "1");
+  ASSERT_TRUE(WaitTiles(*second.operator->(), drawn));
   ExpectSame(before, ViewOf(*second.operator->()));
   // Also what a job makes of it.
   ASSERT_EQ(Smooth(*second.operator->()).state, JobState::kSucceeded);
@@ -161,6 +181,8 @@ TEST(SavedSites, ARunningServerDeletesASiteAndTakesItUpAgain) {
     EXPECT_THAT(active.status.message, HasSubstr("is active"));
     ASSERT_NO_FATAL_FAILURE(Leave(house));
     ASSERT_TRUE(house.Ask(AboutSite(RequestKind::kSiteSave)).status.ok());
+    ASSERT_TRUE(ImportSite(*OpenStore(directory / "1").value(), directory / "0" / "saved" / "lab.site"));
+    ASSERT_TRUE(WaitTiles(house, StopAndGetTiles(*StoredServer(directory / "1").operator->())));
     before = ViewOf(house);
     const std::uint32_t epoch = house.Ask(AboutSite(RequestKind::kMapInfo)).maps.at(0).epoch;
     ASSERT_EQ(house.Ask(AboutFile(RequestKind::kSiteLoad, "", "lab")).status.code, StatusCode::kAlreadyExists);
@@ -183,8 +205,7 @@ TEST(SavedSites, ARunningServerDeletesASiteAndTakesItUpAgain) {
 
     const Reply loaded = house.Ask(AboutFile(RequestKind::kSiteLoad, "", "lab"));
     ASSERT_TRUE(loaded.status.ok()) << loaded.status.message;
-    ASSERT_TRUE(house.WaitFor([&] { return house.Ask(AboutSite(RequestKind::kTiles)).tiles.size() > 0; }));
-    ASSERT_TRUE(house.WaitFor([&] { return ViewOf(house).tiles == before.tiles; }));
+    ASSERT_TRUE(WaitTiles(house, before.tiles));
     ExpectSame(before, ViewOf(house));
     EXPECT_GT(house.Ask(AboutSite(RequestKind::kMapInfo)).maps.at(0).epoch, epoch)
         << "an epoch that clients know is over";
@@ -270,6 +291,7 @@ TEST(SavedSites, TwoSitesAreMergedIntoOneMap) {
   StoredServer server(directory / "0");
   WholeServer& house = *server.operator->();
   EXPECT_EQ(house.Ask(AboutSite(RequestKind::kMapInfo, "annex")).status.code, StatusCode::kNotFound);
+  ASSERT_TRUE(WaitDrawn(house));
   View view = ViewOf(house);
   for (const char* robot : {"r1", "r2"}) {
     EXPECT_EQ(view.used[robot], static_cast<std::uint64_t>(kScans)) << robot;
@@ -323,6 +345,7 @@ TEST(SavedSites, TheGoldenFileOfEveryVersionLoads) {
     WholeServer& house = *server.operator->();
     const Reply loaded = house.Ask(AboutFile(RequestKind::kSiteLoad, "lab", "golden"));
     ASSERT_TRUE(loaded.status.ok()) << loaded.status.message;
+    ASSERT_TRUE(WaitDrawn(house));
     View view = ViewOf(house);
     EXPECT_EQ(view.used, (std::map<std::string, std::uint64_t>{{"robot1", 40U}, {"robot2", 40U}}));
     EXPECT_EQ(view.paths["robot1"].size(), 40U);

@@ -94,7 +94,7 @@ TEST_F(CairnSite, IsSavedDeletedLoadedAndMovedToAnotherServer) {
 }
 
 TEST_F(CairnSite, FilesAreMergedSplitAndShortened) {
-  for (const std::string site : {"hall", "annex"}) {
+  for (const std::string& site : {std::string("hall"), std::string("annex")}) {
     ASSERT_NO_FATAL_FAILURE(StartServer(site));
     Stream(site, site == "hall" ? "h" : "a");
     StopServer();
@@ -126,7 +126,7 @@ TEST_F(CairnSite, FilesAreMergedSplitAndShortened) {
   EXPECT_NEAR(x, 30.0 - MustJson({"pose", "a1"})["pose"]["y"].get<double>(), 0.3);
   StopServer();
   EXPECT_EQ(Cairn({"site", "merge", File("hall.site"), File("annex.site")}).code, ExitCode::kUsage);
-  directory_.Write("bad.site", directory_.Read("hall.site").substr(0, 5000));
+  static_cast<void>(directory_.Write("bad.site", directory_.Read("hall.site").substr(0, 5000)));
   const SiteOutcome bad = Cairn({"site", "import", File("bad.site"), "--state", File("d")});
   EXPECT_EQ(bad.code, ExitCode::kFailed);
   EXPECT_THAT(bad.err, HasSubstr("DATA_LOSS"));
