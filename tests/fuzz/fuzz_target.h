@@ -57,7 +57,8 @@ class Pieces {
   }
   // As much as its length says, or as is left.
   std::string_view TakePiece() {
-    const std::size_t size = std::min<std::size_t>(Take<std::uint16_t>(), rest_.size());
+    const std::size_t wanted = Take<std::uint16_t>();
+    const std::size_t size = std::min(wanted, rest_.size());
     const std::string_view piece = rest_.substr(0, size);
     rest_.remove_prefix(size);
     return piece;

@@ -103,7 +103,7 @@ std::vector<std::string> SeedsOfMaps() {
       seed(0, picture(1, ".pgm")),
       seed(1, picture(3, ".bmp")),
       seed(2, "P2\n# a comment\n3 2\n255\n0 254 205\n1 2 3\n"),
-      seed(0, "P3 1 2 65535 0 9 65535 7 7 7"),
+      seed(0, "P3 1 2 65535 0 9 65535 7 7 7\n"),
       seed(4, "cairn-map-lines 1\n# walls\nwall 0 0 4.5 0\nside 4.5 0 4.5 3\nwall -1e-3 2 7 2.25\n")};
   for (const MapImageMode mode : {MapImageMode::kTrinary, MapImageMode::kRaw}) {
     Must(SaveMapYaml(SmallMap(), directory / "good.yaml", ".pgm", {mode, 0.65, 0.25}).has_value(), "a map for a seed");
