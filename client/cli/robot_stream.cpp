@@ -79,8 +79,8 @@ void RobotStream::OnRestart(SessionToken session) {
   ++restarted_;
 }
 
-// A robot would wait for its server. For a log or a simulation, a lost server is an error, unless the session is durable,
-// so that the next server continues it.
+// A robot would wait for its server. For a log or a simulation, a lost server is an error, unless the session is
+// durable, so that the next server continues it.
 Result<void> RobotStream::CheckServer() {
   const SessionState state = client_->session();
   if (state.phase == SessionPhase::kSuspended && state.status.code == StatusCode::kUnavailable && !state.durable)

@@ -86,8 +86,7 @@ bool ReplyParts::Fill(Reply& part) {
   return full.Take(items_.poses, taken_.poses, part.poses) && full.Take(items_.path, taken_.path, part.path) &&
          full.Take(tiles_, taken_.tiles, part.tiles) && full.Take(items_.landmarks, taken_.landmarks, part.landmarks) &&
          full.Take(items_.maps, taken_.maps, part.maps) && full.Take(items_.robots, taken_.robots, part.robots) &&
-         full.Take(items_.jobs, taken_.jobs, part.jobs) &&
-         full.Take(items_.saved, taken_.saved, part.saved);
+         full.Take(items_.jobs, taken_.jobs, part.jobs) && full.Take(items_.saved, taken_.saved, part.saved);
 }
 
 }  // namespace cairn::server

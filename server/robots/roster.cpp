@@ -22,7 +22,8 @@ Result<void> ValidateRequest(const SessionRequest& request) {
   for (const std::string& sensor : request.sensors) {
     if (auto valid = ValidateName("sensor", sensor); !valid) return valid;
     if (sensor == SessionRecord::kOdometry)
-      return Fail(StatusCode::kInvalidArgument, "no sensor may be named 'odometry': this is the name of the robot's odometry stream");
+      return Fail(StatusCode::kInvalidArgument,
+                  "no sensor may be named 'odometry': this is the name of the robot's odometry stream");
   }
   return request.has_start ? ValidateStart(request.T_map_robot_start) : Result<void>{};
 }
