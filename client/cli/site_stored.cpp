@@ -89,7 +89,7 @@ ExitCode List(Program& program, const SiteArguments& arguments) {
   return arguments.state.empty() ? ListSites(program) : ListStored(program, arguments.state);
 }
 
-ExitCode Export(Program& program, const SiteArguments& arguments) {
+ExitCode ExportStored(Program& program, const SiteArguments& arguments) {
   const auto store = OpenState(arguments.state, true);
   if (!store) return program.Refuse(store.error());
   return Told(program, server::WriteSiteFile(**store, arguments.names[0], arguments.output));
@@ -225,7 +225,7 @@ void AddTransfer(CLI::App& site, Program& program) {
   write->add_option("site", exported->names, "The site's name")->required()->expected(1);
   write->add_option("-o,--output", exported->output, "The file to write")->required()->type_name("FILE");
   write->add_option("--state", exported->state, "State directory of the stopped server")->required();
-  program.OnChosen(*write, exported, Export);
+  program.OnChosen(*write, exported, ExportStored);
   auto imported = std::make_shared<SiteArguments>();
   auto* read = site.add_subcommand("import", "Add the site of a file to the state of a stopped server");
   read->add_option("file", imported->names, "The file of a saved site")->required()->expected(1);

@@ -120,7 +120,7 @@ Result<void> RobotClient::SendNow(const StreamedSample& sample) {
   if (first) Ask();
   const auto* const scan = std::get_if<ScanSample>(&sample);
   const auto* const odometry = std::get_if<OdometrySample>(&sample);
-  const Result<void> published = scan != nullptr ? wire->scans->Publish(*scan) : wire->odometry->Publish(*odometry);
+  Result<void> published = scan != nullptr ? wire->scans->Publish(*scan) : wire->odometry->Publish(*odometry);
   if (!published) return published;
   const MutexLock lock(mutex_);
   if (scan != nullptr) {

@@ -73,10 +73,10 @@ void SiteShelf::Serve(const Request& request) {
   Reply reply = ReplyTo(request);
   try {
     auto answer = Answer(request);
-    if (answer) reply.saved = *std::move(answer);
     if (!answer) reply.status = answer.error();
     spdlog::info("{} of site '{}', file '{}': {}", RequestKindName(request.kind), request.site, request.saved,
                  answer ? "done" : answer.error().message);
+    if (answer) reply.saved = *std::move(answer);
   } catch (const std::exception& error) {
     spdlog::error("a request of kind {} failed with an exception: {}", RequestKindName(request.kind), error.what());
     reply = ReplyTo(request, {StatusCode::kInternal, "internal error of the server; see its log for the cause"});
@@ -163,7 +163,7 @@ Result<void> SiteShelf::Load(const Request& request) {
   options.first_job = rooms_.jobs.ReserveIds(file->last_job);
   const auto loaded =
       Between<SiteFileSummary>([path = *path, options](Store& store) { return ImportSite(store, path, options); });
-  const auto taken = loaded ? TakeUp(*loaded) : Result<void>(tl::unexpected(loaded.error()));
+  auto taken = loaded ? TakeUp(*loaded) : Result<void>(tl::unexpected(loaded.error()));
   rooms_.atlas.Release(options.site);
   return taken;
 }

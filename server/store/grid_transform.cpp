@@ -21,7 +21,7 @@ using Cells = std::array<std::int16_t, static_cast<std::size_t>(kTileArea)>;
 void AddTouched(const Place& chunk, const Pose2& T_to_from, double side_m, std::set<Place>& touched) {
   int low_x = INT32_MAX, low_y = INT32_MAX, high_x = INT32_MIN, high_y = INT32_MIN;
   for (int corner = 0; corner < 4; ++corner) {
-    const Eigen::Vector2d p_from(side_m * (chunk.first + corner % 2), side_m * (chunk.second + corner / 2));
+    const Eigen::Vector2d p_from(side_m * (chunk.first + corner % 2), side_m * (chunk.second + (corner < 2 ? 0 : 1)));
     const Eigen::Vector2d p_to = T_to_from * p_from / side_m;
     low_x = std::min(low_x, static_cast<int>(std::floor(p_to.x())));
     low_y = std::min(low_y, static_cast<int>(std::floor(p_to.y())));
@@ -49,8 +49,8 @@ StoredGrid Transformed(const StoredGrid& grid, const Pose2& T_to_from, double re
     auto cells = std::make_shared<Cells>();
     bool seen = false;
     for (int i = 0; i < kTileArea; ++i) {
-      const Eigen::Vector2d cell_to(place.first * kTileCells + i % kTileCells + 0.5,
-                                    place.second * kTileCells + i / kTileCells + 0.5);
+      const int column = i % kTileCells, row = i / kTileCells;
+      const Eigen::Vector2d cell_to(place.first * kTileCells + column + 0.5, place.second * kTileCells + row + 0.5);
       const Eigen::Vector2d cell_from = T_from_to * (cell_to * resolution_m) / resolution_m;
       const int x = static_cast<int>(std::floor(cell_from.x())), y = static_cast<int>(std::floor(cell_from.y()));
       const auto source = from.find({FloorDiv(x, kTileCells), FloorDiv(y, kTileCells)});

@@ -42,10 +42,12 @@ class Rooms {
         shelf_({}, nullptr, {outbound_, roster_, atlas_, jobs_, worker_}),
         desk_(64, outbound_, roster_, atlas_, jobs_, worker_, shelf_, kGeneration) {
     spdlog::set_level(spdlog::level::off);  // Every damaged record is an error in the log.
+    shelf_.Start();
     desk_.Start();
   }
   ~Rooms() {
     desk_.Stop();
+    shelf_.Stop();
     worker_.Stop();
     pool_.join();
   }
