@@ -10,7 +10,8 @@ namespace cairn::server {
 namespace {
 
 PathPose PoseAt(Stamp stamp) {
-  return {stamp, {0.1 * static_cast<double>(stamp), 0, 0}, 0.5F, true, PoseReason::kTracking, {}, {}};
+  const Eigen::Matrix3f covariance = Eigen::Matrix3f::Zero();
+  return {stamp, {0.1 * static_cast<double>(stamp), 0, 0}, 0.5F, true, PoseReason::kTracking, covariance, {}};
 }
 
 TEST(PoseHistory, InterpolatesBetweenPosesAcrossBlocks) {
