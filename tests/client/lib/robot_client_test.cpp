@@ -146,6 +146,11 @@ TEST_F(RobotClientTest, OpensANewSessionWhereTheRobotIsIfTheServerForgotIt) {
   };
   for (int step = 0; step < 10; ++step) drive(step);
   ASSERT_TRUE(client->WaitSettled(20.0));
+  // WaitSettled is about scans. What is not settled of the odometry is sent again as well, with all that came after it.
+  ASSERT_TRUE(Eventually([&] {
+    const auto odometry = client->ledger("odometry");
+    return odometry && odometry->settled_through == 10;
+  }));
   const SessionToken before = client->session().session;
   server_->SetSettling(false);
   for (int step = 10; step < 15; ++step) drive(step);
