@@ -42,9 +42,9 @@ Server::Server(const ServerOptions& options, Inbound& inbound, Outbound& outboun
       worker_(
           options.jobs, jobs_,
           [this](const Job& job, bool enable, const JobControl& control) { return smooth_.Run(job, enable, control); }),
-      shelf_(saved, journal, {outbound, roster_, atlas_, jobs_, worker_}),
-      desk_(static_cast<std::size_t>(options.server.query_queue), outbound, roster_, atlas_, jobs_, worker_, shelf_,
-            generation),
+      saved_sites_(saved, journal, {outbound, roster_, atlas_, jobs_, worker_}),
+      desk_(static_cast<std::size_t>(options.server.query_queue), outbound, roster_, atlas_, jobs_, worker_,
+            saved_sites_, generation),
       heartbeat_(
           std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options.server.stall_limit_s))) {}
 
@@ -66,7 +66,7 @@ Result<void> Server::Start() {
   for (const std::string& name : options_.server.site_names()) {
     if (const auto site = atlas_.Create(name); !site) return tl::unexpected(site.error());
   }
-  shelf_.Start();
+  saved_sites_.Start();
   desk_.Start();
   worker_.Start();
   dispatcher_ = std::jthread([this](const std::stop_token& stop) { Dispatch(stop); });
@@ -163,7 +163,7 @@ void Server::Stop() {
   outbound_.lane(Outbound::Lane::kReplies).Close();
   if (dispatcher_.joinable()) dispatcher_.join();  // It first dispatches what the channel still holds.
   housekeeping_ = {};
-  shelf_.Stop();
+  saved_sites_.Stop();
   worker_.Stop();
   FinishSessions();
   PublishMaps();

@@ -68,7 +68,7 @@ class Server {
   JobList jobs_;
   const SmoothJob smooth_;
   JobWorker worker_;
-  SiteShelf shelf_;
+  SavedSites saved_sites_;
   Desk desk_;
   Heartbeat heartbeat_;
   std::size_t first_site_ = 0;     // Of the next publication; used by housekeeping only.

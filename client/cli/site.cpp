@@ -69,7 +69,7 @@ void AddSite(CLI::App& app, Program& program) {
   save->add_option("name", kept->name, "The file's name; one that is there is replaced [the site's]");
   program.OnChosen(*save, kept, SaveSite);
   auto taken = std::make_shared<SiteAndFile>();
-  auto* load = site->add_subcommand("load", "Take up a saved site, with its sessions, while the server runs");
+  auto* load = site->add_subcommand("load", "Load a saved site, with its sessions, while the server runs");
   load->add_option("name", taken->name, "The file's name")->required();
   load->add_option("--as", taken->site, "The site's name from now on [as in the file]");
   program.OnChosen(*load, taken, LoadSite);

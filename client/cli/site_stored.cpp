@@ -55,7 +55,7 @@ std::string TextOf(const server::SiteFileSummary& summary) {
                      summary.entries, summary.jobs.size());
 }
 
-ExitCode Told(Program& program, const Result<server::SiteFileSummary>& summary) {
+ExitCode PrintSummary(Program& program, const Result<server::SiteFileSummary>& summary) {
   if (!summary) return program.Refuse(summary.error());
   return program.Print(TextOf(*summary), JsonOf(*summary));
 }
@@ -92,7 +92,7 @@ ExitCode List(Program& program, const SiteArguments& arguments) {
 ExitCode ExportStored(Program& program, const SiteArguments& arguments) {
   const auto store = OpenState(arguments.state, true);
   if (!store) return program.Refuse(store.error());
-  return Told(program, server::WriteSiteFile(**store, arguments.names[0], arguments.output));
+  return PrintSummary(program, server::WriteSiteFile(**store, arguments.names[0], arguments.output));
 }
 
 ExitCode Import(Program& program, const SiteArguments& arguments) {
@@ -100,7 +100,8 @@ ExitCode Import(Program& program, const SiteArguments& arguments) {
   if (!renames) return program.Refuse(renames.error());
   const auto store = OpenState(arguments.state, false);
   if (!store) return program.Refuse(store.error());
-  return Told(program, server::ImportSite(**store, arguments.names[0], {.site = arguments.as, .robots = *renames}));
+  return PrintSummary(program,
+                      server::ImportSite(**store, arguments.names[0], {.site = arguments.as, .robots = *renames}));
 }
 
 // Reads files into a store in memory, one site each. The second gets another name there if it has the first one's.
@@ -132,62 +133,64 @@ ExitCode Merge(Program& program, const SiteArguments& arguments) {
   if (!store) return program.Refuse(store.error());
   if (auto merged = server::MergeSites(**store, sites[0], sites[1], arguments.T_into_from); !merged)
     return program.Refuse(merged.error());
-  if (files) return Told(program, server::WriteSiteFile(**store, sites[0], arguments.output));
+  if (files) return PrintSummary(program, server::WriteSiteFile(**store, sites[0], arguments.output));
   return program.Print(fmt::format("site {} is part of {} now\n", sites[1], sites[0]),
                        {{"site", sites[0]}, {"merged", sites[1]}});
 }
 
-// The sessions that the command names after the site or file.
-Result<std::vector<std::uint64_t>> SessionsOf(Store& store, const std::string& site,
-                                              const std::vector<std::string>& names) {
-  const auto contents = server::ReadSite(store, site);
-  if (!contents) return tl::unexpected(contents.error());
+// The site that a command changes, in the state directory or read from a file, and the sessions that it names.
+struct NamedSessions {
+  std::unique_ptr<Store> store;
+  std::string site;
   std::vector<std::uint64_t> sessions;
+};
+
+Result<NamedSessions> OpenSessions(const SiteArguments& arguments) {
+  const auto& names = arguments.names;  // The site or its file, then the sessions.
+  std::vector<std::string> sites;
+  auto store = arguments.state.empty() ? OpenFiles({names[0]}, sites) : OpenState(arguments.state, true);
+  if (!store) return tl::unexpected(store.error());
+  NamedSessions named{std::move(*store), sites.empty() ? names[0] : sites[0], {}};
+  const auto contents = server::ReadSite(*named.store, named.site);
+  if (!contents) return tl::unexpected(contents.error());
   for (std::size_t i = 1; i < names.size(); ++i) {
     const auto found = server::FindSession(*contents, names[i]);
     if (!found) return tl::unexpected(found.error());
-    sessions.push_back(*found);
+    named.sessions.push_back(*found);
   }
-  return sessions;
+  return named;
 }
 
 ExitCode Split(Program& program, const SiteArguments& arguments) {
-  const bool files = arguments.state.empty();
-  std::vector<std::string> sites{arguments.names[0]};
-  if (files) sites.clear();
-  const auto store = files ? OpenFiles({arguments.names[0]}, sites) : OpenState(arguments.state, true);
-  if (!store) return program.Refuse(store.error());
-  const auto sessions = SessionsOf(**store, sites[0], arguments.names);
-  if (!sessions) return program.Refuse(sessions.error());
-  if (auto split = server::SplitSite(**store, sites[0], *sessions, arguments.as); !split)
+  const auto named = OpenSessions(arguments);
+  if (!named) return program.Refuse(named.error());
+  Store& store = *named->store;
+  const std::string& site = named->site;
+  if (auto split = server::SplitSite(store, site, named->sessions, arguments.as); !split)
     return program.Refuse(split.error());
-  if (files) {
+  if (arguments.state.empty()) {
     if (!arguments.rest.empty()) {
-      const auto rest = server::WriteSiteFile(**store, sites[0], arguments.rest);
+      const auto rest = server::WriteSiteFile(store, site, arguments.rest);
       if (!rest) return program.Refuse(rest.error());
     }
-    return Told(program, server::WriteSiteFile(**store, arguments.as, arguments.output));
+    return PrintSummary(program, server::WriteSiteFile(store, arguments.as, arguments.output));
   }
   return program.Print(
-      fmt::format("{} sessions of site {} are site {} now\n", sessions->size(), sites[0], arguments.as),
-      {{"site", sites[0]}, {"new_site", arguments.as}, {"sessions", *sessions}});
+      fmt::format("{} sessions of site {} are site {} now\n", named->sessions.size(), site, arguments.as),
+      {{"site", site}, {"new_site", arguments.as}, {"sessions", named->sessions}});
 }
 
 ExitCode DeleteSession(Program& program, const SiteArguments& arguments) {
-  const bool files = arguments.state.empty();
-  std::vector<std::string> sites{arguments.names[0]};
-  if (files) sites.clear();
-  const auto store = files ? OpenFiles({arguments.names[0]}, sites) : OpenState(arguments.state, true);
-  if (!store) return program.Refuse(store.error());
-  const auto sessions = SessionsOf(**store, sites[0], arguments.names);
-  if (!sessions) return program.Refuse(sessions.error());
-  for (const std::uint64_t session : *sessions) {
-    if (auto deleted = server::DeleteSession(**store, sites[0], session); !deleted)
-      return program.Refuse(deleted.error());
+  const auto named = OpenSessions(arguments);
+  if (!named) return program.Refuse(named.error());
+  Store& store = *named->store;
+  const std::string& site = named->site;
+  for (const std::uint64_t session : named->sessions) {
+    if (auto deleted = server::DeleteSession(store, site, session); !deleted) return program.Refuse(deleted.error());
   }
-  if (files) return Told(program, server::WriteSiteFile(**store, sites[0], arguments.output));
-  return program.Print(fmt::format("{} of site {} deleted\n", arguments.names[1], sites[0]),
-                       {{"site", sites[0]}, {"session", arguments.names[1]}, {"deleted", true}});
+  if (arguments.state.empty()) return PrintSummary(program, server::WriteSiteFile(store, site, arguments.output));
+  return program.Print(fmt::format("{} of site {} deleted\n", arguments.names[1], site),
+                       {{"site", site}, {"session", arguments.names[1]}, {"deleted", true}});
 }
 
 // A command whose result goes either into the state directory or into a new file.

@@ -11,7 +11,7 @@
 namespace cairn::client {
 
 MapClient::MapClient(wire::Bus& bus, const std::string& site, std::function<void()> on_change)
-    : bus_(bus), site_(site), on_change_(std::move(on_change)), mirror_(HashName(site)), heard_(Clock::now()) {}
+    : bus_(bus), site_(site), on_change_(std::move(on_change)), mirror_(HashName(site)), last_value_(Clock::now()) {}
 
 MapClient::~MapClient() {
   std::unique_ptr<Wire> last;  // Its callbacks take the mutex.
@@ -54,7 +54,7 @@ void MapClient::Apply(int number, Value&& value) {
   {
     const MutexLock lock(mutex_);
     if (number != number_ || !mirror_->Apply(std::forward<Value>(value))) return;
-    heard_ = Clock::now();
+    last_value_ = Clock::now();
     changed_.NotifyAll();
   }
   if (on_change_) on_change_();
@@ -78,8 +78,8 @@ void MapClient::Watch() {
       if (!stopping_) changed_.WaitFor(mutex_, std::chrono::milliseconds(200));
       if (stopping_) return;
       const auto now = Clock::now();
-      if (now - heard_ < kSilence) behind = false;
-      if (now - heard_ < kSilence || now - asked < pause) continue;
+      if (now - last_value_ < kSilence) behind = false;
+      if (now - last_value_ < kSilence || now - asked < pause) continue;
       asked = now;
     }
     if (queries_ == nullptr) {
@@ -102,7 +102,7 @@ void MapClient::Watch() {
   }
 }
 
-// Nothing that was heard before counts any more: it may have been forged.
+// Nothing that was received before counts any more: it may have been forged.
 void MapClient::Renew() {
   auto bus = wire::Bus::Create(bus_.options(), "map");
   if (!bus) return;
@@ -111,7 +111,7 @@ void MapClient::Renew() {
     const MutexLock lock(mutex_);
     number = ++number_;
     mirror_.emplace(HashName(site_));
-    heard_ = Clock::now();
+    last_value_ = Clock::now();
   }
   auto wire = Connect(**bus, number);
   if (!wire) return;

@@ -1,7 +1,8 @@
 // Follows the map of one site: a TileMirror kept up to date by the wire. Gets the whole current map on joining, then
 // what changes. After two silent seconds it asks the server for the map's version: where the mirror is behind it and
-// stays so, forged messages have made it deaf or wrong, and it joins the domain anew (RobotClient). Thread rule: every
-// method from any thread; `on_change` runs on the wire's threads, may call the methods, and must return soon.
+// stays so, forged messages keep it from receiving, or have made it wrong, and it joins the domain anew (RobotClient).
+// Thread rule: every method from any thread; `on_change` runs on the wire's threads, may call the methods, and must
+// return soon.
 #pragma once
 
 #include <chrono>
@@ -59,8 +60,8 @@ class MapClient {
   mutable Mutex mutex_;
   CondVar changed_;
   std::optional<TileMirror> mirror_ CAIRN_GUARDED_BY(mutex_);
-  Clock::time_point heard_ CAIRN_GUARDED_BY(mutex_);  // Last value of the site.
-  int number_ CAIRN_GUARDED_BY(mutex_) = 0;           // Of the wire whose values count.
+  Clock::time_point last_value_ CAIRN_GUARDED_BY(mutex_);  // When the last value of the site arrived.
+  int number_ CAIRN_GUARDED_BY(mutex_) = 0;                // Of the wire whose values count.
   bool stopping_ CAIRN_GUARDED_BY(mutex_) = false;
   std::unique_ptr<QueryClient> queries_;  // The watcher's, from the first silence on.
   std::unique_ptr<Wire> wire_ CAIRN_GUARDED_BY(mutex_);

@@ -1,6 +1,6 @@
-// Follows the poses that the server publishes for one robot. Not a history: it hears only what is published while it
+// Follows the poses that the server publishes for one robot. Not a history: it receives only what is published while it
 // exists, and where the reader is slow, the oldest waiting poses are dropped. Poses of an earlier generation of the
-// server than one heard before are ignored. (QueryClient::Path has all poses.)
+// server than one seen before are ignored. (QueryClient::Path has all poses.)
 // Thread rule: every method from any thread, but Next not from a callback of the wire.
 #pragma once
 

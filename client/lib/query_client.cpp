@@ -91,13 +91,13 @@ std::shared_ptr<QueryClient::Wire> QueryClient::CurrentWire() {
 }
 
 // `began`: since when pings have not been answered.
-void QueryClient::RenewIfDeaf(Deadline began) {
+void QueryClient::RenewIfSilent(Deadline began) {
   constexpr std::chrono::seconds kPatience{1};
   constexpr std::chrono::seconds kLongestPause{60};  // A server may be silent for another reason.
   {
     const MutexLock lock(mutex_);
     const auto now = Clock::now();
-    if (now - std::max(began, heard_) < kPatience || now - renewed_ < renewal_pause_) return;
+    if (now - std::max(began, last_answer_) < kPatience || now - renewed_ < renewal_pause_) return;
     renewed_ = now;
     renewal_pause_ = std::min(2 * renewal_pause_, kLongestPause);
   }
@@ -115,7 +115,7 @@ void QueryClient::RenewIfDeaf(Deadline began) {
 
 void QueryClient::OnReply(Reply&& part) {
   const MutexLock lock(mutex_);
-  heard_ = Clock::now();
+  last_answer_ = Clock::now();
   const auto pending = pending_.find(part.sequence);
   if (pending == pending_.end()) return;  // The caller has stopped waiting.
   pending->second.Add(std::move(part));
@@ -152,7 +152,7 @@ Result<void> QueryClient::WaitForServer(Deadline deadline) {
     }
     const Deadline soon = std::min(deadline, Clock::now() + kPatience);
     const Result<Reply> pong = AskOnce(MakeRequest(RequestKind::kPing), soon, soon);
-    if (!pong) RenewIfDeaf(began);
+    if (!pong) RenewIfSilent(began);
     const MutexLock lock(mutex_);
     if (pong) {
       server_found_ = true;

@@ -3,7 +3,7 @@
 // kDeadlineExceeded if the answer was late. The time needed to find the server counts towards the timeout.
 // A question without an answer is asked again within the timeout, except one that starts a job, after an answered ping.
 // If no ping is answered for a second although a server is there, the client joins the domain again: forged messages
-// may have made it deaf (RobotClient).
+// may keep it from receiving (RobotClient).
 // Thread rule: any number of threads may ask at once, and each waits for its own answer. Do not ask from a callback of
 // the wire: the answer arrives on the thread that the callback would block.
 #pragma once
@@ -90,7 +90,7 @@ class QueryClient {
   // Writes everything that the server has stored of the site into the file of this name, in place of one that is there;
   // an empty name is the site's. kNotFound: nothing is stored of such a site.
   [[nodiscard]] Result<SavedSite> SaveSite(const std::string& site, const std::string& name = "");
-  // Takes up a saved site; an empty site is named as in the file. kAlreadyExists: there is such a site, or one of its
+  // Loads a saved site; an empty site is named as in the file. kAlreadyExists: there is such a site, or one of its
   // robots has a session. kDataLoss: the file is damaged. kFailedPrecondition: a newer server has written it.
   [[nodiscard]] Result<void> LoadSite(const std::string& name, const std::string& site = "");
   // With all that is stored of it. kFailedPrecondition: a robot is active in it, or a job has not ended.
@@ -116,7 +116,7 @@ class QueryClient {
   };
   [[nodiscard]] Result<std::shared_ptr<Wire>> Connect(wire::Bus& bus);
   [[nodiscard]] std::shared_ptr<Wire> CurrentWire();
-  void RenewIfDeaf(Deadline began);
+  void RenewIfSilent(Deadline began);
   [[nodiscard]] Result<void> WaitForServer(Deadline deadline);
   [[nodiscard]] Result<Reply> Ask(const Request& request);
   [[nodiscard]] Result<Job> AskForJob(const Request& request);
@@ -132,7 +132,7 @@ class QueryClient {
   bool server_found_ CAIRN_GUARDED_BY(mutex_) = false;
   std::int64_t sequence_ CAIRN_GUARDED_BY(mutex_) = 0;
   std::map<std::int64_t, ReplyAssembly> pending_ CAIRN_GUARDED_BY(mutex_);  // By sequence; what callers wait for.
-  Deadline heard_ CAIRN_GUARDED_BY(mutex_);                                 // Last answer, however late.
+  Deadline last_answer_ CAIRN_GUARDED_BY(mutex_);                           // Last answer, however late.
   Deadline renewed_ CAIRN_GUARDED_BY(mutex_);                               // Last time it joined anew, or began to,
   std::chrono::seconds renewal_pause_ CAIRN_GUARDED_BY(mutex_){1};          // and how long until it may again.
   std::shared_ptr<Wire> wire_ CAIRN_GUARDED_BY(mutex_);                     // Last: its callbacks use everything above.

@@ -113,8 +113,8 @@ class RobotClient {
   [[nodiscard]] Result<void> Advertise(Wire& wire);
   [[nodiscard]] Result<void> Subscribe(Wire& wire);
   template <typename Value>
-  [[nodiscard]] Result<void> Hear(Wire& wire, void (RobotClient::*on_value)(Value&&),
-                                  wire::SubscriptionEvents events = {});
+  [[nodiscard]] Result<void> SubscribeTo(Wire& wire, void (RobotClient::*on_value)(Value&&),
+                                         wire::SubscriptionEvents events = {});
   [[nodiscard]] Result<void> Connect(wire::Bus& bus);
   [[nodiscard]] Result<void> AwaitSession(const wire::Bus& bus, double timeout_s);
   void OnSession(SessionState&& state);

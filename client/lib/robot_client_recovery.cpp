@@ -1,6 +1,6 @@
-// The part of RobotClient that joins the domain, notices that a session stands still although a server is there, and
-// joins the domain anew. All that a reader or a writer believes about its peer belongs to the two participants: a new
-// one begins without it.
+// The part of RobotClient that joins the domain, notices that a session makes no progress although a server is there,
+// and then joins the domain with a new participant. What a reader or a writer has recorded about its peer, true or
+// forged, belongs to the pair of participants, so a new participant starts without it.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,15 +11,16 @@
 namespace cairn::client {
 namespace {
 
-constexpr std::chrono::milliseconds kPatience{1800};  // Stale after that; with the watcher's period below 2 s.
-constexpr std::chrono::seconds kLostServer{3};        // Longer than a server that goes away is remembered.
-constexpr std::chrono::milliseconds kLoop{700};       // Until the server's word of a stream follows its samples.
-constexpr std::chrono::seconds kRetire{3};
-// Pauses between two renewals: they double, because a server may be silent for another reason, except while the guard
-// drops datagrams, when each new participant may be made deaf like the one before.
+constexpr std::chrono::milliseconds kStaleAfter{1800};  // Together with the watcher's period below 2 s.
+constexpr std::chrono::seconds kLostServer{3};          // Longer than the lease of a server that has gone.
+constexpr std::chrono::milliseconds kReportDelay{700};  // Until the server's report of a stream follows its samples.
+constexpr std::chrono::seconds kKeepRetired{3};         // If the server does not answer the new participant.
+// Pauses between two renewals. They double, because the server may be silent for another reason. They stay short while
+// the guard drops datagrams, because then each new participant may be stopped like the one before.
 constexpr std::chrono::seconds kShortestPause{2};
 constexpr std::chrono::seconds kLongestPause{60};
-constexpr std::chrono::milliseconds kResendPause{500};  // While stale: what was sent before the server's match is lost.
+constexpr std::chrono::milliseconds kResendPause{
+    500};  // While stale: what was sent before the server was found is lost.
 
 }  // namespace
 
@@ -38,7 +39,8 @@ Result<void> RobotClient::Advertise(Wire& wire) {
 
 // Only the values of the current wire count.
 template <typename Value>
-Result<void> RobotClient::Hear(Wire& wire, void (RobotClient::*on_value)(Value&&), wire::SubscriptionEvents events) {
+Result<void> RobotClient::SubscribeTo(Wire& wire, void (RobotClient::*on_value)(Value&&),
+                                      wire::SubscriptionEvents events) {
   auto subscription = wire.bus->Subscribe<Value>(
       [this, on_value, number = wire.number](Value&& value) {
         if (current_ == number) (this->*on_value)(std::move(value));
@@ -54,10 +56,10 @@ Result<void> RobotClient::Subscribe(Wire& wire) {
   events.matched = [this, number = wire.number](int servers) {
     if (current_ == number) OnMatched(servers);
   };
-  if (auto heard = Hear(wire, &RobotClient::OnSession, std::move(events)); !heard) return heard;
-  if (auto heard = Hear(wire, &RobotClient::OnRefusal); !heard) return heard;
-  if (auto heard = Hear(wire, &RobotClient::OnLedger); !heard) return heard;
-  return Hear(wire, &RobotClient::OnPose);
+  if (auto done = SubscribeTo(wire, &RobotClient::OnSession, std::move(events)); !done) return done;
+  if (auto done = SubscribeTo(wire, &RobotClient::OnRefusal); !done) return done;
+  if (auto done = SubscribeTo(wire, &RobotClient::OnLedger); !done) return done;
+  return SubscribeTo(wire, &RobotClient::OnPose);
 }
 
 std::shared_ptr<RobotClient::Wire> RobotClient::CurrentWire() const {
@@ -71,7 +73,7 @@ bool RobotClient::connected() const {
 
 void RobotClient::Sent(NameId sensor_id, std::uint64_t number) {
   const auto now = Clock::now();
-  if (now - std::exchange(sent_at_, now) > kLoop) sending_since_ = now;
+  if (now - std::exchange(sent_at_, now) > kReportDelay) sending_since_ = now;
   Stream& stream = streams_.find(sensor_id)->second;
   if (stream.sent <= stream.arrived) stream.moved = now;
   stream.sent = std::max(stream.sent, number);
@@ -83,27 +85,27 @@ void RobotClient::Arrived(Stream& stream, std::uint64_t through) {
   stream.moved = stream.advanced = Clock::now();
 }
 
-// Why the session stands still; empty where it does not.
+// Why the session makes no progress; empty if it does.
 std::string RobotClient::Silence(Clock::time_point now) {
   const bool server = wire_->session->matched() > 0;
   if (server) connected_at_ = now;
   if (Answered() || !server) answered_at_ = now;
   if (over_ || reopening_ || state_->phase == SessionPhase::kEnded) return {};
-  if (now - answered_at_ > kPatience) return "the server does not answer the session's request";
+  if (now - answered_at_ > kStaleAfter) return "the server does not answer the session's request";
   const bool hostile = wire_->bus->datagrams_refused() > refused_at_renewal_;
   if (hostile && now - connected_at_ > kLostServer) return "no server is found any more";
   for (const auto& [sensor_id, stream] : streams_) {
-    if (!Answered() || !server || stream.sent <= stream.arrived || now - stream.moved <= kPatience) continue;
+    if (!Answered() || !server || stream.sent <= stream.arrived || now - stream.moved <= kStaleAfter) continue;
     return fmt::format("nothing that was sent has arrived at the server for {:.1f} s ({} of {} samples {})",
                        std::chrono::duration<double>(now - stream.moved).count(), stream.arrived, stream.sent,
                        sensor_id == HashName(kOdometrySensor) ? "of odometry" : "of scans");
   }
-  const bool sending = now - sent_at_ < kLoop && now - sending_since_ > kLoop;
-  if (sending && state_->stale && now - called_stale_ > kLoop) return "the server says that nothing arrives";
+  const bool sending = now - sent_at_ < kReportDelay && now - sending_since_ > kReportDelay;
+  if (sending && state_->stale && now - called_stale_ > kReportDelay) return "the server says that nothing arrives";
   return {};
 }
 
-// Whether everything that stood still goes on.
+// Whether every stream that had stopped makes progress again.
 bool RobotClient::Moving() const {
   if (!Answered() || state_->stale) return false;
   const auto moves = [&](const auto& entry)
@@ -126,7 +128,7 @@ bool RobotClient::RenewalDue(Clock::time_point now) {
   return true;
 }
 
-// Nothing that was heard before counts any more, not even a generation: it may have been forged.
+// Nothing that was received before counts any more, not even a generation: it may have been forged.
 void RobotClient::StartOver(Clock::time_point now) {
   answered_ = false;
   generation_ = 0;
@@ -164,7 +166,7 @@ void RobotClient::Recover() {
   DropRetired();
 }
 
-// Another participant goes on with the session. Where none can be made, the one before stays.
+// A new participant continues the session. If none can be made, the old one stays.
 void RobotClient::Renew() {
   const std::shared_ptr<Wire> before = CurrentWire();
   auto bus = wire::Bus::Create(before->bus->options(), "robot");
@@ -190,14 +192,16 @@ void RobotClient::Renew() {
   Ask();
 }
 
-// Those before leave when the server knows their successor, so that it does not take the robot for gone.
+// The old participants leave when the server knows the new one, so that it does not conclude that the robot has left.
 void RobotClient::DropRetired() {
   if (retired_.empty()) return;
   {
     const MutexLock lock(mutex_);
-    if (!Answered() && Clock::now() - renewed_at_ < kRetire) return;
+    if (!Answered() && Clock::now() - renewed_at_ < kKeepRetired) return;
   }
-  std::erase_if(retired_, [](const auto& wire) { return wire.use_count() == 1; });  // Others are just sending.
+  std::erase_if(retired_, [](const auto& wire) {
+    return wire.use_count() == 1;
+  });  // Another thread may still be sending with it.
 }
 
 }  // namespace cairn::client

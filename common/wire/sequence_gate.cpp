@@ -32,7 +32,7 @@ bool SequenceGate::Accept(const Key& whose, std::int64_t number, Clock::time_poi
   return true;
 }
 
-// Peers with invented names are heard once. Those that are known for longer stay.
+// Peers with invented identifiers are seen once. Those that are known for longer stay.
 void SequenceGate::MakeRoom() {
   constexpr std::chrono::seconds kKnown{1};
   std::erase_if(peers_, [&](const auto& entry) { return entry.second.raised - entry.second.first < kKnown; });

@@ -1,12 +1,12 @@
 // Decides whether the numbers in RTPS submessages are plausible: a forged one that is far ahead makes a reader or a
-// writer ignore everything up to it, so that a stream is deaf for as long as it takes to get there.
+// writer ignore everything up to it, so that nothing of the stream arrives until its numbers get there.
 //
 // What a peer numbers (samples, heartbeats, acknowledgements) may grow by one from datagram to datagram without limit.
 // It may skip numbers, because datagrams are lost and the first contact is late, but not more than kStep at once and
-// kRate a second: so many samples no writer of Cairn makes, not even while a network is silent for hours. The first
-// number of a peer may be any. What a peer acknowledges is compared with what the participant itself has sent.
-// Not a proof: a number that is a little too large passes, and a stream that stands still is noticed and made
-// anew elsewhere (client/lib/robot_client.h).
+// kRate a second: no writer of Cairn makes so many samples, not even while the network is interrupted for hours. The
+// first number of a peer may be any. What a peer acknowledges is compared with what the participant itself has sent.
+// This is no proof: a number that is a little too large passes. A stream that stands still because of one is noticed
+// and made anew elsewhere (client/lib/robot_client.h).
 // When its table is full, it forgets the peers that it has known for less than a second. Thread-safe.
 #pragma once
 

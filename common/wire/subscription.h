@@ -73,7 +73,7 @@ class DdsSubscription final : public Subscription {
       const ClientId client = value.client;
       on_value_(std::move(value));
       // The lease may have run out before the request was taken.
-      if (!clients_.Heard(writer, client) && events_.liveliness) events_.liveliness(client, false);
+      if (!clients_.Seen(writer, client) && events_.liveliness) events_.liveliness(client, false);
     } else {
       on_value_(std::move(value));
     }

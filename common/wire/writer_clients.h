@@ -23,7 +23,7 @@ class WriterClients {
   using Writer = eprosima::fastdds::dds::InstanceHandle_t;
 
   // Records a request of the writer. Returns whether the lease of one of the client's writers is valid.
-  bool Heard(const Writer& writer, ClientId client) {
+  bool Seen(const Writer& writer, ClientId client) {
     entries_[writer].client = client;
     return Alive(client);
   }

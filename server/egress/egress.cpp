@@ -118,13 +118,13 @@ void Egress::Finish() {
   threads_.clear();
   // Readers that still listen get the last states; one that does not answer may not delay the end for long.
   const auto deadline = std::chrono::steady_clock::now() + kLastMessagesPatience;
-  const auto heard = [&deadline](auto& publication) {
+  const auto wait_for_readers = [&deadline](auto& publication) {
     const auto left = deadline - std::chrono::steady_clock::now();
     static_cast<void>(publication->WaitForAcknowledgement(
         std::max(std::chrono::milliseconds(0), std::chrono::duration_cast<std::chrono::milliseconds>(left))));
   };
-  heard(std::get<Publications::Of<Ledger>>(publications_->of));
-  heard(std::get<Publications::Of<SessionState>>(publications_->of));
+  wait_for_readers(std::get<Publications::Of<Ledger>>(publications_->of));
+  wait_for_readers(std::get<Publications::Of<SessionState>>(publications_->of));
 }
 
 void Egress::Run(BoundedChannel<OutboundValue>& lane) {

@@ -18,10 +18,10 @@ Result<std::vector<StoredJob>> JobList::Restore() {
   if (journal_ == nullptr) return std::vector<StoredJob>{};
   const auto ids = journal_->store().Owners(RecordKind::kJob);
   if (!ids) return tl::unexpected(ids.error());
-  return TakeUp(*ids);
+  return AddStored(*ids);
 }
 
-Result<std::vector<StoredJob>> JobList::TakeUp(const std::vector<std::uint64_t>& ids) {
+Result<std::vector<StoredJob>> JobList::AddStored(const std::vector<std::uint64_t>& ids) {
   std::vector<StoredJob> unfinished;
   const MutexLock lock(mutex_);
   for (const std::uint64_t id : ids) {
@@ -194,7 +194,8 @@ void JobList::Progress(std::uint64_t id, double progress) {
 }
 
 void JobList::ChangedLocked(Entry& entry) {
-  // First to the journal: who hears of the change may save the site at once, and the change must be in the file.
+  // First to the journal: a client that learns of the change may save the site at once, and the change must be in the
+  // file.
   if (journal_ != nullptr && !stopping_) {
     journal_->Put({RecordKind::kJob, entry.job.id, 0},
                   [stored = StoredJob{entry.job, entry.enable}] { return BytesOf(stored); });

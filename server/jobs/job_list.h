@@ -30,7 +30,7 @@ class JobList {
   // Jobs that are loaded while the server runs: the first of so many numbers that no other job gets, and then the jobs
   // themselves, as Restore takes them.
   [[nodiscard]] std::uint64_t ReserveIds(std::uint64_t count);
-  Result<std::vector<StoredJob>> TakeUp(const std::vector<std::uint64_t>& ids);
+  Result<std::vector<StoredJob>> AddStored(const std::vector<std::uint64_t>& ids);
   // The site is deleted: its jobs that have ended are gone, what is stored of them stays.
   void RemoveSite(const std::string& site);
   // Adds a queued job. RESOURCE_EXHAUSTED: the list is full of unfinished jobs. `enable`: see JobWorker.

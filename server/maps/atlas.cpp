@@ -63,7 +63,7 @@ void Atlas::Release(const std::string& name) {
   reserved_.erase(name);
 }
 
-Result<void> Atlas::TakeUp(const std::string& name) {
+Result<void> Atlas::OpenStored(const std::string& name) {
   const auto stored = Stored(HashName(name));
   if (!stored) return tl::unexpected(stored.error());
   std::shared_ptr<Site> site;

@@ -26,10 +26,10 @@ class Atlas {
   // damaged. FAILED_PRECONDITION: a newer server has written it.
   Result<void> Restore();
 
-  // Takes up one site more that was stored by now, under a name that was reserved; then the name is free again. Not for
+  // Opens one more site that is stored by now, under a name that was reserved; then the name is free again. Not for
   // the dispatcher: it reads the store.
-  Result<void> TakeUp(const std::string& name);
-  // Nobody else can make a site of this name until it is taken up or released. A site that holds nothing gives way.
+  Result<void> OpenStored(const std::string& name);
+  // Nobody else can make a site of this name until it is opened or released. A site that holds nothing gives way.
   // ALREADY_EXISTS: there is one. RESOURCE_EXHAUSTED: too many sites.
   Result<void> Reserve(const std::string& name);
   void Release(const std::string& name);

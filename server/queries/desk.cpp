@@ -22,13 +22,13 @@ Reply JobReply(const Request& request, Result<Job> job) {
 }  // namespace
 
 Desk::Desk(std::size_t capacity, Outbound& outbound, Roster& roster, Atlas& atlas, JobList& jobs, JobWorker& worker,
-           SiteShelf& shelf, Generation generation)
+           SavedSites& saved_sites, Generation generation)
     : outbound_(outbound),
       roster_(roster),
       atlas_(atlas),
       jobs_(jobs),
       worker_(worker),
-      shelf_(shelf),
+      saved_sites_(saved_sites),
       generation_(generation),
       requests_(capacity) {}
 
@@ -123,7 +123,7 @@ std::optional<Answer> Desk::AnswerTo(const Request& request) {
     case RequestKind::kSiteSave:
     case RequestKind::kSiteLoad:
     case RequestKind::kSiteDelete:
-      shelf_.Take(Request(request));
+      saved_sites_.Take(Request(request));
       return std::nullopt;
   }
   throw std::logic_error("the request has an unknown kind");

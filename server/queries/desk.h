@@ -17,7 +17,7 @@
 #include "server/outbound.h"
 #include "server/queries/answers.h"
 #include "server/queries/request_queue.h"
-#include "server/queries/site_shelf.h"
+#include "server/queries/saved_sites.h"
 #include "server/robots/roster.h"
 
 namespace cairn::server {
@@ -25,7 +25,7 @@ namespace cairn::server {
 class Desk {
  public:
   Desk(std::size_t capacity, Outbound& outbound, Roster& roster, Atlas& atlas, JobList& jobs, JobWorker& worker,
-       SiteShelf& shelf, Generation generation);
+       SavedSites& saved_sites, Generation generation);
   ~Desk();
 
   void Start();
@@ -54,7 +54,7 @@ class Desk {
   Atlas& atlas_;
   JobList& jobs_;
   JobWorker& worker_;
-  SiteShelf& shelf_;
+  SavedSites& saved_sites_;
   const Generation generation_;
   RequestQueue requests_;
   std::jthread thread_;  // The last member, because it uses the members above.

@@ -51,8 +51,8 @@ class Roster {
   // one.
   [[nodiscard]] Result<void> HasRoomFor(const std::vector<std::string>& robots) const;
   // Takes them up as Restore does; their site is open. Where a robot has opened a session meanwhile, that one stays and
-  // the loaded one has ended. Returns how many were taken up.
-  std::size_t TakeUp(const std::vector<SessionId>& ids);
+  // the loaded one has ended. Returns how many were opened.
+  std::size_t OpenStored(const std::vector<SessionId>& ids);
   // All sessions of the site are ended and gone, what is stored of them stays, and the site is not found any more.
   // FAILED_PRECONDITION: a robot is active in it. NOT_FOUND: no such site.
   Result<std::shared_ptr<Site>> RemoveSite(const std::string& site);

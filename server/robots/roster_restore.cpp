@@ -86,7 +86,7 @@ Result<void> Roster::HasRoomFor(const std::vector<std::string>& robots) const {
   return {};
 }
 
-std::size_t Roster::TakeUp(const std::vector<SessionId>& ids) {
+std::size_t Roster::OpenStored(const std::vector<SessionId>& ids) {
   const Restored sessions = RestoreEach(ids);
   std::size_t taken = 0;
   for (std::size_t i = 0; i < ids.size(); ++i) {

@@ -268,7 +268,7 @@ bool SessionRecord::LookForSilence(Clock::time_point now) {
   const MutexLock lock(mutex_);
   std::string silence;
   const auto look = [&](const Stream& stream) CAIRN_NO_THREAD_SAFETY_ANALYSIS {
-    // A stream that was never heard is one that the robot may not have begun.
+    // The robot may not have begun to send a stream of which nothing has arrived.
     if (stream.arrived == Clock::time_point{} || now - std::max(stream.arrived, active_) <= kPatience) return;
     silence += (silence.empty() ? "'" : ", '") + stream.account.ledger().sensor + "'";
   };

@@ -101,7 +101,7 @@ std::vector<std::string> SeedsOfRecords() {
   return {seed(0, journal),
           seed(1, BytesOf(testing::SampleSession(5))),
           seed(2, BytesOf(SampleVersion(false))),
-          seed(3, BytesOf(SampleSite())),
+          seed(3, BytesOf(server::testing::SampleSiteRecord())),
           seed(4, BytesOf(StoredLayer{6, {}})),
           seed(4, BytesOf(StoredLayer{6, OneChunk()})),
           seed(5, BytesOf(SampleJob(4, JobState::kRunning))),

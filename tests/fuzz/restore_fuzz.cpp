@@ -40,7 +40,7 @@ std::string StoredDrive() {
 std::vector<std::string> SeedsOfStores() {
   StoredSession session = testing::SampleSession(5);
   session.request.T_map_robot_start = kStart;
-  StoredSite site = SampleSite(), plain = SampleSite();
+  StoredSite site = server::testing::SampleSiteRecord(), plain = server::testing::SampleSiteRecord();
   plain.enabled_version = 1;
   plain.next_version = 2;
   const std::string opened = Stored(RecordKind::kSession, 5, 0, BytesOf(session));

@@ -59,7 +59,7 @@ inline void AskEverything(Rooms& rooms) {
   }
 }
 
-// Whether everything of the store was taken up.
+// Whether everything of the store was restored.
 inline bool StartOn(MemoryStore& store) {
   server::Journal journal(store, {});  // Never started: nothing is written.
   Rooms rooms([](server::OutboundValue&&) {}, &journal);

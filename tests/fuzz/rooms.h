@@ -39,15 +39,15 @@ class Rooms {
                 [](const Job&, bool, const server::JobControl&) {
                   return Result<server::JobOutcome>(server::JobOutcome{});
                 }),
-        shelf_({}, nullptr, {outbound_, roster_, atlas_, jobs_, worker_}),
-        desk_(64, outbound_, roster_, atlas_, jobs_, worker_, shelf_, kGeneration) {
+        saved_sites_({}, nullptr, {outbound_, roster_, atlas_, jobs_, worker_}),
+        desk_(64, outbound_, roster_, atlas_, jobs_, worker_, saved_sites_, kGeneration) {
     spdlog::set_level(spdlog::level::off);  // Every damaged record is an error in the log.
-    shelf_.Start();
+    saved_sites_.Start();
     desk_.Start();
   }
   ~Rooms() {
     desk_.Stop();
-    shelf_.Stop();
+    saved_sites_.Stop();
     worker_.Stop();
     pool_.join();
   }
@@ -94,7 +94,7 @@ class Rooms {
   server::Roster roster_;
   server::JobList jobs_;
   server::JobWorker worker_;
-  server::SiteShelf shelf_;
+  server::SavedSites saved_sites_;
   server::Desk desk_;
 };
 

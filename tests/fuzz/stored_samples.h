@@ -15,16 +15,6 @@ inline server::StoredGrid OneChunk() {
   return grid;
 }
 
-inline server::StoredSite SampleSite() {
-  return {.name = "lab",
-          .epoch = 2,
-          .tile_version = 90,
-          .next_version = 4,
-          .enabled_version = 3,
-          .switches = {{1, 100}, {2, 101}},
-          .members = {{HashName("r5"), 5}}};
-}
-
 inline server::StoredVersion SampleVersion(bool with_grid) {
   server::StoredVersion version{.version = 3, .job = 8, .note = "smoothed", .parts = {}, .smoothed = {}};
   version.parts[5] = with_grid ? OneChunk() : server::StoredGrid{.keyframes = 4, .chunks = {}};

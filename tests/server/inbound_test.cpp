@@ -34,7 +34,7 @@ TEST(Inbound, ValuesOfAllLanesLeaveInTheOrderTheyCame) {
 }
 
 // Two robots that streamed fast filled the one channel there was; a third could not open its session and was not told,
-// and the end of a client's lease was lost, so that nobody else could take up its robot's name.
+// and the end of a client's lease was lost, so that no other client could use its robot's name.
 TEST(Inbound, AFloodInOneLaneDisplacesNothingInAnother) {
   Inbound inbound(4);
   for (std::uint64_t i = 1; i <= 4; ++i) EXPECT_TRUE(inbound.TryPush(ScanValue(i)));
@@ -65,7 +65,8 @@ TEST(Inbound, SessionRequestsAreBoundedAndLivelinessIsNeverRefused) {
   EXPECT_FALSE(nine.alive);
 }
 
-// A lease that is lost after the request must be heard after it, also where an older word of the lease still waits.
+// A lease that is lost after the request must be passed on after it, also where an older message of the lease still
+// waits.
 TEST(Inbound, TheNewestLivelinessStaysBehindTheRequestBeforeIt) {
   Inbound inbound(4);
   EXPECT_TRUE(inbound.TryPush(ClientLiveliness{7, true}));

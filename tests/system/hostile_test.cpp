@@ -1,5 +1,6 @@
-// Forged datagrams that make readers and writers deaf: the streams of two robots stood still for good, while the server
-// said `active`. Now they are noticed, said to be stale, and flow again. `cairn-study hostile` does it for longer.
+// Forged datagrams after which readers and writers ignore each other: the streams of two robots stood still for good,
+// while the server said `active`. Now they are noticed, said to be stale, and flow again. `cairn-study hostile` does it
+// for longer.
 #include <gtest/gtest.h>
 
 #include <atomic>

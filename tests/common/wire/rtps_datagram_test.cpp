@@ -130,7 +130,7 @@ TEST(RtpsDatagram, ALongUptimeIsNotAJump) {
   EXPECT_EQ(numbers.Take(Datagram().Heartbeat(years, years)), DatagramFault::kNone);
 }
 
-// A heartbeat or a gap of a few thousand numbers made a stream of 10 Hz deaf for minutes.
+// A heartbeat or a gap of a few thousand numbers stopped a stream of 10 Hz for minutes.
 TEST(RtpsDatagram, ForgedNumbersThatRunAheadAreRefused) {
   Numbers numbers;
   const auto gap = [](std::int64_t start, std::int64_t base) {

@@ -58,7 +58,7 @@ TYPED_TEST(Keys, ThatAreRetiredMakeRoomForOthers) {
     const TypeParam value = OfRobot<TypeParam>(robot);
     // A new writer takes over as soon as it has found the reader.
     ASSERT_TRUE(Eventually([&] { return publication->Publish(value).has_value(); })) << robot;
-    if (robot % 64 == 0) {
+    if (robot % 512 == 0) {
       ASSERT_TRUE(publication->WaitForAcknowledgement(kDeadline));
     }
     ASSERT_TRUE(publication->Retire(value)) << robot;

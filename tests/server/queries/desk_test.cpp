@@ -66,8 +66,8 @@ class DeskTest : public ::testing::Test {
                       enable_ = enable;
                       return Result<JobOutcome>(JobOutcome{});
                     }};
-  SiteShelf shelf_{{}, nullptr, {outbound_, roster_, atlas_, jobs_, worker_}};
-  Desk desk_{kCapacity, outbound_, roster_, atlas_, jobs_, worker_, shelf_, 1};
+  SavedSites saved_sites_{{}, nullptr, {outbound_, roster_, atlas_, jobs_, worker_}};
+  Desk desk_{kCapacity, outbound_, roster_, atlas_, jobs_, worker_, saved_sites_, 1};
   bool started_ = false;
   std::int64_t sequence_ = 0;
 };

@@ -33,7 +33,7 @@ TEST_F(RosterTest, ASessionThatWasStartedElsewhereIsNotOpenedAtItsOldStart) {
   EXPECT_EQ(LastState("r1", 7).phase, SessionPhase::kActive);
 }
 
-TEST_F(RosterTest, AnotherProcessMayTakeUpASessionThatItKnows) {
+TEST_F(RosterTest, AnotherProcessMayContinueASessionThatItKnows) {
   roster().Take(RequestOf("r1", 7));
   Suspend(7);
   SessionRequest same = RequestOf("r1", 8);

@@ -132,8 +132,8 @@ TEST_F(SessionEstimatorTest, ACorrectionReplacesTheGridAndTellsWhatItGaveUp) {
   EXPECT_EQ(poses_.back().map_epoch, 9U);
 }
 
-// The clock of a robot was set back by an hour: it is heard again after a few scans, its poses carry its own stamps,
-// and the path goes on growing.
+// The clock of a robot was set back by an hour: its scans are accepted again after a few of them, its poses carry its
+// own stamps, and the path goes on growing.
 TEST_F(SessionEstimatorTest, AClockThatIsSetBackCostsAFewScans) {
   Drive(0, 10);
   for (int step = 10; step < 40; ++step) {

@@ -56,13 +56,7 @@ TEST(Records, SessionsSitesVersionsLayersAndJobsComeBack) {
   EXPECT_EQ(session->request.T_map_robot_start.y, 2.0);
   EXPECT_EQ(session->map_epoch, 3U);
 
-  const StoredSite site{.name = "lab",
-                        .epoch = 2,
-                        .tile_version = 90,
-                        .next_version = 4,
-                        .enabled_version = 3,
-                        .switches = {{1, 100}, {2, 101}},
-                        .members = {{HashName("r5"), 5}}};
+  const StoredSite site = testing::SampleSiteRecord();
   const auto site_back = SiteOf(BytesOf(site));
   ASSERT_TRUE(site_back);
   EXPECT_EQ(site_back->switches, site.switches);

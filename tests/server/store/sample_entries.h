@@ -1,4 +1,4 @@
-// Journal entries with every field set, and their comparison by bytes.
+// Journal entries and records with every field set, and their comparison by bytes.
 #pragma once
 
 #include <limits>
@@ -74,6 +74,16 @@ inline StoredSession SampleSession(std::uint64_t id) {
                       .session = 78,
                       .started = false},
           .map_epoch = 3};
+}
+
+inline StoredSite SampleSiteRecord() {
+  return {.name = "lab",
+          .epoch = 2,
+          .tile_version = 90,
+          .next_version = 4,
+          .enabled_version = 3,
+          .switches = {{1, 100}, {2, 101}},
+          .members = {{HashName("r5"), 5}}};
 }
 
 }  // namespace cairn::server::testing

@@ -31,7 +31,7 @@ class WholeServer {
  public:
   static constexpr Generation kGeneration = 7;
 
-  // `journal`: the server takes up what its store holds, and stores its own state there. `saved`: the directory of
+  // `journal`: the server restores what its store holds, and stores its own state there. `saved`: the directory of
   // saved sites.
   explicit WholeServer(const ServerOptions& options = TestOptions(), Journal* journal = nullptr,
                        Generation generation = kGeneration, const std::filesystem::path& saved = {})

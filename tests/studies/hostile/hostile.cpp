@@ -1,5 +1,5 @@
 // cairn-study hostile sends mutated and generated datagrams, from three senders as fast as they can, to a cairnd and
-// two robots that stream: whether a process dies, what the guard drops, whether streams become deaf and how soon they
+// two robots that stream: whether a process dies, what the guard drops, whether streams stop and how soon they
 // flow again. Everything is on loopback in a domain of its own. Recording the traffic needs CAP_NET_RAW.
 // --seconds: of the long part (600); --runs: of the short ones (100).
 #include <algorithm>
@@ -41,7 +41,7 @@ class HostileFleet {
   }
 
   // What the server says of each robot: scans and odometry received, and whether it is stale. Nothing where it does not
-  // answer. Each answer comes to a process of its own, because nobody here should be heard by the senders.
+  // answer. Each answer comes to a process of its own, because the senders must not receive what these processes send.
   struct RobotFlow {
     std::uint64_t scans = 0;
     std::uint64_t odometry = 0;

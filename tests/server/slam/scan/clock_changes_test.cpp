@@ -16,7 +16,7 @@ using test::Pairing;
 using testing::ElementsAre;
 using testing::Pair;
 
-// A robot whose first stamp was a year ahead, before its clock was set, was not heard until the year was over.
+// A robot whose first stamp was a year ahead, before its clock was set, had its scans refused until the year was over.
 TEST(ClockChanges, AWrongFirstStampIsOvercomeByTheNextOnes) {
   constexpr Stamp kYear = 365 * 24 * 3600 * kSecond;
   for (const bool odometry_too : {false, true}) {

@@ -1,4 +1,4 @@
-// Keeps sites as files while the server runs, and takes them up again: the requests to list, save, load and delete. The
+// Saves sites as files while the server runs and loads them again: the requests to list, save, load and delete. The
 // files are NAME.site in one directory, and no name leads out of it. Each change of the store is one commit between two
 // of the journal, so a server that is killed meanwhile has done all of it or nothing. One request after the other; the
 // queue is bounded, and a request that finds it full is answered RESOURCE_EXHAUSTED at once.
@@ -20,7 +20,7 @@
 
 namespace cairn::server {
 
-class SiteShelf {
+class SavedSites {
  public:
   struct Rooms {
     Outbound& outbound;
@@ -31,8 +31,8 @@ class SiteShelf {
   };
 
   // `journal`: null, or `directory` empty, where nothing is stored: then every request is refused.
-  SiteShelf(std::filesystem::path directory, Journal* journal, const Rooms& rooms);
-  ~SiteShelf();
+  SavedSites(std::filesystem::path directory, Journal* journal, const Rooms& rooms);
+  ~SavedSites();
 
   void Start();
   // REQUIRES: the kind is one of the four.
@@ -50,7 +50,7 @@ class SiteShelf {
   Result<std::vector<SavedSite>> List() const;
   Result<std::vector<SavedSite>> Save(const Request& request);
   Result<void> Load(const Request& request);
-  Result<void> TakeUp(const SiteFileSummary& loaded);
+  Result<void> OpenLoaded(const SiteFileSummary& loaded);
   Result<void> Delete(const std::string& site);
   [[nodiscard]] Result<std::filesystem::path> PathOf(const std::string& name) const;
   // Calls `work` between two commits of the journal, and waits for it.

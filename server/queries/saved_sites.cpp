@@ -1,4 +1,4 @@
-#include "server/queries/site_shelf.h"
+#include "server/queries/saved_sites.h"
 
 #include <spdlog/spdlog.h>
 
@@ -45,31 +45,31 @@ SavedSite SavedAt(const std::filesystem::path& path) {
 
 }  // namespace
 
-SiteShelf::SiteShelf(std::filesystem::path directory, Journal* journal, const Rooms& rooms)
+SavedSites::SavedSites(std::filesystem::path directory, Journal* journal, const Rooms& rooms)
     : directory_(std::move(directory)), journal_(journal), rooms_(rooms) {}
 
-SiteShelf::~SiteShelf() {
+SavedSites::~SavedSites() {
   Stop();
 }
 
-void SiteShelf::Start() {
+void SavedSites::Start() {
   thread_ = std::jthread([this] {
     while (const auto request = requests_.Pop()) Serve(*request);
   });
 }
 
-void SiteShelf::Take(Request&& request) {
+void SavedSites::Take(Request&& request) {
   Reply busy = ReplyTo(request, {StatusCode::kResourceExhausted, "too many requests are waiting; try again later"});
   if (!requests_.TryPush(std::move(request))) rooms_.outbound.Send(std::move(busy));
 }
 
-void SiteShelf::Stop() {
+void SavedSites::Stop() {
   stopping_ = true;
   requests_.Close();
   if (thread_.joinable()) thread_.join();
 }
 
-void SiteShelf::Serve(const Request& request) {
+void SavedSites::Serve(const Request& request) {
   Reply reply = ReplyTo(request);
   try {
     auto answer = Answer(request);
@@ -85,7 +85,7 @@ void SiteShelf::Serve(const Request& request) {
   while (auto part = parts.Next()) rooms_.outbound.SendPatiently(*std::move(part));
 }
 
-Result<std::vector<SavedSite>> SiteShelf::Answer(const Request& request) {
+Result<std::vector<SavedSite>> SavedSites::Answer(const Request& request) {
   if (journal_ == nullptr || directory_.empty())
     return Fail(StatusCode::kFailedPrecondition, "the server keeps no state (--state none), so it has no saved sites");
   if (stopping_) return Fail(StatusCode::kUnavailable, "the server is stopping");
@@ -96,14 +96,14 @@ Result<std::vector<SavedSite>> SiteShelf::Answer(const Request& request) {
   return Delete(request.site).map(nothing);
 }
 
-Result<std::filesystem::path> SiteShelf::PathOf(const std::string& name) const {
+Result<std::filesystem::path> SavedSites::PathOf(const std::string& name) const {
   // A name has no separator and does not begin with a dot.
   if (auto valid = ValidateName("saved site", name); !valid) return tl::unexpected(valid.error());
   return directory_ / (name + kExtension);
 }
 
 template <typename Value>
-Result<Value> SiteShelf::Between(std::function<Result<Value>(Store&)> work) {
+Result<Value> SavedSites::Between(std::function<Result<Value>(Store&)> work) {
   const auto promise = std::make_shared<std::promise<Result<Value>>>();
   auto answer = promise->get_future();
   journal_->Between([promise, work = std::move(work)](Store& store) {
@@ -119,7 +119,7 @@ Result<Value> SiteShelf::Between(std::function<Result<Value>(Store&)> work) {
   return answer.get();
 }
 
-Result<std::vector<SavedSite>> SiteShelf::List() const {
+Result<std::vector<SavedSite>> SavedSites::List() const {
   std::vector<SavedSite> all;
   std::error_code error;
   for (auto entry = std::filesystem::directory_iterator(directory_, error);
@@ -131,7 +131,7 @@ Result<std::vector<SavedSite>> SiteShelf::List() const {
   return all;
 }
 
-Result<std::vector<SavedSite>> SiteShelf::Save(const Request& request) {
+Result<std::vector<SavedSite>> SavedSites::Save(const Request& request) {
   const auto path = PathOf(request.saved.empty() ? request.site : request.saved);
   if (!path) return tl::unexpected(path.error());
   std::error_code error;
@@ -142,7 +142,7 @@ Result<std::vector<SavedSite>> SiteShelf::Save(const Request& request) {
   return std::vector<SavedSite>{SavedAt(*path)};
 }
 
-Result<void> SiteShelf::Load(const Request& request) {
+Result<void> SavedSites::Load(const Request& request) {
   const auto path = PathOf(request.saved);
   if (!path) return tl::unexpected(path.error());
   const auto file = SurveySiteFile(*path);
@@ -163,24 +163,24 @@ Result<void> SiteShelf::Load(const Request& request) {
   options.first_job = rooms_.jobs.ReserveIds(file->last_job);
   const auto loaded =
       Between<SiteFileSummary>([path = *path, options](Store& store) { return ImportSite(store, path, options); });
-  auto taken = loaded ? TakeUp(*loaded) : Result<void>(tl::unexpected(loaded.error()));
+  auto taken = loaded ? OpenLoaded(*loaded) : Result<void>(tl::unexpected(loaded.error()));
   rooms_.atlas.Release(options.site);
   return taken;
 }
 
-Result<void> SiteShelf::TakeUp(const SiteFileSummary& loaded) {
+Result<void> SavedSites::OpenLoaded(const SiteFileSummary& loaded) {
   const std::string& site = loaded.site.name;
-  if (auto open = rooms_.atlas.TakeUp(site); !open) {
+  if (auto open = rooms_.atlas.OpenStored(site); !open) {
     const auto removed = Between<bool>(
         [site](Store& store) -> Result<bool> { return DeleteSite(store, site).map([] { return true; }); });
     if (!removed) spdlog::error("site '{}' is stored and not loaded: {}", site, removed.error().message);
     return open;
   }
-  const auto unfinished = rooms_.jobs.TakeUp({loaded.jobs.begin(), loaded.jobs.end()});
+  const auto unfinished = rooms_.jobs.AddStored({loaded.jobs.begin(), loaded.jobs.end()});
   if (!unfinished) spdlog::error("the jobs of site '{}' are not loaded: {}", site, unfinished.error().message);
   std::vector<SessionId> ids;
   for (const auto& [id, robot] : loaded.sessions) ids.push_back(id);
-  const std::size_t taken = rooms_.roster.TakeUp(ids);
+  const std::size_t taken = rooms_.roster.OpenStored(ids);
   if (unfinished) {
     for (const StoredJob& job : *unfinished) rooms_.worker.Requeue(job.job.id, job.enable);
   }
@@ -188,7 +188,7 @@ Result<void> SiteShelf::TakeUp(const SiteFileSummary& loaded) {
   return {};
 }
 
-Result<void> SiteShelf::Delete(const std::string& name) {
+Result<void> SavedSites::Delete(const std::string& name) {
   for (const Job& job : rooms_.jobs.OfSite(name)) {
     if (name.empty() || IsFinal(job.state)) continue;
     return Fail(StatusCode::kFailedPrecondition,
