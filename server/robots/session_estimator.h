@@ -54,7 +54,8 @@ class SessionEstimator {
   // After the last entry: what was drawn goes to the map.
   void Replayed();
   // Everything that the entries so far have made, as a function that makes its bytes, which may take long and run on
-  // any thread; nothing while something waits. Load takes it up before the first entry that follows it.
+  // any thread; nothing where the moment does not allow it (SessionRecord::Save). Load takes it up before the first
+  // entry that follows it.
   [[nodiscard]] std::function<std::string()> Save() const;
   [[nodiscard]] Result<void> Load(std::string_view bytes);
 
@@ -77,6 +78,7 @@ class SessionEstimator {
   slam::OccupancyGrid::Chunks PublishedChunks();
   void RefreshLandmarks(bool at_once);
   void Store(JournalEntry entry);
+  [[nodiscard]] SessionRecord::WaitingScans WaitingBySensor() const;
   void ReplayOdometry(const OdometryTaken& odometry);
   void AdoptGrid(std::uint32_t epoch, const RobotGrid& grid);
 

@@ -173,26 +173,32 @@ void SessionRecord::Durable(const std::vector<JournalEntry>& entries) {
 }
 
 template <typename Archive>
-void SessionRecord::Members(Archive& archive, auto& self) {
+void SessionRecord::Members(Archive& archive, auto& self, auto& odometry) {
   auto& pose = self.status_.pose;
   archive(self.status_.session.client, self.status_.session.session, pose.stamp, pose.scan_sequence, pose.T_map_robot,
           pose.covariance, pose.T_map_odom, pose.localized, pose.score, pose.reason, pose.map_epoch);
   archive.Require(pose.reason <= PoseReason::kWaiting, "the reason of a pose");
-  archive(self.odometry_.account, self.history_);
+  archive(odometry, self.history_);
 }
 
-bool SessionRecord::Save(slam::StateWriter& writer) const {
+bool SessionRecord::Save(slam::StateWriter& writer, const WaitingScans& in_estimator) const {
+  static const std::set<std::uint64_t> kNone;
   const MutexLock lock(mutex_);
-  bool idle = odometry_.account.idle();
-  for (const auto& [sensor_id, stream] : streams_) idle = idle && stream.account.idle();
-  if (!idle || status_.session.phase == SessionPhase::kEnded) return false;
+  if (status_.session.phase == SessionPhase::kEnded) return false;
   writer(static_cast<std::uint64_t>(streams_.size()));
-  for (const auto& [sensor_id, stream] : streams_) writer(stream.account.ledger().sensor, stream.account);
-  Members(writer, *this);
+  for (const auto& [sensor_id, stream] : streams_) {
+    const auto taken = in_estimator.find(sensor_id);
+    const auto account = stream.account.AsJournaled(taken == in_estimator.end() ? kNone : taken->second);
+    if (!account) return false;
+    writer(stream.account.ledger().sensor, *account);
+  }
+  const auto odometry = odometry_.account.AsJournaled(kNone);
+  if (!odometry) return false;
+  Members(writer, *this, *odometry);
   return true;
 }
 
-Result<void> SessionRecord::Load(slam::StateReader& reader) {
+Result<void> SessionRecord::Load(slam::StateReader& reader, const WaitingScans& in_estimator) {
   const MutexLock lock(mutex_);
   std::uint64_t sensors = 0;
   reader(sensors);
@@ -205,7 +211,11 @@ Result<void> SessionRecord::Load(slam::StateReader& reader) {
     stream.account = StreamLedger(NamesOf(sensor_id, sensor));
     reader(stream.account);
   }
-  if (reader.ok()) Members(reader, *this);
+  if (reader.ok()) Members(reader, *this, odometry_.account);
+  WaitingScans waiting;
+  for (const auto& [sensor_id, stream] : streams_)
+    if (!stream.account.waiting().empty()) waiting.emplace(sensor_id, stream.account.waiting());
+  reader.Require(waiting == in_estimator && odometry_.account.waiting().empty(), "account of what waits");
   if (!reader.ok()) return Fail(StatusCode::kDataLoss, std::string("a checkpoint holds a wrong ") + reader.failed());
   return {};
 }

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -59,10 +60,12 @@ class SessionRecord {
   bool SetStored(bool stored, const Status& why = {});
   // These entries of the session's journal are on the disk.
   void Durable(const std::vector<JournalEntry>& entries);
-  // The part of a checkpoint that is kept here, where nothing waits in any stream; false where something does.
-  [[nodiscard]] bool Save(slam::StateWriter& writer) const;
+  // Scans that wait in the estimator, by sensor: they are in the journal, those in the queue are not.
+  using WaitingScans = std::map<NameId, std::set<std::uint64_t>>;
+  // The part of a checkpoint that is kept here; false where the moment does not allow one (StreamLedger::AsJournaled).
+  [[nodiscard]] bool Save(slam::StateWriter& writer, const WaitingScans& in_estimator) const;
   // DATA_LOSS: the bytes are damaged; the record must then not be used.
-  [[nodiscard]] Result<void> Load(slam::StateReader& reader);
+  [[nodiscard]] Result<void> Load(slam::StateReader& reader, const WaitingScans& in_estimator);
   // Everything here was read from the disk; the robot is not back yet.
   void Restored();
   [[nodiscard]] std::vector<std::string> sensors() const;
@@ -102,7 +105,7 @@ class SessionRecord {
   };
   // Both callers hold the lock of `self`, which the analysis can not see.
   template <typename Archive>
-  static void Members(Archive& archive, auto& self) CAIRN_NO_THREAD_SAFETY_ANALYSIS;
+  static void Members(Archive& archive, auto& self, auto& odometry) CAIRN_NO_THREAD_SAFETY_ANALYSIS;
   bool LeftAside(Stream& stream, std::uint64_t sequence) const;
   Ledger NamesOf(NameId sensor_id, const std::string& sensor) const CAIRN_REQUIRES(mutex_);
   static bool IsDue(const Stream& stream, Clock::time_point now, Urgency urgency, Clock::duration period);

@@ -38,18 +38,23 @@ class StreamLedger {
   // A scan of someone else's client under this stream's name: counted, its number means nothing here.
   void DroppedForeign(DropReason reason);
 
-  // Nothing waits: the account can be part of a checkpoint.
-  [[nodiscard]] bool idle() const { return ledger_.waiting == 0; }
+  // The account as a checkpoint needs it, which holds what the journal does: of the waiting numbers only those in
+  // `taken` are in the journal. The others are taken back, as if they had never come, because the journal's later
+  // entries or the client bring them again. Nothing where that cannot be said exactly; a later moment will do.
+  [[nodiscard]] std::optional<StreamLedger> AsJournaled(const std::set<std::uint64_t>& taken) const;
+  [[nodiscard]] const std::set<std::uint64_t>& waiting() const { return waiting_; }
   // For checkpoints (slam/state/archive.h). The names, the latencies and what is on the disk are not part of it.
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     auto& ledger = self.ledger_;
     archive(ledger.received, ledger.used, ledger.keyframes, ledger.dropped, ledger.last_sequence,
-            ledger.settled_through, ledger.last_stamp, self.begun_, self.first_sequence_, self.settled_count_);
+            ledger.settled_through, ledger.last_stamp, self.begun_, self.first_sequence_, self.settled_count_,
+            self.waiting_);
     std::vector<std::uint64_t> gaps;  // First and last missing number of each.
     for (const auto& [first, last] : self.gaps_) gaps.insert(gaps.end(), {first, last});
     archive(gaps);
     if constexpr (Archive::kReads) {
+      ledger.waiting = self.waiting_.size();
       self.gaps_.clear();
       if (!archive.Require(gaps.size() % 2 == 0, "gaps of a stream")) return;
       for (std::size_t i = 0; i < gaps.size(); i += 2) self.gaps_.emplace(gaps[i], gaps[i + 1]);
@@ -77,6 +82,7 @@ class StreamLedger {
 
   void Advance(std::uint64_t sequence);
   bool FillGap(std::uint64_t sequence);
+  bool TakeBack(std::uint64_t sequence);
   void BeginAt(std::uint64_t sequence);
   void Settle(std::uint64_t sequence);
   void AdvanceDurable();
