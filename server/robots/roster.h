@@ -28,6 +28,8 @@
 
 namespace cairn::server {
 
+class RestoreMarks;
+
 class Roster {
  public:
   // Sessions draw the sites of the atlas; a robot that opens a session enters its site there.
@@ -39,7 +41,9 @@ class Roster {
 
   // The sessions of the servers before this one, taken up where their journals end, in parallel on the pool; the sites
   // must have been restored. Before anything else is called. FAILED_PRECONDITION: a newer server has written them. A
-  // session whose records are damaged is left out, with the reason in the log.
+  // session whose records are damaged is left out, with the reason in the log; its robot is told to open a new one. A
+  // session whose restoring ended servers before this one (RestoreMarks) is restored alone; after two deaths only its
+  // part of the map is, from its checkpoint; after three nothing.
   Result<void> Restore();
 
   // Opens, resumes, refuses or ends; the answer goes out as a SessionState.
@@ -61,10 +65,16 @@ class Roster {
   Result<void> Admit(const SessionRequest& request);
   Result<void> Resume(Session& session, const SessionRequest& request);
   Result<void> Open(const SessionRequest& request);
+  [[nodiscard]] std::string WhyNotRestored(const std::string& robot) const;
   std::shared_ptr<Session> Make(SessionId id, const SessionRequest& request, std::uint32_t map_epoch,
                                 const std::shared_ptr<Site>& site) const;
   Journal::Durable DurableFor(const std::shared_ptr<Session>& session) const;
-  Result<std::shared_ptr<Session>> RestoreOne(SessionId id);
+  Result<void> RestoreTogether(const std::vector<SessionId>& ids, RestoreMarks& marks);
+  Result<void> RestoreDoubted(SessionId id, RestoreMarks& marks);
+  Result<void> TakeUp(SessionId id, Result<std::shared_ptr<Session>> restored);
+  Result<std::shared_ptr<Session>> NotRestored(SessionId id, Status why);
+  Result<std::shared_ptr<Session>> RestoreOne(SessionId id, bool with_journal);
+  Result<std::shared_ptr<Session>> ReadBack(SessionId id, bool with_journal);
   // The session that has to be removed before this robot can have a new one; null where there is room.
   Result<std::shared_ptr<Session>> GivesWay(NameId robot_id) const CAIRN_REQUIRES(mutex_);
   void Refuse(const SessionRequest& request, Status status);
@@ -86,6 +96,7 @@ class Roster {
   std::deque<SessionRefusal> unsent_ CAIRN_GUARDED_BY(mutex_);           // Refusals the outbound lane had no room for.
   std::vector<std::shared_ptr<Session>> gone_ CAIRN_GUARDED_BY(mutex_);  // Removed, and not retired on the wire yet.
   SessionId next_id_ CAIRN_GUARDED_BY(mutex_) = 1;
+  std::map<std::string, std::string> not_restored_ CAIRN_GUARDED_BY(mutex_);  // By robot: why.
 };
 
 }  // namespace cairn::server

@@ -92,7 +92,8 @@ void Journal::Forget(std::uint64_t session) {
   const MutexLock lock(mutex_);
   lines_.erase(session);
   std::erase_if(checkpoints_, [session](const WantedCheckpoint& wanted) { return wanted.session == session; });
-  for (const RecordKind kind : {RecordKind::kSession, RecordKind::kJournal, RecordKind::kCheckpoint}) {
+  for (const RecordKind kind :
+       {RecordKind::kSession, RecordKind::kJournal, RecordKind::kCheckpoint, RecordKind::kRestoring}) {
     Push(AllOf(kind, session), 64);
   }
 }
@@ -145,7 +146,10 @@ void Journal::Run(const std::stop_token& stop) {
       if (writing_) writing_->AddTo(prepared.changes);
       if (!CommitPatiently(prepared.changes, stop)) return;
       Tell(prepared, oldest);
-      if (writing_ && writing_->complete()) EndCheckpoint();
+      if (writing_ && writing_->complete()) {
+        EndCheckpoint();
+        budget_checked_ = {};  // The journal before it may be removed now.
+      }
       KeepBudget();
     } catch (const std::exception& error) {  // For example, not enough memory for the group: the journal ends here.
       const MutexLock lock(mutex_);

@@ -5,67 +5,13 @@
 #include <filesystem>
 #include <map>
 
-#include "server/store/sqlite_store.h"
-#include "tests/server/support/whole_server.h"
+#include "tests/server/support/stored_server.h"
 #include "tests/temp_directory.h"
 
 namespace cairn::server::testing {
 namespace {
 
-constexpr ClientId kDriver = 7;
 constexpr int kSteps = 120;
-
-// A server with a store in a directory.
-class StoredServer {
- public:
-  explicit StoredServer(const std::filesystem::path& directory, ServerOptions options = TestOptions())
-      : store_(*OpenStore(directory)),
-        journal_(*store_, {.commit_delay_ms = 5}),
-        generation_(*NextGeneration(*store_, 1)),
-        house_(options, &journal_, generation_) {
-    journal_.Start();
-  }
-  ~StoredServer() {
-    house_.Stop();
-    journal_.Stop();
-  }
-  WholeServer* operator->() { return &house_; }
-
- private:
-  const std::unique_ptr<Store> store_;
-  Journal journal_;
-  const Generation generation_;
-  WholeServer house_;
-};
-
-// What a kill at this moment leaves.
-void CopyState(const std::filesystem::path& from, const std::filesystem::path& to) {
-  std::filesystem::create_directory(to);
-  for (const char* name : {"cairn.db", "cairn.db-wal"}) std::filesystem::copy_file(from / name, to / name);
-}
-
-Request About(RequestKind kind, const std::string& robot = "r1") {
-  Request request;
-  request.kind = kind;
-  request.site = "lab";
-  request.robot = robot;
-  return request;
-}
-
-Trajectory PathOf(WholeServer& house, const std::string& robot = "r1") {
-  return house.Ask(About(RequestKind::kPath, robot)).path;
-}
-
-bool SamePath(const Trajectory& a, const Trajectory& b) {
-  return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), [](const auto& x, const auto& y) {
-           return x.stamp == y.stamp && x.T_map_robot == y.T_map_robot;
-         });
-}
-
-std::uint64_t DurableScans(WholeServer& house) {
-  const Reply status = house.Ask(About(RequestKind::kStatus));
-  return status.robots.empty() || status.robots[0].ledgers.empty() ? 0 : status.robots[0].ledgers[0].durable_through;
-}
 
 // The same room without a kill.
 const Trajectory& UndisturbedPath() {
@@ -153,6 +99,44 @@ TEST(Restore, FromACheckpointThePathIsTheSameToTheLastBit) {
   EXPECT_EQ(status.robots[0].ledgers[0].received, 90U);
   EXPECT_EQ(status.robots[0].ledgers[0].durable_through, 90U);
   GoOn(*second.operator->(), 90, kSteps);
+  EXPECT_TRUE(SamePath(PathOf(*second.operator->()), UndisturbedPath()));
+  const Ledger after = second->LastLedger("r1");
+  EXPECT_EQ(after.received, static_cast<std::uint64_t>(kSteps));
+  EXPECT_EQ(after.used, static_cast<std::uint64_t>(kSteps));
+}
+
+// Some scan always waits for its odometry, so that the session is never without a waiting sample.
+TEST(Restore, ARobotWhoseOdometryLagsGetsCheckpointsToo) {
+  constexpr int kLag = 3;
+  const TempDirectory directory;
+  ServerOptions options = TestOptions();
+  options.robots.checkpoint_entries = 40;
+  {
+    StoredServer first(directory / "0", options);
+    first->Open("r1", kDriver);
+    for (int step = 0; step < 90; ++step) {
+      first->SendScan("r1", kDriver, RoomScan(step));
+      if (step < kLag) continue;
+      first->SendOdometry("r1", kDriver, RoomOdometry(step - kLag));
+      if (step % 8 == 0) first->WaitSettled("r1", static_cast<std::uint64_t>(step - kLag) + 1);
+    }
+    ASSERT_TRUE(first->WaitFor([&] { return DurableScans(*first.operator->()) == 90; }));
+    CopyState(directory / "0", directory / "1");
+  }
+  {
+    const auto store = *OpenStore(directory / "1");
+    const auto checkpoint = ReadCheckpoint(*store, 1);
+    ASSERT_TRUE(checkpoint && *checkpoint);
+    ASSERT_TRUE(store->Commit(
+        {.removed = {{.kind = RecordKind::kJournal, .owner = 1, .first = 0, .last = (*checkpoint)->position}},
+         .put = {}}));
+  }
+  StoredServer second(directory / "1", options);
+  const Reply status = second->Ask(About(RequestKind::kStatus));
+  ASSERT_EQ(status.robots.size(), 1U);
+  EXPECT_EQ(status.robots[0].ledgers[0].received, 90U);
+  EXPECT_EQ(status.robots[0].ledgers[0].waiting, static_cast<std::uint64_t>(kLag));
+  GoOn(*second.operator->(), 90 - kLag, kSteps);
   EXPECT_TRUE(SamePath(PathOf(*second.operator->()), UndisturbedPath()));
   const Ledger after = second->LastLedger("r1");
   EXPECT_EQ(after.received, static_cast<std::uint64_t>(kSteps));
