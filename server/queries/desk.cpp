@@ -22,13 +22,14 @@ Reply JobReply(const Request& request, Result<Job> job) {
 }  // namespace
 
 Desk::Desk(std::size_t capacity, Outbound& outbound, Roster& roster, Atlas& atlas, JobList& jobs, JobWorker& worker,
-           Generation generation)
+           Generation generation, const Journal* journal)
     : outbound_(outbound),
       roster_(roster),
       atlas_(atlas),
       jobs_(jobs),
       worker_(worker),
       generation_(generation),
+      journal_(journal),
       requests_(capacity) {}
 
 Desk::~Desk() {
@@ -82,8 +83,11 @@ std::optional<Reply> Desk::Answer(const Request& request) {
       return AnswerLandmarks(request, AllSessions(), MapOf(request.site));
     case RequestKind::kMapInfo:
       return AnswerMapInfo(request, request.site.empty() ? AllMaps() : MapOf(request.site));
-    case RequestKind::kStatus:
-      return AnswerStatus(request, request.robot.empty() ? AllSessions() : SessionOf(request.robot));
+    case RequestKind::kStatus: {
+      Reply reply = AnswerStatus(request, request.robot.empty() ? AllSessions() : SessionOf(request.robot));
+      if (reply.status.ok() && journal_ != nullptr) reply.status.message = journal_->health().reason;
+      return reply;
+    }
     case RequestKind::kJobSubmit:
       return JobReply(request, SubmitJob(request));
     case RequestKind::kJobGet:

@@ -18,13 +18,14 @@
 #include "server/outbound.h"
 #include "server/queries/answers.h"
 #include "server/robots/roster.h"
+#include "server/store/journal.h"
 
 namespace cairn::server {
 
 class Desk {
  public:
   Desk(std::size_t capacity, Outbound& outbound, Roster& roster, Atlas& atlas, JobList& jobs, JobWorker& worker,
-       Generation generation);
+       Generation generation, const Journal* journal = nullptr);
   ~Desk();
 
   void Start();
@@ -52,6 +53,7 @@ class Desk {
   JobList& jobs_;
   JobWorker& worker_;
   const Generation generation_;
+  const Journal* const journal_;  // Null where nothing is stored.
   BoundedChannel<Request> requests_;
   std::jthread thread_;  // The last member, because it uses the members above.
 };
