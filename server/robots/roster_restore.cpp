@@ -162,9 +162,12 @@ Result<std::shared_ptr<Session>> Roster::ReadBack(SessionId id, bool with_journa
         session->Replay(std::move(entry), switched);
         return {};
       });
-  if (!last) {
+  // Without the checkpoint and without any entry it would begin where the robot once stood.
+  const bool checkpoint_unused = position == 0 && (!checkpoint || *checkpoint);
+  if (!last || (checkpoint_unused && *last == 0)) {
     session->Disown();
-    return tl::unexpected(last.error());
+    if (!last) return tl::unexpected(last.error());
+    return Fail(StatusCode::kDataLoss, "its checkpoint cannot be used, and the journal before it was removed");
   }
   session->Replayed();
   journal_->Reopen(id, *last, DurableFor(session));

@@ -65,22 +65,26 @@ TEST(Restore, ASessionWithDamagedRecordsIsRefusedAndTheOthersComeBack) {
     EXPECT_EQ(second->Ask(About(RequestKind::kStatus, "")).robots.size(), 2U);
     EXPECT_EQ(PathOf(*second.operator->(), "r1").size(), 60U);
   }
-  {
-    const auto store = *OpenStore(directory / "1");
-    ASSERT_TRUE(store->Commit(
-        {.removed = {{.kind = RecordKind::kJournal, .owner = 1, .first = 0, .last = position}}, .put = {}}));
+  // The journal before it was removed, with or without anything after it.
+  for (const std::uint64_t last : {position, UINT64_MAX}) {
+    {
+      const auto store = *OpenStore(directory / "1");
+      ASSERT_TRUE(store->Commit(
+          {.removed = {{.kind = RecordKind::kJournal, .owner = 1, .first = 0, .last = last}}, .put = {}}));
+    }
+    StoredServer second(directory / "1", options);
+    const Reply status = second->Ask(About(RequestKind::kStatus, ""));
+    ASSERT_EQ(status.robots.size(), 1U);
+    EXPECT_EQ(status.robots[0].session.robot, "r2");
+    EXPECT_EQ(PathOf(*second.operator->(), "r2").size(), 60U);
+    // Its robot is told to open a new session, and why.
+    SayStarted(*second.operator->());
+    ASSERT_TRUE(second->WaitPhase("r1", kDriver, SessionPhase::kRefused));
+    const Status refused = second->LastState("r1", kDriver).status;
+    EXPECT_EQ(refused.code, StatusCode::kFailedPrecondition);
+    EXPECT_THAT(refused.message, ::testing::AnyOf(::testing::HasSubstr("misses entries"),
+                                                  ::testing::HasSubstr("the journal before it was removed")));
   }
-  StoredServer second(directory / "1", options);
-  const Reply status = second->Ask(About(RequestKind::kStatus, ""));
-  ASSERT_EQ(status.robots.size(), 1U);
-  EXPECT_EQ(status.robots[0].session.robot, "r2");
-  EXPECT_EQ(PathOf(*second.operator->(), "r2").size(), 60U);
-  // Its robot is told to open a new session, and why.
-  SayStarted(*second.operator->());
-  ASSERT_TRUE(second->WaitPhase("r1", kDriver, SessionPhase::kRefused));
-  const Status refused = second->LastState("r1", kDriver).status;
-  EXPECT_EQ(refused.code, StatusCode::kFailedPrecondition);
-  EXPECT_NE(refused.message.find("misses entries"), std::string::npos) << refused.message;
 }
 
 // Reading the journal of one session ends the process, as a scan would that the estimator can not survive.
@@ -159,7 +163,7 @@ TEST(Restore, ASessionWhoseJournalEndsTheServerDoesSoTwiceAndTheOthersComeBack) 
       return {};
     };
     EXPECT_TRUE(store->Read({.kind = RecordKind::kLayer, .owner = HashName("lab")}, take));
-    EXPECT_GE(chunks, 4U);
+    EXPECT_GE(chunks, 2U);
   }
   StoredServer second(directory / "0", options);
   const Reply status = second->Ask(About(RequestKind::kStatus, ""));

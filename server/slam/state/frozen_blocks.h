@@ -33,9 +33,10 @@ class FrozenBlocks {
     std::shared_ptr<const Block> rest;
     archive(blocks_, rest);
     values.clear();
+    if (!archive.ok()) return;
     for (const auto& block : blocks_)
       if (archive.Require(block->values.size() == kBlock, "a block")) Append(*block, values);
-    if (archive.ok()) Append(*rest, values);
+    Append(*rest, values);
   }
 
  private:

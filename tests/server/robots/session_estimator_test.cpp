@@ -30,6 +30,7 @@ class SessionEstimatorTest : public ::testing::Test {
   }
   void Drive(int first, int last) {
     for (int step = first; step < last; ++step) {
+      EXPECT_TRUE(record_.OdometryReceived(RoomOdometry(step).sequence));
       estimator_.Handle(OdometryOf("r1", RoomOdometry(step)));
       HandleScan(RoomScan(step));
     }
@@ -204,6 +205,8 @@ TEST_F(SessionEstimatorTest, ACheckpointHoldsWhatWaitsInTheEstimatorAndNotWhatWa
       other.Handle(ScanOf("r1", RoomScan(step)));
       estimator_.Handle(ScanOf("r1", RoomScan(step)));
     }
+    EXPECT_TRUE(record.OdometryReceived(RoomOdometry(step).sequence));
+    EXPECT_TRUE(record_.OdometryReceived(RoomOdometry(step).sequence));
     other.Handle(OdometryOf("r1", RoomOdometry(step)));
     estimator_.Handle(OdometryOf("r1", RoomOdometry(step)));
   }
