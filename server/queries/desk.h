@@ -19,13 +19,14 @@
 #include "server/queries/request_queue.h"
 #include "server/queries/site_shelf.h"
 #include "server/robots/roster.h"
+#include "server/store/journal.h"
 
 namespace cairn::server {
 
 class Desk {
  public:
   Desk(std::size_t capacity, Outbound& outbound, Roster& roster, Atlas& atlas, JobList& jobs, JobWorker& worker,
-       SiteShelf& shelf, Generation generation);
+       SiteShelf& shelf, Generation generation, const Journal* journal = nullptr);
   ~Desk();
 
   void Start();
@@ -56,6 +57,7 @@ class Desk {
   JobWorker& worker_;
   SiteShelf& shelf_;
   const Generation generation_;
+  const Journal* const journal_;  // Null if nothing is stored.
   RequestQueue requests_;
   std::jthread thread_;  // The last member, because it uses the members above.
 };
