@@ -44,7 +44,7 @@ Server::Server(const ServerOptions& options, Inbound& inbound, Outbound& outboun
           [this](const Job& job, bool enable, const JobControl& control) { return smooth_.Run(job, enable, control); }),
       saved_sites_(saved, journal, {outbound, roster_, atlas_, jobs_, worker_}),
       desk_(static_cast<std::size_t>(options.server.query_queue), outbound, roster_, atlas_, jobs_, worker_,
-            saved_sites_, generation),
+            saved_sites_, generation, journal),
       heartbeat_(
           std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(options.server.stall_limit_s))) {}
 

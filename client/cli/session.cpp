@@ -6,11 +6,13 @@ namespace cairn::client {
 namespace {
 
 ExitCode ShowStatus(Program& program, const std::string& robot) {
-  const auto robots = program.Ask([&](QueryClient& server) { return server.Robots(robot); });
-  if (!robots) return program.Refuse(robots.error());
-  std::string text = robots->empty() ? "no robot yet\n" : "";
-  for (const RobotStatus& status : *robots) text += FormatRobot(status);
-  return program.Print(text, {{"robots", *robots}});
+  const auto answer = program.Ask([&](QueryClient& server) { return server.ServerStatus(robot); });
+  if (!answer) return program.Refuse(answer.error());
+  std::string text;
+  if (!answer->degraded.empty()) text += "DEGRADED, new data is not stored: " + answer->degraded + "\n";
+  if (answer->robots.empty()) text += "no robot yet\n";
+  for (const RobotStatus& status : answer->robots) text += FormatRobot(status);
+  return program.Print(text, {{"robots", answer->robots}, {"degraded", answer->degraded}});
 }
 
 ExitCode EndSession(Program& program, const std::string& robot) {

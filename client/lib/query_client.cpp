@@ -201,8 +201,14 @@ Result<PathAnswer> QueryClient::Path(const std::string& robot, bool smoothed) {
   return Ask(request).map([](Reply&& reply) { return PathAnswer{std::move(reply.path), reply.map_epoch}; });
 }
 
+Result<StatusAnswer> QueryClient::ServerStatus(const std::string& robot) {
+  return Ask(AboutRobot(RequestKind::kStatus, robot)).map([](Reply&& reply) {
+    return StatusAnswer{std::move(reply.robots), std::move(reply.status.message)};
+  });
+}
+
 Result<std::vector<RobotStatus>> QueryClient::Robots(const std::string& robot) {
-  return Ask(AboutRobot(RequestKind::kStatus, robot)).map([](Reply&& reply) { return std::move(reply.robots); });
+  return ServerStatus(robot).map([](StatusAnswer&& answer) { return std::move(answer.robots); });
 }
 
 Result<void> QueryClient::EndSession(const std::string& robot) {

@@ -28,6 +28,11 @@ struct QueryClientOptions {
   double timeout_s = 2.0;  // How long each method waits for its answer.
 };
 
+struct StatusAnswer {
+  std::vector<RobotStatus> robots;
+  std::string degraded;  // Why new data is not stored; empty if it is, or if the server stores nothing.
+};
+
 struct PathAnswer {
   Trajectory poses;             // In the site's map frame, by increasing stamp.
   std::uint32_t map_epoch = 0;  // The map's epoch that the poses belong to.
@@ -67,7 +72,9 @@ class QueryClient {
   [[nodiscard]] Result<PoseReport> Pose(const std::string& robot, std::optional<Stamp> at = {});
   // All poses so far, or those of the smoothing job whose map is enabled (kFailedPrecondition if there is none).
   [[nodiscard]] Result<PathAnswer> Path(const std::string& robot, bool smoothed = false);
-  // Session, newest pose and ledgers of all robots, or of one (kNotFound if the server does not know it).
+  // Session, newest pose and ledgers of all robots, or of one (kNotFound if the server does not know it), and the state
+  // of the server itself.
+  [[nodiscard]] Result<StatusAnswer> ServerStatus(const std::string& robot = "");
   [[nodiscard]] Result<std::vector<RobotStatus>> Robots(const std::string& robot = "");
   // Ends the robot's session for good.
   [[nodiscard]] Result<void> EndSession(const std::string& robot);

@@ -22,7 +22,7 @@ Reply JobReply(const Request& request, Result<Job> job) {
 }  // namespace
 
 Desk::Desk(std::size_t capacity, Outbound& outbound, Roster& roster, Atlas& atlas, JobList& jobs, JobWorker& worker,
-           SavedSites& saved_sites, Generation generation)
+           SavedSites& saved_sites, Generation generation, const Journal* journal)
     : outbound_(outbound),
       roster_(roster),
       atlas_(atlas),
@@ -30,6 +30,7 @@ Desk::Desk(std::size_t capacity, Outbound& outbound, Roster& roster, Atlas& atla
       worker_(worker),
       saved_sites_(saved_sites),
       generation_(generation),
+      journal_(journal),
       requests_(capacity) {}
 
 Desk::~Desk() {
@@ -100,8 +101,11 @@ std::optional<Answer> Desk::AnswerTo(const Request& request) {
       return AnswerLandmarks(request, AllSessions(), MapOf(request.site));
     case RequestKind::kMapInfo:
       return AnswerMapInfo(request, request.site.empty() ? AllMaps() : MapOf(request.site));
-    case RequestKind::kStatus:
-      return AnswerStatus(request, request.robot.empty() ? AllSessions() : SessionOf(request.robot));
+    case RequestKind::kStatus: {
+      Reply reply = AnswerStatus(request, request.robot.empty() ? AllSessions() : SessionOf(request.robot));
+      if (reply.status.ok() && journal_ != nullptr) reply.status.message = journal_->health().reason;
+      return reply;
+    }
     case RequestKind::kJobSubmit:
       return JobReply(request, SubmitJob(request));
     case RequestKind::kJobGet:

@@ -19,13 +19,14 @@
 #include "server/queries/request_queue.h"
 #include "server/queries/saved_sites.h"
 #include "server/robots/roster.h"
+#include "server/store/journal.h"
 
 namespace cairn::server {
 
 class Desk {
  public:
   Desk(std::size_t capacity, Outbound& outbound, Roster& roster, Atlas& atlas, JobList& jobs, JobWorker& worker,
-       SavedSites& saved_sites, Generation generation);
+       SavedSites& saved_sites, Generation generation, const Journal* journal = nullptr);
   ~Desk();
 
   void Start();
@@ -56,6 +57,7 @@ class Desk {
   JobWorker& worker_;
   SavedSites& saved_sites_;
   const Generation generation_;
+  const Journal* const journal_;  // Null if nothing is stored.
   RequestQueue requests_;
   std::jthread thread_;  // The last member, because it uses the members above.
 };

@@ -87,11 +87,17 @@ Result<void> Roster::Admit(const SessionRequest& request) {
     return {};
   }
   if (request.started) {
-    return Fail(StatusCode::kFailedPrecondition,
-                "the server does not know this session of '" + request.robot + "'; open a new one");
+    return Fail(StatusCode::kFailedPrecondition, "the server does not know this session of '" + request.robot +
+                                                     "'; open a new one" + WhyNotRestored(request.robot));
   }
   if (session == nullptr || session->record().phase() == SessionPhase::kEnded) return Open(request);
   return Resume(*session, request);
+}
+
+std::string Roster::WhyNotRestored(const std::string& robot) const {
+  const MutexLock lock(mutex_);
+  const auto found = not_restored_.find(robot);
+  return found == not_restored_.end() ? std::string() : " (" + found->second + ")";
 }
 
 Result<void> Roster::Resume(Session& session, const SessionRequest& request) {

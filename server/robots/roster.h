@@ -31,6 +31,8 @@
 
 namespace cairn::server {
 
+class RestoreMarks;
+
 class Roster {
  public:
   // Sessions draw the sites of the atlas; a robot that opens a session enters its site there.
@@ -42,7 +44,9 @@ class Roster {
 
   // Restores the sessions of earlier servers from their checkpoints and journals, in parallel on the pool. REQUIRES:
   // the sites were restored before, and no other function was called. FAILED_PRECONDITION: a newer server has written
-  // the records. A session whose records are damaged is left out, and the reason is logged.
+  // the records. A session whose records are damaged is left out, the reason is logged, and its robot is told to open a
+  // new one. A session during whose restoring earlier servers ended (RestoreMarks) is restored alone; after two such
+  // ends only its part of the map is restored, from its checkpoint; after three, nothing.
   Result<void> Restore();
 
   // Sessions that are loaded while the server runs. `first` of so many numbers that no other session gets.
@@ -76,12 +80,18 @@ class Roster {
   Result<void> Admit(const SessionRequest& request);
   Result<void> Resume(Session& session, const SessionRequest& request);
   Result<void> Open(const SessionRequest& request);
+  [[nodiscard]] std::string WhyNotRestored(const std::string& robot) const;
   std::shared_ptr<Session> Make(SessionId id, const SessionRequest& request, std::uint32_t map_epoch,
                                 const std::shared_ptr<Site>& site) const;
   Journal::Durable DurableFor(const std::shared_ptr<Session>& session) const;
   using Restored = std::vector<Result<std::shared_ptr<Session>>>;
   Restored RestoreEach(const std::vector<SessionId>& ids);
-  Result<std::shared_ptr<Session>> RestoreOne(SessionId id);
+  Result<void> RestoreTogether(const std::vector<SessionId>& ids, RestoreMarks& marks);
+  Result<void> RestoreDoubtful(SessionId id, RestoreMarks& marks);
+  Result<void> Register(SessionId id, Result<std::shared_ptr<Session>> restored);
+  Result<std::shared_ptr<Session>> NotRestored(SessionId id, Status why);
+  Result<std::shared_ptr<Session>> RestoreOne(SessionId id, bool with_journal);
+  Result<std::shared_ptr<Session>> ReadBack(SessionId id, bool with_journal);
   // The session that has to be removed before this robot can have a new one; null if there is room.
   Result<std::shared_ptr<Session>> GivesWay(NameId robot_id) const CAIRN_REQUIRES(mutex_);
   void Refuse(const SessionRequest& request, Status status);
@@ -103,6 +113,7 @@ class Roster {
   std::deque<SessionRefusal> unsent_ CAIRN_GUARDED_BY(mutex_);           // Refusals not sent yet: the lane was full.
   std::vector<std::shared_ptr<Session>> gone_ CAIRN_GUARDED_BY(mutex_);  // Removed sessions whose keys are not retired.
   SessionId next_id_ CAIRN_GUARDED_BY(mutex_) = 1;
+  std::map<std::string, std::string> not_restored_ CAIRN_GUARDED_BY(mutex_);  // By robot: why.
 };
 
 }  // namespace cairn::server

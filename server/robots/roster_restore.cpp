@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/robots/roster.h"
+#include "server/store/restore_marks.h"
 
 namespace cairn::server {
 namespace {
@@ -22,6 +23,14 @@ Result<StoredSession> ReadSession(Store& store, SessionId id) {
   return session;
 }
 
+constexpr std::uint32_t kDeathsWithJournal = 2;     // After so many the journal is left out,
+constexpr std::uint32_t kDeathsWithCheckpoint = 3;  // and after so many the checkpoint as well.
+
+// What a server that is not sure to survive its start says of a session.
+std::string AfterDeaths(std::uint32_t deaths) {
+  return "the server ended " + std::to_string(deaths) + " times while it restored this session";
+}
+
 }  // namespace
 
 Roster::Restored Roster::RestoreEach(const std::vector<SessionId>& ids) {
@@ -29,11 +38,7 @@ Roster::Restored Roster::RestoreEach(const std::vector<SessionId>& ids) {
   std::latch done(static_cast<std::ptrdiff_t>(ids.size()));
   for (std::size_t i = 0; i < ids.size(); ++i) {
     asio::post(pool_, [&, i] {
-      try {
-        sessions[i] = RestoreOne(ids[i]);
-      } catch (const std::exception& error) {
-        sessions[i] = Fail(StatusCode::kInternal, error.what());
-      }
+      sessions[i] = RestoreOne(ids[i], true);
       done.count_down();
     });
   }
@@ -45,26 +50,86 @@ Result<void> Roster::Restore() {
   if (journal_ == nullptr) return {};
   const auto ids = journal_->store().Owners(RecordKind::kSession);
   if (!ids) return tl::unexpected(ids.error());
+  auto marks = RestoreMarks::Read(journal_->store());
+  if (!marks) return tl::unexpected(marks.error());
   const auto begin = std::chrono::steady_clock::now();
-  const Restored sessions = RestoreEach(*ids);
-  const MutexLock lock(mutex_);
-  for (const auto& site : atlas_.All()) next_id_ = std::max(next_id_, site->last_layer() + 1);
-  for (std::size_t i = 0; i < ids->size(); ++i) {
-    next_id_ = std::max(next_id_, (*ids)[i] + 1);
-    if (!sessions[i]) {
-      if (sessions[i].error().code == StatusCode::kFailedPrecondition) return tl::unexpected(sessions[i].error());
-      spdlog::error("session {} is not restored: {}", (*ids)[i], sessions[i].error().message);
-      continue;
+  std::vector<SessionId> doubtful, others;
+  {
+    const MutexLock lock(mutex_);
+    for (const auto& site : atlas_.All()) next_id_ = std::max(next_id_, site->last_layer() + 1);
+    for (const SessionId id : *ids) {
+      next_id_ = std::max(next_id_, id + 1);
+      (marks->deaths(id) == 0 ? others : doubtful).push_back(id);
     }
-    const std::shared_ptr<Session>& session = *sessions[i];
-    const SessionState state = session->record().state();
-    // A later session of the same robot takes the place of an earlier one, whose part of the map stays.
-    sessions_.insert_or_assign(state.robot_id, session);
-    if (const auto site = atlas_.Find(state.site)) site->Join(state.robot_id, session->id(), session);
+  }
+  if (auto restored = RestoreTogether(others, *marks); !restored) return restored;
+  // One of these may have ended the server before. One at a time, so that it alone is marked when it does so again.
+  for (const SessionId id : doubtful) {
+    if (auto restored = RestoreDoubtful(id, *marks); !restored) return restored;
   }
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
-  spdlog::info("{} sessions restored in {:.2f} s", sessions_.size(), took.count());
+  spdlog::info("{} sessions restored in {:.2f} s", All().size(), took.count());
   return {};
+}
+
+Result<void> Roster::RestoreTogether(const std::vector<SessionId>& ids, RestoreMarks& marks) {
+  if (auto marked = marks.Begin(ids); !marked) return marked;
+  Restored sessions = RestoreEach(ids);
+  if (auto unmarked = marks.Succeeded(ids); !unmarked) return unmarked;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    if (auto registered = Register(ids[i], std::move(sessions[i])); !registered) return registered;
+  }
+  return {};
+}
+
+Result<void> Roster::RestoreDoubtful(SessionId id, RestoreMarks& marks) {
+  const std::uint32_t deaths = marks.deaths(id);
+  if (deaths >= kDeathsWithCheckpoint)
+    return Register(id, NotRestored(id, {StatusCode::kAborted, AfterDeaths(deaths)}));
+  if (auto marked = marks.Begin({id}); !marked) return marked;
+  const bool with_journal = deaths < kDeathsWithJournal;
+  auto session = RestoreOne(id, with_journal);
+  if (auto unmarked = marks.Succeeded({id}); !unmarked) return unmarked;
+  if (with_journal || !session) return Register(id, std::move(session));
+  // The robot has moved on since the checkpoint, and what it did is left out: it starts a new session. This one's part
+  // of the map stays, as that of any session that is gone.
+  return Register(id, NotRestored(id, {StatusCode::kAborted, AfterDeaths(deaths) + "; its newest data is left out"}));
+}
+
+// Makes the session known, or the reason why it is not.
+Result<void> Roster::Register(SessionId id, Result<std::shared_ptr<Session>> restored) {
+  if (!restored) {
+    if (restored.error().code == StatusCode::kFailedPrecondition) return tl::unexpected(restored.error());
+    spdlog::error("session {} is not restored: {}", id, restored.error().message);
+    return {};
+  }
+  const MutexLock lock(mutex_);
+  const std::shared_ptr<Session>& session = *restored;
+  const SessionState state = session->record().state();
+  // A later session of the same robot takes the place of an earlier one, whose part of the map stays.
+  const auto [known, first] = sessions_.try_emplace(state.robot_id, session);
+  if (!first && known->second->id() > id) return {};
+  known->second = session;
+  if (const auto site = atlas_.Find(state.site)) site->Join(state.robot_id, session->id(), session);
+  return {};
+}
+
+// So that the robot can be told why it must open a new session.
+Result<std::shared_ptr<Session>> Roster::NotRestored(SessionId id, Status why) {
+  if (const auto stored = ReadSession(journal_->store(), id)) {
+    const MutexLock lock(mutex_);
+    not_restored_[stored->request.robot] = why.message;
+  }
+  return tl::unexpected(std::move(why));
+}
+
+Result<std::shared_ptr<Session>> Roster::RestoreOne(SessionId id, bool with_journal) {
+  try {
+    auto restored = ReadBack(id, with_journal);
+    return restored ? std::move(restored) : NotRestored(id, restored.error());
+  } catch (const std::exception& error) {
+    return NotRestored(id, {StatusCode::kInternal, error.what()});
+  }
 }
 
 SessionId Roster::ReserveIds(std::uint64_t count) {
@@ -132,7 +197,7 @@ Result<std::shared_ptr<Site>> Roster::RemoveSite(const std::string& name) {
   return site;
 }
 
-Result<std::shared_ptr<Session>> Roster::RestoreOne(SessionId id) {
+Result<std::shared_ptr<Session>> Roster::ReadBack(SessionId id, bool with_journal) {
   const auto stored = ReadSession(journal_->store(), id);
   if (!stored) return tl::unexpected(stored.error());
   Result<std::shared_ptr<Site>> site = atlas_.Find(stored->request.site);
@@ -146,7 +211,10 @@ Result<std::shared_ptr<Session>> Roster::RestoreOne(SessionId id) {
   std::shared_ptr<Session> session = make();
   const auto checkpoint = ReadCheckpoint(journal_->store(), id);
   std::uint64_t position = 0;
-  if (checkpoint && *checkpoint) {
+  if (!checkpoint) {
+    // The whole journal, where it is still there, does as well.
+    spdlog::warn("the checkpoint of session {} is not used: {}", id, checkpoint.error().message);
+  } else if (*checkpoint) {
     if (const auto loaded = session->Load((*checkpoint)->bytes)) {
       position = (*checkpoint)->position;
     } else {
@@ -160,14 +228,21 @@ Result<std::shared_ptr<Session>> Roster::RestoreOne(SessionId id) {
   const auto switched = [&site](std::uint32_t epoch, std::uint64_t generation) {
     return (*site)->Switched(epoch, generation);
   };
+  if (!with_journal) {
+    session->Replayed();
+    return session;
+  }
   const auto last =
       ReadJournal(journal_->store(), id, position, [&](std::uint64_t, JournalEntry&& entry) -> Result<void> {
         session->Replay(std::move(entry), switched);
         return {};
       });
-  if (!last) {
+  // Without the checkpoint and without any entry it would begin where the robot once stood.
+  const bool checkpoint_unused = position == 0 && (!checkpoint || *checkpoint);
+  if (!last || (checkpoint_unused && *last == 0)) {
     session->KeepStored();
-    return tl::unexpected(last.error());
+    if (!last) return tl::unexpected(last.error());
+    return Fail(StatusCode::kDataLoss, "its checkpoint cannot be used, and the journal before it was removed");
   }
   session->Replayed();
   journal_->Reopen(id, *last, DurableFor(session));

@@ -31,6 +31,8 @@ Session::~Session() {
   if (outputs_.gone && !keep_stored_) outputs_.gone();
 }
 
+// What is settled here, away from the strand, goes into the record first and into the journal after it: a checkpoint
+// between the two then holds more than the journal up to its position, and the entry is ignored when it is read.
 bool Session::Take(ScanArrival&& arrival) {
   const NameId sensor = arrival.stream.sensor_id;
   const std::uint64_t sequence = arrival.scan->sequence;
@@ -43,14 +45,14 @@ bool Session::Take(ScanArrival&& arrival) {
   if (kind != SessionRecord::Arrival::kNew) return kind != SessionRecord::Arrival::kUnknownSensor;
   if (ending_ || arrival.refused) {
     const DropReason reason = arrival.refused.value_or(DropReason::kSessionEnded);
-    Store(ScanRefused{arrival.stream, sequence, reason});
     record_.ScanDropped(sensor, sequence, reason);
+    Store(ScanRefused{arrival.stream, sequence, reason});
     PublishLedgers(SessionRecord::Urgency::kWhenDue);
     return true;
   }
   if (const auto displaced = queue_.Push(std::move(arrival))) {
-    Store(ScanRefused{displaced->stream, displaced->scan->sequence, DropReason::kQueueFull});
     record_.ScanDropped(displaced->stream.sensor_id, displaced->scan->sequence, DropReason::kQueueFull);
+    Store(ScanRefused{displaced->stream, displaced->scan->sequence, DropReason::kQueueFull});
   }
   Schedule();
   return true;
@@ -60,13 +62,13 @@ void Session::Take(OdometryArrival&& arrival) {
   const std::uint64_t sequence = arrival.odometry.sequence;
   if (arrival.stream.session != record_.token() || !record_.OdometryReceived(sequence)) return;
   if (arrival.refused || ending_) {
-    Store(OdometryTaken{arrival.stream, arrival.odometry, OdometryUse::kRefused});
     record_.OdometryDropped(sequence, arrival.refused ? DropReason::kBadGeometry : DropReason::kSessionEnded);
+    Store(OdometryTaken{arrival.stream, arrival.odometry, OdometryUse::kRefused});
     return;
   }
   if (const auto merged = queue_.Push(std::move(arrival))) {
-    Store(OdometryTaken{merged->stream, merged->odometry, OdometryUse::kMerged});
     record_.OdometryDropped(merged->odometry.sequence, DropReason::kQueueFull);
+    Store(OdometryTaken{merged->stream, merged->odometry, OdometryUse::kMerged});
   }
   Schedule();
 }
@@ -207,7 +209,7 @@ void Session::Drain() {
     handling_ = false;
   }
   const bool drained = queue_.empty();
-  if (drained) Throws([this] { TakeCheckpoint(); });
+  Throws([this] { TakeCheckpoint(); });
   Throws([&] { PublishLedgers(drained ? SessionRecord::Urgency::kDrained : SessionRecord::Urgency::kWhenDue); });
   scheduled_ = false;
   // An event that came between the last Pop and the line above found `scheduled_` set and relies on this turn.
@@ -215,11 +217,12 @@ void Session::Drain() {
 }
 
 void Session::TakeCheckpoint() {
-  if (failed_ || !outputs_.position || !outputs_.checkpoint) return;
+  // What a session drops at its end is not in the journal.
+  if (failed_ || ending_ || !outputs_.position || !outputs_.checkpoint) return;
   const std::uint64_t position = outputs_.position();
   if (position < checkpointed_ + outputs_.checkpoint_entries) return;
   auto bytes = estimator_.Save();
-  // Samples that arrived meanwhile are in the record, but perhaps not in the journal before this position.
+  // Samples that were settled meanwhile are in the record, but perhaps not in the journal before this position.
   if (!bytes || outputs_.position() != position) return;
   if (outputs_.checkpoint(position, std::move(bytes))) checkpointed_ = position;
 }

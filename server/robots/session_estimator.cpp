@@ -151,9 +151,12 @@ void SessionEstimator::ReplayOdometry(const OdometryTaken& odometry) {
 
 std::function<std::string()> SessionEstimator::Save() const {
   auto writer = std::make_shared<slam::StateWriter>();
-  if (ended_ || !waiting_.empty()) return nullptr;
-  (*writer)(epoch_, session_);
-  if (!record_.Save(*writer)) return nullptr;
+  if (ended_) return nullptr;
+  // The scans themselves are saved by the pipeline, in the same order.
+  std::vector<NameId> waiting;
+  pipeline_.ForEachWaiting([&](const Scan& scan) { waiting.push_back(waiting_.at(&scan).sensor_id); });
+  (*writer)(epoch_, session_, waiting);
+  if (!record_.Save(*writer, WaitingBySensor())) return nullptr;
   return [writer, pipeline = std::make_shared<const slam::Checkpoint>(pipeline_.Save())] {
     const std::string own = writer->Bytes();
     std::string bytes;
@@ -170,9 +173,22 @@ Result<void> SessionEstimator::Load(std::string_view bytes) {
   // The estimator is loaded first: if that fails, nothing has changed.
   if (auto loaded = pipeline_.Load(bytes.substr(8 + size)); !loaded) return loaded;
   slam::StateReader reader(bytes.substr(8, size));
-  reader(epoch_, session_);
-  if (auto loaded = record_.Load(reader); !loaded) return loaded;
-  return {};
+  std::vector<NameId> waiting;
+  reader(epoch_, session_, waiting);
+  waiting_.clear();
+  std::size_t next = 0;
+  pipeline_.ForEachWaiting([&](const Scan& scan) {
+    if (reader.Require(next < waiting.size(), "number of waiting scans"))
+      waiting_.emplace(&scan, Waiting{waiting[next++], scan.sequence, Clock::now()});
+  });
+  reader.Require(next == waiting.size(), "number of waiting scans");
+  return record_.Load(reader, WaitingBySensor());
+}
+
+SessionRecord::WaitingScans SessionEstimator::WaitingBySensor() const {
+  SessionRecord::WaitingScans waiting;
+  for (const auto& [scan, one] : waiting_) waiting[one.sensor_id].insert(one.sequence);
+  return waiting;
 }
 
 void SessionEstimator::Replayed() {

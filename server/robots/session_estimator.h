@@ -56,7 +56,8 @@ class SessionEstimator {
   // Called after the last entry: gives the drawn grid to the map.
   void Replayed();
   // Saves the state after the entries so far. The result is a function that makes the bytes; it may take long and may
-  // run on any thread. Empty while a sample waits. Load restores this state; then the entries that follow are replayed.
+  // run on any thread. Empty if the moment does not allow a checkpoint (SessionRecord::Save). Load restores this state;
+  // then the entries that follow are replayed.
   [[nodiscard]] std::function<std::string()> Save() const;
   [[nodiscard]] Result<void> Load(std::string_view bytes);
 
@@ -79,6 +80,7 @@ class SessionEstimator {
   slam::OccupancyGrid::Chunks PublishedChunks();
   void RefreshLandmarks(bool at_once);
   void Store(JournalEntry entry);
+  [[nodiscard]] SessionRecord::WaitingScans WaitingBySensor() const;
   void ReplayOdometry(const OdometryTaken& odometry);
   void AdoptGrid(std::uint32_t epoch, const RobotGrid& grid);
 

@@ -175,61 +175,6 @@ void SessionRecord::Durable(const std::vector<JournalEntry>& entries) {
   }
 }
 
-template <typename Archive>
-void SessionRecord::Members(Archive& archive, auto& self) {
-  auto& pose = self.status_.pose;
-  archive(self.status_.session.client, self.status_.session.session, pose.stamp, pose.scan_sequence, pose.T_map_robot,
-          pose.covariance, pose.T_map_odom, pose.localized, pose.score, pose.reason, pose.map_epoch);
-  archive.Require(pose.reason <= PoseReason::kWaiting, "the reason of a pose");
-  archive(self.odometry_.account, self.history_);
-}
-
-bool SessionRecord::Save(slam::StateWriter& writer) const {
-  const MutexLock lock(mutex_);
-  bool idle = odometry_.account.idle();
-  for (const auto& [sensor_id, stream] : streams_) idle = idle && stream.account.idle();
-  if (!idle || status_.session.phase == SessionPhase::kEnded) return false;
-  writer(static_cast<std::uint64_t>(streams_.size()));
-  for (const auto& [sensor_id, stream] : streams_) writer(stream.account.ledger().sensor, stream.account);
-  Members(writer, *this);
-  return true;
-}
-
-Result<void> SessionRecord::Load(slam::StateReader& reader) {
-  const MutexLock lock(mutex_);
-  std::uint64_t sensors = 0;
-  reader(sensors);
-  reader.Require(sensors <= kMaxSensors, "the number of sensors");
-  for (std::uint64_t i = 0; i < sensors && reader.ok(); ++i) {
-    std::string sensor;
-    reader(sensor);
-    const NameId sensor_id = HashName(sensor);
-    Stream& stream = streams_[sensor_id];
-    stream.account = StreamLedger(NamesOf(sensor_id, sensor));
-    reader(stream.account);
-  }
-  if (reader.ok()) Members(reader, *this);
-  if (!reader.ok()) return Fail(StatusCode::kDataLoss, std::string("a checkpoint holds a wrong ") + reader.failed());
-  return {};
-}
-
-void SessionRecord::Restored() {
-  const MutexLock lock(mutex_);
-  status_.session.durable = true;
-  status_.alive = false;
-  if (status_.session.phase != SessionPhase::kEnded) {
-    status_.session.phase = SessionPhase::kSuspended;
-    status_.session.status = {StatusCode::kUnavailable, "the server was started again, and the robot is not back yet"};
-    suspended_ = Clock::now();
-  }
-  const auto restore = [](Stream& stream) {
-    stream.account.Restored();
-    stream.resuming = stream.changed = true;
-  };
-  for (auto& [sensor_id, stream] : streams_) restore(stream);
-  restore(odometry_);
-}
-
 std::vector<std::string> SessionRecord::sensors() const {
   const MutexLock lock(mutex_);
   std::vector<std::string> names;

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -60,11 +61,13 @@ class SessionRecord {
   bool SetStored(bool stored, const Status& why = {});
   // These entries of the session's journal are on the disk.
   void Durable(const std::vector<JournalEntry>& entries);
-  // Writes the record's part of a checkpoint. Returns false if a sample waits in any stream; then there can be no
-  // checkpoint.
-  [[nodiscard]] bool Save(slam::StateWriter& writer) const;
+  // Scans that wait in the estimator, by sensor. They are in the journal; those that wait in the queue are not.
+  using WaitingScans = std::map<NameId, std::set<std::uint64_t>>;
+  // Writes the record's part of a checkpoint. Returns false if the moment does not allow a checkpoint
+  // (StreamLedger::AsJournaled).
+  [[nodiscard]] bool Save(slam::StateWriter& writer, const WaitingScans& in_estimator) const;
   // DATA_LOSS: the bytes are damaged; the record must then not be used.
-  [[nodiscard]] Result<void> Load(slam::StateReader& reader);
+  [[nodiscard]] Result<void> Load(slam::StateReader& reader, const WaitingScans& in_estimator);
   // Called after the record was read from the disk, while the robot is not connected yet.
   void Restored();
   [[nodiscard]] std::vector<std::string> sensors() const;
@@ -108,7 +111,7 @@ class SessionRecord {
   };
   // Both callers hold the lock of `self`. The thread-safety analysis cannot see that.
   template <typename Archive>
-  static void Members(Archive& archive, auto& self) CAIRN_NO_THREAD_SAFETY_ANALYSIS;
+  static void Members(Archive& archive, auto& self, auto& odometry) CAIRN_NO_THREAD_SAFETY_ANALYSIS;
   bool LeftAside(Stream& stream, std::uint64_t sequence) const;
   Ledger NamesOf(NameId sensor_id, const std::string& sensor) const CAIRN_REQUIRES(mutex_);
   static bool IsDue(const Stream& stream, Clock::time_point now, Urgency urgency, Clock::duration period);

@@ -1,6 +1,7 @@
 #include "server/robots/stream_ledger.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace cairn::server {
@@ -118,6 +119,38 @@ bool StreamLedger::FillGap(std::uint64_t sequence) {
   if (first < sequence) gaps_.emplace(first, sequence - 1);
   if (sequence < last) gaps_.emplace(sequence + 1, last);
   if (sequence > first_sequence_) --Count(ledger_, DropReason::kLostOnWire);
+  return true;
+}
+
+std::optional<StreamLedger> StreamLedger::AsJournaled(const std::set<std::uint64_t>& taken) const {
+  // Samples without a number, or of an earlier client, wait as well.
+  if (ledger_.waiting != waiting_.size() || !std::ranges::includes(waiting_, taken)) return std::nullopt;
+  StreamLedger account = *this;
+  for (auto number = waiting_.rbegin(); number != waiting_.rend(); ++number) {
+    if (!taken.contains(*number) && !account.TakeBack(*number)) return std::nullopt;
+  }
+  return account;
+}
+
+// The reverse of Received. REQUIRES: it waits, and no later number that is to be taken back does.
+bool StreamLedger::TakeBack(std::uint64_t sequence) {
+  if (sequence <= first_sequence_ || gaps_.size() >= kMaxGaps) return false;
+  --ledger_.received;
+  --ledger_.waiting;
+  waiting_.erase(sequence);
+  if (sequence < ledger_.last_sequence) {
+    gaps_.emplace(sequence, sequence);
+    ++Count(ledger_, DropReason::kLostOnWire);
+    return true;
+  }
+  --ledger_.last_sequence;
+  if (!gaps_.empty() && gaps_.rbegin()->second == ledger_.last_sequence) {
+    const auto [first, last] = *gaps_.rbegin();
+    Count(ledger_, DropReason::kLostOnWire) -= last - first + 1;
+    ledger_.last_sequence = first - 1;
+    gaps_.erase(std::prev(gaps_.end()));
+  }
+  ledger_.settled_through = std::min(ledger_.settled_through, ledger_.last_sequence);
   return true;
 }
 

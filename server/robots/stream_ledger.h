@@ -39,18 +39,24 @@ class StreamLedger {
   // A sample that another client sent under this stream's name. It is counted; its number is ignored.
   void DroppedForeign(DropReason reason);
 
-  // Whether no sample waits. Only then a checkpoint can contain this ledger.
-  [[nodiscard]] bool idle() const { return ledger_.waiting == 0; }
+  // The ledger as a checkpoint must contain it, which has to agree with the journal. Of the numbers that wait only
+  // those in `journaled` are in the journal. The others are removed, as if they had never arrived, because later
+  // entries of the journal or the client bring them again. Nothing if this is not possible exactly; the caller tries
+  // again later.
+  [[nodiscard]] std::optional<StreamLedger> AsJournaled(const std::set<std::uint64_t>& journaled) const;
+  [[nodiscard]] const std::set<std::uint64_t>& waiting() const { return waiting_; }
   // For checkpoints (slam/state/archive.h). Names, latencies and durability are not part of a checkpoint.
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     auto& ledger = self.ledger_;
     archive(ledger.received, ledger.used, ledger.keyframes, ledger.dropped, ledger.last_sequence,
-            ledger.settled_through, ledger.last_stamp, self.begun_, self.first_sequence_, self.settled_count_);
+            ledger.settled_through, ledger.last_stamp, self.begun_, self.first_sequence_, self.settled_count_,
+            self.waiting_);
     std::vector<std::uint64_t> gaps;  // First and last missing number of each gap.
     for (const auto& [first, last] : self.gaps_) gaps.insert(gaps.end(), {first, last});
     archive(gaps);
     if constexpr (Archive::kReads) {
+      ledger.waiting = self.waiting_.size();
       self.gaps_.clear();
       if (!archive.Require(gaps.size() % 2 == 0, "gaps of a stream")) return;
       for (std::size_t i = 0; i < gaps.size(); i += 2) self.gaps_.emplace(gaps[i], gaps[i + 1]);
@@ -78,6 +84,7 @@ class StreamLedger {
 
   void Advance(std::uint64_t sequence);
   bool FillGap(std::uint64_t sequence);
+  bool TakeBack(std::uint64_t sequence);
   void BeginAt(std::uint64_t sequence);
   void Settle(std::uint64_t sequence);
   void AdvanceDurable();

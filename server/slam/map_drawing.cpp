@@ -28,6 +28,7 @@ void MapDrawing::StartAgain(std::size_t keyframes) {
 void MapDrawing::Begin(std::span<const Keyframe> keyframes, const SharedSequence<Pose2>& path) {
   StartAgain(keyframes.size());
   path_ = path.values();
+  frozen_path_.Forget();
   DrawOnto(grid_, keyframes.back(), path_.back());
 }
 
@@ -39,6 +40,7 @@ void MapDrawing::Continue(std::span<const Keyframe> keyframes, const SharedSeque
   grid_.ReplaceBy(std::move(redraw_->grid));
   redraw_.reset();
   path_ = path.values();
+  frozen_path_.Forget();
 }
 
 void MapDrawing::Finish(std::span<const Keyframe> keyframes, const SharedSequence<Pose2>& path) {

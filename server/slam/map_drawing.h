@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "server/slam/grid/occupancy_grid.h"
+#include "server/slam/state/frozen_blocks.h"
 #include "server/slam/trail/keyframe.h"
 #include "server/slam/trail/shared_sequence.h"
 
@@ -46,7 +47,8 @@ class MapDrawing {
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     bool redrawing = self.redrawing();
-    archive(self.grid_, self.path_, redrawing, self.changed_at_);
+    InBlocks(archive, self.frozen_path_, self.path_);
+    archive(self.grid_, redrawing, self.changed_at_);
     if constexpr (Archive::kReads) {
       self.redraw_.reset();
       if (redrawing) self.redraw_.emplace(Redraw{OccupancyGrid(self.grid_.options()), 0});
@@ -62,8 +64,9 @@ class MapDrawing {
 
   OccupancyGrid grid_;
   std::vector<Pose2> path_;
-  std::optional<Redraw> redraw_;  // The new map, while it is being drawn after a change of the path.
-  std::size_t changed_at_ = 0;    // Number of keyframes when the path changed.
+  FrozenBlocks<Pose2> frozen_path_;  // For checkpoints.
+  std::optional<Redraw> redraw_;     // The new map, while it is being drawn after a change of the path.
+  std::size_t changed_at_ = 0;       // Number of keyframes when the path changed.
 };
 
 }  // namespace cairn::slam

@@ -29,7 +29,7 @@ struct Mapper::State {
       : options(given),
         front_end(given.front_end, MakeMatcher(given.matcher, given.matching)),
         blind(given.blind, given.front_end.use_odometry, given.lost_after_m),
-        trail(given.filter.back_end.drift),
+        trail(given.filter.back_end.drift, given.front_end.surface),
         revisits(given.revisit, given.front_end.refine),
         filter(MakeFilter(given.filter.kind, given.filter, T_map_robot_start, seed)),
         loops(given.loop, given.front_end.refine),
@@ -269,12 +269,11 @@ void Mapper::Save(StateWriter& archive) const {
   state_->filter->Save(archive);
 }
 
-void Mapper::Load(StateReader& archive, const ParallelFor& parallel_for) {
+void Mapper::Load(StateReader& archive) {
   auto loaded = std::make_unique<State>(state_->options, Pose2{}, 0);
   archive(*loaded);
   if (archive.ok()) loaded->filter->Load(archive);
   if (!archive.ok() || !archive.Require(loaded->IsConsistent(), "the paths")) return;
-  loaded->trail.RestorePoints(loaded->options.front_end.surface, parallel_for);
   state_ = std::move(loaded);
 }
 

@@ -71,7 +71,7 @@ class Mapper {
   // Writes the whole state, and replaces it by one of a mapper with the same options (state/archive.h). If reading
   // fails, nothing changes.
   void Save(StateWriter& archive) const;
-  void Load(StateReader& archive, const ParallelFor& parallel_for);
+  void Load(StateReader& archive);
 
  private:
   struct State;

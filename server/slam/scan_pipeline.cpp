@@ -49,7 +49,7 @@ Result<void> ScanPipeline::Load(std::string_view bytes) {
   if (!state) return tl::unexpected(state.error());
   StateReader archive(*state);
   Mapper mapper(options_, {}, 0);
-  mapper.Load(archive, parallel_for_);
+  mapper.Load(archive);
   // The pairing is read twice, at first into one that is not used, so that a failure changes nothing.
   StateReader again = archive;
   OdometryPairing trial(options_.pairing, {});

@@ -39,6 +39,13 @@ class ScanPipeline {
   // Ends the streams: scans that still wait for odometry are used or dropped.
   void Finish();
 
+  // Calls visit(scan) for every scan that waits for odometry or for its clock to be believed, in an order that saving
+  // and loading keep.
+  template <typename Visit>
+  void ForEachWaiting(const Visit& visit) const {
+    pairing_.ForEachWaiting(visit);
+  }
+
   // The whole state, so that a pipeline with the same options that loads it goes on exactly as this one would: the same
   // poses, maps and random numbers. Takes a few milliseconds: what only grows (scans) is shared with the checkpoint,
   // and the time is spent in Checkpoint::Bytes, which may run on another thread.

@@ -108,7 +108,8 @@ void Journal::Between(Work work) {
 void Journal::Forget(std::uint64_t session) {
   const MutexLock lock(mutex_);
   CloseLocked(session);
-  for (const RecordKind kind : {RecordKind::kSession, RecordKind::kJournal, RecordKind::kCheckpoint}) {
+  for (const RecordKind kind :
+       {RecordKind::kSession, RecordKind::kJournal, RecordKind::kCheckpoint, RecordKind::kRestoring}) {
     Push(AllOf(kind, session), 64);
   }
 }
@@ -163,7 +164,10 @@ void Journal::Run(const std::stop_token& stop) {
       if (writing_) writing_->AddTo(prepared.changes);
       if (!CommitPatiently(prepared.changes, stop)) return;
       Tell(prepared, oldest);
-      if (writing_ && writing_->complete()) EndCheckpoint();
+      if (writing_ && writing_->complete()) {
+        EndCheckpoint();
+        budget_checked_ = {};  // The journal before it may be removed now.
+      }
       for (const Work& work : works) work(store_);
       KeepBudget();
     } catch (const std::exception& error) {  // For example, not enough memory for the group: the journal ends here.

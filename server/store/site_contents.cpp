@@ -91,7 +91,8 @@ Result<SiteContents> ReadSite(Store& store, const std::string& name) {
 std::vector<RecordRange> RangesOfSession(std::uint64_t session) {
   return {{.kind = RecordKind::kSession, .owner = session},
           {.kind = RecordKind::kCheckpoint, .owner = session},
-          {.kind = RecordKind::kJournal, .owner = session}};
+          {.kind = RecordKind::kJournal, .owner = session},
+          {.kind = RecordKind::kRestoring, .owner = session}};
 }
 
 std::vector<RecordRange> RangesOf(const SiteContents& contents) {

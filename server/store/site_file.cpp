@@ -90,6 +90,7 @@ class Survey {
       case RecordKind::kJob:
         return TakeJob(record);
       case RecordKind::kServer:
+      case RecordKind::kRestoring:
         break;
     }
     return Unreadable("a record of another kind");
@@ -265,6 +266,7 @@ Result<SiteFileSummary> WriteSiteFile(Store& store, const std::string& site, con
   if (auto begun = writer.Append(std::string(kMagic) + BytesOfNumber(kSiteFileFormat)); !begun)
     return tl::unexpected(begun.error());
   for (const RecordRange& range : RangesOf(*contents)) {
+    if (range.kind == RecordKind::kRestoring) continue;  // It says something about this server only.
     const auto write = [&](std::uint64_t number, std::string_view bytes) -> Result<void> {
       const Record record{{range.kind, range.owner, number}, std::string(bytes)};
       if (auto taken = survey.Take(record); !taken) return taken;

@@ -53,6 +53,7 @@ class Renaming {
         return Journal(std::move(record));
       case RecordKind::kCheckpoint:
       case RecordKind::kServer:
+      case RecordKind::kRestoring:
         break;
     }
     record.key.owner = Session(record.key.owner);

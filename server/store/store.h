@@ -27,6 +27,7 @@ enum class RecordKind : std::uint8_t {
   kMapVersion = 5,  // Owner: HashName of the site; number: the version.
   kLayer = 6,       // Owner: HashName of the site; number: session id.
   kJob = 7,         // Owner: job id.
+  kRestoring = 8,   // Owner: session id; number 0.
 };
 
 struct RecordKey {

@@ -162,13 +162,23 @@ std::string SeedOfServer(int scans) {
   pipeline.Save(saved);
   server::SessionRecord record(5, server::testing::SampleSession(5).request, {});
   slam::StateWriter writer;
-  writer(std::uint32_t{3}, std::uint64_t{kTokenBefore});
   Must(record.AddSensors({"laser"}), "a session with a sensor");
   for (std::uint64_t sequence = 1; sequence <= 2; ++sequence) {
     static_cast<void>(record.ScanReceived(HashName("laser"), sequence));
-    record.ScanUsed(HashName("laser"), {}, static_cast<Stamp>(10 * sequence), true, 1.0);
+    PoseReport pose;
+    pose.scan_sequence = sequence;
+    record.ScanUsed(HashName("laser"), pose, static_cast<Stamp>(10 * sequence), true, 1.0);
   }
-  Must(record.Save(writer), "the account of a session");
+  std::vector<NameId> waiting;
+  server::SessionRecord::WaitingScans numbers;
+  pipeline.ForEachWaiting([&](const Scan&) {
+    waiting.push_back(HashName("laser"));
+    const std::uint64_t sequence = 2 + waiting.size();
+    static_cast<void>(record.ScanReceived(HashName("laser"), sequence));
+    numbers[HashName("laser")].insert(sequence);
+  });
+  writer(std::uint32_t{3}, std::uint64_t{kTokenBefore}, waiting);
+  Must(record.Save(writer, numbers), "the account of a session");
   return std::string(1, static_cast<char>(kServer)) + Piece(writer.Bytes()) + StateOf(saved);
 }
 

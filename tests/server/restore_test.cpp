@@ -11,31 +11,7 @@
 namespace cairn::server::testing {
 namespace {
 
-constexpr ClientId kDriver = 7;
 constexpr int kSteps = 120;
-
-// What a kill at this moment leaves.
-void CopyState(const std::filesystem::path& from, const std::filesystem::path& to) {
-  std::filesystem::create_directory(to);
-  for (const char* name : {"cairn.db", "cairn.db-wal"}) std::filesystem::copy_file(from / name, to / name);
-}
-
-Request About(RequestKind kind, const std::string& robot = "r1") {
-  Request request;
-  request.kind = kind;
-  request.site = "lab";
-  request.robot = robot;
-  return request;
-}
-
-Trajectory PathOf(WholeServer& house, const std::string& robot = "r1") {
-  return house.Ask(About(RequestKind::kPath, robot)).path;
-}
-
-std::uint64_t DurableScans(WholeServer& house) {
-  const Reply status = house.Ask(About(RequestKind::kStatus));
-  return status.robots.empty() || status.robots[0].ledgers.empty() ? 0 : status.robots[0].ledgers[0].durable_through;
-}
 
 // The same room without a kill.
 const Trajectory& UndisturbedPath() {
@@ -123,6 +99,44 @@ TEST(Restore, FromACheckpointThePathIsTheSameToTheLastBit) {
   EXPECT_EQ(status.robots[0].ledgers[0].received, 90U);
   EXPECT_EQ(status.robots[0].ledgers[0].durable_through, 90U);
   GoOn(*second.operator->(), 90, kSteps);
+  EXPECT_TRUE(SamePath(PathOf(*second.operator->()), UndisturbedPath()));
+  const Ledger after = second->LastLedger("r1");
+  EXPECT_EQ(after.received, static_cast<std::uint64_t>(kSteps));
+  EXPECT_EQ(after.used, static_cast<std::uint64_t>(kSteps));
+}
+
+// Some scan always waits for its odometry, so that the session is never without a waiting sample.
+TEST(Restore, ARobotWhoseOdometryLagsGetsCheckpointsToo) {
+  constexpr int kLag = 3;
+  const TempDirectory directory;
+  ServerOptions options = TestOptions();
+  options.robots.checkpoint_entries = 40;
+  {
+    StoredServer first(directory / "0", options);
+    first->Open("r1", kDriver);
+    for (int step = 0; step < 90; ++step) {
+      first->SendScan("r1", kDriver, RoomScan(step));
+      if (step < kLag) continue;
+      first->SendOdometry("r1", kDriver, RoomOdometry(step - kLag));
+      if (step % 8 == 0) first->WaitSettled("r1", static_cast<std::uint64_t>(step - kLag) + 1);
+    }
+    ASSERT_TRUE(first->WaitFor([&] { return DurableScans(*first.operator->()) == 90; }));
+    CopyState(directory / "0", directory / "1");
+  }
+  {
+    const auto store = *OpenStore(directory / "1");
+    const auto checkpoint = ReadCheckpoint(*store, 1);
+    ASSERT_TRUE(checkpoint && *checkpoint);
+    ASSERT_TRUE(store->Commit(
+        {.removed = {{.kind = RecordKind::kJournal, .owner = 1, .first = 0, .last = (*checkpoint)->position}},
+         .put = {}}));
+  }
+  StoredServer second(directory / "1", options);
+  const Reply status = second->Ask(About(RequestKind::kStatus));
+  ASSERT_EQ(status.robots.size(), 1U);
+  EXPECT_EQ(status.robots[0].ledgers[0].received, 90U);
+  EXPECT_EQ(status.robots[0].ledgers[0].waiting, static_cast<std::uint64_t>(kLag));
+  GoOn(*second.operator->(), 90 - kLag, kSteps);
   EXPECT_TRUE(SamePath(PathOf(*second.operator->()), UndisturbedPath()));
   const Ledger after = second->LastLedger("r1");
   EXPECT_EQ(after.received, static_cast<std::uint64_t>(kSteps));

@@ -2,6 +2,8 @@
 // server that nobody killed. `cairn-study kills` does the same a thousand times.
 #include <gtest/gtest.h>
 
+#include <csignal>
+
 #include "tests/child_process.h"
 #include "tests/system/killed_fleet.h"
 #include "tests/temp_directory.h"
@@ -28,6 +30,35 @@ TEST(Kill, TwentyKillsChangeNothing) {
   EXPECT_EQ(outcome.wrongly_localized, 0U);
   EXPECT_EQ(outcome.paths_that_differ, 0);
   EXPECT_GT(outcome.poses, 300U);
+}
+
+// The disk is full for this process: no file of its may grow beyond a limit (setrlimit(2), RLIMIT_FSIZE).
+TEST(Kill, WithoutSpaceOnTheDiskItIsDegradedSaysSoAndEndsWithThree) {
+  const TempDirectory directory;
+  const std::string domain = std::to_string(TestDomain());
+  const std::string command = "trap '' XFSZ; ulimit -f 300; exec '" + std::string(CAIRND_PATH) + "' --domain " +
+                              domain + " --set slam.particles=20 --state '" + (directory / "state").string() + "'";
+  ChildProcess server({"/bin/bash", "-c", command});
+  ASSERT_TRUE(server.Says(" ready"));
+  ChildProcess robots({CAIRN_PATH, "sim", "--site", "office", "--world", "office", "--robots", "1", "--beams", "181",
+                       "--hz", "20", "--seconds", "60", "--domain", domain, "--json"});
+  ASSERT_TRUE(server.Says("degraded, new data is not stored"));
+  const auto status = ChildProcess({CAIRN_PATH, "status", "--domain", domain, "--json"}).Wait();
+  EXPECT_EQ(status.exit_code, 0);
+  EXPECT_NE(status.output.find("\"degraded\":\"cannot write to the store"), std::string::npos) << status.output;
+  // Poses go on.
+  EXPECT_TRUE(robots.RunningAfter(std::chrono::milliseconds(0)));
+  server.Signal(SIGTERM);
+  const auto outcome = server.Wait();
+  EXPECT_EQ(outcome.exit_code, 3) << outcome.output;
+  EXPECT_NE(outcome.output.find("stopped while degraded"), std::string::npos) << outcome.output;
+  // With space again, what was durable before is there.
+  ChildProcess next(
+      {CAIRND_PATH, "--domain", domain, "--set", "slam.particles=20", "--state", (directory / "state").string()});
+  ASSERT_TRUE(next.Says(" ready"));
+  const auto after = ChildProcess({CAIRN_PATH, "status", "--domain", domain, "--json"}).Wait();
+  EXPECT_NE(after.output.find("\"degraded\":\"\""), std::string::npos) << after.output;
+  EXPECT_NE(after.output.find("\"robots\":[{"), std::string::npos) << after.output;
 }
 
 TEST(Kill, ASecondServerOnTheSameStateEndsWithOneAndSaysSo) {

@@ -71,6 +71,7 @@ void ErrorEnsemble::LoseAncestors(Errors& errors, double share, int partner) con
 
 void ErrorEnsemble::Rebase(std::size_t keyframes, const Pose2& T_map_robot, const Eigen::Matrix3d& covariance) {
   path_.assign(keyframes, std::make_shared<const Kept>());
+  frozen_path_.Forget();
   robot_.setZero();
   Disturb(T_map_robot, covariance);
 }

@@ -27,6 +27,7 @@
 #include "server/slam/fastslam/motion_sampler.h"
 #include "server/slam/landmarks/innovation.h"
 #include "server/slam/random/resampling.h"
+#include "server/slam/state/frozen_blocks.h"
 
 namespace cairn::slam {
 
@@ -58,7 +59,8 @@ class ErrorEnsemble {
 
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
-    archive(self.rng_, self.robot_, self.path_);
+    archive(self.rng_, self.robot_);
+    InBlocks(archive, self.frozen_path_, self.path_);
     if constexpr (Archive::kReads) archive.Require(self.path_.size() == archive.keyframes(), "the errors of the path");
   }
 
@@ -88,6 +90,7 @@ class ErrorEnsemble {
   Rng rng_;
   Errors robot_ = Errors::Zero();
   std::vector<std::shared_ptr<const Kept>> path_;  // Immutable, so that a checkpoint shares them.
+  FrozenBlocks<std::shared_ptr<const Kept>> frozen_path_;
 };
 
 template <int N>

@@ -54,7 +54,8 @@ class FastSlam final : public Filter {
   void Load(StateReader& archive) override { archive(*this); }
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
-    archive(self.candidates_, self.index_, self.set_, self.maps_, self.contradictions_);
+    Later maps{self.maps_};
+    archive(self.candidates_, self.index_, self.set_, maps, self.contradictions_);
     bool sound = self.maps_.size() == self.set_.size() && self.candidates_.slots() <= self.index_.size();
     for (const Map& map : self.maps_) sound = sound && map.size() <= self.index_.size();
     archive.Require(sound, "the maps of the particles");

@@ -114,7 +114,8 @@ class ParticleSet {
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     const std::size_t count = self.size();
-    archive(self.rng_, self.particles_, self.errors_, self.spread_share_, self.best_, self.travelled_, self.sample_due_,
+    Later particles{self.particles_};
+    archive(self.rng_, particles, self.errors_, self.spread_share_, self.best_, self.travelled_, self.sample_due_,
             self.effective_, self.nis_, self.estimate_);
     archive.Require(self.size() == count && self.best_ < count, "the particles");
   }

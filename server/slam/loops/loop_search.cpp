@@ -153,8 +153,8 @@ std::optional<LoopClosure> LoopSearch::Compare(const Trail& trail, std::size_t o
   const Stretch recent_stretch = StretchAround(shapes, now, kStretchM);
   if (old >= recent_stretch.first) return std::nullopt;  // This is the present place, not an old one.
   const Stretch old_stretch = StretchAround(shapes.first(recent_stretch.first), old, kStretchM);
-  const std::vector<SurfacePoint> recent = SurfacesOf(shapes, recent_stretch, 2.0 * kSearchCellM);
-  const std::vector<SurfacePoint> before = SurfacesOf(shapes, old_stretch, 0.5 * kSearchCellM);
+  const std::vector<SurfacePoint> recent = SurfacesOf(trail, recent_stretch, 2.0 * kSearchCellM);
+  const std::vector<SurfacePoint> before = SurfacesOf(trail, old_stretch, 0.5 * kSearchCellM);
   if (recent.size() < 20 || before.size() < 20) return std::nullopt;
 
   const LikelihoodPyramid pyramid(before, kSearchCellM, kLikelihoodReachM, kLevels);

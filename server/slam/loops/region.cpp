@@ -29,10 +29,10 @@ Stretch StretchAround(std::span<const KeyframeShape> shapes, std::size_t centre,
   return stretch;
 }
 
-std::vector<SurfacePoint> SurfacesOf(std::span<const KeyframeShape> shapes, const Stretch& stretch, double cell_m) {
+std::vector<SurfacePoint> SurfacesOf(const Trail& trail, const Stretch& stretch, double cell_m) {
   std::vector<SurfacePoint> surfaces;
   std::unordered_set<std::int64_t> taken;
-  ForEachSurface(shapes, stretch, [&](const SurfacePoint& surface) {
+  ForEachSurface(trail, stretch, [&](const SurfacePoint& surface) {
     const auto x = static_cast<std::int64_t>(std::floor(surface.p.x() / cell_m));
     const auto y = static_cast<std::int64_t>(std::floor(surface.p.y() / cell_m));
     if (taken.insert((x << 32) ^ (y & 0xffffffff)).second) surfaces.push_back(surface);

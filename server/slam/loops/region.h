@@ -31,18 +31,18 @@ struct Stretch {
 // Calls visit(point) for every surface point of the stretch, in the frame of the anchor and in the order of
 // the keyframes.
 template <typename Visit>
-void ForEachSurface(std::span<const KeyframeShape> shapes, const Stretch& stretch, const Visit& visit) {
+void ForEachSurface(const Trail& trail, const Stretch& stretch, const Visit& visit) {
+  const std::span<const KeyframeShape> shapes = trail.shapes();
   for (std::size_t k = stretch.first; k <= stretch.last; ++k) {
     const Pose2 T_anchor_k = Between(shapes[stretch.anchor].T_track_robot, shapes[k].T_track_robot);
     const Eigen::Matrix2d R = T_anchor_k.rotation();
-    for (const SurfacePoint& point : shapes[k].points)
+    for (const SurfacePoint& point : trail.points(k))
       visit(SurfacePoint{R * point.p + T_anchor_k.translation(), R * point.normal});
   }
 }
 
 // Returns the surface points of the stretch, one per cell of `cell_m`, in the order of the keyframes.
-[[nodiscard]] std::vector<SurfacePoint> SurfacesOf(std::span<const KeyframeShape> shapes, const Stretch& stretch,
-                                                   double cell_m);
+[[nodiscard]] std::vector<SurfacePoint> SurfacesOf(const Trail& trail, const Stretch& stretch, double cell_m);
 
 // An old keyframe that a search may use; those of the lowest cost come first.
 struct KeyframeCost {

@@ -63,7 +63,7 @@ std::optional<RevisitObservation> RevisitSearch::Find(std::span<const SurfacePoi
   const Hypothesis best = filter.hypothesis(0);
   const std::optional<std::size_t> centre = NearestKeyframe(best, trail, travelled_m, options_);
   if (!centre) return std::nullopt;
-  BuildReference(trail.shapes(), *centre);
+  BuildReference(trail, *centre);
   const Eigen::Matrix3d prior = PoseCovariance(kGuessSigmaM, kGuessSigmaRad);
   const auto align = [&](const Hypothesis& belief) {
     const Pose2 guess = Between(belief.path[*centre], belief.T_map_robot);
@@ -96,11 +96,11 @@ MatchResult RevisitSearch::AlignFromOthers(const Filter& filter,
   return best;
 }
 
-void RevisitSearch::BuildReference(std::span<const KeyframeShape> shapes, std::size_t centre) {
+void RevisitSearch::BuildReference(const Trail& trail, std::size_t centre) {
   reference_.Clear();
   const auto reach = static_cast<std::size_t>(options_.neighbours);
-  const Stretch around{centre > reach ? centre - reach : 0, std::min(shapes.size() - 1, centre + reach), centre};
-  ForEachSurface(shapes, around, [&](const SurfacePoint& surface) { reference_.Add(surface); });
+  const Stretch around{centre > reach ? centre - reach : 0, std::min(trail.size() - 1, centre + reach), centre};
+  ForEachSurface(trail, around, [&](const SurfacePoint& surface) { reference_.Add(surface); });
 }
 
 }  // namespace cairn::slam

@@ -40,7 +40,7 @@ class RevisitSearch {
   MatchResult AlignFromOthers(const Filter& filter, const std::function<MatchResult(const Hypothesis&)>& align,
                               const ParallelFor& parallel_for) const;
   // Collects the surfaces around keyframe `centre`, in its robot frame.
-  void BuildReference(std::span<const KeyframeShape> shapes, std::size_t centre);
+  void BuildReference(const Trail& trail, std::size_t centre);
 
   RevisitOptions options_;
   PointToLineOptions align_;

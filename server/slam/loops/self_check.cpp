@@ -46,9 +46,9 @@ void SelfCheck::Look(const Trail& trail, const SharedSequence<Pose2>& path) {
   for (const std::size_t old : KeyframesToCompare(shapes, path)) {
     const Pose2 T_old_now = Between(path[old], path[now]);
     comparison.counts +=
-        CompareVisibility(*keyframes[old].scan, T_old_now, shapes[now].points, options_.near_m, kMaxRangeM);
+        CompareVisibility(*keyframes[old].scan, T_old_now, trail.points(now), options_.near_m, kMaxRangeM);
     comparison.counts +=
-        CompareVisibility(*keyframes[now].scan, T_old_now.Inverse(), shapes[old].points, options_.near_m, kMaxRangeM);
+        CompareVisibility(*keyframes[now].scan, T_old_now.Inverse(), trail.points(old), options_.near_m, kMaxRangeM);
   }
   if (comparison.counts.known() < kMinKnown) return;
   comparisons_.push_back(comparison);

@@ -55,6 +55,12 @@ class OdometryPairing {
   void Finish();
 
   [[nodiscard]] std::size_t waiting() const { return scans_.size(); }
+  // Calls visit(scan) for every scan for which the sink has not been called yet.
+  template <typename Visit>
+  void ForEachWaiting(const Visit& visit) const {
+    for (const auto& scan : scans_) visit(*scan);
+    scan_gate_.ForEachHeld([&visit](const std::shared_ptr<const Scan>& scan) { visit(*scan); });
+  }
   // Odometry samples refused so far for their stamps.
   [[nodiscard]] std::uint64_t odometry_refused() const { return odometry_refused_; }
 

@@ -57,6 +57,12 @@ class StampGate {
   // The next sample comes from another client, which numbers from the beginning.
   void NewClient() { last_sequence_ = 0; }
 
+  // Calls visit(sample) for every sample that was neither passed nor refused yet.
+  template <typename Visit>
+  void ForEachHeld(const Visit& visit) const {
+    for (const Held& held : held_) visit(held.sample);
+  }
+
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     archive(self.has_last_, self.last_, self.last_sequence_, self.held_, self.returning_, self.returned_);

@@ -23,6 +23,8 @@ void StateWriter::RawAcrossBlocks(const char* data, std::size_t size) {
 }
 
 void StateWriter::Clear() {
+  nodes_.clear();
+  next_node_ = 0;
   if (blocks_.empty()) return;
   blocks_.resize(1);
   end_ = blocks_.front().get();

@@ -8,9 +8,10 @@
 // the conditions on which the rest of the class relies, such as valid indices and sizes. If one does not hold while
 // reading, the reading fails, and the values read so far must not be used. Immutable values (std::shared_ptr<const T>:
 // scans, parts of the map) are not written at once. The writer shares them until Bytes() writes them, which may be
-// called on another thread. Other shared nodes (SharedSequence) are written once, and are shared again after reading.
-// An immutable value must not contain shared nodes. All numbers are little-endian. The same state gives the same bytes.
-// Not thread-safe.
+// called on another thread. Other shared nodes (SharedSequence) are written once in the main part and once in each
+// immutable value, and are shared there again after reading. An immutable value must not contain immutable values.
+// Later() makes an immutable value of what is cheap to copy and slow to write. All numbers are little-endian. The same
+// state gives the same bytes. Not thread-safe.
 #pragma once
 
 #include <Eigen/Core>
@@ -90,6 +91,24 @@ void MembersOf(Archive& archive, Self& box) {
   archive(box.min(), box.max());
 }
 
+// Reads and writes a value that is cheap to copy, by means of shared nodes: what is written is the copy.
+template <typename T>
+struct Later {
+  T& value;
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    using Value = std::remove_const_t<T>;
+    std::shared_ptr<const Value> copy;
+    if constexpr (!Archive::kReads) copy = std::make_shared<const Value>(self.value);
+    archive(copy);
+    if constexpr (Archive::kReads)
+      if (archive.ok()) self.value = *copy;
+  }
+};
+template <typename T>
+Later(T&) -> Later<T>;
+
 // The address of kKindOf<T> stands for the type T.
 template <typename T>
 inline constexpr char kKindOf = 0;
@@ -142,7 +161,7 @@ class StateWriter {
     free_ -= size;
   }
   void RawAcrossBlocks(const char* data, std::size_t size);
-  // Forgets what was written, but keeps the memory.
+  // Forgets what was written and which nodes were, but keeps the memory.
   void Clear();
   [[nodiscard]] std::size_t size() const { return blocks_.size() * kBlockSize - free_; }
   void AppendTo(std::string& bytes) const;
@@ -299,7 +318,9 @@ class StateReader {
     if (!shared.value) {
       auto read = std::make_shared<T>();
       const std::string_view rest = std::exchange(rest_, shared.bytes);
+      std::vector<NodeRead> nodes = std::exchange(nodes_, {});
       Get(*read);
+      nodes_ = std::move(nodes);
       Require(rest_.empty(), "the length of a shared value");
       rest_ = ok() ? rest : std::string_view{};
       if (!ok()) return;

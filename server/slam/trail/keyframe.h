@@ -4,13 +4,13 @@
 
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "common/geometry/pose2.h"
 #include "common/sensor/scan.h"
 #include "common/sensor/trajectory.h"
 #include "server/slam/graph/pose_graph.h"
-#include "server/slam/scan/surface_points.h"
 
 namespace cairn::slam {
 
@@ -23,19 +23,24 @@ struct Keyframe {
   bool tentative = false;
 
   template <typename Archive>
-  static void Members(Archive& archive, auto& self) {
-    archive(self.scan, self.T_odom_robot, self.localized, self.tentative);
+  static void InlineMembers(Archive& archive, auto& self) {
+    if constexpr (Archive::kReads) {
+      auto read = std::make_shared<Scan>();
+      archive(*read);
+      self.scan = std::move(read);
+    } else {
+      archive(*self.scan);
+    }
+    archive(self.T_odom_robot, self.localized, self.tentative);
   }
 };
 
-// The part of a keyframe that matching uses.
+// Where a keyframe lies along the way of the robot. Its surface points are at Trail::points.
 struct KeyframeShape {
   // Pose in the front-end's frame: exact relative to neighbours, but it drifts over the whole path.
   Pose2 T_track_robot;
-  double travelled_m = 0.0;          // Distance travelled along the path up to this keyframe.
-  std::vector<SurfacePoint> points;  // Surface points in the robot frame of this keyframe.
+  double travelled_m = 0.0;  // Distance travelled along the path up to this keyframe.
 
-  // Without the points, which follow from the scan (Trail::RestorePoints).
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     archive(self.T_track_robot, self.travelled_m);

@@ -112,7 +112,13 @@ class SharedSequence {
 
   template <typename Node>
   static Node& Own(std::shared_ptr<void>& link) {
-    if (link.use_count() > 1) link = std::make_shared<Node>(*static_cast<const Node*>(link.get()));
+    if (link.use_count() > 1) {
+      link = std::make_shared<Node>(*static_cast<const Node*>(link.get()));
+      return *static_cast<Node*>(link.get());
+    }
+    // The last other owner may have been a checkpoint on another thread. Taking and giving back the node once more puts
+    // what that thread has read before what is written now.
+    const std::shared_ptr<void> synchronised = link;
     return *static_cast<Node*>(link.get());
   }
 

@@ -1,9 +1,12 @@
 #include "server/slam/trail/trail.h"
 
+#include <algorithm>
 #include <functional>
 #include <limits>
 #include <queue>
 #include <utility>
+
+#include "server/slam/scan/beam_points.h"
 
 namespace cairn::slam {
 namespace {
@@ -24,7 +27,8 @@ void Trail::Append(Keyframe keyframe, const Pose2& T_track_robot, std::vector<Su
   if (node > 0)
     relations_.push_back(
         PositiveDefinite({node - 1, node, T_prev_curr, drift_.Covariance(T_prev_curr) + step_covariance, false}));
-  shapes_.push_back({T_track_robot, TravelledTo(T_track_robot), std::move(points_robot)});
+  shapes_.push_back({T_track_robot, TravelledTo(T_track_robot)});
+  points_.emplace_back(std::move(points_robot));
   keyframes_.push_back(std::move(keyframe));
   loops_.emplace_back();
   if (revisit) {
@@ -41,6 +45,7 @@ void Trail::MarkLast(bool localized, bool on_the_path) {
 
 void Trail::ConfirmTentative() {
   keyframes_ = ConfirmedKeyframes();
+  frozen_keyframes_.Forget();
 }
 
 std::vector<Keyframe> Trail::ConfirmedKeyframes() const {
@@ -52,14 +57,29 @@ std::vector<Keyframe> Trail::ConfirmedKeyframes() const {
   return trusted;
 }
 
-void Trail::RestorePoints(const SurfaceOptions& options, const ParallelFor& parallel_for) {
-  parallel_for(static_cast<int>(size()), [&](int begin, int end) {
-    for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
-      const Scan& scan = *keyframes_[k].scan;
-      shapes_[k].points = SurfacePointsOf(PointsOf(scan), scan, options);
-    }
-  });
-  if (!empty()) distances_m_ = DistancesFromLast();
+const std::vector<SurfacePoint>& Trail::points(std::size_t keyframe) const {
+  std::optional<std::vector<SurfacePoint>>& points = points_[keyframe];
+  if (!points) {
+    const Scan& scan = *keyframes_[keyframe].scan;
+    points = SurfacePointsOf(PointsOf(scan), scan, surface_);
+  }
+  return *points;
+}
+
+bool Trail::IsConsistent() const {
+  if (shapes_.size() != size()) return false;
+  for (std::size_t k = 1; k < size(); ++k)
+    if (shapes_[k - 1].travelled_m > shapes_[k].travelled_m) return false;
+  return std::ranges::all_of(relations_, [this](const auto& one) { return one.from < size() && one.to < size(); }) &&
+         std::ranges::all_of(scans_, [this](const auto& scan) { return scan.keyframe < size(); });
+}
+
+void Trail::RestoreRest() {
+  points_.assign(size(), std::nullopt);
+  loops_.assign(size(), {});
+  for (const PoseRelation& relation : relations_)
+    if (relation.loop) NoteLoop(relation);
+  distances_m_ = empty() ? std::vector<double>{} : DistancesFromLast();
 }
 
 void Trail::AddScan(Stamp stamp, const Pose2& T_keyframe_robot) {
@@ -68,10 +88,14 @@ void Trail::AddScan(Stamp stamp, const Pose2& T_keyframe_robot) {
 
 void Trail::AddLoop(const PoseRelation& loop) {
   relations_.push_back(PositiveDefinite(loop));
+  NoteLoop(loop);
+  distances_m_ = DistancesFromLast();
+}
+
+void Trail::NoteLoop(const PoseRelation& loop) {
   const double way_m = loop.T_from_to.translation().norm();
   loops_[loop.from].push_back({loop.to, way_m});
   loops_[loop.to].push_back({loop.from, way_m});
-  distances_m_ = DistancesFromLast();
 }
 
 std::vector<double> Trail::DistancesFromLast() const {

@@ -12,15 +12,16 @@
 
 #include "server/slam/graph/pose_graph.h"
 #include "server/slam/motion/step_motion.h"
-#include "server/slam/parallel_for.h"
+#include "server/slam/scan/surface_points.h"
+#include "server/slam/state/frozen_blocks.h"
 #include "server/slam/trail/keyframe.h"
 
 namespace cairn::slam {
 
 class Trail {
  public:
-  // `drift` gives the covariance of a matched step.
-  explicit Trail(const MotionNoise& drift) : drift_(drift) {}
+  // `drift` gives the covariance of a matched step; `surface` are the options with which the points were found.
+  explicit Trail(const MotionNoise& drift, const SurfaceOptions& surface = {}) : drift_(drift), surface_(surface) {}
 
   // Appends the next keyframe. `step_covariance` is the covariance of the step to it, in the frame in which
   // the step starts, in addition to the drift; it is ignored for the first keyframe. `revisit` is an old
@@ -52,49 +53,53 @@ class Trail {
 
   [[nodiscard]] const std::vector<Keyframe>& keyframes() const { return keyframes_; }
   [[nodiscard]] std::span<const KeyframeShape> shapes() const { return shapes_; }
+  // The surface points of a keyframe in its robot frame. After reading they are computed when they are first asked for,
+  // because most keyframes are never looked at again.
+  [[nodiscard]] const std::vector<SurfacePoint>& points(std::size_t keyframe) const;
   // Per keyframe: length of the shortest path along the relations from the last keyframe, in metres.
   [[nodiscard]] std::span<const double> distances_m() const { return distances_m_; }
   [[nodiscard]] const std::vector<MapperSnapshot::ScanPlace>& scans() const { return scans_; }
   // Steps, revisits and loops; empty as long as no place was seen again.
   [[nodiscard]] std::vector<PoseRelation> relations() const;
 
-  // Without the points of the shapes and the distances, which follow from the rest: after reading, call RestorePoints.
+  // Without the points, the loops and the distances, which follow from the rest.
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
-    archive(self.keyframes_, self.shapes_, self.relations_, self.loops_, self.scans_);
+    InBlocks(archive, self.frozen_keyframes_, self.keyframes_);
+    InBlocks(archive, self.frozen_shapes_, self.shapes_);
+    InBlocks(archive, self.frozen_relations_, self.relations_);
+    InBlocks(archive, self.frozen_scans_, self.scans_);
     const std::size_t size = self.size();
     archive.SetKeyframes(size);
-    archive.Require(self.shapes_.size() == size && self.loops_.size() == size, "the number of keyframes");
-    for (const PoseRelation& relation : self.relations_)
-      archive.Require(relation.from < size && relation.to < size, "a relation between keyframes");
-    for (const auto& loops : self.loops_)
-      for (const Loop& loop : loops) archive.Require(loop.other < size && loop.way_m >= 0.0, "a loop");
-    for (std::size_t k = 1; k < size && archive.ok(); ++k)
-      archive.Require(self.shapes_[k - 1].travelled_m <= self.shapes_[k].travelled_m, "the way to a keyframe");
-    for (const auto& scan : self.scans_) archive.Require(scan.keyframe < size, "the keyframe of a scan");
+    if constexpr (Archive::kReads)
+      if (archive.Require(self.IsConsistent(), "the way along the keyframes")) self.RestoreRest();
   }
-  // Computes what is not stored; `options` are those of the front-end that gave the points.
-  void RestorePoints(const SurfaceOptions& options, const ParallelFor& parallel_for);
 
  private:
   struct Loop {
     std::size_t other = 0;
     double way_m = 0.0;
-
-    template <typename Archive>
-    static void Members(Archive& archive, auto& self) {
-      archive(self.other, self.way_m);
-    }
   };
   [[nodiscard]] std::vector<double> DistancesFromLast() const;
+  void NoteLoop(const PoseRelation& loop);
+  // Whether what was read fits together.
+  [[nodiscard]] bool IsConsistent() const;
+  void RestoreRest();
 
   MotionNoise drift_;
+  SurfaceOptions surface_;
   std::vector<Keyframe> keyframes_;
-  std::vector<KeyframeShape> shapes_;  // One per keyframe.
+  std::vector<KeyframeShape> shapes_;                                     // One per keyframe.
+  mutable std::vector<std::optional<std::vector<SurfacePoint>>> points_;  // One per keyframe; empty until asked for.
   std::vector<PoseRelation> relations_;
   std::vector<std::vector<Loop>> loops_;  // One list per keyframe. A loop is stored at both of its keyframes.
   std::vector<double> distances_m_;
   std::vector<MapperSnapshot::ScanPlace> scans_;
+  // For checkpoints: all of these grow at their ends only, but for the keyframes in ConfirmTentative.
+  FrozenBlocks<Keyframe> frozen_keyframes_;
+  FrozenBlocks<KeyframeShape> frozen_shapes_;
+  FrozenBlocks<PoseRelation> frozen_relations_;
+  FrozenBlocks<MapperSnapshot::ScanPlace> frozen_scans_;
 };
 
 }  // namespace cairn::slam

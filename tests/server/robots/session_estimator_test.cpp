@@ -30,6 +30,7 @@ class SessionEstimatorTest : public ::testing::Test {
   }
   void Drive(int first, int last) {
     for (int step = first; step < last; ++step) {
+      EXPECT_TRUE(record_.OdometryReceived(RoomOdometry(step).sequence));
       estimator_.Handle(OdometryOf("r1", RoomOdometry(step)));
       HandleScan(RoomScan(step));
     }
@@ -171,6 +172,51 @@ TEST_F(SessionEstimatorTest, ANewClientMayNumberFromTheBeginningWithAnEarlierClo
   }
   // The clock that went back is believed after slam.pairing.jump_confirmations samples of each stream.
   EXPECT_GE(ledger().used, kBefore + kAfter - 6U);
+}
+
+// Scans wait in the estimator for their odometry, and others in the queue for the estimator. The first are in the
+// checkpoint, the second are not: they come again.
+TEST_F(SessionEstimatorTest, ACheckpointHoldsWhatWaitsInTheEstimatorAndNotWhatWaitsInTheQueue) {
+  Drive(0, 20);
+  for (int step = 20; step < 23; ++step) HandleScan(RoomScan(step));
+  for (std::uint64_t sequence = 24; sequence <= 26; ++sequence)
+    EXPECT_EQ(record_.ScanReceived(HashName("laser"), sequence), SessionRecord::Arrival::kNew);
+  EXPECT_EQ(ledger().waiting, 6U);
+  const auto save = estimator_.Save();
+  ASSERT_TRUE(save);
+
+  std::vector<PoseReport> poses;
+  SessionRecord record(4, RequestOf("r1"), RobotsOptions{});
+  SessionEstimator other{FewParticles(),
+                         record,
+                         {.send =
+                              [&poses](OutboundValue value) {
+                                poses.push_back(std::get<PoseReport>(std::move(value)));
+                                return true;
+                              },
+                          .grid_changed = [](GridChange&&) {}}};
+  ASSERT_TRUE(other.Load(save()));
+  const auto restored = [&record] { return record.snapshot().status.ledgers.at(0); };
+  EXPECT_EQ(restored().received, 23U);
+  EXPECT_EQ(restored().waiting, 3U);
+  for (int step = 20; step < 26; ++step) {
+    if (step >= 23) {
+      EXPECT_EQ(record.ScanReceived(HashName("laser"), RoomScan(step).sequence), SessionRecord::Arrival::kNew);
+      other.Handle(ScanOf("r1", RoomScan(step)));
+      estimator_.Handle(ScanOf("r1", RoomScan(step)));
+    }
+    EXPECT_TRUE(record.OdometryReceived(RoomOdometry(step).sequence));
+    EXPECT_TRUE(record_.OdometryReceived(RoomOdometry(step).sequence));
+    other.Handle(OdometryOf("r1", RoomOdometry(step)));
+    estimator_.Handle(OdometryOf("r1", RoomOdometry(step)));
+  }
+  EXPECT_EQ(restored().used, 26U);
+  EXPECT_EQ(restored().waiting, 0U);
+  ASSERT_EQ(poses.size(), 6U);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    EXPECT_EQ(poses[i].T_map_robot, poses_[20 + i].T_map_robot);
+    EXPECT_EQ(poses[i].scan_sequence, poses_[20 + i].scan_sequence);
+  }
 }
 
 TEST_F(SessionEstimatorTest, DiscardAnswersWithoutTheEstimator) {

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <iterator>
 #include <random>
+#include <set>
 
 namespace cairn::server {
 namespace {
@@ -125,6 +127,46 @@ TEST(StreamLedger, PercentilesAreOfTheLastLatencies) {
   }
   EXPECT_NEAR(ledger.ledger().latency_p50_ms, 50.0, 1.0);
   EXPECT_NEAR(ledger.ledger().latency_p99_ms, 99.0, 1.0);
+}
+
+// Property: the numbers that a checkpoint leaves out can come again, and then the account is as if nothing had been
+// saved: the same counts, and settled_through of the same waiting numbers.
+TEST(StreamLedger, WhatTheJournalDoesNotHoldIsTakenBackAndComesAgain) {
+  std::mt19937 random(6);
+  int saved = 0;
+  for (int run = 0; run < 500; ++run) {
+    StreamLedger whole{Ledger{}};
+    std::set<std::uint64_t> waiting;
+    std::uint64_t last = random() % 5;
+    for (int i = 0; i < 40; ++i) {
+      last += random() % 4 == 0 ? 1 + random() % 3 : 1;
+      EXPECT_TRUE(whole.Received(last));
+      waiting.insert(last);
+      if (waiting.size() < 10 || random() % 2 == 0) continue;
+      whole.Used(*waiting.begin(), 1, false, 1.0);
+      waiting.erase(waiting.begin());
+    }
+    // The estimator holds the first ones, the queue the others.
+    std::set<std::uint64_t> taken = waiting;
+    while (!taken.empty() && random() % 5 != 0) taken.erase(std::prev(taken.end()));
+    const auto account = whole.AsJournaled(taken);
+    if (!account) continue;
+    ++saved;
+    StreamLedger again = *account;
+    const Ledger before = again.ledger();
+    ASSERT_EQ(before.received + Lost(again), before.used + before.dropped_total() + before.waiting);
+    ASSERT_EQ(before.waiting, taken.size());
+    for (const std::uint64_t number : waiting) ASSERT_EQ(again.Received(number), !taken.contains(number)) << number;
+    ASSERT_EQ(again.ledger().received, whole.ledger().received);
+    ASSERT_EQ(Lost(again), Lost(whole));
+    ASSERT_EQ(again.ledger().last_sequence, whole.ledger().last_sequence);
+    for (const std::uint64_t number : waiting) {
+      again.Used(number, 1, false, 1.0);
+      whole.Used(number, 1, false, 1.0);
+      ASSERT_EQ(again.ledger().settled_through, whole.ledger().settled_through);
+    }
+  }
+  EXPECT_GT(saved, 450);
 }
 
 // Property: whatever arrives in whatever order, no scan vanishes and settled_through never goes back.

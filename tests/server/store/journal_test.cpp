@@ -211,6 +211,51 @@ TEST(Journal, ACheckpointIsWholeOrTheOneBeforeIsTaken) {
   EXPECT_EQ(after, std::vector<std::uint64_t>{5});
 }
 
+// The oldest history goes first, and never what a checkpoint needs: all of it where there is none.
+TEST(Journal, OverTheBudgetOnlyTheJournalBeforeACheckpointIsRemoved) {
+  const TempDirectory directory;
+  const auto store = *OpenStore(directory.path());
+  Journal journal(*store, {.commit_delay_ms = 1, .max_gib = 1e-6});
+  journal.Start();
+  Followed told[3];
+  for (const std::uint64_t session : {1, 2}) {
+    journal.Open(SampleSession(session), told[session].durable());
+    // In two commits at least: an entry is removed with the commit that it belongs to.
+    for (const std::int64_t through : {200, 300}) {
+      while (journal.position(session) < static_cast<std::uint64_t>(through)) journal.Append(session, SampleScan(7));
+      ASSERT_TRUE(test::Eventually([&] { return told[session].through == through; }));
+    }
+  }
+  ASSERT_TRUE(journal.Checkpoint(1, 200, [] { return LargeState(1, 1000); }));
+  std::uint64_t first = 0;
+  ASSERT_TRUE(test::Eventually([&] {
+    first = 0;
+    const auto see = [&first](std::uint64_t position, JournalEntry&&) -> Result<void> {
+      first = first == 0 ? position : first;
+      return {};
+    };
+    static_cast<void>(ReadJournal(*store, 1, 200, see));
+    return !ReadJournal(*store, 1, 0, see);  // Its beginning is gone.
+  }));
+  EXPECT_EQ(first, 201U);
+  EXPECT_EQ(*ReadJournal(*store, 1, 200, [](std::uint64_t, JournalEntry&&) -> Result<void> { return {}; }), 300U);
+  EXPECT_EQ((*ReadCheckpoint(*store, 1))->bytes, LargeState(1, 1000));
+  EXPECT_EQ(StoredEntries(*store, 2), 300U);  // Without a checkpoint everything is needed.
+}
+
+TEST(Journal, BelowTheBudgetEverythingIsKept) {
+  const TempDirectory directory;
+  const auto store = *OpenStore(directory.path());
+  Journal journal(*store, {.commit_delay_ms = 1});
+  journal.Start();
+  journal.Open(SampleSession(1), {});
+  for (std::uint64_t i = 1; i <= 50; ++i) journal.Append(1, SampleScan(i));
+  ASSERT_TRUE(journal.Checkpoint(1, 40, [] { return LargeState(1, 1000); }));
+  ASSERT_TRUE(test::Eventually([&] { return journal.Checkpoint(1, 50, [] { return LargeState(2, 1000); }); }));
+  journal.Stop();
+  EXPECT_EQ(StoredEntries(*store, 1), 50U);
+}
+
 TEST(Journal, WhatIsForgottenIsGone) {
   const auto store = *OpenStore(std::string(kInMemory));
   Journal journal(*store, {.commit_delay_ms = 10000});

@@ -224,10 +224,11 @@ TEST(SplitSite, TheSessionsGoWithTheirPartOfEverything) {
 TEST(DeleteSession, ItsScansAndItsPartOfTheMapAreGone) {
   const auto store = MemoryStore();
   Put(*store, {});
+  ASSERT_TRUE(store->Commit({.removed = {}, .put = {{{RecordKind::kRestoring, 1, 0}, "a mark"}}}));
   ASSERT_TRUE(DeleteSession(*store, "lab", 1));
   for (const auto& [key, bytes] : Everything(*store)) {
-    const bool of_session =
-        key.kind == RecordKind::kSession || key.kind == RecordKind::kJournal || key.kind == RecordKind::kCheckpoint;
+    const bool of_session = key.kind == RecordKind::kSession || key.kind == RecordKind::kJournal ||
+                            key.kind == RecordKind::kCheckpoint || key.kind == RecordKind::kRestoring;
     EXPECT_FALSE(of_session && key.owner == 1) << static_cast<int>(key.kind);
   }
   const auto versions = *ReadVersions(*store, HashName("lab"));

@@ -1,15 +1,18 @@
-// The whole server on a store in a directory, as cairnd has it: the next one on the same directory goes on.
+// The whole server on a store in a directory, as cairnd has it (without DDS): the next one on the same directory goes
+// on. And what a kill leaves of it.
 #pragma once
 
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <string>
 
 #include "server/store/sqlite_store.h"
 #include "tests/server/support/whole_server.h"
 
 namespace cairn::server::testing {
 
+inline constexpr ClientId kDriver = 7;
 // A server with a store in a directory.
 class StoredServer {
  public:
@@ -34,10 +37,33 @@ class StoredServer {
   WholeServer house_;
 };
 
+// What a kill at this moment leaves.
+inline void CopyState(const std::filesystem::path& from, const std::filesystem::path& to) {
+  std::filesystem::create_directory(to);
+  for (const char* name : {"cairn.db", "cairn.db-wal"}) std::filesystem::copy_file(from / name, to / name);
+}
+
+inline Request About(RequestKind kind, const std::string& robot = "r1") {
+  Request request;
+  request.kind = kind;
+  request.site = "lab";
+  request.robot = robot;
+  return request;
+}
+
+inline Trajectory PathOf(WholeServer& house, const std::string& robot = "r1") {
+  return house.Ask(About(RequestKind::kPath, robot)).path;
+}
+
 inline bool SamePath(const Trajectory& a, const Trajectory& b) {
   return a.size() == b.size() && std::equal(a.begin(), a.end(), b.begin(), [](const auto& x, const auto& y) {
            return x.stamp == y.stamp && x.T_map_robot == y.T_map_robot;
          });
+}
+
+inline std::uint64_t DurableScans(WholeServer& house) {
+  const Reply status = house.Ask(About(RequestKind::kStatus));
+  return status.robots.empty() || status.robots[0].ledgers.empty() ? 0 : status.robots[0].ledgers[0].durable_through;
 }
 
 }  // namespace cairn::server::testing

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "tests/studies/fleet/live_server.h"
+#include "tests/studies/kills/restart.h"
 #include "tests/studies/study.h"
 #include "tests/system/killed_fleet.h"
 #include "tests/temp_directory.h"
@@ -15,6 +16,8 @@
 
 namespace cairn::studies {
 namespace {
+
+constexpr double kLongestRestart_s = 2.0;
 
 double At(std::vector<double> values, double share) {
   if (values.empty()) return 0.0;
@@ -114,9 +117,23 @@ void StudyCost(StudyContext& context) {
   report.Text("Being durable costs " + Percent(with.cpu_s / without.cpu_s - 1.0) + " more processor time.");
 }
 
+void StudyRestart(StudyContext& context) {
+  Report& report = context.report;
+  report.Heading("Restart with eight robots of an hour each");
+  const RestartTimes times = MeasureRestarts(context);
+  Table table({"kills", "state (MB)", "tiles after p50 (s)", "p99 (s)", "all poses after p50 (s)", "p99 (s)"});
+  table.Add({Count(static_cast<long long>(times.tiles_s.size())),
+             Number(static_cast<double>(times.state_bytes) / 1e6, 0), Number(At(times.tiles_s, 0.5), 2),
+             Number(At(times.tiles_s, 0.99), 2), Number(At(times.poses_s, 0.5), 2),
+             Number(At(times.poses_s, 0.99), 2)});
+  report.Add(table, "restart");
+  report.Expect(At(times.poses_s, 0.99) <= kLongestRestart_s, "a restart takes more than 2 s");
+}
+
 void StudyAll(StudyContext& context) {
   if (context.Wants("kills")) StudyKills(context);
   if (context.Wants("cost")) StudyCost(context);
+  if (context.Wants("restart")) StudyRestart(context);
 }
 
 const Registration kKills("kills", "SIGKILL a thousand times under robots that drive, and the cost of being durable",

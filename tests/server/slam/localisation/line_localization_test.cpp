@@ -108,7 +108,7 @@ TEST(LineLocalization, AStateFromBeforeTheRobotIsPlacedCanBeLoaded) {
   robot.mapper.Save(writer);
   const std::string bytes = writer.Bytes();
   StateReader reader(bytes);
-  loaded.mapper.Load(reader, SerialFor);
+  loaded.mapper.Load(reader);
   ASSERT_TRUE(reader.done()) << reader.failed();
   EXPECT_EQ(loaded.mapper.keyframe_count(), robot.mapper.keyframe_count());
 }

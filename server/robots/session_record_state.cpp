@@ -1,0 +1,75 @@
+// What a checkpoint holds of a session's record (session_record.h).
+#include <set>
+#include <string>
+#include <utility>
+
+#include "server/robots/session_record.h"
+
+namespace cairn::server {
+
+template <typename Archive>
+void SessionRecord::Members(Archive& archive, auto& self, auto& odometry) {
+  auto& pose = self.status_.pose;
+  archive(self.status_.session.client, self.status_.session.session, pose.stamp, pose.scan_sequence, pose.T_map_robot,
+          pose.covariance, pose.T_map_odom, pose.localized, pose.score, pose.reason, pose.map_epoch);
+  archive.Require(pose.reason <= PoseReason::kWaiting, "the reason of a pose");
+  archive(odometry, self.history_);
+}
+
+bool SessionRecord::Save(slam::StateWriter& writer, const WaitingScans& in_estimator) const {
+  static const std::set<std::uint64_t> kNone;
+  const MutexLock lock(mutex_);
+  if (status_.session.phase == SessionPhase::kEnded) return false;
+  writer(static_cast<std::uint64_t>(streams_.size()));
+  for (const auto& [sensor_id, stream] : streams_) {
+    const auto taken = in_estimator.find(sensor_id);
+    const auto account = stream.account.AsJournaled(taken == in_estimator.end() ? kNone : taken->second);
+    if (!account) return false;
+    writer(stream.account.ledger().sensor, *account);
+  }
+  const auto odometry = odometry_.account.AsJournaled(kNone);
+  if (!odometry) return false;
+  Members(writer, *this, *odometry);
+  return true;
+}
+
+Result<void> SessionRecord::Load(slam::StateReader& reader, const WaitingScans& in_estimator) {
+  const MutexLock lock(mutex_);
+  std::uint64_t sensors = 0;
+  reader(sensors);
+  reader.Require(sensors <= kMaxSensors, "the number of sensors");
+  for (std::uint64_t i = 0; i < sensors && reader.ok(); ++i) {
+    std::string sensor;
+    reader(sensor);
+    const NameId sensor_id = HashName(sensor);
+    Stream& stream = streams_[sensor_id];
+    stream.account = StreamLedger(NamesOf(sensor_id, sensor));
+    reader(stream.account);
+  }
+  if (reader.ok()) Members(reader, *this, odometry_.account);
+  WaitingScans waiting;
+  for (const auto& [sensor_id, stream] : streams_)
+    if (!stream.account.waiting().empty()) waiting.emplace(sensor_id, stream.account.waiting());
+  reader.Require(waiting == in_estimator && odometry_.account.waiting().empty(), "account of what waits");
+  if (!reader.ok()) return Fail(StatusCode::kDataLoss, std::string("a checkpoint holds a wrong ") + reader.failed());
+  return {};
+}
+
+void SessionRecord::Restored() {
+  const MutexLock lock(mutex_);
+  status_.session.durable = true;
+  status_.alive = false;
+  if (status_.session.phase != SessionPhase::kEnded) {
+    status_.session.phase = SessionPhase::kSuspended;
+    status_.session.status = {StatusCode::kUnavailable, "the server was started again, and the robot is not back yet"};
+    suspended_ = Clock::now();
+  }
+  const auto restore = [](Stream& stream) {
+    stream.account.Restored();
+    stream.resuming = stream.changed = true;
+  };
+  for (auto& [sensor_id, stream] : streams_) restore(stream);
+  restore(odometry_);
+}
+
+}  // namespace cairn::server

@@ -1,0 +1,121 @@
+// How long a server that was killed takes until it answers again: eight robots of which it knows an hour each.
+#include "tests/studies/kills/restart.h"
+
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <memory>
+#include <random>
+#include <thread>
+
+#include "tests/studies/fleet/live_server.h"
+#include "tests/temp_directory.h"
+#include "tests/test_domain.h"
+
+namespace cairn::studies {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+constexpr int kRobots = 8;
+constexpr std::chrono::seconds kLongest{60};
+
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+std::string RobotName(int robot) {
+  return "robot" + std::to_string(robot + 1);
+}
+
+std::vector<std::string> OnDomain(std::vector<std::string> arguments) {
+  arguments.insert(arguments.end(), {"--domain", std::to_string(test::TestDomain())});
+  return arguments;
+}
+
+std::unique_ptr<ChildProcess> StartServer(const fs::path& state) {
+  return std::make_unique<ChildProcess>(OnDomain({ProgramPath("cairnd"), "--state", state.string()}));
+}
+
+// Drives the robots through a building and sends their logs as fast as a server takes them, which is killed then.
+void MakeState(const fs::path& place, double seconds, StudyContext& context) {
+  const fs::path logs = place / "logs", unfinished = place / "unfinished";
+  fs::remove_all(unfinished);
+  const auto cairn = [](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), ProgramPath("cairn"));
+    return std::make_unique<ChildProcess>(OnDomain(std::move(arguments)));
+  };
+  static_cast<void>(
+      PrintedBy(cairn({"sim", "--no-stream", "--world", "building", "--robots", std::to_string(kRobots), "--hz", "10",
+                       "--seconds", std::to_string(seconds), "--log-dir", logs.string(), "--json"})
+                    ->Wait(LiveServer::kDeadline)));
+  context.report.Progress("logs of " + Number(seconds, 0) + " s");
+  const auto server = StartServer(unfinished);
+  if (!server->Says(" ready")) throw std::runtime_error("cairnd does not start: " + server->Wait().output);
+  std::vector<std::unique_ptr<ChildProcess>> robots;
+  for (int robot = 0; robot < kRobots; ++robot)
+    robots.push_back(cairn({"replay", (logs / (RobotName(robot) + ".log")).string(), "--site", "lab", "--robot",
+                            RobotName(robot), "--fast", "--json"}));
+  for (const auto& robot : robots) static_cast<void>(PrintedBy(robot->Wait(LiveServer::kDeadline)));
+  server->Signal(SIGKILL);
+  server->Wait();
+  fs::rename(unfinished, place / "state");
+}
+
+// Asks until the answer is there; the time since `start`.
+template <typename Ask>
+double TimeUntil(Clock::time_point start, const Ask& ask) {
+  while (!ask()) {
+    if (Clock::now() - start > kLongest) throw std::runtime_error("the server does not answer after its restart");
+  }
+  return SecondsSince(start);
+}
+
+bool HasTiles(client::QueryClient& queries) {
+  client::TileQuery query;
+  query.site = "lab";
+  const auto answer = queries.Tiles(query);
+  return answer && !answer->tiles.empty();
+}
+
+bool HasAllPoses(client::QueryClient& queries) {
+  const auto robots = queries.Robots();
+  if (!robots || robots->size() < static_cast<std::size_t>(kRobots)) return false;
+  for (const RobotStatus& robot : *robots)
+    if (robot.pose.stamp == 0) return false;
+  return true;
+}
+
+}  // namespace
+
+RestartTimes MeasureRestarts(StudyContext& context) {
+  const TempDirectory temporary;
+  const fs::path place =
+      (context.report.directory().empty() ? temporary.path() : fs::absolute(context.report.directory())) /
+      (context.quick ? "restart-quick" : "restart");
+  fs::create_directories(place);
+  if (!fs::exists(place / "state")) MakeState(place, context.Pick(3600.0, 30.0), context);
+  RestartTimes times;
+  for (const auto& file : fs::directory_iterator(place / "state")) times.state_bytes += fs::file_size(file);
+  wire::WireOptions wire;
+  wire.domain = test::TestDomain();
+  const auto bus = wire::Bus::Create(wire, "restart");
+  if (!bus) throw std::runtime_error(bus.error().message);
+  std::mt19937_64 random(context.seed);
+  for (int kill = 0; kill < context.Pick(100, 3); ++kill) {
+    const auto queries = client::QueryClient::Create(**bus, {.timeout_s = 0.3});
+    if (!queries) throw std::runtime_error(queries.error().message);
+    const auto start = Clock::now();
+    const auto server = StartServer(place / "state");
+    times.tiles_s.push_back(TimeUntil(start, [&] { return HasTiles(**queries); }));
+    times.poses_s.push_back(TimeUntil(start, [&] { return HasAllPoses(**queries); }));
+    // The moment of the kill is random.
+    std::this_thread::sleep_for(std::chrono::milliseconds(random() % 300));
+    server->Signal(SIGKILL);
+    server->Wait();
+  }
+  return times;
+}
+
+}  // namespace cairn::studies
