@@ -8,7 +8,7 @@ namespace cairn {
 namespace {
 
 constexpr double kMaxMountingDistance = 100.0;  // m
-constexpr double kMaxBeamPeriod = 1e4;          // s
+constexpr double kMaxDuration = 10.0;           // From the first beam to the last, in s.
 // A full turn computed as step * (beams - 1) in floating point may exceed 2 pi by rounding alone.
 constexpr double kSpanSlack = 1e-6;
 
@@ -38,7 +38,8 @@ Validity ValidateGeometry(const Scan& scan) {
   const double distance = scan.T_robot_laser.translation().norm();
   if (!(distance <= kMaxMountingDistance)) return Bad("mounting is too far from the robot, in m", distance);
   const double period = scan.beam_period_s;
-  if (!std::isfinite(period) || period < 0.0 || period > kMaxBeamPeriod) return Bad("beam period", period);
+  const double duration = period * static_cast<double>(scan.ranges_m.size() - 1);
+  if (!std::isfinite(period) || period < 0.0 || duration > kMaxDuration) return Bad("beam period", period);
   return {};
 }
 

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <utility>
+#include <vector>
+
+#include "server/slam/scan/deskew.h"
 
 namespace cairn::slam {
 namespace {
@@ -98,35 +101,47 @@ void OdometryPairing::Pair(const std::shared_ptr<const Scan>& scan, const Pose2&
     set_back_ns_ = static_cast<std::uint64_t>(stamp) - robot_time;
   }
   last_paired_ = stamp;
-  sink_.paired({scan, T_odom_robot, stamp});
+  sink_.paired({WithoutMotion(scan), T_odom_robot, stamp});
+}
+
+// Whether odometry covers the whole scan.
+bool OdometryPairing::Covers(const Scan& scan) const {
+  if (odometry_.empty() || odometry_.back().stamp < scan.stamp) return false;
+  return NanosBetween(scan.stamp, odometry_.back().stamp) >= DurationNs(scan);
+}
+
+// Pairs a scan that has odometry at or after its stamp, or drops it.
+void OdometryPairing::PairOrDrop(const std::shared_ptr<const Scan>& scan) {
+  const auto after = std::lower_bound(odometry_.begin(), odometry_.end(), scan->stamp,
+                                      [](const Odometry& odometry, Stamp stamp) { return odometry.stamp < stamp; });
+  const bool exact = after->stamp == scan->stamp;
+  if (!exact && after == odometry_.begin()) return sink_.dropped(*scan, DropReason::kNoOdometry);
+  const auto before = exact ? after : std::prev(after);
+  const bool too_far = !exact && NanosBetween(before->stamp, after->stamp) > Nanos(options_.max_gap_s);
+  const Pose2 T_odom_robot = exact ? after->T_odom_robot : PoseAt(scan->stamp, *before, *after);
+  // Later scans have later stamps, so nothing before this sample is needed any more.
+  odometry_.erase(odometry_.begin(), before);
+  if (too_far) return sink_.dropped(*scan, DropReason::kNoOdometry);
+  Pair(scan, T_odom_robot);
+}
+
+// A scan whose beams were measured one after the other is replaced by one that was taken at its stamp.
+std::shared_ptr<const Scan> OdometryPairing::WithoutMotion(const std::shared_ptr<const Scan>& scan) const {
+  const std::uint64_t duration_ns = DurationNs(*scan);
+  if (duration_ns == 0 || odometry_.empty() || odometry_.front().stamp > scan->stamp) return scan;
+  std::vector<Odometry> during;
+  for (const Odometry& odometry : odometry_) {
+    during.push_back(odometry);
+    if (odometry.stamp >= scan->stamp && NanosBetween(scan->stamp, odometry.stamp) >= duration_ns) break;
+  }
+  return std::make_shared<const Scan>(Deskew(*scan, during));
 }
 
 void OdometryPairing::Flush() {
-  while (!scans_.empty() && !odometry_.empty() && odometry_.back().stamp >= scans_.front()->stamp) {
+  while (!scans_.empty() && Covers(*scans_.front())) {
     const auto scan = std::move(scans_.front());
     scans_.pop_front();
-    const auto after = std::lower_bound(odometry_.begin(), odometry_.end(), scan->stamp,
-                                        [](const Odometry& odometry, Stamp stamp) { return odometry.stamp < stamp; });
-    if (after->stamp == scan->stamp) {
-      // Later scans have later stamps, so nothing before this sample is needed any more.
-      const Pose2 T_odom_robot = after->T_odom_robot;
-      odometry_.erase(odometry_.begin(), after);
-      Pair(scan, T_odom_robot);
-      continue;
-    }
-    if (after == odometry_.begin()) {
-      sink_.dropped(*scan, DropReason::kNoOdometry);
-      continue;
-    }
-    const auto before = std::prev(after);
-    const bool too_far = NanosBetween(before->stamp, after->stamp) > Nanos(options_.max_gap_s);
-    const Pose2 T_odom_robot = PoseAt(scan->stamp, *before, *after);
-    odometry_.erase(odometry_.begin(), before);
-    if (too_far) {
-      sink_.dropped(*scan, DropReason::kNoOdometry);
-    } else {
-      Pair(scan, T_odom_robot);
-    }
+    PairOrDrop(scan);
   }
 }
 
@@ -137,8 +152,10 @@ void OdometryPairing::Finish() {
   while (!scans_.empty()) {
     const auto scan = std::move(scans_.front());
     scans_.pop_front();
-    // After Flush only scans later than the last odometry sample are left.
-    if (!odometry_.empty() && NanosBetween(odometry_.back().stamp, scan->stamp) <= Nanos(options_.max_gap_s)) {
+    // After Flush only scans are left that end later than the last odometry sample.
+    if (!odometry_.empty() && odometry_.back().stamp >= scan->stamp) {
+      PairOrDrop(scan);
+    } else if (!odometry_.empty() && NanosBetween(odometry_.back().stamp, scan->stamp) <= Nanos(options_.max_gap_s)) {
       Pair(scan, odometry_.back().T_odom_robot);
     } else {
       sink_.dropped(*scan, DropReason::kNoOdometry);

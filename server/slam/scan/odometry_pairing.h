@@ -1,5 +1,6 @@
 // Gives every scan the odometry pose at its stamp, independently of the order in which the two streams
-// arrive: a scan waits until there is a sample at or after its stamp, and then gets an interpolated pose. All
+// arrive: a scan waits until there is a sample at or after its last beam, and then gets an interpolated pose; where its
+// beams were measured one after the other, the motion meanwhile is taken out of it (deskew.h). All
 // decisions depend on stamps alone, so the same two streams give the same pairs however they interleave, as
 // long as no bound is reached and no clock is set back. When a clock is set back, waiting scans are dropped, because
 // scans and odometry of two clocks cannot be joined; the time of the estimator still grows (PairedScan::stamp).
@@ -29,7 +30,7 @@ struct PairingOptions {
 void Visit(OptionVisitor& visitor, PairingOptions& options);
 
 struct PairedScan {
-  std::shared_ptr<const Scan> scan;
+  std::shared_ptr<const Scan> scan;  // With all beams at its stamp.
   Pose2 T_odom_robot;
   Stamp stamp = 0;  // The scan's, plus what the robot's clock was set back by: grows from pair to pair.
 };
@@ -74,6 +75,9 @@ class OdometryPairing {
   void Take(std::shared_ptr<const Scan>&& scan);
   void Take(const Odometry& odometry);
   void ClockSetBack();
+  [[nodiscard]] bool Covers(const Scan& scan) const;
+  void PairOrDrop(const std::shared_ptr<const Scan>& scan);
+  [[nodiscard]] std::shared_ptr<const Scan> WithoutMotion(const std::shared_ptr<const Scan>& scan) const;
   void Flush();
   void Pair(const std::shared_ptr<const Scan>& scan, const Pose2& T_odom_robot);
 

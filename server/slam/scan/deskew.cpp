@@ -1,0 +1,166 @@
+#include "server/slam/scan/deskew.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "server/slam/scan/beam_points.h"
+#include "server/slam/scan/stamp_gate.h"
+
+namespace cairn::slam {
+namespace {
+
+// Two neighbouring ends lie on one surface if they are not farther apart than this and this many beams' distance.
+constexpr double kSurfaceGapM = 0.05;
+constexpr double kSurfaceSteps = 6.0;
+// A surface that is nearer by more hides one that was seen before it at the same angle.
+constexpr double kHiddenM = 0.2;
+
+// Poses of the robot at times that grow, interpolated between samples of odometry.
+class PoseWalk {
+ public:
+  explicit PoseWalk(std::span<const Odometry> samples) : samples_(samples), origin_(samples.front().stamp) {}
+
+  Pose2 At(std::uint64_t ns_after_origin) {
+    while (next_ < samples_.size() && Since(next_) <= ns_after_origin) ++next_;
+    const Odometry& before = samples_[next_ - 1];
+    if (next_ == samples_.size()) return before.T_odom_robot;
+    const auto gap = static_cast<double>(Since(next_) - Since(next_ - 1));
+    return Interpolate(before.T_odom_robot, samples_[next_].T_odom_robot,
+                       static_cast<double>(ns_after_origin - Since(next_ - 1)) / gap);
+  }
+
+ private:
+  [[nodiscard]] std::uint64_t Since(std::size_t sample) const { return NanosBetween(origin_, samples_[sample].stamp); }
+
+  std::span<const Odometry> samples_;
+  Stamp origin_;
+  std::size_t next_ = 1;
+};
+
+// The end of a beam as the lidar would see it at the stamp of the scan.
+struct MovedEnd {
+  BeamClass kind = BeamClass::kInvalid;
+  Eigen::Vector2d p_laser = Eigen::Vector2d::Zero();  // At the stamp. Of a beam without a hit: its direction.
+  double beam = 0.0;                                  // Where it lies between the beams of the scan.
+  float range_m = 0.0F;
+};
+
+std::vector<MovedEnd> MovedEnds(const Scan& scan, std::span<const Odometry> odometry) {
+  PoseWalk walk(odometry);
+  const std::uint64_t start = NanosBetween(odometry.front().stamp, scan.stamp);
+  const Pose2 T_first_odom = (walk.At(start) * scan.T_robot_laser).Inverse();
+  std::vector<MovedEnd> ends(scan.ranges_m.size());
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    const auto index = static_cast<double>(i);
+    const Pose2 T_odom_robot =
+        walk.At(start + static_cast<std::uint64_t>(std::llround(index * scan.beam_period_s * 1e9)));
+    const Pose2 T_first_laser = T_first_odom * T_odom_robot * scan.T_robot_laser;
+    const double angle = scan.angle_first_rad + index * scan.angle_step_rad;
+    const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
+    MovedEnd& end = ends[i];
+    end.kind = ClassifyRange(scan.ranges_m[i], scan.range_min_m, scan.range_max_m);
+    end.range_m = scan.ranges_m[i];
+    end.p_laser = end.kind == BeamClass::kHit ? T_first_laser * (direction * scan.ranges_m[i])
+                                              : Eigen::Vector2d(T_first_laser.rotation() * direction);
+    const double seen_at = std::atan2(end.p_laser.y(), end.p_laser.x());
+    end.beam = index + WrapAngle(seen_at - angle) / scan.angle_step_rad;
+  }
+  return ends;
+}
+
+// Where the direction cuts the line from a to b; nothing if they are nearly parallel.
+std::optional<double> RangeOfCut(const Eigen::Vector2d& direction, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  const Eigen::Vector2d d = b - a;
+  const double across = direction.x() * d.y() - direction.y() * d.x();
+  if (std::abs(across) < 1e-3 * d.norm()) return std::nullopt;
+  return (a.x() * d.y() - a.y() * d.x()) / across;
+}
+
+// Collects the ranges of the result.
+class Resampling {
+ public:
+  explicit Resampling(const Scan& scan)
+      : scan_(scan),
+        full_turn_(IsFullTurn(scan)),
+        ranges_(scan.ranges_m.size(), std::numeric_limits<float>::quiet_NaN()) {}
+
+  // Every beam between two neighbouring ends on one surface.
+  void AddSurface(const MovedEnd& from, const MovedEnd& to) {
+    const double spacing = std::max(from.p_laser.norm(), to.p_laser.norm()) * std::abs(scan_.angle_step_rad);
+    if ((to.p_laser - from.p_laser).norm() > kSurfaceGapM + kSurfaceSteps * spacing) return;
+    const double last = std::floor(std::max(from.beam, to.beam));
+    for (double beam = std::ceil(std::min(from.beam, to.beam)); beam <= last; ++beam) {
+      const double angle = scan_.angle_first_rad + beam * scan_.angle_step_rad;
+      const auto range = RangeOfCut({std::cos(angle), std::sin(angle)}, from.p_laser, to.p_laser);
+      if (range && *range > 0.0) Put(beam, *range);
+    }
+  }
+  void AddHit(const MovedEnd& end) {
+    if (Empty(std::round(end.beam))) Put(std::round(end.beam), end.p_laser.norm());
+  }
+  void AddNoReturn(const MovedEnd& end) {
+    float* const range = At(std::round(end.beam));
+    if (range != nullptr && std::isnan(*range)) *range = end.range_m;
+  }
+  [[nodiscard]] std::vector<float> ranges() && { return std::move(ranges_); }
+
+ private:
+  // Null outside the field of view.
+  float* At(double beam) {
+    const auto count = static_cast<double>(ranges_.size());
+    if (full_turn_) beam -= count * std::floor(beam / count);
+    return beam >= 0.0 && beam < count ? &ranges_[static_cast<std::size_t>(beam)] : nullptr;
+  }
+  bool Empty(double beam) {
+    const float* const range = At(beam);
+    return range != nullptr && std::isnan(*range);
+  }
+  void Put(double beam, double range_m) {
+    float* const range = At(beam);
+    if (range == nullptr || range_m < scan_.range_min_m) return;
+    // A hit stays a hit, although it is a little farther from where the lidar was at the stamp.
+    const auto farthest = std::nextafter(static_cast<float>(scan_.range_max_m), 0.0F);
+    const float hit = std::min(static_cast<float>(range_m), farthest);
+    if (std::isnan(*range) || hit < *range - static_cast<float>(kHiddenM)) *range = hit;
+  }
+
+  const Scan& scan_;
+  const bool full_turn_;
+  std::vector<float> ranges_;
+};
+
+}  // namespace
+
+std::uint64_t DurationNs(const Scan& scan) {
+  if (scan.beam_period_s == 0.0) return 0;
+  return static_cast<std::uint64_t>(
+      std::llround(static_cast<double>(scan.ranges_m.size() - 1) * scan.beam_period_s * 1e9));
+}
+
+Scan Deskew(const Scan& scan, std::span<const Odometry> odometry) {
+  Scan still = scan;
+  still.beam_period_s = 0.0;
+  const bool moved = std::any_of(odometry.begin(), odometry.end(), [&](const Odometry& sample) {
+    return sample.T_odom_robot != odometry.front().T_odom_robot;
+  });
+  if (!moved) return still;
+  const std::vector<MovedEnd> ends = MovedEnds(scan, odometry);
+  Resampling resampling(scan);
+  for (std::size_t i = 1; i < ends.size(); ++i) {
+    if (ends[i - 1].kind == BeamClass::kHit && ends[i].kind == BeamClass::kHit)
+      resampling.AddSurface(ends[i - 1], ends[i]);
+  }
+  for (const MovedEnd& end : ends) {
+    if (end.kind == BeamClass::kHit) resampling.AddHit(end);
+  }
+  for (const MovedEnd& end : ends) {
+    if (end.kind == BeamClass::kNoReturn) resampling.AddNoReturn(end);
+  }
+  still.ranges_m = std::move(resampling).ranges();
+  return still;
+}
+
+}  // namespace cairn::slam
