@@ -1,8 +1,8 @@
 // The hits of one scan as points in the robot frame, in the order of the beams. Beams without an echo and
 // invalid beams are left out; ClassifyRange tells them apart. A tilted scan plane is projected on the ground:
-// lengths along the laser's x axis shrink by cos(tilt). The points are neither thinned nor deskewed. Metres
-// and radians. Stateless, thread-safe.
-// Precondition: the scan passed ValidateScan.
+// lengths along the laser's x axis shrink by cos(tilt). The points are not thinned; the motion of the robot during the
+// scan is taken out before (deskew.h). Metres and radians. Stateless, thread-safe. Precondition: the scan passed
+// ValidateScan.
 #pragma once
 
 #include <Eigen/Core>

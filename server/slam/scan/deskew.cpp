@@ -15,8 +15,6 @@ namespace {
 // Two neighbouring ends lie on one surface if they are not farther apart than this and this many beams' distance.
 constexpr double kSurfaceGapM = 0.05;
 constexpr double kSurfaceSteps = 6.0;
-// A surface that is nearer by more hides one that was seen before it at the same angle.
-constexpr double kHiddenM = 0.2;
 
 // Poses of the robot at times that grow, interpolated between samples of odometry.
 class PoseWalk {
@@ -98,12 +96,13 @@ class Resampling {
       if (range && *range > 0.0) Put(beam, *range);
     }
   }
-  void AddHit(const MovedEnd& end) {
-    if (Empty(std::round(end.beam))) Put(std::round(end.beam), end.p_laser.norm());
-  }
-  void AddNoReturn(const MovedEnd& end) {
-    float* const range = At(std::round(end.beam));
-    if (range != nullptr && std::isnan(*range)) *range = end.range_m;
+  void AddHit(const MovedEnd& end) { Put(std::round(end.beam), end.p_laser.norm()); }
+  // Every beam from one that hit nothing to the next one.
+  void AddNoReturns(const MovedEnd& from, const MovedEnd& to) {
+    const double last = std::round(std::max(from.beam, to.beam));
+    for (double beam = std::round(std::min(from.beam, to.beam)); beam <= last; ++beam) {
+      if (Empty(beam)) *At(beam) = to.range_m;
+    }
   }
   [[nodiscard]] std::vector<float> ranges() && { return std::move(ranges_); }
 
@@ -119,12 +118,11 @@ class Resampling {
     return range != nullptr && std::isnan(*range);
   }
   void Put(double beam, double range_m) {
-    float* const range = At(beam);
-    if (range == nullptr || range_m < scan_.range_min_m) return;
+    // What was seen first is nearest to the stamp.
+    if (!Empty(beam) || range_m < scan_.range_min_m) return;
     // A hit stays a hit, although it is a little farther from where the lidar was at the stamp.
     const auto farthest = std::nextafter(static_cast<float>(scan_.range_max_m), 0.0F);
-    const float hit = std::min(static_cast<float>(range_m), farthest);
-    if (std::isnan(*range) || hit < *range - static_cast<float>(kHiddenM)) *range = hit;
+    *At(beam) = std::min(static_cast<float>(range_m), farthest);
   }
 
   const Scan& scan_;
@@ -156,8 +154,10 @@ Scan Deskew(const Scan& scan, std::span<const Odometry> odometry) {
   for (const MovedEnd& end : ends) {
     if (end.kind == BeamClass::kHit) resampling.AddHit(end);
   }
-  for (const MovedEnd& end : ends) {
-    if (end.kind == BeamClass::kNoReturn) resampling.AddNoReturn(end);
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    if (ends[i].kind != BeamClass::kNoReturn) continue;
+    const bool joined = i > 0 && ends[i - 1].kind == BeamClass::kNoReturn;
+    resampling.AddNoReturns(joined ? ends[i - 1] : ends[i], ends[i]);
   }
   still.ranges_m = std::move(resampling).ranges();
   return still;

@@ -5,9 +5,9 @@
 // The result is the scan that a lidar would have taken with all beams at once, at the stamp of the scan. Each end of a
 // beam is moved by the odometry between the stamp and the time of the beam, as seen from the lidar at the stamp. The
 // ends are then no longer at the angles of the beams; therefore each beam of the result gets the range at which it cuts
-// the line between two neighbouring ends on one surface, and otherwise that of the nearest end. What a nearer surface
-// hides at the stamp is left out. A beam that nothing tells anything about is invalid (not a number).
-// The scan plane is taken to be level. Stateless, thread-safe.
+// the line between two neighbouring ends on one surface, and otherwise that of the nearest end. Where
+// the turn of the robot shows a place twice, the first sight counts. A beam that nothing tells anything about is
+// invalid (not a number). The scan plane is taken to be level. Stateless, thread-safe.
 #pragma once
 
 #include <cstdint>

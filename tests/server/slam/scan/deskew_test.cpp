@@ -72,7 +72,7 @@ TEST(Deskew, GivesTheScanThatAllBeamsAtOnceWouldHaveGiven) {
       const Scan at_once = Measure(given, 0.0), rolling = Measure(given, kTurn_s);
       EXPECT_LT(ShareThatAgrees(rolling, at_once), 0.6);
       const Scan deskewed = Deskew(rolling, Wheels(twist));
-      EXPECT_GT(ShareThatAgrees(deskewed, at_once), 0.99) << field_of_view << " deg, " << twist.turn_rad_s << " rad/s";
+      EXPECT_GT(ShareThatAgrees(deskewed, at_once), 0.98) << field_of_view << " deg, " << twist.turn_rad_s << " rad/s";
       EXPECT_EQ(deskewed.beam_period_s, 0.0);
       EXPECT_EQ(deskewed.stamp, rolling.stamp);
     }
@@ -83,7 +83,7 @@ TEST(Deskew, GivesTheScanThatAllBeamsAtOnceWouldHaveGiven) {
 TEST(Deskew, KeepsNearThingsApartFromWhatIsBehindThem) {
   const Case given{.pillars = {{{2.5, 1.5}, 0.15}, {{0.0, 2.0}, 0.1}, {{-1.0, -1.0}, 0.2}}};
   const Scan at_once = Measure(given, 0.0);
-  EXPECT_GT(ShareThatAgrees(Deskew(Measure(given, kTurn_s), Wheels(given.twist)), at_once), 0.97);
+  EXPECT_GT(ShareThatAgrees(Deskew(Measure(given, kTurn_s), Wheels(given.twist)), at_once), 0.98);
 }
 
 TEST(Deskew, WhatHitNothingStaysFreeAndWhatIsInvalidStaysInvalid) {
