@@ -3,11 +3,11 @@
 // grows although the robot only stands is kept for nothing. Then it measures the memory of sessions that do nothing.
 // --hours: of the drive (24); --only driving|standing|idle.
 #include <algorithm>
-#include <numeric>
+#include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "client/sim/shipped_worlds.h"
-#include "tests/eventually.h"
 #include "tests/loopback.h"
 #include "tests/studies/soak/fast_robot.h"
 #include "tests/studies/soak/soaked_server.h"
@@ -18,16 +18,24 @@ namespace {
 
 constexpr double kScanRate_hz = 10.0;
 constexpr double kWarmUp = 0.25;  // Share of a phase before the slopes: buffers grow to their sizes.
+constexpr int kMemoryLooks = 12;  // In the time of a sample.
 constexpr int kIdleSessions = 64;
+// What may grow: 12,000 keyframes an hour, of 20 KiB each; and for every scan its pose on the path (144 bytes in two
+// places) and its record in the journal.
+constexpr double kMostMemory_mib_per_hour = 240.0;
+constexpr double kMostStanding_mib_per_hour = 16.0;
+constexpr double kMostDisk_mib_per_hour = 150.0;
 
 struct Sample {
   double hours = 0.0;
-  double resident_mib = 0.0;
+  double resident_mib = 0.0;  // The least since the sample before: without what a checkpoint needs for a moment.
+  double peak_mib = 0.0;      // The most.
   double disk_mib = 0.0;
   double p50_ms = 0.0;
   double p99_ms = 0.0;
   double restart_s = 0.0;
   double keyframes = 0.0;
+  double dropped = 0.0;
 };
 
 // A figure of the samples, and how much it may grow in an hour.
@@ -39,20 +47,24 @@ struct Figure {
   int decimals;
 };
 
-// Least squares.
+// What the robot does meanwhile, and by how much memory may grow then.
+struct Phase {
+  const char* name;
+  void (FastRobot::*advance)(double seconds);
+  double hours;
+  double most_mib_per_hour;
+};
+
+// The median of the slopes between all pairs (Theil 1950, Sen 1968): single samples, such as those taken while a
+// checkpoint is made, do not move it.
 double SlopePerHour(const std::vector<Sample>& samples, double Sample::*value) {
   const auto first = static_cast<std::size_t>(kWarmUp * static_cast<double>(samples.size()));
-  const auto count = static_cast<double>(samples.size() - first);
-  double x = 0.0, y = 0.0, xx = 0.0, xy = 0.0;
+  client::Percentiles slopes;
   for (std::size_t i = first; i < samples.size(); ++i) {
-    x += samples[i].hours / count;
-    y += samples[i].*value / count;
+    for (std::size_t j = i + 1; j < samples.size(); ++j)
+      slopes.Add((samples[j].*value - samples[i].*value) / (samples[j].hours - samples[i].hours));
   }
-  for (std::size_t i = first; i < samples.size(); ++i) {
-    xx += (samples[i].hours - x) * (samples[i].hours - x);
-    xy += (samples[i].hours - x) * (samples[i].*value - y);
-  }
-  return xx > 0.0 ? xy / xx : 0.0;
+  return slopes.At(0.5);
 }
 
 sim::Fleet OneRobot(std::uint64_t seed) {
@@ -69,40 +81,66 @@ sim::Fleet OneRobot(std::uint64_t seed) {
 }
 
 // Everything there is to know of the server at this moment. The robot is between two scans.
-Sample Look(const SoakedServer& server, FastRobot& robot) {
-  Sample sample;
+Sample Look(const SoakedServer& server, FastRobot& robot, Sample sample) {
   const client::Percentiles latency_ms = robot.TakeLatencies();
   const Ledger ledger = robot.ledger();
   if (ledger.used + ledger.dropped_total() != robot.scans()) throw std::runtime_error("a scan is not accounted for");
   sample.hours = static_cast<double>(robot.scans()) / kScanRate_hz / 3600.0;
-  sample.resident_mib = server.resident_mib();
   sample.disk_mib = server.disk_mib();
   sample.p50_ms = latency_ms.At(0.5);
   sample.p99_ms = latency_ms.At(0.99);
   sample.keyframes = static_cast<double>(ledger.keyframes);
+  sample.dropped = static_cast<double>(ledger.dropped_total());
   sample.restart_s = server.RestartSeconds();
   return sample;
 }
 
-using Advance = void (FastRobot::*)(double seconds);
-
-std::vector<Sample> Soak(Report& report, const SoakedServer& server, FastRobot& robot, Advance advance, double hours,
-                         double every_s) {
+std::vector<Sample> Watch(const StudyContext& context, const Phase& phase, const SoakedServer& server,
+                          FastRobot& robot) {
+  const double every_s = context.Pick(600.0, 180.0);
+  const auto count = static_cast<int>((context.hours > 0.0 ? context.hours : phase.hours) * 3600.0 / every_s + 0.5);
   std::vector<Sample> samples;
-  const auto count = static_cast<int>(hours * 3600.0 / every_s + 0.5);
   for (int i = 0; i < count; ++i) {
-    (robot.*advance)(every_s);
-    samples.push_back(Look(server, robot));
+    Sample memory{.resident_mib = std::numeric_limits<double>::infinity()};
+    for (int part = 0; part < kMemoryLooks; ++part) {
+      (robot.*phase.advance)(every_s / kMemoryLooks);
+      memory.resident_mib = std::min(memory.resident_mib, server.resident_mib());
+      memory.peak_mib = std::max(memory.peak_mib, server.resident_mib());
+    }
+    samples.push_back(Look(server, robot, memory));
     const Sample& now = samples.back();
-    report.Progress(Number(now.hours, 2) + " h: " + Number(now.resident_mib, 1) + " MiB, disk " +
-                    Number(now.disk_mib, 1) + " MiB, scan to pose " + Number(now.p50_ms, 2) + " and " +
-                    Number(now.p99_ms, 2) + " ms, restart " + Number(now.restart_s, 2) + " s");
+    context.report.Progress(Number(now.hours, 2) + " h: " + Number(now.resident_mib, 1) + " to " +
+                            Number(now.peak_mib, 1) + " MiB, disk " + Number(now.disk_mib, 1) +
+                            " MiB, scan to pose p50 " + Number(now.p50_ms, 2) + " ms, p99 " + Number(now.p99_ms, 2) +
+                            " ms, restart " + Number(now.restart_s, 2) + " s");
   }
   return samples;
 }
 
-void Print(Report& report, const std::string& name, const std::vector<Sample>& samples,
-           const std::vector<Figure>& figures) {
+void Draw(Report& report, const std::string& phase, const Figure& figure, const std::vector<Sample>& samples) {
+  Plot plot{.title = phase + ": " + figure.name, .x = {"time", "h"}, .y = {figure.name, figure.unit}};
+  Series series;
+  for (const Sample& sample : samples) {
+    series.x.push_back(sample.hours);
+    series.y.push_back(sample.*figure.value);
+  }
+  plot.series = {series};
+  report.Add(plot, phase + " " + figure.name);
+}
+
+void Soak(StudyContext& context, const Phase& phase, const SoakedServer& server, FastRobot& robot) {
+  const std::vector<Sample> samples = Watch(context, phase, server, robot);
+  // Slopes of times over a few minutes are noise, so a quick run allows more.
+  const std::vector<Figure> figures = {
+      {"memory", "MiB", &Sample::resident_mib, phase.most_mib_per_hour, 1},
+      {"peak of memory", "MiB", &Sample::peak_mib, 5.0 * phase.most_mib_per_hour, 1},
+      {"disk", "MiB", &Sample::disk_mib, kMostDisk_mib_per_hour, 1},
+      {"latency p50", "ms", &Sample::p50_ms, context.Pick(0.1, 5.0), 2},
+      {"latency p99", "ms", &Sample::p99_ms, context.Pick(1.0, 50.0), 2},
+      {"restart", "s", &Sample::restart_s, context.Pick(0.5, 10.0), 2},
+      {"dropped scans", "1", &Sample::dropped, 0.0, 0},
+  };
+  Report& report = context.report;
   Table table({"figure", "first", "last", "per hour", "may grow per hour"});
   for (const Figure& figure : figures) {
     const double slope = SlopePerHour(samples, figure.value);
@@ -110,47 +148,28 @@ void Print(Report& report, const std::string& name, const std::vector<Sample>& s
     table.Add({what, Number(samples.front().*figure.value, figure.decimals),
                Number(samples.back().*figure.value, figure.decimals), Number(slope, figure.decimals),
                Number(figure.most_per_hour, figure.decimals)});
-    report.Expect(slope <= figure.most_per_hour, name + ": " + what + " grows by " + Number(slope, 2) + " per hour");
-    Plot plot{.title = name + ": " + figure.name, .x = {"time", "h"}, .y = {figure.name, figure.unit}};
-    Series series{.label = figure.name};
-    for (const Sample& sample : samples) {
-      series.x.push_back(sample.hours);
-      series.y.push_back(sample.*figure.value);
-    }
-    plot.series = {series};
-    report.Add(plot, name + " " + figure.name);
+    report.Expect(slope <= figure.most_per_hour,
+                  phase.name + (": " + what) + " grows by " + Number(slope, 2) + " in an hour");
+    Draw(report, phase.name, figure, samples);
   }
-  report.Add(table, name);
+  report.Add(table, phase.name);
+  report.Text(Count(std::llround(SlopePerHour(samples, &Sample::keyframes))) + " keyframes an hour.");
 }
 
 void StudyTime(StudyContext& context) {
-  Report& report = context.report;
   const SoakedServer server;
   const auto bus = test::MakeBus("soak");
   FastRobot robot(*bus, "robot", OneRobot(context.seed), kScanRate_hz);
-  const double every_s = context.Pick(600.0, 60.0);
-  if (context.Wants("driving") || context.Wants("standing")) {
-    const double hours = context.hours > 0.0 ? context.hours : context.Pick(24.0, 0.3);
-    report.Heading("A robot drives: 10 scans of 181 beams a second");
-    const auto samples = Soak(report, server, robot, &FastRobot::Drive, hours, every_s);
-    Print(report, "driving", samples,
-          {{"memory", "MiB", &Sample::resident_mib, 120.0, 1},
-           {"disk", "MiB", &Sample::disk_mib, 60.0, 1},
-           {"scan to pose, median", "ms", &Sample::p50_ms, context.Pick(0.1, 5.0), 2},
-           {"scan to pose, 99th percentile", "ms", &Sample::p99_ms, context.Pick(1.0, 50.0), 2},
-           {"restart", "s", &Sample::restart_s, context.Pick(0.2, 4.0), 2},
-           {"keyframes", "1", &Sample::keyframes, 1e9, 0}});
+  if (context.Wants("driving")) {
+    context.report.Heading("A robot drives: 10 scans of 181 beams a second");
+    Soak(context, {"driving", &FastRobot::Drive, context.Pick(24.0, 0.25), kMostMemory_mib_per_hour}, server, robot);
+  } else {
+    robot.Drive(60.0);
   }
-  if (!context.Wants("standing")) return;
-  report.Heading("The robot stands");
-  const double hours = context.hours > 0.0 ? context.hours / 6.0 : context.Pick(4.0, 0.3);
-  const auto samples = Soak(report, server, robot, &FastRobot::Stand, hours, every_s);
-  Print(report, "standing", samples,
-        {{"memory", "MiB", &Sample::resident_mib, 12.0, 1},
-         {"disk", "MiB", &Sample::disk_mib, 60.0, 1},
-         {"scan to pose, median", "ms", &Sample::p50_ms, context.Pick(0.1, 5.0), 2},
-         {"scan to pose, 99th percentile", "ms", &Sample::p99_ms, context.Pick(1.0, 50.0), 2},
-         {"restart", "s", &Sample::restart_s, context.Pick(0.2, 4.0), 2}});
+  if (context.Wants("standing")) {
+    context.report.Heading("The robot stands");
+    Soak(context, {"standing", &FastRobot::Stand, context.Pick(4.0, 0.5), kMostStanding_mib_per_hour}, server, robot);
+  }
 }
 
 void StudyIdle(StudyContext& context) {
