@@ -45,7 +45,7 @@ void FastRobot::OnPose(const PoseReport& pose) {
   const MutexLock lock(mutex_);
   const auto departure = departures_.find(pose.stamp);
   if (departure == departures_.end()) return;
-  latency_ms_.Add(std::chrono::duration<double, std::milli>(now - departure->second).count());
+  latency_ms_.push_back(std::chrono::duration<double, std::milli>(now - departure->second).count());
   departures_.erase(departures_.begin(), std::next(departure));
 }
 
@@ -87,11 +87,11 @@ void FastRobot::Stand(double seconds) {
   }
 }
 
-client::Percentiles FastRobot::TakeLatencies() {
+Distribution FastRobot::TakeLatencies() {
   OrThrow(client_->WaitSettled(kPatience_s));
   const MutexLock lock(mutex_);
   departures_.clear();
-  return std::exchange(latency_ms_, {});
+  return DistributionOf(std::exchange(latency_ms_, {}));
 }
 
 Ledger FastRobot::ledger() const {

@@ -3,15 +3,16 @@
 // Thread rule: one thread; poses arrive on threads of the wire.
 #pragma once
 
-#include <functional>
+#include <chrono>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
-#include "client/cli/percentiles.h"
 #include "client/lib/robot_client.h"
 #include "client/sim/fleet.h"
+#include "tests/studies/stopwatch.h"
 
 namespace cairn::studies {
 
@@ -24,7 +25,7 @@ class FastRobot {
   void Drive(double seconds);
   void Stand(double seconds);
   // Waits until all scans are settled, and takes the times from scan to pose since the last call (ms).
-  [[nodiscard]] client::Percentiles TakeLatencies();
+  [[nodiscard]] Distribution TakeLatencies();
   // The server's account of the scans.
   [[nodiscard]] Ledger ledger() const;
   [[nodiscard]] std::uint64_t scans() const { return scans_; }
@@ -42,7 +43,7 @@ class FastRobot {
   Pose2 T_odom_robot_;
   Mutex mutex_;
   std::map<Stamp, Clock::time_point> departures_ CAIRN_GUARDED_BY(mutex_);  // Of scans without a pose.
-  client::Percentiles latency_ms_ CAIRN_GUARDED_BY(mutex_);
+  std::vector<double> latency_ms_ CAIRN_GUARDED_BY(mutex_);
   std::unique_ptr<client::RobotClient> client_;  // Last: its callbacks use the above.
 };
 

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "tests/studies/fleet/live_server.h"
+#include "tests/studies/stopwatch.h"
 #include "tests/test_domain.h"
 
 namespace cairn::studies {
@@ -46,6 +47,10 @@ double SoakedServer::disk_mib() const {
     if (file.is_regular_file()) bytes += static_cast<double>(file.file_size());
   }
   return bytes / (1024.0 * 1024.0);
+}
+
+double SoakedServer::cpu_s() const {
+  return CpuSecondsOf(server_->pid());
 }
 
 double SoakedServer::RestartSeconds() const {

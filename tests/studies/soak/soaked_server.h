@@ -1,6 +1,6 @@
-// A cairnd with its state on the disk, as a process of its own, and what it costs over time: memory, disk, and the time
-// that another server would take to start on the same state. Throws std::runtime_error where something cannot be
-// measured. The server is killed at the end.
+// A cairnd with its state on the disk, as a process of its own, and what it costs over time: memory, disk, processor
+// time, and the time that another server would take to start on the same state. Throws std::runtime_error where
+// something cannot be measured. The server is killed at the end.
 #pragma once
 
 #include <filesystem>
@@ -17,6 +17,7 @@ class SoakedServer {
 
   [[nodiscard]] double resident_mib() const;
   [[nodiscard]] double disk_mib() const;
+  [[nodiscard]] double cpu_s() const;
   // Copies the state as a SIGKILL would leave it at this moment, and starts a server on the copy, in another domain.
   // Seconds until that is ready.
   [[nodiscard]] double RestartSeconds() const;
