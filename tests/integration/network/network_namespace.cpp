@@ -45,7 +45,7 @@ bool Raise(int socket, const char* device) {
 const char* Configure(int frames, const std::string& address) {
   ifreq tap = Named(kDevice);
   tap.ifr_flags = IFF_TAP | IFF_NO_PI;
-  if (ioctl(frames, TUNSETIFF, &tap) != 0) return "a TAP device";
+  if (ioctl(frames, TUNSETIFF, &tap) != 0) return "make a TAP device";
   const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   ifreq own = WithAddress(kDevice, address), mask = WithAddress(kDevice, "255.255.255.0");
   const bool works = socket >= 0 && ioctl(socket, SIOCSIFADDR, &own) == 0 &&
@@ -53,7 +53,7 @@ const char* Configure(int frames, const std::string& address) {
   const int error = errno;
   close(socket);
   errno = error;
-  return works ? nullptr : "an address of a TAP device";
+  return works ? nullptr : "give a TAP device an address";
 }
 
 }  // namespace
@@ -65,18 +65,18 @@ Result<NetworkNamespace> NetworkNamespace::Create(const std::string& address) {
   // Only this thread moves into the new namespace.
   std::thread([&] {
     if (unshare(CLONE_NEWNET) != 0) {
-      failed = "a network namespace";
+      failed = "make a network namespace";
     } else if ((made.namespace_ = open("/proc/thread-self/ns/net", O_RDONLY | O_CLOEXEC)) < 0) {
-      failed = "the name of a network namespace";
+      failed = "open a network namespace";
     } else if ((made.frames_ = open("/dev/net/tun", O_RDWR | O_NONBLOCK | O_CLOEXEC)) < 0) {
-      failed = "/dev/net/tun";
+      failed = "open /dev/net/tun";
     } else {
       failed = Configure(made.frames_, address);
     }
     error = errno;
   }).join();
   if (failed == nullptr) return made;
-  return Fail(StatusCode::kPermissionDenied, std::string("no ") + failed + ": " + std::strerror(error));
+  return Fail(StatusCode::kPermissionDenied, std::string("cannot ") + failed + ": " + std::strerror(error));
 }
 
 NetworkNamespace::~NetworkNamespace() {

@@ -94,7 +94,7 @@ class Network : public ::testing::Test {
   void SetUp() override {
     for (const char* address : {kServerAddress, kRobotAddress}) {
       auto made = NetworkNamespace::Create(address);
-      if (!made) GTEST_SKIP() << "SKIPPED: this system lets a test have " << made.error().message;
+      if (!made) GTEST_SKIP() << "SKIPPED: this user " << made.error().message;
       machines_.push_back(std::make_unique<NetworkNamespace>(std::move(*made)));
     }
     link_ = std::make_unique<FaultyLink>(machines_[0]->frames(), machines_[1]->frames(), 1);
