@@ -182,11 +182,14 @@ count() { # exit code
   local code=$1 row tests bad left
   summary=$(tail -n 1 "$log")
   if [ -s "$logs/$stage.xml" ]; then
-    read -ra row <<<"$(python3 -c '
-import sys, xml.etree.ElementTree
+    mapfile -t row <<<"$(python3 -c '
+import re, sys, xml.etree.ElementTree
 suite = xml.etree.ElementTree.parse(sys.argv[1]).getroot()
-not_run = [case.get("name") for case in suite.iter("testcase") if case.get("status") in ("notrun", "disabled")]
-print(suite.get("tests"), suite.get("failures"), len(not_run), *not_run)' "$logs/$stage.xml")"
+not_run = [case for case in suite.iter("testcase") if case.get("status") in ("notrun", "disabled")]
+print(suite.get("tests"), suite.get("failures"), len(not_run), sep="\n")
+for case in not_run:
+    why = re.search("SKIPPED: .*", case.findtext("system-out") or "")
+    print(case.get("name"), *([why.group()[9:]] if why else []), sep=": ")' "$logs/$stage.xml")"
     tests=${row[0]} bad=${row[1]} left=${row[2]}
     summary="$tests tests"
     passed=$((passed + tests - bad - left)) failed=$((failed + bad)) skipped=$((skipped + left))

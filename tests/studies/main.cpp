@@ -1,5 +1,5 @@
 // cairn-study runs measurements for people: `cairn-study list`, `cairn-study NAME [--out DIR] [--quick]
-// [--seed N] [--log F] [--only TEXT] [--seconds S] [--runs N]`.
+// [--seed N] [--log F] [--only TEXT] [--seconds S] [--hours H] [--runs N]`.
 // Exit codes: 0 done and plausible, 1 the study failed or a figure is not plausible, 2 wrong command line.
 #include <CLI/CLI.hpp>
 #include <exception>
@@ -49,7 +49,7 @@ int Main(int argc, char** argv) {
   std::string only;
   bool quick = false;
   std::uint64_t seed = 1;
-  double seconds = 0.0;
+  double seconds = 0.0, hours = 0.0;
   int runs = 0;
   CLI::App app{"Measures the estimators and draws the figures: tables, plots, a Markdown report."};
   app.set_version_flag("--version", std::string("cairn-study ") + kVersion);
@@ -60,6 +60,8 @@ int Main(int argc, char** argv) {
   app.add_option("--log", logs, "A log instead of the study's own choice; repeatable")->check(CLI::ExistingFile);
   app.add_option("--only", only, "For a study with several parts: run only those whose name contains this text");
   app.add_option("--seconds", seconds, "How long to measure, for a study that lets you choose")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--hours", hours, "How much simulated time, for a study that lets you choose")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--runs", runs, "How often to measure, for a study that lets you choose")
       ->check(CLI::NonNegativeNumber);
@@ -72,7 +74,7 @@ int Main(int argc, char** argv) {
   for (const Study& study : AllStudies()) {
     if (study.name != name) continue;
     Report report(out, "cairn-study " + name, std::cout);
-    return RunNamed(study, {report, quick, seed, logs, only, seconds, runs});
+    return RunNamed(study, {report, quick, seed, logs, only, seconds, hours, runs});
   }
   std::cerr << "cairn-study: no study is called '" << name << "'; `cairn-study list` prints them\n";
   return 2;

@@ -2,6 +2,8 @@
 // time; then only the processor time of this process can be compared, so both are printed.
 #pragma once
 
+#include <sys/types.h>
+
 #include <chrono>
 #include <ctime>
 #include <vector>
@@ -33,6 +35,8 @@ class Stopwatch {
 
 // Processor time in user mode of the whole process so far.
 [[nodiscard]] double UserCpuSeconds();
+// Processor time that another process has used so far. REQUIRES: there is such a process.
+[[nodiscard]] double CpuSecondsOf(pid_t pid);
 
 struct Distribution {
   double mean = 0.0, deviation = 0.0, median = 0.0, p95 = 0.0, p99 = 0.0, max = 0.0;

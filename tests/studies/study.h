@@ -24,8 +24,10 @@ struct StudyContext {
   std::string
       only{};  // --only: of a study in named parts or of named systems, those whose name contains this; empty: all.
 
-  // --seconds and --runs, for a study that names them: how long it measures, and how often. 0: the study's own choice.
+  // --seconds, --hours and --runs, for a study that names them: how long it measures, how much simulated time, and how
+  // often. 0: the study's own choice.
   double seconds = 0.0;
+  double hours = 0.0;
   int runs = 0;
 
   [[nodiscard]] bool Wants(const std::string& name) const { return name.find(only) != std::string::npos; }

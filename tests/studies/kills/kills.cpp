@@ -1,14 +1,11 @@
 // cairn-study kills ends cairnd with SIGKILL a thousand times while robots drive, and compares the results with those
 // of a server that is not killed. Then it measures the processor time that the store needs. Times are wall-clock times,
 // so no other program should run on the machine.
-#include <unistd.h>
-
 #include <algorithm>
-#include <fstream>
-#include <sstream>
 
 #include "tests/studies/fleet/live_server.h"
 #include "tests/studies/kills/restart.h"
+#include "tests/studies/stopwatch.h"
 #include "tests/studies/study.h"
 #include "tests/system/killed_fleet.h"
 #include "tests/temp_directory.h"
@@ -70,18 +67,6 @@ void StudyKills(StudyContext& context) {
   report.Expect(all.paths_that_differ == 0, "paths differ from those of an undisturbed server");
 }
 
-// Processor time that a process has used, in seconds: fields 14 and 15 of /proc/PID/stat (proc(5)).
-double CpuSeconds(pid_t pid) {
-  std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
-  std::string text((std::istreambuf_iterator<char>(file)), {});
-  std::istringstream fields(text.substr(text.rfind(')') + 2));
-  std::string skipped;
-  for (int i = 3; i < 14; ++i) fields >> skipped;
-  double user = 0.0, system = 0.0;
-  fields >> user >> system;
-  return (user + system) / static_cast<double>(sysconf(_SC_CLK_TCK));
-}
-
 struct Cost {
   double cpu_s = 0.0;
   std::string store_line;  // What the server logs about its store at the end.
@@ -91,11 +76,11 @@ Cost CostOf(const std::string& state, int seconds) {
   const std::string domain = std::to_string(test::TestDomain());
   ChildProcess server({ProgramPath("cairnd"), "--domain", domain, "--state", state});
   if (!server.Says(" ready")) throw std::runtime_error("cairnd does not start: " + server.Wait().output);
-  const double before = CpuSeconds(server.pid());
+  const double before = CpuSecondsOf(server.pid());
   ChildProcess fleet({ProgramPath("cairn"), "sim", "--site", "cost", "--robots", "4", "--beams", "360", "--hz", "10",
                       "--world", "building", "--seconds", std::to_string(seconds), "--domain", domain, "--json"});
   static_cast<void>(PrintedBy(fleet.Wait(LiveServer::kDeadline)));
-  Cost cost{CpuSeconds(server.pid()) - before, {}};
+  Cost cost{CpuSecondsOf(server.pid()) - before, {}};
   server.Signal(SIGTERM);
   const std::string output = server.Wait().output;
   if (const auto found = output.find("store: ", output.find(" ready")); found != std::string::npos)

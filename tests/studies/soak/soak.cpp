@@ -1,0 +1,215 @@
+// cairn-study soak lets a robot drive for a day of simulated time, as fast as a cairnd takes its scans, and then stand
+// for some hours: memory, disk, time from scan to pose, and the time that a restart would take, against time. What
+// grows although the robot only stands is kept for nothing. Then it measures the memory of sessions that do nothing.
+// --hours: of the drive (24); --only driving|standing|idle.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "client/sim/shipped_worlds.h"
+#include "tests/loopback.h"
+#include "tests/studies/soak/fast_robot.h"
+#include "tests/studies/soak/soaked_server.h"
+#include "tests/studies/stopwatch.h"
+#include "tests/studies/study.h"
+
+namespace cairn::studies {
+namespace {
+
+constexpr double kScanRate_hz = 10.0;
+constexpr double kWarmUp = 0.25;  // Share of a phase before the slopes: buffers grow to their sizes.
+constexpr int kMemoryLooks = 12;  // In the time of a sample.
+constexpr int kIdleSessions = 64;
+// What may grow: 12,000 keyframes an hour, of 20 KiB each; and for every scan its pose on the path (144 bytes in two
+// places) and its record in the journal.
+constexpr double kMostMemory_mib_per_hour = 240.0;
+constexpr double kMostStanding_mib_per_hour = 12.0;
+constexpr double kMostDisk_mib_per_hour = 150.0;
+
+struct Sample {
+  double hours = 0.0;
+  double resident_mib = 0.0;  // The least since the sample before: without what a checkpoint needs for a moment.
+  double peak_mib = 0.0;      // The most.
+  double disk_mib = 0.0;
+  double p50_ms = 0.0;
+  double p99_ms = 0.0;
+  double cpu_ms = 0.0;  // Processor time of the server for each scan.
+  double restart_s = 0.0;
+  double keyframes = 0.0;
+  double dropped = 0.0;
+};
+
+// A figure of the samples, and how much it may grow in an hour.
+struct Figure {
+  const char* name;
+  const char* unit;
+  double Sample::*value;
+  double most_per_hour;
+  int decimals;
+};
+
+// What the robot does meanwhile, and by how much memory may grow then.
+struct Phase {
+  const char* name;
+  void (FastRobot::*advance)(double seconds);
+  double hours;
+  double most_mib_per_hour;
+};
+
+// The median of the slopes between all pairs (Theil 1950, Sen 1968): single samples, such as those taken while a
+// checkpoint is made, do not move it.
+double SlopePerHour(const std::vector<Sample>& samples, double Sample::*value) {
+  const auto first = static_cast<std::size_t>(kWarmUp * static_cast<double>(samples.size()));
+  std::vector<double> slopes;
+  for (std::size_t i = first; i < samples.size(); ++i) {
+    for (std::size_t j = i + 1; j < samples.size(); ++j)
+      slopes.push_back((samples[j].*value - samples[i].*value) / (samples[j].hours - samples[i].hours));
+  }
+  return DistributionOf(std::move(slopes)).median;
+}
+
+sim::Fleet OneRobot(std::uint64_t seed) {
+  auto world = sim::OpenSurroundings("office");
+  if (!world) throw std::runtime_error(world.error().message);
+  sim::FleetOptions options;
+  options.robots = 1;
+  options.scan_hz = kScanRate_hz;
+  options.laser.beams = 181;
+  options.seed = seed;
+  auto fleet = sim::Fleet::Create(std::move(*world), options);
+  if (!fleet) throw std::runtime_error(fleet.error().message);
+  return std::move(*fleet);
+}
+
+// Everything there is to know of the server at this moment. The robot is between two scans.
+Sample Look(const SoakedServer& server, FastRobot& robot, Sample sample) {
+  const Distribution latency_ms = robot.TakeLatencies();
+  const Ledger ledger = robot.ledger();
+  if (ledger.used + ledger.dropped_total() != robot.scans()) throw std::runtime_error("a scan is not accounted for");
+  sample.hours = static_cast<double>(robot.scans()) / kScanRate_hz / 3600.0;
+  sample.disk_mib = server.disk_mib();
+  sample.p50_ms = latency_ms.median;
+  sample.p99_ms = latency_ms.p99;
+  sample.keyframes = static_cast<double>(ledger.keyframes);
+  sample.dropped = static_cast<double>(ledger.dropped_total());
+  sample.restart_s = server.RestartSeconds();
+  return sample;
+}
+
+std::vector<Sample> Watch(const StudyContext& context, const Phase& phase, const SoakedServer& server,
+                          FastRobot& robot) {
+  const double every_s = context.Pick(600.0, 180.0);
+  const auto count = static_cast<int>((context.hours > 0.0 ? context.hours : phase.hours) * 3600.0 / every_s + 0.5);
+  std::vector<Sample> samples;
+  for (int i = 0; i < count; ++i) {
+    Sample since{.resident_mib = std::numeric_limits<double>::infinity()};
+    const double cpu_s = server.cpu_s();
+    const auto scans = static_cast<double>(robot.scans());
+    for (int part = 0; part < kMemoryLooks; ++part) {
+      (robot.*phase.advance)(every_s / kMemoryLooks);
+      since.resident_mib = std::min(since.resident_mib, server.resident_mib());
+      since.peak_mib = std::max(since.peak_mib, server.resident_mib());
+    }
+    since.cpu_ms = 1e3 * (server.cpu_s() - cpu_s) / (static_cast<double>(robot.scans()) - scans);
+    samples.push_back(Look(server, robot, since));
+    const Sample& now = samples.back();
+    context.report.Progress(Number(now.hours, 2) + " h: " + Number(now.resident_mib, 1) + " to " +
+                            Number(now.peak_mib, 1) + " MiB, disk " + Number(now.disk_mib, 1) +
+                            " MiB, scan to pose p50 " + Number(now.p50_ms, 2) + " ms, p99 " + Number(now.p99_ms, 2) +
+                            " ms, processor " + Number(now.cpu_ms, 2) + " ms, restart " + Number(now.restart_s, 2) +
+                            " s");
+  }
+  return samples;
+}
+
+void Draw(Report& report, const std::string& phase, const Figure& figure, const std::vector<Sample>& samples) {
+  Plot plot{.title = phase + ": " + figure.name, .x = {"time", "h"}, .y = {figure.name, figure.unit}};
+  Series series;
+  for (const Sample& sample : samples) {
+    series.x.push_back(sample.hours);
+    series.y.push_back(sample.*figure.value);
+  }
+  plot.series = {series};
+  report.Add(plot, phase + " " + figure.name);
+}
+
+void Soak(StudyContext& context, const Phase& phase, const SoakedServer& server, FastRobot& robot) {
+  const std::vector<Sample> samples = Watch(context, phase, server, robot);
+  // Slopes of times over a few minutes are noise, so a quick run allows more.
+  const std::vector<Figure> figures = {
+      {"memory", "MiB", &Sample::resident_mib, phase.most_mib_per_hour, 1},
+      {"peak of memory", "MiB", &Sample::peak_mib, 5.0 * phase.most_mib_per_hour, 1},
+      {"disk", "MiB", &Sample::disk_mib, kMostDisk_mib_per_hour, 1},
+      {"latency p50", "ms", &Sample::p50_ms, context.Pick(0.1, 5.0), 2},
+      {"latency p99", "ms", &Sample::p99_ms, context.Pick(1.0, 200.0), 2},
+      {"processor time of a scan", "ms", &Sample::cpu_ms, context.Pick(0.1, 5.0), 2},
+      {"restart", "s", &Sample::restart_s, context.Pick(0.5, 10.0), 2},
+      {"dropped scans", "1", &Sample::dropped, 0.0, 0},
+  };
+  Report& report = context.report;
+  Table table({"figure", "first", "last", "per hour", "may grow per hour"});
+  for (const Figure& figure : figures) {
+    const double slope = SlopePerHour(samples, figure.value);
+    const std::string what = std::string(figure.name) + " (" + figure.unit + ")";
+    table.Add({what, Number(samples.front().*figure.value, figure.decimals),
+               Number(samples.back().*figure.value, figure.decimals), Number(slope, figure.decimals),
+               Number(figure.most_per_hour, figure.decimals)});
+    report.Expect(slope <= figure.most_per_hour,
+                  phase.name + (": " + what) + " grows by " + Number(slope, 2) + " in an hour");
+    Draw(report, phase.name, figure, samples);
+  }
+  report.Add(table, phase.name);
+  report.Text(Count(std::llround(SlopePerHour(samples, &Sample::keyframes))) + " keyframes an hour.");
+}
+
+void StudyTime(StudyContext& context) {
+  const SoakedServer server;
+  const auto bus = test::MakeBus("soak");
+  FastRobot robot(*bus, "robot", OneRobot(context.seed), kScanRate_hz);
+  if (context.Wants("driving")) {
+    context.report.Heading("A robot drives: 10 scans of 181 beams a second");
+    Soak(context, {"driving", &FastRobot::Drive, context.Pick(24.0, 0.25), kMostMemory_mib_per_hour}, server, robot);
+  } else {
+    robot.Drive(60.0);
+  }
+  if (context.Wants("standing")) {
+    context.report.Heading("The robot stands");
+    Soak(context, {"standing", &FastRobot::Stand, context.Pick(4.0, 0.5), kMostStanding_mib_per_hour}, server, robot);
+  }
+}
+
+void StudyIdle(StudyContext& context) {
+  Report& report = context.report;
+  report.Heading("Sessions that do nothing");
+  const SoakedServer server;
+  const auto bus = test::MakeBus("idle");
+  Table table({"sessions", "memory (MiB)", "per session (MiB)"});
+  const double empty_mib = server.resident_mib();
+  table.Add({"0", Number(empty_mib, 1), "-"});
+  const auto add = [&](const std::string& what) {
+    const double now_mib = server.resident_mib();
+    table.Add({Count(kIdleSessions) + what, Number(now_mib, 1), Number((now_mib - empty_mib) / kIdleSessions, 2)});
+  };
+  std::vector<std::unique_ptr<FastRobot>> robots;
+  for (int i = 0; i < kIdleSessions; ++i)
+    robots.push_back(std::make_unique<FastRobot>(*bus, "idle" + std::to_string(i + 1), OneRobot(1), kScanRate_hz));
+  add(", opened");
+  for (const auto& robot : robots) {
+    robot->Drive(1.0);
+    static_cast<void>(robot->TakeLatencies());
+  }
+  add(", after 10 scans each");
+  report.Add(table, "idle");
+}
+
+void StudySoak(StudyContext& context) {
+  if (context.Wants("driving") || context.Wants("standing")) StudyTime(context);
+  if (context.Wants("idle")) StudyIdle(context);
+}
+
+const Registration kSoak("soak", "a day of one robot: memory, disk, time to the pose and restart; idle sessions",
+                         StudySoak);
+
+}  // namespace
+}  // namespace cairn::studies

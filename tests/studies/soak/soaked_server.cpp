@@ -1,0 +1,66 @@
+#include "tests/studies/soak/soaked_server.h"
+
+#include <chrono>
+#include <fstream>
+#include <stdexcept>
+#include <string>
+
+#include "tests/studies/fleet/live_server.h"
+#include "tests/studies/stopwatch.h"
+#include "tests/test_domain.h"
+
+namespace cairn::studies {
+namespace {
+
+constexpr std::chrono::seconds kReady{600};
+
+// Of the server on the copy: TestDomain is at most 200, and a domain above 232 has no ports.
+std::int64_t OtherDomain() {
+  return 201 + test::TestDomain() % 30;
+}
+
+std::unique_ptr<ChildProcess> StartServer(std::int64_t domain, const std::filesystem::path& state) {
+  auto server = std::make_unique<ChildProcess>(
+      std::vector<std::string>{ProgramPath("cairnd"), "--domain", std::to_string(domain), "--state", state.string()});
+  if (!server->Says(" ready", kReady)) throw std::runtime_error("cairnd does not start: " + server->Wait().output);
+  return server;
+}
+
+}  // namespace
+
+SoakedServer::SoakedServer() : server_(StartServer(test::TestDomain(), directory_ / "state")) {}
+
+double SoakedServer::resident_mib() const {
+  std::ifstream status("/proc/" + std::to_string(server_->pid()) + "/status");
+  for (std::string word; status >> word;) {
+    if (word != "VmRSS:") continue;
+    double kib = 0.0;
+    status >> kib;
+    return kib / 1024.0;
+  }
+  throw std::runtime_error("cairnd has ended: " + server_->Wait().output);
+}
+
+double SoakedServer::disk_mib() const {
+  double bytes = 0.0;
+  for (const auto& file : std::filesystem::recursive_directory_iterator(directory_ / "state")) {
+    if (file.is_regular_file()) bytes += static_cast<double>(file.file_size());
+  }
+  return bytes / (1024.0 * 1024.0);
+}
+
+double SoakedServer::cpu_s() const {
+  return CpuSecondsOf(server_->pid());
+}
+
+double SoakedServer::RestartSeconds() const {
+  const TempDirectory copy;
+  server_->Signal(SIGSTOP);  // So that all files are of one moment.
+  std::filesystem::copy(directory_ / "state", copy / "state", std::filesystem::copy_options::recursive);
+  server_->Signal(SIGCONT);
+  const auto start = std::chrono::steady_clock::now();
+  const auto restarted = StartServer(OtherDomain(), copy / "state");
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace cairn::studies
