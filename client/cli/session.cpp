@@ -6,11 +6,12 @@ namespace cairn::client {
 namespace {
 
 ExitCode ShowStatus(Program& program, const std::string& robot) {
-  const auto robots = program.Ask([&](QueryClient& server) { return server.Robots(robot); });
-  if (!robots) return program.Refuse(robots.error());
-  std::string text = robots->empty() ? "no robot yet\n" : "";
-  for (const RobotStatus& status : *robots) text += FormatRobot(status);
-  return program.Print(text, {{"robots", *robots}});
+  const auto answer = program.Ask([&](QueryClient& server) { return server.StatusOf(robot); });
+  if (!answer) return program.Refuse(answer.error());
+  std::string text = answer->robots.empty() ? "no robot yet\n" : "";
+  for (const RobotStatus& status : answer->robots) text += FormatRobot(status);
+  text += FormatRefusals(answer->refused);
+  return program.Print(text, {{"robots", answer->robots}, {"refused", answer->refused}});
 }
 
 ExitCode EndSession(Program& program, const std::string& robot) {
@@ -25,6 +26,7 @@ void AddStatus(CLI::App& app, Program& program) {
   auto* command = app.add_subcommand("status", "Sessions, poses and ledgers of all robots, or of one");
   command->footer(
       "The ledger says what became of every scan: received = used + dropped (by reason) + waiting.\n"
+      "The last line counts what the server refused because of its sender. The server's log names the senders.\n"
       "EXAMPLES\n  cairn status\n  cairn status robot1 --json");
   auto robot = std::make_shared<std::string>();
   command->add_option("robot", *robot, "Only this robot");

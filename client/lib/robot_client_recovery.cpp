@@ -24,9 +24,9 @@ constexpr std::chrono::milliseconds kResendPause{500};  // While stale: what was
 }  // namespace
 
 Result<void> RobotClient::Advertise(Wire& wire) {
-  const auto advertise = [&wire](auto& publication) -> Result<void> {
+  const auto advertise = [this, &wire](auto& publication) -> Result<void> {
     using Value = typename std::remove_reference_t<decltype(*publication)>::ValueType;
-    auto made = wire.bus->Advertise<Value>();
+    auto made = wire.bus->Advertise<Value>(robot_);
     if (!made) return tl::unexpected(made.error());
     publication = std::move(*made);
     return {};

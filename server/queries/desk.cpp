@@ -101,7 +101,7 @@ std::optional<Answer> Desk::AnswerTo(const Request& request) {
     case RequestKind::kMapInfo:
       return AnswerMapInfo(request, request.site.empty() ? AllMaps() : MapOf(request.site));
     case RequestKind::kStatus:
-      return AnswerStatus(request, request.robot.empty() ? AllSessions() : SessionOf(request.robot));
+      return StatusReply(request);
     case RequestKind::kJobSubmit:
       return JobReply(request, SubmitJob(request));
     case RequestKind::kJobGet:
@@ -127,6 +127,18 @@ std::optional<Answer> Desk::AnswerTo(const Request& request) {
       return std::nullopt;
   }
   throw std::logic_error("the request has an unknown kind");
+}
+
+void Desk::SetRefusals(const Refusals& refusals) {
+  const MutexLock lock(mutex_);
+  refusals_ = refusals;
+}
+
+Reply Desk::StatusReply(const Request& request) {
+  Reply reply = AnswerStatus(request, request.robot.empty() ? AllSessions() : SessionOf(request.robot));
+  const MutexLock lock(mutex_);
+  reply.refused = {refusals_};
+  return reply;
 }
 
 Result<Job> Desk::SubmitJob(const Request& request) {

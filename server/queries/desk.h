@@ -11,6 +11,7 @@
 #include <string>
 #include <thread>
 
+#include "common/mutex.h"
 #include "server/jobs/job_worker.h"
 #include "server/maps/atlas.h"
 #include "server/ops/heartbeat.h"
@@ -30,6 +31,8 @@ class Desk {
 
   void Start();
   void Take(Request&& request);
+  // What the next answers about the status say. From any thread.
+  void SetRefusals(const Refusals& refusals);
   // Answers the waiting requests, then returns.
   void Stop();
   // Thread rule: any thread.
@@ -39,6 +42,7 @@ class Desk {
   // Sends a few parts of the answer; what is left waits for the client's next turn.
   void Serve(OpenRequest&& open);
   void Send(OpenRequest& open);
+  Reply StatusReply(const Request& request);
   // Returns nothing if the answer is sent later.
   std::optional<Answer> AnswerTo(const Request& request);
   Result<Job> SubmitJob(const Request& request);
@@ -56,6 +60,8 @@ class Desk {
   JobWorker& worker_;
   SiteShelf& shelf_;
   const Generation generation_;
+  Mutex mutex_;
+  Refusals refusals_ CAIRN_GUARDED_BY(mutex_);
   RequestQueue requests_;
   std::jthread thread_;  // The last member, because it uses the members above.
 };
