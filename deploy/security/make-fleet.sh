@@ -35,6 +35,7 @@ while [ $# -gt 0 ]; do
 done
 [ -n "$dir" ] || usage
 [[ $days =~ ^[1-9][0-9]{0,4}$ ]] || code=2 fail "--days: '$days' is not a number of days"
+[[ ! $robots$viewers$operators =~ [[:space:]] ]] || code=2 fail "names must not contain spaces"
 # The same names as everywhere in Cairn. In particular they contain nothing that XML or the shell would interpret.
 for name in ${robots//[,=+]/ } ${viewers//,/ } ${operators//,/ }; do
   [[ $name =~ ^[A-Za-z0-9_][A-Za-z0-9._-]{0,63}$ ]] ||
