@@ -1,11 +1,11 @@
 #include "common/wire/peer_watch.h"
 
+#include <fastdds/rtps/participant/ParticipantDiscoveryInfo.h>
+#include <fastdds/rtps/writer/WriterDiscoveryInfo.h>
 #include <fastrtps/utils/IPLocator.h>
 
 #include <algorithm>
 #include <fastdds/dds/log/Log.hpp>
-#include <fastdds/rtps/participant/ParticipantDiscoveryInfo.h>
-#include <fastdds/rtps/writer/WriterDiscoveryInfo.h>
 #include <mutex>
 #include <regex>
 #include <sstream>
@@ -20,7 +20,6 @@ namespace rtps = eprosima::fastrtps::rtps;
 // More than a fleet has. What a peer can make grow stays below it.
 constexpr std::size_t kMaxPeers = 4096;
 constexpr std::size_t kMaxWriters = 65536;
-constexpr std::size_t kMaxLines = 16;  // Between two calls of TakeLines.
 
 // The log of the library is one for the whole process, and so is this.
 struct LibraryLog {
@@ -148,7 +147,7 @@ void PeerWatch::on_publisher_discovery(Participant*, rtps::WriterDiscoveryInfo&&
 void PeerWatch::Forget(const Guid& participant) {
   const auto of_participant = [&](const Guid& writer) { return writer.guidPrefix == participant.guidPrefix; };
   std::erase_if(robots_, [&](const auto& writer) { return of_participant(writer.first); });
-  std::erase_if(impostors_, of_participant);
+  std::erase_if(named_, of_participant);
 }
 
 bool PeerWatch::MaySpeakFor(const Guid& writer, NameId robot) {
@@ -158,10 +157,8 @@ bool PeerWatch::MaySpeakFor(const Guid& writer, NameId robot) {
   const std::string own = known == robots_.end() ? "" : known->second;
   if (!own.empty() && HashName(own) == robot) return true;
   ++refusals_.samples;
-  if (impostors_.size() >= kMaxWriters) impostors_.clear();
-  if (impostors_.insert(writer).second) {
-    Say("samples of " + TextOf(writer) + " are refused: it writes in the name of another robot than '" + own + "'");
-  }
+  SayOf(writer,
+        "samples of " + TextOf(writer) + " are refused: it writes in the name of another robot than '" + own + "'");
   return false;
 }
 
@@ -189,15 +186,26 @@ void PeerWatch::Refuse(const Guid& guid, const std::string& reason) {
       " is refused: " + reason);
 }
 
+void PeerWatch::SayOf(const Guid& endpoint, const std::string& line) {
+  if (named_.size() >= kMaxWriters) named_.clear();
+  if (named_.insert(endpoint).second) Say(line);
+}
+
 void PeerWatch::Say(const std::string& line) {
-  if (lines_.size() < kMaxLines) lines_.push_back(line);
+  const auto now = Clock::now();
+  const double waited_s = std::chrono::duration<double>(now - std::exchange(allowed_at_, now)).count();
+  lines_allowed_ = std::min(kMaxLines, lines_allowed_ + waited_s * kLinesPerSecond);
+  if (lines_allowed_ < 1.0) return;
+  lines_allowed_ -= 1.0;
+  lines_.push_back(line);
 }
 
 void PeerWatch::OnLibraryError(const std::string& message) {
   // The texts of Fast DDS 2.9: `Error checking create remote writer <GUID> (<reason>)`, the same of a reader, and
   // `Error validating remote permissions for <GUID> (<reason>).`
-  static const std::regex kText("Error (checking create remote (?:writer|reader)|validating remote permissions for|"
-                                "checking remote participant) +([0-9a-f.|]+) \\((.*)\\)\\.?\\n?");
+  static const std::regex kText(
+      "Error (checking create remote (?:writer|reader)|validating remote permissions for|"
+      "checking remote participant) +([0-9a-f.|]+) \\((.*)\\)\\.?\\n?");
   std::smatch parts;
   if (!std::regex_match(message, parts, kText)) return;
   Guid guid;
@@ -208,7 +216,7 @@ void PeerWatch::OnLibraryError(const std::string& message) {
     return;
   }
   ++refusals_.endpoints;
-  Say("an endpoint of " + TextOf(guid) + " is refused: " + parts[3].str());
+  SayOf(guid, "an endpoint of " + TextOf(guid) + " is refused: " + parts[3].str());
 }
 
 }  // namespace cairn::wire

@@ -76,9 +76,18 @@ TEST_F(Watched, TheLogOfTheLibraryNamesRefusedEndpointsAndPeers) {
   watch_.OnLibraryError("Error of another kind (01.0f)");
   EXPECT_EQ(watch_.refusals(), (Refusals{.secure = true, .peers = 1, .endpoints = 1}));
   EXPECT_THAT(watch_.TakeLines(),
-              ElementsAre(HasSubstr("|0.0.1.3 is refused: x topic not found in allow rule."),
+              ElementsAre(HasSubstr("90.a0 is refused: x topic not found in allow rule."),
                           HasSubstr("peer 01.0f.10.20.30.40.50.60.70.80.90.a0 at an unknown address is refused: why")));
   EXPECT_THAT(watch_.TakeLines(), IsEmpty());
+}
+
+TEST_F(Watched, StrangersDoNotFillTheLog) {
+  for (int i = 0; i < 1000; ++i) {
+    watch_.OnLibraryError("Error validating remote permissions for 01.0f.10.20.30.40.50.60.70.80." +
+                          std::to_string(10 + i / 50) + "." + std::to_string(10 + i % 50) + "|0.0.1.c1 (why).");
+  }
+  EXPECT_EQ(watch_.refusals().peers, 1000u);
+  EXPECT_LE(watch_.TakeLines().size(), 33u);
 }
 
 TEST(UnsecuredWatch, LetsEverybodySpeak) {

@@ -24,8 +24,14 @@ struct SecureOutcome {
 };
 
 std::vector<std::string> ServerWith(const std::filesystem::path& security, const std::string& state) {
-  return {CAIRND_PATH, "--domain",  std::to_string(test::TestDomain()),      "--state",
-          state,       "--set",     "wire.security=" + security.string(),    "--set",
+  return {CAIRND_PATH,
+          "--domain",
+          std::to_string(test::TestDomain()),
+          "--state",
+          state,
+          "--set",
+          "wire.security=" + security.string(),
+          "--set",
           "slam.particles=20"};
 }
 
@@ -60,13 +66,32 @@ class SecureServer : public ::testing::Test {
     return outcome.out.empty() ? nlohmann::json() : nlohmann::json::parse(outcome.out)["refused"];
   }
 
+  // A viewer may write questions, and this is a command in the place of one.
+  static void CommandAmongQuestionsIsDenied() {
+    const auto viewer = test::MakeBus("viewer", test::SecureOptions(Fleet() / "viewers" / "v"));
+    test::Inbox<Reply> replies;
+    const auto subscription = test::Must(viewer->SubscribeReplies(5, replies.Sink()));
+    const auto requests = test::Must(viewer->Advertise<Request>());
+    Request submit;
+    submit.client = 5;
+    submit.kind = RequestKind::kJobSubmit;
+    submit.site = "hall";
+    ASSERT_TRUE(test::Eventually([&] {
+      test::Must(requests->Publish(submit));
+      return !replies.values().empty();
+    }));
+    EXPECT_EQ(replies.values().front().status.code, StatusCode::kPermissionDenied);
+    EXPECT_TRUE(test::Eventually([] { return Refused()["commands"] >= 1; }));
+  }
+
   const TempDirectory directory_;
   std::optional<ChildProcess> server_;
 };
 
 std::vector<std::string> Drive(const std::string& prefix, int robots) {
-  return {"sim",    "--robots", std::to_string(robots), "--prefix", prefix, "--seconds", "5", "--fast",
-          "--beams", "121",     "--site",               "hall",     "--first-stamp", "1000"};
+  return {
+      "sim",    "--robots", std::to_string(robots), "--prefix", prefix, "--seconds", "5", "--fast", "--beams", "121",
+      "--site", "hall",     "--first-stamp",        "1000"};
 }
 
 TEST_F(SecureServer, GivesEachRoleItsRightsAndSaysWhoWasRefused) {
@@ -88,14 +113,15 @@ TEST_F(SecureServer, GivesEachRoleItsRightsAndSaysWhoWasRefused) {
     Works("operators/o", command);
   }
   EXPECT_EQ(Refused()["peers"], 0);
+  CommandAmongQuestionsIsDenied();
 
   const SecureOutcome plain = Cairn("", {"ping"}, "2s");
   EXPECT_EQ(plain.code, ExitCode::kFailed);
   EXPECT_THAT(plain.err, HasSubstr("no server answers"));
-  ChildProcess hostile({CAIRN_HOSTILE_PEER, std::to_string(test::TestDomain()), (Fleet() / "viewers/v").string(),
-                        "command"});
-  ChildProcess impostor({CAIRN_HOSTILE_PEER, std::to_string(test::TestDomain()), (Fleet() / "robots/r2").string(),
-                         "scan", "r1", "r2"});
+  ChildProcess hostile(
+      {CAIRN_HOSTILE_PEER, std::to_string(test::TestDomain()), (Fleet() / "viewers/v").string(), "command"});
+  ChildProcess impostor(
+      {CAIRN_HOSTILE_PEER, std::to_string(test::TestDomain()), (Fleet() / "robots/r2").string(), "scan", "r1", "r2"});
   ASSERT_TRUE(test::Eventually([] {
     const auto refused = Refused();
     return refused["peers"] == 1 && refused["endpoints"] >= 1 && refused["samples"] >= 1;
