@@ -71,10 +71,11 @@ std::string FormatRobot(const RobotStatus& robot) {
 
 std::string FormatRefusals(const Refusals& refused) {
   if (!refused.secure && refused.commands == 0 && refused.datagrams == 0) return "";
-  return fmt::format("DDS Security {}; refused since the start: {} peers, {} endpoints, {} samples, {} commands, {} "
-                     "datagrams\n",
-                     refused.secure ? "on" : "off", refused.peers, refused.endpoints, refused.samples,
-                     refused.commands, refused.datagrams);
+  return fmt::format(
+      "DDS Security {}; refused since the start: {} peers, {} endpoints, {} samples, {} commands, {} "
+      "datagrams\n",
+      refused.secure ? "on" : "off", refused.peers, refused.endpoints, refused.samples, refused.commands,
+      refused.datagrams);
 }
 
 std::string FormatMap(const MapInfo& map) {

@@ -114,10 +114,10 @@ struct Reply {
   std::vector<MapInfo> maps;
   std::vector<RobotStatus> robots;
   std::vector<Job> jobs;
-  std::string server_version;    // kPing.
-  std::vector<SavedSite> saved;  // kSavedList; kSiteSave: the file that was written.
+  std::string server_version;     // kPing.
+  std::vector<SavedSite> saved;   // kSavedList; kSiteSave: the file that was written.
   std::vector<Refusals> refused;  // kStatus: one.
-  Generation generation = 0;     // Set by the server's egress.
+  Generation generation = 0;      // Set by the server's egress.
 };
 
 }  // namespace cairn

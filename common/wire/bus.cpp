@@ -69,7 +69,7 @@ Result<std::unique_ptr<Subscription>> Bus::SubscribeReplies(ClientId client, std
 
 // The macro's argument is a type and cannot be in parentheses. NOLINTBEGIN(bugprone-macro-parentheses)
 #define CAIRN_WIRE_VALUE(Value)                                                                       \
-  template Result<std::unique_ptr<Publication<Value>>> Bus::Advertise<Value>(const std::string&); \
+  template Result<std::unique_ptr<Publication<Value>>> Bus::Advertise<Value>(const std::string&);     \
   template Result<std::unique_ptr<Subscription>> Bus::Subscribe<Value>(std::function<void(Value &&)>, \
                                                                        SubscriptionEvents)
 // NOLINTEND(bugprone-macro-parentheses)

@@ -21,8 +21,8 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
   using Wire = typename Topic<Value>::Wire;
 
  public:
-  [[nodiscard]] static Result<std::unique_ptr<Publication<Value>>> Make(
-      const std::shared_ptr<Participant>& participant, const std::string& robot) {
+  [[nodiscard]] static Result<std::unique_ptr<Publication<Value>>> Make(const std::shared_ptr<Participant>& participant,
+                                                                        const std::string& robot) {
     auto made = std::make_unique<DdsPublication>();
     Result<Participant::Writer> writer =
         participant->MakeWriter(Topic<Value>::kProfile, made->type_, made.get(), robot);

@@ -326,8 +326,8 @@ DatagramFault Walk(Bytes datagram, Inspect inspect) {
 
 std::string_view DatagramFaultName(DatagramFault fault) {
   static constexpr std::array<std::string_view, kDatagramFaults> kNames = {
-      "none",  "not_rtps", "framing",      "statistics", "sequence",
-      "count", "unsent",   "sequence_set", "fragment",   "parameter_list", "security"};
+      "none",   "not_rtps",     "framing",  "statistics",     "sequence", "count",
+      "unsent", "sequence_set", "fragment", "parameter_list", "security"};
   return kNames[static_cast<std::size_t>(fault)];
 }
 

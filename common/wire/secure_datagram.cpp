@@ -64,8 +64,8 @@ class Cursor {
 bool HasSubject(Bytes pem) {
   const std::unique_ptr<BIO, int (*)(BIO*)> bio(BIO_new_mem_buf(pem.data(), static_cast<int>(pem.size())), BIO_free);
   const auto no_password = [](char*, int, int, void*) { return 0; };
-  const std::unique_ptr<X509, void (*)(X509*)> certificate(
-      PEM_read_bio_X509(bio.get(), nullptr, no_password, nullptr), X509_free);
+  const std::unique_ptr<X509, void (*)(X509*)> certificate(PEM_read_bio_X509(bio.get(), nullptr, no_password, nullptr),
+                                                           X509_free);
   ERR_clear_error();
   return certificate && X509_NAME_entry_count(X509_get_subject_name(certificate.get())) > 0;
 }
@@ -89,7 +89,7 @@ std::uint32_t BigEndian(Bytes bytes, std::size_t at) {
   return Cursor(bytes, false, at).U32().value_or(0xffffffff);
 }
 
-constexpr std::size_t kHeaderBytes = 20;   // CryptoHeader: kind 4, key 4, session 4, vector 8.
+constexpr std::size_t kHeaderBytes = 20;  // CryptoHeader: kind 4, key 4, session 4, vector 8.
 constexpr std::size_t kMacBytes = 16;
 constexpr std::size_t kReceiverMacBytes = 20;  // Key 4, MAC 16.
 
