@@ -1,7 +1,7 @@
 // What the guard must know of DDS Security before any key is known: the parts of datagrams that Fast DDS 2.9 decodes
 // before it has authenticated their sender. The library takes counts and lengths from them without a check, so that one
-// forged datagram would make it allocate gigabytes, read beyond a buffer or end with an exception; a part of this also
-// without security. Stateless, thread-safe.
+// forged datagram could make it allocate gigabytes, read beyond a buffer or end with an exception; a part of this also
+// without security. These faults were read in its source. Stateless, thread-safe.
 // Source: OMG DDS-SECURITY 1.1, sections 7.3.6, 7.4.3 and 9.5.2; Fast DDS 2.9.1: CDRMessage.hpp, PKIDH.cpp,
 // AESGCMGMAC_Transform.cpp.
 #pragma once
