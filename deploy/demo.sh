@@ -1,13 +1,19 @@
 #!/usr/bin/env bash
 # The demo builds Cairn, starts a server on its own DDS domain, and streams three simulated robots in one building
 # into one map. It asks for poses and tiles meanwhile, smooths the paths, and compares them with the truth.
-# Usage: deploy/demo.sh [LOG]. A robot log given as LOG is replayed into a second site. No display is needed.
+# Usage: deploy/demo.sh [--secure] [LOG]. A robot log given as LOG is replayed into a second site. No display is needed.
+# --secure: with DDS Security. Every program gets an identity and only the rights of its role (deploy/security/).
 # Output in demo-out/ (or $DEMO_OUT): report.md, map.png, building.yaml, trajectories, and the server's log.
 # DEMO_SECONDS (150) sets how long the robots drive, and DEMO_RATE (3) how much faster than real time. On a
 # slow machine they wait for the server.
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+secure=
+if [ "${1:-}" = --secure ]; then
+  secure=yes
+  shift
+fi
 log=${1:-}
 out=$(realpath -m "${DEMO_OUT:-$root/demo-out}")
 seconds=${DEMO_SECONDS:-150}
@@ -19,7 +25,7 @@ bin=$root/build/release/bin
 export CAIRN_DOMAIN=${CAIRN_DOMAIN:-$((60 + $$ % 42))}
 
 if [ $# -gt 1 ] || [ "$log" = --help ]; then
-  sed -n '2,7s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
+  sed -n '2,8s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
   [ "$log" = --help ] && exit 0
   exit 2
 fi
@@ -33,6 +39,11 @@ fi
 
 step() { printf '\n== %s\n' "$*"; }
 fail() { echo "demo: $*" >&2; exit 1; }
+
+# The options of one member of the fleet: server, robots/NAME, viewers/NAME or operators/NAME.
+as() { if [ -n "$secure" ]; then echo --set "wire.security=fleet/$1"; fi; }
+# Asks as a viewer, who may change nothing.
+ask() { "$bin/cairn" $(as viewers/desk) "$@"; }
 
 server=
 sim=
@@ -60,11 +71,16 @@ mkdir -p "$out/truth"
 cd "$out"
 began=$(date +%s)
 
+if [ -n "$secure" ]; then
+  step "making the identities of the fleet"
+  "$root/deploy/security/make-fleet.sh" fleet --robots "sim=robot1+robot2+robot3,log" --viewers desk --operators boss --days 1
+fi
+
 step "starting cairnd on domain $CAIRN_DOMAIN"
-"$bin/cairnd" --state none >cairnd.log 2>&1 &
+"$bin/cairnd" $(as server) --state none >cairnd.log 2>&1 &
 server=$!
 for attempt in $(seq 40); do
-  if "$bin/cairn" ping --timeout 500ms >ping.txt 2>/dev/null; then break; fi
+  if ask ping --timeout 500ms >ping.txt 2>/dev/null; then break; fi
   kill -0 "$server" 2>/dev/null || { cat cairnd.log >&2; fail "the server ended right after its start; its log is above"; }
   [ "$attempt" -lt 40 ] || fail "the server does not answer; see $out/cairnd.log"
   sleep 0.25
@@ -72,39 +88,43 @@ done
 cat ping.txt
 
 step "three robots drive through one building for $seconds s, at $rate times real time"
-"$bin/cairn" sim --world building --robots 3 --beams 360 --hz 10 --seconds "$seconds" --rate "$rate" --window 32 --site building \
+"$bin/cairn" $(as robots/sim) sim --world building --robots 3 --beams 360 --hz 10 --seconds "$seconds" --rate "$rate" --window 32 --site building \
   --truth-dir truth --watch-pid "$server" >sim.txt 2>sim-progress.txt &
 sim=$!
 while kill -0 "$sim" 2>/dev/null; do
   sleep 5
   kill -0 "$sim" 2>/dev/null || break
   tail -n 1 sim-progress.txt
-  for robot in "${robots[@]}"; do "$bin/cairn" pose "$robot" || true; done
-  "$bin/cairn" tiles --site building --level 2 | tail -n 1 || true
+  for robot in "${robots[@]}"; do ask pose "$robot" || true; done
+  ask tiles --site building --level 2 | tail -n 1 || true
 done
 wait "$sim" || { sim=; cat sim.txt sim-progress.txt >&2; fail "the simulation failed, or scans were lost; see above"; }
 sim=
 cat sim.txt
 
 step "asking the server for its state and the paths"
-"$bin/cairn" status | tee status.txt
-"$bin/cairn" map info --site building
-for robot in "${robots[@]}"; do "$bin/cairn" path "$robot" -o "$robot.tum"; done
-"$bin/cairn" map export --site building -o building-online.yaml
+ask status | tee status.txt
+ask map info --site building
+for robot in "${robots[@]}"; do ask path "$robot" -o "$robot.tum"; done
+ask map export --site building -o building-online.yaml
 
 step "smoothing the whole trajectories"
-"$bin/cairn" job smooth --site building --wait | tee job.txt
-for robot in "${robots[@]}"; do "$bin/cairn" path "$robot" --smoothed -o "$robot-smooth.tum"; done
-"$bin/cairn" map export --site building -o building.yaml
-"$bin/cairn" map draw --site building --paths robot1=robot1-smooth.tum robot2=robot2-smooth.tum robot3=robot3-smooth.tum \
+if [ -n "$secure" ]; then
+  echo "A viewer may not do this:"
+  if ask job smooth --site building; then fail "a viewer could submit a job"; fi
+fi
+"$bin/cairn" $(as operators/boss) job smooth --site building --wait | tee job.txt
+for robot in "${robots[@]}"; do ask path "$robot" --smoothed -o "$robot-smooth.tum"; done
+ask map export --site building -o building.yaml
+ask map draw --site building --paths robot1=robot1-smooth.tum robot2=robot2-smooth.tum robot3=robot3-smooth.tum \
   --title "Three robots, one building, one map" -o map.png
 
 if [ -n "$log" ]; then
   step "replaying the log $(basename "$log") into a second site, as fast as the server takes it"
-  "$bin/cairn" replay "$log" --site log --robot log --fast | tee replay.txt
-  "$bin/cairn" path log -o log.tum
-  "$bin/cairn" map export --site log -o log.yaml
-  "$bin/cairn" map draw --site log --paths log.tum --title "$(basename "$log")" -o log-map.png
+  "$bin/cairn" $(as robots/log) replay "$log" --site log --robot log --fast | tee replay.txt
+  ask path log -o log.tum
+  ask map export --site log -o log.yaml
+  ask map draw --site log --paths log.tum --title "$(basename "$log")" -o log-map.png
 fi
 
 step "computing the errors against the truth"

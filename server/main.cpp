@@ -44,7 +44,8 @@ void LogConfig(const CairndOptions& options) {
 
 // What the main thread checks while the server runs.
 struct Watched {
-  const Server& server;
+  wire::Bus& bus;
+  Server& server;
   const Outbound& outbound;
   const Ingress& ingress;
   const Egress& egress;
@@ -60,8 +61,15 @@ DoorCounts LossesOf(const Watched& watched) {
           .unpublished = watched.egress.unpublished()};
 }
 
-// Checks once a second for servers on other machines (they are discovered only when both run), for lost messages
-// and whether the store works.
+void TellRefusals(const Watched& watched) {
+  for (const std::string& line : watched.bus.TakeRefusalLines()) spdlog::warn("security: {}", line);
+  Refusals refusals = watched.bus.refusals();
+  refusals.commands = watched.ingress.commands_refused();
+  watched.server.SetRefusals(refusals);
+}
+
+// Checks once a second for servers on other machines (they are discovered only when both run), for refused peers,
+// for lost messages and whether the store works.
 void Look(asio::steady_timer& timer, const Watched& watched, DoorLosses& losses, ServiceStatus& status) {
   timer.expires_after(std::chrono::seconds(1));
   timer.async_wait([&](const asio::error_code& error) {
@@ -69,6 +77,7 @@ void Look(asio::steady_timer& timer, const Watched& watched, DoorLosses& losses,
     if (watched.others.Joined()) {
       spdlog::error("another server serves this DDS domain: clients get answers from both; stop one of them");
     }
+    TellRefusals(watched);
     const DoorCounts counts = LossesOf(watched);
     if (const auto line = losses.Check(counts, DoorLosses::Clock::now())) {
       spdlog::warn("{}", *line);
@@ -185,7 +194,7 @@ int Serve(const CairndOptions& options, const std::filesystem::path& state) {
   ServiceStatus service_status(notifier, serving);
   notifier.Ready(serving);
   spdlog::info("ready");
-  const Watched watched{server, outbound, **ingress, **egress, **others, kept->journal.get()};
+  const Watched watched{**bus, server, outbound, **ingress, **egress, **others, kept->journal.get()};
   WaitForSignal(context, signals, watched, notifier, service_status);
   notifier.Stopping();
 

@@ -42,6 +42,8 @@ class Server {
 
   // False if a thread or strand that has work has finished nothing for server.stall_limit_s.
   [[nodiscard]] bool healthy() const { return healthy_; }
+  // What `cairn status` says of refused peers.
+  void SetRefusals(const Refusals& refusals) { desk_.SetRefusals(refusals); }
   // Scans of streams without a session, beyond the first robots.max_unclaimed streams. They are in no ledger.
   [[nodiscard]] std::uint64_t uncounted_scans() const { return roster_.unclaimed_overflow(); }
 

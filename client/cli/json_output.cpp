@@ -92,6 +92,11 @@ void to_json(nlohmann::json& json, const SavedSite& saved) {
   json = {{"name", saved.name}, {"site", saved.site}, {"bytes", saved.bytes}, {"saved", saved.saved}};
 }
 
+void to_json(nlohmann::json& json, const Refusals& refused) {
+  json = {{"secure", refused.secure},   {"peers", refused.peers},       {"endpoints", refused.endpoints},
+          {"samples", refused.samples}, {"commands", refused.commands}, {"datagrams", refused.datagrams}};
+}
+
 void to_json(nlohmann::json& json, const Tile& tile) {
   json = {{"level", tile.key.level},   {"x", tile.key.x},
           {"y", tile.key.y},           {"epoch", tile.epoch},

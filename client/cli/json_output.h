@@ -22,6 +22,7 @@ void to_json(nlohmann::json& json, const MapInfo& map);
 void to_json(nlohmann::json& json, const Tile& tile);  // Without the tile's bytes, but with their number.
 void to_json(nlohmann::json& json, const Job& job);
 void to_json(nlohmann::json& json, const SavedSite& saved);
+void to_json(nlohmann::json& json, const Refusals& refused);
 void to_json(nlohmann::json& json, const LogComplaint& complaint);
 
 }  // namespace cairn

@@ -69,6 +69,15 @@ std::string FormatRobot(const RobotStatus& robot) {
   return text;
 }
 
+std::string FormatRefusals(const Refusals& refused) {
+  if (!refused.secure && refused.commands == 0 && refused.datagrams == 0) return "";
+  return fmt::format(
+      "DDS Security {}; refused since the start: {} peers, {} endpoints, {} samples, {} commands, {} "
+      "datagrams\n",
+      refused.secure ? "on" : "off", refused.peers, refused.endpoints, refused.samples, refused.commands,
+      refused.datagrams);
+}
+
 std::string FormatMap(const MapInfo& map) {
   std::string text = fmt::format("{}: {} tiles in {} levels of {} m, epoch {}, version {}, {} robots\n", map.site,
                                  map.tile_count, map.levels, map.resolution_m, map.epoch, map.version, map.robots);

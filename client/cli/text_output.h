@@ -15,6 +15,8 @@ namespace cairn::client {
 [[nodiscard]] std::string FormatJob(const Job& job);
 // The functions below return several lines, each with its line end.
 [[nodiscard]] std::string FormatRobot(const RobotStatus& robot);
+// What the server refused; empty where DDS Security is off and nothing was refused.
+[[nodiscard]] std::string FormatRefusals(const Refusals& refused);
 [[nodiscard]] std::string FormatMap(const MapInfo& map);
 [[nodiscard]] std::string FormatTrajectoryError(const TrajectoryError& error);
 [[nodiscard]] std::string FormatLogReport(const LogReport& report);

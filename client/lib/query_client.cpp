@@ -82,7 +82,16 @@ Result<std::shared_ptr<QueryClient::Wire>> QueryClient::Connect(wire::Bus& bus) 
   auto requests = bus.Advertise<Request>();
   if (!requests) return tl::unexpected(requests.error());
   wire->requests = std::move(*requests);
+  wire->commands = bus.Advertise<Command>();
+  if (!wire->commands && wire->commands.error().code != StatusCode::kPermissionDenied)
+    return tl::unexpected(wire->commands.error());
   return wire;
+}
+
+Result<void> QueryClient::Wire::Publish(const Request& request) const {
+  if (!IsCommand(request.kind)) return requests->Publish(request);
+  if (!commands) return tl::unexpected(commands.error());
+  return (*commands)->Publish({request});
 }
 
 std::shared_ptr<QueryClient::Wire> QueryClient::CurrentWire() {
@@ -124,9 +133,11 @@ void QueryClient::OnReply(Reply&& part) {
 
 Result<Reply> QueryClient::Ask(const Request& request) {
   const Deadline deadline = DeadlineAfter(options_.timeout_s);
+  const bool command = IsCommand(request.kind);
+  if (const auto wire = CurrentWire(); command && !wire->commands) return tl::unexpected(wire->commands.error());
   const bool repeatable = request.kind != RequestKind::kJobSubmit;
   for (Clock::duration patience = kFirstPatience;; patience *= 2) {
-    if (auto found = WaitForServer(deadline); !found) return tl::unexpected(found.error());
+    if (auto found = WaitForServer(command, deadline); !found) return tl::unexpected(found.error());
     const Deadline begun = repeatable ? std::min(deadline, Clock::now() + patience) : deadline;
     Result<Reply> reply = AskOnce(request, begun, deadline);
     if (reply && !reply->status.ok()) return tl::unexpected(reply->status);
@@ -137,14 +148,15 @@ Result<Reply> QueryClient::Ask(const Request& request) {
 // DDS matches the topic of requests and the topic of replies one after the other, on both sides. Until all four ends
 // have found their peers, an answer may be lost. Only an answered ping proves that they have; a ping may be repeated,
 // while a question that starts a job may not.
-Result<void> QueryClient::WaitForServer(Deadline deadline) {
+Result<void> QueryClient::WaitForServer(bool command, Deadline deadline) {
   constexpr std::chrono::milliseconds kPatience{100};
   Deadline began = Clock::now();
   for (;;) {
     {
       const MutexLock lock(mutex_);
-      if (server_found_) return {};
-      while (wire_->requests->matched() == 0 || wire_->replies->matched() == 0) {
+      const auto taken = [&] { return !command || (wire_->commands && (*wire_->commands)->matched() > 0); };
+      if (server_found_ && taken()) return {};
+      while (wire_->requests->matched() == 0 || wire_->replies->matched() == 0 || !taken()) {
         began = Clock::now();
         if (Clock::now() >= deadline) return Fail(StatusCode::kUnavailable, NoServer(bus_, options_.timeout_s));
         changed_.WaitFor(mutex_, std::chrono::milliseconds(5));
@@ -170,7 +182,7 @@ Result<Reply> QueryClient::AskOnce(Request request, Deadline begun, Deadline dea
     request.sequence = ++sequence_;
     pending_.try_emplace(request.sequence);
   }
-  const Result<void> published = CurrentWire()->requests->Publish(request);
+  const Result<void> published = CurrentWire()->Publish(request);
   const MutexLock lock(mutex_);
   const auto pending = pending_.find(request.sequence);
   const auto until = [&] { return pending->second.parts() > 0 ? deadline : begun; };
@@ -203,7 +215,8 @@ Result<PathAnswer> QueryClient::Path(const std::string& robot, bool smoothed) {
 
 Result<StatusAnswer> QueryClient::ServerStatus(const std::string& robot) {
   return Ask(AboutRobot(RequestKind::kStatus, robot)).map([](Reply&& reply) {
-    return StatusAnswer{std::move(reply.robots), std::move(reply.status.message)};
+    return StatusAnswer{std::move(reply.robots), std::move(reply.status.message),
+                        reply.refused.empty() ? Refusals{} : reply.refused.front()};
   });
 }
 

@@ -1,4 +1,5 @@
-// Asks the server and waits for the whole answer. There is one method per question. Each returns the answer, or the
+// Asks the server and waits for the whole answer. There is one method per question or command. A command that this
+// program's permissions do not allow is refused here (kPermissionDenied). Each returns the answer, or the
 // server's error (its code and message), or why there is no answer: kUnavailable where no server was found, and
 // kDeadlineExceeded if the answer was late. The time needed to find the server counts towards the timeout.
 // A question without an answer is asked again within the timeout, except one that starts a job, after an answered ping.
@@ -31,6 +32,7 @@ struct QueryClientOptions {
 struct StatusAnswer {
   std::vector<RobotStatus> robots;
   std::string degraded;  // Why new data is not stored; empty if it is, or if the server stores nothing.
+  Refusals refused;      // What the server has refused because of its sender.
 };
 
 struct PathAnswer {
@@ -119,12 +121,16 @@ class QueryClient {
   struct Wire {
     std::unique_ptr<wire::Bus> own;  // Null for the first, which uses the caller's.
     std::unique_ptr<wire::Publication<Request>> requests;
+    // Not every identity may send commands.
+    Result<std::unique_ptr<wire::Publication<Command>>> commands = nullptr;
+
+    [[nodiscard]] Result<void> Publish(const Request& request) const;
     std::unique_ptr<wire::Subscription> replies;
   };
   [[nodiscard]] Result<std::shared_ptr<Wire>> Connect(wire::Bus& bus);
   [[nodiscard]] std::shared_ptr<Wire> CurrentWire();
   void RenewIfSilent(Deadline began);
-  [[nodiscard]] Result<void> WaitForServer(Deadline deadline);
+  [[nodiscard]] Result<void> WaitForServer(bool command, Deadline deadline);
   [[nodiscard]] Result<Reply> Ask(const Request& request);
   [[nodiscard]] Result<Job> AskForJob(const Request& request);
   // `begun`: until when the first part must be here.

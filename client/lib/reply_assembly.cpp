@@ -39,6 +39,7 @@ Reply ReplyAssembly::Take() {
     Append(whole.robots, std::move(part.robots));
     Append(whole.jobs, std::move(part.jobs));
     Append(whole.saved, std::move(part.saved));
+    if (whole.refused.empty()) whole.refused = std::move(part.refused);
   }
   Reply& last = parts_.at(last_part_);
   whole.client = last.client;

@@ -26,6 +26,7 @@ bool IsTemporary(StatusCode code) {
 
 RobotClient::RobotClient(SessionRequest request, Callbacks callbacks, const RobotClientOptions& options)
     : client_(NewClientId()),
+      robot_(request.robot),
       robot_id_(HashName(request.robot)),
       callbacks_(std::move(callbacks)),
       options_(options),

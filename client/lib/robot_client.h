@@ -147,6 +147,7 @@ class RobotClient {
   void DropRetired();
 
   const ClientId client_;
+  const std::string robot_;
   const NameId robot_id_;
   const Callbacks callbacks_;
   const RobotClientOptions options_;

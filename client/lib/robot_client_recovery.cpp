@@ -25,9 +25,9 @@ constexpr std::chrono::milliseconds kResendPause{
 }  // namespace
 
 Result<void> RobotClient::Advertise(Wire& wire) {
-  const auto advertise = [&wire](auto& publication) -> Result<void> {
+  const auto advertise = [this, &wire](auto& publication) -> Result<void> {
     using Value = typename std::remove_reference_t<decltype(*publication)>::ValueType;
-    auto made = wire.bus->Advertise<Value>();
+    auto made = wire.bus->Advertise<Value>(robot_);
     if (!made) return tl::unexpected(made.error());
     publication = std::move(*made);
     return {};

@@ -13,4 +13,29 @@ std::string_view RequestKindName(RequestKind kind) {
   return index < kNames.size() ? kNames[index] : "unknown";
 }
 
+bool IsCommand(RequestKind kind) {
+  switch (kind) {
+    case RequestKind::kJobSubmit:
+    case RequestKind::kJobCancel:
+    case RequestKind::kSessionEnd:
+    case RequestKind::kMapEnable:
+    case RequestKind::kSiteSave:
+    case RequestKind::kSiteLoad:
+    case RequestKind::kSiteDelete:
+      return true;
+    case RequestKind::kPing:
+    case RequestKind::kPose:
+    case RequestKind::kPath:
+    case RequestKind::kTiles:
+    case RequestKind::kLandmarks:
+    case RequestKind::kMapInfo:
+    case RequestKind::kStatus:
+    case RequestKind::kJobGet:
+    case RequestKind::kJobList:
+    case RequestKind::kSavedList:
+      break;
+  }
+  return false;
+}
+
 }  // namespace cairn

@@ -12,6 +12,7 @@
 #include "common/service/ledger.h"
 #include "common/service/map_info.h"
 #include "common/service/pose_report.h"
+#include "common/service/refusals.h"
 #include "common/service/session.h"
 #include "common/status.h"
 
@@ -38,6 +39,8 @@ enum class RequestKind : std::uint8_t {
 };
 inline constexpr int kRequestKindCount = 17;
 [[nodiscard]] std::string_view RequestKindName(RequestKind kind);
+// Whether it changes something, and is therefore sent as a Command.
+[[nodiscard]] bool IsCommand(RequestKind kind);
 
 struct Area {
   double x_min_m = 0, y_min_m = 0, x_max_m = 0, y_max_m = 0;  // All 0: everywhere.
@@ -62,6 +65,11 @@ struct Request {
   bool enable = true;             // kJobSubmit: enable the map version it makes.
   std::uint32_t map_version = 0;  // kMapEnable.
   std::string saved;              // kSiteSave, kSiteLoad: the name of a file in the server's directory of saved sites.
+};
+
+// A request that changes something. It has a topic of its own, because DDS Security gives permissions by topic.
+struct Command {
+  Request request;
 };
 
 struct LandmarkReport {
@@ -106,9 +114,10 @@ struct Reply {
   std::vector<MapInfo> maps;
   std::vector<RobotStatus> robots;
   std::vector<Job> jobs;
-  std::string server_version;    // kPing.
-  std::vector<SavedSite> saved;  // kSavedList; kSiteSave: the file that was written.
-  Generation generation = 0;     // Set by the server's egress.
+  std::string server_version;     // kPing.
+  std::vector<SavedSite> saved;   // kSavedList; kSiteSave: the file that was written.
+  std::vector<Refusals> refused;  // kStatus: one.
+  Generation generation = 0;      // Set by the server's egress.
 };
 
 }  // namespace cairn

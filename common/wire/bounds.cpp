@@ -203,6 +203,7 @@ Result<void> CheckBounds(const v1::Reply& reply) {
       .Each("jobs", reply.jobs(), kMaxReplyJobs)
       .Text("server_version", reply.server_version())
       .Each("saved", reply.saved(), kMaxReplySaved)
+      .AtMost("refused", reply.refused().size(), 1)
       .result();
 }
 

@@ -28,6 +28,12 @@ class DdsBus final : public Bus {
     }
     return text.empty() ? "none" : text;
   }
+  Refusals refusals() const override {
+    Refusals refusals = participant_->peers().refusals();
+    refusals.datagrams = datagrams_refused();
+    return refusals;
+  }
+  std::vector<std::string> TakeRefusalLines() override { return participant_->peers().TakeLines(); }
 
  private:
   const std::shared_ptr<Participant> participant_;
@@ -47,8 +53,8 @@ Result<std::unique_ptr<Bus>> Bus::Create(const WireOptions& options, const std::
 }
 
 template <typename Value>
-Result<std::unique_ptr<Publication<Value>>> Bus::Advertise() {
-  return DdsPublication<Value>::Make(ParticipantOf(*this));
+Result<std::unique_ptr<Publication<Value>>> Bus::Advertise(const std::string& robot) {
+  return DdsPublication<Value>::Make(ParticipantOf(*this), robot);
 }
 
 template <typename Value>
@@ -63,7 +69,7 @@ Result<std::unique_ptr<Subscription>> Bus::SubscribeReplies(ClientId client, std
 
 // The macro's argument is a type and cannot be in parentheses. NOLINTBEGIN(bugprone-macro-parentheses)
 #define CAIRN_WIRE_VALUE(Value)                                                                       \
-  template Result<std::unique_ptr<Publication<Value>>> Bus::Advertise<Value>();                       \
+  template Result<std::unique_ptr<Publication<Value>>> Bus::Advertise<Value>(const std::string&);     \
   template Result<std::unique_ptr<Subscription>> Bus::Subscribe<Value>(std::function<void(Value &&)>, \
                                                                        SubscriptionEvents)
 // NOLINTEND(bugprone-macro-parentheses)
@@ -78,6 +84,7 @@ CAIRN_WIRE_VALUE(MapInfo);
 CAIRN_WIRE_VALUE(TileSample);
 CAIRN_WIRE_VALUE(Job);
 CAIRN_WIRE_VALUE(Request);
+CAIRN_WIRE_VALUE(Command);
 CAIRN_WIRE_VALUE(Reply);
 #undef CAIRN_WIRE_VALUE
 

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "common/options/option_visitor.h"
+#include "common/service/refusals.h"
 #include "common/service/request.h"
 #include "common/service/stream.h"
 #include "common/status.h"
@@ -27,6 +28,8 @@ struct WireOptions {
   std::vector<std::string> interfaces = {"127.0.0.1"};  // Addresses to bind. They must be named one by one.
   double liveliness_lease_s = 1.0;
   double participant_lease_s = 3.0;
+  // Directory with the identity and the permissions of this program (deploy/security). Empty: no DDS Security.
+  std::string security;
 };
 // Checks domain, addresses (IPv4, each once) and leases, independently of the machine.
 [[nodiscard]] Result<void> Validate(const WireOptions& options);
@@ -70,14 +73,16 @@ class Subscription {
 };
 
 // Value is one of: SessionRequest, SessionState, SessionRefusal, ScanSample, OdometrySample, PoseReport, Ledger,
-// MapInfo, TileSample, Job, Request, Reply. Publications and subscriptions may outlive the Bus that made them.
+// MapInfo, TileSample, Job, Request, Command, Reply. Publications and subscriptions may outlive the Bus that made them.
 class Bus {
  public:
   virtual ~Bus() = default;
   [[nodiscard]] static Result<std::unique_ptr<Bus>> Create(const WireOptions& options, const std::string& name);
 
+  // `robot`: whose stream it is (SessionRequest, ScanSample, OdometrySample). With security, the subscribers drop
+  // what is about another robot. kPermissionDenied: this program's permissions do not allow it.
   template <typename Value>
-  [[nodiscard]] Result<std::unique_ptr<Publication<Value>>> Advertise();
+  [[nodiscard]] Result<std::unique_ptr<Publication<Value>>> Advertise(const std::string& robot = {});
   template <typename Value>
   [[nodiscard]] Result<std::unique_ptr<Subscription>> Subscribe(std::function<void(Value&&)> on_value,
                                                                 SubscriptionEvents events = {});
@@ -91,6 +96,10 @@ class Bus {
   [[nodiscard]] virtual std::uint64_t datagrams_refused() const = 0;
   // The same by reason, for people: "12 framing, 3 sequence"; "none" where there are none.
   [[nodiscard]] virtual std::string refused_by_reason() const = 0;
+  // What was refused because of its sender. `commands` is not counted here.
+  [[nodiscard]] virtual Refusals refusals() const = 0;
+  // For the program's log: who was refused since the last call, and why. Each peer once, and a bounded number.
+  [[nodiscard]] virtual std::vector<std::string> TakeRefusalLines() = 0;
 
  protected:
   Bus() = default;

@@ -30,6 +30,9 @@ namespace cairn::wire {
 [[nodiscard]] v1::Job ToWire(const Job& value);
 [[nodiscard]] v1::Request ToWire(const Request& value);
 [[nodiscard]] v1::Reply ToWire(const Reply& value);
+[[nodiscard]] inline v1::Request ToWire(const Command& value) {
+  return ToWire(value.request);
+}
 
 // FromWire moves the large members (ranges, bytes) out of its argument.
 [[nodiscard]] SessionRequest FromWire(v1::SessionRequest&& wire);

@@ -84,6 +84,20 @@ static SavedSite FromWire(v1::SavedSite&& wire) {
   return {std::move(wire.name()), std::move(wire.site()), wire.bytes(), wire.saved_ns()};
 }
 
+static v1::Refusals ToWire(const Refusals& value) {
+  v1::Refusals wire;
+  wire.secure(value.secure);
+  wire.peers(value.peers);
+  wire.endpoints(value.endpoints);
+  wire.samples(value.samples);
+  wire.commands(value.commands);
+  wire.datagrams(value.datagrams);
+  return wire;
+}
+static Refusals FromWire(v1::Refusals&& wire) {
+  return {wire.secure(), wire.peers(), wire.endpoints(), wire.samples(), wire.commands(), wire.datagrams()};
+}
+
 // Convert a list element by element, in both directions.
 template <typename Wires, typename Values>
 static void ListToWire(const Values& values, Wires& wires) {
@@ -163,6 +177,7 @@ v1::Reply ToWire(const Reply& value) {
   ListToWire(value.robots, wire.robots());
   ListToWire(value.jobs, wire.jobs());
   ListToWire(value.saved, wire.saved());
+  ListToWire(value.refused, wire.refused());
   wire.server_version(value.server_version);
   return wire;
 }
@@ -185,6 +200,7 @@ Reply FromWire(v1::Reply&& wire) {
   ListFromWire(wire.robots(), value.robots);
   ListFromWire(wire.jobs(), value.jobs);
   ListFromWire(wire.saved(), value.saved);
+  ListFromWire(wire.refused(), value.refused);
   value.server_version = std::move(wire.server_version());
   return value;
 }

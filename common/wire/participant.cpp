@@ -8,6 +8,8 @@
 #include <fastdds/dds/log/Log.hpp>
 #include <mutex>
 
+#include "common/wire/security.h"
+
 #ifdef CAIRN_ADDRESS_SANITIZER
 // Fast DDS 2.9 deletes one of its own objects with the wrong size (RTPSWriter::~RTPSWriter). With this check,
 // the address sanitizer would stop every program at the end of its first publication. All other checks stay
@@ -53,6 +55,7 @@ fd::DomainParticipantQos ParticipantQos(const WireOptions& options, const std::s
   builtin.discovery_config.leaseDuration = Duration_t(options.participant_lease_s);
   builtin.discovery_config.leaseDuration_announcementperiod =
       Duration_t(std::min(options.participant_lease_s / 3.0, kMaxAnnouncementPeriodS));
+  if (!options.security.empty()) AddSecurity(options.security, qos);
   builtin.readerHistoryMemoryPolicy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
   builtin.writerHistoryMemoryPolicy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
   return qos;
@@ -91,18 +94,26 @@ Status Broken(const std::string& what) {
 Result<std::shared_ptr<Participant>> Participant::Create(const WireOptions& options, const std::string& name) {
   if (const Result<void> valid = Validate(options); !valid) return tl::unexpected(valid.error());
   if (const Result<void> present = RequireInterfaces(options); !present) return tl::unexpected(present.error());
+  if (!options.security.empty()) {
+    if (const Result<void> usable = CheckSecurityFiles(options.security); !usable)
+      return tl::unexpected(usable.error());
+  }
   ConfigureLibraryOnce();
   const std::shared_ptr<Participant> made(new Participant(options));
   made->participant_ = fd::DomainParticipantFactory::get_instance()->create_participant(
-      static_cast<fd::DomainId_t>(options.domain), ParticipantQos(options, name, made->datagrams_refused_), nullptr,
-      fd::StatusMask::none());
+      static_cast<fd::DomainId_t>(options.domain), ParticipantQos(options, name, made->datagrams_refused_),
+      made->peers_.get(), fd::StatusMask::none());
   if (made->participant_ == nullptr) {
     return Fail(StatusCode::kUnavailable, "cannot join DDS domain " + std::to_string(options.domain) +
-                                              ": no free port or address, or the domain is full");
+                                              ": no free port or address, or the domain is full" +
+                                              (made->secure() ? ", or Fast DDS refused wire.security" : ""));
   }
-  made->publisher_ = made->participant_->create_publisher(fd::PUBLISHER_QOS_DEFAULT);
   made->subscriber_ = made->participant_->create_subscriber(fd::SUBSCRIBER_QOS_DEFAULT);
-  if (made->publisher_ == nullptr || made->subscriber_ == nullptr) return tl::unexpected(Broken("a publisher"));
+  fd::SubscriberQos every_partition;
+  every_partition.partition().push_back("*");
+  if (made->secure()) made->robots_ = made->participant_->create_subscriber(every_partition);
+  if (made->subscriber_ == nullptr || (made->secure() && made->robots_ == nullptr))
+    return tl::unexpected(Broken("a subscriber"));
   return made;
 }
 
@@ -112,10 +123,29 @@ Participant::~Participant() {
   fd::DomainParticipantFactory::get_instance()->delete_participant(participant_);
 }
 
+// Fast DDS gives no reason. With security there is one that is likely.
+Status Participant::NotMade(const std::string& what) const {
+  if (!secure()) return Broken(what);
+  return {StatusCode::kPermissionDenied, "the permissions in " + options_.security + " do not allow " + what};
+}
+
+fd::Publisher* Participant::PublisherFor(const std::string& partition) {
+  const MutexLock lock(mutex_);
+  fd::Publisher*& publisher = publishers_[partition];
+  if (publisher == nullptr) {
+    fd::PublisherQos qos;
+    if (!partition.empty()) qos.partition().push_back(partition.c_str());
+    publisher = participant_->create_publisher(qos);
+  }
+  return publisher;
+}
+
 Result<fd::Topic*> Participant::FindTopic(const TopicProfile& profile, const fd::TypeSupport& type) {
   const MutexLock lock(mutex_);
   if (const auto known = topics_.find(profile.name); known != topics_.end()) return known->second;
-  if (type.register_type(participant_) != ReturnCode_t::RETCODE_OK) {
+  // Two topics may have one type.
+  if (participant_->find_type(type.get_type_name()).empty() &&
+      type.register_type(participant_) != ReturnCode_t::RETCODE_OK) {
     return tl::unexpected(Broken(std::string("type ") + type.get_type_name()));
   }
   fd::Topic* topic = participant_->create_topic(profile.name, type.get_type_name(), fd::TOPIC_QOS_DEFAULT);
@@ -125,7 +155,7 @@ Result<fd::Topic*> Participant::FindTopic(const TopicProfile& profile, const fd:
 }
 
 Result<Participant::Writer> Participant::MakeWriter(const TopicProfile& profile, const fd::TypeSupport& type,
-                                                    fd::DataWriterListener* listener) {
+                                                    fd::DataWriterListener* listener, const std::string& robot) {
   const Result<fd::Topic*> topic = FindTopic(profile, type);
   if (!topic) return tl::unexpected(topic.error());
   fd::DataWriterQos qos;
@@ -136,8 +166,14 @@ Result<Participant::Writer> Participant::MakeWriter(const TopicProfile& profile,
   times.heartbeatPeriod = Duration_t(profile.heartbeat_ms * 1e-3);
   times.nackResponseDelay = Duration_t(0.002);
   if (profile.deadline_s > 0) qos.deadline().period = Duration_t(profile.deadline_s);
-  fd::DataWriter* writer = publisher_->create_datawriter(*topic, qos, listener);
-  if (writer == nullptr) return tl::unexpected(Broken(std::string("a writer of ") + profile.name));
+  const std::string partition = secure() && profile.of_robot ? robot : "";
+  fd::Publisher* publisher = PublisherFor(partition);
+  if (publisher == nullptr) return tl::unexpected(Broken("a publisher"));
+  fd::DataWriter* writer = publisher->create_datawriter(*topic, qos, listener);
+  if (writer == nullptr) {
+    return tl::unexpected(NotMade(std::string("a writer of ") + profile.name +
+                                  (partition.empty() ? "" : " for the robot '" + partition + "'")));
+  }
   return Writer(writer, WriterDeleter{shared_from_this()});
 }
 
@@ -151,17 +187,18 @@ Result<Participant::Reader> Participant::MakeReader(const TopicProfile& profile,
   const int instances = profile.max_instances == 1 ? 1 : 2 * profile.max_instances;
   SetCommon(profile, profile.reader_depth, instances, options_, qos);
   qos.reliable_reader_qos().times.heartbeatResponseDelay = Duration_t(0.001);
-  fd::DataReader* reader = subscriber_->create_datareader(*topic, qos, listener);
-  if (reader == nullptr) return tl::unexpected(Broken(std::string("a reader of ") + profile.name));
+  fd::Subscriber* subscriber = secure() && profile.of_robot ? robots_ : subscriber_;
+  fd::DataReader* reader = subscriber->create_datareader(*topic, qos, listener);
+  if (reader == nullptr) return tl::unexpected(NotMade(std::string("a reader of ") + profile.name));
   return Reader(reader, ReaderDeleter{shared_from_this()});
 }
 
 void Participant::WriterDeleter::operator()(fd::DataWriter* writer) const {
-  participant->publisher_->delete_datawriter(writer);
+  const_cast<fd::Publisher*>(writer->get_publisher())->delete_datawriter(writer);
 }
 
 void Participant::ReaderDeleter::operator()(fd::DataReader* reader) const {
-  participant->subscriber_->delete_datareader(reader);
+  const_cast<fd::Subscriber*>(reader->get_subscriber())->delete_datareader(reader);
 }
 
 }  // namespace cairn::wire

@@ -19,6 +19,7 @@
 #include "common/mutex.h"
 #include "common/wire/bus.h"
 #include "common/wire/guard_transport.h"
+#include "common/wire/peer_watch.h"
 #include "common/wire/topics.h"
 
 namespace cairn::wire {
@@ -43,25 +44,34 @@ class Participant : public std::enable_shared_from_this<Participant> {
   Participant(const Participant&) = delete;
   Participant& operator=(const Participant&) = delete;
 
-  // The listener is called from creation until the entity is deleted, and must outlive it.
+  // The listener is called from creation until the entity is deleted, and must outlive it. `robot`: whose stream it
+  // is, where the topic belongs to robots; it counts only with security. kPermissionDenied: the permissions of this
+  // participant do not allow it.
   [[nodiscard]] Result<Writer> MakeWriter(const TopicProfile& profile, const fd::TypeSupport& type,
-                                          fd::DataWriterListener* listener);
+                                          fd::DataWriterListener* listener, const std::string& robot = {});
   [[nodiscard]] Result<Reader> MakeReader(const TopicProfile& profile, const fd::TypeSupport& type,
                                           fd::DataReaderListener* listener);
 
   [[nodiscard]] const WireOptions& options() const { return options_; }
   [[nodiscard]] const RefusedDatagrams& datagrams_refused() const { return *datagrams_refused_; }
+  [[nodiscard]] PeerWatch& peers() const { return *peers_; }
 
  private:
-  explicit Participant(const WireOptions& options) : options_(options) {}
+  explicit Participant(const WireOptions& options)
+      : options_(options), peers_(PeerWatch::Make(!options.security.empty())) {}
+  [[nodiscard]] bool secure() const { return !options_.security.empty(); }
+  [[nodiscard]] Status NotMade(const std::string& what) const;
+  [[nodiscard]] fd::Publisher* PublisherFor(const std::string& partition);
   [[nodiscard]] Result<fd::Topic*> FindTopic(const TopicProfile& profile, const fd::TypeSupport& type);
 
   const WireOptions options_;
   const std::shared_ptr<RefusedDatagrams> datagrams_refused_ = std::make_shared<RefusedDatagrams>();
+  const std::shared_ptr<PeerWatch> peers_;        // The participant's listener.
   fd::DomainParticipant* participant_ = nullptr;  // Set once by Create.
-  fd::Publisher* publisher_ = nullptr;
   fd::Subscriber* subscriber_ = nullptr;
+  fd::Subscriber* robots_ = nullptr;  // Of all robots' partitions; only with security.
   Mutex mutex_;
+  std::map<std::string, fd::Publisher*> publishers_ CAIRN_GUARDED_BY(mutex_);  // By partition.
   std::map<std::string, fd::Topic*> topics_ CAIRN_GUARDED_BY(mutex_);
 };
 

@@ -21,10 +21,11 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
   using Wire = typename Topic<Value>::Wire;
 
  public:
-  [[nodiscard]] static Result<std::unique_ptr<Publication<Value>>> Make(
-      const std::shared_ptr<Participant>& participant) {
+  [[nodiscard]] static Result<std::unique_ptr<Publication<Value>>> Make(const std::shared_ptr<Participant>& participant,
+                                                                        const std::string& robot) {
     auto made = std::make_unique<DdsPublication>();
-    Result<Participant::Writer> writer = participant->MakeWriter(Topic<Value>::kProfile, made->type_, made.get());
+    Result<Participant::Writer> writer =
+        participant->MakeWriter(Topic<Value>::kProfile, made->type_, made.get(), robot);
     if (!writer) return tl::unexpected(writer.error());
     made->participant_ = participant;
     made->writer_ = std::move(*writer);

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "common/wire/limits.h"
+#include "common/wire/secure_datagram.h"
 
 namespace cairn::wire {
 namespace {
@@ -134,6 +135,27 @@ bool IsDiscoveryWriter(Bytes entity) {
   return entity[3] == kBuiltinWriterWithKey && (is(kParticipants) || is(kWriters) || is(kReaders));
 }
 
+// The endpoints of handshakes (DDS-SECURITY 7.4.7.1). A message may name only one of them.
+bool IsHandshake(Bytes entities) {
+  constexpr std::array<std::uint8_t, 4> kReader = {0x00, 0x02, 0x01, 0xc4};
+  constexpr std::array<std::uint8_t, 4> kWriter = {0x00, 0x02, 0x01, 0xc3};
+  return std::equal(kReader.begin(), kReader.end(), entities.begin()) ||
+         std::equal(kWriter.begin(), kWriter.end(), entities.begin() + 4);
+}
+
+// Whether the security tokens in a whole parameter list are whole.
+bool TokensAreWhole(const Reader& list) {
+  constexpr std::uint16_t kSentinel = 1;
+  constexpr std::uint16_t kIdentityToken = 0x1001;
+  constexpr std::uint16_t kPermissionsToken = 0x1002;
+  for (std::size_t at = 0; list.U16(at) != kSentinel; at += 4 + list.U16(at + 2)) {
+    const std::uint16_t id = list.U16(at);
+    if (id != kIdentityToken && id != kPermissionsToken) continue;
+    if (at % 4 != 0 || !IsWholeToken(list.bytes.subspan(at + 4, list.U16(at + 2)), list.little)) return false;
+  }
+  return true;
+}
+
 // What arrives is inspected with these.
 struct Inspection {
   SequenceGate& gate;
@@ -157,10 +179,16 @@ DatagramFault InspectData(const Submessage& m, const Inspection& with) {
   if (m.size() < payload + 4) return DatagramFault::kFraming;
   // Discovery data are parameter lists, which the library itself parses. Other built-in data may be labelled
   // as a parameter list without being one, such as the liveliness messages of Fast DDS.
+  const Bytes sample = m.body.bytes.subspan(payload);
+  if (IsHandshake(m.body.bytes.subspan(4, 8))) {
+    return IsWholeHandshake(sample) ? DatagramFault::kNone : DatagramFault::kSecurity;
+  }
+  if (!HoldsItsCiphertext(sample, sample.size())) return DatagramFault::kSecurity;
   const std::uint8_t encoding = m.body.bytes[payload + 1];
   if (IsDiscoveryWriter(m.body.bytes.subspan(8, 4)) && (encoding & 0xfe) == kParameterListEncoding) {
     const Reader list{m.body.bytes.subspan(payload + 4), (encoding & 1) != 0};
     if (EndOfParameters(list, 0) == 0) return DatagramFault::kParameterList;
+    if (!TokensAreWhole(list)) return DatagramFault::kSecurity;
   }
   return DatagramFault::kNone;
 }
@@ -174,6 +202,9 @@ DatagramFault InspectDataFrag(const Submessage& m, const Inspection& with) {
   const std::uint64_t fragment_bytes = m.body.U16(26);
   const std::uint64_t sample_bytes = m.body.U32(28);
   if (start == 0 || count == 0 || fragment_bytes == 0) return DatagramFault::kFragment;
+  // These are small, and would be inspected only in part.
+  if (IsDiscoveryWriter(m.body.bytes.subspan(8, 4)) || IsHandshake(m.body.bytes.subspan(4, 8)))
+    return DatagramFault::kFragment;
   if (sample_bytes == 0 || sample_bytes > kMaxSampleBytes) return DatagramFault::kFragment;
   const std::uint64_t fragments = (sample_bytes + fragment_bytes - 1) / fragment_bytes;
   if (start + count - 1 > fragments) return DatagramFault::kFragment;
@@ -181,7 +212,8 @@ DatagramFault InspectDataFrag(const Submessage& m, const Inspection& with) {
   if (payload == 0) return DatagramFault::kParameterList;
   const std::uint64_t end = std::min(sample_bytes, (start + count - 1) * fragment_bytes);
   if (m.size() - payload < end - (start - 1) * fragment_bytes) return DatagramFault::kFragment;
-  return DatagramFault::kNone;
+  const bool whole = start > 1 || HoldsItsCiphertext(m.body.bytes.subspan(payload), sample_bytes);
+  return whole ? DatagramFault::kNone : DatagramFault::kSecurity;
 }
 
 DatagramFault InspectHeartbeat(const Submessage& m, const Inspection& with) {
@@ -255,8 +287,8 @@ DatagramFault InspectSubmessage(const Submessage& m, const Inspection& with) {
       return at_least(20);
     case kInfoDestination:
       return at_least(12);
-    default:
-      return DatagramFault::kNone;  // Receivers skip unknown submessages.
+    default:  // Receivers skip unknown submessages.
+      return IsWholeProtection(m.id, m.body.bytes) ? DatagramFault::kNone : DatagramFault::kSecurity;
   }
 }
 
@@ -294,8 +326,8 @@ DatagramFault Walk(Bytes datagram, Inspect inspect) {
 
 std::string_view DatagramFaultName(DatagramFault fault) {
   static constexpr std::array<std::string_view, kDatagramFaults> kNames = {
-      "none",  "not_rtps", "framing",      "statistics", "sequence",
-      "count", "unsent",   "sequence_set", "fragment",   "parameter_list"};
+      "none",   "not_rtps",     "framing",  "statistics",     "sequence", "count",
+      "unsent", "sequence_set", "fragment", "parameter_list", "security"};
   return kNames[static_cast<std::size_t>(fault)];
 }
 

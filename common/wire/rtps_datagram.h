@@ -26,8 +26,9 @@ enum class DatagramFault : std::uint8_t {
   kSequenceSet,    // More bits than a set can have, or than the submessage holds.
   kFragment,       // Fragment numbers that describe no sample, or a sample over the limit.
   kParameterList,  // A parameter longer than its list, or a list without end.
+  kSecurity,       // A part of DDS Security whose counts or lengths exceed it (secure_datagram.h).
 };
-inline constexpr std::size_t kDatagramFaults = 10;
+inline constexpr std::size_t kDatagramFaults = 11;
 [[nodiscard]] std::string_view DatagramFaultName(DatagramFault fault);
 
 // A datagram that arrived at `now`. The gate keeps what must be known of the ones before.

@@ -29,6 +29,7 @@ class DdsSubscription final : public Subscription {
     auto made = std::make_unique<DdsSubscription>(std::move(on_value), std::move(events), only);
     Result<Participant::Reader> reader = participant->MakeReader(Topic<Value>::kProfile, made->type_, &made->listener_);
     if (!reader) return tl::unexpected(reader.error());
+    made->participant_ = participant;
     made->reader_ = std::move(*reader);
     made->thread_ = std::thread([self = made.get()] { self->Run(); });
     return made;
@@ -64,7 +65,17 @@ class DdsSubscription final : public Subscription {
         refused_.fetch_add(1, std::memory_order_relaxed);
         continue;
       }
-      Deliver(FromWire(std::move(sample.value)), info.publication_handle);
+      if (!SpeaksForItself(sample.value, info.publication_handle)) continue;
+      Deliver(Value{FromWire(std::move(sample.value))}, info.publication_handle);
+    }
+  }
+
+  // A sample of a robot's stream must be about the robot that its writer belongs to.
+  bool SpeaksForItself(const Wire& sample, const WriterClients::Writer& writer) {
+    if constexpr (Topic<Value>::kProfile.of_robot) {
+      return participant_->peers().MaySpeakFor(eprosima::fastrtps::rtps::iHandle2GUID(writer), sample.robot_id());
+    } else {
+      return true;
     }
   }
 
@@ -95,6 +106,7 @@ class DdsSubscription final : public Subscription {
   const SubscriptionEvents events_;
   const std::optional<ClientId> only_;
   std::atomic<std::uint64_t> refused_ = 0;
+  std::shared_ptr<Participant> participant_;
   const fd::TypeSupport type_{new typename Topic<Value>::Type()};
   WriterClients clients_;  // Used only on the subscription's thread.
   ReaderEvents listener_;

@@ -27,6 +27,7 @@ struct TopicProfile {
   double deadline_s;          // Offered by writers, not requested by readers. 0: none.
   bool leased;                // Whether both ends use the liveliness lease.
   std::uint8_t heartbeat_ms;  // Period of heartbeats while a sample is unacknowledged.
+  bool of_robot = false;      // Each writer belongs to one robot: with security, it writes in a partition of that name.
 };
 
 // Samples of streams, sessions, requests and replies that have been acknowledged must not be lost while a
@@ -38,7 +39,7 @@ template <>
 struct Topic<SessionRequest> {
   using Wire = v1::SessionRequest;
   using Type = SampleType<Wire, v1::SessionRequestPubSubType>;
-  static constexpr TopicProfile kProfile{"cairn/v1/session", true, 1, 16, 4096, 0.0, true, 20};
+  static constexpr TopicProfile kProfile{"cairn/v1/session", true, 1, 16, 4096, 0.0, true, 20, true};
 };
 template <>
 struct Topic<SessionState> {
@@ -56,13 +57,13 @@ template <>
 struct Topic<ScanSample> {
   using Wire = v1::Scan;
   using Type = SampleType<Wire, v1::ScanPubSubType>;
-  static constexpr TopicProfile kProfile{"cairn/v1/scan", false, 64, 128, 4096, 0.0, false, 20};
+  static constexpr TopicProfile kProfile{"cairn/v1/scan", false, 64, 128, 4096, 0.0, false, 20, true};
 };
 template <>
 struct Topic<OdometrySample> {
   using Wire = v1::Odometry;
   using Type = SampleType<Wire, v1::OdometryPubSubType>;
-  static constexpr TopicProfile kProfile{"cairn/v1/odometry", false, 256, 512, 4096, 0.0, false, 20};
+  static constexpr TopicProfile kProfile{"cairn/v1/odometry", false, 256, 512, 4096, 0.0, false, 20, true};
 };
 template <>
 struct Topic<PoseReport> {
@@ -99,6 +100,12 @@ struct Topic<Request> {
   using Wire = v1::Request;
   using Type = SampleType<Wire, v1::RequestPubSubType>;
   static constexpr TopicProfile kProfile{"cairn/v1/request", false, 64, 1024, 1, 0.0, false, 20};
+};
+template <>
+struct Topic<Command> {
+  using Wire = v1::Request;
+  using Type = SampleType<Wire, v1::RequestPubSubType>;
+  static constexpr TopicProfile kProfile{"cairn/v1/command", false, 64, 1024, 1, 0.0, false, 20};
 };
 template <>
 struct Topic<Reply> {

@@ -95,6 +95,11 @@ void Visit(OptionVisitor& visitor, WireOptions& options) {
                             "value, or the robots a smaller one."));
   visitor.Real("participant_lease_s", options.participant_lease_s, "s", 0.1, 3600.0,
                "A process that is silent for longer is forgotten, and is discovered anew when it returns.");
+  visitor.Text(
+      "security", options.security,
+      ForOperators("Directory with the identity and the permissions of this program, made by "
+                   "deploy/security/make-fleet.sh. Empty: DDS Security is off, and everybody in these networks "
+                   "is trusted."));
   visitor.Require(options.liveliness_lease_s <= options.participant_lease_s, "liveliness_lease_s", "must not exceed",
                   "participant_lease_s");
 }

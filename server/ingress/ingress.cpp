@@ -49,6 +49,7 @@ Result<void> Ingress::Subscribe(wire::Bus& bus) {
   if (auto added = Add<ScanSample>(bus, &Ingress::Take); !added) return added;
   if (auto added = Add<OdometrySample>(bus, &Ingress::Take); !added) return added;
   if (auto added = Add<Request>(bus, &Ingress::Take); !added) return added;
+  if (auto added = Add<Command>(bus, &Ingress::Take); !added) return added;
   return Add<SessionRequest>(bus, &Ingress::Take, std::move(session_events));
 }
 
@@ -73,7 +74,23 @@ void Ingress::Take(OdometrySample&& sample) {
   Push(Admit(std::move(sample)));
 }
 
+// Permissions are given by topic. A command on the other topic may come from somebody who may only ask.
 void Ingress::Take(Request&& request) {
+  if (!IsCommand(request.kind)) return Ask(std::move(request));
+  commands_refused_.fetch_add(1, std::memory_order_relaxed);
+  Reply reply;
+  reply.client = request.client;
+  reply.sequence = request.sequence;
+  reply.status = {StatusCode::kPermissionDenied,
+                  std::string(RequestKindName(request.kind)) + " is a command: send it on the topic cairn/v1/command"};
+  outbound_.Send(std::move(reply));
+}
+
+void Ingress::Take(Command&& command) {
+  Ask(std::move(command.request));
+}
+
+void Ingress::Ask(Request&& request) {
   Reply busy;
   busy.client = request.client;
   busy.sequence = request.sequence;

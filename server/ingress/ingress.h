@@ -24,6 +24,8 @@ class Ingress {
   void Close();
   // Values dropped because the channel was full.
   [[nodiscard]] std::uint64_t overflow() const { return overflow_.load(std::memory_order_relaxed); }
+  // Commands that were sent on the topic of questions.
+  [[nodiscard]] std::uint64_t commands_refused() const { return commands_refused_.load(std::memory_order_relaxed); }
   // Samples dropped because lengths or enums were out of range.
   [[nodiscard]] std::uint64_t malformed() const;
 
@@ -36,11 +38,14 @@ class Ingress {
   void Take(ScanSample&& sample);
   void Take(OdometrySample&& sample);
   void Take(Request&& request);
+  void Take(Command&& command);
+  void Ask(Request&& request);
   void Push(InboundValue&& value);
 
   Inbound& inbound_;
   Outbound& outbound_;
   std::atomic<std::uint64_t> overflow_{0};
+  std::atomic<std::uint64_t> commands_refused_{0};
   std::uint64_t malformed_until_closed_ = 0;
   std::vector<std::unique_ptr<wire::Subscription>> subscriptions_;
 };

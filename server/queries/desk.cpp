@@ -101,11 +101,8 @@ std::optional<Answer> Desk::AnswerTo(const Request& request) {
       return AnswerLandmarks(request, AllSessions(), MapOf(request.site));
     case RequestKind::kMapInfo:
       return AnswerMapInfo(request, request.site.empty() ? AllMaps() : MapOf(request.site));
-    case RequestKind::kStatus: {
-      Reply reply = AnswerStatus(request, request.robot.empty() ? AllSessions() : SessionOf(request.robot));
-      if (reply.status.ok() && journal_ != nullptr) reply.status.message = journal_->health().reason;
-      return reply;
-    }
+    case RequestKind::kStatus:
+      return StatusReply(request);
     case RequestKind::kJobSubmit:
       return JobReply(request, SubmitJob(request));
     case RequestKind::kJobGet:
@@ -131,6 +128,19 @@ std::optional<Answer> Desk::AnswerTo(const Request& request) {
       return std::nullopt;
   }
   throw std::logic_error("the request has an unknown kind");
+}
+
+void Desk::SetRefusals(const Refusals& refusals) {
+  const MutexLock lock(mutex_);
+  refusals_ = refusals;
+}
+
+Reply Desk::StatusReply(const Request& request) {
+  Reply reply = AnswerStatus(request, request.robot.empty() ? AllSessions() : SessionOf(request.robot));
+  if (reply.status.ok() && journal_ != nullptr) reply.status.message = journal_->health().reason;
+  const MutexLock lock(mutex_);
+  reply.refused = {refusals_};
+  return reply;
 }
 
 Result<Job> Desk::SubmitJob(const Request& request) {

@@ -11,6 +11,7 @@
 #include <string>
 #include <thread>
 
+#include "common/mutex.h"
 #include "server/jobs/job_worker.h"
 #include "server/maps/atlas.h"
 #include "server/ops/heartbeat.h"
@@ -31,6 +32,8 @@ class Desk {
 
   void Start();
   void Take(Request&& request);
+  // What the next answers about the status say. From any thread.
+  void SetRefusals(const Refusals& refusals);
   // Answers the waiting requests, then returns.
   void Stop();
   // Thread rule: any thread.
@@ -40,6 +43,7 @@ class Desk {
   // Sends a few parts of the answer; what is left waits for the client's next turn.
   void Serve(OpenRequest&& open);
   void Send(OpenRequest& open);
+  Reply StatusReply(const Request& request);
   // Returns nothing if the answer is sent later.
   std::optional<Answer> AnswerTo(const Request& request);
   Result<Job> SubmitJob(const Request& request);
@@ -58,6 +62,8 @@ class Desk {
   SavedSites& saved_sites_;
   const Generation generation_;
   const Journal* const journal_;  // Null if nothing is stored.
+  Mutex mutex_;
+  Refusals refusals_ CAIRN_GUARDED_BY(mutex_);
   RequestQueue requests_;
   std::jthread thread_;  // The last member, because it uses the members above.
 };

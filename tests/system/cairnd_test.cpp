@@ -158,13 +158,14 @@ class Cairnd : public ::testing::Test {
     scans_ = Must(bus_->Advertise<ScanSample>());
     odometry_ = Must(bus_->Advertise<OdometrySample>());
     requests_ = Must(bus_->Advertise<Request>());
+    commands_ = Must(bus_->Advertise<Command>());
     subscriptions_.push_back(Must(bus_->Subscribe<SessionState>(states_.Sink())));
     subscriptions_.push_back(Must(bus_->Subscribe<PoseReport>(poses_.Sink())));
     subscriptions_.push_back(Must(bus_->Subscribe<Ledger>(ledgers_.Sink())));
     subscriptions_.push_back(Must(bus_->Subscribe<Reply>(replies_.Sink())));
     ASSERT_TRUE(Eventually([&] {
       return sessions_->matched() > 0 && scans_->matched() > 0 && odometry_->matched() > 0 &&
-             requests_->matched() > 0 &&
+             requests_->matched() > 0 && commands_->matched() > 0 &&
              std::all_of(subscriptions_.begin(), subscriptions_.end(), [](auto& s) { return s->matched() > 0; });
     }));
   }
@@ -205,7 +206,7 @@ class Cairnd : public ::testing::Test {
     request.kind = kind;
     request.site = "lab";
     request.robot = "r1";
-    EXPECT_TRUE(requests_->Publish(request));
+    EXPECT_TRUE(IsCommand(request.kind) ? commands_->Publish({request}) : requests_->Publish(request));
     Reply whole;
     whole.status.code = StatusCode::kDeadlineExceeded;
     Eventually([&] {
@@ -226,6 +227,7 @@ class Cairnd : public ::testing::Test {
   std::unique_ptr<wire::Publication<ScanSample>> scans_;
   std::unique_ptr<wire::Publication<OdometrySample>> odometry_;
   std::unique_ptr<wire::Publication<Request>> requests_;
+  std::unique_ptr<wire::Publication<Command>> commands_;
   Inbox<SessionState> states_;
   Inbox<PoseReport> poses_;
   Inbox<Ledger> ledgers_;

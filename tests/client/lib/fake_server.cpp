@@ -27,6 +27,7 @@ FakeServer::FakeServer(const wire::WireOptions& options, Generation generation)
     if (settling_) Report(sample.stream);
   }));
   add(bus_->Subscribe<Request>([this](Request&& request) { OnRequest(std::move(request)); }));
+  add(bus_->Subscribe<Command>([this](Command&& command) { OnRequest(std::move(command.request)); }));
   add(bus_->Subscribe<SessionRequest>([this](SessionRequest&& request) { OnSession(std::move(request)); }));
 }
 

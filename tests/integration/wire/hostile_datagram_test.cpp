@@ -169,6 +169,22 @@ TEST_F(HostileDatagrams, TheKillerOf84BytesIsKeptOut) {
   ExpectDataStillFlows();
 }
 
+// The library makes room for as many properties as an announcement's identity token says, also without security.
+TEST_F(HostileDatagrams, AnIdentityTokenOfFourThousandMillionPropertiesIsKeptOut) {
+  Bytes bytes = {'R', 'T', 'P', 'S', 2, 3, 1, 15, 1, 15, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10};
+  const Bytes announcement = {0x15, 0x05, 44, 0,                                         // DATA, little-endian
+                              0,    0,    16, 0, 0,    1,    0,    0xc7, 0, 1, 0, 0xc2,  // for readers of participants
+                              0,    0,    0,  0, 1,    0,    0,    0,                    // sequence number 1
+                              0,    3,    0,  0,                                         // a parameter list:
+                              0x01, 0x10, 12, 0,                                         // the identity token,
+                              0,    0,    0,  0, 0xff, 0xff, 0xff, 0xff, 0, 0, 0, 0,     // its class and properties
+                              1,    0,    0,  0};                                        // the end
+  bytes.insert(bytes.end(), announcement.begin(), announcement.end());
+  attacker_.SendEverywhere(bytes);
+  EXPECT_TRUE(Eventually([&] { return sender_->datagrams_refused() > 0 && receiver_->datagrams_refused() > 0; }));
+  ExpectDataStillFlows();
+}
+
 TEST_F(HostileDatagrams, RandomBytesAndSubmessagesAreSurvived) {
   std::mt19937 random(11);
   for (int i = 0; i < 3000; ++i) {

@@ -1,0 +1,299 @@
+// What DDS Security refuses, seen from the server's side, against peers that ignore every check of their own side.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <optional>
+#include <sstream>
+
+#include "client/lib/query_client.h"
+#include "client/lib/robot_client.h"
+#include "tests/client/lib/fake_server.h"
+#include "tests/integration/security/fleet_files.h"
+
+namespace cairn {
+namespace {
+
+using test::Eventually;
+using test::Fleet;
+using test::Inbox;
+using test::MakeBus;
+using test::Must;
+using test::SecureOptions;
+using ::testing::HasSubstr;
+
+ScanSample ScanOf(const std::string& robot) {
+  ScanSample sample;
+  sample.stream = {.robot_id = HashName(robot), .sensor_id = HashName("laser"), .session = 3};
+  sample.scan.sequence = 1;
+  sample.scan.ranges_m.assign(10, 2.0F);
+  return sample;
+}
+
+Request RequestOf(ClientId client, RequestKind kind) {
+  Request request;
+  request.client = client;
+  request.kind = kind;
+  return request;
+}
+
+// The server's end of the topics that others write.
+class SecureDoors : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    server_ = MakeBus("server", SecureOptions(Fleet() / "server"));
+    subscriptions_.push_back(Must(server_->Subscribe<ScanSample>(scans_.Sink())));
+    subscriptions_.push_back(Must(server_->Subscribe<Request>(requests_.Sink())));
+    subscriptions_.push_back(Must(server_->Subscribe<Command>(commands_.Sink())));
+  }
+  void TearDown() override { subscriptions_.clear(); }
+
+  static ChildProcess Hostile(const std::filesystem::path& member, std::vector<std::string> action) {
+    std::vector<std::string> arguments = {CAIRN_HOSTILE_PEER, std::to_string(test::TestDomain()), member.string()};
+    arguments.insert(arguments.end(), action.begin(), action.end());
+    return ChildProcess(std::move(arguments));
+  }
+  // Waits until a line with this text is said of somebody.
+  bool Says(const std::string& text) {
+    return Eventually([&] {
+      static_cast<void>(server_->refusals());
+      for (std::string& line : server_->TakeRefusalLines()) said_ += line + "\n";
+      return said_.find(text) != std::string::npos;
+    });
+  }
+  // An honest member's question arrives: by then a hostile one's would have arrived too.
+  void HonestQuestionArrives() {
+    const std::size_t before = requests_.values().size();
+    const auto viewer = MakeBus("viewer", SecureOptions(Fleet() / "viewers" / "v"));
+    const auto requests = Must(viewer->Advertise<Request>());
+    ASSERT_TRUE(Eventually([&] { return requests->matched() == 1; }));
+    Must(requests->Publish(RequestOf(1, RequestKind::kPing)));
+    ASSERT_TRUE(requests_.WaitFor(before + 1));
+  }
+
+  std::unique_ptr<wire::Bus> server_;
+  Inbox<ScanSample> scans_;
+  Inbox<Request> requests_;
+  Inbox<Command> commands_;
+  std::vector<std::unique_ptr<wire::Subscription>> subscriptions_;
+  std::string said_;
+};
+
+TEST_F(SecureDoors, LetHonestMembersIn) {
+  const auto robot = MakeBus("robot", SecureOptions(Fleet() / "robots" / "r1"));
+  const auto sim = MakeBus("sim", SecureOptions(Fleet() / "robots" / "sim"));
+  const auto scans = Must(robot->Advertise<ScanSample>("r1"));
+  const auto first = Must(sim->Advertise<ScanSample>("s1"));
+  const auto second = Must(sim->Advertise<ScanSample>("s2"));
+  const auto boss = MakeBus("operator", SecureOptions(Fleet() / "operators" / "o"));
+  const auto commands = Must(boss->Advertise<Command>());
+  for (const auto* publication : {&scans, &first, &second})
+    ASSERT_TRUE(Eventually([&] { return (*publication)->matched() == 1; }));
+  ASSERT_TRUE(Eventually([&] { return commands->matched() == 1; }));
+  Must(scans->Publish(ScanOf("r1")));
+  Must(first->Publish(ScanOf("s1")));
+  Must(second->Publish(ScanOf("s2")));
+  Must(commands->Publish({RequestOf(2, RequestKind::kJobSubmit)}));
+  EXPECT_TRUE(scans_.WaitFor(3));
+  EXPECT_TRUE(commands_.WaitFor(1));
+  HonestQuestionArrives();
+  EXPECT_EQ(server_->refusals(), Refusals{.secure = true});
+}
+
+TEST_F(SecureDoors, RefuseAParticipantWithoutSecurity) {
+  const auto plain = MakeBus("plain");
+  const auto requests = Must(plain->Advertise<Request>());
+  const auto scans = Must(plain->Advertise<ScanSample>("r1"));
+  EXPECT_TRUE(Says("it has no identity: it runs without DDS Security"));
+  EXPECT_THAT(said_, HasSubstr("at 127.0.0.1 is refused"));
+  HonestQuestionArrives();
+  EXPECT_EQ(requests->matched(), 0);
+  EXPECT_EQ(scans->matched(), 0);
+  EXPECT_EQ(server_->refusals().peers, 1u);
+}
+
+TEST_F(SecureDoors, RefuseAnIdentityOfAnotherFleet) {
+  ChildProcess stranger = Hostile(test::OtherFleet() / "operators" / "o", {"ask"});
+  ASSERT_TRUE(stranger.Says("writing"));
+  EXPECT_TRUE(Says("its identity is not valid: unable to get local issuer certificate")) << said_;
+  HonestQuestionArrives();
+  EXPECT_EQ(requests_.values().size(), 1u);
+  EXPECT_EQ(server_->refusals().peers, 1u);
+}
+
+TEST_F(SecureDoors, RefuseAnExpiredIdentity) {
+  const TempDirectory directory;
+  const auto expired = test::CopyOf(Fleet() / "operators" / "o", directory);
+  test::Expire(expired, Fleet());
+  ChildProcess former = Hostile(expired, {"ask"});
+  ASSERT_TRUE(former.Says("writing"));
+  EXPECT_TRUE(Says("its identity is not valid: certificate has expired")) << said_;
+  HonestQuestionArrives();
+  EXPECT_EQ(requests_.values().size(), 1u);
+  EXPECT_EQ(server_->refusals().peers, 1u);
+}
+
+TEST_F(SecureDoors, RefuseARobotInThePartitionOfAnother) {
+  const auto honest = MakeBus("robot", SecureOptions(Fleet() / "robots" / "r2"));
+  const auto other = honest->Advertise<ScanSample>("r1");
+  ASSERT_FALSE(other);
+  EXPECT_EQ(other.error().code, StatusCode::kPermissionDenied);
+
+  ChildProcess impostor = Hostile(Fleet() / "robots" / "r2", {"scan", "r1", "r1"});
+  ASSERT_TRUE(impostor.Says("writing"));
+  EXPECT_TRUE(Says("r1 partition not found in rule")) << said_;
+  EXPECT_THAT(said_, HasSubstr("an endpoint of "));
+  HonestQuestionArrives();
+  EXPECT_TRUE(scans_.values().empty());
+  EXPECT_GE(server_->refusals().endpoints, 1u);
+}
+
+TEST_F(SecureDoors, RefuseSamplesInTheNameOfAnotherRobot) {
+  ChildProcess impostor = Hostile(Fleet() / "robots" / "r2", {"scan", "r1", "r2"});
+  ASSERT_TRUE(impostor.Says("matched"));
+  EXPECT_TRUE(Says("it writes in the name of another robot than 'r2'")) << said_;
+  const auto robot = MakeBus("robot", SecureOptions(Fleet() / "robots" / "r1"));
+  const auto scans = Must(robot->Advertise<ScanSample>("r1"));
+  ASSERT_TRUE(Eventually([&] { return scans->matched() == 1; }));
+  Must(scans->Publish(ScanOf("r1")));
+  ASSERT_TRUE(scans_.WaitFor(1));
+  EXPECT_EQ(scans_.values().size(), 1u);
+  EXPECT_EQ(scans_.values().front().stream.session, 3u);
+  EXPECT_GE(server_->refusals().samples, 1u);
+}
+
+// A wildcard would be in the partition of every robot.
+TEST_F(SecureDoors, RefuseAPartitionWithAWildcard) {
+  ChildProcess impostor = Hostile(Fleet() / "robots" / "r2", {"scan", "r1", "*"});
+  ASSERT_TRUE(impostor.Says("writing"));
+  EXPECT_TRUE(Says("* partition not found in rule")) << said_;
+  HonestQuestionArrives();
+  EXPECT_TRUE(scans_.values().empty());
+}
+
+TEST_F(SecureDoors, RefuseTheCommandsOfAViewer) {
+  auto viewer = MakeBus("viewer", SecureOptions(Fleet() / "viewers" / "v"));
+  const auto client = Must(client::QueryClient::Create(*viewer));
+  const auto job = client->SubmitJob("hall", JobKind::kSmooth);
+  ASSERT_FALSE(job);
+  EXPECT_EQ(job.error().code, StatusCode::kPermissionDenied);
+
+  ChildProcess hostile = Hostile(Fleet() / "viewers" / "v", {"command"});
+  ASSERT_TRUE(hostile.Says("writing"));
+  EXPECT_TRUE(Says("cairn/v1/command topic not found in allow rule")) << said_;
+  HonestQuestionArrives();
+  EXPECT_TRUE(commands_.values().empty());
+  EXPECT_GE(server_->refusals().endpoints, 1u);
+}
+
+TEST_F(SecureDoors, KeepTheStreamsOfARobotFromOthers) {
+  for (const char* member : {"robots/r2", "viewers/v", "operators/o"}) {
+    const auto bus = MakeBus("reader", SecureOptions(Fleet() / member));
+    const auto scans = bus->Subscribe<ScanSample>([](ScanSample&&) {});
+    ASSERT_FALSE(scans) << member;
+    EXPECT_EQ(scans.error().code, StatusCode::kPermissionDenied) << member;
+    EXPECT_FALSE(bus->Advertise<PoseReport>()) << member;
+  }
+}
+
+// A client that the server does not hear joins as another participant, which proves the same identity.
+TEST(SecureClients, JoinAgainWithTheirIdentity) {
+  test::FakeServer server(SecureOptions(Fleet() / "server"));
+  const auto bus = MakeBus("robot", SecureOptions(Fleet() / "robots" / "r1"));
+  SessionRequest request;
+  request.robot = "r1";
+  request.site = "hall";
+  request.sensors = {"laser"};
+  const auto robot = Must(client::RobotClient::Open(*bus, request, 30.0));
+  server.SetSettling(false);  // Nothing seems to arrive.
+  Scan scan;
+  scan.ranges_m.assign(10, 2.0F);
+  Must(robot->Publish(scan));
+  ASSERT_TRUE(Eventually([&] { return robot->renewed() > 0; }));
+  server.SetSettling(true);
+  Must(robot->WaitSettled(20.0));
+  EXPECT_EQ(server.received(), std::vector<std::uint64_t>{1});
+}
+
+class SecurityFiles : public ::testing::Test {
+ protected:
+  void SetUp() override { member_ = test::CopyOf(Fleet() / "robots" / "r1", directory_); }
+  std::string Fault() {
+    const auto bus = wire::Bus::Create(SecureOptions(member_), "member");
+    if (bus) return "none";
+    EXPECT_EQ(bus.error().code, StatusCode::kFailedPrecondition);
+    return bus.error().message;
+  }
+  void Copy(const std::filesystem::path& from, const std::string& name) {
+    std::filesystem::copy_file(from, member_ / name, std::filesystem::copy_options::overwrite_existing);
+  }
+  static std::string TextOf(const std::filesystem::path& path) {
+    std::ifstream file(path);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+
+  const TempDirectory directory_;
+  std::filesystem::path member_;
+};
+
+TEST_F(SecurityFiles, AreComplete) {
+  EXPECT_EQ(Fault(), "none");
+  for (const char* name : {"identity_ca.pem", "cert.pem", "key.pem", "governance.smime", "permissions.smime"}) {
+    member_ = test::CopyOf(Fleet() / "robots" / "r1", directory_);
+    std::filesystem::remove(member_ / name);
+    EXPECT_THAT(Fault(), HasSubstr(std::string(name) + " cannot be read"));
+    std::ofstream(member_ / name) << "nonsense";
+    EXPECT_THAT(Fault(), HasSubstr(std::string(name)));
+  }
+}
+
+TEST_F(SecurityFiles, BelongTogether) {
+  Copy(Fleet() / "robots" / "r2" / "key.pem", "key.pem");
+  const std::string fault = Fault();
+  EXPECT_THAT(fault, HasSubstr("key.pem does not belong to cert.pem"));
+  const std::string secret = TextOf(member_ / "key.pem").substr(40, 20);
+  EXPECT_EQ(fault.find(secret), std::string::npos);
+  member_ = test::CopyOf(Fleet() / "robots" / "r1", directory_);
+  Copy(test::OtherFleet() / "ca.pem", "identity_ca.pem");
+  EXPECT_THAT(Fault(), HasSubstr("cert.pem is not valid: unable to get local issuer certificate"));
+  member_ = test::CopyOf(Fleet() / "viewers" / "v", directory_);
+  Copy(Fleet() / "operators" / "o" / "permissions.smime", "permissions.smime");
+  EXPECT_THAT(Fault(), HasSubstr("permissions.smime has no grant for CN=v,OU=viewer,O=cairn"));
+  member_ = test::CopyOf(Fleet() / "robots" / "r1", directory_);
+  Copy(test::OtherFleet() / "robots" / "r1" / "permissions.smime", "permissions.smime");
+  EXPECT_THAT(Fault(), HasSubstr("permissions.smime has no valid signature of identity_ca.pem"));
+}
+
+TEST_F(SecurityFiles, AreNotChangedAfterTheyWereSigned) {
+  std::string text = TextOf(member_ / "permissions.smime");
+  const auto at = text.find("cairn/v1/request");
+  ASSERT_NE(at, std::string::npos);
+  std::ofstream(member_ / "permissions.smime") << text.replace(at, 16, "cairn/v1/*      ");
+  EXPECT_THAT(Fault(), HasSubstr("permissions.smime has no valid signature"));
+}
+
+TEST_F(SecurityFiles, AreInDateAndSecret) {
+  std::filesystem::permissions(member_ / "key.pem", std::filesystem::perms::others_read,
+                               std::filesystem::perm_options::add);
+  EXPECT_THAT(Fault(), HasSubstr("key.pem is open to every user of this machine"));
+  std::filesystem::permissions(member_ / "key.pem", std::filesystem::perms::others_read,
+                               std::filesystem::perm_options::remove);
+  test::Expire(member_, Fleet());
+  EXPECT_THAT(Fault(), HasSubstr("cert.pem is not valid: certificate has expired"));
+}
+
+TEST_F(SecurityFiles, OfAnExistingFleetStayWhenMembersAreAdded) {
+  const std::string before = TextOf(Fleet() / "robots" / "r1" / "cert.pem");
+  const auto made = ChildProcess({CAIRN_MAKE_FLEET, Fleet().string(), "--robots", "r1,r9"}).Wait();
+  EXPECT_EQ(made.exit_code, 0) << made.output;
+  EXPECT_EQ(TextOf(Fleet() / "robots" / "r1" / "cert.pem"), before);
+  member_ = Fleet() / "robots" / "r9";
+  EXPECT_EQ(Fault(), "none");
+  for (const char* name : {"-x", "a;b", "<b>", "../up", "a b"}) {
+    const auto refused = ChildProcess({CAIRN_MAKE_FLEET, Fleet().string(), "--viewers", name}).Wait();
+    EXPECT_EQ(refused.exit_code, 2) << name << ": " << refused.output;
+  }
+}
+
+}  // namespace
+}  // namespace cairn
