@@ -230,6 +230,46 @@ TEST(Mapper, AGridFromBeforeALargeLoopIsDrawnAnew) {
   EXPECT_LT(ShareMissing(after, mapper.grid()), 0.01);
 }
 
+// Half a round after the grid was handed out for smoothing, it comes back: what was mapped meanwhile is drawn into it.
+TEST(Mapper, AGridThatComesBackGetsWhatWasMappedMeanwhile) {
+  const Drive drive = DriveRound();
+  MapperOptions options;
+  options.filter.particles = 20;
+  Mapper mapper(options, drive.truth.front(), 1);
+  const auto process = [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i)
+      static_cast<void>(mapper.Process(drive.scans[i], drive.odometry[i], SerialFor));
+  };
+  process(0, 60);
+  OccupancyGrid before(mapper.grid().options(), mapper.ShareGrid());
+  const std::size_t keyframes = mapper.keyframe_count();
+  process(60, 160);
+  const OccupancyGrid after(mapper.grid().options(), mapper.ShareGrid());
+  ASSERT_GT(ShareMissing(after, before), 0.1);
+  mapper.AdoptGrid(std::move(before), keyframes);
+  EXPECT_LT(ShareMissing(after, mapper.grid()), 0.01);
+}
+
+// Between level scans the doubt grows with the way, and the tilted scan is part of the path.
+TEST(Mapper, ATiltedScanHasThePoseOfTheOdometryAndItsDoubt) {
+  Mapper mapper({}, {}, 1);
+  const auto scan = [](double x, Stamp stamp, double tilt_rad) {
+    auto looked = std::make_shared<Scan>(Look(test::Office(), {x, 0, 0}, {}));
+    looked->stamp = stamp;
+    looked->tilt_rad = tilt_rad;
+    return looked;
+  };
+  const ScanOutcome level = mapper.Process(scan(0.0, 100, 0.0), {3, 2, 1}, SerialFor);
+  const Pose2 T_odom_robot = Pose2{3, 2, 1} * Pose2{0.5, 0, 0};
+  const ScanOutcome tilted = mapper.Process(scan(0.5, 200, 0.5), T_odom_robot, SerialFor);
+  EXPECT_NEAR(tilted.T_map_robot.x, 0.5, 1e-9);
+  EXPECT_EQ(tilted.reason, PoseReason::kOdometryOnly);
+  EXPECT_GT(tilted.covariance(0, 0), level.covariance(0, 0) + 1e-6);
+  EXPECT_TRUE(IsCovariance(tilted.covariance));
+  const MapperSnapshot snapshot = mapper.Snapshot();
+  ASSERT_EQ(snapshot.scans.size(), 2U);
+}
+
 // No filter corrects the slip on a short side, so the first side is drawn a second time beside itself. The
 // pose reports this with self_check on, from the second round on and not before. If the loop is closed, the
 // robot is localized again.
