@@ -145,6 +145,12 @@ Result<Reply> QueryClient::Ask(const Request& request) {
   }
 }
 
+// Whether a server's ends of the topics of requests, of replies and, for a command, of commands are known here.
+bool QueryClient::Matched(bool command) const {
+  if (wire_->requests->matched() == 0 || wire_->replies->matched() == 0) return false;
+  return !command || (wire_->commands && (*wire_->commands)->matched() > 0);
+}
+
 // DDS matches the topic of requests and the topic of replies one after the other, on both sides. Until all four ends
 // have found their peers, an answer may be lost. Only an answered ping proves that they have; a ping may be repeated,
 // while a question that starts a job may not.
@@ -154,9 +160,8 @@ Result<void> QueryClient::WaitForServer(bool command, Deadline deadline) {
   for (;;) {
     {
       const MutexLock lock(mutex_);
-      const auto taken = [&] { return !command || (wire_->commands && (*wire_->commands)->matched() > 0); };
-      if (server_found_ && taken()) return {};
-      while (wire_->requests->matched() == 0 || wire_->replies->matched() == 0 || !taken()) {
+      if (server_found_ && Matched(command)) return {};
+      while (!Matched(command)) {
         began = Clock::now();
         if (Clock::now() >= deadline) return Fail(StatusCode::kUnavailable, NoServer(bus_, options_.timeout_s));
         changed_.WaitFor(mutex_, std::chrono::milliseconds(5));

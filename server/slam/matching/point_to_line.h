@@ -42,7 +42,7 @@ struct PointToLineOptions {
   double residual_sigma_m = 0.04;
   double stop_step_m = 5e-4;
   double inlier_distance_m = 0.12;
-  double min_score = 0.4;  // Not in the configuration: share of the points that must be explained for a match.
+  double min_score = 0.4;
   double rough_trust = 0.2;
   double same_side = 0.5;
   double cauchy_share = 0.25;
