@@ -145,10 +145,9 @@ Result<Reply> QueryClient::Ask(const Request& request) {
   }
 }
 
-// Whether a server's ends of the topics of requests, of replies and, for a command, of commands are known here.
-bool QueryClient::Matched(bool command) const {
-  if (wire_->requests->matched() == 0 || wire_->replies->matched() == 0) return false;
-  return !command || (wire_->commands && (*wire_->commands)->matched() > 0);
+// Whether a server that takes commands is known here.
+bool QueryClient::CommandsMatched() const {
+  return wire_->commands && (*wire_->commands)->matched() > 0;
 }
 
 // DDS matches the topic of requests and the topic of replies one after the other, on both sides. Until all four ends
@@ -160,8 +159,8 @@ Result<void> QueryClient::WaitForServer(bool command, Deadline deadline) {
   for (;;) {
     {
       const MutexLock lock(mutex_);
-      if (server_found_ && Matched(command)) return {};
-      while (!Matched(command)) {
+      if (server_found_ && (!command || CommandsMatched())) return {};
+      while (wire_->requests->matched() == 0 || wire_->replies->matched() == 0 || (command && !CommandsMatched())) {
         began = Clock::now();
         if (Clock::now() >= deadline) return Fail(StatusCode::kUnavailable, NoServer(bus_, options_.timeout_s));
         changed_.WaitFor(mutex_, std::chrono::milliseconds(5));

@@ -130,7 +130,7 @@ class QueryClient {
   [[nodiscard]] Result<std::shared_ptr<Wire>> Connect(wire::Bus& bus);
   [[nodiscard]] std::shared_ptr<Wire> CurrentWire();
   void RenewIfSilent(Deadline began);
-  [[nodiscard]] bool Matched(bool command) const CAIRN_REQUIRES(mutex_);
+  [[nodiscard]] bool CommandsMatched() const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] Result<void> WaitForServer(bool command, Deadline deadline);
   [[nodiscard]] Result<Reply> Ask(const Request& request);
   [[nodiscard]] Result<Job> AskForJob(const Request& request);
