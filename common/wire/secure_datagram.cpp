@@ -89,7 +89,7 @@ std::uint32_t BigEndian(Bytes bytes, std::size_t at) {
   return Cursor(bytes, false, at).U32().value_or(0xffffffff);
 }
 
-constexpr std::size_t kHeaderBytes = 20;  // CryptoHeader: kind 4, key 4, session 4, vector 8.
+constexpr std::size_t kCryptoHeaderBytes = 20;  // CryptoHeader: kind 4, key 4, session 4, vector 8.
 constexpr std::size_t kMacBytes = 16;
 constexpr std::size_t kReceiverMacBytes = 20;  // Key 4, MAC 16.
 
@@ -113,7 +113,7 @@ bool IsWholeProtection(std::uint8_t id, Bytes content) {
       return content.size() >= 4 && BigEndian(content, 0) <= content.size() - 4;
     case 0x31:  // SEC_PREFIX
     case 0x33:  // SRTPS_PREFIX
-      return content.size() == kHeaderBytes;
+      return content.size() == kCryptoHeaderBytes;
     case 0x32:  // SEC_POSTFIX
     case 0x34:  // SRTPS_POSTFIX
       return content.size() >= kMacBytes + 4 &&
@@ -126,11 +126,11 @@ bool IsWholeProtection(std::uint8_t id, Bytes content) {
 bool HoldsItsCiphertext(Bytes beginning, std::size_t size) {
   constexpr std::uint32_t kAes128Gcm = 2;
   constexpr std::uint32_t kAes256Gcm = 4;
-  if (beginning.size() < kHeaderBytes + 4) return true;
+  if (beginning.size() < kCryptoHeaderBytes + 4) return true;
   const std::uint32_t kind = BigEndian(beginning, 0);
   if (kind != kAes128Gcm && kind != kAes256Gcm) return true;
-  const std::size_t rest = kHeaderBytes + 4 + kMacBytes + 4;
-  return size >= rest && BigEndian(beginning, kHeaderBytes) <= size - rest;
+  const std::size_t rest = kCryptoHeaderBytes + 4 + kMacBytes + 4;
+  return size >= rest && BigEndian(beginning, kCryptoHeaderBytes) <= size - rest;
 }
 
 }  // namespace cairn::wire

@@ -19,7 +19,7 @@ namespace {
 
 constexpr const char* kAuthority = "identity_ca.pem";
 constexpr const char* kCertificate = "cert.pem";
-constexpr const char* kKey = "key.pem";
+constexpr const char* kKeyFile = "key.pem";
 constexpr const char* kGovernance = "governance.smime";
 constexpr const char* kPermissions = "permissions.smime";
 
@@ -125,7 +125,7 @@ Result<void> CheckSecurityFiles(const std::string& directory) {
   if (!certificate) return tl::unexpected(certificate.error());
   const Trust trust(X509_STORE_new());
   X509_STORE_add_cert(trust.get(), authority->get());
-  if (auto own = CheckKey(place / kKey, certificate->get()); !own) return own;
+  if (auto own = CheckKey(place / kKeyFile, certificate->get()); !own) return own;
   if (auto issued = CheckIssued(place / kCertificate, certificate->get(), trust.get()); !issued) return issued;
   if (const auto rules = ReadSigned(place / kGovernance, trust.get()); !rules) return tl::unexpected(rules.error());
   const auto permissions = ReadSigned(place / kPermissions, trust.get());
@@ -145,7 +145,7 @@ void AddSecurity(const std::string& directory, eprosima::fastdds::dds::DomainPar
   const std::string identity = "dds.sec.auth.builtin.PKI-DH.";
   add(identity + "identity_ca", place + kAuthority);
   add(identity + "identity_certificate", place + kCertificate);
-  add(identity + "private_key", place + kKey);
+  add(identity + "private_key", place + kKeyFile);
   add("dds.sec.access.plugin", "builtin.Access-Permissions");
   const std::string access = "dds.sec.access.builtin.Access-Permissions.";
   add(access + "permissions_ca", place + kAuthority);
