@@ -14,7 +14,7 @@ ScanPipeline::ScanPipeline(const MapperOptions& options, const Pose2& T_map_robo
                {.paired =
                     [this](PairedScan&& pair) {
                       if (mapper_.full()) return sink_.dropped(*pair.scan, DropReason::kSessionFull);
-                      std::shared_ptr<const Scan> scan = pair.scan;
+                      std::shared_ptr<const Scan> scan = pair.at_stamp;
                       if (scan->stamp != pair.stamp) {
                         auto restamped = std::make_shared<Scan>(*scan);
                         restamped->stamp = pair.stamp;

@@ -101,7 +101,7 @@ void OdometryPairing::Pair(const std::shared_ptr<const Scan>& scan, const Pose2&
     set_back_ns_ = static_cast<std::uint64_t>(stamp) - robot_time;
   }
   last_paired_ = stamp;
-  sink_.paired({WithoutMotion(scan), T_odom_robot, stamp});
+  sink_.paired({scan, WithoutMotion(scan), T_odom_robot, stamp});
 }
 
 // Whether odometry covers the whole scan.

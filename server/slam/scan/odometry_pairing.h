@@ -30,7 +30,8 @@ struct PairingOptions {
 void Visit(OptionVisitor& visitor, PairingOptions& options);
 
 struct PairedScan {
-  std::shared_ptr<const Scan> scan;  // With all beams at its stamp.
+  std::shared_ptr<const Scan> scan;      // As it was added.
+  std::shared_ptr<const Scan> at_stamp;  // The same with all beams at its stamp, for estimation.
   Pose2 T_odom_robot;
   Stamp stamp = 0;  // The scan's, plus what the robot's clock was set back by: grows from pair to pair.
 };

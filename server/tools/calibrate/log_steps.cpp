@@ -88,9 +88,9 @@ Result<LogSteps> MeasureSteps(const std::filesystem::path& log, const LogStepOpt
                               const slam::ParallelFor& parallel_for) {
   StepTaker taker(options, parallel_for);
   int unusable = 0;
-  slam::OdometryPairing pairing(options.slam.pairing,
-                                {.paired = [&](slam::PairedScan&& pair) { taker.Take(*pair.scan, pair.T_odom_robot); },
-                                 .dropped = [&](const Scan&, DropReason) { ++unusable; }});
+  slam::OdometryPairing pairing(
+      options.slam.pairing, {.paired = [&](slam::PairedScan&& pair) { taker.Take(*pair.at_stamp, pair.T_odom_robot); },
+                             .dropped = [&](const Scan&, DropReason) { ++unusable; }});
   auto summary = ReadLog(log, options.reader, [&](LogRecord&& record) {
     if (const auto* odometry = std::get_if<Odometry>(&record)) {
       if (ValidateOdometry(*odometry)) pairing.Add(*odometry);

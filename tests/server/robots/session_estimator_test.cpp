@@ -55,6 +55,20 @@ class SessionEstimatorTest : public ::testing::Test {
                                .grid_changed = [this](GridChange&& change) { changes_.push_back(std::move(change)); }}};
 };
 
+// The beams follow one another while the robot drives: another scan is estimated than the one that came.
+TEST_F(SessionEstimatorTest, ARollingScanIsUsedAsSoonAsItsLastBeamHasOdometry) {
+  for (int step = 0; step < 6; ++step) {
+    EXPECT_TRUE(record_.OdometryReceived(RoomOdometry(step).sequence));
+    estimator_.Handle(OdometryOf("r1", RoomOdometry(step)));
+    Scan scan = RoomScan(step);
+    scan.beam_period_s = 0.01 / static_cast<double>(scan.ranges_m.size());
+    HandleScan(std::move(scan));
+  }
+  EXPECT_EQ(poses_.size(), 5U);
+  EXPECT_EQ(ledger().used, 5U);
+  EXPECT_EQ(ledger().waiting, 1U);
+}
+
 TEST_F(SessionEstimatorTest, EveryKeyframeChangesTheMapAndEveryScanGivesAPose) {
   Drive(0, 20);
   EXPECT_EQ(poses_.size(), 20U);

@@ -28,7 +28,7 @@ std::vector<GridStep> GridSteps(const StudyLog& log, double gate_m, double gate_
   const auto paired = [&](slam::PairedScan&& pair) {
     const Pose2 step = steps.empty() ? Pose2{} : Between(T_odom_last, pair.T_odom_robot);
     if (!steps.empty() && step.translation().norm() < gate_m && std::abs(step.theta) < gate_rad) return;
-    steps.push_back({pair.scan->stamp, step, pair.scan});
+    steps.push_back({pair.scan->stamp, step, pair.at_stamp});
     T_odom_last = pair.T_odom_robot;
   };
   slam::OdometryPairing pairing({}, {.paired = paired, .dropped = [](const Scan&, DropReason) {}});

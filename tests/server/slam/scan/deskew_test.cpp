@@ -114,7 +114,7 @@ TEST(OdometryPairing, TakesTheMotionOutOfARollingScan) {
     pairing.Add(sample);
   }
   ASSERT_EQ(pairs.size(), 1U);
-  EXPECT_GT(ShareThatAgrees(*pairs[0].scan, Measure(given, 0.0)), 0.98);
+  EXPECT_GT(ShareThatAgrees(*pairs[0].at_stamp, Measure(given, 0.0)), 0.98);
 }
 
 // A log that ends within a scan.
@@ -129,7 +129,7 @@ TEST(OdometryPairing, TakesOutTheMotionThatIsKnownWhenNoMoreOdometryComes) {
   EXPECT_TRUE(pairs.empty());
   pairing.Finish();
   ASSERT_EQ(pairs.size(), 1U);
-  EXPECT_GT(ShareThatAgrees(*pairs[0].scan, Measure(given, 0.0)), 0.6);
+  EXPECT_GT(ShareThatAgrees(*pairs[0].at_stamp, Measure(given, 0.0)), 0.6);
 }
 
 }  // namespace
