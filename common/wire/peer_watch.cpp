@@ -19,6 +19,7 @@ namespace rtps = eprosima::fastrtps::rtps;
 
 // More than a fleet has. What a peer can make grow stays below it.
 constexpr std::size_t kMaxPeers = 4096;
+constexpr std::size_t kMaxText = 512;
 constexpr std::size_t kMaxWriters = 65536;
 
 // The log of the library is one for the whole process, and so is this.
@@ -110,7 +111,9 @@ void PeerWatch::on_participant_discovery(Participant*, rtps::ParticipantDiscover
   }
   if (info.status != rtps::ParticipantDiscoveryInfo::DISCOVERED_PARTICIPANT || peers_.contains(guid)) return;
   Forget(guid);
-  if (peers_.size() >= kMaxPeers) peers_.clear();
+  // Those without an identity can be as many as a stranger likes; those of the fleet stay.
+  if (peers_.size() >= kMaxPeers) std::erase_if(peers_, [](const auto& peer) { return !peer.second.authorized; });
+  if (peers_.size() >= kMaxPeers) return;
   peers_[guid] = {.address = AddressOf(info.info), .since = Clock::now()};
   if (info.info.identity_token_.is_nil()) Refuse(guid, "it has no identity: it runs without DDS Security");
 }
@@ -130,17 +133,21 @@ void PeerWatch::onParticipantAuthentication(Participant*, rtps::ParticipantAuthe
 void PeerWatch::on_publisher_discovery(Participant*, rtps::WriterDiscoveryInfo&& info) {
   if (!secure_ || info.status == rtps::WriterDiscoveryInfo::REMOVED_WRITER) return;
   const auto& partitions = info.info.m_qos.m_partition;
-  std::string robot;
-  if (partitions.size() == 1) robot = partitions.begin()->name();
+  const std::string robot = partitions.size() == 1 ? partitions.begin()->name() : "";
   const MutexLock lock(mutex_);
+  if (const auto known = robots_.find(info.info.guid()); known != robots_.end()) {
+    if (known->second != robot) known->second.clear();
+    return;
+  }
   if (robots_.size() >= kMaxWriters) {
     std::erase_if(robots_, [this](const auto& writer) CAIRN_REQUIRES(mutex_) {
       return !peers_.contains(Guid(writer.first.guidPrefix, rtps::c_EntityId_RTPSParticipant));
     });
     if (robots_.size() >= kMaxWriters) return;
   }
-  const auto [known, fresh] = robots_.try_emplace(info.info.guid(), robot);
-  if (!fresh && known->second != robot) known->second.clear();
+  // Access control has compared the partition that a writer has at first, and not a later one.
+  const bool compared = info.status == rtps::WriterDiscoveryInfo::DISCOVERED_WRITER;
+  robots_.emplace(info.info.guid(), compared ? robot : "");
 }
 
 // What was known of an earlier participant with the same GUID.
@@ -195,7 +202,7 @@ void PeerWatch::Say(const std::string& line) {
   const auto now = Clock::now();
   const double waited_s = std::chrono::duration<double>(now - std::exchange(allowed_at_, now)).count();
   lines_allowed_ = std::min(kMaxLines, lines_allowed_ + waited_s * kLinesPerSecond);
-  if (lines_allowed_ < 1.0) return;
+  if (lines_allowed_ < 1.0 || lines_.size() >= static_cast<std::size_t>(kMaxLines)) return;
   lines_allowed_ -= 1.0;
   lines_.push_back(line);
 }
@@ -205,9 +212,13 @@ void PeerWatch::OnLibraryError(const std::string& message) {
   // `Error validating remote permissions for <GUID> (<reason>).`
   static const std::regex kText(
       "Error (checking create remote (?:writer|reader)|validating remote permissions for|"
-      "checking remote participant) +([0-9a-f.|]+) \\((.*)\\)\\.?\\n?");
+      "checking remote participant) +([0-9a-f.|]+) \\((.*?)(?:\\)\\.? ?)?");
   std::smatch parts;
-  if (!std::regex_match(message, parts, kText)) return;
+  // A member may have chosen a part of the text. The expression takes a part of the stack for each character.
+  std::string text = message.substr(0, kMaxText);
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7F; }, ' ');
+  if (!std::regex_match(text, parts, kText)) return;
   Guid guid;
   std::istringstream(parts[2].str()) >> guid;
   const MutexLock lock(mutex_);

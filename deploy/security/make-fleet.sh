@@ -8,7 +8,7 @@
 # To renew a member, or to change the robots of `sim`, delete its directory and run the script again.
 # Certificates and permissions are valid for N days (365), the CA for ten times as long.
 # Exit codes: 0 made, 1 openssl failed, 2 wrong usage.
-set -euo pipefail
+set -euo pipefail -o noglob
 
 usage() { sed -n '2,11s/^# \{0,1\}//p' "${BASH_SOURCE[0]}" >&2; exit 2; }
 fail() { echo "make-fleet: $*" >&2; exit "${code:-1}"; }
@@ -62,7 +62,8 @@ if [ ! -e ca.key ]; then
 fi
 
 # The rules that all members share. Whoever has no identity of this fleet is refused. Discovery and samples are
-# encrypted with keys that a writer gives only to the readers that the permissions allow; every message is signed.
+# encrypted with keys that a writer gives only to the readers that the permissions allow; every message is signed, but
+# Fast DDS 2.9 also accepts unsigned ones.
 if [ ! -e governance.smime ]; then
   cat >"$scratch/governance.xml" <<XML
 <?xml version="1.0" encoding="UTF-8"?>
@@ -93,7 +94,7 @@ elements() { # tag, values
 }
 topics() { printf '<topics>'; elements topic "${@/#/cairn\/v1\/}"; printf '</topics>'; }
 rule() { printf '<allow_rule><domains><id_range><min>0</min><max>232</max></id_range></domains>%s</allow_rule>\n' "$*"; }
-told=(session_state session_refusal pose ledger map tile job reply) # What the server tells everybody.
+told=(session_state session_refusal pose ledger map tile job reply) # Topics that the server writes and every member may read.
 
 rules_of_server() {
   local all='<topics><topic>cairn/v1/*</topic></topics><partitions><partition>*</partition></partitions>'
@@ -119,12 +120,14 @@ member() { # role, name, rules, directory
   mkdir "$new"
   new_key "$new/key.pem"
   run openssl req -new -key "$new/key.pem" -subj "/O=cairn/OU=$role/CN=$name" -out "$scratch/request"
-  run openssl x509 -req -in "$scratch/request" -CA ca.pem -CAkey ca.key -set_serial "0x$(openssl rand -hex 16)" \
+  # A member must not sign permissions, although its certificate comes from the CA that signs them.
+  printf 'basicConstraints=critical,CA:FALSE\nextendedKeyUsage=critical,clientAuth,serverAuth\n' >"$scratch/extensions"
+  run openssl x509 -req -extfile "$scratch/extensions" -in "$scratch/request" -CA ca.pem -CAkey ca.key -set_serial "0x$(openssl rand -hex 16)" \
     -days "$days" -out "$new/cert.pem"
   {
     echo '<?xml version="1.0" encoding="UTF-8"?>'
     echo "<dds><permissions><grant name=\"$role-$name\"><subject_name>CN=$name,OU=$role,O=cairn</subject_name>"
-    echo "<validity><not_before>$(moment '-1 day')</not_before><not_after>$(moment "+$days days")</not_after></validity>"
+    echo "<validity><not_before>$(moment '-1 day')</not_before><not_after>$(moment "+$((days + 1)) days")</not_after></validity>"
     echo "$rules<default>DENY</default></grant></permissions></dds>"
   } >"$scratch/permissions.xml"
   sign "$scratch/permissions.xml" "$new/permissions.smime"

@@ -89,7 +89,10 @@ Result<void> Roster::RestoreDoubtful(SessionId id, RestoreMarks& marks) {
   if (auto marked = marks.Begin({id}); !marked) return marked;
   const bool with_journal = deaths < kDeathsWithJournal;
   auto session = RestoreOne(id, with_journal);
-  if (auto unmarked = marks.Succeeded({id}); !unmarked) return unmarked;
+  // Without its journal and without a checkpoint it is not read at the next start either.
+  if (with_journal || session) {
+    if (auto unmarked = marks.Succeeded({id}); !unmarked) return unmarked;
+  }
   if (with_journal || !session) return Register(id, std::move(session));
   // The robot has moved on since the checkpoint, and what it did is left out: it starts a new session. This one's part
   // of the map stays, as that of any session that is gone.
@@ -229,6 +232,11 @@ Result<std::shared_ptr<Session>> Roster::ReadBack(SessionId id, bool with_journa
     return (*site)->Switched(epoch, generation);
   };
   if (!with_journal) {
+    // Empty, it would be taken for a session that is gone, and its journal would be removed.
+    if (position == 0) {
+      session->KeepStored();
+      return Fail(StatusCode::kDataLoss, "it has no checkpoint that can be used, and its journal is left out");
+    }
     session->Replayed();
     return session;
   }

@@ -51,12 +51,14 @@ void ErrorEnsemble::Resample(double lost) {
   const int partner = 1 + static_cast<int>(UniformDraw(rng_) * (kMembers - 1));
   const double robot_share = path_.empty() ? 0.0 : path_.back()->spread_share;
   LoseAncestors(robot_, lost * robot_share, partner);
-  for (auto at = path_.rbegin(); at != path_.rend() && (*at)->spread_share > kNothingLeft; ++at) {
+  auto at = path_.rbegin();
+  for (; at != path_.rend() && (*at)->spread_share > kNothingLeft; ++at) {
     auto kept = std::make_shared<Kept>(**at);
     LoseAncestors(kept->errors, lost * kept->spread_share, partner);
     kept->spread_share *= 1.0 - lost;
     *at = std::move(kept);
   }
+  frozen_path_.ForgetFrom(static_cast<std::size_t>(at.base() - path_.begin()));
 }
 
 // Resampling moves the mean of the particles to that of the ancestors that are left, which are a random draw

@@ -77,56 +77,70 @@ std::optional<double> RangeOfCut(const Eigen::Vector2d& direction, const Eigen::
   return (a.x() * d.y() - a.y() * d.x()) / across;
 }
 
-// Collects the ranges of the result.
+// Collects the ranges of the result. The first one at a beam stays.
 class Resampling {
  public:
   explicit Resampling(const Scan& scan)
       : scan_(scan),
-        full_turn_(IsFullTurn(scan)),
+        turn_(IsFullTurn(scan) ? std::round(2.0 * kPi / std::abs(scan.angle_step_rad)) : 0.0),
+        // A hit stays a hit, although it is a little farther from where the lidar was at the stamp.
+        farthest_(std::nextafter(static_cast<float>(std::min<double>(scan.range_max_m, kLargest)), 0.0F)),
         ranges_(scan.ranges_m.size(), std::numeric_limits<float>::quiet_NaN()) {}
 
   // Every beam between two neighbouring ends on one surface.
   void AddSurface(const MovedEnd& from, const MovedEnd& to) {
     const double spacing = std::max(from.p_laser.norm(), to.p_laser.norm()) * std::abs(scan_.angle_step_rad);
-    if ((to.p_laser - from.p_laser).norm() > kSurfaceGapM + kSurfaceSteps * spacing) return;
-    const double last = std::floor(std::max(from.beam, to.beam));
-    for (double beam = std::ceil(std::min(from.beam, to.beam)); beam <= last; ++beam) {
+    if ((to.p_laser - from.p_laser).norm() > kSurfaceGapM + kSurfaceSteps * spacing || Opposite(from, to)) return;
+    ForEachBeam(std::ceil(std::min(from.beam, to.beam)), std::floor(std::max(from.beam, to.beam)), [&](double beam) {
       const double angle = scan_.angle_first_rad + beam * scan_.angle_step_rad;
       const auto range = RangeOfCut({std::cos(angle), std::sin(angle)}, from.p_laser, to.p_laser);
       if (range && *range > 0.0) Put(beam, *range);
-    }
+    });
   }
-  void AddHit(const MovedEnd& end) { Put(std::round(end.beam), end.p_laser.norm()); }
+  void AddHit(const MovedEnd& end) {
+    const double beam = std::round(end.beam);
+    ForEachBeam(beam, beam, [&](double at) { Put(at, end.p_laser.norm()); });
+  }
   // Every beam from one that hit nothing to the next one.
-  void AddNoReturns(const MovedEnd& from, const MovedEnd& to) {
-    const double last = std::round(std::max(from.beam, to.beam));
-    for (double beam = std::round(std::min(from.beam, to.beam)); beam <= last; ++beam) {
-      if (Empty(beam)) *At(beam) = to.range_m;
-    }
+  void AddNoReturns(const MovedEnd& before, const MovedEnd& to) {
+    const MovedEnd& from = Opposite(before, to) ? to : before;
+    ForEachBeam(std::round(std::min(from.beam, to.beam)), std::round(std::max(from.beam, to.beam)),
+                [&](double beam) { *At(beam) = to.range_m; });
   }
   [[nodiscard]] std::vector<float> ranges() && { return std::move(ranges_); }
 
  private:
+  static constexpr double kLargest = std::numeric_limits<float>::max();
+
+  // Half a turn apart or more, as where the robot turns fast or an end passes behind the lidar: nothing lies between.
+  [[nodiscard]] bool Opposite(const MovedEnd& from, const MovedEnd& to) const {
+    return !(std::abs(to.beam - from.beam) * std::abs(scan_.angle_step_rad) < kPi);
+  }
+  // The beams within the field of view that have no range yet. The ends of a scan with a tiny step lie anywhere.
+  template <typename Visit>
+  void ForEachBeam(double first, double last, Visit visit) {
+    if (turn_ == 0.0) {
+      first = std::max(first, 0.0);
+      last = std::min(last, static_cast<double>(ranges_.size()) - 1.0);
+    }
+    for (double beam = first; beam <= last; ++beam) {
+      const float* const range = At(beam);
+      if (range != nullptr && std::isnan(*range)) visit(beam);
+    }
+  }
   // Null outside the field of view.
   float* At(double beam) {
-    const auto count = static_cast<double>(ranges_.size());
-    if (full_turn_) beam -= count * std::floor(beam / count);
-    return beam >= 0.0 && beam < count ? &ranges_[static_cast<std::size_t>(beam)] : nullptr;
-  }
-  bool Empty(double beam) {
-    const float* const range = At(beam);
-    return range != nullptr && std::isnan(*range);
+    if (turn_ > 0.0) beam -= turn_ * std::floor(beam / turn_);
+    return beam >= 0.0 && beam < static_cast<double>(ranges_.size()) ? &ranges_[static_cast<std::size_t>(beam)]
+                                                                     : nullptr;
   }
   void Put(double beam, double range_m) {
-    // What was seen first is nearest to the stamp.
-    if (!Empty(beam) || range_m < scan_.range_min_m) return;
-    // A hit stays a hit, although it is a little farther from where the lidar was at the stamp.
-    const auto farthest = std::nextafter(static_cast<float>(scan_.range_max_m), 0.0F);
-    *At(beam) = std::min(static_cast<float>(range_m), farthest);
+    if (range_m >= scan_.range_min_m) *At(beam) = std::min(static_cast<float>(std::min(range_m, kLargest)), farthest_);
   }
 
   const Scan& scan_;
-  const bool full_turn_;
+  const double turn_;  // Beams of a full turn; 0 if the field of view is smaller.
+  const float farthest_;
   std::vector<float> ranges_;
 };
 

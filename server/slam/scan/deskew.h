@@ -6,7 +6,8 @@
 // beam is moved by the odometry between the stamp and the time of the beam, as seen from the lidar at the stamp. The
 // ends are then no longer at the angles of the beams; therefore each beam of the result gets the range at which it cuts
 // the line between two neighbouring ends on one surface, and otherwise that of the nearest end. Where
-// the turn of the robot shows a place twice, the first sight counts. A beam that nothing tells anything about is
+// the turn of the robot shows a place twice, a surface counts more than a single end, an end more than a beam that hit
+// nothing, and among equals the first one counts. A beam that nothing tells anything about is
 // invalid (not a number). The scan plane is taken to be level. Stateless, thread-safe.
 #pragma once
 
@@ -22,8 +23,9 @@ namespace cairn::slam {
 [[nodiscard]] std::uint64_t DurationNs(const Scan& scan);
 
 // `odometry`: in the order of the stamps, from the last sample at or before the stamp on. After its last sample the
-// robot is taken to stand. The result has a beam_period_s of 0; if the robot did not move, only this has changed.
-// REQUIRES: the scan passed ValidateScan; `odometry` is not empty and its first sample is not after the scan's stamp.
+// robot is taken to stand. The result has a beam_period_s of 0; if all samples have the same pose, only this has
+// changed. The result may have no usable beam left. REQUIRES: the scan passed ValidateScan; `odometry` is not empty and
+// its first sample is not after the scan's stamp.
 [[nodiscard]] Scan Deskew(const Scan& scan, std::span<const Odometry> odometry);
 
 }  // namespace cairn::slam

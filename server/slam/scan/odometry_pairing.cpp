@@ -129,12 +129,16 @@ void OdometryPairing::PairOrDrop(const std::shared_ptr<const Scan>& scan) {
 std::shared_ptr<const Scan> OdometryPairing::WithoutMotion(const std::shared_ptr<const Scan>& scan) const {
   const std::uint64_t duration_ns = DurationNs(*scan);
   if (duration_ns == 0 || odometry_.empty() || odometry_.front().stamp > scan->stamp) return scan;
+  const auto later = [](Stamp stamp, const Odometry& odometry) { return stamp < odometry.stamp; };
   std::vector<Odometry> during;
-  for (const Odometry& odometry : odometry_) {
-    during.push_back(odometry);
-    if (odometry.stamp >= scan->stamp && NanosBetween(scan->stamp, odometry.stamp) >= duration_ns) break;
+  for (auto at = std::prev(std::upper_bound(odometry_.begin(), odometry_.end(), scan->stamp, later));
+       at != odometry_.end(); ++at) {
+    during.push_back(*at);
+    if (at->stamp >= scan->stamp && NanosBetween(scan->stamp, at->stamp) >= duration_ns) break;
   }
-  return std::make_shared<const Scan>(Deskew(*scan, during));
+  // Where the robot has turned away from everything that was hit, nothing would be left of the scan.
+  auto still = std::make_shared<const Scan>(Deskew(*scan, during));
+  return ValidateScan(*still) ? still : scan;
 }
 
 void OdometryPairing::Flush() {

@@ -52,8 +52,9 @@ class OdometryPairing {
   void Add(const Odometry& odometry);
   // From now on both streams come from another client, which numbers from the beginning.
   void NewClient();
-  // Call this when no more odometry will come. A waiting scan is paired with the last sample if that is at
-  // most max_gap_s old, and is dropped otherwise.
+  // Call this when no more odometry will come. A waiting scan that began before the last sample is paired as usual, and
+  // the robot is taken to stand after that sample. A later scan is paired with the last sample if that is at most
+  // max_gap_s old, and is dropped otherwise.
   void Finish();
 
   [[nodiscard]] std::size_t waiting() const { return scans_.size(); }

@@ -4,6 +4,7 @@
 // sequence itself stays a vector, to which this belongs. Not thread-safe; the blocks never change.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <memory>
 #include <utility>
@@ -18,7 +19,11 @@ namespace cairn::slam {
 template <typename T>
 class FrozenBlocks {
  public:
-  // An element of the blocks has changed: they are copied anew.
+  // Whoever changes an element or shortens the sequence calls this with the first one concerned; otherwise later
+  // checkpoints contain the old values.
+  void ForgetFrom(std::size_t first) {
+    blocks_.resize(std::min(blocks_.size(), first / static_cast<std::size_t>(kBlock)));
+  }
   void Forget() { blocks_.clear(); }
 
   void Save(StateWriter& archive, const std::vector<T>& values) const {

@@ -272,6 +272,19 @@ TEST_F(SecurityFiles, AreNotChangedAfterTheyWereSigned) {
   EXPECT_THAT(Fault(), HasSubstr("permissions.smime has no valid signature"));
 }
 
+// The certificate of a member comes from the same authority, but it is not one to sign permissions with.
+TEST_F(SecurityFiles, AreNotSignedByAMember) {
+  const std::filesystem::path text = directory_ / "permissions.xml", forged = directory_ / "forged.smime";
+  std::ofstream(text) << "<dds><permissions/></dds>";
+  const auto signing =
+      ChildProcess({"/usr/bin/env", "openssl", "smime", "-sign", "-in", text.string(), "-text", "-out", forged.string(),
+                    "-signer", (member_ / "cert.pem").string(), "-inkey", (member_ / "key.pem").string()})
+          .Wait();
+  ASSERT_EQ(signing.exit_code, 0) << signing.output;
+  Copy(forged, "permissions.smime");
+  EXPECT_THAT(Fault(), HasSubstr("permissions.smime has no valid signature"));
+}
+
 TEST_F(SecurityFiles, AreInDateAndSecret) {
   std::filesystem::permissions(member_ / "key.pem", std::filesystem::perms::others_read,
                                std::filesystem::perm_options::add);

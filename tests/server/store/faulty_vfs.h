@@ -41,7 +41,7 @@ class FaultyVfs {
 
  private:
   static constexpr const char* kName = "faulty";
-  struct alignas(16) File {
+  struct alignas(8) File {
     sqlite3_file base;
     sqlite3_file* real;
   };

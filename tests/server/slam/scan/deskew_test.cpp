@@ -103,6 +103,38 @@ TEST(Deskew, OfARobotThatStandsChangesNoRange) {
   EXPECT_EQ(Deskew(rolling, Wheels({})).ranges_m, rolling.ranges_m);
 }
 
+// Whatever a peer may send takes little time and gives nothing that lies between opposite directions.
+TEST(Deskew, OfATinyStepOrAFastTurnEndsAndInventsNothing) {
+  const Case given{.field_of_view_deg = 180.0, .pillars = {}};
+  Scan tiny = Measure(given, kTurn_s);
+  tiny.angle_step_rad = 1e-300;
+  EXPECT_EQ(Deskew(tiny, Wheels(given.twist)).ranges_m.size(), tiny.ranges_m.size());
+  for (float& range : tiny.ranges_m) range = std::numeric_limits<float>::infinity();
+  EXPECT_EQ(Deskew(tiny, Wheels(given.twist)).ranges_m.size(), tiny.ranges_m.size());
+
+  // At 17 rad/s the robot turns by half a turn and more within the scan, and the directions come round again.
+  const Case fast{.field_of_view_deg = 90.0, .twist = {0.0, 17.0}, .pillars = {}};
+  const Scan at_once = Measure(fast, 0.0), deskewed = Deskew(Measure(fast, kTurn_s), Wheels(fast.twist));
+  for (std::size_t i = 0; i < at_once.ranges_m.size(); ++i) {
+    if (std::isnan(deskewed.ranges_m[i])) continue;
+    EXPECT_NEAR(deskewed.ranges_m[i], at_once.ranges_m[i], 0.2F) << i;
+  }
+}
+
+// The only hits turn out of the field of view: such a scan stays as it came, because an estimator needs a usable beam.
+TEST(OdometryPairing, LeavesAScanOfWhichNothingWouldBeLeft) {
+  std::vector<PairedScan> pairs;
+  OdometryPairing pairing({}, {[&](PairedScan&& pair) { pairs.push_back(std::move(pair)); }, {}});
+  const Case given{.field_of_view_deg = 90.0, .twist = {0.0, 2.0}, .pillars = {}};
+  Scan scan = Measure(given, kTurn_s);
+  for (std::size_t i = 0; i + 2 < scan.ranges_m.size(); ++i) scan.ranges_m[i] = 0.0F;
+  const auto added = std::make_shared<const Scan>(std::move(scan));
+  pairing.Add(added);
+  for (const Odometry& sample : Wheels(given.twist)) pairing.Add(sample);
+  ASSERT_EQ(pairs.size(), 1U);
+  EXPECT_EQ(pairs[0].at_stamp, added);
+}
+
 // The pairing waits for the odometry at the last beam, and no longer.
 TEST(OdometryPairing, TakesTheMotionOutOfARollingScan) {
   std::vector<PairedScan> pairs;
@@ -110,7 +142,7 @@ TEST(OdometryPairing, TakesTheMotionOutOfARollingScan) {
   const Case given;
   pairing.Add(std::make_shared<const Scan>(Measure(given, kTurn_s)));
   for (const Odometry& sample : Wheels(given.twist)) {
-    EXPECT_EQ(pairs.size(), sample.stamp > kStart + Stamp{210'000'000} ? 1U : 0U);
+    EXPECT_TRUE(pairs.empty());
     pairing.Add(sample);
   }
   ASSERT_EQ(pairs.size(), 1U);
