@@ -62,8 +62,9 @@ DoorCounts LossesOf(const Watched& watched) {
 }
 
 void TellRefusals(const Watched& watched) {
-  for (const std::string& line : watched.bus.TakeRefusalLines()) spdlog::warn("security: {}", line);
+  // Asking for the counts also finds peers that have answered too late; their lines come with them.
   Refusals refusals = watched.bus.refusals();
+  for (const std::string& line : watched.bus.TakeRefusalLines()) spdlog::warn("security: {}", line);
   refusals.commands = watched.ingress.commands_refused();
   watched.server.SetRefusals(refusals);
 }
