@@ -2,7 +2,8 @@
 // program's permissions do not allow is refused here (kPermissionDenied). Each returns the answer, or the
 // server's error (its code and message), or why there is no answer: kUnavailable where no server was found, and
 // kDeadlineExceeded if the answer was late. The time needed to find the server counts towards the timeout.
-// A question without an answer is asked again within the timeout, except one that starts a job, after an answered ping.
+// The client first waits for an answered ping. A question without an answer is asked again within the timeout; one that
+// starts a job is not.
 // If no ping is answered for a second although a server is there, the client joins the domain again: forged messages
 // may keep it from receiving (RobotClient).
 // Thread rule: any number of threads may ask at once, and each waits for its own answer. Do not ask from a callback of

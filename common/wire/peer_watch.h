@@ -3,8 +3,8 @@
 // The robot: a writer of a robot's streams is in one DDS partition, which is named as the robot. The access control of
 // Fast DDS 2.9 has compared it with the permissions that the fleet's CA has signed before it matches the writer. The
 // GUID would be no proof: the library does not compare it with the certificate. Fast DDS compares the partition once. A
-// writer that announces another one later, or has been removed, therefore speaks for nobody until its participant is
-// gone.
+// writer that announces another one later, also after it was removed, therefore speaks for nobody until its participant
+// is gone.
 // The reasons: the callbacks of Fast DDS give no reason and do not report a refused endpoint, so both come from its
 // log. Thread-safe. This header uses the Fast DDS 2.x API; include it only inside common/wire.
 #pragma once

@@ -14,7 +14,8 @@ namespace cairn::wire {
 // Whether a participant can be made with the files of `directory`: identity_ca.pem, cert.pem, key.pem,
 // governance.smime, permissions.smime. Fast DDS reports every fault of them by the same message without a reason, so
 // they are checked first. An error names the file and the fault, and quotes nothing of the key. kFailedPrecondition:
-// a file is missing, invalid or expired, or does not belong to the others.
+// a file is missing or invalid, the certificate has expired, or they do not belong together. The dates of the
+// permissions are not read.
 [[nodiscard]] Result<void> CheckSecurityFiles(const std::string& directory);
 
 // Makes the participant authenticate itself with these files, and demand the same of its peers.

@@ -26,7 +26,7 @@ Result<StoredSession> ReadSession(Store& store, SessionId id) {
 constexpr std::uint32_t kDeathsWithJournal = 2;     // After so many the journal is left out,
 constexpr std::uint32_t kDeathsWithCheckpoint = 3;  // and after so many the checkpoint as well.
 
-// What a server that is not sure to survive its start says of a session.
+// Why a session is not restored, or not completely.
 std::string AfterDeaths(std::uint32_t deaths) {
   return "the server ended " + std::to_string(deaths) + " times while it restored this session";
 }

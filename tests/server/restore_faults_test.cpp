@@ -25,6 +25,16 @@ void SayStarted(WholeServer& house) {
                             .started = true});
 }
 
+// A server with two robots, which then stops.
+void DriveTwoRobots(const std::filesystem::path& state, const ServerOptions& options) {
+  StoredServer server(state, options);
+  for (const char* robot : {"r1", "r2"}) {
+    server->Open(robot, kDriver);
+    server->Drive(robot, kDriver, 0, 60);
+  }
+  ASSERT_TRUE(server->WaitFor([&] { return server->LastLedger("r2").durable_through == 60; }));
+}
+
 // Turns over one byte in every part of the session's newest checkpoint, as a bad disk does.
 void DamageCheckpoint(const std::filesystem::path& directory, std::uint64_t session) {
   sqlite3* database = nullptr;
@@ -42,14 +52,7 @@ TEST(Restore, ASessionWithDamagedRecordsIsRefusedAndTheOthersComeBack) {
   const TempDirectory directory;
   ServerOptions options = TestOptions();
   options.robots.checkpoint_entries = 40;
-  {
-    StoredServer first(directory / "0", options);
-    for (const char* robot : {"r1", "r2"}) {
-      first->Open(robot, kDriver);
-      first->Drive(robot, kDriver, 0, 60);
-    }
-    ASSERT_TRUE(first->WaitFor([&] { return first->LastLedger("r2").durable_through == 60; }));
-  }
+  DriveTwoRobots(directory / "0", options);
   std::uint64_t position = 0;
   {
     const auto store = *OpenStore(directory / "0");
@@ -131,14 +134,7 @@ TEST(Restore, ASessionWhoseJournalEndsTheServerDoesSoTwiceAndTheOthersComeBack) 
   const TempDirectory directory;
   ServerOptions options = TestOptions();
   options.robots.checkpoint_entries = 40;
-  {
-    StoredServer first(directory / "0", options);
-    for (const char* robot : {"r1", "r2"}) {
-      first->Open(robot, kDriver);
-      first->Drive(robot, kDriver, 0, 60);
-    }
-    ASSERT_TRUE(first->WaitFor([&] { return first->LastLedger("r2").durable_through == 60; }));
-  }
+  DriveTwoRobots(directory / "0", options);
   const auto deaths = [&](std::uint64_t session) {
     const auto store = *OpenStore(directory / "0");
     return RestoreMarks::Read(*store)->deaths(session);

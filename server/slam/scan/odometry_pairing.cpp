@@ -83,7 +83,6 @@ void OdometryPairing::Take(const Odometry& odometry) {
   odometry_.push_back(odometry);
   // Flush runs before a sample is dropped, because a waiting scan may need the oldest samples.
   Flush();
-  // Poses are absolute, so no motion is lost when the oldest sample is dropped.
   if (odometry_.size() > static_cast<std::size_t>(options_.max_odometry)) odometry_.pop_front();
 }
 

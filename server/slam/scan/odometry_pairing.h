@@ -25,7 +25,7 @@ struct PairingOptions {
   double max_stamp_jump_s = 10.0;
   std::int64_t jump_confirmations = 5;
   std::int64_t max_waiting_scans = 64;
-  std::int64_t max_odometry = 1024;  // Poses are absolute, so no motion is lost with a dropped sample.
+  std::int64_t max_odometry = 1024;  // A scan that takes longer than so many samples cannot be used.
 };
 void Visit(OptionVisitor& visitor, PairingOptions& options);
 
