@@ -8,6 +8,7 @@
 
 #include "client/cli/program.h"
 #include "common/sensor/trajectory.h"
+#include "tests/temp_directory.h"
 
 namespace cairn::client {
 namespace {
@@ -28,16 +29,9 @@ CommandOutcome RunLine(const std::vector<std::string>& arguments) {
 
 class CommandLine : public ::testing::Test {
  protected:
-  void SetUp() override {
-    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    directory_ = std::filesystem::path(::testing::TempDir()) / (std::string("cairn_cli_") + test->name());
-    std::filesystem::remove_all(directory_);
-    std::filesystem::create_directories(directory_);
-  }
-  void TearDown() override { std::filesystem::remove_all(directory_); }
   [[nodiscard]] std::string File(const std::string& name) const { return (directory_ / name).string(); }
 
-  std::filesystem::path directory_;
+  TempDirectory directory_;
 };
 
 TEST_F(CommandLine, NonsenseIsAUsageError) {
