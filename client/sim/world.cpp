@@ -1,5 +1,6 @@
 #include "client/sim/world.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace cairn::sim {

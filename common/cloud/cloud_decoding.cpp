@@ -1,4 +1,5 @@
 // DecodeCloud of cloud_file.h: headers of PLY and PCD into one layout of a point, then points by that layout.
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cstring>

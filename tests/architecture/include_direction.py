@@ -142,6 +142,35 @@ def check_name(path):
             yield f"the name '{word}' says nothing"
 
 
+def headers_of(tree, path, known):
+    """The headers of libraries that a file includes, itself or through files of the tree."""
+    if path not in known:
+        known[path] = headers = set()
+        for match in INCLUDE.finditer(blank(COMMENT, tree.sources.get(path, ""))):
+            if match.group(1):
+                headers |= headers_of(tree, match.group(1), known)
+            else:
+                headers.add("Eigen/" if match.group(2).startswith("Eigen/") else match.group(2))
+                headers.update({"utility"} if match.group(2) in rooms.BRINGS_UTILITY else ())
+    return known[path]
+
+
+def check_used_headers(tree):
+    """Yields (path, what is wrong) where a source uses what only the precompiled headers declare for it."""
+    known = {}
+    for path, text in tree.sources.items():
+        if inside(path, ["tests"]) or pathlib.PurePosixPath(path).suffix == ".c":
+            continue
+        bare = blank(COMMENT_OR_TEXT, text)
+        for header, names in rooms.HEADER_OF.items():
+            if header in rooms.IMPURE_HEADERS and inside(path, rooms.PURE):
+                continue  # It may neither use nor include this.
+            used = re.search(names, bare)
+            if used and header not in headers_of(tree, path, known):
+                line = bare.count("\n", 0, used.start()) + 1
+                yield f"{path}:{line}", f"{used.group()} needs <{header}>, which nothing here includes"
+
+
 def check_build_lists(tree):
     """Yields (path, what is wrong) about source files that no build file lists."""
     listed = set()
@@ -187,7 +216,8 @@ def check(tree):
         wrong += [f"{path}: {what}" for what in check_name(path)]
     for path in tree.sources:
         wrong += [f"{path}:{line}: {what}" for line, what in check_source(tree, path)]
-    wrong += [f"{path}: {what}" for path, what in (*check_build_lists(tree), *check_slam_links(tree))]
+    wrong += [f"{path}: {what}"
+              for path, what in (*check_used_headers(tree), *check_build_lists(tree), *check_slam_links(tree))]
     return sorted(wrong)
 
 

@@ -40,6 +40,16 @@ class Breaks(unittest.TestCase):
             self.assertIn("SLAM_ROOMS", found[0])
         self.assertEqual(wrongs({"server/slam/CMakeLists.txt": build_file(lambda lists: None)}), [])
 
+    def test_precompiled_headers_hide_no_missing_include(self):
+        for text, header in (("std::vector<int> a;", "vector"), ("auto b = std::max(1, 2);", "algorithm"),
+                             ("Eigen::Vector2d c;", "Eigen/"), ("auto d = std::move(e);", "utility")):
+            self.assert_wrong("common/sensor/scan.cpp", text, f"needs <{header}>")
+            include = "Eigen/Core" if header == "Eigen/" else header
+            self.assertEqual(wrongs({"common/sensor/scan.cpp": f"#include <{include}>\n{text}"}), [])
+            self.assertEqual(wrongs({"common/sensor/scan.cpp": f'#include "common/status.h"\n{text}',
+                                     "common/status.h": f"{HEADER}#include <{include}>\n"}), [])
+        self.assertEqual(wrongs({"common/sensor/scan.cpp": "// std::vector"}), [])
+
     def test_arrows_between_rooms(self):
         for path, target in (("common/sensor/scan.h", "server/slam/mapper.h"),
                              ("common/sensor/scan.h", "common/wire/bus.h"),

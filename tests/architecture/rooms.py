@@ -140,3 +140,30 @@ EMPTY_STEMS = {"base", "impl", "data", "process", "types", "defs"}
 EMPTY_TYPES = r"\b(?:class|struct)\s+(?:\[\[\w+\]\]\s*)?(\w*(?:Manager|Helper|Helpers|Utils|Util))\b"
 
 MOST_LINES = 400
+
+# What the precompiled headers (common/precompiled.cmake) declare for everybody, and the header that a source must include
+# for it, itself or through headers of the tree: without precompiled headers it has to compile as well.
+HEADER_OF = {
+    "Eigen/": r"\bEigen::",
+    "algorithm": r"\bstd::(ranges::)?(all_of|any_of|none_of|find|find_if|count_if|copy|copy_if|transform|fill|sort|stable_sort|"
+                 r"nth_element|lower_bound|upper_bound|min|max|minmax|clamp|min_element|max_element|remove_if|reverse|rotate|unique)\(",
+    "array": r"\bstd::array\b",
+    "chrono": r"\bstd::chrono::",
+    "cmath": r"\bstd::(sqrt|hypot|cos|sin|tan|atan2|abs|floor|ceil|round|lround|exp|log|log1p|pow|isfinite|isnan|fmod|remainder)\(",
+    "filesystem": r"\bstd::filesystem::",
+    "functional": r"\bstd::(function|hash|less|greater)\b",
+    "map": r"\bstd::(multi)?map\b",
+    "memory": r"\bstd::(unique_ptr|shared_ptr|weak_ptr|make_unique|make_shared)\b",
+    "optional": r"\bstd::(optional|nullopt|make_optional)\b",
+    "set": r"\bstd::(multi)?set\b",
+    "span": r"\bstd::span\b",
+    "sstream": r"\bstd::[io]?stringstream\b",
+    "string": r"\bstd::(string|to_string|getline|stoi|stod)\b",
+    "string_view": r"\bstd::string_view\b",
+    "thread": r"\bstd::(thread|this_thread|jthread)\b",
+    "utility": r"\bstd::(pair|move|exchange|swap|forward|as_const)\b",
+    "variant": r"\bstd::(variant|visit|get_if|monostate|holds_alternative)\b",
+    "vector": r"\bstd::vector\b",
+}
+# Headers that bring <utility>, as the standard's text of them or every library has it.
+BRINGS_UTILITY = {"algorithm", "chrono", "functional", "map", "memory", "optional", "unordered_map", "variant", "vector"}
