@@ -40,6 +40,8 @@ done
 stages+=("${studies[@]}")
 
 jobs=${CAIRN_JOBS:-$(deploy/build-jobs.sh)}
+# Many tests wait for a timer of the middleware half of their time.
+tests_at_once=$((jobs + 1))
 
 # One compiler cache for all build folders and clones: paths relative to the root, and precompiled headers allowed.
 export CCACHE_BASEDIR=$root CCACHE_SLOPPINESS=pch_defines,time_macros
@@ -72,7 +74,7 @@ build() { # folder, cmake --build options
 run_tests() { # folder, ctest options
   local folder=$1
   shift
-  "${fixed_layout[@]}" ctest --test-dir "build/$folder" -j "$jobs" --output-on-failure --no-tests=error \
+  "${fixed_layout[@]}" ctest --test-dir "build/$folder" -j "$tests_at_once" --output-on-failure --no-tests=error \
     --output-junit "$logs/$stage.xml" "$@"
 }
 

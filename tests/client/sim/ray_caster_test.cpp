@@ -51,7 +51,7 @@ TEST(RayCaster, AgreesWithEverySegmentTriedInTurn) {
   }
   const RayCaster walls(segments);
   int hits = 0;
-  for (int i = 0; i < 20000; ++i) {
+  for (int i = 0; i < 5000; ++i) {
     const Eigen::Vector2d origin(1.3 * place(random), 1.3 * place(random));
     const double a = i % 10 == 0 ? kPi / 2 * (i / 10 % 4) : angle(random);  // Also along the axes.
     const Eigen::Vector2d direction(std::cos(a), std::sin(a));
@@ -63,7 +63,7 @@ TEST(RayCaster, AgreesWithEverySegmentTriedInTurn) {
       ++hits;
     }
   }
-  EXPECT_GT(hits, 10000);
+  EXPECT_GT(hits, 2500);
 }
 
 TEST(RayCaster, SeesNothingBeyondTheLimitOrOutside) {
