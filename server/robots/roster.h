@@ -2,11 +2,13 @@
 // belong to; scans without one are counted as unclaimed.
 // Rules of opening: a robot has one session. Whoever names it (its token) resumes it, where its owner is the same
 // client or is not alive; its start pose is then ignored. A session that was started elsewhere and is not known here is
-// refused (FAILED_PRECONDITION): its start pose is out of date. A new session of a robot whose owner is not alive goes
-// on with the one it has, and the client that loses it is told; another live client is refused (ALREADY_EXISTS). An
-// ended session gives way to a new one. When max_robots is reached, the ended session that is oldest is forgotten first
-// (its part of the map stays), then the one suspended for longest. A session suspended for too long is ended. Thread
-// rule: any thread; nothing here waits for an estimator.
+// refused (FAILED_PRECONDITION): its start pose is out of date. A new session of a robot whose owner is not alive
+// replaces the one it has where the request says where the robot starts; otherwise it goes on with it, and the robot
+// has to be found in its map before it is localized (slam/recovery.h), because nobody knows whether it is still where
+// it was, or even the same robot. The client that loses its session is told; another live client is refused
+// (ALREADY_EXISTS). An ended session gives way to a new one. When max_robots is reached, the ended session that is
+// oldest is forgotten first (its part of the map stays), then the one suspended for longest. A session suspended for
+// too long is ended. Thread rule: any thread; nothing here waits for an estimator.
 #pragma once
 
 #include <asio/thread_pool.hpp>
@@ -59,7 +61,10 @@ class Roster {
 
  private:
   Result<void> Admit(const SessionRequest& request);
+  static Result<void> MayTakeOver(const Session& session, const SessionRequest& request);
   Result<void> Resume(Session& session, const SessionRequest& request);
+  Result<void> Replace(Session& session, const SessionRequest& request);
+  void TellDisplaced(const SessionState& before, const SessionRequest& request);
   Result<void> Open(const SessionRequest& request);
   std::shared_ptr<Session> Make(SessionId id, const SessionRequest& request, std::uint32_t map_epoch,
                                 const std::shared_ptr<Site>& site) const;
