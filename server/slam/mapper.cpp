@@ -1,5 +1,6 @@
 #include "server/slam/mapper.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -39,7 +40,14 @@ struct Mapper::State {
 
   ScanOutcome Coast(Stamp stamp, const Pose2& T_odom_robot);
   void LosePlace(bool odometry_goes_on);
-  [[nodiscard]] bool Agrees(const Scan& scan, const ScanView& view, const TrackStep& step) const;
+  [[nodiscard]] Recovery::Known LastKnown() const {
+    return {level.outcome.T_map_robot, level.T_odom_robot, level.outcome.covariance};
+  }
+  // Without odometry the robot is expected where it was.
+  [[nodiscard]] Pose2 OdometryOrNone(const Pose2& T_odom_robot) const {
+    return options.front_end.use_odometry ? T_odom_robot : level.T_odom_robot;
+  }
+  bool GoesOn(const Scan& scan, const ScanView& view, const TrackStep& step, const Pose2& T_odom_robot);
   ScanOutcome Recover(Keyframe keyframe, ScanView view, const ParallelFor& parallel_for);
   [[nodiscard]] ScanOutcome ReportRecovery(Stamp stamp, const Pose2& T_odom_robot) const;
   ScanOutcome GoOnAt(const FoundPlace& place, Keyframe keyframe, ScanView view, TrackStep step,
@@ -99,6 +107,7 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   State& s = *state_;
   const Stamp stamp = scan->stamp;
   const bool tilted = IsTilted(*scan, s.options.max_tilt_rad);
+  if (!s.options.front_end.use_odometry) passage = std::min(passage, Passage::kPaused);
   if (passage == Passage::kUnknown || (passage == Passage::kPaused && (tilted || s.recovery.active())))
     s.LosePlace(passage == Passage::kPaused);
   if (tilted) return s.Coast(stamp, T_odom_robot);
@@ -109,7 +118,7 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   if (s.recovery.active()) return s.Recover({std::move(scan), T_odom_robot}, std::move(view), parallel_for);
 
   const TrackStep step = s.front_end.Track(view, T_odom_robot, parallel_for);
-  if (passage == Passage::kPaused && !s.Agrees(*scan, view, step)) {
+  if (passage == Passage::kPaused && !s.GoesOn(*scan, view, step, T_odom_robot)) {
     s.LosePlace(true);
     return s.Recover({std::move(scan), T_odom_robot}, std::move(view), parallel_for);
   }
@@ -240,23 +249,27 @@ ScanOutcome Mapper::State::Coast(Stamp stamp, const Pose2& T_odom_robot) {
 void Mapper::State::LosePlace(bool odometry_goes_on) {
   if (trail.empty()) return;  // There is no map yet, and the next scan defines the start.
   if (!recovery.active()) {
-    recovery.Begin({level.outcome.T_map_robot, level.T_odom_robot, level.outcome.covariance},
-                   odometry_goes_on || !options.front_end.use_odometry);
-  } else if (!odometry_goes_on && options.front_end.use_odometry) {
+    recovery.Begin(LastKnown(), odometry_goes_on);
+  } else if (!odometry_goes_on) {
     recovery.OdometryBeganAnew();
   }
   recovery.ForgetScans();
   front_end.Restart();
 }
 
-// Whether a scan after a pause shows that the robot is where the front-end says.
-bool Mapper::State::Agrees(const Scan& scan, const ScanView& view, const TrackStep& step) const {
+// Whether a scan after a pause shows that the robot is where odometry has taken it, as if there had been no pause.
+bool Mapper::State::GoesOn(const Scan& scan, const ScanView& view, const TrackStep& step, const Pose2& T_odom_robot) {
   if (trail.empty()) return true;
-  if (!step.matched || step.score < options.front_end.retry_below) return false;
+  if (!step.matched || step.degenerate) return false;
   const SharedSequence<Pose2> path = believed_path();
   const Pose2 T_map_robot = path[trail.size() - 1] * trail.FromLast(step.T_track_robot);
-  return recovery.search().Compare(trail, path, scan, view.points_robot, T_map_robot) !=
-         PlaceSearch::Agreement::kContradicts;
+  recovery.Begin(LastKnown(), true);
+  const bool expected = recovery.IsWhereExpected(T_map_robot, recovery.BeliefAt(OdometryOrNone(T_odom_robot)));
+  recovery.End();
+  if (!expected || step.score < options.front_end.retry_below) return false;
+  const PlaceSearch& search = recovery.search();
+  return search.Compare(trail, path, scan, view.points_robot, T_map_robot) != PlaceSearch::Agreement::kContradicts &&
+         !search.FitsBetterElsewhere(trail, path, view.points_robot, T_map_robot);
 }
 
 // Follows a robot whose place is not known, until it is found.
@@ -268,8 +281,8 @@ ScanOutcome Mapper::State::Recover(Keyframe keyframe, ScanView view, const Paral
     step = front_end.Track(view, keyframe.T_odom_robot, parallel_for);
   }
   if (!recovery.has_scans() || MovedEnough(recovery.FromLast(step.T_track_robot), options.gate)) {
-    const auto place = recovery.Take(keyframe.scan, step.T_track_robot, keyframe.T_odom_robot, view.points_robot, trail,
-                                     believed_path());
+    const auto place = recovery.Take(keyframe.scan, step.T_track_robot, OdometryOrNone(keyframe.T_odom_robot),
+                                     view.points_robot, trail, believed_path());
     if (place) return GoOnAt(*place, std::move(keyframe), std::move(view), step, parallel_for);
     front_end.AddKeyframe(view);
   }
@@ -297,7 +310,7 @@ ScanOutcome Mapper::State::GoOnAt(const FoundPlace& place, Keyframe keyframe, Sc
 }
 
 ScanOutcome Mapper::State::ReportRecovery(Stamp stamp, const Pose2& T_odom_robot) const {
-  const Recovery::Belief belief = recovery.BeliefAt(options.front_end.use_odometry ? T_odom_robot : level.T_odom_robot);
+  const Recovery::Belief belief = recovery.BeliefAt(OdometryOrNone(T_odom_robot));
   ScanOutcome outcome;
   outcome.stamp = stamp;
   outcome.T_map_robot = belief.T_map_robot;

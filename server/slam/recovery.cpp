@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "common/geometry/pose_difference.h"
@@ -11,9 +10,13 @@ namespace cairn::slam {
 namespace {
 
 constexpr std::size_t kMaxRecent = 120;  // Scans that are kept: turning on the spot makes many.
-constexpr double kSigmas = 3.0;          // A place is the expected one within so many standard deviations,
-constexpr double kExpectedM = 0.5;       // and such an error of the search.
+// A place is the expected one within these errors of the search and of the map, and so many standard deviations of the
+// motion, but never beyond what is the most.
+constexpr double kExpectedM = 0.5;
 constexpr double kExpectedRad = 0.2;
+constexpr double kSigmas = 3.0;
+constexpr double kMostExpectedM = 1.5;
+constexpr double kMostExpectedRad = 0.6;
 constexpr double kUnknownM = 1000.0;  // Standard deviation of a place that is not known.
 constexpr double kNever = -1.0;       // No search yet.
 
@@ -65,11 +68,12 @@ std::optional<FoundPlace> Recovery::Take(std::shared_ptr<const Scan> scan, const
 }
 
 bool Recovery::IsWhereExpected(const Pose2& T_map_robot, const Belief& belief) const {
+  // Nobody knows whether a robot with new odometry has been moved: it is expected nowhere else than where it was.
+  const Eigen::Matrix3d doubt = odometry_goes_on_ ? belief.doubt : Eigen::Matrix3d::Zero();
   const Eigen::Vector3d error = Minus(T_map_robot, belief.T_map_robot);
-  const Eigen::Matrix3d& covariance = odometry_goes_on_ ? belief.covariance : known_.covariance;
-  const double sigma_m = std::sqrt(std::max(covariance(0, 0), covariance(1, 1)));
-  return error.head<2>().norm() < kExpectedM + kSigmas * sigma_m &&
-         std::abs(error.z()) < kExpectedRad + kSigmas * std::sqrt(covariance(2, 2));
+  const double sigma_m = std::sqrt(std::max(doubt(0, 0), doubt(1, 1)));
+  return error.head<2>().norm() < std::min(kExpectedM + kSigmas * sigma_m, kMostExpectedM) &&
+         std::abs(error.z()) < std::min(kExpectedRad + kSigmas * std::sqrt(doubt(2, 2)), kMostExpectedRad);
 }
 
 bool Recovery::IsConfirmed(const Pose2& T_map_robot) {
@@ -87,15 +91,15 @@ bool Recovery::IsConfirmed(const Pose2& T_map_robot) {
 
 Recovery::Belief Recovery::BeliefAt(const Pose2& T_odom_robot) const {
   if (!odometry_goes_on_) {
-    return {known_.T_map_robot, Eigen::Vector3d(kUnknownM * kUnknownM, kUnknownM * kUnknownM, kPi * kPi).asDiagonal(),
-            PoseReason::kLost};
+    const Eigen::Vector3d unknown(kUnknownM * kUnknownM, kUnknownM * kUnknownM, kPi * kPi);
+    return {known_.T_map_robot, unknown.asDiagonal(), unknown.asDiagonal(), PoseReason::kLost};
   }
   const Pose2 moved = Between(known_.T_odom_robot, T_odom_robot);
   const Eigen::Matrix3d J_known = J_compose_left(known_.T_map_robot, moved);
   const Eigen::Matrix3d J_moved = J_compose_right(known_.T_map_robot, moved);
+  const Eigen::Matrix3d doubt = J_moved * blind_.Covariance(moved) * J_moved.transpose();
   const bool lost = contradicted_ || moved.translation().norm() > lost_after_m_;
-  return {known_.T_map_robot * moved,
-          J_known * known_.covariance * J_known.transpose() + J_moved * blind_.Covariance(moved) * J_moved.transpose(),
+  return {known_.T_map_robot * moved, J_known * known_.covariance * J_known.transpose() + doubt, doubt,
           lost ? PoseReason::kLost : PoseReason::kOdometryOnly};
 }
 

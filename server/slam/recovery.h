@@ -33,7 +33,8 @@ class Recovery {
   struct Belief {
     Pose2 T_map_robot;
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-    PoseReason reason = PoseReason::kLost;  // Or kOdometryOnly.
+    Eigen::Matrix3d doubt = Eigen::Matrix3d::Zero();  // The part of the covariance that has come since.
+    PoseReason reason = PoseReason::kLost;            // Or kOdometryOnly.
   };
 
   // `blind` is the noise of motion known by odometry alone.
@@ -59,6 +60,8 @@ class Recovery {
                                                const Pose2& T_odom_robot, std::vector<SurfacePoint> points_robot,
                                                const Trail& trail, const SharedSequence<Pose2>& path);
   [[nodiscard]] Belief BeliefAt(const Pose2& T_odom_robot) const;
+  // Whether a place is the one to which odometry has taken the robot, within the doubt about both.
+  [[nodiscard]] bool IsWhereExpected(const Pose2& T_map_robot, const Belief& belief) const;
 
   void RestorePoints(const SurfaceOptions& options) { recent_.RestorePoints(options); }
   template <typename Archive>
@@ -79,7 +82,6 @@ class Recovery {
       archive(self.T_map_track, self.travelled_m);
     }
   };
-  [[nodiscard]] bool IsWhereExpected(const Pose2& T_map_robot, const Belief& belief) const;
   [[nodiscard]] bool IsConfirmed(const Pose2& T_map_robot);
 
   LoopOptions loop_;

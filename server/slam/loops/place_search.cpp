@@ -21,6 +21,9 @@ constexpr double kMinExplained = 0.6;      // Share of the recent surfaces that 
 constexpr int kMinCompared = 20;           // Points that must be compared for an agreement to count.
 constexpr std::size_t kNearKeyframes = 4;  // Old keyframes that a scan is compared with, ...
 constexpr double kApartM = 1.0;            // ... so far apart along the path.
+// A pose is searched here for its best fit.
+constexpr double kHereM = 0.4;
+constexpr double kHereRad = 0.05;
 
 // The points of one cell on a raster are represented by the first of them.
 class OnePerCell {
@@ -36,6 +39,13 @@ class OnePerCell {
   double cell_m_;
   std::unordered_set<std::int64_t> taken_;
 };
+
+std::vector<Eigen::Vector2d> SampleForSearch(const std::vector<SurfacePoint>& surfaces) {
+  const std::size_t stride = surfaces.size() / kMaxSample + 1;
+  std::vector<Eigen::Vector2d> points;
+  for (std::size_t i = 0; i < surfaces.size(); i += stride) points.push_back(surfaces[i].p);
+  return points;
+}
 
 SearchWindow WindowOver(const std::vector<SurfacePoint>& surfaces) {
   Eigen::AlignedBox2d box;
@@ -84,30 +94,43 @@ std::vector<SurfacePoint> PlaceSearch::SurfacesOfMap(const Trail& trail, const S
 
 std::optional<FoundPlace> PlaceSearch::Find(const Trail& trail, const SharedSequence<Pose2>& path,
                                             const RecentScans& recent) {
-  if (recent.scans.empty()) return std::nullopt;
   if (!map_) map_ = std::make_shared<const Map>(SurfacesOfMap(trail, path), options_, align_.first_pair_distance_m);
+  if (recent.scans.empty() || map_->surfaces.size() < kMinSurfaces) return std::nullopt;
   const std::size_t now = recent.shapes.size() - 1;
   const std::vector<SurfacePoint> surfaces =
       SurfacesOf(recent.shapes, Stretch{0, now, now}, kCoarser * options_.search_cell_m);
-  if (surfaces.size() < kMinSurfaces || map_->surfaces.size() < kMinSurfaces) return std::nullopt;
-  std::vector<Eigen::Vector2d> sample;
-  const std::size_t stride = surfaces.size() / kMaxSample + 1;
-  for (std::size_t i = 0; i < surfaces.size(); i += stride) sample.push_back(surfaces[i].p);
-
+  if (surfaces.size() < kMinSurfaces) return std::nullopt;
+  const std::vector<Eigen::Vector2d> sample = SampleForSearch(surfaces);
   const auto peak = FindBestPose(sample, map_->pyramid, map_->window, options_.min_score);
   if (!peak || !peak->complete) return std::nullopt;
   const Exclusion exclusion{peak->T_ref_curr, options_.rival_beyond_m, options_.rival_beyond_rad};
   if (FindBestPose(sample, map_->pyramid, map_->window, options_.max_rival * peak->score, exclusion))
     return std::nullopt;
-  const Eigen::Matrix3d prior = options_.align_variances.asDiagonal();
+  return Fit(trail, path, recent, surfaces, peak->T_ref_curr, options_.align_variances.asDiagonal());
+}
+
+bool PlaceSearch::FitsBetterElsewhere(const Trail& trail, const SharedSequence<Pose2>& path,
+                                      const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const {
+  const Map map(SurfacesOfMap(trail, path), options_, align_.first_pair_distance_m);
+  if (map.surfaces.size() < kMinSurfaces || points_robot.size() < kMinSurfaces) return false;
+  const std::vector<Eigen::Vector2d> sample = SampleForSearch(points_robot);
+  const auto here = FindBestPose(sample, map.pyramid, {T_map_robot, kHereM, kHereRad}, 0.0);
+  if (!here) return true;
+  const Exclusion exclusion{here->T_ref_curr, options_.rival_beyond_m, options_.rival_beyond_rad};
+  return FindBestPose(sample, map.pyramid, map.window, here->score / options_.max_rival, exclusion).has_value();
+}
+
+std::optional<FoundPlace> PlaceSearch::Fit(const Trail& trail, const SharedSequence<Pose2>& path,
+                                           const RecentScans& recent, const std::vector<SurfacePoint>& surfaces,
+                                           const Pose2& T_map_robot, const Eigen::Matrix3d& covariance) const {
   const MatchResult match =
-      AlignPointsToSurfaces(surfaces, map_->index, {peak->T_ref_curr, peak->T_ref_curr, prior}, align_);
+      AlignPointsToSurfaces(surfaces, map_->index, {T_map_robot, T_map_robot, covariance}, align_);
   if (!match.converged || match.degenerate) return std::nullopt;
+  const std::size_t now = recent.shapes.size() - 1;
   for (const std::size_t k : {now, now / 2, std::size_t{0}}) {
     const Pose2 T_map_k = match.T_ref_curr * Between(recent.shapes[now].T_track_robot, recent.shapes[k].T_track_robot);
     const Agreement agreement = Compare(trail, path, *recent.scans[k], recent.shapes[k].points, T_map_k);
-    if (agreement == Agreement::kContradicts || (k == now && agreement == Agreement::kNothingNear))
-      return std::nullopt;
+    if (agreement == Agreement::kContradicts || (k == now && agreement == Agreement::kNothingNear)) return std::nullopt;
   }
   FoundPlace found{match.T_ref_curr, match.covariance};
   found.covariance.diagonal() +=

@@ -48,6 +48,9 @@ class PlaceSearch {
   // trail nor the path changes between two calls, unless Forget is called.
   [[nodiscard]] std::optional<FoundPlace> Find(const Trail& trail, const SharedSequence<Pose2>& path,
                                                const RecentScans& recent);
+  // Whether a scan fits clearly better at another place of the map than at this pose.
+  [[nodiscard]] bool FitsBetterElsewhere(const Trail& trail, const SharedSequence<Pose2>& path,
+                                         const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const;
   void Forget() { map_.reset(); }
 
   // How a scan at this pose agrees with old keyframes near it.
@@ -63,6 +66,10 @@ class PlaceSearch {
     PointIndex index;
     SearchWindow window;  // All of the map, in every heading.
   };
+  // The pose near this one at which everything fits.
+  [[nodiscard]] std::optional<FoundPlace> Fit(const Trail& trail, const SharedSequence<Pose2>& path,
+                                              const RecentScans& recent, const std::vector<SurfacePoint>& surfaces,
+                                              const Pose2& T_map_robot, const Eigen::Matrix3d& covariance) const;
   [[nodiscard]] std::vector<SurfacePoint> SurfacesOfMap(const Trail& trail, const SharedSequence<Pose2>& path) const;
 
   LoopOptions options_;
