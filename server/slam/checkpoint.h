@@ -16,7 +16,7 @@
 
 namespace cairn::slam {
 
-inline constexpr std::uint32_t kCheckpointFormat = 1;
+inline constexpr std::uint32_t kCheckpointFormat = 2;
 
 class Checkpoint {
  public:

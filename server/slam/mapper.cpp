@@ -1,5 +1,6 @@
 #include "server/slam/mapper.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -10,6 +11,7 @@
 #include "server/slam/map_drawing.h"
 #include "server/slam/methods.h"
 #include "server/slam/motion/step_motion.h"
+#include "server/slam/recovery.h"
 #include "server/slam/scan/beam_points.h"
 #include "server/slam/scan/stamp_gate.h"
 #include "server/slam/tracking/front_end.h"
@@ -34,9 +36,23 @@ struct Mapper::State {
         filter(MakeFilter(given.filter.kind, given.filter, T_map_robot_start, seed)),
         loops(given.loop, given.front_end.refine),
         self_check(given.self_check),
+        recovery(given.loop, given.self_check, given.front_end.refine, given.blind, given.lost_after_m),
         drawing(given.grid) {}
 
   ScanOutcome Coast(Stamp stamp, const Pose2& T_odom_robot);
+  void LosePlace(bool odometry_goes_on);
+  [[nodiscard]] Recovery::Known LastKnown() const {
+    return {level.outcome.T_map_robot, level.T_odom_robot, level.outcome.covariance};
+  }
+  // Without odometry the robot is expected where it was.
+  [[nodiscard]] Pose2 OdometryOrNone(const Pose2& T_odom_robot) const {
+    return options.front_end.use_odometry ? T_odom_robot : level.T_odom_robot;
+  }
+  bool GoesOn(const Scan& scan, const ScanView& view, const TrackStep& step, const Pose2& T_odom_robot);
+  ScanOutcome Recover(Keyframe keyframe, ScanView view, const ParallelFor& parallel_for);
+  [[nodiscard]] ScanOutcome ReportRecovery(Stamp stamp, const Pose2& T_odom_robot) const;
+  ScanOutcome GoOnAt(const FoundPlace& place, Keyframe keyframe, ScanView view, TrackStep step,
+                     const ParallelFor& parallel_for);
   void AddKeyframe(Keyframe keyframe, ScanView view, const TrackStep& step, const ParallelFor& parallel_for);
   StepMotion MotionTo(const Keyframe& keyframe, const TrackStep& step, const Eigen::Matrix3d& covariance);
   void CloseLargeLoop();
@@ -48,7 +64,8 @@ struct Mapper::State {
   // All but the filter, which is behind an interface.
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
-    archive(self.trail, self.front_end, self.blind, self.speed, self.loops, self.self_check, self.drawing, self.level);
+    archive(self.recovery, self.trail, self.front_end, self.blind, self.speed, self.loops, self.self_check,
+            self.drawing, self.level);
   }
 
   // The last scan that was not tilted.
@@ -75,6 +92,7 @@ struct Mapper::State {
   std::unique_ptr<Filter> filter;
   LoopSearch loops;
   SelfCheck self_check;
+  Recovery recovery;
   MapDrawing drawing;
   LevelScan level;
 };
@@ -86,16 +104,25 @@ Mapper::Mapper(Mapper&&) noexcept = default;
 Mapper& Mapper::operator=(Mapper&&) noexcept = default;
 
 ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot,
-                            const ParallelFor& parallel_for) {
+                            const ParallelFor& parallel_for, Passage passage) {
   State& s = *state_;
   const Stamp stamp = scan->stamp;
-  if (IsTilted(*scan, s.options.max_tilt_rad)) return s.Coast(stamp, T_odom_robot);
+  const bool tilted = IsTilted(*scan, s.options.max_tilt_rad);
+  if (!s.options.front_end.use_odometry) passage = std::min(passage, Passage::kPaused);
+  if (passage == Passage::kUnknown || (passage == Passage::kPaused && (tilted || s.recovery.active())))
+    s.LosePlace(passage == Passage::kPaused);
+  if (tilted) return s.Coast(stamp, T_odom_robot);
 
   if (s.drawing.redrawing()) s.drawing.Continue(s.trail.keyframes(), s.believed_path());
 
   ScanView view = Look(*scan, s.options.front_end);
+  if (s.recovery.active()) return s.Recover({std::move(scan), T_odom_robot}, std::move(view), parallel_for);
 
   const TrackStep step = s.front_end.Track(view, T_odom_robot, parallel_for);
+  if (passage == Passage::kPaused && !s.GoesOn(*scan, view, step, T_odom_robot)) {
+    s.LosePlace(true);
+    return s.Recover({std::move(scan), T_odom_robot}, std::move(view), parallel_for);
+  }
   s.blind.Add(step, s.trail.empty() ? Pose2{} : s.trail.shapes().back().T_track_robot);
 
   const bool keyframe = s.trail.empty() || MovedEnough(s.trail.FromLast(step.T_track_robot), s.options.gate);
@@ -134,7 +161,8 @@ StepMotion Mapper::State::MotionTo(const Keyframe& keyframe, const TrackStep& st
   const Keyframe& last = trail.keyframes().back();
   const double seconds = 1e-9 * static_cast<double>(NanosBetween(last.scan->stamp, keyframe.scan->stamp));
   StepMotion motion{trail.FromLast(step.T_track_robot), covariance};
-  if (options.front_end.use_odometry) motion.T_prev_curr_odom = Between(last.T_odom_robot, keyframe.T_odom_robot);
+  if (options.front_end.use_odometry && !step.found)
+    motion.T_prev_curr_odom = Between(last.T_odom_robot, keyframe.T_odom_robot);
   motion.lambda_m = std::abs(speed.Forecast(seconds).x);
   speed.Moved(motion.T_prev_curr, seconds);
   return motion;
@@ -197,6 +225,7 @@ PoseReason Mapper::State::ReasonOf(const TrackStep& step) const {
 // A tilted scan is not matched: its pose is the one to which odometry has taken the robot since the last
 // level scan.
 ScanOutcome Mapper::State::Coast(Stamp stamp, const Pose2& T_odom_robot) {
+  if (recovery.active()) return ReportRecovery(stamp, T_odom_robot);
   ScanOutcome outcome = level.outcome;
   outcome.stamp = stamp;
   outcome.keyframe = false;
@@ -213,6 +242,81 @@ ScanOutcome Mapper::State::Coast(Stamp stamp, const Pose2& T_odom_robot) {
   if (!outcome.localized) return outcome;
   outcome.localized = !blind.Lost(moved.translation().norm());
   outcome.reason = outcome.localized ? PoseReason::kOdometryOnly : PoseReason::kLost;
+  return outcome;
+}
+
+// From now on the robot has to be found again.
+void Mapper::State::LosePlace(bool odometry_goes_on) {
+  if (trail.empty()) return;  // There is no map yet, and the next scan defines the start.
+  if (!recovery.active()) {
+    recovery.Begin(LastKnown(), odometry_goes_on);
+  } else if (!odometry_goes_on) {
+    recovery.OdometryBeganAnew();
+  }
+  recovery.ForgetScans();
+  front_end.Restart();
+}
+
+// Whether a scan after a pause shows that the robot is where odometry has taken it, as if there had been no pause.
+bool Mapper::State::GoesOn(const Scan& scan, const ScanView& view, const TrackStep& step, const Pose2& T_odom_robot) {
+  if (trail.empty()) return true;
+  if (!step.matched || step.degenerate) return false;
+  const SharedSequence<Pose2> path = believed_path();
+  const Pose2 T_map_robot = path[trail.size() - 1] * trail.FromLast(step.T_track_robot);
+  recovery.Begin(LastKnown(), true);
+  const bool expected = recovery.IsWhereExpected(T_map_robot, recovery.BeliefAt(OdometryOrNone(T_odom_robot)));
+  recovery.End();
+  if (!expected || step.score < options.front_end.retry_below) return false;
+  const PlaceSearch& search = recovery.search();
+  return search.Compare(trail, path, scan, view.points_robot, T_map_robot) != PlaceSearch::Agreement::kContradicts &&
+         !search.FitsBetterElsewhere(trail, path, view.points_robot, T_map_robot);
+}
+
+// Follows a robot whose place is not known, until it is found.
+ScanOutcome Mapper::State::Recover(Keyframe keyframe, ScanView view, const ParallelFor& parallel_for) {
+  TrackStep step = front_end.Track(view, keyframe.T_odom_robot, parallel_for);
+  if (!step.matched) {
+    recovery.ForgetScans();
+    front_end.Restart();
+    step = front_end.Track(view, keyframe.T_odom_robot, parallel_for);
+  }
+  if (!recovery.has_scans() || MovedEnough(recovery.FromLast(step.T_track_robot), options.gate)) {
+    const auto place = recovery.Take(keyframe.scan, step.T_track_robot, OdometryOrNone(keyframe.T_odom_robot),
+                                     view.points_robot, trail, believed_path());
+    if (place) return GoOnAt(*place, std::move(keyframe), std::move(view), step, parallel_for);
+    front_end.AddKeyframe(view);
+  }
+  return ReportRecovery(keyframe.scan->stamp, keyframe.T_odom_robot);
+}
+
+// The robot has been found: the path goes on there, with a step from the last keyframe that no scan or odometry shows.
+ScanOutcome Mapper::State::GoOnAt(const FoundPlace& place, Keyframe keyframe, ScanView view, TrackStep step,
+                                  const ParallelFor& parallel_for) {
+  const Stamp stamp = keyframe.scan->stamp;
+  const Pose2 T_odom_robot = keyframe.T_odom_robot;
+  const Pose2 T_map_last = believed_path()[trail.size() - 1];
+  const Pose2 T_track_robot = trail.shapes().back().T_track_robot * Between(T_map_last, place.T_map_robot);
+  front_end.MoveTo(T_track_robot * step.T_track_robot.Inverse());
+  step.T_track_robot = T_track_robot;
+  step.found = true;
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  R.topLeftCorner<2, 2>() = T_map_last.rotation().transpose();
+  blind.Found(R * place.covariance * R.transpose());
+  recovery.End();
+  self_check.Forget();
+  AddKeyframe(std::move(keyframe), std::move(view), step, parallel_for);
+  speed.Forget();
+  return Report(stamp, T_odom_robot, step, true);
+}
+
+ScanOutcome Mapper::State::ReportRecovery(Stamp stamp, const Pose2& T_odom_robot) const {
+  const Recovery::Belief belief = recovery.BeliefAt(OdometryOrNone(T_odom_robot));
+  ScanOutcome outcome;
+  outcome.stamp = stamp;
+  outcome.T_map_robot = belief.T_map_robot;
+  outcome.T_map_odom = outcome.T_map_robot * T_odom_robot.Inverse();
+  outcome.covariance = belief.covariance;
+  outcome.reason = belief.reason;
   return outcome;
 }
 
@@ -275,12 +379,14 @@ void Mapper::Load(StateReader& archive, const ParallelFor& parallel_for) {
   if (archive.ok()) loaded->filter->Load(archive);
   if (!archive.ok() || !archive.Require(loaded->IsConsistent(), "the paths")) return;
   loaded->trail.RestorePoints(loaded->options.front_end.surface, parallel_for);
+  loaded->recovery.RestorePoints(loaded->options.front_end.surface);
   state_ = std::move(loaded);
 }
 
 bool Mapper::State::IsConsistent() const {
   for (std::size_t i = 0; i < filter->hypothesis_count(); ++i)
     if (filter->hypothesis(i).path.size() != trail.size()) return false;
+  if (recovery.active() && trail.empty()) return false;
   return drawing.path().size() == (filter->placed() ? trail.size() : 0);
 }
 
