@@ -24,6 +24,27 @@ bool IsLocalized(PoseReason reason) {
   return reason != PoseReason::kLost && reason != PoseReason::kDiverged;
 }
 
+// A robot stood still if its odometry has changed by less, and so many of the beams show what they showed before.
+constexpr double kStillM = 0.02;
+constexpr double kStillRad = 0.02;
+constexpr double kSameRangeM = 0.1;
+constexpr double kSameRangePerM = 0.01;
+constexpr double kUnchanged = 0.95;
+
+bool LookAlike(const Scan& a, const Scan& b) {
+  if (a.ranges_m.size() != b.ranges_m.size() || a.angle_first_rad != b.angle_first_rad) return false;
+  std::size_t compared = 0, same = 0;
+  for (std::size_t i = 0; i < a.ranges_m.size(); ++i) {
+    const BeamClass class_a = ClassifyRange(a.ranges_m[i], a.range_min_m, a.range_max_m),
+                    class_b = ClassifyRange(b.ranges_m[i], b.range_min_m, b.range_max_m);
+    if (class_a != BeamClass::kHit && class_b != BeamClass::kHit) continue;
+    ++compared;
+    const double difference_m = std::abs(static_cast<double>(a.ranges_m[i]) - b.ranges_m[i]);
+    same += class_a == class_b && difference_m < kSameRangeM + kSameRangePerM * a.ranges_m[i] ? 1 : 0;
+  }
+  return compared > 0 && static_cast<double>(same) >= kUnchanged * static_cast<double>(compared);
+}
+
 }  // namespace
 
 struct Mapper::State {
@@ -41,6 +62,8 @@ struct Mapper::State {
 
   ScanOutcome Coast(Stamp stamp, const Pose2& T_odom_robot);
   void LosePlace(bool odometry_goes_on);
+  // Before, the next scan defines the start, or the filter itself looks for the robot's place.
+  [[nodiscard]] bool HasMap() const { return !trail.empty() && filter->placed(); }
   [[nodiscard]] Recovery::Known LastKnown() const {
     return {level.outcome.T_map_robot, level.T_odom_robot, level.outcome.covariance};
   }
@@ -48,12 +71,16 @@ struct Mapper::State {
   [[nodiscard]] Pose2 OdometryOrNone(const Pose2& T_odom_robot) const {
     return options.front_end.use_odometry ? T_odom_robot : level.T_odom_robot;
   }
-  bool GoesOn(const Scan& scan, const ScanView& view, const TrackStep& step, const Pose2& T_odom_robot);
-  ScanOutcome Recover(Keyframe keyframe, ScanView view, const ParallelFor& parallel_for);
-  [[nodiscard]] ScanOutcome ReportRecovery(Stamp stamp, const Pose2& T_odom_robot) const;
+  [[nodiscard]] bool StoodStill(const Scan& scan, const Pose2& T_odom_robot, const TrackStep& step) const;
+  TrackStep DoubtPlace(const ScanView& view, const Pose2& T_odom_robot, const TrackStep& step,
+                       const ParallelFor& parallel_for);
+  ScanOutcome Recover(Keyframe keyframe, ScanView view, TrackStep step, const ParallelFor& parallel_for);
+  [[nodiscard]] ScanOutcome ReportRecovery(Stamp stamp, const Pose2& T_odom_robot, const Pose2& T_track_robot) const;
+  ScanOutcome GoOnAlongPath(const ParallelFor& parallel_for);
   ScanOutcome GoOnAt(const FoundPlace& place, Keyframe keyframe, ScanView view, TrackStep step,
                      const ParallelFor& parallel_for);
-  void AddKeyframe(Keyframe keyframe, ScanView view, const TrackStep& step, const ParallelFor& parallel_for);
+  void AddKeyframe(Keyframe keyframe, ScanView view, const TrackStep& step, const Eigen::Matrix3d& step_covariance,
+                   const ParallelFor& parallel_for);
   StepMotion MotionTo(const Keyframe& keyframe, const TrackStep& step, const Eigen::Matrix3d& covariance);
   void CloseLargeLoop();
   void Draw(const TrackStep& step, bool placed_before);
@@ -65,7 +92,7 @@ struct Mapper::State {
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     archive(self.recovery, self.trail, self.front_end, self.blind, self.speed, self.loops, self.self_check,
-            self.drawing, self.level);
+            self.drawing, self.level, self.last_scan);
   }
 
   // The last scan that was not tilted.
@@ -77,6 +104,18 @@ struct Mapper::State {
     template <typename Archive>
     static void Members(Archive& archive, auto& self) {
       archive(self.outcome, self.T_keyframe_robot, self.T_odom_robot);
+    }
+  };
+
+  // The last scan of all that was not tilted.
+  struct LastScan {
+    std::shared_ptr<const Scan> scan;
+    Pose2 T_odom_robot;
+    Pose2 T_track_robot;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.scan, self.T_odom_robot, self.T_track_robot);
     }
   };
 
@@ -95,6 +134,7 @@ struct Mapper::State {
   Recovery recovery;
   MapDrawing drawing;
   LevelScan level;
+  std::optional<LastScan> last_scan;
 };
 
 Mapper::Mapper(const MapperOptions& options, const Pose2& T_map_robot_start, std::uint64_t seed)
@@ -109,33 +149,31 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   const Stamp stamp = scan->stamp;
   const bool tilted = IsTilted(*scan, s.options.max_tilt_rad);
   if (!s.options.front_end.use_odometry) passage = std::min(passage, Passage::kPaused);
-  if (passage == Passage::kUnknown || (passage == Passage::kPaused && (tilted || s.recovery.active())))
-    s.LosePlace(passage == Passage::kPaused);
+  if (passage == Passage::kUnknown || (passage == Passage::kPaused && tilted)) s.LosePlace(passage == Passage::kPaused);
   if (tilted) return s.Coast(stamp, T_odom_robot);
 
   if (s.drawing.redrawing()) s.drawing.Continue(s.trail.keyframes(), s.believed_path());
 
   ScanView view = Look(*scan, s.options.front_end);
-  if (s.recovery.active()) return s.Recover({std::move(scan), T_odom_robot}, std::move(view), parallel_for);
+  TrackStep step = s.front_end.Track(view, T_odom_robot, parallel_for);
+  if (passage == Passage::kPaused && !s.StoodStill(*scan, T_odom_robot, step))
+    step = s.DoubtPlace(view, T_odom_robot, step, parallel_for);
+  s.last_scan = State::LastScan{scan, T_odom_robot, step.T_track_robot};
+  if (s.recovery.active()) return s.Recover({std::move(scan), T_odom_robot}, std::move(view), step, parallel_for);
 
-  const TrackStep step = s.front_end.Track(view, T_odom_robot, parallel_for);
-  if (passage == Passage::kPaused && !s.GoesOn(*scan, view, step, T_odom_robot)) {
-    s.LosePlace(true);
-    return s.Recover({std::move(scan), T_odom_robot}, std::move(view), parallel_for);
-  }
   s.blind.Add(step, s.trail.empty() ? Pose2{} : s.trail.shapes().back().T_track_robot);
-
   const bool keyframe = s.trail.empty() || MovedEnough(s.trail.FromLast(step.T_track_robot), s.options.gate);
-  if (keyframe) s.AddKeyframe({std::move(scan), T_odom_robot}, std::move(view), step, parallel_for);
-
+  if (keyframe) {
+    s.front_end.AddKeyframe(view);
+    s.AddKeyframe({std::move(scan), T_odom_robot}, std::move(view), step, s.blind.TakeCovariance(), parallel_for);
+  }
   return s.Report(stamp, T_odom_robot, step, keyframe);
 }
 
 // Adds a scan with enough new content to the filter, the loops and the map.
 void Mapper::State::AddKeyframe(Keyframe keyframe, ScanView view, const TrackStep& step,
-                                const ParallelFor& parallel_for) {
+                                const Eigen::Matrix3d& step_covariance, const ParallelFor& parallel_for) {
   const double travelled_m = trail.TravelledTo(step.T_track_robot);
-  const Eigen::Matrix3d step_covariance = blind.TakeCovariance();
   const bool placed_before = filter->placed();
 
   std::optional<RevisitObservation> revisit;
@@ -147,7 +185,6 @@ void Mapper::State::AddKeyframe(Keyframe keyframe, ScanView view, const TrackSte
   filter->Observe(KeyframeSight{*keyframe.scan, view, step.T_track_robot, travelled_m}, parallel_for);
   filter->Commit();
 
-  front_end.AddKeyframe(view);
   trail.Append(std::move(keyframe), step.T_track_robot, std::move(view.points_robot), step_covariance, revisit);
 
   CloseLargeLoop();
@@ -225,7 +262,10 @@ PoseReason Mapper::State::ReasonOf(const TrackStep& step) const {
 // A tilted scan is not matched: its pose is the one to which odometry has taken the robot since the last
 // level scan.
 ScanOutcome Mapper::State::Coast(Stamp stamp, const Pose2& T_odom_robot) {
-  if (recovery.active()) return ReportRecovery(stamp, T_odom_robot);
+  if (recovery.active()) {
+    const Pose2 moved = options.front_end.use_odometry ? Between(last_scan->T_odom_robot, T_odom_robot) : Pose2{};
+    return ReportRecovery(stamp, T_odom_robot, last_scan->T_track_robot * moved);
+  }
   ScanOutcome outcome = level.outcome;
   outcome.stamp = stamp;
   outcome.keyframe = false;
@@ -247,7 +287,7 @@ ScanOutcome Mapper::State::Coast(Stamp stamp, const Pose2& T_odom_robot) {
 
 // From now on the robot has to be found again.
 void Mapper::State::LosePlace(bool odometry_goes_on) {
-  if (trail.empty()) return;  // There is no map yet, and the next scan defines the start.
+  if (!HasMap()) return;
   if (!recovery.active()) {
     recovery.Begin(LastKnown(), odometry_goes_on);
   } else if (!odometry_goes_on) {
@@ -257,36 +297,66 @@ void Mapper::State::LosePlace(bool odometry_goes_on) {
   front_end.Restart();
 }
 
-// Whether a scan after a pause shows that the robot is where odometry has taken it, as if there had been no pause.
-bool Mapper::State::GoesOn(const Scan& scan, const ScanView& view, const TrackStep& step, const Pose2& T_odom_robot) {
-  if (trail.empty()) return true;
-  if (!step.matched || step.degenerate) return false;
-  const SharedSequence<Pose2> path = believed_path();
-  const Pose2 T_map_robot = path[trail.size() - 1] * trail.FromLast(step.T_track_robot);
-  recovery.Begin(LastKnown(), true);
-  const bool expected = recovery.IsWhereExpected(T_map_robot, recovery.BeliefAt(OdometryOrNone(T_odom_robot)));
-  recovery.End();
-  if (!expected || step.score < options.front_end.retry_below) return false;
-  const PlaceSearch& search = recovery.search();
-  return search.Compare(trail, path, scan, view.points_robot, T_map_robot) != PlaceSearch::Agreement::kContradicts &&
-         !search.FitsBetterElsewhere(trail, path, view.points_robot, T_map_robot);
+// Whether nothing at all has changed since the last scan: nobody has moved the robot.
+bool Mapper::State::StoodStill(const Scan& scan, const Pose2& T_odom_robot, const TrackStep& step) const {
+  if (!last_scan || !step.matched || step.degenerate) return false;
+  const Pose2 moved = options.front_end.use_odometry ? Between(last_scan->T_odom_robot, T_odom_robot) : Pose2{};
+  return moved.translation().norm() < kStillM && std::abs(moved.theta) < kStillRad && LookAlike(*last_scan->scan, scan);
 }
 
-// Follows a robot whose place is not known, until it is found.
-ScanOutcome Mapper::State::Recover(Keyframe keyframe, ScanView view, const ParallelFor& parallel_for) {
-  TrackStep step = front_end.Track(view, keyframe.T_odom_robot, parallel_for);
+// Nobody watched the robot before this scan. If the scan goes on where the last ones ended, as far as it shows, the
+// robot is probably still on its path, but has to prove it; otherwise it has to be found.
+TrackStep Mapper::State::DoubtPlace(const ScanView& view, const Pose2& T_odom_robot, const TrackStep& step,
+                                    const ParallelFor& parallel_for) {
+  if (!HasMap()) return step;
+  if (!recovery.active() && step.matched) {
+    const Pose2 T_map_track = believed_path()[trail.size() - 1] * trail.shapes().back().T_track_robot.Inverse();
+    recovery.BeginOnPath(LastKnown(), T_map_track);
+    return step;
+  }
+  LosePlace(true);
+  return front_end.Track(view, T_odom_robot, parallel_for);
+}
+
+// Follows a robot whose place is not certain, until it is proved.
+ScanOutcome Mapper::State::Recover(Keyframe keyframe, ScanView view, TrackStep step, const ParallelFor& parallel_for) {
+  const Stamp stamp = keyframe.scan->stamp;
+  const Pose2 T_odom_robot = keyframe.T_odom_robot;
   if (!step.matched) {
     recovery.ForgetScans();
     front_end.Restart();
-    step = front_end.Track(view, keyframe.T_odom_robot, parallel_for);
+    step = front_end.Track(view, T_odom_robot, parallel_for);
+    last_scan->T_track_robot = step.T_track_robot;
   }
-  if (!recovery.has_scans() || MovedEnough(recovery.FromLast(step.T_track_robot), options.gate)) {
-    const auto place = recovery.Take(keyframe.scan, step.T_track_robot, OdometryOrNone(keyframe.T_odom_robot),
-                                     view.points_robot, trail, believed_path());
-    if (place) return GoOnAt(*place, std::move(keyframe), std::move(view), step, parallel_for);
-    front_end.AddKeyframe(view);
+  const bool first = !recovery.has_scans();
+  const bool on_path = recovery.on_path();
+  const Pose2 T_track_kept = on_path ? trail.shapes().back().T_track_robot : step.T_track_robot;
+  const Pose2 T_track_last = recovery.LastKept(T_track_kept);
+  const bool keep = MovedEnough(Between(T_track_last, step.T_track_robot), options.gate) || (first && !on_path);
+  if (keep) front_end.AddKeyframe(view);
+  if (on_path) {
+    blind.Add(step, T_track_last);
+    if (keep) recovery.Hold({keyframe, step, blind.TakeCovariance()});
   }
-  return ReportRecovery(keyframe.scan->stamp, keyframe.T_odom_robot);
+  if (keep || first) {
+    const auto found =
+        recovery.Take({keyframe.scan, OdometryOrNone(T_odom_robot)}, step, view.points_robot, trail, believed_path());
+    if (found && found->on_path) return GoOnAlongPath(parallel_for);
+    if (found) return GoOnAt(found->place, std::move(keyframe), std::move(view), step, parallel_for);
+  }
+  return ReportRecovery(stamp, T_odom_robot, step.T_track_robot);
+}
+
+// The robot has been found on its path: nothing was missing.
+ScanOutcome Mapper::State::GoOnAlongPath(const ParallelFor& parallel_for) {
+  const std::vector<Recovery::Held> held = recovery.TakeHeld();
+  recovery.End();
+  for (const Recovery::Held& one : held) {
+    AddKeyframe(one.keyframe, Look(*one.keyframe.scan, options.front_end), one.step, one.step_covariance, parallel_for);
+    if (&one != &held.back()) trail.AddScan(one.keyframe.scan->stamp, {});
+  }
+  const Recovery::Held& now = held.back();
+  return Report(now.keyframe.scan->stamp, now.keyframe.T_odom_robot, now.step, true);
 }
 
 // The robot has been found: the path goes on there, with a step from the last keyframe that no scan or odometry shows.
@@ -304,13 +374,13 @@ ScanOutcome Mapper::State::GoOnAt(const FoundPlace& place, Keyframe keyframe, Sc
   blind.Found(R * place.covariance * R.transpose());
   recovery.End();
   self_check.Forget();
-  AddKeyframe(std::move(keyframe), std::move(view), step, parallel_for);
+  AddKeyframe(std::move(keyframe), std::move(view), step, blind.TakeCovariance(), parallel_for);
   speed.Forget();
   return Report(stamp, T_odom_robot, step, true);
 }
 
-ScanOutcome Mapper::State::ReportRecovery(Stamp stamp, const Pose2& T_odom_robot) const {
-  const Recovery::Belief belief = recovery.BeliefAt(OdometryOrNone(T_odom_robot));
+ScanOutcome Mapper::State::ReportRecovery(Stamp stamp, const Pose2& T_odom_robot, const Pose2& T_track_robot) const {
+  const Recovery::Belief belief = recovery.BeliefAt(OdometryOrNone(T_odom_robot), T_track_robot);
   ScanOutcome outcome;
   outcome.stamp = stamp;
   outcome.T_map_robot = belief.T_map_robot;
@@ -386,7 +456,7 @@ void Mapper::Load(StateReader& archive, const ParallelFor& parallel_for) {
 bool Mapper::State::IsConsistent() const {
   for (std::size_t i = 0; i < filter->hypothesis_count(); ++i)
     if (filter->hypothesis(i).path.size() != trail.size()) return false;
-  if (recovery.active() && trail.empty()) return false;
+  if (recovery.active() && (trail.empty() || !last_scan)) return false;
   return drawing.path().size() == (filter->placed() ? trail.size() : 0);
 }
 

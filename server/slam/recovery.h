@@ -1,18 +1,20 @@
-// A robot whose place is not known for sure: scans are missing, and its scan does not agree with the map where odometry
-// says that it is; or odometry has begun anew. Its pose is carried on by odometry where there is any, nothing is drawn,
-// and it is not localized until it has been found in its own map (loops/place_search.h):
-//  - at once, if the place found is the one to which odometry has taken it (after odometry began anew: the last known
-//    place, where most robots stand that were switched off and on);
-//  - elsewhere only if a second search agrees after some more way.
-// The front-end follows the robot meanwhile, in a frame of its own. Not thread-safe. Deterministic.
+// Follows a robot whose place is not certain: scans are missing, or odometry has begun anew. The robot is not
+// localized, and nothing is drawn, until it has been found in its own map (loops/place_search.h). It has been found
+// when two searches, with some way between them, agree: one scan or one search is no proof, because places look alike.
+//  - While the scans continue those before the pause, the robot is probably on its path: its scans are held, and are
+//    added to the path as if there had been no pause, if the place found is that one (`on_path`).
+//  - Otherwise its pose is carried on by odometry where there is any, and the path goes on at the place found.
+// Frames: `track` is that of the front-end. Not thread-safe. Deterministic.
 #pragma once
 
-#include <deque>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "common/service/pose_report.h"
 #include "server/slam/loops/place_search.h"
 #include "server/slam/motion/step_motion.h"
+#include "server/slam/tracking/front_end.h"
 
 namespace cairn::slam {
 
@@ -36,6 +38,21 @@ class Recovery {
     Eigen::Matrix3d doubt = Eigen::Matrix3d::Zero();  // The part of the covariance that has come since.
     PoseReason reason = PoseReason::kLost;            // Or kOdometryOnly.
   };
+  // A keyframe that waits until it is known that the robot is on its path.
+  struct Held {
+    Keyframe keyframe;
+    TrackStep step;
+    Eigen::Matrix3d step_covariance = Eigen::Matrix3d::Zero();
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.keyframe, self.step, self.step_covariance);
+    }
+  };
+  struct Found {
+    FoundPlace place;
+    bool on_path = false;  // Then the held keyframes belong to the path.
+  };
 
   // `blind` is the noise of motion known by odometry alone.
   Recovery(const LoopOptions& loop, const SelfCheckOptions& check, const PointToLineOptions& align,
@@ -43,9 +60,11 @@ class Recovery {
       : loop_(loop), search_(loop, check, align), blind_(blind), lost_after_m_(lost_after_m) {}
 
   [[nodiscard]] bool active() const { return active_; }
-  [[nodiscard]] const PlaceSearch& search() const { return search_; }
   // `odometry_goes_on`: the odometry since `known` is that of one drive.
   void Begin(const Known& known, bool odometry_goes_on);
+  // The next scans continue the path: `T_map_track` is its pose in the map.
+  void BeginOnPath(const Known& known, const Pose2& T_map_track);
+  [[nodiscard]] bool on_path() const { return T_map_track_.has_value(); }
   // The odometry has begun anew.
   void OdometryBeganAnew() { odometry_goes_on_ = false; }
   void End();
@@ -53,21 +72,25 @@ class Recovery {
   // The last scans do not belong together with the next one.
   void ForgetScans();
   [[nodiscard]] bool has_scans() const { return !recent_.scans.empty(); }
-  // Motion from the last scan taken. REQUIRES: has_scans().
-  [[nodiscard]] Pose2 FromLast(const Pose2& T_track_robot) const;
-  // Takes a scan with its pose in the front-end's frame, and searches. Returns its place once it is known.
-  [[nodiscard]] std::optional<FoundPlace> Take(std::shared_ptr<const Scan> scan, const Pose2& T_track_robot,
-                                               const Pose2& T_odom_robot, std::vector<SurfacePoint> points_robot,
-                                               const Trail& trail, const SharedSequence<Pose2>& path);
-  [[nodiscard]] Belief BeliefAt(const Pose2& T_odom_robot) const;
-  // Whether a place is the one to which odometry has taken the robot, within the doubt about both.
-  [[nodiscard]] bool IsWhereExpected(const Pose2& T_map_robot, const Belief& belief) const;
+  // The pose in `track` of the last scan that was held or, off the path, taken; `otherwise` if there is none.
+  [[nodiscard]] Pose2 LastKept(const Pose2& otherwise) const {
+    if (on_path()) return held_.empty() ? otherwise : held_.back().step.T_track_robot;
+    return has_scans() ? recent_.shapes.back().T_track_robot : otherwise;
+  }
+  [[nodiscard]] std::vector<Held> TakeHeld() { return std::exchange(held_, {}); }
+  void Hold(Held held) { held_.push_back(std::move(held)); }
+
+  // Takes a scan, and searches. Returns the robot's place once it is proved.
+  [[nodiscard]] std::optional<Found> Take(const Keyframe& keyframe, const TrackStep& step,
+                                          std::vector<SurfacePoint> points_robot, const Trail& trail,
+                                          const SharedSequence<Pose2>& path);
+  [[nodiscard]] Belief BeliefAt(const Pose2& T_odom_robot, const Pose2& T_track_robot) const;
 
   void RestorePoints(const SurfaceOptions& options) { recent_.RestorePoints(options); }
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
-    archive(self.active_, self.odometry_goes_on_, self.contradicted_, self.known_, self.searched_at_m_, self.recent_,
-            self.unconfirmed_);
+    archive(self.active_, self.odometry_goes_on_, self.contradicted_, self.known_, self.T_map_track_,
+            self.searched_at_m_, self.recent_, self.held_, self.unconfirmed_);
     if constexpr (Archive::kReads) self.search_.Forget();
   }
 
@@ -82,7 +105,11 @@ class Recovery {
       archive(self.T_map_track, self.travelled_m);
     }
   };
+  [[nodiscard]] Pose2 FromLast(const Pose2& T_track_robot) const;
+  void Append(const Keyframe& keyframe, const TrackStep& step, std::vector<SurfacePoint> points_robot);
+  void LeavePath();
   [[nodiscard]] bool IsConfirmed(const Pose2& T_map_robot);
+  [[nodiscard]] bool Agree(const Candidate& earlier, const Pose2& T_map_robot) const;
 
   LoopOptions loop_;
   PlaceSearch search_;
@@ -90,11 +117,13 @@ class Recovery {
   double lost_after_m_;
   bool active_ = false;
   bool odometry_goes_on_ = false;
-  bool contradicted_ = false;  // The last scan does not fit where odometry says that the robot is.
+  bool contradicted_ = false;  // The last scan does not fit where the robot is believed to be.
   Known known_;
+  std::optional<Pose2> T_map_track_;  // While the scans continue the path.
   double searched_at_m_ = 0.0;
   RecentScans recent_;
-  std::deque<Candidate> unconfirmed_;
+  std::vector<Held> held_;  // While the scans continue the path: those that will be its keyframes.
+  std::vector<Candidate> unconfirmed_;
 };
 
 }  // namespace cairn::slam

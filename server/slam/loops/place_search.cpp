@@ -14,16 +14,22 @@ namespace {
 // A whole map is searched: cells twice as large as for a loop, and levels up to blocks of 13 m.
 constexpr double kCoarser = 2.0;
 constexpr int kMapLevels = 7;
-constexpr std::size_t kMaxSample = 250;    // Points of the recent scans that are searched with.
-constexpr std::size_t kMinSurfaces = 20;   // On either side; with fewer nothing is found.
-constexpr double kMapReach_m = 300.0;      // Of the map around the last known place: bounds memory and time.
-constexpr double kMinExplained = 0.6;      // Share of the recent surfaces that must lie on surfaces of the map.
-constexpr int kMinCompared = 20;           // Points that must be compared for an agreement to count.
-constexpr std::size_t kNearKeyframes = 4;  // Old keyframes that a scan is compared with, ...
-constexpr double kApartM = 1.0;            // ... so far apart along the path.
-// A pose is searched here for its best fit.
-constexpr double kHereM = 0.4;
-constexpr double kHereRad = 0.05;
+constexpr std::size_t kMaxSample = 250;     // Points of the recent scans that are searched with.
+constexpr std::size_t kMinSurfaces = 20;    // On either side; with fewer nothing is found.
+constexpr double kMapReach_m = 300.0;       // Of the map around the last known place: bounds memory and time.
+constexpr double kMinPlaceExplained = 0.6;  // Share of the recent surfaces that must lie on surfaces of the map.
+constexpr int kMinCompared = 20;            // Points that must be compared for an agreement to count.
+constexpr std::size_t kNearKeyframes = 4;   // Old keyframes that a scan is compared with, ...
+constexpr double kApartM = 1.0;             // ... so far apart along the path.
+// As in LoopSearch and SelfCheck.
+constexpr double kCellM = 0.1;
+constexpr double kReachM = 0.3;
+constexpr double kMinLikelihoodOfPlace = 0.5;
+constexpr double kRivalM = 1.0;
+constexpr double kRivalRad = 0.3;
+constexpr double kMaxComparedM = 4.0;
+constexpr double kMaxComparedRangeM = 10.0;
+constexpr double kPlaceSigmaRad = 0.01;
 
 // The points of one cell on a raster are represented by the first of them.
 class OnePerCell {
@@ -61,9 +67,9 @@ void RecentScans::RestorePoints(const SurfaceOptions& options) {
     shapes[i].points = SurfacePointsOf(PointsOf(*scans[i]), *scans[i], options);
 }
 
-PlaceSearch::Map::Map(std::vector<SurfacePoint> given, const LoopOptions& options, double index_cell_m)
+PlaceSearch::Map::Map(std::vector<SurfacePoint> given, double index_cell_m)
     : surfaces(std::move(given)),
-      pyramid(surfaces, kCoarser * options.search_cell_m, kCoarser * options.likelihood_reach_m, kMapLevels),
+      pyramid(surfaces, kCoarser * kCellM, kCoarser * kReachM, kMapLevels),
       index(index_cell_m),
       window(WindowOver(surfaces)) {
   for (const SurfacePoint& surface : surfaces) index.Add(surface);
@@ -71,13 +77,13 @@ PlaceSearch::Map::Map(std::vector<SurfacePoint> given, const LoopOptions& option
 
 PlaceSearch::PlaceSearch(const LoopOptions& loop, const SelfCheckOptions& check, const PointToLineOptions& align)
     : options_(loop), check_(check), align_(align) {
-  align_.min_score = std::max(loop.min_explained, kMinExplained);
+  align_.min_score = kMinPlaceExplained;
 }
 
 // Without keyframes whose place was not known.
 std::vector<SurfacePoint> PlaceSearch::SurfacesOfMap(const Trail& trail, const SharedSequence<Pose2>& path) const {
   std::vector<SurfacePoint> surfaces;
-  OnePerCell cells(0.5 * options_.search_cell_m);
+  OnePerCell cells(0.5 * kCellM);
   const Eigen::Vector2d last = path[trail.size() - 1].translation();
   for (std::size_t k = 0; k < trail.size(); ++k) {
     const Pose2& T_map_k = path[k];
@@ -94,30 +100,18 @@ std::vector<SurfacePoint> PlaceSearch::SurfacesOfMap(const Trail& trail, const S
 
 std::optional<FoundPlace> PlaceSearch::Find(const Trail& trail, const SharedSequence<Pose2>& path,
                                             const RecentScans& recent) {
-  if (!map_) map_ = std::make_shared<const Map>(SurfacesOfMap(trail, path), options_, align_.first_pair_distance_m);
+  if (!map_) map_ = std::make_shared<const Map>(SurfacesOfMap(trail, path), align_.first_pair_distance_m);
   if (recent.scans.empty() || map_->surfaces.size() < kMinSurfaces) return std::nullopt;
   const std::size_t now = recent.shapes.size() - 1;
-  const std::vector<SurfacePoint> surfaces =
-      SurfacesOf(recent.shapes, Stretch{0, now, now}, kCoarser * options_.search_cell_m);
+  const std::vector<SurfacePoint> surfaces = SurfacesOf(recent.shapes, Stretch{0, now, now}, kCoarser * kCellM);
   if (surfaces.size() < kMinSurfaces) return std::nullopt;
   const std::vector<Eigen::Vector2d> sample = SampleForSearch(surfaces);
-  const auto peak = FindBestPose(sample, map_->pyramid, map_->window, options_.min_score);
+  const auto peak = FindBestPose(sample, map_->pyramid, map_->window, kMinLikelihoodOfPlace);
   if (!peak || !peak->complete) return std::nullopt;
-  const Exclusion exclusion{peak->T_ref_curr, options_.rival_beyond_m, options_.rival_beyond_rad};
+  const Exclusion exclusion{peak->T_ref_curr, kRivalM, kRivalRad};
   if (FindBestPose(sample, map_->pyramid, map_->window, options_.max_rival * peak->score, exclusion))
     return std::nullopt;
-  return Fit(trail, path, recent, surfaces, peak->T_ref_curr, options_.align_variances.asDiagonal());
-}
-
-bool PlaceSearch::FitsBetterElsewhere(const Trail& trail, const SharedSequence<Pose2>& path,
-                                      const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const {
-  const Map map(SurfacesOfMap(trail, path), options_, align_.first_pair_distance_m);
-  if (map.surfaces.size() < kMinSurfaces || points_robot.size() < kMinSurfaces) return false;
-  const std::vector<Eigen::Vector2d> sample = SampleForSearch(points_robot);
-  const auto here = FindBestPose(sample, map.pyramid, {T_map_robot, kHereM, kHereRad}, 0.0);
-  if (!here) return true;
-  const Exclusion exclusion{here->T_ref_curr, options_.rival_beyond_m, options_.rival_beyond_rad};
-  return FindBestPose(sample, map.pyramid, map.window, here->score / options_.max_rival, exclusion).has_value();
+  return Fit(trail, path, recent, surfaces, peak->T_ref_curr, Eigen::Vector3d(0.25, 0.25, 0.01).asDiagonal());
 }
 
 std::optional<FoundPlace> PlaceSearch::Fit(const Trail& trail, const SharedSequence<Pose2>& path,
@@ -132,11 +126,7 @@ std::optional<FoundPlace> PlaceSearch::Fit(const Trail& trail, const SharedSeque
     const Agreement agreement = Compare(trail, path, *recent.scans[k], recent.shapes[k].points, T_map_k);
     if (agreement == Agreement::kContradicts || (k == now && agreement == Agreement::kNothingNear)) return std::nullopt;
   }
-  FoundPlace found{match.T_ref_curr, match.covariance};
-  found.covariance.diagonal() +=
-      Eigen::Vector3d(options_.sigma_m * options_.sigma_m, options_.sigma_m * options_.sigma_m,
-                      options_.sigma_rad * options_.sigma_rad);
-  return found;
+  return FoundPlace{match.T_ref_curr, match.covariance + PoseCovariance(options_.sigma_m, kPlaceSigmaRad)};
 }
 
 PlaceSearch::Agreement PlaceSearch::Compare(const Trail& trail, const SharedSequence<Pose2>& path, const Scan& scan,
@@ -146,14 +136,14 @@ PlaceSearch::Agreement PlaceSearch::Compare(const Trail& trail, const SharedSequ
   std::vector<KeyframeCost> near;
   for (std::size_t k = 0; k < shapes.size(); ++k) {
     const double distance_m = (path[k].translation() - T_map_robot.translation()).norm();
-    if (!trail.keyframes()[k].localized || distance_m > check_.max_distance_m) continue;
+    if (!trail.keyframes()[k].localized || distance_m > kMaxComparedM) continue;
     near.push_back({k, distance_m + std::abs(AngleDiff(path[k].theta, T_map_robot.theta))});
   }
   VisibilityCounts counts;
   for (const std::size_t k : BestPlaces(std::move(near), shapes, kApartM, kNearKeyframes)) {
     const Pose2 T_old_now = Between(path[k], T_map_robot);
-    counts += CompareVisibility(*trail.keyframes()[k].scan, T_old_now, points_robot, check_.near_m, check_.max_range_m);
-    counts += CompareVisibility(scan, T_old_now.Inverse(), shapes[k].points, check_.near_m, check_.max_range_m);
+    counts += CompareVisibility(*trail.keyframes()[k].scan, T_old_now, points_robot, check_.near_m, kMaxComparedRangeM);
+    counts += CompareVisibility(scan, T_old_now.Inverse(), shapes[k].points, check_.near_m, kMaxComparedRangeM);
   }
   if (counts.known() < kMinCompared) return Agreement::kNothingNear;
   // As the self-check judges a pose that was wrong before.

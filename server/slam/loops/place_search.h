@@ -48,9 +48,6 @@ class PlaceSearch {
   // trail nor the path changes between two calls, unless Forget is called.
   [[nodiscard]] std::optional<FoundPlace> Find(const Trail& trail, const SharedSequence<Pose2>& path,
                                                const RecentScans& recent);
-  // Whether a scan fits clearly better at another place of the map than at this pose.
-  [[nodiscard]] bool FitsBetterElsewhere(const Trail& trail, const SharedSequence<Pose2>& path,
-                                         const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const;
   void Forget() { map_.reset(); }
 
   // How a scan at this pose agrees with old keyframes near it.
@@ -60,7 +57,7 @@ class PlaceSearch {
 
  private:
   struct Map {
-    Map(std::vector<SurfacePoint> surfaces, const LoopOptions& options, double index_cell_m);
+    Map(std::vector<SurfacePoint> surfaces, double index_cell_m);
     std::vector<SurfacePoint> surfaces;
     LikelihoodPyramid pyramid;
     PointIndex index;

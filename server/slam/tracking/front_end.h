@@ -70,6 +70,12 @@ struct TrackStep {
   // corridor, or a scan without a match), along the axes of `track`. It is zero if odometry is used:
   // BlindMotion accounts for that case.
   Eigen::Matrix3d forecast_covariance = Eigen::Matrix3d::Zero();
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.T_track_robot, self.score, self.matched, self.degenerate, self.moved_m, self.found,
+            self.forecast_covariance);
+  }
 };
 
 class FrontEnd {
