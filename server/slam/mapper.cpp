@@ -30,8 +30,9 @@ constexpr double kStillRad = 0.02;
 constexpr double kSameRangeM = 0.1;
 constexpr double kSameRangePerM = 0.01;
 constexpr double kUnchanged = 0.95;
+constexpr double kUnchangedAlongCorridor = 0.98;  // Most beams show the same everywhere along it.
 
-bool LookAlike(const Scan& a, const Scan& b) {
+bool LookAlike(const Scan& a, const Scan& b, double least) {
   if (a.ranges_m.size() != b.ranges_m.size() || a.angle_first_rad != b.angle_first_rad) return false;
   std::size_t compared = 0, same = 0;
   for (std::size_t i = 0; i < a.ranges_m.size(); ++i) {
@@ -42,7 +43,7 @@ bool LookAlike(const Scan& a, const Scan& b) {
     const double difference_m = std::abs(static_cast<double>(a.ranges_m[i]) - b.ranges_m[i]);
     same += class_a == class_b && difference_m < kSameRangeM + kSameRangePerM * a.ranges_m[i] ? 1 : 0;
   }
-  return compared > 0 && static_cast<double>(same) >= kUnchanged * static_cast<double>(compared);
+  return compared > 0 && static_cast<double>(same) >= least * static_cast<double>(compared);
 }
 
 }  // namespace
@@ -299,9 +300,10 @@ void Mapper::State::LosePlace(bool odometry_goes_on) {
 
 // Whether nothing at all has changed since the last scan: nobody has moved the robot.
 bool Mapper::State::StoodStill(const Scan& scan, const Pose2& T_odom_robot, const TrackStep& step) const {
-  if (!last_scan || !step.matched || step.degenerate) return false;
+  if (!last_scan || !step.matched) return false;
   const Pose2 moved = options.front_end.use_odometry ? Between(last_scan->T_odom_robot, T_odom_robot) : Pose2{};
-  return moved.translation().norm() < kStillM && std::abs(moved.theta) < kStillRad && LookAlike(*last_scan->scan, scan);
+  return moved.translation().norm() < kStillM && std::abs(moved.theta) < kStillRad &&
+         LookAlike(*last_scan->scan, scan, step.degenerate ? kUnchangedAlongCorridor : kUnchanged);
 }
 
 // Nobody watched the robot before this scan. If the scan goes on where the last ones ended, as far as it shows, the

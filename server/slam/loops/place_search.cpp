@@ -17,7 +17,7 @@ constexpr int kMapLevels = 7;
 constexpr std::size_t kMaxSample = 250;     // Points of the recent scans that are searched with.
 constexpr std::size_t kMinSurfaces = 20;    // On either side; with fewer nothing is found.
 constexpr double kMapReach_m = 300.0;       // Of the map around the last known place: bounds memory and time.
-constexpr double kMinPlaceExplained = 0.6;  // Share of the recent surfaces that must lie on surfaces of the map.
+constexpr double kMinPlaceExplained = 0.7;  // Share of the recent surfaces that must lie on surfaces of the map.
 constexpr int kMinCompared = 20;            // Points that must be compared for an agreement to count.
 constexpr std::size_t kNearKeyframes = 4;   // Old keyframes that a scan is compared with, ...
 constexpr double kApartM = 1.0;             // ... so far apart along the path.
@@ -29,6 +29,9 @@ constexpr double kRivalM = 1.0;
 constexpr double kRivalRad = 0.3;
 constexpr double kMaxComparedM = 4.0;
 constexpr double kMaxComparedRangeM = 10.0;
+// Largest share of the points compared that may contradict a place. In the worlds of the study `moved` true places have
+// 0.00, and false ones, which look like them, from 0.05 on.
+constexpr double kMaxConflictOfPlace = 0.03;
 constexpr double kPlaceSigmaRad = 0.01;
 
 // The points of one cell on a raster are represented by the first of them.
@@ -120,18 +123,21 @@ std::optional<FoundPlace> PlaceSearch::Fit(const Trail& trail, const SharedSeque
   const MatchResult match =
       AlignPointsToSurfaces(surfaces, map_->index, {T_map_robot, T_map_robot, covariance}, align_);
   if (!match.converged || match.degenerate) return std::nullopt;
+  // Every one of the scans, not only the last ones: a place that looks like the true one differs from it somewhere.
   const std::size_t now = recent.shapes.size() - 1;
-  for (const std::size_t k : {now, now / 2, std::size_t{0}}) {
+  VisibilityCounts all;
+  for (std::size_t k = 0; k <= now; ++k) {
     const Pose2 T_map_k = match.T_ref_curr * Between(recent.shapes[now].T_track_robot, recent.shapes[k].T_track_robot);
-    const Agreement agreement = Compare(trail, path, *recent.scans[k], recent.shapes[k].points, T_map_k);
-    if (agreement == Agreement::kContradicts || (k == now && agreement == Agreement::kNothingNear)) return std::nullopt;
+    const VisibilityCounts one = Visible(trail, path, *recent.scans[k], recent.shapes[k].points, T_map_k);
+    all += one;
+    if (k == now && one.known() < kMinCompared) return std::nullopt;
   }
+  if (all.contradicted > kMaxConflictOfPlace * all.known()) return std::nullopt;
   return FoundPlace{match.T_ref_curr, match.covariance + PoseCovariance(options_.sigma_m, kPlaceSigmaRad)};
 }
 
-PlaceSearch::Agreement PlaceSearch::Compare(const Trail& trail, const SharedSequence<Pose2>& path, const Scan& scan,
-                                            const std::vector<SurfacePoint>& points_robot,
-                                            const Pose2& T_map_robot) const {
+VisibilityCounts PlaceSearch::Visible(const Trail& trail, const SharedSequence<Pose2>& path, const Scan& scan,
+                                      const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const {
   const std::span<const KeyframeShape> shapes = trail.shapes();
   std::vector<KeyframeCost> near;
   for (std::size_t k = 0; k < shapes.size(); ++k) {
@@ -145,6 +151,13 @@ PlaceSearch::Agreement PlaceSearch::Compare(const Trail& trail, const SharedSequ
     counts += CompareVisibility(*trail.keyframes()[k].scan, T_old_now, points_robot, check_.near_m, kMaxComparedRangeM);
     counts += CompareVisibility(scan, T_old_now.Inverse(), shapes[k].points, check_.near_m, kMaxComparedRangeM);
   }
+  return counts;
+}
+
+PlaceSearch::Agreement PlaceSearch::Compare(const Trail& trail, const SharedSequence<Pose2>& path, const Scan& scan,
+                                            const std::vector<SurfacePoint>& points_robot,
+                                            const Pose2& T_map_robot) const {
+  const VisibilityCounts counts = Visible(trail, path, scan, points_robot, T_map_robot);
   if (counts.known() < kMinCompared) return Agreement::kNothingNear;
   // As the self-check judges a pose that was wrong before.
   const bool contradicted = counts.contradicted > 0.5 * check_.max_conflict * counts.known();

@@ -56,6 +56,8 @@ class PlaceSearch {
                                   const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const;
 
  private:
+  [[nodiscard]] VisibilityCounts Visible(const Trail& trail, const SharedSequence<Pose2>& path, const Scan& scan,
+                                         const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const;
   struct Map {
     Map(std::vector<SurfacePoint> surfaces, double index_cell_m);
     std::vector<SurfacePoint> surfaces;
