@@ -200,15 +200,40 @@ TEST_P(Unwatched, IsTheSameAfterACheckpointToTheLastBit) {
 INSTANTIATE_TEST_SUITE_P(Recovery, Unwatched, testing::ValuesIn(kCases),
                          [](const auto& tested) { return tested.param.name; });
 
-TEST(Recovery, WhereOdometrySpansThePauseAndTheScanAgreesTheRobotGoesOnAtOnce) {
-  for (const bool new_client : {false, true}) {
-    const Away away{170.0, new_client ? 170.0 : 182.0, Odometer::kGoesOn, false, new_client};
-    const std::vector<Seen> seen = Play(Building(), away, 190.0);
-    const Seen* const first = First(seen, away.to_s, false);
-    ASSERT_NE(first, nullptr);
-    EXPECT_EQ(first->outcome.reason, PoseReason::kTracking) << new_client;
-    EXPECT_LT(ErrorOf(*first), 0.3);
-    EXPECT_EQ(Wrong(seen), 0);
+// Its scans are held meanwhile: nothing is missing in its map afterwards.
+TEST(Recovery, OnItsPathTheRobotGoesOnAsIfThereHadBeenNoPauseOnceItHasProvedItsPlace) {
+  const Away away{170.0, 174.0, Odometer::kGoesOn, false};
+  const std::vector<Seen> seen = Play(Building(), away, 200.0);
+  const Seen* const first = First(seen, away.to_s, false);
+  ASSERT_NE(first, nullptr);
+  EXPECT_EQ(first->outcome.reason, PoseReason::kOdometryOnly);
+  EXPECT_FALSE(first->outcome.localized);
+  EXPECT_LT(ErrorOf(*first), 0.3);
+  const Seen* const found = First(seen, away.to_s, true);
+  ASSERT_NE(found, nullptr);
+  EXPECT_LT(found->seconds - away.to_s, 15.0);
+  EXPECT_GT(found->keyframes, first->keyframes + 3);
+  EXPECT_EQ(Wrong(seen), 0);
+}
+
+// Whether a robot that has stood still is localized at once, and one that was carried by 0.7 m is not.
+TEST(Recovery, ARobotThatStoodStillGoesOnAtOnce) {
+  const test::World world = test::RingCorridor(true);
+  const test::Laser laser{.beams = 181, .step_rad = Radians(1.5), .sigma_m = 0.01};
+  for (const double carried_m : {0.0, 0.7}) {
+    std::mt19937_64 rng(3);
+    Mapper mapper(FewParticles(), {}, 1);
+    Stamp stamp = 0;
+    const auto process = [&](const Pose2& truth, const Pose2& T_odom_robot, Passage passage) {
+      Scan scan = test::Look(world, truth, laser, &rng);
+      scan.stamp = (stamp += kNanosPerSecond / 5);
+      return mapper.Process(std::make_shared<const Scan>(std::move(scan)), T_odom_robot, SerialFor, passage);
+    };
+    double x = 0.0;
+    for (; x < 20.0; x += 0.2) ASSERT_TRUE(process({x, 0, 0}, {x, 0, 0}, Passage::kDriven).localized);
+    const Pose2 T_odom_robot{x - 0.2, 0, 0};
+    const ScanOutcome outcome = process({x - 0.2 + carried_m, 0, 0}, T_odom_robot, Passage::kPaused);
+    EXPECT_EQ(outcome.localized, carried_m == 0.0) << carried_m;
   }
 }
 

@@ -4,7 +4,7 @@
 #include <map>
 
 #include "tests/studies/study.h"
-#include "tests/system/moved_sweep.h"
+#include "tests/server/slam/moved_sweep.h"
 
 namespace cairn::studies {
 namespace {

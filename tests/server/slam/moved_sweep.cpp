@@ -1,4 +1,4 @@
-#include "tests/system/moved_sweep.h"
+#include "tests/server/slam/moved_sweep.h"
 
 #include <cmath>
 #include <cstdlib>
@@ -102,6 +102,7 @@ class Follower {
     case_ = counted;
   }
   [[nodiscard]] const Pose2& T_map_world_now() const { return T_map_world_now_; }
+  [[nodiscard]] const Pose2& T_odom_robot() const { return T_odom_robot_; }  // At the last scan.
   void Feed(LogRecord record, const Pose2& T_new_old) {
     if (auto* const scan = std::get_if<Scan>(&record)) {
       scan->stamp += later_;
@@ -132,6 +133,7 @@ class Follower {
     if (before_) way_m_ += (truth->translation() - before_->translation()).norm();
     before_ = *truth;
     ++case_->poses;
+    T_odom_robot_ = outcome.T_map_odom.Inverse() * outcome.T_map_robot;
     T_map_world_now_ = outcome.T_map_robot * truth->Inverse();
     const Eigen::Vector2d told = outcome.T_map_robot.translation();
     const double error_m =
@@ -149,7 +151,7 @@ class Follower {
 
   const Trajectory* truth_ = nullptr;
   Stamp later_ = 0;
-  Pose2 T_map_world_, T_map_world_now_;
+  Pose2 T_map_world_, T_map_world_now_, T_odom_robot_;
   MovedCase* case_ = nullptr;
   std::optional<Stamp> first_;
   std::optional<Pose2> before_;
@@ -159,9 +161,10 @@ class Follower {
 
 struct Before {
   double seconds = 0.0;
-  Pose2 T_map_world;  // The drift of the map there.
-  Odometry odometry;
-  Scan scan;  // The last one.
+  Pose2 T_map_world;   // The drift of the map there.
+  Odometry odometry;   // The last one.
+  Scan scan;           // The last one,
+  Pose2 T_odom_robot;  // and the odometry at its stamp.
   std::string state;
 };
 
@@ -176,7 +179,7 @@ MovedCase After(const Before& before, const std::vector<OneDrive>& drives, const
   std::optional<Pose2> T_new_old;
   Pose2 T_half;
   if (result.stood_still) {  // The robot still sees what it saw, and then it drives on.
-    follower.Feed(before.odometry, {});
+    follower.Feed(Odometry{.sequence = 0, .stamp = before.scan.stamp, .T_odom_robot = before.T_odom_robot}, {});
     follower.Feed(before.scan, {});
   }
   for (const auto& [seconds, record] : drive.records) {
@@ -221,9 +224,11 @@ std::vector<Before> RunUndisturbed(const OneDrive& drive, const MovedSweepOption
   Before now;
   for (const auto& [seconds, record] : drive.records) {
     const double moment_s = options.first_s + options.between_s * static_cast<double>(moments.size());
-    if (seconds > moment_s && moments.size() < static_cast<std::size_t>(options.moments)) {
+    if (seconds > moment_s && std::holds_alternative<Scan>(record) &&
+        moments.size() < static_cast<std::size_t>(options.moments)) {
       now.seconds = moment_s;
       now.T_map_world = follower.T_map_world_now();
+      now.T_odom_robot = follower.T_odom_robot();
       follower.pipeline().Save(now.state);
       moments.push_back(now);
     }
