@@ -101,6 +101,9 @@ class Follower {
     T_map_world_ = T_map_world;
     case_ = counted;
   }
+  // The poses of the same drive without a gap; their drift is no fault of the gap.
+  void CompareWith(const Trajectory* undisturbed) { undisturbed_ = undisturbed; }
+  [[nodiscard]] const Trajectory& told() const { return told_; }
   [[nodiscard]] const Pose2& T_map_world_now() const { return T_map_world_now_; }
   [[nodiscard]] const Pose2& T_odom_robot() const { return T_odom_robot_; }  // At the last scan.
   void Feed(LogRecord record, const Pose2& T_new_old) {
@@ -138,6 +141,8 @@ class Follower {
     const Eigen::Vector2d told = outcome.T_map_robot.translation();
     const double error_m =
         std::min((told - truth->translation()).norm(), (told - (T_map_world_ * *truth).translation()).norm());
+    const auto same = undisturbed_ == nullptr ? std::nullopt : PoseOn(*undisturbed_, scan.stamp - later_, 1.0);
+    if (same) error_m = std::min(error_m, (told - same->translation()).norm());
     if (!outcome.localized) {
       case_->found_after_s = case_->found_after_m = -1.0;
     } else if (case_->found_after_s < 0.0) {
@@ -150,6 +155,8 @@ class Follower {
   }
 
   const Trajectory* truth_ = nullptr;
+  const Trajectory* undisturbed_ = nullptr;
+  Trajectory told_;
   Stamp later_ = 0;
   Pose2 T_map_world_, T_map_world_now_, T_odom_robot_;
   MovedCase* case_ = nullptr;
@@ -168,14 +175,15 @@ struct Before {
   std::string state;
 };
 
-MovedCase After(const Before& before, const std::vector<OneDrive>& drives, const Kind& kind,
-                const MovedSweepOptions& options, MovedCase result) {
+MovedCase After(const Before& before, const std::vector<OneDrive>& drives, const Trajectory& undisturbed,
+                const Kind& kind, const MovedSweepOptions& options, MovedCase result) {
   const OneDrive& drive = drives[kind.other_robot ? 1 : 0];
   Follower follower({}, options.seed);
   if (!follower.pipeline().Load(before.state)) std::abort();
   if (kind.new_client) follower.pipeline().NewClient();
   const double until_s = before.seconds + kind.skipped_s;
   follower.Watch(drive.truth, StampFromSeconds(kind.lasts_s - kind.skipped_s), before.T_map_world, &result);
+  if (!kind.other_robot) follower.CompareWith(&undisturbed);
   std::optional<Pose2> T_new_old;
   Pose2 T_half;
   if (result.stood_still) {  // The robot still sees what it saw, and then it drives on.
@@ -216,7 +224,7 @@ MovedCase After(const Before& before, const std::vector<OneDrive>& drives, const
 }
 
 // The state at each moment of the drive as it is without a gap.
-std::vector<Before> RunUndisturbed(const OneDrive& drive, const MovedSweepOptions& options) {
+std::vector<Before> RunUndisturbed(const OneDrive& drive, const MovedSweepOptions& options, Trajectory* told) {
   std::vector<Before> moments;
   Follower follower(drive.T_map_robot_start, options.seed);
   MovedCase undisturbed;
@@ -236,6 +244,7 @@ std::vector<Before> RunUndisturbed(const OneDrive& drive, const MovedSweepOption
     if (const auto* const scan = std::get_if<Scan>(&record)) now.scan = *scan;
     follower.Feed(record, {});
   }
+  *told = follower.told();
   return moments;
 }
 
@@ -253,12 +262,13 @@ std::vector<MovedCase> RunMovedSweep(const MovedSweepOptions& options) {
     const double last_s = options.first_s + options.between_s * (options.moments - 1);
     const std::vector<OneDrive> drives =
         DriveThrough(world, last_s + 80.0 + options.watched_again_s + 1.0, options.seed);
-    for (const Before& before : RunUndisturbed(drives.front(), options)) {
+    Trajectory undisturbed;
+    for (const Before& before : RunUndisturbed(drives.front(), options, &undisturbed)) {
       for (const Kind& kind : kKinds) {
         if (kind.name.find(options.only) == std::string::npos) continue;
         MovedCase one{.world = world, .kind = kind.name, .from_s = before.seconds, .seed = options.seed};
         one.stood_still = kind.odometer == Odometer::kStandsStill && kind.skipped_s == 0.0 && !kind.other_robot;
-        cases.push_back(After(before, drives, kind, options, std::move(one)));
+        cases.push_back(After(before, drives, undisturbed, kind, options, std::move(one)));
         options.done(cases.back());
       }
     }

@@ -15,7 +15,9 @@ TEST(MovedSweep, NoRobotIsLocalizedAtAWrongPlace) {
   const std::vector<MovedCase> cases = RunMovedSweep(options);
   for (const MovedCase& one : cases) {
     EXPECT_EQ(one.wrong, 0) << one.world << ", " << one.kind << ", at " << one.from_s << " s";
-    if (one.stood_still) EXPECT_EQ(one.found_after_s, 0.0) << one.world << ", " << one.kind << ", at " << one.from_s;
+    if (one.stood_still) {
+      EXPECT_EQ(one.found_after_s, 0.0) << one.world << ", " << one.kind << ", at " << one.from_s;
+    }
     found += one.found_after_s >= 0.0 ? 1 : 0;
   }
   EXPECT_GE(cases.size(), 72U);
