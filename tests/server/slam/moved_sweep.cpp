@@ -139,7 +139,7 @@ class Follower {
     T_odom_robot_ = outcome.T_map_odom.Inverse() * outcome.T_map_robot;
     T_map_world_now_ = outcome.T_map_robot * truth->Inverse();
     const Eigen::Vector2d told = outcome.T_map_robot.translation();
-    const double error_m =
+    double error_m =
         std::min((told - truth->translation()).norm(), (told - (T_map_world_ * *truth).translation()).norm());
     const auto same = undisturbed_ == nullptr ? std::nullopt : PoseOn(*undisturbed_, scan.stamp - later_, 1.0);
     if (same) error_m = std::min(error_m, (told - same->translation()).norm());
