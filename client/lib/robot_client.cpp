@@ -292,8 +292,10 @@ bool RobotClient::ReadyToReopen() const {
   return (odometry && odometry->complete) || Clock::now() - refused_ > kOdometryPatience;
 }
 
-// The last reported pose (or, if there is none, the start of the session), moved on by the odometry since then.
-Pose2 RobotClient::StartOfNextSession() const {
+// The last reported pose (or, if there is none, the start of the session), moved on by the odometry since then. Nothing
+// if the robot was not localized, because the server would believe the pose.
+std::optional<Pose2> RobotClient::StartOfNextSession() const {
+  if (pose_ ? !pose_->localized : start_unknown_) return std::nullopt;
   const Pose2 first = request_.has_start ? request_.T_map_robot_start : Pose2{};
   const auto odometry = backlog_.OdometryAtFirstScan();
   if (!odometry) return pose_ ? pose_->T_map_robot : first;
@@ -304,15 +306,16 @@ Pose2 RobotClient::StartOfNextSession() const {
 
 void RobotClient::Reopen() {
   SessionToken session = 0;
-  Pose2 start;
+  std::optional<Pose2> start;
   {
     const MutexLock sending(sending_);
     const MutexLock lock(mutex_);
     start = StartOfNextSession();
     session = NewClientId();
     request_.session = session;
-    request_.has_start = true;
-    request_.T_map_robot_start = start;
+    start_unknown_ = !start;
+    request_.has_start = start.has_value();
+    request_.T_map_robot_start = start.value_or(Pose2{});
     request_.started = false;
     // If this session is lost before its first pose, the next one starts from here.
     if (const auto odometry = backlog_.OdometryAtFirstScan()) T_odom_robot_start_ = odometry->T_odom_robot;
@@ -328,7 +331,7 @@ void RobotClient::Reopen() {
     reopening_ = false;
     restarted_.fetch_add(1, std::memory_order_relaxed);
   }
-  if (callbacks_.restarted) callbacks_.restarted(session, start);
+  if (callbacks_.restarted) callbacks_.restarted(session, start.value_or(Pose2{}));
   Ask();
 }
 

@@ -44,7 +44,8 @@ class RobotClient {
     std::function<void(const Ledger&)> ledger;
     std::function<void(const PoseReport&)> pose;
     std::function<void(const SessionState&)> session;
-    // A new session has replaced one that the server no longer knows.
+    // A new session has replaced one that the server no longer knows. The start is the identity if the robot was not
+    // localized: then the request says none.
     std::function<void(SessionToken session, const Pose2& T_map_robot_start)> restarted;
   };
 
@@ -127,7 +128,7 @@ class RobotClient {
   [[nodiscard]] bool Answered() const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool Streaming() const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool ReadyToReopen() const CAIRN_REQUIRES(mutex_);
-  [[nodiscard]] Pose2 StartOfNextSession() const CAIRN_REQUIRES(mutex_);
+  [[nodiscard]] std::optional<Pose2> StartOfNextSession() const CAIRN_REQUIRES(mutex_);
   Result<void> SendNow(const StreamedSample& sample) CAIRN_REQUIRES(sending_);
   Result<void> AddAndSend(StreamedSample&& sample, Stream& stream) CAIRN_REQUIRES(sending_);
   void Ask();
@@ -169,6 +170,7 @@ class RobotClient {
   std::optional<Status> over_ CAIRN_GUARDED_BY(mutex_);  // Why the session ended for good.
   std::optional<PoseReport> pose_ CAIRN_GUARDED_BY(mutex_);
   std::optional<Pose2> T_odom_robot_start_ CAIRN_GUARDED_BY(mutex_);  // Odometry when the session was opened.
+  bool start_unknown_ CAIRN_GUARDED_BY(mutex_) = false;  // The robot was not localized when this session was opened.
   Clock::time_point asked_ CAIRN_GUARDED_BY(mutex_);
   Clock::time_point refused_ CAIRN_GUARDED_BY(mutex_);  // When reopening began.
   Clock::time_point progress_ CAIRN_GUARDED_BY(mutex_);

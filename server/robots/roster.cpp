@@ -91,7 +91,7 @@ Result<void> Roster::Admit(const SessionRequest& request) {
                                                      "'; open a new one" + WhyNotRestored(request.robot));
   }
   if (session == nullptr || session->record().phase() == SessionPhase::kEnded) return Open(request);
-  return Resume(*session, request);
+  return request.has_start ? Replace(*session, request) : Resume(*session, request);
 }
 
 std::string Roster::WhyNotRestored(const std::string& robot) const {
@@ -100,33 +100,52 @@ std::string Roster::WhyNotRestored(const std::string& robot) const {
   return found == not_restored_.end() ? std::string() : " (" + found->second + ")";
 }
 
-Result<void> Roster::Resume(Session& session, const SessionRequest& request) {
-  const Status ending{StatusCode::kUnavailable,
-                      "the last session of '" + request.robot + "' is still ending; try again"};
-  if (session.ending()) return tl::unexpected(ending);
+// What keeps the request from having anything to do with this session, which has not ended.
+Result<void> Roster::MayTakeOver(const Session& session, const SessionRequest& request) {
   const SessionState state = session.record().state();
+  if (session.ending())
+    return Fail(StatusCode::kUnavailable, "the last session of '" + request.robot + "' is still ending; try again");
   if (state.robot != request.robot) {
     return Fail(StatusCode::kAlreadyExists,
                 "the names '" + request.robot + "' and '" + state.robot + "' share an id; choose another name");
   }
-  if (state.client != request.client && session.record().alive()) {
+  if (state.client != request.client && session.record().alive())
     return Fail(StatusCode::kAlreadyExists, "another live client streams as '" + request.robot + "'");
-  }
   if (state.site != request.site) {
     return Fail(StatusCode::kFailedPrecondition,
                 "'" + request.robot + "' has an open session in site '" + state.site + "'; end it first");
   }
+  return {};
+}
+
+// Who says where the robot starts does not go on with what it did before.
+Result<void> Roster::Replace(Session& session, const SessionRequest& request) {
+  if (auto may = MayTakeOver(session, request); !may) return may;
+  const SessionState state = session.record().state();
+  if (auto opened = Open(request); !opened) return opened;
+  session.End({StatusCode::kAborted, "a new session of '" + state.robot + "' was opened with a start pose"});
+  TellDisplaced(state, request);
+  return {};
+}
+
+void Roster::TellDisplaced(const SessionState& before, const SessionRequest& request) {
+  if (before.client == request.client) return;
+  SessionRequest displaced = request;
+  displaced.client = before.client;
+  displaced.session = before.session;
+  Refuse(displaced, {StatusCode::kAlreadyExists, "another client has taken over the session of '" + before.robot +
+                                                     "' while this one was not alive"});
+}
+
+Result<void> Roster::Resume(Session& session, const SessionRequest& request) {
+  if (auto may = MayTakeOver(session, request); !may) return may;
+  const SessionState state = session.record().state();
   if (!session.record().AddSensors(request.sensors)) {
     return Fail(StatusCode::kResourceExhausted, "more than 16 sensors in one session");
   }
-  if (!session.Resume(request.client, request.session)) return tl::unexpected(ending);
-  if (state.client != request.client) {
-    SessionRequest displaced = request;
-    displaced.client = state.client;
-    displaced.session = state.session;
-    Refuse(displaced, {StatusCode::kAlreadyExists, "another client has taken over the session of '" + state.robot +
-                                                       "' while this one was not alive"});
-  }
+  if (!session.Resume(request.client, request.session))
+    return Fail(StatusCode::kUnavailable, "the last session of '" + request.robot + "' is still ending; try again");
+  TellDisplaced(state, request);
   return {};
 }
 
@@ -162,7 +181,7 @@ Result<void> Roster::Open(const SessionRequest& request) {
   }
   session->Resume(request.client, request.session);
   site->Join(robot_id, session->id(), session);
-  if (gone != nullptr && !gone->ending()) {
+  if (gone != nullptr && !gone->ending() && gone->record().state().robot_id != robot_id) {
     gone->End({StatusCode::kResourceExhausted, "its robot stayed away, and its place was needed for another"});
   }
   RetireGone();

@@ -4,8 +4,10 @@
 //   alive. The start pose of the request is then ignored.
 // - A request that is `started` and names a session that the server does not know is refused (FAILED_PRECONDITION),
 //   because its start pose is out of date.
-// - A request for a new session continues the robot's present session if the owner is not alive; the former owner is
-//   told. If another client that is alive owns it, the request is refused (ALREADY_EXISTS).
+// - A request for a new session of a robot whose owner is not alive replaces the robot's present session if it says
+//   where the robot starts. Otherwise it continues the present session, and the robot must be found in its map before it
+//   is localized (slam/recovery.h), because nobody knows whether it is still where it was, or even the same robot.
+//   The former owner is told. If another client that is alive owns the session, the request is refused (ALREADY_EXISTS).
 // - A session that has ended is replaced by a new one.
 // When max_robots is reached, the oldest ended session is removed first (its part of the map stays), then the one that
 // has been suspended for longest. A session that has been suspended for too long is ended. Thread rule: any thread;
@@ -78,7 +80,10 @@ class Roster {
 
  private:
   Result<void> Admit(const SessionRequest& request);
+  static Result<void> MayTakeOver(const Session& session, const SessionRequest& request);
   Result<void> Resume(Session& session, const SessionRequest& request);
+  Result<void> Replace(Session& session, const SessionRequest& request);
+  void TellDisplaced(const SessionState& before, const SessionRequest& request);
   Result<void> Open(const SessionRequest& request);
   [[nodiscard]] std::string WhyNotRestored(const std::string& robot) const;
   std::shared_ptr<Session> Make(SessionId id, const SessionRequest& request, std::uint32_t map_epoch,

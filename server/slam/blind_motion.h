@@ -29,6 +29,11 @@ class BlindMotion {
 
   // Returns the covariance of the motion since the last call: (x, y, theta) in the last keyframe.
   [[nodiscard]] Eigen::Matrix3d TakeCovariance() { return std::exchange(covariance_, Eigen::Matrix3d::Zero()); }
+  // The step since the last call leads to where the robot was found again.
+  void Found(const Eigen::Matrix3d& covariance) {
+    unmatched_m_ = 0.0;
+    covariance_ = covariance;
+  }
   // Whether the robot has travelled too far since the last match, counting `more_m` in addition.
   [[nodiscard]] bool Lost(double more_m = 0.0) const { return unmatched_m_ + more_m > lost_after_m_; }
 

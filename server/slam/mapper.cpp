@@ -1,19 +1,10 @@
 #include "server/slam/mapper.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
-#include "server/slam/blind_motion.h"
-#include "server/slam/loops/loop_search.h"
-#include "server/slam/loops/revisit_search.h"
-#include "server/slam/loops/self_check.h"
-#include "server/slam/map_drawing.h"
-#include "server/slam/methods.h"
-#include "server/slam/motion/step_motion.h"
-#include "server/slam/scan/beam_points.h"
-#include "server/slam/scan/stamp_gate.h"
-#include "server/slam/tracking/front_end.h"
-#include "server/slam/trail/trail.h"
+#include "server/slam/mapper_state.h"
 
 namespace cairn::slam {
 namespace {
@@ -24,61 +15,6 @@ bool IsLocalized(PoseReason reason) {
 
 }  // namespace
 
-struct Mapper::State {
-  State(const MapperOptions& given, const Pose2& T_map_robot_start, std::uint64_t seed)
-      : options(given),
-        front_end(given.front_end, MakeMatcher(given.matcher, given.matching)),
-        blind(given.blind, given.front_end.use_odometry, given.lost_after_m),
-        trail(given.filter.back_end.drift, given.front_end.surface),
-        revisits(given.revisit, given.front_end.refine),
-        filter(MakeFilter(given.filter.kind, given.filter, T_map_robot_start, seed)),
-        loops(given.loop, given.front_end.refine),
-        self_check(given.self_check),
-        drawing(given.grid) {}
-
-  ScanOutcome Coast(Stamp stamp, const Pose2& T_odom_robot);
-  void AddKeyframe(Keyframe keyframe, ScanView view, const TrackStep& step, const ParallelFor& parallel_for);
-  StepMotion MotionTo(const Keyframe& keyframe, const TrackStep& step, const Eigen::Matrix3d& covariance);
-  void CloseLargeLoop();
-  void Draw(const TrackStep& step, bool placed_before);
-  ScanOutcome Report(Stamp stamp, const Pose2& T_odom_robot, const TrackStep& step, bool keyframe);
-  [[nodiscard]] PoseReason ReasonOf(const TrackStep& step) const;
-  [[nodiscard]] SharedSequence<Pose2> believed_path() const { return filter->hypothesis(0).path; }
-
-  // All but the filter, which is behind an interface.
-  template <typename Archive>
-  static void Members(Archive& archive, auto& self) {
-    archive(self.trail, self.front_end, self.blind, self.speed, self.loops, self.self_check, self.drawing, self.level);
-  }
-
-  // The last scan that was not tilted.
-  struct LevelScan {
-    ScanOutcome outcome;
-    Pose2 T_keyframe_robot;
-    Pose2 T_odom_robot;
-
-    template <typename Archive>
-    static void Members(Archive& archive, auto& self) {
-      archive(self.outcome, self.T_keyframe_robot, self.T_odom_robot);
-    }
-  };
-
-  // Whether the parts fit together after reading.
-  [[nodiscard]] bool IsConsistent() const;
-
-  const MapperOptions options;
-  FrontEnd front_end;
-  BlindMotion blind;
-  ConstantSpeed speed;  // Speed of the motion from keyframe to keyframe.
-  Trail trail;
-  RevisitSearch revisits;
-  std::unique_ptr<Filter> filter;
-  LoopSearch loops;
-  SelfCheck self_check;
-  MapDrawing drawing;
-  LevelScan level;
-};
-
 Mapper::Mapper(const MapperOptions& options, const Pose2& T_map_robot_start, std::uint64_t seed)
     : state_(std::make_unique<State>(options, T_map_robot_start, seed)) {}
 Mapper::~Mapper() = default;
@@ -86,29 +22,36 @@ Mapper::Mapper(Mapper&&) noexcept = default;
 Mapper& Mapper::operator=(Mapper&&) noexcept = default;
 
 ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot,
-                            const ParallelFor& parallel_for) {
+                            const ParallelFor& parallel_for, Passage passage) {
   State& s = *state_;
   const Stamp stamp = scan->stamp;
-  if (IsTilted(*scan, s.options.max_tilt_rad)) return s.Coast(stamp, T_odom_robot);
+  const bool tilted = IsTilted(*scan, s.options.max_tilt_rad);
+  if (!s.options.front_end.use_odometry) passage = std::min(passage, Passage::kPaused);
+  if (passage == Passage::kUnknown || (passage == Passage::kPaused && tilted)) s.LosePlace(passage == Passage::kPaused);
+  if (tilted) return s.Coast(stamp, T_odom_robot);
 
   if (s.drawing.redrawing()) s.drawing.Continue(s.trail.keyframes(), s.believed_path());
 
   ScanView view = Look(*scan, s.options.front_end);
+  TrackStep step = s.front_end.Track(view, T_odom_robot, parallel_for);
+  if (passage == Passage::kPaused && !s.StoodStill(*scan, T_odom_robot, step))
+    step = s.DoubtPlace(view, T_odom_robot, step, parallel_for);
+  s.last_scan = State::LastScan{scan, T_odom_robot, step.T_track_robot};
+  if (s.recovery.active()) return s.Recover({std::move(scan), T_odom_robot}, std::move(view), step, parallel_for);
 
-  const TrackStep step = s.front_end.Track(view, T_odom_robot, parallel_for);
   s.blind.Add(step, s.trail.empty() ? Pose2{} : s.trail.shapes().back().T_track_robot);
-
   const bool keyframe = s.trail.empty() || MovedEnough(s.trail.FromLast(step.T_track_robot), s.options.gate);
-  if (keyframe) s.AddKeyframe({std::move(scan), T_odom_robot}, std::move(view), step, parallel_for);
-
+  if (keyframe) {
+    s.front_end.AddKeyframe(view);
+    s.AddKeyframe({std::move(scan), T_odom_robot}, std::move(view), step, s.blind.TakeCovariance(), parallel_for);
+  }
   return s.Report(stamp, T_odom_robot, step, keyframe);
 }
 
 // Adds a scan with enough new content to the filter, the loops and the map.
 void Mapper::State::AddKeyframe(Keyframe keyframe, ScanView view, const TrackStep& step,
-                                const ParallelFor& parallel_for) {
+                                const Eigen::Matrix3d& step_covariance, const ParallelFor& parallel_for) {
   const double travelled_m = trail.TravelledTo(step.T_track_robot);
-  const Eigen::Matrix3d step_covariance = blind.TakeCovariance();
   const bool placed_before = filter->placed();
 
   std::optional<RevisitObservation> revisit;
@@ -120,7 +63,6 @@ void Mapper::State::AddKeyframe(Keyframe keyframe, ScanView view, const TrackSte
   filter->Observe(KeyframeSight{*keyframe.scan, view, step.T_track_robot, travelled_m}, parallel_for);
   filter->Commit();
 
-  front_end.AddKeyframe(view);
   trail.Append(std::move(keyframe), step.T_track_robot, std::move(view.points_robot), step_covariance, revisit);
 
   CloseLargeLoop();
@@ -134,7 +76,8 @@ StepMotion Mapper::State::MotionTo(const Keyframe& keyframe, const TrackStep& st
   const Keyframe& last = trail.keyframes().back();
   const double seconds = 1e-9 * static_cast<double>(NanosBetween(last.scan->stamp, keyframe.scan->stamp));
   StepMotion motion{trail.FromLast(step.T_track_robot), covariance};
-  if (options.front_end.use_odometry) motion.T_prev_curr_odom = Between(last.T_odom_robot, keyframe.T_odom_robot);
+  if (options.front_end.use_odometry && !step.found)
+    motion.T_prev_curr_odom = Between(last.T_odom_robot, keyframe.T_odom_robot);
   motion.lambda_m = std::abs(speed.Forecast(seconds).x);
   speed.Moved(motion.T_prev_curr, seconds);
   return motion;
@@ -197,6 +140,10 @@ PoseReason Mapper::State::ReasonOf(const TrackStep& step) const {
 // A tilted scan is not matched: its pose is the one to which odometry has taken the robot since the last
 // level scan.
 ScanOutcome Mapper::State::Coast(Stamp stamp, const Pose2& T_odom_robot) {
+  if (recovery.active()) {
+    const Pose2 moved = options.front_end.use_odometry ? Between(last_scan->T_odom_robot, T_odom_robot) : Pose2{};
+    return ReportRecovery(stamp, T_odom_robot, last_scan->T_track_robot * moved);
+  }
   ScanOutcome outcome = level.outcome;
   outcome.stamp = stamp;
   outcome.keyframe = false;
@@ -280,6 +227,7 @@ void Mapper::Load(StateReader& archive) {
 bool Mapper::State::IsConsistent() const {
   for (std::size_t i = 0; i < filter->hypothesis_count(); ++i)
     if (filter->hypothesis(i).path.size() != trail.size()) return false;
+  if (recovery.active() && (trail.empty() || !last_scan)) return false;
   return drawing.path().size() == (filter->placed() ? trail.size() : 0);
 }
 

@@ -49,7 +49,10 @@ class Mapper {
   Mapper& operator=(Mapper&&) noexcept;
 
   // `T_odom_robot` is the odometry at the scan's stamp. A scan whose pose is not localized is drawn into no map.
-  ScanOutcome Process(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot, const ParallelFor& parallel_for);
+  // `passage` is what lies between this scan and the one before it. Where that is a pause in which the scan does not
+  // agree with the map, or is not known, the robot is not localized until it has been found in its map (recovery.h).
+  ScanOutcome Process(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot, const ParallelFor& parallel_for,
+                      Passage passage = Passage::kDriven);
 
   // It has as many keyframes, or its map as many chunks, as the options allow: it takes no more scans.
   [[nodiscard]] bool full() const;

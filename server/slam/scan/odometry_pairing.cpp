@@ -1,6 +1,7 @@
 #include "server/slam/scan/odometry_pairing.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -8,6 +9,11 @@
 
 namespace cairn::slam {
 namespace {
+
+// Odometry after a time that is not known, or in which no sample came, goes on if it has changed by less than this. A
+// robot that was switched off for a night may have driven anywhere; its odometry would be plausible after any distance.
+constexpr double kSamePlaceM = 1.0;
+constexpr double kSameHeadingRad = 1.0;
 
 // The time assumed between the last scan of a clock and the first one after the clock was set back, because the true
 // time is not known.
@@ -39,6 +45,12 @@ void Visit(OptionVisitor& visitor, PairingOptions& options) {
                   "Scans that may wait for odometry. When there are more, the oldest is dropped.");
   visitor.Integer("max_odometry", options.max_odometry, "samples", 2, 100000,
                   "Odometry samples that are kept for later scans. When there are more, the oldest is dropped.");
+  visitor.Real("max_pause_s", options.max_pause_s, "s", 0.1, 1e7,
+               "After a longer time between two scans the robot counts as localized only if its scan agrees with its "
+               "map where odometry says that it is.");
+  visitor.Real("max_speed_m_s", options.max_speed_m_s, "m/s", 0.1, 1000.0,
+               "Odometry that moves faster, by a metre or more, has begun anew. The place of the robot is then not "
+               "known.");
   visitor.Require(options.max_gap_s <= options.max_stamp_jump_s, "max_gap_s", "must not exceed", "max_stamp_jump_s");
 }
 
@@ -65,6 +77,7 @@ void OdometryPairing::Add(const Odometry& odometry) {
 }
 
 void OdometryPairing::NewClient() {
+  BeginAnew(Passage::kPaused);
   scan_gate_.NewClient();
   odometry_gate_.NewClient();
 }
@@ -80,6 +93,9 @@ void OdometryPairing::Take(std::shared_ptr<const Scan>&& scan) {
 }
 
 void OdometryPairing::Take(const Odometry& odometry) {
+  if (newest_ && !Follows(odometry)) BeginAnew(Passage::kUnknown);
+  newest_ = odometry;
+  time_known_ = true;
   odometry_.push_back(odometry);
   // Flush runs before a sample is dropped, because a waiting scan may need the oldest samples.
   Flush();
@@ -87,8 +103,25 @@ void OdometryPairing::Take(const Odometry& odometry) {
 }
 
 void OdometryPairing::ClockSetBack() {
+  BeginAnew(Passage::kPaused);
+}
+
+// What came before cannot be joined with what comes now.
+void OdometryPairing::BeginAnew(Passage passage) {
   for (const auto& scan : std::exchange(scans_, {})) sink_.dropped(*scan, DropReason::kNoOdometry);
   odometry_.clear();
+  passage_ = std::max(passage_, passage);
+  time_known_ = false;
+}
+
+// Whether this may be the odometry of the same drive as the sample before.
+bool OdometryPairing::Follows(const Odometry& odometry) const {
+  const Pose2 moved = Between(newest_->T_odom_robot, odometry.T_odom_robot);
+  const double moved_m = moved.translation().norm();
+  const std::uint64_t passed_ns = NanosBetween(newest_->stamp, odometry.stamp);
+  if (!time_known_ || passed_ns > Nanos(options_.max_gap_s))
+    return moved_m <= kSamePlaceM && std::abs(moved.theta) <= kSameHeadingRad;
+  return moved_m <= kSamePlaceM + options_.max_speed_m_s * 1e-9 * static_cast<double>(passed_ns);
 }
 
 void OdometryPairing::Pair(const std::shared_ptr<const Scan>& scan, const Pose2& T_odom_robot) {
@@ -99,8 +132,12 @@ void OdometryPairing::Pair(const std::shared_ptr<const Scan>& scan, const Pose2&
     stamp = *last_paired_ + kIntervalNs;
     set_back_ns_ = static_cast<std::uint64_t>(stamp) - robot_time;
   }
+  if (last_paired_ && NanosBetween(*last_paired_, stamp) > Nanos(options_.max_pause_s))
+    passage_ = std::max(passage_, Passage::kPaused);
+  // Before the first pair nothing is known that could be lost.
+  if (!last_paired_) passage_ = Passage::kDriven;
   last_paired_ = stamp;
-  sink_.paired({scan, WithoutMotion(scan), T_odom_robot, stamp});
+  sink_.paired({scan, WithoutMotion(scan), T_odom_robot, stamp, std::exchange(passage_, Passage::kDriven)});
 }
 
 // Whether odometry covers the whole scan.

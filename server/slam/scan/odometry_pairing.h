@@ -4,9 +4,11 @@
 // decisions depend on stamps alone, so the same two streams give the same pairs however they interleave, as
 // long as no bound is reached and no clock is set back. When a clock is set back, waiting scans are dropped, because
 // scans and odometry of two clocks cannot be joined; the time of the estimator still grows (PairedScan::stamp).
-// Memory is bounded. Not thread-safe.
+// It also says what lies between a pair and the one before it (Passage): a pause, and odometry that cannot be that of
+// one drive. Memory is bounded. Not thread-safe.
 #pragma once
 
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -26,14 +28,24 @@ struct PairingOptions {
   std::int64_t jump_confirmations = 5;
   std::int64_t max_waiting_scans = 64;
   std::int64_t max_odometry = 1024;  // A scan that takes longer than so many samples cannot be used.
+  double max_pause_s = 5.0;
+  double max_speed_m_s = 3.0;
 };
 void Visit(OptionVisitor& visitor, PairingOptions& options);
+
+// What lies between a scan and the one before it. Of two, the larger counts.
+enum class Passage : std::uint8_t {
+  kDriven = 0,  // The robot was watched all the way.
+  kPaused,      // Scans are missing, but odometry says how the robot moved meanwhile, as far as can be told.
+  kUnknown,     // The odometry began anew or jumped: nothing says where the robot is now.
+};
 
 struct PairedScan {
   std::shared_ptr<const Scan> scan;      // As it was added.
   std::shared_ptr<const Scan> at_stamp;  // The same with all beams at its stamp, for estimation.
   Pose2 T_odom_robot;
   Stamp stamp = 0;  // The scan's, plus what the robot's clock was set back by: grows from pair to pair.
+  Passage passage = Passage::kDriven;
 };
 
 class OdometryPairing {
@@ -50,7 +62,8 @@ class OdometryPairing {
   // Both functions may call the sink, for this scan or for waiting ones, in the order of their stamps.
   void Add(std::shared_ptr<const Scan> scan);
   void Add(const Odometry& odometry);
-  // From now on both streams come from another client, which numbers from the beginning.
+  // From now on both streams come from another client, which numbers from the beginning. Nobody has watched the robot
+  // since the last sample, for a time that no clock tells. Scans that still wait for odometry are dropped.
   void NewClient();
   // Call this when no more odometry will come. A waiting scan that began before the last sample is paired as usual, and
   // the robot is taken to stand after that sample. A later scan is paired with the last sample if that is at most
@@ -69,8 +82,9 @@ class OdometryPairing {
 
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
-    archive(self.scans_, self.odometry_, self.last_paired_, self.set_back_ns_, self.odometry_refused_, self.scan_gate_,
-            self.odometry_gate_);
+    archive(self.scans_, self.odometry_, self.last_paired_, self.set_back_ns_, self.odometry_refused_, self.passage_,
+            self.newest_, self.time_known_, self.scan_gate_, self.odometry_gate_);
+    archive.Require(self.passage_ <= Passage::kUnknown, "a passage");
   }
 
  private:
@@ -80,6 +94,8 @@ class OdometryPairing {
   [[nodiscard]] bool Covers(const Scan& scan) const;
   void PairOrDrop(const std::shared_ptr<const Scan>& scan);
   [[nodiscard]] std::shared_ptr<const Scan> WithoutMotion(const std::shared_ptr<const Scan>& scan) const;
+  void BeginAnew(Passage passage);
+  [[nodiscard]] bool Follows(const Odometry& odometry) const;
   void Flush();
   void Pair(const std::shared_ptr<const Scan>& scan, const Pose2& T_odom_robot);
 
@@ -90,6 +106,9 @@ class OdometryPairing {
   std::optional<Stamp> last_paired_;  // In the estimator's time.
   std::uint64_t set_back_ns_ = 0;     // The estimator's time less the robot's, modulo 2^64.
   std::uint64_t odometry_refused_ = 0;
+  Passage passage_ = Passage::kDriven;  // Since the last pair, as far as it is known.
+  std::optional<Odometry> newest_;      // The last sample taken, of any clock or client,
+  bool time_known_ = true;              // and whether the time since then is known.
   StampGate<std::shared_ptr<const Scan>> scan_gate_;
   StampGate<Odometry> odometry_gate_;
 };

@@ -279,6 +279,25 @@ void FrontEnd::AddKeyframe(const ScanView& view) {
   BuildIndices();
 }
 
+void FrontEnd::Restart() {
+  score_ = 0.0;
+  keyframe_ = {};
+  keyframe_view_ = {};
+  history_.clear();
+  reference_.clear();
+  BuildIndices();
+}
+
+void FrontEnd::MoveTo(const Pose2& T_new_old) {
+  keyframe_.T_track_robot = T_new_old * keyframe_.T_track_robot;
+  for (Sight& sight : history_) sight.T_track_robot = T_new_old * sight.T_track_robot;
+  for (auto& points : reference_) {
+    const std::vector<SurfacePoint> points_old = std::exchange(points, {});
+    AppendMoved(T_new_old, points_old, points);
+  }
+  BuildIndices();
+}
+
 void FrontEnd::BuildIndices() {
   index_.Clear();
   for (const auto& points : reference_)

@@ -65,10 +65,17 @@ struct TrackStep {
   bool matched = false;     // False if the pose comes from odometry or from the forecast.
   bool degenerate = false;  // True in a corridor: the scan does not show the position along it.
   double moved_m = 0.0;     // Distance travelled since the previous scan.
+  bool found = false;       // The step leads to where the robot was found again; odometry does not know it.
   // Covariance of the part of the step that neither a scan nor odometry measured (the direction along a
   // corridor, or a scan without a match), along the axes of `track`. It is zero if odometry is used:
   // BlindMotion accounts for that case.
   Eigen::Matrix3d forecast_covariance = Eigen::Matrix3d::Zero();
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.T_track_robot, self.score, self.matched, self.degenerate, self.moved_m, self.found,
+            self.forecast_covariance);
+  }
 };
 
 class FrontEnd {
@@ -79,6 +86,10 @@ class FrontEnd {
   TrackStep Track(const ScanView& view, const Pose2& T_odom_robot, const ParallelFor& parallel_for);
   // Makes the scan just tracked part of the reference.
   void AddKeyframe(const ScanView& view);
+  // Forgets all scans: the next one is at the identity again.
+  void Restart();
+  // Expresses everything in another frame `new`; the old one is `old`.
+  void MoveTo(const Pose2& T_new_old);
 
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {

@@ -35,6 +35,10 @@ FakeServer::~FakeServer() {
   subscriptions_.clear();
 }
 
+void FakeServer::SetLocalized(bool localized) {
+  localized_ = localized;
+}
+
 void FakeServer::SetSettling(bool settling) {
   const MutexLock lock(mutex_);
   settling_ = settling;
@@ -169,7 +173,8 @@ void FakeServer::OnScan(ScanSample&& sample) {
   pose.stamp = sample.scan.stamp;
   pose.scan_sequence = sample.scan.sequence;
   pose.generation = generation_;
-  pose.reason = PoseReason::kTracking;
+  pose.localized = localized_;
+  pose.reason = localized_ ? PoseReason::kTracking : PoseReason::kLost;
   Must(poses_->Publish(pose));
 }
 

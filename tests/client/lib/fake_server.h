@@ -2,6 +2,7 @@
 // not do (settle, answer) can be switched off, to see how clients wait.
 #pragma once
 
+#include <atomic>
 #include <map>
 #include <memory>
 #include <set>
@@ -20,6 +21,7 @@ class FakeServer {
 
   // A stopped server receives scans but settles none; resuming settles all it has.
   void SetSettling(bool settling);
+  void SetLocalized(bool localized);  // Whether its poses are.
   // The server says that it stores; nothing is on disk until SetDurableThrough.
   void SetDurable(bool durable);
   void SetDurableThrough(std::uint64_t sequence);
@@ -65,6 +67,7 @@ class FakeServer {
 
   mutable Mutex mutex_;
   bool settling_ CAIRN_GUARDED_BY(mutex_) = true;
+  std::atomic<bool> localized_ = true;
   bool durable_ CAIRN_GUARDED_BY(mutex_) = false;
   std::uint64_t durable_through_ CAIRN_GUARDED_BY(mutex_) = 0;
   bool answering_ CAIRN_GUARDED_BY(mutex_) = true;

@@ -176,6 +176,30 @@ TEST_F(RobotClientTest, OpensANewSessionWhereTheRobotIsIfTheServerForgotIt) {
   EXPECT_NEAR(last.T_map_robot_start.x, 1.0, 1e-9);
 }
 
+// It gave the last pose, of a robot that was lost, as its start, and the server believed it.
+TEST_F(RobotClientTest, ALostRobotGivesNoStartToTheNextServer) {
+  server_->SetLocalized(false);
+  SessionRequest request = Robot("r1");
+  request.has_start = true;
+  request.T_map_robot_start = {10, 0, 0};
+  const auto client = Must(RobotClient::Open(*bus_, request, 20.0));
+  ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = 0, .T_odom_robot = {5, 0, 0}}));
+  Scan scan = SomeScan();
+  scan.stamp = 100;
+  ASSERT_TRUE(client->Publish(scan));
+  ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = 200, .T_odom_robot = {6, 0, 0}}));
+  ASSERT_TRUE(Eventually([&] { return client->pose().has_value(); }));
+  server_->SetSettling(false);
+  scan.stamp = 150;
+  ASSERT_TRUE(client->Publish(scan));
+  ASSERT_TRUE(Eventually([&] { return server_->received().size() == 2; }));
+  server_.reset();
+  server_ = std::make_unique<FakeServer>(LoopbackOptions(), 2);
+  ASSERT_TRUE(client->WaitSettled(20.0));
+  EXPECT_EQ(client->restarted(), 1);
+  EXPECT_FALSE(server_->sessions().back().has_start);
+}
+
 TEST_F(RobotClientTest, WithoutAPoseTheFirstStartIsCarriedOnByTheOdometry) {
   SessionRequest request = Robot("r1");
   request.has_start = true;

@@ -1,0 +1,174 @@
+#include "server/slam/loops/place_search.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <unordered_set>
+#include <utility>
+
+namespace cairn::slam {
+namespace {
+
+// A whole map is searched: cells twice as large as for a loop, and levels up to blocks of 13 m.
+constexpr double kCoarser = 2.0;
+constexpr int kMapLevels = 7;
+constexpr std::size_t kMaxSample = 250;     // Points of the recent scans that are searched with.
+constexpr std::size_t kMinSurfaces = 20;    // On either side; with fewer nothing is found.
+constexpr double kMapReach_m = 300.0;       // Of the map around the last known place: bounds memory and time.
+constexpr double kMinPlaceExplained = 0.7;  // Share of the recent surfaces that must lie on surfaces of the map.
+constexpr int kMinCompared = 20;            // Points that must be compared for an agreement to count.
+constexpr std::size_t kNearKeyframes = 4;   // Old keyframes that a scan is compared with, ...
+constexpr double kApartM = 1.0;             // ... so far apart along the path.
+// As in LoopSearch and SelfCheck.
+constexpr double kCellM = 0.1;
+constexpr double kReachM = 0.3;
+constexpr double kMinLikelihoodOfPlace = 0.5;
+constexpr double kRivalM = 1.0;
+constexpr double kRivalRad = 0.3;
+constexpr double kMaxComparedM = 4.0;
+constexpr double kMaxComparedRangeM = 10.0;
+// Largest share of the points compared that may contradict a place. In the worlds of the study `moved` true places have
+// 0.00, and false ones, which look like them, from 0.05 on.
+constexpr double kMaxConflictOfPlace = 0.03;
+constexpr double kPlaceSigmaRad = 0.01;
+
+// The points of one cell on a raster are represented by the first of them.
+class OnePerCell {
+ public:
+  explicit OnePerCell(double cell_m) : cell_m_(cell_m) {}
+  bool Takes(const Eigen::Vector2d& p) {
+    const auto x = static_cast<std::int64_t>(std::floor(p.x() / cell_m_));
+    const auto y = static_cast<std::int64_t>(std::floor(p.y() / cell_m_));
+    return taken_.insert((x << 32) ^ (y & 0xffffffff)).second;
+  }
+
+ private:
+  double cell_m_;
+  std::unordered_set<std::int64_t> taken_;
+};
+
+std::vector<Eigen::Vector2d> SampleForSearch(const std::vector<SurfacePoint>& surfaces) {
+  const std::size_t stride = surfaces.size() / kMaxSample + 1;
+  std::vector<Eigen::Vector2d> points;
+  for (std::size_t i = 0; i < surfaces.size(); i += stride) points.push_back(surfaces[i].p);
+  return points;
+}
+
+// The surface points of the scans, one per cell, in the frame of the last scan.
+std::vector<SurfacePoint> SurfacesOf(std::span<const RecentScan> recent, double cell_m) {
+  std::vector<SurfacePoint> surfaces;
+  OnePerCell cells(cell_m);
+  for (const RecentScan& one : recent) {
+    const Pose2 T_last_robot = Between(recent.back().T_track_robot, one.T_track_robot);
+    const Eigen::Matrix2d R = T_last_robot.rotation();
+    for (const SurfacePoint& point : one.points) {
+      const Eigen::Vector2d p = R * point.p + T_last_robot.translation();
+      if (cells.Takes(p)) surfaces.push_back({p, R * point.normal});
+    }
+  }
+  return surfaces;
+}
+
+SearchWindow WindowOver(const std::vector<SurfacePoint>& surfaces) {
+  Eigen::AlignedBox2d box;
+  for (const SurfacePoint& surface : surfaces) box.extend(surface.p);
+  const Eigen::Vector2d centre = box.center();
+  return {{centre.x(), centre.y(), 0.0}, 0.5 * box.sizes().maxCoeff(), kPi};
+}
+
+}  // namespace
+
+PlaceSearch::Map::Map(std::vector<SurfacePoint> given, double index_cell_m)
+    : surfaces(std::move(given)),
+      pyramid(surfaces, kCoarser * kCellM, kCoarser * kReachM, kMapLevels),
+      index(index_cell_m),
+      window(WindowOver(surfaces)) {
+  for (const SurfacePoint& surface : surfaces) index.Add(surface);
+}
+
+PlaceSearch::PlaceSearch(const LoopOptions& loop, const SelfCheckOptions& check, const PointToLineOptions& align)
+    : options_(loop), check_(check), align_(align) {
+  align_.min_score = kMinPlaceExplained;
+}
+
+// Without keyframes whose place was not known.
+std::vector<SurfacePoint> PlaceSearch::SurfacesOfMap(const Trail& trail, const SharedSequence<Pose2>& path) const {
+  std::vector<SurfacePoint> surfaces;
+  OnePerCell cells(0.5 * kCellM);
+  const Eigen::Vector2d last = path[trail.size() - 1].translation();
+  for (std::size_t k = 0; k < trail.size(); ++k) {
+    const Pose2& T_map_k = path[k];
+    if (!trail.keyframes()[k].localized) continue;
+    if ((T_map_k.translation() - last).cwiseAbs().maxCoeff() > kMapReach_m) continue;
+    const Eigen::Matrix2d R = T_map_k.rotation();
+    for (const SurfacePoint& point : trail.points(k)) {
+      const Eigen::Vector2d p = R * point.p + T_map_k.translation();
+      if (cells.Takes(p)) surfaces.push_back({p, R * point.normal});
+    }
+  }
+  return surfaces;
+}
+
+std::optional<FoundPlace> PlaceSearch::Find(const Trail& trail, const SharedSequence<Pose2>& path,
+                                            std::span<const RecentScan> recent) {
+  if (!map_) map_ = std::make_shared<const Map>(SurfacesOfMap(trail, path), align_.first_pair_distance_m);
+  if (recent.empty() || map_->surfaces.size() < kMinSurfaces) return std::nullopt;
+  const std::vector<SurfacePoint> surfaces = SurfacesOf(recent, kCoarser * kCellM);
+  if (surfaces.size() < kMinSurfaces) return std::nullopt;
+  const std::vector<Eigen::Vector2d> sample = SampleForSearch(surfaces);
+  const auto peak = FindBestPose(sample, map_->pyramid, map_->window, kMinLikelihoodOfPlace);
+  if (!peak || !peak->complete) return std::nullopt;
+  const Exclusion exclusion{peak->T_ref_curr, kRivalM, kRivalRad};
+  if (FindBestPose(sample, map_->pyramid, map_->window, options_.max_rival * peak->score, exclusion))
+    return std::nullopt;
+  return Fit(trail, path, recent, surfaces, peak->T_ref_curr, Eigen::Vector3d(0.25, 0.25, 0.01).asDiagonal());
+}
+
+std::optional<FoundPlace> PlaceSearch::Fit(const Trail& trail, const SharedSequence<Pose2>& path,
+                                           std::span<const RecentScan> recent,
+                                           const std::vector<SurfacePoint>& surfaces, const Pose2& T_map_robot,
+                                           const Eigen::Matrix3d& covariance) const {
+  const MatchResult match =
+      AlignPointsToSurfaces(surfaces, map_->index, {T_map_robot, T_map_robot, covariance}, align_);
+  if (!match.converged || match.degenerate) return std::nullopt;
+  // Every one of the scans, not only the last ones: a place that looks like the true one differs from it somewhere.
+  VisibilityCounts all;
+  for (const RecentScan& one : recent) {
+    const Pose2 T_map_one = match.T_ref_curr * Between(recent.back().T_track_robot, one.T_track_robot);
+    const VisibilityCounts counts = Visible(trail, path, *one.scan, one.points, T_map_one);
+    all += counts;
+    if (&one == &recent.back() && counts.known() < kMinCompared) return std::nullopt;
+  }
+  if (all.contradicted > kMaxConflictOfPlace * all.known()) return std::nullopt;
+  return FoundPlace{match.T_ref_curr, match.covariance + PoseCovariance(options_.sigma_m, kPlaceSigmaRad)};
+}
+
+VisibilityCounts PlaceSearch::Visible(const Trail& trail, const SharedSequence<Pose2>& path, const Scan& scan,
+                                      const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const {
+  const std::span<const KeyframeShape> shapes = trail.shapes();
+  std::vector<KeyframeCost> near;
+  for (std::size_t k = 0; k < shapes.size(); ++k) {
+    const double distance_m = (path[k].translation() - T_map_robot.translation()).norm();
+    if (!trail.keyframes()[k].localized || distance_m > kMaxComparedM) continue;
+    near.push_back({k, distance_m + std::abs(AngleDiff(path[k].theta, T_map_robot.theta))});
+  }
+  VisibilityCounts counts;
+  for (const std::size_t k : BestPlaces(std::move(near), shapes, kApartM, kNearKeyframes)) {
+    const Pose2 T_old_now = Between(path[k], T_map_robot);
+    counts += CompareVisibility(*trail.keyframes()[k].scan, T_old_now, points_robot, check_.near_m, kMaxComparedRangeM);
+    counts += CompareVisibility(scan, T_old_now.Inverse(), trail.points(k), check_.near_m, kMaxComparedRangeM);
+  }
+  return counts;
+}
+
+PlaceSearch::Agreement PlaceSearch::Compare(const Trail& trail, const SharedSequence<Pose2>& path, const Scan& scan,
+                                            const std::vector<SurfacePoint>& points_robot,
+                                            const Pose2& T_map_robot) const {
+  const VisibilityCounts counts = Visible(trail, path, scan, points_robot, T_map_robot);
+  if (counts.known() < kMinCompared) return Agreement::kNothingNear;
+  // As the self-check judges a pose that was wrong before.
+  const bool contradicted = counts.contradicted > 0.5 * check_.max_conflict * counts.known();
+  return contradicted ? Agreement::kContradicts : Agreement::kAgrees;
+}
+
+}  // namespace cairn::slam

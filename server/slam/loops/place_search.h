@@ -1,0 +1,84 @@
+// Finds the robot in the map that it has made itself, without knowing anything of where it is: after scans are missing
+// and odometry does not tell how the robot moved meanwhile, or after somebody carried it. The last scans are compared
+// with all surfaces of the path. A place is found only if no other place fits nearly as well, if most of the scans is
+// explained, and if no surface lies where beams passed. Where rooms look alike there is no such place. It prefers
+// finding nothing to finding a wrong place, but cannot know of places that it has never seen: a room that looks like
+// one of the map, and is not in it, is taken for it.
+// Frames: surfaces in `map`; recent scans in any frame that is smooth over their stretch. Not thread-safe.
+// Deterministic.
+// Source: as LoopSearch (loop_search.h), over the whole map at once; visibility.h.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "server/slam/loops/loop_search.h"
+#include "server/slam/loops/region_search.h"
+#include "server/slam/loops/self_check.h"
+#include "server/slam/trail/shared_sequence.h"
+#include "server/slam/trail/trail.h"
+
+namespace cairn::slam {
+
+// One of the last scans of a robot whose place is not known.
+struct RecentScan {
+  std::shared_ptr<const Scan> scan;
+  Pose2 T_track_robot;
+  double travelled_m = 0.0;
+  std::vector<SurfacePoint> points;  // In the robot's frame. They follow from the scan and are not stored.
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.scan, self.T_track_robot, self.travelled_m);
+    if constexpr (Archive::kReads) archive.Require(self.scan != nullptr, "one of the last scans");
+  }
+};
+
+struct FoundPlace {
+  Pose2 T_map_robot;  // At the last scan.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
+};
+
+class PlaceSearch {
+ public:
+  // Shares the options of large loops and of the self-check, so that a place is judged alike everywhere.
+  PlaceSearch(const LoopOptions& loop, const SelfCheckOptions& check, const PointToLineOptions& align);
+
+  // The place of the last of the scans, which are in the order of time. `path` is the believed path, one pose
+  // T_map_robot per keyframe. REQUIRES: neither the trail nor the path changes between two calls, unless Forget is
+  // called.
+  [[nodiscard]] std::optional<FoundPlace> Find(const Trail& trail, const SharedSequence<Pose2>& path,
+                                               std::span<const RecentScan> recent);
+  void Forget() { map_.reset(); }
+
+  // How a scan at this pose agrees with old keyframes near it.
+  enum class Agreement { kNothingNear, kAgrees, kContradicts };
+  [[nodiscard]] Agreement Compare(const Trail& trail, const SharedSequence<Pose2>& path, const Scan& scan,
+                                  const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const;
+
+ private:
+  [[nodiscard]] VisibilityCounts Visible(const Trail& trail, const SharedSequence<Pose2>& path, const Scan& scan,
+                                         const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const;
+  struct Map {
+    Map(std::vector<SurfacePoint> surfaces, double index_cell_m);
+    std::vector<SurfacePoint> surfaces;
+    LikelihoodPyramid pyramid;
+    PointIndex index;
+    SearchWindow window;  // All of the map, in every heading.
+  };
+  // The pose near this one at which everything fits.
+  [[nodiscard]] std::optional<FoundPlace> Fit(const Trail& trail, const SharedSequence<Pose2>& path,
+                                              std::span<const RecentScan> recent,
+                                              const std::vector<SurfacePoint>& surfaces, const Pose2& T_map_robot,
+                                              const Eigen::Matrix3d& covariance) const;
+  [[nodiscard]] std::vector<SurfacePoint> SurfacesOfMap(const Trail& trail, const SharedSequence<Pose2>& path) const;
+
+  LoopOptions options_;
+  SelfCheckOptions check_;
+  PointToLineOptions align_;
+  std::shared_ptr<const Map> map_;  // Made at the first search.
+};
+
+}  // namespace cairn::slam

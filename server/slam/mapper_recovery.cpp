@@ -1,0 +1,142 @@
+// The part of the mapper that follows a robot whose place is not certain.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "server/slam/mapper_state.h"
+#include "server/slam/scan/beam_points.h"
+
+namespace cairn::slam {
+namespace {
+
+// A robot stood still if its odometry has changed by less, and so many of the beams show what they showed before.
+constexpr double kStillM = 0.02;
+constexpr double kStillRad = 0.02;
+constexpr double kSameRangeM = 0.1;
+constexpr double kSameRangePerM = 0.01;
+constexpr double kUnchanged = 0.95;
+constexpr double kUnchangedAlongCorridor = 0.98;  // Most beams show the same everywhere along it.
+
+bool LookAlike(const Scan& a, const Scan& b, double least) {
+  if (a.ranges_m.size() != b.ranges_m.size() || a.angle_first_rad != b.angle_first_rad) return false;
+  std::size_t compared = 0, same = 0;
+  for (std::size_t i = 0; i < a.ranges_m.size(); ++i) {
+    const BeamClass class_a = ClassifyRange(a.ranges_m[i], a.range_min_m, a.range_max_m),
+                    class_b = ClassifyRange(b.ranges_m[i], b.range_min_m, b.range_max_m);
+    if (class_a != BeamClass::kHit && class_b != BeamClass::kHit) continue;
+    ++compared;
+    const double difference_m = std::abs(static_cast<double>(a.ranges_m[i]) - b.ranges_m[i]);
+    same += class_a == class_b && difference_m < kSameRangeM + kSameRangePerM * a.ranges_m[i] ? 1 : 0;
+  }
+  return compared > 0 && static_cast<double>(same) >= least * static_cast<double>(compared);
+}
+
+}  // namespace
+
+// From now on the robot has to be found again.
+void Mapper::State::LosePlace(bool odometry_goes_on) {
+  if (!HasMap()) return;
+  if (!recovery.active()) {
+    recovery.Begin(LastKnown(), odometry_goes_on);
+  } else if (!odometry_goes_on) {
+    recovery.OdometryBeganAnew();
+  }
+  recovery.ForgetScans();
+  front_end.Restart();
+}
+
+// Whether nothing at all has changed since the last scan: nobody has moved the robot.
+bool Mapper::State::StoodStill(const Scan& scan, const Pose2& T_odom_robot, const TrackStep& step) const {
+  if (!last_scan || !step.matched) return false;
+  const Pose2 moved = options.front_end.use_odometry ? Between(last_scan->T_odom_robot, T_odom_robot) : Pose2{};
+  return moved.translation().norm() < kStillM && std::abs(moved.theta) < kStillRad &&
+         LookAlike(*last_scan->scan, scan, step.degenerate ? kUnchangedAlongCorridor : kUnchanged);
+}
+
+// Nobody watched the robot before this scan. If the scan goes on where the last ones ended, as far as it shows, the
+// robot is probably still on its path, but has to prove it; otherwise it has to be found.
+TrackStep Mapper::State::DoubtPlace(const ScanView& view, const Pose2& T_odom_robot, const TrackStep& step,
+                                    const ParallelFor& parallel_for) {
+  if (!HasMap()) return step;
+  if (!recovery.active() && step.matched) {
+    const Pose2 T_map_track = believed_path()[trail.size() - 1] * trail.shapes().back().T_track_robot.Inverse();
+    recovery.BeginOnPath(LastKnown(), T_map_track);
+    return step;
+  }
+  LosePlace(true);
+  return front_end.Track(view, T_odom_robot, parallel_for);
+}
+
+// Follows a robot whose place is not certain, until it is proved.
+ScanOutcome Mapper::State::Recover(Keyframe keyframe, ScanView view, TrackStep step, const ParallelFor& parallel_for) {
+  const Stamp stamp = keyframe.scan->stamp;
+  const Pose2 T_odom_robot = keyframe.T_odom_robot;
+  if (!step.matched) {
+    recovery.ForgetScans();
+    front_end.Restart();
+    step = front_end.Track(view, T_odom_robot, parallel_for);
+    last_scan->T_track_robot = step.T_track_robot;
+  }
+  const bool first = !recovery.has_scans();
+  const bool on_path = recovery.on_path();
+  const Pose2 T_track_kept = on_path ? trail.shapes().back().T_track_robot : step.T_track_robot;
+  const Pose2 T_track_last = recovery.LastKept(T_track_kept);
+  const bool keep = MovedEnough(Between(T_track_last, step.T_track_robot), options.gate) || (first && !on_path);
+  if (keep) front_end.AddKeyframe(view);
+  if (on_path) {
+    blind.Add(step, T_track_last);
+    if (keep) recovery.Hold({keyframe, step, blind.TakeCovariance()});
+  }
+  if (keep || first) {
+    const auto found =
+        recovery.Take({keyframe.scan, OdometryOrNone(T_odom_robot)}, step, view.points_robot, trail, believed_path());
+    if (found && found->on_path) return GoOnAlongPath(parallel_for);
+    if (found) return GoOnAt(found->place, std::move(keyframe), std::move(view), step, parallel_for);
+  }
+  return ReportRecovery(stamp, T_odom_robot, step.T_track_robot);
+}
+
+// The robot has been found on its path: nothing was missing.
+ScanOutcome Mapper::State::GoOnAlongPath(const ParallelFor& parallel_for) {
+  const std::vector<Recovery::Held> held = recovery.TakeHeld();
+  recovery.End();
+  for (const Recovery::Held& one : held) {
+    AddKeyframe(one.keyframe, Look(*one.keyframe.scan, options.front_end), one.step, one.step_covariance, parallel_for);
+    if (&one != &held.back()) trail.AddScan(one.keyframe.scan->stamp, {});
+  }
+  const Recovery::Held& now = held.back();
+  return Report(now.keyframe.scan->stamp, now.keyframe.T_odom_robot, now.step, true);
+}
+
+// The robot has been found: the path goes on there, with a step from the last keyframe that no scan or odometry shows.
+ScanOutcome Mapper::State::GoOnAt(const FoundPlace& place, Keyframe keyframe, ScanView view, TrackStep step,
+                                  const ParallelFor& parallel_for) {
+  const Stamp stamp = keyframe.scan->stamp;
+  const Pose2 T_odom_robot = keyframe.T_odom_robot;
+  const Pose2 T_map_last = believed_path()[trail.size() - 1];
+  const Pose2 T_track_robot = trail.shapes().back().T_track_robot * Between(T_map_last, place.T_map_robot);
+  front_end.MoveTo(T_track_robot * step.T_track_robot.Inverse());
+  step.T_track_robot = T_track_robot;
+  step.found = true;
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  R.topLeftCorner<2, 2>() = T_map_last.rotation().transpose();
+  blind.Found(R * place.covariance * R.transpose());
+  recovery.End();
+  self_check.Forget();
+  AddKeyframe(std::move(keyframe), std::move(view), step, blind.TakeCovariance(), parallel_for);
+  speed.Forget();
+  return Report(stamp, T_odom_robot, step, true);
+}
+
+ScanOutcome Mapper::State::ReportRecovery(Stamp stamp, const Pose2& T_odom_robot, const Pose2& T_track_robot) const {
+  const Recovery::Belief belief = recovery.BeliefAt(OdometryOrNone(T_odom_robot), T_track_robot);
+  ScanOutcome outcome;
+  outcome.stamp = stamp;
+  outcome.T_map_robot = belief.T_map_robot;
+  outcome.T_map_odom = outcome.T_map_robot * T_odom_robot.Inverse();
+  outcome.covariance = belief.covariance;
+  outcome.reason = belief.reason;
+  return outcome;
+}
+
+}  // namespace cairn::slam

@@ -1,0 +1,115 @@
+// The state of a mapper, for the sources that implement it: mapper.cpp (a robot whose place is known) and
+// mapper_recovery.cpp (one whose place has to be proved).
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "server/slam/blind_motion.h"
+#include "server/slam/loops/loop_search.h"
+#include "server/slam/loops/revisit_search.h"
+#include "server/slam/loops/self_check.h"
+#include "server/slam/map_drawing.h"
+#include "server/slam/mapper.h"
+#include "server/slam/methods.h"
+#include "server/slam/motion/step_motion.h"
+#include "server/slam/recovery.h"
+#include "server/slam/scan/beam_points.h"
+#include "server/slam/scan/stamp_gate.h"
+#include "server/slam/tracking/front_end.h"
+#include "server/slam/trail/trail.h"
+
+namespace cairn::slam {
+
+struct Mapper::State {
+  State(const MapperOptions& given, const Pose2& T_map_robot_start, std::uint64_t seed)
+      : options(given),
+        front_end(given.front_end, MakeMatcher(given.matcher, given.matching)),
+        blind(given.blind, given.front_end.use_odometry, given.lost_after_m),
+        trail(given.filter.back_end.drift, given.front_end.surface),
+        revisits(given.revisit, given.front_end.refine),
+        filter(MakeFilter(given.filter.kind, given.filter, T_map_robot_start, seed)),
+        loops(given.loop, given.front_end.refine),
+        self_check(given.self_check),
+        recovery(given.loop, given.self_check, given.front_end.refine, given.front_end.surface, given.blind,
+                 given.lost_after_m),
+        drawing(given.grid) {}
+
+  ScanOutcome Coast(Stamp stamp, const Pose2& T_odom_robot);
+  void LosePlace(bool odometry_goes_on);
+  // Before, the next scan defines the start, or the filter itself looks for the robot's place.
+  [[nodiscard]] bool HasMap() const { return !trail.empty() && filter->placed(); }
+  [[nodiscard]] Recovery::Known LastKnown() const {
+    return {level.outcome.T_map_robot, level.T_odom_robot, level.outcome.covariance};
+  }
+  // Without odometry the robot is expected where it was.
+  [[nodiscard]] Pose2 OdometryOrNone(const Pose2& T_odom_robot) const {
+    return options.front_end.use_odometry ? T_odom_robot : level.T_odom_robot;
+  }
+  [[nodiscard]] bool StoodStill(const Scan& scan, const Pose2& T_odom_robot, const TrackStep& step) const;
+  TrackStep DoubtPlace(const ScanView& view, const Pose2& T_odom_robot, const TrackStep& step,
+                       const ParallelFor& parallel_for);
+  ScanOutcome Recover(Keyframe keyframe, ScanView view, TrackStep step, const ParallelFor& parallel_for);
+  [[nodiscard]] ScanOutcome ReportRecovery(Stamp stamp, const Pose2& T_odom_robot, const Pose2& T_track_robot) const;
+  ScanOutcome GoOnAlongPath(const ParallelFor& parallel_for);
+  ScanOutcome GoOnAt(const FoundPlace& place, Keyframe keyframe, ScanView view, TrackStep step,
+                     const ParallelFor& parallel_for);
+  void AddKeyframe(Keyframe keyframe, ScanView view, const TrackStep& step, const Eigen::Matrix3d& step_covariance,
+                   const ParallelFor& parallel_for);
+  StepMotion MotionTo(const Keyframe& keyframe, const TrackStep& step, const Eigen::Matrix3d& covariance);
+  void CloseLargeLoop();
+  void Draw(const TrackStep& step, bool placed_before);
+  ScanOutcome Report(Stamp stamp, const Pose2& T_odom_robot, const TrackStep& step, bool keyframe);
+  [[nodiscard]] PoseReason ReasonOf(const TrackStep& step) const;
+  [[nodiscard]] SharedSequence<Pose2> believed_path() const { return filter->hypothesis(0).path; }
+
+  // All but the filter, which is behind an interface.
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.recovery, self.trail, self.front_end, self.blind, self.speed, self.loops, self.self_check,
+            self.drawing, self.level, self.last_scan);
+  }
+
+  // The last scan that was not tilted.
+  struct LevelScan {
+    ScanOutcome outcome;
+    Pose2 T_keyframe_robot;
+    Pose2 T_odom_robot;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.outcome, self.T_keyframe_robot, self.T_odom_robot);
+    }
+  };
+
+  // The last scan of all that was not tilted.
+  struct LastScan {
+    std::shared_ptr<const Scan> scan;
+    Pose2 T_odom_robot;
+    Pose2 T_track_robot;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.scan, self.T_odom_robot, self.T_track_robot);
+    }
+  };
+
+  // Whether the parts fit together after reading.
+  [[nodiscard]] bool IsConsistent() const;
+
+  const MapperOptions options;
+  FrontEnd front_end;
+  BlindMotion blind;
+  ConstantSpeed speed;  // Speed of the motion from keyframe to keyframe.
+  Trail trail;
+  RevisitSearch revisits;
+  std::unique_ptr<Filter> filter;
+  LoopSearch loops;
+  SelfCheck self_check;
+  Recovery recovery;
+  MapDrawing drawing;
+  LevelScan level;
+  std::optional<LastScan> last_scan;
+};
+
+}  // namespace cairn::slam

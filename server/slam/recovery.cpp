@@ -1,0 +1,123 @@
+#include "server/slam/recovery.h"
+
+#include <cmath>
+#include <utility>
+
+#include "server/slam/scan/beam_points.h"
+
+namespace cairn::slam {
+namespace {
+
+constexpr std::size_t kMaxRecent = 120;  // Scans that are kept: turning on the spot makes many.
+constexpr double kOnPathM = 0.3;         // A place found this near to the path, ...
+constexpr double kOnPathRad = 0.1;       // ... and with this heading, is the one on the path.
+// Two places found agree, as in LoopSearch.
+constexpr double kStretchM = 15.0;
+constexpr double kConfirmWithinM = 10.0;
+constexpr double kAgreeM = 0.5;
+constexpr double kAgreeRad = 0.06;
+constexpr std::size_t kMaxHeld = 60;  // Keyframes that may be added to the path at once: bounds the time of one scan.
+constexpr double kUnknownM = 1000.0;  // Standard deviation of a place that is not known.
+constexpr double kNever = -1.0;       // No search yet.
+
+}  // namespace
+
+void Recovery::Begin(const Known& known, bool odometry_goes_on) {
+  End();
+  active_ = true;
+  odometry_goes_on_ = odometry_goes_on;
+  known_ = known;
+}
+
+void Recovery::BeginOnPath(const Known& known, const Pose2& T_map_track) {
+  Begin(known, true);
+  T_map_track_ = T_map_track;
+}
+
+void Recovery::End() {
+  active_ = false;
+  contradicted_ = false;
+  ForgetScans();
+  search_.Forget();
+}
+
+void Recovery::ForgetScans() {
+  LeavePath();
+  recent_.clear();
+  unconfirmed_.clear();
+  searched_at_m_ = kNever;
+}
+
+void Recovery::LeavePath() {
+  T_map_track_.reset();
+  held_.clear();
+}
+
+void Recovery::RestorePoints() {
+  for (RecentScan& one : recent_) one.points = SurfacePointsOf(PointsOf(*one.scan), *one.scan, surface_);
+}
+
+Pose2 Recovery::FromLast(const Pose2& T_track_robot) const {
+  return Between(recent_.back().T_track_robot, T_track_robot);
+}
+
+void Recovery::Append(const Keyframe& keyframe, const TrackStep& step, std::vector<SurfacePoint> points_robot) {
+  const double travelled_m =
+      has_scans() ? recent_.back().travelled_m + FromLast(step.T_track_robot).translation().norm() : 0.0;
+  recent_.push_back({keyframe.scan, step.T_track_robot, travelled_m, std::move(points_robot)});
+  while (recent_.size() > kMaxRecent || travelled_m - recent_.front().travelled_m > kStretchM)
+    recent_.erase(recent_.begin());
+  if (held_.size() > kMaxHeld) LeavePath();
+}
+
+std::optional<Recovery::Found> Recovery::Take(const Keyframe& keyframe, const TrackStep& step,
+                                              std::vector<SurfacePoint> points_robot, const Trail& trail,
+                                              const SharedSequence<Pose2>& path) {
+  Append(keyframe, step, std::move(points_robot));
+  const Pose2 T_map_robot = BeliefAt(keyframe.T_odom_robot, step.T_track_robot).T_map_robot;
+  contradicted_ = search_.Compare(trail, path, *recent_.back().scan, recent_.back().points, T_map_robot) ==
+                  PlaceSearch::Agreement::kContradicts;
+  if (contradicted_) LeavePath();
+  const double travelled_m = recent_.back().travelled_m;
+  if (searched_at_m_ != kNever && travelled_m - searched_at_m_ < loop_.every_m) return std::nullopt;
+  searched_at_m_ = travelled_m;
+  const auto place = search_.Find(trail, path, recent_);
+  if (!place || !IsConfirmed(place->T_map_robot)) return std::nullopt;
+  const Pose2 error = Between(T_map_robot, place->T_map_robot);
+  const bool on_path = T_map_track_ && error.translation().norm() < kOnPathM && std::abs(error.theta) < kOnPathRad;
+  return Found{*place, on_path};
+}
+
+// All places found over some way must be one place.
+bool Recovery::IsConfirmed(const Pose2& T_map_robot) {
+  const RecentScan& now = recent_.back();
+  if (!unconfirmed_.empty() &&
+      (now.travelled_m - unconfirmed_.back().travelled_m > kConfirmWithinM || !Agree(unconfirmed_.back(), T_map_robot)))
+    unconfirmed_.clear();
+  const bool confirmed = !unconfirmed_.empty() && Agree(unconfirmed_.front(), T_map_robot) &&
+                         now.travelled_m - unconfirmed_.front().travelled_m >= loop_.confirm_after_m;
+  unconfirmed_.push_back({T_map_robot * now.T_track_robot.Inverse(), now.travelled_m});
+  return confirmed;
+}
+
+bool Recovery::Agree(const Candidate& earlier, const Pose2& T_map_robot) const {
+  const Pose2 error = Between(earlier.T_map_track * recent_.back().T_track_robot, T_map_robot);
+  return error.translation().norm() < kAgreeM && std::abs(error.theta) < kAgreeRad;
+}
+
+Recovery::Belief Recovery::BeliefAt(const Pose2& T_odom_robot, const Pose2& T_track_robot) const {
+  if (!odometry_goes_on_) {
+    const Eigen::Vector3d unknown(kUnknownM * kUnknownM, kUnknownM * kUnknownM, kPi * kPi);
+    return {known_.T_map_robot, unknown.asDiagonal(), unknown.asDiagonal(), PoseReason::kLost};
+  }
+  const Pose2 moved = Between(known_.T_odom_robot, T_odom_robot);
+  const Eigen::Matrix3d J_known = J_compose_left(known_.T_map_robot, moved);
+  const Eigen::Matrix3d J_moved = J_compose_right(known_.T_map_robot, moved);
+  const Eigen::Matrix3d doubt = J_moved * blind_.Covariance(moved) * J_moved.transpose();
+  const bool lost = contradicted_ || moved.translation().norm() > lost_after_m_;
+  return {T_map_track_ ? *T_map_track_ * T_track_robot : known_.T_map_robot * moved,
+          J_known * known_.covariance * J_known.transpose() + doubt, doubt,
+          lost ? PoseReason::kLost : PoseReason::kOdometryOnly};
+}
+
+}  // namespace cairn::slam

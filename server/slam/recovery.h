@@ -1,0 +1,134 @@
+// Follows a robot whose place is not certain: scans are missing, or odometry has begun anew. The robot is not
+// localized, and nothing is drawn, until it has been found in its own map (loops/place_search.h). It has been found
+// when two searches, with some way between them, agree: one scan or one search is no proof, because places look alike.
+//  - While the scans continue those before the pause, the robot is probably on its path: its scans are held, and are
+//    added to the path as if there had been no pause, if the place found is that one (`on_path`).
+//  - Otherwise its pose is carried on by odometry where there is any, and the path goes on at the place found.
+// Frames: `track` is that of the front-end. Not thread-safe. Deterministic.
+#pragma once
+
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "common/service/pose_report.h"
+#include "server/slam/loops/place_search.h"
+#include "server/slam/motion/step_motion.h"
+#include "server/slam/tracking/front_end.h"
+
+namespace cairn::slam {
+
+class Recovery {
+ public:
+  // What was known last.
+  struct Known {
+    Pose2 T_map_robot;
+    Pose2 T_odom_robot;
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.T_map_robot, self.T_odom_robot, self.covariance);
+    }
+  };
+  // The pose meanwhile.
+  struct Belief {
+    Pose2 T_map_robot;
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+    Eigen::Matrix3d doubt = Eigen::Matrix3d::Zero();  // The part of the covariance that has come since.
+    PoseReason reason = PoseReason::kLost;            // Or kOdometryOnly.
+  };
+  // A keyframe that waits until it is known that the robot is on its path.
+  struct Held {
+    Keyframe keyframe;
+    TrackStep step;
+    Eigen::Matrix3d step_covariance = Eigen::Matrix3d::Zero();
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      Keyframe::InlineMembers(archive, self.keyframe);
+      archive(self.step, self.step_covariance);
+    }
+  };
+  struct Found {
+    FoundPlace place;
+    bool on_path = false;  // Then the held keyframes belong to the path.
+  };
+
+  // `blind` is the noise of motion known by odometry alone.
+  Recovery(const LoopOptions& loop, const SelfCheckOptions& check, const PointToLineOptions& align,
+           const SurfaceOptions& surface, const MotionNoise& blind, double lost_after_m)
+      : loop_(loop), search_(loop, check, align), surface_(surface), blind_(blind), lost_after_m_(lost_after_m) {}
+
+  [[nodiscard]] bool active() const { return active_; }
+  // `odometry_goes_on`: the odometry since `known` is that of one drive.
+  void Begin(const Known& known, bool odometry_goes_on);
+  // The next scans continue the path: `T_map_track` is its pose in the map.
+  void BeginOnPath(const Known& known, const Pose2& T_map_track);
+  [[nodiscard]] bool on_path() const { return T_map_track_.has_value(); }
+  // The odometry has begun anew.
+  void OdometryBeganAnew() { odometry_goes_on_ = false; }
+  void End();
+
+  // The last scans do not belong together with the next one.
+  void ForgetScans();
+  [[nodiscard]] bool has_scans() const { return !recent_.empty(); }
+  // The pose in `track` of the last scan that was held or, off the path, taken; `otherwise` if there is none.
+  [[nodiscard]] Pose2 LastKept(const Pose2& otherwise) const {
+    if (on_path()) return held_.empty() ? otherwise : held_.back().step.T_track_robot;
+    return has_scans() ? recent_.back().T_track_robot : otherwise;
+  }
+  [[nodiscard]] std::vector<Held> TakeHeld() { return std::exchange(held_, {}); }
+  void Hold(Held held) { held_.push_back(std::move(held)); }
+
+  // Takes a scan, and searches. Returns the robot's place once it is proved.
+  [[nodiscard]] std::optional<Found> Take(const Keyframe& keyframe, const TrackStep& step,
+                                          std::vector<SurfacePoint> points_robot, const Trail& trail,
+                                          const SharedSequence<Pose2>& path);
+  [[nodiscard]] Belief BeliefAt(const Pose2& T_odom_robot, const Pose2& T_track_robot) const;
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.active_, self.odometry_goes_on_, self.contradicted_, self.known_, self.T_map_track_,
+            self.searched_at_m_, self.recent_, self.held_, self.unconfirmed_);
+    if constexpr (Archive::kReads) {
+      self.search_.Forget();
+      if (archive.ok()) self.RestorePoints();
+    }
+  }
+
+ private:
+  // A place found that is not yet confirmed.
+  struct Candidate {
+    Pose2 T_map_track;
+    double travelled_m = 0.0;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.T_map_track, self.travelled_m);
+    }
+  };
+  void RestorePoints();
+  [[nodiscard]] Pose2 FromLast(const Pose2& T_track_robot) const;
+  void Append(const Keyframe& keyframe, const TrackStep& step, std::vector<SurfacePoint> points_robot);
+  void LeavePath();
+  [[nodiscard]] bool IsConfirmed(const Pose2& T_map_robot);
+  [[nodiscard]] bool Agree(const Candidate& earlier, const Pose2& T_map_robot) const;
+
+  LoopOptions loop_;
+  PlaceSearch search_;
+  SurfaceOptions surface_;
+  MotionNoise blind_;
+  double lost_after_m_;
+  bool active_ = false;
+  bool odometry_goes_on_ = false;
+  bool contradicted_ = false;  // The last scan does not fit where the robot is believed to be.
+  Known known_;
+  std::optional<Pose2> T_map_track_;  // While the scans continue the path.
+  double searched_at_m_ = 0.0;
+  std::vector<RecentScan> recent_;
+  std::vector<Held> held_;  // While the scans continue the path: those that will be its keyframes.
+  std::vector<Candidate> unconfirmed_;
+};
+
+}  // namespace cairn::slam

@@ -1,0 +1,279 @@
+#include "tests/server/slam/moved_sweep.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "client/sim/fleet.h"
+#include "client/sim/shipped_worlds.h"
+#include "server/slam/scan_pipeline.h"
+
+namespace cairn::test {
+namespace {
+
+// What the odometry shows after the gap.
+enum class Odometer {
+  kGoesOn,       // What happened in the gap.
+  kStandsStill,  // What it showed before: the robot was carried.
+  kHalf,         // The first half of the way: then the robot was carried.
+  kAtZero,       // It began anew.
+};
+
+struct Kind {
+  std::string name;
+  double skipped_s = 0.0;  // So much of the drive happens in the gap ...
+  double lasts_s = 0.0;    // ... which is so long by the robot's clock.
+  Odometer odometer = Odometer::kGoesOn;
+  bool odometry_missing = true;
+  bool new_client = false;
+  bool other_robot = false;  // Another robot goes on, which stands somewhere else.
+};
+
+const std::vector<Kind> kKinds = {
+    {"stands for 10 s", 0.0, 10.0, Odometer::kStandsStill},
+    {"stands for 10 min", 0.0, 600.0, Odometer::kStandsStill},
+    {"drives 4 s, odometry sees it", 4.0, 4.0, Odometer::kGoesOn, false},
+    {"drives 15 s, odometry sees it", 15.0, 15.0, Odometer::kGoesOn, false},
+    {"drives 60 s, odometry sees it", 60.0, 60.0, Odometer::kGoesOn, false},
+    {"drives 4 s", 4.0, 4.0, Odometer::kGoesOn},
+    {"drives 40 s", 40.0, 40.0, Odometer::kGoesOn},
+    {"carried for 3 s", 3.0, 3.0, Odometer::kStandsStill},
+    {"carried for 12 s", 12.0, 12.0, Odometer::kStandsStill},
+    {"carried for 45 s", 45.0, 45.0, Odometer::kStandsStill},
+    {"carried for 80 s", 80.0, 80.0, Odometer::kStandsStill},
+    {"carried for 1 s", 1.0, 10.0, Odometer::kStandsStill},
+    {"carried for 2 s", 2.0, 10.0, Odometer::kStandsStill},
+    {"drives, then carried", 20.0, 20.0, Odometer::kHalf},
+    {"odometry anew at once", 0.0, 0.0, Odometer::kAtZero, false},
+    {"odometry anew, carried for 5 s", 5.0, 30.0, Odometer::kAtZero},
+    {"odometry anew, carried for 50 s", 50.0, 50.0, Odometer::kAtZero},
+    {"new client, carried for 12 s", 12.0, 12.0, Odometer::kStandsStill, true, true},
+    {"other robot", 0.0, 5.0, Odometer::kAtZero, true, true, true},
+    {"other robot, odometry fits", 0.0, 5.0, Odometer::kStandsStill, true, true, true},
+};
+
+struct OneDrive {
+  struct Timed {
+    double seconds = 0.0;
+    LogRecord record;
+  };
+  Pose2 T_map_robot_start;
+  std::vector<Timed> records;
+  Trajectory truth;
+};
+
+std::vector<OneDrive> DriveThrough(const std::string& world, double seconds, std::uint64_t seed) {
+  sim::FleetOptions options;
+  options.robots = 2;
+  options.see_each_other = false;
+  options.scan_hz = 5.0;
+  options.odometry_hz = 10.0;
+  options.laser.beams = 181;
+  options.seed = seed;
+  auto fleet = sim::Fleet::Create(*sim::OpenWorld(world), options);
+  std::vector<OneDrive> drives(2);
+  for (double now = 0.0; now < seconds;) {
+    sim::FleetRecord next = fleet->Next();
+    now = SecondsFromStamp(std::visit([](const auto& one) { return one.stamp; }, next.record) - options.first_stamp);
+    drives[static_cast<std::size_t>(next.robot)].records.push_back({now, std::move(next.record)});
+  }
+  for (int robot = 0; robot < 2; ++robot) {
+    drives[static_cast<std::size_t>(robot)].T_map_robot_start = fleet->T_map_robot_start(robot);
+    drives[static_cast<std::size_t>(robot)].truth = fleet->truth(robot);
+  }
+  return drives;
+}
+
+// Feeds one estimator and counts.
+class Follower {
+ public:
+  explicit Follower(const Pose2& start, std::uint64_t seed)
+      : pipeline_(Options(seed), start, slam::SerialFor,
+                  {.used = [this](const Scan& scan, const slam::ScanOutcome& outcome) { Judge(scan, outcome); },
+                   .dropped = [](const Scan&, DropReason) {}}) {}
+
+  // The truth of what is fed, the shift of its stamps, and where the map has put the robot's true place by its drift.
+  void Watch(const Trajectory& truth, Stamp later, const Pose2& T_map_world, MovedCase* counted) {
+    truth_ = &truth;
+    later_ = later;
+    T_map_world_ = T_map_world;
+    case_ = counted;
+  }
+  // The poses of the same drive without a gap; their drift is no fault of the gap.
+  void CompareWith(const Trajectory* undisturbed) { undisturbed_ = undisturbed; }
+  [[nodiscard]] const Trajectory& told() const { return told_; }
+  [[nodiscard]] const Pose2& T_map_world_now() const { return T_map_world_now_; }
+  [[nodiscard]] const Pose2& T_odom_robot() const { return T_odom_robot_; }  // At the last scan.
+  void Feed(LogRecord record, const Pose2& T_new_old) {
+    if (auto* const scan = std::get_if<Scan>(&record)) {
+      scan->stamp += later_;
+      scan->sequence = 0;
+      pipeline_.Add(std::make_shared<const Scan>(std::move(*scan)));
+    } else {
+      auto& odometry = std::get<Odometry>(record);
+      odometry.stamp += later_;
+      odometry.sequence = 0;
+      odometry.T_odom_robot = T_new_old * odometry.T_odom_robot;
+      pipeline_.Add(odometry);
+    }
+  }
+  [[nodiscard]] slam::ScanPipeline& pipeline() { return pipeline_; }
+
+ private:
+  static slam::MapperOptions Options(std::uint64_t seed) {
+    slam::MapperOptions options;
+    options.filter.particles = 20;
+    options.seed = static_cast<std::int64_t>(seed);
+    return options;
+  }
+  void Judge(const Scan& scan, const slam::ScanOutcome& outcome) {
+    if (case_ == nullptr) return;
+    const auto truth = PoseOn(*truth_, scan.stamp - later_, 1.0);
+    if (!truth) return;
+    if (!first_) first_ = scan.stamp;
+    if (before_) way_m_ += (truth->translation() - before_->translation()).norm();
+    before_ = *truth;
+    ++case_->poses;
+    T_odom_robot_ = outcome.T_map_odom.Inverse() * outcome.T_map_robot;
+    T_map_world_now_ = outcome.T_map_robot * truth->Inverse();
+    const Eigen::Vector2d told = outcome.T_map_robot.translation();
+    double error_m =
+        std::min((told - truth->translation()).norm(), (told - (T_map_world_ * *truth).translation()).norm());
+    const auto same = undisturbed_ == nullptr ? std::nullopt : PoseOn(*undisturbed_, scan.stamp - later_, 1.0);
+    if (same) error_m = std::min(error_m, (told - same->translation()).norm());
+    if (!outcome.localized) {
+      case_->found_after_s = case_->found_after_m = -1.0;
+    } else if (case_->found_after_s < 0.0) {
+      case_->found_after_s = SecondsFromStamp(scan.stamp - *first_);
+      case_->found_after_m = way_m_;
+    }
+    if (!outcome.localized) return;
+    case_->worst_m = std::max(case_->worst_m, error_m);
+    if (error_m > kMovedWrongM) ++case_->wrong;
+  }
+
+  const Trajectory* truth_ = nullptr;
+  const Trajectory* undisturbed_ = nullptr;
+  Trajectory told_;
+  Stamp later_ = 0;
+  Pose2 T_map_world_, T_map_world_now_, T_odom_robot_;
+  MovedCase* case_ = nullptr;
+  std::optional<Stamp> first_;
+  std::optional<Pose2> before_;
+  double way_m_ = 0.0;
+  slam::ScanPipeline pipeline_;
+};
+
+struct Before {
+  double seconds = 0.0;
+  Pose2 T_map_world;   // The drift of the map there.
+  Odometry odometry;   // The last one.
+  Scan scan;           // The last one,
+  Pose2 T_odom_robot;  // and the odometry at its stamp.
+  std::string state;
+};
+
+MovedCase After(const Before& before, const std::vector<OneDrive>& drives, const Trajectory& undisturbed,
+                const Kind& kind, const MovedSweepOptions& options, MovedCase result) {
+  const OneDrive& drive = drives[kind.other_robot ? 1 : 0];
+  Follower follower({}, options.seed);
+  if (!follower.pipeline().Load(before.state)) std::abort();
+  if (kind.new_client) follower.pipeline().NewClient();
+  const double until_s = before.seconds + kind.skipped_s;
+  follower.Watch(drive.truth, StampFromSeconds(kind.lasts_s - kind.skipped_s), before.T_map_world, &result);
+  if (!kind.other_robot) follower.CompareWith(&undisturbed);
+  std::optional<Pose2> T_new_old;
+  Pose2 T_half;
+  if (result.stood_still) {  // The robot still sees what it saw, and then it drives on.
+    follower.Feed(Odometry{.sequence = 0, .stamp = before.scan.stamp, .T_odom_robot = before.T_odom_robot}, {});
+    follower.Feed(before.scan, {});
+  }
+  for (const auto& [seconds, record] : drive.records) {
+    if (seconds <= before.seconds) continue;
+    if (seconds > until_s + options.watched_again_s) break;
+    const auto* const odometry = std::get_if<Odometry>(&record);
+    if (odometry != nullptr && seconds <= before.seconds + 0.5 * kind.skipped_s) T_half = odometry->T_odom_robot;
+    if (seconds <= until_s) {
+      if (odometry != nullptr && !kind.odometry_missing) follower.Feed(record, {});
+      continue;
+    }
+    if (!T_new_old) {
+      if (odometry == nullptr) continue;
+      const Pose2 T_old_odom = odometry->T_odom_robot.Inverse();
+      switch (kind.odometer) {
+        case Odometer::kGoesOn:
+          T_new_old = Pose2{};
+          break;
+        case Odometer::kStandsStill:
+          T_new_old = before.odometry.T_odom_robot * T_old_odom;
+          break;
+        case Odometer::kHalf:
+          T_new_old = T_half * T_old_odom;
+          break;
+        case Odometer::kAtZero:
+          T_new_old = T_old_odom;
+          break;
+      }
+    }
+    follower.Feed(record, *T_new_old);
+  }
+  follower.pipeline().Finish();
+  return result;
+}
+
+// The state at each moment of the drive as it is without a gap.
+std::vector<Before> RunUndisturbed(const OneDrive& drive, const MovedSweepOptions& options, Trajectory* told) {
+  std::vector<Before> moments;
+  Follower follower(drive.T_map_robot_start, options.seed);
+  MovedCase undisturbed;
+  follower.Watch(drive.truth, 0, {}, &undisturbed);
+  Before now;
+  for (const auto& [seconds, record] : drive.records) {
+    const double moment_s = options.first_s + options.between_s * static_cast<double>(moments.size());
+    if (seconds > moment_s && std::holds_alternative<Scan>(record) &&
+        moments.size() < static_cast<std::size_t>(options.moments)) {
+      now.seconds = moment_s;
+      now.T_map_world = follower.T_map_world_now();
+      now.T_odom_robot = follower.T_odom_robot();
+      follower.pipeline().Save(now.state);
+      moments.push_back(now);
+    }
+    if (const auto* const odometry = std::get_if<Odometry>(&record)) now.odometry = *odometry;
+    if (const auto* const scan = std::get_if<Scan>(&record)) now.scan = *scan;
+    follower.Feed(record, {});
+  }
+  *told = follower.told();
+  return moments;
+}
+
+}  // namespace
+
+std::vector<std::string> MovedKinds() {
+  std::vector<std::string> names;
+  for (const Kind& kind : kKinds) names.push_back(kind.name);
+  return names;
+}
+
+std::vector<MovedCase> RunMovedSweep(const MovedSweepOptions& options) {
+  std::vector<MovedCase> cases;
+  for (const std::string& world : options.worlds) {
+    const double last_s = options.first_s + options.between_s * (options.moments - 1);
+    const std::vector<OneDrive> drives =
+        DriveThrough(world, last_s + 80.0 + options.watched_again_s + 1.0, options.seed);
+    Trajectory undisturbed;
+    for (const Before& before : RunUndisturbed(drives.front(), options, &undisturbed)) {
+      for (const Kind& kind : kKinds) {
+        if (kind.name.find(options.only) == std::string::npos) continue;
+        MovedCase one{.world = world, .kind = kind.name, .from_s = before.seconds, .seed = options.seed};
+        one.stood_still = kind.odometer == Odometer::kStandsStill && kind.skipped_s == 0.0 && !kind.other_robot;
+        cases.push_back(After(before, drives, undisturbed, kind, options, std::move(one)));
+        options.done(cases.back());
+      }
+    }
+  }
+  return cases;
+}
+
+}  // namespace cairn::test

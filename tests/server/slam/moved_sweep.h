@@ -1,0 +1,49 @@
+// Robots that nobody watched for a while, in many worlds and at many moments: scans and odometry are missing, somebody
+// carried the robot, its odometry began anew, or another robot goes on under its name. Counts the poses that are called
+// localized beside the truth. Runs the estimator in this process, on simulated drives. Same options, same figures.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace cairn::test {
+
+struct MovedSweepOptions {
+  std::vector<std::string> worlds = {"building", "office", "room"};
+  int moments = 3;              // On each drive.
+  double first_s = 60.0;        // When the first moment is, and ...
+  double between_s = 45.0;      // ... the time between two of them.
+  double watched_again_s = 60;  // How long each robot is followed afterwards.
+  std::uint64_t seed = 1;
+  // Only kinds whose name contains this.
+  std::string only{};
+  // Called after every case.
+  std::function<void(const struct MovedCase&)> done = [](const struct MovedCase&) {};
+};
+
+// One robot at one moment.
+struct MovedCase {
+  std::string world;
+  std::string kind;
+  double from_s = 0.0;
+  std::uint64_t seed = 0;
+  // Poses that were localized and farther than kMovedWrongM from the truth, from the truth moved by the drift before
+  // the gap, and from what the same robot tells without a gap: the drift of an unclosed map is no fault of the gap.
+  int wrong = 0;
+  double worst_m = 0.0;  // The largest error of a pose that was localized.
+  int poses = 0;
+  // From the first scan after the gap to the first pose that is localized, and stays so; negative if there is none.
+  double found_after_s = -1.0;
+  double found_after_m = -1.0;
+  bool stood_still = false;  // Nothing had happened to the robot, so that it must go on at once.
+};
+
+inline constexpr double kMovedWrongM = 0.5;
+
+[[nodiscard]] std::vector<MovedCase> RunMovedSweep(const MovedSweepOptions& options);
+// The names of what may happen to a robot.
+[[nodiscard]] std::vector<std::string> MovedKinds();
+
+}  // namespace cairn::test

@@ -1,0 +1,28 @@
+#include "tests/server/slam/moved_sweep.h"
+
+#include <gtest/gtest.h>
+
+namespace cairn::test {
+namespace {
+
+// The cut of the study `moved` for every day.
+TEST(MovedSweep, NoRobotIsLocalizedAtAWrongPlace) {
+  MovedSweepOptions options;
+  options.worlds = {"building", "office"};
+  options.moments = 2;
+  options.watched_again_s = 25.0;
+  int found = 0;
+  const std::vector<MovedCase> cases = RunMovedSweep(options);
+  for (const MovedCase& one : cases) {
+    EXPECT_EQ(one.wrong, 0) << one.world << ", " << one.kind << ", at " << one.from_s << " s";
+    if (one.stood_still) {
+      EXPECT_EQ(one.found_after_s, 0.0) << one.world << ", " << one.kind << ", at " << one.from_s;
+    }
+    found += one.found_after_s >= 0.0 ? 1 : 0;
+  }
+  EXPECT_GE(cases.size(), 72U);
+  EXPECT_GE(3 * found, static_cast<int>(cases.size()));
+}
+
+}  // namespace
+}  // namespace cairn::test

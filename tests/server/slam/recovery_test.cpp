@@ -1,0 +1,265 @@
+// Robots that were not watched for a while: scans are missing, somebody carried the robot, its odometry began anew. At
+// no time may a pose be called localized beside the truth.
+#include "server/slam/recovery.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <memory>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "client/sim/fleet.h"
+#include "client/sim/shipped_worlds.h"
+#include "server/slam/scan_pipeline.h"
+#include "tests/server/slam/ring_world.h"
+
+namespace cairn::slam {
+namespace {
+
+constexpr double kWrong_m = 0.5;
+
+// What becomes of the odometry while nobody watches.
+enum class Odometer { kGoesOn, kStandsStill, kStartsAtZero };
+
+struct Away {
+  double from_s = 0.0;
+  double to_s = 0.0;
+  Odometer odometer = Odometer::kGoesOn;
+  bool odometry_missing = true;  // As the scans are.
+  bool new_client = false;
+};
+
+struct Seen {
+  ScanOutcome outcome;
+  Pose2 T_map_robot_true;
+  double seconds = 0.0;
+  std::size_t chunks = 0;
+  std::size_t keyframes = 0;
+};
+
+struct Record {
+  double seconds = 0.0;
+  LogRecord record;
+};
+
+struct WholeDrive {
+  Pose2 T_map_robot_start;
+  std::vector<Record> records;
+  Trajectory truth;
+};
+
+// Several times round through the world; every test takes its part of it.
+WholeDrive DriveThrough(const std::string& world, double seconds) {
+  sim::FleetOptions options;
+  options.robots = 1;
+  options.scan_hz = 5.0;
+  options.odometry_hz = 10.0;
+  options.laser.beams = 181;
+  auto fleet = sim::Fleet::Create(*sim::OpenWorld(world), options);
+  WholeDrive drive{fleet->T_map_robot_start(0), {}, {}};
+  for (double now = 0.0; now < seconds;) {
+    LogRecord record = fleet->Next().record;
+    const Stamp stamp = std::visit([](const auto& one) { return one.stamp; }, record);
+    now = SecondsFromStamp(stamp - options.first_stamp);
+    drive.records.push_back({now, std::move(record)});
+  }
+  drive.truth = fleet->truth(0);
+  return drive;
+}
+
+const WholeDrive& Building() {
+  static const WholeDrive drive = DriveThrough("building", 400.0);
+  return drive;
+}
+
+MapperOptions FewParticles() {
+  MapperOptions options;
+  options.filter.particles = 20;
+  return options;
+}
+
+// Drives with the robot unwatched as `away` says. With `stop_every` the estimator is saved and another goes on.
+std::vector<Seen> Play(const WholeDrive& drive, const Away& away, double until_s, int stop_every = 0,
+                       std::string* state = nullptr) {
+  std::vector<Seen> seen;
+  std::unique_ptr<ScanPipeline> pipeline;
+  const auto make = [&](const Pose2& start) {
+    return std::make_unique<ScanPipeline>(
+        FewParticles(), start, SerialFor,
+        ScanPipeline::Sink{.used =
+                               [&](const Scan& scan, const ScanOutcome& outcome) {
+                                 const Pose2 truth = *PoseOn(drive.truth, scan.stamp, 1.0);
+                                 const double seconds = SecondsFromStamp(scan.stamp - drive.truth.front().stamp);
+                                 seen.push_back({outcome, truth, seconds, pipeline->mapper().grid().chunk_count(),
+                                                 pipeline->mapper().keyframe_count()});
+                               },
+                           .dropped = [](const Scan&, DropReason) {}});
+  };
+  pipeline = make(drive.T_map_robot_start);
+  Pose2 last_odometry, T_new_old;
+  bool after = false;
+  int scans = 0;
+  for (const auto& [seconds, record] : drive.records) {
+    if (seconds > until_s) break;
+    const bool missing = seconds >= away.from_s && seconds < away.to_s;
+    if (const auto* const scan = std::get_if<Scan>(&record)) {
+      if (!missing) pipeline->Add(std::make_shared<const Scan>(*scan));
+      if (stop_every == 0 || ++scans % stop_every != 0) continue;
+      std::string bytes;
+      pipeline->Save(bytes);
+      pipeline = make({});
+      EXPECT_TRUE(pipeline->Load(bytes));
+      continue;
+    }
+    if (missing && away.odometry_missing) continue;
+    Odometry odometry = std::get<Odometry>(record);
+    if (seconds >= away.to_s && !std::exchange(after, true)) {
+      if (away.new_client) pipeline->NewClient();
+      const Pose2 old_odom = odometry.T_odom_robot;
+      if (away.odometer == Odometer::kStandsStill) T_new_old = last_odometry * old_odom.Inverse();
+      if (away.odometer == Odometer::kStartsAtZero) T_new_old = old_odom.Inverse();
+    }
+    odometry.T_odom_robot = T_new_old * odometry.T_odom_robot;
+    last_odometry = odometry.T_odom_robot;
+    pipeline->Add(odometry);
+  }
+  pipeline->Finish();
+  if (state != nullptr) pipeline->Save(*state);
+  return seen;
+}
+
+double ErrorOf(const Seen& seen) {
+  return (seen.outcome.T_map_robot.translation() - seen.T_map_robot_true.translation()).norm();
+}
+
+int Wrong(const std::vector<Seen>& seen) {
+  return static_cast<int>(
+      std::ranges::count_if(seen, [](const Seen& one) { return one.outcome.localized && ErrorOf(one) > kWrong_m; }));
+}
+
+// The first scan from `since_s` on, and the first localized one.
+const Seen* First(const std::vector<Seen>& seen, double since_s, bool localized) {
+  const auto found = std::ranges::find_if(
+      seen, [&](const Seen& one) { return one.seconds >= since_s && (one.outcome.localized || !localized); });
+  return found == seen.end() ? nullptr : &*found;
+}
+
+bool Drawn(const std::vector<Seen>& seen, double since_s) {
+  const Seen* const first = First(seen, since_s, false);
+  const Seen* const found = First(seen, since_s, true);
+  return std::any_of(first, found == nullptr ? seen.data() + seen.size() : found,
+                     [&](const Seen& one) { return one.chunks != first->chunks || one.keyframes != first->keyframes; });
+}
+
+struct Case {
+  std::string name;
+  Away away;
+};
+
+const Case kCases[] = {
+    {"CarriedALittle", {90.0, 93.0, Odometer::kStandsStill}},
+    {"Carried", {230.0, 242.0, Odometer::kStandsStill}},
+    {"CarriedFar", {150.0, 190.0, Odometer::kStandsStill}},
+    {"OdometryBeginsAnew", {230.0, 242.0, Odometer::kStartsAtZero}},
+    {"OdometryBeginsAnewAtOnce", {150.0, 153.0, Odometer::kStartsAtZero, false}},
+    {"OdometryWithAGap", {230.0, 270.0, Odometer::kGoesOn}},
+    {"AnotherClient", {150.0, 162.0, Odometer::kStartsAtZero, true, true}},
+};
+
+class Unwatched : public testing::TestWithParam<Case> {};
+
+TEST_P(Unwatched, IsNotLocalizedUntilItIsFoundAndNeverBesideTheTruth) {
+  const Away& away = GetParam().away;
+  const std::vector<Seen> seen = Play(Building(), away, away.to_s + 30.0);
+  const Seen* const first = First(seen, away.to_s, false);
+  ASSERT_NE(first, nullptr);
+  EXPECT_GT(ErrorOf(*first), kWrong_m);  // Where it would be if nobody looked.
+  EXPECT_FALSE(first->outcome.localized);
+  EXPECT_TRUE(first->outcome.reason == PoseReason::kLost || first->outcome.reason == PoseReason::kOdometryOnly);
+  EXPECT_GT(first->outcome.covariance(0, 0), 1e-4);
+  EXPECT_EQ(Wrong(seen), 0);
+  EXPECT_FALSE(Drawn(seen, away.to_s));
+  const Seen* const found = First(seen, away.to_s, true);
+  ASSERT_NE(found, nullptr);
+  EXPECT_LT(ErrorOf(*found), 0.3);
+  EXPECT_EQ(seen.back().outcome.reason, PoseReason::kTracking);
+}
+
+TEST_P(Unwatched, IsTheSameAfterACheckpointToTheLastBit) {
+  const Away& away = GetParam().away;
+  std::string whole, stopped;
+  static_cast<void>(Play(Building(), away, away.to_s + 15.0, 0, &whole));
+  static_cast<void>(Play(Building(), away, away.to_s + 15.0, 10, &stopped));
+  EXPECT_FALSE(whole.empty());
+  EXPECT_TRUE(whole == stopped);
+}
+
+INSTANTIATE_TEST_SUITE_P(Recovery, Unwatched, testing::ValuesIn(kCases),
+                         [](const auto& tested) { return tested.param.name; });
+
+// Its scans are held meanwhile: nothing is missing in its map afterwards.
+TEST(Recovery, OnItsPathTheRobotGoesOnAsIfThereHadBeenNoPauseOnceItHasProvedItsPlace) {
+  const Away away{170.0, 172.4, Odometer::kGoesOn, false};  // Odometry carries the pose by less than lost_after_m.
+  const std::vector<Seen> seen = Play(Building(), away, 200.0);
+  const Seen* const first = First(seen, away.to_s, false);
+  ASSERT_NE(first, nullptr);
+  EXPECT_EQ(first->outcome.reason, PoseReason::kOdometryOnly);
+  EXPECT_FALSE(first->outcome.localized);
+  EXPECT_LT(ErrorOf(*first), 0.3);
+  const Seen* const found = First(seen, away.to_s, true);
+  ASSERT_NE(found, nullptr);
+  EXPECT_LT(found->seconds - away.to_s, 15.0);
+  EXPECT_GT(found->keyframes, first->keyframes + 3);
+  EXPECT_EQ(Wrong(seen), 0);
+}
+
+// Whether a robot that has stood still is localized at once, and one that was carried by 0.7 m is not.
+TEST(Recovery, ARobotThatStoodStillGoesOnAtOnce) {
+  const test::World world = test::RingCorridor(true);
+  const test::Laser laser{.beams = 181, .step_rad = Radians(1.5), .sigma_m = 0.01};
+  for (const double carried_m : {0.0, 0.7}) {
+    std::mt19937_64 rng(3);
+    Mapper mapper(FewParticles(), {}, 1);
+    Stamp stamp = 0;
+    const auto process = [&](const Pose2& truth, const Pose2& T_odom_robot, Passage passage) {
+      Scan scan = test::Look(world, truth, laser, &rng);
+      scan.stamp = (stamp += kNanosPerSecond / 5);
+      return mapper.Process(std::make_shared<const Scan>(std::move(scan)), T_odom_robot, SerialFor, passage);
+    };
+    double x = 0.0;
+    for (; x < 20.0; x += 0.2) ASSERT_TRUE(process({x, 0, 0}, {x, 0, 0}, Passage::kDriven).localized);
+    const Pose2 T_odom_robot{x - 0.2, 0, 0};
+    const ScanOutcome outcome = process({x - 0.2 + carried_m, 0, 0}, T_odom_robot, Passage::kPaused);
+    EXPECT_EQ(outcome.localized, carried_m == 0.0) << carried_m;
+  }
+}
+
+// A robot that was switched off before one room and on again before another one that looks the same.
+TEST(Recovery, WhereRoomsLookAlikeTheRobotStaysLost) {
+  const test::World world = test::RingOfEqualRooms();
+  const test::Laser laser{.beams = 181, .step_rad = Radians(1.5), .sigma_m = 0.01};
+  std::mt19937_64 rng(3);
+  Mapper mapper(FewParticles(), {}, 1);
+  Stamp stamp = 0;
+  const auto process = [&](const Pose2& truth, const Pose2& T_odom_robot, Passage passage) {
+    Scan scan = test::Look(world, truth, laser, &rng);
+    scan.stamp = (stamp += kNanosPerSecond / 5);
+    return mapper.Process(std::make_shared<const Scan>(std::move(scan)), T_odom_robot, SerialFor, passage);
+  };
+  double x = 0.0;
+  for (; x < 28.0; x += 0.2) ASSERT_TRUE(process({x, 0, 0}, {x, 0, 0}, Passage::kDriven).localized);
+  const double from = 12.0;  // Carried back by four rooms.
+  for (double way = 0.0; way < 8.0; way += 0.2) {
+    const ScanOutcome outcome =
+        process({from + way, 0, 0}, {way, 0, 0}, way == 0.0 ? Passage::kUnknown : Passage::kDriven);
+    EXPECT_FALSE(outcome.localized && std::abs(outcome.T_map_robot.x - from - way) > kWrong_m) << way;
+    EXPECT_FALSE(outcome.localized) << way;
+    EXPECT_EQ(outcome.reason, PoseReason::kLost);
+  }
+}
+
+}  // namespace
+}  // namespace cairn::slam

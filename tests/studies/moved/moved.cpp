@@ -1,0 +1,77 @@
+// cairn-study moved follows robots that nobody watched for a while: how many poses are called localized at a wrong
+// place, how many robots are found again, and after which time and way.
+#include <algorithm>
+#include <map>
+
+#include "tests/studies/study.h"
+#include "tests/server/slam/moved_sweep.h"
+
+namespace cairn::studies {
+namespace {
+
+struct Tally {
+  int cases = 0, poses = 0, wrong = 0;
+  std::vector<double> found_s, found_m;
+};
+
+double Quantile(std::vector<double> values, double share) {
+  if (values.empty()) return std::nan("");
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+}
+
+void AddTo(Tally& tally, const test::MovedCase& one) {
+  ++tally.cases;
+  tally.poses += one.poses;
+  tally.wrong += one.wrong;
+  if (one.found_after_s < 0.0) return;
+  tally.found_s.push_back(one.found_after_s);
+  tally.found_m.push_back(one.found_after_m);
+}
+
+void AddTable(Report& report, const std::map<std::string, Tally>& tallies, const std::string& by) {
+  Table table({by, "cases", "poses", "wrong", "found again", "after p50 (s)", "p90 (s)", "p50 (m)", "p90 (m)"});
+  for (const auto& [name, tally] : tallies)
+    table.Add({name, Count(tally.cases), Count(tally.poses), Count(tally.wrong),
+               Percent(static_cast<double>(tally.found_s.size()) / tally.cases),
+               Number(Quantile(tally.found_s, 0.5), 1), Number(Quantile(tally.found_s, 0.9), 1),
+               Number(Quantile(tally.found_m, 0.5), 1), Number(Quantile(tally.found_m, 0.9), 1)});
+  report.Add(table, "moved by " + by);
+}
+
+void StudyMoved(StudyContext& context) {
+  Report& report = context.report;
+  std::map<std::string, Tally> by_kind, by_world, all;
+  bool stood_still = true;
+  test::MovedSweepOptions options;
+  options.only = context.only;
+  options.moments = context.Pick(3, 1);
+  options.done = [&](const test::MovedCase& one) {
+    AddTo(by_kind[one.kind], one);
+    AddTo(by_world[one.world], one);
+    AddTo(all["all"], one);
+    stood_still = stood_still && (!one.stood_still || one.found_after_s >= 0.0);
+    if (one.wrong > 0)
+      report.Progress(Count(one.wrong) + " wrong, up to " + Number(one.worst_m, 1) + " m: " + one.world + ", " +
+                      one.kind + ", at " + Number(one.from_s, 0) + " s, seed " +
+                      Count(static_cast<long long>(one.seed)));
+  };
+  const int seeds = context.runs > 0 ? context.runs : context.Pick(5, 1);
+  for (int k = 0; k < seeds; ++k) {
+    options.seed = context.seed + static_cast<std::uint64_t>(k);
+    static_cast<void>(test::RunMovedSweep(options));
+  }
+  AddTable(report, by_kind, "kind");
+  AddTable(report, by_world, "world");
+  AddTable(report, all, "sum");
+  report.Expect(all["all"].wrong == 0, "a robot was localized at a wrong place");
+  report.Expect(2 * all["all"].found_s.size() > static_cast<std::size_t>(all["all"].cases),
+                "fewer than half of the robots were found again");
+  report.Expect(stood_still, "a robot that stood still was lost");
+}
+
+const Registration kRegistered{"moved", "robots that nobody watched for a while: never localized at a wrong place",
+                               StudyMoved};
+
+}  // namespace
+}  // namespace cairn::studies
