@@ -74,7 +74,7 @@ std::string StateWriter::Bytes() const {
 
 std::vector<std::shared_ptr<const void>> StateReader::values() const {
   std::vector<std::shared_ptr<const void>> values;
-  for (const Immutable& shared : immutable_) values.push_back(shared.value);
+  for (std::size_t i = first_piece_; i < immutable_.size(); ++i) values.push_back(immutable_[i].value);
   return values;
 }
 
@@ -89,6 +89,7 @@ StateReader::StateReader(std::string_view bytes, std::span<const std::string_vie
   };
   const std::string_view main = part();
   while (ok() && !rest_.empty()) immutable_.push_back({part(), nullptr, nullptr});
+  first_piece_ = immutable_.size();
   for (const std::string_view piece : pieces) immutable_.push_back({piece, nullptr, nullptr});
   rest_ = ok() ? main : std::string_view{};
 }

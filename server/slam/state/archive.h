@@ -266,7 +266,7 @@ class StateReader {
   [[nodiscard]] const char* failed() const { return failed_; }
   // Whether everything has been read.
   [[nodiscard]] bool done() const { return ok() && rest_.empty(); }
-  // The immutable values that were read, in the order of the pieces. Null: it was not needed.
+  // The values of `pieces`, in their order. Null: it was not needed.
   [[nodiscard]] std::vector<std::shared_ptr<const void>> values() const;
 
   // The number of keyframes, to which the indices that follow must belong.
@@ -398,7 +398,8 @@ class StateReader {
   const char* failed_ = nullptr;
   std::size_t keyframes_ = 0;
   std::vector<NodeRead> nodes_;
-  std::vector<Immutable> immutable_;
+  std::vector<Immutable> immutable_;  // Those in `bytes`, then the pieces.
+  std::size_t first_piece_ = 0;
 };
 
 }  // namespace cairn::slam
