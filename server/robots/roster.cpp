@@ -209,8 +209,8 @@ std::shared_ptr<Session> Roster::Make(SessionId id, const SessionRequest& reques
       return false;
     };
     outputs.position = [journal = journal_, id] { return journal->position(id); };
-    outputs.checkpoint = [journal = journal_, id](std::uint64_t position, Journal::Bytes bytes) {
-      return journal->Checkpoint(id, position, std::move(bytes));
+    outputs.checkpoint = [journal = journal_, id](std::uint64_t position, Journal::Content content) {
+      return journal->Checkpoint(id, position, std::move(content));
     };
     outputs.checkpoint_entries = static_cast<std::uint64_t>(options_.checkpoint_entries);
   }

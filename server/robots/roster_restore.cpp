@@ -214,12 +214,15 @@ Result<std::shared_ptr<Session>> Roster::ReadBack(SessionId id, bool with_journa
   std::shared_ptr<Session> session = make();
   const auto checkpoint = ReadCheckpoint(journal_->store(), id);
   std::uint64_t position = 0;
+  StoredPieces pieces;
   if (!checkpoint) {
     // The whole journal, where it is still there, does as well.
     spdlog::warn("the checkpoint of session {} is not used: {}", id, checkpoint.error().message);
   } else if (*checkpoint) {
-    if (const auto loaded = session->Load((*checkpoint)->bytes)) {
+    for (const std::uint64_t number : (*checkpoint)->order) pieces.emplace(number, nullptr);
+    if (const auto loaded = session->Load((*checkpoint)->bytes, (*checkpoint)->PiecesInOrder())) {
       position = (*checkpoint)->position;
+      for (std::size_t i = 0; i < loaded->size(); ++i) pieces[(*checkpoint)->order[i]] = (*loaded)[i];
     } else {
       // For example, the estimator has other options now. The whole journal can be replayed instead, if it is still
       // there.
@@ -253,7 +256,7 @@ Result<std::shared_ptr<Session>> Roster::ReadBack(SessionId id, bool with_journa
     return Fail(StatusCode::kDataLoss, "its checkpoint cannot be used, and the journal before it was removed");
   }
   session->Replayed();
-  journal_->Reopen(id, *last, DurableFor(session));
+  journal_->Reopen(id, *last, DurableFor(session), std::move(pieces));
   return session;
 }
 

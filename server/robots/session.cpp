@@ -217,14 +217,15 @@ void Session::Drain() {
 }
 
 void Session::TakeCheckpoint() {
-  // What a session drops at its end is not in the journal.
+  // What is dropped when a session ends or the server stops is in the record but not in the journal. The client sends
+  // it again to the next server, which must not take it for something that it has received before.
   if (failed_ || ending_ || !outputs_.position || !outputs_.checkpoint) return;
   const std::uint64_t position = outputs_.position();
   if (position < checkpointed_ + outputs_.checkpoint_entries) return;
-  auto bytes = estimator_.Save();
+  auto content = estimator_.Save();
   // Samples that were settled meanwhile are in the record, but perhaps not in the journal before this position.
-  if (!bytes || outputs_.position() != position) return;
-  if (outputs_.checkpoint(position, std::move(bytes))) checkpointed_ = position;
+  if (!content || ending_ || outputs_.position() != position) return;
+  if (outputs_.checkpoint(position, std::move(content))) checkpointed_ = position;
 }
 
 void Session::Handle(RobotEvent&& event) {

@@ -61,7 +61,10 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   void Replayed();
   // This restored session is not used after all. Its records stay in the store when it is destroyed.
   void KeepStored() { keep_stored_ = true; }
-  [[nodiscard]] Result<void> Load(std::string_view bytes) { return estimator_.Load(bytes); }
+  [[nodiscard]] Result<SessionEstimator::PieceValues> Load(std::string_view main,
+                                                           std::span<const std::string_view> pieces) {
+    return estimator_.Load(main, pieces);
+  }
   // Publishes ledgers that are due and whatever could not be sent before.
   void Tick();
 

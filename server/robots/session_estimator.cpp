@@ -46,6 +46,20 @@ std::vector<LandmarkReport> ReportsOf(const std::vector<slam::Landmark>& landmar
   return reports;
 }
 
+std::string BytesOfNumber(std::uint64_t number) {
+  std::string bytes;
+  for (int i = 0; i < 8; ++i) bytes.push_back(static_cast<char>(number >> (8 * i)));
+  return bytes;
+}
+
+std::optional<std::uint64_t> TakeNumber(std::string_view& bytes) {
+  if (bytes.size() < 8) return std::nullopt;
+  std::uint64_t number = 0;
+  for (std::size_t i = 0; i < 8; ++i) number |= std::uint64_t{static_cast<unsigned char>(bytes[i])} << (8 * i);
+  bytes.remove_prefix(8);
+  return number;
+}
+
 }  // namespace
 
 SessionEstimator::SessionEstimator(const EstimatorSetup& setup, SessionRecord& record, SessionOutputs outputs)
@@ -149,7 +163,7 @@ void SessionEstimator::ReplayOdometry(const OdometryTaken& odometry) {
                           odometry.use == OdometryUse::kMerged ? DropReason::kQueueFull : DropReason::kBadGeometry);
 }
 
-std::function<std::string()> SessionEstimator::Save() const {
+Journal::Content SessionEstimator::Save() const {
   auto writer = std::make_shared<slam::StateWriter>();
   if (ended_) return nullptr;
   // The scans themselves are saved by the pipeline, in the same order.
@@ -158,21 +172,28 @@ std::function<std::string()> SessionEstimator::Save() const {
   (*writer)(epoch_, session_, waiting);
   if (!record_.Save(*writer, WaitingBySensor())) return nullptr;
   return [writer, pipeline = std::make_shared<const slam::Checkpoint>(pipeline_.Save())] {
-    const std::string own = writer->Bytes();
-    std::string bytes;
-    for (int i = 0; i < 8; ++i) bytes.push_back(static_cast<char>(own.size() >> (8 * i)));
-    return bytes + own + pipeline->Bytes();
+    const std::string own = writer->Main();
+    CheckpointContent content(BytesOfNumber(own.size()) + own + BytesOfNumber(writer->pieces().size()) +
+                              pipeline->Main());
+    for (const auto* const pieces : {&writer->pieces(), &pipeline->pieces()})
+      for (const slam::StatePiece& piece : *pieces)
+        content.pieces.push_back({piece.value, [piece] { return piece.Bytes(); }});
+    return content;
   };
 }
 
-Result<void> SessionEstimator::Load(std::string_view bytes) {
-  std::uint64_t size = 0;
-  for (std::size_t i = 0; i < 8 && i < bytes.size(); ++i)
-    size |= std::uint64_t{static_cast<unsigned char>(bytes[i])} << (8 * i);
-  if (bytes.size() < 8 || size > bytes.size() - 8) return Fail(StatusCode::kDataLoss, "a checkpoint is too short");
+Result<SessionEstimator::PieceValues> SessionEstimator::Load(std::string_view main,
+                                                             std::span<const std::string_view> pieces) {
+  const auto own_size = TakeNumber(main);
+  if (!own_size || *own_size > main.size()) return Fail(StatusCode::kDataLoss, "a checkpoint is too short");
+  const std::string_view own = main.substr(0, *own_size);
+  main.remove_prefix(own.size());
+  const auto own_pieces = TakeNumber(main);
+  if (!own_pieces || *own_pieces > pieces.size()) return Fail(StatusCode::kDataLoss, "a checkpoint is too short");
   // The estimator is loaded first: if that fails, nothing has changed.
-  if (auto loaded = pipeline_.Load(bytes.substr(8 + size)); !loaded) return loaded;
-  slam::StateReader reader(bytes.substr(8, size));
+  const auto loaded = pipeline_.LoadPieces(main, pieces.subspan(*own_pieces));
+  if (!loaded) return tl::unexpected(loaded.error());
+  slam::StateReader reader(own, pieces.first(*own_pieces));
   std::vector<NameId> waiting;
   reader(epoch_, session_, waiting);
   waiting_.clear();
@@ -182,7 +203,10 @@ Result<void> SessionEstimator::Load(std::string_view bytes) {
       waiting_.emplace(&scan, Waiting{waiting[next++], scan.sequence, Clock::now()});
   });
   reader.Require(next == waiting.size(), "number of waiting scans");
-  return record_.Load(reader, WaitingBySensor());
+  if (auto record = record_.Load(reader, WaitingBySensor()); !record) return tl::unexpected(record.error());
+  PieceValues values = reader.values();
+  values.insert(values.end(), loaded->begin(), loaded->end());
+  return values;
 }
 
 SessionRecord::WaitingScans SessionEstimator::WaitingBySensor() const {

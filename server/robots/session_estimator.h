@@ -7,12 +7,16 @@
 
 #include <chrono>
 #include <functional>
+#include <memory>
+#include <span>
 #include <unordered_map>
+#include <vector>
 
 #include "server/outbound.h"
 #include "server/robots/robot_event.h"
 #include "server/robots/session_record.h"
 #include "server/slam/scan_pipeline.h"
+#include "server/store/journal.h"
 
 namespace cairn::server {
 
@@ -26,7 +30,7 @@ struct SessionOutputs {
   // `position` returns the position of the last entry that `store` accepted, and `checkpoint` stores the state after
   // this entry. A checkpoint is due after every `checkpoint_entries` entries. Empty functions: no checkpoints.
   std::function<std::uint64_t()> position = {};
-  std::function<bool(std::uint64_t position, std::function<std::string()> bytes)> checkpoint = {};
+  std::function<bool(std::uint64_t position, Journal::Content content)> checkpoint = {};
   std::uint64_t checkpoint_entries = 0;
   // Called when the session has been destroyed, after all of its changes were reported. May be empty.
   std::function<void()> gone = {};
@@ -55,11 +59,13 @@ class SessionEstimator {
   void Replay(JournalEntry&& entry, const Switched& switched);
   // Called after the last entry: gives the drawn grid to the map.
   void Replayed();
-  // Saves the state after the entries so far. The result is a function that makes the bytes; it may take long and may
+  // Saves the state after the entries so far. The result is a function that makes the content; it may take long and may
   // run on any thread. Empty if the moment does not allow a checkpoint (SessionRecord::Save). Load restores this state;
   // then the entries that follow are replayed.
-  [[nodiscard]] std::function<std::string()> Save() const;
-  [[nodiscard]] Result<void> Load(std::string_view bytes);
+  [[nodiscard]] Journal::Content Save() const;
+  // Returns the values of the pieces, in their order.
+  using PieceValues = std::vector<std::shared_ptr<const void>>;
+  [[nodiscard]] Result<PieceValues> Load(std::string_view main, std::span<const std::string_view> pieces);
 
  private:
   struct Waiting {

@@ -103,10 +103,18 @@ Checkpoint::Checkpoint(const MapperOptions& options, StateWriter state)
     : options_(TextOf(options)), state_(std::move(state)) {}
 
 std::string Checkpoint::Bytes() const {
+  return With(state_.Bytes());
+}
+
+std::string Checkpoint::Main() const {
+  return With(state_.Main());
+}
+
+std::string Checkpoint::With(const std::string& state) const {
   std::string checked;
   AppendNumber(checked, static_cast<std::uint64_t>(options_.size()));
   checked += options_;
-  checked += state_.Bytes();
+  checked += state;
   std::string bytes(kMagic);
   AppendNumber(bytes, kCheckpointFormat);
   AppendNumber(bytes, Checksum(checked));

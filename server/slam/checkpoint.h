@@ -16,7 +16,7 @@
 
 namespace cairn::slam {
 
-inline constexpr std::uint32_t kCheckpointFormat = 2;
+inline constexpr std::uint32_t kCheckpointFormat = 3;
 
 class Checkpoint {
  public:
@@ -24,8 +24,13 @@ class Checkpoint {
 
   // May take long. May be called from any thread, even while the estimator runs.
   [[nodiscard]] std::string Bytes() const;
+  // The same in two parts (StateWriter::Main); the checksum is that of the main part.
+  [[nodiscard]] std::string Main() const;
+  [[nodiscard]] const std::vector<StatePiece>& pieces() const { return state_.pieces(); }
 
  private:
+  [[nodiscard]] std::string With(const std::string& state) const;
+
   std::string options_;
   StateWriter state_;
 };

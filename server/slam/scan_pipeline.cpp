@@ -46,9 +46,14 @@ Checkpoint ScanPipeline::Save() const {
 }
 
 Result<void> ScanPipeline::Load(std::string_view bytes) {
-  const Result<std::string_view> state = OpenCheckpoint(bytes, options_);
+  return LoadPieces(bytes, {}).map([](const auto&) {});
+}
+
+Result<std::vector<std::shared_ptr<const void>>> ScanPipeline::LoadPieces(std::string_view main,
+                                                                          std::span<const std::string_view> pieces) {
+  const Result<std::string_view> state = OpenCheckpoint(main, options_);
   if (!state) return tl::unexpected(state.error());
-  StateReader archive(*state);
+  StateReader archive(*state, pieces);
   Mapper mapper(options_, {}, 0);
   mapper.Load(archive);
   // The pairing is read twice, at first into one that is not used, so that a failure changes nothing.
@@ -60,7 +65,7 @@ Result<void> ScanPipeline::Load(std::string_view bytes) {
                 std::string("the checkpoint is damaged: ") + (archive.ok() ? "more than the state" : archive.failed()));
   again(pairing_);
   mapper_ = std::move(mapper);
-  return {};
+  return again.values();
 }
 
 }  // namespace cairn::slam

@@ -54,6 +54,10 @@ class ScanPipeline {
   // Replaces the state by a saved one, which may come from a pipeline with another start pose. If the bytes are damaged
   // (kDataLoss), have another format or were made with other options (kFailedPrecondition), nothing changes.
   [[nodiscard]] Result<void> Load(std::string_view bytes);
+  // The same for a checkpoint in parts (Checkpoint::Main). Returns the values of the pieces, in their order; a later
+  // checkpoint shares those that it still needs.
+  [[nodiscard]] Result<std::vector<std::shared_ptr<const void>>> LoadPieces(std::string_view main,
+                                                                            std::span<const std::string_view> pieces);
 
   // Odometry samples refused so far for their stamps.
   [[nodiscard]] std::uint64_t odometry_refused() const { return pairing_.odometry_refused(); }

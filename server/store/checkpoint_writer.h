@@ -1,46 +1,86 @@
-// Writes the checkpoint of a session in parts, over several commits, so that a large one does not delay other commits.
-// Part 0 (the head) is written last and completes the checkpoint; older checkpoints are removed in the same commit. The
-// record number is position * 65,536 + part. Not thread-safe.
+// Writes the checkpoint of a session, over several commits, so that a large one does not delay other commits. It
+// consists of a main part and of pieces. A piece never changes, and later checkpoints that still contain it refer to
+// the record that is already on the disk, so that a checkpoint takes the time and the space of what is new. The main
+// part is written in records of 1 MiB. Its head is written last and completes the checkpoint; in the same commit older
+// main parts, and pieces that this checkpoint does not contain, are removed. Record numbers: head position * 65,536,
+// part n of the main part position * 65,536 + n, piece n 2^63 + n. Not thread-safe.
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "server/store/store.h"
 
 namespace cairn::server {
 
+struct CheckpointPiece {
+  std::shared_ptr<const void> value;  // The same value is the same piece. It must not change as long as it is shared.
+  std::function<std::string()> bytes;
+};
+struct CheckpointContent {
+  CheckpointContent(std::string main_part, std::vector<CheckpointPiece> all_pieces = {})
+      : main(std::move(main_part)), pieces(std::move(all_pieces)) {}
+
+  std::string main;
+  std::vector<CheckpointPiece> pieces;
+};
+
+// The pieces of the newest checkpoint on the disk, by number. Null: the value is not in memory.
+using StoredPieces = std::map<std::uint64_t, std::shared_ptr<const void>>;
+
 class CheckpointWriter {
  public:
   static constexpr std::size_t kPartBytes = std::size_t{1} << 20;
-  static constexpr std::size_t kPartsPerCommit = 4;
+  static constexpr std::size_t kBytesPerCommit = 4 * kPartBytes;
 
-  CheckpointWriter(std::uint64_t session, std::uint64_t position, std::string bytes)
-      : session_(session), position_(position), bytes_(std::move(bytes)) {}
+  CheckpointWriter(std::uint64_t session, std::uint64_t position, CheckpointContent content, StoredPieces stored = {});
 
-  // Adds the next parts to a commit that is about to be made.
+  // Adds the next records to a commit that is about to be made.
   void AddTo(RecordChanges& changes);
-  // Whether all parts, including the head, have been added to commits.
+  // Whether everything, including the head, has been added to commits.
   [[nodiscard]] bool complete() const { return complete_; }
   [[nodiscard]] std::uint64_t session() const { return session_; }
   [[nodiscard]] std::uint64_t position() const { return position_; }
+  // What is stored when it is complete.
+  [[nodiscard]] const StoredPieces& pieces() const { return pieces_; }
 
  private:
-  [[nodiscard]] RecordKey KeyOf(std::uint32_t part) const;
+  struct NewPiece {
+    std::uint64_t number = 0;
+    std::function<std::string()> bytes;
+  };
+  void Number(std::vector<CheckpointPiece> pieces);
+  void Complete(RecordChanges& changes);
 
   const std::uint64_t session_;
   const std::uint64_t position_;
-  const std::string bytes_;
+  const std::string main_;
+  const StoredPieces stored_;
+  StoredPieces pieces_;
+  std::vector<std::uint64_t> order_;
+  std::vector<NewPiece> new_pieces_;
+  bool begun_ = false;
+  std::size_t pieces_written_ = 0;
   std::uint32_t parts_ = 0;
-  std::size_t written_ = 0;
+  std::size_t written_ = 0;  // Bytes of the main part.
   bool complete_ = false;
 };
 
 // The newest complete checkpoint of a session.
 struct StoredCheckpoint {
   std::uint64_t position = 0;
-  std::string bytes;
+  std::string bytes;  // The main part.
+  std::map<std::uint64_t, std::string> pieces;
+  std::vector<std::uint64_t> order;  // Numbers of the pieces; none twice.
+
+  [[nodiscard]] std::vector<std::string_view> PiecesInOrder() const;
 };
 // DATA_LOSS: it is damaged, or a part of it is missing.
 [[nodiscard]] Result<std::optional<StoredCheckpoint>> ReadCheckpoint(Store& store, std::uint64_t session);

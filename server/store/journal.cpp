@@ -55,9 +55,9 @@ void Journal::Open(const StoredSession& session, Durable durable) {
   urgent_ = true;
 }
 
-void Journal::Reopen(std::uint64_t session, std::uint64_t last, Durable durable) {
+void Journal::Reopen(std::uint64_t session, std::uint64_t last, Durable durable, StoredPieces pieces) {
   const MutexLock lock(mutex_);
-  lines_[session] = Line{.next = last + 1, .durable = std::move(durable)};
+  lines_[session] = Line{.next = last + 1, .pieces = std::move(pieces), .durable = std::move(durable)};
 }
 
 std::uint64_t Journal::Append(std::uint64_t session, JournalEntry entry) {
@@ -78,12 +78,12 @@ std::uint64_t Journal::position(std::uint64_t session) const {
   return line == lines_.end() || line->second.lost ? 0 : line->second.next - 1;
 }
 
-bool Journal::Checkpoint(std::uint64_t session, std::uint64_t position, Bytes bytes) {
+bool Journal::Checkpoint(std::uint64_t session, std::uint64_t position, Content content) {
   const MutexLock lock(mutex_);
   const auto line = lines_.find(session);
   if (line == lines_.end() || line->second.lost || line->second.checkpointing) return false;
   line->second.checkpointing = true;
-  checkpoints_.push_back({session, position, std::move(bytes)});
+  checkpoints_.push_back({session, position, std::move(content)});
   arrived_.NotifyAll();
   return true;
 }
@@ -232,13 +232,15 @@ void Journal::DropForgottenCheckpoint() {
 void Journal::BeginCheckpoint() {
   if (writing_) return;
   WantedCheckpoint wanted;
+  StoredPieces pieces;
   {
     const MutexLock lock(mutex_);
     if (checkpoints_.empty()) return;
     wanted = std::move(checkpoints_.front());
     checkpoints_.pop_front();
+    if (const auto line = lines_.find(wanted.session); line != lines_.end()) pieces = line->second.pieces;
   }
-  writing_.emplace(wanted.session, wanted.position, wanted.bytes());
+  writing_.emplace(wanted.session, wanted.position, wanted.content(), std::move(pieces));
 }
 
 bool Journal::CommitOnce(const RecordChanges& changes) {
@@ -281,6 +283,7 @@ void Journal::EndCheckpoint() {
   if (line != lines_.end()) {
     line->second.checkpointing = false;
     line->second.checkpointed = writing_->position();
+    line->second.pieces = writing_->pieces();
   }
   writing_.reset();
 }

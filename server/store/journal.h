@@ -60,14 +60,16 @@ class Journal {
 
   // Open: a new session, which is stored at once. Reopen: a session that was restored up to position `last`.
   void Open(const StoredSession& session, Durable durable);
-  void Reopen(std::uint64_t session, std::uint64_t last, Durable durable);
+  // `pieces` are those of its newest checkpoint.
+  void Reopen(std::uint64_t session, std::uint64_t last, Durable durable, StoredPieces pieces = {});
   // Returns the position of the entry, counted from 1; 0 if it is not stored, also because `session` is not open.
   std::uint64_t Append(std::uint64_t session, JournalEntry entry);
   // The position of the session's last entry; 0 if there is none, or if the session is not stored.
   [[nodiscard]] std::uint64_t position(std::uint64_t session) const;
-  // Stores the session's state after exactly the entries up to `position`. Returns false if another checkpoint of the
-  // session is still being written.
-  bool Checkpoint(std::uint64_t session, std::uint64_t position, Bytes bytes);
+  // Stores the session's state after exactly the entries up to `position`. `content` is called on the journal's thread.
+  // Returns false if another checkpoint of the session is still being written.
+  using Content = std::function<CheckpointContent()>;
+  bool Checkpoint(std::uint64_t session, std::uint64_t position, Content content);
   // Nothing of the session is written any more, and what is stored of it stays.
   void Close(std::uint64_t session);
   // Removes all records of a session that will not be restored.
@@ -94,6 +96,7 @@ class Journal {
     bool lost = false;
     bool checkpointing = false;
     std::uint64_t checkpointed = 0;  // Position of the newest complete checkpoint of this start.
+    StoredPieces pieces = {};        // Those of the newest complete checkpoint.
     Durable durable;
   };
   struct Appended {
@@ -123,7 +126,7 @@ class Journal {
   struct WantedCheckpoint {
     std::uint64_t session = 0;
     std::uint64_t position = 0;
-    Bytes bytes;
+    Content content;
   };
 
   void CloseLocked(std::uint64_t session) CAIRN_REQUIRES(mutex_);

@@ -116,9 +116,10 @@ bool RunEstimator(std::size_t kind, std::string_view state) {
 // As SessionEstimator::Save joins the two parts.
 std::string Joined(std::string_view account, std::string_view estimator) {
   const std::uint64_t size = account.size();
-  std::string bytes(sizeof(size), '\0');
-  std::memcpy(bytes.data(), &size, sizeof(size));
-  return bytes.append(account).append(estimator);
+  std::string number(sizeof(size), '\0');
+  const std::string no_pieces = number;
+  std::memcpy(number.data(), &size, sizeof(size));
+  return number.append(account).append(no_pieces).append(estimator);
 }
 
 bool RunServer(std::string_view account, std::string_view state) {

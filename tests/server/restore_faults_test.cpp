@@ -58,7 +58,13 @@ TEST(Restore, ASessionWithDamagedRecordsIsRefusedAndTheOthersComeBack) {
     const auto store = *OpenStore(directory / "0");
     const auto checkpoint = ReadCheckpoint(*store, 1);
     ASSERT_TRUE(checkpoint && *checkpoint);
-    position = (*checkpoint)->position;
+    // The end of the record that contains the entry of this position.
+    const auto find = [&](std::uint64_t number, std::string_view) -> Result<void> {
+      if (position == 0 && number >= (*checkpoint)->position) position = number;
+      return {};
+    };
+    ASSERT_TRUE(store->Read({.kind = RecordKind::kJournal, .owner = 1}, find));
+    ASSERT_GT(position, 0U);
   }
   ASSERT_NO_FATAL_FAILURE(DamageCheckpoint(directory / "0", 1));
   std::filesystem::copy(directory / "0", directory / "1");

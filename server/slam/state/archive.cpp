@@ -31,29 +31,54 @@ void StateWriter::Clear() {
   free_ = kBlockSize;
 }
 
+void StateWriter::AppendLengthTo(std::string& bytes) const {
+  const std::uint64_t length = size();
+  bytes.append(reinterpret_cast<const char*>(&length), sizeof(length));
+}
+
 void StateWriter::AppendTo(std::string& bytes) const {
-  std::uint64_t left = size();
-  bytes.append(reinterpret_cast<const char*>(&left), sizeof(left));
+  std::size_t left = size();
   for (const auto& block : blocks_) {
-    const std::size_t part = std::min<std::size_t>(left, kBlockSize);
+    const std::size_t part = std::min(left, kBlockSize);
     bytes.append(block.get(), part);
     left -= part;
   }
 }
 
-std::string StateWriter::Bytes() const {
-  std::string bytes;
-  AppendTo(bytes);
+std::string StatePiece::Bytes() const {
   StateWriter writer;
-  for (const Immutable& shared : immutable_) {
+  write(writer, value.get());
+  std::string bytes;
+  writer.AppendTo(bytes);
+  return bytes;
+}
+
+std::string StateWriter::Main() const {
+  std::string bytes;
+  AppendLengthTo(bytes);
+  AppendTo(bytes);
+  return bytes;
+}
+
+std::string StateWriter::Bytes() const {
+  std::string bytes = Main();
+  StateWriter writer;
+  for (const StatePiece& shared : immutable_) {
     writer.Clear();
     shared.write(writer, shared.value.get());
+    writer.AppendLengthTo(bytes);
     writer.AppendTo(bytes);
   }
   return bytes;
 }
 
-StateReader::StateReader(std::string_view bytes) : rest_(bytes) {
+std::vector<std::shared_ptr<const void>> StateReader::values() const {
+  std::vector<std::shared_ptr<const void>> values;
+  for (std::size_t i = first_piece_; i < immutable_.size(); ++i) values.push_back(immutable_[i].value);
+  return values;
+}
+
+StateReader::StateReader(std::string_view bytes, std::span<const std::string_view> pieces) : rest_(bytes) {
   const auto part = [this] {
     std::uint64_t size = 0;
     Get(size);
@@ -64,6 +89,8 @@ StateReader::StateReader(std::string_view bytes) : rest_(bytes) {
   };
   const std::string_view main = part();
   while (ok() && !rest_.empty()) immutable_.push_back({part(), nullptr, nullptr});
+  first_piece_ = immutable_.size();
+  for (const std::string_view piece : pieces) immutable_.push_back({piece, nullptr, nullptr});
   rest_ = ok() ? main : std::string_view{};
 }
 

@@ -27,6 +27,7 @@
 #include <optional>
 #include <random>
 #include <set>
+#include <span>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -113,6 +114,16 @@ Later(T&) -> Later<T>;
 template <typename T>
 inline constexpr char kKindOf = 0;
 
+class StateWriter;
+
+// An immutable value that a state shares. Bytes may be called from any thread.
+struct StatePiece {
+  std::shared_ptr<const void> value;
+  void (*write)(StateWriter& writer, const void* value) = nullptr;
+
+  [[nodiscard]] std::string Bytes() const;
+};
+
 class StateWriter {
  public:
   static constexpr bool kReads = false;
@@ -140,15 +151,16 @@ class StateWriter {
   // Everything written so far, with the immutable values that it shares. They are written here, so that the time is
   // spent by whoever calls this. May be called from any thread, if nothing is written any more.
   [[nodiscard]] std::string Bytes() const;
+  // The same in two parts, for those who have the bytes of some immutable values already: Bytes() is Main() and then
+  // the length and the bytes of each piece.
+  [[nodiscard]] std::string Main() const;
+  [[nodiscard]] const std::vector<StatePiece>& pieces() const { return immutable_; }
 
  private:
+  friend struct StatePiece;
   struct NodeSeen {
     std::uint32_t id = 0;
     std::uint64_t shape = 0;
-  };
-  struct Immutable {
-    std::shared_ptr<const void> value;
-    void (*write)(StateWriter& writer, const void* value);
   };
 
   static constexpr std::size_t kBlockSize = 1 << 20;
@@ -165,6 +177,7 @@ class StateWriter {
   void Clear();
   [[nodiscard]] std::size_t size() const { return blocks_.size() * kBlockSize - free_; }
   void AppendTo(std::string& bytes) const;
+  void AppendLengthTo(std::string& bytes) const;
 
   template <typename T>
   void Put(const T& value) {
@@ -230,7 +243,7 @@ class StateWriter {
   std::unordered_map<const void*, NodeSeen> nodes_;
   std::uint32_t next_node_ = 0;
   std::unordered_map<const void*, std::uint32_t> immutable_ids_;
-  std::vector<Immutable> immutable_;
+  std::vector<StatePiece> immutable_;
 };
 
 class StateReader {
@@ -238,8 +251,9 @@ class StateReader {
   static constexpr bool kReads = true;
   static constexpr double kLargest = 1e12;  // No length, angle or weight of an estimator is larger.
 
-  // `bytes` are the result of StateWriter::Bytes, or anything else; they must outlive the reader.
-  explicit StateReader(std::string_view bytes);
+  // `bytes` are the result of StateWriter::Bytes, or of Main with the bytes of the pieces in their order, or anything
+  // else; they must outlive the reader.
+  explicit StateReader(std::string_view bytes, std::span<const std::string_view> pieces = {});
 
   template <typename... Values>
   void operator()(Values&... values) {
@@ -252,6 +266,8 @@ class StateReader {
   [[nodiscard]] const char* failed() const { return failed_; }
   // Whether everything has been read.
   [[nodiscard]] bool done() const { return ok() && rest_.empty(); }
+  // The values of `pieces`, in their order. Null: it was not needed.
+  [[nodiscard]] std::vector<std::shared_ptr<const void>> values() const;
 
   // The number of keyframes, to which the indices that follow must belong.
   void SetKeyframes(std::size_t count) { keyframes_ = count; }
@@ -382,7 +398,8 @@ class StateReader {
   const char* failed_ = nullptr;
   std::size_t keyframes_ = 0;
   std::vector<NodeRead> nodes_;
-  std::vector<Immutable> immutable_;
+  std::vector<Immutable> immutable_;  // Those in `bytes`, then the pieces.
+  std::size_t first_piece_ = 0;
 };
 
 }  // namespace cairn::slam

@@ -45,7 +45,7 @@ class FrozenBlocks {
   }
 
  private:
-  static constexpr std::ptrdiff_t kBlock = 1024;
+  static constexpr std::ptrdiff_t kBlock = 256;
 
   struct Block {
     std::vector<T> values;

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
 #include <functional>
 #include <future>
@@ -97,7 +98,14 @@ class OneSession {
                              const bool taken = !on_send || on_send(value);
                              return taken && sent_.Keep(std::move(value));
                            },
-                       .grid_changed = [](GridChange&&) {}});
+                       .grid_changed = [](GridChange&&) {},
+                       .position = [this] { return position.load(); },
+                       .checkpoint =
+                           [this](std::uint64_t, const Journal::Content&) {
+                             ++checkpoints;
+                             return true;
+                           },
+                       .checkpoint_entries = 1});
     EXPECT_TRUE(session_->record().AddSensors({"laser"}));
   }
   ~OneSession() { pool_.join(); }
@@ -129,6 +137,9 @@ class OneSession {
   Session& session() { return *session_; }
   const Sent& sent() const { return sent_; }
   std::function<bool(const OutboundValue&)> on_send;  // Set before anything arrives.
+  // A checkpoint is due when the position is above that of the last one.
+  std::atomic<std::uint64_t> position{0};
+  std::atomic<int> checkpoints{0};
 
  private:
   const std::string robot_;

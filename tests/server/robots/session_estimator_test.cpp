@@ -198,6 +198,7 @@ TEST_F(SessionEstimatorTest, ACheckpointHoldsWhatWaitsInTheEstimatorAndNotWhatWa
   EXPECT_EQ(ledger().waiting, 6U);
   const auto save = estimator_.Save();
   ASSERT_TRUE(save);
+  const CheckpointContent content = save();
 
   std::vector<PoseReport> poses;
   SessionRecord record(4, RequestOf("r1"), RobotsOptions{});
@@ -209,7 +210,17 @@ TEST_F(SessionEstimatorTest, ACheckpointHoldsWhatWaitsInTheEstimatorAndNotWhatWa
                                 return true;
                               },
                           .grid_changed = [](GridChange&&) {}}};
-  ASSERT_TRUE(other.Load(save()));
+  std::vector<std::string> pieces;
+  for (const CheckpointPiece& piece : content.pieces) pieces.push_back(piece.bytes());
+  const std::vector<std::string_view> views(pieces.begin(), pieces.end());
+  const auto loaded = other.Load(content.main, views);
+  ASSERT_TRUE(loaded);
+  // The next checkpoint shares what has not changed.
+  ASSERT_EQ(loaded->size(), pieces.size());
+  const CheckpointContent again = other.Save()();
+  EXPECT_TRUE(std::ranges::any_of(again.pieces, [&](const CheckpointPiece& piece) {
+    return std::ranges::find(*loaded, piece.value) != loaded->end();
+  }));
   const auto restored = [&record] { return record.snapshot().status.ledgers.at(0); };
   EXPECT_EQ(restored().received, 23U);
   EXPECT_EQ(restored().waiting, 3U);

@@ -362,5 +362,28 @@ TEST(Session, AbandonDropsWhatStillWaits) {
   EXPECT_EQ(one.ledger().waiting, 0U);
 }
 
+// What the server's stop drops is sent again to the next server. A checkpoint that counted it would make the next
+// server ignore it.
+TEST(Session, NoCheckpointHoldsWhatTheServersStopDrops) {
+  for (const bool stopping : {false, true}) {
+    OneSession one;
+    const auto release = one.HoldStrand();
+    one.Drive(0, 8);
+    std::promise<void> done;
+    if (stopping) one.session().Suspend([&done] { done.set_value(); });
+    one.session().Abandon();
+    one.position = 100;
+    release->set_value();
+    if (stopping) {
+      ASSERT_EQ(done.get_future().wait_for(std::chrono::seconds(20)), std::future_status::ready);
+      ASSERT_TRUE(one.sent().WaitFor([&] { return !one.session().has_work(); }));
+      EXPECT_EQ(Dropped(one.ledger(), DropReason::kSessionEnded), 8U);
+      EXPECT_EQ(one.checkpoints, 0);
+    } else {
+      EXPECT_TRUE(one.sent().WaitFor([&] { return one.checkpoints > 0; }));
+    }
+  }
+}
+
 }  // namespace
 }  // namespace cairn::server

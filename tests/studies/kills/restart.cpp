@@ -40,16 +40,19 @@ std::unique_ptr<ChildProcess> StartServer(const fs::path& state) {
 
 // Drives the robots through a building and sends their logs as fast as a server takes them, which is killed then.
 void MakeState(const fs::path& place, double seconds, StudyContext& context) {
-  const fs::path logs = place / "logs", unfinished = place / "unfinished";
+  const fs::path logs = place / "logs", new_logs = place / "new-logs", unfinished = place / "unfinished";
   fs::remove_all(unfinished);
   const auto cairn = [](std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), ProgramPath("cairn"));
     return std::make_unique<ChildProcess>(OnDomain(std::move(arguments)));
   };
-  static_cast<void>(
-      PrintedBy(cairn({"sim", "--no-stream", "--world", "building", "--robots", std::to_string(kRobots), "--hz", "10",
-                       "--seconds", std::to_string(seconds), "--log-dir", logs.string(), "--json"})
-                    ->Wait(LiveServer::kDeadline)));
+  if (!fs::exists(logs)) {
+    static_cast<void>(
+        PrintedBy(cairn({"sim", "--no-stream", "--world", "building", "--robots", std::to_string(kRobots), "--hz", "10",
+                         "--seconds", std::to_string(seconds), "--log-dir", new_logs.string(), "--json"})
+                      ->Wait(LiveServer::kDeadline)));
+    fs::rename(new_logs, logs);
+  }
   context.report.Progress("logs of " + Number(seconds, 0) + " s");
   const auto server = StartServer(unfinished);
   if (!server->Says(" ready")) throw std::runtime_error("cairnd does not start: " + server->Wait().output);
