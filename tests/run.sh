@@ -152,7 +152,7 @@ stage_fuzz() {
 stage_tsan() {
   configure tsan
   build tsan --target tsan_tests
-  run_tests tsan -L tsan
+  tests_at_once=$jobs run_tests tsan -L tsan  # These compute more than they wait.
 }
 
 # Nothing is compiled. All sources of a target at once: one by one they take ten times as long.

@@ -15,7 +15,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -25,10 +24,8 @@
 #include <deque>
 #include <memory>
 #include <optional>
-#include <random>
 #include <set>
 #include <span>
-#include <sstream>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -37,8 +34,7 @@
 #include <vector>
 
 #include "common/geometry/pose2.h"
-#include "common/sensor/odometry.h"
-#include "common/sensor/scan.h"
+#include "server/slam/state/value_members.h"
 
 namespace cairn::slam {
 
@@ -51,47 +47,6 @@ template <typename T>
 concept PlainNumber = std::is_arithmetic_v<T> && !std::same_as<T, bool>;
 template <typename T>
 concept FixedMatrix = std::is_base_of_v<Eigen::PlainObjectBase<T>, T> && T::SizeAtCompileTime != Eigen::Dynamic;
-template <typename T, typename Of>
-concept MaybeConst = std::same_as<std::remove_const_t<T>, Of>;
-
-// The members of values of `common`. A pose must be finite and within the bounds of odometry.
-template <typename Archive, MaybeConst<Pose2> Self>
-void MembersOf(Archive& archive, Self& pose) {
-  archive(pose.x, pose.y, pose.theta);
-  if constexpr (Archive::kReads)
-    archive.Require(pose.IsFinite() && std::abs(pose.x) <= 2e7 && std::abs(pose.y) <= 2e7, "a pose");
-}
-template <typename Archive, MaybeConst<Odometry> Self>
-void MembersOf(Archive& archive, Self& odometry) {
-  archive(odometry.sequence, odometry.stamp, odometry.T_odom_robot);
-}
-template <typename Archive, MaybeConst<Scan> Self>
-void MembersOf(Archive& archive, Self& scan) {
-  archive(scan.sequence, scan.stamp, scan.angle_first_rad, scan.angle_step_rad, scan.range_min_m, scan.range_max_m,
-          scan.beam_period_s, scan.tilt_rad, scan.T_robot_laser, scan.ranges_m);
-  if constexpr (Archive::kReads) archive.Require(ValidateScan(scan).has_value(), "a scan");
-}
-// The standard defines the text of a random engine.
-template <typename Archive, MaybeConst<std::mt19937_64> Self>
-void MembersOf(Archive& archive, Self& engine) {
-  std::stringstream stream;
-  std::string text;
-  if constexpr (!Archive::kReads) {
-    stream << engine;
-    text = stream.str();
-  }
-  archive(text);
-  if constexpr (Archive::kReads) {
-    stream.str(text);
-    stream >> engine;
-    archive.Require(!stream.fail(), "a random engine");
-  }
-}
-template <typename Archive, MaybeConst<Eigen::AlignedBox2d> Self>
-void MembersOf(Archive& archive, Self& box) {
-  archive(box.min(), box.max());
-}
-
 // Reads and writes a value that is cheap to copy, by means of shared nodes: what is written is the copy.
 template <typename T>
 struct Later {
