@@ -26,16 +26,18 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   State& s = *state_;
   const Stamp stamp = scan->stamp;
   const bool tilted = IsTilted(*scan, s.options.max_tilt_rad);
-  if (!s.options.front_end.use_odometry) passage = std::min(passage, Passage::kPaused);
-  if (passage == Passage::kUnknown || (passage == Passage::kPaused && tilted)) s.LosePlace(passage == Passage::kPaused);
+  if (!s.options.front_end.use_odometry) passage = std::min(passage, Passage::kUnwatched);
+  if (passage == Passage::kUnknown || (passage != Passage::kDriven && tilted))
+    s.LosePlace(passage != Passage::kUnknown);
   if (tilted) return s.Coast(stamp, T_odom_robot);
 
   if (s.drawing.redrawing()) s.drawing.Continue(s.trail.keyframes(), s.believed_path());
 
   ScanView view = Look(*scan, s.options.front_end);
   TrackStep step = s.front_end.Track(view, T_odom_robot, parallel_for);
-  if (passage == Passage::kPaused && !s.StoodStill(*scan, T_odom_robot, step))
-    step = s.DoubtPlace(view, T_odom_robot, step, parallel_for);
+  const bool watched = passage == Passage::kDriven || s.StoodStill(*scan, T_odom_robot, step) ||
+                       (passage == Passage::kPaused && s.GoesOn(*scan, view.points_robot, T_odom_robot, step));
+  if (!watched && passage != Passage::kUnknown) step = s.DoubtPlace(view, T_odom_robot, step, parallel_for);
   s.last_scan = State::LastScan{scan, T_odom_robot, step.T_track_robot};
   if (s.recovery.active()) return s.Recover({std::move(scan), T_odom_robot}, std::move(view), step, parallel_for);
 

@@ -17,6 +17,12 @@ constexpr double kSameRangePerM = 0.01;
 constexpr double kUnchanged = 0.95;
 constexpr double kUnchangedAlongCorridor = 0.98;  // Most beams show the same everywhere along it.
 
+// A pause may be so long if the robot goes on at once, and scan and odometry may differ by so much.
+constexpr double kShortPause_s = 10.0;
+constexpr double kAsOdometryM = 0.15;
+constexpr double kAsOdometryPerM = 0.1;
+constexpr double kAsOdometryRad = 0.1;
+
 bool LookAlike(const Scan& a, const Scan& b, double least) {
   if (a.ranges_m.size() != b.ranges_m.size() || a.angle_first_rad != b.angle_first_rad) return false;
   std::size_t compared = 0, same = 0;
@@ -53,14 +59,28 @@ bool Mapper::State::StoodStill(const Scan& scan, const Pose2& T_odom_robot, cons
          LookAlike(*last_scan->scan, scan, step.degenerate ? kUnchangedAlongCorridor : kUnchanged);
 }
 
+// Whether the robot has certainly driven on by itself during a short pause: the scan shows its position, this is where
+// odometry has taken it, and nothing there looks different from before.
+bool Mapper::State::GoesOn(const Scan& scan, const std::vector<SurfacePoint>& points_robot, const Pose2& T_odom_robot,
+                           const TrackStep& step) const {
+  if (!HasMap() || recovery.active() || !options.front_end.use_odometry) return false;
+  if (!last_scan || !step.matched || step.degenerate) return false;
+  if (NanosBetween(last_scan->scan->stamp, scan.stamp) > static_cast<std::uint64_t>(kShortPause_s * kNanosPerSecond))
+    return false;
+  const Pose2 odometry = Between(last_scan->T_odom_robot, T_odom_robot);
+  const Pose2 error = Between(odometry, Between(last_scan->T_track_robot, step.T_track_robot));
+  const double allowed_m = kAsOdometryM + kAsOdometryPerM * odometry.translation().norm();
+  return error.translation().norm() < allowed_m && std::abs(error.theta) < kAsOdometryRad &&
+         recovery.Fits(scan, points_robot, T_map_track() * step.T_track_robot, trail, believed_path());
+}
+
 // Nobody watched the robot before this scan. If the scan goes on where the last ones ended, as far as it shows, the
 // robot is probably still on its path, but has to prove it; otherwise it has to be found.
 TrackStep Mapper::State::DoubtPlace(const ScanView& view, const Pose2& T_odom_robot, const TrackStep& step,
                                     const ParallelFor& parallel_for) {
   if (!HasMap()) return step;
   if (!recovery.active() && step.matched) {
-    const Pose2 T_map_track = believed_path()[trail.size() - 1] * trail.shapes().back().T_track_robot.Inverse();
-    recovery.BeginOnPath(LastKnown(), T_map_track);
+    recovery.BeginOnPath(LastKnown(), T_map_track());
     return step;
   }
   LosePlace(true);

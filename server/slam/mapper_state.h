@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "server/slam/blind_motion.h"
 #include "server/slam/loops/loop_search.h"
@@ -47,6 +48,11 @@ struct Mapper::State {
     return options.front_end.use_odometry ? T_odom_robot : level.T_odom_robot;
   }
   [[nodiscard]] bool StoodStill(const Scan& scan, const Pose2& T_odom_robot, const TrackStep& step) const;
+  [[nodiscard]] bool GoesOn(const Scan& scan, const std::vector<SurfacePoint>& points_robot, const Pose2& T_odom_robot,
+                            const TrackStep& step) const;
+  [[nodiscard]] Pose2 T_map_track() const {
+    return believed_path()[trail.size() - 1] * trail.shapes().back().T_track_robot.Inverse();
+  }
   TrackStep DoubtPlace(const ScanView& view, const Pose2& T_odom_robot, const TrackStep& step,
                        const ParallelFor& parallel_for);
   ScanOutcome Recover(Keyframe keyframe, ScanView view, TrackStep step, const ParallelFor& parallel_for);

@@ -168,7 +168,8 @@ PlaceSearch::Agreement PlaceSearch::Compare(const Trail& trail, const SharedSequ
   if (counts.known() < kMinCompared) return Agreement::kNothingNear;
   // As the self-check judges a pose that was wrong before.
   const bool contradicted = counts.contradicted > 0.5 * check_.max_conflict * counts.known();
-  return contradicted ? Agreement::kContradicts : Agreement::kAgrees;
+  if (contradicted) return Agreement::kContradicts;
+  return counts.contradicted > kMaxConflictOfPlace * counts.known() ? Agreement::kDoubtful : Agreement::kAgrees;
 }
 
 }  // namespace cairn::slam

@@ -54,7 +54,7 @@ class PlaceSearch {
   void Forget() { map_.reset(); }
 
   // How a scan at this pose agrees with old keyframes near it.
-  enum class Agreement { kNothingNear, kAgrees, kContradicts };
+  enum class Agreement { kNothingNear, kAgrees, kDoubtful, kContradicts };
   [[nodiscard]] Agreement Compare(const Trail& trail, const SharedSequence<Pose2>& path, const Scan& scan,
                                   const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const;
 

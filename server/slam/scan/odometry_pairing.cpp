@@ -77,7 +77,7 @@ void OdometryPairing::Add(const Odometry& odometry) {
 }
 
 void OdometryPairing::NewClient() {
-  BeginAnew(Passage::kPaused);
+  BeginAnew(Passage::kUnwatched);
   scan_gate_.NewClient();
   odometry_gate_.NewClient();
 }
@@ -103,7 +103,7 @@ void OdometryPairing::Take(const Odometry& odometry) {
 }
 
 void OdometryPairing::ClockSetBack() {
-  BeginAnew(Passage::kPaused);
+  BeginAnew(Passage::kUnwatched);
 }
 
 // What came before cannot be joined with what comes now.
@@ -129,7 +129,7 @@ void OdometryPairing::Pair(const std::shared_ptr<const Scan>& scan, const Pose2&
   const auto robot_time = static_cast<std::uint64_t>(scan->stamp);
   auto stamp = static_cast<Stamp>(robot_time + set_back_ns_);
   if (last_paired_ && stamp <= *last_paired_) {
-    stamp = *last_paired_ + kIntervalNs;
+    stamp = static_cast<Stamp>(static_cast<std::uint64_t>(*last_paired_) + kIntervalNs);
     set_back_ns_ = static_cast<std::uint64_t>(stamp) - robot_time;
   }
   if (last_paired_ && NanosBetween(*last_paired_, stamp) > Nanos(options_.max_pause_s))

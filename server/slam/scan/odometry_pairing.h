@@ -28,7 +28,7 @@ struct PairingOptions {
   std::int64_t jump_confirmations = 5;
   std::int64_t max_waiting_scans = 64;
   std::int64_t max_odometry = 1024;  // A scan that takes longer than so many samples cannot be used.
-  double max_pause_s = 5.0;
+  double max_pause_s = 2.0;
   double max_speed_m_s = 3.0;
 };
 void Visit(OptionVisitor& visitor, PairingOptions& options);
@@ -36,7 +36,8 @@ void Visit(OptionVisitor& visitor, PairingOptions& options);
 // What lies between a scan and the one before it. Of two, the larger counts.
 enum class Passage : std::uint8_t {
   kDriven = 0,  // The robot was watched all the way.
-  kPaused,      // Scans are missing, but odometry says how the robot moved meanwhile, as far as can be told.
+  kPaused,      // Scans are missing for some time. Odometry says how the robot moved, if nobody carried it.
+  kUnwatched,   // The same, but nobody knows for how long, or another client goes on.
   kUnknown,     // The odometry began anew or jumped: nothing says where the robot is now.
 };
 
