@@ -173,8 +173,8 @@ Journal::Content SessionEstimator::Save() const {
   if (!record_.Save(*writer, WaitingBySensor())) return nullptr;
   return [writer, pipeline = std::make_shared<const slam::Checkpoint>(pipeline_.Save())] {
     const std::string own = writer->Main();
-    CheckpointContent content(BytesOfNumber(own.size()) + own + BytesOfNumber(writer->pieces().size()) +
-                              pipeline->Main());
+    CheckpointContent content{BytesOfNumber(own.size()) + own + BytesOfNumber(writer->pieces().size()) +
+                              pipeline->Main()};
     for (const auto* const pieces : {&writer->pieces(), &pipeline->pieces()})
       for (const slam::StatePiece& piece : *pieces)
         content.pieces.push_back({piece.value, [piece] { return piece.Bytes(); }});

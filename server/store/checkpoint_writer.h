@@ -25,11 +25,8 @@ struct CheckpointPiece {
   std::function<std::string()> bytes;
 };
 struct CheckpointContent {
-  CheckpointContent(std::string main_part, std::vector<CheckpointPiece> all_pieces = {})
-      : main(std::move(main_part)), pieces(std::move(all_pieces)) {}
-
   std::string main;
-  std::vector<CheckpointPiece> pieces;
+  std::vector<CheckpointPiece> pieces = {};
 };
 
 // The pieces of the newest checkpoint on the disk, by number. Null: the value is not in memory.

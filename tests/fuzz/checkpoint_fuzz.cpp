@@ -125,7 +125,7 @@ std::string Joined(std::string_view account, std::string_view estimator) {
 bool RunServer(std::string_view account, std::string_view state) {
   MemoryStore store;
   store.Put({server::RecordKind::kSession, 5, 0}, BytesOf(server::testing::SampleSession(5)));
-  server::CheckpointWriter writer(5, 3, Joined(account, WithState(TinyEstimator(), state)));
+  server::CheckpointWriter writer(5, 3, {Joined(account, WithState(TinyEstimator(), state))});
   while (!writer.complete()) {
     server::RecordChanges changes;
     writer.AddTo(changes);

@@ -183,7 +183,8 @@ TEST(Journal, ACheckpointIsWholeOrTheOneBeforeIsTaken) {
   for (std::uint64_t i = 1; i <= 5; ++i) journal.Append(1, SampleScan(i));
   EXPECT_FALSE(*ReadCheckpoint(*store, 1));
   const auto checkpoint_at = [&](std::uint64_t position, std::size_t size) {
-    ASSERT_TRUE(journal.Checkpoint(1, position, [position, size] { return LargeState(position, size); }));
+    ASSERT_TRUE(
+        journal.Checkpoint(1, position, [position, size] { return CheckpointContent{LargeState(position, size)}; }));
     EXPECT_TRUE(test::Eventually([&] {
       const auto newest = ReadCheckpoint(*store, 1);
       return newest && *newest && (*newest)->position == position;
@@ -191,10 +192,11 @@ TEST(Journal, ACheckpointIsWholeOrTheOneBeforeIsTaken) {
     EXPECT_EQ((*ReadCheckpoint(*store, 1))->bytes, LargeState(position, size));
   };
   checkpoint_at(2, 9'500'000);
-  ASSERT_TRUE(test::Eventually([&] { return journal.Checkpoint(1, 4, [] { return LargeState(4, 100); }); }));
+  ASSERT_TRUE(
+      test::Eventually([&] { return journal.Checkpoint(1, 4, [] { return CheckpointContent{LargeState(4, 100)}; }); }));
   ASSERT_TRUE(test::Eventually([&] { return (*ReadCheckpoint(*store, 1))->position == 4; }));
   // A crash in the middle of a third one leaves parts of it.
-  CheckpointWriter torn(1, 5, LargeState(5, 9'000'000));
+  CheckpointWriter torn(1, 5, {LargeState(5, 9'000'000)});
   RecordChanges changes;
   torn.AddTo(changes);
   ASSERT_FALSE(torn.complete());
@@ -226,7 +228,7 @@ TEST(Journal, OverTheBudgetOnlyTheJournalBeforeACheckpointIsRemoved) {
       ASSERT_TRUE(test::Eventually([&] { return told[session].through == through; }));
     }
   }
-  ASSERT_TRUE(journal.Checkpoint(1, 200, [] { return LargeState(1, 1000); }));
+  ASSERT_TRUE(journal.Checkpoint(1, 200, [] { return CheckpointContent{LargeState(1, 1000)}; }));
   std::uint64_t first = 0;
   ASSERT_TRUE(test::Eventually([&] {
     first = 0;
@@ -250,8 +252,9 @@ TEST(Journal, BelowTheBudgetEverythingIsKept) {
   journal.Start();
   journal.Open(SampleSession(1), {});
   for (std::uint64_t i = 1; i <= 50; ++i) journal.Append(1, SampleScan(i));
-  ASSERT_TRUE(journal.Checkpoint(1, 40, [] { return LargeState(1, 1000); }));
-  ASSERT_TRUE(test::Eventually([&] { return journal.Checkpoint(1, 50, [] { return LargeState(2, 1000); }); }));
+  ASSERT_TRUE(journal.Checkpoint(1, 40, [] { return CheckpointContent{LargeState(1, 1000)}; }));
+  ASSERT_TRUE(test::Eventually(
+      [&] { return journal.Checkpoint(1, 50, [] { return CheckpointContent{LargeState(2, 1000)}; }); }));
   journal.Stop();
   EXPECT_EQ(StoredEntries(*store, 1), 50U);
 }
@@ -305,7 +308,7 @@ TEST(Journal, ACheckpointOfASessionThatIsClosedMeanwhileIsNotFinished) {
   ASSERT_TRUE(journal.Checkpoint(1, 1, [&] {
     begun = true;
     EXPECT_TRUE(test::Eventually([&] { return closed.load(); }));
-    return LargeState(1, 20'000'000);
+    return CheckpointContent{LargeState(1, 20'000'000)};
   }));
   ASSERT_TRUE(test::Eventually([&] { return begun.load(); }));
   journal.Close(1);

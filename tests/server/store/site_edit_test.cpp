@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "server/store/grid_transform.h"
+#include "server/store/journal.h"
 #include "tests/server/store/faulty_vfs.h"
 #include "tests/server/store/stored_sites.h"
 #include "tests/temp_directory.h"

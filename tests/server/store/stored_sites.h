@@ -70,7 +70,7 @@ inline RecordChanges RecordsOf(const SampleSite& sample) {
     put({RecordKind::kJournal, session, 2}, BytesOf(1, {SampleScan(1), SampleOdometry(1)}));
     put({RecordKind::kJournal, session, 4},
         BytesOf(3, {CorrectionTaken{sample.epoch, sample.generation, SampleGrid(2)}, SampleScan(2)}));
-    CheckpointWriter checkpoint(session, 4, "the state of session " + std::to_string(session));
+    CheckpointWriter checkpoint(session, 4, {"the state of session " + std::to_string(session)});
     checkpoint.AddTo(changes);
     live.parts[session] = SampleGrid(3);
     smooth.parts[session] = SampleGrid(4);
