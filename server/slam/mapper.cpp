@@ -52,14 +52,14 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
 
 // Adds a scan with enough new content to the filter, the loops and the map.
 void Mapper::State::AddKeyframe(Keyframe keyframe, ScanView view, const TrackStep& step,
-                                const Eigen::Matrix3d& step_covariance, const ParallelFor& parallel_for) {
+                                const Eigen::Matrix3d& step_covariance, const ParallelFor& parallel_for,
+                                std::optional<RevisitObservation> revisit) {
   const double travelled_m = trail.TravelledTo(step.T_track_robot);
   const bool placed_before = filter->placed();
 
-  std::optional<RevisitObservation> revisit;
   if (!trail.empty()) {
     filter->Predict(MotionTo(keyframe, step, step_covariance));
-    revisit = revisits.Find(view.points_robot, trail, travelled_m, *filter, parallel_for);
+    if (!revisit) revisit = revisits.Find(view.points_robot, trail, travelled_m, *filter, parallel_for);
     if (revisit && !filter->Observe(*revisit)) revisit.reset();
   }
   filter->Observe(KeyframeSight{*keyframe.scan, view, step.T_track_robot, travelled_m}, parallel_for);

@@ -1,6 +1,7 @@
 // The part of the mapper that follows a robot whose place is not certain.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "server/slam/mapper_state.h"
@@ -60,7 +61,7 @@ bool Mapper::State::StoodStill(const Scan& scan, const Pose2& T_odom_robot, cons
 }
 
 // Whether the robot has certainly driven on by itself during a short pause: the scan shows its position, this is where
-// odometry has taken it, and nothing there looks different from before.
+// odometry has taken it, and the scan agrees with the map there, or no worse than the last scan before the pause.
 bool Mapper::State::GoesOn(const Scan& scan, const std::vector<SurfacePoint>& points_robot, const Pose2& T_odom_robot,
                            const TrackStep& step) const {
   if (!HasMap() || recovery.active() || !options.front_end.use_odometry) return false;
@@ -70,8 +71,15 @@ bool Mapper::State::GoesOn(const Scan& scan, const std::vector<SurfacePoint>& po
   const Pose2 odometry = Between(last_scan->T_odom_robot, T_odom_robot);
   const Pose2 error = Between(odometry, Between(last_scan->T_track_robot, step.T_track_robot));
   const double allowed_m = kAsOdometryM + kAsOdometryPerM * odometry.translation().norm();
-  return error.translation().norm() < allowed_m && std::abs(error.theta) < kAsOdometryRad &&
-         recovery.Fits(scan, points_robot, T_map_track() * step.T_track_robot, trail, believed_path());
+  if (error.translation().norm() > allowed_m || std::abs(error.theta) > kAsOdometryRad) return false;
+  using Agreement = PlaceSearch::Agreement;
+  const auto agreement = [&](const Scan& one, const std::vector<SurfacePoint>& points, const Pose2& T_track_robot) {
+    return recovery.Compare(one, points, T_map_track() * T_track_robot, trail, believed_path());
+  };
+  const Agreement now = agreement(scan, points_robot, step.T_track_robot);
+  if (now != Agreement::kDoubtful) return now == Agreement::kAgrees;
+  const std::vector<SurfacePoint> last_points = Look(*last_scan->scan, options.front_end).points_robot;
+  return agreement(*last_scan->scan, last_points, last_scan->T_track_robot) == Agreement::kDoubtful;
 }
 
 // Nobody watched the robot before this scan. If the scan goes on where the last ones ended, as far as it shows, the
@@ -128,6 +136,23 @@ ScanOutcome Mapper::State::GoOnAlongPath(const ParallelFor& parallel_for) {
   return Report(now.keyframe.scan->stamp, now.keyframe.T_odom_robot, now.step, true);
 }
 
+// The place found as seen from the nearest keyframe. Each hypothesis has a map of its own, in which that place is not
+// where the best one has it.
+RevisitObservation Mapper::State::SeenFromNearest(const FoundPlace& place) const {
+  const SharedSequence<Pose2> path = believed_path();
+  std::size_t nearest = 0;
+  double nearest_m = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < trail.size(); ++k) {
+    const double distance_m = (path[k].translation() - place.T_map_robot.translation()).norm();
+    if (!trail.keyframes()[k].localized || distance_m >= nearest_m) continue;
+    nearest = k;
+    nearest_m = distance_m;
+  }
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  R.topLeftCorner<2, 2>() = path[nearest].rotation().transpose();
+  return {nearest, Between(path[nearest], place.T_map_robot), R * place.covariance * R.transpose()};
+}
+
 // The robot has been found: the path goes on there, with a step from the last keyframe that no scan or odometry shows.
 ScanOutcome Mapper::State::GoOnAt(const FoundPlace& place, Keyframe keyframe, ScanView view, TrackStep step,
                                   const ParallelFor& parallel_for) {
@@ -143,7 +168,7 @@ ScanOutcome Mapper::State::GoOnAt(const FoundPlace& place, Keyframe keyframe, Sc
   blind.Found(R * place.covariance * R.transpose());
   recovery.End();
   self_check.Forget();
-  AddKeyframe(std::move(keyframe), std::move(view), step, blind.TakeCovariance(), parallel_for);
+  AddKeyframe(std::move(keyframe), std::move(view), step, blind.TakeCovariance(), parallel_for, SeenFromNearest(place));
   speed.Forget();
   return Report(stamp, T_odom_robot, step, true);
 }

@@ -60,8 +60,10 @@ struct Mapper::State {
   ScanOutcome GoOnAlongPath(const ParallelFor& parallel_for);
   ScanOutcome GoOnAt(const FoundPlace& place, Keyframe keyframe, ScanView view, TrackStep step,
                      const ParallelFor& parallel_for);
+  // `revisit`: the old keyframe that the scan is known to show; without it, one is searched for.
   void AddKeyframe(Keyframe keyframe, ScanView view, const TrackStep& step, const Eigen::Matrix3d& step_covariance,
-                   const ParallelFor& parallel_for);
+                   const ParallelFor& parallel_for, std::optional<RevisitObservation> revisit = std::nullopt);
+  [[nodiscard]] RevisitObservation SeenFromNearest(const FoundPlace& place) const;
   StepMotion MotionTo(const Keyframe& keyframe, const TrackStep& step, const Eigen::Matrix3d& covariance);
   void CloseLargeLoop();
   void Draw(const TrackStep& step, bool placed_before);

@@ -85,10 +85,11 @@ class Recovery {
   [[nodiscard]] std::optional<Found> Take(const Keyframe& keyframe, const TrackStep& step,
                                           std::vector<SurfacePoint> points_robot, const Trail& trail,
                                           const SharedSequence<Pose2>& path);
-  // Whether a scan at this pose shows what earlier scans have shown there.
-  [[nodiscard]] bool Fits(const Scan& scan, const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot,
-                          const Trail& trail, const SharedSequence<Pose2>& path) const {
-    return search_.Compare(trail, path, scan, points_robot, T_map_robot) == PlaceSearch::Agreement::kAgrees;
+  // How a scan at this pose agrees with what earlier scans have shown there.
+  [[nodiscard]] PlaceSearch::Agreement Compare(const Scan& scan, const std::vector<SurfacePoint>& points_robot,
+                                               const Pose2& T_map_robot, const Trail& trail,
+                                               const SharedSequence<Pose2>& path) const {
+    return search_.Compare(trail, path, scan, points_robot, T_map_robot);
   }
   [[nodiscard]] Belief BeliefAt(const Pose2& T_odom_robot, const Pose2& T_track_robot) const;
 

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -86,6 +87,18 @@ std::vector<OneDrive> DriveThrough(const std::string& world, double seconds, std
   return drives;
 }
 
+// A place of the world, and where the map shows it.
+struct Shown {
+  Pose2 T_world_robot;
+  Pose2 T_map_robot;
+};
+
+constexpr double kSamePlaceM = 10.0;  // The map is rigid over such a distance.
+
+double DistanceM(const Pose2& a, const Pose2& b) {
+  return (a.translation() - b.translation()).norm();
+}
+
 // Feeds one estimator and counts.
 class Follower {
  public:
@@ -94,17 +107,20 @@ class Follower {
                   {.used = [this](const Scan& scan, const slam::ScanOutcome& outcome) { Judge(scan, outcome); },
                    .dropped = [](const Scan&, DropReason) {}}) {}
 
-  // The truth of what is fed, the shift of its stamps, and where the map has put the robot's true place by its drift.
-  void Watch(const Trajectory& truth, Stamp later, const Pose2& T_map_world, MovedCase* counted) {
+  // The truth of what is fed, and the shift of its stamps.
+  void Watch(const Trajectory& truth, Stamp later, MovedCase* counted) {
     truth_ = &truth;
     later_ = later;
-    T_map_world_ = T_map_world;
     case_ = counted;
   }
-  // The poses of the same drive without a gap; their drift is no fault of the gap.
-  void CompareWith(const Trajectory* undisturbed) { undisturbed_ = undisturbed; }
-  [[nodiscard]] const Trajectory& told() const { return told_; }
-  [[nodiscard]] const Pose2& T_map_world_now() const { return T_map_world_now_; }
+  // Where the map of the drive without a gap shows the places of the world, and the truth of the drive before the gap,
+  // at which the present map is compared. The drift of an unclosed map is no fault of the gap.
+  void CompareWith(const std::vector<Shown>* undisturbed, const Trajectory* before, Stamp until) {
+    undisturbed_ = undisturbed;
+    truth_before_ = before;
+    until_ = until;
+  }
+  [[nodiscard]] const std::vector<Shown>& shown() const { return shown_; }
   [[nodiscard]] const Pose2& T_odom_robot() const { return T_odom_robot_; }  // At the last scan.
   void Feed(LogRecord record, const Pose2& T_new_old) {
     if (auto* const scan = std::get_if<Scan>(&record)) {
@@ -133,16 +149,12 @@ class Follower {
     const auto truth = PoseOn(*truth_, scan.stamp - later_, 1.0);
     if (!truth) return;
     if (!first_) first_ = scan.stamp;
-    if (before_) way_m_ += (truth->translation() - before_->translation()).norm();
+    if (before_) way_m_ += DistanceM(*truth, *before_);
     before_ = *truth;
+    if (outcome.localized) shown_.push_back({*truth, outcome.T_map_robot});
     ++case_->poses;
     T_odom_robot_ = outcome.T_map_odom.Inverse() * outcome.T_map_robot;
-    T_map_world_now_ = outcome.T_map_robot * truth->Inverse();
-    const Eigen::Vector2d told = outcome.T_map_robot.translation();
-    double error_m =
-        std::min((told - truth->translation()).norm(), (told - (T_map_world_ * *truth).translation()).norm());
-    const auto same = undisturbed_ == nullptr ? std::nullopt : PoseOn(*undisturbed_, scan.stamp - later_, 1.0);
-    if (same) error_m = std::min(error_m, (told - same->translation()).norm());
+    const double error_m = ErrorOf(outcome.T_map_robot, *truth);
     if (!outcome.localized) {
       case_->found_after_s = case_->found_after_m = -1.0;
     } else if (case_->found_after_s < 0.0) {
@@ -153,12 +165,37 @@ class Follower {
     case_->worst_m = std::max(case_->worst_m, error_m);
     if (error_m > kMovedWrongM) ++case_->wrong;
   }
+  // The places before the gap, as the best hypothesis has them now.
+  [[nodiscard]] std::vector<Shown> Mapped() const {
+    std::vector<Shown> mapped;
+    const slam::MapperSnapshot now = pipeline_.mapper().Snapshot();
+    for (std::size_t k = 0; k < now.keyframes.size() && now.keyframes[k].scan->stamp <= until_; ++k)
+      mapped.push_back({*PoseOn(*truth_before_, now.keyframes[k].scan->stamp, 1.0), now.full_path[k]});
+    return mapped;
+  }
+  [[nodiscard]] double ErrorOf(const Pose2& told, const Pose2& truth) const {
+    double error_m = (told.translation() - truth.translation()).norm();
+    if (undisturbed_ == nullptr || error_m <= kMovedWrongM) return error_m;
+    std::vector<Shown> places = Mapped();
+    places.insert(places.end(), undisturbed_->begin(), undisturbed_->end());
+    double nearest_m = std::numeric_limits<double>::infinity();
+    for (const Shown& one : places) nearest_m = std::min(nearest_m, DistanceM(one.T_world_robot, truth));
+    const double near_m = std::max(nearest_m, kSamePlaceM);
+    for (const Shown& one : places) {
+      if (DistanceM(one.T_world_robot, truth) > near_m) continue;
+      const Pose2 T_robot_now = Between(one.T_world_robot, truth);
+      error_m = std::min(error_m, DistanceM(told, one.T_map_robot * T_robot_now));
+    }
+    return error_m;
+  }
 
   const Trajectory* truth_ = nullptr;
-  const Trajectory* undisturbed_ = nullptr;
-  Trajectory told_;
+  const std::vector<Shown>* undisturbed_ = nullptr;
+  const Trajectory* truth_before_ = nullptr;
+  Stamp until_ = 0;
+  std::vector<Shown> shown_;
   Stamp later_ = 0;
-  Pose2 T_map_world_, T_map_world_now_, T_odom_robot_;
+  Pose2 T_odom_robot_;
   MovedCase* case_ = nullptr;
   std::optional<Stamp> first_;
   std::optional<Pose2> before_;
@@ -168,22 +205,21 @@ class Follower {
 
 struct Before {
   double seconds = 0.0;
-  Pose2 T_map_world;   // The drift of the map there.
   Odometry odometry;   // The last one.
   Scan scan;           // The last one,
   Pose2 T_odom_robot;  // and the odometry at its stamp.
   std::string state;
 };
 
-MovedCase After(const Before& before, const std::vector<OneDrive>& drives, const Trajectory& undisturbed,
+MovedCase After(const Before& before, const std::vector<OneDrive>& drives, const std::vector<Shown>& undisturbed,
                 const Kind& kind, const MovedSweepOptions& options, MovedCase result) {
   const OneDrive& drive = drives[kind.other_robot ? 1 : 0];
   Follower follower({}, options.seed);
   if (!follower.pipeline().Load(before.state)) std::abort();
   if (kind.new_client) follower.pipeline().NewClient();
   const double until_s = before.seconds + kind.skipped_s;
-  follower.Watch(drive.truth, StampFromSeconds(kind.lasts_s - kind.skipped_s), before.T_map_world, &result);
-  if (!kind.other_robot) follower.CompareWith(&undisturbed);
+  follower.Watch(drive.truth, StampFromSeconds(kind.lasts_s - kind.skipped_s), &result);
+  follower.CompareWith(&undisturbed, &drives.front().truth, before.scan.stamp);
   std::optional<Pose2> T_new_old;
   Pose2 T_half;
   if (result.stood_still) {  // The robot still sees what it saw, and then it drives on.
@@ -224,18 +260,17 @@ MovedCase After(const Before& before, const std::vector<OneDrive>& drives, const
 }
 
 // The state at each moment of the drive as it is without a gap.
-std::vector<Before> RunUndisturbed(const OneDrive& drive, const MovedSweepOptions& options, Trajectory* told) {
+std::vector<Before> RunUndisturbed(const OneDrive& drive, const MovedSweepOptions& options, std::vector<Shown>* shown) {
   std::vector<Before> moments;
   Follower follower(drive.T_map_robot_start, options.seed);
   MovedCase undisturbed;
-  follower.Watch(drive.truth, 0, {}, &undisturbed);
+  follower.Watch(drive.truth, 0, &undisturbed);
   Before now;
   for (const auto& [seconds, record] : drive.records) {
     const double moment_s = options.first_s + options.between_s * static_cast<double>(moments.size());
     if (seconds > moment_s && std::holds_alternative<Scan>(record) &&
         moments.size() < static_cast<std::size_t>(options.moments)) {
       now.seconds = moment_s;
-      now.T_map_world = follower.T_map_world_now();
       now.T_odom_robot = follower.T_odom_robot();
       follower.pipeline().Save(now.state);
       moments.push_back(now);
@@ -244,7 +279,7 @@ std::vector<Before> RunUndisturbed(const OneDrive& drive, const MovedSweepOption
     if (const auto* const scan = std::get_if<Scan>(&record)) now.scan = *scan;
     follower.Feed(record, {});
   }
-  *told = follower.told();
+  *shown = follower.shown();
   return moments;
 }
 
@@ -262,7 +297,7 @@ std::vector<MovedCase> RunMovedSweep(const MovedSweepOptions& options) {
     const double last_s = options.first_s + options.between_s * (options.moments - 1);
     const std::vector<OneDrive> drives =
         DriveThrough(world, last_s + 80.0 + options.watched_again_s + 1.0, options.seed);
-    Trajectory undisturbed;
+    std::vector<Shown> undisturbed;
     for (const Before& before : RunUndisturbed(drives.front(), options, &undisturbed)) {
       for (const Kind& kind : kKinds) {
         if (kind.name.find(options.only) == std::string::npos) continue;

@@ -29,8 +29,9 @@ struct MovedCase {
   std::string kind;
   double from_s = 0.0;
   std::uint64_t seed = 0;
-  // Poses that were localized and farther than kMovedWrongM from the truth, from the truth moved by the drift before
-  // the gap, and from what the same robot tells without a gap: the drift of an unclosed map is no fault of the gap.
+  // Poses that were localized and farther than kMovedWrongM from the truth, from where the map of the same drive
+  // without a gap shows that place, and from where the present map shows places near it: the drift of an unclosed map
+  // is no fault of the gap.
   int wrong = 0;
   double worst_m = 0.0;  // The largest error of a pose that was localized.
   int poses = 0;

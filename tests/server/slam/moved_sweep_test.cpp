@@ -9,7 +9,8 @@ namespace {
 TEST(MovedSweep, NoRobotIsLocalizedAtAWrongPlace) {
   MovedSweepOptions options;
   options.worlds = {"building", "office"};
-  options.moments = 2;
+  options.moments = 1;
+  options.first_s = 90.0;
   options.watched_again_s = 25.0;
   int found = 0;
   const std::vector<MovedCase> cases = RunMovedSweep(options);
@@ -20,7 +21,7 @@ TEST(MovedSweep, NoRobotIsLocalizedAtAWrongPlace) {
     }
     found += one.found_after_s >= 0.0 ? 1 : 0;
   }
-  EXPECT_GE(cases.size(), 72U);
+  EXPECT_GE(cases.size(), 36U);
   EXPECT_GE(3 * found, static_cast<int>(cases.size()));
 }
 

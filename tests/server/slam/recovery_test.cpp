@@ -202,7 +202,8 @@ INSTANTIATE_TEST_SUITE_P(Recovery, Unwatched, testing::ValuesIn(kCases),
 
 // Its scans are held meanwhile: nothing is missing in its map afterwards.
 TEST(Recovery, OnItsPathTheRobotGoesOnAsIfThereHadBeenNoPauseOnceItHasProvedItsPlace) {
-  const Away away{170.0, 172.4, Odometer::kGoesOn, false};  // Odometry carries the pose by less than lost_after_m.
+  // Odometry carries the pose by less than lost_after_m.
+  const Away away{.from_s = 170.0, .to_s = 172.4, .odometry_missing = false, .new_client = true};
   const std::vector<Seen> seen = Play(Building(), away, 200.0);
   const Seen* const first = First(seen, away.to_s, false);
   ASSERT_NE(first, nullptr);
