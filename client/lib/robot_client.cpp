@@ -207,7 +207,8 @@ void RobotClient::OnPose(PoseReport&& report) {
   if (report.robot_id != robot_id_) return;
   {
     const MutexLock lock(mutex_);
-    if (report.generation < generation_ || !state_) return;
+    // The last pose of another client, or of another robot with this name, may still be on the wire.
+    if (report.generation < generation_ || !state_ || report.session != request_.session) return;
     pose_ = report;
   }
   if (callbacks_.pose) callbacks_.pose(report);

@@ -28,6 +28,7 @@ struct PoseReport {
   std::string robot;
   std::string site;
   Stamp stamp = 0;
+  std::uint64_t session = 0;        // The session (SessionToken) of the scan this pose belongs to.
   std::uint64_t scan_sequence = 0;  // The scan this pose belongs to; 0 for an interpolated answer.
   Pose2 T_map_robot;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // For (x, y, theta) in the frame map.

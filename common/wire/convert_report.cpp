@@ -12,6 +12,7 @@ v1::PoseReport ToWire(const PoseReport& value) {
   wire.robot(value.robot);
   wire.site(value.site);
   wire.stamp_ns(value.stamp);
+  wire.session(value.session);
   wire.scan_sequence(value.scan_sequence);
   wire.T_map_robot(ToWire(value.T_map_robot));
   for (int row = 0; row < 3; ++row) {
@@ -34,6 +35,7 @@ PoseReport FromWire(v1::PoseReport&& wire) {
   value.robot = std::move(wire.robot());
   value.site = std::move(wire.site());
   value.stamp = wire.stamp_ns();
+  value.session = wire.session();
   value.scan_sequence = wire.scan_sequence();
   value.T_map_robot = FromWire(wire.T_map_robot());
   for (int row = 0; row < 3; ++row) {

@@ -13,13 +13,14 @@ using Clock = std::chrono::steady_clock;
 // How often landmarks are copied for queries: a landmark hardly moves in less time.
 constexpr auto kLandmarkPeriod = std::chrono::milliseconds(500);
 
-PoseReport ReportOf(const Scan& scan, const slam::ScanOutcome& outcome, const SessionState& session,
+PoseReport ReportOf(const Scan& scan, const slam::ScanOutcome& outcome, const SessionState& session, SessionToken token,
                     std::uint32_t epoch) {
   PoseReport report;
   report.robot_id = session.robot_id;
   report.robot = session.robot;
   report.site = session.site;
   report.stamp = scan.stamp;
+  report.session = token;
   report.scan_sequence = scan.sequence;
   report.T_map_robot = outcome.T_map_robot;
   report.covariance = outcome.covariance;
@@ -226,7 +227,7 @@ void SessionEstimator::Replayed() {
 
 void SessionEstimator::Used(const Scan& scan, const slam::ScanOutcome& outcome) {
   const auto waiting = waiting_.find(&scan);
-  const PoseReport report = ReportOf(scan, outcome, identity_.status.session, epoch_);
+  const PoseReport report = ReportOf(scan, outcome, identity_.status.session, session_, epoch_);
   if (!replaying_) outputs_.send(report);
   const std::chrono::duration<double, std::milli> latency = Clock::now() - waiting->second.received;
   record_.ScanUsed(waiting->second.sensor_id, report, outcome.stamp, outcome.keyframe, latency.count());

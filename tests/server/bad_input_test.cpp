@@ -163,17 +163,20 @@ TEST_F(BadInput, ARobotThatConnectsTwiceIsRefusedWhileTheFirstLives) {
 
   house_.Push(ClientLiveliness{kSender, false});
   ASSERT_TRUE(house_.WaitPhase("r1", kSender, SessionPhase::kSuspended));
-  house_.Open("r1", 8);
+  house_.Open("r1", 8, "lab", TruePose(10));
   ASSERT_TRUE(house_.WaitPhase("r1", 8, SessionPhase::kActive));
-  // The new client numbers from 1; poses go on where they were.
+  // The new client numbers from 1, and its session begins where it says.
   for (int step = 10; step < 20; ++step) {
     Scan scan = RoomScan(step);
     scan.sequence = static_cast<std::uint64_t>(step) - 9;
     house_.SendOdometry("r1", 8, RoomOdometry(step));
     house_.SendScan("r1", 8, scan);
   }
-  ASSERT_TRUE(house_.WaitFor([&] { return house_.LastLedger("r1").used == 20; }));
-  EXPECT_LT(Between(TruePose(19), house_.All<PoseReport>().back().T_map_robot).translation().norm(), 0.1);
+  ASSERT_TRUE(house_.WaitFor([&] { return house_.All<PoseReport>().back().stamp == RoomScan(19).stamp; }));
+  const PoseReport last = house_.All<PoseReport>().back();
+  EXPECT_EQ(last.session, house_.TokenOf("r1", 8));
+  EXPECT_EQ(last.scan_sequence, 10U);
+  EXPECT_LT(Between(TruePose(19), last.T_map_robot).translation().norm(), 0.1);
 }
 
 TEST_F(BadInput, ScansWithoutASessionAreCountedInABoundedTable) {

@@ -82,6 +82,10 @@ void FakeServer::LoseOnce(std::uint64_t sequence) {
   to_lose_.insert(sequence);
 }
 
+void FakeServer::Publish(const PoseReport& pose) {
+  Must(poses_->Publish(pose));
+}
+
 void FakeServer::Publish(const MapInfo& info) {
   Must(maps_->Publish(info));
 }
@@ -171,6 +175,7 @@ void FakeServer::OnScan(ScanSample&& sample) {
   PoseReport pose;
   pose.robot_id = sample.stream.robot_id;
   pose.stamp = sample.scan.stamp;
+  pose.session = sample.stream.session;
   pose.scan_sequence = sample.scan.sequence;
   pose.generation = generation_;
   pose.localized = localized_;

@@ -34,6 +34,7 @@ class FakeServer {
   // Scans with this number are lost on their way, once.
   void LoseOnce(std::uint64_t sequence);
 
+  void Publish(const PoseReport& pose);
   void Publish(const MapInfo& info);
   void Publish(const TileSample& sample);
 

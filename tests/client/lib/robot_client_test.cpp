@@ -64,6 +64,22 @@ TEST_F(RobotClientTest, HandsOutPosesAndLedgers) {
   EXPECT_TRUE(Eventually([&] { return client->pose() && client->pose()->reason == PoseReason::kTracking; }));
 }
 
+// Another robot had the name before, or another client of this one.
+TEST_F(RobotClientTest, APoseOfAnotherSessionIsNotItsOwn) {
+  std::atomic<int> wrong = 0;
+  const auto client =
+      Open({}, {{}, [&](const PoseReport& pose) { wrong += pose.scan_sequence == 1000 ? 1 : 0; }, {}, {}});
+  ASSERT_TRUE(Eventually([&] { return client->Publish(SomeScan()) && client->pose(); }));
+  const PoseReport own = *client->pose();
+  PoseReport other = own;
+  other.session = own.session + 1;
+  other.scan_sequence = 1000;
+  server_->Publish(other);
+  ASSERT_TRUE(client->Publish(SomeScan()));
+  ASSERT_TRUE(Eventually([&] { return client->pose()->scan_sequence > own.scan_sequence; }));
+  EXPECT_EQ(wrong, 0);
+}
+
 TEST_F(RobotClientTest, ASecondClientOfOneRobotIsRefusedAndTheFirstGoesOn) {
   const auto owner = Open();
   const auto other_bus = MakeBus("impostor");
@@ -144,26 +160,31 @@ TEST_F(RobotClientTest, OpensANewSessionWhereTheRobotIsIfTheServerForgotIt) {
     scan.stamp = step * 10;
     ASSERT_TRUE(client->Publish(scan));
   };
-  for (int step = 0; step < 10; ++step) drive(step);
+  // Poses are not kept for late readers.
+  int settled = 0;
+  ASSERT_TRUE(Eventually([&] {
+    drive(settled++);
+    return client->pose().has_value();
+  }));
   ASSERT_TRUE(client->WaitSettled(20.0));
   // WaitSettled is about scans. What is not settled of the odometry is sent again as well, with all that came after it.
   ASSERT_TRUE(Eventually([&] {
     const auto odometry = client->ledger("odometry");
-    return odometry && odometry->settled_through == 10;
+    return odometry && odometry->settled_through == static_cast<std::uint64_t>(settled);
   }));
   const SessionToken before = client->session().session;
   server_->SetSettling(false);
-  for (int step = 10; step < 15; ++step) drive(step);
-  ASSERT_TRUE(Eventually([&] { return server_->received().size() == 15; }));
+  for (int more = 0; more < 5; ++more) drive(settled + more);
+  ASSERT_TRUE(Eventually([&] { return server_->received().size() == static_cast<std::size_t>(settled) + 5; }));
   server_.reset();
   server_ = std::make_unique<FakeServer>(LoopbackOptions(), 2);
-  drive(15);
+  drive(settled + 5);
   ASSERT_TRUE(client->WaitSettled(20.0));
   EXPECT_EQ(client->restarted(), 1);
   EXPECT_EQ(told, 1);
   // Numbered anew, what was not settled before.
   EXPECT_EQ(server_->received(), OneTo(6));
-  EXPECT_EQ(server_->last_scan().scan.stamp, 150);
+  EXPECT_EQ(server_->last_scan().scan.stamp, 10 * (settled + 5));
   const SessionRequest first = server_->sessions().front();
   EXPECT_TRUE(first.started);
   EXPECT_EQ(first.session, before);
@@ -171,9 +192,9 @@ TEST_F(RobotClientTest, OpensANewSessionWhereTheRobotIsIfTheServerForgotIt) {
   EXPECT_NE(last.session, before);
   EXPECT_EQ(client->session().session, last.session);
   EXPECT_EQ(client->session().generation, 2U);
-  // The fake server's poses say that the frames `map` and `odom` are the same. The first scan sent again is the
-  // eleventh, one metre along the way.
-  EXPECT_NEAR(last.T_map_robot_start.x, 1.0, 1e-9);
+  // The fake server's poses say that the frames `map` and `odom` are the same. The robot drives 0.1 m from scan to
+  // scan.
+  EXPECT_NEAR(last.T_map_robot_start.x, 0.1 * settled, 1e-9);
 }
 
 // It gave the last pose, of a robot that was lost, as its start, and the server believed it.

@@ -135,6 +135,7 @@ PoseReport ExtremePose() {
   value.robot = Name('r');
   value.site = Name('s');
   value.stamp = kMin64;
+  value.session = kMax64 - 3;
   value.scan_sequence = kMax64;
   value.T_map_robot = {kMax, kTiny, -3};
   value.covariance << 1, 2, 3, 4, 5, 6, 7, 8, kInf;
@@ -291,7 +292,7 @@ bool Same(const OdometrySample& a, const OdometrySample& b) {
 }
 bool Same(const PoseReport& a, const PoseReport& b) {
   return a.robot_id == b.robot_id && a.robot == b.robot && a.site == b.site && a.stamp == b.stamp &&
-         a.scan_sequence == b.scan_sequence && Eq(a.T_map_robot, b.T_map_robot) &&
+         a.session == b.session && a.scan_sequence == b.scan_sequence && Eq(a.T_map_robot, b.T_map_robot) &&
          EqMatrix(a.covariance, b.covariance) && Eq(a.T_map_odom, b.T_map_odom) && a.localized == b.localized &&
          Eq(a.score, b.score) && a.reason == b.reason && a.map_epoch == b.map_epoch && a.generation == b.generation;
 }
