@@ -87,6 +87,7 @@ void Atlas::Remove(const std::string& name) {
   beginning_.epoch = std::max(beginning_.epoch, last.epoch + 2);
   beginning_.tile_version = std::max(beginning_.tile_version, last.version + 2);
   sites_.erase(found);
+  reserved_.insert(name);
 }
 
 Result<std::shared_ptr<Site>> Atlas::Enter(const std::string& name) {
@@ -125,7 +126,7 @@ std::shared_ptr<Site> Atlas::NewSite(const std::string& name) const {
 
 Result<void> Atlas::CheckName(const std::string& name) const {
   if (reserved_.contains(name))
-    return Fail(StatusCode::kUnavailable, "site '" + name + "' is being loaded; try again later");
+    return Fail(StatusCode::kUnavailable, "site '" + name + "' is being loaded or deleted; try again later");
   const auto same_id = [&name](const std::string& other) {
     return Fail(StatusCode::kAlreadyExists,
                 "the names '" + name + "' and '" + other + "' have the same id; choose another name");

@@ -203,6 +203,7 @@ Result<void> SavedSites::Delete(const std::string& name) {
   const std::shared_ptr<const MapSnapshot> last = retired.get();
   const auto removed =
       Between<bool>([name](Store& store) -> Result<bool> { return DeleteSite(store, name).map([] { return true; }); });
+  rooms_.atlas.Release(name);
   for (int level = 0; level < kPyramidLevels; ++level) {
     last->tiles.ForEach(level, [&](const TileSet::TilePtr& tile) {
       TileSample gone{.site_id = last->info.site_id, .tile = {}, .deleted = true};

@@ -208,6 +208,7 @@ Result<std::shared_ptr<Session>> Roster::ReadBack(SessionId id, bool with_journa
   if (!site) return tl::unexpected(site.error());
   const auto make = [&] {
     auto made = Make(id, stored->request, stored->map_epoch, *site);
+    made->KeepStored();  // Whatever fails from here on, also by an exception.
     static_cast<void>(made->record().AddSensors(stored->request.sensors));
     return made;
   };
@@ -227,7 +228,6 @@ Result<std::shared_ptr<Session>> Roster::ReadBack(SessionId id, bool with_journa
       // For example, the estimator has other options now. The whole journal can be replayed instead, if it is still
       // there.
       spdlog::warn("the checkpoint of session {} is not used: {}", id, loaded.error().message);
-      session->KeepStored();
       session = make();
     }
   }
@@ -236,11 +236,10 @@ Result<std::shared_ptr<Session>> Roster::ReadBack(SessionId id, bool with_journa
   };
   if (!with_journal) {
     // Empty, it would be taken for a session that is gone, and its journal would be removed.
-    if (position == 0) {
-      session->KeepStored();
+    if (position == 0)
       return Fail(StatusCode::kDataLoss, "it has no checkpoint that can be used, and its journal is left out");
-    }
     session->Replayed();
+    session->KeepStored(false);
     return session;
   }
   const auto last =
@@ -250,13 +249,13 @@ Result<std::shared_ptr<Session>> Roster::ReadBack(SessionId id, bool with_journa
       });
   // Without the checkpoint and without any entry it would begin where the robot once stood.
   const bool checkpoint_unused = position == 0 && (!checkpoint || *checkpoint);
-  if (!last || (checkpoint_unused && *last == 0)) {
-    session->KeepStored();
-    if (!last) return tl::unexpected(last.error());
+  if (!last) return tl::unexpected(last.error());
+  if (checkpoint_unused && *last == 0)
     return Fail(StatusCode::kDataLoss, "its checkpoint cannot be used, and the journal before it was removed");
-  }
   session->Replayed();
-  journal_->Reopen(id, *last, DurableFor(session), std::move(pieces));
+  session->SetCheckpointed(position);
+  journal_->Reopen(id, *last, DurableFor(session), position, std::move(pieces));
+  session->KeepStored(false);
   return session;
 }
 

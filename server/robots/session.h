@@ -59,12 +59,14 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   // See SessionEstimator. Called from one thread, before any other thread knows the session.
   void Replay(JournalEntry&& entry, const SessionEstimator::Switched& switched);
   void Replayed();
-  // This restored session is not used after all. Its records stay in the store when it is destroyed.
-  void KeepStored() { keep_stored_ = true; }
+  // Whether its records stay in the store when it is destroyed, because it is a restored one that is not used after all.
+  void KeepStored(bool keep = true) { keep_stored_ = keep; }
   [[nodiscard]] Result<SessionEstimator::PieceValues> Load(std::string_view main,
                                                            std::span<const std::string_view> pieces) {
     return estimator_.Load(main, pieces);
   }
+  // Its newest checkpoint. REQUIRES: nothing was taken yet.
+  void SetCheckpointed(std::uint64_t position) { checkpointed_ = position; }
   // Publishes ledgers that are due and whatever could not be sent before.
   void Tick();
 

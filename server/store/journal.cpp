@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <iterator>
 #include <utility>
 
 namespace cairn::server {
@@ -48,16 +49,20 @@ void Journal::Stop() {
 
 void Journal::Open(const StoredSession& session, Durable durable) {
   const MutexLock lock(mutex_);
-  lines_[session.id] = Line{.next = 1, .durable = std::move(durable)};
+  Line& line = lines_[session.id] = Line{.next = 1, .durable = std::move(durable)};
   const RecordKey key{RecordKind::kSession, session.id, 0};
-  // Position 0 stands for the session itself; the caller is told as soon as it is on the disk.
-  if (!Push(Written{key, [session] { return BytesOf(session); }}, 1024)) lines_[session.id].lost = true;
+  // Nothing that an earlier session of this number may have left can become a part of this one.
+  line.lost = !RemoveStatesOf(session.id, 1024, Room::kForSamples);
+  // The caller is told as soon as the session itself is on the disk.
+  if (!line.lost) Push(Written{key, [session] { return BytesOf(session); }}, 0);
   urgent_ = true;
 }
 
-void Journal::Reopen(std::uint64_t session, std::uint64_t last, Durable durable, StoredPieces pieces) {
+void Journal::Reopen(std::uint64_t session, std::uint64_t last, Durable durable, std::uint64_t checkpointed,
+                     StoredPieces pieces) {
   const MutexLock lock(mutex_);
-  lines_[session] = Line{.next = last + 1, .pieces = std::move(pieces), .durable = std::move(durable)};
+  lines_[session] =
+      Line{.next = last + 1, .checkpointed = checkpointed, .pieces = std::move(pieces), .durable = std::move(durable)};
 }
 
 std::uint64_t Journal::Append(std::uint64_t session, JournalEntry entry) {
@@ -82,6 +87,8 @@ bool Journal::Checkpoint(std::uint64_t session, std::uint64_t position, Content 
   const MutexLock lock(mutex_);
   const auto line = lines_.find(session);
   if (line == lines_.end() || line->second.lost || line->second.checkpointing) return false;
+  // Nothing new; and to write it again would first remove the one that is there.
+  if (position <= line->second.checkpointed) return false;
   line->second.checkpointing = true;
   checkpoints_.push_back({session, position, std::move(content)});
   arrived_.NotifyAll();
@@ -108,24 +115,31 @@ void Journal::Between(Work work) {
 void Journal::Forget(std::uint64_t session) {
   const MutexLock lock(mutex_);
   CloseLocked(session);
-  for (const RecordKind kind :
-       {RecordKind::kSession, RecordKind::kJournal, RecordKind::kCheckpoint, RecordKind::kRestoring}) {
-    Push(AllOf(kind, session), 64);
-  }
+  if (RemoveStatesOf(session, 256, Room::kWithReserve))
+    Push(AllOf(RecordKind::kSession, session), 0, Room::kWithReserve);
+}
+
+// Removes what belongs to a session besides its own record. `size` is that of the whole change, so that what follows
+// at once finds room as well.
+bool Journal::RemoveStatesOf(std::uint64_t session, std::size_t size, Room room) {
+  if (!Push(AllOf(RecordKind::kJournal, session), size, room)) return false;
+  return Push(AllOf(RecordKind::kCheckpoint, session), 0, room) &&
+         Push(AllOf(RecordKind::kRestoring, session), 0, room);
 }
 
 void Journal::Put(const RecordKey& key, Bytes bytes, std::size_t size) {
   const MutexLock lock(mutex_);
-  Push(Written{key, std::move(bytes)}, size);
+  Push(Written{key, std::move(bytes)}, size, Room::kWithReserve);
 }
 
 void Journal::Remove(const RecordRange& range) {
   const MutexLock lock(mutex_);
-  Push(range, 64);
+  Push(range, 64, Room::kWithReserve);
 }
 
-bool Journal::Push(Change change, std::size_t size) {
-  if (queued_bytes_ + committing_bytes_ + size > static_cast<std::size_t>(options_.queue_mib) << 20) {
+bool Journal::Push(Change change, std::size_t size, Room room) {
+  const std::size_t bound = static_cast<std::size_t>(options_.queue_mib) << (room == Room::kWithReserve ? 21 : 20);
+  if (queued_bytes_ + committing_bytes_ + size > bound) {
     lost_ = "the disk was too slow or failed for too long, and a part of the state is no longer stored";
     return false;
   }
@@ -138,8 +152,9 @@ bool Journal::Push(Change change, std::size_t size) {
 
 JournalHealth Journal::health() const {
   const MutexLock lock(mutex_);
-  const std::string& reason = disk_fault_.empty() ? lost_ : disk_fault_;
-  return {.degraded = !reason.empty(), .reason = reason};
+  for (const std::string& reason : {disk_fault_, lost_, checkpoint_fault_})
+    if (!reason.empty()) return {.degraded = true, .reason = reason};
+  return {};
 }
 
 JournalCounts Journal::counts() const {
@@ -158,10 +173,10 @@ void Journal::Run(const std::stop_token& stop) {
     const Clock::time_point oldest = group->oldest;
     try {
       const std::vector<Work> works = std::move(group->works);
+      std::optional<WantedCheckpoint> wanted = std::move(group->checkpoint);
       Prepared prepared = Prepare(std::move(*group));
       DropForgottenCheckpoint();
-      if (!stop.stop_requested()) BeginCheckpoint();
-      if (writing_) writing_->AddTo(prepared.changes);
+      if (!stop.stop_requested()) WriteCheckpoint(std::move(wanted), prepared.changes);
       if (!CommitPatiently(prepared.changes, stop)) return;
       Tell(prepared, oldest);
       if (writing_ && writing_->complete()) {
@@ -190,7 +205,13 @@ std::optional<Journal::Group> Journal::Next(const std::stop_token& stop) {
     arrived_.WaitUntil(mutex_, due);
   urgent_ = false;
   committing_bytes_ = std::exchange(queued_bytes_, 0);
-  return Group{std::exchange(queue_, {}), std::exchange(works_, {}), oldest_};
+  Group group{std::exchange(queue_, {}), std::exchange(works_, {}), std::nullopt, oldest_};
+  // Together with the queue: the entries before a checkpoint are in this group or in an earlier one.
+  if (!writing_ && !checkpoints_.empty()) {
+    group.checkpoint = std::move(checkpoints_.front());
+    checkpoints_.pop_front();
+  }
+  return group;
 }
 
 Journal::Prepared Journal::Prepare(Group&& group) {
@@ -229,16 +250,32 @@ void Journal::DropForgottenCheckpoint() {
   if (writing_ && !lines_.contains(writing_->session())) writing_.reset();
 }
 
-void Journal::BeginCheckpoint() {
-  if (writing_) return;
-  WantedCheckpoint wanted;
+// Adds the next records of the checkpoint that is being written, or of a new one. One that cannot be made, for example
+// because memory is short, is left out: the one before it stays, and the journal goes on.
+void Journal::WriteCheckpoint(std::optional<WantedCheckpoint> wanted, RecordChanges& changes) {
+  if (!wanted && !writing_) return;
+  const std::uint64_t session = writing_ ? writing_->session() : wanted->session;
+  try {
+    if (wanted) BeginCheckpoint(std::move(*wanted));
+    RecordChanges records;
+    if (writing_) writing_->AddTo(records);
+    std::ranges::move(records.removed, std::back_inserter(changes.removed));
+    std::ranges::move(records.put, std::back_inserter(changes.put));
+  } catch (const std::exception& error) {
+    const MutexLock lock(mutex_);
+    checkpoint_fault_ = std::string("the last checkpoint could not be made: ") + error.what();
+    if (const auto line = lines_.find(session); line != lines_.end()) line->second.checkpointing = false;
+    writing_.reset();
+  }
+}
+
+void Journal::BeginCheckpoint(WantedCheckpoint wanted) {
   StoredPieces pieces;
   {
     const MutexLock lock(mutex_);
-    if (checkpoints_.empty()) return;
-    wanted = std::move(checkpoints_.front());
-    checkpoints_.pop_front();
-    if (const auto line = lines_.find(wanted.session); line != lines_.end()) pieces = line->second.pieces;
+    const auto line = lines_.find(wanted.session);
+    if (line == lines_.end()) return;  // It was closed meanwhile.
+    pieces = line->second.pieces;
   }
   writing_.emplace(wanted.session, wanted.position, wanted.content(), std::move(pieces));
 }
@@ -285,6 +322,7 @@ void Journal::EndCheckpoint() {
     line->second.checkpointed = writing_->position();
     line->second.pieces = writing_->pieces();
   }
+  checkpoint_fault_.clear();
   writing_.reset();
 }
 

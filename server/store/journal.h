@@ -60,14 +60,16 @@ class Journal {
 
   // Open: a new session, which is stored at once. Reopen: a session that was restored up to position `last`.
   void Open(const StoredSession& session, Durable durable);
-  // `pieces` are those of its newest checkpoint.
-  void Reopen(std::uint64_t session, std::uint64_t last, Durable durable, StoredPieces pieces = {});
+  // `checkpointed` and `pieces` are the position of its newest checkpoint, 0 if there is none, and its pieces.
+  void Reopen(std::uint64_t session, std::uint64_t last, Durable durable, std::uint64_t checkpointed = 0,
+              StoredPieces pieces = {});
   // Returns the position of the entry, counted from 1; 0 if it is not stored, also because `session` is not open.
   std::uint64_t Append(std::uint64_t session, JournalEntry entry);
   // The position of the session's last entry; 0 if there is none, or if the session is not stored.
   [[nodiscard]] std::uint64_t position(std::uint64_t session) const;
   // Stores the session's state after exactly the entries up to `position`. `content` is called on the journal's thread.
-  // Returns false if another checkpoint of the session is still being written.
+  // Returns false if another checkpoint of the session is still being written, or if it has one at this position or a
+  // later one.
   using Content = std::function<CheckpointContent()>;
   bool Checkpoint(std::uint64_t session, std::uint64_t position, Content content);
   // Nothing of the session is written any more, and what is stored of it stays.
@@ -95,7 +97,7 @@ class Journal {
     std::uint64_t next = 1;
     bool lost = false;
     bool checkpointing = false;
-    std::uint64_t checkpointed = 0;  // Position of the newest complete checkpoint of this start.
+    std::uint64_t checkpointed = 0;  // Position of the newest complete checkpoint.
     StoredPieces pieces = {};        // Those of the newest complete checkpoint.
     Durable durable;
   };
@@ -109,12 +111,6 @@ class Journal {
     Bytes bytes;
   };
   using Change = std::variant<Appended, Written, RecordRange>;
-  // Changes that are committed together.
-  struct Group {
-    std::deque<Change> changes;
-    std::vector<Work> works;  // After the commit.
-    Clock::time_point oldest;
-  };
   struct Batch {
     std::uint64_t first = 0;
     std::vector<JournalEntry> entries;
@@ -128,14 +124,26 @@ class Journal {
     std::uint64_t position = 0;
     Content content;
   };
+  // Changes that are committed together.
+  struct Group {
+    std::deque<Change> changes;
+    std::vector<Work> works;  // After the commit.
+    std::optional<WantedCheckpoint> checkpoint;
+    Clock::time_point oldest;
+  };
+  // Samples fill the queue's bound. What else changes is little, and parts of it may not be missing: it has as much
+  // room again.
+  enum class Room { kForSamples, kWithReserve };
 
   void CloseLocked(std::uint64_t session) CAIRN_REQUIRES(mutex_);
-  bool Push(Change change, std::size_t size) CAIRN_REQUIRES(mutex_);
+  bool RemoveStatesOf(std::uint64_t session, std::size_t size, Room room) CAIRN_REQUIRES(mutex_);
+  bool Push(Change change, std::size_t size, Room room = Room::kForSamples) CAIRN_REQUIRES(mutex_);
   void Run(const std::stop_token& stop);
   std::optional<Group> Next(const std::stop_token& stop);
   static Prepared Prepare(Group&& group);
   void DropForgottenCheckpoint() CAIRN_EXCLUDES(mutex_);
-  void BeginCheckpoint() CAIRN_EXCLUDES(mutex_);
+  void WriteCheckpoint(std::optional<WantedCheckpoint> wanted, RecordChanges& changes) CAIRN_EXCLUDES(mutex_);
+  void BeginCheckpoint(WantedCheckpoint wanted) CAIRN_EXCLUDES(mutex_);
   bool CommitOnce(const RecordChanges& changes);
   bool CommitPatiently(const RecordChanges& changes, const std::stop_token& stop);
   void Tell(const Prepared& prepared, Clock::time_point oldest);
@@ -153,8 +161,9 @@ class Journal {
   std::size_t committing_bytes_ CAIRN_GUARDED_BY(mutex_) = 0;  // Bytes of the group being committed.
   Clock::time_point oldest_ CAIRN_GUARDED_BY(mutex_);
   bool urgent_ CAIRN_GUARDED_BY(mutex_) = false;
-  std::string disk_fault_ CAIRN_GUARDED_BY(mutex_);  // Why the last commit failed; empty if it did not.
-  std::string lost_ CAIRN_GUARDED_BY(mutex_);        // Which session is no longer stored.
+  std::string disk_fault_ CAIRN_GUARDED_BY(mutex_);        // Why the last commit failed; empty if it did not.
+  std::string lost_ CAIRN_GUARDED_BY(mutex_);              // Which session is no longer stored.
+  std::string checkpoint_fault_ CAIRN_GUARDED_BY(mutex_);  // Why the last checkpoint is missing.
   JournalCounts counts_ CAIRN_GUARDED_BY(mutex_);
   std::deque<float> delays_ms_ CAIRN_GUARDED_BY(mutex_);
   std::deque<WantedCheckpoint> checkpoints_ CAIRN_GUARDED_BY(mutex_);

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "common/service/start_pose.h"
+#include "server/store/checkpoint_writer.h"
 #include "server/store/grid_transform.h"
 #include "server/store/site_edit.h"
 
@@ -67,11 +68,14 @@ class Merge {
   // Corrections name epochs, and a switch that was not completed may not look completed among those of both sites.
   Result<void> Journals(const SiteContents& of, std::uint32_t shift, bool moves) {
     for (const auto& [id, session] : of.sessions) {
-      std::uint64_t first = 0;
+      std::uint64_t first = 0, next = 1;
+      bool whole = true;
       const auto take = [&, id = id](std::uint64_t number, std::string_view bytes) -> Result<void> {
         auto batch = BatchOf(bytes);
         if (!batch) return tl::unexpected(batch.error());
         if (first == 0) first = batch->first;
+        whole = whole && batch->first == next;
+        next = batch->first + batch->entries.size();
         bool changed = false;
         for (JournalEntry& entry : batch->entries) {
           auto* const correction = std::get_if<CorrectionTaken>(&entry);
@@ -86,9 +90,15 @@ class Merge {
         return {};
       };
       if (auto read = store_.Read({.kind = RecordKind::kJournal, .owner = id}, take); !read) return read;
-      if (moves && first > 1) {
+      // A checkpoint cannot be moved: the session will be restored from its journal alone.
+      if (moves && first == 0) {
+        const auto checkpoint = ReadCheckpoint(store_, id);
+        whole = checkpoint && !*checkpoint;
+      }
+      if (moves && !whole) {
         return Fail(StatusCode::kFailedPrecondition,
-                    "the journal of session " + std::to_string(id) + " begins at entry " + std::to_string(first) +
+                    "the journal of session " + std::to_string(id) +
+                        (first == 0 ? " has no entries" : " begins at entry " + std::to_string(first)) +
                         ", because older ones were removed (store.max_gib); such a session cannot be moved");
       }
     }

@@ -5,6 +5,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <new>
+
 #include "server/store/restore_marks.h"
 #include "tests/server/support/stored_server.h"
 #include "tests/temp_directory.h"
@@ -96,44 +98,68 @@ TEST(Restore, ASessionWithDamagedRecordsIsRefusedAndTheOthersComeBack) {
   }
 }
 
-// Reading the journal of one session ends the process, as a scan would that the estimator cannot process.
-class DeadlyStore : public Store {
+// Calls a function before anything is read.
+class WatchedStore : public Store {
  public:
-  DeadlyStore(std::unique_ptr<Store> store, std::uint64_t session) : store_(std::move(store)), session_(session) {}
+  using BeforeRead = std::function<void(const RecordRange& range)>;
+  WatchedStore(std::unique_ptr<Store> store, BeforeRead before)
+      : store_(std::move(store)), before_(std::move(before)) {}
   Result<void> Commit(const RecordChanges& changes) override { return store_->Commit(changes); }
   Result<void> CommitEach(const Next& next) override { return store_->CommitEach(next); }
   Result<void> Read(const RecordRange& range, const Visit& visit) override {
-    if (range.kind == RecordKind::kJournal && range.owner == session_) _exit(kDead);
+    before_(range);
     return store_->Read(range, visit);
   }
   Result<std::vector<std::uint64_t>> Owners(RecordKind kind) override { return store_->Owners(kind); }
   Result<std::uint64_t> bytes_used() override { return store_->bytes_used(); }
 
-  static constexpr int kDead = 77;
-
  private:
   const std::unique_ptr<Store> store_;
-  const std::uint64_t session_;
+  const BeforeRead before_;
 };
 
-// Starts a server on this state in a process of its own; with what exit code it ended: 0 where it started.
+// Starts a server on this state, and stops it; whether it started.
+bool StartOnce(const std::filesystem::path& directory, const ServerOptions& options, WatchedStore::BeforeRead before) {
+  WatchedStore store(*OpenStore(directory), std::move(before));
+  Journal journal(store, {.commit_delay_ms = 5});
+  Inbound inbound(16);
+  Outbound outbound(16);
+  Server server(options, inbound, outbound, 1, &journal);
+  const bool started = server.Start().has_value();
+  journal.Start();
+  server.Stop();
+  journal.Stop();
+  return started;
+}
+
+constexpr int kDead = 77;
+
+// Starts a server in a process of its own, which ends when it reads the journal of a session, as a scan would end it
+// that the estimator cannot process. Returns its exit code: 0 where it started.
 int StartElsewhere(const std::filesystem::path& directory, const ServerOptions& options, std::uint64_t deadly) {
   const pid_t child = fork();
   if (child == 0) {
-    DeadlyStore store(*OpenStore(directory), deadly);
-    Journal journal(store, {.commit_delay_ms = 5});
-    Inbound inbound(16);
-    Outbound outbound(16);
-    Server server(options, inbound, outbound, 1, &journal);
-    const bool started = server.Start().has_value();
-    journal.Start();
-    server.Stop();
-    journal.Stop();
-    _exit(started ? 0 : 1);
+    const auto die = [deadly](const RecordRange& range) {
+      if (range.kind == RecordKind::kJournal && range.owner == deadly) _exit(kDead);
+    };
+    _exit(StartOnce(directory, options, die) ? 0 : 1);
   }
   int status = 0;
   waitpid(child, &status, 0);
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+// The session was taken for one that is gone, and everything that was stored of it was removed.
+TEST(Restore, ASessionThatCannotBeReadForLackOfMemoryStaysForTheNextStart) {
+  const TempDirectory directory;
+  ServerOptions options = TestOptions();
+  options.robots.checkpoint_entries = 40;
+  DriveTwoRobots(directory / "0", options);
+  EXPECT_TRUE(StartOnce(directory / "0", options, [](const RecordRange& range) {
+    if (range.kind == RecordKind::kCheckpoint && range.owner == 1) throw std::bad_alloc();
+  }));
+  StoredServer second(directory / "0", options);
+  for (const char* robot : {"r1", "r2"}) EXPECT_EQ(PathOf(*second.operator->(), robot).size(), 60U);
 }
 
 TEST(Restore, ASessionWhoseJournalEndsTheServerDoesSoTwiceAndTheOthersComeBack) {
@@ -145,9 +171,9 @@ TEST(Restore, ASessionWhoseJournalEndsTheServerDoesSoTwiceAndTheOthersComeBack) 
     const auto store = *OpenStore(directory / "0");
     return RestoreMarks::Read(*store)->deaths(session);
   };
-  EXPECT_EQ(StartElsewhere(directory / "0", options, 1), DeadlyStore::kDead);
+  EXPECT_EQ(StartElsewhere(directory / "0", options, 1), kDead);
   EXPECT_EQ(deaths(1), 1U);
-  EXPECT_EQ(StartElsewhere(directory / "0", options, 1), DeadlyStore::kDead);
+  EXPECT_EQ(StartElsewhere(directory / "0", options, 1), kDead);
   EXPECT_EQ(deaths(1), 2U);
   // The other one was restored alone meanwhile, or its turn has not come.
   EXPECT_LE(deaths(2), 1U);

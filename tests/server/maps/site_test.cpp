@@ -278,6 +278,19 @@ TEST(Atlas, RefusesSitesItDoesNotServeAndTooMany) {
   pool.join();
 }
 
+// A robot that entered while the records of a deleted site were being removed lost its own records with them.
+TEST(Atlas, ADeletedSiteIsMadeAgainOnlyWhenItIsReleased) {
+  asio::thread_pool pool(1);
+  Outbound outbound(64);
+  Atlas atlas(MapsOptions{}, 0.05, true, pool, outbound);
+  EXPECT_TRUE(atlas.Enter("lab"));
+  atlas.Remove("lab");
+  EXPECT_EQ(atlas.Enter("lab").error().code, StatusCode::kUnavailable);
+  atlas.Release("lab");
+  EXPECT_TRUE(atlas.Enter("lab"));
+  pool.join();
+}
+
 // Misspelt names used up the sites for good.
 TEST(Atlas, ASiteThatHoldsNothingGivesWay) {
   asio::thread_pool pool(1);

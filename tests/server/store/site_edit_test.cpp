@@ -193,6 +193,18 @@ TEST(MergeSites, WhatCannotBeMergedStaysAsItIs) {
   EXPECT_TRUE(MergeSites(*store, "lab", "hall")) << "without a transform nothing is estimated again";
 }
 
+// Its checkpoint would be removed, and nothing would be left of it.
+TEST(MergeSites, ASessionOfWhichOnlyTheCheckpointIsLeftIsNotMoved) {
+  const auto store = MemoryStore();
+  Put(*store, {.name = "lab"});
+  Put(*store, {.name = "hall", .first_session = 11, .job = 4});
+  ASSERT_TRUE(store->Commit({.removed = {{.kind = RecordKind::kJournal, .owner = 11}}, .put = {}}));
+  const auto moved = MergeSites(*store, "lab", "hall", {1.0, 0.0, 0.0});
+  ASSERT_FALSE(moved);
+  EXPECT_NE(moved.error().message.find("has no entries"), std::string::npos) << moved.error().message;
+  EXPECT_TRUE(*ReadCheckpoint(*store, 11));
+}
+
 TEST(SplitSite, TheSessionsGoWithTheirPartOfEverything) {
   const auto store = MemoryStore();
   Put(*store, {});

@@ -1,0 +1,149 @@
+// A journal whose disk is full or fails at the worst moment, or whose memory is short.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <new>
+
+#include "server/store/checkpoint_writer.h"
+#include "server/store/journal.h"
+#include "server/store/sqlite_store.h"
+#include "tests/eventually.h"
+#include "tests/server/store/sample_entries.h"
+#include "tests/server/store/stored_sites.h"
+
+namespace cairn::server::testing {
+namespace {
+
+constexpr std::size_t kQueueBytes = std::size_t{1} << 20;
+const StoreOptions kSmallQueue{.commit_delay_ms = 1, .queue_mib = 1};
+
+// Nothing can be written any more after the commit in which a checkpoint becomes complete.
+class FullAfterACheckpoint : public Store {
+ public:
+  explicit FullAfterACheckpoint(Store& store) : store_(store) {}
+  Result<void> Commit(const RecordChanges& changes) override {
+    if (full_) return Fail(StatusCode::kResourceExhausted, "the disk is full");
+    auto committed = store_.Commit(changes);
+    full_ = ReadCheckpoint(store_, 1).value().has_value();
+    return committed;
+  }
+  Result<void> CommitEach(const Next& next) override { return store_.CommitEach(next); }
+  Result<void> Read(const RecordRange& range, const Visit& visit) override { return store_.Read(range, visit); }
+  Result<std::vector<std::uint64_t>> Owners(RecordKind kind) override { return store_.Owners(kind); }
+  Result<std::uint64_t> bytes_used() override { return store_.bytes_used(); }
+
+ private:
+  Store& store_;
+  std::atomic<bool> full_{false};
+};
+
+std::uint64_t LastEntry(Store& store, std::uint64_t session) {
+  const auto last = ReadJournal(store, session, 0, [](auto, JournalEntry&&) { return Result<void>{}; });
+  EXPECT_TRUE(last) << last.error().message;
+  return last.value_or(0);
+}
+
+bool HasSession(Store& store, std::uint64_t session) {
+  return ReadSessions(store)->contains(session);
+}
+
+// A job's record as large as this is waiting.
+void FillQueue(Journal& journal, std::size_t bytes) {
+  journal.Put(
+      {RecordKind::kJob, 99, 0}, [] { return std::string("x"); }, bytes);
+}
+
+TEST(JournalFaults, ACheckpointIsNeverAheadOfTheEntriesBeforeIt) {
+  const auto memory = MemoryStore();
+  FullAfterACheckpoint store(*memory);
+  {
+    Journal journal(store, {.commit_delay_ms = 1});
+    journal.Open(SampleSession(1), {});
+    for (std::uint64_t i = 1; i <= 3; ++i) journal.Append(1, SampleOdometry(i));
+    // This record's bytes are made while its group is prepared. An entry and a checkpoint that come then belong to the
+    // next group.
+    journal.Put({RecordKind::kJob, 1, 0}, [&] {
+      const std::uint64_t position = journal.Append(1, SampleOdometry(4));
+      EXPECT_TRUE(journal.Checkpoint(1, position, [] { return CheckpointContent{"state after 4"}; }));
+      return std::string("x");
+    });
+    journal.Start();
+    EXPECT_TRUE(test::Eventually([&] { return ReadCheckpoint(*memory, 1).value().has_value(); }));
+  }
+  EXPECT_EQ((*ReadCheckpoint(*memory, 1))->position, 4U);
+  EXPECT_EQ(LastEntry(*memory, 1), 4U);
+}
+
+TEST(JournalFaults, OneCheckpointThatCannotBeMadeIsLeftOutAndTheJournalGoesOn) {
+  const auto store = MemoryStore();
+  Journal journal(*store, {.commit_delay_ms = 1});
+  journal.Start();
+  journal.Open(SampleSession(1), {});
+  journal.Append(1, SampleOdometry(1));
+  ASSERT_TRUE(journal.Checkpoint(1, 1, []() -> CheckpointContent { throw std::bad_alloc(); }));
+  EXPECT_TRUE(test::Eventually([&] { return journal.health().degraded; }));
+  EXPECT_EQ(journal.Append(1, SampleOdometry(2)), 2U);
+  EXPECT_TRUE(test::Eventually([&] { return LastEntry(*store, 1) == 2U; }));
+  EXPECT_TRUE(test::Eventually([&] { return journal.Checkpoint(1, 2, [] { return CheckpointContent{"two"}; }); }));
+  EXPECT_TRUE(test::Eventually([&] { return !journal.health().degraded; }));
+  EXPECT_EQ((*ReadCheckpoint(*store, 1))->bytes, "two");
+}
+
+// To write it again would begin with removing the one that is there.
+TEST(JournalFaults, ACheckpointAtThePositionOfTheNewestIsRefused) {
+  const auto store = MemoryStore();
+  Journal journal(*store, {.commit_delay_ms = 1});
+  journal.Reopen(1, 7, {}, 5);
+  EXPECT_FALSE(journal.Checkpoint(1, 5, [] { return CheckpointContent{"again"}; }));
+  EXPECT_TRUE(journal.Checkpoint(1, 6, [] { return CheckpointContent{"later"}; }));
+}
+
+TEST(JournalFaults, WhereTheQueueIsFullALayerIsStoredAllTheSameBeforeItsSessionIsForgotten) {
+  for (const std::size_t room : {100, 600}) {
+    const auto store = MemoryStore();
+    Put(*store, SampleSite{});
+    Journal journal(*store, kSmallQueue);
+    FillQueue(journal, kQueueBytes - room);
+    journal.Put({RecordKind::kLayer, HashName("lab"), 1}, [] { return BytesOf(StoredLayer{1, SampleGrid(1)}); });
+    journal.Forget(1);
+    journal.Start();
+    journal.Stop();
+    EXPECT_FALSE(HasSession(*store, 1));
+    EXPECT_FALSE(*ReadCheckpoint(*store, 1));
+    const std::vector<StoredLayer> layers = *ReadLayers(*store, HashName("lab"));
+    EXPECT_TRUE(std::ranges::any_of(layers, [](const StoredLayer& layer) { return layer.session == 1; }));
+  }
+}
+
+TEST(JournalFaults, ASessionIsForgottenAsAWholeOrNotAtAll) {
+  for (const std::size_t room : {10, 300}) {
+    const auto store = MemoryStore();
+    Put(*store, SampleSite{});
+    Journal journal(*store, kSmallQueue);
+    FillQueue(journal, 2 * kQueueBytes - room);
+    journal.Forget(1);
+    journal.Start();
+    journal.Stop();
+    EXPECT_EQ(HasSession(*store, 1), room == 10);
+    EXPECT_EQ(ReadCheckpoint(*store, 1)->has_value(), room == 10);
+    EXPECT_EQ(LastEntry(*store, 1) > 0, room == 10);
+  }
+}
+
+TEST(JournalFaults, ANewSessionTakesNothingOverFromAnotherOfItsNumber) {
+  const auto store = MemoryStore();
+  Put(*store, SampleSite{});
+  ASSERT_TRUE(store->Commit({.removed = {{.kind = RecordKind::kSession, .owner = 1}}, .put = {}}));
+  ASSERT_TRUE(*ReadCheckpoint(*store, 1));
+  Journal journal(*store, {.commit_delay_ms = 1});
+  journal.Start();
+  journal.Open(SampleSession(1), {});
+  journal.Append(1, SampleOdometry(1));
+  journal.Stop();
+  EXPECT_TRUE(HasSession(*store, 1));
+  EXPECT_FALSE(*ReadCheckpoint(*store, 1));
+  EXPECT_EQ(LastEntry(*store, 1), 1U);
+}
+
+}  // namespace
+}  // namespace cairn::server::testing
