@@ -3,14 +3,15 @@
 #include <algorithm>
 #include <map>
 
-#include "tests/studies/study.h"
 #include "tests/server/slam/moved_sweep.h"
+#include "tests/studies/study.h"
 
 namespace cairn::studies {
 namespace {
 
 struct Tally {
   int cases = 0, poses = 0, wrong = 0;
+  double worst_m = 0.0;
   std::vector<double> found_s, found_m;
 };
 
@@ -24,15 +25,17 @@ void AddTo(Tally& tally, const test::MovedCase& one) {
   ++tally.cases;
   tally.poses += one.poses;
   tally.wrong += one.wrong;
+  tally.worst_m = std::max(tally.worst_m, one.worst_m);
   if (one.found_after_s < 0.0) return;
   tally.found_s.push_back(one.found_after_s);
   tally.found_m.push_back(one.found_after_m);
 }
 
 void AddTable(Report& report, const std::map<std::string, Tally>& tallies, const std::string& by) {
-  Table table({by, "cases", "poses", "wrong", "found again", "after p50 (s)", "p90 (s)", "p50 (m)", "p90 (m)"});
+  Table table({by, "cases", "poses", "wrong", "largest error (m)", "found again", "after p50 (s)", "p90 (s)", "p50 (m)",
+               "p90 (m)"});
   for (const auto& [name, tally] : tallies)
-    table.Add({name, Count(tally.cases), Count(tally.poses), Count(tally.wrong),
+    table.Add({name, Count(tally.cases), Count(tally.poses), Count(tally.wrong), Number(tally.worst_m, 2),
                Percent(static_cast<double>(tally.found_s.size()) / tally.cases),
                Number(Quantile(tally.found_s, 0.5), 1), Number(Quantile(tally.found_s, 0.9), 1),
                Number(Quantile(tally.found_m, 0.5), 1), Number(Quantile(tally.found_m, 0.9), 1)});
