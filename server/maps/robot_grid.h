@@ -2,9 +2,11 @@
 // calls a session (GridOwner). Chunks are shared, immutable, and in the map frame.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 
 #include "server/slam/grid/occupancy_grid.h"
 
@@ -39,6 +41,9 @@ struct Correction {
   std::uint64_t generation = 0;  // Start of the server that switches the map.
   RobotGrid grid;
   std::function<void(Adopted&&)> done;
+  // Becomes true when all sessions have adopted their parts and this was handed to the journal. If the server ends
+  // before, nothing has been switched: until then no checkpoint may hold the new grid. Null: true from the beginning.
+  std::shared_ptr<const std::atomic<bool>> completed{};
 };
 
 // The interface of a session for its site. Thread rule: any thread; must not block.

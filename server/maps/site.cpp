@@ -219,10 +219,11 @@ void Site::Begin(std::uint32_t version, Done done) {
   for (const auto& [session, part] : wanted->parts) {
     switch_->awaited.insert(session);
     const auto ticket = std::make_shared<Ticket>(shared_from_this(), version, session);
-    Correction correction{
-        .epoch = epoch_ + 1, .generation = generation_, .grid = part, .done = [ticket](Adopted&& adopted) {
-          ticket->Answer(std::move(adopted));
-        }};
+    Correction correction{.epoch = epoch_ + 1,
+                          .generation = generation_,
+                          .grid = part,
+                          .done = [ticket](Adopted&& adopted) { ticket->Answer(std::move(adopted)); },
+                          .completed = switch_->completed};
     // If the session has ended, the correction and its ticket are dropped here.
     if (const auto owner = OwnerOf(session)) owner->Adopt(std::move(correction));
   }
@@ -269,6 +270,7 @@ void Site::CommitIfComplete() {
   switches_[++epoch_] = generation_;
   StoreVersion(before);
   RenderAll();
+  *complete.completed = true;
   Send();
   complete.done(complete.version);
 }

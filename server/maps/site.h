@@ -40,6 +40,7 @@ struct VersionSwitch {
   std::map<SessionId, slam::OccupancyGrid::Chunks> staged;  // The new grids of the sessions that have answered.
   std::map<SessionId, RobotGrid> displaced;
   std::function<void(Result<std::uint32_t>)> done;
+  std::shared_ptr<std::atomic<bool>> completed = std::make_shared<std::atomic<bool>>(false);  // Correction::completed.
 };
 
 class Site : public std::enable_shared_from_this<Site> {

@@ -166,7 +166,7 @@ void SessionEstimator::ReplayOdometry(const OdometryTaken& odometry) {
 
 Journal::Content SessionEstimator::Save() const {
   auto writer = std::make_shared<slam::StateWriter>();
-  if (ended_) return nullptr;
+  if (ended_ || (switch_completed_ && !*switch_completed_)) return nullptr;
   // The scans themselves are saved by the pipeline, in the same order.
   std::vector<NameId> waiting;
   pipeline_.ForEachWaiting([&](const Scan& scan) { waiting.push_back(waiting_.at(&scan).sensor_id); });
@@ -270,6 +270,7 @@ void SessionEstimator::On(Correction&& correction) {
                   .displaced = {PublishedChunks(), pipeline_.mapper().keyframe_count()},
                   .change = {.session = identity_.id, .chunks = {}}};
   AdoptGrid(correction.epoch, correction.grid);
+  switch_completed_ = std::move(correction.completed);
   adopted.change = TakeGridChange();
   correction.done(std::move(adopted));
 }

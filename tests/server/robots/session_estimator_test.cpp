@@ -147,6 +147,17 @@ TEST_F(SessionEstimatorTest, ACorrectionReplacesTheGridAndTellsWhatItGaveUp) {
   EXPECT_EQ(poses_.back().map_epoch, 9U);
 }
 
+// The next server would have this robot's part of a map that was never switched, beside the old parts of the others.
+TEST_F(SessionEstimatorTest, NoCheckpointHoldsAGridBeforeTheSwitchToItIsComplete) {
+  Drive(0, 10);
+  ASSERT_TRUE(estimator_.Save());
+  const auto completed = std::make_shared<std::atomic<bool>>(false);
+  estimator_.Handle(Correction{.epoch = 9, .grid = {}, .done = [](Adopted&&) {}, .completed = completed});
+  EXPECT_FALSE(estimator_.Save());
+  *completed = true;
+  EXPECT_TRUE(estimator_.Save());
+}
+
 // The clock of a robot was set back by an hour: its scans are accepted again after a few of them, its poses carry its
 // own stamps, and the path goes on growing.
 TEST_F(SessionEstimatorTest, AClockThatIsSetBackCostsAFewScans) {
