@@ -114,12 +114,14 @@ TEST_F(SiteTest, ASwitchIsSeenAllAtOnceWithTombstones) {
   site_->Change({.session = 1, .chunks = {{{0, 1}, UniformChunk(-50)}}});
   EXPECT_TRUE(TakeTiles().empty());
   EXPECT_EQ(site_->snapshot()->info.epoch, 0U);
+  EXPECT_FALSE(*corrections_[0].second.completed);
 
   corrections_[1].second.done(
       {.session = 2,
        .displaced = {{{{20, 20}, UniformChunk(100)}}, 5},
        .change = {.session = 2, .chunks = {{{20, 20}, nullptr}, {{21, 21}, UniformChunk(50)}}}});
   EXPECT_EQ(*enabled.get(), 2U);
+  EXPECT_TRUE(*corrections_[0].second.completed);
   std::map<TileKey, TileSample> samples;
   for (const TileSample& tile : TakeTiles()) samples[tile.tile.key] = tile;
   EXPECT_TRUE(samples.at({0, 20, 20}).deleted);
