@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/options/config.h"
+#include "common/sensor/log_options.h"
 #include "common/service/start_pose.h"
 #include "common/version.h"
 #include "server/known_map.h"
@@ -48,6 +49,8 @@ std::optional<OfflineOptions> ParseOfflineOptions(int argc, char** argv, int& ex
   app.add_option("--smoothed-map", options.smoothed_map, "Write the map redrawn along the smoothed path");
   app.add_option("--map-lines", options.map_lines,
                  "Write the walls seen, as lines, for slam.line_match.map (along the smoothed path with --smooth)");
+  app.add_option("--used-log", options.used_log,
+                 "Write the scans as they were used, without the robot's motion during a scan, as a CARMEN log");
   const auto take_start = [&options](const std::string& text) {
     const auto start = ParseStart(text);
     if (!start) throw CLI::ValidationError("--start", start.error().message);
@@ -61,9 +64,7 @@ std::optional<OfflineOptions> ParseOfflineOptions(int argc, char** argv, int& ex
   app.add_option("--seed", seed, "Same as --set slam.seed=N");
   app.add_option("--threads", options.threads, "Number of threads; 0: one per core. The output does not depend on it")
       ->check(CLI::Range(0, 256));
-  app.add_option("--no-return", options.reader.no_return_m,
-                 "Ranges from this value on mean that the beam hit nothing (m); 0: take it from the log")
-      ->check(CLI::NonNegativeNumber);
+  AddLogOptions(app, options.reader);
   app.add_flag("--json", options.json, "One JSON object on standard output");
   try {
     app.parse(argc, argv);
