@@ -12,6 +12,7 @@
 #include "server/slam/motion/step_motion.h"
 #include "server/slam/scan/beam_points.h"
 #include "server/slam/scan/stamp_gate.h"
+#include "server/slam/scan_tracking.h"
 #include "server/slam/tracking/front_end.h"
 #include "server/slam/trail/trail.h"
 
@@ -86,20 +87,20 @@ Mapper::Mapper(Mapper&&) noexcept = default;
 Mapper& Mapper::operator=(Mapper&&) noexcept = default;
 
 ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot,
-                            const ParallelFor& parallel_for) {
+                            const ParallelFor& parallel_for, const RollingScan* rolling) {
   State& s = *state_;
   const Stamp stamp = scan->stamp;
   if (IsTilted(*scan, s.options.max_tilt_rad)) return s.Coast(stamp, T_odom_robot);
 
   if (s.drawing.redrawing()) s.drawing.Continue(s.trail.keyframes(), s.believed_path());
 
-  ScanView view = Look(*scan, s.options.front_end);
-
-  const TrackStep step = s.front_end.Track(view, T_odom_robot, parallel_for);
+  TrackedScan tracked =
+      TrackScan(s.front_end, s.options.front_end, s.trail, std::move(scan), rolling, T_odom_robot, parallel_for);
+  const TrackStep& step = tracked.step;
   s.blind.Add(step, s.trail.empty() ? Pose2{} : s.trail.shapes().back().T_track_robot);
 
   const bool keyframe = s.trail.empty() || MovedEnough(s.trail.FromLast(step.T_track_robot), s.options.gate);
-  if (keyframe) s.AddKeyframe({std::move(scan), T_odom_robot}, std::move(view), step, parallel_for);
+  if (keyframe) s.AddKeyframe({std::move(tracked.scan), T_odom_robot}, std::move(tracked.view), step, parallel_for);
 
   return s.Report(stamp, T_odom_robot, step, keyframe);
 }

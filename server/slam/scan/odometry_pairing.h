@@ -1,16 +1,17 @@
 // Gives every scan the odometry pose at its stamp, independently of the order in which the two streams
 // arrive: a scan waits until there is a sample at or after its last beam, and then gets an interpolated pose; where its
-// beams were measured one after the other, the motion meanwhile is taken out of it (deskew.h). All
-// decisions depend on stamps alone, so the same two streams give the same pairs however they interleave, as
-// long as no bound is reached and no clock is set back. When a clock is set back, waiting scans are dropped, because
-// scans and odometry of two clocks cannot be joined; the time of the estimator still grows (PairedScan::stamp).
-// Memory is bounded. Not thread-safe.
+// beams were measured one after the other, the motion meanwhile is taken out of it (deskew.h), and a gap
+// in the odometry until its last beam counts as one at its stamp. All decisions depend on stamps alone, so the same two
+// streams give the same pairs however they interleave, as long as no bound is reached and no clock is set back. When a
+// clock is set back, waiting scans are dropped, because scans and odometry of two clocks cannot be joined; the time of
+// the estimator still grows (PairedScan::stamp). Memory is bounded. Not thread-safe.
 #pragma once
 
 #include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "common/options/option_visitor.h"
 #include "common/sensor/odometry.h"
@@ -33,7 +34,8 @@ struct PairedScan {
   std::shared_ptr<const Scan> scan;      // As it was added.
   std::shared_ptr<const Scan> at_stamp;  // The same with all beams at its stamp, for estimation.
   Pose2 T_odom_robot;
-  Stamp stamp = 0;  // The scan's, plus what the robot's clock was set back by: grows from pair to pair.
+  Stamp stamp = 0;                 // The scan's, plus what the robot's clock was set back by: grows from pair to pair.
+  std::vector<Odometry> during{};  // RollingScan::odometry; empty if all beams are measured at once.
 };
 
 class OdometryPairing {
@@ -79,7 +81,7 @@ class OdometryPairing {
   void ClockSetBack();
   [[nodiscard]] bool Covers(const Scan& scan) const;
   void PairOrDrop(const std::shared_ptr<const Scan>& scan);
-  [[nodiscard]] std::shared_ptr<const Scan> WithoutMotion(const std::shared_ptr<const Scan>& scan) const;
+  [[nodiscard]] std::vector<Odometry> During(const Scan& scan) const;
   void Flush();
   void Pair(const std::shared_ptr<const Scan>& scan, const Pose2& T_odom_robot);
 

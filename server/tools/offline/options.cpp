@@ -49,8 +49,6 @@ std::optional<OfflineOptions> ParseOfflineOptions(int argc, char** argv, int& ex
   app.add_option("--smoothed-map", options.smoothed_map, "Write the map redrawn along the smoothed path");
   app.add_option("--map-lines", options.map_lines,
                  "Write the walls seen, as lines, for slam.line_match.map (along the smoothed path with --smooth)");
-  app.add_option("--used-log", options.used_log,
-                 "Write the scans as they were used, without the robot's motion during a scan, as a CARMEN log");
   const auto take_start = [&options](const std::string& text) {
     const auto start = ParseStart(text);
     if (!start) throw CLI::ValidationError("--start", start.error().message);
