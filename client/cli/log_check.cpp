@@ -10,6 +10,7 @@
 #include "client/cli/json_output.h"
 #include "client/cli/option_checks.h"
 #include "client/cli/text_output.h"
+#include "common/sensor/log_options.h"
 
 namespace cairn::client {
 namespace {

@@ -8,7 +8,6 @@
 #include <string>
 
 #include "common/options/number_text.h"
-#include "common/sensor/log_reader.h"
 #include "common/status.h"
 
 namespace cairn::client {
@@ -50,26 +49,6 @@ template <typename Number>
 CLI::Option* AddNumber(CLI::App& app, const std::string& name, Number& value, double least, double most,
                        const std::string& help, const std::string& unit = CLI::detail::type_name<Number>()) {
   return app.add_option(name, value, help)->check(InRange(least, most))->type_name(unit)->capture_default_str();
-}
-
-// The options of commands that read a log. They tell what the file itself does not contain.
-inline void AddLogOptions(CLI::App& command, LogReaderOptions& options) {
-  command
-      .add_option("--no-return", options.no_return_m,
-                  "A range of this length or more hit nothing; 0: find the limit from the log")
-      ->check(CLI::NonNegativeNumber)
-      ->type_name("METRES");
-  command
-      .add_option("--laser-forward", options.dpslam_laser_forward_m,
-                  "DP-SLAM logs: distance of the laser ahead of the pivot")
-      ->type_name("METRES")
-      ->capture_default_str();
-  command
-      .add_option("--scan-period", options.dpslam_scan_period_s,
-                  "DP-SLAM logs, which have no stamps: time between two scans")
-      ->check(CLI::PositiveNumber)
-      ->type_name("SECONDS")
-      ->capture_default_str();
 }
 
 }  // namespace cairn::client

@@ -11,6 +11,7 @@
 #include "client/cli/progress_line.h"
 #include "client/cli/quantity_text.h"
 #include "client/cli/robot_stream.h"
+#include "common/sensor/log_options.h"
 #include "common/service/start_pose.h"
 
 namespace cairn::client {

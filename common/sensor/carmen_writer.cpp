@@ -63,6 +63,7 @@ void CarmenWriter::Write(const Odometry& odometry) {
 }
 
 void CarmenWriter::Write(const Scan& scan, const Pose2& T_odom_robot) {
+  WriteTiming(scan);
   const bool tilted = scan.tilt_rad != 0.0;
   const bool flaser = !tilted && IsFlaserLayout(scan);
   std::string line = flaser ? "FLASER" : tilted ? "TILTLASER1" : "ROBOTLASER1 0";
@@ -83,6 +84,13 @@ void CarmenWriter::Write(const Scan& scan, const Pose2& T_odom_robot) {
   Append(line, T_odom_robot);
   if (!flaser) line += " 0 0 0 0 0";  // tv rv forward_safety side_safety turn_axis
   WriteTime(line, scan.stamp);
+}
+
+void CarmenWriter::WriteTiming(const Scan& scan) {
+  const double period_s = scan.beam_period_s / std::abs(scan.angle_step_rad) * 2.0 * kPi;
+  if (period_s == scan_period_s_) return;
+  scan_period_s_ = period_s;
+  out_ << "PARAM lidar_scan_period " << ExactText(period_s) << '\n';
 }
 
 void CarmenWriter::WriteTime(std::string& line, Stamp stamp) {

@@ -1,7 +1,9 @@
 #include "common/sensor/log_message.h"
 
 #include <algorithm>
+#include <utility>
 
+#include "common/sensor/lidar_timing.h"
 #include "common/sensor/log_fields.h"
 
 namespace cairn {
@@ -92,7 +94,21 @@ OdometryMessage ReadDpslamOdometry(LogFields& fields) {
   return odometry;
 }
 
-// PARAM, SYNC, TRUEPOS, SONAR, GPS_NMEA_GGA, ...
+// What follows the value (CARMEN: time, host, time) is not read.
+LogMessage ReadParameter(LogFields& fields) {
+  constexpr std::string_view kPrefix = "lidar_";
+  std::string name(fields.Word("name"));
+  if (!name.starts_with(kPrefix)) return IgnoredMessage{};
+  name.erase(0, kPrefix.size());
+  std::replace(name.begin(), name.end(), '_', '-');
+  if (std::ranges::find(LidarTimingNames(), name) == LidarTimingNames().end()) return IgnoredMessage{};
+  const std::string value(fields.Word("value"));
+  LidarTiming trial;
+  if (const auto set = SetLidarTiming(trial, name, Shown(value)); !set) return BadMessage{true, set.error().message};
+  return TimingMessage{std::move(name), value};
+}
+
+// SYNC, TRUEPOS, SONAR, GPS_NMEA_GGA, ...
 bool LooksLikeMessageName(std::string_view word) {
   constexpr std::size_t kLongest = 40;
   return word.size() >= 2 && word.size() <= kLongest && word[0] >= 'A' && word[0] <= 'Z' &&
@@ -121,6 +137,7 @@ LogMessage ParseLogLine(std::string_view line) {
   if (kind == "Laser") return Checked(fields, ReadDpslamLaser(fields));
   if (kind == "ODOM") return Checked(fields, ReadOdometry(fields));
   if (kind == "Odometry") return Checked(fields, ReadDpslamOdometry(fields));
+  if (kind == "PARAM") return ReadParameter(fields);
   if (LooksLikeMessageName(kind)) return IgnoredMessage{};
   return BadMessage{false, "unknown message '" + Shown(kind) + "'"};
 }

@@ -35,6 +35,12 @@ struct OdometryMessage {
   Pose2 T_odom_robot;
 };
 
+// PARAM lidar_NAME VALUE: one of LidarTimingNames, with '_' for '-'.
+struct TimingMessage {
+  std::string name;
+  std::string value;
+};
+
 struct NoMessage {};       // Blank line or comment.
 struct IgnoredMessage {};  // A message of another kind.
 struct BadMessage {
@@ -42,7 +48,7 @@ struct BadMessage {
   std::string reason;
 };
 
-using LogMessage = std::variant<NoMessage, IgnoredMessage, BadMessage, LaserMessage, OdometryMessage>;
+using LogMessage = std::variant<NoMessage, IgnoredMessage, BadMessage, LaserMessage, OdometryMessage, TimingMessage>;
 
 // More readings than any scanner has are refused before anything is allocated for them.
 inline constexpr int kMaxReadings = 100'000;

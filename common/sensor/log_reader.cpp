@@ -121,6 +121,10 @@ class LogEmitter {
     if (auto* laser = std::get_if<LaserMessage>(&message)) return TakeLaser(line, std::move(*laser));
     if (const auto* odometry = std::get_if<OdometryMessage>(&message)) return TakeOdometry(line, *odometry);
     if (const auto* bad = std::get_if<BadMessage>(&message)) Complain(line, bad->reason);
+    if (const auto* timing = std::get_if<TimingMessage>(&message)) {
+      if (const auto set = SetLidarTiming(logged_timing_, timing->name, timing->value); !set)
+        Complain(line, set.error().message);
+    }
     if (std::holds_alternative<IgnoredMessage>(message)) ++summary_.ignored;
     return true;
   }
@@ -168,6 +172,10 @@ class LogEmitter {
     scan.tilt_rad = laser.tilt_rad;
     scan.T_robot_laser = facts.T_robot_laser;
     scan.ranges_m = std::move(laser.ranges_m);
+    if (const auto timed = PutInOrderOfTime(Merge(options_.timing, logged_timing_), scan); !timed) {
+      Complain(line, timed.error().message);
+      return true;
+    }
     ++summary_.scans;
     return sink_(std::move(scan));
   }
@@ -210,6 +218,7 @@ class LogEmitter {
   LogReaderOptions options_;
   const std::function<bool(LogRecord&&)>& sink_;
   LogSummary summary_;
+  LidarTiming logged_timing_;     // Of the lines so far.
   std::optional<Pose2> pending_;  // DP-SLAM odometry waiting for its laser message.
   std::int64_t dpslam_pairs_ = 0;
   Stamp last_odometry_stamp_ = 0;

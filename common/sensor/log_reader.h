@@ -17,6 +17,10 @@
 //   likewise.
 // - DP-SLAM logs have no stamps: a Laser and the Odometry before it share one, dpslam_scan_period_s after the last
 //   pair's; the first pair is stamped one period. LogReaderOptions carries laser offset and range.
+// - A lidar that turns measures its beams one after the other. What LogReaderOptions::timing says of it, or else the
+//   log itself, gives the beams their times (lidar_timing.h); the stamp of a scan is then that of its first beam, while
+//   odometry keeps its stamp. In a log, the lines `PARAM lidar_scan_period S`, `PARAM lidar_stamp_at
+//   first|middle|last`, `PARAM lidar_clockwise on|off` and `PARAM lidar_turn_from DEG` count for all scans after them.
 // Scans are not validated here (ValidateScan), sequence numbers are 0. Memory is bounded for files of any size.
 // Source: CARMEN logger message list; DP-SLAM README (Eliazar, Parr 2003).
 #pragma once
@@ -24,6 +28,7 @@
 #include <filesystem>
 #include <functional>
 
+#include "common/sensor/lidar_timing.h"
 #include "common/sensor/log_record.h"
 #include "common/status.h"
 
@@ -34,6 +39,7 @@ struct LogReaderOptions {
   double dpslam_laser_forward_m = 0.40;  // DP-SLAM logs: laser ahead of the robot's pivot.
   double dpslam_range_max_m = 8.19;
   double dpslam_scan_period_s = 0.2;  // DP-SLAM logs carry no time.
+  LidarTiming timing;                 // Counts before what the log says.
 };
 
 // The path must be a regular file (it is read twice). Calls `sink` for every record; a sink that returns false ends the

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "server/slam/mapper_state.h"
+#include "server/slam/scan_tracking.h"
 
 namespace cairn::slam {
 namespace {
@@ -22,7 +23,7 @@ Mapper::Mapper(Mapper&&) noexcept = default;
 Mapper& Mapper::operator=(Mapper&&) noexcept = default;
 
 ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot,
-                            const ParallelFor& parallel_for, Passage passage) {
+                            const ParallelFor& parallel_for, Passage passage, const RollingScan* rolling) {
   State& s = *state_;
   const Stamp stamp = scan->stamp;
   const bool tilted = IsTilted(*scan, s.options.max_tilt_rad);
@@ -33,19 +34,22 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
 
   if (s.drawing.redrawing()) s.drawing.Continue(s.trail.keyframes(), s.believed_path());
 
-  ScanView view = Look(*scan, s.options.front_end);
-  TrackStep step = s.front_end.Track(view, T_odom_robot, parallel_for);
-  const bool watched = passage == Passage::kDriven || s.StoodStill(*scan, T_odom_robot, step) ||
-                       (passage == Passage::kPaused && s.GoesOn(*scan, view.points_robot, T_odom_robot, step));
+  // The motion of the last scans says nothing where they do not belong together with this one.
+  if (passage != Passage::kDriven || s.recovery.active()) rolling = nullptr;
+  TrackedScan tracked =
+      TrackScan(s.front_end, s.options.front_end, s.trail, std::move(scan), rolling, T_odom_robot, parallel_for);
+  auto& [still, view, step] = tracked;
+  const bool watched = passage == Passage::kDriven || s.StoodStill(*still, T_odom_robot, step) ||
+                       (passage == Passage::kPaused && s.GoesOn(*still, view.points_robot, T_odom_robot, step));
   if (!watched && passage != Passage::kUnknown) step = s.DoubtPlace(view, T_odom_robot, step, parallel_for);
-  s.last_scan = State::LastScan{scan, T_odom_robot, step.T_track_robot};
-  if (s.recovery.active()) return s.Recover({std::move(scan), T_odom_robot}, std::move(view), step, parallel_for);
+  s.last_scan = State::LastScan{still, T_odom_robot, step.T_track_robot};
+  if (s.recovery.active()) return s.Recover({std::move(still), T_odom_robot}, std::move(view), step, parallel_for);
 
   s.blind.Add(step, s.trail.empty() ? Pose2{} : s.trail.shapes().back().T_track_robot);
   const bool keyframe = s.trail.empty() || MovedEnough(s.trail.FromLast(step.T_track_robot), s.options.gate);
   if (keyframe) {
     s.front_end.AddKeyframe(view);
-    s.AddKeyframe({std::move(scan), T_odom_robot}, std::move(view), step, s.blind.TakeCovariance(), parallel_for);
+    s.AddKeyframe({std::move(still), T_odom_robot}, std::move(view), step, s.blind.TakeCovariance(), parallel_for);
   }
   return s.Report(stamp, T_odom_robot, step, keyframe);
 }

@@ -16,6 +16,7 @@
 #include "server/slam/landmarks/landmark.h"
 #include "server/slam/mapper_options.h"
 #include "server/slam/parallel_for.h"
+#include "server/slam/scan/scan_motion.h"
 #include "server/slam/trail/keyframe.h"
 
 namespace cairn::slam {
@@ -51,8 +52,9 @@ class Mapper {
   // `T_odom_robot` is the odometry at the scan's stamp. A scan whose pose is not localized is drawn into no map.
   // `passage` is what lies between this scan and the one before it. Where that is a pause in which the scan does not
   // agree with the map, or is not known, the robot is not localized until it has been found in its map (recovery.h).
+  // `rolling`: the same scan as it was measured, if its beams were measured one after the other (scan_tracking.h).
   ScanOutcome Process(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot, const ParallelFor& parallel_for,
-                      Passage passage = Passage::kDriven);
+                      Passage passage = Passage::kDriven, const RollingScan* rolling = nullptr);
 
   // It has as many keyframes, or its map as many chunks, as the options allow: it takes no more scans.
   [[nodiscard]] bool full() const;

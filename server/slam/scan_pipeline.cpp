@@ -20,8 +20,10 @@ ScanPipeline::ScanPipeline(const MapperOptions& options, const Pose2& T_map_robo
                         restamped->stamp = pair.stamp;
                         scan = std::move(restamped);
                       }
+                      const RollingScan rolling{pair.scan, std::move(pair.during)};
                       const ScanOutcome outcome =
-                          mapper_.Process(std::move(scan), pair.T_odom_robot, parallel_for_, pair.passage);
+                          mapper_.Process(std::move(scan), pair.T_odom_robot, parallel_for_, pair.passage,
+                                          rolling.odometry.empty() ? nullptr : &rolling);
                       sink_.used(*pair.scan, outcome);
                     },
                 .dropped = [this](const Scan& scan, DropReason reason) { sink_.dropped(scan, reason); }}) {}

@@ -29,6 +29,15 @@ Pose2 PoseAt(Stamp stamp, const Odometry& before, const Odometry& after) {
                      static_cast<double>(NanosBetween(before.stamp, stamp)) / gap);
 }
 
+// A scan whose beams were measured one after the other is replaced by one that was taken at its stamp.
+std::shared_ptr<const Scan> WithoutMotion(const std::shared_ptr<const Scan>& scan,
+                                          const std::vector<Odometry>& during) {
+  if (during.empty()) return scan;
+  // Where the robot has turned away from everything that was hit, nothing would be left of the scan.
+  auto still = std::make_shared<const Scan>(Deskew(*scan, during));
+  return ValidateScan(*still) ? still : scan;
+}
+
 }  // namespace
 
 void Visit(OptionVisitor& visitor, PairingOptions& options) {
@@ -137,7 +146,9 @@ void OdometryPairing::Pair(const std::shared_ptr<const Scan>& scan, const Pose2&
   // Before the first pair nothing is known that could be lost.
   if (!last_paired_) passage_ = Passage::kDriven;
   last_paired_ = stamp;
-  sink_.paired({scan, WithoutMotion(scan), T_odom_robot, stamp, std::exchange(passage_, Passage::kDriven)});
+  std::vector<Odometry> during = During(*scan);
+  sink_.paired({scan, WithoutMotion(scan, during), T_odom_robot, stamp, std::exchange(passage_, Passage::kDriven),
+                std::move(during)});
 }
 
 // Whether odometry covers the whole scan.
@@ -157,24 +168,28 @@ void OdometryPairing::PairOrDrop(const std::shared_ptr<const Scan>& scan) {
   const Pose2 T_odom_robot = exact ? after->T_odom_robot : PoseAt(scan->stamp, *before, *after);
   // Later scans have later stamps, so nothing before this sample is needed any more.
   odometry_.erase(odometry_.begin(), before);
-  if (too_far) return sink_.dropped(*scan, DropReason::kNoOdometry);
+  const std::vector<Odometry> during = During(*scan);
+  const auto apart = [this](const Odometry& a, const Odometry& b) {
+    return NanosBetween(a.stamp, b.stamp) > Nanos(options_.max_gap_s);
+  };
+  if (too_far || std::adjacent_find(during.begin(), during.end(), apart) != during.end())
+    return sink_.dropped(*scan, DropReason::kNoOdometry);
   Pair(scan, T_odom_robot);
 }
 
-// A scan whose beams were measured one after the other is replaced by one that was taken at its stamp.
-std::shared_ptr<const Scan> OdometryPairing::WithoutMotion(const std::shared_ptr<const Scan>& scan) const {
-  const std::uint64_t duration_ns = DurationNs(*scan);
-  if (duration_ns == 0 || odometry_.empty() || odometry_.front().stamp > scan->stamp) return scan;
-  const auto later = [](Stamp stamp, const Odometry& odometry) { return stamp < odometry.stamp; };
+// The odometry from the last sample at or before the stamp of a scan to its last beam; nothing if the scan was taken at
+// once.
+std::vector<Odometry> OdometryPairing::During(const Scan& scan) const {
+  const std::uint64_t duration_ns = DurationNs(scan);
   std::vector<Odometry> during;
-  for (auto at = std::prev(std::upper_bound(odometry_.begin(), odometry_.end(), scan->stamp, later));
+  if (duration_ns == 0 || odometry_.empty() || odometry_.front().stamp > scan.stamp) return during;
+  const auto later = [](Stamp stamp, const Odometry& odometry) { return stamp < odometry.stamp; };
+  for (auto at = std::prev(std::upper_bound(odometry_.begin(), odometry_.end(), scan.stamp, later));
        at != odometry_.end(); ++at) {
     during.push_back(*at);
-    if (at->stamp >= scan->stamp && NanosBetween(scan->stamp, at->stamp) >= duration_ns) break;
+    if (at->stamp >= scan.stamp && NanosBetween(scan.stamp, at->stamp) >= duration_ns) break;
   }
-  // Where the robot has turned away from everything that was hit, nothing would be left of the scan.
-  auto still = std::make_shared<const Scan>(Deskew(*scan, during));
-  return ValidateScan(*still) ? still : scan;
+  return during;
 }
 
 void OdometryPairing::Flush() {

@@ -1,11 +1,11 @@
 // Gives every scan the odometry pose at its stamp, independently of the order in which the two streams
 // arrive: a scan waits until there is a sample at or after its last beam, and then gets an interpolated pose; where its
-// beams were measured one after the other, the motion meanwhile is taken out of it (deskew.h). All
-// decisions depend on stamps alone, so the same two streams give the same pairs however they interleave, as
-// long as no bound is reached and no clock is set back. When a clock is set back, waiting scans are dropped, because
-// scans and odometry of two clocks cannot be joined; the time of the estimator still grows (PairedScan::stamp).
-// It also says what lies between a pair and the one before it (Passage): a pause, and odometry that cannot be that of
-// one drive. Memory is bounded. Not thread-safe.
+// beams were measured one after the other, the motion meanwhile is taken out of it (deskew.h), and a gap
+// in the odometry until its last beam counts as one at its stamp. All decisions depend on stamps alone, so the same two
+// streams give the same pairs however they interleave, as long as no bound is reached and no clock is set back. When a
+// clock is set back, waiting scans are dropped, because scans and odometry of two clocks cannot be joined; the time of
+// the estimator still grows (PairedScan::stamp). It also says what lies between a pair and the one before it (Passage):
+// a pause, and odometry that cannot be that of one drive. Memory is bounded. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -13,6 +13,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "common/options/option_visitor.h"
 #include "common/sensor/odometry.h"
@@ -47,6 +48,7 @@ struct PairedScan {
   Pose2 T_odom_robot;
   Stamp stamp = 0;  // The scan's, plus what the robot's clock was set back by: grows from pair to pair.
   Passage passage = Passage::kDriven;
+  std::vector<Odometry> during{};  // RollingScan::odometry; empty if all beams are measured at once.
 };
 
 class OdometryPairing {
@@ -94,7 +96,7 @@ class OdometryPairing {
   void ClockSetBack();
   [[nodiscard]] bool Covers(const Scan& scan) const;
   void PairOrDrop(const std::shared_ptr<const Scan>& scan);
-  [[nodiscard]] std::shared_ptr<const Scan> WithoutMotion(const std::shared_ptr<const Scan>& scan) const;
+  [[nodiscard]] std::vector<Odometry> During(const Scan& scan) const;
   void BeginAnew(Passage passage);
   [[nodiscard]] bool Follows(const Odometry& odometry) const;
   void Flush();

@@ -126,6 +126,10 @@ TrackStep FrontEnd::Follow(const ScanView& view, const Pose2& T_odom_robot, cons
     TakeAlongFromPrior({guess.T_track_robot, guess.covariance}, coarse);
   const MatchResult match = options_.refine_enabled ? Refine(view, T_odom_robot, guess, coarse)
                                                     : MatchAlone(view, T_odom_robot, guess, coarse, parallel_for);
+  return StepOf(match);
+}
+
+TrackStep FrontEnd::StepOf(const MatchResult& match) const {
   TrackStep step{.T_track_robot = match.T_ref_curr,
                  .score = match.score,
                  .matched = match.converged,
@@ -136,6 +140,26 @@ TrackStep FrontEnd::Follow(const ScanView& view, const Pose2& T_odom_robot, cons
     step.forecast_covariance = ForecastShare(match);
   }
   return step;
+}
+
+std::optional<Pose2> FrontEnd::LastOdometryStep() const {
+  if (history_.size() < 2) return std::nullopt;
+  return Between(history_[history_.size() - 2].T_odom_robot, history_.back().T_odom_robot);
+}
+
+std::optional<TrackStep> FrontEnd::TrackAgain(const ScanView& view, const Pose2& T_odom_robot, const TrackStep& step) {
+  if (history_.size() < 2 || !options_.refine_enabled) return std::nullopt;
+  const Sight first = history_.back();
+  history_.pop_back();
+  const Guess guess = Predict(T_odom_robot);
+  const MatchResult match = AlignPointsToSurfaces(
+      view.points_robot, index_, {step.T_track_robot, guess.T_track_robot, guess.covariance}, options_.refine);
+  const bool better = match.converged && match.score > step.score;
+  const TrackStep again = better ? StepOf(match) : step;
+  score_ = again.score;
+  history_.push_back({again.T_track_robot, first.T_odom_robot});
+  if (!better) return std::nullopt;
+  return again;
 }
 
 FrontEnd::Guess FrontEnd::Predict(const Pose2& T_odom_robot) const {

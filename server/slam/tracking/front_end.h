@@ -10,6 +10,7 @@
 #pragma once
 
 #include <deque>
+#include <optional>
 #include <vector>
 
 #include "server/slam/features/feature_extraction.h"
@@ -84,6 +85,12 @@ class FrontEnd {
 
   // Returns the pose at this scan. The first scan is at the identity and counts as matched.
   TrackStep Track(const ScanView& view, const Pose2& T_odom_robot, const ParallelFor& parallel_for);
+  // The scan just tracked once more, as `view` shows it now: aligned from the pose that was found. Nothing, and no
+  // change, if it does not explain more of the scan, or if there is no refinement. Otherwise the result replaces that
+  // of Track.
+  std::optional<TrackStep> TrackAgain(const ScanView& view, const Pose2& T_odom_robot, const TrackStep& step);
+  // The step of odometry from the scan before to the scan just tracked; nothing if there is none before.
+  [[nodiscard]] std::optional<Pose2> LastOdometryStep() const;
   // Makes the scan just tracked part of the reference.
   void AddKeyframe(const ScanView& view);
   // Forgets all scans: the next one is at the identity again.
@@ -116,6 +123,7 @@ class FrontEnd {
   };
   [[nodiscard]] TrackStep Follow(const ScanView& view, const Pose2& T_odom_robot,
                                  const ParallelFor& parallel_for) const;
+  [[nodiscard]] TrackStep StepOf(const MatchResult& match) const;
   [[nodiscard]] Guess Predict(const Pose2& T_odom_robot) const;
   // In the results of the next three functions the reference frame is `track`.
   [[nodiscard]] MatchResult MatchLastKeyframe(const ScanView& view, const Guess& guess,

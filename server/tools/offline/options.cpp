@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/options/config.h"
+#include "common/sensor/log_options.h"
 #include "common/service/start_pose.h"
 #include "common/version.h"
 #include "server/known_map.h"
@@ -61,9 +62,7 @@ std::optional<OfflineOptions> ParseOfflineOptions(int argc, char** argv, int& ex
   app.add_option("--seed", seed, "Same as --set slam.seed=N");
   app.add_option("--threads", options.threads, "Number of threads; 0: one per core. The output does not depend on it")
       ->check(CLI::Range(0, 256));
-  app.add_option("--no-return", options.reader.no_return_m,
-                 "Ranges from this value on mean that the beam hit nothing (m); 0: take it from the log")
-      ->check(CLI::NonNegativeNumber);
+  AddLogOptions(app, options.reader);
   app.add_flag("--json", options.json, "One JSON object on standard output");
   try {
     app.parse(argc, argv);

@@ -15,6 +15,7 @@ struct OfflineOptions {
   std::filesystem::path trajectory;  // An empty path means "do not write this file", here and below.
   std::filesystem::path map;
   std::filesystem::path map_lines;
+  std::filesystem::path used_log;
   bool smooth = false;
   std::filesystem::path smoothed_trajectory;
   std::filesystem::path smoothed_map;

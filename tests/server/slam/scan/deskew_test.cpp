@@ -164,5 +164,24 @@ TEST(OdometryPairing, TakesOutTheMotionThatIsKnownWhenNoMoreOdometryComes) {
   EXPECT_GT(ShareThatAgrees(*pairs[0].at_stamp, Measure(given, 0.0)), 0.6);
 }
 
+// As at its stamp: over a longer gap nobody knows how the robot moved.
+TEST(OdometryPairing, DropsARollingScanWithAGapInItsOdometry) {
+  for (const double max_gap_s : {0.1, 0.2}) {
+    int paired = 0, dropped = 0;
+    OdometryPairing pairing({.max_gap_s = max_gap_s}, {[&](PairedScan&&) { ++paired; },
+                                                       [&](const Scan&, DropReason reason) {
+                                                         EXPECT_EQ(reason, DropReason::kNoOdometry);
+                                                         ++dropped;
+                                                       }});
+    pairing.Add(std::make_shared<const Scan>(Measure({}, kTurn_s)));
+    for (const Odometry& sample : Wheels({0.5, 1.2})) {
+      const Stamp since = sample.stamp - kStart;  // Samples are missing well after the stamp.
+      if (since < Stamp{20'000'000} || since > Stamp{140'000'000}) pairing.Add(sample);
+    }
+    EXPECT_EQ(paired, max_gap_s > 0.15 ? 1 : 0);
+    EXPECT_EQ(dropped, max_gap_s > 0.15 ? 0 : 1);
+  }
+}
+
 }  // namespace
 }  // namespace cairn::slam
