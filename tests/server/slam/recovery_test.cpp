@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <ostream>
 #include <random>
 #include <string>
 #include <utility>
@@ -158,6 +159,9 @@ struct Case {
   std::string name;
   Away away;
 };
+[[maybe_unused]] void PrintTo(const Case& one, std::ostream* out) {
+  *out << one.name;
+}
 
 const Case kCases[] = {
     {"CarriedALittle", {90.0, 93.0, Odometer::kStandsStill}},
