@@ -59,7 +59,8 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   // See SessionEstimator. Called from one thread, before any other thread knows the session.
   void Replay(JournalEntry&& entry, const SessionEstimator::Switched& switched);
   void Replayed();
-  // Whether its records stay in the store when it is destroyed, because it is a restored one that is not used after all.
+  // Whether its records stay in the store when it is destroyed, because it is a restored one that is not used after
+  // all.
   void KeepStored(bool keep = true) { keep_stored_ = keep; }
   [[nodiscard]] Result<SessionEstimator::PieceValues> Load(std::string_view main,
                                                            std::span<const std::string_view> pieces) {

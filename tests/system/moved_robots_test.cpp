@@ -229,7 +229,8 @@ TEST_F(MovedRobots, WhoExchangedTheirNamesAndSayWhereTheyAreBeginThere) {
   const Stamp back = now_;
   Ride(0, fleet_.name(1), fleet_.truth(0).back().T_map_robot);
   Ride(1, fleet_.name(0), fleet_.truth(1).back().T_map_robot);
-  // A short drive: the start is the pose at the last sample before, not at the first scan, so that the new map is turned.
+  // A short drive: the start is the pose at the last sample before, not at the first scan, so that the new map is
+  // turned.
   ASSERT_NO_FATAL_FAILURE(Drive(8.0, {0, 1}));
   EXPECT_EQ(Wrong(), 0);
   for (int robot = 0; robot < kRobots; ++robot) {

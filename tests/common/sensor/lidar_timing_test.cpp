@@ -174,9 +174,9 @@ constexpr char kScanLine[] =
 
 TEST(LidarTiming, ALogSaysItForTheScansThatFollow) {
   const auto log = ReadText(std::string(kScanLine) +
-                                  "PARAM lidar_scan_period 0.4 1 host 1\nPARAM lidar_stamp_at last\n"
-                                  "PARAM lidar_clockwise on\nPARAM lidar_colour red\nPARAM lidar_turn_from x\n" +
-                                  std::string(kScanLine).replace(std::string(kScanLine).find(" 100 "), 5, " 101 "));
+                            "PARAM lidar_scan_period 0.4 1 host 1\nPARAM lidar_stamp_at last\n"
+                            "PARAM lidar_clockwise on\nPARAM lidar_colour red\nPARAM lidar_turn_from x\n" +
+                            std::string(kScanLine).replace(std::string(kScanLine).find(" 100 "), 5, " 101 "));
   ASSERT_EQ(log.scans.size(), 2U);
   EXPECT_EQ(log.scans[0].beam_period_s, 0.0);
   EXPECT_NEAR(log.scans[1].beam_period_s, 0.1, 1e-12);
