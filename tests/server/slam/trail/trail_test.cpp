@@ -39,6 +39,25 @@ TEST(Trail, ALoopIsAShortCutBothWays) {
   EXPECT_EQ(trail.relations().size(), 11U);
 }
 
+// Keyframes on a line, with loops to old ones. The distances are asked for at some keyframes only.
+TEST(Trail, WhetherAKeyframeIsFartherFollowsTheDistancesAlsoLongAfterTheyWereComputed) {
+  Trail asked_seldom(kDrift);
+  for (std::size_t k = 0; k < 120; ++k) {
+    std::optional<RevisitObservation> revisit;
+    if (k > 60 && k % 7 == 0) revisit = RevisitObservation{k - 60, {0.3, 0.0, 0.0}, Eigen::Matrix3d::Identity()};
+    asked_seldom.Append({std::make_shared<const Scan>(), {}}, {1.0 * static_cast<double>(k), 0.0, 0.0}, {},
+                        Eigen::Matrix3d::Zero(), revisit);
+    if (k % 5 != 0) continue;
+    Trail fresh = asked_seldom;
+    for (const double way_m : {0.5, 10.5, 40.5}) {
+      std::vector<bool> farther, expected;
+      for (std::size_t other = 0; other <= k; ++other) farther.push_back(asked_seldom.IsFarther(other, way_m));
+      for (const double distance_m : fresh.distances_m()) expected.push_back(distance_m > way_m);
+      EXPECT_EQ(farther, expected) << "keyframe " << k << ", " << way_m << " m";
+    }
+  }
+}
+
 TEST(Trail, ARevisitIsALoopOfTheKeyframeThatSawIt) {
   Trail trail = Chain(10);
   trail.Append({std::make_shared<const Scan>(), {}}, {20.0, 0.0, 0.0}, {}, Eigen::Matrix3d::Zero(),
