@@ -8,6 +8,7 @@ namespace cairn {
 namespace {
 
 constexpr double kMaxMountingDistance = 100.0;  // m
+constexpr double kMinStep = 1e-5;               // rad. The finest planar scanners have steps of some 1e-4 rad.
 constexpr double kMaxDuration = 10.0;           // From the first beam to the last, in s.
 // A full turn computed as step * (beams - 1) in floating point may exceed 2 pi by rounding alone.
 constexpr double kSpanSlack = 1e-6;
@@ -25,8 +26,8 @@ tl::unexpected<ScanRefusal> Bad(const std::string& what, double value) {
 Validity ValidateGeometry(const Scan& scan) {
   if (!std::isfinite(scan.angle_first_rad)) return Bad("angle of the first beam is not finite", scan.angle_first_rad);
   if (std::abs(scan.angle_first_rad) > 4.0 * kPi) return Bad("angle of the first beam", scan.angle_first_rad);
-  if (!std::isfinite(scan.angle_step_rad) || scan.angle_step_rad == 0.0) {
-    return Bad("angle step must be finite and not zero", scan.angle_step_rad);
+  if (!std::isfinite(scan.angle_step_rad) || std::abs(scan.angle_step_rad) < kMinStep) {
+    return Bad("angle step must be finite and at least 0.00001 rad to either side", scan.angle_step_rad);
   }
   const double span = std::abs(scan.angle_step_rad) * static_cast<double>(scan.ranges_m.size() - 1);
   if (!(span <= 2.0 * kPi + kSpanSlack)) return Bad("field of view exceeds one turn", span);

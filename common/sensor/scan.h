@@ -44,10 +44,10 @@ struct ScanRefusal {
   std::string message;  // Names the value that is wrong.
 };
 
-// Checks what an estimator relies on: 1..kMaxBeams beams; finite angles with a non-zero step and a span of at most one
-// turn; 0 <= range_min < range_max, finite; |tilt| < pi/2; mounting within 100 m; a finite non-negative beam period and
-// at most 10 s from the first beam to the last; at least one beam that is not kInvalid. Single bad ranges are normal
-// and stay (kInvalid).
+// Checks what an estimator relies on: 1..kMaxBeams beams; finite angles with a step of at least 1e-5 rad to either
+// side and a span of at most one turn; 0 <= range_min < range_max, finite; |tilt| < pi/2; mounting within 100 m; a
+// finite non-negative beam period and at most 10 s from the first beam to the last; at least one beam that is not
+// kInvalid. Single bad ranges are normal and stay (kInvalid).
 [[nodiscard]] tl::expected<void, ScanRefusal> ValidateScan(const Scan& scan);
 
 }  // namespace cairn

@@ -76,7 +76,14 @@ bool StreamLedger::NextIs(std::uint64_t sequence) const {
 }
 
 void StreamLedger::AdvanceDurable() {
-  const std::uint64_t through = undurable_.empty() ? ledger_.last_sequence : *undurable_.begin() - 1;
+  std::uint64_t through = undurable_.empty() ? ledger_.last_sequence : *undurable_.begin() - 1;
+  // That numbers are missing is known only from a later one. Before that is on the disk, a server that starts again
+  // still waits for them.
+  for (auto after = gaps_.upper_bound(through); after != gaps_.begin(); after = gaps_.upper_bound(through)) {
+    const auto& [first, last] = *std::prev(after);
+    if (last < through) break;
+    through = first - 1;
+  }
   ledger_.durable_through = std::max(ledger_.durable_through, through);
 }
 

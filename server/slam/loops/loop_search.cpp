@@ -133,13 +133,12 @@ std::optional<LoopClosure> LoopSearch::Find(const Trail& trail, const SharedSequ
 // Old keyframes in whose surroundings the robot may be, the most likely first, and only one per place.
 std::vector<std::size_t> LoopSearch::Candidates(const Trail& trail, const SharedSequence<Pose2>& path) const {
   const std::span<const KeyframeShape> shapes = trail.shapes();
-  const std::span<const double> distances_m = trail.distances_m();
   std::vector<KeyframeCost> all;
   const Pose2& here = path[shapes.size() - 1];
   for (std::size_t k = 0; k < shapes.size(); k += kCandidateStride) {
-    if (distances_m[k] < kLargeLoopM) continue;
-    // Distance divided by the reach.
-    const double cost = (path[k].translation() - here.translation()).norm() / Reach(distances_m[k]);
+    const double away_m = (path[k].translation() - here.translation()).norm();
+    if (away_m >= options_.max_doubt_m || !trail.IsFarther(k, kLargeLoopM)) continue;
+    const double cost = away_m / Reach(trail.distances_m()[k]);  // Distance divided by the reach.
     if (cost < 1.0) all.push_back({k, cost});
   }
   return BestPlaces(std::move(all), shapes, kStretchM, kMaxCandidates);

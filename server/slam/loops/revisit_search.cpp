@@ -21,17 +21,15 @@ std::optional<std::size_t> NearestKeyframe(const Hypothesis& belief, const Trail
   double best = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < trail.size(); ++k) {
     if (travelled_m - trail.shapes()[k].travelled_m < kMinRevisitTravelM) break;
-    if (trail.distances_m()[k] > kLargeLoopM) continue;
     const Pose2& T_map_k = belief.path[k];
     const double distance = (T_map_k.translation() - belief.T_map_robot.translation()).norm();
     if (distance > options.max_distance_m) continue;
     const double turn = std::abs(AngleDiff(T_map_k.theta, belief.T_map_robot.theta));
     if (turn > options.max_turn_rad) continue;
     const double cost = distance + options.max_distance_m * turn / options.max_turn_rad;
-    if (cost < best) {
-      best = cost;
-      nearest = k;
-    }
+    if (!(cost < best) || trail.IsFarther(k, kLargeLoopM)) continue;
+    best = cost;
+    nearest = k;
   }
   return nearest;
 }

@@ -31,11 +31,8 @@ void Trail::Append(Keyframe keyframe, const Pose2& T_track_robot, std::vector<Su
   points_.emplace_back(std::move(points_robot));
   keyframes_.push_back(std::move(keyframe));
   loops_.emplace_back();
-  if (revisit) {
-    AddLoop({revisit->keyframe, node, revisit->T_keyframe_robot, revisit->covariance, true});
-  } else {
-    distances_m_ = DistancesFromLast();
-  }
+  distances_current_ = false;
+  if (revisit) AddLoop({revisit->keyframe, node, revisit->T_keyframe_robot, revisit->covariance, true});
 }
 
 void Trail::MarkLast(bool localized, bool on_the_path) {
@@ -79,7 +76,8 @@ void Trail::RestoreRest() {
   loops_.assign(size(), {});
   for (const PoseRelation& relation : relations_)
     if (relation.loop) NoteLoop(relation);
-  distances_m_ = empty() ? std::vector<double>{} : DistancesFromLast();
+  distances_m_.clear();
+  distances_current_ = empty();
 }
 
 void Trail::AddScan(Stamp stamp, const Pose2& T_keyframe_robot) {
@@ -89,13 +87,35 @@ void Trail::AddScan(Stamp stamp, const Pose2& T_keyframe_robot) {
 void Trail::AddLoop(const PoseRelation& loop) {
   relations_.push_back(PositiveDefinite(loop));
   NoteLoop(loop);
-  distances_m_ = DistancesFromLast();
+  distances_current_ = false;
 }
 
 void Trail::NoteLoop(const PoseRelation& loop) {
   const double way_m = loop.T_from_to.translation().norm();
   loops_[loop.from].push_back({loop.to, way_m});
   loops_[loop.to].push_back({loop.from, way_m});
+}
+
+std::span<const double> Trail::distances_m() const {
+  if (!distances_current_) distances_m_ = DistancesFromLast();
+  distances_current_ = true;
+  return distances_m_;
+}
+
+// Keyframes and relations are only added. So no path becomes longer, and the steps from the keyframe at which the
+// distances were computed to the last one bound how far everything has gone away since.
+double Trail::DistanceAtMost(std::size_t keyframe) const {
+  const double now_m = shapes_.back().travelled_m;
+  const double along_steps_m = now_m - shapes_[keyframe].travelled_m;
+  if (keyframe >= distances_m_.size()) return along_steps_m;
+  const double since_m = now_m - shapes_[distances_m_.size() - 1].travelled_m;
+  return std::min(along_steps_m, distances_m_[keyframe] + since_m);
+}
+
+bool Trail::IsFarther(std::size_t keyframe, double way_m) const {
+  constexpr double kRoundingM = 1e-6;  // More than sums of the same lengths in another order can differ.
+  if (DistanceAtMost(keyframe) + kRoundingM < way_m) return false;
+  return distances_m()[keyframe] > way_m;
 }
 
 std::vector<double> Trail::DistancesFromLast() const {

@@ -56,8 +56,11 @@ class Trail {
   // The surface points of a keyframe in its robot frame. After reading they are computed when they are first asked for,
   // because most keyframes are never looked at again.
   [[nodiscard]] const std::vector<SurfacePoint>& points(std::size_t keyframe) const;
-  // Per keyframe: length of the shortest path along the relations from the last keyframe, in metres.
-  [[nodiscard]] std::span<const double> distances_m() const { return distances_m_; }
+  // Per keyframe: length of the shortest path along the relations from the last keyframe, in metres. The first call
+  // after a change goes through all keyframes; IsFarther seldom does.
+  [[nodiscard]] std::span<const double> distances_m() const;
+  // Whether distances_m()[keyframe] is more than `way_m`.
+  [[nodiscard]] bool IsFarther(std::size_t keyframe, double way_m) const;
   [[nodiscard]] const std::vector<MapperSnapshot::ScanPlace>& scans() const { return scans_; }
   // Steps, revisits and loops; empty as long as no place was seen again.
   [[nodiscard]] std::vector<PoseRelation> relations() const;
@@ -81,6 +84,8 @@ class Trail {
     double way_m = 0.0;
   };
   [[nodiscard]] std::vector<double> DistancesFromLast() const;
+  // At least distances_m()[keyframe], from what is known already.
+  [[nodiscard]] double DistanceAtMost(std::size_t keyframe) const;
   void NoteLoop(const PoseRelation& loop);
   // Whether what was read fits together.
   [[nodiscard]] bool IsConsistent() const;
@@ -92,8 +97,9 @@ class Trail {
   std::vector<KeyframeShape> shapes_;                                     // One per keyframe.
   mutable std::vector<std::optional<std::vector<SurfacePoint>>> points_;  // One per keyframe; empty until asked for.
   std::vector<PoseRelation> relations_;
-  std::vector<std::vector<Loop>> loops_;  // One list per keyframe. A loop is stored at both of its keyframes.
-  std::vector<double> distances_m_;
+  std::vector<std::vector<Loop>> loops_;     // One list per keyframe. A loop is stored at both of its keyframes.
+  mutable std::vector<double> distances_m_;  // From keyframe distances_m_.size() - 1, when they were last computed.
+  mutable bool distances_current_ = true;
   std::vector<MapperSnapshot::ScanPlace> scans_;
   // For checkpoints: all of these grow at their ends only, but for the keyframes in ConfirmTentative.
   FrozenBlocks<Keyframe> frozen_keyframes_;

@@ -93,6 +93,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Fault{"FirstAngleNan", [](Scan& s) { s.angle_first_rad = kNan; }, "first beam"},
                     Fault{"FirstAngleHuge", [](Scan& s) { s.angle_first_rad = 1e9; }, "first beam"},
                     Fault{"StepZero", [](Scan& s) { s.angle_step_rad = 0; }, "step"},
+                    Fault{"StepTiny", [](Scan& s) { s.angle_step_rad = -1e-300; }, "step"},
                     Fault{"StepInfinite", [](Scan& s) { s.angle_step_rad = kInf; }, "step"},
                     Fault{"MoreThanATurn", [](Scan& s) { s.angle_step_rad = 0.04; }, "field of view"},
                     Fault{"RangeMinNegative", [](Scan& s) { s.range_min_m = -1; }, "range_min"},

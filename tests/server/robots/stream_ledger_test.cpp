@@ -170,6 +170,24 @@ TEST(StreamLedger, WhatTheJournalDoesNotHoldIsTakenBackAndComesAgain) {
 }
 
 // Property: whatever arrives in whatever order, no scan vanishes and settled_through never goes back.
+TEST(StreamLedger, MissingNumbersAreDurableOnlyTogetherWithALaterOne) {
+  StreamLedger ledger{Ledger{}};
+  ledger.SetStored(true);
+  for (const std::uint64_t n : {1, 2, 6, 9}) EXPECT_TRUE(ledger.Received(n));
+  ledger.Durable(1);
+  EXPECT_EQ(ledger.ledger().durable_through, 1U);
+  // A server that starts again now knows nothing of 6, and waits for 3.
+  ledger.Durable(2);
+  EXPECT_EQ(ledger.ledger().durable_through, 2U);
+  ledger.Durable(6);
+  EXPECT_EQ(ledger.ledger().durable_through, 6U);
+  EXPECT_TRUE(ledger.Received(7));
+  ledger.Durable(9);
+  EXPECT_EQ(ledger.ledger().durable_through, 6U);
+  ledger.Durable(7);
+  EXPECT_EQ(ledger.ledger().durable_through, 9U);
+}
+
 TEST(StreamLedger, TheEquationHoldsUnderRandomTraffic) {
   std::mt19937 random(5);
   for (int run = 0; run < 50; ++run) {

@@ -39,6 +39,25 @@ TEST(Trail, ALoopIsAShortCutBothWays) {
   EXPECT_EQ(trail.relations().size(), 11U);
 }
 
+// Keyframes on a line, with loops to old ones. Each trail is asked about one way only, at some keyframes only, and the
+// newest keyframes first, so that earlier distances decide most answers.
+TEST(Trail, WhetherAKeyframeIsFartherFollowsTheDistancesAlsoLongAfterTheyWereComputed) {
+  for (const double way_m : {0.5, 10.5, 40.5}) {
+    Trail asked(kDrift);
+    for (std::size_t k = 0; k < 120; ++k) {
+      std::optional<RevisitObservation> revisit;
+      if (k > 60 && k % 7 == 0) revisit = RevisitObservation{k - 60, {0.3, 0.0, 0.0}, Eigen::Matrix3d::Identity()};
+      asked.Append({std::make_shared<const Scan>(), {}}, {1.0 * static_cast<double>(k), 0.0, 0.0}, {},
+                   Eigen::Matrix3d::Zero(), revisit);
+      if (k % 5 != 0) continue;
+      const Trail computed = asked;
+      for (std::size_t other = k + 1; other-- > 0;)
+        EXPECT_EQ(asked.IsFarther(other, way_m), computed.distances_m()[other] > way_m)
+            << "keyframe " << other << " from " << k << ", " << way_m << " m";
+    }
+  }
+}
+
 TEST(Trail, ARevisitIsALoopOfTheKeyframeThatSawIt) {
   Trail trail = Chain(10);
   trail.Append({std::make_shared<const Scan>(), {}}, {20.0, 0.0, 0.0}, {}, Eigen::Matrix3d::Zero(),
