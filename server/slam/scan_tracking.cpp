@@ -16,6 +16,9 @@ constexpr double kLongest_s = 1.0;
 // A scan is computed anew if its last beam moves by so much: a beam of a cheap lidar, and its noise.
 constexpr double kWorthwhile_m = 0.01;
 constexpr double kWorthwhile_rad = 0.01;
+// The step to a scan with the wrong motion in it is itself wrong by up to half of the error of that motion, so that the
+// first look halves the error only.
+constexpr int kMostLooks = 4;
 
 struct TimedStep {
   Pose2 step;
@@ -52,24 +55,36 @@ std::vector<Odometry> Forecast(const Scan& scan, const std::optional<TimedStep>&
   return last ? AtConstantVelocity(scan, last->step, last->seconds) : AtConstantVelocity(scan, {}, 1.0);
 }
 
-// Where the match shows another motion, the scan is computed with it and aligned again.
-void LookAgain(FrontEnd& front_end, const FrontEndOptions& options, const Trail& trail, const RollingScan& rolling,
-               const std::vector<Odometry>& motion, const Pose2& T_odom_robot, TrackedScan& tracked) {
-  if (trail.scans().empty() || !tracked.step.matched || tracked.step.degenerate) return;
+// The motion within the scan, if the robot moves on as from the scan before to the pose that was matched. Nothing if
+// the match does not say.
+std::optional<std::vector<Odometry>> MatchedMotion(const FrontEnd& front_end, const FrontEndOptions& options,
+                                                   const Trail& trail, const RollingScan& rolling,
+                                                   const TrackedScan& tracked) {
+  if (trail.scans().empty() || !tracked.step.matched || tracked.step.degenerate) return std::nullopt;
   const auto& last = trail.scans().back();
   const auto step = StepBetween(last.stamp, PlaceOf(trail, last), tracked.scan->stamp, tracked.step.T_track_robot);
   const auto odometry_step = front_end.LastOdometryStep();
-  if (!step || !odometry_step) return;
-  const std::vector<Odometry> matched = options.use_odometry
-                                            ? CorrectedMotion(rolling, step->step, *odometry_step, step->seconds)
-                                            : AtConstantVelocity(*rolling.scan, step->step, step->seconds);
-  const Pose2 change = DifferenceAtTheEnd(motion, matched);
-  if (change.translation().norm() < kWorthwhile_m && std::abs(change.theta) < kWorthwhile_rad) return;
-  auto scan = Computed(rolling, matched, tracked.scan->stamp);
-  if (scan == nullptr) return;
-  ScanView view = Look(*scan, options);
-  const auto again = front_end.TrackAgain(view, T_odom_robot, tracked.step);
-  if (again) tracked = {std::move(scan), std::move(view), *again};
+  if (!step || !odometry_step) return std::nullopt;
+  return options.use_odometry ? CorrectedMotion(rolling, step->step, *odometry_step, step->seconds)
+                              : AtConstantVelocity(*rolling.scan, step->step, step->seconds);
+}
+
+// Where the match shows another motion, the scan is computed with it and aligned again.
+void LookAgain(FrontEnd& front_end, const FrontEndOptions& options, const Trail& trail, const RollingScan& rolling,
+               std::vector<Odometry> motion, const Pose2& T_odom_robot, TrackedScan& tracked) {
+  for (int look = 0; look < kMostLooks; ++look) {
+    auto matched = MatchedMotion(front_end, options, trail, rolling, tracked);
+    if (!matched) return;
+    const Pose2 change = DifferenceAtTheEnd(motion, *matched);
+    if (change.translation().norm() < kWorthwhile_m && std::abs(change.theta) < kWorthwhile_rad) return;
+    motion = std::move(*matched);
+    auto scan = Computed(rolling, motion, tracked.scan->stamp);
+    if (scan == nullptr) return;
+    ScanView view = Look(*scan, options);
+    const auto again = front_end.TrackAgain(view, T_odom_robot, tracked.step);
+    if (!again) return;
+    tracked = {std::move(scan), std::move(view), *again};
+  }
 }
 
 }  // namespace
@@ -86,7 +101,7 @@ TrackedScan TrackScan(FrontEnd& front_end, const FrontEndOptions& options, const
   ScanView view = Look(*scan, options);
   const TrackStep step = front_end.Track(view, T_odom_robot, parallel_for);
   TrackedScan tracked{std::move(scan), std::move(view), step};
-  if (rolling != nullptr) LookAgain(front_end, options, trail, *rolling, motion, T_odom_robot, tracked);
+  if (rolling != nullptr) LookAgain(front_end, options, trail, *rolling, std::move(motion), T_odom_robot, tracked);
   return tracked;
 }
 
