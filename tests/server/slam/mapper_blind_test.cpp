@@ -51,6 +51,10 @@ TEST(Mapper, ATiltedScanHasThePoseOfTheOdometryAndItsDoubt) {
   EXPECT_TRUE(IsCovariance(tilted.covariance));
   const MapperSnapshot snapshot = mapper.Snapshot();
   ASSERT_EQ(snapshot.scans.size(), 2U);
+  // After MapperOptions::lost_after_m without a level scan the robot is lost.
+  const ScanOutcome far = mapper.Process(scan(0.5, 300, 0.5), Pose2{3, 2, 1} * Pose2{2.5, 0, 0}, SerialFor);
+  EXPECT_EQ(far.reason, PoseReason::kLost);
+  EXPECT_FALSE(far.localized);
 }
 
 }  // namespace

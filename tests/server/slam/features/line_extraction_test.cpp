@@ -191,6 +191,22 @@ TEST(LineExtraction, ScansWithoutStructureHaveNoLines) {
   EXPECT_TRUE(LinesOf(scan).empty());
 }
 
+// Every second beam to the wall ahead returns from a little behind it.
+TEST(LineExtraction, AWallMayDeviateFromItsLineAsMuchAsTheOptionSays) {
+  Scan scan = Look(World{}, {}, Laser{});
+  const auto set_roughness = [&](double rough_m) {
+    for (int beam = 80; beam <= 100; ++beam) {
+      const double x = 8.0 + (beam % 2 == 0 ? rough_m : -rough_m);
+      scan.ranges_m[static_cast<std::size_t>(beam)] = static_cast<float>(x / std::cos(Radians(beam - 90.0)));
+    }
+  };
+  set_roughness(0.035);
+  ASSERT_EQ(LinesOf(scan).size(), 1U);
+  EXPECT_NEAR(LinesOf(scan).front().deviation, 0.035, 0.002);
+  set_roughness(0.045);
+  EXPECT_TRUE(LinesOf(scan).empty());
+}
+
 // Ranges without any structure: sometimes a few neighbouring hits lie on a line by chance.
 TEST(LineExtraction, APureChanceScanShowsOneLineOrTwoAndTheyAreOfFewPoints) {
   std::mt19937_64 engine(1);

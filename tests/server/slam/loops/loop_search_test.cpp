@@ -41,14 +41,15 @@ struct Ride {
 };
 constexpr Ride kRides[] = {{1, 0.0015, 0.0}, {2, -0.0015, 0.0}, {3, 0.0005, 2.0}, {4, -0.0005, -2.0}};
 
-// Drives `metres` along the ring and searches from `from_m` on.
+// Drives `metres` along the ring and searches from `from_m` on. From there on the world is `later`, if given.
 std::optional<LoopClosure> DriveUntilFound(Drive& drive, const World& world, double metres, const Ride& ride,
-                                           double from_m = 0.0) {
-  LoopSearch search({}, {});
+                                           double from_m = 0.0, const LoopOptions& options = {},
+                                           const World* later = nullptr) {
+  LoopSearch search(options, {});
   std::mt19937_64 rng(ride.seed);
   double way_m = 0.0;
   for (const Pose2& step : RingSteps(metres, 0.4)) {
-    drive.Step(world, step, ride.drift_rad_per_m * step.x, rng,
+    drive.Step(later != nullptr && way_m >= from_m ? *later : world, step, ride.drift_rad_per_m * step.x, rng,
                way_m < 70.0 && way_m + step.x >= 70.0 ? ride.slip_m : 0.0);
     way_m += step.x;
     if (way_m < from_m) continue;
@@ -95,6 +96,30 @@ TEST(LoopSearch, ABareCorridorFitsAnywhereAndIsNotBelieved) {
     Drive drive;
     EXPECT_FALSE(DriveUntilFound(drive, RingCorridor(false), kBeforeTheNextCornerM, ride, kOnTheFirstSideM))
         << ride.seed;
+  }
+}
+
+// Even if another place may fit as well: a bare corridor does not show where along it the robot is.
+TEST(LoopSearch, ABareCorridorIsNotBelievedWhateverElseFits) {
+  LoopOptions options;
+  options.max_rival = 1.0;
+  Drive drive;
+  EXPECT_FALSE(DriveUntilFound(drive, RingCorridor(false), 138.0, kRides[0], kOnTheFirstSideM, options));
+}
+
+// On the second round boxes stand where the beams of the first round have passed. The niches still fit.
+TEST(LoopSearch, APlaceWhereThingsStandInFormerlyFreeSpaceIsAnother) {
+  const World empty = RingCorridor(true);
+  World furnished = empty;
+  for (double x = 0.5; x < 38.0; x += 1.5)
+    furnished.Add({{x, 0.6}, {x + 0.5, 0.6}, {x + 0.5, 1.0}, {x, 1.0}, {x, 0.6}});
+  LoopOptions options;
+  for (const bool conflicts_count : {true, false}) {
+    options.max_conflict = conflicts_count ? 0.1 : 1.0;
+    Drive drive;
+    const auto found = DriveUntilFound(drive, empty, 150.0, kRides[0], 112.0, options, &furnished);
+    EXPECT_EQ(found.has_value(), !conflicts_count);
+    if (found) ExpectRight(drive, *found);
   }
 }
 

@@ -158,5 +158,27 @@ TEST(PatternVotes, RunAlongTheDiagonalOfAShiftedScan) {
   }
 }
 
+// The angles from each of four lines to the next ones; in the second scan all turns are so much larger.
+TEST(PatternVotes, TakeTurnsForEqualThatDifferByLessThanTheTolerance) {
+  const auto features = [](double more_deg) {
+    ScanFeatures scan;
+    scan.lines.resize(4);
+    for (int line = 0; line < 4; ++line) {
+      LinePattern& pattern = scan.patterns.emplace_back();
+      pattern.count = 3 - line;
+      for (int k = 0; k < pattern.count; ++k)
+        pattern.angle[static_cast<std::size_t>(k)] = Radians((20.0 + more_deg) * (k + 1));
+    }
+    return scan;
+  };
+  const auto votes_at_first = [&](double more_deg) {
+    return Votes(features(0.0), features(more_deg),
+                 [](const ScanPair& scans, VoteTable& table) { VoteByAnglePatterns(scans, kTolerances, table); })
+        .At(0, 0);
+  };
+  EXPECT_GT(votes_at_first(0.5), 0.0);
+  EXPECT_EQ(votes_at_first(8.0), 0.0);
+}
+
 }  // namespace
 }  // namespace cairn::slam
