@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "server/slam/loops/region_search.h"
+#include "server/slam/scan/point_index.h"
 
 namespace cairn::slam {
 namespace {
@@ -37,12 +38,6 @@ std::vector<Eigen::Vector2d> Sample(const std::vector<SurfacePoint>& surfaces) {
   std::vector<Eigen::Vector2d> points;
   for (std::size_t i = 0; i < surfaces.size(); i += stride) points.push_back(surfaces[i].p);
   return points;
-}
-
-PointIndex IndexOf(const std::vector<SurfacePoint>& surfaces, double cell_m) {
-  PointIndex index(cell_m);
-  for (const SurfacePoint& point : surfaces) index.Add(point);
-  return index;
 }
 
 // Numbers of `surfaces`, transformed by `T`, that agree with the other side and that contradict it.
@@ -165,7 +160,7 @@ std::optional<LoopClosure> LoopSearch::Compare(const Trail& trail, std::size_t o
   const Exclusion exclusion{peak->T_ref_curr, kRivalBeyondM, kRivalBeyondRad};
   if (FindBestPose(sample, pyramid, window, options_.max_rival * peak->score, exclusion)) return std::nullopt;
 
-  const PointIndex before_index = IndexOf(before, align_.first_pair_distance_m);
+  const PointIndex before_index(before);
   // The search is exact to some cells; the surfaces decide the rest.
   const Eigen::Matrix3d prior = Eigen::Vector3d(0.25, 0.25, 0.01).asDiagonal();
   const MatchResult aligned =
@@ -173,7 +168,7 @@ std::optional<LoopClosure> LoopSearch::Compare(const Trail& trail, std::size_t o
   if (!aligned.converged || aligned.degenerate) return std::nullopt;
   const FreeSpace before_free(trail, old_stretch, options_.free_cell_m),
       recent_free(trail, recent_stretch, options_.free_cell_m);
-  const PointIndex recent_index = IndexOf(recent, align_.first_pair_distance_m);
+  const PointIndex recent_index(recent);
   const double near_m = kNearShare * align_.inlier_distance_m;
   const Agreement ours = AgreementOf(recent, aligned.T_ref_curr, before_index, before_free, near_m);
   const Agreement theirs = AgreementOf(before, aligned.T_ref_curr.Inverse(), recent_index, recent_free, near_m);

@@ -78,13 +78,11 @@ SearchWindow WindowOver(const std::vector<SurfacePoint>& surfaces) {
 
 }  // namespace
 
-PlaceSearch::Map::Map(std::vector<SurfacePoint> given, double index_cell_m)
+PlaceSearch::Map::Map(std::vector<SurfacePoint> given)
     : surfaces(std::move(given)),
       pyramid(surfaces, kCoarser * kCellM, kCoarser * kReachM, kMapLevels),
-      index(index_cell_m),
-      window(WindowOver(surfaces)) {
-  for (const SurfacePoint& surface : surfaces) index.Add(surface);
-}
+      index(surfaces),
+      window(WindowOver(surfaces)) {}
 
 PlaceSearch::PlaceSearch(const LoopOptions& loop, const SelfCheckOptions& check, const PointToLineOptions& align)
     : options_(loop), check_(check), align_(align) {
@@ -111,7 +109,7 @@ std::vector<SurfacePoint> PlaceSearch::SurfacesOfMap(const Trail& trail, const S
 
 std::optional<FoundPlace> PlaceSearch::Find(const Trail& trail, const SharedSequence<Pose2>& path,
                                             std::span<const RecentScan> recent) {
-  if (!map_) map_ = std::make_shared<const Map>(SurfacesOfMap(trail, path), align_.first_pair_distance_m);
+  if (!map_) map_ = std::make_shared<const Map>(SurfacesOfMap(trail, path));
   if (recent.empty() || map_->surfaces.size() < kMinSurfaces) return std::nullopt;
   const std::vector<SurfacePoint> surfaces = SurfacesOf(recent, kCoarser * kCellM);
   if (surfaces.size() < kMinSurfaces) return std::nullopt;

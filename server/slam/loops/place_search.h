@@ -17,6 +17,7 @@
 #include "server/slam/loops/loop_search.h"
 #include "server/slam/loops/region_search.h"
 #include "server/slam/loops/self_check.h"
+#include "server/slam/scan/point_index.h"
 #include "server/slam/trail/shared_sequence.h"
 #include "server/slam/trail/trail.h"
 
@@ -62,7 +63,7 @@ class PlaceSearch {
   [[nodiscard]] VisibilityCounts Visible(const Trail& trail, const SharedSequence<Pose2>& path, const Scan& scan,
                                          const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const;
   struct Map {
-    Map(std::vector<SurfacePoint> surfaces, double index_cell_m);
+    explicit Map(std::vector<SurfacePoint> surfaces);
     std::vector<SurfacePoint> surfaces;
     LikelihoodPyramid pyramid;
     PointIndex index;

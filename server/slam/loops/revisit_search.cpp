@@ -50,7 +50,7 @@ void Visit(OptionVisitor& visitor, RevisitOptions& options) {
 }
 
 RevisitSearch::RevisitSearch(const RevisitOptions& options, const PointToLineOptions& align)
-    : options_(options), align_(align), reference_(align.first_pair_distance_m) {
+    : options_(options), align_(align) {
   align_.min_score = kMinRevisitScore;
 }
 

@@ -3,6 +3,7 @@
 #include "server/slam/matchers/correlative_search.h"
 #include "server/slam/matching/match_result.h"
 #include "server/slam/matching/point_to_line.h"
+#include "server/slam/scan/point_index.h"
 
 namespace cairn::slam {
 
@@ -48,8 +49,7 @@ MatchResult MatchByCorrelation(const ScanView& ref, const ScanView& curr, const 
   result.iterations = answer.tried;
   if (answer.on_border) return fail(MatchFailure::kNotConverged);
 
-  PointIndex reference(options.inlier_distance_m);
-  for (const SurfacePoint& point : ref.points_robot) reference.Add(point);
+  const PointIndex reference(ref.points_robot);
   const SurfaceAgreement agreement =
       CompareSurfaces(curr.points_robot, reference, answer.mean, options.inlier_distance_m);
   result.score = agreement.score;

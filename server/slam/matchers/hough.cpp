@@ -10,6 +10,7 @@
 #include "server/slam/matchers/hough_transform.h"
 #include "server/slam/matching/match_result.h"
 #include "server/slam/matching/point_to_line.h"
+#include "server/slam/scan/point_index.h"
 
 namespace cairn::slam {
 namespace {
@@ -39,8 +40,7 @@ class HoughMatch {
         options_(options),
         ref_(ref.points_robot, static_cast<int>(options.directions), options.rho_step_m, options.max_range_m),
         curr_(curr.points_robot, static_cast<int>(options.directions), options.rho_step_m, options.max_range_m),
-        reference_(options.inlier_distance_m) {
-    for (const SurfacePoint& point : ref.points_robot) reference_.Add(point);
+        reference_(ref.points_robot) {
     prior_information_ = prior.covariance.llt().solve(Eigen::Matrix3d::Identity());
     directions_ = PeaksOf(curr_.spectrum(), true, static_cast<int>(options.shift_directions), 0.02);
   }

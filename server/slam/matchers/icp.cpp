@@ -2,13 +2,13 @@
 
 #include "server/slam/matching/match_result.h"
 #include "server/slam/matching/point_to_line.h"
+#include "server/slam/scan/point_index.h"
 
 namespace cairn::slam {
 
 MatchResult MatchByIcp(const ScanView& ref, const ScanView& curr, const MatchPrior& prior,
                        const PointToLineOptions& options) {
-  PointIndex reference(options.first_pair_distance_m);
-  for (const SurfacePoint& point : ref.points_robot) reference.Add(point);
+  const PointIndex reference(ref.points_robot);
   MatchResult result = AlignPointsToSurfaces(curr.points_robot, reference,
                                              {prior.T_ref_curr, prior.T_ref_curr, prior.covariance}, options);
   if (!result.converged) return result;

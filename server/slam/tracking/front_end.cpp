@@ -98,10 +98,7 @@ void Visit(OptionVisitor& visitor, FrontEndOptions& options) {
 }
 
 FrontEnd::FrontEnd(const FrontEndOptions& options, ScanMatcher matcher)
-    : options_(options),
-      matcher_(std::move(matcher)),
-      keyframe_index_(options.refine.inlier_distance_m),
-      index_(options.refine.first_pair_distance_m) {}
+    : options_(options), matcher_(std::move(matcher)) {}
 
 ScanView Look(const Scan& scan, const FrontEndOptions& options) {
   const std::vector<BeamPoint> points = PointsOf(scan);
@@ -295,12 +292,16 @@ void FrontEnd::AddKeyframe(const ScanView& view) {
   if (matcher_alone && matcher_.keeps_reference && score_ >= options_.keep_above) return;
   keyframe_ = history_.back();
   AppendMoved(keyframe_.T_track_robot, view.points_robot, reference_.emplace_back());
-  if (reference_.size() > static_cast<std::size_t>(options_.reference_keyframes)) reference_.pop_front();
+  for (const SurfacePoint& point : reference_.back()) index_.Add(point);
+  if (reference_.size() > static_cast<std::size_t>(options_.reference_keyframes)) {
+    index_.DropOldest(reference_.front().size());
+    reference_.pop_front();
+  }
 
   keyframe_view_ = view;
   if (!options_.use_odometry)
     keyframe_view_.points_robot = MergedPoints(static_cast<std::size_t>(options_.no_odometry.merged_keyframes));
-  BuildIndices();
+  BuildKeyframeIndex();
 }
 
 void FrontEnd::Restart() {
@@ -326,6 +327,10 @@ void FrontEnd::BuildIndices() {
   index_.Clear();
   for (const auto& points : reference_)
     for (const SurfacePoint& point : points) index_.Add(point);
+  BuildKeyframeIndex();
+}
+
+void FrontEnd::BuildKeyframeIndex() {
   keyframe_index_.Clear();
   for (const SurfacePoint& point : keyframe_view_.points_robot) keyframe_index_.Add(point);
 }

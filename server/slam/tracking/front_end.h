@@ -18,6 +18,7 @@
 #include "server/slam/matching/point_to_line.h"
 #include "server/slam/matching/scan_matcher.h"
 #include "server/slam/motion/step_motion.h"
+#include "server/slam/scan/point_index.h"
 
 namespace cairn::slam {
 
@@ -139,6 +140,7 @@ class FrontEnd {
   // Share of the scan's points that lie on the surfaces of the last keyframe.
   [[nodiscard]] double Explained(const ScanView& view, const Pose2& T_track_robot) const;
   void BuildIndices();
+  void BuildKeyframeIndex();
   // Points of the last keyframes, in the robot frame of the newest of them.
   [[nodiscard]] std::vector<SurfacePoint> MergedPoints(std::size_t keyframes) const;
 

@@ -7,6 +7,7 @@
 #include "server/slam/motion/step_motion.h"
 #include "server/slam/scan/beam_points.h"
 #include "server/slam/scan/odometry_pairing.h"
+#include "server/slam/scan/point_index.h"
 #include "server/slam/scan_pipeline.h"
 #include "server/slam/tracking/front_end.h"
 
@@ -52,8 +53,7 @@ class StepTaker {
     LogStep step{last_->stamp, now.stamp, odometry, {}, {}, 0.0};
     const Eigen::Matrix3d wide =
         Eigen::Vector3d(options_.wide_m, options_.wide_m, options_.wide_rad).cwiseAbs2().asDiagonal();
-    slam::PointIndex reference(options_.slam.front_end.refine.first_pair_distance_m);
-    for (const slam::SurfacePoint& point : last_->view.points_robot) reference.Add(point);
+    const slam::PointIndex reference(last_->view.points_robot);
     step.match = slam::AlignPointsToSurfaces(now.view.points_robot, reference, {odometry, odometry, wide},
                                              options_.slam.front_end.refine);
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/slam/scan/point_index.h"
 #include "tests/server/slam/worlds.h"
 
 namespace cairn::slam {
@@ -17,9 +18,7 @@ std::vector<SurfacePoint> SurfaceOf(const Scan& scan, const SurfaceOptions& opti
 
 // The reference holds what the robot sees from the world's origin.
 PointIndex ReferenceOf(const World& world, const Laser& laser) {
-  PointIndex index(PointToLineOptions{}.first_pair_distance_m);
-  for (const SurfacePoint& point : SurfaceOf(Look(world, {}, laser))) index.Add(point);
-  return index;
+  return PointIndex(SurfaceOf(Look(world, {}, laser)));
 }
 
 const Eigen::Matrix3d kPrior = Eigen::Vector3d(0.09, 0.09, 0.04).asDiagonal();
@@ -45,8 +44,7 @@ TEST(PointToLine, SaysThatACorridorHoldsOnlyOneDirection) {
   corridor.Add({{-50, 1}, {50, 1}}).Add({{-50, -1}, {50, -1}});
   // Far hits are a metre apart on these walls, so a wall's direction is visible only from several of them.
   const Laser laser{.beams = 361, .step_rad = Radians(0.5)};
-  PointIndex reference(PointToLineOptions{}.first_pair_distance_m);
-  for (const SurfacePoint& point : SurfaceOf(Look(corridor, {}, laser))) reference.Add(point);
+  const PointIndex reference = ReferenceOf(corridor, laser);
   const std::vector<SurfacePoint> points = SurfaceOf(Look(corridor, {0.3, 0.05, 0.03}, laser));
   const Pose2 guess{0.4, 0.0, 0.0};
   const MatchResult match = AlignPointsToSurfaces(points, reference, {guess, guess, kPrior}, {});

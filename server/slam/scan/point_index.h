@@ -1,0 +1,83 @@
+// Finds the nearest surface point of a reference set. Nearly all time of the estimator is spent here.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "server/slam/scan/surface_points.h"
+
+namespace cairn::slam {
+
+// The plane is divided into small square cells, which a hash table finds. A search looks into the cell of the place and
+// then into the rings of cells around it, until no cell that is left can hold a nearer point. Of a cell only the last
+// kMaxInCell points are compared, far more than a wall that was seen forty times puts there, so that no scan can make
+// the search slow. Thread rule: built by one thread, then read from any thread.
+class PointIndex {
+ public:
+  static constexpr std::int32_t kMaxInCell = 400;
+
+  explicit PointIndex(std::span<const SurfacePoint> points = {});
+
+  void Clear();
+  void Add(const SurfacePoint& point);
+  // Forgets the points that were added first. REQUIRES: there are so many.
+  void DropOldest(std::size_t count);
+  // The nearest point that is nearer than max_distance_m, or null; of several equally near ones of a cell, the last
+  // that was added. Time grows with the square of max_distance_m where there is no point.
+  [[nodiscard]] const SurfacePoint* Nearest(const Eigen::Vector2d& p, double max_distance_m) const;
+  [[nodiscard]] std::size_t size() const { return points_.size() - dropped_; }
+
+ private:
+  // Points of one cell, in the order in which they were added. The coordinates of many points lie side by side, because
+  // comparing them is the inner loop.
+  struct Block {
+    static constexpr std::int32_t kPoints = 16;
+    std::array<double, kPoints> x;
+    std::array<double, kPoints> y;
+    std::array<std::int32_t, kPoints> point;  // Index in points_.
+    std::int32_t size = 0;
+    std::int32_t older = -1;  // The block of this cell that was filled before, or -1.
+  };
+  struct Cell {
+    std::int32_t x = 0;
+    std::int32_t y = 0;
+    std::int32_t newest = -1;  // Its last block, or -1 in a slot of the table that is free.
+  };
+  struct Best {
+    double squared_m2;
+    std::int32_t point = -1;
+  };
+
+  // The number of rings of cells round a place that hold no point, for every place. The number may be too small:
+  // distant places share one, and it does not grow when points are dropped.
+  class EmptyRings {
+   public:
+    static constexpr std::int32_t kMost = 5;  // Where there are more, the number is this.
+    EmptyRings();
+    void Clear();
+    void Fill(std::int32_t x, std::int32_t y);
+    [[nodiscard]] std::int32_t Around(std::int32_t x, std::int32_t y) const;
+
+   private:
+    static constexpr std::int32_t kSide = 512;
+    std::vector<std::uint8_t> rings_;
+  };
+
+  [[nodiscard]] std::size_t SlotOf(std::int32_t x, std::int32_t y) const;
+  void LookInto(std::int32_t x, std::int32_t y, const Eigen::Vector2d& p, Best& best) const;
+  void Grow();
+
+  std::vector<Cell> table_;  // Open addressing; at most half full. The size is a power of two.
+  std::size_t cells_ = 0;    // Slots in use.
+  EmptyRings empty_rings_;
+  std::vector<Block> blocks_;
+  // Dropped points stay, at the front and in their blocks, until they are half of all.
+  std::vector<SurfacePoint> points_;
+  std::size_t dropped_ = 0;
+};
+
+}  // namespace cairn::slam
