@@ -111,7 +111,7 @@ void PeerWatch::on_participant_discovery(Participant*, rtps::ParticipantDiscover
   }
   if (info.status != rtps::ParticipantDiscoveryInfo::DISCOVERED_PARTICIPANT || peers_.contains(guid)) return;
   Forget(guid);
-  // Those without an identity can be as many as a stranger likes; those of the fleet stay.
+  // A stranger can announce any number of participants without an identity. They make room for those of the fleet.
   if (peers_.size() >= kMaxPeers) std::erase_if(peers_, [](const auto& peer) { return !peer.second.authorized; });
   if (peers_.size() >= kMaxPeers) return;
   peers_[guid] = {.address = AddressOf(info.info), .since = Clock::now()};

@@ -49,7 +49,7 @@ struct Reader {
   }
 };
 
-// A submessage, who sent it, and to whom.
+// A submessage, its sender and its receiver.
 struct Submessage {
   std::uint8_t id;
   std::uint8_t flags;

@@ -26,7 +26,7 @@ template <typename Wire>
 struct Sample {
   Wire value;
   Decoding decoding = Decoding::kDecoded;
-  std::optional<ClientId> only;  // Set by a reader of replies: the client whose replies it wants.
+  std::optional<ClientId> only;  // Set by a reader of replies: the client whose replies it reads.
 };
 
 // Returns the client id at the start of a serialised reply; nothing if the reply is too short or not plain

@@ -19,7 +19,8 @@ using Clock = std::chrono::steady_clock;
 // A waiting job checks this often whether it was cancelled or its time has passed.
 constexpr auto kLook = std::chrono::milliseconds(50);
 
-// Who comes first decides: the site, which then begins, or the job, which then no longer wants it.
+// Only the first call succeeds: that of the site, which then begins the switch, or that of the job, which then gives
+// the switch up.
 class Decision {
  public:
   bool Take() { return !taken_.exchange(true); }

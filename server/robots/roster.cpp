@@ -118,7 +118,7 @@ Result<void> Roster::MayTakeOver(const Session& session, const SessionRequest& r
   return {};
 }
 
-// Who says where the robot starts does not go on with what it did before.
+// A client that says where the robot starts gets a new session instead of the old one.
 Result<void> Roster::Replace(Session& session, const SessionRequest& request) {
   if (auto may = MayTakeOver(session, request); !may) return may;
   const SessionState state = session.record().state();

@@ -116,7 +116,7 @@ class Hostile : public ::testing::Test {
   }
 
   // From every participant, as each of its first writers: "all up to `ahead` numbers from now are gone".
-  void Deafen(const std::vector<GuidPrefix>& participants, std::int64_t ahead) {
+  void ForgeNumbersAhead(const std::vector<GuidPrefix>& participants, std::int64_t ahead) {
     for (const GuidPrefix& from : participants) {
       for (std::uint32_t entity = 0x0100; entity <= 0x0a00; entity += 0x0100) {
         for (const std::uint32_t kind : {0x02U, 0x03U}) {
@@ -152,13 +152,13 @@ class Hostile : public ::testing::Test {
 TEST_F(Hostile, NumbersThatAreFarAheadChangeNothing) {
   const auto participants = OverhearParticipants(TestDomain(), seconds(4));
   ASSERT_GE(participants.size(), 3U);
-  Deafen(participants, std::int64_t{1} << 29);
+  ForgeNumbersAhead(participants, std::int64_t{1} << 29);
   EXPECT_TRUE(AllFlow(seconds(2)));
   for (const auto& robot : robots_) EXPECT_EQ(robot->client().renewed(), 0);
   ExpectNothingLostOrDoubled();
 }
 
-TEST_F(Hostile, AStreamThatIsDeafIsStaleAndFlowsAgainWithinFiveSeconds) {
+TEST_F(Hostile, AStreamThatTakesNothingIsStaleAndFlowsAgainWithinFiveSeconds) {
   const auto participants = OverhearParticipants(TestDomain(), seconds(4));
   ASSERT_GE(participants.size(), 3U);
   const auto queries_bus = MakeBus("operator");
@@ -166,7 +166,7 @@ TEST_F(Hostile, AStreamThatIsDeafIsStaleAndFlowsAgainWithinFiveSeconds) {
   ASSERT_EQ(Must(queries->Robots()).size(), 2U);
   const auto ahead =
       static_cast<std::int64_t>(robots_[0]->flow().odometry + 300);  // Plausible: the guard lets it pass.
-  Deafen(participants, ahead);
+  ForgeNumbersAhead(participants, ahead);
   const auto end = std::chrono::steady_clock::now();
   // Somebody who came after the forgeries: what the server says.
   Inbox<SessionState> states;
