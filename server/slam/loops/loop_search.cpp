@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "server/slam/loops/region_search.h"
-#include "server/slam/scan/point_index.h"
+#include "server/slam/matching/point_index.h"
 
 namespace cairn::slam {
 namespace {

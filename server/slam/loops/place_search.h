@@ -17,7 +17,7 @@
 #include "server/slam/loops/loop_search.h"
 #include "server/slam/loops/region_search.h"
 #include "server/slam/loops/self_check.h"
-#include "server/slam/scan/point_index.h"
+#include "server/slam/matching/point_index.h"
 #include "server/slam/trail/shared_sequence.h"
 #include "server/slam/trail/trail.h"
 

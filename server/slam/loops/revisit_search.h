@@ -12,9 +12,9 @@
 
 #include "server/slam/filters/filter.h"
 #include "server/slam/loops/region.h"
+#include "server/slam/matching/point_index.h"
 #include "server/slam/matching/point_to_line.h"
 #include "server/slam/parallel_for.h"
-#include "server/slam/scan/point_index.h"
 
 namespace cairn::slam {
 

@@ -9,8 +9,8 @@
 #include "common/geometry/pose_difference.h"
 #include "server/slam/matchers/hough_transform.h"
 #include "server/slam/matching/match_result.h"
+#include "server/slam/matching/point_index.h"
 #include "server/slam/matching/point_to_line.h"
-#include "server/slam/scan/point_index.h"
 
 namespace cairn::slam {
 namespace {

@@ -1,8 +1,8 @@
 #include "server/slam/matchers/icp.h"
 
 #include "server/slam/matching/match_result.h"
+#include "server/slam/matching/point_index.h"
 #include "server/slam/matching/point_to_line.h"
-#include "server/slam/scan/point_index.h"
 
 namespace cairn::slam {
 

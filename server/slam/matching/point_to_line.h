@@ -15,7 +15,7 @@
 #include "common/geometry/pose2.h"
 #include "common/options/option_visitor.h"
 #include "server/slam/matching/match_result.h"
-#include "server/slam/scan/point_index.h"
+#include "server/slam/matching/point_index.h"
 #include "server/slam/scan/surface_points.h"
 
 namespace cairn::slam {

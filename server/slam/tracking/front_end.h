@@ -15,10 +15,10 @@
 
 #include "server/slam/features/feature_extraction.h"
 #include "server/slam/features/scan_view.h"
+#include "server/slam/matching/point_index.h"
 #include "server/slam/matching/point_to_line.h"
 #include "server/slam/matching/scan_matcher.h"
 #include "server/slam/motion/step_motion.h"
-#include "server/slam/scan/point_index.h"
 
 namespace cairn::slam {
 

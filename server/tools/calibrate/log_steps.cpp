@@ -4,10 +4,10 @@
 #include <memory>
 #include <optional>
 
+#include "server/slam/matching/point_index.h"
 #include "server/slam/motion/step_motion.h"
 #include "server/slam/scan/beam_points.h"
 #include "server/slam/scan/odometry_pairing.h"
-#include "server/slam/scan/point_index.h"
 #include "server/slam/scan_pipeline.h"
 #include "server/slam/tracking/front_end.h"
 

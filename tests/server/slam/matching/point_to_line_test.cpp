@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/slam/scan/point_index.h"
+#include "server/slam/matching/point_index.h"
 #include "tests/server/slam/worlds.h"
 
 namespace cairn::slam {

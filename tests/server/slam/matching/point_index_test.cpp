@@ -1,4 +1,4 @@
-#include "server/slam/scan/point_index.h"
+#include "server/slam/matching/point_index.h"
 
 #include <gtest/gtest.h>
 
