@@ -24,7 +24,7 @@ void AddJob(CLI::App& app, Program& program);
 void AddCloud(CLI::App& app, Program& program);
 void AddSite(CLI::App& app, Program& program);  // All commands of sites; those that need no server have their own file.
 void AddStoredSites(CLI::App& site, Program& program);
-ExitCode ListSites(Program& program);  // Of the running server.
+ExitCode ListSites(Program& program);  // The sites of the running server.
 void AddSession(CLI::App& app, Program& program);
 
 }  // namespace cairn::client

@@ -57,8 +57,8 @@ void AddMapDraw(CLI::App& map, Program& program) {
   auto* command = map.add_subcommand("draw", "Draw the map and trajectories over it as a picture for people");
   command->footer(
       "The map comes from the server (--site) or a file (--map); paths from the server (--robots) or TUM files.\n"
-      "EXAMPLES\n  cairn map draw --site hall --robots robot1 robot2 -o hall.png\n"
-      "  cairn map draw --map hall.yaml --paths \"robot 1=r1.tum\" --truth truth=t1.tum -o hall.png");
+      "EXAMPLES\n  cairn map draw --site hall --robots robot1 robot2 -o hall-picture.png\n"
+      "  cairn map draw --map hall.yaml --paths \"robot 1=r1.tum\" --truth truth=t1.tum -o hall-picture.png");
   auto arguments = std::make_shared<DrawArguments>();
   auto* source = command->add_option_group("map's source");
   source->add_option("--site", arguments->site, "The site's name: the map the server has now");

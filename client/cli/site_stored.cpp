@@ -17,7 +17,7 @@ using server::Store;
 
 struct SiteArguments {
   std::string state;
-  std::vector<std::string> names;  // Of sites, files or sessions, as the command says.
+  std::vector<std::string> names;  // Names of sites, files or sessions, as the command says.
   std::string output;
   std::string rest;
   std::string as;

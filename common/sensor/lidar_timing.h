@@ -15,10 +15,10 @@
 
 namespace cairn {
 
-// The moment of a scan that its stamp tells: when its first, its middle or its last beam was measured.
+// Which beam of a scan its stamp belongs to.
 enum class StampAt : std::uint8_t { kFirst, kMiddle, kLast };
 
-// What is not set is not known; without a scan period nothing else counts, and scans stay as they are.
+// Values that are not set are unknown. Without scan_period_s the others are ignored, and scans stay as they are.
 struct LidarTiming {
   std::optional<double> scan_period_s;  // Of a full turn, whatever part of it is measured. 0: all beams at once.
   std::optional<StampAt> stamp_at;      // Not set: kFirst.

@@ -16,7 +16,7 @@
 
 namespace cairn::wire {
 
-// Of each fault, how many datagrams were dropped.
+// The number of datagrams that were dropped, by fault.
 using RefusedDatagrams = std::array<std::atomic<std::uint64_t>, kDatagramFaults>;
 
 // Binds sockets to the given IPv4 addresses only. `refused` is shared because it must outlive the transport.

@@ -69,7 +69,7 @@ class Participant : public std::enable_shared_from_this<Participant> {
   const std::shared_ptr<PeerWatch> peers_;        // The participant's listener.
   fd::DomainParticipant* participant_ = nullptr;  // Set once by Create.
   fd::Subscriber* subscriber_ = nullptr;
-  fd::Subscriber* robots_ = nullptr;  // Of all robots' partitions; only with security.
+  fd::Subscriber* robots_ = nullptr;  // For the partitions of all robots; only with security.
   Mutex mutex_;
   std::map<std::string, fd::Publisher*> publishers_ CAIRN_GUARDED_BY(mutex_);  // By partition.
   std::map<std::string, fd::Topic*> topics_ CAIRN_GUARDED_BY(mutex_);

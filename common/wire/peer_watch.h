@@ -3,8 +3,8 @@
 // The robot: a writer of a robot's streams is in one DDS partition, which is named as the robot. The access control of
 // Fast DDS 2.9 has compared it with the permissions that the fleet's CA has signed before it matches the writer. The
 // GUID would be no proof: the library does not compare it with the certificate. Fast DDS compares the partition once. A
-// writer that announces another one later, also after it was removed, therefore speaks for nobody until its participant
-// is gone.
+// writer that announces another one later, also after it was removed, is therefore refused until its participant
+// is gone: its samples are rejected.
 // The reasons: the callbacks of Fast DDS give no reason and do not report a refused endpoint, so both come from its
 // log. Thread-safe. This header uses the Fast DDS 2.x API; include it only inside common/wire.
 #pragma once
@@ -37,7 +37,7 @@ class PeerWatch final : public eprosima::fastdds::dds::DomainParticipantListener
   [[nodiscard]] static std::shared_ptr<PeerWatch> Make(bool secure);
   explicit PeerWatch(bool secure) : secure_(secure) {}
 
-  // Whether samples of this writer may be about this robot. If not, it is counted and said. Without security: always.
+  // Whether samples of this writer may be about this robot. If not, it is counted and logged. Without security: always.
   [[nodiscard]] bool MaySpeakFor(const Guid& writer, NameId robot);
   // Since the start.
   [[nodiscard]] Refusals refusals(Clock::time_point now = Clock::now());
@@ -72,7 +72,7 @@ class PeerWatch final : public eprosima::fastdds::dds::DomainParticipantListener
   Mutex mutex_;
   Refusals refusals_ CAIRN_GUARDED_BY(mutex_);
   std::map<Guid, Peer> peers_ CAIRN_GUARDED_BY(mutex_);
-  std::map<Guid, std::string> robots_ CAIRN_GUARDED_BY(mutex_);  // Of each writer; empty: of nobody.
+  std::map<Guid, std::string> robots_ CAIRN_GUARDED_BY(mutex_);  // Robot by writer; empty if none is allowed.
   std::set<Guid> named_ CAIRN_GUARDED_BY(mutex_);                // Endpoints that a line has named.
   std::vector<std::string> lines_ CAIRN_GUARDED_BY(mutex_);
   double lines_allowed_ CAIRN_GUARDED_BY(mutex_) = kMaxLines;

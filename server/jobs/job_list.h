@@ -31,7 +31,7 @@ class JobList {
   // themselves, as Restore takes them.
   [[nodiscard]] std::uint64_t ReserveIds(std::uint64_t count);
   Result<std::vector<StoredJob>> AddStored(const std::vector<std::uint64_t>& ids);
-  // The site is deleted: its jobs that have ended are gone, what is stored of them stays.
+  // The site is deleted: its jobs that have ended are removed from memory; their records stay.
   void RemoveSite(const std::string& site);
   // Adds a queued job. RESOURCE_EXHAUSTED: the list is full of unfinished jobs. `enable`: see JobWorker.
   Result<Job> Add(const std::string& site, JobKind kind, bool enable = true);

@@ -83,7 +83,7 @@ void Atlas::Remove(const std::string& name) {
   const auto found = sites_.find(name);
   if (found == sites_.end()) return;
   const MapInfo last = found->second.site->snapshot()->info;
-  // Two above: the site says under the next epoch that nothing is left of it.
+  // Two epochs higher: the site publishes its removal under the next one.
   beginning_.epoch = std::max(beginning_.epoch, last.epoch + 2);
   beginning_.tile_version = std::max(beginning_.tile_version, last.version + 2);
   sites_.erase(found);

@@ -70,7 +70,7 @@ class Atlas {
   mutable Mutex mutex_;
   std::map<std::string, Place> sites_ CAIRN_GUARDED_BY(mutex_);
   std::set<std::string> reserved_ CAIRN_GUARDED_BY(mutex_);
-  Site::Beginning beginning_ CAIRN_GUARDED_BY(mutex_);  // Of the next site.
+  Site::Beginning beginning_ CAIRN_GUARDED_BY(mutex_);  // For the next site.
 };
 
 }  // namespace cairn::server

@@ -82,7 +82,7 @@ Site::Site(const std::string& name, double resolution_m, const MapsOptions& opti
 template <typename Act>
 void Site::Run(Act act) {
   const MutexLock lock(mutex_);
-  waiting_.reset();  // What changes from now on comes after `act`.
+  waiting_.reset();  // Later changes belong after `act`.
   Post(std::move(act));
 }
 
@@ -111,7 +111,7 @@ void Site::Change(GridChange&& change) {
       const MutexLock reading(site.mutex_);
       if (site.waiting_ == changes) site.waiting_.reset();
     }
-    // Nobody adds to `changes` any more.
+    // `changes` is final now.
     for (const auto& [session, chunks] : *changes) site.Apply(session, chunks);
   });
 }

@@ -78,7 +78,7 @@ class Site : public std::enable_shared_from_this<Site> {
   void Leave(SessionId session);
   // The highest number of a session that exists no more and has a part here; 0: none. Before the threads start.
   [[nodiscard]] SessionId last_layer() const { return layers_.empty() ? 0 : *layers_.rbegin(); }
-  // The site is deleted: from now on it stores nothing and publishes nothing. `done` receives what it had published
+  // The site is deleted: after this it stores and publishes nothing. `done` receives what it had published
   // last, on the strand, when everything that was asked before is finished. A switch of the map version under way
   // fails.
   void Retire(std::function<void(std::shared_ptr<const MapSnapshot>)> done);

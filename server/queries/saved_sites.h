@@ -1,8 +1,8 @@
 // Saves sites as files while the server runs and loads them again: the requests to list, save, load and delete. The
-// files are NAME.site in one directory, and no name leads out of it. Each change of the store is one commit between two
-// of the journal, so a server that is killed meanwhile has done all of it or nothing. One request after the other; the
-// queue is bounded, and a request that finds it full is answered RESOURCE_EXHAUSTED at once.
-// Thread rule: Take from any thread; Start and Stop from one.
+// files are NAME.site in one directory; a name cannot contain a path. Each change of the store is one commit between
+// two of the journal, so a server that is killed meanwhile has done all of it or nothing. One request after the other;
+// the queue is bounded, and a request that finds it full is answered RESOURCE_EXHAUSTED at once. Thread rule: Take from
+// any thread; Start and Stop from one.
 #pragma once
 
 #include <atomic>

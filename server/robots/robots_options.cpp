@@ -29,8 +29,8 @@ void Visit(OptionVisitor& visitor, RobotsOptions& options) {
                "every eight scans and when its queue becomes empty.");
   visitor.Integer(
       "checkpoint_entries", options.checkpoint_entries, "entries", 10, 1000000000,
-      "Scans and odometry samples of a robot after which its whole state is written to the disk. With a larger "
-      "value less is written, and a server that starts again has more samples to process again.");
+      "Entries of a robot's journal, mostly scans and odometry samples, after which a checkpoint is written. With a "
+      "larger value less is written, and a server that starts again has more samples to process again.");
   visitor.Real(
       "gap_wait_s", options.gap_wait_s, "s", 0.1, 3600.0,
       "After a restart a robot sends again the samples that were not stored. For this long the server accepts no "

@@ -100,7 +100,7 @@ std::string Roster::WhyNotRestored(const std::string& robot) const {
   return found == not_restored_.end() ? std::string() : " (" + found->second + ")";
 }
 
-// What keeps the request from having anything to do with this session, which has not ended.
+// Whether the request may take over this session, or else why not. REQUIRES: the session has not ended.
 Result<void> Roster::MayTakeOver(const Session& session, const SessionRequest& request) {
   const SessionState state = session.record().state();
   if (session.ending())

@@ -57,10 +57,10 @@ class Roster {
   // RESOURCE_EXHAUSTED: so many sessions more are too many (robots.max_robots). ALREADY_EXISTS: one of the robots has
   // one.
   [[nodiscard]] Result<void> HasRoomFor(const std::vector<std::string>& robots) const;
-  // Takes them up as Restore does; their site is open. Where a robot has opened a session meanwhile, that one stays and
-  // the loaded one has ended. Returns how many were opened.
+  // Opens the loaded sessions as Restore does; their site is open. Where a robot has opened a session meanwhile, that
+  // one stays and the loaded one has ended. Returns how many were opened.
   std::size_t OpenStored(const std::vector<SessionId>& ids);
-  // All sessions of the site are ended and gone, what is stored of them stays, and the site is not found any more.
+  // Ends all sessions of the site and removes them from memory; their records stay. The site is not found any more.
   // FAILED_PRECONDITION: a robot is active in it. NOT_FOUND: no such site.
   Result<std::shared_ptr<Site>> RemoveSite(const std::string& site);
 

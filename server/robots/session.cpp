@@ -31,8 +31,8 @@ Session::~Session() {
   if (outputs_.gone && !keep_stored_) outputs_.gone();
 }
 
-// What is settled here, away from the strand, goes into the record first and into the journal after it: a checkpoint
-// between the two then holds more than the journal up to its position, and the entry is ignored when it is read.
+// A sample that is settled here, away from the strand, is recorded before it is journalled. A checkpoint that is taken
+// in between already contains it, so its journal entry is ignored when it is read.
 bool Session::Take(ScanArrival&& arrival) {
   const NameId sensor = arrival.stream.sensor_id;
   const std::uint64_t sequence = arrival.scan->sequence;

@@ -94,7 +94,7 @@ class SessionEstimator {
   const SessionOutputs outputs_;
   const SessionSnapshot identity_;  // Names and id; its other parts are empty.
   std::uint32_t epoch_ = 0;
-  std::shared_ptr<const std::atomic<bool>> switch_completed_;  // Of the last correction.
+  std::shared_ptr<const std::atomic<bool>> switch_completed_;  // Belongs to the last correction.
   bool ended_ = false;
   bool replaying_ = false;
   SessionToken session_ = 0;                          // The session of the last sample.

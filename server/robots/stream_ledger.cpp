@@ -77,8 +77,8 @@ bool StreamLedger::NextIs(std::uint64_t sequence) const {
 
 void StreamLedger::AdvanceDurable() {
   std::uint64_t through = undurable_.empty() ? ledger_.last_sequence : *undurable_.begin() - 1;
-  // That numbers are missing is known only from a later one. Before that is on the disk, a server that starts again
-  // still waits for them.
+  // A gap is stored only with a later number. Until that is on the disk, a server that starts again still expects the
+  // missing numbers.
   for (auto after = gaps_.upper_bound(through); after != gaps_.begin(); after = gaps_.upper_bound(through)) {
     const auto& [first, last] = *std::prev(after);
     if (last < through) break;
@@ -139,7 +139,7 @@ std::optional<StreamLedger> StreamLedger::AsJournaled(const std::set<std::uint64
   return account;
 }
 
-// The reverse of Received. REQUIRES: it waits, and no later number that is to be taken back does.
+// The reverse of Received. REQUIRES: the sample waits, and no later sample remains to be taken back.
 bool StreamLedger::TakeBack(std::uint64_t sequence) {
   if (sequence <= first_sequence_ || gaps_.size() >= kMaxGaps) return false;
   --ledger_.received;

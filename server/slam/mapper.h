@@ -49,7 +49,8 @@ class Mapper {
   Mapper(Mapper&&) noexcept;
   Mapper& operator=(Mapper&&) noexcept;
 
-  // `T_odom_robot` is the odometry at the scan's stamp. A scan whose pose is not localized is drawn into no map.
+  // `T_odom_robot` is the odometry at the scan's stamp. A scan whose pose is not localized is drawn into no
+  // map, at least until its place is known.
   // `passage` is what lies between this scan and the one before it. Where that is a pause in which the scan does not
   // agree with the map, or is not known, the robot is not localized until it has been found in its map (recovery.h).
   // `rolling`: the same scan as it was measured, if its beams were measured one after the other (scan_tracking.h).

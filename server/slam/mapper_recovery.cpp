@@ -10,7 +10,8 @@
 namespace cairn::slam {
 namespace {
 
-// A robot stood still if its odometry has changed by less, and so many of the beams show what they showed before.
+// A robot has not moved if its odometry has changed by less than kStillM and kStillRad, and at least this share of the
+// beams (kUnchanged) shows the same range.
 constexpr double kStillM = 0.02;
 constexpr double kStillRad = 0.02;
 constexpr double kSameRangeM = 0.1;
@@ -18,8 +19,9 @@ constexpr double kSameRangePerM = 0.01;
 constexpr double kUnchanged = 0.95;
 constexpr double kUnchangedAlongCorridor = 0.98;  // Most beams show the same everywhere along it.
 
-// A pause may be so long if the robot goes on at once, and scan and odometry may differ by so much.
-constexpr double kShortPause_s = 10.0;
+// The longest pause after which scan, odometry and map together may confirm the place at once, and the largest
+// difference between scan and odometry then.
+constexpr double kShortPauseS = 10.0;
 constexpr double kAsOdometryM = 0.15;
 constexpr double kAsOdometryPerM = 0.1;
 constexpr double kAsOdometryRad = 0.1;
@@ -66,7 +68,7 @@ bool Mapper::State::GoesOn(const Scan& scan, const std::vector<SurfacePoint>& po
                            const TrackStep& step) const {
   if (!HasMap() || recovery.active() || !options.front_end.use_odometry) return false;
   if (!last_scan || !step.matched || step.degenerate) return false;
-  if (NanosBetween(last_scan->scan->stamp, scan.stamp) > static_cast<std::uint64_t>(kShortPause_s * kNanosPerSecond))
+  if (NanosBetween(last_scan->scan->stamp, scan.stamp) > static_cast<std::uint64_t>(kShortPauseS * kNanosPerSecond))
     return false;
   const Pose2 odometry = Between(last_scan->T_odom_robot, T_odom_robot);
   const Pose2 error = Between(odometry, Between(last_scan->T_track_robot, step.T_track_robot));
@@ -82,8 +84,8 @@ bool Mapper::State::GoesOn(const Scan& scan, const std::vector<SurfacePoint>& po
   return agreement(*last_scan->scan, last_points, last_scan->T_track_robot) == Agreement::kDoubtful;
 }
 
-// Nobody watched the robot before this scan. If the scan goes on where the last ones ended, as far as it shows, the
-// robot is probably still on its path, but has to prove it; otherwise it has to be found.
+// Scans are missing before this one. If it matches the last scans, the robot is probably still on its path, which must
+// be confirmed; otherwise it has to be found.
 TrackStep Mapper::State::DoubtPlace(const ScanView& view, const Pose2& T_odom_robot, const TrackStep& step,
                                     const ParallelFor& parallel_for) {
   if (!HasMap()) return step;
@@ -95,7 +97,7 @@ TrackStep Mapper::State::DoubtPlace(const ScanView& view, const Pose2& T_odom_ro
   return front_end.Track(view, T_odom_robot, parallel_for);
 }
 
-// Follows a robot whose place is not certain, until it is proved.
+// Follows a robot whose place is not certain, until its place is confirmed.
 ScanOutcome Mapper::State::Recover(Keyframe keyframe, ScanView view, TrackStep step, const ParallelFor& parallel_for) {
   const Stamp stamp = keyframe.scan->stamp;
   const Pose2 T_odom_robot = keyframe.T_odom_robot;
@@ -124,7 +126,7 @@ ScanOutcome Mapper::State::Recover(Keyframe keyframe, ScanView view, TrackStep s
   return ReportRecovery(stamp, T_odom_robot, step.T_track_robot);
 }
 
-// The robot has been found on its path: nothing was missing.
+// The robot has been found on its path: the keyframes since then are added to it.
 ScanOutcome Mapper::State::GoOnAlongPath(const ParallelFor& parallel_for) {
   const std::vector<Recovery::Held> held = recovery.TakeHeld();
   recovery.End();

@@ -1,5 +1,5 @@
 // The state of a mapper, for the sources that implement it: mapper.cpp (a robot whose place is known) and
-// mapper_recovery.cpp (one whose place has to be proved).
+// mapper_recovery.cpp (one whose place has to be confirmed).
 #pragma once
 
 #include <memory>
@@ -78,7 +78,7 @@ struct Mapper::State {
             self.drawing, self.level, self.last_scan);
   }
 
-  // The last scan that was not tilted.
+  // The last scan that was reported as part of the path and was not tilted.
   struct LevelScan {
     ScanOutcome outcome;
     Pose2 T_keyframe_robot;
@@ -90,7 +90,7 @@ struct Mapper::State {
     }
   };
 
-  // The last scan of all that was not tilted.
+  // The last scan that was not tilted, also while the robot has to be found.
   struct LastScan {
     std::shared_ptr<const Scan> scan;
     Pose2 T_odom_robot;

@@ -88,7 +88,7 @@ std::optional<Recovery::Found> Recovery::Take(const Keyframe& keyframe, const Tr
   return Found{*place, on_path};
 }
 
-// All places found over some way must be one place.
+// All places found within kConfirmWithinM of way must agree.
 bool Recovery::IsConfirmed(const Pose2& T_map_robot) {
   const RecentScan& now = recent_.back();
   if (!unconfirmed_.empty() &&

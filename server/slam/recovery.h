@@ -81,7 +81,7 @@ class Recovery {
   [[nodiscard]] std::vector<Held> TakeHeld() { return std::exchange(held_, {}); }
   void Hold(Held held) { held_.push_back(std::move(held)); }
 
-  // Takes a scan, and searches. Returns the robot's place once it is proved.
+  // Takes a scan, and searches. Returns the robot's place once it is confirmed.
   [[nodiscard]] std::optional<Found> Take(const Keyframe& keyframe, const TrackStep& step,
                                           std::vector<SurfacePoint> points_robot, const Trail& trail,
                                           const SharedSequence<Pose2>& path);

@@ -11,11 +11,11 @@
 namespace cairn::slam {
 namespace {
 
-// A speed that is older says nothing of the present one.
-constexpr double kLongest_s = 1.0;
+// A speed that is older than this is not used.
+constexpr double kLongestS = 1.0;
 // A scan is computed anew if its last beam moves by so much: a beam of a cheap lidar, and its noise.
-constexpr double kWorthwhile_m = 0.01;
-constexpr double kWorthwhile_rad = 0.01;
+constexpr double kWorthwhileM = 0.01;
+constexpr double kWorthwhileRad = 0.01;
 // The step to a scan with the wrong motion in it is itself wrong by up to half of the error of that motion, so that the
 // first look halves the error only.
 constexpr int kMostLooks = 4;
@@ -32,7 +32,7 @@ Pose2 PlaceOf(const Trail& trail, const MapperSnapshot::ScanPlace& place) {
 std::optional<TimedStep> StepBetween(Stamp earlier, const Pose2& T_track_earlier, Stamp later,
                                      const Pose2& T_track_later) {
   const double seconds = 1e-9 * static_cast<double>(NanosBetween(earlier, later));
-  if (seconds <= 0.0 || seconds > kLongest_s) return std::nullopt;
+  if (seconds <= 0.0 || seconds > kLongestS) return std::nullopt;
   return TimedStep{Between(T_track_earlier, T_track_later), seconds};
 }
 
@@ -76,7 +76,7 @@ void LookAgain(FrontEnd& front_end, const FrontEndOptions& options, const Trail&
     auto matched = MatchedMotion(front_end, options, trail, rolling, tracked);
     if (!matched) return;
     const Pose2 change = DifferenceAtTheEnd(motion, *matched);
-    if (change.translation().norm() < kWorthwhile_m && std::abs(change.theta) < kWorthwhile_rad) return;
+    if (change.translation().norm() < kWorthwhileM && std::abs(change.theta) < kWorthwhileRad) return;
     motion = std::move(*matched);
     auto scan = Computed(rolling, motion, tracked.scan->stamp);
     if (scan == nullptr) return;

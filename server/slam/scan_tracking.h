@@ -1,7 +1,7 @@
-// Looks at a scan and follows the robot to it. Where the beams of the scan were measured one after the other, this is
-// where its match and the motion meanwhile meet: without odometry, the scan is seen as from a robot that goes on as in
-// its last step; and where the match shows another motion than the one that was taken out of the scan, the scan
-// is computed anew with the motion that was matched, and aligned once more. The better of both answers counts.
+// Looks at a scan and follows the robot to it. Where the beams of the scan were measured one after the other, the
+// match corrects the motion that was assumed within the scan: without odometry, the scan is seen as from a robot that
+// goes on as in its last step; and where the match shows another motion than the one that was taken out of the scan,
+// the scan is computed anew with the motion that was matched, and aligned once more. The better of both answers counts.
 // A scan that was taken at once is followed directly. Stateless, thread-safe.
 #pragma once
 

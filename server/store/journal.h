@@ -131,7 +131,7 @@ class Journal {
     std::optional<WantedCheckpoint> checkpoint;
     Clock::time_point oldest;
   };
-  // Samples fill the queue's bound. What else changes is little, and parts of it may not be missing: it has as much
+  // Samples count against the bound of the queue. Other changes are small and must not be lost, so they have the same
   // room again.
   enum class Room { kForSamples, kWithReserve };
 

@@ -90,7 +90,7 @@ struct StoredSite {
   std::uint32_t enabled_version = 1;
   std::map<std::uint32_t, std::uint64_t> switches;  // Epoch -> generation of the server that began it.
   std::map<NameId, std::uint64_t> members;          // Robot -> the session that draws for it.
-  double resolution_m = 0.0;                        // Of the map's cells; 0: not known.
+  double resolution_m = 0.0;                        // Side of the map's cells; 0: not known.
 };
 
 struct StoredLayer {

@@ -27,7 +27,7 @@
 
 namespace cairn::server {
 
-// Of the files that are written; files of all versions up to this one are read.
+// The format of the files that are written; files of all formats up to this one are read.
 inline constexpr std::uint32_t kSiteFileFormat = 1;
 // Numbers of sessions and jobs in a file are smaller, so that they can be counted on.
 inline constexpr std::uint64_t kMaxSavedId = std::uint64_t{1} << 53;
@@ -64,7 +64,7 @@ struct SiteFileSummary {
   std::set<std::uint64_t> jobs;
   std::uint64_t last_job = 0;
   std::uint64_t records = 0;
-  std::uint64_t entries = 0;  // Of all journals.
+  std::uint64_t entries = 0;  // Number of entries in all journals.
 };
 
 // Reads the whole file and every record in it. Errors as of SiteFileReader, with the path and what is wrong.

@@ -12,8 +12,8 @@
 //   be the best until a loop closes, and the pose jumps by the whole spread at the first joint.)
 // - Evidence is used once. The low level found neighbouring segments by how well they fit together, so a
 //   segment is compared only with segments that the low level had forgotten. (With a comparison to its
-//   neighbours, particles die for a drift that a loop would have shown to be right, and few are left when the
-//   robot returns.)
+//   neighbours, particles are removed because of a drift that a loop would have shown to be right, and few are left
+//   when the robot returns.)
 // - A segment is drawn only when the robot comes near it again. Until then it is a placement, which costs
 //   only a pose per particle.
 // - When a loop closes, few of the particles fit. The evidence is therefore introduced in steps, and

@@ -13,8 +13,8 @@ namespace {
 constexpr double kCoarser = 2.0;
 constexpr int kMapLevels = 7;
 constexpr std::size_t kMaxSample = 250;     // Points of the recent scans that are searched with.
-constexpr std::size_t kMinSurfaces = 20;    // On either side; with fewer nothing is found.
-constexpr double kMapReach_m = 300.0;       // Of the map around the last known place: bounds memory and time.
+constexpr std::size_t kMinSurfaces = 20;    // Fewest surfaces, of the scans and of the map.
+constexpr double kMapReachM = 300.0;        // Only the map within this distance of the last pose is searched.
 constexpr double kMinPlaceExplained = 0.7;  // Share of the recent surfaces that must lie on surfaces of the map.
 constexpr int kMinCompared = 20;            // Points that must be compared for an agreement to count.
 constexpr std::size_t kNearKeyframes = 4;   // Old keyframes that a scan is compared with, ...
@@ -89,7 +89,7 @@ PlaceSearch::PlaceSearch(const LoopOptions& loop, const SelfCheckOptions& check,
   align_.min_score = kMinPlaceExplained;
 }
 
-// Without keyframes whose place was not known.
+// Leaves out keyframes that are not localized.
 std::vector<SurfacePoint> PlaceSearch::SurfacesOfMap(const Trail& trail, const SharedSequence<Pose2>& path) const {
   std::vector<SurfacePoint> surfaces;
   OnePerCell cells(0.5 * kCellM);
@@ -97,7 +97,7 @@ std::vector<SurfacePoint> PlaceSearch::SurfacesOfMap(const Trail& trail, const S
   for (std::size_t k = 0; k < trail.size(); ++k) {
     const Pose2& T_map_k = path[k];
     if (!trail.keyframes()[k].localized) continue;
-    if ((T_map_k.translation() - last).cwiseAbs().maxCoeff() > kMapReach_m) continue;
+    if ((T_map_k.translation() - last).cwiseAbs().maxCoeff() > kMapReachM) continue;
     const Eigen::Matrix2d R = T_map_k.rotation();
     for (const SurfacePoint& point : trail.points(k)) {
       const Eigen::Vector2d p = R * point.p + T_map_k.translation();

@@ -116,7 +116,7 @@ class Resampling {
   [[nodiscard]] bool Opposite(const MovedEnd& from, const MovedEnd& to) const {
     return !(std::abs(to.beam - from.beam) * std::abs(scan_.angle_step_rad) < kPi);
   }
-  // The beams within the field of view that have no range yet. The ends of a scan with a tiny step lie anywhere.
+  // The beams within the field of view that have no range yet. Beams outside are skipped.
   template <typename Visit>
   void ForEachBeam(double first, double last, Visit visit) {
     if (turn_ == 0.0) {

@@ -7,7 +7,7 @@
 // ends are then no longer at the angles of the beams; therefore each beam of the result gets the range at which it cuts
 // the line between two neighbouring ends on one surface, and otherwise that of the nearest end. Where
 // the turn of the robot shows a place twice, a surface counts more than a single end, an end more than a beam that hit
-// nothing, and among equals the first one counts. A beam that nothing tells anything about is
+// nothing, and among equals the first one counts. A beam without any evidence is
 // invalid (not a number). The scan plane is taken to be level. Stateless, thread-safe.
 #pragma once
 

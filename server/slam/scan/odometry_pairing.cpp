@@ -10,7 +10,7 @@
 namespace cairn::slam {
 namespace {
 
-// Odometry after a time that is not known, or in which no sample came, goes on if it has changed by less than this. A
+// After a gap, or an unknown time, odometry counts as continued only if it has changed by less than this. A
 // robot that was switched off for a night may have driven anywhere; its odometry would be plausible after any distance.
 constexpr double kSamePlaceM = 1.0;
 constexpr double kSameHeadingRad = 1.0;

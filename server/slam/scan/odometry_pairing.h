@@ -34,11 +34,11 @@ struct PairingOptions {
 };
 void Visit(OptionVisitor& visitor, PairingOptions& options);
 
-// What lies between a scan and the one before it. Of two, the larger counts.
+// What lies between a scan and the one before it. If several apply, the one later in this list counts.
 enum class Passage : std::uint8_t {
   kDriven = 0,  // The robot was watched all the way.
   kPaused,      // Scans are missing for some time. Odometry says how the robot moved, if nobody carried it.
-  kUnwatched,   // The same, but nobody knows for how long, or another client goes on.
+  kUnwatched,   // As kPaused, but its length is unknown, or another client continues.
   kUnknown,     // The odometry began anew or jumped: nothing says where the robot is now.
 };
 
@@ -66,7 +66,7 @@ class OdometryPairing {
   void Add(std::shared_ptr<const Scan> scan);
   void Add(const Odometry& odometry);
   // From now on both streams come from another client, which numbers from the beginning. Nobody has watched the robot
-  // since the last sample, for a time that no clock tells. Scans that still wait for odometry are dropped.
+  // since the last sample, for an unknown time. Scans that still wait for odometry are dropped.
   void NewClient();
   // Call this when no more odometry will come. A waiting scan that began before the last sample is paired as usual, and
   // the robot is taken to stand after that sample. A later scan is paired with the last sample if that is at most

@@ -21,12 +21,12 @@ struct RollingScan {
 // The motion while the scan is taken if the robot goes on as in the `seconds` (> 0) in which it made `step`.
 [[nodiscard]] std::vector<Odometry> AtConstantVelocity(const Scan& scan, const Pose2& step, double seconds);
 
-// The motion that odometry shows while the scan is taken, if odometry goes on to miss what it missed in the `seconds`
-// (> 0) in which the robot moved by `step` and odometry by `odometry_step`.
+// The motion that odometry shows while the scan is taken, if the rate of its error stays as in the last `seconds` (>
+// 0), in which the robot moved by `step` and odometry by `odometry_step`.
 [[nodiscard]] std::vector<Odometry> CorrectedMotion(const RollingScan& rolling, const Pose2& step,
                                                     const Pose2& odometry_step, double seconds);
 
-// How far the second motion moves the last beam's lidar pose away from where the first one has it.
+// The pose of the robot at the last sample of the second motion, seen from that of the first one.
 [[nodiscard]] Pose2 DifferenceAtTheEnd(const std::vector<Odometry>& a, const std::vector<Odometry>& b);
 
 }  // namespace cairn::slam

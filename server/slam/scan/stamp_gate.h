@@ -48,7 +48,7 @@ class StampGate {
     if (held_.size() >= confirmations_) PassHeld();
   }
 
-  // Nothing more comes: two samples that agree are believed, a single one is not.
+  // At the end of the stream: two samples that agree pass, a single one is refused.
   void Finish() {
     if (held_.size() > 1) return PassHeld();
     RefuseHeld();
