@@ -3,14 +3,13 @@
 namespace cairn::server {
 
 void Visit(OptionVisitor& visitor, JobsOptions& options) {
-  visitor.Integer("max_queued", options.max_queued, "jobs", 1, 1024,
-                  ForOperators("Jobs that may wait. Further ones are refused."));
+  visitor.Integer("max_queued", options.max_queued, "jobs", 1, 1024, "Jobs that may wait. Further ones are refused.");
   visitor.Integer(
       "max_kept", options.max_kept, "jobs", 2, 65536,
       "Jobs whose state is remembered, waiting and running ones included. The oldest finished job is forgotten first.");
   visitor.Integer("nice", options.nice, "", 0, 19,
-                  ForOperators("Priority of the thread that runs jobs, as for the command nice. A larger value leaves "
-                               "more time to the robots, and jobs take longer."));
+                  "Priority of the thread that runs jobs, as for the command nice. A larger value leaves "
+                  "more time to the robots, and jobs take longer.");
   visitor.Real("snapshot_timeout_s", options.snapshot_timeout_s, "s", 0.1, 600.0,
                "A job fails if a robot has not handed over its state within this time.");
   visitor.Require(options.max_queued < options.max_kept, "max_queued", "must be below", "max_kept");

@@ -9,9 +9,9 @@ void Visit(OptionVisitor& visitor, MapsOptions& options) {
   visitor.Integer("max_sites", options.max_sites, "", 1, 4096,
                   ForOperators("Sites that may exist at one time. Further ones are refused."));
   visitor.Integer("max_versions", options.max_versions, "", 2, 64,
-                  ForOperators("Versions of the map that are kept for each site. When there are more, the oldest one "
-                               "that is neither published nor enabled is forgotten. Each one takes memory for the "
-                               "parts in which it differs from the present map."));
+                  "Versions of the map that are kept for each site. When there are more, the oldest one "
+                  "that is neither published nor enabled is forgotten. Each one takes memory for the "
+                  "parts in which it differs from the present map.");
 }
 
 }  // namespace cairn::server

@@ -9,15 +9,14 @@ void Visit(OptionVisitor& visitor, RobotsOptions& options) {
                    "is forgotten, then the one whose robot has been away for longest; then further robots "
                    "are refused. Each one takes the memory of an estimator."));
   visitor.Integer("queue_scans", options.queue_scans, "scans", 4, 4096,
-                  ForOperators("Scans of a robot that may wait. When the queue is full, the oldest scan is dropped. A "
-                               "longer queue survives longer interruptions, and poses come later after one."));
+                  "Scans of a robot that may wait. When the queue is full, the oldest scan is dropped. A "
+                  "longer queue survives longer interruptions, and poses come later after one.");
   visitor.Integer("queue_odometry", options.queue_odometry, "samples", 16, 65536,
                   "Odometry samples of a robot that may wait. When the queue is full, the two oldest become one, so "
                   "that no motion is lost.");
-  visitor.Integer(
-      "max_path_poses", options.max_path_poses, "poses", 1024, 100000000,
-      ForOperators("Poses of a robot that are remembered, 104 bytes each. When there are more, every second "
-                   "pose of the older half is removed."));
+  visitor.Integer("max_path_poses", options.max_path_poses, "poses", 1024, 100000000,
+                  "Poses of a robot that are remembered, 104 bytes each. When there are more, every second "
+                  "pose of the older half is removed.");
   visitor.Integer(
       "max_unclaimed", options.max_unclaimed, "streams", 1, 65536,
       "Streams of unknown robots that are counted one by one. The messages of further streams are counted together.");

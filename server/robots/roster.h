@@ -6,8 +6,8 @@
 //   because its start pose is out of date.
 // - A request for a new session of a robot whose owner is not alive replaces the robot's present session if it says
 //   where the robot starts. Otherwise it continues the present session, and the robot must be found in its map before
-//   it is localized (slam/recovery.h), because nobody knows whether it is still where it was, or even the same robot.
-//   The former owner is told. If another client that is alive owns the session, the request is refused
+//   it is localized (slam/recovery/recovery.h), because nobody knows whether it is still where it was, or even the same
+//   robot. The former owner is told. If another client that is alive owns the session, the request is refused
 //   (ALREADY_EXISTS).
 // - A session that has ended is replaced by a new one.
 // When max_robots is reached, the oldest ended session is removed first (its part of the map stays), then the one that

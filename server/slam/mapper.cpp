@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "server/slam/mapper_state.h"
-#include "server/slam/scan_tracking.h"
+#include "server/slam/tracking/scan_tracking.h"
 
 namespace cairn::slam {
 namespace {
@@ -27,9 +27,7 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   State& s = *state_;
   const Stamp stamp = scan->stamp;
   const bool tilted = IsTilted(*scan, s.options.max_tilt_rad);
-  if (!s.options.front_end.use_odometry) passage = std::min(passage, Passage::kUnwatched);
-  if (passage == Passage::kUnknown || (passage != Passage::kDriven && tilted))
-    s.LosePlace(passage != Passage::kUnknown);
+  passage = s.BeginAfter(passage, tilted);
   if (tilted) return s.Coast(stamp, T_odom_robot);
 
   if (s.drawing.redrawing()) s.drawing.Continue(s.trail.keyframes(), s.believed_path());
@@ -38,11 +36,8 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   if (passage != Passage::kDriven || s.recovery.active()) rolling = nullptr;
   TrackedScan tracked =
       TrackScan(s.front_end, s.options.front_end, s.trail, std::move(scan), rolling, T_odom_robot, parallel_for);
+  s.CheckPlace(passage, tracked, T_odom_robot, parallel_for);
   auto& [still, view, step] = tracked;
-  const bool watched = passage == Passage::kDriven || s.StoodStill(*still, T_odom_robot, step) ||
-                       (passage == Passage::kPaused && s.GoesOn(*still, view.points_robot, T_odom_robot, step));
-  if (!watched && passage != Passage::kUnknown) step = s.DoubtPlace(view, T_odom_robot, step, parallel_for);
-  s.last_scan = State::LastScan{still, T_odom_robot, step.T_track_robot};
   if (s.recovery.active()) return s.Recover({std::move(still), T_odom_robot}, std::move(view), step, parallel_for);
 
   s.blind.Add(step, s.trail.empty() ? Pose2{} : s.trail.shapes().back().T_track_robot);

@@ -52,8 +52,9 @@ class Mapper {
   // `T_odom_robot` is the odometry at the scan's stamp. A scan whose pose is not localized is drawn into no
   // map, at least until its place is known.
   // `passage` is what lies between this scan and the one before it. Where that is a pause in which the scan does not
-  // agree with the map, or is not known, the robot is not localized until it has been found in its map (recovery.h).
-  // `rolling`: the same scan as it was measured, if its beams were measured one after the other (scan_tracking.h).
+  // agree with the map, or is not known, the robot is not localized until it has been found in its map
+  // (recovery/recovery.h). `rolling`: the same scan as it was measured, if its beams were measured one after the other
+  // (tracking/scan_tracking.h).
   ScanOutcome Process(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot, const ParallelFor& parallel_for,
                       Passage passage = Passage::kDriven, const RollingScan* rolling = nullptr);
 

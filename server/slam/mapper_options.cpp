@@ -14,11 +14,11 @@ void Visit(OptionVisitor& visitor, MapperOptions& options) {
   visitor.Real("lost_after_m", options.lost_after_m, "m", 0.0, 1000.0,
                "A robot that has travelled farther than this by odometry alone counts as lost.");
   visitor.Integer("max_keyframes", options.max_keyframes, "keyframes", 1, 100000000,
-                  ForOperators("Keyframes of one session, some 20 KiB each. When it has as many, its scans are dropped "
-                               "as session_full."));
+                  "Keyframes of one session, some 20 KiB each. When it has as many, its scans are dropped "
+                  "as session_full.");
   visitor.Integer("max_chunks", options.max_chunks, "chunks", 1, 10000000,
-                  ForOperators("Pieces of the map of one session, 32 KiB each. When it has as many, its scans are "
-                               "dropped as session_full."));
+                  "Pieces of the map of one session, 32 KiB each. When it has as many, its scans are "
+                  "dropped as session_full.");
   visitor.Section("blind", "Uncertainty of a motion that is known from odometry alone. It is added to slam.drift.",
                   [&] { Visit(visitor, options.blind); });
   visitor.Real("max_tilt_rad", options.max_tilt_rad, "rad", 0.0, 1.58,
@@ -33,9 +33,16 @@ void Visit(OptionVisitor& visitor, MapperOptions& options) {
   visitor.Section("gate", "After which motion a scan becomes a keyframe, which updates filter and map.",
                   [&] { Visit(visitor, options.gate); });
   visitor.Section("revisit", "Recognising places that were seen before.", [&] { Visit(visitor, options.revisit); });
-  visitor.Section("loop", "Finding large loops.", [&] { Visit(visitor, options.loop); });
-  visitor.Section("self_check", "Noticing that the scans contradict the map.",
-                  [&] { Visit(visitor, options.self_check); });
+  visitor.Section(
+      "loop",
+      "Finding large loops. every_m, max_rival, confirm_after_m and sigma_m also count when a robot that was not "
+      "watched is looked for in its map; enabled does not.",
+      [&] { Visit(visitor, options.loop); });
+  visitor.Section(
+      "self_check",
+      "Noticing that the scans contradict the map. near_m and max_conflict also count when a robot that was not "
+      "watched is looked for in its map; enabled does not.",
+      [&] { Visit(visitor, options.self_check); });
   visitor.Section("pose_graph", "Least squares over the whole path, for smoothing.",
                   [&] { Visit(visitor, options.pose_graph); });
   visitor.Section("grid", "The occupancy grid.", [&] { Visit(visitor, options.grid); });

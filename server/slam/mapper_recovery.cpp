@@ -42,6 +42,25 @@ bool LookAlike(const Scan& a, const Scan& b, double least) {
 
 }  // namespace
 
+// Loses the robot's place where no scan can confirm it. Returns what lies before the scan; without odometry, a new
+// odometry means no more than a pause of unknown length.
+Passage Mapper::State::BeginAfter(Passage passage, bool tilted) {
+  if (!options.front_end.use_odometry) passage = std::min(passage, Passage::kUnwatched);
+  if (passage == Passage::kUnknown || (passage != Passage::kDriven && tilted)) LosePlace(passage != Passage::kUnknown);
+  return passage;
+}
+
+// Doubts the robot's place where scans are missing before this one, unless the scan shows that the robot stood still or
+// went on along its path.
+void Mapper::State::CheckPlace(Passage passage, TrackedScan& tracked, const Pose2& T_odom_robot,
+                               const ParallelFor& parallel_for) {
+  auto& [still, view, step] = tracked;
+  const bool watched = passage == Passage::kDriven || StoodStill(*still, T_odom_robot, step) ||
+                       (passage == Passage::kPaused && GoesOn(*still, view.points_robot, T_odom_robot, step));
+  if (!watched && passage != Passage::kUnknown) step = DoubtPlace(view, T_odom_robot, step, parallel_for);
+  last_scan = LastScan{still, T_odom_robot, step.T_track_robot};
+}
+
 // From now on the robot has to be found again.
 void Mapper::State::LosePlace(bool odometry_goes_on) {
   if (!HasMap()) return;

@@ -6,18 +6,19 @@
 #include <optional>
 #include <vector>
 
-#include "server/slam/blind_motion.h"
+#include "server/slam/drawing/map_drawing.h"
 #include "server/slam/loops/loop_search.h"
 #include "server/slam/loops/revisit_search.h"
 #include "server/slam/loops/self_check.h"
-#include "server/slam/map_drawing.h"
 #include "server/slam/mapper.h"
 #include "server/slam/methods.h"
 #include "server/slam/motion/step_motion.h"
-#include "server/slam/recovery.h"
+#include "server/slam/recovery/recovery.h"
 #include "server/slam/scan/beam_points.h"
 #include "server/slam/scan/stamp_gate.h"
+#include "server/slam/tracking/blind_motion.h"
 #include "server/slam/tracking/front_end.h"
+#include "server/slam/tracking/scan_tracking.h"
 #include "server/slam/trail/trail.h"
 
 namespace cairn::slam {
@@ -37,6 +38,8 @@ struct Mapper::State {
         drawing(given.grid) {}
 
   ScanOutcome Coast(Stamp stamp, const Pose2& T_odom_robot);
+  Passage BeginAfter(Passage passage, bool tilted);
+  void CheckPlace(Passage passage, TrackedScan& tracked, const Pose2& T_odom_robot, const ParallelFor& parallel_for);
   void LosePlace(bool odometry_goes_on);
   // Before, the next scan defines the start, or the filter itself looks for the robot's place.
   [[nodiscard]] bool HasMap() const { return !trail.empty() && filter->placed(); }

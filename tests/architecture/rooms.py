@@ -25,7 +25,9 @@ SLAM_ROOMS = {
     "filters": ["landmarks", "motion", "trail", "features"],  # What every filter is to the mapper.
     "fastslam": ["filters", "landmarks", "motion", "random", "trail"],
     "loops": ["filters", "trail", "matching", "grid", "scan"],  # Old places seen again; contradictions.
-    "tracking": ["matching", "features", "motion"],  # Scan against the last keyframes.
+    "tracking": ["matching", "features", "motion", "trail", "scan"],  # Scan against the last keyframes.
+    "recovery": ["loops", "tracking", "matching", "trail", "motion", "scan"],  # A robot that was not watched.
+    "drawing": ["trail", "grid"],  # The map of the robot along its path.
     "smoothing": ["trail", "grid"],  # Paths and maps after the fact.
 
     "motion_models": ["motion", "random"],  # Learnt or sampled models of a step.

@@ -56,7 +56,7 @@ void Visit(OptionVisitor& visitor, PairingOptions& options) {
                   "Odometry samples that are kept for later scans. When there are more, the oldest is dropped.");
   visitor.Real("max_pause_s", options.max_pause_s, "s", 0.1, 1e7,
                "After a longer time between two scans the robot counts as localized only if its scan agrees with its "
-               "map where odometry says that it is.");
+               "map where odometry says that it is. After more than 10 s it has to be found in its map.");
   visitor.Real("max_speed_m_s", options.max_speed_m_s, "m/s", 0.1, 1000.0,
                "Odometry that moves faster, by a metre or more, has begun anew. The place of the robot is then not "
                "known.");

@@ -81,7 +81,7 @@ TEST(Ndt, TheInverseProblemHasTheInverseAnswer) {
   EXPECT_LT(TurnOf(back, there.T_ref_curr.Inverse()), 0.005);
 }
 
-TEST(Ndt, ACorridorIsFlaggedAndThePriorDecidesAlongIt) {
+TEST(Ndt, ACorridorIsFlaggedAndTheAnswerLiesBetweenTruthAndPriorAlongIt) {
   const ScanView prev = ViewFrom(test::LongCorridor(), {});
   const ScanView curr = ViewFrom(test::LongCorridor(), {0.3, 0.05, 0.03});
   const MatchPrior prior{{0.4, 0.0, 0.0}, Eigen::Vector3d(1e-3, 1e-3, 1e-3).asDiagonal()};
@@ -91,7 +91,7 @@ TEST(Ndt, ACorridorIsFlaggedAndThePriorDecidesAlongIt) {
   EXPECT_GT(std::abs(match.degenerate_direction.x()), 0.99);
   EXPECT_NEAR(match.T_ref_curr.y, 0.05, 0.01);
   EXPECT_NEAR(match.T_ref_curr.theta, 0.03, 0.005);
-  EXPECT_NEAR(match.T_ref_curr.x, 0.4, 0.11);
+  EXPECT_NEAR(match.T_ref_curr.x, 0.35, 0.055);
   EXPECT_GT(match.covariance(0, 0), 10.0 * match.covariance(1, 1));
 }
 

@@ -1,6 +1,6 @@
 // A robot with a lidar that turns slowly, and wheels that say nothing or too little of its turns: the motion within a
 // scan comes from the forecast, and from what the match shows.
-#include "server/slam/scan_tracking.h"
+#include "server/slam/tracking/scan_tracking.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Follows a robot whose place is not certain: scans are missing, or odometry has begun anew. The robot is not
-// localized, and nothing is drawn, until it has been found in its own map (loops/place_search.h). It has been found
+// localized, and nothing is drawn, until it has been found in its own map (place_search.h). It has been found
 // when two searches, with some way between them, agree: one scan or one search is no proof, because places look alike.
 //  - While the scans continue those before the pause, the robot is probably on its path: its scans are held, and are
 //    added to the path as if there had been no pause, if the place found is that one (`on_path`).
@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "common/service/pose_report.h"
-#include "server/slam/loops/place_search.h"
 #include "server/slam/motion/step_motion.h"
+#include "server/slam/recovery/place_search.h"
 #include "server/slam/tracking/front_end.h"
 
 namespace cairn::slam {

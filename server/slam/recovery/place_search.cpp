@@ -1,4 +1,4 @@
-#include "server/slam/loops/place_search.h"
+#include "server/slam/recovery/place_search.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -1,6 +1,6 @@
 // Robots that were not watched for a while: scans are missing, somebody carried the robot, its odometry began anew. At
 // no time may a pose be called localized beside the truth.
-#include "server/slam/recovery.h"
+#include "server/slam/recovery/recovery.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "server/slam/scan_tracking.h"
+#include "server/slam/tracking/scan_tracking.h"
 
 #include <cmath>
 #include <optional>

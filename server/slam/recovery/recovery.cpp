@@ -1,4 +1,4 @@
-#include "server/slam/recovery.h"
+#include "server/slam/recovery/recovery.h"
 
 #include <cmath>
 #include <utility>

@@ -1,4 +1,4 @@
-#include "server/slam/map_drawing.h"
+#include "server/slam/drawing/map_drawing.h"
 
 #include <gtest/gtest.h>
 
