@@ -38,11 +38,8 @@ void Visit(OptionVisitor& visitor, MapperOptions& options) {
       "Finding large loops. every_m, max_rival, confirm_after_m and sigma_m also count when a robot that was not "
       "watched is looked for in its map; enabled does not.",
       [&] { Visit(visitor, options.loop); });
-  visitor.Section(
-      "self_check",
-      "Noticing that the scans contradict the map. near_m and max_conflict also count when a robot that was not "
-      "watched is looked for in its map; enabled does not.",
-      [&] { Visit(visitor, options.self_check); });
+  visitor.Section("self_check", "Noticing that the scans contradict the map.",
+                  [&] { Visit(visitor, options.self_check); });
   visitor.Section("pose_graph", "Least squares over the whole path, for smoothing.",
                   [&] { Visit(visitor, options.pose_graph); });
   visitor.Section("grid", "The occupancy grid.", [&] { Visit(visitor, options.grid); });

@@ -78,9 +78,11 @@ void Visit(OptionVisitor& visitor, LoopOptions& options) {
                "place.");
   visitor.Real("max_doubt_m", options.max_doubt_m, "m", kDoubtM, 30.0,
                "Largest half width of the search window. The time of a search grows with the square.");
-  visitor.Real("max_rival", options.max_rival, "1", 0.0, 1.0,
-               "Largest ratio of the score of the best other pose to that of the best pose. A larger value finds loops "
-               "sooner, and more wrong ones.");
+  visitor.Real(
+      "max_rival", options.max_rival, "1", 0.0, 1.0,
+      "Largest ratio of the score of the best other pose to that of the best pose. A larger value finds loops "
+      "sooner, and more wrong ones. With every_m, confirm_after_m and sigma_m it also counts when a robot that was not "
+      "watched is looked for in its map; enabled does not.");
   visitor.Real("max_conflict", options.max_conflict, "1", 0.0, 1.0,
                "Largest share of surfaces that lie where beams have passed.");
   visitor.Real("confirm_after_m", options.confirm_after_m, "m", 0.0, kConfirmWithinM,

@@ -28,8 +28,10 @@ void Visit(OptionVisitor& visitor, SelfCheckOptions& options) {
   visitor.Flag("enabled", options.enabled, "Whether scans are compared with the map of earlier visits.");
   visitor.Real("min_travel_m", options.min_travel_m, "m", 0.0, 1000.0,
                "Way between the two visits that are compared. After a shorter way both may have the same drift.");
-  visitor.Real("near_m", options.near_m, "m", 0.02, 5.0,
-               "Error of poses and points that is tolerated. Walls that are doubled by less are not noticed.");
+  visitor.Real(
+      "near_m", options.near_m, "m", 0.02, 5.0,
+      "Error of poses and points that is tolerated. Walls that are doubled by less are not noticed. With max_conflict "
+      "it also counts when a robot that was not watched is looked for in its map; enabled does not.");
   visitor.Real("max_conflict", options.max_conflict, "1", 0.05, 1.0,
                "The pose counts as wrong when a larger share of the comparisons is a contradiction, and as right again "
                "below half of this.");
