@@ -33,11 +33,7 @@ void Visit(OptionVisitor& visitor, MapperOptions& options) {
   visitor.Section("gate", "After which motion a scan becomes a keyframe, which updates filter and map.",
                   [&] { Visit(visitor, options.gate); });
   visitor.Section("revisit", "Recognising places that were seen before.", [&] { Visit(visitor, options.revisit); });
-  visitor.Section(
-      "loop",
-      "Finding large loops. every_m, max_rival, confirm_after_m and sigma_m also count when a robot that was not "
-      "watched is looked for in its map; enabled does not.",
-      [&] { Visit(visitor, options.loop); });
+  visitor.Section("loop", "Finding large loops.", [&] { Visit(visitor, options.loop); });
   visitor.Section("self_check", "Noticing that the scans contradict the map.",
                   [&] { Visit(visitor, options.self_check); });
   visitor.Section("pose_graph", "Least squares over the whole path, for smoothing.",
