@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <csignal>
 #include <fstream>
 #include <optional>
@@ -68,18 +69,24 @@ class SecureServer : public ::testing::Test {
 
   // A viewer may write questions, and this is a command in the place of one.
   static void CommandAmongQuestionsIsDenied() {
-    const auto viewer = test::MakeBus("viewer", test::SecureOptions(Fleet() / "viewers" / "v"));
     test::Inbox<Reply> replies;
-    const auto subscription = test::Must(viewer->SubscribeReplies(5, replies.Sink()));
-    const auto requests = test::Must(viewer->Advertise<Request>());
     Request submit;
     submit.client = 5;
     submit.kind = RequestKind::kJobSubmit;
     submit.site = "hall";
-    ASSERT_TRUE(test::Eventually([&] {
-      test::Must(requests->Publish(submit));
-      return !replies.values().empty();
-    }));
+    // A handshake of Fast DDS 2.9 gets stuck now and then; a client then joins as a new participant.
+    for (int attempt = 0; attempt < 5 && replies.values().empty(); ++attempt) {
+      const auto viewer = test::MakeBus("viewer", test::SecureOptions(Fleet() / "viewers" / "v"));
+      const auto subscription = test::Must(viewer->SubscribeReplies(5, replies.Sink()));
+      const auto requests = test::Must(viewer->Advertise<Request>());
+      static_cast<void>(test::Eventually(
+          [&] {
+            test::Must(requests->Publish(submit));
+            return !replies.values().empty();
+          },
+          std::chrono::seconds(5)));
+    }
+    ASSERT_FALSE(replies.values().empty());
     EXPECT_EQ(replies.values().front().status.code, StatusCode::kPermissionDenied);
     EXPECT_TRUE(test::Eventually([] { return Refused()["commands"] >= 1; }));
   }
