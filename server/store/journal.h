@@ -23,6 +23,7 @@
 #include "common/mutex.h"
 #include "server/store/checkpoint_writer.h"
 #include "server/store/records.h"
+#include "server/store/set_aside.h"
 #include "server/store/store.h"
 #include "server/store/store_options.h"
 
@@ -88,6 +89,9 @@ class Journal {
   void Between(Work work);
 
   [[nodiscard]] Store& store() { return store_; }
+  // What was not restored from this store.
+  [[nodiscard]] SetAside& set_aside() { return set_aside_; }
+  [[nodiscard]] const SetAside& set_aside() const { return set_aside_; }
   [[nodiscard]] JournalHealth health() const;
   [[nodiscard]] JournalCounts counts() const;
 
@@ -152,6 +156,7 @@ class Journal {
 
   Store& store_;
   const StoreOptions options_;
+  SetAside set_aside_;
 
   mutable Mutex mutex_;
   CondVar arrived_;

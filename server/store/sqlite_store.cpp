@@ -31,6 +31,8 @@ constexpr const char* kPut = "INSERT OR REPLACE INTO records (kind, owner, numbe
 constexpr const char* kRemove = "DELETE FROM records WHERE kind = ? AND owner = ? AND number BETWEEN ? AND ?";
 constexpr const char* kRead =
     "SELECT number, content FROM records WHERE kind = ? AND owner = ? AND number BETWEEN ? AND ? ORDER BY number";
+constexpr const char* kNumbers =
+    "SELECT number FROM records WHERE kind = ? AND owner = ? AND number BETWEEN ? AND ? ORDER BY number";
 constexpr const char* kOwners = "SELECT DISTINCT owner FROM records WHERE kind = ? ORDER BY owner";
 
 std::int64_t ToSql(std::uint64_t number) {
@@ -87,6 +89,7 @@ class SqliteStore : public Store {
     remove_.emplace(database_, kRemove);
     read_.emplace(database_, kRead);
     owners_.emplace(database_, kOwners);
+    numbers_.emplace(database_, kNumbers);
   }
 
   // The tables' version, and whether they are ours. Before the constructor, so that it reads nothing foreign.
@@ -173,6 +176,19 @@ class SqliteStore : public Store {
     }
   }
 
+  Result<std::vector<std::uint64_t>> Numbers(const RecordRange& range) override {
+    const MutexLock lock(mutex_);
+    try {
+      Use numbers(*numbers_);
+      BindRange(*numbers, range);
+      std::vector<std::uint64_t> found;
+      while (numbers->executeStep()) found.push_back(FromSql(numbers->getColumn(0).getInt64()));
+      return found;
+    } catch (const SQLite::Exception& error) {
+      return tl::unexpected(StatusOf(error, "cannot read the store"));
+    }
+  }
+
   Result<std::uint64_t> bytes_used() override {
     const MutexLock lock(mutex_);
     try {
@@ -209,7 +225,7 @@ class SqliteStore : public Store {
   SQLite::Database database_;
   EnvelopeCodec codec_ CAIRN_GUARDED_BY(mutex_);
   // Set in the constructor, after the tables exist.
-  std::optional<SQLite::Statement> put_, remove_, read_, owners_;
+  std::optional<SQLite::Statement> put_, remove_, read_, owners_, numbers_;
 };
 
 }  // namespace

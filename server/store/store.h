@@ -75,6 +75,8 @@ class Store {
   virtual Result<void> Read(const RecordRange& range, const Visit& visit) = 0;
   // The owners of records of this kind, in ascending order.
   virtual Result<std::vector<std::uint64_t>> Owners(RecordKind kind) = 0;
+  // The numbers of the records of this range, in ascending order. Their content is not read, and may be damaged.
+  virtual Result<std::vector<std::uint64_t>> Numbers(const RecordRange& range) = 0;
   // Disk space that the records use.
   virtual Result<std::uint64_t> bytes_used() = 0;
 };

@@ -30,6 +30,9 @@ class FullAfterACheckpoint : public Store {
   Result<void> CommitEach(const Next& next) override { return store_.CommitEach(next); }
   Result<void> Read(const RecordRange& range, const Visit& visit) override { return store_.Read(range, visit); }
   Result<std::vector<std::uint64_t>> Owners(RecordKind kind) override { return store_.Owners(kind); }
+  Result<std::vector<std::uint64_t>> Numbers(const RecordRange& range) override {
+    return store_.Numbers(range);
+  }
   Result<std::uint64_t> bytes_used() override { return store_.bytes_used(); }
 
  private:
