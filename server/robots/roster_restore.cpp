@@ -227,10 +227,10 @@ Result<std::shared_ptr<Session>> Roster::ReadBack(SessionId id, bool with_journa
     // The whole journal, where it is still there, does as well.
     spdlog::warn("the checkpoint of session {} is not used: {}", id, checkpoint.error().message);
   } else if (*checkpoint) {
-    for (const std::uint64_t number : (*checkpoint)->order) pieces.emplace(number, nullptr);
+    for (const auto& [number, parts] : (*checkpoint)->parts) pieces.emplace(number, StoredPiece{nullptr, parts});
     if (const auto loaded = session->Load((*checkpoint)->bytes, (*checkpoint)->PiecesInOrder())) {
       position = (*checkpoint)->position;
-      for (std::size_t i = 0; i < loaded->size(); ++i) pieces[(*checkpoint)->order[i]] = (*loaded)[i];
+      for (std::size_t i = 0; i < loaded->size(); ++i) pieces[(*checkpoint)->order[i]].value = (*loaded)[i];
     } else if (loaded.error().code == StatusCode::kUnimplemented) {
       return tl::unexpected(loaded.error());  // A newer server has written it.
     } else {

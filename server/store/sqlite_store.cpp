@@ -110,6 +110,8 @@ class SqliteStore : public Store {
   }
 
   Result<void> Commit(const RecordChanges& changes) override {
+    for (const Record& record : changes.put)
+      if (auto fits = CheckLength(record); !fits) return fits;
     const MutexLock lock(mutex_);
     try {
       SQLite::Transaction transaction(database_, SQLite::TransactionBehavior::IMMEDIATE);
@@ -134,6 +136,7 @@ class SqliteStore : public Store {
         const auto record = next();
         if (!record) return tl::unexpected(record.error());  // The transaction is rolled back.
         if (!*record) break;
+        if (auto fits = CheckLength(**record); !fits) return fits;
         Put(**record);
       }
       transaction.commit();
@@ -200,6 +203,13 @@ class SqliteStore : public Store {
   }
 
  private:
+  Result<void> CheckLength(const Record& record) const {
+    if (record.bytes.size() <= max_record_bytes()) return {};
+    return Fail(StatusCode::kOutOfRange, "a record of " + std::to_string(record.bytes.size()) +
+                                             " bytes is too long for the store; " + std::to_string(max_record_bytes()) +
+                                             " are possible");
+  }
+
   int Pragma(const std::string& name) { return database_.execAndGet("PRAGMA " + name).getInt(); }
 
   void MakeTables() {
