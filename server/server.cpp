@@ -64,6 +64,7 @@ Result<void> Server::Restore() {
 Result<void> Server::Start() {
   if (auto restored = Restore(); !restored) return restored;
   for (const std::string& name : options_.server.site_names()) {
+    if (atlas_.IsSetAside(name)) continue;
     if (const auto site = atlas_.Create(name); !site) return tl::unexpected(site.error());
   }
   saved_sites_.Start();

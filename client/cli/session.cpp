@@ -9,7 +9,7 @@ ExitCode ShowStatus(Program& program, const std::string& robot) {
   const auto answer = program.Ask([&](QueryClient& server) { return server.ServerStatus(robot); });
   if (!answer) return program.Refuse(answer.error());
   std::string text;
-  if (!answer->degraded.empty()) text += "DEGRADED, new data is not stored: " + answer->degraded + "\n";
+  if (!answer->degraded.empty()) text += "DEGRADED: " + answer->degraded + "\n";
   if (answer->robots.empty()) text += "no robot yet\n";
   for (const RobotStatus& status : answer->robots) text += FormatRobot(status);
   text += FormatRefusals(answer->refused);

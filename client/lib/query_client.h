@@ -32,8 +32,9 @@ struct QueryClientOptions {
 
 struct StatusAnswer {
   std::vector<RobotStatus> robots;
-  std::string degraded;  // Why new data is not stored; empty if it is, or if the server stores nothing.
-  Refusals refused;      // What the server has refused because of its sender.
+  // Why new data is not stored, and what was not restored; empty if there is neither, or if the server stores nothing.
+  std::string degraded;
+  Refusals refused;  // What the server has refused because of its sender.
 };
 
 struct PathAnswer {

@@ -1,5 +1,7 @@
 #include "server/jobs/job_list.h"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -47,7 +49,11 @@ Result<void> JobList::RestoreOne(std::uint64_t id, std::vector<StoredJob>& unfin
     next_ = std::max(next_, id + 1);
     return {};
   };
-  return journal_->store().Read({.kind = RecordKind::kJob, .owner = id}, take);
+  const auto unreadable = [&](std::uint64_t, const Status& why) CAIRN_NO_THREAD_SAFETY_ANALYSIS {
+    spdlog::error("{}", journal_->set_aside().Add({}, "job " + std::to_string(id), why));
+    next_ = std::max(next_, id + 1);  // No other job may be written over it.
+  };
+  return ReadEach(journal_->store(), {.kind = RecordKind::kJob, .owner = id}, take, unreadable);
 }
 
 std::uint64_t JobList::ReserveIds(std::uint64_t count) {

@@ -1,8 +1,12 @@
 #include "server/maps/atlas.h"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <optional>
 #include <utility>
+
+#include "server/store/site_contents.h"
 
 namespace cairn::server {
 
@@ -18,9 +22,10 @@ Atlas::Atlas(const MapsOptions& options, double resolution_m, bool create_sites,
 
 Result<StoredSite> Atlas::Stored(NameId owner) const {
   std::optional<StoredSite> stored;
-  const auto take = [&stored](std::uint64_t, std::string_view bytes) -> Result<void> {
+  const auto take = [&stored, owner](std::uint64_t, std::string_view bytes) -> Result<void> {
     auto site = SiteOf(bytes);
     if (!site) return tl::unexpected(site.error());
+    if (HashName(site->name) != owner) return Fail(StatusCode::kDataLoss, "the record is that of another site");
     stored = std::move(*site);
     return {};
   };
@@ -36,12 +41,33 @@ Result<void> Atlas::Restore() {
   if (!owners) return tl::unexpected(owners.error());
   for (const std::uint64_t owner : *owners) {
     const auto stored = Stored(owner);
-    if (!stored) return tl::unexpected(stored.error());
+    if (!stored) {
+      PutAside(owner, stored.error());
+      continue;
+    }
     const auto site = Make(stored->name, false);
     if (!site) return tl::unexpected(site.error());
     if (auto restored = (*site)->Restore(*stored); !restored) return restored;
   }
   return {};
+}
+
+void Atlas::PutAside(NameId owner, const Status& why) {
+  const std::string name = NameOfSite(journal_->store(), owner);
+  const std::string what = name.empty() ? "the site with the id " + std::to_string(owner) : "site '" + name + "'";
+  spdlog::error("{}", journal_->set_aside().Add(name, what, why));
+  const MutexLock lock(mutex_);
+  set_aside_[owner] = why.message;
+}
+
+bool Atlas::IsSetAside(const std::string& name) const {
+  const MutexLock lock(mutex_);
+  return set_aside_.contains(HashName(name));
+}
+
+void Atlas::ForgetSetAside(const std::string& name) {
+  const MutexLock lock(mutex_);
+  set_aside_.erase(HashName(name));
 }
 
 Result<void> Atlas::Reserve(const std::string& name) {
@@ -127,6 +153,10 @@ std::shared_ptr<Site> Atlas::NewSite(const std::string& name) const {
 Result<void> Atlas::CheckName(const std::string& name) const {
   if (reserved_.contains(name))
     return Fail(StatusCode::kUnavailable, "site '" + name + "' is being loaded or deleted; try again later");
+  if (const auto aside = set_aside_.find(HashName(name)); aside != set_aside_.end()) {
+    return Fail(StatusCode::kFailedPrecondition,
+                "site '" + name + "' is set aside (" + aside->second + "); to begin anew, delete it");
+  }
   const auto same_id = [&name](const std::string& other) {
     return Fail(StatusCode::kAlreadyExists,
                 "the names '" + name + "' and '" + other + "' have the same id; choose another name");

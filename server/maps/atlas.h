@@ -22,9 +22,13 @@ class Atlas {
   Atlas(const MapsOptions& options, double resolution_m, bool create_sites, asio::thread_pool& pool, Outbound& outbound,
         Journal* journal = nullptr, Generation generation = 0);
 
-  // Restores the sites of earlier servers. REQUIRES: no other function was called before. DATA_LOSS: a record is
-  // damaged. FAILED_PRECONDITION: a newer server has written it.
+  // Restores the sites of earlier servers. REQUIRES: no other function was called before. A site whose own record
+  // cannot be read is set aside: nobody can enter it or make another of its name until it is deleted. Of the others,
+  // only the records that cannot be read are left out. FAILED_PRECONDITION: the cells have another size here.
   Result<void> Restore();
+  [[nodiscard]] bool IsSetAside(const std::string& name) const;
+  // The site was deleted from the store; its name is free again.
+  void ForgetSetAside(const std::string& name);
 
   // Opens one more site that is stored by now, under a name that was reserved; then the name is free again. Not for
   // the dispatcher: it reads the store.
@@ -54,6 +58,7 @@ class Atlas {
   Result<std::shared_ptr<Site>> Make(const std::string& name, bool configured);
   std::shared_ptr<Site> NewSite(const std::string& name) const CAIRN_REQUIRES(mutex_);
   Result<StoredSite> Stored(NameId owner) const;
+  void PutAside(NameId owner, const Status& why);
   Result<void> CheckName(const std::string& name) const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool Idle(const Place& place) const;
   void Erase(std::map<std::string, Place>::iterator place) CAIRN_REQUIRES(mutex_);
@@ -70,7 +75,8 @@ class Atlas {
   mutable Mutex mutex_;
   std::map<std::string, Place> sites_ CAIRN_GUARDED_BY(mutex_);
   std::set<std::string> reserved_ CAIRN_GUARDED_BY(mutex_);
-  Site::Beginning beginning_ CAIRN_GUARDED_BY(mutex_);  // For the next site.
+  std::map<NameId, std::string> set_aside_ CAIRN_GUARDED_BY(mutex_);  // Why each of these sites was not restored.
+  Site::Beginning beginning_ CAIRN_GUARDED_BY(mutex_);                // For the next site.
 };
 
 }  // namespace cairn::server

@@ -62,7 +62,9 @@ class Site : public std::enable_shared_from_this<Site> {
        Outbound& outbound, Journal* journal = nullptr, Generation generation = 0, const Beginning& beginning = {0, 0});
 
   // Restores what an earlier server has stored: the epoch, the versions, and the parts of the map that were drawn by
-  // sessions that no longer exist. REQUIRES: no other function was called before.
+  // sessions that no longer exist. Records that cannot be read are set aside; without the enabled version, the newest
+  // one that is there counts as enabled. REQUIRES: no other function was called before. FAILED_PRECONDITION: the cells
+  // have another size here.
   Result<void> Restore(const StoredSite& stored);
   // Whether the server of this generation completed the switch that began this epoch. REQUIRES: called before the
   // threads start.
@@ -76,8 +78,6 @@ class Site : public std::enable_shared_from_this<Site> {
   void Change(GridChange&& change);
   // Called when the session is removed. Its part of the map stays and is stored, because the session no longer is.
   void Leave(SessionId session);
-  // The highest number of a session that exists no more and has a part here; 0: none. Before the threads start.
-  [[nodiscard]] SessionId last_layer() const { return layers_.empty() ? 0 : *layers_.rbegin(); }
   // The site is deleted: after this it stores and publishes nothing. `done` receives what it had published
   // last, on the strand, when everything that was asked before is finished. A switch of the map version under way
   // fails.
@@ -125,6 +125,7 @@ class Site : public std::enable_shared_from_this<Site> {
   void RemoveOldVersions();
   Result<void> RestoreVersions(const StoredSite& stored);
   Result<void> RestoreLayers();
+  void PutAside(const std::string& what, const Status& why);
   MapInfo InfoOf(const TileSet& tiles) const;
 
   const std::string name_;

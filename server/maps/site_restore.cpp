@@ -1,4 +1,6 @@
 // What a site stores, and how it is restored (site.h).
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <memory>
 #include <utility>
@@ -85,35 +87,53 @@ Result<void> Site::Restore(const StoredSite& stored) {
   return {};
 }
 
+void Site::PutAside(const std::string& what, const Status& why) {
+  spdlog::error("{}", journal_->set_aside().Add(name_, what + " of site '" + name_ + "'", why));
+}
+
 Result<void> Site::RestoreVersions(const StoredSite& stored) {
   std::map<std::uint32_t, MapVersion> versions;
   versions[1].info = {.version = 1, .enabled = false, .job = 0, .note = "live"};
-  const auto take = [&versions](std::uint64_t, std::string_view bytes) -> Result<void> {
+  std::uint32_t next = stored.next_version;
+  const auto take = [&versions](std::uint64_t number, std::string_view bytes) -> Result<void> {
     auto version = VersionOf(bytes);
     if (!version) return tl::unexpected(version.error());
-    const std::uint32_t number = version->version;
-    versions[number] = VersionFrom(std::move(*version));
+    if (version->version != number) return Fail(StatusCode::kDataLoss, "the record is that of another version");
+    versions[version->version] = VersionFrom(std::move(*version));
     return {};
   };
-  auto read = journal_->store().Read({.kind = RecordKind::kMapVersion, .owner = site_id_}, take);
-  if (!read) return read;
-  if (!versions.contains(stored.enabled_version) || versions.rbegin()->first >= stored.next_version) {
-    return Fail(StatusCode::kDataLoss, "the store lacks a map version of site '" + name_ + "'");
-  }
+  const auto unreadable = [&](std::uint64_t number, const Status& why) {
+    PutAside("map version " + std::to_string(number), why);
+    // No later version may be written over it.
+    if (number < UINT32_MAX) next = std::max(next, static_cast<std::uint32_t>(number) + 1);
+  };
+  const RecordRange all{.kind = RecordKind::kMapVersion, .owner = site_id_};
+  if (auto read = ReadEach(journal_->store(), all, take, unreadable); !read) return read;
   for (const auto& [number, version] : versions) stored_versions_.insert(number);
-  versions_.Restore(std::move(versions), stored.next_version, stored.enabled_version);
+  const std::uint32_t newest = versions.rbegin()->first;
+  const std::uint32_t enabled = versions.contains(stored.enabled_version) ? stored.enabled_version : newest;
+  if (enabled != stored.enabled_version) {
+    PutAside("the enabled map version " + std::to_string(stored.enabled_version),
+             {StatusCode::kDataLoss, "it cannot be read; version " + std::to_string(enabled) + " is enabled instead"});
+  }
+  if (newest < UINT32_MAX) next = std::max(next, newest + 1);
+  versions_.Restore(std::move(versions), next, enabled);
   return {};
 }
 
 Result<void> Site::RestoreLayers() {
-  const auto take = [this](std::uint64_t, std::string_view bytes) -> Result<void> {
+  const auto take = [this](std::uint64_t number, std::string_view bytes) -> Result<void> {
     const auto layer = LayerOf(bytes);
     if (!layer) return tl::unexpected(layer.error());
+    if (layer->session != number) return Fail(StatusCode::kDataLoss, "the record is that of another session");
     layers_.insert(layer->session);
     joint_.Replace(layer->session, FromStored(layer->grid).chunks);
     return {};
   };
-  return journal_->store().Read({.kind = RecordKind::kLayer, .owner = site_id_}, take);
+  const auto unreadable = [this](std::uint64_t number, const Status& why) {
+    PutAside("the part of the map that session " + std::to_string(number) + " has drawn", why);
+  };
+  return ReadEach(journal_->store(), {.kind = RecordKind::kLayer, .owner = site_id_}, take, unreadable);
 }
 
 }  // namespace cairn::server

@@ -19,6 +19,16 @@ Reply JobReply(const Request& request, Result<Job> job) {
   return reply;
 }
 
+// New data is not stored, or something was not restored; empty if neither.
+std::string WhyDegraded(const Journal& journal) {
+  const std::string not_stored = journal.health().reason;
+  std::string why = not_stored.empty() ? std::string() : not_stored + "; new data is not stored";
+  const std::string not_restored = journal.set_aside().text();
+  if (!why.empty() && !not_restored.empty()) why += "; ";
+  constexpr std::size_t kLongest = 1000;  // The wire takes 1,024 bytes.
+  return (why + not_restored).substr(0, kLongest);
+}
+
 }  // namespace
 
 Desk::Desk(std::size_t capacity, Outbound& outbound, Roster& roster, Atlas& atlas, JobList& jobs, JobWorker& worker,
@@ -137,7 +147,7 @@ void Desk::SetRefusals(const Refusals& refusals) {
 
 Reply Desk::StatusReply(const Request& request) {
   Reply reply = AnswerStatus(request, request.robot.empty() ? AllSessions() : SessionOf(request.robot));
-  if (reply.status.ok() && journal_ != nullptr) reply.status.message = journal_->health().reason;
+  if (reply.status.ok() && journal_ != nullptr) reply.status.message = WhyDegraded(*journal_);
   const MutexLock lock(mutex_);
   reply.refused = {refusals_};
   return reply;

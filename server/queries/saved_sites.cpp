@@ -171,9 +171,8 @@ Result<void> SavedSites::Load(const Request& request) {
 Result<void> SavedSites::OpenLoaded(const SiteFileSummary& loaded) {
   const std::string& site = loaded.site.name;
   if (auto open = rooms_.atlas.OpenStored(site); !open) {
-    const auto removed = Between<bool>(
-        [site](Store& store) -> Result<bool> { return DeleteSite(store, site).map([] { return true; }); });
-    if (!removed) spdlog::error("site '{}' is stored and not loaded: {}", site, removed.error().message);
+    if (const auto removed = DeleteStored(site); !removed)
+      spdlog::error("site '{}' is stored and not loaded: {}", site, removed.error().message);
     return open;
   }
   const auto unfinished = rooms_.jobs.AddStored({loaded.jobs.begin(), loaded.jobs.end()});
@@ -188,12 +187,27 @@ Result<void> SavedSites::OpenLoaded(const SiteFileSummary& loaded) {
   return {};
 }
 
+Result<bool> SavedSites::DeleteStored(const std::string& name) {
+  return Between<bool>(
+      [name](Store& store) -> Result<bool> { return DeleteSite(store, name).map([] { return true; }); });
+}
+
+// Nothing but records is there of such a site.
+Result<void> SavedSites::DeleteSetAside(const std::string& name) {
+  if (const auto removed = DeleteStored(name); !removed) return tl::unexpected(removed.error());
+  journal_->set_aside().RemoveSite(name);
+  rooms_.jobs.RemoveSite(name);
+  rooms_.atlas.ForgetSetAside(name);
+  return {};
+}
+
 Result<void> SavedSites::Delete(const std::string& name) {
   for (const Job& job : rooms_.jobs.OfSite(name)) {
     if (name.empty() || IsFinal(job.state)) continue;
     return Fail(StatusCode::kFailedPrecondition,
                 "job " + std::to_string(job.id) + " of site '" + name + "' has not ended; cancel it first");
   }
+  if (rooms_.atlas.IsSetAside(name)) return DeleteSetAside(name);
   const auto site = rooms_.roster.RemoveSite(name);
   if (!site) return tl::unexpected(site.error());
   rooms_.jobs.RemoveSite(name);
@@ -201,8 +215,8 @@ Result<void> SavedSites::Delete(const std::string& name) {
   auto retired = promise->get_future();
   (*site)->Retire([promise](std::shared_ptr<const MapSnapshot> last) { promise->set_value(std::move(last)); });
   const std::shared_ptr<const MapSnapshot> last = retired.get();
-  const auto removed =
-      Between<bool>([name](Store& store) -> Result<bool> { return DeleteSite(store, name).map([] { return true; }); });
+  const auto removed = DeleteStored(name);
+  if (removed) journal_->set_aside().RemoveSite(name);
   rooms_.atlas.Release(name);
   for (int level = 0; level < kPyramidLevels; ++level) {
     last->tiles.ForEach(level, [&](const TileSet::TilePtr& tile) {

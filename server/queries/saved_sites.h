@@ -52,6 +52,8 @@ class SavedSites {
   Result<void> Load(const Request& request);
   Result<void> OpenLoaded(const SiteFileSummary& loaded);
   Result<void> Delete(const std::string& site);
+  Result<void> DeleteSetAside(const std::string& site);
+  Result<bool> DeleteStored(const std::string& site);
   [[nodiscard]] Result<std::filesystem::path> PathOf(const std::string& name) const;
   // Calls `work` between two commits of the journal, and waits for it.
   template <typename Value>

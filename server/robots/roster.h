@@ -46,10 +46,10 @@ class Roster {
   ~Roster();
 
   // Restores the sessions of earlier servers from their checkpoints and journals, in parallel on the pool. REQUIRES:
-  // the sites were restored before, and no other function was called. FAILED_PRECONDITION: a newer server has written
-  // the records. A session whose records are damaged is left out, the reason is logged, and its robot is told to open a
-  // new one. A session during whose restoring earlier servers ended (RestoreMarks) is restored alone; after two such
-  // ends only its part of the map is restored, from its checkpoint; after three, nothing.
+  // the sites were restored before, and no other function was called. A session whose records are damaged, or were
+  // written by a newer server, is set aside (store/set_aside.h): its records stay, and its robot is told to open a new
+  // one. A session during whose restoring earlier servers ended (RestoreMarks) is restored alone; after two such ends
+  // it is set aside, and only its part of the map is shown, from its checkpoint; after three, not even this.
   Result<void> Restore();
 
   // Sessions that are loaded while the server runs. `first` of so many numbers that no other session gets.
@@ -94,7 +94,7 @@ class Roster {
   Restored RestoreEach(const std::vector<SessionId>& ids);
   Result<void> RestoreTogether(const std::vector<SessionId>& ids, RestoreMarks& marks);
   Result<void> RestoreDoubtful(SessionId id, RestoreMarks& marks);
-  Result<void> Register(SessionId id, Result<std::shared_ptr<Session>> restored);
+  void Register(SessionId id, Result<std::shared_ptr<Session>> restored);
   Result<std::shared_ptr<Session>> NotRestored(SessionId id, Status why);
   Result<std::shared_ptr<Session>> RestoreOne(SessionId id, bool with_journal);
   Result<std::shared_ptr<Session>> ReadBack(SessionId id, bool with_journal);

@@ -8,6 +8,7 @@
 
 #include "server/robots/roster.h"
 #include "server/store/restore_marks.h"
+#include "server/store/site_contents.h"
 
 namespace cairn::server {
 namespace {
@@ -50,15 +51,16 @@ Result<void> Roster::Restore() {
   if (journal_ == nullptr) return {};
   const auto ids = journal_->store().Owners(RecordKind::kSession);
   if (!ids) return tl::unexpected(ids.error());
+  const auto last = LastSession(journal_->store());
+  if (!last) return tl::unexpected(last.error());
   auto marks = RestoreMarks::Read(journal_->store());
   if (!marks) return tl::unexpected(marks.error());
   const auto begin = std::chrono::steady_clock::now();
   std::vector<SessionId> doubtful, others;
   {
     const MutexLock lock(mutex_);
-    for (const auto& site : atlas_.All()) next_id_ = std::max(next_id_, site->last_layer() + 1);
+    next_id_ = std::max(next_id_, *last + 1);
     for (const SessionId id : *ids) {
-      next_id_ = std::max(next_id_, id + 1);
       (marks->deaths(id) == 0 ? others : doubtful).push_back(id);
     }
   }
@@ -76,53 +78,57 @@ Result<void> Roster::RestoreTogether(const std::vector<SessionId>& ids, RestoreM
   if (auto marked = marks.Begin(ids); !marked) return marked;
   Restored sessions = RestoreEach(ids);
   if (auto unmarked = marks.Succeeded(ids); !unmarked) return unmarked;
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    if (auto registered = Register(ids[i], std::move(sessions[i])); !registered) return registered;
-  }
+  for (std::size_t i = 0; i < ids.size(); ++i) Register(ids[i], std::move(sessions[i]));
   return {};
 }
 
 Result<void> Roster::RestoreDoubtful(SessionId id, RestoreMarks& marks) {
   const std::uint32_t deaths = marks.deaths(id);
-  if (deaths >= kDeathsWithCheckpoint)
-    return Register(id, NotRestored(id, {StatusCode::kAborted, AfterDeaths(deaths)}));
+  if (deaths >= kDeathsWithCheckpoint) {
+    Register(id, NotRestored(id, {StatusCode::kAborted, AfterDeaths(deaths)}));
+    return {};
+  }
   if (auto marked = marks.Begin({id}); !marked) return marked;
   const bool with_journal = deaths < kDeathsWithJournal;
   auto session = RestoreOne(id, with_journal);
-  // Without its journal and without a checkpoint it is not read at the next start either.
-  if (with_journal || session) {
+  if (with_journal) {
     if (auto unmarked = marks.Succeeded({id}); !unmarked) return unmarked;
+    Register(id, std::move(session));
+    return {};
   }
-  if (with_journal || !session) return Register(id, std::move(session));
-  // The robot has moved on since the checkpoint, and what it did is left out: it starts a new session. This one's part
-  // of the map stays, as that of any session that is gone.
-  return Register(id, NotRestored(id, {StatusCode::kAborted, AfterDeaths(deaths) + "; its newest data is left out"}));
+  // Every later start does the same. Where the checkpoint cannot be used either, it is not read again.
+  if (session) {
+    if (auto marked = marks.Set(id, deaths); !marked) return marked;
+  }
+  // The robot has moved on since the checkpoint, so it begins a new session. What is stored of this one stays, and its
+  // part of the map is shown as it was in the checkpoint.
+  Register(id, NotRestored(id, session ? Status{StatusCode::kAborted, AfterDeaths(deaths)} : session.error()));
+  return {};
 }
 
 // Makes the session known, or the reason why it is not.
-Result<void> Roster::Register(SessionId id, Result<std::shared_ptr<Session>> restored) {
-  if (!restored) {
-    if (restored.error().code == StatusCode::kFailedPrecondition) return tl::unexpected(restored.error());
-    spdlog::error("session {} is not restored: {}", id, restored.error().message);
-    return {};
-  }
+void Roster::Register(SessionId id, Result<std::shared_ptr<Session>> restored) {
+  if (!restored) return;  // NotRestored has set it aside.
   const MutexLock lock(mutex_);
   const std::shared_ptr<Session>& session = *restored;
   const SessionState state = session->record().state();
   // A later session of the same robot takes the place of an earlier one, whose part of the map stays.
   const auto [known, first] = sessions_.try_emplace(state.robot_id, session);
-  if (!first && known->second->id() > id) return {};
+  if (!first && known->second->id() > id) return;
   known->second = session;
   if (const auto site = atlas_.Find(state.site)) site->Join(state.robot_id, session->id(), session);
-  return {};
 }
 
-// So that the robot can be told why it must open a new session.
+// Sets the session aside. The robot can be told why it must open a new one.
 Result<std::shared_ptr<Session>> Roster::NotRestored(SessionId id, Status why) {
+  std::string what = "session " + std::to_string(id), site;
   if (const auto stored = ReadSession(journal_->store(), id)) {
+    site = stored->request.site;
+    what += " of robot '" + stored->request.robot + "' in site '" + site + "'";
     const MutexLock lock(mutex_);
     not_restored_[stored->request.robot] = why.message;
   }
+  spdlog::error("{}", journal_->set_aside().Add(site, what, why));
   return tl::unexpected(std::move(why));
 }
 
@@ -158,10 +164,7 @@ std::size_t Roster::OpenStored(const std::vector<SessionId>& ids) {
   const Restored sessions = RestoreEach(ids);
   std::size_t taken = 0;
   for (std::size_t i = 0; i < ids.size(); ++i) {
-    if (!sessions[i]) {
-      spdlog::error("session {} is not restored: {}", ids[i], sessions[i].error().message);
-      continue;
-    }
+    if (!sessions[i]) continue;  // NotRestored has set it aside.
     const std::shared_ptr<Session>& session = *sessions[i];
     const SessionState state = session->record().state();
     const MutexLock lock(mutex_);
@@ -216,14 +219,20 @@ Result<std::shared_ptr<Session>> Roster::ReadBack(SessionId id, bool with_journa
   const auto checkpoint = ReadCheckpoint(journal_->store(), id);
   std::uint64_t position = 0;
   StoredPieces pieces;
+  if (!checkpoint && checkpoint.error().code != StatusCode::kDataLoss) {
+    // For example, a newer server has written it: to go on without it would end in writing over it.
+    return tl::unexpected(checkpoint.error());
+  }
   if (!checkpoint) {
     // The whole journal, where it is still there, does as well.
     spdlog::warn("the checkpoint of session {} is not used: {}", id, checkpoint.error().message);
   } else if (*checkpoint) {
-    for (const std::uint64_t number : (*checkpoint)->order) pieces.emplace(number, nullptr);
+    for (const auto& [number, parts] : (*checkpoint)->parts) pieces.emplace(number, StoredPiece{nullptr, parts});
     if (const auto loaded = session->Load((*checkpoint)->bytes, (*checkpoint)->PiecesInOrder())) {
       position = (*checkpoint)->position;
-      for (std::size_t i = 0; i < loaded->size(); ++i) pieces[(*checkpoint)->order[i]] = (*loaded)[i];
+      for (std::size_t i = 0; i < loaded->size(); ++i) pieces[(*checkpoint)->order[i]].value = (*loaded)[i];
+    } else if (loaded.error().code == StatusCode::kUnimplemented) {
+      return tl::unexpected(loaded.error());  // A newer server has written it.
     } else {
       // For example, the estimator has other options now. The whole journal can be replayed instead, if it is still
       // there.
@@ -235,12 +244,10 @@ Result<std::shared_ptr<Session>> Roster::ReadBack(SessionId id, bool with_journa
     return (*site)->Switched(epoch, generation);
   };
   if (!with_journal) {
-    // Empty, it would be taken for a session that is gone, and its journal would be removed.
     if (position == 0)
       return Fail(StatusCode::kDataLoss, "it has no checkpoint that can be used, and its journal is left out");
     session->Replayed();
-    session->KeepStored(false);
-    return session;
+    return session;  // To be dropped, with its records kept.
   }
   const auto last =
       ReadJournal(journal_->store(), id, position, [&](std::uint64_t, JournalEntry&& entry) -> Result<void> {

@@ -1,6 +1,7 @@
 #include "server/store/checkpoint_writer.h"
 
 #include <algorithm>
+#include <stdexcept>
 #include <unordered_map>
 
 #include "server/store/record_values.h"
@@ -10,9 +11,16 @@ namespace {
 
 constexpr std::uint64_t kParts = 65536;  // Record numbers for the main part of each checkpoint.
 constexpr std::uint64_t kFirstPiece = std::uint64_t{1} << 63;
+constexpr std::uint64_t kFirstRest = kFirstPiece + (std::uint64_t{1} << 62);  // Of the pieces, all parts but the first.
+constexpr std::uint64_t kMostPieces = std::uint64_t{1} << 46;
 
 RecordRange Range(std::uint64_t session, std::uint64_t first, std::uint64_t last) {
   return {.kind = RecordKind::kCheckpoint, .owner = session, .first = first, .last = last};
+}
+
+// Numbers of the parts of a piece that follow its first one.
+RecordRange RestOf(std::uint64_t session, std::uint64_t piece) {
+  return Range(session, kFirstRest + piece * kParts, kFirstRest + (piece + 1) * kParts - 1);
 }
 
 std::uint64_t NextNumber(const StoredPieces& stored) {
@@ -29,8 +37,8 @@ CheckpointWriter::CheckpointWriter(std::uint64_t session, std::uint64_t position
 
 void CheckpointWriter::Number(std::vector<CheckpointPiece> pieces) {
   std::unordered_map<const void*, std::uint64_t> numbers;
-  for (const auto& [number, value] : stored_)
-    if (value != nullptr) numbers.emplace(value.get(), number);
+  for (const auto& [number, piece] : stored_)
+    if (piece.value != nullptr) numbers.emplace(piece.value.get(), number);
   std::uint64_t next = NextNumber(stored_);
   for (CheckpointPiece& piece : pieces) {
     const auto known = numbers.find(piece.value.get());
@@ -39,30 +47,59 @@ void CheckpointWriter::Number(std::vector<CheckpointPiece> pieces) {
     const std::uint64_t number = fresh ? next++ : known->second;
     if (fresh) new_pieces_.push_back({number, std::move(piece.bytes)});
     order_.push_back(number);
-    pieces_.emplace(number, std::move(piece.value));
+    pieces_.emplace(number, StoredPiece{std::move(piece.value), fresh ? 1 : stored_.at(number).parts});
   }
 }
 
 void CheckpointWriter::AddTo(RecordChanges& changes) {
   if (!std::exchange(begun_, true)) {
     // What a checkpoint that a crash left incomplete has written.
+    const std::uint64_t next = NextNumber(stored_);
     changes.removed.push_back(Range(session_, position_ * kParts, kFirstPiece - 1));
-    changes.removed.push_back(Range(session_, kFirstPiece + NextNumber(stored_), UINT64_MAX));
+    changes.removed.push_back(Range(session_, kFirstPiece + next, kFirstRest - 1));
+    changes.removed.push_back(Range(session_, kFirstRest + next * kParts, UINT64_MAX));
   }
-  const auto key = [this](std::uint64_t number) { return RecordKey{RecordKind::kCheckpoint, session_, number}; };
   std::size_t added = 0;
-  while (added < kBytesPerCommit && pieces_written_ < new_pieces_.size()) {
-    NewPiece& piece = new_pieces_[pieces_written_++];
-    changes.put.push_back({key(kFirstPiece + piece.number), std::exchange(piece.bytes, nullptr)()});
-    added += changes.put.back().bytes.size();
-  }
-  while (added < kBytesPerCommit && written_ < main_.size()) {
-    const std::size_t size = std::min(kPartBytes, main_.size() - written_);
-    changes.put.push_back({key(position_ * kParts + ++parts_), main_.substr(written_, size)});
-    written_ += size;
-    added += size;
-  }
+  while (added < kBytesPerCommit && pieces_written_ < new_pieces_.size()) added += AddPiecePart(changes);
+  while (added < kBytesPerCommit && written_ < main_.size()) added += AddMainPart(changes);
   if (pieces_written_ == new_pieces_.size() && written_ == main_.size()) Complete(changes);
+}
+
+// The next part of the piece that is being written, or the first one of the next piece. Returns its bytes, and at least
+// 1, so that many empty pieces take several commits, too.
+std::size_t CheckpointWriter::AddPiecePart(RecordChanges& changes) {
+  NewPiece& piece = new_pieces_[pieces_written_];
+  if (piece_parts_ == 0) piece_ = std::exchange(piece.bytes, nullptr)();
+  if (piece_parts_ == kParts || piece.number >= kMostPieces)
+    throw std::length_error("a piece of the checkpoint has " + std::to_string(piece_.size()) + " bytes, too many");
+  const std::size_t size = std::min(kPartBytes, piece_.size() - piece_written_);
+  const std::uint64_t number =
+      piece_parts_ == 0 ? kFirstPiece + piece.number : kFirstRest + piece.number * kParts + piece_parts_;
+  changes.put.push_back({{RecordKind::kCheckpoint, session_, number}, piece_.substr(piece_written_, size)});
+  piece_written_ += size;
+  pieces_[piece.number].parts = ++piece_parts_;
+  if (piece_written_ == piece_.size()) {
+    ++pieces_written_;
+    std::string().swap(piece_);
+    piece_written_ = 0;
+    piece_parts_ = 0;
+  }
+  return std::max<std::size_t>(size, 1);
+}
+
+std::size_t CheckpointWriter::AddMainPart(RecordChanges& changes) {
+  if (parts_ + 1 == kParts)
+    throw std::length_error("the main part of the checkpoint has " + std::to_string(main_.size()) + " bytes, too many");
+  const std::size_t size = std::min(kPartBytes, main_.size() - written_);
+  changes.put.push_back(
+      {{RecordKind::kCheckpoint, session_, position_ * kParts + ++parts_}, main_.substr(written_, size)});
+  written_ += size;
+  return size;
+}
+
+void CheckpointWriter::Remove(std::uint64_t piece, std::uint32_t parts, RecordChanges& changes) const {
+  changes.removed.push_back(Range(session_, kFirstPiece + piece, kFirstPiece + piece));
+  if (parts > 1) changes.removed.push_back(RestOf(session_, piece));
 }
 
 void CheckpointWriter::Complete(RecordChanges& changes) {
@@ -70,13 +107,17 @@ void CheckpointWriter::Complete(RecordChanges& changes) {
   head.set_position(position_);
   head.set_parts(parts_);
   head.set_size(main_.size());
-  for (const std::uint64_t number : order_) head.add_pieces(number);
+  for (const std::uint64_t number : order_) {
+    head.add_pieces(number);
+    if (pieces_.at(number).parts == 1) continue;
+    record::CheckpointHead::LargePiece& large = *head.add_large();
+    large.set_number(number);
+    large.set_parts(pieces_.at(number).parts);
+  }
   changes.put.push_back({{RecordKind::kCheckpoint, session_, position_ * kParts}, head.SerializeAsString()});
   if (position_ > 0) changes.removed.push_back(Range(session_, 0, position_ * kParts - 1));
-  for (const auto& [number, value] : stored_) {
-    if (!pieces_.contains(number))
-      changes.removed.push_back(Range(session_, kFirstPiece + number, kFirstPiece + number));
-  }
+  for (const auto& [number, piece] : stored_)
+    if (!pieces_.contains(number)) Remove(number, piece.parts, changes);
   complete_ = true;
 }
 
@@ -86,42 +127,70 @@ std::vector<std::string_view> StoredCheckpoint::PiecesInOrder() const {
   return views;
 }
 
-Result<std::optional<StoredCheckpoint>> ReadCheckpoint(Store& store, std::uint64_t session) {
-  std::optional<StoredCheckpoint> newest;
-  record::CheckpointHead head;
-  std::uint32_t parts = 0;
-  const auto take_head = [&](std::uint64_t position, std::string_view bytes) -> Result<void> {
-    if (!head.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) || head.position() != position)
+namespace {
+
+// Puts a checkpoint together from its records, which come in the order of their numbers.
+class CheckpointReader {
+ public:
+  Result<void> Take(std::uint64_t number, std::string_view bytes) {
+    if (number >= kFirstRest) return TakePiece((number - kFirstRest) / kParts, (number - kFirstRest) % kParts, bytes);
+    if (number >= kFirstPiece) return TakePiece(number - kFirstPiece, 0, bytes);
+    if (number % kParts == 0) return TakeHead(number / kParts, bytes);
+    return TakeMain(number / kParts, number % kParts, bytes);
+  }
+  Result<std::optional<StoredCheckpoint>> Finish() && {
+    if (!newest_) return std::nullopt;
+    if (parts_ != head_.parts() || newest_->bytes.size() != head_.size() || read_ != newest_->parts)
       return Unreadable("a checkpoint");
-    newest = StoredCheckpoint{position, {}, {}, {head.pieces().begin(), head.pieces().end()}};
-    for (const std::uint64_t number : newest->order)
-      if (!newest->pieces.emplace(number, std::string()).second) return Unreadable("a checkpoint");
-    parts = 0;
-    return {};
-  };
-  std::size_t pieces = 0;
-  const auto take = [&](std::uint64_t number, std::string_view bytes) -> Result<void> {
-    if (number >= kFirstPiece) {
-      if (!newest) return {};
-      const auto piece = newest->pieces.find(number - kFirstPiece);
-      if (piece == newest->pieces.end()) return {};  // Of a checkpoint that was never completed.
-      piece->second = bytes;
-      ++pieces;
-      return {};
+    return std::move(newest_);
+  }
+
+ private:
+  Result<void> TakeHead(std::uint64_t position, std::string_view bytes) {
+    if (!head_.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) || head_.position() != position)
+      return Unreadable("a checkpoint");
+    newest_ = StoredCheckpoint{position, {}, {}, {head_.pieces().begin(), head_.pieces().end()}, {}};
+    for (const std::uint64_t number : newest_->order)
+      if (!newest_->parts.emplace(number, 1).second) return Unreadable("a checkpoint");
+    for (const auto& large : head_.large()) {
+      const auto piece = newest_->parts.find(large.number());
+      if (piece == newest_->parts.end() || large.parts() < 2 || large.parts() > kParts)
+        return Unreadable("a checkpoint");
+      piece->second = large.parts();
     }
-    const std::uint64_t position = number / kParts;
-    if (number % kParts == 0) return take_head(position, bytes);
-    // Parts without a head belong to a checkpoint that was never completed.
-    if (!newest || newest->position != position || number % kParts > head.parts()) return {};
-    if (number % kParts != ++parts) return Unreadable("a checkpoint");
-    newest->bytes.append(bytes);
+    parts_ = 0;
     return {};
-  };
-  auto read = store.Read({.kind = RecordKind::kCheckpoint, .owner = session}, take);
-  if (!read) return tl::unexpected(read.error());
-  if (newest && (parts != head.parts() || newest->bytes.size() != head.size() || pieces != newest->pieces.size()))
-    return Unreadable("a checkpoint");
-  return newest;
+  }
+  // Parts without a head belong to a checkpoint that was never completed.
+  Result<void> TakeMain(std::uint64_t position, std::uint64_t part, std::string_view bytes) {
+    if (!newest_ || newest_->position != position || part > head_.parts()) return {};
+    if (part != ++parts_) return Unreadable("a checkpoint");
+    newest_->bytes.append(bytes);
+    return {};
+  }
+  Result<void> TakePiece(std::uint64_t number, std::uint64_t part, std::string_view bytes) {
+    if (!newest_) return {};
+    const auto piece = newest_->parts.find(number);
+    if (piece == newest_->parts.end() || part >= piece->second) return {};  // Of one that was never completed.
+    if (read_[number]++ != part) return Unreadable("a checkpoint");
+    newest_->pieces[number].append(bytes);
+    return {};
+  }
+
+  std::optional<StoredCheckpoint> newest_;
+  record::CheckpointHead head_;
+  std::uint32_t parts_ = 0;                      // Of the main part, read so far.
+  std::map<std::uint64_t, std::uint32_t> read_;  // Of each piece.
+};
+
+}  // namespace
+
+Result<std::optional<StoredCheckpoint>> ReadCheckpoint(Store& store, std::uint64_t session) {
+  CheckpointReader reader;
+  const auto take = [&reader](std::uint64_t number, std::string_view bytes) { return reader.Take(number, bytes); };
+  if (auto read = store.Read({.kind = RecordKind::kCheckpoint, .owner = session}, take); !read)
+    return tl::unexpected(read.error());
+  return std::move(reader).Finish();
 }
 
 }  // namespace cairn::server

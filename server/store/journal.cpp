@@ -175,6 +175,7 @@ void Journal::Run(const std::stop_token& stop) {
       const std::vector<Work> works = std::move(group->works);
       std::optional<WantedCheckpoint> wanted = std::move(group->checkpoint);
       Prepared prepared = Prepare(std::move(*group));
+      LeaveOutTooLong(prepared);
       DropForgottenCheckpoint();
       if (!stop.stop_requested()) WriteCheckpoint(std::move(wanted), prepared.changes);
       if (!CommitPatiently(prepared.changes, stop)) return;
@@ -242,6 +243,26 @@ Journal::Prepared Journal::Prepare(Group&& group) {
   }
   for (auto& [key, bytes] : put) prepared.changes.put.push_back({key, std::move(bytes)});
   return prepared;
+}
+
+// A message over 2 GB has no bytes at all (Protobuf).
+void Journal::LeaveOutTooLong(Prepared& prepared) {
+  const auto too_long = [this](const Record& record) {
+    return record.bytes.empty() || record.bytes.size() > store_.max_record_bytes();
+  };
+  const MutexLock lock(mutex_);
+  std::erase_if(prepared.changes.put, [&](const Record& record) CAIRN_NO_THREAD_SAFETY_ANALYSIS {
+    if (!too_long(record)) return false;
+    lost_ = "a record is too long for the store and was left out, of kind " +
+            std::to_string(static_cast<int>(record.key.kind)) + " and owner " + std::to_string(record.key.owner) +
+            ", with " + std::to_string(record.bytes.size()) + " bytes";
+    const bool of_session = record.key.kind == RecordKind::kJournal || record.key.kind == RecordKind::kSession;
+    if (of_session) {
+      prepared.batches.erase(record.key.owner);  // It is not told that these entries are on the disk.
+      if (const auto line = lines_.find(record.key.owner); line != lines_.end()) line->second.lost = true;
+    }
+    return true;
+  });
 }
 
 // The parts of a checkpoint that are written already are removed with the session.

@@ -5,8 +5,9 @@
 //
 // Overflow rule: the queue is bounded by bytes. While the disk fails, the group is tried again every second and the
 // queue fills. If there is no room for an entry, its session is no longer stored from there on, because a journal with
-// a gap could not be replayed. The entries before stay valid. The state is then `degraded` with the reason. Thread
-// rule: any thread; Start and Stop from one.
+// a gap could not be replayed. The entries before stay valid. The state is then `degraded` with the reason. A record
+// that is longer than the store can hold is left out in the same way; it must not keep others from being written.
+// Thread rule: any thread; Start and Stop from one.
 #pragma once
 
 #include <chrono>
@@ -23,6 +24,7 @@
 #include "common/mutex.h"
 #include "server/store/checkpoint_writer.h"
 #include "server/store/records.h"
+#include "server/store/set_aside.h"
 #include "server/store/store.h"
 #include "server/store/store_options.h"
 
@@ -88,6 +90,9 @@ class Journal {
   void Between(Work work);
 
   [[nodiscard]] Store& store() { return store_; }
+  // What was not restored from this store.
+  [[nodiscard]] SetAside& set_aside() { return set_aside_; }
+  [[nodiscard]] const SetAside& set_aside() const { return set_aside_; }
   [[nodiscard]] JournalHealth health() const;
   [[nodiscard]] JournalCounts counts() const;
 
@@ -141,6 +146,7 @@ class Journal {
   void Run(const std::stop_token& stop);
   std::optional<Group> Next(const std::stop_token& stop);
   static Prepared Prepare(Group&& group);
+  void LeaveOutTooLong(Prepared& prepared) CAIRN_EXCLUDES(mutex_);
   void DropForgottenCheckpoint() CAIRN_EXCLUDES(mutex_);
   void WriteCheckpoint(std::optional<WantedCheckpoint> wanted, RecordChanges& changes) CAIRN_EXCLUDES(mutex_);
   void BeginCheckpoint(WantedCheckpoint wanted) CAIRN_EXCLUDES(mutex_);
@@ -152,6 +158,7 @@ class Journal {
 
   Store& store_;
   const StoreOptions options_;
+  SetAside set_aside_;
 
   mutable Mutex mutex_;
   CondVar arrived_;

@@ -66,7 +66,9 @@ Result<std::uint64_t> NextGeneration(Store& store, std::uint64_t milliseconds) {
     if (!server.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return Unreadable("a generation");
     return {};
   };
-  if (auto read = store.Read({.kind = key.kind, .owner = key.owner, .first = 0, .last = 0}, take); !read)
+  // A damaged one is replaced: the clock gives a larger number, unless it was set back.
+  if (auto read = store.Read({.kind = key.kind, .owner = key.owner, .first = 0, .last = 0}, take);
+      !read && read.error().code != StatusCode::kDataLoss)
     return tl::unexpected(read.error());
   const std::uint64_t generation = std::max(server.generation() + 1, milliseconds);
   server.set_generation(generation);

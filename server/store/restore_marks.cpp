@@ -4,13 +4,6 @@
 #include "server/store/record_values.h"
 
 namespace cairn::server {
-namespace {
-
-RecordKey KeyOf(std::uint64_t session) {
-  return {RecordKind::kRestoring, session, 0};
-}
-
-}  // namespace
 
 Result<RestoreMarks> RestoreMarks::Read(Store& store) {
   RestoreMarks marks(store);
@@ -35,13 +28,20 @@ std::uint32_t RestoreMarks::deaths(std::uint64_t session) const {
   return found == deaths_.end() ? 0 : found->second;
 }
 
+Record RestoreMarks::RecordOf(std::uint64_t session, std::uint32_t deaths) {
+  record::Restoring to;
+  to.set_attempts(deaths);
+  return {{RecordKind::kRestoring, session, 0}, to.SerializeAsString()};
+}
+
+Result<void> RestoreMarks::Set(std::uint64_t session, std::uint32_t deaths) {
+  deaths_[session] = deaths;
+  return store_->Commit({.removed = {}, .put = {RecordOf(session, deaths)}});
+}
+
 Result<void> RestoreMarks::Begin(const std::vector<std::uint64_t>& sessions) {
   RecordChanges changes;
-  for (const std::uint64_t session : sessions) {
-    record::Restoring to;
-    to.set_attempts(deaths(session) + 1);
-    changes.put.push_back({KeyOf(session), to.SerializeAsString()});
-  }
+  for (const std::uint64_t session : sessions) changes.put.push_back(RecordOf(session, deaths(session) + 1));
   return changes.put.empty() ? Result<void>{} : store_->Commit(changes);
 }
 

@@ -16,10 +16,14 @@ class RestoreMarks {
   // A damaged mark counts as one death.
   [[nodiscard]] static Result<RestoreMarks> Read(Store& store);
 
+  // The mark that so many servers died while they restored the session.
+  [[nodiscard]] static Record RecordOf(std::uint64_t session, std::uint32_t deaths);
+
   // How many servers died while they restored this session.
   [[nodiscard]] std::uint32_t deaths(std::uint64_t session) const;
-  // Both return when the change is on the disk.
+  // These return when the change is on the disk.
   [[nodiscard]] Result<void> Begin(const std::vector<std::uint64_t>& sessions);
+  [[nodiscard]] Result<void> Set(std::uint64_t session, std::uint32_t deaths);
   [[nodiscard]] Result<void> Succeeded(const std::vector<std::uint64_t>& sessions);
 
  private:

@@ -26,7 +26,11 @@ Result<std::map<std::uint64_t, Value>> ReadAll(Store& store, RecordKind kind, Of
   std::map<std::uint64_t, Value> all;
   for (const std::uint64_t owner : *owners) {
     const auto keep = [&all, owner](Value&& value) { all.insert_or_assign(owner, std::move(value)); };
-    if (auto read = ForEach(store, kind, owner, of, keep); !read) return tl::unexpected(read.error());
+    const auto read = ForEach(store, kind, owner, of, keep);
+    // A record that nobody can read must not keep others from being used.
+    const bool unreadable =
+        !read && (read.error().code == StatusCode::kDataLoss || read.error().code == StatusCode::kFailedPrecondition);
+    if (!read && !unreadable) return tl::unexpected(read.error());
   }
   return all;
 }
@@ -44,6 +48,28 @@ Result<std::vector<std::string>> SiteNames(Store& store) {
 
 Result<std::map<std::uint64_t, StoredSession>> ReadSessions(Store& store) {
   return ReadAll<StoredSession>(store, RecordKind::kSession, SessionOf);
+}
+
+std::string NameOfSite(Store& store, NameId site) {
+  const auto sessions = ReadSessions(store);
+  if (!sessions) return {};
+  for (const auto& [id, session] : *sessions)
+    if (HashName(session.request.site) == site) return session.request.site;
+  return {};
+}
+
+Result<std::uint64_t> LastSession(Store& store) {
+  const auto sessions = store.Owners(RecordKind::kSession);
+  if (!sessions) return tl::unexpected(sessions.error());
+  std::uint64_t last = sessions->empty() ? 0 : sessions->back();
+  const auto sites = store.Owners(RecordKind::kLayer);
+  if (!sites) return tl::unexpected(sites.error());
+  for (const std::uint64_t site : *sites) {
+    const auto layers = store.Numbers({.kind = RecordKind::kLayer, .owner = site});
+    if (!layers) return tl::unexpected(layers.error());
+    if (!layers->empty()) last = std::max(last, layers->back());
+  }
+  return last;
 }
 
 Result<std::map<std::uint32_t, StoredVersion>> ReadVersions(Store& store, NameId site) {
@@ -65,18 +91,22 @@ Result<std::vector<StoredLayer>> ReadLayers(Store& store, NameId site) {
 }
 
 Result<SiteContents> ReadSite(Store& store, const std::string& name) {
-  SiteContents contents;
-  bool found = false;
-  const auto keep = [&](StoredSite&& site) {
-    found = site.name == name;
-    contents.site = std::move(site);
-  };
+  StoredSite site;
+  const auto keep = [&site](StoredSite&& read) { site = std::move(read); };
   if (auto read = ForEach(store, RecordKind::kSite, HashName(name), SiteOf, keep); !read)
     return tl::unexpected(read.error());
-  if (!found) return Fail(StatusCode::kNotFound, "there is no site '" + name + "'");
-  const auto layers = ReadLayers(store, HashName(name));
+  if (site.name != name) return Fail(StatusCode::kNotFound, "there is no site '" + name + "'");
+  auto contents = ReadAround(store, name);
+  if (contents) contents->site = std::move(site);
+  return contents;
+}
+
+Result<SiteContents> ReadAround(Store& store, const std::string& name) {
+  SiteContents contents;
+  contents.site.name = name;
+  auto layers = store.Numbers({.kind = RecordKind::kLayer, .owner = HashName(name)});
   if (!layers) return tl::unexpected(layers.error());
-  for (const StoredLayer& layer : *layers) contents.layers.push_back(layer.session);
+  contents.layers = std::move(*layers);
   auto sessions = ReadSessions(store);
   if (!sessions) return tl::unexpected(sessions.error());
   std::erase_if(*sessions, [&name](const auto& one) { return one.second.request.site != name; });
@@ -107,8 +137,9 @@ std::vector<RecordRange> RangesOf(const SiteContents& contents) {
 }
 
 Result<std::uint64_t> FindSession(const SiteContents& contents, const std::string& robot_or_number) {
-  for (const auto& [id, session] : contents.sessions) {
-    if (session.request.robot == robot_or_number) return id;
+  // Of two sessions of a robot the earlier one is set aside.
+  for (auto it = contents.sessions.rbegin(); it != contents.sessions.rend(); ++it) {
+    if (it->second.request.robot == robot_or_number) return it->first;
   }
   std::uint64_t number = 0;
   const char* const end = robot_or_number.data() + robot_or_number.size();

@@ -18,12 +18,19 @@ struct SiteContents {
   std::map<std::uint64_t, StoredJob> jobs;          // By id.
 };
 
-// The names of all sites, sorted.
+// The names of all sites, sorted. Sites, sessions and jobs whose own record cannot be read are left out here, in
+// ReadSite and in ReadSessions, because nothing says where they belong.
 [[nodiscard]] Result<std::vector<std::string>> SiteNames(Store& store);
 // NOT_FOUND: no such site. DATA_LOSS: a record is damaged.
 [[nodiscard]] Result<SiteContents> ReadSite(Store& store, const std::string& name);
+// As ReadSite, but of the site itself only the name: its own record may be damaged.
+[[nodiscard]] Result<SiteContents> ReadAround(Store& store, const std::string& name);
 // All sessions of all sites, by id.
 [[nodiscard]] Result<std::map<std::uint64_t, StoredSession>> ReadSessions(Store& store);
+// The name of a site whose own record cannot be read, as its sessions say; empty if none of them does.
+[[nodiscard]] std::string NameOfSite(Store& store, NameId site);
+// The highest number that a session has or had; 0: there was none. Records that cannot be read count.
+[[nodiscard]] Result<std::uint64_t> LastSession(Store& store);
 [[nodiscard]] Result<std::map<std::uint32_t, StoredVersion>> ReadVersions(Store& store, NameId site);
 [[nodiscard]] Result<std::vector<StoredLayer>> ReadLayers(Store& store, NameId site);
 

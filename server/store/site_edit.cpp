@@ -82,7 +82,8 @@ void PutStaying(const Division& division, RecordChanges& changes) {
 }  // namespace
 
 Result<void> DeleteSite(Store& store, const std::string& site) {
-  const auto contents = ReadSite(store, site);
+  auto contents = ReadSite(store, site);
+  if (!contents && contents.error().code != StatusCode::kNotFound) contents = ReadAround(store, site);
   if (!contents) return tl::unexpected(contents.error());
   return store.Commit({.removed = RangesOf(*contents), .put = {}});
 }

@@ -28,7 +28,7 @@ struct ImportOptions {
 [[nodiscard]] Result<SiteFileSummary> ImportSite(Store& store, const std::filesystem::path& file,
                                                  const ImportOptions& options = {});
 
-// NOT_FOUND: no such site.
+// Also of a site with damaged records. NOT_FOUND: no such site.
 [[nodiscard]] Result<void> DeleteSite(Store& store, const std::string& site);
 
 // Moves everything of the site `from` into the site `into`. Where the transform is not the identity, each session of

@@ -31,6 +31,8 @@ constexpr const char* kPut = "INSERT OR REPLACE INTO records (kind, owner, numbe
 constexpr const char* kRemove = "DELETE FROM records WHERE kind = ? AND owner = ? AND number BETWEEN ? AND ?";
 constexpr const char* kRead =
     "SELECT number, content FROM records WHERE kind = ? AND owner = ? AND number BETWEEN ? AND ? ORDER BY number";
+constexpr const char* kNumbers =
+    "SELECT number FROM records WHERE kind = ? AND owner = ? AND number BETWEEN ? AND ? ORDER BY number";
 constexpr const char* kOwners = "SELECT DISTINCT owner FROM records WHERE kind = ? ORDER BY owner";
 
 std::int64_t ToSql(std::uint64_t number) {
@@ -87,6 +89,7 @@ class SqliteStore : public Store {
     remove_.emplace(database_, kRemove);
     read_.emplace(database_, kRead);
     owners_.emplace(database_, kOwners);
+    numbers_.emplace(database_, kNumbers);
   }
 
   // The tables' version, and whether they are ours. Before the constructor, so that it reads nothing foreign.
@@ -107,6 +110,8 @@ class SqliteStore : public Store {
   }
 
   Result<void> Commit(const RecordChanges& changes) override {
+    for (const Record& record : changes.put)
+      if (auto fits = CheckLength(record); !fits) return fits;
     const MutexLock lock(mutex_);
     try {
       SQLite::Transaction transaction(database_, SQLite::TransactionBehavior::IMMEDIATE);
@@ -131,6 +136,7 @@ class SqliteStore : public Store {
         const auto record = next();
         if (!record) return tl::unexpected(record.error());  // The transaction is rolled back.
         if (!*record) break;
+        if (auto fits = CheckLength(**record); !fits) return fits;
         Put(**record);
       }
       transaction.commit();
@@ -173,6 +179,19 @@ class SqliteStore : public Store {
     }
   }
 
+  Result<std::vector<std::uint64_t>> Numbers(const RecordRange& range) override {
+    const MutexLock lock(mutex_);
+    try {
+      Use numbers(*numbers_);
+      BindRange(*numbers, range);
+      std::vector<std::uint64_t> found;
+      while (numbers->executeStep()) found.push_back(FromSql(numbers->getColumn(0).getInt64()));
+      return found;
+    } catch (const SQLite::Exception& error) {
+      return tl::unexpected(StatusOf(error, "cannot read the store"));
+    }
+  }
+
   Result<std::uint64_t> bytes_used() override {
     const MutexLock lock(mutex_);
     try {
@@ -184,6 +203,13 @@ class SqliteStore : public Store {
   }
 
  private:
+  Result<void> CheckLength(const Record& record) const {
+    if (record.bytes.size() <= max_record_bytes()) return {};
+    return Fail(StatusCode::kOutOfRange, "a record of " + std::to_string(record.bytes.size()) +
+                                             " bytes is too long for the store; " + std::to_string(max_record_bytes()) +
+                                             " are possible");
+  }
+
   int Pragma(const std::string& name) { return database_.execAndGet("PRAGMA " + name).getInt(); }
 
   void MakeTables() {
@@ -209,7 +235,7 @@ class SqliteStore : public Store {
   SQLite::Database database_;
   EnvelopeCodec codec_ CAIRN_GUARDED_BY(mutex_);
   // Set in the constructor, after the tables exist.
-  std::optional<SQLite::Statement> put_, remove_, read_, owners_;
+  std::optional<SQLite::Statement> put_, remove_, read_, owners_, numbers_;
 };
 
 }  // namespace

@@ -64,7 +64,8 @@ class Store {
   virtual ~Store() = default;
 
   // Returns when all changes are on the disk. After an error none of them is visible; the same changes may be tried
-  // again. RESOURCE_EXHAUSTED: the disk is full. UNAVAILABLE: any other failure of the disk.
+  // again. RESOURCE_EXHAUSTED: the disk is full. OUT_OF_RANGE: a record is longer than max_record_bytes. UNAVAILABLE:
+  // any other failure of the disk.
   virtual Result<void> Commit(const RecordChanges& changes) = 0;
   // As Commit, of records that are too many for the memory: `next` gives one after the other, nothing at the end, or an
   // error, after which none of them is there and which is returned. `next` must not use the store.
@@ -75,6 +76,10 @@ class Store {
   virtual Result<void> Read(const RecordRange& range, const Visit& visit) = 0;
   // The owners of records of this kind, in ascending order.
   virtual Result<std::vector<std::uint64_t>> Owners(RecordKind kind) = 0;
+  // The numbers of the records of this range, in ascending order. Their content is not read, and may be damaged.
+  virtual Result<std::vector<std::uint64_t>> Numbers(const RecordRange& range) = 0;
+  // Longer records cannot be written. SQLite's limit is 10^9 bytes with all that is around them.
+  [[nodiscard]] virtual std::size_t max_record_bytes() const { return 900'000'000; }
   // Disk space that the records use.
   virtual Result<std::uint64_t> bytes_used() = 0;
 };

@@ -84,7 +84,7 @@ TEST(CheckpointWriter, AServerThatStartsAgainKnowsThePiecesThatItHasRead) {
   // It needed the second one only.
   const CheckpointPiece known{std::make_shared<const std::string>("b"), nullptr}, fresh = pieces.Make("d");
   CheckpointWriter next(kSession, 20, {"main", {known, fresh}},
-                        {{(*read)->order[0], nullptr}, {(*read)->order[1], known.value}});
+                        {{(*read)->order[0], {}}, {(*read)->order[1], {known.value}}});
   Write(next, *store);
   EXPECT_EQ(TextsOf(**ReadCheckpoint(*store, kSession)), (std::vector<std::string>{"b", "d"}));
   EXPECT_EQ(RecordsIn(*store), 4U);
@@ -123,6 +123,53 @@ TEST(CheckpointWriter, ALargeOneTakesSeveralCommits) {
   ASSERT_TRUE(read && *read);
   EXPECT_EQ((*read)->bytes, main);
   EXPECT_EQ((*read)->pieces.size(), 5U);
+}
+
+// A piece was one record, so that a large one held up everything else, and one over 1 GB could never be written.
+TEST(CheckpointWriter, ALargePieceTakesSeveralCommitsAndIsRemovedWhole) {
+  const auto store = *OpenStore(":memory:");
+  Pieces pieces;
+  constexpr std::size_t kLarge = 2 * CheckpointWriter::kBytesPerCommit + 5;
+  const CheckpointPiece small = pieces.Make("s"), large = pieces.Make("l", kLarge), empty = pieces.Make("");
+  CheckpointWriter first(kSession, 10, {"main", {small, large, empty}});
+  RecordChanges changes;
+  first.AddTo(changes);
+  for (const Record& record : changes.put) EXPECT_LE(record.bytes.size(), CheckpointWriter::kPartBytes);
+  EXPECT_TRUE(store->Commit(changes));
+  EXPECT_FALSE(first.complete());
+  EXPECT_EQ(Write(first, *store), 2);
+  EXPECT_EQ(pieces.made(), 3);
+  const auto read = ReadCheckpoint(*store, kSession);
+  ASSERT_TRUE(read && *read);
+  EXPECT_EQ(TextsOf(**read), (std::vector<std::string>{"s", std::string(kLarge, 'l'), ""}));
+  // It stays where the next one contains it, also for a server that has read it,
+  const CheckpointPiece other = pieces.Make("o");
+  StoredPieces stored;
+  for (const auto& [number, parts] : (*read)->parts) stored[number].parts = parts;
+  stored[(*read)->order[1]].value = large.value;
+  CheckpointWriter second(kSession, 20, {"main", {large, other}}, stored);
+  Write(second, *store);
+  EXPECT_EQ(TextsOf(**ReadCheckpoint(*store, kSession)), (std::vector<std::string>{std::string(kLarge, 'l'), "o"}));
+  // and goes with all its parts.
+  CheckpointWriter third(kSession, 30, {"main", {other}}, second.pieces());
+  Write(third, *store);
+  EXPECT_EQ(RecordsIn(*store), 3U);
+}
+
+TEST(CheckpointWriter, AMissingPartOfAPieceMakesTheCheckpointUnreadable) {
+  const auto store = *OpenStore(":memory:");
+  Pieces pieces;
+  CheckpointWriter writer(kSession, 10, {"main", {pieces.Make("l", 3 * CheckpointWriter::kPartBytes)}});
+  Write(writer, *store);
+  std::vector<std::uint64_t> rest =
+      *store->Numbers({.kind = RecordKind::kCheckpoint, .owner = kSession, .first = (std::uint64_t{1} << 63) + 1});
+  ASSERT_EQ(rest.size(), 2U);
+  for (const std::uint64_t number : {rest[1], rest[0]}) {
+    ASSERT_TRUE(store->Commit(
+        {.removed = {{.kind = RecordKind::kCheckpoint, .owner = kSession, .first = number, .last = number}},
+         .put = {}}));
+    EXPECT_EQ(ReadCheckpoint(*store, kSession).error().code, StatusCode::kDataLoss);
+  }
 }
 
 TEST(CheckpointWriter, APieceThatIsMissingMakesTheCheckpointUnreadable) {

@@ -30,6 +30,7 @@ class FullAfterACheckpoint : public Store {
   Result<void> CommitEach(const Next& next) override { return store_.CommitEach(next); }
   Result<void> Read(const RecordRange& range, const Visit& visit) override { return store_.Read(range, visit); }
   Result<std::vector<std::uint64_t>> Owners(RecordKind kind) override { return store_.Owners(kind); }
+  Result<std::vector<std::uint64_t>> Numbers(const RecordRange& range) override { return store_.Numbers(range); }
   Result<std::uint64_t> bytes_used() override { return store_.bytes_used(); }
 
  private:
@@ -143,6 +144,71 @@ TEST(JournalFaults, ANewSessionTakesNothingOverFromAnotherOfItsNumber) {
   EXPECT_TRUE(HasSession(*store, 1));
   EXPECT_FALSE(*ReadCheckpoint(*store, 1));
   EXPECT_EQ(LastEntry(*store, 1), 1U);
+}
+
+// Longer records do not fit.
+class SmallRecords : public Store {
+ public:
+  explicit SmallRecords(Store& store) : store_(store) {}
+  Result<void> Commit(const RecordChanges& changes) override {
+    for (const Record& record : changes.put)
+      if (record.bytes.size() > max_record_bytes()) return Fail(StatusCode::kOutOfRange, "too long");
+    return store_.Commit(changes);
+  }
+  Result<void> CommitEach(const Next& next) override { return store_.CommitEach(next); }
+  Result<void> Read(const RecordRange& range, const Visit& visit) override { return store_.Read(range, visit); }
+  Result<std::vector<std::uint64_t>> Owners(RecordKind kind) override { return store_.Owners(kind); }
+  Result<std::vector<std::uint64_t>> Numbers(const RecordRange& range) override { return store_.Numbers(range); }
+  std::size_t max_record_bytes() const override { return 20'000; }
+  Result<std::uint64_t> bytes_used() override { return store_.bytes_used(); }
+
+ private:
+  Store& store_;
+};
+
+// The group with it was tried again for ever, and everything behind it waited.
+TEST(JournalFaults, ARecordThatIsTooLongForTheStoreKeepsNothingElseFromBeingWritten) {
+  const auto memory = MemoryStore();
+  SmallRecords store(*memory);
+  Journal journal(store, {.commit_delay_ms = 1});
+  std::atomic<int> told{0};
+  for (const std::uint64_t session : {1, 2})
+    journal.Open(SampleSession(session),
+                 [&told](const std::vector<JournalEntry>& entries) { told += static_cast<int>(entries.size()); });
+  EXPECT_EQ(journal.Append(1, SampleScan(1)), 1U);
+  EXPECT_EQ(journal.Append(2, SampleScan(1, 10'000)), 1U);
+  journal.Put({RecordKind::kJob, 3, 0}, [] { return std::string(30'000, 'x'); });
+  journal.Put({RecordKind::kJob, 4, 0}, [] { return std::string("x"); });
+  journal.Start();
+  ASSERT_TRUE(test::Eventually([&] { return told == 1; }));
+  EXPECT_EQ(LastEntry(*memory, 1), 1U);
+  EXPECT_EQ(LastEntry(*memory, 2), 0U);
+  EXPECT_EQ(*memory->Owners(RecordKind::kJob), std::vector<std::uint64_t>{4});
+  EXPECT_TRUE(journal.health().degraded);
+  EXPECT_NE(journal.health().reason.find("too long"), std::string::npos) << journal.health().reason;
+  EXPECT_EQ(journal.Append(2, SampleScan(2)), 0U) << "its journal would have a gap";
+  EXPECT_EQ(journal.Append(1, SampleScan(2)), 2U);
+}
+
+// The scans go on to be stored.
+TEST(JournalFaults, ACheckpointThatIsTooLargeIsLeftOutWithTheReasonAndTheJournalStays) {
+  const auto memory = MemoryStore();
+  Journal journal(*memory, {.commit_delay_ms = 1});
+  journal.Open(SampleSession(1), [](const auto&) {});
+  journal.Start();
+  EXPECT_EQ(journal.Append(1, SampleScan(1)), 1U);
+  ASSERT_TRUE(journal.Checkpoint(1, 1, [] {
+    CheckpointContent content{"main"};
+    content.pieces.push_back({std::make_shared<const int>(1), []() -> std::string {
+                                throw std::length_error("a piece of the checkpoint has too many bytes");
+                              }});
+    return content;
+  }));
+  ASSERT_TRUE(test::Eventually([&] { return journal.health().degraded; }));
+  EXPECT_NE(journal.health().reason.find("too many bytes"), std::string::npos) << journal.health().reason;
+  EXPECT_EQ(journal.Append(1, SampleScan(2)), 2U);
+  EXPECT_TRUE(test::Eventually([&] { return LastEntry(*memory, 1) == 2; }));
+  EXPECT_FALSE(*ReadCheckpoint(*memory, 1));
 }
 
 }  // namespace
