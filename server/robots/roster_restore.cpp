@@ -23,12 +23,12 @@ Result<StoredSession> ReadSession(Store& store, SessionId id) {
   return session;
 }
 
-constexpr std::uint32_t kDeathsWithJournal = 2;     // After so many the journal is left out,
-constexpr std::uint32_t kDeathsWithCheckpoint = 3;  // and after so many the checkpoint as well.
+constexpr std::uint32_t kAttemptsWithJournal = 2;     // After so many failures the journal is not used,
+constexpr std::uint32_t kAttemptsWithCheckpoint = 3;  // and after so many neither is the checkpoint.
 
 // Why a session is not restored, or not completely.
-std::string AfterDeaths(std::uint32_t deaths) {
-  return "the server ended " + std::to_string(deaths) + " times while it restored this session";
+std::string AfterFailures(std::uint32_t failures) {
+  return "the server ended " + std::to_string(failures) + " times while it restored this session";
 }
 
 }  // namespace
@@ -59,7 +59,7 @@ Result<void> Roster::Restore() {
     for (const auto& site : atlas_.All()) next_id_ = std::max(next_id_, site->last_layer() + 1);
     for (const SessionId id : *ids) {
       next_id_ = std::max(next_id_, id + 1);
-      (marks->deaths(id) == 0 ? others : doubtful).push_back(id);
+      (marks->failed(id) == 0 ? others : doubtful).push_back(id);
     }
   }
   if (auto restored = RestoreTogether(others, *marks); !restored) return restored;
@@ -83,20 +83,21 @@ Result<void> Roster::RestoreTogether(const std::vector<SessionId>& ids, RestoreM
 }
 
 Result<void> Roster::RestoreDoubtful(SessionId id, RestoreMarks& marks) {
-  const std::uint32_t deaths = marks.deaths(id);
-  if (deaths >= kDeathsWithCheckpoint)
-    return Register(id, NotRestored(id, {StatusCode::kAborted, AfterDeaths(deaths)}));
+  const std::uint32_t failures = marks.failed(id);
+  if (failures >= kAttemptsWithCheckpoint)
+    return Register(id, NotRestored(id, {StatusCode::kAborted, AfterFailures(failures)}));
   if (auto marked = marks.Begin({id}); !marked) return marked;
-  const bool with_journal = deaths < kDeathsWithJournal;
+  const bool with_journal = failures < kAttemptsWithJournal;
   auto session = RestoreOne(id, with_journal);
   // Without its journal and without a checkpoint it is not read at the next start either.
   if (with_journal || session) {
     if (auto unmarked = marks.Succeeded({id}); !unmarked) return unmarked;
   }
   if (with_journal || !session) return Register(id, std::move(session));
-  // The robot has moved on since the checkpoint, and what it did is left out: it starts a new session. This one's part
-  // of the map stays, as that of any session that is gone.
-  return Register(id, NotRestored(id, {StatusCode::kAborted, AfterDeaths(deaths) + "; its newest data is left out"}));
+  // The data after the checkpoint is left out; the robot opens a new session. The part of the map of this one stays, as
+  // that of any session that has ended.
+  return Register(id,
+                  NotRestored(id, {StatusCode::kAborted, AfterFailures(failures) + "; its newest data is left out"}));
 }
 
 // Makes the session known, or the reason why it is not.
@@ -208,7 +209,7 @@ Result<std::shared_ptr<Session>> Roster::ReadBack(SessionId id, bool with_journa
   if (!site) return tl::unexpected(site.error());
   const auto make = [&] {
     auto made = Make(id, stored->request, stored->map_epoch, *site);
-    made->KeepStored();  // Whatever fails from here on, also by an exception.
+    made->KeepStored();  // Also if an exception ends the restore.
     static_cast<void>(made->record().AddSensors(stored->request.sensors));
     return made;
   };
@@ -217,7 +218,7 @@ Result<std::shared_ptr<Session>> Roster::ReadBack(SessionId id, bool with_journa
   std::uint64_t position = 0;
   StoredPieces pieces;
   if (!checkpoint) {
-    // The whole journal, where it is still there, does as well.
+    // The whole journal is used instead, if it is still there.
     spdlog::warn("the checkpoint of session {} is not used: {}", id, checkpoint.error().message);
   } else if (*checkpoint) {
     for (const std::uint64_t number : (*checkpoint)->order) pieces.emplace(number, nullptr);
@@ -235,7 +236,7 @@ Result<std::shared_ptr<Session>> Roster::ReadBack(SessionId id, bool with_journa
     return (*site)->Switched(epoch, generation);
   };
   if (!with_journal) {
-    // Empty, it would be taken for a session that is gone, and its journal would be removed.
+    // An empty session would count as ended, and its journal would be removed.
     if (position == 0)
       return Fail(StatusCode::kDataLoss, "it has no checkpoint that can be used, and its journal is left out");
     session->Replayed();

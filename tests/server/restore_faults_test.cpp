@@ -167,20 +167,20 @@ TEST(Restore, ASessionWhoseJournalEndsTheServerDoesSoTwiceAndTheOthersComeBack) 
   ServerOptions options = TestOptions();
   options.robots.checkpoint_entries = 40;
   DriveTwoRobots(directory / "0", options);
-  const auto deaths = [&](std::uint64_t session) {
+  const auto failed = [&](std::uint64_t session) {
     const auto store = *OpenStore(directory / "0");
-    return RestoreMarks::Read(*store)->deaths(session);
+    return RestoreMarks::Read(*store)->failed(session);
   };
   EXPECT_EQ(StartElsewhere(directory / "0", options, 1), kDead);
-  EXPECT_EQ(deaths(1), 1U);
+  EXPECT_EQ(failed(1), 1U);
   EXPECT_EQ(StartElsewhere(directory / "0", options, 1), kDead);
-  EXPECT_EQ(deaths(1), 2U);
+  EXPECT_EQ(failed(1), 2U);
   // The other one was restored alone meanwhile, or its turn has not come.
-  EXPECT_LE(deaths(2), 1U);
+  EXPECT_LE(failed(2), 1U);
   // Now it goes without that journal.
   EXPECT_EQ(StartElsewhere(directory / "0", options, 1), 0);
-  EXPECT_EQ(deaths(1), 0U);
-  EXPECT_EQ(deaths(2), 0U);
+  EXPECT_EQ(failed(1), 0U);
+  EXPECT_EQ(failed(2), 0U);
   {
     // The part of the map that r1 drew is kept without its session.
     const auto store = *OpenStore(directory / "0");
@@ -211,7 +211,7 @@ TEST(Restore, ASessionThatEndsTheServerEvenWithoutItsJournalIsLeftOut) {
   {
     const auto store = *OpenStore(directory / "0");
     auto marks = *RestoreMarks::Read(*store);
-    for (int death = 0; death < 3; ++death) {
+    for (int failure = 0; failure < 3; ++failure) {
       ASSERT_TRUE(marks.Begin({1}));
       marks = *RestoreMarks::Read(*store);
     }
