@@ -14,19 +14,6 @@
 namespace cairn::server::testing {
 namespace {
 
-// The robot is back, and knows a session that it had before.
-void SayStarted(WholeServer& house) {
-  house.Push(SessionRequest{.robot = "r1",
-                            .site = "lab",
-                            .sensors = {"laser"},
-                            .client = kDriver,
-                            .has_start = true,
-                            .T_map_robot_start = {},
-                            .end = false,
-                            .session = kDriver,
-                            .started = true});
-}
-
 // A server with two robots, which then stops.
 void DriveTwoRobots(const std::filesystem::path& state, const ServerOptions& options) {
   StoredServer server(state, options);
