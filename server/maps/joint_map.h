@@ -30,7 +30,6 @@ class JointMap {
   // Updates cells(). Returns the tiles of all levels that changed, were added or were removed.
   std::vector<TileKey> Render();
   [[nodiscard]] const std::map<TileKey, Cells>& cells() const { return cells_; }
-  [[nodiscard]] bool dirty() const { return !dirty_.empty(); }
 
  private:
   using Layers = std::map<SessionId, std::shared_ptr<const slam::GridChunk>>;

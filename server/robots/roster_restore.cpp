@@ -24,12 +24,12 @@ Result<StoredSession> ReadSession(Store& store, SessionId id) {
   return session;
 }
 
-constexpr std::uint32_t kDeathsWithJournal = 2;     // After so many the journal is left out,
-constexpr std::uint32_t kDeathsWithCheckpoint = 3;  // and after so many the checkpoint as well.
+constexpr std::uint32_t kAttemptsWithJournal = 2;     // After so many failures the journal is not used,
+constexpr std::uint32_t kAttemptsWithCheckpoint = 3;  // and after so many neither is the checkpoint.
 
 // Why a session is not restored, or not completely.
-std::string AfterDeaths(std::uint32_t deaths) {
-  return "the server ended " + std::to_string(deaths) + " times while it restored this session";
+std::string AfterFailures(std::uint32_t failures) {
+  return "the server ended " + std::to_string(failures) + " times while it restored this session";
 }
 
 }  // namespace
@@ -61,7 +61,7 @@ Result<void> Roster::Restore() {
     const MutexLock lock(mutex_);
     next_id_ = std::max(next_id_, *last + 1);
     for (const SessionId id : *ids) {
-      (marks->deaths(id) == 0 ? others : doubtful).push_back(id);
+      (marks->failed(id) == 0 ? others : doubtful).push_back(id);
     }
   }
   if (auto restored = RestoreTogether(others, *marks); !restored) return restored;
@@ -83,13 +83,13 @@ Result<void> Roster::RestoreTogether(const std::vector<SessionId>& ids, RestoreM
 }
 
 Result<void> Roster::RestoreDoubtful(SessionId id, RestoreMarks& marks) {
-  const std::uint32_t deaths = marks.deaths(id);
-  if (deaths >= kDeathsWithCheckpoint) {
-    Register(id, NotRestored(id, {StatusCode::kAborted, AfterDeaths(deaths)}));
+  const std::uint32_t failures = marks.failed(id);
+  if (failures >= kAttemptsWithCheckpoint) {
+    Register(id, NotRestored(id, {StatusCode::kAborted, AfterFailures(failures)}));
     return {};
   }
   if (auto marked = marks.Begin({id}); !marked) return marked;
-  const bool with_journal = deaths < kDeathsWithJournal;
+  const bool with_journal = failures < kAttemptsWithJournal;
   auto session = RestoreOne(id, with_journal);
   if (with_journal) {
     if (auto unmarked = marks.Succeeded({id}); !unmarked) return unmarked;
@@ -98,11 +98,12 @@ Result<void> Roster::RestoreDoubtful(SessionId id, RestoreMarks& marks) {
   }
   // Every later start does the same. Where the checkpoint cannot be used either, it is not read again.
   if (session) {
-    if (auto marked = marks.Set(id, deaths); !marked) return marked;
+    if (auto marked = marks.Set(id, failures); !marked) return marked;
   }
   // The robot has moved on since the checkpoint, so it begins a new session. What is stored of this one stays, and its
   // part of the map is shown as it was in the checkpoint.
-  Register(id, NotRestored(id, session ? Status{StatusCode::kAborted, AfterDeaths(deaths)} : session.error()));
+  const Status why = session ? Status{StatusCode::kAborted, AfterFailures(failures)} : session.error();
+  Register(id, NotRestored(id, why));
   return {};
 }
 
@@ -211,7 +212,7 @@ Result<std::shared_ptr<Session>> Roster::ReadBack(SessionId id, bool with_journa
   if (!site) return tl::unexpected(site.error());
   const auto make = [&] {
     auto made = Make(id, stored->request, stored->map_epoch, *site);
-    made->KeepStored();  // Whatever fails from here on, also by an exception.
+    made->KeepStored();  // Also if an exception ends the restore.
     static_cast<void>(made->record().AddSensors(stored->request.sensors));
     return made;
   };
@@ -224,7 +225,7 @@ Result<std::shared_ptr<Session>> Roster::ReadBack(SessionId id, bool with_journa
     return tl::unexpected(checkpoint.error());
   }
   if (!checkpoint) {
-    // The whole journal, where it is still there, does as well.
+    // The whole journal is used instead, if it is still there.
     spdlog::warn("the checkpoint of session {} is not used: {}", id, checkpoint.error().message);
   } else if (*checkpoint) {
     for (const auto& [number, parts] : (*checkpoint)->parts) pieces.emplace(number, StoredPiece{nullptr, parts});

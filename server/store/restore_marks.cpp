@@ -13,42 +13,42 @@ Result<RestoreMarks> RestoreMarks::Read(Store& store) {
     const auto take = [&](std::uint64_t, std::string_view bytes) -> Result<void> {
       record::Restoring from;
       if (!from.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return Unreadable("a mark");
-      marks.deaths_[session] = from.attempts();
+      marks.failed_[session] = from.attempts();
       return {};
     };
     const auto read = store.Read({.kind = RecordKind::kRestoring, .owner = session}, take);
     if (!read && read.error().code != StatusCode::kDataLoss) return tl::unexpected(read.error());
-    if (!read) marks.deaths_[session] = 1;
+    if (!read) marks.failed_[session] = 1;
   }
   return marks;
 }
 
-std::uint32_t RestoreMarks::deaths(std::uint64_t session) const {
-  const auto found = deaths_.find(session);
-  return found == deaths_.end() ? 0 : found->second;
+std::uint32_t RestoreMarks::failed(std::uint64_t session) const {
+  const auto found = failed_.find(session);
+  return found == failed_.end() ? 0 : found->second;
 }
 
-Record RestoreMarks::RecordOf(std::uint64_t session, std::uint32_t deaths) {
+Record RestoreMarks::RecordOf(std::uint64_t session, std::uint32_t failures) {
   record::Restoring to;
-  to.set_attempts(deaths);
+  to.set_attempts(failures);
   return {{RecordKind::kRestoring, session, 0}, to.SerializeAsString()};
 }
 
-Result<void> RestoreMarks::Set(std::uint64_t session, std::uint32_t deaths) {
-  deaths_[session] = deaths;
-  return store_->Commit({.removed = {}, .put = {RecordOf(session, deaths)}});
+Result<void> RestoreMarks::Set(std::uint64_t session, std::uint32_t failures) {
+  failed_[session] = failures;
+  return store_->Commit({.removed = {}, .put = {RecordOf(session, failures)}});
 }
 
 Result<void> RestoreMarks::Begin(const std::vector<std::uint64_t>& sessions) {
   RecordChanges changes;
-  for (const std::uint64_t session : sessions) changes.put.push_back(RecordOf(session, deaths(session) + 1));
+  for (const std::uint64_t session : sessions) changes.put.push_back(RecordOf(session, failed(session) + 1));
   return changes.put.empty() ? Result<void>{} : store_->Commit(changes);
 }
 
 Result<void> RestoreMarks::Succeeded(const std::vector<std::uint64_t>& sessions) {
   RecordChanges changes;
   for (const std::uint64_t session : sessions) {
-    deaths_.erase(session);
+    failed_.erase(session);
     changes.removed.push_back({.kind = RecordKind::kRestoring, .owner = session});
   }
   return changes.removed.empty() ? Result<void>{} : store_->Commit(changes);

@@ -1,5 +1,5 @@
-// Changes to the sites of a store: taking one in from a file, joining two, dividing one, leaving something away. Each
-// is one commit, so that a store is as before or as wanted whenever the process ends. For a store that nobody else
+// Changes to the sites of a store: import, merge, split and delete. Each is one commit, so that after any end of the
+// process the change is complete or absent. For a store that nobody else
 // uses: of a stopped server, or between two commits of a running one (Journal::Between). Stateless.
 #pragma once
 

@@ -40,6 +40,12 @@ class MemoryStore : public server::Store {
       if (key.kind == kind) owners.insert(key.owner);
     return std::vector<std::uint64_t>(owners.begin(), owners.end());
   }
+  Result<std::vector<std::uint64_t>> Numbers(const server::RecordRange& range) override {
+    std::vector<std::uint64_t> numbers;
+    for (const auto& [key, bytes] : records_)
+      if (Within(range, key)) numbers.push_back(key.number);
+    return numbers;
+  }
   Result<std::uint64_t> bytes_used() override { return 0; }
 
   void Put(const server::RecordKey& key, std::string_view bytes) { records_[key] = bytes; }

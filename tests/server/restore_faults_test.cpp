@@ -17,19 +17,6 @@
 namespace cairn::server::testing {
 namespace {
 
-// The robot is back, and knows a session that it had before.
-void SayStarted(WholeServer& house) {
-  house.Push(SessionRequest{.robot = "r1",
-                            .site = "lab",
-                            .sensors = {"laser"},
-                            .client = kDriver,
-                            .has_start = true,
-                            .T_map_robot_start = {},
-                            .end = false,
-                            .session = kDriver,
-                            .started = true});
-}
-
 // A server with two robots, which then stops.
 void DriveTwoRobots(const std::filesystem::path& state, const ServerOptions& options) {
   StoredServer server(state, options);
@@ -201,22 +188,22 @@ TEST(Restore, ASessionWhoseJournalEndsTheServerDoesSoTwiceAndTheOthersComeBack) 
   ServerOptions options = TestOptions();
   options.robots.checkpoint_entries = 40;
   DriveTwoRobots(directory / "0", options);
-  const auto deaths = [&](std::uint64_t session) {
+  const auto failed = [&](std::uint64_t session) {
     const auto store = *OpenStore(directory / "0");
-    return RestoreMarks::Read(*store)->deaths(session);
+    return RestoreMarks::Read(*store)->failed(session);
   };
   EXPECT_EQ(StartElsewhere(directory / "0", options, 1), kDead);
-  EXPECT_EQ(deaths(1), 1U);
+  EXPECT_EQ(failed(1), 1U);
   EXPECT_EQ(StartElsewhere(directory / "0", options, 1), kDead);
-  EXPECT_EQ(deaths(1), 2U);
+  EXPECT_EQ(failed(1), 2U);
   // The other one was restored alone meanwhile, or its turn has not come.
-  EXPECT_LE(deaths(2), 1U);
+  EXPECT_LE(failed(2), 1U);
   // Now it goes without that journal.
   EXPECT_EQ(StartElsewhere(directory / "0", options, 1), 0);
   // And so does every later start.
   EXPECT_EQ(StartElsewhere(directory / "0", options, 1), 0);
-  EXPECT_EQ(deaths(1), 2U);
-  EXPECT_EQ(deaths(2), 0U);
+  EXPECT_EQ(failed(1), 2U);
+  EXPECT_EQ(failed(2), 0U);
   StoredServer second(directory / "0", options);
   const Reply status = second->Ask(About(RequestKind::kStatus, ""));
   ASSERT_EQ(status.robots.size(), 1U);
@@ -268,7 +255,7 @@ TEST(Restore, ASessionThatEndsTheServerEvenWithoutItsJournalIsLeftOut) {
   {
     const auto store = *OpenStore(directory / "0");
     auto marks = *RestoreMarks::Read(*store);
-    for (int death = 0; death < 3; ++death) {
+    for (int failure = 0; failure < 3; ++failure) {
       ASSERT_TRUE(marks.Begin({1}));
       marks = *RestoreMarks::Read(*store);
     }

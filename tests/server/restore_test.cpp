@@ -27,15 +27,7 @@ const Trajectory& UndisturbedPath() {
 // What the robot's client does when it meets a new server: says that it was there before, and sends again what is not
 // durable.
 void GoOn(WholeServer& house, int from, int to) {
-  house.Push(SessionRequest{.robot = "r1",
-                            .site = "lab",
-                            .sensors = {"laser"},
-                            .client = kDriver,
-                            .has_start = true,
-                            .T_map_robot_start = {},
-                            .end = false,
-                            .session = kDriver,
-                            .started = true});
+  SayStarted(house);
   ASSERT_TRUE(house.WaitPhase("r1", kDriver, SessionPhase::kActive));
   house.Drive("r1", kDriver, from, to);
 }

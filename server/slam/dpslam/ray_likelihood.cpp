@@ -38,8 +38,7 @@ float Walk(const Rates& rates, const Eigen::Vector2d& origin, const Eigen::Vecto
   // The part before the end needs the optical depth only. It has no branches, because the processor could not
   // predict them along a ray.
   float to = std::min(next_x, next_y);
-  while (to < near) {
-    depth += (to - from) * rates(walk.x, walk.y);
+  const auto enter_next_cell = [&] {
     from = to;
     const bool across = next_x < next_y;
     walk.x += across ? walk.step_x : 0;
@@ -47,6 +46,10 @@ float Walk(const Rates& rates, const Eigen::Vector2d& origin, const Eigen::Vecto
     next_x += across ? per_x : 0.0F;
     next_y += across ? 0.0F : per_y;
     to = std::min(next_x, next_y);
+  };
+  while (to < near) {
+    depth += (to - from) * rates(walk.x, walk.y);
+    enter_next_cell();
   }
   if (!hit) return std::exp(-depth - (near - from) * rates(walk.x, walk.y));
   // Around the end any of the cells may have stopped the ray.
@@ -60,13 +63,7 @@ float Walk(const Rates& rates, const Eigen::Vector2d& origin, const Eigen::Vecto
     if (std::abs(z) < static_cast<float>(kBeamReach)) density += stopped * std::exp(-0.5F * z * z);
     passed = on;
     if (!(to < far)) break;
-    from = to;
-    const bool across = next_x < next_y;
-    walk.x += across ? walk.step_x : 0;
-    walk.y += across ? 0 : walk.step_y;
-    next_x += across ? per_x : 0.0F;
-    next_y += across ? 0.0F : per_y;
-    to = std::min(next_x, next_y);
+    enter_next_cell();
   }
   return density * inverse * static_cast<float>(1.0 / std::sqrt(2.0 * kPi));
 }

@@ -48,9 +48,9 @@ void Visit(OptionVisitor& visitor, LocalizationOptions& options) {
 
 LineLocalization::LineLocalization(const LocalizationOptions& options, const BackEndOptions& back_end,
                                    const Pose2& T_map_robot_start)
-    : options_(options),
+    : SinglePathFilter(back_end.drift, T_map_robot_start),
+      options_(options),
       drift_(back_end.drift),
-      path_(back_end.drift, T_map_robot_start),
       places_(options.places),
       placed_(options.start_known),
       tracking_(options.start_known) {

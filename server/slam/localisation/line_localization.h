@@ -40,7 +40,7 @@ struct LocalizationOptions {
 };
 void Visit(OptionVisitor& visitor, LocalizationOptions& options);
 
-class LineLocalization final : public Filter {
+class LineLocalization final : public SinglePathFilter {
  public:
   LineLocalization(const LocalizationOptions& options, const BackEndOptions& back_end, const Pose2& T_map_robot_start);
 
@@ -48,16 +48,10 @@ class LineLocalization final : public Filter {
   bool Observe(const RevisitObservation& /*revisit*/) override { return false; }
   void Observe(const KeyframeSight& sight, const ParallelFor& parallel_for) override;
   void Observe(std::span<const LineFeature> lines_robot, double travelled_m);
-  void Commit() override { path_.Keep(); }
 
   [[nodiscard]] bool placed() const override { return placed_; }
   [[nodiscard]] FilterEstimate estimate() const override;
   [[nodiscard]] FilterHealth health() const override { return {1.0, nis_, nis_dimension_, placed_ && !tracking_}; }
-  [[nodiscard]] std::size_t hypothesis_count() const override { return 1; }
-  [[nodiscard]] Hypothesis hypothesis(std::size_t /*index*/) const override {
-    return {path_.T_map_robot(), path_.path()};
-  }
-  [[nodiscard]] std::vector<Landmark> landmarks() const override { return {}; }
   void Save(StateWriter& archive) const override { archive(*this); }
   void Load(StateReader& archive) override { archive(*this); }
   template <typename Archive>
@@ -73,7 +67,6 @@ class LineLocalization final : public Filter {
 
   LocalizationOptions options_;
   MotionNoise drift_;
-  ReckonedPath path_;
   PlaceHypotheses places_;
   bool placed_ = false;
   bool tracking_ = false;

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "server/slam/loops/region_search.h"
+#include "server/slam/loops/unique_pose.h"
 #include "server/slam/matching/point_index.h"
 
 namespace cairn::slam {
@@ -13,32 +13,13 @@ namespace {
 constexpr int kLevels = 5;
 // Half or twice of each of these changes the results on the first 4500 scans of mit-killian no more than another seed
 // (study `sensitivity`).
-constexpr std::size_t kMaxSearchPoints = 250;  // Most surface points of the recent keyframes used.
-constexpr std::size_t kMaxCandidates = 2;      // Most old places compared at one keyframe.
-constexpr std::size_t kCandidateStride = 4;    // Only every fourth old keyframe is a candidate.
-constexpr double kStretchM = 15.0;             // Recent path compared, and old path before and after the old place.
-constexpr double kSearchCellM = 0.1;           // Cell of the raster for the search.
-constexpr double kLikelihoodReachM = 0.3;      // At this distance from a surface the likelihood is zero.
-constexpr double kDoubtM = 1.5;                // Half width of the search window for a way of zero.
-constexpr double kDoubtRad = 0.1;              // Turn searched to either side for a way of zero.
-constexpr double kMaxDoubtRad = 0.6;           // Largest turn searched to either side.
-constexpr double kMinLikelihood = 0.5;         // Smallest mean likelihood of the recent surfaces.
-constexpr double kMinExplained = 0.5;          // Smallest share of the recent surfaces that must be found again.
-// A pose is a rival of the best one if it is farther away than this, or if its heading differs by more.
-constexpr double kRivalBeyondM = 1.0;
-constexpr double kRivalBeyondRad = 0.3;
-constexpr double kNearShare = 2.0;        // Tolerance for a surface, in inlier distances of the alignment.
-constexpr double kConfirmWithinM = 10.0;  // Largest way between the two comparisons that must agree.
-constexpr double kAgreeM = 0.5;           // Largest distance between the poses of two comparisons that agree.
-constexpr double kAgreeRad = 0.06;        // Largest turn between them.
-constexpr double kLoopSigmaRad = 0.01;    // Standard deviation of the heading in the relation of a loop.
-
-std::vector<Eigen::Vector2d> Sample(const std::vector<SurfacePoint>& surfaces) {
-  const std::size_t stride = surfaces.size() / kMaxSearchPoints + 1;
-  std::vector<Eigen::Vector2d> points;
-  for (std::size_t i = 0; i < surfaces.size(); i += stride) points.push_back(surfaces[i].p);
-  return points;
-}
+constexpr std::size_t kMaxCandidates = 2;    // Most old places compared at one keyframe.
+constexpr std::size_t kCandidateStride = 4;  // Only every fourth old keyframe is a candidate.
+constexpr double kDoubtM = 1.5;              // Half width of the search window for a way of zero.
+constexpr double kDoubtRad = 0.1;            // Turn searched to either side for a way of zero.
+constexpr double kMaxDoubtRad = 0.6;         // Largest turn searched to either side.
+constexpr double kMinExplained = 0.5;        // Smallest share of the recent surfaces that must be found again.
+constexpr double kNearShare = 2.0;           // Tolerance for a surface, in inlier distances of the alignment.
 
 // Numbers of `surfaces`, transformed by `T`, that agree with the other side and that contradict it.
 struct Agreement {
@@ -151,22 +132,16 @@ std::optional<LoopClosure> LoopSearch::Compare(const Trail& trail, std::size_t o
   const Stretch old_stretch = StretchAround(shapes.first(recent_stretch.first), old, kStretchM);
   const std::vector<SurfacePoint> recent = SurfacesOf(trail, recent_stretch, 2.0 * kSearchCellM);
   const std::vector<SurfacePoint> before = SurfacesOf(trail, old_stretch, 0.5 * kSearchCellM);
-  if (recent.size() < 20 || before.size() < 20) return std::nullopt;
+  if (std::min(recent.size(), before.size()) < kMinSurfaces) return std::nullopt;
 
   const LikelihoodPyramid pyramid(before, kSearchCellM, kLikelihoodReachM, kLevels);
-  const std::vector<Eigen::Vector2d> sample = Sample(recent);
   const SearchWindow window{T_old_recent_guess, Reach(way_m),
                             std::min(kMaxDoubtRad, kDoubtRad + options_.doubt_rad_per_m * way_m)};
-  const auto peak = FindBestPose(sample, pyramid, window, kMinLikelihood);
-  if (!peak || !peak->complete) return std::nullopt;
-  const Exclusion exclusion{peak->T_ref_curr, kRivalBeyondM, kRivalBeyondRad};
-  if (FindBestPose(sample, pyramid, window, options_.max_rival * peak->score, exclusion)) return std::nullopt;
-
+  const auto unique = FindUniquePose(recent, pyramid, window, options_.max_rival);
+  if (!unique) return std::nullopt;
   const PointIndex before_index(before);
-  // The search is exact to some cells; the surfaces decide the rest.
-  const Eigen::Matrix3d prior = Eigen::Vector3d(0.25, 0.25, 0.01).asDiagonal();
   const MatchResult aligned =
-      AlignPointsToSurfaces(recent, before_index, {peak->T_ref_curr, peak->T_ref_curr, prior}, align_);
+      AlignPointsToSurfaces(recent, before_index, {*unique, *unique, UniquePoseCovariance()}, align_);
   if (!aligned.converged || aligned.degenerate) return std::nullopt;
   const FreeSpace before_free(trail, old_stretch, options_.free_cell_m),
       recent_free(trail, recent_stretch, options_.free_cell_m);
@@ -176,7 +151,7 @@ std::optional<LoopClosure> LoopSearch::Compare(const Trail& trail, std::size_t o
   const Agreement theirs = AgreementOf(before, aligned.T_ref_curr.Inverse(), recent_index, recent_free, near_m);
   if (ours.explained < kMinExplained * static_cast<double>(recent.size())) return std::nullopt;
   if (std::max(ours.conflict(), theirs.conflict()) > options_.max_conflict) return std::nullopt;
-  return LoopClosure{old, now, aligned.T_ref_curr, PoseCovariance(options_.sigma_m, kLoopSigmaRad)};
+  return LoopClosure{old, now, aligned.T_ref_curr, PoseCovariance(options_.sigma_m, kFoundSigmaRad)};
 }
 
 bool LoopSearch::Agree(const LoopClosure& a, const LoopClosure& b, std::span<const KeyframeShape> shapes) const {
@@ -188,8 +163,7 @@ bool LoopSearch::Agree(const LoopClosure& a, const LoopClosure& b, std::span<con
   };
   const Pose2 through_a = a.T_old_recent * step(a.recent, b.recent);
   const Pose2 through_b = step(a.old, b.old) * b.T_old_recent;
-  return (through_a.translation() - through_b.translation()).norm() < kAgreeM &&
-         std::abs(AngleDiff(through_a.theta, through_b.theta)) < kAgreeRad;
+  return ConfirmEachOther(through_a, through_b);
 }
 
 }  // namespace cairn::slam

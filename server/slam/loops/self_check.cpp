@@ -11,8 +11,6 @@ namespace {
 
 // Half or twice of any of these changes the share of noticed errors by less than a tenth (study `sensitivity`).
 constexpr std::size_t kMaxCompared = 3;
-constexpr double kMaxDistanceM = 4.0;       // Largest distance between the robot and an old keyframe.
-constexpr double kMaxRangeM = 10.0;         // Errors of the heading displace farther points too much.
 constexpr double kCompareEveryM = 0.5;      // Way between two comparisons.
 constexpr double kCountedM = 5.0;           // Length of the path over which the comparisons are counted.
 constexpr std::size_t kMinComparisons = 5;  // Comparisons of a stretch needed for a decision.
@@ -46,11 +44,8 @@ void SelfCheck::Look(const Trail& trail, const SharedSequence<Pose2>& path) {
   const std::size_t now = shapes.size() - 1;
   Comparison comparison{here_m, {}};
   for (const std::size_t old : KeyframesToCompare(shapes, path)) {
-    const Pose2 T_old_now = Between(path[old], path[now]);
-    comparison.counts +=
-        CompareVisibility(*keyframes[old].scan, T_old_now, trail.points(now), options_.near_m, kMaxRangeM);
-    comparison.counts +=
-        CompareVisibility(*keyframes[now].scan, T_old_now.Inverse(), trail.points(old), options_.near_m, kMaxRangeM);
+    comparison.counts += CompareBothWays(*keyframes[old].scan, trail.points(old), *keyframes[now].scan,
+                                         trail.points(now), Between(path[old], path[now]), options_.near_m);
   }
   if (comparison.counts.known() < kMinKnown) return;
   comparisons_.push_back(comparison);
@@ -71,7 +66,7 @@ std::vector<std::size_t> SelfCheck::KeyframesToCompare(std::span<const KeyframeS
   for (std::size_t k = 0; k < shapes.size() && last.travelled_m - shapes[k].travelled_m >= options_.min_travel_m; ++k) {
     const Pose2& there = path[k];
     const double distance_m = (there.translation() - here.translation()).norm();
-    if (distance_m > kMaxDistanceM) continue;
+    if (distance_m > kMaxVisibleM) continue;
     all.push_back({k, distance_m + kTurnCostM * std::abs(AngleDiff(there.theta, here.theta))});
   }
   return BestPlaces(std::move(all), shapes, kSamePlaceM, kMaxCompared);

@@ -87,4 +87,12 @@ VisibilityCounts CompareVisibility(const Scan& scan, const Pose2& T_scan_points,
   return counts;
 }
 
+VisibilityCounts CompareBothWays(const Scan& scan_a, std::span<const SurfacePoint> points_a, const Scan& scan_b,
+                                 std::span<const SurfacePoint> points_b, const Pose2& T_a_b, double near_m) {
+  constexpr double kMaxRangeM = 10.0;
+  VisibilityCounts counts = CompareVisibility(scan_a, T_a_b, points_b, near_m, kMaxRangeM);
+  counts += CompareVisibility(scan_b, T_a_b.Inverse(), points_a, near_m, kMaxRangeM);
+  return counts;
+}
+
 }  // namespace cairn::slam

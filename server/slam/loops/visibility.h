@@ -35,4 +35,12 @@ struct VisibilityCounts {
                                                  std::span<const SurfacePoint> points, double near_m,
                                                  double max_range_m);
 
+// Old keyframes farther away than this from the robot are not compared: they show too little of the same.
+inline constexpr double kMaxVisibleM = 4.0;
+// Both scans against each other, at the relative pose `T_a_b`. Farther points are left out, because errors of the
+// heading displace them too much.
+[[nodiscard]] VisibilityCounts CompareBothWays(const Scan& scan_a, std::span<const SurfacePoint> points_a,
+                                               const Scan& scan_b, std::span<const SurfacePoint> points_b,
+                                               const Pose2& T_a_b, double near_m);
+
 }  // namespace cairn::slam

@@ -49,10 +49,27 @@ class ReckonedPath {
   SharedSequence<Pose2> path_;
 };
 
-class DeadReckoningFilter final : public Filter {
+// A filter whose belief is one path, which continues with every step.
+class SinglePathFilter : public Filter {
+ public:
+  void Commit() override { path_.Keep(); }
+  [[nodiscard]] FilterEstimate estimate() const override { return {path_.T_map_robot(), path_.covariance()}; }
+  [[nodiscard]] std::size_t hypothesis_count() const override { return 1; }
+  [[nodiscard]] Hypothesis hypothesis(std::size_t /*index*/) const override {
+    return {path_.T_map_robot(), path_.path()};
+  }
+  [[nodiscard]] std::vector<Landmark> landmarks() const override { return {}; }
+
+ protected:
+  SinglePathFilter(const MotionNoise& drift, const Pose2& T_map_robot_start) : path_(drift, T_map_robot_start) {}
+
+  ReckonedPath path_;
+};
+
+class DeadReckoningFilter final : public SinglePathFilter {
  public:
   DeadReckoningFilter(const BackEndOptions& options, const Pose2& T_map_robot_start)
-      : path_(options.drift, T_map_robot_start), contradictions_(options.diverged_after) {}
+      : SinglePathFilter(options.drift, T_map_robot_start), contradictions_(options.diverged_after) {}
 
   void Predict(const StepMotion& step) override { path_.Advance(step.T_prev_curr, step.covariance_prev); }
   bool Observe(const RevisitObservation& revisit) override {
@@ -60,15 +77,8 @@ class DeadReckoningFilter final : public Filter {
     return false;
   }
   void Observe(const KeyframeSight& /*sight*/, const ParallelFor& /*parallel_for*/) override {}
-  void Commit() override { path_.Keep(); }
 
-  [[nodiscard]] FilterEstimate estimate() const override { return {path_.T_map_robot(), path_.covariance()}; }
   [[nodiscard]] FilterHealth health() const override { return {1.0, 0.0, 0, contradictions_.diverged()}; }
-  [[nodiscard]] std::size_t hypothesis_count() const override { return 1; }
-  [[nodiscard]] Hypothesis hypothesis(std::size_t /*index*/) const override {
-    return {path_.T_map_robot(), path_.path()};
-  }
-  [[nodiscard]] std::vector<Landmark> landmarks() const override { return {}; }
   void Save(StateWriter& archive) const override { archive(*this); }
   void Load(StateReader& archive) override { archive(*this); }
   template <typename Archive>
@@ -77,7 +87,6 @@ class DeadReckoningFilter final : public Filter {
   }
 
  private:
-  ReckonedPath path_;
   Contradictions contradictions_;
 };
 

@@ -12,10 +12,10 @@ void Visit(OptionVisitor& visitor, CorrectionOptions& options) {
 
 LandmarkCorrection::LandmarkCorrection(const CorrectionOptions& options, const BackEndOptions& back_end,
                                        const Pose2& T_map_robot_start)
-    : options_(options),
+    : SinglePathFilter(back_end.drift, T_map_robot_start),
+      options_(options),
       back_end_(back_end),
       candidates_(back_end.landmarks),
-      path_(back_end.drift, T_map_robot_start),
       contradictions_(back_end.diverged_after) {}
 
 void LandmarkCorrection::Predict(const StepMotion& step) {

@@ -27,7 +27,7 @@ struct CorrectionOptions {
 };
 void Visit(OptionVisitor& visitor, CorrectionOptions& options);
 
-class LandmarkCorrection final : public Filter {
+class LandmarkCorrection final : public SinglePathFilter {
  public:
   LandmarkCorrection(const CorrectionOptions& options, const BackEndOptions& back_end, const Pose2& T_map_robot_start);
 
@@ -35,14 +35,8 @@ class LandmarkCorrection final : public Filter {
   bool Observe(const RevisitObservation& revisit) override;  // Returns false: only health() changes.
   void Observe(const KeyframeSight& sight, const ParallelFor& parallel_for) override;
   void Observe(const std::vector<LandmarkSighting>& sightings, double travelled_m);
-  void Commit() override { path_.Keep(); }
 
-  [[nodiscard]] FilterEstimate estimate() const override { return {path_.T_map_robot(), path_.covariance()}; }
   [[nodiscard]] FilterHealth health() const override { return {1.0, 0.0, 0, contradictions_.diverged()}; }
-  [[nodiscard]] std::size_t hypothesis_count() const override { return 1; }
-  [[nodiscard]] Hypothesis hypothesis(std::size_t /*index*/) const override {
-    return {path_.T_map_robot(), path_.path()};
-  }
   [[nodiscard]] std::vector<Landmark> landmarks() const override;
   void Save(StateWriter& archive) const override { archive(*this); }
   void Load(StateReader& archive) override { archive(*this); }
@@ -75,7 +69,6 @@ class LandmarkCorrection final : public Filter {
   CorrectionOptions options_;
   BackEndOptions back_end_;
   LandmarkCandidates candidates_;
-  ReckonedPath path_;
   std::vector<Memory> memory_;
   Contradictions contradictions_;
 };

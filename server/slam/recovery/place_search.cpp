@@ -12,25 +12,14 @@ namespace {
 // A whole map is searched: cells twice as large as for a loop, and levels up to blocks of 13 m.
 constexpr double kCoarser = 2.0;
 constexpr int kMapLevels = 7;
-constexpr std::size_t kMaxSample = 250;     // Points of the recent scans that are searched with.
-constexpr std::size_t kMinSurfaces = 20;    // Fewest surfaces, of the scans and of the map.
 constexpr double kMapReachM = 300.0;        // Only the map within this distance of the last pose is searched.
 constexpr double kMinPlaceExplained = 0.7;  // Share of the recent surfaces that must lie on surfaces of the map.
 constexpr int kMinCompared = 20;            // Points that must be compared for an agreement to count.
 constexpr std::size_t kNearKeyframes = 4;   // Old keyframes that a scan is compared with, ...
 constexpr double kApartM = 1.0;             // ... so far apart along the path.
-// As in LoopSearch and SelfCheck.
-constexpr double kCellM = 0.1;
-constexpr double kReachM = 0.3;
-constexpr double kMinLikelihoodOfPlace = 0.5;
-constexpr double kRivalM = 1.0;
-constexpr double kRivalRad = 0.3;
-constexpr double kMaxComparedM = 4.0;
-constexpr double kMaxComparedRangeM = 10.0;
 // Largest share of the points compared that may contradict a place. In the worlds of the study `moved` true places have
 // 0.00, and false ones, which look like them, from 0.05 on.
 constexpr double kMaxConflictOfPlace = 0.03;
-constexpr double kPlaceSigmaRad = 0.01;
 
 // The points of one cell on a raster are represented by the first of them.
 class OnePerCell {
@@ -46,13 +35,6 @@ class OnePerCell {
   double cell_m_;
   std::unordered_set<std::int64_t> taken_;
 };
-
-std::vector<Eigen::Vector2d> SampleForSearch(const std::vector<SurfacePoint>& surfaces) {
-  const std::size_t stride = surfaces.size() / kMaxSample + 1;
-  std::vector<Eigen::Vector2d> points;
-  for (std::size_t i = 0; i < surfaces.size(); i += stride) points.push_back(surfaces[i].p);
-  return points;
-}
 
 // The surface points of the scans, one per cell, in the frame of the last scan.
 std::vector<SurfacePoint> SurfacesOf(std::span<const RecentScan> recent, double cell_m) {
@@ -80,7 +62,7 @@ SearchWindow WindowOver(const std::vector<SurfacePoint>& surfaces) {
 
 PlaceSearch::Map::Map(std::vector<SurfacePoint> given)
     : surfaces(std::move(given)),
-      pyramid(surfaces, kCoarser * kCellM, kCoarser * kReachM, kMapLevels),
+      pyramid(surfaces, kCoarser * kSearchCellM, kCoarser * kLikelihoodReachM, kMapLevels),
       index(surfaces),
       window(WindowOver(surfaces)) {}
 
@@ -92,7 +74,7 @@ PlaceSearch::PlaceSearch(const LoopOptions& loop, const SelfCheckOptions& check,
 // Leaves out keyframes that are not localized.
 std::vector<SurfacePoint> PlaceSearch::SurfacesOfMap(const Trail& trail, const SharedSequence<Pose2>& path) const {
   std::vector<SurfacePoint> surfaces;
-  OnePerCell cells(0.5 * kCellM);
+  OnePerCell cells(0.5 * kSearchCellM);
   const Eigen::Vector2d last = path[trail.size() - 1].translation();
   for (std::size_t k = 0; k < trail.size(); ++k) {
     const Pose2& T_map_k = path[k];
@@ -111,15 +93,11 @@ std::optional<FoundPlace> PlaceSearch::Find(const Trail& trail, const SharedSequ
                                             std::span<const RecentScan> recent) {
   if (!map_) map_ = std::make_shared<const Map>(SurfacesOfMap(trail, path));
   if (recent.empty() || map_->surfaces.size() < kMinSurfaces) return std::nullopt;
-  const std::vector<SurfacePoint> surfaces = SurfacesOf(recent, kCoarser * kCellM);
+  const std::vector<SurfacePoint> surfaces = SurfacesOf(recent, kCoarser * kSearchCellM);
   if (surfaces.size() < kMinSurfaces) return std::nullopt;
-  const std::vector<Eigen::Vector2d> sample = SampleForSearch(surfaces);
-  const auto peak = FindBestPose(sample, map_->pyramid, map_->window, kMinLikelihoodOfPlace);
-  if (!peak || !peak->complete) return std::nullopt;
-  const Exclusion exclusion{peak->T_ref_curr, kRivalM, kRivalRad};
-  if (FindBestPose(sample, map_->pyramid, map_->window, options_.max_rival * peak->score, exclusion))
-    return std::nullopt;
-  return Fit(trail, path, recent, surfaces, peak->T_ref_curr, Eigen::Vector3d(0.25, 0.25, 0.01).asDiagonal());
+  const auto unique = FindUniquePose(surfaces, map_->pyramid, map_->window, options_.max_rival);
+  if (!unique) return std::nullopt;
+  return Fit(trail, path, recent, surfaces, *unique, UniquePoseCovariance());
 }
 
 std::optional<FoundPlace> PlaceSearch::Fit(const Trail& trail, const SharedSequence<Pose2>& path,
@@ -138,7 +116,7 @@ std::optional<FoundPlace> PlaceSearch::Fit(const Trail& trail, const SharedSeque
     if (&one == &recent.back() && counts.known() < kMinCompared) return std::nullopt;
   }
   if (all.contradicted > kMaxConflictOfPlace * all.known()) return std::nullopt;
-  return FoundPlace{match.T_ref_curr, match.covariance + PoseCovariance(options_.sigma_m, kPlaceSigmaRad)};
+  return FoundPlace{match.T_ref_curr, match.covariance + PoseCovariance(options_.sigma_m, kFoundSigmaRad)};
 }
 
 VisibilityCounts PlaceSearch::Visible(const Trail& trail, const SharedSequence<Pose2>& path, const Scan& scan,
@@ -147,14 +125,13 @@ VisibilityCounts PlaceSearch::Visible(const Trail& trail, const SharedSequence<P
   std::vector<KeyframeCost> near;
   for (std::size_t k = 0; k < shapes.size(); ++k) {
     const double distance_m = (path[k].translation() - T_map_robot.translation()).norm();
-    if (!trail.keyframes()[k].localized || distance_m > kMaxComparedM) continue;
+    if (!trail.keyframes()[k].localized || distance_m > kMaxVisibleM) continue;
     near.push_back({k, distance_m + std::abs(AngleDiff(path[k].theta, T_map_robot.theta))});
   }
   VisibilityCounts counts;
   for (const std::size_t k : BestPlaces(std::move(near), shapes, kApartM, kNearKeyframes)) {
-    const Pose2 T_old_now = Between(path[k], T_map_robot);
-    counts += CompareVisibility(*trail.keyframes()[k].scan, T_old_now, points_robot, check_.near_m, kMaxComparedRangeM);
-    counts += CompareVisibility(scan, T_old_now.Inverse(), trail.points(k), check_.near_m, kMaxComparedRangeM);
+    counts += CompareBothWays(*trail.keyframes()[k].scan, trail.points(k), scan, points_robot,
+                              Between(path[k], T_map_robot), check_.near_m);
   }
   return counts;
 }

@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "server/slam/loops/loop_search.h"
-#include "server/slam/loops/region_search.h"
 #include "server/slam/loops/self_check.h"
+#include "server/slam/loops/unique_pose.h"
 #include "server/slam/matching/point_index.h"
 #include "server/slam/trail/shared_sequence.h"
 #include "server/slam/trail/trail.h"

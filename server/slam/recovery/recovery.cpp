@@ -11,11 +11,6 @@ namespace {
 constexpr std::size_t kMaxRecent = 120;  // Scans that are kept: turning on the spot makes many.
 constexpr double kOnPathM = 0.3;         // A place found this near to the path, ...
 constexpr double kOnPathRad = 0.1;       // ... and with this heading, is the one on the path.
-// Two places found agree, as in LoopSearch.
-constexpr double kStretchM = 15.0;
-constexpr double kConfirmWithinM = 10.0;
-constexpr double kAgreeM = 0.5;
-constexpr double kAgreeRad = 0.06;
 constexpr std::size_t kMaxHeld = 60;  // Keyframes that may be added to the path at once: bounds the time of one scan.
 constexpr double kUnknownM = 1000.0;  // Standard deviation of a place that is not known.
 constexpr double kNever = -1.0;       // No search yet.
@@ -101,14 +96,13 @@ bool Recovery::IsConfirmed(const Pose2& T_map_robot) {
 }
 
 bool Recovery::Agree(const Candidate& earlier, const Pose2& T_map_robot) const {
-  const Pose2 error = Between(earlier.T_map_track * recent_.back().T_track_robot, T_map_robot);
-  return error.translation().norm() < kAgreeM && std::abs(error.theta) < kAgreeRad;
+  return ConfirmEachOther(earlier.T_map_track * recent_.back().T_track_robot, T_map_robot);
 }
 
 Recovery::Belief Recovery::BeliefAt(const Pose2& T_odom_robot, const Pose2& T_track_robot) const {
   if (!odometry_goes_on_) {
     const Eigen::Vector3d unknown(kUnknownM * kUnknownM, kUnknownM * kUnknownM, kPi * kPi);
-    return {known_.T_map_robot, unknown.asDiagonal(), unknown.asDiagonal(), PoseReason::kLost};
+    return {known_.T_map_robot, unknown.asDiagonal(), PoseReason::kLost};
   }
   const Pose2 moved = Between(known_.T_odom_robot, T_odom_robot);
   const Eigen::Matrix3d J_known = J_compose_left(known_.T_map_robot, moved);
@@ -116,7 +110,7 @@ Recovery::Belief Recovery::BeliefAt(const Pose2& T_odom_robot, const Pose2& T_tr
   const Eigen::Matrix3d doubt = J_moved * blind_.Covariance(moved) * J_moved.transpose();
   const bool lost = contradicted_ || moved.translation().norm() > lost_after_m_;
   return {T_map_track_ ? *T_map_track_ * T_track_robot : known_.T_map_robot * moved,
-          J_known * known_.covariance * J_known.transpose() + doubt, doubt,
+          J_known * known_.covariance * J_known.transpose() + doubt,
           lost ? PoseReason::kLost : PoseReason::kOdometryOnly};
 }
 

@@ -35,8 +35,7 @@ class Recovery {
   struct Belief {
     Pose2 T_map_robot;
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-    Eigen::Matrix3d doubt = Eigen::Matrix3d::Zero();  // The part of the covariance that has come since.
-    PoseReason reason = PoseReason::kLost;            // Or kOdometryOnly.
+    PoseReason reason = PoseReason::kLost;  // Or kOdometryOnly.
   };
   // A keyframe that waits until it is known that the robot is on its path.
   struct Held {

@@ -43,6 +43,19 @@ inline void CopyState(const std::filesystem::path& from, const std::filesystem::
   for (const char* name : {"cairn.db", "cairn.db-wal"}) std::filesystem::copy_file(from / name, to / name);
 }
 
+// The robot's client says that it had its session before: it meets a server that was started since.
+inline void SayStarted(WholeServer& house, const std::string& robot = "r1") {
+  house.Push(SessionRequest{.robot = robot,
+                            .site = "lab",
+                            .sensors = {"laser"},
+                            .client = kDriver,
+                            .has_start = true,
+                            .T_map_robot_start = {},
+                            .end = false,
+                            .session = kDriver,
+                            .started = true});
+}
+
 inline Request About(RequestKind kind, const std::string& robot = "r1") {
   Request request;
   request.kind = kind;
