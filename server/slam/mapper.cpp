@@ -34,8 +34,8 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
 
   // The motion of the last scans says nothing where they do not belong together with this one.
   if (passage != Passage::kDriven || s.recovery.active()) rolling = nullptr;
-  TrackedScan tracked =
-      TrackScan(s.front_end, s.options.front_end, s.trail, std::move(scan), rolling, T_odom_robot, parallel_for);
+  TrackedScan tracked = TrackScan(s.front_end, {s.options.front_end, s.options.pairing.rolling}, s.trail,
+                                  std::move(scan), rolling, T_odom_robot, parallel_for);
   s.CheckPlace(passage, tracked, T_odom_robot, parallel_for);
   auto& [still, view, step] = tracked;
   if (s.recovery.active()) return s.Recover({std::move(still), T_odom_robot}, std::move(view), step, parallel_for);

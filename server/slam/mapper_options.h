@@ -13,6 +13,7 @@
 #include "server/slam/loops/self_check.h"
 #include "server/slam/methods.h"
 #include "server/slam/motion/motion_gate.h"
+#include "server/slam/recovery/recovery_options.h"
 #include "server/slam/scan/odometry_pairing.h"
 #include "server/slam/tracking/front_end.h"
 
@@ -32,6 +33,7 @@ struct MapperOptions {
   RevisitOptions revisit;
   LoopOptions loop;
   SelfCheckOptions self_check;
+  RecoveryOptions recovery{};
   PoseGraphOptions pose_graph;
   FilterOptions filter;
   GridOptions grid;

@@ -10,23 +10,8 @@
 namespace cairn::slam {
 namespace {
 
-// A robot has not moved if its odometry has changed by less than kStillM and kStillRad, and at least this share of the
-// beams (kUnchanged) shows the same range.
-constexpr double kStillM = 0.02;
-constexpr double kStillRad = 0.02;
-constexpr double kSameRangeM = 0.1;
-constexpr double kSameRangePerM = 0.01;
-constexpr double kUnchanged = 0.95;
-constexpr double kUnchangedAlongCorridor = 0.98;  // Most beams show the same everywhere along it.
-
-// The longest pause after which scan, odometry and map together may confirm the place at once, and the largest
-// difference between scan and odometry then.
-constexpr double kShortPauseS = 10.0;
-constexpr double kAsOdometryM = 0.15;
-constexpr double kAsOdometryPerM = 0.1;
-constexpr double kAsOdometryRad = 0.1;
-
-bool LookAlike(const Scan& a, const Scan& b, double least) {
+// Whether at least the share `least` of the beams shows the same range.
+bool LookAlike(const Scan& a, const Scan& b, double least, const RecoveryOptions& options) {
   if (a.ranges_m.size() != b.ranges_m.size() || a.angle_first_rad != b.angle_first_rad) return false;
   std::size_t compared = 0, same = 0;
   for (std::size_t i = 0; i < a.ranges_m.size(); ++i) {
@@ -35,7 +20,8 @@ bool LookAlike(const Scan& a, const Scan& b, double least) {
     if (class_a != BeamClass::kHit && class_b != BeamClass::kHit) continue;
     ++compared;
     const double difference_m = std::abs(static_cast<double>(a.ranges_m[i]) - b.ranges_m[i]);
-    same += class_a == class_b && difference_m < kSameRangeM + kSameRangePerM * a.ranges_m[i] ? 1 : 0;
+    const double allowed_m = options.same_range_m + options.same_range_per_m * a.ranges_m[i];
+    same += class_a == class_b && difference_m < allowed_m ? 1 : 0;
   }
   return compared > 0 && static_cast<double>(same) >= least * static_cast<double>(compared);
 }
@@ -77,8 +63,10 @@ void Mapper::State::LosePlace(bool odometry_goes_on) {
 bool Mapper::State::StoodStill(const Scan& scan, const Pose2& T_odom_robot, const TrackStep& step) const {
   if (!last_scan || !step.matched) return false;
   const Pose2 moved = options.front_end.use_odometry ? Between(last_scan->T_odom_robot, T_odom_robot) : Pose2{};
-  return moved.translation().norm() < kStillM && std::abs(moved.theta) < kStillRad &&
-         LookAlike(*last_scan->scan, scan, step.degenerate ? kUnchangedAlongCorridor : kUnchanged);
+  const RecoveryOptions& limits = options.recovery;
+  return moved.translation().norm() < limits.still_m && std::abs(moved.theta) < limits.still_rad &&
+         LookAlike(*last_scan->scan, scan, step.degenerate ? limits.unchanged_along_corridor : limits.unchanged,
+                   limits);
 }
 
 // Whether the robot has certainly driven on by itself during a short pause: the scan shows its position, this is where
@@ -87,12 +75,13 @@ bool Mapper::State::GoesOn(const Scan& scan, const std::vector<SurfacePoint>& po
                            const TrackStep& step) const {
   if (!HasMap() || recovery.active() || !options.front_end.use_odometry) return false;
   if (!last_scan || !step.matched || step.degenerate) return false;
-  if (NanosBetween(last_scan->scan->stamp, scan.stamp) > static_cast<std::uint64_t>(kShortPauseS * kNanosPerSecond))
-    return false;
+  const RecoveryOptions& limits = options.recovery;
+  const std::uint64_t pause_ns = NanosBetween(last_scan->scan->stamp, scan.stamp);
+  if (pause_ns > static_cast<std::uint64_t>(limits.short_pause_s * kNanosPerSecond)) return false;
   const Pose2 odometry = Between(last_scan->T_odom_robot, T_odom_robot);
   const Pose2 error = Between(odometry, Between(last_scan->T_track_robot, step.T_track_robot));
-  const double allowed_m = kAsOdometryM + kAsOdometryPerM * odometry.translation().norm();
-  if (error.translation().norm() > allowed_m || std::abs(error.theta) > kAsOdometryRad) return false;
+  const double allowed_m = limits.as_odometry_m + limits.as_odometry_per_m * odometry.translation().norm();
+  if (error.translation().norm() > allowed_m || std::abs(error.theta) > limits.as_odometry_rad) return false;
   using Agreement = PlaceSearch::Agreement;
   const auto agreement = [&](const Scan& one, const std::vector<SurfacePoint>& points, const Pose2& T_track_robot) {
     return recovery.Compare(one, points, T_map_track() * T_track_robot, trail, believed_path());

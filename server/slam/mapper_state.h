@@ -33,8 +33,8 @@ struct Mapper::State {
         filter(MakeFilter(given.filter.kind, given.filter, T_map_robot_start, seed)),
         loops(given.loop, given.front_end.refine),
         self_check(given.self_check),
-        recovery(given.loop, given.self_check, given.front_end.refine, given.front_end.surface, given.blind,
-                 given.lost_after_m),
+        recovery(given.recovery, given.loop, given.self_check, given.front_end.refine, given.front_end.surface,
+                 given.blind, given.lost_after_m),
         drawing(given.grid) {}
 
   ScanOutcome Coast(Stamp stamp, const Pose2& T_odom_robot);

@@ -53,11 +53,14 @@ double StudyLog::seconds() const {
   return SecondsFromStamp(last - first);
 }
 
-std::optional<StudyLog> OpenLogFile(StudyContext& context, const std::filesystem::path& path, int max_scans) {
+std::optional<StudyLog> OpenLogFile(StudyContext& context, const std::filesystem::path& path, int max_scans,
+                                    const LidarTiming& timing) {
   StudyLog log;
   log.name = path.stem().string();
   int scans = 0;
-  const auto read = ReadLog(path, LogReaderOptions{}, [&](LogRecord&& record) {
+  LogReaderOptions options;
+  options.timing = timing;
+  const auto read = ReadLog(path, options, [&](LogRecord&& record) {
     scans += std::holds_alternative<Scan>(record) ? 1 : 0;
     log.records.push_back(std::move(record));
     return max_scans <= 0 || scans < max_scans;
@@ -77,10 +80,11 @@ std::optional<StudyLog> OpenLogFile(StudyContext& context, const std::filesystem
   return log;
 }
 
-std::optional<StudyLog> OpenRealLog(StudyContext& context, const std::string& name, int max_scans) {
+std::optional<StudyLog> OpenRealLog(StudyContext& context, const std::string& name, int max_scans,
+                                    const LidarTiming& timing) {
   for (const char* extension : {".clf", ".log"}) {
     const std::filesystem::path path = RealLog(name + extension);
-    if (std::filesystem::exists(path)) return OpenLogFile(context, path, max_scans);
+    if (std::filesystem::exists(path)) return OpenLogFile(context, path, max_scans, timing);
   }
   context.report.Warn("the published log `" + name + "` is ABSENT (looked for " + RealLog(name).string() +
                       ".clf and .log; set CAIRN_DATA to the logs' folder)");

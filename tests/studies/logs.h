@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "client/sim/fleet.h"
+#include "common/sensor/lidar_timing.h"
 #include "common/sensor/log_record.h"
 #include "common/sensor/trajectory.h"
 #include "tests/studies/relations.h"
@@ -29,12 +30,13 @@ struct StudyLog {
 };
 
 // The published log NAME.clf or NAME.log with NAME.relations, at most `max_scans` (0: all) of its scans.
-// If it is absent, the report contains a warning, and nothing is returned.
-[[nodiscard]] std::optional<StudyLog> OpenRealLog(StudyContext& context, const std::string& name, int max_scans = 0);
+// `timing`: what is known of its lidar. If it is absent, the report contains a warning, and nothing is returned.
+[[nodiscard]] std::optional<StudyLog> OpenRealLog(StudyContext& context, const std::string& name, int max_scans = 0,
+                                                  const LidarTiming& timing = {});
 
 // Reads a log by its path, and FILE.relations beside it if that exists. Errors are reported.
 [[nodiscard]] std::optional<StudyLog> OpenLogFile(StudyContext& context, const std::filesystem::path& path,
-                                                  int max_scans = 0);
+                                                  int max_scans = 0, const LidarTiming& timing = {});
 
 // One robot driving `seconds` through a shipped world or world file. Relations join poses about 1, 5 and 20 m
 // of way apart. Throws std::invalid_argument on a world or options that are not valid: studies name their

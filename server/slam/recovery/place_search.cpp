@@ -9,17 +9,7 @@
 namespace cairn::slam {
 namespace {
 
-// A whole map is searched: cells twice as large as for a loop, and levels up to blocks of 13 m.
-constexpr double kCoarser = 2.0;
-constexpr int kMapLevels = 7;
-constexpr double kMapReachM = 300.0;        // Only the map within this distance of the last pose is searched.
-constexpr double kMinPlaceExplained = 0.7;  // Share of the recent surfaces that must lie on surfaces of the map.
-constexpr int kMinCompared = 20;            // Points that must be compared for an agreement to count.
-constexpr std::size_t kNearKeyframes = 4;   // Old keyframes that a scan is compared with, ...
-constexpr double kApartM = 1.0;             // ... so far apart along the path.
-// Largest share of the points compared that may contradict a place. In the worlds of the study `moved` true places have
-// 0.00, and false ones, which look like them, from 0.05 on.
-constexpr double kMaxConflictOfPlace = 0.03;
+constexpr int kMapLevels = 7;  // Up to blocks of 13 m.
 
 // The points of one cell on a raster are represented by the first of them.
 class OnePerCell {
@@ -60,15 +50,16 @@ SearchWindow WindowOver(const std::vector<SurfacePoint>& surfaces) {
 
 }  // namespace
 
-PlaceSearch::Map::Map(std::vector<SurfacePoint> given)
+PlaceSearch::Map::Map(std::vector<SurfacePoint> given, double coarser)
     : surfaces(std::move(given)),
-      pyramid(surfaces, kCoarser * kSearchCellM, kCoarser * kLikelihoodReachM, kMapLevels),
+      pyramid(surfaces, coarser * kSearchCellM, coarser * kLikelihoodReachM, kMapLevels),
       index(surfaces),
       window(WindowOver(surfaces)) {}
 
-PlaceSearch::PlaceSearch(const LoopOptions& loop, const SelfCheckOptions& check, const PointToLineOptions& align)
-    : options_(loop), check_(check), align_(align) {
-  align_.min_score = kMinPlaceExplained;
+PlaceSearch::PlaceSearch(const PlaceSearchOptions& options, const LoopOptions& loop, const SelfCheckOptions& check,
+                         const PointToLineOptions& align)
+    : options_(options), loop_(loop), check_(check), align_(align) {
+  align_.min_score = options_.min_explained;
 }
 
 // Leaves out keyframes that are not localized.
@@ -79,7 +70,7 @@ std::vector<SurfacePoint> PlaceSearch::SurfacesOfMap(const Trail& trail, const S
   for (std::size_t k = 0; k < trail.size(); ++k) {
     const Pose2& T_map_k = path[k];
     if (!trail.keyframes()[k].localized) continue;
-    if ((T_map_k.translation() - last).cwiseAbs().maxCoeff() > kMapReachM) continue;
+    if ((T_map_k.translation() - last).cwiseAbs().maxCoeff() > options_.map_reach_m) continue;
     const Eigen::Matrix2d R = T_map_k.rotation();
     for (const SurfacePoint& point : trail.points(k)) {
       const Eigen::Vector2d p = R * point.p + T_map_k.translation();
@@ -91,11 +82,11 @@ std::vector<SurfacePoint> PlaceSearch::SurfacesOfMap(const Trail& trail, const S
 
 std::optional<FoundPlace> PlaceSearch::Find(const Trail& trail, const SharedSequence<Pose2>& path,
                                             std::span<const RecentScan> recent) {
-  if (!map_) map_ = std::make_shared<const Map>(SurfacesOfMap(trail, path));
+  if (!map_) map_ = std::make_shared<const Map>(SurfacesOfMap(trail, path), options_.coarser);
   if (recent.empty() || map_->surfaces.size() < kMinSurfaces) return std::nullopt;
-  const std::vector<SurfacePoint> surfaces = SurfacesOf(recent, kCoarser * kSearchCellM);
+  const std::vector<SurfacePoint> surfaces = SurfacesOf(recent, options_.coarser * kSearchCellM);
   if (surfaces.size() < kMinSurfaces) return std::nullopt;
-  const auto unique = FindUniquePose(surfaces, map_->pyramid, map_->window, options_.max_rival);
+  const auto unique = FindUniquePose(surfaces, map_->pyramid, map_->window, loop_.max_rival);
   if (!unique) return std::nullopt;
   return Fit(trail, path, recent, surfaces, *unique, UniquePoseCovariance());
 }
@@ -113,10 +104,10 @@ std::optional<FoundPlace> PlaceSearch::Fit(const Trail& trail, const SharedSeque
     const Pose2 T_map_one = match.T_ref_curr * Between(recent.back().T_track_robot, one.T_track_robot);
     const VisibilityCounts counts = Visible(trail, path, *one.scan, one.points, T_map_one);
     all += counts;
-    if (&one == &recent.back() && counts.known() < kMinCompared) return std::nullopt;
+    if (&one == &recent.back() && counts.known() < options_.min_compared) return std::nullopt;
   }
-  if (all.contradicted > kMaxConflictOfPlace * all.known()) return std::nullopt;
-  return FoundPlace{match.T_ref_curr, match.covariance + PoseCovariance(options_.sigma_m, kFoundSigmaRad)};
+  if (all.contradicted > options_.max_conflict * all.known()) return std::nullopt;
+  return FoundPlace{match.T_ref_curr, match.covariance + PoseCovariance(loop_.sigma_m, kFoundSigmaRad)};
 }
 
 VisibilityCounts PlaceSearch::Visible(const Trail& trail, const SharedSequence<Pose2>& path, const Scan& scan,
@@ -129,7 +120,8 @@ VisibilityCounts PlaceSearch::Visible(const Trail& trail, const SharedSequence<P
     near.push_back({k, distance_m + std::abs(AngleDiff(path[k].theta, T_map_robot.theta))});
   }
   VisibilityCounts counts;
-  for (const std::size_t k : BestPlaces(std::move(near), shapes, kApartM, kNearKeyframes)) {
+  for (const std::size_t k :
+       BestPlaces(std::move(near), shapes, options_.apart_m, static_cast<std::size_t>(options_.near_keyframes))) {
     counts += CompareBothWays(*trail.keyframes()[k].scan, trail.points(k), scan, points_robot,
                               Between(path[k], T_map_robot), check_.near_m);
   }
@@ -140,11 +132,11 @@ PlaceSearch::Agreement PlaceSearch::Compare(const Trail& trail, const SharedSequ
                                             const std::vector<SurfacePoint>& points_robot,
                                             const Pose2& T_map_robot) const {
   const VisibilityCounts counts = Visible(trail, path, scan, points_robot, T_map_robot);
-  if (counts.known() < kMinCompared) return Agreement::kNothingNear;
+  if (counts.known() < options_.min_compared) return Agreement::kNothingNear;
   // As the self-check judges a pose that was wrong before.
   const bool contradicted = counts.contradicted > 0.5 * check_.max_conflict * counts.known();
   if (contradicted) return Agreement::kContradicts;
-  return counts.contradicted > kMaxConflictOfPlace * counts.known() ? Agreement::kDoubtful : Agreement::kAgrees;
+  return counts.contradicted > options_.max_conflict * counts.known() ? Agreement::kDoubtful : Agreement::kAgrees;
 }
 
 }  // namespace cairn::slam

@@ -17,6 +17,7 @@
 #include "server/slam/loops/self_check.h"
 #include "server/slam/loops/unique_pose.h"
 #include "server/slam/matching/point_index.h"
+#include "server/slam/recovery/recovery_options.h"
 #include "server/slam/trail/shared_sequence.h"
 #include "server/slam/trail/trail.h"
 
@@ -44,7 +45,8 @@ struct FoundPlace {
 class PlaceSearch {
  public:
   // Shares the options of large loops and of the self-check, so that a place is judged alike everywhere.
-  PlaceSearch(const LoopOptions& loop, const SelfCheckOptions& check, const PointToLineOptions& align);
+  PlaceSearch(const PlaceSearchOptions& options, const LoopOptions& loop, const SelfCheckOptions& check,
+              const PointToLineOptions& align);
 
   // The place of the last of the scans, which are in the order of time. `path` is the believed path, one pose
   // T_map_robot per keyframe. REQUIRES: neither the trail nor the path changes between two calls, unless Forget is
@@ -62,7 +64,7 @@ class PlaceSearch {
   [[nodiscard]] VisibilityCounts Visible(const Trail& trail, const SharedSequence<Pose2>& path, const Scan& scan,
                                          const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const;
   struct Map {
-    explicit Map(std::vector<SurfacePoint> surfaces);
+    Map(std::vector<SurfacePoint> surfaces, double coarser);
     std::vector<SurfacePoint> surfaces;
     LikelihoodPyramid pyramid;
     PointIndex index;
@@ -75,7 +77,8 @@ class PlaceSearch {
                                               const Eigen::Matrix3d& covariance) const;
   [[nodiscard]] std::vector<SurfacePoint> SurfacesOfMap(const Trail& trail, const SharedSequence<Pose2>& path) const;
 
-  LoopOptions options_;
+  PlaceSearchOptions options_;
+  LoopOptions loop_;
   SelfCheckOptions check_;
   PointToLineOptions align_;
   std::shared_ptr<const Map> map_;  // Made at the first search.

@@ -9,8 +9,6 @@ namespace cairn::slam {
 namespace {
 
 constexpr std::size_t kMaxRecent = 120;  // Scans that are kept: turning on the spot makes many.
-constexpr double kOnPathM = 0.3;         // A place found this near to the path, ...
-constexpr double kOnPathRad = 0.1;       // ... and with this heading, is the one on the path.
 constexpr std::size_t kMaxHeld = 60;  // Keyframes that may be added to the path at once: bounds the time of one scan.
 constexpr double kUnknownM = 1000.0;  // Standard deviation of a place that is not known.
 constexpr double kNever = -1.0;       // No search yet.
@@ -79,7 +77,8 @@ std::optional<Recovery::Found> Recovery::Take(const Keyframe& keyframe, const Tr
   const auto place = search_.Find(trail, path, recent_);
   if (!place || !IsConfirmed(place->T_map_robot)) return std::nullopt;
   const Pose2 error = Between(T_map_robot, place->T_map_robot);
-  const bool on_path = T_map_track_ && error.translation().norm() < kOnPathM && std::abs(error.theta) < kOnPathRad;
+  const bool on_path =
+      T_map_track_ && error.translation().norm() < options_.on_path_m && std::abs(error.theta) < options_.on_path_rad;
   return Found{*place, on_path};
 }
 

@@ -55,9 +55,15 @@ class Recovery {
   };
 
   // `blind` is the noise of motion known by odometry alone.
-  Recovery(const LoopOptions& loop, const SelfCheckOptions& check, const PointToLineOptions& align,
-           const SurfaceOptions& surface, const MotionNoise& blind, double lost_after_m)
-      : loop_(loop), search_(loop, check, align), surface_(surface), blind_(blind), lost_after_m_(lost_after_m) {}
+  Recovery(const RecoveryOptions& options, const LoopOptions& loop, const SelfCheckOptions& check,
+           const PointToLineOptions& align, const SurfaceOptions& surface, const MotionNoise& blind,
+           double lost_after_m)
+      : options_(options),
+        loop_(loop),
+        search_(options.place, loop, check, align),
+        surface_(surface),
+        blind_(blind),
+        lost_after_m_(lost_after_m) {}
 
   [[nodiscard]] bool active() const { return active_; }
   // `odometry_goes_on`: the odometry since `known` is that of one drive.
@@ -120,6 +126,7 @@ class Recovery {
   [[nodiscard]] bool IsConfirmed(const Pose2& T_map_robot);
   [[nodiscard]] bool Agree(const Candidate& earlier, const Pose2& T_map_robot) const;
 
+  RecoveryOptions options_;
   LoopOptions loop_;
   PlaceSearch search_;
   SurfaceOptions surface_;

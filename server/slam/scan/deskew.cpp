@@ -12,10 +12,6 @@
 namespace cairn::slam {
 namespace {
 
-// Two neighbouring ends lie on one surface if they are not farther apart than this and this many beams' distance.
-constexpr double kSurfaceGapM = 0.05;
-constexpr double kSurfaceSteps = 6.0;
-
 // Poses of the robot at times that grow, interpolated between samples of odometry.
 class PoseWalk {
  public:
@@ -80,8 +76,9 @@ std::optional<double> RangeOfCut(const Eigen::Vector2d& direction, const Eigen::
 // Collects the ranges of the result. The first one at a beam stays.
 class Resampling {
  public:
-  explicit Resampling(const Scan& scan)
+  Resampling(const Scan& scan, const DeskewOptions& options)
       : scan_(scan),
+        options_(options),
         turn_(IsFullTurn(scan) ? std::round(2.0 * kPi / std::abs(scan.angle_step_rad)) : 0.0),
         // A hit stays a hit, although it is a little farther from where the lidar was at the stamp.
         farthest_(std::nextafter(static_cast<float>(std::min<double>(scan.range_max_m, kLargest)), 0.0F)),
@@ -90,7 +87,9 @@ class Resampling {
   // Every beam between two neighbouring ends on one surface.
   void AddSurface(const MovedEnd& from, const MovedEnd& to) {
     const double spacing = std::max(from.p_laser.norm(), to.p_laser.norm()) * std::abs(scan_.angle_step_rad);
-    if ((to.p_laser - from.p_laser).norm() > kSurfaceGapM + kSurfaceSteps * spacing || Opposite(from, to)) return;
+    if ((to.p_laser - from.p_laser).norm() > options_.surface_gap_m + options_.surface_steps * spacing ||
+        Opposite(from, to))
+      return;
     ForEachBeam(std::ceil(std::min(from.beam, to.beam)), std::floor(std::max(from.beam, to.beam)), [&](double beam) {
       const double angle = scan_.angle_first_rad + beam * scan_.angle_step_rad;
       const auto range = RangeOfCut({std::cos(angle), std::sin(angle)}, from.p_laser, to.p_laser);
@@ -139,6 +138,7 @@ class Resampling {
   }
 
   const Scan& scan_;
+  const DeskewOptions options_;
   const double turn_;  // Beams of a full turn; 0 if the field of view is smaller.
   const float farthest_;
   std::vector<float> ranges_;
@@ -152,7 +152,7 @@ std::uint64_t DurationNs(const Scan& scan) {
       std::llround(static_cast<double>(scan.ranges_m.size() - 1) * scan.beam_period_s * 1e9));
 }
 
-Scan Deskew(const Scan& scan, std::span<const Odometry> odometry) {
+Scan Deskew(const Scan& scan, std::span<const Odometry> odometry, const DeskewOptions& options) {
   Scan still = scan;
   still.beam_period_s = 0.0;
   const bool moved = std::any_of(odometry.begin(), odometry.end(), [&](const Odometry& sample) {
@@ -160,7 +160,7 @@ Scan Deskew(const Scan& scan, std::span<const Odometry> odometry) {
   });
   if (!moved) return still;
   const std::vector<MovedEnd> ends = MovedEnds(scan, odometry);
-  Resampling resampling(scan);
+  Resampling resampling(scan, options);
   for (std::size_t i = 1; i < ends.size(); ++i) {
     if (ends[i - 1].kind == BeamClass::kHit && ends[i].kind == BeamClass::kHit)
       resampling.AddSurface(ends[i - 1], ends[i]);

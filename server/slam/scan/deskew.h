@@ -19,6 +19,13 @@
 
 namespace cairn::slam {
 
+// No keys of the configuration; `cairn-study sensitivity` halves and doubles them.
+struct DeskewOptions {
+  // Two neighbouring ends lie on one surface if they are not farther apart than this and this many beams' distance.
+  double surface_gap_m = 0.05;
+  double surface_steps = 6.0;
+};
+
 // The time from the stamp to the last beam.
 [[nodiscard]] std::uint64_t DurationNs(const Scan& scan);
 
@@ -26,6 +33,6 @@ namespace cairn::slam {
 // robot is taken to stand. The result has a beam_period_s of 0; if all samples have the same pose, only this has
 // changed. The result may have no usable beam left. REQUIRES: the scan passed ValidateScan; `odometry` is not empty and
 // its first sample is not after the scan's stamp.
-[[nodiscard]] Scan Deskew(const Scan& scan, std::span<const Odometry> odometry);
+[[nodiscard]] Scan Deskew(const Scan& scan, std::span<const Odometry> odometry, const DeskewOptions& options = {});
 
 }  // namespace cairn::slam

@@ -10,11 +10,6 @@
 namespace cairn::slam {
 namespace {
 
-// After a gap, or an unknown time, odometry counts as continued only if it has changed by less than this. A
-// robot that was switched off for a night may have driven anywhere; its odometry would be plausible after any distance.
-constexpr double kSamePlaceM = 1.0;
-constexpr double kSameHeadingRad = 1.0;
-
 // The time assumed between the last scan of a clock and the first one after the clock was set back, because the true
 // time is not known.
 constexpr Stamp kIntervalNs = kNanosPerSecond / 10;
@@ -30,11 +25,11 @@ Pose2 PoseAt(Stamp stamp, const Odometry& before, const Odometry& after) {
 }
 
 // A scan whose beams were measured one after the other is replaced by one that was taken at its stamp.
-std::shared_ptr<const Scan> WithoutMotion(const std::shared_ptr<const Scan>& scan,
-                                          const std::vector<Odometry>& during) {
+std::shared_ptr<const Scan> WithoutMotion(const std::shared_ptr<const Scan>& scan, const std::vector<Odometry>& during,
+                                          const DeskewOptions& options) {
   if (during.empty()) return scan;
   // Where the robot has turned away from everything that was hit, nothing would be left of the scan.
-  auto still = std::make_shared<const Scan>(Deskew(*scan, during));
+  auto still = std::make_shared<const Scan>(Deskew(*scan, during, options));
   return ValidateScan(*still) ? still : scan;
 }
 
@@ -129,8 +124,8 @@ bool OdometryPairing::Follows(const Odometry& odometry) const {
   const double moved_m = moved.translation().norm();
   const std::uint64_t passed_ns = NanosBetween(newest_->stamp, odometry.stamp);
   if (!time_known_ || passed_ns > Nanos(options_.max_gap_s))
-    return moved_m <= kSamePlaceM && std::abs(moved.theta) <= kSameHeadingRad;
-  return moved_m <= kSamePlaceM + options_.max_speed_m_s * 1e-9 * static_cast<double>(passed_ns);
+    return moved_m <= options_.same_place_m && std::abs(moved.theta) <= options_.same_heading_rad;
+  return moved_m <= options_.same_place_m + options_.max_speed_m_s * 1e-9 * static_cast<double>(passed_ns);
 }
 
 void OdometryPairing::Pair(const std::shared_ptr<const Scan>& scan, const Pose2& T_odom_robot) {
@@ -147,8 +142,8 @@ void OdometryPairing::Pair(const std::shared_ptr<const Scan>& scan, const Pose2&
   if (!last_paired_) passage_ = Passage::kDriven;
   last_paired_ = stamp;
   std::vector<Odometry> during = During(*scan);
-  sink_.paired({scan, WithoutMotion(scan, during), T_odom_robot, stamp, std::exchange(passage_, Passage::kDriven),
-                std::move(during)});
+  sink_.paired({scan, WithoutMotion(scan, during, options_.rolling.deskew), T_odom_robot, stamp,
+                std::exchange(passage_, Passage::kDriven), std::move(during)});
 }
 
 // Whether odometry covers the whole scan.

@@ -19,6 +19,7 @@
 #include "common/sensor/odometry.h"
 #include "common/sensor/scan.h"
 #include "common/service/ledger.h"
+#include "server/slam/scan/scan_motion.h"
 #include "server/slam/scan/stamp_gate.h"
 
 namespace cairn::slam {
@@ -31,6 +32,12 @@ struct PairingOptions {
   std::int64_t max_odometry = 1024;  // A scan that takes longer than so many samples cannot be used.
   double max_pause_s = 2.0;
   double max_speed_m_s = 3.0;
+  // No keys of the configuration. After a gap, or an unknown time, odometry counts as continued only if it has changed
+  // by less than this. A robot that was switched off for a night may have driven anywhere; its odometry would be
+  // plausible after any distance.
+  double same_place_m = 1.0;
+  double same_heading_rad = 1.0;
+  RollingOptions rolling{};
 };
 void Visit(OptionVisitor& visitor, PairingOptions& options);
 

@@ -14,6 +14,11 @@
 
 namespace cairn::slam {
 
+struct TrackScanOptions {
+  const FrontEndOptions& front_end;
+  const RollingOptions& rolling;
+};
+
 struct TrackedScan {
   std::shared_ptr<const Scan> scan;  // All beams at its stamp.
   ScanView view;
@@ -22,7 +27,7 @@ struct TrackedScan {
 
 // `scan`: all beams at its stamp, by odometry. `rolling` is the same scan as it was measured; null if it was
 // taken at once. `trail` has the scans before this one.
-[[nodiscard]] TrackedScan TrackScan(FrontEnd& front_end, const FrontEndOptions& options, const Trail& trail,
+[[nodiscard]] TrackedScan TrackScan(FrontEnd& front_end, const TrackScanOptions& options, const Trail& trail,
                                     std::shared_ptr<const Scan> scan, const RollingScan* rolling,
                                     const Pose2& T_odom_robot, const ParallelFor& parallel_for);
 

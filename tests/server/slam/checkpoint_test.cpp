@@ -295,7 +295,7 @@ TEST(Checkpoint, OfANewerFormatIsRefused) {
   saved.bytes[8] = static_cast<char>(kCheckpointFormat + 1);
   const Result<void> loaded = saved.pipeline.Load(saved.bytes);
   ASSERT_FALSE(loaded);
-  EXPECT_EQ(loaded.error().code, StatusCode::kFailedPrecondition);
+  EXPECT_EQ(loaded.error().code, StatusCode::kUnimplemented);
 }
 
 // What the checkpoint shares with the estimator never changes.

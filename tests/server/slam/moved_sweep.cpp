@@ -102,8 +102,8 @@ double DistanceM(const Pose2& a, const Pose2& b) {
 // Feeds one estimator and counts.
 class Follower {
  public:
-  explicit Follower(const Pose2& start, std::uint64_t seed)
-      : pipeline_(Options(seed), start, slam::SerialFor,
+  explicit Follower(const Pose2& start, const MovedSweepOptions& options)
+      : pipeline_(MapperOptionsOf(options), start, slam::SerialFor,
                   {.used = [this](const Scan& scan, const slam::ScanOutcome& outcome) { Judge(scan, outcome); },
                    .dropped = [](const Scan&, DropReason) {}}) {}
 
@@ -138,10 +138,10 @@ class Follower {
   [[nodiscard]] slam::ScanPipeline& pipeline() { return pipeline_; }
 
  private:
-  static slam::MapperOptions Options(std::uint64_t seed) {
-    slam::MapperOptions options;
+  static slam::MapperOptions MapperOptionsOf(const MovedSweepOptions& sweep) {
+    slam::MapperOptions options = sweep.mapper;
     options.filter.particles = 20;
-    options.seed = static_cast<std::int64_t>(seed);
+    options.seed = static_cast<std::int64_t>(sweep.seed);
     return options;
   }
   void Judge(const Scan& scan, const slam::ScanOutcome& outcome) {
@@ -214,7 +214,7 @@ struct Before {
 MovedCase After(const Before& before, const std::vector<OneDrive>& drives, const std::vector<Shown>& undisturbed,
                 const Kind& kind, const MovedSweepOptions& options, MovedCase result) {
   const OneDrive& drive = drives[kind.other_robot ? 1 : 0];
-  Follower follower({}, options.seed);
+  Follower follower({}, options);
   if (!follower.pipeline().Load(before.state)) std::abort();
   if (kind.new_client) follower.pipeline().NewClient();
   const double until_s = before.seconds + kind.skipped_s;
@@ -262,7 +262,7 @@ MovedCase After(const Before& before, const std::vector<OneDrive>& drives, const
 // The state at each moment of the drive as it is without a gap.
 std::vector<Before> RunUndisturbed(const OneDrive& drive, const MovedSweepOptions& options, std::vector<Shown>* shown) {
   std::vector<Before> moments;
-  Follower follower(drive.T_map_robot_start, options.seed);
+  Follower follower(drive.T_map_robot_start, options);
   MovedCase undisturbed;
   follower.Watch(drive.truth, 0, &undisturbed);
   Before now;

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "server/slam/mapper_options.h"
+
 namespace cairn::test {
 
 struct MovedSweepOptions {
@@ -17,6 +19,7 @@ struct MovedSweepOptions {
   double between_s = 45.0;      // ... the time between two of them.
   double watched_again_s = 60;  // How long each robot is followed afterwards.
   std::uint64_t seed = 1;
+  slam::MapperOptions mapper;  // Its number of particles and its seed are those of the sweep.
   // Only kinds whose name contains this.
   std::string only{};
   // Called after every case.

@@ -79,4 +79,14 @@ inline std::uint64_t DurableScans(WholeServer& house) {
   return status.robots.empty() || status.robots[0].ledgers.empty() ? 0 : status.robots[0].ledgers[0].durable_through;
 }
 
+// A server with two robots, which then stops.
+inline void DriveTwoRobots(const std::filesystem::path& state, const ServerOptions& options) {
+  StoredServer server(state, options);
+  for (const char* robot : {"r1", "r2"}) {
+    server->Open(robot, kDriver);
+    server->Drive(robot, kDriver, 0, 60);
+  }
+  ASSERT_TRUE(server->WaitFor([&] { return server->LastLedger("r2").durable_through == 60; }));
+}
+
 }  // namespace cairn::server::testing

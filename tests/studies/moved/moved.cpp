@@ -1,9 +1,11 @@
 // cairn-study moved follows robots that nobody watched for a while: how many poses are called localized at a wrong
-// place, how many robots are found again, and after which time and way.
+// place, how many robots are found again, and after which time and way. --only constants: the same with each constant
+// of the recovery halved and doubled.
 #include <algorithm>
 #include <map>
 
 #include "tests/server/slam/moved_sweep.h"
+#include "tests/studies/sensitivity/constants.h"
 #include "tests/studies/study.h"
 
 namespace cairn::studies {
@@ -42,7 +44,48 @@ void AddTable(Report& report, const std::map<std::string, Tally>& tallies, const
   report.Add(table, "moved by " + by);
 }
 
+// One moment of each drive, all kinds, one seed.
+Tally TallyWith(const StudyContext& context, const slam::MapperOptions& mapper) {
+  Tally tally;
+  test::MovedSweepOptions options;
+  options.moments = 1;
+  options.seed = context.seed;
+  options.mapper = mapper;
+  options.done = [&tally](const test::MovedCase& one) { AddTo(tally, one); };
+  if (context.quick) options.worlds = {"room"};
+  static_cast<void>(test::RunMovedSweep(options));
+  return tally;
+}
+
+void StudyConstants(StudyContext& context) {
+  Table table({"constant", "value", "wrong", "largest error (m)", "found again", "after p50 (s)", "p90 (s)"});
+  const auto add = [&](const std::string& name, const std::string& value, const slam::MapperOptions& mapper) {
+    const Tally tally = TallyWith(context, mapper);
+    const std::vector<std::string> row{name,
+                                       value,
+                                       Count(tally.wrong),
+                                       Number(tally.worst_m, 2),
+                                       Percent(static_cast<double>(tally.found_s.size()) / tally.cases),
+                                       Number(Quantile(tally.found_s, 0.5), 1),
+                                       Number(Quantile(tally.found_s, 0.9), 1)};
+    std::string line;
+    for (const std::string& cell : row) line += cell + " ";
+    context.report.Progress(line);
+    table.Add(row);
+  };
+  add("default", "", {});
+  for (const Constant& constant : RecoveryConstants()) {
+    for (const int direction : {-1, 1}) {
+      slam::MapperOptions mapper;
+      const double value = constant.change(mapper, direction);
+      add(constant.name, Number(value, 3), mapper);
+    }
+  }
+  context.report.Add(table, "moved constants");
+}
+
 void StudyMoved(StudyContext& context) {
+  if (context.only == "constants") return StudyConstants(context);
   Report& report = context.report;
   std::map<std::string, Tally> by_kind, by_world, all;
   bool stood_still = true;

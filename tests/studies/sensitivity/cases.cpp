@@ -79,9 +79,9 @@ std::vector<Drive> SimulatedDrives(std::uint64_t seed) {
           {"room", 60.0, cheap}};
 }
 
-void AddRealLog(StudyContext& context, const std::string& name, Case like, std::vector<Case>& cases,
-                int max_scans = 0) {
-  auto log = OpenRealLog(context, name, max_scans);
+void AddRealLog(StudyContext& context, const std::string& name, Case like, std::vector<Case>& cases, int max_scans = 0,
+                const LidarTiming& timing = {}) {
+  auto log = OpenRealLog(context, name, max_scans, timing);
   if (!log) return;
   like.name = max_scans > 0 ? log->name + " (first " + Count(max_scans) + " scans)" : log->name;
   like.log = *std::move(log);
@@ -124,6 +124,31 @@ void AddUsualCases(StudyContext& context, const Case& like, std::vector<Case>& c
   AddKillian(context, like, cases);
 }
 
+// Lidars that turn slowly, and what is known of how they turn.
+void AddRollingCases(StudyContext& context, const Case& like, std::vector<Case>& cases) {
+  Case one = like;
+  one.group = "small robots";
+  one.yardstick = Yardstick::kCrispness;
+  const auto turns = [](double scan_period_s, bool clockwise) {
+    return LidarTiming{scan_period_s, StampAt::kMiddle, clockwise, 0.0};
+  };
+  AddRealLog(context, "lowcost/maebot_rplidara1_convex", one, cases, context.Pick(0, 50), turns(0.147, true));
+  AddRealLog(context, "lowcost/turtlebot4_rplidara1_mac2", one, cases, context.Pick(0, 50), turns(0.13, true));
+  AddRealLog(context, "lowcost/slambot_rplidara1_6AUG14_16m", one, cases, context.Pick(0, 50), turns(0.182, true));
+  for (Drive& drive : SimulatedDrives(context.seed)) {
+    drive.robot.laser.sweep_s = 0.9 / drive.robot.scan_hz;
+    AddDrive(context, drive, like, cases);
+    cases.back().name += ", rolling";
+  }
+}
+
+// The scans from which the estimator draws its map, with the motion of the robot taken out of them.
+StudyLog DrawnScans(const slam::MapperSnapshot& snapshot) {
+  StudyLog log;
+  for (const slam::Keyframe& keyframe : snapshot.keyframes) log.records.emplace_back(*keyframe.scan);
+  return log;
+}
+
 }  // namespace
 
 std::vector<Case> CasesOf(StudyContext& context, Runs runs) {
@@ -149,6 +174,11 @@ std::vector<Case> CasesOf(StudyContext& context, Runs runs) {
         AddUsualCases(context, like, cases);
       break;
     }
+    case Runs::kRolling:
+      AddRollingCases(context, like, cases);
+      break;
+    case Runs::kMoved:  // Cases of their own: the study `moved`.
+      break;
     case Runs::kDpSlam:
       like.options.filter.kind = slam::FilterKind::kDpSlam;
       like.options.filter.particles = 40;
@@ -188,7 +218,11 @@ Figures MeasureRun(const Case& one, const slam::MapperOptions& options) {
       break;
     }
     case Yardstick::kCrispness: {
-      const MapCrispness online = CrispnessOf(one.log, run.online), after = CrispnessOf(one.log, smoothed);
+      // In scans as they were measured, the motion of the robot blurs walls whatever their poses are.
+      const bool rolling = one.runs == Runs::kRolling;
+      const StudyLog drawn = rolling ? DrawnScans(run.snapshot) : StudyLog{};
+      const StudyLog& scans = rolling ? drawn : one.log;
+      const MapCrispness online = CrispnessOf(scans, run.online), after = CrispnessOf(scans, smoothed);
       figures = {{"online blur", online.blur_m},
                  {"online thickness", online.thickness_m},
                  {"smoothed blur", after.blur_m},

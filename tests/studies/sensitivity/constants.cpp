@@ -157,6 +157,47 @@ void AddSelfCheck(std::vector<Constant>& all) {
   all.push_back(Share("self_check: max_conflict", runs, CAIRN_FIELD(self_check.max_conflict)));
 }
 
+void AddRolling(std::vector<Constant>& all) {
+  const Runs runs = Runs::kRolling;
+  all.push_back(Of("rolling: surface_gap_m", runs, CAIRN_FIELD(pairing.rolling.deskew.surface_gap_m)));
+  all.push_back(Of("rolling: surface_steps", runs, CAIRN_FIELD(pairing.rolling.deskew.surface_steps)));
+  all.push_back(Of("rolling: longest_s", runs, CAIRN_FIELD(pairing.rolling.longest_s)));
+  all.push_back(Of("rolling: worthwhile_m", runs, CAIRN_FIELD(pairing.rolling.worthwhile_m)));
+  all.push_back(Of("rolling: worthwhile_rad", runs, CAIRN_FIELD(pairing.rolling.worthwhile_rad)));
+  all.push_back(Of("rolling: most_looks", runs, CAIRN_FIELD(pairing.rolling.most_looks)));
+}
+
+void AddPairing(std::vector<Constant>& all) {
+  const Runs runs = Runs::kMoved;
+  all.push_back(Of("pairing: max_pause_s", runs, CAIRN_FIELD(pairing.max_pause_s)));
+  all.push_back(Of("pairing: max_speed_m_s", runs, CAIRN_FIELD(pairing.max_speed_m_s)));
+  all.push_back(Of("pairing: same_place_m", runs, CAIRN_FIELD(pairing.same_place_m)));
+  all.push_back(Of("pairing: same_heading_rad", runs, CAIRN_FIELD(pairing.same_heading_rad)));
+}
+
+void AddRecovery(std::vector<Constant>& all) {
+  const Runs runs = Runs::kMoved;
+  all.push_back(Of("recovery: place.coarser", runs, CAIRN_FIELD(recovery.place.coarser)));
+  all.push_back(Of("recovery: place.map_reach_m", runs, CAIRN_FIELD(recovery.place.map_reach_m)));
+  all.push_back(Share("recovery: place.min_explained", runs, CAIRN_FIELD(recovery.place.min_explained)));
+  all.push_back(Of("recovery: place.min_compared", runs, CAIRN_FIELD(recovery.place.min_compared)));
+  all.push_back(Of("recovery: place.near_keyframes", runs, CAIRN_FIELD(recovery.place.near_keyframes)));
+  all.push_back(Of("recovery: place.apart_m", runs, CAIRN_FIELD(recovery.place.apart_m)));
+  all.push_back(Share("recovery: place.max_conflict", runs, CAIRN_FIELD(recovery.place.max_conflict)));
+  all.push_back(Of("recovery: on_path_m", runs, CAIRN_FIELD(recovery.on_path_m)));
+  all.push_back(Of("recovery: on_path_rad", runs, CAIRN_FIELD(recovery.on_path_rad)));
+  all.push_back(Of("recovery: still_m", runs, CAIRN_FIELD(recovery.still_m)));
+  all.push_back(Of("recovery: still_rad", runs, CAIRN_FIELD(recovery.still_rad)));
+  all.push_back(Of("recovery: same_range_m", runs, CAIRN_FIELD(recovery.same_range_m)));
+  all.push_back(Of("recovery: same_range_per_m", runs, CAIRN_FIELD(recovery.same_range_per_m)));
+  all.push_back(Share("recovery: unchanged", runs, CAIRN_FIELD(recovery.unchanged)));
+  all.push_back(Share("recovery: unchanged_along_corridor", runs, CAIRN_FIELD(recovery.unchanged_along_corridor)));
+  all.push_back(Of("recovery: short_pause_s", runs, CAIRN_FIELD(recovery.short_pause_s)));
+  all.push_back(Of("recovery: as_odometry_m", runs, CAIRN_FIELD(recovery.as_odometry_m)));
+  all.push_back(Of("recovery: as_odometry_per_m", runs, CAIRN_FIELD(recovery.as_odometry_per_m)));
+  all.push_back(Of("recovery: as_odometry_rad", runs, CAIRN_FIELD(recovery.as_odometry_rad)));
+}
+
 void AddTheses(std::vector<Constant>& all) {
   all.push_back(Of("dpslam: low.unseen_per_m", Runs::kDpSlam, CAIRN_FIELD(filter.dpslam.low.unseen_per_m)));
   all.push_back(Of("dpslam: high.unseen_per_m", Runs::kDpSlam, CAIRN_FIELD(filter.dpslam.high.unseen_per_m)));
@@ -177,7 +218,15 @@ std::vector<Constant> AllConstants() {
   AddRevisits(all);
   AddLoops(all);
   AddSelfCheck(all);
+  AddRolling(all);
   AddTheses(all);
+  return all;
+}
+
+std::vector<Constant> RecoveryConstants() {
+  std::vector<Constant> all;
+  AddPairing(all);
+  AddRecovery(all);
   return all;
 }
 

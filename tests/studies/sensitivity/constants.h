@@ -17,6 +17,8 @@ enum class Runs : std::uint8_t {
   kLoops,      // ... and on the longest, whose large loops only these constants concern.
   kDpSlam,     // The filter dpslam instead.
   kNdtAlone,   // The matcher ndt, without odometry and without the refinement.
+  kRolling,    // Lidars that measure one beam after the other, with the timing that is known of them.
+  kMoved,      // Robots that nobody watched for a while: the study `moved` runs them.
   kSelfCheck,  // Only the verdicts of the self check, along paths made once.
 };
 
@@ -29,5 +31,7 @@ struct Constant {
 };
 
 [[nodiscard]] std::vector<Constant> AllConstants();
+// Those of the study `moved`, which are not among AllConstants.
+[[nodiscard]] std::vector<Constant> RecoveryConstants();
 
 }  // namespace cairn::studies

@@ -20,10 +20,11 @@ namespace {
 constexpr std::array<int, 2> kDirections = {-1, 1};  // Halved, doubled.
 constexpr int kOtherSeeds = 4;
 constexpr std::array<double, 2> kNudges = {0.99, 1.01};
-constexpr std::array<Runs, 5> kAllRuns = {Runs::kUsual, Runs::kSelfCheck, Runs::kDpSlam, Runs::kNdtAlone, Runs::kLoops};
+constexpr std::array<Runs, 6> kAllRuns = {Runs::kUsual,  Runs::kRolling,  Runs::kSelfCheck,
+                                          Runs::kDpSlam, Runs::kNdtAlone, Runs::kLoops};
 
 std::string KindOf(Runs runs) {
-  constexpr std::array<const char*, 5> kNames = {"usual", "loops", "dpslam", "ndt", "self_check"};
+  constexpr std::array<const char*, 7> kNames = {"usual", "loops", "dpslam", "ndt", "rolling", "moved", "self_check"};
   return kNames[static_cast<std::size_t>(runs)];
 }
 

@@ -1,0 +1,43 @@
+// What it takes to believe where a robot is that was not watched all the time. These are no keys of the configuration;
+// `cairn-study moved --only constants` halves and doubles each of them.
+#pragma once
+
+#include <cstdint>
+
+namespace cairn::slam {
+
+// When a place found in the map counts (place_search.h).
+struct PlaceSearchOptions {
+  double coarser = 2.0;             // Cells of the search, in those of the search for a loop: a whole map is searched.
+  double map_reach_m = 300.0;       // Only the map within this distance of the last pose is searched.
+  double min_explained = 0.7;       // Share of the recent surfaces that must lie on surfaces of the map.
+  std::int64_t min_compared = 20;   // Points that must be compared for an agreement to count.
+  std::int64_t near_keyframes = 4;  // Old keyframes that a scan is compared with, ...
+  double apart_m = 1.0;             // ... so far apart along the path.
+  // Largest share of the points compared that may contradict a place. In the worlds of the study `moved` true places
+  // have 0.00, and false ones, which look like them, from 0.05 on.
+  double max_conflict = 0.03;
+};
+
+struct RecoveryOptions {
+  PlaceSearchOptions place;
+  // A place found this near to the path, and with this heading, is the one on the path.
+  double on_path_m = 0.3;
+  double on_path_rad = 0.1;
+  // A robot has not moved if its odometry has changed by less than this, and at least this share of the beams shows the
+  // same range. Along a corridor more beams must show the same, because most do so everywhere along it.
+  double still_m = 0.02;
+  double still_rad = 0.02;
+  double same_range_m = 0.1;
+  double same_range_per_m = 0.01;
+  double unchanged = 0.95;
+  double unchanged_along_corridor = 0.98;
+  // The longest pause after which scan, odometry and map together may confirm the place at once, and the largest
+  // difference between scan and odometry then.
+  double short_pause_s = 10.0;
+  double as_odometry_m = 0.15;
+  double as_odometry_per_m = 0.1;
+  double as_odometry_rad = 0.1;
+};
+
+}  // namespace cairn::slam
