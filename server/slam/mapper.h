@@ -53,8 +53,8 @@ class Mapper {
   // map, at least until its place is known.
   // `passage` is what lies between this scan and the one before it. Where that is a pause in which the scan does not
   // agree with the map, or is not known, the robot is not localized until it has been found in its map
-  // (recovery/recovery.h). `rolling`: the same scan as it was measured, if its beams were measured one after the other
-  // (tracking/scan_tracking.h).
+  // (recovery/recovery.h); such scans are not in the snapshot unless they become keyframes. `rolling`: the same scan as
+  // it was measured, if its beams were measured one after the other (tracking/scan_tracking.h).
   ScanOutcome Process(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot, const ParallelFor& parallel_for,
                       Passage passage = Passage::kDriven, const RollingScan* rolling = nullptr);
 

@@ -19,9 +19,7 @@
 
 namespace cairn::slam {
 
-// No keys of the configuration; `cairn-study sensitivity` halves and doubles them.
 struct DeskewOptions {
-  // Two neighbouring ends lie on one surface if they are not farther apart than this and this many beams' distance.
   double surface_gap_m = 0.05;
   double surface_steps = 6.0;
 };

@@ -55,6 +55,8 @@ void Visit(OptionVisitor& visitor, PairingOptions& options) {
   visitor.Real("max_speed_m_s", options.max_speed_m_s, "m/s", 0.1, 1000.0,
                "Odometry that moves faster, by a metre or more, has begun anew. The place of the robot is then not "
                "known.");
+  visitor.Section("rolling", "Scans whose beams were measured one after the other.",
+                  [&] { Visit(visitor, options.rolling); });
   visitor.Require(options.max_gap_s <= options.max_stamp_jump_s, "max_gap_s", "must not exceed", "max_stamp_jump_s");
 }
 

@@ -17,6 +17,20 @@ Pose2 Share(const Pose2& step, double share) {
 
 }  // namespace
 
+void Visit(OptionVisitor& visitor, RollingOptions& options) {
+  visitor.Real(
+      "surface_gap_m", options.deskew.surface_gap_m, "m", 0.0, 10.0,
+      "Two neighbouring points of a scan lie on one surface if their distance is at most this and surface_steps "
+      "times the distance of two beams there. Between them the moved scan is interpolated.");
+  visitor.Real("surface_steps", options.deskew.surface_steps, "1", 0.0, 1000.0, "See surface_gap_m.");
+  visitor.Real(
+      "worthwhile_m", options.worthwhile_m, "m", 0.0, 10.0,
+      "Where the match shows another motion during the scan than was assumed, the motion is taken out of the "
+      "scan anew if its last beam moves by this much, or by worthwhile_rad. The default is the noise of a cheap "
+      "lidar and the distance of two of its beams.");
+  visitor.Real("worthwhile_rad", options.worthwhile_rad, "rad", 0.0, 3.2, "See worthwhile_m.");
+}
+
 std::vector<Odometry> AtConstantVelocity(const Scan& scan, const Pose2& step, double seconds) {
   const std::uint64_t duration_ns = DurationNs(scan);
   const Pose2 piece = Share(step, 1e-9 * static_cast<double>(duration_ns) / (kPieces * seconds));

@@ -7,24 +7,25 @@
 #include <memory>
 #include <vector>
 
+#include "common/options/option_visitor.h"
 #include "common/sensor/odometry.h"
 #include "common/sensor/scan.h"
 #include "server/slam/scan/deskew.h"
 
 namespace cairn::slam {
 
-// How the motion is found in scans whose beams were measured one after the other. No keys of the configuration;
-// `cairn-study sensitivity` halves and doubles them.
+// How the motion is found in scans whose beams were measured one after the other.
 struct RollingOptions {
   DeskewOptions deskew;
-  double longest_s = 1.0;  // A speed that is older than this is not used.
-  // A scan is computed anew if its last beam moves by so much: a beam of a cheap lidar, and its noise.
   double worthwhile_m = 0.01;
   double worthwhile_rad = 0.01;
+  // No keys of the configuration:
+  double longest_s = 1.0;  // A speed that is older than this is not used.
   // The step to a scan with the wrong motion in it is itself wrong by up to half of the error of that motion, so that
   // the first look halves the error only.
   std::int64_t most_looks = 4;
 };
+void Visit(OptionVisitor& visitor, RollingOptions& options);
 
 // A scan whose beams were measured one after the other, as it was measured, and the odometry meanwhile: from the last
 // sample at or before its stamp to the first one at or after its last beam.

@@ -56,7 +56,8 @@ struct RevisitObservation {
 
 // The state of a mapper at one moment as jobs use it, shared without locks: the keyframes, the path of the
 // best particle through them (full SLAM), the relations between them, and the pose of every scan relative to
-// the last keyframe before it.
+// the last keyframe before it. Of the scans during which the robot's place was not certain (recovery.h), only those are
+// here that became keyframes later.
 struct MapperSnapshot {
   std::vector<Keyframe> keyframes;
   std::vector<Pose2> online_path;  // T_map_robot per keyframe with which it was drawn into the grid.

@@ -44,11 +44,12 @@ void AddTable(Report& report, const std::map<std::string, Tally>& tallies, const
   report.Add(table, "moved by " + by);
 }
 
-// One moment of each drive, all kinds, one seed.
+// One moment of each drive, all kinds, one seed; half a minute after it.
 Tally TallyWith(const StudyContext& context, const slam::MapperOptions& mapper) {
   Tally tally;
   test::MovedSweepOptions options;
   options.moments = 1;
+  options.watched_again_s = 30.0;
   options.seed = context.seed;
   options.mapper = mapper;
   options.done = [&tally](const test::MovedCase& one) { AddTo(tally, one); };
