@@ -56,12 +56,12 @@ class ChildProcess {
   void Signal(int signal) const { kill(pid_, signal); }
 
   // Whether it still runs after at most this long. Its output must fit into the pipe until Wait reads it (64 KiB).
-  bool RunningAfter(std::chrono::milliseconds time) const {
+  bool RunningAfter(std::chrono::microseconds time) const {
     siginfo_t info{};
     const auto end = std::chrono::steady_clock::now() + time;
     while (waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0) {
       if (std::chrono::steady_clock::now() >= end) return true;
-      usleep(2000);
+      usleep(500);
     }
     return false;
   }

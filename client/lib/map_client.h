@@ -61,7 +61,7 @@ class MapClient {
   CondVar changed_;
   std::optional<TileMirror> mirror_ CAIRN_GUARDED_BY(mutex_);
   Clock::time_point last_value_ CAIRN_GUARDED_BY(mutex_);  // When the last value of the site arrived.
-  int number_ CAIRN_GUARDED_BY(mutex_) = 0;                // Of the wire whose values count.
+  int number_ CAIRN_GUARDED_BY(mutex_) = 0;                // The number of the wire whose values count.
   bool stopping_ CAIRN_GUARDED_BY(mutex_) = false;
   std::unique_ptr<QueryClient> queries_;  // The watcher's, from the first silence on.
   std::unique_ptr<Wire> wire_ CAIRN_GUARDED_BY(mutex_);

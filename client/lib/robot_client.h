@@ -99,7 +99,7 @@ class RobotClient {
   using Clock = std::chrono::steady_clock;
   // What connects the client with the servers of the domain.
   struct Wire {
-    int number = 0;                  // Of the wires of this client.
+    int number = 0;                  // Counts the wires of this client.
     std::unique_ptr<wire::Bus> own;  // Null for the first, which uses the caller's.
     wire::Bus* bus = nullptr;
     std::unique_ptr<wire::Publication<SessionRequest>> session;

@@ -218,7 +218,7 @@ class LogEmitter {
   LogReaderOptions options_;
   const std::function<bool(LogRecord&&)>& sink_;
   LogSummary summary_;
-  LidarTiming logged_timing_;     // Of the lines so far.
+  LidarTiming logged_timing_;     // What the lines so far say.
   std::optional<Pose2> pending_;  // DP-SLAM odometry waiting for its laser message.
   std::int64_t dpslam_pairs_ = 0;
   Stamp last_odometry_stamp_ = 0;

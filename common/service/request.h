@@ -95,7 +95,7 @@ struct SavedSite {
   std::string name;
   std::string site;  // Empty where the file cannot be read.
   std::uint64_t bytes = 0;
-  Stamp saved = 0;  // Of the server's clock.
+  Stamp saved = 0;  // By the server's clock.
 };
 
 // Large answers come in parts of < 64 KB each, `part` from 0; the one with `last` ends them.

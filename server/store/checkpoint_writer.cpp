@@ -11,7 +11,8 @@ namespace {
 
 constexpr std::uint64_t kParts = 65536;  // Record numbers for the main part of each checkpoint.
 constexpr std::uint64_t kFirstPiece = std::uint64_t{1} << 63;
-constexpr std::uint64_t kFirstRest = kFirstPiece + (std::uint64_t{1} << 62);  // Of the pieces, all parts but the first.
+constexpr std::uint64_t kFirstRest =
+    kFirstPiece + (std::uint64_t{1} << 62);  // All parts of the pieces but their first ones.
 constexpr std::uint64_t kMostPieces = std::uint64_t{1} << 46;
 
 RecordRange Range(std::uint64_t session, std::uint64_t first, std::uint64_t last) {
@@ -171,7 +172,8 @@ class CheckpointReader {
   Result<void> TakePiece(std::uint64_t number, std::uint64_t part, std::string_view bytes) {
     if (!newest_) return {};
     const auto piece = newest_->parts.find(number);
-    if (piece == newest_->parts.end() || part >= piece->second) return {};  // Of one that was never completed.
+    if (piece == newest_->parts.end() || part >= piece->second)
+      return {};  // It belongs to a piece that was never completed.
     if (read_[number]++ != part) return Unreadable("a checkpoint");
     newest_->pieces[number].append(bytes);
     return {};
@@ -179,8 +181,8 @@ class CheckpointReader {
 
   std::optional<StoredCheckpoint> newest_;
   record::CheckpointHead head_;
-  std::uint32_t parts_ = 0;                      // Of the main part, read so far.
-  std::map<std::uint64_t, std::uint32_t> read_;  // Of each piece.
+  std::uint32_t parts_ = 0;                      // How many parts of the main part were read so far.
+  std::map<std::uint64_t, std::uint32_t> read_;  // How many parts of each piece were read so far.
 };
 
 }  // namespace

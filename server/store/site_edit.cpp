@@ -33,7 +33,7 @@ Values TakeOut(Values& values, Chosen chosen) {
 struct Division {
   SiteContents contents;
   std::set<std::uint64_t> going;  // Sessions.
-  std::set<std::string> robots;   // Of these sessions.
+  std::set<std::string> robots;   // The robots of these sessions.
   std::vector<StoredVersion> staying_versions, going_versions;
   StoredSite going_site;
 };

@@ -45,10 +45,14 @@ void Visit(OptionVisitor& visitor, PairingOptions& options) {
       "jump_confirmations", options.jump_confirmations, "stamps", 2, 1000,
       "Number of time stamps in a row that agree on a new time, ahead or back, after which the clock counts "
       "as changed.");
-  visitor.Integer("max_waiting_scans", options.max_waiting_scans, "scans", 1, 10000,
-                  "Scans that may wait for odometry. When there are more, the oldest is dropped.");
-  visitor.Integer("max_odometry", options.max_odometry, "samples", 2, 100000,
-                  "Odometry samples that are kept for later scans. When there are more, the oldest is dropped.");
+  visitor.Integer(
+      "max_waiting_scans", options.max_waiting_scans, "scans", 1, 10000,
+      "Scans that may wait for odometry. When there are more, the oldest is dropped. A scan whose beams were "
+      "measured one after the other waits until there is odometry at its last beam.");
+  visitor.Integer(
+      "max_odometry", options.max_odometry, "samples", 2, 100000,
+      "Odometry samples that are kept for later scans. When there are more, the oldest is dropped. They must "
+      "cover the longest scan: a scan of 1 s with odometry at 100 Hz needs more than 100.");
   visitor.Real("max_pause_s", options.max_pause_s, "s", 0.1, 1e7,
                "After a longer time between two scans the robot counts as localized only if its scan agrees with its "
                "map where odometry says that it is. After more than 10 s it has to be found in its map.");

@@ -1,6 +1,7 @@
 // cairn-study checkpoints: how large the saved state of an estimator is and how long saving and loading it take, over
-// an hour of one robot and over a published log; and, for every filter on mit-csail, whether an estimator that is
-// stopped and loaded again at every tenth scan gives the same bytes as one that was never stopped.
+// an hour of one robot and over a published log, and at every hour of a day (--only day, --hours); and, for every
+// filter on mit-csail, whether an estimator that is stopped and loaded again at every tenth scan gives the same bytes
+// as one that was never stopped.
 #include <algorithm>
 #include <memory>
 
@@ -55,6 +56,9 @@ double MeasureSaving(slam::ScanPipeline& pipeline, const slam::MapperOptions& op
              Count(static_cast<long long>(pipeline.mapper().keyframe_count())),
              Number(static_cast<double>(bytes.size()) / 1e6, 2), Number(pause_ms, 2), Number(bytes_ms, 1),
              Number(load_ms, 1)});
+  context.report.Progress(Count(static_cast<long long>(scans)) + " scans: " +
+                          Number(static_cast<double>(bytes.size()) / 1e6, 2) + " MB, pause " + Number(pause_ms, 2) +
+                          " ms, bytes " + Number(bytes_ms, 1) + " ms, loading " + Number(load_ms, 1) + " ms");
   return pause_ms;
 }
 
@@ -86,6 +90,31 @@ void StudyCost(StudyContext& context) {
     }
   }
   report.Add(table, "cost");
+  report.Expect(longest_ms <= kLongestPauseMs, "saving makes the estimator wait for more than 20 ms");
+}
+
+// One robot for a day in one building: a row for each hour.
+void StudyDay(StudyContext& context) {
+  Report& report = context.report;
+  report.Heading("Size and time over a day");
+  const double hours = context.hours > 0.0 ? context.hours : context.Pick(24.0, 0.05);
+  Table table({"log", "scans", "keyframes", "size (MB)", "pause (ms)", "bytes (ms)", "loading (ms)"});
+  sim::FleetOptions options;
+  options.seed = context.seed;
+  const StudyLog log = SimulateLog("building", 3600.0 * hours, options);
+  const auto hour = std::max<std::size_t>(1, static_cast<std::size_t>(static_cast<double>(log.scans()) / hours));
+  slam::MapperOptions mapper;
+  slam::ScanPipeline pipeline(mapper, log.T_map_robot_start, slam::SerialFor, Ignoring());
+  double longest_ms = 0.0;
+  std::size_t scans = 0;
+  for (const LogRecord& record : log.records) {
+    Add(pipeline, record);
+    if (!std::holds_alternative<Scan>(record)) continue;
+    if (++scans % 10 == 0) (void)pipeline.mapper().TakeGridChange();
+    if (scans % hour != 0 && scans != log.scans()) continue;
+    longest_ms = std::max(longest_ms, MeasureSaving(pipeline, mapper, log, scans, context, table));
+  }
+  report.Add(table, "day");
   report.Expect(longest_ms <= kLongestPauseMs, "saving makes the estimator wait for more than 20 ms");
 }
 
@@ -149,6 +178,7 @@ void StudySameBytes(StudyContext& context) {
 
 void RunCheckpoints(StudyContext& context) {
   if (context.Wants("cost")) StudyCost(context);
+  if (context.only == "day") return StudyDay(context);  // Takes long and much memory: only when it is asked for.
   StudySameBytes(context);
 }
 

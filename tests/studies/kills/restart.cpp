@@ -106,7 +106,8 @@ RestartTimes MeasureRestarts(StudyContext& context) {
   const auto bus = wire::Bus::Create(wire, "restart");
   if (!bus) throw std::runtime_error(bus.error().message);
   std::mt19937_64 random(context.seed);
-  for (int kill = 0; kill < context.Pick(100, 3); ++kill) {
+  const int kills = context.runs > 0 ? context.runs : context.Pick(100, 3);
+  for (int kill = 0; kill < kills; ++kill) {
     const auto queries = client::QueryClient::Create(**bus, {.timeout_s = 0.3});
     if (!queries) throw std::runtime_error(queries.error().message);
     const auto start = Clock::now();

@@ -2,8 +2,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <csignal>
+#include <functional>
+#include <map>
 #include <optional>
+#include <random>
+#include <set>
 #include <sstream>
 
 #include "client/cli/program.h"
@@ -54,6 +59,44 @@ class CairnSite : public ::testing::Test {
   std::string PathOf(const std::string& robot) {
     MustJson({"path", robot, "-o", File("path.tum")});
     return directory_.Read("path.tum");
+  }
+  // The sites of a state directory and the robots that have sessions in each.
+  static std::map<std::string, std::set<std::string>> SitesIn(const std::string& state) {
+    std::map<std::string, std::set<std::string>> sites;
+    const nlohmann::json listed = MustJson({"site", "list", "--state", state});
+    for (const auto& site : listed["sites"]) {
+      std::set<std::string>& robots = sites[site["site"].get<std::string>()];
+      for (const auto& session : site["sessions"]) robots.insert(session["robot"].get<std::string>());
+    }
+    return sites;
+  }
+  // Runs `cairn site COMMAND... --state DIR` on copies of a state directory, and kills it at random moments between its
+  // start and its usual end. Calls `check` with the directory that is left. Returns how often it was still running.
+  int KillAtRandom(const std::string& state, std::vector<std::string> command,
+                   const std::function<void(const std::string& state)>& check) {
+    constexpr int kKills = 12;
+    command.insert(command.begin(), {CAIRN_PATH, "site"});
+    command.insert(command.end(), {"--state", ""});
+    const auto start = [&](const std::string& copy) {
+      std::filesystem::copy(File(state), File(copy), std::filesystem::copy_options::recursive);
+      command.back() = File(copy);
+      return ChildProcess(command);
+    };
+    const auto begin = std::chrono::steady_clock::now();
+    EXPECT_EQ(start(state + "-whole").Wait().exit_code, 0);
+    const auto usual = std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::steady_clock::now() - begin);
+    std::mt19937_64 random(1);
+    std::uniform_int_distribution<std::int64_t> moment_us(0, usual.count());
+    int running = 0;
+    for (int i = 0; i < kKills; ++i) {
+      const std::string copy = state + "-" + std::to_string(i);
+      ChildProcess killed = start(copy);
+      running += killed.RunningAfter(std::chrono::microseconds(moment_us(random))) ? 1 : 0;
+      killed.Signal(SIGKILL);
+      static_cast<void>(killed.Wait());
+      check(File(copy));
+    }
+    return running;
   }
   [[nodiscard]] std::string File(const std::string& name) const { return (directory_ / name).string(); }
 
@@ -130,6 +173,42 @@ TEST_F(CairnSite, FilesAreMergedSplitAndShortened) {
   const SiteOutcome bad = Cairn({"site", "import", File("bad.site"), "--state", File("d")});
   EXPECT_EQ(bad.code, ExitCode::kFailed);
   EXPECT_THAT(bad.err, HasSubstr("DATA_LOSS"));
+}
+
+// Whatever the moment, a site is there as a whole or not at all, the others are untouched, and the same command works
+// afterwards.
+TEST_F(CairnSite, AKilledCommandHasChangedEverythingOrNothing) {
+  for (const std::string& site : {std::string("hall"), std::string("annex")}) {
+    ASSERT_NO_FATAL_FAILURE(StartServer(site));
+    Stream(site, site == "hall" ? "h" : "a");
+    StopServer();
+    MustJson({"site", "export", site, "--state", File(site), "-o", File(site + ".site")});
+  }
+  using Sites = std::map<std::string, std::set<std::string>>;
+  const Sites one = {{"annex", {"a1", "a2"}}};
+  const Sites both = {{"annex", {"a1", "a2"}}, {"hall", {"h1", "h2"}}};
+  const Sites merged = {{"annex", {"a1", "a2", "h1", "h2"}}};
+  // What there is of it can be read to the end: the export reads every record.
+  const auto is_whole = [&](const std::string& state, const Sites& sites) {
+    for (const auto& [site, robots] : sites)
+      EXPECT_EQ(MustJson({"site", "export", site, "--state", state, "-o", File("again.site")})["sessions"].size(),
+                robots.size());
+  };
+  const int importing = KillAtRandom("annex", {"import", File("hall.site")}, [&](const std::string& state) {
+    const Sites sites = SitesIn(state);
+    EXPECT_THAT(sites, ::testing::AnyOf(one, both));
+    is_whole(state, sites);
+    if (sites == one) MustJson({"site", "import", File("hall.site"), "--state", state});
+    EXPECT_EQ(SitesIn(state), both);
+  });
+  const int merging = KillAtRandom("annex-whole", {"merge", "annex", "hall", "--transform", "30,0,90deg"},
+                                   [&](const std::string& state) {
+                                     const Sites sites = SitesIn(state);
+                                     EXPECT_THAT(sites, ::testing::AnyOf(both, merged));
+                                     is_whole(state, sites);
+                                   });
+  EXPECT_GT(importing, 0);
+  EXPECT_GT(merging, 0);
 }
 
 }  // namespace
