@@ -189,6 +189,7 @@ TEST_P(Unwatched, IsNotLocalizedUntilItIsFoundAndNeverBesideTheTruth) {
   const Seen* const found = First(seen, away.to_s, true);
   ASSERT_NE(found, nullptr);
   EXPECT_LT(ErrorOf(*found), 0.3);
+  EXPECT_GT(found->outcome.covariance(0, 0), 1e-3);  // It is as uncertain as the search.
   EXPECT_EQ(seen.back().outcome.reason, PoseReason::kTracking);
 }
 
@@ -221,45 +222,77 @@ TEST(Recovery, OnItsPathTheRobotGoesOnAsIfThereHadBeenNoPauseOnceItHasProvedItsP
   EXPECT_EQ(Wrong(seen), 0);
 }
 
-// Whether a robot that has stood still is localized at once, and one that was carried by 0.7 m is not.
-TEST(Recovery, ARobotThatStoodStillGoesOnAtOnce) {
-  const test::World world = test::RingCorridor(true);
-  const test::Laser laser{.beams = 181, .step_rad = Radians(1.5), .sigma_m = 0.01};
-  for (const double carried_m : {0.0, 0.7}) {
-    std::mt19937_64 rng(3);
-    Mapper mapper(FewParticles(), {}, 1);
-    Stamp stamp = 0;
-    const auto process = [&](const Pose2& truth, const Pose2& T_odom_robot, Passage passage) {
-      Scan scan = test::Look(world, truth, laser, &rng);
-      scan.stamp = (stamp += kNanosPerSecond / 5);
-      return mapper.Process(std::make_shared<const Scan>(std::move(scan)), T_odom_robot, SerialFor, passage);
-    };
+// A robot that drives along the x axis of a world of walls, five scans a second.
+class Driver {
+ public:
+  explicit Driver(test::World world) : world_(std::move(world)) {}
+
+  // A scan at `truth`, `later_s` after the last one.
+  ScanOutcome Process(const Pose2& truth, const Pose2& T_odom_robot, Passage passage = Passage::kDriven,
+                      double later_s = 0.2, double tilt_rad = 0.0) {
+    Scan scan = test::Look(world_, truth, {.beams = 181, .step_rad = Radians(1.5), .sigma_m = 0.01}, &rng_);
+    scan.stamp = (stamp_ += StampFromSeconds(later_s));
+    scan.tilt_rad = tilt_rad;
+    return mapper_.Process(std::make_shared<const Scan>(std::move(scan)), T_odom_robot, SerialFor, passage);
+  }
+  // Returns the last x.
+  double DriveTo(double end_x) {
     double x = 0.0;
-    for (; x < 20.0; x += 0.2) ASSERT_TRUE(process({x, 0, 0}, {x, 0, 0}, Passage::kDriven).localized);
-    const Pose2 T_odom_robot{x - 0.2, 0, 0};
-    const ScanOutcome outcome = process({x - 0.2 + carried_m, 0, 0}, T_odom_robot, Passage::kPaused);
-    EXPECT_EQ(outcome.localized, carried_m == 0.0) << carried_m;
+    for (; x < end_x; x += 0.2) EXPECT_TRUE(Process({x, 0, 0}, {x, 0, 0}).localized);
+    return x - 0.2;
+  }
+
+ private:
+  const test::World world_;
+  std::mt19937_64 rng_{3};
+  Mapper mapper_{FewParticles(), {}, 1};
+  Stamp stamp_ = 0;
+};
+
+// Whether a robot that has stood still is localized at once, however long it stood, and one that was carried by 0.7 m
+// is not.
+TEST(Recovery, ARobotThatStoodStillGoesOnAtOnce) {
+  for (const double pause_s : {4.0, 3600.0}) {
+    for (const double carried_m : {0.0, 0.7}) {
+      Driver robot(test::RingCorridor(true));
+      const double x = robot.DriveTo(20.0);
+      const ScanOutcome outcome = robot.Process({x + carried_m, 0, 0}, {x, 0, 0}, Passage::kPaused, pause_s);
+      EXPECT_EQ(outcome.localized, carried_m == 0.0) << carried_m;
+    }
+  }
+}
+
+// After a short pause, odometry, scan and map together are enough.
+TEST(Recovery, ARobotThatDroveOnDuringAShortPauseGoesOnAtOnce) {
+  for (const double pause_s : {4.0, 60.0}) {
+    Driver robot(test::RingCorridor(true));
+    const double x = robot.DriveTo(20.0);
+    EXPECT_EQ(robot.Process({x + 1.6, 0, 0}, {x + 1.6, 0, 0}, Passage::kPaused, pause_s).localized, pause_s < 10.0);
+  }
+  // Odometry does not show that it was turned.
+  Driver robot(test::RingCorridor(true));
+  const double x = robot.DriveTo(20.0);
+  EXPECT_FALSE(robot.Process({x + 1.6, 0, 0.2}, {x + 1.6, 0, 0}, Passage::kPaused, 4.0).localized);
+}
+
+// A tilted scan cannot confirm a place, so that the next level scan has to.
+TEST(Recovery, APauseThatEndsWithATiltedScanIsNotForgotten) {
+  for (const Passage passage : {Passage::kDriven, Passage::kPaused}) {
+    Driver robot(test::RingCorridor(true));
+    const double x = robot.DriveTo(20.0);
+    static_cast<void>(robot.Process({x, 0, 0}, {x, 0, 0}, passage, 4.0, 0.2));
+    EXPECT_EQ(robot.Process({x + 0.2, 0, 0}, {x + 0.2, 0, 0}).localized, passage == Passage::kDriven);
   }
 }
 
 // A robot that was switched off before one room and on again before another one that looks the same.
 TEST(Recovery, WhereRoomsLookAlikeTheRobotStaysLost) {
-  const test::World world = test::RingOfEqualRooms();
-  const test::Laser laser{.beams = 181, .step_rad = Radians(1.5), .sigma_m = 0.01};
-  std::mt19937_64 rng(3);
-  Mapper mapper(FewParticles(), {}, 1);
-  Stamp stamp = 0;
-  const auto process = [&](const Pose2& truth, const Pose2& T_odom_robot, Passage passage) {
-    Scan scan = test::Look(world, truth, laser, &rng);
-    scan.stamp = (stamp += kNanosPerSecond / 5);
-    return mapper.Process(std::make_shared<const Scan>(std::move(scan)), T_odom_robot, SerialFor, passage);
-  };
-  double x = 0.0;
-  for (; x < 28.0; x += 0.2) ASSERT_TRUE(process({x, 0, 0}, {x, 0, 0}, Passage::kDriven).localized);
+  Driver robot(test::RingOfEqualRooms());
+  static_cast<void>(robot.DriveTo(28.0));
   const double from = 12.0;  // Carried back by four rooms.
   for (double way = 0.0; way < 8.0; way += 0.2) {
     const ScanOutcome outcome =
-        process({from + way, 0, 0}, {way, 0, 0}, way == 0.0 ? Passage::kUnknown : Passage::kDriven);
+        robot.Process({from + way, 0, 0}, {way, 0, 0}, way == 0.0 ? Passage::kUnknown : Passage::kDriven);
     EXPECT_FALSE(outcome.localized && std::abs(outcome.T_map_robot.x - from - way) > kWrong_m) << way;
     EXPECT_FALSE(outcome.localized) << way;
     EXPECT_EQ(outcome.reason, PoseReason::kLost);

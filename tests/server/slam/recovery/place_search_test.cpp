@@ -1,0 +1,261 @@
+// Finding a place in a map, and following a robot until it is found, each by itself: the map is a drive round a
+// corridor whose niches make no two stretches alike.
+#include "server/slam/recovery/place_search.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <random>
+#include <vector>
+
+#include "server/slam/mapper_options.h"
+#include "server/slam/recovery/recovery.h"
+#include "server/slam/scan/beam_points.h"
+#include "tests/server/slam/ring_world.h"
+
+namespace cairn::slam {
+namespace {
+
+constexpr test::Laser kLaser{.range_max_m = 12.0, .sigma_m = 0.01};
+
+// A hall of 44 x 10 m. Crates of any size and direction on both sides of its middle make no two stretches alike.
+test::World Hall(std::uint64_t seed = 3) {
+  test::World world = test::Room(-2.0, -5.0, 44.0, 10.0);
+  std::mt19937_64 rng(seed);
+  std::uniform_real_distribution<double> any(0.0, 1.0);
+  for (double x = 0.0; x < 40.0; x += 2.0) {
+    for (const double side : {-1.0, 1.0}) {
+      const Pose2 T_world_crate{x + any(rng), side * (1.8 + 2.0 * any(rng)), kPi * any(rng)};
+      const double length_m = 0.4 + any(rng), width_m = 0.3 + 0.5 * any(rng);
+      std::vector<Eigen::Vector2d> corners;
+      for (const auto& [u, v] : {std::pair(0, 0), {1, 0}, {1, 1}, {0, 1}, {0, 0}})
+        corners.push_back((T_world_crate * Pose2{u * length_m, v * width_m, 0.0}).translation());
+      world.Add(corners);
+    }
+  }
+  return world;
+}
+
+// The map of a drive along the middle: a keyframe every 0.25 m at its true pose.
+struct Map {
+  Trail trail{MotionNoise{}};
+  SharedSequence<Pose2> path;
+
+  explicit Map(const test::World& world, double from_m = 0.0, double to_m = 38.0) {
+    for (double x = from_m; x < to_m; x += 0.25) Add(world, {x, 0, 0}, {x, 0, 0}, true);
+  }
+  void Add(const test::World& world, const Pose2& truth, const Pose2& T_map_robot, bool localized) {
+    Scan scan = test::Look(world, truth, kLaser, &rng);
+    std::vector<SurfacePoint> points = SurfacePointsOf(PointsOf(scan), scan, {});
+    trail.Append({std::make_shared<const Scan>(std::move(scan)), truth}, truth, std::move(points),
+                 Eigen::Matrix3d::Zero(), std::nullopt);
+    trail.MarkLast(localized, localized);
+    path.Append(T_map_robot);
+  }
+  std::mt19937_64 rng{5};
+};
+
+const Map& MapOfHall() {
+  static const Map map(Hall());
+  return map;
+}
+
+// The scan of a robot that stands there, as RecentScan has it; `T_track_world` is any transform.
+RecentScan ScanAt(const test::World& world, const Pose2& truth, const Pose2& T_track_world, double travelled_m,
+                  std::mt19937_64& rng) {
+  auto scan = std::make_shared<const Scan>(test::Look(world, truth, kLaser, &rng));
+  RecentScan recent{scan, T_track_world * truth, travelled_m, {}};
+  recent.points = SurfacePointsOf(PointsOf(*scan), *scan, {});
+  return recent;
+}
+
+// Twelve metres along the middle.
+std::vector<RecentScan> Stretch(const test::World& world, double from_m) {
+  std::mt19937_64 rng(9);
+  std::vector<RecentScan> recent;
+  for (double way_m = 0.0; way_m < 12.0; way_m += 0.25)
+    recent.push_back(ScanAt(world, {from_m + way_m, 0, 0}, {-70.0, 20.0, 2.0}, way_m, rng));
+  return recent;
+}
+
+PlaceSearch Search() {
+  const MapperOptions options;
+  return {options.recovery.place, options.loop, options.self_check, options.front_end.refine};
+}
+
+TEST(PlaceSearch, FindsWhereTheRobotIsInTheWholeMap) {
+  PlaceSearch search = Search();
+  for (const double from_m : {8.0, 25.0}) {
+    const auto found = search.Find(MapOfHall().trail, MapOfHall().path, Stretch(Hall(), from_m));
+    ASSERT_TRUE(found) << from_m;
+    EXPECT_NEAR(found->T_map_robot.x, from_m + 11.75, 0.05);
+    EXPECT_NEAR(found->T_map_robot.y, 0.0, 0.05);
+    EXPECT_NEAR(found->T_map_robot.theta, 0.0, 0.01);
+    const double sigma_m = LoopOptions{}.sigma_m;
+    EXPECT_GE(found->covariance(0, 0), sigma_m * sigma_m);
+    EXPECT_LT(found->covariance(0, 0), 4.0 * sigma_m * sigma_m);
+  }
+}
+
+TEST(PlaceSearch, APlaceWithoutAMapOrInAnotherWorldIsNotFound) {
+  PlaceSearch search = Search();
+  EXPECT_FALSE(search.Find(MapOfHall().trail, MapOfHall().path, {}));
+  EXPECT_FALSE(search.Find(MapOfHall().trail, MapOfHall().path, Stretch(Hall(4), 8.0)));
+}
+
+TEST(PlaceSearch, WhereRoomsLookAlikeNoneOfThemIsFound) {
+  const test::World world = test::RingOfEqualRooms();
+  const Map map(world, 0.0, 30.0);
+  PlaceSearch search = Search();
+  EXPECT_FALSE(search.Find(map.trail, map.path, Stretch(world, 12.0)));
+}
+
+// Everything else fits, but beams pass where the map shows a wall.
+TEST(PlaceSearch, APlaceThatTheScansContradictIsNotFound) {
+  test::World before = Hall();
+  before.Add({{12.0, -1.0}, {18.0, -1.0}});  // A wall that is gone now.
+  const Map map(before);
+  PlaceSearch search = Search();
+  EXPECT_TRUE(search.Find(map.trail, map.path, Stretch(before, 8.0)));
+  EXPECT_FALSE(search.Find(map.trail, map.path, Stretch(Hall(), 8.0)));
+}
+
+// Keyframes whose place is not known are no part of the map.
+TEST(PlaceSearch, KeyframesThatAreNotLocalizedDoNotCount) {
+  Map map(Hall(), 30.0);
+  for (double x = 4.0; x < 22.0; x += 0.25) map.Add(Hall(), {x, 0, 0}, {x, 3.0, 0.0}, false);
+  PlaceSearch search = Search();
+  EXPECT_FALSE(search.Find(map.trail, map.path, Stretch(Hall(), 9.0)));
+}
+
+TEST(PlaceSearch, AScanAgreesWithTheMapContradictsItOrSeesNothingOfIt) {
+  using Agreement = PlaceSearch::Agreement;
+  std::mt19937_64 rng(9);
+  const RecentScan scan = ScanAt(Hall(), {12, 0, 0}, {}, 0.0, rng);
+  const PlaceSearch search = Search();
+  const auto at = [&](const Pose2& T_map_robot) {
+    return search.Compare(MapOfHall().trail, MapOfHall().path, *scan.scan, scan.points, T_map_robot);
+  };
+  EXPECT_EQ(at({12, 0, 0}), Agreement::kAgrees);
+  EXPECT_EQ(at({12, 0.05, 0.01}), Agreement::kAgrees);
+  EXPECT_EQ(at({12, 1.0, 0.5}), Agreement::kContradicts);
+  EXPECT_EQ(at({12, 60, 0}), Agreement::kNothingNear);
+}
+
+// A robot that is not watched any more at this place.
+class Lost : public ::testing::Test {
+ protected:
+  static Recovery Make() {
+    const MapperOptions options;
+    return {options.recovery,          options.loop,  options.self_check,  options.front_end.refine,
+            options.front_end.surface, options.blind, options.lost_after_m};
+  }
+  static Recovery::Known KnownAt(double x) {
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+    covariance.diagonal() << 0.04, 0.01, 0.001;
+    return {{x, 0, 0}, {5, 5, kPi / 2}, covariance};
+  }
+  // The robot stands at `truth`, `odometry` beyond the odometry of KnownAt.
+  std::optional<Recovery::Found> Take(Recovery& recovery, const Pose2& truth, const Pose2& odometry) {
+    const RecentScan scan = ScanAt(world_, truth, T_track_world_, 0.0, rng_);
+    TrackStep step;
+    step.T_track_robot = scan.T_track_robot;
+    step.matched = true;
+    return recovery.Take({scan.scan, KnownAt(0).T_odom_robot * odometry}, step, scan.points, MapOfHall().trail,
+                         MapOfHall().path);
+  }
+
+  const test::World world_ = Hall();
+  const Pose2 T_track_world_{3.0, -4.0, 1.0};
+  std::mt19937_64 rng_{9};
+};
+
+TEST_F(Lost, OdometryCarriesThePoseWithItsDoubtUntilTheWayIsTooLong) {
+  Recovery recovery = Make();
+  recovery.Begin(KnownAt(10), true);
+  const auto after = [&](const Pose2& moved) { return recovery.BeliefAt(KnownAt(10).T_odom_robot * moved, {}); };
+  const Recovery::Belief at_once = after({}), later = after({1.5, 0, 0}), far = after({2.5, 0, 0});
+  EXPECT_NEAR(at_once.covariance(0, 0), 0.04, 1e-4);
+  EXPECT_NEAR(at_once.covariance(1, 1), 0.01, 1e-4);
+  EXPECT_NEAR(later.T_map_robot.x, 11.5, 1e-9);
+  EXPECT_NEAR(later.T_map_robot.y, 0.0, 1e-9);
+  EXPECT_EQ(later.reason, PoseReason::kOdometryOnly);
+  // What was known, what its heading adds on the way, and the noise of odometry.
+  const Eigen::Matrix3d noise = MapperOptions{}.blind.Covariance({1.5, 0, 0});
+  EXPECT_NEAR(later.covariance(0, 0), 0.04 + noise(0, 0), 1e-9);
+  EXPECT_NEAR(later.covariance(1, 1), 0.01 + 1.5 * 1.5 * 0.001 + noise(1, 1), 1e-9);
+  EXPECT_EQ(far.reason, PoseReason::kLost);
+  recovery.OdometryBeganAnew();
+  EXPECT_EQ(after({}).reason, PoseReason::kLost);
+  EXPECT_GT(after({}).covariance(0, 0), 1e5);
+}
+
+TEST_F(Lost, OnThePathTheScansCarryThePose) {
+  Recovery recovery = Make();
+  recovery.BeginOnPath(KnownAt(10), {7.0, 1.0, 0.5});
+  const Pose2 T_track_robot{1.0, 2.0, 0.25};
+  EXPECT_EQ(recovery.BeliefAt(KnownAt(10).T_odom_robot, T_track_robot).T_map_robot,
+            (Pose2{7.0, 1.0, 0.5} * T_track_robot));
+}
+
+TEST_F(Lost, AScanThatContradictsTheMapTakesTheRobotOffItsPath) {
+  for (const bool moved : {false, true}) {
+    Recovery recovery = Make();
+    recovery.BeginOnPath(KnownAt(10), T_track_world_.Inverse());
+    // The map where the scans have carried the pose, and another place.
+    const Pose2 truth = moved ? Pose2{20.0, 0.6, 0.7} : Pose2{10, 0, 0};
+    std::mt19937_64 rng(9);
+    const RecentScan scan = ScanAt(world_, truth, {}, 0.0, rng);
+    TrackStep step;
+    step.matched = true;
+    step.T_track_robot = T_track_world_ * Pose2{10, 0, 0};
+    EXPECT_FALSE(
+        recovery.Take({scan.scan, KnownAt(10).T_odom_robot}, step, scan.points, MapOfHall().trail, MapOfHall().path));
+    EXPECT_EQ(recovery.on_path(), !moved);
+    EXPECT_EQ(recovery.BeliefAt(KnownAt(10).T_odom_robot, step.T_track_robot).reason,
+              moved ? PoseReason::kLost : PoseReason::kOdometryOnly);
+  }
+}
+
+TEST_F(Lost, IsFoundByTwoSearchesThatAgreeWithSomeWayBetweenThem) {
+  Recovery recovery = Make();
+  recovery.Begin(KnownAt(30), false);
+  std::optional<double> found_m;
+  for (double way_m = 0.0; way_m < 15.0 && !found_m; way_m += 0.25) {
+    const auto found = Take(recovery, {8.0 + way_m, 0, 0}, {way_m, 0, 0});
+    if (!found) continue;
+    found_m = way_m;
+    EXPECT_NEAR(found->place.T_map_robot.x, 8.0 + way_m, 0.05);
+    EXPECT_FALSE(found->on_path);
+  }
+  ASSERT_TRUE(found_m);
+  EXPECT_GE(*found_m, LoopOptions{}.confirm_after_m);
+}
+
+TEST_F(Lost, OnlyPlacesThatAreTheSameConfirmEachOther) {
+  const Pose2 place{4.0, 2.0, 3.1};
+  EXPECT_TRUE(ConfirmEachOther(place, {4.3, 2.3, 3.1}));
+  EXPECT_FALSE(ConfirmEachOther(place, {4.4, 2.4, 3.1}));
+  EXPECT_TRUE(ConfirmEachOther(place, {4.0, 2.0, -kPi + 0.01}));
+  EXPECT_FALSE(ConfirmEachOther(place, {4.0, 2.0, -kPi + 0.05}));
+}
+
+// A robot that turns on one spot for an hour.
+TEST_F(Lost, KeepsABoundedNumberOfScans) {
+  const auto bytes_after = [&](int scans) {
+    Recovery recovery = Make();
+    recovery.Begin(KnownAt(10), true);
+    for (int i = 0; i < scans; ++i) {
+      const RecentScan scan = ScanAt(world_, {60, 60, 0}, {}, 0.0, rng_);
+      TrackStep step;
+      static_cast<void>(recovery.Take({scan.scan, {}}, step, scan.points, MapOfHall().trail, MapOfHall().path));
+    }
+    StateWriter writer;
+    writer(recovery);
+    return writer.Bytes().size();
+  };
+  EXPECT_EQ(bytes_after(150), bytes_after(300));
+}
+
+}  // namespace
+}  // namespace cairn::slam
