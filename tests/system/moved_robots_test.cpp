@@ -7,11 +7,11 @@
 #include <map>
 #include <optional>
 
-#include "client/lib/robot_client.h"
 #include "client/sim/fleet.h"
 #include "client/sim/shipped_worlds.h"
 #include "tests/child_process.h"
 #include "tests/loopback.h"
+#include "tests/system/rider.h"
 #include "tests/temp_directory.h"
 
 namespace cairn::client {
@@ -20,49 +20,6 @@ namespace {
 using namespace test;
 
 constexpr double kWrong_m = 0.5;
-
-// A client of one of the robots, under any name, and the poses it was told.
-class Rider {
- public:
-  Rider(wire::Bus& bus, const std::string& name, const std::optional<Pose2>& start) {
-    SessionRequest request;
-    request.robot = name;
-    request.site = "building";
-    request.sensors = {"laser"};
-    request.has_start = start.has_value();
-    request.T_map_robot_start = start.value_or(Pose2{});
-    RobotClientOptions options;
-    options.window = 0;
-    RobotClient::Callbacks callbacks;
-    callbacks.pose = [this](const PoseReport& pose) {
-      const MutexLock lock(mutex_);
-      poses_[pose.stamp] = pose;
-    };
-    client_ = Must(RobotClient::Open(bus, request, 20.0, std::move(callbacks), options));
-  }
-  ~Rider() { client_.reset(); }
-
-  void Publish(const LogRecord& record) {
-    if (const auto* const scan = std::get_if<Scan>(&record)) {
-      Must(client_->Publish(*scan));
-      ++scans_;
-    } else {
-      Must(client_->Publish(std::get<Odometry>(record)));
-    }
-  }
-  [[nodiscard]] std::map<Stamp, PoseReport> poses() const {
-    const MutexLock lock(mutex_);
-    return poses_;
-  }
-  [[nodiscard]] std::size_t scans() const { return scans_; }
-  [[nodiscard]] RobotClient& client() { return *client_; }
-
- private:
-  mutable Mutex mutex_;
-  std::map<Stamp, PoseReport> poses_ CAIRN_GUARDED_BY(mutex_);
-  std::size_t scans_ = 0;
-  std::unique_ptr<RobotClient> client_;
-};
 
 class MovedRobots : public ::testing::Test {
  protected:
@@ -93,7 +50,7 @@ class MovedRobots : public ::testing::Test {
     server_->Wait();
   }
   void Ride(int robot, const std::string& name, const std::optional<Pose2>& start) {
-    riders_[robot] = std::make_unique<Rider>(*bus_, name, start);
+    riders_[robot] = std::make_unique<Rider>(*bus_, name, "building", start);
   }
   void Leave(int robot) {
     Must(riders_[robot]->client().WaitSettled(10.0));

@@ -3,52 +3,19 @@
 #include <gtest/gtest.h>
 
 #include <csignal>
-#include <map>
 #include <optional>
 
 #include "client/lib/map_client.h"
-#include "client/lib/robot_client.h"
 #include "client/sim/fleet.h"
 #include "client/sim/shipped_worlds.h"
 #include "tests/child_process.h"
 #include "tests/loopback.h"
+#include "tests/system/rider.h"
 
 namespace cairn::client {
 namespace {
 
 using namespace test;
-
-// One robot: its client, and the poses it was told, by the stamp of the scan.
-class Rider {
- public:
-  Rider(wire::Bus& bus, const std::string& robot, const Pose2& start) {
-    SessionRequest request;
-    request.robot = robot;
-    request.site = "office";
-    request.sensors = {"laser"};
-    request.has_start = true;
-    request.T_map_robot_start = start;
-    RobotClientOptions options;
-    options.window = 0;
-    RobotClient::Callbacks callbacks;
-    callbacks.pose = [this](const PoseReport& pose) {
-      const MutexLock lock(mutex_);
-      poses_[pose.stamp] = pose;
-    };
-    client_ = Must(RobotClient::Open(bus, request, 20.0, std::move(callbacks), options));
-  }
-
-  RobotClient& client() { return *client_; }
-  std::map<Stamp, PoseReport> poses() {
-    const MutexLock lock(mutex_);
-    return poses_;
-  }
-
- private:
-  Mutex mutex_;
-  std::map<Stamp, PoseReport> poses_ CAIRN_GUARDED_BY(mutex_);
-  std::unique_ptr<RobotClient> client_;
-};
 
 class Restart : public ::testing::Test {
  protected:
@@ -57,7 +24,7 @@ class Restart : public ::testing::Test {
   Restart() : bus_(MakeBus("robots")), fleet_(MakeFleet()) {
     StartServer();
     for (int i = 0; i < kRobots; ++i)
-      riders_.push_back(std::make_unique<Rider>(*bus_, fleet_.name(i), fleet_.T_map_robot_start(i)));
+      riders_.push_back(std::make_unique<Rider>(*bus_, fleet_.name(i), "office", fleet_.T_map_robot_start(i)));
   }
 
   static sim::Fleet MakeFleet() {
@@ -79,15 +46,10 @@ class Restart : public ::testing::Test {
   void Drive(std::size_t scans, bool served) {
     while (fleet_.truth(0).size() < scans || fleet_.truth(1).size() < scans) {
       const sim::FleetRecord next = fleet_.Next();
-      RobotClient& client = riders_[static_cast<std::size_t>(next.robot)]->client();
-      if (const auto* const odometry = std::get_if<Odometry>(&next.record)) {
-        Must(client.Publish(*odometry));
-        continue;
-      }
-      Must(client.Publish(std::get<Scan>(next.record)));
-      ++sent_[next.robot];
-      if (!served) continue;
-      ASSERT_TRUE(HasPoses(next.robot, sent_[next.robot] - std::min<std::size_t>(sent_[next.robot], 16)));
+      Rider& rider = *riders_[static_cast<std::size_t>(next.robot)];
+      rider.Publish(next.record);
+      if (!served || std::holds_alternative<Odometry>(next.record)) continue;
+      ASSERT_TRUE(HasPoses(next.robot, rider.scans() - std::min<std::size_t>(rider.scans(), 16)));
     }
   }
   // Whether the server has given so many poses, of all servers.
@@ -112,7 +74,6 @@ class Restart : public ::testing::Test {
   const std::unique_ptr<wire::Bus> bus_;
   sim::Fleet fleet_;
   std::vector<std::unique_ptr<Rider>> riders_;
-  std::map<int, std::size_t> sent_;
 };
 
 // Robots were put where they had once begun, and said to be tracking there: 6.7 m away.

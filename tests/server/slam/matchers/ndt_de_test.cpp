@@ -24,6 +24,10 @@ void ThreeThreads(int count, const std::function<void(int, int)>& body) {
 }
 
 // Starts anywhere in the range of Table 4.4, without a guess.
+MatchResult MatchNdtDe(const ScanView& prev, const ScanView& curr, const MatchPrior& prior) {
+  return MatchByDifferentialEvolution(prev, curr, prior, {}, SerialFor);
+}
+
 TEST(NdtDe, FindsTheMotionWithoutAGuess) {
   const ScanView prev = ViewFrom(test::Office(), {});
   for (const Pose2& truth :
@@ -111,26 +115,11 @@ TEST(NdtDe, SameBytesOnAnyNumberOfThreads) {
 }
 
 TEST(NdtDe, ACorridorIsFlagged) {
-  const ScanView prev = ViewFrom(test::LongCorridor(), {});
-  const ScanView curr = ViewFrom(test::LongCorridor(), {0.3, 0.05, 0.03});
-  const MatchPrior prior{{0.4, 0.0, 0.0}, Eigen::Vector3d(1e-3, 1e-3, 1e-3).asDiagonal()};
-  const MatchResult match = MatchByDifferentialEvolution(prev, curr, prior, {}, SerialFor);
-  ASSERT_TRUE(match.converged);
-  EXPECT_TRUE(match.degenerate);
-  EXPECT_GT(std::abs(match.degenerate_direction.x()), 0.99);
-  EXPECT_NEAR(match.T_ref_curr.y, 0.05, 0.01);
-  EXPECT_NEAR(match.T_ref_curr.theta, 0.03, 0.005);
+  test::ExpectACorridorIsFlagged(MatchNdtDe);
 }
 
 TEST(NdtDe, WithoutPointsTheAnswerIsThePrior) {
-  const MatchPrior prior = WidePrior({0.3, 0.2, 0.1});
-  const ScanView office = ViewFrom(test::Office(), {}), empty;
-  for (const auto& [prev, curr] : {std::pair{empty, office}, {office, empty}, {empty, empty}}) {
-    const MatchResult match = MatchByDifferentialEvolution(prev, curr, prior, {}, SerialFor);
-    EXPECT_FALSE(match.converged);
-    EXPECT_EQ(match.failure, MatchFailure::kTooFewFeatures);
-    EXPECT_EQ(match.T_ref_curr, prior.T_ref_curr);
-  }
+  test::ExpectWithoutPointsTheAnswerIsThePrior(MatchNdtDe);
 }
 
 TEST(NdtDe, OneWallIsFlagged) {
