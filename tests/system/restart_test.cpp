@@ -35,8 +35,8 @@ class Restart : public ::testing::Test {
   }
   void StartServer() {
     server_.reset();
-    server_.emplace(std::vector<std::string>{CAIRND_PATH, "--domain", std::to_string(TestDomain()), "--set",
-                                             "slam.particles=20", "--log-level", "warn"});
+    server_.emplace(std::vector<std::string>{CAIRND_PATH, "--domain", std::to_string(TestDomain()), "--state",
+                                             ":memory:", "--set", "slam.particles=20", "--log-level", "warn"});
   }
   void KillServer() {
     server_->Signal(SIGKILL);
