@@ -49,6 +49,23 @@ TEST(FrozenBlocks, WhatChangedIsCopiedAnewAfterForgetAndEarlierCheckpointsKeepTh
   EXPECT_TRUE(before.Bytes() == old);
 }
 
+// Of 3000 values only the blocks before the first changed one are kept.
+TEST(FrozenBlocks, OnlyWhatComesBeforeTheFirstChangeIsKept) {
+  for (const std::size_t first : {0U, 255U, 256U, 257U, 1000U, 2816U, 2999U}) {
+    FrozenBlocks<Pose2> blocks;
+    std::vector<Pose2> poses = PosesUpTo(3000);
+    static_cast<void>(BytesInBlocks(blocks, poses));
+    for (std::size_t i = first; i < poses.size(); ++i) poses[i].x = -1.0;
+    blocks.ForgetFrom(first);
+    EXPECT_TRUE(BytesInBlocks(blocks, poses) == BytesInBlocks(FrozenBlocks<Pose2>(), poses)) << first;
+    // A value before it, whose change was not told, shows that its block was kept.
+    if (first < 256) continue;
+    const std::string right = BytesInBlocks(blocks, poses);
+    poses[first / 256 * 256 - 1].x = -2.0;
+    EXPECT_TRUE(BytesInBlocks(blocks, poses) == right) << first;
+  }
+}
+
 TEST(FrozenBlocks, EveryShorterOrOtherTextIsRefusedOrReadWithoutHarm) {
   const std::string bytes = BytesInBlocks(FrozenBlocks<Pose2>(), PosesUpTo(1500));
   for (std::size_t size = 0; size < bytes.size(); size += 97) {
