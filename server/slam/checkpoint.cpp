@@ -131,8 +131,9 @@ Result<std::string_view> OpenCheckpoint(std::string_view bytes, const MapperOpti
   std::uint64_t checksum = 0, length = 0;
   if (!TakeNumber(bytes, format)) return damaged("it is too short");
   if (format != kCheckpointFormat)
-    return Fail(format > kCheckpointFormat ? StatusCode::kUnimplemented : StatusCode::kFailedPrecondition, "the checkpoint has format " + std::to_string(format) +
-                                                     ", this program reads " + std::to_string(kCheckpointFormat));
+    return Fail(format > kCheckpointFormat ? StatusCode::kUnimplemented : StatusCode::kFailedPrecondition,
+                "the checkpoint has format " + std::to_string(format) + ", this program reads " +
+                    std::to_string(kCheckpointFormat));
   if (!TakeNumber(bytes, checksum) || checksum != Checksum(bytes)) return damaged("its checksum is wrong");
   if (!TakeNumber(bytes, length) || length > bytes.size()) return damaged("it is too short");
   const std::string here = TextOf(options), there(bytes.substr(0, length));

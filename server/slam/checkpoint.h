@@ -36,8 +36,8 @@ class Checkpoint {
 };
 
 // Returns the part of the bytes that is the state. kDataLoss: they are damaged or no checkpoint. kFailedPrecondition:
-// they have an older format, or come from an estimator with other options; the message names the first one that differs.
-// kUnimplemented: they have a newer format.
+// they have an older format, or come from an estimator with other options; the message names the first one that
+// differs. kUnimplemented: they have a newer format.
 [[nodiscard]] Result<std::string_view> OpenCheckpoint(std::string_view bytes, const MapperOptions& options);
 
 }  // namespace cairn::slam
