@@ -36,6 +36,8 @@ void Visit(OptionVisitor& visitor, MapperOptions& options) {
   visitor.Section("loop", "Finding large loops.", [&] { Visit(visitor, options.loop); });
   visitor.Section("self_check", "Noticing that the scans contradict the map.",
                   [&] { Visit(visitor, options.self_check); });
+  visitor.Section("recovery", "Finding a robot again in its map that was not watched for some time.",
+                  [&] { Visit(visitor, options.recovery); });
   visitor.Section("pose_graph", "Least squares over the whole path, for smoothing.",
                   [&] { Visit(visitor, options.pose_graph); });
   visitor.Section("grid", "The occupancy grid.", [&] { Visit(visitor, options.grid); });

@@ -50,9 +50,9 @@ SearchWindow WindowOver(const std::vector<SurfacePoint>& surfaces) {
 
 }  // namespace
 
-PlaceSearch::Map::Map(std::vector<SurfacePoint> given, double coarser)
+PlaceSearch::Map::Map(std::vector<SurfacePoint> given, double cell_scale)
     : surfaces(std::move(given)),
-      pyramid(surfaces, coarser * kSearchCellM, coarser * kLikelihoodReachM, kMapLevels),
+      pyramid(surfaces, cell_scale * kSearchCellM, cell_scale * kLikelihoodReachM, kMapLevels),
       index(surfaces),
       window(WindowOver(surfaces)) {}
 
@@ -82,9 +82,9 @@ std::vector<SurfacePoint> PlaceSearch::SurfacesOfMap(const Trail& trail, const S
 
 std::optional<FoundPlace> PlaceSearch::Find(const Trail& trail, const SharedSequence<Pose2>& path,
                                             std::span<const RecentScan> recent) {
-  if (!map_) map_ = std::make_shared<const Map>(SurfacesOfMap(trail, path), options_.coarser);
+  if (!map_) map_ = std::make_shared<const Map>(SurfacesOfMap(trail, path), options_.cell_scale);
   if (recent.empty() || map_->surfaces.size() < kMinSurfaces) return std::nullopt;
-  const std::vector<SurfacePoint> surfaces = SurfacesOf(recent, options_.coarser * kSearchCellM);
+  const std::vector<SurfacePoint> surfaces = SurfacesOf(recent, options_.cell_scale * kSearchCellM);
   if (surfaces.size() < kMinSurfaces) return std::nullopt;
   const auto unique = FindUniquePose(surfaces, map_->pyramid, map_->window, loop_.max_rival);
   if (!unique) return std::nullopt;

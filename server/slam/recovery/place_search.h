@@ -64,7 +64,7 @@ class PlaceSearch {
   [[nodiscard]] VisibilityCounts Visible(const Trail& trail, const SharedSequence<Pose2>& path, const Scan& scan,
                                          const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const;
   struct Map {
-    Map(std::vector<SurfacePoint> surfaces, double coarser);
+    Map(std::vector<SurfacePoint> surfaces, double cell_scale);
     std::vector<SurfacePoint> surfaces;
     LikelihoodPyramid pyramid;
     PointIndex index;

@@ -1,16 +1,18 @@
-// What it takes to believe where a robot is that was not watched all the time. These are no keys of the configuration;
-// `cairn-study moved --only constants` halves and doubles each of them.
+// What it takes to believe where a robot is that was not watched all the time. Only those are keys of the configuration
+// that matter; `cairn-study moved --only constants` halves and doubles each of them.
 #pragma once
 
 #include <cstdint>
+
+#include "common/options/option_visitor.h"
 
 namespace cairn::slam {
 
 // When a place found in the map counts (place_search.h).
 struct PlaceSearchOptions {
-  double coarser = 2.0;             // Cells of the search, in those of the search for a loop: a whole map is searched.
-  double map_reach_m = 300.0;       // Only the map within this distance of the last pose is searched.
-  double min_explained = 0.7;       // Share of the recent surfaces that must lie on surfaces of the map.
+  double cell_scale = 2.0;
+  double map_reach_m = 300.0;  // Only the map within this distance of the last pose is searched.
+  double min_explained = 0.7;
   std::int64_t min_compared = 20;   // Points that must be compared for an agreement to count.
   std::int64_t near_keyframes = 4;  // Old keyframes that a scan is compared with, ...
   double apart_m = 1.0;             // ... so far apart along the path.
@@ -39,5 +41,6 @@ struct RecoveryOptions {
   double as_odometry_per_m = 0.1;
   double as_odometry_rad = 0.1;
 };
+void Visit(OptionVisitor& visitor, RecoveryOptions& options);
 
 }  // namespace cairn::slam

@@ -53,9 +53,11 @@ void Visit(OptionVisitor& visitor, PairingOptions& options) {
       "max_odometry", options.max_odometry, "samples", 2, 100000,
       "Odometry samples that are kept for later scans. When there are more, the oldest is dropped. They must "
       "cover the longest scan: a scan of 1 s with odometry at 100 Hz needs more than 100.");
-  visitor.Real("max_pause_s", options.max_pause_s, "s", 0.1, 1e7,
-               "After a longer time between two scans the robot counts as localized only if its scan agrees with its "
-               "map where odometry says that it is. After more than 10 s it has to be found in its map.");
+  visitor.Real(
+      "max_pause_s", options.max_pause_s, "s", 0.1, 1e7,
+      "After a longer time between two scans the robot counts as localized only if its scan agrees with its "
+      "map where odometry says that it is. After more than 10 s it has to be found in its map. Within a longer "
+      "time somebody may carry the robot to another place without being noticed.");
   visitor.Real("max_speed_m_s", options.max_speed_m_s, "m/s", 0.1, 1000.0,
                "Odometry that moves faster, by a metre or more, has begun anew. The place of the robot is then not "
                "known.");

@@ -177,7 +177,7 @@ void AddPairing(std::vector<Constant>& all) {
 
 void AddRecovery(std::vector<Constant>& all) {
   const Runs runs = Runs::kMoved;
-  all.push_back(Of("recovery: place.coarser", runs, CAIRN_FIELD(recovery.place.coarser)));
+  all.push_back(Of("recovery: place.cell_scale", runs, CAIRN_FIELD(recovery.place.cell_scale)));
   all.push_back(Of("recovery: place.map_reach_m", runs, CAIRN_FIELD(recovery.place.map_reach_m)));
   all.push_back(Share("recovery: place.min_explained", runs, CAIRN_FIELD(recovery.place.min_explained)));
   all.push_back(Of("recovery: place.min_compared", runs, CAIRN_FIELD(recovery.place.min_compared)));
