@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <filesystem>
+
 #include "client/cli/commands.h"
 #include "client/cli/map_picture.h"
 #include "client/cli/quantity_text.h"
@@ -36,7 +38,18 @@ Result<std::vector<PicturePath>> CollectPaths(Program& program, const DrawArgume
   return paths;
 }
 
+// Whether the file is the image of an exported map, which a picture would replace.
+bool IsImageOfMap(const std::filesystem::path& file) {
+  std::filesystem::path yaml = file;
+  return std::filesystem::exists(file) && std::filesystem::exists(yaml.replace_extension(".yaml"));
+}
+
 ExitCode DrawMap(Program& program, const DrawArguments& arguments) {
+  if (IsImageOfMap(arguments.output)) {
+    return program.Refuse({StatusCode::kAlreadyExists, "'" + arguments.output +
+                                                           "' is the image of the map with the same name; give the "
+                                                           "picture another one"});
+  }
   const auto map = arguments.map_file.empty()
                        ? program.Ask([&](QueryClient& server) { return server.MapImage(arguments.site); })
                        : LoadMapYaml(arguments.map_file);

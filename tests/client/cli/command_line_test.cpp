@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "client/cli/program.h"
+#include "common/map/occupancy_image.h"
 #include "common/sensor/trajectory.h"
 #include "tests/temp_directory.h"
 
@@ -150,6 +151,18 @@ TEST_F(CommandLine, FilesThatAreNotThereFailWithOneLine) {
     EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
     EXPECT_THAT(outcome.err, HasSubstr("none."));
   }
+}
+
+// A picture of the same name took the place of the image that a robot navigates with.
+TEST_F(CommandLine, APictureDoesNotReplaceTheImageOfAMap) {
+  const OccupancyImage map{.width = 2, .height = 2, .cells = {0, 0, 100, 0}};
+  ASSERT_TRUE(SaveMapYaml(map, File("lab.yaml"), ".png", {}));
+  const CommandOutcome refused = RunLine({"map", "draw", "--map", File("lab.yaml"), "-o", File("lab.png")});
+  EXPECT_EQ(refused.code, ExitCode::kFailed);
+  EXPECT_THAT(refused.err, HasSubstr("lab.png' is the image of the map"));
+  EXPECT_EQ(LoadMapYaml(File("lab.yaml"))->cells, map.cells);
+  for (int again = 0; again < 2; ++again)
+    EXPECT_EQ(RunLine({"map", "draw", "--map", File("lab.yaml"), "-o", File("picture.png")}).code, ExitCode::kOk);
 }
 
 TEST_F(CommandLine, AnErrorIsAnObjectForMachines) {
