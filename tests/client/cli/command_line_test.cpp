@@ -155,7 +155,7 @@ TEST_F(CommandLine, FilesThatAreNotThereFailWithOneLine) {
 
 // A picture of the same name took the place of the image that a robot navigates with.
 TEST_F(CommandLine, APictureDoesNotReplaceTheImageOfAMap) {
-  const OccupancyImage map{.width = 2, .height = 2, .cells = {0, 0, 100, 0}};
+  const OccupancyImage map{.resolution_m = 0.05, .T_map_origin = {}, .width = 2, .height = 2, .cells = {0, 0, 100, 0}};
   ASSERT_TRUE(SaveMapYaml(map, File("lab.yaml"), ".png", {}));
   const CommandOutcome refused = RunLine({"map", "draw", "--map", File("lab.yaml"), "-o", File("lab.png")});
   EXPECT_EQ(refused.code, ExitCode::kFailed);
