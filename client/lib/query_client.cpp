@@ -13,7 +13,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::seconds kFirstPatience{2};  // For the first part of an answer; then the question is repeated.
+constexpr std::chrono::seconds kFirstPatience{2};   // For the first part of an answer; then the question is repeated.
+constexpr std::chrono::seconds kAnswerPatience{1};  // Pings of a server that was found are not answered for so long.
+constexpr std::chrono::seconds kJoinPatience{3};    // No server is found for so long; a handshake takes 1 s.
 
 // The answer's only element, which a server that says OK must give.
 template <typename T>
@@ -99,14 +101,19 @@ std::shared_ptr<QueryClient::Wire> QueryClient::CurrentWire() {
   return wire_;
 }
 
-// `began`: since when pings have not been answered.
-void QueryClient::RenewIfSilent(Deadline began) {
-  constexpr std::chrono::seconds kPatience{1};
+int QueryClient::renewed() const {
+  const MutexLock lock(mutex_);
+  return times_renewed_;
+}
+
+// `began`: since when there has been no answer.
+void QueryClient::RenewIfSilent(Deadline began, std::chrono::seconds patience) {
   constexpr std::chrono::seconds kLongestPause{60};  // A server may be silent for another reason.
   {
     const MutexLock lock(mutex_);
     const auto now = Clock::now();
-    if (now - std::max(began, last_answer_) < kPatience || now - renewed_ < renewal_pause_) return;
+    const auto pause = std::max(patience, renewal_pause_);
+    if (now - std::max(began, last_answer_) < patience || now - renewed_ < pause) return;
     renewed_ = now;
     renewal_pause_ = std::min(2 * renewal_pause_, kLongestPause);
   }
@@ -119,6 +126,7 @@ void QueryClient::RenewIfSilent(Deadline began) {
   {
     const MutexLock lock(mutex_);
     before = std::exchange(wire_, std::move(*wire));
+    ++times_renewed_;
   }
 }
 
@@ -155,20 +163,26 @@ bool QueryClient::CommandsMatched() const {
 // while a question that starts a job may not.
 Result<void> QueryClient::WaitForServer(bool command, Deadline deadline) {
   constexpr std::chrono::milliseconds kPatience{100};
-  Deadline began = Clock::now();
+  const bool secure = !bus_.options().security.empty();
+  Deadline alone = Clock::now(), began = alone;  // Since when no server is found, and pings are not answered.
   for (;;) {
+    bool matched = false;
     {
       const MutexLock lock(mutex_);
       if (server_found_ && (!command || CommandsMatched())) return {};
-      while (wire_->requests->matched() == 0 || wire_->replies->matched() == 0 || (command && !CommandsMatched())) {
-        began = Clock::now();
-        if (Clock::now() >= deadline) return Fail(StatusCode::kUnavailable, NoServer(bus_, options_.timeout_s));
-        changed_.WaitFor(mutex_, std::chrono::milliseconds(5));
-      }
+      matched = wire_->requests->matched() > 0 && wire_->replies->matched() > 0 && (!command || CommandsMatched());
+      if (!matched) changed_.WaitFor(mutex_, std::chrono::milliseconds(5));
     }
+    if (!matched) {
+      began = Clock::now();
+      if (began >= deadline) return Fail(StatusCode::kUnavailable, NoServer(bus_, options_.timeout_s));
+      if (secure) RenewIfSilent(alone, kJoinPatience);
+      continue;
+    }
+    alone = Clock::now();
     const Deadline soon = std::min(deadline, Clock::now() + kPatience);
     const Result<Reply> pong = AskOnce(MakeRequest(RequestKind::kPing), soon, soon);
-    if (!pong) RenewIfSilent(began);
+    if (!pong) RenewIfSilent(began, kAnswerPatience);
     const MutexLock lock(mutex_);
     if (pong) {
       server_found_ = true;

@@ -68,6 +68,10 @@ class QueryClient {
                                                                    const QueryClientOptions& options = {});
   ~QueryClient();
 
+  // Times it joined anew: with a server that does not answer, and with DDS Security also where none is found, because a
+  // handshake of Fast DDS 2.9 gets stuck now and then.
+  [[nodiscard]] int renewed() const;
+
   // The server's version.
   [[nodiscard]] Result<std::string> Ping();
 
@@ -131,7 +135,7 @@ class QueryClient {
   };
   [[nodiscard]] Result<std::shared_ptr<Wire>> Connect(wire::Bus& bus);
   [[nodiscard]] std::shared_ptr<Wire> CurrentWire();
-  void RenewIfSilent(Deadline began);
+  void RenewIfSilent(Deadline began, std::chrono::seconds patience);
   [[nodiscard]] bool CommandsMatched() const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] Result<void> WaitForServer(bool command, Deadline deadline);
   [[nodiscard]] Result<Reply> Ask(const Request& request);
@@ -143,7 +147,7 @@ class QueryClient {
   const QueryClientOptions options_;
   const ClientId id_;
 
-  Mutex mutex_;
+  mutable Mutex mutex_;
   CondVar changed_;
   bool server_found_ CAIRN_GUARDED_BY(mutex_) = false;
   std::int64_t sequence_ CAIRN_GUARDED_BY(mutex_) = 0;
@@ -151,7 +155,8 @@ class QueryClient {
   Deadline last_answer_ CAIRN_GUARDED_BY(mutex_);                           // Last answer, however late.
   Deadline renewed_ CAIRN_GUARDED_BY(mutex_);                               // Last time it joined anew, or began to,
   std::chrono::seconds renewal_pause_ CAIRN_GUARDED_BY(mutex_){1};          // and how long until it may again.
-  std::shared_ptr<Wire> wire_ CAIRN_GUARDED_BY(mutex_);                     // Last: its callbacks use everything above.
+  int times_renewed_ CAIRN_GUARDED_BY(mutex_) = 0;
+  std::shared_ptr<Wire> wire_ CAIRN_GUARDED_BY(mutex_);  // Last: its callbacks use everything above.
 };
 
 }  // namespace cairn::client
