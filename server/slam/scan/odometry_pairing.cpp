@@ -73,11 +73,11 @@ OdometryPairing::OdometryPairing(const PairingOptions& options, Sink sink)
                  {.pass = [this](std::shared_ptr<const Scan>&& scan) { Take(std::move(scan)); },
                   .refuse = [this](const std::shared_ptr<const Scan>& scan,
                                    DropReason reason) { sink_.dropped(*scan, reason); },
-                  .set_back = [this] { ClockSetBack(); }}),
+                  .set_back = [this](Stamp last) { ScanClockSetBack(last); }}),
       odometry_gate_(Nanos(options.max_stamp_jump_s), static_cast<std::size_t>(options.jump_confirmations),
                      {.pass = [this](Odometry&& odometry) { Take(odometry); },
                       .refuse = [this](const Odometry&, DropReason) { ++odometry_refused_; },
-                      .set_back = [this] { ClockSetBack(); }}) {}
+                      .set_back = [this](Stamp last) { OdometryClockSetBack(last); }}) {}
 
 void OdometryPairing::Add(std::shared_ptr<const Scan> scan) {
   const Scan& sample = *scan;
@@ -114,13 +114,29 @@ void OdometryPairing::Take(const Odometry& odometry) {
   if (odometry_.size() > static_cast<std::size_t>(options_.max_odometry)) odometry_.pop_front();
 }
 
-void OdometryPairing::ClockSetBack() {
-  BeginAnew(Passage::kUnwatched);
+// The two streams notice one after the other that the clock was set back. What the other one has sent meanwhile belongs
+// to the new time, if it lies well before the old one, and stays: a client that sends no more odometry until some scans
+// have been used would wait for ever.
+void OdometryPairing::ScanClockSetBack(Stamp last) {
+  if (!odometry_gate_.IsBefore(last, Nanos(options_.max_gap_s))) return BeginAnew(Passage::kUnwatched);
+  DropWaitingScans();
+  passage_ = std::max(passage_, Passage::kUnwatched);
+}
+
+void OdometryPairing::OdometryClockSetBack(Stamp last) {
+  if (!scan_gate_.IsBefore(last, Nanos(options_.max_gap_s))) return BeginAnew(Passage::kUnwatched);
+  odometry_.clear();
+  passage_ = std::max(passage_, Passage::kUnwatched);
+  time_known_ = false;
+}
+
+void OdometryPairing::DropWaitingScans() {
+  for (const auto& scan : std::exchange(scans_, {})) sink_.dropped(*scan, DropReason::kNoOdometry);
 }
 
 // What came before cannot be joined with what comes now.
 void OdometryPairing::BeginAnew(Passage passage) {
-  for (const auto& scan : std::exchange(scans_, {})) sink_.dropped(*scan, DropReason::kNoOdometry);
+  DropWaitingScans();
   odometry_.clear();
   passage_ = std::max(passage_, passage);
   time_known_ = false;

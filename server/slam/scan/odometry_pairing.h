@@ -100,7 +100,9 @@ class OdometryPairing {
  private:
   void Take(std::shared_ptr<const Scan>&& scan);
   void Take(const Odometry& odometry);
-  void ClockSetBack();
+  void ScanClockSetBack(Stamp last);
+  void OdometryClockSetBack(Stamp last);
+  void DropWaitingScans();
   [[nodiscard]] bool Covers(const Scan& scan) const;
   void PairOrDrop(const std::shared_ptr<const Scan>& scan);
   [[nodiscard]] std::vector<Odometry> During(const Scan& scan) const;

@@ -29,7 +29,8 @@ class StampGate {
   struct Ports {
     std::function<void(Sample&&)> pass;
     std::function<void(const Sample&, DropReason)> refuse;
-    std::function<void()> set_back;  // The next sample to pass is the first of a clock that was set back.
+    // The next sample to pass is the first of a clock that was set back. `last` is the stamp that passed last.
+    std::function<void(Stamp last)> set_back;
   };
 
   StampGate(std::uint64_t max_jump_ns, std::size_t confirmations, Ports ports)
@@ -56,6 +57,11 @@ class StampGate {
 
   // The next sample comes from another client, which numbers from the beginning.
   void NewClient() { last_sequence_ = 0; }
+
+  // Whether all that has passed lies more than `ns` before this stamp.
+  [[nodiscard]] bool IsBefore(Stamp stamp, std::uint64_t ns) const {
+    return has_last_ && last_ < stamp && NanosBetween(last_, stamp) > ns;
+  }
 
   // Calls visit(sample) for every sample that was neither passed nor refused yet.
   template <typename Visit>
@@ -92,7 +98,7 @@ class StampGate {
     const Stamp before = std::exchange(returned_, stamp);
     returning_ = returning_ > 0 && Follows(before, stamp) ? returning_ + 1 : 1;
     if (returning_ < confirmations_) return ports_.refuse(sample, DropReason::kStampWentBack);
-    ports_.set_back();
+    ports_.set_back(last_);
     Pass({stamp, sequence, std::move(sample)});
   }
 

@@ -92,6 +92,31 @@ TEST(ClockChanges, ScansThatWaitWhenTheOdometrysClockIsSetBackAreDropped) {
   EXPECT_THAT(p.drops, ElementsAre(Pair(101 * kSecond, DropReason::kNoOdometry)));
 }
 
+// A replay that sends no more until scans have been used waited for ever: the stream that noticed the change later
+// threw away what the other one had sent of the new time.
+TEST(ClockChanges, WhatOneStreamHasSentOfTheNewTimeStaysWhenTheOtherFollows) {
+  for (const bool odometry_first : {true, false}) {
+    Pairing p;
+    for (int i = 0; i < 50; ++i) {
+      p.OdometryAt(100 * kSecond + i * kSecond / 10, 0);
+      p.ScanAt(100 * kSecond + i * kSecond / 10);
+    }
+    const std::size_t before = p.pairs.size();
+    for (const bool odometry : {odometry_first, !odometry_first}) {
+      for (int i = 0; i < 20; ++i) {
+        if (odometry) p.OdometryAt(i * kSecond / 10, 0.1 * i);
+        if (!odometry) p.ScanAt(i * kSecond / 10);
+      }
+    }
+    // Five stamps show that the clock was set back, and the last of them counts.
+    EXPECT_EQ(p.pairs.size(), before + 16);
+    EXPECT_EQ(p.pairing.waiting(), 0u);
+    for (std::size_t i = before; i < p.pairs.size(); ++i)
+      EXPECT_NEAR(p.pairs[i].T_odom_robot.x, static_cast<double>(p.pairs[i].stamp) / kSecond, 1e-9);
+    EXPECT_TRUE(p.grows);
+  }
+}
+
 TEST(ClockChanges, AfterAClockWasSetBackTimeGrowsAsFastAsTheRobotsClock) {
   Pairing p;
   for (int i = 0; i < 10; ++i) {

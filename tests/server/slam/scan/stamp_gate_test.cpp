@@ -27,7 +27,7 @@ class StampGateTest : public testing::Test {
       3,
       {.pass = [this](Stamp&& stamp) { passed_.push_back(stamp); },
        .refuse = [this](const Stamp& stamp, DropReason reason) { refused_.emplace_back(stamp, reason); },
-       .set_back = [this] { ++set_back_; }}};
+       .set_back = [this](Stamp) { ++set_back_; }}};
 };
 
 TEST_F(StampGateTest, TheFirstStampPassesWhateverItIs) {
