@@ -15,7 +15,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds kFirstPatience{2};   // For the first part of an answer; then the question is repeated.
 constexpr std::chrono::seconds kAnswerPatience{1};  // Pings of a server that was found are not answered for so long.
-constexpr std::chrono::seconds kJoinPatience{3};    // No server is found for so long; a handshake takes 1 s.
+constexpr std::chrono::seconds kJoinPatience{6};    // No server is found for so long; a handshake takes 1 s.
 
 // The answer's only element, which a server that says OK must give.
 template <typename T>

@@ -13,6 +13,7 @@ namespace {
 
 constexpr std::chrono::milliseconds kStaleAfter{1800};  // Together with the watcher's period below 2 s.
 constexpr std::chrono::seconds kLostServer{3};          // Longer than the lease of a server that has gone.
+constexpr std::chrono::seconds kLongestHandshake{6};    // It usually takes 1 s.
 constexpr std::chrono::milliseconds kReportDelay{700};  // Until the server's report of a stream follows its samples.
 constexpr std::chrono::seconds kKeepRetired{3};         // If the server does not answer the new participant.
 // Pauses between two renewals. They double, because the server may be silent for another reason. They stay short while
@@ -93,9 +94,9 @@ std::string RobotClient::Silence(Clock::time_point now) {
   if (over_ || reopening_ || state_->phase == SessionPhase::kEnded) return {};
   if (now - answered_at_ > kStaleAfter) return "the server does not answer the session's request";
   const bool hostile = wire_->bus->datagrams_refused() > refused_at_renewal_;
-  // With DDS Security a handshake gets stuck now and then (Fast DDS 2.9): a new participant begins another one.
-  const bool may_be_stuck = hostile || !wire_->bus->options().security.empty();
-  if (may_be_stuck && now - connected_at_ > kLostServer) return "no server is found";
+  // With DDS Security a handshake gets stuck now and then (Fast DDS 2.9); a new participant begins another one.
+  const bool stuck = !wire_->bus->options().security.empty() && now - connected_at_ > kLongestHandshake;
+  if (stuck || (hostile && now - connected_at_ > kLostServer)) return "no server is found";
   for (const auto& [sensor_id, stream] : streams_) {
     if (!Answered() || !server || stream.sent <= stream.arrived || now - stream.moved <= kStaleAfter) continue;
     return fmt::format("nothing that was sent has arrived at the server for {:.1f} s ({} of {} samples {})",

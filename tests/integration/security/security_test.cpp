@@ -244,7 +244,7 @@ TEST(SecureClients, JoinAgainWhereNoServerIsFound) {
   request.sensors = {"laser"};
   const auto robot = Must(client::RobotClient::Open(*bus, request, 30.0));
   server.reset();
-  const auto queries = Must(client::QueryClient::Create(*bus, {.timeout_s = 5.0}));
+  const auto queries = Must(client::QueryClient::Create(*bus, {.timeout_s = 9.0}));
   EXPECT_FALSE(queries->Ping());
   EXPECT_GE(queries->renewed(), 1);
   EXPECT_TRUE(Eventually([&] { return robot->renewed() > 0; }));

@@ -170,8 +170,8 @@ class SmallRecords : public Store {
 TEST(JournalFaults, ARecordThatIsTooLongForTheStoreKeepsNothingElseFromBeingWritten) {
   const auto memory = MemoryStore();
   SmallRecords store(*memory);
-  Journal journal(store, {.commit_delay_ms = 1});
   std::atomic<int> told{0};
+  Journal journal(store, {.commit_delay_ms = 1});
   for (const std::uint64_t session : {1, 2})
     journal.Open(SampleSession(session),
                  [&told](const std::vector<JournalEntry>& entries) { told += static_cast<int>(entries.size()); });

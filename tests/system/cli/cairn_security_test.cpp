@@ -131,7 +131,7 @@ TEST_F(SecureServer, GivesEachRoleItsRightsAndSaysWhoWasRefused) {
       {CAIRN_HOSTILE_PEER, std::to_string(test::TestDomain()), (Fleet() / "robots/r2").string(), "scan", "r1", "r2"});
   ASSERT_TRUE(test::Eventually([] {
     const auto refused = Refused();
-    return refused["peers"] >= 1 && refused["endpoints"] >= 1 && refused["samples"] >= 1;
+    return refused.is_object() && refused["peers"] >= 1 && refused["endpoints"] >= 1 && refused["samples"] >= 1;
   })) << Refused().dump();
   EXPECT_THAT(Cairn("viewers/v", {"status"}).out, HasSubstr("DDS Security on; refused since the start: "));
 
