@@ -80,7 +80,8 @@ class CairnSite : public ::testing::Test {
     command.insert(command.begin(), {CAIRN_PATH, "site"});
     command.insert(command.end(), {"--state", ""});
     for (int kills = 0; kills < kMost; ++kills) {
-      const std::string copy = File(state + "-" + std::to_string(kills));
+      const TempDirectory place;
+      const std::string copy = (place / state).string();
       std::filesystem::copy(File(state), copy, std::filesystem::copy_options::recursive);
       command.back() = copy;
       ChildProcess killed(command);
@@ -95,7 +96,6 @@ class CairnSite : public ::testing::Test {
       static_cast<void>(killed.Wait());
       check(copy);
       if (!running) return kills;
-      std::filesystem::remove_all(copy);
     }
     return kMost;
   }
