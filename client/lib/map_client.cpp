@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 
 #include "client/lib/client_id.h"
@@ -11,18 +12,14 @@
 namespace cairn::client {
 
 MapClient::MapClient(wire::Bus& bus, const std::string& site, std::function<void()> on_change)
-    : bus_(bus), site_(site), on_change_(std::move(on_change)), mirror_(HashName(site)), last_value_(Clock::now()) {}
+    : bus_(bus),
+      site_(site),
+      on_change_(std::move(on_change)),
+      mirror_(HashName(site)),
+      watch_([this] { return Behind(); }, [this] { Renew(); }) {}
 
 MapClient::~MapClient() {
-  std::unique_ptr<Wire> last;  // Its callbacks take the mutex.
-  {
-    const MutexLock lock(mutex_);
-    stopping_ = true;
-    changed_.NotifyAll();
-  }
-  if (watcher_.joinable()) watcher_.join();
-  const MutexLock lock(mutex_);
-  last = std::move(wire_);
+  watch_.Stop();  // It would change the wire.
 }
 
 Result<std::unique_ptr<MapClient>> MapClient::Create(wire::Bus& bus, const std::string& site,
@@ -30,11 +27,8 @@ Result<std::unique_ptr<MapClient>> MapClient::Create(wire::Bus& bus, const std::
   std::unique_ptr<MapClient> client(new MapClient(bus, site, std::move(on_change)));
   auto wire = client->Connect(bus, 0);
   if (!wire) return tl::unexpected(wire.error());
-  {
-    const MutexLock lock(client->mutex_);
-    client->wire_ = std::move(*wire);
-  }
-  client->watcher_ = std::thread([self = client.get()] { self->Watch(); });
+  const MutexLock lock(client->mutex_);
+  client->wire_ = std::move(*wire);
   return client;
 }
 
@@ -54,52 +48,24 @@ void MapClient::Apply(int number, Value&& value) {
   {
     const MutexLock lock(mutex_);
     if (number != number_ || !mirror_->Apply(std::forward<Value>(value))) return;
-    last_value_ = Clock::now();
     changed_.NotifyAll();
   }
+  watch_.Arrived();
   if (on_change_) on_change_();
 }
 
-// The mirror is not what the server has by now.
-bool MapClient::Behind(const MapInfo& asked) const {
-  const std::uint64_t known = std::max(mirror_->version(), mirror_->info() ? mirror_->info()->version : 0);
-  return asked.generation != mirror_->generation() || asked.epoch != mirror_->epoch() || asked.version > known;
-}
-
-void MapClient::Watch() {
-  constexpr std::chrono::seconds kSilence{2};
-  constexpr std::chrono::seconds kLongestPause{60};
-  Clock::time_point asked = Clock::now();
-  Clock::duration pause = kSilence;  // Between two questions; longer where joining anew did not help.
-  bool behind = false;               // As of the last question, and nothing came since.
-  for (;;) {
-    {
-      const MutexLock lock(mutex_);
-      if (!stopping_) changed_.WaitFor(mutex_, std::chrono::milliseconds(200));
-      if (stopping_) return;
-      const auto now = Clock::now();
-      if (now - last_value_ < kSilence) behind = false;
-      if (now - last_value_ < kSilence || now - asked < pause) continue;
-      asked = now;
-    }
-    if (queries_ == nullptr) {
-      auto queries = QueryClient::Create(bus_);
-      if (!queries) continue;
-      queries_ = std::move(*queries);
-    }
-    const auto info = queries_->Map(site_);
-    if (!info) continue;
-    const bool before = behind;
-    {
-      const MutexLock lock(mutex_);
-      behind = Behind(*info);
-    }
-    if (!behind) pause = kSilence;
-    if (!before || !behind) continue;
-    Renew();
-    pause = std::min<Clock::duration>(2 * pause, kLongestPause);
-    behind = false;
+// Whether the mirror is not what the server has by now.
+bool MapClient::Behind() {
+  if (queries_ == nullptr) {
+    auto queries = QueryClient::Create(bus_);
+    if (!queries) return false;
+    queries_ = std::move(*queries);
   }
+  const auto asked = queries_->Map(site_);
+  if (!asked) return false;
+  const MutexLock lock(mutex_);
+  const std::uint64_t known = std::max(mirror_->version(), mirror_->info() ? mirror_->info()->version : 0);
+  return asked->generation != mirror_->generation() || asked->epoch != mirror_->epoch() || asked->version > known;
 }
 
 // Nothing that was received before counts any more: it may have been forged.
@@ -111,7 +77,6 @@ void MapClient::Renew() {
     const MutexLock lock(mutex_);
     number = ++number_;
     mirror_.emplace(HashName(site_));
-    last_value_ = Clock::now();
   }
   auto wire = Connect(**bus, number);
   if (!wire) return;
@@ -132,7 +97,7 @@ Result<void> MapClient::WaitComplete(double timeout_s) {
   const Deadline deadline = DeadlineAfter(timeout_s);
   const MutexLock lock(mutex_);
   while (!mirror_->complete()) {
-    if (Clock::now() >= deadline) {
+    if (std::chrono::steady_clock::now() >= deadline) {
       if (wire_->map->matched() == 0) return Fail(StatusCode::kUnavailable, NoServer(bus_, timeout_s));
       if (!mirror_->info())
         return Fail(StatusCode::kNotFound, fmt::format("the server has no map of site '{}'", site_));

@@ -1,19 +1,17 @@
 // Follows the map of one site: a TileMirror kept up to date by the wire. Gets the whole current map on joining, then
-// what changes. After two silent seconds it asks the server for the map's version: where the mirror is behind it and
-// stays so, forged messages keep it from receiving, or have made it wrong, and it joins the domain anew (RobotClient).
+// what changes. Where nothing arrives although the server has a newer map, it joins the domain anew (SilenceWatch).
 // Thread rule: every method from any thread; `on_change` runs on the wire's threads, may call the methods, and must
 // return soon.
 #pragma once
 
-#include <chrono>
 #include <functional>
 #include <memory>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "client/lib/query_client.h"
+#include "client/lib/silence_watch.h"
 #include "client/lib/tile_mirror.h"
 #include "common/mutex.h"
 #include "common/wire/bus.h"
@@ -39,7 +37,6 @@ class MapClient {
   [[nodiscard]] int renewed() const;  // Times it joined anew.
 
  private:
-  using Clock = std::chrono::steady_clock;
   struct Wire {
     std::unique_ptr<wire::Bus> own;  // Null for the first, which uses the caller's.
     std::unique_ptr<wire::Subscription> map;
@@ -50,8 +47,7 @@ class MapClient {
   template <typename Value>
   void Apply(int number, Value&& value);
   [[nodiscard]] Result<std::unique_ptr<Wire>> Connect(wire::Bus& bus, int number);
-  void Watch();
-  [[nodiscard]] bool Behind(const MapInfo& asked) const CAIRN_REQUIRES(mutex_);
+  [[nodiscard]] bool Behind();
   void Renew();
 
   wire::Bus& bus_;
@@ -60,12 +56,11 @@ class MapClient {
   mutable Mutex mutex_;
   CondVar changed_;
   std::optional<TileMirror> mirror_ CAIRN_GUARDED_BY(mutex_);
-  Clock::time_point last_value_ CAIRN_GUARDED_BY(mutex_);  // When the last value of the site arrived.
-  int number_ CAIRN_GUARDED_BY(mutex_) = 0;                // The number of the wire whose values count.
-  bool stopping_ CAIRN_GUARDED_BY(mutex_) = false;
-  std::unique_ptr<QueryClient> queries_;  // The watcher's, from the first silence on.
+  int number_ CAIRN_GUARDED_BY(mutex_) = 0;  // The number of the wire whose values count.
+  std::unique_ptr<QueryClient> queries_;     // The watch's, from the first silence on.
+  SilenceWatch watch_;
+  // Last: its callbacks use everything above.
   std::unique_ptr<Wire> wire_ CAIRN_GUARDED_BY(mutex_);
-  std::thread watcher_;
 };
 
 }  // namespace cairn::client

@@ -1,12 +1,12 @@
 #include "server/slam/checkpoint.h"
 
-#include <algorithm>
 #include <cstring>
 #include <functional>
 #include <span>
 #include <sstream>
 #include <utility>
 
+#include "common/file/checksum.h"
 #include "common/options/number_text.h"
 
 namespace cairn::slam {
@@ -25,18 +25,6 @@ bool TakeNumber(std::string_view& bytes, Number& number) {
   std::memcpy(&number, bytes.data(), sizeof(number));
   bytes.remove_prefix(sizeof(number));
   return true;
-}
-
-// FNV-1a over words of eight bytes: a change of one byte always changes the sum. Not against forgery.
-std::uint64_t Checksum(std::string_view bytes) {
-  std::uint64_t sum = 0xcbf29ce484222325 ^ bytes.size();
-  for (std::size_t at = 0; at < bytes.size(); at += sizeof(std::uint64_t)) {
-    std::uint64_t word = 0;
-    std::memcpy(&word, bytes.data() + at, std::min(sizeof(word), bytes.size() - at));
-    sum = (sum ^ word) * 0x100000001b3;
-    sum ^= sum >> 32;
-  }
-  return sum;
 }
 
 // Writes every option as a line `key value`.
@@ -82,7 +70,7 @@ std::string TextOf(MapperOptions options) {
   std::string numbers;
   for (const MapLine& line : *options.filter.line_match.map)
     for (const double number : {line.a.x(), line.a.y(), line.b.x(), line.b.y()}) AppendNumber(numbers, number);
-  return text + "slam.line_match.map with the checksum " + std::to_string(Checksum(numbers)) + '\n';
+  return text + "slam.line_match.map with the checksum " + std::to_string(ChecksumOf(numbers)) + '\n';
 }
 
 // The first line that differs. REQUIRES: the texts are different.
@@ -117,7 +105,7 @@ std::string Checkpoint::With(const std::string& state) const {
   checked += state;
   std::string bytes(kMagic);
   AppendNumber(bytes, kCheckpointFormat);
-  AppendNumber(bytes, Checksum(checked));
+  AppendNumber(bytes, ChecksumOf(checked));
   return bytes + checked;
 }
 
@@ -134,7 +122,7 @@ Result<std::string_view> OpenCheckpoint(std::string_view bytes, const MapperOpti
     return Fail(format > kCheckpointFormat ? StatusCode::kUnimplemented : StatusCode::kFailedPrecondition,
                 "the checkpoint has format " + std::to_string(format) + ", this program reads " +
                     std::to_string(kCheckpointFormat));
-  if (!TakeNumber(bytes, checksum) || checksum != Checksum(bytes)) return damaged("its checksum is wrong");
+  if (!TakeNumber(bytes, checksum) || checksum != ChecksumOf(bytes)) return damaged("its checksum is wrong");
   if (!TakeNumber(bytes, length) || length > bytes.size()) return damaged("it is too short");
   const std::string here = TextOf(options), there(bytes.substr(0, length));
   if (here != there) return tl::unexpected(Different(here, there));

@@ -1,5 +1,5 @@
-// The checksum of records and of saved sites: FNV-1a, 64 bits (Fowler, Noll, Vo 1991). Every step is invertible, so one
-// changed byte always changes the sum. Not thread-safe.
+// The checksum of saved sites, and of records of format 1: FNV-1a over bytes, 64 bits (Fowler, Noll, Vo 1991). Every
+// step is invertible, so one changed byte always changes the sum. Not thread-safe.
 #pragma once
 
 #include <cstdint>

@@ -11,8 +11,9 @@
 
 namespace cairn::server {
 
-// The newest version of the messages in idl/cairn/record.proto that this server can read; it writes this version.
-inline constexpr std::uint32_t kRecordFormat = 1;
+// The newest version of the records (idl/cairn/record.proto) that this server can read; it writes this version. Since
+// version 2 the checksum goes over words and not over bytes.
+inline constexpr std::uint32_t kRecordFormat = 2;
 // Longer records are refused when they are read: the size is a number in a file.
 inline constexpr std::uint64_t kMaxRecordBytes = std::uint64_t{1} << 30;
 

@@ -56,6 +56,7 @@ void Journal::Open(const StoredSession& session, Durable durable) {
   // The caller is told as soon as the session itself is on the disk.
   if (!line.lost) Push(Written{key, [session] { return BytesOf(session); }}, 0);
   urgent_ = true;
+  arrived_.NotifyAll();
 }
 
 void Journal::Reopen(std::uint64_t session, std::uint64_t last, Durable durable, std::uint64_t checkpointed,
@@ -143,10 +144,13 @@ bool Journal::Push(Change change, std::size_t size, Room room) {
     lost_ = "the disk was too slow or failed for too long, and a part of the state is no longer stored";
     return false;
   }
-  if (queue_.empty()) oldest_ = Clock::now();
+  // Only the first change of a group wakes the thread, which then sleeps until the group is due.
+  if (queue_.empty()) {
+    oldest_ = Clock::now();
+    arrived_.NotifyAll();
+  }
   queue_.push_back(std::move(change));
   queued_bytes_ += size;
-  arrived_.NotifyAll();
   return true;
 }
 

@@ -7,6 +7,7 @@
 #include <set>
 #include <thread>
 
+#include "client/lib/pose_client.h"
 #include "client/lib/query_client.h"
 #include "client/lib/robot_client.h"
 #include "tests/child_process.h"
@@ -159,6 +160,9 @@ TEST_F(Hostile, NumbersThatAreFarAheadChangeNothing) {
 }
 
 TEST_F(Hostile, AStreamThatTakesNothingIsStaleAndFlowsAgainWithinFiveSeconds) {
+  const auto viewer_bus = MakeBus("viewer");
+  const auto viewer = Must(client::PoseClient::Create(*viewer_bus, "r1"));
+  ASSERT_TRUE(Eventually([&] { return viewer->Next(0.1).has_value(); }));
   const auto participants = OverhearParticipants(TestDomain(), seconds(4));
   ASSERT_GE(participants.size(), 3U);
   const auto queries_bus = MakeBus("operator");
@@ -183,6 +187,9 @@ TEST_F(Hostile, AStreamThatTakesNothingIsStaleAndFlowsAgainWithinFiveSeconds) {
       },
       milliseconds(2500)));
   EXPECT_TRUE(Eventually([&] { return AllFlow(milliseconds(500)); }, milliseconds(5000)));
+  while (viewer->Next(0.0)) {
+  }
+  EXPECT_TRUE(Eventually([&] { return viewer->Next(0.1).has_value(); }, milliseconds(5000)));
   EXPECT_LT(std::chrono::steady_clock::now() - end, seconds(5));
   EXPECT_TRUE(Eventually([&] {
     for (const auto& robot : robots_) {

@@ -83,10 +83,18 @@ void FakeServer::LoseOnce(std::uint64_t sequence) {
 }
 
 void FakeServer::Publish(const PoseReport& pose) {
+  {
+    const MutexLock lock(mutex_);
+    published_poses_[pose.robot] = pose;
+  }
   Must(poses_->Publish(pose));
 }
 
 void FakeServer::Publish(const MapInfo& info) {
+  {
+    const MutexLock lock(mutex_);
+    published_maps_[info.site] = info;
+  }
   Must(maps_->Publish(info));
 }
 
@@ -216,6 +224,11 @@ void FakeServer::OnRequest(Request&& request) {
       reply.poses.resize(1);
       reply.poses[0].robot = request.robot;
       reply.poses[0].stamp = request.latest ? -1 : request.stamp;
+      if (request.latest) {
+        const MutexLock lock(mutex_);
+        if (const auto last = published_poses_.find(request.robot); last != published_poses_.end())
+          reply.poses[0] = last->second;
+      }
       break;
     case RequestKind::kPath:
       reply.path.resize(request.smoothed ? 2 : 1);
@@ -291,6 +304,7 @@ void FakeServer::OnRequest(Request&& request) {
 
 MapInfo FakeServer::MapOf(const std::string& site) {
   const MutexLock lock(mutex_);
+  if (const auto last = published_maps_.find(site); last != published_maps_.end()) return last->second;
   MapInfo info;
   info.site = site;
   info.resolution_m = 0.1;

@@ -34,6 +34,7 @@ class FakeServer {
   // Scans with this number are lost on their way, once.
   void LoseOnce(std::uint64_t sequence);
 
+  // Questions about the newest pose of the robot, or about the map, are answered with the last one from then on.
   void Publish(const PoseReport& pose);
   void Publish(const MapInfo& info);
   void Publish(const TileSample& sample);
@@ -84,6 +85,8 @@ class FakeServer {
   std::vector<RequestKind> asked_ CAIRN_GUARDED_BY(mutex_);
   std::uint32_t enabled_version_ CAIRN_GUARDED_BY(mutex_) = kMapVersions;
   std::map<std::uint64_t, int> asked_for_job_ CAIRN_GUARDED_BY(mutex_);
+  std::map<std::string, PoseReport> published_poses_ CAIRN_GUARDED_BY(mutex_);  // The last one of each robot.
+  std::map<std::string, MapInfo> published_maps_ CAIRN_GUARDED_BY(mutex_);
 
   std::unique_ptr<wire::Bus> bus_;
   std::unique_ptr<wire::Publication<SessionState>> sessions_;

@@ -61,6 +61,24 @@ TEST(MapClient, ANewEpochReplacesTheMapWhole) {
   Must(client->WaitComplete(20.0));
 }
 
+// Everything of an earlier generation of the server is ignored, so a forged later one would hide the map for ever.
+TEST(MapClient, AForgedMapOfALaterGenerationIsReplacedByTheServersOwn) {
+  FakeServer server(LoopbackOptions());
+  server.Publish(TileAt(3, 0, 1));
+  server.Publish(Hall(0, 1, 1));
+  const auto bus = MakeBus("client"), forger = MakeBus("forger");
+  const auto client = Must(MapClient::Create(*bus, "hall"));
+  Must(client->WaitComplete(20.0));
+  auto forged = Must(forger->Advertise<MapInfo>());
+  ASSERT_TRUE(Eventually([&] { return forged->matched() > 0; }));
+  MapInfo later = Hall(7, 100, 0);
+  later.generation = 9;
+  Must(forged->Publish(later));
+  ASSERT_TRUE(Eventually([&] { return client->epoch() == 7; }));
+  forged.reset();
+  EXPECT_TRUE(Eventually([&] { return client->renewed() > 0 && client->epoch() == 0 && client->tiles().size() == 1; }));
+}
+
 TEST(MapClient, SaysWhatIsMissing) {
   const auto bus = MakeBus("client");
   const auto client = Must(MapClient::Create(*bus, "hall"));

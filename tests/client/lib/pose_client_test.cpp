@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
+#include "tests/client/lib/fake_server.h"
 #include "tests/loopback.h"
 
 namespace cairn::client {
@@ -50,6 +53,44 @@ TEST_F(PoseClientTest, HearsThePosesOfItsRobotInOrder) {
   EXPECT_EQ(before, last);
   EXPECT_FALSE(client_->Next(0.0));
   EXPECT_EQ(client_->dropped(), 0U);
+}
+
+// Poses of an earlier generation of the server are ignored, so a forged later one would hide all others for ever.
+TEST(PoseClientOfAServer, JoinsAnewWhereOnlyTheServerHasNewPoses) {
+  FakeServer server(LoopbackOptions());
+  const auto bus = MakeBus("client"), forger = MakeBus("forger");
+  const auto client = Must(PoseClient::Create(*bus, "r1"));
+  const auto forged = Must(forger->Advertise<PoseReport>());
+  PoseReport pose;
+  pose.robot = "r1";
+  pose.robot_id = HashName(pose.robot);
+  pose.generation = 9;
+  EXPECT_TRUE(Eventually([&] {
+    Must(forged->Publish(pose));
+    const auto arrived = client->Next(0.05);
+    return arrived && arrived->generation == 9;
+  }));
+  pose.generation = 1;
+  EXPECT_TRUE(Eventually([&] {
+    ++pose.stamp;
+    server.Publish(pose);
+    const auto arrived = client->Next(0.05);
+    return arrived && arrived->generation == 1;
+  }));
+  EXPECT_GE(client->renewed(), 1);
+}
+
+TEST(PoseClientOfAServer, StaysWhereTheRobotHasNoNewPoses) {
+  FakeServer server(LoopbackOptions());
+  PoseReport pose;
+  pose.robot = "r1";
+  pose.robot_id = HashName(pose.robot);
+  pose.stamp = 77;
+  server.Publish(pose);
+  const auto bus = MakeBus("client");
+  const auto client = Must(PoseClient::Create(*bus, "r1"));
+  EXPECT_TRUE(Eventually([&] { return std::ranges::count(server.asked(), RequestKind::kPose) >= 4; }));
+  EXPECT_EQ(client->renewed(), 0);
 }
 
 TEST_F(PoseClientTest, ASlowReaderLosesTheOldestPoses) {

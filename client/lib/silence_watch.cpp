@@ -1,0 +1,65 @@
+#include "client/lib/silence_watch.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace cairn::client {
+namespace {
+
+constexpr std::chrono::seconds kSilence{1};
+constexpr std::chrono::seconds kRest{2};  // Between two questions that find nothing new.
+constexpr std::chrono::seconds kLongestRest{60};
+
+}  // namespace
+
+SilenceWatch::SilenceWatch(std::function<bool()> behind, std::function<void()> renew)
+    : behind_(std::move(behind)), renew_(std::move(renew)), thread_([this] { Run(); }) {}
+
+void SilenceWatch::Stop() {
+  {
+    const MutexLock lock(mutex_);
+    stopping_ = true;
+    stopped_.NotifyAll();
+  }
+  if (thread_.joinable()) thread_.join();
+}
+
+void SilenceWatch::Arrived() {
+  const MutexLock lock(mutex_);
+  last_arrival_ = Clock::now();
+}
+
+bool SilenceWatch::WaitForSilence(Clock::time_point next_question) {
+  const MutexLock lock(mutex_);
+  while (!stopping_) {
+    const auto due = std::max(next_question, last_arrival_ + kSilence);
+    if (Clock::now() >= due) return true;
+    stopped_.WaitUntil(mutex_, due);
+  }
+  return false;
+}
+
+void SilenceWatch::Run() {
+  Clock::duration after_renewal = kRest;
+  Clock::time_point next_question = Clock::now();
+  while (WaitForSilence(next_question)) {
+    const auto asked = Clock::now();
+    next_question = asked + kRest;
+    if (!behind_()) {
+      after_renewal = kRest;
+      continue;
+    }
+    // What is on its way has a second to arrive; then WaitForSilence waits for the next silence.
+    if (!WaitForSilence(asked + kSilence)) return;
+    {
+      const MutexLock lock(mutex_);
+      if (last_arrival_ > asked) continue;
+    }
+    if (!behind_()) continue;
+    renew_();
+    next_question = Clock::now() + after_renewal;
+    after_renewal = std::min<Clock::duration>(2 * after_renewal, kLongestRest);
+  }
+}
+
+}  // namespace cairn::client

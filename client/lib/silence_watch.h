@@ -1,0 +1,45 @@
+// Notices that a subscription receives nothing although the server has something new: forged messages can bring a
+// reader of DDS into such a state, and it does not get out of it by itself. After a second of silence the watch asks
+// the server, and where the client is behind twice in a row, it has the client join the domain anew. It asks again
+// after two seconds, and later and later, up to once a minute, where joining did not help. Thread rule: Arrived from
+// any thread, Stop from one. The functions run on the watch's thread.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <thread>
+
+#include "common/mutex.h"
+
+namespace cairn::client {
+
+class SilenceWatch {
+ public:
+  // `behind` asks the server whether it has something newer than what arrived; false where it does not answer.
+  SilenceWatch(std::function<bool()> behind, std::function<void()> renew);
+  ~SilenceWatch() { Stop(); }
+  SilenceWatch(const SilenceWatch&) = delete;
+  SilenceWatch& operator=(const SilenceWatch&) = delete;
+
+  // Something new arrived.
+  void Arrived();
+  // Ends the thread; no function runs afterwards.
+  void Stop();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void Run();
+  // Waits until it is time to ask. Returns false if the watch ends.
+  bool WaitForSilence(Clock::time_point next_question);
+
+  const std::function<bool()> behind_;
+  const std::function<void()> renew_;
+  Mutex mutex_;
+  CondVar stopped_;
+  Clock::time_point last_arrival_ CAIRN_GUARDED_BY(mutex_) = Clock::now();
+  bool stopping_ CAIRN_GUARDED_BY(mutex_) = false;
+  std::thread thread_;  // Last: it uses everything above.
+};
+
+}  // namespace cairn::client
