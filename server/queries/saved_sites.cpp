@@ -159,8 +159,8 @@ Result<void> SavedSites::Load(const Request& request) {
   options.site = request.site.empty() ? file->site.name : request.site;
   if (auto valid = ValidateName("site", options.site); !valid) return valid;
   if (auto reserved = rooms_.atlas.Reserve(options.site); !reserved) return reserved;
-  options.first_session = rooms_.roster.ReserveIds(file->last_session);
-  options.first_job = rooms_.jobs.ReserveIds(file->last_job);
+  options.first_session = rooms_.roster.ReserveIds(file->session_numbers.size());
+  options.first_job = rooms_.jobs.ReserveIds(file->job_numbers.size());
   const auto loaded =
       Between<SiteFileSummary>([path = *path, options](Store& store) { return ImportSite(store, path, options); });
   auto taken = loaded ? OpenLoaded(*loaded) : Result<void>(tl::unexpected(loaded.error()));

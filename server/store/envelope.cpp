@@ -12,9 +12,11 @@
 namespace cairn::server {
 namespace {
 
-// A fast level (negative ones are faster than level 1): the scans of a robot come all day, and the disk is larger than
-// the processor is fast.
-constexpr int kLevel = -5;
+// Level 1 is fast: the scans of a robot come all day, and the disk is larger than the processor is fast. Negative
+// levels are faster: checkpoints are many times as large, and are replaced after seconds.
+int LevelOf(RecordKind kind) {
+  return kind == RecordKind::kCheckpoint ? -5 : 1;
+}
 constexpr std::size_t kShortest = 128;  // Shorter contents gain nothing.
 enum Packing : std::uint32_t { kPlain = 0, kZstd = 1 };
 
@@ -66,7 +68,7 @@ std::string EnvelopeCodec::Seal(const RecordKey& key, std::string_view content, 
   if (content.size() >= kShortest) {
     payload.resize(ZSTD_compressBound(content.size()));
     const std::size_t packed = ZSTD_compressCCtx(compressor_->pack.get(), payload.data(), payload.size(),
-                                                 content.data(), content.size(), kLevel);
+                                                 content.data(), content.size(), LevelOf(key.kind));
     if (ZSTD_isError(packed) == 0 && packed < content.size()) {
       payload.resize(packed);
       envelope.set_packing(kZstd);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstring>
 #include <set>
 #include <system_error>
@@ -12,6 +13,8 @@
 
 namespace cairn::server {
 namespace {
+
+static_assert(std::endian::native == std::endian::little, "numbers are written as they are in memory");
 
 constexpr std::string_view kMagic = "cairnste";
 constexpr std::uint64_t kHeaderBytes = 12;
@@ -106,6 +109,7 @@ class Survey {
     auto site = SiteOf(record.bytes);
     if (!site) return tl::unexpected(site.error());
     if (record.key.owner != HashName(site->name)) return Unreadable("a site of another name");
+    for (const auto& [robot, session] : site->members) summary_.session_numbers.insert(session);
     summary_.site = std::move(*site);
     return {};
   }
@@ -118,7 +122,7 @@ class Survey {
       if (HashName(robot) == HashName(session->request.robot)) return Unreadable("two sessions of one robot");
     }
     summary_.sessions[session->id] = session->request.robot;
-    summary_.last_session = std::max(summary_.last_session, session->id);
+    summary_.session_numbers.insert(session->id);
     return {};
   }
   Result<void> TakeJournal(const Record& record) {
@@ -138,7 +142,9 @@ class Survey {
     if (!good) return Unreadable("a map version");
     for (const auto& [session, part] : version->parts) {
       if (!IsId(session)) return Unreadable("a map version");
+      summary_.session_numbers.insert(session);
     }
+    if (version->job != 0) summary_.job_numbers.insert(version->job);
     versions_.insert(version->version);
     return {};
   }
@@ -147,7 +153,7 @@ class Survey {
     if (!layer) return tl::unexpected(layer.error());
     const bool good = record.key.owner == HashName(summary_.site.name) && record.key.number == layer->session;
     if (!good || !IsId(layer->session)) return Unreadable("a part of a map");
-    summary_.last_session = std::max(summary_.last_session, layer->session);
+    summary_.session_numbers.insert(layer->session);
     return {};
   }
   Result<void> TakeJob(const Record& record) {
@@ -156,7 +162,7 @@ class Survey {
     if (job->job.id != record.key.owner || job->job.site != summary_.site.name || !IsId(job->job.id))
       return Unreadable("a job of another site");
     summary_.jobs.insert(job->job.id);
-    summary_.last_job = std::max(summary_.last_job, job->job.id);
+    summary_.job_numbers.insert(job->job.id);
     return {};
   }
   static bool IsId(std::uint64_t id) { return id < kMaxSavedId; }

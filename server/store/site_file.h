@@ -29,7 +29,7 @@ namespace cairn::server {
 
 // The format of the files that are written; files of all formats up to this one are read.
 inline constexpr std::uint32_t kSiteFileFormat = 1;
-// Numbers of sessions and jobs in a file are smaller, so that they can be counted on.
+// Numbers of sessions and jobs in a file are smaller.
 inline constexpr std::uint64_t kMaxSavedId = std::uint64_t{1} << 53;
 
 // Reads a saved site from its first record to its last. Not thread-safe.
@@ -60,9 +60,10 @@ class SiteFileReader {
 struct SiteFileSummary {
   StoredSite site;
   std::map<std::uint64_t, std::string> sessions;  // Id -> robot.
-  std::uint64_t last_session = 0;                 // The highest number of a session, also of one that exists no more.
   std::set<std::uint64_t> jobs;
-  std::uint64_t last_job = 0;
+  // All numbers of sessions and of jobs in it, also of those that exist no more.
+  std::set<std::uint64_t> session_numbers;
+  std::set<std::uint64_t> job_numbers;
   std::uint64_t records = 0;
   std::uint64_t entries = 0;  // Number of entries in all journals.
 };

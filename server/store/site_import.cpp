@@ -7,27 +7,45 @@
 namespace cairn::server {
 namespace {
 
+using Numbers = std::map<std::uint64_t, std::uint64_t>;
+
+std::set<std::uint64_t> NewOf(const Numbers& numbers) {
+  std::set<std::uint64_t> all;
+  for (const auto& [from, to] : numbers) all.insert(to);
+  return all;
+}
+
+// New numbers without gaps, in the old order, so that numbers do not grow with each save and load.
+Numbers Renumbered(const std::set<std::uint64_t>& old_numbers, std::uint64_t first) {
+  Numbers numbers;
+  for (const std::uint64_t old_number : old_numbers) numbers.emplace(old_number, first++);
+  return numbers;
+}
+
 // How numbers and names of the file become those of the store.
 class Renaming {
  public:
-  Renaming(const SiteFileSummary& file, const ImportOptions& options, std::uint64_t session_offset,
-           std::uint64_t job_offset)
+  Renaming(const SiteFileSummary& file, const ImportOptions& options, std::uint64_t first_session,
+           std::uint64_t first_job)
       : site_(options.site.empty() ? file.site.name : options.site),
         robots_(options.robots),
-        session_offset_(session_offset),
-        job_offset_(job_offset) {
+        sessions_(Renumbered(file.session_numbers, first_session)),
+        jobs_(Renumbered(file.job_numbers, first_job)) {
     for (const auto& [from, to] : robots_) ids_[HashName(from)] = HashName(to);
   }
 
   [[nodiscard]] const std::string& site() const { return site_; }
-  [[nodiscard]] std::uint64_t Session(std::uint64_t id) const { return id + session_offset_; }
-  [[nodiscard]] std::uint64_t Job(std::uint64_t id) const { return id + job_offset_; }
+  [[nodiscard]] std::uint64_t Session(std::uint64_t id) const { return sessions_.at(id); }
+  [[nodiscard]] std::uint64_t Job(std::uint64_t id) const { return jobs_.at(id); }
+  [[nodiscard]] std::set<std::uint64_t> session_numbers() const { return NewOf(sessions_); }
+  [[nodiscard]] std::set<std::uint64_t> job_numbers() const { return NewOf(jobs_); }
   [[nodiscard]] const std::string& Robot(const std::string& name) const {
     const auto found = robots_.find(name);
     return found == robots_.end() ? name : found->second;
   }
 
-  // The file was surveyed before, so every record can be read. A value that cannot be is an error all the same.
+  // The file was surveyed before, so every record can be read, and every number in it is known. A value that cannot be
+  // read is an error all the same. Throws std::out_of_range if the file has changed since.
   [[nodiscard]] Result<Record> Apply(Record&& record) const {
     switch (record.key.kind) {
       case RecordKind::kSite:
@@ -39,8 +57,8 @@ class Renaming {
         return As(LayerOf(record.bytes), HashName(site_), Session(record.key.number),
                   [this](StoredLayer& layer) { layer.session = Session(layer.session); });
       case RecordKind::kJob:
-        return As(JobOf(record.bytes), record.key.owner + job_offset_, 0, [this](StoredJob& stored) {
-          stored.job.id += job_offset_;
+        return As(JobOf(record.bytes), Job(record.key.owner), 0, [this](StoredJob& stored) {
+          stored.job.id = Job(stored.job.id);
           stored.job.site = site_;
         });
       case RecordKind::kSession:
@@ -80,7 +98,7 @@ class Renaming {
     site.members = std::move(members);
   }
   void Rename(StoredVersion& version) const {
-    if (version.job != 0) version.job += job_offset_;
+    if (version.job != 0) version.job = Job(version.job);
     std::map<std::uint64_t, StoredGrid> parts;
     for (auto& [session, grid] : version.parts) parts.emplace(Session(session), std::move(grid));
     version.parts = std::move(parts);
@@ -111,8 +129,8 @@ class Renaming {
   const std::string site_;
   const std::map<std::string, std::string> robots_;
   std::map<NameId, NameId> ids_;
-  const std::uint64_t session_offset_;
-  const std::uint64_t job_offset_;
+  const Numbers sessions_;
+  const Numbers jobs_;
 };
 
 Result<void> CheckNames(const SiteFileSummary& file, const ImportOptions& options) {
@@ -179,6 +197,8 @@ SiteFileSummary Renamed(SiteFileSummary&& file, const Renaming& renaming) {
   std::set<std::uint64_t> jobs;
   for (const std::uint64_t id : file.jobs) jobs.insert(renaming.Job(id));
   file.jobs = std::move(jobs);
+  file.session_numbers = renaming.session_numbers();
+  file.job_numbers = renaming.job_numbers();
   return std::move(file);
 }
 
@@ -192,8 +212,8 @@ Result<SiteFileSummary> ImportSite(Store& store, const std::filesystem::path& pa
   if (!sessions) return tl::unexpected(sessions.error());
   const auto last = LastNumbersOf(store, *sessions);
   if (!last) return tl::unexpected(last.error());
-  const Renaming renaming(*file, options, std::max(last->session, options.first_session - 1),
-                          std::max(last->job, options.first_job - 1));
+  const Renaming renaming(*file, options, std::max(last->session + 1, options.first_session),
+                          std::max(last->job + 1, options.first_job));
   if (auto room = CheckRoom(store, *sessions, *file, renaming); !room) return tl::unexpected(room.error());
   auto reader = SiteFileReader::Open(path);
   if (!reader) return tl::unexpected(reader.error());

@@ -335,11 +335,11 @@ TEST(SavedSites, TwoSitesAreMergedIntoOneMap) {
 TEST(SavedSites, TheGoldenFileOfEveryVersionLoads) {
   const char* const source = std::getenv("CAIRN_SOURCE_DIR");
   ASSERT_NE(source, nullptr);
-  for (std::uint32_t format = 1; format <= kSiteFileFormat; ++format) {
+  for (const char* const name : {"site-v1.site", "site-v1-records-2.site"}) {
+    SCOPED_TRACE(name);
     const TempDirectory directory;
     std::filesystem::create_directories(directory / "0" / "saved");
-    const auto golden =
-        std::filesystem::path(source) / "tests" / "golden" / ("site-v" + std::to_string(format) + ".site");
+    const auto golden = std::filesystem::path(source) / "tests" / "golden" / name;
     ASSERT_TRUE(std::filesystem::copy_file(golden, directory / "0" / "saved" / "golden.site")) << golden;
     StoredServer server(directory / "0");
     WholeServer& house = *server.operator->();

@@ -58,6 +58,25 @@ TEST(ImportSite, GivesNewNumbersBesideOtherSites) {
   EXPECT_EQ(Everything(*store), before);
 }
 
+// Otherwise the numbers of a site that is saved, deleted and loaded every day would soon have no room.
+TEST(ImportSite, NumbersGrowByWhatTheFileHoldsAndNotByTheirSize) {
+  const TempDirectory directory;
+  const auto path = Saved(directory, {});
+  constexpr std::uint64_t kRounds = 70;
+  ImportOptions options;
+  for (std::uint64_t round = 0; round < kRounds; ++round) {
+    const auto store = MemoryStore();
+    const auto imported = ImportSite(*store, path, options);
+    ASSERT_TRUE(imported) << imported.error().message;
+    options.first_session += 3;  // Two sessions, and one of which only the map is left.
+    options.first_job += 1;
+    EXPECT_EQ(imported->session_numbers, (std::set<std::uint64_t>{options.first_session - 3, options.first_session - 2,
+                                                                  options.first_session - 1}));
+    EXPECT_EQ(imported->job_numbers, std::set<std::uint64_t>{options.first_job - 1});
+    ASSERT_TRUE(WriteSiteFile(*store, "lab", path));
+  }
+}
+
 TEST(ImportSite, RefusesWhatIsThereAlreadyAndTakesItUnderOtherNames) {
   const TempDirectory directory;
   const auto path = Saved(directory, {});

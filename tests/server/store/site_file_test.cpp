@@ -82,7 +82,7 @@ TEST_F(SiteFile, EveryRecordComesBackWithTheSameBytes) {
   EXPECT_EQ(summary->site.name, "lab");
   EXPECT_EQ(summary->sessions, (std::map<std::uint64_t, std::string>{{1, "r1"}, {2, "r2"}}));
   EXPECT_EQ(summary->entries, 8U);
-  EXPECT_EQ(summary->last_session, 3U);
+  EXPECT_EQ(summary->session_numbers, (std::set<std::uint64_t>{1, 2, 3}));
   EXPECT_EQ(summary->jobs, std::set<std::uint64_t>{1});
   const auto checkpoint = ReadCheckpoint(*into, 2);
   ASSERT_TRUE(checkpoint && *checkpoint);

@@ -222,5 +222,38 @@ TEST_F(CairnSite, AKilledCommandHasChangedEverythingOrNothing) {
   EXPECT_GT(merges, 0);
 }
 
+// The same of a running server that loads a saved site.
+TEST_F(CairnSite, AServerThatIsKilledWhileItLoadsASiteHasAllOfItOrNothing) {
+  constexpr int kMostKills = 5;
+  ASSERT_NO_FATAL_FAILURE(StartServer("saved"));
+  Stream("hall", "robot");
+  const std::vector<std::string> paths = {PathOf("robot1"), PathOf("robot2")};
+  MustJson({"site", "save", "hall", "monday"});
+  MustJson({"site", "delete", "hall"});
+  StopServer();
+  int kills = 0;
+  for (bool killed = true; killed && kills < kMostKills; ++kills) {
+    const std::string state = "copy" + std::to_string(kills);
+    std::filesystem::copy(File("saved"), File(state), std::filesystem::copy_options::recursive);
+    ASSERT_NO_FATAL_FAILURE(StartServer(state));
+    std::uintmax_t bytes = BytesIn(File(state));
+    ChildProcess load({CAIRN_PATH, "--domain", std::to_string(test::TestDomain()), "site", "load", "monday"});
+    int changes = 0;
+    while (load.RunningAfter(std::chrono::microseconds(0)) && changes <= kills) {
+      if (const std::uintmax_t now = BytesIn(File(state)); std::exchange(bytes, now) != now) ++changes;
+    }
+    killed = changes > kills;
+    server_->Signal(SIGKILL);
+    static_cast<void>(server_->Wait());
+    load.Signal(SIGKILL);
+    static_cast<void>(load.Wait());
+    ASSERT_NO_FATAL_FAILURE(StartServer(state));
+    if (MustJson({"site", "list"})["sites"].empty()) MustJson({"site", "load", "monday"});
+    EXPECT_EQ((std::vector<std::string>{PathOf("robot1"), PathOf("robot2")}), paths);
+    StopServer();
+  }
+  EXPECT_GT(kills, 1);
+}
+
 }  // namespace
 }  // namespace cairn::client
