@@ -311,6 +311,9 @@ DatagramFault Walk(Bytes datagram, Inspect inspect) {
     const bool to_the_end = length == 0 && id != kPad && id != kInfoTimestamp;
     const std::size_t end = to_the_end ? datagram.size() : at + 4 + length;
     if (end > datagram.size()) return DatagramFault::kFraming;
+    // All but the last are multiples of four bytes (9.4.5.1.3). Receivers differ in where the next one of another
+    // length begins: what is harmless here may be something else there.
+    if (end != datagram.size() && length % 4 != 0) return DatagramFault::kFraming;
     if (id == kEprosimaStatistics && end != datagram.size()) return DatagramFault::kStatistics;
     const Submessage submessage{id, flags, {datagram.subspan(at + 4, end - at - 4), little}, from, to};
     const DatagramFault fault = inspect(submessage);

@@ -18,7 +18,7 @@ namespace cairn::wire {
 enum class DatagramFault : std::uint8_t {
   kNone = 0,
   kNotRtps,        // The header is not that of RTPS 2.
-  kFraming,        // A submessage longer than the datagram, or shorter than its fixed part.
+  kFraming,        // A submessage longer than the datagram, shorter than its fixed part, or not a multiple of 4 bytes.
   kStatistics,     // A statistics submessage of eProsima that would trigger an assert.
   kSequence,       // A sequence number that is impossible or far ahead of the previous one.
   kCount,          // A heartbeat or acknowledgement whose own number is far ahead of the previous one.

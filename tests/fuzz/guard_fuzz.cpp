@@ -106,7 +106,7 @@ void ReadAsReceiver(std::string_view datagram) {
     Must(length <= datagram.size() - at - 4, "a submessage ends inside the datagram");
     Must(id != 0x80 || at + 4 + length == datagram.size(), "statistics are the last submessage");
     ReadSubmessage(id, flags, {datagram.substr(at + 4, length), (flags & 1) != 0});
-    at += 4 + length;
+    at += 4 + (length + 3) / 4 * 4;  // As Fast DDS 2.9 does.
   }
 }
 

@@ -38,6 +38,20 @@ TEST(RtpsDatagram, TheStatisticsAssertIsNotReached) {
   EXPECT_EQ(followed.Inspect(), DatagramFault::kStatistics);
 }
 
+// It aborts Fast DDS 2.9.1, which goes on at the next multiple of four bytes, with an empty submessage and then with
+// statistics that are not the last. Without the gap there is one unknown submessage to the end.
+TEST(RtpsDatagram, TheNextSubmessageBeginsAtTheSamePlaceForEveryReceiver) {
+  Datagram two_readings = Datagram().Begin(0x00, 0).Zeros(7).EndWithLength(7);
+  two_readings.U16(0x0122).U16(0).Zeros(1).Begin(0x80, 0).Zeros(56).End().Zeros(8);
+  EXPECT_EQ(two_readings.Inspect(), DatagramFault::kFraming);
+  EXPECT_EQ(Datagram().Begin(0x55, 0).Zeros(7).End().Inspect(), DatagramFault::kNone);
+  for (const std::size_t length : {4U, 8U})
+    EXPECT_EQ(Datagram().Begin(0x55, 0).Zeros(length).End().Heartbeat(1, 2).Inspect(), DatagramFault::kNone) << length;
+  for (const std::size_t length : {1U, 2U, 3U, 5U, 6U, 7U})
+    EXPECT_EQ(Datagram().Begin(0x55, 0).Zeros(length).End().Heartbeat(1, 2).Inspect(), DatagramFault::kFraming)
+        << length;
+}
+
 TEST(RtpsDatagram, SubmessagesLongerThanTheDatagramAreRefused) {
   EXPECT_EQ(Datagram().Begin(0x55, 0).Zeros(4).EndWithLength(5).Inspect(), DatagramFault::kFraming);
   Bytes cut = Datagram().Heartbeat(1, 2).bytes();

@@ -1,5 +1,5 @@
 // Garbage on the DDS ports of two participants that are busy with each other: both go on. Random bytes, random
-// submessages, real discovery datagrams with bytes changed, cut and inserted, and the datagram that aborts a bare
+// submessages, real discovery datagrams with bytes changed, cut and inserted, and the datagrams that abort a bare
 // Fast DDS 2.9.1 (the assert on a statistics submessage that is not the last; found by fuzzing, idl/README.md).
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
@@ -34,6 +34,16 @@ Bytes KillerDatagram() {
   bytes.insert(bytes.end(), {0x80, 0x01, 56, 0});
   bytes.resize(80, 0);
   bytes.insert(bytes.end(), {0x01, 0x01, 0, 0});
+  return bytes;
+}
+
+// The same, hidden: whoever reads on right after the seven bytes of the first submessage sees one that ends the datagram.
+Bytes HiddenKillerDatagram() {
+  Bytes bytes = {'R', 'T', 'P', 'S', 2, 3, 1, 15};
+  bytes.resize(20, 0x42);
+  bytes.insert(bytes.end(), {0x00, 0x01, 7, 0, 0, 0, 0, 0, 0, 0, 0, 0x22, 0x01, 0, 0, 0});
+  bytes.insert(bytes.end(), {0x80, 0x01, 56, 0});
+  bytes.resize(bytes.size() + 64, 0);
   return bytes;
 }
 
@@ -165,6 +175,7 @@ class HostileDatagrams : public ::testing::Test {
 
 TEST_F(HostileDatagrams, TheKillerOf84BytesIsKeptOut) {
   attacker_.SendEverywhere(KillerDatagram());
+  attacker_.SendEverywhere(HiddenKillerDatagram());
   EXPECT_TRUE(Eventually([&] { return sender_->datagrams_refused() > 0 && receiver_->datagrams_refused() > 0; }));
   ExpectDataStillFlows();
 }

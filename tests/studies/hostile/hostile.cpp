@@ -227,7 +227,8 @@ void StudyHostile(StudyContext& context) {
     for (int run = 0; run < runs; ++run) {
       Attack(fleet, 5.0, context.seed + 7 + static_cast<std::uint64_t>(run), outcome);
       report.Progress("run " + Count(run + 1) + ": flows again after " + Number(outcome.flows_s.back(), 2) + " s, " +
-                      Count(static_cast<long long>(outcome.deaths.size())) + " deaths so far");
+                      Count(static_cast<long long>(outcome.deaths.size())) + " deaths so far" +
+                      (outcome.deaths.empty() ? "" : ", the last one " + outcome.deaths.back()));
     }
     Print(report, "runs", outcome);
   }
