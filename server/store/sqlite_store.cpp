@@ -26,7 +26,6 @@ constexpr const char* kSetUp =
     // In pages of 4 KiB: how long the write-ahead log gets before it is copied into the database. Checkpoints replace
     // their records within seconds; what was replaced in the log is never copied.
     "PRAGMA wal_autocheckpoint = 4000;"
-    "PRAGMA secure_delete = OFF;"  // Debian's SQLite writes zeros over all that is removed, and that as often.
     "PRAGMA cell_size_check = ON;";
 constexpr const char* kMakeTables =
     "CREATE TABLE records (kind INTEGER NOT NULL, owner INTEGER NOT NULL, number INTEGER NOT NULL,"

@@ -37,7 +37,8 @@ Bytes KillerDatagram() {
   return bytes;
 }
 
-// The same, hidden: whoever reads on right after the seven bytes of the first submessage sees one that ends the datagram.
+// The same, hidden: a receiver that goes on right after the seven bytes of the first submessage sees another one that
+// ends with the datagram.
 Bytes HiddenKillerDatagram() {
   Bytes bytes = {'R', 'T', 'P', 'S', 2, 3, 1, 15};
   bytes.resize(20, 0x42);
