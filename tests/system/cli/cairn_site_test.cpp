@@ -239,7 +239,8 @@ TEST_F(CairnSite, AServerThatIsKilledWhileItLoadsASiteHasAllOfItOrNothing) {
     std::uintmax_t bytes = BytesIn(File(state));
     ChildProcess load({CAIRN_PATH, "--domain", std::to_string(test::TestDomain()), "site", "load", "monday"});
     int changes = 0;
-    while (load.RunningAfter(std::chrono::microseconds(0)) && changes <= kills) {
+    for (bool running = true; running && changes <= kills;) {
+      running = load.RunningAfter(std::chrono::microseconds(0));
       if (const std::uintmax_t now = BytesIn(File(state)); std::exchange(bytes, now) != now) ++changes;
     }
     killed = changes > kills;
