@@ -3,8 +3,10 @@
 // What is loaded takes scans, draws, and can be saved and loaded again.
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <span>
 
+#include "common/file/checksum.h"
 #include "server/robots/session_record.h"
 #include "server/slam/checkpoint.h"
 #include "server/slam/scan_pipeline.h"
@@ -42,18 +44,6 @@ MapperOptions OptionsOf(std::size_t kind) {
   options.filter.dpslam.segment.trajectories = 2;
   options.filter.dpslam.opacity.max_ray_m = 4.0;
   return options;
-}
-
-// As checkpoint.cpp.
-std::uint64_t ChecksumOf(std::string_view bytes) {
-  std::uint64_t sum = 0xcbf29ce484222325 ^ bytes.size();
-  for (std::size_t at = 0; at < bytes.size(); at += sizeof(std::uint64_t)) {
-    std::uint64_t word = 0;
-    std::memcpy(&word, bytes.data() + at, std::min(sizeof(word), bytes.size() - at));
-    sum = (sum ^ word) * 0x100000001b3;
-    sum ^= sum >> 32;
-  }
-  return sum;
 }
 
 constexpr std::size_t kChecksumAt = 12, kOptionsAt = 20;

@@ -1,7 +1,11 @@
 // Records of the store: a number, then the bytes of one kind of record, or of the envelope around one. What is read is
 // written again as the same bytes; an envelope with a right checksum, which a stranger can make, opens to something
 // bounded or is refused.
+#include <array>
+
 #include "cairn/record.pb.h"
+#include "common/file/checksum.h"
+#include "server/store/checksum.h"
 #include "server/store/envelope.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/stored_samples.h"
@@ -39,16 +43,20 @@ bool RunBatch(std::string_view bytes) {
   return true;
 }
 
-// As envelope.cpp: FNV-1a over key, format, packing, size and payload.
-std::uint64_t ChecksumOf(const RecordKey& key, const record::Envelope& envelope) {
-  std::uint64_t sum = 14695981039346656037ULL;
-  const auto add = [&sum](unsigned char byte) { sum = (sum ^ byte) * 1099511628211ULL; };
-  for (const std::uint64_t number :
-       {static_cast<std::uint64_t>(key.kind), key.owner, key.number, std::uint64_t{envelope.format()},
-        std::uint64_t{envelope.packing()}, std::uint64_t{envelope.size()}})
-    for (int i = 0; i < 8; ++i) add(static_cast<unsigned char>(number >> (8 * i)));
-  for (const char c : envelope.payload()) add(static_cast<unsigned char>(c));
-  return sum;
+// As envelope.cpp.
+std::uint64_t ChecksumFor(const RecordKey& key, const record::Envelope& envelope) {
+  const std::array<std::uint64_t, 6> head = {static_cast<std::uint64_t>(key.kind),
+                                             key.owner,
+                                             key.number,
+                                             envelope.format(),
+                                             envelope.packing(),
+                                             envelope.size()};
+  const std::string_view head_bytes(reinterpret_cast<const char*>(head.data()), sizeof(head));
+  if (envelope.format() != 1) return ChecksumOf(envelope.payload(), ChecksumOf(head_bytes));
+  Checksum sum;
+  sum.Add(head_bytes);
+  sum.Add(envelope.payload());
+  return sum.value();
 }
 
 bool RunEnvelope(std::string_view bytes, bool forged) {
@@ -57,7 +65,7 @@ bool RunEnvelope(std::string_view bytes, bool forged) {
   std::string sealed(bytes);
   record::Envelope envelope;
   if (forged && envelope.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
-    envelope.set_checksum(ChecksumOf(key, envelope));
+    envelope.set_checksum(ChecksumFor(key, envelope));
     sealed = envelope.SerializeAsString();
   }
   const auto content = codec.Open(key, sealed);
