@@ -16,7 +16,8 @@ MapClient::MapClient(wire::Bus& bus, const std::string& site, std::function<void
       site_(site),
       on_change_(std::move(on_change)),
       mirror_(HashName(site)),
-      watch_([this] { return Behind(); }, [this] { Renew(); }) {}
+      watch_(
+          bus, [this](QueryClient& queries) { return Behind(queries); }, [this] { Renew(); }) {}
 
 MapClient::~MapClient() {
   watch_.Stop();  // It would change the wire.
@@ -55,13 +56,8 @@ void MapClient::Apply(int number, Value&& value) {
 }
 
 // Whether the mirror is not what the server has by now.
-bool MapClient::Behind() {
-  if (queries_ == nullptr) {
-    auto queries = QueryClient::Create(bus_);
-    if (!queries) return false;
-    queries_ = std::move(*queries);
-  }
-  const auto asked = queries_->Map(site_);
+bool MapClient::Behind(QueryClient& queries) {
+  const auto asked = queries.Map(site_);
   if (!asked) return false;
   const MutexLock lock(mutex_);
   const std::uint64_t known = std::max(mirror_->version(), mirror_->info() ? mirror_->info()->version : 0);

@@ -47,7 +47,7 @@ class MapClient {
   template <typename Value>
   void Apply(int number, Value&& value);
   [[nodiscard]] Result<std::unique_ptr<Wire>> Connect(wire::Bus& bus, int number);
-  [[nodiscard]] bool Behind();
+  [[nodiscard]] bool Behind(QueryClient& queries);
   void Renew();
 
   wire::Bus& bus_;
@@ -57,7 +57,6 @@ class MapClient {
   CondVar changed_;
   std::optional<TileMirror> mirror_ CAIRN_GUARDED_BY(mutex_);
   int number_ CAIRN_GUARDED_BY(mutex_) = 0;  // The number of the wire whose values count.
-  std::unique_ptr<QueryClient> queries_;     // The watch's, from the first silence on.
   SilenceWatch watch_;
   // Last: its callbacks use everything above.
   std::unique_ptr<Wire> wire_ CAIRN_GUARDED_BY(mutex_);

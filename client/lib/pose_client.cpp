@@ -6,7 +6,11 @@
 namespace cairn::client {
 
 PoseClient::PoseClient(wire::Bus& bus, const std::string& robot)
-    : bus_(bus), robot_(robot), robot_id_(HashName(robot)), watch_([this] { return Behind(); }, [this] { Renew(); }) {}
+    : bus_(bus),
+      robot_(robot),
+      robot_id_(HashName(robot)),
+      watch_(
+          bus, [this](QueryClient& queries) { return Behind(queries); }, [this] { Renew(); }) {}
 
 PoseClient::~PoseClient() {
   watch_.Stop();  // It would change the wire.
@@ -45,13 +49,8 @@ void PoseClient::OnPose(int number, PoseReport&& pose) {
 
 // Whether the server has another pose than the last one that arrived, and another one than at the last question. (What
 // it had when this client joined was published before.)
-bool PoseClient::Behind() {
-  if (queries_ == nullptr) {
-    auto queries = QueryClient::Create(bus_);
-    if (!queries) return false;
-    queries_ = std::move(*queries);
-  }
-  const auto asked = queries_->Pose(robot_);
+bool PoseClient::Behind(QueryClient& queries) {
+  const auto asked = queries.Pose(robot_);
   if (!asked) return false;
   const Newest answer{asked->generation, asked->stamp};
   const bool is_new = answer != std::exchange(answered_, answer);

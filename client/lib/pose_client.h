@@ -47,7 +47,7 @@ class PoseClient {
   PoseClient(wire::Bus& bus, const std::string& robot);
   [[nodiscard]] Result<std::unique_ptr<Wire>> Connect(wire::Bus& bus, int number);
   void OnPose(int number, PoseReport&& pose);
-  [[nodiscard]] bool Behind();
+  [[nodiscard]] bool Behind(QueryClient& queries);
   void Renew();
 
   wire::Bus& bus_;
@@ -58,8 +58,7 @@ class PoseClient {
   mutable Mutex mutex_;
   Newest arrived_ CAIRN_GUARDED_BY(mutex_);
   int number_ CAIRN_GUARDED_BY(mutex_) = 0;  // The number of the wire whose poses count.
-  std::unique_ptr<QueryClient> queries_;     // The watch's, from the first silence on,
-  Newest answered_;                          // and the last answer.
+  Newest answered_;                          // What the watch was told last.
   SilenceWatch watch_;
   // Last: its callback uses everything above.
   std::unique_ptr<Wire> wire_ CAIRN_GUARDED_BY(mutex_);

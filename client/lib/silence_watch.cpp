@@ -12,8 +12,9 @@ constexpr std::chrono::seconds kLongestRest{60};
 
 }  // namespace
 
-SilenceWatch::SilenceWatch(std::function<bool()> behind, std::function<void()> renew)
-    : behind_(std::move(behind)), renew_(std::move(renew)), thread_([this] { Run(); }) {}
+SilenceWatch::SilenceWatch(wire::Bus& bus, std::function<bool(QueryClient& queries)> behind,
+                           std::function<void()> renew)
+    : bus_(bus), behind_(std::move(behind)), renew_(std::move(renew)), thread_([this] { Run(); }) {}
 
 void SilenceWatch::Stop() {
   {
@@ -39,13 +40,22 @@ bool SilenceWatch::WaitForSilence(Clock::time_point next_question) {
   return false;
 }
 
+bool SilenceWatch::IsBehind() {
+  if (queries_ == nullptr) {
+    auto queries = QueryClient::Create(bus_);
+    if (!queries) return false;
+    queries_ = std::move(*queries);
+  }
+  return behind_(*queries_);
+}
+
 void SilenceWatch::Run() {
   Clock::duration after_renewal = kRest;
   Clock::time_point next_question = Clock::now();
   while (WaitForSilence(next_question)) {
     const auto asked = Clock::now();
     next_question = asked + kRest;
-    if (!behind_()) {
+    if (!IsBehind()) {
       after_renewal = kRest;
       continue;
     }
@@ -55,7 +65,7 @@ void SilenceWatch::Run() {
       const MutexLock lock(mutex_);
       if (last_arrival_ > asked) continue;
     }
-    if (!behind_()) continue;
+    if (!IsBehind()) continue;
     renew_();
     next_question = Clock::now() + after_renewal;
     after_renewal = std::min<Clock::duration>(2 * after_renewal, kLongestRest);

@@ -7,16 +7,20 @@
 
 #include <chrono>
 #include <functional>
+#include <memory>
 #include <thread>
 
+#include "client/lib/query_client.h"
 #include "common/mutex.h"
+#include "common/wire/bus.h"
 
 namespace cairn::client {
 
 class SilenceWatch {
  public:
-  // `behind` asks the server whether it has something newer than what arrived; false where it does not answer.
-  SilenceWatch(std::function<bool()> behind, std::function<void()> renew);
+  // `behind` asks the server whether it has something newer than what arrived; false where it does not answer. `bus`
+  // outlives the watch.
+  SilenceWatch(wire::Bus& bus, std::function<bool(QueryClient& queries)> behind, std::function<void()> renew);
   ~SilenceWatch() { Stop(); }
   SilenceWatch(const SilenceWatch&) = delete;
   SilenceWatch& operator=(const SilenceWatch&) = delete;
@@ -32,14 +36,17 @@ class SilenceWatch {
   void Run();
   // Waits until it is time to ask. Returns false if the watch ends.
   bool WaitForSilence(Clock::time_point next_question);
+  bool IsBehind();
 
-  const std::function<bool()> behind_;
+  wire::Bus& bus_;
+  const std::function<bool(QueryClient& queries)> behind_;
   const std::function<void()> renew_;
   Mutex mutex_;
   CondVar stopped_;
   Clock::time_point last_arrival_ CAIRN_GUARDED_BY(mutex_) = Clock::now();
   bool stopping_ CAIRN_GUARDED_BY(mutex_) = false;
-  std::thread thread_;  // Last: it uses everything above.
+  std::unique_ptr<QueryClient> queries_;  // From the first silence on; used by the thread only.
+  std::thread thread_;                    // Last: it uses everything above.
 };
 
 }  // namespace cairn::client

@@ -38,6 +38,8 @@ std::uint64_t ByteChecksumOf(const RecordKey& key, const record::Envelope& envel
   return sum.value();
 }
 
+}  // namespace
+
 std::uint64_t ChecksumOf(const RecordKey& key, const record::Envelope& envelope) {
   if (envelope.format() == 1) return ByteChecksumOf(key, envelope);
   const std::array<std::uint64_t, 6> head = {static_cast<std::uint64_t>(key.kind),
@@ -49,8 +51,6 @@ std::uint64_t ChecksumOf(const RecordKey& key, const record::Envelope& envelope)
   const std::string_view head_bytes(reinterpret_cast<const char*>(head.data()), sizeof(head));
   return cairn::ChecksumOf(envelope.payload(), cairn::ChecksumOf(head_bytes));
 }
-
-}  // namespace
 
 struct EnvelopeCodec::Compressor {
   std::unique_ptr<ZSTD_CCtx, decltype(&ZSTD_freeCCtx)> pack{ZSTD_createCCtx(), &ZSTD_freeCCtx};

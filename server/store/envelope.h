@@ -9,6 +9,10 @@
 #include "common/status.h"
 #include "server/store/store.h"
 
+namespace cairn::record {
+class Envelope;
+}
+
 namespace cairn::server {
 
 // The newest version of the records (idl/cairn/record.proto) that this server can read; it writes this version. Since
@@ -16,6 +20,9 @@ namespace cairn::server {
 inline constexpr std::uint32_t kRecordFormat = 2;
 // Longer records are refused when they are read: the size is a number in a file.
 inline constexpr std::uint64_t kMaxRecordBytes = std::uint64_t{1} << 30;
+
+// The checksum that belongs into the envelope, by its format.
+[[nodiscard]] std::uint64_t ChecksumOf(const RecordKey& key, const record::Envelope& envelope);
 
 class EnvelopeCodec {
  public:

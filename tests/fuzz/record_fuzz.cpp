@@ -1,11 +1,7 @@
 // Records of the store: a number, then the bytes of one kind of record, or of the envelope around one. What is read is
 // written again as the same bytes; an envelope with a right checksum, which a stranger can make, opens to something
 // bounded or is refused.
-#include <array>
-
 #include "cairn/record.pb.h"
-#include "common/file/checksum.h"
-#include "server/store/checksum.h"
 #include "server/store/envelope.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/stored_samples.h"
@@ -43,29 +39,13 @@ bool RunBatch(std::string_view bytes) {
   return true;
 }
 
-// As envelope.cpp.
-std::uint64_t ChecksumFor(const RecordKey& key, const record::Envelope& envelope) {
-  const std::array<std::uint64_t, 6> head = {static_cast<std::uint64_t>(key.kind),
-                                             key.owner,
-                                             key.number,
-                                             envelope.format(),
-                                             envelope.packing(),
-                                             envelope.size()};
-  const std::string_view head_bytes(reinterpret_cast<const char*>(head.data()), sizeof(head));
-  if (envelope.format() != 1) return ChecksumOf(envelope.payload(), ChecksumOf(head_bytes));
-  Checksum sum;
-  sum.Add(head_bytes);
-  sum.Add(envelope.payload());
-  return sum.value();
-}
-
 bool RunEnvelope(std::string_view bytes, bool forged) {
   const RecordKey key{RecordKind::kJournal, 3, 4};
   EnvelopeCodec codec;
   std::string sealed(bytes);
   record::Envelope envelope;
   if (forged && envelope.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
-    envelope.set_checksum(ChecksumFor(key, envelope));
+    envelope.set_checksum(ChecksumOf(key, envelope));
     sealed = envelope.SerializeAsString();
   }
   const auto content = codec.Open(key, sealed);
