@@ -42,7 +42,7 @@ Server::Server(const ServerOptions& options, Inbound& inbound, Outbound& outboun
       worker_(
           options.jobs, jobs_,
           [this](const Job& job, bool enable, const JobControl& control) { return smooth_.Run(job, enable, control); }),
-      saved_sites_(saved, journal, {outbound, roster_, atlas_, jobs_, worker_}),
+      saved_sites_(saved, BytesOf(options.store.max_saved_gib), journal, {outbound, roster_, atlas_, jobs_, worker_}),
       desk_(static_cast<std::size_t>(options.server.query_queue), outbound, roster_, atlas_, jobs_, worker_,
             saved_sites_, generation, journal),
       heartbeat_(

@@ -31,10 +31,16 @@ ExitCode LoadSite(Program& program, const SiteAndFile& arguments) {
   return program.Print(fmt::format("{} loaded\n", arguments.name), {{"name", arguments.name}, {"loaded", true}});
 }
 
-ExitCode DeleteSite(Program& program, const std::string& site) {
-  const auto deleted = program.Ask([&](QueryClient& server) { return server.DeleteSite(site); });
+ExitCode DeleteSite(Program& program, const SiteAndFile& arguments) {
+  const bool file = arguments.site.empty();
+  const auto deleted = program.Ask([&](QueryClient& server) {
+    return file ? server.DeleteSavedSite(arguments.name) : server.DeleteSite(arguments.site);
+  });
   if (!deleted) return program.Refuse(deleted.error());
-  return program.Print(fmt::format("site {} deleted\n", site), {{"site", site}, {"deleted", true}});
+  if (file)
+    return program.Print(fmt::format("saved {} deleted\n", arguments.name),
+                         {{"name", arguments.name}, {"deleted", true}});
+  return program.Print(fmt::format("site {} deleted\n", arguments.site), {{"site", arguments.site}, {"deleted", true}});
 }
 
 }  // namespace
@@ -73,9 +79,13 @@ void AddSite(CLI::App& app, Program& program) {
   load->add_option("name", taken->name, "The file's name")->required();
   load->add_option("--as", taken->site, "The site's name from now on [as in the file]");
   program.OnChosen(*load, taken, LoadSite);
-  auto deleted = std::make_shared<std::string>();
-  auto* remove = site->add_subcommand("delete", "Delete a site with everything the server has stored of it");
-  remove->add_option("site", *deleted, "The site's name; no robot may be active in it")->required();
+  auto deleted = std::make_shared<SiteAndFile>();
+  auto* remove =
+      site->add_subcommand("delete", "Delete a site with everything the server has stored of it, or a saved one");
+  auto* deleted_site = remove->add_option("site", deleted->site, "The site's name; no robot may be active in it");
+  auto* deleted_file = remove->add_option("--saved", deleted->name, "Name of a saved site: only this file is deleted");
+  deleted_site->excludes(deleted_file);
+  remove->require_option(1);
   program.OnChosen(*remove, deleted, DeleteSite);
   AddStoredSites(*site, program);
 }

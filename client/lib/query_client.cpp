@@ -325,6 +325,12 @@ Result<void> QueryClient::DeleteSite(const std::string& site) {
   return Ask(AboutSite(RequestKind::kSiteDelete, site)).map([](Reply&&) {});
 }
 
+Result<void> QueryClient::DeleteSavedSite(const std::string& name) {
+  Request request = MakeRequest(RequestKind::kSiteDelete);
+  request.saved = name;
+  return Ask(request).map([](Reply&&) {});
+}
+
 Result<Job> QueryClient::AskForJob(const Request& request) {
   return Ask(request).and_then([](Reply&& reply) { return Only(std::move(reply.jobs), "jobs"); });
 }

@@ -110,6 +110,8 @@ class QueryClient {
   [[nodiscard]] Result<void> LoadSite(const std::string& name, const std::string& site = "");
   // With all that is stored of it. kFailedPrecondition: a robot is active in it, or a job has not ended.
   [[nodiscard]] Result<void> DeleteSite(const std::string& site);
+  // The file only; a site that was loaded from it stays.
+  [[nodiscard]] Result<void> DeleteSavedSite(const std::string& name);
 
   // `enable`: the server switches the site to the job's map version as soon as the job succeeds.
   [[nodiscard]] Result<Job> SubmitJob(const std::string& site, JobKind kind, bool enable = true);

@@ -35,7 +35,7 @@ enum class RequestKind : std::uint8_t {
   kSavedList,   // The files of saved sites.
   kSiteSave,    // site, saved (the file's name; empty: the site's).
   kSiteLoad,    // saved, site (empty: as in the file).
-  kSiteDelete,  // site.
+  kSiteDelete,  // site, or saved: then that file.
 };
 inline constexpr int kRequestKindCount = 17;
 [[nodiscard]] std::string_view RequestKindName(RequestKind kind);
@@ -64,7 +64,8 @@ struct Request {
   JobKind job_kind = JobKind::kSmooth;
   bool enable = true;             // kJobSubmit: enable the map version it makes.
   std::uint32_t map_version = 0;  // kMapEnable.
-  std::string saved;              // kSiteSave, kSiteLoad: the name of a file in the server's directory of saved sites.
+  // kSiteSave, kSiteLoad, kSiteDelete: the name of a file in the server's directory of saved sites.
+  std::string saved;
 };
 
 // A request that changes something. It has a topic of its own, because DDS Security gives permissions by topic.

@@ -43,10 +43,23 @@ SavedSite SavedAt(const std::filesystem::path& path) {
   return saved;
 }
 
+// Also of files that no request lists: they take their space all the same.
+std::uint64_t BytesIn(const std::filesystem::path& directory) {
+  std::uint64_t bytes = 0;
+  std::error_code error;
+  for (auto entry = std::filesystem::directory_iterator(directory, error);
+       !error && entry != std::filesystem::directory_iterator(); entry.increment(error)) {
+    std::error_code unknown;
+    const std::uintmax_t size = entry->file_size(unknown);
+    if (!unknown) bytes += size;
+  }
+  return bytes;
+}
+
 }  // namespace
 
-SavedSites::SavedSites(std::filesystem::path directory, Journal* journal, const Rooms& rooms)
-    : directory_(std::move(directory)), journal_(journal), rooms_(rooms) {}
+SavedSites::SavedSites(std::filesystem::path directory, std::uint64_t max_bytes, Journal* journal, const Rooms& rooms)
+    : directory_(std::move(directory)), max_bytes_(max_bytes), journal_(journal), rooms_(rooms) {}
 
 SavedSites::~SavedSites() {
   Stop();
@@ -93,7 +106,10 @@ Result<std::vector<SavedSite>> SavedSites::Answer(const Request& request) {
   if (request.kind == RequestKind::kSavedList) return List();
   if (request.kind == RequestKind::kSiteSave) return Save(request);
   if (request.kind == RequestKind::kSiteLoad) return Load(request).map(nothing);
-  return Delete(request.site).map(nothing);
+  if (request.saved.empty()) return Delete(request.site).map(nothing);
+  if (!request.site.empty())
+    return Fail(StatusCode::kInvalidArgument, "either a site is deleted or a saved one, not both in one request");
+  return DeleteFile(request.saved).map(nothing);
 }
 
 Result<std::filesystem::path> SavedSites::PathOf(const std::string& name) const {
@@ -131,11 +147,25 @@ Result<std::vector<SavedSite>> SavedSites::List() const {
   return all;
 }
 
+Result<void> SavedSites::DeleteFile(const std::string& name) {
+  const auto path = PathOf(name);
+  if (!path) return tl::unexpected(path.error());
+  std::error_code error;
+  if (std::filesystem::remove(*path, error)) return {};
+  if (error) return Fail(StatusCode::kUnavailable, "saved site '" + name + "' cannot be deleted: " + error.message());
+  return Fail(StatusCode::kNotFound, "there is no saved site '" + name + "'");
+}
+
 Result<std::vector<SavedSite>> SavedSites::Save(const Request& request) {
   const auto path = PathOf(request.saved.empty() ? request.site : request.saved);
   if (!path) return tl::unexpected(path.error());
   std::error_code error;
   std::filesystem::create_directories(directory_, error);  // Where it fails, so does the file.
+  if (const std::uint64_t bytes = BytesIn(directory_); bytes >= max_bytes_) {
+    return Fail(StatusCode::kResourceExhausted,
+                "the saved sites take " + std::to_string(bytes >> 20) +
+                    " MiB, which is all that store.max_saved_gib allows; delete some of them");
+  }
   const auto written = Between<SiteFileSummary>(
       [site = request.site, path = *path](Store& store) { return WriteSiteFile(store, site, path); });
   if (!written) return tl::unexpected(written.error());

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -30,8 +31,9 @@ class SavedSites {
     JobWorker& worker;
   };
 
-  // `journal`: null, or `directory` empty, where nothing is stored: then every request is refused.
-  SavedSites(std::filesystem::path directory, Journal* journal, const Rooms& rooms);
+  // `journal`: null, or `directory` empty, where nothing is stored: then every request is refused. `max_bytes`: no site
+  // is saved while the files of all saved sites take as much.
+  SavedSites(std::filesystem::path directory, std::uint64_t max_bytes, Journal* journal, const Rooms& rooms);
   ~SavedSites();
 
   void Start();
@@ -52,6 +54,7 @@ class SavedSites {
   Result<void> Load(const Request& request);
   Result<void> OpenLoaded(const SiteFileSummary& loaded);
   Result<void> Delete(const std::string& site);
+  Result<void> DeleteFile(const std::string& name);
   Result<void> DeleteSetAside(const std::string& site);
   Result<bool> DeleteStored(const std::string& site);
   [[nodiscard]] Result<std::filesystem::path> PathOf(const std::string& name) const;
@@ -60,6 +63,7 @@ class SavedSites {
   Result<Value> Between(std::function<Result<Value>(Store&)> work);
 
   const std::filesystem::path directory_;
+  const std::uint64_t max_bytes_;
   Journal* const journal_;
   const Rooms rooms_;
   BoundedChannel<Request> requests_{kCapacity};

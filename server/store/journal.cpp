@@ -354,7 +354,7 @@ void Journal::EndCheckpoint() {
 void Journal::KeepBudget() {
   if (Clock::now() - budget_checked_ < kBudgetPeriod) return;
   budget_checked_ = Clock::now();
-  const auto limit = static_cast<std::uint64_t>(options_.max_gib * 1024.0 * 1024.0 * 1024.0);
+  const std::uint64_t limit = BytesOf(options_.max_gib);
   std::map<std::uint64_t, std::uint64_t> checkpointed;
   {
     const MutexLock lock(mutex_);

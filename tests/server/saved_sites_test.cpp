@@ -269,6 +269,34 @@ TEST(SavedSites, WhatCannotBeSavedOrLoadedIsRefusedAndNothingChanges) {
   EXPECT_EQ(forgetful.Ask(AboutSite(RequestKind::kSiteDelete)).status.code, StatusCode::kFailedPrecondition);
 }
 
+TEST(SavedSites, FilesAreDeletedByNameAndTakeABoundedSpace) {
+  const TempDirectory directory;
+  ServerOptions options = TestOptions();
+  options.store.max_saved_gib = 1e-9;  // One byte: the first file is already as much as is allowed.
+  StoredServer server(directory / "0", options);
+  WholeServer& house = *server.operator->();
+  house.Open("r1", kRider);
+  house.Drive("r1", kRider, 0, 20);
+  ASSERT_TRUE(Stored(house, "r1", 20));
+  ASSERT_TRUE(house.WaitFor([&] { return ReadSite(server.store(), "lab").has_value(); }));
+  const auto status = [&](RequestKind kind, const std::string& site, const std::string& name) {
+    return house.Ask(AboutFile(kind, site, name)).status;
+  };
+  ASSERT_TRUE(status(RequestKind::kSiteSave, "lab", "monday").ok());
+  const Status full = status(RequestKind::kSiteSave, "lab", "tuesday");
+  EXPECT_EQ(full.code, StatusCode::kResourceExhausted);
+  EXPECT_THAT(full.message, HasSubstr("store.max_saved_gib"));
+  EXPECT_EQ(status(RequestKind::kSiteDelete, "lab", "monday").code, StatusCode::kInvalidArgument);
+  EXPECT_EQ(status(RequestKind::kSiteDelete, "", "../cairn").code, StatusCode::kInvalidArgument);
+  EXPECT_EQ(status(RequestKind::kSiteDelete, "", "tuesday").code, StatusCode::kNotFound);
+  EXPECT_EQ(house.Ask(AboutSite(RequestKind::kSavedList)).saved.size(), 1U);
+  ASSERT_TRUE(status(RequestKind::kSiteDelete, "", "monday").ok());
+  EXPECT_TRUE(house.Ask(AboutSite(RequestKind::kSavedList)).saved.empty());
+  EXPECT_FALSE(std::filesystem::exists(directory / "0" / "saved" / "monday.site"));
+  EXPECT_EQ(ViewOf(house).used["r1"], 20U);
+  EXPECT_TRUE(status(RequestKind::kSiteSave, "lab", "tuesday").ok());
+}
+
 // Two robots that have each mapped the same room from where they stood: with the right transform it is one room.
 TEST(SavedSites, TwoSitesAreMergedIntoOneMap) {
   const TempDirectory directory;

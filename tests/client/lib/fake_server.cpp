@@ -286,7 +286,8 @@ void FakeServer::OnRequest(Request&& request) {
         reply.status = {StatusCode::kNotFound, "no file " + request.saved};
       break;
     case RequestKind::kSiteDelete:
-      if (request.site != "hall") reply.status = {StatusCode::kNotFound, "no site " + request.site};
+      if ((request.saved.empty() ? request.site != "hall" : request.saved != "monday"))
+        reply.status = {StatusCode::kNotFound, "no site " + request.site + request.saved};
       break;
     case RequestKind::kSessionEnd:
       break;

@@ -103,6 +103,8 @@ TEST_F(QueryClientTest, SavesLoadsAndDeletesSites) {
   EXPECT_EQ(client_->LoadSite("tuesday", "hall").error().code, StatusCode::kNotFound);
   EXPECT_TRUE(client_->DeleteSite("hall"));
   EXPECT_EQ(client_->DeleteSite("annex").error().code, StatusCode::kNotFound);
+  EXPECT_TRUE(client_->DeleteSavedSite("monday"));
+  EXPECT_EQ(client_->DeleteSavedSite("hall").error().code, StatusCode::kNotFound);
 }
 
 // A question that does something must not be asked twice, however slowly the two sides find each other.
