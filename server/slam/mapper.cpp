@@ -87,7 +87,7 @@ StepMotion Mapper::State::MotionTo(const Keyframe& keyframe, const TrackStep& st
 // Possibly no particle agrees with the large loop: then the loop's error is distributed over the whole path.
 void Mapper::State::CloseLargeLoop() {
   if (!filter->rebases()) return;
-  const SharedSequence<Pose2> believed = believed_path();
+  const PosePath believed = believed_path();
   const auto loop = loops.Find(trail, believed);
   if (!loop) return;
   const auto path = trail.PathWithLoop(loop->relation(), believed.values(), options.pose_graph);

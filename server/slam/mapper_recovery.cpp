@@ -149,7 +149,7 @@ ScanOutcome Mapper::State::GoOnAlongPath(const ParallelFor& parallel_for) {
 // The place found as seen from the nearest keyframe. Each hypothesis has a map of its own, in which that place is not
 // where the best one has it.
 RevisitObservation Mapper::State::SeenFromNearest(const FoundPlace& place) const {
-  const SharedSequence<Pose2> path = believed_path();
+  const PosePath path = believed_path();
   std::size_t nearest = 0;
   double nearest_m = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < trail.size(); ++k) {

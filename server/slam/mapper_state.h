@@ -72,7 +72,7 @@ struct Mapper::State {
   void Draw(const TrackStep& step, bool placed_before);
   ScanOutcome Report(Stamp stamp, const Pose2& T_odom_robot, const TrackStep& step, bool keyframe);
   [[nodiscard]] PoseReason ReasonOf(const TrackStep& step) const;
-  [[nodiscard]] SharedSequence<Pose2> believed_path() const { return filter->hypothesis(0).path; }
+  [[nodiscard]] PosePath believed_path() const { return filter->hypothesis(0).path; }
 
   // All but the filter, which is behind an interface.
   template <typename Archive>

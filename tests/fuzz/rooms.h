@@ -39,7 +39,7 @@ class Rooms {
                 [](const Job&, bool, const server::JobControl&) {
                   return Result<server::JobOutcome>(server::JobOutcome{});
                 }),
-        saved_sites_({}, nullptr, {outbound_, roster_, atlas_, jobs_, worker_}),
+        saved_sites_({}, 0, nullptr, {outbound_, roster_, atlas_, jobs_, worker_}),
         desk_(64, outbound_, roster_, atlas_, jobs_, worker_, saved_sites_, kGeneration) {
     spdlog::set_level(spdlog::level::off);  // Every damaged record is an error in the log.
     saved_sites_.Start();

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <random>
 #include <stdexcept>
 
@@ -47,10 +48,19 @@ T OrThrow(Result<T> result) {
   return std::move(*result);
 }
 
-// Everything that is told of the robots' poses, compared with the truth.
+using Trajectories = std::map<std::string, Trajectory>;
+
+// Everything that is told of the robots' poses, compared with the truth and with what another server told.
 class PoseWatcher {
  public:
-  explicit PoseWatcher(std::map<std::string, Trajectory> truth) : truth_(std::move(truth)) {
+  struct Counts {
+    std::uint64_t poses = 0;
+    std::uint64_t beside_truth = 0;  // Called localized.
+    std::uint64_t beside_other = 0;  // Called localized.
+  };
+
+  // `other`: may be empty.
+  PoseWatcher(Trajectories truth, Trajectories other) : truth_(std::move(truth)), other_(std::move(other)) {
     wire::WireOptions options;
     options.domain = TestDomain();
     bus_ = OrThrow(wire::Bus::Create(options, "watcher"));
@@ -58,10 +68,17 @@ class PoseWatcher {
   }
   ~PoseWatcher() { poses_.reset(); }
 
-  void CountInto(KilledFleetOutcome& outcome) {
+  [[nodiscard]] Counts counts() {
     const MutexLock lock(mutex_);
-    outcome.poses += seen_;
-    outcome.wrongly_localized += wrong_;
+    return counts_;
+  }
+  // The poses that were told while the robots drove, each at its time.
+  [[nodiscard]] Trajectories told() {
+    const MutexLock lock(mutex_);
+    Trajectories told;
+    for (const auto& [robot, poses] : told_)
+      for (const auto& [stamp, pose] : poses) told[robot].push_back({stamp, pose});
+    return told;
   }
   // How many robots have had a pose of the newest generation.
   [[nodiscard]] int RobotsWithPoses() {
@@ -76,19 +93,28 @@ class PoseWatcher {
   }
 
  private:
-  void Take(const PoseReport& pose) {
-    const MutexLock lock(mutex_);
-    ++seen_;
-    generation_ = std::max(generation_, pose.generation);
-    newest_[pose.robot] = std::max(newest_[pose.robot], pose.generation);
-    const auto truth = PoseOn(truth_.at(pose.robot), pose.stamp, 1.0);
-    if (!pose.localized || !truth) return;
-    if ((pose.T_map_robot.translation() - truth->translation()).norm() > kWrong_m) ++wrong_;
+  static bool IsBeside(const Trajectories& right, const PoseReport& pose) {
+    const auto path = right.find(pose.robot);
+    if (path == right.end()) return false;
+    const auto there = PoseOn(path->second, pose.stamp, 1.0);
+    return there && (pose.T_map_robot.translation() - there->translation()).norm() > kWrong_m;
   }
 
-  const std::map<std::string, Trajectory> truth_;
+  void Take(const PoseReport& pose) {
+    const MutexLock lock(mutex_);
+    ++counts_.poses;
+    generation_ = std::max(generation_, pose.generation);
+    newest_[pose.robot] = std::max(newest_[pose.robot], pose.generation);
+    told_[pose.robot][pose.stamp] = pose.T_map_robot;
+    if (!pose.localized) return;
+    if (IsBeside(truth_, pose)) ++counts_.beside_truth;
+    if (IsBeside(other_, pose)) ++counts_.beside_other;
+  }
+
+  const Trajectories truth_, other_;
   Mutex mutex_;
-  std::uint64_t seen_ CAIRN_GUARDED_BY(mutex_) = 0, wrong_ CAIRN_GUARDED_BY(mutex_) = 0;
+  Counts counts_ CAIRN_GUARDED_BY(mutex_);
+  std::map<std::string, std::map<Stamp, Pose2>> told_ CAIRN_GUARDED_BY(mutex_);
   Generation generation_ CAIRN_GUARDED_BY(mutex_) = 0;
   std::map<std::string, Generation> newest_ CAIRN_GUARDED_BY(mutex_);
   std::unique_ptr<wire::Bus> bus_;
@@ -107,8 +133,16 @@ class Drive {
 
   KilledFleetOutcome Run() {
     KilledFleetOutcome outcome;
-    const auto undisturbed = Replay("undisturbed", nullptr);
-    const auto killed = Replay("killed", &outcome);
+    std::optional<PoseWatcher> watcher(std::in_place, truth_, Trajectories{});
+    const auto undisturbed = Replay("undisturbed", *watcher, nullptr);
+    outcome.undisturbed_poses = watcher->counts().poses;
+    outcome.undisturbed_beside_truth = watcher->counts().beside_truth;
+    const Trajectories told = watcher->told();
+    watcher.emplace(truth_, told);
+    const auto killed = Replay("killed", *watcher, &outcome);
+    outcome.poses = watcher->counts().poses;
+    outcome.beside_truth = watcher->counts().beside_truth;
+    outcome.wrongly_localized = watcher->counts().beside_other;
     for (const auto& [robot, calm] : undisturbed) {
       const Result& other = killed.at(robot);
       outcome.sent += other.sent;
@@ -197,8 +231,7 @@ class Drive {
   }
 
   // Kills where there is an outcome to count into.
-  std::map<std::string, Result> Replay(const std::string& state, KilledFleetOutcome* outcome) {
-    PoseWatcher watcher(truth_);
+  std::map<std::string, Result> Replay(const std::string& state, PoseWatcher& watcher, KilledFleetOutcome* outcome) {
     StartServer(state);
     const auto robots = StartRobots(outcome == nullptr);
     while (outcome != nullptr && outcome->kills < options_.kills && Driving(robots) == options_.robots)
@@ -215,7 +248,6 @@ class Drive {
       static_cast<void>(ObjectPrintedBy(Start({"path", robot, "-o", file})->Wait(kLongest)));
       result.path = OrThrow(ReadTum(file));
     }
-    if (outcome != nullptr) watcher.CountInto(*outcome);
     server_->Signal(SIGTERM);
     if (const auto ended = server_->Wait(); ended.exit_code != 0) throw std::runtime_error("cairnd: " + ended.output);
     return results;
@@ -223,7 +255,7 @@ class Drive {
 
   const KilledFleetOptions options_;
   std::mt19937_64 random_;
-  std::map<std::string, Trajectory> truth_;
+  Trajectories truth_;
   std::unique_ptr<ChildProcess> server_;
 };
 

@@ -14,7 +14,7 @@
 #include "server/slam/dpslam/particle_maps.h"
 #include "server/slam/motion/step_motion.h"
 #include "server/slam/random/resampling.h"
-#include "server/slam/trail/shared_sequence.h"
+#include "server/slam/trail/pose_path.h"
 
 namespace cairn::slam {
 
@@ -39,7 +39,7 @@ struct GridParticle {
   double log_weight = 0.0;      // Log weight since the last resampling.
   double log_likelihood = 0.0;  // Log likelihood of the whole path; not reset by resampling.
   double log_prior = 0.0;       // Log density of the drift at its joints (high level only).
-  SharedSequence<Pose2> path;   // T_map_robot at every observed scan.
+  PosePath path;   // T_map_robot at every observed scan.
 
   [[nodiscard]] double log_posterior() const { return log_likelihood + log_prior; }
 

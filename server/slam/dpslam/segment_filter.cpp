@@ -321,7 +321,7 @@ void SegmentFilter::Finish() {
       for (const PlacedRays& placed : segments_[free_ + k].trajectories[joint.trajectory]) {
         particle.T_map_robot = joint.T_map_start * placed.T_start_robot;
         if (done) {
-          particle.path.Mutable(scan++) = particle.T_map_robot;
+          particle.path.Set(scan++, particle.T_map_robot);
         } else {
           particle.path.Append(particle.T_map_robot);
         }

@@ -25,14 +25,14 @@ void MapDrawing::StartAgain(std::size_t keyframes) {
   redraw_ = Redraw{OccupancyGrid(grid_.options()), 0};
 }
 
-void MapDrawing::Begin(std::span<const Keyframe> keyframes, const SharedSequence<Pose2>& path) {
+void MapDrawing::Begin(std::span<const Keyframe> keyframes, const PosePath& path) {
   StartAgain(keyframes.size());
   path_ = path.values();
   frozen_path_.Forget();
   DrawOnto(grid_, keyframes.back(), path_.back());
 }
 
-void MapDrawing::Continue(std::span<const Keyframe> keyframes, const SharedSequence<Pose2>& path) {
+void MapDrawing::Continue(std::span<const Keyframe> keyframes, const PosePath& path) {
   if (!redraw_) return;
   const std::size_t end = std::min(keyframes.size(), redraw_->drawn + kRedrawnPerScan);
   for (std::size_t& k = redraw_->drawn; k < end; ++k) DrawOnto(redraw_->grid, keyframes[k], path[k]);
@@ -43,12 +43,12 @@ void MapDrawing::Continue(std::span<const Keyframe> keyframes, const SharedSeque
   frozen_path_.Forget();
 }
 
-void MapDrawing::Finish(std::span<const Keyframe> keyframes, const SharedSequence<Pose2>& path) {
+void MapDrawing::Finish(std::span<const Keyframe> keyframes, const PosePath& path) {
   while (redraw_) Continue(keyframes, path);
 }
 
 void MapDrawing::Adopt(OccupancyGrid grid, std::size_t drawn, std::span<const Keyframe> keyframes,
-                       const SharedSequence<Pose2>& path) {
+                       const PosePath& path) {
   const bool outdated = drawn < changed_at_ || redraw_;
   redraw_.reset();
   grid_.ReplaceBy(std::move(grid));

@@ -13,7 +13,7 @@
 #include "server/slam/grid/occupancy_grid.h"
 #include "server/slam/state/frozen_blocks.h"
 #include "server/slam/trail/keyframe.h"
-#include "server/slam/trail/shared_sequence.h"
+#include "server/slam/trail/pose_path.h"
 
 namespace cairn::slam {
 
@@ -27,15 +27,15 @@ class MapDrawing {
   void StartAgain(std::size_t keyframes);
   // For keyframes that could not be drawn before, because their place in the map was not known, and that now
   // lie along `path`: draws the last of them, and then begins to draw all of them.
-  void Begin(std::span<const Keyframe> keyframes, const SharedSequence<Pose2>& path);
+  void Begin(std::span<const Keyframe> keyframes, const PosePath& path);
   // Draws some more keyframes at their poses in `path`. Once all are drawn, the new map replaces the old one.
-  void Continue(std::span<const Keyframe> keyframes, const SharedSequence<Pose2>& path);
+  void Continue(std::span<const Keyframe> keyframes, const PosePath& path);
   // Like Continue, but draws all remaining keyframes.
-  void Finish(std::span<const Keyframe> keyframes, const SharedSequence<Pose2>& path);
+  void Finish(std::span<const Keyframe> keyframes, const PosePath& path);
   // Replaces the map by one that a job drew from the first `drawn` keyframes, and draws the other keyframes
   // onto it. A map from before a change of the path is also taken, and then drawn again.
   void Adopt(OccupancyGrid grid, std::size_t drawn, std::span<const Keyframe> keyframes,
-             const SharedSequence<Pose2>& path);
+             const PosePath& path);
 
   [[nodiscard]] bool redrawing() const { return redraw_.has_value(); }
   [[nodiscard]] const OccupancyGrid& grid() const { return grid_; }

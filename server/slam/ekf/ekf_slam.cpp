@@ -147,7 +147,7 @@ void EkfSlam::Commit() {
   path_.Append(state_.robot());
   if (moved_path_)
     for (std::size_t k = 0; k < keyframes_.size(); ++k)
-      path_.Mutable(k) = state_.pose(anchors_[keyframes_[k].anchor].at) * keyframes_[k].T_anchor_robot;
+      path_.Set(k, state_.pose(anchors_[keyframes_[k].anchor].at) * keyframes_[k].T_anchor_robot);
   moved_path_ = false;
   nis_.EndStep();
 }
@@ -162,7 +162,7 @@ void EkfSlam::Rebase(std::span<const Pose2> path) {
   state_.SetPose(0, path.back());
   for (std::size_t k = 0; k < path.size(); ++k) {
     keyframes_[k].T_anchor_robot = Between(path[anchors_[keyframes_[k].anchor].keyframe], path[k]);
-    path_.Mutable(k) = path[k];
+    path_.Set(k, path[k]);
   }
   since_anchor_.T_anchor_robot = keyframes_.back().T_anchor_robot;
 }

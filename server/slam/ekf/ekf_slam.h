@@ -113,7 +113,7 @@ class EkfSlam final : public Filter {
   Hung since_anchor_;
   double since_anchor_m_ = 0.0;
   bool moved_path_ = false;  // Whether an update in this step corrected past poses.
-  SharedSequence<Pose2> path_;
+  PosePath path_;
   Contradictions contradictions_;
   StepNis nis_;
 };

@@ -19,7 +19,7 @@
 #include "server/slam/filters/filter_health.h"
 #include "server/slam/landmarks/innovation.h"
 #include "server/slam/random/resampling.h"
-#include "server/slam/trail/shared_sequence.h"
+#include "server/slam/trail/pose_path.h"
 
 namespace cairn::slam {
 
@@ -38,7 +38,7 @@ struct Particle {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   double log_weight = 0.0;      // Sum since the last resampling.
   double log_likelihood = 0.0;  // Log likelihood of the whole path; resampling keeps it.
-  SharedSequence<Pose2> path;   // T_map_robot at every keyframe.
+  PosePath path;   // T_map_robot at every keyframe.
 
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {

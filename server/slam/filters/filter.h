@@ -19,7 +19,7 @@
 #include "server/slam/parallel_for.h"
 #include "server/slam/state/archive.h"
 #include "server/slam/trail/keyframe.h"
-#include "server/slam/trail/shared_sequence.h"
+#include "server/slam/trail/pose_path.h"
 
 namespace cairn::slam {
 
@@ -47,7 +47,7 @@ struct KeyframeSight {
 // cheap.
 struct Hypothesis {
   Pose2 T_map_robot;
-  SharedSequence<Pose2> path;  // T_map_robot at every committed keyframe.
+  PosePath path;  // T_map_robot at every committed keyframe.
 };
 
 struct FilterEstimate {

@@ -83,7 +83,7 @@ double LoopSearch::Reach(double way_m) const {
   return std::min(options_.max_doubt_m, kDoubtM + options_.doubt_per_m * way_m);
 }
 
-std::optional<LoopClosure> LoopSearch::Find(const Trail& trail, const SharedSequence<Pose2>& path) {
+std::optional<LoopClosure> LoopSearch::Find(const Trail& trail, const PosePath& path) {
   const std::span<const KeyframeShape> shapes = trail.shapes();
   const double here_m = shapes.back().travelled_m;
   if (!options_.enabled || here_m - searched_at_m_ < options_.every_m) return std::nullopt;
@@ -109,16 +109,18 @@ std::optional<LoopClosure> LoopSearch::Find(const Trail& trail, const SharedSequ
 }
 
 // Old keyframes in whose surroundings the robot may be, the most likely first, and only one per place.
-std::vector<std::size_t> LoopSearch::Candidates(const Trail& trail, const SharedSequence<Pose2>& path) const {
+std::vector<std::size_t> LoopSearch::Candidates(const Trail& trail, const PosePath& path) const {
   const std::span<const KeyframeShape> shapes = trail.shapes();
   std::vector<KeyframeCost> all;
   const Pose2& here = path[shapes.size() - 1];
-  for (std::size_t k = 0; k < shapes.size(); k += kCandidateStride) {
-    const double away_m = (path[k].translation() - here.translation()).norm();
-    if (away_m >= options_.max_doubt_m || !trail.IsFarther(k, kLargeLoopM)) continue;
+  const auto look = [&](std::size_t k, const Pose2& there) {
+    if (k % kCandidateStride != 0) return;
+    const double away_m = (there.translation() - here.translation()).norm();
+    if (away_m >= options_.max_doubt_m || !trail.IsFarther(k, kLargeLoopM)) return;
     const double cost = away_m / Reach(trail.distances_m()[k]);  // Distance divided by the reach.
     if (cost < 1.0) all.push_back({k, cost});
-  }
+  };
+  ForEachNear(path, shapes.size(), here.translation(), options_.max_doubt_m, look);
   return BestPlaces(std::move(all), shapes, kStretchM, kMaxCandidates);
 }
 

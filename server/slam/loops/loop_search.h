@@ -16,7 +16,7 @@
 #include "common/options/option_visitor.h"
 #include "server/slam/loops/region.h"
 #include "server/slam/matching/point_to_line.h"
-#include "server/slam/trail/shared_sequence.h"
+#include "server/slam/trail/pose_path.h"
 
 namespace cairn::slam {
 
@@ -57,7 +57,7 @@ class LoopSearch {
 
   // Returns a large loop that the last keyframe closes, once it is confirmed. `path` is the believed path,
   // one pose T_map_robot per keyframe.
-  [[nodiscard]] std::optional<LoopClosure> Find(const Trail& trail, const SharedSequence<Pose2>& path);
+  [[nodiscard]] std::optional<LoopClosure> Find(const Trail& trail, const PosePath& path);
 
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
@@ -65,7 +65,7 @@ class LoopSearch {
   }
 
  private:
-  [[nodiscard]] std::vector<std::size_t> Candidates(const Trail& trail, const SharedSequence<Pose2>& path) const;
+  [[nodiscard]] std::vector<std::size_t> Candidates(const Trail& trail, const PosePath& path) const;
   // Compares the surroundings of the last keyframe with those of `old`.
   [[nodiscard]] std::optional<LoopClosure> Compare(const Trail& trail, std::size_t old,
                                                    const Pose2& T_old_recent_guess) const;

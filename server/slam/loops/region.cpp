@@ -29,6 +29,11 @@ Stretch StretchAround(std::span<const KeyframeShape> shapes, std::size_t centre,
   return stretch;
 }
 
+std::size_t CountBefore(std::span<const KeyframeShape> shapes, double travelled_m, double way_m) {
+  const auto before = [&](const KeyframeShape& shape) { return travelled_m - shape.travelled_m >= way_m; };
+  return static_cast<std::size_t>(std::partition_point(shapes.begin(), shapes.end(), before) - shapes.begin());
+}
+
 std::vector<SurfacePoint> SurfacesOf(const Trail& trail, const Stretch& stretch, double cell_m) {
   std::vector<SurfacePoint> surfaces;
   std::unordered_set<std::int64_t> taken;

@@ -25,6 +25,10 @@ struct Stretch {
   std::size_t anchor = 0;
 };
 
+// How many of the first keyframes lie at least `way_m` of the way before the place to which the robot has travelled
+// `travelled_m`.
+[[nodiscard]] std::size_t CountBefore(std::span<const KeyframeShape> shapes, double travelled_m, double way_m);
+
 // Returns the keyframes within a travelled distance of `way_m` before and after `centre`.
 [[nodiscard]] Stretch StretchAround(std::span<const KeyframeShape> shapes, std::size_t centre, double way_m);
 

@@ -19,18 +19,19 @@ std::optional<std::size_t> NearestKeyframe(const Hypothesis& belief, const Trail
                                            const RevisitOptions& options) {
   std::optional<std::size_t> nearest;
   double best = std::numeric_limits<double>::infinity();
-  for (std::size_t k = 0; k < trail.size(); ++k) {
-    if (travelled_m - trail.shapes()[k].travelled_m < kMinRevisitTravelM) break;
-    const Pose2& T_map_k = belief.path[k];
-    const double distance = (T_map_k.translation() - belief.T_map_robot.translation()).norm();
-    if (distance > options.max_distance_m) continue;
+  const Eigen::Vector2d here = belief.T_map_robot.translation();
+  const auto look = [&](std::size_t k, const Pose2& T_map_k) {
+    const double distance = (T_map_k.translation() - here).norm();
+    if (distance > options.max_distance_m) return;
     const double turn = std::abs(AngleDiff(T_map_k.theta, belief.T_map_robot.theta));
-    if (turn > options.max_turn_rad) continue;
+    if (turn > options.max_turn_rad) return;
     const double cost = distance + options.max_distance_m * turn / options.max_turn_rad;
-    if (!(cost < best) || trail.IsFarther(k, kLargeLoopM)) continue;
+    if (!(cost < best) || trail.IsFarther(k, kLargeLoopM)) return;
     best = cost;
     nearest = k;
-  }
+  };
+  ForEachNear(belief.path, CountBefore(trail.shapes(), travelled_m, kMinRevisitTravelM), here, options.max_distance_m,
+              look);
   return nearest;
 }
 

@@ -35,7 +35,7 @@ void Visit(OptionVisitor& visitor, SelfCheckOptions& options) {
                "below half of this.");
 }
 
-void SelfCheck::Look(const Trail& trail, const SharedSequence<Pose2>& path) {
+void SelfCheck::Look(const Trail& trail, const PosePath& path) {
   const std::span<const Keyframe> keyframes = trail.keyframes();
   const std::span<const KeyframeShape> shapes = trail.shapes();
   const double here_m = shapes.back().travelled_m;
@@ -59,16 +59,16 @@ void SelfCheck::Forget() {
 
 // Old keyframes near the believed pose, those with the most overlap first, and only one per place and visit.
 std::vector<std::size_t> SelfCheck::KeyframesToCompare(std::span<const KeyframeShape> shapes,
-                                                       const SharedSequence<Pose2>& path) const {
+                                                       const PosePath& path) const {
   std::vector<KeyframeCost> all;
-  const KeyframeShape& last = shapes.back();
   const Pose2 here = path[shapes.size() - 1];
-  for (std::size_t k = 0; k < shapes.size() && last.travelled_m - shapes[k].travelled_m >= options_.min_travel_m; ++k) {
-    const Pose2& there = path[k];
+  const auto look = [&](std::size_t k, const Pose2& there) {
     const double distance_m = (there.translation() - here.translation()).norm();
-    if (distance_m > kMaxVisibleM) continue;
+    if (distance_m > kMaxVisibleM) return;
     all.push_back({k, distance_m + kTurnCostM * std::abs(AngleDiff(there.theta, here.theta))});
-  }
+  };
+  ForEachNear(path, CountBefore(shapes, shapes.back().travelled_m, options_.min_travel_m), here.translation(),
+              kMaxVisibleM, look);
   return BestPlaces(std::move(all), shapes, kSamePlaceM, kMaxCompared);
 }
 

@@ -16,7 +16,7 @@
 #include "common/options/option_visitor.h"
 #include "common/sensor/scan.h"
 #include "server/slam/loops/visibility.h"
-#include "server/slam/trail/shared_sequence.h"
+#include "server/slam/trail/pose_path.h"
 #include "server/slam/trail/trail.h"
 
 namespace cairn::slam {
@@ -35,7 +35,7 @@ class SelfCheck {
 
   // Compares the last keyframe, which is already in the path (one pose T_map_robot per keyframe), with old
   // ones.
-  void Look(const Trail& trail, const SharedSequence<Pose2>& path);
+  void Look(const Trail& trail, const PosePath& path);
   // Discards the comparisons along the old path after the path was corrected.
   void Forget();
 
@@ -58,7 +58,7 @@ class SelfCheck {
     }
   };
   [[nodiscard]] std::vector<std::size_t> KeyframesToCompare(std::span<const KeyframeShape> shapes,
-                                                            const SharedSequence<Pose2>& path) const;
+                                                            const PosePath& path) const;
   void UpdateContradicted();
 
   SelfCheckOptions options_;

@@ -11,7 +11,9 @@ void ReckonedPath::Advance(const Pose2& T_prev_curr, const Eigen::Matrix3d& cova
 
 void ReckonedPath::MoveTo(const Pose2& T_map_robot) {
   const Pose2 T_new_old = T_map_robot * pose_.Inverse();
-  for (std::size_t k = 0; k < path_.size(); ++k) path_.Mutable(k) = T_new_old * path_[k];
+  PosePath moved;
+  for (std::size_t k = 0; k < path_.size(); ++k) moved.Append(T_new_old * path_[k]);
+  path_ = std::move(moved);
   pose_ = T_map_robot;
 }
 

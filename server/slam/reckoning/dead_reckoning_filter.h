@@ -9,7 +9,7 @@
 #include "server/slam/filters/filter.h"
 #include "server/slam/filters/filter_health.h"
 #include "server/slam/motion/step_motion.h"
-#include "server/slam/trail/shared_sequence.h"
+#include "server/slam/trail/pose_path.h"
 
 namespace cairn::slam {
 
@@ -35,7 +35,7 @@ class ReckonedPath {
 
   [[nodiscard]] const Pose2& T_map_robot() const { return pose_; }
   [[nodiscard]] const Eigen::Matrix3d& covariance() const { return covariance_; }
-  [[nodiscard]] const SharedSequence<Pose2>& path() const { return path_; }
+  [[nodiscard]] const PosePath& path() const { return path_; }
 
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
@@ -46,7 +46,7 @@ class ReckonedPath {
   MotionNoise drift_;
   Pose2 pose_;
   Eigen::Matrix3d covariance_ = Eigen::Matrix3d::Zero();
-  SharedSequence<Pose2> path_;
+  PosePath path_;
 };
 
 // A filter whose belief is one path, which continues with every step.

@@ -63,7 +63,7 @@ PlaceSearch::PlaceSearch(const PlaceSearchOptions& options, const LoopOptions& l
 }
 
 // Leaves out keyframes that are not localized.
-std::vector<SurfacePoint> PlaceSearch::SurfacesOfMap(const Trail& trail, const SharedSequence<Pose2>& path) const {
+std::vector<SurfacePoint> PlaceSearch::SurfacesOfMap(const Trail& trail, const PosePath& path) const {
   std::vector<SurfacePoint> surfaces;
   OnePerCell cells(0.5 * kSearchCellM);
   const Eigen::Vector2d last = path[trail.size() - 1].translation();
@@ -80,7 +80,7 @@ std::vector<SurfacePoint> PlaceSearch::SurfacesOfMap(const Trail& trail, const S
   return surfaces;
 }
 
-std::optional<FoundPlace> PlaceSearch::Find(const Trail& trail, const SharedSequence<Pose2>& path,
+std::optional<FoundPlace> PlaceSearch::Find(const Trail& trail, const PosePath& path,
                                             std::span<const RecentScan> recent) {
   if (!map_) map_ = std::make_shared<const Map>(SurfacesOfMap(trail, path), options_.cell_scale);
   if (recent.empty() || map_->surfaces.size() < kMinSurfaces) return std::nullopt;
@@ -91,7 +91,7 @@ std::optional<FoundPlace> PlaceSearch::Find(const Trail& trail, const SharedSequ
   return Fit(trail, path, recent, surfaces, *unique, UniquePoseCovariance());
 }
 
-std::optional<FoundPlace> PlaceSearch::Fit(const Trail& trail, const SharedSequence<Pose2>& path,
+std::optional<FoundPlace> PlaceSearch::Fit(const Trail& trail, const PosePath& path,
                                            std::span<const RecentScan> recent,
                                            const std::vector<SurfacePoint>& surfaces, const Pose2& T_map_robot,
                                            const Eigen::Matrix3d& covariance) const {
@@ -110,7 +110,7 @@ std::optional<FoundPlace> PlaceSearch::Fit(const Trail& trail, const SharedSeque
   return FoundPlace{match.T_ref_curr, match.covariance + PoseCovariance(loop_.sigma_m, kFoundSigmaRad)};
 }
 
-VisibilityCounts PlaceSearch::Visible(const Trail& trail, const SharedSequence<Pose2>& path, const Scan& scan,
+VisibilityCounts PlaceSearch::Visible(const Trail& trail, const PosePath& path, const Scan& scan,
                                       const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const {
   const std::span<const KeyframeShape> shapes = trail.shapes();
   std::vector<KeyframeCost> near;
@@ -128,7 +128,7 @@ VisibilityCounts PlaceSearch::Visible(const Trail& trail, const SharedSequence<P
   return counts;
 }
 
-PlaceSearch::Agreement PlaceSearch::Compare(const Trail& trail, const SharedSequence<Pose2>& path, const Scan& scan,
+PlaceSearch::Agreement PlaceSearch::Compare(const Trail& trail, const PosePath& path, const Scan& scan,
                                             const std::vector<SurfacePoint>& points_robot,
                                             const Pose2& T_map_robot) const {
   const VisibilityCounts counts = Visible(trail, path, scan, points_robot, T_map_robot);

@@ -18,7 +18,7 @@
 #include "server/slam/loops/unique_pose.h"
 #include "server/slam/matching/point_index.h"
 #include "server/slam/recovery/recovery_options.h"
-#include "server/slam/trail/shared_sequence.h"
+#include "server/slam/trail/pose_path.h"
 #include "server/slam/trail/trail.h"
 
 namespace cairn::slam {
@@ -51,17 +51,17 @@ class PlaceSearch {
   // The place of the last of the scans, which are in the order of time. `path` is the believed path, one pose
   // T_map_robot per keyframe. REQUIRES: neither the trail nor the path changes between two calls, unless Forget is
   // called.
-  [[nodiscard]] std::optional<FoundPlace> Find(const Trail& trail, const SharedSequence<Pose2>& path,
+  [[nodiscard]] std::optional<FoundPlace> Find(const Trail& trail, const PosePath& path,
                                                std::span<const RecentScan> recent);
   void Forget() { map_.reset(); }
 
   // How a scan at this pose agrees with old keyframes near it.
   enum class Agreement { kNothingNear, kAgrees, kDoubtful, kContradicts };
-  [[nodiscard]] Agreement Compare(const Trail& trail, const SharedSequence<Pose2>& path, const Scan& scan,
+  [[nodiscard]] Agreement Compare(const Trail& trail, const PosePath& path, const Scan& scan,
                                   const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const;
 
  private:
-  [[nodiscard]] VisibilityCounts Visible(const Trail& trail, const SharedSequence<Pose2>& path, const Scan& scan,
+  [[nodiscard]] VisibilityCounts Visible(const Trail& trail, const PosePath& path, const Scan& scan,
                                          const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const;
   struct Map {
     Map(std::vector<SurfacePoint> surfaces, double cell_scale);
@@ -71,11 +71,11 @@ class PlaceSearch {
     SearchWindow window;  // All of the map, in every heading.
   };
   // The pose near this one at which everything fits.
-  [[nodiscard]] std::optional<FoundPlace> Fit(const Trail& trail, const SharedSequence<Pose2>& path,
+  [[nodiscard]] std::optional<FoundPlace> Fit(const Trail& trail, const PosePath& path,
                                               std::span<const RecentScan> recent,
                                               const std::vector<SurfacePoint>& surfaces, const Pose2& T_map_robot,
                                               const Eigen::Matrix3d& covariance) const;
-  [[nodiscard]] std::vector<SurfacePoint> SurfacesOfMap(const Trail& trail, const SharedSequence<Pose2>& path) const;
+  [[nodiscard]] std::vector<SurfacePoint> SurfacesOfMap(const Trail& trail, const PosePath& path) const;
 
   PlaceSearchOptions options_;
   LoopOptions loop_;

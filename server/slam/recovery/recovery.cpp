@@ -65,7 +65,7 @@ void Recovery::Append(const Keyframe& keyframe, const TrackStep& step, std::vect
 
 std::optional<Recovery::Found> Recovery::Take(const Keyframe& keyframe, const TrackStep& step,
                                               std::vector<SurfacePoint> points_robot, const Trail& trail,
-                                              const SharedSequence<Pose2>& path) {
+                                              const PosePath& path) {
   Append(keyframe, step, std::move(points_robot));
   const Pose2 T_map_robot = BeliefAt(keyframe.T_odom_robot, step.T_track_robot).T_map_robot;
   contradicted_ = search_.Compare(trail, path, *recent_.back().scan, recent_.back().points, T_map_robot) ==

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <array>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -17,7 +18,13 @@
 
 namespace cairn::slam {
 
-template <typename Value>
+// What a node of a sequence knows of the values below it: here nothing. Others (pose_path.h) take up each value, and
+// each summary of a part, with Add. A value that was replaced stays in the summaries.
+struct NoSummary {
+  void Add(const auto& /*value_or_part*/) {}
+};
+
+template <typename Value, typename Summary = NoSummary>
 class SharedSequence {
  public:
   [[nodiscard]] std::size_t size() const { return size_; }
@@ -33,11 +40,14 @@ class SharedSequence {
 
   // A reference for writing. Afterwards only this sequence holds the element's node. REQUIRES: index <
   // size().
-  [[nodiscard]] Value& Mutable(std::size_t index) {
+  [[nodiscard]] Value& Mutable(std::size_t index) requires std::same_as<Summary, NoSummary> {
     std::shared_ptr<void>* link = &root_;
     for (int shift = shift_; shift > 0; shift -= kBits) link = &Own<Branch>(*link).children[Slot(index, shift)];
     return Own<Leaf>(*link).values[Slot(index, 0)];
   }
+
+  // Replaces a value. REQUIRES: index < size().
+  void Set(std::size_t index, Value value) { Put(index, std::move(value)); }
 
   // A copy of all values in order.
   [[nodiscard]] std::vector<Value> values() const {
@@ -51,17 +61,19 @@ class SharedSequence {
     if (!root_) root_ = std::make_shared<Leaf>();
     if (size_ == (std::size_t{kWidth} << shift_)) {  // The tree is full and gets one more level.
       auto level = std::make_shared<Branch>();
+      level->summary = SummaryOf(root_, shift_);
       level->children[0] = std::move(root_);
       root_ = std::move(level);
       shift_ += kBits;
     }
-    const std::size_t index = size_++;
-    std::shared_ptr<void>* link = &root_;
-    for (int shift = shift_; shift > 0; shift -= kBits) {
-      link = &Own<Branch>(*link).children[Slot(index, shift)];
-      if (!*link) *link = shift == kBits ? std::shared_ptr<void>(std::make_shared<Leaf>()) : std::make_shared<Branch>();
-    }
-    Own<Leaf>(*link).values[Slot(index, 0)] = std::move(value);
+    Put(size_++, std::move(value));
+  }
+
+  // Calls visit(index, value) in order for the values before `end`, but for those below nodes whose summary `enter`
+  // refuses. REQUIRES: end <= size().
+  template <typename Enter, typename Visitor>
+  void ForEach(std::size_t end, const Enter& enter, const Visitor& visit) const {
+    if (end > 0) VisitNode(root_.get(), 0, end, shift_, enter, visit);
   }
 
   // The state, for archives (state/archive.h). Copies that share nodes share them again when they are read.
@@ -84,12 +96,47 @@ class SharedSequence {
   static constexpr std::uint64_t kMostRead = 1 << 24;
   struct Leaf {
     std::array<Value, kWidth> values{};
+    [[no_unique_address]] Summary summary;
   };
   struct Branch {
     std::array<std::shared_ptr<void>, kWidth> children{};
+    [[no_unique_address]] Summary summary;
   };
 
   static std::size_t Slot(std::size_t index, int shift) { return (index >> shift) & (kWidth - 1); }
+
+  static const Summary& SummaryOf(const std::shared_ptr<void>& node, int shift) {
+    return shift == 0 ? static_cast<const Leaf*>(node.get())->summary : static_cast<const Branch*>(node.get())->summary;
+  }
+
+  // The nodes on the way to the last element may be missing.
+  void Put(std::size_t index, Value value) {
+    std::shared_ptr<void>* link = &root_;
+    for (int shift = shift_; shift > 0; shift -= kBits) {
+      auto& branch = Own<Branch>(*link);
+      branch.summary.Add(value);
+      link = &branch.children[Slot(index, shift)];
+      if (!*link) *link = shift == kBits ? std::shared_ptr<void>(std::make_shared<Leaf>()) : std::make_shared<Branch>();
+    }
+    auto& leaf = Own<Leaf>(*link);
+    leaf.summary.Add(value);
+    leaf.values[Slot(index, 0)] = std::move(value);
+  }
+
+  // `first`: the index of the first value below the node.
+  static void VisitNode(const void* node, std::size_t first, std::size_t end, int shift, const auto& enter,
+                        const auto& visit) {
+    if (shift == 0) {
+      const auto& leaf = *static_cast<const Leaf*>(node);
+      if (!enter(leaf.summary)) return;
+      for (std::size_t i = 0; i < kWidth && first + i < end; ++i) visit(first + i, leaf.values[i]);
+      return;
+    }
+    const auto& branch = *static_cast<const Branch*>(node);
+    if (!enter(branch.summary)) return;
+    for (std::size_t i = 0; i < kWidth && first + (i << shift) < end; ++i)
+      VisitNode(branch.children[i].get(), first + (i << shift), end, shift - kBits, enter, visit);
+  }
 
   // A node with the first `count` elements below it.
   template <typename Archive>
@@ -98,7 +145,10 @@ class SharedSequence {
     if (shift == 0) {
       if (!archive.template Shared<Leaf>(link, shape)) return;
       auto& leaf = *static_cast<Leaf*>(link.get());
-      for (std::size_t i = 0; i < count && archive.ok(); ++i) archive(leaf.values[i]);
+      for (std::size_t i = 0; i < count && archive.ok(); ++i) {
+        archive(leaf.values[i]);
+        if constexpr (Archive::kReads) leaf.summary.Add(leaf.values[i]);
+      }
       return;
     }
     if (!archive.template Shared<Branch>(link, shape)) return;
@@ -106,6 +156,8 @@ class SharedSequence {
     for (std::size_t i = 0, left = count; left > 0 && archive.ok(); ++i) {
       const std::size_t below = std::min(left, std::size_t{1} << shift);
       NodeMembers(archive, branch.children[i], below, shift - kBits);
+      if constexpr (Archive::kReads)
+        if (branch.children[i]) branch.summary.Add(SummaryOf(branch.children[i], shift - kBits));
       left -= below;
     }
   }

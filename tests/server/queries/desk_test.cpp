@@ -66,7 +66,7 @@ class DeskTest : public ::testing::Test {
                       enable_ = enable;
                       return Result<JobOutcome>(JobOutcome{});
                     }};
-  SavedSites saved_sites_{{}, nullptr, {outbound_, roster_, atlas_, jobs_, worker_}};
+  SavedSites saved_sites_{{}, 0, nullptr, {outbound_, roster_, atlas_, jobs_, worker_}};
   Desk desk_{kCapacity, outbound_, roster_, atlas_, jobs_, worker_, saved_sites_, 1};
   bool started_ = false;
   std::int64_t sequence_ = 0;

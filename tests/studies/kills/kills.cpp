@@ -31,6 +31,9 @@ void Add(test::KilledFleetOutcome& all, const test::KilledFleetOutcome& one) {
   all.doubled += one.doubled;
   all.poses += one.poses;
   all.wrongly_localized += one.wrongly_localized;
+  all.beside_truth += one.beside_truth;
+  all.undisturbed_poses += one.undisturbed_poses;
+  all.undisturbed_beside_truth += one.undisturbed_beside_truth;
   all.paths_that_differ += one.paths_that_differ;
   all.ready_s.insert(all.ready_s.end(), one.ready_s.begin(), one.ready_s.end());
   all.tracking_s.insert(all.tracking_s.end(), one.tracking_s.begin(), one.tracking_s.end());
@@ -64,6 +67,14 @@ void StudyKills(StudyContext& context) {
              Number(At(all.ready_s, 0.5), 2), Number(At(all.ready_s, 0.99), 2), Number(At(all.tracking_s, 0.5), 2),
              Number(At(all.tracking_s, 0.99), 2)});
   report.Add(table, "kills");
+  const auto share = [](std::uint64_t part, std::uint64_t whole) {
+    return Percent(static_cast<double>(part) / static_cast<double>(std::max<std::uint64_t>(1, whole)));
+  };
+  report.Text(
+      "Wrongly localized: more than 0.5 m beside the pose of an undisturbed server at the same time. The truth is "
+      "farther away than 0.5 m in " +
+      share(all.beside_truth, all.poses) + " of the poses, and in " +
+      share(all.undisturbed_beside_truth, all.undisturbed_poses) + " of those of the undisturbed server.");
   report.Expect(all.lost == 0 && all.doubled == 0, "scans were lost or used twice");
   report.Expect(all.wrongly_localized == 0, "a robot was localized at a wrong place");
   report.Expect(all.paths_that_differ == 0, "paths differ from those of an undisturbed server");

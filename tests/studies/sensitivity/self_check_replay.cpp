@@ -30,7 +30,7 @@ SelfCheckReplay::Path SelfCheckReplay::PathOf(const std::vector<slam::Keyframe>&
 double SelfCheckReplay::ContradictedShare(const Path& path, const slam::SelfCheckOptions& options) {
   slam::SelfCheck check(options);
   slam::Trail trail{slam::MotionNoise{}};
-  slam::SharedSequence<Pose2> poses;
+  slam::PosePath poses;
   std::size_t contradicted = 0;
   for (std::size_t k = 0; k < path.poses.size(); ++k) {
     trail.Append(path.keyframes[k], path.poses[k], path.points_robot[k], Eigen::Matrix3d::Zero(), std::nullopt);

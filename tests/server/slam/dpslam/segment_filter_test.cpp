@@ -50,7 +50,7 @@ Segments BentRing(double bend_rad, double width_m = 24.0, double laps = 1.25) {
 }
 
 // The error of the path between the last scan and the first scan near it, against the truth.
-double LoopErrorOf(const Segments& segments, const SharedSequence<Pose2>& path) {
+double LoopErrorOf(const Segments& segments, const PosePath& path) {
   const std::size_t last = segments.truth.size() - 1;
   std::size_t near = 0;
   for (std::size_t i = 0; i < last / 2; ++i)
@@ -63,7 +63,7 @@ double LoopErrorOf(const Segments& segments, const SharedSequence<Pose2>& path) 
 }
 
 // The largest distance of the path from the truth.
-double WorstError(const Segments& segments, const SharedSequence<Pose2>& path) {
+double WorstError(const Segments& segments, const PosePath& path) {
   double worst = 0.0;
   for (std::size_t i = 0; i < segments.truth.size(); ++i)
     worst = std::max(worst, (path[i].translation() - segments.truth[i].translation()).norm());
@@ -84,7 +84,7 @@ TEST(SegmentFilter, ClosesALoopThatNoParticleFits) {
   const Segments segments = BentRing(0.015);
   const SegmentFilter filter = Driven(segments, High(60), 1);
   Pose2 joint = segments.truth.front();
-  SharedSequence<Pose2> bent;
+  PosePath bent;
   for (const Evidence& trajectory : segments.trajectories) {
     const Pose2 from = joint;
     for (const PlacedRays& placed : trajectory) bent.Append(joint = from * placed.T_start_robot);
@@ -129,7 +129,7 @@ TEST(SegmentFilter, ChangesNothingOutsideUntilItsWorkIsDone) {
   Rng rng(3);
   int calls = 0;
   for (const Evidence& trajectory : segments.trajectories) {
-    const SharedSequence<Pose2> before = filter.level().best().path;
+    const PosePath before = filter.level().best().path;
     filter.Take({trajectory}, 8.0, rng);
     while (filter.at_work()) {
       ASSERT_EQ(filter.level().best().path.size(), before.size());

@@ -25,8 +25,8 @@ std::vector<Keyframe> Keyframes(std::size_t lost) {
   return keyframes;
 }
 
-SharedSequence<Pose2> Path() {
-  SharedSequence<Pose2> path;
+PosePath Path() {
+  PosePath path;
   for (std::size_t k = 0; k < kKeyframes; ++k) path.Append(PlaceOf(k));
   return path;
 }
@@ -90,7 +90,7 @@ class RedrawnMap : public ::testing::Test {
   }
 
   std::vector<Keyframe> keyframes_;
-  SharedSequence<Pose2> corrected_;
+  PosePath corrected_;
   MapDrawing drawing_{GridOptions{}};
 };
 

@@ -16,7 +16,7 @@ using test::World;
 struct Drive {
   Trail trail{MotionNoise{0.002, 0.01, 0.005, 0.0005, 0.002, 0.005}};
   std::vector<Pose2> truth;
-  SharedSequence<Pose2> believed;
+  PosePath believed;
 
   void Step(const World& world, const Pose2& motion, double drift_rad, std::mt19937_64& rng, double slip_m = 0.0) {
     const Pose2 seen = motion * Pose2{slip_m, 0, drift_rad};

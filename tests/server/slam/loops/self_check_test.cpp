@@ -31,7 +31,7 @@ struct Belief {
   std::mt19937_64 rng{5};
   Pose2 truth;
   Trail trail{MotionNoise{}};
-  SharedSequence<Pose2> path;
+  PosePath path;
 
   [[nodiscard]] double travelled_m() const { return trail.TravelledTo(truth); }
 

@@ -39,7 +39,7 @@ test::World Hall(std::uint64_t seed = 3) {
 // The map of a drive along the middle: a keyframe every 0.25 m at its true pose.
 struct Map {
   Trail trail{MotionNoise{}};
-  SharedSequence<Pose2> path;
+  PosePath path;
 
   explicit Map(const test::World& world, double from_m = 0.0, double to_m = 38.0) {
     for (double x = from_m; x < to_m; x += 0.25) Add(world, {x, 0, 0}, {x, 0, 0}, true);

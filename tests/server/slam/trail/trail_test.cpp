@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
+#include <random>
 #include <utility>
+#include <vector>
 
 namespace cairn::slam {
 namespace {
@@ -37,6 +40,46 @@ TEST(Trail, ALoopIsAShortCutBothWays) {
   EXPECT_DOUBLE_EQ(distance[2], 4.5);
   EXPECT_DOUBLE_EQ(distance[5], 10.0);  // The farthest keyframe: both ways round have the same length.
   EXPECT_EQ(trail.relations().size(), 11U);
+}
+
+// Loops of all lengths, also of none, between any two keyframes: every relation is applied until no distance changes.
+TEST(Trail, DistancesAreThoseThatNoRelationShortens) {
+  std::mt19937 random(4);
+  const auto length_m = [&](double most) { return std::uniform_real_distribution<double>(0.0, most)(random); };
+  Trail trail(kDrift);
+  double x = 0.0;
+  for (int k = 0; k < 400; ++k) {
+    trail.Append({std::make_shared<const Scan>(), {}}, {x, 0.0, 0.0}, {}, Eigen::Matrix3d::Zero(), std::nullopt);
+    if (k % 9 != 0) x += length_m(k % 50 == 0 ? 30.0 : 0.4);
+  }
+  std::vector<std::pair<std::size_t, std::size_t>> ends;
+  std::vector<double> ways;
+  for (int i = 0; i < 300; ++i) {
+    ends.emplace_back(random() % 400, random() % 400);
+    ways.push_back(i % 5 == 0 ? 0.0 : length_m(5.0));
+    trail.AddLoop({ends.back().first, ends.back().second, {ways.back(), 0.0, 0.0}, Eigen::Matrix3d::Identity(), true});
+  }
+  std::vector<double> shortest(400, std::numeric_limits<double>::infinity());
+  shortest.back() = 0.0;
+  bool changes = true;
+  const auto shorten = [&](std::size_t to, double way_m) {
+    if (!(way_m < shortest[to])) return;
+    shortest[to] = way_m;
+    changes = true;
+  };
+  const auto travelled_m = [&](std::size_t k) { return trail.shapes()[k].travelled_m; };
+  while (std::exchange(changes, false)) {
+    for (std::size_t k = 1; k < 400; ++k) {
+      shorten(k, shortest[k - 1] + travelled_m(k) - travelled_m(k - 1));
+      shorten(k - 1, shortest[k] + travelled_m(k) - travelled_m(k - 1));
+    }
+    for (std::size_t i = 0; i < ends.size(); ++i) {
+      shorten(ends[i].second, shortest[ends[i].first] + ways[i]);
+      shorten(ends[i].first, shortest[ends[i].second] + ways[i]);
+    }
+  }
+  const std::span<const double> distances = trail.distances_m();
+  EXPECT_EQ(std::vector<double>(distances.begin(), distances.end()), shortest);
 }
 
 // Keyframes on a line, with loops to old ones. Each trail is asked about one way only, at some keyframes only, and the
