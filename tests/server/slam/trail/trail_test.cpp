@@ -82,6 +82,19 @@ TEST(Trail, DistancesAreThoseThatNoRelationShortens) {
   EXPECT_EQ(std::vector<double>(distances.begin(), distances.end()), shortest);
 }
 
+// A step of no length after a way of a round number of metres: with rounding the sum may be a little shorter than
+// the way before it.
+TEST(Trail, DistancesGoOnWhereRoundingMakesAWayShorter) {
+  for (int i = 1; i <= 50; ++i) {
+    Trail trail(kDrift);
+    const double x = 0.1 * i;
+    for (const double at : {0.0, x, x, x + 100.0})
+      trail.Append({std::make_shared<const Scan>(), {}}, {at, 0.0, 0.0}, {}, Eigen::Matrix3d::Zero(), std::nullopt);
+    trail.AddLoop({2, 3, {0.25, 0.0, 0.0}, Eigen::Matrix3d::Identity(), true});
+    EXPECT_NEAR(trail.distances_m()[0], x + 0.25, 1e-9) << x;
+  }
+}
+
 // Keyframes on a line, with loops to old ones. Each trail is asked about one way only, at some keyframes only, and the
 // newest keyframes first, so that earlier distances decide most answers.
 TEST(Trail, WhetherAKeyframeIsFartherFollowsTheDistancesAlsoLongAfterTheyWereComputed) {
