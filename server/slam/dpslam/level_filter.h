@@ -39,7 +39,7 @@ struct GridParticle {
   double log_weight = 0.0;      // Log weight since the last resampling.
   double log_likelihood = 0.0;  // Log likelihood of the whole path; not reset by resampling.
   double log_prior = 0.0;       // Log density of the drift at its joints (high level only).
-  PosePath path;   // T_map_robot at every observed scan.
+  PosePath path;                // T_map_robot at every observed scan.
 
   [[nodiscard]] double log_posterior() const { return log_likelihood + log_prior; }
 

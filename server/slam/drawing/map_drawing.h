@@ -34,8 +34,7 @@ class MapDrawing {
   void Finish(std::span<const Keyframe> keyframes, const PosePath& path);
   // Replaces the map by one that a job drew from the first `drawn` keyframes, and draws the other keyframes
   // onto it. A map from before a change of the path is also taken, and then drawn again.
-  void Adopt(OccupancyGrid grid, std::size_t drawn, std::span<const Keyframe> keyframes,
-             const PosePath& path);
+  void Adopt(OccupancyGrid grid, std::size_t drawn, std::span<const Keyframe> keyframes, const PosePath& path);
 
   [[nodiscard]] bool redrawing() const { return redraw_.has_value(); }
   [[nodiscard]] const OccupancyGrid& grid() const { return grid_; }

@@ -38,7 +38,7 @@ struct Particle {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   double log_weight = 0.0;      // Sum since the last resampling.
   double log_likelihood = 0.0;  // Log likelihood of the whole path; resampling keeps it.
-  PosePath path;   // T_map_robot at every keyframe.
+  PosePath path;                // T_map_robot at every keyframe.
 
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {

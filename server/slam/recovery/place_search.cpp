@@ -91,8 +91,7 @@ std::optional<FoundPlace> PlaceSearch::Find(const Trail& trail, const PosePath& 
   return Fit(trail, path, recent, surfaces, *unique, UniquePoseCovariance());
 }
 
-std::optional<FoundPlace> PlaceSearch::Fit(const Trail& trail, const PosePath& path,
-                                           std::span<const RecentScan> recent,
+std::optional<FoundPlace> PlaceSearch::Fit(const Trail& trail, const PosePath& path, std::span<const RecentScan> recent,
                                            const std::vector<SurfacePoint>& surfaces, const Pose2& T_map_robot,
                                            const Eigen::Matrix3d& covariance) const {
   const MatchResult match =
