@@ -169,6 +169,7 @@ Result<Participant::Writer> Participant::MakeWriter(const TopicProfile& profile,
   const std::string partition = secure() && profile.of_robot ? robot : "";
   fd::Publisher* publisher = PublisherFor(partition);
   if (publisher == nullptr) return tl::unexpected(Broken("a publisher"));
+  const MutexLock lock(endpoints_);
   fd::DataWriter* writer = publisher->create_datawriter(*topic, qos, listener);
   if (writer == nullptr) {
     return tl::unexpected(NotMade(std::string("a writer of ") + profile.name +
@@ -188,16 +189,19 @@ Result<Participant::Reader> Participant::MakeReader(const TopicProfile& profile,
   SetCommon(profile, profile.reader_depth, instances, options_, qos);
   qos.reliable_reader_qos().times.heartbeatResponseDelay = Duration_t(0.001);
   fd::Subscriber* subscriber = secure() && profile.of_robot ? robots_ : subscriber_;
+  const MutexLock lock(endpoints_);
   fd::DataReader* reader = subscriber->create_datareader(*topic, qos, listener);
   if (reader == nullptr) return tl::unexpected(NotMade(std::string("a reader of ") + profile.name));
   return Reader(reader, ReaderDeleter{shared_from_this()});
 }
 
 void Participant::WriterDeleter::operator()(fd::DataWriter* writer) const {
+  const MutexLock lock(participant->endpoints_);
   const_cast<fd::Publisher*>(writer->get_publisher())->delete_datawriter(writer);
 }
 
 void Participant::ReaderDeleter::operator()(fd::DataReader* reader) const {
+  const MutexLock lock(participant->endpoints_);
   const_cast<fd::Subscriber*>(reader->get_subscriber())->delete_datareader(reader);
 }
 

@@ -41,17 +41,17 @@ bool Session::Take(ScanArrival&& arrival) {
     PublishLedgers(SessionRecord::Urgency::kWhenDue);
     return known;
   }
-  const SessionRecord::Arrival kind = record_.ScanReceived(sensor, sequence);
+  const SessionRecord::Arrival kind = record_.ScanReceived(arrival.stream, sequence);
   if (kind != SessionRecord::Arrival::kNew) return kind != SessionRecord::Arrival::kUnknownSensor;
   if (ending_ || arrival.refused) {
     const DropReason reason = arrival.refused.value_or(DropReason::kSessionEnded);
-    record_.ScanDropped(sensor, sequence, reason);
+    record_.ScanDropped(arrival.stream, sequence, reason);
     Store(ScanRefused{arrival.stream, sequence, reason});
     PublishLedgers(SessionRecord::Urgency::kWhenDue);
     return true;
   }
   if (const auto displaced = queue_.Push(std::move(arrival))) {
-    record_.ScanDropped(displaced->stream.sensor_id, displaced->scan->sequence, DropReason::kQueueFull);
+    record_.ScanDropped(displaced->stream, displaced->scan->sequence, DropReason::kQueueFull);
     Store(ScanRefused{displaced->stream, displaced->scan->sequence, DropReason::kQueueFull});
   }
   Schedule();
@@ -60,14 +60,15 @@ bool Session::Take(ScanArrival&& arrival) {
 
 void Session::Take(OdometryArrival&& arrival) {
   const std::uint64_t sequence = arrival.odometry.sequence;
-  if (arrival.stream.session != record_.token() || !record_.OdometryReceived(sequence)) return;
+  if (arrival.stream.session != record_.token() || !record_.OdometryReceived(arrival.stream.session, sequence)) return;
   if (arrival.refused || ending_) {
-    record_.OdometryDropped(sequence, arrival.refused ? DropReason::kBadGeometry : DropReason::kSessionEnded);
+    record_.OdometryDropped(arrival.stream.session, sequence,
+                            arrival.refused ? DropReason::kBadGeometry : DropReason::kSessionEnded);
     Store(OdometryTaken{arrival.stream, arrival.odometry, OdometryUse::kRefused});
     return;
   }
   if (const auto merged = queue_.Push(std::move(arrival))) {
-    record_.OdometryDropped(merged->odometry.sequence, DropReason::kQueueFull);
+    record_.OdometryDropped(merged->stream.session, merged->odometry.sequence, DropReason::kQueueFull);
     Store(OdometryTaken{merged->stream, merged->odometry, OdometryUse::kMerged});
   }
   Schedule();
@@ -128,7 +129,7 @@ void Session::Suspend(const std::function<void()>& done) {
 
 void Session::Abandon() {
   for (const ScanArrival& scan : queue_.TakeScans()) {
-    record_.ScanDropped(scan.stream.sensor_id, scan.scan->sequence, DropReason::kSessionEnded);
+    record_.ScanDropped(scan.stream, scan.scan->sequence, DropReason::kSessionEnded);
   }
 }
 

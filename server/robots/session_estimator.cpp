@@ -81,10 +81,10 @@ void SessionEstimator::Discard(RobotEvent&& event) {
     // A scan that has moved on into the estimator is one of those that wait there.
     if (arrival->scan != nullptr) {
       Store(ScanRefused{arrival->stream, arrival->scan->sequence, DropReason::kSessionEnded});
-      record_.ScanDropped(arrival->stream.sensor_id, arrival->scan->sequence, DropReason::kSessionEnded);
+      record_.ScanDropped(arrival->stream, arrival->scan->sequence, DropReason::kSessionEnded);
     }
-  } else if (std::holds_alternative<OdometryArrival>(event)) {
-    record_.OdometryDropped(std::get<OdometryArrival>(event).odometry.sequence, DropReason::kSessionEnded);
+  } else if (const auto* const odometry = std::get_if<OdometryArrival>(&event)) {
+    record_.OdometryDropped(odometry->stream.session, odometry->odometry.sequence, DropReason::kSessionEnded);
   } else if (auto* const wanted = std::get_if<SnapshotWanted>(&event)) {
     wanted->done({.session = identity_.id,
                   .robot = identity_.status.session.robot,
@@ -97,7 +97,7 @@ void SessionEstimator::Discard(RobotEvent&& event) {
 
 void SessionEstimator::DropWaiting() {
   for (const auto& [scan, waiting] : waiting_)
-    record_.ScanDropped(waiting.sensor_id, waiting.sequence, DropReason::kSessionEnded);
+    record_.ScanDropped(waiting.stream, waiting.sequence, DropReason::kSessionEnded);
   waiting_.clear();
 }
 
@@ -105,7 +105,7 @@ void SessionEstimator::On(ScanArrival&& arrival) {
   if (ended_) return Discard(std::move(arrival));
   Store(ScanTaken{arrival.stream, arrival.scan});
   ComesFrom(arrival.stream.session);
-  waiting_.emplace(arrival.scan.get(), Waiting{arrival.stream.sensor_id, arrival.scan->sequence, arrival.received});
+  waiting_.emplace(arrival.scan.get(), Waiting{arrival.stream, arrival.scan->sequence, arrival.received});
   pipeline_.Add(std::move(arrival.scan));
 }
 
@@ -117,9 +117,9 @@ void SessionEstimator::On(OdometryArrival&& arrival) {
   pipeline_.Add(arrival.odometry);
   const Odometry& odometry = arrival.odometry;
   if (pipeline_.odometry_refused() == refused_before) {
-    record_.OdometryUsed(odometry.sequence, odometry.stamp);
+    record_.OdometryUsed(arrival.stream.session, odometry.sequence, odometry.stamp);
   } else {
-    record_.OdometryDropped(odometry.sequence, DropReason::kStampWentBack);
+    record_.OdometryDropped(arrival.stream.session, odometry.sequence, DropReason::kStampWentBack);
   }
 }
 
@@ -135,11 +135,11 @@ void SessionEstimator::Store(JournalEntry entry) {
 void SessionEstimator::Replay(JournalEntry&& entry, const Switched& switched) {
   replaying_ = true;
   if (auto* const scan = std::get_if<ScanTaken>(&entry)) {
-    if (record_.ScanReceived(scan->stream.sensor_id, scan->scan->sequence) == SessionRecord::Arrival::kNew)
+    if (record_.ScanReceived(scan->stream, scan->scan->sequence) == SessionRecord::Arrival::kNew)
       On(ScanArrival{scan->stream, std::move(scan->scan), std::nullopt, Clock::now()});
   } else if (const auto* const refused = std::get_if<ScanRefused>(&entry)) {
-    if (record_.ScanReceived(refused->stream.sensor_id, refused->sequence) == SessionRecord::Arrival::kNew)
-      record_.ScanDropped(refused->stream.sensor_id, refused->sequence, refused->reason);
+    if (record_.ScanReceived(refused->stream, refused->sequence) == SessionRecord::Arrival::kNew)
+      record_.ScanDropped(refused->stream, refused->sequence, refused->reason);
   } else if (const auto* const odometry = std::get_if<OdometryTaken>(&entry)) {
     ReplayOdometry(*odometry);
   } else if (const auto* const owner = std::get_if<OwnerChanged>(&entry)) {
@@ -158,9 +158,9 @@ void SessionEstimator::Replay(JournalEntry&& entry, const Switched& switched) {
 
 void SessionEstimator::ReplayOdometry(const OdometryTaken& odometry) {
   const std::uint64_t sequence = odometry.odometry.sequence;
-  if (!record_.OdometryReceived(sequence)) return;
+  if (!record_.OdometryReceived(odometry.stream.session, sequence)) return;
   if (odometry.use == OdometryUse::kTaken) return On(OdometryArrival{odometry.stream, odometry.odometry, false});
-  record_.OdometryDropped(sequence,
+  record_.OdometryDropped(odometry.stream.session, sequence,
                           odometry.use == OdometryUse::kMerged ? DropReason::kQueueFull : DropReason::kBadGeometry);
 }
 
@@ -169,7 +169,7 @@ Journal::Content SessionEstimator::Save() const {
   if (ended_ || (switch_completed_ && !*switch_completed_)) return nullptr;
   // The scans themselves are saved by the pipeline, in the same order.
   std::vector<NameId> waiting;
-  pipeline_.ForEachWaiting([&](const Scan& scan) { waiting.push_back(waiting_.at(&scan).sensor_id); });
+  pipeline_.ForEachWaiting([&](const Scan& scan) { waiting.push_back(waiting_.at(&scan).stream.sensor_id); });
   (*writer)(epoch_, session_, waiting);
   if (!record_.Save(*writer, WaitingBySensor())) return nullptr;
   return [writer, pipeline = std::make_shared<const slam::Checkpoint>(pipeline_.Save())] {
@@ -201,7 +201,8 @@ Result<SessionEstimator::PieceValues> SessionEstimator::Load(std::string_view ma
   std::size_t next = 0;
   pipeline_.ForEachWaiting([&](const Scan& scan) {
     if (reader.Require(next < waiting.size(), "number of waiting scans"))
-      waiting_.emplace(&scan, Waiting{waiting[next++], scan.sequence, Clock::now()});
+      waiting_.emplace(
+          &scan, Waiting{{identity_.status.session.robot_id, waiting[next++], session_}, scan.sequence, Clock::now()});
   });
   reader.Require(next == waiting.size(), "number of waiting scans");
   if (auto record = record_.Load(reader, WaitingBySensor()); !record) return tl::unexpected(record.error());
@@ -212,7 +213,7 @@ Result<SessionEstimator::PieceValues> SessionEstimator::Load(std::string_view ma
 
 SessionRecord::WaitingScans SessionEstimator::WaitingBySensor() const {
   SessionRecord::WaitingScans waiting;
-  for (const auto& [scan, one] : waiting_) waiting[one.sensor_id].insert(one.sequence);
+  for (const auto& [scan, one] : waiting_) waiting[one.stream.sensor_id].insert(one.sequence);
   return waiting;
 }
 
@@ -230,7 +231,7 @@ void SessionEstimator::Used(const Scan& scan, const slam::ScanOutcome& outcome) 
   const PoseReport report = ReportOf(scan, outcome, identity_.status.session, session_, epoch_);
   if (!replaying_) outputs_.send(report);
   const std::chrono::duration<double, std::milli> latency = Clock::now() - waiting->second.received;
-  record_.ScanUsed(waiting->second.sensor_id, report, outcome.stamp, outcome.keyframe, latency.count());
+  record_.ScanUsed(waiting->second.stream, report, outcome.stamp, outcome.keyframe, latency.count());
   waiting_.erase(waiting);  // Only now: whatever fails before leaves it among those to be dropped.
   if (outcome.keyframe && !replaying_) {
     GridChange change = TakeGridChange();
@@ -241,7 +242,7 @@ void SessionEstimator::Used(const Scan& scan, const slam::ScanOutcome& outcome) 
 
 void SessionEstimator::Dropped(const Scan& scan, DropReason reason) {
   const auto waiting = waiting_.find(&scan);
-  record_.ScanDropped(waiting->second.sensor_id, scan.sequence, reason);
+  record_.ScanDropped(waiting->second.stream, scan.sequence, reason);
   waiting_.erase(waiting);
 }
 

@@ -69,7 +69,7 @@ class SessionEstimator {
 
  private:
   struct Waiting {
-    NameId sensor_id = 0;
+    StreamId stream;
     std::uint64_t sequence = 0;
     std::chrono::steady_clock::time_point received;
   };

@@ -71,33 +71,37 @@ bool SessionRecord::Has(NameId sensor_id) const {
   return streams_.contains(sensor_id);
 }
 
-SessionRecord::Arrival SessionRecord::ScanReceived(NameId sensor_id, std::uint64_t sequence) {
+std::uint64_t SessionRecord::NumberOf(SessionToken session, std::uint64_t sequence) const {
+  return session == status_.session.session ? sequence : 0;
+}
+
+SessionRecord::Arrival SessionRecord::ScanReceived(const StreamId& of, std::uint64_t sequence) {
   const MutexLock lock(mutex_);
-  Stream* const stream = Find(sensor_id);
+  Stream* const stream = Find(of.sensor_id);
   if (stream == nullptr) return Arrival::kUnknownSensor;
   stream->arrived = Clock::now();
   if (LeftAside(*stream, sequence)) return Arrival::kAside;
-  if (!stream->account.Received(sequence)) return Arrival::kDuplicate;
+  if (!stream->account.Received(NumberOf(of.session, sequence))) return Arrival::kDuplicate;
   stream->changed = true;
   return Arrival::kNew;
 }
 
-void SessionRecord::ScanDropped(NameId sensor_id, std::uint64_t sequence, DropReason reason) {
+void SessionRecord::ScanDropped(const StreamId& of, std::uint64_t sequence, DropReason reason) {
   const MutexLock lock(mutex_);
-  if (Stream* const stream = Find(sensor_id)) {
-    stream->account.Dropped(sequence, reason);
+  if (Stream* const stream = Find(of.sensor_id)) {
+    stream->account.Dropped(NumberOf(of.session, sequence), reason);
     stream->changed = true;
   }
 }
 
-void SessionRecord::ScanUsed(NameId sensor_id, const PoseReport& pose, Stamp path_stamp, bool keyframe,
+void SessionRecord::ScanUsed(const StreamId& of, const PoseReport& pose, Stamp path_stamp, bool keyframe,
                              double latency_ms) {
   const MutexLock lock(mutex_);
   status_.pose = pose;
   history_.Append({path_stamp, pose.T_map_robot, static_cast<float>(pose.score), pose.localized, pose.reason,
                    pose.covariance.cast<float>(), pose.T_map_odom});
-  if (Stream* const stream = Find(sensor_id)) {
-    stream->account.Used(pose.scan_sequence, pose.stamp, keyframe, latency_ms);
+  if (Stream* const stream = Find(of.sensor_id)) {
+    stream->account.Used(NumberOf(of.session, pose.scan_sequence), pose.stamp, keyframe, latency_ms);
     stream->changed = true;
   }
 }
@@ -111,23 +115,23 @@ SessionRecord::Arrival SessionRecord::ForeignScan(NameId sensor_id, DropReason r
   return Arrival::kNew;
 }
 
-bool SessionRecord::OdometryReceived(std::uint64_t sequence) {
+bool SessionRecord::OdometryReceived(SessionToken session, std::uint64_t sequence) {
   const MutexLock lock(mutex_);
   odometry_.arrived = Clock::now();
-  if (LeftAside(odometry_, sequence) || !odometry_.account.Received(sequence)) return false;
+  if (LeftAside(odometry_, sequence) || !odometry_.account.Received(NumberOf(session, sequence))) return false;
   odometry_.changed = true;
   return true;
 }
 
-void SessionRecord::OdometryUsed(std::uint64_t sequence, Stamp stamp) {
+void SessionRecord::OdometryUsed(SessionToken session, std::uint64_t sequence, Stamp stamp) {
   const MutexLock lock(mutex_);
-  odometry_.account.Used(sequence, stamp);
+  odometry_.account.Used(NumberOf(session, sequence), stamp);
   odometry_.changed = true;
 }
 
-void SessionRecord::OdometryDropped(std::uint64_t sequence, DropReason reason) {
+void SessionRecord::OdometryDropped(SessionToken session, std::uint64_t sequence, DropReason reason) {
   const MutexLock lock(mutex_);
-  odometry_.account.Dropped(sequence, reason);
+  odometry_.account.Dropped(NumberOf(session, sequence), reason);
   odometry_.changed = true;
 }
 

@@ -42,20 +42,22 @@ class SessionRecord {
   // A scan of the owner. Only kNew changes the record. kAside: after a restart, scans before this one must be sent
   // again first (robots.gap_wait_s). The client will send this one again after them.
   enum class Arrival { kNew, kDuplicate, kAside, kUnknownSensor };
-  Arrival ScanReceived(NameId sensor_id, std::uint64_t sequence);
-  void ScanDropped(NameId sensor_id, std::uint64_t sequence, DropReason reason);
+  // What an earlier owner sent, and the journal or the estimator holds, is counted without its number, which may be
+  // one of the owner's as well.
+  Arrival ScanReceived(const StreamId& stream, std::uint64_t sequence);
+  void ScanDropped(const StreamId& stream, std::uint64_t sequence, DropReason reason);
   // `path_stamp` is the estimator's time, which grows also where the robot's clock was set back: the path is kept by
   // it.
-  void ScanUsed(NameId sensor_id, const PoseReport& pose, Stamp path_stamp, bool keyframe, double latency_ms);
+  void ScanUsed(const StreamId& stream, const PoseReport& pose, Stamp path_stamp, bool keyframe, double latency_ms);
   // A scan of a client that does not own the session.
   Arrival ForeignScan(NameId sensor_id, DropReason reason);
 
   // Odometry of the owner. Returns false, and changes nothing, if the number was received before or must be sent again
   // later (see kAside).
-  [[nodiscard]] bool OdometryReceived(std::uint64_t sequence);
-  void OdometryUsed(std::uint64_t sequence, Stamp stamp);
+  [[nodiscard]] bool OdometryReceived(SessionToken session, std::uint64_t sequence);
+  void OdometryUsed(SessionToken session, std::uint64_t sequence, Stamp stamp);
   // kQueueFull: the sample was merged into its successor.
-  void OdometryDropped(std::uint64_t sequence, DropReason reason);
+  void OdometryDropped(SessionToken session, std::uint64_t sequence, DropReason reason);
 
   // Sets whether received samples are stored, and if not, the reason. Returns whether this is a change.
   bool SetStored(bool stored, const Status& why = {});
@@ -119,6 +121,8 @@ class SessionRecord {
   SessionState StateNow() const CAIRN_REQUIRES(mutex_);
   Ledger LedgerOf(const Stream& stream) const CAIRN_REQUIRES(mutex_);
   Stream* Find(NameId sensor_id) CAIRN_REQUIRES(mutex_);
+  // The number under which the present owner's account knows the sample: 0 if it is not one of the owner's.
+  std::uint64_t NumberOf(SessionToken session, std::uint64_t sequence) const CAIRN_REQUIRES(mutex_);
 
   const SessionId id_;
   const Clock::duration ledger_period_;

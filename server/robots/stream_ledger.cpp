@@ -72,7 +72,15 @@ void StreamLedger::Restored() {
 }
 
 bool StreamLedger::NextIs(std::uint64_t sequence) const {
-  return sequence <= ledger_.last_sequence + 1;
+  return !begun_ || sequence <= ledger_.last_sequence + 1;
+}
+
+void StreamLedger::NewClient() {
+  begun_ = false;
+  ledger_.last_sequence = ledger_.settled_through = ledger_.durable_through = 0;
+  waiting_.clear();
+  undurable_.clear();
+  gaps_.clear();
 }
 
 void StreamLedger::AdvanceDurable() {

@@ -72,8 +72,9 @@ class StreamLedger {
   [[nodiscard]] bool NextIs(std::uint64_t sequence) const;
 
   void Rename(const Ledger& names);
-  // The next sample belongs to another session of the robot.
-  void NewClient() { begun_ = false; }
+  // The next number belongs to another client, which counts for itself: nothing of what it sends has arrived yet.
+  // Samples of the earlier client that still wait are from now on Used or Dropped with the number 0.
+  void NewClient();
 
   // Scans used or dropped so far, for deciding when to publish.
   [[nodiscard]] std::uint64_t settled_count() const { return settled_count_; }

@@ -151,21 +151,23 @@ std::string SeedOfServer(int scans) {
   DriveOn(pipeline, 0, scans);
   std::string saved;
   pipeline.Save(saved);
-  server::SessionRecord record(5, server::testing::SampleSession(5).request, {});
+  const SessionRequest request = server::testing::SampleSession(5).request;
+  const StreamId stream{HashName(request.robot), HashName("laser"), request.session};
+  server::SessionRecord record(5, request, {});
   slam::StateWriter writer;
   Must(record.AddSensors({"laser"}), "a session with a sensor");
   for (std::uint64_t sequence = 1; sequence <= 2; ++sequence) {
-    static_cast<void>(record.ScanReceived(HashName("laser"), sequence));
+    static_cast<void>(record.ScanReceived(stream, sequence));
     PoseReport pose;
     pose.scan_sequence = sequence;
-    record.ScanUsed(HashName("laser"), pose, static_cast<Stamp>(10 * sequence), true, 1.0);
+    record.ScanUsed(stream, pose, static_cast<Stamp>(10 * sequence), true, 1.0);
   }
   std::vector<NameId> waiting;
   server::SessionRecord::WaitingScans numbers;
   pipeline.ForEachWaiting([&](const Scan&) {
     waiting.push_back(HashName("laser"));
     const std::uint64_t sequence = 2 + waiting.size();
-    static_cast<void>(record.ScanReceived(HashName("laser"), sequence));
+    static_cast<void>(record.ScanReceived(stream, sequence));
     numbers[HashName("laser")].insert(sequence);
   });
   writer(std::uint32_t{3}, std::uint64_t{kTokenBefore}, waiting);

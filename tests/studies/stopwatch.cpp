@@ -11,6 +11,7 @@
 #include <limits>
 #include <numeric>
 #include <sstream>
+#include <stdexcept>
 #include <string>
 
 namespace cairn::studies {
@@ -31,6 +32,18 @@ double CpuSecondsOf(pid_t pid) {
   double user = 0.0, system = 0.0;
   fields >> user >> system;
   return (user + system) / static_cast<double>(sysconf(_SC_CLK_TCK));
+}
+
+// Field VmRSS of /proc/PID/status.
+double ResidentMibOf(pid_t pid) {
+  std::ifstream status("/proc/" + std::to_string(pid) + "/status");
+  for (std::string word; status >> word;) {
+    if (word != "VmRSS:") continue;
+    double kib = 0.0;
+    status >> kib;
+    return kib / 1024.0;
+  }
+  throw std::runtime_error("process " + std::to_string(pid) + " has ended");
 }
 
 Distribution DistributionOf(std::vector<double> samples) {

@@ -38,6 +38,9 @@ class Stopwatch {
 // Processor time that another process has used so far. REQUIRES: there is such a process.
 [[nodiscard]] double CpuSecondsOf(pid_t pid);
 
+// Memory of another process that is in RAM now. Throws std::runtime_error if there is no such process.
+[[nodiscard]] double ResidentMibOf(pid_t pid);
+
 struct Distribution {
   double mean = 0.0, deviation = 0.0, median = 0.0, p95 = 0.0, p99 = 0.0, max = 0.0;
 };

@@ -4,6 +4,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdio>
+#include <cstdlib>
+#include <future>
+#include <memory>
+#include <thread>
+#include <vector>
+
 #include "common/wire/limits.h"
 #include "tests/common/wire/sample_values.h"
 #include "tests/loopback.h"
@@ -144,6 +151,35 @@ TEST_F(BusPair, MatchesAreAnnounced) {
     EXPECT_TRUE(Eventually([&] { return matched == 1; }));
   }
   EXPECT_TRUE(Eventually([&] { return matched == 0; }));
+}
+
+// Without a lock around it, Fast DDS 2.9 deadlocks here.
+TEST(Bus, ManyThreadsMakeAndDeleteEndpointsAtOnce) {
+  constexpr int kThreads = 40;
+  constexpr int kRounds = 5;
+  const auto far = MakeBus("far");
+  const auto readers = far->Subscribe<PoseReport>([](PoseReport&&) {}, {});
+  auto done = std::make_shared<std::promise<void>>();
+  auto finished = done->get_future();
+  std::thread([done, bus = std::shared_ptr<Bus>(MakeBus("near"))] {
+    std::vector<std::jthread> threads;
+    for (int i = 0; i < kThreads; ++i) {
+      threads.emplace_back([&bus = *bus] {
+        for (int round = 0; round < kRounds; ++round) {
+          const auto writer = bus.Advertise<PoseReport>();
+          const auto poses = bus.Subscribe<PoseReport>([](PoseReport&&) {}, {});
+          const auto ledgers = bus.Subscribe<Ledger>([](Ledger&&) {}, {});
+          EXPECT_TRUE(writer && poses && ledgers);
+        }
+      });
+    }
+    threads.clear();
+    done->set_value();
+  }).detach();
+  if (finished.wait_for(std::chrono::seconds(60)) == std::future_status::ready) return;
+  // The threads cannot be ended.
+  std::fputs("the threads are waiting for one another\n", stderr);
+  std::_Exit(1);
 }
 
 TEST(Bus, PublicationsAndSubscriptionsOutliveTheirBus) {

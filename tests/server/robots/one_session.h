@@ -21,6 +21,9 @@ namespace cairn::server::testing {
 
 inline constexpr ClientId kOwner = 7;
 
+// What the owner's laser sends, if the robot is called r1.
+inline const StreamId kScans{HashName("r1"), HashName("laser"), kOwner};
+
 // A client has one session, whose token is the client's id.
 inline SessionRequest RequestOf(const std::string& robot, ClientId client = kOwner) {
   return {.robot = robot,

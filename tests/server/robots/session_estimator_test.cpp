@@ -9,6 +9,7 @@ namespace {
 
 using testing::Dropped;
 using testing::kOwner;
+using testing::kScans;
 using testing::OdometryOf;
 using testing::RequestOf;
 using testing::RoomOdometry;
@@ -25,12 +26,12 @@ class SessionEstimatorTest : public ::testing::Test {
     return setup;
   }
   void HandleScan(Scan scan, ClientId client = kOwner) {
-    record_.ScanReceived(HashName("laser"), scan.sequence);
+    record_.ScanReceived({HashName("r1"), HashName("laser"), client}, scan.sequence);
     estimator_.Handle(ScanOf("r1", std::move(scan), client));
   }
   void Drive(int first, int last) {
     for (int step = first; step < last; ++step) {
-      EXPECT_TRUE(record_.OdometryReceived(RoomOdometry(step).sequence));
+      EXPECT_TRUE(record_.OdometryReceived(kOwner, RoomOdometry(step).sequence));
       estimator_.Handle(OdometryOf("r1", RoomOdometry(step)));
       HandleScan(RoomScan(step));
     }
@@ -58,7 +59,7 @@ class SessionEstimatorTest : public ::testing::Test {
 // The beams follow one another while the robot drives: another scan is estimated than the one that came.
 TEST_F(SessionEstimatorTest, ARollingScanIsUsedAsSoonAsItsLastBeamHasOdometry) {
   for (int step = 0; step < 6; ++step) {
-    EXPECT_TRUE(record_.OdometryReceived(RoomOdometry(step).sequence));
+    EXPECT_TRUE(record_.OdometryReceived(kOwner, RoomOdometry(step).sequence));
     estimator_.Handle(OdometryOf("r1", RoomOdometry(step)));
     Scan scan = RoomScan(step);
     scan.beam_period_s = 0.01 / static_cast<double>(scan.ranges_m.size());
@@ -205,7 +206,7 @@ TEST_F(SessionEstimatorTest, ACheckpointHoldsWhatWaitsInTheEstimatorAndNotWhatWa
   Drive(0, 20);
   for (int step = 20; step < 23; ++step) HandleScan(RoomScan(step));
   for (std::uint64_t sequence = 24; sequence <= 26; ++sequence)
-    EXPECT_EQ(record_.ScanReceived(HashName("laser"), sequence), SessionRecord::Arrival::kNew);
+    EXPECT_EQ(record_.ScanReceived(kScans, sequence), SessionRecord::Arrival::kNew);
   EXPECT_EQ(ledger().waiting, 6U);
   const auto save = estimator_.Save();
   ASSERT_TRUE(save);
@@ -237,12 +238,12 @@ TEST_F(SessionEstimatorTest, ACheckpointHoldsWhatWaitsInTheEstimatorAndNotWhatWa
   EXPECT_EQ(restored().waiting, 3U);
   for (int step = 20; step < 26; ++step) {
     if (step >= 23) {
-      EXPECT_EQ(record.ScanReceived(HashName("laser"), RoomScan(step).sequence), SessionRecord::Arrival::kNew);
+      EXPECT_EQ(record.ScanReceived(kScans, RoomScan(step).sequence), SessionRecord::Arrival::kNew);
       other.Handle(ScanOf("r1", RoomScan(step)));
       estimator_.Handle(ScanOf("r1", RoomScan(step)));
     }
-    EXPECT_TRUE(record.OdometryReceived(RoomOdometry(step).sequence));
-    EXPECT_TRUE(record_.OdometryReceived(RoomOdometry(step).sequence));
+    EXPECT_TRUE(record.OdometryReceived(kOwner, RoomOdometry(step).sequence));
+    EXPECT_TRUE(record_.OdometryReceived(kOwner, RoomOdometry(step).sequence));
     other.Handle(OdometryOf("r1", RoomOdometry(step)));
     estimator_.Handle(OdometryOf("r1", RoomOdometry(step)));
   }
@@ -257,7 +258,7 @@ TEST_F(SessionEstimatorTest, ACheckpointHoldsWhatWaitsInTheEstimatorAndNotWhatWa
 
 TEST_F(SessionEstimatorTest, DiscardAnswersWithoutTheEstimator) {
   Drive(0, 3);
-  record_.ScanReceived(HashName("laser"), 4);
+  record_.ScanReceived(kScans, 4);
   estimator_.Discard(ScanOf("r1", RoomScan(3)));
   estimator_.Discard(OdometryOf("r1", RoomOdometry(3)));
   bool done = false;

@@ -10,10 +10,12 @@ namespace {
 using std::chrono::milliseconds;
 using testing::Dropped;
 using testing::kOwner;
+using testing::kScans;
 using testing::RequestOf;
 using Urgency = SessionRecord::Urgency;
 
 const NameId kLaser = HashName("laser");
+const StreamId kSonar{HashName("r1"), HashName("sonar"), kOwner};
 
 class SessionRecordTest : public ::testing::Test {
  protected:
@@ -25,9 +27,9 @@ class SessionRecordTest : public ::testing::Test {
     return record_.TakeDueLedgers(start_ + milliseconds(at_ms), urgency);
   }
   void Receive(std::uint64_t sequence) {
-    EXPECT_EQ(record_.ScanReceived(kLaser, sequence), SessionRecord::Arrival::kNew);
+    EXPECT_EQ(record_.ScanReceived(kScans, sequence), SessionRecord::Arrival::kNew);
   }
-  void Settle(std::uint64_t sequence) { record_.ScanDropped(kLaser, sequence, DropReason::kEmpty); }
+  void Settle(std::uint64_t sequence) { record_.ScanDropped(kScans, sequence, DropReason::kEmpty); }
   Ledger ledger() const { return record_.snapshot().status.ledgers.at(0); }
 
   const SessionRecord::Clock::time_point start_ = SessionRecord::Clock::now();
@@ -77,22 +79,22 @@ TEST_F(SessionRecordTest, ALedgerThatCouldNotBeSentIsDueAgain) {
 TEST_F(SessionRecordTest, CountsWhatBecameOfScansAndOdometry) {
   Receive(1);
   Receive(2);
-  EXPECT_EQ(record_.ScanReceived(kLaser, 2), SessionRecord::Arrival::kDuplicate);
-  EXPECT_EQ(record_.ScanReceived(HashName("sonar"), 1), SessionRecord::Arrival::kUnknownSensor);
+  EXPECT_EQ(record_.ScanReceived(kScans, 2), SessionRecord::Arrival::kDuplicate);
+  EXPECT_EQ(record_.ScanReceived(kSonar, 1), SessionRecord::Arrival::kUnknownSensor);
   EXPECT_EQ(record_.ForeignScan(HashName("sonar"), DropReason::kNotOwner), SessionRecord::Arrival::kUnknownSensor);
   EXPECT_EQ(record_.ForeignScan(kLaser, DropReason::kNotOwner), SessionRecord::Arrival::kNew);
   PoseReport pose;
   pose.stamp = 10;
   pose.scan_sequence = 1;
   pose.score = 0.75;
-  record_.ScanUsed(kLaser, pose, 1010, true, 2.5);
+  record_.ScanUsed(kScans, pose, 1010, true, 2.5);
   Settle(2);
-  for (std::uint64_t i = 1; i <= 4; ++i) EXPECT_TRUE(record_.OdometryReceived(i));
-  EXPECT_FALSE(record_.OdometryReceived(2));
-  record_.OdometryDropped(1, DropReason::kStampWentBack);
-  record_.OdometryDropped(2, DropReason::kBadGeometry);
-  record_.OdometryDropped(3, DropReason::kQueueFull);
-  record_.OdometryUsed(4, 40);
+  for (std::uint64_t i = 1; i <= 4; ++i) EXPECT_TRUE(record_.OdometryReceived(kOwner, i));
+  EXPECT_FALSE(record_.OdometryReceived(kOwner, 2));
+  record_.OdometryDropped(kOwner, 1, DropReason::kStampWentBack);
+  record_.OdometryDropped(kOwner, 2, DropReason::kBadGeometry);
+  record_.OdometryDropped(kOwner, 3, DropReason::kQueueFull);
+  record_.OdometryUsed(kOwner, 4, 40);
   const Ledger counted = ledger();
   EXPECT_EQ(counted.received, 3U);
   EXPECT_EQ(counted.used, 1U);
@@ -114,13 +116,63 @@ TEST_F(SessionRecordTest, CountsWhatBecameOfScansAndOdometry) {
 TEST_F(SessionRecordTest, OnlyAnotherClientNumbersAnew) {
   Receive(5);
   record_.Resume(kOwner, kOwner);
-  EXPECT_EQ(record_.ScanReceived(kLaser, 5), SessionRecord::Arrival::kDuplicate);
+  EXPECT_EQ(record_.ScanReceived(kScans, 5), SessionRecord::Arrival::kDuplicate);
   EXPECT_EQ(record_.owner(), kOwner);
   record_.SetAlive(false);
   record_.Resume(9, 9);
   EXPECT_EQ(record_.owner(), 9U);
   EXPECT_TRUE(record_.alive());
-  Receive(1);
+  EXPECT_EQ(record_.ScanReceived({kScans.robot_id, kLaser, 9}, 1), SessionRecord::Arrival::kNew);
+  EXPECT_EQ(Dropped(ledger(), DropReason::kLostOnWire), 0U);
+}
+
+// The new client sent 50 scans, was told that all numbers up to 50 had settled, and left: they were those of the client
+// before it.
+TEST_F(SessionRecordTest, TheLedgerOfANewClientSaysNothingOfTheNumbersOfTheOneBefore) {
+  constexpr SessionToken kNext = 9;
+  const StreamId next{kScans.robot_id, kLaser, kNext};
+  static_cast<void>(record_.SetStored(true));
+  for (std::uint64_t number = 1; number <= 5; ++number) {
+    Receive(number);
+    EXPECT_TRUE(record_.OdometryReceived(kOwner, number));
+  }
+  Settle(1);
+  record_.Resume(kNext, kNext);
+  Ledger now = ledger();
+  EXPECT_EQ(now.session, kNext);
+  EXPECT_EQ(now.last_sequence, 0U);
+  EXPECT_EQ(now.settled_through, 0U);
+  EXPECT_EQ(now.durable_through, 0U);
+  EXPECT_EQ(now.received, 5U);
+  EXPECT_EQ(now.waiting, 4U);
+
+  // Both clients have a second and a third scan. That of the earlier one settles first.
+  for (std::uint64_t number = 1; number <= 3; ++number) {
+    EXPECT_EQ(record_.ScanReceived(next, number), SessionRecord::Arrival::kNew);
+    EXPECT_TRUE(record_.OdometryReceived(kNext, number));
+  }
+  for (std::uint64_t number = 2; number <= 5; ++number) {
+    Settle(number);
+    record_.OdometryUsed(kOwner, number, 10);
+  }
+  now = ledger();
+  EXPECT_EQ(now.settled_through, 0U);
+  EXPECT_EQ(now.last_sequence, 3U);
+  EXPECT_EQ(now.waiting, 3U);
+  EXPECT_EQ(Take(10'000, Urgency::kNow).front().settled_through, 0U) << "odometry";
+  record_.ScanDropped(next, 1, DropReason::kEmpty);
+  EXPECT_EQ(ledger().settled_through, 1U);
+}
+
+// In the journal, an entry of the earlier client may follow the change.
+TEST_F(SessionRecordTest, AScanOfAnEarlierClientIsCountedAndTakesNoNumberOfTheNext) {
+  constexpr SessionToken kNext = 9;
+  record_.Resume(kNext, kNext);
+  Receive(40);
+  Settle(40);
+  for (std::uint64_t number = 1; number <= 40; ++number)
+    EXPECT_EQ(record_.ScanReceived({kScans.robot_id, kLaser, kNext}, number), SessionRecord::Arrival::kNew) << number;
+  EXPECT_EQ(ledger().received, 41U);
   EXPECT_EQ(Dropped(ledger(), DropReason::kLostOnWire), 0U);
 }
 
@@ -153,7 +205,7 @@ TEST_F(SessionRecordTest, AnInheritedAccountGoesOnUnderTheStreamsNames) {
   EXPECT_TRUE(before.Received(3));
   before.Dropped(3, DropReason::kNoSession);
   record_.Inherit(kLaser, std::move(before));
-  EXPECT_EQ(record_.ScanReceived(kLaser, 3), SessionRecord::Arrival::kDuplicate);
+  EXPECT_EQ(record_.ScanReceived(kScans, 3), SessionRecord::Arrival::kDuplicate);
   EXPECT_EQ(ledger().robot, "r1");
   EXPECT_EQ(ledger().sensor, "laser");
   EXPECT_EQ(Dropped(ledger(), DropReason::kNoSession), 1U);

@@ -1,7 +1,6 @@
 #include "tests/studies/soak/soaked_server.h"
 
 #include <chrono>
-#include <fstream>
 #include <stdexcept>
 #include <string>
 
@@ -31,14 +30,7 @@ std::unique_ptr<ChildProcess> StartServer(std::int64_t domain, const std::filesy
 SoakedServer::SoakedServer() : server_(StartServer(test::TestDomain(), directory_ / "state")) {}
 
 double SoakedServer::resident_mib() const {
-  std::ifstream status("/proc/" + std::to_string(server_->pid()) + "/status");
-  for (std::string word; status >> word;) {
-    if (word != "VmRSS:") continue;
-    double kib = 0.0;
-    status >> kib;
-    return kib / 1024.0;
-  }
-  throw std::runtime_error("cairnd has ended: " + server_->Wait().output);
+  return ResidentMibOf(server_->pid());
 }
 
 double SoakedServer::disk_mib() const {

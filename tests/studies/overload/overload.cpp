@@ -1,0 +1,213 @@
+// cairn-study overload: robots stream to a live server while others ask too much of it: a reader of tiles that takes
+// none, 1,000 questions a second of eight clients, 200 robots that open sessions at once, and more jobs than can be
+// done. Does the time from scan to pose stay within twice that of a server without them, is every scan accounted for,
+// is each question answered or refused, and does the server's memory stay bounded? Times are wall-clock times. Those
+// who ask would be on other machines, so here they have the lowest priority.
+// --seconds: how long the robots drive in each part (60); --only alone|tiles|questions|sessions|jobs.
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <functional>
+#include <optional>
+#include <thread>
+
+#include "client/lib/robot_client.h"
+#include "tests/loopback.h"
+#include "tests/studies/fleet/live_server.h"
+#include "tests/studies/stopwatch.h"
+#include "tests/studies/study.h"
+
+namespace cairn::studies {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr int kRobots = 4;
+constexpr double kMostLatency = 2.0;       // Times that of the server alone.
+constexpr double kMostMemory_mib = 256.0;  // More than the server alone.
+constexpr int kClients = 8;
+constexpr auto kQuestionEvery = 8ms;  // Of each client.
+constexpr int kCrowd = 200;
+constexpr int kLowestPriority = 19;
+constexpr double kPatience_s = 60.0;
+
+// What those who ask were told.
+struct Answers {
+  std::atomic<std::uint64_t> ok{0}, busy{0}, other{0};
+
+  template <typename T>
+  void Count(const Result<T>& result) {
+    ++(result ? ok : result.error().code == StatusCode::kResourceExhausted ? busy : other);
+  }
+};
+
+using Crowd = std::function<void(const std::stop_token& stop, Answers& answers)>;
+
+std::unique_ptr<client::QueryClient> MakeQueries(wire::Bus& bus) {
+  auto queries = client::QueryClient::Create(bus, {.timeout_s = kPatience_s});
+  if (!queries) throw std::runtime_error(queries.error().message);
+  return std::move(*queries);
+}
+
+// Takes the first tile and then nothing more until the end.
+void ReadTilesSlowly(const std::stop_token& stop, Answers& answers) {
+  const auto bus = test::MakeBus("slow");
+  const auto tiles = bus->Subscribe<TileSample>(
+      [&](TileSample&&) {
+        ++answers.ok;
+        while (!stop.stop_requested()) std::this_thread::sleep_for(10ms);
+      },
+      {});
+  if (!tiles) throw std::runtime_error(tiles.error().message);
+  while (!stop.stop_requested()) std::this_thread::sleep_for(10ms);
+}
+
+void AskALot(const std::stop_token& stop, Answers& answers) {
+  std::vector<std::unique_ptr<wire::Bus>> buses;
+  std::vector<std::unique_ptr<client::QueryClient>> clients;
+  for (int i = 0; i < kClients; ++i) {
+    buses.push_back(test::MakeBus("asks" + std::to_string(i)));
+    clients.push_back(MakeQueries(*buses.back()));
+  }
+  std::vector<std::jthread> threads;
+  for (int i = 0; i < kClients; ++i) {
+    threads.emplace_back([&, i] {
+      client::QueryClient* const queries = clients[static_cast<std::size_t>(i)].get();
+      auto next = std::chrono::steady_clock::now();
+      for (int asked = 0; !stop.stop_requested(); ++asked) {
+        if (asked % 4 == 0) answers.Count(queries->Robots());
+        if (asked % 4 == 1) answers.Count(queries->Maps());
+        if (asked % 4 == 2) answers.Count(queries->Pose("robot" + std::to_string(1 + i % kRobots)));
+        if (asked % 4 == 3) answers.Count(queries->Tiles({.site = "load", .area = {}, .level = 3}));
+        next = std::max(next + kQuestionEvery, std::chrono::steady_clock::now() - 1s);  // What is late is made up for.
+        std::this_thread::sleep_until(next);
+      }
+    });
+  }
+}
+
+void OpenManySessions(const std::stop_token& stop, Answers& answers) {
+  const auto bus = test::MakeBus("crowd");
+  std::vector<std::unique_ptr<client::RobotClient>> opened(kCrowd);
+  {
+    std::vector<std::jthread> openers;
+    for (int i = 0; i < kCrowd; ++i) {
+      openers.emplace_back([&, i] {
+        SessionRequest request;
+        request.robot = "crowd" + std::to_string(i);
+        request.site = "crowd";
+        request.sensors = {"laser"};
+        auto client = client::RobotClient::Open(*bus, request, kPatience_s, {}, {});
+        answers.Count(client);
+        if (client) opened[static_cast<std::size_t>(i)] = std::move(*client);
+      });
+    }
+  }
+  while (!stop.stop_requested()) std::this_thread::sleep_for(10ms);
+}
+
+void SubmitManyJobs(const std::stop_token& stop, Answers& answers) {
+  const auto bus = test::MakeBus("jobs");
+  const auto queries = MakeQueries(*bus);
+  while (!stop.stop_requested()) answers.Count(queries->SubmitJob("load", JobKind::kSmooth));
+  const auto jobs = queries->Jobs();
+  if (!jobs) throw std::runtime_error(jobs.error().message);
+  for (const Job& job : *jobs)
+    if (!IsFinal(job.state)) (void)queries->CancelJob(job.id);  // It may have ended meanwhile.
+}
+
+struct Outcome {
+  nlohmann::json sim;
+  double most_mib = 0.0;
+  std::string fault;  // Of those who ask.
+};
+
+Outcome Drive(int seconds, const Crowd& crowd, Answers& answers) {
+  LiveServer server;
+  const auto robots = server.Start({"sim", "--site", "load", "--robots", std::to_string(kRobots), "--beams", "360",
+                                    "--hz", "10", "--world", "building", "--seconds", std::to_string(seconds)});
+  const auto streaming = [&] {
+    const auto known = server.queries().Robots();
+    return known && std::count_if(known->begin(), known->end(),
+                                  [](const RobotStatus& robot) { return robot.pose.stamp != 0; }) == kRobots;
+  };
+  while (!streaming() && robots->RunningAfter(50ms)) continue;
+  Outcome outcome;
+  std::jthread asks([&](const std::stop_token& stop) {
+    try {
+      // Threads inherit it (setpriority(2)), also those of the middleware.
+      setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kLowestPriority);
+      if (crowd) crowd(stop, answers);
+    } catch (const std::exception& error) {
+      outcome.fault = error.what();
+    }
+  });
+  while (robots->RunningAfter(100ms))
+    outcome.most_mib = std::max(outcome.most_mib, ResidentMibOf(std::stoi(server.pid())));
+  asks.request_stop();
+  asks.join();
+  outcome.sim = PrintedBy(robots->Wait(LiveServer::kDeadline));
+  if (const auto alive = server.queries().Ping(); !alive)
+    outcome.fault = "no answer afterwards: " + alive.error().message;
+  return outcome;
+}
+
+void RunOverload(StudyContext& context) {
+  struct Part {
+    const char* name;
+    const char* what;
+    Crowd crowd;
+    std::uint64_t least_answers;  // In ten seconds.
+  };
+  const std::vector<Part> parts = {
+      {"alone", "nobody", nullptr, 0},
+      {"tiles", "a reader of tiles that takes none", ReadTilesSlowly, 1},
+      {"questions", "eight clients, 1,000 questions a second", AskALot, 2000},
+      {"sessions", "200 robots that open sessions at once", OpenManySessions, kCrowd},
+      {"jobs", "a client that submits jobs without pause", SubmitManyJobs, 50},
+  };
+  Report& report = context.report;
+  const int seconds = context.seconds > 0.0 ? static_cast<int>(context.seconds) : context.Pick(60, 6);
+  report.Heading("Four robots at 10 Hz, 360 beams, and beside them");
+  Table table({"beside them", "scans", "used", "unexplained", "scan to pose p50 (ms)", "p99 (ms)", "times alone",
+               "memory, most (MiB)", "answered", "refused as too much", "other errors"});
+  std::optional<double> alone_ms, alone_mib;
+  for (const Part& part : parts) {
+    if (part.crowd && !context.Wants(part.name)) continue;  // All others are compared with the first.
+    Answers answers;
+    const Outcome outcome = Drive(seconds, part.crowd, answers);
+    std::uint64_t sent = 0, used = 0;
+    std::int64_t unexplained = 0;
+    for (const auto& robot : outcome.sim.at("robots")) {
+      sent += robot.at("sent").get<std::uint64_t>();
+      used += robot.at("used").get<std::uint64_t>();
+      unexplained += robot.at("unexplained").get<std::int64_t>();
+    }
+    const double p99_ms = outcome.sim.at("pose_latency_p99_ms");
+    if (!part.crowd) alone_ms = p99_ms, alone_mib = outcome.most_mib;
+    const double times = p99_ms / *alone_ms;
+    const auto count = [](std::uint64_t value) { return Count(static_cast<long long>(value)); };
+    table.Add({part.what, count(sent), count(used), Count(unexplained),
+               Number(outcome.sim.at("pose_latency_p50_ms"), 1), Number(p99_ms, 1), Number(times, 2),
+               Number(outcome.most_mib, 0), count(answers.ok), count(answers.busy), count(answers.other)});
+    context.report.Progress(std::string(part.what) + ": p99 " + Number(p99_ms, 1) + " ms");
+    const std::string who = std::string(part.what) + ": ";
+    report.Expect(outcome.fault.empty(), who + outcome.fault);
+    report.Expect(unexplained == 0 && sent == used, who + "scans were not used");
+    report.Expect(answers.other == 0, who + "errors other than RESOURCE_EXHAUSTED");
+    report.Expect(
+        10 * (answers.ok + answers.busy) >= part.least_answers * static_cast<std::uint64_t>(std::min(seconds, 10)),
+        who + "too few were answered");
+    report.Expect(outcome.most_mib <= *alone_mib + kMostMemory_mib, who + "the server took too much memory");
+    // A quick run is a test beside other tests, so its times say how busy the machine is.
+    report.Expect(context.quick || times <= kMostLatency, who + "p99 is " + Number(times, 2) + " times that alone");
+  }
+  report.Add(table, "overload");
+}
+
+const Registration kOverload("overload", "a live server while others ask too much of it", RunOverload);
+
+}  // namespace
+}  // namespace cairn::studies
