@@ -31,14 +31,13 @@ struct Borders {
 
 }  // namespace
 
-PointIndex::EmptyRings::EmptyRings() : rings_(static_cast<std::size_t>(kSide * kSide), kMost) {}
-
 void PointIndex::EmptyRings::Clear() {
   std::fill(rings_.begin(), rings_.end(), static_cast<std::uint8_t>(kMost));
 }
 
 // From now on the cell holds a point.
 void PointIndex::EmptyRings::Fill(std::int32_t x, std::int32_t y) {
+  if (rings_.empty()) rings_.assign(static_cast<std::size_t>(kSide * kSide), kMost);
   for (std::int32_t j = 1 - kMost; j < kMost; ++j) {
     std::uint8_t* row = rings_.data() + ((y + j) & (kSide - 1)) * kSide;
     for (std::int32_t i = 1 - kMost; i < kMost; ++i) {
@@ -129,6 +128,7 @@ void PointIndex::LookInto(std::int32_t x, std::int32_t y, const Eigen::Vector2d&
 }
 
 const SurfacePoint* PointIndex::Nearest(const Eigen::Vector2d& p, double max_distance_m) const {
+  if (points_.empty()) return nullptr;
   Best best{max_distance_m * max_distance_m};
   const std::int32_t x = CellOf(p.x()), y = CellOf(p.y());
   const Borders across(p.x(), x), along(p.y(), y);

@@ -57,14 +57,14 @@ class PointIndex {
   class EmptyRings {
    public:
     static constexpr std::int32_t kMost = 5;  // Where there are more, the number is this.
-    EmptyRings();
     void Clear();
     void Fill(std::int32_t x, std::int32_t y);
+    // REQUIRES: Fill was called before.
     [[nodiscard]] std::int32_t Around(std::int32_t x, std::int32_t y) const;
 
    private:
     static constexpr std::int32_t kSide = 512;
-    std::vector<std::uint8_t> rings_;
+    std::vector<std::uint8_t> rings_;  // Allocated by the first Fill: most robots of a fleet may never drive.
   };
 
   [[nodiscard]] std::size_t SlotOf(std::int32_t x, std::int32_t y) const;

@@ -46,6 +46,7 @@ TEST(PointIndex, FindsWhatLookingAtAllFinds) {
 // Places on the borders of cells, and points that are as near as each other.
 TEST(PointIndex, BordersOfCellsHideNothing) {
   PointIndex index;
+  EXPECT_EQ(index.Nearest({0.0, 0.0}, 5.0), nullptr);
   for (int i = -20; i <= 20; ++i) index.Add(At(0.1 * i, 0.0));
   for (int i = -20; i <= 20; ++i) {
     for (const double off_m : {-1e-9, 0.0, 1e-9}) {
