@@ -70,8 +70,8 @@ class Participant : public std::enable_shared_from_this<Participant> {
   fd::DomainParticipant* participant_ = nullptr;  // Set once by Create.
   fd::Subscriber* subscriber_ = nullptr;
   fd::Subscriber* robots_ = nullptr;  // For the partitions of all robots; only with security.
-  // Held while an endpoint is created or deleted: Fast DDS 2.9 can deadlock where several threads do so at once in one
-  // participant. Listeners must not create or delete endpoints.
+  // Held while an endpoint is created or deleted: Fast DDS 2.9 can deadlock or crash where several threads do so at
+  // once in one participant. Listeners must not create or delete endpoints.
   Mutex endpoints_;
   Mutex mutex_;
   std::map<std::string, fd::Publisher*> publishers_ CAIRN_GUARDED_BY(mutex_);  // By partition.

@@ -72,7 +72,7 @@ void StreamLedger::Restored() {
 }
 
 bool StreamLedger::NextIs(std::uint64_t sequence) const {
-  return !begun_ || sequence <= ledger_.last_sequence + 1;
+  return sequence <= ledger_.last_sequence + 1;
 }
 
 void StreamLedger::NewClient() {

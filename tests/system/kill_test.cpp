@@ -23,6 +23,7 @@ TEST(Kill, TwentyKillsChangeNothing) {
   options.most_up_s = 0.8;
   options.kills = 20;
   const KilledFleetOutcome outcome = RunKilledFleet(options);
+  SCOPED_TRACE(testing::PrintToString(outcome.accounts));
   EXPECT_GE(outcome.kills, 15);
   EXPECT_GT(outcome.sent, 500U);
   EXPECT_EQ(outcome.lost, 0U);

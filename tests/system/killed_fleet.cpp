@@ -145,6 +145,7 @@ class Drive {
     outcome.wrongly_localized = watcher->counts().beside_other;
     for (const auto& [robot, calm] : undisturbed) {
       const Result& other = killed.at(robot);
+      outcome.accounts.push_back(other.account);
       outcome.sent += other.sent;
       outcome.lost += calm.used > other.used ? calm.used - other.used : 0;
       outcome.doubled += other.used > calm.used ? other.used - calm.used : 0;
@@ -159,6 +160,7 @@ class Drive {
   struct Result {
     std::uint64_t sent = 0, used = 0;
     std::int64_t unexplained = 0;  // Scans sent and in no account; negative where more were counted than sent.
+    std::string account;
     Trajectory path;
   };
 
@@ -244,6 +246,7 @@ class Drive {
       result.sent = account.at("sent");
       result.used = account.at("used");
       result.unexplained = account.at("unexplained");
+      result.account = account.dump();
       const std::string file = (options_.directory / (state + "-" + robot + ".tum")).string();
       static_cast<void>(ObjectPrintedBy(Start({"path", robot, "-o", file})->Wait(kLongest)));
       result.path = OrThrow(ReadTum(file));

@@ -153,7 +153,7 @@ TEST_F(BusPair, MatchesAreAnnounced) {
   EXPECT_TRUE(Eventually([&] { return matched == 0; }));
 }
 
-// Without a lock around it, Fast DDS 2.9 deadlocks here.
+// Without a lock around it, Fast DDS 2.9 deadlocks or crashes here.
 TEST(Bus, ManyThreadsMakeAndDeleteEndpointsAtOnce) {
   constexpr int kThreads = 40;
   constexpr int kRounds = 5;
@@ -177,7 +177,7 @@ TEST(Bus, ManyThreadsMakeAndDeleteEndpointsAtOnce) {
     done->set_value();
   }).detach();
   if (finished.wait_for(std::chrono::seconds(60)) == std::future_status::ready) return;
-  // The threads cannot be ended.
+  // Threads that wait for one another for ever can only be ended with the process.
   std::fputs("the threads are waiting for one another\n", stderr);
   std::_Exit(1);
 }

@@ -57,6 +57,35 @@ TEST_F(SessionRecordTest, ABurstOfSettledScansIsDueAtOnce) {
   EXPECT_EQ(due[0].site, "lab");
 }
 
+// What the robot sends at this moment may arrive before what it sends again.
+TEST_F(SessionRecordTest, AfterARestartWhatIsSentAgainComesFirst) {
+  for (std::uint64_t number = 1; number <= 3; ++number) {
+    Receive(number);
+    EXPECT_TRUE(record_.OdometryReceived(kOwner, number));
+  }
+  record_.Restored();
+  ASSERT_TRUE(record_.Resume(kOwner, kOwner));
+  EXPECT_EQ(record_.ScanReceived(kScans, 7), SessionRecord::Arrival::kAside);
+  EXPECT_FALSE(record_.OdometryReceived(kOwner, 7));
+  EXPECT_EQ(record_.ScanReceived(kScans, 3), SessionRecord::Arrival::kDuplicate);
+  for (std::uint64_t number = 4; number <= 7; ++number) {
+    Receive(number);
+    EXPECT_TRUE(record_.OdometryReceived(kOwner, number)) << number;
+  }
+  EXPECT_EQ(Dropped(ledger(), DropReason::kLostOnWire), 0U);
+}
+
+TEST_F(SessionRecordTest, AfterARestartBeforeTheFirstSampleTheFirstOneComesFirst) {
+  record_.Restored();
+  ASSERT_TRUE(record_.Resume(kOwner, kOwner));
+  EXPECT_EQ(record_.ScanReceived(kScans, 5), SessionRecord::Arrival::kAside);
+  EXPECT_FALSE(record_.OdometryReceived(kOwner, 5));
+  for (std::uint64_t number = 1; number <= 5; ++number) {
+    Receive(number);
+    EXPECT_TRUE(record_.OdometryReceived(kOwner, number)) << number;
+  }
+}
+
 // A client that replays a log waits for the ledger before it sends more; the end of a burst must not wait for the
 // clock.
 TEST_F(SessionRecordTest, ADrainedQueueIsDueAtOnceWhereAScanWasSettled) {
