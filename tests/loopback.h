@@ -9,12 +9,12 @@
 #include <functional>
 #include <memory>
 #include <mutex>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "common/wire/bus.h"
 #include "tests/eventually.h"
+#include "tests/must.h"
 #include "tests/test_domain.h"
 
 namespace cairn::test {
@@ -29,19 +29,7 @@ inline WireOptions LoopbackOptions() {
 }
 
 inline std::unique_ptr<Bus> MakeBus(const std::string& name, const WireOptions& options = LoopbackOptions()) {
-  Result<std::unique_ptr<Bus>> bus = Bus::Create(options, name);
-  if (!bus) throw std::runtime_error(bus.error().message);
-  return std::move(*bus);
-}
-
-inline void Must(const Result<void>& result) {
-  if (!result) throw std::runtime_error(result.error().message);
-}
-
-template <typename T>
-T Must(Result<T> result) {
-  if (!result) throw std::runtime_error(result.error().message);
-  return std::move(*result);
+  return Must(Bus::Create(options, name));
 }
 
 // Collects what a subscription receives.

@@ -18,6 +18,7 @@
 #include "common/wire/bus.h"
 #include "tests/child_process.h"
 #include "tests/eventually.h"
+#include "tests/must.h"
 #include "tests/test_domain.h"
 
 namespace cairn::test {
@@ -42,12 +43,6 @@ json ObjectPrintedBy(const ChildProcess::Outcome& outcome) {
   return object;
 }
 
-template <typename T>
-T OrThrow(Result<T> result) {
-  if (!result) throw std::runtime_error(result.error().message);
-  return std::move(*result);
-}
-
 using Trajectories = std::map<std::string, Trajectory>;
 
 // Everything that is told of the robots' poses, compared with the truth and with what another server told.
@@ -63,8 +58,8 @@ class PoseWatcher {
   PoseWatcher(Trajectories truth, Trajectories other) : truth_(std::move(truth)), other_(std::move(other)) {
     wire::WireOptions options;
     options.domain = TestDomain();
-    bus_ = OrThrow(wire::Bus::Create(options, "watcher"));
-    poses_ = OrThrow(bus_->Subscribe<PoseReport>([this](PoseReport&& pose) { Take(pose); }, {}));
+    bus_ = Must(wire::Bus::Create(options, "watcher"));
+    poses_ = Must(bus_->Subscribe<PoseReport>([this](PoseReport&& pose) { Take(pose); }, {}));
   }
   ~PoseWatcher() { poses_.reset(); }
 
@@ -127,7 +122,7 @@ class Drive {
     MakeLogs();
     for (int i = 1; i <= options.robots; ++i) {
       const std::string robot = "robot" + std::to_string(i);
-      truth_[robot] = OrThrow(ReadTum(options_.directory / "truth" / (robot + ".tum")));
+      truth_[robot] = Must(ReadTum(options_.directory / "truth" / (robot + ".tum")));
     }
   }
 
@@ -249,7 +244,7 @@ class Drive {
       result.account = account.dump();
       const std::string file = (options_.directory / (state + "-" + robot + ".tum")).string();
       static_cast<void>(ObjectPrintedBy(Start({"path", robot, "-o", file})->Wait(kLongest)));
-      result.path = OrThrow(ReadTum(file));
+      result.path = Must(ReadTum(file));
     }
     server_->Signal(SIGTERM);
     if (const auto ended = server_->Wait(); ended.exit_code != 0) throw std::runtime_error("cairnd: " + ended.output);

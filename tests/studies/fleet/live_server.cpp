@@ -4,21 +4,16 @@
 #include <stdexcept>
 #include <utility>
 
+#include "tests/must.h"
 #include "tests/test_domain.h"
 
 namespace cairn::studies {
 namespace {
 
-template <typename T>
-T OrThrow(Result<T> result) {
-  if (!result) throw std::runtime_error(result.error().message);
-  return std::move(*result);
-}
-
 std::unique_ptr<wire::Bus> JoinDomain() {
   wire::WireOptions options;
   options.domain = test::TestDomain();
-  return OrThrow(wire::Bus::Create(options, "cairn-study"));
+  return test::Must(wire::Bus::Create(options, "cairn-study"));
 }
 
 }  // namespace
@@ -44,7 +39,7 @@ LiveServer::LiveServer()
     : server_({ProgramPath("cairnd"), "--domain", std::to_string(test::TestDomain()), "--state", ":memory:", "--set",
                "server.log_level=warn"}),
       bus_(JoinDomain()),
-      queries_(OrThrow(client::QueryClient::Create(*bus_, {.timeout_s = 20.0}))) {
+      queries_(test::Must(client::QueryClient::Create(*bus_, {.timeout_s = 20.0}))) {
   if (const auto version = queries_->Ping(); !version) throw std::runtime_error("cairnd: " + version.error().message);
 }
 

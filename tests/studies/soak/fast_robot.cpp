@@ -1,8 +1,9 @@
 #include "tests/studies/soak/fast_robot.h"
 
 #include <algorithm>
-#include <stdexcept>
 #include <utility>
+
+#include "tests/must.h"
 
 namespace cairn::studies {
 namespace {
@@ -11,12 +12,6 @@ namespace {
 // of the server and not that of a queue.
 constexpr std::uint64_t kWindow = 2;
 constexpr double kPatience_s = 60.0;
-
-template <typename T>
-T OrThrow(Result<T> result) {
-  if (!result) throw std::runtime_error(result.error().message);
-  if constexpr (!std::is_void_v<T>) return std::move(*result);
-}
 
 Stamp StampOf(const LogRecord& record) {
   return std::visit([](const auto& value) { return value.stamp; }, record);
@@ -37,7 +32,7 @@ FastRobot::FastRobot(wire::Bus& bus, const std::string& name, sim::Fleet fleet, 
   client::RobotClientOptions options;
   options.window = kWindow;
   options.send_timeout_s = kPatience_s;
-  client_ = OrThrow(client::RobotClient::Open(bus, request, kPatience_s, std::move(callbacks), options));
+  client_ = test::Must(client::RobotClient::Open(bus, request, kPatience_s, std::move(callbacks), options));
 }
 
 void FastRobot::OnPose(const PoseReport& pose) {
@@ -53,14 +48,14 @@ void FastRobot::Send(LogRecord&& record) {
   now_ = StampOf(record);
   if (const auto* odometry = std::get_if<Odometry>(&record)) {
     T_odom_robot_ = odometry->T_odom_robot;
-    return OrThrow(client_->Publish(*odometry));
+    return test::Must(client_->Publish(*odometry));
   }
   last_scan_ = std::get<Scan>(std::move(record));
   {
     const MutexLock lock(mutex_);
     departures_[now_] = Clock::now();
   }
-  OrThrow(client_->Publish(*last_scan_));
+  test::Must(client_->Publish(*last_scan_));
   ++scans_;
 }
 
@@ -88,7 +83,7 @@ void FastRobot::Stand(double seconds) {
 }
 
 Distribution FastRobot::TakeLatencies() {
-  OrThrow(client_->WaitSettled(kPatience_s));
+  test::Must(client_->WaitSettled(kPatience_s));
   const MutexLock lock(mutex_);
   departures_.clear();
   return DistributionOf(std::exchange(latency_ms_, {}));

@@ -36,6 +36,8 @@ struct Sample {
   double p99_ms = 0.0;
   double cpu_ms = 0.0;  // Processor time of the server for each scan.
   double restart_s = 0.0;
+  double checkpoint_mib = 0.0;  // What is written anew each time.
+  double pieces_mib = 0.0;      // What is written once.
   double keyframes = 0.0;
   double dropped = 0.0;
 };
@@ -94,7 +96,10 @@ Sample Look(const SoakedServer& server, FastRobot& robot, Sample sample) {
   sample.p99_ms = latency_ms.p99;
   sample.keyframes = static_cast<double>(ledger.keyframes);
   sample.dropped = static_cast<double>(ledger.dropped_total());
-  sample.restart_s = server.RestartSeconds();
+  const SoakedServer::Restart restart = server.RestartOnCopy();
+  sample.restart_s = restart.seconds;
+  sample.checkpoint_mib = restart.checkpoint_mib;
+  sample.pieces_mib = restart.pieces_mib;
   return sample;
 }
 
@@ -116,7 +121,8 @@ std::vector<Sample> Watch(const StudyContext& context, const Phase& phase, const
     samples.push_back(Look(server, robot, since));
     const Sample& now = samples.back();
     context.report.Progress(Number(now.hours, 2) + " h: " + Number(now.resident_mib, 1) + " to " +
-                            Number(now.peak_mib, 1) + " MiB, disk " + Number(now.disk_mib, 1) +
+                            Number(now.peak_mib, 1) + " MiB, disk " + Number(now.disk_mib, 1) + " MiB, checkpoint " +
+                            Number(now.checkpoint_mib, 1) + " + " + Number(now.pieces_mib, 1) +
                             " MiB, scan to pose p50 " + Number(now.p50_ms, 2) + " ms, p99 " + Number(now.p99_ms, 2) +
                             " ms, processor " + Number(now.cpu_ms, 2) + " ms, restart " + Number(now.restart_s, 2) +
                             " s");
@@ -141,6 +147,8 @@ void Soak(StudyContext& context, const Phase& phase, const SoakedServer& server,
       {"memory", "MiB", &Sample::resident_mib, phase.most_mib_per_hour, 1},
       {"peak of memory", "MiB", &Sample::peak_mib, 5.0 * phase.most_mib_per_hour, 1},
       {"disk", "MiB", &Sample::disk_mib, kMostDisk_mib_per_hour, 1},
+      {"checkpoint", "MiB", &Sample::checkpoint_mib, kMostDisk_mib_per_hour, 1},
+      {"pieces of the checkpoint", "MiB", &Sample::pieces_mib, kMostDisk_mib_per_hour, 1},
       {"latency p50", "ms", &Sample::p50_ms, 0.1, 2, true},
       {"latency p99", "ms", &Sample::p99_ms, 1.0, 2, true},
       {"processor time of a scan", "ms", &Sample::cpu_ms, 0.1, 2, true},

@@ -19,8 +19,12 @@ class SoakedServer {
   [[nodiscard]] double disk_mib() const;
   [[nodiscard]] double cpu_s() const;
   // Copies the state as a SIGKILL would leave it at this moment, and starts a server on the copy, in another domain.
-  // Seconds until that is ready.
-  [[nodiscard]] double RestartSeconds() const;
+  struct Restart {
+    double seconds = 0.0;         // Until it is ready.
+    double checkpoint_mib = 0.0;  // The main part of the first session's checkpoint, which is written anew each time.
+    double pieces_mib = 0.0;      // Its pieces, each of which is written once.
+  };
+  [[nodiscard]] Restart RestartOnCopy() const;
 
  private:
   const TempDirectory directory_;
