@@ -106,8 +106,9 @@ Result<void> RobotStream::Send(LogRecord&& record) {
 }
 
 void RobotStream::Settle() {
-  // Scans that are not settled in time appear as waiting or unexplained in the account.
-  (void)client_->WaitSettled(timeout_s_);
+  // Scans that are not settled in time appear as waiting or unexplained in the account. A server that cannot store says
+  // so itself.
+  if (client_->WaitSettled(timeout_s_)) (void)client_->WaitSafe(timeout_s_);
 }
 
 Result<void> RobotStream::End() {

@@ -40,7 +40,8 @@ class RobotStream {
   // Waits for room in the window; fails if the server settles nothing within the program's timeout, says that it
   // stops, or has been away for that long.
   [[nodiscard]] Result<void> Send(LogRecord&& record);
-  // Waits until everything sent is settled, or the program's timeout has passed: account() tells what is left.
+  // Waits until everything sent is settled and then until it is stored, each at most for the program's timeout:
+  // account() tells what is left.
   void Settle();
   // Ends the session for good.
   [[nodiscard]] Result<void> End();

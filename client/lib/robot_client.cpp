@@ -231,6 +231,25 @@ Result<void> RobotClient::WaitSettled(double timeout_s) {
   return {};
 }
 
+Result<void> RobotClient::WaitSafe(double timeout_s) {
+  const auto deadline = DeadlineAfter(timeout_s);
+  const MutexLock lock(mutex_);
+  for (const auto& [sensor, stream] : streams_) {
+    while (!IsSafe(stream)) {
+      if (Clock::now() >= deadline)
+        return Fail(StatusCode::kDeadlineExceeded, fmt::format("not everything is safe within {:.1f} s", timeout_s));
+      changed_.WaitUntil(mutex_, deadline);
+    }
+  }
+  return {};
+}
+
+bool RobotClient::IsSafe(const Stream& stream) const {
+  if (stream.window.sent() == 0) return true;
+  if (!stream.ledger || stream.ledger->session != request_.session) return false;
+  return (state_->durable ? stream.ledger->durable_through : stream.ledger->settled_through) >= stream.window.sent();
+}
+
 Result<void> RobotClient::End(double timeout_s) {
   {
     const MutexLock lock(mutex_);

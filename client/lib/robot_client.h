@@ -67,6 +67,10 @@ class RobotClient {
 
   // Waits until the server has settled every scan sent (kDeadlineExceeded).
   [[nodiscard]] Result<void> WaitSettled(double timeout_s);
+  // Waits until the server will not need anything of what was sent again (kDeadlineExceeded): scans and odometry are on
+  // its disk, or settled if it stores nothing. A program that ends earlier may leave a server that is killed at this
+  // moment without its last samples.
+  [[nodiscard]] Result<void> WaitSafe(double timeout_s);
   // Ends the session for good, and waits until the server confirms it.
   [[nodiscard]] Result<void> End(double timeout_s = 2.0);
 
@@ -126,6 +130,7 @@ class RobotClient {
 
   [[nodiscard]] Result<void> AwaitRoom(const Stream& stream) CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool Answered() const CAIRN_REQUIRES(mutex_);
+  [[nodiscard]] bool IsSafe(const Stream& stream) const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool Streaming() const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool ReadyToReopen() const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] std::optional<Pose2> StartOfNextSession() const CAIRN_REQUIRES(mutex_);

@@ -140,13 +140,15 @@ class Drive {
     outcome.wrongly_localized = watcher->counts().beside_other;
     for (const auto& [robot, calm] : undisturbed) {
       const Result& other = killed.at(robot);
-      outcome.accounts.push_back(other.account);
       outcome.sent += other.sent;
       outcome.lost += calm.used > other.used ? calm.used - other.used : 0;
       outcome.doubled += other.used > calm.used ? other.used - calm.used : 0;
       outcome.lost += static_cast<std::uint64_t>(std::max<std::int64_t>(0, other.unexplained));
       outcome.doubled += static_cast<std::uint64_t>(std::max<std::int64_t>(0, -other.unexplained));
-      outcome.paths_that_differ += SamePath(calm.path, other.path) ? 0 : 1;
+      const std::string difference = DifferenceOf(calm.path, other.path);
+      outcome.paths_that_differ += difference.empty() ? 0 : 1;
+      if (!difference.empty() || other.used != calm.used || other.unexplained != 0)
+        outcome.differences.push_back(robot + ": " + difference + "; " + other.account);
     }
     return outcome;
   }
@@ -159,10 +161,16 @@ class Drive {
     Trajectory path;
   };
 
-  static bool SamePath(const Trajectory& a, const Trajectory& b) {
-    return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const StampedPose& x, const StampedPose& y) {
-      return x.stamp == y.stamp && x.T_map_robot == y.T_map_robot;
-    });
+  // Empty: the paths are the same to the last bit.
+  static std::string DifferenceOf(const Trajectory& a, const Trajectory& b) {
+    const auto [x, y] =
+        std::mismatch(a.begin(), a.end(), b.begin(), b.end(), [](const StampedPose& p, const StampedPose& q) {
+          return p.stamp == q.stamp && p.T_map_robot == q.T_map_robot;
+        });
+    if (x == a.end() && y == b.end()) return {};
+    if (x == a.end() || y == b.end()) return fmt::format("paths of {} and {} poses", a.size(), b.size());
+    return fmt::format("paths of {} and {} poses differ from pose {} on, there by {:.6f} m", a.size(), b.size(),
+                       x - a.begin(), (x->T_map_robot.translation() - y->T_map_robot.translation()).norm());
   }
 
   [[nodiscard]] std::string Domain() const { return std::to_string(TestDomain()); }
@@ -241,7 +249,7 @@ class Drive {
       result.sent = account.at("sent");
       result.used = account.at("used");
       result.unexplained = account.at("unexplained");
-      result.account = account.dump();
+      result.account = ObjectPrintedBy(Start({"status", robot})->Wait(kLongest)).dump();
       const std::string file = (options_.directory / (state + "-" + robot + ".tum")).string();
       static_cast<void>(ObjectPrintedBy(Start({"path", robot, "-o", file})->Wait(kLongest)));
       result.path = Must(ReadTum(file));

@@ -32,10 +32,11 @@ struct KilledFleetOutcome {
   // Of these, called localized and more than 0.5 m beside the truth; and the same of the undisturbed server. Where a
   // robot drives for long before it sees a place again, the error of its estimate alone is as large.
   std::uint64_t beside_truth = 0, undisturbed_poses = 0, undisturbed_beside_truth = 0;
-  int paths_that_differ = 0;          // Robots whose path is not the undisturbed one to the last bit.
-  std::vector<std::string> accounts;  // What the client of each robot printed at the end of the drive with kills.
-  std::vector<double> ready_s;        // From each start after a kill until the server answers.
-  std::vector<double> tracking_s;     // ... until all robots that still drive get poses from it.
+  int paths_that_differ = 0;  // Robots whose path is not the undisturbed one to the last bit.
+  // About each robot with a loss, a scan used twice or another path: what differs, and the account of its samples.
+  std::vector<std::string> differences;
+  std::vector<double> ready_s;     // From each start after a kill until the server answers.
+  std::vector<double> tracking_s;  // ... until all robots that still drive get poses from it.
 };
 
 // Throws std::runtime_error where a program cannot be started or fails.

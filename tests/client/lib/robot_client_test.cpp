@@ -262,6 +262,28 @@ TEST_F(RobotClientTest, IsToldThatAnotherClientHasTakenTheRobotOver) {
 }
 
 // A server that stores: what is settled but not on disk goes again, and only that.
+// A program that ended when its scans were settled left a server that was killed right then without the last of them.
+TEST_F(RobotClientTest, WaitsUntilScansAndOdometryAreStored) {
+  server_->SetDurable(true);
+  const auto client = Open();
+  ASSERT_TRUE(client->WaitSafe(0.0)) << "nothing was sent";
+  ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = 0, .T_odom_robot = {}}));
+  ASSERT_TRUE(client->Publish(SomeScan()));
+  ASSERT_TRUE(client->Publish(SomeScan()));
+  ASSERT_TRUE(client->WaitSettled(20.0));
+  EXPECT_EQ(client->WaitSafe(0.1).error().code, StatusCode::kDeadlineExceeded);
+  server_->SetDurableThrough(1);
+  EXPECT_EQ(client->WaitSafe(0.1).error().code, StatusCode::kDeadlineExceeded);
+  server_->SetDurableThrough(2);
+  EXPECT_TRUE(client->WaitSafe(20.0));
+}
+
+TEST_F(RobotClientTest, WhatIsSettledIsSafeIfTheServerStoresNothing) {
+  const auto client = Open();
+  ASSERT_TRUE(client->Publish(SomeScan()));
+  EXPECT_TRUE(client->WaitSafe(20.0));
+}
+
 TEST_F(RobotClientTest, SendsAgainWhatIsNotDurable) {
   server_->SetDurable(true);
   const auto client = Open();

@@ -16,6 +16,16 @@ std::unique_ptr<wire::Bus> JoinDomain() {
   return test::Must(wire::Bus::Create(options, "cairn-study"));
 }
 
+std::vector<std::string> CommandLine(const std::vector<std::string>& arguments,
+                                     const std::vector<std::string>& environment) {
+  std::vector<std::string> line = {"/usr/bin/env"};
+  line.insert(line.end(), environment.begin(), environment.end());
+  line.insert(line.end(), {ProgramPath("cairnd"), "--domain", std::to_string(test::TestDomain()), "--state",
+                           ":memory:", "--set", "server.log_level=warn"});
+  line.insert(line.end(), arguments.begin(), arguments.end());
+  return line;
+}
+
 }  // namespace
 
 std::string ProgramPath(const std::string& name) {
@@ -35,9 +45,8 @@ nlohmann::json PrintedBy(const ChildProcess::Outcome& outcome) {
   return object;
 }
 
-LiveServer::LiveServer()
-    : server_({ProgramPath("cairnd"), "--domain", std::to_string(test::TestDomain()), "--state", ":memory:", "--set",
-               "server.log_level=warn"}),
+LiveServer::LiveServer(const std::vector<std::string>& arguments, const std::vector<std::string>& environment)
+    : server_(CommandLine(arguments, environment)),
       bus_(JoinDomain()),
       queries_(test::Must(client::QueryClient::Create(*bus_, {.timeout_s = 20.0}))) {
   if (const auto version = queries_->Ping(); !version) throw std::runtime_error("cairnd: " + version.error().message);

@@ -24,7 +24,8 @@ namespace cairn::studies {
 
 class LiveServer {
  public:
-  LiveServer();  // Returns once it answers.
+  // Returns once it answers. `arguments` of cairnd come last; `environment`: NAME=VALUE, beside this program's own.
+  explicit LiveServer(const std::vector<std::string>& arguments = {}, const std::vector<std::string>& environment = {});
 
   [[nodiscard]] client::QueryClient& queries() { return *queries_; }
   // Starts `cairn ARGUMENTS --json`. PrintedBy(its outcome) is its output.

@@ -55,6 +55,7 @@ void StudyKills(StudyContext& context) {
     const test::KilledFleetOutcome one = test::RunKilledFleet(options);
     if (one.kills == 0) return context.report.Fault("no kill was possible");
     Add(all, one);
+    for (const std::string& difference : one.differences) context.report.Progress(difference);
     context.report.Progress(Count(all.kills) + " kills, " + Count(static_cast<long long>(all.lost)) + " scans lost");
   }
   Report& report = context.report;

@@ -3,7 +3,8 @@
 // than can be done. Does the time from scan to pose stay within twice that of a server without them, is every scan
 // accounted for, is each question answered or refused, and does the server's memory stay bounded? Times are wall-clock
 // times. Those who ask would be on other machines, so here they have the lowest priority.
-// --seconds: how long the robots drive in each part (60); --only alone|tiles|questions|sessions|jobs.
+// And, in a part of its own, estimators that are too slow for what the robots send.
+// --seconds: how long the robots drive in each part (60; slow: 300); --only alone|tiles|questions|sessions|jobs|slow.
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -19,6 +20,7 @@
 #include "client/lib/query_client.h"
 #include "tests/loopback.h"
 #include "tests/studies/fleet/live_server.h"
+#include "tests/studies/overload/slow_estimator.h"
 #include "tests/studies/stopwatch.h"
 #include "tests/studies/study.h"
 
@@ -197,7 +199,7 @@ Outcome Drive(int seconds, const Crowd& crowd, int crowd_priority, Answers& answ
   return outcome;
 }
 
-void RunOverload(StudyContext& context) {
+void StudyCrowds(StudyContext& context) {
   struct Part {
     const char* name;
     const char* what;
@@ -211,6 +213,7 @@ void RunOverload(StudyContext& context) {
       {"sessions", "200 robots that open sessions at once", OpenManySessions, kCrowd},
       {"jobs", "a client that submits jobs without pause", SubmitManyJobs, 50},
   };
+  if (std::ranges::none_of(parts, [&](const Part& part) { return context.Wants(part.name); })) return;
   Report& report = context.report;
   const int seconds = context.seconds > 0.0 ? static_cast<int>(context.seconds) : context.Pick(60, 3);
   // A quick run is a test beside other tests. These would leave no time to those with the lowest priority, and measured
@@ -249,6 +252,11 @@ void RunOverload(StudyContext& context) {
     report.Expect(context.quick || times <= kMostLatency, who + "p99 is " + Number(times, 2) + " times that alone");
   }
   report.Add(table, "overload");
+}
+
+void RunOverload(StudyContext& context) {
+  StudyCrowds(context);
+  if (context.Wants("slow")) StudySlowEstimator(context);
 }
 
 const Registration kOverload("overload", "a live server while others ask too much of it", RunOverload);
