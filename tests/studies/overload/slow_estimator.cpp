@@ -37,9 +37,9 @@ double SecondsBetween(std::chrono::steady_clock::time_point from, std::chrono::s
 }
 
 // What the service manager of the system hears from a service (sd_notify(3)).
-class ServiceManager {
+class NotifySocket {
  public:
-  ServiceManager() : name_("cairn-study-" + std::to_string(getpid())), socket_(socket(AF_UNIX, SOCK_DGRAM, 0)) {
+  NotifySocket() : name_("cairn-study-" + std::to_string(getpid())), socket_(socket(AF_UNIX, SOCK_DGRAM, 0)) {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     name_.copy(address.sun_path + 1, sizeof(address.sun_path) - 2);  // The name of no file (unix(7)).
@@ -50,7 +50,7 @@ class ServiceManager {
       throw std::runtime_error("no socket of a service manager");
     listener_ = std::jthread([this](const std::stop_token& stop) { Listen(stop); });
   }
-  ~ServiceManager() {
+  ~NotifySocket() {
     listener_ = {};
     close(socket_);
   }
@@ -103,13 +103,13 @@ void StudySlowEstimator(StudyContext& context) {
   Report& report = context.report;
   const int seconds = context.seconds > 0.0 ? static_cast<int>(context.seconds) : context.Pick(300, 3);
   report.Heading("Twelve robots at 5 Hz, 360 beams; the filter dpslam on one thread");
-  ServiceManager manager;
-  LiveServer server({"--set", "slam.filter=dpslam", "--set", "server.threads=1"}, manager.Environment());
+  NotifySocket socket;
+  LiveServer server({"--set", "slam.filter=dpslam", "--set", "server.threads=1"}, socket.Environment());
   const auto robots =
       server.Start({"sim", "--site", "slow", "--robots", std::to_string(kSlowRobots), "--beams", "360", "--hz", "5",
                     "--world", "building", "--seconds", std::to_string(seconds), "--timeout",
                     "300"});  // The server works on what waits when the robots have stopped.
-  manager.Restart();
+  socket.Restart();
   std::vector<double> answers_s;
   int unanswered = 0;
   double most_mib = 0.0;
@@ -122,7 +122,7 @@ void StudySlowEstimator(StudyContext& context) {
     }
     most_mib = std::max(most_mib, ResidentMibOf(std::stoi(server.pid())));
   }
-  const auto heard = manager.heard();
+  const auto heard = socket.heard();
   const nlohmann::json sim = PrintedBy(robots->Wait(LiveServer::kDeadline));
   long long sent = 0, used = 0, dropped = 0, waiting = 0, unexplained = 0;
   std::map<std::string, long long> reasons;
