@@ -4,6 +4,9 @@
 #include <fastdds/rtps/transport/ChainingTransport.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 
+#include "common/mutex.h"
+#include "common/wire/fragment_hold.h"
+
 namespace cairn::wire {
 namespace {
 
@@ -35,17 +38,25 @@ class GuardTransport : public transport::ChainingTransport {
   void receive(transport::TransportReceiverInterface* next, const rtps::octet* bytes, std::uint32_t size,
                const rtps::Locator_t& local, const rtps::Locator_t& remote) override {
     const DatagramFault fault = InspectDatagram({bytes, size}, gate_);
-    if (fault == DatagramFault::kNone) {
-      next->OnDataReceived(bytes, size, local, remote);
-    } else {
+    if (fault != DatagramFault::kNone) {
       (*refused_)[static_cast<std::size_t>(fault)].fetch_add(1, std::memory_order_relaxed);
+      return;
     }
+    const FragmentTraffic traffic = FragmentTrafficOf({bytes, size});
+    if (traffic.fragments.empty() && !traffic.gap) return next->OnDataReceived(bytes, size, local, remote);
+    // No gap of another thread may come between the fragments of a sample.
+    const MutexLock lock(whole_samples_);
+    if (traffic.fragments.empty()) return next->OnDataReceived(bytes, size, local, remote);
+    for (const FragmentHold::Datagram& whole : hold_.Add({bytes, size}, traffic.fragments))
+      next->OnDataReceived(whole.data(), static_cast<std::uint32_t>(whole.size()), local, remote);
   }
 
  private:
   GuardDescriptor descriptor_;
   std::shared_ptr<RefusedDatagrams> refused_;
   SequenceGate gate_;
+  Mutex whole_samples_;
+  FragmentHold hold_ CAIRN_GUARDED_BY(whole_samples_);
 };
 
 transport::TransportInterface* GuardDescriptor::create_transport() const {

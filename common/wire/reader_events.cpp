@@ -75,6 +75,14 @@ void ReaderEvents::on_requested_incompatible_qos(Reader*, const fd::RequestedInc
   wake_.NotifyOne();
 }
 
+void ReaderEvents::on_sample_rejected(Reader*, const fd::SampleRejectedStatus& status) {
+  if (status.last_reason != fd::REJECTED_BY_INSTANCES_LIMIT) return;
+  const MutexLock lock(mutex_);
+  news_.full = true;
+  pending_ = true;
+  wake_.NotifyOne();
+}
+
 void ReaderEvents::on_sample_lost(Reader*, const fd::SampleLostStatus& status) {
   const MutexLock lock(mutex_);
   news_.lost_total = status.total_count;

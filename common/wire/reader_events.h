@@ -20,6 +20,7 @@ struct ReaderNews {
   std::optional<int> lost_total;
   std::optional<std::string> incompatible_policy;
   std::vector<LivelinessChange> liveliness;  // In order.
+  bool full = false;                         // A sample was refused, because there are too many instances.
 };
 
 class ReaderEvents final : public eprosima::fastdds::dds::DataReaderListener {
@@ -37,6 +38,7 @@ class ReaderEvents final : public eprosima::fastdds::dds::DataReaderListener {
   void on_liveliness_changed(Reader* reader, const eprosima::fastrtps::LivelinessChangedStatus& status) override;
   void on_requested_incompatible_qos(Reader* reader,
                                      const eprosima::fastdds::dds::RequestedIncompatibleQosStatus& status) override;
+  void on_sample_rejected(Reader* reader, const eprosima::fastdds::dds::SampleRejectedStatus& status) override;
   void on_sample_lost(Reader* reader, const eprosima::fastdds::dds::SampleLostStatus& status) override;
 
   std::atomic<int> matched_ = 0;

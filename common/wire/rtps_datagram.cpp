@@ -339,6 +339,21 @@ DatagramFault InspectDatagram(Bytes datagram, SequenceGate& gate, SequenceGate::
   return Walk(datagram, [&](const Submessage& submessage) { return InspectSubmessage(submessage, with); });
 }
 
+FragmentTraffic FragmentTrafficOf(Bytes datagram) {
+  FragmentTraffic traffic;
+  static_cast<void>(Walk(datagram, [&](const Submessage& m) {
+    if (m.id == kGap) traffic.gap = true;
+    if (m.id != kDataFrag) return DatagramFault::kNone;
+    traffic.fragments.push_back({.sample = {m.Numbers(8, m.Entity(4)), m.body.Sequence(12)},
+                                 .first = m.body.U32(20),
+                                 .count = m.body.U16(24),
+                                 .fragment_bytes = m.body.U16(26),
+                                 .sample_bytes = m.body.U32(28)});
+    return DatagramFault::kNone;
+  }));
+  return traffic;
+}
+
 void NoteSent(Bytes datagram, SequenceGate& gate) {
   static_cast<void>(Walk(datagram, [&](const Submessage& m) {
     if (m.id == kData || m.id == kDataFrag) gate.Sent(m.from, m.Entity(8), m.body.Sequence(12));

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <memory>
 #include <thread>
 #include <type_traits>
@@ -51,7 +52,19 @@ class DdsSubscription final : public Subscription {
     while (std::optional<ReaderNews> news = listener_.Wait()) {
       TakeAll();
       Tell(*news);
+      if (news->full) MakeReaderAnew();
     }
+  }
+
+  // Fast DDS 2.9 keeps instances of which no sample was delivered for ever. When forged samples have filled its table,
+  // it refuses everything of a robot that it does not know. A new reader has an empty table.
+  void MakeReaderAnew() {
+    const auto now = std::chrono::steady_clock::now();
+    if (now - made_ < kShortestLife) return;
+    Result<Participant::Reader> reader = participant_->MakeReader(Topic<Value>::kProfile, type_, &listener_);
+    if (!reader) return;  // The next sample that is refused asks again.
+    made_ = now;
+    reader_ = std::move(*reader);
   }
 
   void TakeAll() {
@@ -102,6 +115,8 @@ class DdsSubscription final : public Subscription {
     }
   }
 
+  static constexpr std::chrono::seconds kShortestLife{1};
+
   const std::function<void(Value&&)> on_value_;
   const SubscriptionEvents events_;
   const std::optional<ClientId> only_;
@@ -110,7 +125,8 @@ class DdsSubscription final : public Subscription {
   const fd::TypeSupport type_{new typename Topic<Value>::Type()};
   WriterClients clients_;  // Used only on the subscription's thread.
   ReaderEvents listener_;
-  Participant::Reader reader_;  // After the listener, which it calls until it is destroyed.
+  std::chrono::steady_clock::time_point made_{};  // When the reader was made anew.
+  Participant::Reader reader_;                    // After the listener, which it calls until it is destroyed.
   std::thread thread_;
 };
 

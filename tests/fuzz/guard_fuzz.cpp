@@ -112,6 +112,7 @@ void ReadAsReceiver(std::string_view datagram) {
 
 bool RunGuard(std::string_view input) {
   wire::SequenceGate gate;
+  wire::FragmentHold hold;
   bool accepted = false;
   for (Pieces pieces(input); !pieces.empty();) {
     const std::string_view piece = pieces.TakePiece();
@@ -122,6 +123,11 @@ bool RunGuard(std::string_view input) {
     accepted = true;
     Must(wire::InspectDatagram(datagram, gate) == wire::DatagramFault::kNone, "a repeated datagram is accepted again");
     ReadAsReceiver(piece);
+    const wire::FragmentTraffic traffic = wire::FragmentTrafficOf(datagram);
+    if (traffic.fragments.empty()) continue;
+    for (const auto& whole : hold.Add(datagram, traffic.fragments))
+      Must(wire::FragmentTrafficOf(whole).fragments.size() > 0, "only what has fragments is held");
+    Must(hold.bytes() <= wire::FragmentHold::kMaxBytes, "what is held is bounded");
   }
   return accepted;
 }

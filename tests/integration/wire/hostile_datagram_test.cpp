@@ -48,6 +48,54 @@ Bytes HiddenKillerDatagram() {
   return bytes;
 }
 
+void Put(Bytes& bytes, std::uint32_t value) {
+  for (int i = 0; i < 4; ++i) bytes.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
+}
+
+// The inline parameters of a sample: its key, as a hash.
+void PutKey(Bytes& bytes, std::uint32_t key) {
+  Put(bytes, 0x10U << 16 | 0x70U);
+  for (int i = 0; i < 4; ++i) Put(bytes, key);
+  Put(bytes, 1);
+}
+
+void PutWriterAndSequence(Bytes& bytes, std::uint8_t writer, std::uint8_t kind, std::uint32_t sequence) {
+  bytes.insert(bytes.end(), {0, 0, 0, 0, 0, 0, writer, kind, 0, 0, 0, 0});  // To every reader.
+  Put(bytes, sequence);
+}
+
+// The first of two fragments of a sample.
+Bytes FirstFragment(std::uint8_t writer, std::uint8_t kind, std::uint32_t sequence) {
+  Bytes bytes = {0x16, 0x03, 56, 1, 0, 0, 28, 0};  // DATA_FRAG of 312 bytes, little-endian, with parameters.
+  PutWriterAndSequence(bytes, writer, kind, sequence);
+  Put(bytes, 1);               // From fragment 1,
+  Put(bytes, 256U << 16 | 1);  // one fragment of 256 bytes,
+  Put(bytes, 512);             // of a sample of 512.
+  PutKey(bytes, sequence % 3);
+  bytes.resize(bytes.size() + 256, 0);
+  return bytes;
+}
+
+// There are no samples with the eight numbers from this one on.
+Bytes Gap(std::uint8_t writer, std::uint8_t kind, std::uint32_t sequence) {
+  Bytes bytes = {0x08, 0x01, 32, 0};
+  PutWriterAndSequence(bytes, writer, kind, sequence);
+  Put(bytes, 0);
+  Put(bytes, sequence + 1);
+  Put(bytes, 7);
+  Put(bytes, 0xfe000000);
+  return bytes;
+}
+
+// A whole sample that can not be decoded.
+Bytes SampleOf(std::uint32_t key, std::uint8_t writer, std::uint32_t sequence) {
+  Bytes bytes = {0x15, 0x07, 48, 0, 0, 0, 16, 0};
+  PutWriterAndSequence(bytes, writer, 0x02, sequence);
+  PutKey(bytes, key);
+  bytes.insert(bytes.end(), {0, 1, 0, 0});
+  return bytes;
+}
+
 class Attacker {
  public:
   Attacker() {
@@ -166,6 +214,29 @@ class HostileDatagrams : public ::testing::Test {
     }
   }
 
+  // The greeting of a newcomer makes the others announce themselves; the headers of that say who sends.
+  std::vector<Bytes> OverhearHeaders() {
+    const auto visitor = MakeBus("visitor");
+    std::vector<Bytes> headers = attacker_.Overhear(6);
+    for (Bytes& bytes : headers) bytes.resize(20);
+    std::ranges::sort(headers);
+    headers.erase(std::unique(headers.begin(), headers.end()), headers.end());
+    return headers;
+  }
+  void SendAs(Bytes bytes, const Bytes& submessage) const {
+    bytes.insert(bytes.end(), submessage.begin(), submessage.end());
+    attacker_.SendEverywhere(bytes);
+  }
+  void ExpectANewRobotIsHeard() {
+    const auto newcomer = MakeBus("newcomer");
+    const auto publication = Must(newcomer->Advertise<ScanSample>());
+    ASSERT_TRUE(Eventually([&] { return publication->matched() == 1; }));
+    ScanSample scan = ExtremeScan(360);
+    ++scan.stream.robot_id;
+    const int before = received_;
+    EXPECT_TRUE(Eventually([&] { return publication->Publish(scan) && received_ > before; }));
+  }
+
   std::atomic<int> received_ = 0;
   const std::unique_ptr<Bus> sender_ = MakeBus("sender");
   const std::unique_ptr<Bus> receiver_ = MakeBus("receiver");
@@ -195,6 +266,43 @@ TEST_F(HostileDatagrams, AnIdentityTokenOfFourThousandMillionPropertiesIsKeptOut
   attacker_.SendEverywhere(bytes);
   EXPECT_TRUE(Eventually([&] { return sender_->datagrams_refused() > 0 && receiver_->datagrams_refused() > 0; }));
   ExpectDataStillFlows();
+}
+
+// Fast DDS 2.9.1 keeps a pointer to a sample of which some fragments have arrived, also after a gap has taken the
+// sample back. Then it delivers leftovers, or aborts.
+TEST_F(HostileDatagrams, FragmentsThatAGapTakesBackLeaveNothingBehind) {
+  ExpectDataStillFlows();
+  const std::vector<Bytes> headers = OverhearHeaders();
+  ASSERT_FALSE(headers.empty());
+  for (std::uint32_t sequence = 200; sequence < 400; sequence += 8) {
+    for (const Bytes& header : headers) {
+      for (std::uint8_t writer = 1; writer <= 4; ++writer) {
+        for (const std::uint8_t kind : {0x02, 0x03}) {
+          for (std::uint32_t i = 0; i < 8; ++i) SendAs(header, FirstFragment(writer, kind, sequence + i));
+          SendAs(header, Gap(writer, kind, sequence));
+        }
+      }
+    }
+  }
+  ExpectDataStillFlows();
+  ExpectANewRobotIsHeard();
+}
+
+// Fast DDS 2.9.1 keeps a place for the key of every sample, also of those that it has not delivered when their writer
+// goes. When there are no more places, it refuses all keys that are new.
+TEST_F(HostileDatagrams, KeysThatNobodyHasDoNotFillAReaderForEver) {
+  ExpectDataStillFlows();
+  const std::vector<Bytes> headers = OverhearHeaders();
+  ASSERT_FALSE(headers.empty());
+  const auto begin = std::chrono::steady_clock::now();
+  constexpr std::uint32_t kKeys = 9000;  // The reader has 8192 places.
+  for (std::uint32_t key = 0; key < kKeys; ++key) {
+    for (const Bytes& header : headers)
+      for (std::uint8_t writer = 1; writer <= 4; ++writer) SendAs(header, SampleOf(key, writer, 200 + key));
+    // Not faster than the numbers of a writer may grow.
+    std::this_thread::sleep_until(begin + std::chrono::microseconds(250) * key);
+  }
+  ExpectANewRobotIsHeard();
 }
 
 TEST_F(HostileDatagrams, RandomBytesAndSubmessagesAreSurvived) {
