@@ -9,6 +9,8 @@
 #include <utility>
 #include <variant>
 
+#include "server/slam/site_options_of.h"
+
 namespace cairn::server {
 namespace {
 
@@ -38,7 +40,7 @@ Server::Server(const ServerOptions& options, Inbound& inbound, Outbound& outboun
              generation),
       roster_(options.robots, options.slam, robots_pool_, outbound, atlas_, journal),
       jobs_(options.jobs, outbound, ServerClock, journal),
-      smooth_(options.jobs, roster_, atlas_),
+      smooth_(options.jobs, SiteOptionsOf(options.slam), roster_, atlas_),
       worker_(
           options.jobs, jobs_,
           [this](const Job& job, bool enable, const JobControl& control) { return smooth_.Run(job, enable, control); }),

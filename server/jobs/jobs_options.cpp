@@ -12,6 +12,10 @@ void Visit(OptionVisitor& visitor, JobsOptions& options) {
                   "more time to the robots, and jobs take longer.");
   visitor.Real("snapshot_timeout_s", options.snapshot_timeout_s, "s", 0.1, 600.0,
                "A job fails if a robot has not handed over its state within this time.");
+  visitor.Flag(
+      "joint", options.joint,
+      "Whether a smoothing job also looks for places that several robots of the site have seen, and smooths all "
+      "robots together. This takes about a second per hundred metres of way and per pair of robots.");
   visitor.Require(options.max_queued < options.max_kept, "max_queued", "must be below", "max_kept");
 }
 

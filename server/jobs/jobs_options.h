@@ -12,6 +12,7 @@ struct JobsOptions {
   std::int64_t max_kept = 256;
   std::int64_t nice = 10;
   double snapshot_timeout_s = 10;
+  bool joint = true;
 };
 void Visit(OptionVisitor& visitor, JobsOptions& options);
 

@@ -3,13 +3,17 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <future>
 #include <map>
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "common/bounded_channel.h"
+#include "server/slam/site/site_smoothing.h"
 #include "server/slam/smoothing/smoothed_map.h"
 
 namespace cairn::server {
@@ -29,10 +33,43 @@ class Decision {
   std::atomic<bool> taken_ = false;
 };
 
+constexpr double kShareOfJoining = 0.5;  // Of the progress.
+
+// Nothing: cancelled.
+std::optional<std::vector<slam::SmoothedSession>> SmoothTogether(const std::vector<SessionMaterial>& material,
+                                                                 const slam::SiteOptions& site,
+                                                                 const JobControl& control) {
+  std::vector<slam::SiteSession> sessions;
+  for (const SessionMaterial& session : material) sessions.push_back({session.snapshot, session.start_known});
+  return slam::SmoothSessions(sessions, site, [&control](double share) {
+    control.Progress(kShareOfJoining * share);
+    return !control.cancelled();
+  });
+}
+
+// What a person wants to know of the joint smoothing: at most as many robots as fit on a line.
+std::string Joins(const std::vector<SessionMaterial>& material, const std::vector<slam::SmoothedSession>& joint) {
+  constexpr int kMostNamed = 4;
+  std::string together, apart;
+  int joined = 0, alone = 0;
+  for (std::size_t i = 0; i < material.size(); ++i) {
+    if (joint[i].path.empty()) continue;
+    if (joint[i].joined) {
+      if (++joined > kMostNamed) continue;
+      together += (together.empty() ? "" : ", ") + material[i].robot + " (" + std::to_string(joint[i].relations) +
+                  " relations, " + std::to_string(std::lround(100.0 * joint[i].agreement)) + " % agrees)";
+    } else if (++alone <= kMostNamed) {
+      apart += (apart.empty() ? "" : ", ") + material[i].robot;
+    }
+  }
+  return "; joined " + std::to_string(joined) + (together.empty() ? "" : ": " + together) + "; not joined " +
+         std::to_string(alone) + (apart.empty() ? "" : ": " + apart);
+}
+
 }  // namespace
 
 Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMaterial>& material,
-                                const JobControl& control) {
+                                const slam::SiteOptions* site, const JobControl& control) {
   std::size_t keyframes = 0, scans = 0;
   for (const SessionMaterial& session : material) {
     keyframes += session.snapshot.keyframes.size();
@@ -40,27 +77,40 @@ Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMateria
   }
   if (keyframes == 0) return Fail(StatusCode::kFailedPrecondition, "site '" + job.site + "' has no scans to smooth");
 
-  // Progress is the share of scans drawn and compared.
+  const bool together = site != nullptr && material.size() > 1;
+  std::vector<slam::SmoothedSession> joint(material.size());
+  if (together) {
+    auto smoothed = SmoothTogether(material, *site, control);
+    if (!smoothed) return Fail(StatusCode::kCancelled, "cancelled");
+    joint = *std::move(smoothed);
+  }
+  // The rest of the progress is the share of scans drawn and compared.
+  const double begun = together ? kShareOfJoining : 0.0;
   const double steps = static_cast<double>(slam::kSmoothingStepsPerKeyframe) * static_cast<double>(keyframes);
   std::size_t done = 0;
   const auto next = [&] {
-    control.Progress(static_cast<double>(done++) / steps);
+    control.Progress(begun + (1.0 - begun) * static_cast<double>(done++) / steps);
     return !control.cancelled();
   };
   slam::Disagreement before, after;
   SmoothedSite smoothed;
   smoothed.version.info.job = job.id;
-  for (const SessionMaterial& session : material) {
+  for (std::size_t i = 0; i < material.size(); ++i) {
+    const SessionMaterial& session = material[i];
     const slam::MapperSnapshot& snapshot = session.snapshot;
-    auto map = slam::SmoothMap(snapshot, session.grid_options, next, [&control] { return !control.cancelled(); });
+    auto map = joint[i].joined
+                   ? slam::MapAlong(snapshot, joint[i].path, session.grid_options, next)
+                   : slam::SmoothMap(snapshot, session.grid_options, next, [&control] { return !control.cancelled(); });
     if (!map) return Fail(StatusCode::kCancelled, "cancelled");
     before.Add(map->before);
     after.Add(map->after);
-    smoothed.version.parts[session.session] = {map->grid.Share(), snapshot.keyframes.size()};
     smoothed.version.smoothed[session.robot] = std::make_shared<const Trajectory>(snapshot.TrajectoryAlong(map->path));
+    smoothed.version.parts[session.session] = {map->grid.Share(), snapshot.keyframes.size(),
+                                               std::make_shared<const std::vector<Pose2>>(std::move(map->path))};
   }
-  const std::string summary = std::to_string(material.size()) + " robots, " + std::to_string(keyframes) +
-                              " keyframes, " + std::to_string(scans) + " scans";
+  std::string summary = std::to_string(material.size()) + " robots, " + std::to_string(keyframes) + " keyframes, " +
+                        std::to_string(scans) + " scans";
+  if (together) summary += Joins(material, joint);
   smoothed.version.info.note = "smoothed: " + summary;
   smoothed.outcome = {
       .cost_before = before.mean_m2(), .cost_after = after.mean_m2(), .map_version = 0, .message = summary};
@@ -70,7 +120,7 @@ Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMateria
 Result<JobOutcome> SmoothJob::Run(const Job& job, bool enable, const JobControl& control) const {
   const auto material = Collect(job.site, control);
   if (!material) return tl::unexpected(material.error());
-  auto smoothed = SmoothSite(job, *material, control);
+  auto smoothed = SmoothSite(job, *material, options_.joint ? &site_ : nullptr, control);
   if (!smoothed) return tl::unexpected(smoothed.error());
   JobOutcome outcome = std::move(smoothed->outcome);
   const auto number = Await(job.site, control, [&](Site& site, Site::Done done, Site::Wanted wanted) {

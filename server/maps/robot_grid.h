@@ -7,7 +7,9 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <vector>
 
+#include "common/geometry/pose2.h"
 #include "server/slam/grid/occupancy_grid.h"
 
 namespace cairn::server {
@@ -18,6 +20,9 @@ using SessionId = std::uint64_t;  // Unique while the server runs; later session
 struct RobotGrid {
   slam::OccupancyGrid::Chunks chunks;
   std::size_t keyframes = 0;
+  // T_map_robot of these keyframes in this grid. The estimator's path follows it (slam::Mapper::AdoptGrid). Null: it is
+  // not known, and the path stays.
+  std::shared_ptr<const std::vector<Pose2>> path{};
 };
 
 // The changed chunks of one session's grid (null: removed).

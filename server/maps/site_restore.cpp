@@ -17,7 +17,7 @@ StoredVersion StoredOf(const MapVersion& version) {
                        .note = version.info.note,
                        .parts = {},
                        .smoothed = version.smoothed};
-  for (const auto& [session, part] : version.parts) stored.parts[session] = ToStored(part.chunks, part.keyframes);
+  for (const auto& [session, part] : version.parts) stored.parts[session] = ToStored(part);
   return stored;
 }
 
@@ -64,7 +64,7 @@ void Site::RemoveOldVersions() {
 void Site::StoreLayer(SessionId session) {
   if (journal_ == nullptr) return;
   journal_->Put({RecordKind::kLayer, site_id_, session},
-                [layer = StoredLayer{session, ToStored(joint_.ChunksOf(session), 0)}] { return BytesOf(layer); });
+                [layer = StoredLayer{session, ToStored({joint_.ChunksOf(session), 0})}] { return BytesOf(layer); });
 }
 
 bool Site::Switched(std::uint32_t epoch, Generation generation) const {

@@ -5,16 +5,16 @@
 
 namespace cairn::server {
 
-StoredGrid ToStored(const slam::OccupancyGrid::Chunks& chunks, std::size_t keyframes) {
-  StoredGrid stored{.keyframes = keyframes, .chunks = {}};
-  for (const auto& [key, chunk] : chunks) {
+StoredGrid ToStored(const RobotGrid& grid) {
+  StoredGrid stored{.keyframes = grid.keyframes, .chunks = {}, .path = grid.path};
+  for (const auto& [key, chunk] : grid.chunks) {
     stored.chunks.push_back({key.x, key.y, std::shared_ptr<const std::int16_t>(chunk, chunk->log_odds.data())});
   }
   return stored;
 }
 
 RobotGrid FromStored(const StoredGrid& stored) {
-  RobotGrid grid{.chunks = {}, .keyframes = static_cast<std::size_t>(stored.keyframes)};
+  RobotGrid grid{.chunks = {}, .keyframes = static_cast<std::size_t>(stored.keyframes), .path = stored.path};
   for (const StoredChunk& one : stored.chunks) {
     auto chunk = std::make_shared<slam::GridChunk>();
     std::copy_n(one.cells.get(), chunk->log_odds.size(), chunk->log_odds.begin());

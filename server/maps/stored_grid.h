@@ -7,7 +7,7 @@
 
 namespace cairn::server {
 
-[[nodiscard]] StoredGrid ToStored(const slam::OccupancyGrid::Chunks& chunks, std::size_t keyframes);
+[[nodiscard]] StoredGrid ToStored(const RobotGrid& grid);
 [[nodiscard]] RobotGrid FromStored(const StoredGrid& stored);
 
 }  // namespace cairn::server

@@ -21,6 +21,7 @@ struct SessionMaterial {
   std::string robot;
   slam::MapperSnapshot snapshot;
   slam::GridOptions grid_options;
+  bool start_known = true;  // Whether somebody has said where the robot stood at first.
 };
 
 struct SnapshotWanted {

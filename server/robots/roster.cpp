@@ -190,10 +190,11 @@ Result<void> Roster::Open(const SessionRequest& request) {
 
 std::shared_ptr<Session> Roster::Make(SessionId id, const SessionRequest& request, std::uint32_t map_epoch,
                                       const std::shared_ptr<Site>& site) const {
-  const SessionSetup setup{.id = id,
-                           .request = request,
-                           .map_epoch = map_epoch,
-                           .estimator = {.mapper = mapper_, .T_map_robot_start = StartOf(request)}};
+  const SessionSetup setup{
+      .id = id,
+      .request = request,
+      .map_epoch = map_epoch,
+      .estimator = {.mapper = mapper_, .T_map_robot_start = StartOf(request), .start_known = request.has_start}};
   SessionOutputs outputs{.send = [this](OutboundValue value) { return outbound_.Send(std::move(value)); },
                          .grid_changed = [site](GridChange&& change) { site->Change(std::move(change)); },
                          .store = {},

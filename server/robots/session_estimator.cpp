@@ -66,6 +66,7 @@ std::optional<std::uint64_t> TakeNumber(std::string_view& bytes) {
 SessionEstimator::SessionEstimator(const EstimatorSetup& setup, SessionRecord& record, SessionOutputs outputs)
     : record_(record),
       outputs_(std::move(outputs)),
+      start_known_(setup.start_known),
       identity_(record.snapshot()),
       epoch_(record.epoch()),
       pipeline_(setup.mapper, setup.T_map_robot_start, slam::SerialFor,
@@ -265,20 +266,27 @@ void SessionEstimator::RefreshLandmarks(bool at_once) {
 }
 
 void SessionEstimator::On(Correction&& correction) {
-  Store(CorrectionTaken{correction.epoch, correction.generation,
-                        ToStored(correction.grid.chunks, correction.grid.keyframes)});
-  Adopted adopted{.session = identity_.id,
-                  .displaced = {PublishedChunks(), pipeline_.mapper().keyframe_count()},
-                  .change = {.session = identity_.id, .chunks = {}}};
+  Store(CorrectionTaken{correction.epoch, correction.generation, ToStored(correction.grid)});
+  Adopted adopted{
+      .session = identity_.id, .displaced = DisplacedGrid(), .change = {.session = identity_.id, .chunks = {}}};
   AdoptGrid(correction.epoch, correction.grid);
   switch_completed_ = std::move(correction.completed);
   adopted.change = TakeGridChange();
   correction.done(std::move(adopted));
 }
 
+// The grid before a correction, and the path to go back to with it.
+RobotGrid SessionEstimator::DisplacedGrid() {
+  RobotGrid displaced{PublishedChunks(), pipeline_.mapper().keyframe_count()};
+  if (auto path = pipeline_.mapper().BestPath(); path.size() == displaced.keyframes)
+    displaced.path = std::make_shared<const std::vector<Pose2>>(std::move(path));
+  return displaced;
+}
+
 void SessionEstimator::AdoptGrid(std::uint32_t epoch, const RobotGrid& grid) {
   slam::Mapper& mapper = pipeline_.mapper();
-  mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), grid.chunks), grid.keyframes);
+  const auto path = grid.path != nullptr ? std::span<const Pose2>(*grid.path) : std::span<const Pose2>();
+  mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), grid.chunks), grid.keyframes, path);
   epoch_ = epoch;
   record_.SetEpoch(epoch_);
 }
@@ -287,7 +295,8 @@ void SessionEstimator::On(SnapshotWanted&& wanted) {
   wanted.done({.session = identity_.id,
                .robot = identity_.status.session.robot,
                .snapshot = pipeline_.mapper().Snapshot(),
-               .grid_options = pipeline_.mapper().grid().options()});
+               .grid_options = pipeline_.mapper().grid().options(),
+               .start_known = start_known_});
 }
 
 void SessionEstimator::On(Finish&& finish) {

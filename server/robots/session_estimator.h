@@ -39,6 +39,7 @@ struct SessionOutputs {
 struct EstimatorSetup {
   slam::MapperOptions mapper;
   Pose2 T_map_robot_start;
+  bool start_known = true;  // False: nobody has said where the robot starts, and its start is the origin.
 };
 
 class SessionEstimator {
@@ -88,10 +89,12 @@ class SessionEstimator {
   void Store(JournalEntry entry);
   [[nodiscard]] SessionRecord::WaitingScans WaitingBySensor() const;
   void ReplayOdometry(const OdometryTaken& odometry);
+  RobotGrid DisplacedGrid();
   void AdoptGrid(std::uint32_t epoch, const RobotGrid& grid);
 
   SessionRecord& record_;
   const SessionOutputs outputs_;
+  const bool start_known_;
   const SessionSnapshot identity_;  // Names and id; its other parts are empty.
   std::uint32_t epoch_ = 0;
   std::shared_ptr<const std::atomic<bool>> switch_completed_;  // Belongs to the last correction.

@@ -207,9 +207,53 @@ void Mapper::FinishMap() {
   state_->drawing.Finish(state_->trail.keyframes(), state_->believed_path());
 }
 
-void Mapper::AdoptGrid(OccupancyGrid grid, std::size_t keyframes) {
+void Mapper::AdoptGrid(OccupancyGrid grid, std::size_t keyframes, std::span<const Pose2> path) {
   State& s = *state_;
-  s.drawing.Adopt(std::move(grid), keyframes, s.trail.keyframes(), s.believed_path());
+  const bool follows = s.filter->rebases() && s.filter->placed() && !path.empty() && path.size() == keyframes &&
+                       keyframes <= s.trail.size();
+  if (follows) s.Follow(path);
+  s.drawing.Adopt(std::move(grid), keyframes, s.trail.keyframes(), s.believed_path(), follows);
+}
+
+// Takes the poses of the first keyframes from a job, as after a large loop.
+void Mapper::State::Follow(std::span<const Pose2> first_poses) {
+  const std::vector<Pose2> before = believed_path().values();
+  std::vector<Pose2> path(first_poses.begin(), first_poses.end());
+  const std::size_t known = path.size();
+  for (std::size_t k = known; k < before.size(); ++k)
+    path.push_back(path[known - 1] * Between(before[known - 1], before[k]));
+  KeepShape(path, known);
+  // Large loops that the job did not know.
+  if (drawing.changed_at() > known) OptimisePoses(path, trail.relations(), options.pose_graph);
+  filter->Rebase(path);
+  trail.ConfirmTentative();
+  self_check.Forget();
+  const Pose2 T_new_old = path.back() * before.back().Inverse();
+  recovery.Move(T_new_old);
+  level.outcome.T_map_robot = T_new_old * level.outcome.T_map_robot;
+  level.outcome.T_map_odom = T_new_old * level.outcome.T_map_odom;
+}
+
+// A job may know more than the relations of this robot, such as what others have seen. Where it has changed the path,
+// relations along the way keep what it has found when the next large loop closes.
+void Mapper::State::KeepShape(std::span<const Pose2> path, std::size_t known) {
+  constexpr double kEveryM = 10.0;
+  // As certain as the steps over this way; less of a change is not kept.
+  constexpr double kSigmaM = 0.05, kSigmaRad = 0.005;
+  const std::vector<Pose2> before = believed_path().values();
+  std::size_t last = 0;
+  for (std::size_t k = 1; k < known; ++k) {
+    if (k + 1 < known && trail.shapes()[k].travelled_m - trail.shapes()[last].travelled_m < kEveryM) continue;
+    const Pose2 T_last_k = Between(path[last], path[k]);
+    const Pose2 change = Between(Between(before[last], before[k]), T_last_k);
+    if (change.translation().norm() > 0.5 * kSigmaM || std::abs(change.theta) > 0.5 * kSigmaRad)
+      trail.AddLoop({last, k, T_last_k, PoseCovariance(kSigmaM, kSigmaRad), true});
+    last = k;
+  }
+}
+
+std::vector<Pose2> Mapper::BestPath() const {
+  return state_->filter->placed() ? state_->believed_path().values() : std::vector<Pose2>{};
 }
 
 void Mapper::Save(StateWriter& archive) const {

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "common/sensor/scan.h"
@@ -71,9 +72,14 @@ class Mapper {
   [[nodiscard]] MapperSnapshot Snapshot() const;
   // Ends the mapping: if the map is still being drawn again after a large loop, draws the rest.
   void FinishMap();
-  // Replaces the grid by the result of a finished job, drawn from the first `keyframes` keyframes. Then draws
-  // the later keyframes onto it along the present best path. Every chunk of both grids counts as changed.
-  void AdoptGrid(OccupancyGrid grid, std::size_t keyframes);
+  // Replaces the grid by the result of a finished job, drawn from the first `keyframes` keyframes. `path` holds the
+  // poses of these keyframes in it: path, particles, landmarks and the pose follow, so that all agree with the grid.
+  // The later keyframes keep their places relative to the last of these. If `path` has another length, or the filter
+  // can not follow (Filter::rebases), only the grid is replaced. Then draws the later keyframes onto it along the
+  // present best path. Every chunk of both grids counts as changed.
+  void AdoptGrid(OccupancyGrid grid, std::size_t keyframes, std::span<const Pose2> path = {});
+  // T_map_robot of every keyframe along the best path; empty while the robot's place in the map is not known.
+  [[nodiscard]] std::vector<Pose2> BestPath() const;
 
   // Writes the whole state, and replaces it by one of a mapper with the same options (state/archive.h). If reading
   // fails, nothing changes.

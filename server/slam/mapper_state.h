@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "server/slam/drawing/map_drawing.h"
@@ -69,6 +70,8 @@ struct Mapper::State {
   [[nodiscard]] RevisitObservation SeenFromNearest(const FoundPlace& place) const;
   StepMotion MotionTo(const Keyframe& keyframe, const TrackStep& step, const Eigen::Matrix3d& covariance);
   void CloseLargeLoop();
+  void Follow(std::span<const Pose2> first_poses);
+  void KeepShape(std::span<const Pose2> path, std::size_t known);
   void Draw(const TrackStep& step, bool placed_before);
   ScanOutcome Report(Stamp stamp, const Pose2& T_odom_robot, const TrackStep& step, bool keyframe);
   [[nodiscard]] PoseReason ReasonOf(const TrackStep& step) const;

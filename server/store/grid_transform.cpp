@@ -45,6 +45,11 @@ StoredGrid Transformed(const StoredGrid& grid, const Pose2& T_to_from, double re
   }
   const Pose2 T_from_to = T_to_from.Inverse();
   StoredGrid result{.keyframes = grid.keyframes, .chunks = {}};
+  if (grid.path != nullptr) {
+    auto path = std::make_shared<std::vector<Pose2>>();
+    for (const Pose2& pose : *grid.path) path->push_back(T_to_from * pose);
+    result.path = std::move(path);
+  }
   for (const Place& place : touched) {
     auto cells = std::make_shared<Cells>();
     bool seen = false;

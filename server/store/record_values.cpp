@@ -10,6 +10,7 @@ namespace cairn::server {
 namespace {
 
 constexpr int kFarthestChunk = 1 << 22;  // No estimator draws farther from the origin.
+constexpr double kFarthestM = 1e7;       // No robot drives farther from it.
 constexpr std::size_t kChunkBytes = sizeof(std::int16_t) * static_cast<std::size_t>(kTileArea);
 static_assert(std::endian::native == std::endian::little, "cells are stored as they lie in memory");
 
@@ -50,6 +51,9 @@ void Fill(record::Grid& to, const StoredGrid& from) {
     added.set_y(chunk.y);
     added.set_log_odds(chunk.cells.get(), kChunkBytes);
   }
+  if (from.path == nullptr) return;
+  for (const Pose2& pose : *from.path)
+    for (const double number : {pose.x, pose.y, pose.theta}) to.add_path(number);
 }
 
 Pose2 ValueOf(const record::Pose& from) {
@@ -88,6 +92,15 @@ Result<StoredGrid> ValueOf(const record::Grid& from) {
     const std::int16_t* const first = cells->data();
     grid.chunks.push_back({chunk.x(), chunk.y(), std::shared_ptr<const std::int16_t>(std::move(cells), first)});
   }
+  if (from.path().empty()) return grid;
+  if (static_cast<std::uint64_t>(from.path_size()) != 3 * grid.keyframes) return Unreadable("the path of a grid");
+  auto path = std::make_shared<std::vector<Pose2>>();
+  for (int i = 0; i < from.path_size(); i += 3) {
+    const Pose2& pose = path->emplace_back(Pose2{from.path(i), from.path(i + 1), WrapAngle(from.path(i + 2))});
+    if (!pose.IsFinite() || pose.translation().cwiseAbs().maxCoeff() > kFarthestM)
+      return Unreadable("the path of a grid");
+  }
+  grid.path = std::move(path);
   return grid;
 }
 

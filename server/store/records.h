@@ -30,6 +30,7 @@ struct StoredChunk {
 struct StoredGrid {
   std::uint64_t keyframes = 0;
   std::vector<StoredChunk> chunks;
+  std::shared_ptr<const std::vector<Pose2>> path{};  // T_map_robot of the keyframes; null: not known.
 };
 
 // The entries of a session's journal: the events that its strand processed, in this order.

@@ -48,11 +48,15 @@ void MapDrawing::Finish(std::span<const Keyframe> keyframes, const PosePath& pat
 }
 
 void MapDrawing::Adopt(OccupancyGrid grid, std::size_t drawn, std::span<const Keyframe> keyframes,
-                       const PosePath& path) {
-  const bool outdated = drawn < changed_at_ || redraw_;
+                       const PosePath& path, bool along_path) {
+  const bool outdated = drawn < changed_at_ || (redraw_ && !along_path);
   redraw_.reset();
   grid_.ReplaceBy(std::move(grid));
   for (std::size_t k = drawn; k < keyframes.size(); ++k) DrawOnto(grid_, keyframes[k], path[k]);
+  if (along_path) {
+    path_ = path.values();
+    frozen_path_.Forget();
+  }
   if (outdated) redraw_ = Redraw{OccupancyGrid(grid_.options()), 0};
 }
 

@@ -4,45 +4,16 @@
 #include <cmath>
 #include <utility>
 
+#include "server/slam/loops/stretch_match.h"
 #include "server/slam/loops/unique_pose.h"
-#include "server/slam/matching/point_index.h"
 
 namespace cairn::slam {
 namespace {
 
-constexpr int kLevels = 5;
 // Half or twice of each of these changes the results on the first 4500 scans of mit-killian no more than another seed
 // (study `sensitivity`).
 constexpr std::size_t kMaxCandidates = 2;    // Most old places compared at one keyframe.
 constexpr std::size_t kCandidateStride = 4;  // Only every fourth old keyframe is a candidate.
-constexpr double kDoubtM = 1.5;              // Half width of the search window for a way of zero.
-constexpr double kDoubtRad = 0.1;            // Turn searched to either side for a way of zero.
-constexpr double kMaxDoubtRad = 0.6;         // Largest turn searched to either side.
-constexpr double kMinExplained = 0.5;        // Smallest share of the recent surfaces that must be found again.
-constexpr double kNearShare = 2.0;           // Tolerance for a surface, in inlier distances of the alignment.
-
-// Numbers of `surfaces`, transformed by `T`, that agree with the other side and that contradict it.
-struct Agreement {
-  int explained = 0;
-  int conflicts = 0;
-  [[nodiscard]] double conflict() const {
-    return conflicts / std::max(1.0, static_cast<double>(explained + conflicts));
-  }
-};
-
-Agreement AgreementOf(const std::vector<SurfacePoint>& surfaces, const Pose2& T, const PointIndex& other,
-                      const FreeSpace& other_free, double near_m) {
-  Agreement agreement;
-  for (const SurfacePoint& surface : surfaces) {
-    const Eigen::Vector2d p = T * surface.p;
-    if (other.Nearest(p, near_m) != nullptr) {
-      ++agreement.explained;
-    } else if (other_free.Contradicts(p)) {
-      ++agreement.conflicts;
-    }
-  }
-  return agreement;
-}
 
 }  // namespace
 
@@ -57,7 +28,7 @@ void Visit(OptionVisitor& visitor, LoopOptions& options) {
   visitor.Real("doubt_rad_per_m", options.doubt_rad_per_m, "rad/m", 0.0, 1.0,
                "Growth of the turn that is searched to either side per metre of way between the robot and the old "
                "place.");
-  visitor.Real("max_doubt_m", options.max_doubt_m, "m", kDoubtM, 30.0,
+  visitor.Real("max_doubt_m", options.max_doubt_m, "m", kLeastDoubtM, 30.0,
                "Largest half width of the search window. The time of a search grows with the square.");
   visitor.Real(
       "max_rival", options.max_rival, "1", 0.0, 1.0,
@@ -75,12 +46,11 @@ void Visit(OptionVisitor& visitor, LoopOptions& options) {
                "smoothed error on the first 4500 scans of mit-killian is 0.8 times as large.");
 }
 
-LoopSearch::LoopSearch(const LoopOptions& options, const PointToLineOptions& align) : options_(options), align_(align) {
-  align_.min_score = kMinExplained;
-}
+LoopSearch::LoopSearch(const LoopOptions& options, const PointToLineOptions& align)
+    : options_(options), align_(align) {}
 
 double LoopSearch::Reach(double way_m) const {
-  return std::min(options_.max_doubt_m, kDoubtM + options_.doubt_per_m * way_m);
+  return WindowAround({}, way_m, options_).reach_m;
 }
 
 std::optional<LoopClosure> LoopSearch::Find(const Trail& trail, const PosePath& path) {
@@ -132,28 +102,10 @@ std::optional<LoopClosure> LoopSearch::Compare(const Trail& trail, std::size_t o
   const Stretch recent_stretch = StretchAround(shapes, now, kStretchM);
   if (old >= recent_stretch.first) return std::nullopt;  // This is the present place, not an old one.
   const Stretch old_stretch = StretchAround(shapes.first(recent_stretch.first), old, kStretchM);
-  const std::vector<SurfacePoint> recent = SurfacesOf(trail, recent_stretch, 2.0 * kSearchCellM);
-  const std::vector<SurfacePoint> before = SurfacesOf(trail, old_stretch, 0.5 * kSearchCellM);
-  if (std::min(recent.size(), before.size()) < kMinSurfaces) return std::nullopt;
-
-  const LikelihoodPyramid pyramid(before, kSearchCellM, kLikelihoodReachM, kLevels);
-  const SearchWindow window{T_old_recent_guess, Reach(way_m),
-                            std::min(kMaxDoubtRad, kDoubtRad + options_.doubt_rad_per_m * way_m)};
-  const auto unique = FindUniquePose(recent, pyramid, window, options_.max_rival);
-  if (!unique) return std::nullopt;
-  const PointIndex before_index(before);
-  const MatchResult aligned =
-      AlignPointsToSurfaces(recent, before_index, {*unique, *unique, UniquePoseCovariance()}, align_);
-  if (!aligned.converged || aligned.degenerate) return std::nullopt;
-  const FreeSpace before_free(trail, old_stretch, options_.free_cell_m),
-      recent_free(trail, recent_stretch, options_.free_cell_m);
-  const PointIndex recent_index(recent);
-  const double near_m = kNearShare * align_.inlier_distance_m;
-  const Agreement ours = AgreementOf(recent, aligned.T_ref_curr, before_index, before_free, near_m);
-  const Agreement theirs = AgreementOf(before, aligned.T_ref_curr.Inverse(), recent_index, recent_free, near_m);
-  if (ours.explained < kMinExplained * static_cast<double>(recent.size())) return std::nullopt;
-  if (std::max(ours.conflict(), theirs.conflict()) > options_.max_conflict) return std::nullopt;
-  return LoopClosure{old, now, aligned.T_ref_curr, PoseCovariance(options_.sigma_m, kFoundSigmaRad)};
+  const auto T_old_recent = MatchStretches(trail, old_stretch, trail, recent_stretch,
+                                           WindowAround(T_old_recent_guess, way_m, options_), options_, align_);
+  if (!T_old_recent) return std::nullopt;
+  return LoopClosure{old, now, *T_old_recent, PoseCovariance(options_.sigma_m, kFoundSigmaRad)};
 }
 
 bool LoopSearch::Agree(const LoopClosure& a, const LoopClosure& b, std::span<const KeyframeShape> shapes) const {

@@ -15,22 +15,26 @@ constexpr double kRivalBeyondRad = 0.3;
 constexpr double kAgreeM = 0.5;     // Largest distance between two poses that agree.
 constexpr double kAgreeRad = 0.06;  // Largest turn between them.
 
-std::vector<Eigen::Vector2d> Sample(std::span<const SurfacePoint> surfaces) {
+}  // namespace
+
+std::vector<Eigen::Vector2d> SampleOf(std::span<const SurfacePoint> surfaces) {
   const std::size_t stride = surfaces.size() / kMaxSearchPoints + 1;
   std::vector<Eigen::Vector2d> points;
   for (std::size_t i = 0; i < surfaces.size(); i += stride) points.push_back(surfaces[i].p);
   return points;
 }
 
-}  // namespace
+Exclusion ApartFrom(const Pose2& T_ref_curr) {
+  return {T_ref_curr, kRivalBeyondM, kRivalBeyondRad};
+}
 
 std::optional<Pose2> FindUniquePose(std::span<const SurfacePoint> surfaces_curr, const LikelihoodPyramid& pyramid_ref,
                                     const SearchWindow& window, double max_rival) {
-  const std::vector<Eigen::Vector2d> sample = Sample(surfaces_curr);
+  const std::vector<Eigen::Vector2d> sample = SampleOf(surfaces_curr);
   const auto peak = FindBestPose(sample, pyramid_ref, window, kMinLikelihood);
   if (!peak || !peak->complete) return std::nullopt;
-  const Exclusion exclusion{peak->T_ref_curr, kRivalBeyondM, kRivalBeyondRad};
-  if (FindBestPose(sample, pyramid_ref, window, max_rival * peak->score, exclusion)) return std::nullopt;
+  if (FindBestPose(sample, pyramid_ref, window, max_rival * peak->score, ApartFrom(peak->T_ref_curr)))
+    return std::nullopt;
   return peak->T_ref_curr;
 }
 

@@ -24,6 +24,11 @@ inline constexpr double kFoundSigmaRad = 0.01;    // Standard deviation of the h
                                                   const LikelihoodPyramid& pyramid_ref, const SearchWindow& window,
                                                   double max_rival);
 
+// The points with which poses are compared: at most 250 of the surfaces, spread over all of them.
+[[nodiscard]] std::vector<Eigen::Vector2d> SampleOf(std::span<const SurfacePoint> surfaces);
+// A pose within this of the best one is no rival of it.
+[[nodiscard]] Exclusion ApartFrom(const Pose2& T_ref_curr);
+
 // The covariance of the answer, for an alignment that starts there: the search is exact to some cells.
 [[nodiscard]] Eigen::Matrix3d UniquePoseCovariance();
 

@@ -82,13 +82,32 @@ std::vector<SurfacePoint> PlaceSearch::SurfacesOfMap(const Trail& trail, const P
 
 std::optional<FoundPlace> PlaceSearch::Find(const Trail& trail, const PosePath& path,
                                             std::span<const RecentScan> recent) {
-  if (!map_) map_ = std::make_shared<const Map>(SurfacesOfMap(trail, path), options_.cell_scale);
-  if (recent.empty() || map_->surfaces.size() < kMinSurfaces) return std::nullopt;
+  if (recent.empty() || MapOf(trail, path).surfaces.size() < kMinSurfaces) return std::nullopt;
   const std::vector<SurfacePoint> surfaces = SurfacesOf(recent, options_.cell_scale * kSearchCellM);
   if (surfaces.size() < kMinSurfaces) return std::nullopt;
   const auto unique = FindUniquePose(surfaces, map_->pyramid, map_->window, loop_.max_rival);
   if (!unique) return std::nullopt;
   return Fit(trail, path, recent, surfaces, *unique, UniquePoseCovariance());
+}
+
+const PlaceSearch::Map& PlaceSearch::MapOf(const Trail& trail, const PosePath& path) {
+  if (!map_) map_ = std::make_shared<const Map>(SurfacesOfMap(trail, path), options_.cell_scale);
+  return *map_;
+}
+
+double PlaceSearch::ScoreAt(const Trail& trail, const PosePath& path, std::span<const RecentScan> recent,
+                            const Pose2& T_map_robot) {
+  const auto points = SampleOf(SurfacesOf(recent, options_.cell_scale * kSearchCellM));
+  const LikelihoodPyramid& pyramid = MapOf(trail, path).pyramid;
+  const auto best = FindBestPose(points, pyramid, {T_map_robot, 2.0 * pyramid.cell_m(), 2.0 * kFoundSigmaRad}, 0.0);
+  return best ? best->score : 0.0;
+}
+
+bool PlaceSearch::FitsElsewhere(const Trail& trail, const PosePath& path, std::span<const RecentScan> recent,
+                                const Pose2& T_map_robot, double score) {
+  const auto points = SampleOf(SurfacesOf(recent, options_.cell_scale * kSearchCellM));
+  const Map& map = MapOf(trail, path);
+  return FindBestPose(points, map.pyramid, map.window, score, ApartFrom(T_map_robot)).has_value();
 }
 
 std::optional<FoundPlace> PlaceSearch::Fit(const Trail& trail, const PosePath& path, std::span<const RecentScan> recent,

@@ -54,6 +54,13 @@ class PlaceSearch {
   [[nodiscard]] std::optional<FoundPlace> Find(const Trail& trail, const PosePath& path,
                                                std::span<const RecentScan> recent);
   void Forget() { map_.reset(); }
+  // How well the surfaces of these scans fit, with the last of them at this pose and as seen best with a search of some
+  // cells around it, 0..1. REQUIRES: as Find.
+  [[nodiscard]] double ScoreAt(const Trail& trail, const PosePath& path, std::span<const RecentScan> recent,
+                               const Pose2& T_map_robot);
+  // Whether they fit with more than `score` anywhere else, or may do so, because the search had to be given up.
+  [[nodiscard]] bool FitsElsewhere(const Trail& trail, const PosePath& path, std::span<const RecentScan> recent,
+                                   const Pose2& T_map_robot, double score);
 
   // How a scan at this pose agrees with old keyframes near it.
   enum class Agreement { kNothingNear, kAgrees, kDoubtful, kContradicts };
@@ -75,6 +82,7 @@ class PlaceSearch {
                                               std::span<const RecentScan> recent,
                                               const std::vector<SurfacePoint>& surfaces, const Pose2& T_map_robot,
                                               const Eigen::Matrix3d& covariance) const;
+  const Map& MapOf(const Trail& trail, const PosePath& path);
   [[nodiscard]] std::vector<SurfacePoint> SurfacesOfMap(const Trail& trail, const PosePath& path) const;
 
   PlaceSearchOptions options_;

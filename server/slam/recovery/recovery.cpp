@@ -27,6 +27,15 @@ void Recovery::BeginOnPath(const Known& known, const Pose2& T_map_track) {
   T_map_track_ = T_map_track;
 }
 
+void Recovery::Move(const Pose2& T_new_old) {
+  const Eigen::Matrix3d J = J_compose_right(T_new_old, known_.T_map_robot);
+  known_.T_map_robot = T_new_old * known_.T_map_robot;
+  known_.covariance = J * known_.covariance * J.transpose();
+  if (T_map_track_) T_map_track_ = T_new_old * *T_map_track_;
+  unconfirmed_.clear();  // They may lie at other places of the map, which have moved otherwise.
+  search_.Forget();
+}
+
 void Recovery::End() {
   active_ = false;
   contradicted_ = false;

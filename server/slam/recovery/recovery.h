@@ -71,6 +71,8 @@ class Recovery {
   // The next scans continue the path: `T_map_track` is its pose in the map.
   void BeginOnPath(const Known& known, const Pose2& T_map_track);
   [[nodiscard]] bool on_path() const { return T_map_track_.has_value(); }
+  // The map has moved by this where the robot was last.
+  void Move(const Pose2& T_new_old);
   // The odometry has begun anew.
   void OdometryBeganAnew() { odometry_goes_on_ = false; }
   void End();

@@ -38,6 +38,15 @@ std::vector<Pose2> SmoothedPath(const MapperSnapshot& snapshot) {
   return *SmoothedPath(snapshot, {});
 }
 
+std::optional<SmoothedMap> MapAlong(const MapperSnapshot& snapshot, std::vector<Pose2> path,
+                                    const GridOptions& options, const std::function<bool()>& next) {
+  const auto online = DrawAlong(snapshot.online_path, snapshot, options, next);
+  if (!online) return {};
+  auto smoothed = DrawAlong(path, snapshot, options, next);
+  if (!smoothed) return {};
+  return SmoothedMap{std::move(path), std::move(smoothed->grid), online->disagreement, smoothed->disagreement};
+}
+
 std::optional<SmoothedMap> SmoothMap(const MapperSnapshot& snapshot, const GridOptions& options,
                                      const std::function<bool()>& next, const std::function<bool()>& go_on) {
   auto online = DrawAlong(snapshot.online_path, snapshot, options, next);

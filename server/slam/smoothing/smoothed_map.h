@@ -32,6 +32,11 @@ struct SmoothedMap {
   Disagreement after;       // The scans along `path` against `grid`.
 };
 
+// The map along a path that was fitted elsewhere, together with those of other robots (server/slam/site). `next`: as
+// below.
+[[nodiscard]] std::optional<SmoothedMap> MapAlong(const MapperSnapshot& snapshot, std::vector<Pose2> path,
+                                                  const GridOptions& options, const std::function<bool()>& next);
+
 inline constexpr int kSmoothingStepsPerKeyframe = 4;  // Two paths are each drawn and compared.
 
 // `next` is called before each step, and `go_on` between the iterations of the optimisation. If either

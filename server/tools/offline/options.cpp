@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/options/config.h"
@@ -25,6 +26,42 @@ void VisitFile(OptionVisitor& visitor, OfflineOptions& options) {
   IgnoreServerSections(visitor);
 }
 
+Result<void> TakeStarts(const std::vector<std::string>& texts, OfflineOptions& options) {
+  const std::size_t logs = options.logs.size();
+  if (texts.empty()) {
+    options.starts.assign(logs, logs == 1 ? std::optional(Pose2{}) : std::nullopt);
+    return {};
+  }
+  if (texts.size() != logs) {
+    return Fail(StatusCode::kInvalidArgument,
+                "--start is given " + std::to_string(texts.size()) + " times for " + std::to_string(logs) + " logs");
+  }
+  for (const std::string& text : texts) {
+    if (text == "unknown") {
+      options.starts.emplace_back(std::nullopt);
+      continue;
+    }
+    const auto start = ParseStart(text);
+    if (!start) return Fail(StatusCode::kInvalidArgument, "--start: " + start.error().message);
+    options.starts.emplace_back(*start);
+  }
+  return {};
+}
+
+Result<void> CheckCounts(const OfflineOptions& options) {
+  const std::size_t logs = options.logs.size();
+  for (const auto& [name, files] : {std::pair{"--trajectory", &options.trajectories},
+                                    std::pair{"--smoothed-trajectory", &options.smoothed_trajectories}}) {
+    if (!files->empty() && files->size() != logs) {
+      return Fail(StatusCode::kInvalidArgument, std::string(name) + " is given " + std::to_string(files->size()) +
+                                                    " times for " + std::to_string(logs) + " logs");
+    }
+  }
+  if (logs > 1 && !(options.map.empty() && options.map_lines.empty()))
+    return Fail(StatusCode::kInvalidArgument, "--map and --map-lines take a single log; --smoothed-map takes several");
+  return {};
+}
+
 bool Complain(const Result<void>& result, int& exit_code) {
   if (result) return false;
   std::cerr << "cairn-offline: " << result.error().message << '\n';
@@ -39,23 +76,28 @@ std::optional<OfflineOptions> ParseOfflineOptions(int argc, char** argv, int& ex
   std::filesystem::path config;
   std::vector<std::string> assignments;
   std::string seed;  // Kept as text, so that a number that is too large is reported as an error.
-  CLI::App app{"Runs the estimator over a robot log without a server: the same trajectory as through cairnd."};
+  CLI::App app{
+      "Runs the estimator over a robot log without a server: the same trajectory as through cairnd. Several logs are "
+      "robots of one site; they are smoothed together."};
   app.set_version_flag("--version", std::string("cairn-offline ") + kVersion);
-  app.add_option("LOG", options.log, "CARMEN or DP-SLAM log")->required();
-  app.add_option("--trajectory", options.trajectory, "Write the online trajectory (TUM)");
+  app.add_option("LOG", options.logs, "CARMEN or DP-SLAM log; several: one per robot")->required();
+  // With several logs an option takes one file at a time, so that it does not take the next log.
+  app.add_option("--trajectory", options.trajectories, "Write the online trajectory (TUM); once per log")
+      ->allow_extra_args(false);
   app.add_option("--map", options.map, "Write the online map (map.yaml and an image beside it)");
   app.add_flag("--smooth", options.smooth, "Also smooth the whole path and redraw the map along it");
-  app.add_option("--smoothed-trajectory", options.smoothed_trajectory, "Write the smoothed trajectory (TUM)");
+  app.add_option("--smoothed-trajectory", options.smoothed_trajectories,
+                 "Write the smoothed trajectory (TUM); once per log")
+      ->allow_extra_args(false);
   app.add_option("--smoothed-map", options.smoothed_map, "Write the map redrawn along the smoothed path");
   app.add_option("--map-lines", options.map_lines,
                  "Write the walls seen, as lines, for slam.line_match.map (along the smoothed path with --smooth)");
-  const auto take_start = [&options](const std::string& text) {
-    const auto start = ParseStart(text);
-    if (!start) throw CLI::ValidationError("--start", start.error().message);
-    options.T_map_robot_start = *start;
-  };
-  app.add_option_function<std::string>("--start", take_start, "Where the robot stands at first (m; rad, or 45deg)")
-      ->type_name("X,Y,THETA");
+  std::vector<std::string> starts;
+  app.add_option("--start", starts,
+                 "Where the robot stands at first (m; rad, or 45deg), or unknown; once per log. Without it a single "
+                 "robot starts at the origin, and the starts of several are unknown")
+      ->type_name("X,Y,THETA|unknown")
+      ->allow_extra_args(false);
   app.add_option("--config", config, "YAML file; its slam section is used (cairnd's file will do)");
   app.add_option("--set", assignments, "key=value, e.g. slam.particles=100; repeatable, wins over --config")
       ->allow_extra_args(false);
@@ -70,8 +112,10 @@ std::optional<OfflineOptions> ParseOfflineOptions(int argc, char** argv, int& ex
     exit_code = app.exit(error) == 0 ? 0 : 2;
     return std::nullopt;
   }
+  if (Complain(TakeStarts(starts, options), exit_code) || Complain(CheckCounts(options), exit_code))
+    return std::nullopt;
   if (!seed.empty()) assignments.push_back("slam.seed=" + seed);
-  options.smooth = options.smooth || !options.smoothed_trajectory.empty() || !options.smoothed_map.empty();
+  options.smooth = options.smooth || !options.smoothed_trajectories.empty() || !options.smoothed_map.empty();
 
   if (!config.empty() &&
       Complain(ApplyYamlFile(config, [&](OptionVisitor& visitor) { VisitFile(visitor, options); }), exit_code))

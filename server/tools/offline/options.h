@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "common/geometry/pose2.h"
 #include "common/sensor/log_reader.h"
@@ -11,15 +12,18 @@
 namespace cairn::server {
 
 struct OfflineOptions {
-  std::filesystem::path log;
-  std::filesystem::path trajectory;  // An empty path means "do not write this file", here and below.
+  std::vector<std::filesystem::path> logs;  // Each of one robot. At least one.
+  // One per log, or none: then these files are not written.
+  std::vector<std::filesystem::path> trajectories;
+  std::vector<std::filesystem::path> smoothed_trajectories;
+  // An empty path means "do not write this file", here and below. All but the smoothed map are those of a single log.
   std::filesystem::path map;
   std::filesystem::path map_lines;
   std::filesystem::path used_log;
   bool smooth = false;
-  std::filesystem::path smoothed_trajectory;
   std::filesystem::path smoothed_map;
-  Pose2 T_map_robot_start;
+  // One per log: where its robot stands at first. Nothing: unknown, and found by what the others have seen.
+  std::vector<std::optional<Pose2>> starts;
   std::int64_t threads = 0;  // 0: one per core.
   bool json = false;
   LogReaderOptions reader;

@@ -42,6 +42,8 @@ std::uint64_t Total(const std::array<std::uint64_t, kDropReasonCount>& dropped) 
   return std::accumulate(dropped.begin(), dropped.end(), std::uint64_t{0});
 }
 
+}  // namespace
+
 void AddUsage(OfflineReport& report) {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
@@ -56,9 +58,11 @@ Result<void> WriteMap(const slam::OccupancyGrid& grid, const std::filesystem::pa
   return SaveMapYaml(slam::ImageOf(grid), path, ".png", MapSaveOptions{});
 }
 
+namespace {
+
 Result<void> WriteResults(const OfflineOptions& options, const Trajectory& online, const slam::Mapper& mapper) {
-  if (!options.trajectory.empty())
-    if (auto written = WriteTum(online, options.trajectory); !written) return written;
+  if (!options.trajectories.empty())
+    if (auto written = WriteTum(online, options.trajectories.front()); !written) return written;
   if (!options.map.empty())
     if (auto written = WriteMap(mapper.grid(), options.map); !written) return written;
   if (!options.smooth && options.map_lines.empty()) return {};
@@ -70,8 +74,8 @@ Result<void> WriteResults(const OfflineOptions& options, const Trajectory& onlin
   if (!options.smooth) return write_lines(snapshot.full_path);
   const auto smoothed = slam::SmoothMap(snapshot, options.slam.grid, [] { return true; });
   if (auto written = write_lines(smoothed->path); !written) return written;
-  if (!options.smoothed_trajectory.empty()) {
-    auto written = WriteTum(snapshot.TrajectoryAlong(smoothed->path), options.smoothed_trajectory);
+  if (!options.smoothed_trajectories.empty()) {
+    auto written = WriteTum(snapshot.TrajectoryAlong(smoothed->path), options.smoothed_trajectories.front());
     if (!written) return written;
   }
   return options.smoothed_map.empty() ? Result<void>{} : WriteMap(smoothed->grid, options.smoothed_map);
@@ -79,22 +83,24 @@ Result<void> WriteResults(const OfflineOptions& options, const Trajectory& onlin
 
 }  // namespace
 
-Result<OfflineReport> RunOffline(const OfflineOptions& options) {
-  const Clock::time_point start = Clock::now();
-  OfflineReport report;
-  Trajectory online;
+Result<OfflineRobot> Estimate(const OfflineOptions& options, const std::filesystem::path& log,
+                              const Pose2& T_map_robot_start) {
+  OfflineRobot robot;
+  OfflineReport& report = robot.report;
   Clock::time_point before;
-  slam::ScanPipeline pipeline(
-      options.slam, options.T_map_robot_start, OverThreads(options.threads),
-      {[&](const Scan&, const slam::ScanOutcome& outcome) {
-         report.scan_ms.push_back(SecondsSince(before) * 1e3);
-         before = Clock::now();
-         ++report.scans_used;
-         report.keyframes += outcome.keyframe ? 1 : 0;
-         report.not_localized += outcome.localized ? 0 : 1;
-         online.push_back({outcome.stamp, outcome.T_map_robot});
-       },
-       [&](const Scan&, DropReason reason) { ++report.dropped[static_cast<std::size_t>(reason)]; }});
+  robot.pipeline = std::make_unique<slam::ScanPipeline>(
+      options.slam, T_map_robot_start, OverThreads(options.threads),
+      slam::ScanPipeline::Sink{
+          [&](const Scan&, const slam::ScanOutcome& outcome) {
+            report.scan_ms.push_back(SecondsSince(before) * 1e3);
+            before = Clock::now();
+            ++report.scans_used;
+            report.keyframes += outcome.keyframe ? 1 : 0;
+            report.not_localized += outcome.localized ? 0 : 1;
+            robot.online.push_back({outcome.stamp, outcome.T_map_robot});
+          },
+          [&](const Scan&, DropReason reason) { ++report.dropped[static_cast<std::size_t>(reason)]; }});
+  slam::ScanPipeline& pipeline = *robot.pipeline;
 
   const auto add = [&](LogRecord&& record) {
     before = Clock::now();
@@ -114,7 +120,7 @@ Result<OfflineReport> RunOffline(const OfflineOptions& options) {
     }
     return true;
   };
-  auto summary = ReadLog(options.log, options.reader, add);
+  auto summary = ReadLog(log, options.reader, add);
   if (!summary) return tl::unexpected<Status>(summary.error());
   report.log = *std::move(summary);
   before = Clock::now();
@@ -122,11 +128,18 @@ Result<OfflineReport> RunOffline(const OfflineOptions& options) {
   report.odometry_dropped += pipeline.odometry_refused();
   pipeline.mapper().FinishMap();
   report.landmarks = pipeline.mapper().landmarks().size();
-  if (auto written = WriteResults(options, online, pipeline.mapper()); !written)
+  return robot;
+}
+
+Result<OfflineReport> RunOffline(const OfflineOptions& options) {
+  const Clock::time_point start = Clock::now();
+  auto robot = Estimate(options, options.logs.front(), options.starts.front().value_or(Pose2{}));
+  if (!robot) return tl::unexpected<Status>(robot.error());
+  if (auto written = WriteResults(options, robot->online, robot->pipeline->mapper()); !written)
     return tl::unexpected<Status>(written.error());
-  report.wall_s = SecondsSince(start);
-  AddUsage(report);
-  return report;
+  robot->report.wall_s = SecondsSince(start);
+  AddUsage(robot->report);
+  return std::move(robot->report);
 }
 
 std::string ReportText(const OfflineReport& report) {
@@ -151,24 +164,24 @@ std::string ReportText(const OfflineReport& report) {
   return out.str();
 }
 
-std::string ReportJson(const OfflineReport& report) {
+Json JsonOf(const OfflineReport& report) {
   Json dropped = Json::object();
   for (std::size_t i = 0; i < report.dropped.size(); ++i)
     if (report.dropped[i] > 0) dropped[std::string(DropReasonName(static_cast<DropReason>(i)))] = report.dropped[i];
-  return JsonLine({{"time_ms_mean", Mean(report.scan_ms)},
-                   {"time_ms_p50", Percentile(report.scan_ms, 0.5)},
-                   {"time_ms_p99", Percentile(report.scan_ms, 0.99)},
-                   {"time_ms_max", Percentile(report.scan_ms, 1.0)},
-                   {"cpu_s", report.cpu_s},
-                   {"wall_s", report.wall_s},
-                   {"scans_used", report.scans_used},
-                   {"scans_dropped", Total(report.dropped)},
-                   {"landmarks", report.landmarks},
-                   {"peak_rss_mib", report.peak_rss_mib},
-                   {"keyframes", report.keyframes},
-                   {"not_localized", report.not_localized},
-                   {"dropped", std::move(dropped)},
-                   {"log_complaints", report.log.complaint_count}});
+  return {{"time_ms_mean", Mean(report.scan_ms)},
+          {"time_ms_p50", Percentile(report.scan_ms, 0.5)},
+          {"time_ms_p99", Percentile(report.scan_ms, 0.99)},
+          {"time_ms_max", Percentile(report.scan_ms, 1.0)},
+          {"cpu_s", report.cpu_s},
+          {"wall_s", report.wall_s},
+          {"scans_used", report.scans_used},
+          {"scans_dropped", Total(report.dropped)},
+          {"landmarks", report.landmarks},
+          {"peak_rss_mib", report.peak_rss_mib},
+          {"keyframes", report.keyframes},
+          {"not_localized", report.not_localized},
+          {"dropped", std::move(dropped)},
+          {"log_complaints", report.log.complaint_count}};
 }
 
 }  // namespace cairn::server

@@ -1,8 +1,11 @@
-// Runs the estimator once over a log and measures the time of each scan.
+// Runs the estimator once over a log, or once over each of several, and measures the time of each scan.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,6 +14,7 @@
 #include "common/service/ledger.h"
 #include "common/status.h"
 #include "server/slam/scan_pipeline.h"
+#include "server/tools/log_run/json_line.h"
 #include "server/tools/offline/options.h"
 
 namespace cairn::server {
@@ -29,10 +33,25 @@ struct OfflineReport {
   LogSummary log;
 };
 
-// Reads the log, runs the estimator, and writes the requested files.
+// One robot after the last scan of its log.
+struct OfflineRobot {
+  OfflineReport report;
+  Trajectory online;
+  std::unique_ptr<slam::ScanPipeline> pipeline;
+};
+
+[[nodiscard]] Result<OfflineRobot> Estimate(const OfflineOptions& options, const std::filesystem::path& log,
+                                            const Pose2& T_map_robot_start);
+
+[[nodiscard]] Result<void> WriteMap(const slam::OccupancyGrid& grid, const std::filesystem::path& path);
+
+// The time since the start of the program and its memory.
+void AddUsage(OfflineReport& report);
+
+// Reads the log, runs the estimator, and writes the requested files. REQUIRES: there is one log.
 [[nodiscard]] Result<OfflineReport> RunOffline(const OfflineOptions& options);
 
 [[nodiscard]] std::string ReportText(const OfflineReport& report);
-[[nodiscard]] std::string ReportJson(const OfflineReport& report);
+[[nodiscard]] Json JsonOf(const OfflineReport& report);
 
 }  // namespace cairn::server

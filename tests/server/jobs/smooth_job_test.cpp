@@ -14,6 +14,7 @@
 
 #include "server/jobs/job_worker.h"
 #include "tests/server/robots/one_session.h"
+#include "tests/server/slam/site/site_drives.h"
 #include "tests/server/support/room_world.h"
 
 namespace cairn::server {
@@ -51,7 +52,7 @@ class SmoothSiteTest : public ::testing::Test {
 };
 
 TEST_F(SmoothSiteTest, RedrawsTheMapAlongTheFullPathAndSaysHowMuchBetterItFits) {
-  const auto smoothed = SmoothSite(job_, {Material()}, control_);
+  const auto smoothed = SmoothSite(job_, {Material()}, nullptr, control_);
   ASSERT_TRUE(smoothed);
   EXPECT_LT(smoothed->outcome.cost_after, smoothed->outcome.cost_before);
   EXPECT_GT(smoothed->outcome.cost_after, 0.0);
@@ -73,8 +74,8 @@ TEST_F(SmoothSiteTest, TheResultIsTheSumOverAllRobots) {
   SessionMaterial other = Material();
   other.session = 6;
   other.robot = "r2";
-  const auto one = SmoothSite(job_, {Material()}, control_);
-  const auto both = SmoothSite(job_, {Material(), other}, control_);
+  const auto one = SmoothSite(job_, {Material()}, nullptr, control_);
+  const auto both = SmoothSite(job_, {Material(), other}, nullptr, control_);
   ASSERT_TRUE(one && both);
   EXPECT_EQ(both->outcome.message, "2 robots, 40 keyframes, 40 scans");
   EXPECT_EQ(both->version.parts.size(), 2U);
@@ -83,16 +84,51 @@ TEST_F(SmoothSiteTest, TheResultIsTheSumOverAllRobots) {
   EXPECT_DOUBLE_EQ(both->outcome.cost_after, one->outcome.cost_after);
 }
 
+// Nobody has said where they start; each has a map of its own, and both have seen a part of the same corridor.
+TEST_F(SmoothSiteTest, RobotsThatHaveSeenTheSameAreSmoothedTogether) {
+  const slam::test::World world = slam::test::RingCorridor(true);
+  const auto material_of = [&](SessionId session, double from_m, const Pose2& T_own_start) {
+    SessionMaterial material{.session = session,
+                             .robot = "r" + std::to_string(session),
+                             .snapshot = slam::test::DriveRing(world, from_m, 60.0, T_own_start, session).snapshot,
+                             .grid_options = {},
+                             .start_known = false};
+    return material;
+  };
+  const std::vector<SessionMaterial> material{material_of(1, 0.0, {}), material_of(2, 24.0, {5.0, -3.0, 1.0})};
+  const slam::SiteOptions options = SiteOptionsOf(slam::MapperOptions{});
+  const auto smoothed = SmoothSite(job_, material, &options, control_);
+  ASSERT_TRUE(smoothed);
+  EXPECT_NE(smoothed->outcome.message.find("; joined 2: r1 ("), std::string::npos) << smoothed->outcome.message;
+  EXPECT_NE(smoothed->outcome.message.find("not joined 0"), std::string::npos) << smoothed->outcome.message;
+  const RobotGrid& moved = smoothed->version.parts.at(2);
+  ASSERT_TRUE(moved.path);
+  ASSERT_EQ(moved.path->size(), material[1].snapshot.keyframes.size());
+  // 24 m along the first side.
+  EXPECT_LT((moved.path->front().translation() - Eigen::Vector2d(24.0, 0.0)).norm(), 0.5);
+  slam::OccupancyGrid expected(slam::GridOptions{});
+  for (std::size_t k = 0; k < moved.path->size(); ++k)
+    expected.Draw(*material[1].snapshot.keyframes[k].scan, (*moved.path)[k]);
+  EXPECT_EQ(moved.chunks.size(), expected.chunk_count());
+  EXPECT_EQ(smoothed->version.smoothed.at("r2")->front().T_map_robot, moved.path->front());
+  EXPECT_TRUE(std::ranges::is_sorted(progress_));
+  EXPECT_GT(progress_.back(), 0.95);
+
+  const auto apart = SmoothSite(job_, material, nullptr, control_);
+  ASSERT_TRUE(apart);
+  EXPECT_EQ(apart->version.parts.at(2).path->front(), (Pose2{5.0, -3.0, 1.0}));
+}
+
 TEST_F(SmoothSiteTest, TheSmoothedPathIsTheOneAlongWhichTheMapIsDrawn) {
   SessionMaterial material = Material();
   std::swap(material.snapshot.online_path, material.snapshot.full_path);  // Now the online path is right.
-  const auto smoothed = SmoothSite(job_, {material}, control_);
+  const auto smoothed = SmoothSite(job_, {material}, nullptr, control_);
   ASSERT_TRUE(smoothed);
   EXPECT_EQ(smoothed->version.smoothed.at("r1")->back().T_map_robot, TruePose(4 * (kKeyframes - 1)));
 }
 
 TEST_F(SmoothSiteTest, ProgressGoesFromNothingToAll) {
-  ASSERT_TRUE(SmoothSite(job_, {Material()}, control_));
+  ASSERT_TRUE(SmoothSite(job_, {Material()}, nullptr, control_));
   ASSERT_EQ(progress_.size(), 4U * kKeyframes);
   EXPECT_TRUE(std::is_sorted(progress_.begin(), progress_.end()));
   EXPECT_EQ(progress_.front(), 0.0);
@@ -101,7 +137,7 @@ TEST_F(SmoothSiteTest, ProgressGoesFromNothingToAll) {
 
 TEST_F(SmoothSiteTest, CancellingEndsItAtTheNextStep) {
   control_.Cancel();
-  const auto smoothed = SmoothSite(job_, {Material()}, control_);
+  const auto smoothed = SmoothSite(job_, {Material()}, nullptr, control_);
   ASSERT_FALSE(smoothed);
   EXPECT_EQ(smoothed.error().code, StatusCode::kCancelled);
   EXPECT_EQ(progress_.size(), 1U);
@@ -132,7 +168,7 @@ class SmoothJobTest : public SmoothSiteTest {
   Result<JobOutcome> Run(double timeout_s, bool enable = true) {
     JobsOptions options;
     options.snapshot_timeout_s = timeout_s;
-    return SmoothJob(options, roster_, atlas_).Run(job_, enable, control_);
+    return SmoothJob(options, {}, roster_, atlas_).Run(job_, enable, control_);
   }
 
   std::promise<void> release_;
@@ -178,7 +214,7 @@ TEST_F(SmoothJobTest, ASiteWithoutRobotsOrThatIsGoneFailsWithAReason) {
   EXPECT_EQ(Run(20.0).error().code, StatusCode::kFailedPrecondition);
   job_.site = "lab";
   const Atlas without_it(MapsOptions{}, 0.05, true, maps_pool_, outbound_);
-  EXPECT_EQ(SmoothJob({}, roster_, without_it).Run(job_, true, control_).error().code, StatusCode::kNotFound);
+  EXPECT_EQ(SmoothJob({}, {}, roster_, without_it).Run(job_, true, control_).error().code, StatusCode::kNotFound);
 }
 
 TEST_F(SmoothJobTest, FailsIfARobotDoesNotHandOverItsStateInTime) {
@@ -212,7 +248,7 @@ TEST_F(SmoothJobTest, AJobThatIsCancelledWhileItWaitsForItsSiteEndsAtOnce) {
   JobsOptions options;
   options.snapshot_timeout_s = 60.0;
   const auto begin = std::chrono::steady_clock::now();
-  EXPECT_EQ(SmoothJob(options, roster_, atlas_).Run(job_, true, control).error().code, StatusCode::kCancelled);
+  EXPECT_EQ(SmoothJob(options, {}, roster_, atlas_).Run(job_, true, control).error().code, StatusCode::kCancelled);
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(30));
 }
 
@@ -230,7 +266,7 @@ TEST_F(SmoothJobTest, ASwitchThatHasBegunIsWaitedFor) {
   JobsOptions options;
   options.snapshot_timeout_s = kTimeoutS;
   auto job =
-      std::async(std::launch::async, [&] { return SmoothJob(options, roster_, atlas_).Run(job_, true, control); });
+      std::async(std::launch::async, [&] { return SmoothJob(options, {}, roster_, atlas_).Run(job_, true, control); });
   EXPECT_EQ(job.wait_for(std::chrono::duration<double>(1.5 * kTimeoutS)), std::future_status::timeout);
   release.set_value();
   const auto outcome = job.get();
@@ -276,7 +312,7 @@ TEST(JobWorker, StopEndsALongFitAtItsNextIteration) {
     clockid_t clock{};
     pthread_getcpuclockid(pthread_self(), &clock);
     clock_of_worker.set_value(clock);
-    auto smoothed = SmoothSite(job, {material}, control);
+    auto smoothed = SmoothSite(job, {material}, nullptr, control);
     if (!smoothed) return tl::unexpected(smoothed.error());
     return smoothed->outcome;
   });
@@ -308,7 +344,7 @@ TEST(JobWorker, StopEndsALongFitAtItsNextIteration) {
 }
 
 TEST_F(SmoothSiteTest, ASiteWithoutScansFailsWithAReason) {
-  EXPECT_EQ(SmoothSite(job_, {}, control_).error().code, StatusCode::kFailedPrecondition);
+  EXPECT_EQ(SmoothSite(job_, {}, nullptr, control_).error().code, StatusCode::kFailedPrecondition);
 }
 
 }  // namespace

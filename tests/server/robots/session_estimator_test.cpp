@@ -148,6 +148,30 @@ TEST_F(SessionEstimatorTest, ACorrectionReplacesTheGridAndTellsWhatItGaveUp) {
   EXPECT_EQ(poses_.back().map_epoch, 9U);
 }
 
+// The pose after a switch lies in the map of the new epoch, and a rollback takes it back.
+TEST_F(SessionEstimatorTest, ACorrectionWithAPathMovesThePose) {
+  Drive(0, 10);
+  const std::size_t keyframes = ledger().keyframes;
+  const Pose2 before = poses_.back().T_map_robot, T_new_old{2.0, 1.0, 0.3};
+  std::vector<Pose2> path = Snapshot().snapshot.full_path;
+  for (Pose2& pose : path) pose = T_new_old * pose;
+  std::optional<Adopted> adopted;
+  const auto adopt = [&](std::uint32_t epoch, RobotGrid grid) {
+    estimator_.Handle(Correction{.epoch = epoch, .grid = std::move(grid), .done = [&adopted](Adopted&& answer) {
+                                   adopted = std::move(answer);
+                                 }});
+  };
+  adopt(9, {{}, keyframes, std::make_shared<const std::vector<Pose2>>(path)});
+  Drive(10, 11);
+  EXPECT_EQ(poses_.back().map_epoch, 9U);
+  EXPECT_LT((poses_.back().T_map_robot.translation() - (T_new_old * before).translation()).norm(), 0.5);
+  ASSERT_TRUE(adopted && adopted->displaced.path);
+  EXPECT_EQ(adopted->displaced.path->size(), adopted->displaced.keyframes);
+  adopt(10, RobotGrid(adopted->displaced));
+  Drive(11, 12);
+  EXPECT_LT((poses_.back().T_map_robot.translation() - before.translation()).norm(), 0.5);
+}
+
 // The next server would have this robot's part of a map that was never switched, beside the old parts of the others.
 TEST_F(SessionEstimatorTest, NoCheckpointHoldsAGridBeforeTheSwitchToItIsComplete) {
   Drive(0, 10);

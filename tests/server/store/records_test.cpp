@@ -108,5 +108,25 @@ TEST(Records, ValuesThatNoServerWritesAreRefused) {
   EXPECT_FALSE(LayerOf(BytesOf(far)));
 }
 
+// The estimator follows this path, so it must be one.
+TEST(Records, ThePathOfAGridIsOnePoseForEachOfItsKeyframes) {
+  const auto with = [](std::vector<Pose2> path) {
+    StoredLayer layer{6, SampleGrid(1)};
+    layer.grid.path = std::make_shared<const std::vector<Pose2>>(std::move(path));
+    return BytesOf(layer);
+  };
+  std::vector<Pose2> path(12, Pose2{1.0, 2.0, 0.5});
+  path.back() = {-3.0, 4.0, -1.5};
+  const auto back = LayerOf(with(path));
+  ASSERT_TRUE(back && back->grid.path);
+  EXPECT_EQ(*back->grid.path, path);
+  EXPECT_EQ(LayerOf(BytesOf(StoredLayer{6, SampleGrid(1)}))->grid.path, nullptr);
+  EXPECT_FALSE(LayerOf(with(std::vector<Pose2>(11))));
+  path[3].x = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(LayerOf(with(path)));
+  path[3].x = 1e12;
+  EXPECT_FALSE(LayerOf(with(path)));
+}
+
 }  // namespace
 }  // namespace cairn::server

@@ -283,7 +283,8 @@ TEST(FindSession, TakesARobotOrANumber) {
 }
 
 TEST(GridTransform, TurnsAndBackAreTheSameGrid) {
-  const StoredGrid grid = SampleGrid(3);
+  StoredGrid grid = SampleGrid(3);
+  grid.path = std::make_shared<const std::vector<Pose2>>(12, Pose2{1.0, 2.0, 0.5});
   const StoredGrid there = Transformed(grid, {0.35, -2.0, kQuarterTurn}, 0.05);
   const StoredGrid back = Transformed(there, Pose2{0.35, -2.0, kQuarterTurn}.Inverse(), 0.05);
   EXPECT_EQ(back.keyframes, grid.keyframes);
@@ -294,7 +295,12 @@ TEST(GridTransform, TurnsAndBackAreTheSameGrid) {
     EXPECT_TRUE(
         std::equal(grid.chunks[i].cells.get(), grid.chunks[i].cells.get() + kTileArea, back.chunks[i].cells.get()));
   }
+  const Pose2 T_to_from{0.35, -2.0, kQuarterTurn};
+  ASSERT_TRUE(there.path && back.path);
+  EXPECT_EQ(there.path->at(5), T_to_from * grid.path->at(5));
+  EXPECT_LT((back.path->at(5).translation() - grid.path->at(5).translation()).norm(), 1e-9);
   EXPECT_TRUE(Transformed({}, {1, 2, 3}, 0.05).chunks.empty());
+  EXPECT_EQ(Transformed({}, {1, 2, 3}, 0.05).path, nullptr);
 }
 
 }  // namespace

@@ -61,6 +61,56 @@ TEST_F(CairnOffline, SameInputAndSeedGiveTheSameBytesWhateverTheThreads) {
   }
 }
 
+// The same drive as two robots, the second of which is said to have started a little beside the first.
+TEST_F(CairnOffline, SeveralRobotsAreSmoothedTogetherToTheSameBytesEveryTime) {
+  const std::vector<std::string> names{"a.tum", "b.tum", "map.png"};
+  std::vector<std::string> first;
+  for (const std::string threads : {"1", "2"}) {
+    const TempDirectory out;
+    const auto run = Run({Log(), Log(), "--start", "0,0,0", "--start", "0.2,0.1,0", "--threads", threads, "--json",
+                          "--smoothed-trajectory", (out / "a.tum").string(), "--smoothed-trajectory",
+                          (out / "b.tum").string(), "--smoothed-map", (out / "map.yaml").string()});
+    ASSERT_EQ(run.exit_code, 0) << run.output;
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      const std::string bytes = out.Read(names[i]);
+      ASSERT_FALSE(bytes.empty()) << names[i];
+      if (first.size() < names.size()) {
+        first.push_back(bytes);
+      } else {
+        EXPECT_TRUE(bytes == first[i]) << names[i] << " with " << threads << " threads";
+      }
+    }
+    const auto robots = nlohmann::json::parse(run.output)["robots"];
+    ASSERT_EQ(robots.size(), 2U);
+    for (const auto& robot : robots) {
+      EXPECT_TRUE(robot["joined"]);
+      EXPECT_TRUE(robot["in_map"]);
+      EXPECT_EQ(robot["frame"], 0);
+      EXPECT_GT(robot["scans_used"], 100);
+      EXPECT_GT(robot["agreement"], 0.95);
+    }
+    const auto a = ReadTum(out / "a.tum"), b = ReadTum(out / "b.tum");
+    ASSERT_TRUE(a && b);
+    EXPECT_LT((a->back().T_map_robot.translation() - b->back().T_map_robot.translation()).norm(), 0.05);
+  }
+}
+
+// What 20 s of driving show is no proof of where a robot is.
+TEST_F(CairnOffline, ARobotThatIsNotJoinedIsNotDrawnIntoTheOthersMap) {
+  const TempDirectory out;
+  const auto run = Run({Log(), Log(), "--start", "0,0,0", "--start", "unknown", "--smooth"});
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  EXPECT_NE(run.output.find("not joined"), std::string::npos) << run.output;
+  EXPECT_NE(run.output.find("not drawn"), std::string::npos) << run.output;
+}
+
+TEST_F(CairnOffline, SaysWhichOptionsEachOfSeveralLogsNeeds) {
+  EXPECT_EQ(Run({Log(), Log(), "--start", "0,0,0"}).exit_code, 2);
+  EXPECT_EQ(Run({Log(), Log(), "--smoothed-trajectory", "a.tum"}).exit_code, 2);
+  EXPECT_EQ(Run({Log(), Log(), "--map", "map.yaml"}).exit_code, 2);
+  EXPECT_EQ(Run({Log(), "--start", "somewhere"}).exit_code, 2);
+}
+
 TEST_F(CairnOffline, FindsItselfInTheWallsOfAnEarlierDriveFromAWrongStart) {
   const TempDirectory out;
   const std::string lines = (out / "walls.lines").string();

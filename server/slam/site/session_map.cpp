@@ -1,0 +1,63 @@
+#include "server/slam/site/session_map.h"
+
+#include <limits>
+#include <utility>
+
+#include "server/slam/loops/region.h"
+#include "server/slam/scan/beam_points.h"
+
+namespace cairn::slam {
+
+namespace {
+
+// The steps alone, for a session in which no place was seen again: its snapshot has no relations then.
+std::vector<PoseRelation> StepsAlong(const std::vector<Pose2>& path, const MotionNoise& drift) {
+  std::vector<PoseRelation> steps;
+  for (std::size_t k = 1; k < path.size(); ++k) {
+    const Pose2 step = Between(path[k - 1], path[k]);
+    steps.push_back({k - 1, k, step, drift.Covariance(step) + 1e-10 * Eigen::Matrix3d::Identity(), false});
+  }
+  return steps;
+}
+
+}  // namespace
+
+SessionMap::SessionMap(const MapperSnapshot& snapshot, std::vector<Pose2> own_path, const SiteOptions& options)
+    : relations_(snapshot.relations.empty() ? StepsAlong(own_path, options.drift) : snapshot.relations),
+      own_path_(std::move(own_path)),
+      trail_(MotionNoise{}, options.surface),
+      places_(options.place, options.loop, options.self_check, options.align) {
+  for (std::size_t k = 0; k < own_path_.size(); ++k) {
+    const Scan& scan = *snapshot.keyframes[k].scan;
+    trail_.Append(snapshot.keyframes[k], own_path_[k], SurfacePointsOf(PointsOf(scan), scan, options.surface),
+                  Eigen::Matrix3d::Zero(), std::nullopt);
+    shared_own_path_.Append(own_path_[k]);
+  }
+}
+
+std::vector<RecentScan> SessionMap::ScansAround(std::size_t keyframe, double way_m) const {
+  const Stretch stretch = StretchAround(trail_.shapes(), keyframe, way_m);
+  std::vector<RecentScan> scans;
+  for (std::size_t k = stretch.first; k <= stretch.last; ++k)
+    if (localized(k)) scans.push_back({trail_.keyframes()[k].scan, own_path_[k], travelled_m(k), trail_.points(k)});
+  return scans;
+}
+
+std::optional<FoundPlace> SessionMap::Find(std::span<const RecentScan> scans) {
+  return places_.Find(trail_, shared_own_path_, scans);
+}
+
+std::size_t SessionMap::NearestTo(const Pose2& T_own_robot) const {
+  std::size_t nearest = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < size(); ++k) {
+    const double away = (own_path_[k].translation() - T_own_robot.translation()).norm() +
+                        std::abs(AngleDiff(own_path_[k].theta, T_own_robot.theta));
+    if (!localized(k) || away >= least) continue;
+    least = away;
+    nearest = k;
+  }
+  return nearest;
+}
+
+}  // namespace cairn::slam

@@ -1,0 +1,46 @@
+// One smoothing over all sessions of a site: finds relations between robots and between runs, and fits all paths to
+// them at once. Sessions whose start is unknown or wrong get their place from these relations. A session that does not
+// join stays as it is, and the result says so. It prefers leaving a session apart to joining it at a wrong place; but
+// who has seen only one of two equal places can not know that there is another. Frames: `own` is the map frame of a
+// session before; `site` that of the sessions it is joined with (site_graph.h). Stateless, thread-safe, deterministic
+// (one thread). Takes about a second per hundred metres of way and per pair of sessions.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "server/slam/site/relation_search.h"
+#include "server/slam/site/site_options.h"
+#include "server/slam/trail/keyframe.h"
+
+namespace cairn::slam {
+
+struct SiteSession {
+  const MapperSnapshot& snapshot;
+  // Whether the place of its first keyframe in the site is known, to half a metre.
+  bool start_known = true;
+};
+
+struct SmoothedSession {
+  std::vector<Pose2> path;  // T_site_robot, one per keyframe.
+  bool joined = false;      // Related to other sessions, also where its own frame is the common one.
+  std::size_t frame = 0;    // The number of the session in whose frame `path` lies; its own if it is not joined.
+  // How its first keyframe has moved. The identity for the session whose frame it is.
+  Pose2 T_site_own;
+  std::size_t relations = 0;  // With other sessions, after wrong ones were withdrawn.
+  std::size_t withdrawn = 0;
+  // Confidence: the share of surfaces seen by other sessions as well that are where those saw them. 0 without
+  // relations.
+  double agreement = 0.0;
+};
+
+// One result per session. `go_on` is asked often and gets the share of the work that is done, 0..1; if it returns
+// false, there is no result.
+[[nodiscard]] std::optional<std::vector<SmoothedSession>> SmoothSessions(std::span<const SiteSession> sessions,
+                                                                         const SiteOptions& options,
+                                                                         const std::function<bool(double)>& go_on);
+
+}  // namespace cairn::slam

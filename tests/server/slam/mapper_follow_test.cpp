@@ -1,0 +1,126 @@
+// The estimator follows the path that a job has found.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "server/slam/graph/pose_graph.h"
+#include "server/slam/mapper.h"
+#include "tests/server/slam/ring_drive.h"
+
+namespace cairn::slam {
+namespace {
+
+using test::Drive;
+using test::DriveRound;
+using test::ShareMissing;
+
+// A job has found that the whole map lies elsewhere, and knows a path that is not quite the robot's own. From then on
+// the pose, the path, the landmarks and what is drawn are those of the job's map.
+TEST(MapperFollows, TheEstimatorFollowsThePathThatComesWithAGrid) {
+  const Drive drive = DriveRound();
+  MapperOptions options;
+  options.filter.particles = 20;
+  Mapper mapper(options, drive.truth.front(), 1), undisturbed(options, drive.truth.front(), 1);
+  const auto process = [&](Mapper& one, std::size_t i) {
+    return one.Process(drive.scans[i], drive.odometry[i], SerialFor);
+  };
+  for (std::size_t i = 0; i < 60; ++i) {
+    static_cast<void>(process(mapper, i));
+    static_cast<void>(process(undisturbed, i));
+  }
+  const Pose2 T_new_old{3.0, -2.0, 0.5};
+  const MapperSnapshot snapshot = mapper.Snapshot();
+  std::vector<Pose2> path = snapshot.full_path;
+  OccupancyGrid grid(mapper.grid().options());
+  for (std::size_t k = 0; k < path.size(); ++k) {
+    path[k] = T_new_old * path[k];
+    grid.Draw(*snapshot.keyframes[k].scan, path[k]);
+  }
+  for (std::size_t i = 60; i < 80; ++i) {  // While the job was at work.
+    static_cast<void>(process(mapper, i));
+    static_cast<void>(process(undisturbed, i));
+  }
+  const std::vector<Landmark> landmarks = mapper.landmarks();
+  ASSERT_FALSE(landmarks.empty());
+  mapper.AdoptGrid(std::move(grid), path.size(), path);
+
+  EXPECT_EQ(mapper.BestPath().front(), path.front());
+  ASSERT_EQ(mapper.BestPath().size(), mapper.keyframe_count());
+  EXPECT_EQ(mapper.Snapshot().online_path, mapper.BestPath()) << "the grid is drawn along it";
+  ASSERT_EQ(mapper.landmarks().size(), landmarks.size());
+  EXPECT_LT((mapper.landmarks().front().p_map - T_new_old * landmarks.front().p_map).norm(), 0.05);
+  OccupancyGrid expected(mapper.grid().options());
+  for (std::size_t i = 80; i < 160; ++i) {
+    const ScanOutcome there = process(mapper, i), here = process(undisturbed, i);
+    EXPECT_LT((there.T_map_robot.translation() - T_new_old * here.T_map_robot.translation()).norm(), 0.15) << i;
+    EXPECT_LT(std::abs(AngleDiff(there.T_map_robot.theta, (T_new_old * here.T_map_robot).theta)), 0.03) << i;
+    EXPECT_TRUE(there.localized);
+  }
+  const MapperSnapshot after = mapper.Snapshot();
+  for (std::size_t k = 0; k < after.keyframes.size(); ++k)
+    expected.Draw(*after.keyframes[k].scan, after.online_path[k]);
+  EXPECT_LT(ShareMissing(expected, mapper.grid()), 0.01);
+  EXPECT_LT(ShareMissing(mapper.grid(), expected), 0.01);
+}
+
+// The pose of a scan that is not level comes from the last level one, also when that was before the map moved.
+TEST(MapperFollows, ATiltedScanAfterTheMapHasMovedIsReportedInTheNewMap) {
+  const Drive drive = DriveRound();
+  MapperOptions options;
+  options.filter.particles = 20;
+  Mapper mapper(options, drive.truth.front(), 1);
+  ScanOutcome last;
+  for (std::size_t i = 0; i < 40; ++i) last = mapper.Process(drive.scans[i], drive.odometry[i], SerialFor);
+  const Pose2 T_new_old{3.0, -2.0, 0.5};
+  std::vector<Pose2> path = mapper.BestPath();
+  for (Pose2& pose : path) pose = T_new_old * pose;
+  mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), path.size(), path);
+  Scan tilted = *drive.scans[40];
+  tilted.tilt_rad = 0.3;
+  const ScanOutcome outcome = mapper.Process(std::make_shared<const Scan>(tilted), drive.odometry[39], SerialFor);
+  EXPECT_LT((outcome.T_map_robot.translation() - (T_new_old * last.T_map_robot).translation()).norm(), 1e-6);
+}
+
+// A job has bent the path by what other robots have seen. The next large loop must not bend it back.
+TEST(MapperFollows, TheShapeOfAPathThatWasTakenIsKeptInRelations) {
+  const Drive drive = DriveRound();
+  MapperOptions options;
+  options.filter.particles = 20;
+  Mapper mapper(options, drive.truth.front(), 1);
+  for (std::size_t i = 0; i < 100; ++i) static_cast<void>(mapper.Process(drive.scans[i], drive.odometry[i], SerialFor));
+  ASSERT_TRUE(mapper.Snapshot().relations.empty()) << "no place was seen again";
+  std::vector<Pose2> path = mapper.BestPath();
+  for (std::size_t k = 1; k < path.size(); ++k) {
+    const Pose2 step = Between(mapper.BestPath()[k - 1], mapper.BestPath()[k]);
+    path[k] = path[k - 1] * Pose2{step.x, step.y, step.theta + 0.002};
+  }
+  const auto adopt = [&] { mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), path.size(), path); };
+  adopt();
+  MapperSnapshot snapshot = mapper.Snapshot();
+  ASSERT_FALSE(snapshot.relations.empty());
+  const std::size_t relations = snapshot.relations.size();
+  ASSERT_TRUE(OptimisePoses(snapshot.full_path, snapshot.relations, snapshot.pose_graph).usable);
+  for (std::size_t k = 0; k < path.size(); ++k)
+    EXPECT_LT((snapshot.full_path[k].translation() - path[k].translation()).norm(), 0.15) << k;
+  adopt();
+  EXPECT_EQ(mapper.Snapshot().relations.size(), relations) << "what has not changed is not added again";
+}
+
+// A path that does not belong to the keyframes is not taken.
+TEST(MapperFollows, APathOfAnotherLengthDoesNotMoveTheEstimator) {
+  const Drive drive = DriveRound();
+  MapperOptions options;
+  options.filter.particles = 20;
+  Mapper mapper(options, drive.truth.front(), 1);
+  for (std::size_t i = 0; i < 40; ++i) static_cast<void>(mapper.Process(drive.scans[i], drive.odometry[i], SerialFor));
+  const std::vector<Pose2> before = mapper.BestPath();
+  const std::vector<Pose2> short_path(before.size() - 1), long_path(before.size() + 1);
+  mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), before.size(), short_path);
+  mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), long_path.size(), long_path);
+  EXPECT_EQ(mapper.BestPath(), before);
+}
+
+}  // namespace
+}  // namespace cairn::slam

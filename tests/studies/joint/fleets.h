@@ -1,0 +1,22 @@
+// Robots of a simulated fleet whose starts nobody knows: whether they are joined where they truly are.
+#pragma once
+
+#include <cstdint>
+
+#include "server/slam/mapper_options.h"
+#include "tests/studies/mapper/mapper_consistency.h"
+
+namespace cairn::studies {
+
+struct FleetJoin {
+  int robots = 0;
+  int joined = 0;        // To another robot's frame, or with others in their own.
+  int wrong = 0;         // Of these: further than half a metre from the true place, seen from the frame's robot.
+  double error_m = 0.0;  // Mean distance of those that are not wrong.
+};
+
+// Three robots drive through a world.
+[[nodiscard]] FleetJoin JoinFleet(const ConsistencyDrive& drive, const slam::MapperOptions& options,
+                                  std::uint64_t seed);
+
+}  // namespace cairn::studies

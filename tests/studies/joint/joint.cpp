@@ -1,0 +1,182 @@
+// Several robots of one site, smoothed together: published logs cut into parts, each a robot of its own whose start
+// nobody knows. How well the parts keep the true motions, inside each and from one to another, beside the whole log as
+// one robot. And worlds of equal rooms, in which no part may be joined at a wrong place.
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/slam/grid/grid_image.h"
+#include "server/slam/site/site_smoothing.h"
+#include "server/slam/site_options_of.h"
+#include "server/slam/smoothing/smoothed_map.h"
+#include "tests/studies/joint/cut_log.h"
+#include "tests/studies/joint/fleets.h"
+#include "tests/studies/log_run.h"
+#include "tests/studies/study.h"
+
+namespace cairn::studies {
+namespace {
+
+struct Case {
+  std::string log;
+  std::size_t parts = 2;
+  double most_ratio = 1.3;  // Of the error of one robot.
+};
+
+struct Joined {
+  std::vector<slam::SmoothedSession> sessions;
+  double cpu_s = 0.0;
+};
+
+Joined Smooth(const std::vector<LogRun>& runs, const std::vector<std::size_t>& order,
+              const slam::MapperOptions& options) {
+  std::vector<slam::SiteSession> sessions;
+  for (const std::size_t i : order) sessions.push_back({runs[i].snapshot, false});
+  const Stopwatch watch;
+  auto smoothed = slam::SmoothSessions(sessions, SiteOptionsOf(options), [](double) { return true; });
+  Joined joined{.sessions = std::vector<slam::SmoothedSession>(runs.size()), .cpu_s = watch.CpuMs() * 1e-3};
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    joined.sessions[order[i]] = std::move((*smoothed)[i]);
+    joined.sessions[order[i]].frame = order[joined.sessions[order[i]].frame];
+  }
+  return joined;
+}
+
+Trajectory PathOf(const std::vector<LogRun>& runs, const Joined& joined) {
+  Trajectory all;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const Trajectory part = runs[i].snapshot.TrajectoryAlong(joined.sessions[i].path);
+    all.insert(all.end(), part.begin(), part.end());
+  }
+  std::ranges::stable_sort(all, {}, &StampedPose::stamp);
+  return all;
+}
+
+// Relations whose two stamps lie in different parts, or in the same one.
+std::vector<Relation> Across(const std::vector<LogRun>& runs, const std::vector<Relation>& relations, bool across) {
+  const auto part_of = [&runs](Stamp stamp) {
+    std::size_t part = 0;
+    while (part + 1 < runs.size() && stamp >= runs[part + 1].online.front().stamp) ++part;
+    return part;
+  };
+  std::vector<Relation> kept;
+  std::ranges::copy_if(relations, std::back_inserter(kept),
+                       [&](const Relation& one) { return (part_of(one.from) != part_of(one.to)) == across; });
+  return kept;
+}
+
+OccupancyImage Draw(const std::vector<LogRun>& runs, const Joined& joined, const slam::GridOptions& options) {
+  slam::OccupancyGrid grid(options);
+  const std::size_t frame = joined.sessions.front().frame;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    if (joined.sessions[i].frame != frame) continue;
+    for (std::size_t k = 0; k < joined.sessions[i].path.size(); ++k)
+      if (runs[i].snapshot.keyframes[k].localized)
+        grid.Draw(*runs[i].snapshot.keyframes[k].scan, joined.sessions[i].path[k]);
+  }
+  return slam::ImageOf(grid);
+}
+
+void RunCut(StudyContext& context, const Case& one, Table& table, Table& sessions) {
+  const auto log = OpenRealLog(context, one.log, context.Pick(0, 3000));
+  if (!log) return;
+  slam::MapperOptions options;
+  options.seed = static_cast<std::int64_t>(context.seed);
+  context.report.Progress(one.log + ": one robot");
+  const LogRun whole = RunOverLog(*log, options);
+  const double alone_m =
+      ErrorOf(whole.snapshot.TrajectoryAlong(slam::SmoothedPath(whole.snapshot)), log->relations).trans_mean_m;
+
+  std::vector<LogRun> runs;
+  for (const StudyLog& part : CutIntoParts(*log, one.parts)) {
+    context.report.Progress(part.name);
+    runs.push_back(RunOverLog(part, options));
+  }
+  std::vector<std::size_t> order(one.parts);
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  for (const bool reversed : {false, true}) {
+    if (reversed) std::ranges::reverse(order);
+    const Joined joined = Smooth(runs, order, options);
+    const std::size_t frame = joined.sessions.front().frame;
+    const bool all = std::ranges::all_of(
+        joined.sessions, [frame](const auto& session) { return session.joined && session.frame == frame; });
+    const Trajectory path = PathOf(runs, joined);
+    const RelationError error = ErrorOf(path, log->relations);
+    const RelationError across = ErrorOf(path, Across(runs, log->relations, true));
+    const RelationError inside = ErrorOf(path, Across(runs, log->relations, false));
+    const std::string name = one.log + (reversed ? ", last first" : "");
+    table.Add({name, std::to_string(one.parts), all ? "all" : "NOT ALL", Number(alone_m, 4),
+               Number(error.trans_mean_m, 4), Number(error.trans_mean_m / alone_m, 2), Number(inside.trans_mean_m, 4),
+               Number(across.trans_mean_m, 4), std::to_string(across.compared), Number(error.trans_max_m, 2),
+               Number(joined.cpu_s, 1)});
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+      const slam::SmoothedSession& session = joined.sessions[i];
+      sessions.Add({name + " " + std::to_string(i + 1), session.joined ? "yes" : "no",
+                    std::to_string(session.frame + 1), std::to_string(session.relations),
+                    std::to_string(session.withdrawn), Number(session.agreement, 3)});
+    }
+    Plot plot{.title = name + ", " + std::to_string(one.parts) + " robots", .x = {"x", "m"}, .y = {"y", "m"}};
+    for (std::size_t i = 0; i < runs.size(); ++i)
+      if (joined.sessions[i].frame == frame)
+        plot.series.push_back(
+            PathSeries(runs[i].snapshot.TrajectoryAlong(joined.sessions[i].path), "robot " + std::to_string(i + 1)));
+    context.report.AddMap(Draw(runs, joined, options.grid), plot, "joint-" + name);
+    if (context.quick) continue;
+    context.report.Expect(all, name + ": not all robots were joined");
+    context.report.Expect(error.trans_mean_m <= one.most_ratio * alone_m, name + ": the joint path is too inexact");
+  }
+}
+
+// Worlds in which some places look alike, and worlds in which none do.
+void RunFleets(StudyContext& context) {
+  Table table({"world", "runs", "robots joined", "at a wrong place", "mean error (m)"});
+  const int runs = context.runs > 0 ? context.runs : context.Pick(20, 2);
+  for (const ConsistencyDrive& drive : ConsistencyDrives(context.seconds > 0.0 ? context.seconds : 150.0)) {
+    if (!context.Wants(drive.world.name)) continue;
+    FleetJoin all;
+    for (int run = 0; run < runs; ++run) {
+      slam::MapperOptions options;
+      options.filter.particles = 50;
+      const std::uint64_t seed = context.seed + static_cast<std::uint64_t>(run);
+      options.seed = static_cast<std::int64_t>(seed);
+      const FleetJoin one = JoinFleet(drive, options, seed);
+      all.robots += one.robots;
+      all.error_m += one.error_m * (one.joined - one.wrong);
+      all.joined += one.joined;
+      all.wrong += one.wrong;
+      if (one.wrong > 0) context.report.Warn(drive.world.name + ", seed " + std::to_string(seed) + ": wrongly joined");
+    }
+    table.Add({drive.world.name, std::to_string(runs), std::to_string(all.joined) + " of " + std::to_string(all.robots),
+               std::to_string(all.wrong), Number(all.error_m / std::max(1, all.joined - all.wrong), 3)});
+    context.report.Expect(all.wrong == 0, drive.world.name + ": robots were joined at wrong places");
+  }
+  context.report.Add(table, "fleets");
+}
+
+void RunJoint(StudyContext& context) {
+  context.report.Text(
+      "Logs are cut into parts of equal numbers of scans; each part is a robot whose start is unknown. Then all are "
+      "smoothed together. `one robot`: the error of the whole log, smoothed. `inside` and `across`: relations within "
+      "one "
+      "part, and between two.");
+  Table table({"log", "robots", "joined", "one robot (m)", "joint (m)", "ratio", "inside (m)", "across (m)",
+               "relations across", "max (m)", "processor time (s)"});
+  Table sessions({"robot", "joined", "frame of", "relations", "withdrawn", "agreement"});
+  for (const Case& one : {Case{"intel", 3, 1.15}, Case{"mit-csail", 2, 1.3}, Case{"mit-killian", 2, 1.3}})
+    if (context.Wants(one.log)) RunCut(context, one, table, sessions);
+  context.report.Add(table, "joint");
+  context.report.Add(sessions, "sessions");
+  context.report.Text(
+      "Three simulated robots, starts unknown, a hundred metres of way each. `at a wrong place`: more than half a "
+      "metre "
+      "from the true one, seen from the robot in whose frame they are.");
+  RunFleets(context);
+}
+
+const Registration kRegistered{"joint", "several robots of one site, smoothed together", RunJoint};
+
+}  // namespace
+}  // namespace cairn::studies
