@@ -238,8 +238,8 @@ void Mapper::State::Follow(std::span<const Pose2> first_poses) {
 // relations along the way keep what it has found when the next large loop closes.
 void Mapper::State::KeepShape(std::span<const Pose2> path, std::size_t known) {
   constexpr double kEveryM = 10.0;
-  // As certain as the steps over this way; less of a change is not kept.
-  constexpr double kSigmaM = 0.05, kSigmaRad = 0.005;
+  // More certain than the steps over this way, so that they do not pull it back. Half of this is no change.
+  constexpr double kSigmaM = 0.02, kSigmaRad = 0.002;
   const std::vector<Pose2> before = believed_path().values();
   std::size_t last = 0;
   for (std::size_t k = 1; k < known; ++k) {

@@ -42,7 +42,8 @@ class Smoothing {
     result.relations = graph_.CountOf(s);
     result.joined = result.relations > 0;
     result.withdrawn = graph_.WithdrawnOf(s);
-    if (!result.path.empty()) result.T_site_own = result.path.front() * maps_[s].own_path().front().Inverse();
+    if (!result.path.empty() && result.frame != s)
+      result.T_site_own = result.path.front() * maps_[s].own_path().front().Inverse();
     VisibilityCounts all;
     for (std::size_t other = 0; other < maps_.size(); ++other)
       if (other != s && graph_.Together(s, other))

@@ -94,7 +94,7 @@ TEST(MapperFollows, TheShapeOfAPathThatWasTakenIsKeptInRelations) {
   std::vector<Pose2> path = mapper.BestPath();
   for (std::size_t k = 1; k < path.size(); ++k) {
     const Pose2 step = Between(mapper.BestPath()[k - 1], mapper.BestPath()[k]);
-    path[k] = path[k - 1] * Pose2{step.x, step.y, step.theta + 0.002};
+    path[k] = path[k - 1] * Pose2{step.x, step.y, step.theta + 0.0005};
   }
   const auto adopt = [&] { mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), path.size(), path); };
   adopt();
@@ -103,7 +103,7 @@ TEST(MapperFollows, TheShapeOfAPathThatWasTakenIsKeptInRelations) {
   const std::size_t relations = snapshot.relations.size();
   ASSERT_TRUE(OptimisePoses(snapshot.full_path, snapshot.relations, snapshot.pose_graph).usable);
   for (std::size_t k = 0; k < path.size(); ++k)
-    EXPECT_LT((snapshot.full_path[k].translation() - path[k].translation()).norm(), 0.15) << k;
+    EXPECT_LT((snapshot.full_path[k].translation() - path[k].translation()).norm(), 0.05) << k;
   adopt();
   EXPECT_EQ(mapper.Snapshot().relations.size(), relations) << "what has not changed is not added again";
 }

@@ -1,6 +1,7 @@
 #include "tests/studies/joint/fleets.h"
 
 #include <algorithm>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <utility>
@@ -15,7 +16,7 @@ namespace cairn::studies {
 namespace {
 
 constexpr int kRobots = 3;
-constexpr double kWrongM = 0.5;
+constexpr double kWrongM = 1.0;
 
 std::vector<slam::MapperSnapshot> Drive(sim::Fleet& fleet, double seconds, Stamp first_stamp,
                                         const slam::MapperOptions& options) {
@@ -54,18 +55,29 @@ std::vector<Pose2> TruthAt(const slam::MapperSnapshot& snapshot, const Trajector
   return poses;
 }
 
-// Mean distance of one robot's keyframes from their true places, seen from the nearest keyframe of the other.
-double ErrorSeenFrom(const std::vector<Pose2>& path_a, const std::vector<Pose2>& truth_a,
-                     const std::vector<Pose2>& path_b, const std::vector<Pose2>& truth_b) {
+// How far keyframes of one robot are from their true places, seen from those of others where these have been as well:
+// elsewhere each drifts by itself.
+struct Distance {
   double sum_m = 0.0;
-  for (std::size_t k = 0; k < path_b.size(); ++k) {
-    const auto away = [&](const Pose2& pose) { return (pose.translation() - truth_b[k].translation()).squaredNorm(); };
-    const auto nearest = static_cast<std::size_t>(std::ranges::min_element(truth_a, {}, away) - truth_a.begin());
-    sum_m += (Between(path_a[nearest], path_b[k]).translation() - Between(truth_a[nearest], truth_b[k]).translation())
-                 .norm();
+  int compared = 0;
+
+  void Add(const std::vector<Pose2>& path_a, const std::vector<Pose2>& truth_a, const std::vector<Pose2>& path_b,
+           const std::vector<Pose2>& truth_b) {
+    constexpr double kNearM = 3.0;
+    for (std::size_t k = 0; k < path_b.size(); ++k) {
+      const auto away = [&](const Pose2& pose) { return (pose.translation() - truth_b[k].translation()).norm(); };
+      const auto nearest = static_cast<std::size_t>(std::ranges::min_element(truth_a, {}, away) - truth_a.begin());
+      if (away(truth_a[nearest]) > kNearM) continue;
+      ++compared;
+      const Pose2 truth = Between(truth_a[nearest], truth_b[k]);
+      sum_m += (Between(path_a[nearest], path_b[k]).translation() - truth.translation()).norm();
+    }
   }
-  return sum_m / static_cast<double>(std::max<std::size_t>(1, path_b.size()));
-}
+  // Robots that are joined without having been at one place are at a wrong one.
+  [[nodiscard]] double mean_m() const {
+    return compared > 0 ? sum_m / compared : std::numeric_limits<double>::infinity();
+  }
+};
 
 }  // namespace
 
@@ -95,10 +107,12 @@ FleetJoin JoinFleet(const ConsistencyDrive& drive, const slam::MapperOptions& op
     const slam::SmoothedSession& session = (*smoothed)[i];
     if (!session.joined) continue;
     ++result.joined;
-    const double error_m =
-        ErrorSeenFrom((*smoothed)[session.frame].path, truths[session.frame], session.path, truths[i]);
-    result.wrong += error_m > kWrongM ? 1 : 0;
-    if (error_m <= kWrongM) sum_m += error_m;
+    Distance distance;
+    for (std::size_t other = 0; other < smoothed->size(); ++other)
+      if (other != i && (*smoothed)[other].frame == session.frame)
+        distance.Add((*smoothed)[other].path, truths[other], session.path, truths[i]);
+    result.wrong += distance.mean_m() > kWrongM ? 1 : 0;
+    if (distance.mean_m() <= kWrongM) sum_m += distance.mean_m();
   }
   result.error_m = sum_m / std::max(1, result.joined - result.wrong);
   return result;

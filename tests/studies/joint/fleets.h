@@ -10,8 +10,9 @@ namespace cairn::studies {
 
 struct FleetJoin {
   int robots = 0;
-  int joined = 0;        // To another robot's frame, or with others in their own.
-  int wrong = 0;         // Of these: further than half a metre from the true place, seen from the frame's robot.
+  int joined = 0;  // To another robot's frame, or with others in their own.
+  // Of these: more than a metre from the true place, seen from the others where these have been.
+  int wrong = 0;
   double error_m = 0.0;  // Mean distance of those that are not wrong.
 };
 

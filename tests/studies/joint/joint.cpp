@@ -170,9 +170,9 @@ void RunJoint(StudyContext& context) {
   context.report.Add(table, "joint");
   context.report.Add(sessions, "sessions");
   context.report.Text(
-      "Three simulated robots, starts unknown, a hundred metres of way each. `at a wrong place`: more than half a "
-      "metre "
-      "from the true one, seen from the robot in whose frame they are.");
+      "Three simulated robots, starts unknown, a hundred metres of way each. `at a wrong place`: more than a metre "
+      "from the true "
+      "one, seen from the others where these have been.");
   RunFleets(context);
 }
 

@@ -23,7 +23,7 @@ struct RobotDrive {
 };
 
 inline RobotDrive DriveThrough(const World& world, const Pose2& T_world_start, std::span<const Pose2> steps,
-                               const Pose2& T_own_start, std::uint64_t seed, double drift_rad_per_m = 0.0005) {
+                               const Pose2& T_own_start, std::uint64_t seed, double drift_rad_per_m = 0.0002) {
   RobotDrive drive;
   std::mt19937_64 rng(seed);
   const Laser laser{.first_rad = -kPi / 2, .range_max_m = 12.0, .sigma_m = 0.01};

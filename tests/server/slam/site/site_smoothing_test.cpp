@@ -14,12 +14,11 @@ using test::ErrorBetween;
 using test::RingCorridor;
 using test::RobotDrive;
 
-bool GoOn(double /*share*/) {
-  return true;
-}
-
-std::vector<SmoothedSession> Smooth(const std::vector<SiteSession>& sessions) {
-  auto smoothed = SmoothSessions(sessions, SiteOptionsOf(MapperOptions{}), GoOn);
+std::vector<SmoothedSession> Smooth(const std::vector<SiteSession>& sessions, std::vector<double>* shares = nullptr) {
+  auto smoothed = SmoothSessions(sessions, SiteOptionsOf(MapperOptions{}), [shares](double share) {
+    if (shares != nullptr) shares->push_back(share);
+    return true;
+  });
   return smoothed ? *std::move(smoothed) : std::vector<SmoothedSession>(sessions.size());
 }
 
@@ -33,41 +32,42 @@ struct TwoRobots : ::testing::Test {
     static const RobotDrive drive = DriveRing(RingCorridor(true), 30.0, 70.0, {5.0, -3.0, 1.0}, 2);
     return drive;
   }
+  // Both together, nobody knows where they started.
+  static const std::vector<SmoothedSession>& Together() {
+    static const std::vector<SmoothedSession> smoothed =
+        Smooth({{First().snapshot, false}, {Second().snapshot, false}}, &Shares());
+    return smoothed;
+  }
+  // The share of the work that was done, whenever it was told.
+  static std::vector<double>& Shares() {
+    static std::vector<double> shares;
+    return shares;
+  }
   // How the second robot's map lies in the world, which is the first one's map but for its drift.
   static Pose2 T_first_second() { return Second().truth.front() * Second().snapshot.full_path.front().Inverse(); }
 };
 
 TEST_F(TwoRobots, WithoutStartsAreJoinedWhereTheyHaveSeenTheSame) {
-  const auto smoothed = Smooth({{First().snapshot, false}, {Second().snapshot, false}});
-  for (const SmoothedSession& session : smoothed) {
+  for (const SmoothedSession& session : Together()) {
     EXPECT_TRUE(session.joined);
     EXPECT_EQ(session.frame, 0U);
     EXPECT_GT(session.relations, 50U);
     EXPECT_GT(session.agreement, 0.95);
   }
-  EXPECT_EQ(smoothed[0].T_site_own, Pose2{});
-  EXPECT_LT((smoothed[1].T_site_own.translation() - T_first_second().translation()).norm(), 0.5);
-  EXPECT_LT(ErrorBetween(First(), smoothed[0].path, Second(), smoothed[1].path), 0.6);
+  EXPECT_EQ(Together()[0].T_site_own, Pose2{});
+  EXPECT_LT((Together()[1].T_site_own.translation() - T_first_second().translation()).norm(), 0.5);
+  EXPECT_LT(ErrorBetween(First(), Together()[0].path, Second(), Together()[1].path), 0.6);
 }
 
 TEST_F(TwoRobots, LieAlikeWhicheverBegan) {
-  const auto smoothed = Smooth({{First().snapshot, false}, {Second().snapshot, false}});
   const auto reversed = Smooth({{Second().snapshot, false}, {First().snapshot, false}});
-  ASSERT_TRUE(smoothed[1].joined && reversed[1].joined);
+  ASSERT_TRUE(reversed[0].joined && reversed[1].joined);
   EXPECT_EQ(reversed[0].T_site_own, Pose2{});
-  for (std::size_t k = 0; k < smoothed[1].path.size(); k += 10) {
-    const Pose2 one = Between(smoothed[0].path.back(), smoothed[1].path[k]);
+  for (std::size_t k = 0; k < reversed[0].path.size(); k += 10) {
+    const Pose2 one = Between(Together()[0].path.back(), Together()[1].path[k]);
     const Pose2 other = Between(reversed[1].path.back(), reversed[0].path[k]);
     EXPECT_LT((one.translation() - other.translation()).norm(), 0.15) << "keyframe " << k;
   }
-}
-
-TEST_F(TwoRobots, AStartThatIsKnownGivesTheFrame) {
-  const auto smoothed = Smooth({{First().snapshot, false}, {Second().snapshot, true}});
-  ASSERT_TRUE(smoothed[0].joined && smoothed[1].joined);
-  EXPECT_EQ(smoothed[0].frame, 1U);
-  EXPECT_EQ(smoothed[1].T_site_own, Pose2{});
-  EXPECT_LT((smoothed[0].T_site_own.translation() - T_first_second().Inverse().translation()).norm(), 0.5);
 }
 
 // The second one's start is said to be (5, -3), where the first one sees something else.
@@ -79,31 +79,27 @@ TEST_F(TwoRobots, AWrongStartGivesWayToWhatWasSeen) {
 }
 
 TEST_F(TwoRobots, AreSmoothedToTheSameBytesEveryTime) {
-  const auto one = Smooth({{First().snapshot, false}, {Second().snapshot, false}});
-  const auto other = Smooth({{First().snapshot, false}, {Second().snapshot, false}});
-  for (std::size_t i = 0; i < one.size(); ++i) {
-    EXPECT_EQ(one[i].path, other[i].path);
-    EXPECT_EQ(one[i].relations, other[i].relations);
+  const auto again = Smooth({{First().snapshot, false}, {Second().snapshot, false}});
+  for (std::size_t i = 0; i < again.size(); ++i) {
+    EXPECT_EQ(again[i].path, Together()[i].path);
+    EXPECT_EQ(again[i].relations, Together()[i].relations);
   }
 }
 
-TEST_F(TwoRobots, ARobotOfAnotherBuildingStaysAsItIs) {
-  const RobotDrive elsewhere = DriveRing(RingCorridor(true, 77), 10.0, 60.0, {1.0, 1.0, 0.5}, 3);
-  const auto smoothed = Smooth({{First().snapshot, false}, {Second().snapshot, false}, {elsewhere.snapshot, false}});
-  EXPECT_TRUE(smoothed[0].joined && smoothed[1].joined);
-  EXPECT_FALSE(smoothed[2].joined);
-  EXPECT_EQ(smoothed[2].frame, 2U);
-  EXPECT_EQ(smoothed[2].relations, 0U);
-  EXPECT_EQ(smoothed[2].agreement, 0.0);
-  EXPECT_EQ(smoothed[2].path, elsewhere.snapshot.full_path);
-}
-
-TEST_F(TwoRobots, ARobotWithoutScansIsNoHindrance) {
+// One robot has seen nothing yet, and one drives in another building.
+TEST_F(TwoRobots, RobotsThatHaveSeenNothingOfItStayAsTheyAre) {
   const MapperSnapshot nothing;
-  const auto smoothed = Smooth({{nothing, false}, {First().snapshot, false}, {Second().snapshot, false}});
+  const RobotDrive elsewhere = DriveRing(RingCorridor(true, 77), 10.0, 60.0, {1.0, 1.0, 0.5}, 3);
+  const auto smoothed =
+      Smooth({{nothing, false}, {First().snapshot, false}, {Second().snapshot, false}, {elsewhere.snapshot, false}});
   EXPECT_FALSE(smoothed[0].joined);
   EXPECT_TRUE(smoothed[0].path.empty());
   EXPECT_TRUE(smoothed[1].joined && smoothed[2].joined);
+  EXPECT_FALSE(smoothed[3].joined);
+  EXPECT_EQ(smoothed[3].frame, 3U);
+  EXPECT_EQ(smoothed[3].relations, 0U);
+  EXPECT_EQ(smoothed[3].agreement, 0.0);
+  EXPECT_EQ(smoothed[3].path, elsewhere.snapshot.full_path);
 }
 
 TEST_F(TwoRobots, AreNotJoinedWhenAskedToStop) {
@@ -114,15 +110,10 @@ TEST_F(TwoRobots, AreNotJoinedWhenAskedToStop) {
 }
 
 TEST_F(TwoRobots, TheWorkDoneOnlyGrows) {
-  std::vector<double> shares;
-  const std::vector<SiteSession> sessions{{First().snapshot, false}, {Second().snapshot, false}};
-  ASSERT_TRUE(SmoothSessions(sessions, SiteOptionsOf(MapperOptions{}), [&shares](double share) {
-    shares.push_back(share);
-    return true;
-  }));
-  EXPECT_TRUE(std::ranges::is_sorted(shares));
-  EXPECT_EQ(shares.front(), 0.0);
-  EXPECT_LT(shares.back(), 1.0);
+  ASSERT_TRUE(Together()[0].joined);
+  EXPECT_TRUE(std::ranges::is_sorted(Shares()));
+  EXPECT_EQ(Shares().front(), 0.0);
+  EXPECT_LT(Shares().back(), 1.0);
 }
 
 // Every place of a side looks like the place 4 m further on. Who has seen some of them can not know which.
