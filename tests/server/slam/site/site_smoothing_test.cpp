@@ -116,6 +116,35 @@ TEST_F(TwoRobots, TheWorkDoneOnlyGrows) {
   EXPECT_LT(Shares().back(), 1.0);
 }
 
+// Two wings of a building look alike. One robot has seen one of them, the other one both; it is the other one's own map
+// that tells that a wing is no proof.
+TEST(EqualWings, AreNoProofForWhoHasSeenBoth) {
+  const test::World world = RingCorridor(true);
+  const RobotDrive one = DriveRing(world, 0.0, 50.0, {}, 1);
+  RobotDrive both = DriveRing(world, 0.0, 50.0, {3.0, 3.0, 2.0}, 2);
+  const RobotDrive first_wing = both;
+  const RobotDrive other_wing = DriveRing(world, 0.0, 50.0, {90.0, 40.0, -1.0}, 3);
+  for (std::size_t k = 0; k < other_wing.truth.size(); ++k) {
+    Keyframe keyframe = other_wing.snapshot.keyframes[k];
+    both.snapshot.keyframes.push_back(std::move(keyframe));
+    both.snapshot.online_path.push_back(other_wing.snapshot.online_path[k]);
+    both.snapshot.full_path.push_back(other_wing.snapshot.full_path[k]);
+  }
+  for (const SmoothedSession& session : Smooth({{one.snapshot, false}, {first_wing.snapshot, false}}))
+    EXPECT_TRUE(session.joined);
+  for (const SmoothedSession& session : Smooth({{one.snapshot, false}, {both.snapshot, false}}))
+    EXPECT_FALSE(session.joined);
+}
+
+// The last metres of one are the first of the other: what looks the same there may do so elsewhere as well.
+TEST(ShortOverlap, IsNoProof) {
+  const test::World world = RingCorridor(true);
+  const RobotDrive first = DriveRing(world, 0.0, 38.0, {}, 1),
+                   second = DriveRing(world, 24.0, 40.0, {3.0, 3.0, 2.0}, 2);
+  for (const SmoothedSession& session : Smooth({{first.snapshot, false}, {second.snapshot, false}}))
+    EXPECT_FALSE(session.joined);
+}
+
 // Every place of a side looks like the place 4 m further on. Who has seen some of them can not know which.
 TEST(EqualRooms, AreNoProof) {
   const test::World world = test::RingOfEqualRooms();
