@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/slam/site/agreement.h"
 #include "server/slam/site/consistent_set.h"
 #include "tests/server/slam/site/site_drives.h"
 
@@ -115,6 +116,28 @@ TEST_F(TwoPaths, RelationsAgreeIfTheWayRoundThroughBothClosesWithinItsDoubt) {
   EXPECT_GT(Disagreement2(one, turned, *maps[0], *maps[1], loop), kMaxChiSquare);
   EXPECT_NEAR(Disagreement2(one, off, *maps[0], *maps[1], loop), Disagreement2(off, one, *maps[0], *maps[1], loop),
               1e-6);
+}
+
+// The last check of a join: at a wrong place a session sees walls where the other one drove.
+TEST(SessionAgreement, IsNearlyCompleteAtTheTruePlaceAndPoorAtAWrongOne) {
+  const test::World world = test::RingCorridor(true);
+  const SiteOptions options = SiteOptionsOf(MapperOptions{});
+  const RobotDrive drive = test::DriveRing(world, 0.0, 60.0, {}, 1), again = test::DriveRing(world, 0.0, 60.0, {}, 2);
+  const SessionMap a(drive.snapshot, drive.snapshot.full_path, options),
+      b(again.snapshot, again.snapshot.full_path, options);
+  const auto agreement_at = [&](const Pose2& T_true_wrong) {
+    PosePath path_a, path_b;
+    for (const Pose2& pose : a.own_path()) path_a.Append(pose);
+    for (const Pose2& pose : b.own_path()) path_b.Append(T_true_wrong * pose);
+    return AgreementOf({0, a, path_a}, {1, b, path_b}, options);
+  };
+  const SessionAgreement right = agreement_at({}), wrong = agreement_at({0.0, 1.5, 0.0});
+  EXPECT_GT(right.places, 50U);
+  EXPECT_EQ(right.contradicting, 0U);
+  EXPECT_LT(right.counts.contradicted, 0.02 * right.counts.known());
+  EXPECT_GT(wrong.places, 20U);
+  EXPECT_GT(wrong.counts.contradicted, 0.15 * wrong.counts.known());
+  EXPECT_EQ(agreement_at({500.0, 0.0, 0.0}).places, 0U);
 }
 
 TEST(LargestConsistentSet, IsTheLargestInWhichAllAgree) {
