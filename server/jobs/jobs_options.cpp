@@ -15,7 +15,7 @@ void Visit(OptionVisitor& visitor, JobsOptions& options) {
   visitor.Flag(
       "joint", options.joint,
       "Whether a smoothing job also looks for places that several robots of the site have seen, and smooths all "
-      "robots together. This takes about a second per hundred metres of way and per pair of robots.");
+      "robots together. This takes one to three seconds per hundred metres of way and per pair of robots.");
   visitor.Require(options.max_queued < options.max_kept, "max_queued", "must be below", "max_kept");
 }
 
