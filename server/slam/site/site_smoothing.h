@@ -1,9 +1,10 @@
 // One smoothing over all sessions of a site: finds relations between robots and between runs, and fits all paths to
 // them at once. Sessions whose start is unknown or wrong get their place from these relations. A session that does not
 // join stays as it is, and the result says so. It prefers leaving a session apart to joining it at a wrong place; but
-// who has seen only one of two equal places can not know that there is another. Frames: `own` is the map frame of a
-// session before; `site` that of the sessions it is joined with (site_graph.h). Stateless, thread-safe, deterministic
-// (one thread). Takes about a second per hundred metres of way and per pair of sessions.
+// who has seen only one of two equal places can not know that there is another.
+// Frames: `own` is the map frame of a session before; `site` that of the sessions it is joined with (site_graph.h).
+// Stateless, thread-safe, deterministic (one thread). Takes one to three seconds per hundred metres of way and per pair
+// of sessions.
 #pragma once
 
 #include <cstddef>
