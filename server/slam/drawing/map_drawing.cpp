@@ -47,8 +47,8 @@ void MapDrawing::Finish(std::span<const Keyframe> keyframes, const PosePath& pat
   while (redraw_) Continue(keyframes, path);
 }
 
-void MapDrawing::Adopt(OccupancyGrid grid, std::size_t drawn, std::span<const Keyframe> keyframes,
-                       const PosePath& path, bool along_path) {
+void MapDrawing::Adopt(OccupancyGrid grid, std::size_t drawn, std::span<const Keyframe> keyframes, const PosePath& path,
+                       bool along_path) {
   const bool outdated = drawn < changed_at_ || (redraw_ && !along_path);
   redraw_.reset();
   grid_.ReplaceBy(std::move(grid));

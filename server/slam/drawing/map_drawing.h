@@ -33,8 +33,8 @@ class MapDrawing {
   // Like Continue, but draws all remaining keyframes.
   void Finish(std::span<const Keyframe> keyframes, const PosePath& path);
   // Replaces the map by one that a job drew from the first `drawn` keyframes, and draws the other keyframes
-  // onto it. A map from before a change of the path is also taken, and then drawn again. `along_path`: the given map was
-  // drawn along `path`, which has changed with it.
+  // onto it. A map from before a change of the path is also taken, and then drawn again. `along_path`: the given map
+  // was drawn along `path`, which has changed with it.
   void Adopt(OccupancyGrid grid, std::size_t drawn, std::span<const Keyframe> keyframes, const PosePath& path,
              bool along_path = false);
 

@@ -38,8 +38,8 @@ std::vector<Pose2> SmoothedPath(const MapperSnapshot& snapshot) {
   return *SmoothedPath(snapshot, {});
 }
 
-std::optional<SmoothedMap> MapAlong(const MapperSnapshot& snapshot, std::vector<Pose2> path,
-                                    const GridOptions& options, const std::function<bool()>& next) {
+std::optional<SmoothedMap> MapAlong(const MapperSnapshot& snapshot, std::vector<Pose2> path, const GridOptions& options,
+                                    const std::function<bool()>& next) {
   const auto online = DrawAlong(snapshot.online_path, snapshot, options, next);
   if (!online) return {};
   auto smoothed = DrawAlong(path, snapshot, options, next);
