@@ -275,6 +275,10 @@ void FakeServer::OnRequest(Request&& request) {
     case RequestKind::kJobList:
       reply.jobs.resize(2);
       break;
+    case RequestKind::kRos2:
+      reply.ros2 = {{.enabled = true, .domain = 5, .problems = {}}};
+      reply.ros2_namespaces = {{.name = "/r1", .robot = "r1", .site = "lab", .problems = {"no odometry"}}};
+      break;
     case RequestKind::kSavedList:
       reply.saved.resize(2);
       break;
