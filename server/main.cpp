@@ -210,7 +210,10 @@ int Serve(const CairndOptions& options, const std::filesystem::path& state) {
   if (kept->journal != nullptr) kept->journal->Start();
   auto ingress = Ingress::Open(**bus, inbound, outbound);
   if (!ingress) return failed(ingress.error());
-  if (*ros2 != nullptr) (*ros2)->Start();
+  if (*ros2 != nullptr) {
+    (*ros2)->Start();
+    server.SetRos2((*ros2)->report());
+  }
 
   const ServiceNotifier notifier;
   const std::string serving = "serving DDS domain " + std::to_string(options.wire.domain);

@@ -46,7 +46,8 @@ class RosFleet : public ::testing::Test {
   nlohmann::json DoctorOf(const std::string& name, const std::function<bool(const nlohmann::json&)>& good) {
     nlohmann::json found;
     const bool came = test::Eventually([&] {
-      for (const auto& one : Doctor()["namespaces"]) {
+      const nlohmann::json report = Doctor();
+      for (const auto& one : report.at("namespaces")) {
         if (one["name"] == name) found = one;
       }
       return !found.is_null() && good(found);
