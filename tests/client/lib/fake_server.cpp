@@ -277,7 +277,9 @@ void FakeServer::OnRequest(Request&& request) {
       break;
     case RequestKind::kRos2:
       reply.ros2 = {{.enabled = true, .domain = 5, .problems = {}}};
-      reply.ros2_namespaces = {{.name = "/r1", .robot = "r1", .site = "lab", .problems = {"no odometry"}}};
+      reply.ros2_namespaces.resize(1);
+      reply.ros2_namespaces[0].name = "/r1";
+      reply.ros2_namespaces[0].problems = {"no odometry"};
       break;
     case RequestKind::kSavedList:
       reply.saved.resize(2);

@@ -261,6 +261,10 @@ Reply ExtremeReply() {
   value.jobs = {ExtremeJob(), Job{}};
   value.server_version = Text('v');
   value.saved = {{Name('f'), Name('s'), kMax64, kMin64}, SavedSite{}};
+  value.ros2 = {{true, kMin64, {Text('d'), ""}}};
+  Ros2Namespace name_space{Text('n'), Name('r'), Name('s'), true, {Text('p')}, {}};
+  name_space.topics = {{Text('t'), Text('y'), kMax32, true, true, kTiny, kMax64, kMax64}, Ros2Topic{}};
+  value.ros2_namespaces = {name_space, Ros2Namespace{}};
   return value;
 }
 
