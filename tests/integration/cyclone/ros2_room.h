@@ -1,5 +1,5 @@
-/* A simulated robot in a room: where it is at a moment, and what its laser sees from there. It drives on a circle, so both
- * are known in closed form. */
+/* A simulated robot in a room: where it is at a moment, and what its laser sees from there. It drives on a circle, so
+ * both are known in closed form. */
 #pragma once
 
 struct RoomPose {
@@ -12,4 +12,3 @@ struct RoomPose TruthAt(double seconds);
 double RangeFrom(double x, double y, double direction);
 /* a^-1 * b. */
 struct RoomPose RelativePose(struct RoomPose a, struct RoomPose b);
-

@@ -225,8 +225,9 @@ void RunFleet(StudyContext& context) {
   if (context.Wants("ros2")) StudyRos2Latency(context);
 }
 
-const Registration kRegistered{"fleet", "a live server: latency, pauses during jobs, logs at x20, the door for ROS 2 (--only latency ...)",
-                               RunFleet};
+const Registration kRegistered{
+    "fleet", "a live server: latency, pauses during jobs, logs at x20, the door for ROS 2 (--only latency ...)",
+    RunFleet};
 
 }  // namespace
 }  // namespace cairn::studies
