@@ -28,10 +28,12 @@ bool Complain(const Result<void>& result) {
 void Visit(OptionVisitor& visitor, CairndOptions& options) {
   Visit(visitor, options.server);
   visitor.Section("wire", "The DDS network.", [&] { wire::Visit(visitor, options.wire); });
+  visitor.Section("ros2", "Robots that run ROS 2.", [&] { Visit(visitor, options.ros2); });
 }
 
 Result<void> Validate(const CairndOptions& options) {
   if (auto valid = wire::Validate(options.wire); !valid) return valid;
+  if (auto valid = Validate(options.ros2); !valid) return valid;
   for (const std::string& site : options.server.server.site_names())
     if (auto valid = ValidateName("server.sites", site); !valid) return valid;
   CairndOptions copy = options;

@@ -9,13 +9,15 @@
 #include "common/status.h"
 #include "common/wire/bus.h"
 #include "server/options.h"
+#include "server/ros2/ros2_options.h"
 
 namespace cairn::server {
 
-// All options of cairnd, those of the server and those of the wire, as one tree.
+// All options of cairnd, those of the server, of the wire and of the door for ROS 2, as one tree.
 struct CairndOptions {
   ServerOptions server;
   wire::WireOptions wire;
+  Ros2Options ros2;
 };
 void Visit(OptionVisitor& visitor, CairndOptions& options);
 // Checks what does not depend on the machine: fields that contradict each other, names of sites, and

@@ -12,6 +12,7 @@
 #include <chrono>
 #include <csignal>
 #include <iostream>
+#include <memory>
 #include <sstream>
 
 #include "common/options/config.h"
@@ -23,6 +24,7 @@
 #include "server/ingress/other_servers.h"
 #include "server/ops/domain_lock.h"
 #include "server/ops/service_notifier.h"
+#include "server/ros2/ros2_door.h"
 #include "server/server.h"
 #include "server/state_directory.h"
 #include "server/store/sqlite_store.h"
@@ -51,14 +53,21 @@ struct Watched {
   const Egress& egress;
   OtherServers& others;
   const Journal* journal;  // Null if nothing is stored.
+  const Ros2Door* ros2;    // Null if ROS 2 robots are not served.
 };
 
 DoorCounts LossesOf(const Watched& watched) {
-  return {.inbound_full = watched.ingress.overflow(),
-          .malformed = watched.ingress.malformed(),
-          .uncounted_scans = watched.server.uncounted_scans(),
-          .outbound_full = watched.outbound.refused(),
-          .unpublished = watched.egress.unpublished()};
+  DoorCounts counts{.inbound_full = watched.ingress.overflow(),
+                    .malformed = watched.ingress.malformed(),
+                    .uncounted_scans = watched.server.uncounted_scans(),
+                    .outbound_full = watched.outbound.refused(),
+                    .unpublished = watched.egress.unpublished()};
+  if (watched.ros2 != nullptr) {
+    counts.inbound_full += watched.ros2->overflow();
+    counts.malformed += watched.ros2->malformed();
+    counts.unpublished += watched.ros2->unpublished();
+  }
+  return counts;
 }
 
 void TellRefusals(const Watched& watched) {
@@ -66,6 +75,7 @@ void TellRefusals(const Watched& watched) {
   Refusals refusals = watched.bus.refusals();
   for (const std::string& line : watched.bus.TakeRefusalLines()) spdlog::warn("security: {}", line);
   refusals.commands = watched.ingress.commands_refused();
+  if (watched.ros2 != nullptr) refusals.datagrams += watched.ros2->datagrams_refused();
   watched.server.SetRefusals(refusals);
 }
 
@@ -84,6 +94,7 @@ void Look(asio::steady_timer& timer, const Watched& watched, DoorLosses& losses,
       spdlog::warn("{}", *line);
       status.Losses(TextOf(counts));
     }
+    if (watched.ros2 != nullptr) watched.server.SetRos2(watched.ros2->report());
     if (watched.journal != nullptr) status.Degraded(watched.journal->health().reason);
     Look(timer, watched, losses, status);
   });
@@ -158,6 +169,14 @@ int StopJournal(Journal& journal) {
   return kDegraded;
 }
 
+// The door for ROS 2 robots; null if it is not wanted.
+Result<std::unique_ptr<Ros2Door>> OpenRos2(const CairndOptions& options, Inbound& inbound, Outbound& outbound) {
+  if (!options.ros2.enabled) return nullptr;
+  auto door = Ros2Door::Open(options.ros2, options.wire, inbound, outbound);
+  if (door) spdlog::info("ROS 2 robots are served in DDS domain {}", options.ros2.domain);
+  return door;
+}
+
 int Serve(const CairndOptions& options, const std::filesystem::path& state) {
   StartLogging(options.server.server.log_level);
   // The signal set is made before any thread starts, so that no thread receives the signals instead.
@@ -183,25 +202,33 @@ int Serve(const CairndOptions& options, const std::filesystem::path& state) {
   if (!others) return failed(others.error());
   auto egress = Egress::Open(**bus, outbound, kept->generation);
   if (!egress) return failed(egress.error());
+  auto ros2 = OpenRos2(options, inbound, outbound);
+  if (!ros2) return failed(ros2.error());
   const auto saved = state == kNoState || state == kInMemory ? std::filesystem::path() : state / "saved";
   Server server(options.server, inbound, outbound, kept->generation, kept->journal.get(), saved);
   if (auto started = server.Start(); !started) return failed(started.error());
   if (kept->journal != nullptr) kept->journal->Start();
   auto ingress = Ingress::Open(**bus, inbound, outbound);
   if (!ingress) return failed(ingress.error());
+  if (*ros2 != nullptr) {
+    (*ros2)->Start();
+    server.SetRos2((*ros2)->report());
+  }
 
   const ServiceNotifier notifier;
   const std::string serving = "serving DDS domain " + std::to_string(options.wire.domain);
   ServiceStatus service_status(notifier, serving);
   notifier.Ready(serving);
   spdlog::info("ready");
-  const Watched watched{**bus, server, outbound, **ingress, **egress, **others, kept->journal.get()};
+  const Watched watched{**bus, server, outbound, **ingress, **egress, **others, kept->journal.get(), ros2->get()};
   WaitForSignal(context, signals, watched, notifier, service_status);
   notifier.Stopping();
 
   (*ingress)->Close();
+  if (*ros2 != nullptr) (*ros2)->Close();
   server.Stop();
   (*egress)->Finish();
+  if (*ros2 != nullptr) (*ros2)->Finish();
   const int exit_code = kept->journal == nullptr ? 0 : StopJournal(*kept->journal);
   spdlog::info("datagrams refused by reason: {}", (*bus)->refused_by_reason());
   spdlog::info("stopped; messages lost between DDS and the server since the start: {}", TextOf(LossesOf(watched)));

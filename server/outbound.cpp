@@ -9,6 +9,7 @@ Outbound::Outbound(std::size_t capacity_per_lane)
              BoundedChannel<OutboundValue>(capacity_per_lane)} {}
 
 bool Outbound::Send(OutboundValue value) {
+  if (watcher_) watcher_(value);
   const Lane of_value = LaneOf(value);
   if (lane(of_value).TryPush(std::move(value))) return true;
   refused_.fetch_add(1, std::memory_order_relaxed);
@@ -16,6 +17,7 @@ bool Outbound::Send(OutboundValue value) {
 }
 
 bool Outbound::SendPatiently(OutboundValue value) {
+  if (watcher_) watcher_(value);
   const Lane of_value = LaneOf(value);
   if (lane(of_value).Push(std::move(value))) return true;
   refused_.fetch_add(1, std::memory_order_relaxed);

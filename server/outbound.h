@@ -10,6 +10,8 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <functional>
+#include <utility>
 #include <variant>
 
 #include "common/bounded_channel.h"
@@ -33,6 +35,10 @@ class Outbound {
 
   explicit Outbound(std::size_t capacity_per_lane);
 
+  // `watcher` sees every value that is sent from now on, also one that finds no room: a state is then sent again, so it
+  // may see one twice. It must not wait. REQUIRES: nothing was sent yet.
+  void Watch(std::function<void(const OutboundValue&)> watcher) { watcher_ = std::move(watcher); }
+
   bool Send(OutboundValue value);
   // As Send, but waits for room until Close: only for the thread that answers queries, whose own queue then fills and
   // refuses. The door's reader always moves on (its writes have a bounded blocking time).
@@ -47,6 +53,7 @@ class Outbound {
  private:
   static Lane LaneOf(const OutboundValue& value);
 
+  std::function<void(const OutboundValue&)> watcher_;
   std::array<BoundedChannel<OutboundValue>, kLanes> lanes_;
   std::atomic<std::uint64_t> refused_{0};
 };

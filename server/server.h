@@ -12,6 +12,7 @@
 #include <filesystem>
 #include <memory>
 #include <thread>
+#include <utility>
 
 #include "server/inbound.h"
 #include "server/jobs/job_worker.h"
@@ -44,6 +45,8 @@ class Server {
   [[nodiscard]] bool healthy() const { return healthy_; }
   // What `cairn status` says of refused peers.
   void SetRefusals(const Refusals& refusals) { desk_.SetRefusals(refusals); }
+  // What `cairn ros2 doctor` says.
+  void SetRos2(Ros2Report&& report) { desk_.SetRos2(std::move(report)); }
   // Scans of streams without a session, beyond the first robots.max_unclaimed streams. They are in no ledger.
   [[nodiscard]] std::uint64_t uncounted_scans() const { return roster_.unclaimed_overflow(); }
 

@@ -97,6 +97,26 @@ void to_json(nlohmann::json& json, const Refusals& refused) {
           {"samples", refused.samples}, {"commands", refused.commands}, {"datagrams", refused.datagrams}};
 }
 
+void to_json(nlohmann::json& json, const Ros2Topic& topic) {
+  json = {{"name", topic.name},
+          {"type", topic.type},
+          {"publishers", topic.publishers},
+          {"reliable", topic.reliable},
+          {"transient_local", topic.transient_local},
+          {"rate_hz", topic.rate_hz},
+          {"received", topic.received},
+          {"refused", topic.refused}};
+}
+
+void to_json(nlohmann::json& json, const Ros2Namespace& one) {
+  json = {{"name", one.name},     {"robot", one.robot},       {"site", one.site},
+          {"on_map", one.on_map}, {"problems", one.problems}, {"topics", one.topics}};
+}
+
+void to_json(nlohmann::json& json, const Ros2Report& report) {
+  json = {{"domain", report.door.domain}, {"problems", report.door.problems}, {"namespaces", report.namespaces}};
+}
+
 void to_json(nlohmann::json& json, const Tile& tile) {
   json = {{"level", tile.key.level},   {"x", tile.key.x},
           {"y", tile.key.y},           {"epoch", tile.epoch},

@@ -23,6 +23,7 @@ void to_json(nlohmann::json& json, const Tile& tile);  // Without the tile's byt
 void to_json(nlohmann::json& json, const Job& job);
 void to_json(nlohmann::json& json, const SavedSite& saved);
 void to_json(nlohmann::json& json, const Refusals& refused);
+void to_json(nlohmann::json& json, const Ros2Report& report);
 void to_json(nlohmann::json& json, const LogComplaint& complaint);
 
 }  // namespace cairn

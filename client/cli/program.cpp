@@ -90,6 +90,7 @@ ExitCode RunCairn(const std::vector<std::string>& arguments, std::ostream& out, 
   AddStatus(app, program);
   AddJob(app, program);
   AddSession(app, program);
+  AddRos2(app, program);
   AddSite(app, program);
   AddCheckLog(app, program);
   AddEval(app, program);

@@ -242,6 +242,13 @@ Result<std::vector<RobotStatus>> QueryClient::Robots(const std::string& robot) {
   return ServerStatus(robot).map([](StatusAnswer&& answer) { return std::move(answer.robots); });
 }
 
+Result<Ros2Report> QueryClient::Ros2() {
+  return Ask(MakeRequest(RequestKind::kRos2)).map([](Reply&& reply) {
+    return Ros2Report{reply.ros2.empty() ? Ros2DoorState{} : std::move(reply.ros2.front()),
+                      std::move(reply.ros2_namespaces)};
+  });
+}
+
 Result<void> QueryClient::EndSession(const std::string& robot) {
   return Ask(AboutRobot(RequestKind::kSessionEnd, robot)).map([](Reply&&) {});
 }

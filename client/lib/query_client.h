@@ -84,6 +84,8 @@ class QueryClient {
   // of the server itself.
   [[nodiscard]] Result<StatusAnswer> ServerStatus(const std::string& robot = "");
   [[nodiscard]] Result<std::vector<RobotStatus>> Robots(const std::string& robot = "");
+  // The namespaces of ROS 2 that the server sees, and why their robots are not on the map.
+  [[nodiscard]] Result<Ros2Report> Ros2();
   // Ends the robot's session for good.
   [[nodiscard]] Result<void> EndSession(const std::string& robot);
 

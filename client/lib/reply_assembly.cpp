@@ -39,6 +39,8 @@ Reply ReplyAssembly::Take() {
     Append(whole.robots, std::move(part.robots));
     Append(whole.jobs, std::move(part.jobs));
     Append(whole.saved, std::move(part.saved));
+    Append(whole.ros2_namespaces, std::move(part.ros2_namespaces));
+    if (whole.ros2.empty()) whole.ros2 = std::move(part.ros2);
     if (whole.refused.empty()) whole.refused = std::move(part.refused);
   }
   Reply& last = parts_.at(last_part_);

@@ -6,9 +6,9 @@ namespace cairn {
 
 std::string_view RequestKindName(RequestKind kind) {
   static constexpr std::array<std::string_view, kRequestKindCount> kNames = {
-      "ping",       "pose",       "path",      "tiles",      "landmarks",  "map_info",
-      "status",     "job_submit", "job_get",   "job_cancel", "job_list",   "session_end",
-      "map_enable", "saved_list", "site_save", "site_load",  "site_delete"};
+      "ping",       "pose",       "path",      "tiles",      "landmarks",   "map_info",
+      "status",     "job_submit", "job_get",   "job_cancel", "job_list",    "session_end",
+      "map_enable", "saved_list", "site_save", "site_load",  "site_delete", "ros2"};
   const auto index = static_cast<std::size_t>(kind);
   return index < kNames.size() ? kNames[index] : "unknown";
 }
@@ -33,6 +33,7 @@ bool IsCommand(RequestKind kind) {
     case RequestKind::kJobGet:
     case RequestKind::kJobList:
     case RequestKind::kSavedList:
+    case RequestKind::kRos2:
       break;
   }
   return false;

@@ -13,6 +13,7 @@
 #include "common/service/map_info.h"
 #include "common/service/pose_report.h"
 #include "common/service/refusals.h"
+#include "common/service/ros2_report.h"
 #include "common/service/session.h"
 #include "common/status.h"
 
@@ -36,8 +37,9 @@ enum class RequestKind : std::uint8_t {
   kSiteSave,    // site, saved (the file's name; empty: the site's).
   kSiteLoad,    // saved, site (empty: as in the file).
   kSiteDelete,  // site, or saved: then that file.
+  kRos2,        // What the door for ROS 2 robots sees.
 };
-inline constexpr int kRequestKindCount = 17;
+inline constexpr int kRequestKindCount = 18;
 [[nodiscard]] std::string_view RequestKindName(RequestKind kind);
 // Whether it changes something, and is therefore sent as a Command.
 [[nodiscard]] bool IsCommand(RequestKind kind);
@@ -115,10 +117,12 @@ struct Reply {
   std::vector<MapInfo> maps;
   std::vector<RobotStatus> robots;
   std::vector<Job> jobs;
-  std::string server_version;     // kPing.
-  std::vector<SavedSite> saved;   // kSavedList; kSiteSave: the file that was written.
-  std::vector<Refusals> refused;  // kStatus: one.
-  Generation generation = 0;      // Set by the server's egress.
+  std::string server_version;       // kPing.
+  std::vector<SavedSite> saved;     // kSavedList; kSiteSave: the file that was written.
+  std::vector<Refusals> refused;    // kStatus: one.
+  std::vector<Ros2DoorState> ros2;  // kRos2: one.
+  std::vector<Ros2Namespace> ros2_namespaces;
+  Generation generation = 0;  // Set by the server's egress.
 };
 
 }  // namespace cairn

@@ -2,6 +2,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "common/service/names.h"
 #include "common/wire/limits.h"
@@ -15,6 +16,9 @@ static Result<void> CheckBounds(const v1::TileRecord& tile);
 static Result<void> CheckBounds(const v1::Landmark& landmark);
 static Result<void> CheckBounds(const v1::RobotStatus& robot);
 static Result<void> CheckBounds(const v1::SavedSite& saved);
+static Result<void> CheckBounds(const v1::Ros2DoorState& door);
+static Result<void> CheckBounds(const v1::Ros2Topic& topic);
+static Result<void> CheckBounds(const v1::Ros2Namespace& name_space);
 
 namespace {
 
@@ -51,6 +55,11 @@ class Bounds {
         break;
       }
     }
+    return *this;
+  }
+  Bounds& Texts(std::string_view field, const std::vector<std::string>& texts, std::size_t limit) {
+    AtMost(field, texts.size(), limit);
+    for (const std::string& text : texts) Text(field, text);
     return *this;
   }
   Bounds& Inside(std::string_view field, const Result<void>& inner) {
@@ -109,6 +118,24 @@ static Result<void> CheckBounds(const v1::RobotStatus& robot) {
 
 static Result<void> CheckBounds(const v1::SavedSite& saved) {
   return Bounds().Name("name", saved.name()).Name("site", saved.site()).result();
+}
+
+static Result<void> CheckBounds(const v1::Ros2DoorState& door) {
+  return Bounds().Texts("problems", door.problems(), kMaxRos2Problems).result();
+}
+
+static Result<void> CheckBounds(const v1::Ros2Topic& topic) {
+  return Bounds().Text("name", topic.name()).Text("type_name", topic.type_name()).result();
+}
+
+static Result<void> CheckBounds(const v1::Ros2Namespace& name_space) {
+  return Bounds()
+      .Text("name", name_space.name())
+      .Name("robot", name_space.robot())
+      .Name("site", name_space.site())
+      .Texts("problems", name_space.problems(), kMaxRos2Problems)
+      .Each("topics", name_space.topics(), kMaxRos2Topics)
+      .result();
 }
 
 Result<void> CheckBounds(const v1::SessionRequest& request) {
@@ -182,7 +209,7 @@ Result<void> CheckBounds(const v1::Job& job) {
 
 Result<void> CheckBounds(const v1::Request& request) {
   return Bounds()
-      .Known("kind", request.kind(), v1::REQUEST_SITE_DELETE)
+      .Known("kind", request.kind(), v1::REQUEST_ROS2)
       .Name("site", request.site())
       .Name("robot", request.robot())
       .Within("level", request.level(), 0, kMaxTileLevel)
@@ -204,6 +231,8 @@ Result<void> CheckBounds(const v1::Reply& reply) {
       .Text("server_version", reply.server_version())
       .Each("saved", reply.saved(), kMaxReplySaved)
       .AtMost("refused", reply.refused().size(), 1)
+      .Each("ros2", reply.ros2(), 1)
+      .Each("ros2_namespaces", reply.ros2_namespaces(), kMaxReplyNamespaces)
       .result();
 }
 

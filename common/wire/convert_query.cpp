@@ -98,6 +98,53 @@ static Refusals FromWire(v1::Refusals&& wire) {
   return {wire.secure(), wire.peers(), wire.endpoints(), wire.samples(), wire.commands(), wire.datagrams()};
 }
 
+static v1::Ros2Topic ToWire(const Ros2Topic& value) {
+  v1::Ros2Topic wire;
+  wire.name(value.name);
+  wire.type_name(value.type);
+  wire.publishers(value.publishers);
+  wire.reliable(value.reliable);
+  wire.transient_local(value.transient_local);
+  wire.rate_hz(value.rate_hz);
+  wire.received(value.received);
+  wire.refused(value.refused);
+  return wire;
+}
+static Ros2Topic FromWire(v1::Ros2Topic&& wire) {
+  return {std::move(wire.name()), std::move(wire.type_name()),
+          wire.publishers(),      wire.reliable(),
+          wire.transient_local(), wire.rate_hz(),
+          wire.received(),        wire.refused()};
+}
+
+static v1::Ros2Namespace ToWire(const Ros2Namespace& value) {
+  v1::Ros2Namespace wire;
+  wire.name(value.name);
+  wire.robot(value.robot);
+  wire.site(value.site);
+  wire.on_map(value.on_map);
+  wire.problems(value.problems);
+  for (const Ros2Topic& topic : value.topics) wire.topics().push_back(ToWire(topic));
+  return wire;
+}
+static Ros2Namespace FromWire(v1::Ros2Namespace&& wire) {
+  Ros2Namespace value{std::move(wire.name()), std::move(wire.robot()),    std::move(wire.site()),
+                      wire.on_map(),          std::move(wire.problems()), {}};
+  for (v1::Ros2Topic& topic : wire.topics()) value.topics.push_back(FromWire(std::move(topic)));
+  return value;
+}
+
+static v1::Ros2DoorState ToWire(const Ros2DoorState& value) {
+  v1::Ros2DoorState wire;
+  wire.enabled(value.enabled);
+  wire.domain(value.domain);
+  wire.problems(value.problems);
+  return wire;
+}
+static Ros2DoorState FromWire(v1::Ros2DoorState&& wire) {
+  return {wire.enabled(), wire.domain(), std::move(wire.problems())};
+}
+
 // Convert a list element by element, in both directions.
 template <typename Wires, typename Values>
 static void ListToWire(const Values& values, Wires& wires) {
@@ -178,6 +225,8 @@ v1::Reply ToWire(const Reply& value) {
   ListToWire(value.jobs, wire.jobs());
   ListToWire(value.saved, wire.saved());
   ListToWire(value.refused, wire.refused());
+  ListToWire(value.ros2, wire.ros2());
+  ListToWire(value.ros2_namespaces, wire.ros2_namespaces());
   wire.server_version(value.server_version);
   return wire;
 }
@@ -201,6 +250,8 @@ Reply FromWire(v1::Reply&& wire) {
   ListFromWire(wire.jobs(), value.jobs);
   ListFromWire(wire.saved(), value.saved);
   ListFromWire(wire.refused(), value.refused);
+  ListFromWire(wire.ros2(), value.ros2);
+  ListFromWire(wire.ros2_namespaces(), value.ros2_namespaces);
   value.server_version = std::move(wire.server_version());
   return value;
 }

@@ -29,6 +29,9 @@ inline constexpr std::size_t kMaxReplyMaps = 256;
 inline constexpr std::size_t kMaxReplyRobots = 256;
 inline constexpr std::size_t kMaxReplyJobs = 1024;
 inline constexpr std::size_t kMaxReplySaved = 1024;
+inline constexpr std::size_t kMaxReplyNamespaces = 256;
+inline constexpr std::size_t kMaxRos2Problems = 16;
+inline constexpr std::size_t kMaxRos2Topics = 64;
 
 // The size of one serialised sample. It bounds what a datagram can make the middleware allocate.
 inline constexpr std::uint32_t kMaxSampleBytes = 256 * 1024;

@@ -1,23 +1,9 @@
 #include "common/wire/participant.h"
 
-#include <fastrtps/attributes/LibrarySettingsAttributes.h>
-#include <fastrtps/xmlparser/XMLProfileManager.h>
-
-#include <algorithm>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
-#include <fastdds/dds/log/Log.hpp>
-#include <mutex>
 
+#include "common/wire/participant_qos.h"
 #include "common/wire/security.h"
-
-#ifdef CAIRN_ADDRESS_SANITIZER
-// Fast DDS 2.9 deletes one of its own objects with the wrong size (RTPSWriter::~RTPSWriter). With this check,
-// the address sanitizer would stop every program at the end of its first publication. All other checks stay
-// on, and ASAN_OPTIONS can switch this one on again.
-extern "C" const char* __asan_default_options() {  // NOLINT(readability-identifier-naming): the sanitizer's name.
-  return "new_delete_type_mismatch=0";
-}
-#endif
 
 namespace cairn::wire {
 namespace {
@@ -25,41 +11,6 @@ namespace {
 namespace rtps = eprosima::fastrtps::rtps;
 using eprosima::fastrtps::Duration_t;
 using eprosima::fastrtps::types::ReturnCode_t;
-
-// Two programs that start together on a busy machine may miss each other's first announcements. With this
-// period they find each other a few seconds later, even if the lease is long.
-constexpr double kMaxAnnouncementPeriodS = 3.0;
-
-// A library must not print, and messages that peers can provoke must not fill a disk. Errors are returned as
-// values.
-void ConfigureLibraryOnce() {
-  static std::once_flag once;
-  std::call_once(once, [] {
-    fd::Log::ClearConsumers();
-    fd::Log::SetVerbosity(fd::Log::Kind::Error);
-    // Delivery within a process would lose samples for good when a reader is full (measured), so samples
-    // always go through the socket.
-    eprosima::fastrtps::LibrarySettingsAttributes settings;
-    settings.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;
-    eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
-  });
-}
-
-fd::DomainParticipantQos ParticipantQos(const WireOptions& options, const std::string& name,
-                                        const std::shared_ptr<RefusedDatagrams>& refused) {
-  fd::DomainParticipantQos qos;
-  qos.name(name);
-  qos.transport().use_builtin_transports = false;
-  qos.transport().user_transports.push_back(MakeGuardedUdp(options.interfaces, refused, !options.security.empty()));
-  auto& builtin = qos.wire_protocol().builtin;
-  builtin.discovery_config.leaseDuration = Duration_t(options.participant_lease_s);
-  builtin.discovery_config.leaseDuration_announcementperiod =
-      Duration_t(std::min(options.participant_lease_s / 3.0, kMaxAnnouncementPeriodS));
-  if (!options.security.empty()) AddSecurity(options.security, qos);
-  builtin.readerHistoryMemoryPolicy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
-  builtin.writerHistoryMemoryPolicy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
-  return qos;
-}
 
 // The QoS that both ends of a topic share. Every limit is set, because the default allows only 10 instances
 // and refuses the next without an error.

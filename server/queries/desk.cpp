@@ -136,6 +136,8 @@ std::optional<Answer> Desk::AnswerTo(const Request& request) {
     case RequestKind::kSiteDelete:
       saved_sites_.Take(Request(request));
       return std::nullopt;
+    case RequestKind::kRos2:
+      return Ros2Reply(request);
   }
   throw std::logic_error("the request has an unknown kind");
 }
@@ -143,6 +145,19 @@ std::optional<Answer> Desk::AnswerTo(const Request& request) {
 void Desk::SetRefusals(const Refusals& refusals) {
   const MutexLock lock(mutex_);
   refusals_ = refusals;
+}
+
+void Desk::SetRos2(Ros2Report&& report) {
+  const MutexLock lock(mutex_);
+  ros2_ = std::move(report);
+}
+
+Reply Desk::Ros2Reply(const Request& request) {
+  Reply reply = ReplyTo(request);
+  const MutexLock lock(mutex_);
+  reply.ros2 = {ros2_.door};
+  reply.ros2_namespaces = ros2_.namespaces;
+  return reply;
 }
 
 Reply Desk::StatusReply(const Request& request) {

@@ -34,6 +34,7 @@ class Desk {
   void Take(Request&& request);
   // What the next answers about the status say. From any thread.
   void SetRefusals(const Refusals& refusals);
+  void SetRos2(Ros2Report&& report);
   // Answers the waiting requests, then returns.
   void Stop();
   // Thread rule: any thread.
@@ -44,6 +45,7 @@ class Desk {
   void Serve(OpenRequest&& open);
   void Send(OpenRequest& open);
   Reply StatusReply(const Request& request);
+  Reply Ros2Reply(const Request& request);
   // Returns nothing if the answer is sent later.
   std::optional<Answer> AnswerTo(const Request& request);
   Result<Job> SubmitJob(const Request& request);
@@ -64,6 +66,7 @@ class Desk {
   const Journal* const journal_;  // Null if nothing is stored.
   Mutex mutex_;
   Refusals refusals_ CAIRN_GUARDED_BY(mutex_);
+  Ros2Report ros2_ CAIRN_GUARDED_BY(mutex_);
   RequestQueue requests_;
   std::jthread thread_;  // The last member, because it uses the members above.
 };

@@ -33,6 +33,13 @@ std::size_t BytesOf(const Job& job) {
   return job.message.size() + job.site.size() + 160;
 }
 
+std::size_t BytesOf(const Ros2Namespace& name_space) {
+  std::size_t bytes = name_space.name.size() + 256;
+  for (const std::string& problem : name_space.problems) bytes += problem.size() + 8;
+  for (const Ros2Topic& topic : name_space.topics) bytes += topic.name.size() + topic.type.size() + 64;
+  return bytes;
+}
+
 template <typename Item>
 Item Content(Item&& item) {
   return std::forward<Item>(item);
@@ -70,6 +77,7 @@ ReplyParts::ReplyParts(Answer&& answer) : tiles_(std::move(answer.tiles)), heade
   items_.robots = std::exchange(header_.robots, {});
   items_.jobs = std::exchange(header_.jobs, {});
   items_.saved = std::exchange(header_.saved, {});
+  items_.ros2_namespaces = std::exchange(header_.ros2_namespaces, {});
 }
 
 std::optional<Reply> ReplyParts::Next() {
@@ -86,7 +94,8 @@ bool ReplyParts::Fill(Reply& part) {
   return full.Take(items_.poses, taken_.poses, part.poses) && full.Take(items_.path, taken_.path, part.path) &&
          full.Take(tiles_, taken_.tiles, part.tiles) && full.Take(items_.landmarks, taken_.landmarks, part.landmarks) &&
          full.Take(items_.maps, taken_.maps, part.maps) && full.Take(items_.robots, taken_.robots, part.robots) &&
-         full.Take(items_.jobs, taken_.jobs, part.jobs) && full.Take(items_.saved, taken_.saved, part.saved);
+         full.Take(items_.jobs, taken_.jobs, part.jobs) && full.Take(items_.saved, taken_.saved, part.saved) &&
+         full.Take(items_.ros2_namespaces, taken_.ros2_namespaces, part.ros2_namespaces);
 }
 
 }  // namespace cairn::server

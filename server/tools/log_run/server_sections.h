@@ -8,7 +8,7 @@ namespace cairn::server {
 
 // Makes the keys of these sections valid in a file, and ignores them.
 inline void IgnoreServerSections(OptionVisitor& visitor) {
-  for (const char* section : {"server", "robots", "maps", "jobs", "store", "wire"}) visitor.Foreign(section);
+  for (const char* section : {"server", "robots", "maps", "jobs", "store", "wire", "ros2"}) visitor.Foreign(section);
 }
 
 }  // namespace cairn::server

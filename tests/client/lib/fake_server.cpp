@@ -275,6 +275,12 @@ void FakeServer::OnRequest(Request&& request) {
     case RequestKind::kJobList:
       reply.jobs.resize(2);
       break;
+    case RequestKind::kRos2:
+      reply.ros2 = {{.enabled = true, .domain = 5, .problems = {}}};
+      reply.ros2_namespaces.resize(1);
+      reply.ros2_namespaces[0].name = "/r1";
+      reply.ros2_namespaces[0].problems = {"no odometry"};
+      break;
     case RequestKind::kSavedList:
       reply.saved.resize(2);
       break;

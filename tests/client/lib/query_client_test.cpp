@@ -93,6 +93,15 @@ TEST_F(QueryClientTest, SaysWhatWasNotAnsweredInTime) {
   EXPECT_EQ(path.error().message, "no answer to path within 0.2 s");
 }
 
+TEST_F(QueryClientTest, AsksWhatTheDoorForRos2Sees) {
+  const Ros2Report report = Must(client_->Ros2());
+  EXPECT_TRUE(report.door.enabled);
+  EXPECT_EQ(report.door.domain, 5);
+  ASSERT_EQ(report.namespaces.size(), 1U);
+  EXPECT_EQ(report.namespaces[0].name, "/r1");
+  EXPECT_EQ(report.namespaces[0].problems, std::vector<std::string>{"no odometry"});
+}
+
 TEST_F(QueryClientTest, SavesLoadsAndDeletesSites) {
   EXPECT_EQ(Must(client_->SavedSites()).size(), 2U);
   const SavedSite saved = Must(client_->SaveSite("hall", "monday"));

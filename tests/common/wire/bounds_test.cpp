@@ -57,6 +57,18 @@ TEST(Bounds, RefuseAbsurdScans) {
   ExpectRefused(scan, "ranges_m");
 }
 
+TEST(Bounds, RefuseAReportOnRos2ThatIsTooLong) {
+  v1::Reply reply = ToWire(ExtremeReply());
+  reply.ros2_namespaces().at(0).problems().resize(kMaxRos2Problems + 1);
+  ExpectRefused(reply, "problems");
+  reply = ToWire(ExtremeReply());
+  reply.ros2_namespaces().at(0).topics().resize(kMaxRos2Topics + 1);
+  ExpectRefused(reply, "topics");
+  reply = ToWire(ExtremeReply());
+  reply.ros2().at(0).problems().at(0).resize(kMaxTextBytes + 1, 'p');
+  ExpectRefused(reply, "problems");
+}
+
 TEST(Bounds, RefuseUnknownEnumValues) {
   v1::SessionState state = ToWire(ExtremeSessionState());
   state.phase(static_cast<v1::SessionPhase>(4));
@@ -71,7 +83,7 @@ TEST(Bounds, RefuseUnknownEnumValues) {
   job.state(static_cast<v1::JobState>(5));
   ExpectRefused(job, "state");
   v1::Request request = ToWire(ExtremeRequest());
-  request.kind(static_cast<v1::RequestKind>(17));
+  request.kind(static_cast<v1::RequestKind>(18));
   ExpectRefused(request, "kind");
   request = ToWire(ExtremeRequest());
   request.job_kind(static_cast<v1::JobKind>(77));

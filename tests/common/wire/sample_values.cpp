@@ -214,7 +214,7 @@ Request ExtremeRequest() {
   Request value;
   value.client = kMax64;
   value.sequence = kMin64;
-  value.kind = RequestKind::kSiteDelete;
+  value.kind = RequestKind::kRos2;
   value.site = Name('s');
   value.robot = Name('r');
   value.latest = false;
@@ -261,6 +261,10 @@ Reply ExtremeReply() {
   value.jobs = {ExtremeJob(), Job{}};
   value.server_version = Text('v');
   value.saved = {{Name('f'), Name('s'), kMax64, kMin64}, SavedSite{}};
+  value.ros2 = {{true, kMin64, {Text('d'), ""}}};
+  Ros2Namespace name_space{Text('n'), Name('r'), Name('s'), true, {Text('p')}, {}};
+  name_space.topics = {{Text('t'), Text('y'), kMax32, true, true, kTiny, kMax64, kMax64}, Ros2Topic{}};
+  value.ros2_namespaces = {name_space, Ros2Namespace{}};
   return value;
 }
 
@@ -338,12 +342,25 @@ bool Same(const Reply& a, const Reply& b) {
     return Same(x.session, y.session) && x.alive == y.alive && Same(x.pose, y.pose) &&
            EqList(x.ledgers, y.ledgers, same);
   };
+  const auto same_door = [](const Ros2DoorState& x, const Ros2DoorState& y) {
+    return x.enabled == y.enabled && x.domain == y.domain && x.problems == y.problems;
+  };
+  const auto same_topic = [](const Ros2Topic& x, const Ros2Topic& y) {
+    return x.name == y.name && x.type == y.type && x.publishers == y.publishers && x.reliable == y.reliable &&
+           x.transient_local == y.transient_local && Eq(x.rate_hz, y.rate_hz) && x.received == y.received &&
+           x.refused == y.refused;
+  };
+  const auto same_namespace = [&](const Ros2Namespace& x, const Ros2Namespace& y) {
+    return x.name == y.name && x.robot == y.robot && x.site == y.site && x.on_map == y.on_map &&
+           x.problems == y.problems && EqList(x.topics, y.topics, same_topic);
+  };
   return a.client == b.client && a.sequence == b.sequence && a.part == b.part && a.last == b.last &&
          Eq(a.status, b.status) && a.map_epoch == b.map_epoch && a.map_version == b.map_version &&
          a.generation == b.generation && EqList(a.poses, b.poses, same) && EqList(a.path, b.path, eq) &&
          EqList(a.tiles, b.tiles, eq) && EqList(a.landmarks, b.landmarks, eq) && EqList(a.maps, b.maps, same) &&
-         EqList(a.robots, b.robots, same_robot) && EqList(a.jobs, b.jobs, same) &&
-         a.server_version == b.server_version && EqList(a.saved, b.saved, [](const SavedSite& x, const SavedSite& y) {
+         EqList(a.robots, b.robots, same_robot) && EqList(a.jobs, b.jobs, same) && EqList(a.ros2, b.ros2, same_door) &&
+         EqList(a.ros2_namespaces, b.ros2_namespaces, same_namespace) && a.server_version == b.server_version &&
+         EqList(a.saved, b.saved, [](const SavedSite& x, const SavedSite& y) {
            return x.name == y.name && x.site == y.site && x.bytes == y.bytes && x.saved == y.saved;
          });
 }

@@ -9,6 +9,7 @@
 
 #include "tests/real_log_path.h"
 #include "tests/studies/fleet/live_server.h"
+#include "tests/studies/fleet/ros2_latency.h"
 #include "tests/studies/stopwatch.h"
 #include "tests/studies/study.h"
 #include "tests/temp_directory.h"
@@ -221,10 +222,12 @@ void RunFleet(StudyContext& context) {
   if (context.Wants("latency")) StudyLatency(context);
   if (context.Wants("pauses")) StudyPauses(context);
   if (context.Wants("replay")) StudyReplay(context);
+  if (context.Wants("ros2")) StudyRos2Latency(context);
 }
 
-const Registration kRegistered{"fleet", "a live server: latency, pauses during jobs, logs at x20 (--only latency ...)",
-                               RunFleet};
+const Registration kRegistered{
+    "fleet", "a live server: latency, pauses during jobs, logs at x20, the door for ROS 2 (--only latency ...)",
+    RunFleet};
 
 }  // namespace
 }  // namespace cairn::studies

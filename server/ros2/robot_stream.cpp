@@ -1,0 +1,248 @@
+#include "server/ros2/robot_stream.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <random>
+#include <utility>
+
+#include "common/service/start_pose.h"
+#include "server/ingress/admission.h"
+
+namespace cairn::server {
+namespace {
+
+constexpr std::chrono::seconds kFresh{2};            // Odometry that is older does not open a session.
+constexpr std::chrono::seconds kTryAgain{1};         // After a refusal that will pass by itself.
+constexpr std::chrono::seconds kTryLater{5};         // After any other.
+constexpr std::size_t kMaxEarly = 64;                // Odometry samples kept for the first scan of a session.
+constexpr const char* kOdometrySensor = "odometry";  // As on the native wire.
+
+// A random number other than 0, as clients of the native wire draw it.
+std::uint64_t DrawId() {
+  std::random_device random;
+  std::uniform_int_distribution<std::uint64_t> any(1);
+  return any(random);
+}
+
+std::string SensorName(std::string topic) {
+  std::replace(topic.begin(), topic.end(), '/', '.');
+  return topic;
+}
+
+}  // namespace
+
+RobotStream::RobotStream(RobotPlace place, const Ros2Options& options, const FrameTree& shared_frames, Inbound& inbound)
+    : place_(std::move(place)),
+      robot_id_(HashName(place_.robot)),
+      options_(options),
+      shared_frames_(shared_frames),
+      inbound_(inbound) {}
+
+RobotStream::Lidar& RobotStream::LidarOf(const std::string& topic) {
+  const auto [lidar, is_new] = lidars_.try_emplace(topic);
+  if (is_new) lidar->second.sensor = SensorName(topic);
+  return lidar->second;
+}
+
+void RobotStream::FindMounting(Lidar& lidar) {
+  const std::uint64_t version = frames_.version() + shared_frames_.version() + 1;
+  if (lidar.frames_version == version) return;
+  lidar.mounting.reset();
+  if (lidar.frame.empty()) {
+    lidar.why_not = "its scans name no frame (header.frame_id is empty)";
+  } else if (base_frame_.empty()) {
+    lidar.why_not = "the frame of the robot is not known yet, because there is no odometry";
+    return;  // Odometry does not change the version.
+  } else if (const auto motion = FindMotion(std::array<const FrameTree*, 2>{&frames_, &shared_frames_}, base_frame_,
+                                            lidar.frame, std::array{odom_frame_, options_.map_frame})) {
+    const auto mounting = MountingOf(*motion);
+    lidar.why_not = mounting ? std::string() : mounting.error().message;
+    if (mounting) lidar.mounting = *mounting;
+  } else {
+    lidar.why_not = "no transform connects its frame '" + lidar.frame + "' with the robot's frame '" + base_frame_ +
+                    "': neither tf_static nor tf has one (is robot_state_publisher running in this namespace?)";
+  }
+  lidar.frames_version = version;
+}
+
+void RobotStream::Take(const std::string& topic, ros2::LaserScan&& message, const ros2::Origin& origin,
+                       Clock::time_point now) {
+  Lidar& lidar = LidarOf(topic);
+  const bool is_new = !lidar.stamp;
+  lidar.stamp = message.header.stamp;
+  lidar.received = now;
+  if (message.header.frame != lidar.frame) {
+    lidar.frame = message.header.frame;
+    lidar.frames_version = 0;
+  }
+  FindMounting(lidar);
+  if (phase_ != Phase::kOpen) {
+    OpenIfComplete(now);
+    if (phase_ != Phase::kOpen) return;
+  } else if (is_new) {
+    Open(now);  // The same session, with one sensor more.
+  }
+  const std::uint64_t number = lidar.numbers.Next(origin);
+  // A scan of a lidar whose place is not known is counted as refused, with an impossible mounting.
+  Mounting mounting;
+  mounting.T_robot_laser.x = std::nan("");
+  ScanSample sample{{robot_id_, HashName(lidar.sensor), session_},
+                    ScanOf(std::move(message), lidar.mounting.value_or(mounting))};
+  sample.scan.sequence = number;
+  Push(Admit(std::move(sample), now));
+}
+
+void RobotStream::Take(ros2::Odometry&& message, const ros2::Origin& origin, Clock::time_point now) {
+  TakeOdometry(message.header.frame, message.child_frame, message.header.stamp, message.pose, origin, now);
+}
+
+void RobotStream::TakeOdometry(const std::string& parent, const std::string& child, Stamp stamp,
+                               const ros2::Pose3& pose, const ros2::Origin& origin, Clock::time_point now) {
+  const auto motion = MotionOf(pose);
+  odometry_fault_ = motion ? std::string() : "its odometry is refused: " + motion.error().message;
+  if (!motion) return;
+  // Some drivers leave the frames empty. Then the first of the usual names has to do.
+  const std::string base = child.empty() ? options_.base_names().front() : child;
+  if (base != base_frame_) {
+    base_frame_ = base;
+    for (auto& [topic, lidar] : lidars_) lidar.frames_version = 0;
+  }
+  odom_frame_ = parent.empty() ? options_.odom_frame : parent;
+  odometry_stamp_ = stamp;
+  odometry_received_ = now;
+  Odometry odometry{.sequence = 0, .stamp = stamp, .T_odom_robot = PlanarPart(*motion)};
+  early_.push_back({odometry, origin});
+  if (early_.size() > kMaxEarly) early_.pop_front();
+  if (phase_ == Phase::kOpen) Send(odometry, origin);
+}
+
+void RobotStream::Send(const Odometry& odometry, const ros2::Origin& origin) {
+  OdometrySample sample{{robot_id_, HashName(kOdometrySensor), session_}, odometry};
+  sample.odometry.sequence = odometry_numbers_.Next(origin);
+  Push(Admit(std::move(sample)));
+}
+
+void RobotStream::Take(const ros2::Transforms& message, const ros2::Origin& origin, Clock::time_point now) {
+  for (const ros2::Transform& transform : message.transforms) static_cast<void>(frames_.Set(transform));
+  TakeTransformOdometry(message, true, origin, now);
+}
+
+void RobotStream::TakeShared(const ros2::Transforms& message, bool its_own, const ros2::Origin& origin,
+                             Clock::time_point now) {
+  TakeTransformOdometry(message, its_own, origin, now);
+}
+
+// A robot that publishes no odometry may still say it as the transform from odom to base_link. On the shared tf its
+// frames begin with its name.
+void RobotStream::TakeTransformOdometry(const ros2::Transforms& message, bool its_own, const ros2::Origin& origin,
+                                        Clock::time_point now) {
+  if (odometry_published_) return;
+  const std::string prefix = place_.robot + "/";
+  for (const ros2::Transform& transform : message.transforms) {
+    const bool prefixed = transform.header.frame == prefix + options_.odom_frame;
+    if (!prefixed && (!its_own || transform.header.frame != options_.odom_frame)) continue;
+    for (const std::string& base : options_.base_names()) {
+      if (transform.child_frame != (prefixed ? prefix + base : base)) continue;
+      TakeOdometry(transform.header.frame, transform.child_frame, transform.header.stamp, transform.T_frame_child,
+                   origin, now);
+    }
+  }
+}
+
+void RobotStream::TakeStart(const ros2::PoseWithCovariance& message) {
+  const auto motion = MotionOf(message.pose);
+  const bool in_map = message.header.frame == options_.map_frame;
+  if (!motion || !in_map || !ValidateStart(PlanarPart(*motion))) {
+    spdlog::warn("ROS 2: an initial pose of {} is ignored, because {}", place_.robot,
+                 in_map ? "it is no pose" : "its frame is not '" + options_.map_frame + "'");
+    return;
+  }
+  start_ = PlanarPart(*motion);
+  // The present session is left, so that a new one may begin at the pose (robots/roster.h).
+  if (phase_ == Phase::kOpen) Push(ClientLiveliness{client_, false});
+  phase_ = Phase::kWaiting;
+  client_ = 0;
+}
+
+bool RobotStream::odometry_is_fresh(Clock::time_point now) const {
+  return odometry_stamp_ && now - odometry_received_ < kFresh;
+}
+
+void RobotStream::OpenIfComplete(Clock::time_point now) {
+  if (phase_ == Phase::kEnded || (phase_ == Phase::kRefused && now < try_again_)) return;
+  const bool mounted =
+      std::any_of(lidars_.begin(), lidars_.end(), [](const auto& one) { return one.second.mounting.has_value(); });
+  if (!mounted || !odometry_is_fresh(now)) return;
+  if (client_ == 0) client_ = DrawId();
+  session_ = DrawId();
+  for (auto& [topic, lidar] : lidars_) lidar.numbers.Restart();
+  odometry_numbers_.Restart();
+  Open(now);
+  if (phase_ != Phase::kOpen) return;
+  spdlog::info("ROS 2: the session of {} in {} is opened", place_.robot, place_.site);
+  for (const EarlyOdometry& one : early_) Send(one.odometry, one.origin);
+}
+
+// Opens the session, or adds the sensors that are new.
+void RobotStream::Open(Clock::time_point now) {
+  SessionRequest request{.robot = place_.robot,
+                         .site = place_.site,
+                         .sensors = {},
+                         .client = client_,
+                         .has_start = start_.has_value(),
+                         .T_map_robot_start = start_.value_or(Pose2{}),
+                         .end = false,
+                         .session = session_};
+  for (const auto& [topic, lidar] : lidars_) request.sensors.push_back(lidar.sensor);
+  if (!Push(std::move(request))) return Refused({StatusCode::kResourceExhausted, "the server is busy"}, now);
+  phase_ = Phase::kOpen;
+  alive_ = true;
+  why_refused_.clear();
+}
+
+void RobotStream::Refused(const Status& why, Clock::time_point now) {
+  const bool passes = why.code == StatusCode::kResourceExhausted || why.code == StatusCode::kUnavailable;
+  phase_ = Phase::kRefused;
+  why_refused_ = why.message;
+  try_again_ = now + (passes ? kTryAgain : kTryLater);
+}
+
+void RobotStream::Take(const SessionState& state, Clock::time_point /*now*/) {
+  if (state.session != session_ || session_ == 0) return;
+  if (state.phase == SessionPhase::kActive) start_.reset();  // It has begun there; it counts once.
+  if (state.phase != SessionPhase::kEnded || phase_ != Phase::kOpen) return;
+  phase_ = Phase::kEnded;
+  why_refused_ = state.status.message;
+}
+
+void RobotStream::Take(const SessionRefusal& refusal, Clock::time_point now) {
+  if (refusal.state.session != session_ || refusal.state.client != client_ || phase_ != Phase::kOpen) return;
+  Refused(refusal.state.status, now);
+}
+
+void RobotStream::SetPublishers(bool scans, bool odometry, Clock::time_point /*now*/) {
+  const bool returns = scans && !scans_published_;
+  scans_published_ = scans;
+  odometry_published_ = odometry;
+  // A session that somebody has ended is opened again only for a robot that was started again.
+  if (returns && phase_ == Phase::kEnded) phase_ = Phase::kWaiting;
+  if (phase_ != Phase::kOpen || alive_ == scans) return;
+  alive_ = scans;
+  Push(ClientLiveliness{client_, alive_});
+}
+
+void RobotStream::Tick(Clock::time_point now) {
+  for (auto& [topic, lidar] : lidars_) FindMounting(lidar);
+  if (phase_ == Phase::kRefused) OpenIfComplete(now);
+}
+
+bool RobotStream::Push(InboundValue&& value) {
+  if (inbound_.TryPush(std::move(value))) return true;
+  ++overflow_;
+  return false;
+}
+
+}  // namespace cairn::server

@@ -1,0 +1,127 @@
+// One ROS 2 robot at the door: turns what its namespace publishes into the values that the native door passes on, and
+// opens and keeps its session for it. It pushes a session request first and samples behind it; the channel keeps the
+// order. It needs three things before it opens a session: a scan, odometry, and how the lidar of the scan is mounted.
+// What is missing, or refused, it says in words (Problems). Not thread-safe: the door holds its lock. Time is given by
+// the caller.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/service/pose_report.h"
+#include "common/service/session.h"
+#include "common/wire/ros2/bus.h"
+#include "server/inbound.h"
+#include "server/ros2/frame_tree.h"
+#include "server/ros2/namespace_rules.h"
+#include "server/ros2/ros2_options.h"
+#include "server/ros2/sample_numbers.h"
+#include "server/ros2/scan_conversion.h"
+
+namespace cairn::server {
+
+class RobotStream {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  // `shared_frames`: the transforms of the topics /tf and /tf_static, which all robots share.
+  RobotStream(RobotPlace place, const Ros2Options& options, const FrameTree& shared_frames, Inbound& inbound);
+
+  // `topic`: the name of the stream in the namespace, such as "scan".
+  void Take(const std::string& topic, ros2::LaserScan&& message, const ros2::Origin& origin, Clock::time_point now);
+  void Take(ros2::Odometry&& message, const ros2::Origin& origin, Clock::time_point now);
+  // Of the namespace's own tf and tf_static.
+  void Take(const ros2::Transforms& message, const ros2::Origin& origin, Clock::time_point now);
+  // Odometry that comes as a transform on the shared tf. `its_own`: also frames that do not begin with the robot's
+  // name.
+  void TakeShared(const ros2::Transforms& message, bool its_own, const ros2::Origin& origin, Clock::time_point now);
+  // The robot is here now: the session, if one is open, ends, and a new one begins at this pose.
+  void TakeStart(const ros2::PoseWithCovariance& message);
+
+  // From the server.
+  void Take(const SessionState& state, Clock::time_point now);
+  void Take(const SessionRefusal& refusal, Clock::time_point now);
+  void Take(const PoseReport& report) { last_pose_ = report; }
+
+  // Which writers exist now. A robot without a publisher of scans is away.
+  void SetPublishers(bool scans, bool odometry, Clock::time_point now);
+  // Opens what has to be opened again.
+  void Tick(Clock::time_point now);
+
+  [[nodiscard]] const RobotPlace& place() const { return place_; }
+  [[nodiscard]] bool open() const { return phase_ == Phase::kOpen; }
+  [[nodiscard]] const std::string& odom_frame() const { return odom_frame_; }
+  [[nodiscard]] const std::optional<PoseReport>& last_pose() const { return last_pose_; }
+  // Why it is not on the map; empty if it is.
+  [[nodiscard]] std::vector<std::string> Problems(Clock::time_point now) const;
+  // Values that did not fit into the inbound channel.
+  [[nodiscard]] std::uint64_t overflow() const { return overflow_; }
+
+ private:
+  enum class Phase { kWaiting, kOpen, kRefused, kEnded };
+  struct Lidar {
+    std::string sensor;  // Its name in the session.
+    SampleNumbers numbers;
+    std::string frame;
+    std::string why_not;  // Why its scans cannot be used; empty if they can.
+    std::optional<Mounting> mounting;
+    std::uint64_t frames_version = 0;
+    std::optional<Stamp> stamp;
+    Clock::time_point received{};
+  };
+
+  Lidar& LidarOf(const std::string& topic);
+  void FindMounting(Lidar& lidar);
+  void TakeOdometry(const std::string& parent, const std::string& child, Stamp stamp, const ros2::Pose3& pose,
+                    const ros2::Origin& origin, Clock::time_point now);
+  void TakeTransformOdometry(const ros2::Transforms& message, bool its_own, const ros2::Origin& origin,
+                             Clock::time_point now);
+  void OpenIfComplete(Clock::time_point now);
+  void Open(Clock::time_point now);
+  void Refused(const Status& why, Clock::time_point now);
+  bool Push(InboundValue&& value);
+  void Send(const Odometry& odometry, const ros2::Origin& origin);
+  [[nodiscard]] bool odometry_is_fresh(Clock::time_point now) const;
+  [[nodiscard]] std::string WhyNoOdometry(Clock::time_point now) const;
+  [[nodiscard]] std::vector<std::string> ProblemsOfPose() const;
+
+  struct EarlyOdometry {
+    Odometry odometry;
+    ros2::Origin origin;
+  };
+
+  const RobotPlace place_;
+  const NameId robot_id_;
+  const Ros2Options options_;
+  const FrameTree& shared_frames_;
+  Inbound& inbound_;
+  FrameTree frames_;
+  std::map<std::string, Lidar> lidars_;  // By topic.
+
+  std::string odom_frame_;
+  std::string base_frame_;  // Empty until odometry says it.
+  SampleNumbers odometry_numbers_;
+  std::deque<EarlyOdometry> early_;  // The last ones: the first scan of a session needs odometry before it.
+  std::optional<Stamp> odometry_stamp_;
+  Clock::time_point odometry_received_{};
+  std::string odometry_fault_;
+
+  Phase phase_ = Phase::kWaiting;
+  ClientId client_ = 0;
+  SessionToken session_ = 0;
+  std::optional<Pose2> start_;
+  std::string why_refused_;
+  Clock::time_point try_again_{};
+  bool scans_published_ = false;
+  bool odometry_published_ = false;
+  bool alive_ = true;  // As the server was told last.
+  std::optional<PoseReport> last_pose_;
+  std::uint64_t overflow_ = 0;
+};
+
+}  // namespace cairn::server

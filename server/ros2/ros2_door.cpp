@@ -1,0 +1,76 @@
+#include "server/ros2/ros2_door.h"
+
+#include <chrono>
+#include <utility>
+
+#include "common/options/number_text.h"
+
+namespace cairn::server {
+namespace {
+
+constexpr std::chrono::milliseconds kTickPeriod{100};
+// What ROS 2 programs expect of each other. A shorter lease would lose robots on a bad network.
+constexpr double kParticipantLease_s = 20.0;
+
+wire::WireOptions WireOf(const Ros2Options& options, const wire::WireOptions& native) {
+  wire::WireOptions wire;
+  wire.domain = options.domain;
+  wire.interfaces = options.interfaces.empty() ? native.interfaces : SplitAtCommas(options.interfaces);
+  wire.participant_lease_s = kParticipantLease_s;
+  return wire;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Ros2Door>> Ros2Door::Open(const Ros2Options& options, const wire::WireOptions& wire,
+                                                 Inbound& inbound, Outbound& outbound) {
+  auto rules = NamespaceRules::Parse(options.namespaces, options.site);
+  if (!rules) return tl::unexpected(rules.error());
+  auto bus = ros2::Bus::Create(WireOf(options, wire), "cairnd_ros2");
+  if (!bus) return tl::unexpected(bus.error());
+  std::unique_ptr<Ros2Door> door(new Ros2Door(options, *std::move(rules), *std::move(bus), inbound));
+  outbound.Watch([to = door.get()](const OutboundValue& value) {
+    to->ingress_.Take(value);
+    to->egress_.See(value);
+  });
+  return door;
+}
+
+Ros2Door::Ros2Door(const Ros2Options& options, NamespaceRules rules, std::unique_ptr<ros2::Bus> bus, Inbound& inbound)
+    : options_(options),
+      bus_(std::move(bus)),
+      egress_(*bus_, options),
+      ingress_(*bus_, options, std::move(rules), inbound,
+               [this](const RobotAddress& address) { egress_.Serve(address); }) {}
+
+Ros2Door::~Ros2Door() {
+  Close();
+  Finish();
+}
+
+void Ros2Door::Start() {
+  egress_.Start();
+  thread_ = std::jthread([this](const std::stop_token& stop) {
+    bus_->Run(
+        stop, [this] { ingress_.Tick(Ros2Ingress::Clock::now()); }, kTickPeriod);
+  });
+}
+
+void Ros2Door::Close() {
+  thread_ = {};
+  ingress_.Close();
+}
+
+void Ros2Door::Finish() {
+  egress_.Finish();
+}
+
+Ros2Report Ros2Door::report() const {
+  Ros2Report report;
+  report.door = {.enabled = true, .domain = options_.domain, .problems = ingress_.problems()};
+  for (std::string& problem : egress_.problems()) report.door.problems.push_back(std::move(problem));
+  report.namespaces = ingress_.report(Ros2Ingress::Clock::now());
+  return report;
+}
+
+}  // namespace cairn::server

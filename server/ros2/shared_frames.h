@@ -1,0 +1,42 @@
+// The transforms of the topics /tf and /tf_static, which all robots share. Where two live publishers contend for one
+// frame (two robots with the same names of frames), nobody knows whose it is: the frame is left out until one of them
+// is gone. Not thread-safe: one owner.
+#pragma once
+
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/wire/ros2/bus.h"
+#include "server/ros2/frame_tree.h"
+
+namespace cairn::server {
+
+class SharedFrames {
+ public:
+  // Takes those transforms of a message that are clear, and returns them. `fixed`: of tf_static, where two publishers
+  // may say the same.
+  [[nodiscard]] ros2::Transforms Take(const ros2::Transforms& message, const ros2::WriterId& writer, bool fixed);
+  // Forgets what publishers have said who are gone.
+  void SetWriters(const std::set<ros2::WriterId>& writers);
+
+  [[nodiscard]] const FrameTree& tree() const { return tree_; }
+  // The frames that two publishers contend for.
+  [[nodiscard]] std::vector<std::string> contended() const;
+
+ private:
+  struct Owner {
+    ros2::WriterId writer{};
+    ros2::Transform said;
+  };
+  // What each of its publishers says of a contended frame.
+  using Contenders = std::map<ros2::WriterId, ros2::Transform>;
+  static constexpr std::size_t kMaxContenders = 16;
+
+  std::map<std::string, Owner, std::less<>> owners_;
+  std::map<std::string, Contenders> contended_;  // At most FrameTree::kMaxFrames.
+  FrameTree tree_;
+};
+
+}  // namespace cairn::server
