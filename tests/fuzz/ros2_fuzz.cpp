@@ -98,11 +98,11 @@ class Door {
 };
 
 bool RunRos2(std::string_view input) {
-  constexpr std::size_t kMostPieces = 64;
+  constexpr std::size_t kMostRos2Pieces = 64;
   Door door;
   bool accepted = false;
   std::size_t sent = 0;
-  for (Pieces pieces(input); !pieces.empty() && sent < kMostPieces; ++sent) {
+  for (Pieces pieces(input); !pieces.empty() && sent < kMostRos2Pieces; ++sent) {
     const std::uint8_t kind = pieces.Take() % 6;
     accepted |= door.Send(kind, pieces.TakePiece());
   }
@@ -110,7 +110,7 @@ bool RunRos2(std::string_view input) {
   return accepted;
 }
 
-std::string Sent(char kind, std::string_view bytes) {
+std::string PieceOf(char kind, std::string_view bytes) {
   return std::string(1, kind) + Piece(bytes);
 }
 
@@ -131,14 +131,14 @@ std::vector<std::string> SeedsOfRos2() {
   transforms.transforms = {link};
   ros2::PoseWithCovariance start;
   start.header.frame = "map";
-  const std::string drive = Sent(1, Encoded(odometry)) + Sent(2, Encoded(transforms)) + Sent(0, Encoded(scan));
-  return {Sent(0, Encoded(scan)),
-          Sent(1, Encoded(odometry)),
-          Sent(3, Encoded(transforms)),
-          Sent(4, Encoded(start)),
-          Sent(5, "rt/hall/r1/scan"),
+  const std::string drive = PieceOf(1, Encoded(odometry)) + PieceOf(2, Encoded(transforms)) + PieceOf(0, Encoded(scan));
+  return {PieceOf(0, Encoded(scan)),
+          PieceOf(1, Encoded(odometry)),
+          PieceOf(3, Encoded(transforms)),
+          PieceOf(4, Encoded(start)),
+          PieceOf(5, "rt/hall/r1/scan"),
           drive,
-          drive + Sent(4, Encoded(start)) + drive};
+          drive + PieceOf(4, Encoded(start)) + drive};
 }
 
 const bool kRos2Target = Register({"ros2", &RunRos2, &SeedsOfRos2});
