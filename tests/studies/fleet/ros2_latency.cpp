@@ -117,7 +117,10 @@ class Ros2Side final : public Door {
     Robot& to = of(robot);
     if (!to.mounted) {
       ros2::Transforms mounting;
-      mounting.transforms.push_back({{0, "base_link"}, "laser", InSpace(scan.T_robot_laser)});
+      ros2::Transform& link = mounting.transforms.emplace_back();
+      link.header.frame = "base_link";
+      link.child_frame = "laser";
+      link.T_frame_child = InSpace(scan.T_robot_laser);
       Must(to.tf_static->Publish(mounting));
       to.mounted = true;
     }
