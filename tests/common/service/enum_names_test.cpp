@@ -19,7 +19,7 @@ void ExpectNamed(int count, std::string_view (*name)(Enum)) {
   for (int i = 0; i < count; ++i) {
     const std::string text(name(static_cast<Enum>(i)));
     EXPECT_FALSE(text.empty());
-    EXPECT_EQ(text.find_first_not_of("abcdefghijklmnopqrstuvwxyz_"), std::string::npos) << text;
+    EXPECT_EQ(text.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789_"), std::string::npos) << text;
     EXPECT_NE(text, "unknown");
     names.insert(text);
   }
