@@ -204,6 +204,7 @@ class Smoothing {
       return Disagreement2(all[i], all[j], from, to, options_.loop) <= kMaxChiSquare;
     });
     std::vector<SessionRelation> agreeing;
+    agreeing.reserve(set.size());
     for (const std::size_t i : set) agreeing.push_back(all[i]);
     return agreeing;
   }
