@@ -1,5 +1,7 @@
 #include "common/wire/ros2/writer_list.h"
 
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+
 #include <algorithm>
 #include <string>
 #include <string_view>
