@@ -66,6 +66,16 @@ bool HasFragments(Bytes datagram) {
   return has;
 }
 
+bool HasBuiltInFragments(Bytes datagram) {
+  const auto built_in = [](std::uint8_t kind) { return (kind & 0xc0) == 0xc0; };  // RTPS 9.3.1.2.
+  bool has = false;
+  static_cast<void>(Walk(datagram, [&](const Submessage& m) {
+    has = has || (m.id == kDataFrag && (built_in(m.body.bytes[7]) || built_in(m.body.bytes[11])));
+    return DatagramFault::kNone;
+  }));
+  return has;
+}
+
 std::vector<FragmentAssembly::Datagram> FragmentAssembly::Take(Bytes datagram) {
   std::vector<Datagram> deliver;
   Datagram sender(datagram.begin(), datagram.begin() + kRtpsHeaderBytes);

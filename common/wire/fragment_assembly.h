@@ -20,6 +20,8 @@
 namespace cairn::wire {
 
 [[nodiscard]] bool HasFragments(std::span<const std::uint8_t> datagram);
+// Fragments of what a built-in endpoint sends or receives. Cyclone DDS sends the type of an endpoint in them.
+[[nodiscard]] bool HasBuiltInFragments(std::span<const std::uint8_t> datagram);
 
 class FragmentAssembly {
  public:

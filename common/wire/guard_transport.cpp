@@ -39,8 +39,13 @@ class GuardTransport : public transport::ChainingTransport {
   void receive(transport::TransportReceiverInterface* next, const rtps::octet* bytes, std::uint32_t size,
                const rtps::Locator_t& local, const rtps::Locator_t& remote) override {
     if (!IsSound({bytes, size})) return;
-    // With DDS Security each fragment is encrypted by itself, and a reader takes none of a stranger.
-    if (descriptor_.secure || !HasFragments({bytes, size})) return next->OnDataReceived(bytes, size, local, remote);
+    if (!HasFragments({bytes, size})) return next->OnDataReceived(bytes, size, local, remote);
+    if (descriptor_.secure) {
+      // Each fragment is encrypted by itself, and a reader takes none of a stranger. What built-in endpoints receive
+      // could be inspected only in part.
+      if (HasBuiltInFragments({bytes, size})) return Refuse(DatagramFault::kFragment);
+      return next->OnDataReceived(bytes, size, local, remote);
+    }
     for (const FragmentAssembly::Datagram& datagram : Assemble({bytes, size})) {
       // The beginning of a sample could be seen only in part before.
       if (IsSound(datagram))
@@ -51,9 +56,12 @@ class GuardTransport : public transport::ChainingTransport {
  private:
   bool IsSound(std::span<const rtps::octet> datagram) {
     const DatagramFault fault = InspectDatagram(datagram, gate_);
-    if (fault != DatagramFault::kNone)
-      (*refused_)[static_cast<std::size_t>(fault)].fetch_add(1, std::memory_order_relaxed);
+    if (fault != DatagramFault::kNone) Refuse(fault);
     return fault == DatagramFault::kNone;
+  }
+
+  void Refuse(DatagramFault fault) {
+    (*refused_)[static_cast<std::size_t>(fault)].fetch_add(1, std::memory_order_relaxed);
   }
   std::vector<FragmentAssembly::Datagram> Assemble(std::span<const rtps::octet> datagram) {
     const MutexLock lock(mutex_);

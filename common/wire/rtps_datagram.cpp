@@ -43,11 +43,6 @@ bool IsDiscoveryWriter(Bytes entity) {
   return entity[3] == kBuiltinWriterWithKey && (is(kParticipants) || is(kWriters) || is(kReaders));
 }
 
-// Whether this is the kind of a built-in entity (RTPS 9.3.1.2).
-bool IsBuiltIn(std::uint8_t kind) {
-  return (kind & 0xc0) == 0xc0;
-}
-
 // The endpoints of handshakes (DDS-SECURITY 7.4.7.1). A message may name only one of them.
 bool IsHandshake(Bytes entities) {
   constexpr std::array<std::uint8_t, 4> kReader = {0x00, 0x02, 0x01, 0xc4};
@@ -116,8 +111,8 @@ DatagramFault InspectDataFrag(const Submessage& m, const Inspection& with) {
   const std::uint64_t fragment_bytes = m.body.U16(26);
   const std::uint64_t sample_bytes = m.body.U32(28);
   if (start == 0 || count == 0 || fragment_bytes == 0) return DatagramFault::kFragment;
-  // What built-in endpoints send is small, and would be inspected only in part.
-  if (IsBuiltIn(m.body.bytes[7]) || IsBuiltIn(m.body.bytes[11])) return DatagramFault::kFragment;
+  // These are small, and would be inspected only in part, because with DDS Security fragments are not assembled.
+  if (IsHandshake(m.body.bytes.subspan(4, 8))) return DatagramFault::kFragment;
   // Fast DDS would deliver a fragmented key as a sample with whatever the memory held before.
   if ((m.flags & kHasKey) != 0) return DatagramFault::kFragment;
   if (sample_bytes == 0 || sample_bytes > kMaxSampleBytes) return DatagramFault::kFragment;

@@ -1,8 +1,7 @@
 #include "common/wire/ros2/writer_list.h"
 
-#include <fastdds/dds/domain/DomainParticipant.hpp>
-
 #include <algorithm>
+#include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <string>
 #include <string_view>
 #include <utility>
