@@ -31,7 +31,7 @@ SLAM_ROOMS = {
     "smoothing": ["trail", "grid"],  # Paths and maps after the fact.
 
     "motion_models": ["motion", "random"],  # Learnt or sampled models of a step.
-    "calibration": ["motion_models", "random"],  # How such models and wheels are learnt.
+    "calibration": ["matching", "motion_models", "random", "scan"],  # How models, wheels and lidars are learnt.
     "matchers": ["matching", "features", "scan"],
     "landmark_variants": ["landmarks"],  # Other models of a landmark.
     "ekf": ["filters", "landmark_variants", "landmarks", "motion"],
