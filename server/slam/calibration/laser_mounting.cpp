@@ -165,21 +165,35 @@ Values Minimise(const MountingProblem& problem, Values v, const Known& fixed) {
   return v;
 }
 
-// The lag at which turns agree best: the other values hardly matter for it.
-double RoughLag(const MountingProblem& problem, const Values& start, double widest_s) {
-  constexpr double kGrid_s = 0.02, kFarthest_rad = 0.15;
+// The lag at which turns agree best: the other values hardly matter for it. Nothing if other lags are about as good,
+// as they are for a robot that drives straight ahead: the least squares would then only find a chance minimum.
+std::optional<double> RoughLag(const MountingProblem& problem, const Values& start, double widest_s) {
+  constexpr double kGrid_s = 0.02, kFarthest_rad = 0.15, kClearly = 0.8;
   double best = start(0), least = -1.0;
-  const int steps = static_cast<int>(widest_s / kGrid_s);
+  std::vector<double> costs;
+  const int steps = std::max(10, static_cast<int>(widest_s / kGrid_s));
   for (int k = -steps; k <= steps; ++k) {
     Values v = start;
     v(0) += k * kGrid_s;
-    double sum = 1e-9 * std::abs(k);  // Among equals the nearest.
-    for (const Eigen::Vector3d& residual : problem.Residuals(v)) sum += std::min(std::abs(residual.z()), kFarthest_rad);
+    double sum = 0.0;
+    std::size_t known = 0;  // A lag at which odometry does not cover the log must not look good.
+    for (const Eigen::Vector3d& residual : problem.Residuals(v)) {
+      if (residual == Eigen::Vector3d::Zero()) continue;
+      sum += std::min(std::abs(residual.z()), kFarthest_rad);
+      ++known;
+    }
+    if (2 * known < problem.pairs()) continue;
+    sum = sum / static_cast<double>(known) + 1e-9 * std::abs(k);  // Among equals the nearest.
+    costs.push_back(sum);
     if (least >= 0.0 && sum >= least) continue;
     least = sum;
     best = v(0);
   }
-  return best;
+  if (costs.empty()) return std::nullopt;
+  const auto middle = costs.begin() + static_cast<std::ptrdiff_t>(costs.size() / 2);
+  std::nth_element(costs.begin(), middle, costs.end());
+  if (least > kClearly * *middle) return std::nullopt;
+  return widest_s > 0.0 ? best : start(0);
 }
 
 // The heading of the lidar at which the ways agree best.
@@ -237,9 +251,11 @@ MountingFit FitMounting(std::span<const Odometry> odometry, std::span<const Alig
   for (std::size_t k = 0; k < kLaserUnknowns; ++k) fit.doubt[k] = kBefore(static_cast<Eigen::Index>(k));
   if (problem.pairs() < 10) return fit;
   Values v = start;
-  v(0) = RoughLag(problem, v, widest_lag_s);
+  const auto lag_s = RoughLag(problem, v, widest_lag_s);
+  if (lag_s) v(0) = *lag_s;
   v(6) = RoughHeading(problem, v);
   Known fixed{};
+  fixed[static_cast<std::size_t>(LaserUnknown::kLag)] = !lag_s;
   // What is not shown is fixed, and the rest is estimated again: the worst one first, as others may then be shown.
   for (std::size_t round = 0; round < kLaserUnknowns; ++round) {
     v = Minimise(problem, v, fixed);
