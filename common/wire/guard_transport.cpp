@@ -5,7 +5,7 @@
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 
 #include "common/mutex.h"
-#include "common/wire/fragment_hold.h"
+#include "common/wire/fragment_assembly.h"
 
 namespace cairn::wire {
 namespace {
@@ -15,11 +15,12 @@ namespace rtps = eprosima::fastrtps::rtps;
 
 struct GuardDescriptor : transport::ChainingTransportDescriptor {
   GuardDescriptor(std::shared_ptr<transport::TransportDescriptorInterface> udp,
-                  std::shared_ptr<RefusedDatagrams> counter)
-      : ChainingTransportDescriptor(std::move(udp)), refused(std::move(counter)) {}
+                  std::shared_ptr<RefusedDatagrams> counter, bool with_security)
+      : ChainingTransportDescriptor(std::move(udp)), refused(std::move(counter)), secure(with_security) {}
   transport::TransportInterface* create_transport() const override;
 
   std::shared_ptr<RefusedDatagrams> refused;
+  bool secure;
 };
 
 class GuardTransport : public transport::ChainingTransport {
@@ -37,26 +38,33 @@ class GuardTransport : public transport::ChainingTransport {
 
   void receive(transport::TransportReceiverInterface* next, const rtps::octet* bytes, std::uint32_t size,
                const rtps::Locator_t& local, const rtps::Locator_t& remote) override {
-    const DatagramFault fault = InspectDatagram({bytes, size}, gate_);
-    if (fault != DatagramFault::kNone) {
-      (*refused_)[static_cast<std::size_t>(fault)].fetch_add(1, std::memory_order_relaxed);
-      return;
+    if (!IsSound({bytes, size})) return;
+    // With DDS Security each fragment is encrypted by itself, and a reader takes none of a stranger.
+    if (descriptor_.secure || !HasFragments({bytes, size})) return next->OnDataReceived(bytes, size, local, remote);
+    for (const FragmentAssembly::Datagram& datagram : Assemble({bytes, size})) {
+      // The beginning of a sample could be seen only in part before.
+      if (IsSound(datagram))
+        next->OnDataReceived(datagram.data(), static_cast<std::uint32_t>(datagram.size()), local, remote);
     }
-    const FragmentTraffic traffic = FragmentTrafficOf({bytes, size});
-    if (traffic.fragments.empty() && !traffic.gap) return next->OnDataReceived(bytes, size, local, remote);
-    // No gap of another thread may come between the fragments of a sample.
-    const MutexLock lock(whole_samples_);
-    if (traffic.fragments.empty()) return next->OnDataReceived(bytes, size, local, remote);
-    for (const FragmentHold::Datagram& whole : hold_.Add({bytes, size}, traffic.fragments))
-      next->OnDataReceived(whole.data(), static_cast<std::uint32_t>(whole.size()), local, remote);
   }
 
  private:
+  bool IsSound(std::span<const rtps::octet> datagram) {
+    const DatagramFault fault = InspectDatagram(datagram, gate_);
+    if (fault != DatagramFault::kNone)
+      (*refused_)[static_cast<std::size_t>(fault)].fetch_add(1, std::memory_order_relaxed);
+    return fault == DatagramFault::kNone;
+  }
+  std::vector<FragmentAssembly::Datagram> Assemble(std::span<const rtps::octet> datagram) {
+    const MutexLock lock(mutex_);
+    return assembly_.Take(datagram);
+  }
+
   GuardDescriptor descriptor_;
   std::shared_ptr<RefusedDatagrams> refused_;
   SequenceGate gate_;
-  Mutex whole_samples_;
-  FragmentHold hold_ CAIRN_GUARDED_BY(whole_samples_);
+  Mutex mutex_;
+  FragmentAssembly assembly_ CAIRN_GUARDED_BY(mutex_);
 };
 
 transport::TransportInterface* GuardDescriptor::create_transport() const {
@@ -66,7 +74,8 @@ transport::TransportInterface* GuardDescriptor::create_transport() const {
 }  // namespace
 
 std::shared_ptr<transport::TransportDescriptorInterface> MakeGuardedUdp(const std::vector<std::string>& interfaces,
-                                                                        std::shared_ptr<RefusedDatagrams> refused) {
+                                                                        std::shared_ptr<RefusedDatagrams> refused,
+                                                                        bool secure) {
   // A burst of tiles or replies overflows a socket buffer of default size. The kernel limits this size if it
   // is too large.
   constexpr std::uint32_t kSocketBufferBytes = 4 * 1024 * 1024;
@@ -74,7 +83,7 @@ std::shared_ptr<transport::TransportDescriptorInterface> MakeGuardedUdp(const st
   udp->interfaceWhiteList = interfaces;
   udp->sendBufferSize = kSocketBufferBytes;
   udp->receiveBufferSize = kSocketBufferBytes;
-  return std::make_shared<GuardDescriptor>(std::move(udp), std::move(refused));
+  return std::make_shared<GuardDescriptor>(std::move(udp), std::move(refused), secure);
 }
 
 }  // namespace cairn::wire

@@ -1,6 +1,6 @@
 // A UDPv4 transport that checks every datagram with InspectDatagram before the participant sees it. Datagrams
-// that fail the check are dropped and counted. This header uses the Fast DDS 2.x transport API; include it
-// only inside common/wire.
+// that fail the check are dropped and counted. Samples in fragments reach the participant as whole ones. This header
+// uses the Fast DDS 2.x transport API; include it only inside common/wire.
 #pragma once
 
 #include <fastdds/rtps/transport/ChainingTransportDescriptor.h>
@@ -19,8 +19,9 @@ namespace cairn::wire {
 // The number of datagrams that were dropped, by fault.
 using RefusedDatagrams = std::array<std::atomic<std::uint64_t>, kDatagramFaults>;
 
-// Binds sockets to the given IPv4 addresses only. `refused` is shared because it must outlive the transport.
+// Binds sockets to the given IPv4 addresses only. `refused` is shared because it must outlive the transport. `secure`:
+// the participant uses DDS Security.
 [[nodiscard]] std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> MakeGuardedUdp(
-    const std::vector<std::string>& interfaces, std::shared_ptr<RefusedDatagrams> refused);
+    const std::vector<std::string>& interfaces, std::shared_ptr<RefusedDatagrams> refused, bool secure);
 
 }  // namespace cairn::wire

@@ -50,7 +50,7 @@ fd::DomainParticipantQos ParticipantQos(const WireOptions& options, const std::s
   fd::DomainParticipantQos qos;
   qos.name(name);
   qos.transport().use_builtin_transports = false;
-  qos.transport().user_transports.push_back(MakeGuardedUdp(options.interfaces, refused));
+  qos.transport().user_transports.push_back(MakeGuardedUdp(options.interfaces, refused, !options.security.empty()));
   auto& builtin = qos.wire_protocol().builtin;
   builtin.discovery_config.leaseDuration = Duration_t(options.participant_lease_s);
   builtin.discovery_config.leaseDuration_announcementperiod =

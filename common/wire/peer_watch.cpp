@@ -111,8 +111,7 @@ void PeerWatch::on_participant_discovery(Participant*, rtps::ParticipantDiscover
   }
   if (info.status != rtps::ParticipantDiscoveryInfo::DISCOVERED_PARTICIPANT || peers_.contains(guid)) return;
   Forget(guid);
-  // A stranger can announce any number of participants without an identity. They make room for those of the fleet.
-  if (peers_.size() >= kMaxPeers) std::erase_if(peers_, [](const auto& peer) { return !peer.second.authorized; });
+  MakeRoom();
   if (peers_.size() >= kMaxPeers) return;
   peers_[guid] = {.address = AddressOf(info.info), .since = Clock::now()};
   if (info.info.identity_token_.is_nil()) Refuse(guid, "it has no identity: it runs without DDS Security");
@@ -148,6 +147,11 @@ void PeerWatch::on_publisher_discovery(Participant*, rtps::WriterDiscoveryInfo&&
   // Access control has compared the partition that a writer has at first, and not a later one.
   const bool compared = info.status == rtps::WriterDiscoveryInfo::DISCOVERED_WRITER;
   robots_.emplace(info.info.guid(), compared ? robot : "");
+}
+
+// A stranger can announce any number of participants without an identity. They make room for those of the fleet.
+void PeerWatch::MakeRoom() {
+  if (peers_.size() >= kMaxPeers) std::erase_if(peers_, [](const auto& peer) { return !peer.second.authorized; });
 }
 
 // What was known of an earlier participant with the same GUID.
@@ -186,6 +190,7 @@ std::vector<std::string> PeerWatch::TakeLines() {
 
 // The handshake is tried again and again. Each peer is counted and said once.
 void PeerWatch::Refuse(const Guid& guid, const std::string& reason) {
+  if (!peers_.contains(guid)) MakeRoom();
   Peer& peer = peers_[guid];
   if (std::exchange(peer.refused, true)) return;
   ++refusals_.peers;

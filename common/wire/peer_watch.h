@@ -62,6 +62,7 @@ class PeerWatch final : public eprosima::fastdds::dds::DomainParticipantListener
   void onParticipantAuthentication(Participant* participant,
                                    eprosima::fastrtps::rtps::ParticipantAuthenticationInfo&& info) override;
   void on_publisher_discovery(Participant* participant, eprosima::fastrtps::rtps::WriterDiscoveryInfo&& info) override;
+  void MakeRoom() CAIRN_REQUIRES(mutex_);
   void Forget(const Guid& participant) CAIRN_REQUIRES(mutex_);
   void Refuse(const Guid& guid, const std::string& reason) CAIRN_REQUIRES(mutex_);
   // Names an endpoint once.

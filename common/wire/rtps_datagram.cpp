@@ -1,101 +1,18 @@
 #include "common/wire/rtps_datagram.h"
 
 #include <algorithm>
-#include <cstring>
 
 #include "common/wire/limits.h"
+#include "common/wire/rtps_submessage.h"
 #include "common/wire/secure_datagram.h"
 
 namespace cairn::wire {
 namespace {
 
 using Bytes = std::span<const std::uint8_t>;
+using Reader = SubmessageReader;
 
-constexpr std::size_t kHeaderBytes = 20;
-constexpr std::size_t kGuidPrefixOffset = 8;
 constexpr std::uint32_t kMaxSetBits = 256;
-
-enum SubmessageId : std::uint8_t {
-  kPad = 0x01,
-  kAckNack = 0x06,
-  kHeartbeat = 0x07,
-  kGap = 0x08,
-  kInfoTimestamp = 0x09,
-  kInfoSource = 0x0c,
-  kInfoDestination = 0x0e,
-  kNackFrag = 0x12,
-  kHeartbeatFrag = 0x13,
-  kData = 0x15,
-  kDataFrag = 0x16,
-  kEprosimaStatistics = 0x80,
-};
-
-// Reads numbers in the byte order of one submessage. The caller must check the size first.
-struct Reader {
-  Bytes bytes;
-  bool little;
-
-  [[nodiscard]] std::uint16_t U16(std::size_t at) const {
-    return static_cast<std::uint16_t>(little ? bytes[at] | bytes[at + 1] << 8 : bytes[at] << 8 | bytes[at + 1]);
-  }
-  [[nodiscard]] std::uint32_t U32(std::size_t at) const {
-    const std::uint32_t first = U16(at);
-    const std::uint32_t second = U16(at + 2);
-    return little ? first | second << 16 : first << 16 | second;
-  }
-  // A sequence number: high word first, whatever the byte order.
-  [[nodiscard]] std::int64_t Sequence(std::size_t at) const {
-    return static_cast<std::int64_t>(static_cast<std::uint64_t>(U32(at)) << 32 | U32(at + 4));
-  }
-};
-
-// A submessage, its sender and its receiver.
-struct Submessage {
-  std::uint8_t id;
-  std::uint8_t flags;
-  Reader body;
-  SequenceGate::GuidPrefix from;
-  SequenceGate::GuidPrefix to;  // All zero: everybody.
-
-  [[nodiscard]] std::size_t size() const { return body.bytes.size(); }
-  [[nodiscard]] SequenceGate::EntityId Entity(std::size_t at) const {
-    SequenceGate::EntityId entity = 0;
-    std::memcpy(&entity, body.bytes.data() + at, sizeof(entity));
-    return entity;
-  }
-  // The numbers of the sender's entity whose id stands at `at`; of what it numbers, where there are several things.
-  [[nodiscard]] SequenceGate::Key Numbers(std::size_t at, SequenceGate::EntityId what = 0) const {
-    SequenceGate::Key key;
-    std::copy(from.begin(), from.end(), key.begin());
-    std::copy_n(body.bytes.begin() + static_cast<std::ptrdiff_t>(at), 4, key.begin() + 12);
-    std::memcpy(key.data() + 16, &what, sizeof(what));
-    return key;
-  }
-};
-
-// Steps over a parameter list; returns where it ends, or 0 if it is broken.
-std::size_t EndOfParameters(const Reader& body, std::size_t at) {
-  constexpr std::uint16_t kSentinel = 1;
-  constexpr std::uint16_t kKeyHash = 0x70;
-  constexpr std::uint16_t kStatusInfo = 0x71;
-  while (at + 4 <= body.bytes.size()) {
-    const std::uint16_t id = body.U16(at);
-    const std::uint16_t length = body.U16(at + 2);
-    at += 4;
-    if (id == kSentinel) return at;
-    if (length > body.bytes.size() - at) return 0;
-    if (id == kKeyHash && length != 16) return 0;
-    if (id == kStatusInfo && length != 4) return 0;
-    at += length;
-  }
-  return 0;
-}
-
-SequenceGate::GuidPrefix PrefixAt(Bytes bytes, std::size_t at) {
-  SequenceGate::GuidPrefix prefix;
-  std::copy_n(bytes.begin() + static_cast<std::ptrdiff_t>(at), prefix.size(), prefix.begin());
-  return prefix;
-}
 
 // Whether a sequence number set fits: its bit count stands at `at`, then come the words of bits, and `tail`
 // more bytes.
@@ -116,15 +33,6 @@ std::int64_t HighestOf(const Submessage& m, std::size_t base) {
   return 0;
 }
 
-// Steps over the inline QoS of DATA and DATA_FRAG, which follows `fixed` bytes. Returns where the payload
-// starts, or 0 if the inline QoS is broken.
-std::size_t PayloadStart(const Submessage& m, std::size_t fixed) {
-  constexpr std::uint8_t kInlineQos = 0x02;
-  const std::size_t qos = 4 + static_cast<std::size_t>(m.body.U16(2));
-  if (qos < fixed || qos > m.size()) return 0;
-  return (m.flags & kInlineQos) != 0 ? EndOfParameters(m.body, qos) : qos;
-}
-
 // Entity ids of the built-in participants, writers and readers (RTPS 9.3.1.5).
 bool IsDiscoveryWriter(Bytes entity) {
   constexpr std::array<std::uint8_t, 3> kParticipants = {0x00, 0x01, 0x00};
@@ -133,6 +41,11 @@ bool IsDiscoveryWriter(Bytes entity) {
   constexpr std::uint8_t kBuiltinWriterWithKey = 0xc2;
   const auto is = [&](const auto& key) { return std::equal(key.begin(), key.end(), entity.begin()); };
   return entity[3] == kBuiltinWriterWithKey && (is(kParticipants) || is(kWriters) || is(kReaders));
+}
+
+// Whether this is the kind of a built-in entity (RTPS 9.3.1.2).
+bool IsBuiltIn(std::uint8_t kind) {
+  return (kind & 0xc0) == 0xc0;
 }
 
 // The endpoints of handshakes (DDS-SECURITY 7.4.7.1). A message may name only one of them.
@@ -194,6 +107,7 @@ DatagramFault InspectData(const Submessage& m, const Inspection& with) {
 }
 
 DatagramFault InspectDataFrag(const Submessage& m, const Inspection& with) {
+  constexpr std::uint8_t kHasKey = 0x04;
   if (m.size() < 32) return DatagramFault::kFraming;
   const std::int64_t sequence = m.body.Sequence(12);
   if (sequence <= 0 || !with.Accepts(m.Numbers(8), sequence)) return DatagramFault::kSequence;
@@ -202,9 +116,10 @@ DatagramFault InspectDataFrag(const Submessage& m, const Inspection& with) {
   const std::uint64_t fragment_bytes = m.body.U16(26);
   const std::uint64_t sample_bytes = m.body.U32(28);
   if (start == 0 || count == 0 || fragment_bytes == 0) return DatagramFault::kFragment;
-  // These are small, and would be inspected only in part.
-  if (IsDiscoveryWriter(m.body.bytes.subspan(8, 4)) || IsHandshake(m.body.bytes.subspan(4, 8)))
-    return DatagramFault::kFragment;
+  // What built-in endpoints send is small, and would be inspected only in part.
+  if (IsBuiltIn(m.body.bytes[7]) || IsBuiltIn(m.body.bytes[11])) return DatagramFault::kFragment;
+  // Fast DDS would deliver a fragmented key as a sample with whatever the memory held before.
+  if ((m.flags & kHasKey) != 0) return DatagramFault::kFragment;
   if (sample_bytes == 0 || sample_bytes > kMaxSampleBytes) return DatagramFault::kFragment;
   const std::uint64_t fragments = (sample_bytes + fragment_bytes - 1) / fragment_bytes;
   if (start + count - 1 > fragments) return DatagramFault::kFragment;
@@ -292,39 +207,6 @@ DatagramFault InspectSubmessage(const Submessage& m, const Inspection& with) {
   }
 }
 
-// Gives each submessage to `inspect` until one has a fault.
-template <typename Inspect>
-DatagramFault Walk(Bytes datagram, Inspect inspect) {
-  constexpr std::uint8_t kMajorVersion = 2;
-  if (datagram.size() < kHeaderBytes || std::memcmp(datagram.data(), "RTPS", 4) != 0) return DatagramFault::kNotRtps;
-  if (datagram[4] != kMajorVersion) return DatagramFault::kNotRtps;
-  SequenceGate::GuidPrefix from = PrefixAt(datagram, kGuidPrefixOffset);
-  SequenceGate::GuidPrefix to{};
-  std::size_t at = kHeaderBytes;
-  while (at < datagram.size()) {
-    if (datagram.size() - at < 4) return DatagramFault::kFraming;
-    const std::uint8_t id = datagram[at];
-    const std::uint8_t flags = datagram[at + 1];
-    const bool little = (flags & 1) != 0;
-    const std::size_t length = Reader{datagram, little}.U16(at + 2);
-    // Length 0 means "to the end of the datagram", except for the two kinds of submessage that may be empty.
-    const bool to_the_end = length == 0 && id != kPad && id != kInfoTimestamp;
-    const std::size_t end = to_the_end ? datagram.size() : at + 4 + length;
-    if (end > datagram.size()) return DatagramFault::kFraming;
-    // All but the last are multiples of four bytes (9.4.5.1.3). Receivers differ in where the next one of another
-    // length begins: what is harmless here may be something else there.
-    if (end != datagram.size() && length % 4 != 0) return DatagramFault::kFraming;
-    if (id == kEprosimaStatistics && end != datagram.size()) return DatagramFault::kStatistics;
-    const Submessage submessage{id, flags, {datagram.subspan(at + 4, end - at - 4), little}, from, to};
-    const DatagramFault fault = inspect(submessage);
-    if (fault != DatagramFault::kNone) return fault;
-    if (id == kInfoSource) from = PrefixAt(submessage.body.bytes, 8);  // The sender of what follows.
-    if (id == kInfoDestination) to = PrefixAt(submessage.body.bytes, 0);
-    at = end;
-  }
-  return DatagramFault::kNone;
-}
-
 }  // namespace
 
 std::string_view DatagramFaultName(DatagramFault fault) {
@@ -337,21 +219,6 @@ std::string_view DatagramFaultName(DatagramFault fault) {
 DatagramFault InspectDatagram(Bytes datagram, SequenceGate& gate, SequenceGate::Clock::time_point now) {
   const Inspection with{gate, now};
   return Walk(datagram, [&](const Submessage& submessage) { return InspectSubmessage(submessage, with); });
-}
-
-FragmentTraffic FragmentTrafficOf(Bytes datagram) {
-  FragmentTraffic traffic;
-  static_cast<void>(Walk(datagram, [&](const Submessage& m) {
-    if (m.id == kGap) traffic.gap = true;
-    if (m.id != kDataFrag) return DatagramFault::kNone;
-    traffic.fragments.push_back({.sample = {m.Numbers(8, m.Entity(4)), m.body.Sequence(12)},
-                                 .first = m.body.U32(20),
-                                 .count = m.body.U16(24),
-                                 .fragment_bytes = m.body.U16(26),
-                                 .sample_bytes = m.body.U32(28)});
-    return DatagramFault::kNone;
-  }));
-  return traffic;
 }
 
 void NoteSent(Bytes datagram, SequenceGate& gate) {

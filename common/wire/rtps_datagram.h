@@ -10,9 +10,7 @@
 #include <cstdint>
 #include <span>
 #include <string_view>
-#include <vector>
 
-#include "common/wire/fragment_hold.h"
 #include "common/wire/sequence_gate.h"
 
 namespace cairn::wire {
@@ -36,13 +34,6 @@ inline constexpr std::size_t kDatagramFaults = 11;
 // A datagram that arrived at `now`. The gate keeps what must be known of the ones before.
 [[nodiscard]] DatagramFault InspectDatagram(std::span<const std::uint8_t> datagram, SequenceGate& gate,
                                             SequenceGate::Clock::time_point now = SequenceGate::Clock::now());
-// What a datagram says of samples in several datagrams.
-struct FragmentTraffic {
-  std::vector<FragmentRange> fragments;
-  bool gap = false;  // Some samples do not exist.
-};
-// REQUIRES: InspectDatagram finds no fault.
-[[nodiscard]] FragmentTraffic FragmentTrafficOf(std::span<const std::uint8_t> datagram);
 // A datagram that the participant itself sends: tells the gate its numbers.
 void NoteSent(std::span<const std::uint8_t> datagram, SequenceGate& gate);
 

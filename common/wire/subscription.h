@@ -63,6 +63,7 @@ class DdsSubscription final : public Subscription {
     if (now - made_ < kShortestLife) return;
     Result<Participant::Reader> reader = participant_->MakeReader(Topic<Value>::kProfile, type_, &listener_);
     if (!reader) return;  // The next sample that is refused asks again.
+    TakeAll();            // What has arrived meanwhile would be lost with the old reader.
     made_ = now;
     reader_ = std::move(*reader);
   }

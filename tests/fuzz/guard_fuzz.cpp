@@ -3,6 +3,7 @@
 #include <limits>
 #include <span>
 
+#include "common/wire/fragment_assembly.h"
 #include "common/wire/limits.h"
 #include "common/wire/rtps_datagram.h"
 #include "tests/fuzz/fuzz_target.h"
@@ -112,7 +113,7 @@ void ReadAsReceiver(std::string_view datagram) {
 
 bool RunGuard(std::string_view input) {
   wire::SequenceGate gate;
-  wire::FragmentHold hold;
+  wire::FragmentAssembly assembly;
   bool accepted = false;
   for (Pieces pieces(input); !pieces.empty();) {
     const std::string_view piece = pieces.TakePiece();
@@ -123,11 +124,13 @@ bool RunGuard(std::string_view input) {
     accepted = true;
     Must(wire::InspectDatagram(datagram, gate) == wire::DatagramFault::kNone, "a repeated datagram is accepted again");
     ReadAsReceiver(piece);
-    const wire::FragmentTraffic traffic = wire::FragmentTrafficOf(datagram);
-    if (traffic.fragments.empty()) continue;
-    for (const auto& whole : hold.Add(datagram, traffic.fragments))
-      Must(wire::FragmentTrafficOf(whole).fragments.size() > 0, "only what has fragments is held");
-    Must(hold.bytes() <= wire::FragmentHold::kMaxBytes, "what is held is bounded");
+    if (!wire::HasFragments(datagram)) continue;
+    for (const auto& whole : assembly.Take(datagram)) {
+      Must(!wire::HasFragments(whole), "fragments do not reach the middleware");
+      if (wire::InspectDatagram(whole, gate) == wire::DatagramFault::kNone)
+        ReadAsReceiver(std::string(whole.begin(), whole.end()));
+    }
+    Must(assembly.bytes() <= wire::FragmentAssembly::kMaxBytes, "what waits is bounded");
   }
   return accepted;
 }

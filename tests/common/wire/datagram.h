@@ -26,6 +26,7 @@ class Datagram {
     start_ = bytes_.size();
     return *this;
   }
+  Datagram& Byte(std::uint8_t v) { return Put(v, 1); }
   Datagram& U16(std::uint16_t v) { return Put(v, 2); }
   Datagram& U32(std::uint32_t v) { return Put(v, 4); }
   Datagram& Sequence(std::int64_t v) {

@@ -222,6 +222,20 @@ TEST(RtpsDatagram, FragmentsMustDescribeASampleWithinTheLimit) {
   EXPECT_EQ(DataFrag(1, 1, 1000, kMaxSampleBytes + 1).Zeros(1000).End().Inspect(), DatagramFault::kFragment);
 }
 
+// Built-in endpoints, the last byte of whose id begins with two bits, send no fragments. A key in fragments would be
+// delivered as a sample that nobody has sent.
+TEST(RtpsDatagram, FragmentsOfBuiltInEndpointsAndOfKeysAreRefused) {
+  const auto fragment = [](std::uint8_t flags, std::uint32_t reader, std::uint32_t writer) {
+    Datagram datagram;
+    datagram.Begin(0x16, flags).U16(0).U16(28).U32(reader).U32(writer).Sequence(1).U32(1).U16(1).U16(8).U32(16);
+    return datagram.Zeros(8).End().Inspect();
+  };
+  EXPECT_EQ(fragment(0, 0x07000000, 0x02000000), DatagramFault::kNone);
+  EXPECT_EQ(fragment(0, 0xc7000200, 0x02000000), DatagramFault::kFragment);
+  EXPECT_EQ(fragment(0, 0, 0xc2000200), DatagramFault::kFragment);
+  EXPECT_EQ(fragment(0x04, 0x07000000, 0x02000000), DatagramFault::kFragment);
+}
+
 TEST(RtpsDatagram, RandomSubmessagesAreInspectedWithoutReadingBeyondThem) {
   std::mt19937 random(7);
   SequenceGate gate;

@@ -48,6 +48,10 @@ Bytes HiddenKillerDatagram() {
   return bytes;
 }
 
+void Append(Bytes& bytes, const Bytes& more) {
+  bytes.insert(bytes.end(), more.begin(), more.end());
+}
+
 void Put(Bytes& bytes, std::uint32_t value) {
   for (int i = 0; i < 4; ++i) bytes.push_back(static_cast<std::uint8_t>(value >> (8 * i)));
 }
@@ -64,12 +68,12 @@ void PutWriterAndSequence(Bytes& bytes, std::uint8_t writer, std::uint8_t kind, 
   Put(bytes, sequence);
 }
 
-// The first of two fragments of a sample.
-Bytes FirstFragment(std::uint8_t writer, std::uint8_t kind, std::uint32_t sequence) {
+// One of the two fragments of a sample.
+Bytes Fragment(std::uint32_t number, std::uint8_t writer, std::uint8_t kind, std::uint32_t sequence) {
   Bytes bytes = {0x16, 0x03, 56, 1, 0, 0, 28, 0};  // DATA_FRAG of 312 bytes, little-endian, with parameters.
   PutWriterAndSequence(bytes, writer, kind, sequence);
-  Put(bytes, 1);               // From fragment 1,
-  Put(bytes, 256U << 16 | 1);  // one fragment of 256 bytes,
+  Put(bytes, number);
+  Put(bytes, 256U << 16 | 1);  // One fragment of 256 bytes
   Put(bytes, 512);             // of a sample of 512.
   PutKey(bytes, sequence % 3);
   bytes.resize(bytes.size() + 256, 0);
@@ -223,8 +227,8 @@ class HostileDatagrams : public ::testing::Test {
     headers.erase(std::unique(headers.begin(), headers.end()), headers.end());
     return headers;
   }
-  void SendAs(Bytes bytes, const Bytes& submessage) const {
-    bytes.insert(bytes.end(), submessage.begin(), submessage.end());
+  void SendAs(Bytes bytes, const Bytes& submessages) const {
+    Append(bytes, submessages);
     attacker_.SendEverywhere(bytes);
   }
   void ExpectANewRobotIsHeard() {
@@ -278,8 +282,39 @@ TEST_F(HostileDatagrams, FragmentsThatAGapTakesBackLeaveNothingBehind) {
     for (const Bytes& header : headers) {
       for (std::uint8_t writer = 1; writer <= 4; ++writer) {
         for (const std::uint8_t kind : {0x02, 0x03}) {
-          for (std::uint32_t i = 0; i < 8; ++i) SendAs(header, FirstFragment(writer, kind, sequence + i));
+          for (std::uint32_t i = 0; i < 8; ++i) SendAs(header, Fragment(1, writer, kind, sequence + i));
           SendAs(header, Gap(writer, kind, sequence));
+        }
+      }
+    }
+  }
+  ExpectDataStillFlows();
+  ExpectANewRobotIsHeard();
+}
+
+// The same where the samples are whole in the end: the gap comes between their fragments, in one datagram with the last
+// ones; or the first fragments would come alone, because the last ones are in a datagram with one of another sample.
+TEST_F(HostileDatagrams, FragmentsThatArriveTogetherWithOthersLeaveNothingBehind) {
+  ExpectDataStillFlows();
+  const std::vector<Bytes> headers = OverhearHeaders();
+  ASSERT_FALSE(headers.empty());
+  for (std::uint32_t sequence = 200; sequence < 600; sequence += 8) {
+    for (const Bytes& header : headers) {
+      for (std::uint8_t writer = 1; writer <= 4; ++writer) {
+        for (const std::uint8_t kind : {0x02, 0x03}) {
+          Bytes last;
+          for (std::uint32_t i = 0; i < 8; ++i) {
+            SendAs(header, Fragment(1, writer, kind, sequence + i));
+            Append(last, Fragment(2, writer, kind, sequence + i));
+          }
+          Bytes gap = Gap(writer, kind, sequence);
+          if (sequence % 16 == 0) {
+            Append(gap, last);
+          } else {
+            Append(last, Fragment(1, writer, kind, sequence + 500));
+            SendAs(header, last);
+          }
+          SendAs(header, gap);
         }
       }
     }
