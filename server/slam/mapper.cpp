@@ -92,8 +92,8 @@ void Mapper::State::CloseLargeLoop() {
   if (!loop) return;
   const auto path = trail.PathWithLoop(loop->relation(), believed.values(), options.pose_graph);
   if (!path) return;  // The loop is not stored, so that it will be searched for again.
-  filter->Rebase(*path);
   trail.AddLoop(loop->relation());
+  filter->Rebase(*path, trail.relations());
   trail.ConfirmTentative();
   drawing.StartAgain(trail.size());
   self_check.Forget();

@@ -1,5 +1,7 @@
 #include "server/slam/loops/revisit_search.h"
 
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -13,6 +15,7 @@ constexpr double kGuessSigmaM = 0.5;         // Standard deviation of the positi
 constexpr double kGuessSigmaRad = 0.15;      // Standard deviation of its heading.
 constexpr double kMinRevisitScore = 0.6;     // Share of the points of the scan that must be explained.
 constexpr double kRevisitSigmaRad = 0.02;    // Standard deviation that is added to the heading of a match.
+constexpr double kOpenSigmaM = 100.0;        // Standard deviation of the position where a scan does not show it.
 
 // The old keyframe that most likely shows the same surroundings: near, and with a similar heading.
 std::optional<std::size_t> NearestKeyframe(const Hypothesis& belief, const Trail& trail, double travelled_m,
@@ -33,6 +36,17 @@ std::optional<std::size_t> NearestKeyframe(const Hypothesis& belief, const Trail
   ForEachNear(belief.path, CountBefore(trail.shapes(), travelled_m, kMinRevisitTravelM), here, options.max_distance_m,
               look);
   return nearest;
+}
+
+// What the scan itself shows. The guess, which is the belief of one hypothesis, was the prior of the alignment: its
+// information is taken out again, and along a corridor nothing is left.
+Eigen::Matrix3d MeasuredCovariance(MatchResult match, const Eigen::Matrix3d& prior) {
+  const Eigen::Matrix3d measured = match.covariance.inverse() - prior.inverse();
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(0.5 * (measured + measured.transpose()));
+  const Eigen::Vector3d variances = solver.eigenvalues().cwiseMax(1.0 / (kOpenSigmaM * kOpenSigmaM)).cwiseInverse();
+  match.covariance = solver.eigenvectors() * variances.asDiagonal() * solver.eigenvectors().transpose();
+  TakeAlongFromPrior({match.T_ref_curr, PoseCovariance(kOpenSigmaM, 0.0)}, match);
+  return match.covariance;
 }
 
 }  // namespace
@@ -73,7 +87,7 @@ std::optional<RevisitObservation> RevisitSearch::Find(std::span<const SurfacePoi
   if (!match.converged) return std::nullopt;
   // Neighbouring matches have similar errors.
   return RevisitObservation{*centre, match.T_ref_curr,
-                            match.covariance + PoseCovariance(options_.sigma_m, kRevisitSigmaRad)};
+                            MeasuredCovariance(match, prior) + PoseCovariance(options_.sigma_m, kRevisitSigmaRad)};
 }
 
 // Aligns with other hypotheses of the filter, and returns the result that explains most.

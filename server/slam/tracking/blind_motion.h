@@ -1,6 +1,6 @@
-// Accumulates the motion that no scan measured: the part that is known by odometry or by a forecast alone. It
-// gives the uncertainty of a step between keyframes in addition to the drift of matching, and decides when
-// the robot counts as lost. Not thread-safe.
+// Accumulates the motion that no scan measured: the part that is known by odometry or by a forecast alone. Along a
+// corridor this is the position along it, although the scan matches. It gives the uncertainty of a step between
+// keyframes in addition to the drift of matching, and decides when the robot counts as lost. Not thread-safe.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,16 +15,16 @@ class BlindMotion {
  public:
   // `noise` is the noise of motion known by odometry alone. Without odometry the front-end itself reports the
   // covariance of what it did not measure.
-  BlindMotion(const MotionNoise& noise, bool use_odometry, double lost_after_m)
+  BlindMotion(const OdometryNoise& noise, bool use_odometry, double lost_after_m)
       : noise_(noise), use_odometry_(use_odometry), lost_after_m_(lost_after_m) {}
 
   // `T_track_keyframe` is the pose of the last keyframe.
   void Add(const TrackStep& step, const Pose2& T_track_keyframe) {
     unmatched_m_ = step.matched ? 0.0 : unmatched_m_ + step.moved_m;
-    if (!step.matched && use_odometry_) covariance_ += noise_.Covariance({step.moved_m, 0.0, 0.0});
     Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
     R.topLeftCorner<2, 2>() = T_track_keyframe.rotation().transpose();
-    covariance_ += R * step.forecast_covariance * R.transpose();
+    const Eigen::Matrix3d unseen = use_odometry_ ? ShareOfOdometry(step) : step.forecast_covariance;
+    covariance_ += R * unseen * R.transpose();
   }
 
   // Returns the covariance of the motion since the last call: (x, y, theta) in the last keyframe.
@@ -43,7 +43,18 @@ class BlindMotion {
   }
 
  private:
-  MotionNoise noise_;
+  // Covariance of what only odometry measured of this step, along the axes of `track`.
+  [[nodiscard]] Eigen::Matrix3d ShareOfOdometry(const TrackStep& step) const {
+    if (step.matched && !step.degenerate) return Eigen::Matrix3d::Zero();
+    Eigen::Matrix3d odometry = noise_.Covariance(step.moved_m, step.turned_rad);
+    if (!step.matched) return odometry;
+    const double along = odometry(0, 0);
+    odometry.setZero();
+    odometry.topLeftCorner<2, 2>() = along * step.open_direction * step.open_direction.transpose();
+    return odometry;
+  }
+
+  OdometryNoise noise_;
   bool use_odometry_;
   double lost_after_m_;
   double unmatched_m_ = 0.0;  // Distance travelled since the last match.

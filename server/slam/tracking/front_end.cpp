@@ -121,8 +121,10 @@ TrackStep FrontEnd::Follow(const ScanView& view, const Pose2& T_odom_robot, cons
   // refinement must therefore begin at the pose where it is to stay.
   if (!options_.use_odometry && options_.refine_enabled)
     TakeAlongFromPrior({guess.T_track_robot, guess.covariance}, coarse);
-  const MatchResult match = options_.refine_enabled ? Refine(view, T_odom_robot, guess, coarse)
-                                                    : MatchAlone(view, T_odom_robot, guess, coarse, parallel_for);
+  MatchResult match = options_.refine_enabled ? Refine(view, T_odom_robot, guess, coarse)
+                                              : MatchAlone(view, T_odom_robot, guess, coarse, parallel_for);
+  // What the alignment finds along a corridor comes from rough points and from the ends of the view.
+  if (options_.use_odometry) TakeAlongFromPrior({guess.T_track_robot, guess.covariance}, match);
   return StepOf(match);
 }
 
@@ -130,8 +132,11 @@ TrackStep FrontEnd::StepOf(const MatchResult& match) const {
   TrackStep step{.T_track_robot = match.T_ref_curr,
                  .score = match.score,
                  .matched = match.converged,
-                 .degenerate = match.degenerate};
-  step.moved_m = Between(history_.back().T_track_robot, step.T_track_robot).translation().norm();
+                 .degenerate = match.degenerate,
+                 .open_direction = match.degenerate_direction};
+  const Pose2 moved = Between(history_.back().T_track_robot, step.T_track_robot);
+  step.moved_m = moved.translation().norm();
+  step.turned_rad = std::abs(moved.theta);
   if (!options_.use_odometry) {
     if (!step.matched) step.moved_m = std::max(step.moved_m, options_.no_odometry.unmatched_step_m);
     step.forecast_covariance = ForecastShare(match);
@@ -149,8 +154,9 @@ std::optional<TrackStep> FrontEnd::TrackAgain(const ScanView& view, const Pose2&
   const Sight first = history_.back();
   history_.pop_back();
   const Guess guess = Predict(T_odom_robot);
-  const MatchResult match = AlignPointsToSurfaces(
+  MatchResult match = AlignPointsToSurfaces(
       view.points_robot, index_, {step.T_track_robot, guess.T_track_robot, guess.covariance}, options_.refine);
+  if (options_.use_odometry) TakeAlongFromPrior({guess.T_track_robot, guess.covariance}, match);
   const bool better = match.converged && match.score > step.score;
   const TrackStep again = better ? StepOf(match) : step;
   score_ = again.score;

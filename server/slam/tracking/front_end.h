@@ -66,7 +66,10 @@ struct TrackStep {
   double score = 0.0;       // Share of the scan that agrees with the last keyframes, 0..1.
   bool matched = false;     // False if the pose comes from odometry or from the forecast.
   bool degenerate = false;  // True in a corridor: the scan does not show the position along it.
+  // Then that direction: a unit vector along the axes of `track`.
+  Eigen::Vector2d open_direction = Eigen::Vector2d::Zero();
   double moved_m = 0.0;     // Distance travelled since the previous scan.
+  double turned_rad = 0.0;  // Turn since the previous scan, not negative.
   bool found = false;       // The step leads to where the robot was found again; odometry does not know it.
   // Covariance of the part of the step that neither a scan nor odometry measured (the direction along a
   // corridor, or a scan without a match), along the axes of `track`. It is zero if odometry is used:
@@ -75,8 +78,8 @@ struct TrackStep {
 
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
-    archive(self.T_track_robot, self.score, self.matched, self.degenerate, self.moved_m, self.found,
-            self.forecast_covariance);
+    archive(self.T_track_robot, self.score, self.matched, self.degenerate, self.open_direction, self.moved_m,
+            self.turned_rad, self.found, self.forecast_covariance);
   }
 };
 
