@@ -30,16 +30,22 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   passage = s.BeginAfter(passage, tilted);
   if (tilted) return s.Coast(stamp, T_odom_robot);
 
+  s.Begin(ScanStep::kDraw);
   if (s.drawing.redrawing()) s.drawing.Continue(s.trail.keyframes(), s.believed_path());
+
+  s.Begin(ScanStep::kLargeLoop);
+  s.GoOnWithLoops();
 
   // The motion of the last scans says nothing where they do not belong together with this one.
   if (passage != Passage::kDriven || s.recovery.active()) rolling = nullptr;
   TrackedScan tracked = TrackScan(s.front_end, {s.options.front_end, s.options.pairing.rolling}, s.trail,
                                   std::move(scan), rolling, T_odom_robot, parallel_for);
+  s.Begin(ScanStep::kRecover);
   s.CheckPlace(passage, tracked, T_odom_robot, parallel_for);
   auto& [still, view, step] = tracked;
   if (s.recovery.active()) return s.Recover({std::move(still), T_odom_robot}, std::move(view), step, parallel_for);
 
+  s.Begin(ScanStep::kOther);
   s.blind.Add(step, s.trail.empty() ? Pose2{} : s.trail.shapes().back().T_track_robot);
   const bool keyframe = s.trail.empty() || MovedEnough(s.trail.FromLast(step.T_track_robot), s.options.gate);
   if (keyframe) {
@@ -57,18 +63,26 @@ void Mapper::State::AddKeyframe(Keyframe keyframe, ScanView view, const TrackSte
   const bool placed_before = filter->placed();
 
   if (!trail.empty()) {
+    Begin(ScanStep::kFilter);
     filter->Predict(MotionTo(keyframe, step, step_covariance));
+    Begin(ScanStep::kRevisit);
     if (!revisit) revisit = revisits.Find(view.points_robot, trail, travelled_m, *filter, parallel_for);
+    Begin(ScanStep::kFilter);
     if (revisit && !filter->Observe(*revisit)) revisit.reset();
   }
+  Begin(ScanStep::kFilter);
   filter->Observe(KeyframeSight{*keyframe.scan, view, step.T_track_robot, travelled_m}, parallel_for);
   filter->Commit();
 
   trail.Append(std::move(keyframe), step.T_track_robot, std::move(view.points_robot), step_covariance, revisit);
 
-  CloseLargeLoop();
+  Begin(ScanStep::kLargeLoop);
+  if (filter->rebases() && !fit) loops.Begin(trail, believed_path());
+  Begin(ScanStep::kSelfCheck);
   self_check.Look(trail, believed_path());
+  Begin(ScanStep::kDraw);
   Draw(step, placed_before);
+  Begin(ScanStep::kOther);
 }
 
 // The measured step from the last keyframe to this one. `covariance` is that of the part of the step that no
@@ -84,16 +98,32 @@ StepMotion Mapper::State::MotionTo(const Keyframe& keyframe, const TrackStep& st
   return motion;
 }
 
-// Possibly no particle agrees with the large loop: then the loop's error is distributed over the whole path.
+// The search for large loops and the path with one are spread over many scans. While the robot has to be found again
+// nothing of it goes on: what is found then changes the path.
+void Mapper::State::GoOnWithLoops() {
+  if (recovery.active()) {
+    fit.reset();
+  } else if (fit) {
+    trail.GoOn(*fit, options.pose_graph);
+    if (fit->done()) CloseLargeLoop();
+  } else if (const auto loop = loops.GoOn(trail)) {
+    fit = trail.FitWithLoop(loop->relation(), believed_path().values());
+  }
+}
+
+// Possibly no particle agrees with the large loop: then the loop's error is distributed over the whole path. What was
+// added while the path was fitted follows the last pose that took part. A loop whose path is not usable is not stored,
+// so that it will be searched for again.
 void Mapper::State::CloseLargeLoop() {
-  if (!filter->rebases()) return;
+  const PathFit closed = std::move(*fit);
+  fit.reset();
+  if (!closed.usable()) return;
+  std::vector<Pose2> path = closed.path();
   const PosePath believed = believed_path();
-  const auto loop = loops.Find(trail, believed);
-  if (!loop) return;
-  const auto path = trail.PathWithLoop(loop->relation(), believed.values(), options.pose_graph);
-  if (!path) return;  // The loop is not stored, so that it will be searched for again.
-  filter->Rebase(*path);
-  trail.AddLoop(loop->relation());
+  for (std::size_t k = path.size(); k < trail.size(); ++k)
+    path.push_back(path.back() * Between(believed[k - 1], believed[k]));
+  filter->Rebase(path);
+  trail.AddLoop(closed.loop());
   trail.ConfirmTentative();
   drawing.StartAgain(trail.size());
   self_check.Forget();
@@ -164,6 +194,10 @@ ScanOutcome Mapper::State::Coast(Stamp stamp, const Pose2& T_odom_robot) {
   return outcome;
 }
 
+void Mapper::WatchSteps(StepWatch watch) {
+  state_->front_end.Watch(std::move(watch));
+}
+
 bool Mapper::full() const {
   const State& s = *state_;
   return s.trail.size() >= static_cast<std::size_t>(s.options.max_keyframes) ||
@@ -222,6 +256,7 @@ void Mapper::Load(StateReader& archive) {
   archive(*loaded);
   if (archive.ok()) loaded->filter->Load(archive);
   if (!archive.ok() || !archive.Require(loaded->IsConsistent(), "the paths")) return;
+  loaded->front_end.Watch(state_->front_end.watch());
   state_ = std::move(loaded);
 }
 
@@ -229,6 +264,7 @@ bool Mapper::State::IsConsistent() const {
   for (std::size_t i = 0; i < filter->hypothesis_count(); ++i)
     if (filter->hypothesis(i).path.size() != trail.size()) return false;
   if (recovery.active() && (trail.empty() || !last_scan)) return false;
+  if (fit && !trail.FitsTo(*fit)) return false;
   return drawing.path().size() == (filter->placed() ? trail.size() : 0);
 }
 

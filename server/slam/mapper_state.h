@@ -37,6 +37,7 @@ struct Mapper::State {
                  given.blind, given.lost_after_m),
         drawing(given.grid) {}
 
+  void Begin(ScanStep step) const { slam::Begin(front_end.watch(), step); }
   ScanOutcome Coast(Stamp stamp, const Pose2& T_odom_robot);
   Passage BeginAfter(Passage passage, bool tilted);
   void CheckPlace(Passage passage, TrackedScan& tracked, const Pose2& T_odom_robot, const ParallelFor& parallel_for);
@@ -68,6 +69,7 @@ struct Mapper::State {
                    const ParallelFor& parallel_for, std::optional<RevisitObservation> revisit = std::nullopt);
   [[nodiscard]] RevisitObservation SeenFromNearest(const FoundPlace& place) const;
   StepMotion MotionTo(const Keyframe& keyframe, const TrackStep& step, const Eigen::Matrix3d& covariance);
+  void GoOnWithLoops();
   void CloseLargeLoop();
   void Draw(const TrackStep& step, bool placed_before);
   ScanOutcome Report(Stamp stamp, const Pose2& T_odom_robot, const TrackStep& step, bool keyframe);
@@ -77,7 +79,7 @@ struct Mapper::State {
   // All but the filter, which is behind an interface.
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
-    archive(self.recovery, self.trail, self.front_end, self.blind, self.speed, self.loops, self.self_check,
+    archive(self.recovery, self.trail, self.front_end, self.blind, self.speed, self.loops, self.fit, self.self_check,
             self.drawing, self.level, self.last_scan);
   }
 
@@ -116,6 +118,7 @@ struct Mapper::State {
   RevisitSearch revisits;
   std::unique_ptr<Filter> filter;
   LoopSearch loops;
+  std::optional<PathFit> fit;  // Of the path with a loop that was found.
   SelfCheck self_check;
   Recovery recovery;
   MapDrawing drawing;

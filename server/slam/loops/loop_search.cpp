@@ -4,13 +4,12 @@
 #include <cmath>
 #include <utility>
 
+#include "server/slam/loops/loop_comparison.h"
 #include "server/slam/loops/unique_pose.h"
-#include "server/slam/matching/point_index.h"
 
 namespace cairn::slam {
 namespace {
 
-constexpr int kLevels = 5;
 // Half or twice of each of these changes the results on the first 4500 scans of mit-killian no more than another seed
 // (study `sensitivity`).
 constexpr std::size_t kMaxCandidates = 2;    // Most old places compared at one keyframe.
@@ -18,31 +17,8 @@ constexpr std::size_t kCandidateStride = 4;  // Only every fourth old keyframe i
 constexpr double kDoubtM = 1.5;              // Half width of the search window for a way of zero.
 constexpr double kDoubtRad = 0.1;            // Turn searched to either side for a way of zero.
 constexpr double kMaxDoubtRad = 0.6;         // Largest turn searched to either side.
-constexpr double kMinExplained = 0.5;        // Smallest share of the recent surfaces that must be found again.
-constexpr double kNearShare = 2.0;           // Tolerance for a surface, in inlier distances of the alignment.
-
-// Numbers of `surfaces`, transformed by `T`, that agree with the other side and that contradict it.
-struct Agreement {
-  int explained = 0;
-  int conflicts = 0;
-  [[nodiscard]] double conflict() const {
-    return conflicts / std::max(1.0, static_cast<double>(explained + conflicts));
-  }
-};
-
-Agreement AgreementOf(const std::vector<SurfacePoint>& surfaces, const Pose2& T, const PointIndex& other,
-                      const FreeSpace& other_free, double near_m) {
-  Agreement agreement;
-  for (const SurfacePoint& surface : surfaces) {
-    const Eigen::Vector2d p = T * surface.p;
-    if (other.Nearest(p, near_m) != nullptr) {
-      ++agreement.explained;
-    } else if (other_free.Contradicts(p)) {
-      ++agreement.conflicts;
-    }
-  }
-  return agreement;
-}
+// Work for each scan, in look-ups of the search: some milliseconds.
+constexpr std::int64_t kWorkPerScan = 3'000'000;
 
 }  // namespace
 
@@ -83,23 +59,51 @@ double LoopSearch::Reach(double way_m) const {
   return std::min(options_.max_doubt_m, kDoubtM + options_.doubt_per_m * way_m);
 }
 
-std::optional<LoopClosure> LoopSearch::Find(const Trail& trail, const PosePath& path) {
+LoopSearch::~LoopSearch() = default;
+
+void LoopSearch::Begin(const Trail& trail, const PosePath& path) {
   const std::span<const KeyframeShape> shapes = trail.shapes();
   const double here_m = shapes.back().travelled_m;
-  if (!options_.enabled || here_m - searched_at_m_ < options_.every_m) return std::nullopt;
+  if (!options_.enabled || searching() || here_m - searched_at_m_ < options_.every_m) return;
   searched_at_m_ = here_m;
   while (!unconfirmed_.empty() && here_m - shapes[unconfirmed_.front().recent].travelled_m > kConfirmWithinM)
     unconfirmed_.pop_front();
-
-  std::vector<LoopClosure> found;
+  recent_ = shapes.size() - 1;
   for (const std::size_t old : Candidates(trail, path)) {
-    const Pose2 guess = Between(path[old], path[shapes.size() - 1]);
-    if (const auto closure = Compare(trail, old, guess)) found.push_back(*closure);
+    const double way_m = trail.distances_m()[old];
+    candidates_.push_back({old,
+                           {Between(path[old], path[recent_]), Reach(way_m),
+                            std::min(kMaxDoubtRad, kDoubtRad + options_.doubt_rad_per_m * way_m)}});
   }
+}
+
+std::optional<LoopClosure> LoopSearch::GoOn(const Trail& trail) {
+  for (std::int64_t left = kWorkPerScan; searching() && left > 0;) {
+    if (!comparison_) {
+      comparison_ = std::make_unique<LoopComparison>(options_, align_, candidates_.front(), recent_);
+      // Where the search was saved within a comparison, that is done once more as far as it had come.
+      comparison_->GoOn(trail, work_done_);
+    }
+    const std::int64_t worked = comparison_->GoOn(trail, left);
+    left -= worked;
+    work_done_ += worked;
+    if (!comparison_->done()) break;
+    if (comparison_->closure()) found_.push_back(*comparison_->closure());
+    comparison_.reset();
+    work_done_ = 0;
+    candidates_.pop_front();
+    if (candidates_.empty()) return Confirmed(trail.shapes());
+  }
+  return std::nullopt;
+}
+
+// All candidates have been compared.
+std::optional<LoopClosure> LoopSearch::Confirmed(std::span<const KeyframeShape> shapes) {
+  const std::vector<LoopClosure> found = std::exchange(found_, {});
   for (const LoopClosure& closure : found) {
     for (const LoopClosure& earlier : unconfirmed_) {
-      if (here_m - shapes[earlier.recent].travelled_m < options_.confirm_after_m) continue;
-      if (!Agree(earlier, closure, shapes)) continue;
+      const double way_m = shapes[closure.recent].travelled_m - shapes[earlier.recent].travelled_m;
+      if (way_m < options_.confirm_after_m || !Agree(earlier, closure, shapes)) continue;
       unconfirmed_.clear();
       return closure;
     }
@@ -122,38 +126,6 @@ std::vector<std::size_t> LoopSearch::Candidates(const Trail& trail, const PosePa
   };
   ForEachNear(path, shapes.size(), here.translation(), options_.max_doubt_m, look);
   return BestPlaces(std::move(all), shapes, kStretchM, kMaxCandidates);
-}
-
-std::optional<LoopClosure> LoopSearch::Compare(const Trail& trail, std::size_t old,
-                                               const Pose2& T_old_recent_guess) const {
-  const std::span<const KeyframeShape> shapes = trail.shapes();
-  const double way_m = trail.distances_m()[old];
-  const std::size_t now = shapes.size() - 1;
-  const Stretch recent_stretch = StretchAround(shapes, now, kStretchM);
-  if (old >= recent_stretch.first) return std::nullopt;  // This is the present place, not an old one.
-  const Stretch old_stretch = StretchAround(shapes.first(recent_stretch.first), old, kStretchM);
-  const std::vector<SurfacePoint> recent = SurfacesOf(trail, recent_stretch, 2.0 * kSearchCellM);
-  const std::vector<SurfacePoint> before = SurfacesOf(trail, old_stretch, 0.5 * kSearchCellM);
-  if (std::min(recent.size(), before.size()) < kMinSurfaces) return std::nullopt;
-
-  const LikelihoodPyramid pyramid(before, kSearchCellM, kLikelihoodReachM, kLevels);
-  const SearchWindow window{T_old_recent_guess, Reach(way_m),
-                            std::min(kMaxDoubtRad, kDoubtRad + options_.doubt_rad_per_m * way_m)};
-  const auto unique = FindUniquePose(recent, pyramid, window, options_.max_rival);
-  if (!unique) return std::nullopt;
-  const PointIndex before_index(before);
-  const MatchResult aligned =
-      AlignPointsToSurfaces(recent, before_index, {*unique, *unique, UniquePoseCovariance()}, align_);
-  if (!aligned.converged || aligned.degenerate) return std::nullopt;
-  const FreeSpace before_free(trail, old_stretch, options_.free_cell_m),
-      recent_free(trail, recent_stretch, options_.free_cell_m);
-  const PointIndex recent_index(recent);
-  const double near_m = kNearShare * align_.inlier_distance_m;
-  const Agreement ours = AgreementOf(recent, aligned.T_ref_curr, before_index, before_free, near_m);
-  const Agreement theirs = AgreementOf(before, aligned.T_ref_curr.Inverse(), recent_index, recent_free, near_m);
-  if (ours.explained < kMinExplained * static_cast<double>(recent.size())) return std::nullopt;
-  if (std::max(ours.conflict(), theirs.conflict()) > options_.max_conflict) return std::nullopt;
-  return LoopClosure{old, now, aligned.T_ref_curr, PoseCovariance(options_.sigma_m, kFoundSigmaRad)};
 }
 
 bool LoopSearch::Agree(const LoopClosure& a, const LoopClosure& b, std::span<const KeyframeShape> shapes) const {

@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
+
+#include "common/geometry/transform2.h"
 
 namespace cairn::slam {
 namespace {
@@ -19,115 +22,6 @@ void MaxAhead(const std::uint8_t* from, std::uint8_t* to, std::size_t count, std
 // At this distance one angle step moves a point by one cell. Farther points move by more, which the reach of
 // the likelihood tolerates.
 constexpr double kFullDetailM = 15.0;
-
-struct Cell {
-  int x = 0;
-  int y = 0;
-};
-
-// A square block of translations at one heading, with an upper bound of their scores.
-struct Block {
-  int turn = 0;  // Index of the heading.
-  int x = 0;     // Lowest translation, in cells.
-  int y = 0;
-  std::int64_t bound = 0;  // Upper bound of the sum over the points.
-};
-
-class BranchAndBound {
- public:
-  BranchAndBound(std::span<const Eigen::Vector2d> points, const LikelihoodPyramid& pyramid, const SearchWindow& window,
-                 const std::optional<Exclusion>& exclusion)
-      : pyramid_(pyramid), window_(window), exclusion_(exclusion) {
-    double farthest = 1.0;
-    for (const Eigen::Vector2d& p : points) farthest = std::max(farthest, p.norm());
-    step_rad_ = pyramid.cell_m() / std::min(farthest, kFullDetailM);
-    reach_turns_ = std::max(1, static_cast<int>(std::ceil(window.reach_rad / step_rad_)));
-    reach_cells_ = static_cast<int>(std::ceil(window.reach_m / pyramid.cell_m()));
-    for (int turn = -reach_turns_; turn <= reach_turns_; ++turn) {
-      const Pose2& centre = window.T_ref_curr_centre;
-      const Pose2 pose{centre.x, centre.y, WrapAngle(centre.theta + turn * step_rad_)};
-      std::vector<Cell>& cells = turned_.emplace_back();
-      cells.reserve(points.size());
-      for (const Eigen::Vector2d& p : points) {
-        const Eigen::Vector2d p_ref = pose * p;
-        cells.push_back({static_cast<int>(std::floor(p_ref.x() / pyramid.cell_m())),
-                         static_cast<int>(std::floor(p_ref.y() / pyramid.cell_m()))});
-      }
-    }
-  }
-
-  std::optional<RegionPeak> Run(double min_score) {
-    const double full = 255.0 * static_cast<double>(turned_.front().size());
-    best_.bound = static_cast<std::int64_t>(min_score * full);
-    std::vector<Block> top;
-    const int level = pyramid_.levels() - 1;
-    for (int turn = 0; turn < static_cast<int>(turned_.size()); ++turn)
-      for (int y = -reach_cells_; y <= reach_cells_; y += 1 << level)
-        for (int x = -reach_cells_; x <= reach_cells_; x += 1 << level) top.push_back({turn, x, y, 0});
-    Descend(std::move(top), level);
-    const bool complete = scored_ <= kMaxBlocks;
-    if (!found_ && complete) return std::nullopt;
-    return RegionPeak{PoseOf(best_), static_cast<double>(best_.bound) / full, complete};
-  }
-
- private:
-  [[nodiscard]] Pose2 PoseOf(const Block& block) const {
-    const Pose2& centre = window_.T_ref_curr_centre;
-    return {centre.x + block.x * pyramid_.cell_m(), centre.y + block.y * pyramid_.cell_m(),
-            WrapAngle(centre.theta + (block.turn - reach_turns_) * step_rad_)};
-  }
-
-  [[nodiscard]] bool Excluded(const Block& block, int level) const {
-    if (!exclusion_) return false;
-    const Pose2 low = PoseOf(block);
-    if (std::abs(AngleDiff(low.theta, exclusion_->T_ref_curr.theta)) > exclusion_->radius_rad) return false;
-    // The whole block must lie inside, so its farthest corner is checked.
-    const double side = ((1 << level) - 1) * pyramid_.cell_m();
-    const double dx =
-        std::max(std::abs(low.x - exclusion_->T_ref_curr.x), std::abs(low.x + side - exclusion_->T_ref_curr.x));
-    const double dy =
-        std::max(std::abs(low.y - exclusion_->T_ref_curr.y), std::abs(low.y + side - exclusion_->T_ref_curr.y));
-    return std::hypot(dx, dy) <= exclusion_->radius_m;
-  }
-
-  // Depth first, in the order of the bounds; skips blocks that cannot exceed the best score.
-  void Descend(std::vector<Block> blocks, int level) {
-    std::erase_if(blocks, [&](const Block& block) { return Excluded(block, level); });
-    for (Block& block : blocks) {
-      block.bound = 0;
-      if (++scored_ > kMaxBlocks) return;
-      for (const Cell& cell : turned_[static_cast<std::size_t>(block.turn)])
-        block.bound += pyramid_.Best(level, cell.x + block.x, cell.y + block.y);
-    }
-    std::stable_sort(blocks.begin(), blocks.end(), [](const Block& a, const Block& b) { return a.bound > b.bound; });
-    for (const Block& block : blocks) {
-      if (block.bound <= best_.bound) return;
-      if (level == 0) {
-        best_ = block;
-        found_ = true;
-        return;
-      }
-      const int half = 1 << (level - 1);
-      std::vector<Block> parts;
-      for (const int dy : {0, half})
-        for (const int dx : {0, half})
-          if (block.x + dx <= reach_cells_ && block.y + dy <= reach_cells_)
-            parts.push_back({block.turn, block.x + dx, block.y + dy, 0});
-      Descend(std::move(parts), level - 1);
-    }
-  }
-
-  const LikelihoodPyramid& pyramid_;
-  const SearchWindow window_;
-  const std::optional<Exclusion> exclusion_;
-  double step_rad_ = 0.0;
-  int reach_turns_ = 0;
-  int reach_cells_ = 0;
-  std::vector<std::vector<Cell>> turned_;  // The cells of the points at each heading.
-  Block best_;
-  bool found_ = false;
-  int scored_ = 0;
-};
 
 }  // namespace
 
@@ -178,11 +72,136 @@ LikelihoodPyramid::LikelihoodPyramid(std::span<const SurfacePoint> reference, do
   }
 }
 
+std::int64_t LikelihoodPyramid::SumOfBest(int level, std::span<const Place> places, int x, int y) const {
+  const std::uint8_t* raster = levels_[static_cast<std::size_t>(level)].data();
+  const int shift_x = x + kPad - low_x_, shift_y = y + kPad - low_y_;
+  const auto width = static_cast<std::uint32_t>(width_), height = static_cast<std::uint32_t>(height_);
+  std::int64_t sum = 0;
+  for (const Place& place : places) {
+    // As unsigned numbers, places to the left and below are too large as well.
+    const auto column = static_cast<std::uint32_t>(place.x + shift_x),
+               row = static_cast<std::uint32_t>(place.y + shift_y);
+    if (column < width && row < height) sum += raster[row * width + column];
+  }
+  return sum;
+}
+
+PoseSearch::PoseSearch(std::span<const Eigen::Vector2d> points_curr, const LikelihoodPyramid& pyramid,
+                       const SearchWindow& window, double min_score, const std::optional<Exclusion>& exclusion)
+    : pyramid_(pyramid), window_(window), exclusion_(exclusion) {
+  double farthest = 1.0;
+  for (const Eigen::Vector2d& p : points_curr) farthest = std::max(farthest, p.norm());
+  step_rad_ = pyramid.cell_m() / std::min(farthest, kFullDetailM);
+  reach_turns_ = std::max(1, static_cast<int>(std::ceil(window.reach_rad / step_rad_)));
+  reach_cells_ = static_cast<int>(std::ceil(window.reach_m / pyramid.cell_m()));
+  for (int turn = -reach_turns_; turn <= reach_turns_; ++turn) {
+    const Pose2& centre = window.T_ref_curr_centre;
+    const Transform2 pose({centre.x, centre.y, WrapAngle(centre.theta + turn * step_rad_)});
+    std::vector<LikelihoodPyramid::Place>& cells = turned_.emplace_back();
+    cells.reserve(points_curr.size());
+    for (const Eigen::Vector2d& p : points_curr) {
+      const Eigen::Vector2d p_ref = pose * p;
+      cells.push_back({static_cast<int>(std::floor(p_ref.x() / pyramid.cell_m())),
+                       static_cast<int>(std::floor(p_ref.y() / pyramid.cell_m()))});
+    }
+  }
+  const double full = 255.0 * static_cast<double>(points_curr.size());
+  best_.bound = static_cast<std::int64_t>(min_score * full);
+  std::vector<Block> top;
+  const int level = pyramid.levels() - 1;
+  for (int turn = 0; turn < static_cast<int>(turned_.size()); ++turn)
+    for (int y = -reach_cells_; y <= reach_cells_; y += 1 << level)
+      for (int x = -reach_cells_; x <= reach_cells_; x += 1 << level) top.push_back({turn, x, y, 0});
+  Open(level, std::move(top));
+}
+
+Pose2 PoseSearch::PoseOf(const Block& block) const {
+  const Pose2& centre = window_.T_ref_curr_centre;
+  return {centre.x + block.x * pyramid_.cell_m(), centre.y + block.y * pyramid_.cell_m(),
+          WrapAngle(centre.theta + (block.turn - reach_turns_) * step_rad_)};
+}
+
+bool PoseSearch::Excluded(const Block& block, int level) const {
+  if (!exclusion_) return false;
+  const Pose2 low = PoseOf(block);
+  if (std::abs(AngleDiff(low.theta, exclusion_->T_ref_curr.theta)) > exclusion_->radius_rad) return false;
+  // The whole block must lie inside, so its farthest corner is checked.
+  const double side = ((1 << level) - 1) * pyramid_.cell_m();
+  const double dx =
+      std::max(std::abs(low.x - exclusion_->T_ref_curr.x), std::abs(low.x + side - exclusion_->T_ref_curr.x));
+  const double dy =
+      std::max(std::abs(low.y - exclusion_->T_ref_curr.y), std::abs(low.y + side - exclusion_->T_ref_curr.y));
+  return std::hypot(dx, dy) <= exclusion_->radius_m;
+}
+
+void PoseSearch::Open(int level, std::vector<Block> blocks) {
+  std::erase_if(blocks, [&](const Block& block) { return Excluded(block, level); });
+  open_.push_back({level, std::move(blocks)});
+}
+
+std::vector<PoseSearch::Block> PoseSearch::PartsOf(const Block& block, int level) const {
+  const int half = 1 << (level - 1);
+  std::vector<Block> parts;
+  for (const int dy : {0, half})
+    for (const int dx : {0, half})
+      if (block.x + dx <= reach_cells_ && block.y + dy <= reach_cells_)
+        parts.push_back({block.turn, block.x + dx, block.y + dy, 0});
+  return parts;
+}
+
+// Depth first, in the order of the bounds; skips blocks that cannot exceed the best score.
+std::int64_t PoseSearch::GoOn(std::int64_t work) {
+  std::int64_t done = 0;
+  while (!open_.empty() && done < work) {
+    Level& last = open_.back();
+    if (!last.bounded) {
+      for (; last.next < last.blocks.size() && done < work; ++last.next) {
+        if (++scored_ > kMaxBlocks) {
+          open_.clear();
+          return done;
+        }
+        Block& block = last.blocks[last.next];
+        const auto& cells = turned_[static_cast<std::size_t>(block.turn)];
+        block.bound = pyramid_.SumOfBest(last.level, cells, block.x, block.y);
+        done += static_cast<std::int64_t>(cells.size());
+      }
+      if (last.next < last.blocks.size()) return done;
+      std::stable_sort(last.blocks.begin(), last.blocks.end(),
+                       [](const Block& a, const Block& b) { return a.bound > b.bound; });
+      last.bounded = true;
+      last.next = 0;
+    }
+    if (last.next == last.blocks.size() || last.blocks[last.next].bound <= best_.bound) {
+      open_.pop_back();
+      continue;
+    }
+    const Block block = last.blocks[last.next++];
+    const int level = last.level;
+    if (level > 0) {
+      Open(level - 1, PartsOf(block, level));
+    } else {
+      best_ = block;
+      found_ = true;
+      open_.pop_back();
+    }
+  }
+  return done;
+}
+
+std::optional<RegionPeak> PoseSearch::peak() const {
+  const bool complete = scored_ <= kMaxBlocks;
+  if (!found_ && complete) return std::nullopt;
+  const double full = 255.0 * static_cast<double>(turned_.front().size());
+  return RegionPeak{PoseOf(best_), static_cast<double>(best_.bound) / full, complete};
+}
+
 std::optional<RegionPeak> FindBestPose(std::span<const Eigen::Vector2d> points_curr, const LikelihoodPyramid& pyramid,
                                        const SearchWindow& window, double min_score,
                                        const std::optional<Exclusion>& exclusion) {
   if (points_curr.empty()) return std::nullopt;
-  return BranchAndBound(points_curr, pyramid, window, exclusion).Run(min_score);
+  PoseSearch search(points_curr, pyramid, window, min_score, exclusion);
+  search.GoOn(std::numeric_limits<std::int64_t>::max());
+  return search.peak();
 }
 
 }  // namespace cairn::slam

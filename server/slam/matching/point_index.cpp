@@ -1,6 +1,7 @@
 #include "server/slam/matching/point_index.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -14,6 +15,11 @@ constexpr std::size_t kFirstSlots = 1024;
 
 std::int32_t CellOf(double coordinate_m) {
   return static_cast<std::int32_t>(std::floor(coordinate_m / kCellM));
+}
+
+// REQUIRES: value is finite and not negative.
+double NextLarger(double value) {
+  return std::bit_cast<double>(std::bit_cast<std::uint64_t>(value) + 1);
 }
 
 // Where a place lies in its cell, along one axis: how far the cells `offset` cells away are at least.
@@ -38,6 +44,7 @@ void PointIndex::EmptyRings::Clear() {
 // From now on the cell holds a point.
 void PointIndex::EmptyRings::Fill(std::int32_t x, std::int32_t y) {
   if (rings_.empty()) rings_.assign(static_cast<std::size_t>(kSide * kSide), kMost);
+  if (Around(x, y) == 0) return;
   for (std::int32_t j = 1 - kMost; j < kMost; ++j) {
     std::uint8_t* row = rings_.data() + ((y + j) & (kSide - 1)) * kSide;
     for (std::int32_t i = 1 - kMost; i < kMost; ++i) {
@@ -95,8 +102,8 @@ void PointIndex::Add(const SurfacePoint& point) {
   }
   Block& block = blocks_[static_cast<std::size_t>(cell.newest)];
   const auto at = static_cast<std::size_t>(block.size++);
-  block.x[at] = point.p.x();
-  block.y[at] = point.p.y();
+  block.x[at] = static_cast<float>(point.p.x() - x * kCellM);
+  block.y[at] = static_cast<float>(point.p.y() - y * kCellM);
   block.point[at] = static_cast<std::int32_t>(points_.size());
   points_.push_back(point);
 }
@@ -109,27 +116,52 @@ void PointIndex::DropOldest(std::size_t count) {
   for (const SurfacePoint& point : kept) Add(point);
 }
 
+// Single precision is exact enough to exclude a point, with this margin: distances within a search are below a few
+// metres, so that their rounding is below a micrometre.
+void PointIndex::Best::Set(double squared, std::int32_t at) {
+  constexpr double kRoundingM = 2e-6;
+  squared_m2 = squared;
+  point = at;
+  const double reach_m = std::sqrt(squared) * (1.0 + 1e-6) + kRoundingM;
+  may_be_nearer_m2 = static_cast<float>(reach_m * reach_m * (1.0 + 1e-6));
+}
+
 void PointIndex::LookInto(std::int32_t x, std::int32_t y, const Eigen::Vector2d& p, Best& best) const {
   const auto dropped = static_cast<std::int32_t>(dropped_);
+  const auto p_x = static_cast<float>(p.x() - x * kCellM), p_y = static_cast<float>(p.y() - y * kCellM);
   std::int32_t left = kMaxInCell;
   for (std::int32_t b = table_[SlotOf(x, y)].newest; b >= 0 && left > 0;) {
     const Block& block = blocks_[static_cast<std::size_t>(b)];
     if (block.point[static_cast<std::size_t>(block.size) - 1] < dropped) return;
-    const std::int32_t end = std::max(0, block.size - left);
-    for (std::int32_t n = block.size; n-- > end;) {
-      const auto i = static_cast<std::size_t>(n);
-      const double dx = block.x[i] - p.x(), dy = block.y[i] - p.y();
-      const double squared_m2 = dx * dx + dy * dy;
-      if (squared_m2 < best.squared_m2 && block.point[i] >= dropped) best = {squared_m2, block.point[i]};
+    std::int32_t candidates = 0;
+    std::array<std::int32_t, Block::kPoints> candidate;
+    for (std::size_t i = 0; i < Block::kPoints; ++i) {
+      const float dx = block.x[i] - p_x, dy = block.y[i] - p_y;
+      candidate[i] = dx * dx + dy * dy <= best.may_be_nearer_m2 ? 1 : 0;
+      candidates |= candidate[i];
+    }
+    if (candidates != 0) {
+      const std::int32_t end = std::max(0, block.size - left);
+      for (std::int32_t n = block.size; n-- > end;) {
+        const auto i = static_cast<std::size_t>(n);
+        if (candidate[i] == 0 || block.point[i] < dropped) continue;
+        const double squared_m2 = (points_[static_cast<std::size_t>(block.point[i])].p - p).squaredNorm();
+        if (squared_m2 < best.squared_m2) best.Set(squared_m2, block.point[i]);
+      }
     }
     left -= block.size;
     b = block.older;
   }
 }
 
-const SurfacePoint* PointIndex::Nearest(const Eigen::Vector2d& p, double max_distance_m) const {
+const SurfacePoint* PointIndex::Nearest(const Eigen::Vector2d& p, double max_distance_m, std::int32_t& likely) const {
   if (points_.empty()) return nullptr;
-  Best best{max_distance_m * max_distance_m};
+  Best best(max_distance_m * max_distance_m);
+  if (likely >= static_cast<std::int32_t>(dropped_) && likely < static_cast<std::int32_t>(points_.size())) {
+    // The least bound below which the point itself lies, so that of equally near points the same one counts as ever.
+    const double bound_m2 = NextLarger((points_[static_cast<std::size_t>(likely)].p - p).squaredNorm());
+    if (bound_m2 < best.squared_m2) best.Set(bound_m2, kNone);
+  }
   const std::int32_t x = CellOf(p.x()), y = CellOf(p.y());
   const Borders across(p.x(), x), along(p.y(), y);
   const double border_m = std::min(across.nearest_m(), along.nearest_m());
@@ -147,7 +179,9 @@ const SurfacePoint* PointIndex::Nearest(const Eigen::Vector2d& p, double max_dis
       }
     }
   }
-  return best.point >= 0 ? &points_[static_cast<std::size_t>(best.point)] : nullptr;
+  if (best.point < 0) return nullptr;
+  likely = best.point;
+  return &points_[static_cast<std::size_t>(best.point)];
 }
 
 }  // namespace cairn::slam

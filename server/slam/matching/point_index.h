@@ -1,4 +1,4 @@
-// Finds the nearest surface point of a reference set. Nearly all time of the estimator is spent here.
+// Finds the nearest surface point of a reference set. Most of the estimator's time is spent here.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,10 +15,13 @@ namespace cairn::slam {
 // The plane is divided into small square cells, which a hash table finds. A search looks into the cell of the place and
 // then into the rings of cells around it, until no cell that is left can hold a nearer point. Of a cell only the last
 // kMaxInCell points are compared, far more than a wall that was seen forty times puts there, so that no scan can make
-// the search slow. Thread rule: built by one thread, then read from any thread.
+// the search slow. Points are compared sixteen at a time with single precision; only those that may be the nearest are
+// compared exactly. Thread rule: built by one thread, then read from any thread.
 class PointIndex {
  public:
   static constexpr std::int32_t kMaxInCell = 400;
+  // No point is known, see Nearest.
+  static constexpr std::int32_t kNone = -1;
 
   explicit PointIndex(std::span<const SurfacePoint> points = {});
 
@@ -28,16 +31,28 @@ class PointIndex {
   void DropOldest(std::size_t count);
   // The nearest point that is nearer than max_distance_m, or null; of several equally near ones of a cell, the last
   // that was added. Time grows with the square of max_distance_m where there is no point.
-  [[nodiscard]] const SurfacePoint* Nearest(const Eigen::Vector2d& p, double max_distance_m) const;
+  [[nodiscard]] const SurfacePoint* Nearest(const Eigen::Vector2d& p, double max_distance_m) const {
+    std::int32_t any = kNone;
+    return Nearest(p, max_distance_m, any);
+  }
+  // The same, faster if `likely` is a point nearby: kNone or what an earlier search of the same reference set left
+  // there. It is set to the point that was found, if there is one. It does not change the answer.
+  [[nodiscard]] const SurfacePoint* Nearest(const Eigen::Vector2d& p, double max_distance_m,
+                                            std::int32_t& likely) const;
   [[nodiscard]] std::size_t size() const { return points_.size() - dropped_; }
 
  private:
-  // Points of one cell, in the order in which they were added. The coordinates of many points lie side by side, because
-  // comparing them is the inner loop.
+  // Points of one cell, in the order in which they were added, relative to the cell's corner. The coordinates of many
+  // points lie side by side, because comparing them is the inner loop. Places without a point are far away.
   struct Block {
     static constexpr std::int32_t kPoints = 16;
-    std::array<double, kPoints> x;
-    std::array<double, kPoints> y;
+    static constexpr float kFarM = 1e15F;
+    Block() {
+      x.fill(kFarM);
+      y.fill(kFarM);
+    }
+    alignas(16) std::array<float, kPoints> x;
+    alignas(16) std::array<float, kPoints> y;
     std::array<std::int32_t, kPoints> point;  // Index in points_.
     std::int32_t size = 0;
     std::int32_t older = -1;  // The block of this cell that was filled before, or -1.
@@ -47,9 +62,13 @@ class PointIndex {
     std::int32_t y = 0;
     std::int32_t newest = -1;  // Its last block, or -1 in a slot of the table that is free.
   };
+  // The search so far: every point whose squared distance is at least `squared_m2` is not nearer.
   struct Best {
-    double squared_m2;
-    std::int32_t point = -1;
+    explicit Best(double squared) { Set(squared, kNone); }
+    void Set(double squared, std::int32_t at);
+    double squared_m2 = 0.0;
+    std::int32_t point = kNone;
+    float may_be_nearer_m2 = 0.0F;  // Above `squared_m2` by more than the error of single precision.
   };
 
   // The number of rings of cells round a place that hold no point, for every place. The number may be too small:
@@ -63,7 +82,7 @@ class PointIndex {
     [[nodiscard]] std::int32_t Around(std::int32_t x, std::int32_t y) const;
 
    private:
-    static constexpr std::int32_t kSide = 512;
+    static constexpr std::int32_t kSide = 256;
     std::vector<std::uint8_t> rings_;  // Allocated by the first Fill: most robots of a fleet may never drive.
   };
 

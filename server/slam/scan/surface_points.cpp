@@ -1,6 +1,5 @@
 #include "server/slam/scan/surface_points.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -20,44 +19,62 @@ constexpr double kGapSteps = 6.0;
 constexpr double kLeastGapM = 0.175;
 constexpr double kLargestGapM = 0.7;
 
-// The consecutive hits around `centre` that lie on its surface: near to it, and without a jump in between.
-std::pair<std::size_t, std::size_t> Neighbourhood(const std::vector<BeamPoint>& hits, std::size_t centre, double step,
-                                                  const SurfaceOptions& options) {
-  // Distant points lie far apart, so they need a wider span to have neighbours at all.
-  const double span = std::max(options.neighbour_span_m, options.span_steps * hits[centre].range_m * step);
-  const double gap = std::clamp(kGapSteps * hits[centre].range_m * step, kLeastGapM, kLargestGapM);
-  const auto connected = [&](std::size_t a, std::size_t b) {
-    return (hits[a].p_robot - hits[b].p_robot).norm() < gap &&
-           std::abs(hits[a].beam - hits[b].beam) <= options.skipped_beams;
-  };
-  std::size_t first = centre, last = centre;
-  while (first > 0 && centre - first < kMaxNeighbours && connected(first, first - 1) &&
-         (hits[first - 1].p_robot - hits[centre].p_robot).norm() < span)
-    --first;
-  while (last + 1 < hits.size() && last - centre < kMaxNeighbours && connected(last, last + 1) &&
-         (hits[last + 1].p_robot - hits[centre].p_robot).norm() < span)
-    ++last;
-  return {first, last};
-}
-
-Eigen::Vector2d NormalOf(const std::vector<BeamPoint>& hits, std::size_t first, std::size_t last,
-                         const Eigen::Vector2d& p_sensor, double max_flatness) {
-  if (last - first + 1 < 3) return Eigen::Vector2d::Zero();
-  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  for (std::size_t i = first; i <= last; ++i) mean += hits[i].p_robot;
-  mean /= static_cast<double>(last - first + 1);
-  Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
-  for (std::size_t i = first; i <= last; ++i) {
-    const Eigen::Vector2d d = hits[i].p_robot - mean;
-    scatter += d * d.transpose();
+// The moments of the consecutive hits that lie on the surface of a hit: near to it, and without a jump in between. They
+// are relative to the hit, where the numbers are small.
+class Neighbourhood {
+ public:
+  Neighbourhood(const std::vector<BeamPoint>& hits, std::size_t centre, double step, const SurfaceOptions& options)
+      : hits_(hits), centre_(hits[centre].p_robot), skipped_beams_(options.skipped_beams) {
+    // Distant points lie far apart, so they need a wider span to have neighbours at all.
+    const double span = std::max(options.neighbour_span_m, options.span_steps * hits[centre].range_m * step);
+    const double gap = std::clamp(kGapSteps * hits[centre].range_m * step, kLeastGapM, kLargestGapM);
+    span_m2_ = span * span;
+    gap_m2_ = gap * gap;
+    for (std::size_t i = centre; i > 0 && centre - i < kMaxNeighbours && Reaches(i, i - 1); --i) {
+    }
+    for (std::size_t i = centre; i + 1 < hits.size() && i - centre < kMaxNeighbours && Reaches(i, i + 1); ++i) {
+    }
   }
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
-  solver.computeDirect(scatter);
-  if (!(solver.eigenvalues()(0) < max_flatness * solver.eigenvalues()(1))) return Eigen::Vector2d::Zero();
-  Eigen::Vector2d normal = solver.eigenvectors().col(0).normalized();
-  if (normal.dot(p_sensor - mean) < 0) normal = -normal;
-  return normal;
-}
+
+  // Unit vector across the surface, towards the sensor; zero if the surface is not flat.
+  [[nodiscard]] Eigen::Vector2d Normal(const Eigen::Vector2d& p_sensor, double max_flatness) const {
+    if (count_ < 3.0) return Eigen::Vector2d::Zero();
+    const Eigen::Vector2d mean = sum_ / count_;
+    const double xx = xx_ - sum_.x() * mean.x(), xy = xy_ - sum_.x() * mean.y(), yy = yy_ - sum_.y() * mean.y();
+    // The eigenvalues of the scatter matrix, and the eigenvector of the smaller one without a difference of like
+    // numbers.
+    const double half_sum = 0.5 * (xx + yy), half_difference = 0.5 * (xx - yy);
+    const double radius = std::sqrt(half_difference * half_difference + xy * xy);
+    if (!(half_sum - radius < max_flatness * (half_sum + radius))) return Eigen::Vector2d::Zero();
+    Eigen::Vector2d normal = half_difference >= 0.0 ? Eigen::Vector2d(-xy, half_difference + radius)
+                                                    : Eigen::Vector2d(radius - half_difference, -xy);
+    normal.normalize();
+    return normal.dot(p_sensor - centre_ - mean) < 0 ? Eigen::Vector2d(-normal) : normal;
+  }
+
+ private:
+  // Takes up the hit `next`, if it belongs to the surface on which its neighbour `at` lies.
+  bool Reaches(std::size_t at, std::size_t next) {
+    const Eigen::Vector2d d = hits_[next].p_robot - centre_;
+    if ((hits_[next].p_robot - hits_[at].p_robot).squaredNorm() >= gap_m2_ || d.squaredNorm() >= span_m2_ ||
+        std::abs(hits_[next].beam - hits_[at].beam) > skipped_beams_)
+      return false;
+    count_ += 1.0;
+    sum_ += d;
+    xx_ += d.x() * d.x();
+    xy_ += d.x() * d.y();
+    yy_ += d.y() * d.y();
+    return true;
+  }
+
+  const std::vector<BeamPoint>& hits_;
+  const Eigen::Vector2d centre_;
+  const std::int64_t skipped_beams_;
+  double span_m2_ = 0.0, gap_m2_ = 0.0;
+  double count_ = 1.0;  // With the hit itself.
+  Eigen::Vector2d sum_ = Eigen::Vector2d::Zero();
+  double xx_ = 0.0, xy_ = 0.0, yy_ = 0.0;
+};
 
 // The normal of a wall that is seen at a grazing angle: the hits of neighbouring beams lie far apart, but on
 // one line.
@@ -125,8 +142,7 @@ std::vector<SurfacePoint> SurfacePointsOf(std::span<const BeamPoint> points, con
   surface.reserve(hits.size() / stride + 1);
   for (std::size_t i = 0; i < hits.size(); i += stride) {
     if (!surface.empty() && (hits[i].p_robot - surface.back().p).norm() < options.min_spacing_m) continue;
-    const auto [first, last] = Neighbourhood(hits, i, step, options);
-    Eigen::Vector2d normal = NormalOf(hits, first, last, p_sensor, options.max_flatness);
+    Eigen::Vector2d normal = Neighbourhood(hits, i, step, options).Normal(p_sensor, options.max_flatness);
     if (normal.isZero()) normal = GrazingNormalOf(hits, i, p_sensor, options);
     surface.push_back({hits[i].p_robot, normal});
   }

@@ -26,6 +26,7 @@ void Trail::Append(Keyframe keyframe, const Pose2& T_track_robot, std::vector<Su
     relations_.push_back(
         PositiveDefinite({node - 1, node, T_prev_curr, drift_.Covariance(T_prev_curr) + step_covariance, false}));
   shapes_.push_back({T_track_robot, TravelledTo(T_track_robot)});
+  points_robot.shrink_to_fit();  // It stays as long as the trail.
   points_.emplace_back(std::move(points_robot));
   keyframes_.push_back(std::move(keyframe));
   loops_.emplace_back();
@@ -146,14 +147,6 @@ std::vector<double> Trail::DistancesFromLast() const {
     }
   }
   return distance;
-}
-
-std::optional<std::vector<Pose2>> Trail::PathWithLoop(const PoseRelation& loop, std::vector<Pose2> path,
-                                                      const PoseGraphOptions& options) const {
-  std::vector<PoseRelation> relations = relations_;
-  relations.push_back(PositiveDefinite(loop));
-  if (!OptimisePoses(path, relations, options).usable) return std::nullopt;
-  return path;
 }
 
 Pose2 Trail::FromLast(const Pose2& T_track_robot) const {

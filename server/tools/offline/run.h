@@ -11,13 +11,18 @@
 #include "common/service/ledger.h"
 #include "common/status.h"
 #include "server/slam/scan_pipeline.h"
+#include "server/slam/tracking/scan_steps.h"
 #include "server/tools/offline/options.h"
 
 namespace cairn::server {
 
 struct OfflineReport {
-  std::vector<double> scan_ms;  // Estimator time per scan, in order.
-  double wall_s = 0.0;          // Whole run: reading, estimating, writing.
+  std::vector<double> scan_ms;      // Estimator time per scan, in order.
+  std::vector<double> scan_cpu_ms;  // The same in processor time of the thread that runs the estimator,
+  // and that by the steps of the estimator: the sum over all scans, and the part of each step in the slowest scan.
+  std::array<double, slam::kScanStepCount> step_ms{};
+  std::array<double, slam::kScanStepCount> slowest_scan_step_ms{};
+  double wall_s = 0.0;  // Whole run: reading, estimating, writing.
   double cpu_s = 0.0;
   double peak_rss_mib = 0.0;
   std::uint64_t scans_used = 0;
