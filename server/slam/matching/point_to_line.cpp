@@ -16,8 +16,7 @@ namespace {
 // changes the errors no more than another seed (study `sensitivity`).
 constexpr double kStopStepRad = 2e-4;
 
-// A sample of so many points is enough for the first iterations, which bring the scan near to its place. With half or
-// twice as many the errors on the real logs change no more than with another seed.
+// So many points take part in the first iterations, which bring the scan near to its place. Other numbers were not tried.
 constexpr std::size_t kSamplePoints = 100;
 // When a step of the sample is shorter than so many of the steps at which the iteration stops, all points take over.
 constexpr double kNearSteps = 10.0;
