@@ -1,0 +1,47 @@
+// One connection as cpp-httplib reads and writes it, with bounds that the library does not have: bytes and time of a
+// whole request. One thread.
+#pragma once
+
+#include <httplib.h>
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <string>
+
+#include "common/http/http_server.h"
+
+namespace cairn {
+
+class ConnectionStream final : public httplib::Stream {
+ public:
+  // `stopping` outlives it: where it becomes true, waiting ends.
+  ConnectionStream(int socket, const HttpOptions& options, const std::atomic<bool>& stopping);
+
+  // Waits for the first byte of a request, at most the idle time. False: none came.
+  [[nodiscard]] bool WaitForRequest();
+
+  [[nodiscard]] bool is_readable() const override;
+  [[nodiscard]] bool is_writable() const override;
+  ssize_t read(char* to, std::size_t size) override;
+  ssize_t write(const char* from, std::size_t size) override;
+  void get_remote_ip_and_port(std::string& ip, int& port) const override;
+  void get_local_ip_and_port(std::string& ip, int& port) const override;
+  [[nodiscard]] socket_t socket() const override { return socket_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  [[nodiscard]] bool Wait(short events, Clock::time_point until) const;
+
+  const int socket_;
+  const HttpOptions& options_;
+  const std::atomic<bool>& stopping_;
+  Clock::time_point request_ends_{};
+  std::size_t bytes_left_ = 0;  // That this request may still have.
+  bool answered_ = false;       // Something of an answer was sent.
+  std::array<char, 4096> buffer_{};
+  std::size_t begin_ = 0, end_ = 0;  // What of the buffer was not read yet.
+};
+
+}  // namespace cairn
