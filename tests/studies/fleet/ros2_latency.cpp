@@ -184,6 +184,7 @@ Drive DriveThrough(Door& door, Waiting& waiting, const LiveServer& server, std::
       door.Send(next.robot, std::get<Odometry>(next.record));
     }
   }
+  // The last poses are on their way, and a pose that was lost never comes: there is no condition to wait for.
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
   drive.server_cpu_s = CpuSecondsOf(pid) - cpu_before;
   drive.latency_ms = waiting.latency_ms();
