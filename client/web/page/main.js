@@ -1,6 +1,7 @@
 // Holds the page together: chooses the site, listens to the events, and hands what they say to the map and the lists.
 import { SiteMap } from '/map.js';
 import { plot } from '/plots.js';
+import { onThemeChange } from '/theme.js';
 import * as panels from '/panels.js';
 import { command, say, token, tokenOfAddress, useToken } from '/commands.js';
 
@@ -146,6 +147,7 @@ $('token-dialog').querySelector('form').addEventListener('submit', async (event)
   }
 });
 
+onThemeChange(() => { if (state?.site) show(state); });
 showFlow();
 panels.showEmptyMap(null);
 await tokenOfAddress();

@@ -3,6 +3,7 @@ import { colourOf, theme, onThemeChange } from '/theme.js';
 
 const TILE = 128;
 const at = (x, y) => L.latLng(y, x);
+const still = window.matchMedia('(prefers-reduced-motion: reduce)');
 
 // Tiles of the pyramid: level 0 is the finest, and Leaflet's zoom counts the other way.
 const CellLayer = L.GridLayer.extend({
@@ -78,6 +79,7 @@ export class SiteMap {
     this.leaflet = L.map(element, {
       crs: L.extend({}, L.CRS.Simple, { transformation: new L.Transformation(1 / factor, 0, -1 / factor, 0) }),
       minZoom: -3, maxZoom: map.levels + 3, zoomSnap: 0.5, zoomDelta: 1, attributionControl: false, center: [0, 0], zoom: map.levels - 1,
+      fadeAnimation: !still.matches, zoomAnimation: !still.matches, markerZoomAnimation: !still.matches,
     });
     // All that it shows is in the lists beside it too; a screen reader would find nameless pictures here.
     this.leaflet.getPane('mapPane').setAttribute('aria-hidden', 'true');
@@ -88,6 +90,8 @@ export class SiteMap {
     this.landmarks = L.layerGroup().addTo(this.leaflet);
     const near = () => element.classList.toggle('near', this.leaflet.getZoom() > map.levels - 1);
     this.leaflet.on('zoomend', near);
+    // Robots glide when they move, and not when the map does.
+    this.leaflet.on('zoomstart viewreset', () => element.classList.remove('gliding'));
     // Once somebody has moved the map, it stays where they put it.
     for (const event of ['mousedown', 'wheel', 'touchstart', 'keydown']) element.addEventListener(event, () => { this.moved = true; }, { passive: true });
     onThemeChange(() => { if (this.leaflet) this.recolour(); });
@@ -110,7 +114,7 @@ export class SiteMap {
     if (!map || map.tiles === 0 || (this.moved && !force)) return;
     if (force) this.moved = false;
     const [x0, y0, x1, y1] = map.bounds;
-    this.leaflet.fitBounds([at(x0, y0), at(x1, y1)], { padding: [24, 24], animate: Boolean(force) });
+    this.leaflet.fitBounds([at(x0, y0), at(x1, y1)], { padding: [24, 24], animate: Boolean(force) && !still.matches });
   }
 
   draw(robot) {
@@ -138,6 +142,7 @@ export class SiteMap {
   }
 
   update(robots, connected) {
+    this.leaflet.getContainer().classList.add('gliding');
     const here = new Set(robots.map((robot) => robot.name));
     for (const [name, drawn] of this.robots) {
       if (here.has(name)) continue;

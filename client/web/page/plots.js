@@ -1,6 +1,6 @@
 // Small plots of the last one to five minutes. Each is a picture with a description in words.
 const SVG = 'http://www.w3.org/2000/svg';
-const WIDTH = 300, HEIGHT = 64, LEFT = 30, SHORTEST_MS = 60000, LONGEST_MS = 300000;
+const WIDTH = 300, HEIGHT = 64, LEFT = 38, SHORTEST_MS = 60000, LONGEST_MS = 300000;
 
 function make(name, attributes, parent) {
   const element = document.createElementNS(SVG, name);

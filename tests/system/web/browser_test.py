@@ -53,7 +53,8 @@ class Programs:
         return process
 
     def start_server(self):
-        return self.start("cairnd", "--state", os.path.join(self.work, "state"), "--set", "slam.particles=20")
+        return self.start("cairnd", "--state", os.path.join(self.work, "state"), "--set", "slam.particles=20",
+                          "--set", "jobs.nice=0")
 
     def stop(self):
         for process in self.all:
@@ -80,14 +81,13 @@ def make_pictures(page, folder):
         page.look(width, height, theme)
         page.click("#fit")
         eventually(f"the map is drawn for {name}", lambda: page.run(
-            f"((tiles) => tiles.length > 0 && tiles.every((tile) => tile.includes('theme={theme}')))({TILES})"))
-        eventually("the map has come to rest", lambda: not page.run(
-            "document.querySelector('.leaflet-zoom-anim, .leaflet-pan-anim') !== null || document.getElementById('said').textContent !== ''"))
+            "((tiles) => tiles.length > 0 && tiles.every((tile) => tile.complete && tile.naturalWidth === 128 && "
+            f"tile.src.includes('theme={theme}')))([...document.querySelectorAll('#map img.cell:not([hidden])')])"))
         page.picture(os.path.join(folder, name))
 
-    shot("web.png", 1180, 720, "light")
+    eventually("nothing is said any more", lambda: page.text("#said") == "")
+    shot("web.png", 920, 540, "light")
     shot("web-dark.png", 1180, 720, "dark")
-    page.run("document.getElementById('legend').open = false")
     shot("web-phone.png", 390, 800, "light")
 
 
@@ -100,9 +100,9 @@ def use_the_page(programs, page, pictures):
     page.open(address)
     eventually("without a robot the page says what to do", lambda: "No site yet" in page.text("#map-empty"))
 
-    robots = programs.start(
+    programs.start(
         "cairn", "sim", "--site", "hall", "--world", "building", "--robots", "2", "--beams", "181", "--hz", "5", "--window", "32",
-        *(["--seconds", "120", "--rate", "6"] if pictures else ["--seconds", "3600", "--rate", "4"]))
+        "--seconds", "3600", "--rate", "4")
     eventually("both robots are listed", lambda: page.run("document.querySelectorAll('#robots .robot').length") == 2)
     eventually("a robot is on the map", lambda: page.shows(".robot-icon[data-robot=robot1]"))
     place = "document.querySelector('.robot-icon[data-robot=robot1]').style.transform"
@@ -130,10 +130,11 @@ def use_the_page(programs, page, pictures):
     eventually("the right one unlocks commands", lambda: page.run("!document.getElementById('smooth').disabled"))
 
     if pictures:
-        eventually("the robots have driven", lambda: robots.poll() is not None, 90)
+        used = "Number(/([0-9]+) scans/.exec(document.querySelector('#robots .where').innerText)[1])"
+        eventually("there is much to see", lambda: page.run(used) > 600, 120)
     before = page.run(TILES)
     page.click("#smooth")
-    eventually("the job ends", lambda: "Done" in page.text("#jobs"))
+    eventually("the job ends", lambda: "Done" in page.text("#jobs"), 120)
     eventually("its map version is enabled", lambda: re.search(r"Version 2[^V]*Enabled", page.text("#versions")))
     eventually("every tile of the map is a new one", lambda: page.run(TILES) and not set(page.run(TILES)) & set(before))
     eventually("the smoothed path is drawn", lambda: page.run(
@@ -158,9 +159,8 @@ def use_the_page(programs, page, pictures):
     eventually("it goes on when the server is back", lambda: "Live" in page.text("#connection") and not page.shows("#banner"))
     if not page.run(TILES):
         raise Failed("the map is gone")
-    if not pictures:
-        before_place = page.run(place)
-        eventually("and the robots drive on", lambda: page.run(place) != before_place)
+    before_place = page.run(place)
+    eventually("and the robots drive on", lambda: page.run(place) != before_place)
     if page.errors:
         raise Failed(f"errors of the page: {page.errors}")
     outside = [url for url in page.requests if not url.startswith((address, "data:", "about:", "blob:"))]

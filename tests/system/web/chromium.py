@@ -46,8 +46,13 @@ class Page:
         self.call("Page.setDownloadBehavior", behavior="allow", downloadPath=self.downloads)
 
     def close(self):
-        self.process.kill()
-        self.process.wait()
+        self._session = None
+        try:
+            self.call("Browser.close")
+            self.process.wait(ANSWER_TIMEOUT_S)
+        except (BrowserError, OSError, subprocess.TimeoutExpired):
+            self.process.kill()
+            self.process.wait()
         os.close(self._to)
         os.close(self._from)
 
@@ -139,9 +144,9 @@ class Page:
                 for node in nodes if not node["ignored"] and node["role"]["value"] in roles and not node.get("name", {}).get("value")]
 
     def look(self, width, height, theme):
-        """The size of the window, and `light` or `dark`."""
+        """The size of the window, and `light` or `dark`. Nothing glides, so that a picture shows what is."""
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600)
-        self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": theme}])
+        self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": theme}, {"name": "prefers-reduced-motion", "value": "reduce"}])
 
     def picture(self, path, whole=False):
         data = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole)["data"]
