@@ -1,7 +1,7 @@
 // The map: tiles, robots, paths, landmarks. Coordinates are metres in the site's frame; Leaflet calls them [y, x].
 import { colourOf, theme, onThemeChange } from '/theme.js';
 
-const TILE = 128;
+const TILE = 128, RETRY_MS = 2000;
 const at = (x, y) => L.latLng(y, x);
 const still = window.matchMedia('(prefers-reduced-motion: reduce)');
 
@@ -19,13 +19,20 @@ const CellLayer = L.GridLayer.extend({
     tile.alt = '';
     tile.className = 'cell';
     tile.onload = () => done(null, tile);
-    tile.onerror = () => { tile.removeAttribute('src'); tile.hidden = true; done(null, tile); };
+    // A tile that is being replaced may be absent for a moment.
+    tile.onerror = () => {
+      tile.removeAttribute('src');
+      tile.hidden = true;
+      done(null, tile);
+      setTimeout(() => { if (tile.isConnected && tile.hidden) this.show(tile, tile.dataset.key); }, RETRY_MS);
+    };
     if (!this.show(tile, this.keyOf(coords))) setTimeout(() => done(null, tile));
     return tile;
   },
   // Whether there is something to load.
   show(tile, key) {
     const version = this.versions.get(key);
+    tile.dataset.key = key;
     tile.hidden = version === undefined;
     if (tile.hidden) return false;
     tile.src = `/api/sites/${this.site}/tiles/${key}.png?theme=${theme()}&v=${version}`;
@@ -78,7 +85,7 @@ export class SiteMap {
     const factor = map.resolution * 2 ** (map.levels - 1);
     this.leaflet = L.map(element, {
       crs: L.extend({}, L.CRS.Simple, { transformation: new L.Transformation(1 / factor, 0, -1 / factor, 0) }),
-      minZoom: -3, maxZoom: map.levels + 3, zoomSnap: 0.5, zoomDelta: 1, attributionControl: false, center: [0, 0], zoom: map.levels - 1,
+      minZoom: -3, maxZoom: map.levels + 3, zoomSnap: 0.25, zoomDelta: 1, attributionControl: false, center: [0, 0], zoom: map.levels - 1,
       fadeAnimation: !still.matches, zoomAnimation: !still.matches, markerZoomAnimation: !still.matches,
     });
     // All that it shows is in the lists beside it too; a screen reader would find nameless pictures here.
@@ -178,8 +185,20 @@ export class SiteMap {
   setPath(name, points, smoothed) {
     const drawn = this.robots.get(name);
     if (!drawn) return;
-    if (!smoothed) drawn.points = points;
-    drawn[smoothed ? 'smoothed' : 'path'].setLatLngs(points.map(([x, y]) => at(x, y)));
+    const line = smoothed ? points : this.joined(points, drawn.points.slice(-200));
+    if (!smoothed) drawn.points = line;
+    drawn[smoothed ? 'smoothed' : 'path'].setLatLngs(line.map(([x, y]) => at(x, y)));
+  }
+
+  // The path that was answered may be seconds old: what was seen here since its end follows it.
+  joined(points, seen) {
+    const [x, y] = points[points.length - 1] ?? [Infinity, Infinity];
+    let nearest = seen.length, least = 0.3;
+    seen.forEach(([u, v], index) => {
+      const apart = Math.hypot(u - x, v - y);
+      if (apart <= least) [nearest, least] = [index, apart];
+    });
+    return points.concat(seen.slice(nearest + 1));
   }
 
   setLandmarks(landmarks) {

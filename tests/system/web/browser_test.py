@@ -81,8 +81,9 @@ def make_pictures(page, folder):
         page.look(width, height, theme)
         page.click("#fit")
         eventually(f"the map is drawn for {name}", lambda: page.run(
-            "((tiles) => tiles.length > 0 && tiles.every((tile) => tile.complete && tile.naturalWidth === 128 && "
-            f"tile.src.includes('theme={theme}')))([...document.querySelectorAll('#map img.cell:not([hidden])')])"))
+            "new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))).then(() => ((tiles) => tiles.length > 0"
+            " && tiles.every((tile) => tile.complete && tile.naturalWidth === 128 && tile.classList.contains('leaflet-tile-loaded')"
+            f" && tile.src.includes('theme={theme}')))([...document.querySelectorAll('#map img.cell:not([hidden])')]))"))
         page.picture(os.path.join(folder, name))
 
     eventually("nothing is said any more", lambda: page.text("#said") == "")
@@ -151,6 +152,9 @@ def use_the_page(programs, page, pictures):
             if not file.read().startswith(begins):
                 raise Failed(f"{name} is no map")
 
+    # That the wrong token is refused was wanted.
+    if any(status != 401 for status, _ in page.refused):
+        raise Failed(f"the page asks for what is refused: {page.refused}")
     server.kill()
     eventually("the page says that the server is lost", lambda: "Server lost" in page.text("#connection") and page.shows("#banner"))
     if not page.run(TILES):

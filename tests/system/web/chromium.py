@@ -24,6 +24,7 @@ class Page:
         os.makedirs(self.downloads, exist_ok=True)
         self.errors = []  # Exceptions of scripts, and what the browser refused to load or run.
         self.requests = []  # Addresses, in order.
+        self.refused = []  # Status and address of answers that are errors.
         self.bytes_received = 0  # Of all answers, as they came over the network.
         self._number = 0
         self._session = None
@@ -96,6 +97,8 @@ class Page:
             self.bytes_received += what["encodedDataLength"]
         elif method == "Network.responseReceived":
             self.bytes_received += what["response"]["encodedDataLength"]
+            if what["response"]["status"] >= 400:
+                self.refused.append((what["response"]["status"], what["response"]["url"]))
 
     def open(self, address):
         self.call("Page.navigate", url=address)
