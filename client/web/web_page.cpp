@@ -6,6 +6,7 @@
 
 #include "client/web/http_answers.h"
 #include "client/web/web_json.h"
+#include "client/web/web_metrics.h"
 #include "common/map/occupancy_image.h"
 #include "common/options/number_text.h"
 
@@ -71,6 +72,8 @@ HttpResponse WebPage::Answer(const HttpRequest& request) {
 HttpResponse WebPage::AnswerGet(const HttpRequest& request, const Parts& parts) {
   if (parts.size() == 1) {
     if (parts[0] == "healthz") return {};
+    if (parts[0] == "readyz") return watch_->view()->connected ? HttpResponse() : Refused(ServerLost().value());
+    if (parts[0] == "metrics") return Metrics();
     return FileOfPage(request, parts[0].empty() ? "index.html" : parts[0]);
   }
   if (parts[0] != "api") return HttpError(404, "there is no such page");
@@ -137,6 +140,14 @@ HttpResponse WebPage::Events(const std::string& site) {
     piece = viewer->NextPiece();
     return true;
   };
+  return response;
+}
+
+HttpResponse WebPage::Metrics() const {
+  HttpResponse response;
+  response.type = "text/plain; version=0.0.4; charset=utf-8";
+  response.headers = {{"Cache-Control", "no-store"}};
+  response.body = MetricsText(*watch_->view());
   return response;
 }
 

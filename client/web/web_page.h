@@ -42,6 +42,7 @@ class WebPage {
   [[nodiscard]] HttpResponse Events(const std::string& site);
   [[nodiscard]] HttpResponse TileFile(const HttpRequest& request, const Parts& parts);
   [[nodiscard]] HttpResponse MapFile(const std::string& site, const std::string& name);
+  [[nodiscard]] HttpResponse Metrics() const;
   [[nodiscard]] HttpResponse Landmarks(const std::string& site);
   [[nodiscard]] HttpResponse Path(const std::string& robot, bool smoothed);
   // The newest answer to a question that many people ask.

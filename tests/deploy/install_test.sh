@@ -20,6 +20,7 @@ for pair in /usr:/etc /usr/local:/usr/local/etc; do
   unit=$world$prefix/lib/systemd/system/cairnd.service
   check "under $prefix the unit starts what is installed there" \
     grep -qxF "ExecStart=$prefix/bin/cairnd --config $etc/cairn/cairnd.yaml" "$unit"
+  check "under $prefix the page's unit too" grep -qF "ExecStart=$prefix/bin/cairn-web " "$world$prefix/lib/systemd/system/cairn-web.service"
   check "no placeholder is left" bash -c "! grep -q '@[A-Za-z_]*@' '$unit'"
   # The service's user is not root.
   check "a careful umask hides nothing from the service" \

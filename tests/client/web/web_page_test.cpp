@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "client/web/web_metrics.h"
 #include "common/map/image_codec.h"
 #include "tests/client/lib/fake_server.h"
 #include "tests/loopback.h"
@@ -94,6 +95,38 @@ TEST_F(Page, WithoutAServerItSaysSo) {
   EXPECT_EQ(state["connected"], false);
   EXPECT_EQ(Get("/api/robots/r1/path").status, 503);
   EXPECT_EQ(Get("/api/sites/hall/tiles/0/0/0.png").status, 404);
+}
+
+TEST_F(Page, FiguresForMonitoringSayWhetherTheServerAnswers) {
+  Open();
+  EXPECT_EQ(Get("/healthz").status, 200);
+  EXPECT_EQ(Get("/readyz").status, 503);
+  EXPECT_THAT(Get("/metrics").body, HasSubstr("\ncairn_up 0\n"));
+  EXPECT_THAT(Get("/metrics").body, Not(HasSubstr("cairn_degraded")));
+  StartServer();
+  ASSERT_TRUE(KnowsSite());
+  EXPECT_EQ(Get("/readyz").status, 200);
+  const std::string text = Get("/metrics").body;
+  EXPECT_THAT(text, HasSubstr("# TYPE cairn_up gauge\ncairn_up 1\n"));
+  EXPECT_THAT(text, HasSubstr("cairn_map_tiles{site=\"drawn\"} 1\n"));
+}
+
+TEST(Metrics, NamesAreQuotedAndSamplesOfAMetricStandTogether) {
+  ServerView view;
+  view.connected = true;
+  view.status.robots.resize(2);
+  view.status.robots[0].session.site = "a\"b\\c\nd";
+  for (RobotStatus& robot : view.status.robots) {
+    robot.ledgers.resize(1);
+    robot.ledgers[0].sensor = "laser";
+    robot.ledgers[0].used = 7;
+    robot.ledgers[0].latency_p99_ms = 25.0;
+  }
+  const std::string text = MetricsText(view);
+  EXPECT_THAT(text, HasSubstr(R"(cairn_scans_used_total{site="a\"b\\c\nd",robot="",sensor="laser"} 7)"
+                              "\n"
+                              R"(cairn_scans_used_total{site="",robot="",sensor="laser"} 7)"));
+  EXPECT_THAT(text, HasSubstr("quantile=\"0.99\"} 0.025\n"));
 }
 
 TEST_F(Page, TilesArePicturesWithATagPerContentAndTheme) {
