@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The one command: installs what is missing, builds every way that counts, runs every test, holds the accuracy.
 #   tests/run.sh                 packages to tsan below; stops at the first that fails
-#   tests/run.sh --full          every source by itself, and a real systemd, besides
+#   tests/run.sh --full          every source by itself, Debian packages, and a real systemd, besides
 #   tests/run.sh --quick         packages, format, architecture, release
 #   tests/run.sh --stage NAME    this stage (may be repeated), with the build it needs
 #   tests/run.sh --studies       whatever else is asked for, and the slow studies (tests/studies) last
@@ -12,7 +12,7 @@ set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
 all=(packages format architecture release accuracy demo nodds tidy asan fuzz tsan)
-full=(plain systemd)
+full=(plain debs systemd)
 stages=()
 studies=()
 full_too=0
@@ -160,6 +160,14 @@ stage_tidy() {
   configure asan -B build/tidy -DCMAKE_UNITY_BUILD_BATCH_SIZE=0
   build tidy --target cairn_idl_sources cairn_record_sources
   python3 tests/tidy.py build/tidy --jobs "$jobs"
+}
+
+# Root only: the packages are installed in a system of their own.
+stage_debs() {
+  deploy/make-packages.sh build/release
+  if [ "$(id -u)" -ne 0 ]; then echo "SKIPPED: not root"; return 77; fi
+  deploy/install-packages.sh boot
+  tests/deploy/packages_test.sh build/release/packages build/debs
 }
 
 # Root only: it makes a system of its own and boots it.
