@@ -1,8 +1,4 @@
-#include <cmath>
-#include <complex>
 #include <filesystem>
-#include <limits>
-#include <numeric>
 #include <optional>
 
 #include "server/tools/calibrate/laser_run.h"
@@ -12,30 +8,6 @@
 
 namespace cairn::studies {
 namespace {
-
-// Root mean square distance of positions after the similarity that fits best (Umeyama 1991, in the plane).
-double ErrorWithScale(const Trajectory& path, const Trajectory& positions) {
-  std::vector<std::complex<double>> ours, theirs;
-  for (const StampedPose& position : positions) {
-    const auto pose = PoseOn(path, position.stamp, 2.0);
-    if (!pose) continue;
-    ours.emplace_back(pose->x, pose->y);
-    theirs.emplace_back(position.T_map_robot.x, position.T_map_robot.y);
-  }
-  if (ours.size() < 3) return std::numeric_limits<double>::quiet_NaN();
-  const auto n = static_cast<double>(ours.size());
-  const auto centre = std::accumulate(ours.begin(), ours.end(), std::complex<double>{}) / n;
-  const auto their_centre = std::accumulate(theirs.begin(), theirs.end(), std::complex<double>{}) / n;
-  std::complex<double> product;
-  double spread = 0.0, squares = 0.0;
-  for (std::size_t i = 0; i < ours.size(); ++i) {
-    product += std::conj(ours[i] - centre) * (theirs[i] - their_centre);
-    spread += std::norm(ours[i] - centre);
-  }
-  for (std::size_t i = 0; i < ours.size(); ++i)
-    squares += std::norm(theirs[i] - their_centre - product / spread * (ours[i] - centre));
-  return std::sqrt(squares / n);
-}
 
 // What the description of the logs says of the lidars.
 struct RealRobot {
@@ -104,7 +76,7 @@ void RunLowcostLogs(StudyContext& context) {
         crispness.push_back(CrispnessOf(still, *one));
         table.Add({robot.log, calibrated ? "measured" : "as described", name, Number(1e3 * crispness.back().blur_m, 1),
                    Number(1e3 * crispness.back().thickness_m, 1), Number(LengthOf(*one), 2),
-                   positions.empty() ? "" : Number(ErrorWithScale(*one, positions), 4)});
+                   positions.empty() ? "" : Number(TrajectoryError(*one, positions, 0.0, true), 4)});
       }
       const auto not_worse = [&](std::size_t a, std::size_t b) {
         return crispness[a].blur_m <= 1.02 * crispness[b].blur_m;

@@ -38,7 +38,7 @@ StudyLog Thinned(const StudyLog& log, double share) {
 void RunRates(StudyContext& context) {
   Report& report = context.report;
   report.Heading("The same drive at several rates");
-  report.Text("One drive, of which fewer scans are used. Error: root mean square distance from the truth.");
+  report.Text("One drive, of which fewer scans are used. Errors are absolute trajectory errors.");
   Table table({"drive", "scans per second", "length by odometry (m)", "online (m)", "smoothed (m)", "error online (m)",
                "error smoothed (m)"});
   const auto add = [&](const StudyLog& log, double full_hz, std::initializer_list<double> rates) {
@@ -47,8 +47,9 @@ void RunRates(StudyContext& context) {
       const Mapped mapped = MapLog(context, thinned, {});
       const bool known = !log.truth.empty();
       table.Add({log.name, Number(hz, 1), Number(LengthOf(RawPath(thinned)), 2), Number(LengthOf(mapped.run.online), 2),
-                 Number(LengthOf(mapped.smoothed), 2), known ? Number(RmsError(mapped.run.online, log.truth), 3) : "",
-                 known ? Number(RmsError(mapped.smoothed, log.truth), 3) : ""});
+                 Number(LengthOf(mapped.smoothed), 2),
+                 known ? Number(TrajectoryError(mapped.run.online, log.truth), 3) : "",
+                 known ? Number(TrajectoryError(mapped.smoothed, log.truth), 3) : ""});
     }
   };
   for (const std::string world : {"building", "corridor"}) {
@@ -110,8 +111,9 @@ void RunLidars(StudyContext& context) {
   const auto add = [&](const std::string& name, const sim::FleetOptions& robot) {
     const StudyLog log = SimulateLog("office", context.Pick(150.0, 15.0), robot);
     const Mapped mapped = MapLog(context, log, {});
-    table.Add({name, Number(RmsError(RawPath(log), log.truth), 3), Number(RmsError(mapped.run.online, log.truth), 3),
-               Number(RmsError(mapped.smoothed, log.truth), 3),
+    table.Add({name, Number(TrajectoryError(RawPath(log), log.truth), 3),
+               Number(TrajectoryError(mapped.run.online, log.truth), 3),
+               Number(TrajectoryError(mapped.smoothed, log.truth), 3),
                Number(100.0 * static_cast<double>(mapped.run.not_localized) /
                           static_cast<double>(std::max<std::size_t>(1, mapped.run.online.size())),
                       1)});
@@ -150,7 +152,7 @@ void RunRolling(StudyContext& context) {
   report.Heading("Lidars that turn slowly");
   report.Text(
       "The simulated building, five scans a second, 8 m of range, 20 mm of noise; a turn takes 0 to 0.2 s, which the "
-      "scans say. Errors are root mean squares in m.");
+      "scans say. Errors are absolute trajectory errors in m.");
   Table table({"a turn takes (s)", "seed", "odometry", "online", "smoothed"});
   for (const double turn_s : {0.0, 0.1, 0.2}) {
     for (std::uint64_t seed = 4; seed < 4 + context.Pick(3U, 1U); ++seed) {
@@ -163,8 +165,10 @@ void RunRolling(StudyContext& context) {
       robot.laser.sweep_s = turn_s;
       const StudyLog log = SimulateLog("building", context.Pick(300.0, 30.0), robot);
       const Mapped mapped = MapLog(context, log, {});
-      table.Add({Number(turn_s, 1), Count(static_cast<long long>(seed)), Number(RmsError(RawPath(log), log.truth), 3),
-                 Number(RmsError(mapped.run.online, log.truth), 3), Number(RmsError(mapped.smoothed, log.truth), 3)});
+      table.Add({Number(turn_s, 1), Count(static_cast<long long>(seed)),
+                 Number(TrajectoryError(RawPath(log), log.truth), 3),
+                 Number(TrajectoryError(mapped.run.online, log.truth), 3),
+                 Number(TrajectoryError(mapped.smoothed, log.truth), 3)});
     }
   }
   report.Add(table, "rolling");
@@ -175,7 +179,8 @@ void RunUnknown(StudyContext& context) {
   report.Heading("A robot that nobody knows");
   report.Text(
       "A turn takes 0.2 s, which the log does not say; its stamps are 0.15 s late. Then the same log with what "
-      "`cairn-calibrate laser` finds. Errors are root mean squares in m, beside those of a lidar that measures at "
+      "`cairn-calibrate laser` finds. Errors are absolute trajectory errors in m, beside those of a lidar that "
+      "measures at "
       "once.");
   server::test::HandedOverDrive drive;
   drive.world = "building";
@@ -207,10 +212,10 @@ void RunUnknown(StudyContext& context) {
   const auto add = [&](const std::string& name, const StudyLog& log, const slam::MapperOptions& options,
                        double late_s) {
     const Mapped mapped = MapLog(context, log, options);
-    table.Add({name, Number(RmsError(mapped.run.online, at_once.truth, late_s), 3),
-               Number(RmsError(mapped.smoothed, at_once.truth, late_s), 3),
+    table.Add({name, Number(TrajectoryError(mapped.run.online, at_once.truth, late_s), 3),
+               Number(TrajectoryError(mapped.smoothed, at_once.truth, late_s), 3),
                Number(1e3 * CrispnessOf(AllAtOnce(log, options.pairing), mapped.smoothed).blur_m, 1)});
-    return RmsError(mapped.smoothed, at_once.truth, late_s);
+    return TrajectoryError(mapped.smoothed, at_once.truth, late_s);
   };
   const double without = add("at once, no lag", at_once, {}, 0.0);
   auto untold = OpenLogFile(context, path);

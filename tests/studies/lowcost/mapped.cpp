@@ -1,7 +1,9 @@
 #include "tests/studies/lowcost/mapped.h"
 
 #include <cmath>
+#include <complex>
 #include <limits>
+#include <numeric>
 #include <optional>
 
 #include "server/slam/calibration/odometry_path.h"
@@ -62,16 +64,33 @@ double LengthOf(const Trajectory& path) {
   return length;
 }
 
-double RmsError(const Trajectory& path, const Trajectory& truth, double late_s) {
-  double squares = 0.0;
-  std::size_t count = 0;
-  for (const StampedPose& pose : path) {
-    const auto at = PoseOn(truth, pose.stamp - StampFromSeconds(late_s), 1.0);
-    if (!at) continue;
-    squares += (pose.T_map_robot.translation() - at->translation()).squaredNorm();
-    ++count;
+double TrajectoryError(const Trajectory& path, const Trajectory& truth, double late_s, bool scaled) {
+  // Both at the stamps of the sparser one.
+  const bool along_path = path.size() <= truth.size();
+  std::vector<std::complex<double>> ours, theirs;
+  const Stamp late = StampFromSeconds(late_s);
+  for (const StampedPose& one : along_path ? path : truth) {
+    const auto other = along_path ? PoseOn(truth, one.stamp - late, 2.0) : PoseOn(path, one.stamp + late, 2.0);
+    if (!other) continue;
+    const Pose2 &mine = along_path ? one.T_map_robot : *other, &its = along_path ? *other : one.T_map_robot;
+    ours.emplace_back(mine.x, mine.y);
+    theirs.emplace_back(its.x, its.y);
   }
-  return count > 0 ? std::sqrt(squares / static_cast<double>(count)) : std::numeric_limits<double>::quiet_NaN();
+  if (ours.size() < 3) return std::numeric_limits<double>::quiet_NaN();
+  const auto n = static_cast<double>(ours.size());
+  const auto centre = std::accumulate(ours.begin(), ours.end(), std::complex<double>{}) / n;
+  const auto their_centre = std::accumulate(theirs.begin(), theirs.end(), std::complex<double>{}) / n;
+  std::complex<double> product;
+  double spread = 0.0, squares = 0.0;
+  for (std::size_t i = 0; i < ours.size(); ++i) {
+    product += std::conj(ours[i] - centre) * (theirs[i] - their_centre);
+    spread += std::norm(ours[i] - centre);
+  }
+  const double size = scaled ? spread : std::abs(product);
+  const std::complex<double> turn = size > 0.0 ? product / size : 1.0;
+  for (std::size_t i = 0; i < ours.size(); ++i)
+    squares += std::norm(theirs[i] - their_centre - turn * (ours[i] - centre));
+  return std::sqrt(squares / n);
 }
 
 Mapped MapLog(const StudyContext& context, const StudyLog& log, slam::MapperOptions options) {

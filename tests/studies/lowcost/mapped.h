@@ -21,8 +21,11 @@ struct Mapped {
 [[nodiscard]] StudyLog AllAtOnce(const StudyLog& log, const slam::PairingOptions& pairing = {});
 // Length of a path in steps of 0.1 m, so that noise adds nothing.
 [[nodiscard]] double LengthOf(const Trajectory& path);
-// Root mean square distance from the truth, in m; `late_s`: the stamps of the path are later than those of the truth.
-[[nodiscard]] double RmsError(const Trajectory& path, const Trajectory& truth, double late_s = 0.0);
+// Root mean square distance of the positions of the path from those of the truth, in m, after the rigid motion that
+// fits best (absolute trajectory error, Sturm et al. 2012); with `scaled` after the similarity that fits best (Umeyama
+// 1991). `late_s`: the stamps of the path are later than those of the truth. NaN where fewer than three stamps agree.
+[[nodiscard]] double TrajectoryError(const Trajectory& path, const Trajectory& truth, double late_s = 0.0,
+                                     bool scaled = false);
 
 // The part of the study on real logs.
 void RunLowcostLogs(StudyContext& context);
