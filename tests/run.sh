@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The one command: installs what is missing, builds every way that counts, runs every test, holds the accuracy.
 #   tests/run.sh                 packages to tsan below; stops at the first that fails
-#   tests/run.sh --full          a real systemd besides
+#   tests/run.sh --full          every source by itself, and a real systemd, besides
 #   tests/run.sh --quick         packages, format, architecture, release
 #   tests/run.sh --stage NAME    this stage (may be repeated), with the build it needs
 #   tests/run.sh --studies       whatever else is asked for, and the slow studies (tests/studies) last
@@ -11,8 +11,8 @@ set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
-all=(packages format architecture release accuracy demo nodds plain tidy asan fuzz tsan)
-full=(systemd)
+all=(packages format architecture release accuracy demo nodds tidy asan fuzz tsan)
+full=(plain systemd)
 stages=()
 studies=()
 full_too=0
