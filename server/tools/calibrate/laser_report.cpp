@@ -166,7 +166,8 @@ std::string ReportJson(const LaserReport& report) {
 
 Result<std::string> ReportConfig(const LaserReport& report) {
   slam::PairingOptions pairing;
-  if (report.fit.mounting.Shows(kLag)) pairing.laser_lag_s = report.fit.lag_s;
+  // In whole milliseconds: a lag of next to nothing would take scans away from the odometry that has their very stamps.
+  if (report.fit.mounting.Shows(kLag)) pairing.laser_lag_s = std::round(1e3 * report.fit.lag_s) / 1e3;
   pairing.wheels = report.fit.mounting.wheels;
   const VisitOptions visit = [&](OptionVisitor& visitor) {
     visitor.Section("slam", "Learnt by cairn-calibrate laser.",
