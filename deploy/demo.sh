@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # The demo builds Cairn, starts a server on its own DDS domain, and streams three simulated robots in one building
-# into one map. It asks for poses and tiles meanwhile, smooths the paths, and compares them with the truth.
+# into one map, which a page shows in the browser. It asks for poses and tiles meanwhile, smooths the paths, and compares
+# them with the truth.
 # Usage: deploy/demo.sh [--secure] [LOG]. A robot log given as LOG is replayed into a second site. No display is needed.
 # --secure: with DDS Security. Every program gets an identity and only the rights of its role (deploy/security/).
 # Output in demo-out/ (or $DEMO_OUT): report.md, map.png, building.yaml, trajectories, and the server's log.
@@ -25,7 +26,7 @@ bin=$root/build/release/bin
 export CAIRN_DOMAIN=${CAIRN_DOMAIN:-$((60 + $$ % 42))}
 
 if [ $# -gt 1 ] || [ "$log" = --help ]; then
-  sed -n '2,8s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
+  sed -n '2,9s/^# \{0,1\}//p' "${BASH_SOURCE[0]}"
   [ "$log" = --help ] && exit 0
   exit 2
 fi
@@ -47,10 +48,11 @@ ask() { "$bin/cairn" $(as viewers/desk) "$@"; }
 
 server=
 sim=
+web=
 clean_up() {
   local code=$?
   trap - EXIT INT TERM
-  for pid in $sim $server; do
+  for pid in $sim $web $server; do
     kill -TERM "$pid" 2>/dev/null || continue
     for _ in $(seq 50); do kill -0 "$pid" 2>/dev/null || break; sleep 0.1; done
     kill -KILL "$pid" 2>/dev/null || true
@@ -64,7 +66,7 @@ trap 'exit 143' TERM
 step "building (the first time takes some minutes)"
 "$root/deploy/install-packages.sh" build
 (cd "$root" && cmake --preset release >/dev/null &&
-  cmake --build --preset release -j "$(deploy/build-jobs.sh)" --target cairnd cairn)
+  cmake --build --preset release -j "$(deploy/build-jobs.sh)" --target cairnd cairn cairn-web)
 
 rm -rf "$out"
 mkdir -p "$out/truth"
@@ -73,7 +75,7 @@ began=$(date +%s)
 
 if [ -n "$secure" ]; then
   step "making the identities of the fleet"
-  "$root/deploy/security/make-fleet.sh" fleet --robots "sim=robot1+robot2+robot3,log" --viewers desk --operators boss --days 1
+  "$root/deploy/security/make-fleet.sh" fleet --robots "sim=robot1+robot2+robot3,log" --viewers desk,web --operators boss --days 1
 fi
 
 step "starting cairnd on domain $CAIRN_DOMAIN"
@@ -86,6 +88,18 @@ for attempt in $(seq 40); do
   sleep 0.25
 done
 cat ping.txt
+
+step "showing the map in the browser"
+"$bin/cairn-web" $(as viewers/web) --port 0 >web.txt 2>&1 &
+web=$!
+for attempt in $(seq 40); do
+  address=$(sed -n 's|^cairn-web: \(http://.*\)|\1|p' web.txt)
+  [ -z "$address" ] || break
+  kill -0 "$web" 2>/dev/null || { cat web.txt >&2; fail "cairn-web ended right after its start; see above"; }
+  [ "$attempt" -lt 40 ] || fail "cairn-web does not say where its page is; see $out/web.txt"
+  sleep 0.25
+done
+echo "Open $address in a browser on this machine, while the robots drive."
 
 step "three robots drive through one building for $seconds s, at $rate times real time"
 "$bin/cairn" $(as robots/sim) sim --world building --robots 3 --beams 360 --hz 10 --seconds "$seconds" --rate "$rate" --window 32 --site building \
@@ -153,9 +167,12 @@ rmse() { "$bin/cairn" eval "$1" "$2" --json | sed -n 's/.*"ate_rmse_m":\([0-9.e+
 } >report.md
 sed -n '/^| robot/,/^$/p' report.md
 
-step "stopping the server"
+step "stopping the page and the server"
+kill -TERM "$web"
+wait "$web" || fail "cairn-web did not stop cleanly"
+web=
 kill -TERM "$server"
 wait "$server" || fail "the server did not stop cleanly; see $out/cairnd.log"
 server=
-rm -f ping.txt sim-progress.txt
+rm -f ping.txt sim-progress.txt web.txt
 echo "The report, the map and the trajectories are in $out. The demo took $(($(date +%s) - began)) s after the build."

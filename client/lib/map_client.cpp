@@ -116,6 +116,20 @@ std::vector<Tile> MapClient::tiles(int level) const {
   return mirror_->tiles(level);
 }
 
+std::optional<Tile> MapClient::tile(const TileKey& key) const {
+  const MutexLock lock(mutex_);
+  return mirror_->tile(key);
+}
+
+TileChanges MapClient::ChangesSince(const TileChanges::Place& place) const {
+  const MutexLock lock(mutex_);
+  const auto mirror = static_cast<std::uint64_t>(number_) + 1;  // The mirror of a default place is none.
+  TileChanges changes = mirror_->ChangesSince(place.mirror == mirror ? place : TileChanges::Place{.mirror = mirror});
+  if (place.mirror != mirror) changes.whole = true;
+  changes.now.mirror = mirror;
+  return changes;
+}
+
 std::optional<MapInfo> MapClient::info() const {
   const MutexLock lock(mutex_);
   return mirror_->info();

@@ -31,6 +31,9 @@ class MapClient {
   // All of one epoch.
   [[nodiscard]] std::vector<Tile> tiles() const;
   [[nodiscard]] std::vector<Tile> tiles(int level) const;
+  [[nodiscard]] std::optional<Tile> tile(const TileKey& key) const;
+  // For a program that shows the map: what to fetch anew. A default place asks for everything.
+  [[nodiscard]] TileChanges ChangesSince(const TileChanges::Place& place) const;
   [[nodiscard]] std::optional<MapInfo> info() const;
   [[nodiscard]] std::uint32_t epoch() const;
   [[nodiscard]] std::uint64_t version() const;

@@ -12,6 +12,7 @@ bool TileMirror::Enter(Generation generation, std::uint32_t epoch) {
     generation_ = generation;
     epoch_ = epoch;
     version_ = 0;
+    ++emptied_;
     entries_.clear();
   }
   return true;
@@ -35,6 +36,7 @@ bool TileMirror::Apply(TileSample&& sample) {
   if (known != entries_.end() && tile.version <= known->second.version) return false;
   Entry& entry = entries_[tile.key];
   entry.version = tile.version;
+  entry.arrived = ++arrivals_;
   version_ = std::max(version_, tile.version);
   if (sample.deleted) {
     entry.tile.reset();
@@ -65,6 +67,24 @@ std::vector<Tile> TileMirror::tiles(int level) const {
     if (entry.tile && key.level == level) tiles.push_back(*entry.tile);
   }
   return tiles;
+}
+
+std::optional<Tile> TileMirror::tile(const TileKey& key) const {
+  const auto found = entries_.find(key);
+  return found == entries_.end() ? std::nullopt : found->second.tile;
+}
+
+TileChanges TileMirror::ChangesSince(const TileChanges::Place& place) const {
+  TileChanges changes;
+  changes.now = {.mirror = place.mirror, .emptied = emptied_, .arrivals = arrivals_};
+  changes.whole = place.emptied != emptied_ || place.arrivals > arrivals_;
+  const std::uint64_t since = changes.whole ? 0 : place.arrivals;
+  if (since == arrivals_) return changes;
+  for (const auto& [key, entry] : entries_) {
+    if (entry.arrived <= since || (changes.whole && !entry.tile)) continue;
+    changes.changed.push_back({.key = key, .version = entry.version, .removed = !entry.tile});
+  }
+  return changes;
 }
 
 }  // namespace cairn::client

@@ -17,6 +17,24 @@
 
 namespace cairn::client {
 
+// What changed in a mirror since a reader last looked. A reader keeps `now`, which no one else changes.
+struct TileChanges {
+  struct Place {
+    std::uint64_t mirror = 0;  // Which mirror, and how often it was emptied: otherwise everything has changed.
+    std::uint64_t emptied = 0;
+    std::uint64_t arrivals = 0;  // Tiles do not arrive in the order of their versions.
+    bool operator==(const Place&) const = default;
+  };
+  struct Change {
+    TileKey key;
+    std::uint64_t version = 0;
+    bool removed = false;
+  };
+  Place now;
+  bool whole = false;  // `changed` is the whole map: what the reader had before is void.
+  std::vector<Change> changed;
+};
+
 class TileMirror {
  public:
   static constexpr std::size_t kMaxTiles = 262144;  // Tiles of all levels; further ones are ignored and counted.
@@ -35,11 +53,14 @@ class TileMirror {
   [[nodiscard]] const std::optional<MapInfo>& info() const { return info_; }
   [[nodiscard]] std::vector<Tile> tiles() const;  // By key.
   [[nodiscard]] std::vector<Tile> tiles(int level) const;
+  [[nodiscard]] std::optional<Tile> tile(const TileKey& key) const;
+  [[nodiscard]] TileChanges ChangesSince(const TileChanges::Place& place) const;
   [[nodiscard]] std::uint64_t ignored() const { return ignored_; }
 
  private:
   struct Entry {
     std::uint64_t version = 0;
+    std::uint64_t arrived = 0;
     std::optional<Tile> tile;  // Empty if the tile was removed.
   };
   // False if the generation or the epoch is void.
@@ -49,6 +70,8 @@ class TileMirror {
   Generation generation_ = 0;
   std::uint32_t epoch_ = 0;
   std::uint64_t version_ = 0;
+  std::uint64_t emptied_ = 0;
+  std::uint64_t arrivals_ = 0;
   std::optional<MapInfo> info_;
   std::map<TileKey, Entry> entries_;
   std::uint64_t ignored_ = 0;

@@ -59,27 +59,6 @@ RasterImage DrawImage(const OccupancyImage& map, const MapSaveOptions& options) 
   return image;
 }
 
-// Numbers are exact. (Nav2 itself prints three digits and so moves far origins: its PR 5398.)
-std::string YamlText(const OccupancyImage& image, const std::string& image_name, const MapSaveOptions& options) {
-  double free_thresh = options.free_thresh, occupied_thresh = options.occupied_thresh;
-  if (options.mode == MapImageMode::kTrinary) {
-    // The options have decided what each cell is. The file's thresholds must let every reader see the same three
-    // values again: pixel 205 is an occupancy of 0.1961, which Nav2's own 0.25 would turn from unknown into free.
-    free_thresh = std::clamp(free_thresh, 0.01, 0.196);
-    occupied_thresh = std::clamp(occupied_thresh, 0.2, 0.99);
-  }
-  YAML::Emitter name;
-  name << YAML::DoubleQuoted << image_name;
-  const Pose2& origin = image.T_map_origin;
-  std::string text = std::string("image: ") + name.c_str() + "\n";
-  text += std::string("mode: ") + kModeNames[static_cast<std::size_t>(options.mode)] + "\n";
-  text += "resolution: " + ExactText(image.resolution_m) + "\n";
-  text += "origin: [" + ExactText(origin.x) + ", " + ExactText(origin.y) + ", " + ExactText(origin.theta) + "]\n";
-  text +=
-      "negate: 0\noccupied_thresh: " + ExactText(occupied_thresh) + "\nfree_thresh: " + ExactText(free_thresh) + "\n";
-  return text;
-}
-
 struct MapYaml {
   std::string image;
   MapImageMode mode = MapImageMode::kTrinary;
@@ -155,8 +134,29 @@ std::uint8_t CellOf(const std::uint8_t* pixel, int channels, const MapYaml& yaml
 
 }  // namespace
 
-Result<void> SaveMapYaml(const OccupancyImage& image, const std::filesystem::path& yaml_path,
-                         const std::string& image_extension, const MapSaveOptions& options) {
+// Numbers are exact. (Nav2 itself prints three digits and so moves far origins: its PR 5398.)
+std::string MapYamlText(const OccupancyImage& image, const std::string& image_name, const MapSaveOptions& options) {
+  double free_thresh = options.free_thresh, occupied_thresh = options.occupied_thresh;
+  if (options.mode == MapImageMode::kTrinary) {
+    // The options have decided what each cell is. The file's thresholds must let every reader see the same three
+    // values again: pixel 205 is an occupancy of 0.1961, which Nav2's own 0.25 would turn from unknown into free.
+    free_thresh = std::clamp(free_thresh, 0.01, 0.196);
+    occupied_thresh = std::clamp(occupied_thresh, 0.2, 0.99);
+  }
+  YAML::Emitter name;
+  name << YAML::DoubleQuoted << image_name;
+  const Pose2& origin = image.T_map_origin;
+  std::string text = std::string("image: ") + name.c_str() + "\n";
+  text += std::string("mode: ") + kModeNames[static_cast<std::size_t>(options.mode)] + "\n";
+  text += "resolution: " + ExactText(image.resolution_m) + "\n";
+  text += "origin: [" + ExactText(origin.x) + ", " + ExactText(origin.y) + ", " + ExactText(origin.theta) + "]\n";
+  text +=
+      "negate: 0\noccupied_thresh: " + ExactText(occupied_thresh) + "\nfree_thresh: " + ExactText(free_thresh) + "\n";
+  return text;
+}
+
+Result<std::vector<std::uint8_t>> EncodeMapImage(const OccupancyImage& image, const std::string& image_extension,
+                                                 const MapSaveOptions& options) {
   const auto refuse = [](const std::string& why) { return Fail(StatusCode::kInvalidArgument, why); };
   if (image_extension != ".png" && image_extension != ".pgm") return refuse("map images are .png or .pgm");
   if (options.mode == MapImageMode::kScale && image_extension != ".png") return refuse("mode scale needs .png (alpha)");
@@ -168,17 +168,22 @@ Result<void> SaveMapYaml(const OccupancyImage& image, const std::filesystem::pat
   if (!image.T_map_origin.IsFinite()) return refuse("origin is not finite");
   const std::string problem = ThresholdProblem(options.free_thresh, options.occupied_thresh);
   if (!problem.empty()) return refuse(problem);
+  constexpr int kPngLevel = 6;
+  return EncodeImage(DrawImage(image, options), image_extension, kPngLevel);
+}
 
+Result<void> SaveMapYaml(const OccupancyImage& image, const std::filesystem::path& yaml_path,
+                         const std::string& image_extension, const MapSaveOptions& options) {
+  const auto bytes = EncodeMapImage(image, image_extension, options);
+  if (!bytes) return tl::unexpected(bytes.error());
   std::filesystem::path image_path = yaml_path;
   image_path.replace_extension(image_extension);
-  if (image_path == yaml_path) return refuse(yaml_path.string() + " must not end in " + image_extension);
-  constexpr int kPngLevel = 6;
-  const auto bytes = EncodeImage(DrawImage(image, options), image_extension, kPngLevel);
-  if (!bytes) return tl::unexpected(bytes.error());
+  if (image_path == yaml_path) {
+    return Fail(StatusCode::kInvalidArgument, yaml_path.string() + " must not end in " + image_extension);
+  }
   const std::string_view content(reinterpret_cast<const char*>(bytes->data()), bytes->size());
   if (auto written = WriteFileAtomically(image_path, content); !written) return written;
-
-  return WriteFileAtomically(yaml_path, YamlText(image, image_path.filename().string(), options));
+  return WriteFileAtomically(yaml_path, MapYamlText(image, image_path.filename().string(), options));
 }
 
 Result<OccupancyImage> LoadMapYaml(const std::filesystem::path& yaml_path) {

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "common/geometry/pose2.h"
@@ -36,6 +37,12 @@ struct MapSaveOptions {
 // atomically, image first.
 [[nodiscard]] Result<void> SaveMapYaml(const OccupancyImage& image, const std::filesystem::path& yaml_path,
                                        const std::string& image_extension, const MapSaveOptions& options);
+// The same two files as values: the text of the yaml, which names the image, and the image's bytes.
+[[nodiscard]] std::string MapYamlText(const OccupancyImage& image, const std::string& image_name,
+                                      const MapSaveOptions& options);
+[[nodiscard]] Result<std::vector<std::uint8_t>> EncodeMapImage(const OccupancyImage& image,
+                                                               const std::string& image_extension,
+                                                               const MapSaveOptions& options);
 // Reads trinary, scale and raw maps as nav2_map_server does; `negate`, both thresholds and yaw honoured.
 [[nodiscard]] Result<OccupancyImage> LoadMapYaml(const std::filesystem::path& yaml_path);
 

@@ -267,7 +267,11 @@ void FakeServer::OnRequest(Request&& request) {
       reply.landmarks.resize(2);
       break;
     case RequestKind::kMapInfo:
-      reply.maps.push_back(MapOf(request.site));
+      if (request.site.empty() && !published_maps().empty()) {
+        reply.maps = published_maps();
+      } else {
+        reply.maps.push_back(MapOf(request.site));
+      }
       break;
     case RequestKind::kStatus:
       reply.robots.resize(3);
@@ -307,6 +311,13 @@ void FakeServer::OnRequest(Request&& request) {
       break;
   }
   Must(replies_->Publish(reply));
+}
+
+std::vector<MapInfo> FakeServer::published_maps() const {
+  const MutexLock lock(mutex_);
+  std::vector<MapInfo> maps;
+  for (const auto& [site, map] : published_maps_) maps.push_back(map);
+  return maps;
 }
 
 MapInfo FakeServer::MapOf(const std::string& site) {

@@ -58,6 +58,7 @@ class FakeServer {
   void OnSession(SessionRequest&& request);
   void OnScan(ScanSample&& sample);
   void OnRequest(Request&& request);
+  [[nodiscard]] std::vector<MapInfo> published_maps() const;
   [[nodiscard]] MapInfo MapOf(const std::string& site);
   void Report(const StreamId& stream) CAIRN_REQUIRES(mutex_);
 

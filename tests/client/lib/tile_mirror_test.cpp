@@ -119,5 +119,28 @@ TEST(TileMirror, GivesOneLevelOfThePyramid) {
   EXPECT_EQ(mirror.tiles(2).size(), 1U);
 }
 
+// Tiles do not arrive in the order of their versions, so a reader that kept the highest version would miss some.
+TEST(TileMirror, AReaderIsToldEveryChangeOnce) {
+  TileMirror mirror(kSite);
+  EXPECT_TRUE(mirror.Apply(MirroredTile(1, 0, 9)));
+  TileChanges changes = mirror.ChangesSince({});
+  ASSERT_EQ(changes.changed.size(), 1U);
+  EXPECT_TRUE(mirror.Apply(MirroredTile(2, 0, 5)));
+  changes = mirror.ChangesSince(changes.now);
+  EXPECT_FALSE(changes.whole);
+  ASSERT_EQ(changes.changed.size(), 1U);
+  EXPECT_EQ(changes.changed[0].key.x, 2);
+  EXPECT_TRUE(mirror.ChangesSince(changes.now).changed.empty());
+  EXPECT_TRUE(mirror.Apply(MirroredTile(2, 0, 10, true)));
+  changes = mirror.ChangesSince(changes.now);
+  ASSERT_EQ(changes.changed.size(), 1U);
+  EXPECT_TRUE(changes.changed[0].removed);
+  EXPECT_TRUE(mirror.Apply(MirroredTile(4, 1, 11)));
+  changes = mirror.ChangesSince(changes.now);
+  EXPECT_TRUE(changes.whole) << "an epoch makes what was before void";
+  ASSERT_EQ(changes.changed.size(), 1U);
+  EXPECT_EQ(changes.changed[0].key.x, 4);
+}
+
 }  // namespace
 }  // namespace cairn::client

@@ -1,0 +1,131 @@
+// cairn-web: shows a Cairn server in the browser. Reads the options, joins the domain, serves the page until a signal.
+// Exit codes: 0 stopped on request; 1 could not start; 2 wrong command line.
+#include <pthread.h>
+#include <signal.h>
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <cstdlib>
+#include <iostream>
+#include <optional>
+#include <random>
+
+#include "client/web/web_page.h"
+#include "common/version.h"
+#include "common/wire/wire_arguments.h"
+
+namespace cairn::web {
+namespace {
+
+struct Arguments {
+  HttpOptions http;
+  wire::WireArguments wire;
+  wire::WireOptions wire_options;
+  std::vector<std::string> token;  // Empty: no option; "": one is drawn.
+};
+
+std::string NewToken() {
+  constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyz234567";
+  std::random_device random;
+  std::string token(26, ' ');  // 130 bits.
+  for (char& letter : token) letter = kLetters[random() % kLetters.size()];
+  return token;
+}
+
+std::string AddressText(const HttpOptions& options, int port) {
+  const std::string host = options.address == "0.0.0.0" ? "127.0.0.1" : options.address;
+  return "http://" + host + ":" + std::to_string(port) + "/";
+}
+
+int Refuse(const std::string& why, int code) {
+  std::cerr << "cairn-web: " << why << "\n";
+  return code;
+}
+
+void AddOptions(CLI::App& app, Arguments& arguments) {
+  app.set_version_flag("--version", std::string("cairn-web ") + kVersion);
+  app.add_option("--address", arguments.http.address,
+                 "Address to listen on; others than loopback are open to the network")
+      ->capture_default_str();
+  arguments.http.port = 8420;
+  app.add_option("--port", arguments.http.port, "Port to listen on; 0: any that is free")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 65535));
+  app.add_option("--host", arguments.http.hosts, "Name under which browsers reach this machine, besides its addresses")
+      ->allow_extra_args(false);
+  app.add_option(
+         "--token", arguments.token,
+         "Allow commands to who has the token. Without TEXT, CAIRN_WEB_TOKEN is used, or else one is drawn and printed")
+      ->type_name("TEXT")
+      ->expected(0, 1);
+  app.add_option("--domain", arguments.wire.domain, "DDS domain of server and robots [CAIRN_DOMAIN, or 0]");
+  app.add_option("--set", arguments.wire.assignments,
+                 "Set any option of the section wire, e.g. wire.interfaces=192.168.1.5")
+      ->type_name("KEY=VALUE")
+      ->allow_extra_args(false);
+  app.footer(
+      "Without --token the page is read-only. Commands need no more than the token, and it travels unencrypted: "
+      "beyond\n"
+      "this machine, put a reverse proxy with TLS before the page.\n"
+      "EXAMPLES\n  cairn-web\n  cairn-web --token --domain 7 --port 0");
+}
+
+std::string ChooseToken(const std::vector<std::string>& given) {
+  if (!given.empty() && !given.front().empty()) return given.front();
+  const char* of_environment = std::getenv("CAIRN_WEB_TOKEN");
+  return of_environment != nullptr && *of_environment != '\0' ? of_environment : NewToken();
+}
+
+int Serve(const Arguments& arguments, bool commands) {
+  // Before any thread starts, so that none of them takes the signals.
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+
+  auto bus = wire::Bus::Create(arguments.wire_options, "cairn-web");
+  if (!bus) return Refuse(bus.error().message, 1);
+  WebOptions options;
+  if (commands) options.token = ChooseToken(arguments.token);
+  auto page = WebPage::Create(**bus, options);
+  if (!page) return Refuse(page.error().message, 1);
+  auto server = HttpServer::Start(arguments.http, [&](const HttpRequest& request) { return (*page)->Answer(request); });
+  if (!server) return Refuse(server.error().message, 1);
+  // A page that gets the token this way does not ask for it. The part after # is not sent to any server.
+  std::cout << "cairn-web: " << AddressText(arguments.http, (*server)->port())
+            << (commands ? "#token=" + options.token : std::string()) << std::endl;
+  int signal_number = 0;
+  sigwait(&signals, &signal_number);
+  return 0;
+}
+
+int Run(int argc, char** argv) {
+  CLI::App app("Shows the robots, maps and jobs of a Cairn server in the browser.", "cairn-web");
+  Arguments arguments;
+  AddOptions(app, arguments);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  const VisitOptions visit = [&](OptionVisitor& visitor) {
+    visitor.Section("wire", "The DDS side.", [&] { Visit(visitor, arguments.wire_options); });
+  };
+  auto valid = Apply(arguments.wire, visit);
+  if (valid) valid = Validate(arguments.wire_options);
+  if (!valid) return Refuse(valid.error().message, 2);
+  return Serve(arguments, app.count("--token") > 0);
+}
+
+}  // namespace
+}  // namespace cairn::web
+
+int main(int argc, char** argv) {
+  try {
+    return cairn::web::Run(argc, argv);
+  } catch (const std::exception& error) {
+    std::cerr << "cairn-web: " << error.what() << "\n";
+    return 1;
+  }
+}

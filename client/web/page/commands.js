@@ -1,0 +1,45 @@
+// Commands to the server, for those who have the token. It comes with the address that cairn-web prints (#token=...) or
+// from the dialog, and is kept for this tab only.
+const KEY = 'cairn-token';
+const said = document.getElementById('said');
+let timer = 0;
+
+export function say(text) {
+  said.textContent = text;
+  clearTimeout(timer);
+  timer = setTimeout(() => { said.textContent = ''; }, 6000);
+}
+
+export const token = () => sessionStorage.getItem(KEY) ?? '';
+
+const post = (path, body, bearer) => fetch(path, {
+  method: 'POST', headers: { 'Content-Type': 'application/json', Authorization: `Bearer ${bearer}` }, body: JSON.stringify(body ?? {}),
+});
+
+export async function useToken(text) {
+  const answer = await post('/api/token', {}, text).catch(() => null);
+  if (!answer?.ok) return false;
+  sessionStorage.setItem(KEY, text);
+  return true;
+}
+
+export async function tokenOfAddress() {
+  const match = /[#&]token=([^&]+)/.exec(location.hash);
+  if (!match) return;
+  history.replaceState(null, '', location.pathname + location.search);
+  await useToken(decodeURIComponent(match[1]));
+}
+
+// The answer, or null after it was said what went wrong.
+export async function command(path, body, done) {
+  const answer = await post(path, body, token()).catch(() => null);
+  if (!answer) { say('cairn-web does not answer.'); return null; }
+  const json = await answer.json().catch(() => ({}));
+  if (!answer.ok) {
+    if (answer.status === 401) sessionStorage.removeItem(KEY);
+    say(`Not done: ${json.error ?? answer.status}`);
+    return null;
+  }
+  say(done);
+  return json;
+}

@@ -1,0 +1,155 @@
+// Holds the page together: chooses the site, listens to the events, and hands what they say to the map and the lists.
+import { SiteMap } from '/map.js';
+import { plot } from '/plots.js';
+import { onThemeChange } from '/theme.js';
+import * as panels from '/panels.js';
+import { command, say, token, tokenOfAddress, useToken } from '/commands.js';
+
+const $ = (id) => document.getElementById(id);
+const PATH_PERIOD_MS = 4000;
+let state = null, map = null, events = null, streamLost = false, waitingTiles = [], flow = [], retry = 0;
+let wanted = new URLSearchParams(location.search).get('site') ?? '';
+
+const may = () => Boolean(state?.commands && token());
+
+async function getJson(path) {
+  const answer = await fetch(path).catch(() => null);
+  return answer?.ok ? answer.json() : null;
+}
+
+function listen() {
+  events?.close();
+  clearTimeout(retry);
+  const source = new EventSource(`/api/events${wanted ? `?site=${encodeURIComponent(wanted)}` : ''}`);
+  events = source;
+  source.addEventListener('state', (event) => { streamLost = false; show(JSON.parse(event.data)); });
+  source.addEventListener('tiles', (event) => {
+    const changes = JSON.parse(event.data);
+    if (map) map.applyTiles(changes); else waitingTiles.push(changes);
+  });
+  source.addEventListener('flow', (event) => { flow = flow.concat(JSON.parse(event.data)).slice(-300); showFlow(); });
+  source.onerror = () => {
+    streamLost = true;
+    panels.showConnection(state, true);
+    source.close();
+    // Ask plainly first: a site that is gone is another thing than a page that is offline.
+    retry = setTimeout(async () => {
+      const answer = await fetch(`/api/state?site=${encodeURIComponent(wanted)}`).catch(() => null);
+      if (answer?.status === 404) choose('');
+      else listen();
+    }, 1000);
+  };
+}
+
+function choose(site) {
+  wanted = site;
+  map?.remove();
+  map = null;
+  flow = [];
+  waitingTiles = [];
+  state = null;
+  const address = new URL(location.href);
+  if (site) address.searchParams.set('site', site); else address.searchParams.delete('site');
+  history.replaceState(null, '', address);
+  listen();
+}
+
+function showSites() {
+  const select = $('site'), names = state.sites;
+  if (select.dataset.names !== names.join()) {
+    select.dataset.names = names.join();
+    select.replaceChildren(...names.map((name) => new Option(name, name)));
+  }
+  select.disabled = names.length < 2;
+  if (state.site) select.value = state.site;
+}
+
+function show(now) {
+  state = now;
+  showSites();
+  panels.showConnection(state, streamLost);
+  panels.showEmptyMap(state);
+  if (!state.site) {
+    panels.showServer({ ...state, robots: [] }, may());
+    if (state.sites.length > 0) choose(state.sites[0]);
+    return;
+  }
+  document.title = `${state.site} – Cairn`;
+  if (!map && state.map) {
+    map = new SiteMap($('map'), state.site, state.map);
+    for (const name of ['path', 'smoothed', 'ellipse', 'landmarks']) map.shown[name] = $(`show-${name}`).checked;
+    for (const changes of waitingTiles) map.applyTiles(changes);
+    waitingTiles = [];
+    askPaths();
+  }
+  map?.fit(state.map, false);
+  map?.update(state.robots, state.connected);
+  panels.showRobots(state, (name) => {
+    const robot = state.robots.find((one) => one.name === name);
+    if (robot?.pose) map?.centre(robot.pose);
+  });
+  panels.showJobs(state, may(), (id) => command(`/api/jobs/${id}/cancel`, {}, 'The job is cancelled.'));
+  panels.showMap(state, may(), (version) => command(`/api/sites/${state.site}/enable`, { version }, `Version ${version} is enabled.`));
+  panels.showServer(state, may());
+}
+
+function showFlow() {
+  plot($('flow'), flow, [
+    { name: 'used', value: (sample) => sample[1], style: 'first' }, { name: 'dropped', value: (sample) => sample[2], style: 'second' }], '/s');
+  plot($('latency'), flow, [
+    { name: 'median', value: (sample) => sample[3], style: 'first' }, { name: '99 %', value: (sample) => sample[4], style: 'third' }], 'ms');
+}
+
+let asking = false;
+async function askPaths() {
+  if (!map || !state?.connected || asking || document.hidden) return;
+  asking = true;
+  const asked = map, smoothed = state.map?.versions.some((version) => version.enabled && version.job !== '0');
+  for (const robot of state.robots) {
+    if (asked.shown.path) {
+      const path = await getJson(`/api/robots/${robot.name}/path`);
+      if (path && map === asked) asked.setPath(robot.name, path.points, false);
+    }
+    if (asked.shown.smoothed) {
+      const path = smoothed ? await getJson(`/api/robots/${robot.name}/path?smoothed=1`) : null;
+      if (map === asked) asked.setPath(robot.name, path?.points ?? [], true);
+    }
+  }
+  if (asked.shown.landmarks && map === asked) asked.setLandmarks((await getJson(`/api/sites/${asked.site}/landmarks`)) ?? []);
+  asking = false;
+}
+
+$('site').addEventListener('change', (event) => choose(event.target.value));
+$('fit').addEventListener('click', () => map?.fit(state?.map, true));
+for (const name of ['path', 'smoothed', 'ellipse', 'landmarks']) {
+  $(`show-${name}`).addEventListener('change', (event) => {
+    if (!map) return;
+    map.shown[name] = event.target.checked;
+    if (name === 'landmarks' && !event.target.checked) map.setLandmarks([]);
+    map.update(state.robots, state.connected);
+    askPaths();
+  });
+}
+$('show-names').addEventListener('change', (event) => $('map').classList.toggle('no-names', !event.target.checked));
+$('smooth').addEventListener('click', () => command(`/api/sites/${state.site}/smooth`, {}, 'Smoothing has begun.'));
+$('rollback').addEventListener('click', () => command(`/api/sites/${state.site}/rollback`, {}, 'The version before is enabled.'));
+$('save').addEventListener('click', () => command(`/api/sites/${state.site}/save`, {}, 'The site is saved on the server.'));
+$('unlock').addEventListener('click', () => { $('token-wrong').hidden = true; $('token').value = ''; $('token-dialog').showModal(); });
+$('token-dialog').querySelector('form').addEventListener('submit', async (event) => {
+  if (event.submitter?.value !== 'use') return;
+  event.preventDefault();
+  if (await useToken($('token').value.trim())) {
+    $('token-dialog').close();
+    say('Commands are unlocked.');
+    if (state) show(state);
+  } else {
+    $('token-wrong').hidden = false;
+  }
+});
+
+onThemeChange(() => { if (state?.site) show(state); });
+showFlow();
+panels.showEmptyMap(null);
+await tokenOfAddress();
+listen();
+setInterval(askPaths, PATH_PERIOD_MS);

@@ -1,0 +1,51 @@
+#include "client/web/tile_picture.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "common/map/image_codec.h"
+
+namespace cairn::web {
+namespace {
+
+using Colour = std::array<double, 3>;  // Blue, green, red.
+
+struct Palette {
+  Colour free;
+  Colour occupied;
+};
+
+Palette PaletteOf(Theme theme) {
+  if (theme == Theme::kDark) return {.free = {62, 50, 42}, .occupied = {244, 234, 226}};
+  return {.free = {255, 255, 255}, .occupied = {46, 34, 24}};
+}
+
+}  // namespace
+
+Result<std::string> DrawTile(const Tile& tile, Theme theme) {
+  const auto cells = DecodeCells(tile.bytes, tile.encoding);
+  if (!cells) return tl::unexpected(cells.error());
+  const Palette palette = PaletteOf(theme);
+  RasterImage image{.width = kTileCells, .height = kTileCells, .channels = 4, .samples = {}};
+  image.samples.resize(std::size_t{4} * kTileArea);
+  auto to = image.samples.begin();
+  for (int row = kTileCells - 1; row >= 0; --row) {
+    for (int column = 0; column < kTileCells; ++column, to += 4) {
+      const std::uint8_t cell = (*cells)[static_cast<std::size_t>(row * kTileCells + column)];
+      if (cell == kUnknownCell) continue;  // Transparent.
+      const double share = cell / 100.0;
+      for (std::size_t i = 0; i < 3; ++i) {
+        const double value = palette.free[i] + share * (palette.occupied[i] - palette.free[i]);
+        to[static_cast<std::ptrdiff_t>(i)] = static_cast<std::uint8_t>(std::lround(value));
+      }
+      to[3] = 255;
+    }
+  }
+  constexpr int kLevel = 3;
+  const auto png = EncodeImage(image, ".png", kLevel);
+  if (!png) return tl::unexpected(png.error());
+  return std::string(png->begin(), png->end());
+}
+
+}  // namespace cairn::web

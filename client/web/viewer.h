@@ -1,0 +1,66 @@
+// What one person who looks is told: the pieces of a stream of server-sent events, on change.
+// Thread rule: StateTexts from any thread; a Viewer from the one thread of its stream.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "client/web/server_watch.h"
+#include "client/web/site_maps.h"
+#include "common/mutex.h"
+
+namespace cairn::web {
+
+// The newest state of each site as JSON, written once for all who look at it.
+class StateTexts {
+ public:
+  using Text = std::shared_ptr<const std::string>;
+
+  explicit StateTexts(bool commands) : commands_(commands) {}
+
+  // REQUIRES: `site` is empty or one of the view's sites.
+  [[nodiscard]] Text Get(const ServerView& view, const std::string& site);
+
+ private:
+  struct Written {
+    std::uint64_t view = 0;
+    Text text;
+  };
+  const bool commands_;
+  Mutex mutex_;
+  std::map<std::string, Written> written_ CAIRN_GUARDED_BY(mutex_);  // By site; those of the newest views only.
+};
+
+class Viewer {
+ public:
+  // `watch` and `states` outlive the viewer. `map` is the site's; null without a site.
+  Viewer(ServerWatch& watch, StateTexts& states, std::string site, std::shared_ptr<SiteMap> map)
+      : watch_(watch), states_(states), site_(std::move(site)), map_(std::move(map)), looking_(watch.Look()) {}
+
+  // Waits up to half a second for something new. May be empty.
+  [[nodiscard]] std::string NextPiece();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void AddView(const ServerView& view, std::string& piece);
+  void AddTiles(std::string& piece);
+
+  ServerWatch& watch_;
+  StateTexts& states_;
+  const std::string site_;
+  const std::shared_ptr<SiteMap> map_;
+  const std::shared_ptr<void> looking_;
+  // What the person has been told.
+  std::uint64_t view_ = 0;
+  StateTexts::Text state_;
+  client::TileChanges::Place tiles_;
+  std::int64_t flow_ms_ = 0;
+  Clock::time_point told_{};
+};
+
+}  // namespace cairn::web

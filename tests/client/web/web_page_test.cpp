@@ -1,0 +1,200 @@
+// The page's answers, against a fake server over DDS. Handlers are called directly; sockets are tests/common/http.
+#include "client/web/web_page.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "common/map/image_codec.h"
+#include "tests/client/lib/fake_server.h"
+#include "tests/loopback.h"
+
+namespace cairn::web {
+namespace {
+
+using namespace test;
+using nlohmann::json;
+using ::testing::HasSubstr;
+
+TileSample Wall(int x, std::uint64_t version) {
+  TileSample sample;
+  sample.site_id = HashName("drawn");
+  sample.tile.key = {0, x, 0};
+  sample.tile.version = version;
+  sample.tile.encoding = TileEncoding::kRaw;
+  sample.tile.bytes.assign(kTileArea, kUnknownCell);
+  sample.tile.bytes[0] = 100;  // Lower-left cell.
+  return sample;
+}
+
+class Page : public ::testing::Test {
+ protected:
+  void Open(const std::string& token = "") {
+    bus_ = MakeBus("page");
+    page_ = Must(WebPage::Create(*bus_, {.token = token}));
+  }
+  void StartServer() {
+    server_.emplace(LoopbackOptions());
+    MapInfo info;
+    info.site_id = HashName("drawn");
+    info.site = "drawn";
+    info.version = 1;
+    info.levels = 4;
+    info.tile_count = 1;
+    server_->Publish(info);
+    server_->Publish(Wall(0, 1));
+  }
+  [[nodiscard]] bool KnowsSite() const {
+    return Eventually([&] { return page_->watch().view()->Sites().count("drawn") > 0; });
+  }
+  HttpResponse Get(const std::string& path, std::multimap<std::string, std::string> query = {},
+                   std::multimap<std::string, std::string> headers = {}) {
+    HttpRequest request;
+    request.method = "GET";
+    request.path = path;
+    request.query = std::move(query);
+    request.headers = std::move(headers);
+    return page_->Answer(request);
+  }
+  HttpResponse Post(const std::string& path, const std::string& token, const std::string& body = "{}") {
+    HttpRequest request;
+    request.method = "POST";
+    request.path = path;
+    request.headers = {{"authorization", "Bearer " + token}};
+    request.body = body;
+    return page_->Answer(request);
+  }
+
+  std::optional<FakeServer> server_;
+  std::unique_ptr<wire::Bus> bus_;
+  std::unique_ptr<WebPage> page_;
+};
+
+TEST_F(Page, ItsFilesComeWithATagAndNothingFromOutside) {
+  Open();
+  const HttpResponse index = Get("/");
+  EXPECT_EQ(index.status, 200);
+  EXPECT_THAT(index.body, HasSubstr("<title>Cairn</title>"));
+  EXPECT_THAT(index.body, Not(HasSubstr("http://")));
+  EXPECT_THAT(index.body, Not(HasSubstr("https://")));
+  EXPECT_EQ(Get("/", {}, {{"if-none-match", index.headers[0].second}}).status, 304);
+  for (const char* file : {"/leaflet.js", "/leaflet.css", "/style.css", "/main.js", "/map.js", "/icon.svg"})
+    EXPECT_EQ(Get(file).status, 200) << file;
+  for (const char* none : {"/nothing", "/api", "/api/sites/x", "/etc/passwd", "//", "/api//tiles/0/0/0.png"})
+    EXPECT_EQ(Get(none).status, 404) << none;
+}
+
+TEST_F(Page, WithoutAServerItSaysSo) {
+  Open();
+  const json state = json::parse(Get("/api/state").body);
+  EXPECT_EQ(state["connected"], false);
+  EXPECT_EQ(Get("/api/robots/r1/path").status, 503);
+  EXPECT_EQ(Get("/api/sites/hall/tiles/0/0/0.png").status, 404);
+}
+
+TEST_F(Page, TilesArePicturesWithATagPerContentAndTheme) {
+  StartServer();
+  Open();
+  ASSERT_TRUE(KnowsSite());
+  HttpResponse tile;
+  ASSERT_TRUE(Eventually([&] { return (tile = Get("/api/sites/drawn/tiles/0/0/0.png")).status == 200; }));
+  const auto picture = Must(DecodeImage({tile.body.begin(), tile.body.end()}));
+  EXPECT_EQ(picture.channels, 4);
+  const auto pixel = [&](int row, int column) {
+    return &picture.samples[static_cast<std::size_t>((row * 128 + column) * 4)];
+  };
+  EXPECT_EQ(pixel(127, 0)[3], 255) << "the lowest row is the last one of the picture";
+  EXPECT_LT(pixel(127, 0)[0], 80);
+  EXPECT_EQ(pixel(0, 0)[3], 0) << "unknown cells are transparent";
+
+  const std::string tag = tile.headers[0].second;
+  EXPECT_EQ(Get("/api/sites/drawn/tiles/0/0/0.png", {}, {{"if-none-match", tag}}).status, 304);
+  EXPECT_EQ(Get("/api/sites/drawn/tiles/0/0/0.png", {{"theme", "dark"}}, {{"if-none-match", tag}}).status, 200);
+  server_->Publish(Wall(0, 2));
+  EXPECT_TRUE(Eventually([&] {
+    return Get("/api/sites/drawn/tiles/0/0/0.png", {}, {{"if-none-match", tag}}).status == 200;
+  }));
+  EXPECT_EQ(Get("/api/sites/drawn/tiles/0/7/0.png").status, 404);
+  EXPECT_EQ(Get("/api/sites/drawn/tiles/0/x/0.png").status, 400);
+  EXPECT_EQ(Get("/api/sites/other/tiles/0/0/0.png").status, 404);
+  EXPECT_EQ(page_->maps().open(), 1U) << "a site that the server does not know opens no map";
+}
+
+TEST_F(Page, TheEventsTellTheStateAndEachTileOnce) {
+  StartServer();
+  Open();
+  ASSERT_TRUE(KnowsSite());
+  EXPECT_EQ(Get("/api/events", {{"site", "other"}}).status, 404);
+  const HttpResponse events = Get("/api/events", {{"site", "drawn"}});
+  ASSERT_TRUE(events.stream);
+  std::string said;
+  const auto hears = [&](const std::string& text) {
+    return Eventually([&] {
+      std::string piece;
+      EXPECT_TRUE(events.stream(piece));
+      said += piece;
+      return said.find(text) != std::string::npos;
+    });
+  };
+  EXPECT_TRUE(hears("event: state"));
+  EXPECT_TRUE(hears("\"site\":\"drawn\""));
+  EXPECT_TRUE(hears("[0,0,0,1]"));
+  said.clear();
+  server_->Publish(Wall(3, 2));
+  EXPECT_TRUE(hears("[0,3,0,2]"));
+  EXPECT_THAT(said, Not(HasSubstr("[0,0,0,1]")));
+}
+
+TEST_F(Page, TheServerMayLeaveAndComeBack) {
+  StartServer();
+  Open();
+  ASSERT_TRUE(KnowsSite());
+  const auto looking = page_->watch().Look();
+  server_.reset();
+  EXPECT_TRUE(Eventually([&] { return !page_->watch().view()->connected; }));
+  EXPECT_EQ(page_->watch().view()->Sites().count("drawn"), 1U) << "what it said last stays";
+  EXPECT_EQ(Get("/api/sites/drawn/map.png").status, 503);
+  StartServer();
+  EXPECT_TRUE(Eventually([&] { return page_->watch().view()->connected; }));
+}
+
+TEST_F(Page, CommandsNeedTheToken) {
+  StartServer();
+  Open("secret");
+  ASSERT_TRUE(KnowsSite());
+  const auto asked = [&](RequestKind kind) {
+    const auto all = server_->asked();
+    return std::count(all.begin(), all.end(), kind);
+  };
+  EXPECT_EQ(Post("/api/sites/drawn/smooth", "").status, 401);
+  EXPECT_EQ(Post("/api/sites/drawn/smooth", "secreT").status, 401);
+  EXPECT_EQ(Post("/api/sites/drawn/smooth", "secretsecret").status, 401);
+  EXPECT_EQ(asked(RequestKind::kJobSubmit), 0);
+  EXPECT_EQ(Post("/api/token", "secret").status, 200);
+  const HttpResponse job = Post("/api/sites/drawn/smooth", "secret");
+  EXPECT_EQ(job.status, 200) << job.body;
+  EXPECT_EQ(json::parse(job.body)["id"], "42");
+  EXPECT_EQ(asked(RequestKind::kJobSubmit), 1);
+  EXPECT_EQ(Post("/api/jobs/42/cancel", "secret").status, 200);
+  EXPECT_EQ(asked(RequestKind::kJobCancel), 1);
+  EXPECT_EQ(Post("/api/sites/drawn/enable", "secret", R"({"version":2})").status, 200);
+  EXPECT_EQ(Post("/api/sites/drawn/enable", "secret", R"({"version":99})").status, 404);
+  for (const char* body : {"[", "[]", R"({"version":-1})", R"({"version":"2"})", R"({"version":1e30})", "{}"})
+    EXPECT_EQ(Post("/api/sites/drawn/enable", "secret", body).status, 400) << body;
+  EXPECT_EQ(Post("/api/sites/other/smooth", "secret").status, 404);
+  EXPECT_EQ(Post("/api/jobs/x/cancel", "secret").status, 404);
+}
+
+TEST_F(Page, WithoutATokenItIsReadOnly) {
+  StartServer();
+  Open();
+  ASSERT_TRUE(KnowsSite());
+  EXPECT_EQ(Post("/api/sites/drawn/smooth", "").status, 403);
+}
+
+}  // namespace
+}  // namespace cairn::web

@@ -1,0 +1,228 @@
+#!/usr/bin/env python3
+"""What a person does with the page, in a real browser against real programs: opens it, sees a robot move and the map grow,
+unlocks commands, starts a job, sees the smoothed map, downloads it, and lives through a crash of the server.
+
+Usage: browser_test.py BIN_DIR [PICTURES]. BIN_DIR has cairnd, cairn and cairn-web. PICTURES is a folder for the pictures of the
+documentation; without it none are made. It waits for conditions and never for a time. Exit code 77, with the line
+`SKIPPED: why`: there is no Chromium."""
+import fcntl
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+from chromium import Page
+
+TOKEN = "token-of-the-test"
+TILES = "[...document.querySelectorAll('#map img.cell:not([hidden])')].filter((tile) => tile.complete && tile.naturalWidth === 128).map((tile) => tile.src)"
+
+
+# How many pixels each robot is drawn from where it must be: a tile that is shown tells where the metres of the map are on the
+# screen, and the list beside the map says where the robot is. Infinite where either is missing.
+APART = """(() => {
+  const tile = [...document.querySelectorAll('#map img.cell:not([hidden])')].find((one) => one.naturalWidth === 128);
+  if (!tile) return [Infinity];
+  const [level, column, row] = tile.dataset.key.split('/').map(Number), box = tile.getBoundingClientRect();
+  const metres = 128 * 0.05 * 2 ** level, scale = box.width / metres;
+  return [...document.querySelectorAll('#robots .robot')].map((robot) => {
+    const icon = document.querySelector(`.robot-icon[data-robot=${robot.querySelector('.name').innerText}] svg`);
+    const place = /(-?[0-9.]+), (-?[0-9.]+) m/.exec(robot.querySelector('.where').innerText);
+    if (!icon || !place) return Infinity;
+    const drawn = icon.getBoundingClientRect();
+    return Math.hypot(box.left + (place[1] - column * metres) * scale - (drawn.left + drawn.right) / 2,
+      box.bottom - (place[2] - row * metres) * scale - (drawn.top + drawn.bottom) / 2);
+  });
+})()"""
+
+
+class Failed(Exception):
+    pass
+
+
+def own_domain():
+    """A DDS domain that no other test uses, and the lock that keeps it: those of tests/test_domain.h."""
+    for i in range(200):
+        domain = 1 + (os.getpid() + i) % 200
+        lock = open(os.path.join(tempfile.gettempdir(), f"cairn-domain-{domain}"), "a")
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return domain, lock
+        except OSError:
+            lock.close()
+    raise Failed("all DDS test domains are in use")
+
+
+class Programs:
+    """The programs of one test, on one domain; what they say goes into files."""
+
+    def __init__(self, binaries, work, domain):
+        self.binaries, self.work, self.domain, self.all = binaries, work, domain, []
+
+    def start(self, program, *options):
+        said = os.path.join(self.work, f"{len(self.all)}-{program}.txt")
+        with open(said, "w") as file:
+            process = subprocess.Popen([os.path.join(self.binaries, program), *options], stdin=subprocess.DEVNULL, stdout=file,
+                                       stderr=subprocess.STDOUT, env={**os.environ, "CAIRN_DOMAIN": str(self.domain)})
+        process.said = said
+        self.all.append(process)
+        return process
+
+    def start_server(self):
+        return self.start("cairnd", "--state", os.path.join(self.work, "state"), "--set", "slam.particles=20",
+                          "--set", "jobs.nice=0")
+
+    def stop(self):
+        for process in self.all:
+            process.kill()
+            process.wait()
+
+
+def said_by(process):
+    with open(process.said) as file:
+        return file.read()
+
+
+def eventually(what, condition, deadline_s=60.0):
+    began = time.monotonic()
+    while not condition():
+        if time.monotonic() - began > deadline_s:
+            raise Failed(f"not within {deadline_s:.0f} s: {what}")
+        time.sleep(0.05)
+    print(f"ok: {what} ({time.monotonic() - began:.1f} s)", flush=True)
+
+
+def make_pictures(page, folder):
+    def shot(name, width, height, theme):
+        page.look(width, height, theme)
+        page.click("#fit")
+        eventually(f"the map is drawn for {name}", lambda: page.run(
+            "new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))).then(() => ((tiles) => tiles.length > 0"
+            " && tiles.every((tile) => tile.complete && tile.naturalWidth === 128 && tile.classList.contains('leaflet-tile-loaded')"
+            f" && tile.src.includes('theme={theme}')))([...document.querySelectorAll('#map img.cell:not([hidden])')]))"))
+        page.picture(os.path.join(folder, name))
+
+    eventually("nothing is said any more", lambda: page.text("#said") == "")
+    shot("web.png", 920, 540, "light")
+    shot("web-dark.png", 1180, 720, "dark")
+    shot("web-phone.png", 390, 800, "light")
+
+
+def use_the_page(programs, page, pictures):
+    server = programs.start_server()
+    web = programs.start("cairn-web", "--port", "0", f"--token={TOKEN}")
+    eventually("cairn-web prints its address", lambda: re.search(r"http://\S+", said_by(web)))
+    address = re.search(r"http://[0-9.:]+/", said_by(web)).group()
+    page.look(1180, 720, "light")
+    page.open(address)
+    eventually("without a robot the page says what to do", lambda: "No site yet" in page.text("#map-empty"))
+
+    programs.start(
+        "cairn", "sim", "--site", "hall", "--world", "building", "--robots", "2", "--beams", "181", "--hz", "5", "--window", "32",
+        "--seconds", "3600", "--rate", "4")
+    eventually("both robots are listed", lambda: page.run("document.querySelectorAll('#robots .robot').length") == 2)
+    eventually("a robot is on the map", lambda: page.shows(".robot-icon[data-robot=robot1]"))
+    place = "document.querySelector('.robot-icon[data-robot=robot1]').style.transform"
+    where = "document.querySelector('#robots .robot .where').innerText.split(' · ')[0]"
+    before_place, before_where = page.run(place), page.run(where)
+    eventually("it moves on the map and in the list", lambda: page.run(place) != before_place and page.run(where) != before_where)
+    eventually("tiles of the map are shown", lambda: page.run(TILES))
+    before = page.run(TILES)
+    eventually("the map grows", lambda: page.run(TILES) not in ([], before))
+    # Longer than a robot: 50 pixels.
+    eventually("the path is drawn", lambda: page.run(
+        "[...document.querySelectorAll('#map path[fill=none]')].some((path) => path.getTotalLength() > 50)"))
+    begins = page.run(where)
+    eventually("a robot has driven on", lambda: page.run(where) != begins)
+    apart = page.run(APART)
+    if len(apart) != 2 or max(apart) > 3:
+        raise Failed(f"the robots are drawn {apart} pixels from where they are on the map")
+    if page.nameless():
+        raise Failed(f"a screen reader has no name for: {page.nameless()}")
+
+    page.click("#unlock")
+    page.click("#token")
+    page.type("wrong")
+    page.click("#token-use")
+    eventually("a wrong token is refused", lambda: page.shows("#token-wrong"))
+    page.run("document.getElementById('token').value = ''")
+    page.click("#token")
+    page.type(TOKEN)
+    page.press_enter()
+    eventually("the right one unlocks commands", lambda: page.run("!document.getElementById('smooth').disabled"))
+
+    if pictures:
+        used = "Number(/([0-9]+) scans/.exec(document.querySelector('#robots .where').innerText)[1])"
+        eventually("there is much to see", lambda: page.run(used) > 600, 120)
+    before = page.run(TILES)
+    page.click("#smooth")
+    eventually("the job ends", lambda: "Done" in page.text("#jobs"), 120)
+    eventually("its map version is enabled", lambda: re.search(r"Version 2[^V]*Enabled", page.text("#versions")))
+    eventually("every tile of the map is a new one", lambda: page.run(TILES) and not set(page.run(TILES)) & set(before))
+    eventually("the smoothed path is drawn", lambda: page.run(
+        "[...document.querySelectorAll('#map path[stroke-dasharray]')].some((path) => path.getTotalLength() > 50)"))
+    if pictures:
+        make_pictures(page, pictures)
+        page.look(1180, 720, "light")
+
+    for name, begins in (("hall.yaml", b"image: \"hall.png\"\n"), ("hall.png", b"\x89PNG")):
+        page.click(f"#download-{name.split('.')[1]}")
+        path = os.path.join(page.downloads, name)
+        eventually(f"{name} is downloaded", lambda: os.path.exists(path))
+        with open(path, "rb") as file:
+            if not file.read().startswith(begins):
+                raise Failed(f"{name} is no map")
+
+    # That the wrong token is refused was wanted, and a tile may be replaced while the page asks for it.
+    refused = [(status, url) for status, url in page.refused if not (status == 401 and "/api/token" in url)
+               and not (status == 404 and "/tiles/" in url)]
+    if refused:
+        raise Failed(f"the page asks for what is refused: {refused}")
+    server.kill()
+    eventually("the page says that the server is lost", lambda: "Server lost" in page.text("#connection") and page.shows("#banner"))
+    if not page.run(TILES):
+        raise Failed("the last map does not stay")
+    programs.start_server()
+    eventually("it goes on when the server is back", lambda: "Live" in page.text("#connection") and not page.shows("#banner"))
+    if not page.run(TILES):
+        raise Failed("the map is gone")
+    before_place = page.run(place)
+    eventually("and the robots drive on", lambda: page.run(place) != before_place)
+    if page.errors:
+        raise Failed(f"errors of the page: {page.errors}")
+    outside = [url for url in page.requests if not url.startswith((address, "data:", "about:", "blob:"))]
+    if outside:
+        raise Failed(f"the page asks others: {outside}")
+
+
+def main():
+    binaries, pictures = sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else None
+    browser = shutil.which("chromium") or shutil.which("chromium-browser")
+    if not browser:
+        print("SKIPPED: there is no Chromium on this machine (deploy/install-packages.sh test)")
+        return 77
+    domain, lock = own_domain()
+    with lock, tempfile.TemporaryDirectory(prefix="cairn-browser-", ignore_cleanup_errors=True) as work:
+        programs = Programs(binaries, work, domain)
+        page = None
+        try:
+            page = Page(browser, work)
+            use_the_page(programs, page, pictures)
+            return 0
+        except Exception as error:  # Whatever it is: what the programs said must be shown.
+            print(f"FAILED: {error}")
+            if page is not None and page.errors:
+                print(f"--- errors of the page: {page.errors}")
+            for process in programs.all:
+                print(f"--- {os.path.basename(process.said)}:\n{said_by(process)[-1500:]}")
+            return 1
+        finally:
+            if page is not None:
+                page.close()
+            programs.stop()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
