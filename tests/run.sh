@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The one command: installs what is missing, builds every way that counts, runs every test, holds the accuracy.
 #   tests/run.sh                 packages to tsan below; stops at the first that fails
-#   tests/run.sh --full          a real systemd besides
+#   tests/run.sh --full          every source by itself, Debian packages, and a real systemd, besides
 #   tests/run.sh --quick         packages, format, architecture, release
 #   tests/run.sh --stage NAME    this stage (may be repeated), with the build it needs
 #   tests/run.sh --studies       whatever else is asked for, and the slow studies (tests/studies) last
@@ -11,8 +11,8 @@ set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
-all=(packages format architecture release accuracy demo nodds plain tidy asan fuzz tsan)
-full=(systemd)
+all=(packages format architecture release accuracy demo nodds tidy asan fuzz tsan)
+full=(plain debs systemd)
 stages=()
 studies=()
 full_too=0
@@ -131,9 +131,9 @@ stage_nodds() {
 # sources to a translation unit can not see. The programs and all they link; nothing is run but their version.
 stage_plain() {
   configure plain
-  build plain --target cairnd cairn cairn-offline cairn-calibrate
+  build plain --target cairnd cairn cairn-offline cairn-calibrate cairn-web
   local program
-  for program in cairnd cairn cairn-offline cairn-calibrate; do "build/plain/bin/$program" --version; done
+  for program in cairnd cairn cairn-offline cairn-calibrate cairn-web; do "build/plain/bin/$program" --version; done
 }
 
 stage_asan() {
@@ -162,12 +162,20 @@ stage_tidy() {
   python3 tests/tidy.py build/tidy --jobs "$jobs"
 }
 
+# Root only: the packages are installed in a system of their own.
+stage_debs() {
+  deploy/make-packages.sh build/release
+  if [ "$(id -u)" -ne 0 ]; then echo "SKIPPED: not root"; return 77; fi
+  deploy/install-packages.sh boot
+  tests/deploy/packages_test.sh build/release/packages build/debs
+}
+
 # Root only: it makes a system of its own and boots it.
 stage_systemd() {
   if [ "$(id -u)" -ne 0 ]; then echo "SKIPPED: not root"; return 77; fi
   deploy/install-packages.sh boot
   configure release
-  build release --target cairnd cairn cairn-offline cairn-calibrate
+  build release --target cairnd cairn cairn-offline cairn-calibrate cairn-web
   tests/deploy/boot_systemd.sh build/release build/systemd
 }
 

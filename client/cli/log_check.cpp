@@ -80,7 +80,9 @@ void LogCheck::AddScan(const Scan& scan) {
         std::abs(scan.angle_step_rad) * std::max<double>(0.0, static_cast<double>(scan.ranges_m.size()) - 1);
     report_.range_max_m = scan.range_max_m;
     report_.T_robot_laser = scan.T_robot_laser;
+    report_.beams_timed = scan.beam_period_s > 0.0;
   }
+  turns_.Add(scan);
   scans_.Add(scan.stamp);
   ++report_.beam_counts[scan.ranges_m.size()];
   constexpr std::size_t kMostKinds =
@@ -106,6 +108,7 @@ void LogCheck::AddScan(const Scan& scan) {
 
 void LogCheck::AddOdometry(const Odometry& odometry) {
   odometry_.Add(odometry.stamp);
+  turns_.Add(odometry);
   if (!ValidateOdometry(odometry)) {
     ++bad_odometry_;
     return;
@@ -136,7 +139,9 @@ LogReport LogCheck::Finish(const LogSummary& summary) {
     report_.no_return_share = static_cast<double>(no_returns_) / beams;
     report_.invalid_share = static_cast<double>(invalid_) / beams;
   }
+  report_.turns = turns_.Finish();
   CollectFindings();
+  CollectLidarFindings();
   return report_;
 }
 
@@ -181,6 +186,32 @@ void LogCheck::CollectFindings() {
   if (r.odometry.count > 1 && r.way_m < 0.1) note("the odometry hardly moves", "a standing robot maps one place only");
   if (r.odometry.rate_hz > 0 && r.scans.rate_hz > 0 && r.odometry.rate_hz < 0.5 * r.scans.rate_hz)
     note("odometry is sparser than scans", "poses between samples are interpolated");
+}
+
+// What scans and odometry together show of the lidar.
+void LogCheck::CollectLidarFindings() {
+  constexpr double kSure = 0.7, kClearly = 0.02, kWorthwhile_s = 0.05, kSlow_hz = 20.0, kFullTurn_rad = 6.0;
+  const auto& r = report_;
+  const TurnFinding& turns = r.turns;
+  const std::string measure = "`cairn-calibrate laser LOG` measures it and says what to do";
+  if (turns.correlation < -kSure)
+    report_.findings.push_back({false, "the scans turn against the odometry",
+                                "the array of beams is turned over, the lidar hangs upside down, or the odometry "
+                                "counts its turns the wrong way"});
+  if (turns.correlation > kSure && turns.correlation > turns.correlation_at_once + kClearly &&
+      std::abs(turns.lag_s) >= kWorthwhile_s)
+    report_.findings.push_back(
+        {false,
+         fmt::format("the scans seem to be {:.2f} s {}{} than the odometry", std::abs(turns.lag_s),
+                     std::abs(turns.lag_s) > TurnCheck::kWidest_s - 1e-3 ? "or more " : "",
+                     turns.lag_s > 0.0 ? "later" : "earlier"),
+         measure});
+  const bool slow = r.scans.rate_hz > 0.0 && r.scans.rate_hz < kSlow_hz;
+  if (!r.beams_timed && slow && r.field_of_view_rad > kFullTurn_rad && r.turned_rad > 1.0)
+    report_.findings.push_back(
+        {false,
+         fmt::format("nothing says when the beams of a turn of up to {:.2f} s were measured", 1.0 / r.scans.rate_hz),
+         "give --scan-period and the other options of lidars that turn; " + measure});
 }
 
 void AddCheckLog(CLI::App& app, Program& program) {

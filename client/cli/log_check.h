@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "client/cli/percentiles.h"
+#include "client/cli/turn_check.h"
 #include "common/sensor/log_record.h"
 
 namespace cairn::client {
@@ -49,6 +50,8 @@ struct LogReport {
   double way_m = 0.0;                            // Measured by the odometry, as the two values below.
   double turned_rad = 0.0;
   double fastest_m_s = 0.0;
+  TurnFinding turns;
+  bool beams_timed = false;  // The first scan says when its beams were measured.
   std::vector<Finding> findings;
 
   [[nodiscard]] bool has_errors() const;
@@ -72,10 +75,12 @@ class LogCheck {
   void AddScan(const Scan& scan);
   void AddOdometry(const Odometry& odometry);
   void CollectFindings();
+  void CollectLidarFindings();
 
   LogReport report_;
   StampTrack scans_;
   StampTrack odometry_;
+  TurnCheck turns_;
   std::optional<Odometry> last_odometry_;
   std::uint64_t jumps_ = 0;  // Odometry steps that are too fast for a robot.
   std::uint64_t bad_odometry_ = 0;

@@ -58,7 +58,6 @@ nlohmann::json ReportToJson(const SimReport& report) {
 
 struct SimArguments {
   SimRunOptions run;
-  std::string laser_model;     // Empty: the options of the laser count one by one.
   double first_stamp_s = 0.0;  // 0: now.
 };
 
@@ -67,11 +66,6 @@ ExitCode Simulate(Program& program, const SimArguments& arguments) {
   if (options.stream && options.site.empty()) {
     program.err() << "cairn sim: --site is required (or --no-stream)\n";
     return ExitCode::kUsage;
-  }
-  if (!arguments.laser_model.empty()) {
-    const auto laser = sim::WithModel(options.fleet.laser, arguments.laser_model);
-    if (!laser) return program.Refuse(laser.error());
-    options.fleet.laser = *laser;
   }
   const std::chrono::nanoseconds now = std::chrono::system_clock::now().time_since_epoch();
   options.fleet.first_stamp = arguments.first_stamp_s > 0.0 ? StampFromSeconds(arguments.first_stamp_s) : now.count();
@@ -94,7 +88,7 @@ void AddSim(CLI::App& app, Program& program) {
       "The same seed gives the same scans. Exit code 1 if the server cannot say what became of a scan.\n"
       "EXAMPLES\n  cairn sim --world building --robots 3 --site hall --seconds 120 --truth-dir truth\n"
       "  cairn sim --robots 16 --beams 360 --hz 10 --site load --watch-pid $(pidof cairnd)\n"
-      "  cairn sim --robots 1 --no-stream --log-dir logs --truth-dir truth\n"
+      "  cairn sim --robots 1 --no-stream --log-dir logs --truth-dir truth --laser-model rplidar-a1\n"
       "  cairn sim --robots 1 --world hall3d --laser-model lms200 --nod=-60,45,36 --site hall --log-dir logs");
   auto arguments = std::make_shared<SimArguments>();
   SimRunOptions* options = &arguments->run;
@@ -107,7 +101,7 @@ void AddSim(CLI::App& app, Program& program) {
   command->add_option("--prefix", options->prefix, "Robots are called PREFIX1, PREFIX2, ...")->capture_default_str();
   AddNumber(*command, "--seconds", options->seconds, 0.1, 1e6, "Simulated time");
   command->add_option("--seed", options->fleet.seed, "Seed of all random numbers")->capture_default_str();
-  AddSensorOptions(*command, options->fleet, arguments->laser_model);
+  AddSensorOptions(*command, options->fleet);
   auto* rate = AddNumber(*command, "--rate", options->rate, 1e-3, 1e4, "How many times faster than real time");
   command->add_flag("--fast", options->fast, "As fast as the server takes it, without losing a scan")->excludes(rate);
   AddWindowOption(*command, options->window);

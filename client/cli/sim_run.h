@@ -56,7 +56,6 @@ struct SimReport {
 [[nodiscard]] std::optional<double> CpuSecondsOf(int pid);
 
 // The options of `cairn sim` that say what the robots carry: laser, tilting mount, wheels.
-// `laser_model` gets the name given with --laser-model; where it stays empty, the laser's single options count.
-void AddSensorOptions(CLI::App& command, sim::FleetOptions& fleet, std::string& laser_model);
+void AddSensorOptions(CLI::App& command, sim::FleetOptions& fleet);
 
 }  // namespace cairn::client

@@ -3,13 +3,25 @@
 
 #include "client/cli/option_checks.h"
 #include "client/cli/sim_run.h"
-#include "client/sim/laser.h"
+#include "client/sim/laser_models.h"
 
 namespace cairn::client {
 namespace {
 
-void AddLaser(CLI::App& command, sim::LaserOptions& laser, std::string& model) {
-  auto* named = command.add_option("--laser-model", model, "Field of view, resolution, range and error of a scanner")
+void AddLaser(CLI::App& command, sim::FleetOptions& fleet) {
+  sim::LaserOptions& laser = fleet.laser;
+  // It is defined first, so that the other options count after it in whatever order they are given.
+  auto* named = command
+                    .add_option_function<std::string>(
+                        "--laser-model",
+                        [&fleet](const std::string& name) {
+                          const auto model = sim::WithModel(fleet.laser, name);
+                          if (!model) throw CLI::ValidationError("--laser-model", model.error().message);
+                          fleet.laser = model->laser;
+                          if (model->scan_hz > 0.0) fleet.scan_hz = model->scan_hz;
+                        },
+                        "Field of view, resolution, range and error of a scanner, and of lidars of today scan rate, "
+                        "time and sense of a turn")
                     ->check(CLI::IsMember(sim::LaserModelNames()));
   command.add_option("--beams", laser.beams, "Number of beams in a scan")
       ->check(CLI::Range(1, kMaxBeams))
@@ -46,6 +58,14 @@ void AddLaser(CLI::App& command, sim::LaserOptions& laser, std::string& model) {
             "step: up to this range --error-bound holds, beyond it --error-share", "METRES")
       ->excludes(named);
   AddNumber(command, "--sweep", laser.sweep_s, 0.0, 1.0, "Time from a scan's first beam to its last", "SECONDS");
+  command.add_flag("--laser-clockwise", laser.clockwise, "The lidar turns clockwise, seen from above")->excludes(named);
+  AddNumber(command, "--range-bias", laser.error.bias_m, -1.0, 1.0, "Every range is too long by this", "METRES");
+  AddNumber(command, "--range-scale", laser.error.bias_share, -0.5, 0.5, "Every range is too long by this share");
+  AddNumber(command, "--range-step", laser.error.quantum_m, 0.0, 1.0, "Ranges are multiples of this; 0: any range",
+            "METRES")
+      ->excludes(named);
+  AddNumber(command, "--dropouts", laser.dropout_share, 0.0, 1.0, "Share of the beams that say nothing")
+      ->excludes(named);
   AddNumber(command, "--laser-height", laser.height_m, 0.0, 100.0, "Height of the scanner above the floor", "METRES");
 }
 
@@ -76,8 +96,8 @@ void AddTilt(CLI::App& command, sim::TiltOptions& tilt) {
 
 }  // namespace
 
-void AddSensorOptions(CLI::App& command, sim::FleetOptions& fleet, std::string& laser_model) {
-  AddLaser(command, fleet.laser, laser_model);
+void AddSensorOptions(CLI::App& command, sim::FleetOptions& fleet) {
+  AddLaser(command, fleet);
   AddTilt(command, fleet.tilt);
   AddNumber(command, "--hz", fleet.scan_hz, 0.1, 200.0, "Scans per second");
   AddNumber(command, "--odometry-hz", fleet.odometry_hz, 0.1, 500.0, "Odometry samples per second");

@@ -93,6 +93,18 @@ Stamp Fleet::NextOdometry(const Member& member) const {
   return Multiple(member.odometries, options_.odometry_hz);
 }
 
+std::vector<DriveLeg> Fleet::DriveDuringScan(const Member& member) const {
+  std::vector<DriveLeg> legs{{member.robot.seconds(), member.robot.T_map_robot(), member.robot.twist()}};
+  if (options_.laser.sweep_s == 0.0) return legs;
+  const double end_s = member.robot.seconds() + options_.laser.sweep_s;
+  // A copy drives ahead. It stops for odometry where the robot itself will, because the follower steers anew at each
+  // stop.
+  Robot ahead = member.robot;
+  for (std::uint64_t k = member.odometries; ahead.seconds() < end_s; ++k)
+    ahead.DriveUntil(SecondsFromStamp(Multiple(k, options_.odometry_hz)), legs);
+  return legs;
+}
+
 Scan Fleet::TakeScan(std::size_t index, Stamp since_start) {
   Member& member = robots_[index];
   const double seconds = SecondsFromStamp(since_start);
@@ -106,10 +118,12 @@ Scan Fleet::TakeScan(std::size_t index, Stamp since_start) {
     }
   }
   const Stamp stamp = options_.first_stamp + since_start;
-  Scan scan = MeasureScan(*surroundings_.scene, posts, member.robot.T_map_robot(), member.robot.twist(), stamp,
-                          TiltOf(member.scans, options_.tilt), options_.laser, member.robot.random());
-  scan.sequence = ++member.scans;
+  const double tilt_rad = TiltOf(member.scans, options_.tilt);
+  ++member.scans;
   member.robot.Halt(HaltsAt(member.scans, options_.tilt, HaltScans(options_)));
+  Scan scan = MeasureScan(*surroundings_.scene, posts, DriveDuringScan(member), stamp, tilt_rad, options_.laser,
+                          member.robot.random());
+  scan.sequence = member.scans;
   member.truth.push_back({stamp, member.robot.T_map_robot()});
   return scan;
 }

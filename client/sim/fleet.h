@@ -78,6 +78,8 @@ class Fleet {
   [[nodiscard]] PathPlace FreePlace(const std::vector<Eigen::Vector2d>& waypoints, double way_m) const;
   [[nodiscard]] Stamp NextScan(const Member& member) const;
   [[nodiscard]] Stamp NextOdometry(const Member& member) const;
+  // What a robot that begins a scan now will drive until the last beam.
+  [[nodiscard]] std::vector<DriveLeg> DriveDuringScan(const Member& member) const;
   [[nodiscard]] Scan TakeScan(std::size_t index, Stamp since_start);
 
   Surroundings surroundings_;

@@ -22,37 +22,6 @@ double StepOf(const LaserOptions& options) {
   return options.field_of_view_rad / (full_turn ? options.beams : std::max(1, options.beams - 1));
 }
 
-struct Model {
-  std::string_view name;
-  int beams;
-  double field_of_view_deg;
-  double range_min_m;
-  double range_max_m;
-  RangeError error;
-};
-
-constexpr RangeError Sigma(double sigma_m) {
-  return {RangeErrorKind::kSigma, sigma_m, 0.0, 0.0, 0.0, 0.0};
-}
-constexpr RangeError Fixed(double bound_m) {
-  return {RangeErrorKind::kPercent, 0.0, 0.0, bound_m, 0.0, 0.0};
-}
-constexpr RangeError Step(double bound_m, double bound_share) {
-  return {RangeErrorKind::kStep, 0.0, 0.0, bound_m, bound_share, 1.0};
-}
-
-// 240 deg at 360/1024 deg a step: 683 beams.
-constexpr double kUrgView_deg = 682 * 360.0 / 1024.0;
-
-constexpr Model kModels[] = {
-    {"thesis", 181, 180.0, 0.02, 30.0, Sigma(0.015)},  // 5.1.1 simulates a standard deviation of 15 mm.
-    {"lms200", 361, 180.0, 0.02, 80.0, Sigma(0.005)},
-    {"lms291", 361, 180.0, 0.02, 80.0, Sigma(0.010)},
-    {"lms291-s05", 361, 180.0, 0.02, 80.0, Fixed(0.010)},
-    {"urg-04lx", 683, kUrgView_deg, 0.06, 4.095, Step(0.010, 0.01)},
-    {"urg-04lx-ug01", 683, kUrgView_deg, 0.02, 5.6, Step(0.030, 0.03)},
-};
-
 }  // namespace
 
 std::span<const std::string_view> RangeErrorNames() {
@@ -63,10 +32,15 @@ std::span<const std::string_view> RangeErrorNames() {
 Result<void> Validate(const RangeError& e) {
   const auto metres = [](double value) { return value >= 0.0 && value <= 10.0; };
   const auto share = [](double value) { return value >= 0.0 && value <= 1.0; };
-  if (!metres(e.sigma_m) || !metres(e.bound_m) || !share(e.sigma_share) || !share(e.bound_share))
+  if (!metres(e.sigma_m) || !metres(e.sigma_far_m) || !metres(e.bound_m) || !share(e.sigma_share) ||
+      !share(e.bound_share))
     return Fail(StatusCode::kInvalidArgument, "laser: noise must be 0..10 m and 0..1 per metre");
   if (!(e.step_m >= 0.0 && e.step_m <= 1000.0))
     return Fail(StatusCode::kInvalidArgument, "laser: the error's step must be at 0..1000 m");
+  if (!(std::abs(e.bias_m) <= 10.0 && std::abs(e.bias_share) <= 0.5))
+    return Fail(StatusCode::kInvalidArgument, "laser: the bias must be within +-10 m and +-0.5 per metre");
+  if (!(e.quantum_m >= 0.0 && e.quantum_m <= 1.0))
+    return Fail(StatusCode::kInvalidArgument, "laser: the quantum must be 0..1 m");
   return {};
 }
 
@@ -79,13 +53,20 @@ double ErrorScale(const RangeError& error, double range_m) {
     case RangeErrorKind::kSigma:
       break;
   }
-  return error.sigma_m + error.sigma_share * range_m;
+  const bool far = error.sigma_far_m > 0.0 && range_m > error.step_m;
+  return (far ? error.sigma_far_m : error.sigma_m) + error.sigma_share * range_m;
 }
 
 double DrawError(const RangeError& error, double range_m, Random& random) {
   const double scale = ErrorScale(error, range_m);
   if (error.kind == RangeErrorKind::kSigma) return Normal(random, scale);
   return scale > 0.0 ? Uniform(random) * (2.0 * scale) - scale : 0.0;
+}
+
+double Measured(const RangeError& error, double range_m, Random& random) {
+  double measured = range_m + DrawError(error, range_m, random) + error.bias_m + error.bias_share * range_m;
+  if (error.quantum_m > 0.0) measured = std::round(measured / error.quantum_m) * error.quantum_m;
+  return std::max(0.0, measured);
 }
 
 Result<void> Validate(const LaserOptions& o) {
@@ -106,12 +87,13 @@ Result<void> Validate(const LaserOptions& o) {
   return Require(o.T_robot_laser.IsFinite(), "the mounting must be finite");
 }
 
-Scan MeasureScan(const Scene& scene, std::span<const Post> posts, const Pose2& T_map_robot, const Twist& twist,
-                 Stamp stamp, double tilt_rad, const LaserOptions& options, Random& random) {
+Scan MeasureScan(const Scene& scene, std::span<const Post> posts, std::span<const DriveLeg> drive, Stamp stamp,
+                 double tilt_rad, const LaserOptions& options, Random& random) {
   Scan scan;
   scan.stamp = stamp;
-  scan.angle_step_rad = StepOf(options);
-  scan.angle_first_rad = options.beams == 1 ? 0.0 : -options.field_of_view_rad / 2;
+  const double sense = options.clockwise ? -1.0 : 1.0;
+  scan.angle_step_rad = sense * StepOf(options);
+  scan.angle_first_rad = options.beams == 1 ? 0.0 : -sense * options.field_of_view_rad / 2;
   scan.range_min_m = options.range_min_m;
   scan.range_max_m = options.range_max_m;
   scan.beam_period_s = options.sweep_s / std::max(1, options.beams - 1);
@@ -120,10 +102,14 @@ Scan MeasureScan(const Scene& scene, std::span<const Post> posts, const Pose2& T
   scan.ranges_m.reserve(static_cast<std::size_t>(options.beams));
 
   const double cos_tilt = std::cos(tilt_rad), sin_tilt = std::sin(tilt_rad);
-  Pose2 T_map_laser = T_map_robot * options.T_robot_laser;
+  Pose2 T_map_laser = drive.front().T_map_robot * options.T_robot_laser;
+  std::size_t leg = 0;
   for (int i = 0; i < options.beams; ++i) {
     if (scan.beam_period_s > 0.0) {
-      const double t = i * scan.beam_period_s;
+      const double now_s = drive.front().from_s + i * scan.beam_period_s;
+      while (leg + 1 < drive.size() && drive[leg + 1].from_s <= now_s) ++leg;
+      const auto& [from_s, T_map_robot, twist] = drive[leg];
+      const double t = now_s - from_s;
       T_map_laser = T_map_robot * DriveArc(twist.speed_m_s * t, twist.turn_rad_s * t) * options.T_robot_laser;
     }
     const double bearing = scan.angle_first_rad + i * scan.angle_step_rad;
@@ -141,35 +127,12 @@ Scan MeasureScan(const Scene& scene, std::span<const Post> posts, const Pose2& T
     if (options.dropout_share > 0.0 && Uniform(random) < options.dropout_share) {
       range = 0.0;
     } else if (range < options.range_max_m) {
-      range = std::max(0.0, range + DrawError(options.error, range, random));
+      range = Measured(options.error, range, random);
     }
     if (range >= options.range_max_m) range = std::numeric_limits<double>::infinity();
     scan.ranges_m.push_back(static_cast<float>(range));
   }
   return scan;
-}
-
-std::vector<std::string> LaserModelNames() {
-  std::vector<std::string> names;
-  for (const Model& model : kModels) names.emplace_back(model.name);
-  return names;
-}
-
-Result<LaserOptions> WithModel(const LaserOptions& laser, const std::string& name) {
-  std::string known;
-  for (const Model& model : kModels) {
-    if (model.name == name) {
-      LaserOptions options = laser;
-      options.beams = model.beams;
-      options.field_of_view_rad = Radians(model.field_of_view_deg);
-      options.range_min_m = model.range_min_m;
-      options.range_max_m = model.range_max_m;
-      options.error = model.error;
-      return options;
-    }
-    known += (known.empty() ? "" : ", ") + std::string(model.name);
-  }
-  return Fail(StatusCode::kNotFound, "laser model '" + name + "' is none of: " + known);
 }
 
 }  // namespace cairn::sim

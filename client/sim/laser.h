@@ -38,12 +38,18 @@ struct RangeError {
   double bound_m = 0.01;
   double bound_share = 0.01;
   double step_m = 1.0;
+  double sigma_far_m = 0.0;  // kSigma: beyond step_m this instead of sigma_m; 0: sigma_m everywhere.
+  double bias_m = 0.0;       // Every range is wrong by bias_m + bias_share * range. Makers state it as "accuracy".
+  double bias_share = 0.0;
+  double quantum_m = 0.0;  // Ranges are multiples of this; 0: any range.
 };
 [[nodiscard]] Result<void> Validate(const RangeError& error);
 
-// The half-width of what a draw may be, or its standard deviation for kSigma.
+// The half-width of what a draw may be, or its standard deviation for kSigma; without bias and quantum.
 [[nodiscard]] double ErrorScale(const RangeError& error, double range_m);
 [[nodiscard]] double DrawError(const RangeError& error, double range_m, Random& random);
+// What the scanner says of a true range: bias, random error and quantum; not below 0.
+[[nodiscard]] double Measured(const RangeError& error, double range_m, Random& random);
 
 struct LaserOptions {
   int beams = 360;                            // 1..8192.
@@ -53,30 +59,36 @@ struct LaserOptions {
   RangeError error;
   double dropout_share = 0.002;  // Share of all beams, 0..1.
   double sweep_s = 0.0;          // From the first beam to the last; 0: all at once.
+  bool clockwise = false;        // The lidar turns clockwise, seen from above: beams run from +half the view down.
   Pose2 T_robot_laser{0.12, 0.0, 0.0};
   double height_m = 0.4;  // Height of the tilt axis above the floor; without effect in a flat world.
 };
 [[nodiscard]] Result<void> Validate(const LaserOptions& options);
 
-// How a robot moves during a sweep.
 struct Twist {
   double speed_m_s = 0.0;
   double turn_rad_s = 0.0;
 };
 
-// `T_map_robot` at the first beam. `posts` are obstacles that are not part of the scene. |tilt| < 90 deg.
-// The scan has no sequence number yet (0); options must be valid.
-[[nodiscard]] Scan MeasureScan(const Scene& scene, std::span<const Post> posts, const Pose2& T_map_robot,
-                               const Twist& twist, Stamp stamp, double tilt_rad, const LaserOptions& options,
-                               Random& random);
+// A part of a robot's drive with constant velocities. It lasts until the next part begins.
+struct DriveLeg {
+  double from_s = 0.0;
+  Pose2 T_map_robot;  // At from_s.
+  Twist twist;
+};
 
-// The scanners of the thesis by name: field of view, resolution, range and error. Mounting, dropouts and sweep are
-// those of LaserOptions' defaults. Source: thesis C 4.3.2 (the simulator's own: +-90 deg in steps of 1 deg), 4.3.3
-// (errors); makers' data sheets for field of view, resolution and range: SICK LMS200/291, Hokuyo URG-04LX and
-// URG-04LX-UG01.
-[[nodiscard]] std::vector<std::string> LaserModelNames();
+// Every beam is measured from where the robot is at the beam's time: `drive` has at least one leg, in the order of
+// time; the first one begins with the first beam. `posts` are obstacles that are not part of the scene; they stand
+// still during the scan. |tilt| < 90 deg. The scan has no sequence number yet (0); options must be valid.
+[[nodiscard]] Scan MeasureScan(const Scene& scene, std::span<const Post> posts, std::span<const DriveLeg> drive,
+                               Stamp stamp, double tilt_rad, const LaserOptions& options, Random& random);
 
-// `laser` with the model's field of view, resolution, range and error.
-[[nodiscard]] Result<LaserOptions> WithModel(const LaserOptions& laser, const std::string& name);
+// The same for velocities that stay the same throughout the scan; `T_map_robot` at the first beam.
+[[nodiscard]] inline Scan MeasureScan(const Scene& scene, std::span<const Post> posts, const Pose2& T_map_robot,
+                                      const Twist& twist, Stamp stamp, double tilt_rad, const LaserOptions& options,
+                                      Random& random) {
+  const DriveLeg leg{0.0, T_map_robot, twist};
+  return MeasureScan(scene, posts, std::span(&leg, 1), stamp, tilt_rad, options, random);
+}
 
 }  // namespace cairn::sim

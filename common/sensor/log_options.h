@@ -5,6 +5,7 @@
 
 #include "common/options/number_text.h"
 #include "common/sensor/log_reader.h"
+#include "common/service/start_pose.h"
 
 namespace cairn {
 
@@ -36,6 +37,18 @@ void AddLogOptions(Command& command, LogReaderOptions& options) {
       ->check(at_least(0.0, false))
       ->type_name("SECONDS")
       ->capture_default_str();
+  command
+      .template add_option_function<std::string>(
+          "--laser-at",
+          [&options](const std::string& text) {
+            if (const auto pose = ParseStart(text)) options.T_robot_laser = *pose;
+          },
+          "Where the laser is mounted, as seen from the robot (m; rad, or 45deg); without this as the log says")
+      ->check([](const std::string& text) {
+        const auto pose = ParseStart(text);
+        return pose ? std::string() : pose.error().message;
+      })
+      ->type_name("X,Y,THETA");
   const auto timing = [&](const std::string& name, const std::string& help, const std::string& type) {
     command
         .template add_option_function<std::string>(

@@ -170,7 +170,7 @@ class LogEmitter {
     scan.angle_step_rad = laser.angle_step_rad;
     scan.range_max_m = RangeMax(laser, facts);
     scan.tilt_rad = laser.tilt_rad;
-    scan.T_robot_laser = facts.T_robot_laser;
+    scan.T_robot_laser = options_.T_robot_laser.value_or(facts.T_robot_laser);
     scan.ranges_m = std::move(laser.ranges_m);
     if (const auto timed = PutInOrderOfTime(Merge(options_.timing, logged_timing_), scan); !timed) {
       Complain(line, timed.error().message);

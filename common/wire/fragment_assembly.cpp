@@ -9,7 +9,8 @@ using Bytes = std::span<const std::uint8_t>;
 
 constexpr std::size_t kSampleBytes = 512;  // About what a sample takes beside its pieces,
 constexpr std::size_t kPieceBytes = 64;    // and a piece beside its payload.
-constexpr std::size_t kFragmentQos = 32;   // Where the inline QoS of DATA_FRAG begins.
+constexpr std::uint8_t kLittleEndian = 1;
+constexpr std::size_t kFragmentQos = 32;  // Where the inline QoS of DATA_FRAG begins.
 
 // The fields of DATA_FRAG behind its sequence number.
 std::uint32_t FirstFragment(const Submessage& m) {
@@ -49,6 +50,25 @@ void AppendDataHead(std::vector<std::uint8_t>& to, const Submessage& m) {
   Append(to, m.body.bytes.subspan(4, 16));
   const std::size_t qos = 4 + static_cast<std::size_t>(m.body.U16(2));
   Append(to, m.body.bytes.subspan(qos, PayloadStart(m, kFragmentQos) - qos));
+}
+
+void Append32(std::vector<std::uint8_t>& to, std::uint32_t value) {
+  for (int shift = 0; shift < 32; shift += 8) to.push_back(static_cast<std::uint8_t>(value >> shift));
+}
+
+// INFO_DST. All zero: what follows is for everybody.
+void AppendDestination(std::vector<std::uint8_t>& to, const SequenceGate::GuidPrefix& prefix) {
+  to.insert(to.end(), {kInfoDestination, kLittleEndian, static_cast<std::uint8_t>(prefix.size()), 0});
+  Append(to, prefix);
+}
+
+// The fields of ACKNACK behind its endpoints: the lowest number that it may ask for, and a bit for each one from there.
+bool AsksFor(const Submessage& ack_nack, std::int64_t sequence) {
+  const std::int64_t base = ack_nack.body.Sequence(8);
+  const std::uint32_t bits = ack_nack.body.U32(16);
+  if (sequence < base || sequence - base >= bits) return false;
+  const auto bit = static_cast<std::uint32_t>(sequence - base);
+  return (ack_nack.body.U32(20 + 4 * std::size_t{bit / 32}) >> (31 - bit % 32) & 1) != 0;
 }
 
 bool IsAboutWhatFollows(const Submessage& m) {
@@ -96,6 +116,56 @@ std::vector<FragmentAssembly::Datagram> FragmentAssembly::Take(Bytes datagram) {
   }));
   if (has_others) deliver.push_back(std::move(others));
   return deliver;
+}
+
+FragmentAssembly::Datagram FragmentAssembly::WithQuestions(Bytes datagram) {
+  if (samples_.empty()) return {};
+  Datagram to_send;
+  static_cast<void>(Walk(datagram, [&](const Submessage& m) {
+    if (m.id == kAckNack) AppendQuestions(to_send, m);
+    return DatagramFault::kNone;
+  }));
+  if (to_send.empty()) return {};
+  // In front, because the last submessage may be one that reaches to the end of the datagram.
+  const Bytes header = datagram.first(kRtpsHeaderBytes);
+  to_send.insert(to_send.begin(), header.begin(), header.end());
+  AppendDestination(to_send, SequenceGate::GuidPrefix{});
+  Append(to_send, datagram.subspan(kRtpsHeaderBytes));
+  return to_send;
+}
+
+void FragmentAssembly::AppendQuestions(Datagram& to, const Submessage& ack_nack) {
+  constexpr int kMostSamples = 16;          // In one datagram. The next ACKNACK asks for others.
+  constexpr std::uint32_t kMostBits = 256;  // Of a set of fragments (9.4.2.6).
+  const Bytes reader = ack_nack.body.bytes.subspan(0, 4), writer = ack_nack.body.bytes.subspan(4, 4);
+  Key from{};
+  std::ranges::copy(ack_nack.to, from.first.begin());
+  std::ranges::copy(writer, from.first.begin() + 12);
+  const auto is_of_writer = [&from](const Key& key) {
+    return std::equal(from.first.begin(), from.first.begin() + 16, key.first.begin());
+  };
+  int asked = 0;
+  for (auto at = samples_.lower_bound(from); at != samples_.end() && is_of_writer(at->first); ++at) {
+    if (!AsksFor(ack_nack, at->first.second)) continue;
+    if (++asked > kMostSamples) return;
+    const std::vector<bool>& arrived = at->second.arrived;
+    const auto first = static_cast<std::uint32_t>(std::ranges::find(arrived, false) - arrived.begin());
+    const std::uint32_t bits = std::min(kMostBits, static_cast<std::uint32_t>(arrived.size()) - first);
+    std::array<std::uint32_t, kMostBits / 32> missing{};
+    for (std::uint32_t bit = 0; bit < bits; ++bit)
+      if (!arrived[first + bit]) missing[bit / 32] |= std::uint32_t{1} << (31 - bit % 32);
+    const std::size_t words = (bits + 31) / 32;
+    AppendDestination(to, ack_nack.to);
+    to.insert(to.end(), {kNackFrag, kLittleEndian, static_cast<std::uint8_t>(28 + 4 * words), 0});
+    Append(to, reader);
+    Append(to, writer);
+    Append32(to, static_cast<std::uint32_t>(at->first.second >> 32));
+    Append32(to, static_cast<std::uint32_t>(at->first.second));
+    Append32(to, first + 1);
+    Append32(to, bits);
+    for (std::size_t word = 0; word < words; ++word) Append32(to, missing[word]);
+    Append32(to, ++questions_);
+  }
 }
 
 FragmentAssembly::Datagram FragmentAssembly::Add(const Submessage& fragment, const Datagram& sender) {

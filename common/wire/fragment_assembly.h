@@ -2,9 +2,10 @@
 // DATA. Fast DDS 2.9 does not handle fragments safely. It keeps a pointer to the first ones of a sample when a gap then
 // says that there is no such sample: readers deliver leftovers, or abort. It writes beyond a sample whose last fragment
 // has less than four bytes (tests/integration/wire/hostile_datagram_test.cpp).
-// A reader that has received nothing of a sample asks for all of it again, so a lost fragment costs all others.
-// The memory is bounded: samples that were begun first are forgotten first. Not thread-safe.
-// Source: OMG DDSI-RTPS 2.3, sections 8.3.7.3 and 9.4.5.4; Fast DDS 2.9.1: StatefulReader.cpp, CacheChange.h.
+// A reader that has received nothing of a sample asks for all of it again (ACKNACK), so a lost fragment costs all
+// others. To some writers that is not enough: Cyclone DDS sends the first fragment again, and waits to be asked for the
+// others. The memory is bounded: samples that were begun first are forgotten first. Not thread-safe. Source: OMG
+// DDSI-RTPS 2.3, sections 8.3.7.3 and 9.4.5.4; Fast DDS 2.9.1: StatefulReader.cpp, CacheChange.h.
 #pragma once
 
 #include <array>
@@ -31,6 +32,9 @@ class FragmentAssembly {
   // What is to be delivered instead of the datagram: each sample that is whole now, and then the other submessages.
   // REQUIRES: InspectDatagram finds no fault in it.
   [[nodiscard]] std::vector<Datagram> Take(std::span<const std::uint8_t> datagram);
+  // What is to be sent instead of the participant's own datagram: if it asks for samples of which some fragments are
+  // here, the same with questions for the other fragments (NACK_FRAG). Empty if there is nothing to ask for.
+  [[nodiscard]] Datagram WithQuestions(std::span<const std::uint8_t> datagram);
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
 
  private:
@@ -57,10 +61,13 @@ class FragmentAssembly {
   [[nodiscard]] Datagram Add(const Submessage& fragment, const Datagram& sender);
   [[nodiscard]] Samples::iterator SampleOf(const Submessage& fragment);
   void Forget(Samples::iterator sample);
+  // Appends the questions for what is missing of the writer's samples that the ACKNACK asks for.
+  void AppendQuestions(Datagram& to, const Submessage& ack_nack);
 
   Samples samples_;
   std::map<std::uint64_t, Key> begun_;  // The same samples, the oldest first.
   std::uint64_t counter_ = 0;
+  std::uint32_t questions_ = 0;
   std::size_t bytes_ = 0;
 };
 

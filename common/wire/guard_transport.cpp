@@ -33,23 +33,29 @@ class GuardTransport : public transport::ChainingTransport {
   bool send(rtps::SenderResource* udp, const rtps::octet* bytes, std::uint32_t size, transport::LocatorsIterator* begin,
             transport::LocatorsIterator* end, const std::chrono::steady_clock::time_point& timeout) override {
     NoteSent({bytes, size}, gate_);
-    return udp->send(bytes, size, begin, end, timeout);
+    const FragmentAssembly::Datagram asking = WithQuestions({bytes, size});
+    if (asking.empty()) return udp->send(bytes, size, begin, end, timeout);
+    return udp->send(asking.data(), static_cast<std::uint32_t>(asking.size()), begin, end, timeout);
   }
 
   void receive(transport::TransportReceiverInterface* next, const rtps::octet* bytes, std::uint32_t size,
                const rtps::Locator_t& local, const rtps::Locator_t& remote) override {
     if (!IsSound({bytes, size})) return;
-    if (!HasFragments({bytes, size})) return next->OnDataReceived(bytes, size, local, remote);
+    const auto deliver = [&](std::span<const rtps::octet> datagram) {
+      const std::vector<rtps::octet> counted = WithOwnCounts(datagram, gate_);
+      if (!counted.empty()) datagram = counted;
+      next->OnDataReceived(datagram.data(), static_cast<std::uint32_t>(datagram.size()), local, remote);
+    };
+    if (!HasFragments({bytes, size})) return deliver({bytes, size});
     if (descriptor_.secure) {
       // Each fragment is encrypted by itself, and a reader takes none of a stranger. What built-in endpoints receive
       // could be inspected only in part.
       if (HasBuiltInFragments({bytes, size})) return Refuse(DatagramFault::kFragment);
-      return next->OnDataReceived(bytes, size, local, remote);
+      return deliver({bytes, size});
     }
     for (const FragmentAssembly::Datagram& datagram : Assemble({bytes, size})) {
       // The beginning of a sample could be seen only in part before.
-      if (IsSound(datagram))
-        next->OnDataReceived(datagram.data(), static_cast<std::uint32_t>(datagram.size()), local, remote);
+      if (IsSound(datagram)) deliver(datagram);
     }
   }
 
@@ -66,6 +72,10 @@ class GuardTransport : public transport::ChainingTransport {
   std::vector<FragmentAssembly::Datagram> Assemble(std::span<const rtps::octet> datagram) {
     const MutexLock lock(mutex_);
     return assembly_.Take(datagram);
+  }
+  FragmentAssembly::Datagram WithQuestions(std::span<const rtps::octet> datagram) {
+    const MutexLock lock(mutex_);
+    return assembly_.WithQuestions(datagram);
   }
 
   GuardDescriptor descriptor_;

@@ -127,13 +127,12 @@ DatagramFault InspectDataFrag(const Submessage& m, const Inspection& with) {
 }
 
 DatagramFault InspectHeartbeat(const Submessage& m, const Inspection& with) {
-  constexpr SequenceGate::EntityId kCounts = 1;
   if (m.size() < 28) return DatagramFault::kFraming;
   const std::int64_t first = m.body.Sequence(8);
   const std::int64_t last = m.body.Sequence(16);
   // In the heartbeat of an empty history first = last + 1.
-  if (first <= 0 || last < first - 1 || !with.Accepts(m.Numbers(4), last)) return DatagramFault::kSequence;
-  return with.Accepts(m.Numbers(4, kCounts), m.body.U32(24)) ? DatagramFault::kNone : DatagramFault::kCount;
+  const bool plausible = first > 0 && last >= first - 1 && with.Accepts(m.Numbers(4), last);
+  return plausible ? DatagramFault::kNone : DatagramFault::kSequence;
 }
 
 DatagramFault InspectGap(const Submessage& m, const Inspection& with) {
@@ -154,23 +153,17 @@ DatagramFault InspectAck(const Submessage& m, const Inspection& with) {
   if (!SetFits(m, 16, 4)) return DatagramFault::kSequenceSet;
   const auto sent = with.gate.LastSent(m.to, m.Entity(4));
   if (!sent) return DatagramFault::kNone;  // For another participant.
-  if (base > *sent + 1 || HighestOf(m, 8) > *sent) return DatagramFault::kUnsent;
-  const std::size_t count = 20 + (m.body.U32(16) + 31) / 32 * 4;
-  return with.Accepts(m.Numbers(0, m.Entity(4)), m.body.U32(count)) ? DatagramFault::kNone : DatagramFault::kCount;
+  return base > *sent + 1 || HighestOf(m, 8) > *sent ? DatagramFault::kUnsent : DatagramFault::kNone;
 }
 
 DatagramFault InspectNackFrag(const Submessage& m, const Inspection& with) {
-  constexpr SequenceGate::EntityId kFragments = 0xffffffff;
   if (m.size() < 28) return DatagramFault::kFraming;
   const std::int64_t sequence = m.body.Sequence(8);
   if (sequence <= 0) return DatagramFault::kSequence;
   if (!SetFits(m, 20, 4)) return DatagramFault::kSequenceSet;
   const auto sent = with.gate.LastSent(m.to, m.Entity(4));
   if (!sent) return DatagramFault::kNone;
-  if (sequence > *sent) return DatagramFault::kUnsent;
-  const std::size_t count = 24 + (m.body.U32(20) + 31) / 32 * 4;
-  return with.Accepts(m.Numbers(0, m.Entity(4) ^ kFragments), m.body.U32(count)) ? DatagramFault::kNone
-                                                                                 : DatagramFault::kCount;
+  return sequence > *sent ? DatagramFault::kUnsent : DatagramFault::kNone;
 }
 
 DatagramFault InspectSubmessage(const Submessage& m, const Inspection& with) {
@@ -206,7 +199,7 @@ DatagramFault InspectSubmessage(const Submessage& m, const Inspection& with) {
 
 std::string_view DatagramFaultName(DatagramFault fault) {
   static constexpr std::array<std::string_view, kDatagramFaults> kNames = {
-      "none",   "not_rtps",     "framing",  "statistics",     "sequence", "count",
+      "none",   "not_rtps",     "framing",  "statistics",     "sequence",
       "unsent", "sequence_set", "fragment", "parameter_list", "security"};
   return kNames[static_cast<std::size_t>(fault)];
 }
@@ -214,6 +207,36 @@ std::string_view DatagramFaultName(DatagramFault fault) {
 DatagramFault InspectDatagram(Bytes datagram, SequenceGate& gate, SequenceGate::Clock::time_point now) {
   const Inspection with{gate, now};
   return Walk(datagram, [&](const Submessage& submessage) { return InspectSubmessage(submessage, with); });
+}
+
+std::vector<std::uint8_t> WithOwnCounts(std::span<const std::uint8_t> datagram, SequenceGate& gate) {
+  constexpr std::uint8_t kSigned = 0x33;  // SRTPS_PREFIX (DDS Security 1.1, 7.3.6.6).
+  // A writer counts its heartbeats; a reader its acknowledgements to each writer, and its requests for fragments.
+  constexpr SequenceGate::EntityId kHeartbeats = 1, kFragments = 0xffffffff;
+  struct Count {
+    std::size_t at;
+    bool little;
+    SequenceGate::Key whose;
+  };
+  std::vector<Count> counts;
+  bool is_signed = false;
+  static_cast<void>(Walk(datagram, [&](const Submessage& m) {
+    const auto begin = static_cast<std::size_t>(m.body.bytes.data() - datagram.data());
+    const auto behind_set = [&](std::size_t set) { return begin + set + 4 + (m.body.U32(set) + 31) / 32 * 4; };
+    is_signed = is_signed || m.id == kSigned;
+    if (m.id == kHeartbeat) counts.push_back({begin + 24, m.body.little, m.Numbers(4, kHeartbeats)});
+    if (m.id == kAckNack) counts.push_back({behind_set(16), m.body.little, m.Numbers(0, m.Entity(4))});
+    if (m.id == kNackFrag) counts.push_back({behind_set(20), m.body.little, m.Numbers(0, m.Entity(4) ^ kFragments)});
+    return DatagramFault::kNone;
+  }));
+  if (counts.empty() || is_signed) return {};
+  std::vector<std::uint8_t> changed(datagram.begin(), datagram.end());
+  for (const Count& count : counts) {
+    const std::uint32_t number = gate.NextCount(count.whose);
+    for (std::size_t byte = 0; byte < 4; ++byte)
+      changed[count.at + (count.little ? byte : 3 - byte)] = static_cast<std::uint8_t>(number >> 8 * byte);
+  }
+  return changed;
 }
 
 void NoteSent(Bytes datagram, SequenceGate& gate) {

@@ -39,6 +39,14 @@ void SequenceGate::MakeRoom() {
   if (peers_.size() >= kMaxPeers) peers_.clear();
 }
 
+std::uint32_t SequenceGate::NextCount(const Key& whose) {
+  const MutexLock lock(mutex_);
+  if (counts_.size() >= kMaxPeers && !counts_.contains(whose)) counts_.clear();
+  std::uint32_t& count = counts_.try_emplace(whose, highest_count_).first->second;
+  highest_count_ = std::max(highest_count_, ++count);
+  return count;
+}
+
 void SequenceGate::Sent(const GuidPrefix& own, EntityId writer, std::int64_t number) {
   const MutexLock lock(mutex_);
   own_ = own;

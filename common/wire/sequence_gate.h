@@ -1,7 +1,7 @@
 // Decides whether the numbers in RTPS submessages are plausible: a forged one that is far ahead makes a reader or a
 // writer ignore everything up to it, so that nothing of the stream arrives until its numbers get there.
 //
-// What a peer numbers (samples, heartbeats, acknowledgements) may grow by one from datagram to datagram without limit.
+// The number of a peer's samples may grow by one from datagram to datagram without limit.
 // It may skip numbers, because datagrams are lost and the first contact is late, but not more than kStep at once and
 // kRate a second: no writer of Cairn makes so many samples, not even while the network is interrupted for hours. The
 // first number of a peer may be any. What a peer acknowledges is compared with what the participant itself has sent.
@@ -38,6 +38,10 @@ class SequenceGate {
   // Accepts and stores a number of a peer, or refuses it. Lower numbers than before are always accepted.
   [[nodiscard]] bool Accept(const Key& whose, std::int64_t number, Clock::time_point now);
 
+  // The next number of what a peer sends and the participant wants counted. It is higher than any before, also if the
+  // peer was forgotten meanwhile because there are too many.
+  [[nodiscard]] std::uint32_t NextCount(const Key& whose);
+
   // The participant's own: its GUID prefix, and the highest number that each of its writers has sent.
   void Sent(const GuidPrefix& own, EntityId writer, std::int64_t number);
   // The highest number sent by one of its writers, 0 where it has sent nothing; nothing where `to` (all zero:
@@ -58,6 +62,8 @@ class SequenceGate {
 
   mutable Mutex mutex_;
   std::unordered_map<Key, Peer, Hash> peers_ CAIRN_GUARDED_BY(mutex_);
+  std::unordered_map<Key, std::uint32_t, Hash> counts_ CAIRN_GUARDED_BY(mutex_);
+  std::uint32_t highest_count_ CAIRN_GUARDED_BY(mutex_) = 0;
   std::optional<GuidPrefix> own_ CAIRN_GUARDED_BY(mutex_);
   std::unordered_map<EntityId, std::int64_t> sent_ CAIRN_GUARDED_BY(mutex_);
 };

@@ -1,4 +1,4 @@
-# Run by `cmake --install`. Installs the units and the configuration for the prefix of this call (--prefix,
+# Run by `cmake --install`. Installs the server's unit and its configuration for the prefix of this call (--prefix,
 # DESTDIR).
 set(bindir ${CMAKE_INSTALL_PREFIX}/bin)
 set(docdir ${CMAKE_INSTALL_PREFIX}/share/doc/cairn)
@@ -17,9 +17,7 @@ file(INSTALL ${CMAKE_CURRENT_LIST_DIR}/../cairnd.yaml DESTINATION ${sysconfdir}/
 file(CHMOD $ENV{DESTDIR}${sysconfdir}/cairn PERMISSIONS
   OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
 
-foreach(name cairnd cairn-web)
-  set(unit $ENV{DESTDIR}${CMAKE_INSTALL_PREFIX}/lib/systemd/system/${name}.service)
-  message(STATUS "Installing: ${unit}")
-  configure_file(${CMAKE_CURRENT_LIST_DIR}/${name}.service.in ${unit} @ONLY)
-  file(CHMOD ${unit} PERMISSIONS OWNER_READ OWNER_WRITE GROUP_READ WORLD_READ)
-endforeach()
+set(unit $ENV{DESTDIR}${CMAKE_INSTALL_PREFIX}/lib/systemd/system/cairnd.service)
+message(STATUS "Installing: ${unit}")
+configure_file(${CMAKE_CURRENT_LIST_DIR}/cairnd.service.in ${unit} @ONLY)
+file(CHMOD ${unit} PERMISSIONS OWNER_READ OWNER_WRITE GROUP_READ WORLD_READ)

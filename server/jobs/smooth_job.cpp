@@ -40,6 +40,7 @@ std::optional<std::vector<slam::SmoothedSession>> SmoothTogether(const std::vect
                                                                  const slam::SiteOptions& site,
                                                                  const JobControl& control) {
   std::vector<slam::SiteSession> sessions;
+  sessions.reserve(material.size());
   for (const SessionMaterial& session : material) sessions.push_back({session.snapshot, session.start_known});
   return slam::SmoothSessions(sessions, site, [&control](double share) {
     control.Progress(kShareOfJoining * share);

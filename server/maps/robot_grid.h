@@ -56,6 +56,9 @@ class GridOwner {
  public:
   virtual ~GridOwner() = default;
   virtual void Adopt(Correction&& correction) = 0;
+  // The map is in this epoch now. A version that was made from older data has no part for this session: its grid and
+  // its path stay as they are.
+  virtual void SetMapEpoch(std::uint32_t epoch) = 0;
 };
 
 }  // namespace cairn::server

@@ -136,6 +136,8 @@ void Site::Join(NameId robot, SessionId session, std::weak_ptr<GridOwner> owner)
     std::erase_if(site.members_, [](const auto& member) { return member.second.owner.expired(); });
     site.info_changed_ = true;
     site.StoreSite();
+    // The map may have been switched since the session was made, or since the server that made it was killed.
+    if (const auto known = owner.lock()) known->SetMapEpoch(site.epoch_);
   });
 }
 
@@ -271,6 +273,10 @@ void Site::CommitIfComplete() {
   StoreVersion(before);
   RenderAll();
   *complete.completed = true;
+  for (const auto& [robot, member] : members_) {
+    if (complete.staged.contains(member.session)) continue;
+    if (const auto owner = member.owner.lock()) owner->SetMapEpoch(epoch_);
+  }
   Send();
   complete.done(complete.version);
 }

@@ -30,12 +30,17 @@ struct SnapshotWanted {
 
 // The end of a session. Scans that arrived before it are finished first. `final` is true if the session is over, and
 // false if the server stops and the session could go on later.
+// The epoch of the map has changed, and what this session draws has not.
+struct EpochChange {
+  std::uint32_t epoch = 0;
+};
+
 struct Finish {
   bool final = true;
   Status reason = {};
   std::function<void()> done;
 };
 
-using RobotEvent = std::variant<ScanArrival, OdometryArrival, Correction, SnapshotWanted, Finish>;
+using RobotEvent = std::variant<ScanArrival, OdometryArrival, Correction, EpochChange, SnapshotWanted, Finish>;
 
 }  // namespace cairn::server

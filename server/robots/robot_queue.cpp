@@ -41,6 +41,12 @@ std::optional<Correction> RobotQueue::Push(Correction correction) {
   return superseded;
 }
 
+void RobotQueue::Push(EpochChange change) {
+  const MutexLock lock(mutex_);
+  if (!control_.empty() && std::holds_alternative<EpochChange>(control_.back().event)) control_.pop_back();
+  control_.push_back({next_++, change});
+}
+
 bool RobotQueue::Push(SnapshotWanted wanted) {
   const MutexLock lock(mutex_);
   if (control_.size() >= kMaxControl) return false;

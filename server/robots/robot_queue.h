@@ -4,6 +4,7 @@
 //  - scans: the oldest waiting one gives way and is returned, for the ledger (queue_full);
 //  - odometry: the two oldest become one; poses in `odom` are absolute, so leaving out the older keeps all motion;
 //  - corrections: the newest wins; one displaced is returned and never adopted;
+//  - changes of the epoch: the newest stays, where two follow each other;
 //  - snapshots: refused while kMaxControl control events wait;
 //  - the end of the session: never refused. It is asked for once, and once more when the server stops.
 // Thread rule: any thread.
@@ -30,6 +31,7 @@ class RobotQueue {
   std::optional<OdometryArrival> Push(OdometryArrival odometry);
   // The correction that was superseded, if any.
   std::optional<Correction> Push(Correction correction);
+  void Push(EpochChange change);
   // False where too many wait.
   bool Push(SnapshotWanted wanted);
   void Push(Finish finish);

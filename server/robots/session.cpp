@@ -79,6 +79,11 @@ void Session::Adopt(Correction&& correction) {
   Schedule();
 }
 
+void Session::SetMapEpoch(std::uint32_t epoch) {
+  queue_.Push(EpochChange{epoch});
+  Schedule();
+}
+
 bool Session::Post(SnapshotWanted&& wanted) {
   if (!queue_.Push(std::move(wanted))) return false;
   Schedule();

@@ -36,6 +36,7 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   void Take(OdometryArrival&& arrival);
   // The newest correction wins; one still waiting is dropped without a call to its `done`.
   void Adopt(Correction&& correction) override;
+  void SetMapEpoch(std::uint32_t epoch) override;
   // Asks for a snapshot; false where too many wait.
   bool Post(SnapshotWanted&& wanted);
 

@@ -149,6 +149,8 @@ void SessionEstimator::Replay(JournalEntry&& entry, const Switched& switched) {
   } else if (const auto* const correction = std::get_if<CorrectionTaken>(&entry)) {
     // A switch that was not completed before the server ended has no effect.
     if (switched(correction->epoch, correction->generation)) AdoptGrid(correction->epoch, FromStored(correction->grid));
+  } else if (const auto* const epoch = std::get_if<EpochChanged>(&entry)) {
+    SetEpoch(epoch->epoch);
   } else if (const auto* const finished = std::get_if<SessionFinished>(&entry)) {
     Finish finish;
     finish.final = finished->final;
@@ -275,6 +277,17 @@ void SessionEstimator::On(Correction&& correction) {
   correction.done(std::move(adopted));
 }
 
+void SessionEstimator::On(EpochChange&& change) {
+  if (change.epoch == epoch_) return;
+  if (!ended_) Store(EpochChanged{change.epoch});
+  SetEpoch(change.epoch);
+}
+
+void SessionEstimator::SetEpoch(std::uint32_t epoch) {
+  epoch_ = epoch;
+  record_.SetEpoch(epoch_);
+}
+
 // The grid before a correction, and the path to go back to with it.
 RobotGrid SessionEstimator::DisplacedGrid() {
   RobotGrid displaced{PublishedChunks(), pipeline_.mapper().keyframe_count()};
@@ -287,8 +300,7 @@ void SessionEstimator::AdoptGrid(std::uint32_t epoch, const RobotGrid& grid) {
   slam::Mapper& mapper = pipeline_.mapper();
   const auto path = grid.path != nullptr ? std::span<const Pose2>(*grid.path) : std::span<const Pose2>();
   mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), grid.chunks), grid.keyframes, path);
-  epoch_ = epoch;
-  record_.SetEpoch(epoch_);
+  SetEpoch(epoch);
 }
 
 void SessionEstimator::On(SnapshotWanted&& wanted) {

@@ -78,6 +78,7 @@ class SessionEstimator {
   void On(ScanArrival&& arrival);
   void On(OdometryArrival&& arrival);
   void On(Correction&& correction);
+  void On(EpochChange&& change);
   void On(SnapshotWanted&& wanted);
   void On(Finish&& finish);
   void Used(const Scan& scan, const slam::ScanOutcome& outcome);
@@ -91,6 +92,7 @@ class SessionEstimator {
   void ReplayOdometry(const OdometryTaken& odometry);
   RobotGrid DisplacedGrid();
   void AdoptGrid(std::uint32_t epoch, const RobotGrid& grid);
+  void SetEpoch(std::uint32_t epoch);
 
   SessionRecord& record_;
   const SessionOutputs outputs_;

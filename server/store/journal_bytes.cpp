@@ -49,6 +49,10 @@ void FillEntry(record::Entry& to, const CorrectionTaken& from) {
   Fill(*to.mutable_correction()->mutable_grid(), from.grid);
 }
 
+void FillEntry(record::Entry& to, const EpochChanged& from) {
+  to.mutable_epoch()->set_epoch(from.epoch);
+}
+
 void FillEntry(record::Entry& to, const SessionFinished& from) {
   to.mutable_finish()->set_final(from.final);
   Fill(*to.mutable_finish()->mutable_status(), from.status);
@@ -103,6 +107,8 @@ Result<JournalEntry> EntryOf(const record::Entry& from) {
                           {from.owner().sensors().begin(), from.owner().sensors().end()}};
     case record::Entry::kCorrection:
       return CorrectionOf(from.correction());
+    case record::Entry::kEpoch:
+      return EpochChanged{from.epoch().epoch()};
     case record::Entry::kFinish:
       return SessionFinished{from.finish().final(), ValueOf(from.finish().status())};
     case record::Entry::CONTENT_NOT_SET:

@@ -62,12 +62,16 @@ struct CorrectionTaken {
   std::uint64_t generation = 0;
   StoredGrid grid;
 };
+// The epoch of the map changed, and nothing of this session.
+struct EpochChanged {
+  std::uint32_t epoch = 0;
+};
 struct SessionFinished {
   bool final = true;
   Status status;
 };
 using JournalEntry =
-    std::variant<ScanTaken, ScanRefused, OdometryTaken, OwnerChanged, CorrectionTaken, SessionFinished>;
+    std::variant<ScanTaken, ScanRefused, OdometryTaken, OwnerChanged, CorrectionTaken, EpochChanged, SessionFinished>;
 
 struct StoredSession {
   std::uint64_t id = 0;

@@ -78,6 +78,10 @@ class Merge {
         next = batch->first + batch->entries.size();
         bool changed = false;
         for (JournalEntry& entry : batch->entries) {
+          if (auto* const epoch = std::get_if<EpochChanged>(&entry)) {
+            changed = true;
+            epoch->epoch += shift;
+          }
           auto* const correction = std::get_if<CorrectionTaken>(&entry);
           if (correction == nullptr) continue;
           changed = true;

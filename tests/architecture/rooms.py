@@ -32,7 +32,7 @@ SLAM_ROOMS = {
     "site": ["recovery", "loops", "smoothing", "graph", "matching", "trail", "motion", "scan"],  # Several sessions as one graph.
 
     "motion_models": ["motion", "random"],  # Learnt or sampled models of a step.
-    "calibration": ["motion_models", "random"],  # How such models and wheels are learnt.
+    "calibration": ["matching", "motion_models", "random", "scan"],  # How models, wheels and lidars are learnt.
     "matchers": ["matching", "features", "scan"],
     "landmark_variants": ["landmarks"],  # Other models of a landmark.
     "ekf": ["filters", "landmark_variants", "landmarks", "motion"],

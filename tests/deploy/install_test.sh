@@ -11,7 +11,10 @@ check() { # what, command
   shift
   if "$@"; then echo "ok: $what"; else echo "FAILED: $what"; status=1; fi
 }
-install() { DESTDIR=$world cmake --install "$build" --component service --prefix "$1" >/dev/null; }
+install() {
+  local component
+  for component in server web; do DESTDIR=$world cmake --install "$build" --component "$component" --prefix "$1" >/dev/null; done
+}
 
 # A unit configured for one prefix and installed under another named programs that were not there.
 for pair in /usr:/etc /usr/local:/usr/local/etc; do

@@ -6,7 +6,7 @@ set -euo pipefail
 if ! command -v systemd-analyze >/dev/null; then echo "SKIPPED: no systemd-analyze on this machine"; exit 77; fi
 world=$(mktemp -d)
 trap 'rm -rf "$world"' EXIT
-cmake --install "$1" --component service --prefix "$world/installed" >/dev/null
+for component in server web; do cmake --install "$1" --component "$component" --prefix "$world/installed" >/dev/null; done
 units=$world/installed/lib/systemd/system
 
 status=0

@@ -124,6 +124,11 @@ bool RunGuard(std::string_view input) {
     accepted = true;
     Must(wire::InspectDatagram(datagram, gate) == wire::DatagramFault::kNone, "a repeated datagram is accepted again");
     ReadAsReceiver(piece);
+    if (const auto counted = wire::WithOwnCounts(datagram, gate); !counted.empty()) {
+      Must(counted.size() == datagram.size(), "only counts are changed");
+      Must(wire::InspectDatagram(counted, gate) == wire::DatagramFault::kNone, "a changed datagram is accepted");
+    }
+    static_cast<void>(assembly.WithQuestions(datagram));
     if (!wire::HasFragments(datagram)) continue;
     for (const auto& whole : assembly.Take(datagram)) {
       Must(!wire::HasFragments(whole), "fragments do not reach the middleware");

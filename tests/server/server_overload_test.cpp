@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/eventually.h"
 #include "tests/server/support/whole_server.h"
 
 namespace cairn::server::testing {
@@ -54,6 +55,29 @@ TEST(ServerOverload, IsHealthyUnderOverloadAsLongAsItMoves) {
   options.server.stall_limit_s = std::max(0.3, 30.0 * seconds_per_scan);
   const double seconds = SecondsFor(options, 6, 60, [](WholeServer& house) { EXPECT_TRUE(house.server().healthy()); });
   EXPECT_GT(seconds, 2.0 * options.server.stall_limit_s) << "the work was too little to show anything";
+}
+
+// What is sent waits in a lane until its thread takes it. Such a thread once hung, while the server went on to say that
+// it was alive.
+TEST(ServerOverload, IsNotHealthyWhereNobodyTakesWhatItSends) {
+  ServerOptions options = TestOptions();
+  options.server.stall_limit_s = 0.5;
+  Inbound inbound(64);
+  Outbound outbound(64);
+  Server server(options, inbound, outbound, 1);
+  ASSERT_TRUE(server.Start());
+  EXPECT_TRUE(server.healthy());
+  SessionRequest request;
+  request.robot = "r";
+  request.site = "lab";
+  request.sensors = {"laser"};
+  request.client = request.session = kOverloadClient;
+  ASSERT_TRUE(inbound.Push(request));
+  EXPECT_TRUE(test::Eventually([&] { return !server.healthy(); }));
+  for (const auto lane : {Outbound::Lane::kLive, Outbound::Lane::kMap, Outbound::Lane::kReplies})
+    while (outbound.lane(lane).size() > 0) static_cast<void>(outbound.lane(lane).Pop());
+  EXPECT_TRUE(test::Eventually([&] { return server.healthy(); }));
+  server.Stop();
 }
 
 }  // namespace

@@ -61,6 +61,19 @@ void Visit(OptionVisitor& visitor, PairingOptions& options) {
   visitor.Real("max_speed_m_s", options.max_speed_m_s, "m/s", 0.1, 1000.0,
                "Odometry that moves faster, by a metre or more, has begun anew. The place of the robot is then not "
                "known.");
+  visitor.Real("laser_lag_s", options.laser_lag_s, "s", -10.0, 10.0,
+               "Scans carry stamps that are later by this than the clock of the odometry says. cairn-calibrate laser "
+               "measures it in a log.");
+  visitor.Section("wheels", "Corrects odometry whose wheels are not as the robot believes; from cairn-calibrate laser.",
+                  [&] {
+                    visitor.Real("wheel_scale", options.wheels.wheel_scale, "1", 0.5, 2.0,
+                                 "True way over the way that odometry reports.");
+                    visitor.Real("turn_scale", options.wheels.turn_scale, "1", 0.5, 2.0,
+                                 "True turn over the turn that odometry reports.");
+                    visitor.Real("turn_per_m", options.wheels.turn_per_m, "rad/m", -1.0, 1.0,
+                                 "Turn to the left for each metre that odometry does not notice, because one wheel is "
+                                 "larger than the other.");
+                  });
   visitor.Section("rolling", "Scans whose beams were measured one after the other.",
                   [&] { Visit(visitor, options.rolling); });
   visitor.Require(options.max_gap_s <= options.max_stamp_jump_s, "max_gap_s", "must not exceed", "max_stamp_jump_s");
@@ -85,7 +98,24 @@ void OdometryPairing::Add(std::shared_ptr<const Scan> scan) {
 }
 
 void OdometryPairing::Add(const Odometry& odometry) {
-  odometry_gate_.Add(odometry.stamp, odometry.sequence, Odometry(odometry));
+  Odometry sample = odometry;
+  // Unsigned, because a broken clock may be anywhere in int64.
+  sample.stamp = static_cast<Stamp>(static_cast<std::uint64_t>(odometry.stamp) +
+                                    static_cast<std::uint64_t>(StampFromSeconds(options_.laser_lag_s)));
+  odometry_gate_.Add(sample.stamp, sample.sequence, Odometry(sample));
+}
+
+// Step by step, because the errors of the wheels grow with the way.
+Odometry OdometryPairing::Corrected(const Odometry& odometry) {
+  Odometry corrected = odometry;
+  if (logged_) {
+    corrected_ = corrected_ * options_.wheels.Apply(Between(*logged_, odometry.T_odom_robot));
+  } else {
+    corrected_ = odometry.T_odom_robot;
+  }
+  logged_ = odometry.T_odom_robot;
+  corrected.T_odom_robot = corrected_;
+  return corrected;
 }
 
 void OdometryPairing::NewClient() {
@@ -104,8 +134,12 @@ void OdometryPairing::Take(std::shared_ptr<const Scan>&& scan) {
   }
 }
 
-void OdometryPairing::Take(const Odometry& odometry) {
-  if (newest_ && !Follows(odometry)) BeginAnew(Passage::kUnknown);
+void OdometryPairing::Take(const Odometry& sample) {
+  Odometry odometry = Corrects() ? Corrected(sample) : sample;
+  if (newest_ && !Follows(odometry)) {
+    BeginAnew(Passage::kUnknown);
+    odometry.T_odom_robot = corrected_ = sample.T_odom_robot;  // No wheel has turned for this step.
+  }
   newest_ = odometry;
   time_known_ = true;
   odometry_.push_back(odometry);

@@ -5,7 +5,8 @@
 // streams give the same pairs however they interleave, as long as no bound is reached and no clock is set back. When a
 // clock is set back, waiting scans are dropped, because scans and odometry of two clocks cannot be joined; the time of
 // the estimator still grows (PairedScan::stamp). It also says what lies between a pair and the one before it (Passage):
-// a pause, and odometry that cannot be that of one drive. Memory is bounded. Not thread-safe.
+// a pause, and odometry that cannot be that of one drive. Odometry is used on the clock of the scans, and corrected for
+// the wheels of the robot, as the options say. Memory is bounded. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -21,6 +22,7 @@
 #include "common/service/ledger.h"
 #include "server/slam/scan/scan_motion.h"
 #include "server/slam/scan/stamp_gate.h"
+#include "server/slam/scan/wheel_correction.h"
 
 namespace cairn::slam {
 
@@ -38,6 +40,9 @@ struct PairingOptions {
   double same_place_m = 1.0;
   double same_heading_rad = 1.0;
   RollingOptions rolling{};
+  // What cairn-calibrate laser has found of the robot.
+  double laser_lag_s = 0.0;
+  WheelCorrection wheels{};
 };
 void Visit(OptionVisitor& visitor, PairingOptions& options);
 
@@ -94,12 +99,15 @@ class OdometryPairing {
   static void Members(Archive& archive, auto& self) {
     archive(self.scans_, self.odometry_, self.last_paired_, self.set_back_ns_, self.odometry_refused_, self.passage_,
             self.newest_, self.time_known_, self.scan_gate_, self.odometry_gate_);
+    if (self.Corrects()) archive(self.logged_, self.corrected_);
     archive.Require(self.passage_ <= Passage::kUnknown, "a passage");
   }
 
  private:
   void Take(std::shared_ptr<const Scan>&& scan);
   void Take(const Odometry& odometry);
+  [[nodiscard]] bool Corrects() const { return options_.wheels != WheelCorrection{}; }
+  [[nodiscard]] Odometry Corrected(const Odometry& odometry);
   void ScanClockSetBack(Stamp last);
   void OdometryClockSetBack(Stamp last);
   void DropWaitingScans();
@@ -121,6 +129,9 @@ class OdometryPairing {
   Passage passage_ = Passage::kDriven;  // Since the last pair, as far as it is known.
   std::optional<Odometry> newest_;      // The last sample taken, of any clock or client,
   bool time_known_ = true;              // and whether the time since then is known.
+  // Where wheels are corrected: the last pose as it came, and as it is used.
+  std::optional<Pose2> logged_;
+  Pose2 corrected_;
   StampGate<std::shared_ptr<const Scan>> scan_gate_;
   StampGate<Odometry> odometry_gate_;
 };

@@ -6,7 +6,9 @@
 
 #include "common/file/atomic_file.h"
 #include "common/options/config.h"
+#include "common/sensor/log_options.h"
 #include "common/version.h"
+#include "server/tools/calibrate/laser_run.h"
 #include "server/tools/calibrate/motion_run.h"
 #include "server/tools/calibrate/odometry_run.h"
 #include "server/tools/log_run/json_line.h"
@@ -153,6 +155,51 @@ void AddMotion(CLI::App& app, Shared& shared) {
   });
 }
 
+void AddLaser(CLI::App& app, Shared& shared) {
+  auto* command = app.add_subcommand(
+      "laser", "What nobody knows of a new robot: lag, turn and mounting of its lidar, errors of its wheels");
+  command->footer(
+      "Every value comes with its doubt (one standard deviation). What the log does not show is said, and is left as "
+      "it\n"
+      "is. A log that shows all: a room with corners, in which the robot drives straight ahead, turns on the spot to\n"
+      "both sides at different speeds, and stops now and then, for some minutes. What the log or the options say of\n"
+      "the lidar's turn is not used.\n"
+      "EXAMPLES\n  cairn-calibrate laser robot1.log\n"
+      "  cairn-calibrate laser robot1.log -o robot.yaml   # then, with the options that it prints:\n"
+      "  cairn-offline robot1.log --config robot.yaml --scan-period 0.18 --stamp-at last --clockwise --turn-from 0");
+  auto options = std::make_shared<LaserRunOptions>();
+  auto learnt = std::make_shared<std::filesystem::path>();
+  command->add_option("LOG", options->log, "CARMEN or DP-SLAM log")->required();
+  command->add_option("-o,--options", *learnt,
+                      "Also write lag and wheels as YAML, for --config of cairn-offline and cairnd");
+  command->add_option("--pairs", options->fit.pairs_along, "Pairs of scans along the way")
+      ->check(CLI::Range(20, 100000))
+      ->capture_default_str();
+  command->add_option("--turning-pairs", options->fit.pairs_turning, "Pairs of scans of unequal turns")
+      ->check(CLI::Range(10, 100000))
+      ->capture_default_str();
+  command->add_option("--widest-lag", options->fit.widest_lag_s, "Largest lag that is looked for (s)")
+      ->check(CLI::Range(0.0, 10.0))
+      ->capture_default_str();
+  command->add_option("--seed", options->fit.seed, "Random seed of the doubts")->capture_default_str();
+  command
+      ->add_option("--threads", options->threads,
+                   "Number of threads; 0: one per core. The output does not depend on it")
+      ->check(CLI::Range(0, 256));
+  AddLogOptions(*command, options->reader);
+  command->callback([&shared, options, learnt] {
+    shared.action = [&shared, options, learnt] {
+      const Result<LaserReport> report = RunLaser(*options);
+      if (report && !learnt->empty()) {
+        const auto yaml = ReportConfig(*report);
+        const auto written = yaml ? WriteFileAtomically(*learnt, *yaml) : tl::unexpected(yaml.error());
+        if (!written) return shared.Refuse(written.error(), 1);
+      }
+      return Show(shared, report);
+    };
+  });
+}
+
 }  // namespace
 
 int RunCalibrate(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err) {
@@ -167,6 +214,7 @@ int RunCalibrate(const std::vector<std::string>& arguments, std::ostream& out, s
   app.add_flag("--json", shared.json, "One JSON object on standard output");
   AddOdometry(app, shared);
   AddMotion(app, shared);
+  AddLaser(app, shared);
   try {
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 takes them from the back.
   } catch (const CLI::ParseError& error) {

@@ -1,4 +1,5 @@
-// The command line of cairn-calibrate: `odometry` (UMBmark) and `motion` (motion models from a log).
+// The command line of cairn-calibrate: `odometry` (UMBmark), `motion` (motion models from a log) and `laser` (lidar and
+// wheels from a log).
 #pragma once
 
 #include <ostream>

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -111,6 +112,47 @@ TEST(Fleet, OdometryOfPerfectWheelsIsTheTruthSeenFromTheStart) {
                   0, 1e-6);
     }
   }
+}
+
+// Perfect wheels say every 2 ms where the robot is, also where it brakes or begins to turn within a scan.
+TEST(Fleet, EachBeamOfASweepIsMeasuredFromWhereTheRobotIsThen) {
+  FleetOptions options;
+  options.robots = 1;
+  options.scan_hz = 5;
+  options.odometry_hz = 500;
+  options.wheels.slip_m_per_sqrt_m = 0;
+  options.wheel_spread = {0, 0};
+  options.laser.beams = 90;
+  options.laser.sweep_s = 0.19;
+  options.laser.error.sigma_m = options.laser.error.sigma_share = options.laser.dropout_share = 0;
+  Fleet fleet = Make("room", options);
+  std::vector<Odometry> odometry;
+  std::vector<Scan> scans;
+  for (const FleetRecord& record : Take(fleet, 30.0)) {
+    if (const auto* sample = std::get_if<Odometry>(&record.record)) odometry.push_back(*sample);
+    if (const auto* scan = std::get_if<Scan>(&record.record)) scans.push_back(*scan);
+  }
+  scans.pop_back();  // Odometry ends within it.
+  const Surroundings room = SurroundingsOf(*OpenWorld("room"));
+  int beams = 0, wrong = 0;
+  for (const Scan& scan : scans) {
+    for (std::size_t i = 0; i < scan.ranges_m.size(); ++i) {
+      const double since_s = SecondsFromStamp(scan.stamp - odometry.front().stamp) + i * scan.beam_period_s;
+      const auto before = static_cast<std::size_t>(since_s * 500.0 + 1e-6);
+      ASSERT_LT(before + 1, odometry.size());
+      const Pose2 T_odom_robot = Interpolate(odometry[before].T_odom_robot, odometry[before + 1].T_odom_robot,
+                                             since_s * 500.0 - static_cast<double>(before));
+      const Pose2 T_map_laser = fleet.T_map_robot_start(0) * T_odom_robot * scan.T_robot_laser;
+      const double angle = T_map_laser.theta + scan.angle_first_rad + static_cast<double>(i) * scan.angle_step_rad;
+      const Eigen::Vector3d origin(T_map_laser.x, T_map_laser.y, 0.4), direction(std::cos(angle), std::sin(angle), 0.0);
+      const double range_m =
+          std::min(room.scene->Cast(origin, direction, 30.0), CastAtPosts(room.posts, origin, direction));
+      ++beams;
+      wrong += std::abs(range_m - scan.ranges_m[i]) > 0.002 ? 1 : 0;  // Beams along an edge may go to either side.
+    }
+  }
+  EXPECT_GT(beams, 13'000);
+  EXPECT_LT(wrong, beams / 1000);
 }
 
 TEST(Fleet, RealWheelsDriftAwayFromTheTruth) {

@@ -1,10 +1,11 @@
 // The laser in space: exact ranges against geometry, the three kinds of error, the models, the tilting mount.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "client/sim/fleet.h"
-#include "client/sim/laser.h"
+#include "client/sim/laser_models.h"
 #include "client/sim/shipped_worlds.h"
 #include "client/sim/tilt_mount.h"
 #include "tests/flat_world.h"
@@ -152,15 +153,64 @@ TEST(RangeError, ReachesTheScans) {
 
 TEST(LaserModels, AreTheScannersOfTheThesis) {
   for (const std::string& name : LaserModelNames()) {
-    const auto laser = WithModel({}, name);
-    ASSERT_TRUE(laser);
-    EXPECT_TRUE(Validate(*laser)) << name;
+    const auto model = WithModel({}, name);
+    ASSERT_TRUE(model);
+    EXPECT_TRUE(Validate(model->laser)) << name;
   }
-  const auto sick = WithModel({}, "lms200"), hokuyo = WithModel({}, "urg-04lx");
-  EXPECT_EQ(ErrorScale(sick->error, 20.0), 0.005);
-  EXPECT_EQ(hokuyo->error.kind, RangeErrorKind::kStep);
-  EXPECT_NEAR(hokuyo->field_of_view_rad / (hokuyo->beams - 1), 2 * kPi / 1024, 1e-12);
+  const LaserOptions sick = WithModel({}, "lms200")->laser, hokuyo = WithModel({}, "urg-04lx")->laser;
+  EXPECT_EQ(ErrorScale(sick.error, 20.0), 0.005);
+  EXPECT_EQ(sick.sweep_s, 0.0);
+  EXPECT_EQ(hokuyo.error.kind, RangeErrorKind::kStep);
+  EXPECT_NEAR(hokuyo.field_of_view_rad / (hokuyo.beams - 1), 2 * kPi / 1024, 1e-12);
   EXPECT_FALSE(WithModel({}, "lms9000"));
+}
+
+TEST(LaserModels, LidarsOfTodayTurnAndRound) {
+  for (const std::string name : {"rplidar-a1", "lds-01", "ld19", "xv11", "urg-04lx", "utm-30lx", "tim561"}) {
+    LaserOptions mine;
+    mine.error.bias_m = 0.03;
+    const auto model = WithModel(mine, name);
+    ASSERT_TRUE(model) << name;
+    EXPECT_GT(model->scan_hz, 0.0) << name;
+    EXPECT_EQ(model->laser.error.bias_m, 0.03) << name;
+    // A beam every step of the turn: no beam of the next turn comes before the last one of this turn.
+    const double turn_s = model->laser.sweep_s / (model->laser.beams - 1) * 2 * kPi /
+                          (model->laser.field_of_view_rad /
+                           (model->laser.field_of_view_rad > 6.28 ? model->laser.beams : model->laser.beams - 1));
+    EXPECT_NEAR(turn_s, 1.0 / model->scan_hz, 1e-9) << name;
+  }
+  EXPECT_TRUE(WithModel({}, "rplidar-a1")->laser.clockwise);
+  EXPECT_FALSE(WithModel({}, "xv11")->laser.clockwise);
+  const RangeError utm = WithModel({}, "utm-30lx")->laser.error;
+  EXPECT_EQ(ErrorScale(utm, 10.0), 0.010);
+  EXPECT_EQ(ErrorScale(utm, 10.1), 0.030);
+}
+
+TEST(RangeError, BiasComesBeforeRounding) {
+  RangeError error{RangeErrorKind::kSigma, 0.0, 0.0, 0.0, 0.0, 1.0};
+  error.bias_m = 0.02;
+  error.bias_share = 0.01;
+  error.quantum_m = 0.05;
+  Random random(1);
+  EXPECT_DOUBLE_EQ(Measured(error, 4.0, random), 4.05);  // 4.06.
+  EXPECT_DOUBLE_EQ(Measured(error, 4.01, random), 4.05);
+  error.bias_m = -5.0;
+  EXPECT_EQ(Measured(error, 4.0, random), 0.0);
+}
+
+TEST(SimLaser, AClockwiseLidarSeesTheSameBeamsInTheOtherOrder) {
+  const SolidScene scene(RoomRectangles());
+  Random random(2);
+  LaserOptions options = Perfect();
+  options.beams = 91;
+  options.field_of_view_rad = kPi / 2;
+  const Scan left = MeasureScan(scene, {}, {}, {}, 5, 0.0, options, random);
+  options.clockwise = true;
+  Scan right = MeasureScan(scene, {}, {}, {}, 5, 0.0, options, random);
+  EXPECT_LT(right.angle_step_rad, 0.0);
+  EXPECT_NEAR(right.angle_first_rad, kPi / 4, 1e-12);
+  std::reverse(right.ranges_m.begin(), right.ranges_m.end());
+  for (std::size_t i = 0; i < left.ranges_m.size(); ++i) EXPECT_NEAR(left.ranges_m[i], right.ranges_m[i], 1e-6);
 }
 
 TEST(TiltMount, NodsBetweenLevelScans) {

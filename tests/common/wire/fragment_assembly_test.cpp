@@ -148,6 +148,52 @@ TEST_F(FragmentAssemblyTest, FragmentsOfAnotherSizeBeginAnotherSample) {
   EXPECT_EQ(Take(Of({{.count = 2}})), Only(Whole({}).bytes()));
 }
 
+// As the middleware asks the writer of Put for the samples 1 and 3.
+Datagram AckNack() {
+  Datagram datagram;
+  datagram.Begin(kInfoDestination, 0).U32(0x03020100).U32(0x07060504).U32(0x0b0a0908).End();
+  datagram.Begin(kAckNack, 0).U32(0x07000000 | kWriterKind).U32(0x02000000 | kWriterKind);
+  datagram.Sequence(1).U32(3).U32(0xa0000000).U32(9).End();
+  return datagram;
+}
+
+// The datagrams of Put have no receiver, but the endpoint ids of the fragments' reader and writer.
+TEST_F(FragmentAssemblyTest, AsksForTheFragmentsThatAreMissing) {
+  EXPECT_TRUE(assembly_.WithQuestions(AckNack().bytes()).empty());
+  EXPECT_TRUE(Take(Of({{.sequence = 1, .first = 1}, {.sequence = 2, .first = 1}})).empty());
+  EXPECT_TRUE(Take(Of({{.sequence = 3, .first = 1, .fragment_bytes = 10}})).empty());
+  const auto question = [](Datagram& datagram, std::int64_t sequence, std::uint32_t bits) -> Datagram& {
+    datagram.Begin(kInfoDestination, 0).U32(0x03020100).U32(0x07060504).U32(0x0b0a0908).End();
+    datagram.Begin(kNackFrag, 0).U32(0x07000000 | kWriterKind).U32(0x02000000 | kWriterKind);
+    return datagram.Sequence(sequence).U32(2).U32(bits);
+  };
+  Datagram expected;
+  question(expected, 1, 2).U32(0xc0000000).U32(1).End();
+  question(expected, 3, 99).U32(0xffffffff).U32(0xffffffff).U32(0xffffffff).U32(0xe0000000).U32(2).End();
+  expected.Begin(kInfoDestination, 0).U32(0).U32(0).U32(0).End();
+  Bytes bytes = expected.bytes();
+  const Bytes ack_nack = AckNack().bytes();
+  bytes.insert(bytes.end(), ack_nack.begin() + kRtpsHeaderBytes, ack_nack.end());
+  EXPECT_EQ(assembly_.WithQuestions(ack_nack), bytes);
+  EXPECT_TRUE(Take(Of({{.first = 3}})).empty());
+  expected = Datagram();
+  question(expected, 1, 2).U32(0x80000000).U32(3).End();
+  const Bytes next = assembly_.WithQuestions(ack_nack);
+  ASSERT_GE(next.size(), expected.bytes().size());
+  EXPECT_EQ(Bytes(next.begin(), next.begin() + static_cast<std::ptrdiff_t>(expected.bytes().size())), expected.bytes());
+  EXPECT_EQ(Take(Of({{.first = 2}})), Only(Whole({}).bytes()));
+}
+
+TEST_F(FragmentAssemblyTest, AsksNobodyElse) {
+  Datagram other_writer, heartbeat;
+  other_writer.Begin(kInfoDestination, 0).U32(0x03020100).U32(0x07060504).U32(0x0b0a0908).End();
+  other_writer.Begin(kAckNack, 0).U32(0x07000000 | kWriterKind).U32(0x03000000 | kWriterKind);
+  other_writer.Sequence(1).U32(3).U32(0xa0000000).U32(9).End();
+  EXPECT_TRUE(Take(Of({{}})).empty());
+  EXPECT_TRUE(assembly_.WithQuestions(other_writer.bytes()).empty());
+  EXPECT_TRUE(assembly_.WithQuestions(heartbeat.Heartbeat(1, 1).bytes()).empty());
+}
+
 TEST_F(FragmentAssemblyTest, TheOldestAreForgottenFirst) {
   EXPECT_TRUE(Take(Of({{.sequence = 1, .count = 2}})).empty());
   for (std::int64_t sequence = 2; sequence < 6000; ++sequence) {

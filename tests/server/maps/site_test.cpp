@@ -23,11 +23,14 @@ using Corrections = std::vector<std::pair<SessionId, Correction>>;
 class FakeSession : public GridOwner {
  public:
   FakeSession(SessionId id, Corrections& corrections) : id_(id), corrections_(corrections) {}
+  void SetMapEpoch(std::uint32_t epoch) override { epoch_ = epoch; }
+  [[nodiscard]] std::uint32_t epoch() const { return epoch_; }
   void Adopt(Correction&& correction) override { corrections_.emplace_back(id_, std::move(correction)); }
 
  private:
   const SessionId id_;
   Corrections& corrections_;
+  std::uint32_t epoch_ = 0;
 };
 
 class SiteTest : public ::testing::Test {
@@ -225,6 +228,7 @@ TEST_F(SiteTest, AnExceptionEndsThePieceOfWorkAndNotTheSite) {
   // Who waits for an answer gets one, and the next switch can begin.
   class Thrower : public GridOwner {
     void Adopt(Correction&&) override { throw std::runtime_error("out of luck"); }
+    void SetMapEpoch(std::uint32_t) override {}
   };
   const auto thrower = std::make_shared<Thrower>();
   site_->Join(103, 3, thrower);
@@ -240,6 +244,29 @@ TEST_F(SiteTest, OneSwitchAtATime) {
   EXPECT_EQ(Enable(1).get().error().code, StatusCode::kUnavailable);
   corrections_.clear();
   EXPECT_TRUE(first.get());
+}
+
+// A version is made from a snapshot. Whoever opened a session after it, or during the switch, kept the old epoch, and
+// poses and tiles of one moment did not belong together.
+TEST_F(SiteTest, ASessionWithoutAPartOfTheVersionLearnsTheEpochToo) {
+  const std::uint32_t version = AddVersion({{1, {{{{0, 0}, UniformChunk(-100)}}, 3}}});
+  auto enabled = Enable(version);
+  const auto during = std::make_shared<FakeSession>(3, corrections_);
+  site_->Join(103, 3, during);
+  Settle();
+  EXPECT_EQ(sessions_[2]->epoch(), 0U);
+  EXPECT_EQ(during->epoch(), 0U);
+  corrections_.clear();
+  ASSERT_TRUE(enabled.get());
+  Settle();
+  EXPECT_EQ(site_->snapshot()->info.epoch, 1U);
+  EXPECT_EQ(sessions_[2]->epoch(), 1U);
+  EXPECT_EQ(during->epoch(), 1U);
+  // What was made before the switch and joins after it.
+  const auto late = std::make_shared<FakeSession>(4, corrections_);
+  site_->Join(104, 4, late);
+  Settle();
+  EXPECT_EQ(late->epoch(), 1U);
 }
 
 TEST_F(SiteTest, EnablingWhatIsEnabledOrMissing) {

@@ -51,6 +51,15 @@ TEST(RobotQueue, FullOdometryKeepsTheNewerOfTheTwoOldest) {
   EXPECT_EQ(std::get<OdometryArrival>(*queue.Pop()).odometry.sequence, 2U);
 }
 
+TEST(RobotQueue, OfSuccessiveChangesOfTheEpochTheNewestStays) {
+  RobotQueue queue(2, 2);
+  queue.Push(EpochChange{1});
+  queue.Push(EpochChange{2});
+  queue.Push(Finish{});
+  EXPECT_EQ(std::get<EpochChange>(*queue.Pop()).epoch, 2U);
+  EXPECT_TRUE(std::holds_alternative<Finish>(*queue.Pop()));
+}
+
 TEST(RobotQueue, TheNewestCorrectionWins) {
   RobotQueue queue(2, 2);
   EXPECT_FALSE(queue.Push(Correction{.epoch = 1, .grid = {}, .done = {}}));

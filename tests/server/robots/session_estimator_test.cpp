@@ -148,6 +148,18 @@ TEST_F(SessionEstimatorTest, ACorrectionReplacesTheGridAndTellsWhatItGaveUp) {
   EXPECT_EQ(poses_.back().map_epoch, 9U);
 }
 
+TEST_F(SessionEstimatorTest, AnotherEpochAloneChangesNothingElse) {
+  Drive(0, 10);
+  const Pose2 before = poses_.back().T_map_robot;
+  const std::size_t chunks = Snapshot().snapshot.full_path.size();
+  estimator_.Handle(EpochChange{9});
+  EXPECT_EQ(record_.epoch(), 9U);
+  EXPECT_EQ(Snapshot().snapshot.full_path.size(), chunks);
+  Drive(10, 11);
+  EXPECT_EQ(poses_.back().map_epoch, 9U);
+  EXPECT_LT((poses_.back().T_map_robot.translation() - before.translation()).norm(), 0.5);
+}
+
 // The pose after a switch lies in the map of the new epoch, and a rollback takes it back.
 TEST_F(SessionEstimatorTest, ACorrectionWithAPathMovesThePose) {
   Drive(0, 10);

@@ -59,6 +59,7 @@ inline std::vector<JournalEntry> OneOfEach() {
           ScanRefused{SampleStream(), 2, DropReason::kQueueFull},
           SampleOdometry(3),
           CorrectionTaken{4, 5, SampleGrid(6)},
+          EpochChanged{7},
           SessionFinished{true, {StatusCode::kUnavailable, "gone"}}};
 }
 

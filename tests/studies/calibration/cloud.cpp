@@ -3,7 +3,7 @@
 
 #include "client/sim/cloud_error.h"
 #include "client/sim/fleet.h"
-#include "client/sim/laser.h"
+#include "client/sim/laser_models.h"
 #include "client/sim/shipped_worlds.h"
 #include "common/cloud/cloud_builder.h"
 #include "common/cloud/cloud_file.h"
@@ -104,7 +104,7 @@ void StudyCloud(StudyContext& context) {
     options.robots = 1;
     options.seed = context.seed;
     options.scan_hz = 5;
-    options.laser = *sim::WithModel(options.laser, model);
+    options.laser = sim::WithModel(options.laser, model)->laser;
     options.tilt = {
         .scans = 36, .first_rad = Radians(-60.0), .last_rad = Radians(45.0), .level_scans = 60, .halt = true};
     const Drive drive = NodThrough(options, context.Pick(300.0, 40.0));

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <random>
 #include <vector>
@@ -40,6 +41,52 @@ TEST(OdometryPairing, InterpolatesBetweenItsNeighbours) {
   p.OdometryAt(2 * kSecond, 2);
   ASSERT_EQ(p.pairs.size(), 1u);
   EXPECT_NEAR(p.pairs[0].T_odom_robot.x, 0.5, 1e-12);
+}
+
+// Scans whose stamps are 0.25 s late get the odometry of 0.25 s before; they keep their stamps.
+TEST(OdometryPairing, ALagIsTakenOutOfTheOdometry) {
+  PairingOptions options;
+  options.laser_lag_s = 0.25;
+  Pairing p(options);
+  p.OdometryAt(1 * kSecond, 0);
+  p.OdometryAt(2 * kSecond, 2);
+  p.ScanAt(2 * kSecond);
+  ASSERT_EQ(p.pairs.size(), 1u);
+  EXPECT_NEAR(p.pairs[0].T_odom_robot.x, 1.5, 1e-12);
+  EXPECT_EQ(p.pairs[0].stamp, 2 * kSecond);
+}
+
+TEST(OdometryPairing, WheelsAreCorrectedStepByStep) {
+  PairingOptions options;
+  options.wheels = {1.1, 0.5, 0.1};
+  Pairing p(options);
+  const auto add = [&](Stamp stamp, const Pose2& pose) {
+    p.pairing.Add(Odometry{0, stamp, pose});
+    p.ScanAt(stamp);
+  };
+  add(1 * kSecond, {3, 0, 0});
+  add(2 * kSecond, {3, 0, 0.4});                        // A turn of 0.4 is one of 0.2,
+  add(3 * kSecond, Pose2{3, 0, 0.4} * Pose2{1, 0, 0});  // and a metre is 1.1 m along an arc of 0.1 rad.
+  ASSERT_EQ(p.pairs.size(), 3u);
+  EXPECT_EQ(p.pairs[0].T_odom_robot.x, 3);
+  EXPECT_NEAR(p.pairs[1].T_odom_robot.theta, 0.2, 1e-12);
+  EXPECT_NEAR(p.pairs[2].T_odom_robot.theta, 0.3, 1e-12);
+  EXPECT_NEAR(p.pairs[2].T_odom_robot.x, 3 + 1.1 * std::cos(0.25), 1e-12);
+  EXPECT_NEAR(p.pairs[2].T_odom_robot.y, 1.1 * std::sin(0.25), 1e-12);
+}
+
+// Odometry that begins anew elsewhere is no way that wheels have rolled.
+TEST(OdometryPairing, AJumpOfOdometryIsNotCorrected) {
+  PairingOptions options;
+  options.wheels = {1.1, 0.5, 0.1};
+  Pairing p(options);
+  for (const auto& [stamp, x] : {std::pair{1 * kSecond, 0.0}, {2 * kSecond, 1.0}, {3 * kSecond, 500.0}}) {
+    p.OdometryAt(stamp, x);
+    p.ScanAt(stamp);
+  }
+  ASSERT_EQ(p.pairs.size(), 3u);
+  EXPECT_NEAR(p.pairs[1].T_odom_robot.theta, 0.1, 1e-12);
+  EXPECT_EQ(p.pairs[2].T_odom_robot, (Pose2{500, 0, 0}));
 }
 
 // The sample that belongs to one scan exactly is also the one before the next scan.

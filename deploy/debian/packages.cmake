@@ -1,0 +1,83 @@
+# Debian packages, made by CPack from the components that deploy/CMakeLists.txt installs:
+#   cairn-server   cairnd with its unit and its configuration, cairn-offline, cairn-calibrate
+#   cairn-client   cairn: robots from logs, questions, maps, jobs
+#   libcairn-dev   the client library for find_package(cairn)
+# deploy/make-packages.sh builds them. What only a package needs (its copyright, its changelog) is left out of a plain
+# `cmake --install`.
+set(CAIRN_PACKAGES server client development)
+set(server_package cairn-server)
+set(client_package cairn-client)
+set(development_package libcairn-dev)
+
+# Pages for man(1), from what the programs say themselves. `cmake --build ... --target man_pages`; without help2man
+# there is no such target, and no pages are installed.
+find_program(HELP2MAN help2man)
+set(pages)
+function(cairn_man_page program section component name)
+  set(page ${CMAKE_BINARY_DIR}/man/${program}.${section}.gz)
+  install(FILES ${page} DESTINATION ${CMAKE_INSTALL_MANDIR}/man${section} COMPONENT ${component} OPTIONAL)
+  if(HELP2MAN AND TARGET ${program})
+    add_custom_command(OUTPUT ${page} DEPENDS ${program} VERBATIM
+      COMMAND ${CMAKE_COMMAND} -E make_directory ${CMAKE_BINARY_DIR}/man
+      COMMAND sh -c "help2man --no-info --section=$2 --name=\"$3\" $4 \"$0\" | gzip -9n >\"$1\""
+        $<TARGET_FILE:${program}> ${page} ${section} ${name} "${ARGN}")
+    set(pages ${pages} ${page} PARENT_SCOPE)
+  endif()
+endfunction()
+cairn_man_page(cairnd 8 server "mapping server for robot fleets")
+cairn_man_page(cairn-offline 1 server "maps and trajectories from logs, without a server")
+cairn_man_page(cairn-calibrate 1 server "wheels, mountings and motion models of a robot from its logs")
+cairn_man_page(cairn 1 client "client of the mapping server cairnd")
+if(HELP2MAN)
+  add_custom_target(man_pages DEPENDS ${pages})
+endif()
+
+set(changelog ${CMAKE_CURRENT_BINARY_DIR}/changelog.gz)
+execute_process(COMMAND gzip -9nc ${CMAKE_CURRENT_LIST_DIR}/changelog OUTPUT_FILE ${changelog})
+foreach(component IN LISTS CAIRN_PACKAGES)
+  set(package ${${component}_package})
+  install(FILES ${CMAKE_CURRENT_LIST_DIR}/copyright ${changelog}
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${package} COMPONENT ${component} EXCLUDE_FROM_ALL)
+endforeach()
+
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME cairn)
+set(CPACK_PACKAGE_CONTACT "Cairn maintainers <maintainers@cairn.invalid>")
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "mapping service for robot fleets")
+set(CPACK_PACKAGE_DIRECTORY ${CMAKE_BINARY_DIR}/packages)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_COMPONENTS_ALL ${CAIRN_PACKAGES})
+set(CPACK_COMPONENTS_GROUPING IGNORE)
+# The unit and the configuration name absolute paths.
+set(CPACK_SET_DESTDIR ON)
+set(CPACK_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_SECTION misc)
+set(CPACK_DEBIAN_PACKAGE_PRIORITY optional)
+set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
+
+set(CPACK_DEBIAN_SERVER_PACKAGE_NAME cairn-server)
+set(CPACK_DEBIAN_SERVER_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_SERVER_PACKAGE_SUGGESTS cairn-client)
+set(CPACK_DEBIAN_SERVER_PACKAGE_CONTROL_STRICT_PERMISSION ON)
+set(scripts ${CMAKE_CURRENT_LIST_DIR}/server)
+set(CPACK_DEBIAN_SERVER_PACKAGE_CONTROL_EXTRA ${scripts}/conffiles ${scripts}/postinst ${scripts}/prerm ${scripts}/postrm)
+set(CPACK_COMPONENT_SERVER_DESCRIPTION "Robots stream 2D laser scans and odometry over DDS. The server keeps the SLAM
+state and the maps of all of them, answers questions for poses and map tiles,
+and smooths whole trajectories as jobs. Its state outlives it.
+
+With cairn-offline, which makes maps and trajectories from logs, and
+cairn-calibrate, which measures a robot from its logs.")
+set(CPACK_DEBIAN_CLIENT_PACKAGE_NAME cairn-client)
+set(CPACK_DEBIAN_CLIENT_PACKAGE_SHLIBDEPS ON)
+set(CPACK_COMPONENT_CLIENT_DESCRIPTION "Client of the mapping server cairnd: replays logs as robots, simulates robots,
+asks for poses, paths and maps, exports maps, starts jobs and edits sites.")
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libcairn-dev)
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libeigen3-dev, libexpected-dev, libfastcdr-dev, libfastrtps-dev, \
+libfmt-dev, libopencv-core-dev, libopencv-imgcodecs-dev, libopencv-imgproc-dev, libssl-dev, libyaml-cpp-dev")
+set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "Client library of the mapping server cairnd: headers and static libraries with
+which a program streams scans to a server, asks questions and follows poses and
+maps; for find_package(cairn).")
+include(CPack)
