@@ -186,8 +186,7 @@ def use_the_page(programs, page, pictures):
         raise Failed("the last map does not stay")
     programs.start_server()
     eventually("it goes on when the server is back", lambda: "Live" in page.text("#connection") and not page.shows("#banner"))
-    if not page.run(TILES):
-        raise Failed("the map is gone")
+    eventually("with the map", lambda: page.run(TILES))
     before_place = page.run(place)
     eventually("and the robots drive on", lambda: page.run(place) != before_place)
     if page.errors:
