@@ -1,12 +1,14 @@
 # Debian packages, made by CPack from the components that deploy/CMakeLists.txt installs:
 #   cairn-server   cairnd with its unit and its configuration, cairn-offline, cairn-calibrate
 #   cairn-client   cairn: robots from logs, questions, maps, jobs
+#   cairn-web      the page with the live map, with its unit
 #   libcairn-dev   the client library for find_package(cairn)
 # deploy/make-packages.sh builds them. What only a package needs (its copyright, its changelog) is left out of a plain
 # `cmake --install`.
-set(CAIRN_PACKAGES server client development)
+set(CAIRN_PACKAGES server client web development)
 set(server_package cairn-server)
 set(client_package cairn-client)
+set(web_package cairn-web)
 set(development_package libcairn-dev)
 
 # Pages for man(1), from what the programs say themselves. `cmake --build ... --target man_pages`; without help2man
@@ -27,6 +29,7 @@ endfunction()
 cairn_man_page(cairnd 8 server "mapping server for robot fleets")
 cairn_man_page(cairn-offline 1 server "maps and trajectories from logs, without a server")
 cairn_man_page(cairn-calibrate 1 server "wheels, mountings and motion models of a robot from its logs")
+cairn_man_page(cairn-web 1 web "shows the mapping server cairnd in the browser")
 cairn_man_page(cairn 1 client "client of the mapping server cairnd")
 if(HELP2MAN)
   add_custom_target(man_pages DEPENDS ${pages})
@@ -57,12 +60,27 @@ set(CPACK_DEBIAN_PACKAGE_SECTION misc)
 set(CPACK_DEBIAN_PACKAGE_PRIORITY optional)
 set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
 
+# The scripts with which a package enables, starts, stops and forgets its service. `purge`: more that is deleted then.
+function(cairn_service_scripts folder service purge)
+  foreach(script IN ITEMS postinst prerm postrm)
+    configure_file(${CMAKE_CURRENT_FUNCTION_LIST_DIR}/${script}.in ${folder}/${script} @ONLY)
+    file(CHMOD ${folder}/${script} PERMISSIONS
+      OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
+  endforeach()
+endfunction()
+
 set(CPACK_DEBIAN_SERVER_PACKAGE_NAME cairn-server)
 set(CPACK_DEBIAN_SERVER_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_SERVER_PACKAGE_SUGGESTS cairn-client)
 set(CPACK_DEBIAN_SERVER_PACKAGE_CONTROL_STRICT_PERMISSION ON)
-set(scripts ${CMAKE_CURRENT_LIST_DIR}/server)
-set(CPACK_DEBIAN_SERVER_PACKAGE_CONTROL_EXTRA ${scripts}/conffiles ${scripts}/postinst ${scripts}/prerm ${scripts}/postrm)
+# The first folder is where systemd keeps the state of a service with a user of its own; the second is a link to it.
+set(scripts ${CMAKE_CURRENT_BINARY_DIR}/debian/server)
+cairn_service_scripts(${scripts} cairnd.service "  rm -rf /var/lib/private/cairn /var/lib/cairn
+  rm -f /etc/cairn/cairnd.yaml.default
+  rmdir /etc/cairn 2>/dev/null || true
+")
+set(CPACK_DEBIAN_SERVER_PACKAGE_CONTROL_EXTRA
+  ${CMAKE_CURRENT_LIST_DIR}/conffiles ${scripts}/postinst ${scripts}/prerm ${scripts}/postrm)
 set(CPACK_COMPONENT_SERVER_DESCRIPTION "Robots stream 2D laser scans and odometry over DDS. The server keeps the SLAM
 state and the maps of all of them, answers questions for poses and map tiles,
 and smooths whole trajectories as jobs. Its state outlives it.
@@ -73,6 +91,14 @@ set(CPACK_DEBIAN_CLIENT_PACKAGE_NAME cairn-client)
 set(CPACK_DEBIAN_CLIENT_PACKAGE_SHLIBDEPS ON)
 set(CPACK_COMPONENT_CLIENT_DESCRIPTION "Client of the mapping server cairnd: replays logs as robots, simulates robots,
 asks for poses, paths and maps, exports maps, starts jobs and edits sites.")
+set(CPACK_DEBIAN_WEB_PACKAGE_NAME cairn-web)
+set(CPACK_DEBIAN_WEB_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_WEB_PACKAGE_CONTROL_STRICT_PERMISSION ON)
+set(scripts ${CMAKE_CURRENT_BINARY_DIR}/debian/web)
+cairn_service_scripts(${scripts} cairn-web.service "")
+set(CPACK_DEBIAN_WEB_PACKAGE_CONTROL_EXTRA ${scripts}/postinst ${scripts}/prerm ${scripts}/postrm)
+set(CPACK_COMPONENT_WEB_DESCRIPTION "The mapping server cairnd in the browser: the live map with robots and their
+paths, jobs, downloads of maps, and figures for Prometheus.")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libcairn-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libeigen3-dev, libexpected-dev, libfastcdr-dev, libfastrtps-dev, \

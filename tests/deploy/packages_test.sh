@@ -63,6 +63,10 @@ cairn sim --world office --site hall --robots 1 --seconds 30 --rate 4
 cairn status
 cairn map export --site hall -o /tmp/hall.yaml
 [ -s /tmp/hall.png ]
+cairn-web --port 0 >/tmp/web.txt 2>&1 &
+web=$!
+trap 'kill "$web" "$server"; wait "$server"' EXIT
+until grep -q '^cairn-web: http://' /tmp/web.txt; do kill -0 "$web"; sleep 0.1; done
 USE
 
 apt update
@@ -72,16 +76,16 @@ installed=$((SECONDS - start))
 check "a robot maps, and the map can be exported" alone sh /opt/use.sh
 echo "packages installed after ${installed} s, a map after $((SECONDS - start)) s"
 check "each program has a manual page" \
-  inside sh -c 'for page in man8/cairnd.8 man1/cairn.1 man1/cairn-offline.1 man1/cairn-calibrate.1; do test -s "/usr/share/man/$page.gz" || exit 1; done'
+  inside sh -c 'for page in man8/cairnd.8 man1/cairn.1 man1/cairn-web.1 man1/cairn-offline.1 man1/cairn-calibrate.1; do test -s "/usr/share/man/$page.gz" || exit 1; done'
 check "the service is enabled" there /etc/systemd/system/multi-user.target.wants/cairnd.service
 [ "$failed" -eq 0 ] || exit 1  # Nothing below makes sense.
 echo "wire: {domain: 5}" >/run/root/etc/cairn/cairnd.yaml
 check "the packages can be installed again" apt install --reinstall "${debs[@]}"
 check "and keep a changed configuration" grep -q 'domain: 5' /run/root/etc/cairn/cairnd.yaml
 mkdir -p /run/root/var/lib/private/cairn
-check "they can be removed" apt remove cairn-server cairn-client
+check "they can be removed" apt remove cairn-server cairn-client cairn-web
 check "their programs are gone" gone /usr/bin/cairnd
 check "the configuration and the maps are still there" eval 'there /etc/cairn/cairnd.yaml && there /var/lib/private/cairn'
-check "they can be purged" apt purge cairn-server cairn-client
+check "they can be purged" apt purge cairn-server cairn-client cairn-web
 check "nothing is left" eval 'gone /etc/cairn && gone /var/lib/private/cairn && gone /etc/systemd/system/multi-user.target.wants/cairnd.service'
 exit $failed
