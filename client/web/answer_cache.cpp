@@ -36,7 +36,14 @@ void AnswerCache::EndTurn(const std::string& question, const Body& body) {
 Result<AnswerCache::Body> AnswerCache::Get(const std::string& question, const Ask& ask) {
   Result<Body> known = WaitForTurn(question);
   if (!known || *known) return known;
-  Result<std::string> answer = ask();
+  Result<std::string> answer = [&] {
+    try {
+      return ask();
+    } catch (...) {
+      EndTurn(question, nullptr);  // Otherwise everybody else would wait for ever.
+      throw;
+    }
+  }();
   const Body body = answer ? std::make_shared<const std::string>(std::move(*answer)) : nullptr;
   EndTurn(question, body);
   if (!answer) return tl::unexpected(answer.error());

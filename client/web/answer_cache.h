@@ -25,7 +25,7 @@ class AnswerCache {
   // An answer is given again until it is `lifetime` old. An error is not kept.
   AnswerCache(std::chrono::milliseconds lifetime, std::size_t most) : lifetime_(lifetime), most_(most) {}
 
-  // `ask` runs on the calling thread.
+  // `ask` runs on the calling thread. If it throws, so does this.
   [[nodiscard]] Result<Body> Get(const std::string& question, const Ask& ask);
 
  private:

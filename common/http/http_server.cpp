@@ -202,12 +202,16 @@ class HttpServer::Impl final : public httplib::Server {
     if (place != nullptr) {
       to.set_chunked_content_provider(
           from.type, [this, place, next = std::move(from.stream)](std::size_t, httplib::DataSink& sink) {
-            std::string piece;
-            if (stopping_ || !next(piece)) {
-              sink.done();
-              return true;
+            try {
+              std::string piece;
+              if (stopping_ || !next(piece)) {
+                sink.done();
+                return true;
+              }
+              return piece.empty() || sink.write(piece.data(), piece.size());
+            } catch (...) {  // The library catches only what the making of an answer throws.
+              return false;
             }
-            return piece.empty() || sink.write(piece.data(), piece.size());
           });
     } else if (from.status != 304) {
       to.set_content(std::move(from.body), from.type);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <stdexcept>
 #include <thread>
 #include <vector>
 
@@ -31,6 +32,14 @@ TEST(AnswerCache, AnErrorIsPassedOnAndNotKept) {
   AnswerCache cache(hours(1), 8);
   const auto fails = []() -> Result<std::string> { return Fail(StatusCode::kNotFound, "no such robot"); };
   EXPECT_EQ(cache.Get("a", fails).error().code, StatusCode::kNotFound);
+  EXPECT_EQ(**cache.Get("a", [] { return Result<std::string>("there"); }), "there");
+}
+
+// Everybody else would wait for ever.
+TEST(AnswerCache, AnExceptionEndsTheTurn) {
+  AnswerCache cache(hours(1), 8);
+  EXPECT_THROW(static_cast<void>(cache.Get("a", []() -> Result<std::string> { throw std::runtime_error("no"); })),
+               std::runtime_error);
   EXPECT_EQ(**cache.Get("a", [] { return Result<std::string>("there"); }), "there");
 }
 
