@@ -13,6 +13,7 @@ void AddSim(CLI::App& app, Program& program);
 void AddPose(CLI::App& app, Program& program);
 void AddPath(CLI::App& app, Program& program);
 void AddStatus(CLI::App& app, Program& program);
+void AddTop(CLI::App& app, Program& program);
 void AddTiles(CLI::App& app, Program& program);
 void AddPing(CLI::App& app, Program& program);
 void AddCheckLog(CLI::App& app, Program& program);

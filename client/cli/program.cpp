@@ -88,6 +88,7 @@ ExitCode RunCairn(const std::vector<std::string>& arguments, std::ostream& out, 
   AddTiles(app, program);
   AddCloud(app, program);
   AddStatus(app, program);
+  AddTop(app, program);
   AddJob(app, program);
   AddSession(app, program);
   AddRos2(app, program);

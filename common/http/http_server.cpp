@@ -214,7 +214,7 @@ class HttpServer::Impl final : public httplib::Server {
             }
           });
     } else if (from.status != 304) {
-      to.set_content(std::move(from.body), from.type);
+      to.set_content(from.body, from.type);
     }
   }
 

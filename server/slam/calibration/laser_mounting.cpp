@@ -203,7 +203,8 @@ double RoughHeading(const MountingProblem& problem, const Values& start) {
   double best = start(6), least = -1.0;
   for (int k = 0; k < kHeadings; ++k) {
     Values v = start;
-    v(6) += (k % 2 == 0 ? 1.0 : -1.0) * ((k + 1) / 2) * 2.0 * kPi / kHeadings;
+    const int steps = (k + 1) / 2;  // 0, 1, 1, 2, 2, ... to both sides.
+    v(6) += (k % 2 == 0 ? 1.0 : -1.0) * steps * 2.0 * kPi / kHeadings;
     double sum = 0.0;
     for (const Eigen::Vector3d& residual : problem.Residuals(v))
       sum += std::min(residual.head<2>().norm(), kFarthest_m);

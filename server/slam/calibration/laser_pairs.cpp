@@ -13,11 +13,11 @@ namespace {
 // Turns are measured over about the time of a scan.
 constexpr double kRateWindow_s = 0.2;
 // A pair along the way: this far apart, or this far turned, but not longer ago.
-constexpr double kStep_m = 0.2, kStep_rad = 0.2, kLongestStep_s = 2.0;
+constexpr double kPairStep_m = 0.2, kPairStep_rad = 0.2, kLongestStep_s = 2.0;
 // Two scans of unequal turns.
 constexpr double kNear_m = 0.6, kNear_s = 5.0, kUnequal_rad_s = 0.2;
 // Points farther from every surface count as this far.
-constexpr double kFarthest_m = 0.15;
+constexpr double kFarthestPoint_m = 0.15;
 // The prior of a free alignment: the scans decide.
 constexpr double kFree_m = 0.3, kFree_rad = 0.3;
 
@@ -35,14 +35,14 @@ double Disagreement(std::span<const SurfacePoint> points, const PointIndex& refe
   for (const SurfacePoint& point : points) {
     if (!point.smooth()) continue;
     const Eigen::Vector2d p = T_ref_curr * point.p;
-    const SurfacePoint* nearest = reference.Nearest(p, kFarthest_m);
-    double d = kFarthest_m;
+    const SurfacePoint* nearest = reference.Nearest(p, kFarthestPoint_m);
+    double d = kFarthestPoint_m;
     if (nearest != nullptr && nearest->smooth() && nearest->normal.dot(R * point.normal) > 0.5)
       d = std::min(d, std::abs(nearest->normal.dot(p - nearest->p)));
     sum += d * d;
     ++count;
   }
-  return count > 0 ? sum / static_cast<double>(count) : kFarthest_m * kFarthest_m;
+  return count > 0 ? sum / static_cast<double>(count) : kFarthestPoint_m * kFarthestPoint_m;
 }
 
 }  // namespace
@@ -72,7 +72,7 @@ std::vector<PairOfScans> PairsAlongTheWay(const LaserLog& log, const OdometryPat
     if (last) {
       const Pose2 moved = Between(T_odom_last, *T_odom_robot);
       const bool late = SecondsFromStamp(log.scans[i]->stamp - log.scans[*last]->stamp) > kLongestStep_s;
-      const bool enough = moved.translation().norm() >= kStep_m || std::abs(moved.theta) >= kStep_rad;
+      const bool enough = moved.translation().norm() >= kPairStep_m || std::abs(moved.theta) >= kPairStep_rad;
       if (!late && !enough) continue;
       if (enough && !late) pairs.push_back({*last, i});
     }
@@ -112,6 +112,7 @@ std::vector<PairOfScans> PairsOfUnequalTurns(const LaserLog& log, const Odometry
   }
   // Of more than twice as many, the half that shows less is left out; the rest is spread over the log.
   std::vector<double> differences;
+  differences.reserve(candidates.size());
   for (const Candidate& candidate : candidates) differences.push_back(candidate.difference);
   double least = 0.0;
   if (differences.size() > 2 * most) {

@@ -60,6 +60,7 @@ struct LineMinimum {
 // costs[g]: those of every pair at one place of the grid.
 LineMinimum MinimumOf(const std::vector<Costs>& costs, std::uint64_t seed) {
   std::vector<double> means;
+  means.reserve(costs.size());
   for (const Costs& one : costs) means.push_back(Mean(one));
   LineMinimum minimum{LeastOf(means), 0.0};
   Rng rng(seed);
