@@ -130,13 +130,14 @@ void Site::Apply(SessionId session, const slam::OccupancyGrid::Chunks& chunks) {
   joint_.Apply({session, {chunks.begin(), chunks.end()}});
 }
 
-void Site::Join(NameId robot, SessionId session, std::weak_ptr<GridOwner> owner) {
-  Run([robot, session, owner = std::move(owner)](Site& site) {
+void Site::Join(NameId robot, SessionId session, std::weak_ptr<GridOwner> owner, std::uint32_t epoch) {
+  Run([robot, session, owner = std::move(owner), epoch](Site& site) {
     site.members_[robot] = {session, owner};
     std::erase_if(site.members_, [](const auto& member) { return member.second.owner.expired(); });
     site.info_changed_ = true;
     site.StoreSite();
     // The map may have been switched since the session was made, or since the server that made it was killed.
+    if (epoch == site.epoch_) return;
     if (const auto known = owner.lock()) known->SetMapEpoch(site.epoch_);
   });
 }

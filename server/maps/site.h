@@ -72,7 +72,8 @@ class Site : public std::enable_shared_from_this<Site> {
 
   // From now on this session of the robot draws here, in place of the robot's previous session. A session
   // that has ended is kept while its GridOwner exists, because its part of the map can still be corrected.
-  void Join(NameId robot, SessionId session, std::weak_ptr<GridOwner> owner);
+  // `epoch`: of the map, as the session knows it.
+  void Join(NameId robot, SessionId session, std::weak_ptr<GridOwner> owner, std::uint32_t epoch);
   // Changes that wait for the strand are merged: the newest form of each chunk is kept, so that a site that is slow
   // holds at most the chunks that its sessions have.
   void Change(GridChange&& change);

@@ -180,7 +180,7 @@ Result<void> Roster::Open(const SessionRequest& request) {
     journal_->Open({session->id(), request, session->record().epoch()}, DurableFor(session));
   }
   session->Resume(request.client, request.session);
-  site->Join(robot_id, session->id(), session);
+  site->Join(robot_id, session->id(), session, session->record().epoch());
   if (gone != nullptr && !gone->ending() && gone->record().state().robot_id != robot_id) {
     gone->End({StatusCode::kResourceExhausted, "its robot stayed away, and its place was needed for another"});
   }

@@ -117,7 +117,8 @@ void Roster::Register(SessionId id, Result<std::shared_ptr<Session>> restored) {
   const auto [known, first] = sessions_.try_emplace(state.robot_id, session);
   if (!first && known->second->id() > id) return;
   known->second = session;
-  if (const auto site = atlas_.Find(state.site)) site->Join(state.robot_id, session->id(), session);
+  if (const auto site = atlas_.Find(state.site))
+    site->Join(state.robot_id, session->id(), session, session->record().epoch());
 }
 
 // Sets the session aside. The robot can be told why it must open a new one.
@@ -171,7 +172,8 @@ std::size_t Roster::OpenStored(const std::vector<SessionId>& ids) {
     const MutexLock lock(mutex_);
     if (!sessions_.emplace(state.robot_id, session).second) continue;
     ++taken;
-    if (const auto site = atlas_.Find(state.site)) site->Join(state.robot_id, session->id(), session);
+    if (const auto site = atlas_.Find(state.site))
+      site->Join(state.robot_id, session->id(), session, session->record().epoch());
   }
   return taken;
 }

@@ -38,7 +38,7 @@ class SiteTest : public ::testing::Test {
   SiteTest() {
     for (const SessionId id : {SessionId{1}, SessionId{2}}) {
       sessions_[id] = std::make_shared<FakeSession>(id, corrections_);
-      site_->Join(100 + id, id, sessions_[id]);
+      site_->Join(100 + id, id, sessions_[id], 0);
     }
   }
   ~SiteTest() override { pool_.join(); }
@@ -231,7 +231,7 @@ TEST_F(SiteTest, AnExceptionEndsThePieceOfWorkAndNotTheSite) {
     void SetMapEpoch(std::uint32_t) override {}
   };
   const auto thrower = std::make_shared<Thrower>();
-  site_->Join(103, 3, thrower);
+  site_->Join(103, 3, thrower, 0);
   const std::uint32_t bad = AddVersion({{3, {{}, 1}}});
   EXPECT_EQ(Enable(bad).get().error().code, StatusCode::kInternal);
   const std::uint32_t good = AddVersion({});
@@ -252,7 +252,7 @@ TEST_F(SiteTest, ASessionWithoutAPartOfTheVersionLearnsTheEpochToo) {
   const std::uint32_t version = AddVersion({{1, {{{{0, 0}, UniformChunk(-100)}}, 3}}});
   auto enabled = Enable(version);
   const auto during = std::make_shared<FakeSession>(3, corrections_);
-  site_->Join(103, 3, during);
+  site_->Join(103, 3, during, 0);
   Settle();
   EXPECT_EQ(sessions_[2]->epoch(), 0U);
   EXPECT_EQ(during->epoch(), 0U);
@@ -264,7 +264,7 @@ TEST_F(SiteTest, ASessionWithoutAPartOfTheVersionLearnsTheEpochToo) {
   EXPECT_EQ(during->epoch(), 1U);
   // What was made before the switch and joins after it.
   const auto late = std::make_shared<FakeSession>(4, corrections_);
-  site_->Join(104, 4, late);
+  site_->Join(104, 4, late, 0);
   Settle();
   EXPECT_EQ(late->epoch(), 1U);
 }
@@ -281,7 +281,7 @@ TEST_F(SiteTest, ARobotsNewSessionTakesThePlaceOfTheOld) {
   site_->Publish();
   Settle();
   const auto next = std::make_shared<FakeSession>(3, corrections_);
-  site_->Join(101, 3, next);
+  site_->Join(101, 3, next, 0);
   site_->AddVersion({}, [](Result<std::uint32_t>) {});
   Settle();
   EXPECT_EQ(site_->snapshot()->info.robots, 2U);
