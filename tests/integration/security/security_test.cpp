@@ -76,7 +76,7 @@ class SecureDoors : public ::testing::Test {
       for (const std::string& robot : robots)
         member.writers.push_back(Must(member.bus->template Advertise<Sample>(robot)));
       const auto matched = [](const auto& writer) { return writer->matched() == 1; };
-      if (Eventually([&] { return std::ranges::all_of(member.writers, matched); }, std::chrono::seconds(5)))
+      if (Eventually([&] { return std::ranges::all_of(member.writers, matched); }, std::chrono::seconds(15)))
         return member;
     }
     ADD_FAILURE() << identity
