@@ -1,9 +1,11 @@
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <iostream>
 #include <optional>
 #include <thread>
+#include <utility>
 
 #include "client/cli/commands.h"
 #include "client/cli/interrupt.h"
@@ -32,10 +34,12 @@ Result<TopView> AskServer(Program& program) {
 
 // In steps, so that Ctrl-C ends it at once.
 void Pause(double seconds) {
-  using Clock = std::chrono::steady_clock;
-  const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
-  while (!Interrupted() && Clock::now() < end)
-    std::this_thread::sleep_for(std::min<Clock::duration>(std::chrono::milliseconds(50), end - Clock::now()));
+  using SteadyClock = std::chrono::steady_clock;
+  const auto end =
+      SteadyClock::now() + std::chrono::duration_cast<SteadyClock::duration>(std::chrono::duration<double>(seconds));
+  while (!Interrupted() && SteadyClock::now() < end)
+    std::this_thread::sleep_for(
+        std::min<SteadyClock::duration>(std::chrono::milliseconds(50), end - SteadyClock::now()));
 }
 
 ExitCode ShowTop(Program& program, const TopArguments& arguments) {
