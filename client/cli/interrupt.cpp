@@ -1,7 +1,9 @@
 #include "client/cli/interrupt.h"
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
+#include <thread>
 
 namespace cairn::client {
 namespace {
@@ -23,6 +25,13 @@ void CatchInterrupts() {
 
 bool Interrupted() {
   return interrupted;
+}
+
+void WaitUntil(std::chrono::steady_clock::time_point time) {
+  using Clock = std::chrono::steady_clock;
+  constexpr std::chrono::milliseconds kStep{50};
+  for (auto now = Clock::now(); now < time && !interrupted; now = Clock::now())
+    std::this_thread::sleep_for(std::min<Clock::duration>(time - now, kStep));
 }
 
 }  // namespace cairn::client

@@ -1,8 +1,5 @@
 #include "client/cli/pacer.h"
 
-#include <algorithm>
-#include <thread>
-
 #include "client/cli/interrupt.h"
 
 namespace cairn::client {
@@ -24,12 +21,7 @@ Pacer::Clock::time_point Pacer::Due(Stamp stamp, Clock::time_point now) {
 }
 
 void Pacer::WaitFor(Stamp stamp) {
-  const auto due = Due(stamp, Clock::now());
-  while (!Interrupted()) {
-    const auto now = Clock::now();
-    if (now >= due) return;
-    std::this_thread::sleep_for(std::min<Clock::duration>(due - now, std::chrono::milliseconds(100)));
-  }
+  WaitUntil(Due(stamp, Clock::now()));
 }
 
 }  // namespace cairn::client

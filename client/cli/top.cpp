@@ -1,10 +1,8 @@
 #include <unistd.h>
 
-#include <algorithm>
 #include <chrono>
 #include <iostream>
 #include <optional>
-#include <thread>
 #include <utility>
 
 #include "client/cli/commands.h"
@@ -32,23 +30,17 @@ Result<TopView> AskServer(Program& program) {
   return view;
 }
 
-// In steps, so that Ctrl-C ends it at once.
-void Pause(double seconds) {
-  using SteadyClock = std::chrono::steady_clock;
-  const auto end =
-      SteadyClock::now() + std::chrono::duration_cast<SteadyClock::duration>(std::chrono::duration<double>(seconds));
-  while (!Interrupted() && SteadyClock::now() < end)
-    std::this_thread::sleep_for(
-        std::min<SteadyClock::duration>(std::chrono::milliseconds(50), end - SteadyClock::now()));
-}
-
 ExitCode ShowTop(Program& program, const TopArguments& arguments) {
   // On a terminal each table takes the place of the one before; in a file or a pipe they follow each other.
   const bool screen = &program.out() == &std::cout && isatty(STDOUT_FILENO) != 0 && !program.options.json;
   std::optional<TopView> before;
   for (int shown = 0; !Interrupted() && (arguments.count == 0 || shown < arguments.count); ++shown) {
-    if (shown > 0) Pause(arguments.interval_s);
-    if (Interrupted()) break;
+    if (shown > 0) {
+      using Clock = std::chrono::steady_clock;
+      WaitUntil(Clock::now() +
+                std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(arguments.interval_s)));
+      if (Interrupted()) break;
+    }
     auto now = AskServer(program);
     // The server may be started again; where nobody looks at it, its silence ends the command.
     if (!now && (!screen || shown == 0)) return program.Refuse(now.error());

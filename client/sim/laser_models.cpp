@@ -47,21 +47,25 @@ constexpr Model kModels[] = {
     // (RangeError::bias_m). It is named in the comments and is not part of the model. Data sheets say nothing of
     // dropouts. The shares here are of single beams without an answer between two beams that agree: 0.5 % in a log of a
     // MaeBot (RPLIDAR A1, University of Michigan), 1.1 % in one of a Neato (Olin College); other RPLIDARs have between
-    // 0.3 and 6.5 %. Assumptions, which no sheet states, are named as such.
+    // 0.3 and 6.5 %. Assumptions, which no sheet states, are named as such. Where a figure is marked `not checked`, the
+    // sheet was not at hand when it was written down here.
 
-    // Hokuyo URG-04LX, data sheet: 0.06-4.095 m, +-10 mm to 1 m, +-1 % beyond (also thesis C 4.3.3), 1 mm steps.
+    // Hokuyo URG-04LX, data sheet: 0.06-4.095 m, +-10 mm to 1 m, +-1 % beyond (thesis C 4.3.3 has the same), 1 mm steps
+    // (not checked).
     // SCIP 2.0 specification C-42-03320B, figure 1, table 2, PP command: 239.77 deg in steps of 360/1024 deg, 600 turns
     // a minute, anti-clockwise seen from above. Assumption: the whole +-10 mm or +-1 % is random.
     {"urg-04lx", 683, kUrgView_deg, 0.06, 4.095, Steps(Step(0.010, 0.01), 0.001), 10.0},
 
     // SLAMTEC RPLIDAR A1M8, data sheet, "Measurement performance": 0.15-12 m, 1 deg at 5.5 turns a second (typical),
     // resolution < 0.5 mm below 1.5 m and < 1 % of the distance everywhere. The interface protocol has steps of
-    // 0.25 mm and angles that grow clockwise. Assumption: the random error is as large as the resolution, for which the
+    // 0.25 mm (distance_q2) and angles that grow clockwise. Assumption: the random error is as large as the resolution,
+    // for which the
     // sheet has no standard deviation.
     {"rplidar-a1", 360, 360.0, 0.15, 12.0, Steps(Step(0.0005, 0.01, 1.5), 0.00025), 5.5, true, 0.005},
 
     // Hitachi-LG HLS-LFCD2, sold as LDS-01 (ROBOTIS e-Manual, TurtleBot3, appendix LDS-01): 0.12-3.5 m, 1 deg, 300
-    // turns a minute, precision +-10 mm below 0.5 m and +-3.5 % beyond (accuracy +-15 mm, +-5 %). Distances are sent in
+    // turns a minute, precision +-10 mm below 0.5 m and +-3.5 % beyond (accuracy +-15 mm, +-5 %; all not checked).
+    // Distances are sent in
     // mm. The maker's ROS driver turns the array over, so angles grow clockwise.
     {"lds-01", 360, 360.0, 0.12, 3.5, Steps(Step(0.010, 0.035, 0.5), 0.001), 5.0, true},
 
@@ -78,7 +82,8 @@ constexpr Model kModels[] = {
      0.011},
 
     // Hokuyo UTM-30LX, specification: 0.1-30 m, 270 deg at 0.25 deg, 25 ms a turn; repeated accuracy sigma < 10 mm to
-    // 10 m, < 30 mm beyond (accuracy +-30 and +-50 mm). SCIP 2.0 specification: anti-clockwise. Steps of 1 mm.
+    // 10 m, < 30 mm beyond (accuracy +-30 and +-50 mm; not checked). SCIP 2.0 specification: anti-clockwise. Steps of 1
+    // mm.
     {"utm-30lx", 1081, 270.0, 0.1, 30.0, Steps({RangeErrorKind::kSigma, 0.010, 0.0, 0.0, 0.0, 10.0, 0.030}, 0.001),
      40.0},
 

@@ -1,5 +1,7 @@
 #include "client/web/web_page.h"
 
+#include <openssl/crypto.h>
+
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
@@ -26,13 +28,9 @@ Result<std::string> MapFileText(const OccupancyImage& map, const std::string& si
   return std::string(image->begin(), image->end());
 }
 
-// Takes as long for every wrong text, so that nobody can guess a token letter by letter.
+// Takes as long for every wrong text of the same length, so that nobody can guess a token letter by letter.
 bool SameText(const std::string& a, const std::string& b) {
-  unsigned difference = a.size() == b.size() ? 0 : 1;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    difference |= static_cast<unsigned char>(a[i]) ^ static_cast<unsigned char>(b[b.empty() ? 0 : i % b.size()]);
-  }
-  return difference == 0;
+  return a.size() == b.size() && CRYPTO_memcmp(a.data(), b.data(), a.size()) == 0;
 }
 
 // The body's object; nothing where it is none. An empty body is an empty object.

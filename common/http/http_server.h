@@ -8,7 +8,7 @@
 // - With `hosts`, requests that name another host are refused, because a page from elsewhere could otherwise read the
 //   answers in the browser of somebody on this machine (DNS rebinding). Addresses and `localhost` are always allowed.
 // The handler runs on many threads at once. It must not throw; where it does, the client gets 500.
-// Library: cpp-httplib, which no other file includes.
+// Library: cpp-httplib, which only this room includes.
 #pragma once
 
 #include <chrono>

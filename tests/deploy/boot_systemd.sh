@@ -8,7 +8,8 @@
 set -euo pipefail
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
-skip() { echo "SKIPPED: $*"; exit 77; }
+# shellcheck source=tests/deploy/empty_system.sh
+. "$here/empty_system.sh"
 
 if [ "${1:-}" != --inside ]; then
   [ $# -eq 2 ] || { sed -n '2,7s/^# \{0,1\}//p' "$0" >&2; exit 2; }
@@ -16,16 +17,7 @@ if [ "${1:-}" != --inside ]; then
   [ "$(id -u)" -eq 0 ] || skip "not root"
   for tool in debootstrap systemd-nspawn unshare; do command -v "$tool" >/dev/null || skip "no $tool on this machine"; done
 
-  if [ ! -e "$tree/complete" ]; then
-    # shellcheck disable=SC1091
-    release=$(. /etc/os-release && echo "$VERSION_CODENAME $ID")
-    components=main
-    [ "${release#* }" != ubuntu ] || components=main,universe
-    rm -rf "$tree"
-    mkdir -p "$tree"
-    echo "making $tree"
-    debootstrap --variant=minbase --components=$components --include=systemd,systemd-sysv,dbus \
-      "${release% *}" "$tree/root" >"$tree/log" 2>&1 || skip "debootstrap failed: $(tail -n 1 "$tree/log")"
+  if empty_system "$tree" systemd,systemd-sysv,dbus; then
     cp -r "$here/../../deploy" "$tree/root/opt/deploy"
     chroot "$tree/root" /opt/deploy/install-packages.sh run
     touch "$tree/complete"
@@ -36,9 +28,7 @@ fi
 
 build=$2 tree=$3
 # Of this process alone, and gone with it: the container's root over the tree, and what nspawn keeps in /run.
-mount -t tmpfs -o mode=755 tmpfs /run
-mkdir -p /run/over/{upper,work} /run/root
-mount -t overlay -o "lowerdir=$tree/root,upperdir=/run/over/upper,workdir=/run/over/work" overlay /run/root
+enter_overlay "$tree"
 # The hierarchy that every systemd takes; where the machine has the older one, that stays as it is outside.
 umount -R /sys/fs/cgroup 2>/dev/null || true
 mount -t cgroup2 cgroup2 /sys/fs/cgroup

@@ -6,32 +6,21 @@
 # was a map. Needs root, debootstrap and the package sources. Exit code: 77 where it cannot be done.
 set -euo pipefail
 
-skip() { echo "SKIPPED: $*"; exit 77; }
+# shellcheck source=tests/deploy/empty_system.sh
+. "$(dirname "${BASH_SOURCE[0]}")/empty_system.sh"
 
 if [ "${1:-}" != --inside ]; then
   [ $# -eq 2 ] || { sed -n '2,6s/^# \{0,1\}//p' "$0" >&2; exit 2; }
   packages=$(realpath "$1") tree=$(realpath -m "$2")
   [ "$(id -u)" -eq 0 ] || skip "not root"
   for tool in debootstrap ip unshare; do command -v "$tool" >/dev/null || skip "no $tool on this machine"; done
-  if [ ! -e "$tree/complete" ]; then
-    # shellcheck disable=SC1091
-    release=$(. /etc/os-release && echo "$VERSION_CODENAME $ID")
-    components=main
-    [ "${release#* }" != ubuntu ] || components=main,universe
-    rm -rf "$tree"
-    mkdir -p "$tree"
-    debootstrap --variant=minbase --components=$components "${release% *}" "$tree/root" >"$tree/log" 2>&1 ||
-      skip "debootstrap failed: $(tail -n 1 "$tree/log")"
-    touch "$tree/complete"
-  fi
+  if empty_system "$tree" ""; then touch "$tree/complete"; fi
   exec unshare --mount --pid --ipc --uts --fork --kill-child --mount-proc --propagation private \
     "$0" --inside "$packages" "$tree"
 fi
 
 packages=$2 tree=$3
-mount -t tmpfs -o mode=755 tmpfs /run
-mkdir -p /run/over/{upper,work} /run/root
-mount -t overlay -o "lowerdir=$tree/root,upperdir=/run/over/upper,workdir=/run/over/work" overlay /run/root
+enter_overlay "$tree"
 mount -t proc proc /run/root/proc
 mount --rbind /dev /run/root/dev
 cp "$packages"/*.deb /run/root/opt/
