@@ -36,9 +36,9 @@ ExitCode ShowTop(Program& program, const TopArguments& arguments) {
   std::optional<TopView> before;
   for (int shown = 0; !Interrupted() && (arguments.count == 0 || shown < arguments.count); ++shown) {
     if (shown > 0) {
-      using Clock = std::chrono::steady_clock;
-      WaitUntil(Clock::now() +
-                std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(arguments.interval_s)));
+      const std::chrono::duration<double> interval(arguments.interval_s);
+      WaitUntil(std::chrono::steady_clock::now() +
+                std::chrono::duration_cast<std::chrono::steady_clock::duration>(interval));
       if (Interrupted()) break;
     }
     auto now = AskServer(program);
