@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <latch>
 #include <optional>
 #include <utility>
 
@@ -201,6 +202,19 @@ std::vector<std::shared_ptr<Site>> Atlas::All() const {
   std::vector<std::shared_ptr<Site>> all;
   for (const auto& [name, place] : sites_) all.push_back(place.site);
   return all;
+}
+
+void Atlas::Publish() {
+  const auto sites = All();
+  const std::size_t first = first_++;
+  for (std::size_t i = 0; i < sites.size(); ++i) sites[(first + i) % sites.size()]->Publish();
+}
+
+void Atlas::Close() {
+  const auto sites = All();
+  std::latch open(static_cast<std::ptrdiff_t>(sites.size()));
+  for (const auto& site : sites) site->Close([&open] { open.count_down(); });
+  open.wait();
 }
 
 }  // namespace cairn::server

@@ -4,7 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <future>
+#include <map>
+#include <set>
 #include <stdexcept>
+#include <string>
+#include <variant>
 
 #include "server/maps/atlas.h"
 
@@ -269,6 +273,24 @@ TEST_F(SiteTest, ASessionWithoutAPartOfTheVersionLearnsTheEpochToo) {
   EXPECT_EQ(late->epoch(), 1U);
 }
 
+// What a session is told then would never be handled, and be destroyed after its pool.
+TEST_F(SiteTest, ASiteThatIsClosedTellsNoSessionAnything) {
+  const std::uint32_t version = AddVersion({{1, {{}, 1}}});
+  auto enabled = Enable(version);
+  ASSERT_EQ(corrections_.size(), 1U);
+  std::promise<void> closed;
+  site_->Close([&] { closed.set_value(); });
+  closed.get_future().wait();
+  EXPECT_EQ(enabled.get().error().code, StatusCode::kUnavailable);
+  // The answer that was under way comes too late.
+  corrections_[0].second.done({.session = 1, .displaced = {}, .change = {.session = 1, .chunks = {}}});
+  corrections_.clear();
+  auto next = Enable(AddVersion({{1, {{}, 1}}, {2, {{}, 1}}}));
+  EXPECT_TRUE(next.get());
+  EXPECT_TRUE(corrections_.empty());
+  for (const auto& [id, session] : sessions_) EXPECT_EQ(session->epoch(), 0U);
+}
+
 TEST_F(SiteTest, EnablingWhatIsEnabledOrMissing) {
   EXPECT_EQ(*Enable(1).get(), 1U);
   EXPECT_EQ(site_->snapshot()->info.epoch, 0U);
@@ -343,6 +365,33 @@ TEST(Atlas, ASiteThatHoldsNothingGivesWay) {
   EXPECT_TRUE(atlas.Enter("another"));
   EXPECT_NE(atlas.Find("configured"), nullptr);
   EXPECT_NE(atlas.Find("drawn"), nullptr);
+}
+
+// The first site by name filled the lane each time, and the others were never seen.
+TEST(Atlas, EverySiteIsPublishedAlthoughOneFillsTheLane) {
+  asio::thread_pool pool(1);
+  Outbound outbound(1);
+  Atlas atlas(MapsOptions{}, 0.05, true, pool, outbound);
+  std::map<std::string, std::shared_ptr<Site>> sites;
+  std::set<NameId> seen;
+  for (const char* name : {"a", "b", "c"}) sites[name] = *atlas.Enter(name);
+  for (int round = 0; round < 3; ++round) {
+    for (const auto& [name, site] : sites) {
+      site->Change({.session = 1, .chunks = {{{round, 0}, UniformChunk(100)}}});
+    }
+    atlas.Publish();
+    for (const auto& [name, site] : sites) {
+      std::promise<void> reached;
+      site->Probe([&] { reached.set_value(); });
+      reached.get_future().wait();
+    }
+    while (const auto value = outbound.lane(Outbound::Lane::kMap).TryPop()) {
+      if (const auto* info = std::get_if<MapInfo>(&*value)) seen.insert(info->site_id);
+      if (const auto* tile = std::get_if<TileSample>(&*value)) seen.insert(tile->site_id);
+    }
+  }
+  EXPECT_EQ(seen.size(), 3U);
+  pool.join();
 }
 
 }  // namespace
