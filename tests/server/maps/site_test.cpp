@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <future>
 #include <map>
 #include <stdexcept>
@@ -280,13 +281,14 @@ TEST_F(SiteTest, ASiteThatIsClosedTellsNoSessionAnything) {
   std::promise<void> closed;
   site_->Close([&] { closed.set_value(); });
   closed.get_future().wait();
+  ASSERT_EQ(enabled.wait_for(std::chrono::seconds(10)), std::future_status::ready);
   EXPECT_EQ(enabled.get().error().code, StatusCode::kUnavailable);
   // The answer that was under way comes too late.
   corrections_[0].second.done({.session = 1, .displaced = {}, .change = {.session = 1, .chunks = {}}});
   corrections_.clear();
   auto next = Enable(AddVersion({{1, {{}, 1}}, {2, {{}, 1}}}));
+  ASSERT_TRUE(corrections_.empty());
   EXPECT_TRUE(next.get());
-  EXPECT_TRUE(corrections_.empty());
   for (const auto& [id, session] : sessions_) EXPECT_EQ(session->epoch(), 0U);
 }
 
