@@ -65,6 +65,7 @@ installed=$((SECONDS - start))
 check "a robot maps, and the map can be exported" alone sh /opt/use.sh
 echo "packages installed after ${installed} s, a map after $((SECONDS - start)) s"
 check "each program has a manual page" \
+  inside test -s /usr/share/bash-completion/completions/cairn
   inside sh -c 'for page in man8/cairnd.8 man1/cairn.1 man1/cairn-web.1 man1/cairn-offline.1 man1/cairn-calibrate.1; do test -s "/usr/share/man/$page.gz" || exit 1; done'
 check "the service is enabled" there /etc/systemd/system/multi-user.target.wants/cairnd.service
 [ "$failed" -eq 0 ] || exit 1  # Nothing below makes sense.
