@@ -42,7 +42,7 @@ offers 'cairnd --' --config --print-config --set
 offers 'cairn-offline --' --trajectory --smooth
 offers 'cairn-calibrate ' laser motion
 offers 'cairn-web --' --port --token
-offers 'cairn sim --laser-model ' lms200
+offers 'cairn sim --laser-model ' thesis lms200 tim561
 # Nothing of its own: bash goes on with the names of files.
 complete_line 'cairn replay robot1'
 [ "${#COMPREPLY[@]}" -eq 0 ] || { echo "a file's name is not left to bash: ${COMPREPLY[*]}"; exit 1; }
