@@ -89,6 +89,9 @@ void Look(asio::steady_timer& timer, const Watched& watched, DoorLosses& losses,
       spdlog::error("another server serves this DDS domain: clients get answers from both; stop one of them");
     }
     TellRefusals(watched);
+    auto busy = watched.bus.busy_with_one_datagram();
+    if (watched.ros2 != nullptr) busy = std::max(busy, watched.ros2->busy_with_one_datagram());
+    watched.server.SetReceiving(busy);
     const DoorCounts counts = LossesOf(watched);
     if (const auto line = losses.Check(counts, DoorLosses::Clock::now())) {
       spdlog::warn("{}", *line);

@@ -135,7 +135,9 @@ void Server::CheckHealth() {
     const auto& values = outbound_.lane(static_cast<Outbound::Lane>(lane));
     pulses.emplace("outbound lane " + std::to_string(lane), Pulse{values.taken(), values.size() > 0});
   }
-  const std::vector<std::string> stalled = heartbeat_.Check(pulses, Clock::now());
+  std::vector<std::string> stalled = heartbeat_.Check(pulses, Clock::now());
+  if (static_cast<double>(receiving_ns_) * 1e-9 > options_.server.stall_limit_s)
+    stalled.emplace_back("the middleware, which received a datagram,");
   const bool was_healthy = healthy_.exchange(stalled.empty());
   if (was_healthy && !stalled.empty())
     spdlog::error("{} makes no progress; the systemd watchdog is no longer notified", stalled.front());

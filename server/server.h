@@ -8,6 +8,7 @@
 
 #include <asio/thread_pool.hpp>
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -41,10 +42,13 @@ class Server {
   // and counted. Then it publishes the last state of every session and closes the outbound lanes.
   void Stop();
 
-  // False if a thread or strand that has work has finished nothing for server.stall_limit_s.
+  // False if a thread or strand that has work, or the middleware, has finished nothing for server.stall_limit_s.
   [[nodiscard]] bool healthy() const { return healthy_; }
   // What `cairn status` says of refused peers.
   void SetRefusals(const Refusals& refusals) { desk_.SetRefusals(refusals); }
+  // For how long the middleware has been busy with one datagram. It counts for `healthy`, because nothing can arrive
+  // meanwhile, not even a question.
+  void SetReceiving(std::chrono::nanoseconds busy_with_one) { receiving_ns_ = busy_with_one.count(); }
   // What `cairn ros2 doctor` says.
   void SetRos2(Ros2Report&& report) { desk_.SetRos2(std::move(report)); }
   // Scans of streams without a session, beyond the first robots.max_unclaimed streams. They are in no ledger.
@@ -77,6 +81,7 @@ class Server {
   Heartbeat heartbeat_;
   bool journal_degraded_ = false;  // As last logged.
   std::atomic<bool> healthy_{true};
+  std::atomic<std::int64_t> receiving_ns_{0};
   std::atomic<bool> stopping_{false};
   std::jthread housekeeping_;
   std::jthread dispatcher_;

@@ -15,11 +15,14 @@ class DdsBus final : public Bus {
   [[nodiscard]] const std::shared_ptr<Participant>& participant() const { return participant_; }
   const WireOptions& options() const override { return participant_->options(); }
   std::uint64_t datagrams_refused() const override {
-    const RefusedDatagrams& refused = participant_->datagrams_refused();
+    const RefusedDatagrams& refused = participant_->guard().refused;
     return std::accumulate(refused.begin(), refused.end(), std::uint64_t{0});
   }
+  std::chrono::nanoseconds busy_with_one_datagram() const override {
+    return participant_->guard().receiving.Longest(ReceiveWatch::Clock::now());
+  }
   std::string refused_by_reason() const override {
-    const RefusedDatagrams& refused = participant_->datagrams_refused();
+    const RefusedDatagrams& refused = participant_->guard().refused;
     std::string text;
     for (std::size_t fault = 0; fault < refused.size(); ++fault) {
       if (refused[fault] == 0) continue;

@@ -94,7 +94,9 @@ class Bus {
   [[nodiscard]] virtual const WireOptions& options() const = 0;
   // Number of datagrams that were not valid or not plausible RTPS and were therefore not passed to the middleware.
   [[nodiscard]] virtual std::uint64_t datagrams_refused() const = 0;
-  // The same by reason, for people: "12 framing, 3 sequence"; "none" where there are none.
+  // For how long the middleware has been busy with one datagram, which takes microseconds. Nothing arrives meanwhile.
+  [[nodiscard]] virtual std::chrono::nanoseconds busy_with_one_datagram() const = 0;
+  // The refused ones by reason, for people: "12 framing, 3 sequence"; "none" where there are none.
   [[nodiscard]] virtual std::string refused_by_reason() const = 0;
   // What was refused because of its sender. `commands` is not counted here.
   [[nodiscard]] virtual Refusals refusals() const = 0;

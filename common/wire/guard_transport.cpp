@@ -14,19 +14,19 @@ namespace transport = eprosima::fastdds::rtps;
 namespace rtps = eprosima::fastrtps::rtps;
 
 struct GuardDescriptor : transport::ChainingTransportDescriptor {
-  GuardDescriptor(std::shared_ptr<transport::TransportDescriptorInterface> udp,
-                  std::shared_ptr<RefusedDatagrams> counter, bool with_security)
-      : ChainingTransportDescriptor(std::move(udp)), refused(std::move(counter)), secure(with_security) {}
+  GuardDescriptor(std::shared_ptr<transport::TransportDescriptorInterface> udp, std::shared_ptr<GuardReport> to,
+                  bool with_security)
+      : ChainingTransportDescriptor(std::move(udp)), report(std::move(to)), secure(with_security) {}
   transport::TransportInterface* create_transport() const override;
 
-  std::shared_ptr<RefusedDatagrams> refused;
+  std::shared_ptr<GuardReport> report;
   bool secure;
 };
 
 class GuardTransport : public transport::ChainingTransport {
  public:
   explicit GuardTransport(const GuardDescriptor& descriptor)
-      : ChainingTransport(descriptor), descriptor_(descriptor), refused_(descriptor.refused) {}
+      : ChainingTransport(descriptor), descriptor_(descriptor), report_(descriptor.report) {}
 
   transport::TransportDescriptorInterface* get_configuration() override { return &descriptor_; }
 
@@ -44,6 +44,7 @@ class GuardTransport : public transport::ChainingTransport {
     const auto deliver = [&](std::span<const rtps::octet> datagram) {
       const std::vector<rtps::octet> counted = WithOwnCounts(datagram, gate_);
       if (!counted.empty()) datagram = counted;
+      const ReceiveWatch::Delivery delivery(report_->receiving);
       next->OnDataReceived(datagram.data(), static_cast<std::uint32_t>(datagram.size()), local, remote);
     };
     if (!HasFragments({bytes, size})) return deliver({bytes, size});
@@ -67,7 +68,7 @@ class GuardTransport : public transport::ChainingTransport {
   }
 
   void Refuse(DatagramFault fault) {
-    (*refused_)[static_cast<std::size_t>(fault)].fetch_add(1, std::memory_order_relaxed);
+    report_->refused[static_cast<std::size_t>(fault)].fetch_add(1, std::memory_order_relaxed);
   }
   std::vector<FragmentAssembly::Datagram> Assemble(std::span<const rtps::octet> datagram) {
     const MutexLock lock(mutex_);
@@ -79,7 +80,7 @@ class GuardTransport : public transport::ChainingTransport {
   }
 
   GuardDescriptor descriptor_;
-  std::shared_ptr<RefusedDatagrams> refused_;
+  std::shared_ptr<GuardReport> report_;
   SequenceGate gate_;
   Mutex mutex_;
   FragmentAssembly assembly_ CAIRN_GUARDED_BY(mutex_);
@@ -92,7 +93,7 @@ transport::TransportInterface* GuardDescriptor::create_transport() const {
 }  // namespace
 
 std::shared_ptr<transport::TransportDescriptorInterface> MakeGuardedUdp(const std::vector<std::string>& interfaces,
-                                                                        std::shared_ptr<RefusedDatagrams> refused,
+                                                                        std::shared_ptr<GuardReport> report,
                                                                         bool secure) {
   // A burst of tiles or replies overflows a socket buffer of default size. The kernel limits this size if it
   // is too large.
@@ -101,7 +102,7 @@ std::shared_ptr<transport::TransportDescriptorInterface> MakeGuardedUdp(const st
   udp->interfaceWhiteList = interfaces;
   udp->sendBufferSize = kSocketBufferBytes;
   udp->receiveBufferSize = kSocketBufferBytes;
-  return std::make_shared<GuardDescriptor>(std::move(udp), std::move(refused), secure);
+  return std::make_shared<GuardDescriptor>(std::move(udp), std::move(report), secure);
 }
 
 }  // namespace cairn::wire

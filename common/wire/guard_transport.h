@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "common/wire/receive_watch.h"
 #include "common/wire/rtps_datagram.h"
 
 namespace cairn::wire {
@@ -19,9 +20,15 @@ namespace cairn::wire {
 // The number of datagrams that were dropped, by fault.
 using RefusedDatagrams = std::array<std::atomic<std::uint64_t>, kDatagramFaults>;
 
-// Binds sockets to the given IPv4 addresses only. `refused` is shared because it must outlive the transport. `secure`:
+// What a transport tells of itself.
+struct GuardReport {
+  RefusedDatagrams refused{};
+  ReceiveWatch receiving;
+};
+
+// Binds sockets to the given IPv4 addresses only. `report` is shared because it must outlive the transport. `secure`:
 // the participant uses DDS Security.
 [[nodiscard]] std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface> MakeGuardedUdp(
-    const std::vector<std::string>& interfaces, std::shared_ptr<RefusedDatagrams> refused, bool secure);
+    const std::vector<std::string>& interfaces, std::shared_ptr<GuardReport> report, bool secure);
 
 }  // namespace cairn::wire

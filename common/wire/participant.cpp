@@ -52,8 +52,8 @@ Result<std::shared_ptr<Participant>> Participant::Create(const WireOptions& opti
   ConfigureLibraryOnce();
   const std::shared_ptr<Participant> made(new Participant(options));
   made->participant_ = fd::DomainParticipantFactory::get_instance()->create_participant(
-      static_cast<fd::DomainId_t>(options.domain), ParticipantQos(options, name, made->datagrams_refused_),
-      made->peers_.get(), fd::StatusMask::none());
+      static_cast<fd::DomainId_t>(options.domain), ParticipantQos(options, name, made->guard_), made->peers_.get(),
+      fd::StatusMask::none());
   if (made->participant_ == nullptr) {
     return Fail(StatusCode::kUnavailable, "cannot join DDS domain " + std::to_string(options.domain) +
                                               ": no free port or address, or the domain is full" +

@@ -53,7 +53,7 @@ class Participant : public std::enable_shared_from_this<Participant> {
                                           fd::DataReaderListener* listener);
 
   [[nodiscard]] const WireOptions& options() const { return options_; }
-  [[nodiscard]] const RefusedDatagrams& datagrams_refused() const { return *datagrams_refused_; }
+  [[nodiscard]] const GuardReport& guard() const { return *guard_; }
   [[nodiscard]] PeerWatch& peers() const { return *peers_; }
 
  private:
@@ -65,7 +65,7 @@ class Participant : public std::enable_shared_from_this<Participant> {
   [[nodiscard]] Result<fd::Topic*> FindTopic(const TopicProfile& profile, const fd::TypeSupport& type);
 
   const WireOptions options_;
-  const std::shared_ptr<RefusedDatagrams> datagrams_refused_ = std::make_shared<RefusedDatagrams>();
+  const std::shared_ptr<GuardReport> guard_ = std::make_shared<GuardReport>();
   const std::shared_ptr<PeerWatch> peers_;        // The participant's listener.
   fd::DomainParticipant* participant_ = nullptr;  // Set once by Create.
   fd::Subscriber* subscriber_ = nullptr;

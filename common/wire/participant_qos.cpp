@@ -7,6 +7,7 @@
 #include <fastdds/dds/log/Log.hpp>
 #include <mutex>
 
+#include "common/wire/library_repairs.h"
 #include "common/wire/security.h"
 
 #ifdef CAIRN_ADDRESS_SANITIZER
@@ -36,6 +37,7 @@ constexpr double kMaxAnnouncementPeriodS = 3.0;
 void ConfigureLibraryOnce() {
   static std::once_flag once;
   std::call_once(once, [] {
+    UseRepairs();
     fd::Log::ClearConsumers();
     fd::Log::SetVerbosity(fd::Log::Kind::Error);
     // Delivery within a process would lose samples for good when a reader is full (measured), so samples
@@ -47,11 +49,11 @@ void ConfigureLibraryOnce() {
 }
 
 fd::DomainParticipantQos ParticipantQos(const WireOptions& options, const std::string& name,
-                                        const std::shared_ptr<RefusedDatagrams>& refused) {
+                                        const std::shared_ptr<GuardReport>& report) {
   fd::DomainParticipantQos qos;
   qos.name(name);
   qos.transport().use_builtin_transports = false;
-  qos.transport().user_transports.push_back(MakeGuardedUdp(options.interfaces, refused, !options.security.empty()));
+  qos.transport().user_transports.push_back(MakeGuardedUdp(options.interfaces, report, !options.security.empty()));
   auto& builtin = qos.wire_protocol().builtin;
   builtin.discovery_config.leaseDuration = Duration_t(options.participant_lease_s);
   builtin.discovery_config.leaseDuration_announcementperiod =

@@ -14,7 +14,8 @@ namespace cairn::wire {
 // Settings of the library that hold for the whole process. To be called before a participant is made.
 void ConfigureLibraryOnce();
 
-[[nodiscard]] eprosima::fastdds::dds::DomainParticipantQos ParticipantQos(
-    const WireOptions& options, const std::string& name, const std::shared_ptr<RefusedDatagrams>& refused);
+[[nodiscard]] eprosima::fastdds::dds::DomainParticipantQos ParticipantQos(const WireOptions& options,
+                                                                          const std::string& name,
+                                                                          const std::shared_ptr<GuardReport>& report);
 
 }  // namespace cairn::wire

@@ -1,7 +1,6 @@
 #include "common/wire/sequence_gate.h"
 
 #include <algorithm>
-#include <cstdlib>
 #include <functional>
 #include <string_view>
 
@@ -36,7 +35,7 @@ bool SequenceGate::Accept(const Key& whose, std::int64_t number, Clock::time_poi
 }
 
 bool SequenceGate::IsRepeated(Peer& peer, std::int64_t number, Clock::time_point now) {
-  if (peer.claims == 0 || std::abs(number - peer.claimed) > kStep) {
+  if (peer.claims == 0 || number > peer.claimed + kStep || number < peer.claimed - kStep) {
     peer.claims = 0;
     peer.claimed_first = now;
   }

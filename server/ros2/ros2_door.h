@@ -4,6 +4,7 @@
 // thread; report and the counts from any.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <thread>
@@ -36,6 +37,7 @@ class Ros2Door {
   [[nodiscard]] std::uint64_t malformed() const { return ingress_.malformed(); }
   [[nodiscard]] std::uint64_t unpublished() const { return egress_.unpublished(); }
   [[nodiscard]] std::uint64_t datagrams_refused() const { return bus_->datagrams_refused(); }
+  [[nodiscard]] std::chrono::nanoseconds busy_with_one_datagram() const { return bus_->busy_with_one_datagram(); }
 
  private:
   Ros2Door(const Ros2Options& options, NamespaceRules rules, std::unique_ptr<ros2::Bus> bus, Inbound& inbound);

@@ -80,5 +80,17 @@ TEST(ServerOverload, IsNotHealthyWhereNobodyTakesWhatItSends) {
   server.Stop();
 }
 
+// The middleware counted for days what a forged heartbeat had announced. Nobody could ask the server any more, and it
+// went on to say that it was alive.
+TEST(ServerOverload, IsNotHealthyWhereTheMiddlewareIsBusyWithOneDatagram) {
+  WholeServer house;
+  house.server().SetReceiving(std::chrono::seconds(4));
+  EXPECT_TRUE(house.server().healthy());
+  house.server().SetReceiving(std::chrono::seconds(6));
+  EXPECT_TRUE(test::Eventually([&] { return !house.server().healthy(); }));
+  house.server().SetReceiving(std::chrono::seconds(0));
+  EXPECT_TRUE(test::Eventually([&] { return house.server().healthy(); }));
+}
+
 }  // namespace
 }  // namespace cairn::server::testing

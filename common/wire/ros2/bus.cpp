@@ -110,7 +110,7 @@ class Participant {
     if (const auto present = RequireInterfaces(options); !present) return tl::unexpected(present.error());
     wire::ConfigureLibraryOnce();
     auto made = std::make_shared<Participant>();
-    fd::DomainParticipantQos qos = wire::ParticipantQos(options, name, made->datagrams_refused_);
+    fd::DomainParticipantQos qos = wire::ParticipantQos(options, name, made->guard_);
     SetUserData(qos.user_data(), "enclave=/;");
     made->participant_ = fd::DomainParticipantFactory::get_instance()->create_participant(
         static_cast<fd::DomainId_t>(options.domain), qos, &made->writers_, fd::StatusMask::none());
@@ -148,11 +148,14 @@ class Participant {
   // Held while an endpoint is made or deleted, as in common/wire/participant.h.
   Mutex& endpoints() { return endpoints_; }
   std::uint64_t datagrams_refused() const {
-    return std::accumulate(datagrams_refused_->begin(), datagrams_refused_->end(), std::uint64_t{0});
+    return std::accumulate(guard_->refused.begin(), guard_->refused.end(), std::uint64_t{0});
+  }
+  std::chrono::nanoseconds busy_with_one_datagram() const {
+    return guard_->receiving.Longest(wire::ReceiveWatch::Clock::now());
   }
 
  private:
-  const std::shared_ptr<wire::RefusedDatagrams> datagrams_refused_ = std::make_shared<wire::RefusedDatagrams>();
+  const std::shared_ptr<wire::GuardReport> guard_ = std::make_shared<wire::GuardReport>();
   WriterList writers_;  // The participant's listener.
   ReadyReaders ready_;
   Mutex endpoints_;
@@ -289,6 +292,7 @@ class DdsBus final : public Bus {
   std::vector<RemoteWriter> writers() const override { return participant_->writers().writers(); }
   std::uint64_t writers_version() const override { return participant_->writers().version(); }
   std::uint64_t datagrams_refused() const override { return participant_->datagrams_refused(); }
+  std::chrono::nanoseconds busy_with_one_datagram() const override { return participant_->busy_with_one_datagram(); }
 
  private:
   const std::shared_ptr<Participant> participant_;

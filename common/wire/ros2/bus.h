@@ -92,6 +92,8 @@ class Bus {
   [[nodiscard]] virtual std::vector<RemoteWriter> writers() const = 0;
   [[nodiscard]] virtual std::uint64_t writers_version() const = 0;
   [[nodiscard]] virtual std::uint64_t datagrams_refused() const = 0;
+  // As of common/wire/bus.h.
+  [[nodiscard]] virtual std::chrono::nanoseconds busy_with_one_datagram() const = 0;
 
  protected:
   Bus() = default;

@@ -182,6 +182,39 @@ TEST(Bus, ManyThreadsMakeAndDeleteEndpointsAtOnce) {
   std::_Exit(1);
 }
 
+// The thread that removes the endpoint of a peer waited for the thread of timers, and that one for the other, because
+// it wanted to see whether a peer's lease has run out: then nothing arrived any more (library_repairs.cpp). With short
+// leases it looks often.
+TEST(Bus, EndpointsGoWhileLeasesAreWatched) {
+  constexpr int kPeers = 8;
+  constexpr int kRounds = 60;
+  WireOptions options = LoopbackOptions();
+  options.liveliness_lease_s = options.participant_lease_s = 0.1;
+  auto done = std::make_shared<std::promise<void>>();
+  auto finished = done->get_future();
+  std::thread([done, options] {
+    const auto watcher = MakeBus("watcher");
+    const auto subscription = Must(watcher->Subscribe<Ledger>([](Ledger&&) {}));
+    std::vector<std::jthread> peers;
+    for (int i = 0; i < kPeers; ++i) {
+      peers.emplace_back([&, i] {
+        const auto peer = MakeBus("peer" + std::to_string(i), options);
+        for (int round = 0; round < kRounds; ++round) {
+          std::vector<std::unique_ptr<Publication<Ledger>>> publications;
+          for (int k = 0; k < 4; ++k) publications.push_back(Must(peer->Advertise<Ledger>()));
+          EXPECT_TRUE(Eventually([&] { return publications.back()->matched() > 0; }, std::chrono::seconds(2)));
+        }
+      });
+    }
+    peers.clear();
+    EXPECT_TRUE(Eventually([&] { return subscription->matched() == 0; }));
+    done->set_value();
+  }).detach();
+  if (finished.wait_for(std::chrono::seconds(90)) == std::future_status::ready) return;
+  std::fputs("the threads are waiting for one another\n", stderr);
+  std::_Exit(1);
+}
+
 TEST(Bus, PublicationsAndSubscriptionsOutliveTheirBus) {
   Inbox<Job> inbox;
   std::unique_ptr<Bus> bus = MakeBus("short-lived");

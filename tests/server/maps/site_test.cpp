@@ -10,8 +10,6 @@
 #include <string>
 #include <variant>
 
-#include "server/maps/atlas.h"
-
 namespace cairn::server {
 namespace {
 
@@ -313,90 +311,6 @@ TEST_F(SiteTest, ARobotsNewSessionTakesThePlaceOfTheOld) {
   ASSERT_EQ(corrections_.size(), 1U);
   EXPECT_EQ(corrections_[0].first, 3U);
   corrections_.clear();
-}
-
-TEST(Atlas, RefusesSitesItDoesNotServeAndTooMany) {
-  asio::thread_pool pool(1);
-  Outbound outbound(64);
-  MapsOptions options;
-  options.max_sites = 2;
-  Atlas closed(options, 0.05, false, pool, outbound);
-  EXPECT_EQ(closed.Enter("a").error().code, StatusCode::kNotFound);
-  EXPECT_TRUE(closed.Create("a"));
-  EXPECT_TRUE(closed.Enter("a"));
-  EXPECT_EQ(closed.Create("/bad").error().code, StatusCode::kInvalidArgument);
-  EXPECT_TRUE(closed.Create("b"));
-  EXPECT_EQ(closed.Create("c").error().code, StatusCode::kResourceExhausted);
-  pool.join();
-}
-
-// A robot that entered while the records of a deleted site were being removed lost its own records with them.
-TEST(Atlas, ADeletedSiteIsMadeAgainOnlyWhenItIsReleased) {
-  asio::thread_pool pool(1);
-  Outbound outbound(64);
-  Atlas atlas(MapsOptions{}, 0.05, true, pool, outbound);
-  EXPECT_TRUE(atlas.Enter("lab"));
-  atlas.Remove("lab");
-  EXPECT_EQ(atlas.Enter("lab").error().code, StatusCode::kUnavailable);
-  atlas.Release("lab");
-  EXPECT_TRUE(atlas.Enter("lab"));
-  pool.join();
-}
-
-// Misspelt names used up the sites for good.
-TEST(Atlas, ASiteThatHoldsNothingGivesWay) {
-  asio::thread_pool pool(1);
-  Outbound outbound(64);
-  MapsOptions options;
-  options.max_sites = 3;
-  Atlas atlas(options, 0.05, true, pool, outbound);
-  EXPECT_TRUE(atlas.Create("configured"));
-  auto drawn = *atlas.Enter("drawn");
-  drawn->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(100)}}});
-  drawn->Publish();
-  auto used = *atlas.Enter("used");
-  EXPECT_EQ(atlas.Enter("next").error().code, StatusCode::kResourceExhausted);
-  used.reset();
-  EXPECT_TRUE(atlas.Enter("next"));
-  EXPECT_EQ(atlas.Find("used"), nullptr);
-  EXPECT_TRUE(atlas.Enter("one.after"));
-  pool.join();
-  EXPECT_EQ(drawn->snapshot()->info.tile_count, 1U);
-  drawn.reset();
-  EXPECT_TRUE(atlas.Enter("another"));
-  EXPECT_NE(atlas.Find("configured"), nullptr);
-  EXPECT_NE(atlas.Find("drawn"), nullptr);
-}
-
-// The first site by name filled the lane each time, and the others were never seen.
-TEST(Atlas, AnotherSiteIsTheFirstToBePublishedEachTime) {
-  asio::thread_pool pool(1);
-  Outbound outbound(1);
-  Atlas atlas(MapsOptions{}, 0.05, true, pool, outbound);
-  std::map<std::string, std::shared_ptr<Site>> sites;
-  for (const char* name : {"a", "b", "c"}) sites[name] = *atlas.Enter(name);
-  for (const std::string first : {"a", "b", "c", "a"}) {
-    // Work waits on all of them, that of the others earlier.
-    for (const auto& [name, site] : sites) {
-      if (name != first) site->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(100)}}});
-    }
-    sites.at(first)->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(100)}}});
-    atlas.Publish();
-    const auto reach = [](const std::shared_ptr<Site>& site) {
-      std::promise<void> reached;
-      site->Probe([&] { reached.set_value(); });
-      reached.get_future().wait();
-    };
-    reach(sites.at(first));
-    for (const auto& [name, site] : sites) reach(site);
-    const auto value = outbound.lane(Outbound::Lane::kMap).TryPop();
-    ASSERT_TRUE(value);
-    const auto* info = std::get_if<MapInfo>(&*value);
-    const auto* tile = std::get_if<TileSample>(&*value);
-    ASSERT_TRUE(info != nullptr || tile != nullptr);
-    EXPECT_EQ(info != nullptr ? info->site_id : tile->site_id, HashName(first));
-  }
-  pool.join();
 }
 
 }  // namespace
