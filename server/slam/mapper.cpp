@@ -92,8 +92,8 @@ void Mapper::State::CloseLargeLoop() {
   if (!loop) return;
   const auto path = trail.PathWithLoop(loop->relation(), believed.values(), options.pose_graph);
   if (!path) return;  // The loop is not stored, so that it will be searched for again.
-  filter->Rebase(*path);
   trail.AddLoop(loop->relation());
+  filter->Rebase(*path, trail.relations());
   trail.ConfirmTentative();
   drawing.StartAgain(trail.size());
   self_check.Forget();
@@ -225,7 +225,7 @@ void Mapper::State::Follow(std::span<const Pose2> first_poses) {
   KeepShape(path, known);
   // Large loops that the job did not know.
   if (drawing.changed_at() > known) OptimisePoses(path, trail.relations(), options.pose_graph);
-  filter->Rebase(path);
+  filter->Rebase(path, trail.relations());
   trail.ConfirmTentative();
   self_check.Forget();
   const Pose2 T_new_old = path.back() * before.back().Inverse();

@@ -25,7 +25,7 @@ struct MapperOptions {
   double max_tilt_rad = 0.035;          // Two degrees (scan/beam_points.h).
   std::int64_t max_keyframes = 500000;  // Some 40 h of driving.
   std::int64_t max_chunks = 16384;      // 0.67 km^2 at 5 cm a cell, 512 MiB.
-  MotionNoise blind{0.002, 0.2, 0.0, 0.001, 0.05, 0.0};
+  OdometryNoise blind;
   MatcherKind matcher = MatcherKind::kVoting;
   MatcherOptions matching;
   FrontEndOptions front_end;

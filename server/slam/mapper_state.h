@@ -27,7 +27,7 @@ namespace cairn::slam {
 struct Mapper::State {
   State(const MapperOptions& given, const Pose2& T_map_robot_start, std::uint64_t seed)
       : options(given),
-        front_end(given.front_end, MakeMatcher(given.matcher, given.matching)),
+        front_end(given.front_end, MakeMatcher(given.matcher, given.matching), given.blind),
         blind(given.blind, given.front_end.use_odometry, given.lost_after_m),
         trail(given.filter.back_end.drift, given.front_end.surface),
         revisits(given.revisit, given.front_end.refine),

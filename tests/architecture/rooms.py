@@ -16,14 +16,14 @@ SLAM_ROOMS = {
     "scan": [],  # What a scan is: points, surfaces, tilt, its odometry.
     "features": ["scan"],  # Lines and corners of a scan.
     "motion": [],  # What a step is, and its noise.
-    "graph": [],  # Relations between keyframes, and the path that fits them best.
+    "graph": ["random"],  # Relations between keyframes, and the path that fits them best.
     "grid": ["scan"],  # Cells and rays.
     "trail": ["graph", "motion", "scan"],  # Keyframes and the path through them.
     "matching": ["features", "scan"],  # One scan against another: answers, point-to-line.
     "voting": ["matching", "features"],  # The default's matcher.
     "landmarks": ["features"],  # Which features become landmarks, and their estimates.
     "filters": ["landmarks", "motion", "trail", "features"],  # What every filter is to the mapper.
-    "fastslam": ["filters", "landmarks", "motion", "random", "trail"],
+    "fastslam": ["filters", "graph", "landmarks", "motion", "random", "trail"],
     "loops": ["filters", "trail", "matching", "grid", "scan"],  # Old places seen again; contradictions.
     "tracking": ["matching", "features", "motion", "trail", "scan"],  # Scan against the last keyframes.
     "recovery": ["loops", "tracking", "matching", "trail", "motion", "scan"],  # A robot that was not watched.

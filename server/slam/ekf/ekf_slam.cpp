@@ -152,7 +152,7 @@ void EkfSlam::Commit() {
   nis_.EndStep();
 }
 
-void EkfSlam::Rebase(std::span<const Pose2> path) {
+void EkfSlam::Rebase(std::span<const Pose2> path, std::span<const PoseRelation> /*relations*/) {
   for (Entry& entry : landmarks_) {
     const Pose2 correction = path[entry.first_keyframe] * path_[entry.first_keyframe].Inverse();
     state_.SetPoint(entry.at, correction * state_.point(entry.at));

@@ -39,7 +39,7 @@ class EkfSlam final : public Filter {
   void Commit() override;
   // Moves the means only. The covariance is unchanged and thus larger than necessary.
   [[nodiscard]] bool rebases() const override { return true; }
-  void Rebase(std::span<const Pose2> path) override;
+  void Rebase(std::span<const Pose2> path, std::span<const PoseRelation> relations) override;
 
   [[nodiscard]] FilterEstimate estimate() const override { return {state_.robot(), state_.covariance<3, 3>(0, 0)}; }
   [[nodiscard]] FilterHealth health() const override;

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "common/geometry/pose_difference.h"
+#include "server/slam/graph/path_errors.h"
 
 namespace cairn::slam {
 namespace {
@@ -71,11 +72,16 @@ void ErrorEnsemble::LoseAncestors(Errors& errors, double share, int partner) con
   errors.rightCols(partner) += drawn.leftCols(partner);
 }
 
-void ErrorEnsemble::Rebase(std::size_t keyframes, const Pose2& T_map_robot, const Eigen::Matrix3d& covariance) {
-  path_.assign(keyframes, std::make_shared<const Kept>());
+void ErrorEnsemble::Rebase(std::span<const Pose2> path, std::span<const PoseRelation> relations) {
+  const std::vector<PoseErrorSamples> samples = SamplePathErrors(path, relations, kMembers, rng_);
+  path_.clear();
   frozen_path_.Forget();
-  robot_.setZero();
-  Disturb(T_map_robot, covariance);
+  for (std::size_t k = 0; k < path.size(); ++k) {
+    Kept kept;
+    kept.errors = J_pose_error(path[k]).inverse().cast<float>() * samples[k];
+    path_.push_back(std::make_shared<const Kept>(kept));
+  }
+  robot_ = path_.back()->errors;
 }
 
 Eigen::Matrix3d ErrorEnsemble::covariance(const Pose2& T_map_robot) const {

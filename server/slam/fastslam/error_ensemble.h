@@ -21,10 +21,12 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "common/geometry/pose2.h"
 #include "server/slam/fastslam/motion_sampler.h"
+#include "server/slam/graph/pose_graph.h"
 #include "server/slam/landmarks/innovation.h"
 #include "server/slam/random/resampling.h"
 #include "server/slam/state/frozen_blocks.h"
@@ -50,9 +52,9 @@ class ErrorEnsemble {
   // Appends the robot's error to the path. `spread_share` is the share of its variance over which the
   // particles still spread.
   void Keep(double spread_share) { path_.push_back(std::make_shared<const Kept>(Kept{robot_, spread_share})); }
-  // Sets the errors of all past keyframes to zero, and gives the robot's error this covariance of the pose,
-  // (x, y, theta) in map.
-  void Rebase(std::size_t keyframes, const Pose2& T_map_robot, const Eigen::Matrix3d& covariance);
+  // Replaces all errors by those that `path` may have, which was fitted to `relations`: one pose per keyframe, of which
+  // the last one is the robot's.
+  void Rebase(std::span<const Pose2> path, std::span<const PoseRelation> relations);
 
   // The covariance of the robot's pose, (x, y, theta) in map.
   [[nodiscard]] Eigen::Matrix3d covariance(const Pose2& T_map_robot) const;

@@ -42,7 +42,7 @@ class FastSlam final : public Filter {
   void Observe(std::span<const LandmarkSighting> sightings, double travelled_m);
   void Commit() override;
   [[nodiscard]] bool rebases() const override { return true; }
-  void Rebase(std::span<const Pose2> path) override;
+  void Rebase(std::span<const Pose2> path, std::span<const PoseRelation> relations) override;
 
   [[nodiscard]] FilterEstimate estimate() const override { return set_.estimate(); }
   [[nodiscard]] FilterHealth health() const override;
@@ -238,7 +238,7 @@ void FastSlam<LandmarkModel>::Commit() {
 }
 
 template <typename LandmarkModel>
-void FastSlam<LandmarkModel>::Rebase(std::span<const Pose2> path) {
+void FastSlam<LandmarkModel>::Rebase(std::span<const Pose2> path, std::span<const PoseRelation> relations) {
   Map map = maps_[set_.best_index()];
   for (std::size_t slot = 0; slot < map.size(); ++slot) {
     if (map[slot].sightings == 0) continue;
@@ -246,7 +246,7 @@ void FastSlam<LandmarkModel>::Rebase(std::span<const Pose2> path) {
     entry.landmark.Move(path[entry.first_keyframe] * set_.best().path[entry.first_keyframe].Inverse());
     index_.Grow(slot, entry.landmark.p_map());
   }
-  set_.Rebase(path);
+  set_.Rebase(path, relations);
   std::fill(maps_.begin(), maps_.end(), map);
 }
 

@@ -90,11 +90,11 @@ std::vector<int> ParticleSet::Commit() {
   return parents;
 }
 
-void ParticleSet::Rebase(std::span<const Pose2> path) {
+void ParticleSet::Rebase(std::span<const Pose2> path, std::span<const PoseRelation> relations) {
   Particle particle;
   particle.T_map_robot = path.back();
-  // The pose keeps some uncertainty, because a closed loop does not make it exact. Half or twice of the two standard
-  // deviations changes the errors no more than another seed (study `sensitivity`).
+  // The particles spread a little again, so that they can follow the next observations. Half or twice of the two
+  // standard deviations changes the errors no more than another seed (study `sensitivity`).
   particle.covariance = PoseCovariance(0.05, 0.01);
   particle.log_likelihood = best().log_likelihood;
   for (const Pose2& pose : path) particle.path.Append(pose);
@@ -102,9 +102,9 @@ void ParticleSet::Rebase(std::span<const Pose2> path) {
   best_ = 0;
   travelled_ = 0.0;
   sample_due_ = false;
-  errors_.Rebase(path.size(), path.back(), particle.covariance);
+  errors_.Rebase(path, relations);
   effective_ = static_cast<double>(particles_.size());
-  estimate_ = {particle.T_map_robot, particle.covariance};
+  estimate_ = {particle.T_map_robot, errors_.covariance(particle.T_map_robot)};
 }
 
 void ParticleSet::Summarise(const std::vector<double>& shares) {

@@ -96,8 +96,9 @@ class ParticleSet {
   // effective sample size is too small. Returns the parents of the new set in order; empty if there was no
   // resampling.
   [[nodiscard]] std::vector<int> Commit();
-  // Replaces the path of every particle by this one. All particles are equal afterwards.
-  void Rebase(std::span<const Pose2> path);
+  // Replaces the path of every particle by this one. All particles are equal afterwards. The error ensemble becomes
+  // that of the fit.
+  void Rebase(std::span<const Pose2> path, std::span<const PoseRelation> relations);
 
   [[nodiscard]] const std::vector<Particle>& particles() const { return particles_; }
   [[nodiscard]] const Particle& operator[](std::size_t index) const { return particles_[index]; }

@@ -81,10 +81,10 @@ class Filter {
   virtual void Commit() = 0;
   // True if the filter supports Rebase.
   [[nodiscard]] virtual bool rebases() const { return false; }
-  // Replaces the path after a large loop was closed; `path` has one pose per committed keyframe. Every
-  // hypothesis takes this path, and its landmarks move with the keyframes from which they were seen.
+  // Replaces the path after a large loop was closed; `path` has one pose per committed keyframe and fits `relations`.
+  // Every hypothesis takes this path, and its landmarks move with the keyframes from which they were seen.
   // REQUIRES: rebases(), and called between steps.
-  virtual void Rebase(std::span<const Pose2> /*path*/) {}
+  virtual void Rebase(std::span<const Pose2> /*path*/, std::span<const PoseRelation> /*relations*/) {}
 
   // False as long as the pose of the robot in `map` is not known; its poses are then relative to its start.
   // When the robot is placed for the first time, the whole path moves.

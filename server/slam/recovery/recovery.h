@@ -56,7 +56,7 @@ class Recovery {
 
   // `blind` is the noise of motion known by odometry alone.
   Recovery(const RecoveryOptions& options, const LoopOptions& loop, const SelfCheckOptions& check,
-           const PointToLineOptions& align, const SurfaceOptions& surface, const MotionNoise& blind,
+           const PointToLineOptions& align, const SurfaceOptions& surface, const OdometryNoise& blind,
            double lost_after_m)
       : options_(options),
         loop_(loop),
@@ -132,7 +132,7 @@ class Recovery {
   LoopOptions loop_;
   PlaceSearch search_;
   SurfaceOptions surface_;
-  MotionNoise blind_;
+  OdometryNoise blind_;
   double lost_after_m_;
   bool active_ = false;
   bool odometry_goes_on_ = false;

@@ -1,11 +1,12 @@
-// Accumulates the motion that no scan measured: the part that is known by odometry or by a forecast alone. It
-// gives the uncertainty of a step between keyframes in addition to the drift of matching, and decides when
-// the robot counts as lost. Not thread-safe.
+// Accumulates the motion that no scan measured: the part that is known by odometry or by a forecast alone. Along a
+// corridor this is the position along it, although the scan matches. It gives the uncertainty of a step between
+// keyframes in addition to the drift of matching, and decides when the robot counts as lost. Not thread-safe.
 #pragma once
 
 #include <Eigen/Core>
 #include <utility>
 
+#include "server/slam/matching/match_result.h"
 #include "server/slam/motion/step_motion.h"
 #include "server/slam/tracking/front_end.h"
 
@@ -15,16 +16,20 @@ class BlindMotion {
  public:
   // `noise` is the noise of motion known by odometry alone. Without odometry the front-end itself reports the
   // covariance of what it did not measure.
-  BlindMotion(const MotionNoise& noise, bool use_odometry, double lost_after_m)
+  BlindMotion(const OdometryNoise& noise, bool use_odometry, double lost_after_m)
       : noise_(noise), use_odometry_(use_odometry), lost_after_m_(lost_after_m) {}
 
   // `T_track_keyframe` is the pose of the last keyframe.
   void Add(const TrackStep& step, const Pose2& T_track_keyframe) {
     unmatched_m_ = step.matched ? 0.0 : unmatched_m_ + step.moved_m;
-    if (!step.matched && use_odometry_) covariance_ += noise_.Covariance({step.moved_m, 0.0, 0.0});
     Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
     R.topLeftCorner<2, 2>() = T_track_keyframe.rotation().transpose();
-    covariance_ += R * step.forecast_covariance * R.transpose();
+    if (!use_odometry_) {
+      covariance_ += R * step.forecast_covariance * R.transpose();
+      return;
+    }
+    covariance_ += noise_.Covariance(step.T_prev_curr_odom);
+    if (step.matched) KeepUnseen(R.topLeftCorner<2, 2>() * step.open_direction, step.open_information);
   }
 
   // Returns the covariance of the motion since the last call: (x, y, theta) in the last keyframe.
@@ -43,7 +48,15 @@ class BlindMotion {
   }
 
  private:
-  MotionNoise noise_;
+  // A match shows where the robot is relative to the keyframe, but little or nothing of the position along `open`,
+  // which is zero if there is no such direction.
+  void KeepUnseen(const Eigen::Vector2d& open, double information) {
+    const double along = open.dot(covariance_.topLeftCorner<2, 2>() * open);
+    covariance_.setZero();
+    covariance_.topLeftCorner<2, 2>() = VarianceAfter(along, information) * open * open.transpose();
+  }
+
+  OdometryNoise noise_;
   bool use_odometry_;
   double lost_after_m_;
   double unmatched_m_ = 0.0;  // Distance travelled since the last match.

@@ -97,8 +97,8 @@ void Visit(OptionVisitor& visitor, FrontEndOptions& options) {
                   "no_odometry.merged_keyframes", "must not exceed", "reference_keyframes");
 }
 
-FrontEnd::FrontEnd(const FrontEndOptions& options, ScanMatcher matcher)
-    : options_(options), matcher_(std::move(matcher)) {}
+FrontEnd::FrontEnd(const FrontEndOptions& options, ScanMatcher matcher, const OdometryNoise& blind)
+    : options_(options), matcher_(std::move(matcher)), blind_(blind) {}
 
 ScanView Look(const Scan& scan, const FrontEndOptions& options) {
   const std::vector<BeamPoint> points = PointsOf(scan);
@@ -123,15 +123,18 @@ TrackStep FrontEnd::Follow(const ScanView& view, const Pose2& T_odom_robot, cons
     TakeAlongFromPrior({guess.T_track_robot, guess.covariance}, coarse);
   const MatchResult match = options_.refine_enabled ? Refine(view, T_odom_robot, guess, coarse)
                                                     : MatchAlone(view, T_odom_robot, guess, coarse, parallel_for);
-  return StepOf(match);
+  return StepOf(match, T_odom_robot);
 }
 
-TrackStep FrontEnd::StepOf(const MatchResult& match) const {
+TrackStep FrontEnd::StepOf(const MatchResult& match, const Pose2& T_odom_robot) const {
   TrackStep step{.T_track_robot = match.T_ref_curr,
                  .score = match.score,
                  .matched = match.converged,
-                 .degenerate = match.degenerate};
+                 .degenerate = match.degenerate,
+                 .open_information = match.open_information};
+  if (match.degenerate) step.open_direction = match.degenerate_direction;
   step.moved_m = Between(history_.back().T_track_robot, step.T_track_robot).translation().norm();
+  step.T_prev_curr_odom = Between(history_.back().T_odom_robot, T_odom_robot);
   if (!options_.use_odometry) {
     if (!step.matched) step.moved_m = std::max(step.moved_m, options_.no_odometry.unmatched_step_m);
     step.forecast_covariance = ForecastShare(match);
@@ -149,10 +152,9 @@ std::optional<TrackStep> FrontEnd::TrackAgain(const ScanView& view, const Pose2&
   const Sight first = history_.back();
   history_.pop_back();
   const Guess guess = Predict(T_odom_robot);
-  const MatchResult match = AlignPointsToSurfaces(
-      view.points_robot, index_, {step.T_track_robot, guess.T_track_robot, guess.covariance}, options_.refine);
+  const MatchResult match = Align(view, step.T_track_robot, guess);
   const bool better = match.converged && match.score > step.score;
-  const TrackStep again = better ? StepOf(match) : step;
+  const TrackStep again = better ? StepOf(match, T_odom_robot) : step;
   score_ = again.score;
   history_.push_back({again.T_track_robot, first.T_odom_robot});
   if (!better) return std::nullopt;
@@ -245,6 +247,18 @@ double FrontEnd::Explained(const ScanView& view, const Pose2& T_track_robot) con
       .score;
 }
 
+// The prior of the alignment is generous, because real odometry fails. Along a corridor rough points and the ends of
+// the view, which move with the robot, would outweigh it and hold the robot back.
+MatchResult FrontEnd::Align(const ScanView& view, const Pose2& start, const Guess& guess) const {
+  MatchResult match =
+      AlignPointsToSurfaces(view.points_robot, index_, {start, guess.T_track_robot, guess.covariance}, options_.refine);
+  if (options_.use_odometry) {
+    const Pose2 motion = Between(history_.back().T_track_robot, guess.T_track_robot);
+    WeighAlongWithPrior({guess.T_track_robot, blind_.Covariance(motion)}, match);
+  }
+  return match;
+}
+
 std::vector<Pose2> FrontEnd::UnusualGuesses(const Pose2& T_odom_robot) const {
   std::vector<Pose2> guesses = {history_.back().T_track_robot};
   for (const std::size_t back : kLookBack) {
@@ -257,10 +271,7 @@ std::vector<Pose2> FrontEnd::UnusualGuesses(const Pose2& T_odom_robot) const {
 
 MatchResult FrontEnd::Refine(const ScanView& view, const Pose2& T_odom_robot, const Guess& guess,
                              const MatchResult& coarse) const {
-  const auto align = [&](const Pose2& start) {
-    return AlignPointsToSurfaces(view.points_robot, index_, {start, guess.T_track_robot, guess.covariance},
-                                 options_.refine);
-  };
+  const auto align = [&](const Pose2& start) { return Align(view, start, guess); };
 
   // The refinement starts at the matcher's answer or, if there is none, at the prediction.
   MatchResult best = align(coarse.converged ? coarse.T_ref_curr : guess.T_track_robot);

@@ -66,8 +66,13 @@ struct TrackStep {
   double score = 0.0;       // Share of the scan that agrees with the last keyframes, 0..1.
   bool matched = false;     // False if the pose comes from odometry or from the forecast.
   bool degenerate = false;  // True in a corridor: the scan does not show the position along it.
-  double moved_m = 0.0;     // Distance travelled since the previous scan.
-  bool found = false;       // The step leads to where the robot was found again; odometry does not know it.
+  // Then that direction, a unit vector along the axes of `track`, and the information of the scan on the position along
+  // it, 1/m^2.
+  Eigen::Vector2d open_direction = Eigen::Vector2d::Zero();
+  double open_information = 0.0;
+  double moved_m = 0.0;      // Distance travelled since the previous scan.
+  Pose2 T_prev_curr_odom{};  // The step from the previous scan as odometry measured it.
+  bool found = false;        // The step leads to where the robot was found again; odometry does not know it.
   // Covariance of the part of the step that neither a scan nor odometry measured (the direction along a
   // corridor, or a scan without a match), along the axes of `track`. It is zero if odometry is used:
   // BlindMotion accounts for that case.
@@ -75,14 +80,15 @@ struct TrackStep {
 
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
-    archive(self.T_track_robot, self.score, self.matched, self.degenerate, self.moved_m, self.found,
-            self.forecast_covariance);
+    archive(self.T_track_robot, self.score, self.matched, self.degenerate, self.open_direction, self.open_information,
+            self.moved_m, self.T_prev_curr_odom, self.found, self.forecast_covariance);
   }
 };
 
 class FrontEnd {
  public:
-  FrontEnd(const FrontEndOptions& options, ScanMatcher matcher);
+  // `blind` is the noise of motion known by odometry alone.
+  FrontEnd(const FrontEndOptions& options, ScanMatcher matcher, const OdometryNoise& blind = {});
 
   // Returns the pose at this scan. The first scan is at the identity and counts as matched.
   TrackStep Track(const ScanView& view, const Pose2& T_odom_robot, const ParallelFor& parallel_for);
@@ -124,8 +130,11 @@ class FrontEnd {
   };
   [[nodiscard]] TrackStep Follow(const ScanView& view, const Pose2& T_odom_robot,
                                  const ParallelFor& parallel_for) const;
-  [[nodiscard]] TrackStep StepOf(const MatchResult& match) const;
+  [[nodiscard]] TrackStep StepOf(const MatchResult& match, const Pose2& T_odom_robot) const;
   [[nodiscard]] Guess Predict(const Pose2& T_odom_robot) const;
+  // Alignment with the reference, from `start`. Along a corridor odometry, with the noise that it usually has, decides
+  // together with the surfaces.
+  [[nodiscard]] MatchResult Align(const ScanView& view, const Pose2& start, const Guess& guess) const;
   // In the results of the next three functions the reference frame is `track`.
   [[nodiscard]] MatchResult MatchLastKeyframe(const ScanView& view, const Guess& guess,
                                               const ParallelFor& parallel_for) const;
@@ -146,6 +155,7 @@ class FrontEnd {
 
   FrontEndOptions options_;
   ScanMatcher matcher_;
+  OdometryNoise blind_;
   double score_ = 0.0;  // Score of the last match.
   // The reference of the matcher, which mostly is the last keyframe, and its points in its robot frame.
   Sight keyframe_;

@@ -20,9 +20,10 @@ struct Drive {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // Covariance of dead reckoning.
   std::vector<Pose2> path;
 
+  static Eigen::Matrix3d Noise() { return Eigen::Vector3d(4e-4, 1e-4, 1e-4).asDiagonal(); }
   // Keeps the keyframe it stands at, then drives on.
   void Step(ErrorEnsemble& errors, const Pose2& step, double spread_share = 1.0) {
-    const Eigen::Matrix3d noise = Eigen::Vector3d(4e-4, 1e-4, 1e-4).asDiagonal();
+    const Eigen::Matrix3d noise = Noise();
     errors.Keep(spread_share);
     path.push_back(T_map_robot);
     errors.Move(T_map_robot, step, noise);
@@ -82,15 +83,25 @@ TEST(ErrorEnsemble, OneAncestorLeftErrsByAsMuchAsItWasDrawnFrom) {
   EXPECT_EQ(errors.covariance(drive.T_map_robot), after);
 }
 
-TEST(ErrorEnsemble, ARebasedPathIsKnown) {
+// After the fit of a circle whose end sees its beginning, the errors are those of the fit: small at the end, largest in
+// the middle, and known relative to old keyframes as well.
+TEST(ErrorEnsemble, ARebasedPathIsAsSureAsItsRelations) {
   ErrorEnsemble errors(5);
   Drive drive;
-  for (int i = 0; i < 40; ++i) drive.Step(errors, {0.5, 0.0, 0.0});
-  const Eigen::Matrix3d doubt = Eigen::Vector3d(0.04, 0.01, 0.0004).asDiagonal();
-  errors.Rebase(drive.path.size(), drive.T_map_robot, doubt);
-  ExpectSpread(errors.covariance(drive.T_map_robot), doubt);
-  SeeAgain(errors, drive, 20);
-  EXPECT_LT(errors.covariance(drive.T_map_robot).trace(), 0.02 * doubt.trace());
+  for (int i = 0; i < 40; ++i) drive.Step(errors, {0.5, 0.0, kPi / 20});
+  std::vector<PoseRelation> relations;
+  for (std::size_t k = 1; k < drive.path.size(); ++k)
+    relations.push_back({k - 1, k, Between(drive.path[k - 1], drive.path[k]), Drive::Noise(), false});
+  const std::size_t last = drive.path.size() - 1;
+  relations.push_back({0, last, Between(drive.path[0], drive.path[last]), kSight, true});
+  errors.Rebase(drive.path, relations);
+  const Eigen::Matrix3d claimed = errors.covariance(drive.path.back());
+  EXPECT_NEAR(std::sqrt(claimed(0, 0)), 0.01, 0.004);
+  EXPECT_NEAR(std::sqrt(claimed(2, 2)), 0.001, 0.0004);
+  drive.T_map_robot = drive.path.back();
+  SeeAgain(errors, drive, last / 2);  // What was seen in the middle of the circle is less certain than the beginning.
+  EXPECT_LT(errors.covariance(drive.T_map_robot).trace(), 1.2 * claimed.trace());
+  EXPECT_GT(errors.covariance(drive.T_map_robot).trace(), 0.3 * claimed.trace());
 }
 
 }  // namespace
