@@ -11,8 +11,8 @@ namespace cairn::slam {
 namespace {
 
 constexpr int kSamples = 400;
-const Eigen::Matrix3d kStepCovariance = Eigen::Vector3d(4e-4, 1e-4, 2e-4).asDiagonal();
-const Eigen::Matrix3d kLoopCovariance = Eigen::Vector3d(1e-4, 1e-4, 1e-4).asDiagonal();
+const Eigen::Matrix3d kStepErrors = Eigen::Vector3d(4e-4, 1e-4, 2e-4).asDiagonal();
+const Eigen::Matrix3d kLoopErrors = Eigen::Vector3d(1e-4, 1e-4, 1e-4).asDiagonal();
 
 Pose2 WithNoise(const Pose2& pose, const Eigen::Matrix3d& covariance, Rng& rng) {
   return Plus(pose, covariance.llt().matrixL() * ThreeNormalDraws(rng));
@@ -27,13 +27,13 @@ struct FittedDrive {
   FittedDrive(bool loop, Rng& rng) {
     for (std::size_t k = 0; k < 40; ++k) {
       const Pose2 step{0.5, 0.0, k % 10 == 9 ? kPi / 2 : 0.0};
-      const Pose2 seen = WithNoise(step, kStepCovariance, rng);
+      const Pose2 seen = WithNoise(step, kStepErrors, rng);
       truth.push_back(truth.back() * step);
       path.push_back(path.back() * seen);
-      relations.push_back({k, k + 1, seen, kStepCovariance, false});
+      relations.push_back({k, k + 1, seen, kStepErrors, false});
     }
     if (!loop) return;
-    relations.push_back({0, 40, WithNoise(Between(truth[0], truth[40]), kLoopCovariance, rng), kLoopCovariance, true});
+    relations.push_back({0, 40, WithNoise(Between(truth[0], truth[40]), kLoopErrors, rng), kLoopErrors, true});
     EXPECT_TRUE(OptimisePoses(path, relations, {}).usable);
   }
 };
@@ -74,7 +74,7 @@ TEST(PathErrors, OfThePoseThatALoopJoinsAreThoseOfTheLoop) {
   const auto errors = SamplePathErrors(drive.path, drive.relations, kSamples, rng);
   const Eigen::Matrix3d ends = RelativeCovariance(drive.path[0], errors[0], drive.path[40], errors[40]);
   const Eigen::Matrix3d middle = RelativeCovariance(drive.path[0], errors[0], drive.path[20], errors[20]);
-  EXPECT_NEAR(ends(0, 0) / kLoopCovariance(0, 0), 1.0, 0.2);
+  EXPECT_NEAR(ends(0, 0) / kLoopErrors(0, 0), 1.0, 0.2);
   EXPECT_GT((middle.topLeftCorner<2, 2>().trace()), (10.0 * ends.topLeftCorner<2, 2>().trace()));
   EXPECT_TRUE(errors[0].isZero());
 }
@@ -83,7 +83,7 @@ TEST(PathErrors, ALoopThatIsOutvotedAddsNoCertainty) {
   Rng rng(5);
   FittedDrive drive(false, rng);
   const auto without = SamplePathErrors(drive.path, drive.relations, kSamples, rng);
-  drive.relations.push_back({0, 40, Between(drive.path[0], drive.path[40]) * Pose2{50, 0, 0}, kLoopCovariance, true});
+  drive.relations.push_back({0, 40, Between(drive.path[0], drive.path[40]) * Pose2{50, 0, 0}, kLoopErrors, true});
   const auto with = SamplePathErrors(drive.path, drive.relations, kSamples, rng);
   const auto at_the_end = [&](const std::vector<PoseErrorSamples>& errors) {
     return RelativeCovariance(drive.path[0], errors[0], drive.path[40], errors[40]).trace();
