@@ -103,6 +103,19 @@ TEST(ScanRaster, MarksWhatEveryRayByItselfMarks) {
   EXPECT_GT(cells, 100'000U);
 }
 
+TEST(ScanRaster, ABeamThatEndsWhereAnotherHitDoesNotClearIt) {
+  Scan scan = test::Look(test::Office(), {}, test::FullTurnLaser(90));
+  scan.ranges_m = {3.0F, static_cast<float>(scan.range_max_m)};  // The second one has no echo.
+  scan.angle_first_rad = 0.01;
+  scan.angle_step_rad = 1e-4;
+  const RasterOptions options{.no_return_free_m = 3.0};
+  int hits = 0;
+  ScanRaster().Rasterise(scan, {}, options, [&](GridCell, const ScanRaster::Piece& marks) {
+    hits += static_cast<int>(std::count(marks.begin(), marks.end(), ScanRaster::kHit));
+  });
+  EXPECT_EQ(hits, 1);
+}
+
 // A pose may have any finite coordinates.
 TEST(ScanRaster, FarAwayAllRaysFallIntoOneCell) {
   const Scan scan = test::Look(test::Office(), {}, test::FullTurnLaser(90));
