@@ -107,7 +107,7 @@ void Server::KeepHouse(const std::stop_token& stop) {
     roster_.Tick();
     jobs_.Tick();
     if (Clock::now() >= next_publish) {
-      PublishMaps();
+      atlas_.Publish();
       next_publish = std::max(next_publish + publish_period, Clock::now());
     }
     CheckHealth();
@@ -117,13 +117,6 @@ void Server::KeepHouse(const std::stop_token& stop) {
     while (!stop.stop_requested() && tick.WaitUntil(mutex, std::min(next, next_publish))) {
     }
   }
-}
-
-void Server::PublishMaps() {
-  // Another site is the first each time, because the first one may fill the lane.
-  const auto sites = atlas_.All();
-  ++first_site_;
-  for (std::size_t i = 0; i < sites.size(); ++i) sites[(first_site_ + i) % sites.size()]->Publish();
 }
 
 void Server::CheckHealth() {
@@ -169,7 +162,8 @@ void Server::Stop() {
   saved_sites_.Stop();
   worker_.Stop();
   FinishSessions();
-  PublishMaps();
+  atlas_.Publish();
+  atlas_.Close();
   robots_pool_.join();
   maps_pool_.join();
   desk_.Stop();

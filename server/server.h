@@ -56,7 +56,6 @@ class Server {
   Result<void> Restore();
   void CheckHealth();
   void CheckJournal();
-  void PublishMaps();
   void FinishSessions();
 
   const ServerOptions options_;
@@ -76,7 +75,6 @@ class Server {
   SavedSites saved_sites_;
   Desk desk_;
   Heartbeat heartbeat_;
-  std::size_t first_site_ = 0;     // The next one to be published; used by housekeeping only.
   bool journal_degraded_ = false;  // As last logged.
   std::atomic<bool> healthy_{true};
   std::atomic<bool> stopping_{false};

@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <latch>
 #include <optional>
 #include <utility>
 
@@ -201,6 +202,24 @@ std::vector<std::shared_ptr<Site>> Atlas::All() const {
   std::vector<std::shared_ptr<Site>> all;
   for (const auto& [name, place] : sites_) all.push_back(place.site);
   return all;
+}
+
+void Atlas::Publish() {
+  auto others = All();
+  if (others.empty()) return;
+  const auto next = others.begin() + static_cast<std::ptrdiff_t>(first_++ % others.size());
+  const std::shared_ptr<Site> first = *next;
+  others.erase(next);
+  first->Publish([others = std::move(others)] {
+    for (const auto& site : others) site->Publish();
+  });
+}
+
+void Atlas::Close() {
+  const auto sites = All();
+  std::latch open(static_cast<std::ptrdiff_t>(sites.size()));
+  for (const auto& site : sites) site->Close([&open] { open.count_down(); });
+  open.wait();
 }
 
 }  // namespace cairn::server

@@ -4,6 +4,8 @@
 #pragma once
 
 #include <asio/thread_pool.hpp>
+#include <atomic>
+#include <cstddef>
 #include <map>
 #include <memory>
 #include <set>
@@ -49,6 +51,11 @@ class Atlas {
   Result<std::shared_ptr<Site>> Create(const std::string& name);
   [[nodiscard]] std::shared_ptr<Site> Find(const std::string& name) const;
   [[nodiscard]] std::vector<std::shared_ptr<Site>> All() const;
+  // Every site publishes what changed. Another one is the first each time, and the others wait for it, because one site
+  // may fill the lane.
+  void Publish();
+  // The server stops: closes every site and waits until all have come to it. REQUIRES: the pool is running.
+  void Close();
 
  private:
   struct Place {
@@ -77,6 +84,7 @@ class Atlas {
   std::set<std::string> reserved_ CAIRN_GUARDED_BY(mutex_);
   std::map<NameId, std::string> set_aside_ CAIRN_GUARDED_BY(mutex_);  // Why each of these sites was not restored.
   Site::Beginning beginning_ CAIRN_GUARDED_BY(mutex_);                // For the next site.
+  std::atomic<std::size_t> first_ = 0;                                // Counts the calls of Publish.
 };
 
 }  // namespace cairn::server

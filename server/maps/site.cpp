@@ -172,15 +172,26 @@ void Site::Enable(std::uint32_t version, Done done, Wanted wanted) {
 
 void Site::Retire(std::function<void(std::shared_ptr<const MapSnapshot>)> done) {
   Run([done = std::move(done)](Site& site) {
-    if (site.switch_) {
-      const Done waiting = std::move(site.switch_->done);
-      site.switch_.reset();
-      waiting(Fail(StatusCode::kNotFound, "site '" + site.name_ + "' was deleted"));
-    }
+    site.FailSwitch(StatusCode::kNotFound, "site '" + site.name_ + "' was deleted");
     site.journal_ = nullptr;
     site.retired_ = true;
     done(site.snapshot());
   });
+}
+
+void Site::Close(std::function<void()> done) {
+  Run([done = std::move(done)](Site& site) {
+    site.members_.clear();
+    done();
+    site.FailSwitch(StatusCode::kUnavailable, "the server is stopping");
+  });
+}
+
+void Site::FailSwitch(StatusCode code, const std::string& why) {
+  if (!switch_) return;
+  const Done waiting = std::move(switch_->done);
+  switch_.reset();
+  waiting(Fail(code, why));
 }
 
 void Site::Leave(SessionId session) {
@@ -192,12 +203,16 @@ void Site::Leave(SessionId session) {
   });
 }
 
-void Site::Publish() {
-  if (publish_waits_.exchange(true)) return;
-  Run([](Site& site) {
+void Site::Publish(std::function<void()> then) {
+  if (publish_waits_.exchange(true)) {
+    if (then) then();
+    return;
+  }
+  Run([then = std::move(then)](Site& site) {
     site.publish_waits_ = false;
     site.Render();
     site.Send();
+    if (then) then();
   });
 }
 

@@ -83,12 +83,16 @@ class Site : public std::enable_shared_from_this<Site> {
   // last, on the strand, when everything that was asked before is finished. A switch of the map version under way
   // fails.
   void Retire(std::function<void(std::shared_ptr<const MapSnapshot>)> done);
+  // The server stops: after this no session is told anything, because its pool is about to end. `done` is called on the
+  // strand when everything that was asked before is finished. A switch of the map version under way fails.
+  void Close(std::function<void()> done);
   // Adds a disabled version; `done` receives its number.
   void AddVersion(MapVersion&& version, Done done, Wanted wanted = {});
   // UNAVAILABLE: another switch is under way. NOT_FOUND: the version does not exist or has been removed.
   void Enable(std::uint32_t version, Done done, Wanted wanted = {});
-  // Renders and publishes what changed, soon; does nothing where an earlier call still waits for the strand.
-  void Publish();
+  // Renders and publishes what changed, soon; does nothing where an earlier call still waits for the strand. Then calls
+  // `then`, if there is one.
+  void Publish(std::function<void()> then = {});
   // Does nothing but call `done` on the strand, to show that the strand makes progress.
   void Probe(std::function<void()> done);
 
@@ -112,6 +116,7 @@ class Site : public std::enable_shared_from_this<Site> {
   // The functions below run on the strand only.
   void Apply(SessionId session, const slam::OccupancyGrid::Chunks& chunks);
   void Begin(std::uint32_t version, Done done);
+  void FailSwitch(StatusCode code, const std::string& why);
   void Settle(std::uint32_t version, SessionId session, std::optional<Adopted>&& adopted);
   std::shared_ptr<GridOwner> OwnerOf(SessionId session) const;
   void StageGone(SessionId session);

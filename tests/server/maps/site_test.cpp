@@ -3,8 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <future>
+#include <map>
 #include <stdexcept>
+#include <string>
+#include <variant>
 
 #include "server/maps/atlas.h"
 
@@ -269,6 +273,25 @@ TEST_F(SiteTest, ASessionWithoutAPartOfTheVersionLearnsTheEpochToo) {
   EXPECT_EQ(late->epoch(), 1U);
 }
 
+// What a session is told then would never be handled, and be destroyed after its pool.
+TEST_F(SiteTest, ASiteThatIsClosedTellsNoSessionAnything) {
+  const std::uint32_t version = AddVersion({{1, {{}, 1}}});
+  auto enabled = Enable(version);
+  ASSERT_EQ(corrections_.size(), 1U);
+  std::promise<void> closed;
+  site_->Close([&] { closed.set_value(); });
+  closed.get_future().wait();
+  ASSERT_EQ(enabled.wait_for(std::chrono::seconds(10)), std::future_status::ready);
+  EXPECT_EQ(enabled.get().error().code, StatusCode::kUnavailable);
+  // The answer that was under way comes too late.
+  corrections_[0].second.done({.session = 1, .displaced = {}, .change = {.session = 1, .chunks = {}}});
+  corrections_.clear();
+  auto next = Enable(AddVersion({{1, {{}, 1}}, {2, {{}, 1}}}));
+  ASSERT_TRUE(corrections_.empty());
+  EXPECT_TRUE(next.get());
+  for (const auto& [id, session] : sessions_) EXPECT_EQ(session->epoch(), 0U);
+}
+
 TEST_F(SiteTest, EnablingWhatIsEnabledOrMissing) {
   EXPECT_EQ(*Enable(1).get(), 1U);
   EXPECT_EQ(site_->snapshot()->info.epoch, 0U);
@@ -343,6 +366,37 @@ TEST(Atlas, ASiteThatHoldsNothingGivesWay) {
   EXPECT_TRUE(atlas.Enter("another"));
   EXPECT_NE(atlas.Find("configured"), nullptr);
   EXPECT_NE(atlas.Find("drawn"), nullptr);
+}
+
+// The first site by name filled the lane each time, and the others were never seen.
+TEST(Atlas, AnotherSiteIsTheFirstToBePublishedEachTime) {
+  asio::thread_pool pool(1);
+  Outbound outbound(1);
+  Atlas atlas(MapsOptions{}, 0.05, true, pool, outbound);
+  std::map<std::string, std::shared_ptr<Site>> sites;
+  for (const char* name : {"a", "b", "c"}) sites[name] = *atlas.Enter(name);
+  for (const std::string first : {"a", "b", "c", "a"}) {
+    // Work waits on all of them, that of the others earlier.
+    for (const auto& [name, site] : sites) {
+      if (name != first) site->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(100)}}});
+    }
+    sites.at(first)->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(100)}}});
+    atlas.Publish();
+    const auto reach = [](const std::shared_ptr<Site>& site) {
+      std::promise<void> reached;
+      site->Probe([&] { reached.set_value(); });
+      reached.get_future().wait();
+    };
+    reach(sites.at(first));
+    for (const auto& [name, site] : sites) reach(site);
+    const auto value = outbound.lane(Outbound::Lane::kMap).TryPop();
+    ASSERT_TRUE(value);
+    const auto* info = std::get_if<MapInfo>(&*value);
+    const auto* tile = std::get_if<TileSample>(&*value);
+    ASSERT_TRUE(info != nullptr || tile != nullptr);
+    EXPECT_EQ(info != nullptr ? info->site_id : tile->site_id, HashName(first));
+  }
+  pool.join();
 }
 
 }  // namespace
