@@ -8,6 +8,7 @@
 
 #include "common/geometry/pose_difference.h"
 #include "common/geometry/transform2.h"
+#include "common/geometry/transform2.h"
 #include "server/slam/matching/match_result.h"
 #include "server/slam/matching/point_to_line.h"
 

@@ -43,6 +43,46 @@ TEST(PointIndex, FindsWhatLookingAtAllFinds) {
   EXPECT_GT(far, 500);
 }
 
+// Clouds as dense as walls that were seen forty times, some points twice, and searches that begin at any other point.
+TEST(PointIndex, WhereASearchBeginsDoesNotChangeItsAnswer) {
+  std::mt19937_64 rng(5);
+  std::normal_distribution<double> across(0.0, 0.03);
+  std::uniform_real_distribution<double> along(-1.0, 1.0), share(0.0, 1.0);
+  std::vector<SurfacePoint> all;
+  for (int i = 0; i < 3000; ++i) all.push_back(i % 2 == 0 ? At(along(rng), across(rng)) : At(across(rng), along(rng)));
+  for (std::size_t i = 0; i < 300; ++i) all.push_back(all[7 * i]);
+  const PointIndex index(all);
+  const auto nearest_of_all = [&all](const Eigen::Vector2d& p, double max_distance_m) {
+    const SurfacePoint* nearest = nullptr;
+    double best = max_distance_m * max_distance_m;
+    for (const SurfacePoint& point : all) {
+      const double squared = (point.p - p).squaredNorm();
+      if (squared < best || (nearest != nullptr && squared == best)) nearest = &point;
+      best = std::min(best, squared);
+    }
+    return nearest == nullptr ? -1 : nearest - all.data();
+  };
+  std::int32_t likely = PointIndex::kNone, kept = PointIndex::kNone;
+  int found = 0;
+  for (int i = 0; i < 3000; ++i) {
+    const Eigen::Vector2d p = share(rng) < 0.3 ? all[static_cast<std::size_t>(i)].p
+                                               : Eigen::Vector2d(along(rng), 2.0 * across(rng));
+    const double max_distance_m = i % 3 == 0 ? 0.02 : 0.3;
+    const auto expected = nearest_of_all(p, max_distance_m);
+    std::int32_t any = PointIndex::kNone;
+    for (std::int32_t* begin : {&any, &likely, &kept}) {
+      const SurfacePoint* answer = index.Nearest(p, max_distance_m, *begin);
+      ASSERT_EQ(answer == nullptr, expected < 0) << i;
+      if (answer != nullptr) {
+        ASSERT_EQ(*begin, expected) << i;
+      }
+    }
+    found += expected >= 0 ? 1 : 0;
+    if (i % 10 == 0) kept = likely;  // From somewhere else.
+  }
+  EXPECT_GT(found, 1500);
+}
+
 // Places on the borders of cells, and points that are as near as each other.
 TEST(PointIndex, BordersOfCellsHideNothing) {
   PointIndex index;
@@ -99,7 +139,7 @@ TEST(PointIndex, DroppedPointsAreNotFoundAnyMore) {
 // together.
 TEST(PointIndex, OfACrowdOnlyTheLastAreCompared) {
   PointIndex index;
-  const int crowd = PointIndex::kMaxInCell + 37;
+  const int crowd = PointIndex::kMaxInQuarter + 37;
   for (int i = 0; i < crowd; ++i) index.Add(At(1.0 + 1e-8 * i, 1.0));
   ASSERT_NE(index.Nearest({1.0, 1.0}, 0.5), nullptr);
   EXPECT_EQ(index.Nearest({1.0, 1.0}, 0.5)->p.x(), 1.0 + 1e-8 * 37);
@@ -109,7 +149,7 @@ TEST(PointIndex, OfACrowdOnlyTheLastAreCompared) {
 
 TEST(PointIndex, IsEmptyAgainAfterClear) {
   PointIndex index;
-  for (int i = 0; i < 2 * PointIndex::kMaxInCell; ++i) index.Add(At(1.0, 1.0));
+  for (int i = 0; i < 2 * PointIndex::kMaxInQuarter; ++i) index.Add(At(1.0, 1.0));
   index.Clear();
   EXPECT_EQ(index.size(), 0U);
   EXPECT_EQ(index.Nearest({1.0, 1.0}, 0.5), nullptr);
