@@ -51,6 +51,7 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
     s.front_end.AddKeyframe(view);
     s.AddKeyframe({std::move(still), T_odom_robot}, std::move(view), step, s.blind.TakeCovariance(), parallel_for);
   }
+  s.GoOnWithLoops();
   return s.Report(stamp, T_odom_robot, step, keyframe);
 }
 
@@ -76,12 +77,11 @@ void Mapper::State::AddKeyframe(Keyframe keyframe, ScanView view, const TrackSte
   trail.Append(std::move(keyframe), step.T_track_robot, std::move(view.points_robot), step_covariance, revisit);
 
   Begin(ScanStep::kLargeLoop);
-  CloseLargeLoop();
+  if (filter->rebases() && !fit) loops.Begin(trail, believed_path());
   Begin(ScanStep::kSelfCheck);
   self_check.Look(trail, believed_path());
   Begin(ScanStep::kDraw);
   Draw(step, placed_before);
-  Begin(ScanStep::kOther);
 }
 
 // The measured step from the last keyframe to this one. `covariance` is that of the part of the step that no
@@ -97,16 +97,30 @@ StepMotion Mapper::State::MotionTo(const Keyframe& keyframe, const TrackStep& st
   return motion;
 }
 
-// Possibly no particle agrees with the large loop: then the loop's error is distributed over the whole path.
+// The search for large loops, and the path with one, are spread over many scans.
+void Mapper::State::GoOnWithLoops() {
+  Begin(ScanStep::kLargeLoop);
+  if (fit) {
+    trail.GoOn(*fit, options.pose_graph);
+    if (fit->done()) CloseLargeLoop();
+  } else if (const auto loop = loops.GoOn(trail)) {
+    fit = trail.FitWithLoop(loop->relation(), believed_path().values());
+  }
+  Begin(ScanStep::kOther);
+}
+
+// Possibly no particle agrees with the large loop: then the loop's error is distributed over the whole path. What was
+// added while the path was fitted follows the last pose that took part.
 void Mapper::State::CloseLargeLoop() {
-  if (!filter->rebases()) return;
+  const PathFit closed = std::move(*fit);
+  fit.reset();
+  if (!closed.usable()) return;  // The loop is not stored, so that it will be searched for again.
+  std::vector<Pose2> path = closed.path();
   const PosePath believed = believed_path();
-  const auto loop = loops.Find(trail, believed);
-  if (!loop) return;
-  const auto path = trail.PathWithLoop(loop->relation(), believed.values(), options.pose_graph);
-  if (!path) return;  // The loop is not stored, so that it will be searched for again.
-  filter->Rebase(*path);
-  trail.AddLoop(loop->relation());
+  for (std::size_t k = path.size(); k < trail.size(); ++k)
+    path.push_back(path.back() * Between(believed[k - 1], believed[k]));
+  filter->Rebase(path);
+  trail.AddLoop(closed.loop());
   trail.ConfirmTentative();
   drawing.StartAgain(trail.size());
   self_check.Forget();
@@ -234,6 +248,7 @@ void Mapper::AdoptGrid(OccupancyGrid grid, std::size_t keyframes, std::span<cons
 
 // Takes the poses of the first keyframes from a job, as after a large loop.
 void Mapper::State::Follow(std::span<const Pose2> first_poses) {
+  fit.reset();  // It began with the path before.
   const std::vector<Pose2> before = believed_path().values();
   std::vector<Pose2> path(first_poses.begin(), first_poses.end());
   const std::size_t known = path.size();
@@ -291,6 +306,7 @@ bool Mapper::State::IsConsistent() const {
   for (std::size_t i = 0; i < filter->hypothesis_count(); ++i)
     if (filter->hypothesis(i).path.size() != trail.size()) return false;
   if (recovery.active() && (trail.empty() || !last_scan)) return false;
+  if (fit && !trail.FitsTo(*fit)) return false;
   return drawing.path().size() == (filter->placed() ? trail.size() : 0);
 }
 

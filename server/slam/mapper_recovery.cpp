@@ -109,6 +109,7 @@ TrackStep Mapper::State::DoubtPlace(const ScanView& view, const Pose2& T_odom_ro
 ScanOutcome Mapper::State::Recover(Keyframe keyframe, ScanView view, TrackStep step, const ParallelFor& parallel_for) {
   const Stamp stamp = keyframe.scan->stamp;
   const Pose2 T_odom_robot = keyframe.T_odom_robot;
+  fit.reset();  // The place that will be found belongs to the path as it is now.
   if (!step.matched) {
     recovery.ForgetScans();
     front_end.Restart();

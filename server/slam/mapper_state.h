@@ -70,6 +70,7 @@ struct Mapper::State {
                    const ParallelFor& parallel_for, std::optional<RevisitObservation> revisit = std::nullopt);
   [[nodiscard]] RevisitObservation SeenFromNearest(const FoundPlace& place) const;
   StepMotion MotionTo(const Keyframe& keyframe, const TrackStep& step, const Eigen::Matrix3d& covariance);
+  void GoOnWithLoops();
   void CloseLargeLoop();
   void Follow(std::span<const Pose2> first_poses);
   void KeepShape(std::span<const Pose2> path, std::size_t known);
@@ -81,7 +82,7 @@ struct Mapper::State {
   // All but the filter, which is behind an interface.
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
-    archive(self.recovery, self.trail, self.front_end, self.blind, self.speed, self.loops, self.self_check,
+    archive(self.recovery, self.trail, self.front_end, self.blind, self.speed, self.loops, self.fit, self.self_check,
             self.drawing, self.level, self.last_scan);
   }
 
@@ -120,6 +121,7 @@ struct Mapper::State {
   RevisitSearch revisits;
   std::unique_ptr<Filter> filter;
   LoopSearch loops;
+  std::optional<PathFit> fit;  // Of the path with a loop that was found.
   SelfCheck self_check;
   Recovery recovery;
   MapDrawing drawing;

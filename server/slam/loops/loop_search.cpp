@@ -14,6 +14,8 @@ namespace {
 // (study `sensitivity`).
 constexpr std::size_t kMaxCandidates = 2;    // Most old places compared at one keyframe.
 constexpr std::size_t kCandidateStride = 4;  // Only every fourth old keyframe is a candidate.
+// Work for each scan, in look-ups of the search: some milliseconds.
+constexpr std::int64_t kWorkPerScan = 3'000'000;
 
 }  // namespace
 
@@ -53,23 +55,61 @@ double LoopSearch::Reach(double way_m) const {
   return WindowAround({}, way_m, options_).reach_m;
 }
 
-std::optional<LoopClosure> LoopSearch::Find(const Trail& trail, const PosePath& path) {
+LoopSearch::~LoopSearch() = default;
+
+void LoopSearch::Begin(const Trail& trail, const PosePath& path) {
   const std::span<const KeyframeShape> shapes = trail.shapes();
   const double here_m = shapes.back().travelled_m;
-  if (!options_.enabled || here_m - searched_at_m_ < options_.every_m) return std::nullopt;
+  if (!options_.enabled || searching() || here_m - searched_at_m_ < options_.every_m) return;
   searched_at_m_ = here_m;
   while (!unconfirmed_.empty() && here_m - shapes[unconfirmed_.front().recent].travelled_m > kConfirmWithinM)
     unconfirmed_.pop_front();
+  recent_ = shapes.size() - 1;
+  for (const std::size_t old : Candidates(trail, path))
+    candidates_.push_back({old, WindowAround(Between(path[old], path[recent_]), trail.distances_m()[old], options_)});
+}
 
-  std::vector<LoopClosure> found;
-  for (const std::size_t old : Candidates(trail, path)) {
-    const Pose2 guess = Between(path[old], path[shapes.size() - 1]);
-    if (const auto closure = Compare(trail, old, guess)) found.push_back(*closure);
+std::optional<LoopClosure> LoopSearch::GoOn(const Trail& trail) {
+  for (std::int64_t left = kWorkPerScan; searching() && left > 0;) {
+    if (!comparison_) {
+      comparison_ = Compare(trail.shapes());
+      // Where the search was saved within a comparison, that is done once more as far as it had come.
+      if (comparison_) comparison_->GoOn(trail, trail, work_done_);
+    }
+    if (comparison_) {
+      const std::int64_t worked = comparison_->GoOn(trail, trail, left);
+      left -= worked;
+      work_done_ += worked;
+      if (!comparison_->done()) break;
+      if (const auto& T_old_recent = comparison_->T_ref_curr())
+        found_.push_back(
+            {candidates_.front().old, recent_, *T_old_recent, PoseCovariance(options_.sigma_m, kFoundSigmaRad)});
+      comparison_.reset();
+    }
+    work_done_ = 0;
+    candidates_.pop_front();
+    if (candidates_.empty()) return Confirmed(trail.shapes());
   }
+  return std::nullopt;
+}
+
+// The comparison of the surroundings of the recent keyframe with those of the first candidate; null if that is the
+// present place and not an old one.
+std::unique_ptr<StretchMatch> LoopSearch::Compare(std::span<const KeyframeShape> shapes) const {
+  const LoopCandidate& candidate = candidates_.front();
+  const Stretch recent = StretchAround(shapes.first(recent_ + 1), recent_, kStretchM);
+  if (candidate.old >= recent.first) return nullptr;
+  const Stretch old = StretchAround(shapes.first(recent.first), candidate.old, kStretchM);
+  return std::make_unique<StretchMatch>(old, recent, candidate.window, options_, align_);
+}
+
+// All candidates have been compared.
+std::optional<LoopClosure> LoopSearch::Confirmed(std::span<const KeyframeShape> shapes) {
+  const std::vector<LoopClosure> found = std::exchange(found_, {});
   for (const LoopClosure& closure : found) {
     for (const LoopClosure& earlier : unconfirmed_) {
-      if (here_m - shapes[earlier.recent].travelled_m < options_.confirm_after_m) continue;
-      if (!Agree(earlier, closure, shapes)) continue;
+      const double way_m = shapes[closure.recent].travelled_m - shapes[earlier.recent].travelled_m;
+      if (way_m < options_.confirm_after_m || !Agree(earlier, closure, shapes)) continue;
       unconfirmed_.clear();
       return closure;
     }
@@ -92,20 +132,6 @@ std::vector<std::size_t> LoopSearch::Candidates(const Trail& trail, const PosePa
   };
   ForEachNear(path, shapes.size(), here.translation(), options_.max_doubt_m, look);
   return BestPlaces(std::move(all), shapes, kStretchM, kMaxCandidates);
-}
-
-std::optional<LoopClosure> LoopSearch::Compare(const Trail& trail, std::size_t old,
-                                               const Pose2& T_old_recent_guess) const {
-  const std::span<const KeyframeShape> shapes = trail.shapes();
-  const double way_m = trail.distances_m()[old];
-  const std::size_t now = shapes.size() - 1;
-  const Stretch recent_stretch = StretchAround(shapes, now, kStretchM);
-  if (old >= recent_stretch.first) return std::nullopt;  // This is the present place, not an old one.
-  const Stretch old_stretch = StretchAround(shapes.first(recent_stretch.first), old, kStretchM);
-  const auto T_old_recent = MatchStretches(trail, old_stretch, trail, recent_stretch,
-                                           WindowAround(T_old_recent_guess, way_m, options_), options_, align_);
-  if (!T_old_recent) return std::nullopt;
-  return LoopClosure{old, now, *T_old_recent, PoseCovariance(options_.sigma_m, kFoundSigmaRad)};
 }
 
 bool LoopSearch::Agree(const LoopClosure& a, const LoopClosure& b, std::span<const KeyframeShape> shapes) const {

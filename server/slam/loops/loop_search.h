@@ -8,13 +8,16 @@
 // form.
 #pragma once
 
+#include <cstdint>
 #include <deque>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "common/options/option_visitor.h"
 #include "server/slam/loops/region.h"
+#include "server/slam/loops/region_search.h"
 #include "server/slam/matching/point_to_line.h"
 #include "server/slam/trail/pose_path.h"
 
@@ -51,24 +54,53 @@ struct LoopClosure {
   }
 };
 
-class LoopSearch {
- public:
-  explicit LoopSearch(const LoopOptions& options, const PointToLineOptions& align);
-
-  // Returns a large loop that the last keyframe closes, once it is confirmed. `path` is the believed path,
-  // one pose T_map_robot per keyframe.
-  [[nodiscard]] std::optional<LoopClosure> Find(const Trail& trail, const PosePath& path);
+// An old keyframe in whose surroundings the robot may be, and where it may be there.
+struct LoopCandidate {
+  std::size_t old = 0;
+  SearchWindow window;  // T_old_recent.
 
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
-    archive(self.searched_at_m_, self.unconfirmed_);
+    archive(self.old, self.window.T_ref_curr_centre, self.window.reach_m, self.window.reach_rad);
+    archive.RequireKeyframe(self.old);
+    archive.Require(self.window.T_ref_curr_centre.translation().cwiseAbs().maxCoeff() <= kMostDoubtM &&
+                        0.0 <= self.window.reach_m && self.window.reach_m <= kMostDoubtM &&
+                        0.0 <= self.window.reach_rad && self.window.reach_rad <= kPi,
+                    "where a loop is looked for");
+  }
+  static constexpr double kMostDoubtM = 30.0;  // Upper bound of LoopOptions::max_doubt_m.
+};
+
+class StretchMatch;
+
+// A search takes as long as hundreds of scans, so it is spread over the scans that follow.
+class LoopSearch {
+ public:
+  LoopSearch(const LoopOptions& options, const PointToLineOptions& align);
+  ~LoopSearch();
+  LoopSearch(const LoopSearch&) = delete;
+  LoopSearch& operator=(const LoopSearch&) = delete;
+
+  // Begins a search around the last keyframe, if one is due and none goes on. `path` is the believed path, one pose
+  // T_map_robot per keyframe.
+  void Begin(const Trail& trail, const PosePath& path);
+  [[nodiscard]] bool searching() const { return !candidates_.empty(); }
+  // Goes on with the search by a fixed amount of work. Returns a large loop, once one is confirmed.
+  [[nodiscard]] std::optional<LoopClosure> GoOn(const Trail& trail);
+
+  // A search that goes on is saved by what it searches and how far it has come.
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.searched_at_m_, self.unconfirmed_, self.recent_, self.candidates_, self.work_done_, self.found_);
+    if (self.searching()) archive.RequireKeyframe(self.recent_);
+    constexpr std::int64_t kMostWork = 1'000'000'000'000;
+    archive.Require(0 <= self.work_done_ && self.work_done_ <= kMostWork, "the search for a loop");
   }
 
  private:
   [[nodiscard]] std::vector<std::size_t> Candidates(const Trail& trail, const PosePath& path) const;
-  // Compares the surroundings of the last keyframe with those of `old`.
-  [[nodiscard]] std::optional<LoopClosure> Compare(const Trail& trail, std::size_t old,
-                                                   const Pose2& T_old_recent_guess) const;
+  [[nodiscard]] std::unique_ptr<StretchMatch> Compare(std::span<const KeyframeShape> shapes) const;
+  [[nodiscard]] std::optional<LoopClosure> Confirmed(std::span<const KeyframeShape> shapes);
   [[nodiscard]] bool Agree(const LoopClosure& a, const LoopClosure& b, std::span<const KeyframeShape> shapes) const;
   [[nodiscard]] double Reach(double way_m) const;
 
@@ -76,6 +108,12 @@ class LoopSearch {
   PointToLineOptions align_;
   double searched_at_m_ = 0.0;
   std::deque<LoopClosure> unconfirmed_;
+  // The search that goes on.
+  std::size_t recent_ = 0;                // The keyframe around which it searches.
+  std::deque<LoopCandidate> candidates_;  // Those that have not been compared, the most likely first.
+  std::int64_t work_done_ = 0;            // In the comparison with the first of them.
+  std::vector<LoopClosure> found_;
+  std::unique_ptr<StretchMatch> comparison_;
 };
 
 }  // namespace cairn::slam

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "common/geometry/transform2.h"
@@ -21,109 +22,6 @@ void MaxAhead(const std::uint8_t* from, std::uint8_t* to, std::size_t count, std
 // At this distance one angle step moves a point by one cell. Farther points move by more, which the reach of
 // the likelihood tolerates.
 constexpr double kFullDetailM = 15.0;
-
-// A square block of translations at one heading, with an upper bound of their scores.
-struct Block {
-  int turn = 0;  // Index of the heading.
-  int x = 0;     // Lowest translation, in cells.
-  int y = 0;
-  std::int64_t bound = 0;  // Upper bound of the sum over the points.
-};
-
-class BranchAndBound {
- public:
-  BranchAndBound(std::span<const Eigen::Vector2d> points, const LikelihoodPyramid& pyramid, const SearchWindow& window,
-                 const std::optional<Exclusion>& exclusion)
-      : pyramid_(pyramid), window_(window), exclusion_(exclusion) {
-    double farthest = 1.0;
-    for (const Eigen::Vector2d& p : points) farthest = std::max(farthest, p.norm());
-    step_rad_ = pyramid.cell_m() / std::min(farthest, kFullDetailM);
-    reach_turns_ = std::max(1, static_cast<int>(std::ceil(window.reach_rad / step_rad_)));
-    reach_cells_ = static_cast<int>(std::ceil(window.reach_m / pyramid.cell_m()));
-    for (int turn = -reach_turns_; turn <= reach_turns_; ++turn) {
-      const Pose2& centre = window.T_ref_curr_centre;
-      const Transform2 pose({centre.x, centre.y, WrapAngle(centre.theta + turn * step_rad_)});
-      std::vector<LikelihoodPyramid::Cell>& cells = turned_.emplace_back();
-      cells.reserve(points.size());
-      for (const Eigen::Vector2d& p : points) {
-        const Eigen::Vector2d p_ref = pose * p;
-        cells.push_back({static_cast<int>(std::floor(p_ref.x() / pyramid.cell_m())),
-                         static_cast<int>(std::floor(p_ref.y() / pyramid.cell_m()))});
-      }
-    }
-  }
-
-  std::optional<RegionPeak> Run(double min_score) {
-    const double full = 255.0 * static_cast<double>(turned_.front().size());
-    best_.bound = static_cast<std::int64_t>(min_score * full);
-    std::vector<Block> top;
-    const int level = pyramid_.levels() - 1;
-    for (int turn = 0; turn < static_cast<int>(turned_.size()); ++turn)
-      for (int y = -reach_cells_; y <= reach_cells_; y += 1 << level)
-        for (int x = -reach_cells_; x <= reach_cells_; x += 1 << level) top.push_back({turn, x, y, 0});
-    Descend(std::move(top), level);
-    const bool complete = scored_ <= kMaxBlocks;
-    if (!found_ && complete) return std::nullopt;
-    return RegionPeak{PoseOf(best_), static_cast<double>(best_.bound) / full, complete};
-  }
-
- private:
-  [[nodiscard]] Pose2 PoseOf(const Block& block) const {
-    const Pose2& centre = window_.T_ref_curr_centre;
-    return {centre.x + block.x * pyramid_.cell_m(), centre.y + block.y * pyramid_.cell_m(),
-            WrapAngle(centre.theta + (block.turn - reach_turns_) * step_rad_)};
-  }
-
-  [[nodiscard]] bool Excluded(const Block& block, int level) const {
-    if (!exclusion_) return false;
-    const Pose2 low = PoseOf(block);
-    if (std::abs(AngleDiff(low.theta, exclusion_->T_ref_curr.theta)) > exclusion_->radius_rad) return false;
-    // The whole block must lie inside, so its farthest corner is checked.
-    const double side = ((1 << level) - 1) * pyramid_.cell_m();
-    const double dx =
-        std::max(std::abs(low.x - exclusion_->T_ref_curr.x), std::abs(low.x + side - exclusion_->T_ref_curr.x));
-    const double dy =
-        std::max(std::abs(low.y - exclusion_->T_ref_curr.y), std::abs(low.y + side - exclusion_->T_ref_curr.y));
-    return std::hypot(dx, dy) <= exclusion_->radius_m;
-  }
-
-  // Depth first, in the order of the bounds; skips blocks that cannot exceed the best score.
-  void Descend(std::vector<Block> blocks, int level) {
-    std::erase_if(blocks, [&](const Block& block) { return Excluded(block, level); });
-    for (Block& block : blocks) {
-      if (++scored_ > kMaxBlocks) return;
-      block.bound =
-          pyramid_.SumOfBest(level, turned_[static_cast<std::size_t>(block.turn)], block.x, block.y, best_.bound);
-    }
-    std::stable_sort(blocks.begin(), blocks.end(), [](const Block& a, const Block& b) { return a.bound > b.bound; });
-    for (const Block& block : blocks) {
-      if (block.bound <= best_.bound) return;
-      if (level == 0) {
-        best_ = block;
-        found_ = true;
-        return;
-      }
-      const int half = 1 << (level - 1);
-      std::vector<Block> parts;
-      for (const int dy : {0, half})
-        for (const int dx : {0, half})
-          if (block.x + dx <= reach_cells_ && block.y + dy <= reach_cells_)
-            parts.push_back({block.turn, block.x + dx, block.y + dy, 0});
-      Descend(std::move(parts), level - 1);
-    }
-  }
-
-  const LikelihoodPyramid& pyramid_;
-  const SearchWindow window_;
-  const std::optional<Exclusion> exclusion_;
-  double step_rad_ = 0.0;
-  int reach_turns_ = 0;
-  int reach_cells_ = 0;
-  std::vector<std::vector<LikelihoodPyramid::Cell>> turned_;  // The cells of the points at each heading.
-  Block best_;
-  bool found_ = false;
-  int scored_ = 0;
-};
 
 }  // namespace
 
@@ -194,11 +92,127 @@ std::int64_t LikelihoodPyramid::SumOfBest(int level, std::span<const Cell> cells
   return sum;
 }
 
+PoseSearch::PoseSearch(std::span<const Eigen::Vector2d> points_curr, const LikelihoodPyramid& pyramid,
+                       const SearchWindow& window, double min_score, const std::optional<Exclusion>& exclusion)
+    : pyramid_(pyramid), window_(window), exclusion_(exclusion) {
+  double farthest = 1.0;
+  for (const Eigen::Vector2d& p : points_curr) farthest = std::max(farthest, p.norm());
+  step_rad_ = pyramid.cell_m() / std::min(farthest, kFullDetailM);
+  reach_turns_ = std::max(1, static_cast<int>(std::ceil(window.reach_rad / step_rad_)));
+  reach_cells_ = static_cast<int>(std::ceil(window.reach_m / pyramid.cell_m()));
+  for (int turn = -reach_turns_; turn <= reach_turns_; ++turn) {
+    const Pose2& centre = window.T_ref_curr_centre;
+    const Transform2 pose({centre.x, centre.y, WrapAngle(centre.theta + turn * step_rad_)});
+    std::vector<LikelihoodPyramid::Cell>& cells = turned_.emplace_back();
+    cells.reserve(points_curr.size());
+    for (const Eigen::Vector2d& p : points_curr) {
+      const Eigen::Vector2d p_ref = pose * p;
+      cells.push_back({static_cast<int>(std::floor(p_ref.x() / pyramid.cell_m())),
+                       static_cast<int>(std::floor(p_ref.y() / pyramid.cell_m()))});
+    }
+  }
+  best_.bound = static_cast<std::int64_t>(min_score * (255.0 * static_cast<double>(points_curr.size())));
+  std::vector<Block> top;
+  const int level = pyramid.levels() - 1;
+  for (int turn = 0; turn < static_cast<int>(turned_.size()); ++turn)
+    for (int y = -reach_cells_; y <= reach_cells_; y += 1 << level)
+      for (int x = -reach_cells_; x <= reach_cells_; x += 1 << level) top.push_back({turn, x, y, 0});
+  Open(level, std::move(top));
+}
+
+Pose2 PoseSearch::PoseOf(const Block& block) const {
+  const Pose2& centre = window_.T_ref_curr_centre;
+  return {centre.x + block.x * pyramid_.cell_m(), centre.y + block.y * pyramid_.cell_m(),
+          WrapAngle(centre.theta + (block.turn - reach_turns_) * step_rad_)};
+}
+
+bool PoseSearch::Excluded(const Block& block, int level) const {
+  if (!exclusion_) return false;
+  const Pose2 low = PoseOf(block);
+  if (std::abs(AngleDiff(low.theta, exclusion_->T_ref_curr.theta)) > exclusion_->radius_rad) return false;
+  // The whole block must lie inside, so its farthest corner is checked.
+  const double side = ((1 << level) - 1) * pyramid_.cell_m();
+  const double dx =
+      std::max(std::abs(low.x - exclusion_->T_ref_curr.x), std::abs(low.x + side - exclusion_->T_ref_curr.x));
+  const double dy =
+      std::max(std::abs(low.y - exclusion_->T_ref_curr.y), std::abs(low.y + side - exclusion_->T_ref_curr.y));
+  return std::hypot(dx, dy) <= exclusion_->radius_m;
+}
+
+void PoseSearch::Open(int level, std::vector<Block> blocks) {
+  std::erase_if(blocks, [&](const Block& block) { return Excluded(block, level); });
+  open_.push_back({level, std::move(blocks)});
+}
+
+// Depth first, in the order of the bounds; skips blocks that cannot exceed the best score.
+std::int64_t PoseSearch::GoOn(std::int64_t work) {
+  std::int64_t done = 0;
+  while (!open_.empty() && done < work) {
+    Level& last = open_.back();
+    if (!last.bounded) {
+      done += Bound(last, work - done);
+    } else if (last.next == last.blocks.size() || last.blocks[last.next].bound <= best_.bound) {
+      open_.pop_back();
+    } else {
+      LookInto(last);
+    }
+  }
+  return done;
+}
+
+// Bounds blocks of a level, and ends the search if they are too many.
+std::int64_t PoseSearch::Bound(Level& last, std::int64_t work) {
+  std::int64_t done = 0;
+  for (; last.next < last.blocks.size() && done < work; ++last.next) {
+    if (++scored_ > kMaxBlocks) {
+      open_.clear();
+      return done;
+    }
+    Block& block = last.blocks[last.next];
+    const auto& cells = turned_[static_cast<std::size_t>(block.turn)];
+    block.bound = pyramid_.SumOfBest(last.level, cells, block.x, block.y, best_.bound);
+    done += static_cast<std::int64_t>(cells.size());
+  }
+  if (last.next < last.blocks.size()) return done;
+  std::stable_sort(last.blocks.begin(), last.blocks.end(),
+                   [](const Block& a, const Block& b) { return a.bound > b.bound; });
+  last.bounded = true;
+  last.next = 0;
+  return done;
+}
+
+void PoseSearch::LookInto(Level& last) {
+  const Block block = last.blocks[last.next++];
+  const int level = last.level;
+  if (level == 0) {
+    best_ = block;
+    found_ = true;
+    open_.pop_back();
+    return;
+  }
+  const int half = 1 << (level - 1);
+  std::vector<Block> parts;
+  for (const int dy : {0, half})
+    for (const int dx : {0, half})
+      if (block.x + dx <= reach_cells_ && block.y + dy <= reach_cells_)
+        parts.push_back({block.turn, block.x + dx, block.y + dy, 0});
+  Open(level - 1, std::move(parts));
+}
+
+std::optional<RegionPeak> PoseSearch::peak() const {
+  const bool complete = scored_ <= kMaxBlocks;
+  if (!found_ && complete) return std::nullopt;
+  const double full = 255.0 * static_cast<double>(turned_.front().size());
+  return RegionPeak{PoseOf(best_), static_cast<double>(best_.bound) / full, complete};
+}
+
 std::optional<RegionPeak> FindBestPose(std::span<const Eigen::Vector2d> points_curr, const LikelihoodPyramid& pyramid,
                                        const SearchWindow& window, double min_score,
                                        const std::optional<Exclusion>& exclusion) {
   if (points_curr.empty()) return std::nullopt;
-  return BranchAndBound(points_curr, pyramid, window, exclusion).Run(min_score);
+  PoseSearch search(points_curr, pyramid, window, min_score, exclusion);
+  search.GoOn(std::numeric_limits<std::int64_t>::max());
+  return search.peak();
 }
 
 }  // namespace cairn::slam

@@ -72,6 +72,54 @@ struct Exclusion {
   double radius_rad = 0.2;
 };
 
+// The search in parts, for callers who spread it over time: the parts together look at the same poses in the same order
+// as one call of FindBestPose. REQUIRES: the pyramid outlives it, and there is a point.
+class PoseSearch {
+ public:
+  PoseSearch(std::span<const Eigen::Vector2d> points_curr, const LikelihoodPyramid& pyramid, const SearchWindow& window,
+             double min_score, const std::optional<Exclusion>& exclusion = std::nullopt);
+
+  // Goes on until about `work` cells have been looked up, and returns how many were.
+  std::int64_t GoOn(std::int64_t work);
+  [[nodiscard]] bool done() const { return open_.empty(); }
+  // What FindBestPose returns. REQUIRES: done().
+  [[nodiscard]] std::optional<RegionPeak> peak() const;
+
+ private:
+  // A square block of translations at one heading, with an upper bound of their scores.
+  struct Block {
+    int turn = 0;  // Index of the heading.
+    int x = 0;     // Lowest translation, in cells.
+    int y = 0;
+    std::int64_t bound = 0;  // Upper bound of the sum over the points.
+  };
+  // Blocks of one level. `next` is the one to be bounded next, and once all are, the one to be looked into next.
+  struct Level {
+    int level = 0;
+    std::vector<Block> blocks;
+    std::size_t next = 0;
+    bool bounded = false;
+  };
+
+  [[nodiscard]] Pose2 PoseOf(const Block& block) const;
+  [[nodiscard]] bool Excluded(const Block& block, int level) const;
+  void Open(int level, std::vector<Block> blocks);
+  std::int64_t Bound(Level& last, std::int64_t work);
+  void LookInto(Level& last);
+
+  const LikelihoodPyramid& pyramid_;
+  const SearchWindow window_;
+  const std::optional<Exclusion> exclusion_;
+  double step_rad_ = 0.0;
+  int reach_turns_ = 0;
+  int reach_cells_ = 0;
+  std::vector<std::vector<LikelihoodPyramid::Cell>> turned_;  // The cells of the points at each heading.
+  std::vector<Level> open_;                                   // From the coarsest to the finest.
+  Block best_;
+  bool found_ = false;
+  int scored_ = 0;
+};
+
 // Returns the best pose with a score above `min_score`, or nothing. At most kMaxBlocks blocks are evaluated.
 inline constexpr int kMaxBlocks = 1'000'000;
 [[nodiscard]] std::optional<RegionPeak> FindBestPose(std::span<const Eigen::Vector2d> points_curr,

@@ -1,6 +1,7 @@
 #include "server/slam/loops/unique_pose.h"
 
 #include <cmath>
+#include <limits>
 
 namespace cairn::slam {
 namespace {
@@ -28,14 +29,38 @@ Exclusion ApartFrom(const Pose2& T_ref_curr) {
   return {T_ref_curr, kRivalBeyondM, kRivalBeyondRad};
 }
 
+UniquePoseSearch::UniquePoseSearch(std::span<const SurfacePoint> surfaces_curr, const LikelihoodPyramid& pyramid_ref,
+                                   const SearchWindow& window, double max_rival)
+    : sample_(SampleOf(surfaces_curr)), pyramid_(pyramid_ref), window_(window), max_rival_(max_rival) {
+  if (!sample_.empty()) search_.emplace(sample_, pyramid_, window_, kMinLikelihood);
+}
+
+std::int64_t UniquePoseSearch::GoOn(std::int64_t work) {
+  std::int64_t done = 0;
+  while (search_ && done < work) {
+    done += search_->GoOn(work - done);
+    if (search_->done()) End();
+  }
+  return done;
+}
+
+// What follows when one of the two searches has ended.
+void UniquePoseSearch::End() {
+  const std::optional<RegionPeak> found = search_->peak();
+  search_.reset();
+  if (peak_) {
+    if (!found) pose_ = peak_->T_ref_curr;
+  } else if (found && found->complete) {
+    peak_ = found;
+    search_.emplace(sample_, pyramid_, window_, max_rival_ * found->score, ApartFrom(found->T_ref_curr));
+  }
+}
+
 std::optional<Pose2> FindUniquePose(std::span<const SurfacePoint> surfaces_curr, const LikelihoodPyramid& pyramid_ref,
                                     const SearchWindow& window, double max_rival) {
-  const std::vector<Eigen::Vector2d> sample = SampleOf(surfaces_curr);
-  const auto peak = FindBestPose(sample, pyramid_ref, window, kMinLikelihood);
-  if (!peak || !peak->complete) return std::nullopt;
-  if (FindBestPose(sample, pyramid_ref, window, max_rival * peak->score, ApartFrom(peak->T_ref_curr)))
-    return std::nullopt;
-  return peak->T_ref_curr;
+  UniquePoseSearch search(surfaces_curr, pyramid_ref, window, max_rival);
+  search.GoOn(std::numeric_limits<std::int64_t>::max());
+  return search.pose();
 }
 
 Eigen::Matrix3d UniquePoseCovariance() {

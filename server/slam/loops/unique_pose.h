@@ -3,6 +3,7 @@
 // agree. Stateless, thread-safe, deterministic.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
@@ -17,6 +18,30 @@ inline constexpr double kSearchCellM = 0.1;       // Cell of the raster for the 
 inline constexpr double kLikelihoodReachM = 0.3;  // At this distance from a surface the likelihood is zero.
 inline constexpr double kConfirmWithinM = 10.0;   // Largest way between two poses that confirm each other.
 inline constexpr double kFoundSigmaRad = 0.01;    // Standard deviation of the heading of a pose that was found.
+
+// The search in parts, as PoseSearch. REQUIRES: the pyramid outlives it.
+class UniquePoseSearch {
+ public:
+  UniquePoseSearch(std::span<const SurfacePoint> surfaces_curr, const LikelihoodPyramid& pyramid_ref,
+                   const SearchWindow& window, double max_rival);
+
+  // Goes on until about `work` places have been looked up, and returns how many were.
+  std::int64_t GoOn(std::int64_t work);
+  [[nodiscard]] bool done() const { return !search_; }
+  // What FindUniquePose returns. REQUIRES: done().
+  [[nodiscard]] const std::optional<Pose2>& pose() const { return pose_; }
+
+ private:
+  void End();
+
+  const std::vector<Eigen::Vector2d> sample_;
+  const LikelihoodPyramid& pyramid_;
+  const SearchWindow window_;
+  const double max_rival_;
+  std::optional<PoseSearch> search_;  // For the best pose, then for a rival.
+  std::optional<RegionPeak> peak_;    // Once the first search has ended.
+  std::optional<Pose2> pose_;
+};
 
 // Pose T_ref_curr in the window at which the surfaces fit best. No value if they fit badly, if a pose farther away or
 // with another heading has more than `max_rival` of the best score, or if the search had to be given up.

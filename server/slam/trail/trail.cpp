@@ -148,12 +148,13 @@ std::vector<double> Trail::DistancesFromLast() const {
   return distance;
 }
 
-std::optional<std::vector<Pose2>> Trail::PathWithLoop(const PoseRelation& loop, std::vector<Pose2> path,
-                                                      const PoseGraphOptions& options) const {
-  std::vector<PoseRelation> relations = relations_;
-  relations.push_back(PositiveDefinite(loop));
-  if (!OptimisePoses(path, relations, options).usable) return std::nullopt;
-  return path;
+PathFit Trail::FitWithLoop(const PoseRelation& loop, std::vector<Pose2> path) const {
+  return {std::move(path), relations_, PositiveDefinite(loop)};
+}
+
+void Trail::GoOn(PathFit& fit, const PoseGraphOptions& options) const {
+  constexpr std::size_t kPosesPerScan = 10'000;  // Some milliseconds.
+  fit.GoOn(relations_, options, kPosesPerScan);
 }
 
 Pose2 Trail::FromLast(const Pose2& T_track_robot) const {

@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "server/slam/graph/path_fit.h"
 #include "server/slam/graph/pose_graph.h"
 #include "server/slam/motion/step_motion.h"
 #include "server/slam/scan/surface_points.h"
@@ -39,10 +40,12 @@ class Trail {
   void AddScan(Stamp stamp, const Pose2& T_keyframe_robot);
   // Adds a large loop that was used to correct the path.
   void AddLoop(const PoseRelation& loop);
-  // The path that fits all relations and `loop` best; the search starts at `path` (one pose per keyframe).
-  // Nothing if the result is not usable. The loop is not added to the relations.
-  [[nodiscard]] std::optional<std::vector<Pose2>> PathWithLoop(const PoseRelation& loop, std::vector<Pose2> path,
-                                                               const PoseGraphOptions& options) const;
+  // The search for the path that fits all relations and `loop` best, and its next part (path_fit.h). It starts at
+  // `path` (one pose per keyframe). The loop is not added to the relations.
+  [[nodiscard]] PathFit FitWithLoop(const PoseRelation& loop, std::vector<Pose2> path) const;
+  void GoOn(PathFit& fit, const PoseGraphOptions& options) const;
+  // Whether a fit that was read belongs to this trail.
+  [[nodiscard]] bool FitsTo(const PathFit& fit) const { return fit.IsConsistent(relations_, size()); }
 
   [[nodiscard]] bool empty() const { return keyframes_.empty(); }
   [[nodiscard]] std::size_t size() const { return keyframes_.size(); }

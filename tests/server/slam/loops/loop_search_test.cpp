@@ -53,7 +53,9 @@ std::optional<LoopClosure> DriveUntilFound(Drive& drive, const World& world, dou
                way_m < 70.0 && way_m + step.x >= 70.0 ? ride.slip_m : 0.0);
     way_m += step.x;
     if (way_m < from_m) continue;
-    if (const auto loop = search.Find(drive.trail, drive.believed)) return loop;
+    search.Begin(drive.trail, drive.believed);
+    while (search.searching())
+      if (const auto loop = search.GoOn(drive.trail)) return loop;
   }
   return std::nullopt;
 }
@@ -145,7 +147,8 @@ TEST(LoopSearch, CanBeSwitchedOff) {
   LoopSearch search(off, {});
   std::mt19937_64 rng(1);
   drive.Step(RingCorridor(true), {}, 0.0, rng);
-  EXPECT_FALSE(search.Find(drive.trail, drive.believed));
+  search.Begin(drive.trail, drive.believed);
+  EXPECT_FALSE(search.searching());
 }
 
 TEST(FreeSpace, ContradictsOnlyWhatBeamsWentThrough) {

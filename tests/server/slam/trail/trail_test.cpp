@@ -220,10 +220,12 @@ TEST(Trail, ALoopChangesThePathOnlyOnceItIsAdded) {
   // The last keyframe was seen 0.5 m farther on than the steps say.
   const PoseRelation loop{0, 3, Between(kSquare[0], kSquare[3] * Pose2{0.5, 0.0, 0.0}),
                           1e-4 * Eigen::Matrix3d::Identity(), true};
-  const auto closed = trail.PathWithLoop(loop, path, PoseGraphOptions{});
-  ASSERT_TRUE(closed);
-  EXPECT_LT(Between(kSquare[3] * Pose2{0.5, 0.0, 0.0}, closed->back()).translation().norm(), 0.05);
-  EXPECT_EQ(closed->front(), kSquare[0]);
+  PathFit closed = trail.FitWithLoop(loop, path);
+  EXPECT_TRUE(trail.FitsTo(closed));
+  while (!closed.done()) trail.GoOn(closed, PoseGraphOptions{});
+  ASSERT_TRUE(closed.usable());
+  EXPECT_LT(Between(kSquare[3] * Pose2{0.5, 0.0, 0.0}, closed.path().back()).translation().norm(), 0.05);
+  EXPECT_EQ(closed.path().front(), kSquare[0]);
   EXPECT_TRUE(trail.relations().empty());
   EXPECT_NEAR(trail.distances_m()[0], 3.0, 1e-12);
   trail.AddLoop(loop);
@@ -234,7 +236,9 @@ TEST(Trail, ALoopChangesThePathOnlyOnceItIsAdded) {
 TEST(Trail, APathThatCannotBeFittedIsNoPath) {
   Trail trail(MotionNoise{});
   trail.Append({std::make_shared<const Scan>(), {}}, {}, {}, kNoCovariance, std::nullopt);
-  EXPECT_FALSE(trail.PathWithLoop({0, 0, {}, Eigen::Matrix3d::Identity(), true}, {Pose2{}}, PoseGraphOptions{}));
+  const PathFit fit = trail.FitWithLoop({0, 0, {}, Eigen::Matrix3d::Identity(), true}, {Pose2{}});
+  EXPECT_TRUE(fit.done());
+  EXPECT_FALSE(fit.usable());
 }
 
 TEST(Trail, ScansLieBehindTheLastKeyframeAndFollowWhereItsPathGoes) {
