@@ -136,7 +136,8 @@ DatagramFault InspectHeartbeat(const Submessage& m, const Inspection& with) {
 }
 
 DatagramFault InspectGap(const Submessage& m, const Inspection& with) {
-  constexpr std::int64_t kLongest = std::int64_t{1} << 30;  // The library loops over every number from start to base.
+  // The library counts from start to base, one by one. A longer gap needs no mention: the heartbeats say it as well.
+  constexpr std::int64_t kLongest = SequenceGate::kAtOnce;
   if (m.size() < 28) return DatagramFault::kFraming;
   if (!SetFits(m, 24, 0)) return DatagramFault::kSequenceSet;
   const std::int64_t start = m.body.Sequence(8);

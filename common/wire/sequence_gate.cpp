@@ -1,6 +1,7 @@
 #include "common/wire/sequence_gate.h"
 
 #include <algorithm>
+#include <cstdlib>
 #include <functional>
 #include <string_view>
 
@@ -13,23 +14,34 @@ std::size_t SequenceGate::Hash::operator()(const Key& key) const {
 bool SequenceGate::Accept(const Key& whose, std::int64_t number, Clock::time_point now) {
   if (number < 0) return false;
   const MutexLock lock(mutex_);
-  const auto known = peers_.find(whose);
+  auto known = peers_.find(whose);
   if (known == peers_.end()) {
     if (number > kMaxFirst) return false;
     if (peers_.size() >= kMaxPeers) MakeRoom();
-    peers_.emplace(whose, Peer{number, static_cast<double>(kStep), now, now});
-    return true;
+    known = peers_.emplace(whose, Peer{.first = now, .raised = now}).first;
   }
   Peer& peer = known->second;
-  if (number <= peer.highest) return true;
+  if (peer.accepted && number <= peer.highest) return true;
   const double silent_s = std::chrono::duration<double>(now - peer.raised).count();
-  const double allowed = peer.skips + static_cast<double>(kRate) * silent_s;
-  const auto skipped = static_cast<double>(number - peer.highest - 1);
-  if (skipped > allowed) return false;
+  const double allowed =
+      peer.accepted ? peer.skips + static_cast<double>(kRate) * silent_s : static_cast<double>(kMaxFirst);
+  const std::int64_t skipped = number - peer.highest - 1;
+  if (static_cast<double>(skipped) > allowed) return false;
+  if (skipped > kAtOnce && !IsRepeated(peer, number, now)) return false;
   peer.highest = number;
-  peer.skips = std::min(allowed - skipped, static_cast<double>(kStep));
+  peer.accepted = true;
+  peer.skips = std::min(allowed - static_cast<double>(skipped), static_cast<double>(kStep));
   peer.raised = now;
   return true;
+}
+
+bool SequenceGate::IsRepeated(Peer& peer, std::int64_t number, Clock::time_point now) {
+  if (peer.claims == 0 || std::abs(number - peer.claimed) > kStep) {
+    peer.claims = 0;
+    peer.claimed_first = now;
+  }
+  peer.claimed = number;
+  return ++peer.claims >= kRepetitions && now - peer.claimed_first >= kRepeatedFor;
 }
 
 // Peers with invented identifiers are seen once. Those that are known for longer stay.

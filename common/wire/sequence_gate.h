@@ -4,7 +4,10 @@
 // The number of a peer's samples may grow by one from datagram to datagram without limit.
 // It may skip numbers, because datagrams are lost and the first contact is late, but not more than kStep at once and
 // kRate a second: no writer of Cairn makes so many samples, not even while the network is interrupted for hours. The
-// first number of a peer may be any. What a peer acknowledges is compared with what the participant itself has sent.
+// first number of a peer may be any up to kMaxFirst. Fast DDS 2.9 counts from the number before to the new one, one by
+// one, while its reader is locked, so a skip of more than kAtOnce is accepted only when the peer has repeated it for a
+// while: a damaged or mutated datagram does not come again, and writers repeat their heartbeats.
+// What a peer acknowledges is compared with what the participant itself has sent.
 // This is no proof: a number that is a little too large passes. A stream that stands still because of one is noticed
 // and made anew elsewhere (client/lib/robot_client.h).
 // When its table is full, it forgets the peers that it has known for less than a second. Thread-safe.
@@ -33,6 +36,10 @@ class SequenceGate {
   static constexpr std::int64_t kRate = 5000;  // Per second.
   // Limit of a first number. A writer that has run for years stays far below it.
   static constexpr std::int64_t kMaxFirst = std::int64_t{1} << 40;
+  static constexpr std::int64_t kAtOnce = 1'000'000;  // Fast DDS counts them in about 0.3 s.
+  // A longer skip is accepted at this repetition, and not earlier than so long after the first time.
+  static constexpr int kRepetitions = 4;
+  static constexpr std::chrono::milliseconds kRepeatedFor{300};
   static constexpr std::size_t kMaxPeers = 16384;
 
   // Accepts and stores a number of a peer, or refuses it. Lower numbers than before are always accepted.
@@ -54,10 +61,16 @@ class SequenceGate {
   };
   struct Peer {
     std::int64_t highest = 0;
-    double skips = 0.0;  // How many numbers it may skip at `raised`.
+    bool accepted = false;  // Whether any number was; until then `highest` is 0.
+    double skips = 0.0;     // How many numbers it may skip at `raised`.
     Clock::time_point first{};
     Clock::time_point raised{};
+    // A long skip that is not accepted yet: where to, how often, since when.
+    std::int64_t claimed = 0;
+    int claims = 0;
+    Clock::time_point claimed_first{};
   };
+  [[nodiscard]] static bool IsRepeated(Peer& peer, std::int64_t number, Clock::time_point now);
   void MakeRoom() CAIRN_REQUIRES(mutex_);
 
   mutable Mutex mutex_;

@@ -205,9 +205,14 @@ std::vector<std::shared_ptr<Site>> Atlas::All() const {
 }
 
 void Atlas::Publish() {
-  const auto sites = All();
-  const std::size_t first = first_++;
-  for (std::size_t i = 0; i < sites.size(); ++i) sites[(first + i) % sites.size()]->Publish();
+  auto others = All();
+  if (others.empty()) return;
+  const auto next = others.begin() + static_cast<std::ptrdiff_t>(first_++ % others.size());
+  const std::shared_ptr<Site> first = *next;
+  others.erase(next);
+  first->Publish([others = std::move(others)] {
+    for (const auto& site : others) site->Publish();
+  });
 }
 
 void Atlas::Close() {

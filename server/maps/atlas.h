@@ -51,7 +51,8 @@ class Atlas {
   Result<std::shared_ptr<Site>> Create(const std::string& name);
   [[nodiscard]] std::shared_ptr<Site> Find(const std::string& name) const;
   [[nodiscard]] std::vector<std::shared_ptr<Site>> All() const;
-  // Every site publishes what changed. Another one is the first each time, because the first may fill the lane.
+  // Every site publishes what changed. Another one is the first each time, and the others wait for it, because one site
+  // may fill the lane.
   void Publish();
   // The server stops: closes every site and waits until all have come to it. REQUIRES: the pool is running.
   void Close();

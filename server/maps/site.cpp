@@ -203,12 +203,16 @@ void Site::Leave(SessionId session) {
   });
 }
 
-void Site::Publish() {
-  if (publish_waits_.exchange(true)) return;
-  Run([](Site& site) {
+void Site::Publish(std::function<void()> then) {
+  if (publish_waits_.exchange(true)) {
+    if (then) then();
+    return;
+  }
+  Run([then = std::move(then)](Site& site) {
     site.publish_waits_ = false;
     site.Render();
     site.Send();
+    if (then) then();
   });
 }
 

@@ -90,8 +90,9 @@ class Site : public std::enable_shared_from_this<Site> {
   void AddVersion(MapVersion&& version, Done done, Wanted wanted = {});
   // UNAVAILABLE: another switch is under way. NOT_FOUND: the version does not exist or has been removed.
   void Enable(std::uint32_t version, Done done, Wanted wanted = {});
-  // Renders and publishes what changed, soon; does nothing where an earlier call still waits for the strand.
-  void Publish();
+  // Renders and publishes what changed, soon; does nothing where an earlier call still waits for the strand. Then calls
+  // `then`, if there is one.
+  void Publish(std::function<void()> then = {});
   // Does nothing but call `done` on the strand, to show that the strand makes progress.
   void Probe(std::function<void()> done);
 

@@ -64,6 +64,9 @@ check "apt installs the packages and all they need" apt install --no-install-rec
 installed=$((SECONDS - start))
 check "a robot maps, and the map can be exported" alone sh /opt/use.sh
 echo "packages installed after ${installed} s, a map after $((SECONDS - start)) s"
+for program in cairn cairnd cairn-offline cairn-calibrate cairn-web; do
+  check "bash completes $program" inside test -s "/usr/share/bash-completion/completions/$program"
+done
 check "each program has a manual page" \
   inside sh -c 'for page in man8/cairnd.8 man1/cairn.1 man1/cairn-web.1 man1/cairn-offline.1 man1/cairn-calibrate.1; do test -s "/usr/share/man/$page.gz" || exit 1; done'
 check "the service is enabled" there /etc/systemd/system/multi-user.target.wants/cairnd.service

@@ -1,0 +1,33 @@
+# Completion in bash for all programs of Cairn: commands, options and named values, as the program's own --help prints
+# them, so a new option needs no change here. Everything else is completed as a file name.
+
+# What a page of help lists: its commands, its options, the values that an option may have.
+_cairn_commands() { awk '/^[^ ]/ { inside = /^Subcommands:/ } inside && /^  [a-z]/ { print $1 }' <<<"$1"; }
+_cairn_options() { grep -oE '^ +(-[A-Za-z],)?--[a-z][a-z0-9-]*' <<<"$1" | grep -oE -- '-.*' | tr ',' '\n'; }
+_cairn_values() { grep -E -- "^ +(-[A-Za-z],)?$2[ =:,]|^ +$2," <<<"$1" | grep -oE '\{[^}]*\}' | head -n 1 | tr -d '{}' | tr ',' '\n'; }
+
+_cairn() {
+  local program=$1 current=$2 previous=$3
+  local general help typed word
+  general=$("$program" --help 2>/dev/null) || return 0
+  help=$general
+  local commands=()
+  for typed in "${COMP_WORDS[@]:1:COMP_CWORD-1}"; do
+    for word in $(_cairn_commands "$help"); do
+      [ "$typed" = "$word" ] || continue
+      commands+=("$typed")
+      help=$("$program" "${commands[@]}" --help 2>/dev/null) || return 0
+      break
+    done
+  done
+  local found
+  case $current in
+    -*) found=$(_cairn_options "$help"; _cairn_options "$general") ;;
+    *)
+      found=$(_cairn_commands "$help")
+      case $previous in -*) found=$(_cairn_values "$help"$'\n'"$general" "$previous") ;; esac
+      ;;
+  esac
+  mapfile -t COMPREPLY < <(compgen -W "$(sort -u <<<"$found")" -- "$current")
+}
+complete -o default -F _cairn cairn cairnd cairn-offline cairn-calibrate cairn-web
