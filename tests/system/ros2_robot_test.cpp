@@ -65,8 +65,9 @@ class RosFleet : public ::testing::Test {
 };
 
 TEST_F(RosFleet, RobotsAsTheyAreGetTheirPosesAndTheMap) {
-  const auto humble = Robot("r1", "6");
-  const auto jazzy = Robot("r2", "6", {"jazzy"});
+  // They must still be there when the doctor is asked, which takes some seconds under a sanitizer.
+  const auto humble = Robot("r1", "14");
+  const auto jazzy = Robot("r2", "14", {"jazzy"});
   const auto on_map = [](const nlohmann::json& one) { return one["on_map"] == true; };
   EXPECT_EQ(DoctorOf("/r1", on_map)["site"], "lab");
   EXPECT_EQ(DoctorOf("/r2", on_map)["topics"].size(), 3U);
