@@ -59,14 +59,12 @@ constexpr Model kModels[] = {
     // SLAMTEC RPLIDAR A1M8, data sheet, "Measurement performance": 0.15-12 m, 1 deg at 5.5 turns a second (typical),
     // resolution < 0.5 mm below 1.5 m and < 1 % of the distance everywhere. The interface protocol has steps of
     // 0.25 mm (distance_q2) and angles that grow clockwise. Assumption: the random error is as large as the resolution,
-    // for which the
-    // sheet has no standard deviation.
+    // for which the sheet has no standard deviation.
     {"rplidar-a1", 360, 360.0, 0.15, 12.0, Steps(Step(0.0005, 0.01, 1.5), 0.00025), 5.5, true, 0.005},
 
     // Hitachi-LG HLS-LFCD2, sold as LDS-01 (ROBOTIS e-Manual, TurtleBot3, appendix LDS-01): 0.12-3.5 m, 1 deg, 300
     // turns a minute, precision +-10 mm below 0.5 m and +-3.5 % beyond (accuracy +-15 mm, +-5 %; all not checked).
-    // Distances are sent in
-    // mm. The maker's ROS driver turns the array over, so angles grow clockwise.
+    // Distances are sent in mm. The maker's ROS driver turns the array over, so angles grow clockwise.
     {"lds-01", 360, 360.0, 0.12, 3.5, Steps(Step(0.010, 0.035, 0.5), 0.001), 5.0, true},
 
     // LDROBOT LD19, data sheet: 0.02-12 m, 4,500 ranges and typically 10 turns a second, standard deviation 10 mm,

@@ -5,7 +5,7 @@ source "$1/deploy/completion.bash"
 bin=$2/bin
 
 # offers "WORDS AS TYPED" WORD...: the last of the words is completed, and each WORD is among what is offered.
-# refuses: the same, and none of them is.
+# refuses "WORDS AS TYPED" WORD...: no WORD is.
 complete_line() {
   read -r -a COMP_WORDS <<<"$1"
   case $1 in *' ') COMP_WORDS+=("") ;; esac
