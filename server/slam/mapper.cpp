@@ -30,16 +30,21 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   passage = s.BeginAfter(passage, tilted);
   if (tilted) return s.Coast(stamp, T_odom_robot);
 
-  if (s.drawing.redrawing()) s.drawing.Continue(s.trail.keyframes(), s.believed_path());
+  if (s.drawing.redrawing()) {
+    s.Begin(ScanStep::kDraw);
+    s.drawing.Continue(s.trail.keyframes(), s.believed_path());
+  }
 
   // The motion of the last scans says nothing where they do not belong together with this one.
   if (passage != Passage::kDriven || s.recovery.active()) rolling = nullptr;
   TrackedScan tracked = TrackScan(s.front_end, {s.options.front_end, s.options.pairing.rolling}, s.trail,
                                   std::move(scan), rolling, T_odom_robot, parallel_for);
+  s.Begin(ScanStep::kRecover);
   s.CheckPlace(passage, tracked, T_odom_robot, parallel_for);
   auto& [still, view, step] = tracked;
   if (s.recovery.active()) return s.Recover({std::move(still), T_odom_robot}, std::move(view), step, parallel_for);
 
+  s.Begin(ScanStep::kOther);
   s.blind.Add(step, s.trail.empty() ? Pose2{} : s.trail.shapes().back().T_track_robot);
   const bool keyframe = s.trail.empty() || MovedEnough(s.trail.FromLast(step.T_track_robot), s.options.gate);
   if (keyframe) {
@@ -57,18 +62,26 @@ void Mapper::State::AddKeyframe(Keyframe keyframe, ScanView view, const TrackSte
   const bool placed_before = filter->placed();
 
   if (!trail.empty()) {
+    Begin(ScanStep::kFilter);
     filter->Predict(MotionTo(keyframe, step, step_covariance));
+    Begin(ScanStep::kRevisit);
     if (!revisit) revisit = revisits.Find(view.points_robot, trail, travelled_m, *filter, parallel_for);
+    Begin(ScanStep::kFilter);
     if (revisit && !filter->Observe(*revisit)) revisit.reset();
   }
+  Begin(ScanStep::kFilter);
   filter->Observe(KeyframeSight{*keyframe.scan, view, step.T_track_robot, travelled_m}, parallel_for);
   filter->Commit();
 
   trail.Append(std::move(keyframe), step.T_track_robot, std::move(view.points_robot), step_covariance, revisit);
 
+  Begin(ScanStep::kLargeLoop);
   CloseLargeLoop();
+  Begin(ScanStep::kSelfCheck);
   self_check.Look(trail, believed_path());
+  Begin(ScanStep::kDraw);
   Draw(step, placed_before);
+  Begin(ScanStep::kOther);
 }
 
 // The measured step from the last keyframe to this one. `covariance` is that of the part of the step that no
@@ -162,6 +175,10 @@ ScanOutcome Mapper::State::Coast(Stamp stamp, const Pose2& T_odom_robot) {
   outcome.localized = !blind.Lost(moved.translation().norm());
   outcome.reason = outcome.localized ? PoseReason::kOdometryOnly : PoseReason::kLost;
   return outcome;
+}
+
+void Mapper::WatchSteps(StepWatch watch) {
+  state_->front_end.Watch(std::move(watch));
 }
 
 bool Mapper::full() const {
@@ -266,6 +283,7 @@ void Mapper::Load(StateReader& archive) {
   archive(*loaded);
   if (archive.ok()) loaded->filter->Load(archive);
   if (!archive.ok() || !archive.Require(loaded->IsConsistent(), "the paths")) return;
+  loaded->front_end.Watch(state_->front_end.watch());
   state_ = std::move(loaded);
 }
 

@@ -18,6 +18,7 @@
 #include "server/slam/mapper_options.h"
 #include "server/slam/parallel_for.h"
 #include "server/slam/scan/scan_motion.h"
+#include "server/slam/tracking/scan_steps.h"
 #include "server/slam/trail/keyframe.h"
 
 namespace cairn::slam {
@@ -58,6 +59,9 @@ class Mapper {
   // it was measured, if its beams were measured one after the other (tracking/scan_tracking.h).
   ScanOutcome Process(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot, const ParallelFor& parallel_for,
                       Passage passage = Passage::kDriven, const RollingScan* rolling = nullptr);
+
+  // From now on `watch` is told when a step of Process begins. It is not part of the state: Load keeps it.
+  void WatchSteps(StepWatch watch);
 
   // It has as many keyframes, or its map as many chunks, as the options allow: it takes no more scans.
   [[nodiscard]] bool full() const;

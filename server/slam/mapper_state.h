@@ -38,6 +38,7 @@ struct Mapper::State {
                  given.blind, given.lost_after_m),
         drawing(given.grid) {}
 
+  void Begin(ScanStep step) const { slam::Begin(front_end.watch(), step); }
   ScanOutcome Coast(Stamp stamp, const Pose2& T_odom_robot);
   Passage BeginAfter(Passage passage, bool tilted);
   void CheckPlace(Passage passage, TrackedScan& tracked, const Pose2& T_odom_robot, const ParallelFor& parallel_for);

@@ -62,6 +62,7 @@ OccupancyGrid::OccupancyGrid(const GridOptions& options)
   const auto decides = static_cast<std::int16_t>(2 * clamp_);
   const bool hit_decides = options.model == GridModel::kDeterministic || options.model == GridModel::kDegrading;
   hit_ = hit_decides ? decides : LogOdds(options.hit_probability);
+  adds_up_ = options.model == GridModel::kProbabilistic || options.model == GridModel::kDeterministic;
   miss_ = options.model == GridModel::kDeterministic ? static_cast<std::int16_t>(-decides)
                                                      : LogOdds(options.miss_probability);
 }
@@ -75,15 +76,31 @@ void OccupancyGrid::Draw(const Scan& scan, const Pose2& T_map_robot) {
                              options_.model == GridModel::kTriangular ? options_.hit_spread_m : 0.0};
   ChunkKey current{std::numeric_limits<int>::min(), 0};
   GridChunk* chunk = nullptr;
-  raster_.Rasterise(scan, T_map_robot, raster, [&](GridCell cell, double hit) {
-    const ChunkKey key{FloorDiv(cell.x, kTileCells), FloorDiv(cell.y, kTileCells)};
+  static_assert(kTileCells % ScanRaster::kPiece == 0);  // A piece lies in one chunk.
+  raster_.Rasterise(scan, T_map_robot, raster, [&](GridCell first, const ScanRaster::Piece& marks) {
+    const ChunkKey key{FloorDiv(first.x, kTileCells), FloorDiv(first.y, kTileCells)};
     if (key != current) {
       chunk = &Writable(key);
       current = key;
     }
-    std::int16_t& value = chunk->log_odds[IndexInChunk(cell, key)];
-    value = After(value, hit);
+    std::int16_t* cells = chunk->log_odds.data() + IndexInChunk(first, key);
+    if (adds_up_) return AddUp(marks, cells);
+    for (std::size_t i = 0; i < marks.size(); ++i)
+      if (marks[i] != ScanRaster::kUntouched) cells[i] = After(cells[i], ScanRaster::HitShare(marks[i]));
   });
+}
+
+// What After does, where every mark is a whole hit or none. Written so that compilers vectorise it.
+void OccupancyGrid::AddUp(const ScanRaster::Piece& marks, std::int16_t* cells) const {
+  const std::int16_t hit = hit_, miss = miss_, high = clamp_, low = static_cast<std::int16_t>(-clamp_);
+  std::array<std::int16_t, ScanRaster::kPiece> values;
+  std::copy_n(cells, values.size(), values.begin());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const std::int16_t before = values[i], held = before == kUnseen ? std::int16_t{0} : before;
+    const auto next = static_cast<std::int16_t>(held + (marks[i] == ScanRaster::kHit ? hit : miss));
+    values[i] = marks[i] == ScanRaster::kUntouched ? before : std::min(std::max(next, low), high);
+  }
+  std::copy(values.begin(), values.end(), cells);
 }
 
 std::int16_t OccupancyGrid::After(std::int16_t before, double hit) const {

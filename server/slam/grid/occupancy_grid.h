@@ -143,9 +143,11 @@ class OccupancyGrid {
   GridChunk& Writable(const ChunkKey& key);
   // The value of a cell after one more scan. `hit` is the share of a hit that ScanRaster reports.
   [[nodiscard]] std::int16_t After(std::int16_t before, double hit) const;
+  void AddUp(const ScanRaster::Piece& marks, std::int16_t* cells) const;
 
   GridOptions options_;
   std::int16_t hit_ = 0, miss_ = 0, clamp_ = 0;
+  bool adds_up_ = true;  // Whether a cell adds whole hits and misses, and nothing else.
   std::map<ChunkKey, Slot> slots_;
   std::set<ChunkKey> changed_;
   ScanRaster raster_;

@@ -4,12 +4,13 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "common/geometry/transform2.h"
 #include "server/slam/scan/beam_points.h"
 
 namespace cairn::slam {
 namespace {
 
-constexpr std::uint8_t kPassed = 1, kHit = 255;
+static_assert(ScanRaster::kPiece == 2 * sizeof(std::uint64_t));
 
 // A pose may have any finite coordinates. Beyond kFarthest cells, all points fall into the last cell.
 int CellAlong(double coordinate_m, double resolution_m) {
@@ -21,19 +22,40 @@ GridCell CellOf(const Eigen::Vector2d& p_map, double resolution_m) {
   return {CellAlong(p_map.x(), resolution_m), CellAlong(p_map.y(), resolution_m)};
 }
 
+int RoundDown(int value, int step) {
+  const int rest = value % step;
+  return value - (rest < 0 ? rest + step : rest);
+}
+
 }  // namespace
 
-void ScanRaster::Rasterise(const Scan& scan, const Pose2& T_map_robot, const RasterOptions& options,
-                           const std::function<void(GridCell, double)>& visit) {
+void ScanRaster::MarkAll(const Scan& scan, const Pose2& T_map_robot, const RasterOptions& options) {
   const Pose2 T_map_laser = T_map_robot * scan.T_robot_laser;
   const GridCell from = CellOf(T_map_laser.translation(), options.resolution_m);
+  FindRays(scan, T_map_laser, options);
+  GridCell high = from;
+  low_ = from;
+  for (const Ray& ray : rays_) {
+    low_ = {std::min(low_.x, ray.to.x), std::min(low_.y, ray.to.y)};
+    high = {std::max(high.x, ray.to.x), std::max(high.y, ray.to.y)};
+  }
   const double spread_cells = options.hit_spread_m / options.resolution_m;
-  const int reach = static_cast<int>(std::ceil(options.max_ray_m / options.resolution_m) + std::ceil(spread_cells)) + 2;
-  low_ = {from.x - reach, from.y - reach};
-  width_ = height_ = 2 * reach + 1;
-  marks_.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), 0);
+  const int spread = static_cast<int>(std::ceil(spread_cells));
+  low_ = {RoundDown(low_.x - spread, kPiece), low_.y - spread};
+  width_ = RoundDown(high.x + spread - low_.x, kPiece) + kPiece;
+  height_ = high.y + spread - low_.y + 1;
+  const std::size_t cells = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
+  if (marks_.size() < cells) marks_.resize(cells, kUntouched);
+  for (const Ray& ray : rays_) {
+    MarkRay(from, ray);
+    if (ray.hit && spread_cells > 0.0) MarkAround(ray.to, spread_cells);
+  }
+}
 
+void ScanRaster::FindRays(const Scan& scan, const Pose2& T_map_laser, const RasterOptions& options) {
+  rays_.clear();
   const double cos_tilt = std::cos(scan.tilt_rad);
+  const Transform2 to_map(T_map_laser);
   for (std::size_t beam = 0; beam < scan.ranges_m.size(); ++beam) {
     const BeamClass kind = ClassifyRange(scan.ranges_m[beam], scan.range_min_m, scan.range_max_m);
     if (kind == BeamClass::kInvalid) continue;
@@ -46,29 +68,33 @@ void ScanRaster::Rasterise(const Scan& scan, const Pose2& T_map_robot, const Ras
     }
     if (range <= 0.0) continue;
     const double bearing = scan.angle_first_rad + static_cast<double>(beam) * scan.angle_step_rad;
-    const Eigen::Vector2d end = T_map_laser * OnGround(range, bearing, cos_tilt);
-    MarkRay(from, CellOf(end, options.resolution_m), hit);
-    if (hit && spread_cells > 0.0) MarkAround(CellOf(end, options.resolution_m), spread_cells);
+    rays_.push_back({CellOf(to_map * OnGround(range, bearing, cos_tilt), options.resolution_m), hit});
   }
-  for (const std::uint32_t index : touched_) {
-    const int x = static_cast<int>(index) % width_, y = static_cast<int>(index) / width_;
-    visit({low_.x + x, low_.y + y}, static_cast<double>(marks_[index] - kPassed) / (kHit - kPassed));
-    marks_[index] = 0;
-  }
-  touched_.clear();
 }
 
-void ScanRaster::MarkRay(GridCell from, GridCell to, bool hit) {
-  const int dx = std::abs(to.x - from.x), dy = -std::abs(to.y - from.y);
-  const int step_x = from.x < to.x ? 1 : -1, step_y = from.y < to.y ? 1 : -1;
-  int error = dx + dy, x = from.x, y = from.y;
-  while (x != to.x || y != to.y) {
-    Mark(x, y, kPassed);
-    const int twice = 2 * error;
-    if (twice >= dy) error += dy, x += step_x;
-    if (twice <= dx) error += dx, y += step_y;
+// A step is taken along the longer axis every time and along the other one where the error demands it, without a branch
+// that depends on the direction of the ray.
+void ScanRaster::MarkRay(GridCell from, const Ray& ray) {
+  const int dx = std::abs(ray.to.x - from.x), dy = std::abs(ray.to.y - from.y);
+  const std::ptrdiff_t step_x = from.x < ray.to.x ? 1 : -1, step_y = from.y < ray.to.y ? width_ : -width_;
+  std::uint8_t* mark = &MarkOf(from.x, from.y);
+  const auto walk = [&](std::ptrdiff_t step, std::ptrdiff_t aside, int length, int width) {
+    // The error is that of Bresenham's algorithm in the form that treats all octants alike.
+    int error = length - width;
+    for (int left = length; left > 0; --left) {
+      *mark = static_cast<std::uint8_t>(*mark | (*mark == kUntouched ? kPassed : kUntouched));
+      const bool turn = 2 * error <= length;
+      error += (turn ? length : 0) - width;
+      mark += step + (turn ? aside : 0);
+    }
+  };
+  if (dx >= dy) {
+    walk(step_x, step_y, dx, dy);
+  } else {
+    walk(step_y, step_x, dy, dx);
   }
-  Mark(to.x, to.y, hit ? kHit : kPassed);
+  std::uint8_t& last = MarkOf(ray.to.x, ray.to.y);
+  last = std::max(last, ray.hit ? kHit : kPassed);
 }
 
 // The share falls linearly with the distance from the cell that was hit.
@@ -77,15 +103,10 @@ void ScanRaster::MarkAround(GridCell hit, double spread_cells) {
   for (int dy = -reach; dy <= reach; ++dy) {
     for (int dx = -reach; dx <= reach; ++dx) {
       const double share = 1.0 - std::sqrt(static_cast<double>(dx * dx + dy * dy)) / spread_cells;
-      if (share > 0.0) Mark(hit.x + dx, hit.y + dy, static_cast<std::uint8_t>(kPassed + share * (kHit - kPassed)));
+      std::uint8_t& mark = MarkOf(hit.x + dx, hit.y + dy);
+      if (share > 0.0) mark = std::max(mark, static_cast<std::uint8_t>(kPassed + share * (kHit - kPassed)));
     }
   }
-}
-
-void ScanRaster::Mark(int x, int y, std::uint8_t mark) {
-  const auto index = static_cast<std::uint32_t>((y - low_.y) * width_ + (x - low_.x));
-  if (marks_[index] == 0) touched_.push_back(index);
-  marks_[index] = std::max(marks_[index], mark);
 }
 
 }  // namespace cairn::slam

@@ -5,8 +5,10 @@
 // Source: thesis A 3.7 (rays after Bresenham 1965).
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
-#include <functional>
+#include <cstring>
 #include <vector>
 
 #include "common/geometry/pose2.h"
@@ -28,22 +30,56 @@ struct RasterOptions {
 
 class ScanRaster {
  public:
-  // Calls visit(cell, hit) for every touched cell, in the order of first touch. `hit` is 0 for a cell that
-  // was passed, 1 for one that was hit, and in between for a share of a hit nearby. REQUIRES: the scan passed
-  // ValidateScan, and the pose is finite.
-  void Rasterise(const Scan& scan, const Pose2& T_map_robot, const RasterOptions& options,
-                 const std::function<void(GridCell cell, double hit)>& visit);
+  // Cells are visited in pieces of a row, which begin at a multiple of this number.
+  static constexpr int kPiece = 16;
+  // The mark of a cell: kUntouched, kPassed, kHit, or a share of a hit nearby in between.
+  static constexpr std::uint8_t kUntouched = 0, kPassed = 1, kHit = 255;
+  using Piece = std::array<std::uint8_t, kPiece>;
+
+  // 0 for a cell that was passed, 1 for one that was hit. REQUIRES: the cell was touched.
+  [[nodiscard]] static double HitShare(std::uint8_t mark) {
+    return static_cast<double>(mark - kPassed) / (kHit - kPassed);
+  }
+
+  // Calls visit(first, marks) for every piece with a touched cell; `first` is its lowest cell, and `marks` a Piece. The
+  // order is that of the rows. REQUIRES: the scan passed ValidateScan, and the pose is finite.
+  template <typename Visit>
+  void Rasterise(const Scan& scan, const Pose2& T_map_robot, const RasterOptions& options, const Visit& visit) {
+    MarkAll(scan, T_map_robot, options);
+    for (int row = 0; row < height_; ++row) {
+      std::uint8_t* marks = marks_.data() + static_cast<std::size_t>(row) * static_cast<std::size_t>(width_);
+      for (int column = 0; column < width_; column += kPiece) {
+        std::array<std::uint64_t, kPiece / 8> words;
+        std::memcpy(words.data(), marks + column, kPiece);
+        if ((words[0] | words[1]) == 0) continue;
+        Piece piece;
+        std::memcpy(piece.data(), words.data(), kPiece);
+        visit(GridCell{low_.x + column, low_.y + row}, piece);
+        std::memset(marks + column, kUntouched, kPiece);
+      }
+    }
+  }
 
  private:
-  void MarkRay(GridCell from, GridCell to, bool hit);
-  void MarkAround(GridCell hit, double spread_cells);
-  void Mark(int x, int y, std::uint8_t mark);
+  struct Ray {
+    GridCell to;
+    bool hit = false;
+  };
 
-  GridCell low_{};  // Lowest cell of the scratch area.
-  int width_ = 0, height_ = 0;
-  // Per cell: 0 untouched, 1 passed, larger values a share of a hit, kHit a whole hit.
-  std::vector<std::uint8_t> marks_;
-  std::vector<std::uint32_t> touched_;
+  void MarkAll(const Scan& scan, const Pose2& T_map_robot, const RasterOptions& options);
+  // Sets rays_.
+  void FindRays(const Scan& scan, const Pose2& T_map_laser, const RasterOptions& options);
+  void MarkRay(GridCell from, const Ray& ray);
+  void MarkAround(GridCell hit, double spread_cells);
+  [[nodiscard]] std::uint8_t& MarkOf(int x, int y) {
+    return marks_[static_cast<std::size_t>(y - low_.y) * static_cast<std::size_t>(width_) +
+                  static_cast<std::size_t>(x - low_.x)];
+  }
+
+  GridCell low_{};              // Lowest cell of the scratch area, which contains all rays.
+  int width_ = 0, height_ = 0;  // Its size; the width is a multiple of kPiece.
+  std::vector<Ray> rays_;
+  std::vector<std::uint8_t> marks_;  // By row; all kUntouched between scans.
 };
 
 }  // namespace cairn::slam

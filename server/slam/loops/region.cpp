@@ -88,12 +88,19 @@ FreeSpace::FreeSpace(const Trail& trail, const Stretch& stretch, double cell_m) 
   ScanRaster raster;
   const RasterOptions raster_options{.resolution_m = cell_m_, .max_ray_m = kMaxRayM, .no_return_free_m = 0.0};
   for (const Drawn& one : drawn) {
-    raster.Rasterise(*keyframes[one.keyframe].scan, one.T_anchor_robot, raster_options, [&](GridCell cell, double hit) {
-      const int x = cell.x - low_x_, y = cell.y - low_y_;
-      if (x < 0 || y < 0 || x >= width_ || y >= height_) return;
-      Seen& seen = cells_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)];
-      seen = std::max(seen, hit > 0.0 ? Seen::kHit : Seen::kThrough);
-    });
+    const auto note = [&](GridCell first, const ScanRaster::Piece& marks) {
+      const int y = first.y - low_y_;
+      if (y < 0 || y >= height_) return;
+      for (int i = 0; i < ScanRaster::kPiece; ++i) {
+        const std::uint8_t mark = marks[static_cast<std::size_t>(i)];
+        const int x = first.x + i - low_x_;
+        if (mark == ScanRaster::kUntouched || x < 0 || x >= width_) continue;
+        Seen& seen =
+            cells_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)];
+        seen = std::max(seen, mark > ScanRaster::kPassed ? Seen::kHit : Seen::kThrough);
+      }
+    };
+    raster.Rasterise(*keyframes[one.keyframe].scan, one.T_anchor_robot, raster_options, note);
   }
 }
 

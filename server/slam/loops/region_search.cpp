@@ -5,6 +5,8 @@
 #include <limits>
 #include <vector>
 
+#include "common/geometry/transform2.h"
+
 namespace cairn::slam {
 namespace {
 
@@ -19,11 +21,6 @@ void MaxAhead(const std::uint8_t* from, std::uint8_t* to, std::size_t count, std
 // At this distance one angle step moves a point by one cell. Farther points move by more, which the reach of
 // the likelihood tolerates.
 constexpr double kFullDetailM = 15.0;
-
-struct Cell {
-  int x = 0;
-  int y = 0;
-};
 
 // A square block of translations at one heading, with an upper bound of their scores.
 struct Block {
@@ -45,8 +42,8 @@ class BranchAndBound {
     reach_cells_ = static_cast<int>(std::ceil(window.reach_m / pyramid.cell_m()));
     for (int turn = -reach_turns_; turn <= reach_turns_; ++turn) {
       const Pose2& centre = window.T_ref_curr_centre;
-      const Pose2 pose{centre.x, centre.y, WrapAngle(centre.theta + turn * step_rad_)};
-      std::vector<Cell>& cells = turned_.emplace_back();
+      const Transform2 pose({centre.x, centre.y, WrapAngle(centre.theta + turn * step_rad_)});
+      std::vector<LikelihoodPyramid::Cell>& cells = turned_.emplace_back();
       cells.reserve(points.size());
       for (const Eigen::Vector2d& p : points) {
         const Eigen::Vector2d p_ref = pose * p;
@@ -94,10 +91,9 @@ class BranchAndBound {
   void Descend(std::vector<Block> blocks, int level) {
     std::erase_if(blocks, [&](const Block& block) { return Excluded(block, level); });
     for (Block& block : blocks) {
-      block.bound = 0;
       if (++scored_ > kMaxBlocks) return;
-      for (const Cell& cell : turned_[static_cast<std::size_t>(block.turn)])
-        block.bound += pyramid_.Best(level, cell.x + block.x, cell.y + block.y);
+      block.bound =
+          pyramid_.SumOfBest(level, turned_[static_cast<std::size_t>(block.turn)], block.x, block.y, best_.bound);
     }
     std::stable_sort(blocks.begin(), blocks.end(), [](const Block& a, const Block& b) { return a.bound > b.bound; });
     for (const Block& block : blocks) {
@@ -123,7 +119,7 @@ class BranchAndBound {
   double step_rad_ = 0.0;
   int reach_turns_ = 0;
   int reach_cells_ = 0;
-  std::vector<std::vector<Cell>> turned_;  // The cells of the points at each heading.
+  std::vector<std::vector<LikelihoodPyramid::Cell>> turned_;  // The cells of the points at each heading.
   Block best_;
   bool found_ = false;
   int scored_ = 0;
@@ -176,6 +172,26 @@ LikelihoodPyramid::LikelihoodPyramid(std::span<const SurfacePoint> reference, do
     levels_.emplace_back(size);
     MaxAhead(along.data(), levels_.back().data(), size, half * width);  // All rows are processed at once.
   }
+}
+
+std::int64_t LikelihoodPyramid::SumOfBest(int level, std::span<const Cell> cells, int x, int y,
+                                          std::int64_t enough) const {
+  constexpr std::size_t kAtOnce = 32;
+  const std::uint8_t* raster = levels_[static_cast<std::size_t>(level)].data();
+  const int to_column = x + kPad - low_x_, to_row = y + kPad - low_y_;
+  const auto width = static_cast<std::uint32_t>(width_), height = static_cast<std::uint32_t>(height_);
+  std::int64_t sum = 0;
+  for (std::size_t first = 0; first < cells.size(); first += kAtOnce) {
+    const auto left = cells.subspan(first);
+    if (sum + 255 * static_cast<std::int64_t>(left.size()) <= enough) return sum;
+    for (const Cell& cell : left.first(std::min(kAtOnce, left.size()))) {
+      // As unsigned numbers, cells to the left and below are too large as well.
+      const auto column = static_cast<std::uint32_t>(cell.x + to_column),
+                 row = static_cast<std::uint32_t>(cell.y + to_row);
+      if (column < width && row < height) sum += raster[static_cast<std::size_t>(row) * width + column];
+    }
+  }
+  return sum;
 }
 
 std::optional<RegionPeak> FindBestPose(std::span<const Eigen::Vector2d> points_curr, const LikelihoodPyramid& pyramid,

@@ -33,6 +33,12 @@ class LikelihoodPyramid {
     if (column < 0 || row < 0 || column >= width_ || row >= height_) return 0;
     return levels_[static_cast<std::size_t>(level)][static_cast<std::size_t>(row * width_ + column)];
   }
+  struct Cell {
+    int x = 0;
+    int y = 0;
+  };
+  // The sum of Best over cells that are moved by (x, y), or, if it is at most `enough`, any number that is.
+  [[nodiscard]] std::int64_t SumOfBest(int level, std::span<const Cell> cells, int x, int y, std::int64_t enough) const;
   [[nodiscard]] double cell_m() const { return cell_m_; }
   [[nodiscard]] int levels() const { return static_cast<int>(levels_.size()); }
 

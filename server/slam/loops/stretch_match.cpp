@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "common/geometry/transform2.h"
 #include "server/slam/loops/unique_pose.h"
 #include "server/slam/matching/point_index.h"
 
@@ -29,9 +30,11 @@ struct Agreement {
 Agreement AgreementOf(const std::vector<SurfacePoint>& surfaces, const Pose2& T, const PointIndex& other,
                       const FreeSpace& other_free, double near_m) {
   Agreement agreement;
+  const Transform2 to_other(T);
+  PointIndex::Found neighbour;
   for (const SurfacePoint& surface : surfaces) {
-    const Eigen::Vector2d p = T * surface.p;
-    if (other.Nearest(p, near_m) != nullptr) {
+    const Eigen::Vector2d p = to_other * surface.p;
+    if (other.Nearest(p, near_m, neighbour) != nullptr) {
       ++agreement.explained;
     } else if (other_free.Contradicts(p)) {
       ++agreement.conflicts;
@@ -63,13 +66,15 @@ std::optional<Pose2> MatchStretches(const Trail& trail_ref, const Stretch& ref, 
   const MatchResult aligned =
       AlignPointsToSurfaces(recent, before_index, {*unique, *unique, UniquePoseCovariance()}, explaining);
   if (!aligned.converged || aligned.degenerate) return std::nullopt;
-  const FreeSpace before_free(trail_ref, ref, options.free_cell_m), recent_free(trail_curr, curr, options.free_cell_m);
-  const PointIndex recent_index(recent);
   const double near_m = kNearShare * align.inlier_distance_m;
+  const FreeSpace before_free(trail_ref, ref, options.free_cell_m);
   const Agreement ours = AgreementOf(recent, aligned.T_ref_curr, before_index, before_free, near_m);
+  if (ours.explained < kMinExplained * static_cast<double>(recent.size()) || ours.conflict() > options.max_conflict)
+    return std::nullopt;
+  const PointIndex recent_index(recent);
+  const FreeSpace recent_free(trail_curr, curr, options.free_cell_m);
   const Agreement theirs = AgreementOf(before, aligned.T_ref_curr.Inverse(), recent_index, recent_free, near_m);
-  if (ours.explained < kMinExplained * static_cast<double>(recent.size())) return std::nullopt;
-  if (std::max(ours.conflict(), theirs.conflict()) > options.max_conflict) return std::nullopt;
+  if (theirs.conflict() > options.max_conflict) return std::nullopt;
   return aligned.T_ref_curr;
 }
 

@@ -3,6 +3,8 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <vector>
 
 #include "common/geometry/pose_difference.h"
 #include "server/slam/matching/match_result.h"
@@ -14,35 +16,63 @@ namespace {
 // changes the errors no more than another seed (study `sensitivity`).
 constexpr double kStopStepRad = 2e-4;
 
+// The lower triangle of the sum of weight * J * J', which is all that the solver reads.
+class InformationSum {
+ public:
+  void Add(double weight, const Eigen::Vector3d& J) {
+    const double y = weight * J.y(), turn = weight * J.z();
+    xx_ += weight * J.x() * J.x();
+    yx_ += y * J.x();
+    yy_ += y * J.y();
+    tx_ += turn * J.x();
+    ty_ += turn * J.y();
+    tt_ += turn * J.z();
+  }
+  [[nodiscard]] Eigen::Matrix3d matrix() const {
+    Eigen::Matrix3d H;
+    H << xx_, yx_, tx_, yx_, yy_, ty_, tx_, ty_, tt_;
+    return H;
+  }
+
+ private:
+  double xx_ = 0.0, yx_ = 0.0, yy_ = 0.0, tx_ = 0.0, ty_ = 0.0, tt_ = 0.0;
+};
+
 // Normal equations of the linearised point-to-line errors at one pose, and the numbers of pairs and inliers.
 struct Linearisation {
-  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
-  // H from only the pairs whose reference point has a surface direction.
-  Eigen::Matrix3d H_surfaces = Eigen::Matrix3d::Zero();
+  InformationSum H;
   Eigen::Vector3d g = Eigen::Vector3d::Zero();
   int pairs = 0;
   int inliers = 0;
 };
 
+// `found` has for each point what PointIndex::Nearest left there at the pose before. If `H_surfaces` is not null, H
+// from only the pairs whose reference point has a surface direction is added to it.
 Linearisation Linearise(std::span<const SurfacePoint> points_robot, const PointIndex& reference,
-                        const Pose2& T_ref_robot, double gate_m, const PointToLineOptions& options) {
+                        const Pose2& T_ref_robot, double gate_m, const PointToLineOptions& options,
+                        std::span<PointIndex::Found> found, Eigen::Matrix3d* H_surfaces = nullptr) {
   Linearisation sum;
   const double c = std::cos(T_ref_robot.theta), s = std::sin(T_ref_robot.theta);
   const double scale = std::max(options.residual_sigma_m, options.cauchy_share * gate_m);
-  for (const SurfacePoint& point : points_robot) {
+  std::int32_t neighbour = PointIndex::kNone;  // The surface of the point before is often that of this one as well.
+  for (std::size_t i = 0; i < points_robot.size(); ++i) {
+    const SurfacePoint& point = points_robot[i];
     const Eigen::Vector2d turned(c * point.p.x() - s * point.p.y(), s * point.p.x() + c * point.p.y());
     const Eigen::Vector2d p_ref = turned + T_ref_robot.translation();
-    const SurfacePoint* nearest = reference.Nearest(p_ref, gate_m);
+    if (found[i].clear_m == 0.0) found[i].point = neighbour;
+    const SurfacePoint* nearest = reference.Nearest(p_ref, gate_m, found[i]);
     if (nearest == nullptr) continue;
+    neighbour = found[i].point;
     const Eigen::Vector2d offset = p_ref - nearest->p;
     Eigen::Vector2d normal = nearest->normal;
     double trust = 1.0;
-    if (nearest->smooth() && point.smooth()) {
+    const bool directed = nearest->smooth();
+    if (directed && point.smooth()) {
       // The two sides of a thin wall are different surfaces, so their points are not paired.
       const Eigen::Vector2d own(c * point.normal.x() - s * point.normal.y(),
                                 s * point.normal.x() + c * point.normal.y());
       if (own.dot(normal) < options.same_side) continue;
-    } else if (!nearest->smooth()) {
+    } else if (!directed) {
       // A reference point without a surface direction constrains only the distance to it.
       const double distance = offset.norm();
       if (distance < 1e-6) continue;
@@ -53,8 +83,8 @@ Linearisation Linearise(std::span<const SurfacePoint> points_robot, const PointI
     // Weight of the Cauchy loss.
     const double weight = trust / (1.0 + (residual / scale) * (residual / scale));
     const Eigen::Vector3d J(normal.x(), normal.y(), normal.dot(Eigen::Vector2d(-turned.y(), turned.x())));
-    sum.H.noalias() += weight * J * J.transpose();
-    if (nearest->smooth()) sum.H_surfaces.noalias() += weight * J * J.transpose();
+    sum.H.Add(weight, J);
+    if (directed && H_surfaces != nullptr) H_surfaces->noalias() += weight * J * J.transpose();
     sum.g.noalias() += weight * residual * J;
     ++sum.pairs;
     if (std::abs(residual) < options.inlier_distance_m) ++sum.inliers;
@@ -69,9 +99,10 @@ SurfaceAgreement CompareSurfaces(std::span<const SurfacePoint> points_curr, cons
   SurfaceAgreement sum;
   const Eigen::Matrix2d R = T_ref_curr.rotation();
   double squares = 0.0;
+  PointIndex::Found neighbour;
   for (const SurfacePoint& point : points_curr) {
     const Eigen::Vector2d turned = R * point.p, p_ref = turned + T_ref_curr.translation();
-    const SurfacePoint* nearest = reference.Nearest(p_ref, distance_m);
+    const SurfacePoint* nearest = reference.Nearest(p_ref, distance_m, neighbour);
     if (nearest == nullptr) continue;
     const bool directed = nearest->smooth() && point.smooth();
     // The point lies on the other side of a thin wall.
@@ -140,6 +171,7 @@ MatchResult AlignPointsToSurfaces(std::span<const SurfacePoint> points_robot, co
   }
   const Eigen::Matrix3d prior_information = guess.prior_covariance.llt().solve(Eigen::Matrix3d::Identity());
   const double per_point = 1.0 / (options.residual_sigma_m * options.residual_sigma_m);
+  std::vector<PointIndex::Found> found(points_robot.size());
   Pose2 T = guess.T_ref_robot_start;
   Linearisation sum;
   bool settled = false;
@@ -147,10 +179,10 @@ MatchResult AlignPointsToSurfaces(std::span<const SurfacePoint> points_robot, co
     const double shrink = std::min(1.0, iteration / static_cast<double>(options.shrink_iterations));
     const double gate =
         options.first_pair_distance_m + shrink * (options.last_pair_distance_m - options.first_pair_distance_m);
-    sum = Linearise(points_robot, reference, T, gate, options);
+    sum = Linearise(points_robot, reference, T, gate, options, found);
     if (sum.pairs < 5) break;
     const Eigen::Vector3d from_prior = Minus(T, guess.T_ref_robot_prior);
-    const Eigen::Matrix3d H = per_point * sum.H + prior_information;
+    const Eigen::Matrix3d H = per_point * sum.H.matrix() + prior_information;
     const Eigen::Vector3d step = -H.ldlt().solve(per_point * sum.g + prior_information * from_prior);
     if (!step.allFinite()) {
       result.failure = MatchFailure::kNotConverged;
@@ -160,7 +192,8 @@ MatchResult AlignPointsToSurfaces(std::span<const SurfacePoint> points_robot, co
     result.iterations = iteration + 1;
     settled = shrink >= 1.0 && step.head<2>().norm() < options.stop_step_m && std::abs(step.z()) < kStopStepRad;
   }
-  sum = Linearise(points_robot, reference, T, options.last_pair_distance_m, options);
+  Eigen::Matrix3d H_surfaces = Eigen::Matrix3d::Zero();
+  sum = Linearise(points_robot, reference, T, options.last_pair_distance_m, options, found, &H_surfaces);
   result.inliers = sum.inliers;
   result.score = static_cast<double>(sum.inliers) / static_cast<double>(points_robot.size());
   if (result.score < options.min_score || sum.pairs < 5) {
@@ -169,11 +202,11 @@ MatchResult AlignPointsToSurfaces(std::span<const SurfacePoint> points_robot, co
   }
   result.T_ref_curr = T;
   result.converged = true;
-  result.covariance = (per_point * sum.H + prior_information).llt().solve(Eigen::Matrix3d::Identity());
+  result.covariance = (per_point * sum.H.matrix() + prior_information).llt().solve(Eigen::Matrix3d::Identity());
   result.covariance = 0.5 * (result.covariance + result.covariance.transpose()).eval();
   // A reference point without a surface direction seems to constrain all directions, so only surfaces are
   // used to judge degeneracy.
-  DetectDegeneracy(sum.H_surfaces, result);
+  DetectDegeneracy(H_surfaces, result);
   return result;
 }
 

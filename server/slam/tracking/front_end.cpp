@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/geometry/pose_difference.h"
+#include "common/geometry/transform2.h"
 #include "server/slam/matching/match_result.h"
 #include "server/slam/matching/point_to_line.h"
 
@@ -31,8 +32,9 @@ double JumpOf(const Pose2& T_track_robot, const Pose2& guess, const Eigen::Matri
 // Transforms points from frame b to frame a and appends them.
 void AppendMoved(const Pose2& T_a_b, const std::vector<SurfacePoint>& points_b, std::vector<SurfacePoint>& points_a) {
   const Eigen::Matrix2d R = T_a_b.rotation();
+  const Transform2 to_a(T_a_b);
   points_a.reserve(points_a.size() + points_b.size());
-  for (const SurfacePoint& point : points_b) points_a.push_back({T_a_b * point.p, R * point.normal});
+  for (const SurfacePoint& point : points_b) points_a.push_back({to_a * point.p, R * point.normal});
 }
 
 }  // namespace
@@ -116,11 +118,13 @@ TrackStep FrontEnd::Track(const ScanView& view, const Pose2& T_odom_robot, const
 
 TrackStep FrontEnd::Follow(const ScanView& view, const Pose2& T_odom_robot, const ParallelFor& parallel_for) const {
   const Guess guess = Predict(T_odom_robot);
+  Begin(watch_, ScanStep::kMatch);
   MatchResult coarse = MatchLastKeyframe(view, guess, parallel_for);
   // Along a corridor the alignment moves the points only slowly. If they show nothing in that direction, the
   // refinement must therefore begin at the pose where it is to stay.
   if (!options_.use_odometry && options_.refine_enabled)
     TakeAlongFromPrior({guess.T_track_robot, guess.covariance}, coarse);
+  Begin(watch_, ScanStep::kRefine);
   const MatchResult match = options_.refine_enabled ? Refine(view, T_odom_robot, guess, coarse)
                                                     : MatchAlone(view, T_odom_robot, guess, coarse, parallel_for);
   return StepOf(match);
@@ -149,6 +153,7 @@ std::optional<TrackStep> FrontEnd::TrackAgain(const ScanView& view, const Pose2&
   const Sight first = history_.back();
   history_.pop_back();
   const Guess guess = Predict(T_odom_robot);
+  Begin(watch_, ScanStep::kRefine);
   const MatchResult match = AlignPointsToSurfaces(
       view.points_robot, index_, {step.T_track_robot, guess.T_track_robot, guess.covariance}, options_.refine);
   const bool better = match.converged && match.score > step.score;
@@ -332,6 +337,7 @@ void FrontEnd::BuildIndices() {
 
 void FrontEnd::BuildKeyframeIndex() {
   keyframe_index_.Clear();
+  if (options_.refine_enabled) return;  // Only a matcher that works alone is judged by it.
   for (const SurfacePoint& point : keyframe_view_.points_robot) keyframe_index_.Add(point);
 }
 

@@ -11,6 +11,7 @@
 
 #include <deque>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "server/slam/features/feature_extraction.h"
@@ -19,6 +20,7 @@
 #include "server/slam/matching/point_to_line.h"
 #include "server/slam/matching/scan_matcher.h"
 #include "server/slam/motion/step_motion.h"
+#include "server/slam/tracking/scan_steps.h"
 
 namespace cairn::slam {
 
@@ -84,6 +86,10 @@ class FrontEnd {
  public:
   FrontEnd(const FrontEndOptions& options, ScanMatcher matcher);
 
+  // From now on `watch` is told when kLook, kMatch and kRefine begin.
+  void Watch(StepWatch watch) { watch_ = std::move(watch); }
+  [[nodiscard]] const StepWatch& watch() const { return watch_; }
+
   // Returns the pose at this scan. The first scan is at the identity and counts as matched.
   TrackStep Track(const ScanView& view, const Pose2& T_odom_robot, const ParallelFor& parallel_for);
   // The scan just tracked once more, as `view` shows it now: aligned from the pose that was found. Nothing, and no
@@ -146,6 +152,7 @@ class FrontEnd {
 
   FrontEndOptions options_;
   ScanMatcher matcher_;
+  StepWatch watch_;
   double score_ = 0.0;  // Score of the last match.
   // The reference of the matcher, which mostly is the last keyframe, and its points in its robot frame.
   Sight keyframe_;

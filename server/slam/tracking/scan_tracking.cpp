@@ -74,6 +74,7 @@ void LookAgain(FrontEnd& front_end, const TrackScanOptions& options, const Trail
     motion = std::move(*matched);
     auto scan = Computed(rolling, motion, limits.deskew, tracked.scan->stamp);
     if (scan == nullptr) return;
+    Begin(front_end.watch(), ScanStep::kLook);
     ScanView view = Look(*scan, options.front_end);
     const auto again = front_end.TrackAgain(view, T_odom_robot, tracked.step);
     if (!again) return;
@@ -86,6 +87,7 @@ void LookAgain(FrontEnd& front_end, const TrackScanOptions& options, const Trail
 TrackedScan TrackScan(FrontEnd& front_end, const TrackScanOptions& options, const Trail& trail,
                       std::shared_ptr<const Scan> scan, const RollingScan* rolling, const Pose2& T_odom_robot,
                       const ParallelFor& parallel_for) {
+  Begin(front_end.watch(), ScanStep::kLook);
   std::vector<Odometry> motion;
   if (rolling != nullptr) {
     const bool use_odometry = options.front_end.use_odometry;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <ctime>
 #include <iomanip>
 #include <numeric>
 #include <sstream>
@@ -40,6 +41,59 @@ double Mean(const std::vector<double>& values) {
 
 std::uint64_t Total(const std::array<std::uint64_t, kDropReasonCount>& dropped) {
   return std::accumulate(dropped.begin(), dropped.end(), std::uint64_t{0});
+}
+
+// Of the calling thread: what other programs do on the machine does not count.
+double ProcessorMs() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
+}
+
+// Measures how long each scan takes, and each step of the estimator.
+class ScanTimes {
+ public:
+  explicit ScanTimes(OfflineReport& report) : report_(report) {}
+
+  // The next record begins: what lies between records belongs to no scan.
+  void BeginRecord() {
+    Enter(slam::ScanStep::kOther);
+    scan_ = {};
+    start_ = Clock::now();
+  }
+  void Enter(slam::ScanStep step) {
+    const double now_ms = ProcessorMs();
+    scan_[static_cast<std::size_t>(step_)] += now_ms - since_ms_;
+    step_ = step;
+    since_ms_ = now_ms;
+  }
+  // A record may complete several scans.
+  void EndScan() {
+    Enter(slam::ScanStep::kOther);
+    const double processor_ms = std::accumulate(scan_.begin(), scan_.end(), 0.0);
+    report_.scan_ms.push_back(SecondsSince(start_) * 1e3);
+    report_.scan_cpu_ms.push_back(processor_ms);
+    for (std::size_t k = 0; k < scan_.size(); ++k) report_.step_ms[k] += scan_[k];
+    if (processor_ms > slowest_ms_) report_.slowest_scan_step_ms = scan_;
+    slowest_ms_ = std::max(slowest_ms_, processor_ms);
+    scan_ = {};
+    start_ = Clock::now();
+  }
+
+ private:
+  OfflineReport& report_;
+  std::array<double, slam::kScanStepCount> scan_{};
+  double slowest_ms_ = 0.0;
+  slam::ScanStep step_ = slam::ScanStep::kOther;
+  double since_ms_ = ProcessorMs();
+  Clock::time_point start_ = Clock::now();
+};
+
+Json StepsJson(const std::array<double, slam::kScanStepCount>& step_ms, double scans) {
+  Json steps = Json::object();
+  for (std::size_t k = 0; k < step_ms.size(); ++k)
+    steps[std::string(slam::kScanStepNames[k])] = scans > 0.0 ? step_ms[k] / scans : 0.0;
+  return steps;
 }
 
 }  // namespace
@@ -87,13 +141,12 @@ Result<OfflineRobot> Estimate(const OfflineOptions& options, const std::filesyst
                               const Pose2& T_map_robot_start) {
   OfflineRobot robot;
   OfflineReport& report = robot.report;
-  Clock::time_point before;
+  ScanTimes times(report);
   robot.pipeline = std::make_unique<slam::ScanPipeline>(
       options.slam, T_map_robot_start, OverThreads(options.threads),
       slam::ScanPipeline::Sink{
           [&](const Scan&, const slam::ScanOutcome& outcome) {
-            report.scan_ms.push_back(SecondsSince(before) * 1e3);
-            before = Clock::now();
+            times.EndScan();
             ++report.scans_used;
             report.keyframes += outcome.keyframe ? 1 : 0;
             report.not_localized += outcome.localized ? 0 : 1;
@@ -101,9 +154,11 @@ Result<OfflineRobot> Estimate(const OfflineOptions& options, const std::filesyst
           },
           [&](const Scan&, DropReason reason) { ++report.dropped[static_cast<std::size_t>(reason)]; }});
   slam::ScanPipeline& pipeline = *robot.pipeline;
+  // Reading the clock so often takes a few per cent of the time.
+  if (options.json) pipeline.mapper().WatchSteps([&](slam::ScanStep step) { times.Enter(step); });
 
   const auto add = [&](LogRecord&& record) {
-    before = Clock::now();
+    times.BeginRecord();
     if (const auto* odometry = std::get_if<Odometry>(&record)) {
       if (ValidateOdometry(*odometry)) {
         pipeline.Add(*odometry);
@@ -123,8 +178,9 @@ Result<OfflineRobot> Estimate(const OfflineOptions& options, const std::filesyst
   auto summary = ReadLog(log, options.reader, add);
   if (!summary) return tl::unexpected<Status>(summary.error());
   report.log = *std::move(summary);
-  before = Clock::now();
+  times.BeginRecord();
   pipeline.Finish();
+  pipeline.mapper().WatchSteps({});
   report.odometry_dropped += pipeline.odometry_refused();
   pipeline.mapper().FinishMap();
   report.landmarks = pipeline.mapper().landmarks().size();
@@ -172,6 +228,12 @@ Json JsonOf(const OfflineReport& report) {
           {"time_ms_p50", Percentile(report.scan_ms, 0.5)},
           {"time_ms_p99", Percentile(report.scan_ms, 0.99)},
           {"time_ms_max", Percentile(report.scan_ms, 1.0)},
+          {"cpu_ms_mean", Mean(report.scan_cpu_ms)},
+          {"cpu_ms_p50", Percentile(report.scan_cpu_ms, 0.5)},
+          {"cpu_ms_p99", Percentile(report.scan_cpu_ms, 0.99)},
+          {"cpu_ms_max", Percentile(report.scan_cpu_ms, 1.0)},
+          {"step_ms_mean", StepsJson(report.step_ms, static_cast<double>(report.scan_ms.size()))},
+          {"step_ms_in_slowest_scan", StepsJson(report.slowest_scan_step_ms, 1.0)},
           {"cpu_s", report.cpu_s},
           {"wall_s", report.wall_s},
           {"scans_used", report.scans_used},

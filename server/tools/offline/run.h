@@ -14,6 +14,7 @@
 #include "common/service/ledger.h"
 #include "common/status.h"
 #include "server/slam/scan_pipeline.h"
+#include "server/slam/tracking/scan_steps.h"
 #include "server/tools/log_run/json_line.h"
 #include "server/tools/offline/options.h"
 
@@ -21,7 +22,12 @@ namespace cairn::server {
 
 struct OfflineReport {
   std::vector<double> scan_ms;  // Estimator time per scan, in order.
-  double wall_s = 0.0;          // Whole run: reading, estimating, writing.
+  // The same in processor time of the thread that runs the estimator.
+  std::vector<double> scan_cpu_ms;
+  // Of that, what the steps of the estimator took: all scans together, and the scan that took longest.
+  std::array<double, slam::kScanStepCount> step_ms{};
+  std::array<double, slam::kScanStepCount> slowest_scan_step_ms{};
+  double wall_s = 0.0;  // Whole run: reading, estimating, writing.
   double cpu_s = 0.0;
   double peak_rss_mib = 0.0;
   std::uint64_t scans_used = 0;

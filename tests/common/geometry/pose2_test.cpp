@@ -7,6 +7,8 @@
 #include <random>
 #include <vector>
 
+#include "common/geometry/transform2.h"
+
 namespace cairn {
 namespace {
 
@@ -29,6 +31,13 @@ TEST(Pose2, QuarterTurnByHand) {
   const Eigen::Vector2d p_map = T_map_robot * Eigen::Vector2d(3, 0);  // Three metres ahead.
   EXPECT_NEAR(p_map.x(), 1, 1e-12);
   EXPECT_NEAR(p_map.y(), 5, 1e-12);
+}
+
+TEST(Pose2, ATransformMovesPointsAsItsPoseDoes) {
+  for (const Pose2& T : SomePoses()) {
+    const Transform2 transform(T);
+    for (const Pose2& other : SomePoses()) EXPECT_EQ(transform * other.translation(), T * other.translation());
+  }
 }
 
 TEST(Pose2, InverseUndoesFromBothSides) {

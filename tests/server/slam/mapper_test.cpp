@@ -87,6 +87,38 @@ TEST(Mapper, AModelOfTheOdometryGetsTheOdometryAndNotTheMatch) {
   EXPECT_NEAR(outcome.T_map_robot.x, 1.2, 0.1);
 }
 
+TEST(Mapper, SaysWhichStepsAScanTakes) {
+  MapperOptions options;
+  options.filter.particles = 10;
+  Mapper mapper(options, {}, 1), restored(options, {}, 1);
+  std::vector<ScanStep> steps;
+  const auto note = [&steps](ScanStep step) { steps.push_back(step); };
+  mapper.WatchSteps(note);
+  restored.WatchSteps(note);
+  const auto see = [&](Mapper& by, double x) {
+    steps.clear();
+    auto scan = std::make_shared<Scan>(Look(test::Office(), {x, 0, 0}, {}));
+    scan->stamp = static_cast<Stamp>(1e9 * (1.0 + x));
+    return by.Process(std::move(scan), {x, 0, 0}, SerialFor).keyframe;
+  };
+  using enum ScanStep;
+  ASSERT_TRUE(see(mapper, 0.0));
+  EXPECT_EQ(steps, (std::vector{kLook, kRecover, kOther, kFilter, kLargeLoop, kSelfCheck, kDraw, kOther}));
+  ASSERT_FALSE(see(mapper, 0.01));
+  const std::vector tracked = {kLook, kMatch, kRefine, kRecover, kOther};
+  EXPECT_EQ(steps, tracked);
+  StateWriter writer;
+  mapper.Save(writer);
+  const std::string bytes = writer.Bytes();
+  StateReader reader(bytes);
+  restored.Load(reader);
+  ASSERT_FALSE(see(restored, 0.02));
+  EXPECT_EQ(steps, tracked) << "a state that was loaded is watched as well";
+  ASSERT_TRUE(see(mapper, 1.0));
+  EXPECT_EQ(steps, (std::vector{kLook, kMatch, kRefine, kRecover, kOther, kFilter, kRevisit, kFilter, kFilter,
+                                kLargeLoop, kSelfCheck, kDraw, kOther}));
+}
+
 // Once round a large ring, and 28 m more. For `blind_m` metres from `blind_from_m` on, the robot sees nothing
 // and its wheels slip.
 Drive DriveLargeRing(double blind_from_m, double blind_m) {

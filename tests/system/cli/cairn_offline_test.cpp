@@ -140,6 +140,23 @@ TEST_F(CairnOffline, PrintsOneObjectForMachines) {
   EXPECT_LE(report["time_ms_p50"], report["time_ms_p99"]);
 }
 
+TEST_F(CairnOffline, SaysWhereTheTimeOfAScanWent) {
+  const auto run = Run({Log(), "--json"});
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  const auto report = nlohmann::json::parse(run.output);
+  const auto sum_of = [&](const char* steps) {
+    double sum_ms = 0.0;
+    for (const auto& [name, ms] : report[steps].items()) sum_ms += ms.get<double>();
+    return sum_ms;
+  };
+  EXPECT_NEAR(sum_of("step_ms_mean"), report["cpu_ms_mean"].get<double>(), 1e-6);
+  EXPECT_NEAR(sum_of("step_ms_in_slowest_scan"), report["cpu_ms_max"].get<double>(), 1e-6);
+  EXPECT_LE(report["cpu_ms_mean"], report["cpu_ms_max"]);
+  for (const char* step : {"look", "match", "refine", "filter", "draw"})
+    EXPECT_GT(report["step_ms_mean"][step], 0.0) << step;
+  EXPECT_LT(report["step_ms_mean"]["recover"], report["step_ms_mean"]["refine"]) << "nobody carried this robot";
+}
+
 TEST_F(CairnOffline, StartsWhereItIsTold) {
   const TempDirectory out;
   const auto first = [&](const std::string& start) {

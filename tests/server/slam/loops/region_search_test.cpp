@@ -53,6 +53,32 @@ TEST(LikelihoodPyramid, FallsFromThePointsToNothing) {
   EXPECT_EQ(pyramid.Best(0, 10000, -10000), 0);
 }
 
+TEST(LikelihoodPyramid, ASumEndsOnlyWhereItCannotBeEnough) {
+  const LikelihoodPyramid pyramid(Hall(), kCellM, 0.3, 5);
+  std::mt19937_64 rng(2);
+  std::uniform_int_distribution<int> cell(-30, 110), move(-100, 100);
+  std::uniform_real_distribution<double> share(0.0, 1.0);
+  int ended = 0, whole = 0;
+  for (int run = 0; run < 2000; ++run) {
+    std::vector<LikelihoodPyramid::Cell> cells(static_cast<std::size_t>(1 + run % 150));
+    for (auto& one : cells) one = {cell(rng), cell(rng)};
+    const int level = run % pyramid.levels(), x = run % 2 == 0 ? 0 : move(rng), y = run % 3 == 0 ? 0 : move(rng);
+    std::int64_t sum = 0;
+    for (const auto& one : cells) sum += pyramid.Best(level, one.x + x, one.y + y);
+    const auto enough = static_cast<std::int64_t>(share(rng) * 255.0 * static_cast<double>(cells.size()));
+    const std::int64_t found = pyramid.SumOfBest(level, cells, x, y, enough);
+    if (sum > enough) {
+      ASSERT_EQ(found, sum) << run;
+      ++whole;
+    } else {
+      ASSERT_LE(found, enough) << run;
+      ended += found < sum ? 1 : 0;
+    }
+  }
+  EXPECT_GT(whole, 100);
+  EXPECT_GT(ended, 100);
+}
+
 TEST(RegionSearch, FindsThePoseAnywhereInTheWindow) {
   const std::vector<SurfacePoint> hall = Hall();
   const LikelihoodPyramid pyramid(hall, kCellM, 0.3, 5);

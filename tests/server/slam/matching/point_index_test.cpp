@@ -43,6 +43,70 @@ TEST(PointIndex, FindsWhatLookingAtAllFinds) {
   EXPECT_GT(far, 500);
 }
 
+// Clouds as dense as walls that were seen forty times, some points twice, and searches that begin at any other point.
+TEST(PointIndex, WhereASearchBeginsDoesNotChangeItsAnswer) {
+  std::mt19937_64 rng(5);
+  std::normal_distribution<double> across(0.0, 0.03);
+  std::uniform_real_distribution<double> along(-1.0, 1.0), share(0.0, 1.0);
+  std::vector<SurfacePoint> all;
+  for (int i = 0; i < 3000; ++i) all.push_back(i % 2 == 0 ? At(along(rng), across(rng)) : At(across(rng), along(rng)));
+  for (std::size_t i = 0; i < 300; ++i) all.push_back(all[7 * i]);
+  const PointIndex index(all);
+  const auto nearest_of_all = [&all](const Eigen::Vector2d& p, double max_distance_m) {
+    const SurfacePoint* nearest = nullptr;
+    double best = max_distance_m * max_distance_m;
+    for (const SurfacePoint& point : all) {
+      const double squared = (point.p - p).squaredNorm();
+      if (squared < best || (nearest != nullptr && squared == best)) nearest = &point;
+      best = std::min(best, squared);
+    }
+    return nearest == nullptr ? -1 : nearest - all.data();
+  };
+  PointIndex::Found likely, kept;
+  int found = 0;
+  for (int i = 0; i < 3000; ++i) {
+    const Eigen::Vector2d p =
+        share(rng) < 0.3 ? all[static_cast<std::size_t>(i)].p : Eigen::Vector2d(along(rng), 2.0 * across(rng));
+    const double max_distance_m = i % 3 == 0 ? 0.02 : 0.3;
+    const auto expected = nearest_of_all(p, max_distance_m);
+    PointIndex::Found any;
+    for (PointIndex::Found* begin : {&any, &likely, &kept}) {
+      const SurfacePoint* answer = index.Nearest(p, max_distance_m, *begin);
+      ASSERT_EQ(answer == nullptr, expected < 0) << i;
+      if (answer != nullptr) {
+        ASSERT_EQ(begin->point, expected) << i;
+      }
+    }
+    found += expected >= 0 ? 1 : 0;
+    if (i % 10 == 0) kept = likely;  // From somewhere else.
+  }
+  EXPECT_GT(found, 1500);
+}
+
+// What an alignment does: places that move by less and less.
+TEST(PointIndex, APlaceThatMovesALittleHasTheAnswerOfASearch) {
+  std::mt19937_64 rng(6);
+  std::uniform_real_distribution<double> along(-1.0, 1.0), across(-0.3, 0.3), direction(-1.0, 1.0);
+  std::vector<SurfacePoint> all;
+  for (int i = 0; i < 600; ++i) all.push_back(At(along(rng), 0.1 * across(rng)));
+  const PointIndex index(all);
+  int found = 0, none = 0;
+  for (int run = 0; run < 3000; ++run) {
+    Eigen::Vector2d p(along(rng), across(rng));
+    PointIndex::Found last;
+    double step_m = 0.02;
+    for (int move = 0; move < 12; ++move, step_m *= 0.6) {
+      const double max_distance_m = run % 2 == 0 ? 0.15 : std::max(0.1, 0.2 - 0.02 * move);
+      const SurfacePoint* answer = index.Nearest(p, max_distance_m, last);
+      ASSERT_EQ(answer, index.Nearest(p, max_distance_m)) << run << " " << move;
+      (answer != nullptr ? found : none) += 1;
+      p += step_m * Eigen::Vector2d(direction(rng), direction(rng));
+    }
+  }
+  EXPECT_GT(found, 3000);
+  EXPECT_GT(none, 3000);
+}
+
 // Places on the borders of cells, and points that are as near as each other.
 TEST(PointIndex, BordersOfCellsHideNothing) {
   PointIndex index;

@@ -2,6 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <span>
+#include <vector>
+
+#include "common/geometry/pose_difference.h"
 #include "server/slam/matching/point_index.h"
 #include "tests/server/slam/worlds.h"
 
@@ -37,6 +45,109 @@ TEST(PointToLine, FindsTheWayBackFromSeveralStartingErrors) {
     EXPECT_TRUE(IsCovariance(match.covariance));
     EXPECT_FALSE(match.degenerate);
   }
+}
+
+// The plain form: every search looks at all reference points, and the equations are written as matrices.
+struct Plain {
+  const std::vector<SurfacePoint>& points;
+  const std::vector<SurfacePoint>& reference;
+  PointToLineOptions options;
+
+  struct Sums {
+    Eigen::Matrix3d H = Eigen::Matrix3d::Zero(), H_surfaces = H;
+    Eigen::Vector3d g = Eigen::Vector3d::Zero();
+    int inliers = 0;
+  };
+  [[nodiscard]] Sums At(const Pose2& T, double gate) const {
+    Sums sum;
+    const double c = std::cos(T.theta), s = std::sin(T.theta);
+    const double scale = std::max(options.residual_sigma_m, options.cauchy_share * gate);
+    for (const SurfacePoint& point : points) {
+      const Eigen::Vector2d turned(c * point.p.x() - s * point.p.y(), s * point.p.x() + c * point.p.y());
+      const Eigen::Vector2d p = turned + T.translation();
+      const auto nearest =
+          std::ranges::min_element(reference, {}, [&](const auto& r) { return (r.p - p).squaredNorm(); });
+      if ((nearest->p - p).squaredNorm() >= gate * gate) continue;
+      Eigen::Vector2d normal = nearest->normal;
+      double trust = 1.0;
+      if (nearest->smooth() && point.smooth()) {
+        const Eigen::Vector2d own(c * point.normal.x() - s * point.normal.y(),
+                                  s * point.normal.x() + c * point.normal.y());
+        if (own.dot(normal) < options.same_side) continue;
+      } else if (!nearest->smooth()) {
+        const double distance = (p - nearest->p).norm();
+        if (distance < 1e-6) continue;
+        normal = (p - nearest->p) / distance;
+        trust = options.rough_trust;
+      }
+      const double residual = normal.dot(p - nearest->p);
+      const double weight = trust / (1.0 + (residual / scale) * (residual / scale));
+      const Eigen::Vector3d J(normal.x(), normal.y(), normal.dot(Eigen::Vector2d(-turned.y(), turned.x())));
+      sum.H.noalias() += weight * J * J.transpose();
+      if (nearest->smooth()) sum.H_surfaces.noalias() += weight * J * J.transpose();
+      sum.g.noalias() += weight * residual * J;
+      if (std::abs(residual) < options.inlier_distance_m) ++sum.inliers;
+    }
+    return sum;
+  }
+  [[nodiscard]] MatchResult Align(const Pose2& guess) const {
+    const double per_point = 1.0 / (options.residual_sigma_m * options.residual_sigma_m);
+    const Eigen::Matrix3d prior = kPrior.llt().solve(Eigen::Matrix3d::Identity());
+    MatchResult result;
+    Pose2& T = result.T_ref_curr = guess;
+    for (bool settled = false; result.iterations < options.max_iterations && !settled; ++result.iterations) {
+      const double shrink = std::min(1.0, result.iterations / static_cast<double>(options.shrink_iterations));
+      const Sums sum = At(
+          T, options.first_pair_distance_m + shrink * (options.last_pair_distance_m - options.first_pair_distance_m));
+      const Eigen::Matrix3d H = per_point * sum.H + prior;
+      const Eigen::Vector3d step = -H.ldlt().solve(per_point * sum.g + prior * Minus(T, guess));
+      T = Plus(T, step);
+      settled = shrink >= 1.0 && step.head<2>().norm() < options.stop_step_m && std::abs(step.z()) < 2e-4;
+    }
+    const Sums sum = At(T, options.last_pair_distance_m);
+    result.inliers = sum.inliers;
+    result.covariance = (per_point * sum.H + prior).llt().solve(Eigen::Matrix3d::Identity());
+    result.covariance = 0.5 * (result.covariance + result.covariance.transpose()).eval();
+    DetectDegeneracy(sum.H_surfaces, result);
+    return result;
+  }
+};
+
+TEST(PointToLine, IsThePlainFormToTheLastBit) {
+  const Laser laser{.beams = 181, .step_rad = Radians(1.0), .sigma_m = 0.01};
+  std::mt19937_64 rng(7);
+  std::uniform_real_distribution<double> off(-0.15, 0.15), turn(-0.1, 0.1);
+  World corridor;
+  corridor.Add({{-50, 1}, {50, 1}}).Add({{-50, -1}, {50, -1}});
+  int degenerate = 0, rough = 0;
+  for (const World& world : {test::Office(), corridor}) {
+    std::vector<SurfacePoint> reference;  // Several scans, as the front-end has them.
+    for (int k = 0; k < 6; ++k) {
+      const Pose2 T_ref_robot{0.05 * k, 0.02 * k, 0.03 * k};
+      for (const SurfacePoint& point : SurfaceOf(Look(world, T_ref_robot, laser, &rng)))
+        reference.push_back({T_ref_robot * point.p, T_ref_robot.rotation() * point.normal});
+    }
+    rough += static_cast<int>(std::ranges::count_if(reference, [](const auto& point) { return !point.smooth(); }));
+    const PointIndex index(reference);
+    for (int run = 0; run < 10; ++run) {
+      const Pose2 truth{off(rng), off(rng), turn(rng)}, guess = truth * Pose2{off(rng), off(rng), turn(rng)};
+      const std::vector<SurfacePoint> points = SurfaceOf(Look(world, truth, laser, &rng));
+      const MatchResult plain = Plain{points, reference, {}}.Align(guess);
+      const MatchResult match = AlignPointsToSurfaces(points, index, {guess, guess, kPrior}, {});
+      ASSERT_TRUE(match.converged);
+      EXPECT_EQ(match.T_ref_curr, plain.T_ref_curr) << run;
+      EXPECT_EQ(match.covariance, plain.covariance) << run;
+      EXPECT_EQ(match.iterations, plain.iterations) << run;
+      EXPECT_EQ(match.inliers, plain.inliers) << run;
+      EXPECT_EQ(match.degenerate, plain.degenerate) << run;
+      if (plain.degenerate) {
+        EXPECT_EQ(match.degenerate_direction, plain.degenerate_direction) << run;
+      }
+      degenerate += plain.degenerate ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(degenerate, 10);
+  EXPECT_GT(rough, 10);
 }
 
 TEST(PointToLine, SaysThatACorridorHoldsOnlyOneDirection) {
