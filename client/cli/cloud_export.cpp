@@ -6,6 +6,7 @@
 #include "client/cli/json_output.h"
 #include "client/cli/option_checks.h"
 #include "client/sim/shipped_worlds.h"
+#include "common/bag/recording.h"
 
 namespace cairn::client {
 namespace {
@@ -109,7 +110,7 @@ Result<CloudExportReport> ExportCloud(const Trajectory& path, const CloudExportO
   }
   CloudBuilder builder(path, options.cloud);
   Result<void> added;
-  const auto read = ReadLog(options.log, options.reader, [&](LogRecord&& record) {
+  const auto read = ReadRecording(options.log, options.reader, [&](LogRecord&& record) {
     if (const auto* scan = std::get_if<Scan>(&record)) added = builder.Add(*scan);
     return added.has_value();
   });

@@ -10,6 +10,7 @@
 #include "client/cli/json_output.h"
 #include "client/cli/option_checks.h"
 #include "client/cli/text_output.h"
+#include "common/bag/recording.h"
 #include "common/sensor/log_options.h"
 
 namespace cairn::client {
@@ -22,7 +23,7 @@ struct CheckArguments {
 
 ExitCode CheckLog(Program& program, const CheckArguments& arguments) {
   LogCheck check;
-  const auto summary = ReadLog(arguments.log, arguments.reader, [&check](LogRecord&& record) {
+  const auto summary = ReadRecording(arguments.log, arguments.reader, [&check](LogRecord&& record) {
     check.Add(record);
     return !Interrupted();
   });
@@ -215,12 +216,13 @@ void LogCheck::CollectLidarFindings() {
 }
 
 void AddCheckLog(CLI::App& app, Program& program) {
-  auto* command = app.add_subcommand("check-log", "Say whether a robot log is fit for mapping; needs no server");
+  auto* command = app.add_subcommand("check-log", "Say whether a robot log or bag is fit for mapping; needs no server");
   command->footer(
-      "Reads CARMEN and DP-SLAM logs. Exit code 1 where scans would be lost (each finding says why and what to do).\n"
+      "Reads CARMEN and DP-SLAM logs and bags of ROS 2. Exit code 1 where scans would be lost (each finding says why "
+      "and what to do).\n"
       "EXAMPLES\n  cairn check-log intel.clf\n  cairn check-log run.log --json");
   auto arguments = std::make_shared<CheckArguments>();
-  command->add_option("log", arguments->log, "The log file")->required()->type_name("FILE");
+  command->add_option("log", arguments->log, "The log file, or the bag")->required()->type_name("FILE");
   AddLogOptions(*command, arguments->reader);
   program.OnChosen(*command, arguments, CheckLog);
 }

@@ -11,6 +11,7 @@
 #include "client/cli/progress_line.h"
 #include "client/cli/quantity_text.h"
 #include "client/cli/robot_stream.h"
+#include "common/bag/recording.h"
 #include "common/sensor/log_options.h"
 #include "common/service/start_pose.h"
 
@@ -46,7 +47,7 @@ Result<LogSummary> StreamLog(Program& program, const ReplayArguments& arguments,
                      account.dropped_total(), account.waiting));
   };
   Result<void> sent;
-  auto summary = ReadLog(arguments.log, arguments.reader, [&](LogRecord&& record) {
+  auto summary = ReadRecording(arguments.log, arguments.reader, [&](LogRecord&& record) {
     pacer.WaitFor(std::visit([](const auto& value) { return value.stamp; }, record));
     if (Interrupted()) return false;
     sent = stream.Send(std::move(record));
@@ -79,7 +80,7 @@ std::string FormatInterruptions(const RobotStream& stream) {
 ExitCode Replay(Program& program, const ReplayArguments& arguments) {
   // The log is read once without sending: a file that cannot be read must not open a session, and the progress line
   // needs the number of scans.
-  const auto survey = ReadLog(arguments.log, arguments.reader, [](LogRecord&&) { return !Interrupted(); });
+  const auto survey = ReadRecording(arguments.log, arguments.reader, [](LogRecord&&) { return !Interrupted(); });
   if (!survey) return program.Refuse(survey.error());
   if (survey->scans == 0) return program.Refuse({StatusCode::kInvalidArgument, arguments.log + " holds no scan"});
   StreamOptions options = arguments.stream;
@@ -104,8 +105,8 @@ ExitCode Replay(Program& program, const ReplayArguments& arguments) {
   }
   text += "\n";
   if (survey->complaint_count > 0) {
-    text += fmt::format("{} lines of the log could not be read, the first: line {}: {}\n", survey->complaint_count,
-                        survey->complaints.front().line, survey->complaints.front().reason);
+    text += fmt::format("{} {}s could not be read, the first: {} {}: {}\n", survey->complaint_count, survey->entry,
+                        survey->entry, survey->complaints.front().line, survey->complaints.front().reason);
   }
   text += FormatInterruptions(**stream);
   nlohmann::json object = account;
@@ -134,16 +135,20 @@ ExitCode Replay(Program& program, const ReplayArguments& arguments) {
 }  // namespace
 
 void AddReplay(CLI::App& app, Program& program) {
-  auto* command = app.add_subcommand("replay", "Stream a robot log to the server, as if the robot were driving now");
+  auto* command =
+      app.add_subcommand("replay", "Stream a robot log or bag to the server, as if the robot were driving now");
   command->footer(
-      "Reads CARMEN logs (ODOM, FLASER, RLASER, ROBOTLASER1, RAWLASER1) and DP-SLAM logs. With --fast the log is sent\n"
+      "Reads CARMEN logs (ODOM, FLASER, RLASER, ROBOTLASER1, RAWLASER1), DP-SLAM logs, and bags of ROS 2 (a folder "
+      "with\n"
+      "metadata.yaml, or one .mcap or .db3 file). With --fast the log is sent\n"
       "as fast as the server takes it: at most --window scans wait for an answer, so that none is lost. The summary\n"
       "says how many scans the server used, and how many it dropped for which reason.\n"
       "Exit code 1 if the server cannot say what became of a scan.\n"
       "EXAMPLES\n  cairn replay intel.clf --site intel --robot r1 --fast\n"
-      "  cairn replay run.log --site hall --robot r2 --rate 2 --start 1.5,-2,90deg");
+      "  cairn replay run.log --site hall --robot r2 --rate 2 --start 1.5,-2,90deg\n"
+      "  cairn replay rosbag2_2024_05_13/ --site hall --robot r3 --scan-topic /scan_front");
   auto arguments = std::make_shared<ReplayArguments>();
-  command->add_option("log", arguments->log, "The log file")->required()->type_name("FILE");
+  command->add_option("log", arguments->log, "The log file, or the bag")->required()->type_name("FILE");
   command->add_option("--site", arguments->stream.site, "The site to map into")->required();
   command->add_option("--robot", arguments->stream.robot, "The robot's name")->required();
   command->add_option("--sensor", arguments->stream.sensor, "The scanner's name")->capture_default_str();

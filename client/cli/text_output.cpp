@@ -146,10 +146,11 @@ std::string FormatLogReport(const LogReport& r) {
                       100 * r.no_return_share, 100 * r.invalid_share);
   text += fmt::format("motion    {:.1f} m, {:.0f} deg turned, fastest {:.2f} m/s\n", r.way_m, Degrees(r.turned_rad),
                       r.fastest_m_s);
-  text += fmt::format("lines     {} unreadable, {} of other kinds\n", r.summary.complaint_count, r.summary.ignored);
+  text += fmt::format("{:<10}{} unreadable, {} of other kinds\n", std::string(r.summary.entry) + "s",
+                      r.summary.complaint_count, r.summary.ignored);
   for (const std::string& line : r.summary.notes) text += "note      " + line + "\n";
   for (const LogComplaint& complaint : r.summary.complaints) {
-    text += fmt::format("line {}: {}\n", complaint.line, complaint.reason);
+    text += fmt::format("{} {}: {}\n", r.summary.entry, complaint.line, complaint.reason);
   }
   for (const Finding& finding : r.findings) {
     text += fmt::format("{}: {}: {}\n", finding.error ? "error" : "warning", finding.what, finding.advice);

@@ -49,6 +49,14 @@ void AddLogOptions(Command& command, LogReaderOptions& options) {
         return pose ? std::string() : pose.error().message;
       })
       ->type_name("X,Y,THETA");
+  command
+      .add_option("--scan-topic", options.scan_topic,
+                  "Bags of ROS 2: the topic of the laser scans, where there are several")
+      ->type_name("TOPIC");
+  command
+      .add_option("--odom-topic", options.odometry_topic,
+                  "Bags of ROS 2: the topic of the odometry, where there are several; one of transforms (/tf) will do")
+      ->type_name("TOPIC");
   const auto timing = [&](const std::string& name, const std::string& help, const std::string& type) {
     command
         .template add_option_function<std::string>(

@@ -28,6 +28,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <string>
 
 #include "common/sensor/lidar_timing.h"
 #include "common/sensor/log_record.h"
@@ -39,9 +40,12 @@ struct LogReaderOptions {
   double no_return_m = 0.0;  // > 0: ranges at or above it hit nothing. 0: from the log's format and content.
   double dpslam_laser_forward_m = 0.40;  // DP-SLAM logs: laser ahead of the robot's pivot.
   double dpslam_range_max_m = 8.19;
-  double dpslam_scan_period_s = 0.2;   // DP-SLAM logs carry no time.
-  LidarTiming timing;                  // Counts before what the log says.
-  std::optional<Pose2> T_robot_laser;  // Counts before what the log says.
+  double dpslam_scan_period_s = 0.2;                  // DP-SLAM logs carry no time.
+  LidarTiming timing = {};                            // Counts before what the log says.
+  std::optional<Pose2> T_robot_laser = std::nullopt;  // Counts before what the log says.
+  // Bags of ROS 2 (bag/bag_reader.h): the topics of scans and odometry. Empty: the only ones of their types.
+  std::string scan_topic = {};
+  std::string odometry_topic = {};
 };
 
 // The path must be a regular file (it is read twice). Calls `sink` for every record; a sink that returns false ends the

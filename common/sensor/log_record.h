@@ -13,7 +13,7 @@ namespace cairn {
 
 using LogRecord = std::variant<Odometry, Scan>;
 
-// A line that could not be read. It is skipped and counted.
+// A line (of a bag: a message) that could not be read. It is skipped and counted.
 struct LogComplaint {
   int line = 0;  // 1-based.
   std::string reason;
@@ -23,6 +23,7 @@ struct LogSummary {
   int scans = 0;
   int odometries = 0;
   int ignored = 0;                       // Messages of kinds that carry neither (PARAM, SYNC, ...).
+  const char* entry = "line";            // What LogComplaint::line counts: lines of a log, or messages of a bag.
   std::vector<LogComplaint> complaints;  // The first 100.
   int complaint_count = 0;
   std::vector<std::string> notes;  // Conclusions from the content: range limit, mounting.

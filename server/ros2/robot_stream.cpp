@@ -34,7 +34,8 @@ std::string SensorName(std::string topic) {
 
 }  // namespace
 
-RobotStream::RobotStream(RobotPlace place, const Ros2Options& options, const FrameTree& shared_frames, Inbound& inbound)
+RobotStream::RobotStream(RobotPlace place, const Ros2Options& options, const ros2::FrameTree& shared_frames,
+                         Inbound& inbound)
     : place_(std::move(place)),
       robot_id_(HashName(place_.robot)),
       options_(options),
@@ -56,9 +57,10 @@ void RobotStream::FindMounting(Lidar& lidar) {
   } else if (base_frame_.empty()) {
     lidar.why_not = "the frame of the robot is not known yet, because there is no odometry";
     return;  // Odometry does not change the version.
-  } else if (const auto motion = FindMotion(std::array<const FrameTree*, 2>{&frames_, &shared_frames_}, base_frame_,
-                                            lidar.frame, std::array{odom_frame_, options_.map_frame})) {
-    const auto mounting = MountingOf(*motion);
+  } else if (const auto motion =
+                 ros2::FindMotion(std::array<const ros2::FrameTree*, 2>{&frames_, &shared_frames_}, base_frame_,
+                                  lidar.frame, std::array{odom_frame_, options_.map_frame})) {
+    const auto mounting = ros2::MountingOf(*motion);
     lidar.why_not = mounting ? std::string() : mounting.error().message;
     if (mounting) lidar.mounting = *mounting;
   } else {
@@ -87,10 +89,10 @@ void RobotStream::Take(const std::string& topic, ros2::LaserScan&& message, cons
   }
   const std::uint64_t number = lidar.numbers.Next(origin);
   // A scan of a lidar whose place is not known is counted as refused, with an impossible mounting.
-  Mounting mounting;
+  ros2::Mounting mounting;
   mounting.T_robot_laser.x = std::nan("");
   ScanSample sample{{robot_id_, HashName(lidar.sensor), session_},
-                    ScanOf(std::move(message), lidar.mounting.value_or(mounting))};
+                    ros2::ScanOf(std::move(message), lidar.mounting.value_or(mounting))};
   sample.scan.sequence = number;
   Push(Admit(std::move(sample), now));
 }
@@ -101,7 +103,7 @@ void RobotStream::Take(ros2::Odometry&& message, const ros2::Origin& origin, Clo
 
 void RobotStream::TakeOdometry(const std::string& parent, const std::string& child, Stamp stamp,
                                const ros2::Pose3& pose, const ros2::Origin& origin, Clock::time_point now) {
-  const auto motion = MotionOf(pose);
+  const auto motion = ros2::MotionOf(pose);
   odometry_fault_ = motion ? std::string() : "its odometry is refused: " + motion.error().message;
   if (!motion) return;
   // Some drivers leave the frames empty. Then the first of the usual names has to do.
@@ -113,7 +115,7 @@ void RobotStream::TakeOdometry(const std::string& parent, const std::string& chi
   odom_frame_ = parent.empty() ? options_.odom_frame : parent;
   odometry_stamp_ = stamp;
   odometry_received_ = now;
-  Odometry odometry{.sequence = 0, .stamp = stamp, .T_odom_robot = PlanarPart(*motion)};
+  Odometry odometry{.sequence = 0, .stamp = stamp, .T_odom_robot = ros2::PlanarPart(*motion)};
   early_.push_back({odometry, origin});
   if (early_.size() > kMaxEarly) early_.pop_front();
   if (phase_ == Phase::kOpen) Send(odometry, origin);
@@ -153,14 +155,14 @@ void RobotStream::TakeTransformOdometry(const ros2::Transforms& message, bool it
 }
 
 void RobotStream::TakeStart(const ros2::PoseWithCovariance& message) {
-  const auto motion = MotionOf(message.pose);
+  const auto motion = ros2::MotionOf(message.pose);
   const bool in_map = message.header.frame == options_.map_frame;
-  if (!motion || !in_map || !ValidateStart(PlanarPart(*motion))) {
+  if (!motion || !in_map || !ValidateStart(ros2::PlanarPart(*motion))) {
     spdlog::warn("ROS 2: an initial pose of {} is ignored, because {}", place_.robot,
                  in_map ? "it is no pose" : "its frame is not '" + options_.map_frame + "'");
     return;
   }
-  start_ = PlanarPart(*motion);
+  start_ = ros2::PlanarPart(*motion);
   // The present session is left, so that a new one may begin at the pose (robots/roster.h).
   if (phase_ == Phase::kOpen) Push(ClientLiveliness{client_, false});
   phase_ = Phase::kWaiting;

@@ -13,15 +13,15 @@
 #include <string>
 #include <vector>
 
+#include "common/ros2/frame_tree.h"
+#include "common/ros2/scan_conversion.h"
 #include "common/service/pose_report.h"
 #include "common/service/session.h"
 #include "common/wire/ros2/bus.h"
 #include "server/inbound.h"
-#include "server/ros2/frame_tree.h"
 #include "server/ros2/namespace_rules.h"
 #include "server/ros2/ros2_options.h"
 #include "server/ros2/sample_numbers.h"
-#include "server/ros2/scan_conversion.h"
 
 namespace cairn::server {
 
@@ -30,7 +30,7 @@ class RobotStream {
   using Clock = std::chrono::steady_clock;
 
   // `shared_frames`: the transforms of the topics /tf and /tf_static, which all robots share.
-  RobotStream(RobotPlace place, const Ros2Options& options, const FrameTree& shared_frames, Inbound& inbound);
+  RobotStream(RobotPlace place, const Ros2Options& options, const ros2::FrameTree& shared_frames, Inbound& inbound);
 
   // `topic`: the name of the stream in the namespace, such as "scan".
   void Take(const std::string& topic, ros2::LaserScan&& message, const ros2::Origin& origin, Clock::time_point now);
@@ -69,7 +69,7 @@ class RobotStream {
     SampleNumbers numbers;
     std::string frame;
     std::string why_not;  // Why its scans cannot be used; empty if they can.
-    std::optional<Mounting> mounting;
+    std::optional<ros2::Mounting> mounting;
     std::uint64_t frames_version = 0;
     std::optional<Stamp> stamp;
     Clock::time_point received{};
@@ -98,9 +98,9 @@ class RobotStream {
   const RobotPlace place_;
   const NameId robot_id_;
   const Ros2Options options_;
-  const FrameTree& shared_frames_;
+  const ros2::FrameTree& shared_frames_;
   Inbound& inbound_;
-  FrameTree frames_;
+  ros2::FrameTree frames_;
   std::map<std::string, Lidar> lidars_;  // By topic.
 
   std::string odom_frame_;

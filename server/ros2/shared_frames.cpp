@@ -6,8 +6,8 @@ namespace cairn::server {
 namespace {
 
 bool SaysTheSame(const ros2::Transform& one, const ros2::Transform& other) {
-  const auto motion = MotionOf(one.T_frame_child);
-  const auto other_motion = MotionOf(other.T_frame_child);
+  const auto motion = ros2::MotionOf(one.T_frame_child);
+  const auto other_motion = ros2::MotionOf(other.T_frame_child);
   return one.header.frame == other.header.frame && motion && other_motion && motion->isApprox(*other_motion, 1e-9);
 }
 
@@ -25,7 +25,7 @@ ros2::Transforms SharedFrames::Take(const ros2::Transforms& message, const ros2:
     const auto owner = owners_.find(child);
     if (owner != owners_.end() && owner->second.writer != writer &&
         !(fixed && SaysTheSame(owner->second.said, transform))) {
-      if (contended_.size() >= FrameTree::kMaxFrames) continue;
+      if (contended_.size() >= ros2::FrameTree::kMaxFrames) continue;
       contended_[child] = {{owner->second.writer, owner->second.said}, {writer, transform}};
       owners_.erase(owner);
       tree_.Forget(child);

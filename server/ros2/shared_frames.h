@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "common/ros2/frame_tree.h"
 #include "common/wire/ros2/bus.h"
-#include "server/ros2/frame_tree.h"
 
 namespace cairn::server {
 
@@ -21,7 +21,7 @@ class SharedFrames {
   // Forgets what publishers have said who are gone.
   void SetWriters(const std::set<ros2::WriterId>& writers);
 
-  [[nodiscard]] const FrameTree& tree() const { return tree_; }
+  [[nodiscard]] const ros2::FrameTree& tree() const { return tree_; }
   // The frames that two publishers contend for.
   [[nodiscard]] std::vector<std::string> contended() const;
 
@@ -35,8 +35,8 @@ class SharedFrames {
   static constexpr std::size_t kMaxContenders = 16;
 
   std::map<std::string, Owner, std::less<>> owners_;
-  std::map<std::string, Contenders> contended_;  // At most FrameTree::kMaxFrames.
-  FrameTree tree_;
+  std::map<std::string, Contenders> contended_;  // At most ros2::FrameTree::kMaxFrames.
+  ros2::FrameTree tree_;
 };
 
 }  // namespace cairn::server

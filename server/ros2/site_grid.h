@@ -11,9 +11,9 @@
 #include <variant>
 
 #include "common/map/tile.h"
+#include "common/ros2/messages.h"
 #include "common/service/map_info.h"
 #include "common/service/stream.h"
-#include "common/wire/ros2/messages.h"
 #include "server/ros2/ros2_options.h"
 
 namespace cairn::server {

@@ -50,6 +50,8 @@ MAY_INCLUDE = {
     "idl": [],
     "common": [],
     "common/wire": COMMON,
+    # Bags of ROS 2: for programs that read logs, not for the server.
+    "common/bag": COMMON,
     # The messages of ROS 2 on the wire: only the server speaks them.
     "common/wire/ros2": [*COMMON, "common/wire"],
     # The pure library: its rooms, and at the top the recipe and the choice of methods, which may use them all.
@@ -63,7 +65,7 @@ MAY_INCLUDE = {
     "server/known_map.h": SLAM,
     "server/known_map.cpp": [*SLAM, "server/known_map.h"],
     # Programs without a server: they prove that slam stands alone.
-    "server/tools": [*SLAM, "server/known_map.h"],
+    "server/tools": [*SLAM, "common/bag", "server/known_map.h"],
     # Durable state: what outlives the process, as records in a database. It knows none of the rooms that use it.
     "server/store": COMMON,
     # Rooms of the server, each of which may use those before it: the joint map of a site, the robots that draw it (a
@@ -84,14 +86,14 @@ MAY_INCLUDE = {
                "server/queries", "server/ingress", "server/egress", "server/ros2", "server/known_map.h"],
     "client/lib": [*COMMON, "common/wire"],
     "client/sim": COMMON,
-    "client/cli": [*COMMON, "common/wire", "client/lib", "client/sim"],
+    "client/cli": [*COMMON, "common/bag", "common/wire", "client/lib", "client/sim"],
     # The web page and what serves it: a client like any other.
     "client/web": [*COMMON, "common/wire", "client/lib"],
     # The commands on a stopped server's state and on saved sites: they read and write the store's records, and know
     # nothing else of the server.
     "client/cli/site_stored.cpp": [*COMMON, "client/cli", "client/lib", "server/store"],
     # Tests may look into everything.
-    "tests": [*CHANNELS, *SLAM, "common/wire", "server/store", "server/ops", "server/maps", "server/robots", "server/jobs",
+    "tests": [*CHANNELS, *SLAM, "common/bag", "common/wire", "server/store", "server/ops", "server/maps", "server/robots", "server/jobs",
               "server/queries", "server/ingress", "server/egress", "server/ros2", "common/wire/ros2", "server", "server/tools",
               "server/known_map.h",
               "client/lib", "client/sim", "client/cli", "client/web"],
@@ -110,9 +112,11 @@ LIBRARIES = {
     "OpenCV": (("opencv2/",), ("common/map", "server/slam", "server/maps", "client/cli"), True),
     "Ceres": (("ceres/",), ("server/slam",), True),
     "Protobuf": (("google/protobuf/",), ("server/store",), False),
-    "SQLite": (("SQLiteCpp/", "sqlite3.h"), ("server/store",), True),
-    "zstd": (("zstd.h",), ("server/store",), True),
-    "yaml-cpp": (("yaml-cpp/",), ("common/options", "common/map", "client/sim"), True),
+    "SQLite": (("SQLiteCpp/", "sqlite3.h"), ("server/store", "common/bag"), True),
+    "zstd": (("zstd.h",), ("server/store", "common/bag"), True),
+    "lz4": (("lz4frame.h", "lz4.h"), ("common/bag",), True),
+    "zlib": (("zlib.h",), ("common/bag",), True),
+    "yaml-cpp": (("yaml-cpp/",), ("common/options", "common/map", "common/bag", "client/sim"), True),
     "spdlog": (("spdlog/", "fmt/"), ("server/*", "server/ingress", "server/egress", "server/robots", "server/maps",
                                      "server/jobs", "server/queries", "server/ops", "server/ros2", "client"), False),
     "cpp-httplib": (("httplib.h",), ("common/http",), False),

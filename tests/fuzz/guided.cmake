@@ -5,7 +5,7 @@ set(CAIRN_LIBFUZZER OFF)
 if(CAIRN_SANITIZE MATCHES address AND CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
   set(CAIRN_LIBFUZZER ON)
   set(CAIRN_FUZZ_GUIDED -fsanitize-coverage=inline-8bit-counters,pc-table,trace-cmp)
-  set(guided cairn_common cairn_sim cairn_known_map cairn_store cairn_records cairn_maps cairn_robots cairn_jobs
+  set(guided cairn_bag cairn_common cairn_sim cairn_known_map cairn_store cairn_records cairn_maps cairn_robots cairn_jobs
     cairn_queries cairn_server)
   if(CAIRN_WITH_DDS)
     list(APPEND guided cairn_idl cairn_wire cairn_client cairn_ros2 cairn_ros2_idl cairn_ros2_wire)

@@ -18,9 +18,9 @@
 #include <string>
 #include <vector>
 
+#include "common/ros2/messages.h"
 #include "common/status.h"
 #include "common/wire/bus.h"
-#include "common/wire/ros2/messages.h"
 
 namespace cairn::ros2 {
 

@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "common/ros2/message_checks.h"
+
 namespace cairn::ros2 {
 namespace {
 
@@ -12,26 +14,12 @@ namespace builtin = ::builtin_interfaces::msg::dds_;
 namespace std_msgs = ::std_msgs::msg::dds_;
 namespace geometry = ::geometry_msgs::msg::dds_;
 
-Result<void> CheckFrame(const std::string& frame) {
-  if (frame.size() > kMaxFrameBytes) return Fail(StatusCode::kOutOfRange, "a name of a frame is too long");
-  // Names of frames are shown to people and compared; ROS itself uses printable characters only.
-  const bool printable = std::all_of(frame.begin(), frame.end(), [](char c) { return c > ' ' && c <= '~'; });
-  if (!printable) return Fail(StatusCode::kOutOfRange, "a name of a frame has other than printable characters");
-  return {};
-}
-
-std::string WithoutSlash(std::string&& frame) {
-  if (!frame.empty() && frame.front() == '/') frame.erase(0, 1);
-  return std::move(frame);
-}
-
 Result<Header> FromWire(std_msgs::Header_&& wire) {
-  if (auto valid = CheckFrame(wire.frame_id()); !valid) return tl::unexpected(valid.error());
-  const std::uint32_t nanoseconds = wire.stamp().nanosec();
-  if (nanoseconds >= static_cast<std::uint32_t>(kNanosPerSecond))
-    return Fail(StatusCode::kOutOfRange, "a stamp has a second or more of nanoseconds");
-  return Header{static_cast<Stamp>(wire.stamp().sec()) * kNanosPerSecond + nanoseconds,
-                WithoutSlash(std::move(wire.frame_id()))};
+  auto frame = FrameName(std::move(wire.frame_id()));
+  if (!frame) return tl::unexpected(frame.error());
+  const auto stamp = StampOfTime(wire.stamp().sec(), wire.stamp().nanosec());
+  if (!stamp) return tl::unexpected(stamp.error());
+  return Header{*stamp, *std::move(frame)};
 }
 
 // The stamps of ROS have 32 bits for the seconds: they end in 2038.
@@ -91,7 +79,7 @@ geometry::Pose_ ToWire(const Pose2& value) {
 Result<LaserScan> FromWire(::sensor_msgs::msg::dds_::LaserScan_&& wire) {
   Result<Header> header = FromWire(std::move(wire.header()));
   if (!header) return tl::unexpected(header.error());
-  if (wire.ranges().size() > kMaxRangesRead) return Fail(StatusCode::kOutOfRange, "a scan has too many ranges");
+  if (wire.ranges().size() > kMaxRanges) return Fail(StatusCode::kOutOfRange, "a scan has too many ranges");
   LaserScan value;
   value.header = *std::move(header);
   value.angle_min = wire.angle_min();
@@ -107,8 +95,9 @@ Result<LaserScan> FromWire(::sensor_msgs::msg::dds_::LaserScan_&& wire) {
 Result<Odometry> FromWire(::nav_msgs::msg::dds_::Odometry_&& wire) {
   Result<Header> header = FromWire(std::move(wire.header()));
   if (!header) return tl::unexpected(header.error());
-  if (auto valid = CheckFrame(wire.child_frame_id()); !valid) return tl::unexpected(valid.error());
-  return Odometry{*std::move(header), WithoutSlash(std::move(wire.child_frame_id())), FromWire(wire.pose().pose())};
+  auto child = FrameName(std::move(wire.child_frame_id()));
+  if (!child) return tl::unexpected(child.error());
+  return Odometry{*std::move(header), *std::move(child), FromWire(wire.pose().pose())};
 }
 
 Result<Transforms> FromWire(::tf2_msgs::msg::dds_::TFMessage_&& wire) {
@@ -117,11 +106,11 @@ Result<Transforms> FromWire(::tf2_msgs::msg::dds_::TFMessage_&& wire) {
   for (geometry::TransformStamped_& one : wire.transforms()) {
     Result<Header> header = FromWire(std::move(one.header()));
     if (!header) return tl::unexpected(header.error());
-    if (auto valid = CheckFrame(one.child_frame_id()); !valid) return tl::unexpected(valid.error());
+    auto child = FrameName(std::move(one.child_frame_id()));
+    if (!child) return tl::unexpected(child.error());
     const geometry::Vector3_& at = one.transform().translation();
-    value.transforms.push_back({*std::move(header),
-                                WithoutSlash(std::move(one.child_frame_id())),
-                                {{at.x(), at.y(), at.z()}, FromWire(one.transform().rotation())}});
+    value.transforms.push_back(
+        {*std::move(header), *std::move(child), {{at.x(), at.y(), at.z()}, FromWire(one.transform().rotation())}});
   }
   return value;
 }

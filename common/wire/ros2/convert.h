@@ -1,11 +1,10 @@
-// Converts messages to the types of idl/ros2 and back. FromWire fails for what exceeds the limits below, and where the
-// nanoseconds of a stamp are no part of a second. This header includes generated code; include it only inside
-// common/wire and tests.
+// Converts messages to the types of idl/ros2 and back. FromWire fails for what exceeds the limits of message_checks.h,
+// and where the nanoseconds of a stamp are no part of a second. This header includes generated code; include it only
+// inside common/wire and tests.
 #pragma once
 
+#include "common/ros2/messages.h"
 #include "common/status.h"
-#include "common/wire/limits.h"
-#include "common/wire/ros2/messages.h"
 #include "ros2/geometry_msgs.h"
 #include "ros2/map_msgs.h"
 #include "ros2/nav_msgs.h"
@@ -13,10 +12,6 @@
 #include "ros2/tf2_msgs.h"
 
 namespace cairn::ros2 {
-
-inline constexpr std::size_t kMaxFrameBytes = 255;
-inline constexpr std::size_t kMaxTransforms = 1024;  // In one message.
-using wire::kMaxRangesRead;                          // As on the native wire.
 
 [[nodiscard]] Result<LaserScan> FromWire(::sensor_msgs::msg::dds_::LaserScan_&& wire);
 [[nodiscard]] Result<Odometry> FromWire(::nav_msgs::msg::dds_::Odometry_&& wire);

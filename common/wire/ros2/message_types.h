@@ -3,7 +3,7 @@
 // hashes again from idl/ros2. This header includes generated code; include it only inside common/wire and tests.
 #pragma once
 
-#include "common/wire/ros2/messages.h"
+#include "common/ros2/messages.h"
 #include "common/wire/sample_type.h"
 #include "ros2/geometry_msgsPubSubTypes.h"
 #include "ros2/map_msgsPubSubTypes.h"

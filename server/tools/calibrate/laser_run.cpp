@@ -5,6 +5,7 @@
 #include <memory>
 #include <sstream>
 
+#include "common/bag/recording.h"
 #include "server/slam/mapper_options.h"
 #include "server/slam/scan/beam_points.h"
 #include "server/tools/log_run/over_threads.h"
@@ -50,7 +51,7 @@ Result<LaserReport> RunLaser(const LaserRunOptions& options) {
   reader.timing.scan_period_s = 0.0;  // Scans as they stand in the log.
   const slam::MapperOptions estimator;
   std::optional<Stamp> last_scan, last_odometry;
-  const auto read = ReadLog(options.log, reader, [&](LogRecord&& record) {
+  const auto read = ReadRecording(options.log, reader, [&](LogRecord&& record) {
     if (const auto* odometry = std::get_if<Odometry>(&record)) {
       if (ValidateOdometry(*odometry) && IsPlausible(odometry->stamp) &&
           (!last_odometry || odometry->stamp > *last_odometry)) {

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 
+#include "common/bag/recording.h"
 #include "server/slam/matching/point_index.h"
 #include "server/slam/motion/step_motion.h"
 #include "server/slam/scan/beam_points.h"
@@ -91,7 +92,7 @@ Result<LogSteps> MeasureSteps(const std::filesystem::path& log, const LogStepOpt
   slam::OdometryPairing pairing(
       options.slam.pairing, {.paired = [&](slam::PairedScan&& pair) { taker.Take(*pair.at_stamp, pair.T_odom_robot); },
                              .dropped = [&](const Scan&, DropReason) { ++unusable; }});
-  auto summary = ReadLog(log, options.reader, [&](LogRecord&& record) {
+  auto summary = ReadRecording(log, options.reader, [&](LogRecord&& record) {
     if (const auto* odometry = std::get_if<Odometry>(&record)) {
       if (ValidateOdometry(*odometry)) pairing.Add(*odometry);
     } else if (auto scan = std::make_shared<const Scan>(std::move(std::get<Scan>(record)));

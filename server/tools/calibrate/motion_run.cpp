@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/bag/recording.h"
 #include "common/sensor/trajectory.h"
 #include "server/slam/scan_pipeline.h"
 #include "server/tools/log_run/over_threads.h"
@@ -19,7 +20,7 @@ Result<Trajectory> PathOfEstimator(const MotionRunOptions& options, const slam::
   slam.matcher = slam::MapperOptions{}.matcher;  // The estimator at its best; slam.matcher is what is examined.
   slam::ScanPipeline pipeline(slam, {}, parallel_for,
                               {[](const Scan&, const slam::ScanOutcome&) {}, [](const Scan&, DropReason) {}});
-  const auto read = ReadLog(options.log, {}, [&](LogRecord&& record) {
+  const auto read = ReadRecording(options.log, {}, [&](LogRecord&& record) {
     if (const auto* odometry = std::get_if<Odometry>(&record)) {
       if (ValidateOdometry(*odometry)) pipeline.Add(*odometry);
     } else if (auto scan = std::make_shared<const Scan>(std::move(std::get<Scan>(record))); ValidateScan(*scan)) {

@@ -10,6 +10,7 @@
 #include <numeric>
 #include <sstream>
 
+#include "common/bag/recording.h"
 #include "common/map/map_lines.h"
 #include "server/slam/grid/grid_image.h"
 #include "server/slam/localisation/keyframe_lines.h"
@@ -175,7 +176,7 @@ Result<OfflineRobot> Estimate(const OfflineOptions& options, const std::filesyst
     }
     return true;
   };
-  auto summary = ReadLog(log, options.reader, add);
+  auto summary = ReadRecording(log, options.reader, add);
   if (!summary) return tl::unexpected<Status>(summary.error());
   report.log = *std::move(summary);
   times.BeginRecord();
@@ -208,9 +209,9 @@ std::string ReportText(const OfflineReport& report) {
       out << "           " << report.dropped[i] << ' ' << DropReasonName(static_cast<DropReason>(i)) << '\n';
   if (report.odometry_dropped > 0) out << "odometry   " << report.odometry_dropped << " samples dropped\n";
   if (report.log.complaint_count > 0) {
-    out << "log        " << report.log.complaint_count << " lines could not be read\n";
+    out << "log        " << report.log.complaint_count << ' ' << report.log.entry << "s could not be read\n";
     for (const LogComplaint& complaint : report.log.complaints)
-      out << "           line " << complaint.line << ": " << complaint.reason << '\n';
+      out << "           " << report.log.entry << ' ' << complaint.line << ": " << complaint.reason << '\n';
   }
   out << "time       " << Mean(report.scan_ms) << " ms a scan, median " << Percentile(report.scan_ms, 0.5) << ", p99 "
       << Percentile(report.scan_ms, 0.99) << ", max " << Percentile(report.scan_ms, 1.0) << '\n';

@@ -86,7 +86,7 @@ class RosRobot : public ::testing::Test {
   }
 
   Inbound inbound_{64};
-  FrameTree shared_;
+  ros2::FrameTree shared_;
   Ros2Options options_;
   RobotStream robot_{{"r1", "lab"}, options_, shared_, inbound_};
   RobotStream::Clock::time_point now_ = RobotStream::Clock::time_point() + std::chrono::hours(1);

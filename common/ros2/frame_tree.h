@@ -13,13 +13,13 @@
 #include <string_view>
 #include <vector>
 
+#include "common/ros2/messages.h"
 #include "common/status.h"
-#include "common/wire/ros2/messages.h"
 
-namespace cairn::server {
+namespace cairn::ros2 {
 
 // The motion that a pose says. Fails for numbers that are not finite and for a quaternion that is not of length 1.
-[[nodiscard]] Result<Eigen::Isometry3d> MotionOf(const ros2::Pose3& pose);
+[[nodiscard]] Result<Eigen::Isometry3d> MotionOf(const Pose3& pose);
 // Its part in the plane: where it is and which way its x axis points.
 [[nodiscard]] Pose2 PlanarPart(const Eigen::Isometry3d& motion);
 
@@ -33,7 +33,7 @@ class FrameTree {
   };
 
   // Fails for a transform that is no motion, names no frames or a frame twice, or where there are too many frames.
-  Result<void> Set(const ros2::Transform& transform);
+  Result<void> Set(const Transform& transform);
   void Forget(std::string_view child);
   [[nodiscard]] const Link* Find(std::string_view child) const;
   // Changes with every change of a link.
@@ -51,4 +51,4 @@ class FrameTree {
 [[nodiscard]] std::optional<Eigen::Isometry3d> FindMotion(std::span<const FrameTree* const> trees, std::string_view to,
                                                           std::string_view from, std::span<const std::string> outside);
 
-}  // namespace cairn::server
+}  // namespace cairn::ros2

@@ -1,9 +1,9 @@
-#include "server/ros2/frame_tree.h"
+#include "common/ros2/frame_tree.h"
 
 #include <algorithm>
 #include <cmath>
 
-namespace cairn::server {
+namespace cairn::ros2 {
 namespace {
 
 constexpr std::size_t kMaxDepth = 32;  // A longer chain is a circle, or nobody's robot.
@@ -33,7 +33,7 @@ std::vector<Ancestor> AncestorsOf(std::span<const FrameTree* const> trees, std::
 
 }  // namespace
 
-Result<Eigen::Isometry3d> MotionOf(const ros2::Pose3& pose) {
+Result<Eigen::Isometry3d> MotionOf(const Pose3& pose) {
   constexpr double kMaxLengthError = 0.1;
   constexpr double kFarthest_m = 1e7;
   if (!pose.translation.allFinite() || pose.translation.cwiseAbs().maxCoeff() > kFarthest_m)
@@ -52,7 +52,7 @@ Pose2 PlanarPart(const Eigen::Isometry3d& motion) {
   return {motion.translation().x(), motion.translation().y(), std::atan2(turn(1, 0), turn(0, 0))};
 }
 
-Result<void> FrameTree::Set(const ros2::Transform& transform) {
+Result<void> FrameTree::Set(const Transform& transform) {
   const std::string& parent = transform.header.frame;
   if (parent.empty() || transform.child_frame.empty() || parent == transform.child_frame)
     return Fail(StatusCode::kInvalidArgument, "a transform needs two frames");
@@ -94,4 +94,4 @@ std::optional<Eigen::Isometry3d> FindMotion(std::span<const FrameTree* const> tr
   return std::nullopt;
 }
 
-}  // namespace cairn::server
+}  // namespace cairn::ros2

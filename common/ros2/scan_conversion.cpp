@@ -1,4 +1,4 @@
-#include "server/ros2/scan_conversion.h"
+#include "common/ros2/scan_conversion.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,9 +6,9 @@
 #include <string>
 #include <utility>
 
-#include "server/ros2/frame_tree.h"
+#include "common/ros2/frame_tree.h"
 
-namespace cairn::server {
+namespace cairn::ros2 {
 
 Result<Mounting> MountingOf(const Eigen::Isometry3d& T_base_laser) {
   constexpr double kMaxLean = 0.17;   // Sine of 10 degrees.
@@ -22,7 +22,7 @@ Result<Mounting> MountingOf(const Eigen::Isometry3d& T_base_laser) {
   return Mounting{PlanarPart(T_base_laser), std::asin(-forward_z), up_z < 0.0};
 }
 
-Scan ScanOf(ros2::LaserScan&& message, const Mounting& mounting) {
+Scan ScanOf(LaserScan&& message, const Mounting& mounting) {
   Scan scan;
   scan.stamp = message.header.stamp;
   const double side = mounting.upside_down ? -1.0 : 1.0;
@@ -42,4 +42,4 @@ Scan ScanOf(ros2::LaserScan&& message, const Mounting& mounting) {
   return scan;
 }
 
-}  // namespace cairn::server
+}  // namespace cairn::ros2

@@ -1,11 +1,11 @@
-#include "server/ros2/scan_conversion.h"
+#include "common/ros2/scan_conversion.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
-namespace cairn::server {
+namespace cairn::ros2 {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
@@ -20,8 +20,8 @@ Eigen::Isometry3d Mounted(double roll, double pitch, double yaw) {
   return T_base_laser;
 }
 
-ros2::LaserScan Message() {
-  ros2::LaserScan message;
+LaserScan Message() {
+  LaserScan message;
   message.header = {5 * kNanosPerSecond, "laser"};
   message.angle_min = -0.4;
   message.angle_increment = 0.2;
@@ -46,8 +46,8 @@ TEST(ScanConversion, EveryMountingPutsTheBeamsWhereTheTransformDoes) {
         Mounted(kPi, 0.3, 0.5), Mounted(0, kPi, 0)}) {
     const auto mounting = MountingOf(T_base_laser);
     ASSERT_TRUE(mounting) << mounting.error().message;
-    const ros2::LaserScan message = Message();
-    const Scan scan = ScanOf(ros2::LaserScan(message), *mounting);
+    const LaserScan message = Message();
+    const Scan scan = ScanOf(LaserScan(message), *mounting);
     for (std::size_t i = 0; i < message.ranges.size(); ++i) {
       const double angle = message.angle_min + static_cast<double>(i) * message.angle_increment;
       const Eigen::Vector3d end =
@@ -66,21 +66,21 @@ TEST(ScanConversion, ALidarThatLeansToItsSideIsRefused) {
 }
 
 TEST(ScanConversion, TheTimesAreThoseOfTheMessage) {
-  ros2::LaserScan message = Message();
+  LaserScan message = Message();
   message.time_increment = 0.01;
-  EXPECT_EQ(ScanOf(ros2::LaserScan(message), {}).beam_period_s, 0.01);
-  EXPECT_EQ(ScanOf(ros2::LaserScan(message), {}).stamp, 5 * kNanosPerSecond) << "ROS stamps the first ray";
+  EXPECT_EQ(ScanOf(LaserScan(message), {}).beam_period_s, 0.01);
+  EXPECT_EQ(ScanOf(LaserScan(message), {}).stamp, 5 * kNanosPerSecond) << "ROS stamps the first ray";
   message.scan_time = 0.1;
-  EXPECT_EQ(ScanOf(ros2::LaserScan(message), {}).beam_period_s, 0.01);
+  EXPECT_EQ(ScanOf(LaserScan(message), {}).beam_period_s, 0.01);
   message.scan_time = 0.02;  // Five rays of 0.01 s take longer than the whole turn.
-  EXPECT_DOUBLE_EQ(ScanOf(ros2::LaserScan(message), {}).beam_period_s, 0.005);
+  EXPECT_DOUBLE_EQ(ScanOf(LaserScan(message), {}).beam_period_s, 0.005);
   message.time_increment = 0.0;
-  EXPECT_EQ(ScanOf(ros2::LaserScan(message), {}).beam_period_s, 0.0);
+  EXPECT_EQ(ScanOf(LaserScan(message), {}).beam_period_s, 0.0);
 }
 
 // REP 117, and the comment of LaserScan.msg on values outside of range_min and range_max.
 TEST(ScanConversion, RangesMeanWhatRosMeans) {
-  ros2::LaserScan message = Message();
+  LaserScan message = Message();
   message.ranges = {1.0F, std::nanf(""), kInfinity, -kInfinity, 0.05F, 10.0F, 10.5F, 0.0F};
   const Scan scan = ScanOf(std::move(message), {});
   const BeamClass expected[] = {BeamClass::kHit,     BeamClass::kInvalid,  BeamClass::kNoReturn, BeamClass::kInvalid,
@@ -90,4 +90,4 @@ TEST(ScanConversion, RangesMeanWhatRosMeans) {
 }
 
 }  // namespace
-}  // namespace cairn::server
+}  // namespace cairn::ros2

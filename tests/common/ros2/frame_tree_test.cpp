@@ -1,4 +1,4 @@
-#include "server/ros2/frame_tree.h"
+#include "common/ros2/frame_tree.h"
 
 #include <gtest/gtest.h>
 
@@ -6,13 +6,11 @@
 #include <cmath>
 #include <limits>
 
-#include "server/ros2/shared_frames.h"
-
-namespace cairn::server {
+namespace cairn::ros2 {
 namespace {
 
-ros2::Transform Link(const std::string& parent, const std::string& child, double x, double yaw = 0.0) {
-  ros2::Transform transform;
+Transform Link(const std::string& parent, const std::string& child, double x, double yaw = 0.0) {
+  Transform transform;
   transform.header.frame = parent;
   transform.child_frame = child;
   transform.T_frame_child = {{x, 0.0, 0.1}, Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()))};
@@ -63,7 +61,7 @@ TEST(FrameTree, RefusesWhatIsNoMotion) {
   EXPECT_FALSE(tree.Set(Link("", "a", 1.0)));
   EXPECT_FALSE(tree.Set(Link("a", "b", std::nan(""))));
   EXPECT_FALSE(tree.Set(Link("a", "b", 1e9)));
-  ros2::Transform no_turn = Link("a", "b", 0.0);
+  Transform no_turn = Link("a", "b", 0.0);
   no_turn.T_frame_child.rotation.coeffs().setZero();
   EXPECT_FALSE(tree.Set(no_turn)) << "the quaternion of a message that nobody has filled in";
   EXPECT_EQ(tree.Find("b"), nullptr);
@@ -85,45 +83,5 @@ TEST(FrameTree, OfTwoTreesTheFirstKnowsBetter) {
   EXPECT_NEAR(Find(own, "base_footprint", "laser", shared)->x, 11.0, 1e-12);
 }
 
-ros2::Transforms Message(const ros2::Transform& transform) {
-  ros2::Transforms message;
-  message.transforms.push_back(transform);
-  return message;
-}
-
-constexpr ros2::WriterId kFirst{1}, kSecond{2};
-
-// Two robots with the same names of frames on the shared topic: each would be mounted like the other.
-TEST(SharedFrames, AFrameOfTwoPublishersIsNobodys) {
-  SharedFrames frames;
-  EXPECT_EQ(frames.Take(Message(Link("base_link", "laser", 1.0)), kFirst, true).transforms.size(), 1U);
-  EXPECT_EQ(frames.Take(Message(Link("base_link", "laser", 2.0)), kSecond, true).transforms.size(), 0U);
-  EXPECT_FALSE(Find(frames.tree(), "base_link", "laser"));
-  EXPECT_EQ(frames.contended(), std::vector<std::string>{"laser"});
-  // The first one leaves: what the second has said counts from now on.
-  frames.SetWriters({kSecond});
-  EXPECT_TRUE(frames.contended().empty());
-  EXPECT_NEAR(Find(frames.tree(), "base_link", "laser")->x, 2.0, 1e-12);
-}
-
-TEST(SharedFrames, TwoPublishersMaySayTheSameStaticTransform) {
-  SharedFrames frames;
-  static_cast<void>(frames.Take(Message(Link("base_link", "laser", 1.0)), kFirst, true));
-  EXPECT_EQ(frames.Take(Message(Link("base_link", "laser", 1.0)), kSecond, true).transforms.size(), 1U);
-  EXPECT_TRUE(frames.contended().empty());
-  // But not the same moving one: then two robots drive.
-  static_cast<void>(frames.Take(Message(Link("odom", "base_link", 1.0)), kFirst, false));
-  EXPECT_TRUE(frames.Take(Message(Link("odom", "base_link", 1.0)), kSecond, false).transforms.empty());
-}
-
-TEST(SharedFrames, APublisherThatWasStartedAgainOwnsItsFrames) {
-  SharedFrames frames;
-  static_cast<void>(frames.Take(Message(Link("base_link", "laser", 1.0)), kFirst, true));
-  frames.SetWriters({kSecond});
-  EXPECT_TRUE(Find(frames.tree(), "base_link", "laser")) << "meanwhile it is mounted as before";
-  EXPECT_EQ(frames.Take(Message(Link("base_link", "laser", 3.0)), kSecond, true).transforms.size(), 1U);
-  EXPECT_NEAR(Find(frames.tree(), "base_link", "laser")->x, 3.0, 1e-12);
-}
-
 }  // namespace
-}  // namespace cairn::server
+}  // namespace cairn::ros2

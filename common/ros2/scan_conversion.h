@@ -4,11 +4,11 @@
 
 #include <Eigen/Geometry>
 
+#include "common/ros2/messages.h"
 #include "common/sensor/scan.h"
 #include "common/status.h"
-#include "common/wire/ros2/messages.h"
 
-namespace cairn::server {
+namespace cairn::ros2 {
 
 struct Mounting {
   Pose2 T_robot_laser;
@@ -25,6 +25,6 @@ struct Mounting {
 // - REP 117: -Inf is an object that is too near, NaN no measurement, +Inf nothing up to range_max. Finite ranges
 // outside
 //   range_min..range_max are to be discarded, also those beyond range_max.
-[[nodiscard]] Scan ScanOf(ros2::LaserScan&& message, const Mounting& mounting);
+[[nodiscard]] Scan ScanOf(LaserScan&& message, const Mounting& mounting);
 
-}  // namespace cairn::server
+}  // namespace cairn::ros2

@@ -1,5 +1,5 @@
 // The messages of ROS 2 that Cairn reads and writes, as plain values. Units are those of ROS: metres, radians, seconds.
-// Only lengths and stamps have been checked when one arrives (convert.h); numbers may be anything, also NaN.
+// Only lengths and stamps have been checked when one arrives (message_checks.h); numbers may be anything, also NaN.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,0 +1,153 @@
+#include "common/bag/bag_survey.h"
+
+#include <algorithm>
+#include <array>
+#include <tuple>
+
+#include "common/bag/unpack.h"
+#include "common/ros2/cdr_decoding.h"
+
+namespace cairn::bag {
+namespace {
+
+constexpr std::size_t kMaxMessageBytes = std::size_t{4} << 20;  // Unpacked: far longer than any scan.
+constexpr const char* kUsualBaseFrame = "base_link";            // Where odometry names no frame.
+
+// "odom", also with the name of a robot before it ("r1/odom").
+bool IsOdometryFrame(std::string_view frame) {
+  return frame == "odom" || frame.ends_with("/odom");
+}
+
+std::vector<Topic> TopicsOf(const Files& files) {
+  std::vector<Topic> all;
+  for (const auto& file : files)
+    for (const Topic& topic : file->topics())
+      if (std::find(all.begin(), all.end(), topic) == all.end()) all.push_back(topic);
+  return all;
+}
+
+}  // namespace
+
+Result<void> ReadMessages(const Files& files, const std::vector<Topic>& topics, const File::Sink& sink) {
+  bool goes_on = true;
+  for (const auto& file : files) {
+    std::vector<std::size_t> wanted, meant;  // Topics of the file, and which of `topics` they are.
+    for (std::size_t i = 0; i < file->topics().size(); ++i) {
+      const auto found = std::find(topics.begin(), topics.end(), file->topics()[i]);
+      if (found == topics.end()) continue;
+      wanted.push_back(i);
+      meant.push_back(static_cast<std::size_t>(found - topics.begin()));
+    }
+    if (wanted.empty()) continue;
+    auto read = file->Read(wanted, [&](std::size_t topic, std::string_view message) {
+      const auto which = std::find(wanted.begin(), wanted.end(), topic) - wanted.begin();
+      const std::size_t index = meant[static_cast<std::size_t>(which)];
+      if (!IsZstd(message)) return goes_on = sink(index, message);
+      const auto unpacked = UnpackZstd(message, kMaxMessageBytes);
+      return goes_on = sink(index, unpacked ? std::string_view(*unpacked) : std::string_view());
+    });
+    if (!read || !goes_on) return read;
+  }
+  return {};
+}
+
+Result<BagSurvey> BagSurvey::Of(const Files& files, const LogReaderOptions& options) {
+  BagSurvey survey;
+  for (const auto& file : files) survey.notes_.insert(survey.notes_.end(), file->notes().begin(), file->notes().end());
+  auto topics = ChooseTopics(TopicsOf(files), options.scan_topic, options.odometry_topic);
+  if (!topics) return tl::unexpected(topics.error());
+  survey.topics_ = *std::move(topics);
+  if (auto read = survey.ReadFixed(files); !read) return tl::unexpected(read.error());
+  if (auto read = survey.ReadFirstFrames(files); !read) return tl::unexpected(read.error());
+  const auto mounted = [&] {
+    return survey.laser_frame_ && survey.MountingOf(*survey.laser_frame_, std::nullopt).has_value();
+  };
+  if (!survey.topics_.odometry) {
+    if (auto read = survey.ReadMoving(files, [] { return false; }); !read) return tl::unexpected(read.error());
+    if (auto found = survey.FindOdometryTransform(); !found) return tl::unexpected(found.error());
+  } else if (!mounted()) {
+    if (auto read = survey.ReadMoving(files, mounted); !read) return tl::unexpected(read.error());
+  }
+  if (survey.laser_frame_) {
+    const auto mounting = survey.MountingOf(*survey.laser_frame_, options.T_robot_laser);
+    if (!mounting) return tl::unexpected(mounting.error());
+    const Pose2& T = mounting->T_robot_laser;
+    survey.notes_.push_back(survey.topics_.scans.name + ": frame '" + *survey.laser_frame_ + "' is mounted on '" +
+                            survey.base_frame_ + "' at " + std::to_string(T.x) + ", " + std::to_string(T.y) + ", " +
+                            std::to_string(T.theta) + (mounting->upside_down ? ", upside down" : ""));
+  }
+  survey.notes_.push_back("odometry: " + (survey.topics_.odometry ? survey.topics_.odometry->name
+                                                                  : "transforms from '" + survey.odometry_frame_ +
+                                                                        "' to '" + survey.base_frame_ + "'"));
+  return survey;
+}
+
+Result<void> BagSurvey::ReadFixed(const Files& files) {
+  return ReadMessages(files, topics_.fixed, [&](std::size_t, std::string_view bytes) {
+    if (const auto message = ros2::DecodeTransforms(bytes))
+      for (const ros2::Transform& transform : message->transforms) static_cast<void>(fixed_.Set(transform));
+    return true;
+  });
+}
+
+Result<void> BagSurvey::ReadFirstFrames(const Files& files) {
+  std::vector<Topic> wanted = {topics_.scans};
+  if (topics_.odometry) wanted.push_back(*topics_.odometry);
+  bool odometry_seen = !topics_.odometry;
+  auto read = ReadMessages(files, wanted, [&](std::size_t topic, std::string_view bytes) {
+    if (topic == 0 && !laser_frame_) {
+      if (const auto scan = ros2::DecodeLaserScan(bytes)) laser_frame_ = scan->header.frame;
+    } else if (topic == 1 && !odometry_seen) {
+      if (const auto odometry = ros2::DecodeOdometry(bytes)) {
+        odometry_seen = true;
+        odometry_frame_ = odometry->header.frame;
+        base_frame_ = odometry->child_frame;
+      }
+    }
+    return !laser_frame_ || !odometry_seen;
+  });
+  if (base_frame_.empty()) base_frame_ = kUsualBaseFrame;
+  return read;
+}
+
+Result<void> BagSurvey::ReadMoving(const Files& files, const std::function<bool()>& enough) {
+  return ReadMessages(files, topics_.moving, [&](std::size_t, std::string_view bytes) {
+    const auto message = ros2::DecodeTransforms(bytes);
+    if (!message) return true;
+    const std::uint64_t before = moving_.version();
+    for (const ros2::Transform& transform : message->transforms) {
+      if (IsOdometryFrame(transform.header.frame) && odometry_links_.size() < ros2::FrameTree::kMaxFrames)
+        odometry_links_.emplace(transform.header.frame, transform.child_frame);
+      static_cast<void>(moving_.Set(transform));
+    }
+    return moving_.version() == before || !enough();
+  });
+}
+
+Result<void> BagSurvey::FindOdometryTransform() {
+  if (odometry_links_.empty())
+    return Fail(StatusCode::kNotFound, "no topic of type nav_msgs/msg/Odometry, and no transform from a frame 'odom'");
+  if (odometry_links_.size() > 1) {
+    std::string links;
+    for (const auto& [parent, child] : odometry_links_) links += " '" + parent + "' to '" + child + "'";
+    return Fail(StatusCode::kInvalidArgument, "more than one transform from a frame 'odom':" + links.substr(0, 1000));
+  }
+  std::tie(odometry_frame_, base_frame_) = *odometry_links_.begin();
+  return {};
+}
+
+Result<ros2::Mounting> BagSurvey::MountingOf(const std::string& laser_frame,
+                                             const std::optional<Pose2>& T_robot_laser) const {
+  const auto motion = ros2::FindMotion(std::array<const ros2::FrameTree*, 2>{&fixed_, &moving_}, base_frame_,
+                                       laser_frame, std::array{odometry_frame_, std::string("map")});
+  Result<ros2::Mounting> mounting =
+      Fail(StatusCode::kFailedPrecondition, "no transform connects the lidar's frame '" + laser_frame +
+                                                "' with the robot's frame '" + base_frame_ +
+                                                "'; --laser-at X,Y,THETA says where the lidar is mounted");
+  if (motion) mounting = ros2::MountingOf(*motion);
+  if (!mounting && T_robot_laser) return ros2::Mounting{*T_robot_laser};
+  if (mounting && T_robot_laser) mounting->T_robot_laser = *T_robot_laser;
+  return mounting;
+}
+
+}  // namespace cairn::bag
