@@ -136,14 +136,11 @@ DatagramFault InspectHeartbeat(const Submessage& m, const Inspection& with) {
 }
 
 DatagramFault InspectGap(const Submessage& m, const Inspection& with) {
-  // The library looks up every number from start to base. Heartbeats say the same of a longer gap. The limit is still
-  // too high: a forged gap below it kept a reader busy for more than two minutes (idl/README.md).
-  constexpr std::int64_t kLongest = SequenceGate::kAtOnce;
   if (m.size() < 28) return DatagramFault::kFraming;
   if (!SetFits(m, 24, 0)) return DatagramFault::kSequenceSet;
   const std::int64_t start = m.body.Sequence(8);
   const std::int64_t base = m.body.Sequence(16);
-  if (start <= 0 || base < start || base - start > kLongest) return DatagramFault::kSequence;
+  if (start <= 0 || base < start || base - start > kMaxGap) return DatagramFault::kSequence;
   const std::int64_t last = std::max(base - 1, HighestOf(m, 16));
   return with.Accepts(m.Numbers(4), last) ? DatagramFault::kNone : DatagramFault::kSequence;
 }

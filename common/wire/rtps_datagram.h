@@ -29,6 +29,9 @@ enum class DatagramFault : std::uint8_t {
   kSecurity,       // A part of DDS Security whose counts or lengths exceed it (secure_datagram.h).
 };
 inline constexpr std::size_t kDatagramFaults = 10;
+// A gap may leave out this many numbers of samples. The library looks up every one of them with its reader locked, and
+// a gap of almost a million kept a reader busy for more than two minutes. Of a longer one, heartbeats say the same.
+inline constexpr std::int64_t kMaxGap = 16'384;
 [[nodiscard]] std::string_view DatagramFaultName(DatagramFault fault);
 
 // A datagram that arrived at `now`. The gate keeps what must be known of the ones before.
