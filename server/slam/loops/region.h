@@ -40,7 +40,8 @@ void ForEachSurface(const Trail& trail, const Stretch& stretch, const Visit& vis
   for (std::size_t k = stretch.first; k <= stretch.last; ++k) {
     const Pose2 T_anchor_k = Between(shapes[stretch.anchor].T_track_robot, shapes[k].T_track_robot);
     const Eigen::Matrix2d R = T_anchor_k.rotation();
-    for (const SurfacePoint& point : trail.points(k))
+    const SharedPoints points = trail.points(k);
+    for (const SurfacePoint& point : *points)
       visit(SurfacePoint{R * point.p + T_anchor_k.translation(), R * point.normal});
   }
 }

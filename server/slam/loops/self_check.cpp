@@ -44,8 +44,8 @@ void SelfCheck::Look(const Trail& trail, const PosePath& path) {
   const std::size_t now = shapes.size() - 1;
   Comparison comparison{here_m, {}};
   for (const std::size_t old : KeyframesToCompare(shapes, path)) {
-    comparison.counts += CompareBothWays(*keyframes[old].scan, trail.points(old), *keyframes[now].scan,
-                                         trail.points(now), Between(path[old], path[now]), options_.near_m);
+    comparison.counts += CompareBothWays(*keyframes[old].scan, *trail.points(old), *keyframes[now].scan,
+                                         *trail.points(now), Between(path[old], path[now]), options_.near_m);
   }
   if (comparison.counts.known() < kMinKnown) return;
   comparisons_.push_back(comparison);

@@ -72,7 +72,8 @@ std::vector<SurfacePoint> PlaceSearch::SurfacesOfMap(const Trail& trail, const P
     if (!trail.keyframes()[k].localized) continue;
     if ((T_map_k.translation() - last).cwiseAbs().maxCoeff() > options_.map_reach_m) continue;
     const Eigen::Matrix2d R = T_map_k.rotation();
-    for (const SurfacePoint& point : trail.points(k)) {
+    const SharedPoints points = trail.points(k);
+    for (const SurfacePoint& point : *points) {
       const Eigen::Vector2d p = R * point.p + T_map_k.translation();
       if (cells.Takes(p)) surfaces.push_back({p, R * point.normal});
     }
@@ -140,7 +141,7 @@ VisibilityCounts PlaceSearch::Visible(const Trail& trail, const PosePath& path, 
   VisibilityCounts counts;
   for (const std::size_t k :
        BestPlaces(std::move(near), shapes, options_.apart_m, static_cast<std::size_t>(options_.near_keyframes))) {
-    counts += CompareBothWays(*trail.keyframes()[k].scan, trail.points(k), scan, points_robot,
+    counts += CompareBothWays(*trail.keyframes()[k].scan, *trail.points(k), scan, points_robot,
                               Between(path[k], T_map_robot), check_.near_m);
   }
   return counts;

@@ -26,7 +26,7 @@ void Trail::Append(Keyframe keyframe, const Pose2& T_track_robot, std::vector<Su
     relations_.push_back(
         PositiveDefinite({node - 1, node, T_prev_curr, drift_.Covariance(T_prev_curr) + step_covariance, false}));
   shapes_.push_back({T_track_robot, TravelledTo(T_track_robot)});
-  points_.emplace_back(std::move(points_robot));
+  points_.Keep(node, std::move(points_robot));
   keyframes_.push_back(std::move(keyframe));
   loops_.emplace_back();
   distances_current_ = false;
@@ -52,13 +52,10 @@ std::vector<Keyframe> Trail::ConfirmedKeyframes() const {
   return trusted;
 }
 
-const std::vector<SurfacePoint>& Trail::points(std::size_t keyframe) const {
-  std::optional<std::vector<SurfacePoint>>& points = points_[keyframe];
-  if (!points) {
-    const Scan& scan = *keyframes_[keyframe].scan;
-    points = SurfacePointsOf(PointsOf(scan), scan, surface_);
-  }
-  return *points;
+SharedPoints Trail::points(std::size_t keyframe) const {
+  if (SharedPoints kept = points_.Find(keyframe)) return kept;
+  const Scan& scan = *keyframes_[keyframe].scan;
+  return points_.Keep(keyframe, SurfacePointsOf(PointsOf(scan), scan, surface_));
 }
 
 bool Trail::IsConsistent() const {
@@ -70,7 +67,7 @@ bool Trail::IsConsistent() const {
 }
 
 void Trail::RestoreRest() {
-  points_.assign(size(), std::nullopt);
+  points_.Clear();
   loops_.assign(size(), {});
   for (const PoseRelation& relation : relations_)
     if (relation.loop) NoteLoop(relation);
