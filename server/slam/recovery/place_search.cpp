@@ -132,15 +132,14 @@ std::optional<FoundPlace> PlaceSearch::Fit(const Trail& trail, const PosePath& p
 VisibilityCounts PlaceSearch::Visible(const Trail& trail, const PosePath& path, const Scan& scan,
                                       const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const {
   const std::span<const KeyframeShape> shapes = trail.shapes();
-  std::vector<KeyframeCost> near;
+  BestPlaces near(shapes, options_.apart_m, static_cast<std::size_t>(options_.near_keyframes));
   for (std::size_t k = 0; k < shapes.size(); ++k) {
     const double distance_m = (path[k].translation() - T_map_robot.translation()).norm();
     if (!trail.keyframes()[k].localized || distance_m > kMaxVisibleM) continue;
-    near.push_back({k, distance_m + std::abs(AngleDiff(path[k].theta, T_map_robot.theta))});
+    near.Add({k, distance_m + std::abs(AngleDiff(path[k].theta, T_map_robot.theta))});
   }
   VisibilityCounts counts;
-  for (const std::size_t k :
-       BestPlaces(std::move(near), shapes, options_.apart_m, static_cast<std::size_t>(options_.near_keyframes))) {
+  for (const std::size_t k : near.Take()) {
     counts += CompareBothWays(*trail.keyframes()[k].scan, *trail.points(k), scan, points_robot,
                               Between(path[k], T_map_robot), check_.near_m);
   }

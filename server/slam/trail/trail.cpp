@@ -9,6 +9,8 @@
 namespace cairn::slam {
 namespace {
 
+constexpr double kRoundingM = 1e-6;  // More than sums of the same lengths in another order can differ.
+
 // Added to every covariance: options may set all noise to zero, but the least squares need positive definite
 // covariances.
 PoseRelation PositiveDefinite(PoseRelation relation) {
@@ -30,6 +32,7 @@ void Trail::Append(Keyframe keyframe, const Pose2& T_track_robot, std::vector<Su
   keyframes_.push_back(std::move(keyframe));
   loops_.emplace_back();
   distances_current_ = false;
+  if (node > 0) way_bounds_.Append(shapes_[node].travelled_m - shapes_[node - 1].travelled_m);
   if (revisit) AddLoop({revisit->keyframe, node, revisit->T_keyframe_robot, revisit->covariance, true});
 }
 
@@ -69,6 +72,7 @@ bool Trail::IsConsistent() const {
 void Trail::RestoreRest() {
   points_.Clear();
   loops_.assign(size(), {});
+  way_bounds_.Clear();
   for (const PoseRelation& relation : relations_)
     if (relation.loop) NoteLoop(relation);
   distances_m_.clear();
@@ -89,28 +93,30 @@ void Trail::NoteLoop(const PoseRelation& loop) {
   const double way_m = loop.T_from_to.translation().norm();
   loops_[loop.from].push_back({loop.to, way_m});
   loops_[loop.to].push_back({loop.from, way_m});
+  way_bounds_.AddRelation(loop.from, loop.to, way_m);
 }
 
 std::span<const double> Trail::distances_m() const {
-  if (!distances_current_) distances_m_ = DistancesFromLast();
+  if (distances_current_) return distances_m_;
+  distances_m_ = DistancesFromLast();
   distances_current_ = true;
+  if (!empty()) way_bounds_.AddHub(distances_m_);
   return distances_m_;
 }
 
-// Keyframes and relations are only added. So no path becomes longer, and the steps from the keyframe at which the
-// distances were computed to the last one bound how far everything has gone away since.
 double Trail::DistanceAtMost(std::size_t keyframe) const {
-  const double now_m = shapes_.back().travelled_m;
-  const double along_steps_m = now_m - shapes_[keyframe].travelled_m;
-  if (keyframe >= distances_m_.size()) return along_steps_m;
-  const double since_m = now_m - shapes_[distances_m_.size() - 1].travelled_m;
-  return std::min(along_steps_m, distances_m_[keyframe] + since_m);
+  const double along_steps_m = shapes_.back().travelled_m - shapes_[keyframe].travelled_m;
+  return std::min(along_steps_m, way_bounds_.AtMostM(keyframe));
 }
 
 bool Trail::IsFarther(std::size_t keyframe, double way_m) const {
-  constexpr double kRoundingM = 1e-6;  // More than sums of the same lengths in another order can differ.
   if (DistanceAtMost(keyframe) + kRoundingM < way_m) return false;
   return distances_m()[keyframe] > way_m;
+}
+
+bool Trail::AllWithin(std::size_t begin, std::size_t end, double way_m) const {
+  const double along_steps_m = shapes_.back().travelled_m - shapes_[begin].travelled_m;
+  return along_steps_m + kRoundingM < way_m || way_bounds_.AllBelow(begin, end, way_m - kRoundingM);
 }
 
 // Dijkstra's search, with buckets for a queue (Dial 1969): a heap takes five times as long. Within a bucket keyframes

@@ -16,6 +16,7 @@
 #include "server/slam/state/frozen_blocks.h"
 #include "server/slam/trail/keyframe.h"
 #include "server/slam/trail/point_cache.h"
+#include "server/slam/trail/way_bounds.h"
 
 namespace cairn::slam {
 
@@ -58,10 +59,13 @@ class Trail {
   // at lately (point_cache.h).
   [[nodiscard]] SharedPoints points(std::size_t keyframe) const;
   // Per keyframe: length of the shortest path along the relations from the last keyframe, in metres. The first call
-  // after a change goes through all keyframes; IsFarther seldom does.
+  // after a change goes through all keyframes; IsFarther seldom does, and AllWithin never.
   [[nodiscard]] std::span<const double> distances_m() const;
   // Whether distances_m()[keyframe] is more than `way_m`.
   [[nodiscard]] bool IsFarther(std::size_t keyframe, double way_m) const;
+  // Whether IsFarther is false for all keyframes from `begin` on and before `end`. It may say no although it is; for
+  // the keyframes below a node of a path (shared_sequence.h) it takes no longer than for one.
+  [[nodiscard]] bool AllWithin(std::size_t begin, std::size_t end, double way_m) const;
   [[nodiscard]] const std::vector<MapperSnapshot::ScanPlace>& scans() const { return scans_; }
   // Steps, revisits and loops; empty as long as no place was seen again.
   [[nodiscard]] std::vector<PoseRelation> relations() const;
@@ -100,8 +104,9 @@ class Trail {
   std::vector<KeyframeShape> shapes_;  // One per keyframe.
   mutable PointCache points_{kMaxCachedPoints};
   std::vector<PoseRelation> relations_;
-  std::vector<std::vector<Loop>> loops_;     // One list per keyframe. A loop is stored at both of its keyframes.
-  mutable std::vector<double> distances_m_;  // From keyframe distances_m_.size() - 1, when they were last computed.
+  std::vector<std::vector<Loop>> loops_;  // One list per keyframe. A loop is stored at both of its keyframes.
+  mutable std::vector<double> distances_m_;
+  mutable WayBounds way_bounds_;  // Follows from the rest.
   mutable bool distances_current_ = true;
   std::vector<MapperSnapshot::ScanPlace> scans_;
   // For checkpoints: all of these grow at their ends only, but for the keyframes in ConfirmTentative.
