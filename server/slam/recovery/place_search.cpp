@@ -133,11 +133,11 @@ VisibilityCounts PlaceSearch::Visible(const Trail& trail, const PosePath& path, 
                                       const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const {
   const std::span<const KeyframeShape> shapes = trail.shapes();
   BestPlaces near(shapes, options_.apart_m, static_cast<std::size_t>(options_.near_keyframes));
-  for (std::size_t k = 0; k < shapes.size(); ++k) {
-    const double distance_m = (path[k].translation() - T_map_robot.translation()).norm();
-    if (!trail.keyframes()[k].localized || distance_m > kMaxVisibleM) continue;
-    near.Add({k, distance_m + std::abs(AngleDiff(path[k].theta, T_map_robot.theta))});
-  }
+  ForEachNear(path, shapes.size(), T_map_robot.translation(), kMaxVisibleM, [&](std::size_t k, const Pose2& there) {
+    const double distance_m = (there.translation() - T_map_robot.translation()).norm();
+    if (!trail.keyframes()[k].localized || distance_m > kMaxVisibleM) return;
+    near.Add({k, distance_m + std::abs(AngleDiff(there.theta, T_map_robot.theta))});
+  });
   VisibilityCounts counts;
   for (const std::size_t k : near.Take()) {
     counts += CompareBothWays(*trail.keyframes()[k].scan, *trail.points(k), scan, points_robot,

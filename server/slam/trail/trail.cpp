@@ -29,6 +29,7 @@ void Trail::Append(Keyframe keyframe, const Pose2& T_track_robot, std::vector<Su
         PositiveDefinite({node - 1, node, T_prev_curr, drift_.Covariance(T_prev_curr) + step_covariance, false}));
   shapes_.push_back({T_track_robot, TravelledTo(T_track_robot)});
   points_.Keep(node, std::move(points_robot));
+  keyframe.scan.Pack();
   keyframes_.push_back(std::move(keyframe));
   loops_.emplace_back();
   distances_current_ = false;
@@ -57,7 +58,7 @@ std::vector<Keyframe> Trail::ConfirmedKeyframes() const {
 
 SharedPoints Trail::points(std::size_t keyframe) const {
   if (SharedPoints kept = points_.Find(keyframe)) return kept;
-  const Scan& scan = *keyframes_[keyframe].scan;
+  const Scan scan = *keyframes_[keyframe].scan;
   return points_.Keep(keyframe, SurfacePointsOf(PointsOf(scan), scan, surface_));
 }
 
