@@ -41,7 +41,7 @@ void SetPosition(const Pose2& pose, Vector& position) {
 void SetRotation(double theta, double tilt, foxglove::Quaternion& rotation) {
   const double cos_z = std::cos(theta / 2), sin_z = std::sin(theta / 2);
   const double cos_y = std::cos(tilt / 2), sin_y = std::sin(tilt / 2);
-  rotation.set_x(-sin_z * sin_y);
+  rotation.set_x(0.0 - sin_z * sin_y);  // Not -0.
   rotation.set_y(cos_z * sin_y);
   rotation.set_z(sin_z * cos_y);
   rotation.set_w(cos_z * cos_y);
