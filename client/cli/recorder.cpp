@@ -98,19 +98,20 @@ Result<bool> Recorder::IsNew(const StreamId& id, std::uint64_t sequence, const s
     stream.session = id.session;
     stream.last = 0;
   }
-  if (stream.last > 0 && sequence <= stream.last) {
+  if (sequence <= stream.last) {  // They begin with 1.
     ++account_.repeated;
     return false;
   }
-  const std::uint64_t missing = stream.last > 0 ? sequence - stream.last - 1 : 0;
+  const bool begins = stream.last == 0;
+  const std::uint64_t missing = sequence - stream.last - 1;
   stream.last = sequence;
   if (missing == 0) return true;
-  account_.missing += missing;
-  if (auto logged =
-          file_.AddLog(LogLevel::kWarning, robot,
-                       fmt::format("{} {} before number {} did not reach the recorder", missing, what, sequence), time);
-      !logged)
-    return tl::unexpected(logged.error());
+  if (!begins) account_.missing += missing;
+  auto logged = begins
+                    ? file_.AddLog(LogLevel::kInfo, robot, fmt::format("{} from number {} on", what, sequence), time)
+                    : file_.AddLog(LogLevel::kWarning, robot,
+                                   fmt::format("{} {} before number {} did not arrive", missing, what, sequence), time);
+  if (!logged) return tl::unexpected(logged.error());
   return true;
 }
 

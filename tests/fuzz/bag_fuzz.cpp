@@ -1,6 +1,6 @@
-// Recordings: a number, then an MCAP file that is read as a drive, or one message of a topic that is decoded: of ROS 2, of
-// Foxglove, or of a recording of our own. SQLite opens files by their names only, and is fuzzed by its makers; damaged
-// databases are in sqlite_file_test.
+// Recordings: a number, then an MCAP file that is read as a drive, or one message of a topic that is decoded: of ROS 2,
+// of Foxglove, or of a recording of our own. SQLite opens files by their names only, and is fuzzed by its makers;
+// damaged databases are in sqlite_file_test.
 #include <cmath>
 
 #include "common/bag/foxglove_decoding.h"

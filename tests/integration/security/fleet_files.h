@@ -1,5 +1,6 @@
 // A fleet's certificates, made once for the test program by deploy/security/make-fleet.sh: robots r1 and r2, the
-// program `sim` for s1 and s2, viewer v, recorder c, operator o; and a second fleet, with which the first has nothing to do.
+// program `sim` for s1 and s2, viewer v, recorder c, operator o; and a second fleet, with which the first has nothing
+// to do.
 #pragma once
 
 #include <openssl/pem.h>
