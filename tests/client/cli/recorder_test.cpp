@@ -297,6 +297,18 @@ TEST_F(Recording, ChangesOfStateAreLogged) {
   EXPECT_THAT(lines, ::testing::Contains(::testing::HasSubstr("a stream stands still: no scans?for 2 s ?")));
 }
 
+// A recorder that is killed loses what is younger.
+TEST_F(Recording, ReachesTheFileInTwoSeconds) {
+  Begin();
+  Introduce();
+  const std::uint64_t before = file_->bytes();
+  Must(file_->EndOldChunk(1'000'000 + RecordingFile::kChunkAge - 1));
+  EXPECT_EQ(file_->bytes(), before);
+  Must(file_->EndOldChunk(1'000'000 + RecordingFile::kChunkAge));
+  EXPECT_GT(file_->bytes(), before);
+  EXPECT_EQ(Must(bag::OpenMcap(path_))->topics().size(), 1U) << "the log";
+}
+
 // What a peer can send must not end up in a name.
 TEST_F(Recording, NamesThatAreNoneAreIgnored) {
   Begin();

@@ -252,8 +252,16 @@ TEST_F(McapWriting, OnADiskThatFillsUpTheFileKeepsItsChunksAndGetsItsEnd) {
   EXPECT_EQ(writer->Write(a_, 3000, 3000, "more").error().message, written.error().message);
   EXPECT_THAT(Read(path_), ElementsAre("message 0", "message 1", "message 2", "message 3"));
   EXPECT_THAT(notes_, IsEmpty()) << "there was room for the end";
-  FieldReader statistics(RecordsOf(directory_.Read("out.mcap")).find(McapOp::kStatistics)->second.content);
+  const std::string file = directory_.Read("out.mcap");
+  FieldReader statistics(RecordsOf(file).find(McapOp::kStatistics)->second.content);
   EXPECT_EQ(statistics.Take<std::uint64_t>(), 4U);
+  // After eight numbers that do not matter here: the messages of each channel, without those that found no room.
+  static_cast<void>(statistics.TakeBytes(2 + 4 * 4 + 2 * 8));
+  FieldReader counts(statistics.TakeString());
+  for (const std::uint16_t channel : {a_, b_}) {
+    EXPECT_EQ(counts.Take<std::uint16_t>(), channel);
+    EXPECT_EQ(counts.Take<std::uint64_t>(), 2U);
+  }
 }
 
 TEST_F(McapWriting, WithNoRoomForTheEndTheFileStaysReadable) {
