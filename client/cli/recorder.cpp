@@ -66,7 +66,6 @@ Recorder::Robot* Recorder::Learn(NameId id, const std::string& name, const std::
   if (known == robots_.end()) {
     if (robots_.size() >= kMaxRobots || !IsNameOf(id, name)) return nullptr;
     known = robots_.emplace(id, Robot{.name = name, .site = {}, .state = {}}).first;
-    known->second.state.phase = SessionPhase::kEnded;
     named_ = true;
   }
   if (!site.empty() && known->second.site != site && ValidateName("a site", site)) {
@@ -135,9 +134,8 @@ Result<void> Recorder::On(OdometrySample& sample, std::int64_t time) {
 
 Result<void> Recorder::On(PoseReport& pose, std::int64_t time) {
   Robot* const robot = Learn(pose.robot_id, pose.robot, pose.site);
-  if (robot == nullptr || !Wants(*robot) || pose.generation < robot->generation || pose.site != robot->site) return {};
+  if (robot == nullptr || !Wants(*robot) || pose.site != robot->site) return {};
   if (!pose.T_map_robot.IsFinite() || !pose.T_map_odom.IsFinite()) return {};
-  robot->generation = pose.generation;
   robot->recorded = true;
   pose.robot = robot->name;
   if (std::exchange(robot->reason, pose.reason) != pose.reason) {
@@ -154,6 +152,8 @@ Result<void> Recorder::On(SessionState& state, std::int64_t time) {
   Robot* const robot = Learn(state.robot_id, state.robot, state.site);
   if (robot == nullptr || !Wants(*robot)) return {};
   const SessionState before = std::exchange(robot->state, state);
+  // A session that had ended before the recorder came is no news.
+  if (before.session == 0 && state.phase == SessionPhase::kEnded) return {};
   if (before.phase == state.phase && before.session == state.session && before.stale == state.stale) return {};
   std::string text = fmt::format("session {} in site {}", SessionPhaseName(state.phase), robot->site);
   if (state.stale) text += ", a stream stands still";
@@ -189,6 +189,7 @@ Result<void> Recorder::On(Job& job, std::int64_t time) {
   if (known == jobs_.end() && jobs_.size() >= kMaxJobs) return {};
   if (known != jobs_.end() && known->second == job.state) return {};
   jobs_[job.id] = job.state;
+  if (known == jobs_.end() && IsFinal(job.state)) return {};  // The server tells the jobs of days.
   std::string text = fmt::format("job {} ({}): {}", job.id, JobKindName(job.kind), JobStateName(job.state));
   if (!job.message.empty()) text += ": " + job.message;
   return file_.AddLog(job.state == JobState::kFailed ? LogLevel::kError : LogLevel::kInfo, job.site, text, time);

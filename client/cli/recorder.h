@@ -52,9 +52,8 @@ class Recorder {
   struct Robot {
     std::string name;
     std::string site;
-    SessionState state;
+    SessionState state;  // Its session is 0 until one is told.
     PoseReason reason = PoseReason::kWaiting;
-    Generation generation = 0;  // Of its last pose.
     bool recorded = false;
   };
   struct Stream {

@@ -292,6 +292,18 @@ TEST_F(Recording, ChangesOfStateAreLogged) {
   restarted.generation = 2;
   Take(restarted);
   EXPECT_EQ(file_->counts().log_lines, before + 5);
+  // What had ended before the recorder came is no news.
+  SessionState ended = StateOf("r3", "hall");
+  ended.phase = SessionPhase::kEnded;
+  ended.generation = 2;
+  Take(ended);
+  job.id = 4;
+  job.state = JobState::kSucceeded;
+  Take(job);
+  EXPECT_EQ(file_->counts().log_lines, before + 5);
+  job.id = 3;
+  Take(job);
+  EXPECT_EQ(file_->counts().log_lines, before + 6);
   const std::vector<std::string> lines = (static_cast<void>(Topics()), messages_["/log"]);
   EXPECT_THAT(lines, ::testing::Contains(::testing::HasSubstr("lost, not localized")));
   EXPECT_THAT(lines, ::testing::Contains(::testing::HasSubstr("a stream stands still: no scans?for 2 s ?")));
