@@ -327,13 +327,20 @@ TEST_F(Recording, NamesThatAreNoneAreIgnored) {
   SessionState forged = StateOf("r1", "hall");
   forged.robot = "r2";  // Not that of the id.
   Take(forged);
-  for (const char* name : {"../x", "a/b", "", "\xff"}) Take(StateOf(name, "hall"));
+  Take(LedgerOf("r9", "hall"));  // Names the sensor.
+  Take(ScanOf("r1", 1));
+  for (const char* name : {"../x", "a/b", "", "\xff"}) {
+    Take(StateOf(name, "hall"));
+    Take(ScanOf(name, 1));
+  }
+  EXPECT_EQ(file_->counts().scans, 0U);
+  EXPECT_EQ(recorder_->account().nameless, 5U);
   PoseReport pose = PoseOf("r1", "no/site");
   Take(pose);
   pose = PoseOf("r1", "hall");
   pose.T_map_robot.x = std::nan("");
   Take(pose);
-  EXPECT_THAT(recorder_->robots(), IsEmpty());
+  EXPECT_THAT(recorder_->robots(), ElementsAre("r1")) << "the robot's name was good";
   EXPECT_EQ(file_->counts().poses, 0U);
 }
 
