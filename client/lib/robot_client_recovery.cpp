@@ -69,8 +69,9 @@ std::shared_ptr<RobotClient::Wire> RobotClient::CurrentWire() const {
   return wire_;
 }
 
+// Recorders read scans, too; only the server reads the session.
 bool RobotClient::connected() const {
-  return CurrentWire()->scans->matched() > 0;
+  return CurrentWire()->session->matched() > 0;
 }
 
 void RobotClient::Sent(NameId sensor_id, std::uint64_t number) {
