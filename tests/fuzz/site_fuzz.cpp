@@ -77,7 +77,10 @@ bool IsEmpty(const MemoryStore& store) {
 
 // The site of the store goes into a file and from there into an empty store.
 SavedRecords SavedAndLoaded(MemoryStore& store, const std::string& site) {
-  static const TempDirectory directory;
+  // In memory, because the file is flushed to the disk.
+  static const TempDirectory directory(std::filesystem::is_directory("/dev/shm")
+                                           ? std::filesystem::path("/dev/shm")
+                                           : std::filesystem::temp_directory_path());
   const std::filesystem::path path = directory / "again.site";
   Must(WriteSiteFile(store, site, path).has_value(), "what was imported can be saved");
   MemoryStore other;
