@@ -28,7 +28,7 @@ class Restart : public ::testing::Test {
   // The server stores nothing, or its state stays and the robots have little memory for what it has not stored.
   explicit Restart(bool stored = false)
       : state_(stored ? (directory_ / "state").string() : "none"), bus_(MakeBus("robots")), fleet_(MakeFleet()) {
-    StartServer();
+    StartServer("20");
     for (int i = 0; i < kRobots; ++i) {
       RobotClientOptions options;
       if (stored) options = {.max_kept_bytes = 8 * 1024, .spill_file = SpillOf(i).string()};
@@ -45,10 +45,12 @@ class Restart : public ::testing::Test {
     options.laser.beams = 181;
     return Must(sim::Fleet::Create(Must(sim::OpenSurroundings("office")), options));
   }
-  void StartServer() {
+  // How often it publishes the map, so how fast its versions grow.
+  void StartServer(const std::string& publish_rate_hz = "2") {
     server_.reset();
     server_.emplace(std::vector<std::string>{CAIRND_PATH, "--domain", std::to_string(TestDomain()), "--state", state_,
-                                             "--set", "slam.particles=20", "--log-level", "warn"});
+                                             "--set", "slam.particles=20", "--set",
+                                             "maps.publish_rate_hz=" + publish_rate_hz, "--log-level", "warn"});
   }
   void KillServer() {
     server_->Signal(SIGKILL);
@@ -105,10 +107,16 @@ TileVersions VersionsOf(const MapClient& map) {
 
 // Robots were put where they had once begun, and said to be tracking there: 6.7 m away.
 TEST_F(Restart, TwoRobotsGoOnWhereTheyAreThoughTheServerForgotThem) {
-  ASSERT_NO_FATAL_FAILURE(Drive(40, true));
+  ASSERT_NO_FATAL_FAILURE(Drive(10, true));
   const auto map = Must(MapClient::Create(*bus_, "office"));
   ASSERT_TRUE(map->WaitComplete(20.0));
+  for (std::size_t scans = 15; scans <= 40; scans += 5) {
+    const std::uint64_t version = map->version();
+    ASSERT_NO_FATAL_FAILURE(Drive(scans, true));
+    ASSERT_TRUE(Eventually([&] { return map->version() > version; }));
+  }
   const Generation first = map->info()->generation;
+  const std::uint64_t first_version = map->version();
   KillServer();
   ASSERT_NO_FATAL_FAILURE(Drive(60, false));
   EXPECT_FALSE(map->tiles().empty()) << "what the last server said is there until another one says more";
@@ -134,13 +142,15 @@ TEST_F(Restart, TwoRobotsGoOnWhereTheyAreThoughTheServerForgotThem) {
     EXPECT_GE(rider.poses().size(), 118U);
     EXPECT_TRUE(rider.client().pose()->localized);
   }
-  // The client of the map has that of the last server and nothing of the ones before: epochs and versions of each begin
-  // anew, so what is left of an earlier one could have a higher version.
+  // The client of the map has that of the last server and nothing of the ones before. Epochs and versions of each begin
+  // anew, and the first server's versions were higher.
   const auto newcomer = Must(MapClient::Create(*bus_, "office"));
   ASSERT_TRUE(newcomer->WaitComplete(20.0));
   EXPECT_TRUE(Eventually([&] { return VersionsOf(*map) == VersionsOf(*newcomer); }));
   EXPECT_EQ(map->info()->generation, newcomer->info()->generation);
   EXPECT_GT(map->tiles().size(), 0U);
+  EXPECT_LT(map->version(), first_version);
+  EXPECT_EQ(map->renewed(), 0) << "it did not need to join the domain anew";
 }
 
 TEST_F(RestartOnItsState, WhatDoesNotFitIntoMemoryComesOnceFromTheSpillFile) {
