@@ -2,8 +2,8 @@
 // need to receive, or to receive again. A sample is removed from the front when the server reports that it is safe
 // (durable, or settled if the server stores nothing). A cursor divides the queue: samples before the cursor were sent,
 // the sample at the cursor is the next one to send. Bounded: above `max_bytes` the oldest samples are moved into the
-// spill file if there is one. Without one, or where the disk is full, the oldest are dropped and counted. Does no other I/O and uses no clock. Not
-// thread-safe.
+// spill file if there is one. Without one, or where the disk is full, the oldest are dropped and counted. Does no other
+// I/O and uses no clock. Not thread-safe.
 #pragma once
 
 #include <cstddef>
