@@ -14,8 +14,8 @@ namespace cairn {
 
 class TempDirectory {
  public:
-  TempDirectory() {
-    std::string name = (std::filesystem::temp_directory_path() / "cairn_test_XXXXXX").string();
+  explicit TempDirectory(const std::filesystem::path& in = std::filesystem::temp_directory_path()) {
+    std::string name = (in / "cairn_test_XXXXXX").string();
     if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("cannot make a directory in " + name);
     path_ = name;
   }

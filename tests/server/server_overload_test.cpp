@@ -58,6 +58,36 @@ TEST(ServerOverload, IsHealthyUnderOverloadAsLongAsItMoves) {
   EXPECT_GT(seconds, 2.0 * options.server.stall_limit_s) << "the work was too little to show anything";
 }
 
+std::ptrdiff_t PosesOf(const WholeServer& house, const std::string& robot) {
+  const auto poses = house.All<PoseReport>();
+  return std::count_if(poses.begin(), poses.end(), [&](const PoseReport& pose) { return pose.robot == robot; });
+}
+
+// One thread estimates for all. A robot whose queue is full must not make another one wait for more than a turn.
+TEST(ServerOverload, ARobotThatSendsTooMuchDelaysACalmOneByATurn) {
+  WholeServer house(SlowOnOneThread());
+  for (const char* robot : {"flood", "calm"}) house.Open(robot, kOverloadClient);
+  int step = 0;
+  const auto flood = [&](int scans) {
+    for (int last = step + scans; step < last; ++step) {
+      house.SendOdometry("flood", kOverloadClient, RoomOdometry(step));
+      house.SendScan("flood", kOverloadClient, RoomScan(step));
+    }
+  };
+  flood(50);
+  for (int calm = 0; calm < 4; ++calm) {
+    const auto before = PosesOf(house, "flood");
+    house.SendOdometry("calm", kOverloadClient, RoomOdometry(calm));
+    house.SendScan("calm", kOverloadClient, RoomScan(calm));
+    house.SendOdometry("calm", kOverloadClient, RoomOdometry(calm + 1));
+    ASSERT_TRUE(house.WaitFor([&] { return PosesOf(house, "calm") == calm + 1; }));
+    // A turn has eight events, so four scans and their odometry; and as much may have been begun before.
+    EXPECT_LE(PosesOf(house, "flood") - before, 10) << calm;
+    EXPECT_LT(house.LastLedger("flood").settled_through + 15, static_cast<std::uint64_t>(step)) << "no flood is left";
+    flood(10);
+  }
+}
+
 // What is sent waits in a lane until its thread takes it. Such a thread once hung, while the server went on to say that
 // it was alive.
 TEST(ServerOverload, IsNotHealthyWhereNobodyTakesWhatItSends) {
