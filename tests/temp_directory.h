@@ -14,7 +14,8 @@ namespace cairn {
 
 class TempDirectory {
  public:
-  explicit TempDirectory(const std::filesystem::path& in = std::filesystem::temp_directory_path()) {
+  TempDirectory() : TempDirectory(std::filesystem::temp_directory_path()) {}
+  explicit TempDirectory(const std::filesystem::path& in) {
     std::string name = (in / "cairn_test_XXXXXX").string();
     if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("cannot make a directory in " + name);
     path_ = name;
