@@ -65,7 +65,8 @@ void Mapper::State::AddKeyframe(Keyframe keyframe, ScanView view, const TrackSte
     Begin(ScanStep::kFilter);
     filter->Predict(MotionTo(keyframe, step, step_covariance));
     Begin(ScanStep::kRevisit);
-    if (!revisit) revisit = revisits.Find(view.points_robot, trail, travelled_m, *filter, parallel_for);
+    if (!revisit)
+      revisit = revisits.Find(view.points_robot, trail, travelled_m, *filter, believed_index(), parallel_for);
     Begin(ScanStep::kFilter);
     if (revisit && !filter->Observe(*revisit)) revisit.reset();
   }
@@ -78,7 +79,7 @@ void Mapper::State::AddKeyframe(Keyframe keyframe, ScanView view, const TrackSte
   Begin(ScanStep::kLargeLoop);
   CloseLargeLoop();
   Begin(ScanStep::kSelfCheck);
-  self_check.Look(trail, believed_path());
+  self_check.Look(trail, believed_index());
   Begin(ScanStep::kDraw);
   Draw(step, placed_before);
   Begin(ScanStep::kOther);

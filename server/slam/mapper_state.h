@@ -20,6 +20,7 @@
 #include "server/slam/tracking/blind_motion.h"
 #include "server/slam/tracking/front_end.h"
 #include "server/slam/tracking/scan_tracking.h"
+#include "server/slam/trail/path_index.h"
 #include "server/slam/trail/trail.h"
 
 namespace cairn::slam {
@@ -77,6 +78,11 @@ struct Mapper::State {
   ScanOutcome Report(Stamp stamp, const Pose2& T_odom_robot, const TrackStep& step, bool keyframe);
   [[nodiscard]] PoseReason ReasonOf(const TrackStep& step) const;
   [[nodiscard]] PosePath believed_path() const { return filter->hypothesis(0).path; }
+  // Of the believed path as it is now.
+  [[nodiscard]] const PathIndex& believed_index() {
+    index.Follow(believed_path());
+    return index;
+  }
 
   // All but the filter, which is behind an interface.
   template <typename Archive>
@@ -118,6 +124,7 @@ struct Mapper::State {
   ConstantSpeed speed;  // Speed of the motion from keyframe to keyframe.
   Trail trail;
   RevisitSearch revisits;
+  PathIndex index;  // Follows from the filter's path.
   std::unique_ptr<Filter> filter;
   LoopSearch loops;
   SelfCheck self_check;

@@ -8,6 +8,8 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <unordered_map>
 #include <vector>
 
 #include "server/slam/landmarks/landmark_sighting.h"
@@ -25,7 +27,13 @@ class LandmarkIndex {
   void Name(std::size_t slot, const LandmarkSignature& signature);
   // Extends the box of a landmark by the position that a particle has for it. REQUIRES: Name was called for
   // the slot.
-  void Grow(std::size_t slot, const Eigen::Vector2d& p_map) { places_[slot].box.extend(p_map); }
+  void Grow(std::size_t slot, const Eigen::Vector2d& p_map) {
+    Eigen::AlignedBox2d& box = places_[slot].box;
+    if (box.contains(p_map)) return;
+    const Eigen::AlignedBox2d before = box;
+    box.extend(p_map);
+    Enter(slot, before);
+  }
 
   // Slots of similar landmarks that some particle may have within `box`.
   [[nodiscard]] std::vector<std::size_t> Near(const LandmarkSignature& signature, const Eigen::AlignedBox2d& box,
@@ -36,9 +44,31 @@ class LandmarkIndex {
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     archive(self.places_);
+    if constexpr (Archive::kReads) self.EnterAll();
   }
 
  private:
+  // The squares of the plane that a box touches, by their numbers in x and in y.
+  struct Squares {
+    int first_x = 0, last_x = -1;
+    int first_y = 0, last_y = -1;
+
+    [[nodiscard]] bool Contains(int x, int y) const {
+      return first_x <= x && x <= last_x && first_y <= y && y <= last_y;
+    }
+    [[nodiscard]] std::size_t count() const {
+      return static_cast<std::size_t>(last_x - first_x + 1) * static_cast<std::size_t>(last_y - first_y + 1);
+    }
+  };
+  // Nothing if there are too many, or if the box is empty or not finite.
+  [[nodiscard]] static std::optional<Squares> SquaresOf(const Eigen::AlignedBox2d& box);
+  [[nodiscard]] static std::uint64_t KeyOf(int x, int y) {
+    return (std::uint64_t{static_cast<std::uint32_t>(x)} << 32) | static_cast<std::uint32_t>(y);
+  }
+  // Enters a slot whose box has grown into the squares that are new to it.
+  void Enter(std::size_t slot, const Eigen::AlignedBox2d& before);
+  void EnterAll();
+
   struct Place {
     LandmarkSignature signature;
     Eigen::AlignedBox2d box;  // Empty if no particle has the landmark.
@@ -49,6 +79,9 @@ class LandmarkIndex {
     }
   };
   std::vector<Place> places_;  // Indexed by slot.
+  // The slots whose boxes touch a square, and those whose boxes are too large for that. They follow from the places.
+  std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> by_square_;
+  std::vector<std::uint32_t> large_;
 };
 
 enum class AssociationDecision : std::uint8_t {

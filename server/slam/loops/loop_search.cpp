@@ -81,17 +81,20 @@ std::optional<LoopClosure> LoopSearch::Find(const Trail& trail, const PosePath& 
 // Old keyframes in whose surroundings the robot may be, the most likely first, and only one per place.
 std::vector<std::size_t> LoopSearch::Candidates(const Trail& trail, const PosePath& path) const {
   const std::span<const KeyframeShape> shapes = trail.shapes();
-  std::vector<KeyframeCost> all;
+  BestPlaces best(shapes, kStretchM, kMaxCandidates);
   const Pose2& here = path[shapes.size() - 1];
   const auto look = [&](std::size_t k, const Pose2& there) {
     if (k % kCandidateStride != 0) return;
     const double away_m = (there.translation() - here.translation()).norm();
     if (away_m >= options_.max_doubt_m || !trail.IsFarther(k, kLargeLoopM)) return;
     const double cost = away_m / Reach(trail.distances_m()[k]);  // Distance divided by the reach.
-    if (cost < 1.0) all.push_back({k, cost});
+    if (cost < 1.0) best.Add({k, cost});
   };
-  ForEachNear(path, shapes.size(), here.translation(), options_.max_doubt_m, look);
-  return BestPlaces(std::move(all), shapes, kStretchM, kMaxCandidates);
+  const auto enter = [&](const PathBounds& bounds, std::size_t begin, std::size_t end) {
+    return !trail.AllWithin(begin, end, kLargeLoopM) && bounds.IsWithin(options_.max_doubt_m, here.translation());
+  };
+  path.ForEach(shapes.size(), enter, look);
+  return best.Take();
 }
 
 std::optional<LoopClosure> LoopSearch::Compare(const Trail& trail, std::size_t old,

@@ -3,7 +3,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <unordered_set>
+#include <utility>
 
 namespace cairn::slam {
 namespace {
@@ -12,6 +14,10 @@ namespace {
 // no more than another seed (study `sensitivity`).
 constexpr double kMaxRayM = 15.0;     // Beyond this range neighbouring beams leave gaps.
 constexpr double kDrawEveryM = 0.75;  // Distance between the keyframes drawn.
+
+bool IsDearer(const KeyframeCost& a, const KeyframeCost& b) {
+  return a.cost != b.cost ? a.cost > b.cost : a.keyframe > b.keyframe;
+}
 
 }  // namespace
 
@@ -45,19 +51,27 @@ std::vector<SurfacePoint> SurfacesOf(const Trail& trail, const Stretch& stretch,
   return surfaces;
 }
 
-std::vector<std::size_t> BestPlaces(std::vector<KeyframeCost> all, std::span<const KeyframeShape> shapes,
-                                    double apart_m, std::size_t most) {
-  std::stable_sort(all.begin(), all.end(),
-                   [](const KeyframeCost& a, const KeyframeCost& b) { return a.cost < b.cost; });
-  std::vector<std::size_t> chosen;
-  for (const KeyframeCost& candidate : all) {
-    const bool same_place = std::any_of(chosen.begin(), chosen.end(), [&](std::size_t other) {
-      return std::abs(shapes[candidate.keyframe].travelled_m - shapes[other].travelled_m) < apart_m;
+void BestPlaces::Add(const KeyframeCost& candidate) {
+  left_.push_back(candidate);
+  std::push_heap(left_.begin(), left_.end(), IsDearer);
+}
+
+bool BestPlaces::Settle(double cost) {
+  while (chosen_.size() < most_ && !left_.empty() && left_.front().cost < cost) {
+    const std::size_t keyframe = left_.front().keyframe;
+    std::pop_heap(left_.begin(), left_.end(), IsDearer);
+    left_.pop_back();
+    const bool same_place = std::any_of(chosen_.begin(), chosen_.end(), [&](std::size_t other) {
+      return std::abs(shapes_[keyframe].travelled_m - shapes_[other].travelled_m) < apart_m_;
     });
-    if (!same_place) chosen.push_back(candidate.keyframe);
-    if (chosen.size() == most) break;
+    if (!same_place) chosen_.push_back(keyframe);
   }
-  return chosen;
+  return chosen_.size() == most_;
+}
+
+std::vector<std::size_t> BestPlaces::Take() {
+  Settle(std::numeric_limits<double>::infinity());
+  return std::move(chosen_);
 }
 
 FreeSpace::FreeSpace(const Trail& trail, const Stretch& stretch, double cell_m) : cell_m_(cell_m) {

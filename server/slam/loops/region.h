@@ -40,7 +40,8 @@ void ForEachSurface(const Trail& trail, const Stretch& stretch, const Visit& vis
   for (std::size_t k = stretch.first; k <= stretch.last; ++k) {
     const Pose2 T_anchor_k = Between(shapes[stretch.anchor].T_track_robot, shapes[k].T_track_robot);
     const Eigen::Matrix2d R = T_anchor_k.rotation();
-    for (const SurfacePoint& point : trail.points(k))
+    const SharedPoints points = trail.points(k);
+    for (const SurfacePoint& point : *points)
       visit(SurfacePoint{R * point.p + T_anchor_k.translation(), R * point.normal});
   }
 }
@@ -54,10 +55,27 @@ struct KeyframeCost {
   double cost = 0.0;
 };
 
-// Returns at most `most` keyframes in the order of their costs, and only one per place: no two are nearer to each
-// other along the path than `apart_m`.
-[[nodiscard]] std::vector<std::size_t> BestPlaces(std::vector<KeyframeCost> all, std::span<const KeyframeShape> shapes,
-                                                  double apart_m, std::size_t most);
+// Chooses at most `most` keyframes in the order of their costs (of equal ones in the order of the keyframes), and only
+// one per place: no two are nearer to each other along the path than `apart_m`.
+class BestPlaces {
+ public:
+  // `shapes` must outlive it.
+  BestPlaces(std::span<const KeyframeShape> shapes, double apart_m, std::size_t most)
+      : shapes_(shapes), apart_m_(apart_m), most_(most) {}
+
+  void Add(const KeyframeCost& candidate);
+  // No candidate that costs less than this will be added any more. Returns whether all are chosen.
+  bool Settle(double cost);
+  // All candidates have been added.
+  [[nodiscard]] std::vector<std::size_t> Take();
+
+ private:
+  std::span<const KeyframeShape> shapes_;
+  double apart_m_;
+  std::size_t most_;
+  std::vector<KeyframeCost> left_;  // A heap with the cheapest on top.
+  std::vector<std::size_t> chosen_;
+};
 
 // The space through which beams of a stretch passed and in which none ended.
 class FreeSpace {

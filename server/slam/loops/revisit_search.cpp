@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace cairn::slam {
 namespace {
@@ -15,23 +16,27 @@ constexpr double kMinRevisitScore = 0.6;     // Share of the points of the scan 
 constexpr double kRevisitSigmaRad = 0.02;    // Standard deviation that is added to the heading of a match.
 
 // The old keyframe that most likely shows the same surroundings: near, and with a similar heading.
-std::optional<std::size_t> NearestKeyframe(const Hypothesis& belief, const Trail& trail, double travelled_m,
-                                           const RevisitOptions& options) {
+std::optional<std::size_t> NearestKeyframe(const Pose2& T_map_robot, const PathIndex& index, const Trail& trail,
+                                           double travelled_m, const RevisitOptions& options) {
   std::optional<std::size_t> nearest;
   double best = std::numeric_limits<double>::infinity();
-  const Eigen::Vector2d here = belief.T_map_robot.translation();
+  const Eigen::Vector2d here = T_map_robot.translation();
+  const std::size_t end = CountBefore(trail.shapes(), travelled_m, kMinRevisitTravelM);
   const auto look = [&](std::size_t k, const Pose2& T_map_k) {
+    if (k >= end) return;
     const double distance = (T_map_k.translation() - here).norm();
     if (distance > options.max_distance_m) return;
-    const double turn = std::abs(AngleDiff(T_map_k.theta, belief.T_map_robot.theta));
+    const double turn = std::abs(AngleDiff(T_map_k.theta, T_map_robot.theta));
     if (turn > options.max_turn_rad) return;
     const double cost = distance + options.max_distance_m * turn / options.max_turn_rad;
-    if (!(cost < best) || trail.IsFarther(k, kLargeLoopM)) return;
+    const bool better = cost < best || (cost == best && nearest && k < *nearest);
+    if (!better || trail.IsFarther(k, kLargeLoopM)) return;
     best = cost;
     nearest = k;
   };
-  ForEachNear(belief.path, CountBefore(trail.shapes(), travelled_m, kMinRevisitTravelM), here, options.max_distance_m,
-              look);
+  // No keyframe costs less than its distance.
+  const auto go_on = [&best](double distance_m) { return distance_m <= best; };
+  index.ForEachFrom(here, options.max_distance_m, go_on, look);
   return nearest;
 }
 
@@ -56,11 +61,11 @@ RevisitSearch::RevisitSearch(const RevisitOptions& options, const PointToLineOpt
 }
 
 std::optional<RevisitObservation> RevisitSearch::Find(std::span<const SurfacePoint> points_robot, const Trail& trail,
-                                                      double travelled_m, const Filter& filter,
+                                                      double travelled_m, const Filter& filter, const PathIndex& index,
                                                       const ParallelFor& parallel_for) {
   if (!options_.enabled) return std::nullopt;
   const Hypothesis best = filter.hypothesis(0);
-  const std::optional<std::size_t> centre = NearestKeyframe(best, trail, travelled_m, options_);
+  const std::optional<std::size_t> centre = NearestKeyframe(best.T_map_robot, index, trail, travelled_m, options_);
   if (!centre) return std::nullopt;
   BuildReference(trail, *centre);
   const Eigen::Matrix3d prior = PoseCovariance(kGuessSigmaM, kGuessSigmaRad);

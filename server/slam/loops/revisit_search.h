@@ -15,6 +15,7 @@
 #include "server/slam/matching/point_index.h"
 #include "server/slam/matching/point_to_line.h"
 #include "server/slam/parallel_for.h"
+#include "server/slam/trail/path_index.h"
 
 namespace cairn::slam {
 
@@ -32,9 +33,9 @@ class RevisitSearch {
   RevisitSearch(const RevisitOptions& options, const PointToLineOptions& align);
 
   // Searches with the scan of the next keyframe, which is not yet part of the trail: its points and the
-  // travelled distance.
+  // travelled distance. `index` follows the path of the filter's best hypothesis.
   [[nodiscard]] std::optional<RevisitObservation> Find(std::span<const SurfacePoint> points_robot, const Trail& trail,
-                                                       double travelled_m, const Filter& filter,
+                                                       double travelled_m, const Filter& filter, const PathIndex& index,
                                                        const ParallelFor& parallel_for);
 
  private:

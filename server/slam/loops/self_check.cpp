@@ -35,17 +35,18 @@ void Visit(OptionVisitor& visitor, SelfCheckOptions& options) {
                "below half of this.");
 }
 
-void SelfCheck::Look(const Trail& trail, const PosePath& path) {
+void SelfCheck::Look(const Trail& trail, const PathIndex& index) {
   const std::span<const Keyframe> keyframes = trail.keyframes();
   const std::span<const KeyframeShape> shapes = trail.shapes();
   const double here_m = shapes.back().travelled_m;
   if (!options_.enabled || here_m - compared_at_m_ < kCompareEveryM) return;
   compared_at_m_ = here_m;
+  const PosePath& path = index.path();
   const std::size_t now = shapes.size() - 1;
   Comparison comparison{here_m, {}};
-  for (const std::size_t old : KeyframesToCompare(shapes, path)) {
-    comparison.counts += CompareBothWays(*keyframes[old].scan, trail.points(old), *keyframes[now].scan,
-                                         trail.points(now), Between(path[old], path[now]), options_.near_m);
+  for (const std::size_t old : KeyframesToCompare(shapes, index)) {
+    comparison.counts += CompareBothWays(*keyframes[old].scan, *trail.points(old), *keyframes[now].scan,
+                                         *trail.points(now), Between(path[old], path[now]), options_.near_m);
   }
   if (comparison.counts.known() < kMinKnown) return;
   comparisons_.push_back(comparison);
@@ -59,17 +60,20 @@ void SelfCheck::Forget() {
 
 // Old keyframes near the believed pose, those with the most overlap first, and only one per place and visit.
 std::vector<std::size_t> SelfCheck::KeyframesToCompare(std::span<const KeyframeShape> shapes,
-                                                       const PosePath& path) const {
-  std::vector<KeyframeCost> all;
-  const Pose2 here = path[shapes.size() - 1];
+                                                       const PathIndex& index) const {
+  BestPlaces best(shapes, kSamePlaceM, kMaxCompared);
+  const Pose2& here = index.path()[shapes.size() - 1];
+  const std::size_t end = CountBefore(shapes, shapes.back().travelled_m, options_.min_travel_m);
   const auto look = [&](std::size_t k, const Pose2& there) {
+    if (k >= end) return;
     const double distance_m = (there.translation() - here.translation()).norm();
     if (distance_m > kMaxVisibleM) return;
-    all.push_back({k, distance_m + kTurnCostM * std::abs(AngleDiff(there.theta, here.theta))});
+    best.Add({k, distance_m + kTurnCostM * std::abs(AngleDiff(there.theta, here.theta))});
   };
-  ForEachNear(path, CountBefore(shapes, shapes.back().travelled_m, options_.min_travel_m), here.translation(),
-              kMaxVisibleM, look);
-  return BestPlaces(std::move(all), shapes, kSamePlaceM, kMaxCompared);
+  // No keyframe costs less than its distance.
+  const auto go_on = [&best](double distance_m) { return !best.Settle(distance_m); };
+  index.ForEachFrom(here.translation(), kMaxVisibleM, go_on, look);
+  return best.Take();
 }
 
 void SelfCheck::UpdateContradicted() {

@@ -16,7 +16,7 @@
 #include "common/options/option_visitor.h"
 #include "common/sensor/scan.h"
 #include "server/slam/loops/visibility.h"
-#include "server/slam/trail/pose_path.h"
+#include "server/slam/trail/path_index.h"
 #include "server/slam/trail/trail.h"
 
 namespace cairn::slam {
@@ -34,8 +34,8 @@ class SelfCheck {
   explicit SelfCheck(const SelfCheckOptions& options) : options_(options) {}
 
   // Compares the last keyframe, which is already in the path (one pose T_map_robot per keyframe), with old
-  // ones.
-  void Look(const Trail& trail, const PosePath& path);
+  // ones. `index` follows the path.
+  void Look(const Trail& trail, const PathIndex& index);
   // Discards the comparisons along the old path after the path was corrected.
   void Forget();
 
@@ -58,7 +58,7 @@ class SelfCheck {
     }
   };
   [[nodiscard]] std::vector<std::size_t> KeyframesToCompare(std::span<const KeyframeShape> shapes,
-                                                            const PosePath& path) const;
+                                                            const PathIndex& index) const;
   void UpdateContradicted();
 
   SelfCheckOptions options_;

@@ -72,7 +72,8 @@ std::vector<SurfacePoint> PlaceSearch::SurfacesOfMap(const Trail& trail, const P
     if (!trail.keyframes()[k].localized) continue;
     if ((T_map_k.translation() - last).cwiseAbs().maxCoeff() > options_.map_reach_m) continue;
     const Eigen::Matrix2d R = T_map_k.rotation();
-    for (const SurfacePoint& point : trail.points(k)) {
+    const SharedPoints points = trail.points(k);
+    for (const SurfacePoint& point : *points) {
       const Eigen::Vector2d p = R * point.p + T_map_k.translation();
       if (cells.Takes(p)) surfaces.push_back({p, R * point.normal});
     }
@@ -131,16 +132,15 @@ std::optional<FoundPlace> PlaceSearch::Fit(const Trail& trail, const PosePath& p
 VisibilityCounts PlaceSearch::Visible(const Trail& trail, const PosePath& path, const Scan& scan,
                                       const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const {
   const std::span<const KeyframeShape> shapes = trail.shapes();
-  std::vector<KeyframeCost> near;
-  for (std::size_t k = 0; k < shapes.size(); ++k) {
-    const double distance_m = (path[k].translation() - T_map_robot.translation()).norm();
-    if (!trail.keyframes()[k].localized || distance_m > kMaxVisibleM) continue;
-    near.push_back({k, distance_m + std::abs(AngleDiff(path[k].theta, T_map_robot.theta))});
-  }
+  BestPlaces near(shapes, options_.apart_m, static_cast<std::size_t>(options_.near_keyframes));
+  ForEachNear(path, shapes.size(), T_map_robot.translation(), kMaxVisibleM, [&](std::size_t k, const Pose2& there) {
+    const double distance_m = (there.translation() - T_map_robot.translation()).norm();
+    if (!trail.keyframes()[k].localized || distance_m > kMaxVisibleM) return;
+    near.Add({k, distance_m + std::abs(AngleDiff(there.theta, T_map_robot.theta))});
+  });
   VisibilityCounts counts;
-  for (const std::size_t k :
-       BestPlaces(std::move(near), shapes, options_.apart_m, static_cast<std::size_t>(options_.near_keyframes))) {
-    counts += CompareBothWays(*trail.keyframes()[k].scan, trail.points(k), scan, points_robot,
+  for (const std::size_t k : near.Take()) {
+    counts += CompareBothWays(*trail.keyframes()[k].scan, *trail.points(k), scan, points_robot,
                               Between(path[k], T_map_robot), check_.near_m);
   }
   return counts;

@@ -66,7 +66,7 @@ Pose2 Recovery::FromLast(const Pose2& T_track_robot) const {
 void Recovery::Append(const Keyframe& keyframe, const TrackStep& step, std::vector<SurfacePoint> points_robot) {
   const double travelled_m =
       has_scans() ? recent_.back().travelled_m + FromLast(step.T_track_robot).translation().norm() : 0.0;
-  recent_.push_back({keyframe.scan, step.T_track_robot, travelled_m, std::move(points_robot)});
+  recent_.push_back({keyframe.scan.Share(), step.T_track_robot, travelled_m, std::move(points_robot)});
   while (recent_.size() > kMaxRecent || travelled_m - recent_.front().travelled_m > kStretchM)
     recent_.erase(recent_.begin());
   if (held_.size() > kMaxHeld) LeavePath();

@@ -20,6 +20,14 @@ constexpr double kGapSteps = 6.0;
 constexpr double kLeastGapM = 0.175;
 constexpr double kLargestGapM = 0.7;
 
+// The same as `std::sqrt(squared) < limit`. The root is drawn only where the squares do not decide.
+bool IsShorter(double squared, double limit) {
+  constexpr double kRounding = 1e-14;  // More than the rounding of a square and of a root.
+  const double limit2 = limit * limit;
+  if (squared < limit2 * (1.0 - kRounding)) return true;
+  return squared <= limit2 * (1.0 + kRounding) && std::sqrt(squared) < limit;
+}
+
 // The consecutive hits around `centre` that lie on its surface: near to it, and without a jump in between.
 std::pair<std::size_t, std::size_t> Neighbourhood(const std::vector<BeamPoint>& hits, std::size_t centre, double step,
                                                   const SurfaceOptions& options) {
@@ -27,15 +35,15 @@ std::pair<std::size_t, std::size_t> Neighbourhood(const std::vector<BeamPoint>& 
   const double span = std::max(options.neighbour_span_m, options.span_steps * hits[centre].range_m * step);
   const double gap = std::clamp(kGapSteps * hits[centre].range_m * step, kLeastGapM, kLargestGapM);
   const auto connected = [&](std::size_t a, std::size_t b) {
-    return (hits[a].p_robot - hits[b].p_robot).norm() < gap &&
+    return IsShorter((hits[a].p_robot - hits[b].p_robot).squaredNorm(), gap) &&
            std::abs(hits[a].beam - hits[b].beam) <= options.skipped_beams;
   };
+  const auto within_span = [&](std::size_t other) {
+    return IsShorter((hits[other].p_robot - hits[centre].p_robot).squaredNorm(), span);
+  };
   std::size_t first = centre, last = centre;
-  while (first > 0 && centre - first < kMaxNeighbours && connected(first, first - 1) &&
-         (hits[first - 1].p_robot - hits[centre].p_robot).norm() < span)
-    --first;
-  while (last + 1 < hits.size() && last - centre < kMaxNeighbours && connected(last, last + 1) &&
-         (hits[last + 1].p_robot - hits[centre].p_robot).norm() < span)
+  while (first > 0 && centre - first < kMaxNeighbours && connected(first, first - 1) && within_span(first - 1)) --first;
+  while (last + 1 < hits.size() && last - centre < kMaxNeighbours && connected(last, last + 1) && within_span(last + 1))
     ++last;
   return {first, last};
 }

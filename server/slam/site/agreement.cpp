@@ -39,7 +39,7 @@ SessionAgreement AgreementOf(const PlacedSession& a, const PlacedSession& b, con
     const Trail& of_a = a.map.trail();
     const Trail& of_b = b.map.trail();
     const VisibilityCounts counts =
-        CompareBothWays(*of_a.keyframes()[*near].scan, of_a.points(*near), *of_b.keyframes()[k].scan, of_b.points(k),
+        CompareBothWays(*of_a.keyframes()[*near].scan, *of_a.points(*near), *of_b.keyframes()[k].scan, *of_b.points(k),
                         Between(a.path[*near], b.path[k]), options.self_check.near_m);
     if (counts.known() < kMinCompared) continue;
     agreement.counts += counts;

@@ -84,14 +84,14 @@ class NearbySearch {
     const Pose2 guess = Guess(*centre, seen);
     const Trail& of_known = known_.map.trail();
     const Trail& of_seen = seen_.map.trail();
-    const auto match = AlignPointsToSurfaces(of_seen.points(seen), reference_,
+    const auto match = AlignPointsToSurfaces(*of_seen.points(seen), reference_,
                                              {guess, guess, PoseCovariance(kGuessSigmaM, kGuessSigmaRad)}, align_);
     if (!match.converged) return std::nullopt;
     const double corrected_m = (match.T_ref_curr.translation() - guess.translation()).norm();
     if (corrected_m > kCorrectionM + kCorrectionPerM * way_m) return std::nullopt;
     const VisibilityCounts counts =
-        CompareBothWays(*of_known.keyframes()[*centre].scan, of_known.points(*centre), *of_seen.keyframes()[seen].scan,
-                        of_seen.points(seen), match.T_ref_curr, options_.self_check.near_m);
+        CompareBothWays(*of_known.keyframes()[*centre].scan, *of_known.points(*centre), *of_seen.keyframes()[seen].scan,
+                        *of_seen.points(seen), match.T_ref_curr, options_.self_check.near_m);
     if (counts.known() < kMinRevisitPoints || counts.contradicted > options_.loop.max_conflict * counts.known())
       return std::nullopt;
     return SessionRelation{{known_.number, *centre},

@@ -28,7 +28,7 @@ SessionMap::SessionMap(const MapperSnapshot& snapshot, std::vector<Pose2> own_pa
       trail_(MotionNoise{}, options.surface),
       places_(options.place, options.loop, options.self_check, options.align) {
   for (std::size_t k = 0; k < own_path_.size(); ++k) {
-    const Scan& scan = *snapshot.keyframes[k].scan;
+    const Scan scan = *snapshot.keyframes[k].scan;
     trail_.Append(snapshot.keyframes[k], own_path_[k], SurfacePointsOf(PointsOf(scan), scan, options.surface),
                   Eigen::Matrix3d::Zero(), std::nullopt);
     shared_own_path_.Append(own_path_[k]);
@@ -39,7 +39,7 @@ std::vector<RecentScan> SessionMap::ScansAround(std::size_t keyframe, double way
   const Stretch stretch = StretchAround(trail_.shapes(), keyframe, way_m);
   std::vector<RecentScan> scans;
   for (std::size_t k = stretch.first; k <= stretch.last; ++k)
-    if (localized(k)) scans.push_back({trail_.keyframes()[k].scan, own_path_[k], travelled_m(k), trail_.points(k)});
+    if (localized(k)) scans.push_back({trail_.keyframes()[k].scan.Share(), own_path_[k], travelled_m(k), *trail_.points(k)});
   return scans;
 }
 

@@ -11,11 +11,12 @@
 #include "common/sensor/scan.h"
 #include "common/sensor/trajectory.h"
 #include "server/slam/graph/pose_graph.h"
+#include "server/slam/trail/kept_scan.h"
 
 namespace cairn::slam {
 
 struct Keyframe {
-  std::shared_ptr<const Scan> scan;
+  KeptScan scan;
   Pose2 T_odom_robot;
   bool localized = true;  // Otherwise its pose is not known, and it is drawn into no map.
   // Not localized, because the path contradicts the scans; but where it lies along the path is known. It counts as
@@ -27,7 +28,8 @@ struct Keyframe {
     if constexpr (Archive::kReads) {
       auto read = std::make_shared<Scan>();
       archive(*read);
-      self.scan = std::move(read);
+      self.scan = std::shared_ptr<const Scan>(std::move(read));
+      self.scan.Pack();
     } else {
       archive(*self.scan);
     }

@@ -61,7 +61,7 @@ class SharedSequence {
     if (!root_) root_ = std::make_shared<Leaf>();
     if (size_ == (std::size_t{kWidth} << shift_)) {  // The tree is full and gets one more level.
       auto level = std::make_shared<Branch>();
-      level->summary = SummaryOf(root_, shift_);
+      level->summary = SummaryOf(root_.get(), shift_);
       level->children[0] = std::move(root_);
       root_ = std::move(level);
       shift_ += kBits;
@@ -69,11 +69,28 @@ class SharedSequence {
     Put(size_++, std::move(value));
   }
 
-  // Calls visit(index, value) in order for the values before `end`, but for those below nodes whose summary `enter`
-  // refuses. REQUIRES: end <= size().
+  // Calls visit(index, value) in order for the values from `begin` on and before `end`, but for those below nodes whose
+  // summary `enter` refuses. `enter` may also take the index of the first value below the node and that after the last.
+  // REQUIRES: end <= size().
+  template <typename Enter, typename Visitor>
+  void ForEach(std::size_t begin, std::size_t end, const Enter& enter, const Visitor& visit) const {
+    if (begin < end) VisitNode(root_.get(), 0, {begin, end}, shift_, enter, visit);
+  }
   template <typename Enter, typename Visitor>
   void ForEach(std::size_t end, const Enter& enter, const Visitor& visit) const {
-    if (end > 0) VisitNode(root_.get(), 0, end, shift_, enter, visit);
+    ForEach(0, end, enter, visit);
+  }
+
+  // How many of the first `end` values are the same as those of `other`. Nodes that both share are not looked into.
+  // REQUIRES: end <= size(), end <= other.size().
+  [[nodiscard]] std::size_t SharedWith(const SharedSequence& other, std::size_t end) const {
+    if (end == 0) return 0;
+    const void* mine = root_.get();
+    const void* theirs = other.root_.get();
+    int shift = shift_, other_shift = other.shift_;
+    for (; shift > other_shift; shift -= kBits) mine = static_cast<const Branch*>(mine)->children[0].get();
+    for (; other_shift > shift; other_shift -= kBits) theirs = static_cast<const Branch*>(theirs)->children[0].get();
+    return SharedBelow(mine, theirs, end, shift);
   }
 
   // The state, for archives (state/archive.h). Copies that share nodes share them again when they are read.
@@ -105,8 +122,8 @@ class SharedSequence {
 
   static std::size_t Slot(std::size_t index, int shift) { return (index >> shift) & (kWidth - 1); }
 
-  static const Summary& SummaryOf(const std::shared_ptr<void>& node, int shift) {
-    return shift == 0 ? static_cast<const Leaf*>(node.get())->summary : static_cast<const Branch*>(node.get())->summary;
+  static const Summary& SummaryOf(const void* node, int shift) {
+    return shift == 0 ? static_cast<const Leaf*>(node)->summary : static_cast<const Branch*>(node)->summary;
   }
 
   // The nodes on the way to the last element may be missing.
@@ -123,19 +140,50 @@ class SharedSequence {
     leaf.values[Slot(index, 0)] = std::move(value);
   }
 
+  struct Range {
+    std::size_t begin = 0;
+    std::size_t end = 0;
+  };
+
   // `first`: the index of the first value below the node.
-  static void VisitNode(const void* node, std::size_t first, std::size_t end, int shift, const auto& enter,
+  static void VisitNode(const void* node, std::size_t first, const Range& range, int shift, const auto& enter,
                         const auto& visit) {
-    if (shift == 0) {
-      const auto& leaf = *static_cast<const Leaf*>(node);
-      if (!enter(leaf.summary)) return;
-      for (std::size_t i = 0; i < kWidth && first + i < end; ++i) visit(first + i, leaf.values[i]);
-      return;
+    const auto enters = [&](const Summary& summary) {
+      if constexpr (std::invocable<decltype(enter), const Summary&>) {
+        return enter(summary);
+      } else {
+        return enter(summary, first, std::min(first + (std::size_t{kWidth} << shift), range.end));
+      }
+    };
+    if (!enters(SummaryOf(node, shift))) return;
+    for (std::size_t i = 0; i < kWidth; ++i) {
+      const std::size_t at = first + (i << shift);
+      if (at >= range.end) return;
+      if (shift > 0 && at + (std::size_t{1} << shift) > range.begin) {
+        VisitNode(static_cast<const Branch*>(node)->children[i].get(), at, range, shift - kBits, enter, visit);
+      } else if (shift == 0 && at >= range.begin) {
+        visit(at, static_cast<const Leaf*>(node)->values[i]);
+      }
     }
-    const auto& branch = *static_cast<const Branch*>(node);
-    if (!enter(branch.summary)) return;
-    for (std::size_t i = 0; i < kWidth && first + (i << shift) < end; ++i)
-      VisitNode(branch.children[i].get(), first + (i << shift), end, shift - kBits, enter, visit);
+  }
+
+  // How many of the first `end` values below two nodes are the same.
+  static std::size_t SharedBelow(const void* a, const void* b, std::size_t end, int shift) {
+    if (a == b) return end;
+    std::size_t same = 0;
+    for (std::size_t i = 0; same < end; ++i) {
+      if (shift == 0) {
+        if (!(static_cast<const Leaf*>(a)->values[i] == static_cast<const Leaf*>(b)->values[i])) return same;
+        ++same;
+        continue;
+      }
+      const std::size_t below = std::min(end - same, std::size_t{1} << shift);
+      const std::size_t found = SharedBelow(static_cast<const Branch*>(a)->children[i].get(),
+                                            static_cast<const Branch*>(b)->children[i].get(), below, shift - kBits);
+      same += found;
+      if (found < below) return same;
+    }
+    return same;
   }
 
   // A node with the first `count` elements below it.
@@ -157,7 +205,7 @@ class SharedSequence {
       const std::size_t below = std::min(left, std::size_t{1} << shift);
       NodeMembers(archive, branch.children[i], below, shift - kBits);
       if constexpr (Archive::kReads)
-        if (branch.children[i]) branch.summary.Add(SummaryOf(branch.children[i], shift - kBits));
+        if (branch.children[i]) branch.summary.Add(SummaryOf(branch.children[i].get(), shift - kBits));
       left -= below;
     }
   }

@@ -9,6 +9,8 @@
 namespace cairn::slam {
 namespace {
 
+constexpr double kRoundingM = 1e-6;  // More than sums of the same lengths in another order can differ.
+
 // Added to every covariance: options may set all noise to zero, but the least squares need positive definite
 // covariances.
 PoseRelation PositiveDefinite(PoseRelation relation) {
@@ -26,10 +28,12 @@ void Trail::Append(Keyframe keyframe, const Pose2& T_track_robot, std::vector<Su
     relations_.push_back(
         PositiveDefinite({node - 1, node, T_prev_curr, drift_.Covariance(T_prev_curr) + step_covariance, false}));
   shapes_.push_back({T_track_robot, TravelledTo(T_track_robot)});
-  points_.emplace_back(std::move(points_robot));
+  points_.Keep(node, std::move(points_robot));
+  keyframe.scan.Pack();
   keyframes_.push_back(std::move(keyframe));
   loops_.emplace_back();
   distances_current_ = false;
+  if (node > 0) way_bounds_.Append(shapes_[node].travelled_m - shapes_[node - 1].travelled_m);
   if (revisit) AddLoop({revisit->keyframe, node, revisit->T_keyframe_robot, revisit->covariance, true});
 }
 
@@ -52,13 +56,10 @@ std::vector<Keyframe> Trail::ConfirmedKeyframes() const {
   return trusted;
 }
 
-const std::vector<SurfacePoint>& Trail::points(std::size_t keyframe) const {
-  std::optional<std::vector<SurfacePoint>>& points = points_[keyframe];
-  if (!points) {
-    const Scan& scan = *keyframes_[keyframe].scan;
-    points = SurfacePointsOf(PointsOf(scan), scan, surface_);
-  }
-  return *points;
+SharedPoints Trail::points(std::size_t keyframe) const {
+  if (SharedPoints kept = points_.Find(keyframe)) return kept;
+  const Scan scan = *keyframes_[keyframe].scan;
+  return points_.Keep(keyframe, SurfacePointsOf(PointsOf(scan), scan, surface_));
 }
 
 bool Trail::IsConsistent() const {
@@ -70,8 +71,9 @@ bool Trail::IsConsistent() const {
 }
 
 void Trail::RestoreRest() {
-  points_.assign(size(), std::nullopt);
+  points_.Clear();
   loops_.assign(size(), {});
+  way_bounds_.Clear();
   for (const PoseRelation& relation : relations_)
     if (relation.loop) NoteLoop(relation);
   distances_m_.clear();
@@ -92,28 +94,30 @@ void Trail::NoteLoop(const PoseRelation& loop) {
   const double way_m = loop.T_from_to.translation().norm();
   loops_[loop.from].push_back({loop.to, way_m});
   loops_[loop.to].push_back({loop.from, way_m});
+  way_bounds_.AddRelation(loop.from, loop.to, way_m);
 }
 
 std::span<const double> Trail::distances_m() const {
-  if (!distances_current_) distances_m_ = DistancesFromLast();
+  if (distances_current_) return distances_m_;
+  distances_m_ = DistancesFromLast();
   distances_current_ = true;
+  if (!empty()) way_bounds_.AddHub(distances_m_);
   return distances_m_;
 }
 
-// Keyframes and relations are only added. So no path becomes longer, and the steps from the keyframe at which the
-// distances were computed to the last one bound how far everything has gone away since.
 double Trail::DistanceAtMost(std::size_t keyframe) const {
-  const double now_m = shapes_.back().travelled_m;
-  const double along_steps_m = now_m - shapes_[keyframe].travelled_m;
-  if (keyframe >= distances_m_.size()) return along_steps_m;
-  const double since_m = now_m - shapes_[distances_m_.size() - 1].travelled_m;
-  return std::min(along_steps_m, distances_m_[keyframe] + since_m);
+  const double along_steps_m = shapes_.back().travelled_m - shapes_[keyframe].travelled_m;
+  return std::min(along_steps_m, way_bounds_.AtMostM(keyframe));
 }
 
 bool Trail::IsFarther(std::size_t keyframe, double way_m) const {
-  constexpr double kRoundingM = 1e-6;  // More than sums of the same lengths in another order can differ.
   if (DistanceAtMost(keyframe) + kRoundingM < way_m) return false;
   return distances_m()[keyframe] > way_m;
+}
+
+bool Trail::AllWithin(std::size_t begin, std::size_t end, double way_m) const {
+  const double along_steps_m = shapes_.back().travelled_m - shapes_[begin].travelled_m;
+  return along_steps_m + kRoundingM < way_m || way_bounds_.AllBelow(begin, end, way_m - kRoundingM);
 }
 
 // Dijkstra's search, with buckets for a queue (Dial 1969): a heap takes five times as long. Within a bucket keyframes

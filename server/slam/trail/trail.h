@@ -15,6 +15,8 @@
 #include "server/slam/scan/surface_points.h"
 #include "server/slam/state/frozen_blocks.h"
 #include "server/slam/trail/keyframe.h"
+#include "server/slam/trail/point_cache.h"
+#include "server/slam/trail/way_bounds.h"
 
 namespace cairn::slam {
 
@@ -25,7 +27,7 @@ class Trail {
 
   // Appends the next keyframe. `step_covariance` is the covariance of the step to it, in the frame in which
   // the step starts, in addition to the drift; it is ignored for the first keyframe. `revisit` is an old
-  // keyframe that was seen again from this one.
+  // keyframe that was seen again from this one. `points_robot` are the surface points of its scan.
   void Append(Keyframe keyframe, const Pose2& T_track_robot, std::vector<SurfacePoint> points_robot,
               const Eigen::Matrix3d& step_covariance, const std::optional<RevisitObservation>& revisit);
   // Sets whether the last keyframe is localized, so that it may be drawn, and if not, whether its place along the path
@@ -53,14 +55,17 @@ class Trail {
 
   [[nodiscard]] const std::vector<Keyframe>& keyframes() const { return keyframes_; }
   [[nodiscard]] std::span<const KeyframeShape> shapes() const { return shapes_; }
-  // The surface points of a keyframe in its robot frame. After reading they are computed when they are first asked for,
-  // because most keyframes are never looked at again.
-  [[nodiscard]] const std::vector<SurfacePoint>& points(std::size_t keyframe) const;
+  // The surface points of a keyframe in its robot frame. They are computed from its scan unless the keyframe was looked
+  // at lately (point_cache.h).
+  [[nodiscard]] SharedPoints points(std::size_t keyframe) const;
   // Per keyframe: length of the shortest path along the relations from the last keyframe, in metres. The first call
-  // after a change goes through all keyframes; IsFarther seldom does.
+  // after a change goes through all keyframes; IsFarther seldom does, and AllWithin never.
   [[nodiscard]] std::span<const double> distances_m() const;
   // Whether distances_m()[keyframe] is more than `way_m`.
   [[nodiscard]] bool IsFarther(std::size_t keyframe, double way_m) const;
+  // Whether IsFarther is false for all keyframes from `begin` on and before `end`. It may say no although it is; for
+  // the keyframes below a node of a path (shared_sequence.h) it takes no longer than for one.
+  [[nodiscard]] bool AllWithin(std::size_t begin, std::size_t end, double way_m) const;
   [[nodiscard]] const std::vector<MapperSnapshot::ScanPlace>& scans() const { return scans_; }
   // Steps, revisits and loops; empty as long as no place was seen again.
   [[nodiscard]] std::vector<PoseRelation> relations() const;
@@ -91,14 +96,17 @@ class Trail {
   [[nodiscard]] bool IsConsistent() const;
   void RestoreRest();
 
+  static constexpr std::size_t kMaxCachedPoints = 1 << 18;  // 8 MiB.
+
   MotionNoise drift_;
   SurfaceOptions surface_;
   std::vector<Keyframe> keyframes_;
-  std::vector<KeyframeShape> shapes_;                                     // One per keyframe.
-  mutable std::vector<std::optional<std::vector<SurfacePoint>>> points_;  // One per keyframe; empty until asked for.
+  std::vector<KeyframeShape> shapes_;  // One per keyframe.
+  mutable PointCache points_{kMaxCachedPoints};
   std::vector<PoseRelation> relations_;
-  std::vector<std::vector<Loop>> loops_;     // One list per keyframe. A loop is stored at both of its keyframes.
-  mutable std::vector<double> distances_m_;  // From keyframe distances_m_.size() - 1, when they were last computed.
+  std::vector<std::vector<Loop>> loops_;  // One list per keyframe. A loop is stored at both of its keyframes.
+  mutable std::vector<double> distances_m_;
+  mutable WayBounds way_bounds_;  // Follows from the rest.
   mutable bool distances_current_ = true;
   std::vector<MapperSnapshot::ScanPlace> scans_;
   // For checkpoints: all of these grow at their ends only, but for the keyframes in ConfirmTentative.

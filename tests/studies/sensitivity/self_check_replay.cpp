@@ -31,11 +31,13 @@ double SelfCheckReplay::ContradictedShare(const Path& path, const slam::SelfChec
   slam::SelfCheck check(options);
   slam::Trail trail{slam::MotionNoise{}};
   slam::PosePath poses;
+  slam::PathIndex index;
   std::size_t contradicted = 0;
   for (std::size_t k = 0; k < path.poses.size(); ++k) {
     trail.Append(path.keyframes[k], path.poses[k], path.points_robot[k], Eigen::Matrix3d::Zero(), std::nullopt);
     poses.Append(path.poses[k]);
-    check.Look(trail, poses);
+    index.Follow(poses);
+    check.Look(trail, index);
     contradicted += check.contradicted() ? 1 : 0;
   }
   return path.poses.empty() ? 0.0 : static_cast<double>(contradicted) / static_cast<double>(path.poses.size());

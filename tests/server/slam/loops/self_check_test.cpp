@@ -32,8 +32,13 @@ struct Belief {
   Pose2 truth;
   Trail trail{MotionNoise{}};
   PosePath path;
+  PathIndex index;
 
   [[nodiscard]] double travelled_m() const { return trail.TravelledTo(truth); }
+  void Show(SelfCheck& check) {
+    index.Follow(path);
+    check.Look(trail, index);
+  }
 
   // `crowd`: the share of the beams that end early at something that moves.
   void Step(const Pose2& motion, const Pose2& T_map_world, double crowd) {
@@ -61,7 +66,7 @@ Verdict DriveTwice(Belief& belief, SelfCheck& check, const std::function<Pose2(d
   Verdict verdict;
   for (const Pose2& step : test::RingSteps(2.0 * kRoundM, 0.25)) {
     belief.Step(step, T_map_world(belief.travelled_m()), crowd);
-    check.Look(belief.trail, belief.path);
+    belief.Show(check);
     if (check.contradicted() && !verdict.said_at_m) verdict.said_at_m = belief.travelled_m();
   }
   verdict.at_end = check.contradicted();
@@ -143,7 +148,7 @@ TEST(SelfCheck, TheVerdictStandsWhereThereIsNothingToCompare) {
   // The robot moves to and fro on the spot, and is believed to be far from everything it has seen.
   for (int i = 0; i < 200; ++i) {
     belief.Step({i % 2 == 0 ? 0.25 : -0.25, 0, 0}, {1000.0 + i, 0.0, 0.0}, 0.0);
-    check.Look(belief.trail, belief.path);
+    belief.Show(check);
   }
   EXPECT_TRUE(check.contradicted());
 }
@@ -158,7 +163,7 @@ TEST(SelfCheck, ForgetsOnceThePathIsPutRight) {
   for (const KeyframeShape& shape : belief.trail.shapes()) belief.path.Append(shape.T_track_robot);  // The truth.
   for (const Pose2& step : test::RingSteps(30.0, 0.25)) {
     belief.Step(step, {}, 0.0);
-    check.Look(belief.trail, belief.path);
+    belief.Show(check);
     EXPECT_FALSE(check.contradicted());
   }
 }

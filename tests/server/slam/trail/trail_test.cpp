@@ -177,7 +177,7 @@ TEST(Trail, KeepsThePointsTheWayAndTheDistances) {
   ASSERT_EQ(trail.size(), 4U);
   for (std::size_t k = 0; k < 4; ++k) {
     EXPECT_EQ(trail.shapes()[k].T_track_robot, kSquare[k]);
-    EXPECT_EQ(trail.points(k).size(), k + 1);
+    EXPECT_EQ(trail.points(k)->size(), k + 1);
     EXPECT_NEAR(trail.shapes()[k].travelled_m, static_cast<double>(k), 1e-12);
     EXPECT_NEAR(trail.distances_m()[k], 3.0 - static_cast<double>(k), 1e-12);  // Back along the steps.
   }
