@@ -2,7 +2,8 @@
 // a signal, and stops. Exit codes: 0 stopped on request; 1 could not start, but a
 // later try may succeed (for example, an address does not exist yet); 2 wrong command line or configuration, so that a
 // restart would fail again, also because of a store that a newer server has written or that is damaged; 3 stopped on
-// request, but the store had failed and the last data is lost.
+// request, but the store had failed and the last data is lost; 4 ended itself, because it had not worked for a minute
+// and no service manager watched it: start it again.
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 #include <asio/steady_timer.hpp>
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
 #include <iostream>
 #include <memory>
 #include <sstream>
@@ -23,6 +25,7 @@
 #include "server/ingress/ingress.h"
 #include "server/ingress/other_servers.h"
 #include "server/ops/domain_lock.h"
+#include "server/ops/heartbeat.h"
 #include "server/ops/service_notifier.h"
 #include "server/ros2/ros2_door.h"
 #include "server/server.h"
@@ -75,8 +78,20 @@ void TellRefusals(const Watched& watched) {
   Refusals refusals = watched.bus.refusals();
   for (const std::string& line : watched.bus.TakeRefusalLines()) spdlog::warn("security: {}", line);
   refusals.commands = watched.ingress.commands_refused();
+  refusals.over_limit = watched.outbound.over_limit();
   if (watched.ros2 != nullptr) refusals.datagrams += watched.ros2->datagrams_refused();
   watched.server.SetRefusals(refusals);
+}
+
+constexpr int kStuck = 4;
+constexpr std::chrono::minutes kLongestIllness{1};
+
+// A thread that is stuck cannot be asked to stop, so nothing is closed. What was called durable is on the disk.
+[[noreturn]] void EndAtOnce() {
+  spdlog::critical(
+      "the server has not worked for a minute and no service manager watches it: it ends, to be started again");
+  spdlog::shutdown();
+  std::_Exit(kStuck);
 }
 
 // Checks once a second for servers on other machines (they are discovered only when both run), for refused peers,
@@ -103,7 +118,8 @@ void Look(asio::steady_timer& timer, const Watched& watched, DoorLosses& losses,
   });
 }
 
-// Runs until SIGTERM or SIGINT. Notifies the watchdog while the server is healthy.
+// Runs until SIGTERM or SIGINT. Notifies the watchdog while the server is healthy; where there is none, ends the
+// process when it has not been healthy for kLongestIllness.
 void WaitForSignal(asio::io_context& context, asio::signal_set& signals, const Watched& watched,
                    const ServiceNotifier& notifier, ServiceStatus& status) {
   signals.async_wait([&context](const asio::error_code& error, int signal) {
@@ -112,14 +128,17 @@ void WaitForSignal(asio::io_context& context, asio::signal_set& signals, const W
   });
   asio::steady_timer timer(context);
   const auto watchdog = notifier.watchdog();
-  const auto period = watchdog ? *watchdog / 3 : std::chrono::microseconds(0);
+  const auto period = watchdog ? *watchdog / 3 : std::chrono::microseconds(std::chrono::seconds(1));
+  LastResort last_resort(kLongestIllness);
   const std::function<void(const asio::error_code&)> feed = [&](const asio::error_code& error) {
     if (error) return;
-    if (watched.server.healthy()) notifier.Alive();
+    const bool healthy = watched.server.healthy();
+    if (healthy) notifier.Alive();
+    if (!watchdog && last_resort.Over(healthy, LastResort::Clock::now())) EndAtOnce();
     timer.expires_after(period);
     timer.async_wait(feed);
   };
-  if (watchdog) feed({});
+  feed({});
   asio::steady_timer second(context);
   DoorLosses losses;
   Look(second, watched, losses, status);

@@ -44,6 +44,8 @@ class Outbound {
   // refuses. The door's reader always moves on (its writes have a bounded blocking time).
   bool SendPatiently(OutboundValue value);
   [[nodiscard]] std::uint64_t refused() const { return refused_.load(std::memory_order_relaxed); }
+  // Sessions and requests that were answered RESOURCE_EXHAUSTED.
+  [[nodiscard]] std::uint64_t over_limit() const { return over_limit_.load(std::memory_order_relaxed); }
 
   // The door's side: one reader per lane.
   [[nodiscard]] BoundedChannel<OutboundValue>& lane(Lane lane) { return lanes_[static_cast<std::size_t>(lane)]; }
@@ -52,10 +54,11 @@ class Outbound {
 
  private:
   static Lane LaneOf(const OutboundValue& value);
+  void See(const OutboundValue& value);
 
   std::function<void(const OutboundValue&)> watcher_;
   std::array<BoundedChannel<OutboundValue>, kLanes> lanes_;
-  std::atomic<std::uint64_t> refused_{0};
+  std::atomic<std::uint64_t> refused_{0}, over_limit_{0};
 };
 
 }  // namespace cairn::server

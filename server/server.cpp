@@ -69,6 +69,7 @@ Result<void> Server::Start() {
     if (atlas_.IsSetAside(name)) continue;
     if (const auto site = atlas_.Create(name); !site) return tl::unexpected(site.error());
   }
+  looked_at_ = Clock::now().time_since_epoch();
   saved_sites_.Start();
   desk_.Start();
   worker_.Start();
@@ -79,16 +80,20 @@ Result<void> Server::Start() {
 
 void Server::Dispatch(const std::stop_token& stop) {
   while (auto value = inbound_.Pop(stop)) {
-    std::visit(
-        [this](auto&& alternative) {
-          using Value = std::decay_t<decltype(alternative)>;
-          if constexpr (std::is_same_v<Value, Request>) {
-            desk_.Take(std::move(alternative));
-          } else {
-            roster_.Take(std::move(alternative));
-          }
-        },
-        std::move(*value));
+    try {
+      std::visit(
+          [this](auto&& alternative) {
+            using Value = std::decay_t<decltype(alternative)>;
+            if constexpr (std::is_same_v<Value, Request>) {
+              desk_.Take(std::move(alternative));
+            } else {
+              roster_.Take(std::move(alternative));
+            }
+          },
+          std::move(*value));
+    } catch (const std::exception& error) {
+      spdlog::error("a value that was received failed with an exception and was dropped: {}", error.what());
+    }
   }
 }
 
@@ -104,19 +109,28 @@ void Server::KeepHouse(const std::stop_token& stop) {
   auto next = Clock::now();
   auto next_publish = next;
   while (!stop.stop_requested()) {
-    roster_.Tick();
-    jobs_.Tick();
-    if (Clock::now() >= next_publish) {
-      atlas_.Publish();
-      next_publish = std::max(next_publish + publish_period, Clock::now());
+    try {
+      roster_.Tick();
+      jobs_.Tick();
+      if (Clock::now() >= next_publish) {
+        next_publish = std::max(next_publish + publish_period, Clock::now());
+        atlas_.Publish();
+      }
+      CheckHealth();
+      CheckJournal();
+    } catch (const std::exception& error) {
+      spdlog::error("a turn of the housekeeping failed with an exception: {}", error.what());
     }
-    CheckHealth();
-    CheckJournal();
     next = std::max(next + kHousekeepingPeriod, Clock::now());
     const MutexLock lock(mutex);
     while (!stop.stop_requested() && tick.WaitUntil(mutex, std::min(next, next_publish))) {
     }
   }
+}
+
+bool Server::healthy() const {
+  const std::chrono::duration<double> limit(options_.server.stall_limit_s);
+  return healthy_ && Clock::now().time_since_epoch() - looked_at_.load() < limit;
 }
 
 void Server::CheckHealth() {
@@ -139,6 +153,7 @@ void Server::CheckHealth() {
   if (static_cast<double>(receiving_ns_) * 1e-9 > options_.server.stall_limit_s)
     stalled.emplace_back("the middleware, which received a datagram,");
   const bool was_healthy = healthy_.exchange(stalled.empty());
+  looked_at_ = Clock::now().time_since_epoch();
   if (was_healthy && !stalled.empty())
     spdlog::error("{} makes no progress; the systemd watchdog is no longer notified", stalled.front());
 }
@@ -146,6 +161,9 @@ void Server::CheckHealth() {
 void Server::CheckJournal() {
   if (journal_ == nullptr) return;
   const JournalHealth health = journal_->health();
+  if (health.over_budget && !std::exchange(over_budget_, health.over_budget))
+    spdlog::warn("the store is larger than store.max_gib, and everything in it is needed");
+  over_budget_ = health.over_budget;
   if (health.degraded == std::exchange(journal_degraded_, health.degraded)) return;
   if (health.degraded) {
     spdlog::error("degraded, new data is not stored: {}", health.reason);

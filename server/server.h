@@ -42,8 +42,9 @@ class Server {
   // and counted. Then it publishes the last state of every session and closes the outbound lanes.
   void Stop();
 
-  // False if a thread or strand that has work, or the middleware, has finished nothing for server.stall_limit_s.
-  [[nodiscard]] bool healthy() const { return healthy_; }
+  // False if a thread or strand that has work, or the middleware, has finished nothing for server.stall_limit_s, or if
+  // nobody has looked for so long.
+  [[nodiscard]] bool healthy() const;
   // What `cairn status` says of refused peers.
   void SetRefusals(const Refusals& refusals) { desk_.SetRefusals(refusals); }
   // For how long the middleware has been busy with one datagram. It counts for `healthy`, because nothing can arrive
@@ -79,8 +80,9 @@ class Server {
   SavedSites saved_sites_;
   Desk desk_;
   Heartbeat heartbeat_;
-  bool journal_degraded_ = false;  // As last logged.
+  bool journal_degraded_ = false, over_budget_ = false;  // As last logged.
   std::atomic<bool> healthy_{true};
+  std::atomic<std::chrono::steady_clock::duration> looked_at_;  // Of the last CheckHealth, since the clock's beginning.
   std::atomic<std::int64_t> receiving_ns_{0};
   std::atomic<bool> stopping_{false};
   std::jthread housekeeping_;

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # The one command: installs what is missing, builds every way that counts, runs every test, holds the accuracy.
 #   tests/run.sh                 packages to tsan below; stops at the first that fails
-#   tests/run.sh --full          the other tests under the address sanitizer, every source by itself, Debian packages, and a
-#                                real systemd, besides
+#   tests/run.sh --full          the other tests under the address sanitizer, every source by itself, the demo with DDS
+#                                Security, Debian packages, and a real systemd, besides
 #   tests/run.sh --quick         packages, format, architecture, release
 #   tests/run.sh --stage NAME    this stage (may be repeated), with the build it needs
 #   tests/run.sh --studies       whatever else is asked for, and the slow studies (tests/studies) last
@@ -13,7 +13,7 @@ set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
 all=(packages format architecture release accuracy demo nodds tidy asan fuzz tsan)
-full=(asan_rest plain debs systemd)
+full=(asan_rest plain demo_secure debs systemd)
 stages=()
 studies=()
 full_too=0
@@ -118,11 +118,18 @@ stage_accuracy() {
 }
 
 # The README's first command, cut short. Finds what the release stage built.
-stage_demo() {
-  DEMO_SECONDS=20 DEMO_OUT=$root/build/demo deploy/demo.sh
+run_demo() { # folder, options of demo.sh
+  local folder=$1
+  shift
+  DEMO_SECONDS=20 DEMO_OUT=$root/build/$folder deploy/demo.sh "$@"
   local left
-  for left in map.png report.md; do [ -s "build/demo/$left" ] || { echo "the demo left no $left"; return 1; }; done
+  for left in map.png report.md; do [ -s "build/$folder/$left" ] || { echo "the demo left no $left"; return 1; }; done
 }
+
+stage_demo() { run_demo demo; }
+
+# Every program with its identity and the rights of its role.
+stage_demo_secure() { run_demo demo-secure --secure; }
 
 # The same flags as release: the compiler cache hands over every object. That it builds and links is new; of the tests,
 # which passed as the same objects in release, those of the estimator as a whole.
@@ -169,7 +176,7 @@ stage_tsan() {
 # Nothing is compiled. All sources of a target at once: one by one they take ten times as long.
 stage_tidy() {
   configure asan -B build/tidy -DCMAKE_UNITY_BUILD_BATCH_SIZE=0
-  build tidy --target cairn_idl_sources cairn_record_sources
+  build tidy --target cairn_idl_sources cairn_record_sources cairn_recording_sources
   python3 tests/tidy.py build/tidy --jobs "$jobs"
 }
 

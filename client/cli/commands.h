@@ -9,6 +9,7 @@
 namespace cairn::client {
 
 void AddReplay(CLI::App& app, Program& program);
+void AddRecord(CLI::App& app, Program& program);
 void AddSim(CLI::App& app, Program& program);
 void AddPose(CLI::App& app, Program& program);
 void AddPath(CLI::App& app, Program& program);

@@ -93,8 +93,9 @@ void to_json(nlohmann::json& json, const SavedSite& saved) {
 }
 
 void to_json(nlohmann::json& json, const Refusals& refused) {
-  json = {{"secure", refused.secure},   {"peers", refused.peers},       {"endpoints", refused.endpoints},
-          {"samples", refused.samples}, {"commands", refused.commands}, {"datagrams", refused.datagrams}};
+  json = {{"secure", refused.secure},        {"peers", refused.peers},       {"endpoints", refused.endpoints},
+          {"samples", refused.samples},      {"commands", refused.commands}, {"datagrams", refused.datagrams},
+          {"over_limit", refused.over_limit}};
 }
 
 void to_json(nlohmann::json& json, const Ros2Topic& topic) {

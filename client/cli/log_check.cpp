@@ -218,7 +218,8 @@ void LogCheck::CollectLidarFindings() {
 void AddCheckLog(CLI::App& app, Program& program) {
   auto* command = app.add_subcommand("check-log", "Say whether a robot log or bag is fit for mapping; needs no server");
   command->footer(
-      "Reads CARMEN and DP-SLAM logs and bags of ROS 2. Exit code 1 where scans would be lost (each finding says why "
+      "Reads CARMEN and DP-SLAM logs, bags of ROS 2 and recordings. Exit code 1 where scans would be lost (each "
+      "finding says why "
       "and what to do).\n"
       "EXAMPLES\n  cairn check-log intel.clf\n  cairn check-log run.log --json");
   auto arguments = std::make_shared<CheckArguments>();

@@ -81,6 +81,7 @@ ExitCode RunCairn(const std::vector<std::string>& arguments, std::ostream& out, 
   app.require_subcommand(1);
   AddGlobalOptions(app, program, wire);
   AddReplay(app, program);
+  AddRecord(app, program);
   AddSim(app, program);
   AddPose(app, program);
   AddPath(app, program);

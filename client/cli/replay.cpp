@@ -138,9 +138,9 @@ void AddReplay(CLI::App& app, Program& program) {
   auto* command =
       app.add_subcommand("replay", "Stream a robot log or bag to the server, as if the robot were driving now");
   command->footer(
-      "Reads CARMEN logs (ODOM, FLASER, RLASER, ROBOTLASER1, RAWLASER1), DP-SLAM logs, and bags of ROS 2 (a folder "
+      "Reads CARMEN logs (ODOM, FLASER, RLASER, ROBOTLASER1, RAWLASER1), DP-SLAM logs, bags of ROS 2 (a folder "
       "with\n"
-      "metadata.yaml, or one .mcap or .db3 file). With --fast the log is sent\n"
+      "metadata.yaml, or one .mcap or .db3 file), and what `cairn record` writes. With --fast the log is sent\n"
       "as fast as the server takes it: at most --window scans wait for an answer, so that none is lost. The summary\n"
       "says how many scans the server used, and how many it dropped for which reason.\n"
       "Exit code 1 if the server cannot say what became of a scan.\n"

@@ -70,12 +70,12 @@ std::string FormatRobot(const RobotStatus& robot) {
 }
 
 std::string FormatRefusals(const Refusals& refused) {
-  if (!refused.secure && refused.commands == 0 && refused.datagrams == 0) return "";
+  if (refused == Refusals{}) return "";
   return fmt::format(
       "DDS Security {}; refused since the start: {} peers, {} endpoints, {} samples, {} commands, {} "
-      "datagrams\n",
+      "datagrams, {} over a limit\n",
       refused.secure ? "on" : "off", refused.peers, refused.endpoints, refused.samples, refused.commands,
-      refused.datagrams);
+      refused.datagrams, refused.over_limit);
 }
 
 std::string FormatRos2(const Ros2Report& report) {

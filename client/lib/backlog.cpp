@@ -131,12 +131,18 @@ void Backlog::Bound() {
 }
 
 bool Backlog::Spill() {
-  if (spill_ == nullptr || !spill_error_.empty()) return false;
-  Entry& entry = entries_[spilled_];
-  const auto place = spill_->Append(Encode(*entry.sample));
-  if (!place) {
+  if (spill_ == nullptr) return false;
+  Entry& entry = entries_[spilled_];  // Stays where it is in memory while entries before it are removed.
+  const std::string bytes = Encode(*entry.sample);
+  auto place = spill_->Append(bytes);
+  while (!place) {
     spill_error_ = place.error().message;
-    return false;
+    if (spilled_ == 0) return false;
+    // The oldest in the file make room there, no more of them than necessary.
+    ++displaced_;
+    PopFront();
+    if (spilled_ > 0) spill_->Forget(entries_.front().place);
+    place = spill_->Append(bytes);
   }
   entry.place = *place;
   entry.sample.reset();

@@ -2,8 +2,8 @@
 // need to receive, or to receive again. A sample is removed from the front when the server reports that it is safe
 // (durable, or settled if the server stores nothing). A cursor divides the queue: samples before the cursor were sent,
 // the sample at the cursor is the next one to send. Bounded: above `max_bytes` the oldest samples are moved into the
-// spill file if there is one. Otherwise they are dropped and counted. Does no other I/O and uses no clock. Not
-// thread-safe.
+// spill file if there is one. Without one, or where the disk is full, the oldest are dropped and counted. Does no other
+// I/O and uses no clock. Not thread-safe.
 #pragma once
 
 #include <cstddef>
@@ -60,7 +60,7 @@ class Backlog {
 
   // Number of samples that were dropped before they were safe.
   [[nodiscard]] std::uint64_t displaced() const { return displaced_; }
-  // Why the spill file is no longer used; empty while it is used.
+  // Why the spill file did not take or give a sample, the last time; empty where it always did.
   [[nodiscard]] const std::string& spill_error() const { return spill_error_; }
   [[nodiscard]] std::size_t bytes() const { return bytes_; }  // Memory used.
 

@@ -77,7 +77,7 @@ class RobotClient {
   [[nodiscard]] ClientId id() const { return client_; }
   // `stale` and the reason in `status` where the session stands still; see above.
   [[nodiscard]] SessionState session() const;
-  [[nodiscard]] bool connected() const;  // Whether a server listens right now.
+  [[nodiscard]] bool connected() const;  // Whether a server is there right now.
   [[nodiscard]] std::optional<PoseReport> pose() const;
   [[nodiscard]] std::optional<Ledger> ledger() const;  // The ledger of the first sensor.
   [[nodiscard]] std::optional<Ledger> ledger(const std::string& sensor) const;

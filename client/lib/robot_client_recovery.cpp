@@ -20,6 +20,7 @@ constexpr std::chrono::seconds kKeepRetired{3};         // If the server does no
 // the guard drops datagrams, because then each new participant may be stopped like the one before.
 constexpr std::chrono::seconds kShortestPause{2};
 constexpr std::chrono::seconds kLongestPause{60};
+constexpr std::chrono::seconds kStuckAfter{1};  // A datagram takes microseconds.
 constexpr std::chrono::milliseconds kResendPause{
     500};  // While stale: what was sent before the server was found is lost.
 
@@ -68,8 +69,9 @@ std::shared_ptr<RobotClient::Wire> RobotClient::CurrentWire() const {
   return wire_;
 }
 
+// Recorders read scans, too; only the server reads the session.
 bool RobotClient::connected() const {
-  return CurrentWire()->scans->matched() > 0;
+  return CurrentWire()->session->matched() > 0;
 }
 
 void RobotClient::Sent(NameId sensor_id, std::uint64_t number) {
@@ -202,9 +204,11 @@ void RobotClient::DropRetired() {
     const MutexLock lock(mutex_);
     if (!Answered() && Clock::now() - renewed_at_ < kKeepRetired) return;
   }
+  // Another thread may still be sending with it. A participant that is stuck in one datagram could not leave: this
+  // thread would wait for it, and recover nothing any more.
   std::erase_if(retired_, [](const auto& wire) {
-    return wire.use_count() == 1;
-  });  // Another thread may still be sending with it.
+    return wire.use_count() == 1 && wire->bus->busy_with_one_datagram() < kStuckAfter;
+  });
 }
 
 }  // namespace cairn::client

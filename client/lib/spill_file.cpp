@@ -78,6 +78,10 @@ Result<std::string> SpillFile::Read(std::uint64_t place) const {
   return record;
 }
 
+void SpillFile::Forget(std::uint64_t place) {
+  fallocate(file_, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, 0, static_cast<off_t>(place));
+}
+
 void SpillFile::Clear() {
   if (size_ > 0 && ftruncate(file_, 0) == 0) size_ = 0;
 }

@@ -24,6 +24,9 @@ class SpillFile {
   [[nodiscard]] Result<std::uint64_t> Append(std::string_view record);
   // kDataLoss: there is no whole record at this place.
   [[nodiscard]] Result<std::string> Read(std::uint64_t place) const;
+  // The records before this place will not be read any more: their part of the disk is given back, where the file
+  // system can do that.
+  void Forget(std::uint64_t place);
   // Removes all records.
   void Clear();
   [[nodiscard]] std::uint64_t size() const { return size_; }  // Bytes.

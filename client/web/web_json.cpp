@@ -120,7 +120,8 @@ std::string StateJson(const ServerView& view, const std::string& site, bool comm
                  {"endpoints", refused.endpoints},
                  {"samples", refused.samples},
                  {"commands", refused.commands},
-                 {"datagrams", refused.datagrams}}},
+                 {"datagrams", refused.datagrams},
+                 {"over_limit", refused.over_limit}}},
                {"commands", commands},
                {"sites", view.Sites()}};
   if (site.empty()) return Text(json);

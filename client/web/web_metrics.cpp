@@ -100,9 +100,11 @@ std::string SiteMetrics(const std::vector<MapInfo>& maps, const std::vector<Job>
 }
 
 std::string RefusalMetrics(const Refusals& refused) {
-  Metric metric("cairn_refused_total", "counter", "What the server has refused because of its sender, by kind.");
+  Metric metric("cairn_refused_total", "counter",
+                "What the server has refused because of its sender or of a limit, by kind.");
   metric.Add("kind=\"datagrams\"", refused.datagrams);
   metric.Add("kind=\"commands\"", refused.commands);
+  metric.Add("kind=\"over_limit\"", refused.over_limit);
   if (refused.secure) {
     metric.Add("kind=\"peers\"", refused.peers);
     metric.Add("kind=\"endpoints\"", refused.endpoints);

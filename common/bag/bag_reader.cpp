@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "common/bag/bag_folder.h"
+#include "common/bag/bag_messages.h"
 #include "common/bag/bag_survey.h"
-#include "common/ros2/cdr_decoding.h"
 
 namespace cairn::bag {
 namespace {
@@ -28,32 +28,59 @@ class BagEmitter {
   // False if the sink wants no more, as below.
   bool TakeScan(std::string_view bytes) {
     ++messages_;
-    auto message = ros2::DecodeLaserScan(bytes);
-    if (!message) return Complain(survey_.topics().scans.name, message.error());
-    if (!mounting_ || message->header.frame != frame_) {
-      frame_ = message->header.frame;
-      mounting_ = survey_.MountingOf(frame_, options_.T_robot_laser);
+    const Topic& topic = survey_.topics().scans;
+    auto message = DecodeScan(topic, bytes);
+    if (!message) return Complain(topic.name, message.error());
+    Scan scan;
+    if (scan_details_ && scan_details_->stamp == message->scan.header.stamp) {
+      if (options_.no_return_m > 0.0) SetNoReturn(message->scan);
+      scan = *std::exchange(scan_details_, std::nullopt);
+      scan.sequence = 0;
+      scan.ranges_m = std::move(message->scan.ranges);
+      if (options_.no_return_m > 0.0) scan.range_max_m = options_.no_return_m;
+      if (options_.T_robot_laser) scan.T_robot_laser = *options_.T_robot_laser;
+    } else {
+      const auto& mounting = MountingOf(*message);
+      if (!mounting) return Complain(topic.name, mounting.error());
+      if (options_.no_return_m > 0.0) SetNoReturn(message->scan);
+      scan = ros2::ScanOf(std::move(message->scan), *mounting);
     }
-    if (!*mounting_) return Complain(survey_.topics().scans.name, mounting_->error());
-    if (options_.no_return_m > 0.0) SetNoReturn(*message);
-    Scan scan = ros2::ScanOf(*std::move(message), **mounting_);
     if (options_.timing.scan_period_s == 0.0) scan.beam_period_s = 0.0;
-    if (const auto timed = PutInOrderOfTime(options_.timing, scan); !timed)
-      return Complain(survey_.topics().scans.name, timed.error());
+    if (const auto timed = PutInOrderOfTime(options_.timing, scan); !timed) return Complain(topic.name, timed.error());
     ++summary_.scans;
     return sink_(std::move(scan));
   }
 
-  bool TakeOdometry(std::string_view bytes) {
+  // What the next scan has no fields for, and the same for odometry.
+  bool TakeScanDetails(std::string_view bytes) {
     ++messages_;
-    const auto message = ros2::DecodeOdometry(bytes);
-    if (!message) return Complain(survey_.topics().odometry->name, message.error());
-    return EmitOdometry(message->header.stamp, message->pose);
+    auto details = DecodeScanDetails(bytes);
+    if (!details) return Complain(survey_.topics().scan_details->name, details.error());
+    scan_details_ = *std::move(details);
+    return true;
+  }
+  bool TakeOdometryDetails(std::string_view bytes) {
+    ++messages_;
+    const auto details = DecodeOdometryDetails(bytes);
+    if (!details) return Complain(survey_.topics().odometry_details->name, details.error());
+    odometry_details_ = *details;
+    return true;
   }
 
-  bool TakeTransforms(std::string_view bytes) {
+  bool TakeOdometry(std::string_view bytes) {
     ++messages_;
-    const auto message = ros2::DecodeTransforms(bytes);
+    const auto message = DecodeOdometry(*survey_.topics().odometry, bytes);
+    if (!message) return Complain(survey_.topics().odometry->name, message.error());
+    if (!odometry_details_ || odometry_details_->stamp != message->header.stamp)
+      return EmitOdometry(message->header.stamp, message->pose);
+    const Odometry exact = *std::exchange(odometry_details_, std::nullopt);
+    ++summary_.odometries;
+    return sink_(Odometry{0, exact.stamp, exact.T_odom_robot});
+  }
+
+  bool TakeTransforms(const Topic& topic, std::string_view bytes) {
+    ++messages_;
+    const auto message = DecodeTransforms(topic, bytes);
     if (!message) return Complain("transforms", message.error());
     for (const ros2::Transform& transform : message->transforms) {
       if (transform.header.frame != survey_.odometry_frame() || transform.child_frame != survey_.base_frame()) continue;
@@ -74,6 +101,18 @@ class BagEmitter {
     return sink_(Odometry{0, stamp, ros2::PlanarPart(*motion)});
   }
 
+  const Result<ros2::Mounting>& MountingOf(const ScanMessage& message) {
+    const ros2::Pose3& T = message.T_frame_scan;
+    const bool moved =
+        T.translation != T_frame_scan_.translation || T.rotation.coeffs() != T_frame_scan_.rotation.coeffs();
+    if (!mounting_ || message.scan.header.frame != frame_ || moved) {
+      frame_ = message.scan.header.frame;
+      T_frame_scan_ = T;
+      mounting_ = survey_.MountingOf(frame_, T, options_.T_robot_laser);
+    }
+    return *mounting_;
+  }
+
   // What is at or beyond the limit has hit nothing, whatever the message's own limit is.
   void SetNoReturn(ros2::LaserScan& message) const {
     message.range_max = options_.no_return_m;
@@ -92,8 +131,11 @@ class BagEmitter {
   const std::function<bool(LogRecord&&)>& sink_;
   LogSummary summary_;
   int messages_ = 0;
-  std::string frame_;  // Of the scan before.
+  std::string frame_;         // Of the scan before.
+  ros2::Pose3 T_frame_scan_;  // The same.
   std::optional<Result<ros2::Mounting>> mounting_;
+  std::optional<Scan> scan_details_;
+  std::optional<Odometry> odometry_details_;
   std::optional<Stamp> last_stamp_;
 };
 
@@ -112,17 +154,24 @@ Result<LogSummary> ReadBag(const std::filesystem::path& path, const LogReaderOpt
   const auto survey = BagSurvey::Of(files, options);
   if (!survey) return Fail(survey.error().code, path.string() + ": " + survey.error().message);
   const TopicChoice& topics = survey->topics();
-  std::vector<Topic> wanted = {topics.scans};
-  if (topics.odometry) {
-    wanted.push_back(*topics.odometry);
-  } else {
-    wanted.insert(wanted.end(), topics.moving.begin(), topics.moving.end());
-  }
   BagEmitter emitter(*survey, options, sink);
-  auto read = ReadMessages(files, wanted, [&](std::size_t topic, std::string_view bytes) {
-    if (topic == 0) return emitter.TakeScan(bytes);
-    return topics.odometry ? emitter.TakeOdometry(bytes) : emitter.TakeTransforms(bytes);
-  });
+  std::vector<Topic> wanted;
+  std::vector<std::function<bool(std::string_view)>> takers;  // Of each.
+  const auto want = [&](const Topic& topic, std::function<bool(std::string_view)> take) {
+    wanted.push_back(topic);
+    takers.push_back(std::move(take));
+  };
+  want(topics.scans, [&](std::string_view bytes) { return emitter.TakeScan(bytes); });
+  if (topics.scan_details)
+    want(*topics.scan_details, [&](std::string_view bytes) { return emitter.TakeScanDetails(bytes); });
+  if (topics.odometry) want(*topics.odometry, [&](std::string_view bytes) { return emitter.TakeOdometry(bytes); });
+  if (topics.odometry_details)
+    want(*topics.odometry_details, [&](std::string_view bytes) { return emitter.TakeOdometryDetails(bytes); });
+  if (!topics.odometry)
+    for (const Topic& topic : topics.moving)
+      want(topic, [&](std::string_view bytes) { return emitter.TakeTransforms(topic, bytes); });
+  auto read =
+      ReadMessages(files, wanted, [&](std::size_t topic, std::string_view bytes) { return takers[topic](bytes); });
   if (!read) return tl::unexpected(read.error());
   return std::move(emitter).summary();
 }

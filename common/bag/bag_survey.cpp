@@ -4,8 +4,9 @@
 #include <array>
 #include <tuple>
 
+#include "common/bag/bag_messages.h"
+#include "common/bag/foxglove_encoding.h"
 #include "common/bag/unpack.h"
-#include "common/ros2/cdr_decoding.h"
 
 namespace cairn::bag {
 namespace {
@@ -59,8 +60,10 @@ Result<BagSurvey> BagSurvey::Of(const Files& files, const LogReaderOptions& opti
   survey.topics_ = *std::move(topics);
   if (auto read = survey.ReadFixed(files); !read) return tl::unexpected(read.error());
   if (auto read = survey.ReadFirstFrames(files); !read) return tl::unexpected(read.error());
+  if (auto found = survey.FindBaseFrame(files); !found) return tl::unexpected(found.error());
   const auto mounted = [&] {
-    return survey.laser_frame_ && survey.MountingOf(*survey.laser_frame_, std::nullopt).has_value();
+    return survey.laser_frame_ &&
+           survey.MountingOf(*survey.laser_frame_, survey.T_frame_scan_, std::nullopt).has_value();
   };
   if (!survey.topics_.odometry) {
     if (auto read = survey.ReadMoving(files, [] { return false; }); !read) return tl::unexpected(read.error());
@@ -69,7 +72,7 @@ Result<BagSurvey> BagSurvey::Of(const Files& files, const LogReaderOptions& opti
     if (auto read = survey.ReadMoving(files, mounted); !read) return tl::unexpected(read.error());
   }
   if (survey.laser_frame_) {
-    const auto mounting = survey.MountingOf(*survey.laser_frame_, options.T_robot_laser);
+    const auto mounting = survey.MountingOf(*survey.laser_frame_, survey.T_frame_scan_, options.T_robot_laser);
     if (!mounting) return tl::unexpected(mounting.error());
     const Pose2& T = mounting->T_robot_laser;
     survey.notes_.push_back(survey.topics_.scans.name + ": frame '" + *survey.laser_frame_ + "' is mounted on '" +
@@ -83,8 +86,8 @@ Result<BagSurvey> BagSurvey::Of(const Files& files, const LogReaderOptions& opti
 }
 
 Result<void> BagSurvey::ReadFixed(const Files& files) {
-  return ReadMessages(files, topics_.fixed, [&](std::size_t, std::string_view bytes) {
-    if (const auto message = ros2::DecodeTransforms(bytes))
+  return ReadMessages(files, topics_.fixed, [&](std::size_t topic, std::string_view bytes) {
+    if (const auto message = DecodeTransforms(topics_.fixed[topic], bytes))
       for (const ros2::Transform& transform : message->transforms) static_cast<void>(fixed_.Set(transform));
     return true;
   });
@@ -96,9 +99,12 @@ Result<void> BagSurvey::ReadFirstFrames(const Files& files) {
   bool odometry_seen = !topics_.odometry;
   auto read = ReadMessages(files, wanted, [&](std::size_t topic, std::string_view bytes) {
     if (topic == 0 && !laser_frame_) {
-      if (const auto scan = ros2::DecodeLaserScan(bytes)) laser_frame_ = scan->header.frame;
+      if (const auto message = DecodeScan(topics_.scans, bytes)) {
+        laser_frame_ = message->scan.header.frame;
+        T_frame_scan_ = message->T_frame_scan;
+      }
     } else if (topic == 1 && !odometry_seen) {
-      if (const auto odometry = ros2::DecodeOdometry(bytes)) {
+      if (const auto odometry = DecodeOdometry(*topics_.odometry, bytes)) {
         odometry_seen = true;
         odometry_frame_ = odometry->header.frame;
         base_frame_ = odometry->child_frame;
@@ -106,13 +112,28 @@ Result<void> BagSurvey::ReadFirstFrames(const Files& files) {
     }
     return !laser_frame_ || !odometry_seen;
   });
-  if (base_frame_.empty()) base_frame_ = kUsualBaseFrame;
   return read;
 }
 
+Result<void> BagSurvey::FindBaseFrame(const Files& files) {
+  if (!base_frame_.empty()) return {};
+  if (topics_.odometry && topics_.odometry->type == kPoseSchema) {
+    const auto found = [&] {
+      for (const auto& [parent, child] : odometry_links_)
+        if (parent == odometry_frame_) base_frame_ = child;
+      return !base_frame_.empty();
+    };
+    if (auto read = ReadMoving(files, found); !read) return read;
+    // Without transforms, scans are taken to be in the frame of the robot: their pose says the mounting.
+    if (base_frame_.empty() && laser_frame_) base_frame_ = *laser_frame_;
+  }
+  if (base_frame_.empty()) base_frame_ = kUsualBaseFrame;
+  return {};
+}
+
 Result<void> BagSurvey::ReadMoving(const Files& files, const std::function<bool()>& enough) {
-  return ReadMessages(files, topics_.moving, [&](std::size_t, std::string_view bytes) {
-    const auto message = ros2::DecodeTransforms(bytes);
+  return ReadMessages(files, topics_.moving, [&](std::size_t topic, std::string_view bytes) {
+    const auto message = DecodeTransforms(topics_.moving[topic], bytes);
     if (!message) return true;
     const std::uint64_t before = moving_.version();
     for (const ros2::Transform& transform : message->transforms) {
@@ -126,7 +147,7 @@ Result<void> BagSurvey::ReadMoving(const Files& files, const std::function<bool(
 
 Result<void> BagSurvey::FindOdometryTransform() {
   if (odometry_links_.empty())
-    return Fail(StatusCode::kNotFound, "no topic of type nav_msgs/msg/Odometry, and no transform from a frame 'odom'");
+    return Fail(StatusCode::kNotFound, "no topic of odometry, and no transform from a frame 'odom'");
   if (odometry_links_.size() > 1) {
     std::string links;
     for (const auto& [parent, child] : odometry_links_) links += " '" + parent + "' to '" + child + "'";
@@ -136,15 +157,17 @@ Result<void> BagSurvey::FindOdometryTransform() {
   return {};
 }
 
-Result<ros2::Mounting> BagSurvey::MountingOf(const std::string& laser_frame,
+Result<ros2::Mounting> BagSurvey::MountingOf(const std::string& laser_frame, const ros2::Pose3& T_frame_scan,
                                              const std::optional<Pose2>& T_robot_laser) const {
+  const auto T_frame = ros2::MotionOf(T_frame_scan);
+  if (!T_frame) return tl::unexpected(T_frame.error());
   const auto motion = ros2::FindMotion(std::array<const ros2::FrameTree*, 2>{&fixed_, &moving_}, base_frame_,
                                        laser_frame, std::array{odometry_frame_, std::string("map")});
   Result<ros2::Mounting> mounting =
       Fail(StatusCode::kFailedPrecondition, "no transform connects the lidar's frame '" + laser_frame +
                                                 "' with the robot's frame '" + base_frame_ +
                                                 "'; --laser-at X,Y,THETA says where the lidar is mounted");
-  if (motion) mounting = ros2::MountingOf(*motion);
+  if (motion) mounting = ros2::MountingOf(*motion * *T_frame);
   if (!mounting && T_robot_laser) return ros2::Mounting{*T_robot_laser};
   if (mounting && T_robot_laser) mounting->T_robot_laser = *T_robot_laser;
   return mounting;

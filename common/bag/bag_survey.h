@@ -33,21 +33,24 @@ class BagSurvey {
   [[nodiscard]] const std::string& odometry_frame() const { return odometry_frame_; }
   [[nodiscard]] const std::string& base_frame() const { return base_frame_; }
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
-  // How the lidar with this frame is mounted on the robot. What the options say counts first, but only transforms say
-  // whether it is tilted or upside down.
-  [[nodiscard]] Result<ros2::Mounting> MountingOf(const std::string& laser_frame,
+  // How a lidar is mounted on the robot whose scans are in the plane T_frame_scan of this frame. What the options say
+  // counts first, but only transforms say whether it is tilted or upside down.
+  [[nodiscard]] Result<ros2::Mounting> MountingOf(const std::string& laser_frame, const ros2::Pose3& T_frame_scan,
                                                   const std::optional<Pose2>& T_robot_laser) const;
 
  private:
   Result<void> ReadFirstFrames(const Files& files);
   Result<void> ReadFixed(const Files& files);
-  // Reads all of them, or until `enough`.
+  // Where odometry does not name the robot's frame, a transform from the odometry's frame does.
+  Result<void> FindBaseFrame(const Files& files);
+  // Reads all of them, or until `enough`, which is asked when something has changed.
   Result<void> ReadMoving(const Files& files, const std::function<bool()>& enough);
   // Which of the moving transforms is the odometry.
   Result<void> FindOdometryTransform();
 
   TopicChoice topics_;
   std::optional<std::string> laser_frame_;  // Of the first scan.
+  ros2::Pose3 T_frame_scan_;                // Of the first scan.
   std::string odometry_frame_;
   std::string base_frame_;
   ros2::FrameTree fixed_;

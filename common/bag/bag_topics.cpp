@@ -1,16 +1,31 @@
 #include "common/bag/bag_topics.h"
 
 #include <algorithm>
+#include <array>
 #include <iterator>
+#include <span>
 #include <string_view>
 #include <utility>
+
+#include "common/bag/foxglove_encoding.h"
 
 namespace cairn::bag {
 namespace {
 
-constexpr std::string_view kScanType = "sensor_msgs/msg/LaserScan";
-constexpr std::string_view kOdometryType = "nav_msgs/msg/Odometry";
-constexpr std::string_view kTransformType = "tf2_msgs/msg/TFMessage";
+// The types of messages that mean the same, with their encodings.
+struct MessageType {
+  std::string_view name, encoding;
+};
+using MessageTypes = std::span<const MessageType>;
+constexpr std::array kScanTypes = {MessageType{"sensor_msgs/msg/LaserScan", "cdr"},
+                                   MessageType{kLaserScanSchema, kProtobuf}};
+constexpr std::array kOdometryTypes = {MessageType{"nav_msgs/msg/Odometry", "cdr"},
+                                       MessageType{kPoseSchema, kProtobuf}};
+constexpr std::array kTransformTypes = {MessageType{"tf2_msgs/msg/TFMessage", "cdr"},
+                                        MessageType{kTransformSchema, kProtobuf},
+                                        MessageType{kTransformsSchema, kProtobuf}};
+constexpr std::array kDetailsTypes = {MessageType{kScanDetailsSchema, kProtobuf},
+                                      MessageType{kOdometryDetailsSchema, kProtobuf}};
 
 std::string ListOf(const std::vector<Topic>& topics) {
   constexpr std::size_t kMostListed = 40;
@@ -18,15 +33,19 @@ std::string ListOf(const std::vector<Topic>& topics) {
   std::string text = "its topics are";
   for (std::size_t i = 0; i < std::min(topics.size(), kMostListed); ++i) {
     text += (i == 0 ? " " : ", ") + topics[i].name + " (" + topics[i].type;
-    text += topics[i].encoding == "cdr" ? ")" : " as " + topics[i].encoding + ")";
+    const bool usual = topics[i].encoding == "cdr" || topics[i].encoding == kProtobuf;
+    text += usual ? ")" : " as " + topics[i].encoding + ")";
   }
   return topics.size() > kMostListed ? text + ", and others" : text;
 }
 
-std::vector<Topic> OfType(const std::vector<Topic>& topics, std::string_view type) {
+std::vector<Topic> OfTypes(const std::vector<Topic>& topics, MessageTypes types) {
   std::vector<Topic> found;
-  std::copy_if(topics.begin(), topics.end(), std::back_inserter(found),
-               [&](const Topic& topic) { return topic.type == type && topic.encoding == "cdr"; });
+  std::copy_if(topics.begin(), topics.end(), std::back_inserter(found), [&](const Topic& topic) {
+    return std::any_of(types.begin(), types.end(), [&](const MessageType& type) {
+      return topic.type == type.name && topic.encoding == type.encoding;
+    });
+  });
   return found;
 }
 
@@ -34,37 +53,64 @@ std::string_view WithoutSlash(std::string_view name) {
   return name.starts_with('/') ? name.substr(1) : name;
 }
 
-// `option`: that of the command line which names the topic.
-Result<Topic> Choose(const std::vector<Topic>& topics, std::string_view type, const std::string& wanted,
-                     const std::string& option) {
-  std::vector<Topic> found = OfType(topics, type);
+bool IsCalledOdometry(std::string_view topic) {
+  return topic.ends_with("odometry") || topic.ends_with("odom");
+}
+
+// Topics that are odometry, although nobody says so.
+std::vector<Topic> OdometryAmong(const std::vector<Topic>& topics, const std::string& scan_topic) {
+  std::vector<Topic> found = OfTypes(topics, kOdometryTypes);
+  std::erase_if(found, [](const Topic& topic) { return topic.type == kPoseSchema && !IsCalledOdometry(topic.name); });
+  const std::size_t scan = scan_topic.rfind("/scan");
+  if (found.size() < 2 || scan == std::string::npos) return found;
+  const auto beside = std::find_if(found.begin(), found.end(), [&](const Topic& topic) {
+    return topic.type == kPoseSchema && topic.name == scan_topic.substr(0, scan) + "/odometry";
+  });
+  return beside == found.end() ? found : std::vector<Topic>{*beside};
+}
+
+// The topic of `found` that is meant. `option`: that of the command line which names it.
+Result<Topic> Choose(const std::vector<Topic>& all, std::vector<Topic> found, MessageTypes types,
+                     const std::string& wanted, const std::string& option) {
   if (!wanted.empty())
     std::erase_if(found, [&](const Topic& topic) { return WithoutSlash(topic.name) != WithoutSlash(wanted); });
-  const std::string kind =
-      "topic " + (wanted.empty() ? std::string() : "'" + wanted + "' ") + "of type " + std::string(type);
-  if (found.empty()) return Fail(StatusCode::kNotFound, "no " + kind + "; " + ListOf(topics));
+  std::string kind = "topic " + (wanted.empty() ? std::string() : "'" + wanted + "' ") + "of type ";
+  for (const MessageType& type : types) kind += (&type == types.data() ? "" : " or ") + std::string(type.name);
+  if (found.empty()) return Fail(StatusCode::kNotFound, "no " + kind + "; " + ListOf(all));
   if (found.size() > 1)
     return Fail(StatusCode::kInvalidArgument, "more than one " + kind + ", " + option + " chooses; " + ListOf(found));
   return found.front();
+}
+
+std::optional<Topic> DetailsOf(const std::vector<Topic>& topics, const Topic& topic) {
+  const std::vector<Topic> details = OfTypes(topics, kDetailsTypes);
+  const std::string_view type = topic.type == kLaserScanSchema ? kScanDetailsSchema : kOdometryDetailsSchema;
+  const auto found = std::find_if(details.begin(), details.end(), [&](const Topic& one) {
+    return one.type == type && one.name == topic.name + kDetailsSuffix;
+  });
+  return found == details.end() ? std::nullopt : std::optional(*found);
 }
 
 }  // namespace
 
 Result<TopicChoice> ChooseTopics(const std::vector<Topic>& topics, const std::string& scan_topic,
                                  const std::string& odometry_topic) {
-  auto scans = Choose(topics, kScanType, scan_topic, "--scan-topic");
+  auto scans = Choose(topics, OfTypes(topics, kScanTypes), kScanTypes, scan_topic, "--scan-topic");
   if (!scans) return tl::unexpected(scans.error());
   TopicChoice choice{.scans = *std::move(scans), .odometry = std::nullopt};
-  for (Topic& topic : OfType(topics, kTransformType))
+  choice.scan_details = DetailsOf(topics, choice.scans);
+  for (Topic& topic : OfTypes(topics, kTransformTypes))
     (topic.name.ends_with("tf_static") ? choice.fixed : choice.moving).push_back(std::move(topic));
   const bool named_transforms = std::any_of(choice.moving.begin(), choice.moving.end(), [&](const Topic& topic) {
     return WithoutSlash(topic.name) == WithoutSlash(odometry_topic);
   });
-  const bool only_transforms =
-      odometry_topic.empty() && OfType(topics, kOdometryType).empty() && !choice.moving.empty();
+  std::vector<Topic> odometries =
+      odometry_topic.empty() ? OdometryAmong(topics, choice.scans.name) : OfTypes(topics, kOdometryTypes);
+  const bool only_transforms = odometry_topic.empty() && odometries.empty() && !choice.moving.empty();
   if (named_transforms || only_transforms) return choice;
-  auto odometry = Choose(topics, kOdometryType, odometry_topic, "--odom-topic");
+  auto odometry = Choose(topics, std::move(odometries), kOdometryTypes, odometry_topic, "--odom-topic");
   if (!odometry) return tl::unexpected(odometry.error());
+  choice.odometry_details = DetailsOf(topics, *odometry);
   choice.odometry = *std::move(odometry);
   return choice;
 }

@@ -12,13 +12,17 @@ namespace cairn::bag {
 
 struct TopicChoice {
   Topic scans;
-  std::optional<Topic> odometry;   // Nothing: odometry is a transform of `moving`.
-  std::vector<Topic> fixed = {};   // Transforms: those of every tf_static,
-  std::vector<Topic> moving = {};  // and of every tf.
+  std::optional<Topic> odometry;               // Nothing: odometry is a transform of `moving`.
+  std::optional<Topic> scan_details = {};      // Of a recording of Cairn's own (idl/cairn/recording.proto).
+  std::optional<Topic> odometry_details = {};  // The same.
+  std::vector<Topic> fixed = {};               // Transforms: those of every tf_static,
+  std::vector<Topic> moving = {};              // and of every tf.
 };
 
-// The only topic of its type, or the one that is named (a slash in front may be left out; as odometry also one of
-// transforms). Fails where that is none or several, and lists the topics that there are.
+// The only topic of its types, or the one that is named (a slash in front may be left out; as odometry also one of
+// transforms). Types are those of ROS 2 and those of Foxglove. A foxglove.PoseInFrame that nobody has named counts as
+// odometry where its topic is called so; of several, the one beside the scans: ROBOT/odometry with ROBOT/scan/LASER.
+// Fails where that is none or several, and lists the topics that there are.
 [[nodiscard]] Result<TopicChoice> ChooseTopics(const std::vector<Topic>& topics, const std::string& scan_topic,
                                                const std::string& odometry_topic);
 

@@ -23,6 +23,7 @@ enum class McapOp : std::uint8_t {
   kMessageIndex = 0x07,
   kChunkIndex = 0x08,
   kStatistics = 0x0b,
+  kSummaryOffset = 0x0e,
   kDataEnd = 0x0f,
 };
 

@@ -1,5 +1,6 @@
-// Reads the drive of a robot from whatever it was recorded in: a bag of ROS 2 (bag_reader.h), or a log in the format of
-// CARMEN or DP-SLAM (sensor/log_reader.h). Which of them is recognised from the content.
+// Reads the drive of a robot from whatever it was recorded in: a bag of ROS 2 or a file of `cairn record`
+// (bag_reader.h), or a log in the format of CARMEN or DP-SLAM (sensor/log_reader.h). Which of them is recognised from
+// the content.
 #pragma once
 
 #include <filesystem>

@@ -19,7 +19,7 @@ namespace cairn::bag {
 // At most `max_bytes`.
 [[nodiscard]] Result<std::string> UnpackZstd(std::string_view stored, std::size_t max_bytes);
 
-// CRC-32 as zlib and MCAP have it.
-[[nodiscard]] std::uint32_t Crc32(std::string_view bytes);
+// CRC-32 as zlib and MCAP have it; `before` is that of the bytes before these.
+[[nodiscard]] std::uint32_t Crc32(std::string_view bytes, std::uint32_t before = 0);
 
 }  // namespace cairn::bag

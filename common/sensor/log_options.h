@@ -51,11 +51,12 @@ void AddLogOptions(Command& command, LogReaderOptions& options) {
       ->type_name("X,Y,THETA");
   command
       .add_option("--scan-topic", options.scan_topic,
-                  "Bags of ROS 2: the topic of the laser scans, where there are several")
+                  "Bags and recordings: the topic of the laser scans, where there are several")
       ->type_name("TOPIC");
   command
-      .add_option("--odom-topic", options.odometry_topic,
-                  "Bags of ROS 2: the topic of the odometry, where there are several; one of transforms (/tf) will do")
+      .add_option(
+          "--odom-topic", options.odometry_topic,
+          "Bags and recordings: the topic of the odometry, where there are several; one of transforms (/tf) will do")
       ->type_name("TOPIC");
   const auto timing = [&](const std::string& name, const std::string& help, const std::string& type) {
     command

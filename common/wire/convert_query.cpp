@@ -92,10 +92,12 @@ static v1::Refusals ToWire(const Refusals& value) {
   wire.samples(value.samples);
   wire.commands(value.commands);
   wire.datagrams(value.datagrams);
+  wire.over_limit(value.over_limit);
   return wire;
 }
 static Refusals FromWire(v1::Refusals&& wire) {
-  return {wire.secure(), wire.peers(), wire.endpoints(), wire.samples(), wire.commands(), wire.datagrams()};
+  return {wire.secure(),   wire.peers(),     wire.endpoints(), wire.samples(),
+          wire.commands(), wire.datagrams(), wire.over_limit()};
 }
 
 static v1::Ros2Topic ToWire(const Ros2Topic& value) {

@@ -50,9 +50,13 @@ class DdsSubscription final : public Subscription {
  private:
   void Run() {
     while (std::optional<ReaderNews> news = listener_.Wait()) {
-      TakeAll();
-      Tell(*news);
-      if (news->full) MakeReaderAnew();
+      try {
+        TakeAll();
+        Tell(*news);
+        if (news->full) MakeReaderAnew();
+      } catch (const std::exception&) {  // For example, no memory for a sample. The next one wakes this thread again.
+        refused_.fetch_add(1, std::memory_order_relaxed);
+      }
     }
   }
 
@@ -80,7 +84,11 @@ class DdsSubscription final : public Subscription {
         continue;
       }
       if (!SpeaksForItself(sample.value, info.publication_handle)) continue;
-      Deliver(Value{FromWire(std::move(sample.value))}, info.publication_handle);
+      try {
+        Deliver(Value{FromWire(std::move(sample.value))}, info.publication_handle);
+      } catch (const std::exception&) {  // Of the receiver; the other samples are still delivered.
+        refused_.fetch_add(1, std::memory_order_relaxed);
+      }
     }
   }
 

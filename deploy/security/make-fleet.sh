@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # Makes what a fleet needs for DDS Security: a certificate authority (CA), and a directory for the server and for every
-# robot, viewer and operator, to be named by the option wire.security of `cairnd` and `cairn`.
-# Usage: make-fleet.sh DIR [--robots NAMES] [--viewers NAMES] [--operators NAMES] [--days N]
+# robot, viewer, recorder and operator, to be named by the option wire.security of `cairnd` and `cairn`.
+# Usage: make-fleet.sh DIR [--robots NAMES] [--viewers NAMES] [--recorders NAMES] [--operators NAMES] [--days N]
 # NAMES are separated by commas. A robot `sim=r1+r2` is one program that drives the robots r1 and r2.
-# Output: DIR/ca.key (the secret of the fleet; keep it away from the robots), DIR/ca.pem, DIR/server, DIR/robots/NAME,
-# DIR/viewers/NAME, DIR/operators/NAME. If DIR has a CA already, that CA is used, and existing members stay as they are.
+# Output: DIR/ca.key (the secret of the fleet; keep it away from the robots), DIR/ca.pem, DIR/server, and DIR/robots/NAME,
+# DIR/viewers/NAME and so on. If DIR has a CA already, that CA is used, and existing members stay as they are.
 # To renew a member, or to change the robots of `sim`, delete its directory and run the script again.
 # Certificates and permissions are valid for N days (365), the CA for ten times as long.
 # Exit codes: 0 made, 1 openssl failed, 2 wrong usage.
@@ -16,11 +16,12 @@ fail() { echo "make-fleet: $*" >&2; exit "${code:-1}"; }
 dir=
 robots=
 viewers=
+recorders=
 operators=
 days=365
 while [ $# -gt 0 ]; do
   case $1 in
-    --robots | --viewers | --operators | --days)
+    --robots | --viewers | --recorders | --operators | --days)
       [ $# -ge 2 ] || usage
       printf -v "${1#--}" %s "$2"
       shift 2
@@ -35,9 +36,9 @@ while [ $# -gt 0 ]; do
 done
 [ -n "$dir" ] || usage
 [[ $days =~ ^[1-9][0-9]{0,4}$ ]] || code=2 fail "--days: '$days' is not a number of days"
-[[ ! $robots$viewers$operators =~ [[:space:]] ]] || code=2 fail "names must not contain spaces"
+[[ ! $robots$viewers$recorders$operators =~ [[:space:]] ]] || code=2 fail "names must not contain spaces"
 # The same names as everywhere in Cairn. In particular they contain nothing that XML or the shell would interpret.
-for name in ${robots//[,=+]/ } ${viewers//,/ } ${operators//,/ }; do
+for name in ${robots//[,=+]/ } ${viewers//,/ } ${recorders//,/ } ${operators//,/ }; do
   [[ $name =~ ^[A-Za-z0-9_][A-Za-z0-9._-]{0,63}$ ]] ||
     code=2 fail "'$name' is not a name (1 to 64 of A-Z a-z 0-9 . _ -, not starting with . or -)"
 done
@@ -107,6 +108,10 @@ rules_of_robot() { # the robots' names, separated by +
   rules_of_viewer
 }
 rules_of_viewer() { rule "<publish>$(topics request)</publish><subscribe>$(topics "${told[@]}")</subscribe>"; }
+rules_of_recorder() { # What all robots send, besides.
+  rule "<subscribe>$(topics scan odometry)<partitions><partition>*</partition></partitions></subscribe>"
+  rules_of_viewer
+}
 rules_of_operator() { rule "<publish>$(topics request command)</publish><subscribe>$(topics "${told[@]}")</subscribe>"; }
 
 member() { # role, name, rules, directory
@@ -143,4 +148,5 @@ for robot in ${robots//,/ }; do
   member robot "${robot%%=*}" "$(rules_of_robot "${robot#*=}")" "robots/${robot%%=*}"
 done
 for viewer in ${viewers//,/ }; do member viewer "$viewer" "$(rules_of_viewer)" "viewers/$viewer"; done
+for recorder in ${recorders//,/ }; do member recorder "$recorder" "$(rules_of_recorder)" "recorders/$recorder"; done
 for operator in ${operators//,/ }; do member operator "$operator" "$(rules_of_operator)" "operators/$operator"; done

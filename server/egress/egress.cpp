@@ -1,7 +1,10 @@
 #include "server/egress/egress.h"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <chrono>
+#include <exception>
 #include <optional>
 #include <tuple>
 #include <utility>
@@ -133,14 +136,19 @@ void Egress::Run(BoundedChannel<OutboundValue>& lane) {
   for (;;) {
     std::optional<OutboundValue> value = door.waiting() ? lane.PopFor(kRetryPeriod) : lane.Pop();
     if (!value && (lane.closed() || !door.waiting())) return;
-    if (value && !door.Send(*std::move(value))) {
+    try {
+      if (value && !door.Send(*std::move(value))) {
+        unpublished_.fetch_add(1, std::memory_order_relaxed);
+        // While the server stops, it does not wait for a reader that takes nothing.
+        if (lane.closed()) return;
+      }
+      if (!door.waiting() || std::chrono::steady_clock::now() < next_retry) continue;
+      next_retry = std::chrono::steady_clock::now() + kRetryPeriod;
+      door.SendAgain();
+    } catch (const std::exception& error) {
       unpublished_.fetch_add(1, std::memory_order_relaxed);
-      // While the server stops, it does not wait for a reader that takes nothing.
-      if (lane.closed()) return;
+      spdlog::error("a value could not be sent because of an exception: {}", error.what());
     }
-    if (!door.waiting() || std::chrono::steady_clock::now() < next_retry) continue;
-    door.SendAgain();
-    next_retry = std::chrono::steady_clock::now() + kRetryPeriod;
   }
 }
 

@@ -105,7 +105,8 @@ Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMateria
     if (!map) return Fail(StatusCode::kCancelled, "cancelled");
     before.Add(map->before);
     after.Add(map->after);
-    smoothed.version.smoothed[session.robot] = std::make_shared<const Trajectory>(snapshot.TrajectoryAlong(map->path));
+    smoothed.version.smoothed[session.robot] = {
+        session.session, std::make_shared<const Trajectory>(snapshot.TrajectoryAlong(map->path))};
     smoothed.version.parts[session.session] = {map->grid.Share(), snapshot.keyframes.size(),
                                                std::make_shared<const std::vector<Pose2>>(std::move(map->path))};
   }

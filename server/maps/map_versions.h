@@ -7,17 +7,13 @@
 #pragma once
 
 #include <map>
-#include <memory>
-#include <string>
 #include <vector>
 
-#include "common/sensor/trajectory.h"
 #include "common/service/map_info.h"
 #include "server/maps/robot_grid.h"
+#include "server/store/records.h"
 
 namespace cairn::server {
-
-using SmoothedPaths = std::map<std::string, std::shared_ptr<const Trajectory>>;  // By robot.
 
 struct MapVersion {
   MapVersionInfo info;

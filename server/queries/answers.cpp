@@ -106,11 +106,16 @@ Reply AnswerPath(const Request& request, const Sessions& sessions, const Maps& m
     return reply;
   }
   const std::string& robot = session.status.session.robot;
-  if (map == nullptr || !map->smoothed.contains(robot)) {
-    return ReplyTo(request, {StatusCode::kFailedPrecondition,
-                             "no smoothed path of '" + robot + "': no smoothing job of its site has finished"});
-  }
-  reply.path = *map->smoothed.at(robot);
+  const auto refuse = [&](const std::string& why) {
+    return ReplyTo(request, {StatusCode::kFailedPrecondition, "no smoothed path of '" + robot + "': " + why});
+  };
+  const SmoothedPaths none;
+  const SmoothedPaths& paths = map == nullptr ? none : map->smoothed;
+  const auto smoothed = paths.find(robot);
+  if (smoothed == paths.end()) return refuse("no smoothing job of its site has finished");
+  if (smoothed->second.session != 0 && smoothed->second.session != session.id)
+    return refuse("its session has begun after the last smoothing job");
+  reply.path = *smoothed->second.path;
   return reply;
 }
 

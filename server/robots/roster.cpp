@@ -1,6 +1,9 @@
 #include "server/robots/roster.h"
 
+#include <spdlog/spdlog.h>
+
 #include <chrono>
+#include <exception>
 #include <utility>
 
 #include "common/service/start_pose.h"
@@ -70,7 +73,12 @@ void Roster::Take(const SessionRequest& request) {
     }
     return;
   }
-  if (auto admitted = Admit(request); !admitted) Refuse(request, admitted.error());
+  try {
+    if (auto admitted = Admit(request); !admitted) Refuse(request, admitted.error());
+  } catch (const std::exception& error) {
+    spdlog::error("a session of robot {} could not be opened because of an exception: {}", request.robot, error.what());
+    Refuse(request, {StatusCode::kInternal, "internal error of the server; see its log for the cause"});
+  }
 }
 
 Result<void> Roster::Admit(const SessionRequest& request) {
@@ -149,6 +157,7 @@ Result<void> Roster::Resume(Session& session, const SessionRequest& request) {
   return {};
 }
 
+// The session is known to others last: if an exception ends this, it is gone, and the client may ask again.
 Result<void> Roster::Open(const SessionRequest& request) {
   const NameId robot_id = HashName(request.robot);
   std::shared_ptr<Session> session, gone;  // The memory of the one that goes is freed without the lock.
@@ -162,10 +171,6 @@ Result<void> Roster::Open(const SessionRequest& request) {
     if (!entered) return tl::unexpected(entered.error());
     site = *std::move(entered);
     gone = *std::move(giving_way);
-    if (gone != nullptr) {
-      sessions_.erase(gone->record().state().robot_id);
-      gone_.push_back(gone);
-    }
     session = Make(next_id_++, request, site->snapshot()->info.epoch, site);
     session->record().AddSensors(request.sensors);
     for (const std::string& sensor : request.sensors) {
@@ -173,7 +178,6 @@ Result<void> Roster::Open(const SessionRequest& request) {
         session->record().Inherit(HashName(sensor), std::move(*account));
       }
     }
-    sessions_.emplace(robot_id, session);
   }
   if (journal_ != nullptr) {
     session->ExpectDurable();
@@ -181,10 +185,18 @@ Result<void> Roster::Open(const SessionRequest& request) {
   }
   session->Resume(request.client, request.session);
   site->Join(robot_id, session->id(), session, session->record().epoch());
-  if (gone != nullptr && !gone->ending() && gone->record().state().robot_id != robot_id) {
-    gone->End({StatusCode::kResourceExhausted, "its robot stayed away, and its place was needed for another"});
+  {
+    const MutexLock lock(mutex_);
+    if (gone != nullptr) gone_.push_back(gone);
+    std::shared_ptr<Session>& place = sessions_[robot_id];
+    if (gone != nullptr && gone != place) sessions_.erase(gone->record().state().robot_id);
+    place = session;
   }
-  RetireGone();
+  try {
+    RetireGone();
+  } catch (const std::exception& error) {  // The session is open all the same, and the next Tick retires the others.
+    spdlog::error("a session that gave way could not be ended because of an exception: {}", error.what());
+  }
   return {};
 }
 
@@ -329,7 +341,11 @@ void Roster::RetireGone() {
   const MutexLock lock(mutex_);
   std::erase_if(gone_, [&](const std::shared_ptr<Session>& gone) CAIRN_REQUIRES(mutex_) {
     const auto successor = sessions_.find(gone->record().state().robot_id);
-    if (successor == sessions_.end()) gone->Tick();
+    if (successor == sessions_.end()) {
+      if (!gone->ending() && gone->record().phase() != SessionPhase::kEnded)
+        gone->End({StatusCode::kResourceExhausted, "its robot stayed away, and its place was needed for another"});
+      gone->Tick();
+    }
     if (gone->record().phase() != SessionPhase::kEnded || gone->has_work()) return false;
     const RobotStatus status = gone->record().snapshot().status;
     bool retired = true;

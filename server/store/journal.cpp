@@ -157,8 +157,8 @@ bool Journal::Push(Change change, std::size_t size, Room room) {
 JournalHealth Journal::health() const {
   const MutexLock lock(mutex_);
   for (const std::string& reason : {disk_fault_, lost_, checkpoint_fault_})
-    if (!reason.empty()) return {.degraded = true, .reason = reason};
-  return {};
+    if (!reason.empty()) return {.degraded = true, .reason = reason, .over_budget = over_budget_};
+  return {.degraded = false, .reason = {}, .over_budget = over_budget_};
 }
 
 JournalCounts Journal::counts() const {
@@ -362,11 +362,16 @@ void Journal::KeepBudget() {
   }
   for (const auto& [session, position] : checkpointed) {
     const auto used = store_.bytes_used();
-    if (!used || *used <= limit) return;
+    if (!used) return;
+    if (*used <= limit) break;
     if (position == 0) continue;
     CommitOnce(
         {.removed = {{.kind = RecordKind::kJournal, .owner = session, .first = 0, .last = position}}, .put = {}});
   }
+  const auto used = store_.bytes_used();
+  if (!used) return;
+  const MutexLock lock(mutex_);
+  over_budget_ = *used > limit;
 }
 
 }  // namespace cairn::server

@@ -33,6 +33,7 @@ namespace cairn::server {
 struct JournalHealth {
   bool degraded = false;
   std::string reason;
+  bool over_budget = false;  // The store is larger than store.max_gib, and everything in it is needed.
 };
 
 // Since the start.
@@ -171,6 +172,7 @@ class Journal {
   std::string disk_fault_ CAIRN_GUARDED_BY(mutex_);        // Why the last commit failed; empty if it did not.
   std::string lost_ CAIRN_GUARDED_BY(mutex_);              // Which session is no longer stored.
   std::string checkpoint_fault_ CAIRN_GUARDED_BY(mutex_);  // Why the last checkpoint is missing.
+  bool over_budget_ CAIRN_GUARDED_BY(mutex_) = false;
   JournalCounts counts_ CAIRN_GUARDED_BY(mutex_);
   std::deque<float> delays_ms_ CAIRN_GUARDED_BY(mutex_);
   std::deque<WantedCheckpoint> checkpoints_ CAIRN_GUARDED_BY(mutex_);

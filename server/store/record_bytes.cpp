@@ -13,9 +13,10 @@ bool Parse(Message& message, std::string_view bytes) {
   return message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
 }
 
-void FillPath(record::MapVersion::SmoothedPath& to, const std::string& robot, const Trajectory& path) {
+void FillPath(record::MapVersion::SmoothedPath& to, const std::string& robot, const SmoothedPath& smoothed) {
   to.set_robot(robot);
-  for (const StampedPose& pose : path) {
+  to.set_session(smoothed.session);
+  for (const StampedPose& pose : *smoothed.path) {
     to.add_stamps(pose.stamp);
     to.add_poses(pose.T_map_robot.x);
     to.add_poses(pose.T_map_robot.y);
@@ -63,7 +64,7 @@ std::string BytesOf(const StoredVersion& version) {
     part.set_session(session);
     Fill(*part.mutable_grid(), grid);
   }
-  for (const auto& [robot, path] : version.smoothed) FillPath(*to.add_paths(), robot, *path);
+  for (const auto& [robot, path] : version.smoothed) FillPath(*to.add_paths(), robot, path);
   return to.SerializeAsString();
 }
 
@@ -82,7 +83,7 @@ Result<StoredVersion> VersionOf(std::string_view bytes) {
   for (const record::MapVersion::SmoothedPath& one : from.paths()) {
     auto path = PathOf(one);
     if (!path) return tl::unexpected(path.error());
-    version.smoothed.emplace(one.robot(), std::move(*path));
+    version.smoothed.emplace(one.robot(), SmoothedPath{one.session(), std::move(*path)});
   }
   return version;
 }

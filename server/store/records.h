@@ -79,12 +79,19 @@ struct StoredSession {
   std::uint32_t map_epoch = 0;
 };
 
+// The path of a robot after smoothing, and the session that drove it: the robot may have begun another since.
+struct SmoothedPath {
+  std::uint64_t session = 0;  // 0: an older server did not say.
+  std::shared_ptr<const Trajectory> path;
+};
+using SmoothedPaths = std::map<std::string, SmoothedPath>;  // By robot.
+
 struct StoredVersion {
   std::uint32_t version = 0;
   std::uint64_t job = 0;
   std::string note;
   std::map<std::uint64_t, StoredGrid> parts;  // By session id.
-  std::map<std::string, std::shared_ptr<const Trajectory>> smoothed;
+  SmoothedPaths smoothed;
 };
 
 struct StoredSite {

@@ -102,8 +102,11 @@ class Renaming {
     std::map<std::uint64_t, StoredGrid> parts;
     for (auto& [session, grid] : version.parts) parts.emplace(Session(session), std::move(grid));
     version.parts = std::move(parts);
-    decltype(version.smoothed) smoothed;
-    for (auto& [robot, path] : version.smoothed) smoothed.emplace(Robot(robot), std::move(path));
+    SmoothedPaths smoothed;
+    for (auto& [robot, path] : version.smoothed) {
+      const auto session = sessions_.find(path.session);  // It may be gone.
+      smoothed.emplace(Robot(robot), SmoothedPath{session == sessions_.end() ? 0 : session->second, path.path});
+    }
     version.smoothed = std::move(smoothed);
   }
   Result<Record> Journal(Record&& record) const {

@@ -10,11 +10,10 @@
 namespace cairn::server {
 namespace {
 
-using Smoothed = decltype(StoredVersion::smoothed);
 using Versions = std::map<std::uint32_t, StoredVersion>;
 
 // The paths that a site shows: those of the enabled version; if it has none, of the newest version that has some.
-Smoothed Shown(const Versions& versions, std::uint32_t enabled) {
+SmoothedPaths Shown(const Versions& versions, std::uint32_t enabled) {
   const auto found = versions.find(enabled);
   if (found != versions.end() && !found->second.smoothed.empty()) return found->second.smoothed;
   for (auto it = versions.rbegin(); it != versions.rend(); ++it) {
@@ -149,10 +148,10 @@ class Merge {
     auto from = ReadVersions(store_, HashName(from_.site.name));
     if (!from) return tl::unexpected(from.error());
     version_shift_ = into_.site.next_version - 2;
-    Smoothed shown = Shown(*into, into_.site.enabled_version);
+    SmoothedPaths shown = Shown(*into, into_.site.enabled_version);
     Versions merged = std::move(*into);
-    const auto Path = [this](const std::shared_ptr<const Trajectory>& path) {
-      return moves_ ? Transformed(*path, T_into_from_) : path;
+    const auto Path = [this](const SmoothedPath& path) {
+      return moves_ ? SmoothedPath{path.session, Transformed(*path.path, T_into_from_)} : path;
     };
     for (const auto& [robot, path] : Shown(*from, from_.site.enabled_version)) shown.emplace(robot, Path(path));
     for (auto& [number, version] : *from) {

@@ -50,7 +50,7 @@ MAY_INCLUDE = {
     "idl": [],
     "common": [],
     "common/wire": COMMON,
-    # Bags of ROS 2: for programs that read logs, not for the server.
+    # Recordings, and bags of ROS 2: for programs that read and write logs, not for the server.
     "common/bag": COMMON,
     # The messages of ROS 2 on the wire: only the server speaks them.
     "common/wire/ros2": [*COMMON, "common/wire"],
@@ -111,7 +111,7 @@ LIBRARIES = {
     "DDS": (("fastdds/", "fastrtps/", "fastcdr/", "dds/", "ddsc/"), ("common/wire",), False),
     "OpenCV": (("opencv2/",), ("common/map", "server/slam", "server/maps", "client/cli"), True),
     "Ceres": (("ceres/",), ("server/slam",), True),
-    "Protobuf": (("google/protobuf/",), ("server/store",), False),
+    "Protobuf": (("google/protobuf/",), ("server/store", "common/bag"), False),
     "SQLite": (("SQLiteCpp/", "sqlite3.h"), ("server/store", "common/bag"), True),
     "zstd": (("zstd.h",), ("server/store", "common/bag"), True),
     "lz4": (("lz4frame.h", "lz4.h"), ("common/bag",), True),
@@ -129,7 +129,7 @@ LIBRARIES = {
 }
 
 # Generated code (a quoted include that is no file of the tree) may be included here.
-GENERATED_CODE = ("common/wire", "server/store")
+GENERATED_CODE = ("common/wire", "server/store", "common/bag")
 
 # No thread, clock, I/O or log: same input and seed, same bytes out. Files and streams of logs are common/sensor's trade.
 PURE = ("server/slam", "common/geometry")

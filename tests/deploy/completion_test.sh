@@ -30,7 +30,7 @@ refuses() {
   done
 }
 
-offers 'cairn ' replay map site check-log
+offers 'cairn ' replay record map site check-log
 offers 'cairn ma' map
 refuses 'cairn ma' replay
 offers 'cairn map ' draw export

@@ -1,8 +1,12 @@
-// Bags of ROS 2: a number, then an MCAP file that is read as a drive, or one message of a topic that is decoded. SQLite
-// opens files by their names only, and is fuzzed by its makers; damaged databases are in sqlite_file_test.
+// Recordings: a number, then an MCAP file that is read as a drive, or one message of a topic that is decoded: of ROS 2,
+// of Foxglove, or of a recording of our own. SQLite opens files by their names only, and is fuzzed by its makers;
+// damaged databases are in sqlite_file_test.
 #include <cmath>
 
+#include "common/bag/foxglove_decoding.h"
+#include "common/bag/foxglove_encoding.h"
 #include "common/bag/mcap_file.h"
+#include "common/bag/mcap_writer.h"
 #include "common/bag/recording.h"
 #include "common/ros2/cdr_decoding.h"
 #include "common/ros2/frame_tree.h"
@@ -44,20 +48,103 @@ bool RunDrive(std::string_view bytes) {
   return scans + odometries > 0;
 }
 
-bool RunMessage(std::uint8_t kind, std::string_view bytes) {
-  if (kind == 1) return ros2::DecodeLaserScan(bytes).has_value();
-  if (kind == 2) return ros2::DecodeOdometry(bytes).has_value();
-  const auto message = ros2::DecodeTransforms(bytes);
+bool TakeTransforms(const Result<ros2::Transforms>& message) {
   ros2::FrameTree tree;
   if (message)
     for (const ros2::Transform& transform : message->transforms) static_cast<void>(tree.Set(transform));
   return message.has_value();
 }
 
+bool RunMessage(std::uint8_t kind, std::string_view bytes) {
+  switch (kind) {
+    case 1:
+      return ros2::DecodeLaserScan(bytes).has_value();
+    case 2:
+      return ros2::DecodeOdometry(bytes).has_value();
+    case 3:
+      return TakeTransforms(ros2::DecodeTransforms(bytes));
+    case 4: {
+      const auto message = bag::DecodeFoxgloveScan(bytes);
+      return message && ros2::MotionOf(message->T_frame_scan);
+    }
+    case 5: {
+      const auto message = bag::DecodePoseInFrame(bytes);
+      return message && ros2::MotionOf(message->pose);
+    }
+    case 6:
+      return TakeTransforms(bag::DecodeFrameTransform(bytes));
+    case 7:
+      return TakeTransforms(bag::DecodeFrameTransforms(bytes));
+    case 8: {
+      // What is decoded is written again as the same value.
+      const auto scan = bag::DecodeScanDetails(bytes);
+      if (!scan) return false;
+      const std::string again = bag::EncodeDetails(*scan, 0);
+      const auto twice = bag::DecodeScanDetails(again);
+      Must(twice && bag::EncodeDetails(*twice, 0) == again, "details of a scan read back");
+      return true;
+    }
+    default: {
+      const auto odometry = bag::DecodeOdometryDetails(bytes);
+      Must(!odometry || odometry->T_odom_robot.IsFinite(), "odometry is a pose");
+      return odometry.has_value();
+    }
+  }
+}
+
 bool RunBag(std::string_view input) {
+  constexpr std::uint8_t kKinds = 10;
   Pieces pieces(input);
-  const std::uint8_t kind = pieces.Take() % 4;
+  const std::uint8_t kind = pieces.Take() % kKinds;
   return kind == 0 ? RunDrive(pieces.rest()) : RunMessage(kind, pieces.rest());
+}
+
+// A recording as `cairn record` writes it, and the messages in it.
+void AddSeedsOfRecordings(std::vector<std::string>& seeds) {
+  Scan scan;
+  scan.stamp = kNanosPerSecond;
+  scan.angle_step_rad = 0.5;
+  scan.range_max_m = 10.0;
+  scan.beam_period_s = 0.001;
+  scan.tilt_rad = 0.1;
+  scan.T_robot_laser = {0.2, 0.0, 0.1};
+  scan.ranges_m = {1.0F, 2.0F, 3.0F};
+  const Odometry odometry{1, kNanosPerSecond, {1.0, 0.0, 0.1}};
+  const std::string scan_details = bag::EncodeDetails(scan, 3), odometry_details = bag::EncodeDetails(odometry, 3);
+  const std::string seen = bag::EncodeLaserScan(scan, "r/base");
+  const std::string pose = bag::EncodePose(odometry.stamp, "r/odom", odometry.T_odom_robot);
+  const std::string transform = bag::EncodeTransform(odometry.stamp, "r/odom", "r/base", odometry.T_odom_robot);
+  const std::string transforms = std::string("\x0a") + static_cast<char>(transform.size()) + transform;
+  char kind = 4;
+  for (const std::string& message : {seen, pose, transform, transforms, scan_details, odometry_details})
+    seeds.push_back(kind++ + message);
+
+  struct Written {
+    const char* topic;
+    const char* schema;
+    const std::string& message;
+  };
+  const std::vector<Written> all = {{"/r/scan/l/details", bag::kScanDetailsSchema, scan_details},
+                                    {"/r/scan/l", bag::kLaserScanSchema, seen},
+                                    {"/r/tf", bag::kTransformSchema, transform},
+                                    {"/tf", bag::kTransformsSchema, transforms},
+                                    {"/r/odometry/details", bag::kOdometryDetailsSchema, odometry_details},
+                                    {"/r/odometry", bag::kPoseSchema, pose}};
+  // With everything, without the details, and with transforms only.
+  for (const std::string& without : {std::string("none"), std::string("details"), std::string("odometry")}) {
+    const MemoryFile file;
+    const auto path = file.With("");
+    auto writer = bag::McapWriter::Create(path, {.overwrite = true});
+    Must(writer.has_value(), "a file in memory is written");
+    for (const Written& one : all) {
+      if (std::string(one.topic).find(without) != std::string::npos) continue;
+      const auto schema = (*writer)->AddSchema(one.schema, bag::kProtobuf, "");
+      const auto channel = (*writer)->AddChannel(*schema, one.topic, bag::kProtobuf);
+      Must((*writer)->Write(*channel, 1, 1, one.message).has_value(), "a message is written");
+    }
+    Must((*writer)->Finish().has_value(), "the file is finished");
+    seeds.push_back(std::string(1, '\0') + file.Read());
+  }
 }
 
 std::vector<std::string> SeedsOfBags() {
@@ -83,6 +170,7 @@ std::vector<std::string> SeedsOfBags() {
       for (const bool as_transform : {false, true})
         seeds.push_back(std::string(1, '\0') + recorded::McapOf({mounting, as_transform ? moving : moved, seen, packed},
                                                                 compression, per_chunk));
+  AddSeedsOfRecordings(seeds);
   return seeds;
 }
 

@@ -7,6 +7,7 @@
 #include "common/wire/limits.h"
 #include "common/wire/rtps_datagram.h"
 #include "tests/fuzz/fuzz_target.h"
+#include "tests/fuzz/guard_seeds.h"
 
 namespace cairn::fuzz {
 namespace {
@@ -24,6 +25,9 @@ class Body {
       number = number << 8 | static_cast<std::uint8_t>(bytes_[at + (little_ ? width - 1 - i : i)]);
     return number;
   }
+  [[nodiscard]] std::string_view Bytes(std::size_t at, std::size_t size) const { return bytes_.substr(at, size); }
+  // DDS Security: whatever the submessage's own byte order is.
+  [[nodiscard]] std::uint64_t BigEndian(std::size_t at) const { return Body(bytes_, false).Number(at, 4); }
   [[nodiscard]] std::int64_t Sequence(std::size_t at) const {
     return static_cast<std::int64_t>(Number(at, 4) << 32 | Number(at + 4, 4));
   }
@@ -71,10 +75,16 @@ void ReadData(const Body& body, std::uint8_t flags, bool fragment) {
   Must(begin < end && end - begin <= body.size() - payload, "the fragments are inside the submessage and the sample");
 }
 
-void ReadSubmessage(std::uint8_t id, std::uint8_t flags, const Body& body) {
+// The last sample that the participant has sent by the writer whose id stands there.
+std::int64_t LastOf(const Body& body, std::size_t at) {
+  return body.Bytes(at, 4) == std::string_view("\0\0\0\2", 4) ? kOwnLast : 0;  // kSeedWriter.
+}
+
+void ReadSubmessage(std::uint8_t id, std::uint8_t flags, const Body& body, bool to_own) {
   switch (id) {
     case 0x06:  // ACKNACK
       Must(body.Sequence(8) >= 0, "a base is no negative number");
+      Must(!to_own || body.Sequence(8) <= LastOf(body, 4) + 1, "nothing is acknowledged that was never sent");
       return ReadSet(body, 16);
     case 0x07:  // HEARTBEAT
       MustBePlausible(body.Sequence(8));
@@ -82,10 +92,11 @@ void ReadSubmessage(std::uint8_t id, std::uint8_t flags, const Body& body) {
       return static_cast<void>(body.Number(24, 4));
     case 0x08: {  // GAP
       const std::int64_t first = body.Sequence(8), base = body.Sequence(16);
-      Must(first > 0 && base >= first && base - first <= kLongestSkip, "a gap that can be walked");
+      Must(first > 0 && base >= first && base - first <= wire::kMaxGap, "a gap that can be walked");
       return ReadSet(body, 24);
     }
     case 0x12:  // NACK_FRAG
+      Must(!to_own || body.Sequence(8) <= LastOf(body, 4), "no fragment is asked for that was never sent");
       return ReadSet(body, 20);
     case 0x13:  // HEARTBEAT_FRAG
       return static_cast<void>(body.Number(20, 4));
@@ -93,12 +104,22 @@ void ReadSubmessage(std::uint8_t id, std::uint8_t flags, const Body& body) {
       return ReadData(body, flags, false);
     case 0x16:  // DATA_FRAG
       return ReadData(body, flags, true);
+    case 0x30:  // SEC_BODY
+      return Must(body.BigEndian(0) <= body.size() - 4, "a ciphertext is inside the submessage");
+    case 0x31:  // SEC_PREFIX
+    case 0x33:  // SRTPS_PREFIX
+      return Must(body.size() == 20, "the header of what is protected has 20 bytes");
+    case 0x32:  // SEC_POSTFIX
+    case 0x34:  // SRTPS_POSTFIX
+      return Must(body.BigEndian(16) <= (body.size() - 20) / 20,
+                  "the codes of all receivers are inside the submessage");
     default:
       return;
   }
 }
 
 void ReadAsReceiver(std::string_view datagram) {
+  bool to_own = true;  // To everybody.
   std::size_t at = 20;
   while (at < datagram.size()) {
     const auto id = static_cast<std::uint8_t>(datagram[at]), flags = static_cast<std::uint8_t>(datagram[at + 1]);
@@ -106,13 +127,16 @@ void ReadAsReceiver(std::string_view datagram) {
     if (length == 0 && id != 0x01 && id != 0x09) length = datagram.size() - at - 4;
     Must(length <= datagram.size() - at - 4, "a submessage ends inside the datagram");
     Must(id != 0x80 || at + 4 + length == datagram.size(), "statistics are the last submessage");
-    ReadSubmessage(id, flags, {datagram.substr(at + 4, length), (flags & 1) != 0});
+    const std::string_view content = datagram.substr(at + 4, length);
+    ReadSubmessage(id, flags, {content, (flags & 1) != 0}, to_own);
+    if (id == 0x0e) to_own = content.substr(0, 12) == kOwnPrefix || content.substr(0, 12) == std::string(12, '\0');
     at += 4 + (length + 3) / 4 * 4;  // As Fast DDS 2.9 does.
   }
 }
 
 bool RunGuard(std::string_view input) {
   wire::SequenceGate gate;
+  wire::NoteSent(OwnDatagram().bytes(), gate);
   wire::FragmentAssembly assembly;
   bool accepted = false;
   for (Pieces pieces(input); !pieces.empty();) {
@@ -184,6 +208,11 @@ std::vector<std::string> SeedsOfDatagrams() {
   }
   seeds.push_back(Piece(Message(all)));
   seeds.push_back(traffic);
+  for (const Datagram& secure : SecureDatagrams()) seeds.push_back(DatagramPiece(secure));
+  for (const auto& conversation : Conversations()) {
+    seeds.emplace_back();
+    for (const Datagram& datagram : conversation) seeds.back() += DatagramPiece(datagram);
+  }
   return seeds;
 }
 

@@ -26,6 +26,12 @@ class MemoryFile {
     Must(pwrite(file_, bytes.data(), bytes.size(), 0) == static_cast<ssize_t>(bytes.size()), "the file can be written");
     return "/proc/self/fd/" + std::to_string(file_);
   }
+  // What it holds now.
+  [[nodiscard]] std::string Read() const {
+    std::string bytes(static_cast<std::size_t>(lseek(file_, 0, SEEK_END)), '\0');
+    Must(pread(file_, bytes.data(), bytes.size(), 0) == static_cast<ssize_t>(bytes.size()), "the file can be read");
+    return bytes;
+  }
 
  private:
   int file_;

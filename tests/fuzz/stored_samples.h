@@ -18,7 +18,7 @@ inline server::StoredGrid OneChunk() {
 inline server::StoredVersion SampleVersion(bool with_grid) {
   server::StoredVersion version{.version = 3, .job = 8, .note = "smoothed", .parts = {}, .smoothed = {}};
   version.parts[5] = with_grid ? OneChunk() : server::StoredGrid{.keyframes = 4, .chunks = {}};
-  version.smoothed["r5"] = std::make_shared<const Trajectory>(Trajectory{{10, {1, 2, 3}}, {20, {4, 5, 0.6}}});
+  version.smoothed["r5"] = {5, std::make_shared<const Trajectory>(Trajectory{{10, {1, 2, 3}}, {20, {4, 5, 0.6}}})};
   return version;
 }
 

@@ -46,15 +46,46 @@ double SecondsFor(const ServerOptions& options, int robot_count, int steps,
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 
-// Six robots on one thread with a full queue each. The watchdog was starved once in such a case, and the server killed
-// for being busy: the sign of life that was asked of a robot waited behind all its scans, and those of the others.
+// Twelve robots on one thread with a full queue each. The watchdog was starved once in such a case, and the server
+// killed for being busy: the sign of life that was asked of a robot waited behind all its scans, and those of the
+// others.
 TEST(ServerOverload, IsHealthyUnderOverloadAsLongAsItMoves) {
   ServerOptions options = SlowOnOneThread();
   // A limit that no single scan reaches on this machine, sanitized or not, but a whole queue does.
   const double seconds_per_scan = SecondsFor(options, 1, 10, [](WholeServer&) {}) / 10.0;
   options.server.stall_limit_s = std::max(0.3, 30.0 * seconds_per_scan);
-  const double seconds = SecondsFor(options, 6, 60, [](WholeServer& house) { EXPECT_TRUE(house.server().healthy()); });
+  const double seconds = SecondsFor(options, 12, 60, [](WholeServer& house) { EXPECT_TRUE(house.server().healthy()); });
   EXPECT_GT(seconds, 2.0 * options.server.stall_limit_s) << "the work was too little to show anything";
+}
+
+std::ptrdiff_t PosesOf(const WholeServer& house, const std::string& robot) {
+  const auto poses = house.All<PoseReport>();
+  return std::count_if(poses.begin(), poses.end(), [&](const PoseReport& pose) { return pose.robot == robot; });
+}
+
+// One thread estimates for all. A robot whose queue is full must not make another one wait for more than a turn.
+TEST(ServerOverload, ARobotThatSendsTooMuchDelaysACalmOneByATurn) {
+  WholeServer house(SlowOnOneThread());
+  for (const char* robot : {"flood", "calm"}) house.Open(robot, kOverloadClient);
+  int step = 0;
+  const auto flood = [&](int scans) {
+    for (int last = step + scans; step < last; ++step) {
+      house.SendOdometry("flood", kOverloadClient, RoomOdometry(step));
+      house.SendScan("flood", kOverloadClient, RoomScan(step));
+    }
+  };
+  flood(50);
+  for (int calm = 0; calm < 4; ++calm) {
+    const auto before = PosesOf(house, "flood");
+    house.SendOdometry("calm", kOverloadClient, RoomOdometry(calm));
+    house.SendScan("calm", kOverloadClient, RoomScan(calm));
+    house.SendOdometry("calm", kOverloadClient, RoomOdometry(calm + 1));
+    ASSERT_TRUE(house.WaitFor([&] { return PosesOf(house, "calm") == calm + 1; }));
+    // A turn has eight events, so four scans and their odometry; and as much may have been begun before.
+    EXPECT_LE(PosesOf(house, "flood") - before, 10) << calm;
+    EXPECT_LT(house.LastLedger("flood").settled_through + 15, static_cast<std::uint64_t>(step)) << "no flood is left";
+    flood(10);
+  }
 }
 
 // What is sent waits in a lane until its thread takes it. Such a thread once hung, while the server went on to say that
@@ -78,6 +109,8 @@ TEST(ServerOverload, IsNotHealthyWhereNobodyTakesWhatItSends) {
     while (outbound.lane(lane).size() > 0) static_cast<void>(outbound.lane(lane).Pop());
   EXPECT_TRUE(test::Eventually([&] { return server.healthy(); }));
   server.Stop();
+  // Its housekeeping, which looks at all others, is watched as well.
+  EXPECT_TRUE(test::Eventually([&] { return !server.healthy(); }));
 }
 
 // The middleware counted for days what a forged heartbeat had announced. Nobody could ask the server any more, and it

@@ -1,9 +1,12 @@
-// A server that dies without warning and comes back without its memory, under two robots that drive on.
+// A server that dies without warning and comes back, without its memory or with it, under two robots that drive on.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <csignal>
+#include <filesystem>
+#include <map>
 #include <optional>
+#include <string>
 
 #include "client/lib/map_client.h"
 #include "client/sim/fleet.h"
@@ -11,6 +14,7 @@
 #include "tests/child_process.h"
 #include "tests/loopback.h"
 #include "tests/system/rider.h"
+#include "tests/temp_directory.h"
 
 namespace cairn::client {
 namespace {
@@ -21,22 +25,32 @@ class Restart : public ::testing::Test {
  protected:
   static constexpr int kRobots = 2;
 
-  Restart() : bus_(MakeBus("robots")), fleet_(MakeFleet()) {
-    StartServer();
-    for (int i = 0; i < kRobots; ++i)
-      riders_.push_back(std::make_unique<Rider>(*bus_, fleet_.name(i), "office", fleet_.T_map_robot_start(i)));
+  // The server stores nothing, or its state stays and the robots have little memory for what it has not stored.
+  explicit Restart(bool stored = false)
+      : state_(stored ? (directory_ / "state").string() : "none"), bus_(MakeBus("robots")), fleet_(MakeFleet()) {
+    StartServer("20");
+    for (int i = 0; i < kRobots; ++i) {
+      RobotClientOptions options;
+      if (stored) options = {.max_kept_bytes = 8 * 1024, .spill_file = SpillOf(i).string()};
+      riders_.push_back(std::make_unique<Rider>(*bus_, fleet_.name(i), "office", fleet_.T_map_robot_start(i), options));
+    }
   }
 
+  [[nodiscard]] std::filesystem::path SpillOf(int robot) const {
+    return directory_ / ("spill" + std::to_string(robot));
+  }
   static sim::Fleet MakeFleet() {
     sim::FleetOptions options;
     options.robots = kRobots;
     options.laser.beams = 181;
     return Must(sim::Fleet::Create(Must(sim::OpenSurroundings("office")), options));
   }
-  void StartServer() {
+  // How often it publishes the map, so how fast its versions grow.
+  void StartServer(const std::string& publish_rate_hz = "2") {
     server_.reset();
-    server_.emplace(std::vector<std::string>{CAIRND_PATH, "--domain", std::to_string(TestDomain()), "--state",
-                                             ":memory:", "--set", "slam.particles=20", "--log-level", "warn"});
+    server_.emplace(std::vector<std::string>{CAIRND_PATH, "--domain", std::to_string(TestDomain()), "--state", state_,
+                                             "--set", "slam.particles=20", "--set",
+                                             "maps.publish_rate_hz=" + publish_rate_hz, "--log-level", "warn"});
   }
   void KillServer() {
     server_->Signal(SIGKILL);
@@ -70,26 +84,53 @@ class Restart : public ::testing::Test {
     return worst_m;
   }
 
+  const TempDirectory directory_;
+  const std::string state_;
   std::optional<ChildProcess> server_;
   const std::unique_ptr<wire::Bus> bus_;
   sim::Fleet fleet_;
   std::vector<std::unique_ptr<Rider>> riders_;
 };
 
+class RestartOnItsState : public Restart {
+ protected:
+  RestartOnItsState() : Restart(true) {}
+};
+
+using TileVersions = std::map<TileKey, std::uint64_t>;
+
+TileVersions VersionsOf(const MapClient& map) {
+  TileVersions versions;
+  for (const Tile& tile : map.tiles()) versions[tile.key] = tile.version;
+  return versions;
+}
+
 // Robots were put where they had once begun, and said to be tracking there: 6.7 m away.
 TEST_F(Restart, TwoRobotsGoOnWhereTheyAreThoughTheServerForgotThem) {
-  ASSERT_NO_FATAL_FAILURE(Drive(40, true));
+  ASSERT_NO_FATAL_FAILURE(Drive(10, true));
+  const auto map = Must(MapClient::Create(*bus_, "office"));
+  ASSERT_TRUE(map->WaitComplete(20.0));
+  for (std::size_t scans = 15; scans <= 40; scans += 5) {
+    const std::uint64_t version = map->version();
+    ASSERT_NO_FATAL_FAILURE(Drive(scans, true));
+    ASSERT_TRUE(Eventually([&] { return map->version() > version; }));
+  }
+  const Generation first = map->info()->generation;
+  const std::uint64_t first_version = map->version();
   KillServer();
   ASSERT_NO_FATAL_FAILURE(Drive(60, false));
+  EXPECT_FALSE(map->tiles().empty()) << "what the last server said is there until another one says more";
   StartServer();
   ASSERT_NO_FATAL_FAILURE(Drive(90, true));
+  EXPECT_TRUE(Eventually([&] { return map->info() && map->info()->generation > first; }));
   KillServer();
   StartServer();
   ASSERT_NO_FATAL_FAILURE(Drive(120, true));
   for (int i = 0; i < kRobots; ++i) {
     Rider& rider = *riders_[static_cast<std::size_t>(i)];
     const Trajectory& truth = fleet_.truth(i);
-    ASSERT_TRUE(Eventually([&] { return rider.poses().contains(truth.back().stamp) || rider.poses().size() >= 119; }));
+    ASSERT_TRUE(Eventually([&] { return rider.poses().contains(truth.back().stamp) || rider.poses().size() >= 119; }))
+        << rider.poses().size() << " poses of " << rider.scans() << " scans";
     EXPECT_EQ(rider.client().restarted(), 2);
     EXPECT_EQ(rider.client().displaced(), 0U);
     // The robot has moved so far that its first start would be wrong.
@@ -100,6 +141,41 @@ TEST_F(Restart, TwoRobotsGoOnWhereTheyAreThoughTheServerForgotThem) {
     // What was scanned while no server was there is not lost.
     EXPECT_GE(rider.poses().size(), 118U);
     EXPECT_TRUE(rider.client().pose()->localized);
+  }
+  // The client of the map has that of the last server and nothing of the ones before. Epochs and versions of each begin
+  // anew, and the first server's versions were higher.
+  const auto newcomer = Must(MapClient::Create(*bus_, "office"));
+  ASSERT_TRUE(newcomer->WaitComplete(20.0));
+  EXPECT_TRUE(Eventually([&] { return VersionsOf(*map) == VersionsOf(*newcomer); }));
+  EXPECT_EQ(map->info()->generation, newcomer->info()->generation);
+  EXPECT_GT(map->tiles().size(), 0U);
+  EXPECT_LT(map->version(), first_version);
+  EXPECT_EQ(map->renewed(), 0) << "it did not need to join the domain anew";
+}
+
+TEST_F(RestartOnItsState, WhatDoesNotFitIntoMemoryComesOnceFromTheSpillFile) {
+  ASSERT_NO_FATAL_FAILURE(Drive(30, true));
+  KillServer();
+  ASSERT_NO_FATAL_FAILURE(Drive(90, false));
+  for (int i = 0; i < kRobots; ++i) EXPECT_GT(std::filesystem::file_size(SpillOf(i)), 30U * 1024);
+  StartServer();
+  ASSERT_NO_FATAL_FAILURE(Drive(100, true));
+  for (int i = 0; i < kRobots; ++i) {
+    Rider& rider = *riders_[static_cast<std::size_t>(i)];
+    ASSERT_TRUE(rider.client().WaitSafe(30.0));
+    // The last scan may wait for the odometry after it.
+    ASSERT_TRUE(Eventually([&] { return rider.client().ledger()->used + 1 >= rider.scans(); }));
+    const auto ledger = rider.client().ledger();
+    EXPECT_EQ(ledger->received, rider.scans());
+    EXPECT_EQ(ledger->last_sequence, rider.scans());
+    EXPECT_EQ(ledger->durable_through, rider.scans());
+    EXPECT_EQ(ledger->used + ledger->waiting, rider.scans());
+    EXPECT_LE(ledger->waiting, 1U);
+    EXPECT_EQ(ledger->dropped_total(), 0U);
+    EXPECT_EQ(rider.client().restarted(), 0) << "the server knew the session";
+    EXPECT_EQ(rider.client().displaced(), 0U);
+    EXPECT_EQ(rider.client().spill_error(), "");
+    EXPECT_TRUE(Eventually([&] { return std::filesystem::file_size(SpillOf(i)) == 0; })) << "all of it was stored";
   }
 }
 

@@ -17,14 +17,14 @@ namespace cairn::test {
 class Rider {
  public:
   // Without `start` the session goes on where it was. Publish never waits.
-  Rider(wire::Bus& bus, const std::string& robot, const std::string& site, const std::optional<Pose2>& start) {
+  Rider(wire::Bus& bus, const std::string& robot, const std::string& site, const std::optional<Pose2>& start,
+        client::RobotClientOptions options = {}) {
     SessionRequest request;
     request.robot = robot;
     request.site = site;
     request.sensors = {"laser"};
     request.has_start = start.has_value();
     request.T_map_robot_start = start.value_or(Pose2{});
-    client::RobotClientOptions options;
     options.window = 0;
     client::RobotClient::Callbacks callbacks;
     callbacks.pose = [this](const PoseReport& pose) {

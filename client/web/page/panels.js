@@ -150,7 +150,7 @@ export function showServer(state, may) {
   facts($('server-facts'), [
     ['Version', state.version || 'unknown'],
     ['Storing', state.degraded ? `DEGRADED: ${state.degraded}` : 'no problem'],
-    ['Refused', `${r.datagrams} datagrams, ${r.commands} commands${r.secure ? `, ${r.peers} peers, ${r.endpoints} endpoints, ${r.samples} samples` : ''}`]]);
+    ['Refused', `${r.datagrams} datagrams, ${r.commands} commands, ${r.over_limit} over a limit${r.secure ? `, ${r.peers} peers, ${r.endpoints} endpoints, ${r.samples} samples` : ''}`]]);
   $('read-only').hidden = state.commands;
   $('unlock').hidden = !state.commands || may;
   $('smooth').hidden = !state.commands;

@@ -112,7 +112,7 @@ void AddMotion(CLI::App& app, Shared& shared) {
   auto config = std::make_shared<std::filesystem::path>();
   auto seed = std::make_shared<std::optional<std::int64_t>>();
   auto learnt = std::make_shared<std::filesystem::path>();
-  command->add_option("LOG", options->log, "CARMEN or DP-SLAM log, or bag of ROS 2")->required();
+  command->add_option("LOG", options->log, "CARMEN or DP-SLAM log, bag of ROS 2, or recording")->required();
   command->add_option("--truth", options->truth, "True poses (TUM)");
   auto* no_matcher =
       command->add_flag("!--no-matcher", options->matcher_model, "Do not learn the scan matcher's model");
@@ -169,7 +169,7 @@ void AddLaser(CLI::App& app, Shared& shared) {
       "  cairn-offline robot1.log --config robot.yaml --scan-period 0.18 --stamp-at last --clockwise --turn-from 0");
   auto options = std::make_shared<LaserRunOptions>();
   auto learnt = std::make_shared<std::filesystem::path>();
-  command->add_option("LOG", options->log, "CARMEN or DP-SLAM log, or bag of ROS 2")->required();
+  command->add_option("LOG", options->log, "CARMEN or DP-SLAM log, bag of ROS 2, or recording")->required();
   command->add_option("-o,--options", *learnt,
                       "Also write lag and wheels as YAML, for --config of cairn-offline and cairnd");
   command->add_option("--pairs", options->fit.pairs_along, "Pairs of scans along the way")

@@ -80,7 +80,8 @@ std::optional<OfflineOptions> ParseOfflineOptions(int argc, char** argv, int& ex
       "Runs the estimator over a robot log without a server: the same trajectory as through cairnd. Several logs are "
       "robots of one site; they are smoothed together."};
   app.set_version_flag("--version", std::string("cairn-offline ") + kVersion);
-  app.add_option("LOG", options.logs, "CARMEN or DP-SLAM log, or bag of ROS 2; several: one per robot")->required();
+  app.add_option("LOG", options.logs, "CARMEN or DP-SLAM log, bag of ROS 2, or recording; several: one per robot")
+      ->required();
   // With several logs an option takes one file at a time, so that it does not take the next log.
   app.add_option("--trajectory", options.trajectories, "Write the online trajectory (TUM); once per log")
       ->allow_extra_args(false);

@@ -2,9 +2,12 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
+#include <csignal>
 #include <filesystem>
 
+#include "tests/own_mount.h"
 #include "tests/temp_directory.h"
 
 namespace cairn::client {
@@ -126,10 +129,62 @@ TEST(Backlog, ASpillFileTakesWhatIsBeyondTheBoundWithoutAChange) {
   EXPECT_FALSE(std::filesystem::exists(path));
 }
 
-TEST(Backlog, WithoutSpaceOnTheDiskTheOldestAreGivenUp) {
-  auto full = SpillFile::Create("/dev/full");
-  EXPECT_EQ(full.error().code, StatusCode::kAlreadyExists);  // Nobody's file is overwritten.
+TEST(Backlog, NobodysFileIsOverwritten) {
+  EXPECT_EQ(SpillFile::Create("/dev/full").error().code, StatusCode::kAlreadyExists);
   EXPECT_EQ(SpillFile::Create("/nowhere/at/all").error().code, StatusCode::kUnavailable);
+}
+
+// The scans that are left are the newest ones, as they were given.
+void ExpectTheNewest(Backlog& backlog, std::uint64_t added) {
+  EXPECT_EQ(backlog.displaced() + backlog.size(), added);
+  backlog.Rewind();
+  std::uint64_t next = backlog.displaced();
+  while (const auto sample = backlog.Next()) {
+    const Scan& scan = std::get<ScanSample>(*sample).scan;
+    ASSERT_EQ(scan.sequence, ++next);
+    ASSERT_EQ(scan.ranges_m, std::vector<float>(100, static_cast<float>(next)));
+  }
+  EXPECT_EQ(next, added);
+}
+
+// No file of this process may grow beyond a limit (setrlimit(2), RLIMIT_FSIZE).
+TEST(Backlog, WhatNoFileTakesIsGivenUpAndSaid) {
+  const TempDirectory directory;
+  Backlog backlog(20 * 1024);
+  backlog.SpillTo(std::move(*SpillFile::Create((directory / "spill").string())));
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  const rlimit small{100, before.rlim_max};
+  std::signal(SIGXFSZ, SIG_IGN);
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+  for (std::uint64_t i = 1; i <= 100; ++i) backlog.Add(ScanOf(i));
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
+  EXPECT_LE(backlog.bytes(), 20U * 1024);
+  EXPECT_GT(backlog.displaced(), 50U);
+  EXPECT_NE(backlog.spill_error().find("spill: cannot be written: File too large"), std::string::npos)
+      << backlog.spill_error();
+  ExpectTheNewest(backlog, 100);
+}
+
+// All that was in the file was given up where one more scan did not fit, and the file was never used again.
+TEST(Backlog, OnAFullDiskTheOldestMakeRoomForTheNewest) {
+  const TempDirectory directory;
+  const auto disk = test::OwnMount::Disk(directory.path(), 64 * 1024);
+  if (!disk) GTEST_SKIP() << "this user may not mount a small disk";
+  Backlog backlog(20 * 1024);
+  backlog.SpillTo(std::move(*SpillFile::Create((directory / "spill").string())));
+  std::uint64_t added = 0;
+  while (backlog.displaced() == 0 && added < 1000) backlog.Add(ScanOf(++added));
+  const std::size_t most = backlog.size();
+  EXPECT_GT(most, 100U);
+  EXPECT_NE(backlog.spill_error().find("spill: cannot be written: No space left on device"), std::string::npos)
+      << backlog.spill_error();
+  for (int i = 0; i < 200; ++i) {
+    backlog.Add(ScanOf(++added));
+    ASSERT_GE(backlog.size(), most - 20) << "the oldest make room, a page of the disk at a time";
+    ASSERT_LE(backlog.bytes(), 20U * 1024);
+  }
+  ExpectTheNewest(backlog, added);
 }
 
 TEST(Backlog, ANewSessionBeginsWithTheOdometryBeforeItsFirstScan) {

@@ -145,6 +145,24 @@ TEST_F(RobotClientTest, GoesOnAfterAServerThatNobodyHeardOfForAWhile) {
   EXPECT_EQ(server_->received(), OneTo(100));
 }
 
+// `cairn record` reads scans too, and stays when the server goes.
+TEST_F(RobotClientTest, ARecorderIsNoServer) {
+  RobotClientOptions options;
+  options.window = 0;
+  const auto client = Open(options);
+  const auto recorder = MakeBus("recorder");
+  Inbox<ScanSample> recorded;
+  const auto scans = Must(recorder->Subscribe<ScanSample>(recorded.Sink()));
+  ASSERT_TRUE(Eventually([&] {
+    EXPECT_TRUE(client->Publish(SomeScan()));
+    return !recorded.values().empty();
+  }));
+  EXPECT_TRUE(client->connected());
+  server_.reset();
+  EXPECT_TRUE(Eventually([&] { return !client->connected(); }));
+  EXPECT_EQ(scans->matched(), 1);
+}
+
 // A server that began anew put the robot where it had once begun.
 TEST_F(RobotClientTest, OpensANewSessionWhereTheRobotIsIfTheServerForgotIt) {
   SessionRequest request = Robot("r1");

@@ -259,6 +259,7 @@ Reply ExtremeReply() {
   value.maps = {ExtremeMapInfo()};
   value.robots = {{ExtremeSessionState(), true, ExtremePose(), {ExtremeLedger(), Ledger{}}}};
   value.jobs = {ExtremeJob(), Job{}};
+  value.refused = {{true, kMax64, kMax64 - 1, kMax64 - 2, kMax64 - 3, kMax64 - 4, kMax64 - 5}};
   value.server_version = Text('v');
   value.saved = {{Name('f'), Name('s'), kMax64, kMin64}, SavedSite{}};
   value.ros2 = {{true, kMin64, {Text('d'), ""}}};

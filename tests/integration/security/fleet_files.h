@@ -1,5 +1,6 @@
 // A fleet's certificates, made once for the test program by deploy/security/make-fleet.sh: robots r1 and r2, the
-// program `sim` for s1 and s2, viewer v, operator o; and a second fleet, with which the first has nothing to do.
+// program `sim` for s1 and s2, viewer v, recorder c, operator o; and a second fleet, with which the first has nothing
+// to do.
 #pragma once
 
 #include <openssl/pem.h>
@@ -19,7 +20,7 @@ namespace cairn::test {
 
 inline void MakeFleet(const std::filesystem::path& directory) {
   const auto made = ChildProcess({CAIRN_MAKE_FLEET, directory.string(), "--robots", "r1,r2,sim=s1+s2", "--viewers", "v",
-                                  "--operators", "o"})
+                                  "--recorders", "c", "--operators", "o"})
                         .Wait();
   if (made.exit_code != 0) throw std::runtime_error(made.output);
 }

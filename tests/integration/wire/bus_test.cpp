@@ -125,6 +125,26 @@ TEST_F(BusPair, AClientSeesOnlyItsOwnReplies) {
   EXPECT_EQ(my_subscription->refused(), 0U);
 }
 
+TEST_F(BusPair, AReceiverThatThrowsLosesOneSampleOnly) {
+  Inbox<PoseReport> inbox;
+  const auto keep = inbox.Sink();
+  const auto subscription = Must(receiver_->Subscribe<PoseReport>([&](PoseReport&& report) {
+    if (report.scan_sequence == 1) throw std::runtime_error("out of memory");
+    keep(std::move(report));
+  }));
+  const auto publication = Must(sender_->Advertise<PoseReport>());
+  ASSERT_TRUE(Eventually([&] { return publication->matched() == 1 && subscription->matched() == 1; }));
+  PoseReport report = ExtremePose();
+  for (std::uint64_t sequence = 1; sequence <= 3; ++sequence) {
+    report.scan_sequence = sequence;
+    ASSERT_TRUE(publication->Publish(report));
+    ASSERT_TRUE(publication->WaitForAcknowledgement(kDeadline));
+    ASSERT_TRUE(Eventually([&] { return inbox.values().size() + subscription->refused() == sequence; }));
+  }
+  EXPECT_EQ(subscription->refused(), 1U);
+  EXPECT_EQ(inbox.values().front().scan_sequence, 2U);
+}
+
 TEST_F(BusPair, WhatExceedsTheLimitsIsNotSent) {
   const auto tiles = Must(sender_->Advertise<TileSample>());
   const Result<void> too_long = tiles->Publish(ExtremeTile(kMaxTileBytes + 1));

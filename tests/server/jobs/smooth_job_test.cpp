@@ -67,7 +67,7 @@ TEST_F(SmoothSiteTest, RedrawsTheMapAlongTheFullPathAndSaysHowMuchBetterItFits) 
     EXPECT_EQ(part.chunks.at(key)->log_odds, chunk.log_odds);
   });
   EXPECT_EQ(part.keyframes, static_cast<std::size_t>(kKeyframes));
-  EXPECT_EQ(smoothed->version.smoothed.at("r1")->size(), static_cast<std::size_t>(kKeyframes));
+  EXPECT_EQ(smoothed->version.smoothed.at("r1").path->size(), static_cast<std::size_t>(kKeyframes));
 }
 
 TEST_F(SmoothSiteTest, TheResultIsTheSumOverAllRobots) {
@@ -110,7 +110,7 @@ TEST_F(SmoothSiteTest, RobotsThatHaveSeenTheSameAreSmoothedTogether) {
   for (std::size_t k = 0; k < moved.path->size(); ++k)
     expected.Draw(*material[1].snapshot.keyframes[k].scan, (*moved.path)[k]);
   EXPECT_EQ(moved.chunks.size(), expected.chunk_count());
-  EXPECT_EQ(smoothed->version.smoothed.at("r2")->front().T_map_robot, moved.path->front());
+  EXPECT_EQ(smoothed->version.smoothed.at("r2").path->front().T_map_robot, moved.path->front());
   EXPECT_TRUE(std::ranges::is_sorted(progress_));
   EXPECT_GT(progress_.back(), 0.95);
 
@@ -124,7 +124,7 @@ TEST_F(SmoothSiteTest, TheSmoothedPathIsTheOneAlongWhichTheMapIsDrawn) {
   std::swap(material.snapshot.online_path, material.snapshot.full_path);  // Now the online path is right.
   const auto smoothed = SmoothSite(job_, {material}, nullptr, control_);
   ASSERT_TRUE(smoothed);
-  EXPECT_EQ(smoothed->version.smoothed.at("r1")->back().T_map_robot, TruePose(4 * (kKeyframes - 1)));
+  EXPECT_EQ(smoothed->version.smoothed.at("r1").path->back().T_map_robot, TruePose(4 * (kKeyframes - 1)));
 }
 
 TEST_F(SmoothSiteTest, ProgressGoesFromNothingToAll) {

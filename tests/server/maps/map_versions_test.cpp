@@ -7,7 +7,7 @@ namespace {
 
 MapVersion Smoothed(const std::string& robot) {
   MapVersion version;
-  version.smoothed[robot] = std::make_shared<const Trajectory>(Trajectory{{1, {}}});
+  version.smoothed[robot] = {1, std::make_shared<const Trajectory>(Trajectory{{1, {}}})};
   return version;
 }
 

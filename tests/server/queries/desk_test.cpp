@@ -82,6 +82,7 @@ TEST_F(DeskTest, ARequestBeyondTheQueueIsAnsweredBusyAtOnceAndTheOthersLater) {
   ASSERT_TRUE(busy);
   EXPECT_EQ(busy->sequence, 3);
   EXPECT_EQ(busy->status.code, StatusCode::kResourceExhausted);
+  EXPECT_EQ(outbound_.over_limit(), 1U);
   desk_.Start();
   desk_.Stop();  // It answers what waits before it ends.
   for (std::int64_t sequence = 1; sequence <= 2; ++sequence) {

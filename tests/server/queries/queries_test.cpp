@@ -122,10 +122,20 @@ TEST_F(Queries, PathIsOnlineOrSmoothed) {
   EXPECT_EQ(Ask(RequestKind::kPath).path.size(), 2U);
   request_.smoothed = true;
   EXPECT_EQ(Ask(RequestKind::kPath).status.code, StatusCode::kFailedPrecondition);
-  map_.smoothed["r1"] = std::make_shared<const Trajectory>(Trajectory{{100, {7, 0, 0}}});
+  map_.smoothed["r1"] = {session_.id, std::make_shared<const Trajectory>(Trajectory{{100, {7, 0, 0}}})};
   const Reply smoothed = Ask(RequestKind::kPath);
   ASSERT_EQ(smoothed.path.size(), 1U);
   EXPECT_EQ(smoothed.path[0].T_map_robot.x, 7.0);
+}
+
+// The robot has begun again since: its old path says nothing of where it is.
+TEST_F(Queries, TheSmoothedPathOfAnEarlierSessionIsNotThatOfThisOne) {
+  AddPose(100, 1.0);
+  request_.smoothed = true;
+  map_.smoothed["r1"] = {session_.id + 1, std::make_shared<const Trajectory>(Trajectory{{100, {7, 0, 0}}})};
+  const Reply reply = Ask(RequestKind::kPath);
+  EXPECT_EQ(reply.status.code, StatusCode::kFailedPrecondition);
+  EXPECT_TRUE(reply.path.empty());
 }
 
 TEST_F(Queries, TilesByAreaLevelAndVersion) {

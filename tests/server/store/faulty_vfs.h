@@ -11,7 +11,7 @@
 
 namespace cairn::server::testing {
 
-enum class DiskFault { kNone, kFull, kWriteError, kSyncError, kReadOnly };
+enum class DiskFault { kNone, kFull, kWriteError, kSyncError, kReadOnly, kReadError };
 
 class FaultyVfs {
  public:
@@ -64,6 +64,7 @@ class FaultyVfs {
         return SQLITE_READONLY;
       case DiskFault::kNone:
       case DiskFault::kSyncError:
+      case DiskFault::kReadError:
         break;
     }
     return to->pMethods->xWrite(to, bytes, count, offset);
@@ -79,6 +80,7 @@ class FaultyVfs {
       m.iVersion = 1;
       m.xClose = [](sqlite3_file* f) { return RealOf(f)->pMethods->xClose(RealOf(f)); };
       m.xRead = [](sqlite3_file* f, void* to, int n, sqlite3_int64 at) {
+        if (fault() == DiskFault::kReadError) return SQLITE_IOERR_READ;
         return RealOf(f)->pMethods->xRead(RealOf(f), to, n, at);
       };
       m.xWrite = &Write;

@@ -243,6 +243,8 @@ TEST(Journal, OverTheBudgetOnlyTheJournalBeforeACheckpointIsRemoved) {
   EXPECT_EQ(*ReadJournal(*store, 1, 200, [](std::uint64_t, JournalEntry&&) -> Result<void> { return {}; }), 300U);
   EXPECT_EQ((*ReadCheckpoint(*store, 1))->bytes, LargeState(1, 1000));
   EXPECT_EQ(StoredEntries(*store, 2), 300U);  // Without a checkpoint everything is needed.
+  EXPECT_TRUE(test::Eventually([&] { return journal.health().over_budget; }));
+  EXPECT_FALSE(journal.health().degraded);
 }
 
 TEST(Journal, BelowTheBudgetEverythingIsKept) {

@@ -64,13 +64,14 @@ TEST(Records, SessionsSitesVersionsLayersAndJobsComeBack) {
   EXPECT_EQ(site_back->tile_version, 90U);
 
   StoredVersion version{.version = 3, .job = 8, .note = "smoothed", .parts = {{5, SampleGrid(1)}}, .smoothed = {}};
-  version.smoothed["r5"] = std::make_shared<const Trajectory>(Trajectory{{10, {1, 2, 3}}, {20, {4, 5, 6}}});
+  version.smoothed["r5"] = {5, std::make_shared<const Trajectory>(Trajectory{{10, {1, 2, 3}}, {20, {4, 5, 6}}})};
   const auto version_back = VersionOf(BytesOf(version));
   ASSERT_TRUE(version_back);
   EXPECT_EQ(version_back->note, "smoothed");
   EXPECT_EQ(version_back->parts.at(5).keyframes, 12U);
   EXPECT_EQ(version_back->parts.at(5).chunks.at(1).cells.get()[5], 2);
-  EXPECT_EQ(version_back->smoothed.at("r5")->at(1).T_map_robot.y, 5.0);
+  EXPECT_EQ(version_back->smoothed.at("r5").session, 5U);
+  EXPECT_EQ(version_back->smoothed.at("r5").path->at(1).T_map_robot.y, 5.0);
 
   const auto layer = LayerOf(BytesOf(StoredLayer{6, SampleGrid(2)}));
   ASSERT_TRUE(layer);

@@ -100,7 +100,7 @@ TEST(ImportSite, RefusesWhatIsThereAlreadyAndTakesItUnderOtherNames) {
   ASSERT_TRUE(contents);
   EXPECT_EQ(contents->sessions.at(4).request.robot, "c1");
   EXPECT_EQ(contents->site.members.at(HashName("c2")), 5U);
-  EXPECT_TRUE(ReadVersions(*store, HashName("copy"))->at(2).smoothed.contains("c2"));
+  EXPECT_EQ(ReadVersions(*store, HashName("copy"))->at(2).smoothed.at("c2").session, 5U);
   // The samples in a journal name a robot by its number.
   EXPECT_EQ(std::get<ScanTaken>(JournalOf(*store, 4)[0]).stream.robot_id, HashName("c1"));
 }
@@ -189,9 +189,9 @@ TEST(MergeSites, ATransformMovesWhatHasBeenDrawnAndWhereSessionsBegin) {
   EXPECT_EQ(CellAt(std::get<CorrectionTaken>(JournalOf(*store, 11)[2]).grid, 147, 271), 2);
   const auto versions = *ReadVersions(*store, HashName("lab"));
   EXPECT_EQ(CellAt(versions.at(3).parts.at(11), 147, 527), 4);
-  const StampedPose& pose = versions.at(4).smoothed.at("r11")->front();
+  const StampedPose& pose = versions.at(4).smoothed.at("r11").path->front();
   EXPECT_NEAR(pose.T_map_robot.x, -1.0, 1e-12);
-  EXPECT_NEAR(versions.at(4).smoothed.at("r1")->front().T_map_robot.x, 1.0, 0.0);
+  EXPECT_NEAR(versions.at(4).smoothed.at("r1").path->front().T_map_robot.x, 1.0, 0.0);
 }
 
 TEST(MergeSites, WhatCannotBeMergedStaysAsItIs) {

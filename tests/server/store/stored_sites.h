@@ -74,8 +74,8 @@ inline RecordChanges RecordsOf(const SampleSite& sample) {
     checkpoint.AddTo(changes);
     live.parts[session] = SampleGrid(3);
     smooth.parts[session] = SampleGrid(4);
-    smooth.smoothed[stored.request.robot] =
-        std::make_shared<const Trajectory>(Trajectory{{100, {1.0, 2.0, 0.5}}, {200, {2.0, 2.0, 0.5}}});
+    smooth.smoothed[stored.request.robot] = {
+        session, std::make_shared<const Trajectory>(Trajectory{{100, {1.0, 2.0, 0.5}}, {200, {2.0, 2.0, 0.5}}})};
   }
   changes.removed.clear();
   const std::uint64_t gone = sample.first_session + 2;

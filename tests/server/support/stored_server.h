@@ -16,8 +16,10 @@ inline constexpr ClientId kDriver = 7;
 // A server with a store in a directory.
 class StoredServer {
  public:
-  explicit StoredServer(const std::filesystem::path& directory, ServerOptions options = TestOptions())
-      : store_(*OpenStore(directory)),
+  // `vfs`: of SQLite, for disks that fail (tests/server/store/faulty_vfs.h).
+  explicit StoredServer(const std::filesystem::path& directory, ServerOptions options = TestOptions(),
+                        const std::string& vfs = {})
+      : store_(*OpenStore(directory, vfs)),
         journal_(*store_, {.commit_delay_ms = 5}),
         generation_(*NextGeneration(*store_, 1)),
         house_(options, &journal_, generation_, directory / "saved") {

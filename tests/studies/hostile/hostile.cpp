@@ -190,8 +190,9 @@ void Attack(HostileFleet& fleet, double seconds, std::uint64_t seed, Outcome& ou
 }
 
 void Print(Report& report, const std::string& name, const Outcome& outcome) {
-  Table table({"traffic (s)", "datagrams", "deaths", "deaths per 10^6", "longest silence after a death (s)", "asked",
-               "no answer", "stale", "flows again p50 (s)", "p99 (s)", "longest (s)", "within 5 s"});
+  Table table({"traffic (s)", "datagrams", "deaths", "deaths per 10^6", "silence after a death p50 (s)", "p99 (s)",
+               "longest (s)", "asked", "no answer", "stale", "flows again p50 (s)", "p99 (s)", "longest (s)",
+               "within 5 s"});
   const auto longest = [](const std::vector<double>& values) {
     return values.empty() ? 0.0 : *std::max_element(values.begin(), values.end());
   };
@@ -200,12 +201,16 @@ void Print(Report& report, const std::string& name, const Outcome& outcome) {
   table.Add({Number(outcome.seconds, 0), Count(static_cast<long long>(outcome.sent)),
              Count(static_cast<long long>(outcome.deaths.size())),
              Number(1e6 * static_cast<double>(outcome.deaths.size()) / static_cast<double>(outcome.sent), 3),
+             Number(Share(outcome.silence_s, 0.5), 2), Number(Share(outcome.silence_s, 0.99), 2),
              Number(longest(outcome.silence_s), 2), Count(outcome.looks), Count(outcome.unanswered),
              Count(outcome.stale), Number(Share(outcome.flows_s, 0.5), 2), Number(Share(outcome.flows_s, 0.99), 2),
              Number(longest(outcome.flows_s), 2),
              Count(within) + " of " + Count(static_cast<long long>(outcome.flows_s.size()))});
   report.Add(table, name);
   for (const std::string& death : outcome.deaths) report.Text("Died: " + death);
+  std::string silences;
+  for (const double silence : outcome.silence_s) silences += (silences.empty() ? "" : ", ") + Number(silence, 2);
+  report.Text("Silences after deaths (s): " + (silences.empty() ? "none" : silences));
   report.Expect(outcome.deaths.empty(), "a process died");
   report.Expect(within == static_cast<long>(outcome.flows_s.size()), "a stream did not flow again within 5 s");
 }

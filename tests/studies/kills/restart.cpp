@@ -1,14 +1,20 @@
-// How long a server that was killed takes until it answers again: eight robots of which it knows an hour each.
+// How long a server that was killed takes until it answers again, and until its robots have new poses: eight robots of
+// which it knows an hour each, and which are connected.
 #include "tests/studies/kills/restart.h"
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <random>
 #include <thread>
+#include <vector>
 
+#include "tests/eventually.h"
 #include "tests/studies/fleet/live_server.h"
+#include "tests/studies/kills/standing_robot.h"
 #include "tests/temp_directory.h"
 #include "tests/test_domain.h"
 
@@ -90,6 +96,19 @@ bool HasAllPoses(client::QueryClient& queries) {
   return true;
 }
 
+using Robots = std::vector<std::unique_ptr<StandingRobot>>;
+
+// When the last of the robots had its pose; nothing if one has none yet.
+std::optional<Clock::time_point> AllBack(const Robots& robots) {
+  Clock::time_point last{};
+  for (const auto& robot : robots) {
+    const auto back = robot->back();
+    if (!back) return std::nullopt;
+    last = std::max(last, *back);
+  }
+  return last;
+}
+
 }  // namespace
 
 RestartTimes MeasureRestarts(StudyContext& context) {
@@ -105,20 +124,41 @@ RestartTimes MeasureRestarts(StudyContext& context) {
   wire.domain = test::TestDomain();
   const auto bus = wire::Bus::Create(wire, "restart");
   if (!bus) throw std::runtime_error(bus.error().message);
+  const fs::path state = temporary / "state";
+  fs::copy(place / "state", state, fs::copy_options::recursive);
+  auto server = StartServer(state);
+  if (!server->Says(" ready")) throw std::runtime_error("cairnd does not start: " + server->Wait().output);
+  Robots robots;
+  for (int robot = 0; robot < kRobots; ++robot)
+    robots.push_back(
+        std::make_unique<StandingRobot>(**bus, RobotName(robot), "lab", place / "logs" / (RobotName(robot) + ".log")));
+  const std::jthread publisher([&robots](const std::stop_token& stop) {
+    for (auto next = Clock::now(); !stop.stop_requested(); next += std::chrono::milliseconds(100)) {
+      for (const auto& robot : robots) robot->Publish();
+      std::this_thread::sleep_until(next);
+    }
+  });
+  const auto all_back = [&robots] { return AllBack(robots).has_value(); };
+  if (!test::Eventually(all_back, kLongest)) throw std::runtime_error("the robots have no poses");
   std::mt19937_64 random(context.seed);
-  const int kills = context.runs > 0 ? context.runs : context.Pick(100, 3);
+  const int kills = context.runs > 0 ? context.runs : context.Pick(1000, 3);
   for (int kill = 0; kill < kills; ++kill) {
+    for (const auto& robot : robots) robot->Expect();
+    server->Signal(SIGKILL);
+    server->Wait();
     const auto queries = client::QueryClient::Create(**bus, {.timeout_s = 0.3});
     if (!queries) throw std::runtime_error(queries.error().message);
     const auto start = Clock::now();
-    const auto server = StartServer(place / "state");
+    server = StartServer(state);
     times.tiles_s.push_back(TimeUntil(start, [&] { return HasTiles(**queries); }));
     times.poses_s.push_back(TimeUntil(start, [&] { return HasAllPoses(**queries); }));
+    if (!test::Eventually(all_back, kLongest)) throw std::runtime_error("a robot has no pose after a restart");
+    times.new_poses_s.push_back(std::chrono::duration<double>(*AllBack(robots) - start).count());
+    if (kill % 50 == 49) context.report.Progress(std::to_string(kill + 1) + " kills");
     // The moment of the kill is random.
     std::this_thread::sleep_for(std::chrono::milliseconds(random() % 300));
-    server->Signal(SIGKILL);
-    server->Wait();
   }
+  for (const auto& robot : robots) times.new_sessions += robot->restarted();
   return times;
 }
 
