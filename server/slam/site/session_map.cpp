@@ -39,7 +39,8 @@ std::vector<RecentScan> SessionMap::ScansAround(std::size_t keyframe, double way
   const Stretch stretch = StretchAround(trail_.shapes(), keyframe, way_m);
   std::vector<RecentScan> scans;
   for (std::size_t k = stretch.first; k <= stretch.last; ++k)
-    if (localized(k)) scans.push_back({trail_.keyframes()[k].scan.Share(), own_path_[k], travelled_m(k), *trail_.points(k)});
+    if (localized(k))
+      scans.push_back({trail_.keyframes()[k].scan.Share(), own_path_[k], travelled_m(k), *trail_.points(k)});
   return scans;
 }
 

@@ -28,7 +28,7 @@ struct Keyframe {
     if constexpr (Archive::kReads) {
       auto read = std::make_shared<Scan>();
       archive(*read);
-      self.scan = std::shared_ptr<const Scan>(std::move(read));
+      self.scan = std::move(read);
       self.scan.Pack();
     } else {
       archive(*self.scan);

@@ -20,8 +20,12 @@ class PointCache {
  public:
   // 32 bytes each.
   explicit PointCache(std::size_t max_points) : max_points_(max_points) {}
+  // A copy begins without points.
+  PointCache(const PointCache& other) : max_points_(other.max_points_) {}
+  PointCache& operator=(const PointCache& other) { return *this = PointCache(other); }
   PointCache(PointCache&&) = default;
   PointCache& operator=(PointCache&&) = default;
+  ~PointCache() = default;
 
   // The points of a keyframe; null if they are not here.
   [[nodiscard]] SharedPoints Find(std::size_t keyframe);

@@ -74,6 +74,7 @@ double WayBounds::AtMostM(std::size_t keyframe) const {
 bool WayBounds::AllBelow(std::size_t begin, std::size_t end, double way_m) const {
   std::size_t level = 0;
   while (level + 1 < kLevels && (std::size_t{1} << (kBits * (level + 1))) < end - begin) ++level;
+  if ((std::size_t{1} << (kBits * (level + 1))) < end - begin) return false;
   const std::size_t block = begin >> (kBits * (level + 1));
   for (const Hub& hub : hubs_) {
     const double to_hub_m = hub.ways_m.back();

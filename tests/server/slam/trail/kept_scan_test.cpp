@@ -31,7 +31,7 @@ std::vector<float> Wall(double steps, std::size_t beams) {
   std::normal_distribution<double> noise(0.0, 0.01);
   std::vector<float> ranges;
   for (std::size_t i = 0; i < beams; ++i) {
-    const double range = 4.0 / std::cos(0.005 * static_cast<double>(i) - 0.9) + noise(random);
+    const double range = 4.0 / std::cos(0.0025 * static_cast<double>(i) - 0.9) + noise(random);
     ranges.push_back(static_cast<float>(steps > 0.0 ? std::round(range * steps) / steps : range));
   }
   return ranges;
@@ -58,7 +58,7 @@ TEST(PackFloats, GivesBackEveryBit) {
   }
 }
 
-TEST(PackFloats, TakesHalfOfTheMemoryWhereALidarMeasuresSteps) {
+TEST(PackFloats, TakesAThirdOfTheMemoryWhereALidarMeasuresSteps) {
   EXPECT_LT(ExpectSameAgain(Wall(1000.0, 720)), 1.3);
   EXPECT_LT(ExpectSameAgain(Wall(4000.0, 720)), 1.5);
   EXPECT_LT(ExpectSameAgain(Wall(100.0, 720)), 1.3);
