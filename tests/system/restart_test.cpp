@@ -129,8 +129,9 @@ TEST_F(Restart, TwoRobotsGoOnWhereTheyAreThoughTheServerForgotThem) {
   for (int i = 0; i < kRobots; ++i) {
     Rider& rider = *riders_[static_cast<std::size_t>(i)];
     const Trajectory& truth = fleet_.truth(i);
-    ASSERT_TRUE(Eventually([&] { return rider.poses().contains(truth.back().stamp) || rider.poses().size() >= 119; }))
-        << rider.poses().size() << " poses of " << rider.scans() << " scans";
+    // The last scan may wait for the odometry after it.
+    const auto has_last = [&] { return rider.poses().rbegin()->first >= truth[truth.size() - 2].stamp; };
+    ASSERT_TRUE(Eventually(has_last)) << rider.poses().size() << " poses of " << rider.scans() << " scans";
     EXPECT_EQ(rider.client().restarted(), 2);
     EXPECT_EQ(rider.client().displaced(), 0U);
     // The robot has moved so far that its first start would be wrong.
@@ -138,8 +139,9 @@ TEST_F(Restart, TwoRobotsGoOnWhereTheyAreThoughTheServerForgotThem) {
     EXPECT_GT(moved_m, 2.0);
     // What a few particles drift in this world; the first start is 2 m away and more.
     EXPECT_LT(WorstError(i, truth.front().stamp), 0.6);
-    // What was scanned while no server was there is not lost.
-    EXPECT_GE(rider.poses().size(), 118U);
+    // The twenty that were scanned while no server was there are not lost. Poses on their way to the robot when a
+    // server was killed may be.
+    EXPECT_GE(rider.poses().size(), 110U);
     EXPECT_TRUE(rider.client().pose()->localized);
   }
   // The client of the map has that of the last server and nothing of the ones before. Epochs and versions of each begin
