@@ -84,7 +84,7 @@ void TellRefusals(const Watched& watched) {
 }
 
 constexpr int kStuck = 4;
-constexpr std::chrono::minutes kLongestIllness{1};
+constexpr std::chrono::minutes kLongestUnhealthy{1};
 
 // A thread that is stuck cannot be asked to stop, so nothing is closed. What was called durable is on the disk.
 [[noreturn]] void EndAtOnce() {
@@ -119,7 +119,7 @@ void Look(asio::steady_timer& timer, const Watched& watched, DoorLosses& losses,
 }
 
 // Runs until SIGTERM or SIGINT. Notifies the watchdog while the server is healthy; where there is none, ends the
-// process when it has not been healthy for kLongestIllness.
+// process when it has not been healthy for kLongestUnhealthy.
 void WaitForSignal(asio::io_context& context, asio::signal_set& signals, const Watched& watched,
                    const ServiceNotifier& notifier, ServiceStatus& status) {
   signals.async_wait([&context](const asio::error_code& error, int signal) {
@@ -129,16 +129,17 @@ void WaitForSignal(asio::io_context& context, asio::signal_set& signals, const W
   asio::steady_timer timer(context);
   const auto watchdog = notifier.watchdog();
   const auto period = watchdog ? *watchdog / 3 : std::chrono::microseconds(std::chrono::seconds(1));
-  LastResort last_resort(kLongestIllness);
-  const std::function<void(const asio::error_code&)> feed = [&](const asio::error_code& error) {
+  Heartbeat whole_server(kLongestUnhealthy);
+  const std::function<void(const asio::error_code&)> check = [&](const asio::error_code& error) {
     if (error) return;
     const bool healthy = watched.server.healthy();
     if (healthy) notifier.Alive();
-    if (!watchdog && last_resort.Over(healthy, LastResort::Clock::now())) EndAtOnce();
+    const Pulse pulse{.finished = 0, .busy = !healthy};
+    if (!watchdog && !whole_server.Check({{"server", pulse}}, Heartbeat::Clock::now()).empty()) EndAtOnce();
     timer.expires_after(period);
-    timer.async_wait(feed);
+    timer.async_wait(check);
   };
-  feed({});
+  check({});
   asio::steady_timer second(context);
   DoorLosses losses;
   Look(second, watched, losses, status);

@@ -11,8 +11,7 @@ namespace cairn::server {
 struct MapSnapshot {
   MapInfo info;
   TileSet tiles;  // All levels.
-  // From the enabled map version; if it has none, from the newest version that has
-  // some.
+  // Those of the enabled map version; if it has none, those of the newest version that has some.
   SmoothedPaths smoothed;
 };
 

@@ -8,7 +8,6 @@
 #include <chrono>
 #include <cstdint>
 #include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,24 +35,6 @@ class Heartbeat {
   };
   const Clock::duration limit_;
   std::map<std::string, Beat> beats_;
-};
-
-// Decides when a server ends itself although no service manager watches it: when it has not been healthy for the whole
-// limit. Whatever started it can start it again; a server that answers nobody would help nobody. Not thread-safe.
-class LastResort {
- public:
-  using Clock = std::chrono::steady_clock;
-
-  explicit LastResort(Clock::duration limit) : limit_(limit) {}
-
-  [[nodiscard]] bool Over(bool healthy, Clock::time_point now) {
-    if (healthy || !ill_since_) ill_since_ = healthy ? std::nullopt : std::optional(now);
-    return ill_since_ && now - *ill_since_ >= limit_;
-  }
-
- private:
-  const Clock::duration limit_;
-  std::optional<Clock::time_point> ill_since_;
 };
 
 }  // namespace cairn::server

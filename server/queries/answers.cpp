@@ -114,7 +114,7 @@ Reply AnswerPath(const Request& request, const Sessions& sessions, const Maps& m
   const auto smoothed = paths.find(robot);
   if (smoothed == paths.end()) return refuse("no smoothing job of its site has finished");
   if (smoothed->second.session != 0 && smoothed->second.session != session.id)
-    return refuse("its session has begun after the last smoothing job");
+    return refuse("its session began after the last smoothing job");
   reply.path = *smoothed->second.path;
   return reply;
 }

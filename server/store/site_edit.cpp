@@ -58,7 +58,10 @@ Result<Division> Divide(Store& store, const std::string& site, const std::vector
   for (auto& [number, version] : *versions) {
     StoredVersion gone{.version = number, .job = version.job, .note = version.note, .parts = {}, .smoothed = {}};
     gone.parts = TakeOut(version.parts, [&](const auto& part) { return division.going.contains(part.first); });
-    gone.smoothed = TakeOut(version.smoothed, [&](const auto& path) { return division.robots.contains(path.first); });
+    gone.smoothed = TakeOut(version.smoothed, [&](const auto& path) {
+      const std::uint64_t session = path.second.session;
+      return session == 0 ? division.robots.contains(path.first) : division.going.contains(session);
+    });
     division.staying_versions.push_back(std::move(version));
     division.going_versions.push_back(std::move(gone));
   }

@@ -144,6 +144,11 @@ class Survey {
       if (!IsId(session)) return Unreadable("a map version");
       summary_.session_numbers.insert(session);
     }
+    for (const auto& [robot, path] : version->smoothed) {
+      if (path.session == 0) continue;
+      if (!IsId(path.session)) return Unreadable("a map version");
+      summary_.session_numbers.insert(path.session);
+    }
     if (version->job != 0) summary_.job_numbers.insert(version->job);
     versions_.insert(version->version);
     return {};

@@ -103,10 +103,8 @@ class Renaming {
     for (auto& [session, grid] : version.parts) parts.emplace(Session(session), std::move(grid));
     version.parts = std::move(parts);
     SmoothedPaths smoothed;
-    for (auto& [robot, path] : version.smoothed) {
-      const auto session = sessions_.find(path.session);  // It may be gone.
-      smoothed.emplace(Robot(robot), SmoothedPath{session == sessions_.end() ? 0 : session->second, path.path});
-    }
+    for (auto& [robot, path] : version.smoothed)
+      smoothed.emplace(Robot(robot), SmoothedPath{path.session == 0 ? 0 : Session(path.session), path.path});
     version.smoothed = std::move(smoothed);
   }
   Result<Record> Journal(Record&& record) const {

@@ -46,19 +46,5 @@ TEST_F(HeartbeatTest, ANameThatComesBackStartsAnew) {
   EXPECT_THAT(At(14, {{"robot", {0, true}}}), ElementsAre("robot"));
 }
 
-TEST(LastResort, IsOverWhenNothingWasHealthyForTheWholeLimit) {
-  LastResort resort(seconds(60));
-  const auto over = [&resort](bool healthy, int second) {
-    return resort.Over(healthy, LastResort::Clock::time_point{} + seconds(second));
-  };
-  EXPECT_FALSE(over(true, 0));
-  EXPECT_FALSE(over(false, 100));
-  EXPECT_FALSE(over(false, 159));
-  EXPECT_FALSE(over(true, 160));
-  EXPECT_FALSE(over(false, 161));
-  EXPECT_FALSE(over(false, 220));
-  EXPECT_TRUE(over(false, 221));
-}
-
 }  // namespace
 }  // namespace cairn::server

@@ -58,6 +58,30 @@ TEST(ImportSite, GivesNewNumbersBesideOtherSites) {
   EXPECT_EQ(Everything(*store), before);
 }
 
+// The smoothed path of a session that is gone must not become that of the session that the robot has now, and goes only
+// with its own session.
+TEST(ImportSite, ASmoothedPathKeepsTheSessionThatDroveIt) {
+  const TempDirectory directory;
+  const auto store = MemoryStore();
+  Put(*store, {});
+  const NameId lab = HashName("lab");
+  StoredVersion version = ReadVersions(*store, lab)->at(2);
+  version.smoothed.at("r1").session = 77;
+  ASSERT_TRUE(store->Commit({.removed = {}, .put = {{{RecordKind::kMapVersion, lab, 2}, BytesOf(version)}}}));
+  const auto path = directory / "lab.site";
+  ASSERT_TRUE(WriteSiteFile(*store, "lab", path));
+  const auto other = MemoryStore();
+  const auto imported = ImportSite(*other, path);
+  ASSERT_TRUE(imported) << imported.error().message;
+  const std::uint64_t session = ReadVersions(*other, lab)->at(2).smoothed.at("r1").session;
+  EXPECT_NE(session, 0U);
+  EXPECT_FALSE(imported->sessions.contains(session));
+  EXPECT_TRUE(imported->session_numbers.contains(session));
+  const std::uint64_t of_r1 = imported->sessions.begin()->first;
+  ASSERT_TRUE(DeleteSession(*other, "lab", of_r1));
+  EXPECT_TRUE(ReadVersions(*other, lab)->at(2).smoothed.contains("r1"));
+}
+
 // Otherwise the numbers of a site that is saved, deleted and loaded every day would soon have no room.
 TEST(ImportSite, NumbersGrowByWhatTheFileHoldsAndNotByTheirSize) {
   const TempDirectory directory;

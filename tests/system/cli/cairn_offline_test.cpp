@@ -15,33 +15,19 @@
 #include "common/sensor/trajectory.h"
 #include "tests/child_process.h"
 #include "tests/common/bag/bag_writer.h"
+#include "tests/system/cli/simulated_log.h"
 #include "tests/temp_directory.h"
 
 namespace cairn::client {
 namespace {
 
-class CairnOffline : public ::testing::Test {
+class CairnOffline : public SimulatedLog<20> {
  protected:
-  static void SetUpTestSuite() {
-    logs_ = new TempDirectory;
-    std::ostringstream out, err;
-    const ExitCode code = RunCairn({"sim", "--no-stream", "--robots", "1", "--seconds", "20", "--beams", "181", "--fov",
-                                    "180", "--first-stamp", "1000", "--log-dir", logs_->path().string()},
-                                   out, err);
-    ASSERT_EQ(code, ExitCode::kOk) << err.str();
-  }
-  static void TearDownTestSuite() {
-    delete logs_;
-    logs_ = nullptr;
-  }
-
-  static std::string Log() { return (*logs_ / "robot1.log").string(); }
+  static std::string Log() { return LogFile().string(); }
   static ChildProcess::Outcome Run(std::vector<std::string> arguments) {
     arguments.insert(arguments.begin(), {CAIRN_OFFLINE_PATH, "--set", "slam.particles=30"});
     return ChildProcess(arguments).Wait();
   }
-
-  static inline TempDirectory* logs_ = nullptr;
 };
 
 TEST_F(CairnOffline, SameInputAndSeedGiveTheSameBytesWhateverTheThreads) {

@@ -17,6 +17,7 @@
 #include "common/bag/recording.h"
 #include "tests/child_process.h"
 #include "tests/loopback.h"
+#include "tests/system/cli/simulated_log.h"
 #include "tests/temp_directory.h"
 
 namespace cairn::client {
@@ -101,22 +102,8 @@ class ListenedRobot {
   std::unique_ptr<wire::Subscription> states_;
 };
 
-class CairnRecord : public ::testing::Test {
+class CairnRecord : public SimulatedLog<12> {
  protected:
-  static void SetUpTestSuite() {
-    logs_ = new TempDirectory;
-    std::ostringstream out, err;
-    const ExitCode code = RunCairn({"sim", "--no-stream", "--robots", "1", "--seconds", "12", "--beams", "181", "--fov",
-                                    "180", "--first-stamp", "1000", "--log-dir", logs_->path().string()},
-                                   out, err);
-    ASSERT_EQ(code, ExitCode::kOk) << err.str();
-  }
-  static void TearDownTestSuite() {
-    delete logs_;
-    logs_ = nullptr;
-  }
-  static std::filesystem::path Log() { return *logs_ / "robot1.log"; }
-
   void StartServer() {
     server_.emplace(std::vector<std::string>{CAIRND_PATH, "--domain", Domain(), "--set", "slam.particles=20",
                                              "--log-level", "info"});
@@ -130,7 +117,7 @@ class CairnRecord : public ::testing::Test {
   [[nodiscard]] std::filesystem::path File() const { return directory_ / "out.mcap"; }
   // Sends the log from its beginning, again and again with later stamps, until the condition holds.
   static bool DriveUntil(ListenedRobot& robot, const std::function<bool()>& condition) {
-    const Drive log = Read(Log());
+    const Drive log = Read(LogFile());
     const Stamp span = log.odometries.back().stamp - log.odometries.front().stamp + 20'000'000;
     std::size_t odometry = 0;
     for (std::size_t i = 0; i < 100 * log.scans.size(); ++i) {
@@ -144,7 +131,6 @@ class CairnRecord : public ::testing::Test {
     return false;
   }
 
-  static inline TempDirectory* logs_ = nullptr;
   TempDirectory directory_;
   std::optional<ChildProcess> server_;
 };
@@ -152,10 +138,10 @@ class CairnRecord : public ::testing::Test {
 TEST_F(CairnRecord, ADriveIsReadBackBitForBitAndGivesTheSameTrajectory) {
   ASSERT_NO_FATAL_FAILURE(StartServer());
   ChildProcess recorder(Command({"--map-every", "0.2"}));
-  const Drive log = Read(Log());
+  const Drive log = Read(LogFile());
   {
     ListenedRobot robot("r1", 2);
-    Must(ReadRecording(Log(), {}, [&](LogRecord&& record) {
+    Must(ReadRecording(LogFile(), {}, [&](LogRecord&& record) {
       robot.Publish(std::move(record));
       return !::testing::Test::HasFatalFailure();
     }));
@@ -201,7 +187,7 @@ TEST_F(CairnRecord, ADriveIsReadBackBitForBitAndGivesTheSameTrajectory) {
     EXPECT_EQ(run.exit_code, 0) << run.output;
     return directory_.Read(name);
   };
-  const std::string expected = trajectory(Log(), "log.tum");
+  const std::string expected = trajectory(LogFile(), "log.tum");
   EXPECT_GT(expected.size(), 1000U);
   EXPECT_TRUE(trajectory(File(), "mcap.tum") == expected);
 
