@@ -44,6 +44,8 @@ Server::Server(const ServerOptions& options, Inbound& inbound, Outbound& outboun
       worker_(
           options.jobs, jobs_,
           [this](const Job& job, bool enable, const JobControl& control) { return smooth_.Run(job, enable, control); }),
+      joiner_(options.jobs, roster_, jobs_, worker_),
+      start_check_(options.jobs, roster_, atlas_),
       saved_sites_(saved, BytesOf(options.store.max_saved_gib), journal, {outbound, roster_, atlas_, jobs_, worker_}),
       desk_(static_cast<std::size_t>(options.server.query_queue), outbound, roster_, atlas_, jobs_, worker_,
             saved_sites_, generation, journal),
@@ -112,6 +114,8 @@ void Server::KeepHouse(const std::stop_token& stop) {
     try {
       roster_.Tick();
       jobs_.Tick();
+      joiner_.Tick();
+      start_check_.Tick();
       if (Clock::now() >= next_publish) {
         next_publish = std::max(next_publish + publish_period, Clock::now());
         atlas_.Publish();
@@ -182,7 +186,6 @@ void Server::Stop() {
   saved_sites_.Stop();
   worker_.Stop();
   FinishSessions();
-  atlas_.Publish();
   atlas_.Close();
   robots_pool_.join();
   maps_pool_.join();

@@ -17,7 +17,9 @@
 
 #include "server/inbound.h"
 #include "server/jobs/job_worker.h"
+#include "server/jobs/joiner.h"
 #include "server/jobs/smooth_job.h"
+#include "server/jobs/start_check.h"
 #include "server/maps/atlas.h"
 #include "server/ops/heartbeat.h"
 #include "server/options.h"
@@ -77,6 +79,8 @@ class Server {
   JobList jobs_;
   const SmoothJob smooth_;
   JobWorker worker_;
+  Joiner joiner_;           // Used by housekeeping only, ...
+  StartCheck start_check_;  // ... as this.
   SavedSites saved_sites_;
   Desk desk_;
   Heartbeat heartbeat_;

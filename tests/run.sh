@@ -265,6 +265,8 @@ for stage in "${stages[@]}"; do
     77) echo "   $(grep -m 1 '^SKIPPED' "$log" || echo "SKIPPED")" ;;
     *)
       tail -n 150 "$log"
+      # The causes once more, where they are seen: a test that failed may have printed much after its own.
+      grep -A 3 -e ': Failure$' -e 'runtime error: ' -e '^SUMMARY: ' -e 'does not hold' -e ' error: ' "$log" | tail -n 40 || true
       echo "FAILED in stage $stage after ${took} s; the whole output: ${log#"$root"/}"
       finish
       exit 1 ;;

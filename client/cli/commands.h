@@ -28,6 +28,7 @@ void AddSite(CLI::App& app, Program& program);  // All commands of sites; those 
 void AddStoredSites(CLI::App& site, Program& program);
 ExitCode ListSites(Program& program);  // The sites of the running server.
 void AddSession(CLI::App& app, Program& program);
+void AddRobot(CLI::App& app, Program& program);
 void AddRos2(CLI::App& app, Program& program);
 
 }  // namespace cairn::client

@@ -92,6 +92,7 @@ ExitCode RunCairn(const std::vector<std::string>& arguments, std::ostream& out, 
   AddTop(app, program);
   AddJob(app, program);
   AddSession(app, program);
+  AddRobot(app, program);
   AddRos2(app, program);
   AddSite(app, program);
   AddCheckLog(app, program);

@@ -85,6 +85,7 @@ void AddSim(CLI::App& app, Program& program) {
       "Worlds that come with the program:" + worlds +
       ". client/sim/README.md explains how to write others.\n"
       "Each robot tells the server its true start, so the poses in the map can be compared with the truth directly.\n"
+      "With --unknown-starts the frame of the map is the start of the first robot.\n"
       "The same seed gives the same scans. Exit code 1 if the server cannot say what became of a scan.\n"
       "EXAMPLES\n  cairn sim --world building --robots 3 --site hall --seconds 120 --truth-dir truth\n"
       "  cairn sim --robots 16 --beams 360 --hz 10 --site load --watch-pid $(pidof cairnd)\n"
@@ -112,6 +113,11 @@ void AddSim(CLI::App& app, Program& program) {
   command->add_option("--first-stamp", arguments->first_stamp_s, "Stamp of the first record; 0: now")
       ->check(CLI::NonNegativeNumber)
       ->type_name("SECONDS");
+  command->add_flag(
+      "!--unknown-starts", options->starts_known,
+      "The robots do not say where they start. The first one begins the map; the others are joined with it "
+      "once they have seen enough of the same places");
+  command->add_flag("!--unseen", options->fleet.see_each_other, "The robots do not appear in each other's scans");
   command->add_flag("--end", options->end, "End the sessions afterwards; without this they can be resumed");
   command
       ->add_option("--watch-pid", options->watched_pid,

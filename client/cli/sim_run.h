@@ -22,6 +22,7 @@ struct SimRunOptions {
   bool fast = false;
   std::uint64_t window = 0;  // Unsettled scans per robot, at most; 0: no limit, or kFastWindow with `fast`.
   bool stream = true;        // False: no server; only the files are written.
+  bool starts_known = true;  // Whether the robots say where they start.
   bool end = false;
   std::string truth_dir;  // <robot>.tum: true poses at the scans' stamps.
   std::string log_dir;    // <robot>.log: CARMEN logs of what was streamed.

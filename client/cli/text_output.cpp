@@ -35,8 +35,9 @@ std::string FormatJob(const Job& job) {
   if (job.ended > job.started && job.started > 0)
     line += ", took " + FormatDuration(SecondsFromStamp(job.ended - job.started));
   if (job.state == JobState::kSucceeded) {
-    line += fmt::format(", cost {:.4g} -> {:.4g}", job.cost_before, job.cost_after);
-    if (job.map_version > 0) line += fmt::format(", map version {}", job.map_version);
+    // A job that had nothing to join has made no map to compare.
+    if (job.map_version > 0)
+      line += fmt::format(", cost {:.4g} -> {:.4g}, map version {}", job.cost_before, job.cost_after, job.map_version);
   }
   if (!job.message.empty()) line += ": " + job.message;
   return line;

@@ -253,6 +253,12 @@ Result<void> QueryClient::EndSession(const std::string& robot) {
   return Ask(AboutRobot(RequestKind::kSessionEnd, robot)).map([](Reply&&) {});
 }
 
+Result<void> QueryClient::Relocalise(const std::string& robot, const std::optional<Pose2>& T_map_robot) {
+  Request request = AboutRobot(RequestKind::kRelocalise, robot);
+  request.T_map_robot = T_map_robot;
+  return Ask(request).map([](Reply&&) {});
+}
+
 Result<std::vector<MapInfo>> QueryClient::Maps() {
   return Ask(MakeRequest(RequestKind::kMapInfo)).map([](Reply&& reply) { return std::move(reply.maps); });
 }

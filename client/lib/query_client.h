@@ -88,6 +88,10 @@ class QueryClient {
   [[nodiscard]] Result<Ros2Report> Ros2();
   // Ends the robot's session for good.
   [[nodiscard]] Result<void> EndSession(const std::string& robot);
+  // The robot is not where the server believes. It is not localized until it has been found in its map: near
+  // `T_map_robot` where that is given, else anywhere. kFailedPrecondition: a pose is given, and the robot is not joined
+  // with the map of its site.
+  [[nodiscard]] Result<void> Relocalise(const std::string& robot, const std::optional<Pose2>& T_map_robot = {});
 
   // All maps.
   [[nodiscard]] Result<std::vector<MapInfo>> Maps();

@@ -194,7 +194,10 @@ void RobotClient::OnLedger(Ledger&& ledger) {
     Stream& stream = found->second;
     const std::uint64_t before = stream.window.settled_through();
     stream.window.OnLedger(ledger);
-    if (stream.window.settled_through() != before) progress_ = Clock::now();
+    if (stream.window.settled_through() != before) {
+      progress_ = Clock::now();
+      pace_ = kFirstPace / 2;
+    }
     stream.ledger = ledger;
     Arrived(stream, ledger.last_sequence);
     backlog_.Safe(ledger.sensor_id, state_->durable ? ledger.durable_through : ledger.settled_through);
@@ -285,12 +288,11 @@ void RobotClient::Watch() {
       if (!stopping_) changed_.WaitFor(mutex_, std::chrono::milliseconds(100));
       if (stopping_) return;
       const auto now = Clock::now();
-      bool waiting = false;
-      for (const auto& [sensor, stream] : streams_) waiting = waiting || !stream.window.settled();
-      if (waiting && Streaming() && now - progress_ > std::chrono::duration<double>(options_.resend_after_s)) {
+      if (!Settled() && Streaming() && now - progress_ > std::chrono::duration<double>(options_.resend_after_s)) {
         sent_before_ = backlog_.size() - backlog_.unsent();
         backlog_.Rewind();
         progress_ = now;
+        pace_ = std::min(2 * pace_, kLastPace);
         ask = true;  // The server may have forgotten the session, too.
       }
       reopen = reopening_ && ReadyToReopen();

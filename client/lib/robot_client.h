@@ -147,6 +147,8 @@ class RobotClient {
   [[nodiscard]] std::string Silence(Clock::time_point now) CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool Moving() const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool RenewalDue(Clock::time_point now) CAIRN_REQUIRES(mutex_);
+  // Whether every sample has settled.
+  [[nodiscard]] bool Settled() const CAIRN_REQUIRES(mutex_);
   void StartOver(Clock::time_point now) CAIRN_REQUIRES(mutex_);
   void Recover();
   void Renew();
@@ -179,6 +181,11 @@ class RobotClient {
   Clock::time_point asked_ CAIRN_GUARDED_BY(mutex_);
   Clock::time_point refused_ CAIRN_GUARDED_BY(mutex_);  // When reopening began.
   Clock::time_point progress_ CAIRN_GUARDED_BY(mutex_);
+  // Largest number of scans that were sent again and have not settled. At first fewer than fit into the server's queue
+  // and the writer's history. Doubled with each time that all is sent again and nothing has settled: the server may
+  // wait for odometry that stands behind these scans.
+  static constexpr std::uint64_t kFirstPace = 32, kLastPace = 4096;
+  std::uint64_t pace_ CAIRN_GUARDED_BY(mutex_) = kFirstPace / 2;
   bool stopping_ CAIRN_GUARDED_BY(mutex_) = false;
 
   // Recovery.

@@ -1,20 +1,13 @@
 // The part of RobotClient that sends samples: new ones, and those that must be sent later or again.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "client/lib/deadline.h"
 #include "client/lib/robot_client.h"
 
 namespace cairn::client {
-namespace {
-
-// Largest number of scans that were sent again and have not settled: fewer than fit into the server's queue and the
-// writer's history.
-constexpr std::uint64_t kPace = 32;
-
-}  // namespace
-
 Result<void> RobotClient::AwaitRoom(const Stream& stream) {
   const auto deadline = DeadlineAfter(options_.send_timeout_s);
   for (;;) {
@@ -77,12 +70,16 @@ Result<void> RobotClient::Publish(const Odometry& odometry) {
   return AddAndSend(OdometrySample{{robot_id_, sensor_id, 0}, odometry}, *stream);
 }
 
+bool RobotClient::Settled() const {
+  return std::ranges::all_of(streams_, [](const auto& entry) { return entry.second.window.settled(); });
+}
+
 // Numbers and keeps the sample, and sends it at once if no other sample waits before it.
 Result<void> RobotClient::AddAndSend(StreamedSample&& sample, Stream& stream) {
   std::shared_ptr<const StreamedSample> next;
   {
     const MutexLock lock(mutex_);
-    if (stream.window.settled()) progress_ = Clock::now();
+    if (Settled()) progress_ = Clock::now();
     const SessionToken session = request_.session;
     std::visit([session](auto& one) { one.stream.session = session; }, sample);
     if (auto* const scan = std::get_if<ScanSample>(&sample)) {
@@ -142,7 +139,8 @@ void RobotClient::Pump() {
       if (stopping_ || !Streaming()) return;
       if (const auto scan = backlog_.next_scan()) {
         const ScanWindow& window = streams_.find(scan->first)->second.window;
-        if (scan->second > window.settled_through() + kPace) return;  // Watch continues with the next ledger.
+        // Watch continues with the next ledger.
+        if (scan->second > window.settled_through() + std::max(pace_, kFirstPace)) return;
       }
       sample = backlog_.Next();
       if (sample == nullptr) return;

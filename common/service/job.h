@@ -11,7 +11,10 @@
 
 namespace cairn {
 
-enum class JobKind : std::uint8_t { kSmooth = 0 };
+enum class JobKind : std::uint8_t {
+  kSmooth = 0,  // Smooths the paths of all robots of a site.
+  kJoin,        // The same, but changes nothing unless a robot that was not joined with the map can be joined now.
+};
 enum class JobState : std::uint8_t { kQueued = 0, kRunning, kSucceeded, kFailed, kCancelled };
 [[nodiscard]] std::string_view JobKindName(JobKind kind);
 [[nodiscard]] std::string_view JobStateName(JobState state);

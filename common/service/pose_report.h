@@ -20,6 +20,9 @@ enum class PoseReason : std::uint8_t {
   kLost,          // Too far by odometry alone, or the estimate contradicts the scans.
   kDiverged,      // The filter's belief contradicts what is seen, or failed numerically.
   kWaiting,       // No scan used yet.
+  // Nobody has said where the robot started, and what it has seen is not joined with the map of the site yet: its pose
+  // is relative to its start, and its part of the map is not shown.
+  kNotJoined,
 };
 [[nodiscard]] std::string_view PoseReasonName(PoseReason reason);
 

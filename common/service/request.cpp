@@ -6,9 +6,9 @@ namespace cairn {
 
 std::string_view RequestKindName(RequestKind kind) {
   static constexpr std::array<std::string_view, kRequestKindCount> kNames = {
-      "ping",       "pose",       "path",      "tiles",      "landmarks",   "map_info",
-      "status",     "job_submit", "job_get",   "job_cancel", "job_list",    "session_end",
-      "map_enable", "saved_list", "site_save", "site_load",  "site_delete", "ros2"};
+      "ping",       "pose",      "path",        "tiles",    "landmarks",   "map_info",   "status",
+      "job_submit", "job_get",   "job_cancel",  "job_list", "session_end", "map_enable", "saved_list",
+      "site_save",  "site_load", "site_delete", "ros2",     "relocalise"};
   const auto index = static_cast<std::size_t>(kind);
   return index < kNames.size() ? kNames[index] : "unknown";
 }
@@ -22,6 +22,7 @@ bool IsCommand(RequestKind kind) {
     case RequestKind::kSiteSave:
     case RequestKind::kSiteLoad:
     case RequestKind::kSiteDelete:
+    case RequestKind::kRelocalise:
       return true;
     case RequestKind::kPing:
     case RequestKind::kPose:

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,8 +39,9 @@ enum class RequestKind : std::uint8_t {
   kSiteLoad,    // saved, site (empty: as in the file).
   kSiteDelete,  // site, or saved: then that file.
   kRos2,        // What the door for ROS 2 robots sees.
+  kRelocalise,  // robot; T_map_robot (where it is) or nothing (it is not known).
 };
-inline constexpr int kRequestKindCount = 18;
+inline constexpr int kRequestKindCount = 19;
 [[nodiscard]] std::string_view RequestKindName(RequestKind kind);
 // Whether it changes something, and is therefore sent as a Command.
 [[nodiscard]] bool IsCommand(RequestKind kind);
@@ -68,6 +70,7 @@ struct Request {
   std::uint32_t map_version = 0;  // kMapEnable.
   // kSiteSave, kSiteLoad, kSiteDelete: the name of a file in the server's directory of saved sites.
   std::string saved;
+  std::optional<Pose2> T_map_robot;  // kRelocalise.
 };
 
 // A request that changes something. It has a topic of its own, because DDS Security gives permissions by topic.

@@ -174,7 +174,7 @@ Result<void> CheckBounds(const v1::PoseReport& report) {
   return Bounds()
       .Name("robot", report.robot())
       .Name("site", report.site())
-      .Known("reason", report.reason(), v1::POSE_WAITING)
+      .Known("reason", report.reason(), v1::POSE_NOT_JOINED)
       .result();
 }
 
@@ -201,7 +201,7 @@ Result<void> CheckBounds(const v1::Tile& tile) {
 Result<void> CheckBounds(const v1::Job& job) {
   return Bounds()
       .Name("site", job.site())
-      .Known("kind", job.kind(), v1::JOB_SMOOTH)
+      .Known("kind", job.kind(), v1::JOB_JOIN)
       .Known("state", job.state(), v1::JOB_CANCELLED)
       .Text("message", job.message())
       .result();
@@ -209,11 +209,11 @@ Result<void> CheckBounds(const v1::Job& job) {
 
 Result<void> CheckBounds(const v1::Request& request) {
   return Bounds()
-      .Known("kind", request.kind(), v1::REQUEST_ROS2)
+      .Known("kind", request.kind(), v1::REQUEST_RELOCALISE)
       .Name("site", request.site())
       .Name("robot", request.robot())
       .Within("level", request.level(), 0, kMaxTileLevel)
-      .Known("job_kind", request.job_kind(), v1::JOB_SMOOTH)
+      .Known("job_kind", request.job_kind(), v1::JOB_JOIN)
       .Name("saved", request.saved())
       .result();
 }

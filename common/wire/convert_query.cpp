@@ -182,6 +182,8 @@ v1::Request ToWire(const Request& value) {
   wire.enable(value.enable);
   wire.map_version(value.map_version);
   wire.saved(value.saved);
+  wire.has_pose(value.T_map_robot.has_value());
+  wire.T_map_robot(ToWire(value.T_map_robot.value_or(Pose2{})));
   return wire;
 }
 
@@ -205,6 +207,7 @@ Request FromWire(v1::Request&& wire) {
   value.enable = wire.enable();
   value.map_version = wire.map_version();
   value.saved = std::move(wire.saved());
+  if (wire.has_pose()) value.T_map_robot = FromWire(wire.T_map_robot());
   return value;
 }
 

@@ -16,6 +16,16 @@ void Visit(OptionVisitor& visitor, JobsOptions& options) {
       "joint", options.joint,
       "Whether a smoothing job also looks for places that several robots of the site have seen, and smooths all "
       "robots together. This takes one to three seconds per hundred metres of way and per pair of robots.");
+  visitor.Flag("join", options.join,
+               "Whether robots that have not said where they start in a site with a map are joined with this map by "
+               "themselves, as soon as they have seen enough of the same places. Otherwise a smoothing job joins them. "
+               "Has no effect unless `joint` is true.");
+  visitor.Real("join_way_m", options.join_way_m, "m", 1.0, 1e5,
+               "How far such a robot, and the others of the site together, must have driven before it is tried for the "
+               "first time. It is tried again whenever it or they have driven a quarter more.");
+  visitor.Flag("check_starts", options.check_starts,
+               "Whether a robot whose first metres contradict what others have drawn there is taken for one that has "
+               "not said where it starts.");
   visitor.Require(options.max_queued < options.max_kept, "max_queued", "must be below", "max_kept");
 }
 

@@ -13,6 +13,9 @@ struct JobsOptions {
   std::int64_t nice = 10;
   double snapshot_timeout_s = 10;
   bool joint = true;
+  bool join = true;
+  double join_way_m = 20;
+  bool check_starts = true;
 };
 void Visit(OptionVisitor& visitor, JobsOptions& options);
 

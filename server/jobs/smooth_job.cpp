@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -37,15 +38,44 @@ constexpr double kShareOfJoining = 0.5;  // Of the progress.
 
 // Nothing: cancelled.
 std::optional<std::vector<slam::SmoothedSession>> SmoothTogether(const std::vector<SessionMaterial>& material,
-                                                                 const slam::SiteOptions& site,
+                                                                 const slam::SiteOptions& site, JobKind kind,
                                                                  const JobControl& control) {
   std::vector<slam::SiteSession> sessions;
   sessions.reserve(material.size());
   for (const SessionMaterial& session : material) sessions.push_back({session.snapshot, session.start_known});
-  return slam::SmoothSessions(sessions, site, [&control](double share) {
+  const auto go_on = [&control](double share) {
     control.Progress(kShareOfJoining * share);
     return !control.cancelled();
-  });
+  };
+  return slam::SmoothSessions(sessions, site, go_on,
+                              kind == JobKind::kJoin ? slam::SiteSearch::kFragments : slam::SiteSearch::kAll);
+}
+
+// For each session, whether it is shown: its place in the map is known, or it is joined with one whose place is known.
+std::vector<bool> Shown(const std::vector<SessionMaterial>& material, const std::vector<slam::SmoothedSession>& joint) {
+  const auto frame_of = [&joint](std::size_t i) { return joint[i].joined ? joint[i].frame : i; };
+  std::set<std::size_t> frames;
+  for (std::size_t i = 0; i < material.size(); ++i) {
+    if (material[i].start_known) frames.insert(frame_of(i));
+  }
+  std::vector<bool> shown(material.size());
+  for (std::size_t i = 0; i < material.size(); ++i) shown[i] = frames.contains(frame_of(i));
+  return shown;
+}
+
+bool JoinsAny(const std::vector<SessionMaterial>& material, const std::vector<bool>& shown) {
+  for (std::size_t i = 0; i < material.size(); ++i) {
+    if (shown[i] && !material[i].start_known) return true;
+  }
+  return false;
+}
+
+std::string Counts(const std::vector<SessionMaterial>& material) {
+  std::set<std::string> robots;
+  for (const SessionMaterial& session : material) robots.insert(session.robot);
+  std::string counts = std::to_string(robots.size()) + " robots";
+  if (robots.size() < material.size()) counts += " in " + std::to_string(material.size()) + " sessions";
+  return counts;
 }
 
 // What a person wants to know of the joint smoothing: at most as many robots as fit on a line.
@@ -81,9 +111,18 @@ Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMateria
   const bool together = site != nullptr && material.size() > 1;
   std::vector<slam::SmoothedSession> joint(material.size());
   if (together) {
-    auto smoothed = SmoothTogether(material, *site, control);
+    auto smoothed = SmoothTogether(material, *site, job.kind, control);
     if (!smoothed) return Fail(StatusCode::kCancelled, "cancelled");
     joint = *std::move(smoothed);
+  }
+  const std::vector<bool> shown = Shown(material, joint);
+  std::string summary =
+      Counts(material) + ", " + std::to_string(keyframes) + " keyframes, " + std::to_string(scans) + " scans";
+  if (together) summary += Joins(material, joint);
+  SmoothedSite smoothed;
+  if (job.kind == JobKind::kJoin && !JoinsAny(material, shown)) {
+    smoothed.outcome.message = "nothing to join yet: " + summary;
+    return smoothed;
   }
   // The rest of the progress is the share of scans drawn and compared.
   const double begun = together ? kShareOfJoining : 0.0;
@@ -94,8 +133,8 @@ Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMateria
     return !control.cancelled();
   };
   slam::Disagreement before, after;
-  SmoothedSite smoothed;
-  smoothed.version.info.job = job.id;
+  MapVersion version;
+  version.info.job = job.id;
   for (std::size_t i = 0; i < material.size(); ++i) {
     const SessionMaterial& session = material[i];
     const slam::MapperSnapshot& snapshot = session.snapshot;
@@ -105,15 +144,16 @@ Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMateria
     if (!map) return Fail(StatusCode::kCancelled, "cancelled");
     before.Add(map->before);
     after.Add(map->after);
-    smoothed.version.smoothed[session.robot] = {
-        session.session, std::make_shared<const Trajectory>(snapshot.TrajectoryAlong(map->path))};
-    smoothed.version.parts[session.session] = {map->grid.Share(), snapshot.keyframes.size(),
-                                               std::make_shared<const std::vector<Pose2>>(std::move(map->path))};
+    if (shown[i])
+      version.smoothed[session.robot] = {session.session,
+                                         std::make_shared<const Trajectory>(snapshot.TrajectoryAlong(map->path))};
+    version.parts[session.session] = {.chunks = map->grid.Share(),
+                                      .keyframes = snapshot.keyframes.size(),
+                                      .path = std::make_shared<const std::vector<Pose2>>(std::move(map->path)),
+                                      .fragment = !shown[i]};
   }
-  std::string summary = std::to_string(material.size()) + " robots, " + std::to_string(keyframes) + " keyframes, " +
-                        std::to_string(scans) + " scans";
-  if (together) summary += Joins(material, joint);
-  smoothed.version.info.note = "smoothed: " + summary;
+  version.info.note = "smoothed: " + summary;
+  smoothed.version = std::move(version);
   smoothed.outcome = {
       .cost_before = before.mean_m2(), .cost_after = after.mean_m2(), .map_version = 0, .message = summary};
   return smoothed;
@@ -125,8 +165,9 @@ Result<JobOutcome> SmoothJob::Run(const Job& job, bool enable, const JobControl&
   auto smoothed = SmoothSite(job, *material, options_.joint ? &site_ : nullptr, control);
   if (!smoothed) return tl::unexpected(smoothed.error());
   JobOutcome outcome = std::move(smoothed->outcome);
+  if (!smoothed->version) return outcome;
   const auto number = Await(job.site, control, [&](Site& site, Site::Done done, Site::Wanted wanted) {
-    site.AddVersion(std::move(smoothed->version), std::move(done), std::move(wanted));
+    site.AddVersion(*std::move(smoothed->version), std::move(done), std::move(wanted));
   });
   if (!number) return tl::unexpected(number.error());
   outcome.map_version = *number;

@@ -2,12 +2,15 @@
 // particle (fitted to all steps, revisits and loops: slam/smoothing) and draws the robot's grid along the
 // smoothed path. The paths of robots that have seen the same places are fitted together (slam/site); a robot whose
 // start was unknown or wrong moves to where the others have seen the same. The result is published as a new map
-// version, which is disabled at first. Source: thesis A 5.4 (full-SLAM path of the best particle). Thread rule: runs on
+// version, which is disabled at first. A robot whose place in the map is not known and that is not joined with one
+// whose place is known stays a fragment in the new version (maps/robot_grid.h). A job of the kind kJoin makes no
+// version unless it joins a fragment. Source: thesis A 5.4 (full-SLAM path of the best particle). Thread rule: runs on
 // the job worker's thread. It waits for the sessions and for the site, at most jobs.snapshot_timeout_s each, and for a
 // switch of versions that has begun until it is complete; no other thread waits for it.
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,8 +24,8 @@ namespace cairn::server {
 
 // The result of smoothing a site, before it is published.
 struct SmoothedSite {
-  MapVersion version;
-  JobOutcome outcome;  // Its map_version is still 0.
+  std::optional<MapVersion> version;  // Nothing: a job of the kind kJoin has found nothing to join.
+  JobOutcome outcome;                 // Its map_version is still 0.
 };
 
 // A pure function: the same material gives the same result. Progress is reported from 0 to 1. `site`: how robots are

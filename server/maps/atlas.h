@@ -54,7 +54,8 @@ class Atlas {
   // Every site publishes what changed. Another one is the first each time, and the others wait for it, because one site
   // may fill the lane.
   void Publish();
-  // The server stops: closes every site and waits until all have come to it. REQUIRES: the pool is running.
+  // The server stops: closes every site, which publishes what has changed, and waits for all. REQUIRES: the pool is
+  // running.
   void Close();
 
  private:

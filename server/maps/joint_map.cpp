@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/maps/grid_agreement.h"
+
 namespace cairn::server {
 namespace {
 
@@ -30,6 +32,35 @@ slam::OccupancyGrid::Chunks JointMap::ChunksOf(SessionId session) const {
     if (layer != layers.end()) mine.emplace(key, layer->second);
   }
   return mine;
+}
+
+slam::OccupancyGrid::Chunks JointMap::DrawnBefore(SessionId session) const {
+  constexpr int kAround = 2;  // Chunks.
+  std::set<slam::ChunkKey> area;
+  for (const auto& [key, layers] : chunks_) {
+    if (!layers.contains(session)) continue;
+    for (int dy = -kAround; dy <= kAround; ++dy)
+      for (int dx = -kAround; dx <= kAround; ++dx) area.insert({key.x + dx, key.y + dy});
+  }
+  std::map<SessionId, slam::OccupancyGrid::Chunks> grids;
+  for (const slam::ChunkKey& key : area) {
+    const auto layers = chunks_.find(key);
+    if (layers == chunks_.end()) continue;
+    for (const auto& [other, chunk] : layers->second)
+      if (other < session && !hidden_.contains(other)) grids[other].emplace(key, chunk);
+  }
+  std::vector<const slam::OccupancyGrid::Chunks*> summed;
+  summed.reserve(grids.size());
+  for (const auto& [other, grid] : grids) summed.push_back(&grid);
+  return SumOfGrids(summed);
+}
+
+void JointMap::SetHidden(SessionId session, bool hidden) {
+  const bool changed = hidden ? hidden_.insert(session).second : hidden_.erase(session) > 0;
+  if (!changed) return;
+  for (const auto& [key, layers] : chunks_) {
+    if (layers.contains(session)) dirty_.insert(key);
+  }
 }
 
 void JointMap::SetLayer(slam::ChunkKey key, SessionId session, std::shared_ptr<const slam::GridChunk> chunk) {
@@ -80,12 +111,15 @@ bool JointMap::Store(TileKey key, Cells cells) {
 JointMap::Cells JointMap::Sum(slam::ChunkKey key) const {
   const auto found = chunks_.find(key);
   if (found == chunks_.end()) return nullptr;
-  const Layers& layers = found->second;
+  std::vector<const slam::GridChunk*> shown;
+  for (const auto& [session, chunk] : found->second) {
+    if (!hidden_.contains(session)) shown.push_back(chunk.get());
+  }
   auto cells = std::make_shared<TileCells>();
   for (std::size_t i = 0; i < cells->size(); ++i) {
     int sum = 0;
     bool seen = false;
-    for (const auto& [session, chunk] : layers) {
+    for (const slam::GridChunk* const chunk : shown) {
       const std::int16_t log_odds = chunk->log_odds[i];
       if (log_odds == slam::kUnseen) continue;
       seen = true;

@@ -26,6 +26,12 @@ class JointMap {
   // Replaces the whole grid of one session.
   void Replace(SessionId session, const slam::OccupancyGrid::Chunks& chunks);
   [[nodiscard]] slam::OccupancyGrid::Chunks ChunksOf(SessionId session) const;
+  // The grids of hidden sessions are kept, but are not part of the sum. A session is shown unless it was hidden.
+  void SetHidden(SessionId session, bool hidden);
+  [[nodiscard]] const std::set<SessionId>& hidden() const { return hidden_; }
+
+  // The sum of the grids of the sessions before this one that are shown, in and around the area of its own grid.
+  [[nodiscard]] slam::OccupancyGrid::Chunks DrawnBefore(SessionId session) const;
 
   // Updates cells(). Returns the tiles of all levels that changed, were added or were removed.
   std::vector<TileKey> Render();
@@ -41,6 +47,7 @@ class JointMap {
   Cells Reduce(TileKey parent) const;
 
   std::map<slam::ChunkKey, Layers> chunks_;
+  std::set<SessionId> hidden_;
   std::set<slam::ChunkKey> dirty_;
   std::map<TileKey, Cells> cells_;
 };

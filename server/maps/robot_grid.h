@@ -23,6 +23,8 @@ struct RobotGrid {
   // T_map_robot of these keyframes in this grid. The estimator's path follows it (slam::Mapper::AdoptGrid). Null: it is
   // not known, and the path stays.
   std::shared_ptr<const std::vector<Pose2>> path{};
+  // Whether it is not joined with the map of the site: it has a frame of its own and is not shown.
+  bool fragment = false;
 };
 
 // The changed chunks of one session's grid (null: removed).

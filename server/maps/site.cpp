@@ -130,15 +130,29 @@ void Site::Apply(SessionId session, const slam::OccupancyGrid::Chunks& chunks) {
   joint_.Apply({session, {chunks.begin(), chunks.end()}});
 }
 
-void Site::Join(NameId robot, SessionId session, std::weak_ptr<GridOwner> owner, std::uint32_t epoch) {
-  Run([robot, session, owner = std::move(owner), epoch](Site& site) {
-    site.members_[robot] = {session, owner};
-    std::erase_if(site.members_, [](const auto& member) { return member.second.owner.expired(); });
+void Site::Join(Member member) {
+  Run([member = std::move(member)](Site& site) {
+    site.members_[member.session] = member;
+    std::erase_if(site.members_, [](const auto& one) { return one.second.owner.expired(); });
+    site.joint_.SetHidden(member.session, member.fragment);
     site.info_changed_ = true;
     site.StoreSite();
     // The map may have been switched since the session was made, or since the server that made it was killed.
-    if (epoch == site.epoch_) return;
-    if (const auto known = owner.lock()) known->SetMapEpoch(site.epoch_);
+    if (member.epoch == site.epoch_) return;
+    if (const auto known = member.owner.lock()) known->SetMapEpoch(site.epoch_);
+  });
+}
+
+void Site::CheckStart(SessionId session, const Pose2& T_map_robot, Refuses refuses) {
+  Run([session, T_map_robot, refuses = std::move(refuses)](Site& site) {
+    GridAgreement agreement;
+    if (!site.switch_)
+      agreement = CompareGrids(site.joint_.ChunksOf(session), site.joint_.DrawnBefore(session), T_map_robot,
+                               site.resolution_m_);
+    if (!refuses(agreement)) return;
+    site.joint_.SetHidden(session, true);
+    site.info_changed_ = true;
+    site.StoreSite();
   });
 }
 
@@ -180,6 +194,8 @@ void Site::Retire(std::function<void(std::shared_ptr<const MapSnapshot>)> done) 
 }
 
 void Site::Close(std::function<void()> done) {
+  publish_waits_ = false;  // A call that waits may come before the last changes.
+  Publish();
   Run([done = std::move(done)](Site& site) {
     site.members_.clear();
     done();
@@ -249,10 +265,8 @@ void Site::Begin(std::uint32_t version, Done done) {
 }
 
 std::shared_ptr<GridOwner> Site::OwnerOf(SessionId session) const {
-  for (const auto& [robot, member] : members_) {
-    if (member.session == session) return member.owner.lock();
-  }
-  return nullptr;
+  const auto member = members_.find(session);
+  return member == members_.end() ? nullptr : member->second.owner.lock();
 }
 
 void Site::Settle(std::uint32_t version, SessionId session, std::optional<Adopted>&& adopted) {
@@ -272,15 +286,20 @@ void Site::Settle(std::uint32_t version, SessionId session, std::optional<Adopte
 void Site::StageGone(SessionId session) {
   const RobotGrid& part = versions_.Find(switch_->version)->parts.at(session);
   switch_->staged.emplace(session, part.chunks);
-  switch_->displaced.emplace(session, RobotGrid{joint_.ChunksOf(session), part.keyframes});
+  switch_->displaced.emplace(session, RobotGrid{.chunks = joint_.ChunksOf(session),
+                                                .keyframes = part.keyframes,
+                                                .path = {},
+                                                .fragment = joint_.hidden().contains(session)});
 }
 
 void Site::CommitIfComplete() {
   if (!switch_->awaited.empty()) return;
   VersionSwitch complete = std::move(*switch_);
   switch_.reset();
+  const MapVersion& version = *versions_.Find(complete.version);
   for (const auto& [session, chunks] : complete.staged) {
     joint_.Replace(session, chunks);
+    joint_.SetHidden(session, version.parts.at(session).fragment);
     if (layers_.contains(session)) StoreLayer(session);
   }
   const std::uint32_t before = versions_.enabled();
@@ -289,8 +308,8 @@ void Site::CommitIfComplete() {
   StoreVersion(before);
   RenderAll();
   *complete.completed = true;
-  for (const auto& [robot, member] : members_) {
-    if (complete.staged.contains(member.session)) continue;
+  for (const auto& [session, member] : members_) {
+    if (complete.staged.contains(session)) continue;
     if (const auto owner = member.owner.lock()) owner->SetMapEpoch(epoch_);
   }
   Send();
@@ -317,8 +336,8 @@ void Site::Refresh(const std::vector<TileKey>& changed, bool all) {
   std::map<TileKey, TileSet::TilePtr> tiles;
   for (const TileKey& key : changed) {
     const auto cells = joint_.cells().find(key);
-    const bool gone = cells == joint_.cells().end();
-    tiles[key] = gone ? nullptr : EncodeTile(key, *cells->second, epoch_, tile_version_);
+    tiles[key] = cells == joint_.cells().end() ? nullptr : EncodeTile(key, *cells->second, epoch_, tile_version_);
+    ++encoded_;
   }
   for (int level = 0; all && level < kPyramidLevels; ++level) {
     before->tiles.ForEach(level, [&](const TileSet::TilePtr& tile) {
@@ -360,7 +379,11 @@ MapInfo Site::InfoOf(const TileSet& tiles) const {
   info.epoch = epoch_;
   info.version = tile_version_;
   info.levels = kPyramidLevels;
-  for (const auto& [robot, member] : members_) info.robots += member.owner.expired() ? 0U : 1U;
+  std::set<NameId> robots;
+  for (const auto& [session, member] : members_) {
+    if (!member.owner.expired()) robots.insert(member.robot);
+  }
+  info.robots = static_cast<std::uint32_t>(robots.size());
   info.enabled_version = versions_.enabled();
   info.versions = versions_.infos();
   if (const auto box = tiles.BoxOf(0)) {

@@ -23,6 +23,7 @@
 #include "common/mutex.h"
 #include "common/service/generation.h"
 #include "common/service/names.h"
+#include "server/maps/grid_agreement.h"
 #include "server/maps/joint_map.h"
 #include "server/maps/map_snapshot.h"
 #include "server/maps/map_versions.h"
@@ -70,10 +71,21 @@ class Site : public std::enable_shared_from_this<Site> {
   // threads start.
   [[nodiscard]] bool Switched(std::uint32_t epoch, Generation generation) const;
 
-  // From now on this session of the robot draws here, in place of the robot's previous session. A session
-  // that has ended is kept while its GridOwner exists, because its part of the map can still be corrected.
-  // `epoch`: of the map, as the session knows it.
-  void Join(NameId robot, SessionId session, std::weak_ptr<GridOwner> owner, std::uint32_t epoch);
+  // A session that draws here. One that has ended stays a member while its GridOwner exists, because its part of the
+  // map can still be corrected; so a robot may have several.
+  struct Member {
+    SessionId session = 0;
+    NameId robot = 0;
+    std::weak_ptr<GridOwner> owner;
+    std::uint32_t epoch = 0;  // Of the map, as the session knows it.
+    bool fragment = false;    // What it draws is not shown until a map version joins it (RobotGrid::fragment).
+  };
+  void Join(Member member);
+  // Compares what the session has drawn with what earlier ones have drawn there. `refuses` is asked once, on the
+  // strand; if it says so, what the session draws is not shown from then on, as that of a fragment. While the map is
+  // being switched nothing is compared. The robot is at `T_map_robot`.
+  using Refuses = std::function<bool(const GridAgreement&)>;
+  void CheckStart(SessionId session, const Pose2& T_map_robot, Refuses refuses);
   // Changes that wait for the strand are merged: the newest form of each chunk is kept, so that a site that is slow
   // holds at most the chunks that its sessions have.
   void Change(GridChange&& change);
@@ -84,7 +96,8 @@ class Site : public std::enable_shared_from_this<Site> {
   // fails.
   void Retire(std::function<void(std::shared_ptr<const MapSnapshot>)> done);
   // The server stops: after this no session is told anything, because its pool is about to end. `done` is called on the
-  // strand when everything that was asked before is finished. A switch of the map version under way fails.
+  // strand when everything that was asked before is finished, and what that changed is published. A switch of the map
+  // version under way fails.
   void Close(std::function<void()> done);
   // Adds a disabled version; `done` receives its number.
   void AddVersion(MapVersion&& version, Done done, Wanted wanted = {});
@@ -97,15 +110,10 @@ class Site : public std::enable_shared_from_this<Site> {
   void Probe(std::function<void()> done);
 
   [[nodiscard]] std::shared_ptr<const MapSnapshot> snapshot() const;
-  [[nodiscard]] Pulse pulse() const { return {handled_, handled_ != asked_}; }
+  [[nodiscard]] Pulse pulse() const { return {handled_ + encoded_, handled_ != asked_}; }
 
  private:
   class Ticket;
-  struct Member {
-    SessionId session = 0;
-    std::weak_ptr<GridOwner> owner;
-  };
-
   using Changes = std::map<SessionId, slam::OccupancyGrid::Chunks>;  // A null chunk: removed.
 
   // Does `act` on the strand, after everything that was asked for before.
@@ -148,7 +156,7 @@ class Site : public std::enable_shared_from_this<Site> {
   MapVersions versions_;
   std::uint32_t epoch_ = 0;
   std::uint64_t tile_version_ = 0;
-  std::map<NameId, Member> members_;
+  std::map<SessionId, Member> members_;
   std::map<std::uint32_t, Generation> switches_;  // Epoch -> the server that switched the map to it.
   std::set<SessionId> layers_;                    // Removed sessions whose parts are stored.
   std::set<std::uint32_t> stored_versions_;
@@ -157,6 +165,7 @@ class Site : public std::enable_shared_from_this<Site> {
   std::set<TileKey> unsent_;  // Tiles (or tombstones) to publish.
 
   std::atomic<std::uint64_t> asked_{0}, handled_{0};  // Pieces of work posted to the strand, and finished on it.
+  std::atomic<std::uint64_t> encoded_{0};             // Tiles: a piece of work that encodes thousands is progress.
   mutable Mutex mutex_;
   std::shared_ptr<const MapSnapshot> snapshot_ CAIRN_GUARDED_BY(mutex_);
   std::shared_ptr<Changes> waiting_ CAIRN_GUARDED_BY(mutex_);  // To be added to, until the strand takes them.

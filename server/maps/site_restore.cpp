@@ -40,8 +40,9 @@ void Site::StoreSite() {
                     .enabled_version = versions_.enabled(),
                     .switches = switches_,
                     .members = {},
-                    .resolution_m = resolution_m_};
-  for (const auto& [robot, member] : members_) stored.members[robot] = member.session;
+                    .resolution_m = resolution_m_,
+                    .fragments = joint_.hidden()};
+  for (const auto& [session, member] : members_) stored.members[member.robot] = session;  // The last one.
   journal_->Put({RecordKind::kSite, site_id_, 0}, [stored = std::move(stored)] { return BytesOf(stored); });
 }
 
@@ -63,8 +64,9 @@ void Site::RemoveOldVersions() {
 
 void Site::StoreLayer(SessionId session) {
   if (journal_ == nullptr) return;
-  journal_->Put({RecordKind::kLayer, site_id_, session},
-                [layer = StoredLayer{session, ToStored({joint_.ChunksOf(session), 0})}] { return BytesOf(layer); });
+  journal_->Put(
+      {RecordKind::kLayer, site_id_, session},
+      [layer = StoredLayer{session, ToStored({.chunks = joint_.ChunksOf(session)})}] { return BytesOf(layer); });
 }
 
 bool Site::Switched(std::uint32_t epoch, Generation generation) const {
@@ -81,6 +83,7 @@ Result<void> Site::Restore(const StoredSite& stored) {
   epoch_ = std::max(epoch_, stored.epoch);
   tile_version_ = std::max(tile_version_, stored.tile_version);
   switches_ = stored.switches;
+  for (const SessionId session : stored.fragments) joint_.SetHidden(session, true);
   if (auto restored = RestoreVersions(stored); !restored) return restored;
   if (auto restored = RestoreLayers(); !restored) return restored;
   Render();

@@ -6,7 +6,7 @@
 namespace cairn::server {
 
 StoredGrid ToStored(const RobotGrid& grid) {
-  StoredGrid stored{.keyframes = grid.keyframes, .chunks = {}, .path = grid.path};
+  StoredGrid stored{.keyframes = grid.keyframes, .chunks = {}, .path = grid.path, .fragment = grid.fragment};
   for (const auto& [key, chunk] : grid.chunks) {
     stored.chunks.push_back({key.x, key.y, std::shared_ptr<const std::int16_t>(chunk, chunk->log_odds.data())});
   }
@@ -14,7 +14,10 @@ StoredGrid ToStored(const RobotGrid& grid) {
 }
 
 RobotGrid FromStored(const StoredGrid& stored) {
-  RobotGrid grid{.chunks = {}, .keyframes = static_cast<std::size_t>(stored.keyframes), .path = stored.path};
+  RobotGrid grid{.chunks = {},
+                 .keyframes = static_cast<std::size_t>(stored.keyframes),
+                 .path = stored.path,
+                 .fragment = stored.fragment};
   for (const StoredChunk& one : stored.chunks) {
     auto chunk = std::make_shared<slam::GridChunk>();
     std::copy_n(one.cells.get(), chunk->log_odds.size(), chunk->log_odds.begin());

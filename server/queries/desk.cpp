@@ -128,6 +128,10 @@ std::optional<Answer> Desk::AnswerTo(const Request& request) {
       const auto ended = roster_.End(request.robot);
       return ReplyTo(request, ended ? Status{} : ended.error());
     }
+    case RequestKind::kRelocalise: {
+      const auto taken = roster_.Relocalise(request.robot, request.T_map_robot);
+      return ReplyTo(request, taken ? Status{} : taken.error());
+    }
     case RequestKind::kMapEnable:
       return EnableMap(request);
     case RequestKind::kSavedList:

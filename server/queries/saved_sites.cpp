@@ -7,6 +7,7 @@
 #include <exception>
 #include <future>
 #include <memory>
+#include <set>
 #include <system_error>
 #include <utility>
 
@@ -182,8 +183,8 @@ Result<void> SavedSites::Load(const Request& request) {
                                                      std::to_string(file->site.resolution_m) +
                                                      " m, this server those of slam.grid.resolution_m");
   }
-  std::vector<std::string> robots;
-  for (const auto& [id, robot] : file->sessions) robots.push_back(robot);
+  std::set<std::string> robots;
+  for (const auto& [id, robot] : file->sessions) robots.insert(robot);
   if (auto room = rooms_.roster.HasRoomFor(robots); !room) return room;
   ImportOptions options;
   options.site = request.site.empty() ? file->site.name : request.site;

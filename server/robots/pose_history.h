@@ -28,7 +28,7 @@ struct PathPose {
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     archive(self.stamp, self.T_map_robot, self.score, self.localized, self.reason, self.covariance, self.T_map_odom);
-    archive.Require(self.reason <= PoseReason::kWaiting, "the reason of a pose");
+    archive.Require(self.reason <= PoseReason::kNotJoined, "the reason of a pose");
   }
 };
 

@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -21,11 +22,23 @@ struct SessionMaterial {
   std::string robot;
   slam::MapperSnapshot snapshot;
   slam::GridOptions grid_options;
-  bool start_known = true;  // Whether somebody has said where the robot stood at first.
+  // Whether the place of its start in the map is known: somebody has said where it is, the session began the map, or a
+  // map version has joined it (maps/robot_grid.h).
+  bool start_known = true;
 };
 
 struct SnapshotWanted {
   std::function<void(SessionMaterial&&)> done;  // Called on the session's strand.
+};
+
+// Somebody says that the robot is not where it is believed to be, and perhaps where it is (slam::Mapper::Relocalise).
+struct RelocaliseWanted {
+  std::optional<Pose2> T_map_robot;
+};
+
+// What others have drawn contradicts the place where the robot is said to have started (jobs/start_check.h).
+struct StartRefused {
+  std::string why;
 };
 
 // The end of a session. Scans that arrived before it are finished first. `final` is true if the session is over, and
@@ -41,6 +54,7 @@ struct Finish {
   std::function<void()> done;
 };
 
-using RobotEvent = std::variant<ScanArrival, OdometryArrival, Correction, EpochChange, SnapshotWanted, Finish>;
+using RobotEvent = std::variant<ScanArrival, OdometryArrival, Correction, EpochChange, SnapshotWanted, RelocaliseWanted,
+                                StartRefused, Finish>;
 
 }  // namespace cairn::server

@@ -47,11 +47,24 @@ void RobotQueue::Push(EpochChange change) {
   control_.push_back({next_++, change});
 }
 
-bool RobotQueue::Push(SnapshotWanted wanted) {
+bool RobotQueue::PushIfRoom(RobotEvent event) {
   const MutexLock lock(mutex_);
   if (control_.size() >= kMaxControl) return false;
-  control_.push_back({next_++, std::move(wanted)});
+  control_.push_back({next_++, std::move(event)});
   return true;
+}
+
+bool RobotQueue::Push(SnapshotWanted wanted) {
+  return PushIfRoom(std::move(wanted));
+}
+
+bool RobotQueue::Push(RelocaliseWanted wanted) {
+  return PushIfRoom(wanted);
+}
+
+void RobotQueue::Push(StartRefused refused) {
+  const MutexLock lock(mutex_);
+  control_.push_back({next_++, std::move(refused)});
 }
 
 void RobotQueue::Push(Finish finish) {

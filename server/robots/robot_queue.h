@@ -5,7 +5,8 @@
 //  - odometry: the two oldest become one; poses in `odom` are absolute, so leaving out the older keeps all motion;
 //  - corrections: the newest wins; one displaced is returned and never adopted;
 //  - changes of the epoch: the newest stays, where two follow each other;
-//  - snapshots: refused while kMaxControl control events wait;
+//  - snapshots, and that the robot has to be found: refused while kMaxControl control events wait;
+//  - that the start is refused: never refused, asked once;
 //  - the end of the session: never refused. It is asked for once, and once more when the server stops.
 // Thread rule: any thread.
 #pragma once
@@ -34,6 +35,8 @@ class RobotQueue {
   void Push(EpochChange change);
   // False where too many wait.
   bool Push(SnapshotWanted wanted);
+  bool Push(RelocaliseWanted wanted);
+  void Push(StartRefused refused);
   void Push(Finish finish);
 
   // The event that arrived first.
@@ -43,6 +46,8 @@ class RobotQueue {
   [[nodiscard]] bool empty() const;
 
  private:
+  bool PushIfRoom(RobotEvent event);
+
   template <typename T>
   struct Arrived {
     std::uint64_t number;

@@ -20,6 +20,11 @@ void Visit(OptionVisitor& visitor, RobotsOptions& options) {
   visitor.Integer(
       "max_unclaimed", options.max_unclaimed, "streams", 1, 65536,
       "Streams of unknown robots that are counted one by one. The messages of further streams are counted together.");
+  visitor.Integer(
+      "max_earlier", options.max_earlier, "sessions", 0, 4096,
+      "Ended sessions that are kept of robots that have begun another one since, so that what they saw can be "
+      "joined with what is seen now. When there are more, the oldest is forgotten; its part of the map stays "
+      "as it is. Each one takes the memory of an estimator, and smoothing jobs take longer.");
   visitor.Real("suspended_expiry_s", options.suspended_expiry_s, "s", 1.0, 1e8,
                ForOperators("A session whose robot stays away for longer than this is ended. With a longer time robots "
                             "may come back later, and vanished ones take memory for longer."));

@@ -31,11 +31,8 @@ Result<void> ValidateRequest(const SessionRequest& request) {
   return request.has_start ? ValidateStart(request.T_map_robot_start) : Result<void>{};
 }
 
-Pose2 StartOf(const SessionRequest& request) {
-  if (!request.has_start) return {};
-  Pose2 start = request.T_map_robot_start;
-  start.theta = WrapAngle(start.theta);
-  return start;
+bool HasDrawn(const Session& session) {
+  return session.record().snapshot().status.pose.reason != PoseReason::kWaiting;
 }
 
 }  // namespace
@@ -157,106 +154,6 @@ Result<void> Roster::Resume(Session& session, const SessionRequest& request) {
   return {};
 }
 
-// The session is known to others last: if an exception ends this, it is gone, and the client may ask again.
-Result<void> Roster::Open(const SessionRequest& request) {
-  const NameId robot_id = HashName(request.robot);
-  std::shared_ptr<Session> session, gone;  // The memory of the one that goes is freed without the lock.
-  std::shared_ptr<Site> site;
-  {
-    const MutexLock lock(mutex_);
-    // First the limit, then the site: a robot that is refused leaves no site behind.
-    auto giving_way = GivesWay(robot_id);
-    if (!giving_way) return tl::unexpected(giving_way.error());
-    auto entered = atlas_.Enter(request.site);
-    if (!entered) return tl::unexpected(entered.error());
-    site = *std::move(entered);
-    gone = *std::move(giving_way);
-    session = Make(next_id_++, request, site->snapshot()->info.epoch, site);
-    session->record().AddSensors(request.sensors);
-    for (const std::string& sensor : request.sensors) {
-      if (auto account = unclaimed_.Claim({robot_id, HashName(sensor), request.session})) {
-        session->record().Inherit(HashName(sensor), std::move(*account));
-      }
-    }
-  }
-  if (journal_ != nullptr) {
-    session->ExpectDurable();
-    journal_->Open({session->id(), request, session->record().epoch()}, DurableFor(session));
-  }
-  session->Resume(request.client, request.session);
-  site->Join(robot_id, session->id(), session, session->record().epoch());
-  {
-    const MutexLock lock(mutex_);
-    if (gone != nullptr) gone_.push_back(gone);
-    std::shared_ptr<Session>& place = sessions_[robot_id];
-    if (gone != nullptr && gone != place) sessions_.erase(gone->record().state().robot_id);
-    place = session;
-  }
-  try {
-    RetireGone();
-  } catch (const std::exception& error) {  // The session is open all the same, and the next Tick retires the others.
-    spdlog::error("a session that gave way could not be ended because of an exception: {}", error.what());
-  }
-  return {};
-}
-
-std::shared_ptr<Session> Roster::Make(SessionId id, const SessionRequest& request, std::uint32_t map_epoch,
-                                      const std::shared_ptr<Site>& site) const {
-  const SessionSetup setup{
-      .id = id,
-      .request = request,
-      .map_epoch = map_epoch,
-      .estimator = {.mapper = mapper_, .T_map_robot_start = StartOf(request), .start_known = request.has_start}};
-  SessionOutputs outputs{.send = [this](OutboundValue value) { return outbound_.Send(std::move(value)); },
-                         .grid_changed = [site](GridChange&& change) { site->Change(std::move(change)); },
-                         .store = {},
-                         .gone =
-                             [site, id, closing = closing_] {
-                               if (!*closing) site->Leave(id);
-                             }};
-  const auto self = std::make_shared<std::weak_ptr<Session>>();
-  if (journal_ != nullptr) {
-    outputs.store = [journal = journal_, id, self](JournalEntry entry) {
-      if (journal->Append(id, std::move(entry)) != 0) return true;
-      if (const auto session = self->lock()) session->Lost({StatusCode::kUnavailable, journal->health().reason});
-      return false;
-    };
-    outputs.position = [journal = journal_, id] { return journal->position(id); };
-    outputs.checkpoint = [journal = journal_, id](std::uint64_t position, Journal::Content content) {
-      return journal->Checkpoint(id, position, std::move(content));
-    };
-    outputs.checkpoint_entries = static_cast<std::uint64_t>(options_.checkpoint_entries);
-  }
-  auto session = std::make_shared<Session>(setup, options_, pool_, std::move(outputs));
-  *self = session;
-  return session;
-}
-
-Journal::Durable Roster::DurableFor(const std::shared_ptr<Session>& session) const {
-  return [weak = std::weak_ptr(session)](const std::vector<JournalEntry>& entries) {
-    if (const auto known = weak.lock()) known->Durable(entries);
-  };
-}
-
-Result<std::shared_ptr<Session>> Roster::GivesWay(NameId robot_id) const {
-  const auto own = sessions_.find(robot_id);
-  if (own != sessions_.end()) return own->second;
-  if (sessions_.size() < static_cast<std::size_t>(options_.max_robots)) return nullptr;
-  const auto now = SessionRecord::Clock::now();
-  std::shared_ptr<Session> ended, suspended;
-  for (const auto& [id, session] : sessions_) {
-    const SessionRecord& record = session->record();
-    const bool is_ended = record.phase() == SessionPhase::kEnded;
-    if (is_ended && (ended == nullptr || session->id() < ended->id())) ended = session;
-    const auto away = record.SuspendedFor(now);
-    if (away > (suspended == nullptr ? away.zero() : suspended->record().SuspendedFor(now))) suspended = session;
-  }
-  if (ended != nullptr) return ended;
-  if (suspended != nullptr) return suspended;
-  return Fail(StatusCode::kResourceExhausted,
-              std::to_string(sessions_.size()) + " robots have open sessions; the limit is robots.max_robots");
-}
-
 void Roster::Refuse(const SessionRequest& request, Status status) {
   const NameId robot_id = HashName(request.robot);
   {
@@ -311,10 +208,25 @@ void Roster::Take(const ClientLiveliness& liveliness) {
 }
 
 Result<void> Roster::End(const std::string& robot) {
-  const std::shared_ptr<Session> session = Find(robot);
-  if (session == nullptr) return Fail(StatusCode::kNotFound, "robot '" + robot + "' has no session");
-  session->End();
+  const auto session = FindOrFail(robot);
+  if (!session) return tl::unexpected(session.error());
+  (*session)->End();
   return {};
+}
+
+Result<void> Roster::Relocalise(const std::string& robot, const std::optional<Pose2>& T_map_robot) {
+  if (T_map_robot) {
+    if (auto valid = ValidateStart(*T_map_robot); !valid) return valid;
+  }
+  const auto session = FindOrFail(robot);
+  if (!session) return tl::unexpected(session.error());
+  return (*session)->Relocalise(T_map_robot);
+}
+
+Result<std::shared_ptr<Session>> Roster::FindOrFail(const std::string& robot) const {
+  std::shared_ptr<Session> session = Find(robot);
+  if (session == nullptr) return Fail(StatusCode::kNotFound, "robot '" + robot + "' has no session");
+  return session;
 }
 
 void Roster::Tick() {
@@ -339,7 +251,8 @@ void Roster::Tick() {
 void Roster::RetireGone() {
   std::vector<std::shared_ptr<Session>> freed;  // Destroyed after the lock is released.
   const MutexLock lock(mutex_);
-  std::erase_if(gone_, [&](const std::shared_ptr<Session>& gone) CAIRN_REQUIRES(mutex_) {
+  std::erase_if(gone_, [&](const Leaving& leaving) CAIRN_REQUIRES(mutex_) {
+    const std::shared_ptr<Session>& gone = leaving.session;
     const auto successor = sessions_.find(gone->record().state().robot_id);
     if (successor == sessions_.end()) {
       if (!gone->ending() && gone->record().phase() != SessionPhase::kEnded)
@@ -363,9 +276,18 @@ void Roster::RetireGone() {
       retire(PoseReport(status.pose));
       retire(SessionState(status.session));
     }
-    if (retired) freed.push_back(gone);
-    return retired;
+    if (!retired) return false;
+    if (leaving.keep && HasDrawn(*gone)) {
+      earlier_.emplace(gone->id(), gone);
+    } else {
+      freed.push_back(gone);
+    }
+    return true;
   });
+  while (earlier_.size() > static_cast<std::size_t>(options_.max_earlier)) {
+    freed.push_back(std::move(earlier_.begin()->second));
+    earlier_.erase(earlier_.begin());
+  }
 }
 
 std::shared_ptr<Session> Roster::Find(const std::string& robot) const {
@@ -385,9 +307,15 @@ std::vector<std::shared_ptr<Session>> Roster::All() const {
 
 std::vector<std::shared_ptr<Session>> Roster::InSite(const std::string& site) const {
   std::vector<std::shared_ptr<Session>> in_site;
-  for (const auto& session : All()) {
+  const auto add = [&](const std::shared_ptr<Session>& session) {
     if (session->record().state().site == site) in_site.push_back(session);
+  };
+  const MutexLock lock(mutex_);
+  for (const auto& [id, session] : earlier_) add(session);
+  for (const Leaving& leaving : gone_) {
+    if (leaving.keep && HasDrawn(*leaving.session)) add(leaving.session);
   }
+  for (const auto& [robot_id, session] : sessions_) add(session);
   return in_site;
 }
 

@@ -9,7 +9,10 @@
 //   it is localized (slam/recovery/recovery.h), because nobody knows whether it is still where it was, or even the same
 //   robot. The former owner is told. If another client that is alive owns the session, the request is refused
 //   (ALREADY_EXISTS).
-// - A session that has ended is replaced by a new one.
+// - A session that has ended is replaced by a new one. It is kept as an earlier session (robots.max_earlier), so that
+//   jobs can fit the robot to what it saw then.
+// - A new session that does not say where the robot starts, in a site that has a map, is a fragment: its part is not
+//   shown, and its robot is not localized, until a map version joins it (jobs/joiner.h).
 // When max_robots is reached, the oldest ended session is removed first (its part of the map stays), then the one that
 // has been suspended for longest. A session that has been suspended for too long is ended. Thread rule: any thread;
 // nothing here waits for an estimator.
@@ -21,6 +24,7 @@
 #include <deque>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -56,7 +60,7 @@ class Roster {
   [[nodiscard]] SessionId ReserveIds(std::uint64_t count);
   // RESOURCE_EXHAUSTED: so many sessions more are too many (robots.max_robots). ALREADY_EXISTS: one of the robots has
   // one.
-  [[nodiscard]] Result<void> HasRoomFor(const std::vector<std::string>& robots) const;
+  [[nodiscard]] Result<void> HasRoomFor(const std::set<std::string>& robots) const;
   // Opens the loaded sessions as Restore does; their site is open. Where a robot has opened a session meanwhile, that
   // one stays and the loaded one has ended. Returns how many were opened.
   std::size_t OpenStored(const std::vector<SessionId>& ids);
@@ -71,11 +75,15 @@ class Roster {
   void Take(const ClientLiveliness& liveliness);
   // NOT_FOUND without such a session.
   Result<void> End(const std::string& robot);
+  // See Session::Relocalise. NOT_FOUND without a session, INVALID_ARGUMENT for a pose that is not finite or absurd.
+  Result<void> Relocalise(const std::string& robot, const std::optional<Pose2>& T_map_robot);
   // Publishes what is due, and ends sessions whose robots stayed away for too long.
   void Tick();
 
   [[nodiscard]] std::shared_ptr<Session> Find(const std::string& robot) const;
+  [[nodiscard]] Result<std::shared_ptr<Session>> FindOrFail(const std::string& robot) const;
   [[nodiscard]] std::vector<std::shared_ptr<Session>> All() const;
+  // All sessions that draw the site, also the earlier ones of its robots.
   [[nodiscard]] std::vector<std::shared_ptr<Session>> InSite(const std::string& site) const;
   [[nodiscard]] std::uint64_t unclaimed_overflow() const;
 
@@ -87,8 +95,10 @@ class Roster {
   void TellDisplaced(const SessionState& before, const SessionRequest& request);
   Result<void> Open(const SessionRequest& request);
   [[nodiscard]] std::string WhyNotRestored(const std::string& robot) const;
-  std::shared_ptr<Session> Make(SessionId id, const SessionRequest& request, std::uint32_t map_epoch,
-                                const std::shared_ptr<Site>& site) const;
+  [[nodiscard]] bool BeginsFragment(const SessionRequest& request, const Site& site) const CAIRN_REQUIRES(mutex_);
+  std::shared_ptr<Session> Make(const StoredSession& stored, const std::shared_ptr<Site>& site) const;
+  static void Enter(Site& site, const std::shared_ptr<Session>& session);
+  void Place(const std::shared_ptr<Session>& session, bool first) CAIRN_REQUIRES(mutex_);
   Journal::Durable DurableFor(const std::shared_ptr<Session>& session) const;
   using Restored = std::vector<Result<std::shared_ptr<Session>>>;
   Restored RestoreEach(const std::vector<SessionId>& ids);
@@ -116,8 +126,14 @@ class Roster {
   mutable Mutex mutex_;
   std::map<NameId, std::shared_ptr<Session>> sessions_ CAIRN_GUARDED_BY(mutex_);
   UnclaimedStreams unclaimed_ CAIRN_GUARDED_BY(mutex_);
-  std::deque<SessionRefusal> unsent_ CAIRN_GUARDED_BY(mutex_);           // Refusals not sent yet: the lane was full.
-  std::vector<std::shared_ptr<Session>> gone_ CAIRN_GUARDED_BY(mutex_);  // Removed sessions whose keys are not retired.
+  std::deque<SessionRefusal> unsent_ CAIRN_GUARDED_BY(mutex_);  // Refusals not sent yet: the lane was full.
+  // Sessions that are not the present ones of their robots any more, and whose keys are not retired yet.
+  struct Leaving {
+    std::shared_ptr<Session> session;
+    bool keep = false;  // It becomes an earlier session.
+  };
+  std::vector<Leaving> gone_ CAIRN_GUARDED_BY(mutex_);
+  std::map<SessionId, std::shared_ptr<Session>> earlier_ CAIRN_GUARDED_BY(mutex_);  // Ended; others follow them.
   SessionId next_id_ CAIRN_GUARDED_BY(mutex_) = 1;
   std::map<std::string, std::string> not_restored_ CAIRN_GUARDED_BY(mutex_);  // By robot: why.
 };

@@ -4,6 +4,7 @@
 #include <asio/post.hpp>
 #include <chrono>
 #include <latch>
+#include <set>
 #include <utility>
 
 #include "server/robots/roster.h"
@@ -111,14 +112,20 @@ Result<void> Roster::RestoreDoubtful(SessionId id, RestoreMarks& marks) {
 void Roster::Register(SessionId id, Result<std::shared_ptr<Session>> restored) {
   if (!restored) return;  // NotRestored has set it aside.
   const MutexLock lock(mutex_);
-  const std::shared_ptr<Session>& session = *restored;
+  const auto known = sessions_.find((*restored)->record().state().robot_id);
+  Place(*restored, known == sessions_.end() || known->second->id() < id);
+}
+
+// `first`: the session becomes the present one of its robot, and the one before becomes an earlier session; else it is
+// an earlier session itself.
+void Roster::Place(const std::shared_ptr<Session>& session, bool first) {
   const SessionState state = session->record().state();
-  // A later session of the same robot takes the place of an earlier one, whose part of the map stays.
-  const auto [known, first] = sessions_.try_emplace(state.robot_id, session);
-  if (!first && known->second->id() > id) return;
-  known->second = session;
-  if (const auto site = atlas_.Find(state.site))
-    site->Join(state.robot_id, session->id(), session, session->record().epoch());
+  if (const auto site = atlas_.Find(state.site)) Enter(*site, session);
+  std::shared_ptr<Session> earlier = session;
+  if (first) std::swap(earlier, sessions_[state.robot_id]);
+  if (earlier == nullptr) return;
+  earlier->End({StatusCode::kAborted, "another session of '" + state.robot + "' follows"});
+  gone_.push_back({std::move(earlier), true});
 }
 
 // Sets the session aside. The robot can be told why it must open a new one.
@@ -148,7 +155,7 @@ SessionId Roster::ReserveIds(std::uint64_t count) {
   return std::exchange(next_id_, next_id_ + count);
 }
 
-Result<void> Roster::HasRoomFor(const std::vector<std::string>& robots) const {
+Result<void> Roster::HasRoomFor(const std::set<std::string>& robots) const {
   const MutexLock lock(mutex_);
   if (sessions_.size() + robots.size() > static_cast<std::size_t>(options_.max_robots)) {
     return Fail(StatusCode::kResourceExhausted, std::to_string(sessions_.size()) + " robots have sessions; with " +
@@ -164,22 +171,21 @@ Result<void> Roster::HasRoomFor(const std::vector<std::string>& robots) const {
 
 std::size_t Roster::OpenStored(const std::vector<SessionId>& ids) {
   const Restored sessions = RestoreEach(ids);
+  const std::set<SessionId> loaded(ids.begin(), ids.end());
   std::size_t taken = 0;
   for (std::size_t i = 0; i < ids.size(); ++i) {
     if (!sessions[i]) continue;  // NotRestored has set it aside.
-    const std::shared_ptr<Session>& session = *sessions[i];
-    const SessionState state = session->record().state();
     const MutexLock lock(mutex_);
-    if (!sessions_.emplace(state.robot_id, session).second) continue;
+    const auto known = sessions_.find((*sessions[i])->record().state().robot_id);
+    Place(*sessions[i],
+          known == sessions_.end() || (loaded.contains(known->second->id()) && known->second->id() < ids[i]));
     ++taken;
-    if (const auto site = atlas_.Find(state.site))
-      site->Join(state.robot_id, session->id(), session, session->record().epoch());
   }
   return taken;
 }
 
 Result<std::shared_ptr<Site>> Roster::RemoveSite(const std::string& name) {
-  std::vector<std::shared_ptr<Session>> removed;
+  std::vector<std::shared_ptr<Session>> removed, earlier;  // Freed without the lock.
   std::shared_ptr<Site> site;
   {
     const MutexLock lock(mutex_);
@@ -194,12 +200,25 @@ Result<std::shared_ptr<Site>> Roster::RemoveSite(const std::string& name) {
       }
       removed.push_back(session);
     }
+    const auto leaves_its_records = [this](Session& session) {
+      session.KeepStored();
+      if (journal_ != nullptr) journal_->Close(session.id());
+    };
     for (const auto& session : removed) {
-      session->KeepStored();
-      if (journal_ != nullptr) journal_->Close(session->id());
+      leaves_its_records(*session);
       sessions_.erase(session->record().state().robot_id);
-      gone_.push_back(session);
+      gone_.push_back({session, false});
     }
+    for (Leaving& leaving : gone_) {
+      if (leaving.session->record().state().site == name && leaving.keep) leaves_its_records(*leaving.session);
+      leaving.keep = leaving.keep && leaving.session->record().state().site != name;
+    }
+    std::erase_if(earlier_, [&](const auto& one) {
+      if (one.second->record().state().site != name) return false;
+      leaves_its_records(*one.second);
+      earlier.push_back(one.second);
+      return true;
+    });
     atlas_.Remove(name);
   }
   for (const auto& session : removed) session->End({StatusCode::kNotFound, "the site '" + name + "' was deleted"});
@@ -213,7 +232,7 @@ Result<std::shared_ptr<Session>> Roster::ReadBack(SessionId id, bool with_journa
   if (*site == nullptr) site = atlas_.Enter(stored->request.site);
   if (!site) return tl::unexpected(site.error());
   const auto make = [&] {
-    auto made = Make(id, stored->request, stored->map_epoch, *site);
+    auto made = Make(*stored, *site);
     made->KeepStored();  // Also if an exception ends the restore.
     static_cast<void>(made->record().AddSensors(stored->request.sensors));
     return made;

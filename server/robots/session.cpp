@@ -90,6 +90,22 @@ bool Session::Post(SnapshotWanted&& wanted) {
   return true;
 }
 
+void Session::RefuseStart(const std::string& why) {
+  queue_.Push(StartRefused{why});
+  Schedule();
+}
+
+Result<void> Session::Relocalise(const std::optional<Pose2>& T_map_robot) {
+  if (ending_) return cairn::Fail(StatusCode::kFailedPrecondition, "the session has ended");
+  if (T_map_robot && record_.joining().fragment)
+    return cairn::Fail(StatusCode::kFailedPrecondition,
+                       "the robot is not joined with the map of its site, so no pose in that map can be used");
+  if (!queue_.Push(RelocaliseWanted{T_map_robot}))
+    return cairn::Fail(StatusCode::kResourceExhausted, "too many commands wait for the robot's estimator");
+  Schedule();
+  return {};
+}
+
 void Session::SetLiveliness(bool alive) {
   record_.SetAlive(alive);
   const SessionPhase wanted = alive ? SessionPhase::kActive : SessionPhase::kSuspended;
@@ -235,7 +251,12 @@ void Session::TakeCheckpoint() {
 }
 
 void Session::Handle(RobotEvent&& event) {
-  if (!failed_ && !Throws([&] { estimator_.Handle(std::move(event)); })) return;
+  // What its status says of the robot's place may change with these.
+  const bool changes_state = std::holds_alternative<StartRefused>(event) || std::holds_alternative<Correction>(event);
+  if (!failed_ && !Throws([&] { estimator_.Handle(std::move(event)); })) {
+    if (changes_state) state_unsent_ = true;
+    return;
+  }
   Throws([&] { estimator_.Discard(std::move(event)); });
 }
 

@@ -39,6 +39,11 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   void SetMapEpoch(std::uint32_t epoch) override;
   // Asks for a snapshot; false where too many wait.
   bool Post(SnapshotWanted&& wanted);
+  // From now on it is a fragment: it is not where somebody said it starts.
+  void RefuseStart(const std::string& why);
+  // The robot has to be found in its map. FAILED_PRECONDITION: the session is ending, or a pose is given and the robot
+  // is not joined with the map. RESOURCE_EXHAUSTED: too many events wait.
+  [[nodiscard]] Result<void> Relocalise(const std::optional<Pose2>& T_map_robot);
 
   // The owner's liveliness lease was lost or came back: kSuspended or kActive.
   void SetLiveliness(bool alive);
@@ -82,9 +87,9 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   // Events wait or are being handled.
   [[nodiscard]] bool has_work() const { return scheduled_; }
 
- private:
   static constexpr int kEventsPerTurn = 8;  // After so many, the pool may do other work first.
 
+ private:
   void Schedule();
   void Drain();
   void Handle(RobotEvent&& event);

@@ -14,7 +14,7 @@ using Clock = std::chrono::steady_clock;
 constexpr auto kLandmarkPeriod = std::chrono::milliseconds(500);
 
 PoseReport ReportOf(const Scan& scan, const slam::ScanOutcome& outcome, const SessionState& session, SessionToken token,
-                    std::uint32_t epoch) {
+                    std::uint32_t epoch, bool fragment) {
   PoseReport report;
   report.robot_id = session.robot_id;
   report.robot = session.robot;
@@ -28,6 +28,10 @@ PoseReport ReportOf(const Scan& scan, const slam::ScanOutcome& outcome, const Se
   report.localized = outcome.localized;
   report.score = outcome.score;
   report.reason = outcome.reason;
+  if (fragment && report.localized) {
+    report.localized = false;
+    report.reason = PoseReason::kNotJoined;
+  }
   report.map_epoch = epoch;
   return report;
 }
@@ -66,12 +70,14 @@ std::optional<std::uint64_t> TakeNumber(std::string_view& bytes) {
 SessionEstimator::SessionEstimator(const EstimatorSetup& setup, SessionRecord& record, SessionOutputs outputs)
     : record_(record),
       outputs_(std::move(outputs)),
-      start_known_(setup.start_known),
       identity_(record.snapshot()),
       epoch_(record.epoch()),
+      fragment_(setup.fragment),
       pipeline_(setup.mapper, setup.T_map_robot_start, slam::SerialFor,
                 {.used = [this](const Scan& scan, const slam::ScanOutcome& outcome) { Used(scan, outcome); },
-                 .dropped = [this](const Scan& scan, DropReason reason) { Dropped(scan, reason); }}) {}
+                 .dropped = [this](const Scan& scan, DropReason reason) { Dropped(scan, reason); }}) {
+  record_.SetJoining({fragment_, driven_m_, start_refused_});
+}
 
 void SessionEstimator::Handle(RobotEvent&& event) {
   std::visit([this](auto&& alternative) { On(std::move(alternative)); }, std::move(event));
@@ -136,10 +142,12 @@ void SessionEstimator::Store(JournalEntry entry) {
 void SessionEstimator::Replay(JournalEntry&& entry, const Switched& switched) {
   replaying_ = true;
   if (auto* const scan = std::get_if<ScanTaken>(&entry)) {
-    if (record_.ScanReceived(scan->stream, scan->scan->sequence) == SessionRecord::Arrival::kNew)
+    if (record_.ScanReceived(scan->stream, scan->scan->sequence, SessionRecord::From::kJournal) ==
+        SessionRecord::Arrival::kNew)
       On(ScanArrival{scan->stream, std::move(scan->scan), std::nullopt, Clock::now()});
   } else if (const auto* const refused = std::get_if<ScanRefused>(&entry)) {
-    if (record_.ScanReceived(refused->stream, refused->sequence) == SessionRecord::Arrival::kNew)
+    if (record_.ScanReceived(refused->stream, refused->sequence, SessionRecord::From::kJournal) ==
+        SessionRecord::Arrival::kNew)
       record_.ScanDropped(refused->stream, refused->sequence, refused->reason);
   } else if (const auto* const odometry = std::get_if<OdometryTaken>(&entry)) {
     ReplayOdometry(*odometry);
@@ -151,6 +159,10 @@ void SessionEstimator::Replay(JournalEntry&& entry, const Switched& switched) {
     if (switched(correction->epoch, correction->generation)) AdoptGrid(correction->epoch, FromStored(correction->grid));
   } else if (const auto* const epoch = std::get_if<EpochChanged>(&entry)) {
     SetEpoch(epoch->epoch);
+  } else if (const auto* const relocalise = std::get_if<RelocaliseTaken>(&entry)) {
+    On(RelocaliseWanted{relocalise->T_map_robot});
+  } else if (auto* const refusal = std::get_if<StartRefusal>(&entry)) {
+    On(StartRefused{std::move(refusal->why)});
   } else if (const auto* const finished = std::get_if<SessionFinished>(&entry)) {
     Finish finish;
     finish.final = finished->final;
@@ -161,7 +173,7 @@ void SessionEstimator::Replay(JournalEntry&& entry, const Switched& switched) {
 
 void SessionEstimator::ReplayOdometry(const OdometryTaken& odometry) {
   const std::uint64_t sequence = odometry.odometry.sequence;
-  if (!record_.OdometryReceived(odometry.stream.session, sequence)) return;
+  if (!record_.OdometryReceived(odometry.stream.session, sequence, SessionRecord::From::kJournal)) return;
   if (odometry.use == OdometryUse::kTaken) return On(OdometryArrival{odometry.stream, odometry.odometry, false});
   record_.OdometryDropped(odometry.stream.session, sequence,
                           odometry.use == OdometryUse::kMerged ? DropReason::kQueueFull : DropReason::kBadGeometry);
@@ -173,7 +185,7 @@ Journal::Content SessionEstimator::Save() const {
   // The scans themselves are saved by the pipeline, in the same order.
   std::vector<NameId> waiting;
   pipeline_.ForEachWaiting([&](const Scan& scan) { waiting.push_back(waiting_.at(&scan).stream.sensor_id); });
-  (*writer)(epoch_, session_, waiting);
+  (*writer)(epoch_, session_, fragment_, driven_m_, start_refused_, waiting);
   if (!record_.Save(*writer, WaitingBySensor())) return nullptr;
   return [writer, pipeline = std::make_shared<const slam::Checkpoint>(pipeline_.Save())] {
     const std::string own = writer->Main();
@@ -199,7 +211,8 @@ Result<SessionEstimator::PieceValues> SessionEstimator::Load(std::string_view ma
   if (!loaded) return tl::unexpected(loaded.error());
   slam::StateReader reader(own, pieces.first(*own_pieces));
   std::vector<NameId> waiting;
-  reader(epoch_, session_, waiting);
+  reader(epoch_, session_, fragment_, driven_m_, start_refused_, waiting);
+  T_map_keyframe_.reset();
   waiting_.clear();
   std::size_t next = 0;
   pipeline_.ForEachWaiting([&](const Scan& scan) {
@@ -209,6 +222,7 @@ Result<SessionEstimator::PieceValues> SessionEstimator::Load(std::string_view ma
   });
   reader.Require(next == waiting.size(), "number of waiting scans");
   if (auto record = record_.Load(reader, WaitingBySensor()); !record) return tl::unexpected(record.error());
+  record_.SetJoining({fragment_, driven_m_, start_refused_});
   PieceValues values = reader.values();
   values.insert(values.end(), loaded->begin(), loaded->end());
   return values;
@@ -231,7 +245,8 @@ void SessionEstimator::Replayed() {
 
 void SessionEstimator::Used(const Scan& scan, const slam::ScanOutcome& outcome) {
   const auto waiting = waiting_.find(&scan);
-  const PoseReport report = ReportOf(scan, outcome, identity_.status.session, session_, epoch_);
+  const PoseReport report = ReportOf(scan, outcome, identity_.status.session, session_, epoch_, fragment_);
+  if (outcome.keyframe) Drive(outcome.T_map_robot);
   if (!replaying_) outputs_.send(report);
   const std::chrono::duration<double, std::milli> latency = Clock::now() - waiting->second.received;
   record_.ScanUsed(waiting->second.stream, report, outcome.stamp, outcome.keyframe, latency.count());
@@ -264,6 +279,7 @@ void SessionEstimator::RefreshLandmarks(bool at_once) {
   const auto now = Clock::now();
   if (!at_once && now - landmarks_refreshed_ < kLandmarkPeriod) return;
   landmarks_refreshed_ = now;
+  if (fragment_) return record_.SetLandmarks({});  // They lie in a frame of their own.
   record_.SetLandmarks(ReportsOf(pipeline_.mapper().landmarks(), identity_.status.session.robot));
 }
 
@@ -290,7 +306,8 @@ void SessionEstimator::SetEpoch(std::uint32_t epoch) {
 
 // The grid before a correction, and the path to go back to with it.
 RobotGrid SessionEstimator::DisplacedGrid() {
-  RobotGrid displaced{PublishedChunks(), pipeline_.mapper().keyframe_count()};
+  RobotGrid displaced{
+      .chunks = PublishedChunks(), .keyframes = pipeline_.mapper().keyframe_count(), .path = {}, .fragment = fragment_};
   if (auto path = pipeline_.mapper().BestPath(); path.size() == displaced.keyframes)
     displaced.path = std::make_shared<const std::vector<Pose2>>(std::move(path));
   return displaced;
@@ -300,7 +317,18 @@ void SessionEstimator::AdoptGrid(std::uint32_t epoch, const RobotGrid& grid) {
   slam::Mapper& mapper = pipeline_.mapper();
   const auto path = grid.path != nullptr ? std::span<const Pose2>(*grid.path) : std::span<const Pose2>();
   mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), grid.chunks), grid.keyframes, path);
+  if (grid.fragment && !fragment_) driven_m_ = 0.0;  // So that no job joins it again at once.
+  fragment_ = grid.fragment;
+  if (!fragment_) start_refused_.clear();
+  T_map_keyframe_.reset();
+  record_.SetJoining({fragment_, driven_m_, start_refused_});
   SetEpoch(epoch);
+}
+
+void SessionEstimator::Drive(const Pose2& T_map_robot) {
+  if (T_map_keyframe_) driven_m_ += (T_map_robot.translation() - T_map_keyframe_->translation()).norm();
+  T_map_keyframe_ = T_map_robot;
+  record_.SetJoining({fragment_, driven_m_, start_refused_});
 }
 
 void SessionEstimator::On(SnapshotWanted&& wanted) {
@@ -308,7 +336,23 @@ void SessionEstimator::On(SnapshotWanted&& wanted) {
                .robot = identity_.status.session.robot,
                .snapshot = pipeline_.mapper().Snapshot(),
                .grid_options = pipeline_.mapper().grid().options(),
-               .start_known = start_known_});
+               .start_known = !fragment_});
+}
+
+void SessionEstimator::On(RelocaliseWanted&& wanted) {
+  if (ended_) return;
+  Store(RelocaliseTaken{wanted.T_map_robot});
+  pipeline_.mapper().Relocalise(wanted.T_map_robot);
+  T_map_keyframe_.reset();
+}
+
+void SessionEstimator::On(StartRefused&& refused) {
+  if (ended_ || fragment_) return;
+  Store(StartRefusal{refused.why});
+  fragment_ = true;
+  start_refused_ = std::move(refused.why);
+  record_.SetJoining({fragment_, driven_m_, start_refused_});
+  RefreshLandmarks(true);
 }
 
 void SessionEstimator::On(Finish&& finish) {

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -39,7 +40,9 @@ struct SessionOutputs {
 struct EstimatorSetup {
   slam::MapperOptions mapper;
   Pose2 T_map_robot_start;
-  bool start_known = true;  // False: nobody has said where the robot starts, and its start is the origin.
+  // Nobody has said where the robot starts in a map that others have begun. Its start is the origin of a frame of its
+  // own, and it is not localized, until a map version joins it (maps/robot_grid.h).
+  bool fragment = false;
 };
 
 class SessionEstimator {
@@ -80,6 +83,8 @@ class SessionEstimator {
   void On(Correction&& correction);
   void On(EpochChange&& change);
   void On(SnapshotWanted&& wanted);
+  void On(RelocaliseWanted&& wanted);
+  void On(StartRefused&& refused);
   void On(Finish&& finish);
   void Used(const Scan& scan, const slam::ScanOutcome& outcome);
   void Dropped(const Scan& scan, DropReason reason);
@@ -93,12 +98,16 @@ class SessionEstimator {
   RobotGrid DisplacedGrid();
   void AdoptGrid(std::uint32_t epoch, const RobotGrid& grid);
   void SetEpoch(std::uint32_t epoch);
+  void Drive(const Pose2& T_map_robot);
 
   SessionRecord& record_;
   const SessionOutputs outputs_;
-  const bool start_known_;
   const SessionSnapshot identity_;  // Names and id; its other parts are empty.
   std::uint32_t epoch_ = 0;
+  bool fragment_ = false;
+  std::string start_refused_;                                  // Why, if it was.
+  double driven_m_ = 0.0;                                      // See SessionRecord::Joining. Along the keyframes.
+  std::optional<Pose2> T_map_keyframe_;                        // The last one; empty after a correction.
   std::shared_ptr<const std::atomic<bool>> switch_completed_;  // Belongs to the last correction.
   bool ended_ = false;
   bool replaying_ = false;

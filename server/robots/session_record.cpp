@@ -75,15 +75,20 @@ std::uint64_t SessionRecord::NumberOf(SessionToken session, std::uint64_t sequen
   return session == status_.session.session ? sequence : 0;
 }
 
-SessionRecord::Arrival SessionRecord::ScanReceived(const StreamId& of, std::uint64_t sequence) {
+SessionRecord::Arrival SessionRecord::Account(Stream& stream, std::uint64_t sequence, std::uint64_t number, From from) {
+  stream.arrived = Clock::now();
+  if (LeftAside(stream, sequence)) return Arrival::kAside;
+  if (from == From::kRobot && stream.account.IsDoubtful(number)) return Arrival::kAside;
+  if (!stream.account.Received(number)) return Arrival::kDuplicate;
+  stream.changed = true;
+  return Arrival::kNew;
+}
+
+SessionRecord::Arrival SessionRecord::ScanReceived(const StreamId& of, std::uint64_t sequence, From from) {
   const MutexLock lock(mutex_);
   Stream* const stream = Find(of.sensor_id);
   if (stream == nullptr) return Arrival::kUnknownSensor;
-  stream->arrived = Clock::now();
-  if (LeftAside(*stream, sequence)) return Arrival::kAside;
-  if (!stream->account.Received(NumberOf(of.session, sequence))) return Arrival::kDuplicate;
-  stream->changed = true;
-  return Arrival::kNew;
+  return Account(*stream, sequence, NumberOf(of.session, sequence), from);
 }
 
 void SessionRecord::ScanDropped(const StreamId& of, std::uint64_t sequence, DropReason reason) {
@@ -115,12 +120,9 @@ SessionRecord::Arrival SessionRecord::ForeignScan(NameId sensor_id, DropReason r
   return Arrival::kNew;
 }
 
-bool SessionRecord::OdometryReceived(SessionToken session, std::uint64_t sequence) {
+bool SessionRecord::OdometryReceived(SessionToken session, std::uint64_t sequence, From from) {
   const MutexLock lock(mutex_);
-  odometry_.arrived = Clock::now();
-  if (LeftAside(odometry_, sequence) || !odometry_.account.Received(NumberOf(session, sequence))) return false;
-  odometry_.changed = true;
-  return true;
+  return Account(odometry_, sequence, NumberOf(session, sequence), from) == Arrival::kNew;
 }
 
 void SessionRecord::OdometryUsed(SessionToken session, std::uint64_t sequence, Stamp stamp) {
@@ -190,6 +192,16 @@ void SessionRecord::SetLandmarks(std::vector<LandmarkReport> landmarks) {
   auto shared = std::make_shared<const std::vector<LandmarkReport>>(std::move(landmarks));
   const MutexLock lock(mutex_);
   landmarks_.swap(shared);
+}
+
+void SessionRecord::SetJoining(const Joining& joining) {
+  const MutexLock lock(mutex_);
+  joining_ = joining;
+}
+
+SessionRecord::Joining SessionRecord::joining() const {
+  const MutexLock lock(mutex_);
+  return joining_;
 }
 
 void SessionRecord::SetEpoch(std::uint32_t epoch) {
@@ -273,6 +285,8 @@ SessionState SessionRecord::state() const {
 
 SessionState SessionRecord::StateNow() const {
   SessionState state = status_.session;
+  if (joining_.fragment && !joining_.why.empty() && state.status.ok())
+    state.status = {StatusCode::kFailedPrecondition, joining_.why};
   state.stale = !silence_.empty();
   if (state.stale && state.status.ok()) {
     state.status = {StatusCode::kUnavailable,

@@ -40,11 +40,13 @@ class SessionRecord {
   [[nodiscard]] bool Has(NameId sensor_id) const;
 
   // A scan of the owner. Only kNew changes the record. kAside: after a restart, scans before this one must be sent
-  // again first (robots.gap_wait_s). The client will send this one again after them.
+  // again first (robots.gap_wait_s), or its number is doubtful (StreamLedger::IsDoubtful). The client will send this
+  // one again.
   enum class Arrival { kNew, kDuplicate, kAside, kUnknownSensor };
   // What an earlier owner sent, and the journal or the estimator holds, is counted without its number, which may be
   // one of the owner's as well.
-  Arrival ScanReceived(const StreamId& stream, std::uint64_t sequence);
+  enum class From { kRobot, kJournal };  // The journal is believed.
+  Arrival ScanReceived(const StreamId& stream, std::uint64_t sequence, From from = From::kRobot);
   void ScanDropped(const StreamId& stream, std::uint64_t sequence, DropReason reason);
   // `path_stamp` is the estimator's time, which grows also where the robot's clock was set back: the path is kept by
   // it.
@@ -54,7 +56,7 @@ class SessionRecord {
 
   // Odometry of the owner. Returns false, and changes nothing, if the number was received before or must be sent again
   // later (see kAside).
-  [[nodiscard]] bool OdometryReceived(SessionToken session, std::uint64_t sequence);
+  [[nodiscard]] bool OdometryReceived(SessionToken session, std::uint64_t sequence, From from = From::kRobot);
   void OdometryUsed(SessionToken session, std::uint64_t sequence, Stamp stamp);
   // kQueueFull: the sample was merged into its successor.
   void OdometryDropped(SessionToken session, std::uint64_t sequence, DropReason reason);
@@ -75,6 +77,15 @@ class SessionRecord {
   [[nodiscard]] std::vector<std::string> sensors() const;
 
   void SetLandmarks(std::vector<LandmarkReport> landmarks);
+  // Whether the robot is not joined with the map of its site, and how far it has driven since it began, or since it was
+  // taken out of the map.
+  struct Joining {
+    bool fragment = false;
+    double driven_m = 0.0;
+    std::string why = {};  // Why its start was refused, if it was; the status of an active session says it.
+  };
+  void SetJoining(const Joining& joining);
+  [[nodiscard]] Joining joining() const;
   // Another epoch of the map: the newest pose belongs to it from now on.
   void SetEpoch(std::uint32_t epoch);
   void SetAlive(bool alive);
@@ -115,6 +126,8 @@ class SessionRecord {
   template <typename Archive>
   static void Members(Archive& archive, auto& self, auto& odometry) CAIRN_NO_THREAD_SAFETY_ANALYSIS;
   bool LeftAside(Stream& stream, std::uint64_t sequence) const;
+  // Takes a sample's number into the account. Returns kAside or kDuplicate if it must not be used.
+  Arrival Account(Stream& stream, std::uint64_t sequence, std::uint64_t number, From from) CAIRN_REQUIRES(mutex_);
   Ledger NamesOf(NameId sensor_id, const std::string& sensor) const CAIRN_REQUIRES(mutex_);
   static bool IsDue(const Stream& stream, Clock::time_point now, Urgency urgency, Clock::duration period);
   Ledger TakeLedger(Stream& stream, Clock::time_point now) const CAIRN_REQUIRES(mutex_);
@@ -136,6 +149,7 @@ class SessionRecord {
   std::map<NameId, Stream> streams_ CAIRN_GUARDED_BY(mutex_);
   Stream odometry_ CAIRN_GUARDED_BY(mutex_);
   PoseHistory history_ CAIRN_GUARDED_BY(mutex_);
+  Joining joining_ CAIRN_GUARDED_BY(mutex_);
   std::shared_ptr<const std::vector<LandmarkReport>> landmarks_ CAIRN_GUARDED_BY(mutex_);
 };
 

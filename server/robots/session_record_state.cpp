@@ -12,7 +12,7 @@ void SessionRecord::Members(Archive& archive, auto& self, auto& odometry) {
   auto& pose = self.status_.pose;
   archive(self.status_.session.client, self.status_.session.session, pose.stamp, pose.session, pose.scan_sequence,
           pose.T_map_robot, pose.covariance, pose.T_map_odom, pose.localized, pose.score, pose.reason, pose.map_epoch);
-  archive.Require(pose.reason <= PoseReason::kWaiting, "the reason of a pose");
+  archive.Require(pose.reason <= PoseReason::kNotJoined, "the reason of a pose");
   archive(odometry, self.history_);
 }
 

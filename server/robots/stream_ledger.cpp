@@ -13,6 +13,17 @@ std::uint64_t& Count(Ledger& ledger, DropReason reason) {
 
 }  // namespace
 
+bool StreamLedger::IsDoubtful(std::uint64_t sequence) {
+  const std::uint64_t claimed = std::exchange(claimed_, 0);
+  const auto follows = [sequence](std::uint64_t other) {
+    return sequence <= other || sequence - other <= kBelievedStep;
+  };
+  if (!begun_ || follows(ledger_.last_sequence)) return false;
+  if (claimed != 0 && claimed <= sequence && follows(claimed)) return false;
+  claimed_ = sequence;
+  return true;
+}
+
 bool StreamLedger::Received(std::uint64_t sequence) {
   if (sequence > 0) {
     const bool first = !std::exchange(begun_, true);

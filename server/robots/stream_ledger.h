@@ -7,7 +7,10 @@
 // remembered; older ones stay lost for good. Numbers before the first one of a client may have gone to an earlier
 // session or to the server before its last restart. They do not count as lost, and are taken if they come late. The
 // counts go on. A number more than kMaxStep ahead begins a new count in the same way, because no client loses a million
-// scans at once. Thread rule: none of its own; the session's lock guards it.
+// scans at once.
+// A number that is more than kBelievedStep ahead is believed when another one follows it (IsDoubtful): a single forged
+// or damaged sample would otherwise settle everything up to it, and the client would send none of this again.
+// Thread rule: none of its own; the session's lock guards it.
 #pragma once
 
 #include <array>
@@ -26,9 +29,12 @@ class StreamLedger {
  public:
   static constexpr std::size_t kMaxGaps = 1024;
   static constexpr std::uint64_t kMaxStep = 1'000'000;
+  static constexpr std::uint64_t kBelievedStep = 256;  // A writer keeps no more samples: so many can be lost at once.
 
   explicit StreamLedger(Ledger names) : ledger_(std::move(names)) {}
 
+  // Whether the sample must not be taken yet. Called with each number in the order of arrival, before Received.
+  [[nodiscard]] bool IsDoubtful(std::uint64_t sequence);
   // A sample arrived. Returns false for a duplicate number, which the caller must ignore. Otherwise Used or Dropped
   // must follow.
   bool Received(std::uint64_t sequence);
@@ -95,6 +101,7 @@ class StreamLedger {
   bool begun_ = false;                // The client has sent a number before.
   std::uint64_t first_sequence_ = 0;  // The first number of the client; numbers missing before it are not lost.
   std::uint64_t settled_count_ = 0;
+  std::uint64_t claimed_ = 0;                    // The last number, if it was doubtful.
   std::set<std::uint64_t> waiting_;              // Numbers received and not settled; bounded by the robot's queue.
   std::set<std::uint64_t> undurable_;            // Numbers received and not yet on the disk.
   std::map<std::uint64_t, std::uint64_t> gaps_;  // First missing number -> last missing number, disjoint.

@@ -37,6 +37,10 @@ std::vector<std::string> RobotStream::ProblemsOfPose() const {
   std::vector<std::string> problems;
   if (!last_pose_) {
     problems.emplace_back("no scan has been used yet: `cairn status " + place_.robot + "` says what became of them");
+  } else if (last_pose_->reason == PoseReason::kNotJoined) {
+    problems.emplace_back(
+        "nobody has said where it started, and it is not joined with the map of its site yet: publish an initial pose, "
+        "or drive on through places that others have seen");
   } else if (!last_pose_->localized) {
     problems.push_back("the server has lost it (" + std::string(PoseReasonName(last_pose_->reason)) +
                        "): publish an initial pose, or drive on until it is found");

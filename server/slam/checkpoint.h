@@ -16,7 +16,7 @@
 
 namespace cairn::slam {
 
-inline constexpr std::uint32_t kCheckpointFormat = 4;
+inline constexpr std::uint32_t kCheckpointFormat = 6;
 
 class Checkpoint {
  public:

@@ -270,6 +270,10 @@ void Mapper::State::KeepShape(std::span<const Pose2> path, std::size_t known) {
   }
 }
 
+void Mapper::Relocalise(const std::optional<Pose2>& T_map_robot) {
+  state_->Relocalise(T_map_robot);
+}
+
 std::vector<Pose2> Mapper::BestPath() const {
   return state_->filter->placed() ? state_->believed_path().values() : std::vector<Pose2>{};
 }

@@ -82,6 +82,10 @@ class Mapper {
   // can not follow (Filter::rebases), only the grid is replaced. Then draws the later keyframes onto it along the
   // present best path. Every chunk of both grids counts as changed.
   void AdoptGrid(OccupancyGrid grid, std::size_t keyframes, std::span<const Pose2> path = {});
+  // Somebody says that the robot is not where it is believed to be, and perhaps where it is (T_map_robot at the last
+  // scan). From the next scan on it is not localized until it is found in its map: near that pose, or anywhere
+  // (recovery/recovery.h). Nothing happens before there is a map.
+  void Relocalise(const std::optional<Pose2>& T_map_robot);
   // T_map_robot of every keyframe along the best path; empty while the robot's place in the map is not known.
   [[nodiscard]] std::vector<Pose2> BestPath() const;
 

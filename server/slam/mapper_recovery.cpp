@@ -59,6 +59,21 @@ void Mapper::State::LosePlace(bool odometry_goes_on) {
   front_end.Restart();
 }
 
+// As Mapper::Relocalise.
+void Mapper::State::Relocalise(const std::optional<Pose2>& T_map_robot) {
+  if (!HasMap() || !last_scan) return;
+  Recovery::Known known = LastKnown();
+  if (T_map_robot) {
+    known.T_map_robot = *T_map_robot;
+    known.T_odom_robot = OdometryOrNone(last_scan->T_odom_robot);
+    known.covariance = PoseCovariance(options.recovery.place.near_m, options.recovery.place.near_rad);
+    recovery.BeginWhereSaid(known);
+  } else {
+    recovery.Begin(known, false);
+  }
+  front_end.Restart();
+}
+
 // Whether nothing at all has changed since the last scan: nobody has moved the robot.
 bool Mapper::State::StoodStill(const Scan& scan, const Pose2& T_odom_robot, const TrackStep& step) const {
   if (!last_scan || !step.matched) return false;

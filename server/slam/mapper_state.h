@@ -44,6 +44,7 @@ struct Mapper::State {
   Passage BeginAfter(Passage passage, bool tilted);
   void CheckPlace(Passage passage, TrackedScan& tracked, const Pose2& T_odom_robot, const ParallelFor& parallel_for);
   void LosePlace(bool odometry_goes_on);
+  void Relocalise(const std::optional<Pose2>& T_map_robot);
   // Before, the next scan defines the start, or the filter itself looks for the robot's place.
   [[nodiscard]] bool HasMap() const { return !trail.empty() && filter->placed(); }
   [[nodiscard]] Recovery::Known LastKnown() const {

@@ -1,6 +1,7 @@
 // The bytes of a batch of journal entries (records.h).
 #include <utility>
 
+#include "common/service/start_pose.h"
 #include "server/store/record_values.h"
 
 namespace cairn::server {
@@ -53,6 +54,15 @@ void FillEntry(record::Entry& to, const EpochChanged& from) {
   to.mutable_epoch()->set_epoch(from.epoch);
 }
 
+void FillEntry(record::Entry& to, const RelocaliseTaken& from) {
+  record::Relocalise& relocalise = *to.mutable_relocalise();
+  if (from.T_map_robot) Fill(*relocalise.mutable_t_map_robot(), *from.T_map_robot);
+}
+
+void FillEntry(record::Entry& to, const StartRefusal& from) {
+  to.mutable_start_refusal()->set_why(from.why);
+}
+
 void FillEntry(record::Entry& to, const SessionFinished& from) {
   to.mutable_finish()->set_final(from.final);
   Fill(*to.mutable_finish()->mutable_status(), from.status);
@@ -91,6 +101,13 @@ Result<JournalEntry> CorrectionOf(const record::Correction& from) {
   return CorrectionTaken{from.epoch(), from.generation(), std::move(*grid)};
 }
 
+Result<JournalEntry> RelocaliseOf(const record::Relocalise& from) {
+  if (!from.has_t_map_robot()) return RelocaliseTaken{};
+  const Pose2 T_map_robot = ValueOf(from.t_map_robot());
+  if (!ValidateStart(T_map_robot)) return Unreadable("a pose");
+  return RelocaliseTaken{T_map_robot};
+}
+
 Result<JournalEntry> EntryOf(const record::Entry& from) {
   switch (from.content_case()) {
     case record::Entry::kScan:
@@ -109,6 +126,10 @@ Result<JournalEntry> EntryOf(const record::Entry& from) {
       return CorrectionOf(from.correction());
     case record::Entry::kEpoch:
       return EpochChanged{from.epoch().epoch()};
+    case record::Entry::kRelocalise:
+      return RelocaliseOf(from.relocalise());
+    case record::Entry::kStartRefusal:
+      return StartRefusal{from.start_refusal().why()};
     case record::Entry::kFinish:
       return SessionFinished{from.finish().final(), ValueOf(from.finish().status())};
     case record::Entry::CONTENT_NOT_SET:

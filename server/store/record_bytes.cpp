@@ -40,13 +40,15 @@ std::string BytesOf(const StoredSession& session) {
   to.set_id(session.id);
   Fill(*to.mutable_request(), session.request);
   to.set_map_epoch(session.map_epoch);
+  to.set_fragment(session.fragment);
   return to.SerializeAsString();
 }
 
 Result<StoredSession> SessionOf(std::string_view bytes) {
   record::Session from;
   if (!Parse(from, bytes)) return Unreadable("a session");
-  StoredSession session{.id = from.id(), .request = ValueOf(from.request()), .map_epoch = from.map_epoch()};
+  StoredSession session{
+      .id = from.id(), .request = ValueOf(from.request()), .map_epoch = from.map_epoch(), .fragment = from.fragment()};
   const bool valid = session.id != 0 && ValidateName("robot", session.request.robot) &&
                      ValidateName("site", session.request.site) &&
                      (!session.request.has_start || ValidateStart(session.request.T_map_robot_start));
@@ -106,6 +108,7 @@ std::string BytesOf(const StoredSite& site) {
     member.set_session(session);
   }
   to.set_resolution_m(site.resolution_m);
+  for (const std::uint64_t session : site.fragments) to.add_fragments(session);
   return to.SerializeAsString();
 }
 
@@ -120,7 +123,8 @@ Result<StoredSite> SiteOf(std::string_view bytes) {
                   .enabled_version = from.enabled_version(),
                   .switches = {},
                   .members = {},
-                  .resolution_m = from.resolution_m()};
+                  .resolution_m = from.resolution_m(),
+                  .fragments = {from.fragments().begin(), from.fragments().end()}};
   if (!(site.resolution_m >= 0.0 && site.resolution_m <= 10.0)) return Unreadable("a site");
   for (const auto& made : from.switches()) site.switches[made.epoch()] = made.generation();
   for (const auto& member : from.members()) site.members[member.robot_id()] = member.session();
@@ -164,7 +168,7 @@ std::string BytesOf(const StoredJob& stored) {
 Result<StoredJob> JobOf(std::string_view bytes) {
   record::Job from;
   if (!Parse(from, bytes) || from.id() == 0) return Unreadable("a job");
-  if (from.kind() > static_cast<std::uint32_t>(JobKind::kSmooth)) return Unreadable("a job");
+  if (from.kind() > static_cast<std::uint32_t>(JobKind::kJoin)) return Unreadable("a job");
   if (from.state() > static_cast<std::uint32_t>(JobState::kCancelled)) return Unreadable("a job");
   StoredJob stored;
   Job& job = stored.job;

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -31,6 +32,7 @@ struct StoredGrid {
   std::uint64_t keyframes = 0;
   std::vector<StoredChunk> chunks;
   std::shared_ptr<const std::vector<Pose2>> path{};  // T_map_robot of the keyframes; null: not known.
+  bool fragment = false;                             // Not joined with the map of the site.
 };
 
 // The entries of a session's journal: the events that its strand processed, in this order.
@@ -66,17 +68,26 @@ struct CorrectionTaken {
 struct EpochChanged {
   std::uint32_t epoch = 0;
 };
+// Somebody said that the robot has to be found again, and perhaps where it is.
+struct RelocaliseTaken {
+  std::optional<Pose2> T_map_robot;
+};
+// The robot is not where it was said to start: from now on it is a fragment.
+struct StartRefusal {
+  std::string why;
+};
 struct SessionFinished {
   bool final = true;
   Status status;
 };
-using JournalEntry =
-    std::variant<ScanTaken, ScanRefused, OdometryTaken, OwnerChanged, CorrectionTaken, EpochChanged, SessionFinished>;
+using JournalEntry = std::variant<ScanTaken, ScanRefused, OdometryTaken, OwnerChanged, CorrectionTaken, EpochChanged,
+                                  RelocaliseTaken, StartRefusal, SessionFinished>;
 
 struct StoredSession {
   std::uint64_t id = 0;
   SessionRequest request;
   std::uint32_t map_epoch = 0;
+  bool fragment = false;  // It began without being joined with the map of the site.
 };
 
 // The path of a robot after smoothing, and the session that drove it: the robot may have begun another since.
@@ -103,6 +114,7 @@ struct StoredSite {
   std::map<std::uint32_t, std::uint64_t> switches;  // Epoch -> generation of the server that began it.
   std::map<NameId, std::uint64_t> members;          // Robot -> the session that draws for it.
   double resolution_m = 0.0;                        // Side of the map's cells; 0: not known.
+  std::set<std::uint64_t> fragments;                // Sessions that are not joined with the map.
 };
 
 struct StoredLayer {

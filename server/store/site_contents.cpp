@@ -137,7 +137,7 @@ std::vector<RecordRange> RangesOf(const SiteContents& contents) {
 }
 
 Result<std::uint64_t> FindSession(const SiteContents& contents, const std::string& robot_or_number) {
-  // If a robot has two sessions, the earlier one is set aside.
+  // Of several sessions of a robot it is the last one.
   for (auto it = contents.sessions.rbegin(); it != contents.sessions.rend(); ++it) {
     if (it->second.request.robot == robot_or_number) return it->first;
   }

@@ -69,6 +69,8 @@ Result<Division> Divide(Store& store, const std::string& site, const std::vector
   division.going_site = stays;
   division.going_site.members =
       TakeOut(stays.members, [&](const auto& member) { return division.going.contains(member.second); });
+  division.going_site.fragments =
+      TakeOut(stays.fragments, [&](std::uint64_t fragment) { return division.going.contains(fragment); });
   ++stays.tile_version;
   return division;
 }

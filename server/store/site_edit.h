@@ -23,7 +23,7 @@ struct ImportOptions {
 
 // Adds the site of a file. Its sessions and jobs get new numbers in the old order, without gaps, after the store's own.
 // The summary names site, robots and numbers as they are in the store now. ALREADY_EXISTS: the store has a site of this
-// name, or one of the robots has a session in another site; a robot has one session. INVALID_ARGUMENT: a new name that
+// name, or one of the robots has a session in another site; a robot is in one site. INVALID_ARGUMENT: a new name that
 // is none, or of a robot that is not there. Errors of the file: SiteFileReader.
 [[nodiscard]] Result<SiteFileSummary> ImportSite(Store& store, const std::filesystem::path& file,
                                                  const ImportOptions& options = {});

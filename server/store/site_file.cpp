@@ -110,6 +110,7 @@ class Survey {
     if (!site) return tl::unexpected(site.error());
     if (record.key.owner != HashName(site->name)) return Unreadable("a site of another name");
     for (const auto& [robot, session] : site->members) summary_.session_numbers.insert(session);
+    summary_.session_numbers.insert(site->fragments.begin(), site->fragments.end());
     summary_.site = std::move(*site);
     return {};
   }
@@ -119,7 +120,8 @@ class Survey {
     if (session->id != record.key.owner || session->request.site != summary_.site.name || !IsId(session->id))
       return Unreadable("a session of another site");
     for (const auto& [id, robot] : summary_.sessions) {
-      if (HashName(robot) == HashName(session->request.robot)) return Unreadable("two sessions of one robot");
+      if (robot != session->request.robot && HashName(robot) == HashName(session->request.robot))
+        return Unreadable("two robots with one id");
     }
     summary_.sessions[session->id] = session->request.robot;
     summary_.session_numbers.insert(session->id);

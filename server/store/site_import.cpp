@@ -96,6 +96,9 @@ class Renaming {
     std::map<NameId, std::uint64_t> members;
     for (const auto& [robot, session] : site.members) members[Id(robot)] = Session(session);
     site.members = std::move(members);
+    std::set<std::uint64_t> fragments;
+    for (const std::uint64_t session : site.fragments) fragments.insert(Session(session));
+    site.fragments = std::move(fragments);
   }
   void Rename(StoredVersion& version) const {
     if (version.job != 0) version.job = Job(version.job);
@@ -159,12 +162,17 @@ Result<void> CheckRoom(Store& store, const std::map<std::uint64_t, StoredSession
   }
   std::map<NameId, std::string> taken;  // Robot -> its site.
   for (const auto& [id, session] : stored) taken[HashName(session.request.robot)] = session.request.site;
+  std::map<NameId, std::string> own;  // New id -> the robot in the file.
   for (const auto& [id, robot] : file.sessions) {
     const std::string& name = renaming.Robot(robot);
-    const auto [other, fresh] = taken.emplace(HashName(name), renaming.site());
-    if (!fresh)
+    const auto other = taken.find(HashName(name));
+    if (other != taken.end())
       return Fail(StatusCode::kAlreadyExists, "robot '" + name + "' has a session in site '" + other->second +
-                                                  "', and a robot has one session; give this one another name");
+                                                  "', and a robot is in one site; give this one another name");
+    const auto same = own.emplace(HashName(name), robot).first;
+    if (same->second != robot)
+      return Fail(StatusCode::kAlreadyExists, "the robots '" + same->second + "' and '" + robot +
+                                                  "' of the file would have one name; give each its own");
   }
   return {};
 }

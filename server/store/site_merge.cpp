@@ -81,13 +81,19 @@ class Merge {
             changed = true;
             epoch->epoch += shift;
           }
+          auto* const relocalise = std::get_if<RelocaliseTaken>(&entry);
+          if (relocalise != nullptr && relocalise->T_map_robot && moves) {
+            changed = true;
+            relocalise->T_map_robot = T_into_from_ * *relocalise->T_map_robot;
+          }
           auto* const correction = std::get_if<CorrectionTaken>(&entry);
           if (correction == nullptr) continue;
           changed = true;
           const auto made = of.site.switches.find(correction->epoch);
           const bool completed = made != of.site.switches.end() && made->second == correction->generation;
           correction->epoch = completed ? correction->epoch + shift : 0;
-          if (moves) correction->grid = Transformed(correction->grid, T_into_from_, of.site.resolution_m);
+          if (moves && !correction->grid.fragment)
+            correction->grid = Transformed(correction->grid, T_into_from_, of.site.resolution_m);
         }
         if (changed) Put({RecordKind::kJournal, id, number}, BytesOf(batch->first, batch->entries));
         return {};
@@ -115,10 +121,12 @@ class Merge {
       session.request.site = into_.site.name;
       session.map_epoch += epoch_shift_;
       if (moves_) {
-        Pose2& start = session.request.T_map_robot_start;
-        start = session.request.has_start ? T_into_from_ * start : T_into_from_;
-        session.request.has_start = true;
-        if (auto valid = ValidateStart(start); !valid) return valid;
+        if (!session.fragment) {  // The place of a fragment in the map is not known, neither before nor after.
+          Pose2& start = session.request.T_map_robot_start;
+          start = session.request.has_start ? T_into_from_ * start : T_into_from_;
+          session.request.has_start = true;
+          if (auto valid = ValidateStart(start); !valid) return valid;
+        }
         changes_.removed.push_back({.kind = RecordKind::kCheckpoint, .owner = id});
       }
       Put({RecordKind::kSession, id, 0}, BytesOf(session));
@@ -127,13 +135,14 @@ class Merge {
   }
 
   StoredGrid Moved(const StoredGrid& grid) const {
-    return moves_ ? Transformed(grid, T_into_from_, from_.site.resolution_m) : grid;
+    return moves_ && !grid.fragment ? Transformed(grid, T_into_from_, from_.site.resolution_m) : grid;
   }
 
   Result<void> Layers() {
-    const auto layers = ReadLayers(store_, HashName(from_.site.name));
+    auto layers = ReadLayers(store_, HashName(from_.site.name));
     if (!layers) return tl::unexpected(layers.error());
-    for (const StoredLayer& layer : *layers) {
+    for (StoredLayer& layer : *layers) {
+      layer.grid.fragment = from_.site.fragments.contains(layer.session);
       Put({RecordKind::kLayer, HashName(into_.site.name), layer.session},
           BytesOf(StoredLayer{layer.session, Moved(layer.grid)}));
     }
@@ -181,6 +190,7 @@ class Merge {
     site.tile_version = std::max(site.tile_version, from_.site.tile_version) + 1;
     for (const auto& [epoch, generation] : from_.site.switches) site.switches[epoch + epoch_shift_] = generation;
     site.members.insert(from_.site.members.begin(), from_.site.members.end());
+    site.fragments.insert(from_.site.fragments.begin(), from_.site.fragments.end());
     Put({RecordKind::kSite, HashName(site.name), 0}, BytesOf(site));
     for (const RecordKind kind : {RecordKind::kSite, RecordKind::kMapVersion, RecordKind::kLayer})
       changes_.removed.push_back({.kind = kind, .owner = HashName(from_.site.name)});

@@ -30,7 +30,8 @@ for name in cairnd cairn-web; do
     check "exposure is at most 2.0" systemd-analyze security --no-pager --offline=true --threshold=20 "$world/$name.service"
   fi
 done
-for line in Type=notify WatchdogSec= StateDirectory=cairn; do
+for line in Type=notify WatchdogSec= StateDirectory=cairn UMask=0077 PrivateMounts=yes ProcSubset=pid \
+  MemoryDenyWriteExecute=yes; do
   check "the unit of cairnd says $line" grep -q "^$line" "$units/cairnd.service"
 done
 exit $status

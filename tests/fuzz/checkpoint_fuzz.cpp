@@ -170,7 +170,7 @@ std::string SeedOfServer(int scans) {
     static_cast<void>(record.ScanReceived(stream, sequence));
     numbers[HashName("laser")].insert(sequence);
   });
-  writer(std::uint32_t{3}, std::uint64_t{kTokenBefore}, waiting);
+  writer(std::uint32_t{3}, std::uint64_t{kTokenBefore}, false, 0.0, std::string(), waiting);
   Must(record.Save(writer, numbers), "the account of a session");
   return std::string(1, static_cast<char>(kServer)) + Piece(writer.Bytes()) + StateOf(saved);
 }

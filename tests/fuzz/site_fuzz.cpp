@@ -138,7 +138,8 @@ std::vector<Saved> SampleRecords(bool with_grid) {
       {{RecordKind::kSession, 5, 0}, BytesOf(server::testing::SampleSession(5))},
   };
   for (const Record& part : checkpoint.put) records.push_back({part.key, part.bytes});
-  records.push_back({{RecordKind::kJournal, 5, 7}, BytesOf(1, SmallJournal())});
+  // The number of its last entry is part of its key.
+  records.push_back({{RecordKind::kJournal, 5, SmallJournal().size()}, BytesOf(1, SmallJournal())});
   return records;
 }
 

@@ -36,6 +36,8 @@ inline std::vector<server::JournalEntry> SmallJournal() {
           ScanRefused{testing::SampleStream(), 2, DropReason::kQueueFull},
           testing::SampleOdometry(3),
           CorrectionTaken{4, 5, {.keyframes = 1, .chunks = {}}},
+          RelocaliseTaken{Pose2{1.0, 2.0, 3.0}},
+          StartRefusal{"it is elsewhere"},
           SessionFinished{true, {StatusCode::kUnavailable, "gone"}}};
 }
 

@@ -77,7 +77,9 @@ TEST(Restore, ACheckpointOfANewerServerIsKeptAndItsSessionIsSetAside) {
 // Site lab with a session that is gone (its part of the map is left), r1 whose map was smoothed, and a job; site hall
 // with r2.
 void MakeTwoSites(const std::filesystem::path& state) {
-  StoredServer server(state);
+  ServerOptions options = TestOptions();
+  options.robots.max_earlier = 0;
+  StoredServer server(state, options);
   server->Open("r0", 9);
   server->Drive("r0", 9, 0, 20);
   server->End("r0", 9);

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "server/robots/session.h"
 #include "tests/eventually.h"
 #include "tests/server/support/whole_server.h"
 
@@ -51,10 +52,14 @@ double SecondsFor(const ServerOptions& options, int robot_count, int steps,
 // others.
 TEST(ServerOverload, IsHealthyUnderOverloadAsLongAsItMoves) {
   ServerOptions options = SlowOnOneThread();
-  // A limit that no single scan reaches on this machine, sanitized or not, but a whole queue does.
+  constexpr int kRobots = 12, kScans = 60;
+  // A limit that neither a turn of each robot nor the drawing of what these change in the map reaches on this machine,
+  // sanitized or not, but all queues together do. Half of a turn is odometry, so this is twice as long as the turns
+  // take.
   const double seconds_per_scan = SecondsFor(options, 1, 10, [](WholeServer&) {}) / 10.0;
-  options.server.stall_limit_s = std::max(0.3, 30.0 * seconds_per_scan);
-  const double seconds = SecondsFor(options, 12, 60, [](WholeServer& house) { EXPECT_TRUE(house.server().healthy()); });
+  options.server.stall_limit_s = std::max(0.3, kRobots * Session::kEventsPerTurn * seconds_per_scan);
+  const double seconds =
+      SecondsFor(options, kRobots, kScans, [](WholeServer& house) { EXPECT_TRUE(house.server().healthy()); });
   EXPECT_GT(seconds, 2.0 * options.server.stall_limit_s) << "the work was too little to show anything";
 }
 

@@ -300,7 +300,7 @@ TEST(Server, AnEndedSessionsPartOfTheMapStaysWhenTheRobotComesBack) {
   ASSERT_TRUE(house.WaitPhase("r1", kClient, SessionPhase::kEnded));
   ASSERT_TRUE(house.WaitFor([&] { return house.CurrentTiles().size() >= 4; }));
   const auto before = house.CurrentTiles();
-  house.Open("r1", kClient, "lab", {0.5, 0.5, 0.0});
+  house.Open("r1", kClient, "lab", Pose2{0.5, 0.5, 0.0});
   ASSERT_TRUE(house.WaitPhase("r1", kClient, SessionPhase::kActive));
   for (const auto& [key, tile] : before) EXPECT_TRUE(house.CurrentTiles().contains(key));
   ASSERT_TRUE(

@@ -16,7 +16,7 @@
 
 namespace cairn::studies {
 
-inline constexpr int kPoseReasonCount = static_cast<int>(PoseReason::kWaiting) + 1;
+inline constexpr int kPoseReasonCount = static_cast<int>(PoseReason::kNotJoined) + 1;
 
 struct LogRun {
   Trajectory online;                 // The poses as estimated during the run.

@@ -23,12 +23,13 @@ class RosFleet : public ::testing::Test {
     setenv("CYCLONEDDS_URI", "file://" CAIRN_CYCLONE_CONFIG, 1);
     server_ = std::make_unique<ChildProcess>(
         Words{CAIRND_PATH, "--domain", domain_, "--set", "ros2.enabled=true", "--set", "ros2.domain=" + domain_,
-              "--set", "ros2.namespaces=/{robot}, /=rootless", "--set", "slam.particles=20"});
+              "--set", "ros2.namespaces=/r2=yard/r2, /{robot}, /=rootless", "--set", "slam.particles=20"});
     EXPECT_TRUE(server_->Says("ready"));
   }
 
-  std::unique_ptr<ChildProcess> Robot(const std::string& name_space, const std::string& seconds, Words words = {}) {
-    Words line{CAIRN_ROS2_ROBOT, domain_, name_space, "lab", seconds};
+  std::unique_ptr<ChildProcess> Robot(const std::string& name_space, const std::string& seconds, Words words = {},
+                                      const std::string& site = "lab") {
+    Words line{CAIRN_ROS2_ROBOT, domain_, name_space, site, seconds};
     line.insert(line.end(), words.begin(), words.end());
     return std::make_unique<ChildProcess>(line);
   }
@@ -67,7 +68,7 @@ class RosFleet : public ::testing::Test {
 TEST_F(RosFleet, RobotsAsTheyAreGetTheirPosesAndTheMap) {
   // They must still be there when the doctor is asked, which takes some seconds under a sanitizer.
   const auto humble = Robot("r1", "14");
-  const auto jazzy = Robot("r2", "14", {"jazzy"});
+  const auto jazzy = Robot("r2", "14", {"jazzy"}, "yard");  // In the other's map it would have to be joined first.
   const auto on_map = [](const nlohmann::json& one) { return one["on_map"] == true; };
   EXPECT_EQ(DoctorOf("/r1", on_map)["site"], "lab");
   EXPECT_EQ(DoctorOf("/r2", on_map)["topics"].size(), 3U);

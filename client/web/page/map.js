@@ -61,6 +61,7 @@ export function robotState(robot, connected) {
   if (!robot.pose) return ['unsure', 'Waiting for scans'];
   if (robot.pose.reason === 'lost' || robot.pose.reason === 'diverged') return ['lost', 'Lost'];
   if (robot.pose.reason === 'odometry_only') return ['unsure', 'Odometry only'];
+  if (robot.pose.reason === 'not_joined') return ['unsure', 'Not joined'];
   if (!robot.pose.localized) return ['unsure', 'Not localized'];
   if (robot.pose.reason === 'degenerate') return ['tracking', 'Corridor'];
   return ['tracking', connected ? 'Tracking' : 'Last known'];
@@ -159,6 +160,11 @@ export class SiteMap {
     for (const robot of robots) {
       if (!robot.pose) continue;
       const drawn = this.draw(robot), { pose } = robot;
+      // Its pose is relative to its own start and says nothing about this map.
+      if (pose.reason === 'not_joined') {
+        for (const layer of [drawn.path, drawn.smoothed, drawn.ellipse, drawn.marker]) this.toggle(layer, false);
+        continue;
+      }
       const [state] = robotState(robot, connected);
       drawn.marker.setLatLng(at(pose.x, pose.y));
       this.toggle(drawn.marker, true);

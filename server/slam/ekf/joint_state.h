@@ -69,7 +69,9 @@ class JointState {
   static void Members(Archive& archive, auto& self) {
     std::int64_t capacity = self.mean_.size();
     archive(self.size_, capacity, self.headings_);
-    bool sound = 3 <= self.size_ && self.size_ <= capacity && capacity <= 4 * self.size_ && capacity <= kMostRead;
+    bool sound = 3 <= self.size_ && self.size_ <= kMostRead && self.size_ <= capacity && capacity <= 4 * self.size_;
+    if constexpr (Archive::kReads)
+      sound = sound && archive.Holds(static_cast<std::size_t>(self.size_ * self.size_) * sizeof(double));
     for (const Eigen::Index heading : self.headings_) sound = sound && 0 <= heading && heading < self.size_;
     if (!archive.Require(sound, "the size of the joint state")) return;
     if constexpr (Archive::kReads) {

@@ -83,10 +83,22 @@ std::vector<SurfacePoint> PlaceSearch::SurfacesOfMap(const Trail& trail, const P
 
 std::optional<FoundPlace> PlaceSearch::Find(const Trail& trail, const PosePath& path,
                                             std::span<const RecentScan> recent) {
+  return FindWithin(nullptr, trail, path, recent);
+}
+
+std::optional<FoundPlace> PlaceSearch::FindNear(const Trail& trail, const PosePath& path,
+                                                std::span<const RecentScan> recent, const Pose2& T_map_robot) {
+  const SearchWindow window{T_map_robot, options_.near_m, options_.near_rad};
+  return FindWithin(&window, trail, path, recent);
+}
+
+std::optional<FoundPlace> PlaceSearch::FindWithin(const SearchWindow* window, const Trail& trail, const PosePath& path,
+                                                  std::span<const RecentScan> recent) {
   if (recent.empty() || MapOf(trail, path).surfaces.size() < kMinSurfaces) return std::nullopt;
   const std::vector<SurfacePoint> surfaces = SurfacesOf(recent, options_.cell_scale * kSearchCellM);
   if (surfaces.size() < kMinSurfaces) return std::nullopt;
-  const auto unique = FindUniquePose(surfaces, map_->pyramid, map_->window, loop_.max_rival);
+  const auto unique =
+      FindUniquePose(surfaces, map_->pyramid, window != nullptr ? *window : map_->window, loop_.max_rival);
   if (!unique) return std::nullopt;
   return Fit(trail, path, recent, surfaces, *unique, UniquePoseCovariance());
 }

@@ -53,6 +53,9 @@ class PlaceSearch {
   // called.
   [[nodiscard]] std::optional<FoundPlace> Find(const Trail& trail, const PosePath& path,
                                                std::span<const RecentScan> recent);
+  // The same, in the part of the map around a pose where the last of the scans is believed to be.
+  [[nodiscard]] std::optional<FoundPlace> FindNear(const Trail& trail, const PosePath& path,
+                                                   std::span<const RecentScan> recent, const Pose2& T_map_robot);
   void Forget() { map_.reset(); }
   // How well the surfaces of these scans fit, with the last of them at this pose and as seen best with a search of some
   // cells around it, 0..1. REQUIRES: as Find.
@@ -82,6 +85,9 @@ class PlaceSearch {
                                               std::span<const RecentScan> recent,
                                               const std::vector<SurfacePoint>& surfaces, const Pose2& T_map_robot,
                                               const Eigen::Matrix3d& covariance) const;
+  // Over all of the map if there is no window.
+  [[nodiscard]] std::optional<FoundPlace> FindWithin(const SearchWindow* window, const Trail& trail,
+                                                     const PosePath& path, std::span<const RecentScan> recent);
   const Map& MapOf(const Trail& trail, const PosePath& path);
   [[nodiscard]] std::vector<SurfacePoint> SurfacesOfMap(const Trail& trail, const PosePath& path) const;
 

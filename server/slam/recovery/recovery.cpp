@@ -22,6 +22,11 @@ void Recovery::Begin(const Known& known, bool odometry_goes_on) {
   known_ = known;
 }
 
+void Recovery::BeginWhereSaid(const Known& known) {
+  Begin(known, true);
+  said_ = true;
+}
+
 void Recovery::BeginOnPath(const Known& known, const Pose2& T_map_track) {
   Begin(known, true);
   T_map_track_ = T_map_track;
@@ -38,6 +43,7 @@ void Recovery::Move(const Pose2& T_new_old) {
 
 void Recovery::End() {
   active_ = false;
+  said_ = false;
   contradicted_ = false;
   ForgetScans();
   search_.Forget();
@@ -80,6 +86,9 @@ std::optional<Recovery::Found> Recovery::Take(const Keyframe& keyframe, const Tr
   contradicted_ = search_.Compare(trail, path, *recent_.back().scan, recent_.back().points, T_map_robot) ==
                   PlaceSearch::Agreement::kContradicts;
   if (contradicted_) LeavePath();
+  if (said_) {
+    if (const auto place = search_.FindNear(trail, path, recent_, T_map_robot)) return Found{*place, false};
+  }
   const double travelled_m = recent_.back().travelled_m;
   if (searched_at_m_ != kNever && travelled_m - searched_at_m_ < loop_.every_m) return std::nullopt;
   searched_at_m_ = travelled_m;

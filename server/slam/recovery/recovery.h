@@ -4,6 +4,7 @@
 //  - While the scans continue those before the pause, the robot is probably on its path: its scans are held, and are
 //    added to the path as if there had been no pause, if the place found is that one (`on_path`).
 //  - Otherwise its pose is carried on by odometry where there is any, and the path goes on at the place found.
+//  - Where somebody has said where the robot is, one search near there that finds it is enough (`BeginWhereSaid`).
 // Frames: `track` is that of the front-end. Not thread-safe. Deterministic.
 #pragma once
 
@@ -68,6 +69,8 @@ class Recovery {
   [[nodiscard]] bool active() const { return active_; }
   // `odometry_goes_on`: the odometry since `known` is that of one drive.
   void Begin(const Known& known, bool odometry_goes_on);
+  // Somebody says that the robot is at `known.T_map_robot`.
+  void BeginWhereSaid(const Known& known);
   // The next scans continue the path: `T_map_track` is its pose in the map.
   void BeginOnPath(const Known& known, const Pose2& T_map_track);
   [[nodiscard]] bool on_path() const { return T_map_track_.has_value(); }
@@ -102,7 +105,7 @@ class Recovery {
 
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
-    archive(self.active_, self.odometry_goes_on_, self.contradicted_, self.known_, self.T_map_track_,
+    archive(self.active_, self.odometry_goes_on_, self.said_, self.contradicted_, self.known_, self.T_map_track_,
             self.searched_at_m_, self.recent_, self.held_, self.unconfirmed_);
     if constexpr (Archive::kReads) {
       self.search_.Forget();
@@ -136,6 +139,7 @@ class Recovery {
   double lost_after_m_;
   bool active_ = false;
   bool odometry_goes_on_ = false;
+  bool said_ = false;          // `known_` is where somebody says that the robot is.
   bool contradicted_ = false;  // The last scan does not fit where the robot is believed to be.
   Known known_;
   std::optional<Pose2> T_map_track_;  // While the scans continue the path.

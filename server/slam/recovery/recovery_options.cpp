@@ -1,5 +1,7 @@
 #include "server/slam/recovery/recovery_options.h"
 
+#include "common/geometry/angle.h"
+
 namespace cairn::slam {
 
 void Visit(OptionVisitor& visitor, RecoveryOptions& options) {
@@ -10,6 +12,9 @@ void Visit(OptionVisitor& visitor, RecoveryOptions& options) {
       "min_explained", options.place.min_explained, "1", 0.1, 1.0,
       "Share of the surfaces seen last that must lie on surfaces of the map at the place found. A larger value "
       "finds fewer robots again where furniture has moved.");
+  visitor.Real("near_m", options.place.near_m, "m", 0.1, 20.0,
+               "How far a robot may be from the place where somebody says it is (cairn robot relocalise --here).");
+  visitor.Real("near_rad", options.place.near_rad, "rad", 0.05, kPi, "The same for its heading.");
 }
 
 }  // namespace cairn::slam

@@ -19,6 +19,9 @@ struct PlaceSearchOptions {
   // Largest share of the points compared that may contradict a place. In the worlds of the study `moved` true places
   // have 0.00, and false ones, which look like them, from 0.05 on.
   double max_conflict = 0.03;
+  // How far from the place that somebody has said the robot may be.
+  double near_m = 1.0;
+  double near_rad = 0.5;
 };
 
 struct RecoveryOptions {

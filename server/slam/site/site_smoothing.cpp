@@ -1,6 +1,7 @@
 #include "server/slam/site/site_smoothing.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <deque>
 #include <limits>
@@ -14,10 +15,12 @@
 namespace cairn::slam {
 namespace {
 
-constexpr std::size_t kMinPlaces = 3;       // Recognised places that must agree before sessions are joined, ...
-constexpr double kMinSpreadM = 15.0;        // ... and the way along which they must lie, in both sessions.
-constexpr std::size_t kEnoughPlaces = 5;    // With so many the search ends.
-constexpr std::size_t kPasses = 4;          // The first one looks at every fourth place.
+constexpr std::size_t kMinPlaces = 3;     // Recognised places that must agree before sessions are joined, ...
+constexpr double kMinSpreadM = 15.0;      // ... and the way along which they must lie, in both sessions.
+constexpr std::size_t kEnoughPlaces = 5;  // With so many the search ends.
+constexpr std::array<std::size_t, 4> kPasses{0, 2, 1, 3};  // Each looks at every fourth place, from this one on.
+// A job that will soon be made again ends where so many passes have found no place.
+constexpr std::size_t kFirstPasses = 2;
 constexpr double kTieEveryM = 3.0;          // Way between two ties.
 constexpr std::size_t kMinRelations = 3;    // Two sessions are not related by fewer.
 constexpr double kMaxContradicting = 0.10;  // Share of what both have seen that may contradict, ...
@@ -28,12 +31,16 @@ constexpr double kEnoughMore = 1.02;  // No further search if the last one found
 
 class Smoothing {
  public:
-  Smoothing(std::deque<SessionMap>& maps, SiteGraph graph, const SiteOptions& options,
+  Smoothing(std::deque<SessionMap>& maps, SiteGraph graph, const SiteOptions& options, SiteSearch search,
             const std::function<bool(double)>& go_on)
-      : maps_(maps), graph_(std::move(graph)), options_(options), go_on_(go_on) {}
+      : maps_(maps), graph_(std::move(graph)), options_(options), search_(search), go_on_(go_on) {}
 
   // False: cancelled.
-  bool Run() { return JoinByStarts() && JoinByPlaces() && Refine(); }
+  bool Run() {
+    if (search_ == SiteSearch::kAll) return JoinByStarts() && JoinByPlaces() && Refine();
+    // Where nothing was found, there is nothing to fit.
+    return JoinByPlaces() && (graph_.relations().empty() || (JoinByStarts() && Refine()));
+  }
 
   [[nodiscard]] SmoothedSession ResultOf(std::size_t s) const {
     SmoothedSession result;
@@ -85,22 +92,42 @@ class Smoothing {
   }
 
   bool JoinByPlaces() {
-    const std::vector<Pair> pairs = Pairs();
-    std::size_t searched = 0;
-    for (const auto& [a, b] : pairs) {
-      done_ = kShareOfPlaces * static_cast<double>(searched++) / static_cast<double>(pairs.size());
-      if (graph_.Together(a, b)) continue;
-      const auto places = AgreeingPlaces(a, b);
-      if (!go_on_(done_)) return false;
-      if (places.empty()) continue;
-      const SiteGraph before = graph_;
-      if (!Try(a, b, places)) return false;
-      const auto found = SearchNearby(a, b, TiesOf(a, b));
-      if (!go_on_(done_) || !Try(a, b, found)) return false;
-      if (!IsTrusted(a, b)) graph_ = before;
+    std::vector<Pair> left = Pairs();
+    const std::size_t all = left.size();
+    // A fragment that is joined makes pairs of others worth a search that were not before.
+    for (auto next = left.begin(); next != left.end();) {
+      done_ = kShareOfPlaces * static_cast<double>(all - left.size()) / static_cast<double>(all);
+      const Pair pair = *next;
+      if (!IsToBeSearched(pair)) {
+        ++next;
+        continue;
+      }
+      left.erase(next);
+      if (!JoinPair(pair)) return false;
+      next = left.begin();
     }
     for (SessionMap& map : maps_) map.ForgetPlaces();
     done_ = kShareOfPlaces;
+    return true;
+  }
+
+  [[nodiscard]] bool IsToBeSearched(const Pair& pair) const {
+    if (graph_.Together(pair.a, pair.b)) return false;
+    const auto known = [this](std::size_t session) { return graph_.start_known(graph_.frame_of(session)); };
+    return search_ == SiteSearch::kAll || known(pair.a) != known(pair.b);
+  }
+
+  // False: cancelled.
+  bool JoinPair(const Pair& pair) {
+    const auto [a, b] = pair;
+    const auto places = AgreeingPlaces(a, b);
+    if (!go_on_(done_)) return false;
+    if (places.empty()) return true;
+    const SiteGraph before = graph_;
+    if (!Try(a, b, places)) return false;
+    const auto found = SearchNearby(a, b, TiesOf(a, b));
+    if (!go_on_(done_) || !Try(a, b, found)) return false;
+    if (!IsTrusted(a, b)) graph_ = before;
     return true;
   }
 
@@ -177,8 +204,9 @@ class Smoothing {
       all.push_back(*place);
       agreeing = LargestAgreeing(all);
     };
-    for (std::size_t first = 0; first < kPasses; ++first) {
-      for (std::size_t i = first; i < std::max(of_a.size(), of_b.size()); i += kPasses) {
+    for (std::size_t pass = 0; pass < kPasses.size(); ++pass) {
+      if (search_ == SiteSearch::kFragments && pass == kFirstPasses && all.empty()) return {};
+      for (std::size_t i = kPasses[pass]; i < std::max(of_a.size(), of_b.size()); i += kPasses.size()) {
         if (IsProof(agreeing, kEnoughPlaces)) return agreeing;
         if (!go_on_(done_)) return {};
         if (i < of_b.size()) add(RecognisePlace(a, maps_[a], b, maps_[b], of_b[i], options_.loop));
@@ -273,6 +301,7 @@ class Smoothing {
   std::deque<SessionMap>& maps_;
   SiteGraph graph_;
   const SiteOptions& options_;
+  const SiteSearch search_;
   const std::function<bool(double)>& go_on_;
   double done_ = 0.0;
 };
@@ -281,7 +310,8 @@ class Smoothing {
 
 std::optional<std::vector<SmoothedSession>> SmoothSessions(std::span<const SiteSession> sessions,
                                                            const SiteOptions& options,
-                                                           const std::function<bool(double)>& go_on) {
+                                                           const std::function<bool(double)>& go_on,
+                                                           SiteSearch search) {
   std::deque<SessionMap> maps;
   std::vector<const SessionMap*> known;
   std::vector<bool> start_known;
@@ -291,7 +321,7 @@ std::optional<std::vector<SmoothedSession>> SmoothSessions(std::span<const SiteS
     known.push_back(&maps.emplace_back(session.snapshot, *std::move(own_path), options));
     start_known.push_back(session.start_known);
   }
-  Smoothing smoothing(maps, SiteGraph(known, std::move(start_known), options.pose_graph), options, go_on);
+  Smoothing smoothing(maps, SiteGraph(known, std::move(start_known), options.pose_graph), options, search, go_on);
   if (options.pose_graph.enabled && !smoothing.Run()) return std::nullopt;
   std::vector<SmoothedSession> results;
   for (std::size_t s = 0; s < maps.size(); ++s) results.push_back(smoothing.ResultOf(s));

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <span>
@@ -38,10 +39,17 @@ struct SmoothedSession {
   double agreement = 0.0;
 };
 
+enum class SiteSearch : std::uint8_t {
+  kAll = 0,    // All sessions are related with each other.
+  kFragments,  // Only sessions whose start is not known are looked for, and only where sessions of a known place have
+               // been.
+};
+
 // One result per session. `go_on` is asked often and gets the share of the work that is done, 0..1; if it returns
 // false, there is no result.
 [[nodiscard]] std::optional<std::vector<SmoothedSession>> SmoothSessions(std::span<const SiteSession> sessions,
                                                                          const SiteOptions& options,
-                                                                         const std::function<bool(double)>& go_on);
+                                                                         const std::function<bool(double)>& go_on,
+                                                                         SiteSearch search = SiteSearch::kAll);
 
 }  // namespace cairn::slam

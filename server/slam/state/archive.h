@@ -221,6 +221,8 @@ class StateReader {
   [[nodiscard]] const char* failed() const { return failed_; }
   // Whether everything has been read.
   [[nodiscard]] bool done() const { return ok() && rest_.empty(); }
+  // Whether so many bytes are left. For what takes memory before it is read.
+  [[nodiscard]] bool Holds(std::size_t bytes) const { return bytes <= rest_.size(); }
   // The values of `pieces`, in their order. Null: it was not needed.
   [[nodiscard]] std::vector<std::shared_ptr<const void>> values() const;
 

@@ -10,6 +10,7 @@
 #include "common/geometry/transform2.h"
 #include "server/slam/matching/match_result.h"
 #include "server/slam/matching/point_to_line.h"
+#include "server/slam/tracking/surface_votes.h"
 
 namespace cairn::slam {
 namespace {
@@ -22,6 +23,16 @@ constexpr int kTurns = 4;  // Turns to either side that are tried.
 // An unusual guess must explain this share of the scan more than the best one so far. With half or twice
 // the value, the error on mit-csail changes no more than with another seed (tests/studies/sensitivity).
 constexpr double kClearly = 0.05;
+
+// A match that moves the robot otherwise than odometry by this, and this share of the step, must be shown by more
+// surfaces than odometry is. Where it holds the robot back by half of the step, what moves along with it may be the
+// cause, so there must be so many more. Not in turns, where odometry freezes and catches up. With more votes for every
+// match, the online error on intel is twice as large.
+constexpr double kContradictsM = 0.02, kContradictsShare = 0.1;
+constexpr double kHeldBack = 0.5;
+constexpr int kMoreVotes = 1, kMoreVotesHeldBack = 3;
+constexpr double kStepM = 0.03, kTurnRad = 0.1;  // Shorter steps and larger turns are not checked.
+constexpr double kHeldM = 0.002;                 // Standard deviation that holds an alignment where it begins.
 
 // Distance between an answer and the odometry in standard deviations.
 double JumpOf(const Pose2& T_track_robot, const Pose2& guess, const Eigen::Matrix3d& covariance) {
@@ -111,6 +122,10 @@ TrackStep FrontEnd::Track(const ScanView& view, const Pose2& T_odom_robot, const
   TrackStep step{.T_track_robot = {}, .score = 1.0, .matched = true};
   if (!history_.empty()) step = Follow(view, T_odom_robot, parallel_for);
   score_ = step.score;
+  if (options_.use_odometry && !history_.empty()) {
+    const double way_m = Between(history_.back().T_odom_robot, T_odom_robot).translation().norm();
+    unmatched_m_ = std::max(0.0, unmatched_m_ + (step.matched ? -way_m : way_m));
+  }
   history_.push_back({step.T_track_robot, T_odom_robot});
   if (history_.size() > kLookBack.back()) history_.pop_front();
   return step;
@@ -125,7 +140,7 @@ TrackStep FrontEnd::Follow(const ScanView& view, const Pose2& T_odom_robot, cons
   if (!options_.use_odometry && options_.refine_enabled)
     TakeAlongFromPrior({guess.T_track_robot, guess.covariance}, coarse);
   Begin(watch_, ScanStep::kRefine);
-  const MatchResult match = options_.refine_enabled ? Refine(view, T_odom_robot, guess, coarse)
+  const MatchResult match = options_.refine_enabled ? Checked(view, guess, Refine(view, T_odom_robot, guess, coarse))
                                                     : MatchAlone(view, T_odom_robot, guess, coarse, parallel_for);
   return StepOf(match);
 }
@@ -292,6 +307,34 @@ MatchResult FrontEnd::Refine(const ScanView& view, const Pose2& T_odom_robot, co
   return best;
 }
 
+MatchResult FrontEnd::Checked(const ScanView& view, const Guess& guess, const MatchResult& match) const {
+  if (!options_.use_odometry || !match.converged) return match;
+  if (unmatched_m_ > 0.0) return match;  // It may correct what odometry did wrong on that way.
+  const Pose2& T_track_last = history_.back().T_track_robot;
+  const Eigen::Vector2d expected = guess.T_track_robot.translation() - T_track_last.translation();
+  const Eigen::Vector2d moved = match.T_ref_curr.translation() - T_track_last.translation();
+  const Eigen::Vector2d jump = moved - expected;
+  const double step_m = expected.norm();
+  const bool checked =
+      step_m >= kStepM && std::abs(WrapAngle(guess.T_track_robot.theta - T_track_last.theta)) <= kTurnRad;
+  if (!checked || jump.norm() < kContradictsM + kContradictsShare * step_m) return match;
+
+  // As far as odometry says in this direction, else as the scan shows.
+  const Eigen::Vector3d along = (Eigen::Vector3d() << jump.normalized(), 0.0).finished();
+  const Eigen::Matrix3d others = Eigen::Matrix3d::Identity() - along * along.transpose();
+  const Eigen::Matrix3d held = others * guess.covariance * others + kHeldM * kHeldM * along * along.transpose();
+  MatchResult odometry = AlignPointsToSurfaces(view.points_robot, index_,
+                                               {guess.T_track_robot, guess.T_track_robot, held}, options_.refine);
+  if (!odometry.converged) return match;
+  const bool held_back = moved.dot(expected) < kHeldBack * step_m * step_m;
+  const int votes = SurfaceVotes(view.points_robot, index_, odometry.T_ref_curr, match.T_ref_curr);
+  if (votes >= (held_back ? kMoreVotesHeldBack : kMoreVotes)) return match;
+  odometry.covariance += along.dot(guess.covariance * along) * along * along.transpose();
+  odometry.degenerate = true;
+  odometry.degenerate_direction = along.head<2>();
+  return odometry;
+}
+
 void FrontEnd::AddKeyframe(const ScanView& view) {
   const bool matcher_alone = !options_.refine_enabled && !reference_.empty();
   if (matcher_alone && matcher_.keeps_reference && score_ >= options_.keep_above) return;
@@ -311,6 +354,7 @@ void FrontEnd::AddKeyframe(const ScanView& view) {
 
 void FrontEnd::Restart() {
   score_ = 0.0;
+  unmatched_m_ = 0.0;
   keyframe_ = {};
   keyframe_view_ = {};
   history_.clear();

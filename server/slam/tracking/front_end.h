@@ -107,7 +107,7 @@ class FrontEnd {
 
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
-    archive(self.score_, self.keyframe_, self.keyframe_view_, self.history_, self.reference_);
+    archive(self.score_, self.unmatched_m_, self.keyframe_, self.keyframe_view_, self.history_, self.reference_);
     if constexpr (Archive::kReads)
       if (archive.ok()) self.BuildIndices();
   }
@@ -137,6 +137,8 @@ class FrontEnd {
                                               const ParallelFor& parallel_for) const;
   [[nodiscard]] MatchResult Refine(const ScanView& view, const Pose2& T_odom_robot, const Guess& guess,
                                    const MatchResult& coarse) const;
+  // The match, or the pose that odometry gives if the match contradicts it and too few separate surfaces show that.
+  [[nodiscard]] MatchResult Checked(const ScanView& view, const Guess& guess, const MatchResult& match) const;
   [[nodiscard]] MatchResult MatchAlone(const ScanView& view, const Pose2& T_odom_robot, const Guess& guess,
                                        const MatchResult& coarse, const ParallelFor& parallel_for) const;
   // Guesses that do not use the odometry since the last scan, for odometry that stood still or came late. One
@@ -154,6 +156,9 @@ class FrontEnd {
   ScanMatcher matcher_;
   StepWatch watch_;
   double score_ = 0.0;  // Score of the last match.
+  // The way of the last scans without a match, less that of the scans with one since then: where it is not zero, a
+  // match may correct what odometry did wrong on that way.
+  double unmatched_m_ = 0.0;
   // The reference of the matcher, which mostly is the last keyframe, and its points in its robot frame.
   Sight keyframe_;
   ScanView keyframe_view_;

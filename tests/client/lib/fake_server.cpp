@@ -301,6 +301,10 @@ void FakeServer::OnRequest(Request&& request) {
       break;
     case RequestKind::kSessionEnd:
       break;
+    case RequestKind::kRelocalise:
+      if (request.T_map_robot != Pose2{1.5, -2.0, kPi / 2})
+        reply.status = {StatusCode::kFailedPrecondition, "another pose was expected"};
+      break;
     case RequestKind::kMapEnable:
       if (request.map_version > kMapVersions) {
         reply.status = {StatusCode::kNotFound, "no version " + std::to_string(request.map_version)};

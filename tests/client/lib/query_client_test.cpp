@@ -35,6 +35,8 @@ TEST_F(QueryClientTest, AsksEveryKindOfQuestion) {
   EXPECT_EQ(Must(client_->CancelJob(6)).id, 6U);
   EXPECT_EQ(Must(client_->Jobs()).size(), 2U);
   EXPECT_TRUE(client_->EndSession("r1"));
+  EXPECT_TRUE(client_->Relocalise("r1", Pose2{1.5, -2.0, kPi / 2}));
+  EXPECT_FALSE(client_->Relocalise("r1"));
 }
 
 TEST_F(QueryClientTest, PutsThePartsOfAnAnswerTogether) {

@@ -131,6 +131,24 @@ TEST_F(RobotClientTest, SendsAgainWhatGotStuck) {
   EXPECT_THAT(server_->received(), ::testing::UnorderedElementsAreArray(OneTo(10)));
 }
 
+// A server settles no scan before it has odometry after it. That odometry may stand behind more scans than are sent
+// again at once; where these waited for each other, the stream stood still for ever.
+TEST_F(RobotClientTest, WhatTheServerWaitsForComesBehindScansThatDoNotSettle) {
+  std::atomic<std::uint64_t> highest = 0;
+  const auto ear = MakeBus("ear");
+  const auto odometry =
+      Must(ear->Subscribe<OdometrySample>([&](OdometrySample&& sample) { highest = sample.odometry.sequence; }));
+  server_->SetSettling(false);
+  RobotClientOptions options;
+  options.resend_after_s = 0.2;
+  options.window = 0;
+  const auto client = Open(options);
+  for (int i = 0; i < 60; ++i) ASSERT_TRUE(client->Publish(SomeScan()));
+  ASSERT_TRUE(Eventually([&] { return client->resent() >= 32; }));
+  ASSERT_TRUE(client->Publish(Odometry{}));
+  EXPECT_TRUE(Eventually([&] { return highest == 1; }));
+}
+
 TEST_F(RobotClientTest, GoesOnAfterAServerThatNobodyHeardOfForAWhile) {
   RobotClientOptions options;
   options.window = 0;

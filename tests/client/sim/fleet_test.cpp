@@ -250,7 +250,7 @@ TEST_P(ShippedWorld, RobotsDriveItsRoutesClearOfEverything) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(All, ShippedWorld, ::testing::Values("building", "office", "corridor", "room"),
+INSTANTIATE_TEST_SUITE_P(All, ShippedWorld, ::testing::Values("building", "office", "storey", "corridor", "room"),
                          [](const auto& param) { return param.param; });
 
 TEST(Fleet, RefusesWhatCannotBe) {

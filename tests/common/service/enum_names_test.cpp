@@ -29,10 +29,10 @@ void ExpectNamed(int count, std::string_view (*name)(Enum)) {
 }
 
 TEST(EnumNames, AreCompleteAndDifferent) {
-  ExpectNamed<JobKind>(1, JobKindName);
+  ExpectNamed<JobKind>(2, JobKindName);
   ExpectNamed<JobState>(5, JobStateName);
   ExpectNamed<DropReason>(kDropReasonCount, DropReasonName);
-  ExpectNamed<PoseReason>(6, PoseReasonName);
+  ExpectNamed<PoseReason>(7, PoseReasonName);
   ExpectNamed<RequestKind>(kRequestKindCount, RequestKindName);
   ExpectNamed<SessionPhase>(4, SessionPhaseName);
 }
@@ -42,6 +42,7 @@ TEST(EnumNames, StandForTheirEnumerators) {
   EXPECT_EQ(DropReasonName(DropReason::kSessionEnded), "session_ended");
   EXPECT_EQ(DropReasonName(DropReason::kSessionFull), "session_full");
   EXPECT_EQ(PoseReasonName(PoseReason::kWaiting), "waiting");
+  EXPECT_EQ(PoseReasonName(PoseReason::kNotJoined), "not_joined");
   EXPECT_EQ(RequestKindName(RequestKind::kMapEnable), "map_enable");
   EXPECT_EQ(RequestKindName(RequestKind::kStatus), "status");
   EXPECT_EQ(JobStateName(JobState::kCancelled), "cancelled");

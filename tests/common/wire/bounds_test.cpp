@@ -77,13 +77,13 @@ TEST(Bounds, RefuseUnknownEnumValues) {
   pose.reason(static_cast<v1::PoseReason>(0xffffffffU));
   ExpectRefused(pose, "reason");
   v1::Job job = ToWire(ExtremeJob());
-  job.kind(static_cast<v1::JobKind>(1));
+  job.kind(static_cast<v1::JobKind>(2));
   ExpectRefused(job, "kind");
   job = ToWire(ExtremeJob());
   job.state(static_cast<v1::JobState>(5));
   ExpectRefused(job, "state");
   v1::Request request = ToWire(ExtremeRequest());
-  request.kind(static_cast<v1::RequestKind>(18));
+  request.kind(static_cast<v1::RequestKind>(19));
   ExpectRefused(request, "kind");
   request = ToWire(ExtremeRequest());
   request.job_kind(static_cast<v1::JobKind>(77));
@@ -127,7 +127,7 @@ TEST(Bounds, RefuseLedgersWithTooManyReasons) {
 
 TEST(Bounds, RefuseRepliesByTheirInnermostViolation) {
   v1::Reply reply = ToWire(ExtremeReply());
-  reply.robots()[0].pose().reason(static_cast<v1::PoseReason>(6));
+  reply.robots()[0].pose().reason(static_cast<v1::PoseReason>(7));
   ExpectRefused(reply, "robots: pose: reason");
   reply = ToWire(ExtremeReply());
   reply.tiles()[0].level(-1);

@@ -69,15 +69,15 @@ TEST(Convert, ReadsLedgersOfServersWithFewerOrMoreDropReasons) {
 
 TEST(Convert, NumbersOfTheIdlEnumsAreThoseOfTheValues) {
   EXPECT_EQ(static_cast<int>(v1::SESSION_SUSPENDED), static_cast<int>(SessionPhase::kSuspended));
-  EXPECT_EQ(static_cast<int>(v1::POSE_WAITING), static_cast<int>(PoseReason::kWaiting));
+  EXPECT_EQ(static_cast<int>(v1::POSE_NOT_JOINED), static_cast<int>(PoseReason::kNotJoined));
   EXPECT_EQ(static_cast<int>(v1::DROP_SESSION_ENDED), static_cast<int>(DropReason::kSessionEnded));
   EXPECT_EQ(static_cast<int>(v1::DROP_SESSION_FULL), static_cast<int>(DropReason::kSessionFull));
   EXPECT_EQ(static_cast<int>(v1::DROP_SESSION_FULL) + 1, kDropReasonCount);
   EXPECT_EQ(static_cast<int>(v1::TILE_PNG), static_cast<int>(TileEncoding::kPng));
-  EXPECT_EQ(static_cast<int>(v1::JOB_SMOOTH), static_cast<int>(JobKind::kSmooth));
+  EXPECT_EQ(static_cast<int>(v1::JOB_JOIN), static_cast<int>(JobKind::kJoin));
   EXPECT_EQ(static_cast<int>(v1::JOB_CANCELLED), static_cast<int>(JobState::kCancelled));
   EXPECT_EQ(static_cast<int>(v1::REQUEST_SESSION_END), static_cast<int>(RequestKind::kSessionEnd));
-  EXPECT_EQ(static_cast<int>(v1::REQUEST_ROS2) + 1, kRequestKindCount);
+  EXPECT_EQ(static_cast<int>(v1::REQUEST_RELOCALISE) + 1, kRequestKindCount);
 }
 
 // The number idl/README.md gives to writers of other clients.

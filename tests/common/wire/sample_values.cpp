@@ -214,7 +214,7 @@ Request ExtremeRequest() {
   Request value;
   value.client = kMax64;
   value.sequence = kMin64;
-  value.kind = RequestKind::kRos2;
+  value.kind = RequestKind::kRelocalise;
   value.site = Name('s');
   value.robot = Name('r');
   value.latest = false;
@@ -230,6 +230,7 @@ Request ExtremeRequest() {
   value.enable = false;
   value.map_version = kMax32;
   value.saved = Name('f');
+  value.T_map_robot = Pose2{kMax, -1.5, 2.5};
   return value;
 }
 
@@ -334,7 +335,9 @@ bool Same(const Request& a, const Request& b) {
          Eq(a.area.x_max_m, b.area.x_max_m) && Eq(a.area.y_max_m, b.area.y_max_m) && a.level == b.level &&
          a.since_epoch == b.since_epoch && a.since_version == b.since_version &&
          a.since_generation == b.since_generation && a.job == b.job && a.job_kind == b.job_kind &&
-         a.enable == b.enable && a.map_version == b.map_version && a.saved == b.saved;
+         a.enable == b.enable && a.map_version == b.map_version && a.saved == b.saved &&
+         a.T_map_robot.has_value() == b.T_map_robot.has_value() &&
+         (!a.T_map_robot || Eq(*a.T_map_robot, *b.T_map_robot));
 }
 bool Same(const Reply& a, const Reply& b) {
   const auto same = [](const auto& x, const auto& y) { return Same(x, y); };

@@ -56,18 +56,18 @@ TEST_F(SmoothSiteTest, RedrawsTheMapAlongTheFullPathAndSaysHowMuchBetterItFits) 
   ASSERT_TRUE(smoothed);
   EXPECT_LT(smoothed->outcome.cost_after, smoothed->outcome.cost_before);
   EXPECT_GT(smoothed->outcome.cost_after, 0.0);
-  EXPECT_EQ(smoothed->version.info.job, 9U);
-  EXPECT_EQ(smoothed->version.info.note, "smoothed: 1 robots, 20 keyframes, 20 scans");
+  EXPECT_EQ(smoothed->version->info.job, 9U);
+  EXPECT_EQ(smoothed->version->info.note, "smoothed: 1 robots, 20 keyframes, 20 scans");
   EXPECT_EQ(smoothed->outcome.message, "1 robots, 20 keyframes, 20 scans");
   slam::OccupancyGrid expected{slam::GridOptions{}};
   for (int k = 0; k < kKeyframes; ++k) expected.Draw(RoomScan(4 * k), TruePose(4 * k));
-  const RobotGrid& part = smoothed->version.parts.at(5);
+  const RobotGrid& part = smoothed->version->parts.at(5);
   ASSERT_EQ(part.chunks.size(), expected.chunk_count());
   expected.ForEachChunk([&](const slam::ChunkKey& key, const slam::GridChunk& chunk) {
     EXPECT_EQ(part.chunks.at(key)->log_odds, chunk.log_odds);
   });
   EXPECT_EQ(part.keyframes, static_cast<std::size_t>(kKeyframes));
-  EXPECT_EQ(smoothed->version.smoothed.at("r1").path->size(), static_cast<std::size_t>(kKeyframes));
+  EXPECT_EQ(smoothed->version->smoothed.at("r1").path->size(), static_cast<std::size_t>(kKeyframes));
 }
 
 TEST_F(SmoothSiteTest, TheResultIsTheSumOverAllRobots) {
@@ -78,13 +78,14 @@ TEST_F(SmoothSiteTest, TheResultIsTheSumOverAllRobots) {
   const auto both = SmoothSite(job_, {Material(), other}, nullptr, control_);
   ASSERT_TRUE(one && both);
   EXPECT_EQ(both->outcome.message, "2 robots, 40 keyframes, 40 scans");
-  EXPECT_EQ(both->version.parts.size(), 2U);
-  EXPECT_EQ(both->version.smoothed.size(), 2U);
+  EXPECT_EQ(both->version->parts.size(), 2U);
+  EXPECT_EQ(both->version->smoothed.size(), 2U);
   EXPECT_DOUBLE_EQ(both->outcome.cost_before, one->outcome.cost_before);  // A mean over equal robots.
   EXPECT_DOUBLE_EQ(both->outcome.cost_after, one->outcome.cost_after);
 }
 
-// Nobody has said where they start; each has a map of its own, and both have seen a part of the same corridor.
+// Nobody has said where the second one starts; each has a map of its own, and both have seen a part of the same
+// corridor.
 TEST_F(SmoothSiteTest, RobotsThatHaveSeenTheSameAreSmoothedTogether) {
   const slam::test::World world = slam::test::RingCorridor(true);
   const auto material_of = [&](SessionId session, double from_m, const Pose2& T_own_start) {
@@ -92,7 +93,7 @@ TEST_F(SmoothSiteTest, RobotsThatHaveSeenTheSameAreSmoothedTogether) {
                              .robot = "r" + std::to_string(session),
                              .snapshot = slam::test::DriveRing(world, from_m, 60.0, T_own_start, session).snapshot,
                              .grid_options = {},
-                             .start_known = false};
+                             .start_known = session == 1};
     return material;
   };
   const std::vector<SessionMaterial> material{material_of(1, 0.0, {}), material_of(2, 24.0, {5.0, -3.0, 1.0})};
@@ -101,7 +102,8 @@ TEST_F(SmoothSiteTest, RobotsThatHaveSeenTheSameAreSmoothedTogether) {
   ASSERT_TRUE(smoothed);
   EXPECT_NE(smoothed->outcome.message.find("; joined 2: r1 ("), std::string::npos) << smoothed->outcome.message;
   EXPECT_NE(smoothed->outcome.message.find("not joined 0"), std::string::npos) << smoothed->outcome.message;
-  const RobotGrid& moved = smoothed->version.parts.at(2);
+  const RobotGrid& moved = smoothed->version->parts.at(2);
+  EXPECT_FALSE(moved.fragment);
   ASSERT_TRUE(moved.path);
   ASSERT_EQ(moved.path->size(), material[1].snapshot.keyframes.size());
   // 24 m along the first side.
@@ -110,13 +112,32 @@ TEST_F(SmoothSiteTest, RobotsThatHaveSeenTheSameAreSmoothedTogether) {
   for (std::size_t k = 0; k < moved.path->size(); ++k)
     expected.Draw(*material[1].snapshot.keyframes[k].scan, (*moved.path)[k]);
   EXPECT_EQ(moved.chunks.size(), expected.chunk_count());
-  EXPECT_EQ(smoothed->version.smoothed.at("r2").path->front().T_map_robot, moved.path->front());
+  EXPECT_EQ(smoothed->version->smoothed.at("r2").path->front().T_map_robot, moved.path->front());
   EXPECT_TRUE(std::ranges::is_sorted(progress_));
   EXPECT_GT(progress_.back(), 0.95);
 
   const auto apart = SmoothSite(job_, material, nullptr, control_);
   ASSERT_TRUE(apart);
-  EXPECT_EQ(apart->version.parts.at(2).path->front(), (Pose2{5.0, -3.0, 1.0}));
+  EXPECT_EQ(apart->version->parts.at(2).path->front(), (Pose2{5.0, -3.0, 1.0}));
+  EXPECT_TRUE(apart->version->parts.at(2).fragment);
+  EXPECT_FALSE(apart->version->parts.at(1).fragment);
+  EXPECT_FALSE(apart->version->smoothed.contains("r2"));
+
+  // A job that only joins makes the same version, and none where there is nothing to join.
+  job_.kind = JobKind::kJoin;
+  const auto joined = SmoothSite(job_, material, &options, control_);
+  ASSERT_TRUE(joined && joined->version);
+  EXPECT_EQ(*joined->version->parts.at(2).path, *moved.path);
+  const auto nothing = SmoothSite(job_, {material[0]}, &options, control_);
+  ASSERT_TRUE(nothing);
+  EXPECT_FALSE(nothing->version);
+  EXPECT_NE(nothing->outcome.message.find("nothing to join yet"), std::string::npos);
+  // Two that are joined with each other, and with nobody whose place is known.
+  std::vector<SessionMaterial> unknown = material;
+  unknown[0].start_known = false;
+  const auto among_themselves = SmoothSite(job_, unknown, &options, control_);
+  ASSERT_TRUE(among_themselves);
+  EXPECT_FALSE(among_themselves->version);
 }
 
 TEST_F(SmoothSiteTest, TheSmoothedPathIsTheOneAlongWhichTheMapIsDrawn) {
@@ -124,7 +145,7 @@ TEST_F(SmoothSiteTest, TheSmoothedPathIsTheOneAlongWhichTheMapIsDrawn) {
   std::swap(material.snapshot.online_path, material.snapshot.full_path);  // Now the online path is right.
   const auto smoothed = SmoothSite(job_, {material}, nullptr, control_);
   ASSERT_TRUE(smoothed);
-  EXPECT_EQ(smoothed->version.smoothed.at("r1").path->back().T_map_robot, TruePose(4 * (kKeyframes - 1)));
+  EXPECT_EQ(smoothed->version->smoothed.at("r1").path->back().T_map_robot, TruePose(4 * (kKeyframes - 1)));
 }
 
 TEST_F(SmoothSiteTest, ProgressGoesFromNothingToAll) {

@@ -33,6 +33,24 @@ TEST(JointMap, ContraryEvidenceCancels) {
   EXPECT_EQ((*map.cells().at({0, 0, 0}))[0], 50);
 }
 
+TEST(JointMap, AHiddenSessionIsKeptAndNotShown) {
+  JointMap map;
+  map.Apply({.session = 1, .chunks = {{{0, 0}, ChunkOf(100, 2)}}});
+  map.SetHidden(2, true);
+  map.Apply({.session = 2, .chunks = {{{0, 0}, ChunkOf(50, 1)}, {{1, 0}, ChunkOf(50)}}});
+  map.Render();
+  EXPECT_EQ((*map.cells().at({0, 0, 0}))[0], slam::OccupancyOf(100));
+  EXPECT_FALSE(map.cells().contains({0, 1, 0}));
+  EXPECT_EQ(map.ChunksOf(2).size(), 2U);
+  map.SetHidden(2, false);
+  EXPECT_FALSE(map.Render().empty());
+  EXPECT_EQ((*map.cells().at({0, 0, 0}))[0], slam::OccupancyOf(150));
+  EXPECT_TRUE(map.cells().contains({0, 1, 0}));
+  map.SetHidden(2, true);
+  EXPECT_FALSE(map.Render().empty());
+  EXPECT_FALSE(map.cells().contains({0, 1, 0}));
+}
+
 TEST(JointMap, RenderNamesWhatChangedOnEveryLevelOnce) {
   JointMap map;
   map.Apply({.session = 1, .chunks = {{{0, 0}, ChunkOf(100)}, {{1, 0}, ChunkOf(100)}}});

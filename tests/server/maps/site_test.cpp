@@ -40,7 +40,7 @@ class SiteTest : public ::testing::Test {
   SiteTest() {
     for (const SessionId id : {SessionId{1}, SessionId{2}}) {
       sessions_[id] = std::make_shared<FakeSession>(id, corrections_);
-      site_->Join(100 + id, id, sessions_[id], 0);
+      site_->Join({.session = id, .robot = 100 + id, .owner = sessions_[id]});
     }
   }
   ~SiteTest() override { pool_.join(); }
@@ -143,6 +143,46 @@ TEST_F(SiteTest, ASwitchIsSeenAllAtOnceWithTombstones) {
   EXPECT_TRUE(corrections_[1].second.grid.chunks.contains({20, 20}));
 }
 
+// A robot that did not say where it starts draws in a frame of its own.
+TEST_F(SiteTest, AFragmentIsShownFromTheVersionThatJoinsItUntilOneThatDoesNot) {
+  auto fragment = std::make_shared<FakeSession>(3, corrections_);
+  site_->Join({.session = 3, .robot = 103, .owner = fragment, .fragment = true});
+  site_->Change({.session = 3, .chunks = {{{7, 7}, UniformChunk(100)}}});
+  EXPECT_TRUE(TakeTiles().empty());
+
+  const std::uint32_t version = AddVersion({{3, {{{{8, 8}, UniformChunk(100)}}, 3}}});
+  auto enabled = Enable(version);
+  ASSERT_EQ(corrections_.size(), 1U);
+  EXPECT_FALSE(corrections_[0].second.grid.fragment);
+  corrections_[0].second.done(
+      {.session = 3,
+       .displaced = {.chunks = {{{7, 7}, UniformChunk(100)}}, .keyframes = 3, .path = {}, .fragment = true},
+       .change = {.session = 3, .chunks = {{{7, 7}, nullptr}, {{8, 8}, UniformChunk(100)}}}});
+  EXPECT_TRUE(enabled.get());
+  TakeTiles();
+  EXPECT_NE(site_->snapshot()->tiles.Find({0, 8, 8}), nullptr);
+  EXPECT_EQ(site_->snapshot()->tiles.Find({0, 7, 7}), nullptr);
+
+  corrections_.clear();
+  auto back = Enable(1);
+  ASSERT_EQ(corrections_.size(), 1U);
+  EXPECT_TRUE(corrections_[0].second.grid.fragment);
+  corrections_.clear();  // It ends without an answer.
+  EXPECT_TRUE(back.get());
+  TakeTiles();
+  EXPECT_EQ(site_->snapshot()->tiles.Find({0, 7, 7}), nullptr);
+  EXPECT_EQ(site_->snapshot()->tiles.Find({0, 8, 8}), nullptr);
+
+  // Of a session that is gone, the site itself knows whether it was shown.
+  fragment.reset();
+  EXPECT_TRUE(Enable(version).get());
+  TakeTiles();
+  EXPECT_NE(site_->snapshot()->tiles.Find({0, 8, 8}), nullptr);
+  EXPECT_TRUE(Enable(1).get());
+  TakeTiles();
+  EXPECT_EQ(site_->snapshot()->tiles.Find({0, 7, 7}), nullptr);
+}
+
 // Changes that wait are merged, but not with those before the session's answer to a correction.
 TEST_F(SiteTest, AChangeStaysBehindTheAnswerBeforeIt) {
   const std::uint32_t version = AddVersion({{1, {{{{0, 0}, UniformChunk(-100)}}, 3}}});
@@ -175,7 +215,7 @@ TEST_F(SiteTest, ChangesThatWaitAreOnePieceOfWork) {
   gate.set_value();
   TakeTiles();
   TakeTiles();
-  EXPECT_LE(site_->pulse().finished - before, 10U);
+  EXPECT_LE(site_->pulse().finished - before, 20U);  // Few pieces, and the few tiles that they encode.
   const auto tile = site_->snapshot()->tiles.Find({0, 0, 0});
   EXPECT_EQ((*DecodeCells(tile->bytes, tile->encoding))[0], slam::OccupancyOf(-100));
 }
@@ -233,7 +273,7 @@ TEST_F(SiteTest, AnExceptionEndsThePieceOfWorkAndNotTheSite) {
     void SetMapEpoch(std::uint32_t) override {}
   };
   const auto thrower = std::make_shared<Thrower>();
-  site_->Join(103, 3, thrower, 0);
+  site_->Join({.session = 3, .robot = 103, .owner = thrower});
   const std::uint32_t bad = AddVersion({{3, {{}, 1}}});
   EXPECT_EQ(Enable(bad).get().error().code, StatusCode::kInternal);
   const std::uint32_t good = AddVersion({});
@@ -254,7 +294,7 @@ TEST_F(SiteTest, ASessionWithoutAPartOfTheVersionLearnsTheEpochToo) {
   const std::uint32_t version = AddVersion({{1, {{{{0, 0}, UniformChunk(-100)}}, 3}}});
   auto enabled = Enable(version);
   const auto during = std::make_shared<FakeSession>(3, corrections_);
-  site_->Join(103, 3, during, 0);
+  site_->Join({.session = 3, .robot = 103, .owner = during});
   Settle();
   EXPECT_EQ(sessions_[2]->epoch(), 0U);
   EXPECT_EQ(during->epoch(), 0U);
@@ -266,7 +306,7 @@ TEST_F(SiteTest, ASessionWithoutAPartOfTheVersionLearnsTheEpochToo) {
   EXPECT_EQ(during->epoch(), 1U);
   // What was made before the switch and joins after it.
   const auto late = std::make_shared<FakeSession>(4, corrections_);
-  site_->Join(104, 4, late, 0);
+  site_->Join({.session = 4, .robot = 104, .owner = late});
   Settle();
   EXPECT_EQ(late->epoch(), 1U);
 }
@@ -296,20 +336,37 @@ TEST_F(SiteTest, EnablingWhatIsEnabledOrMissing) {
   EXPECT_EQ(Enable(77).get().error().code, StatusCode::kNotFound);
 }
 
-// A robot has one session at a time; the one before is not counted and not corrected any more.
-TEST_F(SiteTest, ARobotsNewSessionTakesThePlaceOfTheOld) {
+// At the end of a server. The last changes were lost where Publish had been asked for before them and still waited.
+TEST_F(SiteTest, WhatChangedLastIsPublishedWhenItCloses) {
+  std::promise<void> gate;
+  site_->Probe([&] { gate.get_future().wait(); });
+  site_->Publish();
+  site_->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(100)}}});
+  std::promise<void> closed;
+  site_->Close([&] { closed.set_value(); });
+  gate.set_value();
+  closed.get_future().wait();
+  bool published = false;
+  while (auto value = outbound_.lane(Outbound::Lane::kMap).TryPop())
+    published = published || std::holds_alternative<TileSample>(*value);
+  EXPECT_TRUE(published);
+}
+
+// A robot has one session at a time. While the one before is there, it is corrected too.
+TEST_F(SiteTest, ARobotIsCountedOnceWithAllItsSessions) {
   Settle();
   site_->Publish();
   Settle();
   const auto next = std::make_shared<FakeSession>(3, corrections_);
-  site_->Join(101, 3, next, 0);
+  site_->Join({.session = 3, .robot = 101, .owner = next});
   site_->AddVersion({}, [](Result<std::uint32_t>) {});
   Settle();
   EXPECT_EQ(site_->snapshot()->info.robots, 2U);
   const std::uint32_t version = AddVersion({{1, {{}, 1}}, {3, {{}, 1}}});
   const auto enabled = Enable(version);
-  ASSERT_EQ(corrections_.size(), 1U);
-  EXPECT_EQ(corrections_[0].first, 3U);
+  ASSERT_EQ(corrections_.size(), 2U);
+  EXPECT_EQ(corrections_[0].first, 1U);
+  EXPECT_EQ(corrections_[1].first, 3U);
   corrections_.clear();
 }
 

@@ -75,6 +75,7 @@ TEST(RobotQueue, TooManySnapshotsAreRefusedAndTheEndNever) {
   RobotQueue queue(2, 2);
   for (std::size_t i = 0; i < RobotQueue::kMaxControl; ++i) EXPECT_TRUE(queue.Push(SnapshotWanted{}));
   EXPECT_FALSE(queue.Push(SnapshotWanted{}));
+  EXPECT_FALSE(queue.Push(RelocaliseWanted{}));
   queue.Push(Finish{.final = true, .done = {}});
   for (std::size_t i = 0; i < RobotQueue::kMaxControl; ++i)
     EXPECT_TRUE(std::holds_alternative<SnapshotWanted>(*queue.Pop()));

@@ -1,6 +1,8 @@
 // Which sessions a roster knows, and when it gives their keys back.
 #include <gmock/gmock.h>
 
+#include <functional>
+#include <future>
 #include <type_traits>
 #include <variant>
 #include <vector>
@@ -11,8 +13,12 @@ namespace cairn::server {
 namespace {
 
 using ::testing::HasSubstr;
+using testing::OdometryOf;
 using testing::RequestOf;
+using testing::RoomOdometry;
+using testing::RoomScan;
 using testing::RosterTest;
+using testing::ScanOf;
 
 // After a restart of the server, robots were put where they had once begun.
 TEST_F(RosterTest, ASessionThatWasStartedElsewhereIsNotOpenedAtItsOldStart) {
@@ -42,6 +48,90 @@ TEST_F(RosterTest, AnotherProcessMayContinueASessionThatItKnows) {
   roster().Take(same);
   EXPECT_EQ(LastState("r1", 8).phase, SessionPhase::kActive);
   EXPECT_EQ(roster().Find("r1")->record().owner(), 8U);
+}
+
+TEST_F(RosterTest, ARobotThatDoesNotSayWhereItStartsIsAFragmentWhereOthersHaveBegunAMap) {
+  const auto is_fragment = [&](const std::string& robot) { return roster().Find(robot)->record().joining().fragment; };
+  roster().Take(RequestOf("r1", 7));
+  EXPECT_FALSE(is_fragment("r1"));  // It begins the map.
+  roster().Take(RequestOf("r2", 8));
+  EXPECT_TRUE(is_fragment("r2"));
+  SessionRequest known = RequestOf("r3", 9);
+  known.has_start = true;
+  roster().Take(known);
+  EXPECT_FALSE(is_fragment("r3"));
+  SessionRequest elsewhere = RequestOf("r4", 10);
+  elsewhere.site = "hall";
+  roster().Take(elsewhere);
+  EXPECT_FALSE(is_fragment("r4"));
+}
+
+// Only fragments are left, and they have begun nothing that others could be joined with.
+TEST_F(RosterTest, ARobotThatFindsNoMapBeginsIt) {
+  roster().Take(RequestOf("r1", 7));
+  roster().Take(RequestOf("r2", 8));
+  ASSERT_TRUE(roster().End("r1"));  // It has not seen anything.
+  ASSERT_TRUE(WaitPhase("r1", 7, SessionPhase::kEnded));
+  roster().Take(RequestOf("r3", 9));
+  EXPECT_FALSE(roster().Find("r3")->record().joining().fragment);
+}
+
+TEST_F(RosterTest, WhatARobotHasDrawnIsAMapAlsoAfterItHasGone) {
+  roster().Take(RequestOf("r1", 7));
+  for (int step = 0; step < 5; ++step) {
+    roster().Take(OdometryOf("r1", RoomOdometry(step), 7));
+    roster().Take(ScanOf("r1", RoomScan(step), 7));
+  }
+  ASSERT_TRUE(roster().End("r1"));
+  ASSERT_TRUE(WaitPhase("r1", 7, SessionPhase::kEnded));
+  SessionRequest again = RequestOf("r1", 7);
+  again.session = 70;
+  roster().Take(again);
+  EXPECT_TRUE(roster().Find("r1")->record().joining().fragment);
+}
+
+// Robot r1 has drawn something, its session has ended, and another one follows.
+void BeginAgain(Roster& roster, const std::function<bool()>& ended) {
+  roster.Take(RequestOf("r1", 7));
+  for (int step = 0; step < 5; ++step) {
+    roster.Take(OdometryOf("r1", RoomOdometry(step), 7));
+    roster.Take(ScanOf("r1", RoomScan(step), 7));
+  }
+  ASSERT_TRUE(roster.End("r1"));
+  ASSERT_TRUE(ended());
+  SessionRequest again = RequestOf("r1", 7);
+  again.session = 70;
+  again.has_start = true;
+  roster.Take(again);
+  roster.Tick();
+}
+
+TEST_F(RosterTest, TheEarlierSessionOfARobotStillAnswersForItsSite) {
+  ASSERT_NO_FATAL_FAILURE(BeginAgain(roster(), [&] { return WaitPhase("r1", 7, SessionPhase::kEnded); }));
+  EXPECT_EQ(roster().All().size(), 1U);
+  const auto sessions = roster().InSite("lab");
+  ASSERT_EQ(sessions.size(), 2U);
+  std::promise<std::size_t> keyframes;
+  ASSERT_TRUE(sessions[0]->Post(
+      SnapshotWanted{[&](SessionMaterial&& material) { keyframes.set_value(material.snapshot.keyframes.size()); }}));
+  EXPECT_GT(keyframes.get_future().get(), 0U);
+  EXPECT_EQ(roster().Find("r1")->record().token(), 70U);
+
+  // One that has not seen anything is of no use.
+  ASSERT_TRUE(roster().End("r1"));
+  ASSERT_TRUE(WaitPhase("r1", 7, SessionPhase::kEnded));
+  SessionRequest third = RequestOf("r1", 7);
+  third.session = 71;
+  roster().Take(third);
+  roster().Tick();
+  EXPECT_EQ(roster().InSite("lab").size(), 2U);
+}
+
+TEST_F(RosterTest, EarlierSessionsAreBounded) {
+  RobotsOptions options;
+  options.max_earlier = 0;
+  ASSERT_NO_FATAL_FAILURE(BeginAgain(roster(options), [&] { return WaitPhase("r1", 7, SessionPhase::kEnded); }));
+  EXPECT_EQ(roster().InSite("lab").size(), 1U);
 }
 
 TEST_F(RosterTest, TheKeysOfASessionThatIsGoneAreGivenBack) {

@@ -86,6 +86,59 @@ TEST_F(SessionEstimatorTest, TheLandmarksAreThoseOfTheEndWhateverTheirPeriod) {
   EXPECT_EQ(record_.snapshot().landmarks->front().robot, "r1");
 }
 
+// Nobody knows where a fragment is in the map, however well it knows its own surroundings.
+TEST_F(SessionEstimatorTest, AFragmentIsNotLocalizedUntilAVersionJoinsIt) {
+  EstimatorSetup setup = FewParticles();
+  setup.fragment = true;
+  std::vector<PoseReport> poses;
+  SessionRecord record{5, RequestOf("r1"), RobotsOptions{}};
+  ASSERT_TRUE(record.AddSensors({"laser"}));
+  SessionEstimator estimator{setup,
+                             record,
+                             {.send =
+                                  [&](OutboundValue value) {
+                                    poses.push_back(std::get<PoseReport>(std::move(value)));
+                                    return true;
+                                  },
+                              .grid_changed = [](GridChange&&) {}}};
+  const auto drive = [&](int first, int last) {
+    for (int step = first; step < last; ++step) {
+      EXPECT_TRUE(record.OdometryReceived(kOwner, RoomOdometry(step).sequence));
+      estimator.Handle(OdometryOf("r1", RoomOdometry(step)));
+      record.ScanReceived(kScans, RoomScan(step).sequence);
+      estimator.Handle(ScanOf("r1", RoomScan(step)));
+    }
+  };
+  drive(0, 40);
+  for (const PoseReport& pose : poses) {
+    EXPECT_FALSE(pose.localized);
+    EXPECT_EQ(pose.reason, PoseReason::kNotJoined);
+  }
+  EXPECT_TRUE(record.joining().fragment);
+  EXPECT_GT(record.joining().driven_m, 0.5);
+  estimator.Handle(Finish{.final = false, .done = {}});
+  EXPECT_TRUE(record.snapshot().landmarks == nullptr || record.snapshot().landmarks->empty());
+
+  RobotGrid displaced;
+  const auto adopt = [&](RobotGrid grid) {
+    estimator.Handle(Correction{.epoch = 1,
+                                .generation = 1,
+                                .grid = std::move(grid),
+                                .done = [&](Adopted&& adopted) { displaced = std::move(adopted.displaced); },
+                                .completed = std::make_shared<std::atomic<bool>>(true)});
+  };
+  adopt({.chunks = {}, .keyframes = 1});
+  EXPECT_TRUE(displaced.fragment);
+  EXPECT_FALSE(record.joining().fragment);
+  drive(40, 45);
+  EXPECT_TRUE(poses.back().localized);
+  adopt(RobotGrid(displaced));
+  EXPECT_FALSE(displaced.fragment);
+  EXPECT_EQ(record.joining().driven_m, 0.0);  // No job joins it again at once.
+  drive(45, 50);
+  EXPECT_EQ(poses.back().reason, PoseReason::kNotJoined);
+}
+
 TEST_F(SessionEstimatorTest, ASnapshotNamesItsSessionAndHoldsWhatWasUsed) {
   Drive(0, 20);
   const SessionMaterial material = Snapshot();

@@ -86,6 +86,20 @@ TEST_F(SessionRecordTest, AfterARestartBeforeTheFirstSampleTheFirstOneComesFirst
   }
 }
 
+TEST_F(SessionRecordTest, ANumberFarAheadOfTheRobotIsLeftAsideAndOneOfTheJournalIsNot) {
+  constexpr std::uint64_t kFar = std::uint64_t{1} << 32;
+  Receive(1);
+  EXPECT_TRUE(record_.OdometryReceived(kOwner, 1));
+  EXPECT_EQ(record_.ScanReceived(kScans, kFar), SessionRecord::Arrival::kAside);
+  EXPECT_FALSE(record_.OdometryReceived(kOwner, kFar));
+  EXPECT_EQ(ledger().last_sequence, 1U);
+  Receive(2);
+  EXPECT_TRUE(record_.OdometryReceived(kOwner, 2));
+  EXPECT_EQ(record_.ScanReceived(kScans, kFar, SessionRecord::From::kJournal), SessionRecord::Arrival::kNew);
+  EXPECT_TRUE(record_.OdometryReceived(kOwner, kFar, SessionRecord::From::kJournal));
+  EXPECT_EQ(ledger().last_sequence, kFar);
+}
+
 // A client that replays a log waits for the ledger before it sends more; the end of a burst must not wait for the
 // clock.
 TEST_F(SessionRecordTest, ADrainedQueueIsDueAtOnceWhereAScanWasSettled) {

@@ -119,6 +119,24 @@ TEST(StreamLedger, AnAbsurdNumberStartsAnewInsteadOfLosingMillions) {
   EXPECT_FALSE(ledger.Received(UINT64_MAX));
 }
 
+// One damaged sample of the odometry had settled four thousand million numbers: the robot's client sent nothing again
+// that was lost, and its scans waited for this odometry for ever.
+TEST(StreamLedger, ANumberFarAheadIsDoubtfulUntilAnotherFollowsIt) {
+  StreamLedger ledger{Ledger{}};
+  EXPECT_FALSE(ledger.IsDoubtful(7)) << "the first number of a client";
+  EXPECT_TRUE(ledger.Received(7));
+  const std::uint64_t far = std::uint64_t{1} << 32;
+  EXPECT_FALSE(ledger.IsDoubtful(7 + StreamLedger::kBelievedStep));
+  EXPECT_TRUE(ledger.IsDoubtful(8 + StreamLedger::kBelievedStep));
+  EXPECT_TRUE(ledger.IsDoubtful(far)) << "it does not follow the doubtful one";
+  EXPECT_FALSE(ledger.IsDoubtful(8));
+  EXPECT_TRUE(ledger.IsDoubtful(far + 1)) << "the stream has gone on in between";
+  EXPECT_TRUE(ledger.IsDoubtful(far - 1)) << "one that goes back";
+  EXPECT_FALSE(ledger.IsDoubtful(far + 2));
+  EXPECT_EQ(ledger.ledger().last_sequence, 7U);
+  EXPECT_EQ(ledger.ledger().received, 1U);
+}
+
 TEST(StreamLedger, PercentilesAreOfTheLastLatencies) {
   StreamLedger ledger{Ledger{}};
   for (std::uint64_t n = 1; n <= 100; ++n) {

@@ -55,6 +55,10 @@ TEST(Records, SessionsSitesVersionsLayersAndJobsComeBack) {
   EXPECT_EQ(session->request.robot, "r5");
   EXPECT_EQ(session->request.T_map_robot_start.y, 2.0);
   EXPECT_EQ(session->map_epoch, 3U);
+  EXPECT_FALSE(session->fragment);
+  StoredSession apart = SampleSession(5);
+  apart.fragment = true;
+  EXPECT_TRUE(SessionOf(BytesOf(apart))->fragment);
 
   const StoredSite site = testing::SampleSiteRecord();
   const auto site_back = SiteOf(BytesOf(site));
@@ -62,6 +66,7 @@ TEST(Records, SessionsSitesVersionsLayersAndJobsComeBack) {
   EXPECT_EQ(site_back->switches, site.switches);
   EXPECT_EQ(site_back->members, site.members);
   EXPECT_EQ(site_back->tile_version, 90U);
+  EXPECT_EQ(site_back->fragments, site.fragments);
 
   StoredVersion version{.version = 3, .job = 8, .note = "smoothed", .parts = {{5, SampleGrid(1)}}, .smoothed = {}};
   version.smoothed["r5"] = {5, std::make_shared<const Trajectory>(Trajectory{{10, {1, 2, 3}}, {20, {4, 5, 6}}})};
@@ -77,6 +82,10 @@ TEST(Records, SessionsSitesVersionsLayersAndJobsComeBack) {
   ASSERT_TRUE(layer);
   EXPECT_EQ(layer->session, 6U);
   EXPECT_EQ(layer->grid.chunks.size(), 2U);
+  EXPECT_FALSE(layer->grid.fragment);
+  StoredLayer apart_layer{6, SampleGrid(2)};
+  apart_layer.grid.fragment = true;
+  EXPECT_TRUE(LayerOf(BytesOf(apart_layer))->grid.fragment);
 
   StoredJob job;
   job.job = {.id = 4, .site = "lab", .state = JobState::kRunning, .progress = 0.5, .message = "m"};

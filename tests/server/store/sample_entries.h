@@ -60,6 +60,9 @@ inline std::vector<JournalEntry> OneOfEach() {
           SampleOdometry(3),
           CorrectionTaken{4, 5, SampleGrid(6)},
           EpochChanged{7},
+          RelocaliseTaken{Pose2{1.5, -2.0, 0.5}},
+          RelocaliseTaken{},
+          StartRefusal{"it is elsewhere"},
           SessionFinished{true, {StatusCode::kUnavailable, "gone"}}};
 }
 
@@ -84,7 +87,8 @@ inline StoredSite SampleSiteRecord() {
           .next_version = 4,
           .enabled_version = 3,
           .switches = {{1, 100}, {2, 101}},
-          .members = {{HashName("r5"), 5}}};
+          .members = {{HashName("r5"), 5}},
+          .fragments = {5, 7}};
 }
 
 }  // namespace cairn::server::testing

@@ -13,9 +13,25 @@ namespace {
 
 constexpr double kQuarterTurn = kPi / 2;
 
-std::filesystem::path Saved(const TempDirectory& directory, const SampleSite& sample) {
+// These sessions of the site have begun without a start and are not joined with the map.
+void MakeFragments(Store& store, const std::string& name, const std::set<std::uint64_t>& sessions) {
+  auto contents = ReadSite(store, name);
+  ASSERT_TRUE(contents);
+  contents->site.fragments = sessions;
+  RecordChanges changes;
+  changes.put.push_back({{RecordKind::kSite, HashName(name), 0}, BytesOf(contents->site)});
+  for (auto& [id, session] : contents->sessions) {
+    session.fragment = sessions.contains(id);
+    session.request.has_start = session.request.has_start && !session.fragment;
+    changes.put.push_back({{RecordKind::kSession, id, 0}, BytesOf(session)});
+  }
+  ASSERT_TRUE(store.Commit(std::move(changes)));
+}
+
+std::filesystem::path Saved(const TempDirectory& directory, const SampleSite& sample, std::uint64_t fragment = 0) {
   const auto store = MemoryStore();
   Put(*store, sample);
+  if (fragment != 0) MakeFragments(*store, sample.name, {fragment});
   const auto path = directory / (sample.name + ".site");
   EXPECT_TRUE(WriteSiteFile(*store, sample.name, path));
   return path;
@@ -33,7 +49,7 @@ std::vector<JournalEntry> JournalOf(Store& store, std::uint64_t session) {
 
 TEST(ImportSite, GivesNewNumbersBesideOtherSites) {
   const TempDirectory directory;
-  const auto path = Saved(directory, {.name = "hall"});
+  const auto path = Saved(directory, {.name = "hall"}, 2);
   const auto store = MemoryStore();
   Put(*store, {.name = "lab", .first_session = 11, .job = 4});  // The highest number is 13, of a session that is gone.
   const auto before = Everything(*store);
@@ -45,6 +61,7 @@ TEST(ImportSite, GivesNewNumbersBesideOtherSites) {
   ASSERT_TRUE(hall);
   EXPECT_EQ(hall->sessions.at(14).id, 14U);
   EXPECT_EQ(hall->site.members.at(HashName("r2")), 15U);
+  EXPECT_EQ(hall->site.fragments, std::set<std::uint64_t>{15});
   EXPECT_EQ(hall->layers, std::vector<std::uint64_t>{16});
   EXPECT_EQ(hall->jobs.at(5).job.id, 5U);
   const auto versions = ReadVersions(*store, HashName("hall"));
@@ -218,6 +235,25 @@ TEST(MergeSites, ATransformMovesWhatHasBeenDrawnAndWhereSessionsBegin) {
   EXPECT_NEAR(versions.at(4).smoothed.at("r1").path->front().T_map_robot.x, 1.0, 0.0);
 }
 
+// Where a fragment lies in the map is not known, so a transform of the map says nothing of it.
+TEST(MergeSites, AFragmentKeepsItsFrameAndIsOneInTheOtherSiteToo) {
+  const auto store = MemoryStore();
+  Put(*store, {.name = "lab"});
+  Put(*store, {.name = "hall", .first_session = 11, .job = 4});
+  MakeFragments(*store, "hall", {12, 13});
+  const Pose2 start = ReadSite(*store, "hall")->sessions.at(12).request.T_map_robot_start;
+  ASSERT_TRUE(MergeSites(*store, "lab", "hall", {1.0, 0.5, kQuarterTurn}));
+  const auto lab = ReadSite(*store, "lab");
+  ASSERT_TRUE(lab);
+  EXPECT_EQ(lab->site.fragments, (std::set<std::uint64_t>{12, 13}));
+  EXPECT_TRUE(lab->sessions.at(12).fragment);
+  EXPECT_FALSE(lab->sessions.at(12).request.has_start);
+  EXPECT_EQ(lab->sessions.at(12).request.T_map_robot_start, start);
+  EXPECT_EQ(CellAt(ReadLayers(*store, HashName("lab"))->at(1).grid, 645, -128), 5);
+  // A version has joined it once: what it has drawn since lies in the map.
+  EXPECT_EQ(CellAt(std::get<CorrectionTaken>(JournalOf(*store, 12)[2]).grid, 147, 271), 2);
+}
+
 TEST(MergeSites, WhatCannotBeMergedStaysAsItIs) {
   const auto store = MemoryStore();
   Put(*store, {.name = "lab"});
@@ -252,7 +288,10 @@ TEST(SplitSite, TheSessionsGoWithTheirPartOfEverything) {
   const auto store = MemoryStore();
   Put(*store, {});
   const auto before = Everything(*store);
+  MakeFragments(*store, "lab", {1, 3});
   ASSERT_TRUE(SplitSite(*store, "lab", {2, 3}, "annex"));
+  EXPECT_EQ(ReadSite(*store, "lab")->site.fragments, std::set<std::uint64_t>{1});
+  EXPECT_EQ(ReadSite(*store, "annex")->site.fragments, std::set<std::uint64_t>{3});
   const auto lab = ReadSite(*store, "lab"), annex = ReadSite(*store, "annex");
   ASSERT_TRUE(lab && annex);
   EXPECT_EQ(lab->sessions.size(), 1U);

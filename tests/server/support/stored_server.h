@@ -30,6 +30,7 @@ class StoredServer {
     journal_.Stop();
   }
   WholeServer* operator->() { return &house_; }
+  WholeServer& house() { return house_; }
   Store& store() { return *store_; }
 
  private:
@@ -46,15 +47,15 @@ inline void CopyState(const std::filesystem::path& from, const std::filesystem::
 }
 
 // The robot's client says that it had its session before: it meets a server that was started since.
-inline void SayStarted(WholeServer& house, const std::string& robot = "r1") {
+inline void SayStarted(WholeServer& house, const std::string& robot = "r1", ClientId client = kDriver) {
   house.Push(SessionRequest{.robot = robot,
                             .site = "lab",
                             .sensors = {"laser"},
-                            .client = kDriver,
+                            .client = client,
                             .has_start = true,
                             .T_map_robot_start = {},
                             .end = false,
-                            .session = kDriver,
+                            .session = client,
                             .started = true});
 }
 

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <optional>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -54,15 +55,16 @@ class WholeServer {
 
   void Push(InboundValue value) { ASSERT_TRUE(inbound_.Push(std::move(value))); }
 
-  void Open(const std::string& robot, ClientId client, const std::string& site = "lab", const Pose2& start = {}) {
+  void Open(const std::string& robot, ClientId client, const std::string& site = "lab",
+            const std::optional<Pose2>& start = Pose2{}) {
     SessionToken& token = tokens_[{robot, client}];
     if (token == 0 || LastState(robot, client).phase == SessionPhase::kEnded) token += client;
     Push(SessionRequest{.robot = robot,
                         .site = site,
                         .sensors = {"laser"},
                         .client = client,
-                        .has_start = true,
-                        .T_map_robot_start = start,
+                        .has_start = start.has_value(),
+                        .T_map_robot_start = start.value_or(Pose2{}),
                         .end = false,
                         .session = TokenOf(robot, client)});
   }

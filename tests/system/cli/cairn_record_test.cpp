@@ -206,8 +206,12 @@ TEST_F(CairnRecord, AKilledRecorderLeavesWhatItHasWritten) {
   ASSERT_NO_FATAL_FAILURE(StartServer());
   ChildProcess recorder(Command());
   ListenedRobot robot("r1", 2);
-  std::error_code none;
-  EXPECT_TRUE(DriveUntil(robot, [&] { return std::filesystem::file_size(File(), none) > 20'000; }));
+  const auto is_large = [&] {
+    std::error_code error;
+    const auto bytes = std::filesystem::file_size(File(), error);
+    return !error && bytes > 20'000;
+  };
+  EXPECT_TRUE(DriveUntil(robot, is_large));
   recorder.Signal(SIGKILL);
   static_cast<void>(recorder.Wait());
   const Drive recorded = Read(File());

@@ -114,6 +114,7 @@ TEST_F(SecureServer, GivesEachRoleItsRightsAndSaysWhoWasRefused) {
   const std::vector<std::vector<std::string>> commands = {{"job", "smooth", "--site", "hall", "--wait"},
                                                           {"map", "enable", "--site", "hall", "--version", "1"},
                                                           {"site", "save", "hall", "monday"},
+                                                          {"robot", "relocalise", "r1"},
                                                           {"session", "end", "r1"}};
   for (const auto& command : commands) {
     IsDenied("viewers/v", command);

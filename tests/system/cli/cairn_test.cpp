@@ -156,6 +156,7 @@ TEST_F(CairnProgram, AReplayAsFastAsTheServerTakesItLosesNothing) {
   EXPECT_EQ(account["used"], 300);
   EXPECT_EQ(account["dropped_total"], 0);
   EXPECT_EQ(account["unexplained"], 0);
+  EXPECT_EQ(MustJson({"robot", "relocalise", "r1", "--here", "1.2,8.2,90deg"})["accepted"], true);
 }
 
 TEST_F(CairnProgram, AnEndedSessionCanBeReplayedAgainAndAResumedOneTakesTheClockAsSetBack) {
@@ -225,6 +226,7 @@ TEST_F(CairnProgram, WhatTheServerDoesNotKnowFailsWithItsReason) {
       {{"job", "show", "99"}, "NOT_FOUND"},
       {{"job", "cancel", "99"}, "NOT_FOUND"},
       {{"job", "smooth", "--site", "nowhere"}, "NOT_FOUND"},
+      {{"robot", "relocalise", "nobody"}, "NOT_FOUND"},
       {{"session", "end", "nobody"}, "NOT_FOUND"}};
   for (const auto& [arguments, code] : unknown) {
     const Outcome outcome = Cairn(arguments);

@@ -2,9 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <limits>
 #include <random>
+#include <vector>
 
 #include "server/slam/landmarks/landmark_sighting.h"
+#include "server/slam/state/archive.h"
 
 namespace cairn::slam {
 namespace {
@@ -97,6 +101,32 @@ TEST(JointState, LeavingAnEntryOutChangesNothingElse) {
   EXPECT_EQ(state.pose(pose - 2), old);
   EXPECT_TRUE((state.covariance<2, 2>(b - 2, b - 2) == covariance));
   EXPECT_TRUE((state.covariance<3, 2>(0, b - 2) == cross));
+}
+
+// Whether a state of these sizes is read, followed by the numbers of a state with three elements.
+bool IsRead(std::int64_t size, std::int64_t capacity) {
+  StateWriter writer;
+  writer(size, capacity, std::vector<Eigen::Index>{2});
+  for (int i = 0; i < 3 + 3 * 3; ++i) writer(1.0);
+  const std::string bytes = writer.Bytes();
+  StateReader reader(bytes);
+  JointState state(Pose2{});
+  reader(state);
+  return reader.done();
+}
+
+// Sizes come from a file. They must take neither an overflow nor more memory than the file has numbers for.
+TEST(JointState, SizesForWhichThereAreNoNumbersAreNotRead) {
+  constexpr std::int64_t kLargest = std::numeric_limits<std::int64_t>::max();
+  EXPECT_TRUE(IsRead(3, 3));
+  EXPECT_TRUE(IsRead(3, 12));
+  EXPECT_FALSE(IsRead(3, 13));
+  EXPECT_FALSE(IsRead(3, 2));
+  EXPECT_FALSE(IsRead(2, 3));
+  EXPECT_FALSE(IsRead(-3, 3));
+  EXPECT_FALSE(IsRead(50000, 50000));
+  EXPECT_FALSE(IsRead(kLargest / 3, kLargest));
+  EXPECT_FALSE(IsRead(kLargest, kLargest));
 }
 
 }  // namespace

@@ -232,6 +232,18 @@ TEST_F(Lost, IsFoundByTwoSearchesThatAgreeWithSomeWayBetweenThem) {
   EXPECT_GE(*found_m, LoopOptions{}.confirm_after_m);
 }
 
+TEST_F(Lost, WhereItIsSaidToBeOneSearchIsEnough) {
+  for (const double said_x : {8.6, 12.0}) {
+    Recovery recovery = Make();
+    recovery.BeginWhereSaid(KnownAt(said_x));
+    const auto found = Take(recovery, {8.0, 0, 0}, {});
+    ASSERT_EQ(found.has_value(), said_x < 10.0);
+    if (found) {
+      EXPECT_NEAR(found->place.T_map_robot.x, 8.0, 0.05);
+    }
+  }
+}
+
 TEST_F(Lost, OnlyPlacesThatAreTheSameConfirmEachOther) {
   const Pose2 place{4.0, 2.0, 3.1};
   EXPECT_TRUE(ConfirmEachOther(place, {4.3, 2.3, 3.1}));

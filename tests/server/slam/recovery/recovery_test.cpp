@@ -235,6 +235,7 @@ class Driver {
     scan.tilt_rad = tilt_rad;
     return mapper_.Process(std::make_shared<const Scan>(std::move(scan)), T_odom_robot, SerialFor, passage);
   }
+  void Relocalise(const std::optional<Pose2>& T_map_robot) { mapper_.Relocalise(T_map_robot); }
   // Returns the last x.
   double DriveTo(double end_x) {
     double x = 0.0;
@@ -283,6 +284,32 @@ TEST(Recovery, APauseThatEndsWithATiltedScanIsNotForgotten) {
     static_cast<void>(robot.Process({x, 0, 0}, {x, 0, 0}, passage, 4.0, 0.2));
     EXPECT_EQ(robot.Process({x + 0.2, 0, 0}, {x + 0.2, 0, 0}).localized, passage == Passage::kDriven);
   }
+}
+
+// Somebody carries the robot, which does not notice it, and says where it is.
+TEST(Recovery, ARobotIsFoundWhereItIsSaidToBeAndNowhereElse) {
+  for (const double said_x : {8.6, 13.0}) {
+    Driver robot(test::RingCorridor(true));
+    const double x = robot.DriveTo(20.0);
+    robot.Relocalise(Pose2{said_x, 0.3, 0.1});
+    std::optional<double> found_m;
+    for (double way = 0.0; way < 3.0 && !found_m; way += 0.2) {
+      const ScanOutcome outcome = robot.Process({8.0 + way, 0, 0}, {x + way, 0, 0});
+      if (!outcome.localized) continue;
+      found_m = way;
+      EXPECT_NEAR(outcome.T_map_robot.x, 8.0 + way, 0.1);
+    }
+    EXPECT_EQ(found_m.has_value(), said_x < 10.0);
+  }
+}
+
+TEST(Recovery, ARobotOfWhichOnlyIsSaidThatItIsElsewhereHasToProveItsPlace) {
+  Driver robot(test::RingCorridor(true));
+  const double x = robot.DriveTo(20.0);
+  robot.Relocalise(std::nullopt);
+  const ScanOutcome outcome = robot.Process({x, 0, 0}, {x, 0, 0});
+  EXPECT_FALSE(outcome.localized);
+  EXPECT_EQ(outcome.reason, PoseReason::kLost);
 }
 
 // A robot that was switched off before one room and on again before another one that looks the same.

@@ -1,0 +1,61 @@
+#include "server/jobs/joiner.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace cairn::server {
+namespace {
+
+constexpr double kAgainAfter = 1.25;  // Ratio of the ways driven until the next job and until the last one.
+
+}  // namespace
+
+void Joiner::Tick() {
+  if (!options_.joint || !options_.join) return;
+  auto sites = Look();
+  std::erase_if(tried_, [&sites](const auto& one) { return !sites.contains(one.first); });
+  for (auto& [site, driven] : sites) {
+    if (!IsDue(site, driven) || HasWork(site)) continue;
+    if (const auto job = worker_.Submit(site, JobKind::kJoin, true); !job)
+      spdlog::warn("site {}: no job to join its robots could be submitted: {}", site, job.error().message);
+    tried_[site] = std::move(driven);
+  }
+}
+
+// The sites that have fragments.
+std::map<std::string, Joiner::Driven> Joiner::Look() const {
+  std::map<std::string, Driven> sites;
+  for (const auto& session : roster_.All()) {
+    const SessionRecord::Joining joining = session->record().joining();
+    if (joining.fragment) sites[session->record().state().site].fragments.emplace(session->id(), joining.driven_m);
+  }
+  for (auto& [site, driven] : sites) {
+    for (const auto& session : roster_.InSite(site)) {
+      const SessionRecord::Joining joining = session->record().joining();
+      if (!joining.fragment) driven.others_m += joining.driven_m;
+    }
+  }
+  return sites;
+}
+
+bool Joiner::IsDue(const std::string& site, const Driven& now) const {
+  if (now.others_m < options_.join_way_m) return false;
+  const auto tried = tried_.find(site);
+  return std::ranges::any_of(now.fragments, [&](const auto& fragment) {
+    const auto& [session, driven_m] = fragment;
+    if (driven_m < options_.join_way_m) return false;
+    if (tried == tried_.end()) return true;
+    const auto before = tried->second.fragments.find(session);
+    return before == tried->second.fragments.end() ||
+           driven_m >= kAgainAfter * std::max(before->second, options_.join_way_m) ||
+           now.others_m >= kAgainAfter * tried->second.others_m;
+  });
+}
+
+bool Joiner::HasWork(const std::string& site) const {
+  return std::ranges::any_of(jobs_.OfSite(site), [](const Job& job) { return !IsFinal(job.state); });
+}
+
+}  // namespace cairn::server

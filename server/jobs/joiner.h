@@ -1,0 +1,44 @@
+// Submits jobs that join robots with the map of their site. A robot that did not say where it starts is a fragment: its
+// part of the map is not shown (robots/roster.h). A job of the kind kJoin looks for places that it and others have
+// seen, and, where it finds enough of them, makes and enables a map version that contains the fragment. A job takes
+// time that grows with the map, so one is submitted when a fragment has driven jobs.join_way_m, and again only when it,
+// or those with whom it may be joined, have driven a quarter more. Thread rule: one thread (housekeeping).
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "server/jobs/job_list.h"
+#include "server/jobs/job_worker.h"
+#include "server/jobs/jobs_options.h"
+#include "server/robots/roster.h"
+
+namespace cairn::server {
+
+class Joiner {
+ public:
+  Joiner(const JobsOptions& options, const Roster& roster, const JobList& jobs, JobWorker& worker)
+      : options_(options), roster_(roster), jobs_(jobs), worker_(worker) {}
+
+  // Submits the jobs that are due, at most one per site. None while the site has a job that has not ended, because that
+  // job may join the fragment.
+  void Tick();
+
+ private:
+  // How far the sessions of a site have driven, in metres.
+  struct Driven {
+    std::map<SessionId, double> fragments;
+    double others_m = 0.0;
+  };
+  [[nodiscard]] std::map<std::string, Driven> Look() const;
+  [[nodiscard]] bool IsDue(const std::string& site, const Driven& now) const;
+  [[nodiscard]] bool HasWork(const std::string& site) const;
+
+  const JobsOptions options_;
+  const Roster& roster_;
+  const JobList& jobs_;
+  JobWorker& worker_;
+  std::map<std::string, Driven> tried_;  // By site: at the last job.
+};
+
+}  // namespace cairn::server

@@ -1,0 +1,41 @@
+// Notices robots that are not where somebody said they start. On the first metres of a robot it is compared, after each
+// metre, with what others have drawn of the same place before (maps/grid_agreement.h). If they contradict each other
+// twice, its start is refused: from then on the robot is a fragment like one that did not say where it starts. It is
+// not localized, the map shows nothing of it, and the joiner looks for where it really is. Thread rule: Tick on one
+// thread (housekeeping).
+#pragma once
+
+#include <atomic>
+#include <map>
+#include <memory>
+
+#include "server/jobs/jobs_options.h"
+#include "server/maps/atlas.h"
+#include "server/robots/roster.h"
+
+namespace cairn::server {
+
+class StartCheck {
+ public:
+  StartCheck(const JobsOptions& options, const Roster& roster, const Atlas& atlas)
+      : options_(options), roster_(roster), atlas_(atlas) {}
+
+  // Begins the comparisons that are due.
+  void Tick();
+
+ private:
+  // Shared with the site's strand while it compares.
+  struct Watched {
+    double compared_at_m = 0.0;
+    std::atomic<bool> comparing = false;
+    std::atomic<int> contradictions = 0;
+  };
+  void Compare(const std::shared_ptr<Session>& session, const std::shared_ptr<Watched>& watched) const;
+
+  const JobsOptions options_;
+  const Roster& roster_;
+  const Atlas& atlas_;
+  std::map<SessionId, std::shared_ptr<Watched>> watched_;  // Sessions on their first metres.
+};
+
+}  // namespace cairn::server

@@ -1,0 +1,144 @@
+#include "server/maps/grid_agreement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <memory>
+
+namespace cairn::server {
+namespace {
+
+using slam::OccupancyGrid;
+
+// In units of GridChunk::log_odds: three hits, one hit, five rays that passed.
+constexpr int kOccupied = 200, kHit = 80, kFree = -150;
+constexpr int kLargest = 32000;           // Of a sum.
+constexpr std::size_t kMostCells = 1000;  // That are compared; of more, every second, third, ...
+constexpr double kStepM = 0.15, kStepRad = 0.03;
+
+struct Cell {
+  int x = 0, y = 0;
+};
+
+template <typename Visit>
+void ForEachCell(const OccupancyGrid::Chunks& grid, const Visit& visit) {
+  for (const auto& [key, chunk] : grid) {
+    for (int i = 0; i < kTileArea; ++i)
+      visit(Cell{key.x * kTileCells + i % kTileCells, key.y * kTileCells + i / kTileCells},
+            chunk->log_odds[static_cast<std::size_t>(i)]);
+  }
+}
+
+// What others know of each cell of an area.
+class Known {
+ public:
+  enum What : std::uint8_t { kNothing = 0, kIsFree, kNearWall };
+
+  Known(const OccupancyGrid::Chunks& grid, Cell low, Cell high, int near)
+      : low_(low),
+        width_(high.x - low.x + 1),
+        height_(high.y - low.y + 1),
+        cells_(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), kNothing) {
+    ForEachCell(grid, [&](Cell cell, int log_odds) {
+      if (log_odds == slam::kUnseen) return;
+      if (log_odds >= kHit) MarkNear(cell, near);
+      if (log_odds <= kFree && Has(cell) && At(cell) == kNothing) Set(cell, kIsFree);
+    });
+  }
+  [[nodiscard]] What operator()(Cell cell) const { return Has(cell) ? At(cell) : kNothing; }
+
+ private:
+  [[nodiscard]] bool Has(Cell cell) const {
+    return low_.x <= cell.x && cell.x < low_.x + width_ && low_.y <= cell.y && cell.y < low_.y + height_;
+  }
+  [[nodiscard]] std::size_t Index(Cell cell) const {
+    return static_cast<std::size_t>(cell.y - low_.y) * static_cast<std::size_t>(width_) +
+           static_cast<std::size_t>(cell.x - low_.x);
+  }
+  [[nodiscard]] What At(Cell cell) const { return static_cast<What>(cells_[Index(cell)]); }
+  void Set(Cell cell, What what) { cells_[Index(cell)] = what; }
+  void MarkNear(Cell wall, int near) {
+    for (int dy = -near; dy <= near; ++dy) {
+      for (int dx = -near; dx <= near; ++dx) {
+        const Cell cell{wall.x + dx, wall.y + dy};
+        if (Has(cell)) Set(cell, kNearWall);
+      }
+    }
+  }
+
+  const Cell low_;
+  const int width_, height_;
+  std::vector<std::uint8_t> cells_;
+};
+
+}  // namespace
+
+GridAgreement CompareGrids(const OccupancyGrid::Chunks& grid, const OccupancyGrid::Chunks& others, const Pose2& centre,
+                           double resolution_m) {
+  const Eigen::Vector2d c = centre.translation();
+  const auto cell_of = [&](const Eigen::Vector2d& p) {
+    return Cell{static_cast<int>(std::floor(p.x() / resolution_m)), static_cast<int>(std::floor(p.y() / resolution_m))};
+  };
+  std::vector<Eigen::Vector2d> walls;  // As seen from the centre.
+  double reach_m = 0.0;
+  ForEachCell(grid, [&](Cell cell, int log_odds) {
+    if (log_odds < kOccupied) return;
+    walls.push_back(Eigen::Vector2d(cell.x + 0.5, cell.y + 0.5) * resolution_m - c);
+    reach_m = std::max(reach_m, walls.back().norm());
+  });
+
+  reach_m += 2.0 * GridAgreement::kReachM;
+  const Eigen::Vector2d corner(reach_m, reach_m);
+  const Known known(others, cell_of(c - corner), cell_of(c + corner),
+                    static_cast<int>(std::lround(GridAgreement::kNearM / resolution_m)));
+
+  const std::size_t stride = walls.size() / kMostCells + 1;
+  const auto turns = static_cast<int>(std::lround(GridAgreement::kReachRad / kStepRad));
+  const auto steps = static_cast<int>(std::lround(GridAgreement::kReachM / kStepM));
+  GridAgreement best;
+  for (int turn = -turns; turn <= turns; ++turn) {
+    const Eigen::Matrix2d R = Pose2{0.0, 0.0, turn * kStepRad}.rotation();
+    for (int y = -steps; y <= steps; ++y) {
+      for (int x = -steps; x <= steps; ++x) {
+        const Eigen::Vector2d shift = kStepM * Eigen::Vector2d(x, y);
+        GridAgreement agreement;
+        for (std::size_t i = 0; i < walls.size(); i += stride) {
+          const Known::What what = known(cell_of(R * walls[i] + shift + c));
+          agreement.compared += what != Known::kNothing ? 1 : 0;
+          agreement.contradicted += what == Known::kIsFree ? 1 : 0;
+        }
+        // At the best place most of what can be compared agrees.
+        const auto agrees = [](const GridAgreement& one) {
+          return static_cast<double>(one.compared) - 2.0 * static_cast<double>(one.contradicted);
+        };
+        if (best.compared == 0 || agrees(agreement) > agrees(best)) best = agreement;
+      }
+    }
+  }
+  return best;
+}
+
+OccupancyGrid::Chunks SumOfGrids(const std::vector<const OccupancyGrid::Chunks*>& grids) {
+  std::map<slam::ChunkKey, std::shared_ptr<slam::GridChunk>> sums;
+  OccupancyGrid::Chunks sum;
+  for (const OccupancyGrid::Chunks* const grid : grids) {
+    for (const auto& [key, chunk] : *grid) {
+      const auto first = sum.try_emplace(key, chunk);
+      if (first.second) continue;  // Shared, as long as there is only one.
+      auto& own = sums[key];
+      if (own == nullptr) {
+        own = std::make_shared<slam::GridChunk>(*first.first->second);
+        first.first->second = own;
+      }
+      for (std::size_t i = 0; i < own->log_odds.size(); ++i) {
+        const int a = own->log_odds[i], b = chunk->log_odds[i];
+        if (b == slam::kUnseen) continue;
+        own->log_odds[i] = static_cast<std::int16_t>(a == slam::kUnseen ? b : std::clamp(a + b, -kLargest, kLargest));
+      }
+    }
+  }
+  return sum;
+}
+
+}  // namespace cairn::server

@@ -1,0 +1,156 @@
+// How the roster opens sessions (roster.h).
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <exception>
+#include <utility>
+
+#include "server/robots/roster.h"
+
+namespace cairn::server {
+namespace {
+
+Pose2 StartOf(const SessionRequest& request) {
+  if (!request.has_start) return {};
+  Pose2 start = request.T_map_robot_start;
+  start.theta = WrapAngle(start.theta);
+  return start;
+}
+
+}  // namespace
+
+// The session is known to others last: if an exception ends this, it is gone, and the client may ask again.
+Result<void> Roster::Open(const SessionRequest& request) {
+  const NameId robot_id = HashName(request.robot);
+  std::shared_ptr<Session> session, gone;  // The memory of the one that goes is freed without the lock.
+  std::shared_ptr<Site> site;
+  StoredSession stored{.id = 0, .request = request};
+  {
+    const MutexLock lock(mutex_);
+    // First the limit, then the site: a robot that is refused leaves no site behind.
+    auto giving_way = GivesWay(robot_id);
+    if (!giving_way) return tl::unexpected(giving_way.error());
+    auto entered = atlas_.Enter(request.site);
+    if (!entered) return tl::unexpected(entered.error());
+    site = *std::move(entered);
+    gone = *std::move(giving_way);
+    stored.id = next_id_++;
+    stored.map_epoch = site->snapshot()->info.epoch;
+    stored.fragment = BeginsFragment(request, *site);
+    session = Make(stored, site);
+    session->record().AddSensors(request.sensors);
+    for (const std::string& sensor : request.sensors) {
+      if (auto account = unclaimed_.Claim({robot_id, HashName(sensor), request.session})) {
+        session->record().Inherit(HashName(sensor), std::move(*account));
+      }
+    }
+  }
+  if (journal_ != nullptr) {
+    session->ExpectDurable();
+    journal_->Open(stored, DurableFor(session));
+  }
+  session->Resume(request.client, request.session);
+  Enter(*site, session);
+  if (stored.fragment) {
+    spdlog::warn(
+        "robot {} did not say where it starts in site {}, which has a map: it is not localized, and its part of the "
+        "map is not shown, until it has driven through places that others have seen and a job joins it. With a start "
+        "pose it would be localized at once",
+        request.robot, request.site);
+  }
+  {
+    const MutexLock lock(mutex_);
+    std::shared_ptr<Session>& place = sessions_[robot_id];
+    if (gone != nullptr) gone_.push_back({gone, gone == place});
+    if (gone != nullptr && gone != place) sessions_.erase(gone->record().state().robot_id);
+    place = session;
+  }
+  try {
+    RetireGone();
+  } catch (const std::exception& error) {  // The session is open all the same, and the next Tick retires the others.
+    spdlog::error("a session that gave way could not be ended because of an exception: {}", error.what());
+  }
+  return {};
+}
+
+bool Roster::BeginsFragment(const SessionRequest& request, const Site& site) const {
+  // The filter line_match finds the robot in a map that it was given.
+  if (request.has_start || mapper_.filter.kind == slam::FilterKind::kLineMatch) return false;
+  if (site.snapshot()->info.tile_count > 0) return true;
+  // Others may have begun a map that is not rendered yet.
+  return std::ranges::any_of(sessions_, [&](const auto& one) {
+    const SessionRecord& record = one.second->record();
+    const RobotStatus status = record.snapshot().status;
+    const bool draws = status.session.phase != SessionPhase::kEnded || status.pose.reason != PoseReason::kWaiting;
+    return status.session.site == request.site && draws && !record.joining().fragment;
+  });
+}
+
+// The session draws the site from now on.
+void Roster::Enter(Site& site, const std::shared_ptr<Session>& session) {
+  const SessionRecord& record = session->record();
+  site.Join({.session = session->id(),
+             .robot = record.state().robot_id,
+             .owner = session,
+             .epoch = record.epoch(),
+             .fragment = record.joining().fragment});
+}
+
+std::shared_ptr<Session> Roster::Make(const StoredSession& stored, const std::shared_ptr<Site>& site) const {
+  const SessionId id = stored.id;
+  const SessionSetup setup{
+      .id = id,
+      .request = stored.request,
+      .map_epoch = stored.map_epoch,
+      .estimator = {.mapper = mapper_, .T_map_robot_start = StartOf(stored.request), .fragment = stored.fragment}};
+  SessionOutputs outputs{.send = [this](OutboundValue value) { return outbound_.Send(std::move(value)); },
+                         .grid_changed = [site](GridChange&& change) { site->Change(std::move(change)); },
+                         .store = {},
+                         .gone =
+                             [site, id, closing = closing_] {
+                               if (!*closing) site->Leave(id);
+                             }};
+  const auto self = std::make_shared<std::weak_ptr<Session>>();
+  if (journal_ != nullptr) {
+    outputs.store = [journal = journal_, id, self](JournalEntry entry) {
+      if (journal->Append(id, std::move(entry)) != 0) return true;
+      if (const auto session = self->lock()) session->Lost({StatusCode::kUnavailable, journal->health().reason});
+      return false;
+    };
+    outputs.position = [journal = journal_, id] { return journal->position(id); };
+    outputs.checkpoint = [journal = journal_, id](std::uint64_t position, Journal::Content content) {
+      return journal->Checkpoint(id, position, std::move(content));
+    };
+    outputs.checkpoint_entries = static_cast<std::uint64_t>(options_.checkpoint_entries);
+  }
+  auto session = std::make_shared<Session>(setup, options_, pool_, std::move(outputs));
+  *self = session;
+  return session;
+}
+
+Journal::Durable Roster::DurableFor(const std::shared_ptr<Session>& session) const {
+  return [weak = std::weak_ptr(session)](const std::vector<JournalEntry>& entries) {
+    if (const auto known = weak.lock()) known->Durable(entries);
+  };
+}
+
+Result<std::shared_ptr<Session>> Roster::GivesWay(NameId robot_id) const {
+  const auto own = sessions_.find(robot_id);
+  if (own != sessions_.end()) return own->second;
+  if (sessions_.size() < static_cast<std::size_t>(options_.max_robots)) return nullptr;
+  const auto now = SessionRecord::Clock::now();
+  std::shared_ptr<Session> ended, suspended;
+  for (const auto& [id, session] : sessions_) {
+    const SessionRecord& record = session->record();
+    const bool is_ended = record.phase() == SessionPhase::kEnded;
+    if (is_ended && (ended == nullptr || session->id() < ended->id())) ended = session;
+    const auto away = record.SuspendedFor(now);
+    if (away > (suspended == nullptr ? away.zero() : suspended->record().SuspendedFor(now))) suspended = session;
+  }
+  if (ended != nullptr) return ended;
+  if (suspended != nullptr) return suspended;
+  return Fail(StatusCode::kResourceExhausted,
+              std::to_string(sessions_.size()) + " robots have open sessions; the limit is robots.max_robots");
+}
+
+}  // namespace cairn::server

@@ -1,0 +1,172 @@
+// cairn-study starts: robots that are told a wrong place where they start, in a map that others have made. After which
+// way the map contradicts what such a robot draws, and whether it ever contradicts one whose start is as exact as a
+// person says it. Through the estimator and the comparison of the server, without a server. --runs: starts for each
+// robot and kind (10).
+#include <cmath>
+#include <map>
+#include <memory>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "client/sim/fleet.h"
+#include "client/sim/shipped_worlds.h"
+#include "server/maps/grid_agreement.h"
+#include "server/slam/scan_pipeline.h"
+#include "tests/studies/study.h"
+
+namespace cairn::studies {
+namespace {
+
+using server::CompareGrids;
+using server::GridAgreement;
+using slam::OccupancyGrid;
+
+constexpr double kFirstM = 1.0, kStepM = 1.0, kLastM = 8.0;
+constexpr double kWantedM = 5.0;  // A wrong start is to be noticed within this way.
+
+sim::Fleet MakeFleet(const std::string& world, std::uint64_t seed) {
+  auto surroundings = sim::OpenSurroundings(world);
+  if (!surroundings) throw std::runtime_error(surroundings.error().message);
+  sim::FleetOptions options;
+  options.robots = 4;
+  options.laser.beams = 360;
+  options.seed = seed;
+  auto fleet = sim::Fleet::Create(std::move(*surroundings), options);
+  if (!fleet) throw std::runtime_error(fleet.error().message);
+  return std::move(*fleet);
+}
+
+using RobotRecords = std::vector<std::vector<LogRecord>>;
+
+RobotRecords Drive(sim::Fleet& fleet, double seconds) {
+  RobotRecords records(static_cast<std::size_t>(fleet.robots()));
+  const Stamp end = sim::FleetOptions{}.first_stamp + StampFromSeconds(seconds);
+  for (;;) {
+    sim::FleetRecord next = fleet.Next();
+    if (std::visit([](const auto& one) { return one.stamp; }, next.record) > end) return records;
+    records[static_cast<std::size_t>(next.robot)].push_back(std::move(next.record));
+  }
+}
+
+// Calls visit(way_m, pose, grid) after every metre from kFirstM to kLastM, and at the end (way_m < 0).
+template <typename Visit>
+void Draw(const std::vector<LogRecord>& records, const Pose2& T_map_robot_start, double last_m, const Visit& visit) {
+  double way_m = 0.0, next_m = kFirstM;
+  std::optional<Pose2> last;
+  slam::MapperOptions options;
+  options.filter.particles = 20;
+  slam::ScanPipeline pipeline(options, T_map_robot_start, slam::SerialFor,
+                              {.used =
+                                   [&](const Scan&, const slam::ScanOutcome& outcome) {
+                                     if (!outcome.keyframe) return;
+                                     if (last)
+                                       way_m += (outcome.T_map_robot.translation() - last->translation()).norm();
+                                     last = outcome.T_map_robot;
+                                   },
+                               .dropped = [](const Scan&, DropReason) {}});
+  for (const LogRecord& record : records) {
+    if (const auto* const scan = std::get_if<Scan>(&record)) {
+      pipeline.Add(std::make_shared<const Scan>(*scan));
+    } else {
+      pipeline.Add(std::get<Odometry>(record));
+    }
+    for (; way_m >= next_m && next_m <= last_m; next_m += kStepM) visit(next_m, *last, pipeline.mapper().ShareGrid());
+    if (way_m > last_m) break;
+  }
+  visit(-1.0, last.value_or(T_map_robot_start), pipeline.mapper().ShareGrid());
+}
+
+// The sum of several grids.
+OccupancyGrid::Chunks SumOf(const std::vector<OccupancyGrid::Chunks>& grids, std::size_t without) {
+  std::vector<const OccupancyGrid::Chunks*> others;
+  for (std::size_t i = 0; i < grids.size(); ++i)
+    if (i != without) others.push_back(&grids[i]);
+  return server::SumOfGrids(others);
+}
+
+struct Kind {
+  std::string name;
+  double from_m = 0.0, to_m = 0.0;      // Error of the position, in any direction.
+  double from_rad = 0.0, to_rad = 0.0;  // Error of the heading, to either side.
+  bool wrong = false;
+};
+
+const std::vector<Kind> kKinds = {
+    {"as a person says it", 0.0, 0.3, 0.0, 0.05, false},    {"carelessly", 0.3, 0.5, 0.05, 0.1, true},
+    {"1.5 to 3 m beside", 1.5, 3.0, 0.0, 0.1, true},        {"3 to 10 m beside", 3.0, 10.0, 0.0, 0.1, true},
+    {"turned by 0.4 to 0.8 rad", 0.0, 0.3, 0.4, 0.8, true}, {"another way round", 0.0, 1.0, 2.8, 3.2, true}};
+
+struct Count {
+  int starts = 0, judged = 0, refused_within = 0, refused = 0;
+  double most_share = 0.0, least_share = 1.0;  // Of those that were judged, at the end.
+};
+
+void RunStarts(StudyContext& context) {
+  Report& report = context.report;
+  const int runs = context.runs > 0 ? context.runs : context.Pick(10, 1);
+  for (const std::string world : {"office", "building", "storey"}) {
+    report.Heading("World " + world);
+    sim::Fleet fleet = MakeFleet(world, context.seed);
+    const RobotRecords whole = Drive(fleet, context.quick ? 60.0 : 180.0);
+    std::vector<OccupancyGrid::Chunks> grids(whole.size());
+    for (std::size_t i = 0; i < whole.size(); ++i)
+      Draw(whole[i], fleet.T_map_robot_start(static_cast<int>(i)), 1e9,
+           [&](double way_m, const Pose2&, OccupancyGrid::Chunks&& grid) {
+             if (way_m < 0.0) grids[i] = std::move(grid);
+           });
+    sim::Fleet other = MakeFleet(world, context.seed + 1);
+    const RobotRecords first = Drive(other, 20.0);
+    std::mt19937_64 random(context.seed);
+    std::uniform_real_distribution<double> any(0.0, 1.0);
+    std::map<std::string, Count> counts;
+    for (std::size_t robot = 0; robot < first.size(); ++robot) {
+      const OccupancyGrid::Chunks others = SumOf(grids, robot);
+      for (const Kind& kind : kKinds) {
+        for (int run = 0; run < runs; ++run) {
+          Count& count = counts[kind.name];
+          const double away_m = kind.from_m + (kind.to_m - kind.from_m) * any(random),
+                       direction = 2 * kPi * any(random);
+          const double turn =
+              (any(random) < 0.5 ? -1.0 : 1.0) * (kind.from_rad + (kind.to_rad - kind.from_rad) * any(random));
+          const Pose2& start = other.T_map_robot_start(static_cast<int>(robot));
+          const Pose2 said{start.x + away_m * std::cos(direction), start.y + away_m * std::sin(direction),
+                           WrapAngle(start.theta + turn)};
+          std::optional<double> refused_m;
+          GridAgreement last;
+          Draw(first[robot], said, kLastM,
+               [&](double way_m, const Pose2& T_map_robot, const OccupancyGrid::Chunks& grid) {
+                 last = CompareGrids(grid, others, T_map_robot, slam::GridOptions{}.resolution_m);
+                 if (!refused_m && way_m >= 0.0 && last.Contradicts()) refused_m = way_m;
+               });
+          ++count.starts;
+          if (last.compared < 100) continue;
+          ++count.judged;
+          count.refused += refused_m ? 1 : 0;
+          count.refused_within += refused_m && *refused_m <= kWantedM ? 1 : 0;
+          count.most_share = std::max(count.most_share, last.contradicted_share());
+          count.least_share = std::min(count.least_share, last.contradicted_share());
+        }
+      }
+    }
+    Table table({"start said", "starts", "with something to compare", "refused within 5 m", "refused within 8 m",
+                 "share that contradicts, least (%)", "most (%)"});
+    for (const Kind& kind : kKinds) {
+      const Count& count = counts[kind.name];
+      table.Add({kind.name, std::to_string(count.starts), std::to_string(count.judged),
+                 std::to_string(count.refused_within), std::to_string(count.refused),
+                 Number(100.0 * count.least_share, 1), Number(100.0 * count.most_share, 1)});
+      if (!kind.wrong) report.Expect(count.refused == 0, world + ": a start said " + kind.name + " was refused");
+    }
+    report.Add(table, "starts-" + world);
+  }
+}
+
+const Registration kStarts("starts", "wrong starts in a map that others have made: whether and when they are noticed",
+                           RunStarts);
+
+}  // namespace
+}  // namespace cairn::studies
