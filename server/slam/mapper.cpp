@@ -287,7 +287,7 @@ void Mapper::Load(StateReader& archive) {
   auto loaded = std::make_unique<State>(state_->options, Pose2{}, 0);
   archive(*loaded);
   if (archive.ok()) loaded->filter->Load(archive);
-  if (!archive.ok() || !archive.Require(loaded->IsConsistent(), "the paths")) return;
+  if (!archive.RequireThat([&] { return loaded->IsConsistent(); }, "the paths")) return;
   loaded->front_end.Watch(state_->front_end.watch());
   state_ = std::move(loaded);
 }

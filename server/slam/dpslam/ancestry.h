@@ -52,7 +52,7 @@ class Ancestry {
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     archive(self.nodes_, self.free_, self.living_);
-    if constexpr (Archive::kReads) archive.Require(self.IsTree(), "the ancestry of the particles");
+    if constexpr (Archive::kReads) archive.RequireThat([&] { return self.IsTree(); }, "the ancestry of the particles");
   }
 
  private:

@@ -46,7 +46,7 @@ class DpSlam final : public Filter {
     if (self.high_) archive(*self.high_);
     if (self.plain_) archive(*self.plain_);
     if constexpr (Archive::kReads)
-      archive.Require(self.IsConsistent(archive.keyframes()), "the scans of the low level");
+      archive.RequireThat([&] { return self.IsConsistent(archive.keyframes()); }, "the scans of the low level");
   }
 
   // The map of the low level covers only the surroundings if there is a high level.

@@ -60,7 +60,7 @@ class SegmentFilter {
     archive(self.level_, self.segments_, self.joints_, self.fixed_, self.open_, self.at_work_, self.share_, self.free_,
             self.candidates_, self.proposed_, self.log_likelihoods_, self.tempering_, self.stride_, self.moves_left_,
             self.moved_, self.to_draw_, self.drawings_, self.children_);
-    if constexpr (Archive::kReads) archive.Require(self.IsConsistent(), "the segments");
+    if constexpr (Archive::kReads) archive.RequireThat([&] { return self.IsConsistent(); }, "the segments");
   }
 
  private:

@@ -216,6 +216,9 @@ class StateReader {
   }
   // Fails if `holds` is false; `what` names what is wrong. Returns whether nothing has failed so far.
   bool Require(bool holds, const char* what);
+  // The same with a function that is called only if nothing has failed so far: it may rely on everything that was
+  // required before, also by the parts that were read.
+  bool RequireThat(const std::predicate auto& holds, const char* what) { return ok() && Require(holds(), what); }
   [[nodiscard]] bool ok() const { return failed_ == nullptr; }
   // What is wrong, if something is.
   [[nodiscard]] const char* failed() const { return failed_; }

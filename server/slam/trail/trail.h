@@ -80,7 +80,7 @@ class Trail {
     const std::size_t size = self.size();
     archive.SetKeyframes(size);
     if constexpr (Archive::kReads)
-      if (archive.Require(self.IsConsistent(), "the way along the keyframes")) self.RestoreRest();
+      if (archive.RequireThat([&] { return self.IsConsistent(); }, "the way along the keyframes")) self.RestoreRest();
   }
 
  private:

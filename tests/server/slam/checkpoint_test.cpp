@@ -226,6 +226,15 @@ TEST_P(Checkpoints, ADamagedStateIsRefusedOrHarmless) {
     try_one(std::string_view(bytes).substr(0, size));
     EXPECT_EQ(refused, 1) << size;
   }
+  // A main part that ends too early, with its right length: what comes before the end is read.
+  std::uint64_t main = 0;
+  std::memcpy(&main, bytes.data(), sizeof(main));
+  for (std::uint64_t size = 0; size < main; size += 1 + main / (kFast ? 500 : 100)) {
+    refused = 0;
+    try_one(std::string(reinterpret_cast<const char*>(&size), sizeof(size)) + bytes.substr(sizeof(main), size) +
+            bytes.substr(sizeof(main) + main));
+    EXPECT_EQ(refused, 1) << size;
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(EveryFilter, Checkpoints, testing::ValuesIn(kCases),
