@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "client/sim/laser.h"
@@ -60,6 +61,10 @@ class Fleet {
 
   // The true poses at the stamps of the scans so far.
   [[nodiscard]] const Trajectory& truth(int robot) const { return members(robot).truth; }
+  // The same since the last call, and forgets them.
+  [[nodiscard]] Trajectory TakeTruth(int robot) {
+    return std::exchange(robots_[static_cast<std::size_t>(robot)].truth, {});
+  }
 
  private:
   struct Member {

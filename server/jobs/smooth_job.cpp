@@ -148,8 +148,9 @@ Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMateria
       version.smoothed[session.robot] = {session.session,
                                          std::make_shared<const Trajectory>(snapshot.TrajectoryAlong(map->path))};
     version.parts[session.session] = {.chunks = map->grid.Share(),
-                                      .keyframes = snapshot.keyframes.size(),
+                                      .keyframes = snapshot.made(),
                                       .path = std::make_shared<const std::vector<Pose2>>(std::move(map->path)),
+                                      .numbers = std::make_shared<const std::vector<std::uint64_t>>(snapshot.numbers),
                                       .fragment = !shown[i]};
   }
   version.info.note = "smoothed: " + summary;

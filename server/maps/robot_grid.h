@@ -16,13 +16,15 @@ namespace cairn::server {
 
 using SessionId = std::uint64_t;  // Unique while the server runs; later sessions have larger ids.
 
-// A robot's grid, drawn from its first `keyframes` keyframes.
+// A robot's grid, drawn when there had been so many keyframes.
 struct RobotGrid {
   slam::OccupancyGrid::Chunks chunks;
-  std::size_t keyframes = 0;
+  std::uint64_t keyframes = 0;
   // T_map_robot of these keyframes in this grid. The estimator's path follows it (slam::Mapper::AdoptGrid). Null: it is
   // not known, and the path stays.
   std::shared_ptr<const std::vector<Pose2>> path{};
+  // The numbers of the keyframes of the path, because some may have been retired. Null: all of them, 0, 1, 2, ...
+  std::shared_ptr<const std::vector<std::uint64_t>> numbers{};
   // Whether it is not joined with the map of the site: it has a frame of its own and is not shown.
   bool fragment = false;
 };

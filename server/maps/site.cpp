@@ -289,6 +289,7 @@ void Site::StageGone(SessionId session) {
   switch_->displaced.emplace(session, RobotGrid{.chunks = joint_.ChunksOf(session),
                                                 .keyframes = part.keyframes,
                                                 .path = {},
+                                                .numbers = {},
                                                 .fragment = joint_.hidden().contains(session)});
 }
 

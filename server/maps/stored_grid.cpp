@@ -6,7 +6,8 @@
 namespace cairn::server {
 
 StoredGrid ToStored(const RobotGrid& grid) {
-  StoredGrid stored{.keyframes = grid.keyframes, .chunks = {}, .path = grid.path, .fragment = grid.fragment};
+  StoredGrid stored{
+      .keyframes = grid.keyframes, .chunks = {}, .path = grid.path, .numbers = grid.numbers, .fragment = grid.fragment};
   for (const auto& [key, chunk] : grid.chunks) {
     stored.chunks.push_back({key.x, key.y, std::shared_ptr<const std::int16_t>(chunk, chunk->log_odds.data())});
   }
@@ -15,8 +16,9 @@ StoredGrid ToStored(const RobotGrid& grid) {
 
 RobotGrid FromStored(const StoredGrid& stored) {
   RobotGrid grid{.chunks = {},
-                 .keyframes = static_cast<std::size_t>(stored.keyframes),
+                 .keyframes = stored.keyframes,
                  .path = stored.path,
+                 .numbers = stored.numbers,
                  .fragment = stored.fragment};
   for (const StoredChunk& one : stored.chunks) {
     auto chunk = std::make_shared<slam::GridChunk>();

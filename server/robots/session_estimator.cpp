@@ -306,17 +306,24 @@ void SessionEstimator::SetEpoch(std::uint32_t epoch) {
 
 // The grid before a correction, and the path to go back to with it.
 RobotGrid SessionEstimator::DisplacedGrid() {
-  RobotGrid displaced{
-      .chunks = PublishedChunks(), .keyframes = pipeline_.mapper().keyframe_count(), .path = {}, .fragment = fragment_};
-  if (auto path = pipeline_.mapper().BestPath(); path.size() == displaced.keyframes)
+  const slam::Mapper& mapper = pipeline_.mapper();
+  RobotGrid displaced{.chunks = PublishedChunks(),
+                      .keyframes = mapper.keyframes_made(),
+                      .path = {},
+                      .numbers = {},
+                      .fragment = fragment_};
+  if (auto path = mapper.BestPath(); path.size() == mapper.keyframe_count()) {
     displaced.path = std::make_shared<const std::vector<Pose2>>(std::move(path));
+    displaced.numbers = std::make_shared<const std::vector<std::uint64_t>>(mapper.keyframe_numbers());
+  }
   return displaced;
 }
 
 void SessionEstimator::AdoptGrid(std::uint32_t epoch, const RobotGrid& grid) {
   slam::Mapper& mapper = pipeline_.mapper();
   const auto path = grid.path != nullptr ? std::span<const Pose2>(*grid.path) : std::span<const Pose2>();
-  mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), grid.chunks), grid.keyframes, path);
+  const auto numbers = grid.numbers != nullptr ? std::span(*grid.numbers) : std::span<const std::uint64_t>();
+  mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), grid.chunks), grid.keyframes, path, numbers);
   if (grid.fragment && !fragment_) driven_m_ = 0.0;  // So that no job joins it again at once.
   fragment_ = grid.fragment;
   if (!fragment_) start_refused_.clear();

@@ -82,6 +82,8 @@ void Mapper::State::AddKeyframe(Keyframe keyframe, ScanView view, const TrackSte
   self_check.Look(trail, believed_index());
   Begin(ScanStep::kDraw);
   Draw(step, placed_before);
+  Begin(ScanStep::kRetire);
+  RetireKeyframes();
   Begin(ScanStep::kOther);
 }
 
@@ -111,6 +113,25 @@ void Mapper::State::CloseLargeLoop() {
   trail.ConfirmTentative();
   drawing.StartAgain(trail.size());
   self_check.Forget();
+}
+
+// All that is kept is gone through, so it happens seldom: each time that an eighth has been added. Only where all
+// hypotheses have the same past, and no keyframe that something is still being done with.
+void Mapper::State::RetireKeyframes() {
+  const RetireOptions& limits = options.retire;
+  if (!limits.enabled || !filter->retires() || !filter->placed() || drawing.redrawing()) return;
+  const auto from = static_cast<std::uint64_t>(limits.from_keyframes);
+  if (trail.size() < from || trail.size() < looked_at_size + std::max(from, looked_at_size) / 8) return;
+  const PosePath path = believed_path();
+  std::size_t end = trail.size() - std::min(trail.size(), static_cast<std::size_t>(limits.recent_keyframes));
+  for (std::size_t i = 1; i < filter->hypothesis_count(); ++i) end = filter->hypothesis(i).path.SharedWith(path, end);
+  if (const auto retirement = ChooseRetired(trail, path, end, limits)) {
+    trail.Retire(*retirement);
+    filter->Retire(*retirement);
+    loops.Retire(*retirement);
+    drawing.Retire(*retirement);
+  }
+  looked_at_size = trail.size();
 }
 
 // A robot that does not know where it is would draw noise over its map, and the map would grow without end.
@@ -208,12 +229,17 @@ std::size_t Mapper::keyframe_count() const {
   return state_->trail.size();
 }
 
+std::uint64_t Mapper::keyframes_made() const {
+  return state_->trail.made();
+}
+
 MapperSnapshot Mapper::Snapshot() const {
   const State& s = *state_;
   if (!s.filter->placed()) return {};
   // Smoothing corrects the path, so that tentative keyframes count as localized.
   const bool corrected = s.level.outcome.localized;
   return {.keyframes = corrected ? s.trail.ConfirmedKeyframes() : s.trail.keyframes(),
+          .numbers = s.trail.numbers(),
           .online_path = s.drawing.path(),
           .full_path = s.believed_path().values(),
           .relations = s.trail.relations(),
@@ -225,12 +251,35 @@ void Mapper::FinishMap() {
   state_->drawing.Finish(state_->trail.keyframes(), state_->believed_path());
 }
 
-void Mapper::AdoptGrid(OccupancyGrid grid, std::size_t keyframes, std::span<const Pose2> path) {
+void Mapper::AdoptGrid(OccupancyGrid grid, std::uint64_t keyframes, std::span<const Pose2> path,
+                       std::span<const std::uint64_t> numbers) {
   State& s = *state_;
-  const bool follows = s.filter->rebases() && s.filter->placed() && !path.empty() && path.size() == keyframes &&
-                       keyframes <= s.trail.size();
-  if (follows) s.Follow(path);
-  s.drawing.Adopt(std::move(grid), keyframes, s.trail.keyframes(), s.believed_path(), follows);
+  const std::size_t drawn = s.trail.CountBelow(keyframes);
+  bool follows = false;
+  if (s.filter->rebases() && s.filter->placed() && keyframes <= s.trail.made()) {
+    const std::vector<Pose2> first_poses = s.PosesOfFirst(keyframes, path, numbers);
+    follows = !first_poses.empty();
+    if (follows) s.Follow(first_poses);
+  }
+  s.drawing.Adopt(std::move(grid), drawn, s.trail.keyframes(), s.believed_path(), follows);
+}
+
+// The poses of the keyframes with numbers below `made`, out of a path that may have more of these, because some were
+// retired since. Empty if it lacks one.
+std::vector<Pose2> Mapper::State::PosesOfFirst(std::uint64_t made, std::span<const Pose2> path,
+                                               std::span<const std::uint64_t> numbers) const {
+  std::vector<Pose2> poses;
+  if (path.size() != (numbers.empty() ? made : numbers.size())) return poses;
+  for (const std::uint64_t wanted : trail.numbers()) {
+    if (wanted >= made) break;
+    std::size_t at = static_cast<std::size_t>(wanted);
+    if (!numbers.empty()) {
+      at = static_cast<std::size_t>(std::ranges::lower_bound(numbers, wanted) - numbers.begin());
+      if (at == numbers.size() || numbers[at] != wanted) return {};
+    }
+    poses.push_back(path[at]);
+  }
+  return poses;
 }
 
 // Takes the poses of the first keyframes from a job, as after a large loop.
@@ -274,6 +323,10 @@ void Mapper::Relocalise(const std::optional<Pose2>& T_map_robot) {
   state_->Relocalise(T_map_robot);
 }
 
+std::vector<std::uint64_t> Mapper::keyframe_numbers() const {
+  return state_->trail.numbers();
+}
+
 std::vector<Pose2> Mapper::BestPath() const {
   return state_->filter->placed() ? state_->believed_path().values() : std::vector<Pose2>{};
 }
@@ -293,6 +346,7 @@ void Mapper::Load(StateReader& archive) {
 }
 
 bool Mapper::State::IsConsistent() const {
+  if (looked_at_size > trail.size()) return false;
   for (std::size_t i = 0; i < filter->hypothesis_count(); ++i)
     if (filter->hypothesis(i).path.size() != trail.size()) return false;
   if (recovery.active() && (trail.empty() || !last_scan)) return false;

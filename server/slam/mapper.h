@@ -71,21 +71,26 @@ class Mapper {
   [[nodiscard]] OccupancyGrid::Chunks ShareGrid();
   [[nodiscard]] OccupancyGrid::Change TakeGridChange();
   [[nodiscard]] std::vector<Landmark> landmarks() const;  // The landmarks of the best hypothesis.
+  // The keyframes that are kept, and all that there have been.
   [[nodiscard]] std::size_t keyframe_count() const;
+  [[nodiscard]] std::uint64_t keyframes_made() const;
   // Empty while the robot's place in the map is not known (filter.h: placed).
   [[nodiscard]] MapperSnapshot Snapshot() const;
   // Ends the mapping: if the map is still being drawn again after a large loop, draws the rest.
   void FinishMap();
-  // Replaces the grid by the result of a finished job, drawn from the first `keyframes` keyframes. `path` holds the
-  // poses of these keyframes in it: path, particles, landmarks and the pose follow, so that all agree with the grid.
-  // The later keyframes keep their places relative to the last of these. If `path` has another length, or the filter
-  // can not follow (Filter::rebases), only the grid is replaced. Then draws the later keyframes onto it along the
-  // present best path. Every chunk of both grids counts as changed.
-  void AdoptGrid(OccupancyGrid grid, std::size_t keyframes, std::span<const Pose2> path = {});
+  // Replaces the grid by the result of a finished job, drawn when there had been `keyframes` keyframes
+  // (keyframes_made). `path` holds the poses of those with these `numbers` in it (none: 0, 1, 2, ...): path, particles,
+  // landmarks and the pose follow, so that all agree with the grid. The later keyframes keep their places relative to
+  // the last of these. If `path` lacks one of the earlier keyframes, or the filter can not follow (Filter::rebases),
+  // only the grid is replaced. Then draws the later keyframes onto it along the present best path. Every chunk of both
+  // grids counts as changed.
+  void AdoptGrid(OccupancyGrid grid, std::uint64_t keyframes, std::span<const Pose2> path = {},
+                 std::span<const std::uint64_t> numbers = {});
   // Somebody says that the robot is not where it is believed to be, and perhaps where it is (T_map_robot at the last
   // scan). From the next scan on it is not localized until it is found in its map: near that pose, or anywhere
   // (recovery/recovery.h). Nothing happens before there is a map.
   void Relocalise(const std::optional<Pose2>& T_map_robot);
+  [[nodiscard]] std::vector<std::uint64_t> keyframe_numbers() const;
   // T_map_robot of every keyframe along the best path; empty while the robot's place in the map is not known.
   [[nodiscard]] std::vector<Pose2> BestPath() const;
 

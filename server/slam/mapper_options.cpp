@@ -14,7 +14,7 @@ void Visit(OptionVisitor& visitor, MapperOptions& options) {
   visitor.Real("lost_after_m", options.lost_after_m, "m", 0.0, 1000.0,
                "A robot that has travelled farther than this by odometry alone counts as lost.");
   visitor.Integer("max_keyframes", options.max_keyframes, "keyframes", 1, 100000000,
-                  "Keyframes of one session, some 20 KiB each. When it has as many, its scans are dropped "
+                  "Keyframes that one session keeps, some 3.5 KiB each. When it has as many, its scans are dropped "
                   "as session_full.");
   visitor.Integer("max_chunks", options.max_chunks, "chunks", 1, 10000000,
                   "Pieces of the map of one session, 32 KiB each. When it has as many, its scans are "
@@ -40,6 +40,7 @@ void Visit(OptionVisitor& visitor, MapperOptions& options) {
                   [&] { Visit(visitor, options.recovery); });
   visitor.Section("pose_graph", "Least squares over the whole path, for smoothing.",
                   [&] { Visit(visitor, options.pose_graph); });
+  visitor.Section("retire", "Forgetting keyframes that show nothing new.", [&] { Visit(visitor, options.retire); });
   visitor.Section("grid", "The occupancy grid.", [&] { Visit(visitor, options.grid); });
   visitor.Section("pairing", "Finding the odometry at the time of each scan.",
                   [&] { Visit(visitor, options.pairing); });

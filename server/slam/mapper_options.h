@@ -16,6 +16,7 @@
 #include "server/slam/recovery/recovery_options.h"
 #include "server/slam/scan/odometry_pairing.h"
 #include "server/slam/tracking/front_end.h"
+#include "server/slam/trail/retirement_choice.h"
 
 namespace cairn::slam {
 
@@ -23,7 +24,7 @@ struct MapperOptions {
   std::int64_t seed = 1;
   double lost_after_m = 2.0;
   double max_tilt_rad = 0.035;          // Two degrees (scan/beam_points.h).
-  std::int64_t max_keyframes = 500000;  // Some 40 h of driving.
+  std::int64_t max_keyframes = 500000;
   std::int64_t max_chunks = 16384;      // 0.67 km^2 at 5 cm a cell, 512 MiB.
   MotionNoise blind{0.002, 0.2, 0.0, 0.001, 0.05, 0.0};
   MatcherKind matcher = MatcherKind::kVoting;
@@ -35,6 +36,7 @@ struct MapperOptions {
   SelfCheckOptions self_check;
   RecoveryOptions recovery{};
   PoseGraphOptions pose_graph;
+  RetireOptions retire;
   FilterOptions filter;
   GridOptions grid;
   PairingOptions pairing;

@@ -1,7 +1,9 @@
 #include "server/store/record_values.h"
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
+#include <functional>
 #include <utility>
 
 #include "common/map/tile.h"
@@ -55,6 +57,8 @@ void Fill(record::Grid& to, const StoredGrid& from) {
   if (from.path == nullptr) return;
   for (const Pose2& pose : *from.path)
     for (const double number : {pose.x, pose.y, pose.theta}) to.add_path(number);
+  if (from.numbers != nullptr && from.keyframes != from.numbers->size())
+    to.mutable_numbers()->Add(from.numbers->begin(), from.numbers->end());
 }
 
 Pose2 ValueOf(const record::Pose& from) {
@@ -95,7 +99,15 @@ Result<StoredGrid> ValueOf(const record::Grid& from) {
     grid.chunks.push_back({chunk.x(), chunk.y(), std::shared_ptr<const std::int16_t>(std::move(cells), first)});
   }
   if (from.path().empty()) return grid;
-  if (static_cast<std::uint64_t>(from.path_size()) != 3 * grid.keyframes) return Unreadable("the path of a grid");
+  const std::uint64_t poses = from.numbers().empty() ? grid.keyframes : static_cast<std::uint64_t>(from.numbers_size());
+  if (static_cast<std::uint64_t>(from.path_size()) != 3 * poses) return Unreadable("the path of a grid");
+  if (!from.numbers().empty()) {
+    auto numbers = std::make_shared<std::vector<std::uint64_t>>(from.numbers().begin(), from.numbers().end());
+    if (std::ranges::adjacent_find(*numbers, std::greater_equal<>()) != numbers->end() ||
+        numbers->back() >= grid.keyframes)
+      return Unreadable("the keyframes of a grid");
+    grid.numbers = std::move(numbers);
+  }
   auto path = std::make_shared<std::vector<Pose2>>();
   for (int i = 0; i < from.path_size(); i += 3) {
     const Pose2& pose = path->emplace_back(Pose2{from.path(i), from.path(i + 1), WrapAngle(from.path(i + 2))});

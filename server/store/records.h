@@ -32,7 +32,9 @@ struct StoredGrid {
   std::uint64_t keyframes = 0;
   std::vector<StoredChunk> chunks;
   std::shared_ptr<const std::vector<Pose2>> path{};  // T_map_robot of the keyframes; null: not known.
-  bool fragment = false;                             // Not joined with the map of the site.
+  // The numbers of the keyframes of the path, increasing; null: 0, 1, 2, ...
+  std::shared_ptr<const std::vector<std::uint64_t>> numbers{};
+  bool fragment = false;  // Not joined with the map of the site.
 };
 
 // The entries of a session's journal: the events that its strand processed, in this order.

@@ -43,6 +43,13 @@ void MapDrawing::Continue(std::span<const Keyframe> keyframes, const PosePath& p
   frozen_path_.Forget();
 }
 
+void MapDrawing::Retire(const Retirement& retirement) {
+  KeepOnly(path_, retirement);
+  frozen_path_.Forget();
+  changed_at_ =
+      static_cast<std::size_t>(std::ranges::lower_bound(retirement.kept, changed_at_) - retirement.kept.begin());
+}
+
 void MapDrawing::Finish(std::span<const Keyframe> keyframes, const PosePath& path) {
   while (redraw_) Continue(keyframes, path);
 }

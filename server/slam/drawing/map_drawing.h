@@ -14,6 +14,7 @@
 #include "server/slam/state/frozen_blocks.h"
 #include "server/slam/trail/keyframe.h"
 #include "server/slam/trail/pose_path.h"
+#include "server/slam/trail/retirement.h"
 
 namespace cairn::slam {
 
@@ -37,6 +38,9 @@ class MapDrawing {
   // was drawn along `path`, which has changed with it.
   void Adopt(OccupancyGrid grid, std::size_t drawn, std::span<const Keyframe> keyframes, const PosePath& path,
              bool along_path = false);
+
+  // Keyframes are retired: what they have drawn stays. REQUIRES: not redrawing().
+  void Retire(const Retirement& retirement);
 
   // The number of keyframes when the path changed last.
   [[nodiscard]] std::size_t changed_at() const { return changed_at_; }

@@ -28,6 +28,7 @@
 #include "server/slam/landmarks/innovation.h"
 #include "server/slam/random/resampling.h"
 #include "server/slam/state/frozen_blocks.h"
+#include "server/slam/trail/retirement.h"
 
 namespace cairn::slam {
 
@@ -53,6 +54,11 @@ class ErrorEnsemble {
   // Sets the errors of all past keyframes to zero, and gives the robot's error this covariance of the pose,
   // (x, y, theta) in map.
   void Rebase(std::size_t keyframes, const Pose2& T_map_robot, const Eigen::Matrix3d& covariance);
+  // Forgets the errors of keyframes.
+  void Retire(const Retirement& retirement) {
+    KeepOnly(path_, retirement);
+    frozen_path_.Forget();
+  }
 
   // The covariance of the robot's pose, (x, y, theta) in map.
   [[nodiscard]] Eigen::Matrix3d covariance(const Pose2& T_map_robot) const;

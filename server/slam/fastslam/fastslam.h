@@ -43,6 +43,8 @@ class FastSlam final : public Filter {
   void Commit() override;
   [[nodiscard]] bool rebases() const override { return true; }
   void Rebase(std::span<const Pose2> path) override;
+  [[nodiscard]] bool retires() const override { return true; }
+  void Retire(const Retirement& retirement) override;
 
   [[nodiscard]] FilterEstimate estimate() const override { return set_.estimate(); }
   [[nodiscard]] FilterHealth health() const override;
@@ -248,6 +250,19 @@ void FastSlam<LandmarkModel>::Rebase(std::span<const Pose2> path) {
   }
   set_.Rebase(path);
   std::fill(maps_.begin(), maps_.end(), map);
+}
+
+template <typename LandmarkModel>
+void FastSlam<LandmarkModel>::Retire(const Retirement& retirement) {
+  set_.Retire(retirement);
+  typename Map::Rewritten done;
+  for (Map& map : maps_)
+    map.Rewrite(
+        [&](Entry& entry) {
+          if (entry.sightings > 0)
+            entry.first_keyframe = static_cast<std::uint32_t>(retirement.index_after[entry.first_keyframe]);
+        },
+        done);
 }
 
 template <typename LandmarkModel>

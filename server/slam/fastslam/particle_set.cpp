@@ -107,6 +107,27 @@ void ParticleSet::Rebase(std::span<const Pose2> path) {
   estimate_ = {particle.T_map_robot, particle.covariance};
 }
 
+// The part of the paths that all share is made once, so that they share it again.
+void ParticleSet::Retire(const Retirement& retirement) {
+  const std::vector<std::size_t>& kept = retirement.kept;
+  std::size_t shared = best().path.size();
+  for (const Particle& particle : particles_) shared = particle.path.SharedWith(best().path, shared);
+  const auto apart = std::ranges::lower_bound(kept, shared);
+  PosePath common;
+  for (auto k = kept.begin(); k != apart; ++k) common.Append(best().path[*k]);
+  PosePath before, after;  // Of the last particle. Particles that were resampled lately have the same path.
+  for (Particle& particle : particles_) {
+    const std::size_t size = particle.path.size();
+    if (before.size() != size || particle.path.SharedWith(before, size) != size) {
+      after = common;
+      for (auto k = apart; k != kept.end(); ++k) after.Append(particle.path[*k]);
+      before = particle.path;
+    }
+    particle.path = after;
+  }
+  errors_.Retire(retirement);
+}
+
 void ParticleSet::Summarise(const std::vector<double>& shares) {
   best_ = 0;
   for (std::size_t i = 1; i < particles_.size(); ++i)

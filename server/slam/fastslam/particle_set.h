@@ -98,6 +98,8 @@ class ParticleSet {
   [[nodiscard]] std::vector<int> Commit();
   // Replaces the path of every particle by this one. All particles are equal afterwards.
   void Rebase(std::span<const Pose2> path);
+  // Leaves out keyframes of all paths.
+  void Retire(const Retirement& retirement);
 
   [[nodiscard]] const std::vector<Particle>& particles() const { return particles_; }
   [[nodiscard]] const Particle& operator[](std::size_t index) const { return particles_[index]; }

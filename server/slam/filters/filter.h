@@ -20,6 +20,7 @@
 #include "server/slam/state/archive.h"
 #include "server/slam/trail/keyframe.h"
 #include "server/slam/trail/pose_path.h"
+#include "server/slam/trail/retirement.h"
 
 namespace cairn::slam {
 
@@ -85,6 +86,11 @@ class Filter {
   // hypothesis takes this path, and its landmarks move with the keyframes from which they were seen.
   // REQUIRES: rebases(), and called between steps.
   virtual void Rebase(std::span<const Pose2> /*path*/) {}
+  // True if the filter supports Retire.
+  [[nodiscard]] virtual bool retires() const { return false; }
+  // Gives up committed keyframes: the paths go on without them, and what was seen from them counts as seen from those
+  // that stand for them. REQUIRES: retires(), and called between steps.
+  virtual void Retire(const Retirement& /*retirement*/) {}
 
   // False as long as the pose of the robot in `map` is not known; its poses are then relative to its start.
   // When the robot is placed for the first time, the whole path moves.

@@ -78,6 +78,15 @@ std::optional<LoopClosure> LoopSearch::Find(const Trail& trail, const PosePath& 
   return std::nullopt;
 }
 
+void LoopSearch::Retire(const Retirement& retirement) {
+  std::erase_if(unconfirmed_,
+                [&](const LoopClosure& one) { return !retirement.IsKept(one.old) || !retirement.IsKept(one.recent); });
+  for (LoopClosure& one : unconfirmed_) {
+    one.old = retirement.index_after[one.old];
+    one.recent = retirement.index_after[one.recent];
+  }
+}
+
 // Old keyframes in whose surroundings the robot may be, the most likely first, and only one per place.
 std::vector<std::size_t> LoopSearch::Candidates(const Trail& trail, const PosePath& path) const {
   const std::span<const KeyframeShape> shapes = trail.shapes();

@@ -17,6 +17,7 @@
 #include "server/slam/loops/region.h"
 #include "server/slam/matching/point_to_line.h"
 #include "server/slam/trail/pose_path.h"
+#include "server/slam/trail/retirement.h"
 
 namespace cairn::slam {
 
@@ -58,6 +59,9 @@ class LoopSearch {
   // Returns a large loop that the last keyframe closes, once it is confirmed. `path` is the believed path,
   // one pose T_map_robot per keyframe.
   [[nodiscard]] std::optional<LoopClosure> Find(const Trail& trail, const PosePath& path);
+
+  // Forgets the loops that are not confirmed yet if their old keyframe is retired.
+  void Retire(const Retirement& retirement);
 
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {

@@ -24,14 +24,18 @@ bool IsDearer(const KeyframeCost& a, const KeyframeCost& b) {
 Stretch StretchAround(std::span<const KeyframeShape> shapes, std::size_t centre, double way_m) {
   // Bound to either side: turning on the spot makes many keyframes.
   constexpr std::size_t kMaxKeyframes = 200;
-  Stretch stretch{centre, centre, centre};
+  Stretch stretch = NeighboursOf(shapes, centre, kMaxKeyframes);
   const double here = shapes[centre].travelled_m;
-  while (stretch.first > 0 && centre - stretch.first < kMaxKeyframes &&
-         here - shapes[stretch.first - 1].travelled_m <= way_m)
-    --stretch.first;
-  while (stretch.last + 1 < shapes.size() && stretch.last - centre < kMaxKeyframes &&
-         shapes[stretch.last + 1].travelled_m - here <= way_m)
-    ++stretch.last;
+  while (here - shapes[stretch.first].travelled_m > way_m) ++stretch.first;
+  while (shapes[stretch.last].travelled_m - here > way_m) --stretch.last;
+  return stretch;
+}
+
+Stretch NeighboursOf(std::span<const KeyframeShape> shapes, std::size_t centre, std::size_t reach) {
+  const auto follows = [&](std::size_t k) { return shapes[k].number == shapes[k - 1].number + 1; };
+  Stretch stretch{centre, centre, centre};
+  while (stretch.first > 0 && centre - stretch.first < reach && follows(stretch.first)) --stretch.first;
+  while (stretch.last + 1 < shapes.size() && stretch.last - centre < reach && follows(stretch.last + 1)) ++stretch.last;
   return stretch;
 }
 

@@ -29,8 +29,11 @@ struct Stretch {
 // `travelled_m`.
 [[nodiscard]] std::size_t CountBefore(std::span<const KeyframeShape> shapes, double travelled_m, double way_m);
 
-// Returns the keyframes within a travelled distance of `way_m` before and after `centre`.
+// Returns the keyframes within a travelled distance of `way_m` before and after `centre`. It ends where keyframes are
+// retired, because the front-end has drifted since.
 [[nodiscard]] Stretch StretchAround(std::span<const KeyframeShape> shapes, std::size_t centre, double way_m);
+// Returns the same number of keyframes, or fewer, before and after `centre`.
+[[nodiscard]] Stretch NeighboursOf(std::span<const KeyframeShape> shapes, std::size_t centre, std::size_t reach);
 
 // Calls visit(point) for every surface point of the stretch, in the frame of the anchor and in the order of
 // the keyframes.

@@ -102,8 +102,7 @@ MatchResult RevisitSearch::AlignFromOthers(const Filter& filter,
 
 void RevisitSearch::BuildReference(const Trail& trail, std::size_t centre) {
   reference_.Clear();
-  const auto reach = static_cast<std::size_t>(options_.neighbours);
-  const Stretch around{centre > reach ? centre - reach : 0, std::min(trail.size() - 1, centre + reach), centre};
+  const Stretch around = NeighboursOf(trail.shapes(), centre, static_cast<std::size_t>(options_.neighbours));
   ForEachSurface(trail, around, [&](const SurfacePoint& surface) { reference_.Add(surface); });
 }
 

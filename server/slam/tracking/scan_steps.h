@@ -21,10 +21,11 @@ enum class ScanStep : std::uint8_t {
   kLargeLoop,  // The search for large loops, and the path with one.
   kSelfCheck,  // Whether the scan agrees with the old map.
   kDraw,       // The occupancy grid, also when it is drawn again.
+  kRetire,     // Keyframes that show nothing new.
 };
-inline constexpr std::size_t kScanStepCount = 10;
+inline constexpr std::size_t kScanStepCount = 11;
 inline constexpr std::array<std::string_view, kScanStepCount> kScanStepNames = {
-    "other", "look", "match", "refine", "recover", "revisit", "filter", "large_loop", "self_check", "draw"};
+    "other", "look", "match", "refine", "recover", "revisit", "filter", "large_loop", "self_check", "draw", "retire"};
 
 // Called when a step begins; the step before has ended then. It may be empty.
 using StepWatch = std::function<void(ScanStep)>;

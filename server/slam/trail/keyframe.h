@@ -1,7 +1,9 @@
-// A keyframe is a scan that is kept because the robot moved enough since the last one. Keyframes are numbered
-// from 0 in the order of time; a number means the same keyframe everywhere in slam. Plain values.
+// A keyframe is a scan that is kept because the robot moved enough since the last one. Keyframes have indices from 0 in
+// the order of time, which mean the same keyframe everywhere in slam until some are retired (retirement.h). A
+// keyframe's number never changes: it is the count of those before it, retired ones too. Plain values.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <utility>
@@ -42,10 +44,11 @@ struct KeyframeShape {
   // Pose in the front-end's frame: exact relative to neighbours, but it drifts over the whole path.
   Pose2 T_track_robot;
   double travelled_m = 0.0;  // Distance travelled along the path up to this keyframe.
+  std::uint64_t number = 0;
 
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
-    archive(self.T_track_robot, self.travelled_m);
+    archive(self.T_track_robot, self.travelled_m, self.number);
   }
 };
 
@@ -62,14 +65,16 @@ struct RevisitObservation {
 // here that became keyframes later.
 struct MapperSnapshot {
   std::vector<Keyframe> keyframes;
-  std::vector<Pose2> online_path;  // T_map_robot per keyframe with which it was drawn into the grid.
-  std::vector<Pose2> full_path;    // T_map_robot per keyframe along the best particle's ancestry.
+  std::vector<std::uint64_t> numbers;  // Of the keyframes. Empty: 0, 1, 2, ...
+  std::vector<Pose2> online_path;      // T_map_robot per keyframe with which it was drawn into the grid.
+  std::vector<Pose2> full_path;        // T_map_robot per keyframe along the best particle's ancestry.
   // Steps, revisits and loops; empty if the filter uses none of them, or if no place was seen again.
   std::vector<PoseRelation> relations;
   PoseGraphOptions pose_graph;
   struct ScanPlace {
     Stamp stamp = 0;
-    std::size_t keyframe = 0;  // Index of the last keyframe at or before the scan.
+    // Index of the last keyframe at or before the scan, or of the one that stands for it.
+    std::size_t keyframe = 0;
     Pose2 T_keyframe_robot;
 
     template <typename Archive>
@@ -79,6 +84,8 @@ struct MapperSnapshot {
   };
   std::vector<ScanPlace> scans;
 
+  // How many keyframes there have been, with those that were retired.
+  [[nodiscard]] std::uint64_t made() const { return numbers.empty() ? keyframes.size() : numbers.back() + 1; }
   // Converts a path with one pose per keyframe to a trajectory with one pose per scan.
   [[nodiscard]] Trajectory TrajectoryAlong(std::span<const Pose2> path) const;
   [[nodiscard]] Trajectory FullTrajectory() const { return TrajectoryAlong(full_path); }

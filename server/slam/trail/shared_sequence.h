@@ -13,6 +13,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -44,6 +45,19 @@ class SharedSequence {
     std::shared_ptr<void>* link = &root_;
     for (int shift = shift_; shift > 0; shift -= kBits) link = &Own<Branch>(*link).children[Slot(index, shift)];
     return Own<Leaf>(*link).values[Slot(index, 0)];
+  }
+
+  // Nodes as they were, and as Rewrite has made them.
+  struct RewrittenNode {
+    std::shared_ptr<void> before;
+    std::shared_ptr<void> after;
+  };
+  using Rewritten = std::unordered_map<const void*, RewrittenNode>;
+  // Calls change(value) for every value. Sequences that share nodes share them afterwards if all are given the same
+  // `done`; other copies do not change.
+  template <typename Change>
+  void Rewrite(const Change& change, Rewritten& done) requires std::same_as<Summary, NoSummary> {
+    if (size_ > 0) RewriteNode(root_, shift_, change, done);
   }
 
   // Replaces a value. REQUIRES: index < size().
@@ -208,6 +222,25 @@ class SharedSequence {
         if (branch.children[i]) branch.summary.Add(SummaryOf(branch.children[i].get(), shift - kBits));
       left -= below;
     }
+  }
+
+  static void RewriteNode(std::shared_ptr<void>& link, int shift, const auto& change, Rewritten& done) {
+    if (!link) return;
+    if (const auto known = done.find(link.get()); known != done.end()) {
+      link = known->second.after;
+      return;
+    }
+    const std::shared_ptr<void> before = link;
+    if (shift == 0) {
+      auto leaf = std::make_shared<Leaf>(*static_cast<const Leaf*>(before.get()));
+      for (Value& value : leaf->values) change(value);
+      link = std::move(leaf);
+    } else {
+      auto branch = std::make_shared<Branch>(*static_cast<const Branch*>(before.get()));
+      for (std::shared_ptr<void>& child : branch->children) RewriteNode(child, shift - kBits, change, done);
+      link = std::move(branch);
+    }
+    done.emplace(before.get(), RewrittenNode{before, link});
   }
 
   template <typename Node>

@@ -9,6 +9,7 @@
 namespace cairn::slam {
 namespace {
 
+constexpr std::uint64_t kMostMade = std::uint64_t{1} << 48;
 constexpr double kRoundingM = 1e-6;  // More than sums of the same lengths in another order can differ.
 
 // Added to every covariance: options may set all noise to zero, but the least squares need positive definite
@@ -27,7 +28,7 @@ void Trail::Append(Keyframe keyframe, const Pose2& T_track_robot, std::vector<Su
   if (node > 0)
     relations_.push_back(
         PositiveDefinite({node - 1, node, T_prev_curr, drift_.Covariance(T_prev_curr) + step_covariance, false}));
-  shapes_.push_back({T_track_robot, TravelledTo(T_track_robot)});
+  shapes_.push_back({T_track_robot, TravelledTo(T_track_robot), made()});
   points_.Keep(node, std::move(points_robot));
   keyframe.scan.Pack();
   keyframes_.push_back(std::move(keyframe));
@@ -65,7 +66,8 @@ SharedPoints Trail::points(std::size_t keyframe) const {
 bool Trail::IsConsistent() const {
   if (shapes_.size() != size()) return false;
   for (std::size_t k = 1; k < size(); ++k)
-    if (shapes_[k - 1].travelled_m > shapes_[k].travelled_m) return false;
+    if (shapes_[k - 1].travelled_m > shapes_[k].travelled_m || shapes_[k - 1].number >= shapes_[k].number) return false;
+  if (made() > kMostMade) return false;
   return std::ranges::all_of(relations_, [this](const auto& one) { return one.from < size() && one.to < size(); }) &&
          std::ranges::all_of(scans_, [this](const auto& scan) { return scan.keyframe < size(); });
 }
@@ -169,8 +171,20 @@ double Trail::TravelledTo(const Pose2& T_track_robot) const {
 }
 
 std::vector<PoseRelation> Trail::relations() const {
-  // Without a loop there is one relation less than there are keyframes.
-  return !empty() && relations_.size() + 1 > size() ? relations_ : std::vector<PoseRelation>{};
+  const bool seen_again = std::ranges::any_of(relations_, [](const PoseRelation& one) { return one.loop; });
+  return seen_again ? relations_ : std::vector<PoseRelation>{};
+}
+
+std::vector<std::uint64_t> Trail::numbers() const {
+  std::vector<std::uint64_t> numbers;
+  numbers.reserve(size());
+  for (const KeyframeShape& shape : shapes_) numbers.push_back(shape.number);
+  return numbers;
+}
+
+std::size_t Trail::CountBelow(std::uint64_t number) const {
+  return static_cast<std::size_t>(std::ranges::lower_bound(shapes_, number, {}, &KeyframeShape::number) -
+                                  shapes_.begin());
 }
 
 }  // namespace cairn::slam

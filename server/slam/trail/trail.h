@@ -16,6 +16,7 @@
 #include "server/slam/state/frozen_blocks.h"
 #include "server/slam/trail/keyframe.h"
 #include "server/slam/trail/point_cache.h"
+#include "server/slam/trail/retirement.h"
 #include "server/slam/trail/way_bounds.h"
 
 namespace cairn::slam {
@@ -69,6 +70,16 @@ class Trail {
   [[nodiscard]] const std::vector<MapperSnapshot::ScanPlace>& scans() const { return scans_; }
   // Steps, revisits and loops; empty as long as no place was seen again.
   [[nodiscard]] std::vector<PoseRelation> relations() const;
+  // Whether a place was seen again from this keyframe, or it from another.
+  [[nodiscard]] bool HasLoop(std::size_t keyframe) const { return !loops_[keyframe].empty(); }
+  // How many keyframes there have been, with those that were retired.
+  [[nodiscard]] std::uint64_t made() const { return empty() ? 0 : shapes_.back().number + 1; }
+  [[nodiscard]] std::vector<std::uint64_t> numbers() const;  // Of the keyframes.
+  // How many of the keyframes have a smaller number.
+  [[nodiscard]] std::size_t CountBelow(std::uint64_t number) const;
+  // Gives up keyframes. What they knew is handed over to those that stand for them: their relations, as far as they are
+  // not repetitions, and the scans seen from them. REQUIRES: the last keyframe stays.
+  void Retire(const Retirement& retirement);
 
   // Without the points, the loops and the distances, which follow from the rest.
   template <typename Archive>
@@ -109,7 +120,7 @@ class Trail {
   mutable WayBounds way_bounds_;  // Follows from the rest.
   mutable bool distances_current_ = true;
   std::vector<MapperSnapshot::ScanPlace> scans_;
-  // For checkpoints: all of these grow at their ends only, but for the keyframes in ConfirmTentative.
+  // For checkpoints: all of these grow at their ends only, but for the keyframes in ConfirmTentative, and in Retire.
   FrozenBlocks<Keyframe> frozen_keyframes_;
   FrozenBlocks<KeyframeShape> frozen_shapes_;
   FrozenBlocks<PoseRelation> frozen_relations_;

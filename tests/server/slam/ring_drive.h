@@ -26,8 +26,8 @@ struct Drive {
   std::vector<Pose2> truth;
 };
 
-// Twice round the ring, with odometry that turns 1 % too far and scales 2 %.
-inline Drive DriveRound() {
+// Some times round the ring, with odometry that turns 1 % too far and scales 2 %.
+inline Drive DriveRound(int rounds = 2) {
   Drive drive;
   std::mt19937_64 rng(3);
   const Laser laser{.beams = 181, .step_rad = Radians(1.5), .sigma_m = 0.01};
@@ -41,7 +41,7 @@ inline Drive DriveRound() {
     truth = truth * T_prev_curr;
     odometry = odometry * Pose2{1.02 * T_prev_curr.x, 0.0, 1.01 * T_prev_curr.theta};
   };
-  for (int round = 0; round < 2; ++round) {
+  for (int round = 0; round < rounds; ++round) {
     for (const double side : {12.0, 8.0, 12.0, 8.0}) {
       for (int i = 0; i < static_cast<int>(side / 0.2); ++i) step({0.2, 0, 0});
       for (int i = 0; i < 10; ++i) step({0, 0, kPi / 20});

@@ -1,12 +1,15 @@
 // cairn-study lifelong lets one robot drive for a day of simulated time in one building, through the estimator of this
-// process (without a server): what a scan costs and what memory is kept in each hour. The building is whole after some
-// minutes, so what grows later grows with time and not with the map. --hours: how long (24).
+// process (without a server): what a scan costs, what memory is kept, and how far the poses are from the truth in each
+// hour. The building is whole after some minutes, so what grows later grows with time and not with the map. --hours:
+// how long (24).
 #include <malloc.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
+#include <deque>
 #include <memory>
 #include <numeric>
 #include <stdexcept>
@@ -50,7 +53,16 @@ class StepClock {
 
 struct Part {
   std::vector<double> scan_ms;
-  StepTimes step_ms{};  // Sums.
+  StepTimes step_ms{};            // Sums.
+  double squared_error_m2 = 0.0;  // A sum.
+  double largest_error_m = 0.0;
+  long long not_localized = 0;
+  double heap_mib = 0.0;  // The largest.
+
+  void AddError(double error_m) {
+    squared_error_m2 += error_m * error_m;
+    largest_error_m = std::max(largest_error_m, error_m);
+  }
 };
 
 // Bytes in use, without what the allocator has kept back.
@@ -86,22 +98,30 @@ void RunLifelong(StudyContext& context) {
   Part part;
   StepClock clock;
   std::uint64_t hash = 0xcbf29ce484222325U;
-  const slam::ScanPipeline::Sink sink{.used =
-                                          [&](const Scan&, const slam::ScanOutcome& outcome) {
-                                            const StepTimes steps = clock.Take();
-                                            part.scan_ms.push_back(std::accumulate(steps.begin(), steps.end(), 0.0));
-                                            for (std::size_t k = 0; k < steps.size(); ++k) part.step_ms[k] += steps[k];
-                                            const Pose2& pose = outcome.T_map_robot;
-                                            hash = Mixed(Mixed(Mixed(hash, pose.x), pose.y), pose.theta);
-                                          },
-                                      .dropped = [](const Scan&, DropReason) {}};
+  std::deque<StampedPose> truth;
+  const slam::ScanPipeline::Sink sink{
+      .used =
+          [&](const Scan&, const slam::ScanOutcome& outcome) {
+            const StepTimes steps = clock.Take();
+            part.scan_ms.push_back(std::accumulate(steps.begin(), steps.end(), 0.0));
+            for (std::size_t k = 0; k < steps.size(); ++k) part.step_ms[k] += steps[k];
+            part.not_localized += outcome.localized ? 0 : 1;
+            const Pose2& pose = outcome.T_map_robot;
+            // The estimator may answer later, when it knows the odometry.
+            while (!truth.empty() && truth.front().stamp < outcome.stamp) truth.pop_front();
+            if (!truth.empty() && truth.front().stamp == outcome.stamp)
+              part.AddError((pose.translation() - truth.front().T_map_robot.translation()).norm());
+            hash = Mixed(Mixed(Mixed(hash, pose.x), pose.y), pose.theta);
+          },
+      .dropped = [](const Scan&, DropReason) {}};
   slam::MapperOptions options;
   options.max_keyframes = 100000000;
   slam::ScanPipeline pipeline(options, fleet.T_map_robot_start(0), slam::SerialFor, sink);
   pipeline.mapper().WatchSteps([&clock](slam::ScanStep step) { clock.Enter(step); });
 
-  std::vector<std::string> columns = {"hours",     "mean (ms)",  "p99 (ms)",      "max (ms)",
-                                      "keyframes", "heap (MiB)", "resident (MiB)"};
+  std::vector<std::string> columns = {"hours",         "mean (ms)",       "p99 (ms)",       "max (ms)",
+                                      "keyframes",     "most heap (MiB)", "resident (MiB)", "error rms (m)",
+                                      "error max (m)", "not localized"};
   for (const std::string_view step : slam::kScanStepNames) columns.push_back(std::string(step) + " (ms)");
   columns.emplace_back("poses");
   Table table(columns);
@@ -111,6 +131,7 @@ void RunLifelong(StudyContext& context) {
     sim::FleetRecord next = fleet.Next();
     const bool is_scan = std::holds_alternative<Scan>(next.record);
     auto scan = is_scan ? std::make_shared<const Scan>(std::get<Scan>(std::move(next.record))) : nullptr;
+    for (const StampedPose& pose : fleet.TakeTruth(0)) truth.push_back(pose);
     clock.Skip();
     if (is_scan) {
       pipeline.Add(std::move(scan));
@@ -120,19 +141,24 @@ void RunLifelong(StudyContext& context) {
     if (!is_scan) continue;
     // A server publishes the map about as often.
     if (++scans % 10 == 0) static_cast<void>(pipeline.mapper().TakeGridChange());
+    if (scans % 500 == 0) part.heap_mib = std::max(part.heap_mib, HeapMib());
     if (static_cast<double>(part.scan_ms.size()) < part_h * 36000.0) continue;
     hour += part_h;
     const Distribution scan_ms = DistributionOf(part.scan_ms);
     means.push_back(scan_ms.mean);
     p99s.push_back(scan_ms.p99);
-    heaps.push_back(HeapMib());
-    std::vector<std::string> row = {Number(hour, 2),
-                                    Number(scan_ms.mean, 3),
-                                    Number(scan_ms.p99, 2),
-                                    Number(scan_ms.max, 1),
-                                    Count(static_cast<long long>(pipeline.mapper().keyframe_count())),
-                                    Number(heaps.back(), 1),
-                                    Number(ResidentMibOf(getpid()), 1)};
+    heaps.push_back(part.heap_mib);
+    std::vector<std::string> row = {
+        Number(hour, 2),
+        Number(scan_ms.mean, 3),
+        Number(scan_ms.p99, 2),
+        Number(scan_ms.max, 1),
+        Count(static_cast<long long>(pipeline.mapper().keyframe_count())),
+        Number(heaps.back(), 1),
+        Number(ResidentMibOf(getpid()), 1),
+        Number(std::sqrt(part.squared_error_m2 / static_cast<double>(part.scan_ms.size())), 3),
+        Number(part.largest_error_m, 3),
+        Count(part.not_localized)};
     for (const double step_ms : part.step_ms)
       row.push_back(Number(step_ms / static_cast<double>(part.scan_ms.size()), 3));
     row.push_back(std::to_string(hash));

@@ -37,6 +37,19 @@ std::size_t ChunksOfOne() {
   return grid.chunk_count();
 }
 
+// What a retired keyframe has drawn stays, and the counts of keyframes are those of the kept ones.
+TEST(MapDrawing, KeepsWhatRetiredKeyframesHaveDrawn) {
+  const std::vector<Keyframe> keyframes = Keyframes(kKeyframes);
+  MapDrawing drawing{GridOptions{}};
+  for (std::size_t k = 0; k < kKeyframes; ++k) drawing.Add(keyframes[k], PlaceOf(k));
+  drawing.StartAgain(3);
+  drawing.Finish(keyframes, Path());
+  drawing.Retire({.kept = {0, 3}, .stands_for = {0, 0, 0, 3}, .index_after = {0, 0, 0, 1}, .T_stands_keyframe = {}});
+  EXPECT_EQ(drawing.path(), (std::vector<Pose2>{PlaceOf(0), PlaceOf(3)}));
+  EXPECT_EQ(drawing.changed_at(), 1U) << "the first was there when the path changed";
+  EXPECT_EQ(drawing.grid().chunk_count(), kKeyframes * ChunksOfOne());
+}
+
 // Whichever way a keyframe comes into the map: as the next one, as the first one, or when the map is drawn again or
 // replaced. A keyframe that is not localized keeps its place in the path, which has one pose for each.
 TEST(MapDrawing, DrawsNoKeyframeThatIsNotLocalized) {

@@ -113,6 +113,33 @@ TYPED_TEST(FastSlamVariants, LandmarksSeenAgainPullTheRobotBack) {
   EXPECT_GT(filter.landmarks()[0].sightings, 3U);
 }
 
+// Landmarks that were first seen from a retired keyframe move with the one that stands for it.
+TYPED_TEST(FastSlamVariants, RetiredKeyframesLeaveAllPathsAndTheirLandmarksStay) {
+  auto filter = Make<TypeParam>::Filter(3);
+  for (int i = 0; i < 6; ++i) {
+    if (i > 0) filter.Predict({{0.5, 0, 0}});
+    if (i == 2) filter.Observe(TwoCorners({1.0, 0, 0}), 1.0);
+    filter.Commit();
+  }
+  ASSERT_EQ(filter.landmarks().size(), 2U);
+  const PosePath before = filter.hypothesis(0).path;
+  const Eigen::Vector2d landmark = filter.landmarks().front().p_map;
+  ASSERT_TRUE(filter.retires());
+  filter.Retire({.kept = {0, 3, 4, 5},
+                 .stands_for = {0, 3, 3, 3, 4, 5},
+                 .index_after = {0, 1, 1, 1, 2, 3},
+                 .T_stands_keyframe = {}});
+  for (std::size_t i = 0; i < filter.hypothesis_count(); ++i) ASSERT_EQ(filter.hypothesis(i).path.size(), 4U);
+  EXPECT_EQ(filter.hypothesis(0).path[1], before[3]);
+  EXPECT_EQ(filter.hypothesis(0).path[3], before[5]);
+  std::vector<Pose2> path = filter.hypothesis(0).path.values();
+  const Pose2 T_new_old{3, -2, 0.5};
+  path[1] = T_new_old * path[1];
+  filter.Rebase(path);
+  EXPECT_LT((filter.landmarks().front().p_map - T_new_old * landmark).norm(), 1e-9);
+  EXPECT_TRUE(filter.Observe({1, Between(path[1], path[3]), Eigen::Matrix3d::Identity()}));
+}
+
 TYPED_TEST(FastSlamVariants, EveryParticleDecidesForItselfWhatItSees) {
   // Particles spread over metres see a corner of another slot, and only some of them have a landmark there.
   auto filter = Make<TypeParam>::Filter(5);

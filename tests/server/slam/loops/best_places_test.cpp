@@ -10,6 +10,24 @@
 namespace cairn::slam {
 namespace {
 
+// The front-end has drifted where keyframes were retired.
+TEST(Stretches, EndWhereKeyframesWereRetired) {
+  std::vector<KeyframeShape> shapes(60);
+  for (std::size_t k = 0; k < shapes.size(); ++k) {
+    shapes[k].travelled_m = 0.1 * static_cast<double>(k);
+    shapes[k].number = k < 30 ? k : k + 100;
+  }
+  const Stretch around = StretchAround(shapes, 25, 1.05);
+  EXPECT_EQ(around.first, 15U);
+  EXPECT_EQ(around.last, 29U);
+  EXPECT_EQ(around.anchor, 25U);
+  const Stretch neighbours = NeighboursOf(shapes, 33, 8);
+  EXPECT_EQ(neighbours.first, 30U);
+  EXPECT_EQ(neighbours.last, 41U);
+  EXPECT_EQ(NeighboursOf(shapes, 58, 8).last, 59U);
+  EXPECT_EQ(NeighboursOf(shapes, 2, 8).first, 0U);
+}
+
 // All candidates sorted, then taken one after the other.
 std::vector<std::size_t> Sorted(std::vector<KeyframeCost> all, const std::vector<KeyframeShape>& shapes, double apart_m,
                                 std::size_t most) {

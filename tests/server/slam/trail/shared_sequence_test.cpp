@@ -36,6 +36,23 @@ TEST(SharedSequence, CopiesShareWhatTheyDoNotChange) {
   EXPECT_NE(&original[17], &copy[17]);
 }
 
+TEST(SharedSequence, RewrittenTogetherTheyShareAgain) {
+  SharedSequence<int> one = Counting(300);
+  SharedSequence<int> other = one;
+  other.Mutable(17) = -1;
+  const SharedSequence<int> before = one;
+  SharedSequence<int>::Rewritten done;
+  for (SharedSequence<int>* sequence : {&one, &other}) sequence->Rewrite([](int& value) { value += 1000; }, done);
+  EXPECT_EQ(one[17], 1017);
+  EXPECT_EQ(other[17], 999);
+  EXPECT_EQ(other[299], 1299);
+  EXPECT_EQ(&one[250], &other[250]);
+  EXPECT_EQ(before[250], 250);
+  one.Append(5);
+  EXPECT_EQ(one[300], 5);
+  EXPECT_EQ(other.size(), 300U);
+}
+
 TEST(SharedSequence, WritesInPlaceWhenNobodySharesTheNode) {
   SharedSequence<int> sequence = Counting(40);
   const int* before = &sequence[20];

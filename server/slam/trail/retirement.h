@@ -1,0 +1,36 @@
+// The keyframes that a trail gives up because others show the same (retirement_choice.h), and what becomes of their
+// indices. Plain values.
+#pragma once
+
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "common/geometry/pose2.h"
+
+namespace cairn::slam {
+
+struct Retirement {
+  std::vector<std::size_t> kept;  // The keyframes that stay, by their indices before, in order.
+  // Per keyframe: the kept one that stands for it, by its index before (its own where it stays) and afterwards, and its
+  // pose relative to that one.
+  std::vector<std::size_t> stands_for;
+  std::vector<std::size_t> index_after;
+  std::vector<Pose2> T_stands_keyframe;
+
+  [[nodiscard]] bool IsKept(std::size_t keyframe) const { return stands_for[keyframe] == keyframe; }
+};
+
+// Leaves only the values of the kept keyframes. REQUIRES: one value per keyframe.
+template <typename T>
+void KeepOnly(std::vector<T>& values, const Retirement& retirement) {
+  std::size_t to = 0;
+  for (const std::size_t from : retirement.kept) {
+    if (to != from) values[to] = std::move(values[from]);
+    ++to;
+  }
+  values.erase(values.begin() + static_cast<std::ptrdiff_t>(to), values.end());
+  values.shrink_to_fit();
+}
+
+}  // namespace cairn::slam

@@ -1,0 +1,114 @@
+// Which keyframes are given up. The robot drives round and round on a circle of 16 m.
+#include "server/slam/trail/retirement_choice.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <vector>
+
+#include "common/geometry/angle.h"
+
+namespace cairn::slam {
+namespace {
+
+constexpr std::size_t kPerRound = 80;
+constexpr double kAround = 2.0 * std::numbers::pi;
+constexpr double kRadiusM = 16.0 / kAround;
+constexpr RetireOptions kOptions{.recent_keyframes = 200, .visits = 3, .cell_m = 1.0};
+
+struct Rounds {
+  Trail trail{MotionNoise{}};
+  PosePath path;
+};
+
+// Every keyframe but those of the first round has seen the same place a round before, if `tied`.
+Rounds Drive(std::size_t rounds, bool tied = true) {
+  Rounds drive;
+  for (std::size_t k = 0; k < rounds * kPerRound; ++k) {
+    const double angle = kAround * static_cast<double>(k % kPerRound) / kPerRound;
+    const Pose2 pose{kRadiusM * std::cos(angle), kRadiusM * std::sin(angle), WrapAngle(angle + kAround / 4.0)};
+    std::optional<RevisitObservation> revisit;
+    if (tied && k >= kPerRound) revisit = RevisitObservation{k - kPerRound, {}, Eigen::Matrix3d::Identity()};
+    drive.trail.Append({std::make_shared<const Scan>(), {}}, pose, {}, Eigen::Matrix3d::Zero(), revisit);
+    drive.path.Append(pose);
+  }
+  return drive;
+}
+
+TEST(RetirementChoice, KeepsTheFirstVisitOfAPlaceAndTheLast) {
+  const Rounds drive = Drive(10);
+  const auto chosen = ChooseRetired(drive.trail, drive.path, drive.trail.size(), kOptions);
+  ASSERT_TRUE(chosen);
+  ASSERT_EQ(chosen->stands_for.size(), drive.trail.size());
+  for (std::size_t k = 0; k < drive.trail.size(); ++k) {
+    const std::size_t round = k / kPerRound;
+    // A visit at the end of a round and the beginning of the next is one.
+    if (round == 0 || round == 9) {
+      EXPECT_TRUE(chosen->IsKept(k)) << k;
+    }
+    if (round >= 2 && round <= 6) {
+      EXPECT_FALSE(chosen->IsKept(k)) << k;
+    }
+  }
+  EXPECT_LT(chosen->kept.size(), 4 * kPerRound);
+}
+
+TEST(RetirementChoice, OneThatStaysAtTheSamePlaceStandsForEach) {
+  const Rounds drive = Drive(10);
+  const auto chosen = ChooseRetired(drive.trail, drive.path, drive.trail.size(), kOptions);
+  ASSERT_TRUE(chosen);
+  for (std::size_t k = 0; k < drive.trail.size(); ++k) {
+    const std::size_t stands = chosen->stands_for[k];
+    ASSERT_TRUE(chosen->IsKept(stands));
+    EXPECT_EQ(chosen->kept[chosen->index_after[k]], stands);
+    EXPECT_LT((drive.path[k].translation() - drive.path[stands].translation()).norm(), 1e-9);
+    EXPECT_LT(std::abs(AngleDiff(drive.path[k].theta, drive.path[stands].theta)), 1e-9);
+  }
+}
+
+TEST(RetirementChoice, KeepsWhatIsRecentOrNotTiedOrNotLocalized) {
+  const Rounds drive = Drive(10);
+  const std::size_t end = 5 * kPerRound;
+  const auto chosen = ChooseRetired(drive.trail, drive.path, end, kOptions);
+  ASSERT_TRUE(chosen);
+  for (std::size_t k = end; k < drive.trail.size(); ++k) EXPECT_TRUE(chosen->IsKept(k)) << k;
+  EXPECT_FALSE(chosen->IsKept(end - 10));
+
+  const Rounds loose = Drive(10, false);
+  EXPECT_FALSE(ChooseRetired(loose.trail, loose.path, loose.trail.size(), kOptions));
+
+  Rounds lost = Drive(9);
+  for (std::size_t k = 0; k < 2 * kPerRound; ++k) {
+    const Pose2 pose = lost.path[k];
+    lost.trail.Append({std::make_shared<const Scan>(), {}}, pose, {}, Eigen::Matrix3d::Zero(),
+                      RevisitObservation{k, {}, Eigen::Matrix3d::Identity()});
+    if (k < kPerRound) lost.trail.MarkLast(false, false);
+    lost.path.Append(pose);
+  }
+  const auto of_lost = ChooseRetired(lost.trail, lost.path, lost.trail.size(), kOptions);
+  ASSERT_TRUE(of_lost);
+  for (std::size_t k = 9 * kPerRound; k < 10 * kPerRound; ++k) EXPECT_TRUE(of_lost->IsKept(k)) << k;
+}
+
+// A laser that sees only what lies ahead sees something else on the way back.
+TEST(RetirementChoice, TheWayBackIsAnotherPlace) {
+  Rounds drive = Drive(3);
+  for (std::size_t k = 0; k < 3 * kPerRound; ++k) {
+    const Pose2& there = drive.path[3 * kPerRound - 1 - k];
+    const Pose2 pose{there.x, there.y, WrapAngle(there.theta + kAround / 2.0)};
+    drive.trail.Append({std::make_shared<const Scan>(), {}}, pose, {}, Eigen::Matrix3d::Zero(),
+                       RevisitObservation{3 * kPerRound - 1 - k, {}, Eigen::Matrix3d::Identity()});
+    drive.path.Append(pose);
+  }
+  EXPECT_FALSE(ChooseRetired(drive.trail, drive.path, drive.trail.size(), kOptions));
+}
+
+TEST(RetirementChoice, FewAreNotWorthTheWork) {
+  const Rounds drive = Drive(10);
+  EXPECT_FALSE(ChooseRetired(drive.trail, drive.path, kPerRound + 30, kOptions));
+}
+
+}  // namespace
+}  // namespace cairn::slam

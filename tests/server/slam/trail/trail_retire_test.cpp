@@ -1,0 +1,151 @@
+// What a trail hands over when it gives up keyframes. The robot drives round and round on a circle.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/geometry/angle.h"
+#include "server/slam/state/archive.h"
+#include "server/slam/trail/trail.h"
+
+namespace cairn::slam {
+namespace {
+
+constexpr std::size_t kPerRound = 40;
+constexpr double kAround = 2.0 * std::numbers::pi;
+constexpr MotionNoise kStepNoise{0.01, 0.0, 0.0, 0.01, 0.0, 0.0};
+
+Pose2 PoseAt(std::size_t keyframe) {
+  const double angle = kAround * static_cast<double>(keyframe % kPerRound) / kPerRound;
+  // A little farther outside in each round.
+  const double radius_m = 3.0 + 0.01 * static_cast<double>(keyframe / kPerRound);
+  return {radius_m * std::cos(angle), radius_m * std::sin(angle), WrapAngle(angle + kAround / 4.0)};
+}
+
+// Keyframes [first, end), with two scans each; those from the second round on have seen the place a round before.
+void DriveOn(Trail& trail, std::size_t first, std::size_t end) {
+  const auto scan = std::make_shared<Scan>();
+  scan->ranges_m = {1.0F, 1.0F};
+  scan->angle_step_rad = 0.1;
+  scan->range_max_m = 10.0;
+  for (std::size_t k = first; k < end; ++k) {
+    std::optional<RevisitObservation> revisit;
+    if (trail.size() >= kPerRound) {
+      const std::size_t old = trail.size() - kPerRound;
+      revisit = RevisitObservation{old, Between(PoseAt(trail.shapes()[old].number), PoseAt(k)),
+                                   1e-4 * Eigen::Matrix3d::Identity()};
+    }
+    trail.Append({scan, {}}, PoseAt(k), {}, Eigen::Matrix3d::Zero(), revisit);
+    trail.AddScan(2 * k, {});
+    trail.AddScan(2 * k + 1, {0.1, 0.0, 0.0});
+  }
+}
+
+// Gives up [first, end); those of the first round stand for them. The indices are those of the keyframes' numbers
+// still.
+Retirement GivingUp(const Trail& trail, std::size_t first, std::size_t end) {
+  Retirement retirement;
+  for (std::size_t k = 0; k < trail.size(); ++k) {
+    const bool kept = k < first || k >= end;
+    const std::size_t stands = kept ? k : k % kPerRound;
+    retirement.stands_for.push_back(stands);
+    retirement.T_stands_keyframe.push_back(
+        Between(PoseAt(trail.shapes()[stands].number), PoseAt(trail.shapes()[k].number)));
+    if (kept) retirement.kept.push_back(k);
+  }
+  for (const std::size_t k : retirement.stands_for) retirement.index_after.push_back(k < first ? k : k - (end - first));
+  return retirement;
+}
+
+double ErrorOf(const PoseRelation& relation, const Trail& trail) {
+  const auto pose = [&](std::size_t k) { return PoseAt(trail.shapes()[k].number); };
+  const Pose2 error = Between(Between(pose(relation.from), pose(relation.to)), relation.T_from_to);
+  return error.translation().norm() + std::abs(error.theta);
+}
+
+TEST(TrailRetire, KeepsNumbersScansAndTrueRelations) {
+  Trail trail(kStepNoise);
+  DriveOn(trail, 0, 5 * kPerRound);
+  const std::vector<PoseRelation> before = trail.relations();
+  trail.Retire(GivingUp(trail, kPerRound, 4 * kPerRound));
+
+  ASSERT_EQ(trail.size(), 2 * kPerRound);
+  EXPECT_EQ(trail.made(), 5 * kPerRound);
+  EXPECT_EQ(trail.shapes()[kPerRound].number, 4 * kPerRound);
+  EXPECT_EQ(trail.CountBelow(3 * kPerRound), kPerRound);
+  EXPECT_EQ(trail.numbers().back(), 5 * kPerRound - 1);
+  ASSERT_EQ(trail.scans().size(), 10 * kPerRound);
+  for (const MapperSnapshot::ScanPlace& scan : trail.scans()) {
+    const Pose2 expected = PoseAt(scan.stamp / 2) * Pose2{scan.stamp % 2 == 0 ? 0.0 : 0.1, 0.0, 0.0};
+    const Pose2 place = PoseAt(trail.shapes()[scan.keyframe].number) * scan.T_keyframe_robot;
+    EXPECT_LT((place.translation() - expected.translation()).norm(), 1e-9);
+  }
+  const std::vector<PoseRelation> relations = trail.relations();
+  EXPECT_LT(relations.size(), before.size());
+  for (const PoseRelation& relation : relations) {
+    ASSERT_LT(relation.from, trail.size());
+    ASSERT_LT(relation.to, trail.size());
+    EXPECT_NE(relation.from, relation.to);
+    EXPECT_LT(ErrorOf(relation, trail), 1e-6);
+    EXPECT_GT(relation.covariance.ldlt().vectorD().minCoeff(), 0.0);
+  }
+}
+
+// The last round is bound to the first only through those between.
+TEST(TrailRetire, WhatHungTogetherStillDoes) {
+  Trail trail(kStepNoise);
+  DriveOn(trail, 0, 5 * kPerRound);
+  trail.Retire(GivingUp(trail, kPerRound, 4 * kPerRound));
+  std::set<std::size_t> reached{0};
+  for (std::size_t before = 0; before != reached.size();) {
+    before = reached.size();
+    for (const PoseRelation& one : trail.relations())
+      if (reached.contains(one.from) != reached.contains(one.to)) reached.insert({one.from, one.to});
+  }
+  EXPECT_EQ(reached.size(), trail.size());
+  // The way from the last keyframe to the first is short through what was handed over.
+  EXPECT_LT(trail.distances_m()[0], 3.0);
+}
+
+// A robot that drives the same round for ever.
+TEST(TrailRetire, RelationsDoNotGrowWithoutEnd) {
+  Trail trail(kStepNoise);
+  DriveOn(trail, 0, 4 * kPerRound);
+  std::size_t after_first = 0, after_last = 0, driven = 4 * kPerRound;
+  for (int time = 0; time < 200; ++time) {
+    trail.Retire(GivingUp(trail, kPerRound, 3 * kPerRound));
+    ASSERT_EQ(trail.size(), 2 * kPerRound);
+    after_last = trail.relations().size();
+    if (time == 20) after_first = after_last;
+    DriveOn(trail, driven, driven + 2 * kPerRound);
+    driven += 2 * kPerRound;
+  }
+  EXPECT_LE(after_last, after_first + after_first / 4);
+}
+
+TEST(TrailRetire, IsReadAgainAsItWas) {
+  Trail trail(kStepNoise);
+  DriveOn(trail, 0, 5 * kPerRound);
+  trail.Retire(GivingUp(trail, kPerRound, 4 * kPerRound));
+  StateWriter writer;
+  writer(trail);
+  const std::string bytes = writer.Bytes();
+  StateReader reader(bytes);
+  Trail read(kStepNoise);
+  reader(read);
+  ASSERT_TRUE(reader.ok()) << reader.failed();
+  EXPECT_EQ(read.numbers(), trail.numbers());
+  DriveOn(trail, 5 * kPerRound, 6 * kPerRound);
+  DriveOn(read, 5 * kPerRound, 6 * kPerRound);
+  const auto expected = trail.distances_m(), distances = read.distances_m();
+  EXPECT_TRUE(std::ranges::equal(distances, expected));
+  EXPECT_EQ(read.made(), 6 * kPerRound);
+}
+
+}  // namespace
+}  // namespace cairn::slam
