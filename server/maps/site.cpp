@@ -286,11 +286,10 @@ void Site::Settle(std::uint32_t version, SessionId session, std::optional<Adopte
 void Site::StageGone(SessionId session) {
   const RobotGrid& part = versions_.Find(switch_->version)->parts.at(session);
   switch_->staged.emplace(session, part.chunks);
-  switch_->displaced.emplace(session, RobotGrid{.chunks = joint_.ChunksOf(session),
-                                                .keyframes = part.keyframes,
-                                                .path = {},
-                                                .numbers = {},
-                                                .fragment = joint_.hidden().contains(session)});
+  RobotGrid& displaced = switch_->displaced[session];
+  displaced.chunks = joint_.ChunksOf(session);
+  displaced.keyframes = part.keyframes;
+  displaced.fragment = joint_.hidden().contains(session);
 }
 
 void Site::CommitIfComplete() {

@@ -255,14 +255,18 @@ void FastSlam<LandmarkModel>::Rebase(std::span<const Pose2> path) {
 template <typename LandmarkModel>
 void FastSlam<LandmarkModel>::Retire(const Retirement& retirement) {
   set_.Retire(retirement);
+  std::vector<bool> used(index_.size());
+  const auto change = [&](std::size_t slot, Entry& entry) {
+    if (entry.sightings == 0) return;
+    used[slot] = true;
+    entry.first_keyframe = static_cast<std::uint32_t>(retirement.index_after[entry.first_keyframe]);
+  };
   typename Map::Rewritten done;
-  for (Map& map : maps_)
-    map.Rewrite(
-        [&](Entry& entry) {
-          if (entry.sightings > 0)
-            entry.first_keyframe = static_cast<std::uint32_t>(retirement.index_after[entry.first_keyframe]);
-        },
-        done);
+  for (Map& map : maps_) map.Rewrite(change, done);
+  // Every sighting that may be new takes a slot, and landmarks die with their particles.
+  index_.Forget(used);
+  used.resize(candidates_.slots());
+  candidates_.GiveAgain(used);
 }
 
 template <typename LandmarkModel>

@@ -17,6 +17,12 @@ void LandmarkIndex::Name(std::size_t slot, const LandmarkSignature& signature) {
   if (places_[slot].box.isEmpty()) places_[slot].signature = signature;
 }
 
+void LandmarkIndex::Forget(const std::vector<bool>& used) {
+  for (std::size_t slot = 0; slot < places_.size(); ++slot)
+    if (!used[slot]) places_[slot].box.setEmpty();
+  EnterAll();
+}
+
 // In the order of the slots.
 std::vector<std::size_t> LandmarkIndex::Near(const LandmarkSignature& signature, const Eigen::AlignedBox2d& box,
                                              const LandmarkOptions& options) const {

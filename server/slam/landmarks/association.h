@@ -23,7 +23,7 @@ namespace cairn::slam {
 // Frame `map`. Bounded by the number of landmarks. Not thread-safe.
 class LandmarkIndex {
  public:
-  // Makes room for `slot` and sets the kind of its landmark. One call per slot is enough.
+  // Makes room for `slot` and sets the kind of its landmark, unless a particle has one there already.
   void Name(std::size_t slot, const LandmarkSignature& signature);
   // Extends the box of a landmark by the position that a particle has for it. REQUIRES: Name was called for
   // the slot.
@@ -34,6 +34,9 @@ class LandmarkIndex {
     box.extend(p_map);
     Enter(slot, before);
   }
+
+  // No particle has a landmark in the slots for which `used` is false. One flag per slot.
+  void Forget(const std::vector<bool>& used);
 
   // Slots of similar landmarks that some particle may have within `box`.
   [[nodiscard]] std::vector<std::size_t> Near(const LandmarkSignature& signature, const Eigen::AlignedBox2d& box,

@@ -14,11 +14,27 @@ std::vector<LandmarkSighting> LandmarkCandidates::Observe(const ScanFeatures& fe
     Candidate& candidate = CandidateOf(feature, T_track_robot, travelled_m);
     if (candidate.sightings < options_.min_sightings) continue;
     if (candidate.slot >= 0 && travelled_m - candidate.last_shown_m < options_.min_travel_m) continue;
-    if (candidate.slot < 0) candidate.slot = slots_++;
+    if (candidate.slot < 0) candidate.slot = NextSlot();
     candidate.last_shown_m = travelled_m;
     due.push_back({static_cast<std::size_t>(candidate.slot), feature.signature, feature.p_robot, feature.slope});
   }
   return due;
+}
+
+std::ptrdiff_t LandmarkCandidates::NextSlot() {
+  if (free_.empty()) return slots_++;
+  const std::ptrdiff_t slot = free_.back();
+  free_.pop_back();
+  return slot;
+}
+
+void LandmarkCandidates::GiveAgain(const std::vector<bool>& used) {
+  std::vector<bool> taken = used;
+  for (const Candidate& candidate : candidates_)
+    if (candidate.slot >= 0) taken[static_cast<std::size_t>(candidate.slot)] = true;
+  free_.clear();
+  for (std::size_t slot = taken.size(); slot-- > 0;)
+    if (!taken[slot]) free_.push_back(static_cast<std::ptrdiff_t>(slot));
 }
 
 // Real corners and lines ended on both sides, without those that have a similar one close by (4.4).

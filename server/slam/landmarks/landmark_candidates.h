@@ -26,14 +26,17 @@ class LandmarkCandidates {
   // `min_travel_m`.
   [[nodiscard]] std::vector<LandmarkSighting> Observe(const ScanFeatures& features, const Pose2& T_track_robot,
                                                       double travelled_m);
-  // Number of slots given so far.
+  // All slots are below this.
   [[nodiscard]] std::size_t slots() const { return static_cast<std::size_t>(slots_); }
+  // Slots for which `used` is false will be given again, but for those of the present candidates. One flag per slot.
+  void GiveAgain(const std::vector<bool>& used);
 
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
-    archive(self.candidates_, self.slots_);
+    archive(self.candidates_, self.slots_, self.free_);
     bool sound = self.slots_ >= 0;
     for (const Candidate& candidate : self.candidates_) sound = sound && candidate.slot < self.slots_;
+    for (const std::ptrdiff_t slot : self.free_) sound = sound && 0 <= slot && slot < self.slots_;
     archive.Require(sound, "the candidates for landmarks");
   }
 
@@ -60,11 +63,13 @@ class LandmarkCandidates {
   };
 
   [[nodiscard]] std::vector<Feature> UsableFeatures(const ScanFeatures& features) const;
+  [[nodiscard]] std::ptrdiff_t NextSlot();
   Candidate& CandidateOf(const Feature& feature, const Pose2& T_track_robot, double travelled_m);
 
   LandmarkOptions options_;
   std::vector<Candidate> candidates_;
   std::ptrdiff_t slots_ = 0;
+  std::vector<std::ptrdiff_t> free_;  // Slots to give again, the smallest last.
 };
 
 }  // namespace cairn::slam

@@ -53,11 +53,11 @@ class SharedSequence {
     std::shared_ptr<void> after;
   };
   using Rewritten = std::unordered_map<const void*, RewrittenNode>;
-  // Calls change(value) for every value. Sequences that share nodes share them afterwards if all are given the same
-  // `done`; other copies do not change.
+  // Calls change(index, value) for every value, and for some beyond the end. Sequences that share nodes share them
+  // afterwards if all are given the same `done`, and shared values are changed once; other copies do not change.
   template <typename Change>
   void Rewrite(const Change& change, Rewritten& done) requires std::same_as<Summary, NoSummary> {
-    if (size_ > 0) RewriteNode(root_, shift_, change, done);
+    if (size_ > 0) RewriteNode(root_, 0, shift_, change, done);
   }
 
   // Replaces a value. REQUIRES: index < size().
@@ -224,7 +224,8 @@ class SharedSequence {
     }
   }
 
-  static void RewriteNode(std::shared_ptr<void>& link, int shift, const auto& change, Rewritten& done) {
+  static void RewriteNode(std::shared_ptr<void>& link, std::size_t first, int shift, const auto& change,
+                          Rewritten& done) {
     if (!link) return;
     if (const auto known = done.find(link.get()); known != done.end()) {
       link = known->second.after;
@@ -233,11 +234,12 @@ class SharedSequence {
     const std::shared_ptr<void> before = link;
     if (shift == 0) {
       auto leaf = std::make_shared<Leaf>(*static_cast<const Leaf*>(before.get()));
-      for (Value& value : leaf->values) change(value);
+      for (std::size_t i = 0; i < kWidth; ++i) change(first + i, leaf->values[i]);
       link = std::move(leaf);
     } else {
       auto branch = std::make_shared<Branch>(*static_cast<const Branch*>(before.get()));
-      for (std::shared_ptr<void>& child : branch->children) RewriteNode(child, shift - kBits, change, done);
+      for (std::size_t i = 0; i < kWidth; ++i)
+        RewriteNode(branch->children[i], first + (i << shift), shift - kBits, change, done);
       link = std::move(branch);
     }
     done.emplace(before.get(), RewrittenNode{before, link});

@@ -17,7 +17,7 @@ constexpr double kPlaceSigmaRad = 0.01;
 // would grow without end in number and, as they repeat each other, in weight.
 constexpr std::size_t kEnoughLoops = 12;
 // Of more scans between keyframes than this the older ones are given up.
-constexpr std::size_t kMostScans = 1 << 18;  // 10 MiB.
+constexpr std::size_t kMostScans = 1 << 17;  // 5 MiB.
 
 // Which keyframes hang together.
 class Components {
@@ -95,6 +95,7 @@ void Trail::Retire(const Retirement& retirement) {
     const auto end = scans_.end() - static_cast<std::ptrdiff_t>(kMostScans);
     scans_.erase(
         std::remove_if(scans_.begin(), end, [](const auto& scan) { return !(scan.T_keyframe_robot == Pose2{}); }), end);
+    scans_.shrink_to_fit();
   }
   KeepOnly(keyframes_, retirement);
   KeepOnly(shapes_, retirement);

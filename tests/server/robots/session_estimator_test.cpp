@@ -232,6 +232,8 @@ TEST_F(SessionEstimatorTest, ACorrectionWithAPathMovesThePose) {
   EXPECT_LT((poses_.back().T_map_robot.translation() - (T_new_old * before).translation()).norm(), 0.5);
   ASSERT_TRUE(adopted && adopted->displaced.path);
   EXPECT_EQ(adopted->displaced.path->size(), adopted->displaced.keyframes);
+  ASSERT_TRUE(adopted->displaced.numbers);
+  EXPECT_EQ(*adopted->displaced.numbers, Snapshot().snapshot.numbers);
   adopt(10, RobotGrid(adopted->displaced));
   Drive(11, 12);
   EXPECT_LT((poses_.back().T_map_robot.translation() - before.translation()).norm(), 0.5);

@@ -103,7 +103,7 @@ TEST(Mapper, SaysWhichStepsAScanTakes) {
   };
   using enum ScanStep;
   ASSERT_TRUE(see(mapper, 0.0));
-  EXPECT_EQ(steps, (std::vector{kLook, kRecover, kOther, kFilter, kLargeLoop, kSelfCheck, kDraw, kOther}));
+  EXPECT_EQ(steps, (std::vector{kLook, kRecover, kOther, kFilter, kLargeLoop, kSelfCheck, kDraw, kRetire, kOther}));
   ASSERT_FALSE(see(mapper, 0.01));
   const std::vector tracked = {kLook, kMatch, kRefine, kRecover, kOther};
   EXPECT_EQ(steps, tracked);
@@ -116,7 +116,7 @@ TEST(Mapper, SaysWhichStepsAScanTakes) {
   EXPECT_EQ(steps, tracked) << "a state that was loaded is watched as well";
   ASSERT_TRUE(see(mapper, 1.0));
   EXPECT_EQ(steps, (std::vector{kLook, kMatch, kRefine, kRecover, kOther, kFilter, kRevisit, kFilter, kFilter,
-                                kLargeLoop, kSelfCheck, kDraw, kOther}));
+                                kLargeLoop, kSelfCheck, kDraw, kRetire, kOther}));
 }
 
 // Once round a large ring, and 28 m more. For `blind_m` metres from `blind_from_m` on, the robot sees nothing

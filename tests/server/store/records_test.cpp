@@ -87,6 +87,20 @@ TEST(Records, SessionsSitesVersionsLayersAndJobsComeBack) {
   apart_layer.grid.fragment = true;
   EXPECT_TRUE(LayerOf(BytesOf(apart_layer))->grid.fragment);
 
+  // A path of all keyframes, and one from which some are missing.
+  StoredGrid whole = SampleGrid(2);
+  whole.path = std::make_shared<const std::vector<Pose2>>(12, Pose2{1.0, 2.0, 0.5});
+  const StoredGrid whole_back = LayerOf(BytesOf(StoredLayer{6, whole}))->grid;
+  EXPECT_EQ(*whole_back.path, *whole.path);
+  EXPECT_EQ(whole_back.numbers, nullptr);
+  StoredGrid thinned = SampleGrid(2);
+  thinned.path = std::make_shared<const std::vector<Pose2>>(3, Pose2{1.0, 2.0, 0.5});
+  thinned.numbers = std::make_shared<const std::vector<std::uint64_t>>(std::vector<std::uint64_t>{0, 7, 11});
+  const StoredGrid thinned_back = LayerOf(BytesOf(StoredLayer{6, thinned}))->grid;
+  ASSERT_NE(thinned_back.numbers, nullptr);
+  EXPECT_EQ(*thinned_back.numbers, *thinned.numbers);
+  EXPECT_EQ(thinned_back.path->size(), 3U);
+
   StoredJob job;
   job.job = {.id = 4, .site = "lab", .state = JobState::kRunning, .progress = 0.5, .message = "m"};
   job.enable = false;
@@ -104,6 +118,13 @@ TEST(Records, ValuesThatNoServerWritesAreRefused) {
   OdometryTaken odometry = testing::SampleOdometry(1);
   odometry.odometry.T_odom_robot.x = std::numeric_limits<double>::infinity();
   EXPECT_FALSE(BatchOf(BytesOf(1, {odometry})));
+  for (const std::vector<std::uint64_t>& numbers :
+       {std::vector<std::uint64_t>{0, 7, 7}, {0, 7, 12}, {7, 0, 11}, {0, 7}, {0, 3, 7, 11}}) {
+    StoredGrid grid = SampleGrid(2);
+    grid.path = std::make_shared<const std::vector<Pose2>>(3, Pose2{1.0, 2.0, 0.5});
+    grid.numbers = std::make_shared<const std::vector<std::uint64_t>>(numbers);
+    EXPECT_FALSE(LayerOf(BytesOf(StoredLayer{6, grid})));
+  }
   StoredSession nameless = SampleSession(1);
   nameless.request.robot = "a/b";
   EXPECT_FALSE(SessionOf(BytesOf(nameless)));

@@ -348,9 +348,11 @@ TEST(FindSession, TakesARobotOrANumber) {
 TEST(GridTransform, TurnsAndBackAreTheSameGrid) {
   StoredGrid grid = SampleGrid(3);
   grid.path = std::make_shared<const std::vector<Pose2>>(12, Pose2{1.0, 2.0, 0.5});
+  grid.numbers = std::make_shared<const std::vector<std::uint64_t>>(12, 5);
   const StoredGrid there = Transformed(grid, {0.35, -2.0, kQuarterTurn}, 0.05);
   const StoredGrid back = Transformed(there, Pose2{0.35, -2.0, kQuarterTurn}.Inverse(), 0.05);
   EXPECT_EQ(back.keyframes, grid.keyframes);
+  EXPECT_EQ(back.numbers, grid.numbers);
   ASSERT_EQ(back.chunks.size(), grid.chunks.size());
   for (std::size_t i = 0; i < grid.chunks.size(); ++i) {
     EXPECT_EQ(back.chunks[i].x, grid.chunks[i].x);

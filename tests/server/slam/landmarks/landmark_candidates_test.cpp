@@ -59,6 +59,26 @@ TEST(LandmarkCandidates, AForgottenFeatureGetsANewSlot) {
   EXPECT_EQ(due[0].slot, 1U);
 }
 
+// Slot 0 is used by somebody, slot 1 by nobody any more, and slot 2 belongs to a candidate in view.
+TEST(LandmarkCandidates, SlotsThatNobodyUsesAreGivenAgain) {
+  LandmarkCandidates candidates({});
+  std::vector<LandmarkSighting> due;
+  const auto see = [&](const Eigen::Vector2d& place, double from_m) {
+    for (int i = 0; i < 3; ++i) due = candidates.Observe(Corners({place}), {}, from_m + 0.1 * i);
+  };
+  see({2, 0}, 0.0);
+  see({2, 0}, 30.0);
+  see({2, 0}, 60.0);
+  ASSERT_EQ(candidates.slots(), 3U);
+  candidates.GiveAgain({true, false, false});
+  see({9, 9}, 60.5);
+  ASSERT_EQ(due.size(), 1U);
+  EXPECT_EQ(due[0].slot, 1U);
+  see({-9, 9}, 61.0);
+  ASSERT_EQ(due.size(), 1U);
+  EXPECT_EQ(due[0].slot, 3U);
+}
+
 TEST(LandmarkCandidates, NothingFromAnEmptyScanOrSwitchedOff) {
   LandmarkOptions off;
   off.enabled = false;

@@ -42,7 +42,13 @@ TEST(SharedSequence, RewrittenTogetherTheyShareAgain) {
   other.Mutable(17) = -1;
   const SharedSequence<int> before = one;
   SharedSequence<int>::Rewritten done;
-  for (SharedSequence<int>* sequence : {&one, &other}) sequence->Rewrite([](int& value) { value += 1000; }, done);
+  const auto change = [](std::size_t index, int& value) {
+    if (index != 17 && index < 300) {
+      EXPECT_EQ(value, static_cast<int>(index));
+    }
+    value += 1000;
+  };
+  for (SharedSequence<int>* sequence : {&one, &other}) sequence->Rewrite(change, done);
   EXPECT_EQ(one[17], 1017);
   EXPECT_EQ(other[17], 999);
   EXPECT_EQ(other[299], 1299);
