@@ -68,6 +68,17 @@ double ErrorOf(const PoseRelation& relation, const Trail& trail) {
   return error.translation().norm() + std::abs(error.theta);
 }
 
+// How many keyframes hang together with the first.
+std::size_t ReachedFromTheFirst(const Trail& trail) {
+  std::set<std::size_t> reached{0};
+  for (std::size_t before = 0; before != reached.size();) {
+    before = reached.size();
+    for (const PoseRelation& one : trail.relations())
+      if (reached.contains(one.from) != reached.contains(one.to)) reached.insert({one.from, one.to});
+  }
+  return reached.size();
+}
+
 TEST(TrailRetire, KeepsNumbersScansAndTrueRelations) {
   Trail trail(kStepNoise);
   DriveOn(trail, 0, 5 * kPerRound);
@@ -101,15 +112,26 @@ TEST(TrailRetire, WhatHungTogetherStillDoes) {
   Trail trail(kStepNoise);
   DriveOn(trail, 0, 5 * kPerRound);
   trail.Retire(GivingUp(trail, kPerRound, 4 * kPerRound));
-  std::set<std::size_t> reached{0};
-  for (std::size_t before = 0; before != reached.size();) {
-    before = reached.size();
-    for (const PoseRelation& one : trail.relations())
-      if (reached.contains(one.from) != reached.contains(one.to)) reached.insert({one.from, one.to});
-  }
-  EXPECT_EQ(reached.size(), trail.size());
+  EXPECT_EQ(ReachedFromTheFirst(trail), trail.size());
   // The way from the last keyframe to the first is short through what was handed over.
   EXPECT_LT(trail.distances_m()[0], 3.0);
+}
+
+// The only relation with a side way is handed over, although both its keyframes have many loops.
+TEST(TrailRetire, TheOnlyRelationIsNoRepetition) {
+  Trail trail(kStepNoise);
+  DriveOn(trail, 0, 2 * kPerRound);
+  for (std::size_t k = 2 * kPerRound; k < 2 * kPerRound + 14; ++k)
+    trail.Append({std::make_shared<const Scan>(), {}}, PoseAt(k), {}, Eigen::Matrix3d::Zero(), std::nullopt);
+  for (std::size_t i = 1; i < 14; ++i) {
+    for (const std::size_t k : {std::size_t{0}, 2 * kPerRound})
+      trail.AddLoop({k, k + i, Between(PoseAt(k), PoseAt(k + i)), Eigen::Matrix3d::Identity(), true});
+    const std::size_t last = kPerRound - 1;
+    trail.AddLoop({last - i, last, Between(PoseAt(last - i), PoseAt(last)), Eigen::Matrix3d::Identity(), true});
+  }
+  trail.Retire(GivingUp(trail, kPerRound, 2 * kPerRound));
+  ASSERT_EQ(trail.size(), kPerRound + 14);
+  EXPECT_EQ(ReachedFromTheFirst(trail), trail.size());
 }
 
 // A robot that drives the same round for ever.
