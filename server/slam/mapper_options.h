@@ -23,9 +23,9 @@ namespace cairn::slam {
 struct MapperOptions {
   std::int64_t seed = 1;
   double lost_after_m = 2.0;
-  double max_tilt_rad = 0.035;          // Two degrees (scan/beam_points.h).
+  double max_tilt_rad = 0.035;  // Two degrees (scan/beam_points.h).
   std::int64_t max_keyframes = 500000;
-  std::int64_t max_chunks = 16384;      // 0.67 km^2 at 5 cm a cell, 512 MiB.
+  std::int64_t max_chunks = 16384;  // 0.67 km^2 at 5 cm a cell, 512 MiB.
   MotionNoise blind{0.002, 0.2, 0.0, 0.001, 0.05, 0.0};
   MatcherKind matcher = MatcherKind::kVoting;
   MatcherOptions matching;

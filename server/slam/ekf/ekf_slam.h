@@ -55,7 +55,8 @@ class EkfSlam final : public Filter {
   static void Members(Archive& archive, auto& self) {
     archive(self.candidates_, self.state_, self.landmarks_, self.anchors_, self.keyframes_, self.since_anchor_,
             self.since_anchor_m_, self.moved_path_, self.path_, self.contradictions_, self.nis_);
-    if constexpr (Archive::kReads) archive.RequireThat([&] { return self.IsConsistent(archive.keyframes()); }, "the landmarks and anchors");
+    if constexpr (Archive::kReads)
+      archive.RequireThat([&] { return self.IsConsistent(archive.keyframes()); }, "the landmarks and anchors");
   }
 
  private:
