@@ -79,7 +79,7 @@ struct Command {
 };
 
 struct LandmarkReport {
-  std::uint64_t id = 0;
+  std::uint64_t id = 0;  // Of no other landmark of this robot now; it may be given to another one later.
   std::string robot;
   bool corner = false;  // False: the midpoint of a line that ends on both sides.
   Eigen::Vector2d p_map = Eigen::Vector2d::Zero();

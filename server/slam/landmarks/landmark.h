@@ -7,7 +7,7 @@
 namespace cairn::slam {
 
 struct Landmark {
-  std::uint64_t id = 0;
+  std::uint64_t id = 0;  // Of no other landmark now; it may be given to another one later.
   bool corner = false;
   Eigen::Vector2d p_map = Eigen::Vector2d::Zero();
   double direction_rad = 0.0;
