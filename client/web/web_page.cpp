@@ -2,6 +2,7 @@
 
 #include <openssl/crypto.h>
 
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
@@ -9,6 +10,8 @@
 #include "client/web/http_answers.h"
 #include "client/web/web_json.h"
 #include "client/web/web_metrics.h"
+#include "common/geometry/angle.h"
+#include "common/geometry/pose2.h"
 #include "common/map/occupancy_image.h"
 #include "common/options/number_text.h"
 
@@ -207,12 +210,32 @@ HttpResponse WebPage::AnswerPost(const HttpRequest& request, const Parts& parts)
   if (parts[1] == "jobs" && parts[3] == "cancel" && ParseNumber(parts[2], id)) {
     const auto job = queries_->CancelJob(id);
     response = job ? JsonAnswer(JobJson(*job)) : Refused(job.error());
+  } else if (parts[1] == "robots" && parts[3] == "relocalise") {
+    response = Relocalise(parts[2], request.body);
   } else if (parts[1] == "sites") {
     if (watch_->view()->Sites().count(parts[2]) == 0) return HttpError(404, "the server has no such site");
     response = CommandSite(parts[2], parts[3], request.body);
   }
   watch_->AskNow();
   return response;
+}
+
+// The body holds x, y and theta, or nothing where nobody knows where the robot is.
+HttpResponse WebPage::Relocalise(const std::string& robot, const std::string& body) {
+  const auto arguments = Object(body);
+  if (!arguments) return HttpError(400, "the body is no JSON object");
+  std::optional<Pose2> T_map_robot;
+  if (!arguments->empty()) {
+    const auto number = [&](const char* name) {
+      const auto at = arguments->find(name);
+      return at != arguments->end() && at->is_number() ? at->get<double>() : std::numeric_limits<double>::quiet_NaN();
+    };
+    T_map_robot = Pose2{number("x"), number("y"), number("theta")};
+    if (!T_map_robot->IsFinite()) return HttpError(400, "`x`, `y` and `theta` must be numbers, or all be left out");
+    T_map_robot->theta = WrapAngle(T_map_robot->theta);
+  }
+  const auto done = queries_->Relocalise(robot, T_map_robot);
+  return done ? JsonAnswer("{}") : Refused(done.error());
 }
 
 HttpResponse WebPage::CommandSite(const std::string& site, const std::string& command, const std::string& body) {

@@ -84,13 +84,22 @@ function show(now) {
   }
   map?.fit(state.map, false);
   map?.update(state.robots, state.connected);
-  panels.showRobots(state, (name) => {
+  panels.showRobots(state, may(), (name) => {
     const robot = state.robots.find((one) => one.name === name);
     if (robot?.pose) map?.centre(robot.pose);
-  });
+  }, relocalise);
   panels.showJobs(state, may(), (id) => command(`/api/jobs/${id}/cancel`, {}, 'The job is cancelled.'));
   panels.showMap(state, may(), (version) => command(`/api/sites/${state.site}/enable`, { version }, `Version ${version} is enabled.`));
   panels.showServer(state, may());
+}
+
+function relocalise(name, how, pose) {
+  const tell = (body) => command(`/api/robots/${name}/relocalise`, body, `${name} is looked for ${body.x === undefined ? 'everywhere' : 'there'}.`);
+  if (how !== 'map') { tell(pose ?? {}); return; }
+  const robot = state.robots.find((one) => one.name === name);
+  if (!map || !robot?.pose) return;
+  say(`Press where ${name} is, and drag to where it looks. Escape leaves it as it is.`);
+  map.place(name, robot.pose.theta, (placed) => { if (placed) tell(placed); else say(''); });
 }
 
 function showFlow() {

@@ -105,7 +105,7 @@ export class SiteMap {
     onThemeChange(() => { if (this.leaflet) this.recolour(); });
   }
 
-  remove() { this.leaflet.remove(); this.leaflet = null; }
+  remove() { this.stopPlacing?.(); this.leaflet.remove(); this.leaflet = null; }
 
   recolour() {
     this.cells.reload();
@@ -214,6 +214,43 @@ export class SiteMap {
     for (const [x, y, corner] of landmarks) {
       this.landmarks.addLayer(L.circleMarker(at(x, y), { radius: corner ? 4 : 3, color, weight: 1.5, fillOpacity: corner ? 0.6 : 0, interactive: false }));
     }
+  }
+
+  // Somebody shows where a robot is: presses at its place and drags to where it looks. `done` gets the pose, or nothing if
+  // Escape was pressed. Without a drag it looks where it looked before (`theta`).
+  place(name, theta, done) {
+    this.stopPlacing?.();
+    const { leaflet } = this, element = leaflet.getContainer();
+    const arrow = L.polyline([], { color: colourOf(name), weight: 5, interactive: false });
+    const stop = new AbortController();
+    let from = null;
+    const finish = (pose) => {
+      stop.abort();
+      this.stopPlacing = null;
+      arrow.remove();
+      element.classList.remove('placing');
+      leaflet.dragging.enable();
+      done(pose);
+    };
+    const on = (target, event, listener) => target.addEventListener(event, listener, { signal: stop.signal });
+    const metres = (event) => leaflet.mouseEventToLatLng(event);
+    this.stopPlacing = () => finish(null);
+    leaflet.dragging.disable();
+    element.classList.add('placing');
+    on(element, 'pointerdown', (event) => {
+      if (event.target.closest('.leaflet-control')) return;
+      element.setPointerCapture(event.pointerId);
+      from = metres(event);
+      arrow.setLatLngs([from, from]).addTo(leaflet);
+    });
+    on(element, 'pointermove', (event) => { if (from) arrow.setLatLngs([from, metres(event)]); });
+    on(element, 'pointerup', (event) => {
+      if (!from) return;
+      const to = metres(event);
+      const dragged = leaflet.latLngToContainerPoint(from).distanceTo(leaflet.latLngToContainerPoint(to)) > 8;
+      finish({ x: from.lng, y: from.lat, theta: dragged ? Math.atan2(to.lat - from.lat, to.lng - from.lng) : theta });
+    });
+    on(window, 'keydown', (event) => { if (event.key === 'Escape') finish(null); });
   }
 
   centre(pose) {

@@ -44,7 +44,36 @@ function describeSensor(sensor) {
     + `. Scan to pose ${format(sensor.p50)} ms (median), ${format(sensor.p99)} ms (99 %).`;
 }
 
-export function showRobots(state, onChosen) {
+// What somebody says of a robot's place: on the map, in numbers, or that nobody knows it.
+function makeRelocalise(item, robot, onRelocalise) {
+  const details = element('details', 'relocalise command', item);
+  setText(element('summary', '', details), 'It is elsewhere');
+  const row = element('p', 'row', details);
+  const button = (text, className, parent, clicked) => {
+    const made = element('button', className, parent);
+    made.type = 'button';
+    setText(made, text);
+    made.addEventListener('click', clicked);
+  };
+  button('Show it on the map', 'on-map', row, () => onRelocalise(robot.name, 'map'));
+  button('Look for it everywhere', 'anywhere', row, () => onRelocalise(robot.name, 'anywhere'));
+  const form = element('form', 'row', details);
+  for (const [name, words] of [['x', 'x (m)'], ['y', 'y (m)'], ['theta', 'heading (°)']]) {
+    const label = element('label', '', form);
+    label.append(words, ' ');
+    const input = element('input', '', label);
+    Object.assign(input, { type: 'number', step: 'any', name, required: true });
+  }
+  const here = element('button', '', form);
+  setText(here, 'It is here');
+  form.addEventListener('submit', (event) => {
+    event.preventDefault();
+    const number = (name) => Number(form.elements[name].value);
+    onRelocalise(robot.name, 'here', { x: number('x'), y: number('y'), theta: (number('theta') * Math.PI) / 180 });
+  });
+}
+
+export function showRobots(state, may, onChosen, onRelocalise) {
   $('robots-empty').hidden = state.robots.length > 0;
   keyed($('robots'), state.robots, (robot) => robot.name, (robot) => {
     const item = element('li', 'robot');
@@ -58,6 +87,7 @@ export function showRobots(state, onChosen) {
     const details = element('details', '', item);
     setText(element('summary', '', details), 'Scans');
     element('div', 'sensors', details);
+    makeRelocalise(item, robot, onRelocalise);
     return item;
   }, (item, robot) => {
     const [style, words] = robotState(robot, state.connected);
@@ -69,6 +99,7 @@ export function showRobots(state, onChosen) {
     pill.className = `pill ${PILLS[style]}`;
     setText(pill, words);
     const { pose } = robot;
+    item.querySelector('.relocalise').hidden = !may || !pose || robot.phase === 'ended';
     const used = scanSensors(robot).reduce((sum, sensor) => sum + sensor.used, 0);
     const dropped = scanSensors(robot).reduce((sum, sensor) => sum + droppedOf(sensor), 0);
     const place = pose ? `${pose.x.toFixed(2)}, ${pose.y.toFixed(2)} m, ${((pose.theta * 180) / Math.PI).toFixed(0)}°, ±${pose.ellipse ? pose.ellipse[0].toFixed(2) : '?'} m` : 'no pose yet';

@@ -13,7 +13,7 @@
 namespace cairn::slam {
 namespace {
 
-constexpr double kVisitGapM = 12.0;      // After such a way it is another visit of a place.
+constexpr double kVisitM = 12.0;         // From the beginning of a visit: what comes after such a way is another one.
 constexpr double kTiedM = 2.0;           // Largest way to a keyframe that has seen a place again.
 constexpr int kHeadings = 8;             // Many lasers see only what lies ahead.
 constexpr std::size_t kShortestRun = 4;  // Fewer keyframes in a row are not worth a gap in the path.
@@ -56,13 +56,14 @@ void MarkBetween(const std::vector<std::size_t>& in_cell, std::span<const Keyfra
                  const std::vector<bool>& may, std::vector<bool>& marked) {
   std::vector<std::size_t> begins;  // Of the visits, in `in_cell`.
   for (std::size_t i = 0; i < in_cell.size(); ++i)
-    if (i == 0 || shapes[in_cell[i]].travelled_m - shapes[in_cell[i - 1]].travelled_m >= kVisitGapM)
+    if (i == 0 || shapes[in_cell[i]].travelled_m - shapes[in_cell[begins.back()]].travelled_m >= kVisitM)
       begins.push_back(i);
   if (begins.size() <= visits) return;
   const std::size_t end = begins[begins.size() - (visits - 1)];
   for (std::size_t i = begins[1]; i < end; ++i) marked[in_cell[i]] = may[in_cell[i]];
 }
 
+// Each piece of the path that is left out ends some stretches along which searches go.
 void KeepShortRuns(std::vector<bool>& marked) {
   for (std::size_t k = 0; k < marked.size();) {
     std::size_t end = k + 1;
@@ -76,9 +77,9 @@ void KeepShortRuns(std::vector<bool>& marked) {
 
 // Finds the keyframes that stand for those retired: one that the retired has been matched with, or the keyframe before
 // it. Two matches in a row are exact to some centimetres, which the path need not be.
-class Stand {
+class Representatives {
  public:
-  Stand(const Trail& trail, const PosePath& path, const std::vector<bool>& retired)
+  Representatives(const Trail& trail, const PosePath& path, const std::vector<bool>& retired)
       : shapes_(trail.shapes()), path_(path), relations_(trail.relations()), matched_(trail.size()) {
     for (const PoseRelation& one : relations_)
       if (one.loop && one.from < one.to) matched_[one.to] = &one;
@@ -152,11 +153,11 @@ std::optional<Retirement> ChooseRetired(const Trail& trail, const PosePath& path
   const auto count = static_cast<std::size_t>(std::ranges::count(retired, true));
   if (count == 0 || count < trail.size() / kLeastShare) return std::nullopt;
 
-  Stand stand(trail, path, retired);
+  Representatives representatives(trail, path, retired);
   Retirement result{.kept = {},
-                    .stands_for = std::move(stand.stands_for),
+                    .stands_for = std::move(representatives.stands_for),
                     .index_after = {},
-                    .T_stands_keyframe = std::move(stand.T_stands_keyframe)};
+                    .T_stands_keyframe = std::move(representatives.T_stands_keyframe)};
   for (std::size_t k = 0; k < trail.size(); ++k)
     if (!retired[k]) result.kept.push_back(k);
   std::vector<std::size_t> after(trail.size());

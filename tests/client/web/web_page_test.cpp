@@ -222,6 +222,24 @@ TEST_F(Page, CommandsNeedTheToken) {
   EXPECT_EQ(Post("/api/jobs/x/cancel", "secret").status, 404);
 }
 
+TEST_F(Page, SomebodySaysWhereARobotIs) {
+  StartServer();
+  Open("secret");
+  ASSERT_TRUE(KnowsSite());
+  const auto relocalise = [&](const std::string& body) {
+    return Post("/api/robots/r1/relocalise", "secret", body).status;
+  };
+  EXPECT_EQ(Post("/api/robots/r1/relocalise", "").status, 401);
+  EXPECT_EQ(relocalise(R"({"x":1.5,"y":-2,"theta":1.5707963267948966})"), 200);
+  EXPECT_EQ(relocalise(R"({"x":1.5,"y":-2,"theta":0})"), 409) << "the server says that this is no place for it";
+  EXPECT_EQ(relocalise("{}"), 409);
+  for (const char* body : {"[]", R"({"x":1})", R"({"x":1,"y":2,"theta":"3"})", R"({"x":1,"y":1e999,"theta":0})"})
+    EXPECT_EQ(relocalise(body), 400) << body;
+  EXPECT_EQ(Post("/api/robots/a%2Fb/relocalise", "secret").status, 400);
+  const auto asked = server_->asked();
+  EXPECT_EQ(std::count(asked.begin(), asked.end(), RequestKind::kRelocalise), 3);
+}
+
 TEST_F(Page, WithoutATokenItIsReadOnly) {
   StartServer();
   Open();

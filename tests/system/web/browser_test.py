@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """What a person does with the page, in a real browser against real programs: opens it, sees a robot move and the map grow,
-unlocks commands, starts a job, sees the smoothed map, downloads it, and lives through a crash of the server.
+unlocks commands, starts a job, sees the smoothed map, shows where a robot is, downloads the map, and lives through a crash of the server.
 
 Usage: browser_test.py BIN_DIR [PICTURES]. BIN_DIR has cairnd, cairn and cairn-web. PICTURES is a folder for the pictures of the
 documentation; without it none are made. It waits for conditions and never for a time. Exit code 77, with the line
 `SKIPPED: why`: there is no Chromium."""
 import fcntl
+import math
 import os
 import re
 import shutil
@@ -166,6 +167,19 @@ def use_the_page(programs, page, pictures):
     if pictures:
         make_pictures(page, pictures)
         page.look(1180, 720, "light")
+
+    # The robot drives on while it is shown, so its place is a little off, as a person's would be.
+    page.click("#robots [data-key=robot1] .relocalise summary")
+    page.click("#robots [data-key=robot1] .on-map")
+    eventually("the page says how to show a place", lambda: "robot1" in page.text("#said"))
+    icon = page.run("(() => { const box = document.querySelector('.robot-icon[data-robot=robot1] svg').getBoundingClientRect();"
+                    " const turn = /rotate\\((.*)\\)/.exec(document.querySelector('.robot-icon[data-robot=robot1] .body').getAttribute('transform'))[1];"
+                    " return [box.x + box.width / 2, box.y + box.height / 2, turn * Math.PI / 180]; })()")
+    x, y, turn = icon
+    page.drag((x, y), (x + 40 * math.cos(turn), y + 40 * math.sin(turn)))
+    eventually("the robot is looked for there", lambda: "looked for there" in page.text("#said"))
+    state = "document.querySelector('#robots [data-key=robot1] .pill').innerText"
+    eventually("and found", lambda: page.run(state) == "Tracking")
 
     for name, begins in (("hall.yaml", b"image: \"hall.png\"\n"), ("hall.png", b"\x89PNG")):
         page.click(f"#download-{name.split('.')[1]}")

@@ -132,6 +132,12 @@ class Page:
         for what in ("mousePressed", "mouseReleased"):
             self.call("Input.dispatchMouseEvent", type=what, button="left", clickCount=1, **place)
 
+    def drag(self, begin, end):
+        """With the mouse, from one point of the window to another: (x, y) in pixels."""
+        for what, (x, y) in (("mouseMoved", begin), ("mousePressed", begin), ("mouseMoved", end), ("mouseReleased", end)):
+            self.call("Input.dispatchMouseEvent", type=what, button="none" if what == "mouseMoved" and (x, y) == begin else "left",
+                      buttons=0 if what == "mouseReleased" else 1, clickCount=1, x=x, y=y)
+
     def type(self, text):
         self.call("Input.insertText", text=text)
 

@@ -92,6 +92,25 @@ TEST(RetirementChoice, KeepsWhatIsRecentOrNotTiedOrNotLocalized) {
   for (std::size_t k = 9 * kPerRound; k < 10 * kPerRound; ++k) EXPECT_TRUE(of_lost->IsKept(k)) << k;
 }
 
+// It is never away from any place for long.
+TEST(RetirementChoice, ARobotThatShuttlesDoesNotKeepAll) {
+  constexpr std::size_t kThereAndBack = 40;  // Over 4 m.
+  Rounds drive;
+  for (std::size_t k = 0; k < 30 * kThereAndBack; ++k) {
+    const std::size_t step = k % kThereAndBack;
+    const bool there = step < kThereAndBack / 2;
+    const double x = 0.2 * static_cast<double>(there ? step : kThereAndBack - step);
+    std::optional<RevisitObservation> revisit;
+    if (k >= 2 * kThereAndBack) revisit = RevisitObservation{k - 2 * kThereAndBack, {}, Eigen::Matrix3d::Identity()};
+    const Pose2 pose{x, 0.0, there ? 0.0 : kPi};
+    drive.trail.Append({std::make_shared<const Scan>(), {}}, pose, {}, Eigen::Matrix3d::Zero(), revisit);
+    drive.path.Append(pose);
+  }
+  const auto chosen = ChooseRetired(drive.trail, drive.path, drive.trail.size() - 200, kOptions);
+  ASSERT_TRUE(chosen);
+  EXPECT_LT(chosen->kept.size(), 200 + 8 * kThereAndBack);
+}
+
 // A laser that sees only what lies ahead sees something else on the way back.
 TEST(RetirementChoice, TheWayBackIsAnotherPlace) {
   Rounds drive = Drive(3);
