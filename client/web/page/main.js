@@ -98,7 +98,8 @@ function relocalise(name, how, pose) {
   if (how !== 'map') { tell(pose ?? {}); return; }
   const robot = state.robots.find((one) => one.name === name);
   if (!map || !robot?.pose) return;
-  say(`Press where ${name} is, and drag to where it looks. Escape leaves it as it is.`);
+  if (map.placing === name) { map.stopPlacing(); return; }
+  say(`Press where ${name} is, and drag to where it looks. Escape, or the button again, leaves it as it is.`);
   map.place(name, robot.pose.theta, (placed) => { if (placed) tell(placed); else say(''); });
 }
 

@@ -220,13 +220,14 @@ export class SiteMap {
   // Escape was pressed. Without a drag it looks where it looked before (`theta`).
   place(name, theta, done) {
     this.stopPlacing?.();
+    this.placing = name;
     const { leaflet } = this, element = leaflet.getContainer();
     const arrow = L.polyline([], { color: colourOf(name), weight: 5, interactive: false });
     const stop = new AbortController();
     let from = null;
     const finish = (pose) => {
       stop.abort();
-      this.stopPlacing = null;
+      this.stopPlacing = this.placing = null;
       arrow.remove();
       element.classList.remove('placing');
       leaflet.dragging.enable();

@@ -102,7 +102,7 @@ export function showRobots(state, may, onChosen, onRelocalise) {
     item.querySelector('.relocalise').hidden = !may || !pose || robot.phase === 'ended';
     const used = scanSensors(robot).reduce((sum, sensor) => sum + sensor.used, 0);
     const dropped = scanSensors(robot).reduce((sum, sensor) => sum + droppedOf(sensor), 0);
-    const place = pose ? `${pose.x.toFixed(2)}, ${pose.y.toFixed(2)} m, ${((pose.theta * 180) / Math.PI).toFixed(0)}°, ±${pose.ellipse ? pose.ellipse[0].toFixed(2) : '?'} m` : 'no pose yet';
+    const place = pose ? `${pose.x.toFixed(2)}, ${pose.y.toFixed(2)} m, ${Math.round((pose.theta * 180) / Math.PI) || 0}°, ±${pose.ellipse ? pose.ellipse[0].toFixed(2) : '?'} m` : 'no pose yet';
     setText(item.querySelector('.where'), `${place} · ${used} scans used${dropped ? `, ${dropped} dropped` : ''}`);
     const note = item.querySelector('.note');
     note.hidden = !robot.note;

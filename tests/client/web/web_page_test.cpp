@@ -235,7 +235,6 @@ TEST_F(Page, SomebodySaysWhereARobotIs) {
   EXPECT_EQ(relocalise("{}"), 409);
   for (const char* body : {"[]", R"({"x":1})", R"({"x":1,"y":2,"theta":"3"})", R"({"x":1,"y":1e999,"theta":0})"})
     EXPECT_EQ(relocalise(body), 400) << body;
-  EXPECT_EQ(Post("/api/robots/a%2Fb/relocalise", "secret").status, 400);
   const auto asked = server_->asked();
   EXPECT_EQ(std::count(asked.begin(), asked.end(), RequestKind::kRelocalise), 3);
 }
