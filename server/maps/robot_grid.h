@@ -20,7 +20,7 @@ using SessionId = std::uint64_t;  // Unique while the server runs; later session
 struct RobotGrid {
   slam::OccupancyGrid::Chunks chunks;
   std::uint64_t keyframes = 0;
-  // T_map_robot of these keyframes in this grid. The estimator's path follows it (slam::Mapper::AdoptGrid). Null: it is
+  // T_map_robot of the keyframes in this grid. The estimator's path follows it (slam::Mapper::AdoptGrid). Null: it is
   // not known, and the path stays.
   std::shared_ptr<const std::vector<Pose2>> path{};
   // The numbers of the keyframes of the path, because some may have been retired. Null: all of them, 0, 1, 2, ...

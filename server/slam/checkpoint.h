@@ -16,7 +16,7 @@
 
 namespace cairn::slam {
 
-inline constexpr std::uint32_t kCheckpointFormat = 6;
+inline constexpr std::uint32_t kCheckpointFormat = 7;
 
 class Checkpoint {
  public:

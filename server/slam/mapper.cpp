@@ -111,7 +111,7 @@ void Mapper::State::CloseLargeLoop() {
   filter->Rebase(*path);
   trail.AddLoop(loop->relation());
   trail.ConfirmTentative();
-  drawing.StartAgain(trail.size());
+  drawing.StartAgain(trail.made());
   self_check.Forget();
 }
 
@@ -120,8 +120,10 @@ void Mapper::State::CloseLargeLoop() {
 void Mapper::State::RetireKeyframes() {
   const RetireOptions& limits = options.retire;
   if (!limits.enabled || !filter->retires() || !filter->placed() || drawing.redrawing()) return;
-  const auto from = static_cast<std::uint64_t>(limits.from_keyframes);
-  if (trail.size() < from || trail.size() < looked_at_size + std::max(from, looked_at_size) / 8) return;
+  const auto from = static_cast<std::uint64_t>(std::min(limits.from_keyframes, options.max_keyframes / 2));
+  const bool enough_new = trail.size() >= size_after_last_search + std::max(from, size_after_last_search) / 8;
+  const bool full = trail.size() >= static_cast<std::uint64_t>(options.max_keyframes);
+  if (trail.size() < from || !(enough_new || full)) return;
   const PosePath path = believed_path();
   std::size_t end = trail.size() - std::min(trail.size(), static_cast<std::size_t>(limits.recent_keyframes));
   for (std::size_t i = 1; i < filter->hypothesis_count(); ++i) end = filter->hypothesis(i).path.SharedWith(path, end);
@@ -131,7 +133,7 @@ void Mapper::State::RetireKeyframes() {
     loops.Retire(*retirement);
     drawing.Retire(*retirement);
   }
-  looked_at_size = trail.size();
+  size_after_last_search = trail.size();
 }
 
 // A robot that does not know where it is would draw noise over its map, and the map would grow without end.
@@ -259,9 +261,9 @@ void Mapper::AdoptGrid(OccupancyGrid grid, std::uint64_t keyframes, std::span<co
   if (s.filter->rebases() && s.filter->placed() && keyframes <= s.trail.made()) {
     const std::vector<Pose2> first_poses = s.PosesOfFirst(keyframes, path, numbers);
     follows = !first_poses.empty();
-    if (follows) s.Follow(first_poses);
+    if (follows) s.Follow(first_poses, keyframes);
   }
-  s.drawing.Adopt(std::move(grid), drawn, s.trail.keyframes(), s.believed_path(), follows);
+  s.drawing.Adopt(std::move(grid), keyframes, drawn, s.trail.keyframes(), s.believed_path(), follows);
 }
 
 // The poses of the keyframes with numbers below `made`, out of a path that may have more of these, because some were
@@ -282,8 +284,8 @@ std::vector<Pose2> Mapper::State::PosesOfFirst(std::uint64_t made, std::span<con
   return poses;
 }
 
-// Takes the poses of the first keyframes from a job, as after a large loop.
-void Mapper::State::Follow(std::span<const Pose2> first_poses) {
+// Takes the poses of the first keyframes from a job, as after a large loop. The job knew `made` keyframes.
+void Mapper::State::Follow(std::span<const Pose2> first_poses, std::uint64_t made) {
   const std::vector<Pose2> before = believed_path().values();
   std::vector<Pose2> path(first_poses.begin(), first_poses.end());
   const std::size_t known = path.size();
@@ -291,7 +293,7 @@ void Mapper::State::Follow(std::span<const Pose2> first_poses) {
     path.push_back(path[known - 1] * Between(before[known - 1], before[k]));
   KeepShape(path, known);
   // Large loops that the job did not know.
-  if (drawing.changed_at() > known) OptimisePoses(path, trail.relations(), options.pose_graph);
+  if (drawing.changed_at() > made) OptimisePoses(path, trail.relations(), options.pose_graph);
   filter->Rebase(path);
   trail.ConfirmTentative();
   self_check.Forget();
@@ -346,7 +348,7 @@ void Mapper::Load(StateReader& archive) {
 }
 
 bool Mapper::State::IsConsistent() const {
-  if (looked_at_size > trail.size()) return false;
+  if (size_after_last_search > trail.size()) return false;
   for (std::size_t i = 0; i < filter->hypothesis_count(); ++i)
     if (filter->hypothesis(i).path.size() != trail.size()) return false;
   if (recovery.active() && (trail.empty() || !last_scan)) return false;

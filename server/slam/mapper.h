@@ -74,6 +74,8 @@ class Mapper {
   // The keyframes that are kept, and all that there have been.
   [[nodiscard]] std::size_t keyframe_count() const;
   [[nodiscard]] std::uint64_t keyframes_made() const;
+  // The numbers (trail/keyframe.h) of those that are kept, increasing.
+  [[nodiscard]] std::vector<std::uint64_t> keyframe_numbers() const;
   // Empty while the robot's place in the map is not known (filter.h: placed).
   [[nodiscard]] MapperSnapshot Snapshot() const;
   // Ends the mapping: if the map is still being drawn again after a large loop, draws the rest.
@@ -90,7 +92,6 @@ class Mapper {
   // scan). From the next scan on it is not localized until it is found in its map: near that pose, or anywhere
   // (recovery/recovery.h). Nothing happens before there is a map.
   void Relocalise(const std::optional<Pose2>& T_map_robot);
-  [[nodiscard]] std::vector<std::uint64_t> keyframe_numbers() const;
   // T_map_robot of every keyframe along the best path; empty while the robot's place in the map is not known.
   [[nodiscard]] std::vector<Pose2> BestPath() const;
 

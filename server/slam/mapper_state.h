@@ -74,7 +74,7 @@ struct Mapper::State {
   StepMotion MotionTo(const Keyframe& keyframe, const TrackStep& step, const Eigen::Matrix3d& covariance);
   void CloseLargeLoop();
   void RetireKeyframes();
-  void Follow(std::span<const Pose2> first_poses);
+  void Follow(std::span<const Pose2> first_poses, std::uint64_t made);
   [[nodiscard]] std::vector<Pose2> PosesOfFirst(std::uint64_t made, std::span<const Pose2> path,
                                                 std::span<const std::uint64_t> numbers) const;
   void KeepShape(std::span<const Pose2> path, std::size_t known);
@@ -92,7 +92,7 @@ struct Mapper::State {
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     archive(self.recovery, self.trail, self.front_end, self.blind, self.speed, self.loops, self.self_check,
-            self.drawing, self.level, self.last_scan, self.looked_at_size);
+            self.drawing, self.level, self.last_scan, self.size_after_last_search);
   }
 
   // The last scan that was reported as part of the path and was not tilted.
@@ -136,7 +136,7 @@ struct Mapper::State {
   MapDrawing drawing;
   LevelScan level;
   std::optional<LastScan> last_scan;
-  std::uint64_t looked_at_size = 0;  // Number of keyframes after those that show nothing new were looked for last.
+  std::uint64_t size_after_last_search = 0;  // Number of keyframes left after RetireKeyframes looked last.
 };
 
 }  // namespace cairn::slam

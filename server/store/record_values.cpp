@@ -55,10 +55,11 @@ void Fill(record::Grid& to, const StoredGrid& from) {
     added.set_log_odds(chunk.cells.get(), kChunkBytes);
   }
   if (from.path == nullptr) return;
+  const bool all = from.numbers == nullptr || from.keyframes == from.numbers->size();
+  if (!all) to.mutable_numbers()->Add(from.numbers->begin(), from.numbers->end());
+  auto& numbers = all ? *to.mutable_path() : *to.mutable_kept_path();
   for (const Pose2& pose : *from.path)
-    for (const double number : {pose.x, pose.y, pose.theta}) to.add_path(number);
-  if (from.numbers != nullptr && from.keyframes != from.numbers->size())
-    to.mutable_numbers()->Add(from.numbers->begin(), from.numbers->end());
+    for (const double number : {pose.x, pose.y, pose.theta}) numbers.Add(number);
 }
 
 Pose2 ValueOf(const record::Pose& from) {
@@ -98,19 +99,20 @@ Result<StoredGrid> ValueOf(const record::Grid& from) {
     const std::int16_t* const first = cells->data();
     grid.chunks.push_back({chunk.x(), chunk.y(), std::shared_ptr<const std::int16_t>(std::move(cells), first)});
   }
-  if (from.path().empty()) return grid;
-  const std::uint64_t poses = from.numbers().empty() ? grid.keyframes : static_cast<std::uint64_t>(from.numbers_size());
-  if (static_cast<std::uint64_t>(from.path_size()) != 3 * poses) return Unreadable("the path of a grid");
-  if (!from.numbers().empty()) {
-    auto numbers = std::make_shared<std::vector<std::uint64_t>>(from.numbers().begin(), from.numbers().end());
-    if (std::ranges::adjacent_find(*numbers, std::greater_equal<>()) != numbers->end() ||
-        numbers->back() >= grid.keyframes)
+  const bool all = from.numbers().empty();
+  const auto& numbers = all ? from.path() : from.kept_path();
+  if (numbers.empty() && all) return grid;
+  const std::uint64_t poses = all ? grid.keyframes : static_cast<std::uint64_t>(from.numbers_size());
+  if (static_cast<std::uint64_t>(numbers.size()) != 3 * poses) return Unreadable("the path of a grid");
+  if (!all) {
+    auto kept = std::make_shared<std::vector<std::uint64_t>>(from.numbers().begin(), from.numbers().end());
+    if (std::ranges::adjacent_find(*kept, std::greater_equal<>()) != kept->end() || kept->back() >= grid.keyframes)
       return Unreadable("the keyframes of a grid");
-    grid.numbers = std::move(numbers);
+    grid.numbers = std::move(kept);
   }
   auto path = std::make_shared<std::vector<Pose2>>();
-  for (int i = 0; i < from.path_size(); i += 3) {
-    const Pose2& pose = path->emplace_back(Pose2{from.path(i), from.path(i + 1), WrapAngle(from.path(i + 2))});
+  for (int i = 0; i < numbers.size(); i += 3) {
+    const Pose2& pose = path->emplace_back(Pose2{numbers[i], numbers[i + 1], WrapAngle(numbers[i + 2])});
     if (!pose.IsFinite() || pose.translation().cwiseAbs().maxCoeff() > kFarthestM)
       return Unreadable("the path of a grid");
   }

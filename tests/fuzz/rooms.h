@@ -20,6 +20,8 @@ inline slam::MapperOptions TinyEstimator() {
   options.filter.particles = 4;
   options.max_chunks = 256;
   options.max_keyframes = 64;
+  options.retire.from_keyframes = 4;
+  options.retire.recent_keyframes = 2;
   options.grid.resolution_m = kResolution_m;
   return options;
 }

@@ -4,10 +4,11 @@ const KEY = 'cairn-token';
 const said = document.getElementById('said');
 let timer = 0;
 
-export function say(text) {
+// `stays`: until something else is said.
+export function say(text, stays = false) {
   said.textContent = text;
   clearTimeout(timer);
-  timer = setTimeout(() => { said.textContent = ''; }, 6000);
+  if (!stays) timer = setTimeout(() => { said.textContent = ''; }, 6000);
 }
 
 export const token = () => sessionStorage.getItem(KEY) ?? '';

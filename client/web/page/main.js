@@ -99,8 +99,8 @@ function relocalise(name, how, pose) {
   const robot = state.robots.find((one) => one.name === name);
   if (!map || !robot?.pose) return;
   if (map.placing === name) { map.stopPlacing(); return; }
-  say(`Press where ${name} is, and drag to where it looks. Escape, or the button again, leaves it as it is.`);
   map.place(name, robot.pose.theta, (placed) => { if (placed) tell(placed); else say(''); });
+  say(`Press where ${name} is, and drag to where it looks. Escape, or the button again, leaves it as it is.`, true);
 }
 
 function showFlow() {

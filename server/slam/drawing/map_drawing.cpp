@@ -20,8 +20,8 @@ void MapDrawing::Add(const Keyframe& keyframe, const Pose2& T_map_robot) {
   DrawOnto(grid_, keyframe, T_map_robot);
 }
 
-void MapDrawing::StartAgain(std::size_t keyframes) {
-  changed_at_ = keyframes;
+void MapDrawing::StartAgain(std::uint64_t made) {
+  changed_at_ = made;
   redraw_ = Redraw{OccupancyGrid(grid_.options()), 0};
 }
 
@@ -46,17 +46,15 @@ void MapDrawing::Continue(std::span<const Keyframe> keyframes, const PosePath& p
 void MapDrawing::Retire(const Retirement& retirement) {
   KeepOnly(path_, retirement);
   frozen_path_.Forget();
-  changed_at_ =
-      static_cast<std::size_t>(std::ranges::lower_bound(retirement.kept, changed_at_) - retirement.kept.begin());
 }
 
 void MapDrawing::Finish(std::span<const Keyframe> keyframes, const PosePath& path) {
   while (redraw_) Continue(keyframes, path);
 }
 
-void MapDrawing::Adopt(OccupancyGrid grid, std::size_t drawn, std::span<const Keyframe> keyframes, const PosePath& path,
-                       bool along_path) {
-  const bool outdated = drawn < changed_at_ || (redraw_ && !along_path);
+void MapDrawing::Adopt(OccupancyGrid grid, std::uint64_t made, std::size_t drawn, std::span<const Keyframe> keyframes,
+                       const PosePath& path, bool along_path) {
+  const bool outdated = made < changed_at_ || (redraw_ && !along_path);
   redraw_.reset();
   grid_.ReplaceBy(std::move(grid));
   for (std::size_t k = drawn; k < keyframes.size(); ++k) DrawOnto(grid_, keyframes[k], path[k]);

@@ -24,8 +24,8 @@ class MapDrawing {
 
   // Draws the next keyframe at this pose.
   void Add(const Keyframe& keyframe, const Pose2& T_map_robot);
-  // The poses of the first `keyframes` keyframes have changed: begins to draw all of them again.
-  void StartAgain(std::size_t keyframes);
+  // The poses of all keyframes have changed, when there had been so many (Trail::made): begins to draw them again.
+  void StartAgain(std::uint64_t made);
   // For keyframes that could not be drawn before, because their place in the map was not known, and that now
   // lie along `path`: draws the last of them, and then begins to draw all of them.
   void Begin(std::span<const Keyframe> keyframes, const PosePath& path);
@@ -33,17 +33,17 @@ class MapDrawing {
   void Continue(std::span<const Keyframe> keyframes, const PosePath& path);
   // Like Continue, but draws all remaining keyframes.
   void Finish(std::span<const Keyframe> keyframes, const PosePath& path);
-  // Replaces the map by one that a job drew from the first `drawn` keyframes, and draws the other keyframes
-  // onto it. A map from before a change of the path is also taken, and then drawn again. `along_path`: the given map
-  // was drawn along `path`, which has changed with it.
-  void Adopt(OccupancyGrid grid, std::size_t drawn, std::span<const Keyframe> keyframes, const PosePath& path,
-             bool along_path = false);
+  // Replaces the map by one that a job drew when there had been `made` keyframes, of which the first `drawn` are left,
+  // and draws the later ones onto it. A map from before a change of the path is also taken, and then drawn again.
+  // `along_path`: the given map was drawn along `path`, which has changed with it.
+  void Adopt(OccupancyGrid grid, std::uint64_t made, std::size_t drawn, std::span<const Keyframe> keyframes,
+             const PosePath& path, bool along_path = false);
 
   // Keyframes are retired: what they have drawn stays. REQUIRES: not redrawing().
   void Retire(const Retirement& retirement);
 
-  // The number of keyframes when the path changed last.
-  [[nodiscard]] std::size_t changed_at() const { return changed_at_; }
+  // How many keyframes there had been when the path changed last.
+  [[nodiscard]] std::uint64_t changed_at() const { return changed_at_; }
   [[nodiscard]] bool redrawing() const { return redraw_.has_value(); }
   [[nodiscard]] const OccupancyGrid& grid() const { return grid_; }
   [[nodiscard]] OccupancyGrid::Chunks Share() { return grid_.Share(); }
@@ -73,7 +73,7 @@ class MapDrawing {
   std::vector<Pose2> path_;
   FrozenBlocks<Pose2> frozen_path_;  // For checkpoints.
   std::optional<Redraw> redraw_;     // The new map, while it is being drawn after a change of the path.
-  std::size_t changed_at_ = 0;       // Number of keyframes when the path changed.
+  std::uint64_t changed_at_ = 0;     // How many keyframes there had been when the path changed.
 };
 
 }  // namespace cairn::slam

@@ -88,8 +88,8 @@ class Filter {
   virtual void Rebase(std::span<const Pose2> /*path*/) {}
   // True if the filter supports Retire.
   [[nodiscard]] virtual bool retires() const { return false; }
-  // Gives up committed keyframes: the paths go on without them, and what was seen from them counts as seen from those
-  // that stand for them. REQUIRES: retires(), and called between steps.
+  // Gives up committed keyframes: the paths go on without them, and what was seen from them counts as seen from their
+  // representatives. REQUIRES: retires(), and called between steps.
   virtual void Retire(const Retirement& /*retirement*/) {}
 
   // False as long as the pose of the robot in `map` is not known; its poses are then relative to its start.

@@ -60,7 +60,7 @@ class LoopSearch {
   // one pose T_map_robot per keyframe.
   [[nodiscard]] std::optional<LoopClosure> Find(const Trail& trail, const PosePath& path);
 
-  // Forgets the loops that are not confirmed yet if their old keyframe is retired.
+  // Forgets the loops that are not confirmed yet if one of their keyframes is retired.
   void Retire(const Retirement& retirement);
 
   template <typename Archive>

@@ -18,7 +18,7 @@
 
 namespace cairn::slam {
 
-// A keyframe of one of the sessions, each by its number.
+// A keyframe of one of the sessions, each by its index.
 struct SessionKeyframe {
   std::size_t session = 0;
   std::size_t keyframe = 0;

@@ -61,8 +61,8 @@ struct RevisitObservation {
 
 // The state of a mapper at one moment as jobs use it, shared without locks: the keyframes, the path of the
 // best particle through them (full SLAM), the relations between them, and the pose of every scan relative to
-// the last keyframe before it. Of the scans during which the robot's place was not certain (recovery.h), only those are
-// here that became keyframes later.
+// the last keyframe before it, or to the one that represents that keyframe. Of the scans during which the robot's place
+// was not certain (recovery.h), only those are here that became keyframes later.
 struct MapperSnapshot {
   std::vector<Keyframe> keyframes;
   std::vector<std::uint64_t> numbers;  // Of the keyframes. Empty: 0, 1, 2, ...
@@ -73,7 +73,7 @@ struct MapperSnapshot {
   PoseGraphOptions pose_graph;
   struct ScanPlace {
     Stamp stamp = 0;
-    // Index of the last keyframe at or before the scan, or of the one that stands for it.
+    // Index of the last keyframe at or before the scan, or of the one that represents it.
     std::size_t keyframe = 0;
     Pose2 T_keyframe_robot;
 

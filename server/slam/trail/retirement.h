@@ -1,5 +1,5 @@
-// The keyframes that a trail gives up because others show the same (retirement_choice.h), and what becomes of their
-// indices. Plain values.
+// The keyframes that a trail gives up because others show the same (retirement_choice.h; the field speaks of keyframe
+// culling and graph reduction), and what becomes of their indices. Plain values.
 #pragma once
 
 #include <cstddef>
@@ -12,13 +12,12 @@ namespace cairn::slam {
 
 struct Retirement {
   std::vector<std::size_t> kept;  // The keyframes that stay, by their indices before, in order.
-  // Per keyframe: the kept one that stands for it, by its index before (its own where it stays) and afterwards, and its
-  // pose relative to that one.
-  std::vector<std::size_t> stands_for;
-  std::vector<std::size_t> index_after;
-  std::vector<Pose2> T_stands_keyframe;
+  std::vector<std::size_t>
+      representative;                    // Per keyframe: a kept one near it, by its index before; itself if it stays.
+  std::vector<std::size_t> index_after;  // Per keyframe: the index afterwards of its representative.
+  std::vector<Pose2> T_representative_keyframe;
 
-  [[nodiscard]] bool IsKept(std::size_t keyframe) const { return stands_for[keyframe] == keyframe; }
+  [[nodiscard]] bool IsKept(std::size_t keyframe) const { return representative[keyframe] == keyframe; }
 };
 
 // Leaves only the values of the kept keyframes. REQUIRES: one value per keyframe.

@@ -1,8 +1,7 @@
-// Which keyframes of a trail show nothing new. A place that a robot passes day after day is kept as the first visit has
-// seen it, because the map hangs together by it, and as the last visits have, because they show it as it is now. The
-// visits between are retired if they are bound to the others by relations: each of their keyframes is represented by
-// one that stays at the same place, to which its relations are handed over (Trail::Retire). So memory and time follow
-// the area and not the way driven. Stateless, deterministic.
+// Which keyframes of a trail show nothing new. Of the visits of a place the first is kept, because later ones were
+// matched with it, and the last ones, because they show the place as it is now. The keyframes of the visits between are
+// retired where matches bind them to others: each is represented by a kept keyframe near it, which takes over its
+// relations (Trail::Retire). So memory and time follow the area and not the way driven. Stateless, deterministic.
 // Source: Johannsson et al. 2013 (a pose graph that grows with the area only).
 #pragma once
 

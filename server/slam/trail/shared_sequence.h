@@ -47,7 +47,7 @@ class SharedSequence {
     return Own<Leaf>(*link).values[Slot(index, 0)];
   }
 
-  // Nodes as they were, and as Rewrite has made them.
+  // Nodes as they were, and as Rewrite has made them. The former are held so that no new node gets the address of one.
   struct RewrittenNode {
     std::shared_ptr<void> before;
     std::shared_ptr<void> after;

@@ -65,9 +65,9 @@ SharedPoints Trail::points(std::size_t keyframe) const {
 
 bool Trail::IsConsistent() const {
   if (shapes_.size() != size()) return false;
+  if (!empty() && shapes_.back().number >= kMostMade) return false;
   for (std::size_t k = 1; k < size(); ++k)
     if (shapes_[k - 1].travelled_m > shapes_[k].travelled_m || shapes_[k - 1].number >= shapes_[k].number) return false;
-  if (made() > kMostMade) return false;
   return std::ranges::all_of(relations_, [this](const auto& one) { return one.from < size() && one.to < size(); }) &&
          std::ranges::all_of(scans_, [this](const auto& scan) { return scan.keyframe < size(); });
 }

@@ -1,7 +1,7 @@
 // The keyframes along the way of one robot: the keyframes themselves, their shapes, the relations between
 // them (the motion from each keyframe to the next, and the relative poses of keyframes whose place was seen
 // again: loops), the distances along these relations, which bound the error of two keyframes' relative pose,
-// and the place of every scan between them. It is the only owner of all this; searches and checks read it. It
+// and the places of the scans between them. It is the only owner of all this; searches and checks read it. It
 // does not contain the poses of the keyframes in the map: these are the filter's path. Not thread-safe.
 // Source: Lu and Milios 1997; distance along the graph as a measure of uncertainty: Bosse et al. 2004 (Atlas).
 #pragma once
@@ -70,14 +70,12 @@ class Trail {
   [[nodiscard]] const std::vector<MapperSnapshot::ScanPlace>& scans() const { return scans_; }
   // Steps, revisits and loops; empty as long as no place was seen again.
   [[nodiscard]] std::vector<PoseRelation> relations() const;
-  // Whether a place was seen again from this keyframe, or it from another.
-  [[nodiscard]] bool HasLoop(std::size_t keyframe) const { return !loops_[keyframe].empty(); }
   // How many keyframes there have been, with those that were retired.
   [[nodiscard]] std::uint64_t made() const { return empty() ? 0 : shapes_.back().number + 1; }
   [[nodiscard]] std::vector<std::uint64_t> numbers() const;  // Of the keyframes.
   // How many of the keyframes have a smaller number.
   [[nodiscard]] std::size_t CountBelow(std::uint64_t number) const;
-  // Gives up keyframes. What they knew is handed over to those that stand for them: their relations, as far as they are
+  // Gives up keyframes. What they knew is handed over to their representatives: their relations, as far as they are
   // not repetitions, and the scans seen from them. REQUIRES: the last keyframe stays.
   void Retire(const Retirement& retirement);
 

@@ -10,7 +10,7 @@
 namespace cairn::slam {
 namespace {
 
-// How well the place of a retired keyframe relative to the one that stands for it is known.
+// How well the place of a retired keyframe relative to its representative is known.
 constexpr double kPlaceSigmaM = 0.05;
 constexpr double kPlaceSigmaRad = 0.01;
 // A relation that is handed over is given up if both its keyframes have so many loops already. Otherwise relations
@@ -39,14 +39,14 @@ class Components {
   std::vector<std::size_t> parent_;
 };
 
-// The same relation between the keyframes that stand for its two.
+// The same relation between the representatives of its two keyframes.
 PoseRelation HandedOver(const PoseRelation& relation, const Retirement& retirement) {
-  const Pose2& T_stands_from = retirement.T_stands_keyframe[relation.from];
-  const Pose2& T_stands_to = retirement.T_stands_keyframe[relation.to];
+  const Pose2& T_representative_from = retirement.T_representative_keyframe[relation.from];
+  const Pose2& T_representative_to = retirement.T_representative_keyframe[relation.to];
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
-  R.topLeftCorner<2, 2>() = T_stands_from.rotation();
-  PoseRelation result{retirement.stands_for[relation.from], retirement.stands_for[relation.to],
-                      T_stands_from * relation.T_from_to * T_stands_to.Inverse(),
+  R.topLeftCorner<2, 2>() = T_representative_from.rotation();
+  PoseRelation result{retirement.representative[relation.from], retirement.representative[relation.to],
+                      T_representative_from * relation.T_from_to * T_representative_to.Inverse(),
                       R * relation.covariance * R.transpose(), true};
   for (const std::size_t keyframe : {relation.from, relation.to})
     if (!retirement.IsKept(keyframe)) result.covariance += PoseCovariance(kPlaceSigmaM, kPlaceSigmaRad);
@@ -88,7 +88,7 @@ void Trail::Retire(const Retirement& retirement) {
   relations_ = Contracted(relations_, retirement);
   for (MapperSnapshot::ScanPlace& scan : scans_) {
     if (!retirement.IsKept(scan.keyframe))
-      scan.T_keyframe_robot = retirement.T_stands_keyframe[scan.keyframe] * scan.T_keyframe_robot;
+      scan.T_keyframe_robot = retirement.T_representative_keyframe[scan.keyframe] * scan.T_keyframe_robot;
     scan.keyframe = retirement.index_after[scan.keyframe];
   }
   if (scans_.size() > kMostScans) {

@@ -1,7 +1,7 @@
 // Bounds from above how long the shortest way along the relations is from the last keyframe to any other. It remembers
 // the lengths from some keyframes (the hubs), for which all were computed once, and continues them with each keyframe
-// that comes: keyframes and relations are only added, so no way becomes longer, and a way through a hub is a way. So a
-// robot that stays in one building needs no search through all its keyframes any more. Not thread-safe.
+// that comes: keyframes and relations are only added (until Clear), so no way becomes longer, and a way through a hub
+// is a way. So a robot that stays in one building needs no search through all its keyframes any more. Not thread-safe.
 // Source: landmarks and the triangle inequality as in Goldberg and Harrelson 2005 (there for bounds from below).
 #pragma once
 

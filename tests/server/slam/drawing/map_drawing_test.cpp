@@ -37,16 +37,17 @@ std::size_t ChunksOfOne() {
   return grid.chunk_count();
 }
 
-// What a retired keyframe has drawn stays, and the counts of keyframes are those of the kept ones.
+// What a retired keyframe has drawn stays.
 TEST(MapDrawing, KeepsWhatRetiredKeyframesHaveDrawn) {
   const std::vector<Keyframe> keyframes = Keyframes(kKeyframes);
   MapDrawing drawing{GridOptions{}};
   for (std::size_t k = 0; k < kKeyframes; ++k) drawing.Add(keyframes[k], PlaceOf(k));
   drawing.StartAgain(3);
   drawing.Finish(keyframes, Path());
-  drawing.Retire({.kept = {0, 3}, .stands_for = {0, 0, 0, 3}, .index_after = {0, 0, 0, 1}, .T_stands_keyframe = {}});
+  drawing.Retire(
+      {.kept = {0, 3}, .representative = {0, 0, 0, 3}, .index_after = {0, 0, 0, 1}, .T_representative_keyframe = {}});
   EXPECT_EQ(drawing.path(), (std::vector<Pose2>{PlaceOf(0), PlaceOf(3)}));
-  EXPECT_EQ(drawing.changed_at(), 1U) << "the first was there when the path changed";
+  EXPECT_EQ(drawing.changed_at(), 3U);
   EXPECT_EQ(drawing.grid().chunk_count(), kKeyframes * ChunksOfOne());
 }
 
@@ -65,7 +66,7 @@ TEST(MapDrawing, DrawsNoKeyframeThatIsNotLocalized) {
   EXPECT_EQ(drawing.grid().chunk_count(), drawn);
   EXPECT_EQ(drawing.path().size(), kKeyframes);
 
-  drawing.Adopt(OccupancyGrid(GridOptions{}), 0, keyframes, Path());
+  drawing.Adopt(OccupancyGrid(GridOptions{}), 0, 0, keyframes, Path());
   EXPECT_EQ(drawing.grid().chunk_count(), drawn);
 
   MapDrawing begun{GridOptions{}};
@@ -146,7 +147,7 @@ TEST_F(RedrawnMap, BeginDrawsTheLastKeyframeAtOnceAndTheOthersLater) {
 }
 
 TEST_F(RedrawnMap, AnAdoptedGridGetsTheKeyframesThatTheJobDidNotHave) {
-  drawing_.Adopt(GridOf(40, CorrectedPlaceOf), 40, keyframes_, corrected_);
+  drawing_.Adopt(GridOf(40, CorrectedPlaceOf), 40, 40, keyframes_, corrected_);
   EXPECT_FALSE(drawing_.redrawing());
   EXPECT_EQ(drawing_.grid().chunk_count(), kMany * ChunksOfOne());
   for (const std::size_t k : {std::size_t{39}, std::size_t{40}, kMany - 1}) EXPECT_TRUE(DrawnAt(CorrectedPlaceOf(k)));
@@ -155,9 +156,9 @@ TEST_F(RedrawnMap, AnAdoptedGridGetsTheKeyframesThatTheJobDidNotHave) {
 TEST_F(RedrawnMap, AGridFromBeforeTheLastChangeOfThePathIsDrawnAgain) {
   drawing_.StartAgain(40);  // The path changed when there were 40 keyframes.
   drawing_.Finish(keyframes_, corrected_);
-  drawing_.Adopt(GridOf(40, CorrectedPlaceOf), 40, keyframes_, corrected_);
+  drawing_.Adopt(GridOf(40, CorrectedPlaceOf), 40, 40, keyframes_, corrected_);
   EXPECT_FALSE(drawing_.redrawing()) << "the job had all keyframes whose poses changed";
-  drawing_.Adopt(GridOf(39, PlaceOf), 39, keyframes_, corrected_);
+  drawing_.Adopt(GridOf(39, PlaceOf), 39, 39, keyframes_, corrected_);
   EXPECT_TRUE(drawing_.redrawing());
   EXPECT_TRUE(DrawnAt(PlaceOf(0))) << "it is adopted first, so that the job is answered";
   drawing_.Finish(keyframes_, corrected_);
@@ -168,7 +169,7 @@ TEST_F(RedrawnMap, AGridFromBeforeTheLastChangeOfThePathIsDrawnAgain) {
 TEST_F(RedrawnMap, AGridThatComesWhileTheMapIsDrawnAgainDoesNotEndThat) {
   drawing_.StartAgain(40);
   drawing_.Continue(keyframes_, corrected_);
-  drawing_.Adopt(GridOf(kMany, PlaceOf), kMany, keyframes_, corrected_);
+  drawing_.Adopt(GridOf(kMany, PlaceOf), kMany, kMany, keyframes_, corrected_);
   EXPECT_TRUE(drawing_.redrawing());
   drawing_.Finish(keyframes_, corrected_);
   EXPECT_EQ(drawing_.grid().chunk_count(), kMany * ChunksOfOne());

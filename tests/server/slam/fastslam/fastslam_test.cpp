@@ -113,7 +113,7 @@ TYPED_TEST(FastSlamVariants, LandmarksSeenAgainPullTheRobotBack) {
   EXPECT_GT(filter.landmarks()[0].sightings, 3U);
 }
 
-// Landmarks that were first seen from a retired keyframe move with the one that stands for it.
+// Landmarks that were first seen from a retired keyframe move with its representative.
 TYPED_TEST(FastSlamVariants, RetiredKeyframesLeaveAllPathsAndTheirLandmarksStay) {
   auto filter = Make<TypeParam>::Filter(3);
   for (int i = 0; i < 6; ++i) {
@@ -126,9 +126,9 @@ TYPED_TEST(FastSlamVariants, RetiredKeyframesLeaveAllPathsAndTheirLandmarksStay)
   const Eigen::Vector2d landmark = filter.landmarks().front().p_map;
   ASSERT_TRUE(filter.retires());
   filter.Retire({.kept = {0, 3, 4, 5},
-                 .stands_for = {0, 3, 3, 3, 4, 5},
+                 .representative = {0, 3, 3, 3, 4, 5},
                  .index_after = {0, 1, 1, 1, 2, 3},
-                 .T_stands_keyframe = {}});
+                 .T_representative_keyframe = {}});
   for (std::size_t i = 0; i < filter.hypothesis_count(); ++i) ASSERT_EQ(filter.hypothesis(i).path.size(), 4U);
   EXPECT_EQ(filter.hypothesis(0).path[1], before[3]);
   EXPECT_EQ(filter.hypothesis(0).path[3], before[5]);

@@ -41,7 +41,7 @@ TEST(RetirementChoice, KeepsTheFirstVisitOfAPlaceAndTheLast) {
   const Rounds drive = Drive(10);
   const auto chosen = ChooseRetired(drive.trail, drive.path, drive.trail.size(), kOptions);
   ASSERT_TRUE(chosen);
-  ASSERT_EQ(chosen->stands_for.size(), drive.trail.size());
+  ASSERT_EQ(chosen->representative.size(), drive.trail.size());
   for (std::size_t k = 0; k < drive.trail.size(); ++k) {
     const std::size_t round = k / kPerRound;
     // A visit at the end of a round and the beginning of the next is one.
@@ -55,16 +55,55 @@ TEST(RetirementChoice, KeepsTheFirstVisitOfAPlaceAndTheLast) {
   EXPECT_LT(chosen->kept.size(), 4 * kPerRound);
 }
 
-TEST(RetirementChoice, OneThatStaysAtTheSamePlaceStandsForEach) {
+TEST(RetirementChoice, EachIsRepresentedByAKeptOneAtTheSamePlace) {
   const Rounds drive = Drive(10);
   const auto chosen = ChooseRetired(drive.trail, drive.path, drive.trail.size(), kOptions);
   ASSERT_TRUE(chosen);
   for (std::size_t k = 0; k < drive.trail.size(); ++k) {
-    const std::size_t stands = chosen->stands_for[k];
-    ASSERT_TRUE(chosen->IsKept(stands));
-    EXPECT_EQ(chosen->kept[chosen->index_after[k]], stands);
-    EXPECT_LT((drive.path[k].translation() - drive.path[stands].translation()).norm(), 1e-9);
-    EXPECT_LT(std::abs(AngleDiff(drive.path[k].theta, drive.path[stands].theta)), 1e-9);
+    const std::size_t represents = chosen->representative[k];
+    ASSERT_TRUE(chosen->IsKept(represents));
+    EXPECT_EQ(chosen->kept[chosen->index_after[k]], represents);
+    EXPECT_LT((drive.path[k].translation() - drive.path[represents].translation()).norm(), 1e-9);
+    EXPECT_LT(std::abs(AngleDiff(drive.path[k].theta, drive.path[represents].theta)), 1e-9);
+  }
+}
+
+// A job has added relations along the same drive, 10 m on.
+TEST(RetirementChoice, RelationsAlongTheSameDriveAreNoMatches) {
+  const auto add = [](Rounds& drive) {
+    for (std::size_t k = 50; k < drive.trail.size(); ++k)
+      drive.trail.AddLoop(
+          {k - 50, k, Between(drive.path[k - 50], drive.path[k]), 1e-4 * Eigen::Matrix3d::Identity(), true});
+  };
+  Rounds drive = Drive(10);
+  add(drive);
+  const auto chosen = ChooseRetired(drive.trail, drive.path, drive.trail.size(), kOptions);
+  ASSERT_TRUE(chosen);
+  EXPECT_LT(chosen->kept.size(), 4 * kPerRound);
+  for (std::size_t k = 0; k < drive.trail.size(); ++k)
+    EXPECT_LT((drive.path[k].translation() - drive.path[chosen->representative[k]].translation()).norm(), 1e-9) << k;
+  Rounds loose = Drive(10, false);
+  add(loose);
+  EXPECT_FALSE(ChooseRetired(loose.trail, loose.path, loose.trail.size(), kOptions));
+}
+
+// Only every tenth keyframe has a match, 2 m apart.
+TEST(RetirementChoice, ARepresentativeIsNear) {
+  Rounds drive;
+  for (std::size_t k = 0; k < 10 * kPerRound; ++k) {
+    const Pose2 pose = Drive(1).path[k % kPerRound];
+    std::optional<RevisitObservation> revisit;
+    if (k >= kPerRound && k % 10 == 0) revisit = RevisitObservation{k - kPerRound, {}, Eigen::Matrix3d::Identity()};
+    drive.trail.Append({std::make_shared<const Scan>(), {}}, pose, {}, Eigen::Matrix3d::Zero(), revisit);
+    drive.path.Append(pose);
+  }
+  const auto chosen = ChooseRetired(drive.trail, drive.path, drive.trail.size(), kOptions);
+  ASSERT_TRUE(chosen);
+  EXPECT_LT(chosen->kept.size(), 5 * kPerRound);
+  for (std::size_t k = 0; k < drive.trail.size(); ++k) {
+    const Pose2 T = Between(drive.path[chosen->representative[k]], drive.path[k]);
+    EXPECT_LT(T.translation().norm(), 3.01) << k;
+    EXPECT_LT(Between(T, chosen->T_representative_keyframe[k]).translation().norm(), 1e-6) << k;
   }
 }
 

@@ -46,19 +46,20 @@ void DriveOn(Trail& trail, std::size_t first, std::size_t end) {
   }
 }
 
-// Gives up [first, end); those of the first round stand for them. The indices are those of the keyframes' numbers
+// Gives up [first, end); those of the first round represent them. The indices are those of the keyframes' numbers
 // still.
 Retirement GivingUp(const Trail& trail, std::size_t first, std::size_t end) {
   Retirement retirement;
   for (std::size_t k = 0; k < trail.size(); ++k) {
     const bool kept = k < first || k >= end;
-    const std::size_t stands = kept ? k : k % kPerRound;
-    retirement.stands_for.push_back(stands);
-    retirement.T_stands_keyframe.push_back(
-        Between(PoseAt(trail.shapes()[stands].number), PoseAt(trail.shapes()[k].number)));
+    const std::size_t represents = kept ? k : k % kPerRound;
+    retirement.representative.push_back(represents);
+    retirement.T_representative_keyframe.push_back(
+        Between(PoseAt(trail.shapes()[represents].number), PoseAt(trail.shapes()[k].number)));
     if (kept) retirement.kept.push_back(k);
   }
-  for (const std::size_t k : retirement.stands_for) retirement.index_after.push_back(k < first ? k : k - (end - first));
+  for (const std::size_t k : retirement.representative)
+    retirement.index_after.push_back(k < first ? k : k - (end - first));
   return retirement;
 }
 
