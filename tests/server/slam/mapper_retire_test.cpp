@@ -73,7 +73,7 @@ TEST(MapperRetires, ItKeepsFewerKeyframesAndIsAsExact) {
   EXPECT_LT(few.mapper.keyframe_count(), 0.75 * static_cast<double>(all.mapper.keyframe_count()));
   EXPECT_EQ(few.lost, 0);
   EXPECT_LT(few.worst_m, all.worst_m + 0.05);
-  EXPECT_LT(WorstError(few.mapper), WorstError(all.mapper) + 0.05);
+  EXPECT_LT(WorstError(few.mapper), WorstError(all.mapper) + 0.02);
   EXPECT_LT(ShareMissing(all.mapper.grid(), few.mapper.grid()), 0.02);
   EXPECT_EQ(few.mapper.landmarks().size() > 0, all.mapper.landmarks().size() > 0);
 }
