@@ -82,7 +82,7 @@ void MarkBetween(const std::vector<std::size_t>& in_cell, std::span<const Keyfra
   for (std::size_t i = begins[1]; i < end; ++i) marked[in_cell[i]] = may[in_cell[i]];
 }
 
-// Each piece of the path that is left out ends some stretches along which searches go.
+// Searches use keyframes that follow each other (StretchAround), so a gap costs more than a few keyframes.
 void KeepShortRuns(std::vector<bool>& marked) {
   for (std::size_t k = 0; k < marked.size();) {
     std::size_t end = k + 1;

@@ -19,11 +19,11 @@ constexpr std::size_t kEnoughLoops = 12;
 // Of more scans between keyframes than this the older ones are given up.
 constexpr std::size_t kMostScans = 1 << 17;  // 5 MiB.
 
-// Which keyframes hang together.
+// The connected components of a graph of keyframes (union-find).
 class Components {
  public:
   explicit Components(std::size_t size) : parent_(size) { std::iota(parent_.begin(), parent_.end(), std::size_t{0}); }
-  // True if they did not hang together before.
+  // True if the two were not connected before.
   bool Join(std::size_t a, std::size_t b) {
     a = RootOf(a);
     b = RootOf(b);
@@ -53,7 +53,8 @@ PoseRelation HandedOver(const PoseRelation& relation, const Retirement& retireme
   return result;
 }
 
-// The relations between the keyframes that stay, by their indices afterwards. Keyframes that hung together still do.
+// The relations between the keyframes that stay, by their indices afterwards. Keyframes that were connected
+// still are.
 std::vector<PoseRelation> Contracted(const std::vector<PoseRelation>& relations, const Retirement& retirement) {
   std::vector<PoseRelation> result;
   Components components(retirement.kept.size());
