@@ -66,7 +66,7 @@ inline bool StartOn(MemoryStore& store) {
   Rooms rooms([](server::OutboundValue&&) {}, &journal);
   const auto sites = rooms.atlas().Restore();
   if (!sites) return Must(!sites.error().message.empty(), "a refusal has a reason"), false;
-  StartControl control;
+  server::StartControl control;
   const auto sessions = rooms.roster().Restore(control);
   if (!sessions) return Must(!sessions.error().message.empty(), "a refusal has a reason"), false;
   const auto jobs = rooms.jobs().Restore();
