@@ -229,9 +229,13 @@ Result<void> StartWatched(Server& server, asio::io_context& context, asio::signa
   LookAtStart(timer, control, 0, notifier);
   Result<void> started;
   {
-    std::jthread watching([&context] { context.run(); });
+    struct StopsAtTheEnd {
+      asio::io_context& context;
+      ~StopsAtTheEnd() { context.stop(); }
+    };
+    const std::jthread watching([&context] { context.run(); });
+    const StopsAtTheEnd stops{context};  // Also if an exception ends the start: the thread would not end otherwise.
     started = server.Start(control);
-    context.stop();
   }
   timer.cancel();
   signals.cancel();

@@ -125,11 +125,16 @@ class Roster {
     Result<std::optional<StoredCheckpoint>> checkpoint;
   };
   RestoredSession ReadBack(SessionId id, const Restoring& how);
-  RestoredSession FromCheckpoint(const Stored& stored, const slam::MapperOptions& mapper, const Restoring& how);
+  // A session in the state after the entries of its journal up to `position`, and the pieces of that checkpoint.
+  struct Begun {
+    std::shared_ptr<Session> session;
+    std::uint64_t position = 0;
+    StoredPieces pieces;
+  };
   std::shared_ptr<Session> MakeToRestore(const Stored& stored, const slam::MapperOptions& mapper) const;
+  Result<Begun> LoadCheckpoint(const Stored& stored, const slam::MapperOptions& mapper) const;
   RestoredSession FromJournal(const Stored& stored, const Restoring& how);
-  RestoredSession GoOn(const Stored& stored, std::shared_ptr<Session> session, std::uint64_t position,
-                       StoredPieces pieces, const Restoring& how);
+  RestoredSession GoOn(const Stored& stored, Begun begun, const Restoring& how);
   // The session that has to be removed before this robot can have a new one; null if there is room.
   Result<std::shared_ptr<Session>> GivesWay(NameId robot_id) const CAIRN_REQUIRES(mutex_);
   void Refuse(const SessionRequest& request, Status status);

@@ -88,7 +88,11 @@ Result<void> Roster::RestoreTogether(const std::vector<SessionId>& ids, const Re
   if (auto marked = how.marks->Begin(ids); !marked) return marked;
   std::vector<RestoredSession> sessions = RestoreEach(ids, how);
   if (auto unmarked = how.marks->Succeeded(ids); !unmarked) return unmarked;
-  if (how.control.given_up()) return GivenUp();
+  if (how.control.given_up()) {
+    for (const RestoredSession& session : sessions)
+      if (session) (*session)->KeepStored();
+    return GivenUp();
+  }
   for (std::size_t i = 0; i < ids.size(); ++i) Register(ids[i], std::move(sessions[i]));
   return {};
 }
@@ -104,6 +108,7 @@ Result<void> Roster::RestoreDoubtful(SessionId id, Restoring how) {
   if (auto marked = how.with_journal ? marks.Begin({id}) : marks.BeginWithoutJournal(id); !marked) return marked;
   auto session = RestoreOne(id, how);
   if (how.control.given_up()) {
+    if (session) (*session)->KeepStored();
     if (auto marked = marks.Set(id, failures); !marked) return marked;
     return GivenUp();
   }
@@ -254,40 +259,39 @@ Roster::RestoredSession Roster::ReadBack(SessionId id, const Restoring& how) {
   if (!checkpoint && checkpoint.error().code != StatusCode::kDataLoss) return tl::unexpected(checkpoint.error());
   if (checkpoint && !*checkpoint) return FromJournal(stored, how);
 
-  RestoredSession session = checkpoint ? FromCheckpoint(stored, mapper_, how) : tl::unexpected(checkpoint.error());
-  if (session || how.control.given_up() || session.error().code == StatusCode::kUnimplemented) return session;
-  const Status why = session.error();
+  auto loaded = checkpoint ? LoadCheckpoint(stored, mapper_) : tl::unexpected(checkpoint.error());
+  if (loaded) return GoOn(stored, std::move(*loaded), how);
+  const Status why = loaded.error();
+  if (why.code == StatusCode::kUnimplemented) return tl::unexpected(why);
   const bool other_options = checkpoint && why.code == StatusCode::kFailedPrecondition;
   const auto options = other_options ? SessionEstimator::OptionsOf((*checkpoint)->bytes, mapper_)
                                      : Result<slam::MapperOptions>(tl::unexpected(why));
   if (!options || (how.with_journal && (*checkpoint)->position <= kMostReprocessed)) {
     spdlog::warn("the checkpoint of session {} is not used: {}", id, why.message);
-    session = FromJournal(stored, how);
+    auto session = FromJournal(stored, how);
     if (session || !options || how.control.given_up()) return session;
   }
   spdlog::warn("session {} goes on with the options that it was begun with: {}", id, why.message);
-  return FromCheckpoint(stored, *options, how);
+  loaded = LoadCheckpoint(stored, *options);
+  if (!loaded) return tl::unexpected(loaded.error());
+  return GoOn(stored, std::move(*loaded), how);
 }
 
-Roster::RestoredSession Roster::FromCheckpoint(const Stored& stored, const slam::MapperOptions& mapper,
-                                               const Restoring& how) {
+Result<Roster::Begun> Roster::LoadCheckpoint(const Stored& stored, const slam::MapperOptions& mapper) const {
   const StoredCheckpoint& checkpoint = **stored.checkpoint;
-  auto session = MakeToRestore(stored, mapper);
-  const auto loaded = session->Load(checkpoint.bytes, checkpoint.PiecesInOrder());
+  Begun begun{MakeToRestore(stored, mapper), checkpoint.position, {}};
+  const auto loaded = begun.session->Load(checkpoint.bytes, checkpoint.PiecesInOrder());
   if (!loaded) return tl::unexpected(loaded.error());
-  StoredPieces pieces;
-  for (const auto& [number, parts] : checkpoint.parts) pieces.emplace(number, StoredPiece{nullptr, parts});
-  for (std::size_t i = 0; i < loaded->size(); ++i) pieces[checkpoint.order[i]].value = (*loaded)[i];
-  if (how.with_journal) return GoOn(stored, std::move(session), checkpoint.position, std::move(pieces), how);
-  session->Replayed();
-  return session;  // To be dropped, with its records kept.
+  for (const auto& [number, parts] : checkpoint.parts) begun.pieces.emplace(number, StoredPiece{nullptr, parts});
+  for (std::size_t i = 0; i < loaded->size(); ++i) begun.pieces[checkpoint.order[i]].value = (*loaded)[i];
+  return begun;
 }
 
 // From the first entry on.
 Roster::RestoredSession Roster::FromJournal(const Stored& stored, const Restoring& how) {
   if (!how.with_journal)
     return Fail(StatusCode::kDataLoss, "it has no checkpoint that can be used, and its journal is left out");
-  return GoOn(stored, MakeToRestore(stored, mapper_), 0, {}, how);
+  return GoOn(stored, {MakeToRestore(stored, mapper_), 0, {}}, how);
 }
 
 std::shared_ptr<Session> Roster::MakeToRestore(const Stored& stored, const slam::MapperOptions& mapper) const {
@@ -297,14 +301,18 @@ std::shared_ptr<Session> Roster::MakeToRestore(const Stored& stored, const slam:
   return session;
 }
 
-// Processes the journal after `position` again.
-Roster::RestoredSession Roster::GoOn(const Stored& stored, std::shared_ptr<Session> session, std::uint64_t position,
-                                     StoredPieces pieces, const Restoring& how) {
+// Processes the journal that follows again.
+Roster::RestoredSession Roster::GoOn(const Stored& stored, Begun begun, const Restoring& how) {
+  auto& [session, position, pieces] = begun;
+  if (!how.with_journal) {
+    session->Replayed();
+    return session;  // To be dropped, with its records kept.
+  }
   const SessionId id = stored.session.id;
   const auto switched = [&stored](std::uint32_t epoch, std::uint64_t generation) {
     return stored.site->Switched(epoch, generation);
   };
-  const auto replay = [&](std::uint64_t at, JournalEntry&& entry) -> Result<void> {
+  const auto replay = [&, &session = session](std::uint64_t at, JournalEntry&& entry) -> Result<void> {
     if (how.control.given_up()) return GivenUp();
     session->Replay(std::move(entry), switched);
     how.control.Advance();
