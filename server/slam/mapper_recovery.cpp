@@ -98,8 +98,10 @@ bool Mapper::State::GoesOn(const Scan& scan, const std::vector<SurfacePoint>& po
   const double allowed_m = limits.as_odometry_m + limits.as_odometry_per_m * odometry.translation().norm();
   if (error.translation().norm() > allowed_m || std::abs(error.theta) > limits.as_odometry_rad) return false;
   using Agreement = PlaceSearch::Agreement;
+  const PosePath path = believed_path();
+  const PathMap own_map(trail, path, options.recovery.place, options.self_check.near_m);
   const auto agreement = [&](const Scan& one, const std::vector<SurfacePoint>& points, const Pose2& T_track_robot) {
-    return recovery.Compare(one, points, T_map_track() * T_track_robot, trail, believed_path());
+    return recovery.Compare(one, points, T_map_track() * T_track_robot, own_map);
   };
   const Agreement now = agreement(scan, points_robot, step.T_track_robot);
   if (now != Agreement::kDoubtful) return now == Agreement::kAgrees;
@@ -141,8 +143,9 @@ ScanOutcome Mapper::State::Recover(Keyframe keyframe, ScanView view, TrackStep s
     if (keep) recovery.Hold({keyframe, step, blind.TakeCovariance()});
   }
   if (keep || first) {
-    const auto found =
-        recovery.Take({keyframe.scan, OdometryOrNone(T_odom_robot)}, step, view.points_robot, trail, believed_path());
+    const PosePath path = believed_path();
+    const auto found = recovery.Take({keyframe.scan, OdometryOrNone(T_odom_robot)}, step, view.points_robot,
+                                     PathMap(trail, path, options.recovery.place, options.self_check.near_m));
     if (found && found->on_path) return GoOnAlongPath(parallel_for);
     if (found) return GoOnAt(found->place, std::move(keyframe), std::move(view), step, parallel_for);
   }

@@ -79,20 +79,19 @@ void Recovery::Append(const Keyframe& keyframe, const TrackStep& step, std::vect
 }
 
 std::optional<Recovery::Found> Recovery::Take(const Keyframe& keyframe, const TrackStep& step,
-                                              std::vector<SurfacePoint> points_robot, const Trail& trail,
-                                              const PosePath& path) {
+                                              std::vector<SurfacePoint> points_robot, const SearchedMap& map) {
   Append(keyframe, step, std::move(points_robot));
   const Pose2 T_map_robot = BeliefAt(keyframe.T_odom_robot, step.T_track_robot).T_map_robot;
-  contradicted_ = search_.Compare(trail, path, *recent_.back().scan, recent_.back().points, T_map_robot) ==
+  contradicted_ = search_.Compare(map, *recent_.back().scan, recent_.back().points, T_map_robot) ==
                   PlaceSearch::Agreement::kContradicts;
   if (contradicted_) LeavePath();
   if (said_) {
-    if (const auto place = search_.FindNear(trail, path, recent_, T_map_robot)) return Found{*place, false};
+    if (const auto place = search_.FindNear(map, recent_, T_map_robot)) return Found{*place, false};
   }
   const double travelled_m = recent_.back().travelled_m;
   if (searched_at_m_ != kNever && travelled_m - searched_at_m_ < loop_.every_m) return std::nullopt;
   searched_at_m_ = travelled_m;
-  const auto place = search_.Find(trail, path, recent_);
+  const auto place = search_.Find(map, recent_);
   if (!place || !IsConfirmed(place->T_map_robot)) return std::nullopt;
   const Pose2 error = Between(T_map_robot, place->T_map_robot);
   const bool on_path =

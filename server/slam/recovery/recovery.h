@@ -93,13 +93,11 @@ class Recovery {
 
   // Takes a scan, and searches. Returns the robot's place once it is confirmed.
   [[nodiscard]] std::optional<Found> Take(const Keyframe& keyframe, const TrackStep& step,
-                                          std::vector<SurfacePoint> points_robot, const Trail& trail,
-                                          const PosePath& path);
+                                          std::vector<SurfacePoint> points_robot, const SearchedMap& map);
   // How a scan at this pose agrees with what earlier scans have shown there.
   [[nodiscard]] PlaceSearch::Agreement Compare(const Scan& scan, const std::vector<SurfacePoint>& points_robot,
-                                               const Pose2& T_map_robot, const Trail& trail,
-                                               const PosePath& path) const {
-    return search_.Compare(trail, path, scan, points_robot, T_map_robot);
+                                               const Pose2& T_map_robot, const SearchedMap& map) const {
+    return search_.Compare(map, scan, points_robot, T_map_robot);
   }
   [[nodiscard]] Belief BeliefAt(const Pose2& T_odom_robot, const Pose2& T_track_robot) const;
 
