@@ -16,6 +16,8 @@
 #include <iostream>
 #include <memory>
 #include <sstream>
+#include <string>
+#include <thread>
 
 #include "common/options/config.h"
 #include "common/version.h"
@@ -200,6 +202,47 @@ Result<std::unique_ptr<Ros2Door>> OpenRos2(const CairndOptions& options, Inbound
   return door;
 }
 
+// Tells the service manager that the start goes on, as long as it does, so that it is not taken for one that hangs.
+void LookAtStart(asio::steady_timer& timer, const StartControl& control, std::uint64_t advanced,
+                 const ServiceNotifier& notifier) {
+  constexpr std::chrono::seconds kPeriod{2}, kLonger{60};
+  timer.expires_after(kPeriod);
+  timer.async_wait([&timer, &control, advanced, &notifier](const asio::error_code& error) {
+    if (error) return;
+    const std::uint64_t now = control.advanced();
+    if (now != advanced)
+      notifier.Starting("restoring: " + std::to_string(now) + " entries of the journals processed", kLonger);
+    LookAtStart(timer, control, now, notifier);
+  });
+}
+
+// Starts the server. A signal gives that up: CANCELLED.
+Result<void> StartWatched(Server& server, asio::io_context& context, asio::signal_set& signals,
+                          const ServiceNotifier& notifier) {
+  StartControl control;
+  signals.async_wait([&control](const asio::error_code& error, int signal) {
+    if (error) return;
+    spdlog::info("signal {}: the start is given up", signal);
+    control.GiveUp();
+  });
+  asio::steady_timer timer(context);
+  LookAtStart(timer, control, 0, notifier);
+  Result<void> started;
+  {
+    std::jthread watching([&context] { context.run(); });
+    started = server.Start(control);
+    context.stop();
+  }
+  timer.cancel();
+  signals.cancel();
+  // A signal may have come last.
+  context.restart();
+  context.poll();
+  context.restart();
+  if (started && control.given_up()) return Fail(StatusCode::kCancelled, "the start was given up");
+  return started;
+}
+
 int Serve(const CairndOptions& options, const std::filesystem::path& state) {
   StartLogging(options.server.server.log_level);
   // The signal set is made before any thread starts, so that no thread receives the signals instead.
@@ -229,7 +272,12 @@ int Serve(const CairndOptions& options, const std::filesystem::path& state) {
   if (!ros2) return failed(ros2.error());
   const auto saved = state == kNoState || state == kInMemory ? std::filesystem::path() : state / "saved";
   Server server(options.server, inbound, outbound, kept->generation, kept->journal.get(), saved);
-  if (auto started = server.Start(); !started) return failed(started.error());
+  const ServiceNotifier notifier;
+  if (auto started = StartWatched(server, context, signals, notifier); !started) {
+    if (started.error().code != StatusCode::kCancelled) return failed(started.error());
+    spdlog::info("stopped before the start was finished");
+    return 0;
+  }
   if (kept->journal != nullptr) kept->journal->Start();
   auto ingress = Ingress::Open(**bus, inbound, outbound);
   if (!ingress) return failed(ingress.error());
@@ -238,7 +286,6 @@ int Serve(const CairndOptions& options, const std::filesystem::path& state) {
     server.SetRos2((*ros2)->report());
   }
 
-  const ServiceNotifier notifier;
   const std::string serving = "serving DDS domain " + std::to_string(options.wire.domain);
   ServiceStatus service_status(notifier, serving);
   notifier.Ready(serving);

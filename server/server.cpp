@@ -56,17 +56,17 @@ Server::~Server() {
   Stop();
 }
 
-Result<void> Server::Restore() {
+Result<void> Server::Restore(StartControl& control) {
   if (auto sites = atlas_.Restore(); !sites) return sites;
-  if (auto sessions = roster_.Restore(); !sessions) return sessions;
+  if (auto sessions = roster_.Restore(control); !sessions) return sessions;
   const auto unfinished = jobs_.Restore();
   if (!unfinished) return tl::unexpected(unfinished.error());
   for (const StoredJob& job : *unfinished) worker_.Requeue(job.job.id, job.enable);
   return {};
 }
 
-Result<void> Server::Start() {
-  if (auto restored = Restore(); !restored) return restored;
+Result<void> Server::Start(StartControl& control) {
+  if (auto restored = Restore(control); !restored) return restored;
   for (const std::string& name : options_.server.site_names()) {
     if (atlas_.IsSetAside(name)) continue;
     if (const auto site = atlas_.Create(name); !site) return tl::unexpected(site.error());

@@ -22,6 +22,7 @@
 #include "server/jobs/start_check.h"
 #include "server/maps/atlas.h"
 #include "server/ops/heartbeat.h"
+#include "server/ops/start_control.h"
 #include "server/options.h"
 #include "server/outbound.h"
 #include "server/queries/desk.h"
@@ -38,8 +39,13 @@ class Server {
          Journal* journal = nullptr, const std::filesystem::path& saved = {});
   ~Server();
 
-  // Restores what is stored, creates the configured sites and starts the threads.
-  Result<void> Start();
+  // Restores what is stored, creates the configured sites and starts the threads. `control` tells other threads how it
+  // goes on; CANCELLED if it was given up, after which the server can only be destroyed.
+  Result<void> Start(StartControl& control);
+  Result<void> Start() {
+    StartControl control;
+    return Start(control);
+  }
   // Accepts no more values and finishes the accepted ones within server.stop_timeout_s; the rest is dropped
   // and counted. Then it publishes the last state of every session and closes the outbound lanes.
   void Stop();
@@ -60,7 +66,7 @@ class Server {
  private:
   void Dispatch(const std::stop_token& stop);
   void KeepHouse(const std::stop_token& stop);
-  Result<void> Restore();
+  Result<void> Restore(StartControl& control);
   void CheckHealth();
   void CheckJournal();
   void FinishSessions();

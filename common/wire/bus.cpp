@@ -18,6 +18,7 @@ class DdsBus final : public Bus {
     const RefusedDatagrams& refused = participant_->guard().refused;
     return std::accumulate(refused.begin(), refused.end(), std::uint64_t{0});
   }
+  std::uint64_t bytes_received() const override { return participant_->guard().bytes.load(std::memory_order_relaxed); }
   std::chrono::nanoseconds busy_with_one_datagram() const override {
     return participant_->guard().receiving.Longest(ReceiveWatch::Clock::now());
   }

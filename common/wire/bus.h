@@ -86,7 +86,7 @@ class Bus {
   template <typename Value>
   [[nodiscard]] Result<std::unique_ptr<Subscription>> Subscribe(std::function<void(Value&&)> on_value,
                                                                 SubscriptionEvents events = {});
-  // Like Subscribe<Reply>, but replies to other clients are skipped before they are decoded.
+  // Like Subscribe<Reply>, but replies to other clients are not sent here (client_filter.h), or skipped undecoded.
   [[nodiscard]] Result<std::unique_ptr<Subscription>> SubscribeReplies(ClientId client,
                                                                        std::function<void(Reply&&)> on_value,
                                                                        SubscriptionEvents events = {});
@@ -94,6 +94,8 @@ class Bus {
   [[nodiscard]] virtual const WireOptions& options() const = 0;
   // Number of datagrams that were not valid or not plausible RTPS and were therefore not passed to the middleware.
   [[nodiscard]] virtual std::uint64_t datagrams_refused() const = 0;
+  // All that has arrived, also what was refused.
+  [[nodiscard]] virtual std::uint64_t bytes_received() const = 0;
   // For how long the middleware has been busy with one datagram, which takes microseconds. Nothing arrives meanwhile.
   [[nodiscard]] virtual std::chrono::nanoseconds busy_with_one_datagram() const = 0;
   // The refused ones by reason, for people: "12 framing, 3 sequence"; "none" where there are none.

@@ -40,6 +40,7 @@ class GuardTransport : public transport::ChainingTransport {
 
   void receive(transport::TransportReceiverInterface* next, const rtps::octet* bytes, std::uint32_t size,
                const rtps::Locator_t& local, const rtps::Locator_t& remote) override {
+    report_->bytes.fetch_add(size, std::memory_order_relaxed);
     if (!IsSound({bytes, size})) return;
     const auto deliver = [&](std::span<const rtps::octet> datagram) {
       const std::vector<rtps::octet> counted = WithOwnCounts(datagram, gate_);

@@ -23,6 +23,7 @@ using RefusedDatagrams = std::array<std::atomic<std::uint64_t>, kDatagramFaults>
 // What a transport tells of itself.
 struct GuardReport {
   RefusedDatagrams refused{};
+  std::atomic<std::uint64_t> bytes = 0;  // Of all datagrams that arrived.
   ReceiveWatch receiving;
 };
 

@@ -2,6 +2,7 @@
 
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 
+#include "common/wire/client_filter.h"
 #include "common/wire/participant_qos.h"
 #include "common/wire/security.h"
 
@@ -11,6 +12,10 @@ namespace {
 namespace rtps = eprosima::fastrtps::rtps;
 using eprosima::fastrtps::Duration_t;
 using eprosima::fastrtps::types::ReturnCode_t;
+
+// A writer of replies filters for so many readers; the library's default is 32. Further ones get all replies, and skip
+// those of others.
+constexpr std::size_t kMaxFilteringReaders = 1024;
 
 // The QoS that both ends of a topic share. Every limit is set, because the default allows only 10 instances
 // and refuses the next without an error.
@@ -59,6 +64,11 @@ Result<std::shared_ptr<Participant>> Participant::Create(const WireOptions& opti
                                               ": no free port or address, or the domain is full" +
                                               (made->secure() ? ", or Fast DDS refused wire.security" : ""));
   }
+  // Before any writer of replies is made, or it would not know the class of the readers' filters.
+  if (made->participant_->register_content_filter_factory(kClientFilterClass, &ClientFilters()) !=
+      ReturnCode_t::RETCODE_OK) {
+    return tl::unexpected(Broken("the filter of replies"));
+  }
   made->subscriber_ = made->participant_->create_subscriber(fd::SUBSCRIBER_QOS_DEFAULT);
   fd::SubscriberQos every_partition;
   every_partition.partition().push_back("*");
@@ -105,6 +115,18 @@ Result<fd::Topic*> Participant::FindTopic(const TopicProfile& profile, const fd:
   return topic;
 }
 
+// Made once for each client of this program: the readers that replace each other share it.
+Result<fd::TopicDescription*> Participant::FindFiltered(fd::Topic* topic, ClientId only) {
+  const std::string expression = ClientExpression(only);
+  const std::string name = topic->get_name() + '/' + expression;
+  const MutexLock lock(mutex_);
+  fd::ContentFilteredTopic*& filtered = filtered_[name];
+  if (filtered == nullptr)
+    filtered = participant_->create_contentfilteredtopic(name, topic, expression, {}, kClientFilterClass);
+  if (filtered == nullptr) return tl::unexpected(Broken("topic " + name));
+  return filtered;
+}
+
 Result<Participant::Writer> Participant::MakeWriter(const TopicProfile& profile, const fd::TypeSupport& type,
                                                     fd::DataWriterListener* listener, const std::string& robot) {
   const Result<fd::Topic*> topic = FindTopic(profile, type);
@@ -118,6 +140,7 @@ Result<Participant::Writer> Participant::MakeWriter(const TopicProfile& profile,
   times.nackResponseDelay = Duration_t(0.002);
   if (profile.deadline_s > 0) qos.deadline().period = Duration_t(profile.deadline_s);
   const std::string partition = secure() && profile.of_robot ? robot : "";
+  qos.writer_resource_limits().reader_filters_allocation.maximum = kMaxFilteringReaders;
   fd::Publisher* publisher = PublisherFor(partition);
   if (publisher == nullptr) return tl::unexpected(Broken("a publisher"));
   const MutexLock lock(endpoints_);
@@ -130,9 +153,15 @@ Result<Participant::Writer> Participant::MakeWriter(const TopicProfile& profile,
 }
 
 Result<Participant::Reader> Participant::MakeReader(const TopicProfile& profile, const fd::TypeSupport& type,
-                                                    fd::DataReaderListener* listener) {
+                                                    fd::DataReaderListener* listener, std::optional<ClientId> only) {
   const Result<fd::Topic*> topic = FindTopic(profile, type);
   if (!topic) return tl::unexpected(topic.error());
+  fd::TopicDescription* read = *topic;
+  if (only) {
+    const Result<fd::TopicDescription*> filtered = FindFiltered(*topic, *only);
+    if (!filtered) return tl::unexpected(filtered.error());
+    read = *filtered;
+  }
   fd::DataReaderQos qos;
   // For a moment the reader has the keys of two writers: one that is full, and the one that replaces it
   // (publication.h). A sample that finds no place among the instances is lost, also on a reliable topic.
@@ -141,7 +170,7 @@ Result<Participant::Reader> Participant::MakeReader(const TopicProfile& profile,
   qos.reliable_reader_qos().times.heartbeatResponseDelay = Duration_t(0.001);
   fd::Subscriber* subscriber = secure() && profile.of_robot ? robots_ : subscriber_;
   const MutexLock lock(endpoints_);
-  fd::DataReader* reader = subscriber->create_datareader(*topic, qos, listener);
+  fd::DataReader* reader = subscriber->create_datareader(read, qos, listener);
   if (reader == nullptr) return tl::unexpected(NotMade(std::string("a reader of ") + profile.name));
   return Reader(reader, ReaderDeleter{shared_from_this()});
 }

@@ -10,10 +10,12 @@
 #include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <fastdds/dds/topic/ContentFilteredTopic.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "common/mutex.h"
@@ -49,8 +51,9 @@ class Participant : public std::enable_shared_from_this<Participant> {
   // participant do not allow it.
   [[nodiscard]] Result<Writer> MakeWriter(const TopicProfile& profile, const fd::TypeSupport& type,
                                           fd::DataWriterListener* listener, const std::string& robot = {});
+  // `only`: of a topic of replies, what is for this client (client_filter.h).
   [[nodiscard]] Result<Reader> MakeReader(const TopicProfile& profile, const fd::TypeSupport& type,
-                                          fd::DataReaderListener* listener);
+                                          fd::DataReaderListener* listener, std::optional<ClientId> only = {});
 
   [[nodiscard]] const WireOptions& options() const { return options_; }
   [[nodiscard]] const GuardReport& guard() const { return *guard_; }
@@ -63,6 +66,7 @@ class Participant : public std::enable_shared_from_this<Participant> {
   [[nodiscard]] Status NotMade(const std::string& what) const;
   [[nodiscard]] fd::Publisher* PublisherFor(const std::string& partition);
   [[nodiscard]] Result<fd::Topic*> FindTopic(const TopicProfile& profile, const fd::TypeSupport& type);
+  [[nodiscard]] Result<fd::TopicDescription*> FindFiltered(fd::Topic* topic, ClientId only);
 
   const WireOptions options_;
   const std::shared_ptr<GuardReport> guard_ = std::make_shared<GuardReport>();
@@ -76,6 +80,7 @@ class Participant : public std::enable_shared_from_this<Participant> {
   Mutex mutex_;
   std::map<std::string, fd::Publisher*> publishers_ CAIRN_GUARDED_BY(mutex_);  // By partition.
   std::map<std::string, fd::Topic*> topics_ CAIRN_GUARDED_BY(mutex_);
+  std::map<std::string, fd::ContentFilteredTopic*> filtered_ CAIRN_GUARDED_BY(mutex_);
 };
 
 }  // namespace cairn::wire

@@ -28,7 +28,8 @@ class DdsSubscription final : public Subscription {
                                                                   SubscriptionEvents events,
                                                                   std::optional<ClientId> only = {}) {
     auto made = std::make_unique<DdsSubscription>(std::move(on_value), std::move(events), only);
-    Result<Participant::Reader> reader = participant->MakeReader(Topic<Value>::kProfile, made->type_, &made->listener_);
+    Result<Participant::Reader> reader =
+        participant->MakeReader(Topic<Value>::kProfile, made->type_, &made->listener_, only);
     if (!reader) return tl::unexpected(reader.error());
     made->participant_ = participant;
     made->reader_ = std::move(*reader);
@@ -65,7 +66,7 @@ class DdsSubscription final : public Subscription {
   void MakeReaderAnew() {
     const auto now = std::chrono::steady_clock::now();
     if (now - made_ < kShortestLife) return;
-    Result<Participant::Reader> reader = participant_->MakeReader(Topic<Value>::kProfile, type_, &listener_);
+    Result<Participant::Reader> reader = participant_->MakeReader(Topic<Value>::kProfile, type_, &listener_, only_);
     if (!reader) return;  // The next sample that is refused asks again.
     TakeAll();            // What has arrived meanwhile would be lost with the old reader.
     made_ = now;

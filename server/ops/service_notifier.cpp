@@ -11,6 +11,12 @@ void ServiceNotifier::Ready(const std::string& status) const {
   static_cast<void>(sd_notify(0, ("READY=1\nSTATUS=" + status).c_str()));
 }
 
+void ServiceNotifier::Starting(const std::string& status, std::chrono::seconds longer) const {
+  const auto microseconds = std::chrono::microseconds(longer).count();
+  static_cast<void>(
+      sd_notify(0, ("EXTEND_TIMEOUT_USEC=" + std::to_string(microseconds) + "\nSTATUS=" + status).c_str()));
+}
+
 void ServiceNotifier::Alive() const {
   static_cast<void>(sd_notify(0, "WATCHDOG=1"));
 }

@@ -11,6 +11,8 @@ namespace cairn::server {
 class ServiceNotifier {
  public:
   void Ready(const std::string& status) const;
+  // The start goes on, and may take so much longer from now on.
+  void Starting(const std::string& status, std::chrono::seconds longer) const;
   void Alive() const;
   // One line that the service manager shows beside the service (systemctl status).
   void Status(const std::string& text) const;

@@ -30,6 +30,7 @@
 
 #include "common/mutex.h"
 #include "server/maps/atlas.h"
+#include "server/ops/start_control.h"
 #include "server/outbound.h"
 #include "server/robots/robots_options.h"
 #include "server/robots/session.h"
@@ -54,7 +55,10 @@ class Roster {
   // written by a newer server, is set aside (store/set_aside.h): its records stay, and its robot is told to open a new
   // one. A session during whose restoring earlier servers ended (RestoreMarks) is restored alone; after two such ends
   // it is set aside, and only its part of the map is shown, from its checkpoint; after three, not even this.
-  Result<void> Restore();
+  // A session whose checkpoint was made with other options of the estimator is restored from its whole journal, if that
+  // is there and short; otherwise it keeps its options. `control`: CANCELLED if it was given up, after which the next
+  // start does the same again.
+  Result<void> Restore(StartControl& control);
 
   // Sessions that are loaded while the server runs. `first` of so many numbers that no other session gets.
   [[nodiscard]] SessionId ReserveIds(std::uint64_t count);
@@ -96,18 +100,36 @@ class Roster {
   Result<void> Open(const SessionRequest& request);
   [[nodiscard]] std::string WhyNotRestored(const std::string& robot) const;
   [[nodiscard]] bool BeginsFragment(const SessionRequest& request, const Site& site) const CAIRN_REQUIRES(mutex_);
-  std::shared_ptr<Session> Make(const StoredSession& stored, const std::shared_ptr<Site>& site) const;
+  std::shared_ptr<Session> Make(const StoredSession& stored, const std::shared_ptr<Site>& site,
+                                const slam::MapperOptions& mapper) const;
   static void Enter(Site& site, const std::shared_ptr<Session>& session);
   void Place(const std::shared_ptr<Session>& session, bool first) CAIRN_REQUIRES(mutex_);
   Journal::Durable DurableFor(const std::shared_ptr<Session>& session) const;
-  using Restored = std::vector<Result<std::shared_ptr<Session>>>;
-  Restored RestoreEach(const std::vector<SessionId>& ids);
-  Result<void> RestoreTogether(const std::vector<SessionId>& ids, RestoreMarks& marks);
-  Result<void> RestoreDoubtful(SessionId id, RestoreMarks& marks);
-  void Register(SessionId id, Result<std::shared_ptr<Session>> restored);
-  Result<std::shared_ptr<Session>> NotRestored(SessionId id, Status why);
-  Result<std::shared_ptr<Session>> RestoreOne(SessionId id, bool with_journal);
-  Result<std::shared_ptr<Session>> ReadBack(SessionId id, bool with_journal);
+  // What restores sessions; the marks are null for sessions that are loaded while the server runs.
+  struct Restoring {
+    StartControl& control;
+    RestoreMarks* marks = nullptr;
+    bool with_journal = true;
+  };
+  using RestoredSession = Result<std::shared_ptr<Session>>;
+  std::vector<RestoredSession> RestoreEach(const std::vector<SessionId>& ids, const Restoring& how);
+  Result<void> RestoreTogether(const std::vector<SessionId>& ids, const Restoring& how);
+  Result<void> RestoreDoubtful(SessionId id, Restoring how);
+  void Register(SessionId id, RestoredSession restored);
+  RestoredSession NotRestored(SessionId id, Status why);
+  RestoredSession RestoreOne(SessionId id, const Restoring& how);
+  // One session as the store has it.
+  struct Stored {
+    StoredSession session;
+    std::shared_ptr<Site> site;
+    Result<std::optional<StoredCheckpoint>> checkpoint;
+  };
+  RestoredSession ReadBack(SessionId id, const Restoring& how);
+  RestoredSession FromCheckpoint(const Stored& stored, const slam::MapperOptions& mapper, const Restoring& how);
+  std::shared_ptr<Session> MakeToRestore(const Stored& stored, const slam::MapperOptions& mapper) const;
+  RestoredSession FromJournal(const Stored& stored, const Restoring& how);
+  RestoredSession GoOn(const Stored& stored, std::shared_ptr<Session> session, std::uint64_t position,
+                       StoredPieces pieces, const Restoring& how);
   // The session that has to be removed before this robot can have a new one; null if there is room.
   Result<std::shared_ptr<Session>> GivesWay(NameId robot_id) const CAIRN_REQUIRES(mutex_);
   void Refuse(const SessionRequest& request, Status status);

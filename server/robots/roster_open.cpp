@@ -37,7 +37,7 @@ Result<void> Roster::Open(const SessionRequest& request) {
     stored.id = next_id_++;
     stored.map_epoch = site->snapshot()->info.epoch;
     stored.fragment = BeginsFragment(request, *site);
-    session = Make(stored, site);
+    session = Make(stored, site, mapper_);
     session->record().AddSensors(request.sensors);
     for (const std::string& sensor : request.sensors) {
       if (auto account = unclaimed_.Claim({robot_id, HashName(sensor), request.session})) {
@@ -96,13 +96,14 @@ void Roster::Enter(Site& site, const std::shared_ptr<Session>& session) {
              .fragment = record.joining().fragment});
 }
 
-std::shared_ptr<Session> Roster::Make(const StoredSession& stored, const std::shared_ptr<Site>& site) const {
+std::shared_ptr<Session> Roster::Make(const StoredSession& stored, const std::shared_ptr<Site>& site,
+                                      const slam::MapperOptions& mapper) const {
   const SessionId id = stored.id;
   const SessionSetup setup{
       .id = id,
       .request = stored.request,
       .map_epoch = stored.map_epoch,
-      .estimator = {.mapper = mapper_, .T_map_robot_start = StartOf(stored.request), .fragment = stored.fragment}};
+      .estimator = {.mapper = mapper, .T_map_robot_start = StartOf(stored.request), .fragment = stored.fragment}};
   SessionOutputs outputs{.send = [this](OutboundValue value) { return outbound_.Send(std::move(value)); },
                          .grid_changed = [site](GridChange&& change) { site->Change(std::move(change)); },
                          .store = {},

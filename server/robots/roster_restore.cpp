@@ -25,6 +25,9 @@ Result<StoredSession> ReadSession(Store& store, SessionId id) {
   return session;
 }
 
+// The longest journal, in entries, that is processed again only because of other options: some minutes.
+constexpr std::uint64_t kMostReprocessed = 100'000;
+
 constexpr std::uint32_t kAttemptsWithJournal = 2;     // After so many failures the journal is not used,
 constexpr std::uint32_t kAttemptsWithCheckpoint = 3;  // and after so many neither is the checkpoint.
 
@@ -33,14 +36,19 @@ std::string AfterFailures(std::uint32_t failures) {
   return "the server ended " + std::to_string(failures) + " times while it restored this session";
 }
 
+tl::unexpected<Status> GivenUp() {
+  return Fail(StatusCode::kCancelled, "the start was given up");
+}
+
 }  // namespace
 
-Roster::Restored Roster::RestoreEach(const std::vector<SessionId>& ids) {
-  Restored sessions(ids.size(), Fail(StatusCode::kInternal, "not restored"));
+std::vector<Roster::RestoredSession> Roster::RestoreEach(const std::vector<SessionId>& ids, const Restoring& how) {
+  std::vector<RestoredSession> sessions(ids.size(), Fail(StatusCode::kInternal, "not restored"));
   std::latch done(static_cast<std::ptrdiff_t>(ids.size()));
   for (std::size_t i = 0; i < ids.size(); ++i) {
     asio::post(pool_, [&, i] {
-      sessions[i] = RestoreOne(ids[i], true);
+      sessions[i] = RestoreOne(ids[i], how);
+      how.control.Advance();
       done.count_down();
     });
   }
@@ -48,7 +56,7 @@ Roster::Restored Roster::RestoreEach(const std::vector<SessionId>& ids) {
   return sessions;
 }
 
-Result<void> Roster::Restore() {
+Result<void> Roster::Restore(StartControl& control) {
   if (journal_ == nullptr) return {};
   const auto ids = journal_->store().Owners(RecordKind::kSession);
   if (!ids) return tl::unexpected(ids.error());
@@ -65,34 +73,41 @@ Result<void> Roster::Restore() {
       (marks->failed(id) == 0 ? others : doubtful).push_back(id);
     }
   }
-  if (auto restored = RestoreTogether(others, *marks); !restored) return restored;
+  const Restoring how{control, &*marks};
+  if (auto restored = RestoreTogether(others, how); !restored) return restored;
   // One of these may have ended the server before. One at a time, so that it alone is marked when it does so again.
   for (const SessionId id : doubtful) {
-    if (auto restored = RestoreDoubtful(id, *marks); !restored) return restored;
+    if (auto restored = RestoreDoubtful(id, how); !restored) return restored;
   }
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
   spdlog::info("{} sessions restored in {:.2f} s", All().size(), took.count());
   return {};
 }
 
-Result<void> Roster::RestoreTogether(const std::vector<SessionId>& ids, RestoreMarks& marks) {
-  if (auto marked = marks.Begin(ids); !marked) return marked;
-  Restored sessions = RestoreEach(ids);
-  if (auto unmarked = marks.Succeeded(ids); !unmarked) return unmarked;
+Result<void> Roster::RestoreTogether(const std::vector<SessionId>& ids, const Restoring& how) {
+  if (auto marked = how.marks->Begin(ids); !marked) return marked;
+  std::vector<RestoredSession> sessions = RestoreEach(ids, how);
+  if (auto unmarked = how.marks->Succeeded(ids); !unmarked) return unmarked;
+  if (how.control.given_up()) return GivenUp();
   for (std::size_t i = 0; i < ids.size(); ++i) Register(ids[i], std::move(sessions[i]));
   return {};
 }
 
-Result<void> Roster::RestoreDoubtful(SessionId id, RestoreMarks& marks) {
+Result<void> Roster::RestoreDoubtful(SessionId id, Restoring how) {
+  RestoreMarks& marks = *how.marks;
   const std::uint32_t failures = marks.failed(id);
   if (failures >= kAttemptsWithCheckpoint) {
     Register(id, NotRestored(id, {StatusCode::kAborted, AfterFailures(failures)}));
     return {};
   }
-  if (auto marked = marks.Begin({id}); !marked) return marked;
-  const bool with_journal = failures < kAttemptsWithJournal;
-  auto session = RestoreOne(id, with_journal);
-  if (with_journal) {
+  how.with_journal = failures < kAttemptsWithJournal;
+  if (auto marked = how.with_journal ? marks.Begin({id}) : marks.BeginWithoutJournal(id); !marked) return marked;
+  auto session = RestoreOne(id, how);
+  if (how.control.given_up()) {
+    if (auto marked = marks.Set(id, failures); !marked) return marked;
+    return GivenUp();
+  }
+  if (how.with_journal) {
     if (auto unmarked = marks.Succeeded({id}); !unmarked) return unmarked;
     Register(id, std::move(session));
     return {};
@@ -109,7 +124,7 @@ Result<void> Roster::RestoreDoubtful(SessionId id, RestoreMarks& marks) {
 }
 
 // Makes the session known, or the reason why it is not.
-void Roster::Register(SessionId id, Result<std::shared_ptr<Session>> restored) {
+void Roster::Register(SessionId id, RestoredSession restored) {
   if (!restored) return;  // NotRestored has set it aside.
   const MutexLock lock(mutex_);
   const auto known = sessions_.find((*restored)->record().state().robot_id);
@@ -129,7 +144,7 @@ void Roster::Place(const std::shared_ptr<Session>& session, bool first) {
 }
 
 // Sets the session aside. The robot can be told why it must open a new one.
-Result<std::shared_ptr<Session>> Roster::NotRestored(SessionId id, Status why) {
+Roster::RestoredSession Roster::NotRestored(SessionId id, Status why) {
   std::string what = "session " + std::to_string(id), site;
   if (const auto stored = ReadSession(journal_->store(), id)) {
     site = stored->request.site;
@@ -141,10 +156,11 @@ Result<std::shared_ptr<Session>> Roster::NotRestored(SessionId id, Status why) {
   return tl::unexpected(std::move(why));
 }
 
-Result<std::shared_ptr<Session>> Roster::RestoreOne(SessionId id, bool with_journal) {
+Roster::RestoredSession Roster::RestoreOne(SessionId id, const Restoring& how) {
   try {
-    auto restored = ReadBack(id, with_journal);
-    return restored ? std::move(restored) : NotRestored(id, restored.error());
+    auto restored = ReadBack(id, how);
+    if (restored || how.control.given_up()) return restored;
+    return NotRestored(id, restored.error());
   } catch (const std::exception& error) {
     return NotRestored(id, {StatusCode::kInternal, error.what()});
   }
@@ -170,7 +186,8 @@ Result<void> Roster::HasRoomFor(const std::set<std::string>& robots) const {
 }
 
 std::size_t Roster::OpenStored(const std::vector<SessionId>& ids) {
-  const Restored sessions = RestoreEach(ids);
+  StartControl control;
+  const std::vector<RestoredSession> sessions = RestoreEach(ids, {control});
   const std::set<SessionId> loaded(ids.begin(), ids.end());
   std::size_t taken = 0;
   for (std::size_t i = 0; i < ids.size(); ++i) {
@@ -225,61 +242,79 @@ Result<std::shared_ptr<Site>> Roster::RemoveSite(const std::string& name) {
   return site;
 }
 
-Result<std::shared_ptr<Session>> Roster::ReadBack(SessionId id, bool with_journal) {
-  const auto stored = ReadSession(journal_->store(), id);
-  if (!stored) return tl::unexpected(stored.error());
-  Result<std::shared_ptr<Site>> site = atlas_.Find(stored->request.site);
-  if (*site == nullptr) site = atlas_.Enter(stored->request.site);
+Roster::RestoredSession Roster::ReadBack(SessionId id, const Restoring& how) {
+  auto read = ReadSession(journal_->store(), id);
+  if (!read) return tl::unexpected(read.error());
+  Result<std::shared_ptr<Site>> site = atlas_.Find(read->request.site);
+  if (*site == nullptr) site = atlas_.Enter(read->request.site);
   if (!site) return tl::unexpected(site.error());
-  const auto make = [&] {
-    auto made = Make(*stored, *site);
-    made->KeepStored();  // Also if an exception ends the restore.
-    static_cast<void>(made->record().AddSensors(stored->request.sensors));
-    return made;
-  };
-  std::shared_ptr<Session> session = make();
-  const auto checkpoint = ReadCheckpoint(journal_->store(), id);
-  std::uint64_t position = 0;
+  const Stored stored{std::move(*read), *site, ReadCheckpoint(journal_->store(), id)};
+  const auto& checkpoint = stored.checkpoint;
+  // For example, a newer server has written it: to go on without it would end in writing over it.
+  if (!checkpoint && checkpoint.error().code != StatusCode::kDataLoss) return tl::unexpected(checkpoint.error());
+  if (checkpoint && !*checkpoint) return FromJournal(stored, how);
+
+  RestoredSession session = checkpoint ? FromCheckpoint(stored, mapper_, how) : tl::unexpected(checkpoint.error());
+  if (session || how.control.given_up() || session.error().code == StatusCode::kUnimplemented) return session;
+  const Status why = session.error();
+  const bool other_options = checkpoint && why.code == StatusCode::kFailedPrecondition;
+  const auto options = other_options ? SessionEstimator::OptionsOf((*checkpoint)->bytes, mapper_)
+                                     : Result<slam::MapperOptions>(tl::unexpected(why));
+  if (!options || (how.with_journal && (*checkpoint)->position <= kMostReprocessed)) {
+    spdlog::warn("the checkpoint of session {} is not used: {}", id, why.message);
+    session = FromJournal(stored, how);
+    if (session || !options || how.control.given_up()) return session;
+  }
+  spdlog::warn("session {} goes on with the options that it was begun with: {}", id, why.message);
+  return FromCheckpoint(stored, *options, how);
+}
+
+Roster::RestoredSession Roster::FromCheckpoint(const Stored& stored, const slam::MapperOptions& mapper,
+                                               const Restoring& how) {
+  const StoredCheckpoint& checkpoint = **stored.checkpoint;
+  auto session = MakeToRestore(stored, mapper);
+  const auto loaded = session->Load(checkpoint.bytes, checkpoint.PiecesInOrder());
+  if (!loaded) return tl::unexpected(loaded.error());
   StoredPieces pieces;
-  if (!checkpoint && checkpoint.error().code != StatusCode::kDataLoss) {
-    // For example, a newer server has written it: to go on without it would end in writing over it.
-    return tl::unexpected(checkpoint.error());
-  }
-  if (!checkpoint) {
-    // The whole journal is used instead, if it is still there.
-    spdlog::warn("the checkpoint of session {} is not used: {}", id, checkpoint.error().message);
-  } else if (*checkpoint) {
-    for (const auto& [number, parts] : (*checkpoint)->parts) pieces.emplace(number, StoredPiece{nullptr, parts});
-    if (const auto loaded = session->Load((*checkpoint)->bytes, (*checkpoint)->PiecesInOrder())) {
-      position = (*checkpoint)->position;
-      for (std::size_t i = 0; i < loaded->size(); ++i) pieces[(*checkpoint)->order[i]].value = (*loaded)[i];
-    } else if (loaded.error().code == StatusCode::kUnimplemented) {
-      return tl::unexpected(loaded.error());  // A newer server has written it.
-    } else {
-      // For example, the estimator has other options now. The whole journal can be replayed instead, if it is still
-      // there.
-      spdlog::warn("the checkpoint of session {} is not used: {}", id, loaded.error().message);
-      session = make();
-    }
-  }
-  const auto switched = [&site](std::uint32_t epoch, std::uint64_t generation) {
-    return (*site)->Switched(epoch, generation);
+  for (const auto& [number, parts] : checkpoint.parts) pieces.emplace(number, StoredPiece{nullptr, parts});
+  for (std::size_t i = 0; i < loaded->size(); ++i) pieces[checkpoint.order[i]].value = (*loaded)[i];
+  if (how.with_journal) return GoOn(stored, std::move(session), checkpoint.position, std::move(pieces), how);
+  session->Replayed();
+  return session;  // To be dropped, with its records kept.
+}
+
+// From the first entry on.
+Roster::RestoredSession Roster::FromJournal(const Stored& stored, const Restoring& how) {
+  if (!how.with_journal)
+    return Fail(StatusCode::kDataLoss, "it has no checkpoint that can be used, and its journal is left out");
+  return GoOn(stored, MakeToRestore(stored, mapper_), 0, {}, how);
+}
+
+std::shared_ptr<Session> Roster::MakeToRestore(const Stored& stored, const slam::MapperOptions& mapper) const {
+  auto session = Make(stored.session, stored.site, mapper);
+  session->KeepStored();  // Also if an exception ends the restore.
+  static_cast<void>(session->record().AddSensors(stored.session.request.sensors));
+  return session;
+}
+
+// Processes the journal after `position` again.
+Roster::RestoredSession Roster::GoOn(const Stored& stored, std::shared_ptr<Session> session, std::uint64_t position,
+                                     StoredPieces pieces, const Restoring& how) {
+  const SessionId id = stored.session.id;
+  const auto switched = [&stored](std::uint32_t epoch, std::uint64_t generation) {
+    return stored.site->Switched(epoch, generation);
   };
-  if (!with_journal) {
-    if (position == 0)
-      return Fail(StatusCode::kDataLoss, "it has no checkpoint that can be used, and its journal is left out");
-    session->Replayed();
-    return session;  // To be dropped, with its records kept.
-  }
-  const auto last =
-      ReadJournal(journal_->store(), id, position, [&](std::uint64_t, JournalEntry&& entry) -> Result<void> {
-        session->Replay(std::move(entry), switched);
-        return {};
-      });
-  // Without the checkpoint and without any entry it would begin where the robot once stood.
-  const bool checkpoint_unused = position == 0 && (!checkpoint || *checkpoint);
+  const auto replay = [&](std::uint64_t at, JournalEntry&& entry) -> Result<void> {
+    if (how.control.given_up()) return GivenUp();
+    session->Replay(std::move(entry), switched);
+    how.control.Advance();
+    return how.marks != nullptr ? how.marks->Reached(id, at) : Result<void>{};
+  };
+  const auto last = ReadJournal(journal_->store(), id, position, replay);
   if (!last) return tl::unexpected(last.error());
-  if (checkpoint_unused && *last == 0)
+  // Without the checkpoint and without any entry it would begin where the robot once stood.
+  const bool had_checkpoint = !stored.checkpoint || *stored.checkpoint;
+  if (position == 0 && had_checkpoint && *last == 0)
     return Fail(StatusCode::kDataLoss, "its checkpoint cannot be used, and the journal before it was removed");
   session->Replayed();
   session->SetCheckpointed(position);

@@ -65,6 +65,27 @@ std::optional<std::uint64_t> TakeNumber(std::string_view& bytes) {
   return number;
 }
 
+// The main part of a checkpoint: of the session, with the number of its pieces, and of the estimator.
+struct CheckpointParts {
+  std::string_view session;
+  std::uint64_t session_pieces = 0;
+  std::string_view estimator;
+};
+
+Result<CheckpointParts> PartsOf(std::string_view main) {
+  const auto too_short = [] { return Fail(StatusCode::kDataLoss, "a checkpoint is too short"); };
+  CheckpointParts parts;
+  const auto size = TakeNumber(main);
+  if (!size || *size > main.size()) return too_short();
+  parts.session = main.substr(0, *size);
+  main.remove_prefix(parts.session.size());
+  const auto pieces = TakeNumber(main);
+  if (!pieces) return too_short();
+  parts.session_pieces = *pieces;
+  parts.estimator = main;
+  return parts;
+}
+
 }  // namespace
 
 SessionEstimator::SessionEstimator(const EstimatorSetup& setup, SessionRecord& record, SessionOutputs outputs)
@@ -200,16 +221,13 @@ Journal::Content SessionEstimator::Save() const {
 
 Result<SessionEstimator::PieceValues> SessionEstimator::Load(std::string_view main,
                                                              std::span<const std::string_view> pieces) {
-  const auto own_size = TakeNumber(main);
-  if (!own_size || *own_size > main.size()) return Fail(StatusCode::kDataLoss, "a checkpoint is too short");
-  const std::string_view own = main.substr(0, *own_size);
-  main.remove_prefix(own.size());
-  const auto own_pieces = TakeNumber(main);
-  if (!own_pieces || *own_pieces > pieces.size()) return Fail(StatusCode::kDataLoss, "a checkpoint is too short");
+  const auto parts = PartsOf(main);
+  if (!parts) return tl::unexpected(parts.error());
+  if (parts->session_pieces > pieces.size()) return Fail(StatusCode::kDataLoss, "a checkpoint is too short");
   // The estimator is loaded first: if that fails, nothing has changed.
-  const auto loaded = pipeline_.LoadPieces(main, pieces.subspan(*own_pieces));
+  const auto loaded = pipeline_.LoadPieces(parts->estimator, pieces.subspan(parts->session_pieces));
   if (!loaded) return tl::unexpected(loaded.error());
-  slam::StateReader reader(own, pieces.first(*own_pieces));
+  slam::StateReader reader(parts->session, pieces.first(parts->session_pieces));
   std::vector<NameId> waiting;
   reader(epoch_, session_, fragment_, driven_m_, start_refused_, waiting);
   T_map_keyframe_.reset();
@@ -226,6 +244,12 @@ Result<SessionEstimator::PieceValues> SessionEstimator::Load(std::string_view ma
   PieceValues values = reader.values();
   values.insert(values.end(), loaded->begin(), loaded->end());
   return values;
+}
+
+Result<slam::MapperOptions> SessionEstimator::OptionsOf(std::string_view main, const slam::MapperOptions& here) {
+  const auto parts = PartsOf(main);
+  if (!parts) return tl::unexpected(parts.error());
+  return slam::OptionsOf(parts->estimator, here);
 }
 
 SessionRecord::WaitingScans SessionEstimator::WaitingBySensor() const {

@@ -70,6 +70,8 @@ class SessionEstimator {
   // Returns the values of the pieces, in their order.
   using PieceValues = std::vector<std::shared_ptr<const void>>;
   [[nodiscard]] Result<PieceValues> Load(std::string_view main, std::span<const std::string_view> pieces);
+  // The options of the estimator whose state this is (slam/checkpoint.h).
+  [[nodiscard]] static Result<slam::MapperOptions> OptionsOf(std::string_view main, const slam::MapperOptions& here);
 
  private:
   struct Waiting {

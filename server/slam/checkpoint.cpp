@@ -1,7 +1,10 @@
 #include "server/slam/checkpoint.h"
 
+#include <algorithm>
 #include <cstring>
 #include <functional>
+#include <map>
+#include <optional>
 #include <span>
 #include <sstream>
 #include <utility>
@@ -13,6 +16,7 @@ namespace cairn::slam {
 namespace {
 
 constexpr std::string_view kMagic = "CAIRNEST";
+constexpr std::string_view kChecksum = " with the checksum ";  // Between a known map and its checksum.
 
 template <typename Number>
 void AppendNumber(std::string& bytes, Number number) {
@@ -70,19 +74,129 @@ std::string TextOf(MapperOptions options) {
   std::string numbers;
   for (const MapLine& line : *options.filter.line_match.map)
     for (const double number : {line.a.x(), line.a.y(), line.b.x(), line.b.y()}) AppendNumber(numbers, number);
-  return text + "slam.line_match.map with the checksum " + std::to_string(ChecksumOf(numbers)) + '\n';
+  return text + "slam.line_match.map" + std::string(kChecksum) + std::to_string(ChecksumOf(numbers)) + '\n';
 }
 
-// The first line that differs. REQUIRES: the texts are different.
-Status Different(const std::string& here, const std::string& there) {
-  std::istringstream ours(here), theirs(there);
-  std::string our, their;
-  do {
-    if (!std::getline(ours, our)) our = "(nothing)";
-    if (!std::getline(theirs, their)) their = "(nothing)";
-  } while (our == their && (ours || theirs));
-  return {StatusCode::kFailedPrecondition,
-          "the checkpoint was made with other options: there '" + their + "', here '" + our + "'"};
+using Values = std::map<std::string, std::string, std::less<>>;  // By key.
+
+// The checksum of a known map is a value, too.
+std::pair<std::string, std::string> KeyAndValue(const std::string& line) {
+  const auto end = line.find(kChecksum);
+  const auto key_end = end == std::string::npos ? line.find(' ') : end + kChecksum.size() - 1;
+  return {line.substr(0, key_end), key_end == std::string::npos ? "" : line.substr(key_end + 1)};
+}
+
+Values ValuesOf(const std::string& text) {
+  Values values;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) values.insert(KeyAndValue(line));
+  return values;
+}
+
+// The first option that has another value there; nothing if there is none.
+std::optional<Status> FirstDifference(const std::string& here, const Values& there) {
+  static const Values defaults = ValuesOf(TextOf({}));
+  const auto line = [](const std::string& key, const Values& values) {
+    const auto found = values.find(key);
+    return found == values.end() ? std::string("(nothing)") : key + ' ' + found->second;
+  };
+  const auto different = [](const std::string& our, const std::string& their) {
+    return Status{StatusCode::kFailedPrecondition,
+                  "the checkpoint was made with other options: there '" + their + "', here '" + our + "'"};
+  };
+  std::istringstream lines(here);
+  for (std::string our; std::getline(lines, our);) {
+    const std::string key = KeyAndValue(our).first;
+    const std::string their = line(key, there.contains(key) ? there : defaults);
+    if (our != their) return different(our, their);
+  }
+  // Of the keys that are there only, the one of a known map says that the estimator had one.
+  const Values ours = ValuesOf(here);
+  for (const auto& [key, value] : there)
+    if (key.ends_with(kChecksum.substr(0, kChecksum.size() - 1)) && !ours.contains(key))
+      return different("(nothing)", line(key, there));
+  return std::nullopt;
+}
+
+// Gives every option the value that it has in the text, or its default.
+class OptionReader final : public OptionVisitor {
+ public:
+  explicit OptionReader(const Values& values) : values_(values) {}
+  void Section(std::string_view key, std::string_view /*help*/, const std::function<void()>& fields) override {
+    const std::size_t outer = prefix_.size();
+    prefix_ += std::string(key) + '.';
+    fields();
+    prefix_.resize(outer);
+  }
+  void Real(std::string_view key, double& value, std::string_view /*unit*/, double min, double max,
+            const Help& /*help*/) override {
+    ReadNumber(key, value, min, max);
+  }
+  void Integer(std::string_view key, std::int64_t& value, std::string_view /*unit*/, std::int64_t min, std::int64_t max,
+               const Help& /*help*/) override {
+    ReadNumber(key, value, min, max);
+  }
+  void Flag(std::string_view key, bool& value, const Help& /*help*/) override {
+    const std::string* const text = Find(key);
+    if (text == nullptr) return;
+    value = *text == "true";
+    if (!value && *text != "false") wrong_ = prefix_ + std::string(key);
+  }
+  void Text(std::string_view key, std::string& value, const Help& /*help*/) override {
+    if (const std::string* const text = Find(key)) value = *text;
+  }
+  void Choice(std::string_view key, int& value, std::span<const std::string_view> names,
+              const Help& /*help*/) override {
+    const std::string* const text = Find(key);
+    if (text == nullptr) return;
+    const auto name = std::ranges::find(names, *text);
+    if (name == names.end()) {
+      wrong_ = prefix_ + std::string(key);
+    } else {
+      value = static_cast<int>(name - names.begin());
+    }
+  }
+  // The last key whose value can not be read; empty if there is none.
+  [[nodiscard]] const std::string& wrong() const { return wrong_; }
+
+ private:
+  [[nodiscard]] const std::string* Find(std::string_view key) const {
+    const auto found = values_.find(prefix_ + std::string(key));
+    return found == values_.end() ? nullptr : &found->second;
+  }
+  template <typename Number>
+  void ReadNumber(std::string_view key, Number& value, Number min, Number max) {
+    const std::string* const text = Find(key);
+    if (text == nullptr) return;
+    if (!ParseNumber(*text, value) || !(min <= value && value <= max)) wrong_ = prefix_ + std::string(key);
+  }
+
+  const Values& values_;
+  std::string prefix_ = "slam.";
+  std::string wrong_;
+};
+
+struct Parts {
+  std::string options;
+  std::string_view state;
+};
+
+Result<Parts> PartsOf(std::string_view bytes) {
+  const auto damaged = [](const char* why) {
+    return Fail(StatusCode::kDataLoss, std::string("the checkpoint is damaged: ") + why);
+  };
+  if (bytes.substr(0, kMagic.size()) != kMagic) return damaged("it does not begin as one");
+  bytes.remove_prefix(kMagic.size());
+  std::uint32_t format = 0;
+  std::uint64_t checksum = 0, length = 0;
+  if (!TakeNumber(bytes, format)) return damaged("it is too short");
+  if (format != kCheckpointFormat)
+    return Fail(format > kCheckpointFormat ? StatusCode::kUnimplemented : StatusCode::kFailedPrecondition,
+                "the checkpoint has format " + std::to_string(format) + ", this program reads " +
+                    std::to_string(kCheckpointFormat));
+  if (!TakeNumber(bytes, checksum) || checksum != ChecksumOf(bytes)) return damaged("its checksum is wrong");
+  if (!TakeNumber(bytes, length) || length > bytes.size()) return damaged("it is too short");
+  return Parts{std::string(bytes.substr(0, length)), bytes.substr(length)};
 }
 
 }  // namespace
@@ -110,23 +224,26 @@ std::string Checkpoint::With(const std::string& state) const {
 }
 
 Result<std::string_view> OpenCheckpoint(std::string_view bytes, const MapperOptions& options) {
-  const auto damaged = [](const char* why) {
-    return Fail(StatusCode::kDataLoss, std::string("the checkpoint is damaged: ") + why);
-  };
-  if (bytes.substr(0, kMagic.size()) != kMagic) return damaged("it does not begin as one");
-  bytes.remove_prefix(kMagic.size());
-  std::uint32_t format = 0;
-  std::uint64_t checksum = 0, length = 0;
-  if (!TakeNumber(bytes, format)) return damaged("it is too short");
-  if (format != kCheckpointFormat)
-    return Fail(format > kCheckpointFormat ? StatusCode::kUnimplemented : StatusCode::kFailedPrecondition,
-                "the checkpoint has format " + std::to_string(format) + ", this program reads " +
-                    std::to_string(kCheckpointFormat));
-  if (!TakeNumber(bytes, checksum) || checksum != ChecksumOf(bytes)) return damaged("its checksum is wrong");
-  if (!TakeNumber(bytes, length) || length > bytes.size()) return damaged("it is too short");
-  const std::string here = TextOf(options), there(bytes.substr(0, length));
-  if (here != there) return tl::unexpected(Different(here, there));
-  return bytes.substr(length);
+  const auto parts = PartsOf(bytes);
+  if (!parts) return tl::unexpected(parts.error());
+  const std::string here = TextOf(options);
+  if (here == parts->options) return parts->state;
+  if (auto different = FirstDifference(here, ValuesOf(parts->options))) return tl::unexpected(std::move(*different));
+  return parts->state;
+}
+
+Result<MapperOptions> OptionsOf(std::string_view bytes, const MapperOptions& here) {
+  const auto parts = PartsOf(bytes);
+  if (!parts) return tl::unexpected(parts.error());
+  const Values values = ValuesOf(parts->options);
+  OptionReader reader(values);
+  MapperOptions options;
+  options.filter.line_match.map = here.filter.line_match.map;
+  Visit(reader, options);
+  if (!reader.wrong().empty())
+    return Fail(StatusCode::kDataLoss, "the checkpoint is damaged: its options have no proper " + reader.wrong());
+  if (auto valid = Validate(options); !valid) return tl::unexpected(valid.error());
+  return options;
 }
 
 }  // namespace cairn::slam

@@ -1,9 +1,12 @@
 // A checkpoint is the state of one estimator (ScanPipeline) as bytes. It also contains the version of the format, a
-// checksum, and the options of the estimator. An estimator can load it only if it has the same options.
+// checksum, and the options of the estimator. An estimator can load it only if it has the same options; OptionsOf says
+// which they are. Options that came later have their defaults, and those that are gone do not count, so that a new
+// option makes no checkpoint useless.
 //
 // Bytes, little-endian: "CAIRNEST", format (uint32), checksum (uint64) of all that follows; length (uint64) and text of
 // the options, one `key value` a line; the state (state/archive.h). The list of members of every class is part of the
-// format: if one changes, kCheckpointFormat must be raised.
+// format: if one changes, kCheckpointFormat must be raised, and the formats from 7 on, which tests/golden has, must
+// still be read.
 #pragma once
 
 #include <cstdint>
@@ -39,5 +42,9 @@ class Checkpoint {
 // they have an older format, or come from an estimator with other options; the message names the first one that
 // differs. kUnimplemented: they have a newer format.
 [[nodiscard]] Result<std::string_view> OpenCheckpoint(std::string_view bytes, const MapperOptions& options);
+
+// The options with which the checkpoint was made. A known map of lines is not in it: that of `here` is taken, and
+// OpenCheckpoint tells whether it is the same. Errors as OpenCheckpoint.
+[[nodiscard]] Result<MapperOptions> OptionsOf(std::string_view bytes, const MapperOptions& here);
 
 }  // namespace cairn::slam

@@ -1,6 +1,8 @@
-// Remembers on the disk which sessions a server is about to restore, so that a session whose restoring ends the process
-// does not end every later start as well: what is still marked at a start was being restored when the process ended.
-// A process that is killed from outside at that moment looks the same. Not thread-safe.
+// Remembers on the disk which sessions a server is about to restore, and how far it has come, so that a session whose
+// restoring ends the process does not end every later start as well: what is still marked at a start was being restored
+// when the process ended. What ends the process does so at the same place of the journal each time, so only ends at the
+// same place are counted together; a long restore that is killed from outside now and then goes on being tried.
+// Thread rule: Reached from any thread, the others from one.
 #pragma once
 
 #include <cstdint>
@@ -13,24 +15,38 @@ namespace cairn::server {
 
 class RestoreMarks {
  public:
+  // A place is a stretch of so many entries of a journal.
+  static constexpr std::uint64_t kPlaceEntries = 10'000;
+
   // A damaged mark counts as one failure.
   [[nodiscard]] static Result<RestoreMarks> Read(Store& store);
 
-  // The mark that so many processes ended while they restored the session.
-  [[nodiscard]] static Record RecordOf(std::uint64_t session, std::uint32_t failures);
+  // The mark that so many processes ended at this place while they restored the session.
+  [[nodiscard]] static Record RecordOf(std::uint64_t session, std::uint32_t failures, std::uint64_t place = 0);
 
-  // How many processes ended while they restored this session.
+  // How many processes ended in a row at the same place of this session.
   [[nodiscard]] std::uint32_t failed(std::uint64_t session) const;
-  // These return when the change is on the disk.
+  // These return when the change is on the disk. Begin: from the first entry, or from a checkpoint.
   [[nodiscard]] Result<void> Begin(const std::vector<std::uint64_t>& sessions);
+  // The session is restored without its journal: if that ends the process too, it is one failure more.
+  [[nodiscard]] Result<void> BeginWithoutJournal(std::uint64_t session);
+  // So many entries of the session's journal have been processed. Writes only where a place begins.
+  [[nodiscard]] Result<void> Reached(std::uint64_t session, std::uint64_t entries) const;
   [[nodiscard]] Result<void> Set(std::uint64_t session, std::uint32_t failures);
   [[nodiscard]] Result<void> Succeeded(const std::vector<std::uint64_t>& sessions);
 
  private:
+  struct Failures {
+    std::uint32_t count = 0;
+    std::uint64_t place = 0;
+  };
   explicit RestoreMarks(Store& store) : store_(&store) {}
+  // The mark of a session that is at this place now.
+  [[nodiscard]] Record MarkAt(std::uint64_t session, std::uint64_t place) const;
+  [[nodiscard]] Failures FailuresOf(std::uint64_t session) const;
 
   Store* store_;
-  std::map<std::uint64_t, std::uint32_t> failed_;
+  std::map<std::uint64_t, Failures> failed_;
 };
 
 }  // namespace cairn::server

@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "server/ops/start_control.h"
 #include "server/store/journal.h"
 #include "tests/fuzz/memory_store.h"
 #include "tests/fuzz/rooms.h"
@@ -65,7 +66,8 @@ inline bool StartOn(MemoryStore& store) {
   Rooms rooms([](server::OutboundValue&&) {}, &journal);
   const auto sites = rooms.atlas().Restore();
   if (!sites) return Must(!sites.error().message.empty(), "a refusal has a reason"), false;
-  const auto sessions = rooms.roster().Restore();
+  server::StartControl control;
+  const auto sessions = rooms.roster().Restore(control);
   if (!sessions) return Must(!sessions.error().message.empty(), "a refusal has a reason"), false;
   const auto jobs = rooms.jobs().Restore();
   if (!jobs) return Must(!jobs.error().message.empty(), "a refusal has a reason"), false;

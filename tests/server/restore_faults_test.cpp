@@ -164,6 +164,81 @@ TEST(Restore, ASessionWhoseJournalEndsTheServerDoesSoTwiceAndTheOthersComeBack) 
   EXPECT_EQ(PathOf(*second.operator->(), "r2").size(), 60U);
 }
 
+// Starts that were given up are not counted as ends of the process.
+TEST(Restore, AStartThatIsGivenUpIsDoneByTheNextOne) {
+  const TempDirectory directory;
+  ServerOptions options = TestOptions();
+  options.robots.checkpoint_entries = 40;
+  DriveTwoRobots(directory / "0", options);
+  for (int start = 0; start < 4; ++start) {
+    StartControl control;
+    WatchedStore store(*OpenStore(directory / "0"), [&control](const RecordRange& range) {
+      if (range.kind == RecordKind::kJournal) control.GiveUp();
+    });
+    Journal journal(store, {.commit_delay_ms = 5});
+    Inbound inbound(16);
+    Outbound outbound(16);
+    Server server(options, inbound, outbound, 1, &journal);
+    const Result<void> started = server.Start(control);
+    ASSERT_FALSE(started);
+    EXPECT_EQ(started.error().code, StatusCode::kCancelled);
+  }
+  EXPECT_EQ(RestoreMarks::Read(**OpenStore(directory / "0"))->failed(1), 0U);
+  StoredServer second(directory / "0", options);
+  for (const char* robot : {"r1", "r2"}) EXPECT_EQ(PathOf(*second.operator->(), robot).size(), 60U);
+}
+
+TEST(Restore, OnlyEndsAtTheSamePlaceAreCountedTogether) {
+  const TempDirectory directory;
+  std::filesystem::create_directories(directory / "0");
+  const auto store = *OpenStore(directory / "0");
+  const auto ends_at = [&](std::uint64_t entries) {
+    auto marks = *RestoreMarks::Read(*store);
+    ASSERT_TRUE(marks.Begin({1}));
+    for (std::uint64_t entry = 1; entry <= entries; ++entry) ASSERT_TRUE(marks.Reached(1, entry));
+  };
+  const auto failed = [&] { return RestoreMarks::Read(*store)->failed(1); };
+  constexpr std::uint64_t kPlace = RestoreMarks::kPlaceEntries;
+  ends_at(kPlace + 5);
+  EXPECT_EQ(failed(), 1U);
+  ends_at(3 * kPlace);
+  EXPECT_EQ(failed(), 1U);
+  ends_at(3 * kPlace + 7);
+  EXPECT_EQ(failed(), 2U);
+  // Without the journal it does not come to that place, and is one more all the same.
+  ASSERT_TRUE(RestoreMarks::Read(*store)->BeginWithoutJournal(1));
+  EXPECT_EQ(failed(), 3U);
+  ends_at(7);
+  EXPECT_EQ(failed(), 1U);
+}
+
+// After a change of the estimator's options the whole journal is processed again. Where its beginning is gone, the
+// session goes on as it was begun, so that no map is lost.
+TEST(Restore, WithOtherOptionsASessionWithoutItsWholeJournalKeepsItsOwn) {
+  const TempDirectory directory;
+  ServerOptions options = TestOptions();
+  options.robots.checkpoint_entries = 40;
+  DriveTwoRobots(directory / "0", options);
+  {
+    const auto store = *OpenStore(directory / "0");
+    const auto checkpoint = ReadCheckpoint(*store, 1);
+    ASSERT_TRUE(checkpoint && *checkpoint);
+    ASSERT_TRUE(store->Commit(
+        {.removed = {{.kind = RecordKind::kJournal, .owner = 1, .first = 0, .last = (*checkpoint)->position}},
+         .put = {}}));
+  }
+  const std::int64_t before = options.slam.filter.particles;
+  options.slam.filter.particles = before + 1;
+  for (int start = 0; start < 2; ++start) {
+    StoredServer later(directory / "0", options);
+    for (const char* robot : {"r1", "r2"}) EXPECT_EQ(PathOf(*later.operator->(), robot).size(), 60U) << robot;
+    EXPECT_THAT(later->Ask(About(RequestKind::kStatus, "")).status.message, ::testing::IsEmpty());
+    // It goes on.
+    SayStarted(*later.operator->());
+    ASSERT_TRUE(later->WaitPhase("r1", kDriver, SessionPhase::kActive));
+  }
+}
+
 // Its journal was removed once, although another version of the server may be able to read it.
 TEST(Restore, ASessionThatEndedTheServerStaysInTheStoreWithItsPartOfTheMapShown) {
   const TempDirectory directory;

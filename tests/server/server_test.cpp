@@ -129,6 +129,10 @@ TEST(Server, TileQueriesAnswerByAreaLevelAndVersion) {
     since.since_version = newest.map_version;
     return house.Ask(since).tiles.empty();
   }));
+  // Of what an earlier start of the server has called so, nothing is known.
+  since.since_generation = WholeServer::kGeneration - 1;
+  EXPECT_EQ(house.Ask(since).tiles.size(), house.Ask(Of(RequestKind::kTiles)).tiles.size());
+  since.since_generation = WholeServer::kGeneration;
   since.since_version = 0;
   EXPECT_EQ(house.Ask(since).tiles.size(), house.Ask(Of(RequestKind::kTiles)).tiles.size());
 }

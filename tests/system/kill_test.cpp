@@ -4,6 +4,8 @@
 
 #include <csignal>
 #include <cstdint>
+#include <filesystem>
+#include <fstream>
 #include <string>
 #include <vector>
 
@@ -99,6 +101,34 @@ TEST(Kill, AServerOnAReadOnlyStateDoesNotStartAndSaysWhy) {
   }
   ChildProcess next(command);
   EXPECT_TRUE(next.Says(" ready"));
+}
+
+// A page of the database, and its first one, hold something else: nothing is guessed, and nothing is written over.
+TEST(Kill, AServerOnADamagedDatabaseEndsWithTwoAndSaysWhy) {
+  const TempDirectory directory;
+  const std::vector<std::string> command = {CAIRND_PATH, "--domain", std::to_string(TestDomain()), "--state",
+                                            directory.path().string()};
+  {
+    ChildProcess first(command);
+    ASSERT_TRUE(first.Says(" ready"));
+    first.Signal(SIGTERM);
+    EXPECT_EQ(first.Wait().exit_code, 0);
+  }
+  const auto database = directory.path() / "cairn.db";
+  const auto size = std::filesystem::file_size(database);
+  for (const std::uintmax_t page : {std::uintmax_t{1}, std::uintmax_t{0}}) {
+    ASSERT_GT(size, (page + 1) * 4096);
+    {
+      std::fstream file(database, std::ios::in | std::ios::out | std::ios::binary);
+      file.seekp(static_cast<std::streamoff>(page * 4096));
+      file << std::string(4096, '\x5a');
+    }
+    const auto outcome = ChildProcess(command).Wait();
+    EXPECT_EQ(outcome.exit_code, 2) << page << outcome.output;
+    EXPECT_NE(outcome.output.find("cannot start: "), std::string::npos) << outcome.output;
+    EXPECT_NE(outcome.output.find("cairn.db"), std::string::npos) << outcome.output;
+    EXPECT_EQ(std::filesystem::file_size(database), size);
+  }
 }
 
 TEST(Kill, ASecondServerOnTheSameStateEndsWithOneAndSaysSo) {

@@ -125,6 +125,35 @@ TEST_F(BusPair, AClientSeesOnlyItsOwnReplies) {
   EXPECT_EQ(my_subscription->refused(), 0U);
 }
 
+TEST_F(BusPair, RepliesToOthersAreNotSent) {
+  constexpr int kReplies = 3000;
+  const std::unique_ptr<Bus> bystander = MakeBus("bystander");
+  const auto publication = Must(sender_->Advertise<Reply>());
+  Inbox<Reply> mine;
+  Inbox<Reply> theirs;
+  const auto my_subscription = Must(receiver_->SubscribeReplies(1, mine.Sink()));
+  const auto their_subscription = Must(bystander->SubscribeReplies(2, theirs.Sink()));
+  ASSERT_TRUE(Eventually([&] { return publication->matched() == 2; }));
+  ASSERT_TRUE(Eventually([&] { return my_subscription->matched() + their_subscription->matched() == 2; }));
+  const std::uint64_t before = bystander->bytes_received();
+  const std::uint64_t receiver_before = receiver_->bytes_received();
+  Reply reply = ExtremeReply();
+  for (int i = 0; i < kReplies; ++i) {
+    reply.client = i % 1000 == 999 ? 2 : 1;
+    reply.sequence = i;
+    ASSERT_TRUE(publication->Publish(reply));
+    if (i % 100 != 0) continue;
+    ASSERT_TRUE(publication->WaitForAcknowledgement(kDeadline));
+  }
+  ASSERT_TRUE(mine.WaitFor(kReplies - 3));
+  ASSERT_TRUE(theirs.WaitFor(3));
+  EXPECT_EQ(mine.values().size(), kReplies - 3U);
+  const std::uint64_t to_receiver = receiver_->bytes_received() - receiver_before;
+  EXPECT_LT(20 * (bystander->bytes_received() - before), to_receiver);
+  EXPECT_GT(to_receiver, kReplies * sizeof(Reply));
+  EXPECT_EQ(bystander->datagrams_refused(), 0U);
+}
+
 TEST_F(BusPair, AReceiverThatThrowsLosesOneSampleOnly) {
   Inbox<PoseReport> inbox;
   const auto keep = inbox.Sink();

@@ -15,6 +15,7 @@
 
 #include "client/sim/fleet.h"
 #include "client/sim/shipped_worlds.h"
+#include "common/file/checksum.h"
 #include "common/sensor/log_reader.h"
 #include "server/slam/localisation/keyframe_lines.h"
 #include "server/slam/scan_pipeline.h"
@@ -314,6 +315,79 @@ TEST(Checkpoint, OfAnotherKnownMapIsRefused) {
   ASSERT_FALSE(loaded);
   EXPECT_NE(loaded.error().message.find("slam.line_match.map with the checksum"), std::string::npos)
       << loaded.error().message;
+}
+
+// The bytes with another text of options.
+std::string WithOptions(const std::string& bytes, const std::function<void(std::string&)>& change) {
+  constexpr std::size_t kChecksumAt = 12, kLengthAt = 20, kTextAt = 28;
+  std::uint64_t length = 0;
+  std::memcpy(&length, bytes.data() + kLengthAt, sizeof(length));
+  std::string text = bytes.substr(kTextAt, length);
+  change(text);
+  std::string checked(sizeof(length), '\0');
+  const std::uint64_t new_length = text.size();
+  std::memcpy(checked.data(), &new_length, sizeof(new_length));
+  checked += text + bytes.substr(kTextAt + length);
+  std::string changed = bytes.substr(0, kLengthAt) + checked;
+  const std::uint64_t checksum = ChecksumOf(checked);
+  std::memcpy(changed.data() + kChecksumAt, &checksum, sizeof(checksum));
+  return changed;
+}
+
+void RemoveLine(std::string& text, const std::string& key) {
+  const auto at = ('\n' + text).find('\n' + key + ' ');
+  ASSERT_NE(at, std::string::npos);
+  text.erase(at, text.find('\n', at) + 1 - at);
+}
+
+// A program that is newer than the checkpoint has options more, or some less.
+TEST(Checkpoint, AnOptionThatIsNotInItHasItsDefault) {
+  Saved saved;
+  const std::string without_gate =
+      WithOptions(saved.bytes, [](std::string& text) { RemoveLine(text, "slam.gate.distance_m"); });
+  EXPECT_TRUE(saved.pipeline.Load(without_gate));
+  MapperOptions options = saved.options;
+  options.gate.distance_m *= 2.0;
+  ScanPipeline other(options, {}, SerialFor, Ignoring());
+  const Result<void> loaded = other.Load(without_gate);
+  ASSERT_FALSE(loaded);
+  EXPECT_NE(loaded.error().message.find("slam.gate.distance_m"), std::string::npos) << loaded.error().message;
+}
+
+TEST(Checkpoint, AnOptionThatIsGoneDoesNotCount) {
+  Saved saved;
+  EXPECT_TRUE(saved.pipeline.Load(WithOptions(saved.bytes, [](std::string& text) { text += "slam.old_option 7\n"; })));
+}
+
+TEST(Checkpoint, TellsTheOptionsWithWhichItWasMade) {
+  Saved saved;
+  MapperOptions here;
+  here.filter.particles = 31;
+  const auto options = OptionsOf(saved.bytes, here);
+  ASSERT_TRUE(options) << options.error().message;
+  EXPECT_EQ(options->filter.particles, 30);
+  ScanPipeline other(*options, {}, SerialFor, Ignoring());
+  EXPECT_TRUE(other.Load(saved.bytes));
+}
+
+TEST(Checkpoint, OptionsThatCanNotBeAreRefused) {
+  Saved saved;
+  for (const auto& [key, value] : {std::pair("slam.particles", "many"),
+                                   {"slam.particles", "-1"},
+                                   {"slam.filter", "magic"},
+                                   {"slam.loop.enabled", "perhaps"},
+                                   {"slam.grid.resolution_m", "nan"}}) {
+    const auto options = OptionsOf(WithOptions(saved.bytes,
+                                               [&](std::string& text) {
+                                                 RemoveLine(text, key);
+                                                 text += std::string(key) + ' ' + value + '\n';
+                                               }),
+                                   saved.options);
+    ASSERT_FALSE(options) << key << ' ' << value;
+    EXPECT_EQ(options.error().code, StatusCode::kDataLoss);
+    EXPECT_NE(options.error().message.find(key), std::string::npos) << options.error().message;
+  }
+  EXPECT_FALSE(OptionsOf("CAIRN", saved.options));
 }
 
 TEST(Checkpoint, OfANewerFormatIsRefused) {

@@ -247,6 +247,42 @@ TEST(Journal, OverTheBudgetOnlyTheJournalBeforeACheckpointIsRemoved) {
   EXPECT_FALSE(journal.health().degraded);
 }
 
+// A journal is of use as a whole only, so it is removed as a whole: that of the session that was begun first.
+TEST(Journal, OverTheBudgetTheOldestSessionGivesItsJournalFirst) {
+  const TempDirectory directory;
+  const auto store = *OpenStore(directory.path());
+  constexpr std::uint64_t kEntries = 300;
+  {
+    Journal journal(*store, {.commit_delay_ms = 1});
+    journal.Start();
+    for (const std::uint64_t session : {1, 2, 3}) {
+      Followed told;
+      journal.Open(SampleSession(session), told.durable());
+      while (journal.position(session) < kEntries) journal.Append(session, SampleScan(7));
+      ASSERT_TRUE(test::Eventually([&] { return told.through == static_cast<std::int64_t>(kEntries); }));
+      ASSERT_TRUE(journal.Checkpoint(session, kEntries, [] { return CheckpointContent{LargeState(1, 100)}; }));
+      ASSERT_TRUE(test::Eventually([&] { return ReadCheckpoint(*store, session)->has_value(); }));
+      journal.Close(session);
+    }
+    journal.Stop();
+  }
+  const std::uint64_t used = *store->bytes_used();
+  // What the journal of one session has is enough.
+  Journal journal(*store, {.commit_delay_ms = 1, .max_gib = (static_cast<double>(used) - 4096.0) / (1 << 30)});
+  for (const std::uint64_t session : {3, 2, 1}) journal.Reopen(session, kEntries, {}, kEntries);
+  journal.Start();
+  journal.Append(3, SampleScan(8));
+  ASSERT_TRUE(test::Eventually([&] {
+    const auto numbers = store->Numbers({.kind = RecordKind::kJournal, .owner = 1});
+    return numbers && numbers->empty();
+  }));
+  journal.Stop();
+  EXPECT_EQ(StoredEntries(*store, 2), kEntries);
+  EXPECT_EQ(StoredEntries(*store, 3), kEntries + 1);
+  EXPECT_TRUE(ReadCheckpoint(*store, 1)->has_value());
+  EXPECT_FALSE(journal.health().over_budget);
+}
+
 TEST(Journal, BelowTheBudgetEverythingIsKept) {
   const TempDirectory directory;
   const auto store = *OpenStore(directory.path());

@@ -205,6 +205,9 @@ def use_the_page(programs, page, pictures):
     eventually("and the robots drive on", lambda: page.run(place) != before_place)
     if page.errors:
         raise Failed(f"errors of the page: {page.errors}")
+    told = [os.path.basename(process.said) for process in programs.all if TOKEN in said_by(process)]
+    if told:
+        raise Failed(f"the token is in what they said: {told}")
     outside = [url for url in page.requests if not url.startswith((address, "data:", "about:", "blob:"))]
     if outside:
         raise Failed(f"the page asks others: {outside}")
