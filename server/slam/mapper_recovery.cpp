@@ -61,6 +61,15 @@ void Mapper::State::LosePlace(bool odometry_goes_on) {
 
 // As Mapper::Relocalise.
 void Mapper::State::Relocalise(const std::optional<Pose2>& T_map_robot) {
+  if (localisation) {
+    if (T_map_robot) {
+      localisation->BeginWhereSaid(*T_map_robot);
+    } else {
+      localisation->Lose(false);
+    }
+    front_end.Restart();
+    return;
+  }
   if (!HasMap() || !last_scan) return;
   Recovery::Known known = LastKnown();
   if (T_map_robot) {

@@ -32,12 +32,12 @@ PlaceSearch::PlaceSearch(const PlaceSearchOptions& options, const LoopOptions& l
 }
 
 std::optional<FoundPlace> PlaceSearch::Find(const SearchedMap& map, std::span<const RecentScan> recent) {
-  return FindWithin(nullptr, trail, path, recent);
+  return FindWithin(nullptr, map, recent);
 }
 
 std::optional<FoundPlace> PlaceSearch::FindNear(const SearchedMap& map, std::span<const RecentScan> recent, const Pose2& T_map_robot) {
   const SearchWindow window{T_map_robot, options_.near_m, options_.near_rad};
-  return FindWithin(&window, trail, path, recent);
+  return FindWithin(&window, map, recent);
 }
 
 std::optional<FoundPlace> PlaceSearch::FindWithin(const SearchWindow* window, const SearchedMap& map, std::span<const RecentScan> recent) {

@@ -37,8 +37,7 @@ void Recovery::Move(const Pose2& T_new_old) {
   known_.T_map_robot = T_new_old * known_.T_map_robot;
   known_.covariance = J * known_.covariance * J.transpose();
   if (T_map_track_) T_map_track_ = T_new_old * *T_map_track_;
-  unconfirmed_.clear();  // They may lie at other places of the map, which have moved otherwise.
-  search_.Forget();
+  ForgetMap();  // What is unconfirmed may lie at other places of the map, which have moved otherwise.
 }
 
 void Recovery::End() {

@@ -76,6 +76,11 @@ class Recovery {
   [[nodiscard]] bool on_path() const { return T_map_track_.has_value(); }
   // The map has moved by this where the robot was last.
   void Move(const Pose2& T_new_old);
+  // The map is another one now.
+  void ForgetMap() {
+    unconfirmed_.clear();
+    search_.Forget();
+  }
   // The odometry has begun anew.
   void OdometryBeganAnew() { odometry_goes_on_ = false; }
   void End();
