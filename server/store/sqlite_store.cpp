@@ -26,6 +26,7 @@ constexpr const char* kSetUp =
     // In pages of 4 KiB: how long the write-ahead log gets before it is copied into the database. Checkpoints replace
     // their records within seconds; what was replaced in the log is never copied.
     "PRAGMA wal_autocheckpoint = 4000;"
+    "PRAGMA cache_size = -32768;"  // KiB. Where pages of what is removed are not in it, they are read first.
     "PRAGMA cell_size_check = ON;";
 constexpr const char* kMakeTables =
     "CREATE TABLE records (kind INTEGER NOT NULL, owner INTEGER NOT NULL, number INTEGER NOT NULL,"
