@@ -23,7 +23,7 @@ void Mapper::State::LocaliseIn(std::shared_ptr<const KnownGrid> map, bool place_
   if (localisation) return localisation->Replace(std::move(map));
   const bool said = place_known && !recovery.active() && (trail.empty() || level.outcome.localized);
   Recovery::Known known = LastKnown();
-  if (trail.empty()) known = {filter->estimate().T_map_robot, {}, {}};
+  if (trail.empty()) known = {filter->estimate().T_map_robot, {}, Eigen::Matrix3d::Zero()};
   if (last_scan) known.T_odom_robot = OdometryOrNone(last_scan->T_odom_robot);
   known.covariance = PoseCovariance(options.recovery.place.near_m, options.recovery.place.near_rad);
   recovery.End();
@@ -40,7 +40,7 @@ Result<void> Mapper::State::MapAgain() {
     return Fail(StatusCode::kFailedPrecondition, "the robot's place in the map is not known");
   localisation.reset();
   front_end.Restart();
-  blind.TakeCovariance();
+  static_cast<void>(blind.TakeCovariance());
   speed.Forget();
   if (!trail.empty()) {
     recovery.BeginWhereSaid({place.T_map_robot, OdometryOrNone(last_scan->T_odom_robot), place.covariance});
@@ -55,7 +55,13 @@ ScanOutcome Mapper::State::Localise(TrackedScan tracked, const Pose2& T_odom_rob
                                     const ParallelFor& parallel_for) {
   auto& [still, view, step] = tracked;
   if (!options.front_end.use_odometry) passage = std::min(passage, Passage::kUnwatched);
-  if (passage != Passage::kDriven && !StoodStill(*still, T_odom_robot, step)) {
+  const auto goes_on = [&] {
+    return passage == Passage::kPaused && options.front_end.use_odometry && !localisation->looking() &&
+           FollowsOdometry(*still, T_odom_robot, step) &&
+           AgreesAsBefore(*still, view.points_robot, step,
+                          {localisation->recovery(), *localisation->map(), localisation->T_map_track()});
+  };
+  if (passage != Passage::kDriven && !StoodStill(*still, T_odom_robot, step) && !goes_on()) {
     localisation->Lose(passage != Passage::kUnknown && options.front_end.use_odometry);
     front_end.Restart();
     step = front_end.Track(view, T_odom_robot, parallel_for);

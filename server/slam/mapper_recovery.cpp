@@ -93,11 +93,8 @@ bool Mapper::State::StoodStill(const Scan& scan, const Pose2& T_odom_robot, cons
                    limits);
 }
 
-// Whether the robot has certainly driven on by itself during a short pause: the scan shows its position, this is where
-// odometry has taken it, and the scan agrees with the map there, or no worse than the last scan before the pause.
-bool Mapper::State::GoesOn(const Scan& scan, const std::vector<SurfacePoint>& points_robot, const Pose2& T_odom_robot,
-                           const TrackStep& step) const {
-  if (!HasMap() || recovery.active() || !options.front_end.use_odometry) return false;
+// Whether the scan shows the position after a short pause, and this is where odometry has taken the robot.
+bool Mapper::State::FollowsOdometry(const Scan& scan, const Pose2& T_odom_robot, const TrackStep& step) const {
   if (!last_scan || !step.matched || step.degenerate) return false;
   const RecoveryOptions& limits = options.recovery;
   const std::uint64_t pause_ns = NanosBetween(last_scan->scan->stamp, scan.stamp);
@@ -105,12 +102,26 @@ bool Mapper::State::GoesOn(const Scan& scan, const std::vector<SurfacePoint>& po
   const Pose2 odometry = Between(last_scan->T_odom_robot, T_odom_robot);
   const Pose2 error = Between(odometry, Between(last_scan->T_track_robot, step.T_track_robot));
   const double allowed_m = limits.as_odometry_m + limits.as_odometry_per_m * odometry.translation().norm();
-  if (error.translation().norm() > allowed_m || std::abs(error.theta) > limits.as_odometry_rad) return false;
-  using Agreement = PlaceSearch::Agreement;
+  return error.translation().norm() <= allowed_m && std::abs(error.theta) <= limits.as_odometry_rad;
+}
+
+// Whether the robot has certainly driven on by itself during a short pause: the scan shows its position, this is where
+// odometry has taken it, and the scan agrees with the map there, or no worse than the last scan before the pause.
+bool Mapper::State::GoesOn(const Scan& scan, const std::vector<SurfacePoint>& points_robot, const Pose2& T_odom_robot,
+                           const TrackStep& step) const {
+  if (!HasMap() || recovery.active() || !options.front_end.use_odometry) return false;
   const PosePath path = believed_path();
   const PathMap own_map(trail, path, options.recovery.place, options.self_check.near_m);
+  return FollowsOdometry(scan, T_odom_robot, step) &&
+         AgreesAsBefore(scan, points_robot, step, {recovery, own_map, T_map_track()});
+}
+
+// Whether the scan agrees with the map where the track leads, or no worse than the last scan.
+bool Mapper::State::AgreesAsBefore(const Scan& scan, const std::vector<SurfacePoint>& points_robot,
+                                   const TrackStep& step, const TrackInMap& track) const {
+  using Agreement = PlaceSearch::Agreement;
   const auto agreement = [&](const Scan& one, const std::vector<SurfacePoint>& points, const Pose2& T_track_robot) {
-    return recovery.Compare(one, points, T_map_track() * T_track_robot, own_map);
+    return track.recovery.Compare(one, points, track.T_map_track * T_track_robot, track.map);
   };
   const Agreement now = agreement(scan, points_robot, step.T_track_robot);
   if (now != Agreement::kDoubtful) return now == Agreement::kAgrees;

@@ -56,6 +56,15 @@ struct Mapper::State {
     return options.front_end.use_odometry ? T_odom_robot : level.T_odom_robot;
   }
   [[nodiscard]] bool StoodStill(const Scan& scan, const Pose2& T_odom_robot, const TrackStep& step) const;
+  [[nodiscard]] bool FollowsOdometry(const Scan& scan, const Pose2& T_odom_robot, const TrackStep& step) const;
+  // A map, and where the track lies in it.
+  struct TrackInMap {
+    const Recovery& recovery;
+    const SearchedMap& map;
+    Pose2 T_map_track;
+  };
+  [[nodiscard]] bool AgreesAsBefore(const Scan& scan, const std::vector<SurfacePoint>& points_robot,
+                                    const TrackStep& step, const TrackInMap& track) const;
   [[nodiscard]] bool GoesOn(const Scan& scan, const std::vector<SurfacePoint>& points_robot, const Pose2& T_odom_robot,
                             const TrackStep& step) const;
   [[nodiscard]] Pose2 T_map_track() const {
@@ -180,7 +189,7 @@ struct Mapper::State {
   LevelScan level;
   std::optional<LastScan> last_scan;
   std::optional<GridLocalisation> localisation;  // Of a robot that does not map now.
-  std::uint64_t size_after_last_search = 0;  // Number of keyframes left after RetireKeyframes looked last.
+  std::uint64_t size_after_last_search = 0;      // Number of keyframes left after RetireKeyframes looked last.
 };
 
 }  // namespace cairn::slam

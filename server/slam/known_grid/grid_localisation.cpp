@@ -7,16 +7,16 @@
 namespace cairn::slam {
 namespace {
 
-constexpr double kMinScore = 0.4;         // Share of the points that must lie on surfaces of the map.
-constexpr double kGuessSigmaM = 0.1;      // The alignment may correct the pose by some of these.
+constexpr double kMinScore = 0.4;     // Share of the points that must lie on surfaces of the map.
+constexpr double kGuessSigmaM = 0.1;  // The alignment may correct the pose by some of these.
 constexpr double kGuessSigmaRad = 0.03;
-constexpr double kMapSigmaM = 0.02;       // Errors of the map: less than half a cell.
+constexpr double kMapSigmaM = 0.02;  // Errors of the map: less than half a cell.
 constexpr double kMapSigmaRad = 0.003;
-constexpr double kLostSigmaM = 0.5;       // With more doubt than this the robot is lost.
+constexpr double kLostSigmaM = 0.5;  // With more doubt than this the robot is lost.
 constexpr double kLostSigmaRad = 0.15;
-constexpr double kCompareEveryM = 0.5;    // As the self-check of a robot that maps.
+constexpr double kCompareEveryM = 0.5;  // As the self-check of a robot that maps.
 constexpr double kStretchOfComparisonsM = 5.0;
-constexpr int kMinCompared = 100;         // Points over a stretch.
+constexpr int kMinCompared = 100;  // Points over a stretch.
 
 bool IsTooDoubtful(const Eigen::Matrix3d& covariance) {
   const double most = kLostSigmaM * kLostSigmaM;
@@ -83,9 +83,9 @@ GridLocalisation::Followed GridLocalisation::Take(const Sight& sight) {
 // The robot is looked for.
 GridLocalisation::Followed GridLocalisation::Look(const Sight& sight) {
   const bool first = !recovery_.has_scans();
-  const Pose2 T_track_last = recovery_.LastKept(sight.step.T_track_robot);
-  const bool keep = first || MovedEnough(Between(T_track_last, sight.step.T_track_robot), options_.gate);
+  const bool keep = first || MovedEnough(Between(T_track_kept_, sight.step.T_track_robot), options_.gate);
   if (keep) {
+    T_track_kept_ = sight.step.T_track_robot;
     if (const auto found = recovery_.Take(sight.scan, sight.step, sight.points_robot, *map_)) {
       recovery_.End();
       comparisons_.clear();
@@ -124,10 +124,17 @@ GridLocalisation::Followed GridLocalisation::Follow(const Sight& sight) {
   unmatched_m_ = fixed ? 0.0 : unmatched_m_ + (now.T_map_robot.translation() - fix_.T_map_robot.translation()).norm();
   fix_ = now;
   blind_covariance_.setZero();
-  if (Contradicted(sight, now.T_map_robot) || IsTooDoubtful(now.covariance)) {
+  const bool contradicted = Contradicted(sight, now.T_map_robot);
+  if (contradicted || IsTooDoubtful(now.covariance)) {
     last_ = {now.T_map_robot, now.covariance, PoseReason::kLost};
     T_odom_robot_ = sight.scan.T_odom_robot;
-    Lose(true);
+    if (contradicted) {
+      Lose(true);
+    } else {
+      recovery_.BeginNear({last_.T_map_robot, T_odom_robot_, last_.covariance},
+                          now.T_map_robot * step.T_track_robot.Inverse());
+    }
+    T_track_kept_ = step.T_track_robot;
     return {last_, true};
   }
   return {{now.T_map_robot, now.covariance, fixed ? PoseReason::kTracking : PoseReason::kOdometryOnly}, true};

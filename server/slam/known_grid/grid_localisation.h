@@ -1,12 +1,11 @@
 // Follows a robot in a map that it does not change. Between the fixes the front-end carries the pose; about every
 // quarter of a metre the scan is aligned with the surfaces of the map, and the answer is fused with the pose. Where the
 // map shows nothing, the pose goes on with growing doubt. The robot is lost where that doubt is too large, or where the
-// scans contradict the map over some metres. It is then looked for as one that was not watched (recovery.h), in this map.
-// People, and furniture that has moved, contradict in some places; that is borne, because it does not contradict for
-// metres everywhere.
-// Frames: `map`; `track` is that of the front-end. Not thread-safe. Deterministic.
-// Source: the extended Kalman filter over matches with a map of Gutmann, Weigel and Nebel 1999 (thesis B 2.2.2), here
-// with points and surfaces.
+// scans contradict the map over some metres. It is then looked for as one that was not watched (recovery.h), in this
+// map. People, and furniture that has moved, contradict in some places; that is borne, because it does not contradict
+// for metres everywhere. Frames: `map`; `track` is that of the front-end. Not thread-safe. Deterministic. Source: the
+// extended Kalman filter over matches with a map of Gutmann, Weigel and Nebel 1999 (thesis B 2.2.2), here with points
+// and surfaces.
 #pragma once
 
 #include <deque>
@@ -38,8 +37,8 @@ class GridLocalisation {
  public:
   explicit GridLocalisation(const GridLocalisationOptions& options);
 
-  // From now on the robot is followed in this map, and looked for first: near `known` if somebody says that it is there,
-  // otherwise everywhere.
+  // From now on the robot is followed in this map, and looked for first: near `known` if somebody says that it is
+  // there, otherwise everywhere.
   void Begin(std::shared_ptr<const KnownGrid> map, const Recovery::Known& known, bool said);
   // The map has changed a little; the robot is where it was.
   void Replace(std::shared_ptr<const KnownGrid> map);
@@ -52,6 +51,12 @@ class GridLocalisation {
     Pose2 T_map_robot;
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
     PoseReason reason = PoseReason::kLost;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.T_map_robot, self.covariance, self.reason);
+      archive.Require(self.reason <= PoseReason::kWaiting, "the reason of a pose");
+    }
   };
   // The scan just tracked. `points_robot`: its surfaces. `keyframe`: whether the front-end takes it as a reference.
   struct Sight {
@@ -65,6 +70,9 @@ class GridLocalisation {
   };
   Followed Take(const Sight& sight);
 
+  // Where the track lies in the map, while the robot is followed.
+  [[nodiscard]] Pose2 T_map_track() const { return fix_.T_map_robot * fix_.T_track_robot.Inverse(); }
+  [[nodiscard]] const Recovery& recovery() const { return recovery_; }
   [[nodiscard]] bool looking() const { return recovery_.active(); }
   [[nodiscard]] const std::shared_ptr<const KnownGrid>& map() const { return map_; }
   // The last place.
@@ -73,7 +81,7 @@ class GridLocalisation {
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     archive(self.recovery_, self.fix_, self.comparisons_, self.last_, self.T_odom_robot_, self.T_track_robot_,
-            self.way_m_, self.blind_covariance_, self.unmatched_m_);
+            self.T_track_kept_, self.way_m_, self.blind_covariance_, self.unmatched_m_);
   }
 
  private:
@@ -109,9 +117,10 @@ class GridLocalisation {
   Fix fix_;
   std::deque<Comparison> comparisons_;
   Place last_;
-  Pose2 T_odom_robot_;   // Of the last scan.
-  Pose2 T_track_robot_;  // Of the last scan.
-  double way_m_ = 0.0;   // Along the track.
+  Pose2 T_odom_robot_;                                          // Of the last scan.
+  Pose2 T_track_robot_;                                         // Of the last scan.
+  Pose2 T_track_kept_;                                          // Of the last scan with which the robot was looked for.
+  double way_m_ = 0.0;                                          // Along the track.
   Eigen::Matrix3d blind_covariance_ = Eigen::Matrix3d::Zero();  // Since the fix.
   double unmatched_m_ = 0.0;  // Way since the map or the last scans have shown where the robot is.
 };

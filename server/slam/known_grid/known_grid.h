@@ -1,8 +1,8 @@
 // An occupancy map that somebody has made before, in which a robot finds itself: its surfaces with their directions, to
 // align scans with, and its cells, to compare scans with. It never changes.
-// A surface lies where an occupied cell has a free one near it, on the line that fits the occupied cells around it best;
-// a wall that is free on both sides has a surface on each. Frame: `map`. Immutable: any thread may read.
-// Source: none; the alignment is that of point_to_line.h, the comparison that of visibility.h.
+// A surface lies where an occupied cell has a free one near it, on the line that fits the occupied cells around it
+// best; a wall that is free on both sides has a surface on each. Frame: `map`. Immutable: any thread may read. Source:
+// none; the alignment is that of point_to_line.h, the comparison that of visibility.h.
 #pragma once
 
 #include <Eigen/Core>

@@ -35,12 +35,15 @@ std::optional<FoundPlace> PlaceSearch::Find(const SearchedMap& map, std::span<co
   return FindWithin(nullptr, map, recent);
 }
 
-std::optional<FoundPlace> PlaceSearch::FindNear(const SearchedMap& map, std::span<const RecentScan> recent, const Pose2& T_map_robot) {
-  const SearchWindow window{T_map_robot, options_.near_m, options_.near_rad};
+std::optional<FoundPlace> PlaceSearch::FindNear(const SearchedMap& map, std::span<const RecentScan> recent,
+                                                const Pose2& T_map_robot, double reach_m, double reach_rad) {
+  const SearchWindow window{T_map_robot, std::max(options_.near_m, reach_m),
+                            std::min(kPi, std::max(options_.near_rad, reach_rad))};
   return FindWithin(&window, map, recent);
 }
 
-std::optional<FoundPlace> PlaceSearch::FindWithin(const SearchWindow* window, const SearchedMap& map, std::span<const RecentScan> recent) {
+std::optional<FoundPlace> PlaceSearch::FindWithin(const SearchWindow* window, const SearchedMap& map,
+                                                  std::span<const RecentScan> recent) {
   if (recent.empty() || IndexOf(map).surfaces.size() < kMinSurfaces) return std::nullopt;
   const std::vector<SurfacePoint> surfaces = SurfacesOf(recent, options_.cell_scale * kSearchCellM);
   if (surfaces.size() < kMinSurfaces) return std::nullopt;
@@ -55,16 +58,15 @@ const IndexedSurfaces& PlaceSearch::IndexOf(const SearchedMap& map) {
   return *index_;
 }
 
-double PlaceSearch::ScoreAt(const SearchedMap& map, std::span<const RecentScan> recent,
-                            const Pose2& T_map_robot) {
+double PlaceSearch::ScoreAt(const SearchedMap& map, std::span<const RecentScan> recent, const Pose2& T_map_robot) {
   const auto points = SampleOf(SurfacesOf(recent, options_.cell_scale * kSearchCellM));
   const LikelihoodPyramid& pyramid = IndexOf(map).pyramid;
   const auto best = FindBestPose(points, pyramid, {T_map_robot, 2.0 * pyramid.cell_m(), 2.0 * kFoundSigmaRad}, 0.0);
   return best ? best->score : 0.0;
 }
 
-bool PlaceSearch::FitsElsewhere(const SearchedMap& map, std::span<const RecentScan> recent,
-                                const Pose2& T_map_robot, double score) {
+bool PlaceSearch::FitsElsewhere(const SearchedMap& map, std::span<const RecentScan> recent, const Pose2& T_map_robot,
+                                double score) {
   const auto points = SampleOf(SurfacesOf(recent, options_.cell_scale * kSearchCellM));
   const IndexedSurfaces& index = IndexOf(map);
   return FindBestPose(points, index.pyramid, index.window, score, ApartFrom(T_map_robot)).has_value();

@@ -1,8 +1,8 @@
-// cairn-study localise: the second half of a drive, only localised in the map of the first. How much of it is localised,
-// is any pose wrong, how exact are they, and how long does it take to find the robot, of which nothing is known at first?
-// "Inside" are the scans of which at least half of the points lie where the map shows a wall, if they are placed along
-// the smoothed path of the whole drive, which is the reference; it is moved to where it fits the path of the first half
-// best. With simulated drives the reference is the truth.
+// cairn-study localise: the second half of a drive, only localised in the map of the first. How much of it is
+// localised, is any pose wrong, how exact are they, and how long does it take to find the robot, of which nothing is
+// known at first? "Inside" are the scans of which at least half of the points lie where the map shows a wall, if they
+// are placed along the smoothed path of the whole drive, which is the reference; it is moved to where it fits the path
+// of the first half best. With simulated drives the reference is the truth.
 #include <Eigen/SVD>
 #include <cmath>
 #include <memory>
@@ -15,7 +15,7 @@
 #include "server/slam/known_grid/known_grid.h"
 #include "server/slam/scan/beam_points.h"
 #include "server/slam/scan_pipeline.h"
-#include "server/slam/smoothing/smoothing.h"
+#include "server/slam/smoothing/smoothed_map.h"
 #include "tests/studies/log_run.h"
 #include "tests/studies/logs.h"
 #include "tests/studies/study.h"
@@ -52,7 +52,8 @@ Pose2 Fit(const Trajectory& from, const Trajectory& to) {
 }
 
 StudyLog Part(const StudyLog& log, double from, double to) {
-  StudyLog part{.name = log.name, .records = {}, .relations = {}, .truth = {}, .T_map_robot_start = log.T_map_robot_start};
+  StudyLog part{
+      .name = log.name, .records = {}, .relations = {}, .truth = {}, .T_map_robot_start = log.T_map_robot_start};
   const auto begin = static_cast<std::ptrdiff_t>(from * static_cast<double>(log.records.size()));
   const auto end = static_cast<std::ptrdiff_t>(to * static_cast<double>(log.records.size()));
   part.records.assign(log.records.begin() + begin, log.records.begin() + end);
@@ -81,7 +82,7 @@ bool IsInside(const slam::KnownGrid& map, const Scan& scan, const Pose2& T_map_r
   int points = 0, shown = 0;
   for (const slam::BeamPoint& point : slam::PointsOf(scan)) {
     ++points;
-    shown += map.surfaces().Nearest(T_map_robot * point.p, 0.2) != nullptr ? 1 : 0;
+    shown += map.surfaces().Nearest(T_map_robot * point.p_robot, 0.2) != nullptr ? 1 : 0;
   }
   return points > 0 && 2 * shown >= points;
 }
@@ -165,7 +166,8 @@ void StudyLocalise(StudyContext& context) {
     for (StampedPose& pose : reference) pose.T_map_robot = T_map_reference * pose.T_map_robot;
     const Outcome outcome = LocaliseIn(map, Part(log, 0.5, 1.0), reference, options);
     const Distribution ms = DistributionOf(outcome.scan_ms);
-    const double share = static_cast<double>(outcome.inside_localized) / std::max(1.0, static_cast<double>(outcome.inside));
+    const double share =
+        static_cast<double>(outcome.inside_localized) / std::max(1.0, static_cast<double>(outcome.inside));
     table.Add({log.name, Number(outcome.way_to_found_m, 1), Count(outcome.inside), Number(100.0 * share, 1) + " %",
                Count(outcome.outside_localized), Count(outcome.wrong),
                Number(std::sqrt(outcome.squares_m2 / std::max(1.0, static_cast<double>(outcome.compared))), 3),
@@ -176,7 +178,8 @@ void StudyLocalise(StudyContext& context) {
   report.Add(table, "localise");
 }
 
-const Registration kLocalise("localise", "the second half of a drive, localised in the map of the first", StudyLocalise);
+const Registration kLocalise("localise", "the second half of a drive, localised in the map of the first",
+                             StudyLocalise);
 
 }  // namespace
 }  // namespace cairn::studies
