@@ -94,11 +94,11 @@ class Mapper {
   // scan). From the next scan on it is not localized until it is found in its map: near that pose, or anywhere
   // (recovery/recovery.h). Nothing happens before there is a map.
   void Relocalise(const std::optional<Pose2>& T_map_robot);
-  // From now on the robot is only localised in this map: what it has mapped itself stays as it is, and nothing is added.
-  // `place_known`: its pose, or its start before the first scan, is one in this map; then it is looked for near there,
-  // otherwise everywhere. A second call replaces the map. Null ends it: the robot maps again, from where it is. The last
-  // needs a robot whose place is known (FAILED_PRECONDITION).
-  Result<void> LocaliseIn(std::shared_ptr<const KnownGrid> map, bool place_known);
+  // From now on the robot is only localised in this map: what it has mapped itself stays as it is, and nothing is
+  // added. `place_known`: its pose, or its start before the first scan, is one in this map; then it is looked for near
+  // there, otherwise everywhere. A later call replaces the map; if it has `moved`, the robot must be found again near
+  // where it is. Null: the robot maps again, from where it is, which must be known (FAILED_PRECONDITION).
+  Result<void> LocaliseIn(std::shared_ptr<const KnownGrid> map, bool place_known, bool moved = false);
   [[nodiscard]] bool localises() const;
   // T_map_robot of every keyframe along the best path; empty while the robot's place in the map is not known.
   [[nodiscard]] std::vector<Pose2> BestPath() const;

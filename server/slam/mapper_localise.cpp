@@ -19,8 +19,12 @@ GridLocalisationOptions Mapper::State::LocalisationOptions() const {
 }
 
 // As Mapper::LocaliseIn, with a map.
-void Mapper::State::LocaliseIn(std::shared_ptr<const KnownGrid> map, bool place_known) {
-  if (localisation) return localisation->Replace(std::move(map));
+void Mapper::State::LocaliseIn(std::shared_ptr<const KnownGrid> map, bool place_known, bool moved) {
+  if (localisation) {
+    localisation->Replace(std::move(map));
+    if (moved) localisation->Doubt();
+    return;
+  }
   const bool said = place_known && !recovery.active() && (trail.empty() || level.outcome.localized);
   Recovery::Known known = LastKnown();
   if (trail.empty()) known = {filter->estimate().T_map_robot, {}, Eigen::Matrix3d::Zero()};
@@ -102,9 +106,9 @@ ScanOutcome Mapper::State::CoastLocalised(Stamp stamp, const Pose2& T_odom_robot
   return outcome;
 }
 
-Result<void> Mapper::LocaliseIn(std::shared_ptr<const KnownGrid> map, bool place_known) {
+Result<void> Mapper::LocaliseIn(std::shared_ptr<const KnownGrid> map, bool place_known, bool moved) {
   if (map == nullptr) return state_->MapAgain();
-  state_->LocaliseIn(std::move(map), place_known);
+  state_->LocaliseIn(std::move(map), place_known, moved);
   return {};
 }
 

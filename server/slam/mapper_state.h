@@ -74,7 +74,7 @@ struct Mapper::State {
                        const ParallelFor& parallel_for);
   ScanOutcome Recover(Keyframe keyframe, ScanView view, TrackStep step, const ParallelFor& parallel_for);
   [[nodiscard]] ScanOutcome ReportRecovery(Stamp stamp, const Pose2& T_odom_robot, const Pose2& T_track_robot) const;
-  void LocaliseIn(std::shared_ptr<const KnownGrid> map, bool place_known);
+  void LocaliseIn(std::shared_ptr<const KnownGrid> map, bool place_known, bool moved);
   Result<void> MapAgain();
   ScanOutcome Localise(TrackedScan tracked, const Pose2& T_odom_robot, Passage passage,
                        const ParallelFor& parallel_for);

@@ -56,6 +56,11 @@ void GridLocalisation::Replace(std::shared_ptr<const KnownGrid> map) {
   recovery_.ForgetMap();
 }
 
+void GridLocalisation::Doubt() {
+  comparisons_.clear();
+  if (!recovery_.active()) recovery_.BeginNear({last_.T_map_robot, T_odom_robot_, last_.covariance}, T_map_track());
+}
+
 void GridLocalisation::Lose(bool odometry_goes_on) {
   comparisons_.clear();
   if (!recovery_.active()) {

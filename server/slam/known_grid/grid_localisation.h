@@ -42,6 +42,8 @@ class GridLocalisation {
   void Begin(std::shared_ptr<const KnownGrid> map, const Recovery::Known& known, bool said);
   // The map has changed a little; the robot is where it was.
   void Replace(std::shared_ptr<const KnownGrid> map);
+  // It may not be where it was, but near: it has to be found again.
+  void Doubt();
   // The robot may be anywhere. `odometry_goes_on`: since the last scan.
   void Lose(bool odometry_goes_on);
   // Somebody says that it is at this pose.
