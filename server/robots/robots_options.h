@@ -17,7 +17,7 @@ struct RobotsOptions {
   double suspended_expiry_s = 86400.0;
   double ledger_rate_hz = 10.0;
   double gap_wait_s = 10.0;
-  std::int64_t checkpoint_entries = 2000;
+  std::int64_t checkpoint_entries = 1500;
 };
 void Visit(OptionVisitor& visitor, RobotsOptions& options);
 

@@ -137,14 +137,12 @@ struct Mapper::State {
       }
       if (!archive.ok()) return;
       self.localisation.emplace(self.LocalisationOptions());
+      self.localisation->Replace(std::make_shared<const KnownGrid>(
+          std::move(tiles), resolution_m, self.options.recovery.place, self.options.self_check.near_m));
     } else {
       for (const auto& [key, cells] : tiles) archive(key, cells);
     }
     archive(*self.localisation);
-    if constexpr (Archive::kReads)
-      if (archive.ok())
-        self.localisation->Replace(std::make_shared<const KnownGrid>(
-            std::move(tiles), resolution_m, self.options.recovery.place, self.options.self_check.near_m));
   }
 
   // The last scan that was reported as part of the path and was not tilted.
