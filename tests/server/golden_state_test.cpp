@@ -1,0 +1,68 @@
+// State directories that earlier versions have written are restored for ever (tests/golden/README.md says how each was
+// made), also where only the checkpoints are left, and although this server has other options.
+#include <gmock/gmock.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+#include "tests/server/support/stored_server.h"
+#include "tests/temp_directory.h"
+
+namespace cairn::server::testing {
+namespace {
+
+class GoldenState : public ::testing::TestWithParam<const char*> {
+ protected:
+  void SetUp() override {
+    const char* const source = std::getenv("CAIRN_SOURCE_DIR");
+    ASSERT_NE(source, nullptr);
+    std::filesystem::create_directories(state());
+    const auto golden = std::filesystem::path(source) / "tests" / "golden" / GetParam() / "cairn.db";
+    ASSERT_TRUE(std::filesystem::copy_file(golden, state() / "cairn.db")) << golden;
+  }
+  [[nodiscard]] std::filesystem::path state() const { return directory_ / "0"; }
+  // Removes what came before the checkpoints, as a small store.max_gib does.
+  void RemoveBeginnings() const {
+    const auto store = *OpenStore(state());
+    for (const std::uint64_t session : *store->Owners(RecordKind::kSession)) {
+      const auto checkpoint = ReadCheckpoint(*store, session);
+      ASSERT_TRUE(checkpoint && *checkpoint);
+      ASSERT_TRUE(store->Commit(
+          {.removed = {{.kind = RecordKind::kJournal, .owner = session, .first = 0, .last = (*checkpoint)->position}},
+           .put = {}}));
+    }
+  }
+  void ExpectWhatItHolds() const {
+    StoredServer server(state());
+    WholeServer& house = *server.operator->();
+    const Reply status = house.Ask(About(RequestKind::kStatus, ""));
+    EXPECT_THAT(status.status.message, ::testing::IsEmpty());  // Nothing is set aside.
+    ASSERT_EQ(status.robots.size(), 2U);
+    for (const char* const robot : {"robot1", "robot2"}) EXPECT_EQ(PathOf(house, robot).size(), 32U) << robot;
+    ASSERT_TRUE(house.WaitFor([&] { return house.CurrentTiles().size() >= 4; }));
+    const Reply map = house.Ask(Request{.kind = RequestKind::kMapInfo, .site = "lab", .robot = {}, .saved = {}});
+    ASSERT_EQ(map.maps.size(), 1U);
+    EXPECT_EQ(map.maps[0].epoch, 1U);
+    EXPECT_EQ(map.maps[0].enabled_version, 2U);
+    EXPECT_EQ(house.Ask(Request{.kind = RequestKind::kJobList, .site = "lab", .robot = {}, .saved = {}}).jobs.size(),
+              1U);
+  }
+
+ private:
+  const TempDirectory directory_;
+};
+
+TEST_P(GoldenState, IsRestoredFromItsJournals) {
+  ExpectWhatItHolds();
+}
+
+TEST_P(GoldenState, IsRestoredFromItsCheckpoints) {
+  ASSERT_NO_FATAL_FAILURE(RemoveBeginnings());
+  ExpectWhatItHolds();
+}
+
+INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenState, ::testing::Values("state-1"),
+                         [](const auto& name) { return name.index == 0 ? std::string("One") : std::string("Later"); });
+
+}  // namespace
+}  // namespace cairn::server::testing
