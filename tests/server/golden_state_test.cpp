@@ -11,6 +11,13 @@
 namespace cairn::server::testing {
 namespace {
 
+Request OfLab(RequestKind kind) {
+  Request request;
+  request.kind = kind;
+  request.site = "lab";
+  return request;
+}
+
 class GoldenState : public ::testing::TestWithParam<const char*> {
  protected:
   void SetUp() override {
@@ -24,7 +31,9 @@ class GoldenState : public ::testing::TestWithParam<const char*> {
   // Removes what came before the checkpoints, as a small store.max_gib does.
   void RemoveBeginnings() const {
     const auto store = *OpenStore(state());
-    for (const std::uint64_t session : *store->Owners(RecordKind::kSession)) {
+    const auto sessions = store->Owners(RecordKind::kSession);
+    ASSERT_TRUE(sessions);
+    for (const std::uint64_t session : *sessions) {
       const auto checkpoint = ReadCheckpoint(*store, session);
       ASSERT_TRUE(checkpoint && *checkpoint);
       ASSERT_TRUE(store->Commit(
@@ -40,12 +49,11 @@ class GoldenState : public ::testing::TestWithParam<const char*> {
     ASSERT_EQ(status.robots.size(), 2U);
     for (const char* const robot : {"robot1", "robot2"}) EXPECT_EQ(PathOf(house, robot).size(), 32U) << robot;
     ASSERT_TRUE(house.WaitFor([&] { return house.CurrentTiles().size() >= 4; }));
-    const Reply map = house.Ask(Request{.kind = RequestKind::kMapInfo, .site = "lab", .robot = {}, .saved = {}});
+    const Reply map = house.Ask(OfLab(RequestKind::kMapInfo));
     ASSERT_EQ(map.maps.size(), 1U);
     EXPECT_EQ(map.maps[0].epoch, 1U);
     EXPECT_EQ(map.maps[0].enabled_version, 2U);
-    EXPECT_EQ(house.Ask(Request{.kind = RequestKind::kJobList, .site = "lab", .robot = {}, .saved = {}}).jobs.size(),
-              1U);
+    EXPECT_EQ(house.Ask(OfLab(RequestKind::kJobList)).jobs.size(), 1U);
   }
 
  private:
