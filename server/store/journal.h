@@ -7,9 +7,9 @@
 // queue fills. If there is no room for an entry, its session is no longer stored from there on, because a journal with
 // a gap could not be replayed. The entries before stay valid. The state is then `degraded` with the reason. A record
 // that is longer than the store can hold is left out in the same way; it must not keep others from being written.
-// Over store.max_gib the journal before a checkpoint is removed, of the session that was begun first, then of the next. A
-// journal is removed as a whole up to the checkpoint, because a rest of it could not be processed again.
-// Thread rule: any thread; Start and Stop from one.
+// Over store.max_gib the journal before a checkpoint is removed, of the session that was begun first, then of the next.
+// A journal is removed as a whole up to the checkpoint, because a rest of it could not be processed again. Thread rule:
+// any thread; Start and Stop from one.
 #pragma once
 
 #include <chrono>

@@ -210,8 +210,7 @@ TEST_F(Lost, AScanThatContradictsTheMapTakesTheRobotOffItsPath) {
     TrackStep step;
     step.matched = true;
     step.T_track_robot = T_track_world_ * Pose2{10, 0, 0};
-    EXPECT_FALSE(
-        recovery.Take({scan.scan, KnownAt(10).T_odom_robot}, step, scan.points, MapOfHall().searched));
+    EXPECT_FALSE(recovery.Take({scan.scan, KnownAt(10).T_odom_robot}, step, scan.points, MapOfHall().searched));
     EXPECT_EQ(recovery.on_path(), !moved);
     EXPECT_EQ(recovery.BeliefAt(KnownAt(10).T_odom_robot, step.T_track_robot).reason,
               moved ? PoseReason::kLost : PoseReason::kOdometryOnly);
