@@ -70,10 +70,11 @@ void AddOptions(CLI::App& app, Arguments& arguments) {
       "EXAMPLES\n  cairn-web\n  cairn-web --token --domain 7 --port 0");
 }
 
-std::string ChooseToken(const std::vector<std::string>& given) {
+// Empty: none was given, so that one has to be drawn.
+std::string GivenToken(const std::vector<std::string>& given) {
   if (!given.empty() && !given.front().empty()) return given.front();
-  const char* of_environment = std::getenv("CAIRN_WEB_TOKEN");
-  return of_environment != nullptr && *of_environment != '\0' ? of_environment : NewToken();
+  const char* const of_environment = std::getenv("CAIRN_WEB_TOKEN");
+  return of_environment != nullptr ? of_environment : "";
 }
 
 int Serve(const Arguments& arguments, bool commands) {
@@ -87,14 +88,16 @@ int Serve(const Arguments& arguments, bool commands) {
   auto bus = wire::Bus::Create(arguments.wire_options, "cairn-web");
   if (!bus) return Refuse(bus.error().message, 1);
   WebOptions options;
-  if (commands) options.token = ChooseToken(arguments.token);
+  const std::string given = GivenToken(arguments.token);
+  if (commands) options.token = given.empty() ? NewToken() : given;
   auto page = WebPage::Create(**bus, options);
   if (!page) return Refuse(page.error().message, 1);
   auto server = HttpServer::Start(arguments.http, [&](const HttpRequest& request) { return (*page)->Answer(request); });
   if (!server) return Refuse(server.error().message, 1);
-  // A page that gets the token this way does not ask for it. The part after # is not sent to any server.
+  // A page that gets the token this way does not ask for it. The part after # is not sent to any server. A token that
+  // was given is not printed, because what a service prints is kept in a log.
   std::cout << "cairn-web: " << AddressText(arguments.http, (*server)->port())
-            << (commands ? "#token=" + options.token : std::string()) << std::endl;
+            << (commands && given.empty() ? "#token=" + options.token : std::string()) << std::endl;
   int signal_number = 0;
   sigwait(&signals, &signal_number);
   return 0;
