@@ -202,16 +202,19 @@ Result<std::unique_ptr<Ros2Door>> OpenRos2(const CairndOptions& options, Inbound
   return door;
 }
 
+constexpr std::chrono::seconds kStartPeriod{2};
+constexpr std::chrono::seconds kStartMayTakeLonger{60};
+
 // Tells the service manager that the start goes on, as long as it does, so that it is not taken for one that hangs.
 void LookAtStart(asio::steady_timer& timer, const StartControl& control, std::uint64_t advanced,
                  const ServiceNotifier& notifier) {
-  constexpr std::chrono::seconds kPeriod{2}, kLonger{60};
-  timer.expires_after(kPeriod);
+  timer.expires_after(kStartPeriod);
   timer.async_wait([&timer, &control, advanced, &notifier](const asio::error_code& error) {
     if (error) return;
     const std::uint64_t now = control.advanced();
     if (now != advanced)
-      notifier.Starting("restoring: " + std::to_string(now) + " entries of the journals processed", kLonger);
+      notifier.Starting("restoring: " + std::to_string(now) + " entries of the journals processed",
+                        kStartMayTakeLonger);
     LookAtStart(timer, control, now, notifier);
   });
 }

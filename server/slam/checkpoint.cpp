@@ -95,7 +95,7 @@ Values ValuesOf(const std::string& text) {
 
 // The first option that has another value there; nothing if there is none.
 std::optional<Status> FirstDifference(const std::string& here, const Values& there) {
-  static const Values defaults = ValuesOf(TextOf({}));
+  static const Values kDefaults = ValuesOf(TextOf({}));
   const auto line = [](const std::string& key, const Values& values) {
     const auto found = values.find(key);
     return found == values.end() ? std::string("(nothing)") : key + ' ' + found->second;
@@ -107,7 +107,7 @@ std::optional<Status> FirstDifference(const std::string& here, const Values& the
   std::istringstream lines(here);
   for (std::string our; std::getline(lines, our);) {
     const std::string key = KeyAndValue(our).first;
-    const std::string their = line(key, there.contains(key) ? there : defaults);
+    const std::string their = line(key, there.contains(key) ? there : kDefaults);
     if (our != their) return different(our, their);
   }
   // Of the keys that are there only, the one of a known map says that the estimator had one.
