@@ -361,7 +361,7 @@ TEST(Checkpoint, OptionsThatCanNotBeAreRefused) {
                                    {"slam.loop.enabled", "perhaps"},
                                    {"slam.grid.resolution_m", "nan"}}) {
     const auto options = OptionsOf(WithOptions(saved.bytes,
-                                               [&](std::string& text) {
+                                               [&key = key, &value = value](std::string& text) {
                                                  RemoveLine(text, key);
                                                  text += std::string(key) + ' ' + value + '\n';
                                                }),
