@@ -9,6 +9,7 @@
 namespace cairn::server {
 namespace {
 
+constexpr std::chrono::minutes kMapPeriod{10};  // A robot that is only localised gets a map that others draw so often.
 constexpr std::chrono::seconds kOpeningPatience{1};  // A robot waits this long for the disk when it opens a session.
 
 }  // namespace
@@ -104,6 +105,40 @@ Result<void> Session::Relocalise(const std::optional<Pose2>& T_map_robot) {
     return cairn::Fail(StatusCode::kResourceExhausted, "too many commands wait for the robot's estimator");
   Schedule();
   return {};
+}
+
+Result<void> Session::Localise(std::shared_ptr<const MapSnapshot> map) {
+  if (ending_) return cairn::Fail(StatusCode::kFailedPrecondition, "the session has ended");
+  {
+    const MutexLock lock(known_map_mutex_);
+    known_map_ = {map->info.epoch, map->info.version, SessionRecord::Clock::now()};
+  }
+  if (!queue_.Push(LocaliseWanted{std::move(map), true}))
+    return cairn::Fail(StatusCode::kResourceExhausted, "too many commands wait for the robot's estimator");
+  Schedule();
+  return {};
+}
+
+Result<void> Session::MapAgain() {
+  if (ending_) return cairn::Fail(StatusCode::kFailedPrecondition, "the session has ended");
+  if (record_.joining().fragment)
+    return cairn::Fail(StatusCode::kFailedPrecondition,
+                       "the robot is not joined with the map of its site: it can only open a new session");
+  if (!queue_.Push(LocaliseWanted{nullptr, false}))
+    return cairn::Fail(StatusCode::kResourceExhausted, "too many commands wait for the robot's estimator");
+  Schedule();
+  return {};
+}
+
+void Session::KeepUpWith(const std::shared_ptr<const MapSnapshot>& map) {
+  const auto now = SessionRecord::Clock::now();
+  const MutexLock lock(known_map_mutex_);
+  const bool moved = !known_map_ || known_map_->epoch != map->info.epoch;
+  const bool drawn = known_map_ && known_map_->version != map->info.version && now - known_map_->given > kMapPeriod;
+  if (!moved && !drawn) return;
+  if (!queue_.Push(LocaliseWanted{map, moved})) return;  // The next call tries again.
+  known_map_ = {map->info.epoch, map->info.version, now};
+  Schedule();
 }
 
 void Session::SetLiveliness(bool alive) {

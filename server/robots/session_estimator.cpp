@@ -59,6 +59,7 @@ SessionEstimator::SessionEstimator(const EstimatorSetup& setup, SessionRecord& r
       identity_(record.snapshot()),
       epoch_(record.epoch()),
       fragment_(setup.fragment),
+      options_(setup.mapper),
       pipeline_(setup.mapper, setup.T_map_robot_start, slam::SerialFor,
                 {.used = [this](const Scan& scan, const slam::ScanOutcome& outcome) { Used(scan, outcome); },
                  .dropped = [this](const Scan& scan, DropReason reason) { Dropped(scan, reason); }}) {
@@ -127,7 +128,8 @@ void SessionEstimator::Store(JournalEntry entry) {
 
 void SessionEstimator::Used(const Scan& scan, const slam::ScanOutcome& outcome) {
   const auto waiting = waiting_.find(&scan);
-  const PoseReport report = ReportOf(scan, outcome, identity_.status.session, session_, epoch_, fragment_);
+  const bool not_joined = fragment_ && !pipeline_.mapper().localises();
+  const PoseReport report = ReportOf(scan, outcome, identity_.status.session, session_, epoch_, not_joined);
   if (outcome.keyframe) Drive(outcome.T_map_robot);
   if (!replaying_) outputs_.send(report);
   const std::chrono::duration<double, std::milli> latency = Clock::now() - waiting->second.received;
@@ -232,6 +234,37 @@ void SessionEstimator::On(RelocaliseWanted&& wanted) {
   if (ended_) return;
   Store(RelocaliseTaken{wanted.T_map_robot});
   pipeline_.mapper().Relocalise(wanted.T_map_robot);
+  T_map_keyframe_.reset();
+}
+
+void SessionEstimator::On(LocaliseWanted&& wanted) {
+  if (ended_) return;
+  LocaliseTaken taken{.tiles = {}, .resolution_m = 0.0, .moved = wanted.moved};
+  if (wanted.map != nullptr) {
+    taken.resolution_m = wanted.map->info.resolution_m;
+    wanted.map->tiles.ForEach(0, [&taken](const std::shared_ptr<const Tile>& tile) {
+      taken.tiles.push_back({tile->key.x, tile->key.y, tile->encoding, tile->bytes});
+    });
+    if (taken.tiles.empty()) return;  // Nothing is drawn yet.
+  }
+  Store(taken);
+  On(std::move(taken));
+}
+
+void SessionEstimator::On(LocaliseTaken&& taken) {
+  std::shared_ptr<const slam::KnownGrid> map;
+  if (!taken.tiles.empty()) {
+    slam::KnownGrid::Tiles tiles;
+    for (const StoredTile& tile : taken.tiles) {
+      if (auto cells = DecodeCells(tile.bytes, tile.encoding))
+        tiles.emplace(slam::ChunkKey{tile.x, tile.y}, std::make_shared<const TileCells>(std::move(*cells)));
+    }
+    map = std::make_shared<const slam::KnownGrid>(std::move(tiles), taken.resolution_m, options_.recovery.place,
+                                                  options_.self_check.near_m);
+  }
+  // A robot that can not map again, because its place is not known, is localised on.
+  static_cast<void>(pipeline_.mapper().LocaliseIn(std::move(map), !fragment_, taken.moved));
+  record_.SetLocalises(pipeline_.mapper().localises());
   T_map_keyframe_.reset();
 }
 

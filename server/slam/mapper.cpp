@@ -27,6 +27,13 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   State& s = *state_;
   const Stamp stamp = scan->stamp;
   const bool tilted = IsTilted(*scan, s.options.max_tilt_rad);
+  if (s.localisation) {
+    if (tilted) return s.CoastLocalised(stamp, T_odom_robot);
+    if (passage != Passage::kDriven || s.localisation->looking()) rolling = nullptr;
+    return s.Localise(TrackScan(s.front_end, {s.options.front_end, s.options.pairing.rolling}, s.trail, std::move(scan),
+                                rolling, T_odom_robot, parallel_for),
+                      T_odom_robot, passage, parallel_for);
+  }
   passage = s.BeginAfter(passage, tilted);
   if (tilted) return s.Coast(stamp, T_odom_robot);
 
@@ -207,6 +214,7 @@ void Mapper::WatchSteps(StepWatch watch) {
 
 bool Mapper::full() const {
   const State& s = *state_;
+  if (s.localisation) return false;
   return s.trail.size() >= static_cast<std::size_t>(s.options.max_keyframes) ||
          s.drawing.grid().chunk_count() >= static_cast<std::size_t>(s.options.max_chunks);
 }

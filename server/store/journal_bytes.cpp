@@ -59,6 +59,19 @@ void FillEntry(record::Entry& to, const RelocaliseTaken& from) {
   if (from.T_map_robot) Fill(*relocalise.mutable_t_map_robot(), *from.T_map_robot);
 }
 
+void FillEntry(record::Entry& to, const LocaliseTaken& from) {
+  record::Localise& localise = *to.mutable_localise();
+  for (const StoredTile& tile : from.tiles) {
+    record::Localise::Tile& added = *localise.add_tiles();
+    added.set_x(tile.x);
+    added.set_y(tile.y);
+    added.set_encoding(static_cast<std::uint32_t>(tile.encoding));
+    added.set_cells(tile.bytes.data(), tile.bytes.size());
+  }
+  localise.set_resolution_m(from.resolution_m);
+  localise.set_moved(from.moved);
+}
+
 void FillEntry(record::Entry& to, const StartRefusal& from) {
   to.mutable_start_refusal()->set_why(from.why);
 }
@@ -108,6 +121,23 @@ Result<JournalEntry> RelocaliseOf(const record::Relocalise& from) {
   return RelocaliseTaken{T_map_robot};
 }
 
+Result<JournalEntry> LocaliseOf(const record::Localise& from) {
+  LocaliseTaken taken{.tiles = {}, .resolution_m = from.resolution_m(), .moved = from.moved()};
+  constexpr int kMost = 1 << 22;
+  constexpr double kLeastCellM = 0.01, kMostCellM = 1.0;  // As slam.grid.resolution_m.
+  if (from.tiles_size() > 0 && !(taken.resolution_m >= kLeastCellM && taken.resolution_m <= kMostCellM))
+    return Unreadable("the cells of a map");
+  for (const record::Localise::Tile& tile : from.tiles()) {
+    if (tile.encoding() > static_cast<std::uint32_t>(TileEncoding::kPng) || tile.x() <= -kMost || tile.x() >= kMost ||
+        tile.y() <= -kMost || tile.y() >= kMost)
+      return Unreadable("a tile");
+    taken.tiles.push_back(
+        {tile.x(), tile.y(), static_cast<TileEncoding>(tile.encoding()), {tile.cells().begin(), tile.cells().end()}});
+    if (!DecodeCells(taken.tiles.back().bytes, taken.tiles.back().encoding)) return Unreadable("a tile");
+  }
+  return taken;
+}
+
 Result<JournalEntry> EntryOf(const record::Entry& from) {
   switch (from.content_case()) {
     case record::Entry::kScan:
@@ -128,6 +158,8 @@ Result<JournalEntry> EntryOf(const record::Entry& from) {
       return EpochChanged{from.epoch().epoch()};
     case record::Entry::kRelocalise:
       return RelocaliseOf(from.relocalise());
+    case record::Entry::kLocalise:
+      return LocaliseOf(from.localise());
     case record::Entry::kStartRefusal:
       return StartRefusal{from.start_refusal().why()};
     case record::Entry::kFinish:

@@ -14,6 +14,7 @@
 #include <variant>
 #include <vector>
 
+#include "common/map/tile.h"
 #include "common/sensor/trajectory.h"
 #include "common/service/job.h"
 #include "common/service/ledger.h"
@@ -74,6 +75,19 @@ struct EpochChanged {
 struct RelocaliseTaken {
   std::optional<Pose2> T_map_robot;
 };
+// The robot is only localised from now on, in this map: tiles of level 0 as the site has encoded them. `moved`: the map
+// may have changed where the robot is. Without tiles, it maps again.
+struct StoredTile {
+  int x = 0;
+  int y = 0;
+  TileEncoding encoding = TileEncoding::kPng;
+  std::vector<std::uint8_t> bytes;
+};
+struct LocaliseTaken {
+  std::vector<StoredTile> tiles;
+  double resolution_m = 0.0;
+  bool moved = false;
+};
 // The robot is not where it was said to start: from now on it is a fragment.
 struct StartRefusal {
   std::string why;
@@ -83,7 +97,7 @@ struct SessionFinished {
   Status status;
 };
 using JournalEntry = std::variant<ScanTaken, ScanRefused, OdometryTaken, OwnerChanged, CorrectionTaken, EpochChanged,
-                                  RelocaliseTaken, StartRefusal, SessionFinished>;
+                                  RelocaliseTaken, LocaliseTaken, StartRefusal, SessionFinished>;
 
 struct StoredSession {
   std::uint64_t id = 0;

@@ -62,6 +62,8 @@ inline std::vector<JournalEntry> OneOfEach() {
           EpochChanged{7},
           RelocaliseTaken{Pose2{1.5, -2.0, 0.5}},
           RelocaliseTaken{},
+          LocaliseTaken{{{-1, 2, TileEncoding::kPng, EncodeCells(TileCells{}, TileEncoding::kPng)}}, 0.05, true},
+          LocaliseTaken{},
           StartRefusal{"it is elsewhere"},
           SessionFinished{true, {StatusCode::kUnavailable, "gone"}}};
 }
