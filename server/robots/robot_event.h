@@ -37,10 +37,11 @@ struct RelocaliseWanted {
   std::optional<Pose2> T_map_robot;
 };
 
-// From now on the robot is only localised, in this map; null: it maps again. `moved`: as LocaliseTaken.
+// From now on the robot is only localised, in this map; null: it maps again. `again`: the map of a robot that is only
+// localised already has changed; for one that maps meanwhile it is left out.
 struct LocaliseWanted {
   std::shared_ptr<const MapSnapshot> map;
-  bool moved = false;
+  bool again = false;
 };
 
 // What others have drawn contradicts the place where the robot is said to have started (jobs/start_check.h).

@@ -229,7 +229,8 @@ Result<void> Roster::Localise(const std::string& robot, bool only) {
   if (!only) return (*session)->MapAgain();
   const auto site = atlas_.Find((*session)->record().state().site);
   const auto map = site != nullptr ? site->snapshot() : nullptr;
-  if (map == nullptr) return Fail(StatusCode::kNotFound, "the site has no map");
+  if (map == nullptr || !map->tiles.BoxOf(0))
+    return Fail(StatusCode::kNotFound, "nothing is drawn in the map of its site");
   return (*session)->Localise(map);
 }
 

@@ -28,7 +28,9 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   const Stamp stamp = scan->stamp;
   const bool tilted = IsTilted(*scan, s.options.max_tilt_rad);
   if (s.localisation) {
-    if (tilted) return s.CoastLocalised(stamp, T_odom_robot);
+    passage = s.LocaliseAfter(passage, tilted);
+    if (tilted)
+      return s.ReportLocalised(stamp, T_odom_robot, s.localisation->CarriedTo(s.OdometryOrNone(T_odom_robot)), 0.0);
     if (passage != Passage::kDriven || s.localisation->looking()) rolling = nullptr;
     return s.Localise(TrackScan(s.front_end, {s.options.front_end, s.options.pairing.rolling}, s.trail, std::move(scan),
                                 rolling, T_odom_robot, parallel_for),
@@ -360,6 +362,7 @@ bool Mapper::State::IsConsistent() const {
   for (std::size_t i = 0; i < filter->hypothesis_count(); ++i)
     if (filter->hypothesis(i).path.size() != trail.size()) return false;
   if (recovery.active() && (trail.empty() || !last_scan)) return false;
+  if (localisation && !localisation->looking() && !last_scan) return false;
   return drawing.path().size() == (filter->placed() ? trail.size() : 0);
 }
 

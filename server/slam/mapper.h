@@ -96,10 +96,12 @@ class Mapper {
   void Relocalise(const std::optional<Pose2>& T_map_robot);
   // From now on the robot is only localised in this map: what it has mapped itself stays as it is, and nothing is
   // added. `place_known`: its pose, or its start before the first scan, is one in this map; then it is looked for near
-  // there, otherwise everywhere. A later call replaces the map; if it has `moved`, the robot must be found again near
-  // where it is. Null: the robot maps again, from where it is, which must be known (FAILED_PRECONDITION).
-  Result<void> LocaliseIn(std::shared_ptr<const KnownGrid> map, bool place_known, bool moved = false);
+  // there, otherwise everywhere. A later call replaces the map, and the next scans must show that the robot is where it
+  // was. Null: the robot maps again, from where it is, which must be known (FAILED_PRECONDITION).
+  Result<void> LocaliseIn(std::shared_ptr<const KnownGrid> map, bool place_known);
   [[nodiscard]] bool localises() const;
+  // The epoch of the map in which it is localised; nothing if it maps.
+  [[nodiscard]] std::optional<std::uint32_t> known_map_epoch() const;
   // T_map_robot of every keyframe along the best path; empty while the robot's place in the map is not known.
   [[nodiscard]] std::vector<Pose2> BestPath() const;
 

@@ -19,12 +19,9 @@ GridLocalisationOptions Mapper::State::LocalisationOptions() const {
 }
 
 // As Mapper::LocaliseIn, with a map.
-void Mapper::State::LocaliseIn(std::shared_ptr<const KnownGrid> map, bool place_known, bool moved) {
-  if (localisation) {
-    localisation->Replace(std::move(map));
-    if (moved) localisation->Doubt();
-    return;
-  }
+void Mapper::State::LocaliseIn(std::shared_ptr<const KnownGrid> map, bool place_known) {
+  if (localisation) return localisation->Replace(std::move(map));
+  drawing.Finish(trail.keyframes(), believed_path());
   const bool said = place_known && !recovery.active() && (trail.empty() || level.outcome.localized);
   Recovery::Known known = LastKnown();
   if (trail.empty()) known = {filter->estimate().T_map_robot, {}, Eigen::Matrix3d::Zero()};
@@ -40,7 +37,7 @@ void Mapper::State::LocaliseIn(std::shared_ptr<const KnownGrid> map, bool place_
 Result<void> Mapper::State::MapAgain() {
   if (!localisation) return {};
   const GridLocalisation::Place place = localisation->place();
-  if (localisation->looking())
+  if (localisation->looking() || !last_scan)
     return Fail(StatusCode::kFailedPrecondition, "the robot's place in the map is not known");
   localisation.reset();
   front_end.Restart();
@@ -55,22 +52,29 @@ Result<void> Mapper::State::MapAgain() {
   return {};
 }
 
+// Returns what lies before the scan. A tilted scan shows nothing, so that what it was doubted for would be forgotten.
+Passage Mapper::State::LocaliseAfter(Passage passage, bool tilted) {
+  if (!options.front_end.use_odometry) passage = std::min(passage, Passage::kUnwatched);
+  if (tilted && passage != Passage::kDriven) {
+    localisation->Lose(passage != Passage::kUnknown && options.front_end.use_odometry);
+    front_end.Restart();
+  }
+  return passage;
+}
+
 ScanOutcome Mapper::State::Localise(TrackedScan tracked, const Pose2& T_odom_robot, Passage passage,
                                     const ParallelFor& parallel_for) {
   auto& [still, view, step] = tracked;
-  if (!options.front_end.use_odometry) passage = std::min(passage, Passage::kUnwatched);
   const auto goes_on = [&] {
     return passage == Passage::kPaused && options.front_end.use_odometry && !localisation->looking() &&
            FollowsOdometry(*still, T_odom_robot, step) &&
            AgreesAsBefore(*still, view.points_robot, step,
                           {localisation->recovery(), *localisation->map(), localisation->T_map_track()});
   };
-  if (passage != Passage::kDriven && !StoodStill(*still, T_odom_robot, step) && !goes_on()) {
-    localisation->Lose(passage != Passage::kUnknown && options.front_end.use_odometry);
-    front_end.Restart();
-    step = front_end.Track(view, T_odom_robot, parallel_for);
-  } else if (!step.matched && localisation->looking()) {  // The last scans do not belong together with this one.
-    localisation->Lose(true);
+  const bool watched = passage == Passage::kDriven || StoodStill(*still, T_odom_robot, step) || goes_on();
+  // The last scans do not belong together with this one.
+  if (!watched || (!step.matched && localisation->looking())) {
+    localisation->Lose(options.front_end.use_odometry && passage != Passage::kUnknown);
     front_end.Restart();
     step = front_end.Track(view, T_odom_robot, parallel_for);
   }
@@ -78,42 +82,35 @@ ScanOutcome Mapper::State::Localise(TrackedScan tracked, const Pose2& T_odom_rob
   const Keyframe seen{still, OdometryOrNone(T_odom_robot)};
   const GridLocalisation::Followed followed = localisation->Take({seen, view.points_robot, step});
   if (followed.moved_enough) front_end.AddKeyframe(view);
+  return ReportLocalised(still->stamp, T_odom_robot, followed.place, step.score);
+}
+
+ScanOutcome Mapper::State::ReportLocalised(Stamp stamp, const Pose2& T_odom_robot, const GridLocalisation::Place& place,
+                                           double score) const {
   ScanOutcome outcome;
-  outcome.stamp = still->stamp;
-  outcome.T_map_robot = followed.place.T_map_robot;
+  outcome.stamp = stamp;
+  outcome.T_map_robot = place.T_map_robot;
   outcome.T_map_odom = outcome.T_map_robot * T_odom_robot.Inverse();
-  outcome.covariance = followed.place.covariance;
-  outcome.score = step.score;
-  outcome.reason = followed.place.reason;
+  outcome.covariance = place.covariance;
+  outcome.score = score;
+  outcome.reason = place.reason;
   outcome.localized = outcome.reason != PoseReason::kLost;
   return outcome;
 }
 
-// A tilted scan: odometry alone carries the pose.
-ScanOutcome Mapper::State::CoastLocalised(Stamp stamp, const Pose2& T_odom_robot) {
-  const GridLocalisation::Place& place = localisation->place();
-  const Pose2 moved =
-      options.front_end.use_odometry && last_scan ? Between(last_scan->T_odom_robot, T_odom_robot) : Pose2{};
-  ScanOutcome outcome;
-  outcome.stamp = stamp;
-  outcome.T_map_robot = place.T_map_robot * moved;
-  outcome.T_map_odom = outcome.T_map_robot * T_odom_robot.Inverse();
-  const Eigen::Matrix3d J = J_compose_right(place.T_map_robot, moved);
-  outcome.covariance = place.covariance + J * options.blind.Covariance(moved) * J.transpose();
-  const bool lost = place.reason == PoseReason::kLost || moved.translation().norm() > options.lost_after_m;
-  outcome.reason = lost ? PoseReason::kLost : PoseReason::kOdometryOnly;
-  outcome.localized = !lost;
-  return outcome;
-}
-
-Result<void> Mapper::LocaliseIn(std::shared_ptr<const KnownGrid> map, bool place_known, bool moved) {
+Result<void> Mapper::LocaliseIn(std::shared_ptr<const KnownGrid> map, bool place_known) {
   if (map == nullptr) return state_->MapAgain();
-  state_->LocaliseIn(std::move(map), place_known, moved);
+  state_->LocaliseIn(std::move(map), place_known);
   return {};
 }
 
 bool Mapper::localises() const {
   return state_->localisation.has_value();
+}
+
+std::optional<std::uint32_t> Mapper::known_map_epoch() const {
+  if (!state_->localisation) return std::nullopt;
+  return state_->localisation->map()->source().epoch;
 }
 
 }  // namespace cairn::slam

@@ -74,11 +74,13 @@ struct Mapper::State {
                        const ParallelFor& parallel_for);
   ScanOutcome Recover(Keyframe keyframe, ScanView view, TrackStep step, const ParallelFor& parallel_for);
   [[nodiscard]] ScanOutcome ReportRecovery(Stamp stamp, const Pose2& T_odom_robot, const Pose2& T_track_robot) const;
-  void LocaliseIn(std::shared_ptr<const KnownGrid> map, bool place_known, bool moved);
+  void LocaliseIn(std::shared_ptr<const KnownGrid> map, bool place_known);
+  Passage LocaliseAfter(Passage passage, bool tilted);
+  [[nodiscard]] ScanOutcome ReportLocalised(Stamp stamp, const Pose2& T_odom_robot,
+                                            const GridLocalisation::Place& place, double score) const;
   Result<void> MapAgain();
   ScanOutcome Localise(TrackedScan tracked, const Pose2& T_odom_robot, Passage passage,
                        const ParallelFor& parallel_for);
-  ScanOutcome CoastLocalised(Stamp stamp, const Pose2& T_odom_robot);
   [[nodiscard]] GridLocalisationOptions LocalisationOptions() const;
   ScanOutcome GoOnAlongPath(const ParallelFor& parallel_for);
   ScanOutcome GoOnAt(const FoundPlace& place, Keyframe keyframe, ScanView view, TrackStep step,
@@ -118,29 +120,25 @@ struct Mapper::State {
     bool localises = self.localisation.has_value();
     archive(localises);
     if (!localises || !archive.ok()) return;
-    KnownGrid::Tiles tiles;
-    double resolution_m = 0.0;
-    if constexpr (!Archive::kReads) {
-      tiles = self.localisation->map()->tiles();
-      resolution_m = self.localisation->map()->resolution_m();
-    }
-    std::uint64_t count = tiles.size();
-    archive(resolution_m, count);
-    archive.Require(resolution_m >= 0.01 && resolution_m <= 1.0, "the cells of a known map");
+    KnownGrid::Source source;
+    if constexpr (!Archive::kReads) source = self.localisation->map()->source();
+    std::uint64_t count = source.tiles.size();
+    archive(source.resolution_m, source.epoch, count);
     if constexpr (Archive::kReads) {
-      while (archive.ok() && tiles.size() < count) {
+      while (archive.ok() && source.tiles.size() < count) {
         ChunkKey key;
         std::shared_ptr<const TileCells> cells;
         archive(key, cells);
-        archive.RequireThat([&] { return cells != nullptr && tiles.emplace(key, cells).second; },
+        archive.RequireThat([&] { return cells != nullptr && source.tiles.emplace(key, cells).second; },
                             "the tiles of a known map");
       }
-      if (!archive.ok()) return;
+      if (!archive.RequireThat([&] { return KnownGrid::IsBounded(source); }, "the extent of a known map")) return;
       self.localisation.emplace(self.LocalisationOptions());
-      self.localisation->Replace(std::make_shared<const KnownGrid>(
-          std::move(tiles), resolution_m, self.options.recovery.place, self.options.self_check.near_m));
+      self.localisation->Begin(std::make_shared<const KnownGrid>(std::move(source), self.options.recovery.place,
+                                                                 self.options.self_check.near_m),
+                               {}, false);
     } else {
-      for (const auto& [key, cells] : tiles) archive(key, cells);
+      for (const auto& [key, cells] : source.tiles) archive(key, cells);
     }
     archive(*self.localisation);
   }

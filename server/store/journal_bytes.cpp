@@ -61,15 +61,16 @@ void FillEntry(record::Entry& to, const RelocaliseTaken& from) {
 
 void FillEntry(record::Entry& to, const LocaliseTaken& from) {
   record::Localise& localise = *to.mutable_localise();
-  for (const StoredTile& tile : from.tiles) {
+  for (const auto& tile : from.tiles) {
     record::Localise::Tile& added = *localise.add_tiles();
-    added.set_x(tile.x);
-    added.set_y(tile.y);
-    added.set_encoding(static_cast<std::uint32_t>(tile.encoding));
-    added.set_cells(tile.bytes.data(), tile.bytes.size());
+    added.set_x(tile->key.x);
+    added.set_y(tile->key.y);
+    added.set_encoding(static_cast<std::uint32_t>(tile->encoding));
+    added.set_cells(tile->bytes.data(), tile->bytes.size());
   }
   localise.set_resolution_m(from.resolution_m);
-  localise.set_moved(from.moved);
+  localise.set_epoch(from.epoch);
+  localise.set_maps_again(from.maps_again);
 }
 
 void FillEntry(record::Entry& to, const StartRefusal& from) {
@@ -121,19 +122,16 @@ Result<JournalEntry> RelocaliseOf(const record::Relocalise& from) {
   return RelocaliseTaken{T_map_robot};
 }
 
+// Whether the tiles can be read, and lie where a robot can be localised, is looked at by the estimator.
 Result<JournalEntry> LocaliseOf(const record::Localise& from) {
-  LocaliseTaken taken{.tiles = {}, .resolution_m = from.resolution_m(), .moved = from.moved()};
-  constexpr int kMost = 1 << 22;
-  constexpr double kLeastCellM = 0.01, kMostCellM = 1.0;  // As slam.grid.resolution_m.
-  if (from.tiles_size() > 0 && !(taken.resolution_m >= kLeastCellM && taken.resolution_m <= kMostCellM))
-    return Unreadable("the cells of a map");
+  LocaliseTaken taken{from.maps_again(), {}, from.resolution_m(), from.epoch()};
   for (const record::Localise::Tile& tile : from.tiles()) {
-    if (tile.encoding() > static_cast<std::uint32_t>(TileEncoding::kPng) || tile.x() <= -kMost || tile.x() >= kMost ||
-        tile.y() <= -kMost || tile.y() >= kMost)
-      return Unreadable("a tile");
-    taken.tiles.push_back(
-        {tile.x(), tile.y(), static_cast<TileEncoding>(tile.encoding()), {tile.cells().begin(), tile.cells().end()}});
-    if (!DecodeCells(taken.tiles.back().bytes, taken.tiles.back().encoding)) return Unreadable("a tile");
+    if (tile.encoding() > static_cast<std::uint32_t>(TileEncoding::kPng)) return Unreadable("a tile");
+    auto added = std::make_shared<Tile>();
+    added->key = {0, tile.x(), tile.y()};
+    added->encoding = static_cast<TileEncoding>(tile.encoding());
+    added->bytes.assign(tile.cells().begin(), tile.cells().end());
+    taken.tiles.push_back(std::move(added));
   }
   return taken;
 }

@@ -75,18 +75,13 @@ struct EpochChanged {
 struct RelocaliseTaken {
   std::optional<Pose2> T_map_robot;
 };
-// The robot is only localised from now on, in this map: tiles of level 0 as the site has encoded them. `moved`: the map
-// may have changed where the robot is. Without tiles, it maps again.
-struct StoredTile {
-  int x = 0;
-  int y = 0;
-  TileEncoding encoding = TileEncoding::kPng;
-  std::vector<std::uint8_t> bytes;
-};
+// The robot is only localised from now on, in this map: the tiles of level 0 as the site has published them, and the
+// epoch of the map. Or it `maps_again`.
 struct LocaliseTaken {
-  std::vector<StoredTile> tiles;
+  bool maps_again = false;
+  std::vector<std::shared_ptr<const Tile>> tiles;
   double resolution_m = 0.0;
-  bool moved = false;
+  std::uint32_t epoch = 0;
 };
 // The robot is not where it was said to start: from now on it is a fragment.
 struct StartRefusal {

@@ -87,7 +87,7 @@ class Merge {
             relocalise->T_map_robot = T_into_from_ * *relocalise->T_map_robot;
           }
           const auto* const localise = std::get_if<LocaliseTaken>(&entry);
-          if (localise != nullptr && !localise->tiles.empty() && moves) {
+          if (localise != nullptr && !localise->maps_again && moves) {
             return Fail(StatusCode::kFailedPrecondition,
                         "session " + std::to_string(id) +
                             " was only localised in the map of its site; such a session cannot be moved");

@@ -43,41 +43,51 @@ void GridLocalisation::Begin(std::shared_ptr<const KnownGrid> map, const Recover
   comparisons_.clear();
   last_ = {known.T_map_robot, known.covariance, PoseReason::kLost};
   T_odom_robot_ = known.T_odom_robot;
-  if (said) {
-    recovery_.BeginWhereSaid(known);
-  } else {
-    recovery_.Begin(known, false);
-  }
+  said_ = said;
+  recovery_.Begin(known, false);
 }
 
 void GridLocalisation::Replace(std::shared_ptr<const KnownGrid> map) {
   map_ = std::move(map);
-  comparisons_.clear();
   recovery_.ForgetMap();
+  if (!looking()) LookNear();
 }
 
-void GridLocalisation::Doubt() {
+void GridLocalisation::LookNear() {
   comparisons_.clear();
-  if (!recovery_.active()) recovery_.BeginNear({last_.T_map_robot, T_odom_robot_, last_.covariance}, T_map_track());
+  last_.reason = PoseReason::kLost;
+  recovery_.BeginNear({last_.T_map_robot, T_odom_robot_, last_.covariance}, T_map_track());
 }
 
 void GridLocalisation::Lose(bool odometry_goes_on) {
   comparisons_.clear();
-  if (!recovery_.active()) {
-    recovery_.Begin({last_.T_map_robot, T_odom_robot_, last_.covariance}, odometry_goes_on);
-  } else if (!odometry_goes_on) {
-    recovery_.OdometryBeganAnew();
-  }
-  recovery_.ForgetScans();
+  last_.reason = PoseReason::kLost;
+  recovery_.Begin({last_.T_map_robot, T_odom_robot_, last_.covariance}, odometry_goes_on);
 }
 
 void GridLocalisation::BeginWhereSaid(const Pose2& T_map_robot) {
-  comparisons_.clear();
   const PlaceSearchOptions& place = options_.recovery.place;
-  recovery_.BeginWhereSaid({T_map_robot, T_odom_robot_, PoseCovariance(place.near_m, place.near_rad)});
+  last_ = {T_map_robot, PoseCovariance(place.near_m, place.near_rad), PoseReason::kLost};
+  comparisons_.clear();
+  said_ = true;
+}
+
+GridLocalisation::Place GridLocalisation::CarriedTo(const Pose2& T_odom_robot) const {
+  if (looking() || said_) {
+    const Recovery::Belief belief = recovery_.BeliefAt(T_odom_robot, T_track_robot_);
+    return {belief.T_map_robot, belief.covariance, PoseReason::kLost};
+  }
+  const Pose2 moved = Between(T_odom_robot_, T_odom_robot);
+  const Eigen::Matrix3d J = J_compose_right(last_.T_map_robot, moved);
+  const double blind_m = unmatched_m_ + moved.translation().norm();
+  return {last_.T_map_robot * moved, last_.covariance + J * options_.blind.Covariance(moved) * J.transpose(),
+          blind_m > options_.lost_after_m ? PoseReason::kLost : PoseReason::kOdometryOnly};
 }
 
 GridLocalisation::Followed GridLocalisation::Take(const Sight& sight) {
+  // Only now it is known where odometry has the robot that somebody has said to be there.
+  if (std::exchange(said_, false))
+    recovery_.BeginWhereSaid({last_.T_map_robot, sight.scan.T_odom_robot, last_.covariance});
   Followed followed = recovery_.active() ? Look(sight) : Follow(sight);
   last_ = followed.place;
   T_odom_robot_ = sight.scan.T_odom_robot;
@@ -121,28 +131,28 @@ GridLocalisation::Followed GridLocalisation::Follow(const Sight& sight) {
   const double step_m = (step.T_track_robot.translation() - T_track_robot_.translation()).norm();
   way_m_ += step_m;
   if (!step.matched) blind_covariance_ += options_.blind.Covariance({step_m, 0.0, 0.0});
+  unmatched_m_ = step.matched ? 0.0 : unmatched_m_ + step_m;
   Fix now = Predicted(step);
+  PoseReason reason = step.matched ? last_.reason : PoseReason::kOdometryOnly;
   const bool moved_enough = MovedEnough(Between(fix_.T_track_robot, step.T_track_robot), options_.gate);
-  if (!moved_enough) return {{now.T_map_robot, now.covariance, last_.reason}, false};
-
-  const bool fixed = Align(sight, now);
-  unmatched_m_ = fixed ? 0.0 : unmatched_m_ + (now.T_map_robot.translation() - fix_.T_map_robot.translation()).norm();
-  fix_ = now;
-  blind_covariance_.setZero();
-  const bool contradicted = Contradicted(sight, now.T_map_robot);
-  if (contradicted || IsTooDoubtful(now.covariance)) {
-    last_ = {now.T_map_robot, now.covariance, PoseReason::kLost};
-    T_odom_robot_ = sight.scan.T_odom_robot;
-    if (contradicted) {
-      Lose(true);
-    } else {
-      recovery_.BeginNear({last_.T_map_robot, T_odom_robot_, last_.covariance},
-                          now.T_map_robot * step.T_track_robot.Inverse());
-    }
-    T_track_kept_ = step.T_track_robot;
-    return {last_, true};
+  bool contradicted = false;
+  if (moved_enough) {
+    const bool fixed = Align(sight, now);
+    if (fixed) unmatched_m_ = 0.0;
+    reason = fixed ? PoseReason::kTracking : PoseReason::kOdometryOnly;
+    fix_ = now;
+    blind_covariance_.setZero();
+    contradicted = Contradicted(sight, now.T_map_robot);
   }
-  return {{now.T_map_robot, now.covariance, fixed ? PoseReason::kTracking : PoseReason::kOdometryOnly}, true};
+  last_ = {now.T_map_robot, now.covariance, reason};
+  T_odom_robot_ = sight.scan.T_odom_robot;
+  T_track_kept_ = step.T_track_robot;
+  if (contradicted) {
+    Lose(true);
+  } else if (unmatched_m_ > options_.lost_after_m || IsTooDoubtful(now.covariance)) {
+    LookNear();
+  }
+  return {last_, moved_enough};
 }
 
 bool GridLocalisation::Align(const Sight& sight, Fix& fix) const {

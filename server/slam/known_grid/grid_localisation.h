@@ -37,13 +37,11 @@ class GridLocalisation {
  public:
   explicit GridLocalisation(const GridLocalisationOptions& options);
 
-  // From now on the robot is followed in this map, and looked for first: near `known` if somebody says that it is
-  // there, otherwise everywhere.
+  // From now on the robot is looked for in this map and then followed: near `known` if somebody says that it is there,
+  // otherwise everywhere.
   void Begin(std::shared_ptr<const KnownGrid> map, const Recovery::Known& known, bool said);
-  // The map has changed a little; the robot is where it was.
+  // The map has changed. The next scans must show that the robot is where it was.
   void Replace(std::shared_ptr<const KnownGrid> map);
-  // It may not be where it was, but near: it has to be found again.
-  void Doubt();
   // The robot may be anywhere. `odometry_goes_on`: since the last scan.
   void Lose(bool odometry_goes_on);
   // Somebody says that it is at this pose.
@@ -60,7 +58,7 @@ class GridLocalisation {
       archive.Require(self.reason <= PoseReason::kWaiting, "the reason of a pose");
     }
   };
-  // The scan just tracked. `points_robot`: its surfaces. `keyframe`: whether the front-end takes it as a reference.
+  // The scan just tracked. `points_robot`: its surfaces.
   struct Sight {
     const Keyframe& scan;
     const std::vector<SurfacePoint>& points_robot;
@@ -75,6 +73,8 @@ class GridLocalisation {
   // Where the track lies in the map, while the robot is followed.
   [[nodiscard]] Pose2 T_map_track() const { return fix_.T_map_robot * fix_.T_track_robot.Inverse(); }
   [[nodiscard]] const Recovery& recovery() const { return recovery_; }
+  // Where odometry has taken the robot since the last scan.
+  [[nodiscard]] Place CarriedTo(const Pose2& T_odom_robot) const;
   [[nodiscard]] bool looking() const { return recovery_.active(); }
   [[nodiscard]] const std::shared_ptr<const KnownGrid>& map() const { return map_; }
   // The last place.
@@ -83,7 +83,7 @@ class GridLocalisation {
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     archive(self.recovery_, self.fix_, self.comparisons_, self.last_, self.T_odom_robot_, self.T_track_robot_,
-            self.T_track_kept_, self.way_m_, self.blind_covariance_, self.unmatched_m_);
+            self.T_track_kept_, self.way_m_, self.blind_covariance_, self.unmatched_m_, self.said_);
   }
 
  private:
@@ -106,6 +106,7 @@ class GridLocalisation {
       archive(self.way_m, self.counts.confirmed, self.counts.contradicted);
     }
   };
+  void LookNear();
   Followed Look(const Sight& sight);
   Followed Follow(const Sight& sight);
   [[nodiscard]] Fix Predicted(const TrackStep& step) const;
@@ -124,7 +125,8 @@ class GridLocalisation {
   Pose2 T_track_kept_;                                          // Of the last scan with which the robot was looked for.
   double way_m_ = 0.0;                                          // Along the track.
   Eigen::Matrix3d blind_covariance_ = Eigen::Matrix3d::Zero();  // Since the fix.
-  double unmatched_m_ = 0.0;  // Way since the map or the last scans have shown where the robot is.
+  double unmatched_m_ = 0.0;  // Way since a scan has shown how the robot moved, or where it is.
+  bool said_ = false;         // The robot is at the last place, says somebody: to be looked for with the next scan.
 };
 
 }  // namespace cairn::slam

@@ -33,10 +33,26 @@ struct Blob {
 
 }  // namespace
 
-KnownGrid::KnownGrid(Tiles tiles, double resolution_m, const PlaceSearchOptions& options, double near_m)
-    : tiles_(std::move(tiles)), resolution_m_(resolution_m), near_m_(near_m) {
+bool KnownGrid::IsBounded(const Source& source) {
+  if (!(source.resolution_m >= 0.01 && source.resolution_m <= 1.0)) return false;
+  if (source.tiles.empty()) return true;
+  constexpr std::int64_t kMostTiles = 1 << 20;  // From the origin.
+  std::int64_t low_x = kMostTiles, high_x = -kMostTiles, low_y = kMostTiles, high_y = -kMostTiles;
+  for (const auto& [key, cells] : source.tiles) {
+    low_x = std::min<std::int64_t>(low_x, key.x);
+    high_x = std::max<std::int64_t>(high_x, key.x);
+    low_y = std::min<std::int64_t>(low_y, key.y);
+    high_y = std::max<std::int64_t>(high_y, key.y);
+  }
+  const double side_m = source.resolution_m * kTileCells;
+  return std::min(low_x, low_y) > -kMostTiles && std::max(high_x, high_y) < kMostTiles &&
+         static_cast<double>(std::max(high_x - low_x, high_y - low_y) + 1) * side_m <= kMostM;
+}
+
+KnownGrid::KnownGrid(Source source, const PlaceSearchOptions& options, double near_m)
+    : source_(std::move(source)), near_m_(near_m) {
   std::vector<SurfacePoint> surfaces;
-  for (const auto& [key, cells] : tiles_) {
+  for (const auto& [key, cells] : source_.tiles) {
     for (int i = 0; i < kTileArea; ++i) {
       const std::uint8_t cell = (*cells)[static_cast<std::size_t>(i)];
       if (cell != kUnknownCell && cell >= kOccupied)
@@ -51,14 +67,14 @@ KnownGrid::KnownGrid(Tiles tiles, double resolution_m, const PlaceSearchOptions&
 }
 
 std::uint8_t KnownGrid::Cell(int x, int y) const {
-  const auto tile = tiles_.find({FloorDiv(x, kTileCells), FloorDiv(y, kTileCells)});
-  if (tile == tiles_.end()) return kUnknownCell;
+  const auto tile = source_.tiles.find({FloorDiv(x, kTileCells), FloorDiv(y, kTileCells)});
+  if (tile == source_.tiles.end()) return kUnknownCell;
   const int column = x - tile->first.x * kTileCells, row = y - tile->first.y * kTileCells;
   return (*tile->second)[static_cast<std::size_t>(row * kTileCells + column)];
 }
 
 int KnownGrid::CellOf(double coordinate_m) const {
-  return static_cast<int>(std::floor(coordinate_m / resolution_m_));
+  return static_cast<int>(std::floor(coordinate_m / source_.resolution_m));
 }
 
 std::uint8_t KnownGrid::At(const Eigen::Vector2d& p_map) const {
@@ -82,7 +98,7 @@ void KnownGrid::AddSurfacesAt(int x, int y, std::vector<SurfacePoint>& surfaces)
     }
   }
   if (free.empty()) return;
-  const Eigen::Vector2d centre = resolution_m_ * Eigen::Vector2d(x + 0.5, y + 0.5);
+  const Eigen::Vector2d centre = source_.resolution_m * Eigen::Vector2d(x + 0.5, y + 0.5);
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(around.covariance());
   const double across = axes.eigenvalues().x(), along = axes.eigenvalues().y();
   if (along <= 0.0 || across > kFlatness * along) {
@@ -90,7 +106,7 @@ void KnownGrid::AddSurfacesAt(int x, int y, std::vector<SurfacePoint>& surfaces)
     return;
   }
   const Eigen::Vector2d normal = axes.eigenvectors().col(0);
-  const Eigen::Vector2d p = centre + resolution_m_ * near.mean().dot(normal) * normal;
+  const Eigen::Vector2d p = centre + source_.resolution_m * near.mean().dot(normal) * normal;
   for (const double side : {1.0, -1.0}) {
     const auto lies_there = [&](const Eigen::Vector2d& d) { return side * (d - near.mean()).dot(normal) > 0.5; };
     if (std::any_of(free.begin(), free.end(), lies_there)) surfaces.push_back({p, side * normal});

@@ -21,9 +21,19 @@ namespace cairn::slam {
 
 class KnownGrid final : public SearchedMap {
  public:
-  // Tiles of level 0 by their place, and the side of a cell. `near_m`: as SelfCheckOptions.
+  // Tiles of level 0 by their place.
   using Tiles = std::map<ChunkKey, std::shared_ptr<const TileCells>>;
-  KnownGrid(Tiles tiles, double resolution_m, const PlaceSearchOptions& options, double near_m);
+  struct Source {
+    Tiles tiles;
+    double resolution_m = 0.05;  // Side of a cell.
+    std::uint32_t epoch = 0;     // Of the map of the site.
+  };
+  // A search takes memory for all of the area, so a map of a larger one is none. REQUIRES of the constructor:
+  // IsBounded.
+  static constexpr double kMostM = 1000.0;
+  [[nodiscard]] static bool IsBounded(const Source& source);
+  // `near_m`: as SelfCheckOptions.
+  KnownGrid(Source source, const PlaceSearchOptions& options, double near_m);
 
   [[nodiscard]] std::shared_ptr<const IndexedSurfaces> Index() const override { return index_; }
   [[nodiscard]] const PointIndex& surfaces() const { return index_->index; }
@@ -33,8 +43,7 @@ class KnownGrid final : public SearchedMap {
                                          const Pose2& T_map_robot) const override;
   // Occupancy at a point: 0..100 %, or kUnknownCell.
   [[nodiscard]] std::uint8_t At(const Eigen::Vector2d& p_map) const;
-  [[nodiscard]] const Tiles& tiles() const { return tiles_; }
-  [[nodiscard]] double resolution_m() const { return resolution_m_; }
+  [[nodiscard]] const Source& source() const { return source_; }
 
  private:
   [[nodiscard]] std::uint8_t Cell(int x, int y) const;
@@ -44,8 +53,7 @@ class KnownGrid final : public SearchedMap {
                                                double max_range_m) const;
   [[nodiscard]] std::vector<SurfacePoint> SurfacesNear(const Eigen::Vector2d& p_map, double distance_m) const;
 
-  Tiles tiles_;
-  double resolution_m_;
+  Source source_;
   double near_m_;
   std::shared_ptr<const IndexedSurfaces> index_;
   std::map<std::pair<int, int>, std::vector<SurfacePoint>> squares_;  // The surfaces by squares of the plane.

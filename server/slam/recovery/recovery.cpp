@@ -99,7 +99,10 @@ std::optional<Recovery::Found> Recovery::Take(const Keyframe& keyframe, const Tr
   if (contradicted_ && !followed) LeavePath();
   if (said_) {
     const auto [reach_m, reach_rad] = followed ? ReachOfTrack() : std::pair(0.0, 0.0);
-    if (const auto place = search_.FindNear(map, recent_, T_map_robot, reach_m, reach_rad)) return Found{*place, false};
+    const auto place = search_.FindNear(map, recent_, T_map_robot, reach_m, reach_rad);
+    // Farther from where the track leads, one search is no proof.
+    if (place && (!followed || IsNear(T_map_robot, place->T_map_robot) || IsConfirmed(place->T_map_robot)))
+      return Found{*place, false};
   }
   const double travelled_m = recent_.back().travelled_m;
   const double every_m = followed ? kEverywhereEveryM : loop_.every_m;
@@ -108,10 +111,12 @@ std::optional<Recovery::Found> Recovery::Take(const Keyframe& keyframe, const Tr
   searched_at_m_ = travelled_m;
   const auto place = search_.Find(map, recent_);
   if (!place || !IsConfirmed(place->T_map_robot)) return std::nullopt;
-  const Pose2 error = Between(T_map_robot, place->T_map_robot);
-  const bool on_path =
-      T_map_track_ && error.translation().norm() < options_.on_path_m && std::abs(error.theta) < options_.on_path_rad;
-  return Found{*place, on_path};
+  return Found{*place, T_map_track_ && IsNear(T_map_robot, place->T_map_robot)};
+}
+
+bool Recovery::IsNear(const Pose2& T_map_believed, const Pose2& T_map_found) const {
+  const Pose2 error = Between(T_map_believed, T_map_found);
+  return error.translation().norm() < options_.on_path_m && std::abs(error.theta) < options_.on_path_rad;
 }
 
 // How far from where the track leads the robot may be.

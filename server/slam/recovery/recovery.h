@@ -5,6 +5,9 @@
 //    added to the path as if there had been no pause, if the place found is that one (`on_path`).
 //  - Otherwise its pose is carried on by odometry where there is any, and the path goes on at the place found.
 //  - Where somebody has said where the robot is, one search near there that finds it is enough (`BeginWhereSaid`).
+//  - A robot that has been followed in the map of others, with too much doubt (`BeginNear`), is found by one search
+//  where
+//    the track leads, and elsewhere by two that agree, like all others.
 // Frames: `track` is that of the front-end. Not thread-safe. Deterministic.
 #pragma once
 
@@ -135,6 +138,7 @@ class Recovery {
   void Append(const Keyframe& keyframe, const TrackStep& step, std::vector<SurfacePoint> points_robot);
   void LeavePath();
   [[nodiscard]] std::pair<double, double> ReachOfTrack() const;
+  [[nodiscard]] bool IsNear(const Pose2& T_map_believed, const Pose2& T_map_found) const;
   [[nodiscard]] bool IsConfirmed(const Pose2& T_map_robot);
   [[nodiscard]] bool Agree(const Candidate& earlier, const Pose2& T_map_robot) const;
 

@@ -74,8 +74,9 @@ std::shared_ptr<const slam::KnownGrid> MapOf(const slam::MapperSnapshot& snapsho
     for (std::size_t i = 0; i < cells->size(); ++i) (*cells)[i] = slam::OccupancyOf(chunk.log_odds[i]);
     tiles.emplace(key, std::move(cells));
   });
-  return std::make_shared<const slam::KnownGrid>(std::move(tiles), options.grid.resolution_m, options.recovery.place,
-                                                 options.self_check.near_m);
+  return std::make_shared<const slam::KnownGrid>(
+      slam::KnownGrid::Source{std::move(tiles), options.grid.resolution_m, 0}, options.recovery.place,
+      options.self_check.near_m);
 }
 
 bool IsInside(const slam::KnownGrid& map, const Scan& scan, const Pose2& T_map_robot) {

@@ -29,8 +29,8 @@ std::shared_ptr<const KnownGrid> KnownGridOf(const OccupancyGrid& grid) {
     for (std::size_t i = 0; i < cells->size(); ++i) (*cells)[i] = OccupancyOf(chunk.log_odds[i]);
     tiles.emplace(key, std::move(cells));
   });
-  return std::make_shared<const KnownGrid>(std::move(tiles), grid.options().resolution_m, options.recovery.place,
-                                           options.self_check.near_m);
+  return std::make_shared<const KnownGrid>(KnownGrid::Source{std::move(tiles), grid.options().resolution_m, 0},
+                                           options.recovery.place, options.self_check.near_m);
 }
 
 // A room of 8 x 6 m, as scans from some places in it have drawn it.
@@ -203,20 +203,21 @@ TEST(LocaliseIn, AMapThatHasMovedIsLookedAtAgain) {
   robot.Add(0, Mapped().half / 2);
   ASSERT_TRUE(robot.outcomes.back().localized);
   // The same map: the next scan shows that the robot is where it was.
-  ASSERT_TRUE(mapper.LocaliseIn(Mapped().map, true, true));
+  ASSERT_TRUE(mapper.LocaliseIn(Mapped().map, true));
   robot.Add(Mapped().half / 2, Mapped().half);
   EXPECT_TRUE(robot.outcomes.back().localized);
   // All of it lies elsewhere: the robot is found there, and not said to be where it was.
   KnownGrid::Tiles moved;
-  for (const auto& [key, cells] : Mapped().map->tiles()) moved.emplace(ChunkKey{key.x + 2, key.y}, cells);
+  for (const auto& [key, cells] : Mapped().map->source().tiles) moved.emplace(ChunkKey{key.x + 2, key.y}, cells);
   const MapperOptions options;
-  ASSERT_TRUE(mapper.LocaliseIn(std::make_shared<const KnownGrid>(moved, Mapped().map->resolution_m(),
-                                                                  options.recovery.place, options.self_check.near_m),
-                                true, true));
+  ASSERT_TRUE(mapper.LocaliseIn(
+      std::make_shared<const KnownGrid>(KnownGrid::Source{moved, Mapped().map->source().resolution_m, 0},
+                                        options.recovery.place, options.self_check.near_m),
+      true));
   const std::size_t before = robot.outcomes.size();
   robot.Add(Mapped().half, Mapped().drive.records.size());
   const std::vector<ScanOutcome> mapped = MappedOutcomes();
-  const double shift_m = 2.0 * kTileCells * Mapped().map->resolution_m();
+  const double shift_m = 2.0 * kTileCells * Mapped().map->source().resolution_m;
   std::size_t localized = 0;
   for (std::size_t i = before; i < robot.outcomes.size(); ++i) {
     if (!robot.outcomes[i].localized) continue;
