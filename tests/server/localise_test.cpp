@@ -71,6 +71,28 @@ TEST(Localise, ARobotMapsAgainFromWhereItIs) {
   EXPECT_TRUE(house.Ask(About(RequestKind::kStatus, "r2")).robots.at(0).session.status.message.empty());
 }
 
+// After a switch of the map version a pose is localized only in the map of the epoch that it names.
+TEST(Localise, ARobotFollowsTheMapToItsNextVersion) {
+  WholeServer house;
+  ASSERT_NO_FATAL_FAILURE(DrawMap(house));
+  house.Open("r2", kGuest, "lab", TruePose(0));
+  ASSERT_TRUE(Ask(house, RequestKind::kLocalise, "r2").ok());
+  house.Drive("r2", kGuest, 0, 20);
+  ASSERT_TRUE(LastPoseOf(house, "r2").localized);
+  const Reply submitted = house.Ask(About(RequestKind::kJobSubmit, ""));
+  ASSERT_EQ(submitted.jobs.size(), 1U) << submitted.status.message;
+  ASSERT_EQ(house.WaitJob(submitted.jobs[0].id).state, JobState::kSucceeded);
+  ASSERT_TRUE(house.WaitFor([&] { return house.Ask(About(RequestKind::kMapInfo, "")).maps.at(0).epoch == 1U; }));
+  int step = 20;
+  ASSERT_TRUE(house.WaitFor([&] {
+    house.Drive("r2", kGuest, step, step + 1);
+    ++step;
+    const PoseReport pose = LastPoseOf(house, "r2");
+    return pose.localized && pose.map_epoch == 1U;
+  }));
+  EXPECT_LT((LastPoseOf(house, "r2").T_map_robot.translation() - TruePose(step - 1).translation()).norm(), 0.15);
+}
+
 TEST(Localise, WhatCannotBeIsRefusedWithAReason) {
   WholeServer house;
   EXPECT_EQ(Ask(house, RequestKind::kLocalise, "r9").code, StatusCode::kNotFound);

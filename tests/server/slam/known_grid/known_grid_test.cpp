@@ -163,6 +163,57 @@ TEST(LocaliseIn, ARobotWhosePlaceIsKnownIsLocalizedWithItsFirstScan) {
   EXPECT_EQ(robot.localized(), robot.outcomes.size());
 }
 
+// Odometry begins anywhere.
+TEST(LocaliseIn, ARobotIsLookedForWhereItIsSaidToStartWhateverItsOdometryIs) {
+  Localised robot(Mapped().drive.T_map_robot_start);
+  ASSERT_TRUE(robot.pipeline.mapper().LocaliseIn(Mapped().map, true));
+  const Pose2 T_other_odom{40.0, -7.0, 2.0};
+  for (std::size_t i = 0; i < Mapped().half / 2; ++i) {
+    if (const auto* odometry = std::get_if<Odometry>(&Mapped().drive.records[i])) {
+      Odometry moved = *odometry;
+      moved.T_odom_robot = T_other_odom * moved.T_odom_robot;
+      robot.pipeline.Add(moved);
+    } else {
+      robot.Add(i, i + 1);
+    }
+  }
+  EXPECT_TRUE(robot.outcomes.front().localized);
+  EXPECT_EQ(robot.localized(), robot.outcomes.size());
+}
+
+// A robot that was carried during a pause, after which its first scan is tilted.
+TEST(LocaliseIn, APauseIsNotForgottenBecauseTheScanAfterItIsTilted) {
+  Localised robot(Mapped().drive.T_map_robot_start);
+  ASSERT_TRUE(robot.pipeline.mapper().LocaliseIn(Mapped().map, true));
+  robot.Add(0, Mapped().half / 2);
+  ASSERT_TRUE(robot.outcomes.back().localized);
+  const std::size_t before = robot.outcomes.size();
+  bool tilted = false;
+  for (std::size_t i = Mapped().half; i < Mapped().half + 60; ++i) {
+    const auto* const scan = std::get_if<Scan>(&Mapped().drive.records[i]);
+    if (scan != nullptr && !tilted) {
+      tilted = true;
+      auto changed = std::make_shared<Scan>(*scan);
+      changed->tilt_rad = 0.2;
+      robot.pipeline.Add(std::move(changed));
+    } else {
+      robot.Add(i, i + 1);
+    }
+  }
+  ASSERT_GT(robot.outcomes.size(), before + 2);
+  EXPECT_FALSE(robot.outcomes[before].localized);
+  EXPECT_FALSE(robot.outcomes[before + 1].localized);
+}
+
+TEST(LocaliseIn, AMapOfTooLargeAnAreaIsNone) {
+  KnownGrid::Source source{Mapped().map->source().tiles, 0.05, 0};
+  EXPECT_TRUE(KnownGrid::IsBounded(source));
+  source.tiles.emplace(ChunkKey{400, 0}, source.tiles.begin()->second);
+  EXPECT_FALSE(KnownGrid::IsBounded(source));
+  EXPECT_FALSE(KnownGrid::IsBounded({{}, std::nan(""), 0}));
+  EXPECT_FALSE(KnownGrid::IsBounded({{{ChunkKey{1 << 21, 0}, source.tiles.begin()->second}}, 0.05, 0}));
+}
+
 TEST(LocaliseIn, ASavedRobotGoesOnWithTheSameBytes) {
   Localised whole, first, second;
   for (Localised* const robot : {&whole, &first}) ASSERT_TRUE(robot->pipeline.mapper().LocaliseIn(Mapped().map, false));
