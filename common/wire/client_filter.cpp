@@ -1,10 +1,10 @@
 #include "common/wire/client_filter.h"
 
-#include <charconv>
 #include <fastdds/dds/topic/IContentFilter.hpp>
 #include <memory>
 #include <new>
 
+#include "common/options/number_text.h"
 #include "common/wire/sample_type.h"
 
 namespace cairn::wire {
@@ -64,9 +64,7 @@ std::string ClientExpression(ClientId client) {
 
 std::optional<ClientId> ClientOfExpression(std::string_view expression) {
   ClientId client = 0;
-  const char* const end = expression.data() + expression.size();
-  const auto [read_to, error] = std::from_chars(expression.data(), end, client);
-  if (error != std::errc() || read_to != end) return std::nullopt;
+  if (!ParseNumber(expression, client)) return std::nullopt;
   return client;
 }
 

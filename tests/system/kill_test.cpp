@@ -80,17 +80,20 @@ TEST(Kill, WithoutSpaceOnTheDiskItIsDegradedSaysSoAndEndsWithThree) {
   EXPECT_NE(after.output.find("\"robots\":[{"), std::string::npos) << after.output;
 }
 
+// A server that leaves its state behind.
+void StartAndStop(const std::vector<std::string>& command) {
+  ChildProcess first(command);
+  ASSERT_TRUE(first.Says(" ready"));
+  first.Signal(SIGTERM);
+  EXPECT_EQ(first.Wait().exit_code, 0);
+}
+
 // Nobody can write there, not even root. Nothing that an earlier server stored may be lost by the attempt.
 TEST(Kill, AServerOnAReadOnlyStateDoesNotStartAndSaysWhy) {
   const TempDirectory directory;
   const std::vector<std::string> command = {CAIRND_PATH, "--domain", std::to_string(TestDomain()), "--state",
                                             directory.path().string()};
-  {
-    ChildProcess first(command);
-    ASSERT_TRUE(first.Says(" ready"));
-    first.Signal(SIGTERM);
-    EXPECT_EQ(first.Wait().exit_code, 0);
-  }
+  ASSERT_NO_FATAL_FAILURE(StartAndStop(command));
   {
     const auto mount = OwnMount::ReadOnly(directory.path());
     if (!mount) GTEST_SKIP() << "this user may not mount a directory read-only";
@@ -108,12 +111,7 @@ TEST(Kill, AServerOnADamagedDatabaseEndsWithTwoAndSaysWhy) {
   const TempDirectory directory;
   const std::vector<std::string> command = {CAIRND_PATH, "--domain", std::to_string(TestDomain()), "--state",
                                             directory.path().string()};
-  {
-    ChildProcess first(command);
-    ASSERT_TRUE(first.Says(" ready"));
-    first.Signal(SIGTERM);
-    EXPECT_EQ(first.Wait().exit_code, 0);
-  }
+  ASSERT_NO_FATAL_FAILURE(StartAndStop(command));
   const auto database = directory.path() / "cairn.db";
   const auto size = std::filesystem::file_size(database);
   for (const std::uintmax_t page : {std::uintmax_t{1}, std::uintmax_t{0}}) {

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
 #include <cstdlib>
 #include <string>
 
@@ -40,6 +41,11 @@ class ServiceNotifierTest : public ::testing::Test {
   int socket_ = -1;
   ServiceNotifier notifier_;
 };
+
+TEST_F(ServiceNotifierTest, SaysThatALongStartGoesOn) {
+  notifier_.Starting("restoring", std::chrono::seconds(60));
+  EXPECT_EQ(Receive(), "EXTEND_TIMEOUT_USEC=60000000\nSTATUS=restoring");
+}
 
 TEST_F(ServiceNotifierTest, SaysReadyAliveAndStopping) {
   notifier_.Ready("serving");
