@@ -19,6 +19,23 @@ ExitCode Relocalise(Program& program, const RelocaliseArguments& arguments) {
                        {{"robot", arguments.robot}, {"accepted", true}});
 }
 
+struct ModeArguments {
+  std::string robot;
+};
+
+ExitCode Localise(Program& program, const ModeArguments& arguments) {
+  const auto taken = program.Ask([&](QueryClient& server) { return server.Localise(arguments.robot); });
+  if (!taken) return program.Refuse(taken.error());
+  return program.Print(arguments.robot + " is only localised from now on, in the map of its site\n",
+                       {{"robot", arguments.robot}, {"accepted", true}});
+}
+
+ExitCode MapAgain(Program& program, const ModeArguments& arguments) {
+  const auto taken = program.Ask([&](QueryClient& server) { return server.MapAgain(arguments.robot); });
+  if (!taken) return program.Refuse(taken.error());
+  return program.Print(arguments.robot + " maps from now on\n", {{"robot", arguments.robot}, {"accepted", true}});
+}
+
 }  // namespace
 
 void AddRobot(CLI::App& app, Program& program) {
@@ -37,6 +54,25 @@ void AddRobot(CLI::App& app, Program& program) {
   AddParsed(*relocalise, "--here", arguments->T_map_robot, ParseStart, "Where it is, in the map of its site",
             "X,Y,THETA");
   program.OnChosen(*relocalise, arguments, Relocalise);
+
+  auto* localise = robot->add_subcommand("localise", "Have a robot only localised, in the map of its site");
+  localise->footer(
+      "From now on nothing is drawn of the robot, and the map that others have made stays as it is. The robot is "
+      "looked\n"
+      "for in that map: near where it is, if that is known, otherwise everywhere, and then it has to drive until two\n"
+      "searches agree. Where the map changes, it is given to the robot again.\n"
+      "EXAMPLE\n  cairn robot localise robot1");
+  auto localised = std::make_shared<ModeArguments>();
+  localise->add_option("robot", localised->robot, "The robot's name")->required();
+  program.OnChosen(*localise, localised, Localise);
+
+  auto* map = robot->add_subcommand("map", "Have a robot map again that was only localised");
+  map->footer(
+      "It maps from where it is. If it has mapped before, its scans must agree with its own map first.\n"
+      "EXAMPLE\n  cairn robot map robot1");
+  auto mapping = std::make_shared<ModeArguments>();
+  map->add_option("robot", mapping->robot, "The robot's name")->required();
+  program.OnChosen(*map, mapping, MapAgain);
 }
 
 }  // namespace cairn::client

@@ -259,6 +259,14 @@ Result<void> QueryClient::Relocalise(const std::string& robot, const std::option
   return Ask(request).map([](Reply&&) {});
 }
 
+Result<void> QueryClient::Localise(const std::string& robot) {
+  return Ask(AboutRobot(RequestKind::kLocalise, robot)).map([](Reply&&) {});
+}
+
+Result<void> QueryClient::MapAgain(const std::string& robot) {
+  return Ask(AboutRobot(RequestKind::kMap, robot)).map([](Reply&&) {});
+}
+
 Result<std::vector<MapInfo>> QueryClient::Maps() {
   return Ask(MakeRequest(RequestKind::kMapInfo)).map([](Reply&& reply) { return std::move(reply.maps); });
 }

@@ -92,6 +92,11 @@ class QueryClient {
   // `T_map_robot` where that is given, else anywhere. kFailedPrecondition: a pose is given, and the robot is not joined
   // with the map of its site.
   [[nodiscard]] Result<void> Relocalise(const std::string& robot, const std::optional<Pose2>& T_map_robot = {});
+  // From now on the robot is only localised, in the map of its site, and nothing is drawn of it. kNotFound: the site
+  // has no map yet.
+  [[nodiscard]] Result<void> Localise(const std::string& robot);
+  // It maps again, from where it is. kFailedPrecondition: it is not joined with the map of its site.
+  [[nodiscard]] Result<void> MapAgain(const std::string& robot);
 
   // All maps.
   [[nodiscard]] Result<std::vector<MapInfo>> Maps();

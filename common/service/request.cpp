@@ -8,7 +8,7 @@ std::string_view RequestKindName(RequestKind kind) {
   static constexpr std::array<std::string_view, kRequestKindCount> kNames = {
       "ping",       "pose",      "path",        "tiles",    "landmarks",   "map_info",   "status",
       "job_submit", "job_get",   "job_cancel",  "job_list", "session_end", "map_enable", "saved_list",
-      "site_save",  "site_load", "site_delete", "ros2",     "relocalise"};
+      "site_save",  "site_load", "site_delete", "ros2",     "relocalise",  "localise",   "map"};
   const auto index = static_cast<std::size_t>(kind);
   return index < kNames.size() ? kNames[index] : "unknown";
 }
@@ -23,6 +23,8 @@ bool IsCommand(RequestKind kind) {
     case RequestKind::kSiteLoad:
     case RequestKind::kSiteDelete:
     case RequestKind::kRelocalise:
+    case RequestKind::kLocalise:
+    case RequestKind::kMap:
       return true;
     case RequestKind::kPing:
     case RequestKind::kPose:

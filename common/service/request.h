@@ -40,8 +40,10 @@ enum class RequestKind : std::uint8_t {
   kSiteDelete,  // site, or saved: then that file.
   kRos2,        // What the door for ROS 2 robots sees.
   kRelocalise,  // robot; T_map_robot (where it is) or nothing (it is not known).
+  kLocalise,    // robot: from now on it is only localised, in the map of its site.
+  kMap,         // robot: it maps again.
 };
-inline constexpr int kRequestKindCount = 19;
+inline constexpr int kRequestKindCount = 21;
 [[nodiscard]] std::string_view RequestKindName(RequestKind kind);
 // Whether it changes something, and is therefore sent as a Command.
 [[nodiscard]] bool IsCommand(RequestKind kind);

@@ -209,7 +209,7 @@ Result<void> CheckBounds(const v1::Job& job) {
 
 Result<void> CheckBounds(const v1::Request& request) {
   return Bounds()
-      .Known("kind", request.kind(), v1::REQUEST_RELOCALISE)
+      .Known("kind", request.kind(), v1::REQUEST_MAP)
       .Name("site", request.site())
       .Name("robot", request.robot())
       .Within("level", request.level(), 0, kMaxTileLevel)

@@ -132,6 +132,11 @@ std::optional<Answer> Desk::AnswerTo(const Request& request) {
       const auto taken = roster_.Relocalise(request.robot, request.T_map_robot);
       return ReplyTo(request, taken ? Status{} : taken.error());
     }
+    case RequestKind::kLocalise:
+    case RequestKind::kMap: {
+      const auto taken = roster_.Localise(request.robot, request.kind == RequestKind::kLocalise);
+      return ReplyTo(request, taken ? Status{} : taken.error());
+    }
     case RequestKind::kMapEnable:
       return EnableMap(request);
     case RequestKind::kSavedList:

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "server/inbound.h"
+#include "server/maps/map_snapshot.h"
 #include "server/maps/robot_grid.h"
 #include "server/slam/mapper.h"
 #include "server/slam/trail/keyframe.h"
@@ -36,6 +37,13 @@ struct RelocaliseWanted {
   std::optional<Pose2> T_map_robot;
 };
 
+// From now on the robot is only localised, in this map; null: it maps again. `again`: the map of a robot that is only
+// localised already has changed; for one that maps meanwhile it is left out.
+struct LocaliseWanted {
+  std::shared_ptr<const MapSnapshot> map;
+  bool again = false;
+};
+
 // What others have drawn contradicts the place where the robot is said to have started (jobs/start_check.h).
 struct StartRefused {
   std::string why;
@@ -55,6 +63,6 @@ struct Finish {
 };
 
 using RobotEvent = std::variant<ScanArrival, OdometryArrival, Correction, EpochChange, SnapshotWanted, RelocaliseWanted,
-                                StartRefused, Finish>;
+                                LocaliseWanted, StartRefused, Finish>;
 
 }  // namespace cairn::server

@@ -62,6 +62,10 @@ bool RobotQueue::Push(RelocaliseWanted wanted) {
   return PushIfRoom(wanted);
 }
 
+bool RobotQueue::Push(LocaliseWanted wanted) {
+  return PushIfRoom(std::move(wanted));
+}
+
 void RobotQueue::Push(StartRefused refused) {
   const MutexLock lock(mutex_);
   control_.push_back({next_++, std::move(refused)});

@@ -36,6 +36,7 @@ class RobotQueue {
   // False where too many wait.
   bool Push(SnapshotWanted wanted);
   bool Push(RelocaliseWanted wanted);
+  bool Push(LocaliseWanted wanted);
   void Push(StartRefused refused);
   void Push(Finish finish);
 

@@ -223,6 +223,17 @@ Result<void> Roster::Relocalise(const std::string& robot, const std::optional<Po
   return (*session)->Relocalise(T_map_robot);
 }
 
+Result<void> Roster::Localise(const std::string& robot, bool only) {
+  const auto session = FindOrFail(robot);
+  if (!session) return tl::unexpected(session.error());
+  if (!only) return (*session)->MapAgain();
+  const auto site = atlas_.Find((*session)->record().state().site);
+  const auto map = site != nullptr ? site->snapshot() : nullptr;
+  if (map == nullptr || !map->tiles.BoxOf(0))
+    return Fail(StatusCode::kNotFound, "nothing is drawn in the map of its site");
+  return (*session)->Localise(map);
+}
+
 Result<std::shared_ptr<Session>> Roster::FindOrFail(const std::string& robot) const {
   std::shared_ptr<Session> session = Find(robot);
   if (session == nullptr) return Fail(StatusCode::kNotFound, "robot '" + robot + "' has no session");
@@ -233,6 +244,9 @@ void Roster::Tick() {
   const std::chrono::duration<double> expiry(options_.suspended_expiry_s);
   for (const auto& session : All()) {
     session->Tick();
+    if (session->record().localises()) {
+      if (const auto site = atlas_.Find(session->record().state().site)) session->KeepUpWith(site->snapshot());
+    }
     if (session->record().SuspendedFor(SessionRecord::Clock::now()) > expiry)
       session->End({StatusCode::kDeadlineExceeded, "its robot stayed away for longer than robots.suspended_expiry_s"});
   }

@@ -81,6 +81,9 @@ class Roster {
   Result<void> End(const std::string& robot);
   // See Session::Relocalise. NOT_FOUND without a session, INVALID_ARGUMENT for a pose that is not finite or absurd.
   Result<void> Relocalise(const std::string& robot, const std::optional<Pose2>& T_map_robot);
+  // From now on the robot is only localised in the map of its site, or it maps again. NOT_FOUND without a session, or
+  // without a map. See Session::Localise.
+  Result<void> Localise(const std::string& robot, bool only);
   // Publishes what is due, and ends sessions whose robots stayed away for too long.
   void Tick();
 

@@ -9,7 +9,12 @@
 namespace cairn::server {
 namespace {
 
+constexpr std::chrono::minutes kMapPeriod{10};  // A robot that is only localised gets a map that others draw so often.
 constexpr std::chrono::seconds kOpeningPatience{1};  // A robot waits this long for the disk when it opens a session.
+
+tl::unexpected<Status> TooMany() {
+  return cairn::Fail(StatusCode::kResourceExhausted, "too many commands wait for the robot's estimator");
+}
 
 }  // namespace
 
@@ -97,13 +102,46 @@ void Session::RefuseStart(const std::string& why) {
 
 Result<void> Session::Relocalise(const std::optional<Pose2>& T_map_robot) {
   if (ending_) return cairn::Fail(StatusCode::kFailedPrecondition, "the session has ended");
-  if (T_map_robot && record_.joining().fragment)
+  if (T_map_robot && record_.joining().fragment && !record_.localises())
     return cairn::Fail(StatusCode::kFailedPrecondition,
                        "the robot is not joined with the map of its site, so no pose in that map can be used");
-  if (!queue_.Push(RelocaliseWanted{T_map_robot}))
-    return cairn::Fail(StatusCode::kResourceExhausted, "too many commands wait for the robot's estimator");
+  if (!queue_.Push(RelocaliseWanted{T_map_robot})) return TooMany();
   Schedule();
   return {};
+}
+
+Result<void> Session::Localise(std::shared_ptr<const MapSnapshot> map) {
+  if (ending_) return cairn::Fail(StatusCode::kFailedPrecondition, "the session has ended");
+  const KnownMap known{map->info.epoch, map->info.version, SessionRecord::Clock::now()};
+  const MutexLock lock(known_map_mutex_);
+  if (!queue_.Push(LocaliseWanted{std::move(map), false})) return TooMany();
+  known_map_ = known;
+  Schedule();
+  return {};
+}
+
+Result<void> Session::MapAgain() {
+  if (ending_) return cairn::Fail(StatusCode::kFailedPrecondition, "the session has ended");
+  if (record_.joining().fragment)
+    return cairn::Fail(StatusCode::kFailedPrecondition,
+                       "the robot is not joined with the map of its site: it can only open a new session");
+  if (record_.localises() && !record_.snapshot().status.pose.localized)
+    return cairn::Fail(StatusCode::kFailedPrecondition, "the robot's place in the map is not known");
+  if (!queue_.Push(LocaliseWanted{nullptr, false})) return TooMany();
+  Schedule();
+  return {};
+}
+
+void Session::KeepUpWith(const std::shared_ptr<const MapSnapshot>& map) {
+  if (record_.phase() != SessionPhase::kActive) return;
+  const auto now = SessionRecord::Clock::now();
+  const MutexLock lock(known_map_mutex_);
+  const bool moved = !known_map_ || known_map_->epoch != map->info.epoch;
+  const bool drawn = known_map_ && known_map_->version != map->info.version && now - known_map_->given > kMapPeriod;
+  if (!moved && !drawn) return;
+  if (!queue_.Push(LocaliseWanted{map, true})) return;  // The next call tries again.
+  known_map_ = {map->info.epoch, map->info.version, now};
+  Schedule();
 }
 
 void Session::SetLiveliness(bool alive) {
@@ -254,7 +292,8 @@ void Session::TakeCheckpoint() {
 
 void Session::Handle(RobotEvent&& event) {
   // What its status says of the robot's place may change with these.
-  const bool changes_state = std::holds_alternative<StartRefused>(event) || std::holds_alternative<Correction>(event);
+  const bool changes_state = std::holds_alternative<StartRefused>(event) || std::holds_alternative<Correction>(event) ||
+                             std::holds_alternative<LocaliseWanted>(event);
   if (!failed_ && !Throws([&] { estimator_.Handle(std::move(event)); })) {
     if (changes_state) state_unsent_ = true;
     return;

@@ -45,6 +45,15 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   // is not joined with the map. RESOURCE_EXHAUSTED: too many events wait.
   [[nodiscard]] Result<void> Relocalise(const std::optional<Pose2>& T_map_robot);
 
+  // From now on the robot is only localised in this map, near where it is in the map or, if that is not known,
+  // everywhere (slam::Mapper::LocaliseIn); MapAgain ends that. FAILED_PRECONDITION: the session is ending, or a robot
+  // that is to map again is not joined with the map. RESOURCE_EXHAUSTED: too many events wait.
+  [[nodiscard]] Result<void> Localise(std::shared_ptr<const MapSnapshot> map);
+  [[nodiscard]] Result<void> MapAgain();
+  // Gives a robot that is only localised the map again: at once where its epoch is another one, and where others have
+  // drawn, after some minutes.
+  void KeepUpWith(const std::shared_ptr<const MapSnapshot>& map);
+
   // The owner's liveliness lease was lost or came back: kSuspended or kActive.
   void SetLiveliness(bool alive);
   // Returns false if the session has ended meanwhile.
@@ -115,6 +124,14 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   std::atomic<bool> scheduled_{false};
   std::atomic<bool> handling_{false};
   std::atomic<std::uint64_t> handled_{0};
+  // What the map was when it was given to the estimator of a robot that is only localised.
+  struct KnownMap {
+    std::uint32_t epoch = 0;
+    std::uint64_t version = 0;
+    SessionRecord::Clock::time_point given{};
+  };
+  Mutex known_map_mutex_;
+  std::optional<KnownMap> known_map_ CAIRN_GUARDED_BY(known_map_mutex_);
   // Held from the reading of a state to its sending: an older state must not overtake a newer one on its way out.
   Mutex publishing_;
   asio::strand<asio::thread_pool::executor_type> strand_;

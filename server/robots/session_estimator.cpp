@@ -59,6 +59,7 @@ SessionEstimator::SessionEstimator(const EstimatorSetup& setup, SessionRecord& r
       identity_(record.snapshot()),
       epoch_(record.epoch()),
       fragment_(setup.fragment),
+      options_(setup.mapper),
       pipeline_(setup.mapper, setup.T_map_robot_start, slam::SerialFor,
                 {.used = [this](const Scan& scan, const slam::ScanOutcome& outcome) { Used(scan, outcome); },
                  .dropped = [this](const Scan& scan, DropReason reason) { Dropped(scan, reason); }}) {
@@ -127,7 +128,13 @@ void SessionEstimator::Store(JournalEntry entry) {
 
 void SessionEstimator::Used(const Scan& scan, const slam::ScanOutcome& outcome) {
   const auto waiting = waiting_.find(&scan);
-  const PoseReport report = ReportOf(scan, outcome, identity_.status.session, session_, epoch_, fragment_);
+  const auto known_epoch = pipeline_.mapper().known_map_epoch();
+  PoseReport report =
+      ReportOf(scan, outcome, identity_.status.session, session_, epoch_, fragment_ && !known_epoch.has_value());
+  if (known_epoch && *known_epoch != epoch_ && report.localized) {  // Its pose is one in another map.
+    report.localized = false;
+    report.reason = PoseReason::kLost;
+  }
   if (outcome.keyframe) Drive(outcome.T_map_robot);
   if (!replaying_) outputs_.send(report);
   const std::chrono::duration<double, std::milli> latency = Clock::now() - waiting->second.received;
@@ -232,6 +239,39 @@ void SessionEstimator::On(RelocaliseWanted&& wanted) {
   if (ended_) return;
   Store(RelocaliseTaken{wanted.T_map_robot});
   pipeline_.mapper().Relocalise(wanted.T_map_robot);
+  T_map_keyframe_.reset();
+}
+
+void SessionEstimator::On(LocaliseWanted&& wanted) {
+  if (ended_ || (wanted.again && !pipeline_.mapper().localises())) return;
+  LocaliseTaken taken;
+  taken.maps_again = wanted.map == nullptr;
+  if (wanted.map != nullptr) {
+    taken.resolution_m = wanted.map->info.resolution_m;
+    taken.epoch = wanted.map->info.epoch;
+    wanted.map->tiles.ForEach(0, [&taken](const std::shared_ptr<const Tile>& tile) { taken.tiles.push_back(tile); });
+  }
+  Store(taken);
+  On(std::move(taken));
+}
+
+// In a map that can not be read or is too large, the robot is not found.
+void SessionEstimator::On(LocaliseTaken&& taken) {
+  std::shared_ptr<const slam::KnownGrid> map;
+  if (!taken.maps_again) {
+    slam::KnownGrid::Source source{{}, taken.resolution_m, taken.epoch};
+    for (const auto& tile : taken.tiles) {
+      if (auto cells = DecodeCells(tile->bytes, tile->encoding))
+        source.tiles.emplace(slam::ChunkKey{tile->key.x, tile->key.y},
+                             std::make_shared<const TileCells>(std::move(*cells)));
+    }
+    if (!slam::KnownGrid::IsBounded(source)) source = {{}, options_.grid.resolution_m, taken.epoch};
+    map =
+        std::make_shared<const slam::KnownGrid>(std::move(source), options_.recovery.place, options_.self_check.near_m);
+  }
+  // A robot that can not map again, because its place is not known or it is not joined, is localised on.
+  if (map != nullptr || !fragment_) static_cast<void>(pipeline_.mapper().LocaliseIn(std::move(map), !fragment_));
+  record_.SetLocalises(pipeline_.mapper().localises());
   T_map_keyframe_.reset();
 }
 

@@ -86,6 +86,8 @@ class SessionEstimator {
   void On(EpochChange&& change);
   void On(SnapshotWanted&& wanted);
   void On(RelocaliseWanted&& wanted);
+  void On(LocaliseWanted&& wanted);
+  void On(LocaliseTaken&& taken);
   void On(StartRefused&& refused);
   void On(Finish&& finish);
   void Used(const Scan& scan, const slam::ScanOutcome& outcome);
@@ -107,6 +109,7 @@ class SessionEstimator {
   const SessionSnapshot identity_;  // Names and id; its other parts are empty.
   std::uint32_t epoch_ = 0;
   bool fragment_ = false;
+  const slam::MapperOptions options_;
   std::string start_refused_;                                  // Why, if it was.
   double driven_m_ = 0.0;                                      // See SessionRecord::Joining. Along the keyframes.
   std::optional<Pose2> T_map_keyframe_;                        // The last one; empty after a correction.

@@ -69,6 +69,8 @@ void SessionEstimator::Replay(JournalEntry&& entry, const Switched& switched) {
     SetEpoch(epoch->epoch);
   } else if (const auto* const relocalise = std::get_if<RelocaliseTaken>(&entry)) {
     On(RelocaliseWanted{relocalise->T_map_robot});
+  } else if (auto* const localise = std::get_if<LocaliseTaken>(&entry)) {
+    On(std::move(*localise));
   } else if (auto* const refusal = std::get_if<StartRefusal>(&entry)) {
     On(StartRefused{std::move(refusal->why)});
   } else if (const auto* const finished = std::get_if<SessionFinished>(&entry)) {
@@ -127,6 +129,7 @@ Result<SessionEstimator::PieceValues> SessionEstimator::Load(std::string_view ma
   });
   reader.Require(next == waiting.size(), "number of waiting scans");
   if (auto record = record_.Load(reader, WaitingBySensor()); !record) return tl::unexpected(record.error());
+  record_.SetLocalises(pipeline_.mapper().localises());
   record_.SetJoining({fragment_, driven_m_, start_refused_});
   PieceValues values = reader.values();
   values.insert(values.end(), loaded->begin(), loaded->end());

@@ -199,6 +199,16 @@ void SessionRecord::SetJoining(const Joining& joining) {
   joining_ = joining;
 }
 
+void SessionRecord::SetLocalises(bool localises) {
+  const MutexLock lock(mutex_);
+  localises_ = localises;
+}
+
+bool SessionRecord::localises() const {
+  const MutexLock lock(mutex_);
+  return localises_;
+}
+
 SessionRecord::Joining SessionRecord::joining() const {
   const MutexLock lock(mutex_);
   return joining_;
@@ -287,6 +297,8 @@ SessionState SessionRecord::StateNow() const {
   SessionState state = status_.session;
   if (joining_.fragment && !joining_.why.empty() && state.status.ok())
     state.status = {StatusCode::kFailedPrecondition, joining_.why};
+  if (localises_ && state.status.ok() && state.status.message.empty())
+    state.status.message = "only localised: nothing is drawn of it";
   state.stale = !silence_.empty();
   if (state.stale && state.status.ok()) {
     state.status = {StatusCode::kUnavailable,

@@ -85,6 +85,9 @@ class SessionRecord {
     std::string why = {};  // Why its start was refused, if it was; the status of an active session says it.
   };
   void SetJoining(const Joining& joining);
+  // Whether the robot is only localised, and maps nothing.
+  void SetLocalises(bool localises);
+  [[nodiscard]] bool localises() const;
   [[nodiscard]] Joining joining() const;
   // Another epoch of the map: the newest pose belongs to it from now on.
   void SetEpoch(std::uint32_t epoch);
@@ -150,6 +153,7 @@ class SessionRecord {
   Stream odometry_ CAIRN_GUARDED_BY(mutex_);
   PoseHistory history_ CAIRN_GUARDED_BY(mutex_);
   Joining joining_ CAIRN_GUARDED_BY(mutex_);
+  bool localises_ CAIRN_GUARDED_BY(mutex_) = false;
   std::shared_ptr<const std::vector<LandmarkReport>> landmarks_ CAIRN_GUARDED_BY(mutex_);
 };
 

@@ -178,7 +178,7 @@ class OptionReader final : public OptionVisitor {
 
 struct Parts {
   std::string options;
-  std::string_view state;
+  OpenedCheckpoint opened;
 };
 
 Result<Parts> PartsOf(std::string_view bytes) {
@@ -190,13 +190,13 @@ Result<Parts> PartsOf(std::string_view bytes) {
   std::uint32_t format = 0;
   std::uint64_t checksum = 0, length = 0;
   if (!TakeNumber(bytes, format)) return damaged("it is too short");
-  if (format != kCheckpointFormat)
+  if (format < kOldestCheckpointFormat || format > kCheckpointFormat)
     return Fail(format > kCheckpointFormat ? StatusCode::kUnimplemented : StatusCode::kFailedPrecondition,
                 "the checkpoint has format " + std::to_string(format) + ", this program reads " +
-                    std::to_string(kCheckpointFormat));
+                    std::to_string(kOldestCheckpointFormat) + " to " + std::to_string(kCheckpointFormat));
   if (!TakeNumber(bytes, checksum) || checksum != ChecksumOf(bytes)) return damaged("its checksum is wrong");
   if (!TakeNumber(bytes, length) || length > bytes.size()) return damaged("it is too short");
-  return Parts{std::string(bytes.substr(0, length)), bytes.substr(length)};
+  return Parts{std::string(bytes.substr(0, length)), {bytes.substr(length), format}};
 }
 
 }  // namespace
@@ -223,13 +223,13 @@ std::string Checkpoint::With(const std::string& state) const {
   return bytes + checked;
 }
 
-Result<std::string_view> OpenCheckpoint(std::string_view bytes, const MapperOptions& options) {
+Result<OpenedCheckpoint> OpenCheckpoint(std::string_view bytes, const MapperOptions& options) {
   const auto parts = PartsOf(bytes);
   if (!parts) return tl::unexpected(parts.error());
   const std::string here = TextOf(options);
-  if (here == parts->options) return parts->state;
+  if (here == parts->options) return parts->opened;
   if (auto different = FirstDifference(here, ValuesOf(parts->options))) return tl::unexpected(std::move(*different));
-  return parts->state;
+  return parts->opened;
 }
 
 Result<MapperOptions> OptionsOf(std::string_view bytes, const MapperOptions& here) {

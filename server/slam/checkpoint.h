@@ -19,7 +19,8 @@
 
 namespace cairn::slam {
 
-inline constexpr std::uint32_t kCheckpointFormat = 7;
+inline constexpr std::uint32_t kCheckpointFormat = kStateFormat;
+inline constexpr std::uint32_t kOldestCheckpointFormat = 7;
 
 class Checkpoint {
  public:
@@ -41,7 +42,11 @@ class Checkpoint {
 // Returns the part of the bytes that is the state. kDataLoss: they are damaged or no checkpoint. kFailedPrecondition:
 // they have an older format, or come from an estimator with other options; the message names the first one that
 // differs. kUnimplemented: they have a newer format.
-[[nodiscard]] Result<std::string_view> OpenCheckpoint(std::string_view bytes, const MapperOptions& options);
+struct OpenedCheckpoint {
+  std::string_view state;
+  std::uint32_t format = 0;
+};
+[[nodiscard]] Result<OpenedCheckpoint> OpenCheckpoint(std::string_view bytes, const MapperOptions& options);
 
 // The options with which the checkpoint was made. A known map of lines is not in it: that of `here` is taken, and
 // OpenCheckpoint tells whether it is the same. Errors as OpenCheckpoint.

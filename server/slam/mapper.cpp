@@ -27,6 +27,15 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   State& s = *state_;
   const Stamp stamp = scan->stamp;
   const bool tilted = IsTilted(*scan, s.options.max_tilt_rad);
+  if (s.localisation) {
+    passage = s.LocaliseAfter(passage, tilted);
+    if (tilted)
+      return s.ReportLocalised(stamp, T_odom_robot, s.localisation->CarriedTo(s.OdometryOrNone(T_odom_robot)), 0.0);
+    if (passage != Passage::kDriven || s.localisation->looking()) rolling = nullptr;
+    return s.Localise(TrackScan(s.front_end, {s.options.front_end, s.options.pairing.rolling}, s.trail, std::move(scan),
+                                rolling, T_odom_robot, parallel_for),
+                      T_odom_robot, passage, parallel_for);
+  }
   passage = s.BeginAfter(passage, tilted);
   if (tilted) return s.Coast(stamp, T_odom_robot);
 
@@ -207,6 +216,7 @@ void Mapper::WatchSteps(StepWatch watch) {
 
 bool Mapper::full() const {
   const State& s = *state_;
+  if (s.localisation) return false;
   return s.trail.size() >= static_cast<std::size_t>(s.options.max_keyframes) ||
          s.drawing.grid().chunk_count() >= static_cast<std::size_t>(s.options.max_chunks);
 }
@@ -352,6 +362,7 @@ bool Mapper::State::IsConsistent() const {
   for (std::size_t i = 0; i < filter->hypothesis_count(); ++i)
     if (filter->hypothesis(i).path.size() != trail.size()) return false;
   if (recovery.active() && (trail.empty() || !last_scan)) return false;
+  if (localisation && !localisation->looking() && !last_scan) return false;
   return drawing.path().size() == (filter->placed() ? trail.size() : 0);
 }
 

@@ -13,7 +13,9 @@
 
 #include "common/sensor/scan.h"
 #include "common/service/pose_report.h"
+#include "common/status.h"
 #include "server/slam/grid/occupancy_grid.h"
+#include "server/slam/known_grid/known_grid.h"
 #include "server/slam/landmarks/landmark.h"
 #include "server/slam/mapper_options.h"
 #include "server/slam/parallel_for.h"
@@ -92,6 +94,14 @@ class Mapper {
   // scan). From the next scan on it is not localized until it is found in its map: near that pose, or anywhere
   // (recovery/recovery.h). Nothing happens before there is a map.
   void Relocalise(const std::optional<Pose2>& T_map_robot);
+  // From now on the robot is only localised in this map: what it has mapped itself stays as it is, and nothing is
+  // added. `place_known`: its pose, or its start before the first scan, is one in this map; then it is looked for near
+  // there, otherwise everywhere. A later call replaces the map, and the next scans must show that the robot is where it
+  // was. Null: the robot maps again, from where it is, which must be known (FAILED_PRECONDITION).
+  Result<void> LocaliseIn(std::shared_ptr<const KnownGrid> map, bool place_known);
+  [[nodiscard]] bool localises() const;
+  // The epoch of the map in which it is localised; nothing if it maps.
+  [[nodiscard]] std::optional<std::uint32_t> known_map_epoch() const;
   // T_map_robot of every keyframe along the best path; empty while the robot's place in the map is not known.
   [[nodiscard]] std::vector<Pose2> BestPath() const;
 

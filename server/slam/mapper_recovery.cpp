@@ -61,6 +61,15 @@ void Mapper::State::LosePlace(bool odometry_goes_on) {
 
 // As Mapper::Relocalise.
 void Mapper::State::Relocalise(const std::optional<Pose2>& T_map_robot) {
+  if (localisation) {
+    if (T_map_robot) {
+      localisation->BeginWhereSaid(*T_map_robot);
+    } else {
+      localisation->Lose(false);
+    }
+    front_end.Restart();
+    return;
+  }
   if (!HasMap() || !last_scan) return;
   Recovery::Known known = LastKnown();
   if (T_map_robot) {
@@ -84,11 +93,8 @@ bool Mapper::State::StoodStill(const Scan& scan, const Pose2& T_odom_robot, cons
                    limits);
 }
 
-// Whether the robot has certainly driven on by itself during a short pause: the scan shows its position, this is where
-// odometry has taken it, and the scan agrees with the map there, or no worse than the last scan before the pause.
-bool Mapper::State::GoesOn(const Scan& scan, const std::vector<SurfacePoint>& points_robot, const Pose2& T_odom_robot,
-                           const TrackStep& step) const {
-  if (!HasMap() || recovery.active() || !options.front_end.use_odometry) return false;
+// Whether the scan shows the position after a short pause, and this is where odometry has taken the robot.
+bool Mapper::State::FollowsOdometry(const Scan& scan, const Pose2& T_odom_robot, const TrackStep& step) const {
   if (!last_scan || !step.matched || step.degenerate) return false;
   const RecoveryOptions& limits = options.recovery;
   const std::uint64_t pause_ns = NanosBetween(last_scan->scan->stamp, scan.stamp);
@@ -96,10 +102,26 @@ bool Mapper::State::GoesOn(const Scan& scan, const std::vector<SurfacePoint>& po
   const Pose2 odometry = Between(last_scan->T_odom_robot, T_odom_robot);
   const Pose2 error = Between(odometry, Between(last_scan->T_track_robot, step.T_track_robot));
   const double allowed_m = limits.as_odometry_m + limits.as_odometry_per_m * odometry.translation().norm();
-  if (error.translation().norm() > allowed_m || std::abs(error.theta) > limits.as_odometry_rad) return false;
+  return error.translation().norm() <= allowed_m && std::abs(error.theta) <= limits.as_odometry_rad;
+}
+
+// Whether the robot has certainly driven on by itself during a short pause: the scan shows its position, this is where
+// odometry has taken it, and the scan agrees with the map there, or no worse than the last scan before the pause.
+bool Mapper::State::GoesOn(const Scan& scan, const std::vector<SurfacePoint>& points_robot, const Pose2& T_odom_robot,
+                           const TrackStep& step) const {
+  if (!HasMap() || recovery.active() || !options.front_end.use_odometry) return false;
+  const PosePath path = believed_path();
+  const PathMap own_map(trail, path, options.recovery.place, options.self_check.near_m);
+  return FollowsOdometry(scan, T_odom_robot, step) &&
+         AgreesAsBefore(scan, points_robot, step, {recovery, own_map, T_map_track()});
+}
+
+// Whether the scan agrees with the map where the track leads, or no worse than the last scan.
+bool Mapper::State::AgreesAsBefore(const Scan& scan, const std::vector<SurfacePoint>& points_robot,
+                                   const TrackStep& step, const TrackInMap& track) const {
   using Agreement = PlaceSearch::Agreement;
   const auto agreement = [&](const Scan& one, const std::vector<SurfacePoint>& points, const Pose2& T_track_robot) {
-    return recovery.Compare(one, points, T_map_track() * T_track_robot, trail, believed_path());
+    return track.recovery.Compare(one, points, track.T_map_track * T_track_robot, track.map);
   };
   const Agreement now = agreement(scan, points_robot, step.T_track_robot);
   if (now != Agreement::kDoubtful) return now == Agreement::kAgrees;
@@ -141,8 +163,9 @@ ScanOutcome Mapper::State::Recover(Keyframe keyframe, ScanView view, TrackStep s
     if (keep) recovery.Hold({keyframe, step, blind.TakeCovariance()});
   }
   if (keep || first) {
-    const auto found =
-        recovery.Take({keyframe.scan, OdometryOrNone(T_odom_robot)}, step, view.points_robot, trail, believed_path());
+    const PosePath path = believed_path();
+    const auto found = recovery.Take({keyframe.scan, OdometryOrNone(T_odom_robot)}, step, view.points_robot,
+                                     PathMap(trail, path, options.recovery.place, options.self_check.near_m));
     if (found && found->on_path) return GoOnAlongPath(parallel_for);
     if (found) return GoOnAt(found->place, std::move(keyframe), std::move(view), step, parallel_for);
   }

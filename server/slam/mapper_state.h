@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "server/slam/drawing/map_drawing.h"
+#include "server/slam/known_grid/grid_localisation.h"
 #include "server/slam/loops/loop_search.h"
 #include "server/slam/loops/revisit_search.h"
 #include "server/slam/loops/self_check.h"
@@ -55,6 +56,15 @@ struct Mapper::State {
     return options.front_end.use_odometry ? T_odom_robot : level.T_odom_robot;
   }
   [[nodiscard]] bool StoodStill(const Scan& scan, const Pose2& T_odom_robot, const TrackStep& step) const;
+  [[nodiscard]] bool FollowsOdometry(const Scan& scan, const Pose2& T_odom_robot, const TrackStep& step) const;
+  // A map, and where the track lies in it.
+  struct TrackInMap {
+    const Recovery& recovery;
+    const SearchedMap& map;
+    Pose2 T_map_track;
+  };
+  [[nodiscard]] bool AgreesAsBefore(const Scan& scan, const std::vector<SurfacePoint>& points_robot,
+                                    const TrackStep& step, const TrackInMap& track) const;
   [[nodiscard]] bool GoesOn(const Scan& scan, const std::vector<SurfacePoint>& points_robot, const Pose2& T_odom_robot,
                             const TrackStep& step) const;
   [[nodiscard]] Pose2 T_map_track() const {
@@ -64,6 +74,14 @@ struct Mapper::State {
                        const ParallelFor& parallel_for);
   ScanOutcome Recover(Keyframe keyframe, ScanView view, TrackStep step, const ParallelFor& parallel_for);
   [[nodiscard]] ScanOutcome ReportRecovery(Stamp stamp, const Pose2& T_odom_robot, const Pose2& T_track_robot) const;
+  void LocaliseIn(std::shared_ptr<const KnownGrid> map, bool place_known);
+  Passage LocaliseAfter(Passage passage, bool tilted);
+  [[nodiscard]] ScanOutcome ReportLocalised(Stamp stamp, const Pose2& T_odom_robot,
+                                            const GridLocalisation::Place& place, double score) const;
+  Result<void> MapAgain();
+  ScanOutcome Localise(TrackedScan tracked, const Pose2& T_odom_robot, Passage passage,
+                       const ParallelFor& parallel_for);
+  [[nodiscard]] GridLocalisationOptions LocalisationOptions() const;
   ScanOutcome GoOnAlongPath(const ParallelFor& parallel_for);
   ScanOutcome GoOnAt(const FoundPlace& place, Keyframe keyframe, ScanView view, TrackStep step,
                      const ParallelFor& parallel_for);
@@ -93,6 +111,36 @@ struct Mapper::State {
   static void Members(Archive& archive, auto& self) {
     archive(self.recovery, self.trail, self.front_end, self.blind, self.speed, self.loops, self.self_check,
             self.drawing, self.level, self.last_scan, self.size_after_last_search);
+    if constexpr (Archive::kReads)
+      if (archive.format() < 8) return;
+    LocalisationMembers(archive, self);
+  }
+  template <typename Archive>
+  static void LocalisationMembers(Archive& archive, auto& self) {
+    bool localises = self.localisation.has_value();
+    archive(localises);
+    if (!localises || !archive.ok()) return;
+    KnownGrid::Source source;
+    if constexpr (!Archive::kReads) source = self.localisation->map()->source();
+    std::uint64_t count = source.tiles.size();
+    archive(source.resolution_m, source.epoch, count);
+    if constexpr (Archive::kReads) {
+      while (archive.ok() && source.tiles.size() < count) {
+        ChunkKey key;
+        std::shared_ptr<const TileCells> cells;
+        archive(key, cells);
+        archive.RequireThat([&] { return cells != nullptr && source.tiles.emplace(key, cells).second; },
+                            "the tiles of a known map");
+      }
+      if (!archive.RequireThat([&] { return KnownGrid::IsBounded(source); }, "the extent of a known map")) return;
+      self.localisation.emplace(self.LocalisationOptions());
+      self.localisation->Begin(std::make_shared<const KnownGrid>(std::move(source), self.options.recovery.place,
+                                                                 self.options.self_check.near_m),
+                               {}, false);
+    } else {
+      for (const auto& [key, cells] : source.tiles) archive(key, cells);
+    }
+    archive(*self.localisation);
   }
 
   // The last scan that was reported as part of the path and was not tilted.
@@ -136,7 +184,8 @@ struct Mapper::State {
   MapDrawing drawing;
   LevelScan level;
   std::optional<LastScan> last_scan;
-  std::uint64_t size_after_last_search = 0;  // Number of keyframes left after RetireKeyframes looked last.
+  std::optional<GridLocalisation> localisation;  // Of a robot that does not map now.
+  std::uint64_t size_after_last_search = 0;      // Number of keyframes left after RetireKeyframes looked last.
 };
 
 }  // namespace cairn::slam

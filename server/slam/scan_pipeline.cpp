@@ -53,9 +53,9 @@ Result<void> ScanPipeline::Load(std::string_view bytes) {
 
 Result<std::vector<std::shared_ptr<const void>>> ScanPipeline::LoadPieces(std::string_view main,
                                                                           std::span<const std::string_view> pieces) {
-  const Result<std::string_view> state = OpenCheckpoint(main, options_);
-  if (!state) return tl::unexpected(state.error());
-  StateReader archive(*state, pieces);
+  const Result<OpenedCheckpoint> opened = OpenCheckpoint(main, options_);
+  if (!opened) return tl::unexpected(opened.error());
+  StateReader archive(opened->state, pieces, opened->format);
   Mapper mapper(options_, {}, 0);
   mapper.Load(archive);
   // The pairing is read twice, at first into one that is not used, so that a failure changes nothing.

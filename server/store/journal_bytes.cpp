@@ -59,6 +59,20 @@ void FillEntry(record::Entry& to, const RelocaliseTaken& from) {
   if (from.T_map_robot) Fill(*relocalise.mutable_t_map_robot(), *from.T_map_robot);
 }
 
+void FillEntry(record::Entry& to, const LocaliseTaken& from) {
+  record::Localise& localise = *to.mutable_localise();
+  for (const auto& tile : from.tiles) {
+    record::Localise::Tile& added = *localise.add_tiles();
+    added.set_x(tile->key.x);
+    added.set_y(tile->key.y);
+    added.set_encoding(static_cast<std::uint32_t>(tile->encoding));
+    added.set_cells(tile->bytes.data(), tile->bytes.size());
+  }
+  localise.set_resolution_m(from.resolution_m);
+  localise.set_epoch(from.epoch);
+  localise.set_maps_again(from.maps_again);
+}
+
 void FillEntry(record::Entry& to, const StartRefusal& from) {
   to.mutable_start_refusal()->set_why(from.why);
 }
@@ -108,6 +122,20 @@ Result<JournalEntry> RelocaliseOf(const record::Relocalise& from) {
   return RelocaliseTaken{T_map_robot};
 }
 
+// Whether the tiles can be read, and lie where a robot can be localised, is looked at by the estimator.
+Result<JournalEntry> LocaliseOf(const record::Localise& from) {
+  LocaliseTaken taken{from.maps_again(), {}, from.resolution_m(), from.epoch()};
+  for (const record::Localise::Tile& tile : from.tiles()) {
+    if (tile.encoding() > static_cast<std::uint32_t>(TileEncoding::kPng)) return Unreadable("a tile");
+    auto added = std::make_shared<Tile>();
+    added->key = {0, tile.x(), tile.y()};
+    added->encoding = static_cast<TileEncoding>(tile.encoding());
+    added->bytes.assign(tile.cells().begin(), tile.cells().end());
+    taken.tiles.push_back(std::move(added));
+  }
+  return taken;
+}
+
 Result<JournalEntry> EntryOf(const record::Entry& from) {
   switch (from.content_case()) {
     case record::Entry::kScan:
@@ -128,6 +156,8 @@ Result<JournalEntry> EntryOf(const record::Entry& from) {
       return EpochChanged{from.epoch().epoch()};
     case record::Entry::kRelocalise:
       return RelocaliseOf(from.relocalise());
+    case record::Entry::kLocalise:
+      return LocaliseOf(from.localise());
     case record::Entry::kStartRefusal:
       return StartRefusal{from.start_refusal().why()};
     case record::Entry::kFinish:

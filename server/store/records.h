@@ -14,6 +14,7 @@
 #include <variant>
 #include <vector>
 
+#include "common/map/tile.h"
 #include "common/sensor/trajectory.h"
 #include "common/service/job.h"
 #include "common/service/ledger.h"
@@ -74,6 +75,14 @@ struct EpochChanged {
 struct RelocaliseTaken {
   std::optional<Pose2> T_map_robot;
 };
+// The robot is only localised from now on, in this map: the tiles of level 0 as the site has published them, and the
+// epoch of the map. Or it `maps_again`.
+struct LocaliseTaken {
+  bool maps_again = false;
+  std::vector<std::shared_ptr<const Tile>> tiles;
+  double resolution_m = 0.0;
+  std::uint32_t epoch = 0;
+};
 // The robot is not where it was said to start: from now on it is a fragment.
 struct StartRefusal {
   std::string why;
@@ -83,7 +92,7 @@ struct SessionFinished {
   Status status;
 };
 using JournalEntry = std::variant<ScanTaken, ScanRefused, OdometryTaken, OwnerChanged, CorrectionTaken, EpochChanged,
-                                  RelocaliseTaken, StartRefusal, SessionFinished>;
+                                  RelocaliseTaken, LocaliseTaken, StartRefusal, SessionFinished>;
 
 struct StoredSession {
   std::uint64_t id = 0;

@@ -86,6 +86,12 @@ class Merge {
             changed = true;
             relocalise->T_map_robot = T_into_from_ * *relocalise->T_map_robot;
           }
+          const auto* const localise = std::get_if<LocaliseTaken>(&entry);
+          if (localise != nullptr && !localise->maps_again && moves) {
+            return Fail(StatusCode::kFailedPrecondition,
+                        "session " + std::to_string(id) +
+                            " was only localised in the map of its site; such a session cannot be moved");
+          }
           auto* const correction = std::get_if<CorrectionTaken>(&entry);
           if (correction == nullptr) continue;
           changed = true;

@@ -37,6 +37,8 @@ inline std::vector<server::JournalEntry> SmallJournal() {
           testing::SampleOdometry(3),
           CorrectionTaken{4, 5, {.keyframes = 1, .chunks = {}}},
           RelocaliseTaken{Pose2{1.0, 2.0, 3.0}},
+          LocaliseTaken{false, {testing::SampleTile()}, 0.05, 3},
+          LocaliseTaken{true, {}, 0.0, 0},
           StartRefusal{"it is elsewhere"},
           SessionFinished{true, {StatusCode::kUnavailable, "gone"}}};
 }

@@ -1,9 +1,9 @@
-// Finds the robot in the map that it has made itself, without knowing anything of where it is: after scans are missing
-// and odometry does not tell how the robot moved meanwhile, or after somebody carried it. The last scans are compared
-// with all surfaces of the path. A place is found only if no other place fits nearly as well, if most of the scans is
-// explained, and if no surface lies where beams passed. Where rooms look alike there is no such place. It prefers
-// finding nothing to finding a wrong place, but it can confuse a place that the map does not show with one that it
-// shows and that looks the same. Frames: surfaces in `map`; recent scans in any frame that is smooth over their
+// Finds the robot in a map, mostly the one that it has made itself, without knowing anything of where it is: after
+// scans are missing and odometry does not tell how the robot moved meanwhile, or after somebody carried it. The last
+// scans are compared with all surfaces of the map. A place is found only if no other place fits nearly as well, if most
+// of the scans is explained, and if no surface lies where beams passed. Where rooms look alike there is no such place.
+// It prefers finding nothing to finding a wrong place, but it can confuse a place that the map does not show with one
+// that it shows and that looks the same. Frames: surfaces in `map`; recent scans in any frame that is smooth over their
 // stretch. Not thread-safe. Deterministic. Source: as LoopSearch (loop_search.h), over the whole map at once;
 // visibility.h.
 #pragma once
@@ -16,10 +16,8 @@
 #include "server/slam/loops/loop_search.h"
 #include "server/slam/loops/self_check.h"
 #include "server/slam/loops/unique_pose.h"
-#include "server/slam/matching/point_index.h"
 #include "server/slam/recovery/recovery_options.h"
-#include "server/slam/trail/pose_path.h"
-#include "server/slam/trail/trail.h"
+#include "server/slam/recovery/searched_map.h"
 
 namespace cairn::slam {
 
@@ -48,54 +46,42 @@ class PlaceSearch {
   PlaceSearch(const PlaceSearchOptions& options, const LoopOptions& loop, const SelfCheckOptions& check,
               const PointToLineOptions& align);
 
-  // The place of the last of the scans, which are in the order of time. `path` is the believed path, one pose
-  // T_map_robot per keyframe. REQUIRES: neither the trail nor the path changes between two calls, unless Forget is
-  // called.
-  [[nodiscard]] std::optional<FoundPlace> Find(const Trail& trail, const PosePath& path,
-                                               std::span<const RecentScan> recent);
-  // The same, in the part of the map around a pose where the last of the scans is believed to be.
-  [[nodiscard]] std::optional<FoundPlace> FindNear(const Trail& trail, const PosePath& path,
-                                                   std::span<const RecentScan> recent, const Pose2& T_map_robot);
-  void Forget() { map_.reset(); }
+  // The place of the last of the scans, which are in the order of time. REQUIRES: the map does not change between two
+  // calls, unless Forget is called.
+  [[nodiscard]] std::optional<FoundPlace> Find(const SearchedMap& map, std::span<const RecentScan> recent);
+  // The same, in the part of the map around a pose where the last of the scans is believed to be: within
+  // PlaceSearchOptions::near_m and near_rad, or farther.
+  [[nodiscard]] std::optional<FoundPlace> FindNear(const SearchedMap& map, std::span<const RecentScan> recent,
+                                                   const Pose2& T_map_robot, double reach_m = 0.0,
+                                                   double reach_rad = 0.0);
+  void Forget() { index_.reset(); }
   // How well the surfaces of these scans fit, with the last of them at this pose and as seen best with a search of some
   // cells around it, 0..1. REQUIRES: as Find.
-  [[nodiscard]] double ScoreAt(const Trail& trail, const PosePath& path, std::span<const RecentScan> recent,
-                               const Pose2& T_map_robot);
+  [[nodiscard]] double ScoreAt(const SearchedMap& map, std::span<const RecentScan> recent, const Pose2& T_map_robot);
   // Whether they fit with more than `score` anywhere else, or may do so, because the search had to be given up.
-  [[nodiscard]] bool FitsElsewhere(const Trail& trail, const PosePath& path, std::span<const RecentScan> recent,
-                                   const Pose2& T_map_robot, double score);
+  [[nodiscard]] bool FitsElsewhere(const SearchedMap& map, std::span<const RecentScan> recent, const Pose2& T_map_robot,
+                                   double score);
 
   // How a scan at this pose agrees with old keyframes near it.
   enum class Agreement { kNothingNear, kAgrees, kDoubtful, kContradicts };
-  [[nodiscard]] Agreement Compare(const Trail& trail, const PosePath& path, const Scan& scan,
+  [[nodiscard]] Agreement Compare(const SearchedMap& map, const Scan& scan,
                                   const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const;
 
  private:
-  [[nodiscard]] VisibilityCounts Visible(const Trail& trail, const PosePath& path, const Scan& scan,
-                                         const std::vector<SurfacePoint>& points_robot, const Pose2& T_map_robot) const;
-  struct Map {
-    Map(std::vector<SurfacePoint> surfaces, double cell_scale);
-    std::vector<SurfacePoint> surfaces;
-    LikelihoodPyramid pyramid;
-    PointIndex index;
-    SearchWindow window;  // All of the map, in every heading.
-  };
   // The pose near this one at which everything fits.
-  [[nodiscard]] std::optional<FoundPlace> Fit(const Trail& trail, const PosePath& path,
-                                              std::span<const RecentScan> recent,
+  [[nodiscard]] std::optional<FoundPlace> Fit(const SearchedMap& map, std::span<const RecentScan> recent,
                                               const std::vector<SurfacePoint>& surfaces, const Pose2& T_map_robot,
                                               const Eigen::Matrix3d& covariance) const;
   // Over all of the map if there is no window.
-  [[nodiscard]] std::optional<FoundPlace> FindWithin(const SearchWindow* window, const Trail& trail,
-                                                     const PosePath& path, std::span<const RecentScan> recent);
-  const Map& MapOf(const Trail& trail, const PosePath& path);
-  [[nodiscard]] std::vector<SurfacePoint> SurfacesOfMap(const Trail& trail, const PosePath& path) const;
+  [[nodiscard]] std::optional<FoundPlace> FindWithin(const SearchWindow* window, const SearchedMap& map,
+                                                     std::span<const RecentScan> recent);
+  const IndexedSurfaces& IndexOf(const SearchedMap& map);
 
   PlaceSearchOptions options_;
   LoopOptions loop_;
   SelfCheckOptions check_;
   PointToLineOptions align_;
-  std::shared_ptr<const Map> map_;  // Made at the first search.
+  std::shared_ptr<const IndexedSurfaces> index_;  // Asked for at the first search.
 };
 
 }  // namespace cairn::slam

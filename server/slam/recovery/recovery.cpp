@@ -12,6 +12,13 @@ constexpr std::size_t kMaxRecent = 120;  // Scans that are kept: turning on the 
 constexpr std::size_t kMaxHeld = 60;  // Keyframes that may be added to the path at once: bounds the time of one scan.
 constexpr double kUnknownM = 1000.0;  // Standard deviation of a place that is not known.
 constexpr double kNever = -1.0;       // No search yet.
+constexpr double kSigmas = 3.0;       // The search near a pose reaches so far, in standard deviations.
+// Of a robot that has been followed: how the doubt grows with the way, how far from the track it is looked for at most,
+// and how often everywhere.
+constexpr double kDriftPerM = 0.01;
+constexpr double kDriftRadPerM = 0.0005;
+constexpr double kFarthestM = 10.0;
+constexpr double kEverywhereEveryM = 4.0;
 
 }  // namespace
 
@@ -27,6 +34,11 @@ void Recovery::BeginWhereSaid(const Known& known) {
   said_ = true;
 }
 
+void Recovery::BeginNear(const Known& known, const Pose2& T_map_track) {
+  BeginOnPath(known, T_map_track);
+  said_ = true;
+}
+
 void Recovery::BeginOnPath(const Known& known, const Pose2& T_map_track) {
   Begin(known, true);
   T_map_track_ = T_map_track;
@@ -37,8 +49,7 @@ void Recovery::Move(const Pose2& T_new_old) {
   known_.T_map_robot = T_new_old * known_.T_map_robot;
   known_.covariance = J * known_.covariance * J.transpose();
   if (T_map_track_) T_map_track_ = T_new_old * *T_map_track_;
-  unconfirmed_.clear();  // They may lie at other places of the map, which have moved otherwise.
-  search_.Forget();
+  ForgetMap();  // What is unconfirmed may lie at other places of the map, which have moved otherwise.
 }
 
 void Recovery::End() {
@@ -79,25 +90,41 @@ void Recovery::Append(const Keyframe& keyframe, const TrackStep& step, std::vect
 }
 
 std::optional<Recovery::Found> Recovery::Take(const Keyframe& keyframe, const TrackStep& step,
-                                              std::vector<SurfacePoint> points_robot, const Trail& trail,
-                                              const PosePath& path) {
+                                              std::vector<SurfacePoint> points_robot, const SearchedMap& map) {
   Append(keyframe, step, std::move(points_robot));
   const Pose2 T_map_robot = BeliefAt(keyframe.T_odom_robot, step.T_track_robot).T_map_robot;
-  contradicted_ = search_.Compare(trail, path, *recent_.back().scan, recent_.back().points, T_map_robot) ==
+  contradicted_ = search_.Compare(map, *recent_.back().scan, recent_.back().points, T_map_robot) ==
                   PlaceSearch::Agreement::kContradicts;
-  if (contradicted_) LeavePath();
+  const bool followed = said_ && T_map_track_.has_value();
+  if (contradicted_ && !followed) LeavePath();
   if (said_) {
-    if (const auto place = search_.FindNear(trail, path, recent_, T_map_robot)) return Found{*place, false};
+    const auto [reach_m, reach_rad] = followed ? ReachOfTrack() : std::pair(0.0, 0.0);
+    const auto place = search_.FindNear(map, recent_, T_map_robot, reach_m, reach_rad);
+    // Farther from where the track leads, one search is no proof.
+    if (place && (!followed || IsNear(T_map_robot, place->T_map_robot) || IsConfirmed(place->T_map_robot)))
+      return Found{*place, false};
   }
   const double travelled_m = recent_.back().travelled_m;
-  if (searched_at_m_ != kNever && travelled_m - searched_at_m_ < loop_.every_m) return std::nullopt;
+  const double every_m = followed ? kEverywhereEveryM : loop_.every_m;
+  if (searched_at_m_ == kNever && followed) searched_at_m_ = travelled_m;
+  if (searched_at_m_ != kNever && travelled_m - searched_at_m_ < every_m) return std::nullopt;
   searched_at_m_ = travelled_m;
-  const auto place = search_.Find(trail, path, recent_);
+  const auto place = search_.Find(map, recent_);
   if (!place || !IsConfirmed(place->T_map_robot)) return std::nullopt;
-  const Pose2 error = Between(T_map_robot, place->T_map_robot);
-  const bool on_path =
-      T_map_track_ && error.translation().norm() < options_.on_path_m && std::abs(error.theta) < options_.on_path_rad;
-  return Found{*place, on_path};
+  return Found{*place, T_map_track_ && IsNear(T_map_robot, place->T_map_robot)};
+}
+
+bool Recovery::IsNear(const Pose2& T_map_believed, const Pose2& T_map_found) const {
+  const Pose2 error = Between(T_map_believed, T_map_found);
+  return error.translation().norm() < options_.on_path_m && std::abs(error.theta) < options_.on_path_rad;
+}
+
+// How far from where the track leads the robot may be.
+std::pair<double, double> Recovery::ReachOfTrack() const {
+  const double way_m = recent_.back().travelled_m;
+  const double sigma_m = std::sqrt(known_.covariance.diagonal().head<2>().maxCoeff()) + kDriftPerM * way_m;
+  const double sigma_rad = std::sqrt(known_.covariance(2, 2)) + kDriftRadPerM * way_m;
+  return {std::min(kSigmas * sigma_m, kFarthestM), kSigmas * sigma_rad};
 }
 
 // All places found within kConfirmWithinM of way must agree.

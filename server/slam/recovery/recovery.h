@@ -5,6 +5,9 @@
 //    added to the path as if there had been no pause, if the place found is that one (`on_path`).
 //  - Otherwise its pose is carried on by odometry where there is any, and the path goes on at the place found.
 //  - Where somebody has said where the robot is, one search near there that finds it is enough (`BeginWhereSaid`).
+//  - A robot that has been followed in the map of others, with too much doubt (`BeginNear`), is found by one search
+//  where
+//    the track leads, and elsewhere by two that agree, like all others.
 // Frames: `track` is that of the front-end. Not thread-safe. Deterministic.
 #pragma once
 
@@ -71,11 +74,19 @@ class Recovery {
   void Begin(const Known& known, bool odometry_goes_on);
   // Somebody says that the robot is at `known.T_map_robot`.
   void BeginWhereSaid(const Known& known);
+  // The robot has been followed on, but with too much doubt: it is looked for within that doubt around where the track
+  // leads, and only now and then everywhere.
+  void BeginNear(const Known& known, const Pose2& T_map_track);
   // The next scans continue the path: `T_map_track` is its pose in the map.
   void BeginOnPath(const Known& known, const Pose2& T_map_track);
   [[nodiscard]] bool on_path() const { return T_map_track_.has_value(); }
   // The map has moved by this where the robot was last.
   void Move(const Pose2& T_new_old);
+  // The map is another one now.
+  void ForgetMap() {
+    unconfirmed_.clear();
+    search_.Forget();
+  }
   // The odometry has begun anew.
   void OdometryBeganAnew() { odometry_goes_on_ = false; }
   void End();
@@ -93,13 +104,11 @@ class Recovery {
 
   // Takes a scan, and searches. Returns the robot's place once it is confirmed.
   [[nodiscard]] std::optional<Found> Take(const Keyframe& keyframe, const TrackStep& step,
-                                          std::vector<SurfacePoint> points_robot, const Trail& trail,
-                                          const PosePath& path);
+                                          std::vector<SurfacePoint> points_robot, const SearchedMap& map);
   // How a scan at this pose agrees with what earlier scans have shown there.
   [[nodiscard]] PlaceSearch::Agreement Compare(const Scan& scan, const std::vector<SurfacePoint>& points_robot,
-                                               const Pose2& T_map_robot, const Trail& trail,
-                                               const PosePath& path) const {
-    return search_.Compare(trail, path, scan, points_robot, T_map_robot);
+                                               const Pose2& T_map_robot, const SearchedMap& map) const {
+    return search_.Compare(map, scan, points_robot, T_map_robot);
   }
   [[nodiscard]] Belief BeliefAt(const Pose2& T_odom_robot, const Pose2& T_track_robot) const;
 
@@ -128,6 +137,8 @@ class Recovery {
   [[nodiscard]] Pose2 FromLast(const Pose2& T_track_robot) const;
   void Append(const Keyframe& keyframe, const TrackStep& step, std::vector<SurfacePoint> points_robot);
   void LeavePath();
+  [[nodiscard]] std::pair<double, double> ReachOfTrack() const;
+  [[nodiscard]] bool IsNear(const Pose2& T_map_believed, const Pose2& T_map_found) const;
   [[nodiscard]] bool IsConfirmed(const Pose2& T_map_robot);
   [[nodiscard]] bool Agree(const Candidate& earlier, const Pose2& T_map_robot) const;
 
@@ -139,7 +150,7 @@ class Recovery {
   double lost_after_m_;
   bool active_ = false;
   bool odometry_goes_on_ = false;
-  bool said_ = false;          // `known_` is where somebody says that the robot is.
+  bool said_ = false;          // `known_` is where somebody says that the robot is, or where it has been followed to.
   bool contradicted_ = false;  // The last scan does not fit where the robot is believed to be.
   Known known_;
   std::optional<Pose2> T_map_track_;  // While the scans continue the path.

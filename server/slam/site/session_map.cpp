@@ -26,6 +26,8 @@ SessionMap::SessionMap(const MapperSnapshot& snapshot, std::vector<Pose2> own_pa
     : relations_(snapshot.relations.empty() ? StepsAlong(own_path, options.drift) : snapshot.relations),
       own_path_(std::move(own_path)),
       trail_(MotionNoise{}, options.surface),
+      place_(options.place),
+      near_m_(options.self_check.near_m),
       places_(options.place, options.loop, options.self_check, options.align) {
   for (std::size_t k = 0; k < own_path_.size(); ++k) {
     const Scan scan = *snapshot.keyframes[k].scan;
@@ -45,7 +47,7 @@ std::vector<RecentScan> SessionMap::ScansAround(std::size_t keyframe, double way
 }
 
 std::optional<FoundPlace> SessionMap::Find(std::span<const RecentScan> scans) {
-  return places_.Find(trail_, shared_own_path_, scans);
+  return places_.Find(map(), scans);
 }
 
 std::size_t SessionMap::NearestTo(const Pose2& T_own_robot) const {

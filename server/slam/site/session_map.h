@@ -51,10 +51,10 @@ class SessionMap {
   [[nodiscard]] std::optional<FoundPlace> Find(std::span<const RecentScan> scans);
   // The same as PlaceSearch, in `own`.
   [[nodiscard]] double ScoreAt(std::span<const RecentScan> scans, const Pose2& T_own_robot) {
-    return places_.ScoreAt(trail_, shared_own_path_, scans, T_own_robot);
+    return places_.ScoreAt(map(), scans, T_own_robot);
   }
   [[nodiscard]] bool FitsElsewhere(std::span<const RecentScan> scans, const Pose2& T_own_robot, double score) {
-    return places_.FitsElsewhere(trail_, shared_own_path_, scans, T_own_robot, score);
+    return places_.FitsElsewhere(map(), scans, T_own_robot, score);
   }
   // The localized keyframe nearest to a pose in `own`. REQUIRES: there is one.
   [[nodiscard]] std::size_t NearestTo(const Pose2& T_own_robot) const;
@@ -62,10 +62,14 @@ class SessionMap {
   void ForgetPlaces() { places_.Forget(); }
 
  private:
+  [[nodiscard]] PathMap map() const { return {trail_, shared_own_path_, place_, near_m_}; }
+
   std::vector<PoseRelation> relations_;
   std::vector<Pose2> own_path_;
   PosePath shared_own_path_;  // The same poses.
   Trail trail_;
+  PlaceSearchOptions place_;
+  double near_m_;
   PlaceSearch places_;
 };
 

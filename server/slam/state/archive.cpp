@@ -78,7 +78,8 @@ std::vector<std::shared_ptr<const void>> StateReader::values() const {
   return values;
 }
 
-StateReader::StateReader(std::string_view bytes, std::span<const std::string_view> pieces) : rest_(bytes) {
+StateReader::StateReader(std::string_view bytes, std::span<const std::string_view> pieces, std::uint32_t format)
+    : rest_(bytes), format_(format) {
   const auto part = [this] {
     std::uint64_t size = 0;
     Get(size);

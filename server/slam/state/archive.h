@@ -69,6 +69,10 @@ Later(T&) -> Later<T>;
 template <typename T>
 inline constexpr char kKindOf = 0;
 
+// The version of what is written; it grows when the members of a class change. A reader is told which version it reads,
+// so that a class that has got a member later can leave it as it is.
+inline constexpr std::uint32_t kStateFormat = 8;
+
 class StateWriter;
 
 // An immutable value that a state shares. Bytes may be called from any thread.
@@ -208,7 +212,9 @@ class StateReader {
 
   // `bytes` are the result of StateWriter::Bytes, or of Main with the bytes of the pieces in their order, or anything
   // else; they must outlive the reader.
-  explicit StateReader(std::string_view bytes, std::span<const std::string_view> pieces = {});
+  explicit StateReader(std::string_view bytes, std::span<const std::string_view> pieces = {},
+                       std::uint32_t format = kStateFormat);
+  [[nodiscard]] std::uint32_t format() const { return format_; }
 
   template <typename... Values>
   void operator()(Values&... values) {
@@ -360,6 +366,7 @@ class StateReader {
   std::vector<NodeRead> nodes_;
   std::vector<Immutable> immutable_;  // Those in `bytes`, then the pieces.
   std::size_t first_piece_ = 0;
+  std::uint32_t format_;
 };
 
 }  // namespace cairn::slam

@@ -301,6 +301,10 @@ void FakeServer::OnRequest(Request&& request) {
       break;
     case RequestKind::kSessionEnd:
       break;
+    case RequestKind::kLocalise:
+    case RequestKind::kMap:
+      if (request.robot != "robot1") reply.status = {StatusCode::kNotFound, "no robot " + request.robot};
+      break;
     case RequestKind::kRelocalise:
       if (request.T_map_robot != Pose2{1.5, -2.0, kPi / 2})
         reply.status = {StatusCode::kFailedPrecondition, "another pose was expected"};

@@ -37,6 +37,10 @@ TEST_F(QueryClientTest, AsksEveryKindOfQuestion) {
   EXPECT_TRUE(client_->EndSession("r1"));
   EXPECT_TRUE(client_->Relocalise("r1", Pose2{1.5, -2.0, kPi / 2}));
   EXPECT_FALSE(client_->Relocalise("r1"));
+  EXPECT_TRUE(client_->Localise("robot1"));
+  EXPECT_TRUE(client_->MapAgain("robot1"));
+  EXPECT_EQ(client_->Localise("robot9").error().code, StatusCode::kNotFound);
+  EXPECT_EQ(client_->MapAgain("robot9").error().code, StatusCode::kNotFound);
 }
 
 TEST_F(QueryClientTest, PutsThePartsOfAnAnswerTogether) {

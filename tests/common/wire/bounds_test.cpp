@@ -83,7 +83,7 @@ TEST(Bounds, RefuseUnknownEnumValues) {
   job.state(static_cast<v1::JobState>(5));
   ExpectRefused(job, "state");
   v1::Request request = ToWire(ExtremeRequest());
-  request.kind(static_cast<v1::RequestKind>(19));
+  request.kind(static_cast<v1::RequestKind>(21));
   ExpectRefused(request, "kind");
   request = ToWire(ExtremeRequest());
   request.job_kind(static_cast<v1::JobKind>(77));

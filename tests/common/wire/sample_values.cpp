@@ -214,7 +214,7 @@ Request ExtremeRequest() {
   Request value;
   value.client = kMax64;
   value.sequence = kMin64;
-  value.kind = RequestKind::kRelocalise;
+  value.kind = RequestKind::kMap;
   value.site = Name('s');
   value.robot = Name('r');
   value.latest = false;

@@ -53,6 +53,13 @@ inline StoredGrid SampleGrid(int seed) {
   return grid;
 }
 
+inline std::shared_ptr<const Tile> SampleTile() {
+  Tile tile;
+  tile.key = {0, -1, 2};
+  tile.bytes = EncodeCells(TileCells{}, tile.encoding);
+  return std::make_shared<const Tile>(std::move(tile));
+}
+
 inline std::vector<JournalEntry> OneOfEach() {
   return {OwnerChanged{77, 78, {"laser", "rear"}},
           SampleScan(1),
@@ -62,6 +69,8 @@ inline std::vector<JournalEntry> OneOfEach() {
           EpochChanged{7},
           RelocaliseTaken{Pose2{1.5, -2.0, 0.5}},
           RelocaliseTaken{},
+          LocaliseTaken{false, {SampleTile()}, 0.05, 3},
+          LocaliseTaken{true, {}, 0.0, 0},
           StartRefusal{"it is elsewhere"},
           SessionFinished{true, {StatusCode::kUnavailable, "gone"}}};
 }

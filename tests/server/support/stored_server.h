@@ -77,8 +77,8 @@ inline bool SamePath(const Trajectory& a, const Trajectory& b) {
          });
 }
 
-inline std::uint64_t DurableScans(WholeServer& house) {
-  const Reply status = house.Ask(About(RequestKind::kStatus));
+inline std::uint64_t DurableScans(WholeServer& house, const std::string& robot = "r1") {
+  const Reply status = house.Ask(About(RequestKind::kStatus, robot));
   return status.robots.empty() || status.robots[0].ledgers.empty() ? 0 : status.robots[0].ledgers[0].durable_through;
 }
 

@@ -53,6 +53,8 @@ struct Map {
     path.Append(T_map_robot);
   }
   std::mt19937_64 rng{5};
+  const PlaceSearchOptions options;
+  const PathMap searched{trail, path, options, SelfCheckOptions{}.near_m};
 };
 
 const Map& MapOfHall() {
@@ -86,7 +88,7 @@ PlaceSearch Search() {
 TEST(PlaceSearch, FindsWhereTheRobotIsInTheWholeMap) {
   PlaceSearch search = Search();
   for (const double from_m : {8.0, 25.0}) {
-    const auto found = search.Find(MapOfHall().trail, MapOfHall().path, Stretch(Hall(), from_m));
+    const auto found = search.Find(MapOfHall().searched, Stretch(Hall(), from_m));
     ASSERT_TRUE(found) << from_m;
     EXPECT_NEAR(found->T_map_robot.x, from_m + 11.75, 0.05);
     EXPECT_NEAR(found->T_map_robot.y, 0.0, 0.05);
@@ -99,15 +101,15 @@ TEST(PlaceSearch, FindsWhereTheRobotIsInTheWholeMap) {
 
 TEST(PlaceSearch, APlaceWithoutAMapOrInAnotherWorldIsNotFound) {
   PlaceSearch search = Search();
-  EXPECT_FALSE(search.Find(MapOfHall().trail, MapOfHall().path, {}));
-  EXPECT_FALSE(search.Find(MapOfHall().trail, MapOfHall().path, Stretch(Hall(4), 8.0)));
+  EXPECT_FALSE(search.Find(MapOfHall().searched, {}));
+  EXPECT_FALSE(search.Find(MapOfHall().searched, Stretch(Hall(4), 8.0)));
 }
 
 TEST(PlaceSearch, WhereRoomsLookAlikeNoneOfThemIsFound) {
   const test::World world = test::RingOfEqualRooms();
   const Map map(world, 0.0, 30.0);
   PlaceSearch search = Search();
-  EXPECT_FALSE(search.Find(map.trail, map.path, Stretch(world, 12.0)));
+  EXPECT_FALSE(search.Find(map.searched, Stretch(world, 12.0)));
 }
 
 // Everything else fits, but beams pass where the map shows a wall.
@@ -116,8 +118,8 @@ TEST(PlaceSearch, APlaceThatTheScansContradictIsNotFound) {
   before.Add({{12.0, -1.0}, {18.0, -1.0}});  // A wall that is gone now.
   const Map map(before);
   PlaceSearch search = Search();
-  EXPECT_TRUE(search.Find(map.trail, map.path, Stretch(before, 8.0)));
-  EXPECT_FALSE(search.Find(map.trail, map.path, Stretch(Hall(), 8.0)));
+  EXPECT_TRUE(search.Find(map.searched, Stretch(before, 8.0)));
+  EXPECT_FALSE(search.Find(map.searched, Stretch(Hall(), 8.0)));
 }
 
 // Keyframes whose place is not known are no part of the map.
@@ -125,7 +127,7 @@ TEST(PlaceSearch, KeyframesThatAreNotLocalizedDoNotCount) {
   Map map(Hall(), 30.0);
   for (double x = 4.0; x < 22.0; x += 0.25) map.Add(Hall(), {x, 0, 0}, {x, 3.0, 0.0}, false);
   PlaceSearch search = Search();
-  EXPECT_FALSE(search.Find(map.trail, map.path, Stretch(Hall(), 9.0)));
+  EXPECT_FALSE(search.Find(map.searched, Stretch(Hall(), 9.0)));
 }
 
 TEST(PlaceSearch, AScanAgreesWithTheMapContradictsItOrSeesNothingOfIt) {
@@ -134,7 +136,7 @@ TEST(PlaceSearch, AScanAgreesWithTheMapContradictsItOrSeesNothingOfIt) {
   const RecentScan scan = ScanAt(Hall(), {12, 0, 0}, {}, 0.0, rng);
   const PlaceSearch search = Search();
   const auto at = [&](const Pose2& T_map_robot) {
-    return search.Compare(MapOfHall().trail, MapOfHall().path, *scan.scan, scan.points, T_map_robot);
+    return search.Compare(MapOfHall().searched, *scan.scan, scan.points, T_map_robot);
   };
   EXPECT_EQ(at({12, 0, 0}), Agreement::kAgrees);
   EXPECT_EQ(at({12, 0.05, 0.01}), Agreement::kAgrees);
@@ -161,8 +163,7 @@ class Lost : public ::testing::Test {
     TrackStep step;
     step.T_track_robot = scan.T_track_robot;
     step.matched = true;
-    return recovery.Take({scan.scan, KnownAt(0).T_odom_robot * odometry}, step, scan.points, MapOfHall().trail,
-                         MapOfHall().path);
+    return recovery.Take({scan.scan, KnownAt(0).T_odom_robot * odometry}, step, scan.points, MapOfHall().searched);
   }
 
   const test::World world_ = Hall();
@@ -209,8 +210,7 @@ TEST_F(Lost, AScanThatContradictsTheMapTakesTheRobotOffItsPath) {
     TrackStep step;
     step.matched = true;
     step.T_track_robot = T_track_world_ * Pose2{10, 0, 0};
-    EXPECT_FALSE(
-        recovery.Take({scan.scan, KnownAt(10).T_odom_robot}, step, scan.points, MapOfHall().trail, MapOfHall().path));
+    EXPECT_FALSE(recovery.Take({scan.scan, KnownAt(10).T_odom_robot}, step, scan.points, MapOfHall().searched));
     EXPECT_EQ(recovery.on_path(), !moved);
     EXPECT_EQ(recovery.BeliefAt(KnownAt(10).T_odom_robot, step.T_track_robot).reason,
               moved ? PoseReason::kLost : PoseReason::kOdometryOnly);
@@ -260,7 +260,7 @@ TEST_F(Lost, KeepsABoundedNumberOfScans) {
     for (int i = 0; i < scans; ++i) {
       const RecentScan scan = ScanAt(world_, {60, 60, 0}, {}, 0.0, rng_);
       TrackStep step;
-      static_cast<void>(recovery.Take({scan.scan, {}}, step, scan.points, MapOfHall().trail, MapOfHall().path));
+      static_cast<void>(recovery.Take({scan.scan, {}}, step, scan.points, MapOfHall().searched));
     }
     StateWriter writer;
     writer(recovery);

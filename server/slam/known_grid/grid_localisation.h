@@ -1,0 +1,132 @@
+// Follows a robot in a map that it does not change. Between the fixes the front-end carries the pose; about every
+// quarter of a metre the scan is aligned with the surfaces of the map, and the answer is fused with the pose. Where the
+// map shows nothing, the pose goes on with growing doubt. The robot is lost where that doubt is too large, or where the
+// scans contradict the map over some metres. It is then looked for as one that was not watched (recovery.h), in this
+// map. People, and furniture that has moved, contradict in some places; that is borne, because it does not contradict
+// for metres everywhere. Frames: `map`; `track` is that of the front-end. Not thread-safe. Deterministic. Source: the
+// extended Kalman filter over matches with a map of Gutmann, Weigel and Nebel 1999 (thesis B 2.2.2), here with points
+// and surfaces.
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "server/slam/known_grid/known_grid.h"
+#include "server/slam/matching/point_to_line.h"
+#include "server/slam/motion/motion_gate.h"
+#include "server/slam/motion/step_motion.h"
+#include "server/slam/recovery/recovery.h"
+
+namespace cairn::slam {
+
+struct GridLocalisationOptions {
+  RecoveryOptions recovery{};
+  LoopOptions loop;
+  SelfCheckOptions self_check;
+  PointToLineOptions align;
+  SurfaceOptions surface;
+  MotionGateOptions gate;
+  MotionNoise drift;  // Of a step that scans have measured, ...
+  MotionNoise blind;  // ... and of one that odometry alone has.
+  double lost_after_m = 2.0;
+};
+
+class GridLocalisation {
+ public:
+  explicit GridLocalisation(const GridLocalisationOptions& options);
+
+  // From now on the robot is looked for in this map and then followed: near `known` if somebody says that it is there,
+  // otherwise everywhere.
+  void Begin(std::shared_ptr<const KnownGrid> map, const Recovery::Known& known, bool said);
+  // The map has changed. The next scans must show that the robot is where it was.
+  void Replace(std::shared_ptr<const KnownGrid> map);
+  // The robot may be anywhere. `odometry_goes_on`: since the last scan.
+  void Lose(bool odometry_goes_on);
+  // Somebody says that it is at this pose.
+  void BeginWhereSaid(const Pose2& T_map_robot);
+
+  struct Place {
+    Pose2 T_map_robot;
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+    PoseReason reason = PoseReason::kLost;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.T_map_robot, self.covariance, self.reason);
+      archive.Require(self.reason <= PoseReason::kWaiting, "the reason of a pose");
+    }
+  };
+  // The scan just tracked. `points_robot`: its surfaces.
+  struct Sight {
+    const Keyframe& scan;
+    const std::vector<SurfacePoint>& points_robot;
+    const TrackStep& step;
+  };
+  struct Followed {
+    Place place;
+    bool moved_enough = false;  // The front-end should take the scan as its reference.
+  };
+  Followed Take(const Sight& sight);
+
+  // Where the track lies in the map, while the robot is followed.
+  [[nodiscard]] Pose2 T_map_track() const { return fix_.T_map_robot * fix_.T_track_robot.Inverse(); }
+  [[nodiscard]] const Recovery& recovery() const { return recovery_; }
+  // Where odometry has taken the robot since the last scan.
+  [[nodiscard]] Place CarriedTo(const Pose2& T_odom_robot) const;
+  [[nodiscard]] bool looking() const { return recovery_.active(); }
+  [[nodiscard]] const std::shared_ptr<const KnownGrid>& map() const { return map_; }
+  // The last place.
+  [[nodiscard]] const Place& place() const { return last_; }
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.recovery_, self.fix_, self.comparisons_, self.last_, self.T_odom_robot_, self.T_track_robot_,
+            self.T_track_kept_, self.way_m_, self.blind_covariance_, self.unmatched_m_, self.said_);
+  }
+
+ private:
+  struct Fix {
+    Pose2 T_map_robot;
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+    Pose2 T_track_robot;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.T_map_robot, self.covariance, self.T_track_robot);
+    }
+  };
+  struct Comparison {
+    double way_m = 0.0;
+    VisibilityCounts counts;
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.way_m, self.counts.confirmed, self.counts.contradicted);
+    }
+  };
+  void LookNear();
+  Followed Look(const Sight& sight);
+  Followed Follow(const Sight& sight);
+  [[nodiscard]] Fix Predicted(const TrackStep& step) const;
+  // Whether the scan was found in the map there.
+  bool Align(const Sight& sight, Fix& fix) const;
+  [[nodiscard]] bool Contradicted(const Sight& sight, const Pose2& T_map_robot);
+
+  GridLocalisationOptions options_;
+  Recovery recovery_;
+  std::shared_ptr<const KnownGrid> map_;
+  Fix fix_;
+  std::deque<Comparison> comparisons_;
+  Place last_;
+  Pose2 T_odom_robot_;                                          // Of the last scan.
+  Pose2 T_track_robot_;                                         // Of the last scan.
+  Pose2 T_track_kept_;                                          // Of the last scan with which the robot was looked for.
+  double way_m_ = 0.0;                                          // Along the track.
+  Eigen::Matrix3d blind_covariance_ = Eigen::Matrix3d::Zero();  // Since the fix.
+  double unmatched_m_ = 0.0;  // Way since a scan has shown how the robot moved, or where it is.
+  bool said_ = false;         // The robot is at the last place, says somebody: to be looked for with the next scan.
+};
+
+}  // namespace cairn::slam

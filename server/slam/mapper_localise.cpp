@@ -1,0 +1,116 @@
+// The part of the mapper that follows a robot in the map of others, and maps nothing.
+#include <algorithm>
+#include <utility>
+
+#include "server/slam/mapper_state.h"
+
+namespace cairn::slam {
+
+GridLocalisationOptions Mapper::State::LocalisationOptions() const {
+  return {.recovery = options.recovery,
+          .loop = options.loop,
+          .self_check = options.self_check,
+          .align = options.front_end.refine,
+          .surface = options.front_end.surface,
+          .gate = options.gate,
+          .drift = options.filter.back_end.drift,
+          .blind = options.blind,
+          .lost_after_m = options.lost_after_m};
+}
+
+// As Mapper::LocaliseIn, with a map.
+void Mapper::State::LocaliseIn(std::shared_ptr<const KnownGrid> map, bool place_known) {
+  if (localisation) return localisation->Replace(std::move(map));
+  drawing.Finish(trail.keyframes(), believed_path());
+  const bool said = place_known && !recovery.active() && (trail.empty() || level.outcome.localized);
+  Recovery::Known known = LastKnown();
+  if (trail.empty()) known = {filter->estimate().T_map_robot, {}, Eigen::Matrix3d::Zero()};
+  if (last_scan) known.T_odom_robot = OdometryOrNone(last_scan->T_odom_robot);
+  known.covariance = PoseCovariance(options.recovery.place.near_m, options.recovery.place.near_rad);
+  recovery.End();
+  localisation.emplace(LocalisationOptions());
+  localisation->Begin(std::move(map), known, said);
+  front_end.Restart();
+}
+
+// The robot maps again, from where it is in the known map. What it has mapped before must show that it is there.
+Result<void> Mapper::State::MapAgain() {
+  if (!localisation) return {};
+  const GridLocalisation::Place place = localisation->place();
+  if (localisation->looking() || !last_scan)
+    return Fail(StatusCode::kFailedPrecondition, "the robot's place in the map is not known");
+  localisation.reset();
+  front_end.Restart();
+  static_cast<void>(blind.TakeCovariance());
+  speed.Forget();
+  if (!trail.empty()) {
+    recovery.BeginWhereSaid({place.T_map_robot, OdometryOrNone(last_scan->T_odom_robot), place.covariance});
+    return {};
+  }
+  filter = MakeFilter(options.filter.kind, options.filter, place.T_map_robot, static_cast<std::uint64_t>(options.seed));
+  last_scan.reset();
+  return {};
+}
+
+// Returns what lies before the scan. A tilted scan shows nothing, so that what it was doubted for would be forgotten.
+Passage Mapper::State::LocaliseAfter(Passage passage, bool tilted) {
+  if (!options.front_end.use_odometry) passage = std::min(passage, Passage::kUnwatched);
+  if (tilted && passage != Passage::kDriven) {
+    localisation->Lose(passage != Passage::kUnknown && options.front_end.use_odometry);
+    front_end.Restart();
+  }
+  return passage;
+}
+
+ScanOutcome Mapper::State::Localise(TrackedScan tracked, const Pose2& T_odom_robot, Passage passage,
+                                    const ParallelFor& parallel_for) {
+  auto& [still, view, step] = tracked;
+  const auto goes_on = [&] {
+    return passage == Passage::kPaused && options.front_end.use_odometry && !localisation->looking() &&
+           FollowsOdometry(*still, T_odom_robot, step) &&
+           AgreesAsBefore(*still, view.points_robot, step,
+                          {localisation->recovery(), *localisation->map(), localisation->T_map_track()});
+  };
+  const bool watched = passage == Passage::kDriven || StoodStill(*still, T_odom_robot, step) || goes_on();
+  // The last scans do not belong together with this one.
+  if (!watched || (!step.matched && localisation->looking())) {
+    localisation->Lose(options.front_end.use_odometry && passage != Passage::kUnknown);
+    front_end.Restart();
+    step = front_end.Track(view, T_odom_robot, parallel_for);
+  }
+  last_scan = LastScan{still, T_odom_robot, step.T_track_robot};
+  const Keyframe seen{still, OdometryOrNone(T_odom_robot)};
+  const GridLocalisation::Followed followed = localisation->Take({seen, view.points_robot, step});
+  if (followed.moved_enough) front_end.AddKeyframe(view);
+  return ReportLocalised(still->stamp, T_odom_robot, followed.place, step.score);
+}
+
+ScanOutcome Mapper::State::ReportLocalised(Stamp stamp, const Pose2& T_odom_robot, const GridLocalisation::Place& place,
+                                           double score) const {
+  ScanOutcome outcome;
+  outcome.stamp = stamp;
+  outcome.T_map_robot = place.T_map_robot;
+  outcome.T_map_odom = outcome.T_map_robot * T_odom_robot.Inverse();
+  outcome.covariance = place.covariance;
+  outcome.score = score;
+  outcome.reason = place.reason;
+  outcome.localized = outcome.reason != PoseReason::kLost;
+  return outcome;
+}
+
+Result<void> Mapper::LocaliseIn(std::shared_ptr<const KnownGrid> map, bool place_known) {
+  if (map == nullptr) return state_->MapAgain();
+  state_->LocaliseIn(std::move(map), place_known);
+  return {};
+}
+
+bool Mapper::localises() const {
+  return state_->localisation.has_value();
+}
+
+std::optional<std::uint32_t> Mapper::known_map_epoch() const {
+  if (!state_->localisation) return std::nullopt;
+  return state_->localisation->map()->source().epoch;
+}
+
+}  // namespace cairn::slam

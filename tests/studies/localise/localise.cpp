@@ -1,0 +1,186 @@
+// cairn-study localise: the second half of a drive, only localised in the map of the first. How much of it is
+// localised, is any pose wrong, how exact are they, and how long does it take to find the robot, of which nothing is
+// known at first? "Inside" are the scans of which at least half of the points lie where the map shows a wall, if they
+// are placed along the smoothed path of the whole drive, which is the reference; it is moved to where it fits the path
+// of the first half best. With simulated drives the reference is the truth.
+#include <Eigen/SVD>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "server/slam/known_grid/known_grid.h"
+#include "server/slam/scan/beam_points.h"
+#include "server/slam/scan_pipeline.h"
+#include "server/slam/smoothing/smoothed_map.h"
+#include "tests/studies/log_run.h"
+#include "tests/studies/logs.h"
+#include "tests/studies/study.h"
+
+namespace cairn::studies {
+namespace {
+
+constexpr double kWrongM = 0.5;
+constexpr double kWrongRad = 0.2;
+
+// The rigid motion that takes the poses of `from` nearest to those of `to` with the same stamps.
+Pose2 Fit(const Trajectory& from, const Trajectory& to) {
+  std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>> pairs;
+  Eigen::Vector2d mean_from = Eigen::Vector2d::Zero(), mean_to = Eigen::Vector2d::Zero();
+  for (const StampedPose& pose : from) {
+    const auto there = PoseOn(to, pose.stamp, 0.01);
+    if (!there) continue;
+    pairs.emplace_back(pose.T_map_robot.translation(), there->translation());
+    mean_from += pairs.back().first;
+    mean_to += pairs.back().second;
+  }
+  const auto count = static_cast<double>(pairs.size());
+  mean_from /= count;
+  mean_to /= count;
+  double sine = 0.0, cosine = 0.0;
+  for (const auto& [a, b] : pairs) {
+    const Eigen::Vector2d p = a - mean_from, q = b - mean_to;
+    cosine += p.dot(q);
+    sine += p.x() * q.y() - p.y() * q.x();
+  }
+  Pose2 T{0.0, 0.0, std::atan2(sine, cosine)};
+  const Eigen::Vector2d t = mean_to - T.rotation() * mean_from;
+  return {t.x(), t.y(), T.theta};
+}
+
+StudyLog Part(const StudyLog& log, double from, double to) {
+  StudyLog part{
+      .name = log.name, .records = {}, .relations = {}, .truth = {}, .T_map_robot_start = log.T_map_robot_start};
+  const auto begin = static_cast<std::ptrdiff_t>(from * static_cast<double>(log.records.size()));
+  const auto end = static_cast<std::ptrdiff_t>(to * static_cast<double>(log.records.size()));
+  part.records.assign(log.records.begin() + begin, log.records.begin() + end);
+  return part;
+}
+
+Trajectory SmoothedTrajectory(const slam::MapperSnapshot& snapshot) {
+  return snapshot.TrajectoryAlong(slam::SmoothedPath(snapshot));
+}
+
+std::shared_ptr<const slam::KnownGrid> MapOf(const slam::MapperSnapshot& snapshot, const slam::MapperOptions& options) {
+  slam::OccupancyGrid grid(options.grid);
+  const std::vector<Pose2> path = slam::SmoothedPath(snapshot);
+  for (std::size_t k = 0; k < path.size(); ++k) grid.Draw(*snapshot.keyframes[k].scan, path[k]);
+  slam::KnownGrid::Tiles tiles;
+  grid.ForEachChunk([&](const slam::ChunkKey& key, const slam::GridChunk& chunk) {
+    auto cells = std::make_shared<TileCells>();
+    for (std::size_t i = 0; i < cells->size(); ++i) (*cells)[i] = slam::OccupancyOf(chunk.log_odds[i]);
+    tiles.emplace(key, std::move(cells));
+  });
+  return std::make_shared<const slam::KnownGrid>(
+      slam::KnownGrid::Source{std::move(tiles), options.grid.resolution_m, 0}, options.recovery.place,
+      options.self_check.near_m);
+}
+
+bool IsInside(const slam::KnownGrid& map, const Scan& scan, const Pose2& T_map_robot) {
+  int points = 0, shown = 0;
+  for (const slam::BeamPoint& point : slam::PointsOf(scan)) {
+    ++points;
+    shown += map.surfaces().Nearest(T_map_robot * point.p_robot, 0.2) != nullptr ? 1 : 0;
+  }
+  return points > 0 && 2 * shown >= points;
+}
+
+struct Outcome {
+  long long inside = 0;            // Scans inside, after the robot was found.
+  long long inside_localized = 0;  // ... and localised.
+  long long outside_localized = 0;
+  long long wrong = 0;
+  double squares_m2 = 0.0;
+  long long compared = 0;
+  double worst_m = 0.0;
+  double way_to_found_m = -1.0;
+  std::vector<double> scan_ms;
+};
+
+Outcome LocaliseIn(const std::shared_ptr<const slam::KnownGrid>& map, const StudyLog& log, const Trajectory& reference,
+                   const slam::MapperOptions& options) {
+  Outcome result;
+  Stopwatch watch;
+  double way_m = 0.0;
+  std::optional<Pose2> last;
+  slam::ScanPipeline pipeline(
+      options, {}, slam::SerialFor,
+      {.used =
+           [&](const Scan& scan, const slam::ScanOutcome& outcome) {
+             result.scan_ms.push_back(watch.CpuMs());
+             watch.Restart();
+             const auto truth = PoseOn(reference, scan.stamp, 0.5);
+             if (!truth) return;
+             if (last) way_m += (truth->translation() - last->translation()).norm();
+             last = truth;
+             const bool inside = IsInside(*map, scan, *truth);
+             if (outcome.localized && result.way_to_found_m < 0.0) result.way_to_found_m = way_m;
+             if (result.way_to_found_m < 0.0) return;
+             result.inside += inside ? 1 : 0;
+             if (!outcome.localized) return;
+             (inside ? result.inside_localized : result.outside_localized) += 1;
+             const double error_m = (outcome.T_map_robot.translation() - truth->translation()).norm();
+             const bool wrong =
+                 error_m > kWrongM || std::abs(AngleDiff(outcome.T_map_robot.theta, truth->theta)) > kWrongRad;
+             result.wrong += wrong ? 1 : 0;
+             result.squares_m2 += error_m * error_m;
+             ++result.compared;
+             result.worst_m = std::max(result.worst_m, error_m);
+           },
+       .dropped = [](const Scan&, DropReason) {}});
+  static_cast<void>(pipeline.mapper().LocaliseIn(map, false));
+  for (const LogRecord& record : log.records) {
+    if (const auto* odometry = std::get_if<Odometry>(&record)) {
+      if (ValidateOdometry(*odometry)) pipeline.Add(*odometry);
+      continue;
+    }
+    auto scan = std::make_shared<const Scan>(std::get<Scan>(record));
+    watch.Restart();
+    if (ValidateScan(*scan)) pipeline.Add(std::move(scan));
+  }
+  pipeline.Finish();
+  return result;
+}
+
+void StudyLocalise(StudyContext& context) {
+  Report& report = context.report;
+  report.Heading("The second half of a drive in the map of the first");
+  slam::MapperOptions options;
+  options.seed = static_cast<std::int64_t>(context.seed);
+  std::vector<StudyLog> logs = ChooseLogs(context, {"intel", "mit-csail", "mit-killian"});
+  for (const char* const world : {"office", "building", "storey"}) {
+    sim::FleetOptions fleet;
+    fleet.seed = context.seed;
+    if (context.logs.empty()) logs.push_back(SimulateLog(world, context.Pick(1200.0, 300.0), fleet));
+  }
+  Table table({"log", "way until found (m)", "scans inside", "localised", "localised outside", "wrong", "error rms (m)",
+               "largest (m)", "mean (ms)", "p99 (ms)", "longest (ms)"});
+  for (const StudyLog& log : logs) {
+    const LogRun first = RunOverLog(Part(log, 0.0, 0.5), options);
+    const auto map = MapOf(first.snapshot, options);
+    Trajectory reference = log.truth;
+    if (reference.empty()) reference = SmoothedTrajectory(RunOverLog(log, options).snapshot);
+    const Pose2 T_map_reference = Fit(reference, SmoothedTrajectory(first.snapshot));
+    for (StampedPose& pose : reference) pose.T_map_robot = T_map_reference * pose.T_map_robot;
+    const Outcome outcome = LocaliseIn(map, Part(log, 0.5, 1.0), reference, options);
+    const Distribution ms = DistributionOf(outcome.scan_ms);
+    const double share =
+        static_cast<double>(outcome.inside_localized) / std::max(1.0, static_cast<double>(outcome.inside));
+    table.Add({log.name, Number(outcome.way_to_found_m, 1), Count(outcome.inside), Number(100.0 * share, 1) + " %",
+               Count(outcome.outside_localized), Count(outcome.wrong),
+               Number(std::sqrt(outcome.squares_m2 / std::max(1.0, static_cast<double>(outcome.compared))), 3),
+               Number(outcome.worst_m, 2), Number(ms.mean, 2), Number(ms.p99, 1), Number(ms.max, 1)});
+    report.Expect(outcome.wrong == 0, log.name + ": " + Count(outcome.wrong) + " poses are localized at a wrong place");
+    report.Expect(share >= 0.95, log.name + ": " + Number(100.0 * share, 1) + " % of what is inside is localized");
+  }
+  report.Add(table, "localise");
+}
+
+const Registration kLocalise("localise", "the second half of a drive, localised in the map of the first",
+                             StudyLocalise);
+
+}  // namespace
+}  // namespace cairn::studies
