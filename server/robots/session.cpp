@@ -190,7 +190,8 @@ void Session::Abandon() {
   for (const ScanArrival& scan : queue_.TakeScans()) {
     record_.ScanDropped(scan.stream, scan.scan->sequence, DropReason::kSessionEnded);
   }
-  // The session may have published its last ledger while these scans, already out of the queue, still counted as waiting.
+  // The session may have published its last ledger while these scans, already out of the queue, still counted as
+  // waiting.
   PublishLedgers(SessionRecord::Urgency::kNow);
 }
 
