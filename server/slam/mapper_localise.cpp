@@ -65,7 +65,7 @@ Passage Mapper::State::LocaliseAfter(Passage passage, bool tilted) {
 ScanOutcome Mapper::State::Localise(TrackedScan tracked, const Pose2& T_odom_robot, Passage passage,
                                     const ParallelFor& parallel_for) {
   auto& [still, view, step] = tracked;
-  const auto goes_on = [&] {
+  const auto goes_on = [&, &still = still, &view = view, &step = step] {
     return passage == Passage::kPaused && options.front_end.use_odometry && !localisation->looking() &&
            FollowsOdometry(*still, T_odom_robot, step) &&
            AgreesAsBefore(*still, view.points_robot, step,
