@@ -65,6 +65,7 @@ Result<void> Roster::Restore(StartControl& control) {
   auto marks = RestoreMarks::Read(journal_->store());
   if (!marks) return tl::unexpected(marks.error());
   const auto begin = std::chrono::steady_clock::now();
+  if (!ids->empty()) spdlog::info("restoring {} sessions", ids->size());
   std::vector<SessionId> doubtful, others;
   {
     const MutexLock lock(mutex_);

@@ -27,6 +27,7 @@ constexpr int kIdleSessions = 64;
 constexpr double kMostMemory_mib_per_hour = 12.0;
 constexpr double kMostAtFirst_mib_per_hour = 100.0;
 constexpr double kMostDisk_mib_per_hour = 150.0;
+constexpr double kMostIdleMib = 2.0;  // Of a session.
 
 struct Sample {
   double hours = 0.0;
@@ -208,6 +209,9 @@ void StudyIdle(StudyContext& context) {
     const double now_mib = server.resident_mib();
     if (i == 1 || i % 16 == 0) table.Add({Count(i), Number(now_mib, 1), Number((now_mib - empty_mib) / i, 2)});
   }
+  const double each_mib = (server.resident_mib() - empty_mib) / kIdleSessions;
+  report.Expect(each_mib <= kMostIdleMib, "a session that does nothing keeps " + Number(each_mib, 2) +
+                                              " MiB; at most " + Number(kMostIdleMib, 0));
   report.Add(table, "idle");
 }
 
