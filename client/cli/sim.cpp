@@ -102,6 +102,14 @@ void AddSim(CLI::App& app, Program& program) {
   command->add_option("--prefix", options->prefix, "Robots are called PREFIX1, PREFIX2, ...")->capture_default_str();
   AddNumber(*command, "--seconds", options->seconds, 0.1, 1e6, "Simulated time");
   command->add_option("--seed", options->fleet.seed, "Seed of all random numbers")->capture_default_str();
+  command
+      ->add_option("--furniture", options->fleet.furniture.pieces,
+                   "Pieces of furniture beside the routes; in a full place there are fewer")
+      ->check(CLI::Range(0, 1000));
+  command
+      ->add_option("--furniture-seed", options->fleet.furniture.seed,
+                   "With another one they stand elsewhere, as in a place that has changed since the last run")
+      ->capture_default_str();
   AddSensorOptions(*command, options->fleet);
   auto* rate = AddNumber(*command, "--rate", options->rate, 1e-3, 1e4, "How many times faster than real time");
   command->add_flag("--fast", options->fast, "As fast as the server takes it, without losing a scan")->excludes(rate);

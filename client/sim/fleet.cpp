@@ -37,6 +37,7 @@ Result<void> Validate(const FleetOptions& o) {
   }
   if (auto valid = Validate(o.wheels); !valid) return valid;
   if (auto valid = Validate(o.drive); !valid) return valid;
+  if (auto valid = Validate(o.furniture); !valid) return valid;
   return Validate(o.tilt, HaltScans(o));
 }
 
@@ -44,6 +45,8 @@ Result<Fleet> Fleet::Create(Surroundings surroundings, const FleetOptions& optio
   if (auto valid = Validate(options); !valid) return tl::unexpected(valid.error());
   if (surroundings.routes.empty())
     return Fail(StatusCode::kInvalidArgument, "fleet: the world '" + surroundings.name + "' has no route");
+  const std::vector<Post> furniture = FurnitureIn(surroundings, options.furniture);
+  surroundings.posts.insert(surroundings.posts.end(), furniture.begin(), furniture.end());
   return Fleet(std::move(surroundings), options);
 }
 

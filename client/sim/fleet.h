@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/sim/furniture.h"
 #include "client/sim/laser.h"
 #include "client/sim/robot.h"
 #include "client/sim/route_follower.h"
@@ -35,6 +36,7 @@ struct FleetOptions {
   bool see_each_other = true;  // Robots appear in each other's scans as discs.
   double robot_radius_m = 0.22;
   double robot_height_m = 0.5;
+  FurnitureOptions furniture;  // Beside what the world has.
   Stamp first_stamp = 1'700'000'000'000'000'000;
   std::uint64_t seed = 1;
 };

@@ -13,7 +13,6 @@ using slam::OccupancyGrid;
 
 // In units of GridChunk::log_odds: three hits, one hit, five rays that passed.
 constexpr int kOccupied = 200, kHit = 80, kFree = -150;
-constexpr int kLargest = 32000;           // Of a sum.
 constexpr std::size_t kMostCells = 1000;  // That are compared; of more, every second, third, ...
 constexpr double kStepM = 0.15, kStepRad = 0.03;
 
@@ -117,28 +116,6 @@ GridAgreement CompareGrids(const OccupancyGrid::Chunks& grid, const OccupancyGri
     }
   }
   return best;
-}
-
-OccupancyGrid::Chunks SumOfGrids(const std::vector<const OccupancyGrid::Chunks*>& grids) {
-  std::map<slam::ChunkKey, std::shared_ptr<slam::GridChunk>> sums;
-  OccupancyGrid::Chunks sum;
-  for (const OccupancyGrid::Chunks* const grid : grids) {
-    for (const auto& [key, chunk] : *grid) {
-      const auto first = sum.try_emplace(key, chunk);
-      if (first.second) continue;  // Shared, as long as there is only one.
-      auto& own = sums[key];
-      if (own == nullptr) {
-        own = std::make_shared<slam::GridChunk>(*first.first->second);
-        first.first->second = own;
-      }
-      for (std::size_t i = 0; i < own->log_odds.size(); ++i) {
-        const int a = own->log_odds[i], b = chunk->log_odds[i];
-        if (b == slam::kUnseen) continue;
-        own->log_odds[i] = static_cast<std::int16_t>(a == slam::kUnseen ? b : std::clamp(a + b, -kLargest, kLargest));
-      }
-    }
-  }
-  return sum;
 }
 
 }  // namespace cairn::server

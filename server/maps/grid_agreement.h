@@ -5,7 +5,6 @@
 #pragma once
 
 #include <cstddef>
-#include <vector>
 
 #include "common/geometry/pose2.h"
 #include "server/slam/grid/occupancy_grid.h"
@@ -34,8 +33,5 @@ struct GridAgreement {
 [[nodiscard]] GridAgreement CompareGrids(const slam::OccupancyGrid::Chunks& grid,
                                          const slam::OccupancyGrid::Chunks& others, const Pose2& centre,
                                          double resolution_m);
-
-// The sum of several grids: log odds of independent evidence add up.
-[[nodiscard]] slam::OccupancyGrid::Chunks SumOfGrids(const std::vector<const slam::OccupancyGrid::Chunks*>& grids);
 
 }  // namespace cairn::server

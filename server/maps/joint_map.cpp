@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "server/maps/grid_agreement.h"
+#include "server/maps/layer_sum.h"
 
 namespace cairn::server {
 namespace {
@@ -13,6 +13,8 @@ bool AllUnknown(const TileCells& cells) {
 }
 
 }  // namespace
+
+JointMap::JointMap(double past_probability) : most_past_(slam::LogOddsOf(past_probability)) {}
 
 void JointMap::Apply(const GridChange& change) {
   for (const auto& [key, chunk] : change.chunks) SetLayer(key, change.session, chunk);
@@ -42,25 +44,51 @@ slam::OccupancyGrid::Chunks JointMap::DrawnBefore(SessionId session) const {
     for (int dy = -kAround; dy <= kAround; ++dy)
       for (int dx = -kAround; dx <= kAround; ++dx) area.insert({key.x + dx, key.y + dy});
   }
-  std::map<SessionId, slam::OccupancyGrid::Chunks> grids;
+  slam::OccupancyGrid::Chunks sum;
   for (const slam::ChunkKey& key : area) {
     const auto layers = chunks_.find(key);
     if (layers == chunks_.end()) continue;
-    for (const auto& [other, chunk] : layers->second)
-      if (other < session && !hidden_.contains(other)) grids[other].emplace(key, chunk);
+    if (auto chunk = SumOf(layers->second, [&](SessionId other) { return other < session; }))
+      sum.emplace(key, std::move(chunk));
   }
-  std::vector<const slam::OccupancyGrid::Chunks*> summed;
-  summed.reserve(grids.size());
-  for (const auto& [other, grid] : grids) summed.push_back(&grid);
-  return SumOfGrids(summed);
+  return sum;
 }
 
 void JointMap::SetHidden(SessionId session, bool hidden) {
   const bool changed = hidden ? hidden_.insert(session).second : hidden_.erase(session) > 0;
-  if (!changed) return;
+  if (changed) MarkChanged(session);
+}
+
+void JointMap::SetPast(SessionId session) {
+  if (past_.insert(session).second) MarkChanged(session);
+}
+
+void JointMap::MarkChanged(SessionId session) {
   for (const auto& [key, layers] : chunks_) {
     if (layers.contains(session)) dirty_.insert(key);
   }
+}
+
+void JointMap::Remove(SessionId session) {
+  Replace(session, {});
+  hidden_.erase(session);
+  past_.erase(session);
+}
+
+void JointMap::Fold(SessionId earlier, SessionId later) {
+  for (const auto& [key, chunk] : ChunksOf(earlier)) {
+    const auto& layers = chunks_.at(key);
+    const auto of_later = layers.find(later);
+    auto both = chunk;
+    if (of_later != layers.end()) {
+      auto sum = std::make_shared<slam::GridChunk>(*chunk);
+      AddLater(*sum, *of_later->second, most_past_);
+      both = std::move(sum);
+    }
+    SetLayer(key, later, std::move(both));
+    SetLayer(key, earlier, nullptr);
+  }
+  past_.erase(earlier);
 }
 
 void JointMap::SetLayer(slam::ChunkKey key, SessionId session, std::shared_ptr<const slam::GridChunk> chunk) {
@@ -108,26 +136,30 @@ bool JointMap::Store(TileKey key, Cells cells) {
   return true;
 }
 
+template <typename Counts>
+std::shared_ptr<const slam::GridChunk> JointMap::SumOf(const Layers& layers, const Counts& counts) const {
+  std::vector<const std::shared_ptr<const slam::GridChunk>*> past, present;  // The earliest first.
+  for (const auto& [session, chunk] : layers) {
+    if (hidden_.contains(session) || !counts(session)) continue;
+    (past_.contains(session) ? past : present).push_back(&chunk);
+  }
+  if (past.empty() && present.empty()) return nullptr;
+  if (past.size() + present.size() == 1) return past.empty() ? *present.front() : *past.front();
+  auto sum = std::make_shared<slam::GridChunk>(UnseenChunk());
+  for (const auto* const chunk : past) AddLater(*sum, **chunk, most_past_);
+  slam::GridChunk now = UnseenChunk();
+  for (const auto* const chunk : present) AddBeside(now, **chunk);
+  AddLater(*sum, now, most_past_);
+  return sum;
+}
+
 JointMap::Cells JointMap::Sum(slam::ChunkKey key) const {
   const auto found = chunks_.find(key);
   if (found == chunks_.end()) return nullptr;
-  std::vector<const slam::GridChunk*> shown;
-  for (const auto& [session, chunk] : found->second) {
-    if (!hidden_.contains(session)) shown.push_back(chunk.get());
-  }
+  const auto sum = SumOf(found->second, [](SessionId) { return true; });
+  if (sum == nullptr) return nullptr;
   auto cells = std::make_shared<TileCells>();
-  for (std::size_t i = 0; i < cells->size(); ++i) {
-    int sum = 0;
-    bool seen = false;
-    for (const slam::GridChunk* const chunk : shown) {
-      const std::int16_t log_odds = chunk->log_odds[i];
-      if (log_odds == slam::kUnseen) continue;
-      seen = true;
-      sum += log_odds;
-    }
-    const int clamped = std::clamp<int>(sum, slam::kUnseen + 1, INT16_MAX);
-    (*cells)[i] = seen ? slam::OccupancyOf(static_cast<std::int16_t>(clamped)) : kUnknownCell;
-  }
+  for (std::size_t i = 0; i < cells->size(); ++i) (*cells)[i] = slam::OccupancyOf(sum->log_odds[i]);
   return AllUnknown(*cells) ? nullptr : cells;
 }
 

@@ -1,6 +1,6 @@
-// The joint occupancy map of a site, and its pyramid of coarser levels. For each chunk, the log odds of all
-// sessions' grids are summed into the cells of one tile, because log odds of independent evidence add up. The
-// robots' start poses place them in one map frame. This class does not publish: Render returns the tiles
+// The joint occupancy map of a site, and its pyramid of coarser levels. For each chunk, the grids of all sessions are
+// summed into the cells of one tile, with less weight for those of sessions that have ended (layer_sum.h). Their start
+// poses place the robots in one map frame. This class does not publish: Render returns the tiles
 // whose cells changed; epochs, versions and encodings are handled by Site.
 // Invariant: after Render, cells() equals a map that is built from the same chunks from scratch.
 // Not thread-safe: used on the site's strand only.
@@ -21,6 +21,9 @@ class JointMap {
  public:
   using Cells = std::shared_ptr<const TileCells>;
 
+  // `past_probability`: the largest probability that ended sessions give a cell that a later one has seen as well.
+  explicit JointMap(double past_probability);
+
   // Applies the changed chunks of one session (null: removed).
   void Apply(const GridChange& change);
   // Replaces the whole grid of one session.
@@ -29,6 +32,13 @@ class JointMap {
   // The grids of hidden sessions are kept, but are not part of the sum. A session is shown unless it was hidden.
   void SetHidden(SessionId session, bool hidden);
   [[nodiscard]] const std::set<SessionId>& hidden() const { return hidden_; }
+
+  // The session has ended. Of those that have ended, one with a larger id is later. A session goes on unless it ended.
+  void SetPast(SessionId session);
+  // Nothing of the session is kept.
+  void Remove(SessionId session);
+  // Both have ended: what the earlier one has drawn becomes part of what the later one has drawn.
+  void Fold(SessionId earlier, SessionId later);
 
   // The sum of the grids of the sessions before this one that are shown, in and around the area of its own grid.
   [[nodiscard]] slam::OccupancyGrid::Chunks DrawnBefore(SessionId session) const;
@@ -40,14 +50,19 @@ class JointMap {
  private:
   using Layers = std::map<SessionId, std::shared_ptr<const slam::GridChunk>>;
 
+  // Of the sessions that `counts` accepts. Null: they have drawn nothing there.
+  template <typename Counts>
+  [[nodiscard]] std::shared_ptr<const slam::GridChunk> SumOf(const Layers& layers, const Counts& counts) const;
+  void MarkChanged(SessionId session);
   void SetLayer(slam::ChunkKey key, SessionId session, std::shared_ptr<const slam::GridChunk> chunk);
   // Stores the cells if they differ, and returns whether they did. Null means that every cell is unknown.
   bool Store(TileKey key, Cells cells);
   Cells Sum(slam::ChunkKey key) const;
   Cells Reduce(TileKey parent) const;
 
+  const int most_past_;  // Log odds.
   std::map<slam::ChunkKey, Layers> chunks_;
-  std::set<SessionId> hidden_;
+  std::set<SessionId> hidden_, past_;
   std::set<slam::ChunkKey> dirty_;
   std::map<TileKey, Cells> cells_;
 };

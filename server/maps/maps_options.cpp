@@ -12,6 +12,14 @@ void Visit(OptionVisitor& visitor, MapsOptions& options) {
                   "Versions of the map that are kept for each site. When there are more, the oldest one "
                   "that is neither published nor enabled is forgotten. Each one takes memory for the "
                   "parts in which it differs from the present map.");
+  visitor.Real("past_probability", options.past_probability, "", 0.51, 0.999,
+               "Largest probability that sessions which have ended give a cell that a later session has seen as well. "
+               "Nearer to 1, what was moved between two runs stays in the map for longer.");
+  visitor.Integer(
+      "max_past_sessions", options.max_past_sessions, "", 1, 10000,
+      "Sessions that no longer exist whose parts of a site's map are kept apart. When there are more, what "
+      "the two oldest have drawn becomes one part, which no older version of the map changes any more. Each "
+      "one takes the memory of the area that it has drawn.");
 }
 
 }  // namespace cairn::server

@@ -1,4 +1,4 @@
-// Options of the joint maps: how often they are published and how many versions are kept.
+// Options of the joint maps: how often they are published, how many versions are kept, and how much the past counts.
 #pragma once
 
 #include <cstdint>
@@ -11,6 +11,8 @@ struct MapsOptions {
   double publish_rate_hz = 2.0;
   std::int64_t max_sites = 64;
   std::int64_t max_versions = 8;
+  double past_probability = 0.8;
+  std::int64_t max_past_sessions = 16;
 };
 void Visit(OptionVisitor& visitor, MapsOptions& options);
 

@@ -66,10 +66,12 @@ Site::Site(const std::string& name, double resolution_m, const MapsOptions& opti
     : name_(name),
       site_id_(HashName(name)),
       resolution_m_(resolution_m),
+      max_past_sessions_(static_cast<std::size_t>(options.max_past_sessions)),
       outbound_(outbound),
       generation_(generation),
       strand_(asio::make_strand(pool)),
       journal_(journal),
+      joint_(options.past_probability),
       versions_(static_cast<std::size_t>(options.max_versions)),
       epoch_(beginning.epoch),
       tile_version_(beginning.tile_version) {
@@ -135,6 +137,7 @@ void Site::Join(Member member) {
     site.members_[member.session] = member;
     std::erase_if(site.members_, [](const auto& one) { return one.second.owner.expired(); });
     site.joint_.SetHidden(member.session, member.fragment);
+    if (member.ended) site.joint_.SetPast(member.session);
     site.info_changed_ = true;
     site.StoreSite();
     // The map may have been switched since the session was made, or since the server that made it was killed.
@@ -210,13 +213,38 @@ void Site::FailSwitch(StatusCode code, const std::string& why) {
   waiting(Fail(code, why));
 }
 
+void Site::End(SessionId session) {
+  Run([session](Site& site) { site.joint_.SetPast(session); });
+}
+
 void Site::Leave(SessionId session) {
   Run([session](Site& site) {
-    if (site.journal_ == nullptr) return;
+    site.joint_.SetPast(session);
     site.layers_.insert(session);
     site.StoreLayer(session);
-    site.journal_->Forget(session);
+    if (site.journal_ != nullptr) site.journal_->Forget(session);
+    site.FoldOldLayers();
   });
+}
+
+// A fragment that was never joined is not shown and cannot become part of what is; the oldest of these go.
+void Site::FoldOldLayers() {
+  if (switch_) return;  // It may need the parts that are folded. The next session that leaves folds more.
+  std::vector<SessionId> shown, hidden;  // The oldest first.
+  for (const SessionId session : layers_) (joint_.hidden().contains(session) ? hidden : shown).push_back(session);
+  for (std::size_t i = 0; i + max_past_sessions_ < hidden.size(); ++i) {
+    joint_.Remove(hidden[i]);
+    RemoveLayer(hidden[i]);
+  }
+  if (hidden.size() > max_past_sessions_) StoreSite();
+  std::size_t first = 0;
+  for (; first + max_past_sessions_ < shown.size(); ++first) {
+    joint_.Fold(shown[first], shown[first + 1]);
+    RemoveLayer(shown[first]);
+  }
+  if (first == 0) return;
+  for (const std::uint32_t version : versions_.RemoveParts(shown[first])) StoreVersion(version);
+  StoreLayer(shown[first]);
 }
 
 void Site::Publish(std::function<void()> then) {

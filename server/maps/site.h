@@ -79,6 +79,7 @@ class Site : public std::enable_shared_from_this<Site> {
     std::weak_ptr<GridOwner> owner;
     std::uint32_t epoch = 0;  // Of the map, as the session knows it.
     bool fragment = false;    // What it draws is not shown until a map version joins it (RobotGrid::fragment).
+    bool ended = false;
   };
   void Join(Member member);
   // Compares what the session has drawn with what earlier ones have drawn there. `refuses` is asked once, on the
@@ -89,6 +90,8 @@ class Site : public std::enable_shared_from_this<Site> {
   // Changes that wait for the strand are merged: the newest form of each chunk is kept, so that a site that is slow
   // holds at most the chunks that its sessions have.
   void Change(GridChange&& change);
+  // The session has ended: what it has drawn is the past from now on (layer_sum.h).
+  void End(SessionId session);
   // Called when the session is removed. Its part of the map stays and is stored, because the session no longer is.
   void Leave(SessionId session);
   // The site is deleted: after this it stores and publishes nothing. `done` receives what it had published
@@ -136,6 +139,8 @@ class Site : public std::enable_shared_from_this<Site> {
   void StoreSite();
   void StoreVersion(std::uint32_t version);
   void StoreLayer(SessionId session);
+  void RemoveLayer(SessionId session);
+  void FoldOldLayers();
   void RemoveOldVersions();
   Result<void> RestoreVersions(const StoredSite& stored);
   Result<void> RestoreLayers();
@@ -145,6 +150,7 @@ class Site : public std::enable_shared_from_this<Site> {
   const std::string name_;
   const NameId site_id_;
   const double resolution_m_;
+  const std::size_t max_past_sessions_;
   Outbound& outbound_;
   const Generation generation_;
   asio::strand<asio::thread_pool::executor_type> strand_;

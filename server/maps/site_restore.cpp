@@ -69,6 +69,13 @@ void Site::StoreLayer(SessionId session) {
       [layer = StoredLayer{session, ToStored({.chunks = joint_.ChunksOf(session)})}] { return BytesOf(layer); });
 }
 
+void Site::RemoveLayer(SessionId session) {
+  for (const std::uint32_t version : versions_.RemoveParts(session)) StoreVersion(version);
+  layers_.erase(session);
+  if (journal_ != nullptr)
+    journal_->Remove({.kind = RecordKind::kLayer, .owner = site_id_, .first = session, .last = session});
+}
+
 bool Site::Switched(std::uint32_t epoch, Generation generation) const {
   const auto made = switches_.find(epoch);
   return made != switches_.end() && made->second == generation;
@@ -131,6 +138,7 @@ Result<void> Site::RestoreLayers() {
     if (layer->session != number) return Fail(StatusCode::kDataLoss, "the record is that of another session");
     layers_.insert(layer->session);
     joint_.Replace(layer->session, FromStored(layer->grid).chunks);
+    joint_.SetPast(layer->session);
     return {};
   };
   const auto unreadable = [this](std::uint64_t number, const Status& why) {

@@ -93,7 +93,8 @@ void Roster::Enter(Site& site, const std::shared_ptr<Session>& session) {
              .robot = record.state().robot_id,
              .owner = session,
              .epoch = record.epoch(),
-             .fragment = record.joining().fragment});
+             .fragment = record.joining().fragment,
+             .ended = record.phase() == SessionPhase::kEnded});
 }
 
 std::shared_ptr<Session> Roster::Make(const StoredSession& stored, const std::shared_ptr<Site>& site,
@@ -107,6 +108,7 @@ std::shared_ptr<Session> Roster::Make(const StoredSession& stored, const std::sh
   SessionOutputs outputs{.send = [this](OutboundValue value) { return outbound_.Send(std::move(value)); },
                          .grid_changed = [site](GridChange&& change) { site->Change(std::move(change)); },
                          .store = {},
+                         .ended = [site, id] { site->End(id); },
                          .gone =
                              [site, id, closing = closing_] {
                                if (!*closing) site->Leave(id);

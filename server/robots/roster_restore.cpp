@@ -157,6 +157,7 @@ Roster::RestoredSession Roster::NotRestored(SessionId id, Status why) {
     what += " of robot '" + stored->request.robot + "' in site '" + site + "'";
     const MutexLock lock(mutex_);
     not_restored_[stored->request.robot] = why.message;
+    if (const auto drawn_in = atlas_.Find(site)) drawn_in->End(id);
   }
   spdlog::error("{}", journal_->set_aside().Add(site, what, why));
   return tl::unexpected(std::move(why));

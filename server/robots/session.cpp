@@ -239,6 +239,7 @@ void Session::Tick() {
 
 void Session::Finished(SessionPhase phase, Status status) {
   record_.SetPhase(phase, std::move(status));
+  if (phase == SessionPhase::kEnded && outputs_.ended) outputs_.ended();
   PublishLedgers(SessionRecord::Urgency::kNow);
   AnnounceState();
 }

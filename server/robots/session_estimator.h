@@ -33,6 +33,8 @@ struct SessionOutputs {
   std::function<std::uint64_t()> position = {};
   std::function<bool(std::uint64_t position, Journal::Content content)> checkpoint = {};
   std::uint64_t checkpoint_entries = 0;
+  // Called when the session ends. May be empty.
+  std::function<void()> ended = {};
   // Called when the session has been destroyed, after all of its changes were reported. May be empty.
   std::function<void()> gone = {};
 };

@@ -9,15 +9,15 @@ namespace {
 
 constexpr double kUnitsPerLogOdd = 100.0;
 
-std::int16_t LogOdds(double probability) {
-  return static_cast<std::int16_t>(std::lround(kUnitsPerLogOdd * std::log(probability / (1.0 - probability))));
-}
-
 std::size_t IndexInChunk(const GridCell& cell, const ChunkKey& key) {
   return static_cast<std::size_t>((cell.y - key.y * kTileCells) * kTileCells + (cell.x - key.x * kTileCells));
 }
 
 }  // namespace
+
+std::int16_t LogOddsOf(double probability) {
+  return static_cast<std::int16_t>(std::lround(kUnitsPerLogOdd * std::log(probability / (1.0 - probability))));
+}
 
 std::uint8_t OccupancyOf(std::int16_t log_odds) {
   if (log_odds == kUnseen) return kUnknownCell;
@@ -57,14 +57,14 @@ void Visit(OptionVisitor& visitor, GridOptions& options) {
 }
 
 OccupancyGrid::OccupancyGrid(const GridOptions& options)
-    : options_(options), clamp_(LogOdds(options.clamp_probability)) {
+    : options_(options), clamp_(LogOddsOf(options.clamp_probability)) {
   // If one observation decides, its step is larger than the range of values that a cell can hold.
   const auto decides = static_cast<std::int16_t>(2 * clamp_);
   const bool hit_decides = options.model == GridModel::kDeterministic || options.model == GridModel::kDegrading;
-  hit_ = hit_decides ? decides : LogOdds(options.hit_probability);
+  hit_ = hit_decides ? decides : LogOddsOf(options.hit_probability);
   adds_up_ = options.model == GridModel::kProbabilistic || options.model == GridModel::kDeterministic;
   miss_ = options.model == GridModel::kDeterministic ? static_cast<std::int16_t>(-decides)
-                                                     : LogOdds(options.miss_probability);
+                                                     : LogOddsOf(options.miss_probability);
 }
 
 OccupancyGrid::OccupancyGrid(const GridOptions& options, const Chunks& shared) : OccupancyGrid(options) {

@@ -46,6 +46,8 @@ struct ChunkKey {
   }
 };
 
+// The log odds of a probability between 0 and 1.
+[[nodiscard]] std::int16_t LogOddsOf(double probability);
 // Converts log odds to an occupancy of 0..100 %, or kUnseen to kUnknownCell.
 [[nodiscard]] std::uint8_t OccupancyOf(std::int16_t log_odds);
 

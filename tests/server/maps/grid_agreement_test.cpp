@@ -44,23 +44,5 @@ TEST(GridAgreement, WhereOthersHaveSeenNothingNothingIsCompared) {
   EXPECT_FALSE(CompareGrids({}, Drawn(), {}, 0.05).Contradicts());
 }
 
-TEST(SumOfGrids, AddsWhatIsSeenAndKeepsWhatIsSeenOnce) {
-  const auto chunk = [](std::int16_t first, std::int16_t second) {
-    auto made = std::make_shared<slam::GridChunk>();
-    made->log_odds.fill(slam::kUnseen);
-    made->log_odds[0] = first;
-    made->log_odds[1] = second;
-    return made;
-  };
-  const OccupancyGrid::Chunks a{{{0, 0}, chunk(100, slam::kUnseen)}},
-      b{{{0, 0}, chunk(-30, 40)}, {{1, 0}, chunk(7, 8)}}, c{{{0, 0}, chunk(32000, 5)}};
-  const OccupancyGrid::Chunks sum = SumOfGrids({&a, &b, &c});
-  ASSERT_EQ(sum.size(), 2U);
-  EXPECT_EQ(sum.at({0, 0})->log_odds[0], 32000);
-  EXPECT_EQ(sum.at({0, 0})->log_odds[1], 45);
-  EXPECT_EQ(sum.at({0, 0})->log_odds[2], slam::kUnseen);
-  EXPECT_EQ(sum.at({1, 0}), b.at({1, 0}));
-}
-
 }  // namespace
 }  // namespace cairn::server

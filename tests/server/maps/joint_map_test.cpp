@@ -7,6 +7,8 @@
 namespace cairn::server {
 namespace {
 
+constexpr double kPast = 0.8;
+
 std::shared_ptr<const slam::GridChunk> ChunkOf(std::int16_t log_odds, std::size_t cells = kTileArea) {
   auto chunk = std::make_shared<slam::GridChunk>();
   chunk->log_odds.fill(slam::kUnseen);
@@ -15,7 +17,7 @@ std::shared_ptr<const slam::GridChunk> ChunkOf(std::int16_t log_odds, std::size_
 }
 
 TEST(JointMap, EvidenceOfSeveralRobotsAdds) {
-  JointMap map;
+  JointMap map(kPast);
   map.Apply({.session = 1, .chunks = {{{0, 0}, ChunkOf(100, 2)}}});
   map.Apply({.session = 2, .chunks = {{{0, 0}, ChunkOf(50, 1)}}});
   map.Render();
@@ -26,15 +28,65 @@ TEST(JointMap, EvidenceOfSeveralRobotsAdds) {
 }
 
 TEST(JointMap, ContraryEvidenceCancels) {
-  JointMap map;
+  JointMap map(kPast);
   map.Apply({.session = 1, .chunks = {{{0, 0}, ChunkOf(200)}}});
   map.Apply({.session = 2, .chunks = {{{0, 0}, ChunkOf(-200)}}});
   map.Render();
   EXPECT_EQ((*map.cells().at({0, 0, 0}))[0], 50);
 }
 
+// A wall that two ended sessions have seen often, and a robot that sees now, as often as a look needs, that it has
+// gone.
+TEST(JointMap, WhatWasMovedSinceTheLastRunsIsGoneAfterAFewLooks) {
+  const std::int16_t wall = 389, miss = slam::LogOddsOf(slam::GridOptions{}.miss_probability);
+  JointMap map(kPast);
+  map.Apply({.session = 1, .chunks = {{{0, 0}, ChunkOf(wall)}}});
+  map.Apply({.session = 2, .chunks = {{{0, 0}, ChunkOf(wall)}}});
+  map.Apply({.session = 3, .chunks = {{{0, 0}, ChunkOf(static_cast<std::int16_t>(6 * miss), 1)}}});
+  map.Render();
+  EXPECT_GT((*map.cells().at({0, 0, 0}))[0], 90);
+  map.SetPast(1);
+  map.SetPast(2);
+  EXPECT_FALSE(map.Render().empty());
+  EXPECT_LT((*map.cells().at({0, 0, 0}))[0], 50);
+  EXPECT_GT((*map.cells().at({0, 0, 0}))[1], 98);  // Nobody has looked there since.
+  // One look is not enough.
+  map.Apply({.session = 3, .chunks = {{{0, 0}, ChunkOf(miss, 1)}}});
+  map.Render();
+  EXPECT_GT((*map.cells().at({0, 0, 0}))[0], 70);
+  // What the last run has seen counts more than the runs before, also after it has ended.
+  map.Apply({.session = 3, .chunks = {{{0, 0}, ChunkOf(-389, 1)}}});
+  map.SetPast(3);
+  map.Render();
+  EXPECT_LT((*map.cells().at({0, 0, 0}))[0], 10);
+}
+
+TEST(JointMap, SessionsThatAreFoldedLookAsBefore) {
+  std::mt19937 random(5);
+  JointMap map(kPast);
+  for (SessionId session = 1; session <= 5; ++session) {
+    for (int x = 0; x < 3; ++x) {
+      auto chunk = std::make_shared<slam::GridChunk>();
+      for (std::int16_t& cell : chunk->log_odds)
+        cell = random() % 3 == 0 ? slam::kUnseen : static_cast<std::int16_t>(static_cast<int>(random() % 779) - 389);
+      if ((session + static_cast<SessionId>(x)) % 3 != 0) map.Apply({.session = session, .chunks = {{{x, 0}, chunk}}});
+    }
+    if (session <= 3) map.SetPast(session);
+  }
+  map.Render();
+  const auto before = map.cells();
+  map.Fold(1, 2);
+  map.Fold(2, 3);
+  map.Render();
+  EXPECT_TRUE(map.ChunksOf(1).empty());
+  EXPECT_TRUE(map.ChunksOf(2).empty());
+  EXPECT_EQ(map.ChunksOf(3).size(), 3U);
+  ASSERT_EQ(map.cells().size(), before.size());
+  for (const auto& [key, cells] : before) EXPECT_EQ(*map.cells().at(key), *cells);
+}
+
 TEST(JointMap, AHiddenSessionIsKeptAndNotShown) {
-  JointMap map;
+  JointMap map(kPast);
   map.Apply({.session = 1, .chunks = {{{0, 0}, ChunkOf(100, 2)}}});
   map.SetHidden(2, true);
   map.Apply({.session = 2, .chunks = {{{0, 0}, ChunkOf(50, 1)}, {{1, 0}, ChunkOf(50)}}});
@@ -52,7 +104,7 @@ TEST(JointMap, AHiddenSessionIsKeptAndNotShown) {
 }
 
 TEST(JointMap, RenderNamesWhatChangedOnEveryLevelOnce) {
-  JointMap map;
+  JointMap map(kPast);
   map.Apply({.session = 1, .chunks = {{{0, 0}, ChunkOf(100)}, {{1, 0}, ChunkOf(100)}}});
   const auto changed = map.Render();
   // Two tiles of level 0 share their parents on levels 1 to 3.
@@ -63,7 +115,7 @@ TEST(JointMap, RenderNamesWhatChangedOnEveryLevelOnce) {
 }
 
 TEST(JointMap, TilesLeftOfTheOriginHaveParentsLeftOfTheOrigin) {
-  JointMap map;
+  JointMap map(kPast);
   map.Apply({.session = 1, .chunks = {{{-1, -3}, ChunkOf(100)}}});
   map.Render();
   EXPECT_TRUE(map.cells().contains({1, -1, -2}));
@@ -72,7 +124,7 @@ TEST(JointMap, TilesLeftOfTheOriginHaveParentsLeftOfTheOrigin) {
 }
 
 TEST(JointMap, AChunkThatGoesTakesItsTileWithIt) {
-  JointMap map;
+  JointMap map(kPast);
   map.Apply({.session = 1, .chunks = {{{0, 0}, ChunkOf(100)}}});
   map.Render();
   map.Apply({.session = 1, .chunks = {{{0, 0}, nullptr}}});
@@ -81,7 +133,7 @@ TEST(JointMap, AChunkThatGoesTakesItsTileWithIt) {
 }
 
 TEST(JointMap, ReplaceRemovesWhatTheNewGridDoesNotHave) {
-  JointMap map;
+  JointMap map(kPast);
   map.Apply({.session = 1, .chunks = {{{0, 0}, ChunkOf(100)}, {{5, 5}, ChunkOf(100)}}});
   map.Apply({.session = 2, .chunks = {{{5, 5}, ChunkOf(70)}}});
   map.Render();
@@ -95,7 +147,7 @@ TEST(JointMap, ReplaceRemovesWhatTheNewGridDoesNotHave) {
 // Property: changes applied one by one give the map that a fresh one gives from the final chunks.
 TEST(JointMap, StepByStepEqualsFromScratch) {
   std::mt19937 random(3);
-  JointMap stepwise;
+  JointMap stepwise(kPast);
   std::map<SessionId, slam::OccupancyGrid::Chunks> latest;
   for (int i = 0; i < 200; ++i) {
     const SessionId session = random() % 3;
@@ -111,7 +163,7 @@ TEST(JointMap, StepByStepEqualsFromScratch) {
     if (i % 7 == 0) stepwise.Render();
   }
   stepwise.Render();
-  JointMap fresh;
+  JointMap fresh(kPast);
   for (const auto& [session, chunks] : latest) fresh.Replace(session, chunks);
   fresh.Render();
   ASSERT_EQ(stepwise.cells().size(), fresh.cells().size());

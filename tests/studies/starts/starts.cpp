@@ -15,6 +15,8 @@
 #include "client/sim/fleet.h"
 #include "client/sim/shipped_worlds.h"
 #include "server/maps/grid_agreement.h"
+#include "server/maps/joint_map.h"
+#include "server/maps/maps_options.h"
 #include "server/slam/scan_pipeline.h"
 #include "tests/studies/study.h"
 
@@ -80,12 +82,11 @@ void Draw(const std::vector<LogRecord>& records, const Pose2& T_map_robot_start,
   visit(-1.0, last.value_or(T_map_robot_start), pipeline.mapper().ShareGrid());
 }
 
-// The sum of several grids.
-OccupancyGrid::Chunks SumOf(const std::vector<OccupancyGrid::Chunks>& grids, std::size_t without) {
-  std::vector<const OccupancyGrid::Chunks*> others;
-  for (std::size_t i = 0; i < grids.size(); ++i)
-    if (i != without) others.push_back(&grids[i]);
-  return server::SumOfGrids(others);
+// What the others have drawn where this robot drives.
+OccupancyGrid::Chunks DrawnByOthers(const std::vector<OccupancyGrid::Chunks>& grids, std::size_t robot) {
+  server::JointMap joint(server::MapsOptions{}.past_probability);
+  for (std::size_t i = 0; i < grids.size(); ++i) joint.Replace(i == robot ? grids.size() : i, grids[i]);
+  return joint.DrawnBefore(grids.size());
 }
 
 struct Kind {
@@ -124,7 +125,7 @@ void RunStarts(StudyContext& context) {
     std::uniform_real_distribution<double> any(0.0, 1.0);
     std::map<std::string, Count> counts;
     for (std::size_t robot = 0; robot < first.size(); ++robot) {
-      const OccupancyGrid::Chunks others = SumOf(grids, robot);
+      const OccupancyGrid::Chunks others = DrawnByOthers(grids, robot);
       for (const Kind& kind : kKinds) {
         for (int run = 0; run < runs; ++run) {
           Count& count = counts[kind.name];

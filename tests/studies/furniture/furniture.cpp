@@ -1,0 +1,200 @@
+// cairn-study furniture: furniture is moved between two runs. How often must a robot of today pass the place where a
+// piece stood until the joint map does not show it any more, and is what was brought there shown? With one and with
+// several runs before; and, for comparison, if the runs before counted as much as the one of today.
+#include "client/sim/furniture.h"
+
+#include <algorithm>
+#include <map>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "client/sim/shipped_worlds.h"
+#include "server/maps/joint_map.h"
+#include "server/maps/maps_options.h"
+#include "server/slam/scan_pipeline.h"
+#include "tests/studies/logs.h"
+#include "tests/studies/study.h"
+
+namespace cairn::studies {
+namespace {
+
+constexpr int kPasses = 5;  // That are told apart.
+constexpr double kPassM = 4.0, kGoneM = 6.0;
+constexpr std::uint8_t kOccupied = 65;
+constexpr int kPieces = 40;
+
+using Chunks = slam::OccupancyGrid::Chunks;
+
+// A place where a piece of furniture stands or stood.
+struct Place {
+  sim::Disc disc;
+  int passes = 0;
+  bool near = false;
+};
+
+bool IsDrawn(const server::JointMap& map, const sim::Disc& disc, double resolution_m) {
+  const auto cell_of = [&](double coordinate_m) { return static_cast<int>(std::floor(coordinate_m / resolution_m)); };
+  const Eigen::Vector2d low = disc.center_map.array() - disc.radius_m, high = disc.center_map.array() + disc.radius_m;
+  int occupied = 0;
+  for (int y = cell_of(low.y()); y <= cell_of(high.y()); ++y) {
+    for (int x = cell_of(low.x()); x <= cell_of(high.x()); ++x) {
+      const Eigen::Vector2d centre = resolution_m * Eigen::Vector2d(x + 0.5, y + 0.5);
+      if ((centre - disc.center_map).norm() > disc.radius_m) continue;
+      const auto tile = map.cells().find({0, FloorDiv(x, kTileCells), FloorDiv(y, kTileCells)});
+      if (tile == map.cells().end()) continue;
+      const int column = x - tile->first.x * kTileCells, row = y - tile->first.y * kTileCells;
+      const std::uint8_t cell = (*tile->second)[static_cast<std::size_t>(row * kTileCells + column)];
+      occupied += cell != kUnknownCell && cell >= kOccupied ? 1 : 0;
+    }
+  }
+  return occupied >= 2;
+}
+
+// Maps a drive, and calls `visit` once a second with the true pose and the grid.
+template <typename Visit>
+Chunks Map(const StudyLog& log, const slam::MapperOptions& options, const Visit& visit) {
+  slam::ScanPipeline pipeline(
+      options, log.T_map_robot_start, slam::SerialFor,
+      {.used = [](const Scan&, const slam::ScanOutcome&) {}, .dropped = [](const Scan&, DropReason) {}});
+  Stamp next = 0;
+  for (const LogRecord& record : log.records) {
+    if (const auto* const odometry = std::get_if<Odometry>(&record)) {
+      pipeline.Add(*odometry);
+      continue;
+    }
+    const auto& scan = std::get<Scan>(record);
+    pipeline.Add(std::make_shared<const Scan>(scan));
+    if (scan.stamp < next) continue;
+    next = scan.stamp + StampFromSeconds(1.0);
+    if (const auto truth = PoseOn(log.truth, scan.stamp, 0.5)) visit(*truth, pipeline.mapper());
+  }
+  return pipeline.mapper().ShareGrid();
+}
+
+StudyLog Drive(const std::string& world, double seconds, std::uint64_t seed, std::uint64_t furniture_seed) {
+  sim::FleetOptions fleet;
+  fleet.seed = seed;
+  fleet.furniture = {.pieces = kPieces, .seed = furniture_seed};
+  return SimulateLog(world, seconds, fleet);
+}
+
+// After so many passes.
+struct Drawn {
+  int places = 0, drawn = 0;
+
+  [[nodiscard]] std::string share() const { return places == 0 ? "-" : Percent(static_cast<double>(drawn) / places); }
+};
+struct Tally {
+  std::map<int, Drawn> moved;  // After so many passes.
+  Drawn brought;               // After one pass.
+};
+
+// The robot of today drives; what it has passed is looked at when it has gone on.
+Tally Today(const std::vector<Chunks>& past, bool weighs_less, const StudyLog& today, std::vector<Place> moved,
+            std::vector<Place> brought, const slam::MapperOptions& options) {
+  server::JointMap map(server::MapsOptions{}.past_probability);
+  const auto me = static_cast<server::SessionId>(past.size() + 1);
+  for (std::size_t i = 0; i < past.size(); ++i) {
+    map.Replace(i + 1, past[i]);
+    if (weighs_less) map.SetPast(i + 1);
+  }
+  map.Render();
+  Tally tally;
+  for (const Place& place : moved) {
+    ++tally.moved[0].places;
+    tally.moved[0].drawn += IsDrawn(map, place.disc, options.grid.resolution_m) ? 1 : 0;
+  }
+  const auto passes = [](std::vector<Place>& places, const Pose2& robot, const auto& passed) {
+    for (Place& place : places) {
+      const double away = (place.disc.center_map - robot.translation()).norm();
+      if (place.near && away > kGoneM) {
+        place.near = false;
+        passed(place.disc, ++place.passes);
+      }
+      place.near = place.near || away < kPassM;
+    }
+  };
+  Map(today, options, [&](const Pose2& robot, slam::Mapper& mapper) {
+    bool drawn_now = false;
+    const auto look = [&](const sim::Disc& disc, Drawn& count) {
+      if (!std::exchange(drawn_now, true)) {
+        map.Replace(me, mapper.ShareGrid());
+        map.Render();
+      }
+      ++count.places;
+      count.drawn += IsDrawn(map, disc, options.grid.resolution_m) ? 1 : 0;
+    };
+    passes(moved, robot, [&](const sim::Disc& disc, int pass) {
+      if (pass <= kPasses) look(disc, tally.moved[pass]);
+    });
+    passes(brought, robot, [&](const sim::Disc& disc, int pass) {
+      if (pass == 1) look(disc, tally.brought);
+    });
+  });
+  return tally;
+}
+
+// The pieces of `here` beside which none of `there` stands.
+std::vector<Place> Apart(const std::vector<sim::Post>& here, const std::vector<sim::Post>& there) {
+  std::vector<Place> apart;
+  for (const sim::Post& post : here) {
+    const bool free = std::all_of(there.begin(), there.end(), [&](const sim::Post& other) {
+      const double between = (other.disc.center_map - post.disc.center_map).norm();
+      return between > other.disc.radius_m + post.disc.radius_m + 0.3;
+    });
+    if (free) apart.push_back({post.disc});
+  }
+  return apart;
+}
+
+void StudyFurniture(StudyContext& context) {
+  Report& report = context.report;
+  report.Heading("Furniture that was moved between two runs");
+  slam::MapperOptions options;
+  options.seed = static_cast<std::int64_t>(context.seed);
+  std::vector<std::string> columns = {"world", "runs before", "the past", "pieces", "drawn before"};
+  for (int pass = 1; pass <= kPasses; ++pass) columns.push_back("after " + Count(pass));
+  columns.push_back("brought, after 1");
+  Table table(columns);
+  for (const std::string world : {"office", "building", "storey"}) {
+    const auto place = sim::OpenSurroundings(world);
+    if (!place) throw std::invalid_argument(place.error().message);
+    const auto before = sim::FurnitureIn(*place, {.pieces = kPieces, .seed = context.seed});
+    const auto after = sim::FurnitureIn(*place, {.pieces = kPieces, .seed = context.seed + 1});
+    const std::vector<Place> moved = Apart(before, after), brought = Apart(after, before);
+    const double seconds = context.Pick(1500.0, 300.0);
+    std::vector<Chunks> past;
+    for (std::uint64_t run = 0; run < 3; ++run)
+      past.push_back(Map(Drive(world, seconds / 3.0, context.seed + run, context.seed), options,
+                         [](const Pose2&, const slam::Mapper&) {}));
+    const StudyLog today = Drive(world, seconds, context.seed + 10, context.seed + 1);
+    for (const std::size_t runs : {std::size_t{1}, std::size_t{3}}) {
+      for (const bool weighs_less : {true, false}) {
+        const Tally tally = Today({past.begin(), past.begin() + static_cast<std::ptrdiff_t>(runs)}, weighs_less, today,
+                                  moved, brought, options);
+        std::vector<std::string> row = {world, Count(runs), weighs_less ? "weighs less" : "counts as today",
+                                        Count(moved.size()), tally.moved.at(0).share()};
+        for (int pass = 1; pass <= kPasses; ++pass) {
+          const auto of_pass = tally.moved.find(pass);
+          row.push_back(of_pass == tally.moved.end() ? "-" : of_pass->second.share());
+        }
+        row.push_back(tally.brought.share());
+        table.Add(row);
+        const auto third = tally.moved.find(3);
+        if (weighs_less && third != tally.moved.end())
+          report.Expect(third->second.drawn <= 0.05 * third->second.places,
+                        world + ": " + third->second.share() + " of what was moved is still drawn after 3 passes");
+      }
+    }
+  }
+  report.Add(table, "furniture");
+}
+
+const Registration kFurniture("furniture", "furniture that was moved between two runs: how soon the map shows it",
+                              StudyFurniture);
+
+}  // namespace
+}  // namespace cairn::studies
