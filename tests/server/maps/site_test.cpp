@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "server/store/site_contents.h"
+#include "server/store/sqlite_store.h"
 
 namespace cairn::server {
 namespace {
