@@ -227,26 +227,6 @@ void Site::Leave(SessionId session) {
   });
 }
 
-// A fragment that was never joined is not shown and cannot become part of what is; the oldest of these go.
-void Site::FoldOldLayers() {
-  if (switch_) return;  // It may need the parts that are folded. The next session that leaves folds more.
-  std::vector<SessionId> shown, hidden;  // The oldest first.
-  for (const SessionId session : layers_) (joint_.hidden().contains(session) ? hidden : shown).push_back(session);
-  for (std::size_t i = 0; i + max_past_sessions_ < hidden.size(); ++i) {
-    joint_.Remove(hidden[i]);
-    RemoveLayer(hidden[i]);
-  }
-  if (hidden.size() > max_past_sessions_) StoreSite();
-  std::size_t first = 0;
-  for (; first + max_past_sessions_ < shown.size(); ++first) {
-    joint_.Fold(shown[first], shown[first + 1]);
-    RemoveLayer(shown[first]);
-  }
-  if (first == 0) return;
-  for (const std::uint32_t version : versions_.RemoveParts(shown[first])) StoreVersion(version);
-  StoreLayer(shown[first]);
-}
-
 void Site::Publish(std::function<void()> then) {
   if (publish_waits_.exchange(true)) {
     if (then) then();
@@ -309,15 +289,6 @@ void Site::Settle(std::uint32_t version, SessionId session, std::optional<Adopte
     StageGone(session);
   }
   CommitIfComplete();
-}
-
-void Site::StageGone(SessionId session) {
-  const RobotGrid& part = versions_.Find(switch_->version)->parts.at(session);
-  switch_->staged.emplace(session, part.chunks);
-  RobotGrid& displaced = switch_->displaced[session];
-  displaced.chunks = joint_.ChunksOf(session);
-  displaced.keyframes = part.keyframes;
-  displaced.fragment = joint_.hidden().contains(session);
 }
 
 void Site::CommitIfComplete() {

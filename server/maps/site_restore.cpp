@@ -62,20 +62,6 @@ void Site::RemoveOldVersions() {
   });
 }
 
-void Site::StoreLayer(SessionId session) {
-  if (journal_ == nullptr) return;
-  journal_->Put(
-      {RecordKind::kLayer, site_id_, session},
-      [layer = StoredLayer{session, ToStored({.chunks = joint_.ChunksOf(session)})}] { return BytesOf(layer); });
-}
-
-void Site::RemoveLayer(SessionId session) {
-  for (const std::uint32_t version : versions_.RemoveParts(session)) StoreVersion(version);
-  layers_.erase(session);
-  if (journal_ != nullptr)
-    journal_->Remove({.kind = RecordKind::kLayer, .owner = site_id_, .first = session, .last = session});
-}
-
 bool Site::Switched(std::uint32_t epoch, Generation generation) const {
   const auto made = switches_.find(epoch);
   return made != switches_.end() && made->second == generation;
@@ -129,22 +115,6 @@ Result<void> Site::RestoreVersions(const StoredSite& stored) {
   if (newest < UINT32_MAX) next = std::max(next, newest + 1);
   versions_.Restore(std::move(versions), next, enabled);
   return {};
-}
-
-Result<void> Site::RestoreLayers() {
-  const auto take = [this](std::uint64_t number, std::string_view bytes) -> Result<void> {
-    const auto layer = LayerOf(bytes);
-    if (!layer) return tl::unexpected(layer.error());
-    if (layer->session != number) return Fail(StatusCode::kDataLoss, "the record is that of another session");
-    layers_.insert(layer->session);
-    joint_.Replace(layer->session, FromStored(layer->grid).chunks);
-    joint_.SetPast(layer->session);
-    return {};
-  };
-  const auto unreadable = [this](std::uint64_t number, const Status& why) {
-    PutAside("the part of the map that session " + std::to_string(number) + " has drawn", why);
-  };
-  return ReadEach(journal_->store(), {.kind = RecordKind::kLayer, .owner = site_id_}, take, unreadable);
 }
 
 }  // namespace cairn::server

@@ -6,23 +6,14 @@
 #include <chrono>
 #include <future>
 #include <map>
-#include <set>
 #include <stdexcept>
 #include <string>
 #include <variant>
-#include <vector>
 
-#include "server/store/site_contents.h"
-#include "server/store/sqlite_store.h"
+#include "tests/server/maps/uniform_chunk.h"
 
 namespace cairn::server {
 namespace {
-
-std::shared_ptr<const slam::GridChunk> UniformChunk(std::int16_t log_odds) {
-  auto chunk = std::make_shared<slam::GridChunk>();
-  chunk->log_odds.fill(log_odds);
-  return chunk;
-}
 
 using Corrections = std::vector<std::pair<SessionId, Correction>>;
 
@@ -85,46 +76,6 @@ class SiteTest : public ::testing::Test {
   std::map<SessionId, std::shared_ptr<FakeSession>> sessions_;
   std::shared_ptr<Site> site_ = std::make_shared<Site>("lab", 0.05, MapsOptions{.max_versions = 3}, pool_, outbound_);
 };
-
-// A site that has run for years. Its memory and its store follow the area, not the number of runs.
-TEST_F(SiteTest, TheOldestOfManySessionsThatAreGoneBecomeOnePartOfTheMap) {
-  const auto store = *OpenStore(kInMemory);
-  Journal journal(*store, StoreOptions{});
-  journal.Start();
-  const auto site =
-      std::make_shared<Site>("years", 0.05, MapsOptions{.max_past_sessions = 3}, pool_, outbound_, &journal);
-  const auto settle = [&] {
-    site->Publish();
-    std::promise<void> reached;
-    site->Probe([&] { reached.set_value(); });
-    reached.get_future().wait();
-  };
-  for (SessionId id = 1; id <= 10; ++id) {
-    const int x = static_cast<int>(id);
-    site->Join({.session = id, .robot = 100 + id, .owner = {}, .fragment = id % 2 == 0});
-    site->Change({.session = id, .chunks = {{{x, 0}, UniformChunk(100)}}});
-    site->Leave(id);
-  }
-  settle();
-  const auto tiles = [](const Site& of) {
-    std::set<int> xs;
-    for (int x = 0; x <= 10; ++x)
-      if (of.snapshot()->tiles.Find({0, x, 0}) != nullptr) xs.insert(x);
-    return xs;
-  };
-  const std::set<int> expected = {1, 3, 5, 7, 9};
-  EXPECT_EQ(tiles(*site), expected);
-  journal.Stop();
-  // Shown: 5 (with what 1 and 3 have drawn), 7 and 9; not joined: 6, 8 and 10.
-  EXPECT_EQ(*store->Numbers({.kind = RecordKind::kLayer, .owner = HashName("years")}),
-            (std::vector<std::uint64_t>{5, 6, 7, 8, 9, 10}));
-  Journal next_journal(*store, StoreOptions{});
-  const auto next = std::make_shared<Site>("years", 0.05, MapsOptions{}, pool_, outbound_, &next_journal);
-  const auto stored = ReadSite(*store, "years");
-  ASSERT_TRUE(stored);
-  ASSERT_TRUE(next->Restore(stored->site));
-  EXPECT_EQ(tiles(*next), expected);
-}
 
 TEST_F(SiteTest, PublishesOnlyWhatChanged) {
   site_->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(100)}, {{9, 9}, UniformChunk(100)}}});
