@@ -179,8 +179,8 @@ class WholeServer {
     return tiles;
   }
 
-  bool WaitFor(const std::function<bool()>& condition) const {
-    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  bool WaitFor(const std::function<bool()>& condition, std::chrono::seconds at_most = std::chrono::seconds(30)) const {
+    const auto deadline = std::chrono::steady_clock::now() + at_most;
     while (!condition()) {
       const MutexLock lock(mutex_);
       if (std::chrono::steady_clock::now() > deadline) return false;
