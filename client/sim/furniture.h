@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "client/sim/scene.h"
 #include "common/status.h"
@@ -16,7 +17,7 @@ struct FurnitureOptions {
 };
 [[nodiscard]] Result<void> Validate(const FurnitureOptions& options);
 
-// The furniture alone, for a place without any. REQUIRES: the place has a route.
+// The new pieces alone. REQUIRES: the place has a route, and no furniture of another call.
 [[nodiscard]] std::vector<Post> FurnitureIn(const Surroundings& place, const FurnitureOptions& options);
 
 }  // namespace cairn::sim

@@ -60,35 +60,19 @@ void JointMap::SetHidden(SessionId session, bool hidden) {
 }
 
 void JointMap::SetPast(SessionId session) {
-  if (past_.insert(session).second) MarkChanged(session);
+  if (past_.emplace(session, past_.size()).second) MarkChanged(session);
+}
+
+std::vector<SessionId> JointMap::past() const {
+  std::vector<SessionId> in_order(past_.size());
+  for (const auto& [session, before] : past_) in_order[before] = session;
+  return in_order;
 }
 
 void JointMap::MarkChanged(SessionId session) {
   for (const auto& [key, layers] : chunks_) {
     if (layers.contains(session)) dirty_.insert(key);
   }
-}
-
-void JointMap::Remove(SessionId session) {
-  Replace(session, {});
-  hidden_.erase(session);
-  past_.erase(session);
-}
-
-void JointMap::Fold(SessionId earlier, SessionId later) {
-  for (const auto& [key, chunk] : ChunksOf(earlier)) {
-    const auto& layers = chunks_.at(key);
-    const auto of_later = layers.find(later);
-    auto both = chunk;
-    if (of_later != layers.end()) {
-      auto sum = std::make_shared<slam::GridChunk>(*chunk);
-      AddLater(*sum, *of_later->second, most_past_);
-      both = std::move(sum);
-    }
-    SetLayer(key, later, std::move(both));
-    SetLayer(key, earlier, nullptr);
-  }
-  past_.erase(earlier);
 }
 
 void JointMap::SetLayer(slam::ChunkKey key, SessionId session, std::shared_ptr<const slam::GridChunk> chunk) {
@@ -138,15 +122,22 @@ bool JointMap::Store(TileKey key, Cells cells) {
 
 template <typename Counts>
 std::shared_ptr<const slam::GridChunk> JointMap::SumOf(const Layers& layers, const Counts& counts) const {
-  std::vector<const std::shared_ptr<const slam::GridChunk>*> past, present;  // The earliest first.
+  using Chunk = std::shared_ptr<const slam::GridChunk>;
+  std::map<std::size_t, const Chunk*> past;  // In the order in which their sessions ended.
+  std::vector<const Chunk*> present;
   for (const auto& [session, chunk] : layers) {
     if (hidden_.contains(session) || !counts(session)) continue;
-    (past_.contains(session) ? past : present).push_back(&chunk);
+    const auto ended = past_.find(session);
+    if (ended == past_.end()) {
+      present.push_back(&chunk);
+    } else {
+      past.emplace(ended->second, &chunk);
+    }
   }
   if (past.empty() && present.empty()) return nullptr;
-  if (past.size() + present.size() == 1) return past.empty() ? *present.front() : *past.front();
+  if (past.size() + present.size() == 1) return past.empty() ? *present.front() : *past.begin()->second;
   auto sum = std::make_shared<slam::GridChunk>(UnseenChunk());
-  for (const auto* const chunk : past) AddLater(*sum, **chunk, most_past_);
+  for (const auto& [before, chunk] : past) AddLater(*sum, **chunk, most_past_);
   slam::GridChunk now = UnseenChunk();
   for (const auto* const chunk : present) AddBeside(now, **chunk);
   AddLater(*sum, now, most_past_);

@@ -6,6 +6,7 @@
 // Not thread-safe: used on the site's strand only.
 #pragma once
 
+#include <cstddef>
 #include <map>
 #include <memory>
 #include <set>
@@ -33,13 +34,11 @@ class JointMap {
   void SetHidden(SessionId session, bool hidden);
   [[nodiscard]] const std::set<SessionId>& hidden() const { return hidden_; }
 
-  // The session has ended. Of those that have ended, one with a larger id is later. A session goes on unless it ended.
+  // The session has ended, later than those for which this was called before. A second call does nothing. Until then a
+  // session counts as one of today.
   void SetPast(SessionId session);
-  // Nothing of the session is kept.
-  void Remove(SessionId session);
-  // Both have ended: what the earlier one has drawn becomes part of what the later one has drawn.
-  void Fold(SessionId earlier, SessionId later);
-
+  // Those that have ended, in that order.
+  [[nodiscard]] std::vector<SessionId> past() const;
   // The sum of the grids of the sessions before this one that are shown, in and around the area of its own grid.
   [[nodiscard]] slam::OccupancyGrid::Chunks DrawnBefore(SessionId session) const;
 
@@ -62,7 +61,8 @@ class JointMap {
 
   const int most_past_;  // Log odds.
   std::map<slam::ChunkKey, Layers> chunks_;
-  std::set<SessionId> hidden_, past_;
+  std::set<SessionId> hidden_;
+  std::map<SessionId, std::size_t> past_;  // Sessions that have ended, and how many had before.
   std::set<slam::ChunkKey> dirty_;
   std::map<TileKey, Cells> cells_;
 };

@@ -33,13 +33,6 @@ void MapVersions::Enable(std::uint32_t version, std::map<SessionId, RobotGrid> d
   versions_.at(version).info.enabled = true;
 }
 
-std::vector<std::uint32_t> MapVersions::RemoveParts(SessionId session) {
-  std::vector<std::uint32_t> changed;
-  for (auto& [number, version] : versions_)
-    if (version.parts.erase(session) > 0) changed.push_back(number);
-  return changed;
-}
-
 void MapVersions::Restore(std::map<std::uint32_t, MapVersion> versions, std::uint32_t next, std::uint32_t enabled) {
   versions_ = std::move(versions);
   next_ = next;

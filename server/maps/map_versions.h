@@ -32,9 +32,6 @@ class MapVersions {
   // REQUIRES: Find(version). `displaced`: the sessions' grids of the version that has been enabled so far.
   void Enable(std::uint32_t version, std::map<SessionId, RobotGrid> displaced);
 
-  // Removes the part of a session from every version. Returns the versions that had one.
-  std::vector<std::uint32_t> RemoveParts(SessionId session);
-
   // Restores the stored versions. REQUIRES: `enabled` is one of the versions, and all are below `next`.
   void Restore(std::map<std::uint32_t, MapVersion> versions, std::uint32_t next, std::uint32_t enabled);
 

@@ -15,11 +15,6 @@ void Visit(OptionVisitor& visitor, MapsOptions& options) {
   visitor.Real("past_probability", options.past_probability, "", 0.51, 0.999,
                "Largest probability that sessions which have ended give a cell that a later session has seen as well. "
                "Nearer to 1, what was moved between two runs stays in the map for longer.");
-  visitor.Integer(
-      "max_past_sessions", options.max_past_sessions, "", 1, 10000,
-      "Sessions that no longer exist whose parts of a site's map are kept apart. When there are more, what "
-      "the two oldest have drawn becomes one part, which no older version of the map changes any more. Each "
-      "one takes the memory of the area that it has drawn.");
 }
 
 }  // namespace cairn::server

@@ -12,7 +12,6 @@ struct MapsOptions {
   std::int64_t max_sites = 64;
   std::int64_t max_versions = 8;
   double past_probability = 0.8;
-  std::int64_t max_past_sessions = 16;
 };
 void Visit(OptionVisitor& visitor, MapsOptions& options);
 

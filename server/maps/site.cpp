@@ -66,7 +66,6 @@ Site::Site(const std::string& name, double resolution_m, const MapsOptions& opti
     : name_(name),
       site_id_(HashName(name)),
       resolution_m_(resolution_m),
-      max_past_sessions_(static_cast<std::size_t>(options.max_past_sessions)),
       outbound_(outbound),
       generation_(generation),
       strand_(asio::make_strand(pool)),
@@ -214,16 +213,20 @@ void Site::FailSwitch(StatusCode code, const std::string& why) {
 }
 
 void Site::End(SessionId session) {
-  Run([session](Site& site) { site.joint_.SetPast(session); });
+  Run([session](Site& site) {
+    site.joint_.SetPast(session);
+    site.StoreSite();
+  });
 }
 
 void Site::Leave(SessionId session) {
   Run([session](Site& site) {
     site.joint_.SetPast(session);
+    if (site.journal_ == nullptr) return;
+    site.StoreSite();
     site.layers_.insert(session);
     site.StoreLayer(session);
-    if (site.journal_ != nullptr) site.journal_->Forget(session);
-    site.FoldOldLayers();
+    site.journal_->Forget(session);
   });
 }
 

@@ -139,8 +139,6 @@ class Site : public std::enable_shared_from_this<Site> {
   void StoreSite();
   void StoreVersion(std::uint32_t version);
   void StoreLayer(SessionId session);
-  void RemoveLayer(SessionId session);
-  void FoldOldLayers();
   void RemoveOldVersions();
   Result<void> RestoreVersions(const StoredSite& stored);
   Result<void> RestoreLayers();
@@ -150,7 +148,6 @@ class Site : public std::enable_shared_from_this<Site> {
   const std::string name_;
   const NameId site_id_;
   const double resolution_m_;
-  const std::size_t max_past_sessions_;
   Outbound& outbound_;
   const Generation generation_;
   asio::strand<asio::thread_pool::executor_type> strand_;

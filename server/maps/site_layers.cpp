@@ -1,6 +1,5 @@
 // The parts of a site's map that sessions have drawn which no longer exist (site.h).
 #include <utility>
-#include <vector>
 
 #include "server/maps/site.h"
 #include "server/maps/stored_grid.h"
@@ -12,13 +11,6 @@ void Site::StoreLayer(SessionId session) {
   journal_->Put(
       {RecordKind::kLayer, site_id_, session},
       [layer = StoredLayer{session, ToStored({.chunks = joint_.ChunksOf(session)})}] { return BytesOf(layer); });
-}
-
-void Site::RemoveLayer(SessionId session) {
-  for (const std::uint32_t version : versions_.RemoveParts(session)) StoreVersion(version);
-  layers_.erase(session);
-  if (journal_ != nullptr)
-    journal_->Remove({.kind = RecordKind::kLayer, .owner = site_id_, .first = session, .last = session});
 }
 
 Result<void> Site::RestoreLayers() {
@@ -35,26 +27,6 @@ Result<void> Site::RestoreLayers() {
     PutAside("the part of the map that session " + std::to_string(number) + " has drawn", why);
   };
   return ReadEach(journal_->store(), {.kind = RecordKind::kLayer, .owner = site_id_}, take, unreadable);
-}
-
-// A fragment that was never joined is not shown and cannot become part of what is; the oldest of these go.
-void Site::FoldOldLayers() {
-  if (switch_) return;  // It may need the parts that are folded. The next session that leaves folds more.
-  std::vector<SessionId> shown, hidden;  // The oldest first.
-  for (const SessionId session : layers_) (joint_.hidden().contains(session) ? hidden : shown).push_back(session);
-  for (std::size_t i = 0; i + max_past_sessions_ < hidden.size(); ++i) {
-    joint_.Remove(hidden[i]);
-    RemoveLayer(hidden[i]);
-  }
-  if (hidden.size() > max_past_sessions_) StoreSite();
-  std::size_t first = 0;
-  for (; first + max_past_sessions_ < shown.size(); ++first) {
-    joint_.Fold(shown[first], shown[first + 1]);
-    RemoveLayer(shown[first]);
-  }
-  if (first == 0) return;
-  for (const std::uint32_t version : versions_.RemoveParts(shown[first])) StoreVersion(version);
-  StoreLayer(shown[first]);
 }
 
 void Site::StageGone(SessionId session) {

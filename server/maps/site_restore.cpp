@@ -41,7 +41,8 @@ void Site::StoreSite() {
                     .switches = switches_,
                     .members = {},
                     .resolution_m = resolution_m_,
-                    .fragments = joint_.hidden()};
+                    .fragments = joint_.hidden(),
+                    .past = joint_.past()};
   for (const auto& [session, member] : members_) stored.members[member.robot] = session;  // The last one.
   journal_->Put({RecordKind::kSite, site_id_, 0}, [stored = std::move(stored)] { return BytesOf(stored); });
 }
@@ -77,6 +78,7 @@ Result<void> Site::Restore(const StoredSite& stored) {
   tile_version_ = std::max(tile_version_, stored.tile_version);
   switches_ = stored.switches;
   for (const SessionId session : stored.fragments) joint_.SetHidden(session, true);
+  for (const SessionId session : stored.past) joint_.SetPast(session);
   if (auto restored = RestoreVersions(stored); !restored) return restored;
   if (auto restored = RestoreLayers(); !restored) return restored;
   Render();

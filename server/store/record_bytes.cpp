@@ -109,6 +109,7 @@ std::string BytesOf(const StoredSite& site) {
   }
   to.set_resolution_m(site.resolution_m);
   for (const std::uint64_t session : site.fragments) to.add_fragments(session);
+  for (const std::uint64_t session : site.past) to.add_past(session);
   return to.SerializeAsString();
 }
 
@@ -124,7 +125,8 @@ Result<StoredSite> SiteOf(std::string_view bytes) {
                   .switches = {},
                   .members = {},
                   .resolution_m = from.resolution_m(),
-                  .fragments = {from.fragments().begin(), from.fragments().end()}};
+                  .fragments = {from.fragments().begin(), from.fragments().end()},
+                  .past = {from.past().begin(), from.past().end()}};
   if (!(site.resolution_m >= 0.0 && site.resolution_m <= 10.0)) return Unreadable("a site");
   for (const auto& made : from.switches()) site.switches[made.epoch()] = made.generation();
   for (const auto& member : from.members()) site.members[member.robot_id()] = member.session();

@@ -126,6 +126,7 @@ struct StoredSite {
   std::map<NameId, std::uint64_t> members;          // Robot -> the session that draws for it.
   double resolution_m = 0.0;                        // Side of the map's cells; 0: not known.
   std::set<std::uint64_t> fragments;                // Sessions that are not joined with the map.
+  std::vector<std::uint64_t> past;                  // Sessions that have ended, in the order in which they did.
 };
 
 struct StoredLayer {

@@ -1,6 +1,7 @@
 #include "server/store/site_edit.h"
 
 #include <algorithm>
+#include <functional>
 #include <set>
 #include <utility>
 
@@ -71,6 +72,9 @@ Result<Division> Divide(Store& store, const std::string& site, const std::vector
       TakeOut(stays.members, [&](const auto& member) { return division.going.contains(member.second); });
   division.going_site.fragments =
       TakeOut(stays.fragments, [&](std::uint64_t fragment) { return division.going.contains(fragment); });
+  const auto goes = [&](std::uint64_t session) { return division.going.contains(session); };
+  std::erase_if(stays.past, goes);
+  std::erase_if(division.going_site.past, std::not_fn(goes));
   ++stays.tile_version;
   return division;
 }

@@ -111,6 +111,7 @@ class Survey {
     if (record.key.owner != HashName(site->name)) return Unreadable("a site of another name");
     for (const auto& [robot, session] : site->members) summary_.session_numbers.insert(session);
     summary_.session_numbers.insert(site->fragments.begin(), site->fragments.end());
+    summary_.session_numbers.insert(site->past.begin(), site->past.end());
     summary_.site = std::move(*site);
     return {};
   }

@@ -99,6 +99,7 @@ class Renaming {
     std::set<std::uint64_t> fragments;
     for (const std::uint64_t session : site.fragments) fragments.insert(Session(session));
     site.fragments = std::move(fragments);
+    for (std::uint64_t& session : site.past) session = Session(session);
   }
   void Rename(StoredVersion& version) const {
     if (version.job != 0) version.job = Job(version.job);

@@ -197,6 +197,7 @@ class Merge {
     for (const auto& [epoch, generation] : from_.site.switches) site.switches[epoch + epoch_shift_] = generation;
     site.members.insert(from_.site.members.begin(), from_.site.members.end());
     site.fragments.insert(from_.site.fragments.begin(), from_.site.fragments.end());
+    site.past.insert(site.past.end(), from_.site.past.begin(), from_.site.past.end());
     Put({RecordKind::kSite, HashName(site.name), 0}, BytesOf(site));
     for (const RecordKind kind : {RecordKind::kSite, RecordKind::kMapVersion, RecordKind::kLayer})
       changes_.removed.push_back({.kind = kind, .owner = HashName(from_.site.name)});

@@ -97,6 +97,34 @@ TEST(Restore, FromACheckpointThePathIsTheSameToTheLastBit) {
   EXPECT_EQ(after.used, static_cast<std::uint64_t>(kSteps));
 }
 
+// The map of today is made of what was drawn today; that a session has ended is known to the next server as well.
+TEST(Restore, ASessionThatHasEndedIsThePastOfItsMap) {
+  const TempDirectory directory;
+  const auto past = [&directory] {
+    const auto store = *OpenStore(directory.path());
+    return ReadSite(*store, "lab")->site.past;
+  };
+  DriveTwoRobots(directory.path(), TestOptions());
+  EXPECT_TRUE(past().empty());
+  {
+    StoredServer second(directory.path());
+    second->Open("r2", kDriver);
+    ASSERT_TRUE(second->WaitPhase("r2", kDriver, SessionPhase::kActive));
+    second->End("r2", kDriver);
+    ASSERT_TRUE(second->WaitPhase("r2", kDriver, SessionPhase::kEnded));
+  }
+  EXPECT_EQ(past(), std::vector<std::uint64_t>{2});
+  // As if the last server was killed before the site was stored.
+  {
+    const auto store = *OpenStore(directory.path());
+    StoredSite site = ReadSite(*store, "lab")->site;
+    site.past.clear();
+    ASSERT_TRUE(store->Commit({.removed = {}, .put = {{{RecordKind::kSite, HashName("lab"), 0}, BytesOf(site)}}}));
+  }
+  { const StoredServer third(directory.path()); }
+  EXPECT_EQ(past(), std::vector<std::uint64_t>{2});
+}
+
 // Some scan always waits for its odometry, so that the session is never without a waiting sample.
 TEST(Restore, ARobotWhoseOdometryLagsGetsCheckpointsToo) {
   constexpr int kLag = 3;

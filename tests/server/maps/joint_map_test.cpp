@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <vector>
+
+#include "server/maps/layer_sum.h"
 
 namespace cairn::server {
 namespace {
@@ -61,28 +64,39 @@ TEST(JointMap, WhatWasMovedSinceTheLastRunsIsGoneAfterAFewLooks) {
   EXPECT_LT((*map.cells().at({0, 0, 0}))[0], 10);
 }
 
-TEST(JointMap, SessionsThatAreFoldedLookAsBefore) {
-  std::mt19937 random(5);
+// A robot that was there for a week, while another one came and went, has seen the newest state.
+TEST(JointMap, OfSessionsThatHaveEndedTheOneThatEndedLastIsTheLatest) {
   JointMap map(kPast);
-  for (SessionId session = 1; session <= 5; ++session) {
-    for (int x = 0; x < 3; ++x) {
-      auto chunk = std::make_shared<slam::GridChunk>();
-      for (std::int16_t& cell : chunk->log_odds)
-        cell = random() % 3 == 0 ? slam::kUnseen : static_cast<std::int16_t>(static_cast<int>(random() % 779) - 389);
-      if ((session + static_cast<SessionId>(x)) % 3 != 0) map.Apply({.session = session, .chunks = {{{x, 0}, chunk}}});
-    }
-    if (session <= 3) map.SetPast(session);
-  }
+  map.Apply({.session = 1, .chunks = {{{0, 0}, ChunkOf(-389)}}});
+  map.Apply({.session = 2, .chunks = {{{0, 0}, ChunkOf(389)}}});
+  map.SetPast(2);
+  map.SetPast(1);
+  map.SetPast(2);  // Again, as after a restart.
   map.Render();
-  const auto before = map.cells();
-  map.Fold(1, 2);
-  map.Fold(2, 3);
-  map.Render();
-  EXPECT_TRUE(map.ChunksOf(1).empty());
-  EXPECT_TRUE(map.ChunksOf(2).empty());
-  EXPECT_EQ(map.ChunksOf(3).size(), 3U);
-  ASSERT_EQ(map.cells().size(), before.size());
-  for (const auto& [key, cells] : before) EXPECT_EQ(*map.cells().at(key), *cells);
+  EXPECT_LT((*map.cells().at({0, 0, 0}))[0], 10);
+  EXPECT_EQ(map.past(), (std::vector<SessionId>{2, 1}));
+}
+
+TEST(LayerSum, CellsThatOnlyOneHasSeenAreKeptAndSumsAreBounded) {
+  slam::GridChunk sum = UnseenChunk();
+  const auto add = [&sum](std::int16_t first, std::int16_t second) {
+    slam::GridChunk other = UnseenChunk();
+    other.log_odds[0] = first;
+    other.log_odds[1] = second;
+    AddBeside(sum, other);
+  };
+  add(100, slam::kUnseen);
+  add(-30, 40);
+  EXPECT_EQ(sum.log_odds[0], 70);
+  EXPECT_EQ(sum.log_odds[1], 40);
+  EXPECT_EQ(sum.log_odds[2], slam::kUnseen);
+  add(32000, 5);
+  EXPECT_EQ(sum.log_odds[0], 32000);
+  slam::GridChunk later = UnseenChunk();
+  later.log_odds[0] = -50;
+  AddLater(sum, later, 139);
+  EXPECT_EQ(sum.log_odds[0], 89);
+  EXPECT_EQ(sum.log_odds[1], 45);
 }
 
 TEST(JointMap, AHiddenSessionIsKeptAndNotShown) {
@@ -160,10 +174,14 @@ TEST(JointMap, StepByStepEqualsFromScratch) {
     } else {
       latest[session][key] = chunk;
     }
+    if (i % 11 == 0) stepwise.SetHidden(session, random() % 2 == 0);
+    if (i == 60 || i == 130) stepwise.SetPast(session);
     if (i % 7 == 0) stepwise.Render();
   }
   stepwise.Render();
   JointMap fresh(kPast);
+  for (const SessionId session : stepwise.past()) fresh.SetPast(session);
+  for (const SessionId session : stepwise.hidden()) fresh.SetHidden(session, true);
   for (const auto& [session, chunks] : latest) fresh.Replace(session, chunks);
   fresh.Render();
   ASSERT_EQ(stepwise.cells().size(), fresh.cells().size());

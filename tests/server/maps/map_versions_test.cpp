@@ -35,19 +35,6 @@ TEST(MapVersions, EnablingKeepsWhatTheOutgoingVersionGivesUp) {
   EXPECT_TRUE(versions.Find(2)->info.enabled);
 }
 
-TEST(MapVersions, ThePartsOfASessionGoFromEveryVersion) {
-  MapVersions versions(4);
-  MapVersion version;
-  version.parts = {{7, RobotGrid{}}, {8, RobotGrid{}}};
-  versions.Add(std::move(version));
-  versions.Add({});
-  versions.Enable(2, {{7, RobotGrid{}}});
-  EXPECT_EQ(versions.RemoveParts(7), (std::vector<std::uint32_t>{1, 2}));
-  EXPECT_FALSE(versions.Find(2)->parts.contains(7));
-  EXPECT_TRUE(versions.Find(2)->parts.contains(8));
-  EXPECT_TRUE(versions.RemoveParts(7).empty());
-}
-
 TEST(MapVersions, TheOldestThatNobodyNeedsIsForgotten) {
   MapVersions versions(3);
   versions.Add({});

@@ -1,4 +1,4 @@
-// What a site keeps of sessions that no longer exist.
+// What a site shows of sessions that have ended.
 #include <gtest/gtest.h>
 
 #include <future>
@@ -14,47 +14,63 @@
 namespace cairn::server {
 namespace {
 
-// A site that has run for years. Its memory and its store follow the area, not the number of runs.
-TEST(SiteLayers, TheOldestOfManySessionsThatAreGoneBecomeOnePartOfTheMap) {
-  asio::thread_pool pool(1);
-  Outbound outbound(64);
-  const auto store = *OpenStore(kInMemory);
-  Journal journal(*store, StoreOptions{});
-  journal.Start();
-  const auto site =
-      std::make_shared<Site>("years", 0.05, MapsOptions{.max_past_sessions = 3}, pool, outbound, &journal);
-  const auto settle = [&] {
-    site->Publish();
-    std::promise<void> reached;
-    site->Probe([&] { reached.set_value(); });
-    reached.get_future().wait();
-  };
-  for (SessionId id = 1; id <= 10; ++id) {
-    const int x = static_cast<int>(id);
-    site->Join({.session = id, .robot = 100 + id, .owner = {}, .fragment = id % 2 == 0});
-    site->Change({.session = id, .chunks = {{{x, 0}, UniformChunk(100)}}});
-    site->Leave(id);
+class SiteLayers : public ::testing::Test {
+ protected:
+  ~SiteLayers() override { pool_.join(); }
+  std::shared_ptr<Site> NewSite(Journal& journal) {
+    return std::make_shared<Site>("lab", 0.05, MapsOptions{}, pool_, outbound_, &journal);
   }
-  settle();
-  const auto tiles = [](const Site& of) {
-    std::set<int> xs;
-    for (int x = 0; x <= 10; ++x)
-      if (of.snapshot()->tiles.Find({0, x, 0}) != nullptr) xs.insert(x);
-    return xs;
-  };
-  const std::set<int> expected = {1, 3, 5, 7, 9};
-  EXPECT_EQ(tiles(*site), expected);
-  journal.Stop();
-  // Shown: 5 (with what 1 and 3 have drawn), 7 and 9; not joined: 6, 8 and 10.
-  EXPECT_EQ(*store->Numbers({.kind = RecordKind::kLayer, .owner = HashName("years")}),
-            (std::vector<std::uint64_t>{5, 6, 7, 8, 9, 10}));
-  Journal next_journal(*store, StoreOptions{});
-  const auto next = std::make_shared<Site>("years", 0.05, MapsOptions{}, pool, outbound, &next_journal);
-  const auto stored = ReadSite(*store, "years");
+  static std::uint8_t CellOf(Site& site) {
+    site.Publish();
+    std::promise<void> reached;
+    site.Probe([&] { reached.set_value(); });
+    reached.get_future().wait();
+    const auto tile = site.snapshot()->tiles.Find({0, 0, 0});
+    return tile == nullptr ? kUnknownCell : (*DecodeCells(tile->bytes, tile->encoding))[0];
+  }
+
+  asio::thread_pool pool_{1};
+  Outbound outbound_{64};
+  std::unique_ptr<Store> store_ = *OpenStore(kInMemory);
+};
+
+// A wall that has gone while session 1 drives on; session 2 was there when it still stood.
+TEST_F(SiteLayers, WhatEndedFirstIsThePastAlsoForTheNextServer) {
+  std::uint8_t before = 0;
+  {
+    Journal journal(*store_, StoreOptions{});
+    journal.Start();
+    const auto site = NewSite(journal);
+    for (const SessionId id : {SessionId{1}, SessionId{2}}) site->Join({.session = id, .robot = 100 + id, .owner = {}});
+    site->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(-389)}}});
+    site->Change({.session = 2, .chunks = {{{0, 0}, UniformChunk(389)}}});
+    EXPECT_EQ(CellOf(*site), 50);
+    site->End(2);
+    EXPECT_LT(CellOf(*site), 10);
+    site->Leave(2);
+    site->Leave(1);
+    before = CellOf(*site);
+    EXPECT_LT(before, 10);
+    journal.Stop();
+  }
+  Journal journal(*store_, StoreOptions{});
+  const auto stored = ReadSite(*store_, "lab");
   ASSERT_TRUE(stored);
+  EXPECT_EQ(stored->site.past, (std::vector<std::uint64_t>{2, 1}));
+  const auto next = NewSite(journal);
   ASSERT_TRUE(next->Restore(stored->site));
-  EXPECT_EQ(tiles(*next), expected);
-  pool.join();
+  EXPECT_EQ(CellOf(*next), before);
+}
+
+// As a session that had ended before the server was started.
+TEST_F(SiteLayers, ASessionThatEntersAsEndedIsThePast) {
+  Journal journal(*store_, StoreOptions{});
+  const auto site = NewSite(journal);
+  site->Join({.session = 1, .robot = 101, .owner = {}});
+  site->Join({.session = 2, .robot = 102, .owner = {}, .ended = true});
+  site->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(-389)}}});
+  site->Change({.session = 2, .chunks = {{{0, 0}, UniformChunk(389)}}});
+  EXPECT_LT(CellOf(*site), 10);
 }
 
 }  // namespace

@@ -67,6 +67,7 @@ TEST(Records, SessionsSitesVersionsLayersAndJobsComeBack) {
   EXPECT_EQ(site_back->members, site.members);
   EXPECT_EQ(site_back->tile_version, 90U);
   EXPECT_EQ(site_back->fragments, site.fragments);
+  EXPECT_EQ(site_back->past, site.past);
 
   StoredVersion version{.version = 3, .job = 8, .note = "smoothed", .parts = {{5, SampleGrid(1)}}, .smoothed = {}};
   version.smoothed["r5"] = {5, std::make_shared<const Trajectory>(Trajectory{{10, {1, 2, 3}}, {20, {4, 5, 6}}})};

@@ -97,7 +97,8 @@ inline StoredSite SampleSiteRecord() {
           .enabled_version = 3,
           .switches = {{1, 100}, {2, 101}},
           .members = {{HashName("r5"), 5}},
-          .fragments = {5, 7}};
+          .fragments = {5, 7},
+          .past = {7, 5}};
 }
 
 }  // namespace cairn::server::testing

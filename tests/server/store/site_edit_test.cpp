@@ -18,6 +18,7 @@ void MakeFragments(Store& store, const std::string& name, const std::set<std::ui
   auto contents = ReadSite(store, name);
   ASSERT_TRUE(contents);
   contents->site.fragments = sessions;
+  contents->site.past = {sessions.begin(), sessions.end()};
   RecordChanges changes;
   changes.put.push_back({{RecordKind::kSite, HashName(name), 0}, BytesOf(contents->site)});
   for (auto& [id, session] : contents->sessions) {
@@ -62,6 +63,7 @@ TEST(ImportSite, GivesNewNumbersBesideOtherSites) {
   EXPECT_EQ(hall->sessions.at(14).id, 14U);
   EXPECT_EQ(hall->site.members.at(HashName("r2")), 15U);
   EXPECT_EQ(hall->site.fragments, std::set<std::uint64_t>{15});
+  EXPECT_EQ(hall->site.past, std::vector<std::uint64_t>{15});
   EXPECT_EQ(hall->layers, std::vector<std::uint64_t>{16});
   EXPECT_EQ(hall->jobs.at(5).job.id, 5U);
   const auto versions = ReadVersions(*store, HashName("hall"));
@@ -246,6 +248,7 @@ TEST(MergeSites, AFragmentKeepsItsFrameAndIsOneInTheOtherSiteToo) {
   const auto lab = ReadSite(*store, "lab");
   ASSERT_TRUE(lab);
   EXPECT_EQ(lab->site.fragments, (std::set<std::uint64_t>{12, 13}));
+  EXPECT_EQ(lab->site.past, (std::vector<std::uint64_t>{12, 13}));
   EXPECT_TRUE(lab->sessions.at(12).fragment);
   EXPECT_FALSE(lab->sessions.at(12).request.has_start);
   EXPECT_EQ(lab->sessions.at(12).request.T_map_robot_start, start);
@@ -292,6 +295,8 @@ TEST(SplitSite, TheSessionsGoWithTheirPartOfEverything) {
   ASSERT_TRUE(SplitSite(*store, "lab", {2, 3}, "annex"));
   EXPECT_EQ(ReadSite(*store, "lab")->site.fragments, std::set<std::uint64_t>{1});
   EXPECT_EQ(ReadSite(*store, "annex")->site.fragments, std::set<std::uint64_t>{3});
+  EXPECT_EQ(ReadSite(*store, "lab")->site.past, std::vector<std::uint64_t>{1});
+  EXPECT_EQ(ReadSite(*store, "annex")->site.past, std::vector<std::uint64_t>{3});
   const auto lab = ReadSite(*store, "lab"), annex = ReadSite(*store, "annex");
   ASSERT_TRUE(lab && annex);
   EXPECT_EQ(lab->sessions.size(), 1U);

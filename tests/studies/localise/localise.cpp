@@ -176,7 +176,7 @@ Drives AfterMoving(const std::string& world, double seconds, std::uint64_t seed)
 
 void StudyLocalise(StudyContext& context) {
   Report& report = context.report;
-  report.Heading("The second half of a drive in the map of the first");
+  report.Heading("A drive in the map of an earlier one");
   slam::MapperOptions options;
   options.seed = static_cast<std::int64_t>(context.seed);
   std::vector<Drives> all;
@@ -211,8 +211,7 @@ void StudyLocalise(StudyContext& context) {
   report.Add(table, "localise");
 }
 
-const Registration kLocalise("localise", "the second half of a drive, localised in the map of the first",
-                             StudyLocalise);
+const Registration kLocalise("localise", "a drive, only localised in the map of an earlier one", StudyLocalise);
 
 }  // namespace
 }  // namespace cairn::studies
