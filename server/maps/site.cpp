@@ -247,11 +247,6 @@ void Site::Probe(std::function<void()> done) {
   Run([done = std::move(done)](Site&) { done(); });
 }
 
-std::shared_ptr<const MapSnapshot> Site::snapshot() const {
-  const MutexLock lock(mutex_);
-  return snapshot_;
-}
-
 void Site::Begin(std::uint32_t version, Done done) {
   const MapVersion* const wanted = versions_.Find(version);
   if (wanted == nullptr) {

@@ -112,7 +112,10 @@ class Site : public std::enable_shared_from_this<Site> {
   // Does nothing but call `done` on the strand, to show that the strand makes progress.
   void Probe(std::function<void()> done);
 
-  [[nodiscard]] std::shared_ptr<const MapSnapshot> snapshot() const;
+  [[nodiscard]] std::shared_ptr<const MapSnapshot> snapshot() const {
+    const MutexLock lock(mutex_);
+    return snapshot_;
+  }
   [[nodiscard]] Pulse pulse() const { return {handled_ + encoded_, handled_ != asked_}; }
 
  private:
