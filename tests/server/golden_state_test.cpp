@@ -69,7 +69,7 @@ TEST_P(GoldenState, IsRestoredFromItsCheckpoints) {
   ExpectWhatItHolds();
 }
 
-INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenState, ::testing::Values("state-1"),
+INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenState, ::testing::Values("state-1", "state-1-checkpoints-8"),
                          [](const auto& name) { return name.index == 0 ? std::string("One") : std::string("Later"); });
 
 }  // namespace
