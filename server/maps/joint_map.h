@@ -1,8 +1,8 @@
 // The joint occupancy map of a site, and its pyramid of coarser levels. For each chunk, the grids of all sessions are
-// summed into the cells of one tile, with less weight for those of sessions that have ended (layer_sum.h). Their start
-// poses place the robots in one map frame. This class does not publish: Render returns the tiles
-// whose cells changed; epochs, versions and encodings are handled by Site.
-// Invariant: after Render, cells() equals a map that is built from the same chunks from scratch.
+// summed into the cells of one tile, with less weight for those of sessions that have ended (layer_sum.h). The start poses
+// place the robots in one map frame. This class does not publish: Render returns the tiles whose cells changed; epochs,
+// versions and encodings are handled by Site. Invariant: after Render, cells() equals a map that is built from scratch
+// from the same chunks, with the same sessions hidden and ended.
 // Not thread-safe: used on the site's strand only.
 #pragma once
 
@@ -39,6 +39,7 @@ class JointMap {
   void SetPast(SessionId session);
   // Those that have ended, in that order.
   [[nodiscard]] std::vector<SessionId> past() const;
+
   // The sum of the grids of the sessions before this one that are shown, in and around the area of its own grid.
   [[nodiscard]] slam::OccupancyGrid::Chunks DrawnBefore(SessionId session) const;
 
