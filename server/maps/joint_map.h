@@ -1,9 +1,9 @@
 // The joint occupancy map of a site, and its pyramid of coarser levels. For each chunk, the grids of all sessions are
-// summed into the cells of one tile, with less weight for those of sessions that have ended (layer_sum.h). The start poses
-// place the robots in one map frame. This class does not publish: Render returns the tiles whose cells changed; epochs,
-// versions and encodings are handled by Site. Invariant: after Render, cells() equals a map that is built from scratch
-// from the same chunks, with the same sessions hidden and ended.
-// Not thread-safe: used on the site's strand only.
+// summed into the cells of one tile, with less weight for those of sessions that have ended (layer_sum.h). The start
+// poses place the robots in one map frame. This class does not publish: Render returns the tiles whose cells changed;
+// epochs, versions and encodings are handled by Site. Invariant: after Render, cells() equals a map that is built from
+// scratch from the same chunks, with the same sessions hidden and ended. Not thread-safe: used on the site's strand
+// only.
 #pragma once
 
 #include <cstddef>
