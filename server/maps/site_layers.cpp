@@ -1,4 +1,4 @@
-// The parts of a site's map that sessions have drawn which no longer exist (site.h).
+// What sessions that no longer exist have drawn in a site's map (site.h).
 #include <utility>
 
 #include "server/maps/site.h"

@@ -97,7 +97,7 @@ TEST(Restore, FromACheckpointThePathIsTheSameToTheLastBit) {
   EXPECT_EQ(after.used, static_cast<std::uint64_t>(kSteps));
 }
 
-// The map of today is made of what was drawn today; that a session has ended is known to the next server as well.
+// What an ended session has drawn weighs less in the map. The next server must know which sessions have ended.
 TEST(Restore, ASessionThatHasEndedIsThePastOfItsMap) {
   const TempDirectory directory;
   const auto past = [&directory] {

@@ -131,8 +131,8 @@ TEST(Kill, AServerOnADamagedDatabaseEndsWithTwoAndSaysWhy) {
   }
 }
 
-// With another filter, every scan is processed again before the server is ready. That takes minutes with so many
-// particles, and somebody who stops the server meanwhile does not wait for it.
+// With another filter, every scan is processed again before the server is ready, which takes long with so many
+// particles. Somebody who stops the server meanwhile does not wait for that.
 TEST(Kill, ALongStartEndsInGoodOrderWhenItIsAskedToAndNothingIsLost) {
   const TempDirectory directory;
   const std::vector<std::string> command = {CAIRND_PATH,         "--domain", std::to_string(TestDomain()),  "--set",

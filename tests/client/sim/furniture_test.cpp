@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
+#include <variant>
 
 #include "client/sim/fleet.h"
 #include "client/sim/shipped_worlds.h"

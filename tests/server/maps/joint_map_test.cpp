@@ -38,8 +38,7 @@ TEST(JointMap, ContraryEvidenceCancels) {
   EXPECT_EQ((*map.cells().at({0, 0, 0}))[0], 50);
 }
 
-// A wall that two ended sessions have seen often, and a robot that sees now, as often as a look needs, that it has
-// gone.
+// Two ended sessions have often seen a wall. A robot of today has seen six times that it is not there.
 TEST(JointMap, WhatWasMovedSinceTheLastRunsIsGoneAfterAFewLooks) {
   const std::int16_t wall = 389, miss = slam::LogOddsOf(slam::GridOptions{}.miss_probability);
   JointMap map(kPast);

@@ -3,7 +3,6 @@
 
 #include <future>
 #include <memory>
-#include <set>
 #include <vector>
 
 #include "server/maps/site.h"

@@ -205,7 +205,7 @@ TEST_F(RosterTest, WhenPlacesRunOutTheEndedGoFirstThenTheLongestAway) {
   EXPECT_EQ(LastState("r7", 8).phase, SessionPhase::kRefused);
   EXPECT_EQ(LastState("r7", 8).status.code, StatusCode::kResourceExhausted);
   EXPECT_EQ(roster().All().size(), 3U);
-  EXPECT_EQ(outbound_.over_limit(), 1U);  // An operator sees how often somebody was refused for want of room.
+  EXPECT_EQ(outbound_.over_limit(), 1U);  // `cairn status` prints how many were refused.
 }
 
 // Sixty-four misspelt site names, from a robot there was no room for, filled the list of sites.

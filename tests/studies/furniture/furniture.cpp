@@ -4,7 +4,9 @@
 #include "client/sim/furniture.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <utility>

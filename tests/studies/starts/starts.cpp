@@ -15,8 +15,7 @@
 #include "client/sim/fleet.h"
 #include "client/sim/shipped_worlds.h"
 #include "server/maps/grid_agreement.h"
-#include "server/maps/joint_map.h"
-#include "server/maps/maps_options.h"
+#include "server/maps/layer_sum.h"
 #include "server/slam/scan_pipeline.h"
 #include "tests/studies/study.h"
 
@@ -82,11 +81,17 @@ void Draw(const std::vector<LogRecord>& records, const Pose2& T_map_robot_start,
   visit(-1.0, last.value_or(T_map_robot_start), pipeline.mapper().ShareGrid());
 }
 
-// What the others have drawn where this robot drives.
-OccupancyGrid::Chunks DrawnByOthers(const std::vector<OccupancyGrid::Chunks>& grids, std::size_t robot) {
-  server::JointMap joint(server::MapsOptions{}.past_probability);
-  for (std::size_t i = 0; i < grids.size(); ++i) joint.Replace(i == robot ? grids.size() : i, grids[i]);
-  return joint.DrawnBefore(grids.size());
+// The sum of several grids of one time.
+OccupancyGrid::Chunks SumOf(const std::vector<OccupancyGrid::Chunks>& grids, std::size_t without) {
+  std::map<slam::ChunkKey, slam::GridChunk> sums;
+  for (std::size_t i = 0; i < grids.size(); ++i) {
+    if (i == without) continue;
+    for (const auto& [key, chunk] : grids[i])
+      server::AddBeside(sums.try_emplace(key, server::UnseenChunk()).first->second, *chunk);
+  }
+  OccupancyGrid::Chunks shared;
+  for (const auto& [key, chunk] : sums) shared.emplace(key, std::make_shared<const slam::GridChunk>(chunk));
+  return shared;
 }
 
 struct Kind {
@@ -125,7 +130,7 @@ void RunStarts(StudyContext& context) {
     std::uniform_real_distribution<double> any(0.0, 1.0);
     std::map<std::string, Count> counts;
     for (std::size_t robot = 0; robot < first.size(); ++robot) {
-      const OccupancyGrid::Chunks others = DrawnByOthers(grids, robot);
+      const OccupancyGrid::Chunks others = SumOf(grids, robot);
       for (const Kind& kind : kKinds) {
         for (int run = 0; run < runs; ++run) {
           Count& count = counts[kind.name];
