@@ -4,6 +4,7 @@
 
 #include "common/wire/participant.h"
 #include "common/wire/publication.h"
+#include "common/wire/reply_publication.h"
 #include "common/wire/subscription.h"
 
 namespace cairn::wire {
@@ -58,7 +59,11 @@ Result<std::unique_ptr<Bus>> Bus::Create(const WireOptions& options, const std::
 
 template <typename Value>
 Result<std::unique_ptr<Publication<Value>>> Bus::Advertise(const std::string& robot) {
-  return DdsPublication<Value>::Make(ParticipantOf(*this), robot);
+  if constexpr (std::is_same_v<Value, Reply>) {
+    return ReplyPublication::Make(ParticipantOf(*this));
+  } else {
+    return DdsPublication<Value>::Make(ParticipantOf(*this), robot);
+  }
 }
 
 template <typename Value>

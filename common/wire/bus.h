@@ -86,7 +86,8 @@ class Bus {
   template <typename Value>
   [[nodiscard]] Result<std::unique_ptr<Subscription>> Subscribe(std::function<void(Value&&)> on_value,
                                                                 SubscriptionEvents events = {});
-  // Like Subscribe<Reply>, but replies to other clients are not sent here (client_filter.h), or skipped undecoded.
+  // Like Subscribe<Reply>, but of the replies to other clients only some are sent here (partitions.h), and
+  // those are skipped undecoded.
   [[nodiscard]] Result<std::unique_ptr<Subscription>> SubscribeReplies(ClientId client,
                                                                        std::function<void(Reply&&)> on_value,
                                                                        SubscriptionEvents events = {});

@@ -2,7 +2,6 @@
 
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 
-#include "common/wire/client_filter.h"
 #include "common/wire/participant_qos.h"
 #include "common/wire/security.h"
 
@@ -12,10 +11,6 @@ namespace {
 namespace rtps = eprosima::fastrtps::rtps;
 using eprosima::fastrtps::Duration_t;
 using eprosima::fastrtps::types::ReturnCode_t;
-
-// A writer of replies filters for so many readers; the library's default is 32. Further ones get all replies, and skip
-// those of others.
-constexpr std::size_t kMaxFilteringReaders = 1024;
 
 // The QoS that both ends of a topic share. Every limit is set, because the default allows only 10 instances
 // and refuses the next without an error.
@@ -64,17 +59,6 @@ Result<std::shared_ptr<Participant>> Participant::Create(const WireOptions& opti
                                               ": no free port or address, or the domain is full" +
                                               (made->secure() ? ", or Fast DDS refused wire.security" : ""));
   }
-  // Before any writer of replies is made, or it would not know the class of the readers' filters.
-  if (made->participant_->register_content_filter_factory(kClientFilterClass, &ClientFilters()) !=
-      ReturnCode_t::RETCODE_OK) {
-    return tl::unexpected(Broken("the filter of replies"));
-  }
-  made->subscriber_ = made->participant_->create_subscriber(fd::SUBSCRIBER_QOS_DEFAULT);
-  fd::SubscriberQos every_partition;
-  every_partition.partition().push_back("*");
-  if (made->secure()) made->robots_ = made->participant_->create_subscriber(every_partition);
-  if (made->subscriber_ == nullptr || (made->secure() && made->robots_ == nullptr))
-    return tl::unexpected(Broken("a subscriber"));
   return made;
 }
 
@@ -101,6 +85,29 @@ fd::Publisher* Participant::PublisherFor(const std::string& partition) {
   return publisher;
 }
 
+fd::Subscriber* Participant::SubscriberFor(const std::string& partition) {
+  const MutexLock lock(mutex_);
+  fd::Subscriber*& subscriber = subscribers_[partition];
+  if (subscriber == nullptr) {
+    fd::SubscriberQos qos;
+    if (!partition.empty()) qos.partition().push_back(partition.c_str());
+    subscriber = participant_->create_subscriber(qos);
+  }
+  return subscriber;
+}
+
+std::string Participant::PartitionToRead(Partitions partitions, std::optional<ClientId> only) const {
+  switch (partitions) {
+    case Partitions::kDefault:
+      return {};
+    case Partitions::kRobots:
+      return secure() ? kEveryPartition : "";
+    case Partitions::kReplies:
+      return only ? ReplyPartition(ReplyPartitionOf(*only)) : kEveryPartition;
+  }
+  return {};
+}
+
 Result<fd::Topic*> Participant::FindTopic(const TopicProfile& profile, const fd::TypeSupport& type) {
   const MutexLock lock(mutex_);
   if (const auto known = topics_.find(profile.name); known != topics_.end()) return known->second;
@@ -115,20 +122,8 @@ Result<fd::Topic*> Participant::FindTopic(const TopicProfile& profile, const fd:
   return topic;
 }
 
-// Made once for each client of this program: the readers that replace each other share it.
-Result<fd::TopicDescription*> Participant::FindFiltered(fd::Topic* topic, ClientId only) {
-  const std::string expression = ClientExpression(only);
-  const std::string name = topic->get_name() + '/' + expression;
-  const MutexLock lock(mutex_);
-  fd::ContentFilteredTopic*& filtered = filtered_[name];
-  if (filtered == nullptr)
-    filtered = participant_->create_contentfilteredtopic(name, topic, expression, {}, kClientFilterClass);
-  if (filtered == nullptr) return tl::unexpected(Broken("topic " + name));
-  return filtered;
-}
-
 Result<Participant::Writer> Participant::MakeWriter(const TopicProfile& profile, const fd::TypeSupport& type,
-                                                    fd::DataWriterListener* listener, const std::string& robot) {
+                                                    fd::DataWriterListener* listener, const std::string& partition) {
   const Result<fd::Topic*> topic = FindTopic(profile, type);
   if (!topic) return tl::unexpected(topic.error());
   fd::DataWriterQos qos;
@@ -139,15 +134,16 @@ Result<Participant::Writer> Participant::MakeWriter(const TopicProfile& profile,
   times.heartbeatPeriod = Duration_t(profile.heartbeat_ms * 1e-3);
   times.nackResponseDelay = Duration_t(0.002);
   if (profile.deadline_s > 0) qos.deadline().period = Duration_t(profile.deadline_s);
-  const std::string partition = secure() && profile.of_robot ? robot : "";
-  qos.writer_resource_limits().reader_filters_allocation.maximum = kMaxFilteringReaders;
-  fd::Publisher* publisher = PublisherFor(partition);
+  // No filters of readers: Fast DDS 2.9 changes a writer's list of them while the writer uses it.
+  qos.writer_resource_limits().reader_filters_allocation.maximum = 0;
+  const bool in_default = profile.partitions == Partitions::kRobots && !secure();
+  fd::Publisher* publisher = PublisherFor(in_default ? "" : partition);
   if (publisher == nullptr) return tl::unexpected(Broken("a publisher"));
   const MutexLock lock(endpoints_);
   fd::DataWriter* writer = publisher->create_datawriter(*topic, qos, listener);
   if (writer == nullptr) {
-    return tl::unexpected(NotMade(std::string("a writer of ") + profile.name +
-                                  (partition.empty() ? "" : " for the robot '" + partition + "'")));
+    return tl::unexpected(
+        NotMade(std::string("a writer of ") + profile.name + (partition.empty() ? "" : " for '" + partition + "'")));
   }
   return Writer(writer, WriterDeleter{shared_from_this()});
 }
@@ -156,21 +152,16 @@ Result<Participant::Reader> Participant::MakeReader(const TopicProfile& profile,
                                                     fd::DataReaderListener* listener, std::optional<ClientId> only) {
   const Result<fd::Topic*> topic = FindTopic(profile, type);
   if (!topic) return tl::unexpected(topic.error());
-  fd::TopicDescription* read = *topic;
-  if (only) {
-    const Result<fd::TopicDescription*> filtered = FindFiltered(*topic, *only);
-    if (!filtered) return tl::unexpected(filtered.error());
-    read = *filtered;
-  }
   fd::DataReaderQos qos;
   // For a moment the reader has the keys of two writers: one that is full, and the one that replaces it
   // (publication.h). A sample that finds no place among the instances is lost, also on a reliable topic.
   const int instances = profile.max_instances == 1 ? 1 : 2 * profile.max_instances;
   SetCommon(profile, profile.reader_depth, instances, options_, qos);
   qos.reliable_reader_qos().times.heartbeatResponseDelay = Duration_t(0.001);
-  fd::Subscriber* subscriber = secure() && profile.of_robot ? robots_ : subscriber_;
+  fd::Subscriber* subscriber = SubscriberFor(PartitionToRead(profile.partitions, only));
+  if (subscriber == nullptr) return tl::unexpected(Broken("a subscriber"));
   const MutexLock lock(endpoints_);
-  fd::DataReader* reader = subscriber->create_datareader(read, qos, listener);
+  fd::DataReader* reader = subscriber->create_datareader(*topic, qos, listener);
   if (reader == nullptr) return tl::unexpected(NotMade(std::string("a reader of ") + profile.name));
   return Reader(reader, ReaderDeleter{shared_from_this()});
 }

@@ -46,12 +46,12 @@ class Participant : public std::enable_shared_from_this<Participant> {
   Participant(const Participant&) = delete;
   Participant& operator=(const Participant&) = delete;
 
-  // The listener is called from creation until the entity is deleted, and must outlive it. `robot`: whose stream it
-  // is, where the topic belongs to robots; it counts only with security. kPermissionDenied: the permissions of this
+  // The listener is called from creation until the entity is deleted, and must outlive it. `partition`: of a
+  // topic of robots, the robot's name, which counts only with security. kPermissionDenied: the permissions of this
   // participant do not allow it.
   [[nodiscard]] Result<Writer> MakeWriter(const TopicProfile& profile, const fd::TypeSupport& type,
-                                          fd::DataWriterListener* listener, const std::string& robot = {});
-  // `only`: of a topic of replies, what is for this client (client_filter.h).
+                                          fd::DataWriterListener* listener, const std::string& partition = {});
+  // `only`: of a topic of replies, what is in the partition of this client.
   [[nodiscard]] Result<Reader> MakeReader(const TopicProfile& profile, const fd::TypeSupport& type,
                                           fd::DataReaderListener* listener, std::optional<ClientId> only = {});
 
@@ -65,22 +65,21 @@ class Participant : public std::enable_shared_from_this<Participant> {
   [[nodiscard]] bool secure() const { return !options_.security.empty(); }
   [[nodiscard]] Status NotMade(const std::string& what) const;
   [[nodiscard]] fd::Publisher* PublisherFor(const std::string& partition);
+  [[nodiscard]] fd::Subscriber* SubscriberFor(const std::string& partition);
+  [[nodiscard]] std::string PartitionToRead(Partitions partitions, std::optional<ClientId> only) const;
   [[nodiscard]] Result<fd::Topic*> FindTopic(const TopicProfile& profile, const fd::TypeSupport& type);
-  [[nodiscard]] Result<fd::TopicDescription*> FindFiltered(fd::Topic* topic, ClientId only);
 
   const WireOptions options_;
   const std::shared_ptr<GuardReport> guard_ = std::make_shared<GuardReport>();
   const std::shared_ptr<PeerWatch> peers_;        // The participant's listener.
   fd::DomainParticipant* participant_ = nullptr;  // Set once by Create.
-  fd::Subscriber* subscriber_ = nullptr;
-  fd::Subscriber* robots_ = nullptr;  // For the partitions of all robots; only with security.
   // Held while an endpoint is created or deleted: Fast DDS 2.9 can deadlock or crash where several threads do so at
   // once in one participant. Listeners must not create or delete endpoints.
   Mutex endpoints_;
   Mutex mutex_;
-  std::map<std::string, fd::Publisher*> publishers_ CAIRN_GUARDED_BY(mutex_);  // By partition.
+  std::map<std::string, fd::Publisher*> publishers_ CAIRN_GUARDED_BY(mutex_);    // By partition.
+  std::map<std::string, fd::Subscriber*> subscribers_ CAIRN_GUARDED_BY(mutex_);  // By partition.
   std::map<std::string, fd::Topic*> topics_ CAIRN_GUARDED_BY(mutex_);
-  std::map<std::string, fd::ContentFilteredTopic*> filtered_ CAIRN_GUARDED_BY(mutex_);
 };
 
 }  // namespace cairn::wire

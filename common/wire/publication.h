@@ -22,10 +22,10 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
 
  public:
   [[nodiscard]] static Result<std::unique_ptr<Publication<Value>>> Make(const std::shared_ptr<Participant>& participant,
-                                                                        const std::string& robot) {
+                                                                        const std::string& partition) {
     auto made = std::make_unique<DdsPublication>();
     Result<Participant::Writer> writer =
-        participant->MakeWriter(Topic<Value>::kProfile, made->type_, made.get(), robot);
+        participant->MakeWriter(Topic<Value>::kProfile, made->type_, made.get(), partition);
     if (!writer) return tl::unexpected(writer.error());
     made->participant_ = participant;
     made->writer_ = std::move(*writer);

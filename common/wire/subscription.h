@@ -95,7 +95,7 @@ class DdsSubscription final : public Subscription {
 
   // A sample of a robot's stream must be about the robot that its writer belongs to.
   bool SpeaksForItself(const Wire& sample, const WriterClients::Writer& writer) {
-    if constexpr (Topic<Value>::kProfile.of_robot) {
+    if constexpr (Topic<Value>::kProfile.partitions == Partitions::kRobots) {
       return participant_->peers().MaySpeakFor(eprosima::fastrtps::rtps::iHandle2GUID(writer), sample.robot_id());
     } else {
       return true;

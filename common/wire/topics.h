@@ -13,6 +13,7 @@
 #include "cairn/tilePubSubTypes.h"
 #include "common/service/request.h"
 #include "common/service/stream.h"
+#include "common/wire/partitions.h"
 #include "common/wire/sample_type.h"
 
 namespace cairn::wire {
@@ -27,7 +28,7 @@ struct TopicProfile {
   double deadline_s;          // Offered by writers, not requested by readers. 0: none.
   bool leased;                // Whether both ends use the liveliness lease.
   std::uint8_t heartbeat_ms;  // Period of heartbeats while a sample is unacknowledged.
-  bool of_robot = false;      // Each writer belongs to one robot: with security, it writes in a partition of that name.
+  Partitions partitions = Partitions::kDefault;
 };
 
 // Samples of streams, sessions, requests and replies that have been acknowledged must not be lost while a
@@ -39,7 +40,7 @@ template <>
 struct Topic<SessionRequest> {
   using Wire = v1::SessionRequest;
   using Type = SampleType<Wire, v1::SessionRequestPubSubType>;
-  static constexpr TopicProfile kProfile{"cairn/v1/session", true, 1, 16, 4096, 0.0, true, 20, true};
+  static constexpr TopicProfile kProfile{"cairn/v1/session", true, 1, 16, 4096, 0.0, true, 20, Partitions::kRobots};
 };
 template <>
 struct Topic<SessionState> {
@@ -57,13 +58,14 @@ template <>
 struct Topic<ScanSample> {
   using Wire = v1::Scan;
   using Type = SampleType<Wire, v1::ScanPubSubType>;
-  static constexpr TopicProfile kProfile{"cairn/v1/scan", false, 64, 128, 4096, 0.0, false, 20, true};
+  static constexpr TopicProfile kProfile{"cairn/v1/scan", false, 64, 128, 4096, 0.0, false, 20, Partitions::kRobots};
 };
 template <>
 struct Topic<OdometrySample> {
   using Wire = v1::Odometry;
   using Type = SampleType<Wire, v1::OdometryPubSubType>;
-  static constexpr TopicProfile kProfile{"cairn/v1/odometry", false, 256, 512, 4096, 0.0, false, 20, true};
+  static constexpr TopicProfile kProfile{"cairn/v1/odometry", false, 256, 512, 4096, 0.0, false, 20,
+                                         Partitions::kRobots};
 };
 template <>
 struct Topic<PoseReport> {
@@ -111,7 +113,7 @@ template <>
 struct Topic<Reply> {
   using Wire = v1::Reply;
   using Type = SampleType<Wire, v1::ReplyPubSubType>;
-  static constexpr TopicProfile kProfile{"cairn/v1/reply", false, 1024, 1024, 1, 0.0, false, 20};
+  static constexpr TopicProfile kProfile{"cairn/v1/reply", false, 1024, 1024, 1, 0.0, false, 20, Partitions::kReplies};
 };
 
 }  // namespace cairn::wire

@@ -95,7 +95,8 @@ elements() { # tag, values
 }
 topics() { printf '<topics>'; elements topic "${@/#/cairn\/v1\/}"; printf '</topics>'; }
 rule() { printf '<allow_rule><domains><id_range><min>0</min><max>232</max></id_range></domains>%s</allow_rule>\n' "$*"; }
-told=(session_state session_refusal pose ledger map tile job reply) # Topics that the server writes and every member may read.
+told=(session_state session_refusal pose ledger map tile job) # Topics that the server writes and every member may read.
+replies=$(printf '<subscribe>'; topics reply; printf '<partitions><partition>reply.*</partition></partitions></subscribe>')
 
 rules_of_server() {
   local all='<topics><topic>cairn/v1/*</topic></topics><partitions><partition>*</partition></partitions>'
@@ -107,12 +108,18 @@ rules_of_robot() { # the robots' names, separated by +
   rule "<publish>$(topics session scan odometry)<partitions>$(elements partition ${1//+/ })</partitions></publish>"
   rules_of_viewer
 }
-rules_of_viewer() { rule "<publish>$(topics request)</publish><subscribe>$(topics "${told[@]}")</subscribe>"; }
+rules_of_viewer() {
+  rule "<publish>$(topics request)</publish><subscribe>$(topics "${told[@]}")</subscribe>"
+  rule "$replies"
+}
 rules_of_recorder() { # What all robots send, besides.
   rule "<subscribe>$(topics scan odometry)<partitions><partition>*</partition></partitions></subscribe>"
   rules_of_viewer
 }
-rules_of_operator() { rule "<publish>$(topics request command)</publish><subscribe>$(topics "${told[@]}")</subscribe>"; }
+rules_of_operator() {
+  rule "<publish>$(topics request command)</publish><subscribe>$(topics "${told[@]}")</subscribe>"
+  rule "$replies"
+}
 
 member() { # role, name, rules, directory
   local role=$1 name=$2 rules=$3 place=$4

@@ -35,6 +35,10 @@ void Visit(OptionVisitor& visitor, RobotsOptions& options) {
       "checkpoint_entries", options.checkpoint_entries, "entries", 10, 1000000000,
       "Entries of a robot's journal, mostly scans and odometry samples, after which a checkpoint is written. With a "
       "larger value less is written, and a server that starts again has more samples to process again.");
+  visitor.Real("checkpoint_work_s", options.checkpoint_work_s, "s", 0.001, 1e6,
+               "Processor time spent on a robot's samples after which a checkpoint is written, also before "
+               "checkpoint_entries. A server that starts again needs up to this time for each robot once more. Where "
+               "checkpoints of a robot take long, there are fewer: they take at most a twentieth of its time.");
   visitor.Real(
       "gap_wait_s", options.gap_wait_s, "s", 0.1, 3600.0,
       "After a restart a robot sends again the samples that were not stored. For this long the server accepts no "

@@ -124,7 +124,9 @@ std::shared_ptr<Session> Roster::Make(const StoredSession& stored, const std::sh
     outputs.checkpoint = [journal = journal_, id](std::uint64_t position, Journal::Content content) {
       return journal->Checkpoint(id, position, std::move(content));
     };
-    outputs.checkpoint_entries = static_cast<std::uint64_t>(options_.checkpoint_entries);
+    outputs.checkpoint_limits = {
+        static_cast<std::uint64_t>(options_.checkpoint_entries),
+        std::chrono::duration_cast<CheckpointPace::Time>(std::chrono::duration<double>(options_.checkpoint_work_s))};
   }
   auto session = std::make_shared<Session>(setup, options_, pool_, std::move(outputs));
   *self = session;

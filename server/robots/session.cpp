@@ -6,6 +6,8 @@
 #include <exception>
 #include <utility>
 
+#include "common/thread_time.h"
+
 namespace cairn::server {
 namespace {
 
@@ -25,6 +27,7 @@ Session::Session(const SessionSetup& setup, const RobotsOptions& options, asio::
       record_(setup.id, setup.request, options),
       queue_(static_cast<std::size_t>(options.queue_scans), static_cast<std::size_t>(options.queue_odometry)),
       strand_(asio::make_strand(pool)),
+      pace_(outputs_.checkpoint_limits),
       estimator_(
           [&] {
             record_.SetEpoch(setup.map_epoch);
@@ -216,7 +219,9 @@ void Session::ExpectDurable() {
 }
 
 void Session::Replay(JournalEntry&& entry, const SessionEstimator::Switched& switched) {
+  const auto begin = ThreadTime();
   if (!failed_) Throws([&] { estimator_.Replay(std::move(entry), switched); });
+  pace_.Worked(ThreadTime() - begin);
 }
 
 void Session::Replayed() {
@@ -264,6 +269,7 @@ void Session::Schedule() {
 }
 
 void Session::Drain() {
+  const auto begin = ThreadTime();
   for (int i = 0; i < kEventsPerTurn; ++i) {
     std::optional<RobotEvent> event = queue_.Pop();
     if (!event) break;
@@ -272,6 +278,7 @@ void Session::Drain() {
     ++handled_;
     handling_ = false;
   }
+  pace_.Worked(ThreadTime() - begin);
   const bool drained = queue_.empty();
   Throws([this] { TakeCheckpoint(); });
   Throws([&] { PublishLedgers(drained ? SessionRecord::Urgency::kDrained : SessionRecord::Urgency::kWhenDue); });
@@ -285,11 +292,19 @@ void Session::TakeCheckpoint() {
   // it again to the next server, which must not take it for something that it has received before.
   if (failed_ || ending_ || !outputs_.position || !outputs_.checkpoint) return;
   const std::uint64_t position = outputs_.position();
-  if (position < checkpointed_ + outputs_.checkpoint_entries) return;
-  auto content = estimator_.Save();
+  if (!pace_.IsDue(position)) return;
+  const auto begin = ThreadTime();
+  auto save = estimator_.Save();
   // Samples that were settled meanwhile are in the record, but perhaps not in the journal before this position.
-  if (!content || ending_ || outputs_.position() != position) return;
-  if (outputs_.checkpoint(position, std::move(content))) checkpointed_ = position;
+  if (!save || ending_ || outputs_.position() != position) return pace_.Refused();
+  auto content = [save = std::move(save), saving = ThreadTime() - begin, cost = pace_.cost()] {
+    const auto making = ThreadTime();
+    CheckpointContent made = save();
+    *cost = (saving + (ThreadTime() - making)).count();
+    return made;
+  };
+  if (!outputs_.checkpoint(position, std::move(content))) return pace_.Refused();
+  pace_.Begun(position);
 }
 
 void Session::Handle(RobotEvent&& event) {

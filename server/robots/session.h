@@ -82,7 +82,7 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
     return estimator_.Load(main, pieces);
   }
   // Its newest checkpoint. REQUIRES: nothing was taken yet.
-  void SetCheckpointed(std::uint64_t position) { checkpointed_ = position; }
+  void SetCheckpointed(std::uint64_t position) { pace_.RestoredFrom(position); }
   // Publishes ledgers that are due and whatever could not be sent before.
   void Tick();
 
@@ -136,7 +136,7 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   Mutex publishing_;
   asio::strand<asio::thread_pool::executor_type> strand_;
   // Strand only.
-  std::uint64_t checkpointed_ = 0;  // Journal position of the last checkpoint that was requested.
+  CheckpointPace pace_;
   bool failed_ = false;  // An exception has left the estimator in an unknown state: it is not asked any more.
   SessionEstimator estimator_;
 };

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "server/outbound.h"
+#include "server/robots/checkpoint_pace.h"
 #include "server/robots/robot_event.h"
 #include "server/robots/session_record.h"
 #include "server/slam/scan_pipeline.h"
@@ -29,10 +30,10 @@ struct SessionOutputs {
   // is stored.
   std::function<bool(JournalEntry)> store = {};
   // `position` returns the position of the last entry that `store` accepted, and `checkpoint` stores the state after
-  // this entry. A checkpoint is due after every `checkpoint_entries` entries. Empty functions: no checkpoints.
+  // this entry. Empty functions: no checkpoints.
   std::function<std::uint64_t()> position = {};
   std::function<bool(std::uint64_t position, Journal::Content content)> checkpoint = {};
-  std::uint64_t checkpoint_entries = 0;
+  CheckpointPace::Limits checkpoint_limits = {};
   // Called when the session ends. May be empty.
   std::function<void()> ended = {};
   // Called when the session has been destroyed, after all of its changes were reported. May be empty.

@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <ctime>
 #include <iomanip>
 #include <numeric>
 #include <sstream>
 
 #include "common/bag/recording.h"
 #include "common/map/map_lines.h"
+#include "common/thread_time.h"
 #include "server/slam/grid/grid_image.h"
 #include "server/slam/localisation/keyframe_lines.h"
 #include "server/slam/scan_pipeline.h"
@@ -46,9 +46,7 @@ std::uint64_t Total(const std::array<std::uint64_t, kDropReasonCount>& dropped) 
 
 // Of the calling thread: what other programs do on the machine does not count.
 double ProcessorMs() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
+  return std::chrono::duration<double, std::milli>(ThreadTime()).count();
 }
 
 // Measures how long each scan takes, and each step of the estimator.

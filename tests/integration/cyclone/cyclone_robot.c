@@ -83,6 +83,23 @@ static dds_entity_t MakeReader(const struct Robot* robot, const dds_topic_descri
   return reader;
 }
 
+/* Replies come in one of 16 partitions: the client id modulo 16. */
+static dds_entity_t MakeReplyReader(const struct Robot* robot) {
+  char partition[16];
+  snprintf(partition, sizeof(partition), "reply.%u", (unsigned)(robot->client % 16));
+  dds_qos_t* qos = dds_create_qos();
+  dds_qset_partition1(qos, partition);
+  const dds_entity_t subscriber = dds_create_subscriber(robot->participant, qos, NULL);
+  dds_delete_qos(qos);
+  if (subscriber < 0) Die("a subscriber");
+  qos = MakeQos(false, 256);
+  const dds_entity_t topic = MakeTopic(robot, &cairn_v1_Reply_desc, "cairn/v1/reply");
+  const dds_entity_t reader = dds_create_reader(subscriber, topic, qos, NULL);
+  dds_delete_qos(qos);
+  if (reader < 0) Die("a reader");
+  return reader;
+}
+
 static void Join(struct Robot* robot, dds_domainid_t domain) {
   robot->participant = dds_create_participant(domain, NULL, NULL);
   if (robot->participant < 0) Die("the domain cannot be joined");
@@ -93,7 +110,7 @@ static void Join(struct Robot* robot, dds_domainid_t domain) {
   robot->ledger = MakeReader(robot, &cairn_v1_Ledger_desc, "cairn/v1/ledger", MakeQos(true, 1));
   robot->map = MakeReader(robot, &cairn_v1_MapInfo_desc, "cairn/v1/map", MakeQos(true, 1));
   robot->tile = MakeReader(robot, &cairn_v1_Tile_desc, "cairn/v1/tile", MakeQos(true, 1));
-  robot->reply = MakeReader(robot, &cairn_v1_Reply_desc, "cairn/v1/reply", MakeQos(false, 256));
+  robot->reply = MakeReplyReader(robot);
   robot->scan = MakeWriter(robot, &cairn_v1_Scan_desc, "cairn/v1/scan", MakeQos(false, 64));
   robot->odometry = MakeWriter(robot, &cairn_v1_Odometry_desc, "cairn/v1/odometry", MakeQos(false, 256));
   robot->request = MakeWriter(robot, &cairn_v1_Request_desc, "cairn/v1/request", MakeQos(false, 16));

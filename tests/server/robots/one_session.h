@@ -108,7 +108,7 @@ class OneSession {
                              ++checkpoints;
                              return true;
                            },
-                       .checkpoint_entries = 1});
+                       .checkpoint_limits = {.entries = 1, .work = {}}});
     EXPECT_TRUE(session_->record().AddSensors({"laser"}));
   }
   ~OneSession() { pool_.join(); }

@@ -1,0 +1,68 @@
+#include "server/robots/checkpoint_pace.h"
+
+#include <gtest/gtest.h>
+
+namespace cairn::server {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr CheckpointPace::Limits kLimits{.entries = 100, .work = milliseconds(80)};
+
+TEST(CheckpointPace, IsDueAfterSoManyEntries) {
+  CheckpointPace pace(kLimits);
+  EXPECT_FALSE(pace.IsDue(99));
+  EXPECT_TRUE(pace.IsDue(100));
+  pace.Begun(100);
+  EXPECT_FALSE(pace.IsDue(199));
+  EXPECT_TRUE(pace.IsDue(200));
+}
+
+TEST(CheckpointPace, IsDueAfterSoMuchWork) {
+  CheckpointPace pace(kLimits);
+  pace.Worked(milliseconds(79));
+  EXPECT_FALSE(pace.IsDue(5));
+  pace.Worked(milliseconds(1));
+  EXPECT_TRUE(pace.IsDue(5));
+  pace.Begun(5);
+  pace.Worked(milliseconds(79));
+  EXPECT_FALSE(pace.IsDue(10));
+}
+
+TEST(CheckpointPace, IsNotDueWhereNothingIsNew) {
+  CheckpointPace pace(kLimits);
+  pace.Begun(5);
+  pace.Worked(milliseconds(1000));
+  EXPECT_FALSE(pace.IsDue(5));
+}
+
+// The server that was killed would otherwise repeat the same again after the next kill.
+TEST(CheckpointPace, WhatARestartHasRepeatedCountsAsWork) {
+  CheckpointPace pace(kLimits);
+  pace.Worked(milliseconds(80));
+  pace.RestoredFrom(40);
+  EXPECT_TRUE(pace.IsDue(60));
+}
+
+TEST(CheckpointPace, CheckpointsTakeATwentiethOfTheTime) {
+  CheckpointPace pace(kLimits);
+  *pace.cost() = CheckpointPace::Time(milliseconds(10)).count();
+  pace.Worked(milliseconds(199));
+  EXPECT_FALSE(pace.IsDue(5));
+  pace.Worked(milliseconds(1));
+  EXPECT_TRUE(pace.IsDue(5));
+  EXPECT_TRUE(CheckpointPace(kLimits).IsDue(100)) << "entries bound it whatever it costs";
+}
+
+TEST(CheckpointPace, IsNotTriedAgainAtOnce) {
+  CheckpointPace pace(kLimits);
+  pace.Worked(milliseconds(80));
+  pace.Refused();
+  EXPECT_FALSE(pace.IsDue(5));
+  EXPECT_FALSE(pace.IsDue(100));
+  pace.Worked(milliseconds(10));
+  EXPECT_TRUE(pace.IsDue(5));
+}
+
+}  // namespace
+}  // namespace cairn::server
