@@ -4,6 +4,16 @@
 #include <utility>
 
 namespace cairn::server {
+namespace {
+
+// Whose sample it is; nothing for other values.
+std::optional<NameId> RobotOf(const InboundValue& value) {
+  if (const auto* const scan = std::get_if<ScanArrival>(&value)) return scan->stream.robot_id;
+  if (const auto* const odometry = std::get_if<OdometryArrival>(&value)) return odometry->stream.robot_id;
+  return std::nullopt;
+}
+
+}  // namespace
 
 bool Inbound::TryPush(InboundValue&& value) {
   const MutexLock lock(mutex_);
@@ -24,9 +34,10 @@ bool Inbound::PushLocked(InboundValue& value) {
   Lane& lane = LaneOf(value);
   if (const auto* const news = std::get_if<ClientLiveliness>(&value)) {
     ForgetOlder(*news);
-  } else if (lane.size() >= (&lane == &control_ ? kMaxControl : capacity_)) {
+  } else if (lane.size() >= (&lane == &control_ ? kMaxControl : capacity_) || !HasShare(value)) {
     return false;
   }
+  if (const auto robot = RobotOf(value)) ++in_streams_[*robot];
   lane.push_back({next_++, std::move(value)});
   filled_.NotifyOne();
   return true;
@@ -36,6 +47,12 @@ Inbound::Lane& Inbound::LaneOf(const InboundValue& value) {
   if (std::holds_alternative<Request>(value)) return questions_;
   if (std::holds_alternative<ScanArrival>(value) || std::holds_alternative<OdometryArrival>(value)) return streams_;
   return control_;
+}
+
+bool Inbound::HasShare(const InboundValue& value) const {
+  const auto robot = RobotOf(value);
+  const auto waiting = robot ? in_streams_.find(*robot) : in_streams_.end();
+  return waiting == in_streams_.end() || waiting->second < std::max(capacity_ / 4, kLeastShare);
 }
 
 void Inbound::ForgetOlder(const ClientLiveliness& news) {
@@ -69,6 +86,10 @@ std::optional<InboundValue> Inbound::PopLocked() {
   if (first == nullptr) return std::nullopt;
   std::optional<InboundValue> value(std::move(first->front().value));
   first->pop_front();
+  if (const auto robot = RobotOf(*value)) {
+    const auto waiting = in_streams_.find(*robot);
+    if (--waiting->second == 0) in_streams_.erase(waiting);
+  }
   ++taken_;
   room_.NotifyAll();
   return value;

@@ -1,6 +1,8 @@
 // What the doors hand to the rooms: plain values over one bounded channel. The only way in.
 // Values leave in the order they came, but each of three lanes has a bound of its own, so that a flood in one never
-// displaces a value of another: control (session requests, liveliness), questions, and streams (scans, odometry).
+// displaces a value of another: control (session requests, liveliness), questions, and streams (scans, odometry). In
+// the lane of streams one robot has at most a quarter of the room, and at least kLeastShare, so that a robot that
+// floods takes nothing away from the others.
 // Overflow rule: a DDS callback never waits. What does not fit is refused, and counted by the door: scans show as a gap
 // in their numbers (lost_on_wire in the ledger), questions and session requests are answered "busy" at once.
 // Liveliness is never refused, because nobody would repeat it: the newest of a client replaces an older one that still
@@ -11,6 +13,7 @@
 #include <chrono>
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <memory>
 #include <optional>
 #include <stop_token>
@@ -50,6 +53,7 @@ using InboundValue = std::variant<SessionRequest, ClientLiveliness, ScanArrival,
 class Inbound {
  public:
   static constexpr std::size_t kMaxControl = 1024;
+  static constexpr std::size_t kLeastShare = 64;
 
   // At most `capacity` values of streams wait, as many questions, and kMaxControl session requests.
   explicit Inbound(std::size_t capacity) : capacity_(capacity) {}
@@ -78,6 +82,7 @@ class Inbound {
   Lane& LaneOf(const InboundValue& value) CAIRN_REQUIRES(mutex_);
   std::optional<InboundValue> PopLocked() CAIRN_REQUIRES(mutex_);
   void ForgetOlder(const ClientLiveliness& news) CAIRN_REQUIRES(mutex_);
+  [[nodiscard]] bool HasShare(const InboundValue& value) const CAIRN_REQUIRES(mutex_);
 
   const std::size_t capacity_;
   mutable Mutex mutex_;
@@ -87,6 +92,7 @@ class Inbound {
   Lane control_ CAIRN_GUARDED_BY(mutex_);
   Lane questions_ CAIRN_GUARDED_BY(mutex_);
   Lane streams_ CAIRN_GUARDED_BY(mutex_);
+  std::map<NameId, std::size_t> in_streams_ CAIRN_GUARDED_BY(mutex_);  // Values that wait there, by robot.
   std::uint64_t taken_ CAIRN_GUARDED_BY(mutex_) = 0;
   bool closed_ CAIRN_GUARDED_BY(mutex_) = false;
 };

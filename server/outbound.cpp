@@ -40,6 +40,8 @@ void Outbound::Close() {
 Outbound::Lane Outbound::LaneOf(const OutboundValue& value) {
   if (std::holds_alternative<Reply>(value)) return Lane::kReplies;
   if (std::holds_alternative<MapInfo>(value) || std::holds_alternative<TileSample>(value)) return Lane::kMap;
+  const auto* const retired = std::get_if<Retired>(&value);  // After what was sent of it before.
+  if (retired != nullptr && std::holds_alternative<MapInfo>(retired->of)) return Lane::kMap;
   return Lane::kLive;
 }
 

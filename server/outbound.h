@@ -22,7 +22,7 @@ namespace cairn::server {
 
 // The object that the keys of `of` name no longer exists. Nothing is sent under these keys until it exists again.
 struct Retired {
-  std::variant<SessionState, PoseReport, Ledger, Job> of;
+  std::variant<SessionState, PoseReport, Ledger, Job, MapInfo> of;
 };
 
 using OutboundValue =

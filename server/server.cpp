@@ -166,7 +166,7 @@ void Server::CheckJournal() {
   if (journal_ == nullptr) return;
   const JournalHealth health = journal_->health();
   if (health.over_budget && !std::exchange(over_budget_, health.over_budget))
-    spdlog::warn("the store is larger than store.max_gib, and everything in it is needed");
+    spdlog::warn("the store is larger than store.max_gib, and all of it is needed");
   over_budget_ = health.over_budget;
   if (health.degraded == std::exchange(journal_degraded_, health.degraded)) return;
   if (health.degraded) {

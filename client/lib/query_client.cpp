@@ -164,6 +164,7 @@ bool QueryClient::CommandsMatched() const {
 Result<void> QueryClient::WaitForServer(bool command, Deadline deadline) {
   constexpr std::chrono::milliseconds kPatience{100};
   const bool secure = !bus_.options().security.empty();
+  const std::uint64_t refused_before = bus_.datagrams_refused();
   Deadline alone = Clock::now(), began = alone;  // Since when no server is found, and pings are not answered.
   for (;;) {
     bool matched = false;
@@ -176,7 +177,8 @@ Result<void> QueryClient::WaitForServer(bool command, Deadline deadline) {
     if (!matched) {
       began = Clock::now();
       if (began >= deadline) return Fail(StatusCode::kUnavailable, NoServer(bus_, options_.timeout_s));
-      if (secure) RenewIfSilent(alone, kJoinPatience);
+      // A handshake can get stuck, and forged discovery messages can make the new endpoints invisible.
+      if (secure || bus_.datagrams_refused() > refused_before) RenewIfSilent(alone, kJoinPatience);
       continue;
     }
     alone = Clock::now();

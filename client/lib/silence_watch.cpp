@@ -52,6 +52,7 @@ bool SilenceWatch::IsBehind() {
 void SilenceWatch::Run() {
   Clock::duration after_renewal = kRest;
   Clock::time_point next_question = Clock::now();
+  std::uint64_t refused = bus_.datagrams_refused();
   while (WaitForSilence(next_question)) {
     const auto asked = Clock::now();
     next_question = asked + kRest;
@@ -68,7 +69,8 @@ void SilenceWatch::Run() {
     if (!IsBehind()) continue;
     renew_();
     next_question = Clock::now() + after_renewal;
-    after_renewal = std::min<Clock::duration>(2 * after_renewal, kLongestRest);
+    const bool hostile = bus_.datagrams_refused() > std::exchange(refused, bus_.datagrams_refused());
+    after_renewal = hostile ? Clock::duration(kRest) : std::min<Clock::duration>(2 * after_renewal, kLongestRest);
   }
 }
 

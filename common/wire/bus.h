@@ -48,7 +48,7 @@ class Publication {
   [[nodiscard]] virtual Result<void> Publish(const Value& value) = 0;
   // Marks the key of `value` as no longer needed. When the topic's instances are used up, its place is given to another
   // key, and late joiners no longer get its last sample. A later Publish of the same key takes a new place. Only for
-  // SessionState, PoseReport, Ledger and Job. kNotFound: nothing of that key was published.
+  // SessionState, PoseReport, Ledger, Job and MapInfo. kNotFound: nothing of that key was published.
   [[nodiscard]] virtual Result<void> Retire(const Value& value) = 0;
   // Waits until every matched subscription has acknowledged everything, or the deadline passes (false).
   [[nodiscard]] virtual bool WaitForAcknowledgement(std::chrono::milliseconds deadline) = 0;

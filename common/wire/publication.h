@@ -70,9 +70,11 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
 
  private:
   using Key = std::array<std::uint8_t, 16>;
-  // The topics whose keys change while a server runs: sessions and jobs begin and end.
+  // The topics whose keys change while a server runs: sessions, jobs and sites begin and end. (So do tiles, but to keep
+  // each tile here as well would double their memory.)
   static constexpr bool kRetires = std::is_same_v<Value, SessionState> || std::is_same_v<Value, PoseReport> ||
-                                   std::is_same_v<Value, Ledger> || std::is_same_v<Value, Job>;
+                                   std::is_same_v<Value, Ledger> || std::is_same_v<Value, Job> ||
+                                   std::is_same_v<Value, MapInfo>;
 
   Key KeyOf(Sample<Wire>& sample) {
     fd::InstanceHandle_t handle;

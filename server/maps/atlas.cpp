@@ -178,6 +178,10 @@ bool Atlas::Idle(const Place& place) const {
 
 void Atlas::Erase(std::map<std::string, Place>::iterator place) {
   if (journal_ != nullptr) journal_->Remove({.kind = RecordKind::kSite, .owner = HashName(place->first)});
+  MapInfo gone;
+  gone.site_id = HashName(place->first);
+  gone.site = place->first;
+  outbound_.Send(Retired{std::move(gone)});
   sites_.erase(place);
 }
 

@@ -36,31 +36,6 @@ Site::Done Once(Site::Done done) {
 
 }  // namespace
 
-// One session's answer to a correction. If a session ends without an answer, it drops the ticket, and the
-// destructor answers instead. So a version switch never waits for ever.
-class Site::Ticket {
- public:
-  Ticket(std::shared_ptr<Site> site, std::uint32_t version, SessionId session)
-      : site_(std::move(site)), version_(version), session_(session) {}
-  Ticket(const Ticket&) = delete;
-  Ticket& operator=(const Ticket&) = delete;
-  ~Ticket() {
-    if (!used_) Answer(std::nullopt);
-  }
-  void Answer(std::optional<Adopted> adopted) {
-    used_ = true;
-    site_->Run([version = version_, session = session_, adopted = std::move(adopted)](Site& site) mutable {
-      site.Settle(version, session, std::move(adopted));
-    });
-  }
-
- private:
-  const std::shared_ptr<Site> site_;
-  const std::uint32_t version_;
-  const SessionId session_;
-  bool used_ = false;
-};
-
 Site::Site(const std::string& name, double resolution_m, const MapsOptions& options, asio::thread_pool& pool,
            Outbound& outbound, Journal* journal, Generation generation, const Beginning& beginning)
     : name_(name),
@@ -80,24 +55,8 @@ Site::Site(const std::string& name, double resolution_m, const MapsOptions& opti
   snapshot_ = std::move(empty);
 }
 
-template <typename Act>
-void Site::Run(Act act) {
-  const MutexLock lock(mutex_);
-  waiting_.reset();  // Later changes belong after `act`.
-  Post(std::move(act));
-}
-
-template <typename Act>
-void Site::Post(Act act) {
-  ++asked_;
-  asio::post(strand_, [self = shared_from_this(), act = std::move(act)]() mutable {
-    try {
-      act(*self);
-    } catch (const std::exception& error) {
-      spdlog::error("site {}: a piece of work failed with an exception and was dropped: {}", self->name_, error.what());
-    }
-    ++self->handled_;
-  });
+void Site::LogFailure(const std::exception& error) const {
+  spdlog::error("site {}: a piece of work failed with an exception and was dropped: {}", name_, error.what());
 }
 
 void Site::Change(GridChange&& change) {
@@ -140,7 +99,7 @@ void Site::Join(Member member) {
     site.info_changed_ = true;
     site.StoreSite();
     // The map may have been switched since the session was made, or since the server that made it was killed.
-    if (member.epoch == site.epoch_) return;
+    if (member.epoch == site.epoch_ || site.GiveMissedPart(member)) return;
     if (const auto known = member.owner.lock()) known->SetMapEpoch(site.epoch_);
   });
 }
@@ -205,13 +164,6 @@ void Site::Close(std::function<void()> done) {
   });
 }
 
-void Site::FailSwitch(StatusCode code, const std::string& why) {
-  if (!switch_) return;
-  const Done waiting = std::move(switch_->done);
-  switch_.reset();
-  waiting(Fail(code, why));
-}
-
 void Site::End(SessionId session) {
   Run([session](Site& site) {
     site.joint_.SetPast(session);
@@ -245,72 +197,6 @@ void Site::Publish(std::function<void()> then) {
 
 void Site::Probe(std::function<void()> done) {
   Run([done = std::move(done)](Site&) { done(); });
-}
-
-void Site::Begin(std::uint32_t version, Done done) {
-  const MapVersion* const wanted = versions_.Find(version);
-  if (wanted == nullptr) {
-    return done(Fail(StatusCode::kNotFound, "site '" + name_ + "' has no map version " + std::to_string(version)));
-  }
-  if (version == versions_.enabled()) return done(version);
-  switch_.emplace();
-  switch_->version = version;
-  switch_->done = std::move(done);
-  for (const auto& [session, part] : wanted->parts) {
-    switch_->awaited.insert(session);
-    const auto ticket = std::make_shared<Ticket>(shared_from_this(), version, session);
-    Correction correction{.epoch = epoch_ + 1,
-                          .generation = generation_,
-                          .grid = part,
-                          .done = [ticket](Adopted&& adopted) { ticket->Answer(std::move(adopted)); },
-                          .completed = switch_->completed};
-    // If the session has ended, the correction and its ticket are dropped here.
-    if (const auto owner = OwnerOf(session)) owner->Adopt(std::move(correction));
-  }
-  CommitIfComplete();
-}
-
-std::shared_ptr<GridOwner> Site::OwnerOf(SessionId session) const {
-  const auto member = members_.find(session);
-  return member == members_.end() ? nullptr : member->second.owner.lock();
-}
-
-void Site::Settle(std::uint32_t version, SessionId session, std::optional<Adopted>&& adopted) {
-  if (!switch_ || switch_->version != version || switch_->awaited.erase(session) == 0) return;
-  if (adopted) {
-    slam::OccupancyGrid::Chunks& staged = switch_->staged[session];
-    for (const auto& [key, chunk] : adopted->change.chunks) {
-      if (chunk != nullptr) staged.emplace(key, chunk);
-    }
-    switch_->displaced.emplace(session, std::move(adopted->displaced));
-  } else {
-    StageGone(session);
-  }
-  CommitIfComplete();
-}
-
-void Site::CommitIfComplete() {
-  if (!switch_->awaited.empty()) return;
-  VersionSwitch complete = std::move(*switch_);
-  switch_.reset();
-  const MapVersion& version = *versions_.Find(complete.version);
-  for (const auto& [session, chunks] : complete.staged) {
-    joint_.Replace(session, chunks);
-    joint_.SetHidden(session, version.parts.at(session).fragment);
-    if (layers_.contains(session)) StoreLayer(session);
-  }
-  const std::uint32_t before = versions_.enabled();
-  versions_.Enable(complete.version, std::move(complete.displaced));
-  switches_[++epoch_] = generation_;
-  StoreVersion(before);
-  RenderAll();
-  *complete.completed = true;
-  for (const auto& [session, member] : members_) {
-    if (complete.staged.contains(session)) continue;
-    if (const auto owner = member.owner.lock()) owner->SetMapEpoch(epoch_);
-  }
-  Send();
-  complete.done(complete.version);
 }
 
 void Site::Render() {

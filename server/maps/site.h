@@ -10,15 +10,18 @@
 // that ends with an exception is logged and dropped, and the site continues.
 #pragma once
 
+#include <asio/post.hpp>
 #include <asio/strand.hpp>
 #include <asio/thread_pool.hpp>
 #include <atomic>
+#include <exception>
 #include <functional>
 #include <map>
 #include <memory>
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 
 #include "common/mutex.h"
 #include "common/service/generation.h"
@@ -127,12 +130,14 @@ class Site : public std::enable_shared_from_this<Site> {
   void Run(Act act) CAIRN_EXCLUDES(mutex_);
   template <typename Act>
   void Post(Act act) CAIRN_REQUIRES(mutex_);
+  void LogFailure(const std::exception& error) const;
   // The functions below run on the strand only.
   void Apply(SessionId session, const slam::OccupancyGrid::Chunks& chunks);
   void Begin(std::uint32_t version, Done done);
   void FailSwitch(StatusCode code, const std::string& why);
   void Settle(std::uint32_t version, SessionId session, std::optional<Adopted>&& adopted);
   std::shared_ptr<GridOwner> OwnerOf(SessionId session) const;
+  bool GiveMissedPart(const Member& member);
   void StageGone(SessionId session);
   void CommitIfComplete();
   void Render();
@@ -177,5 +182,25 @@ class Site : public std::enable_shared_from_this<Site> {
   std::shared_ptr<Changes> waiting_ CAIRN_GUARDED_BY(mutex_);  // To be added to, until the strand takes them.
   std::atomic<bool> publish_waits_ = false;
 };
+
+template <typename Act>
+void Site::Run(Act act) {
+  const MutexLock lock(mutex_);
+  waiting_.reset();  // Later changes belong after `act`.
+  Post(std::move(act));
+}
+
+template <typename Act>
+void Site::Post(Act act) {
+  ++asked_;
+  asio::post(strand_, [self = shared_from_this(), act = std::move(act)]() mutable {
+    try {
+      act(*self);
+    } catch (const std::exception& error) {
+      self->LogFailure(error);
+    }
+    ++self->handled_;
+  });
+}
 
 }  // namespace cairn::server

@@ -92,7 +92,7 @@ Reply AnswerPose(const Request& request, const Sessions& sessions) {
   return reply;
 }
 
-Reply AnswerPath(const Request& request, const Sessions& sessions, const Maps& maps) {
+Answer AnswerPath(const Request& request, const Sessions& sessions, const Maps& maps) {
   if (sessions.empty()) return NoRobot(request);
   const SessionSnapshot& session = sessions.front();
   const MapSnapshot* const map = maps.empty() ? nullptr : maps.front().get();
@@ -101,10 +101,7 @@ Reply AnswerPath(const Request& request, const Sessions& sessions, const Maps& m
     reply.map_epoch = map->info.epoch;
     reply.map_version = map->info.version;
   }
-  if (!request.smoothed) {
-    reply.path = session.path.ToTrajectory();
-    return reply;
-  }
+  if (!request.smoothed) return {std::move(reply), PathItems(session.path)};
   const std::string& robot = session.status.session.robot;
   const auto refuse = [&](const std::string& why) {
     return ReplyTo(request, {StatusCode::kFailedPrecondition, "no smoothed path of '" + robot + "': " + why});
@@ -115,8 +112,7 @@ Reply AnswerPath(const Request& request, const Sessions& sessions, const Maps& m
   if (smoothed == paths.end()) return refuse("no smoothing job of its site has finished");
   if (smoothed->second.session != 0 && smoothed->second.session != session.id)
     return refuse("its session began after the last smoothing job");
-  reply.path = *smoothed->second.path;
-  return reply;
+  return {std::move(reply), PathItems(smoothed->second.path)};
 }
 
 Reply AnswerStatus(const Request& request, const Sessions& sessions) {

@@ -30,7 +30,7 @@ using Maps = std::vector<std::shared_ptr<const MapSnapshot>>;
 // The path of the robot: the online poses exactly as they were published, one per scan used. With `smoothed`:
 // the smoothed path of the enabled map version, or of the newest version that has one. FAILED_PRECONDITION:
 // no smoothing job has finished. `sessions`: the robot's session, if any; `maps`: the map of its site.
-[[nodiscard]] Reply AnswerPath(const Request& request, const Sessions& sessions, const Maps& maps);
+[[nodiscard]] Answer AnswerPath(const Request& request, const Sessions& sessions, const Maps& maps);
 
 // The states, newest poses and ledgers of sessions. `sessions`: all sessions, or the robot's if the request
 // names a robot. If the request names a site, only the sessions of this site are returned.

@@ -21,8 +21,10 @@ Reply JobReply(const Request& request, Result<Job> job) {
 
 // New data is not stored, or something was not restored; empty if neither.
 std::string WhyDegraded(const Journal& journal) {
-  const std::string not_stored = journal.health().reason;
-  std::string why = not_stored.empty() ? std::string() : not_stored + "; new data is not stored";
+  const JournalHealth health = journal.health();
+  std::string why = health.degraded ? health.reason + "; new data is not stored" : std::string();
+  if (health.over_budget)
+    why += (why.empty() ? "" : "; ") + std::string("the store is larger than store.max_gib, and all of it is needed");
   const std::string not_restored = journal.set_aside().text();
   if (!why.empty() && !not_restored.empty()) why += "; ";
   constexpr std::size_t kLongest = 1000;  // The wire takes 1,024 bytes.

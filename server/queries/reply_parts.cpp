@@ -9,9 +9,6 @@ namespace {
 std::size_t BytesOf(const PoseReport&) {
   return 384;
 }
-std::size_t BytesOf(const StampedPose&) {
-  return 32;
-}
 std::size_t BytesOf(const std::shared_ptr<const Tile>& tile) {
   return tile->bytes.size() + 64;
 }
@@ -50,6 +47,21 @@ Tile Content(std::shared_ptr<const Tile>&& tile) {
 
 }  // namespace
 
+bool PathItems::empty() const {
+  return smoothed_ != nullptr ? next_ == smoothed_->size() : block_ == online_.blocks();
+}
+
+StampedPose PathItems::Take() {
+  if (smoothed_ != nullptr) return (*smoothed_)[next_++];
+  const std::vector<PathPose>& block = online_.block(block_);
+  const PathPose& pose = block[next_++];
+  if (next_ == block.size()) {
+    ++block_;
+    next_ = 0;
+  }
+  return {pose.stamp, pose.T_map_robot};
+}
+
 // The part under way and the bytes that it holds so far.
 class ReplyParts::Part {
  public:
@@ -64,14 +76,22 @@ class ReplyParts::Part {
     }
     return true;
   }
+  bool Take(PathItems& items, Trajectory& list) {
+    constexpr std::size_t kPoseBytes = 32;
+    for (; !items.empty(); used_ += kPoseBytes) {
+      if (used_ > 0 && used_ + kPoseBytes > kPartBudgetBytes) return false;
+      list.push_back(items.Take());
+    }
+    return true;
+  }
 
  private:
   std::size_t used_ = 0;
 };
 
-ReplyParts::ReplyParts(Answer&& answer) : tiles_(std::move(answer.tiles)), header_(std::move(answer.reply)) {
+ReplyParts::ReplyParts(Answer&& answer)
+    : tiles_(std::move(answer.tiles)), path_(std::move(answer.path)), header_(std::move(answer.reply)) {
   items_.poses = std::exchange(header_.poses, {});
-  items_.path = std::exchange(header_.path, {});
   items_.landmarks = std::exchange(header_.landmarks, {});
   items_.maps = std::exchange(header_.maps, {});
   items_.robots = std::exchange(header_.robots, {});
@@ -91,7 +111,7 @@ std::optional<Reply> ReplyParts::Next() {
 
 bool ReplyParts::Fill(Reply& part) {
   Part full;
-  return full.Take(items_.poses, taken_.poses, part.poses) && full.Take(items_.path, taken_.path, part.path) &&
+  return full.Take(items_.poses, taken_.poses, part.poses) && full.Take(path_, part.path) &&
          full.Take(tiles_, taken_.tiles, part.tiles) && full.Take(items_.landmarks, taken_.landmarks, part.landmarks) &&
          full.Take(items_.maps, taken_.maps, part.maps) && full.Take(items_.robots, taken_.robots, part.robots) &&
          full.Take(items_.jobs, taken_.jobs, part.jobs) && full.Take(items_.saved, taken_.saved, part.saved) &&

@@ -267,7 +267,8 @@ Result<void> SavedSites::Delete(const std::string& name) {
   empty.epoch = last->info.epoch + 1;
   empty.version = last->info.version + 1;
   empty.levels = last->info.levels;
-  rooms_.outbound.SendPatiently(std::move(empty));
+  rooms_.outbound.SendPatiently(empty);
+  rooms_.outbound.SendPatiently(Retired{std::move(empty)});
   // A site that has stored nothing yet is deleted without a trace.
   if (!removed && removed.error().code != StatusCode::kNotFound) return tl::unexpected(removed.error());
   return {};

@@ -38,17 +38,6 @@ std::optional<PathPose> PathView::At(Stamp stamp) const {
                   Interpolate(before.T_map_odom, after->T_map_odom, fraction)};
 }
 
-Trajectory PathView::ToTrajectory() const {
-  Trajectory all;
-  all.reserve(size());
-  const auto add = [&all](const Block& block) {
-    for (const PathPose& pose : *block) all.push_back({pose.stamp, pose.T_map_robot});
-  };
-  for (const Block& block : *full_) add(block);
-  add(tail_);
-  return all;
-}
-
 void PoseHistory::Append(const PathPose& pose) {
   if (size_ > 0 && pose.stamp <= (tail_.empty() ? full_->back()->back() : tail_.back()).stamp) return;
   tail_.push_back(pose);

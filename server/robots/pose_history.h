@@ -50,7 +50,11 @@ class PathView {
   // Interpolated between the two poses around `stamp`, covariance too, with the worse one's score and reason; nothing
   // outside first_stamp()..last_stamp().
   [[nodiscard]] std::optional<PathPose> At(Stamp stamp) const;
-  [[nodiscard]] Trajectory ToTrajectory() const;
+  // To read the path piece by piece, in order. No block is empty.
+  [[nodiscard]] std::size_t blocks() const { return full_->size() + (tail_->empty() ? 0 : 1); }
+  [[nodiscard]] const std::vector<PathPose>& block(std::size_t i) const {
+    return i < full_->size() ? *(*full_)[i] : *tail_;
+  }
 
  private:
   Blocks full_ = std::make_shared<const std::vector<Block>>();

@@ -242,13 +242,15 @@ Result<std::shared_ptr<Session>> Roster::FindOrFail(const std::string& robot) co
 
 void Roster::Tick() {
   const std::chrono::duration<double> expiry(options_.suspended_expiry_s);
+  const auto now = SessionRecord::Clock::now();
   for (const auto& session : All()) {
     session->Tick();
     if (session->record().localises()) {
       if (const auto site = atlas_.Find(session->record().state().site)) session->KeepUpWith(site->snapshot());
     }
-    if (session->record().SuspendedFor(SessionRecord::Clock::now()) > expiry)
+    if (session->record().SuspendedFor(now) > expiry)
       session->End({StatusCode::kDeadlineExceeded, "its robot stayed away for longer than robots.suspended_expiry_s"});
+    if (session->record().EndedFor(now) > expiry) MakeEarlier(session);
   }
   SendRefusals();
   RetireGone();
@@ -259,6 +261,15 @@ void Roster::Tick() {
     const bool used = session != sessions_.end() && session->second->record().Has(ledger.sensor_id);
     return used || outbound_.Send(Retired{ledger});
   });
+}
+
+// An ended session whose robot has not come back is one of the earlier ones, of which only so many are kept.
+void Roster::MakeEarlier(const std::shared_ptr<Session>& ended) {
+  const MutexLock lock(mutex_);
+  const auto place = sessions_.find(ended->record().state().robot_id);
+  if (place == sessions_.end() || place->second != ended) return;
+  gone_.push_back({ended, true});
+  sessions_.erase(place);
 }
 
 // Once a removed session has published its last state, its keys on the wire that no other session uses are retired.

@@ -53,7 +53,7 @@ class Roster {
   // Restores the sessions of earlier servers from their checkpoints and journals, in parallel on the pool. REQUIRES:
   // the sites were restored before, and no other function was called. A session whose records are damaged, or were
   // written by a newer server, is set aside (store/set_aside.h): its records stay, and its robot is told to open a new
-  // one. A session during whose restoring earlier servers ended (RestoreMarks) is restored alone; after two such ends
+  // one. A session during whose restoring earlier servers failed (RestoreMarks) is restored alone; after two failures
   // it is set aside, and only its part of the map is shown, from its checkpoint; after three, not even this.
   // A session whose checkpoint was made with other options of the estimator is restored from its whole journal, if that
   // is there and short; otherwise it keeps its options. `control`: CANCELLED if it was given up, after which the next
@@ -115,6 +115,7 @@ class Roster {
     bool with_journal = true;
   };
   using RestoredSession = Result<std::shared_ptr<Session>>;
+  void MakeEarlier(const std::shared_ptr<Session>& ended) CAIRN_EXCLUDES(mutex_);
   std::vector<RestoredSession> RestoreEach(const std::vector<SessionId>& ids, const Restoring& how);
   Result<void> RestoreTogether(const std::vector<SessionId>& ids, const Restoring& how);
   Result<void> RestoreDoubtful(SessionId id, Restoring how);

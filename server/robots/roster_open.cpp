@@ -121,9 +121,12 @@ std::shared_ptr<Session> Roster::Make(const StoredSession& stored, const std::sh
       return false;
     };
     outputs.position = [journal = journal_, id] { return journal->position(id); };
-    outputs.checkpoint = [journal = journal_, id](std::uint64_t position, Journal::Content content) {
-      return journal->Checkpoint(id, position, std::move(content));
+    outputs.checkpoint = [journal = journal_, id](std::uint64_t position, Journal::Content content,
+                                                  std::function<void()> done) {
+      return journal->Checkpoint(id, position, std::move(content), std::move(done));
     };
+    outputs.recover = [journal = journal_, id] { return journal->Recover(id); };
+    outputs.abandon = [journal = journal_, id] { journal->Abandon(id); };
     outputs.checkpoint_limits = {
         static_cast<std::uint64_t>(options_.checkpoint_entries),
         std::chrono::duration_cast<CheckpointPace::Time>(std::chrono::duration<double>(options_.checkpoint_work_s))};

@@ -3,11 +3,13 @@
 
 #include <asio/post.hpp>
 #include <chrono>
+#include <filesystem>
 #include <latch>
 #include <set>
 #include <utility>
 
 #include "server/robots/roster.h"
+#include "server/store/crash_note.h"
 #include "server/store/restore_marks.h"
 #include "server/store/site_contents.h"
 
@@ -27,6 +29,8 @@ Result<StoredSession> ReadSession(Store& store, SessionId id) {
 
 // The longest journal, in entries, that is processed again only because of other options: some minutes.
 constexpr std::uint64_t kMostReprocessed = 100'000;
+
+constexpr const char* kCrashNoteFile = "crashed-session";  // In the state directory, while sessions are restored.
 
 constexpr std::uint32_t kAttemptsWithJournal = 2;     // After so many failures the journal is not used,
 constexpr std::uint32_t kAttemptsWithCheckpoint = 3;  // and after so many neither is the checkpoint.
@@ -62,8 +66,12 @@ Result<void> Roster::Restore(StartControl& control) {
   if (!ids) return tl::unexpected(ids.error());
   const auto last = LastSession(journal_->store());
   if (!last) return tl::unexpected(last.error());
-  auto marks = RestoreMarks::Read(journal_->store());
+  const std::filesystem::path place = journal_->store().directory();
+  const std::filesystem::path note = place.empty() ? place : place / kCrashNoteFile;
+  auto marks = RestoreMarks::Read(journal_->store(), CrashNote::Of(note));
   if (!marks) return tl::unexpected(marks.error());
+  if (auto settled = marks->Settle(); !settled) return settled;
+  const CrashNote crash_note(note);
   const auto begin = std::chrono::steady_clock::now();
   if (!ids->empty()) spdlog::info("restoring {} sessions", ids->size());
   std::vector<SessionId> doubtful, others;
@@ -164,6 +172,7 @@ Roster::RestoredSession Roster::NotRestored(SessionId id, Status why) {
 }
 
 Roster::RestoredSession Roster::RestoreOne(SessionId id, const Restoring& how) {
+  const CrashNote::Working working(id);
   try {
     auto restored = ReadBack(id, how);
     if (restored || how.control.given_up()) return restored;

@@ -203,6 +203,7 @@ void Session::Store(JournalEntry entry) {
 }
 
 void Session::Lost(const Status& why) {
+  lost_ = true;
   if (record_.SetStored(false, why)) AnnounceState();
 }
 
@@ -237,6 +238,7 @@ void Session::Tick() {
     unannounced_ = false;
     AnnounceState();
   }
+  if (lost_) Schedule();  // The disk may work again, while nothing arrives from the robot.
   if (record_.LookForSilence(SessionRecord::Clock::now())) state_unsent_ = true;
   if (state_unsent_) AnnounceState();
   PublishLedgers(SessionRecord::Urgency::kWhenDue);
@@ -292,19 +294,45 @@ void Session::TakeCheckpoint() {
   // it again to the next server, which must not take it for something that it has received before.
   if (failed_ || ending_ || !outputs_.position || !outputs_.checkpoint) return;
   const std::uint64_t position = outputs_.position();
-  if (!pace_.IsDue(position)) return;
+  if (pace_.IsDue(position)) {
+    if (!SaveAt(position, {})) pace_.Refused();
+  } else if (position == 0 && lost_ && outputs_.recover) {
+    StoreAgain();
+  }
+}
+
+// Nothing of the session was stored for a while: what came meanwhile is in the checkpoint that begins this.
+void Session::StoreAgain() {
+  const std::uint64_t position = outputs_.recover();
+  if (position == 0) return;
+  lost_ = false;
+  estimator_.BeginStoring();
+  const auto done = [weak = weak_from_this()] {
+    if (const auto self = weak.lock(); self != nullptr && self->record_.StoredAgain()) {
+      self->AnnounceState();
+      self->PublishLedgers(SessionRecord::Urgency::kNow);
+    }
+  };
+  if (SaveAt(position, done)) return;
+  outputs_.abandon();
+  record_.SetStored(false);
+  lost_ = true;
+}
+
+bool Session::SaveAt(std::uint64_t position, std::function<void()> done) {
   const auto begin = ThreadTime();
   auto save = estimator_.Save();
   // Samples that were settled meanwhile are in the record, but perhaps not in the journal before this position.
-  if (!save || ending_ || outputs_.position() != position) return pace_.Refused();
+  if (!save || ending_ || outputs_.position() != position) return false;
   auto content = [save = std::move(save), saving = ThreadTime() - begin, cost = pace_.cost()] {
     const auto making = ThreadTime();
     CheckpointContent made = save();
     *cost = (saving + (ThreadTime() - making)).count();
     return made;
   };
-  if (!outputs_.checkpoint(position, std::move(content))) return pace_.Refused();
+  if (!outputs_.checkpoint(position, std::move(content), std::move(done))) return false;
   pace_.Begun(position);
+  return true;
 }
 
 void Session::Handle(RobotEvent&& event) {

@@ -67,7 +67,8 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   // Publishes the state once more.
   void Announce() { AnnounceState(); }
   // Called for the journal. ExpectDurable: the session's record is being written; the session is announced as open when
-  // Durable is called for the first time. Lost: from now on nothing of the session is stored.
+  // Durable is called for the first time. Lost: from now on nothing of the session is stored, until the disk works
+  // again and a checkpoint of its present state is on it.
   void ExpectDurable();
   void Durable(const std::vector<JournalEntry>& entries);
   void Lost(const Status& why);
@@ -103,6 +104,8 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   void Drain();
   void Handle(RobotEvent&& event);
   void TakeCheckpoint();
+  void StoreAgain();
+  bool SaveAt(std::uint64_t position, std::function<void()> done);
   // Calls `act`; whether it threw. The session has then failed.
   template <typename Act>
   bool Throws(Act act) noexcept;
@@ -118,6 +121,7 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   RobotQueue queue_;
   std::atomic<bool> ending_{false};  // An end was asked for: nothing new is taken.
   std::atomic<bool> state_unsent_{false};
+  std::atomic<bool> lost_{false};  // Nothing of it is stored any more, until StoreAgain.
   std::atomic<bool> keep_stored_{false};
   std::atomic<bool> unannounced_{false};  // Not announced as open until its record is on the disk.
   SessionRecord::Clock::time_point opened_{};

@@ -212,7 +212,10 @@ void SessionEstimator::AdoptGrid(std::uint32_t epoch, const RobotGrid& grid) {
   slam::Mapper& mapper = pipeline_.mapper();
   const auto path = grid.path != nullptr ? std::span<const Pose2>(*grid.path) : std::span<const Pose2>();
   const auto numbers = grid.numbers != nullptr ? std::span(*grid.numbers) : std::span<const std::uint64_t>();
+  const bool behind = mapper.keyframes_made() < grid.keyframes;
   mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), grid.chunks), grid.keyframes, path, numbers);
+  // Of a session that was not stored to its end: its path cannot follow, so its place in this map is not known.
+  if (behind) mapper.Relocalise({});
   if (grid.fragment && !fragment_) driven_m_ = 0.0;  // So that no job joins it again at once.
   fragment_ = grid.fragment;
   if (!fragment_) start_refused_.clear();

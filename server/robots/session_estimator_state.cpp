@@ -108,6 +108,10 @@ Journal::Content SessionEstimator::Save() const {
   };
 }
 
+void SessionEstimator::BeginStoring() {
+  record_.BeginStoring(WaitingBySensor());
+}
+
 Result<SessionEstimator::PieceValues> SessionEstimator::Load(std::string_view main,
                                                              std::span<const std::string_view> pieces) {
   const auto parts = PartsOf(main);

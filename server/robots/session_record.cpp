@@ -47,7 +47,7 @@ bool SessionRecord::AddSensors(const std::vector<std::string>& sensors) {
     if (!streams_.contains(sensor_id)) added.emplace(sensor_id, Stream{StreamLedger(NamesOf(sensor_id, sensor))});
   }
   if (streams_.size() + added.size() > kMaxSensors) return false;
-  for (auto& [sensor_id, stream] : added) stream.account.SetStored(status_.session.durable);
+  for (auto& [sensor_id, stream] : added) stream.account.SetStored(storing_);
   streams_.merge(added);
   return true;
 }
@@ -57,7 +57,7 @@ void SessionRecord::Inherit(NameId sensor_id, StreamLedger&& account) {
   Stream* const stream = Find(sensor_id);
   if (stream == nullptr) return;
   account.Rename(stream->account.ledger());
-  account.SetStored(status_.session.durable);
+  account.SetStored(storing_);
   stream->account = std::move(account);
 }
 
@@ -152,11 +152,12 @@ bool SessionRecord::LeftAside(Stream& stream, std::uint64_t sequence) const {
 
 bool SessionRecord::SetStored(bool stored, const Status& why) {
   const MutexLock lock(mutex_);
-  if (status_.session.durable == stored) return false;
-  status_.session.durable = stored;
-  if (!stored && status_.session.status.ok()) status_.session.status = why;
+  storing_ = stored;
   for (auto& [sensor_id, stream] : streams_) stream.account.SetStored(stored);
   odometry_.account.SetStored(stored);
+  if (status_.session.durable == stored) return false;
+  status_.session.durable = stored;
+  if (!stored && status_.session.status.ok()) status_.session.status = not_stored_ = why;
   return true;
 }
 
@@ -229,6 +230,7 @@ bool SessionRecord::SetPhase(SessionPhase phase, Status status) {
   if (status_.session.phase == SessionPhase::kEnded) return false;
   if (phase == SessionPhase::kActive && status_.session.phase != phase) active_ = Clock::now();
   if (phase == SessionPhase::kSuspended && status_.session.phase != phase) suspended_ = Clock::now();
+  if (phase == SessionPhase::kEnded) ended_ = Clock::now();
   status_.session.phase = phase;
   status_.session.status = std::move(status);
   return true;
@@ -310,6 +312,11 @@ SessionState SessionRecord::StateNow() const {
 SessionRecord::Clock::duration SessionRecord::SuspendedFor(Clock::time_point now) const {
   const MutexLock lock(mutex_);
   return status_.session.phase == SessionPhase::kSuspended ? now - suspended_ : Clock::duration::zero();
+}
+
+SessionRecord::Clock::duration SessionRecord::EndedFor(Clock::time_point now) const {
+  const MutexLock lock(mutex_);
+  return status_.session.phase == SessionPhase::kEnded ? now - ended_ : Clock::duration::zero();
 }
 
 std::uint32_t SessionRecord::epoch() const {

@@ -1,4 +1,4 @@
-// What a checkpoint holds of a session's record (session_record.h).
+// What a checkpoint holds of a session's record, and what counts as stored with it (session_record.h).
 #include <set>
 #include <string>
 #include <utility>
@@ -55,9 +55,34 @@ Result<void> SessionRecord::Load(slam::StateReader& reader, const WaitingScans& 
   return {};
 }
 
+void SessionRecord::BeginStoring(const WaitingScans& in_estimator) {
+  static const std::set<std::uint64_t> kNone;
+  const MutexLock lock(mutex_);
+  storing_ = true;
+  for (auto& [sensor_id, stream] : streams_) {
+    const auto taken = in_estimator.find(sensor_id);
+    stream.account.BeginStoring(taken == in_estimator.end() ? kNone : taken->second);
+  }
+  odometry_.account.BeginStoring(kNone);
+}
+
+bool SessionRecord::StoredAgain() {
+  const MutexLock lock(mutex_);
+  if (!storing_ || status_.session.durable) return false;
+  status_.session.durable = true;
+  if (status_.session.status.message == not_stored_.message) status_.session.status = {};
+  const auto advance = [](Stream& stream) {
+    stream.account.StoredAgain();
+    stream.changed = true;
+  };
+  for (auto& [sensor_id, stream] : streams_) advance(stream);
+  advance(odometry_);
+  return true;
+}
+
 void SessionRecord::Restored() {
   const MutexLock lock(mutex_);
-  status_.session.durable = true;
+  status_.session.durable = storing_ = true;
   status_.alive = false;
   if (status_.session.phase != SessionPhase::kEnded) {
     status_.session.phase = SessionPhase::kSuspended;

@@ -72,6 +72,12 @@ void StreamLedger::SetStored(bool stored) {
   if (!stored) undurable_.clear();
 }
 
+void StreamLedger::BeginStoring(const std::set<std::uint64_t>& in_checkpoint) {
+  stored_ = true;
+  undurable_.clear();
+  std::ranges::set_difference(waiting_, in_checkpoint, std::inserter(undurable_, undurable_.end()));
+}
+
 void StreamLedger::Durable(std::uint64_t sequence) {
   if (stored_ && undurable_.erase(sequence) > 0) AdvanceDurable();
 }

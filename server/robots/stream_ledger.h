@@ -70,6 +70,10 @@ class StreamLedger {
   }
   // Whether samples that are received from now on are stored. If not, durable_through stays where it is.
   void SetStored(bool stored);
+  // Samples are stored again from now on, of those that wait all but these; a checkpoint that is being made holds
+  // everything else. durable_through advances with StoredAgain, when that is on the disk.
+  void BeginStoring(const std::set<std::uint64_t>& in_checkpoint);
+  void StoredAgain() { AdvanceDurable(); }
   // The sample, and whether it was used or dropped, is on the disk.
   void Durable(std::uint64_t sequence);
   // The ledger was restored from the disk, so everything in it is durable. The next sample should have the number after

@@ -5,8 +5,9 @@
 //
 // Overflow rule: the queue is bounded by bytes. While the disk fails, the group is tried again every second and the
 // queue fills. If there is no room for an entry, its session is no longer stored from there on, because a journal with
-// a gap could not be replayed. The entries before stay valid. The state is then `degraded` with the reason. A record
-// that is longer than the store can hold is left out in the same way; it must not keep others from being written.
+// a gap could not be replayed. The entries before stay valid. The state is then `degraded` with the reason, until the
+// session is stored again with a checkpoint of its present state (Recover). A record that is longer than the store can
+// hold is left out in the same way; it must not keep others from being written.
 // Over store.max_gib the journal before a checkpoint is removed, of the session that was begun first, then of the next.
 // A journal is removed as a whole up to the checkpoint, because a rest of it could not be processed again. Thread rule:
 // any thread; Start and Stop from one.
@@ -75,8 +76,15 @@ class Journal {
   // Stores the session's state after exactly the entries up to `position`. `content` is called on the journal's thread.
   // Returns false if another checkpoint of the session is still being written, or if it has one at this position or a
   // later one.
+  // `done`: called on the journal's thread when it is on the disk.
   using Content = std::function<CheckpointContent()>;
-  bool Checkpoint(std::uint64_t session, std::uint64_t position, Content content);
+  bool Checkpoint(std::uint64_t session, std::uint64_t position, Content content, std::function<void()> done = {});
+  // A session that is no longer stored can be stored again: returns the position of a checkpoint that must be asked for
+  // next, or 0 if this is not such a session, or the disk still fails or is far behind. Entries after that position are
+  // kept in memory until the checkpoint is on the disk; then the journal before it is removed. Abandon: the checkpoint
+  // could not be made, and the session is no longer stored again.
+  [[nodiscard]] std::uint64_t Recover(std::uint64_t session);
+  void Abandon(std::uint64_t session);
   // Nothing of the session is written any more, and what is stored of it stays.
   void Close(std::uint64_t session);
   // Removes all records of a session that will not be restored.
@@ -103,7 +111,9 @@ class Journal {
   using Clock = std::chrono::steady_clock;
   struct Line {  // One open session.
     std::uint64_t next = 1;
-    bool lost = false;
+    std::string lost = {};          // Why nothing of it is stored any more; empty: it is.
+    std::uint64_t recovers_at = 0;  // Where it is stored again: the position of its checkpoint. 0: it is stored.
+    std::optional<StoredSession> unwritten = {};  // The session itself, if there was no room even for that.
     bool checkpointing = false;
     std::uint64_t checkpointed = 0;  // Position of the newest complete checkpoint.
     StoredPieces pieces = {};        // Those of the newest complete checkpoint.
@@ -131,6 +141,7 @@ class Journal {
     std::uint64_t session = 0;
     std::uint64_t position = 0;
     Content content;
+    std::function<void()> done;
   };
   // Changes that are committed together.
   struct Group {
@@ -144,6 +155,10 @@ class Journal {
   enum class Room { kForSamples, kWithReserve };
 
   void CloseLocked(std::uint64_t session) CAIRN_REQUIRES(mutex_);
+  void Lose(std::uint64_t session, Line& line, std::string why) CAIRN_REQUIRES(mutex_);
+  void ReleaseHeld(std::uint64_t session, Line& line) CAIRN_REQUIRES(mutex_);
+  [[nodiscard]] std::size_t BytesOfQueue() const;
+  [[nodiscard]] bool HasRoom(std::size_t size, Room room) const CAIRN_REQUIRES(mutex_);
   bool RemoveStatesOf(std::uint64_t session, std::size_t size, Room room) CAIRN_REQUIRES(mutex_);
   bool Push(Change change, std::size_t size, Room room = Room::kForSamples) CAIRN_REQUIRES(mutex_);
   void Run(const std::stop_token& stop);
@@ -152,11 +167,12 @@ class Journal {
   void LeaveOutTooLong(Prepared& prepared) CAIRN_EXCLUDES(mutex_);
   void DropForgottenCheckpoint() CAIRN_EXCLUDES(mutex_);
   void WriteCheckpoint(std::optional<WantedCheckpoint> wanted, RecordChanges& changes) CAIRN_EXCLUDES(mutex_);
+  void AddUnwrittenSession(std::uint64_t session, RecordChanges& changes) CAIRN_EXCLUDES(mutex_);
   void BeginCheckpoint(WantedCheckpoint wanted) CAIRN_EXCLUDES(mutex_);
   bool CommitOnce(const RecordChanges& changes);
   bool CommitPatiently(const RecordChanges& changes, const std::stop_token& stop);
   void Tell(const Prepared& prepared, Clock::time_point oldest);
-  void EndCheckpoint();
+  void EndCheckpoint() CAIRN_EXCLUDES(mutex_);
   void KeepBudget();
 
   Store& store_;
@@ -169,10 +185,13 @@ class Journal {
   std::deque<Change> queue_ CAIRN_GUARDED_BY(mutex_);
   std::size_t queued_bytes_ CAIRN_GUARDED_BY(mutex_) = 0;      // Bytes in queue_.
   std::size_t committing_bytes_ CAIRN_GUARDED_BY(mutex_) = 0;  // Bytes of the group being committed.
+  std::deque<Appended> held_ CAIRN_GUARDED_BY(mutex_);         // Of sessions that wait for the checkpoint of Recover.
+  std::size_t held_bytes_ CAIRN_GUARDED_BY(mutex_) = 0;
   Clock::time_point oldest_ CAIRN_GUARDED_BY(mutex_);
   bool urgent_ CAIRN_GUARDED_BY(mutex_) = false;
   std::string disk_fault_ CAIRN_GUARDED_BY(mutex_);        // Why the last commit failed; empty if it did not.
-  std::string lost_ CAIRN_GUARDED_BY(mutex_);              // Which session is no longer stored.
+  std::string left_out_ CAIRN_GUARDED_BY(mutex_);          // What else than a session is no longer stored, and why.
+  bool ended_ CAIRN_GUARDED_BY(mutex_) = false;            // The thread ended with an exception.
   std::string checkpoint_fault_ CAIRN_GUARDED_BY(mutex_);  // Why the last checkpoint is missing.
   bool over_budget_ CAIRN_GUARDED_BY(mutex_) = false;
   JournalCounts counts_ CAIRN_GUARDED_BY(mutex_);
@@ -182,6 +201,7 @@ class Journal {
 
   // Used by the thread only.
   std::optional<CheckpointWriter> writing_;
+  std::function<void()> written_;  // Called when that is on the disk.
   Clock::time_point budget_checked_{};
 
   std::jthread thread_;  // The last member: it stops before the members it uses are destroyed.

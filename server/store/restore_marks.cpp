@@ -5,7 +5,7 @@
 
 namespace cairn::server {
 
-Result<RestoreMarks> RestoreMarks::Read(Store& store) {
+Result<RestoreMarks> RestoreMarks::Read(Store& store, std::optional<std::uint64_t> crashed) {
   RestoreMarks marks(store);
   const auto sessions = store.Owners(RecordKind::kRestoring);
   if (!sessions) return tl::unexpected(sessions.error());
@@ -13,35 +13,51 @@ Result<RestoreMarks> RestoreMarks::Read(Store& store) {
     const auto take = [&](std::uint64_t, std::string_view bytes) -> Result<void> {
       record::Restoring from;
       if (!from.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return Unreadable("a mark");
-      marks.failed_[session] = {from.attempts(), from.place()};
+      Ends& ends = marks.ends_[session] = {from.attempts(), from.kills(), from.place()};
+      if (from.open() && crashed != session) {
+        if (ends.crashes > 0) --ends.crashes;
+        ++ends.kills;
+      }
       return {};
     };
     const auto read = store.Read({.kind = RecordKind::kRestoring, .owner = session}, take);
     if (!read && read.error().code != StatusCode::kDataLoss) return tl::unexpected(read.error());
-    if (!read) marks.failed_[session] = {1, 0};
+    if (!read) marks.ends_[session] = {.crashes = 1};
   }
   return marks;
 }
 
-RestoreMarks::Failures RestoreMarks::FailuresOf(std::uint64_t session) const {
-  const auto found = failed_.find(session);
-  return found == failed_.end() ? Failures{} : found->second;
+Result<void> RestoreMarks::Settle() {
+  RecordChanges changes;
+  for (const auto& [session, ends] : ends_) changes.put.push_back(RecordOf(session, ends, false));
+  return changes.put.empty() ? Result<void>{} : store_->Commit(changes);
+}
+
+RestoreMarks::Ends RestoreMarks::EndsOf(std::uint64_t session) const {
+  const auto found = ends_.find(session);
+  return found == ends_.end() ? Ends{} : found->second;
 }
 
 std::uint32_t RestoreMarks::failed(std::uint64_t session) const {
-  return FailuresOf(session).count;
+  const Ends ends = EndsOf(session);
+  return ends.crashes + ends.kills / kKillsPerFailure;
 }
 
-Record RestoreMarks::RecordOf(std::uint64_t session, std::uint32_t failures, std::uint64_t place) {
+Record RestoreMarks::RecordOf(std::uint64_t session, const Ends& ends, bool open) {
   record::Restoring to;
-  to.set_attempts(failures);
-  to.set_place(place);
+  to.set_attempts(ends.crashes);
+  to.set_place(ends.place);
+  to.set_kills(ends.kills);
+  to.set_open(open);
   return {{RecordKind::kRestoring, session, 0}, to.SerializeAsString()};
 }
 
+// Should the process end now without a note, it counts as a crash for a server that knows no notes.
 Record RestoreMarks::MarkAt(std::uint64_t session, std::uint64_t place) const {
-  const Failures before = FailuresOf(session);
-  return RecordOf(session, before.place == place ? before.count + 1 : 1, place);
+  Ends ends = EndsOf(session);
+  if (ends.place != place) ends = {.place = place};
+  ++ends.crashes;
+  return RecordOf(session, ends, true);
 }
 
 Result<void> RestoreMarks::Begin(const std::vector<std::uint64_t>& sessions) {
@@ -51,7 +67,7 @@ Result<void> RestoreMarks::Begin(const std::vector<std::uint64_t>& sessions) {
 }
 
 Result<void> RestoreMarks::BeginWithoutJournal(std::uint64_t session) {
-  return store_->Commit({.removed = {}, .put = {MarkAt(session, FailuresOf(session).place)}});
+  return store_->Commit({.removed = {}, .put = {MarkAt(session, EndsOf(session).place)}});
 }
 
 Result<void> RestoreMarks::Reached(std::uint64_t session, std::uint64_t entries) const {
@@ -60,14 +76,14 @@ Result<void> RestoreMarks::Reached(std::uint64_t session, std::uint64_t entries)
 }
 
 Result<void> RestoreMarks::Set(std::uint64_t session, std::uint32_t failures) {
-  failed_[session].count = failures;
-  return store_->Commit({.removed = {}, .put = {RecordOf(session, failures, failed_[session].place)}});
+  ends_[session] = {.crashes = failures, .place = EndsOf(session).place};
+  return store_->Commit({.removed = {}, .put = {RecordOf(session, ends_[session], false)}});
 }
 
 Result<void> RestoreMarks::Succeeded(const std::vector<std::uint64_t>& sessions) {
   RecordChanges changes;
   for (const std::uint64_t session : sessions) {
-    failed_.erase(session);
+    ends_.erase(session);
     changes.removed.push_back({.kind = RecordKind::kRestoring, .owner = session});
   }
   return changes.removed.empty() ? Result<void>{} : store_->Commit(changes);

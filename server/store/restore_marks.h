@@ -1,12 +1,15 @@
 // Remembers on the disk which sessions a server is about to restore, and how far it has come, so that a session whose
 // restoring ends the process does not end every later start as well: what is still marked at a start was being restored
-// when the process ended. What ends the process does so at the same place of the journal each time, so only ends at the
-// same place are counted together; a long restore that is killed from outside now and then goes on being tried.
+// when the process ended. If the process crashed, a note says which session did it (crash_note.h); the others are
+// not to blame. If it was killed, none may be, but memory that is not enough ends a process in this way too: so many
+// kills count as one failure. What ends the process does so at the same place of the journal each time, so only ends at
+// the same place are counted together.
 // Thread rule: Reached from any thread, the others from one.
 #pragma once
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "server/store/store.h"
@@ -18,13 +21,14 @@ class RestoreMarks {
   // A place is a stretch of so many entries of a journal.
   static constexpr std::uint64_t kPlaceEntries = 10'000;
 
-  // A damaged mark counts as one failure.
-  [[nodiscard]] static Result<RestoreMarks> Read(Store& store);
+  static constexpr std::uint32_t kKillsPerFailure = 8;
 
-  // The mark that so many processes ended at this place while they restored the session.
-  [[nodiscard]] static Record RecordOf(std::uint64_t session, std::uint32_t failures, std::uint64_t place = 0);
+  // `crashed`: the session whose thread crashed when the last process ended. A damaged mark counts as one failure.
+  [[nodiscard]] static Result<RestoreMarks> Read(Store& store, std::optional<std::uint64_t> crashed = {});
+  // Writes down what was read, so that the next start need not know who crashed.
+  [[nodiscard]] Result<void> Settle();
 
-  // How many processes ended in a row at the same place of this session.
+  // How many processes failed in a row at the same place of this session.
   [[nodiscard]] std::uint32_t failed(std::uint64_t session) const;
   // These return when the change is on the disk. Begin: from the first entry, or from a checkpoint.
   [[nodiscard]] Result<void> Begin(const std::vector<std::uint64_t>& sessions);
@@ -36,17 +40,19 @@ class RestoreMarks {
   [[nodiscard]] Result<void> Succeeded(const std::vector<std::uint64_t>& sessions);
 
  private:
-  struct Failures {
-    std::uint32_t count = 0;
+  struct Ends {
+    std::uint32_t crashes = 0;
+    std::uint32_t kills = 0;
     std::uint64_t place = 0;
   };
   explicit RestoreMarks(Store& store) : store_(&store) {}
+  [[nodiscard]] static Record RecordOf(std::uint64_t session, const Ends& ends, bool open);
   // The mark of a session that is at this place now.
   [[nodiscard]] Record MarkAt(std::uint64_t session, std::uint64_t place) const;
-  [[nodiscard]] Failures FailuresOf(std::uint64_t session) const;
+  [[nodiscard]] Ends EndsOf(std::uint64_t session) const;
 
   Store* store_;
-  std::map<std::uint64_t, Failures> failed_;
+  std::map<std::uint64_t, Ends> ends_;
 };
 
 }  // namespace cairn::server

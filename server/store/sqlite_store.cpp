@@ -84,8 +84,10 @@ class Use {
 
 class SqliteStore : public Store {
  public:
-  SqliteStore(const std::string& path, const std::string& vfs, DirectoryLock lock)
-      : lock_(std::move(lock)), database_(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, 0, vfs) {
+  SqliteStore(std::filesystem::path directory, const std::string& path, const std::string& vfs, DirectoryLock lock)
+      : directory_(std::move(directory)),
+        lock_(std::move(lock)),
+        database_(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, 0, vfs) {
     database_.exec(kSetUp);
     if (int version = Pragma("user_version"); version == 0) MakeTables();
     put_.emplace(database_, kPut);
@@ -195,6 +197,8 @@ class SqliteStore : public Store {
     }
   }
 
+  std::filesystem::path directory() const override { return directory_; }
+
   Result<std::uint64_t> bytes_used() override {
     const MutexLock lock(mutex_);
     try {
@@ -233,6 +237,7 @@ class SqliteStore : public Store {
     put->exec();
   }
 
+  const std::filesystem::path directory_;  // Empty: in memory.
   const DirectoryLock lock_;
   Mutex mutex_;
   SQLite::Database database_;
@@ -255,7 +260,7 @@ Result<std::unique_ptr<Store>> OpenStore(const std::filesystem::path& directory,
       lock = std::move(*taken);
       if (auto checked = SqliteStore::Check(path, vfs); !checked) return tl::unexpected(checked.error());
     }
-    return std::make_unique<SqliteStore>(path, vfs, std::move(lock));
+    return std::make_unique<SqliteStore>(in_memory ? std::filesystem::path() : directory, path, vfs, std::move(lock));
   } catch (const SQLite::Exception& error) {
     return tl::unexpected(StatusOf(error, "cannot open the store '" + path + "'"));
   } catch (const std::filesystem::filesystem_error& error) {

@@ -7,6 +7,7 @@
 
 #include <compare>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <optional>
 #include <string>
@@ -80,6 +81,8 @@ class Store {
   virtual Result<std::vector<std::uint64_t>> Numbers(const RecordRange& range) = 0;
   // Longer records cannot be written. SQLite's limit is 10^9 bytes with all that is around them.
   [[nodiscard]] virtual std::size_t max_record_bytes() const { return 900'000'000; }
+  // Where its files are; empty if it has none.
+  [[nodiscard]] virtual std::filesystem::path directory() const { return {}; }
   // Disk space that the records use.
   virtual Result<std::uint64_t> bytes_used() = 0;
 };

@@ -74,6 +74,14 @@ check "a killed server is started again" eventually 10 runs_anew "$old"
 echo "   after $(($(now_ms) - began)) ms, NRestarts=$(property NRestarts)"
 check "it answers again" eventually 5 answers
 
+# A server that somebody brings down again and again.
+for _ in $(seq 12); do
+  old=$(pid)
+  kill -KILL "$old"
+  eventually 10 runs_anew "$old" || break
+done
+check "after twelve more deaths it is still started again" eventually 5 answers
+
 # A stop in the middle of work.
 cairn sim --robots 4 --prefix load --beams 360 --hz 10 --seconds 600 --rate 20 --window 32 --site load >/run/load 2>&1 &
 load=$!
@@ -95,7 +103,7 @@ cp "$configuration" /run/cairnd.yaml
 sed -i 's/^\( *publish_rate_hz:\) [0-9.]*/\1 4000/' "$configuration"
 since=$(date '+%F %T')
 check "a wrong configuration fails the start" sh -c '! systemctl start cairnd 2>/dev/null'
-sleep 3  # That nothing happens can only be watched: three times RestartSec.
+sleep 3  # That nothing happens can only be watched: six times RestartSec.
 check "once" [ "$(property NRestarts) $(property ActiveState)" = "0 failed" ]
 check "the journal names file, line and key" journal_says "cairnd.yaml:.*publish_rate_hz" --since="$since"
 cp /run/cairnd.yaml "$configuration"

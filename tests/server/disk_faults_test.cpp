@@ -79,6 +79,37 @@ TEST(DiskFaults, ThatEndLoseNothing) {
   EXPECT_TRUE(SamePath(PathOf(*next.operator->()), path));
 }
 
+// The disk fails for so long that the server cannot keep in memory what is to be written. Until it was started again it
+// stored nothing more of this robot.
+TEST(DiskFaults, AfterALongOneTheRobotIsStoredAgain) {
+  const TempDirectory directory;
+  const auto state = directory / "state";
+  constexpr int kLong = 1000;
+  Trajectory path;
+  {
+    FaultyVfs vfs;
+    StoredServer server(state, TestOptions(), FaultyVfs::name(), {.commit_delay_ms = 5, .queue_mib = 1});
+    server->Open("r1", kDriver);
+    server->Drive("r1", kDriver, 0, 40);
+    ASSERT_TRUE(server->WaitFor([&] { return server->LastLedger("r1").durable_through == 40; }));
+    vfs.Set(DiskFault::kFull);
+    server->Drive("r1", kDriver, 40, kLong);
+    ASSERT_TRUE(server->WaitFor([&] { return !server->LastState("r1", kDriver).durable; }));
+    vfs.Set(DiskFault::kNone);
+    ASSERT_TRUE(server->WaitFor([&] { return server->LastState("r1", kDriver).durable; }));
+    EXPECT_TRUE(server->LastState("r1", kDriver).status.ok()) << server->LastState("r1", kDriver).status.message;
+    ASSERT_TRUE(server->WaitFor([&] { return server->LastLedger("r1").durable_through == kLong; }));
+    server->Drive("r1", kDriver, kLong, kLong + 40);
+    ASSERT_TRUE(server->WaitFor([&] { return server->LastLedger("r1").durable_through == kLong + 40; }));
+    EXPECT_EQ(server->Ask(About(RequestKind::kStatus)).status.message, "");
+    path = PathOf(*server.operator->());
+  }
+  StoredServer next(state);
+  EXPECT_TRUE(SamePath(PathOf(*next.operator->()), path));
+  SayStarted(*next.operator->());
+  ASSERT_TRUE(next->WaitPhase("r1", kDriver, SessionPhase::kActive));
+}
+
 INSTANTIATE_TEST_SUITE_P(Server, FailingDisk,
                          ::testing::Values(Fault{"full", DiskFault::kFull, "database or disk is full"},
                                            Fault{"write", DiskFault::kWriteError, "disk I/O error"},

@@ -5,6 +5,8 @@
 #include <cstdlib>
 #include <filesystem>
 
+#include "server/slam/checkpoint.h"
+#include "server/store/envelope.h"
 #include "tests/server/support/stored_server.h"
 #include "tests/temp_directory.h"
 
@@ -17,6 +19,10 @@ Request OfLab(RequestKind kind) {
   request.site = "lab";
   return request;
 }
+
+// A new format needs a state directory in tests/golden that was written with it.
+static_assert(slam::kCheckpointFormat == 8);
+static_assert(kRecordFormat == 2);
 
 class GoldenState : public ::testing::TestWithParam<const char*> {
  protected:

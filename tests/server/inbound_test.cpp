@@ -48,6 +48,19 @@ TEST(Inbound, AFloodInOneLaneDisplacesNothingInAnother) {
   EXPECT_TRUE(inbound.TryPush(ScanValue(5)));
 }
 
+TEST(Inbound, ARobotThatFloodsLeavesRoomForTheOthers) {
+  constexpr std::size_t kRoom = 4 * Inbound::kLeastShare + 40, kShare = kRoom / 4;
+  Inbound inbound(kRoom);
+  const auto of_robot = [](NameId robot) { return OdometryArrival{.stream = {robot, 1, 1}, .odometry = {}}; };
+  for (std::size_t i = 0; i < kShare; ++i) EXPECT_TRUE(inbound.TryPush(of_robot(1)));
+  EXPECT_FALSE(inbound.TryPush(of_robot(1)));
+  EXPECT_TRUE(inbound.TryPush(of_robot(2)));
+  // What has left makes room again.
+  static_cast<void>(inbound.Pop());
+  EXPECT_TRUE(inbound.TryPush(of_robot(1)));
+  EXPECT_FALSE(inbound.TryPush(of_robot(1)));
+}
+
 TEST(Inbound, SessionRequestsAreBoundedAndLivelinessIsNeverRefused) {
   Inbound inbound(4);
   for (std::size_t i = 0; i < Inbound::kMaxControl; ++i) EXPECT_TRUE(inbound.TryPush(RequestOf(1)));

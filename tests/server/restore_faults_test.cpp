@@ -1,11 +1,14 @@
 // Sessions that cannot be restored: damaged checkpoints, and data that ends every server that reads it. The others come
 // back, and the robot of such a session is told to open a new one.
 #include <gmock/gmock.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <new>
 
+#include "server/store/crash_note.h"
 #include "server/store/restore_marks.h"
 #include "tests/server/support/raw_records.h"
 #include "tests/server/support/stored_server.h"
@@ -86,6 +89,7 @@ class WatchedStore : public Store {
   Result<std::vector<std::uint64_t>> Owners(RecordKind kind) override { return store_->Owners(kind); }
   Result<std::vector<std::uint64_t>> Numbers(const RecordRange& range) override { return store_->Numbers(range); }
   Result<std::uint64_t> bytes_used() override { return store_->bytes_used(); }
+  std::filesystem::path directory() const override { return store_->directory(); }
 
  private:
   const std::unique_ptr<Store> store_;
@@ -106,21 +110,22 @@ bool StartOnce(const std::filesystem::path& directory, const ServerOptions& opti
   return started;
 }
 
-constexpr int kDead = 77;
-
-// Starts a server in a process of its own, which ends when it reads the journal of a session, as a scan would end it
-// that the estimator cannot process. Returns its exit code: 0 where it started.
-int StartElsewhere(const std::filesystem::path& directory, const ServerOptions& options, std::uint64_t deadly) {
+// Starts a server in a process of its own, in which this signal is raised when the journal of a session is read: as
+// would a scan that the estimator cannot process, or somebody who kills it at this moment. Whether it started.
+bool StartsElsewhere(const std::filesystem::path& directory, const ServerOptions& options, std::uint64_t deadly,
+                     int signal) {
   const pid_t child = fork();
   if (child == 0) {
-    const auto die = [deadly](const RecordRange& range) {
-      if (range.kind == RecordKind::kJournal && range.owner == deadly) _exit(kDead);
+    const rlimit no_core{0, 0};
+    setrlimit(RLIMIT_CORE, &no_core);
+    const auto die = [deadly, signal](const RecordRange& range) {
+      if (range.kind == RecordKind::kJournal && range.owner == deadly) raise(signal);
     };
     _exit(StartOnce(directory, options, die) ? 0 : 1);
   }
   int status = 0;
   waitpid(child, &status, 0);
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
 // The session was taken for one that is gone, and everything that was stored of it was removed.
@@ -143,24 +148,49 @@ TEST(Restore, ASessionWhoseJournalEndsTheServerDoesSoTwiceAndTheOthersComeBack) 
   DriveTwoRobots(directory / "0", options);
   const auto failed = [&](std::uint64_t session) {
     const auto store = *OpenStore(directory / "0");
-    return RestoreMarks::Read(*store)->failed(session);
+    return RestoreMarks::Read(*store, CrashNote::Of(directory / "0" / "crashed-session"))->failed(session);
   };
-  EXPECT_EQ(StartElsewhere(directory / "0", options, 1), kDead);
+  EXPECT_FALSE(StartsElsewhere(directory / "0", options, 1, SIGABRT));
   EXPECT_EQ(failed(1), 1U);
-  EXPECT_EQ(StartElsewhere(directory / "0", options, 1), kDead);
+  EXPECT_EQ(failed(2), 0U);
+  EXPECT_FALSE(StartsElsewhere(directory / "0", options, 1, SIGABRT));
   EXPECT_EQ(failed(1), 2U);
-  // The other one was restored alone meanwhile, or its turn has not come.
-  EXPECT_LE(failed(2), 1U);
+  EXPECT_EQ(failed(2), 0U);
   // Now it goes without that journal.
-  EXPECT_EQ(StartElsewhere(directory / "0", options, 1), 0);
+  EXPECT_TRUE(StartsElsewhere(directory / "0", options, 1, SIGABRT));
   // And so does every later start.
-  EXPECT_EQ(StartElsewhere(directory / "0", options, 1), 0);
+  EXPECT_TRUE(StartsElsewhere(directory / "0", options, 1, SIGABRT));
   EXPECT_EQ(failed(1), 2U);
   EXPECT_EQ(failed(2), 0U);
   StoredServer second(directory / "0", options);
   const Reply status = second->Ask(About(RequestKind::kStatus, ""));
   ASSERT_EQ(status.robots.size(), 1U);
   EXPECT_EQ(status.robots[0].session.robot, "r2");
+  EXPECT_EQ(PathOf(*second.operator->(), "r2").size(), 60U);
+}
+
+// Two kills in a row at the start, by whoever, cost a robot its session and its journal.
+TEST(Restore, KillsDuringStartsLoseNothing) {
+  const TempDirectory directory;
+  ServerOptions options = TestOptions();
+  options.robots.checkpoint_entries = 40;
+  DriveTwoRobots(directory / "0", options);
+  for (int kill = 0; kill < 6; ++kill) EXPECT_FALSE(StartsElsewhere(directory / "0", options, 1, SIGKILL));
+  StoredServer second(directory / "0", options);
+  for (const char* robot : {"r1", "r2"}) EXPECT_EQ(PathOf(*second.operator->(), robot).size(), 60U) << robot;
+  EXPECT_EQ(second->Ask(About(RequestKind::kStatus, "")).status.message, "");
+}
+
+// Where memory is not enough for a session, the system kills the process.
+TEST(Restore, ASessionDuringWhichEveryStartIsKilledIsLeftOutInTheEnd) {
+  const TempDirectory directory;
+  ServerOptions options = TestOptions();
+  options.robots.checkpoint_entries = 40;
+  DriveTwoRobots(directory / "0", options);
+  int kills = 0;
+  while (!StartsElsewhere(directory / "0", options, 1, SIGKILL)) ASSERT_LT(++kills, 20);
+  EXPECT_EQ(kills, 2 * static_cast<int>(RestoreMarks::kKillsPerFailure));
+  StoredServer second(directory / "0", options);
   EXPECT_EQ(PathOf(*second.operator->(), "r2").size(), 60U);
 }
 
@@ -193,11 +223,11 @@ TEST(Restore, OnlyEndsAtTheSamePlaceAreCountedTogether) {
   std::filesystem::create_directories(directory / "0");
   const auto store = *OpenStore(directory / "0");
   const auto ends_at = [&](std::uint64_t entries) {
-    auto marks = *RestoreMarks::Read(*store);
+    auto marks = *RestoreMarks::Read(*store, 1);
     ASSERT_TRUE(marks.Begin({1}));
     for (std::uint64_t entry = 1; entry <= entries; ++entry) ASSERT_TRUE(marks.Reached(1, entry));
   };
-  const auto failed = [&] { return RestoreMarks::Read(*store)->failed(1); };
+  const auto failed = [&] { return RestoreMarks::Read(*store, 1)->failed(1); };
   constexpr std::uint64_t kPlace = RestoreMarks::kPlaceEntries;
   ends_at(kPlace + 5);
   EXPECT_EQ(failed(), 1U);
@@ -206,7 +236,7 @@ TEST(Restore, OnlyEndsAtTheSamePlaceAreCountedTogether) {
   ends_at(3 * kPlace + 7);
   EXPECT_EQ(failed(), 2U);
   // Without the journal it does not come to that place, and is one more all the same.
-  ASSERT_TRUE(RestoreMarks::Read(*store)->BeginWithoutJournal(1));
+  ASSERT_TRUE(RestoreMarks::Read(*store, 1)->BeginWithoutJournal(1));
   EXPECT_EQ(failed(), 3U);
   ends_at(7);
   EXPECT_EQ(failed(), 1U);
@@ -285,8 +315,9 @@ TEST(Restore, ASessionThatEndsTheServerEvenWithoutItsJournalIsLeftOut) {
     auto marks = *RestoreMarks::Read(*store);
     for (int failure = 0; failure < 3; ++failure) {
       ASSERT_TRUE(marks.Begin({1}));
-      marks = *RestoreMarks::Read(*store);
+      marks = *RestoreMarks::Read(*store, 1);
     }
+    ASSERT_TRUE(marks.Settle());
   }
   StoredServer second(directory / "0");
   EXPECT_TRUE(second->Ask(About(RequestKind::kStatus, "")).robots.empty());

@@ -188,10 +188,14 @@ class Drive {
             ->Wait(kLongest)));
   }
 
-  void StartServer(const std::string& state) {
+  void LaunchServer(const std::string& state) {
     server_ = std::make_unique<ChildProcess>(std::vector<std::string>{
         options_.cairnd, "--domain", Domain(), "--state", (options_.directory / state).string(), "--set",
         "slam.particles=20", "--set", "robots.checkpoint_entries=100"});
+  }
+
+  void StartServer(const std::string& state) {
+    LaunchServer(state);
     if (!server_->Says(" ready")) throw std::runtime_error("cairnd does not start: " + server_->Wait().output);
   }
 
@@ -219,14 +223,22 @@ class Drive {
 
   void Kill(const std::vector<std::unique_ptr<ChildProcess>>& robots, PoseWatcher& watcher,
             KilledFleetOutcome& outcome) {
-    std::uniform_real_distribution<double> up_s(0.0, options_.most_up_s);
-    // The moment of the kill is random; it is not a wait for anything but the end of the drive.
-    static_cast<void>(Eventually([&] { return Driving(robots) == 0; },
-                                 std::chrono::milliseconds(std::lround(1000.0 * up_s(random_)))));
-    server_->Signal(SIGKILL);
-    server_->Wait();
-    watcher.Killed();
-    ++outcome.kills;
+    const auto kill_within = [&](double most_s) {
+      // The moment of the kill is random; it is not a wait for anything but the end of the drive.
+      std::uniform_real_distribution<double> wait_s(0.0, most_s);
+      static_cast<void>(Eventually([&] { return Driving(robots) == 0; },
+                                   std::chrono::milliseconds(std::lround(1000.0 * wait_s(random_)))));
+      server_->Signal(SIGKILL);
+      server_->Wait();
+      watcher.Killed();
+      ++outcome.kills;
+    };
+    kill_within(options_.most_up_s);
+    // Some servers are killed before they are ready, while they restore.
+    for (; outcome.kills % 3 == 0 && outcome.kills < options_.kills; ++outcome.killed_starting) {
+      LaunchServer("killed");
+      kill_within(options_.most_starting_s);
+    }
     const auto start = Clock::now();
     StartServer("killed");
     outcome.ready_s.push_back(SecondsSince(start));

@@ -14,15 +14,17 @@ struct KilledFleetOptions {
   std::string cairn;
   std::filesystem::path directory;  // Exists; everything is written there.
   int robots = 2;
-  double seconds = 30.0;   // Of each log.
-  double rate = 1.0;       // How much faster than the robots drove.
-  int kills = 20;          // At most: no robot is left to be disturbed when the logs are at their ends.
-  double most_up_s = 1.2;  // A server lives at most this long after it is ready.
+  double seconds = 30.0;         // Of each log.
+  double rate = 1.0;             // How much faster than the robots drove.
+  int kills = 20;                // At most: no robot is left to be disturbed when the logs are at their ends.
+  double most_up_s = 1.2;        // A server lives at most this long after it is ready.
+  double most_starting_s = 0.3;  // Each third kill is followed by one of a server that lives at most this long at all.
   std::uint64_t seed = 1;
 };
 
 struct KilledFleetOutcome {
   int kills = 0;
+  int killed_starting = 0;  // Of these, kills of servers that were just started.
   std::uint64_t sent = 0;
   std::uint64_t lost = 0;     // Scans that the undisturbed server used and the killed one did not.
   std::uint64_t doubled = 0;  // Scans that were used or counted more than once.

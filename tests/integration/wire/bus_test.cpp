@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "common/wire/limits.h"
+#include "common/wire/partitions.h"
 #include "tests/common/wire/sample_values.h"
 #include "tests/loopback.h"
 
@@ -23,11 +24,11 @@ using namespace test;
 class BusPair : public ::testing::Test {
  protected:
   template <typename Value>
-  void ExpectArrives(const Value& value) {
+  void ExpectArrives(const Value& value, int writers = 1) {
     Inbox<Value> inbox;
     const auto subscription = Must(receiver_->Subscribe<Value>(inbox.Sink()));
     const auto publication = Must(sender_->Advertise<Value>());
-    ASSERT_TRUE(Eventually([&] { return publication->matched() == 1 && subscription->matched() == 1; }));
+    ASSERT_TRUE(Eventually([&] { return publication->matched() == writers && subscription->matched() == writers; }));
     const Result<void> published = publication->Publish(value);
     ASSERT_TRUE(published) << published.error().message;
     ASSERT_TRUE(inbox.WaitFor(1));
@@ -83,7 +84,7 @@ TEST_F(BusPair, CarriesRequests) {
   ExpectArrives(ExtremeRequest());
 }
 TEST_F(BusPair, CarriesReplies) {
-  ExpectArrives(ExtremeReply());
+  ExpectArrives(ExtremeReply(), static_cast<int>(kReplyPartitions));
 }
 
 TEST_F(BusPair, ALateJoinerGetsTheWholeMap) {
@@ -106,15 +107,16 @@ TEST_F(BusPair, ALateJoinerGetsTheWholeMap) {
 }
 
 TEST_F(BusPair, AClientSeesOnlyItsOwnReplies) {
+  constexpr ClientId kOther = 1 + kReplyPartitions;  // In the same partition.
   const auto publication = Must(sender_->Advertise<Reply>());
   Inbox<Reply> mine;
   Inbox<Reply> theirs;
   const auto my_subscription = Must(receiver_->SubscribeReplies(1, mine.Sink()));
-  const auto their_subscription = Must(receiver_->SubscribeReplies(2, theirs.Sink()));
+  const auto their_subscription = Must(receiver_->SubscribeReplies(kOther, theirs.Sink()));
   ASSERT_TRUE(Eventually([&] { return publication->matched() == 2; }));
   for (std::int64_t i = 0; i < 10; ++i) {
     Reply reply = ExtremeReply();
-    reply.client = static_cast<ClientId>(1 + i % 2);
+    reply.client = i % 2 == 0 ? 1 : kOther;
     reply.sequence = i;
     ASSERT_TRUE(publication->Publish(reply));
   }

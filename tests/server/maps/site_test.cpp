@@ -247,6 +247,33 @@ TEST_F(SiteTest, ASessionThatGoesWithoutAnsweringDoesNotHoldUpTheSwitch) {
 
 // The bound is three versions. Jobs end while version 2 is being enabled: it used to be forgotten, and the last answer
 // of the switch crashed the process.
+// Its journal had no room for the correction, so an earlier server's session comes back in the map before the switch.
+TEST_F(SiteTest, ASessionThatComesBackFromAnEarlierEpochGetsItsPartOfTheEnabledVersion) {
+  const std::uint32_t version = AddVersion({{1, {{{{0, 0}, UniformChunk(-100)}}, 3}}});
+  auto enabled = Enable(version);
+  ASSERT_EQ(corrections_.size(), 1U);
+  corrections_[0].second.done({.session = 1,
+                               .displaced = {{{{5, 5}, UniformChunk(100)}}, 5},
+                               .change = {.session = 1, .chunks = {{{0, 0}, UniformChunk(-100)}}}});
+  EXPECT_EQ(*enabled.get(), version);
+  corrections_.clear();
+  const auto back = std::make_shared<FakeSession>(1, corrections_);
+  site_->Change({.session = 1, .chunks = {{{0, 0}, nullptr}, {{5, 5}, UniformChunk(100)}}});
+  site_->Join({.session = 1, .robot = 101, .owner = back, .epoch = 0});
+  TakeTiles();
+  ASSERT_EQ(corrections_.size(), 1U);
+  const Correction& correction = corrections_[0].second;
+  EXPECT_EQ(correction.epoch, 1U);
+  EXPECT_EQ(correction.grid.keyframes, 3U);
+  EXPECT_TRUE(correction.grid.chunks.contains({0, 0}));
+  correction.done({.session = 1,
+                   .displaced = {},
+                   .change = {.session = 1, .chunks = {{{5, 5}, nullptr}, {{0, 0}, UniformChunk(-100)}}}});
+  TakeTiles();
+  EXPECT_NE(site_->snapshot()->tiles.Find({0, 0, 0}), nullptr);
+  EXPECT_EQ(site_->snapshot()->tiles.Find({0, 5, 5}), nullptr);
+}
+
 TEST_F(SiteTest, NewVersionsDoNotPushOutTheOneThatIsBeingEnabled) {
   const std::uint32_t version = AddVersion({{1, {{{{0, 0}, UniformChunk(-100)}}, 3}}});
   auto enabled = Enable(version);

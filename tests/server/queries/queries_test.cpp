@@ -64,7 +64,7 @@ class Queries : public ::testing::Test {
       case RequestKind::kPose:
         return AnswerPose(request_, Robot());
       case RequestKind::kPath:
-        return AnswerPath(request_, Robot(), Site());
+        return Whole(AnswerPath(request_, Robot(), Site()));
       case RequestKind::kTiles:
         return Whole(AnswerTiles(request_, Site(), kGeneration));
       case RequestKind::kLandmarks:

@@ -104,7 +104,7 @@ class OneSession {
                        .grid_changed = [](GridChange&&) {},
                        .position = [this] { return position.load(); },
                        .checkpoint =
-                           [this](std::uint64_t, const Journal::Content&) {
+                           [this](std::uint64_t, const Journal::Content&, const std::function<void()>&) {
                              ++checkpoints;
                              return true;
                            },

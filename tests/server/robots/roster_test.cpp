@@ -167,6 +167,25 @@ TEST_F(RosterTest, ASessionWhoseRobotStaysAwayIsEnded) {
   EXPECT_EQ(LastState("r2", 8).phase, SessionPhase::kActive);
 }
 
+// Ended sessions of robots that never came back took memory, and time of each start, until every place was taken.
+TEST_F(RosterTest, ASessionThatEndedLongAgoIsNoLongerShown) {
+  RobotsOptions options;
+  options.suspended_expiry_s = 0.05;
+  roster(options).Take(RequestOf("r1", 7));
+  ASSERT_TRUE(roster().End("r1"));
+  ASSERT_TRUE(sent_.WaitFor([&] {
+    roster().Tick();
+    return roster().Find("r1") == nullptr;
+  }));
+  ASSERT_TRUE(sent_.WaitFor([&] {
+    roster().Tick();
+    return !sent_.All<Retired>().empty();
+  }));
+  // It may come back.
+  roster().Take(RequestOf("r1", 7));
+  EXPECT_EQ(LastState("r1", 7).phase, SessionPhase::kActive);
+}
+
 TEST_F(RosterTest, ARobotThatComesBackInTimeIsNotEnded) {
   roster().Take(RequestOf("r1", 7));
   Suspend(7);

@@ -239,6 +239,17 @@ TEST_F(SessionEstimatorTest, ACorrectionWithAPathMovesThePose) {
   EXPECT_LT((poses_.back().T_map_robot.translation() - before.translation()).norm(), 0.5);
 }
 
+// A session that was not stored to its end, and whose part of the new map knows more of it than the session itself.
+TEST_F(SessionEstimatorTest, WhoIsBehindTheMapThatItAdoptsIsNotLocalized) {
+  Drive(0, 10);
+  ASSERT_TRUE(poses_.back().localized);
+  estimator_.Handle(
+      Correction{.epoch = 9, .grid = {.chunks = {}, .keyframes = ledger().keyframes + 5}, .done = [](Adopted&&) {}});
+  Drive(10, 11);
+  EXPECT_EQ(poses_.back().map_epoch, 9U);
+  EXPECT_FALSE(poses_.back().localized);
+}
+
 // The next server would have this robot's part of a map that was never switched, beside the old parts of the others.
 TEST_F(SessionEstimatorTest, NoCheckpointHoldsAGridBeforeTheSwitchToItIsComplete) {
   Drive(0, 10);

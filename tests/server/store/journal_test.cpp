@@ -7,37 +7,15 @@
 #include "server/store/sqlite_store.h"
 #include "tests/eventually.h"
 #include "tests/server/store/faulty_vfs.h"
+#include "tests/server/store/followed.h"
 #include "tests/server/store/sample_entries.h"
 #include "tests/temp_directory.h"
 
-namespace cairn::server {
+namespace cairn::server::testing {
 namespace {
 
 using testing::DiskFault;
 using testing::FaultyVfs;
-using testing::SampleOdometry;
-using testing::SampleScan;
-using testing::SampleSession;
-
-// The positions of a session's entries in the store.
-std::uint64_t StoredEntries(Store& store, std::uint64_t session) {
-  std::uint64_t count = 0;
-  const auto last = ReadJournal(store, session, 0, [&count](std::uint64_t position, JournalEntry&&) -> Result<void> {
-    EXPECT_EQ(position, ++count);
-    return {};
-  });
-  EXPECT_TRUE(last) << last.error().message;
-  return count;
-}
-
-struct Followed {
-  std::atomic<std::int64_t> through{-1};  // -1: not even the session itself.
-  Journal::Durable durable() {
-    return [this](const std::vector<JournalEntry>& entries) {
-      through = std::max<std::int64_t>(through, 0) + static_cast<std::int64_t>(entries.size());
-    };
-  }
-};
 
 TEST(Journal, TellsOnlyWhatIsOnTheDisk) {
   const auto store = *OpenStore(std::string(kInMemory));
@@ -374,4 +352,4 @@ TEST(Journal, ACheckpointOfASessionThatIsClosedMeanwhileIsNotFinished) {
 }
 
 }  // namespace
-}  // namespace cairn::server
+}  // namespace cairn::server::testing

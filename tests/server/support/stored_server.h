@@ -18,9 +18,9 @@ class StoredServer {
  public:
   // `vfs`: of SQLite, for disks that fail (tests/server/store/faulty_vfs.h).
   explicit StoredServer(const std::filesystem::path& directory, ServerOptions options = TestOptions(),
-                        const std::string& vfs = {})
+                        const std::string& vfs = {}, const StoreOptions& store = {.commit_delay_ms = 5})
       : store_(*OpenStore(directory, vfs)),
-        journal_(*store_, {.commit_delay_ms = 5}),
+        journal_(*store_, store),
         generation_(*NextGeneration(*store_, 1)),
         house_(options, &journal_, generation_, directory / "saved") {
     journal_.Start();

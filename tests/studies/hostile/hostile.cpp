@@ -1,11 +1,18 @@
-// cairn-study hostile sends mutated and generated datagrams, from three senders as fast as they can, to a cairnd and
-// two robots that stream: whether a process dies, what the guard drops, whether streams stop and how soon they
-// flow again. Everything is on loopback in a domain of its own. Recording the traffic needs CAP_NET_RAW.
+// cairn-study hostile sends mutated and generated datagrams, from three senders as fast as they can, to a cairnd, two
+// robots that stream and a viewer of both: whether a process dies, what the guard drops, whether streams stop and how
+// soon they flow again. Everything is on loopback in a domain of its own. Recording the traffic needs CAP_NET_RAW.
 // --seconds: of the long part (600); --runs: of the short ones (100).
 #include <algorithm>
+#include <future>
 #include <map>
+#include <memory>
 #include <thread>
 
+#include "client/lib/map_client.h"
+#include "client/lib/pose_client.h"
+#include "client/lib/query_client.h"
+#include "tests/eventually.h"
+#include "tests/must.h"
 #include "tests/studies/fleet/live_server.h"
 #include "tests/studies/study.h"
 #include "tests/system/hostile_traffic.h"
@@ -150,6 +157,50 @@ class HostileFleet {
   std::vector<std::unique_ptr<ChildProcess>> robots_;
 };
 
+// Who watches the fleet, as a page does: the poses of its robots, and the map.
+class Viewer {
+ public:
+  Viewer() {
+    wire::WireOptions options;
+    options.domain = TestDomain();
+    bus_ = test::Must(wire::Bus::Create(options, "viewer"));
+    for (int i = 1; i <= kRobots; ++i)
+      poses_.push_back(test::Must(client::PoseClient::Create(*bus_, "r" + std::to_string(i) + "-1")));
+    map_ = test::Must(client::MapClient::Create(*bus_, "hostile"));
+    queries_ = test::Must(client::QueryClient::Create(*bus_));
+  }
+
+  // Seconds until a new pose of each robot has come and the map is the server's.
+  [[nodiscard]] double AwaitNews(double patience_s) {
+    const auto start = Clock::now();
+    for (const auto& robot : poses_) {
+      while (robot->Next(0.0)) {  // What came before.
+      }
+    }
+    for (const auto& robot : poses_) {
+      if (!robot->Next(patience_s)) return patience_s;
+    }
+    while (SecondsSince(start) < patience_s) {
+      const auto now = queries_->Map("hostile");
+      if (!now) continue;
+      const auto shown = [&] { return map_->epoch() == now->epoch && map_->version() >= now->version; };
+      if (test::Eventually(shown, std::chrono::milliseconds(500))) break;
+    }
+    return SecondsSince(start);
+  }
+  [[nodiscard]] int renewed() const {
+    int times = map_->renewed();
+    for (const auto& robot : poses_) times += robot->renewed();
+    return times;
+  }
+
+ private:
+  std::unique_ptr<wire::Bus> bus_;
+  std::vector<std::unique_ptr<client::PoseClient>> poses_;
+  std::unique_ptr<client::MapClient> map_;
+  std::unique_ptr<client::QueryClient> queries_;
+};
+
 struct Outcome {
   std::uint64_t sent = 0;
   double seconds = 0.0;
@@ -159,10 +210,11 @@ struct Outcome {
   int unanswered = 0;             // without an answer,
   int stale = 0;                  // or with a stale robot.
   std::vector<double> flows_s;    // From the end of the traffic until everything flows.
+  std::vector<double> shows_s;    // From the end of the traffic until the viewer has new poses and the present map.
 };
 
 // One run: traffic for so long, then the time until everything flows.
-void Attack(HostileFleet& fleet, double seconds, std::uint64_t seed, Outcome& outcome) {
+void Attack(HostileFleet& fleet, Viewer& viewer, double seconds, std::uint64_t seed, Outcome& outcome) {
   auto recorded = test::RecordDatagrams(TestDomain(), std::chrono::seconds(2));
   if (recorded.empty()) throw std::runtime_error("the traffic on loopback cannot be recorded (CAP_NET_RAW)");
   const auto start = Clock::now();
@@ -185,27 +237,32 @@ void Attack(HostileFleet& fleet, double seconds, std::uint64_t seed, Outcome& ou
     outcome.sent += senders.sent();
   }
   outcome.seconds += SecondsSince(start);
+  auto shows = std::async(std::launch::async, [&viewer] { return viewer.AwaitNews(120.0); });
   outcome.flows_s.push_back(fleet.AwaitFlow(120.0));
+  outcome.shows_s.push_back(shows.get());
   for (std::string& dead : fleet.Bury()) outcome.deaths.push_back(std::move(dead));
 }
 
 void Print(Report& report, const std::string& name, const Outcome& outcome) {
   Table table({"traffic (s)", "datagrams", "deaths", "deaths per 10^6", "silence after a death p50 (s)", "p99 (s)",
                "longest (s)", "asked", "no answer", "stale", "flows again p50 (s)", "p99 (s)", "longest (s)",
-               "within 5 s"});
+               "within 5 s", "viewer sees all again p50 (s)", "p99 (s)", "longest (s)", "within 5 s"});
   const auto longest = [](const std::vector<double>& values) {
     return values.empty() ? 0.0 : *std::max_element(values.begin(), values.end());
   };
-  const auto within = std::count_if(outcome.flows_s.begin(), outcome.flows_s.end(),
-                                    [](double value) { return value <= kFlowTarget_s; });
+  const auto within_target = [](const std::vector<double>& values) {
+    return std::count_if(values.begin(), values.end(), [](double value) { return value <= kFlowTarget_s; });
+  };
+  const auto within = within_target(outcome.flows_s), shown = within_target(outcome.shows_s);
+  const std::string runs = " of " + Count(static_cast<long long>(outcome.flows_s.size()));
   table.Add({Number(outcome.seconds, 0), Count(static_cast<long long>(outcome.sent)),
              Count(static_cast<long long>(outcome.deaths.size())),
              Number(1e6 * static_cast<double>(outcome.deaths.size()) / static_cast<double>(outcome.sent), 3),
              Number(Share(outcome.silence_s, 0.5), 2), Number(Share(outcome.silence_s, 0.99), 2),
              Number(longest(outcome.silence_s), 2), Count(outcome.looks), Count(outcome.unanswered),
              Count(outcome.stale), Number(Share(outcome.flows_s, 0.5), 2), Number(Share(outcome.flows_s, 0.99), 2),
-             Number(longest(outcome.flows_s), 2),
-             Count(within) + " of " + Count(static_cast<long long>(outcome.flows_s.size()))});
+             Number(longest(outcome.flows_s), 2), Count(within) + runs, Number(Share(outcome.shows_s, 0.5), 2),
+             Number(Share(outcome.shows_s, 0.99), 2), Number(longest(outcome.shows_s), 2), Count(shown) + runs});
   report.Add(table, name);
   for (const std::string& death : outcome.deaths) report.Text("Died: " + death);
   std::string silences;
@@ -213,16 +270,19 @@ void Print(Report& report, const std::string& name, const Outcome& outcome) {
   report.Text("Silences after deaths (s): " + (silences.empty() ? "none" : silences));
   report.Expect(outcome.deaths.empty(), "a process died");
   report.Expect(within == static_cast<long>(outcome.flows_s.size()), "a stream did not flow again within 5 s");
+  report.Expect(shown == static_cast<long>(outcome.shows_s.size()), "a viewer did not see all again within 5 s");
 }
 
 void StudyHostile(StudyContext& context) {
   Report& report = context.report;
   HostileFleet fleet;
   if (fleet.AwaitFlow(30.0) >= 30.0) return report.Fault("the robots do not stream");
+  Viewer viewer;
+  if (viewer.AwaitNews(30.0) >= 30.0) return report.Fault("the viewer sees no robots");
   if (context.Wants("long")) {
     report.Heading("Traffic without a pause");
     Outcome outcome;
-    Attack(fleet, context.seconds > 0 ? context.seconds : context.Pick(600.0, 10.0), context.seed, outcome);
+    Attack(fleet, viewer, context.seconds > 0 ? context.seconds : context.Pick(600.0, 10.0), context.seed, outcome);
     Print(report, "long", outcome);
   }
   if (context.Wants("runs")) {
@@ -230,13 +290,15 @@ void StudyHostile(StudyContext& context) {
     const int runs = context.runs > 0 ? context.runs : context.Pick(100, 3);
     Outcome outcome;
     for (int run = 0; run < runs; ++run) {
-      Attack(fleet, 5.0, context.seed + 7 + static_cast<std::uint64_t>(run), outcome);
-      report.Progress("run " + Count(run + 1) + ": flows again after " + Number(outcome.flows_s.back(), 2) + " s, " +
+      Attack(fleet, viewer, 5.0, context.seed + 7 + static_cast<std::uint64_t>(run), outcome);
+      report.Progress("run " + Count(run + 1) + ": flows again after " + Number(outcome.flows_s.back(), 2) +
+                      " s, the viewer sees all after " + Number(outcome.shows_s.back(), 2) + " s, " +
                       Count(static_cast<long long>(outcome.deaths.size())) + " deaths so far" +
                       (outcome.deaths.empty() ? "" : ", the last one " + outcome.deaths.back()));
     }
     Print(report, "runs", outcome);
   }
+  report.Text("The viewer has joined anew " + Count(viewer.renewed()) + " times.");
   const std::string log = fleet.StopServer();
   const auto refused = log.find("datagrams refused");
   report.Text("cairnd's last participant: " + (refused == std::string::npos

@@ -14,7 +14,7 @@
 
 #include "tests/eventually.h"
 #include "tests/studies/fleet/live_server.h"
-#include "tests/studies/kills/standing_robot.h"
+#include "tests/studies/kills/returning_robot.h"
 #include "tests/temp_directory.h"
 #include "tests/test_domain.h"
 
@@ -96,7 +96,7 @@ bool HasAllPoses(client::QueryClient& queries) {
   return true;
 }
 
-using Robots = std::vector<std::unique_ptr<StandingRobot>>;
+using Robots = std::vector<std::unique_ptr<ReturningRobot>>;
 
 // When the last of the robots had its pose; nothing if one has none yet.
 std::optional<Clock::time_point> AllBack(const Robots& robots) {
@@ -131,7 +131,7 @@ RestartTimes MeasureRestarts(StudyContext& context) {
   Robots robots;
   for (int robot = 0; robot < kRobots; ++robot)
     robots.push_back(
-        std::make_unique<StandingRobot>(**bus, RobotName(robot), "lab", place / "logs" / (RobotName(robot) + ".log")));
+        std::make_unique<ReturningRobot>(**bus, RobotName(robot), "lab", place / "logs" / (RobotName(robot) + ".log")));
   const std::jthread publisher([&robots](const std::stop_token& stop) {
     for (auto next = Clock::now(); !stop.stop_requested(); next += std::chrono::milliseconds(100)) {
       for (const auto& robot : robots) robot->Publish();

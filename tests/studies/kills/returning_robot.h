@@ -1,5 +1,6 @@
-// A robot that stands where its log ends: a client that continues the robot's session and sends the log's last scan and
-// odometry again and again, and that notes when a server which was started later gives it a pose.
+// A robot that goes on where its log ends, back along the log's last half minute and forth again, backwards where it
+// once drove forwards: a client that continues the robot's session, and notes when a server which was started later
+// gives it a pose.
 #pragma once
 
 #include <atomic>
@@ -8,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "client/lib/robot_client.h"
 #include "common/mutex.h"
@@ -17,17 +19,17 @@
 namespace cairn::studies {
 
 // Thread rule: Publish from one thread, the others from any.
-class StandingRobot {
+class ReturningRobot {
  public:
   using Clock = std::chrono::steady_clock;
 
   // The server knows the session. Throws std::runtime_error where it does not, or where the log cannot be read.
-  StandingRobot(wire::Bus& bus, const std::string& robot, const std::string& site, const std::filesystem::path& log);
-  ~StandingRobot() { client_.reset(); }
-  StandingRobot(const StandingRobot&) = delete;
-  StandingRobot& operator=(const StandingRobot&) = delete;
+  ReturningRobot(wire::Bus& bus, const std::string& robot, const std::string& site, const std::filesystem::path& log);
+  ~ReturningRobot() { client_.reset(); }
+  ReturningRobot(const ReturningRobot&) = delete;
+  ReturningRobot& operator=(const ReturningRobot&) = delete;
 
-  // One scan and the odometry before and after it, 0.1 s after the ones before.
+  // The next scan and its odometry, 0.1 s after the ones before.
   void Publish();
   // The server will be killed now: from here on a pose counts if a later server has told it, of a later scan.
   void Expect();
@@ -39,8 +41,14 @@ class StandingRobot {
  private:
   void Take(const PoseReport& pose);
 
-  Odometry odometry_;
-  Scan scan_;
+  struct Step {
+    Odometry odometry;
+    Scan scan;
+  };
+  std::vector<Step> steps_;
+  std::size_t at_ = 0;
+  int direction_ = -1;
+  Stamp stamp_ = 0;
   mutable Mutex mutex_;
   std::optional<PoseReport> last_ CAIRN_GUARDED_BY(mutex_);
   Stamp published_ CAIRN_GUARDED_BY(mutex_) = 0;  // Of the newest scan.

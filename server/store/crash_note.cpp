@@ -1,0 +1,71 @@
+#include "server/store/crash_note.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <csignal>
+#include <fstream>
+#include <system_error>
+#include <utility>
+
+namespace cairn::server {
+namespace {
+
+constexpr std::array kSignals{SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
+
+// What the handler reads. A handler may use nothing that allocates memory or takes a lock.
+std::array<struct sigaction, kSignals.size()> handlers_before;
+std::atomic<int> note_file{-1};
+thread_local volatile std::uint64_t working_on = 0;
+
+// The page of the file belongs to the kernel, so it reaches the disk although the process ends now.
+void Note(int signal) {
+  const int file = note_file.load();
+  const std::uint64_t number = working_on;
+  if (file >= 0 && number != 0) static_cast<void>(!pwrite(file, &number, sizeof(number), 0));
+  for (std::size_t i = 0; i < kSignals.size(); ++i)
+    if (kSignals[i] == signal) sigaction(signal, &handlers_before[i], nullptr);
+  raise(signal);  // Handled when this function returns, as it would have been without it.
+}
+
+}  // namespace
+
+CrashNote::CrashNote(const std::filesystem::path& file) {
+  if (file.empty()) return;
+  const int opened = open(file.c_str(), O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0600);
+  if (opened < 0) return;
+  file_ = file;
+  note_file = opened;
+  struct sigaction action {};
+  action.sa_handler = Note;
+  sigemptyset(&action.sa_mask);
+  for (std::size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &action, &handlers_before[i]);
+}
+
+CrashNote::~CrashNote() {
+  if (file_.empty()) return;
+  for (std::size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &handlers_before[i], nullptr);
+  close(note_file.exchange(-1));
+  std::error_code ignored;
+  std::filesystem::remove(file_, ignored);
+}
+
+CrashNote::Working::Working(std::uint64_t number) : before_(working_on) {
+  working_on = number;
+}
+
+CrashNote::Working::~Working() {
+  working_on = before_;
+}
+
+std::optional<std::uint64_t> CrashNote::Of(const std::filesystem::path& file) {
+  if (file.empty()) return std::nullopt;
+  std::ifstream in(file, std::ios::binary);
+  std::uint64_t number = 0;
+  if (!in.read(reinterpret_cast<char*>(&number), sizeof(number)) || number == 0) return std::nullopt;
+  return number;
+}
+
+}  // namespace cairn::server
