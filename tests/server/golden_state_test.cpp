@@ -2,6 +2,7 @@
 // made), also where only the checkpoints are left, and although this server has other options.
 #include <gmock/gmock.h>
 
+#include <array>
 #include <cstdlib>
 #include <filesystem>
 
@@ -75,8 +76,30 @@ TEST_P(GoldenState, IsRestoredFromItsCheckpoints) {
   ExpectWhatItHolds();
 }
 
-INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenState, ::testing::Values("state-1", "state-1-checkpoints-8"),
-                         [](const auto& name) { return name.index == 0 ? std::string("One") : std::string("Later"); });
+INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenState,
+                         ::testing::Values("state-1", "state-1-checkpoints-8", "state-1-ended"), [](const auto& name) {
+                           return std::array{"One", "Checkpoints8", "Ended"}.at(name.index);
+                         });
+
+class GoldenEnded : public GoldenState {};
+INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenEnded, ::testing::Values("state-1-ended"));
+
+TEST_P(GoldenEnded, TheOrderInWhichSessionsEndedIsRestored) {
+  {
+    StoredServer server(state());
+    const Reply status = server->Ask(About(RequestKind::kStatus, ""));
+    for (const RobotStatus& robot : status.robots) EXPECT_EQ(robot.session.phase, SessionPhase::kEnded);
+  }
+  const auto store = *OpenStore(state());
+  std::vector<std::string> ended;
+  const auto sessions = *ReadSessions(*store);
+  const auto take = [&](std::uint64_t, std::string_view bytes) -> Result<void> {
+    for (const std::uint64_t session : SiteOf(bytes)->past) ended.push_back(sessions.at(session).request.robot);
+    return {};
+  };
+  ASSERT_TRUE(store->Read({.kind = RecordKind::kSite, .owner = HashName("lab")}, take));
+  EXPECT_THAT(ended, ::testing::ElementsAre("robot2", "robot1"));
+}
 
 }  // namespace
 }  // namespace cairn::server::testing

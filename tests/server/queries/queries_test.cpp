@@ -11,6 +11,7 @@ constexpr Generation kGeneration = 5;
 Reply Whole(Answer&& answer) {
   Reply reply = std::move(answer.reply);
   for (const auto& tile : answer.tiles) reply.tiles.push_back(*tile);
+  while (!answer.path.empty()) reply.path.push_back(answer.path.Take());
   return reply;
 }
 
@@ -215,11 +216,19 @@ TEST(ReplyParts, AnEmptyAnswerIsOnePart) {
   EXPECT_EQ(parts[0].status.code, StatusCode::kNotFound);
 }
 
+TEST_F(Queries, ALongPathComesWholeAndInOrder) {
+  for (Stamp stamp = 1; stamp <= 700; ++stamp) AddPose(stamp, 0.0);
+  const Trajectory path = Ask(RequestKind::kPath).path;
+  ASSERT_EQ(path.size(), 700U);
+  for (std::size_t i = 0; i < path.size(); ++i) EXPECT_EQ(path[i].stamp, static_cast<Stamp>(i) + 1);
+}
+
 TEST(ReplyParts, LargeAnswersKeepOrderAndStaySmall) {
   Reply reply;
   reply.client = 3;
   reply.map_version = 9;
-  for (int i = 0; i < 10000; ++i) reply.path.push_back({i, {}});
+  const auto path = std::make_shared<Trajectory>();
+  for (int i = 0; i < 10000; ++i) path->push_back({i, {}});
   std::vector<std::shared_ptr<const Tile>> tiles;
   for (int i = 0; i < 40; ++i) {
     auto tile = std::make_shared<Tile>();
@@ -227,7 +236,9 @@ TEST(ReplyParts, LargeAnswersKeepOrderAndStaySmall) {
     tile->bytes.resize(16384);
     tiles.push_back(std::move(tile));
   }
-  const auto parts = AllParts({std::move(reply), std::move(tiles)});
+  Answer answer(std::move(reply), std::move(tiles));
+  answer.path = PathItems(std::shared_ptr<const Trajectory>(path));
+  const auto parts = AllParts(std::move(answer));
   Stamp next_stamp = 0;
   int next_tile = 0;
   for (std::size_t i = 0; i < parts.size(); ++i) {

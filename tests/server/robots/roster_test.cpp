@@ -179,7 +179,7 @@ TEST_F(RosterTest, ASessionThatEndedLongAgoIsNoLongerShown) {
   }));
   ASSERT_TRUE(sent_.WaitFor([&] {
     roster().Tick();
-    return !sent_.All<Retired>().empty();
+    return !sent().All<Retired>().empty();
   }));
   // It may come back.
   roster().Take(RequestOf("r1", 7));
