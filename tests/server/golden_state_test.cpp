@@ -2,7 +2,7 @@
 // made), also where only the checkpoints are left, and although this server has other options.
 #include <gmock/gmock.h>
 
-#include <array>
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 
@@ -76,13 +76,16 @@ TEST_P(GoldenState, IsRestoredFromItsCheckpoints) {
   ExpectWhatItHolds();
 }
 
+const auto kNameOf = [](const ::testing::TestParamInfo<const char*>& state) {
+  std::string name = state.param;
+  std::ranges::replace(name, '-', '_');
+  return name;
+};
 INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenState,
-                         ::testing::Values("state-1", "state-1-checkpoints-8", "state-1-ended"), [](const auto& name) {
-                           return std::array{"One", "Checkpoints8", "Ended"}.at(name.index);
-                         });
+                         ::testing::Values("state-1", "state-1-checkpoints-8", "state-1-ended"), kNameOf);
 
 class GoldenEnded : public GoldenState {};
-INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenEnded, ::testing::Values("state-1-ended"));
+INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenEnded, ::testing::Values("state-1-ended"), kNameOf);
 
 TEST_P(GoldenEnded, TheOrderInWhichSessionsEndedIsRestored) {
   {
@@ -94,7 +97,8 @@ TEST_P(GoldenEnded, TheOrderInWhichSessionsEndedIsRestored) {
   std::vector<std::string> ended;
   const auto sessions = *ReadSessions(*store);
   const auto take = [&](std::uint64_t, std::string_view bytes) -> Result<void> {
-    for (const std::uint64_t session : SiteOf(bytes)->past) ended.push_back(sessions.at(session).request.robot);
+    const auto site = SiteOf(bytes);
+    for (const std::uint64_t session : site->past) ended.push_back(sessions.at(session).request.robot);
     return {};
   };
   ASSERT_TRUE(store->Read({.kind = RecordKind::kSite, .owner = HashName("lab")}, take));
