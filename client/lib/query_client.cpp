@@ -130,6 +130,15 @@ void QueryClient::RenewIfSilent(Deadline began, std::chrono::seconds patience) {
   }
 }
 
+void QueryClient::RenewIfAlone(bool secure) {
+  std::optional<Alone> alone;
+  {
+    const MutexLock lock(mutex_);
+    alone = alone_;
+  }
+  if (alone && (secure || bus_.datagrams_refused() > alone->refused)) RenewIfSilent(alone->since, kJoinPatience);
+}
+
 void QueryClient::OnReply(Reply&& part) {
   const MutexLock lock(mutex_);
   last_answer_ = Clock::now();
@@ -164,24 +173,23 @@ bool QueryClient::CommandsMatched() const {
 Result<void> QueryClient::WaitForServer(bool command, Deadline deadline) {
   constexpr std::chrono::milliseconds kPatience{100};
   const bool secure = !bus_.options().security.empty();
-  const std::uint64_t refused_before = bus_.datagrams_refused();
-  Deadline alone = Clock::now(), began = alone;  // Since when no server is found, and pings are not answered.
+  Deadline began = Clock::now();  // Since when pings are not answered.
   for (;;) {
     bool matched = false;
     {
       const MutexLock lock(mutex_);
       if (server_found_ && (!command || CommandsMatched())) return {};
       matched = wire_->requests->matched() > 0 && wire_->replies->matched() > 0 && (!command || CommandsMatched());
+      if (matched) alone_.reset();
+      if (!matched && !alone_) alone_ = Alone{Clock::now(), bus_.datagrams_refused()};
       if (!matched) changed_.WaitFor(mutex_, std::chrono::milliseconds(5));
     }
     if (!matched) {
       began = Clock::now();
       if (began >= deadline) return Fail(StatusCode::kUnavailable, NoServer(bus_, options_.timeout_s));
-      // A handshake can get stuck, and forged discovery messages can make the new endpoints invisible.
-      if (secure || bus_.datagrams_refused() > refused_before) RenewIfSilent(alone, kJoinPatience);
+      RenewIfAlone(secure);
       continue;
     }
-    alone = Clock::now();
     const Deadline soon = std::min(deadline, Clock::now() + kPatience);
     const Result<Reply> pong = AskOnce(MakeRequest(RequestKind::kPing), soon, soon);
     if (!pong) RenewIfSilent(began, kAnswerPatience);

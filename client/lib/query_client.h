@@ -68,8 +68,8 @@ class QueryClient {
                                                                    const QueryClientOptions& options = {});
   ~QueryClient();
 
-  // Times it joined anew: with a server that does not answer, and with DDS Security also where none is found, because a
-  // handshake of Fast DDS 2.9 gets stuck now and then.
+  // Times it joined anew: with a server that does not answer, and where none is found with DDS Security, because a
+  // handshake of Fast DDS 2.9 gets stuck now and then, or while forged messages arrive, which can make it deaf.
   [[nodiscard]] int renewed() const;
 
   // The server's version.
@@ -149,6 +149,7 @@ class QueryClient {
   [[nodiscard]] Result<std::shared_ptr<Wire>> Connect(wire::Bus& bus);
   [[nodiscard]] std::shared_ptr<Wire> CurrentWire();
   void RenewIfSilent(Deadline began, std::chrono::seconds patience);
+  void RenewIfAlone(bool secure);
   [[nodiscard]] bool CommandsMatched() const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] Result<void> WaitForServer(bool command, Deadline deadline);
   [[nodiscard]] Result<Reply> Ask(const Request& request);
@@ -167,7 +168,12 @@ class QueryClient {
   std::map<std::int64_t, ReplyAssembly> pending_ CAIRN_GUARDED_BY(mutex_);  // By sequence; what callers wait for.
   Deadline last_answer_ CAIRN_GUARDED_BY(mutex_);                           // Last answer, however late.
   Deadline renewed_ CAIRN_GUARDED_BY(mutex_);                               // Last time it joined anew, or began to,
-  std::chrono::seconds renewal_pause_ CAIRN_GUARDED_BY(mutex_){1};          // and how long until it may again.
+  struct Alone {
+    Deadline since;
+    std::uint64_t refused = 0;  // Datagrams that were refused before.
+  };
+  std::optional<Alone> alone_ CAIRN_GUARDED_BY(mutex_);             // No server is found.
+  std::chrono::seconds renewal_pause_ CAIRN_GUARDED_BY(mutex_){1};  // and how long until it may again.
   int times_renewed_ CAIRN_GUARDED_BY(mutex_) = 0;
   std::shared_ptr<Wire> wire_ CAIRN_GUARDED_BY(mutex_);  // Last: its callbacks use everything above.
 };

@@ -9,6 +9,7 @@ namespace {
 constexpr std::chrono::seconds kSilence{1};
 constexpr std::chrono::seconds kRest{2};  // Between two questions that find nothing new.
 constexpr std::chrono::seconds kLongestRest{60};
+constexpr std::chrono::seconds kLongestHostileRest{8};  // While forged messages arrive.
 
 }  // namespace
 
@@ -70,7 +71,7 @@ void SilenceWatch::Run() {
     renew_();
     next_question = Clock::now() + after_renewal;
     const bool hostile = bus_.datagrams_refused() > std::exchange(refused, bus_.datagrams_refused());
-    after_renewal = hostile ? Clock::duration(kRest) : std::min<Clock::duration>(2 * after_renewal, kLongestRest);
+    after_renewal = std::min<Clock::duration>(2 * after_renewal, hostile ? kLongestHostileRest : kLongestRest);
   }
 }
 

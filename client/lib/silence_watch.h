@@ -1,8 +1,8 @@
 // Notices that a subscription receives nothing although the server has something new: forged messages can bring a
 // reader of DDS into such a state, and it does not get out of it by itself. After a second of silence the watch asks
 // the server, and where the client is behind twice in a row, it has the client join the domain anew. It asks again
-// after two seconds, and later and later, up to once a minute, where joining did not help; but not later while forged
-// messages arrive, which may have made it deaf again. Thread rule: Arrived from
+// after two seconds, and later and later, up to once a minute, where joining did not help; up to every eight seconds
+// while forged messages arrive, which may have made it deaf again. Thread rule: Arrived from
 // any thread, Stop from one. The functions run on the watch's thread.
 #pragma once
 

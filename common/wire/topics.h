@@ -113,7 +113,7 @@ template <>
 struct Topic<Reply> {
   using Wire = v1::Reply;
   using Type = SampleType<Wire, v1::ReplyPubSubType>;
-  static constexpr TopicProfile kProfile{"cairn/v1/reply", false, 1024, 1024, 1, 0.0, false, 20, Partitions::kReplies};
+  static constexpr TopicProfile kProfile{"cairn/v1/reply", false, 512, 1024, 1, 0.0, false, 20, Partitions::kReplies};
 };
 
 }  // namespace cairn::wire

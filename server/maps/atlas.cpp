@@ -181,8 +181,13 @@ void Atlas::Erase(std::map<std::string, Place>::iterator place) {
   MapInfo gone;
   gone.site_id = HashName(place->first);
   gone.site = place->first;
-  outbound_.Send(Retired{std::move(gone)});
+  gone_.push_back(std::move(gone));
   sites_.erase(place);
+}
+
+void Atlas::Retire(MapInfo gone) {
+  const MutexLock lock(mutex_);
+  gone_.push_back(std::move(gone));
 }
 
 bool Atlas::MakeRoom() {
@@ -209,6 +214,12 @@ std::vector<std::shared_ptr<Site>> Atlas::All() const {
 }
 
 void Atlas::Publish() {
+  {
+    const MutexLock lock(mutex_);
+    std::erase_if(gone_, [this](const MapInfo& gone) CAIRN_REQUIRES(mutex_) {
+      return sites_.contains(gone.site) || outbound_.Send(Retired{gone});
+    });
+  }
   auto others = All();
   if (others.empty()) return;
   const auto next = others.begin() + static_cast<std::ptrdiff_t>(first_++ % others.size());

@@ -54,6 +54,9 @@ class Atlas {
   // Every site publishes what changed. Another one is the first each time, and the others wait for it, because one site
   // may fill the lane.
   void Publish();
+  // The site is gone, and what says so is sent. The next Publish retires its key, unless there is one of its name
+  // again.
+  void Retire(MapInfo gone);
   // The server stops: closes every site, which publishes what has changed, and waits for all. REQUIRES: the pool is
   // running.
   void Close();
@@ -83,6 +86,7 @@ class Atlas {
   mutable Mutex mutex_;
   std::map<std::string, Place> sites_ CAIRN_GUARDED_BY(mutex_);
   std::set<std::string> reserved_ CAIRN_GUARDED_BY(mutex_);
+  std::vector<MapInfo> gone_ CAIRN_GUARDED_BY(mutex_);                // Sites whose keys on the wire are to be retired.
   std::map<NameId, std::string> set_aside_ CAIRN_GUARDED_BY(mutex_);  // Why each of these sites was not restored.
   Site::Beginning beginning_ CAIRN_GUARDED_BY(mutex_);                // For the next site.
   std::atomic<std::size_t> first_ = 0;                                // Counts the calls of Publish.

@@ -40,6 +40,8 @@ struct Adopted {
   SessionId session = 0;
   RobotGrid displaced;
   GridChange change;  // Contains every chunk of both grids.
+  bool fragment =
+      false;  // It is not joined with the map of the site, as RobotGrid says or because it could not follow.
 };
 
 // The grid with which a session is to continue, from a finished job or an older map version. It is valid from

@@ -118,10 +118,11 @@ bool Site::GiveMissedPart(const Member& member) {
   owner->Adopt({.epoch = epoch_,
                 .generation = made_by->second,
                 .grid = part->second,
-                .done = [site = shared_from_this(), fragment = part->second.fragment](Adopted&& adopted) {
-                  site->Run([adopted = std::move(adopted), fragment](Site& self) {
+                .done = [site = shared_from_this()](Adopted&& adopted) {
+                  site->Run([adopted = std::move(adopted)](Site& self) {
                     self.joint_.Apply(adopted.change);
-                    self.joint_.SetHidden(adopted.session, fragment);
+                    self.joint_.SetHidden(adopted.session, adopted.fragment);
+                    self.StoreSite();
                   });
                 }});
   return true;

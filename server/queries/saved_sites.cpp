@@ -268,7 +268,7 @@ Result<void> SavedSites::Delete(const std::string& name) {
   empty.version = last->info.version + 1;
   empty.levels = last->info.levels;
   rooms_.outbound.SendPatiently(empty);
-  rooms_.outbound.SendPatiently(Retired{std::move(empty)});
+  rooms_.atlas.Retire(std::move(empty));
   // A site that has stored nothing yet is deleted without a trace.
   if (!removed && removed.error().code != StatusCode::kNotFound) return tl::unexpected(removed.error());
   return {};

@@ -15,7 +15,7 @@ namespace cairn::server {
 class CheckpointPace {
  public:
   using Time = std::chrono::nanoseconds;   // Of the processor.
-  static constexpr int kWorkPerCost = 20;  // At most one twentieth of the time is spent on checkpoints.
+  static constexpr int kWorkPerCost = 20;  // About one twentieth of the time is spent on checkpoints at most.
 
   struct Limits {
     std::uint64_t entries = 0;  // Of the journal.
@@ -25,7 +25,8 @@ class CheckpointPace {
 
   // The estimator has worked for so long, also while a journal was processed again.
   void Worked(Time time) { work_ += time; }
-  // Where to say what the checkpoint that was made last has taken. Any thread may write it, also after the session.
+  // Where to say what making the bytes of the last checkpoint has taken. Any thread may write it, also after the
+  // session.
   using Cost = std::shared_ptr<std::atomic<Time::rep>>;
   [[nodiscard]] const Cost& cost() const { return cost_; }
 
@@ -35,7 +36,7 @@ class CheckpointPace {
     return position >= newest_ + limits_.entries || work_ >= std::max(limits_.work, kWorkPerCost * Time(*cost_));
   }
   // It could not be made now. It is tried again after some more work, because trying costs as well.
-  void Refused() { next_try_ = work_ + limits_.work / 8; }
+  void Refused() { next_try_ = work_ + std::max(limits_.work, kWorkPerCost * Time(*cost_)) / 8; }
   // One at this position is being written.
   void Begun(std::uint64_t position) {
     newest_ = position;

@@ -117,12 +117,14 @@ std::shared_ptr<Session> Roster::Make(const StoredSession& stored, const std::sh
   if (journal_ != nullptr) {
     outputs.store = [journal = journal_, id, self](JournalEntry entry) {
       if (journal->Append(id, std::move(entry)) != 0) return true;
-      if (const auto session = self->lock()) session->Lost({StatusCode::kUnavailable, journal->health().reason});
+      if (const auto session = self->lock(); session != nullptr && journal->IsLost(id))
+        session->Lost({StatusCode::kUnavailable, journal->health().reason});
       return false;
     };
     outputs.position = [journal = journal_, id] { return journal->position(id); };
+    outputs.checkpointing = [journal = journal_, id] { return journal->IsCheckpointing(id); };
     outputs.checkpoint = [journal = journal_, id](std::uint64_t position, Journal::Content content,
-                                                  std::function<void()> done) {
+                                                  Journal::Done done) {
       return journal->Checkpoint(id, position, std::move(content), std::move(done));
     };
     outputs.recover = [journal = journal_, id] { return journal->Recover(id); };

@@ -238,7 +238,7 @@ void Session::Tick() {
     unannounced_ = false;
     AnnounceState();
   }
-  if (lost_) Schedule();  // The disk may work again, while nothing arrives from the robot.
+  if (lost_ && !ending_) Schedule();  // The disk may work again, while nothing arrives from the robot.
   if (record_.LookForSilence(SessionRecord::Clock::now())) state_unsent_ = true;
   if (state_unsent_) AnnounceState();
   PublishLedgers(SessionRecord::Urgency::kWhenDue);
@@ -283,6 +283,7 @@ void Session::Drain() {
   pace_.Worked(ThreadTime() - begin);
   const bool drained = queue_.empty();
   Throws([this] { TakeCheckpoint(); });
+  ++handled_;  // The turn itself: it may have had no events.
   Throws([&] { PublishLedgers(drained ? SessionRecord::Urgency::kDrained : SessionRecord::Urgency::kWhenDue); });
   scheduled_ = false;
   // An event that came between the last Pop and the line above found `scheduled_` set and relies on this turn.
@@ -293,11 +294,15 @@ void Session::TakeCheckpoint() {
   // What is dropped when a session ends or the server stops is in the record but not in the journal. The client sends
   // it again to the next server, which must not take it for something that it has received before.
   if (failed_ || ending_ || !outputs_.position || !outputs_.checkpoint) return;
+  if (outputs_.checkpointing && outputs_.checkpointing()) return;
   const std::uint64_t position = outputs_.position();
-  if (pace_.IsDue(position)) {
-    if (!SaveAt(position, {})) pace_.Refused();
-  } else if (position == 0 && lost_ && outputs_.recover) {
-    StoreAgain();
+  if (position == 0) {
+    if (lost_ && outputs_.recover) StoreAgain();
+  } else if (lost_) {
+    // Lost came from another thread, about an entry before StoreAgain, and took back what that had begun.
+    outputs_.abandon();
+  } else if (pace_.IsDue(position) && !SaveAt(position, {})) {
+    pace_.Refused();
   }
 }
 
@@ -306,20 +311,29 @@ void Session::StoreAgain() {
   const std::uint64_t position = outputs_.recover();
   if (position == 0) return;
   lost_ = false;
-  estimator_.BeginStoring();
-  const auto done = [weak = weak_from_this()] {
-    if (const auto self = weak.lock(); self != nullptr && self->record_.StoredAgain()) {
+  const auto done = [weak = weak_from_this(), position](bool stored) {
+    const auto self = weak.lock();
+    if (self == nullptr) return;
+    if (!stored) {
+      self->lost_ = true;  // Housekeeping tries again.
+    } else if (self->record_.StoredAgain(position)) {
       self->AnnounceState();
       self->PublishLedgers(SessionRecord::Urgency::kNow);
     }
   };
-  if (SaveAt(position, done)) return;
+  try {
+    estimator_.BeginStoring(position);
+    if (SaveAt(position, done)) return;
+  } catch (...) {
+    outputs_.abandon();
+    throw;
+  }
   outputs_.abandon();
   record_.SetStored(false);
   lost_ = true;
 }
 
-bool Session::SaveAt(std::uint64_t position, std::function<void()> done) {
+bool Session::SaveAt(std::uint64_t position, Journal::Done done) {
   const auto begin = ThreadTime();
   auto save = estimator_.Save();
   // Samples that were settled meanwhile are in the record, but perhaps not in the journal before this position.
@@ -328,6 +342,14 @@ bool Session::SaveAt(std::uint64_t position, std::function<void()> done) {
     const auto making = ThreadTime();
     CheckpointContent made = save();
     *cost = (saving + (ThreadTime() - making)).count();
+    for (CheckpointPiece& piece : made.pieces) {
+      piece.bytes = [bytes = std::move(piece.bytes), cost] {
+        const auto writing = ThreadTime();
+        std::string written = bytes();
+        *cost += (ThreadTime() - writing).count();
+        return written;
+      };
+    }
     return made;
   };
   if (!outputs_.checkpoint(position, std::move(content), std::move(done))) return false;

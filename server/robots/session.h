@@ -105,7 +105,7 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   void Handle(RobotEvent&& event);
   void TakeCheckpoint();
   void StoreAgain();
-  bool SaveAt(std::uint64_t position, std::function<void()> done);
+  bool SaveAt(std::uint64_t position, Journal::Done done);
   // Calls `act`; whether it threw. The session has then failed.
   template <typename Act>
   bool Throws(Act act) noexcept;

@@ -179,6 +179,7 @@ void SessionEstimator::On(Correction&& correction) {
   AdoptGrid(correction.epoch, correction.grid);
   switch_completed_ = std::move(correction.completed);
   adopted.change = TakeGridChange();
+  adopted.fragment = fragment_;
   correction.done(std::move(adopted));
 }
 
@@ -212,12 +213,12 @@ void SessionEstimator::AdoptGrid(std::uint32_t epoch, const RobotGrid& grid) {
   slam::Mapper& mapper = pipeline_.mapper();
   const auto path = grid.path != nullptr ? std::span<const Pose2>(*grid.path) : std::span<const Pose2>();
   const auto numbers = grid.numbers != nullptr ? std::span(*grid.numbers) : std::span<const std::uint64_t>();
-  const bool behind = mapper.keyframes_made() < grid.keyframes;
-  mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), grid.chunks), grid.keyframes, path, numbers);
-  // Of a session that was not stored to its end: its path cannot follow, so its place in this map is not known.
-  if (behind) mapper.Relocalise({});
-  if (grid.fragment && !fragment_) driven_m_ = 0.0;  // So that no job joins it again at once.
-  fragment_ = grid.fragment;
+  // A session that was not stored to its end may not be able to follow: then its place in this map is not known.
+  const bool adopted =
+      mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), grid.chunks), grid.keyframes, path, numbers);
+  const bool fragment = grid.fragment || !adopted;
+  if (fragment && !fragment_) driven_m_ = 0.0;  // So that no job joins it again at once.
+  fragment_ = fragment;
   if (!fragment_) start_refused_.clear();
   T_map_keyframe_.reset();
   record_.SetJoining({fragment_, driven_m_, start_refused_});

@@ -30,9 +30,10 @@ struct SessionOutputs {
   // is stored.
   std::function<bool(JournalEntry)> store = {};
   // `position` returns the position of the last entry that `store` accepted, and `checkpoint` stores the state after
-  // this entry and calls `done` when it is on the disk. Empty functions: no checkpoints.
+  // this entry (Journal::Checkpoint; not while `checkpointing`). Empty functions: no checkpoints.
   std::function<std::uint64_t()> position = {};
-  std::function<bool(std::uint64_t position, Journal::Content content, std::function<void()> done)> checkpoint = {};
+  std::function<bool()> checkpointing = {};
+  std::function<bool(std::uint64_t position, Journal::Content content, Journal::Done done)> checkpoint = {};
   // Journal::Recover and Abandon, for a session that is no longer stored.
   std::function<std::uint64_t()> recover = {};
   std::function<void()> abandon = {};
@@ -73,8 +74,9 @@ class SessionEstimator {
   // run on any thread. Empty if the moment does not allow a checkpoint (SessionRecord::Save). Load restores this state;
   // then the entries that follow are replayed.
   [[nodiscard]] Journal::Content Save() const;
-  // The session is stored again from here on; the next Save holds what came before (SessionRecord::BeginStoring).
-  void BeginStoring();
+  // The session is stored again from here on; the Save at `position` holds what came before
+  // (SessionRecord::BeginStoring).
+  void BeginStoring(std::uint64_t position);
   // Returns the values of the pieces, in their order.
   using PieceValues = std::vector<std::shared_ptr<const void>>;
   [[nodiscard]] Result<PieceValues> Load(std::string_view main, std::span<const std::string_view> pieces);

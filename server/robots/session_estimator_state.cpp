@@ -108,8 +108,8 @@ Journal::Content SessionEstimator::Save() const {
   };
 }
 
-void SessionEstimator::BeginStoring() {
-  record_.BeginStoring(WaitingBySensor());
+void SessionEstimator::BeginStoring(std::uint64_t position) {
+  record_.BeginStoring(position, WaitingBySensor());
 }
 
 Result<SessionEstimator::PieceValues> SessionEstimator::Load(std::string_view main,

@@ -63,12 +63,12 @@ class SessionRecord {
 
   // Sets whether received samples are stored, and if not, the reason. Returns whether this is a change.
   bool SetStored(bool stored, const Status& why = {});
-  // After SetStored(false): what is received from now on is stored again, together with a checkpoint that holds all
-  // before, also the scans that wait in the estimator. StoredAgain: that is on the disk, and the session counts as
-  // stored again; returns whether this is a change. SetStored(false) gives both up.
+  // After SetStored(false): what is received from now on is stored again, together with a checkpoint at this position
+  // of the journal that holds all before, also the scans that wait in the estimator. StoredAgain: that is on the disk,
+  // and the session counts as stored again; returns whether this is a change. SetStored(false) gives both up.
   using WaitingScans = std::map<NameId, std::set<std::uint64_t>>;
-  void BeginStoring(const WaitingScans& in_estimator);
-  bool StoredAgain();
+  void BeginStoring(std::uint64_t position, const WaitingScans& in_estimator);
+  bool StoredAgain(std::uint64_t position);
   // These entries of the session's journal are on the disk.
   void Durable(const std::vector<JournalEntry>& entries);
   // `in_estimator`: the scans that wait there, by sensor. They are in the journal; those that wait in the queue are
@@ -152,13 +152,14 @@ class SessionRecord {
   const Clock::duration gap_wait_;
 
   mutable Mutex mutex_;
-  bool storing_ CAIRN_GUARDED_BY(mutex_) = false;         // Samples are, or soon will be, stored.
-  Status not_stored_ CAIRN_GUARDED_BY(mutex_);            // Why samples were not stored, if they were not.
-  RobotStatus status_ CAIRN_GUARDED_BY(mutex_);           // Its `ledgers` stay empty: they are made on demand.
-  std::string silence_ CAIRN_GUARDED_BY(mutex_);          // What is stale; empty: nothing.
-  Clock::time_point active_ CAIRN_GUARDED_BY(mutex_);     // Start of the activity, if active.
-  Clock::time_point suspended_ CAIRN_GUARDED_BY(mutex_);  // Start of the suspension, if suspended.
-  Clock::time_point ended_ CAIRN_GUARDED_BY(mutex_);      // If it has ended.
+  bool storing_ CAIRN_GUARDED_BY(mutex_) = false;           // Samples are, or soon will be, stored.
+  std::uint64_t stores_from_ CAIRN_GUARDED_BY(mutex_) = 0;  // The position of the last BeginStoring.
+  Status not_stored_ CAIRN_GUARDED_BY(mutex_);              // Why samples were not stored, if they were not.
+  RobotStatus status_ CAIRN_GUARDED_BY(mutex_);             // Its `ledgers` stay empty: they are made on demand.
+  std::string silence_ CAIRN_GUARDED_BY(mutex_);            // What is stale; empty: nothing.
+  Clock::time_point active_ CAIRN_GUARDED_BY(mutex_);       // Start of the activity, if active.
+  Clock::time_point suspended_ CAIRN_GUARDED_BY(mutex_);    // Start of the suspension, if suspended.
+  Clock::time_point ended_ CAIRN_GUARDED_BY(mutex_);        // If it has ended.
   std::map<NameId, Stream> streams_ CAIRN_GUARDED_BY(mutex_);
   Stream odometry_ CAIRN_GUARDED_BY(mutex_);
   PoseHistory history_ CAIRN_GUARDED_BY(mutex_);

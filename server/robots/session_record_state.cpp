@@ -55,10 +55,11 @@ Result<void> SessionRecord::Load(slam::StateReader& reader, const WaitingScans& 
   return {};
 }
 
-void SessionRecord::BeginStoring(const WaitingScans& in_estimator) {
+void SessionRecord::BeginStoring(std::uint64_t position, const WaitingScans& in_estimator) {
   static const std::set<std::uint64_t> kNone;
   const MutexLock lock(mutex_);
   storing_ = true;
+  stores_from_ = position;
   for (auto& [sensor_id, stream] : streams_) {
     const auto taken = in_estimator.find(sensor_id);
     stream.account.BeginStoring(taken == in_estimator.end() ? kNone : taken->second);
@@ -66,9 +67,9 @@ void SessionRecord::BeginStoring(const WaitingScans& in_estimator) {
   odometry_.account.BeginStoring(kNone);
 }
 
-bool SessionRecord::StoredAgain() {
+bool SessionRecord::StoredAgain(std::uint64_t position) {
   const MutexLock lock(mutex_);
-  if (!storing_ || status_.session.durable) return false;
+  if (!storing_ || position != stores_from_ || status_.session.durable) return false;
   status_.session.durable = true;
   if (status_.session.status.message == not_stored_.message) status_.session.status = {};
   const auto advance = [](Stream& stream) {

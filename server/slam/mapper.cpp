@@ -263,17 +263,17 @@ void Mapper::FinishMap() {
   state_->drawing.Finish(state_->trail.keyframes(), state_->believed_path());
 }
 
-void Mapper::AdoptGrid(OccupancyGrid grid, std::uint64_t keyframes, std::span<const Pose2> path,
+bool Mapper::AdoptGrid(OccupancyGrid grid, std::uint64_t keyframes, std::span<const Pose2> path,
                        std::span<const std::uint64_t> numbers) {
   State& s = *state_;
-  const std::size_t drawn = s.trail.CountBelow(keyframes);
-  bool follows = false;
-  if (s.filter->rebases() && s.filter->placed() && keyframes <= s.trail.made()) {
-    const std::vector<Pose2> first_poses = s.PosesOfFirst(keyframes, path, numbers);
-    follows = !first_poses.empty();
-    if (follows) s.Follow(first_poses, keyframes);
-  }
-  s.drawing.Adopt(std::move(grid), keyframes, drawn, s.trail.keyframes(), s.believed_path(), follows);
+  std::vector<Pose2> first_poses;
+  if (s.filter->rebases() && s.filter->placed()) first_poses = s.PosesOfFirst(keyframes, path, numbers);
+  const bool follows = !first_poses.empty();
+  if (keyframes > s.trail.made() && !follows) return false;
+  const std::uint64_t known = std::min(keyframes, s.trail.made());
+  if (follows) s.Follow(first_poses, known);
+  s.drawing.Adopt(std::move(grid), known, s.trail.CountBelow(known), s.trail.keyframes(), s.believed_path(), follows);
+  return true;
 }
 
 // The poses of the keyframes with numbers below `made`, out of a path that may have more of these, because some were

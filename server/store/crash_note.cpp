@@ -13,6 +13,7 @@
 namespace cairn::server {
 namespace {
 
+constexpr std::size_t kStackBytes = 65536;
 constexpr std::array kSignals{SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
 
 // What the handler reads. A handler may use nothing that allocates memory or takes a lock.
@@ -20,11 +21,13 @@ std::array<struct sigaction, kSignals.size()> handlers_before;
 std::atomic<int> note_file{-1};
 thread_local volatile std::uint64_t working_on = 0;
 
-// The page of the file belongs to the kernel, so it reaches the disk although the process ends now.
-void Note(int signal) {
+// The page of the file belongs to the kernel, so it reaches the disk although the process ends now. What another
+// process has sent is no crash.
+void Note(int signal, siginfo_t* info, void* /*context*/) {
   const int file = note_file.load();
   const std::uint64_t number = working_on;
-  if (file >= 0 && number != 0) static_cast<void>(!pwrite(file, &number, sizeof(number), 0));
+  const bool own = info->si_code > 0 || info->si_pid == getpid();
+  if (own && file >= 0 && number != 0) static_cast<void>(!pwrite(file, &number, sizeof(number), 0));
   for (std::size_t i = 0; i < kSignals.size(); ++i)
     if (kSignals[i] == signal) sigaction(signal, &handlers_before[i], nullptr);
   raise(signal);  // Handled when this function returns, as it would have been without it.
@@ -39,7 +42,8 @@ CrashNote::CrashNote(const std::filesystem::path& file) {
   file_ = file;
   note_file = opened;
   struct sigaction action {};
-  action.sa_handler = Note;
+  action.sa_sigaction = Note;
+  action.sa_flags = SA_SIGINFO | SA_ONSTACK;
   sigemptyset(&action.sa_mask);
   for (std::size_t i = 0; i < kSignals.size(); ++i) sigaction(kSignals[i], &action, &handlers_before[i]);
 }
@@ -52,12 +56,18 @@ CrashNote::~CrashNote() {
   std::filesystem::remove(file_, ignored);
 }
 
-CrashNote::Working::Working(std::uint64_t number) : before_(working_on) {
+// The handler needs a stack of its own where the thread's is used up.
+CrashNote::Working::Working(std::uint64_t number) : before_(working_on), stack_(kStackBytes) {
+  stack_t stack{};
+  stack.ss_sp = stack_.data();
+  stack.ss_size = stack_.size();
+  sigaltstack(&stack, &stack_before_);
   working_on = number;
 }
 
 CrashNote::Working::~Working() {
   working_on = before_;
+  sigaltstack(&stack_before_, nullptr);
 }
 
 std::optional<std::uint64_t> CrashNote::Of(const std::filesystem::path& file) {

@@ -3,9 +3,11 @@
 // process.
 #pragma once
 
+#include <csignal>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 namespace cairn::server {
 
@@ -28,6 +30,8 @@ class CrashNote {
 
    private:
     const std::uint64_t before_;
+    std::vector<char> stack_;
+    stack_t stack_before_{};
   };
 
   // What the last process has noted; nothing if it did not crash.

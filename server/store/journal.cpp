@@ -101,7 +101,7 @@ std::uint64_t Journal::position(std::uint64_t session) const {
   return line == lines_.end() || !line->second.lost.empty() ? 0 : line->second.next - 1;
 }
 
-bool Journal::Checkpoint(std::uint64_t session, std::uint64_t position, Content content, std::function<void()> done) {
+bool Journal::Checkpoint(std::uint64_t session, std::uint64_t position, Content content, Done done) {
   const MutexLock lock(mutex_);
   const auto line = lines_.find(session);
   if (line == lines_.end() || !line->second.lost.empty() || line->second.checkpointing) return false;
@@ -128,8 +128,19 @@ std::uint64_t Journal::Recover(std::uint64_t session) {
 
 void Journal::Abandon(std::uint64_t session) {
   const MutexLock lock(mutex_);
-  if (const auto line = lines_.find(session); line != lines_.end() && line->second.recovers_at != 0)
-    Lose(session, line->second, kTooSlow);
+  if (const auto line = lines_.find(session); line != lines_.end()) Lose(session, line->second, kTooSlow);
+}
+
+bool Journal::IsLost(std::uint64_t session) const {
+  const MutexLock lock(mutex_);
+  const auto line = lines_.find(session);
+  return line != lines_.end() && !line->second.lost.empty();
+}
+
+bool Journal::IsCheckpointing(std::uint64_t session) const {
+  const MutexLock lock(mutex_);
+  const auto line = lines_.find(session);
+  return line != lines_.end() && line->second.checkpointing;
 }
 
 void Journal::Lose(std::uint64_t session, Line& line, std::string why) {
@@ -229,7 +240,8 @@ JournalHealth Journal::health() const {
   std::string lost;
   for (const auto& [session, line] : lines_) {
     if (!line.lost.empty()) lost = line.lost;
-    if (line.recovers_at != 0 && lost.empty()) lost = "a session that was not stored for a while is being stored again";
+    if (line.recovers_at != 0 && lost.empty())
+      lost = "what a session has done while the disk failed is not on the disk yet";
   }
   for (const std::string& reason : {disk_fault_, left_out_, lost, checkpoint_fault_})
     if (!reason.empty()) return {.degraded = true, .reason = reason, .over_budget = over_budget_};

@@ -76,15 +76,20 @@ class Journal {
   // Stores the session's state after exactly the entries up to `position`. `content` is called on the journal's thread.
   // Returns false if another checkpoint of the session is still being written, or if it has one at this position or a
   // later one.
-  // `done`: called on the journal's thread when it is on the disk.
+  // `done`: called on the journal's thread, when it is on the disk (true) or could not be made (false).
   using Content = std::function<CheckpointContent()>;
-  bool Checkpoint(std::uint64_t session, std::uint64_t position, Content content, std::function<void()> done = {});
+  using Done = std::function<void(bool stored)>;
+  bool Checkpoint(std::uint64_t session, std::uint64_t position, Content content, Done done = {});
   // A session that is no longer stored can be stored again: returns the position of a checkpoint that must be asked for
   // next, or 0 if this is not such a session, or the disk still fails or is far behind. Entries after that position are
   // kept in memory until the checkpoint is on the disk; then the journal before it is removed. Abandon: the checkpoint
   // could not be made, and the session is no longer stored again.
   [[nodiscard]] std::uint64_t Recover(std::uint64_t session);
   void Abandon(std::uint64_t session);
+  // Whether the session is open and no longer stored.
+  [[nodiscard]] bool IsLost(std::uint64_t session) const;
+  // Whether a checkpoint of the session is being written, so that another one would be refused.
+  [[nodiscard]] bool IsCheckpointing(std::uint64_t session) const;
   // Nothing of the session is written any more, and what is stored of it stays.
   void Close(std::uint64_t session);
   // Removes all records of a session that will not be restored.
@@ -141,7 +146,7 @@ class Journal {
     std::uint64_t session = 0;
     std::uint64_t position = 0;
     Content content;
-    std::function<void()> done;
+    Done done;
   };
   // Changes that are committed together.
   struct Group {
@@ -167,7 +172,7 @@ class Journal {
   void LeaveOutTooLong(Prepared& prepared) CAIRN_EXCLUDES(mutex_);
   void DropForgottenCheckpoint() CAIRN_EXCLUDES(mutex_);
   void WriteCheckpoint(std::optional<WantedCheckpoint> wanted, RecordChanges& changes) CAIRN_EXCLUDES(mutex_);
-  void AddUnwrittenSession(std::uint64_t session, RecordChanges& changes) CAIRN_EXCLUDES(mutex_);
+  void AddRecovered(std::uint64_t session, RecordChanges& changes) CAIRN_EXCLUDES(mutex_);
   void BeginCheckpoint(WantedCheckpoint wanted) CAIRN_EXCLUDES(mutex_);
   bool CommitOnce(const RecordChanges& changes);
   bool CommitPatiently(const RecordChanges& changes, const std::stop_token& stop);
@@ -201,7 +206,7 @@ class Journal {
 
   // Used by the thread only.
   std::optional<CheckpointWriter> writing_;
-  std::function<void()> written_;  // Called when that is on the disk.
+  Done written_;  // Told what became of that.
   Clock::time_point budget_checked_{};
 
   std::jthread thread_;  // The last member: it stops before the members it uses are destroyed.

@@ -29,7 +29,7 @@ void Journal::Run(const std::stop_token& stop) {
       Tell(prepared, oldest);
       if (writing_ && writing_->complete()) {
         EndCheckpoint();
-        if (const auto written = std::exchange(written_, nullptr)) written();
+        if (const auto written = std::exchange(written_, nullptr)) written(true);
         budget_checked_ = {};  // The journal before it may be removed now.
       }
       for (const Work& work : works) work(store_);
@@ -130,31 +130,40 @@ void Journal::DropForgottenCheckpoint() {
 void Journal::WriteCheckpoint(std::optional<WantedCheckpoint> wanted, RecordChanges& changes) {
   if (!wanted && !writing_) return;
   const std::uint64_t session = writing_ ? writing_->session() : wanted->session;
+  Done done = wanted ? wanted->done : written_;
   try {
     if (wanted) BeginCheckpoint(std::move(*wanted));
     RecordChanges records;
     if (writing_) writing_->AddTo(records);
-    if (writing_ && writing_->complete()) AddUnwrittenSession(session, records);
+    if (writing_ && writing_->complete()) AddRecovered(session, records);
     std::ranges::move(records.removed, std::back_inserter(changes.removed));
     std::ranges::move(records.put, std::back_inserter(changes.put));
   } catch (const std::exception& error) {
-    const MutexLock lock(mutex_);
-    checkpoint_fault_ = std::string("the last checkpoint could not be made: ") + error.what();
-    if (const auto line = lines_.find(session); line != lines_.end()) {
-      line->second.checkpointing = false;
-      if (line->second.recovers_at != 0) Lose(session, line->second, checkpoint_fault_);
-    }
     writing_.reset();
     written_ = nullptr;
+    {
+      const MutexLock lock(mutex_);
+      checkpoint_fault_ = std::string("the last checkpoint could not be made: ") + error.what();
+      if (const auto line = lines_.find(session); line != lines_.end()) {
+        line->second.checkpointing = false;
+        if (line->second.recovers_at != 0) Lose(session, line->second, checkpoint_fault_);
+      }
+    }
+    if (done) done(false);
   }
 }
 
-// Together with its checkpoint: a session with neither checkpoint nor journal would begin where its robot once stood.
-void Journal::AddUnwrittenSession(std::uint64_t session, RecordChanges& changes) {
+// What belongs to the checkpoint of Recover, in one commit with it: the session itself, if it is not there yet, because
+// with neither checkpoint nor journal it would begin where its robot once stood; and without the journal before it,
+// which has a gap.
+void Journal::AddRecovered(std::uint64_t session, RecordChanges& changes) {
   const MutexLock lock(mutex_);
   const auto line = lines_.find(session);
-  if (line != lines_.end() && line->second.unwritten)
+  if (line == lines_.end() || line->second.recovers_at != writing_->position()) return;
+  if (line->second.unwritten)
     changes.put.push_back({{RecordKind::kSession, session, 0}, BytesOf(*line->second.unwritten)});
+  changes.removed.push_back(
+      {.kind = RecordKind::kJournal, .owner = session, .first = 0, .last = line->second.recovers_at});
 }
 
 void Journal::BeginCheckpoint(WantedCheckpoint wanted) {
@@ -210,8 +219,10 @@ void Journal::EndCheckpoint() {
     line->second.checkpointing = false;
     line->second.checkpointed = writing_->position();
     line->second.pieces = writing_->pieces();
-    line->second.unwritten.reset();
-    if (line->second.recovers_at == writing_->position()) ReleaseHeld(writing_->session(), line->second);
+    if (line->second.recovers_at == writing_->position()) {
+      line->second.unwritten.reset();
+      ReleaseHeld(writing_->session(), line->second);
+    }
   }
   checkpoint_fault_.clear();
   writing_.reset();

@@ -16,7 +16,7 @@ Result<RestoreMarks> RestoreMarks::Read(Store& store, std::optional<std::uint64_
       Ends& ends = marks.ends_[session] = {from.attempts(), from.kills(), from.place()};
       if (from.open() && crashed != session) {
         if (ends.crashes > 0) --ends.crashes;
-        ++ends.kills;
+        if (!crashed) ++ends.kills;
       }
       return {};
     };

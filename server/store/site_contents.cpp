@@ -62,6 +62,16 @@ Result<std::uint64_t> LastSession(Store& store) {
   const auto sessions = store.Owners(RecordKind::kSession);
   if (!sessions) return tl::unexpected(sessions.error());
   std::uint64_t last = sessions->empty() ? 0 : sessions->back();
+  // A session that was never stored itself may be named by its site.
+  const auto named = ReadAll<StoredSite>(store, RecordKind::kSite, SiteOf);
+  if (!named && named.error().code != StatusCode::kDataLoss) return tl::unexpected(named.error());
+  if (named) {
+    for (const auto& [owner, site] : *named) {
+      for (const auto& [robot, session] : site.members) last = std::max(last, session);
+      for (const std::uint64_t session : site.past) last = std::max(last, session);
+      for (const std::uint64_t session : site.fragments) last = std::max(last, session);
+    }
+  }
   const auto sites = store.Owners(RecordKind::kLayer);
   if (!sites) return tl::unexpected(sites.error());
   for (const std::uint64_t site : *sites) {

@@ -91,6 +91,7 @@ TEST_P(GoldenEnded, TheOrderInWhichSessionsEndedIsRestored) {
   {
     StoredServer server(state());
     const Reply status = server->Ask(About(RequestKind::kStatus, ""));
+    ASSERT_EQ(status.robots.size(), 2U);
     for (const RobotStatus& robot : status.robots) EXPECT_EQ(robot.session.phase, SessionPhase::kEnded);
   }
   const auto store = *OpenStore(state());

@@ -202,6 +202,13 @@ TEST(SavedSites, ARunningServerDeletesASiteAndTakesItUpAgain) {
       return !there.empty() && std::none_of(there.begin(), there.end(), [](const auto& one) { return one.second; });
     }));
     EXPECT_EQ(ViewOf(house, "hall").used["r5"], 20U);
+    // Its robots' keys on the wire are free, also those of sessions that were only suspended.
+    ASSERT_TRUE(house.WaitFor([&] {
+      return std::ranges::any_of(house.All<Retired>(), [](const Retired& retired) {
+        const auto* const state = std::get_if<SessionState>(&retired.of);
+        return state != nullptr && state->site == "lab";
+      });
+    }));
 
     const Reply loaded = house.Ask(AboutFile(RequestKind::kSiteLoad, "", "lab"));
     ASSERT_TRUE(loaded.status.ok()) << loaded.status.message;

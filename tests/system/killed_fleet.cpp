@@ -235,9 +235,10 @@ class Drive {
     };
     kill_within(options_.most_up_s);
     // Some servers are killed before they are ready, while they restore.
-    for (; outcome.kills % 3 == 0 && outcome.kills < options_.kills; ++outcome.killed_starting) {
+    if (outcome.kills % 3 == 0 && outcome.kills < options_.kills) {
       LaunchServer("killed");
       kill_within(options_.most_starting_s);
+      ++outcome.killed_starting;
     }
     const auto start = Clock::now();
     StartServer("killed");

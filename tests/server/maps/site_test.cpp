@@ -245,8 +245,6 @@ TEST_F(SiteTest, ASessionThatGoesWithoutAnsweringDoesNotHoldUpTheSwitch) {
   EXPECT_TRUE(enabled.get());
 }
 
-// The bound is three versions. Jobs end while version 2 is being enabled: it used to be forgotten, and the last answer
-// of the switch crashed the process.
 // Its journal had no room for the correction, so an earlier server's session comes back in the map before the switch.
 TEST_F(SiteTest, ASessionThatComesBackFromAnEarlierEpochGetsItsPartOfTheEnabledVersion) {
   const std::uint32_t version = AddVersion({{1, {{{{0, 0}, UniformChunk(-100)}}, 3}}});
@@ -274,6 +272,8 @@ TEST_F(SiteTest, ASessionThatComesBackFromAnEarlierEpochGetsItsPartOfTheEnabledV
   EXPECT_EQ(site_->snapshot()->tiles.Find({0, 5, 5}), nullptr);
 }
 
+// The bound is three versions. Jobs end while version 2 is being enabled: it used to be forgotten, and the last answer
+// of the switch crashed the process.
 TEST_F(SiteTest, NewVersionsDoNotPushOutTheOneThatIsBeingEnabled) {
   const std::uint32_t version = AddVersion({{1, {{{{0, 0}, UniformChunk(-100)}}, 3}}});
   auto enabled = Enable(version);

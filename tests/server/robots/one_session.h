@@ -104,10 +104,13 @@ class OneSession {
                        .grid_changed = [](GridChange&&) {},
                        .position = [this] { return position.load(); },
                        .checkpoint =
-                           [this](std::uint64_t, const Journal::Content&, const std::function<void()>&) {
+                           [this](std::uint64_t, const Journal::Content&, const Journal::Done& done) {
+                             if (done) stored_.set_value(done);
                              ++checkpoints;
                              return true;
                            },
+                       .recover = [this] { return on_recover ? on_recover() : 0; },
+                       .abandon = [this] { position = 0; },
                        .checkpoint_limits = {.entries = 1, .work = {}}});
     EXPECT_TRUE(session_->record().AddSensors({"laser"}));
   }
@@ -137,15 +140,24 @@ class OneSession {
     return sent_.WaitFor([&] { return ledger().settled_through >= sequence; });
   }
 
+  // Waits for the next checkpoint after which the session counts as stored again; returns what its journal calls then.
+  [[nodiscard]] Journal::Done WaitStoring() {
+    Journal::Done done = stored_.get_future().get();
+    stored_ = {};
+    return done;
+  }
+
   Session& session() { return *session_; }
   const Sent& sent() const { return sent_; }
   std::function<bool(const OutboundValue&)> on_send;  // Set before anything arrives.
   // A checkpoint is due when the position is above that of the last one.
   std::atomic<std::uint64_t> position{0};
   std::atomic<int> checkpoints{0};
+  std::function<std::uint64_t()> on_recover;  // Set before the session is lost. On the strand.
 
  private:
   const std::string robot_;
+  std::promise<Journal::Done> stored_;
   asio::thread_pool pool_{2};
   Sent sent_;
   std::shared_ptr<Session> session_;

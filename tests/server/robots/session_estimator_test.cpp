@@ -239,15 +239,34 @@ TEST_F(SessionEstimatorTest, ACorrectionWithAPathMovesThePose) {
   EXPECT_LT((poses_.back().T_map_robot.translation() - before.translation()).norm(), 0.5);
 }
 
-// A session that was not stored to its end, and whose part of the new map knows more of it than the session itself.
-TEST_F(SessionEstimatorTest, WhoIsBehindTheMapThatItAdoptsIsNotLocalized) {
+// A session that was not stored to its end adopts its part of a map that was drawn when it had gone farther.
+TEST_F(SessionEstimatorTest, WhoIsBehindTheMapThatItAdoptsFollowsItsPath) {
+  Drive(0, 10);
+  const Pose2 before = poses_.back().T_map_robot, T_new_old{2.0, 1.0, 0.3};
+  std::vector<Pose2> path = Snapshot().snapshot.full_path;
+  for (Pose2& pose : path) pose = T_new_old * pose;
+  for (int more = 0; more < 3; ++more) path.push_back(path.back() * Pose2{0.3, 0.0, 0.0});
+  std::optional<Adopted> adopted;
+  estimator_.Handle(Correction{.epoch = 9,
+                               .grid = {{}, path.size(), std::make_shared<const std::vector<Pose2>>(path)},
+                               .done = [&adopted](Adopted&& answer) { adopted = std::move(answer); }});
+  Drive(10, 11);
+  EXPECT_LT((poses_.back().T_map_robot.translation() - (T_new_old * before).translation()).norm(), 0.5);
+  EXPECT_FALSE(adopted->fragment);
+}
+
+// Its poses would be those of the map before, whatever it sees.
+TEST_F(SessionEstimatorTest, WhoCannotFollowTheMapThatItAdoptsIsNotLocalized) {
   Drive(0, 10);
   ASSERT_TRUE(poses_.back().localized);
-  estimator_.Handle(
-      Correction{.epoch = 9, .grid = {.chunks = {}, .keyframes = ledger().keyframes + 5}, .done = [](Adopted&&) {}});
-  Drive(10, 11);
+  std::optional<Adopted> adopted;
+  estimator_.Handle(Correction{.epoch = 9,
+                               .grid = {.chunks = {}, .keyframes = ledger().keyframes + 5},
+                               .done = [&adopted](Adopted&& answer) { adopted = std::move(answer); }});
+  EXPECT_TRUE(adopted->fragment);
+  Drive(10, 260);  // Around the box: it sees its own places again.
+  for (std::size_t i = 10; i < poses_.size(); ++i) EXPECT_FALSE(poses_[i].localized) << i;
   EXPECT_EQ(poses_.back().map_epoch, 9U);
-  EXPECT_FALSE(poses_.back().localized);
 }
 
 // The next server would have this robot's part of a map that was never switched, beside the old parts of the others.

@@ -118,7 +118,8 @@ TEST(MapperFollows, APathOfAnotherLengthDoesNotMoveTheEstimator) {
   const std::vector<Pose2> before = mapper.BestPath();
   const std::vector<Pose2> short_path(before.size() - 1), long_path(before.size() + 1);
   mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), before.size(), short_path);
-  mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), long_path.size(), long_path);
+  mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), before.size(), long_path);
+  EXPECT_FALSE(mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), long_path.size(), short_path));
   EXPECT_EQ(mapper.BestPath(), before);
 }
 

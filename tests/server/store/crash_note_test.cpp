@@ -46,12 +46,16 @@ TEST(CrashNote, HoldsWhatTheCrashedThreadWorkedOn) {
 TEST(CrashNote, ThereIsNoneOfAProcessThatWasKilledFromOutside) {
   const TempDirectory directory;
   const auto file = directory / "note";
-  EXPECT_TRUE(DiesElsewhere([&] {
-    const CrashNote note(file);
-    const CrashNote::Working working(41);
-    raise(SIGKILL);
-  }));
-  EXPECT_EQ(CrashNote::Of(file), std::nullopt);
+  for (const int signal : {SIGKILL, SIGABRT}) {
+    EXPECT_TRUE(DiesElsewhere([&] {
+      const CrashNote note(file);
+      const CrashNote::Working working(41);
+      const pid_t parent = getpid();
+      if (fork() == 0) _exit(kill(parent, signal));
+      pause();
+    }));
+    EXPECT_EQ(CrashNote::Of(file), std::nullopt);
+  }
 }
 
 TEST(CrashNote, ThereIsNoneOfACrashOfSomethingElse) {

@@ -43,7 +43,7 @@ TEST(JournalRecovery, ASessionIsStoredAgainWithACheckpointOfItsPresentState) {
     EXPECT_TRUE(journal.health().degraded) << "the state is not on the disk yet";
     std::atomic<bool> done = false;
     ASSERT_TRUE(journal.Checkpoint(
-        1, position, [] { return CheckpointContent{"all before"}; }, [&] { done = true; }));
+        1, position, [] { return CheckpointContent{"all before"}; }, [&](bool stored) { done = stored; }));
     ASSERT_TRUE(test::Eventually([&] { return done.load(); }));
     ASSERT_TRUE(test::Eventually([&] { return told.through == static_cast<std::int64_t>(accepted) + 1; }));
     EXPECT_FALSE(journal.health().degraded) << journal.health().reason;

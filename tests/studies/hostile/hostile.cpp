@@ -157,7 +157,8 @@ class HostileFleet {
   std::vector<std::unique_ptr<ChildProcess>> robots_;
 };
 
-// Who watches the fleet, as a page does: the poses of its robots, and the map.
+// Who watches the fleet, as a page does: the poses of its robots, and the map. It lives in the study's process: should
+// a datagram end it, the study ends with it.
 class Viewer {
  public:
   Viewer() {

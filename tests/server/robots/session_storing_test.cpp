@@ -1,0 +1,87 @@
+// A session that was not stored for a while, and is again.
+#include <gtest/gtest.h>
+
+#include "tests/server/robots/one_session.h"
+
+namespace cairn::server::testing {
+namespace {
+
+class StoredSessionTest : public ::testing::Test {
+ protected:
+  StoredSessionTest() {
+    one_.on_recover = [this] {
+      one_.position = ++recovered_ * 10;
+      return one_.position.load();
+    };
+    one_.session().ExpectDurable();
+    one_.session().Durable({});
+  }
+  void Lose() { one_.session().Lost({StatusCode::kUnavailable, "the disk is full"}); }
+  [[nodiscard]] SessionState state() { return one_.session().record().state(); }
+
+  std::uint64_t recovered_ = 0;
+  OneSession one_;
+};
+
+TEST_F(StoredSessionTest, CountsAsStoredAgainWhenItsCheckpointIsOnTheDisk) {
+  ASSERT_TRUE(state().durable);
+  Lose();
+  EXPECT_FALSE(state().durable);
+  EXPECT_EQ(state().status.message, "the disk is full");
+  one_.Drive(0, 4);
+  const Journal::Done done = one_.WaitStoring();
+  ASSERT_TRUE(one_.WaitSettled(4));
+  EXPECT_FALSE(state().durable);
+  EXPECT_EQ(one_.ledger().durable_through, 0U);
+  done(true);
+  EXPECT_TRUE(state().durable);
+  EXPECT_TRUE(state().status.ok()) << state().status.message;
+  EXPECT_GT(one_.ledger().durable_through, 0U);
+}
+
+// The robot may be silent; housekeeping finds that the disk works again.
+TEST_F(StoredSessionTest, TriesAgainWhereItsCheckpointCouldNotBeMade) {
+  one_.Drive(0, 4);
+  ASSERT_TRUE(one_.WaitSettled(4));
+  Lose();
+  one_.session().Tick();
+  one_.WaitStoring()(false);
+  one_.position = 0;
+  one_.session().Tick();
+  one_.WaitStoring()(true);
+  EXPECT_EQ(recovered_, 2U);
+  EXPECT_TRUE(state().durable);
+  EXPECT_EQ(one_.ledger().durable_through, 4U);
+}
+
+// What became of an attempt that was given up says nothing about the next one.
+TEST_F(StoredSessionTest, OnlyTheNewestCheckpointMakesItDurable) {
+  one_.Drive(0, 4);
+  ASSERT_TRUE(one_.WaitSettled(4));
+  Lose();
+  one_.session().Tick();
+  const Journal::Done first = one_.WaitStoring();
+  Lose();  // From another thread, late: the journal stores the session.
+  one_.session().Tick();
+  ASSERT_TRUE(one_.sent().WaitFor([&] { return one_.position == 0; }));
+  one_.session().Tick();
+  const Journal::Done second = one_.WaitStoring();
+  first(true);
+  EXPECT_FALSE(state().durable);
+  second(true);
+  EXPECT_TRUE(state().durable);
+}
+
+// Whoever waits for its end would wait for ever.
+TEST_F(StoredSessionTest, HasNoWorkOnceItHasEnded) {
+  Lose();
+  one_.on_recover = {};
+  one_.session().End();
+  ASSERT_TRUE(one_.WaitPhase(SessionPhase::kEnded));
+  ASSERT_TRUE(one_.sent().WaitFor([&] { return !one_.session().has_work(); }));
+  one_.session().Tick();
+  EXPECT_FALSE(one_.session().has_work());
+}
+
+}  // namespace
+}  // namespace cairn::server::testing
