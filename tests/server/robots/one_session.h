@@ -9,6 +9,7 @@
 #include <functional>
 #include <future>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -140,11 +141,17 @@ class OneSession {
     return sent_.WaitFor([&] { return ledger().settled_through >= sequence; });
   }
 
-  // Waits for the next checkpoint after which the session counts as stored again; returns what its journal calls then.
+  // Waits, as a server does that looks after it now and then, for the next checkpoint after which the session counts as
+  // stored again; returns what its journal calls then.
   [[nodiscard]] Journal::Done WaitStoring() {
-    Journal::Done done = stored_.get_future().get();
+    auto stored = stored_.get_future();
+    const bool asked = sent_.WaitFor([&] {
+      session_->Tick();
+      return stored.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+    });
+    if (!asked) throw std::runtime_error("no checkpoint was asked for");
     stored_ = {};
-    return done;
+    return stored.get();
   }
 
   Session& session() { return *session_; }

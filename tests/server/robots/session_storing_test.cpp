@@ -44,10 +44,8 @@ TEST_F(StoredSessionTest, TriesAgainWhereItsCheckpointCouldNotBeMade) {
   one_.Drive(0, 4);
   ASSERT_TRUE(one_.WaitSettled(4));
   Lose();
-  one_.session().Tick();
   one_.WaitStoring()(false);
   one_.position = 0;
-  one_.session().Tick();
   one_.WaitStoring()(true);
   EXPECT_EQ(recovered_, 2U);
   EXPECT_TRUE(state().durable);
@@ -59,12 +57,8 @@ TEST_F(StoredSessionTest, OnlyTheNewestCheckpointMakesItDurable) {
   one_.Drive(0, 4);
   ASSERT_TRUE(one_.WaitSettled(4));
   Lose();
-  one_.session().Tick();
   const Journal::Done first = one_.WaitStoring();
   Lose();  // From another thread, late: the journal stores the session.
-  one_.session().Tick();
-  ASSERT_TRUE(one_.sent().WaitFor([&] { return one_.position == 0; }));
-  one_.session().Tick();
   const Journal::Done second = one_.WaitStoring();
   first(true);
   EXPECT_FALSE(state().durable);
