@@ -24,9 +24,10 @@ TEST(JournalRecovery, ASessionIsStoredAgainWithACheckpointOfItsPresentState) {
   std::uint64_t position = 0;
   {
     const auto store = *OpenStore(directory.path(), FaultyVfs::name());
+    Followed told;
+    std::atomic<bool> done = false;
     Journal journal(*store, {.commit_delay_ms = 1, .queue_mib = 1});
     journal.Start();
-    Followed told;
     journal.Open(SampleSession(1), told.durable());
     ASSERT_TRUE(test::Eventually([&] { return told.through == 0; }));
     EXPECT_EQ(journal.Recover(1), 0U) << "it is stored";
@@ -41,7 +42,6 @@ TEST(JournalRecovery, ASessionIsStoredAgainWithACheckpointOfItsPresentState) {
     EXPECT_EQ(journal.position(1), position);
     EXPECT_EQ(journal.Append(1, SampleScan(7001)), position + 1);
     EXPECT_TRUE(journal.health().degraded) << "the state is not on the disk yet";
-    std::atomic<bool> done = false;
     ASSERT_TRUE(journal.Checkpoint(
         1, position, [] { return CheckpointContent{"all before"}; }, [&](bool stored) { done = stored; }));
     ASSERT_TRUE(test::Eventually([&] { return done.load(); }));
@@ -70,9 +70,9 @@ TEST(JournalRecovery, WhatFollowsACheckpointThatIsNotThereYetIsNotWritten) {
   std::uint64_t accepted = 0;
   {
     const auto store = *OpenStore(directory.path(), FaultyVfs::name());
+    Followed told;
     Journal journal(*store, {.commit_delay_ms = 1, .queue_mib = 1});
     journal.Start();
-    Followed told;
     journal.Open(SampleSession(1), told.durable());
     vfs.Set(DiskFault::kFull);
     while (const std::uint64_t next = journal.Append(1, SampleScan(accepted + 1))) accepted = next;
