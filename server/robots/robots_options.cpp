@@ -39,7 +39,7 @@ void Visit(OptionVisitor& visitor, RobotsOptions& options) {
   visitor.Real("checkpoint_work_s", options.checkpoint_work_s, "s", 0.001, 1e6,
                "Processor time spent on a robot's samples after which a checkpoint is written, also before "
                "checkpoint_entries. A server that starts again needs up to this time for each robot once more. Where "
-               "checkpoints of a robot take long, there are fewer: they take at most a twentieth of its time.");
+               "checkpoints of a robot take long to make, there are fewer: about a twentieth of its time at most.");
   visitor.Real(
       "gap_wait_s", options.gap_wait_s, "s", 0.1, 3600.0,
       "After a restart a robot sends again the samples that were not stored. For this long the server accepts no "
