@@ -16,6 +16,10 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::seconds kFirstPatience{2};   // For the first part of an answer; then the question is repeated.
 constexpr std::chrono::seconds kAnswerPatience{1};  // Pings of a server that was found are not answered for so long.
 constexpr std::chrono::seconds kJoinPatience{6};    // No server is found for so long; a handshake takes 1 s.
+// Where forged messages may have made the client deaf.
+constexpr std::chrono::seconds kHostileFirstPatience{1};
+constexpr std::chrono::seconds kHostileJoinPatience{2};
+constexpr std::chrono::seconds kHostilePause{2};  // Between two times that it joins anew.
 
 // The answer's only element, which a server that says OK must give.
 template <typename T>
@@ -71,6 +75,7 @@ Result<std::unique_ptr<QueryClient>> QueryClient::Create(wire::Bus& bus, const Q
 
 Result<std::shared_ptr<QueryClient::Wire>> QueryClient::Connect(wire::Bus& bus) {
   auto wire = std::make_shared<Wire>();
+  wire->bus = &bus;
   wire::SubscriptionEvents events;
   events.matched = [this](int matched) {
     const MutexLock lock(mutex_);
@@ -106,16 +111,22 @@ int QueryClient::renewed() const {
   return times_renewed_;
 }
 
+// Whether forged messages may have made this client deaf: its participant has refused some. A new participant has not.
+bool QueryClient::MayBeDeaf() {
+  return CurrentWire()->bus->datagrams_refused() > 0;
+}
+
 // `began`: since when there has been no answer.
 void QueryClient::RenewIfSilent(Deadline began, std::chrono::seconds patience) {
   constexpr std::chrono::seconds kLongestPause{60};  // A server may be silent for another reason.
+  const bool hostile = MayBeDeaf();
   {
     const MutexLock lock(mutex_);
     const auto now = Clock::now();
-    const auto pause = std::max(patience, renewal_pause_);
+    const auto pause = hostile ? kHostilePause : std::max(patience, renewal_pause_);
     if (now - std::max(began, last_answer_) < patience || now - renewed_ < pause) return;
     renewed_ = now;
-    renewal_pause_ = std::min(2 * renewal_pause_, kLongestPause);
+    if (!hostile) renewal_pause_ = std::min(2 * renewal_pause_, kLongestPause);
   }
   auto bus = wire::Bus::Create(bus_.options(), "questions");
   if (!bus) return;
@@ -131,12 +142,17 @@ void QueryClient::RenewIfSilent(Deadline began, std::chrono::seconds patience) {
 }
 
 void QueryClient::RenewIfAlone(bool secure) {
-  std::optional<Alone> alone;
+  std::optional<Deadline> alone_since;
   {
     const MutexLock lock(mutex_);
-    alone = alone_;
+    alone_since = alone_since_;
   }
-  if (alone && (secure || bus_.datagrams_refused() > alone->refused)) RenewIfSilent(alone->since, kJoinPatience);
+  if (!alone_since) return;
+  if (MayBeDeaf()) {
+    RenewIfSilent(*alone_since, kHostileJoinPatience);
+  } else if (secure) {
+    RenewIfSilent(*alone_since, kJoinPatience);
+  }
 }
 
 void QueryClient::OnReply(Reply&& part) {
@@ -153,7 +169,7 @@ Result<Reply> QueryClient::Ask(const Request& request) {
   const bool command = IsCommand(request.kind);
   if (const auto wire = CurrentWire(); command && !wire->commands) return tl::unexpected(wire->commands.error());
   const bool repeatable = request.kind != RequestKind::kJobSubmit;
-  for (Clock::duration patience = kFirstPatience;; patience *= 2) {
+  for (Clock::duration patience = MayBeDeaf() ? kHostileFirstPatience : kFirstPatience;; patience *= 2) {
     if (auto found = WaitForServer(command, deadline); !found) return tl::unexpected(found.error());
     const Deadline begun = repeatable ? std::min(deadline, Clock::now() + patience) : deadline;
     Result<Reply> reply = AskOnce(request, begun, deadline);
@@ -180,8 +196,8 @@ Result<void> QueryClient::WaitForServer(bool command, Deadline deadline) {
       const MutexLock lock(mutex_);
       if (server_found_ && (!command || CommandsMatched())) return {};
       matched = wire_->requests->matched() > 0 && wire_->replies->matched() > 0 && (!command || CommandsMatched());
-      if (matched) alone_.reset();
-      if (!matched && !alone_) alone_ = Alone{Clock::now(), bus_.datagrams_refused()};
+      if (matched) alone_since_.reset();
+      if (!matched && !alone_since_) alone_since_ = Clock::now();
       if (!matched) changed_.WaitFor(mutex_, std::chrono::milliseconds(5));
     }
     if (!matched) {

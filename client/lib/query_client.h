@@ -69,7 +69,7 @@ class QueryClient {
   ~QueryClient();
 
   // Times it joined anew: with a server that does not answer, and where none is found with DDS Security, because a
-  // handshake of Fast DDS 2.9 gets stuck now and then, or while forged messages arrive, which can make it deaf.
+  // handshake of Fast DDS 2.9 gets stuck now and then, or after forged messages have arrived, which can make it deaf.
   [[nodiscard]] int renewed() const;
 
   // The server's version.
@@ -139,6 +139,7 @@ class QueryClient {
   void OnReply(Reply&& part);
   struct Wire {
     std::unique_ptr<wire::Bus> own;  // Null for the first, which uses the caller's.
+    wire::Bus* bus = nullptr;
     std::unique_ptr<wire::Publication<Request>> requests;
     // Not every identity may send commands.
     Result<std::unique_ptr<wire::Publication<Command>>> commands = nullptr;
@@ -148,6 +149,7 @@ class QueryClient {
   };
   [[nodiscard]] Result<std::shared_ptr<Wire>> Connect(wire::Bus& bus);
   [[nodiscard]] std::shared_ptr<Wire> CurrentWire();
+  [[nodiscard]] bool MayBeDeaf();
   void RenewIfSilent(Deadline began, std::chrono::seconds patience);
   void RenewIfAlone(bool secure);
   [[nodiscard]] bool CommandsMatched() const CAIRN_REQUIRES(mutex_);
@@ -168,12 +170,8 @@ class QueryClient {
   std::map<std::int64_t, ReplyAssembly> pending_ CAIRN_GUARDED_BY(mutex_);  // By sequence; what callers wait for.
   Deadline last_answer_ CAIRN_GUARDED_BY(mutex_);                           // Last answer, however late.
   Deadline renewed_ CAIRN_GUARDED_BY(mutex_);                               // Last time it joined anew, or began to,
-  struct Alone {
-    Deadline since;
-    std::uint64_t refused = 0;  // Datagrams that were refused before.
-  };
-  std::optional<Alone> alone_ CAIRN_GUARDED_BY(mutex_);             // No server is found.
-  std::chrono::seconds renewal_pause_ CAIRN_GUARDED_BY(mutex_){1};  // and how long until it may again.
+  std::optional<Deadline> alone_since_ CAIRN_GUARDED_BY(mutex_);            // No server is found.
+  std::chrono::seconds renewal_pause_ CAIRN_GUARDED_BY(mutex_){1};          // and how long until it may again.
   int times_renewed_ CAIRN_GUARDED_BY(mutex_) = 0;
   std::shared_ptr<Wire> wire_ CAIRN_GUARDED_BY(mutex_);  // Last: its callbacks use everything above.
 };

@@ -9,7 +9,11 @@ namespace {
 constexpr std::chrono::seconds kSilence{1};
 constexpr std::chrono::seconds kRest{2};  // Between two questions that find nothing new.
 constexpr std::chrono::seconds kLongestRest{60};
-constexpr std::chrono::seconds kLongestHostileRest{8};  // While forged messages arrive.
+// While forged messages arrive, and as soon as they stop.
+constexpr std::chrono::seconds kLongestHostileRest{8};
+constexpr std::chrono::seconds kShortestHostileRest{1};
+constexpr std::chrono::milliseconds kLook{
+    500};  // They come by the thousand: so long without one, and they have stopped.
 
 }  // namespace
 
@@ -41,6 +45,22 @@ bool SilenceWatch::WaitForSilence(Clock::time_point next_question) {
   return false;
 }
 
+// The rest after joining anew where forged messages arrived. Returns false if the watch ends.
+bool SilenceWatch::RestWhileHostile() {
+  const auto start = Clock::now();
+  std::uint64_t refused = bus_.datagrams_refused();
+  for (auto look = start + kShortestHostileRest; look < start + kLongestHostileRest; look += kLook) {
+    {
+      const MutexLock lock(mutex_);
+      while (!stopping_ && Clock::now() < look) stopped_.WaitUntil(mutex_, look);
+      if (stopping_) return false;
+    }
+    const std::uint64_t refused_before = std::exchange(refused, bus_.datagrams_refused());
+    if (refused == refused_before) break;
+  }
+  return true;
+}
+
 bool SilenceWatch::IsBehind() {
   if (queries_ == nullptr) {
     auto queries = QueryClient::Create(bus_);
@@ -69,9 +89,14 @@ void SilenceWatch::Run() {
     }
     if (!IsBehind()) continue;
     renew_();
-    next_question = Clock::now() + after_renewal;
-    const bool hostile = bus_.datagrams_refused() > std::exchange(refused, bus_.datagrams_refused());
-    after_renewal = std::min<Clock::duration>(2 * after_renewal, hostile ? kLongestHostileRest : kLongestRest);
+    const std::uint64_t refused_before = std::exchange(refused, bus_.datagrams_refused());
+    if (refused > refused_before) {
+      if (!RestWhileHostile()) return;
+      next_question = Clock::now();
+    } else {
+      next_question = Clock::now() + after_renewal;
+      after_renewal = std::min<Clock::duration>(2 * after_renewal, kLongestRest);
+    }
   }
 }
 

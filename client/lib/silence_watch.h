@@ -1,9 +1,9 @@
 // Notices that a subscription receives nothing although the server has something new: forged messages can bring a
 // reader of DDS into such a state, and it does not get out of it by itself. After a second of silence the watch asks
 // the server, and where the client is behind twice in a row, it has the client join the domain anew. It asks again
-// after two seconds, and later and later, up to once a minute, where joining did not help; up to every eight seconds
-// while forged messages arrive, which may have made it deaf again. Thread rule: Arrived from
-// any thread, Stop from one. The functions run on the watch's thread.
+// after two seconds, and later and later, up to once a minute, where joining did not help. While forged messages
+// arrive, which may make it deaf again, it asks every eight seconds, and as soon as they have stopped. Thread rule:
+// Arrived from any thread, Stop from one. The functions run on the watch's thread.
 #pragma once
 
 #include <chrono>
@@ -37,6 +37,7 @@ class SilenceWatch {
   void Run();
   // Waits until it is time to ask. Returns false if the watch ends.
   bool WaitForSilence(Clock::time_point next_question);
+  bool RestWhileHostile();
   bool IsBehind();
 
   wire::Bus& bus_;

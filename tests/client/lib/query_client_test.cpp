@@ -1,8 +1,12 @@
 #include "client/lib/query_client.h"
 
+#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
+#include <string_view>
 #include <thread>
 
 #include "tests/client/lib/fake_server.h"
@@ -142,6 +146,43 @@ TEST_F(QueryClientTest, ManyThreadsAskAtOnce) {
   }
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(right, 160);
+}
+
+// A datagram that every participant of the test's domain refuses: its only submessage says that it is longer.
+void SendRefusedDatagram() {
+  constexpr std::string_view kBytes(
+      "RTPS\x02\x03\x01\x0f"
+      "BBBBBBBBBBBB"
+      "\x15\x01\xf0\x00",
+      24);
+  const int sender = socket(AF_INET, SOCK_DGRAM, 0);
+  const in_addr loopback{htonl(INADDR_LOOPBACK)};
+  setsockopt(sender, IPPROTO_IP, IP_MULTICAST_IF, &loopback, sizeof(loopback));
+  sockaddr_in group{};  // Where participants announce themselves (RTPS 9.6.1).
+  group.sin_family = AF_INET;
+  group.sin_port = htons(static_cast<std::uint16_t>(7400 + 250 * TestDomain()));
+  group.sin_addr.s_addr = inet_addr("239.255.0.1");
+  sendto(sender, kBytes.data(), kBytes.size(), 0, reinterpret_cast<const sockaddr*>(&group), sizeof(group));
+  close(sender);
+}
+
+// Also if the forged messages came long before the question.
+TEST(QueryClientAlone, JoinsAnewOnceWhereForgedMessagesMayHaveMadeItDeaf) {
+  const auto bus = MakeBus("client");
+  const auto client = Must(QueryClient::Create(*bus, {.timeout_s = 8.0}));
+  ASSERT_TRUE(Eventually([&] {
+    SendRefusedDatagram();
+    return bus->datagrams_refused() > 0;
+  }));
+  EXPECT_FALSE(client->Ping());
+  EXPECT_EQ(client->renewed(), 1);
+}
+
+TEST(QueryClientAlone, DoesNotJoinAnewWhereThereIsNoServer) {
+  const auto bus = MakeBus("client");
+  const auto client = Must(QueryClient::Create(*bus, {.timeout_s = 3.0}));
+  EXPECT_FALSE(client->Ping());
+  EXPECT_EQ(client->renewed(), 0);
 }
 
 TEST(QueryClientAlone, SaysThatNoServerAnswers) {

@@ -171,28 +171,42 @@ class Viewer {
     queries_ = test::Must(client::QueryClient::Create(*bus_));
   }
 
-  // Seconds until a new pose of each robot has come and the map is the server's.
-  [[nodiscard]] double AwaitNews(double patience_s) {
+  // Seconds until a new pose of each robot has come, a question was answered, and the map is the server's.
+  struct News {
+    double poses_s = 0.0, answer_s = 0.0, map_s = 0.0;
+    [[nodiscard]] double all_s() const { return std::max({poses_s, answer_s, map_s}); }
+  };
+  [[nodiscard]] News AwaitNews(double patience_s) {
     const auto start = Clock::now();
     for (const auto& robot : poses_) {
       while (robot->Next(0.0)) {  // What came before.
       }
     }
-    for (const auto& robot : poses_) {
-      if (!robot->Next(patience_s)) return patience_s;
-    }
+    News news{.answer_s = patience_s, .map_s = patience_s};
+    auto poses = std::async(std::launch::async, [&] {
+      for (const auto& robot : poses_) {
+        if (!robot->Next(patience_s)) return patience_s;
+      }
+      return SecondsSince(start);
+    });
     while (SecondsSince(start) < patience_s) {
       const auto now = queries_->Map("hostile");
       if (!now) continue;
+      news.answer_s = std::min(news.answer_s, SecondsSince(start));
       const auto shown = [&] { return map_->epoch() == now->epoch && map_->version() >= now->version; };
-      if (test::Eventually(shown, std::chrono::milliseconds(500))) break;
+      if (!test::Eventually(shown, std::chrono::milliseconds(500))) continue;
+      news.map_s = SecondsSince(start);
+      break;
     }
-    return SecondsSince(start);
+    news.poses_s = poses.get();
+    return news;
   }
-  [[nodiscard]] int renewed() const {
-    int times = map_->renewed();
-    for (const auto& robot : poses_) times += robot->renewed();
-    return times;
+  // How often its parts have joined the domain anew.
+  [[nodiscard]] std::string Renewals() const {
+    int poses = 0;
+    for (const auto& robot : poses_) poses += robot->renewed();
+    return Count(poses) + " times for poses, " + Count(map_->renewed()) + " times for the map, " +
+           Count(queries_->renewed()) + " times for questions";
   }
 
  private:
@@ -212,6 +226,7 @@ struct Outcome {
   int stale = 0;                  // or with a stale robot.
   std::vector<double> flows_s;    // From the end of the traffic until everything flows.
   std::vector<double> shows_s;    // From the end of the traffic until the viewer has new poses and the present map.
+  Viewer::News news;              // The same for each of its parts, in the last run.
 };
 
 // One run: traffic for so long, then the time until everything flows.
@@ -240,7 +255,8 @@ void Attack(HostileFleet& fleet, Viewer& viewer, double seconds, std::uint64_t s
   outcome.seconds += SecondsSince(start);
   auto shows = std::async(std::launch::async, [&viewer] { return viewer.AwaitNews(120.0); });
   outcome.flows_s.push_back(fleet.AwaitFlow(120.0));
-  outcome.shows_s.push_back(shows.get());
+  outcome.news = shows.get();
+  outcome.shows_s.push_back(outcome.news.all_s());
   for (std::string& dead : fleet.Bury()) outcome.deaths.push_back(std::move(dead));
 }
 
@@ -279,7 +295,7 @@ void StudyHostile(StudyContext& context) {
   HostileFleet fleet;
   if (fleet.AwaitFlow(30.0) >= 30.0) return report.Fault("the robots do not stream");
   Viewer viewer;
-  if (viewer.AwaitNews(30.0) >= 30.0) return report.Fault("the viewer sees no robots");
+  if (viewer.AwaitNews(30.0).all_s() >= 30.0) return report.Fault("the viewer sees no robots");
   if (context.Wants("long")) {
     report.Heading("Traffic without a pause");
     Outcome outcome;
@@ -293,13 +309,14 @@ void StudyHostile(StudyContext& context) {
     for (int run = 0; run < runs; ++run) {
       Attack(fleet, viewer, 5.0, context.seed + 7 + static_cast<std::uint64_t>(run), outcome);
       report.Progress("run " + Count(run + 1) + ": flows again after " + Number(outcome.flows_s.back(), 2) +
-                      " s, the viewer sees all after " + Number(outcome.shows_s.back(), 2) + " s, " +
+                      " s, the viewer has poses after " + Number(outcome.news.poses_s, 2) + " s, an answer after " +
+                      Number(outcome.news.answer_s, 2) + " s, the map after " + Number(outcome.news.map_s, 2) + " s, " +
                       Count(static_cast<long long>(outcome.deaths.size())) + " deaths so far" +
                       (outcome.deaths.empty() ? "" : ", the last one " + outcome.deaths.back()));
     }
     Print(report, "runs", outcome);
   }
-  report.Text("The viewer has joined anew " + Count(viewer.renewed()) + " times.");
+  report.Text("The viewer has joined anew " + viewer.Renewals() + ".");
   const std::string log = fleet.StopServer();
   const auto refused = log.find("datagrams refused");
   report.Text("cairnd's last participant: " + (refused == std::string::npos
