@@ -57,7 +57,7 @@ Server::~Server() {
 }
 
 Result<void> Server::Restore(StartControl& control) {
-  if (auto sites = atlas_.Restore(); !sites) return sites;
+  if (auto sites = atlas_.Restore(control); !sites) return sites;
   if (auto sessions = roster_.Restore(control); !sessions) return sessions;
   const auto unfinished = jobs_.Restore();
   if (!unfinished) return tl::unexpected(unfinished.error());

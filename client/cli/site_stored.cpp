@@ -77,8 +77,10 @@ ExitCode ListStored(Program& program, const std::string& state) {
       sessions.push_back({{"session", id}, {"robot", session.request.robot}});
     }
     for (const std::uint64_t id : contents->layers) {
-      text += fmt::format("  session {}, of which only the map is left\n", id);
-      sessions.push_back({{"session", id}});
+      const bool merged = contents->site.merged.contains(id);
+      text += fmt::format("  session {}, of which only the map is left{}\n", id,
+                          merged ? ", together with that of earlier sessions" : "");
+      sessions.push_back({{"session", id}, {"with_earlier", merged}});
     }
     sites.push_back({{"site", name}, {"sessions", sessions}});
   }
@@ -189,6 +191,7 @@ ExitCode DeleteSession(Program& program, const SiteArguments& arguments) {
     if (auto deleted = server::DeleteSession(store, site, session); !deleted) return program.Refuse(deleted.error());
   }
   if (arguments.state.empty()) return PrintSummary(program, server::WriteSiteFile(store, site, arguments.output));
+  if (auto removed = server::RemoveRests(store); !removed) return program.Refuse(removed.error());
   return program.Print(fmt::format("{} of site {} deleted\n", arguments.names[1], site),
                        {{"site", site}, {"session", arguments.names[1]}, {"deleted", true}});
 }

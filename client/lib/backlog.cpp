@@ -179,8 +179,12 @@ void Backlog::StepBack() {
   if (cursor_ > 0) --cursor_;
 }
 
-bool Backlog::HasScan() const {
-  return std::any_of(entries_.begin(), entries_.end(), [](const Entry& entry) { return entry.is_scan; });
+std::optional<Stamp> Backlog::FirstScan() const {
+  for (const Entry& entry : entries_) {
+    if (!entry.is_scan) continue;
+    if (const auto sample = Load(entry)) return std::get<ScanSample>(*sample).scan.stamp;
+  }
+  return std::nullopt;
 }
 
 std::map<NameId, std::uint64_t> Backlog::MoveTo(SessionToken session) {
@@ -220,17 +224,17 @@ std::optional<Backlog::AtFirstScan> Backlog::OdometryAtFirstScan() const {
     if (sample == nullptr) continue;
     if (const auto* const scan = std::get_if<ScanSample>(sample.get())) {
       stamp = scan->scan.stamp;
-      if (before && before->stamp >= *stamp) return AtFirstScan{before->T_odom_robot, true};
+      if (before && before->stamp >= *stamp) return AtFirstScan{before->T_odom_robot, before->stamp, true};
       continue;
     }
     const Odometry& odometry = std::get<OdometrySample>(*sample).odometry;
     if (stamp && odometry.stamp >= *stamp) {
-      return AtFirstScan{before ? PoseAt(*before, odometry, *stamp) : odometry.T_odom_robot, true};
+      return AtFirstScan{before ? PoseAt(*before, odometry, *stamp) : odometry.T_odom_robot, odometry.stamp, true};
     }
     before = odometry;
   }
   if (!stamp || !before) return std::nullopt;
-  return AtFirstScan{before->T_odom_robot, false};
+  return AtFirstScan{before->T_odom_robot, before->stamp, false};
 }
 
 }  // namespace cairn::client

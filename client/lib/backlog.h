@@ -44,7 +44,8 @@ class Backlog {
   void Rewind() { cursor_ = 0; }
   [[nodiscard]] std::size_t unsent() const { return entries_.size() - cursor_; }
   [[nodiscard]] std::size_t size() const { return entries_.size(); }
-  [[nodiscard]] bool HasScan() const;
+  // The stamp of the first scan in the queue.
+  [[nodiscard]] std::optional<Stamp> FirstScan() const;
 
   // Assigns all samples to another session. Their numbers begin at 1 again. The last odometry sample that was removed
   // is put in front, because the first scan needs odometry before it. Returns the highest number of each stream.
@@ -54,6 +55,7 @@ class Backlog {
   // or none after it. Nothing if there is no scan or no odometry. `complete`: there is odometry at or after the scan.
   struct AtFirstScan {
     Pose2 T_odom_robot;
+    Stamp newest = 0;  // Of the odometry that was used.
     bool complete = false;
   };
   [[nodiscard]] std::optional<AtFirstScan> OdometryAtFirstScan() const;

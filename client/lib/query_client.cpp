@@ -15,11 +15,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds kFirstPatience{2};   // For the first part of an answer; then the question is repeated.
 constexpr std::chrono::seconds kAnswerPatience{1};  // Pings of a server that was found are not answered for so long.
-constexpr std::chrono::seconds kJoinPatience{6};    // No server is found for so long; a handshake takes 1 s.
-// Where forged messages may have made the client deaf.
-constexpr std::chrono::seconds kHostileFirstPatience{1};
-constexpr std::chrono::seconds kHostileJoinPatience{2};
-constexpr std::chrono::seconds kHostilePause{2};  // Between two times that it joins anew.
+constexpr std::chrono::seconds kHostileFirstPatience{1};  // Where forged messages may have made the client deaf.
 
 // The answer's only element, which a server that says OK must give.
 template <typename T>
@@ -111,50 +107,6 @@ int QueryClient::renewed() const {
   return times_renewed_;
 }
 
-// Whether forged messages may have made this client deaf: its participant has refused some. A new participant has not.
-bool QueryClient::MayBeDeaf() {
-  return CurrentWire()->bus->datagrams_refused() > 0;
-}
-
-// `began`: since when there has been no answer.
-void QueryClient::RenewIfSilent(Deadline began, std::chrono::seconds patience) {
-  constexpr std::chrono::seconds kLongestPause{60};  // A server may be silent for another reason.
-  const bool hostile = MayBeDeaf();
-  {
-    const MutexLock lock(mutex_);
-    const auto now = Clock::now();
-    const auto pause = hostile ? kHostilePause : std::max(patience, renewal_pause_);
-    if (now - std::max(began, last_answer_) < patience || now - renewed_ < pause) return;
-    renewed_ = now;
-    if (!hostile) renewal_pause_ = std::min(2 * renewal_pause_, kLongestPause);
-  }
-  auto bus = wire::Bus::Create(bus_.options(), "questions");
-  if (!bus) return;
-  auto wire = Connect(**bus);
-  if (!wire) return;
-  (*wire)->own = std::move(*bus);
-  std::shared_ptr<Wire> before;  // Its callbacks take the mutex: it goes when the lock is released.
-  {
-    const MutexLock lock(mutex_);
-    before = std::exchange(wire_, std::move(*wire));
-    ++times_renewed_;
-  }
-}
-
-void QueryClient::RenewIfAlone(bool secure) {
-  std::optional<Deadline> alone_since;
-  {
-    const MutexLock lock(mutex_);
-    alone_since = alone_since_;
-  }
-  if (!alone_since) return;
-  if (MayBeDeaf()) {
-    RenewIfSilent(*alone_since, kHostileJoinPatience);
-  } else if (secure) {
-    RenewIfSilent(*alone_since, kJoinPatience);
-  }
-}
-
 void QueryClient::OnReply(Reply&& part) {
   const MutexLock lock(mutex_);
   last_answer_ = Clock::now();
@@ -168,7 +120,8 @@ Result<Reply> QueryClient::Ask(const Request& request) {
   const Deadline deadline = DeadlineAfter(options_.timeout_s);
   const bool command = IsCommand(request.kind);
   if (const auto wire = CurrentWire(); command && !wire->commands) return tl::unexpected(wire->commands.error());
-  const bool repeatable = request.kind != RequestKind::kJobSubmit;
+  // A command that is late may have been carried out.
+  const bool repeatable = !command;
   for (Clock::duration patience = MayBeDeaf() ? kHostileFirstPatience : kFirstPatience;; patience *= 2) {
     if (auto found = WaitForServer(command, deadline); !found) return tl::unexpected(found.error());
     const Deadline begun = repeatable ? std::min(deadline, Clock::now() + patience) : deadline;
@@ -403,8 +356,13 @@ Result<std::vector<Job>> QueryClient::Jobs(const std::string& site) {
 
 Result<Job> QueryClient::WaitForJob(std::uint64_t id, const std::function<bool(const Job&)>& keep_waiting) {
   constexpr std::chrono::milliseconds kPause{100};
+  std::optional<Stamp> submitted;
   for (;;) {
     Result<Job> job = GetJob(id);
+    if (job && submitted && job->submitted != *submitted)
+      return Fail(StatusCode::kAborted,
+                  fmt::format("the server has started again without its state, and job {} is another one now", id));
+    if (job) submitted = job->submitted;
     if (!job || IsFinal(job->state) || (keep_waiting && !keep_waiting(*job))) return job;
     std::this_thread::sleep_for(kPause);
   }

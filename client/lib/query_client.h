@@ -2,8 +2,8 @@
 // program's permissions do not allow is refused here (kPermissionDenied). Each returns the answer, or the
 // server's error (its code and message), or why there is no answer: kUnavailable where no server was found, and
 // kDeadlineExceeded if the answer was late. The time needed to find the server counts towards the timeout.
-// The client first waits for an answered ping. A question without an answer is asked again within the timeout; one that
-// starts a job is not.
+// The client first waits for an answered ping. A question without an answer is asked again within the timeout; a
+// command is not, because it may have been carried out.
 // If no ping is answered for a second although a server is there, the client joins the domain again: forged messages
 // may keep it from receiving (RobotClient).
 // Thread rule: any number of threads may ask at once, and each waits for its own answer. Do not ask from a callback of
@@ -131,7 +131,8 @@ class QueryClient {
   // Jobs of all sites, or of one.
   [[nodiscard]] Result<std::vector<Job>> Jobs(const std::string& site = "");
   // Asks for the job ten times a second until it has ended, and returns its last state. The timeout bounds each single
-  // answer and not the whole wait. `keep_waiting` sees every state; where it returns false, the wait ends there.
+  // answer and not the whole wait. kAborted: a server without a state has started again, and the number is that of
+  // another job. `keep_waiting` sees every state; where it returns false, the wait ends there.
   [[nodiscard]] Result<Job> WaitForJob(std::uint64_t id, const std::function<bool(const Job&)>& keep_waiting = {});
 
  private:

@@ -15,8 +15,6 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds kAskPeriod{1};               // Between two requests without an answer.
 constexpr std::chrono::milliseconds kUrgentAskPeriod{300};  // The same while the session is stale.
-// How long a new session waits for odometry after its first scan, which tells exactly where the robot was.
-constexpr std::chrono::milliseconds kOdometryPatience{500};
 
 // Errors that may be gone when the client asks again.
 bool IsTemporary(StatusCode code) {
@@ -305,56 +303,6 @@ void RobotClient::Watch() {
     if (ask) Ask();
     Pump();
   }
-}
-
-// A new session begins with its first scan: only then it is known where the robot is at its start.
-bool RobotClient::ReadyToReopen() const {
-  if (!backlog_.HasScan()) return false;
-  const auto odometry = backlog_.OdometryAtFirstScan();
-  return (odometry && odometry->complete) || Clock::now() - refused_ > kOdometryPatience;
-}
-
-// The last reported pose (or, if there is none, the start of the session), moved on by the odometry since then. Nothing
-// if the robot was not localized, because the server would believe the pose.
-std::optional<Pose2> RobotClient::StartOfNextSession() const {
-  if (pose_ ? !pose_->localized : start_unknown_) return std::nullopt;
-  const Pose2 first = request_.has_start ? request_.T_map_robot_start : Pose2{};
-  const auto odometry = backlog_.OdometryAtFirstScan();
-  if (!odometry) return pose_ ? pose_->T_map_robot : first;
-  if (pose_) return pose_->T_map_odom * odometry->T_odom_robot;
-  if (!T_odom_robot_start_) return first;
-  return first * Between(*T_odom_robot_start_, odometry->T_odom_robot);
-}
-
-void RobotClient::Reopen() {
-  SessionToken session = 0;
-  std::optional<Pose2> start;
-  {
-    const MutexLock sending(sending_);
-    const MutexLock lock(mutex_);
-    start = StartOfNextSession();
-    session = NewClientId();
-    request_.session = session;
-    start_unknown_ = !start;
-    request_.has_start = start.has_value();
-    request_.T_map_robot_start = start.value_or(Pose2{});
-    request_.started = false;
-    // If this session is lost before its first pose, the next one starts from here.
-    if (const auto odometry = backlog_.OdometryAtFirstScan()) T_odom_robot_start_ = odometry->T_odom_robot;
-    pose_.reset();
-    sent_before_ = backlog_.size() - backlog_.unsent();
-    const std::map<NameId, std::uint64_t> highest = backlog_.MoveTo(session);
-    for (auto& [sensor_id, stream] : streams_) {
-      stream.sent = stream.arrived = 0;
-      const auto sent = highest.find(sensor_id);
-      stream.window.Restart(sent == highest.end() ? 0 : sent->second);
-    }
-    answered_ = false;
-    reopening_ = false;
-    restarted_.fetch_add(1, std::memory_order_relaxed);
-  }
-  if (callbacks_.restarted) callbacks_.restarted(session, start.value_or(Pose2{}));
-  Ask();
 }
 
 SessionState RobotClient::session() const {

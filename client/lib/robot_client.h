@@ -4,7 +4,8 @@
 // not sent again.
 // If the server does not know the session (for example because it was started again without its state), the client
 // opens a new session by itself. This begins at the robot's present pose, and the samples that were not safe are sent
-// again in it.
+// again in it. Where the pose is not known, because the robot was not localized, its odometry began anew, or scans are
+// missing for some time, in which somebody may have carried it, the new session has no start pose.
 // If what the client sends does not arrive for two seconds although a server is there, or nothing is received from that
 // server, the session is `stale`: damaged or forged messages can make a reader or a writer ignore its peer for good.
 // The client then joins the domain again, as another participant, and continues the same session; what had arrived is
@@ -15,6 +16,7 @@
 #pragma once
 
 #include <atomic>
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -134,6 +136,9 @@ class RobotClient {
   [[nodiscard]] bool Streaming() const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool ReadyToReopen() const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] std::optional<Pose2> StartOfNextSession() const CAIRN_REQUIRES(mutex_);
+  void WatchOdometry(const Odometry& odometry) CAIRN_REQUIRES(mutex_);
+  // Whether the odometry at the two stamps is that of one drive, as far as this client has seen it.
+  [[nodiscard]] bool IsOneDrive(Stamp a, Stamp b) const CAIRN_REQUIRES(mutex_);
   Result<void> SendNow(const StreamedSample& sample) CAIRN_REQUIRES(sending_);
   Result<void> AddAndSend(StreamedSample&& sample, Stream& stream) CAIRN_REQUIRES(sending_);
   void Ask();
@@ -176,7 +181,10 @@ class RobotClient {
   bool reopening_ CAIRN_GUARDED_BY(mutex_) = false;
   std::optional<Status> over_ CAIRN_GUARDED_BY(mutex_);  // Why the session ended for good.
   std::optional<PoseReport> pose_ CAIRN_GUARDED_BY(mutex_);
-  std::optional<Pose2> T_odom_robot_start_ CAIRN_GUARDED_BY(mutex_);  // Odometry when the session was opened.
+  std::optional<Odometry> start_odometry_ CAIRN_GUARDED_BY(mutex_);  // When the session was opened.
+  // The last two samples of odometry, and the stamps at which it began anew, the oldest first.
+  std::deque<Odometry> newest_odometry_ CAIRN_GUARDED_BY(mutex_);
+  std::deque<Stamp> began_anew_ CAIRN_GUARDED_BY(mutex_);
   bool start_unknown_ CAIRN_GUARDED_BY(mutex_) = false;  // The robot was not localized when this session was opened.
   Clock::time_point asked_ CAIRN_GUARDED_BY(mutex_);
   Clock::time_point refused_ CAIRN_GUARDED_BY(mutex_);  // When reopening began.

@@ -65,7 +65,8 @@ Result<void> RobotClient::Publish(const Odometry& odometry) {
     const MutexLock lock(mutex_);
     if (over_) return tl::unexpected(*over_);
     stream = &streams_.find(sensor_id)->second;
-    if (!T_odom_robot_start_) T_odom_robot_start_ = odometry.T_odom_robot;
+    if (!start_odometry_) start_odometry_ = odometry;
+    WatchOdometry(odometry);
   }
   return AddAndSend(OdometrySample{{robot_id_, sensor_id, 0}, odometry}, *stream);
 }

@@ -20,6 +20,11 @@ inline constexpr Stamp kNanosPerSecond = 1'000'000'000;
   return static_cast<double>(stamp) * 1e-9;
 }
 
+// later - earlier without overflow, for stamps a broken clock may place anywhere in int64.
+[[nodiscard]] constexpr std::uint64_t NanosBetween(Stamp earlier, Stamp later) {
+  return static_cast<std::uint64_t>(later) - static_cast<std::uint64_t>(earlier);
+}
+
 // Stamps as decimal seconds in text, exact to the nanosecond: no detour through double, which cannot hold one.
 // "[-]digits[.digits]"; further decimals than nine are rounded. Nothing for other text or a value beyond int64.
 [[nodiscard]] std::optional<Stamp> ParseStamp(std::string_view seconds);

@@ -53,6 +53,9 @@ struct Area {
 };
 
 struct Request {
+  // Not sent: which participant of the domain it came from, as the receiver of the message knows it. A client chooses
+  // its own id, so that shares of the server's time go by this number. 0: not received.
+  std::uint64_t asker = 0;
   ClientId client = 0;
   std::int64_t sequence = 0;
   RequestKind kind = RequestKind::kPing;

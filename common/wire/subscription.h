@@ -109,8 +109,15 @@ class DdsSubscription final : public Subscription {
       // The lease may have run out before the request was taken.
       if (!clients_.Seen(writer, client) && events_.liveliness) events_.liveliness(client, false);
     } else {
+      if constexpr (std::is_same_v<Value, Request>) value.asker = ParticipantOf(writer);
+      if constexpr (std::is_same_v<Value, Command>) value.request.asker = ParticipantOf(writer);
       on_value_(std::move(value));
     }
+  }
+
+  static std::uint64_t ParticipantOf(const WriterClients::Writer& writer) {
+    const auto prefix = eprosima::fastrtps::rtps::iHandle2GUID(writer).guidPrefix;
+    return HashName({reinterpret_cast<const char*>(prefix.value), sizeof(prefix.value)});
   }
 
   void Tell(const ReaderNews& news) {

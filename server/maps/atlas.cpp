@@ -36,7 +36,7 @@ Result<StoredSite> Atlas::Stored(NameId owner) const {
   return *std::move(stored);
 }
 
-Result<void> Atlas::Restore() {
+Result<void> Atlas::Restore(StartControl& control) {
   if (journal_ == nullptr) return {};
   const auto owners = journal_->store().Owners(RecordKind::kSite);
   if (!owners) return tl::unexpected(owners.error());
@@ -48,7 +48,7 @@ Result<void> Atlas::Restore() {
     }
     const auto site = Make(stored->name, false);
     if (!site) return tl::unexpected(site.error());
-    if (auto restored = (*site)->Restore(*stored); !restored) return restored;
+    if (auto restored = (*site)->Restore(*stored, control); !restored) return restored;
   }
   return {};
 }
@@ -98,7 +98,8 @@ Result<void> Atlas::OpenStored(const std::string& name) {
     const MutexLock lock(mutex_);
     site = NewSite(name);
   }
-  if (auto restored = site->Restore(*stored); !restored) return restored;
+  StartControl control;
+  if (auto restored = site->Restore(*stored, control); !restored) return restored;
   const MutexLock lock(mutex_);
   sites_.emplace(name, Place{std::move(site), false});
   reserved_.erase(name);

@@ -27,7 +27,7 @@ class Atlas {
   // Restores the sites of earlier servers. REQUIRES: no other function was called before. A site whose own record
   // cannot be read is set aside: nobody can enter it or make another of its name until it is deleted. Of the others,
   // only the records that cannot be read are left out. FAILED_PRECONDITION: the cells have another size here.
-  Result<void> Restore();
+  Result<void> Restore(StartControl& control);
   [[nodiscard]] bool IsSetAside(const std::string& name) const;
   // The site was deleted from the store; its name is free again.
   void ForgetSetAside(const std::string& name);

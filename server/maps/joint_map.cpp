@@ -69,6 +69,50 @@ std::vector<SessionId> JointMap::past() const {
   return in_order;
 }
 
+void JointMap::SetPastOrder(const std::vector<SessionId>& in_order) {
+  past_.clear();
+  for (const SessionId session : in_order) past_.emplace(session, past_.size());
+}
+
+slam::OccupancyGrid::Chunks JointMap::SumOfPast(const slam::OccupancyGrid::Chunks& older,
+                                                const slam::OccupancyGrid::Chunks& later) const {
+  slam::OccupancyGrid::Chunks sum = older;
+  for (const auto& [key, chunk] : later) {
+    std::shared_ptr<const slam::GridChunk>& place = sum[key];
+    if (place == nullptr) {
+      place = chunk;
+      continue;
+    }
+    auto both = std::make_shared<slam::GridChunk>(*place);
+    AddLater(*both, *chunk, most_past_);
+    place = std::move(both);
+  }
+  return sum;
+}
+
+// The sum goes from the one that ended first to the last, so that the first ones can be summed before the others.
+void JointMap::MergePast(SessionId older, SessionId later) {
+  const auto of_older = ChunksOf(older), of_later = ChunksOf(later);
+  const std::set<slam::ChunkKey> changed = dirty_;
+  for (const auto& [key, chunk] : of_older) SetLayer(key, older, nullptr);
+  for (const auto& [key, chunk] : SumOfPast(of_older, of_later)) SetLayer(key, later, chunk);
+  std::vector<SessionId> in_order = past();
+  const auto first = std::ranges::find(in_order, older), second = std::ranges::find(in_order, later);
+  if (std::all_of(std::next(first), second, [this](SessionId between) { return hidden_.contains(between); }))
+    dirty_ = changed;
+  in_order.erase(second);
+  *std::ranges::find(in_order, older) = later;
+  SetPastOrder(in_order);
+}
+
+void JointMap::Remove(SessionId session) {
+  Replace(session, {});
+  hidden_.erase(session);
+  std::vector<SessionId> in_order = past();
+  std::erase(in_order, session);
+  SetPastOrder(in_order);
+}
+
 void JointMap::MarkChanged(SessionId session) {
   for (const auto& [key, layers] : chunks_) {
     if (layers.contains(session)) dirty_.insert(key);

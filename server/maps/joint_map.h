@@ -40,6 +40,16 @@ class JointMap {
   // Those that have ended, in that order.
   [[nodiscard]] std::vector<SessionId> past() const;
 
+  // Two grids of the past as one, as they count in the sum.
+  [[nodiscard]] slam::OccupancyGrid::Chunks SumOfPast(const slam::OccupancyGrid::Chunks& older,
+                                                      const slam::OccupancyGrid::Chunks& later) const;
+  // Makes one layer of those of two sessions, which gets the number of the later one. What the map shows stays the same
+  // if no other session that is shown has ended between the two. REQUIRES: both have ended, in this order, and are
+  // shown.
+  void MergePast(SessionId older, SessionId later);
+  // Forgets the session with all that it has drawn.
+  void Remove(SessionId session);
+
   // The sum of the grids of the sessions before this one that are shown, in and around the area of its own grid.
   [[nodiscard]] slam::OccupancyGrid::Chunks DrawnBefore(SessionId session) const;
 
@@ -54,6 +64,7 @@ class JointMap {
   template <typename Counts>
   [[nodiscard]] std::shared_ptr<const slam::GridChunk> SumOf(const Layers& layers, const Counts& counts) const;
   void MarkChanged(SessionId session);
+  void SetPastOrder(const std::vector<SessionId>& in_order);
   void SetLayer(slam::ChunkKey key, SessionId session, std::shared_ptr<const slam::GridChunk> chunk);
   // Stores the cells if they differ, and returns whether they did. Null means that every cell is unknown.
   bool Store(TileKey key, Cells cells);

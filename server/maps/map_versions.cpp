@@ -1,5 +1,6 @@
 #include "server/maps/map_versions.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace cairn::server {
@@ -31,6 +32,28 @@ void MapVersions::Enable(std::uint32_t version, std::map<SessionId, RobotGrid> d
   outgoing.info.enabled = false;
   enabled_ = version;
   versions_.at(version).info.enabled = true;
+}
+
+SessionId MapVersions::LastSession() const {
+  SessionId last = 0;
+  for (const auto& [number, version] : versions_)
+    if (!version.parts.empty()) last = std::max(last, version.parts.rbegin()->first);
+  return last;
+}
+
+std::vector<std::uint32_t> MapVersions::MergeParts(SessionId older, SessionId later, const Merge& merge) {
+  std::vector<std::uint32_t> changed;
+  for (auto& [number, version] : versions_) {
+    const auto first = version.parts.find(older), second = version.parts.find(later);
+    const auto none = version.parts.end();
+    if (first == none && second == none) continue;
+    RobotGrid merged;
+    merged.chunks = merge(first == none ? nullptr : &first->second, second == none ? nullptr : &second->second);
+    if (first != none) version.parts.erase(first);
+    version.parts.insert_or_assign(later, std::move(merged));
+    changed.push_back(number);
+  }
+  return changed;
 }
 
 void MapVersions::Restore(std::map<std::uint32_t, MapVersion> versions, std::uint32_t next, std::uint32_t enabled) {

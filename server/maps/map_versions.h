@@ -6,6 +6,7 @@
 // only.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <vector>
 
@@ -31,6 +32,14 @@ class MapVersions {
   [[nodiscard]] const MapVersion* Find(std::uint32_t version) const;
   // REQUIRES: Find(version). `displaced`: the sessions' grids of the version that has been enabled so far.
   void Enable(std::uint32_t version, std::map<SessionId, RobotGrid> displaced);
+
+  // Two sessions that no longer exist count as one from now on, with the number of the later one. `merge` makes one
+  // grid of the parts that a version has of them, null where it has none. Returns the versions that this changed.
+  using Merge = std::function<slam::OccupancyGrid::Chunks(const RobotGrid* older, const RobotGrid* later)>;
+  std::vector<std::uint32_t> MergeParts(SessionId older, SessionId later, const Merge& merge);
+
+  // The highest number of a session of which a version has a part; 0 if there is none.
+  [[nodiscard]] SessionId LastSession() const;
 
   // Restores the stored versions. REQUIRES: `enabled` is one of the versions, and all are below `next`.
   void Restore(std::map<std::uint32_t, MapVersion> versions, std::uint32_t next, std::uint32_t enabled);

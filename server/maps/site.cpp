@@ -120,10 +120,18 @@ void Site::CheckStart(SessionId session, const Pose2& T_map_robot, Refuses refus
 void Site::AddVersion(MapVersion&& version, Done done, Wanted wanted) {
   Run([version = std::move(version), done = Once(std::move(done)), wanted = std::move(wanted)](Site& site) mutable {
     if (wanted && !wanted()) return done(Fail(StatusCode::kCancelled, "no longer wanted"));
+    // A session that has left meanwhile may have no layer of its own any more: the layers stay as they are.
+    std::erase_if(version.parts, [&site](const auto& part) {
+      const SessionId session = part.first;
+      return site.merged_.contains(session) ||
+             (site.OwnerOf(session) == nullptr && site.joint_.ChunksOf(session).empty());
+    });
     const std::uint32_t number = site.versions_.Add(std::move(version), site.switch_ ? site.switch_->version : 0);
-    site.StoreVersion(number);
-    site.RemoveOldVersions();
-    site.StoreSite();
+    site.StoreTogether([&] {
+      site.StoreVersion(number);
+      site.RemoveOldVersions();
+      site.StoreSite();
+    });
     site.Refresh({}, false);
     site.Send();
     done(number);
@@ -173,12 +181,10 @@ void Site::End(SessionId session) {
 
 void Site::Leave(SessionId session) {
   Run([session](Site& site) {
-    site.joint_.SetPast(session);
-    if (site.journal_ == nullptr) return;
-    site.StoreSite();
-    site.layers_.insert(session);
-    site.StoreLayer(session);
-    site.journal_->Forget(session);
+    site.StoreTogether([&] {
+      site.KeepAsLayer(session);
+      site.together_->forgotten.push_back(session);
+    });
   });
 }
 

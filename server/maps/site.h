@@ -22,6 +22,7 @@
 #include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "common/mutex.h"
 #include "common/service/generation.h"
@@ -32,6 +33,7 @@
 #include "server/maps/map_versions.h"
 #include "server/maps/maps_options.h"
 #include "server/ops/heartbeat.h"
+#include "server/ops/start_control.h"
 #include "server/outbound.h"
 #include "server/store/journal.h"
 
@@ -69,7 +71,7 @@ class Site : public std::enable_shared_from_this<Site> {
   // sessions that no longer exist. Records that cannot be read are set aside; without the enabled version, the newest
   // one that is there counts as enabled. REQUIRES: no other function was called before. FAILED_PRECONDITION: the cells
   // have another size here.
-  Result<void> Restore(const StoredSite& stored);
+  Result<void> Restore(const StoredSite& stored, StartControl& control);
   // Whether the server of this generation completed the switch that began this epoch. REQUIRES: called before the
   // threads start.
   [[nodiscard]] bool Switched(std::uint32_t epoch, Generation generation) const;
@@ -119,6 +121,8 @@ class Site : public std::enable_shared_from_this<Site> {
     const MutexLock lock(mutex_);
     return snapshot_;
   }
+  // The highest number that a version knows. REQUIRES: called before the threads start.
+  [[nodiscard]] SessionId LastSession() const;
   [[nodiscard]] Pulse pulse() const { return {handled_ + encoded_, handled_ != asked_}; }
 
  private:
@@ -147,9 +151,17 @@ class Site : public std::enable_shared_from_this<Site> {
   void StoreSite();
   void StoreVersion(std::uint32_t version);
   void StoreLayer(SessionId session);
+  // Everything that `act` stores is on the disk together, or nothing of it.
+  template <typename Act>
+  void StoreTogether(const Act& act);
+  void Put(const RecordKey& key, Journal::Bytes bytes);
+  void RemoveRecords(const RecordRange& range);
+  void StoreEverything();
+  void KeepAsLayer(SessionId session);
+  void MergeOldestLayers();
   void RemoveOldVersions();
-  Result<void> RestoreVersions(const StoredSite& stored);
-  Result<void> RestoreLayers();
+  Result<void> RestoreVersions(const StoredSite& stored, StartControl& control);
+  Result<void> RestoreLayers(StartControl& control);
   void PutAside(const std::string& what, const Status& why);
   MapInfo InfoOf(const TileSet& tiles) const;
 
@@ -169,7 +181,14 @@ class Site : public std::enable_shared_from_this<Site> {
   std::uint64_t tile_version_ = 0;
   std::map<SessionId, Member> members_;
   std::map<std::uint32_t, Generation> switches_;  // Epoch -> the server that switched the map to it.
-  std::set<SessionId> layers_;                    // Removed sessions whose parts are stored.
+  // Removed sessions whose parts of the map stay. One number may stand for several of them (MergeOldestLayers).
+  std::set<SessionId> layers_;
+  std::set<SessionId> merged_;             // Those of them that stand for several sessions.
+  std::set<SessionId> unreadable_layers_;  // They stay in the store as they are.
+  std::optional<Journal::Edit> together_;  // What StoreTogether has gathered.
+  // An earlier one had no room, so that the next one stores everything; and the sessions that it was to forget.
+  bool incomplete_ = false;
+  std::vector<SessionId> unforgotten_;
   std::set<std::uint32_t> stored_versions_;
   bool info_changed_ = true;
   std::optional<VersionSwitch> switch_;
@@ -201,6 +220,25 @@ void Site::Post(Act act) {
     }
     ++self->handled_;
   });
+}
+
+template <typename Act>
+void Site::StoreTogether(const Act& act) {
+  together_.emplace();
+  try {
+    act();
+    if (incomplete_) StoreEverything();
+  } catch (...) {
+    together_.reset();
+    incomplete_ = true;
+    throw;
+  }
+  Journal::Edit edit = *std::exchange(together_, std::nullopt);
+  if (journal_ == nullptr) return;
+  edit.forgotten.insert(edit.forgotten.end(), unforgotten_.begin(), unforgotten_.end());
+  unforgotten_ = edit.forgotten;
+  incomplete_ = !journal_->Apply(std::move(edit));
+  if (!incomplete_) unforgotten_.clear();
 }
 
 }  // namespace cairn::server

@@ -6,15 +6,69 @@
 
 namespace cairn::server {
 
+namespace {
+
+// Where there are more, the oldest are merged, so that a site's memory follows its area and not the number of sessions.
+constexpr std::size_t kMaxLayers = 8;
+
+}  // namespace
+
 void Site::StoreLayer(SessionId session) {
-  if (journal_ == nullptr) return;
-  journal_->Put(
-      {RecordKind::kLayer, site_id_, session},
+  Put({RecordKind::kLayer, site_id_, session},
       [layer = StoredLayer{session, ToStored({.chunks = joint_.ChunksOf(session)})}] { return BytesOf(layer); });
 }
 
-Result<void> Site::RestoreLayers() {
-  const auto take = [this](std::uint64_t number, std::string_view bytes) -> Result<void> {
+// What nobody sees goes with the session: nothing can be joined with it any more. While the map is being switched it is
+// not known what will be shown.
+void Site::KeepAsLayer(SessionId session) {
+  const bool shown = !joint_.hidden().contains(session) && !joint_.ChunksOf(session).empty();
+  if (shown || switch_) {
+    joint_.SetPast(session);
+    layers_.insert(session);
+    StoreLayer(session);
+    if (!switch_) MergeOldestLayers();
+  } else {
+    joint_.Remove(session);
+    layers_.erase(session);
+  }
+  // All others go, also those that an earlier change has left because there was no room for it.
+  std::set<SessionId> stay = layers_;
+  stay.insert(unreadable_layers_.begin(), unreadable_layers_.end());
+  SessionId next = 0;
+  for (const SessionId kept : stay) {
+    if (kept > next) RemoveRecords({.kind = RecordKind::kLayer, .owner = site_id_, .first = next, .last = kept - 1});
+    next = kept + 1;
+  }
+  RemoveRecords({.kind = RecordKind::kLayer, .owner = site_id_, .first = next});
+  StoreSite();
+}
+
+void Site::MergeOldestLayers() {
+  std::vector<SessionId> shown;  // The one that ended first comes first.
+  for (const SessionId session : joint_.past())
+    if (layers_.contains(session) && !joint_.hidden().contains(session)) shown.push_back(session);
+  for (std::size_t merged = 0; shown.size() - merged > kMaxLayers; ++merged) {
+    const SessionId older = shown[merged], later = shown[merged + 1];
+    const RobotGrid of_older{.chunks = joint_.ChunksOf(older)}, of_later{.chunks = joint_.ChunksOf(later)};
+    // A version without a part of a session leaves its layer as it is.
+    const auto sum = [&](const RobotGrid* first, const RobotGrid* second) {
+      const RobotGrid& one = first != nullptr ? *first : of_older;
+      const RobotGrid& two = second != nullptr ? *second : of_later;
+      return joint_.SumOfPast(one.fragment ? slam::OccupancyGrid::Chunks{} : one.chunks,
+                              two.fragment ? slam::OccupancyGrid::Chunks{} : two.chunks);
+    };
+    for (const std::uint32_t version : versions_.MergeParts(older, later, sum)) StoreVersion(version);
+    joint_.MergePast(older, later);
+    layers_.erase(older);
+    merged_.erase(older);
+    merged_.insert(later);
+    StoreLayer(later);
+  }
+}
+
+Result<void> Site::RestoreLayers(StartControl& control) {
+  const auto take = [this, &control](std::uint64_t number, std::string_view bytes) -> Result<void> {
+    control.Advance();
     const auto layer = LayerOf(bytes);
     if (!layer) return tl::unexpected(layer.error());
     if (layer->session != number) return Fail(StatusCode::kDataLoss, "the record is that of another session");
@@ -24,6 +78,7 @@ Result<void> Site::RestoreLayers() {
     return {};
   };
   const auto unreadable = [this](std::uint64_t number, const Status& why) {
+    unreadable_layers_.insert(number);
     PutAside("the part of the map that session " + std::to_string(number) + " has drawn", why);
   };
   return ReadEach(journal_->store(), {.kind = RecordKind::kLayer, .owner = site_id_}, take, unreadable);

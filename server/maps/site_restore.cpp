@@ -31,6 +31,37 @@ MapVersion VersionFrom(StoredVersion&& stored) {
 
 }  // namespace
 
+void Site::Put(const RecordKey& key, Journal::Bytes bytes) {
+  if (together_) {
+    together_->put.emplace_back(key, std::move(bytes));
+  } else if (journal_ != nullptr) {
+    journal_->Put(key, std::move(bytes));
+  }
+}
+
+void Site::RemoveRecords(const RecordRange& range) {
+  if (together_) {
+    std::erase_if(together_->put, [&range](const auto& one) {
+      const RecordKey& key = one.first;
+      return key.kind == range.kind && key.owner == range.owner && key.number >= range.first &&
+             key.number <= range.last;
+    });
+    together_->removed.push_back(range);
+  } else if (journal_ != nullptr) {
+    journal_->Remove(range);
+  }
+}
+
+SessionId Site::LastSession() const {
+  return versions_.LastSession();
+}
+
+void Site::StoreEverything() {
+  for (const std::uint32_t number : std::set<std::uint32_t>(stored_versions_)) StoreVersion(number);
+  for (const SessionId session : layers_) StoreLayer(session);
+  StoreSite();
+}
+
 void Site::StoreSite() {
   if (journal_ == nullptr) return;
   StoredSite stored{.name = name_,
@@ -42,23 +73,24 @@ void Site::StoreSite() {
                     .members = {},
                     .resolution_m = resolution_m_,
                     .fragments = joint_.hidden(),
-                    .past = joint_.past()};
+                    .past = joint_.past(),
+                    .merged = merged_};
   for (const auto& [session, member] : members_) stored.members[member.robot] = session;  // The last one.
-  journal_->Put({RecordKind::kSite, site_id_, 0}, [stored = std::move(stored)] { return BytesOf(stored); });
+  Put({RecordKind::kSite, site_id_, 0}, [stored = std::move(stored)] { return BytesOf(stored); });
 }
 
 void Site::StoreVersion(std::uint32_t number) {
   const MapVersion* const version = versions_.Find(number);
   if (journal_ == nullptr || version == nullptr) return;
   stored_versions_.insert(number);
-  journal_->Put({RecordKind::kMapVersion, site_id_, number}, [stored = StoredOf(*version)] { return BytesOf(stored); });
+  Put({RecordKind::kMapVersion, site_id_, number}, [stored = StoredOf(*version)] { return BytesOf(stored); });
 }
 
 void Site::RemoveOldVersions() {
   if (journal_ == nullptr) return;
   std::erase_if(stored_versions_, [this](std::uint32_t number) {
     if (versions_.Find(number) != nullptr) return false;
-    journal_->Remove({.kind = RecordKind::kMapVersion, .owner = site_id_, .first = number, .last = number});
+    RemoveRecords({.kind = RecordKind::kMapVersion, .owner = site_id_, .first = number, .last = number});
     return true;
   });
 }
@@ -68,7 +100,7 @@ bool Site::Switched(std::uint32_t epoch, Generation generation) const {
   return made != switches_.end() && made->second == generation;
 }
 
-Result<void> Site::Restore(const StoredSite& stored) {
+Result<void> Site::Restore(const StoredSite& stored, StartControl& control) {
   if (stored.resolution_m != 0.0 && stored.resolution_m != resolution_m_) {
     return Fail(StatusCode::kFailedPrecondition, "site '" + name_ + "' is stored with cells of " +
                                                      std::to_string(stored.resolution_m) +
@@ -79,9 +111,12 @@ Result<void> Site::Restore(const StoredSite& stored) {
   switches_ = stored.switches;
   for (const SessionId session : stored.fragments) joint_.SetHidden(session, true);
   for (const SessionId session : stored.past) joint_.SetPast(session);
-  if (auto restored = RestoreVersions(stored); !restored) return restored;
-  if (auto restored = RestoreLayers(); !restored) return restored;
+  merged_ = stored.merged;
+  if (auto restored = RestoreVersions(stored, control); !restored) return restored;
+  if (auto restored = RestoreLayers(control); !restored) return restored;
+  if (control.given_up()) return Fail(StatusCode::kCancelled, "the start was given up");
   Render();
+  control.Advance();
   return {};
 }
 
@@ -89,11 +124,12 @@ void Site::PutAside(const std::string& what, const Status& why) {
   spdlog::error("{}", journal_->set_aside().Add(name_, what + " of site '" + name_ + "'", why));
 }
 
-Result<void> Site::RestoreVersions(const StoredSite& stored) {
+Result<void> Site::RestoreVersions(const StoredSite& stored, StartControl& control) {
   std::map<std::uint32_t, MapVersion> versions;
   versions[1].info = {.version = 1, .enabled = false, .job = 0, .note = "live"};
   std::uint32_t next = stored.next_version;
-  const auto take = [&versions](std::uint64_t number, std::string_view bytes) -> Result<void> {
+  const auto take = [&versions, &control](std::uint64_t number, std::string_view bytes) -> Result<void> {
+    control.Advance();
     auto version = VersionOf(bytes);
     if (!version) return tl::unexpected(version.error());
     if (version->version != number) return Fail(StatusCode::kDataLoss, "the record is that of another version");

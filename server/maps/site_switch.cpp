@@ -80,16 +80,22 @@ void Site::CommitIfComplete() {
   VersionSwitch complete = std::move(*switch_);
   switch_.reset();
   const MapVersion& version = *versions_.Find(complete.version);
-  for (const auto& [session, chunks] : complete.staged) {
-    joint_.Replace(session, chunks);
-    joint_.SetHidden(session, version.parts.at(session).fragment);
-    if (layers_.contains(session)) StoreLayer(session);
-  }
-  const std::uint32_t before = versions_.enabled();
-  versions_.Enable(complete.version, std::move(complete.displaced));
-  switches_[++epoch_] = generation_;
-  StoreVersion(before);
-  RenderAll();
+  StoreTogether([&] {
+    for (const auto& [session, chunks] : complete.staged) {
+      joint_.Replace(session, chunks);
+      joint_.SetHidden(session, version.parts.at(session).fragment);
+      if (OwnerOf(session) == nullptr) {
+        joint_.SetPast(session);
+        layers_.insert(session);
+      }
+      if (layers_.contains(session)) StoreLayer(session);
+    }
+    const std::uint32_t before = versions_.enabled();
+    versions_.Enable(complete.version, std::move(complete.displaced));
+    switches_[++epoch_] = generation_;
+    StoreVersion(before);
+    RenderAll();
+  });
   *complete.completed = true;
   for (const auto& [session, member] : members_) {
     if (complete.staged.contains(session)) continue;

@@ -34,7 +34,7 @@ std::string WhyDegraded(const Journal& journal) {
 }  // namespace
 
 Desk::Desk(std::size_t capacity, Outbound& outbound, Roster& roster, Atlas& atlas, JobList& jobs, JobWorker& worker,
-           SavedSites& saved_sites, Generation generation, const Journal* journal)
+           SavedSites& saved_sites, Generation generation, Journal* journal)
     : outbound_(outbound),
       roster_(roster),
       atlas_(atlas),
@@ -43,10 +43,12 @@ Desk::Desk(std::size_t capacity, Outbound& outbound, Roster& roster, Atlas& atla
       saved_sites_(saved_sites),
       generation_(generation),
       journal_(journal),
-      requests_(capacity) {}
+      requests_(capacity),
+      answers_(std::make_shared<CommandAnswers>(requests_, journal)) {}
 
 Desk::~Desk() {
   Stop();
+  answers_->Stop();
 }
 
 void Desk::Start() {
@@ -116,29 +118,27 @@ std::optional<Answer> Desk::AnswerTo(const Request& request) {
     case RequestKind::kStatus:
       return StatusReply(request);
     case RequestKind::kJobSubmit:
-      return JobReply(request, SubmitJob(request));
+      return AnswerAboutJob(request, SubmitJob(request));
     case RequestKind::kJobGet:
       return JobReply(request, jobs_.Find(request.job));
     case RequestKind::kJobCancel:
-      return JobReply(request, jobs_.Cancel(request.job));
+      return AnswerAboutJob(request, jobs_.Cancel(request.job));
     case RequestKind::kJobList: {
       Reply reply = ReplyTo(request);
       reply.jobs = jobs_.OfSite(request.site);
       return reply;
     }
-    case RequestKind::kSessionEnd: {
-      const auto ended = roster_.End(request.robot);
-      return ReplyTo(request, ended ? Status{} : ended.error());
-    }
-    case RequestKind::kRelocalise: {
-      const auto taken = roster_.Relocalise(request.robot, request.T_map_robot);
-      return ReplyTo(request, taken ? Status{} : taken.error());
-    }
+    case RequestKind::kSessionEnd:
+      return Order(request, [&](const auto& receipt) { return roster_.End(request.robot, receipt); });
+    case RequestKind::kRelocalise:
+      return Order(request, [&](const auto& receipt) {
+        return roster_.Relocalise(request.robot, request.T_map_robot, receipt);
+      });
     case RequestKind::kLocalise:
-    case RequestKind::kMap: {
-      const auto taken = roster_.Localise(request.robot, request.kind == RequestKind::kLocalise);
-      return ReplyTo(request, taken ? Status{} : taken.error());
-    }
+    case RequestKind::kMap:
+      return Order(request, [&](const auto& receipt) {
+        return roster_.Localise(request.robot, request.kind == RequestKind::kLocalise, receipt);
+      });
     case RequestKind::kMapEnable:
       return EnableMap(request);
     case RequestKind::kSavedList:
@@ -151,6 +151,24 @@ std::optional<Answer> Desk::AnswerTo(const Request& request) {
       return Ros2Reply(request);
   }
   throw std::logic_error("the request has an unknown kind");
+}
+
+template <typename Give>
+std::optional<Answer> Desk::Order(const Request& request, const Give& give) {
+  const auto receipt = std::make_shared<Receipt>([answers = answers_, request](bool taken) {
+    answers->Send(
+        request, ReplyTo(request, taken ? Status{} : Status{StatusCode::kFailedPrecondition, "the session has ended"}));
+  });
+  const Result<void> given = give(receipt);
+  if (given) return std::nullopt;
+  receipt->Cancel();
+  return ReplyTo(request, given.error());
+}
+
+std::optional<Answer> Desk::AnswerAboutJob(const Request& request, Result<Job> job) {
+  if (!job) return ReplyTo(request, job.error());
+  answers_->Send(request, JobReply(request, std::move(job)));
+  return std::nullopt;
 }
 
 void Desk::SetRefusals(const Refusals& refusals) {
@@ -187,10 +205,10 @@ Result<Job> Desk::SubmitJob(const Request& request) {
 std::optional<Answer> Desk::EnableMap(const Request& request) {
   const auto site = atlas_.Find(request.site);
   if (site == nullptr) return ReplyTo(request, {StatusCode::kNotFound, "no site '" + request.site + "'"});
-  site->Enable(request.map_version, [&outbound = outbound_, request](Result<std::uint32_t> enabled) {
+  site->Enable(request.map_version, [answers = answers_, request](Result<std::uint32_t> enabled) {
     Reply reply = ReplyTo(request, enabled ? Status{} : enabled.error());
     if (enabled) spdlog::info("site {}: map version {} is enabled", request.site, *enabled);
-    outbound.Send(std::move(reply));
+    answers->Send(request, std::move(reply));
   });
   return std::nullopt;
 }

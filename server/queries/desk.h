@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <string>
 #include <thread>
@@ -17,6 +18,7 @@
 #include "server/ops/heartbeat.h"
 #include "server/outbound.h"
 #include "server/queries/answers.h"
+#include "server/queries/command_answers.h"
 #include "server/queries/request_queue.h"
 #include "server/queries/saved_sites.h"
 #include "server/robots/roster.h"
@@ -27,7 +29,7 @@ namespace cairn::server {
 class Desk {
  public:
   Desk(std::size_t capacity, Outbound& outbound, Roster& roster, Atlas& atlas, JobList& jobs, JobWorker& worker,
-       SavedSites& saved_sites, Generation generation, const Journal* journal = nullptr);
+       SavedSites& saved_sites, Generation generation, Journal* journal = nullptr);
   ~Desk();
 
   void Start();
@@ -50,6 +52,10 @@ class Desk {
   std::optional<Answer> AnswerTo(const Request& request);
   Result<Job> SubmitJob(const Request& request);
   std::optional<Answer> EnableMap(const Request& request);
+  // Where the order is taken, the answer is sent when it is on the disk.
+  template <typename Give>
+  std::optional<Answer> Order(const Request& request, const Give& give);
+  std::optional<Answer> AnswerAboutJob(const Request& request, Result<Job> job);
   // Both return one snapshot, or none if there is no such robot or site.
   [[nodiscard]] Sessions SessionOf(const std::string& robot) const;
   [[nodiscard]] Maps MapOf(const std::string& site) const;
@@ -63,11 +69,12 @@ class Desk {
   JobWorker& worker_;
   SavedSites& saved_sites_;
   const Generation generation_;
-  const Journal* const journal_;  // Null if nothing is stored.
+  Journal* const journal_;  // Null if nothing is stored.
   Mutex mutex_;
   Refusals refusals_ CAIRN_GUARDED_BY(mutex_);
   Ros2Report ros2_ CAIRN_GUARDED_BY(mutex_);
   RequestQueue requests_;
+  const std::shared_ptr<CommandAnswers> answers_;
   std::jthread thread_;  // The last member, because it uses the members above.
 };
 

@@ -5,9 +5,14 @@
 
 namespace cairn::server {
 
-RequestQueue::Waiting& RequestQueue::QueueOf(ClientId client) {
-  const auto [place, added] = clients_.try_emplace(client);
-  if (added) turns_.push_back(client);
+std::uint64_t RequestQueue::AskerOf(const Request& request) {
+  return request.asker != 0 ? request.asker : request.client;
+}
+
+RequestQueue::Waiting& RequestQueue::QueueOf(const Request& request) {
+  const std::uint64_t asker = AskerOf(request);
+  const auto [place, added] = askers_.try_emplace(asker);
+  if (added) turns_.push_back(asker);
   return place->second;
 }
 
@@ -16,17 +21,16 @@ std::optional<Request> RequestQueue::Push(Request&& request) {
   if (closed_) return std::move(request);
   std::optional<Request> refused;
   if (size_ >= capacity_) {
-    const auto longest = std::max_element(clients_.begin(), clients_.end(), [](const auto& a, const auto& b) {
-      return a.second.size() < b.second.size();
-    });
-    const auto own = clients_.find(request.client);
-    const std::size_t waiting = own == clients_.end() ? 0 : own->second.size();
+    const auto longest = std::max_element(
+        askers_.begin(), askers_.end(), [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); });
+    const auto own = askers_.find(AskerOf(request));
+    const std::size_t waiting = own == askers_.end() ? 0 : own->second.size();
     if (longest->second.size() < waiting + 2) return std::move(request);
     refused = std::move(longest->second.back().request);
     longest->second.pop_back();
     --size_;
   }
-  Waiting& queue = QueueOf(request.client);
+  Waiting& queue = QueueOf(request);
   queue.push_back({std::move(request), std::nullopt});
   ++size_;
   filled_.NotifyOne();
@@ -37,15 +41,15 @@ std::optional<OpenRequest> RequestQueue::Pop() {
   const MutexLock lock(mutex_);
   while (size_ == 0 && !closed_) filled_.Wait(mutex_);
   if (size_ == 0) return std::nullopt;
-  const ClientId client = turns_.front();
+  const std::uint64_t asker = turns_.front();
   turns_.pop_front();
-  const auto place = clients_.find(client);
+  const auto place = askers_.find(asker);
   OpenRequest next = std::move(place->second.front());
   place->second.pop_front();
   if (place->second.empty()) {
-    clients_.erase(place);
+    askers_.erase(place);
   } else {
-    turns_.push_back(client);
+    turns_.push_back(asker);
   }
   --size_;
   ++taken_;
@@ -54,8 +58,10 @@ std::optional<OpenRequest> RequestQueue::Pop() {
 
 void RequestQueue::PutBack(OpenRequest&& open) {
   const MutexLock lock(mutex_);
-  QueueOf(open.request.client).push_front(std::move(open));
+  Waiting& queue = QueueOf(open.request);
+  queue.push_front(std::move(open));
   ++size_;
+  filled_.NotifyOne();
 }
 
 void RequestQueue::Close() {

@@ -25,8 +25,8 @@ std::optional<PathPose> PathView::At(Stamp stamp) const {
                                       [](const PathPose& pose, Stamp value) { return pose.stamp < value; });
   if (after->stamp == stamp) return *after;
   const PathPose& before = after == poses.begin() ? (*std::prev(block))->back() : *std::prev(after);
-  const double fraction = static_cast<double>(slam::NanosBetween(before.stamp, stamp)) /
-                          static_cast<double>(slam::NanosBetween(before.stamp, after->stamp));
+  const double fraction = static_cast<double>(NanosBetween(before.stamp, stamp)) /
+                          static_cast<double>(NanosBetween(before.stamp, after->stamp));
   const PathPose& worse = before.score < after->score ? before : *after;
   const auto share = static_cast<float>(fraction);
   return PathPose{stamp,

@@ -12,6 +12,7 @@
 #include "server/inbound.h"
 #include "server/maps/map_snapshot.h"
 #include "server/maps/robot_grid.h"
+#include "server/robots/receipt.h"
 #include "server/slam/mapper.h"
 #include "server/slam/trail/keyframe.h"
 
@@ -35,6 +36,7 @@ struct SnapshotWanted {
 // Somebody says that the robot is not where it is believed to be, and perhaps where it is (slam::Mapper::Relocalise).
 struct RelocaliseWanted {
   std::optional<Pose2> T_map_robot;
+  std::shared_ptr<Receipt> receipt{};  // Null: nobody is told.
 };
 
 // From now on the robot is only localised, in this map; null: it maps again. `again`: the map of a robot that is only
@@ -42,6 +44,7 @@ struct RelocaliseWanted {
 struct LocaliseWanted {
   std::shared_ptr<const MapSnapshot> map;
   bool again = false;
+  std::shared_ptr<Receipt> receipt{};  // Null: nobody is told.
 };
 
 // What others have drawn contradicts the place where the robot is said to have started (jobs/start_check.h).

@@ -25,10 +25,12 @@ void Visit(OptionVisitor& visitor, RobotsOptions& options) {
       "Ended sessions that are kept of robots that have begun another one or stayed away, so that what they saw can be "
       "joined with what is seen now. When there are more, the oldest is forgotten; its part of the map stays "
       "as it is. Each one takes the memory of an estimator, and smoothing jobs take longer.");
-  visitor.Real("suspended_expiry_s", options.suspended_expiry_s, "s", 1.0, 1e8,
-               ForOperators("A session whose robot stays away for longer than this is ended. With a longer time robots "
-                            "may come back later, and vanished ones take memory for longer. A session that ended so "
-                            "long ago is not shown any more and counts for max_earlier."));
+  visitor.Real(
+      "suspended_expiry_s", options.suspended_expiry_s, "s", 1.0, 1e8,
+      ForOperators("A session whose robot stays away for longer than this is ended, at the earliest an hour after the "
+                   "server was started. With a longer time robots "
+                   "may come back later, and vanished ones take memory for longer. A session that ended so "
+                   "long ago is not shown any more and counts for max_earlier."));
   visitor.Real("ledger_rate_hz", options.ledger_rate_hz, "Hz", 0.1, 100.0,
                "How often the counters of a robot are published while scans arrive. They are published at once after "
                "every eight scans and when its queue becomes empty.");

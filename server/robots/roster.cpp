@@ -207,31 +207,32 @@ void Roster::Take(const ClientLiveliness& liveliness) {
   }
 }
 
-Result<void> Roster::End(const std::string& robot) {
+Result<void> Roster::End(const std::string& robot, std::shared_ptr<Receipt> receipt) {
   const auto session = FindOrFail(robot);
   if (!session) return tl::unexpected(session.error());
-  (*session)->End();
+  (*session)->End({}, std::move(receipt));
   return {};
 }
 
-Result<void> Roster::Relocalise(const std::string& robot, const std::optional<Pose2>& T_map_robot) {
+Result<void> Roster::Relocalise(const std::string& robot, const std::optional<Pose2>& T_map_robot,
+                                const std::shared_ptr<Receipt>& receipt) {
   if (T_map_robot) {
     if (auto valid = ValidateStart(*T_map_robot); !valid) return valid;
   }
   const auto session = FindOrFail(robot);
   if (!session) return tl::unexpected(session.error());
-  return (*session)->Relocalise(T_map_robot);
+  return (*session)->Relocalise(T_map_robot, receipt);
 }
 
-Result<void> Roster::Localise(const std::string& robot, bool only) {
+Result<void> Roster::Localise(const std::string& robot, bool only, const std::shared_ptr<Receipt>& receipt) {
   const auto session = FindOrFail(robot);
   if (!session) return tl::unexpected(session.error());
-  if (!only) return (*session)->MapAgain();
+  if (!only) return (*session)->MapAgain(receipt);
   const auto site = atlas_.Find((*session)->record().state().site);
   const auto map = site != nullptr ? site->snapshot() : nullptr;
   if (map == nullptr || !map->tiles.BoxOf(0))
     return Fail(StatusCode::kNotFound, "nothing is drawn in the map of its site");
-  return (*session)->Localise(map);
+  return (*session)->Localise(map, receipt);
 }
 
 Result<std::shared_ptr<Session>> Roster::FindOrFail(const std::string& robot) const {
@@ -248,19 +249,33 @@ void Roster::Tick() {
     if (session->record().localises()) {
       if (const auto site = atlas_.Find(session->record().state().site)) session->KeepUpWith(site->snapshot());
     }
-    if (session->record().SuspendedFor(now) > expiry)
+    if (session->record().SuspendedFor(now) > expiry && session->record().HasHadTime(now))
       session->End({StatusCode::kDeadlineExceeded, "its robot stayed away for longer than robots.suspended_expiry_s"});
     if (session->record().EndedFor(now) > expiry) MakeEarlier(session);
   }
   SendRefusals();
   RetireGone();
   const MutexLock lock(mutex_);
+  StoreQuiet();
   for (Ledger& ledger : unclaimed_.TakeChanged()) outbound_.Send(std::move(ledger));
   unclaimed_.ForgetSilent(UnclaimedStreams::Clock::now(), [this](const Ledger& ledger) CAIRN_REQUIRES(mutex_) {
     const auto session = sessions_.find(ledger.robot_id);
     const bool used = session != sessions_.end() && session->second->record().Has(ledger.sensor_id);
     return used || outbound_.Send(Retired{ledger});
   });
+}
+
+// Since when sessions are quiet is stored where it has changed. With the lock: a session that is removed meanwhile must
+// not be stored once more.
+void Roster::StoreQuiet() {
+  if (journal_ == nullptr) return;
+  for (const auto& [robot_id, session] : sessions_) {
+    if (!session->record().state().durable) continue;
+    if (auto changed = session->TakeChangedStored()) {
+      journal_->Put({RecordKind::kSession, session->id(), 0},
+                    [stored = std::move(*changed)] { return BytesOf(stored); });
+    }
+  }
 }
 
 // An ended session whose robot has not come back is one of the earlier ones, of which only so many are kept.

@@ -78,12 +78,13 @@ class Roster {
   void Take(OdometryArrival&& arrival);
   void Take(const ClientLiveliness& liveliness);
   // NOT_FOUND without such a session.
-  Result<void> End(const std::string& robot);
+  Result<void> End(const std::string& robot, std::shared_ptr<Receipt> receipt = nullptr);
   // See Session::Relocalise. NOT_FOUND without a session, INVALID_ARGUMENT for a pose that is not finite or absurd.
-  Result<void> Relocalise(const std::string& robot, const std::optional<Pose2>& T_map_robot);
+  Result<void> Relocalise(const std::string& robot, const std::optional<Pose2>& T_map_robot,
+                          const std::shared_ptr<Receipt>& receipt = nullptr);
   // From now on the robot is only localised in the map of its site, or it maps again. NOT_FOUND without a session, or
   // without a map. See Session::Localise.
-  Result<void> Localise(const std::string& robot, bool only);
+  Result<void> Localise(const std::string& robot, bool only, const std::shared_ptr<Receipt>& receipt = nullptr);
   // Publishes what is due, and ends sessions whose robots stayed away for too long.
   void Tick();
 
@@ -101,6 +102,7 @@ class Roster {
   Result<void> Replace(Session& session, const SessionRequest& request);
   void TellDisplaced(const SessionState& before, const SessionRequest& request);
   Result<void> Open(const SessionRequest& request);
+  void StoreQuiet() CAIRN_REQUIRES(mutex_);
   [[nodiscard]] std::string WhyNotRestored(const std::string& robot) const;
   [[nodiscard]] bool BeginsFragment(const SessionRequest& request, const Site& site) const CAIRN_REQUIRES(mutex_);
   std::shared_ptr<Session> Make(const StoredSession& stored, const std::shared_ptr<Site>& site,

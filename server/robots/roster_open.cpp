@@ -104,7 +104,8 @@ std::shared_ptr<Session> Roster::Make(const StoredSession& stored, const std::sh
       .id = id,
       .request = stored.request,
       .map_epoch = stored.map_epoch,
-      .estimator = {.mapper = mapper, .T_map_robot_start = StartOf(stored.request), .fragment = stored.fragment}};
+      .estimator = {.mapper = mapper, .T_map_robot_start = StartOf(stored.request), .fragment = stored.fragment},
+      .quiet_since_ms = stored.quiet_since_ms};
   SessionOutputs outputs{.send = [this](OutboundValue value) { return outbound_.Send(std::move(value)); },
                          .grid_changed = [site](GridChange&& change) { site->Change(std::move(change)); },
                          .store = {},

@@ -78,6 +78,7 @@ Result<void> Roster::Restore(StartControl& control) {
   {
     const MutexLock lock(mutex_);
     next_id_ = std::max(next_id_, *last + 1);
+    for (const auto& site : atlas_.All()) next_id_ = std::max(next_id_, site->LastSession() + 1);
     for (const SessionId id : *ids) {
       (marks->failed(id) == 0 ? others : doubtful).push_back(id);
     }

@@ -11,18 +11,14 @@
 namespace cairn::server {
 namespace {
 
-constexpr std::chrono::minutes kMapPeriod{10};  // A robot that is only localised gets a map that others draw so often.
 constexpr std::chrono::seconds kOpeningPatience{1};  // A robot waits this long for the disk when it opens a session.
-
-tl::unexpected<Status> TooMany() {
-  return cairn::Fail(StatusCode::kResourceExhausted, "too many commands wait for the robot's estimator");
-}
 
 }  // namespace
 
 Session::Session(const SessionSetup& setup, const RobotsOptions& options, asio::thread_pool& pool,
                  SessionOutputs outputs)
     : id_(setup.id),
+      stored_{setup.id, setup.request, setup.map_epoch, setup.estimator.fragment, setup.quiet_since_ms},
       outputs_(std::move(outputs)),
       record_(setup.id, setup.request, options),
       queue_(static_cast<std::size_t>(options.queue_scans), static_cast<std::size_t>(options.queue_odometry)),
@@ -103,48 +99,10 @@ void Session::RefuseStart(const std::string& why) {
   Schedule();
 }
 
-Result<void> Session::Relocalise(const std::optional<Pose2>& T_map_robot) {
-  if (ending_) return cairn::Fail(StatusCode::kFailedPrecondition, "the session has ended");
-  if (T_map_robot && record_.joining().fragment && !record_.localises())
-    return cairn::Fail(StatusCode::kFailedPrecondition,
-                       "the robot is not joined with the map of its site, so no pose in that map can be used");
-  if (!queue_.Push(RelocaliseWanted{T_map_robot})) return TooMany();
-  Schedule();
-  return {};
-}
-
-Result<void> Session::Localise(std::shared_ptr<const MapSnapshot> map) {
-  if (ending_) return cairn::Fail(StatusCode::kFailedPrecondition, "the session has ended");
-  const KnownMap known{map->info.epoch, map->info.version, SessionRecord::Clock::now()};
-  const MutexLock lock(known_map_mutex_);
-  if (!queue_.Push(LocaliseWanted{std::move(map), false})) return TooMany();
-  known_map_ = known;
-  Schedule();
-  return {};
-}
-
-Result<void> Session::MapAgain() {
-  if (ending_) return cairn::Fail(StatusCode::kFailedPrecondition, "the session has ended");
-  if (record_.joining().fragment)
-    return cairn::Fail(StatusCode::kFailedPrecondition,
-                       "the robot is not joined with the map of its site: it can only open a new session");
-  if (record_.localises() && !record_.snapshot().status.pose.localized)
-    return cairn::Fail(StatusCode::kFailedPrecondition, "the robot's place in the map is not known");
-  if (!queue_.Push(LocaliseWanted{nullptr, false})) return TooMany();
-  Schedule();
-  return {};
-}
-
-void Session::KeepUpWith(const std::shared_ptr<const MapSnapshot>& map) {
-  if (record_.phase() != SessionPhase::kActive) return;
-  const auto now = SessionRecord::Clock::now();
-  const MutexLock lock(known_map_mutex_);
-  const bool moved = !known_map_ || known_map_->epoch != map->info.epoch;
-  const bool drawn = known_map_ && known_map_->version != map->info.version && now - known_map_->given > kMapPeriod;
-  if (!moved && !drawn) return;
-  if (!queue_.Push(LocaliseWanted{map, true})) return;  // The next call tries again.
-  known_map_ = {map->info.epoch, map->info.version, now};
-  Schedule();
+std::optional<StoredSession> Session::TakeChangedStored() {
+  const std::uint64_t quiet_since_ms = record_.quiet_since_ms();
+  if (std::exchange(stored_.quiet_since_ms, quiet_since_ms) == quiet_since_ms) return std::nullopt;
+  return stored_;
 }
 
 void Session::SetLiveliness(bool alive) {
@@ -162,14 +120,18 @@ bool Session::Resume(ClientId client, SessionToken session) {
   return true;
 }
 
-void Session::End(const Status& reason) {
+void Session::End(const Status& reason, std::shared_ptr<Receipt> receipt) {
   if (ending_.exchange(true)) {
+    if (receipt) receipt->Taken();                                 // By the one that asked before.
     if (record_.phase() == SessionPhase::kEnded) AnnounceState();  // A repeated request gets the same answer.
     return;
   }
   Finish finish;
   finish.reason = reason;
-  finish.done = [self = shared_from_this(), reason] { self->Finished(SessionPhase::kEnded, reason); };
+  finish.done = [self = shared_from_this(), reason, receipt = std::move(receipt)] {
+    self->Finished(SessionPhase::kEnded, reason);
+    if (receipt) receipt->Taken();
+  };
   queue_.Push(std::move(finish));
   Schedule();
 }
@@ -227,7 +189,7 @@ void Session::Replay(JournalEntry&& entry, const SessionEstimator::Switched& swi
 
 void Session::Replayed() {
   if (!failed_) Throws([this] { estimator_.Replayed(); });
-  record_.Restored();
+  record_.Restored(stored_.quiet_since_ms);
   if (record_.phase() == SessionPhase::kEnded) ending_ = true;
   state_unsent_ = true;
 }

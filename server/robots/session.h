@@ -23,6 +23,7 @@ struct SessionSetup {
   SessionRequest request;
   std::uint32_t map_epoch = 0;
   EstimatorSetup estimator;
+  std::uint64_t quiet_since_ms = 0;  // SessionRecord::Restored.
 };
 
 class Session : public GridOwner, public std::enable_shared_from_this<Session> {
@@ -42,24 +43,31 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   // From now on it is a fragment: it is not where somebody said it starts.
   void RefuseStart(const std::string& why);
   // The robot has to be found in its map. FAILED_PRECONDITION: the session is ending, or a pose is given and the robot
-  // is not joined with the map. RESOURCE_EXHAUSTED: too many events wait.
-  [[nodiscard]] Result<void> Relocalise(const std::optional<Pose2>& T_map_robot);
+  // is not joined with the map. RESOURCE_EXHAUSTED: too many events wait. `receipt` tells when the estimator has it;
+  // null if nobody is to be told.
+  [[nodiscard]] Result<void> Relocalise(const std::optional<Pose2>& T_map_robot,
+                                        std::shared_ptr<Receipt> receipt = nullptr);
 
   // From now on the robot is only localised in this map, near where it is in the map or, if that is not known,
   // everywhere (slam::Mapper::LocaliseIn); MapAgain ends that. FAILED_PRECONDITION: the session is ending, or a robot
   // that is to map again is not joined with the map. RESOURCE_EXHAUSTED: too many events wait.
-  [[nodiscard]] Result<void> Localise(std::shared_ptr<const MapSnapshot> map);
-  [[nodiscard]] Result<void> MapAgain();
+  [[nodiscard]] Result<void> Localise(std::shared_ptr<const MapSnapshot> map,
+                                      std::shared_ptr<Receipt> receipt = nullptr);
+  [[nodiscard]] Result<void> MapAgain(std::shared_ptr<Receipt> receipt = nullptr);
   // Gives a robot that is only localised the map again: at once where its epoch is another one, and where others have
   // drawn, after some minutes.
   void KeepUpWith(const std::shared_ptr<const MapSnapshot>& map);
+
+  // What the store is to hold of the session itself, where that has changed since the last call. Thread rule: one
+  // thread.
+  [[nodiscard]] std::optional<StoredSession> TakeChangedStored();
 
   // The owner's liveliness lease was lost or came back: kSuspended or kActive.
   void SetLiveliness(bool alive);
   // Returns false if the session has ended meanwhile.
   bool Resume(ClientId client, SessionToken session);
   // The session finishes the scans that have arrived and then ends for good. Its state contains `reason`.
-  void End(const Status& reason = {});
+  void End(const Status& reason = {}, std::shared_ptr<Receipt> receipt = nullptr);
   // Like End, but the session is only suspended, because the server stops. `done` is always called, on the strand.
   void Suspend(const std::function<void()>& done);
   // Drops the scans still waiting; what is being estimated is finished.
@@ -116,6 +124,7 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   void Finished(SessionPhase phase, Status status);
 
   const SessionId id_;
+  StoredSession stored_;
   const SessionOutputs outputs_;
   SessionRecord record_;
   RobotQueue queue_;

@@ -242,6 +242,7 @@ void SessionEstimator::On(SnapshotWanted&& wanted) {
 void SessionEstimator::On(RelocaliseWanted&& wanted) {
   if (ended_) return;
   Store(RelocaliseTaken{wanted.T_map_robot});
+  if (wanted.receipt) wanted.receipt->Taken();
   pipeline_.mapper().Relocalise(wanted.T_map_robot);
   T_map_keyframe_.reset();
 }
@@ -256,6 +257,7 @@ void SessionEstimator::On(LocaliseWanted&& wanted) {
     wanted.map->tiles.ForEach(0, [&taken](const std::shared_ptr<const Tile>& tile) { taken.tiles.push_back(tile); });
   }
   Store(taken);
+  if (wanted.receipt) wanted.receipt->Taken();
   On(std::move(taken));
 }
 

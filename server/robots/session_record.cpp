@@ -231,6 +231,7 @@ bool SessionRecord::SetPhase(SessionPhase phase, Status status) {
   if (phase == SessionPhase::kActive && status_.session.phase != phase) active_ = Clock::now();
   if (phase == SessionPhase::kSuspended && status_.session.phase != phase) suspended_ = Clock::now();
   if (phase == SessionPhase::kEnded) ended_ = Clock::now();
+  if (status_.session.phase != phase) quiet_since_ms_ = phase == SessionPhase::kActive ? 0 : MillisecondsNow();
   status_.session.phase = phase;
   status_.session.status = std::move(status);
   return true;
@@ -265,6 +266,7 @@ bool SessionRecord::Resume(ClientId client, SessionToken session) {
   status_.session.client = client;
   status_.session.session = session;
   status_.session.phase = SessionPhase::kActive;
+  quiet_since_ms_ = 0;
   status_.session.status = {};
   status_.alive = true;
   return true;
@@ -312,6 +314,22 @@ SessionState SessionRecord::StateNow() const {
 SessionRecord::Clock::duration SessionRecord::SuspendedFor(Clock::time_point now) const {
   const MutexLock lock(mutex_);
   return status_.session.phase == SessionPhase::kSuspended ? now - suspended_ : Clock::duration::zero();
+}
+
+bool SessionRecord::HasHadTime(Clock::time_point now) const {
+  const MutexLock lock(mutex_);
+  return !restored_ || now - *restored_ >= std::chrono::hours(1);
+}
+
+std::uint64_t SessionRecord::MillisecondsNow() {
+  const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
+  return static_cast<std::uint64_t>(
+      std::max<std::int64_t>(0, std::chrono::duration_cast<std::chrono::milliseconds>(since_1970).count()));
+}
+
+std::uint64_t SessionRecord::quiet_since_ms() const {
+  const MutexLock lock(mutex_);
+  return quiet_since_ms_;
 }
 
 SessionRecord::Clock::duration SessionRecord::EndedFor(Clock::time_point now) const {

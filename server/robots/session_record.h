@@ -77,8 +77,14 @@ class SessionRecord {
   [[nodiscard]] bool Save(slam::StateWriter& writer, const WaitingScans& in_estimator) const;
   // DATA_LOSS: the bytes are damaged; the record must then not be used.
   [[nodiscard]] Result<void> Load(slam::StateReader& reader, const WaitingScans& in_estimator);
-  // Called after the record was read from the disk, while the robot is not connected yet.
-  void Restored();
+  // Called after the record was read from the disk, while the robot is not connected yet. `quiet_since_ms`: what
+  // quiet_since_ms said last; 0: not known.
+  void Restored(std::uint64_t quiet_since_ms = 0);
+  // Whether its robot has had an hour to come back since the server was started. Clocks may be wrong.
+  [[nodiscard]] bool HasHadTime(Clock::time_point now) const;
+  // Since when the robot is away or the session has ended, in milliseconds since 1970; 0: neither.
+  [[nodiscard]] static std::uint64_t MillisecondsNow();
+  [[nodiscard]] std::uint64_t quiet_since_ms() const;
   [[nodiscard]] std::vector<std::string> sensors() const;
 
   void SetLandmarks(std::vector<LandmarkReport> landmarks);
@@ -160,6 +166,8 @@ class SessionRecord {
   Clock::time_point active_ CAIRN_GUARDED_BY(mutex_);       // Start of the activity, if active.
   Clock::time_point suspended_ CAIRN_GUARDED_BY(mutex_);    // Start of the suspension, if suspended.
   Clock::time_point ended_ CAIRN_GUARDED_BY(mutex_);        // If it has ended.
+  std::uint64_t quiet_since_ms_ CAIRN_GUARDED_BY(mutex_) = 0;
+  std::optional<Clock::time_point> restored_ CAIRN_GUARDED_BY(mutex_);
   std::map<NameId, Stream> streams_ CAIRN_GUARDED_BY(mutex_);
   Stream odometry_ CAIRN_GUARDED_BY(mutex_);
   PoseHistory history_ CAIRN_GUARDED_BY(mutex_);

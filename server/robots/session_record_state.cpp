@@ -81,7 +81,7 @@ bool SessionRecord::StoredAgain(std::uint64_t position) {
   return true;
 }
 
-void SessionRecord::Restored() {
+void SessionRecord::Restored(std::uint64_t quiet_since_ms) {
   const MutexLock lock(mutex_);
   status_.session.durable = storing_ = true;
   status_.alive = false;
@@ -90,6 +90,11 @@ void SessionRecord::Restored() {
     status_.session.status = {StatusCode::kUnavailable, "the server was started again, and the robot is not back yet"};
     suspended_ = Clock::now();
   }
+  // It has been away for as long as it was before the start, so that it ages also where servers start often.
+  restored_ = Clock::now();
+  const std::uint64_t now_ms = MillisecondsNow();
+  quiet_since_ms_ = quiet_since_ms == 0 || quiet_since_ms > now_ms ? now_ms : quiet_since_ms;
+  suspended_ = ended_ = Clock::now() - std::chrono::milliseconds(now_ms - quiet_since_ms_);
   const auto restore = [](Stream& stream) {
     stream.account.Restored();
     stream.resuming = stream.changed = true;

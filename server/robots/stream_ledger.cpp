@@ -166,11 +166,12 @@ std::optional<StreamLedger> StreamLedger::AsJournaled(const std::set<std::uint64
 
 // The reverse of Received. REQUIRES: the sample waits, and no later sample remains to be taken back.
 bool StreamLedger::TakeBack(std::uint64_t sequence) {
-  if (sequence <= first_sequence_ || gaps_.size() >= kMaxGaps) return false;
+  const bool leaves_gap = sequence < ledger_.last_sequence;
+  if (sequence <= first_sequence_ || (leaves_gap && gaps_.size() >= kMaxGaps)) return false;
   --ledger_.received;
   --ledger_.waiting;
   waiting_.erase(sequence);
-  if (sequence < ledger_.last_sequence) {
+  if (leaves_gap) {
     gaps_.emplace(sequence, sequence);
     ++Count(ledger_, DropReason::kLostOnWire);
     return true;

@@ -14,6 +14,7 @@
 namespace cairn::server {
 namespace {
 
+constexpr std::chrono::seconds kStartLasts{10};      // The robot may be elsewhere when it is opened later.
 constexpr std::chrono::seconds kFresh{2};            // Odometry that is older does not open a session.
 constexpr std::chrono::seconds kTryAgain{1};         // After a refusal that will pass by itself.
 constexpr std::chrono::seconds kTryLater{5};         // After any other.
@@ -154,7 +155,7 @@ void RobotStream::TakeTransformOdometry(const ros2::Transforms& message, bool it
   }
 }
 
-void RobotStream::TakeStart(const ros2::PoseWithCovariance& message) {
+void RobotStream::TakeStart(const ros2::PoseWithCovariance& message, Clock::time_point now) {
   const auto motion = ros2::MotionOf(message.pose);
   const bool in_map = message.header.frame == options_.map_frame;
   if (!motion || !in_map || !ValidateStart(ros2::PlanarPart(*motion))) {
@@ -163,6 +164,7 @@ void RobotStream::TakeStart(const ros2::PoseWithCovariance& message) {
     return;
   }
   start_ = ros2::PlanarPart(*motion);
+  start_received_ = now;
   // The present session is left, so that a new one may begin at the pose (robots/roster.h).
   if (phase_ == Phase::kOpen) Push(ClientLiveliness{client_, false});
   phase_ = Phase::kWaiting;
@@ -178,6 +180,11 @@ void RobotStream::OpenIfComplete(Clock::time_point now) {
   const bool mounted =
       std::any_of(lidars_.begin(), lidars_.end(), [](const auto& one) { return one.second.mounting.has_value(); });
   if (!mounted || !odometry_is_fresh(now)) return;
+  if (start_ && now - start_received_ > kStartLasts) {
+    spdlog::warn("ROS 2: an initial pose of {} is not used, because its session could not be opened within {} s",
+                 place_.robot, kStartLasts.count());
+    start_.reset();
+  }
   if (client_ == 0) client_ = DrawId();
   session_ = DrawId();
   for (auto& [topic, lidar] : lidars_) lidar.numbers.Restart();

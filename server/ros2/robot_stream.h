@@ -41,7 +41,7 @@ class RobotStream {
   // name.
   void TakeShared(const ros2::Transforms& message, bool its_own, const ros2::Origin& origin, Clock::time_point now);
   // The robot is here now: the session, if one is open, ends, and a new one begins at this pose.
-  void TakeStart(const ros2::PoseWithCovariance& message);
+  void TakeStart(const ros2::PoseWithCovariance& message, Clock::time_point now);
 
   // From the server.
   void Take(const SessionState& state, Clock::time_point now);
@@ -115,6 +115,7 @@ class RobotStream {
   ClientId client_ = 0;
   SessionToken session_ = 0;
   std::optional<Pose2> start_;
+  Clock::time_point start_received_{};
   std::string why_refused_;
   Clock::time_point try_again_{};
   bool scans_published_ = false;

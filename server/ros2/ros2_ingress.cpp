@@ -206,7 +206,7 @@ void Ros2Ingress::Subscribe(const std::string& name, Namespace& one) {
     } else if (stream == kInitialPose) {
       Keep<ros2::PoseWithCovariance>(
           wire_name, topic, 1, false,
-          counted([](RobotStream& to, auto&& message, const ros2::Origin&) { to.TakeStart(message); }));
+          counted([](RobotStream& to, auto&& message, const ros2::Origin&) { to.TakeStart(message, Clock::now()); }));
     }
   }
 }

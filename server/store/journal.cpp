@@ -54,13 +54,13 @@ void Journal::Stop() {
 void Journal::Open(const StoredSession& session, Durable durable) {
   const MutexLock lock(mutex_);
   Line& line = lines_[session.id] = Line{.next = 1, .durable = std::move(durable)};
+  line.unwritten = session;
   const RecordKey key{RecordKind::kSession, session.id, 0};
   // Nothing that an earlier session of this number may have left can become a part of this one.
   if (RemoveStatesOf(session.id, 1024, Room::kForSamples)) {
     // The caller is told as soon as the session itself is on the disk.
     Push(Written{key, [session] { return BytesOf(session); }}, 0);
   } else {
-    line.unwritten = session;
     Lose(session.id, line, kTooSlow);
   }
   urgent_ = true;
@@ -116,7 +116,7 @@ bool Journal::Checkpoint(std::uint64_t session, std::uint64_t position, Content 
 std::uint64_t Journal::Recover(std::uint64_t session) {
   const MutexLock lock(mutex_);
   const auto found = lines_.find(session);
-  if (found == lines_.end() || found->second.lost.empty() || ended_ || !disk_fault_.empty()) return 0;
+  if (found == lines_.end() || found->second.lost.empty() || !disk_fault_.empty()) return 0;
   Line& line = found->second;
   // A checkpoint that was asked for before has another position.
   if (line.checkpointing || !HasRoom(BytesOfQueue() / 2, Room::kForSamples)) return 0;
@@ -155,9 +155,7 @@ void Journal::Lose(std::uint64_t session, Line& line, std::string why) {
 
 // The checkpoint is on the disk, so what came after it can follow. What is before it has a gap.
 void Journal::ReleaseHeld(std::uint64_t session, Line& line) {
-  const std::uint64_t position = std::exchange(line.recovers_at, 0);
-  Push(RecordRange{.kind = RecordKind::kJournal, .owner = session, .first = 0, .last = position}, 64,
-       Room::kWithReserve);
+  line.recovers_at = 0;
   std::erase_if(held_, [&](Appended& appended) CAIRN_NO_THREAD_SAFETY_ANALYSIS {
     if (appended.session != session) return false;
     const std::size_t size = SizeOf(appended.entry);
@@ -186,11 +184,17 @@ void Journal::Between(Work work) {
   arrived_.NotifyAll();
 }
 
+void Journal::WhenStored(std::function<void()> told) {
+  const MutexLock lock(mutex_);
+  told_.push_back(std::move(told));
+  urgent_ = true;
+  arrived_.NotifyAll();
+}
+
 void Journal::Forget(std::uint64_t session) {
   const MutexLock lock(mutex_);
   CloseLocked(session);
-  if (RemoveStatesOf(session, 256, Room::kWithReserve))
-    Push(AllOf(RecordKind::kSession, session), 0, Room::kWithReserve);
+  Push(Forgotten{session}, 256, Room::kWithReserve);
 }
 
 // Removes what belongs to a session besides its own record. `size` is that of the whole change, so that what follows
@@ -198,7 +202,7 @@ void Journal::Forget(std::uint64_t session) {
 bool Journal::RemoveStatesOf(std::uint64_t session, std::size_t size, Room room) {
   if (!Push(AllOf(RecordKind::kJournal, session), size, room)) return false;
   return Push(AllOf(RecordKind::kCheckpoint, session), 0, room) &&
-         Push(AllOf(RecordKind::kRestoring, session), 0, room);
+         Push(AllOf(RecordKind::kRestoring, session), 0, room) && Push(AllOf(RecordKind::kRemoved, session), 0, room);
 }
 
 void Journal::Put(const RecordKey& key, Bytes bytes, std::size_t size) {
@@ -209,6 +213,20 @@ void Journal::Put(const RecordKey& key, Bytes bytes, std::size_t size) {
 void Journal::Remove(const RecordRange& range) {
   const MutexLock lock(mutex_);
   Push(range, 64, Room::kWithReserve);
+}
+
+bool Journal::Apply(Edit edit) {
+  constexpr std::size_t kSize = 1024;
+  const MutexLock lock(mutex_);
+  for (const std::uint64_t session : edit.forgotten) CloseLocked(session);
+  if (!HasRoom(kSize * (edit.put.size() + 1), Room::kWithReserve)) {
+    left_out_ = kTooSlow;
+    return false;
+  }
+  for (const RecordRange& range : edit.removed) Push(range, 0, Room::kWithReserve);
+  for (auto& [key, bytes] : edit.put) Push(Written{key, std::move(bytes)}, kSize, Room::kWithReserve);
+  for (const std::uint64_t session : edit.forgotten) Push(Forgotten{session}, 0, Room::kWithReserve);
+  return true;
 }
 
 std::size_t Journal::BytesOfQueue() const {
@@ -244,8 +262,9 @@ JournalHealth Journal::health() const {
       lost = "what a session has done while the disk failed is not on the disk yet";
   }
   for (const std::string& reason : {disk_fault_, left_out_, lost, checkpoint_fault_})
-    if (!reason.empty()) return {.degraded = true, .reason = reason, .over_budget = over_budget_};
-  return {.degraded = false, .reason = {}, .over_budget = over_budget_};
+    if (!reason.empty())
+      return {.degraded = true, .reason = reason, .disk_fails = !disk_fault_.empty(), .over_budget = over_budget_};
+  return {.degraded = false, .reason = {}, .disk_fails = false, .over_budget = over_budget_};
 }
 
 JournalCounts Journal::counts() const {

@@ -9,8 +9,10 @@
 // session is stored again with a checkpoint of its present state (Recover). A record that is longer than the store can
 // hold is left out in the same way; it must not keep others from being written.
 // Over store.max_gib the journal before a checkpoint is removed, of the session that was begun first, then of the next.
-// A journal is removed as a whole up to the checkpoint, because a rest of it could not be processed again. Thread rule:
-// any thread; Start and Stop from one.
+// A journal is removed as a whole up to the checkpoint, because a rest of it could not be processed again.
+// Journals and checkpoints that nobody needs are removed piece by piece, each in a commit of its own, from the first
+// record on. If the process ends meanwhile, the next one removes what is left of sessions that are gone.
+// Thread rule: any thread; Start and Stop from one.
 #pragma once
 
 #include <chrono>
@@ -21,6 +23,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -36,6 +39,7 @@ namespace cairn::server {
 struct JournalHealth {
   bool degraded = false;
   std::string reason;
+  bool disk_fails = false;   // The last commit failed.
   bool over_budget = false;  // The store is larger than store.max_gib, and everything in it is needed.
 };
 
@@ -92,18 +96,30 @@ class Journal {
   [[nodiscard]] bool IsCheckpointing(std::uint64_t session) const;
   // Nothing of the session is written any more, and what is stored of it stays.
   void Close(std::uint64_t session);
-  // Removes all records of a session that will not be restored.
+  // Removes all records of a session that will not be restored, the large ones after the others.
   void Forget(std::uint64_t session);
 
   // Writes or replaces a record. `size` is an estimate of its bytes, for the bound of the queue.
   void Put(const RecordKey& key, Bytes bytes, std::size_t size = 1024);
   void Remove(const RecordRange& range);
+  // Several of these in one commit: first the removals. Each record counts with 1,024 bytes. Returns false, and does
+  // nothing, if there is no room for all.
+  struct Edit {
+    std::vector<RecordRange> removed;
+    std::vector<std::pair<RecordKey, Bytes>> put;
+    std::vector<std::uint64_t> forgotten;  // Sessions: Forget.
+  };
+  bool Apply(Edit edit);
 
   // Calls `work` on the journal's thread when everything that was handed over before is on the disk. Nothing else is
   // written until it returns, so it sees the store at one moment, and its own commit is the only one. What comes
   // meanwhile waits. `work` is destroyed without a call if the journal stops before.
   using Work = std::function<void(Store&)>;
   void Between(Work work);
+  // Calls `told` on the journal's thread when everything that was handed over before is on the disk, and sees to it
+  // that this is soon; also where that fails, because a disk that fails may do so for long. `told` is destroyed without
+  // a call if the journal stops before.
+  void WhenStored(std::function<void()> told);
 
   [[nodiscard]] Store& store() { return store_; }
   // What was not restored from this store.
@@ -118,7 +134,7 @@ class Journal {
     std::uint64_t next = 1;
     std::string lost = {};          // Why nothing of it is stored any more; empty: it is.
     std::uint64_t recovers_at = 0;  // Where it is stored again: the position of its checkpoint. 0: it is stored.
-    std::optional<StoredSession> unwritten = {};  // The session itself, if there was no room even for that.
+    std::optional<StoredSession> unwritten = {};  // The session itself, until it is on the disk.
     bool checkpointing = false;
     std::uint64_t checkpointed = 0;  // Position of the newest complete checkpoint.
     StoredPieces pieces = {};        // Those of the newest complete checkpoint.
@@ -133,7 +149,10 @@ class Journal {
     RecordKey key;
     Bytes bytes;
   };
-  using Change = std::variant<Appended, Written, RecordRange>;
+  struct Forgotten {
+    std::uint64_t session = 0;
+  };
+  using Change = std::variant<Appended, Written, RecordRange, Forgotten>;
   struct Batch {
     std::uint64_t first = 0;
     std::vector<JournalEntry> entries;
@@ -141,6 +160,8 @@ class Journal {
   struct Prepared {
     RecordChanges changes;
     std::map<std::uint64_t, Batch> batches;  // By session; empty where only the session itself is new.
+    std::vector<std::uint64_t> forgotten;    // Sessions of which the large records are to be removed later.
+    [[nodiscard]] bool empty() const { return changes.removed.empty() && changes.put.empty() && batches.empty(); }
   };
   struct WantedCheckpoint {
     std::uint64_t session = 0;
@@ -152,6 +173,7 @@ class Journal {
   struct Group {
     std::deque<Change> changes;
     std::vector<Work> works;  // After the commit.
+    std::vector<std::function<void()>> told;
     std::optional<WantedCheckpoint> checkpoint;
     Clock::time_point oldest;
   };
@@ -167,6 +189,11 @@ class Journal {
   bool RemoveStatesOf(std::uint64_t session, std::size_t size, Room room) CAIRN_REQUIRES(mutex_);
   bool Push(Change change, std::size_t size, Room room = Room::kForSamples) CAIRN_REQUIRES(mutex_);
   void Run(const std::stop_token& stop);
+  [[nodiscard]] bool RunOnce(Group&& group, const std::stop_token& stop);
+  void StartOver(const std::string& why) CAIRN_EXCLUDES(mutex_);
+  void FindRests();
+  void TellOrders();
+  void RemovePiece() CAIRN_EXCLUDES(mutex_);
   std::optional<Group> Next(const std::stop_token& stop);
   static Prepared Prepare(Group&& group);
   void LeaveOutTooLong(Prepared& prepared) CAIRN_EXCLUDES(mutex_);
@@ -178,7 +205,7 @@ class Journal {
   bool CommitPatiently(const RecordChanges& changes, const std::stop_token& stop);
   void Tell(const Prepared& prepared, Clock::time_point oldest);
   void EndCheckpoint() CAIRN_EXCLUDES(mutex_);
-  void KeepBudget();
+  void KeepBudget() CAIRN_EXCLUDES(mutex_);
 
   Store& store_;
   const StoreOptions options_;
@@ -196,18 +223,22 @@ class Journal {
   bool urgent_ CAIRN_GUARDED_BY(mutex_) = false;
   std::string disk_fault_ CAIRN_GUARDED_BY(mutex_);        // Why the last commit failed; empty if it did not.
   std::string left_out_ CAIRN_GUARDED_BY(mutex_);          // What else than a session is no longer stored, and why.
-  bool ended_ CAIRN_GUARDED_BY(mutex_) = false;            // The thread ended with an exception.
   std::string checkpoint_fault_ CAIRN_GUARDED_BY(mutex_);  // Why the last checkpoint is missing.
   bool over_budget_ CAIRN_GUARDED_BY(mutex_) = false;
   JournalCounts counts_ CAIRN_GUARDED_BY(mutex_);
   std::deque<float> delays_ms_ CAIRN_GUARDED_BY(mutex_);
   std::deque<WantedCheckpoint> checkpoints_ CAIRN_GUARDED_BY(mutex_);
   std::vector<Work> works_ CAIRN_GUARDED_BY(mutex_);
+  std::vector<std::function<void()>> told_ CAIRN_GUARDED_BY(mutex_);
 
   // Used by the thread only.
   std::optional<CheckpointWriter> writing_;
   Done written_;  // Told what became of that.
   Clock::time_point budget_checked_{};
+  bool rests_known_ = false;
+  std::vector<std::function<void()>> telling_;  // Of WhenStored.
+  std::deque<RecordRange> unwanted_;            // What is removed piece by piece.
+  Clock::time_point next_piece_{};              // Later where the disk fails.
 
   std::jthread thread_;  // The last member: it stops before the members it uses are destroyed.
 };

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "server/store/journal.h"
+#include "server/store/site_contents.h"
 
 namespace cairn::server {
 namespace {
@@ -12,50 +13,125 @@ namespace {
 constexpr auto kRetry = std::chrono::seconds(1);
 constexpr auto kBudgetPeriod = std::chrono::seconds(10);
 constexpr std::size_t kMaxDelays = 4096;
+constexpr int kPiecesAtStop = 20;
 
 }  // namespace
 
 void Journal::Run(const std::stop_token& stop) {
   while (auto group = Next(stop)) {
-    const Clock::time_point oldest = group->oldest;
     try {
-      const std::vector<Work> works = std::move(group->works);
-      std::optional<WantedCheckpoint> wanted = std::move(group->checkpoint);
-      Prepared prepared = Prepare(std::move(*group));
-      LeaveOutTooLong(prepared);
-      DropForgottenCheckpoint();
-      if (!stop.stop_requested()) WriteCheckpoint(std::move(wanted), prepared.changes);
-      if (!CommitPatiently(prepared.changes, stop)) return;
-      Tell(prepared, oldest);
-      if (writing_ && writing_->complete()) {
-        EndCheckpoint();
-        if (const auto written = std::exchange(written_, nullptr)) written(true);
-        budget_checked_ = {};  // The journal before it may be removed now.
-      }
-      for (const Work& work : works) work(store_);
-      KeepBudget();
-    } catch (const std::exception& error) {  // For example, not enough memory for the group: the journal ends here.
-      const MutexLock lock(mutex_);
-      left_out_ = std::string("the journal ended with an exception: ") + error.what();
-      ended_ = true;
-      for (auto& [session, line] : lines_) Lose(session, line, left_out_);
+      if (!RunOnce(std::move(*group), stop)) return;
+    } catch (const std::exception& error) {  // For example, not enough memory for the group.
+      StartOver(std::string("the journal lost changes by an exception: ") + error.what());
+    }
+  }
+  // The rest is for the next start.
+  for (int pieces = 0; pieces < kPiecesAtStop && !unwanted_.empty() && Clock::now() >= next_piece_; ++pieces)
+    RemovePiece();
+}
+
+// Returns false if the group could not be written before the stop: what comes after it must not be on the disk.
+bool Journal::RunOnce(Group&& group, const std::stop_token& stop) {
+  const Clock::time_point oldest = group.oldest;
+  const std::vector<Work> works = std::move(group.works);
+  std::ranges::move(group.told, std::back_inserter(telling_));
+  std::optional<WantedCheckpoint> wanted = std::move(group.checkpoint);
+  Prepared prepared = Prepare(std::move(group));
+  LeaveOutTooLong(prepared);
+  DropForgottenCheckpoint();
+  if (!stop.stop_requested()) WriteCheckpoint(std::move(wanted), prepared.changes);
+  if (!prepared.empty() && !CommitPatiently(prepared.changes, stop)) return false;
+  Tell(prepared, oldest);
+  for (const std::uint64_t session : prepared.forgotten)
+    std::ranges::move(RangesOfRemoved(session), std::back_inserter(unwanted_));
+  if (writing_ && writing_->complete()) {
+    EndCheckpoint();
+    if (const auto written = std::exchange(written_, nullptr)) written(true);
+    budget_checked_ = {};  // The journal before it may be removed now.
+  }
+  TellOrders();
+  for (const Work& work : works) work(store_);
+  // At first, and after works, which may have deleted sessions.
+  if (!std::exchange(rests_known_, true) || !works.empty()) FindRests();
+  RemovePiece();
+  KeepBudget();
+  return true;
+}
+
+// After an exception, from which nothing tells what of a group is on the disk: no session is stored from here on, until
+// it is stored again with a checkpoint (Recover).
+void Journal::StartOver(const std::string& why) {
+  const Done written = std::exchange(written_, nullptr);
+  writing_.reset();
+  {
+    const MutexLock lock(mutex_);
+    committing_bytes_ = 0;
+    left_out_ = why;
+    for (auto& [session, line] : lines_) {
+      line.checkpointing = false;
+      Lose(session, line, why);
+    }
+    std::erase_if(queue_, [](const Change& change) { return std::holds_alternative<Appended>(change); });
+  }
+  if (written) written(false);
+  TellOrders();
+}
+
+void Journal::FindRests() {
+  const auto removed = store_.Owners(RecordKind::kRemoved);
+  if (!removed) return;  // The disk fails; the next start finds them.
+  for (const std::uint64_t session : *removed)
+    std::ranges::move(RangesOfRemoved(session), std::back_inserter(unwanted_));
+}
+
+void Journal::TellOrders() {
+  for (const auto& tell : std::exchange(telling_, {})) tell();
+}
+
+// A new session may have the number of one that is gone only after nothing is left of it, but an open one is safe here
+// in any case.
+void Journal::RemovePiece() {
+  if (unwanted_.empty() || Clock::now() < next_piece_) return;
+  const RecordRange& range = unwanted_.front();
+  {
+    const MutexLock lock(mutex_);
+    const auto line = lines_.find(range.owner);
+    if (line != lines_.end() && range.last > line->second.checkpointed) {
+      unwanted_.pop_front();
       return;
     }
   }
+  const std::size_t piece = RemovedAtOnce(range.kind);
+  const auto removed = store_.RemoveFirst(range, piece);
+  if (removed) {
+    if (*removed < piece) unwanted_.pop_front();
+    return;
+  }
+  next_piece_ = Clock::now() + kRetry;
+  // What cannot be removed for another reason than a full disk must not stop the others. The next start tries it again.
+  if (removed.error().code != StatusCode::kResourceExhausted) unwanted_.pop_front();
 }
 
 std::optional<Journal::Group> Journal::Next(const std::stop_token& stop) {
   const auto delay = std::chrono::milliseconds(options_.commit_delay_ms);
   const MutexLock lock(mutex_);
-  while (queue_.empty() && checkpoints_.empty() && works_.empty() && !writing_ && !stop.stop_requested())
-    arrived_.Wait(mutex_);
+  while (queue_.empty() && checkpoints_.empty() && works_.empty() && told_.empty() && !writing_ &&
+         !stop.stop_requested()) {
+    if (unwanted_.empty()) {
+      arrived_.Wait(mutex_);
+    } else if (Clock::now() < next_piece_) {
+      arrived_.WaitUntil(mutex_, next_piece_);
+    } else {
+      break;
+    }
+  }
   if (queue_.empty() && stop.stop_requested()) return std::nullopt;
   const auto due = oldest_ + delay;
   while (!queue_.empty() && !urgent_ && !writing_ && !stop.stop_requested() && Clock::now() < due)
     arrived_.WaitUntil(mutex_, due);
   urgent_ = false;
   committing_bytes_ = std::exchange(queued_bytes_, 0);
-  Group group{std::exchange(queue_, {}), std::exchange(works_, {}), std::nullopt, oldest_};
+  Group group{std::exchange(queue_, {}), std::exchange(works_, {}), std::exchange(told_, {}), std::nullopt, oldest_};
   // Together with the queue: the entries before a checkpoint are in this group or in an earlier one.
   if (!writing_ && !checkpoints_.empty()) {
     group.checkpoint = std::move(checkpoints_.front());
@@ -84,6 +160,14 @@ Journal::Prepared Journal::Prepare(Group&& group) {
       });
       if (range->kind == RecordKind::kJournal) batches.erase(range->owner);
       prepared.changes.removed.push_back(*range);
+    } else if (const auto* const forgotten = std::get_if<Forgotten>(&change)) {
+      const std::uint64_t session = forgotten->session;
+      put.erase({RecordKind::kSession, session, 0});
+      batches.erase(session);
+      prepared.forgotten.push_back(session);
+      for (const RecordKind kind : {RecordKind::kSession, RecordKind::kRestoring})
+        prepared.changes.removed.push_back({.kind = kind, .owner = session});
+      put[MarkOfRemoved(session).key] = MarkOfRemoved(session).bytes;
     }
   }
   for (const auto& [session, batch] : batches) {
@@ -154,16 +238,13 @@ void Journal::WriteCheckpoint(std::optional<WantedCheckpoint> wanted, RecordChan
 }
 
 // What belongs to the checkpoint of Recover, in one commit with it: the session itself, if it is not there yet, because
-// with neither checkpoint nor journal it would begin where its robot once stood; and without the journal before it,
-// which has a gap.
+// with neither checkpoint nor journal it would begin where its robot once stood.
 void Journal::AddRecovered(std::uint64_t session, RecordChanges& changes) {
   const MutexLock lock(mutex_);
   const auto line = lines_.find(session);
   if (line == lines_.end() || line->second.recovers_at != writing_->position()) return;
   if (line->second.unwritten)
     changes.put.push_back({{RecordKind::kSession, session, 0}, BytesOf(*line->second.unwritten)});
-  changes.removed.push_back(
-      {.kind = RecordKind::kJournal, .owner = session, .first = 0, .last = line->second.recovers_at});
 }
 
 void Journal::BeginCheckpoint(WantedCheckpoint wanted) {
@@ -188,6 +269,8 @@ bool Journal::CommitOnce(const RecordChanges& changes) {
 
 bool Journal::CommitPatiently(const RecordChanges& changes, const std::stop_token& stop) {
   while (!CommitOnce(changes)) {
+    TellOrders();   // That it fails can be seen in the status.
+    RemovePiece();  // Where the disk is full, this makes room.
     const auto again = Clock::now() + kRetry;
     const MutexLock lock(mutex_);
     while (!stop.stop_requested() && Clock::now() < again) arrived_.WaitUntil(mutex_, again);
@@ -201,12 +284,15 @@ void Journal::Tell(const Prepared& prepared, Clock::time_point oldest) {
   {
     const MutexLock lock(mutex_);
     committing_bytes_ = 0;
+    if (prepared.empty()) return;
     delays_ms_.push_back(std::chrono::duration<float, std::milli>(Clock::now() - oldest).count());
     if (delays_ms_.size() > kMaxDelays) delays_ms_.pop_front();
     for (const auto& [session, batch] : prepared.batches) {
       counts_.entries += batch.entries.size();
       const auto line = lines_.find(session);
-      if (line != lines_.end() && line->second.durable) told.emplace_back(line->second.durable, &batch);
+      if (line == lines_.end()) continue;
+      line->second.unwritten.reset();
+      if (line->second.durable) told.emplace_back(line->second.durable, &batch);
     }
   }
   for (const auto& [durable, batch] : told) durable(batch->entries);
@@ -221,6 +307,8 @@ void Journal::EndCheckpoint() {
     line->second.pieces = writing_->pieces();
     if (line->second.recovers_at == writing_->position()) {
       line->second.unwritten.reset();
+      // The journal before it has a gap.
+      unwanted_.push_back({.kind = RecordKind::kJournal, .owner = writing_->session(), .last = writing_->position()});
       ReleaseHeld(writing_->session(), line->second);
     }
   }
@@ -229,26 +317,28 @@ void Journal::EndCheckpoint() {
 }
 
 void Journal::KeepBudget() {
-  if (Clock::now() - budget_checked_ < kBudgetPeriod) return;
+  if (!unwanted_.empty() || Clock::now() - budget_checked_ < kBudgetPeriod) return;
   budget_checked_ = Clock::now();
-  const std::uint64_t limit = BytesOf(options_.max_gib);
+  const auto used = store_.bytes_used();
+  if (!used) return;
+  bool over = *used > BytesOf(options_.max_gib);
   std::map<std::uint64_t, std::uint64_t> checkpointed;
   {
     const MutexLock lock(mutex_);
     for (const auto& [session, line] : lines_) checkpointed.emplace(session, line.checkpointed);
   }
   for (const auto& [session, position] : checkpointed) {
-    const auto used = store_.bytes_used();
-    if (!used) return;
-    if (*used <= limit) break;
-    if (position == 0) continue;
-    CommitOnce(
-        {.removed = {{.kind = RecordKind::kJournal, .owner = session, .first = 0, .last = position}}, .put = {}});
+    if (!over || position == 0) continue;
+    const RecordRange range{.kind = RecordKind::kJournal, .owner = session, .first = 0, .last = position};
+    const auto removed = store_.RemoveFirst(range, RemovedAtOnce(range.kind));
+    if (!removed) continue;
+    if (*removed == 0) continue;
+    unwanted_.push_back(range);
+    budget_checked_ = {};  // It may be enough.
+    over = false;
   }
-  const auto used = store_.bytes_used();
-  if (!used) return;
   const MutexLock lock(mutex_);
-  over_budget_ = *used > limit;
+  over_budget_ = over;
 }
 
 }  // namespace cairn::server

@@ -41,14 +41,18 @@ std::string BytesOf(const StoredSession& session) {
   Fill(*to.mutable_request(), session.request);
   to.set_map_epoch(session.map_epoch);
   to.set_fragment(session.fragment);
+  to.set_quiet_since_ms(session.quiet_since_ms);
   return to.SerializeAsString();
 }
 
 Result<StoredSession> SessionOf(std::string_view bytes) {
   record::Session from;
   if (!Parse(from, bytes)) return Unreadable("a session");
-  StoredSession session{
-      .id = from.id(), .request = ValueOf(from.request()), .map_epoch = from.map_epoch(), .fragment = from.fragment()};
+  StoredSession session{.id = from.id(),
+                        .request = ValueOf(from.request()),
+                        .map_epoch = from.map_epoch(),
+                        .fragment = from.fragment(),
+                        .quiet_since_ms = from.quiet_since_ms()};
   const bool valid = session.id != 0 && ValidateName("robot", session.request.robot) &&
                      ValidateName("site", session.request.site) &&
                      (!session.request.has_start || ValidateStart(session.request.T_map_robot_start));
@@ -110,6 +114,7 @@ std::string BytesOf(const StoredSite& site) {
   to.set_resolution_m(site.resolution_m);
   for (const std::uint64_t session : site.fragments) to.add_fragments(session);
   for (const std::uint64_t session : site.past) to.add_past(session);
+  for (const std::uint64_t session : site.merged) to.add_merged(session);
   return to.SerializeAsString();
 }
 
@@ -126,7 +131,8 @@ Result<StoredSite> SiteOf(std::string_view bytes) {
                   .members = {},
                   .resolution_m = from.resolution_m(),
                   .fragments = {from.fragments().begin(), from.fragments().end()},
-                  .past = {from.past().begin(), from.past().end()}};
+                  .past = {from.past().begin(), from.past().end()},
+                  .merged = {from.merged().begin(), from.merged().end()}};
   if (!(site.resolution_m >= 0.0 && site.resolution_m <= 10.0)) return Unreadable("a site");
   for (const auto& made : from.switches()) site.switches[made.epoch()] = made.generation();
   for (const auto& member : from.members()) site.members[member.robot_id()] = member.session();

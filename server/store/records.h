@@ -99,6 +99,8 @@ struct StoredSession {
   SessionRequest request;
   std::uint32_t map_epoch = 0;
   bool fragment = false;  // It began without being joined with the map of the site.
+  // Since when its robot is away, or it has ended: milliseconds since 1970. 0: neither, or not known.
+  std::uint64_t quiet_since_ms = 0;
 };
 
 // The path of a robot after smoothing, and the session that drove it: the robot may have begun another since.
@@ -127,6 +129,7 @@ struct StoredSite {
   double resolution_m = 0.0;                        // Side of the map's cells; 0: not known.
   std::set<std::uint64_t> fragments;                // Sessions that are not joined with the map.
   std::vector<std::uint64_t> past;                  // Sessions that have ended, in the order in which they did.
+  std::set<std::uint64_t> merged{};                 // Layers that stand for several sessions.
 };
 
 struct StoredLayer {

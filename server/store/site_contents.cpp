@@ -50,6 +50,32 @@ Result<std::map<std::uint64_t, StoredSession>> ReadSessions(Store& store) {
   return ReadAll<StoredSession>(store, RecordKind::kSession, SessionOf);
 }
 
+std::vector<RecordRange> RangesOfRemoved(std::uint64_t session) {
+  return {{.kind = RecordKind::kCheckpoint, .owner = session},
+          {.kind = RecordKind::kJournal, .owner = session},
+          {.kind = RecordKind::kRemoved, .owner = session}};
+}
+
+Record MarkOfRemoved(std::uint64_t session) {
+  return {{RecordKind::kRemoved, session, 0}, "removed"};
+}
+
+Result<void> RemoveRests(Store& store) {
+  const auto removed = store.Owners(RecordKind::kRemoved);
+  if (!removed) return tl::unexpected(removed.error());
+  for (const std::uint64_t session : *removed) {
+    for (const RecordRange& range : RangesOfRemoved(session)) {
+      const std::size_t piece = RemovedAtOnce(range.kind);
+      for (std::size_t count = piece; count == piece;) {
+        const auto first = store.RemoveFirst(range, piece);
+        if (!first) return tl::unexpected(first.error());
+        count = *first;
+      }
+    }
+  }
+  return {};
+}
+
 std::string NameOfSite(Store& store, NameId site) {
   const auto sessions = ReadSessions(store);
   if (!sessions) return {};
@@ -62,6 +88,10 @@ Result<std::uint64_t> LastSession(Store& store) {
   const auto sessions = store.Owners(RecordKind::kSession);
   if (!sessions) return tl::unexpected(sessions.error());
   std::uint64_t last = sessions->empty() ? 0 : sessions->back();
+  // One that was removed counts as long as something is left of it.
+  const auto removed = store.Owners(RecordKind::kRemoved);
+  if (!removed) return tl::unexpected(removed.error());
+  if (!removed->empty()) last = std::max(last, removed->back());
   // A session that was never stored itself may be named by its site.
   const auto named = ReadAll<StoredSite>(store, RecordKind::kSite, SiteOf);
   if (!named && named.error().code != StatusCode::kDataLoss) return tl::unexpected(named.error());

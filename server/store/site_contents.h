@@ -31,6 +31,12 @@ struct SiteContents {
 [[nodiscard]] std::string NameOfSite(Store& store, NameId site);
 // The highest number that a session has or had; 0: there was none. Records that cannot be read count.
 [[nodiscard]] Result<std::uint64_t> LastSession(Store& store);
+// A session's own record is removed first, in one commit with a mark of it, because the rest, its checkpoints and its
+// journal, can be large. That is removed piece by piece (Store::RemoveFirst), in this order, and the mark last.
+[[nodiscard]] Record MarkOfRemoved(std::uint64_t session);
+[[nodiscard]] std::vector<RecordRange> RangesOfRemoved(std::uint64_t session);
+// Removes what is left of all sessions with a mark.
+[[nodiscard]] Result<void> RemoveRests(Store& store);
 [[nodiscard]] Result<std::map<std::uint32_t, StoredVersion>> ReadVersions(Store& store, NameId site);
 [[nodiscard]] Result<std::vector<StoredLayer>> ReadLayers(Store& store, NameId site);
 

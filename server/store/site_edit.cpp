@@ -72,11 +72,20 @@ Result<Division> Divide(Store& store, const std::string& site, const std::vector
       TakeOut(stays.members, [&](const auto& member) { return division.going.contains(member.second); });
   division.going_site.fragments =
       TakeOut(stays.fragments, [&](std::uint64_t fragment) { return division.going.contains(fragment); });
+  division.going_site.merged =
+      TakeOut(stays.merged, [&](std::uint64_t layer) { return division.going.contains(layer); });
   const auto goes = [&](std::uint64_t session) { return division.going.contains(session); };
   std::erase_if(stays.past, goes);
   std::erase_if(division.going_site.past, std::not_fn(goes));
   ++stays.tile_version;
   return division;
+}
+
+// Removes a session but for what is large, which RemoveRests does.
+void RemoveSession(std::uint64_t session, RecordChanges& changes) {
+  for (const RecordKind kind : {RecordKind::kSession, RecordKind::kRestoring})
+    changes.removed.push_back({.kind = kind, .owner = session});
+  changes.put.push_back(MarkOfRemoved(session));
 }
 
 void PutStaying(const Division& division, RecordChanges& changes) {
@@ -94,7 +103,12 @@ Result<void> DeleteSite(Store& store, const std::string& site) {
   auto contents = ReadSite(store, site);
   if (!contents && contents.error().code != StatusCode::kNotFound) contents = ReadAround(store, site);
   if (!contents) return tl::unexpected(contents.error());
-  return store.Commit({.removed = RangesOf(*contents), .put = {}});
+  RecordChanges changes;
+  for (const RecordKind kind : {RecordKind::kSite, RecordKind::kMapVersion, RecordKind::kLayer})
+    changes.removed.push_back({.kind = kind, .owner = HashName(site)});
+  for (const auto& [id, job] : contents->jobs) changes.removed.push_back({.kind = RecordKind::kJob, .owner = id});
+  for (const auto& [id, session] : contents->sessions) RemoveSession(id, changes);
+  return store.Commit(changes);
 }
 
 Result<void> DeleteSession(Store& store, const std::string& site, std::uint64_t session) {
@@ -102,7 +116,7 @@ Result<void> DeleteSession(Store& store, const std::string& site, std::uint64_t 
   if (!division) return tl::unexpected(division.error());
   RecordChanges changes;
   PutStaying(*division, changes);
-  for (const RecordRange& range : RangesOfSession(session)) changes.removed.push_back(range);
+  RemoveSession(session, changes);
   return store.Commit(changes);
 }
 

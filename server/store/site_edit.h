@@ -1,6 +1,7 @@
 // Changes to the sites of a store: import, merge, split and delete. Each is one commit, so that after any end of the
-// process the change is complete or absent. For a store that nobody else
-// uses: of a stopped server, or between two commits of a running one (Journal::Between). Stateless.
+// process the change is complete or absent; what is left of deleted sessions is for RemoveRests. For a store that
+// nobody else uses: of a stopped server, or between two commits of a running one (Journal::Between, which removes
+// that). Stateless.
 #pragma once
 
 #include <filesystem>

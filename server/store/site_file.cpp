@@ -94,6 +94,7 @@ class Survey {
         return TakeJob(record);
       case RecordKind::kServer:
       case RecordKind::kRestoring:
+      case RecordKind::kRemoved:
         break;
     }
     return Unreadable("a record of another kind");

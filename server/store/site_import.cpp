@@ -66,12 +66,14 @@ class Renaming {
           session.id = Session(session.id);
           session.request.site = site_;
           session.request.robot = Robot(session.request.robot);
+          session.quiet_since_ms = 0;  // It is away from here only from now on.
         });
       case RecordKind::kJournal:
         return Journal(std::move(record));
       case RecordKind::kCheckpoint:
       case RecordKind::kServer:
       case RecordKind::kRestoring:
+      case RecordKind::kRemoved:
         break;
     }
     record.key.owner = Session(record.key.owner);
@@ -99,6 +101,9 @@ class Renaming {
     std::set<std::uint64_t> fragments;
     for (const std::uint64_t session : site.fragments) fragments.insert(Session(session));
     site.fragments = std::move(fragments);
+    std::set<std::uint64_t> merged;
+    for (const std::uint64_t session : site.merged) merged.insert(Session(session));
+    site.merged = std::move(merged);
     for (std::uint64_t& session : site.past) session = Session(session);
   }
   void Rename(StoredVersion& version) const {

@@ -198,6 +198,7 @@ class Merge {
     site.members.insert(from_.site.members.begin(), from_.site.members.end());
     site.fragments.insert(from_.site.fragments.begin(), from_.site.fragments.end());
     site.past.insert(site.past.end(), from_.site.past.begin(), from_.site.past.end());
+    site.merged.insert(from_.site.merged.begin(), from_.site.merged.end());
     Put({RecordKind::kSite, HashName(site.name), 0}, BytesOf(site));
     for (const RecordKind kind : {RecordKind::kSite, RecordKind::kMapVersion, RecordKind::kLayer})
       changes_.removed.push_back({.kind = kind, .owner = HashName(from_.site.name)});

@@ -29,6 +29,7 @@ enum class RecordKind : std::uint8_t {
   kLayer = 6,       // Owner: HashName of the site; number: session id.
   kJob = 7,         // Owner: job id.
   kRestoring = 8,   // Owner: session id; number 0.
+  kRemoved = 9,     // Owner: the id of a session that was removed, while something is left of it; number 0.
 };
 
 struct RecordKey {
@@ -57,6 +58,11 @@ struct RecordChanges {
   std::vector<Record> put;
 };
 
+// How many records are removed with one commit where there may be many (Store::RemoveFirst): some megabytes.
+[[nodiscard]] constexpr std::size_t RemovedAtOnce(RecordKind kind) {
+  return kind == RecordKind::kCheckpoint ? 8 : 512;
+}
+
 class Store {
  public:
   // Called with a number and the record's bytes; an error ends the reading and is returned.
@@ -72,6 +78,9 @@ class Store {
   // error, after which none of them is there and which is returned. `next` must not use the store.
   using Next = std::function<Result<std::optional<Record>>()>;
   virtual Result<void> CommitEach(const Next& next) = 0;
+  // Removes the first `count` records of the range, in the order of their numbers, in one commit. Returns how many
+  // there were. For ranges of any size: a commit needs room on the disk beside what it removes. Errors as of Commit.
+  virtual Result<std::size_t> RemoveFirst(const RecordRange& range, std::size_t count) = 0;
   // Visits records in the order of their numbers. DATA_LOSS: a record is damaged. FAILED_PRECONDITION: a newer server
   // has written it.
   virtual Result<void> Read(const RecordRange& range, const Visit& visit) = 0;
@@ -83,7 +92,8 @@ class Store {
   [[nodiscard]] virtual std::size_t max_record_bytes() const { return 900'000'000; }
   // Where its files are; empty if it has none.
   [[nodiscard]] virtual std::filesystem::path directory() const { return {}; }
-  // Disk space that the records use.
+  // Disk space that the records use. The files have up to 64 MiB more for the write-ahead log, and they do not get
+  // smaller: the space of removed records is used again.
   virtual Result<std::uint64_t> bytes_used() = 0;
 };
 

@@ -27,6 +27,18 @@ class MemoryStore : public server::Store {
       records_[(*record)->key] = (*record)->bytes;
     }
   }
+  Result<std::size_t> RemoveFirst(const server::RecordRange& range, std::size_t count) override {
+    std::size_t removed = 0;
+    for (auto record = records_.begin(); record != records_.end() && removed < count;) {
+      if (!Within(range, record->first)) {
+        ++record;
+        continue;
+      }
+      record = records_.erase(record);
+      ++removed;
+    }
+    return removed;
+  }
   Result<void> Read(const server::RecordRange& range, const Visit& visit) override {
     for (const auto& [key, bytes] : records_) {
       if (!Within(range, key)) continue;

@@ -64,9 +64,9 @@ inline void AskEverything(Rooms& rooms) {
 inline bool StartOn(MemoryStore& store) {
   server::Journal journal(store, {});  // Never started: nothing is written.
   Rooms rooms([](server::OutboundValue&&) {}, &journal);
-  const auto sites = rooms.atlas().Restore();
-  if (!sites) return Must(!sites.error().message.empty(), "a refusal has a reason"), false;
   server::StartControl control;
+  const auto sites = rooms.atlas().Restore(control);
+  if (!sites) return Must(!sites.error().message.empty(), "a refusal has a reason"), false;
   const auto sessions = rooms.roster().Restore(control);
   if (!sessions) return Must(!sessions.error().message.empty(), "a refusal has a reason"), false;
   const auto jobs = rooms.jobs().Restore();

@@ -55,7 +55,7 @@ class Door {
           robot_.TakeShared(shared_.Take(message, origin.writer, false), true, origin, now_);
         });
       case 4:
-        return With<ros2::PoseWithCovariance>(bytes, [&](auto&& message) { robot_.TakeStart(message); });
+        return With<ros2::PoseWithCovariance>(bytes, [&](auto&& message) { robot_.TakeStart(message, now_); });
       default:
         break;
     }

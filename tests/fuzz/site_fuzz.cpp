@@ -98,6 +98,7 @@ void EditAndDelete(MemoryStore& store, const std::filesystem::path& path, const 
   const auto names = SiteNames(store);
   Must(names.has_value(), "the sites have names");
   for (const std::string& name : *names) Must(DeleteSite(store, name).has_value(), "a site can be deleted");
+  Must(RemoveRests(store).has_value(), "the rest can be removed");
   Must(IsEmpty(store), "nothing of a deleted site is left");
 }
 

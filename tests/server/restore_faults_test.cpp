@@ -82,6 +82,9 @@ class WatchedStore : public Store {
       : store_(std::move(store)), before_(std::move(before)) {}
   Result<void> Commit(const RecordChanges& changes) override { return store_->Commit(changes); }
   Result<void> CommitEach(const Next& next) override { return store_->CommitEach(next); }
+  Result<std::size_t> RemoveFirst(const RecordRange& range, std::size_t count) override {
+    return store_->RemoveFirst(range, count);
+  }
   Result<void> Read(const RecordRange& range, const Visit& visit) override {
     before_(range);
     return store_->Read(range, visit);

@@ -5,6 +5,9 @@
 #include <filesystem>
 #include <map>
 
+#include "server/store/site_contents.h"
+#include "server/store/sqlite_store.h"
+#include "tests/eventually.h"
 #include "tests/server/support/stored_server.h"
 #include "tests/temp_directory.h"
 
@@ -175,6 +178,37 @@ TEST(Restore, WhatIsDurableIsThereAfterAKillAndTheRestIsNotCountedTwice) {
   StoredServer second(directory / "1");
   EXPECT_EQ(DurableScans(*second.operator->()), 40U);
   EXPECT_EQ(PathOf(*second.operator->()).size(), 40U);
+}
+
+// Each start began to count anew for how long a robot was away.
+TEST(Restore, ForHowLongARobotIsAwayIsKeptOverRestarts) {
+  const TempDirectory directory;
+  const auto quiet_since = [&](const char* name) {
+    const auto store = *OpenStore(directory / name);
+    return ReadSessions(*store)->at(1).quiet_since_ms;
+  };
+  {
+    StoredServer first(directory / "0");
+    first->Open("r1", kDriver);
+    first->Drive("r1", kDriver, 0, 20);
+    EXPECT_TRUE(first->WaitFor([&] { return DurableScans(*first.operator->()) == 20; }));
+    CopyState(directory / "0", directory / "driving");
+    first->Push(ClientLiveliness{kDriver, false});
+    ASSERT_TRUE(first->WaitPhase("r1", kDriver, SessionPhase::kSuspended));
+    ASSERT_TRUE(test::Eventually([&] {
+      std::filesystem::remove_all(directory / "now");
+      CopyState(directory / "0", directory / "now");
+      return quiet_since("now") > 0;
+    }));
+  }
+  EXPECT_EQ(quiet_since("driving"), 0U);
+  const std::uint64_t since_ms = quiet_since("0");
+  EXPECT_GT(since_ms, 0U);
+  for (int start = 0; start < 2; ++start) {
+    StoredServer next(directory / "0");
+    EXPECT_EQ(next->Ask(About(RequestKind::kStatus)).robots[0].session.phase, SessionPhase::kSuspended);
+  }
+  EXPECT_EQ(quiet_since("0"), since_ms);
 }
 
 TEST(Restore, TilesAreAnsweredBeforeTheRobotIsBack) {

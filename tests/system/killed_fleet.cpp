@@ -27,7 +27,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using nlohmann::json;
 
-constexpr double kWrong_m = 0.5;
+constexpr double kWrong_m = 0.5, kWrong_rad = 0.5;
 constexpr std::chrono::seconds kLongest{600};
 
 double SecondsSince(Clock::time_point start) {
@@ -92,7 +92,8 @@ class PoseWatcher {
     const auto path = right.find(pose.robot);
     if (path == right.end()) return false;
     const auto there = PoseOn(path->second, pose.stamp, 1.0);
-    return there && (pose.T_map_robot.translation() - there->translation()).norm() > kWrong_m;
+    return there && ((pose.T_map_robot.translation() - there->translation()).norm() > kWrong_m ||
+                     std::abs(AngleDiff(pose.T_map_robot.theta, there->theta)) > kWrong_rad);
   }
 
   void Take(const PoseReport& pose) {

@@ -29,10 +29,11 @@ struct KilledFleetOutcome {
   std::uint64_t lost = 0;     // Scans that the undisturbed server used and the killed one did not.
   std::uint64_t doubled = 0;  // Scans that were used or counted more than once.
   std::uint64_t poses = 0;    // Poses told while the fleet drove.
-  // Of these, called localized and more than 0.5 m beside the pose that the undisturbed server told at this time.
+  // Of these, called localized and more than 0.5 m or 0.5 rad beside the pose that the undisturbed server told at this
+  // time.
   std::uint64_t wrongly_localized = 0;
-  // Of these, called localized and more than 0.5 m beside the truth; and the same of the undisturbed server. Where a
-  // robot drives for long before it sees a place again, the error of its estimate alone is as large.
+  // Of these, called localized and more than 0.5 m or 0.5 rad beside the truth; and the same of the undisturbed server.
+  // Where a robot drives for long before it sees a place again, the error of its estimate alone is as large.
   std::uint64_t beside_truth = 0, undisturbed_poses = 0, undisturbed_beside_truth = 0;
   int paths_that_differ = 0;  // Robots whose path is not the undisturbed one to the last bit.
   // About each robot with a loss, a scan used twice or another path: what differs, and the account of its samples.

@@ -19,7 +19,7 @@ namespace {
 
 using namespace test;
 
-constexpr double kWrong_m = 0.5;
+constexpr double kWrong_m = 0.5, kWrong_rad = 0.5;
 
 class MovedRobots : public ::testing::Test {
  protected:
@@ -41,8 +41,8 @@ class MovedRobots : public ::testing::Test {
   void StartServer() {
     server_.reset();
     server_.emplace(std::vector<std::string>{CAIRND_PATH, "--domain", std::to_string(TestDomain()), "--state",
-                                             state_.path().string(), "--set", "slam.particles=30", "--set",
-                                             "robots.checkpoint_entries=100"});
+                                             stores_ ? state_.path().string() : "none", "--set", "slam.particles=30",
+                                             "--set", "robots.checkpoint_entries=100"});
     ASSERT_TRUE(server_->Says(" ready"));
   }
   void KillServer() {
@@ -100,7 +100,8 @@ class MovedRobots : public ::testing::Test {
         const auto truth = PoseOn(fleet_.truth(robot), stamp, 1.0);
         EXPECT_TRUE(truth);
         const double error_m = (pose.T_map_robot.translation() - truth->translation()).norm();
-        wrong += pose.localized && error_m > kWrong_m ? 1 : 0;
+        const double error_rad = std::abs(AngleDiff(pose.T_map_robot.theta, truth->theta));
+        wrong += pose.localized && (error_m > kWrong_m || error_rad > kWrong_rad) ? 1 : 0;
       }
     }
     return wrong;
@@ -117,6 +118,7 @@ class MovedRobots : public ::testing::Test {
   }
 
   const TempDirectory state_;
+  bool stores_ = true;
   std::optional<ChildProcess> server_;
   const std::unique_ptr<wire::Bus> bus_;
   sim::Fleet fleet_;
@@ -140,6 +142,38 @@ TEST_F(MovedRobots, OneThatWasCarriedWhileTheServerWasDeadIsLostUntilItIsFound) 
   ASSERT_TRUE(FirstPose(0, back));
   EXPECT_FALSE(FirstPose(0, back)->localized);
   EXPECT_TRUE(IsLocalized(0));
+}
+
+// The next server knows nothing, so that it believes the start pose that a client gives.
+TEST_F(MovedRobots, OneThatWasCarriedWhileAServerWithoutAStateWasDeadGivesNoStart) {
+  stores_ = false;
+  KillServer();
+  StartServer();
+  ASSERT_NO_FATAL_FAILURE(Drive(60.0, {0, 1}));
+  EXPECT_TRUE(IsLocalized(0));
+  KillServer();
+  ASSERT_NO_FATAL_FAILURE(Drive(20.0, {}));
+  Set(0, Odometer::kStandsStill);  // Somebody has carried it.
+  Set(1, Odometer::kStartsAtZero);
+  StartServer();
+  ASSERT_NO_FATAL_FAILURE(Drive(5.0, {0, 1}));
+  for (const int robot : {0, 1}) EXPECT_EQ(riders_[robot]->T_map_robot_restarted(), Pose2{}) << robot;
+}
+
+TEST_F(MovedRobots, OneThatDrivesOnWhileAServerWithoutAStateIsDeadIsWhereItIs) {
+  stores_ = false;
+  KillServer();
+  StartServer();
+  ASSERT_NO_FATAL_FAILURE(Drive(60.0, {0, 1}));
+  KillServer();
+  StartServer();
+  ASSERT_NO_FATAL_FAILURE(Drive(30.0, {0, 1}));
+  for (const int robot : {0, 1}) {
+    ASSERT_TRUE(riders_[robot]->T_map_robot_restarted()) << robot;
+    EXPECT_NE(riders_[robot]->T_map_robot_restarted(), Pose2{}) << robot;
+    EXPECT_TRUE(IsLocalized(robot));
+  }
+  EXPECT_EQ(Wrong(), 0);
 }
 
 TEST_F(MovedRobots, OdometryThatBeginsAnewPutsNoRobotAtAWrongPlace) {

@@ -31,6 +31,10 @@ class Rider {
       const MutexLock lock(mutex_);
       poses_[pose.stamp] = pose;
     };
+    callbacks.restarted = [this](SessionToken, const Pose2& T_map_robot_start) {
+      const MutexLock lock(mutex_);
+      T_map_robot_restarted_ = T_map_robot_start;
+    };
     client_ = Must(client::RobotClient::Open(bus, request, 20.0, std::move(callbacks), options));
   }
 
@@ -48,11 +52,17 @@ class Rider {
     const MutexLock lock(mutex_);
     return poses_;
   }
+  // Where the last session began that the client has opened by itself: the identity if it gave no start.
+  [[nodiscard]] std::optional<Pose2> T_map_robot_restarted() const {
+    const MutexLock lock(mutex_);
+    return T_map_robot_restarted_;
+  }
   [[nodiscard]] std::size_t scans() const { return scans_; }  // Published; for the thread that publishes.
 
  private:
   mutable Mutex mutex_;
   std::map<Stamp, PoseReport> poses_ CAIRN_GUARDED_BY(mutex_);
+  std::optional<Pose2> T_map_robot_restarted_ CAIRN_GUARDED_BY(mutex_);
   std::size_t scans_ = 0;
   std::unique_ptr<client::RobotClient> client_;
 };

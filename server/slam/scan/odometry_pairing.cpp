@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/sensor/odometry_continuity.h"
 #include "server/slam/scan/deskew.h"
 
 namespace cairn::slam {
@@ -136,7 +137,7 @@ void OdometryPairing::Take(std::shared_ptr<const Scan>&& scan) {
 
 void OdometryPairing::Take(const Odometry& sample) {
   Odometry odometry = Corrects() ? Corrected(sample) : sample;
-  if (newest_ && !Follows(odometry)) {
+  if (newest_ && !Follows(odometry, sample.T_odom_robot)) {
     BeginAnew(Passage::kUnknown);
     odometry.T_odom_robot = corrected_ = sample.T_odom_robot;  // No wheel has turned for this step.
   }
@@ -176,14 +177,20 @@ void OdometryPairing::BeginAnew(Passage passage) {
   time_known_ = false;
 }
 
-// Whether this may be the odometry of the same drive as the sample before.
-bool OdometryPairing::Follows(const Odometry& odometry) const {
-  const Pose2 moved = Between(newest_->T_odom_robot, odometry.T_odom_robot);
-  const double moved_m = moved.translation().norm();
-  const std::uint64_t passed_ns = NanosBetween(newest_->stamp, odometry.stamp);
-  if (!time_known_ || passed_ns > Nanos(options_.max_gap_s))
-    return moved_m <= options_.same_place_m && std::abs(moved.theta) <= options_.same_heading_rad;
-  return moved_m <= options_.same_place_m + options_.max_speed_m_s * 1e-9 * static_cast<double>(passed_ns);
+// Whether this may be the odometry of the same drive as the sample before. `logged`: as it came.
+bool OdometryPairing::Follows(const Odometry& odometry, const Pose2& logged) const {
+  const DriveLimits limits{options_.max_gap_s, options_.max_speed_m_s, options_.same_place_m,
+                           options_.same_heading_rad};
+  std::optional<double> speed_m_s;
+  std::optional<Pose2> moved_before;
+  if (odometry_.size() >= 2) {
+    const Odometry& before = *std::prev(odometry_.end(), 2);
+    speed_m_s = SpeedBetween(before, odometry_.back(), limits);
+    moved_before = Between(before.T_odom_robot, odometry_.back().T_odom_robot);
+  }
+  if (BeginsAtZero(logged, Between(newest_->T_odom_robot, odometry.T_odom_robot), moved_before)) return false;
+  if (!time_known_) return IsAtSamePlace(newest_->T_odom_robot, odometry.T_odom_robot, limits);
+  return MayBeOneDrive(*newest_, odometry, speed_m_s, limits);
 }
 
 void OdometryPairing::Pair(const std::shared_ptr<const Scan>& scan, const Pose2& T_odom_robot) {
@@ -219,8 +226,9 @@ void OdometryPairing::PairOrDrop(const std::shared_ptr<const Scan>& scan) {
   const auto before = exact ? after : std::prev(after);
   const bool too_far = !exact && NanosBetween(before->stamp, after->stamp) > Nanos(options_.max_gap_s);
   const Pose2 T_odom_robot = exact ? after->T_odom_robot : PoseAt(scan->stamp, *before, *after);
-  // Later scans have later stamps, so nothing before this sample is needed any more.
-  odometry_.erase(odometry_.begin(), before);
+  // Later scans have later stamps, so nothing before this sample is needed any more, but the one before it, which says
+  // how the robot moves (Follows).
+  odometry_.erase(odometry_.begin(), before == odometry_.begin() ? before : std::prev(before));
   const std::vector<Odometry> during = During(*scan);
   const auto apart = [this](const Odometry& a, const Odometry& b) {
     return NanosBetween(a.stamp, b.stamp) > Nanos(options_.max_gap_s);

@@ -34,9 +34,7 @@ struct PairingOptions {
   std::int64_t max_odometry = 1024;  // A scan that takes longer than so many samples cannot be used.
   double max_pause_s = 2.0;
   double max_speed_m_s = 3.0;
-  // No keys of the configuration. After a gap, or an unknown time, odometry counts as continued only if it has changed
-  // by less than this. A robot that was switched off for a night may have driven anywhere; its odometry would be
-  // plausible after any distance.
+  // No keys of the configuration: DriveLimits.
   double same_place_m = 1.0;
   double same_heading_rad = 1.0;
   RollingOptions rolling{};
@@ -115,7 +113,7 @@ class OdometryPairing {
   void PairOrDrop(const std::shared_ptr<const Scan>& scan);
   [[nodiscard]] std::vector<Odometry> During(const Scan& scan) const;
   void BeginAnew(Passage passage);
-  [[nodiscard]] bool Follows(const Odometry& odometry) const;
+  [[nodiscard]] bool Follows(const Odometry& odometry, const Pose2& logged) const;
   void Flush();
   void Pair(const std::shared_ptr<const Scan>& scan, const Pose2& T_odom_robot);
 

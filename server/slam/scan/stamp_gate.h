@@ -18,11 +18,6 @@
 
 namespace cairn::slam {
 
-// later - earlier without overflow, for stamps a broken clock may place anywhere in int64.
-[[nodiscard]] inline std::uint64_t NanosBetween(Stamp earlier, Stamp later) {
-  return static_cast<std::uint64_t>(later) - static_cast<std::uint64_t>(earlier);
-}
-
 template <typename Sample>
 class StampGate {
  public:

@@ -182,6 +182,7 @@ TEST_F(RobotClientTest, ARecorderIsNoServer) {
 }
 
 // A server that began anew put the robot where it had once begun.
+constexpr Stamp kStep = kNanosPerSecond / 10;
 TEST_F(RobotClientTest, OpensANewSessionWhereTheRobotIsIfTheServerForgotIt) {
   SessionRequest request = Robot("r1");
   request.has_start = true;
@@ -191,9 +192,9 @@ TEST_F(RobotClientTest, OpensANewSessionWhereTheRobotIsIfTheServerForgotIt) {
   callbacks.restarted = [&](SessionToken, const Pose2&) { ++told; };
   const auto client = Must(RobotClient::Open(*bus_, request, 20.0, std::move(callbacks)));
   const auto drive = [&](int step) {
-    ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = step * 10, .T_odom_robot = {0.1 * step, 0, 0}}));
+    ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = step * kStep, .T_odom_robot = {0.1 * step, 0, 0}}));
     Scan scan = SomeScan();
-    scan.stamp = step * 10;
+    scan.stamp = step * kStep;
     ASSERT_TRUE(client->Publish(scan));
   };
   // Poses are not kept for late readers.
@@ -220,7 +221,7 @@ TEST_F(RobotClientTest, OpensANewSessionWhereTheRobotIsIfTheServerForgotIt) {
   EXPECT_EQ(told, 1);
   // Numbered anew, what was not settled before.
   EXPECT_EQ(server_->received(), OneTo(6));
-  EXPECT_EQ(server_->last_scan().scan.stamp, 10 * (settled + 5));
+  EXPECT_EQ(server_->last_scan().scan.stamp, kStep * (settled + 5));
   const SessionRequest first = server_->sessions().front();
   EXPECT_TRUE(first.started);
   EXPECT_EQ(first.session, before);
@@ -233,6 +234,42 @@ TEST_F(RobotClientTest, OpensANewSessionWhereTheRobotIsIfTheServerForgotIt) {
   EXPECT_NEAR(last.T_map_robot_start.x, 0.1 * settled, 1e-9);
 }
 
+// Its odometry begins anew, or scans are missing for some time, between the last pose and what the next server gets.
+TEST_F(RobotClientTest, ARobotThatMayBeElsewhereGivesNoStartToTheNextServer) {
+  struct Case {
+    const char* what;
+    Stamp scan;
+    Pose2 T_odom_robot;
+    bool has_start;
+  };
+  for (const Case& one : {Case{"it drives on", 2 * kStep, {5.2, 0, 0}, true},
+                          Case{"its odometry begins anew", 2 * kStep, {0, 0, 0}, false},
+                          Case{"its odometry jumps", 2 * kStep, {25, 0, 0}, false},
+                          Case{"it was watched no longer", 60 * kStep, {5.2, 0, 0}, false}}) {
+    SCOPED_TRACE(one.what);
+    server_.reset();
+    server_ = std::make_unique<FakeServer>(LoopbackOptions(), 1);
+    const auto client = Must(RobotClient::Open(*bus_, Robot("r1"), 20.0));
+    ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = 0, .T_odom_robot = {5, 0, 0}}));
+    Scan scan = SomeScan();
+    scan.stamp = kStep;
+    ASSERT_TRUE(client->Publish(scan));
+    ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = kStep, .T_odom_robot = {5.1, 0, 0}}));
+    ASSERT_TRUE(client->WaitSettled(20.0));
+    ASSERT_TRUE(Eventually([&] { return client->pose().has_value(); }));
+    server_->SetSettling(false);
+    scan.stamp = one.scan;
+    ASSERT_TRUE(client->Publish(scan));
+    ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = one.scan, .T_odom_robot = one.T_odom_robot}));
+    ASSERT_TRUE(Eventually([&] { return server_->received().size() == 2; }));
+    server_.reset();
+    server_ = std::make_unique<FakeServer>(LoopbackOptions(), 2);
+    ASSERT_TRUE(client->WaitSettled(20.0));
+    EXPECT_EQ(client->restarted(), 1);
+    EXPECT_EQ(server_->sessions().back().has_start, one.has_start);
+  }
+}
+
 // It gave the last pose, of a robot that was lost, as its start, and the server believed it.
 TEST_F(RobotClientTest, ALostRobotGivesNoStartToTheNextServer) {
   server_->SetLocalized(false);
@@ -242,12 +279,12 @@ TEST_F(RobotClientTest, ALostRobotGivesNoStartToTheNextServer) {
   const auto client = Must(RobotClient::Open(*bus_, request, 20.0));
   ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = 0, .T_odom_robot = {5, 0, 0}}));
   Scan scan = SomeScan();
-  scan.stamp = 100;
+  scan.stamp = 10 * kStep;
   ASSERT_TRUE(client->Publish(scan));
-  ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = 200, .T_odom_robot = {6, 0, 0}}));
+  ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = 20 * kStep, .T_odom_robot = {6, 0, 0}}));
   ASSERT_TRUE(Eventually([&] { return client->pose().has_value(); }));
   server_->SetSettling(false);
-  scan.stamp = 150;
+  scan.stamp = 15 * kStep;
   ASSERT_TRUE(client->Publish(scan));
   ASSERT_TRUE(Eventually([&] { return server_->received().size() == 2; }));
   server_.reset();
@@ -264,11 +301,11 @@ TEST_F(RobotClientTest, WithoutAPoseTheFirstStartIsCarriedOnByTheOdometry) {
   server_->SetSettling(false);  // No poses either.
   const auto client = Must(RobotClient::Open(*bus_, request, 20.0));
   ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = 0, .T_odom_robot = {5, 0, 0}}));
-  ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = 100, .T_odom_robot = {7, 0, 0}}));
+  ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = 10 * kStep, .T_odom_robot = {7, 0, 0}}));
   Scan scan = SomeScan();
-  scan.stamp = 200;
+  scan.stamp = 20 * kStep;
   ASSERT_TRUE(client->Publish(scan));
-  ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = 300, .T_odom_robot = {9, 0, 0}}));
+  ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = 30 * kStep, .T_odom_robot = {9, 0, 0}}));
   ASSERT_TRUE(Eventually([&] { return server_->received().size() == 1; }));
   server_.reset();
   server_ = std::make_unique<FakeServer>(LoopbackOptions(), 2);

@@ -149,6 +149,7 @@ TEST_F(JobRestore, ADamagedRecordIsSetAsideAndItsNumberIsNotUsedAgain) {
 struct BrokenStore final : Store {
   Result<void> Commit(const RecordChanges& /*changes*/) override { return {}; }
   Result<void> CommitEach(const Next& /*next*/) override { return {}; }
+  Result<std::size_t> RemoveFirst(const RecordRange& /*range*/, std::size_t /*count*/) override { return 0; }
   Result<void> Read(const RecordRange& /*range*/, const Visit& /*visit*/) override { return {}; }
   Result<std::vector<std::uint64_t>> Owners(RecordKind /*kind*/) override {
     return Fail(StatusCode::kUnavailable, "the disk does not answer");

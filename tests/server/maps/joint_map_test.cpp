@@ -157,6 +157,45 @@ TEST(JointMap, ReplaceRemovesWhatTheNewGridDoesNotHave) {
   EXPECT_EQ(map.ChunksOf(1).size(), 1U);
 }
 
+// The first sessions that have ended, as one layer: the map shows the same, and goes on as before.
+TEST(JointMap, MergedLayersShowWhatTheyShowedOneByOne) {
+  std::mt19937 random(5);
+  JointMap apart(kPast), merged(kPast);
+  for (SessionId session = 1; session <= 6; ++session) {
+    for (int i = 0; i < 6; ++i) {
+      const slam::ChunkKey key{static_cast<int>(random() % 3), static_cast<int>(random() % 3)};
+      const auto chunk = ChunkOf(static_cast<std::int16_t>(random() % 800) - 400, random() % kTileArea);
+      for (JointMap* const map : {&apart, &merged}) map->Apply({.session = session, .chunks = {{key, chunk}}});
+    }
+    for (JointMap* const map : {&apart, &merged}) {
+      map->SetHidden(session, session == 2);
+      if (session <= 5) map->SetPast(session);
+      map->Render();
+    }
+  }
+  merged.MergePast(1, 3);
+  EXPECT_TRUE(merged.Render().empty()) << "nothing changes where only a hidden one has ended between the two";
+  merged.MergePast(3, 4);
+  EXPECT_EQ(merged.past(), (std::vector<SessionId>{4, 2, 5}));
+  EXPECT_TRUE(merged.ChunksOf(1).empty() && merged.ChunksOf(3).empty());
+  const auto expect_same = [&] {
+    apart.Render();
+    merged.Render();
+    ASSERT_EQ(apart.cells().size(), merged.cells().size());
+    for (const auto& [key, cells] : apart.cells()) EXPECT_EQ(*merged.cells().at(key), *cells);
+  };
+  expect_same();
+  for (JointMap* const map : {&apart, &merged}) {
+    for (int x = 0; x < 3; ++x) map->Apply({.session = 7, .chunks = {{{x, 1}, ChunkOf(-150)}}});
+    map->SetPast(6);
+  }
+  expect_same();
+  merged.Remove(2);
+  EXPECT_EQ(merged.past(), (std::vector<SessionId>{4, 5, 6}));
+  EXPECT_TRUE(merged.hidden().empty());
+  expect_same();
+}
+
 // Property: changes applied one by one give the map that a fresh one gives from the final chunks.
 TEST(JointMap, StepByStepEqualsFromScratch) {
   std::mt19937 random(3);

@@ -13,6 +13,13 @@
 namespace cairn::server {
 namespace {
 
+// A session that drops its corrections once it is gone.
+struct Owner : GridOwner {
+  bool gone = false;
+  void Adopt(Correction&&) override {}
+  void SetMapEpoch(std::uint32_t) override {}
+};
+
 class SiteLayers : public ::testing::Test {
  protected:
   ~SiteLayers() override { pool_.join(); }
@@ -57,7 +64,9 @@ TEST_F(SiteLayers, WhatEndedFirstIsThePastAlsoForTheNextServer) {
   ASSERT_TRUE(stored);
   EXPECT_EQ(stored->site.past, (std::vector<std::uint64_t>{2, 1}));
   const auto next = NewSite(journal);
-  ASSERT_TRUE(next->Restore(stored->site));
+  StartControl control;
+  ASSERT_TRUE(next->Restore(stored->site, control));
+  EXPECT_GT(control.advanced(), 0U);
   EXPECT_EQ(CellOf(*next), before);
 }
 
@@ -70,6 +79,77 @@ TEST_F(SiteLayers, ASessionThatEntersAsEndedIsThePast) {
   site->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(-389)}}});
   site->Change({.session = 2, .chunks = {{{0, 0}, UniformChunk(389)}}});
   EXPECT_LT(CellOf(*site), 10);
+}
+
+// A robot whose program is started again and again leaves a part of the map each time.
+TEST_F(SiteLayers, HoweverManySessionsLeaveTheirLayersAreFew) {
+  std::uint8_t before = 0;
+  {
+    Journal journal(*store_, StoreOptions{});
+    journal.Start();
+    const auto site = NewSite(journal);
+    for (SessionId id = 1; id <= 60; ++id) {
+      const bool fragment = id % 3 == 0, draws = id % 3 == 1;
+      site->Join({.session = id, .robot = 7, .owner = {}, .fragment = fragment});
+      if (fragment || draws) site->Change({.session = id, .chunks = {{{0, 0}, UniformChunk(id == 1 ? 389 : 20)}}});
+      if (id == 4) site->AddVersion({.info = {}, .parts = {}, .smoothed = {}}, [](const Result<std::uint32_t>&) {});
+      site->End(id);
+      site->Leave(id);
+    }
+    before = CellOf(*site);
+    journal.Stop();
+  }
+  const auto stored = ReadSite(*store_, "lab");
+  ASSERT_TRUE(stored);
+  EXPECT_EQ(stored->layers.size(), 8U);
+  EXPECT_EQ(stored->site.past, stored->layers);
+  EXPECT_TRUE(stored->site.fragments.empty());
+  Journal journal(*store_, StoreOptions{});
+  const auto next = NewSite(journal);
+  StartControl control;
+  ASSERT_TRUE(next->Restore(stored->site, control));
+  EXPECT_EQ(CellOf(*next), before);
+}
+
+// Versions know them by the number under which they are merged.
+TEST_F(SiteLayers, MergedLayersAreSwitchedWithTheirPartsOfTheVersions) {
+  Journal journal(*store_, StoreOptions{});
+  journal.Start();
+  const auto site = NewSite(journal);
+  const auto owner = std::make_shared<Owner>();
+  for (const SessionId id : {SessionId{1}, SessionId{2}}) {
+    site->Join({.session = id, .robot = id, .owner = owner});
+    site->Change({.session = id, .chunks = {{{0, 0}, UniformChunk(50)}}});
+  }
+  std::promise<std::uint32_t> added;
+  MapVersion version;
+  version.parts[1].chunks[{0, 0}] = UniformChunk(-389);
+  version.parts[2].chunks[{0, 0}] = UniformChunk(-389);
+  site->AddVersion(std::move(version), [&](const Result<std::uint32_t>& number) { added.set_value(*number); });
+  const std::uint32_t number = added.get_future().get();
+  for (SessionId id = 3; id <= 10; ++id) {
+    site->Join({.session = id, .robot = id, .owner = owner});
+    site->Change({.session = id, .chunks = {{{9, 9}, UniformChunk(10)}}});
+  }
+  for (SessionId id = 1; id <= 10; ++id) site->Leave(id);
+  EXPECT_GT(CellOf(*site), 50);
+  owner->gone = true;
+  const auto enable = [&](std::uint32_t wanted) {
+    std::promise<bool> done;
+    site->Enable(wanted, [&](const Result<std::uint32_t>& result) { done.set_value(result.has_value()); });
+    return done.get_future().get();
+  };
+  ASSERT_TRUE(enable(number));
+  EXPECT_LT(CellOf(*site), 10);
+  ASSERT_TRUE(enable(1));
+  EXPECT_GT(CellOf(*site), 50);
+  // A job that began before they were merged has a part of one of them alone.
+  std::promise<std::uint32_t> late;
+  MapVersion of_job;
+  of_job.parts[3].chunks[{0, 0}] = UniformChunk(-389);
+  site->AddVersion(std::move(of_job), [&](const Result<std::uint32_t>& made) { late.set_value(*made); });
+  ASSERT_TRUE(enable(late.get_future().get()));
+  EXPECT_GT(CellOf(*site), 50) << "what the others have drawn stays";
 }
 
 }  // namespace

@@ -9,6 +9,8 @@
 #include <optional>
 #include <utility>
 
+#include "server/store/sqlite_store.h"
+#include "tests/eventually.h"
 #include "tests/server/robots/one_session.h"
 
 namespace cairn::server {
@@ -174,6 +176,48 @@ TEST_F(DeskTest, AJobGetsTheWishToEnableItsMap) {
     ASSERT_EQ(jobs_.Find(reply.jobs[0].id)->state, JobState::kSucceeded);
     EXPECT_EQ(enable_, enable);
   }
+}
+
+// A server that was killed after its answer had forgotten the order when it started again.
+TEST_F(DeskTest, OrdersAreAnsweredWhenTheyAreOnTheDisk) {
+  const auto store = *OpenStore(kInMemory);
+  Journal journal(*store, StoreOptions{});
+  Desk desk{kCapacity, outbound_, roster_, atlas_, jobs_, worker_, saved_sites_, 1, &journal};
+  desk.Start();
+  for (const RequestKind kind : {RequestKind::kJobSubmit, RequestKind::kRelocalise}) {
+    desk.Take(Of(kind));
+    desk.Take(Of(RequestKind::kPing));
+    EXPECT_FALSE(NextReply().value_or(Reply{}).server_version.empty()) << "a question is answered before";
+  }
+  EXPECT_TRUE(test::Eventually([&] { return !roster_.Find("r1")->has_work(); }));
+  EXPECT_FALSE(outbound_.lane(Outbound::Lane::kReplies).TryPop());
+  journal.Start();
+  int jobs = 0;
+  for (int i = 0; i < 2; ++i) {
+    const auto reply = NextReply();
+    ASSERT_TRUE(reply);
+    EXPECT_TRUE(reply->status.ok()) << reply->status.message;
+    jobs += static_cast<int>(reply->jobs.size());
+  }
+  EXPECT_EQ(jobs, 1);
+  Request nobody = Of(RequestKind::kRelocalise);
+  nobody.robot = "r9";
+  desk.Take(std::move(nobody));
+  EXPECT_EQ(NextReply().value_or(Reply{}).status.code, StatusCode::kNotFound);
+  desk.Stop();
+  journal.Stop();
+}
+
+// The session ends with the order still in its queue.
+TEST(Receipt, SaysThatNobodyHasTakenIt) {
+  std::vector<bool> told;
+  const auto tell = [&told](bool taken) { told.push_back(taken); };
+  { const Receipt forgotten(tell); }
+  EXPECT_EQ(told, std::vector<bool>{false});
+  Receipt(tell).Taken();
+  EXPECT_EQ(told, (std::vector<bool>{false, true}));
+  Receipt(tell).Cancel();
+  EXPECT_EQ(told.size(), 2U);
 }
 
 TEST_F(DeskTest, JobsAreFoundListedAndCancelled) {

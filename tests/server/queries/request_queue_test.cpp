@@ -82,5 +82,22 @@ TEST(RequestQueue, CloseLetsOutWhatIsInside) {
   waiting.join();
 }
 
+// A program can invent a client for each question; its participant it cannot.
+TEST(RequestQueue, SharesGoByWhoAsksAndNotByTheClientsItNames) {
+  RequestQueue queue(4);
+  const auto from = [](std::uint64_t asker, ClientId client, std::int64_t sequence) {
+    Request request = From(client, sequence);
+    request.asker = asker;
+    return request;
+  };
+  for (std::int64_t i = 1; i <= 4; ++i) EXPECT_FALSE(queue.Push(from(1, 100 + static_cast<ClientId>(i), i)));
+  const auto refused = queue.Push(from(2, 7, 1));
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->client, 104U);
+  EXPECT_EQ(Next(queue), Turn(101, 1));
+  EXPECT_EQ(Next(queue), Turn(7, 1)) << "the next turn is another's";
+  EXPECT_EQ(Next(queue), Turn(102, 2));
+}
+
 }  // namespace
 }  // namespace cairn::server

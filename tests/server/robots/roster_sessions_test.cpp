@@ -7,6 +7,7 @@
 #include <variant>
 #include <vector>
 
+#include "tests/eventually.h"
 #include "tests/server/robots/roster_fixture.h"
 
 namespace cairn::server {
@@ -131,7 +132,11 @@ TEST_F(RosterTest, EarlierSessionsAreBounded) {
   RobotsOptions options;
   options.max_earlier = 0;
   ASSERT_NO_FATAL_FAILURE(BeginAgain(roster(options), [&] { return WaitPhase("r1", 7, SessionPhase::kEnded); }));
-  EXPECT_EQ(roster().InSite("lab").size(), 1U);
+  // The thread that ended the session may not have left it yet.
+  EXPECT_TRUE(test::Eventually([&] {
+    roster().Tick();
+    return roster().InSite("lab").size() == 1;
+  }));
 }
 
 TEST_F(RosterTest, TheKeysOfASessionThatIsGoneAreGivenBack) {

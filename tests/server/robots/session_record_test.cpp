@@ -75,6 +75,26 @@ TEST_F(SessionRecordTest, AfterARestartWhatIsSentAgainComesFirst) {
   EXPECT_EQ(Dropped(ledger(), DropReason::kLostOnWire), 0U);
 }
 
+// A server that is started again every night ended no session ever.
+TEST_F(SessionRecordTest, ItIsAwayForAsLongAsBeforeTheRestart) {
+  const std::uint64_t now_ms = SessionRecord::MillisecondsNow();
+  record_.Restored(now_ms - 5000);
+  EXPECT_EQ(record_.quiet_since_ms(), now_ms - 5000);
+  const auto now = SessionRecord::Clock::now();
+  EXPECT_GE(record_.SuspendedFor(now), milliseconds(5000));
+  EXPECT_FALSE(record_.HasHadTime(now));
+  EXPECT_TRUE(record_.HasHadTime(now + std::chrono::hours(1)));
+  ASSERT_TRUE(record_.Resume(kOwner, kOwner));
+  EXPECT_EQ(record_.quiet_since_ms(), 0U);
+  ASSERT_TRUE(record_.SetPhase(SessionPhase::kEnded, {}));
+  EXPECT_GE(record_.quiet_since_ms(), now_ms);
+}
+
+TEST_F(SessionRecordTest, AClockThatWasSetBackMakesNobodyOlder) {
+  record_.Restored(SessionRecord::MillisecondsNow() + 3'600'000);
+  EXPECT_LT(record_.SuspendedFor(SessionRecord::Clock::now()), milliseconds(60000));
+}
+
 TEST_F(SessionRecordTest, AfterARestartBeforeTheFirstSampleTheFirstOneComesFirst) {
   record_.Restored();
   ASSERT_TRUE(record_.Resume(kOwner, kOwner));

@@ -187,6 +187,20 @@ TEST(StreamLedger, WhatTheJournalDoesNotHoldIsTakenBackAndComesAgain) {
   EXPECT_GT(saved, 450);
 }
 
+// After so many lasting gaps a checkpoint was refused whenever a sample waited, which is nearly always.
+TEST(StreamLedger, IsJournaledAlsoWhereItHasAsManyGapsAsItMayHave) {
+  StreamLedger ledger{Ledger{}};
+  for (std::uint64_t n = 1; n < 4000; n += 2) {
+    EXPECT_TRUE(ledger.Received(n));
+    ledger.Used(n, 1, false, 1.0);
+  }
+  EXPECT_TRUE(ledger.Received(4000));
+  const auto account = ledger.AsJournaled({});
+  ASSERT_TRUE(account);
+  EXPECT_EQ(account->ledger().waiting, 0U);
+  EXPECT_EQ(account->ledger().last_sequence, 3999U);
+}
+
 // Property: whatever arrives in whatever order, no scan vanishes and settled_through never goes back.
 TEST(StreamLedger, MissingNumbersAreDurableOnlyTogetherWithALaterOne) {
   StreamLedger ledger{Ledger{}};

@@ -242,7 +242,7 @@ TEST_F(RosRobot, AnInitialPoseBeginsANewSessionThere) {
   ros2::PoseWithCovariance start;
   start.header.frame = "map";
   start.pose.translation = {3.0, 4.0, 0.0};
-  robot_.TakeStart(start);
+  robot_.TakeStart(start, now_);
   Odom(2);
   Scan(2);
   const std::vector<InboundValue> values = Everything();
@@ -256,15 +256,32 @@ TEST_F(RosRobot, AnInitialPoseBeginsANewSessionThere) {
   EXPECT_EQ(request.T_map_robot_start.x, 3.0);
 }
 
+// The robot may have driven on since, where nobody could see it.
+TEST_F(RosRobot, AnInitialPoseThatCannotBeUsedSoonIsNotUsed) {
+  Open();
+  ros2::PoseWithCovariance start;
+  start.header.frame = "map";
+  robot_.TakeStart(start, now_);
+  static_cast<void>(Everything());
+  now_ += std::chrono::seconds(30);
+  Odom(2);
+  Scan(2);
+  const std::vector<InboundValue> values = Everything();
+  const auto request = std::ranges::find_if(
+      values, [](const InboundValue& value) { return std::holds_alternative<SessionRequest>(value); });
+  ASSERT_NE(request, values.end());
+  EXPECT_FALSE(std::get<SessionRequest>(*request).has_start);
+}
+
 TEST_F(RosRobot, AnInitialPoseInAnotherFrameIsIgnored) {
   Open();
   ros2::PoseWithCovariance start;
   start.header.frame = "odom";
-  robot_.TakeStart(start);
+  robot_.TakeStart(start, now_);
   EXPECT_TRUE(robot_.open());
   start.header.frame = "map";
   start.pose.translation.x() = std::nan("");
-  robot_.TakeStart(start);
+  robot_.TakeStart(start, now_);
   EXPECT_TRUE(robot_.open());
 }
 

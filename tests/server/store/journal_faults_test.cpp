@@ -8,8 +8,10 @@
 #include "server/store/journal.h"
 #include "server/store/sqlite_store.h"
 #include "tests/eventually.h"
+#include "tests/server/store/followed.h"
 #include "tests/server/store/sample_entries.h"
 #include "tests/server/store/stored_sites.h"
+#include "tests/temp_directory.h"
 
 namespace cairn::server::testing {
 namespace {
@@ -28,6 +30,9 @@ class FullAfterACheckpoint : public Store {
     return committed;
   }
   Result<void> CommitEach(const Next& next) override { return store_.CommitEach(next); }
+  Result<std::size_t> RemoveFirst(const RecordRange& range, std::size_t count) override {
+    return store_.RemoveFirst(range, count);
+  }
   Result<void> Read(const RecordRange& range, const Visit& visit) override { return store_.Read(range, visit); }
   Result<std::vector<std::uint64_t>> Owners(RecordKind kind) override { return store_.Owners(kind); }
   Result<std::vector<std::uint64_t>> Numbers(const RecordRange& range) override { return store_.Numbers(range); }
@@ -146,6 +151,103 @@ TEST(JournalFaults, ANewSessionTakesNothingOverFromAnotherOfItsNumber) {
   EXPECT_EQ(LastEntry(*store, 1), 1U);
 }
 
+// A session with a journal of 24 MB, in a file.
+std::unique_ptr<Store> StoreWithALongJournal(const std::filesystem::path& directory, std::uint64_t session) {
+  auto store = *OpenStore(directory);
+  Put(*store, SampleSite{});
+  for (std::uint64_t last = 1; last <= 3000; ++last) {
+    const std::string bytes = BytesOf(last, std::vector<JournalEntry>{SampleOdometry(last)}) + std::string(8000, 'x');
+    EXPECT_TRUE(store->Commit({.removed = {}, .put = {{{RecordKind::kJournal, session, last}, bytes}}}));
+  }
+  store.reset();  // The log goes into the file.
+  return *OpenStore(directory);
+}
+
+// Counts how records are removed piece by piece.
+class CountedRemovals : public Store {
+ public:
+  explicit CountedRemovals(Store& store) : store_(store) {}
+  Result<void> Commit(const RecordChanges& changes) override { return store_.Commit(changes); }
+  Result<void> CommitEach(const Next& next) override { return store_.CommitEach(next); }
+  Result<std::size_t> RemoveFirst(const RecordRange& range, std::size_t count) override {
+    auto removed = store_.RemoveFirst(range, count);
+    ++removals_;
+    if (removed && *removed > largest_removal_) largest_removal_ = *removed;
+    return removed;
+  }
+  Result<void> Read(const RecordRange& range, const Visit& visit) override { return store_.Read(range, visit); }
+  Result<std::vector<std::uint64_t>> Owners(RecordKind kind) override { return store_.Owners(kind); }
+  Result<std::vector<std::uint64_t>> Numbers(const RecordRange& range) override { return store_.Numbers(range); }
+  Result<std::uint64_t> bytes_used() override { return store_.bytes_used(); }
+  [[nodiscard]] std::size_t removals() const { return removals_; }
+  [[nodiscard]] std::size_t largest_removal() const { return largest_removal_; }
+
+ private:
+  Store& store_;
+  std::atomic<std::size_t> removals_{0}, largest_removal_{0};
+};
+
+// One removal of all of it would take long, with nothing else written meanwhile, and much room on the disk.
+TEST(JournalFaults, ALongJournalIsRemovedPieceByPieceWithHardlyAnyRoom) {
+  const TempDirectory directory;
+  const auto file = StoreWithALongJournal(directory.path(), 1);
+  const auto store = std::make_unique<CountedRemovals>(*file);
+  Followed told;
+  Journal journal(*store, {.commit_delay_ms = 1});
+  journal.Open(SampleSession(77), told.durable());
+  journal.Forget(1);
+  journal.Start();
+  std::size_t longest = 0;
+  ASSERT_TRUE(test::Eventually([&] {
+    longest = std::max<std::size_t>(longest, std::filesystem::file_size(directory.path() / "cairn.db-wal"));
+    journal.Append(77, SampleOdometry(1));
+    return store->Numbers({.kind = RecordKind::kJournal, .owner = 1})->empty();
+  }));
+  EXPECT_LT(longest, 4U << 20);
+  EXPECT_FALSE(HasSession(*store, 1));
+  EXPECT_EQ(store->largest_removal(), RemovedAtOnce(RecordKind::kJournal));
+  EXPECT_GE(store->removals(), 3000 / RemovedAtOnce(RecordKind::kJournal));
+}
+
+// A process that ends before all is removed leaves the rest to the next one, which does not give the number again.
+TEST(JournalFaults, WhatIsLeftOfASessionThatIsGoneIsRemovedAfterTheNextStart) {
+  const TempDirectory directory;
+  const auto store = StoreWithALongJournal(directory.path(), 500);
+  ASSERT_TRUE(store->Commit({.removed = {}, .put = {MarkOfRemoved(500)}}));
+  EXPECT_EQ(*LastSession(*store), 500U);
+  Journal journal(*store, {.commit_delay_ms = 1});
+  journal.Start();
+  journal.Open(SampleSession(501), {});
+  ASSERT_TRUE(test::Eventually([&] { return store->Numbers({.kind = RecordKind::kJournal, .owner = 500})->empty(); }));
+  EXPECT_TRUE(HasSession(*store, 501));
+  EXPECT_GT(LastEntry(*store, 1), 0U) << "of a session that is there";
+  EXPECT_TRUE(test::Eventually([&] { return store->Owners(RecordKind::kRemoved)->empty(); }));
+}
+
+// It ended with the first exception, while new sessions were said to be stored.
+TEST(JournalFaults, AfterAnExceptionTheJournalGoesOnAndItsSessionsAreStoredAgain) {
+  const auto store = MemoryStore();
+  Followed told, later;
+  Journal journal(*store, {.commit_delay_ms = 1});
+  journal.Start();
+  journal.Open(SampleSession(1), told.durable());
+  ASSERT_TRUE(test::Eventually([&] { return told.through == 0; }));
+  journal.Put({RecordKind::kJob, 99, 0}, []() -> std::string { throw std::bad_alloc(); });
+  ASSERT_TRUE(test::Eventually([&] { return journal.IsLost(1); }));
+  EXPECT_TRUE(journal.health().degraded);
+  EXPECT_EQ(journal.Append(1, SampleOdometry(1)), 0U);
+  journal.Open(SampleSession(2), later.durable());
+  EXPECT_EQ(journal.Append(2, SampleOdometry(1)), 1U);
+  EXPECT_TRUE(test::Eventually([&] { return later.through == 1; }));
+  const std::uint64_t position = journal.Recover(1);
+  ASSERT_GT(position, 0U);
+  std::atomic<bool> done = false;
+  ASSERT_TRUE(journal.Checkpoint(
+      1, position, [] { return CheckpointContent{"all"}; }, [&](bool stored) { done = stored; }));
+  EXPECT_TRUE(test::Eventually([&] { return done.load(); }));
+  EXPECT_FALSE(journal.IsLost(1));
+}
+
 // Longer records do not fit.
 class SmallRecords : public Store {
  public:
@@ -156,6 +258,9 @@ class SmallRecords : public Store {
     return store_.Commit(changes);
   }
   Result<void> CommitEach(const Next& next) override { return store_.CommitEach(next); }
+  Result<std::size_t> RemoveFirst(const RecordRange& range, std::size_t count) override {
+    return store_.RemoveFirst(range, count);
+  }
   Result<void> Read(const RecordRange& range, const Visit& visit) override { return store_.Read(range, visit); }
   Result<std::vector<std::uint64_t>> Owners(RecordKind kind) override { return store_.Owners(kind); }
   Result<std::vector<std::uint64_t>> Numbers(const RecordRange& range) override { return store_.Numbers(range); }

@@ -74,6 +74,7 @@ TEST(ImportSite, GivesNewNumbersBesideOtherSites) {
   EXPECT_TRUE(*ReadCheckpoint(*store, 15));
   // What was there is as it was, and goes without a trace.
   ASSERT_TRUE(DeleteSite(*store, "hall"));
+  ASSERT_TRUE(RemoveRests(*store));
   EXPECT_EQ(Everything(*store), before);
 }
 
@@ -326,6 +327,7 @@ TEST(DeleteSession, ItsScansAndItsPartOfTheMapAreGone) {
   Put(*store, {});
   ASSERT_TRUE(store->Commit({.removed = {}, .put = {{{RecordKind::kRestoring, 1, 0}, "a mark"}}}));
   ASSERT_TRUE(DeleteSession(*store, "lab", 1));
+  ASSERT_TRUE(RemoveRests(*store));
   for (const auto& [key, bytes] : Everything(*store)) {
     const bool of_session = key.kind == RecordKind::kSession || key.kind == RecordKind::kJournal ||
                             key.kind == RecordKind::kCheckpoint || key.kind == RecordKind::kRestoring;

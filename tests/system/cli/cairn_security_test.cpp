@@ -20,7 +20,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 struct SecureOutcome {
-  ExitCode code;
+  ExitCode code = ExitCode::kFailed;
   std::string out;
   std::string err;
 };
@@ -168,18 +168,21 @@ TEST_F(SecureServer, ARecorderReadsWhatRobotsSendAndAViewerOnlyTheRest) {
   IsDenied("recorders/c", Drive("r", 1));
   IsDenied("recorders/c", {"job", "smooth", "--site", "hall", "--wait"});
   nlohmann::json of_recorder, of_viewer;
-  // A handshake of Fast DDS 2.9 gets stuck now and then, and takes its time on a busy machine.
+  SecureOutcome of_robot;
+  // A handshake of Fast DDS 2.9 gets stuck now and then, of the robot as well, and takes its time on a busy machine.
   for (int attempt = 0; attempt < 5; ++attempt) {
     std::thread robot([&] {
-      Works("robots/r1",
-            {"sim", "--robots", "1", "--prefix", "r", "--seconds", "10", "--beams", "91", "--site", "hall"});
+      of_robot = Cairn("robots/r1",
+                       {"sim", "--robots", "1", "--prefix", "r", "--seconds", "10", "--beams", "91", "--site", "hall"});
     });
     std::thread recorder([&] { of_recorder = record("recorders/c", "all.mcap", "12"); });
     of_viewer = record("viewers/v", "poses.mcap", "12");
     recorder.join();
     robot.join();
-    if (of_recorder["scans"] > 0 && of_recorder["odometry"] > 0 && of_viewer["poses"] > 0) break;
+    const bool all_heard = of_recorder["scans"] > 0 && of_recorder["odometry"] > 0 && of_viewer["poses"] > 0;
+    if (of_robot.code == ExitCode::kOk && all_heard) break;
   }
+  EXPECT_EQ(of_robot.code, ExitCode::kOk) << of_robot.out << of_robot.err;
   EXPECT_GT(of_recorder["scans"], 0);
   EXPECT_GT(of_recorder["odometry"], 0);
   EXPECT_EQ(of_recorder["robots"], nlohmann::json({"r1"}));

@@ -89,6 +89,23 @@ TEST(OdometryPairing, AJumpOfOdometryIsNotCorrected) {
   EXPECT_EQ(p.pairs[2].T_odom_robot, (Pose2{500, 0, 0}));
 }
 
+// A base that was started again near where it was switched on: no jump is too far for a drive, so zero says it.
+TEST(OdometryPairing, OdometryThatBeginsAtZeroIsNotDrivenThere) {
+  for (const double x : {0.3, 2.0, 5.0}) {
+    for (const double seconds : {0.1, 1.5, 5.0}) {
+      Pairing p;
+      p.OdometryAt(1 * kSecond, x - 0.01);
+      p.OdometryAt(2 * kSecond, x);
+      p.ScanAt(2 * kSecond);
+      const Stamp anew = 2 * kSecond + StampFromSeconds(seconds);
+      p.OdometryAt(anew, 0.0);
+      p.ScanAt(anew);
+      ASSERT_EQ(p.pairs.size(), 2U) << x;
+      EXPECT_EQ(p.passages[1], Passage::kUnknown) << x << " m, " << seconds << " s";
+    }
+  }
+}
+
 // The sample that belongs to one scan exactly is also the one before the next scan.
 TEST(OdometryPairing, AnExactPairLeavesItsSampleForTheNextScan) {
   Pairing p;

@@ -13,6 +13,7 @@ struct Pairing {
   explicit Pairing(const PairingOptions& options = {})
       : pairing(options, {[this](PairedScan&& p) {
                             pairs.push_back({p.scan->stamp, p.T_odom_robot});
+                            passages.push_back(p.passage);
                             grows &= pairs.size() == 1 || p.stamp > estimator_time;
                             estimator_time = p.stamp;
                           },
@@ -37,6 +38,7 @@ struct Pairing {
     bool operator==(const Paired&) const = default;
   };
   std::vector<Paired> pairs;
+  std::vector<Passage> passages;  // Of each pair.
   std::vector<std::pair<Stamp, DropReason>> drops;
   bool grows = true;  // The estimator's time, from pair to pair.
   Stamp estimator_time = 0;

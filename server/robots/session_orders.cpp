@@ -1,0 +1,61 @@
+// What people and other parts of the server tell a session's estimator to do (session.h).
+#include <utility>
+
+#include "server/robots/session.h"
+
+namespace cairn::server {
+namespace {
+
+constexpr std::chrono::minutes kMapPeriod{10};  // A robot that is only localised gets a map that others draw so often.
+
+tl::unexpected<Status> TooMany() {
+  return cairn::Fail(StatusCode::kResourceExhausted, "too many commands wait for the robot's estimator");
+}
+
+}  // namespace
+
+Result<void> Session::Relocalise(const std::optional<Pose2>& T_map_robot, std::shared_ptr<Receipt> receipt) {
+  if (ending_) return cairn::Fail(StatusCode::kFailedPrecondition, "the session has ended");
+  if (T_map_robot && record_.joining().fragment && !record_.localises())
+    return cairn::Fail(StatusCode::kFailedPrecondition,
+                       "the robot is not joined with the map of its site, so no pose in that map can be used");
+  if (!queue_.Push(RelocaliseWanted{T_map_robot, std::move(receipt)})) return TooMany();
+  Schedule();
+  return {};
+}
+
+Result<void> Session::Localise(std::shared_ptr<const MapSnapshot> map, std::shared_ptr<Receipt> receipt) {
+  if (ending_) return cairn::Fail(StatusCode::kFailedPrecondition, "the session has ended");
+  const KnownMap known{map->info.epoch, map->info.version, SessionRecord::Clock::now()};
+  const MutexLock lock(known_map_mutex_);
+  if (!queue_.Push(LocaliseWanted{std::move(map), false, std::move(receipt)})) return TooMany();
+  known_map_ = known;
+  Schedule();
+  return {};
+}
+
+Result<void> Session::MapAgain(std::shared_ptr<Receipt> receipt) {
+  if (ending_) return cairn::Fail(StatusCode::kFailedPrecondition, "the session has ended");
+  if (record_.joining().fragment)
+    return cairn::Fail(StatusCode::kFailedPrecondition,
+                       "the robot is not joined with the map of its site: it can only open a new session");
+  if (record_.localises() && !record_.snapshot().status.pose.localized)
+    return cairn::Fail(StatusCode::kFailedPrecondition, "the robot's place in the map is not known");
+  if (!queue_.Push(LocaliseWanted{nullptr, false, std::move(receipt)})) return TooMany();
+  Schedule();
+  return {};
+}
+
+void Session::KeepUpWith(const std::shared_ptr<const MapSnapshot>& map) {
+  if (record_.phase() != SessionPhase::kActive) return;
+  const auto now = SessionRecord::Clock::now();
+  const MutexLock lock(known_map_mutex_);
+  const bool moved = !known_map_ || known_map_->epoch != map->info.epoch;
+  const bool drawn = known_map_ && known_map_->version != map->info.version && now - known_map_->given > kMapPeriod;
+  if (!moved && !drawn) return;
+  if (!queue_.Push(LocaliseWanted{map, true})) return;  // The next call tries again.
+  known_map_ = {map->info.epoch, map->info.version, now};
+  Schedule();
+}
+
+}  // namespace cairn::server
