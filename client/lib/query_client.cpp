@@ -52,8 +52,7 @@ Request AboutJob(RequestKind kind, std::uint64_t id) {
 
 }  // namespace
 
-QueryClient::QueryClient(wire::Bus& bus, const QueryClientOptions& options)
-    : bus_(bus), options_(options), id_(NewClientId()) {}
+QueryClient::QueryClient(wire::Bus& bus, const QueryClientOptions& options) : bus_(bus), options_(options) {}
 
 QueryClient::~QueryClient() {
   const std::shared_ptr<Wire> last = CurrentWire();
@@ -72,6 +71,7 @@ Result<std::unique_ptr<QueryClient>> QueryClient::Create(wire::Bus& bus, const Q
 Result<std::shared_ptr<QueryClient::Wire>> QueryClient::Connect(wire::Bus& bus) {
   auto wire = std::make_shared<Wire>();
   wire->bus = &bus;
+  wire->client = NewClientId();
   wire::SubscriptionEvents events;
   events.matched = [this](int matched) {
     const MutexLock lock(mutex_);
@@ -79,7 +79,7 @@ Result<std::shared_ptr<QueryClient::Wire>> QueryClient::Connect(wire::Bus& bus) 
     changed_.NotifyAll();
   };
   auto replies = bus.SubscribeReplies(
-      id_, [this](Reply&& part) { OnReply(std::move(part)); }, std::move(events));
+      wire->client, [this](Reply&& part) { OnReply(std::move(part)); }, std::move(events));
   if (!replies) return tl::unexpected(replies.error());
   wire->replies = std::move(*replies);
   auto requests = bus.Advertise<Request>();
@@ -173,13 +173,14 @@ Result<void> QueryClient::WaitForServer(bool command, Deadline deadline) {
 }
 
 Result<Reply> QueryClient::AskOnce(Request request, Deadline begun, Deadline deadline) {
-  request.client = id_;
+  const std::shared_ptr<Wire> wire = CurrentWire();
+  request.client = wire->client;
   {
     const MutexLock lock(mutex_);
     request.sequence = ++sequence_;
     pending_.try_emplace(request.sequence);
   }
-  const Result<void> published = CurrentWire()->Publish(request);
+  const Result<void> published = wire->Publish(request);
   const MutexLock lock(mutex_);
   const auto pending = pending_.find(request.sequence);
   const auto until = [&] { return pending->second.parts() > 0 ? deadline : begun; };

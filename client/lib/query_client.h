@@ -141,6 +141,9 @@ class QueryClient {
   struct Wire {
     std::unique_ptr<wire::Bus> own;  // Null for the first, which uses the caller's.
     wire::Bus* bus = nullptr;
+    // A new one each time: replies come in the partition that it chooses (wire/partitions.h), and forged messages may
+    // have spoiled one of them.
+    ClientId client = 0;
     std::unique_ptr<wire::Publication<Request>> requests;
     // Not every identity may send commands.
     Result<std::unique_ptr<wire::Publication<Command>>> commands = nullptr;
@@ -162,7 +165,6 @@ class QueryClient {
 
   wire::Bus& bus_;
   const QueryClientOptions options_;
-  const ClientId id_;
 
   mutable Mutex mutex_;
   CondVar changed_;
