@@ -25,8 +25,8 @@ struct DriveLimits {
 // that comes by has `moved_before`, from sample to sample, as it does now; nothing if that is not known.
 [[nodiscard]] bool BeginsAtZero(const Pose2& pose, const Pose2& moved, const std::optional<Pose2>& moved_before);
 
-// Whether two successive samples may belong to one drive; BeginsAtZero is asked apart. `speed_m_s` is how fast the
-// robot was before, nothing if that is not known: a robot that stood is not two metres away after a second.
+// Whether two successive samples may belong to one drive; call BeginsAtZero as well. `speed_m_s` is how fast the robot
+// was before, nothing if that is not known: a robot that stood is not four metres away after a gap of 1.5 s.
 [[nodiscard]] bool MayBeOneDrive(const Odometry& before, const Odometry& after, std::optional<double> speed_m_s,
                                  const DriveLimits& limits = {});
 
