@@ -26,19 +26,13 @@ bool RobotClient::ReadyToReopen() const {
 
 void RobotClient::WatchOdometry(const Odometry& odometry) {
   constexpr std::size_t kMaxBeginnings = 64;
-  if (!newest_odometry_.empty()) {
-    const Odometry& last = newest_odometry_.back();
-    std::optional<double> speed_m_s;
-    std::optional<Pose2> moved_before;
-    if (newest_odometry_.size() >= 2) {
-      speed_m_s = SpeedBetween(newest_odometry_.front(), last);
-      moved_before = Between(newest_odometry_.front().T_odom_robot, last.T_odom_robot);
-    }
-    const Pose2 moved = Between(last.T_odom_robot, odometry.T_odom_robot);
-    if (BeginsAtZero(odometry.T_odom_robot, moved, moved_before) || !MayBeOneDrive(last, odometry, speed_m_s)) {
-      began_anew_.push_back(odometry.stamp);
-      newest_odometry_.clear();
-    }
+  const std::size_t known = newest_odometry_.size();
+  if (known > 0 && !GoesOn({.earlier = known >= 2 ? &newest_odometry_.front() : nullptr,
+                            .before = newest_odometry_.back(),
+                            .after = odometry,
+                            .logged = odometry.T_odom_robot})) {
+    began_anew_.push_back(odometry.stamp);
+    newest_odometry_.clear();
   }
   newest_odometry_.push_back(odometry);
   if (newest_odometry_.size() > 2) newest_odometry_.pop_front();

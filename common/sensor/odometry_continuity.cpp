@@ -22,6 +22,20 @@ bool IsWithin(const Pose2& pose, double distance_m, double angle_rad) {
 
 }  // namespace
 
+bool GoesOn(const OdometryStep& step, const DriveLimits& limits) {
+  std::optional<double> speed_m_s;
+  std::optional<Pose2> moved_before;
+  if (step.earlier != nullptr) {
+    speed_m_s = SpeedBetween(*step.earlier, step.before, limits);
+    moved_before = Between(step.earlier->T_odom_robot, step.before.T_odom_robot);
+  }
+  const Pose2& before = step.before.T_odom_robot;
+  const Pose2& after = step.after.T_odom_robot;
+  if (BeginsAtZero(step.logged, Between(before, after), moved_before)) return false;
+  return step.time_known ? MayBeOneDrive(step.before, step.after, speed_m_s, limits)
+                         : IsAtSamePlace(before, after, limits);
+}
+
 bool IsAtSamePlace(const Pose2& before, const Pose2& after, const DriveLimits& limits) {
   return IsWithin(Between(before, after), limits.same_place_m, limits.same_heading_rad);
 }

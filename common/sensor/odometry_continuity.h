@@ -21,11 +21,23 @@ struct DriveLimits {
 // After a gap or an unknown time.
 [[nodiscard]] bool IsAtSamePlace(const Pose2& before, const Pose2& after, const DriveLimits& limits = {});
 
+// Two samples of odometry, one after the other.
+struct OdometryStep {
+  const Odometry* earlier = nullptr;  // The one before `before`, if it is known to be of the same drive.
+  const Odometry& before;
+  const Odometry& after;
+  const Pose2& logged;     // Of `after`, as the base has sent it, where `after` was corrected.
+  bool time_known = true;  // Whether the stamps of `before` and `after` are of the same clock.
+};
+
+// Whether odometry goes on with this step. The functions below are its parts.
+[[nodiscard]] bool GoesOn(const OdometryStep& step, const DriveLimits& limits = {});
+
 // Whether a pose that the robot has `moved` to is one where odometry begins: at zero, without having been near. A robot
 // that comes by has `moved_before`, from sample to sample, as it does now; nothing if that is not known.
 [[nodiscard]] bool BeginsAtZero(const Pose2& pose, const Pose2& moved, const std::optional<Pose2>& moved_before);
 
-// Whether two successive samples may belong to one drive; call BeginsAtZero as well. `speed_m_s` is how fast the robot
+// Whether two successive samples may belong to one drive, by their distance. `speed_m_s` is how fast the robot
 // was before, nothing if that is not known: a robot that stood is not four metres away after a gap of 1.5 s.
 [[nodiscard]] bool MayBeOneDrive(const Odometry& before, const Odometry& after, std::optional<double> speed_m_s,
                                  const DriveLimits& limits = {});

@@ -5,10 +5,17 @@
 #include <fastdds/rtps/history/History.h>
 #include <fastdds/rtps/history/ReaderHistory.h>
 #include <fastdds/rtps/resources/TimedEvent.h>
+#include <fastdds/rtps/writer/LivelinessManager.h>
 #include <fastrtps/fastrtps_dll.h>
 
+#include <algorithm>
 #include <chrono>
+#include <deque>
+#include <map>
 #include <mutex>
+#include <utility>
+
+#include "common/mutex.h"
 
 namespace cairn::wire {
 
@@ -17,6 +24,57 @@ void UseRepairs() {}
 }  // namespace cairn::wire
 
 #if FASTRTPS_VERSION_MAJOR == 2 && FASTRTPS_VERSION_MINOR == 9
+
+namespace cairn::wire {
+namespace {
+
+using eprosima::fastrtps::rtps::LivelinessManager;
+
+// Tells of changes of liveliness in the order in which they were made, one after the other. Thread-safe.
+class LivelinessNews {
+ public:
+  using News = std::function<void()>;
+
+  static LivelinessNews& Instance() {
+    static LivelinessNews instance;
+    return instance;
+  }
+  // Called while the manager's own mutex is held, so that the order is that of the changes.
+  void Add(const LivelinessManager* manager, News news) {
+    const MutexLock lock(mutex_);
+    waiting_[manager].news.push_back(std::move(news));
+  }
+  // Called without a mutex. What another thread has added while this one tells is told here as well.
+  void Tell(const LivelinessManager* manager) {
+    mutex_.Lock();
+    const auto found = waiting_.find(manager);
+    if (found == waiting_.end() || found->second.telling) {
+      mutex_.Unlock();
+      return;
+    }
+    found->second.telling = true;  // Nobody else erases it now.
+    while (!found->second.news.empty()) {
+      const News news = std::move(found->second.news.front());
+      found->second.news.pop_front();
+      mutex_.Unlock();
+      news();
+      mutex_.Lock();
+    }
+    waiting_.erase(found);
+    mutex_.Unlock();
+  }
+
+ private:
+  struct Waiting {
+    std::deque<News> news;
+    bool telling = false;
+  };
+  Mutex mutex_;
+  std::map<const LivelinessManager*, Waiting> waiting_ CAIRN_GUARDED_BY(mutex_);
+};
+
+}  // namespace
+}  // namespace cairn::wire
 
 namespace eprosima::fastrtps::rtps {
 
@@ -71,6 +129,51 @@ History::const_iterator History::get_change_nts(const SequenceNumber_t& seq, con
     if (!of_reader) break;
   }
   return next;
+}
+
+// The library changes a writer's state under a mutex and tells of it later, without one. Where a process stood still
+// for longer than a lease, the thread of timers says that writers are lost in the moment in which the thread that
+// receives says that they are back. The two could arrive in the other order, or as one change by nothing: then a robot
+// counted as away for ever although it was there (seen in a test on a loaded machine). Now what happened first is told
+// first. The library also kept a pointer to the writer that is due next, into a list from which others are removed; all
+// that are due are looked for instead.
+bool LivelinessManager::timer_expired() {
+  auto& news = cairn::wire::LivelinessNews::Instance();
+  {
+    const eprosima::shared_lock<eprosima::shared_mutex> collection(col_mutex_);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto now = std::chrono::steady_clock::now();
+    for (LivelinessData& writer : writers_) {
+      if (writer.status != LivelinessData::WriterStatus::ALIVE || writer.time > now) continue;
+      writer.status = LivelinessData::WriterStatus::NOT_ALIVE;
+      news.Add(this, [this, guid = writer.guid, kind = writer.kind, lease = writer.lease_duration] {
+        if (callback_) callback_(guid, kind, lease, -1, 1);
+      });
+    }
+  }
+  news.Tell(this);
+  if (!calculate_next()) return false;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (timer_owner_ == nullptr) return false;
+  const auto left = std::chrono::ceil<std::chrono::milliseconds>(timer_owner_->time - std::chrono::steady_clock::now());
+  timer_.update_interval_millisec(static_cast<double>(std::max<std::int64_t>(left.count(), 0)));
+  return true;
+}
+
+void LivelinessManager::assert_writer_liveliness(LivelinessData& writer) {
+  auto& news = cairn::wire::LivelinessNews::Instance();
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto before = writer.status;
+    writer.status = LivelinessData::WriterStatus::ALIVE;
+    writer.time = std::chrono::steady_clock::now() + std::chrono::nanoseconds(writer.lease_duration.to_ns());
+    if (before == LivelinessData::WriterStatus::ALIVE) return;
+    const int fewer_lost = before == LivelinessData::WriterStatus::NOT_ALIVE ? -1 : 0;
+    news.Add(this, [this, guid = writer.guid, kind = writer.kind, lease = writer.lease_duration, fewer_lost] {
+      if (callback_) callback_(guid, kind, lease, 1, fewer_lost);
+    });
+  }
+  news.Tell(this);
 }
 
 }  // namespace eprosima::fastrtps::rtps

@@ -181,16 +181,12 @@ void OdometryPairing::BeginAnew(Passage passage) {
 bool OdometryPairing::Follows(const Odometry& odometry, const Pose2& logged) const {
   const DriveLimits limits{options_.max_gap_s, options_.max_speed_m_s, options_.same_place_m,
                            options_.same_heading_rad};
-  std::optional<double> speed_m_s;
-  std::optional<Pose2> moved_before;
-  if (odometry_.size() >= 2) {
-    const Odometry& before = *std::prev(odometry_.end(), 2);
-    speed_m_s = SpeedBetween(before, odometry_.back(), limits);
-    moved_before = Between(before.T_odom_robot, odometry_.back().T_odom_robot);
-  }
-  if (BeginsAtZero(logged, Between(newest_->T_odom_robot, odometry.T_odom_robot), moved_before)) return false;
-  if (!time_known_) return IsAtSamePlace(newest_->T_odom_robot, odometry.T_odom_robot, limits);
-  return MayBeOneDrive(*newest_, odometry, speed_m_s, limits);
+  return GoesOn({.earlier = odometry_.size() >= 2 ? &*std::prev(odometry_.end(), 2) : nullptr,
+                 .before = *newest_,
+                 .after = odometry,
+                 .logged = logged,
+                 .time_known = time_known_},
+                limits);
 }
 
 void OdometryPairing::Pair(const std::shared_ptr<const Scan>& scan, const Pose2& T_odom_robot) {

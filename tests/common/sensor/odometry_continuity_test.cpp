@@ -46,6 +46,18 @@ TEST(OdometryContinuity, AfterALongGapOnlyTheSamePlaceGoesOn) {
   EXPECT_FALSE(MayBeOneDrive(At(60.0, {3, 0, 0}), At(0.0, {4.5, 0, 0}), 1.0)) << "a clock that was set back";
 }
 
+TEST(OdometryContinuity, AStepIsJudgedByTheOneBefore) {
+  const Odometry earlier = At(9.9, {5, 0, 0}), before = At(10.0, {5, 0, 0}), far = At(11.5, {9.0, 0, 0});
+  const auto goes_on = [&](const Odometry* known, const Odometry& after, bool time_known = true) {
+    return GoesOn({known, before, after, after.T_odom_robot, time_known});
+  };
+  EXPECT_TRUE(goes_on(nullptr, far));
+  EXPECT_FALSE(goes_on(&earlier, far)) << "it stood";
+  EXPECT_FALSE(goes_on(nullptr, At(10.1, {0, 0, 0}))) << "it begins at zero";
+  EXPECT_TRUE(goes_on(nullptr, At(3.0, {5.2, 0, 0}), false));
+  EXPECT_FALSE(goes_on(nullptr, At(10.1, {6.2, 0, 0}), false)) << "of another clock, and somewhere else";
+}
+
 TEST(OdometryContinuity, TheSpeedIsBounded) {
   EXPECT_DOUBLE_EQ(SpeedBetween(At(0.0, {0, 0, 0}), At(0.5, {1, 0, 0})), 2.0);
   EXPECT_DOUBLE_EQ(SpeedBetween(At(0.0, {0, 0, 0}), At(0.0, {1, 0, 0})), 3.0);

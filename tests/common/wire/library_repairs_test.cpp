@@ -1,9 +1,13 @@
 #include "common/wire/library_repairs.h"
 
 #include <fastdds/rtps/history/ReaderHistory.h>
+#include <fastdds/rtps/resources/ResourceEvent.h>
+#include <fastdds/rtps/writer/LivelinessManager.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <memory>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -70,6 +74,41 @@ TEST(LibraryRepairs, WhereAChangeIsMissingTheNextOneOfItsWriterIsGiven) {
   ASSERT_NE(next, history.changesEnd());
   EXPECT_EQ((*next)->sequenceNumber.low, 5U);
   EXPECT_EQ(history.get_change_nts({0, 6}, WriterOf(1), &found, history.changesBegin()), history.changesEnd());
+}
+
+// Leases run out while they are renewed, as where a process stood still: a loss and a return must be told in turn. The
+// library's own functions told two losses or two returns after each other, or both at the same time.
+TEST(LibraryRepairs, ChangesOfLivelinessAreToldInTheirOrder) {
+  UseRepairs();
+  constexpr int kLosses = 300;
+  const auto kind = eprosima::fastdds::dds::AUTOMATIC_LIVELINESS_QOS;
+  const eprosima::fastrtps::Duration_t lease(0, 2'000'000);
+  std::atomic<int> alive{0};
+  std::atomic<int> losses{0};
+  std::atomic<int> out_of_order{0};
+  std::atomic<int> telling{0};
+  rtps::ResourceEvent events;
+  events.init_thread();
+  {
+    rtps::LivelinessManager manager(
+        [&](const rtps::GUID_t&, const auto&, const auto&, std::int32_t alive_change, std::int32_t) {
+          if (telling.fetch_add(1) != 0) ++out_of_order;
+          std::this_thread::sleep_for(std::chrono::microseconds(200));  // So that another thread may overtake it.
+          if (alive.fetch_add(alive_change) + alive_change != (alive_change > 0 ? 1 : 0)) ++out_of_order;
+          if (alive_change < 0) ++losses;
+          telling.fetch_sub(1);
+        },
+        events, true);
+    ASSERT_TRUE(manager.add_writer(WriterOf(1), kind, lease));
+    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (losses < kLosses && std::chrono::steady_clock::now() < deadline) {
+      manager.assert_liveliness(WriterOf(1), kind, lease);
+      std::this_thread::sleep_for(std::chrono::microseconds(2200));  // About as long as the lease.
+    }
+    events.stop_thread();
+  }
+  EXPECT_GE(losses, kLosses);
+  EXPECT_EQ(out_of_order, 0);
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 // soon they flow again. Everything is on loopback in a domain of its own. Recording the traffic needs CAP_NET_RAW.
 // --seconds: of the long part (600); --runs: of the short ones (100).
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <future>
 #include <map>
 #include <memory>
@@ -11,6 +13,7 @@
 #include "client/lib/map_client.h"
 #include "client/lib/pose_client.h"
 #include "client/lib/query_client.h"
+#include "common/wire/partitions.h"
 #include "tests/eventually.h"
 #include "tests/must.h"
 #include "tests/studies/fleet/live_server.h"
@@ -216,6 +219,39 @@ class Viewer {
   std::unique_ptr<client::QueryClient> queries_;
 };
 
+// The partitions of replies in which a client that has just joined gets no answer to a ping.
+std::vector<int> SilentPartitions() {
+  wire::WireOptions options;
+  options.domain = TestDomain();
+  const auto bus = test::Must(wire::Bus::Create(options, "partitions"));
+  std::array<std::atomic<bool>, wire::kReplyPartitions> answered{};
+  const auto requests = test::Must(bus->Advertise<Request>());
+  std::vector<std::unique_ptr<wire::Subscription>> replies;
+  for (std::uint64_t partition = 0; partition < wire::kReplyPartitions; ++partition) {
+    replies.push_back(test::Must(bus->SubscribeReplies(wire::kReplyPartitions + partition,
+                                                       [&, partition](Reply&&) { answered[partition] = true; }, {})));
+  }
+  const auto all = [&] {
+    for (std::uint64_t partition = 0; partition < wire::kReplyPartitions; ++partition) {
+      if (answered[partition]) continue;
+      Request ping;
+      ping.kind = RequestKind::kPing;
+      ping.client = wire::kReplyPartitions + partition;
+      ping.sequence = 1;
+      static_cast<void>(requests->Publish(ping));
+    }
+    return test::Eventually(
+        [&] { return std::all_of(answered.begin(), answered.end(), [](const auto& it) { return it.load(); }); },
+        std::chrono::milliseconds(100));
+  };
+  std::vector<int> silent;
+  if (test::Eventually(all, std::chrono::seconds(4))) return silent;
+  for (std::uint64_t partition = 0; partition < wire::kReplyPartitions; ++partition) {
+    if (!answered[partition]) silent.push_back(static_cast<int>(partition));
+  }
+  return silent;
+}
+
 struct Outcome {
   std::uint64_t sent = 0;
   double seconds = 0.0;
@@ -227,6 +263,8 @@ struct Outcome {
   std::vector<double> flows_s;    // From the end of the traffic until everything flows.
   std::vector<double> shows_s;    // From the end of the traffic until the viewer has new poses and the present map.
   Viewer::News news;              // The same for each of its parts, in the last run.
+  std::vector<int> silent;        // The partitions of replies that were silent after the last run,
+  int silent_runs = 0;            // and how many runs left one.
 };
 
 // One run: traffic for so long, then the time until everything flows.
@@ -257,6 +295,8 @@ void Attack(HostileFleet& fleet, Viewer& viewer, double seconds, std::uint64_t s
   outcome.flows_s.push_back(fleet.AwaitFlow(120.0));
   outcome.news = shows.get();
   outcome.shows_s.push_back(outcome.news.all_s());
+  outcome.silent = SilentPartitions();
+  outcome.silent_runs += outcome.silent.empty() ? 0 : 1;
   for (std::string& dead : fleet.Bury()) outcome.deaths.push_back(std::move(dead));
 }
 
@@ -287,6 +327,9 @@ void Print(Report& report, const std::string& name, const Outcome& outcome) {
   report.Text("Silences after deaths (s): " + (silences.empty() ? "none" : silences));
   report.Expect(outcome.deaths.empty(), "a process died");
   report.Expect(within == static_cast<long>(outcome.flows_s.size()), "a stream did not flow again within 5 s");
+  report.Text("Runs after which a client that had just joined got no answer in a partition of replies: " +
+              Count(outcome.silent_runs));
+  report.Expect(outcome.silent_runs == 0, "a partition of replies stayed silent");
   report.Expect(shown == static_cast<long>(outcome.shows_s.size()), "a viewer did not see all again within 5 s");
 }
 
@@ -311,6 +354,7 @@ void StudyHostile(StudyContext& context) {
       report.Progress("run " + Count(run + 1) + ": flows again after " + Number(outcome.flows_s.back(), 2) +
                       " s, the viewer has poses after " + Number(outcome.news.poses_s, 2) + " s, an answer after " +
                       Number(outcome.news.answer_s, 2) + " s, the map after " + Number(outcome.news.map_s, 2) + " s, " +
+                      Count(static_cast<long long>(outcome.silent.size())) + " partitions of replies are silent, " +
                       Count(static_cast<long long>(outcome.deaths.size())) + " deaths so far" +
                       (outcome.deaths.empty() ? "" : ", the last one " + outcome.deaths.back()));
     }
