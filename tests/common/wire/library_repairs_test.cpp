@@ -101,9 +101,11 @@ TEST(LibraryRepairs, ChangesOfLivelinessAreToldInTheirOrder) {
         events, true);
     ASSERT_TRUE(manager.add_writer(WriterOf(1), kind, lease));
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-    while (losses < kLosses && std::chrono::steady_clock::now() < deadline) {
+    for (int i = 0; losses < kLosses && std::chrono::steady_clock::now() < deadline; ++i) {
       manager.assert_liveliness(WriterOf(1), kind, lease);
-      std::this_thread::sleep_for(std::chrono::microseconds(2200));  // About as long as the lease.
+      // From half the lease (the library counts whole milliseconds) to more than the lease, so that a loss and a
+      // return meet at every moment.
+      std::this_thread::sleep_for(std::chrono::microseconds(800 + 20 * (i % 80)));
     }
     events.stop_thread();
   }
