@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <fastdds/dds/log/Log.hpp>
 #include <mutex>
+#include <random>
 
 #include "common/wire/library_repairs.h"
 #include "common/wire/security.h"
@@ -29,6 +30,19 @@ using eprosima::fastrtps::Duration_t;
 // Two programs that start together on a busy machine may miss each other's first announcements. With this
 // period they find each other a few seconds later, even if the lease is long.
 constexpr double kMaxAnnouncementPeriodS = 3.0;
+
+// Fast DDS numbers the participants of a process one after the other, so their GUIDs differ in a few bits. A datagram
+// that was damaged or forged, with another GUID in the place of one that is known, then often names a participant that
+// is still to come; peers keep what they were told of it, and do not believe the true one. A client that had joined
+// anew because it was deaf stayed deaf so, several times in a row (cairn-study hostile). Random bytes are not hit.
+rtps::GuidPrefix_t UnpredictablePrefix() {
+  rtps::GuidPrefix_t prefix;
+  std::copy(rtps::c_VendorId_eProsima.begin(), rtps::c_VendorId_eProsima.end(), prefix.value);
+  std::random_device device;
+  std::generate(prefix.value + rtps::c_VendorId_eProsima.size(), prefix.value + rtps::GuidPrefix_t::size,
+                [&device] { return static_cast<rtps::octet>(device()); });
+  return prefix;
+}
 
 }  // namespace
 
@@ -54,6 +68,7 @@ fd::DomainParticipantQos ParticipantQos(const WireOptions& options, const std::s
   qos.name(name);
   qos.transport().use_builtin_transports = false;
   qos.transport().user_transports.push_back(MakeGuardedUdp(options.interfaces, report, !options.security.empty()));
+  qos.wire_protocol().prefix = UnpredictablePrefix();
   auto& builtin = qos.wire_protocol().builtin;
   builtin.discovery_config.leaseDuration = Duration_t(options.participant_lease_s);
   builtin.discovery_config.leaseDuration_announcementperiod =
