@@ -51,6 +51,29 @@ TEST(Kill, TwentyKillsChangeNothing) {
   EXPECT_GT(poses, 300U);
 }
 
+// Whoever was told that the map is switched, or that a job is there, finds it so after each start.
+TEST(Kill, OrdersThatWereAnsweredHold) {
+  const TempDirectory directory;
+  KilledFleetOptions options;
+  options.cairnd = CAIRND_PATH;
+  options.cairn = CAIRN_PATH;
+  options.directory = directory.path();
+  options.seconds = 20.0;
+  options.most_up_s = 2.0;
+  options.kills = 10;
+  options.orders = true;
+  const KilledFleetOutcome outcome = RunKilledFleet(options);
+  EXPECT_GE(outcome.kills, 3);
+  EXPECT_EQ(outcome.lost, 0U) << testing::PrintToString(outcome.differences);
+  EXPECT_EQ(outcome.doubled, 0U) << testing::PrintToString(outcome.differences);
+  EXPECT_EQ(outcome.wrongly_localized, 0U);
+  EXPECT_GT(outcome.orders.jobs, 0);
+  EXPECT_EQ(outcome.orders.ended, outcome.orders.jobs);
+  EXPECT_GT(outcome.orders.switches, 0);
+  EXPECT_GT(outcome.orders.checks, 3);
+  EXPECT_EQ(outcome.orders.broken, std::vector<std::string>{});
+}
+
 // The disk is full for this process: no file of its may grow beyond a limit (setrlimit(2), RLIMIT_FSIZE).
 TEST(Kill, WithoutSpaceOnTheDiskItIsDegradedSaysSoAndEndsWithThree) {
   const TempDirectory directory;

@@ -138,7 +138,7 @@ class Drive {
     const auto killed = Replay("killed", *watcher, &outcome);
     outcome.poses = watcher->counts().poses;
     outcome.beside_truth = watcher->counts().beside_truth;
-    outcome.wrongly_localized = watcher->counts().beside_other;
+    outcome.wrongly_localized = options_.orders ? outcome.beside_truth : watcher->counts().beside_other;
     for (const auto& [robot, calm] : undisturbed) {
       const Result& other = killed.at(robot);
       outcome.sent += other.sent;
@@ -146,7 +146,7 @@ class Drive {
       outcome.doubled += other.used > calm.used ? other.used - calm.used : 0;
       outcome.lost += static_cast<std::uint64_t>(std::max<std::int64_t>(0, other.unexplained));
       outcome.doubled += static_cast<std::uint64_t>(std::max<std::int64_t>(0, -other.unexplained));
-      const std::string difference = DifferenceOf(calm.path, other.path);
+      const std::string difference = options_.orders ? std::string() : DifferenceOf(calm.path, other.path);
       outcome.paths_that_differ += difference.empty() ? 0 : 1;
       if (!difference.empty() || other.used != calm.used || other.unexplained != 0)
         outcome.differences.push_back(robot + ": " + difference + "; " + other.account);
@@ -192,7 +192,7 @@ class Drive {
   void LaunchServer(const std::string& state) {
     server_ = std::make_unique<ChildProcess>(std::vector<std::string>{
         options_.cairnd, "--domain", Domain(), "--state", (options_.directory / state).string(), "--set",
-        "slam.particles=20", "--set", "robots.checkpoint_entries=100"});
+        "slam.particles=20", "--set", "robots.checkpoint_entries=100", "--set", "maps.max_versions=64"});
   }
 
   void StartServer(const std::string& state) {
@@ -253,6 +253,8 @@ class Drive {
   std::map<std::string, Result> Replay(const std::string& state, PoseWatcher& watcher, KilledFleetOutcome* outcome) {
     StartServer(state);
     const auto robots = StartRobots(outcome == nullptr);
+    std::optional<KilledOrders> orders;
+    if (outcome != nullptr && options_.orders) orders.emplace("office", options_.seed);
     while (outcome != nullptr && outcome->kills < options_.kills && Driving(robots) == options_.robots)
       Kill(robots, watcher, *outcome);
     std::map<std::string, Result> results;
@@ -268,6 +270,7 @@ class Drive {
       static_cast<void>(ObjectPrintedBy(Start({"path", robot, "-o", file})->Wait(kLongest)));
       result.path = Must(ReadTum(file));
     }
+    if (orders) outcome->orders = orders->Finish();
     server_->Signal(SIGTERM);
     if (const auto ended = server_->Wait(); ended.exit_code != 0) throw std::runtime_error("cairnd: " + ended.output);
     return results;

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/system/killed_orders.h"
+
 namespace cairn::test {
 
 struct KilledFleetOptions {
@@ -20,6 +22,7 @@ struct KilledFleetOptions {
   double most_up_s = 1.2;        // A server lives at most this long after it is ready.
   double most_starting_s = 0.3;  // Each third kill is followed by one of a server that lives at most this long at all.
   std::uint64_t seed = 1;
+  bool orders = false;  // Meanwhile somebody gives orders (killed_orders.h). The paths are not compared then.
 };
 
 struct KilledFleetOutcome {
@@ -30,7 +33,7 @@ struct KilledFleetOutcome {
   std::uint64_t doubled = 0;  // Scans that were used or counted more than once.
   std::uint64_t poses = 0;    // Poses told while the fleet drove.
   // Of these, called localized and more than 0.5 m or 0.5 rad beside the pose that the undisturbed server told at this
-  // time.
+  // time, or, where orders are given, beside the truth.
   std::uint64_t wrongly_localized = 0;
   // Of these, called localized and more than 0.5 m or 0.5 rad beside the truth; and the same of the undisturbed server.
   // Where a robot drives for long before it sees a place again, the error of its estimate alone is as large.
@@ -38,6 +41,7 @@ struct KilledFleetOutcome {
   int paths_that_differ = 0;  // Robots whose path is not the undisturbed one to the last bit.
   // About each robot with a loss, a scan used twice or another path: what differs, and the account of its samples.
   std::vector<std::string> differences;
+  KilledOrders::Outcome orders;
   std::vector<double> ready_s;     // From each start after a kill until the server answers.
   std::vector<double> tracking_s;  // ... until all robots that still drive get poses from it.
 };

@@ -1,8 +1,9 @@
 // cairn-study kills ends cairnd with SIGKILL a thousand times while robots drive, and compares the results with those
-// of a server that is not killed. Then it measures the processor time that the store needs. Times are wall-clock times,
-// so no other program should run on the machine.
+// of a server that is not killed; also while somebody gives orders. Then it measures the processor time that the store
+// needs. Times are wall-clock times, so no other program should run on the machine.
 #include <algorithm>
 #include <future>
+#include <optional>
 
 #include "tests/studies/fleet/live_server.h"
 #include "tests/studies/kills/restart.h"
@@ -37,12 +38,17 @@ void Add(test::KilledFleetOutcome& all, const test::KilledFleetOutcome& one) {
   all.undisturbed_poses += one.undisturbed_poses;
   all.undisturbed_beside_truth += one.undisturbed_beside_truth;
   all.paths_that_differ += one.paths_that_differ;
+  all.orders.jobs += one.orders.jobs;
+  all.orders.ended += one.orders.ended;
+  all.orders.switches += one.orders.switches;
+  all.orders.checks += one.orders.checks;
+  all.orders.broken.insert(all.orders.broken.end(), one.orders.broken.begin(), one.orders.broken.end());
   all.ready_s.insert(all.ready_s.end(), one.ready_s.begin(), one.ready_s.end());
   all.tracking_s.insert(all.tracking_s.end(), one.tracking_s.begin(), one.tracking_s.end());
 }
 
-void StudyKills(StudyContext& context) {
-  const int wanted = context.Pick(1000, 20);
+// Until there were so many kills. Returns nothing where none was possible.
+std::optional<test::KilledFleetOutcome> Kill(StudyContext& context, int wanted, bool orders) {
   test::KilledFleetOutcome all;
   for (std::uint64_t round = 0; all.kills < wanted; ++round) {
     const TempDirectory directory;
@@ -54,12 +60,28 @@ void StudyKills(StudyContext& context) {
     options.seconds = context.Pick(180.0, 40.0);
     options.kills = wanted - all.kills;
     options.seed = context.seed + round;
+    options.orders = orders;
     const test::KilledFleetOutcome one = test::RunKilledFleet(options);
-    if (one.kills == 0) return context.report.Fault("no kill was possible");
+    if (one.kills == 0) {
+      context.report.Fault("no kill was possible");
+      return std::nullopt;
+    }
     Add(all, one);
     for (const std::string& difference : one.differences) context.report.Progress(difference);
+    for (const std::string& broken : one.orders.broken) context.report.Progress(broken);
     context.report.Progress(Count(all.kills) + " kills, " + Count(static_cast<long long>(all.lost)) + " scans lost");
   }
+  return all;
+}
+
+std::string Share(std::uint64_t part, std::uint64_t whole) {
+  return Percent(static_cast<double>(part) / static_cast<double>(std::max<std::uint64_t>(1, whole)));
+}
+
+void StudyKills(StudyContext& context) {
+  const auto outcome = Kill(context, context.runs > 0 ? context.runs : context.Pick(1000, 20), false);
+  if (!outcome) return;
+  const test::KilledFleetOutcome& all = *outcome;
   Report& report = context.report;
   report.Heading("SIGKILL under four robots");
   Table table({"kills", "of these while starting", "scans sent", "lost", "doubled", "poses told", "wrongly localized",
@@ -71,17 +93,37 @@ void StudyKills(StudyContext& context) {
              Count(all.paths_that_differ), Number(At(all.ready_s, 0.5), 2), Number(At(all.ready_s, 0.99), 2),
              Number(At(all.tracking_s, 0.5), 2), Number(At(all.tracking_s, 0.99), 2)});
   report.Add(table, "kills");
-  const auto share = [](std::uint64_t part, std::uint64_t whole) {
-    return Percent(static_cast<double>(part) / static_cast<double>(std::max<std::uint64_t>(1, whole)));
-  };
   report.Text(
-      "Wrongly localized: more than 0.5 m beside the pose of an undisturbed server at the same time. The truth is "
-      "farther away than 0.5 m in " +
-      share(all.beside_truth, all.poses) + " of the poses, and in " +
-      share(all.undisturbed_beside_truth, all.undisturbed_poses) + " of those of the undisturbed server.");
+      "Wrongly localized: more than 0.5 m or 0.5 rad beside the pose of an undisturbed server at the same time. The "
+      "truth is farther away than that in " +
+      Share(all.beside_truth, all.poses) + " of the poses, and in " +
+      Share(all.undisturbed_beside_truth, all.undisturbed_poses) + " of those of the undisturbed server.");
   report.Expect(all.lost == 0 && all.doubled == 0, "scans were lost or used twice");
   report.Expect(all.wrongly_localized == 0, "a robot was localized at a wrong place");
   report.Expect(all.paths_that_differ == 0, "paths differ from those of an undisturbed server");
+}
+
+void StudyOrders(StudyContext& context) {
+  const auto outcome = Kill(context, context.runs > 0 ? context.runs : context.Pick(200, 10), true);
+  if (!outcome) return;
+  const test::KilledFleetOutcome& all = *outcome;
+  Report& report = context.report;
+  report.Heading("SIGKILL while paths are smoothed and the map is switched");
+  Table table({"kills", "jobs", "of these ended well", "switches of the map", "checks", "broken promises", "scans sent",
+               "lost", "doubled", "poses told", "beside the truth", "undisturbed and without orders"});
+  const auto broken = static_cast<long long>(all.orders.broken.size());
+  table.Add({Count(all.kills), Count(all.orders.jobs), Count(all.orders.ended), Count(all.orders.switches),
+             Count(all.orders.checks), Count(broken), Count(static_cast<long long>(all.sent)),
+             Count(static_cast<long long>(all.lost)), Count(static_cast<long long>(all.doubled)),
+             Count(static_cast<long long>(all.poses)), Share(all.beside_truth, all.poses),
+             Share(all.undisturbed_beside_truth, all.undisturbed_poses)});
+  report.Add(table, "orders");
+  report.Text(
+      "Jobs and switches whose order was answered. Beside the truth: poses called localized and more than 0.5 m or "
+      "0.5 rad away from it.");
+  report.Expect(broken == 0, "what was answered did not hold after a start");
+  report.Expect(all.orders.ended == all.orders.jobs, "jobs did not end well");
+  report.Expect(all.lost == 0 && all.doubled == 0, "scans were lost or used twice");
 }
 
 struct Cost {
@@ -155,6 +197,7 @@ void StudyRestart(StudyContext& context) {
 
 void StudyAll(StudyContext& context) {
   if (context.Wants("kills")) StudyKills(context);
+  if (context.Wants("orders")) StudyOrders(context);
   if (context.Wants("cost")) StudyCost(context);
   if (context.Wants("restart")) StudyRestart(context);
 }

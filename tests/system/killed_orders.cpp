@@ -1,0 +1,113 @@
+#include "tests/system/killed_orders.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "tests/eventually.h"
+#include "tests/must.h"
+#include "tests/test_domain.h"
+
+namespace cairn::test {
+namespace {
+
+constexpr std::size_t kMostWaitingJobs = 2;
+// The server keeps a few more (killed_fleet.cpp); those of jobs whose submission was not answered are among them.
+constexpr std::size_t kVersions = 32;
+
+std::size_t NotEnded(const std::map<std::uint64_t, Job>& jobs) {
+  return static_cast<std::size_t>(
+      std::count_if(jobs.begin(), jobs.end(), [](const auto& job) { return !IsFinal(job.second.state); }));
+}
+
+}  // namespace
+
+KilledOrders::KilledOrders(std::string site, std::uint64_t seed) : site_(std::move(site)), random_(seed) {
+  wire::WireOptions options;
+  options.domain = TestDomain();
+  bus_ = Must(wire::Bus::Create(options, "orders"));
+  queries_ = Must(client::QueryClient::Create(*bus_, {.timeout_s = 1.0}));
+  thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
+}
+
+KilledOrders::~KilledOrders() = default;
+
+void KilledOrders::Break(const std::string& what) {
+  if (std::ranges::find(outcome_.broken, what) == outcome_.broken.end()) outcome_.broken.push_back(what);
+}
+
+void KilledOrders::SubmitJob() {
+  if (NotEnded(jobs_) >= kMostWaitingJobs) return;
+  const auto job = queries_->SubmitJob(site_, JobKind::kSmooth, false);
+  if (!job) return;
+  jobs_[job->id] = *job;
+  ++outcome_.jobs;
+}
+
+void KilledOrders::SwitchMap() {
+  std::vector<std::uint32_t> choice(versions_.begin(), versions_.end());
+  choice.push_back(1);
+  const std::uint32_t wanted = choice[std::uniform_int_distribution<std::size_t>(0, choice.size() - 1)(random_)];
+  // Until the answer has come, the order may be carried out or not.
+  may_be_enabled_.insert(wanted);
+  if (!queries_->EnableMap(site_, wanted)) return;
+  may_be_enabled_ = {wanted};
+  ++outcome_.switches;
+}
+
+bool KilledOrders::Check() {
+  const auto map = queries_->Map(site_);
+  if (!map) return false;
+  if (!may_be_enabled_.contains(map->enabled_version))
+    Break(fmt::format("version {} is enabled instead of {}", map->enabled_version, fmt::join(may_be_enabled_, " or ")));
+  for (const std::uint32_t version : versions_) {
+    if (std::ranges::none_of(map->versions, [version](const auto& one) { return one.version == version; }))
+      Break(fmt::format("version {} is gone", version));
+  }
+  for (auto& [id, known] : jobs_) {
+    const auto job = queries_->GetJob(id);
+    if (!job && job.error().code == StatusCode::kNotFound) Break(fmt::format("job {} is not known", id));
+    if (!job) continue;
+    if (job->submitted != known.submitted) Break(fmt::format("job {} is another one", id));
+    if (IsFinal(known.state) && job->state != known.state)
+      Break(fmt::format("job {} was {} and is {}", id, JobStateName(known.state), JobStateName(job->state)));
+    if (job->state == JobState::kSucceeded && !IsFinal(known.state)) versions_.insert(job->map_version);
+    known = *job;
+  }
+  while (versions_.size() > kVersions) versions_.erase(versions_.begin());
+  ++outcome_.checks;
+  return true;
+}
+
+void KilledOrders::Run(const std::stop_token& stop) {
+  std::uniform_real_distribution<double> pause_s(0.0, 0.2);
+  std::bernoulli_distribution submits(0.5);
+  while (!stop.stop_requested()) {
+    // The moment of an order is random.
+    std::this_thread::sleep_for(std::chrono::duration<double>(pause_s(random_)));
+    if (!Check()) continue;
+    if (submits(random_)) {
+      SubmitJob();
+    } else {
+      SwitchMap();
+    }
+  }
+}
+
+KilledOrders::Outcome KilledOrders::Finish() {
+  thread_.request_stop();
+  thread_.join();
+  const bool ended = Eventually([this] { return Check() && NotEnded(jobs_) == 0; }, std::chrono::seconds(60));
+  if (!ended) Break(fmt::format("{} jobs have not ended", NotEnded(jobs_)));
+  for (const auto& [id, job] : jobs_) {
+    if (job.state == JobState::kSucceeded) ++outcome_.ended;
+    if (IsFinal(job.state) && job.state != JobState::kSucceeded)
+      Break(fmt::format("job {} is {}: {}", id, JobStateName(job.state), job.message));
+  }
+  return outcome_;
+}
+
+}  // namespace cairn::test
