@@ -1,9 +1,7 @@
 // Whether odometry goes on, or has begun anew: the base of a robot was started again, or set to another pose. The poses
 // before and after that cannot be joined. The estimator asks this of what it receives, and a robot's client of what it
-// sends, because it must not give a start pose that it does not know. Pure functions.
+// sends, because it must not give a start pose that it does not know. A pure function.
 #pragma once
-
-#include <optional>
 
 #include "common/sensor/odometry.h"
 
@@ -18,31 +16,19 @@ struct DriveLimits {
   double same_heading_rad = 1.0;
 };
 
-// After a gap or an unknown time.
-[[nodiscard]] bool IsAtSamePlace(const Pose2& before, const Pose2& after, const DriveLimits& limits = {});
-
 // Two samples of odometry, one after the other.
 struct OdometryStep {
   const Odometry* earlier = nullptr;  // The one before `before`, if it is known to be of the same drive.
   const Odometry& before;
   const Odometry& after;
-  const Pose2& logged;     // Of `after`, as the base has sent it, where `after` was corrected.
+  const Pose2& logged;     // The pose of `after` before any correction of the wheels.
   bool time_known = true;  // Whether the stamps of `before` and `after` are of the same clock.
 };
 
-// Whether odometry goes on with this step. The functions below are its parts.
+// Whether odometry goes on with this step. It has begun anew where `after` is at zero and the robot was not near, where
+// no robot could have come so far in the time between, and, where the time is unknown or longer than max_gap_s, where
+// the robot is somewhere else. How fast it was before counts, if that is known: a robot that stood is not four metres
+// away after a gap of 1.5 s.
 [[nodiscard]] bool GoesOn(const OdometryStep& step, const DriveLimits& limits = {});
-
-// Whether a pose that the robot has `moved` to is one where odometry begins: at zero, without having been near. A robot
-// that comes by has `moved_before`, from sample to sample, as it does now; nothing if that is not known.
-[[nodiscard]] bool BeginsAtZero(const Pose2& pose, const Pose2& moved, const std::optional<Pose2>& moved_before);
-
-// Whether two successive samples may belong to one drive, by their distance. `speed_m_s` is how fast the robot
-// was before, nothing if that is not known: a robot that stood is not four metres away after a gap of 1.5 s.
-[[nodiscard]] bool MayBeOneDrive(const Odometry& before, const Odometry& after, std::optional<double> speed_m_s,
-                                 const DriveLimits& limits = {});
-
-// The speed between two samples, at most max_speed_m_s.
-[[nodiscard]] double SpeedBetween(const Odometry& before, const Odometry& after, const DriveLimits& limits = {});
 
 }  // namespace cairn

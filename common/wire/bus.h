@@ -30,8 +30,11 @@ struct WireOptions {
   double participant_lease_s = 3.0;
   // Directory with the identity and the permissions of this program (deploy/security). Empty: no DDS Security.
   std::string security;
+  // "ADDRESS" or "ADDRESS:PORT" of discovery servers of Fast DDS, in the order of their numbers (fast-discovery-server
+  // -i). Empty: participants find each other by multicast.
+  std::vector<std::string> discovery_servers;
 };
-// Checks domain, addresses (IPv4, each once) and leases, independently of the machine.
+// Checks domain, addresses (IPv4, each once), discovery servers and leases, independently of the machine.
 [[nodiscard]] Result<void> Validate(const WireOptions& options);
 // Checks that this machine has the addresses now. REQUIRES: Validate(options). kUnavailable: an address is
 // missing; it may appear later.

@@ -10,9 +10,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <deque>
+#include <functional>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <utility>
 
 #include "common/mutex.h"
@@ -28,6 +31,8 @@ void UseRepairs() {}
 namespace cairn::wire {
 namespace {
 
+using eprosima::fastrtps::ResourceLimitedVector;
+using eprosima::fastrtps::rtps::LivelinessData;
 using eprosima::fastrtps::rtps::LivelinessManager;
 
 // Tells of changes of liveliness in the order in which they were made, one after the other. Thread-safe.
@@ -35,8 +40,10 @@ class LivelinessNews {
  public:
   using News = std::function<void()>;
 
+  // One for all managers, because a class of the library cannot get a new member. It is never destroyed: threads of the
+  // library may still use it while the program ends.
   static LivelinessNews& Instance() {
-    static LivelinessNews instance;
+    static auto& instance = *new LivelinessNews;
     return instance;
   }
   // Called while the manager's own mutex is held, so that the order is that of the changes.
@@ -44,7 +51,7 @@ class LivelinessNews {
     const MutexLock lock(mutex_);
     waiting_[manager].news.push_back(std::move(news));
   }
-  // Called without a mutex. What another thread has added while this one tells is told here as well.
+  // Called without the manager's own mutex. What another thread has added while this one tells is told here as well.
   void Tell(const LivelinessManager* manager) {
     mutex_.Lock();
     const auto found = waiting_.find(manager);
@@ -72,6 +79,17 @@ class LivelinessNews {
   Mutex mutex_;
   std::map<const LivelinessManager*, Waiting> waiting_ CAIRN_GUARDED_BY(mutex_);
 };
+
+// Until the next lease runs out. Nothing where no writer is alive.
+std::optional<double> MillisecondsUntilTheNextIsDue(const ResourceLimitedVector<LivelinessData>& writers) {
+  std::optional<std::chrono::steady_clock::time_point> next;
+  for (const LivelinessData& writer : writers) {
+    if (writer.status == LivelinessData::WriterStatus::ALIVE) next = std::min(next.value_or(writer.time), writer.time);
+  }
+  if (!next) return std::nullopt;
+  const auto left = std::chrono::ceil<std::chrono::milliseconds>(*next - std::chrono::steady_clock::now());
+  return static_cast<double>(std::max<std::int64_t>(left.count(), 0));
+}
 
 }  // namespace
 }  // namespace cairn::wire
@@ -131,12 +149,13 @@ History::const_iterator History::get_change_nts(const SequenceNumber_t& seq, con
   return next;
 }
 
-// The library changes a writer's state under a mutex and tells of it later, without one. Where a process stood still
-// for longer than a lease, the thread of timers says that writers are lost in the moment in which the thread that
-// receives says that they are back. The two could arrive in the other order, or as one change by nothing: then a robot
-// counted as away for ever although it was there (seen in a test on a loaded machine). Now what happened first is told
-// first. The library also kept a pointer to the writer that is due next, into a list from which others are removed; all
-// that are due are looked for instead.
+// The next three functions replace those with which the library notes that a writer is alive, is not, or has gone. It
+// changes the state under a mutex and tells of it later, without one. Where a process stood still for longer than a
+// lease, the thread of timers says that writers are lost in the moment in which the thread that receives says that they
+// are back. The two could arrive in the other order, or as two changes that add up to zero: then a robot counted as
+// away for ever although it was there (seen in a test on a loaded machine). Now what happened first is told first. The
+// library also kept a pointer to the writer that is due next, into a list from which others are removed; here all that
+// are due are looked for instead.
 bool LivelinessManager::timer_expired() {
   auto& news = cairn::wire::LivelinessNews::Instance();
   {
@@ -152,11 +171,42 @@ bool LivelinessManager::timer_expired() {
     }
   }
   news.Tell(this);
-  if (!calculate_next()) return false;
+  const eprosima::shared_lock<eprosima::shared_mutex> collection(col_mutex_);
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (timer_owner_ == nullptr) return false;
-  const auto left = std::chrono::ceil<std::chrono::milliseconds>(timer_owner_->time - std::chrono::steady_clock::now());
-  timer_.update_interval_millisec(static_cast<double>(std::max<std::int64_t>(left.count(), 0)));
+  const auto next_ms = cairn::wire::MillisecondsUntilTheNextIsDue(writers_);
+  if (next_ms) timer_.update_interval_millisec(*next_ms);
+  return next_ms.has_value();
+}
+
+bool LivelinessManager::remove_writer(GUID_t guid, LivelinessQosPolicyKind kind, Duration_t lease_duration) {
+  auto& news = cairn::wire::LivelinessNews::Instance();
+  {
+    const std::lock_guard<eprosima::shared_mutex> collection(col_mutex_);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    auto status = LivelinessData::WriterStatus::NOT_ASSERTED;
+    const bool removed = writers_.remove_if([&](LivelinessData& writer) {
+      if (writer.guid != guid || writer.kind != kind || !(writer.lease_duration == lease_duration)) return false;
+      status = writer.status;
+      return --writer.count == 0;
+    });
+    if (!removed) return false;
+    timer_owner_ = nullptr;  // It may have been this one, or one that stands elsewhere now.
+    if (status != LivelinessData::WriterStatus::NOT_ASSERTED) {
+      const bool was_alive = status == LivelinessData::WriterStatus::ALIVE;
+      news.Add(this, [=, this] {
+        if (callback_) callback_(guid, kind, lease_duration, was_alive ? -1 : 0, was_alive ? 0 : -1);
+      });
+    }
+  }
+  news.Tell(this);
+  const eprosima::shared_lock<eprosima::shared_mutex> collection(col_mutex_);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (const auto next_ms = cairn::wire::MillisecondsUntilTheNextIsDue(writers_)) {
+    timer_.update_interval_millisec(*next_ms);
+    timer_.restart_timer();
+  } else {
+    timer_.cancel_timer();
+  }
   return true;
 }
 
@@ -174,6 +224,14 @@ void LivelinessManager::assert_writer_liveliness(LivelinessData& writer) {
     });
   }
   news.Tell(this);
+}
+
+// Readers keep the number of the last sample by the persistence GUID of its writer, where it has one, and participants
+// whose GUID is chosen (participant_qos.cpp) get one that is numbered. What damaged traffic says of one that does not
+// exist yet would count for it when it joins. Nothing here is persistent in the sense of DDS, so the built-in endpoints
+// have none; those of topics have a random one (participant.cpp).
+GUID_t ParticipantProxyData::get_persistence_guid() const {
+  return c_Guid_Unknown;
 }
 
 }  // namespace eprosima::fastrtps::rtps

@@ -1,6 +1,7 @@
 #include "common/wire/participant.h"
 
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <sstream>
 
 #include "common/wire/participant_qos.h"
 #include "common/wire/security.h"
@@ -134,6 +135,10 @@ Result<Participant::Writer> Participant::MakeWriter(const TopicProfile& profile,
   times.heartbeatPeriod = Duration_t(profile.heartbeat_ms * 1e-3);
   times.nackResponseDelay = Duration_t(0.002);
   if (profile.deadline_s > 0) qos.deadline().period = Duration_t(profile.deadline_s);
+  // Otherwise it is made of the participant's number (library_repairs.cpp).
+  std::ostringstream persistence;
+  persistence << rtps::GUID_t(UnpredictablePrefix(), rtps::c_EntityId_RTPSParticipant);
+  qos.properties().properties().emplace_back("dds.persistence.guid", persistence.str());
   // No filters of readers: Fast DDS 2.9 changes a writer's list of them while the writer uses it.
   qos.writer_resource_limits().reader_filters_allocation.maximum = 0;
   const bool in_default = profile.partitions == Partitions::kRobots && !secure();

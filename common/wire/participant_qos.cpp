@@ -1,6 +1,8 @@
 #include "common/wire/participant_qos.h"
 
+#include <fastdds/rtps/attributes/ServerAttributes.h>
 #include <fastrtps/attributes/LibrarySettingsAttributes.h>
+#include <fastrtps/utils/IPLocator.h>
 #include <fastrtps/xmlparser/XMLProfileManager.h>
 
 #include <algorithm>
@@ -8,6 +10,7 @@
 #include <mutex>
 #include <random>
 
+#include "common/wire/discovery_servers.h"
 #include "common/wire/library_repairs.h"
 #include "common/wire/security.h"
 
@@ -31,10 +34,26 @@ using eprosima::fastrtps::Duration_t;
 // period they find each other a few seconds later, even if the lease is long.
 constexpr double kMaxAnnouncementPeriodS = 3.0;
 
+// REQUIRES: Validate.
+void UseServers(const std::vector<std::string>& servers, rtps::BuiltinAttributes& builtin) {
+  builtin.discovery_config.discoveryProtocol = rtps::DiscoveryProtocol_t::CLIENT;
+  for (std::size_t i = 0; i < servers.size(); ++i) {
+    const auto server = ParseDiscoveryServer(servers[i]);
+    rtps::RemoteServerAttributes remote;
+    rtps::get_server_client_default_guidPrefix(static_cast<int>(i), remote.guidPrefix);
+    rtps::Locator_t locator(LOCATOR_KIND_UDPv4, server->port);
+    rtps::IPLocator::setIPv4(locator, server->address);
+    remote.metatrafficUnicastLocatorList.push_back(locator);
+    builtin.discovery_config.m_DiscoveryServers.push_back(remote);
+  }
+}
+
+}  // namespace
+
 // Fast DDS numbers the participants of a process one after the other, so their GUIDs differ in a few bits. A datagram
 // that was damaged or forged, with another GUID in the place of one that is known, then often names a participant that
-// is still to come; peers keep what they were told of it, and do not believe the true one. A client that had joined
-// anew because it was deaf stayed deaf so, several times in a row (cairn-study hostile). Random bytes are not hit.
+// does not exist yet. Its peers remember what the forgery said and ignore the real one when it joins. A client that
+// joined anew because it was deaf stayed deaf for this reason, several times in a row (cairn-study hostile).
 rtps::GuidPrefix_t UnpredictablePrefix() {
   rtps::GuidPrefix_t prefix;
   std::copy(rtps::c_VendorId_eProsima.begin(), rtps::c_VendorId_eProsima.end(), prefix.value);
@@ -43,8 +62,6 @@ rtps::GuidPrefix_t UnpredictablePrefix() {
                 [&device] { return static_cast<rtps::octet>(device()); });
   return prefix;
 }
-
-}  // namespace
 
 // A library must not print, and messages that peers can provoke must not fill a disk. Errors are returned as
 // values.
@@ -73,6 +90,7 @@ fd::DomainParticipantQos ParticipantQos(const WireOptions& options, const std::s
   builtin.discovery_config.leaseDuration = Duration_t(options.participant_lease_s);
   builtin.discovery_config.leaseDuration_announcementperiod =
       Duration_t(std::min(options.participant_lease_s / 3.0, kMaxAnnouncementPeriodS));
+  if (!options.discovery_servers.empty()) UseServers(options.discovery_servers, builtin);
   if (!options.security.empty()) AddSecurity(options.security, qos);
   builtin.readerHistoryMemoryPolicy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
   builtin.writerHistoryMemoryPolicy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;

@@ -14,6 +14,9 @@ namespace cairn::wire {
 // Settings of the library that hold for the whole process. To be called before a participant is made.
 void ConfigureLibraryOnce();
 
+// The first part of a GUID, random behind the vendor's two bytes.
+[[nodiscard]] eprosima::fastrtps::rtps::GuidPrefix_t UnpredictablePrefix();
+
 [[nodiscard]] eprosima::fastdds::dds::DomainParticipantQos ParticipantQos(const WireOptions& options,
                                                                           const std::string& name,
                                                                           const std::shared_ptr<GuardReport>& report);

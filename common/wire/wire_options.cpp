@@ -6,6 +6,7 @@
 #include <set>
 
 #include "common/wire/bus.h"
+#include "common/wire/discovery_servers.h"
 
 namespace cairn::wire {
 namespace {
@@ -63,6 +64,18 @@ Result<void> Validate(const WireOptions& options) {
       return Fail(StatusCode::kInvalidArgument, "wire.interfaces: " + address + " is named twice");
     }
   }
+  constexpr std::size_t kMostServers = 255;  // Their numbers are bytes of their GUIDs.
+  if (options.discovery_servers.size() > kMostServers)
+    return Fail(StatusCode::kInvalidArgument, "wire.discovery_servers: at most " + std::to_string(kMostServers));
+  for (const std::string& server : options.discovery_servers) {
+    if (auto parsed = ParseDiscoveryServer(server); !parsed)
+      return Fail(StatusCode::kInvalidArgument, "wire.discovery_servers: " + parsed.error().message);
+  }
+  if (!options.discovery_servers.empty() && !options.security.empty()) {
+    return Fail(StatusCode::kInvalidArgument,
+                "wire.discovery_servers: Debian's discovery server has no identity of a fleet; leave wire.security or "
+                "wire.discovery_servers empty");
+  }
   for (const double lease : {options.liveliness_lease_s, options.participant_lease_s}) {
     if (!std::isfinite(lease) || lease < 0.1 || lease > 3600.0) {
       return Fail(StatusCode::kInvalidArgument, "wire: a lease of " + std::to_string(lease) + " s is not in 0.1..3600");
@@ -100,6 +113,13 @@ void Visit(OptionVisitor& visitor, WireOptions& options) {
       ForOperators("Directory with the identity and the permissions of this program, made by "
                    "deploy/security/make-fleet.sh. Empty: DDS Security is off, and everybody in these networks "
                    "is trusted."));
+  std::string servers = Join(options.discovery_servers);
+  visitor.Text("discovery_servers", servers,
+               ForOperators("Where multicast does not reach: the addresses of discovery servers of Fast DDS "
+                            "(fast-discovery-server), separated by commas, each with :PORT where it is not 11811. The "
+                            "first one has number 0. All programs of a fleet use the same ones. Empty: programs find "
+                            "each other by multicast."));
+  options.discovery_servers = Split(servers);
   visitor.Require(options.liveliness_lease_s <= options.participant_lease_s, "liveliness_lease_s", "must not exceed",
                   "participant_lease_s");
 }

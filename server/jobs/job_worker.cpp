@@ -18,7 +18,11 @@ void LowerOwnPriority(std::int64_t nice) {
 }  // namespace
 
 JobWorker::JobWorker(const JobsOptions& options, JobList& list, JobWork work)
-    : options_(options), list_(list), work_(std::move(work)), queue_(static_cast<std::size_t>(options.max_queued)) {}
+    : options_(options),
+      list_(list),
+      work_(std::move(work)),
+      // One more than may be submitted: after a restart the job that ran waits again as well.
+      queue_(static_cast<std::size_t>(options.max_queued) + 1) {}
 
 JobWorker::~JobWorker() {
   Stop();
@@ -30,7 +34,8 @@ void JobWorker::Start() {
 
 Result<Job> JobWorker::Submit(const std::string& site, JobKind kind, bool enable) {
   auto job = list_.Add(site, kind, enable);
-  if (job && !queue_.TryPush(Ticket{job->id, enable})) {
+  const bool full_already = queue_.size() >= static_cast<std::size_t>(options_.max_queued);
+  if (job && (full_already || !queue_.TryPush(Ticket{job->id, enable}))) {
     const Status full{StatusCode::kResourceExhausted, "too many jobs are waiting (jobs.max_queued); try again later"};
     list_.Fail(job->id, full);
     return tl::unexpected(full);

@@ -15,8 +15,9 @@ namespace cairn::test {
 namespace {
 
 constexpr std::size_t kMostWaitingJobs = 2;
-// The server keeps a few more (killed_fleet.cpp); those of jobs whose submission was not answered are among them.
-constexpr std::size_t kVersions = 32;
+// What is remembered. The server keeps more (killed_fleet.cpp), among them what orders have made that were not
+// answered.
+constexpr std::size_t kVersions = 32, kJobs = 32;
 
 std::size_t NotEnded(const std::map<std::uint64_t, Job>& jobs) {
   return static_cast<std::size_t>(
@@ -39,10 +40,17 @@ void KilledOrders::Break(const std::string& what) {
   if (std::ranges::find(outcome_.broken, what) == outcome_.broken.end()) outcome_.broken.push_back(what);
 }
 
+void KilledOrders::PromiseHeld(std::set<std::uint32_t>&& heard) {
+  versions_.merge(heard);
+  while (versions_.size() > kVersions) versions_.erase(versions_.begin());
+}
+
 void KilledOrders::SubmitJob() {
   if (NotEnded(jobs_) >= kMostWaitingJobs) return;
+  auto heard = heard_;
   const auto job = queries_->SubmitJob(site_, JobKind::kSmooth, false);
   if (!job) return;
+  PromiseHeld(std::move(heard));
   jobs_[job->id] = *job;
   ++outcome_.jobs;
 }
@@ -50,35 +58,51 @@ void KilledOrders::SubmitJob() {
 void KilledOrders::SwitchMap() {
   std::vector<std::uint32_t> choice(versions_.begin(), versions_.end());
   choice.push_back(1);
+  if (may_be_enabled_.size() == 1) std::erase(choice, *may_be_enabled_.begin());
+  if (choice.empty()) return;
   const std::uint32_t wanted = choice[std::uniform_int_distribution<std::size_t>(0, choice.size() - 1)(random_)];
+  const bool switches = !may_be_enabled_.contains(wanted);
   // Until the answer has come, the order may be carried out or not.
   may_be_enabled_.insert(wanted);
+  auto heard = heard_;
   if (!queries_->EnableMap(site_, wanted)) return;
+  PromiseHeld(std::move(heard));
   may_be_enabled_ = {wanted};
-  ++outcome_.switches;
+  outcome_.switches += switches ? 1 : 0;
 }
 
 bool KilledOrders::Check() {
   const auto map = queries_->Map(site_);
-  if (!map) return false;
+  if (!map || map->tile_count == 0) return false;  // Before the first scan there is nothing to smooth.
   if (!may_be_enabled_.contains(map->enabled_version))
     Break(fmt::format("version {} is enabled instead of {}", map->enabled_version, fmt::join(may_be_enabled_, " or ")));
   for (const std::uint32_t version : versions_) {
     if (std::ranges::none_of(map->versions, [version](const auto& one) { return one.version == version; }))
       Break(fmt::format("version {} is gone", version));
   }
+  if (!CheckJobs()) return false;
+  ++outcome_.checks;
+  return true;
+}
+
+bool KilledOrders::CheckJobs() {
   for (auto& [id, known] : jobs_) {
     const auto job = queries_->GetJob(id);
-    if (!job && job.error().code == StatusCode::kNotFound) Break(fmt::format("job {} is not known", id));
-    if (!job) continue;
+    if (!job && job.error().code != StatusCode::kNotFound) return false;
+    if (!job) {
+      Break(fmt::format("job {} is not known", id));
+      continue;
+    }
     if (job->submitted != known.submitted) Break(fmt::format("job {} is another one", id));
-    if (IsFinal(known.state) && job->state != known.state)
-      Break(fmt::format("job {} was {} and is {}", id, JobStateName(known.state), JobStateName(job->state)));
-    if (job->state == JobState::kSucceeded && !IsFinal(known.state)) versions_.insert(job->map_version);
+    if (IsFinal(job->state) && job->state != JobState::kSucceeded)
+      Break(fmt::format("job {} is {}: {}", id, JobStateName(job->state), job->message));
+    if (job->state == JobState::kSucceeded) heard_.insert(job->map_version);
     known = *job;
   }
-  while (versions_.size() > kVersions) versions_.erase(versions_.begin());
-  ++outcome_.checks;
+  while (jobs_.size() > kJobs && IsFinal(jobs_.begin()->second.state)) {
+    ++outcome_.ended;
+    jobs_.erase(jobs_.begin());
+  }
   return true;
 }
 
@@ -100,13 +124,19 @@ void KilledOrders::Run(const std::stop_token& stop) {
 KilledOrders::Outcome KilledOrders::Finish() {
   thread_.request_stop();
   thread_.join();
-  const bool ended = Eventually([this] { return Check() && NotEnded(jobs_) == 0; }, std::chrono::seconds(60));
-  if (!ended) Break(fmt::format("{} jobs have not ended", NotEnded(jobs_)));
-  for (const auto& [id, job] : jobs_) {
-    if (job.state == JobState::kSucceeded) ++outcome_.ended;
-    if (IsFinal(job.state) && job.state != JobState::kSucceeded)
-      Break(fmt::format("job {} is {}: {}", id, JobStateName(job.state), job.message));
-  }
+  bool answered = false;
+  const bool ended = Eventually(
+      [&] {
+        answered = Check();
+        return answered && NotEnded(jobs_) == 0;
+      },
+      std::chrono::seconds(60));
+  if (!answered) Break("the server does not answer");
+  if (answered && !ended) Break(fmt::format("{} jobs have not ended", NotEnded(jobs_)));
+  // Also what the last jobs have made.
+  PromiseHeld(std::exchange(heard_, {}));
+  if (ended && !Check()) Break("the server does not answer");
+  outcome_.ended += static_cast<int>(jobs_.size() - NotEnded(jobs_));
   return outcome_;
 }
 

@@ -21,9 +21,9 @@ namespace cairn::test {
 class KilledOrders {
  public:
   struct Outcome {
-    int jobs = 0;      // Whose submission was answered,
-    int ended = 0;     // and of these, that have succeeded; the others are in `broken`.
-    int switches = 0;  // Of the map, whose order was answered.
+    int jobs = 0;      // Whose submission was answered.
+    int ended = 0;     // Jobs that have succeeded. Those that have ended otherwise are in `broken`.
+    int switches = 0;  // Of the map to another version than was known to be enabled, whose order was answered.
     int checks = 0;    // How often everything was compared with what had been answered.
     std::vector<std::string> broken;
   };
@@ -39,8 +39,11 @@ class KilledOrders {
   void Run(const std::stop_token& stop);
   void SubmitJob();
   void SwitchMap();
-  // Returns false where the server did not answer.
+  // What was heard of before an order that was answered is on the disk as well, because the answer waits for that.
+  void PromiseHeld(std::set<std::uint32_t>&& heard);
+  // Compares what the server says with what it has promised. Returns false where it did not answer, or has no map yet.
   bool Check();
+  bool CheckJobs();
   void Break(const std::string& what);
 
   const std::string site_;
@@ -48,8 +51,9 @@ class KilledOrders {
   std::unique_ptr<wire::Bus> bus_;
   std::unique_ptr<client::QueryClient> queries_;
   Outcome outcome_;
-  std::map<std::uint64_t, Job> jobs_;  // What was last heard of each.
-  std::set<std::uint32_t> versions_;   // Of jobs that have succeeded.
+  std::map<std::uint64_t, Job> jobs_;  // What was last heard of each. The oldest that have ended are forgotten.
+  std::set<std::uint32_t> heard_;  // Map versions of jobs that have succeeded: an answer to a question is no promise.
+  std::set<std::uint32_t> versions_;  // Those that must be there after each start.
   std::set<std::uint32_t> may_be_enabled_{1};
   std::jthread thread_;  // The last member: it uses everything above.
 };

@@ -22,6 +22,8 @@ class FakeServer {
   // A stopped server receives scans but settles none; resuming settles all it has.
   void SetSettling(bool settling);
   void SetLocalized(bool localized);  // Whether its poses are.
+  // Poses are not kept for late readers: a test that waits for the pose of one scan waits for this first.
+  [[nodiscard]] bool HasPoseReader() const { return poses_->matched() > 0; }
   // The server says that it stores; nothing is on disk until SetDurableThrough.
   void SetDurable(bool durable);
   void SetDurableThrough(std::uint64_t sequence);

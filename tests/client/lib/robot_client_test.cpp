@@ -250,6 +250,7 @@ TEST_F(RobotClientTest, ARobotThatMayBeElsewhereGivesNoStartToTheNextServer) {
     server_.reset();
     server_ = std::make_unique<FakeServer>(LoopbackOptions(), 1);
     const auto client = Must(RobotClient::Open(*bus_, Robot("r1"), 20.0));
+    ASSERT_TRUE(Eventually([&] { return server_->HasPoseReader(); }));
     ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = 0, .T_odom_robot = {5, 0, 0}}));
     Scan scan = SomeScan();
     scan.stamp = kStep;
@@ -257,6 +258,11 @@ TEST_F(RobotClientTest, ARobotThatMayBeElsewhereGivesNoStartToTheNextServer) {
     ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = kStep, .T_odom_robot = {5.1, 0, 0}}));
     ASSERT_TRUE(client->WaitSettled(20.0));
     ASSERT_TRUE(Eventually([&] { return client->pose().has_value(); }));
+    // What is not settled of the odometry would be sent again with the first scan, at which its start is known.
+    ASSERT_TRUE(Eventually([&] {
+      const auto odometry = client->ledger("odometry");
+      return odometry && odometry->settled_through == 2;
+    }));
     server_->SetSettling(false);
     scan.stamp = one.scan;
     ASSERT_TRUE(client->Publish(scan));
@@ -277,6 +283,7 @@ TEST_F(RobotClientTest, ALostRobotGivesNoStartToTheNextServer) {
   request.has_start = true;
   request.T_map_robot_start = {10, 0, 0};
   const auto client = Must(RobotClient::Open(*bus_, request, 20.0));
+  ASSERT_TRUE(Eventually([&] { return server_->HasPoseReader(); }));
   ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = 0, .T_odom_robot = {5, 0, 0}}));
   Scan scan = SomeScan();
   scan.stamp = 10 * kStep;

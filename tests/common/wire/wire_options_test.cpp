@@ -57,6 +57,26 @@ TEST(WireOptions, RefuseDomainsAndLeasesOutOfRange) {
   EXPECT_FALSE(Validate(options));
 }
 
+TEST(WireOptions, ReadDiscoveryServers) {
+  WireOptions options;
+  options.discovery_servers = {"10.0.0.5", "10.0.0.6:11812"};
+  EXPECT_TRUE(Validate(options));
+  for (const char* wrong : {"", "mapper", "10.0.0.5:", "10.0.0.5:0", "10.0.0.5:65536", "10.0.0.5:1x", "10.0.0.5:1:2"}) {
+    options.discovery_servers = {wrong};
+    const Result<void> valid = Validate(options);
+    ASSERT_FALSE(valid) << wrong;
+    EXPECT_THAT(valid.error().message, ::testing::StartsWith("wire.discovery_servers: '" + std::string(wrong) + "'"));
+  }
+}
+
+// Members of a fleet would not trust it, and nobody would find anybody.
+TEST(WireOptions, RefuseADiscoveryServerInASecuredFleet) {
+  WireOptions options;
+  options.discovery_servers = {"10.0.0.5"};
+  options.security = "/etc/cairn/security";
+  EXPECT_FALSE(Validate(options));
+}
+
 TEST(WireOptions, ABusWithInvalidOptionsIsNotMade) {
   WireOptions options;
   for (const char* address : {"not-an-address", "192.0.2.1"}) {

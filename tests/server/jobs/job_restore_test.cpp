@@ -192,17 +192,27 @@ TEST_F(JobRestore, AJobThatIsQueuedAgainIsRunWithItsChoice) {
   worker.Stop();
 }
 
-TEST_F(JobRestore, MoreJobsThanMayWaitFailWithTheReason) {
+// The one that ran and those that waited: one more than may be submitted.
+TEST_F(JobRestore, TheJobThatRanWaitsBesideThoseThatWaited) {
   RunFirstServer();
   const JobsOptions options{.max_queued = 1};
   StoredList second(*store_, options);
   JobWorker worker(options, second.list, [](const Job&, bool, const JobControl&) -> Result<JobOutcome> { return {}; });
   const auto unfinished = second.list.Restore();
   ASSERT_TRUE(unfinished);
+  ASSERT_EQ(unfinished->size(), 2U);
   for (const StoredJob& job : *unfinished) worker.Requeue(job.job.id, job.enable);
   EXPECT_EQ(second.list.Find(2)->state, JobState::kQueued);
-  EXPECT_EQ(second.list.Find(3)->state, JobState::kFailed);
-  EXPECT_NE(second.list.Find(3)->message.find("jobs.max_queued"), std::string::npos);
+  EXPECT_EQ(second.list.Find(3)->state, JobState::kQueued);
+  const auto submitted = worker.Submit("lab", JobKind::kSmooth, false);
+  ASSERT_FALSE(submitted);
+  EXPECT_EQ(submitted.error().code, StatusCode::kResourceExhausted);
+  // With fewer that may wait than before, those that find no place fail and say why.
+  const auto another = second.list.Add("lab", JobKind::kSmooth, false);
+  ASSERT_TRUE(another);
+  worker.Requeue(another->id, false);
+  EXPECT_EQ(second.list.Find(another->id)->state, JobState::kFailed);
+  EXPECT_NE(second.list.Find(another->id)->message.find("jobs.max_queued"), std::string::npos);
 }
 
 }  // namespace

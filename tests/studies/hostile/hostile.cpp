@@ -1,6 +1,7 @@
 // cairn-study hostile sends mutated and generated datagrams, from three senders as fast as they can, to a cairnd, two
 // robots that stream and a viewer of both: whether a process dies, what the guard drops, whether streams stop and how
-// soon they flow again. Everything is on loopback in a domain of its own. Recording the traffic needs CAP_NET_RAW.
+// soon they flow again, and whether a client that joins then is answered in every partition of replies. Everything is on
+// loopback in a domain of its own. Recording the traffic needs CAP_NET_RAW.
 // --seconds: of the long part (600); --runs: of the short ones (100).
 #include <algorithm>
 #include <array>
@@ -263,8 +264,8 @@ struct Outcome {
   std::vector<double> flows_s;    // From the end of the traffic until everything flows.
   std::vector<double> shows_s;    // From the end of the traffic until the viewer has new poses and the present map.
   Viewer::News news;              // The same for each of its parts, in the last run.
-  std::vector<int> silent;        // The partitions of replies that were silent after the last run,
-  int silent_runs = 0;            // and how many runs left one.
+  std::vector<int> silent;        // The partitions of replies that were silent after the last run.
+  int silent_runs = 0;            // After how many runs a partition was silent.
 };
 
 // One run: traffic for so long, then the time until everything flows.
@@ -295,9 +296,9 @@ void Attack(HostileFleet& fleet, Viewer& viewer, double seconds, std::uint64_t s
   outcome.flows_s.push_back(fleet.AwaitFlow(120.0));
   outcome.news = shows.get();
   outcome.shows_s.push_back(outcome.news.all_s());
+  for (std::string& dead : fleet.Bury()) outcome.deaths.push_back(std::move(dead));
   outcome.silent = SilentPartitions();
   outcome.silent_runs += outcome.silent.empty() ? 0 : 1;
-  for (std::string& dead : fleet.Bury()) outcome.deaths.push_back(std::move(dead));
 }
 
 void Print(Report& report, const std::string& name, const Outcome& outcome) {
