@@ -1,7 +1,7 @@
 // cairn-study hostile sends mutated and generated datagrams, from three senders as fast as they can, to a cairnd, two
 // robots that stream and a viewer of both: whether a process dies, what the guard drops, whether streams stop and how
-// soon they flow again, and whether a client that joins then is answered in every partition of replies. Everything is on
-// loopback in a domain of its own. Recording the traffic needs CAP_NET_RAW.
+// soon they flow again, and whether a client that joins then is answered in every partition of replies. Everything is
+// on loopback in a domain of its own. Recording the traffic needs CAP_NET_RAW.
 // --seconds: of the long part (600); --runs: of the short ones (100).
 #include <algorithm>
 #include <array>
