@@ -13,7 +13,7 @@ set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
 all=(packages format architecture release accuracy demo nodds tidy asan fuzz tsan)
-full=(asan_rest plain demo_secure debs systemd)
+full=(asan_rest plain demo_secure debs containers systemd)
 stages=()
 studies=()
 full_too=0
@@ -186,6 +186,18 @@ stage_debs() {
   if [ "$(id -u)" -ne 0 ]; then echo "SKIPPED: not root"; return 77; fi
   deploy/install-packages.sh boot
   tests/deploy/packages_test.sh build/release/packages build/debs
+}
+
+# The checkers are npm's, in the versions of package-lock.json.
+stage_containers() {
+  command -v npm >/dev/null || deploy/install-packages.sh containers
+  mkdir -p build/containers
+  cp tests/deploy/containers/* build/containers/
+  cd build/containers
+  npm ci --no-audit --no-fund --loglevel=error
+  npx dockerfilelint "$root/deploy/containers/Dockerfile"
+  npx dclint -c dclint.json --max-warnings 0 "$root/deploy/containers/compose.yaml"
+  node manifests.mjs "$root"/deploy/containers/kubernetes/[!k]*.yaml
 }
 
 # Root only: it makes a system of its own and boots it.
