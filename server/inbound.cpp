@@ -58,7 +58,7 @@ bool Inbound::HasShare(const InboundValue& value) const {
 void Inbound::ForgetOlder(const ClientLiveliness& news) {
   const auto older = std::find_if(control_.begin(), control_.end(), [&news](const Arrived& waiting) {
     const auto* const liveliness = std::get_if<ClientLiveliness>(&waiting.value);
-    return liveliness != nullptr && liveliness->client == news.client;
+    return liveliness != nullptr && liveliness->client == news.client && liveliness->robot_id == news.robot_id;
   });
   if (older != control_.end()) control_.erase(older);
 }

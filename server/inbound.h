@@ -42,9 +42,10 @@ struct OdometryArrival {
   bool refused = false;
 };
 
-// A client process gained or lost its liveliness lease.
+// A client process gained or lost its liveliness lease, as far as it speaks for this robot.
 struct ClientLiveliness {
   ClientId client = 0;
+  NameId robot_id = 0;
   bool alive = false;
 };
 

@@ -33,6 +33,14 @@ Result<std::unique_ptr<Store>> OpenState(const std::string& state, bool must_exi
   return server::OpenStore(state);
 }
 
+// To change it. First what an earlier deletion has left is removed, which a running server does little by little.
+Result<std::unique_ptr<Store>> OpenToEdit(const std::string& state, bool must_exist) {
+  auto store = OpenState(state, must_exist);
+  if (!store) return store;
+  if (auto removed = server::RemoveRests(**store); !removed) return tl::unexpected(removed.error());
+  return store;
+}
+
 Result<std::map<std::string, std::string>> RenamesOf(const std::vector<std::string>& texts) {
   std::map<std::string, std::string> renames;
   for (const std::string& text : texts) {
@@ -100,7 +108,7 @@ ExitCode ExportStored(Program& program, const SiteArguments& arguments) {
 ExitCode Import(Program& program, const SiteArguments& arguments) {
   const auto renames = RenamesOf(arguments.renames);
   if (!renames) return program.Refuse(renames.error());
-  const auto store = OpenState(arguments.state, false);
+  const auto store = OpenToEdit(arguments.state, false);
   if (!store) return program.Refuse(store.error());
   return PrintSummary(program,
                       server::ImportSite(**store, arguments.names[0], {.site = arguments.as, .robots = *renames}));
@@ -131,7 +139,7 @@ ExitCode Merge(Program& program, const SiteArguments& arguments) {
   const bool files = arguments.state.empty();
   std::vector<std::string> sites;
   if (!files) sites = arguments.names;
-  const auto store = files ? OpenFiles(arguments.names, sites, *renames) : OpenState(arguments.state, true);
+  const auto store = files ? OpenFiles(arguments.names, sites, *renames) : OpenToEdit(arguments.state, true);
   if (!store) return program.Refuse(store.error());
   if (auto merged = server::MergeSites(**store, sites[0], sites[1], arguments.T_into_from); !merged)
     return program.Refuse(merged.error());
@@ -150,7 +158,7 @@ struct NamedSessions {
 Result<NamedSessions> OpenSessions(const SiteArguments& arguments) {
   const auto& names = arguments.names;  // The site or its file, then the sessions.
   std::vector<std::string> sites;
-  auto store = arguments.state.empty() ? OpenFiles({names[0]}, sites) : OpenState(arguments.state, true);
+  auto store = arguments.state.empty() ? OpenFiles({names[0]}, sites) : OpenToEdit(arguments.state, true);
   if (!store) return tl::unexpected(store.error());
   NamedSessions named{std::move(*store), sites.empty() ? names[0] : sites[0], {}};
   const auto contents = server::ReadSite(*named.store, named.site);

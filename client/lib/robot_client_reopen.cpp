@@ -61,7 +61,8 @@ std::optional<Pose2> RobotClient::StartOfNextSession() const {
     return entry.first != HashName(kOdometrySensor) && entry.second.window.settled_through() > 0;
   });
   if (settled) return std::nullopt;
-  const Pose2 first = request_.has_start ? request_.T_map_robot_start : Pose2{};
+  if (!request_.has_start) return std::nullopt;  // Nobody has said where it was at the beginning either.
+  const Pose2 first = request_.T_map_robot_start;
   if (!odometry || !start_odometry_) return first;
   if (!IsOneDrive(start_odometry_->stamp, odometry->newest)) return std::nullopt;
   return first * Between(start_odometry_->T_odom_robot, odometry->T_odom_robot);

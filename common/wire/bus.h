@@ -63,7 +63,7 @@ struct SubscriptionEvents {
   std::function<void(int lost_total)> lost;  // Samples lost on the wire.
   // For SessionRequest only: the lease of the writer whose last request named `client` has run out, or the
   // writer has left (false); or a sample of the writer arrives again (true).
-  std::function<void(ClientId client, bool alive)> liveliness;
+  std::function<void(ClientId client, NameId robot_id, bool alive)> liveliness;
   std::function<void(const std::string& policy)> incompatible_qos;  // A peer that will never match.
   std::function<void(int matched)> matched;                         // The number of publications changed.
 };

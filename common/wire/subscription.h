@@ -104,10 +104,11 @@ class DdsSubscription final : public Subscription {
 
   void Deliver(Value&& value, const WriterClients::Writer& writer) {
     if constexpr (std::is_same_v<Value, SessionRequest>) {
-      const ClientId client = value.client;
+      const WriterClients::Speaker speaker{value.client, HashName(value.robot)};
       on_value_(std::move(value));
       // The lease may have run out before the request was taken.
-      if (!clients_.Seen(writer, client) && events_.liveliness) events_.liveliness(client, false);
+      if (!clients_.Seen(writer, speaker) && events_.liveliness)
+        events_.liveliness(speaker.client, speaker.robot_id, false);
     } else {
       if constexpr (std::is_same_v<Value, Request>) value.asker = ParticipantOf(writer);
       if constexpr (std::is_same_v<Value, Command>) value.request.asker = ParticipantOf(writer);
@@ -126,8 +127,9 @@ class DdsSubscription final : public Subscription {
     if (news.incompatible_policy && events_.incompatible_qos) events_.incompatible_qos(*news.incompatible_policy);
     if constexpr (std::is_same_v<Value, SessionRequest>) {
       for (const LivelinessChange& change : news.liveliness) {
-        const std::optional<ClientId> client = clients_.Changed(change);
-        if (client && events_.liveliness) events_.liveliness(*client, change.alive);
+        for (const WriterClients::Speaker& speaker : clients_.Changed(change)) {
+          if (events_.liveliness) events_.liveliness(speaker.client, speaker.robot_id, change.alive);
+        }
       }
     }
   }

@@ -44,7 +44,9 @@ Result<void> Ingress::Add(wire::Bus& bus, void (Ingress::*take)(Value&&), wire::
 
 Result<void> Ingress::Subscribe(wire::Bus& bus) {
   wire::SubscriptionEvents session_events;
-  session_events.liveliness = [this](ClientId client, bool alive) { Push(ClientLiveliness{client, alive}); };
+  session_events.liveliness = [this](ClientId client, NameId robot_id, bool alive) {
+    Push(ClientLiveliness{client, robot_id, alive});
+  };
   // Streams come first: once a robot learns that its session is open, its scans must arrive.
   if (auto added = Add<ScanSample>(bus, &Ingress::Take); !added) return added;
   if (auto added = Add<OdometrySample>(bus, &Ingress::Take); !added) return added;

@@ -10,6 +10,8 @@ namespace {
 
 // Shortest time between two progress messages of one job. People do not need them more often.
 constexpr auto kProgressPeriod = std::chrono::milliseconds(200);
+// So many servers may die while a job runs. Kills have other causes as well, so one or two say nothing about the job.
+constexpr std::uint32_t kMostAttempts = 8;
 
 }  // namespace
 
@@ -36,7 +38,14 @@ Result<void> JobList::RestoreOne(std::uint64_t id, std::vector<StoredJob>& unfin
   const auto take = [&](std::uint64_t, std::string_view bytes) CAIRN_NO_THREAD_SAFETY_ANALYSIS -> Result<void> {
     auto stored = JobOf(bytes);
     if (!stored) return tl::unexpected(stored.error());
-    if (!IsFinal(stored->job.state)) {
+    const bool ends_servers = stored->job.state == JobState::kRunning && stored->attempts >= kMostAttempts;
+    if (ends_servers) {
+      stored->job.state = JobState::kFailed;
+      stored->job.ended = now_();
+      stored->job.message = "the server ended " + std::to_string(stored->attempts) +
+                            " times while this job ran, perhaps because it needs more memory than there is";
+      spdlog::error("job {} of site {} is given up: {}", id, stored->job.site, stored->job.message);
+    } else if (!IsFinal(stored->job.state)) {
       stored->job.state = JobState::kQueued;
       stored->job.progress = 0.0;
       unfinished.push_back(*stored);
@@ -44,9 +53,11 @@ Result<void> JobList::RestoreOne(std::uint64_t id, std::vector<StoredJob>& unfin
     Entry& entry = jobs_[id];
     entry.job = stored->job;
     entry.enable = stored->enable;
+    entry.attempts = stored->attempts;
     entry.control = std::make_shared<JobControl>([this, id](double progress) { Progress(id, progress); });
     entry.unsent = true;
     next_ = std::max(next_, id + 1);
+    if (ends_servers) ChangedLocked(entry);
     return {};
   };
   const auto unreadable = [&](std::uint64_t, const Status& why) CAIRN_NO_THREAD_SAFETY_ANALYSIS {
@@ -98,6 +109,7 @@ bool JobList::Start(std::uint64_t id) {
   if (found == jobs_.end() || found->second.job.state != JobState::kQueued) return false;
   found->second.job.state = JobState::kRunning;
   found->second.job.started = now_();
+  ++found->second.attempts;
   ChangedLocked(found->second);
   return true;
 }
@@ -150,6 +162,12 @@ Result<Job> JobList::Cancel(std::uint64_t id) {
 void JobList::CancelAll() {
   {
     const MutexLock lock(mutex_);
+    // This is no attempt that ended the server.
+    for (auto& [id, entry] : jobs_) {
+      if (stopping_ || entry.job.state != JobState::kRunning) continue;
+      --entry.attempts;
+      ChangedLocked(entry);
+    }
     stopping_ = true;
   }
   for (const Job& job : OfSite({})) {
@@ -171,6 +189,15 @@ std::vector<Job> JobList::OfSite(const std::string& site) const {
     if (site.empty() || entry.job.site == site) jobs.push_back(entry.job);
   }
   return jobs;
+}
+
+bool JobList::EndsServers(const std::string& site, JobKind kind) const {
+  const MutexLock lock(mutex_);
+  return std::any_of(jobs_.begin(), jobs_.end(), [&](const auto& one) {
+    const Entry& entry = one.second;
+    return entry.job.site == site && entry.job.kind == kind && entry.job.state == JobState::kFailed &&
+           entry.attempts >= kMostAttempts;
+  });
 }
 
 std::shared_ptr<const JobControl> JobList::ControlOf(std::uint64_t id) const {
@@ -204,7 +231,7 @@ void JobList::ChangedLocked(Entry& entry) {
   // file.
   if (journal_ != nullptr && !stopping_) {
     journal_->Put({RecordKind::kJob, entry.job.id, 0},
-                  [stored = StoredJob{entry.job, entry.enable}] { return BytesOf(stored); });
+                  [stored = StoredJob{entry.job, entry.enable, entry.attempts}] { return BytesOf(stored); });
   }
   SendLocked(entry);
 }

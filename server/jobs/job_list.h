@@ -25,7 +25,8 @@ class JobList {
   JobList(const JobsOptions& options, Outbound& outbound, std::function<Stamp()> now, Journal* journal = nullptr);
 
   // Restores the jobs of earlier servers. Those that had not ended are queued again and returned in the order of their
-  // ids. REQUIRES: no other function was called before.
+  // ids, but for one that ran in each of the last eight servers when they died: it fails, because it may be the cause
+  // (a job that needs more memory than there is). REQUIRES: no other function was called before.
   Result<std::vector<StoredJob>> Restore();
   // Jobs that are loaded while the server runs: the first of so many numbers that no other job gets, and then the jobs
   // themselves, as Restore takes them.
@@ -49,6 +50,8 @@ class JobList {
 
   [[nodiscard]] Result<Job> Find(std::uint64_t id) const;
   [[nodiscard]] std::vector<Job> OfSite(const std::string& site) const;  // An empty name: the jobs of all sites.
+  // Whether a job of this kind failed because servers died while it ran. Another one would do the same.
+  [[nodiscard]] bool EndsServers(const std::string& site, JobKind kind) const;
   [[nodiscard]] std::shared_ptr<const JobControl> ControlOf(std::uint64_t id) const;
   // Publishes the changes that could not be published before.
   void Tick();
@@ -57,6 +60,7 @@ class JobList {
   struct Entry {
     Job job;
     bool enable = true;
+    std::uint32_t attempts = 0;  // StoredJob::attempts.
     std::shared_ptr<JobControl> control;
     bool unsent = false;
     std::chrono::steady_clock::time_point progress_sent{};

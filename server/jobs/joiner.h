@@ -21,7 +21,7 @@ class Joiner {
       : options_(options), roster_(roster), jobs_(jobs), worker_(worker) {}
 
   // Submits the jobs that are due, at most one per site. None while the site has a job that has not ended, because that
-  // job may join the fragment.
+  // job may join the fragment, and none where such a job has ended servers (JobList::EndsServers).
   void Tick();
 
  private:

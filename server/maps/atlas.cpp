@@ -61,6 +61,11 @@ void Atlas::PutAside(NameId owner, const Status& why) {
   set_aside_[owner] = why.message;
 }
 
+void Atlas::SetAside(const std::string& name, const Status& why) {
+  PutAside(HashName(name), why);
+  Release(name);
+}
+
 bool Atlas::IsSetAside(const std::string& name) const {
   const MutexLock lock(mutex_);
   return set_aside_.contains(HashName(name));

@@ -39,6 +39,8 @@ class Atlas {
   // ALREADY_EXISTS: there is one. RESOURCE_EXHAUSTED: too many sites.
   Result<void> Reserve(const std::string& name);
   void Release(const std::string& name);
+  // What was removed could not be deleted from the store: its name stays taken until it is.
+  void SetAside(const std::string& name, const Status& why);
   // The site is not found any more, and nobody can make another of this name until it is released. Those who have it
   // keep it. Sites that are made from now on begin above its epoch.
   void Remove(const std::string& name);

@@ -247,8 +247,15 @@ Result<void> SavedSites::Delete(const std::string& name) {
   (*site)->Retire([promise](std::shared_ptr<const MapSnapshot> last) { promise->set_value(std::move(last)); });
   const std::shared_ptr<const MapSnapshot> last = retired.get();
   const auto removed = DeleteStored(name);
-  if (removed) journal_->set_aside().RemoveSite(name);
-  rooms_.atlas.Release(name);
+  // A site that has stored nothing yet is deleted without a trace.
+  const bool remains = !removed && removed.error().code != StatusCode::kNotFound;
+  if (remains) {
+    // A new site of this name would be mixed with what is left of it. It can be deleted again.
+    rooms_.atlas.SetAside(name, {removed.error().code, "its deletion failed: " + removed.error().message});
+  } else {
+    journal_->set_aside().RemoveSite(name);
+    rooms_.atlas.Release(name);
+  }
   for (int level = 0; level < kPyramidLevels; ++level) {
     last->tiles.ForEach(level, [&](const TileSet::TilePtr& tile) {
       TileSample gone{.site_id = last->info.site_id, .tile = {}, .deleted = true};
@@ -269,8 +276,7 @@ Result<void> SavedSites::Delete(const std::string& name) {
   empty.levels = last->info.levels;
   rooms_.outbound.SendPatiently(empty);
   rooms_.atlas.Retire(std::move(empty));
-  // A site that has stored nothing yet is deleted without a trace.
-  if (!removed && removed.error().code != StatusCode::kNotFound) return tl::unexpected(removed.error());
+  if (remains) return tl::unexpected(removed.error());
   return {};
 }
 

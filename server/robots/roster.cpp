@@ -96,7 +96,9 @@ Result<void> Roster::Admit(const SessionRequest& request) {
                                                      "'; open a new one" + WhyNotRestored(request.robot));
   }
   if (session == nullptr || session->record().phase() == SessionPhase::kEnded) return Open(request);
-  return request.has_start ? Replace(*session, request) : Resume(*session, request);
+  // Before the first scan of a session was used, the robot may have been carried away from where the old client said.
+  const bool replaces = request.has_start || !HasDrawn(*session);
+  return replaces ? Replace(*session, request) : Resume(*session, request);
 }
 
 std::string Roster::WhyNotRestored(const std::string& robot) const {
@@ -123,12 +125,12 @@ Result<void> Roster::MayTakeOver(const Session& session, const SessionRequest& r
   return {};
 }
 
-// A client that says where the robot starts gets a new session instead of the old one.
+// The new client gets a new session instead of the old one.
 Result<void> Roster::Replace(Session& session, const SessionRequest& request) {
   if (auto may = MayTakeOver(session, request); !may) return may;
   const SessionState state = session.record().state();
   if (auto opened = Open(request); !opened) return opened;
-  session.End({StatusCode::kAborted, "a new session of '" + state.robot + "' was opened with a start pose"});
+  session.End({StatusCode::kAborted, "another client has opened a new session of '" + state.robot + "'"});
   TellDisplaced(state, request);
   return {};
 }
@@ -152,6 +154,16 @@ Result<void> Roster::Resume(Session& session, const SessionRequest& request) {
     return Fail(StatusCode::kUnavailable, "the last session of '" + request.robot + "' is still ending; try again");
   TellDisplaced(state, request);
   return {};
+}
+
+// Whether this is the first scan that arrives, others were sent before, and the place where the robot begins matters,
+// because others have made the map.
+bool Roster::BeginsLate(const Session& session, std::uint64_t sequence) const {
+  constexpr std::uint64_t kMostMissing =
+      10;  // About a second. A start that is wrong by this is corrected by the match.
+  if (sequence <= kMostMissing + 1 || session.record().HasReceivedScans() || HasDrawn(session)) return false;
+  const auto site = atlas_.Find(session.record().state().site);
+  return site != nullptr && site->snapshot()->info.tile_count > 0;
 }
 
 void Roster::Refuse(const SessionRequest& request, Status status) {
@@ -184,6 +196,11 @@ void Roster::Take(ScanArrival&& arrival) {
     const auto found = sessions_.find(stream.robot_id);
     if (found != sessions_.end()) session = found->second;
   }
+  if (session != nullptr && BeginsLate(*session, sequence)) {
+    session->RefuseStart(
+        "the first " + std::to_string(sequence - 1) +
+        " scans of its session never arrived, so nothing says that it is still where it was said to start");
+  }
   const DropReason reason = session != nullptr && session->record().token() != stream.session ? DropReason::kNotOwner
                                                                                               : DropReason::kNoSession;
   if (session != nullptr && session->Take(std::move(arrival))) return;
@@ -202,9 +219,13 @@ void Roster::Take(OdometryArrival&& arrival) {
 }
 
 void Roster::Take(const ClientLiveliness& liveliness) {
-  for (const auto& session : All()) {
-    if (session->record().owner() == liveliness.client) session->SetLiveliness(liveliness.alive);
+  std::shared_ptr<Session> session;
+  {
+    const MutexLock lock(mutex_);
+    const auto found = sessions_.find(liveliness.robot_id);
+    if (found != sessions_.end()) session = found->second;
   }
+  if (session != nullptr && session->record().owner() == liveliness.client) session->SetLiveliness(liveliness.alive);
 }
 
 Result<void> Roster::End(const std::string& robot, std::shared_ptr<Receipt> receipt) {

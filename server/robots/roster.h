@@ -143,6 +143,7 @@ class Roster {
   RestoredSession GoOn(const Stored& stored, Begun begun, const Restoring& how);
   // The session that has to be removed before this robot can have a new one; null if there is room.
   Result<std::shared_ptr<Session>> GivesWay(NameId robot_id) const CAIRN_REQUIRES(mutex_);
+  [[nodiscard]] bool BeginsLate(const Session& session, std::uint64_t sequence) const;
   void Refuse(const SessionRequest& request, Status status);
   void RetireGone();
   void SendRefusals();

@@ -103,6 +103,7 @@ class SessionRecord {
   // Another epoch of the map: the newest pose belongs to it from now on.
   void SetEpoch(std::uint32_t epoch);
   void SetAlive(bool alive);
+  [[nodiscard]] bool HasReceivedScans() const;  // Of this client or of an earlier one.
   // Both return false and change nothing if the session has ended. It may have ended after the caller last looked.
   bool SetPhase(SessionPhase phase, Status status);
   // Notices that nothing arrives of a stream although the robot's client is alive, and that it arrives again. Says

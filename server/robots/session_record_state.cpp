@@ -97,6 +97,8 @@ void SessionRecord::Restored(std::uint64_t quiet_since_ms) {
   suspended_ = ended_ = Clock::now() - std::chrono::milliseconds(now_ms - quiet_since_ms_);
   const auto restore = [](Stream& stream) {
     stream.account.Restored();
+    // What arrived before the start arrives again, or the stream stands still.
+    if (stream.account.ledger().received > 0) stream.arrived = Clock::now();
     stream.resuming = stream.changed = true;
   };
   for (auto& [sensor_id, stream] : streams_) restore(stream);

@@ -166,7 +166,7 @@ void RobotStream::TakeStart(const ros2::PoseWithCovariance& message, Clock::time
   start_ = ros2::PlanarPart(*motion);
   start_received_ = now;
   // The present session is left, so that a new one may begin at the pose (robots/roster.h).
-  if (phase_ == Phase::kOpen) Push(ClientLiveliness{client_, false});
+  if (phase_ == Phase::kOpen) Push(ClientLiveliness{client_, robot_id_, false});
   phase_ = Phase::kWaiting;
   client_ = 0;
 }
@@ -240,7 +240,7 @@ void RobotStream::SetPublishers(bool scans, bool odometry, Clock::time_point /*n
   if (returns && phase_ == Phase::kEnded) phase_ = Phase::kWaiting;
   if (phase_ != Phase::kOpen || alive_ == scans) return;
   alive_ = scans;
-  Push(ClientLiveliness{client_, alive_});
+  Push(ClientLiveliness{client_, robot_id_, alive_});
 }
 
 void RobotStream::Tick(Clock::time_point now) {

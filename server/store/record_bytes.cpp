@@ -170,6 +170,7 @@ std::string BytesOf(const StoredJob& stored) {
   to.set_ended(job.ended);
   to.set_message(job.message);
   to.set_enable(stored.enable);
+  to.set_attempts(stored.attempts);
   return to.SerializeAsString();
 }
 
@@ -193,6 +194,7 @@ Result<StoredJob> JobOf(std::string_view bytes) {
   job.ended = from.ended();
   job.message = from.message();
   stored.enable = from.enable();
+  stored.attempts = from.attempts();
   return stored;
 }
 

@@ -140,6 +140,8 @@ struct StoredLayer {
 struct StoredJob {
   Job job;
   bool enable = true;  // Whether to enable the map version that it makes.
+  // How often it was begun, but for those times in which the server was stopped in good order meanwhile.
+  std::uint32_t attempts = 0;
 };
 
 [[nodiscard]] std::string BytesOf(std::uint64_t first, const std::vector<JournalEntry>& entries);

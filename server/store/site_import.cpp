@@ -188,9 +188,12 @@ struct LastNumbers {
   std::uint64_t job = 0;
 };
 
-Result<LastNumbers> LastNumbersOf(Store& store, const std::map<std::uint64_t, StoredSession>& sessions) {
+// Also of what is only half removed: the same numbers would join the old records with the new ones.
+Result<LastNumbers> LastNumbersOf(Store& store) {
   LastNumbers last;
-  if (!sessions.empty()) last.session = sessions.rbegin()->first;
+  const auto session = LastSession(store);
+  if (!session) return tl::unexpected(session.error());
+  last.session = *session;
   const auto sites = store.Owners(RecordKind::kLayer);
   if (!sites) return tl::unexpected(sites.error());
   for (const std::uint64_t site : *sites) {
@@ -225,7 +228,7 @@ Result<SiteFileSummary> ImportSite(Store& store, const std::filesystem::path& pa
   if (auto named = CheckNames(*file, options); !named) return tl::unexpected(named.error());
   const auto sessions = ReadSessions(store);
   if (!sessions) return tl::unexpected(sessions.error());
-  const auto last = LastNumbersOf(store, *sessions);
+  const auto last = LastNumbersOf(store);
   if (!last) return tl::unexpected(last.error());
   const Renaming renaming(*file, options, std::max(last->session + 1, options.first_session),
                           std::max(last->job + 1, options.first_job));

@@ -37,7 +37,8 @@ class Peer {
     if (kind == 3) return With<Request>(bytes, [&](auto&& value) { rooms_.Ask(std::move(value)); });
     Pieces news(bytes);
     const auto client = news.Take<ClientId>();
-    rooms_.roster().Take(server::ClientLiveliness{client, news.Take() % 2 == 1});
+    const auto robot_id = news.Take<NameId>();
+    rooms_.roster().Take(server::ClientLiveliness{client, robot_id, news.Take() % 2 == 1});
   }
   void Finish() { rooms_.Finish(); }
   [[nodiscard]] bool accepted() const { return accepted_; }

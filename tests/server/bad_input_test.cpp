@@ -161,7 +161,7 @@ TEST_F(BadInput, ARobotThatConnectsTwiceIsRefusedWhileTheFirstLives) {
   house_.SendScan("r1", 8, RoomScan(10));
   ASSERT_TRUE(house_.WaitFor([&] { return Dropped(house_.LastLedger("r1"), DropReason::kNotOwner) == 1; }));
 
-  house_.Push(ClientLiveliness{kSender, false});
+  house_.Push(ClientLiveliness{kSender, HashName("r1"), false});
   ASSERT_TRUE(house_.WaitPhase("r1", kSender, SessionPhase::kSuspended));
   house_.Open("r1", 8, "lab", TruePose(10));
   ASSERT_TRUE(house_.WaitPhase("r1", 8, SessionPhase::kActive));

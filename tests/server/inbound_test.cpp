@@ -43,7 +43,7 @@ TEST(Inbound, AFloodInOneLaneDisplacesNothingInAnother) {
   for (int i = 0; i < 4; ++i) EXPECT_TRUE(inbound.TryPush(Request{}));
   EXPECT_FALSE(inbound.TryPush(Request{}));
   EXPECT_TRUE(inbound.TryPush(RequestOf(7)));
-  EXPECT_TRUE(inbound.TryPush(ClientLiveliness{7, false}));
+  EXPECT_TRUE(inbound.TryPush(ClientLiveliness{7, 1, false}));
   static_cast<void>(inbound.Pop());
   EXPECT_TRUE(inbound.TryPush(ScanValue(5)));
 }
@@ -66,8 +66,8 @@ TEST(Inbound, SessionRequestsAreBoundedAndLivelinessIsNeverRefused) {
   for (std::size_t i = 0; i < Inbound::kMaxControl; ++i) EXPECT_TRUE(inbound.TryPush(RequestOf(1)));
   EXPECT_FALSE(inbound.TryPush(RequestOf(1)));
   for (int i = 0; i < 100; ++i) {
-    EXPECT_TRUE(inbound.TryPush(ClientLiveliness{8, i % 2 == 1}));
-    EXPECT_TRUE(inbound.TryPush(ClientLiveliness{9, i % 2 == 0}));
+    EXPECT_TRUE(inbound.TryPush(ClientLiveliness{8, 1, i % 2 == 1}));
+    EXPECT_TRUE(inbound.TryPush(ClientLiveliness{9, 1, i % 2 == 0}));
   }
   EXPECT_EQ(inbound.size(), Inbound::kMaxControl + 2);
   for (std::size_t i = 0; i < Inbound::kMaxControl; ++i) static_cast<void>(inbound.Pop());
@@ -82,9 +82,9 @@ TEST(Inbound, SessionRequestsAreBoundedAndLivelinessIsNeverRefused) {
 // waits.
 TEST(Inbound, TheNewestLivelinessStaysBehindTheRequestBeforeIt) {
   Inbound inbound(4);
-  EXPECT_TRUE(inbound.TryPush(ClientLiveliness{7, true}));
+  EXPECT_TRUE(inbound.TryPush(ClientLiveliness{7, 1, true}));
   EXPECT_TRUE(inbound.TryPush(RequestOf(7)));
-  EXPECT_TRUE(inbound.TryPush(ClientLiveliness{7, false}));
+  EXPECT_TRUE(inbound.TryPush(ClientLiveliness{7, 1, false}));
   EXPECT_TRUE(std::holds_alternative<SessionRequest>(*inbound.Pop()));
   EXPECT_FALSE(std::get<ClientLiveliness>(*inbound.Pop()).alive);
   EXPECT_EQ(inbound.size(), 0U);
@@ -106,7 +106,7 @@ TEST(Inbound, AfterTheCloseOnlyWhatIsInsideGoesOut) {
   EXPECT_TRUE(inbound.Push(ScanValue(1)));
   std::jthread closer([&inbound] { inbound.Close(); });
   EXPECT_FALSE(inbound.Push(ScanValue(2)));
-  EXPECT_FALSE(inbound.TryPush(ClientLiveliness{7, false}));
+  EXPECT_FALSE(inbound.TryPush(ClientLiveliness{7, 1, false}));
   EXPECT_TRUE(inbound.Pop());
   EXPECT_FALSE(inbound.Pop());
 }

@@ -193,7 +193,7 @@ TEST(Restore, ForHowLongARobotIsAwayIsKeptOverRestarts) {
     first->Drive("r1", kDriver, 0, 20);
     EXPECT_TRUE(first->WaitFor([&] { return DurableScans(*first.operator->()) == 20; }));
     CopyState(directory / "0", directory / "driving");
-    first->Push(ClientLiveliness{kDriver, false});
+    first->Push(ClientLiveliness{kDriver, HashName("r1"), false});
     ASSERT_TRUE(first->WaitPhase("r1", kDriver, SessionPhase::kSuspended));
     ASSERT_TRUE(test::Eventually([&] {
       std::filesystem::remove_all(directory / "now");

@@ -121,7 +121,8 @@ void MakeSite(WholeServer& house) {
 }
 
 void Leave(WholeServer& house) {
-  for (const ClientId client : {ClientId{9}, kRider}) house.Push(ClientLiveliness{client, false});
+  house.Push(ClientLiveliness{9, HashName("r0"), false});
+  house.Push(ClientLiveliness{kRider, HashName("r1"), false});
   ASSERT_TRUE(house.WaitPhase("r0", 9, SessionPhase::kSuspended));
   ASSERT_TRUE(house.WaitPhase("r1", kRider, SessionPhase::kSuspended));
 }

@@ -26,7 +26,8 @@ class Liveliness : public ::testing::Test {
  protected:
   SubscriptionEvents Events() {
     SubscriptionEvents events;
-    events.liveliness = [this](ClientId client, bool alive) {
+    events.liveliness = [this](ClientId client, NameId robot_id, bool alive) {
+      if (robot_id == 0) return;
       const std::lock_guard lock(mutex_);
       alive_[client] = alive;
     };

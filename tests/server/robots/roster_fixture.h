@@ -55,7 +55,12 @@ class RosterTest : public ::testing::Test {
       return state.robot == robot && state.phase == phase;
     });
   }
-  void Suspend(ClientId client) { roster().Take(ClientLiveliness{client, false}); }
+  void Suspend(ClientId client) {
+    for (const auto& session : roster().All()) {
+      const SessionState state = session->record().state();
+      if (state.client == client) roster().Take(ClientLiveliness{client, state.robot_id, false});
+    }
+  }
 
   asio::thread_pool pool_{2};
   Outbound outbound_{kLane};

@@ -61,7 +61,7 @@ TEST_F(RosterTest, AClientWhoseSessionIsTakenOverIsTold) {
   EXPECT_EQ(LastState("r1", 7).phase, SessionPhase::kRefused);
   EXPECT_EQ(LastState("r1", 7).status.code, StatusCode::kAlreadyExists);
   // Its lease comes back: that changes nothing for the new owner.
-  roster().Take(ClientLiveliness{7, true});
+  roster().Take(ClientLiveliness{7, HashName("r1"), true});
   EXPECT_EQ(roster().Find("r1")->record().owner(), 8U);
 }
 

@@ -187,7 +187,8 @@ void StudyRestart(StudyContext& context) {
              Number(At(times.new_poses_s, 0.5), 2), Number(At(times.new_poses_s, 0.99), 2), Count(times.new_sessions)});
   report.Add(table, "restart");
   report.Text(
-      "Since the start of the process. The robots are eight clients in this process, which continue their sessions and "
+      "Since the kill, with the pause of 0.1 s after which the service manager starts the server again. The robots are "
+      "eight clients in this process, which continue their sessions and "
       "drive back and forth over the last half minute of their logs; a new pose is one of a scan that was made after "
       "the kill.");
   report.Expect(At(times.poses_s, 0.99) <= kLongestRestart_s, "a restart takes more than 2 s");

@@ -26,6 +26,8 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int kRobots = 8;
 constexpr std::chrono::seconds kLongest{60};
+constexpr std::chrono::milliseconds kRestartPause{
+    100};  // That of the unit (deploy/systemd), before it starts a server again.
 
 double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -144,11 +146,12 @@ RestartTimes MeasureRestarts(StudyContext& context) {
   const int kills = context.runs > 0 ? context.runs : context.Pick(1000, 3);
   for (int kill = 0; kill < kills; ++kill) {
     for (const auto& robot : robots) robot->Expect();
-    server->Signal(SIGKILL);
-    server->Wait();
     const auto queries = client::QueryClient::Create(**bus, {.timeout_s = 0.3});
     if (!queries) throw std::runtime_error(queries.error().message);
     const auto start = Clock::now();
+    server->Signal(SIGKILL);
+    server->Wait();
+    std::this_thread::sleep_for(kRestartPause);
     server = StartServer(state);
     times.tiles_s.push_back(TimeUntil(start, [&] { return HasTiles(**queries); }));
     times.poses_s.push_back(TimeUntil(start, [&] { return HasAllPoses(**queries); }));
