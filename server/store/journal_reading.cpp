@@ -72,8 +72,9 @@ Result<std::uint64_t> NextGeneration(Store& store, std::uint64_t milliseconds) {
     return tl::unexpected(read.error());
   const std::uint64_t generation = std::max(server.generation() + 1, milliseconds);
   server.set_generation(generation);
-  if (auto kept = store.Commit({.removed = {}, .put = {{key, server.SerializeAsString()}}}); !kept)
-    return tl::unexpected(kept.error());
+  // On a full disk the clock alone makes the next one larger; a server that does not start would be worse.
+  auto kept = store.Commit({.removed = {}, .put = {{key, server.SerializeAsString()}}});
+  if (!kept && kept.error().code != StatusCode::kResourceExhausted) return tl::unexpected(kept.error());
   return generation;
 }
 

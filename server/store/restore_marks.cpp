@@ -27,10 +27,18 @@ Result<RestoreMarks> RestoreMarks::Read(Store& store, std::optional<std::uint64_
   return marks;
 }
 
+// On a full disk there are no marks: a session whose restoring ends the process then ends the next start as well. That
+// is better than a server that does not start at all until somebody makes room.
+Result<void> RestoreMarks::Commit(const RecordChanges& changes) const {
+  auto committed = store_->Commit(changes);
+  if (!committed && committed.error().code == StatusCode::kResourceExhausted) return {};
+  return committed;
+}
+
 Result<void> RestoreMarks::Settle() {
   RecordChanges changes;
   for (const auto& [session, ends] : ends_) changes.put.push_back(RecordOf(session, ends, false));
-  return changes.put.empty() ? Result<void>{} : store_->Commit(changes);
+  return changes.put.empty() ? Result<void>{} : Commit(changes);
 }
 
 RestoreMarks::Ends RestoreMarks::EndsOf(std::uint64_t session) const {
@@ -63,21 +71,21 @@ Record RestoreMarks::MarkAt(std::uint64_t session, std::uint64_t place) const {
 Result<void> RestoreMarks::Begin(const std::vector<std::uint64_t>& sessions) {
   RecordChanges changes;
   for (const std::uint64_t session : sessions) changes.put.push_back(MarkAt(session, 0));
-  return changes.put.empty() ? Result<void>{} : store_->Commit(changes);
+  return changes.put.empty() ? Result<void>{} : Commit(changes);
 }
 
 Result<void> RestoreMarks::BeginWithoutJournal(std::uint64_t session) {
-  return store_->Commit({.removed = {}, .put = {MarkAt(session, EndsOf(session).place)}});
+  return Commit({.removed = {}, .put = {MarkAt(session, EndsOf(session).place)}});
 }
 
 Result<void> RestoreMarks::Reached(std::uint64_t session, std::uint64_t entries) const {
   if (entries == 0 || entries % kPlaceEntries != 0) return {};
-  return store_->Commit({.removed = {}, .put = {MarkAt(session, entries / kPlaceEntries)}});
+  return Commit({.removed = {}, .put = {MarkAt(session, entries / kPlaceEntries)}});
 }
 
 Result<void> RestoreMarks::Set(std::uint64_t session, std::uint32_t failures) {
   ends_[session] = {.crashes = failures, .place = EndsOf(session).place};
-  return store_->Commit({.removed = {}, .put = {RecordOf(session, ends_[session], false)}});
+  return Commit({.removed = {}, .put = {RecordOf(session, ends_[session], false)}});
 }
 
 Result<void> RestoreMarks::Succeeded(const std::vector<std::uint64_t>& sessions) {
@@ -86,7 +94,7 @@ Result<void> RestoreMarks::Succeeded(const std::vector<std::uint64_t>& sessions)
     ends_.erase(session);
     changes.removed.push_back({.kind = RecordKind::kRestoring, .owner = session});
   }
-  return changes.removed.empty() ? Result<void>{} : store_->Commit(changes);
+  return changes.removed.empty() ? Result<void>{} : Commit(changes);
 }
 
 }  // namespace cairn::server

@@ -30,7 +30,8 @@ class RestoreMarks {
 
   // How many processes failed in a row at the same place of this session.
   [[nodiscard]] std::uint32_t failed(std::uint64_t session) const;
-  // These return when the change is on the disk. Begin: from the first entry, or from a checkpoint.
+  // These return when the change is on the disk, or when the disk is full. Begin: from the first entry, or from a
+  // checkpoint.
   [[nodiscard]] Result<void> Begin(const std::vector<std::uint64_t>& sessions);
   // The session is restored without its journal: if that ends the process too, it is one failure more.
   [[nodiscard]] Result<void> BeginWithoutJournal(std::uint64_t session);
@@ -46,6 +47,7 @@ class RestoreMarks {
     std::uint64_t place = 0;
   };
   explicit RestoreMarks(Store& store) : store_(&store) {}
+  [[nodiscard]] Result<void> Commit(const RecordChanges& changes) const;
   [[nodiscard]] static Record RecordOf(std::uint64_t session, const Ends& ends, bool open);
   // The mark of a session that is at this place now.
   [[nodiscard]] Record MarkAt(std::uint64_t session, std::uint64_t place) const;

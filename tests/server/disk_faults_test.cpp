@@ -110,6 +110,33 @@ TEST(DiskFaults, AfterALongOneTheRobotIsStoredAgain) {
   ASSERT_TRUE(next->WaitPhase("r1", kDriver, SessionPhase::kActive));
 }
 
+// A degraded server that was killed did not start again until somebody had made room: no map, no poses.
+TEST(DiskFaults, OnAFullDiskTheNextServerStartsAsWell) {
+  const TempDirectory directory;
+  const auto state = directory / "state";
+  Trajectory path;
+  {
+    StoredServer server(state);
+    server->Open("r1", kDriver);
+    server->Drive("r1", kDriver, 0, 40);
+    ASSERT_TRUE(server->WaitFor([&] { return server->LastLedger("r1").durable_through == 40; }));
+    path = PathOf(*server.operator->());
+  }
+  {
+    FaultyVfs vfs;
+    vfs.Set(DiskFault::kFull);
+    StoredServer next(state, TestOptions(), FaultyVfs::name());
+    EXPECT_TRUE(SamePath(PathOf(*next.operator->()), path));
+    SayStarted(*next.operator->());
+    next->Drive("r1", kDriver, 40, 80);
+    EXPECT_EQ(PathOf(*next.operator->()).size(), 80U);
+    ASSERT_TRUE(next->WaitFor(
+        [&] { return next->Ask(About(RequestKind::kStatus)).status.message.find("full") != std::string::npos; }));
+  }
+  StoredServer last(state);
+  EXPECT_TRUE(SamePath(PathOf(*last.operator->()), path));
+}
+
 INSTANTIATE_TEST_SUITE_P(Server, FailingDisk,
                          ::testing::Values(Fault{"full", DiskFault::kFull, "database or disk is full"},
                                            Fault{"write", DiskFault::kWriteError, "disk I/O error"},

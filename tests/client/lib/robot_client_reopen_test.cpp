@@ -128,6 +128,23 @@ TEST_F(RobotClientTest, ALostRobotGivesNoStartToTheNextServer) {
   EXPECT_FALSE(server_->sessions().back().has_start);
 }
 
+// It invented the origin of the map.
+TEST_F(RobotClientTest, ARobotThatNeverHadAStartNorAPoseGivesNoneToTheNextServer) {
+  server_->SetSettling(false);
+  const auto client = Must(RobotClient::Open(*bus_, Robot("r1"), 20.0));
+  ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = 0, .T_odom_robot = {5, 0, 0}}));
+  Scan scan = SomeScan();
+  scan.stamp = kStep;
+  ASSERT_TRUE(client->Publish(scan));
+  ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = kStep, .T_odom_robot = {5.1, 0, 0}}));
+  ASSERT_TRUE(Eventually([&] { return server_->received().size() == 1; }));
+  server_.reset();
+  server_ = std::make_unique<FakeServer>(LoopbackOptions(), 2);
+  ASSERT_TRUE(client->WaitSettled(20.0));
+  EXPECT_EQ(client->restarted(), 1);
+  EXPECT_FALSE(server_->sessions().back().has_start);
+}
+
 TEST_F(RobotClientTest, WithoutAPoseTheFirstStartIsCarriedOnByTheOdometry) {
   SessionRequest request = Robot("r1");
   request.has_start = true;

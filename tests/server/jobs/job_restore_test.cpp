@@ -192,6 +192,38 @@ TEST_F(JobRestore, AJobThatIsQueuedAgainIsRunWithItsChoice) {
   worker.Stop();
 }
 
+// A job that needs more memory than there is ended every server that began it, for ever.
+TEST_F(JobRestore, AJobThatEndsServersIsGivenUp) {
+  RunFirstServer();
+  for (int server = 2; server <= 8; ++server) {
+    StoredList list(*store_);
+    const auto unfinished = list.list.Restore();
+    ASSERT_TRUE(unfinished);
+    ASSERT_EQ(unfinished->size(), 2U) << server;
+    ASSERT_TRUE(list.list.Start(2));
+    EXPECT_FALSE(list.list.EndsServers("hall", JobKind::kSmooth));
+  }
+  StoredList last(*store_);
+  const auto unfinished = last.list.Restore();
+  ASSERT_TRUE(unfinished);
+  ASSERT_EQ(unfinished->size(), 1U);  // The one that only waited.
+  EXPECT_EQ(last.list.Find(2)->state, JobState::kFailed);
+  EXPECT_NE(last.list.Find(2)->message.find("ended 8 times"), std::string::npos) << last.list.Find(2)->message;
+  EXPECT_TRUE(last.list.EndsServers("hall", JobKind::kSmooth));
+  EXPECT_FALSE(last.list.EndsServers("hall", JobKind::kJoin));
+  EXPECT_FALSE(last.list.EndsServers("lab", JobKind::kSmooth));
+}
+
+TEST_F(JobRestore, AServerThatIsStoppedWhileAJobRunsWasNotEndedByIt) {
+  RunFirstServer();
+  for (int server = 2; server <= 20; ++server) {
+    StoredList list(*store_);
+    ASSERT_EQ(list.list.Restore()->size(), 2U) << server;
+    ASSERT_TRUE(list.list.Start(2));
+    list.list.CancelAll();
+  }
+}
+
 // The one that ran and those that waited: one more than may be submitted.
 TEST_F(JobRestore, TheJobThatRanWaitsBesideThoseThatWaited) {
   RunFirstServer();

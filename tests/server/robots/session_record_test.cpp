@@ -75,6 +75,16 @@ TEST_F(SessionRecordTest, AfterARestartWhatIsSentAgainComesFirst) {
   EXPECT_EQ(Dropped(ledger(), DropReason::kLostOnWire), 0U);
 }
 
+// Forged messages may have stopped the stream before the first sample of this server.
+TEST_F(SessionRecordTest, AStreamThatStandsStillAfterARestartIsStale) {
+  Receive(1);
+  record_.Restored();
+  ASSERT_TRUE(record_.Resume(kOwner, kOwner));
+  EXPECT_FALSE(record_.LookForSilence(SessionRecord::Clock::now()));
+  EXPECT_TRUE(record_.LookForSilence(SessionRecord::Clock::now() + std::chrono::seconds(2)));
+  EXPECT_TRUE(record_.state().stale);
+}
+
 // A server that is started again every night ended no session ever.
 TEST_F(SessionRecordTest, ItIsAwayForAsLongAsBeforeTheRestart) {
   const std::uint64_t now_ms = SessionRecord::MillisecondsNow();

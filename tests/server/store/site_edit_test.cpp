@@ -102,6 +102,25 @@ TEST(ImportSite, ASmoothedPathKeepsTheSessionThatDroveIt) {
   EXPECT_TRUE(ReadVersions(*other, lab)->at(2).smoothed.contains("r1"));
 }
 
+// The journals of deleted sessions go little by little. With their numbers, an imported session would be mixed with
+// them.
+TEST(ImportSite, TakesNoNumberOfASessionThatIsOnlyHalfRemoved) {
+  const TempDirectory directory;
+  const auto path = Saved(directory, {});
+  const auto store = MemoryStore();
+  ASSERT_TRUE(store->Commit(RecordsOf({})));
+  const auto before = ReadSite(*store, "lab");
+  ASSERT_TRUE(before);
+  const std::uint64_t last = before->sessions.rbegin()->first;
+  ASSERT_TRUE(DeleteSite(*store, "lab"));  // What is large is still there.
+  ASSERT_FALSE(store->Owners(RecordKind::kRemoved)->empty());
+  const auto imported = ImportSite(*store, path);
+  ASSERT_TRUE(imported) << imported.error().message;
+  EXPECT_GT(imported->sessions.begin()->first, last);
+  ASSERT_TRUE(RemoveRests(*store));
+  for (const auto& [id, robot] : imported->sessions) EXPECT_EQ(JournalOf(*store, id).size(), 4U);
+}
+
 // Otherwise the numbers of a site that is saved, deleted and loaded every day would soon have no room.
 TEST(ImportSite, NumbersGrowByWhatTheFileHoldsAndNotByTheirSize) {
   const TempDirectory directory;
