@@ -78,11 +78,19 @@ TEST_F(SessionRecordTest, AfterARestartWhatIsSentAgainComesFirst) {
 // Forged messages may have stopped the stream before the first sample of this server.
 TEST_F(SessionRecordTest, AStreamThatStandsStillAfterARestartIsStale) {
   Receive(1);
-  record_.Restored();
-  ASSERT_TRUE(record_.Resume(kOwner, kOwner));
-  EXPECT_FALSE(record_.LookForSilence(SessionRecord::Clock::now()));
-  EXPECT_TRUE(record_.LookForSilence(SessionRecord::Clock::now() + std::chrono::seconds(2)));
-  EXPECT_TRUE(record_.state().stale);
+  Settle(1);
+  slam::StateWriter writer;
+  ASSERT_TRUE(record_.Save(writer, {}));
+  SessionRecord next{1, RequestOf("r1"), RobotsOptions{}};  // As of a checkpoint: nothing has arrived in this process.
+  ASSERT_TRUE(next.AddSensors({"laser"}));
+  const std::string bytes = writer.Bytes();
+  slam::StateReader reader(bytes);
+  ASSERT_TRUE(next.Load(reader, {}));
+  next.Restored();
+  ASSERT_TRUE(next.Resume(kOwner, kOwner));
+  EXPECT_FALSE(next.LookForSilence(SessionRecord::Clock::now()));
+  EXPECT_TRUE(next.LookForSilence(SessionRecord::Clock::now() + std::chrono::seconds(2)));
+  EXPECT_TRUE(next.state().stale);
 }
 
 // A server that is started again every night ended no session ever.
