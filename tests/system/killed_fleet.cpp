@@ -52,6 +52,7 @@ class PoseWatcher {
     std::uint64_t poses = 0;
     std::uint64_t beside_truth = 0;  // Called localized.
     std::uint64_t beside_other = 0;  // Called localized.
+    double farthest_m = 0.0;         // From the truth, called localized.
   };
 
   // `other`: may be empty.
@@ -88,11 +89,18 @@ class PoseWatcher {
   }
 
  private:
-  static bool IsBeside(const Trajectories& right, const PoseReport& pose) {
+  // Where the robot was; nothing if that is not known.
+  static std::optional<Pose2> There(const Trajectories& right, const PoseReport& pose) {
     const auto path = right.find(pose.robot);
-    if (path == right.end()) return false;
-    const auto there = PoseOn(path->second, pose.stamp, 1.0);
-    return there && ((pose.T_map_robot.translation() - there->translation()).norm() > kWrong_m ||
+    if (path == right.end()) return std::nullopt;
+    return PoseOn(path->second, pose.stamp, 1.0);
+  }
+  static double Distance(const PoseReport& pose, const Pose2& there) {
+    return (pose.T_map_robot.translation() - there.translation()).norm();
+  }
+  static bool IsBeside(const Trajectories& right, const PoseReport& pose) {
+    const auto there = There(right, pose);
+    return there && (Distance(pose, *there) > kWrong_m ||
                      std::abs(AngleDiff(pose.T_map_robot.theta, there->theta)) > kWrong_rad);
   }
 
@@ -103,6 +111,8 @@ class PoseWatcher {
     newest_[pose.robot] = std::max(newest_[pose.robot], pose.generation);
     told_[pose.robot][pose.stamp] = pose.T_map_robot;
     if (!pose.localized) return;
+    if (const auto there = There(truth_, pose))
+      counts_.farthest_m = std::max(counts_.farthest_m, Distance(pose, *there));
     if (IsBeside(truth_, pose)) ++counts_.beside_truth;
     if (IsBeside(other_, pose)) ++counts_.beside_other;
   }
@@ -133,11 +143,13 @@ class Drive {
     const auto undisturbed = Replay("undisturbed", *watcher, nullptr);
     outcome.undisturbed_poses = watcher->counts().poses;
     outcome.undisturbed_beside_truth = watcher->counts().beside_truth;
+    outcome.undisturbed_farthest_m = watcher->counts().farthest_m;
     const Trajectories told = watcher->told();
     watcher.emplace(truth_, told);
     const auto killed = Replay("killed", *watcher, &outcome);
     outcome.poses = watcher->counts().poses;
     outcome.beside_truth = watcher->counts().beside_truth;
+    outcome.farthest_m = watcher->counts().farthest_m;
     outcome.wrongly_localized = options_.orders ? outcome.beside_truth : watcher->counts().beside_other;
     for (const auto& [robot, calm] : undisturbed) {
       const Result& other = killed.at(robot);

@@ -37,6 +37,8 @@ void Add(test::KilledFleetOutcome& all, const test::KilledFleetOutcome& one) {
   all.beside_truth += one.beside_truth;
   all.undisturbed_poses += one.undisturbed_poses;
   all.undisturbed_beside_truth += one.undisturbed_beside_truth;
+  all.farthest_m = std::max(all.farthest_m, one.farthest_m);
+  all.undisturbed_farthest_m = std::max(all.undisturbed_farthest_m, one.undisturbed_farthest_m);
   all.paths_that_differ += one.paths_that_differ;
   all.orders.jobs += one.orders.jobs;
   all.orders.ended += one.orders.ended;
@@ -110,13 +112,14 @@ void StudyOrders(StudyContext& context) {
   Report& report = context.report;
   report.Heading("SIGKILL while paths are smoothed and the map is switched");
   Table table({"kills", "jobs", "of these ended well", "switches of the map", "checks", "broken promises", "scans sent",
-               "lost", "doubled", "poses told", "beside the truth", "undisturbed and without orders"});
+               "lost", "doubled", "poses told", "beside the truth", "at most (m)",
+               "beside it undisturbed and without orders", "at most (m)"});
   const auto broken = static_cast<long long>(all.orders.broken.size());
   table.Add({Count(all.kills), Count(all.orders.jobs), Count(all.orders.ended), Count(all.orders.switches),
              Count(all.orders.checks), Count(broken), Count(static_cast<long long>(all.sent)),
              Count(static_cast<long long>(all.lost)), Count(static_cast<long long>(all.doubled)),
-             Count(static_cast<long long>(all.poses)), Share(all.beside_truth, all.poses),
-             Share(all.undisturbed_beside_truth, all.undisturbed_poses)});
+             Count(static_cast<long long>(all.poses)), Share(all.beside_truth, all.poses), Number(all.farthest_m, 2),
+             Share(all.undisturbed_beside_truth, all.undisturbed_poses), Number(all.undisturbed_farthest_m, 2)});
   report.Add(table, "orders");
   report.Text(
       "Jobs and switches whose order was answered. Beside the truth: poses called localized and more than 0.5 m or "
