@@ -130,7 +130,7 @@ KilledOrders::Outcome KilledOrders::Finish() {
         answered = Check();
         return answered && NotEnded(jobs_) == 0;
       },
-      std::chrono::seconds(60));
+      std::chrono::seconds(300));  // Jobs run at a low priority.
   if (!answered) Break("the server does not answer");
   if (answered && !ended) Break(fmt::format("{} jobs have not ended", NotEnded(jobs_)));
   // Also what the last jobs have made.
