@@ -225,13 +225,6 @@ void SessionRecord::SetAlive(bool alive) {
   status_.alive = alive;
 }
 
-bool SessionRecord::HasReceivedScans() const {
-  const MutexLock lock(mutex_);
-  return std::ranges::any_of(streams_, [](const auto& one) CAIRN_NO_THREAD_SAFETY_ANALYSIS {
-    return one.second.account.ledger().received > 0;
-  });
-}
-
 bool SessionRecord::SetPhase(SessionPhase phase, Status status) {
   const MutexLock lock(mutex_);
   if (status_.session.phase == SessionPhase::kEnded) return false;

@@ -1,4 +1,5 @@
 // What a checkpoint holds of a session's record, and what counts as stored with it (session_record.h).
+#include <algorithm>
 #include <set>
 #include <string>
 #include <utility>
@@ -79,6 +80,13 @@ bool SessionRecord::StoredAgain(std::uint64_t position) {
   for (auto& [sensor_id, stream] : streams_) advance(stream);
   advance(odometry_);
   return true;
+}
+
+bool SessionRecord::HasReceivedScans() const {
+  const MutexLock lock(mutex_);
+  return std::ranges::any_of(streams_, [](const auto& one) CAIRN_NO_THREAD_SAFETY_ANALYSIS {
+    return one.second.account.ledger().received > 0;
+  });
 }
 
 void SessionRecord::Restored(std::uint64_t quiet_since_ms) {
