@@ -50,6 +50,22 @@ Result<void> Atlas::Restore(StartControl& control) {
     if (!site) return tl::unexpected(site.error());
     if (auto restored = (*site)->Restore(*stored, control); !restored) return restored;
   }
+  return PutRemainsAside({owners->begin(), owners->end()});
+}
+
+// Parts of maps whose site has no record, because that is damaged in a way that hides it. A new site of the name would
+// write over them.
+Result<void> Atlas::PutRemainsAside(const std::set<NameId>& known) {
+  std::set<NameId> remains;
+  for (const RecordKind kind : {RecordKind::kMapVersion, RecordKind::kLayer}) {
+    const auto owners = journal_->store().Owners(kind);
+    if (!owners) return tl::unexpected(owners.error());
+    for (const NameId owner : *owners) {
+      if (!known.contains(owner)) remains.insert(owner);
+    }
+  }
+  for (const NameId owner : remains)
+    PutAside(owner, {StatusCode::kDataLoss, "its own record is missing, and parts of its map are there"});
   return {};
 }
 
@@ -179,7 +195,8 @@ Result<void> Atlas::CheckName(const std::string& name) const {
 
 bool Atlas::Idle(const Place& place) const {
   // Every session and every waiting piece of work holds its site. With a use count of one, only this map holds it.
-  return place.site.use_count() == 1 && place.site->snapshot()->tiles.empty();
+  const auto last = place.site->snapshot();
+  return place.site.use_count() == 1 && last->tiles.empty() && last->info.versions.size() <= 1;
 }
 
 void Atlas::Erase(std::map<std::string, Place>::iterator place) {

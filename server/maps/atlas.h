@@ -1,5 +1,5 @@
 // All sites by name. A site is created when the first robot enters it, if the server may create sites, and is
-// kept. When maps.max_sites is reached, a new site replaces one that is empty (no tile, no session) and not
+// kept. When maps.max_sites is reached, a new site replaces one that is empty (no tile, no version, no session) and not
 // configured, so that misspelt names do not use up the sites. Thread rule: any thread.
 #pragma once
 
@@ -25,8 +25,9 @@ class Atlas {
         Journal* journal = nullptr, Generation generation = 0);
 
   // Restores the sites of earlier servers. REQUIRES: no other function was called before. A site whose own record
-  // cannot be read is set aside: nobody can enter it or make another of its name until it is deleted. Of the others,
-  // only the records that cannot be read are left out. FAILED_PRECONDITION: the cells have another size here.
+  // cannot be read, or is missing while parts of its map are there, is set aside: nobody can enter it or make another
+  // of its name until it is deleted. Of the others, only the records that cannot be read are left out.
+  // FAILED_PRECONDITION: the cells have another size here.
   Result<void> Restore(StartControl& control);
   [[nodiscard]] bool IsSetAside(const std::string& name) const;
   // The site was deleted from the store; its name is free again.
@@ -72,6 +73,7 @@ class Atlas {
   std::shared_ptr<Site> NewSite(const std::string& name) const CAIRN_REQUIRES(mutex_);
   Result<StoredSite> Stored(NameId owner) const;
   void PutAside(NameId owner, const Status& why);
+  Result<void> PutRemainsAside(const std::set<NameId>& known);
   Result<void> CheckName(const std::string& name) const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool Idle(const Place& place) const;
   void Erase(std::map<std::string, Place>::iterator place) CAIRN_REQUIRES(mutex_);

@@ -101,7 +101,13 @@ void PutStaying(const Division& division, RecordChanges& changes) {
 
 Result<void> DeleteSite(Store& store, const std::string& site) {
   auto contents = ReadSite(store, site);
-  if (!contents && contents.error().code != StatusCode::kNotFound) contents = ReadAround(store, site);
+  if (!contents) {
+    const bool missing = contents.error().code == StatusCode::kNotFound;
+    const auto versions = store.Numbers({.kind = RecordKind::kMapVersion, .owner = HashName(site)});
+    const auto layers = store.Numbers({.kind = RecordKind::kLayer, .owner = HashName(site)});
+    // Where its own record is damaged or missing, the rest of it is deleted.
+    if (!missing || !versions || !layers || !versions->empty() || !layers->empty()) contents = ReadAround(store, site);
+  }
   if (!contents) return tl::unexpected(contents.error());
   RecordChanges changes;
   for (const RecordKind kind : {RecordKind::kSite, RecordKind::kMapVersion, RecordKind::kLayer})

@@ -96,6 +96,38 @@ void MakeTwoSites(const std::filesystem::path& state) {
   ASSERT_TRUE(server->WaitFor([&] { return server->LastLedger("r2").durable_through == 40; }));
 }
 
+// A damaged index hides a record. The site began anew, and wrote over its versions.
+TEST(Restore, ASiteWhoseRecordIsMissingIsSetAsideUntilItIsDeleted) {
+  const TempDirectory directory;
+  const auto state = directory / "0";
+  ASSERT_NO_FATAL_FAILURE(MakeTwoSites(state));
+  const auto remains = [](Store& store) {
+    return std::pair{*store.Numbers({.kind = RecordKind::kMapVersion, .owner = HashName("lab")}),
+                     *store.Numbers({.kind = RecordKind::kLayer, .owner = HashName("lab")})};
+  };
+  {
+    const auto store = *OpenStore(state);
+    ASSERT_TRUE(store->Commit({.removed = {{.kind = RecordKind::kSite, .owner = HashName("lab")}}, .put = {}}));
+  }
+  StoredServer server(state);
+  const auto before = remains(server.store());
+  ASSERT_FALSE(before.first.empty());
+  ASSERT_FALSE(before.second.empty());
+  Request everybody = About(RequestKind::kStatus, "");
+  everybody.site.clear();
+  const Reply status = server->Ask(everybody);
+  EXPECT_EQ(Robots(status), std::vector<std::string>{"r2"});
+  EXPECT_THAT(status.status.message, ::testing::HasSubstr("site 'lab' is set aside (its own record is missing"));
+  server->Open("r1", kDriver);
+  ASSERT_TRUE(server->WaitPhase("r1", kDriver, SessionPhase::kRefused));
+  EXPECT_EQ(remains(server.store()), before);
+  const Reply deleted = server->Ask(About(RequestKind::kSiteDelete));
+  EXPECT_TRUE(deleted.status.ok()) << deleted.status.message;
+  EXPECT_EQ(remains(server.store()), (std::pair<std::vector<std::uint64_t>, std::vector<std::uint64_t>>{}));
+  server->Open("r1", kDriver);
+  ASSERT_TRUE(server->WaitPhase("r1", kDriver, SessionPhase::kActive));
+}
+
 struct BadRecord {
   RecordKind kind;
   std::string owner;                // As SQL.
