@@ -5,10 +5,10 @@
 // - A request that is `started` and names a session that the server does not know is refused (FAILED_PRECONDITION),
 //   because its start pose is out of date.
 // - A request for a new session of a robot whose owner is not alive replaces the robot's present session if it says
-//   where the robot starts, or if no scan of the present session was used yet: the start that the former owner said holds
-//   only for what it saw. Otherwise it continues the present session, and the robot must be found in its map before
-//   it is localized (slam/recovery/recovery.h), because nobody knows whether it is still where it was, or even the same
-//   robot. The former owner is told. If another client that is alive owns the session, the request is refused
+//   where the robot starts, or if no scan of the present session was used yet: the start that the former owner said
+//   holds only for what it saw. Otherwise it continues the present session, and the robot must be found in its map
+//   before it is localized (slam/recovery/recovery.h), because nobody knows whether it is still where it was, or even
+//   the same robot. The former owner is told. If another client that is alive owns the session, the request is refused
 //   (ALREADY_EXISTS).
 // - A session that has ended is replaced by a new one. It is kept as an earlier session (robots.max_earlier), so that
 //   jobs can fit the robot to what it saw then.
