@@ -159,8 +159,10 @@ Result<void> Roster::Resume(Session& session, const SessionRequest& request) {
 // Whether this is the first scan that arrives, others were sent before, and the place where the robot begins matters,
 // because others have made the map.
 bool Roster::BeginsLate(const Session& session, std::uint64_t sequence) const {
-  constexpr std::uint64_t kMostMissing =
-      10;  // About a second. A start that is wrong by this is corrected by the match.
+  // About a second. A start that is wrong by what a robot drives in this time is corrected by the match.
+  constexpr std::uint64_t kMostMissing = 10;
+  // The filter line_match finds the robot in a map that it was given.
+  if (mapper_.filter.kind == slam::FilterKind::kLineMatch) return false;
   if (sequence <= kMostMissing + 1 || session.record().HasReceivedScans() || HasDrawn(session)) return false;
   const auto site = atlas_.Find(session.record().state().site);
   return site != nullptr && site->snapshot()->info.tile_count > 0;

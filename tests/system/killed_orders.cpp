@@ -50,7 +50,7 @@ void KilledOrders::SubmitJob() {
   auto heard = heard_;
   const auto job = queries_->SubmitJob(site_, JobKind::kSmooth, false);
   if (!job) return;
-  PromiseHeld(std::move(heard));
+  if (job->generation == generation_) PromiseHeld(std::move(heard));
   jobs_[job->id] = *job;
   ++outcome_.jobs;
 }
@@ -65,8 +65,9 @@ void KilledOrders::SwitchMap() {
   // Until the answer has come, the order may be carried out or not.
   may_be_enabled_.insert(wanted);
   auto heard = heard_;
-  if (!queries_->EnableMap(site_, wanted)) return;
-  PromiseHeld(std::move(heard));
+  const auto map = queries_->EnableMap(site_, wanted);
+  if (!map) return;
+  if (map->generation == generation_) PromiseHeld(std::move(heard));
   may_be_enabled_ = {wanted};
   outcome_.switches += switches ? 1 : 0;
 }
@@ -74,6 +75,8 @@ void KilledOrders::SwitchMap() {
 bool KilledOrders::Check() {
   const auto map = queries_->Map(site_);
   if (!map || map->tile_count == 0) return false;  // Before the first scan there is nothing to smooth.
+  // What the server before has said, and perhaps not stored, is heard again below if it is there.
+  if (std::exchange(generation_, map->generation) != map->generation) heard_.clear();
   if (!may_be_enabled_.contains(map->enabled_version))
     Break(fmt::format("version {} is enabled instead of {}", map->enabled_version, fmt::join(may_be_enabled_, " or ")));
   for (const std::uint32_t version : versions_) {

@@ -39,7 +39,7 @@ class KilledOrders {
   void Run(const std::stop_token& stop);
   void SubmitJob();
   void SwitchMap();
-  // What was heard of before an order that was answered is on the disk as well, because the answer waits for that.
+  // What a server said before it answered an order is on the disk as well, because the answer waits for that.
   void PromiseHeld(std::set<std::uint32_t>&& heard);
   // Compares what the server says with what it has promised. Returns false where it did not answer, or has no map yet.
   bool Check();
@@ -52,6 +52,7 @@ class KilledOrders {
   std::unique_ptr<client::QueryClient> queries_;
   Outcome outcome_;
   std::map<std::uint64_t, Job> jobs_;  // What was last heard of each. The oldest that have ended are forgotten.
+  Generation generation_ = 0;          // Of the server that was heard last.
   std::set<std::uint32_t> heard_;  // Map versions of jobs that have succeeded: an answer to a question is no promise.
   std::set<std::uint32_t> versions_;  // Those that must be there after each start.
   std::set<std::uint32_t> may_be_enabled_{1};

@@ -26,8 +26,8 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int kRobots = 8;
 constexpr std::chrono::seconds kLongest{60};
-constexpr std::chrono::milliseconds kRestartPause{
-    100};  // That of the unit (deploy/systemd), before it starts a server again.
+// Before the unit (deploy/systemd) starts a server again.
+constexpr std::chrono::milliseconds kRestartPause{100};
 
 double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
