@@ -189,9 +189,15 @@ int StopJournal(Journal& journal) {
   spdlog::info("store: {} entries in {} commits, {} failed; on the disk after {:.1f} ms (median), {:.1f} ms (p99)",
                counts.entries, counts.commits, counts.failed_commits, counts.delay_p50_ms, counts.delay_p99_ms);
   const JournalHealth health = journal.health();
-  if (!health.degraded) return 0;
-  spdlog::critical("stopped while degraded; the last data is not stored: {}", health.reason);
-  return kDegraded;
+  if (health.degraded) {
+    spdlog::critical("stopped while degraded; the last data is not stored: {}", health.reason);
+    return kDegraded;
+  }
+  if (const std::string aside = journal.set_aside().text(); !aside.empty()) {
+    spdlog::error("stopped; all new data is stored, but some of the old could not be read: {}", aside);
+    return kDegraded;
+  }
+  return 0;
 }
 
 // The door for ROS 2 robots; null if it is not wanted.

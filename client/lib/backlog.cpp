@@ -175,6 +175,11 @@ std::optional<std::pair<NameId, std::uint64_t>> Backlog::next_scan() const {
   return std::pair(entries_[cursor_].sensor_id, entries_[cursor_].sequence);
 }
 
+std::optional<std::uint64_t> Backlog::OldestOf(NameId sensor_id) const {
+  const auto oldest = std::ranges::find(entries_, sensor_id, &Entry::sensor_id);
+  return oldest == entries_.end() ? std::nullopt : std::optional(oldest->sequence);
+}
+
 void Backlog::StepBack() {
   if (cursor_ > 0) --cursor_;
 }

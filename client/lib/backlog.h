@@ -44,6 +44,8 @@ class Backlog {
   void Rewind() { cursor_ = 0; }
   [[nodiscard]] std::size_t unsent() const { return entries_.size() - cursor_; }
   [[nodiscard]] std::size_t size() const { return entries_.size(); }
+  // The number of the oldest sample of this stream in the queue.
+  [[nodiscard]] std::optional<std::uint64_t> OldestOf(NameId sensor_id) const;
   // The stamp of the first scan in the queue.
   [[nodiscard]] std::optional<Stamp> FirstScan() const;
 

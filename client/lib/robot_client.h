@@ -130,7 +130,8 @@ class RobotClient {
   void OnPose(PoseReport&& report);
   void OnMatched(int servers);
 
-  [[nodiscard]] Result<void> AwaitRoom(const Stream& stream) CAIRN_REQUIRES(mutex_);
+  [[nodiscard]] std::uint64_t GoneThrough(NameId sensor_id, const Stream& stream) const CAIRN_REQUIRES(mutex_);
+  [[nodiscard]] Result<void> AwaitRoom(NameId sensor_id, const Stream& stream) CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool Answered() const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool IsSafe(const Stream& stream) const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool Streaming() const CAIRN_REQUIRES(mutex_);

@@ -105,14 +105,19 @@ std::string RobotClient::Silence(Clock::time_point now) {
                        std::chrono::duration<double>(now - stream.moved).count(), stream.arrived, stream.sent,
                        sensor_id == HashName(kOdometrySensor) ? "of odometry" : "of scans");
   }
+  // The server also calls a stream stale that is not sent, such as that of a lidar that is switched off.
+  const auto waits = [now](const auto& entry) CAIRN_NO_THREAD_SAFETY_ANALYSIS {
+    return entry.second.sent > entry.second.arrived && now - entry.second.moved > kReportDelay;
+  };
   const bool sending = now - sent_at_ < kReportDelay && now - sending_since_ > kReportDelay;
-  if (sending && state_->stale && now - called_stale_ > kReportDelay) return "the server says that nothing arrives";
+  if (sending && state_->stale && now - called_stale_ > kReportDelay && std::ranges::any_of(streams_, waits))
+    return "the server says that nothing arrives";
   return {};
 }
 
 // Whether every stream that had stopped makes progress again.
 bool RobotClient::Moving() const {
-  if (!Answered() || state_->stale) return false;
+  if (!Answered()) return false;
   const auto moves = [&](const auto& entry)
                          CAIRN_NO_THREAD_SAFETY_ANALYSIS { return entry.second.advanced > renewed_at_; };
   if (backlog_.unsent() > 0 && std::none_of(streams_.begin(), streams_.end(), moves)) return false;

@@ -80,6 +80,8 @@ void RobotClient::Reopen() {
     start_unknown_ = !start;
     request_.has_start = start.has_value();
     request_.T_map_robot_start = start.value_or(Pose2{});
+    // Another map of this name may be there now, with another origin.
+    request_.map_frame = start && state_ ? state_->map_frame : 0;
     request_.started = false;
     // If this session is lost before its first pose, the next one starts from here.
     if (const auto odometry = backlog_.OdometryAtFirstScan())

@@ -8,7 +8,15 @@
 #include "client/lib/robot_client.h"
 
 namespace cairn::client {
-Result<void> RobotClient::AwaitRoom(const Stream& stream) {
+
+// Up to which number the samples of a stream are neither here any more nor waited for: they are safe, or there was no
+// room for them. A server that was set back to an earlier state has settled less.
+std::uint64_t RobotClient::GoneThrough(NameId sensor_id, const Stream& stream) const {
+  const auto oldest = backlog_.OldestOf(sensor_id);
+  return oldest ? *oldest - 1 : stream.window.sent();
+}
+
+Result<void> RobotClient::AwaitRoom(NameId sensor_id, const Stream& stream) {
   const auto deadline = DeadlineAfter(options_.send_timeout_s);
   for (;;) {
     if (over_) return tl::unexpected(*over_);
@@ -16,7 +24,7 @@ Result<void> RobotClient::AwaitRoom(const Stream& stream) {
       if (!state_->status.ok()) return tl::unexpected(state_->status);
       return Fail(StatusCode::kFailedPrecondition, fmt::format("the session of '{}' has ended", request_.robot));
     }
-    if (stream.window.HasRoom()) return {};
+    if (stream.window.HasRoom(GoneThrough(sensor_id, stream))) return {};
     if (Clock::now() >= deadline) {
       return Fail(StatusCode::kUnavailable,
                   fmt::format("the server settled no scan of '{}' for {:.1f} s ({} sent, {} settled)", request_.robot,
@@ -46,12 +54,12 @@ Result<void> RobotClient::Publish(const Scan& scan, const std::string& sensor) {
         return Fail(StatusCode::kInvalidArgument, fmt::format("sensor '{}' is not part of the session", sensor));
       }
       stream = &found->second;
-      if (auto room = AwaitRoom(*stream); !room) return room;
+      if (auto room = AwaitRoom(sensor_id, *stream); !room) return room;
     }
     const MutexLock sending(sending_);
     {
       const MutexLock lock(mutex_);
-      if (!stream->window.HasRoom()) continue;  // Another thread was faster.
+      if (!stream->window.HasRoom(GoneThrough(sensor_id, *stream))) continue;  // Another thread was faster.
     }
     return AddAndSend(ScanSample{{robot_id_, sensor_id, 0}, scan}, *stream);
   }
@@ -139,9 +147,10 @@ void RobotClient::Pump() {
       const MutexLock lock(mutex_);
       if (stopping_ || !Streaming()) return;
       if (const auto scan = backlog_.next_scan()) {
-        const ScanWindow& window = streams_.find(scan->first)->second.window;
+        const Stream& stream = streams_.find(scan->first)->second;
+        const std::uint64_t done = std::max(stream.window.settled_through(), GoneThrough(scan->first, stream));
         // Watch continues with the next ledger.
-        if (scan->second > window.settled_through() + std::max(pace_, kFirstPace)) return;
+        if (scan->second > done + std::max(pace_, kFirstPace)) return;
       }
       sample = backlog_.Next();
       if (sample == nullptr) return;

@@ -2,6 +2,7 @@
 // server has settled earlier ones. Does no I/O and uses no clock. Not thread-safe.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "common/service/ledger.h"
@@ -14,8 +15,10 @@ class ScanWindow {
   // depth of the writer's history.
   explicit ScanWindow(std::uint64_t window) : window_(window) {}
 
-  // Whether another sample may be sent now.
-  [[nodiscard]] bool HasRoom() const { return window_ == 0 || sent_ < settled_through_ + window_; }
+  // Whether another sample may be sent now. Those up to `gone` can not be sent any more, so nobody waits for them.
+  [[nodiscard]] bool HasRoom(std::uint64_t gone = 0) const {
+    return window_ == 0 || sent_ < std::max(settled_through_, gone) + window_;
+  }
   // The number of the next sample: 1, 2, 3, ...
   [[nodiscard]] std::uint64_t Next() { return ++sent_; }
   // Makes the last number free again.

@@ -49,12 +49,13 @@ Result<std::unique_ptr<SpillFile>> SpillFile::Create(const std::string& path) {
     }
     return Fail(StatusCode::kUnavailable, path + ": cannot be made: " + ErrnoText(error));
   }
+  // It is of no use to another process, and one that is killed could not remove it.
+  unlink(path.c_str());
   return std::unique_ptr<SpillFile>(new SpillFile(path, file));
 }
 
 SpillFile::~SpillFile() {
   close(file_);
-  unlink(path_.c_str());
 }
 
 Result<std::uint64_t> SpillFile::Append(std::string_view record) {

@@ -1,5 +1,6 @@
 // A file that takes what does not fit into memory: records of bytes, each after its length (32 bits, in this machine's
-// order). It belongs to one process and cannot be read by another one: it is created empty and deleted at the end.
+// order). It belongs to one process and cannot be read by another one: its name is removed as soon as it is open, and
+// the file when the process ends, however it ends.
 // Not thread-safe: one owner.
 #pragma once
 

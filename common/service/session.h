@@ -28,6 +28,9 @@ struct SessionRequest {
   bool end = false;         // Ends the session for good: its trajectory is complete.
   SessionToken session = 0;
   bool started = false;  // Samples were sent in this session before: it can be resumed, but not opened again.
+  // The map in which the start was known (SessionState::map_frame). In another one it is not believed. 0: it does not
+  // come from a map; a person or a program says it.
+  std::uint64_t map_frame = 0;
 };
 
 enum class SessionPhase : std::uint8_t { kActive = 0, kRefused = 1, kEnded = 2, kSuspended = 3 };
@@ -44,6 +47,8 @@ struct SessionState {
   bool durable = false;       // The server stores the samples.
   bool stale = false;         // A stream stands still although the robot's client is alive; `status` says which.
   Generation generation = 0;  // Set by the server's egress.
+  // Of the site's coordinate frame `map`: poses in maps of different numbers have nothing to do with each other. Not 0.
+  std::uint64_t map_frame = 0;
 };
 
 // The answer to a refused request: the request's client and session, phase kRefused and the reason.

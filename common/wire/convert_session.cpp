@@ -37,6 +37,7 @@ v1::SessionRequest ToWire(const SessionRequest& value) {
   wire.sensors(value.sensors);
   wire.has_start(value.has_start);
   wire.T_map_robot_start(ToWire(value.T_map_robot_start));
+  wire.map_frame(value.map_frame);
   wire.started(value.started);
   wire.end(value.end);
   return wire;
@@ -51,6 +52,7 @@ SessionRequest FromWire(v1::SessionRequest&& wire) {
   value.session = wire.session();
   value.has_start = wire.has_start();
   value.T_map_robot_start = FromWire(wire.T_map_robot_start());
+  value.map_frame = wire.map_frame();
   value.started = wire.started();
   value.end = wire.end();
   return value;
@@ -66,6 +68,7 @@ v1::SessionState ToWire(const SessionState& value) {
   wire.site(value.site);
   wire.phase(static_cast<v1::SessionPhase>(value.phase));
   wire.durable(value.durable);
+  wire.map_frame(value.map_frame);
   wire.stale(value.stale);
   wire.status(ToWire(value.status));
   return wire;
@@ -81,6 +84,7 @@ SessionState FromWire(v1::SessionState&& wire) {
   value.site = std::move(wire.site());
   value.phase = static_cast<SessionPhase>(wire.phase());
   value.durable = wire.durable();
+  value.map_frame = wire.map_frame();
   value.stale = wire.stale();
   value.status = FromWire(std::move(wire.status()));
   return value;

@@ -7,8 +7,9 @@ namespace cairn::server {
 
 ScanArrival Admit(ScanSample&& sample, std::chrono::steady_clock::time_point received) {
   ScanArrival arrival{.stream = sample.stream, .scan = nullptr, .refused = {}, .received = received};
-  if (const auto valid = ValidateScan(sample.scan); !valid) {
-    arrival.refused = DropReasonOf(valid.error().fault);
+  const auto valid = ValidateScan(sample.scan);
+  if (!valid || sample.scan.sequence == 0) {
+    arrival.refused = valid ? DropReason::kBadGeometry : DropReasonOf(valid.error().fault);
     Scan stub;
     stub.sequence = sample.scan.sequence;
     stub.stamp = sample.scan.stamp;
@@ -20,8 +21,9 @@ ScanArrival Admit(ScanSample&& sample, std::chrono::steady_clock::time_point rec
 }
 
 OdometryArrival Admit(OdometrySample&& sample) {
-  return {
-      .stream = sample.stream, .odometry = sample.odometry, .refused = !ValidateOdometry(sample.odometry).has_value()};
+  return {.stream = sample.stream,
+          .odometry = sample.odometry,
+          .refused = sample.odometry.sequence == 0 || !ValidateOdometry(sample.odometry).has_value()};
 }
 
 }  // namespace cairn::server

@@ -1,5 +1,6 @@
 // Decides whether a received sample is valid or refused, and why. The contents of scans and odometry are
-// checked only here. Stateless, thread-safe.
+// checked only here. Numbers begin at 1: the ledger can not say what has become of a sample with the number 0.
+// Stateless, thread-safe.
 #pragma once
 
 #include <chrono>

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <latch>
 #include <optional>
+#include <random>
 #include <utility>
 
 #include "server/store/site_contents.h"
@@ -170,7 +171,10 @@ Result<std::shared_ptr<Site>> Atlas::Make(const std::string& name, bool configur
 }
 
 std::shared_ptr<Site> Atlas::NewSite(const std::string& name) const {
-  return std::make_shared<Site>(name, resolution_m_, options_, pool_, outbound_, journal_, generation_, beginning_);
+  Site::Beginning beginning = beginning_;
+  std::random_device random;  // No server, also on another machine, may draw the same number again.
+  beginning.map_frame = (std::uint64_t{random()} << 32 | random()) | 1;
+  return std::make_shared<Site>(name, resolution_m_, options_, pool_, outbound_, journal_, generation_, beginning);
 }
 
 Result<void> Atlas::CheckName(const std::string& name) const {

@@ -25,6 +25,8 @@ struct RobotGrid {
   std::shared_ptr<const std::vector<Pose2>> path{};
   // The numbers of the keyframes of the path, because some may have been retired. Null: all of them, 0, 1, 2, ...
   std::shared_ptr<const std::vector<std::uint64_t>> numbers{};
+  // Nothing but what the robot has seen by itself has shaped the path: no job, and no earlier map version.
+  bool own_path = false;
   // Whether it is not joined with the map of the site: it has a frame of its own and is not shown.
   bool fragment = false;
 };

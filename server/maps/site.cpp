@@ -48,7 +48,8 @@ Site::Site(const std::string& name, double resolution_m, const MapsOptions& opti
       joint_(options.past_probability),
       versions_(static_cast<std::size_t>(options.max_versions)),
       epoch_(beginning.epoch),
-      tile_version_(beginning.tile_version) {
+      tile_version_(beginning.tile_version),
+      map_frame_(beginning.map_frame) {
   auto empty = std::make_shared<MapSnapshot>();
   empty->info = InfoOf({});
   const MutexLock lock(mutex_);
@@ -110,11 +111,23 @@ void Site::CheckStart(SessionId session, const Pose2& T_map_robot, Refuses refus
     if (!site.switch_)
       agreement = CompareGrids(site.joint_.ChunksOf(session), site.joint_.DrawnBefore(session), T_map_robot,
                                site.resolution_m_);
-    if (!refuses(agreement)) return;
-    site.joint_.SetHidden(session, true);
-    site.info_changed_ = true;
-    site.StoreSite();
+    if (refuses(agreement)) site.SetHidden(session);
   });
+}
+
+void Site::Hide(SessionId session) {
+  Run([session](Site& site) { site.SetHidden(session); });
+}
+
+void Site::SetHidden(SessionId session) {
+  joint_.SetHidden(session, true);
+  info_changed_ = true;
+  StoreSite();
+}
+
+void Site::AdoptFrame(std::uint64_t map_frame) {
+  map_frame_ = map_frame;
+  Run([](Site& site) { site.StoreSite(); });
 }
 
 void Site::AddVersion(MapVersion&& version, Done done, Wanted wanted) {

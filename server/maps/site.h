@@ -57,15 +57,16 @@ class Site : public std::enable_shared_from_this<Site> {
   using Wanted = std::function<bool()>;
 
   // The epoch and the version with which the map begins: above those of a deleted site of the same name, because a
-  // client may still know them.
+  // client may still know them. And the number of its coordinate frame (SessionState::map_frame), which no other has.
   struct Beginning {
     std::uint32_t epoch = 0;
     std::uint64_t tile_version = 0;
+    std::uint64_t map_frame = 1;
   };
 
   // `journal`: null if nothing is stored. `generation`: the number of this start of the server.
   Site(const std::string& name, double resolution_m, const MapsOptions& options, asio::thread_pool& pool,
-       Outbound& outbound, Journal* journal = nullptr, Generation generation = 0, const Beginning& beginning = {0, 0});
+       Outbound& outbound, Journal* journal = nullptr, Generation generation = 0, const Beginning& beginning = {0, 0, 1});
 
   // Restores what an earlier server has stored: the epoch, the versions, and the parts of the map that were drawn by
   // sessions that no longer exist. Records that cannot be read are set aside; without the enabled version, the newest
@@ -87,6 +88,12 @@ class Site : public std::enable_shared_from_this<Site> {
     bool ended = false;
   };
   void Join(Member member);
+  [[nodiscard]] std::uint64_t map_frame() const { return map_frame_; }
+  // The map goes on in the frame of another one, for example of a server that has lost its state. REQUIRES: nothing is
+  // drawn yet.
+  void AdoptFrame(std::uint64_t map_frame);
+  // What the session draws is not shown from now on, as that of a fragment.
+  void Hide(SessionId session);
   // Compares what the session has drawn with what earlier ones have drawn there. `refuses` is asked once, on the
   // strand; if it says so, what the session draws is not shown from then on, as that of a fragment. While the map is
   // being switched nothing is compared. The robot is at `T_map_robot`.
@@ -143,6 +150,7 @@ class Site : public std::enable_shared_from_this<Site> {
   std::shared_ptr<GridOwner> OwnerOf(SessionId session) const;
   bool GiveMissedPart(const Member& member);
   void StageGone(SessionId session);
+  void SetHidden(SessionId session);
   void CommitIfComplete();
   void Render();
   void RenderAll();
@@ -194,6 +202,7 @@ class Site : public std::enable_shared_from_this<Site> {
   std::optional<VersionSwitch> switch_;
   std::set<TileKey> unsent_;  // Tiles (or tombstones) to publish.
 
+  std::atomic<std::uint64_t> map_frame_;
   std::atomic<std::uint64_t> asked_{0}, handled_{0};  // Pieces of work posted to the strand, and finished on it.
   std::atomic<std::uint64_t> encoded_{0};             // Tiles: a piece of work that encodes thousands is progress.
   mutable Mutex mutex_;
@@ -235,6 +244,8 @@ void Site::StoreTogether(const Act& act) {
   }
   Journal::Edit edit = *std::exchange(together_, std::nullopt);
   if (journal_ == nullptr) return;
+  // Its records are deleted, and those of another site of its name may be there. Only a session may still go.
+  if (retired_) edit = {.removed = {}, .put = {}, .forgotten = std::move(edit.forgotten)};
   edit.forgotten.insert(edit.forgotten.end(), unforgotten_.begin(), unforgotten_.end());
   unforgotten_ = edit.forgotten;
   incomplete_ = !journal_->Apply(std::move(edit));

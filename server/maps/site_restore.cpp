@@ -74,7 +74,8 @@ void Site::StoreSite() {
                     .resolution_m = resolution_m_,
                     .fragments = joint_.hidden(),
                     .past = joint_.past(),
-                    .merged = merged_};
+                    .merged = merged_,
+                    .map_frame = map_frame_};
   for (const auto& [session, member] : members_) stored.members[member.robot] = session;  // The last one.
   Put({RecordKind::kSite, site_id_, 0}, [stored = std::move(stored)] { return BytesOf(stored); });
 }
@@ -109,6 +110,8 @@ Result<void> Site::Restore(const StoredSite& stored, StartControl& control) {
   epoch_ = std::max(epoch_, stored.epoch);
   tile_version_ = std::max(tile_version_, stored.tile_version);
   switches_ = stored.switches;
+  // A site that was stored without one gets the same one at each start, until it is stored with it.
+  map_frame_ = stored.map_frame != 0 ? stored.map_frame : site_id_;
   for (const SessionId session : stored.fragments) joint_.SetHidden(session, true);
   for (const SessionId session : stored.past) joint_.SetPast(session);
   merged_ = stored.merged;

@@ -4,6 +4,7 @@
 // Thread rule: any thread.
 #pragma once
 
+#include <atomic>
 #include <memory>
 #include <utility>
 
@@ -21,9 +22,14 @@ class CommandAnswers : public std::enable_shared_from_this<CommandAnswers> {
 
   void Send(const Request& request, Reply&& reply) {
     if (journal_ == nullptr || journal_->health().disk_fails) return HandOver(request, std::move(reply));
-    journal_->WhenStored(
-        [self = shared_from_this(), request, reply = std::move(reply)] { self->HandOver(request, Reply(reply)); });
+    waiting_.fetch_add(1);
+    journal_->WhenStored([self = shared_from_this(), request, reply = std::move(reply)] {
+      self->waiting_.fetch_sub(1);
+      self->HandOver(request, Reply(reply));
+    });
   }
+  // So many answers wait for the disk that no further command should be carried out.
+  [[nodiscard]] bool full() const { return waiting_ >= kMostWaiting; }
   // Nothing is sent any more.
   void Stop() {
     const MutexLock lock(mutex_);
@@ -36,6 +42,9 @@ class CommandAnswers : public std::enable_shared_from_this<CommandAnswers> {
     if (requests_ != nullptr) requests_->PutBack({request, ReplyParts(Answer(std::move(reply)))});
   }
 
+  static constexpr int kMostWaiting = 1024;
+
+  std::atomic<int> waiting_{0};
   Mutex mutex_;
   RequestQueue* requests_ CAIRN_GUARDED_BY(mutex_);
   Journal* const journal_;

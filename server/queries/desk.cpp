@@ -97,6 +97,8 @@ void Desk::Send(OpenRequest& open) {
 }
 
 std::optional<Answer> Desk::AnswerTo(const Request& request) {
+  if (IsCommand(request.kind) && answers_->full())
+    return ReplyTo(request, {StatusCode::kResourceExhausted, "too many commands wait for the disk; try again later"});
   switch (request.kind) {
     case RequestKind::kPing: {
       Reply reply = ReplyTo(request);

@@ -25,7 +25,8 @@ std::optional<Request> RequestQueue::Push(Request&& request) {
         askers_.begin(), askers_.end(), [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); });
     const auto own = askers_.find(AskerOf(request));
     const std::size_t waiting = own == askers_.end() ? 0 : own->second.size();
-    if (longest->second.size() < waiting + 2) return std::move(request);
+    // A command whose answer is there was carried out: nobody may be told that it was not.
+    if (longest->second.size() < waiting + 2 || longest->second.back().rest) return std::move(request);
     refused = std::move(longest->second.back().request);
     longest->second.pop_back();
     --size_;

@@ -79,6 +79,7 @@ void SavedSites::Take(Request&& request) {
 
 void SavedSites::Stop() {
   stopping_ = true;
+  loading_.GiveUp();
   requests_.Close();
   if (thread_.joinable()) thread_.join();
 }
@@ -210,7 +211,7 @@ Result<void> SavedSites::OpenLoaded(const SiteFileSummary& loaded) {
   if (!unfinished) spdlog::error("the jobs of site '{}' are not loaded: {}", site, unfinished.error().message);
   std::vector<SessionId> ids;
   for (const auto& [id, robot] : loaded.sessions) ids.push_back(id);
-  const std::size_t taken = rooms_.roster.OpenStored(ids);
+  const std::size_t taken = rooms_.roster.OpenStored(ids, loading_);
   if (unfinished) {
     for (const StoredJob& job : *unfinished) rooms_.worker.Requeue(job.job.id, job.enable);
   }

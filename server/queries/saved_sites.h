@@ -15,6 +15,7 @@
 #include "common/bounded_channel.h"
 #include "server/jobs/job_worker.h"
 #include "server/maps/atlas.h"
+#include "server/ops/start_control.h"
 #include "server/outbound.h"
 #include "server/robots/roster.h"
 #include "server/store/site_edit.h"
@@ -68,6 +69,7 @@ class SavedSites {
   const Rooms rooms_;
   BoundedChannel<Request> requests_{kCapacity};
   std::atomic<bool> stopping_{false};
+  StartControl loading_;
   std::jthread thread_;  // The last member, because it uses the members above.
 };
 

@@ -35,11 +35,21 @@ class CheckpointPace {
     if (position <= newest_ || work_ < next_try_) return false;
     return position >= newest_ + limits_.entries || work_ >= std::max(limits_.work, kWorkPerCost * Time(*cost_));
   }
+  // However often it was tried, none could be made for very long, and the journal would grow without end.
+  [[nodiscard]] bool IsOverdue(std::uint64_t position) const {
+    constexpr std::uint64_t kMostPeriods = 50;
+    constexpr int kManyTimes = 100;
+    return refused_ >= kManyTimes && position >= newest_ + kMostPeriods * limits_.entries;
+  }
   // It could not be made now. It is tried again after some more work, because trying costs as well.
-  void Refused() { next_try_ = work_ + std::max(limits_.work, kWorkPerCost * Time(*cost_)) / 8; }
+  void Refused() {
+    ++refused_;
+    next_try_ = work_ + std::max(limits_.work, kWorkPerCost * Time(*cost_)) / 8;
+  }
   // One at this position is being written.
   void Begun(std::uint64_t position) {
     newest_ = position;
+    refused_ = 0;
     work_ = next_try_ = Time{0};
   }
   // The one on the disk, which the session was restored from. What was processed since then counts as work.
@@ -48,6 +58,7 @@ class CheckpointPace {
  private:
   const Limits limits_;
   std::uint64_t newest_ = 0;
+  int refused_ = 0;  // Since then.
   Time work_{};
   Time next_try_{};
   const Cost cost_ = std::make_shared<std::atomic<Time::rep>>(0);

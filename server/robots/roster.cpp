@@ -32,7 +32,7 @@ Result<void> ValidateRequest(const SessionRequest& request) {
 }
 
 bool HasDrawn(const Session& session) {
-  return session.record().snapshot().status.pose.reason != PoseReason::kWaiting;
+  return session.record().begun();
 }
 
 }  // namespace
@@ -156,18 +156,6 @@ Result<void> Roster::Resume(Session& session, const SessionRequest& request) {
   return {};
 }
 
-// Whether this is the first scan that arrives, others were sent before, and the place where the robot begins matters,
-// because others have made the map.
-bool Roster::BeginsLate(const Session& session, std::uint64_t sequence) const {
-  // About a second. A start that is wrong by what a robot drives in this time is corrected by the match.
-  constexpr std::uint64_t kMostMissing = 10;
-  // The filter line_match finds the robot in a map that it was given.
-  if (mapper_.filter.kind == slam::FilterKind::kLineMatch) return false;
-  if (sequence <= kMostMissing + 1 || session.record().HasReceivedScans() || HasDrawn(session)) return false;
-  const auto site = atlas_.Find(session.record().state().site);
-  return site != nullptr && site->snapshot()->info.tile_count > 0;
-}
-
 void Roster::Refuse(const SessionRequest& request, Status status) {
   const NameId robot_id = HashName(request.robot);
   {
@@ -197,11 +185,6 @@ void Roster::Take(ScanArrival&& arrival) {
     const MutexLock lock(mutex_);
     const auto found = sessions_.find(stream.robot_id);
     if (found != sessions_.end()) session = found->second;
-  }
-  if (session != nullptr && BeginsLate(*session, sequence)) {
-    session->RefuseStart(
-        "the first " + std::to_string(sequence - 1) +
-        " scans of its session never arrived, so nothing says that it is still where it was said to start");
   }
   const DropReason reason = session != nullptr && session->record().token() != stream.session ? DropReason::kNotOwner
                                                                                               : DropReason::kNoSession;

@@ -67,8 +67,8 @@ class Roster {
   // one.
   [[nodiscard]] Result<void> HasRoomFor(const std::set<std::string>& robots) const;
   // Opens the loaded sessions as Restore does; their site is open. Where a robot has opened a session meanwhile, that
-  // one stays and the loaded one has ended. Returns how many were opened.
-  std::size_t OpenStored(const std::vector<SessionId>& ids);
+  // one stays and the loaded one has ended. Returns how many were opened. May take minutes; `control` ends it early.
+  std::size_t OpenStored(const std::vector<SessionId>& ids, StartControl& control);
   // Ends all sessions of the site and removes them from memory; their records stay. The site is not found any more.
   // FAILED_PRECONDITION: a robot is active in it. NOT_FOUND: no such site.
   Result<std::shared_ptr<Site>> RemoveSite(const std::string& site);
@@ -109,6 +109,9 @@ class Roster {
   std::shared_ptr<Session> Make(const StoredSession& stored, const std::shared_ptr<Site>& site,
                                 const slam::MapperOptions& mapper) const;
   static void Enter(Site& site, const std::shared_ptr<Session>& session);
+  // `gone`: the session that gives way, if one does. False, and nothing is changed: the site is not there any more, or
+  // the robot has another session.
+  bool TakePlace(const std::shared_ptr<Session>& session, const std::shared_ptr<Session>& gone, const Site& site);
   void Place(const std::shared_ptr<Session>& session, bool first) CAIRN_REQUIRES(mutex_);
   Journal::Durable DurableFor(const std::shared_ptr<Session>& session) const;
   // What restores sessions; the marks are null for sessions that are loaded while the server runs.
@@ -144,7 +147,6 @@ class Roster {
   RestoredSession GoOn(const Stored& stored, Begun begun, const Restoring& how);
   // The session that has to be removed before this robot can have a new one; null if there is room.
   Result<std::shared_ptr<Session>> GivesWay(NameId robot_id) const CAIRN_REQUIRES(mutex_);
-  [[nodiscard]] bool BeginsLate(const Session& session, std::uint64_t sequence) const;
   void Refuse(const SessionRequest& request, Status status);
   void RetireGone();
   void SendRefusals();

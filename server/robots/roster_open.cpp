@@ -37,6 +37,10 @@ Result<void> Roster::Open(const SessionRequest& request) {
     stored.id = next_id_++;
     stored.map_epoch = site->snapshot()->info.epoch;
     stored.fragment = BeginsFragment(request, *site);
+    // The first that comes back after the state was lost: the others know their places in the same map.
+    const bool elsewhere = request.has_start && request.map_frame != 0 && request.map_frame != site->map_frame();
+    if (elsewhere && !stored.fragment && mapper_.filter.kind != slam::FilterKind::kLineMatch)
+      site->AdoptFrame(request.map_frame);
     session = Make(stored, site, mapper_);
     session->record().AddSensors(request.sensors);
     for (const std::string& sensor : request.sensors) {
@@ -53,18 +57,14 @@ Result<void> Roster::Open(const SessionRequest& request) {
   Enter(*site, session);
   if (stored.fragment) {
     spdlog::warn(
-        "robot {} did not say where it starts in site {}, which has a map: it is not localized, and its part of the "
-        "map is not shown, until it has driven through places that others have seen and a job joins it. With a start "
-        "pose it would be localized at once",
-        request.robot, request.site);
+        "robot {} {} in site {}, which has a map: it is not localized, and its part of the map is not shown, until it "
+        "has driven through places that others have seen and a job joins it. With a start pose in this map it would be "
+        "localized at once",
+        request.robot, request.has_start ? "knows where it starts in another map only" : "did not say where it starts",
+        request.site);
   }
-  {
-    const MutexLock lock(mutex_);
-    std::shared_ptr<Session>& place = sessions_[robot_id];
-    if (gone != nullptr) gone_.push_back({gone, gone == place});
-    if (gone != nullptr && gone != place) sessions_.erase(gone->record().state().robot_id);
-    place = session;
-  }
+  if (!TakePlace(session, gone, *site))
+    return Fail(StatusCode::kUnavailable, "the site or a session of the robot has just changed; ask again");
   try {
     RetireGone();
   } catch (const std::exception& error) {  // The session is open all the same, and the next Tick retires the others.
@@ -73,9 +73,25 @@ Result<void> Roster::Open(const SessionRequest& request) {
   return {};
 }
 
+// Since the site was entered, somebody may have deleted it, or it made room for another one: it had no session yet. Or
+// a session of the robot was loaded.
+bool Roster::TakePlace(const std::shared_ptr<Session>& session, const std::shared_ptr<Session>& gone,
+                       const Site& site) {
+  const SessionState state = session->record().state();
+  const MutexLock lock(mutex_);
+  const auto known = sessions_.find(state.robot_id);
+  if (atlas_.Find(state.site).get() != &site || (known != sessions_.end() && known->second != gone)) return false;
+  std::shared_ptr<Session>& place = sessions_[state.robot_id];
+  if (gone != nullptr) gone_.push_back({gone, gone == place});
+  if (gone != nullptr && gone != place) sessions_.erase(gone->record().state().robot_id);
+  place = session;
+  return true;
+}
+
 bool Roster::BeginsFragment(const SessionRequest& request, const Site& site) const {
+  const bool in_this_map = request.map_frame == 0 || request.map_frame == site.map_frame();
   // The filter line_match finds the robot in a map that it was given.
-  if (request.has_start || mapper_.filter.kind == slam::FilterKind::kLineMatch) return false;
+  if ((request.has_start && in_this_map) || mapper_.filter.kind == slam::FilterKind::kLineMatch) return false;
   if (site.snapshot()->info.tile_count > 0) return true;
   // Others may have begun a map that is not rendered yet.
   return std::ranges::any_of(sessions_, [&](const auto& one) {
@@ -109,6 +125,8 @@ std::shared_ptr<Session> Roster::Make(const StoredSession& stored, const std::sh
   SessionOutputs outputs{.send = [this](OutboundValue value) { return outbound_.Send(std::move(value)); },
                          .grid_changed = [site](GridChange&& change) { site->Change(std::move(change)); },
                          .store = {},
+                         .others_have_drawn = [site] { return site->snapshot()->info.tile_count > 0; },
+                         .hidden = [site, id] { site->Hide(id); },
                          .ended = [site, id] { site->End(id); },
                          .gone =
                              [site, id, closing = closing_] {
@@ -135,6 +153,7 @@ std::shared_ptr<Session> Roster::Make(const StoredSession& stored, const std::sh
         std::chrono::duration_cast<CheckpointPace::Time>(std::chrono::duration<double>(options_.checkpoint_work_s))};
   }
   auto session = std::make_shared<Session>(setup, options_, pool_, std::move(outputs));
+  session->record().SetMapFrame(site->map_frame());
   *self = session;
   return session;
 }

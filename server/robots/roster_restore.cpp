@@ -202,17 +202,21 @@ Result<void> Roster::HasRoomFor(const std::set<std::string>& robots) const {
   return {};
 }
 
-std::size_t Roster::OpenStored(const std::vector<SessionId>& ids) {
-  StartControl control;
-  const std::vector<RestoredSession> sessions = RestoreEach(ids, {control});
+// One after the other on the caller's thread: those of the pool belong to the robots that drive meanwhile, and a session
+// may take a minute.
+std::size_t Roster::OpenStored(const std::vector<SessionId>& ids, StartControl& control) {
   const std::set<SessionId> loaded(ids.begin(), ids.end());
   std::size_t taken = 0;
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    if (!sessions[i]) continue;  // NotRestored has set it aside.
+  for (const SessionId id : ids) {
+    auto session = RestoreOne(id, {control});
+    if (control.given_up()) {  // The next server restores them all.
+      if (session) (*session)->KeepStored();
+      break;
+    }
+    if (!session) continue;  // NotRestored has set it aside.
     const MutexLock lock(mutex_);
-    const auto known = sessions_.find((*sessions[i])->record().state().robot_id);
-    Place(*sessions[i],
-          known == sessions_.end() || (loaded.contains(known->second->id()) && known->second->id() < ids[i]));
+    const auto known = sessions_.find((*session)->record().state().robot_id);
+    Place(*session, known == sessions_.end() || (loaded.contains(known->second->id()) && known->second->id() < id));
     ++taken;
   }
   return taken;

@@ -265,6 +265,9 @@ void Session::TakeCheckpoint() {
     outputs_.abandon();
   } else if (pace_.IsDue(position) && !SaveAt(position, {})) {
     pace_.Refused();
+    if (!pace_.IsOverdue(position)) return;
+    outputs_.abandon();
+    Lost({StatusCode::kUnavailable, "no checkpoint of it could be made for very long"});
   }
 }
 

@@ -1,5 +1,6 @@
 #include "server/robots/session_estimator.h"
 
+#include <string>
 #include <utility>
 #include <variant>
 
@@ -99,6 +100,7 @@ void SessionEstimator::On(ScanArrival&& arrival) {
   if (ended_) return Discard(std::move(arrival));
   Store(ScanTaken{arrival.stream, arrival.scan});
   ComesFrom(arrival.stream.session);
+  if (!first_scan_ && !record_.begun()) first_scan_ = {arrival.scan->sequence, arrival.scan->stamp};
   waiting_.emplace(arrival.scan.get(), Waiting{arrival.stream, arrival.scan->sequence, arrival.received});
   pipeline_.Add(std::move(arrival.scan));
 }
@@ -127,6 +129,7 @@ void SessionEstimator::Store(JournalEntry entry) {
 }
 
 void SessionEstimator::Used(const Scan& scan, const slam::ScanOutcome& outcome) {
+  DoubtLateStart(scan);
   const auto waiting = waiting_.find(&scan);
   const auto known_epoch = pipeline_.mapper().known_map_epoch();
   PoseReport report =
@@ -201,6 +204,7 @@ RobotGrid SessionEstimator::DisplacedGrid() {
                       .keyframes = mapper.keyframes_made(),
                       .path = {},
                       .numbers = {},
+                      .own_path = mapper.path_is_own(),
                       .fragment = fragment_};
   if (auto path = mapper.BestPath(); path.size() == mapper.keyframe_count()) {
     displaced.path = std::make_shared<const std::vector<Pose2>>(std::move(path));
@@ -213,14 +217,18 @@ void SessionEstimator::AdoptGrid(std::uint32_t epoch, const RobotGrid& grid) {
   slam::Mapper& mapper = pipeline_.mapper();
   const auto path = grid.path != nullptr ? std::span<const Pose2>(*grid.path) : std::span<const Pose2>();
   const auto numbers = grid.numbers != nullptr ? std::span(*grid.numbers) : std::span<const std::uint64_t>();
+  const std::vector<Pose2> before = mapper.BestPath();
   // A session that was not stored to its end may not be able to follow: then its place in this map is not known.
-  const bool adopted =
-      mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), grid.chunks), grid.keyframes, path, numbers);
+  const bool adopted = mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), grid.chunks),
+                                        {grid.keyframes, path, numbers, grid.own_path});
   const bool fragment = grid.fragment || !adopted;
   if (fragment && !fragment_) driven_m_ = 0.0;  // So that no job joins it again at once.
   fragment_ = fragment;
   if (!fragment_) start_refused_.clear();
   T_map_keyframe_.reset();
+  // A robot that sends nothing more is where the map version has it as well.
+  const std::vector<Pose2> after = mapper.BestPath();
+  if (!before.empty() && after.size() == before.size()) record_.MoveLast(after.back() * before.back().Inverse());
   record_.SetJoining({fragment_, driven_m_, start_refused_});
   SetEpoch(epoch);
 }
@@ -287,7 +295,23 @@ void SessionEstimator::On(StartRefused&& refused) {
   fragment_ = true;
   start_refused_ = std::move(refused.why);
   record_.SetJoining({fragment_, driven_m_, start_refused_});
+  if (outputs_.hidden && !replaying_) outputs_.hidden();
   RefreshLandmarks(true);
+}
+
+// Called with each scan that is used. The first one may be much later than the robot's start: those before it never
+// arrived, or were dropped. Where there is a map, the robot may then be elsewhere in it.
+void SessionEstimator::DoubtLateStart(const Scan& scan) {
+  // A start that is wrong by what a robot drives in about a second is corrected by the match.
+  constexpr std::uint64_t kMostMissing = 10, kLatestNs = kNanosPerSecond;
+  // The filter line_match finds the robot in a map that it was given.
+  if (replaying_ || !first_scan_ || options_.filter.kind == slam::FilterKind::kLineMatch) return;
+  const auto [sequence, stamp] = *std::exchange(first_scan_, std::nullopt);
+  const bool late = scan.stamp > stamp && NanosBetween(stamp, scan.stamp) > kLatestNs;
+  if ((sequence <= kMostMissing + 1 && !late) || record_.begun()) return;
+  if (!outputs_.others_have_drawn || !outputs_.others_have_drawn()) return;
+  On(StartRefused{"none of the first " + std::to_string(scan.sequence - 1) +
+                  " scans of its session was used, so nothing says that it is still where it was said to start"});
 }
 
 void SessionEstimator::On(Finish&& finish) {

@@ -38,6 +38,10 @@ struct SessionOutputs {
   std::function<std::uint64_t()> recover = {};
   std::function<void()> abandon = {};
   CheckpointPace::Limits checkpoint_limits = {};
+  // Whether there is a map, so that it matters where the robot begins. May be empty.
+  std::function<bool()> others_have_drawn = {};
+  // What the session draws is not shown from now on, because it is not where it was said to start. May be empty.
+  std::function<void()> hidden = {};
   // Called when the session ends. May be empty.
   std::function<void()> ended = {};
   // Called when the session has been destroyed, after all of its changes were reported. May be empty.
@@ -102,6 +106,7 @@ class SessionEstimator {
   void On(Finish&& finish);
   void Used(const Scan& scan, const slam::ScanOutcome& outcome);
   void Dropped(const Scan& scan, DropReason reason);
+  void DoubtLateStart(const Scan& scan);
   void ComesFrom(SessionToken session);
   GridChange TakeGridChange();
   slam::OccupancyGrid::Chunks PublishedChunks();
@@ -121,6 +126,8 @@ class SessionEstimator {
   bool fragment_ = false;
   const slam::MapperOptions options_;
   std::string start_refused_;                                  // Why, if it was.
+  // Number and stamp of the first scan that arrived, until one is used.
+  std::optional<std::pair<std::uint64_t, Stamp>> first_scan_;
   double driven_m_ = 0.0;                                      // See SessionRecord::Joining. Along the keyframes.
   std::optional<Pose2> T_map_keyframe_;                        // The last one; empty after a correction.
   std::shared_ptr<const std::atomic<bool>> switch_completed_;  // Belongs to the last correction.

@@ -220,6 +220,21 @@ void SessionRecord::SetEpoch(std::uint32_t epoch) {
   status_.pose.map_epoch = epoch;
 }
 
+void SessionRecord::MoveLast(const Pose2& T_new_old) {
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  R.topLeftCorner<2, 2>() = T_new_old.rotation();
+  const MutexLock lock(mutex_);
+  PoseReport& pose = status_.pose;
+  pose.T_map_robot = T_new_old * pose.T_map_robot;
+  pose.T_map_odom = T_new_old * pose.T_map_odom;
+  pose.covariance = R * pose.covariance * R.transpose();
+}
+
+void SessionRecord::SetMapFrame(std::uint64_t map_frame) {
+  const MutexLock lock(mutex_);
+  status_.session.map_frame = map_frame;
+}
+
 void SessionRecord::SetAlive(bool alive) {
   const MutexLock lock(mutex_);
   status_.alive = alive;
@@ -342,57 +357,12 @@ std::uint32_t SessionRecord::epoch() const {
   return status_.pose.map_epoch;
 }
 
-Ledger SessionRecord::LedgerOf(const Stream& stream) const {
-  Ledger ledger = stream.account.ledger();
-  const Ledger odometry = odometry_.account.ledger();
-  const auto count = [&odometry](DropReason reason) { return odometry.dropped[static_cast<std::size_t>(reason)]; };
-  ledger.session = status_.session.session;
-  ledger.odometry_received = odometry.received;
-  ledger.odometry_merged = count(DropReason::kQueueFull);
-  ledger.odometry_dropped = odometry.dropped_total() - ledger.odometry_merged - count(DropReason::kLostOnWire);
-  return ledger;
-}
-
 SessionSnapshot SessionRecord::snapshot() const {
   const MutexLock lock(mutex_);
   SessionSnapshot snapshot{.id = id_, .status = status_, .path = history_.view(), .landmarks = landmarks_};
   snapshot.status.session = StateNow();
   for (const auto& [sensor_id, stream] : streams_) snapshot.status.ledgers.push_back(LedgerOf(stream));
   return snapshot;
-}
-
-bool SessionRecord::IsDue(const Stream& stream, Clock::time_point now, Urgency urgency, Clock::duration period) {
-  const std::uint64_t settled = stream.account.settled_count();
-  const bool burst = settled - stream.settled_when_taken >= kSettledBurst;
-  const bool drained = urgency == Urgency::kDrained && settled != stream.settled_when_taken;
-  return urgency == Urgency::kNow || (stream.changed && (burst || drained || now - stream.taken >= period));
-}
-
-Ledger SessionRecord::TakeLedger(Stream& stream, Clock::time_point now) const {
-  stream.changed = false;
-  stream.settled_when_taken = stream.account.settled_count();
-  stream.taken = now;
-  return LedgerOf(stream);
-}
-
-std::vector<Ledger> SessionRecord::TakeDueLedgers(Clock::time_point now, Urgency urgency) {
-  const MutexLock lock(mutex_);
-  std::vector<Ledger> due;
-  for (auto& [sensor_id, stream] : streams_) {
-    if (IsDue(stream, now, urgency, ledger_period_)) due.push_back(TakeLedger(stream, now));
-  }
-  // No client waits for the ledger of the odometry alone, however many samples settle. It is sent just before those of
-  // the scans, so that a client removes odometry and scans of the same time.
-  const bool rested = now - odometry_.taken >= ledger_period_;
-  if (urgency == Urgency::kNow || (odometry_.changed && (rested || !due.empty())))
-    due.insert(due.begin(), TakeLedger(odometry_, now));
-  return due;
-}
-
-void SessionRecord::MarkUnsent(NameId sensor_id) {
-  const MutexLock lock(mutex_);
-  if (Stream* const stream = Find(sensor_id)) stream->changed = true;
-  if (sensor_id == HashName(kOdometry)) odometry_.changed = true;
 }
 
 }  // namespace cairn::server

@@ -102,8 +102,11 @@ class SessionRecord {
   [[nodiscard]] Joining joining() const;
   // Another epoch of the map: the newest pose belongs to it from now on.
   void SetEpoch(std::uint32_t epoch);
+  // The map around the last pose has moved (`map` before and after): the pose in the status follows.
+  void MoveLast(const Pose2& T_new_old);
+  void SetMapFrame(std::uint64_t map_frame);
   void SetAlive(bool alive);
-  [[nodiscard]] bool HasReceivedScans() const;  // Of this client or of an earlier one.
+  [[nodiscard]] bool begun() const;  // A scan was used.
   // Both return false and change nothing if the session has ended. It may have ended after the caller last looked.
   bool SetPhase(SessionPhase phase, Status status);
   // Notices that nothing arrives of a stream although the robot's client is alive, and that it arrives again. Says

@@ -82,11 +82,9 @@ bool SessionRecord::StoredAgain(std::uint64_t position) {
   return true;
 }
 
-bool SessionRecord::HasReceivedScans() const {
+bool SessionRecord::begun() const {
   const MutexLock lock(mutex_);
-  return std::ranges::any_of(streams_, [](const auto& one) CAIRN_NO_THREAD_SAFETY_ANALYSIS {
-    return one.second.account.ledger().received > 0;
-  });
+  return status_.pose.reason != PoseReason::kWaiting;
 }
 
 void SessionRecord::Restored(std::uint64_t quiet_since_ms) {

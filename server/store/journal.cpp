@@ -59,7 +59,7 @@ void Journal::Open(const StoredSession& session, Durable durable) {
   // Nothing that an earlier session of this number may have left can become a part of this one.
   if (RemoveStatesOf(session.id, 1024, Room::kForSamples)) {
     // The caller is told as soon as the session itself is on the disk.
-    Push(Written{key, [session] { return BytesOf(session); }}, 0);
+    PushRecord(key, [session] { return BytesOf(session); }, 0, Room::kForSamples);
   } else {
     Lose(session.id, line, kTooSlow);
   }
@@ -207,7 +207,7 @@ bool Journal::RemoveStatesOf(std::uint64_t session, std::size_t size, Room room)
 
 void Journal::Put(const RecordKey& key, Bytes bytes, std::size_t size) {
   const MutexLock lock(mutex_);
-  Push(Written{key, std::move(bytes)}, size, Room::kWithReserve);
+  PushRecord(key, std::move(bytes), size, Room::kWithReserve);
 }
 
 void Journal::Remove(const RecordRange& range) {
@@ -220,11 +220,12 @@ bool Journal::Apply(Edit edit) {
   const MutexLock lock(mutex_);
   for (const std::uint64_t session : edit.forgotten) CloseLocked(session);
   if (!HasRoom(kSize * (edit.put.size() + 1), Room::kWithReserve)) {
-    left_out_ = kTooSlow;
+    if (edit.put.empty()) left_out_ = kTooSlow;
+    for (const auto& [key, bytes] : edit.put) omitted_.insert(key);
     return false;
   }
   for (const RecordRange& range : edit.removed) Push(range, 0, Room::kWithReserve);
-  for (auto& [key, bytes] : edit.put) Push(Written{key, std::move(bytes)}, kSize, Room::kWithReserve);
+  for (auto& [key, bytes] : edit.put) PushRecord(key, std::move(bytes), kSize, Room::kWithReserve);
   for (const std::uint64_t session : edit.forgotten) Push(Forgotten{session}, 0, Room::kWithReserve);
   return true;
 }
@@ -236,6 +237,26 @@ std::size_t Journal::BytesOfQueue() const {
 bool Journal::HasRoom(std::size_t size, Room room) const {
   const std::size_t bound = room == Room::kWithReserve ? 2 * BytesOfQueue() : BytesOfQueue();
   return queued_bytes_ + committing_bytes_ + held_bytes_ + size <= bound;
+}
+
+// All changes of the queue are committed together, so that only the last form of a record reaches the disk.
+bool Journal::PushRecord(const RecordKey& key, Bytes bytes, std::size_t size, Room room) {
+  if (const auto older = queued_records_.find(key); older != queued_records_.end()) {
+    Written& written = std::get<Written>(*older->second);
+    written.bytes = std::move(bytes);
+    queued_bytes_ += size - std::min(size, written.size);
+    written.size = std::max(size, written.size);
+    queue_.splice(queue_.end(), queue_, older->second);  // After removals that came meanwhile.
+    return true;
+  }
+  if (!HasRoom(size, room)) {
+    omitted_.insert(key);
+    return false;
+  }
+  if (!Push(Written{key, std::move(bytes), size}, size, room)) return false;
+  queued_records_[key] = std::prev(queue_.end());
+  omitted_.erase(key);
+  return true;
 }
 
 bool Journal::Push(Change change, std::size_t size, Room room) {
@@ -261,7 +282,8 @@ JournalHealth Journal::health() const {
     if (line.recovers_at != 0 && lost.empty())
       lost = "what a session has done while the disk failed is not on the disk yet";
   }
-  for (const std::string& reason : {disk_fault_, left_out_, lost, checkpoint_fault_})
+  const std::string omitted = omitted_.empty() ? std::string() : kTooSlow;
+  for (const std::string& reason : {disk_fault_, left_out_, omitted, lost, checkpoint_fault_})
     if (!reason.empty())
       return {.degraded = true, .reason = reason, .disk_fails = !disk_fault_.empty(), .over_budget = over_budget_};
   return {.degraded = false, .reason = {}, .disk_fails = false, .over_budget = over_budget_};

@@ -7,7 +7,8 @@
 // queue fills. If there is no room for an entry, its session is no longer stored from there on, because a journal with
 // a gap could not be replayed. The entries before stay valid. The state is then `degraded` with the reason, until the
 // session is stored again with a checkpoint of its present state (Recover). A record that is longer than the store can
-// hold is left out in the same way; it must not keep others from being written.
+// hold is left out in the same way; it must not keep others from being written. A record of a site or a job for which
+// there is no room is missing until it is handed over again; each time, that is its whole newest form.
 // Over store.max_gib the journal before a checkpoint is removed, of the session that was begun first, then of the next.
 // A journal is removed as a whole up to the checkpoint, because a rest of it could not be processed again.
 // Journals and checkpoints that nobody needs are removed piece by piece, each in a commit of its own, from the first
@@ -19,8 +20,10 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <list>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
 #include <utility>
@@ -148,6 +151,7 @@ class Journal {
   struct Written {
     RecordKey key;
     Bytes bytes;
+    std::size_t size = 0;  // That it counts with.
   };
   struct Forgotten {
     std::uint64_t session = 0;
@@ -171,7 +175,7 @@ class Journal {
   };
   // Changes that are committed together.
   struct Group {
-    std::deque<Change> changes;
+    std::list<Change> changes;
     std::vector<Work> works;  // After the commit.
     std::vector<std::function<void()>> told;
     std::optional<WantedCheckpoint> checkpoint;
@@ -188,6 +192,7 @@ class Journal {
   [[nodiscard]] bool HasRoom(std::size_t size, Room room) const CAIRN_REQUIRES(mutex_);
   bool RemoveStatesOf(std::uint64_t session, std::size_t size, Room room) CAIRN_REQUIRES(mutex_);
   bool Push(Change change, std::size_t size, Room room = Room::kForSamples) CAIRN_REQUIRES(mutex_);
+  bool PushRecord(const RecordKey& key, Bytes bytes, std::size_t size, Room room) CAIRN_REQUIRES(mutex_);
   void Run(const std::stop_token& stop);
   [[nodiscard]] bool RunOnce(Group&& group, const std::stop_token& stop);
   void StartOver(const std::string& why) CAIRN_EXCLUDES(mutex_);
@@ -214,7 +219,11 @@ class Journal {
   mutable Mutex mutex_;
   CondVar arrived_;
   std::map<std::uint64_t, Line> lines_ CAIRN_GUARDED_BY(mutex_);
-  std::deque<Change> queue_ CAIRN_GUARDED_BY(mutex_);
+  std::list<Change> queue_ CAIRN_GUARDED_BY(mutex_);
+  // The newest form of each record that is in the queue. An older one is not needed any more.
+  std::map<RecordKey, std::list<Change>::iterator> queued_records_ CAIRN_GUARDED_BY(mutex_);
+  // Records of which the newest form found no room, until there is a newer one.
+  std::set<RecordKey> omitted_ CAIRN_GUARDED_BY(mutex_);
   std::size_t queued_bytes_ CAIRN_GUARDED_BY(mutex_) = 0;      // Bytes in queue_.
   std::size_t committing_bytes_ CAIRN_GUARDED_BY(mutex_) = 0;  // Bytes of the group being committed.
   std::deque<Appended> held_ CAIRN_GUARDED_BY(mutex_);         // Of sessions that wait for the checkpoint of Recover.

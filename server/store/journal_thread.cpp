@@ -131,6 +131,7 @@ std::optional<Journal::Group> Journal::Next(const std::stop_token& stop) {
     arrived_.WaitUntil(mutex_, due);
   urgent_ = false;
   committing_bytes_ = std::exchange(queued_bytes_, 0);
+  queued_records_.clear();
   Group group{std::exchange(queue_, {}), std::exchange(works_, {}), std::exchange(told_, {}), std::nullopt, oldest_};
   // Together with the queue: the entries before a checkpoint are in this group or in an earlier one.
   if (!writing_ && !checkpoints_.empty()) {

@@ -115,6 +115,7 @@ std::string BytesOf(const StoredSite& site) {
   for (const std::uint64_t session : site.fragments) to.add_fragments(session);
   for (const std::uint64_t session : site.past) to.add_past(session);
   for (const std::uint64_t session : site.merged) to.add_merged(session);
+  to.set_map_frame(site.map_frame);
   return to.SerializeAsString();
 }
 
@@ -132,7 +133,8 @@ Result<StoredSite> SiteOf(std::string_view bytes) {
                   .resolution_m = from.resolution_m(),
                   .fragments = {from.fragments().begin(), from.fragments().end()},
                   .past = {from.past().begin(), from.past().end()},
-                  .merged = {from.merged().begin(), from.merged().end()}};
+                  .merged = {from.merged().begin(), from.merged().end()},
+                  .map_frame = from.map_frame()};
   if (!(site.resolution_m >= 0.0 && site.resolution_m <= 10.0)) return Unreadable("a site");
   for (const auto& made : from.switches()) site.switches[made.epoch()] = made.generation();
   for (const auto& member : from.members()) site.members[member.robot_id()] = member.session();

@@ -36,6 +36,7 @@ struct StoredGrid {
   // The numbers of the keyframes of the path, increasing; null: 0, 1, 2, ...
   std::shared_ptr<const std::vector<std::uint64_t>> numbers{};
   bool fragment = false;  // Not joined with the map of the site.
+  bool own_path = false;  // Nothing but what the robot has seen by itself has shaped the path.
 };
 
 // The entries of a session's journal: the events that its strand processed, in this order.
@@ -130,6 +131,7 @@ struct StoredSite {
   std::set<std::uint64_t> fragments;                // Sessions that are not joined with the map.
   std::vector<std::uint64_t> past;                  // Sessions that have ended, in the order in which they did.
   std::set<std::uint64_t> merged{};                 // Layers that stand for several sessions.
+  std::uint64_t map_frame = 0;                      // SessionState::map_frame; 0: stored without one.
 };
 
 struct StoredLayer {

@@ -1,7 +1,10 @@
 // Where a robot is said to start in a map that others have made: who is believed, and for how long.
 #include <gtest/gtest.h>
 
+#include <optional>
+
 #include "tests/server/support/stored_server.h"
+#include "tests/temp_directory.h"
 
 namespace cairn::server::testing {
 namespace {
@@ -73,6 +76,67 @@ TEST_F(Start, IsNotBelievedAMinuteLater) {
   Send(kFirst, 600, 4);
   EXPECT_FALSE(FirstPose().localized);
   EXPECT_EQ(FirstPose().reason, PoseReason::kNotJoined);
+}
+
+// All of them arrived, and the server could use none: its queue was full, or nothing said how the robot had moved.
+TEST_F(Start, IsNotBelievedWhereTheServerDroppedTheFirstScans) {
+  const std::size_t tiles = house_.CurrentTiles().size();
+  for (int step = 0; step < 40; ++step) house_.SendScan("r1", kFirst, RoomScan(step));
+  for (int step = 30; step < 44; ++step) {
+    Odometry odometry = RoomOdometry(step);
+    odometry.sequence -= 30;
+    house_.SendOdometry("r1", kFirst, odometry);
+  }
+  EXPECT_FALSE(FirstPose().localized);
+  EXPECT_EQ(FirstPose().reason, PoseReason::kNotJoined);
+  EXPECT_EQ(house_.CurrentTiles().size(), tiles) << "what it draws is not shown";
+}
+
+// Opens a session with a start that is known in this map, drives a little, and returns the first pose.
+PoseReport FirstPoseFrom(WholeServer& house, const std::string& robot, ClientId client, std::uint64_t map_frame) {
+  house.Open(robot, client, "lab", Pose2{}, map_frame);
+  EXPECT_TRUE(house.WaitPhase(robot, client, SessionPhase::kActive));
+  house.Drive(robot, client, 0, 20);
+  std::optional<PoseReport> first;
+  static_cast<void>(house.WaitFor([&] {
+    for (const PoseReport& pose : house.All<PoseReport>())
+      if (!first && pose.robot == robot) first = pose;
+    return first.has_value();
+  }));
+  return first.value_or(PoseReport{});
+}
+
+// The robot knows where it is in another map of this name, perhaps with another origin.
+TEST_F(Start, IsNotBelievedFromAnotherMap) {
+  const std::uint64_t here = house_.LastState("r1", kFirst).map_frame;
+  EXPECT_NE(here, 0U);
+  EXPECT_TRUE(FirstPoseFrom(house_, "same", 21, here).localized);
+  EXPECT_EQ(FirstPoseFrom(house_, "other", 22, here + 2).reason, PoseReason::kNotJoined);
+}
+
+// The server has lost its state: the first robot that comes back begins the map again where it was in the old one, and
+// the others know their places in the same map.
+TEST(StartInAnEmptySite, TheMapGoesOnInTheFrameThatTheFirstRobotKnows) {
+  WholeServer house;
+  EXPECT_TRUE(FirstPoseFrom(house, "r0", kMapper, 4711).localized);
+  EXPECT_EQ(house.LastState("r0", kMapper).map_frame, 4711U);
+  EXPECT_TRUE(FirstPoseFrom(house, "r1", kFirst, 4711).localized);
+  EXPECT_EQ(FirstPoseFrom(house, "r2", kSecond, 4713).reason, PoseReason::kNotJoined);
+}
+
+// Also after a restart, and where the site is saved and loaded again.
+TEST(StoredFrame, IsThatOfTheMapForEver) {
+  const TempDirectory directory;
+  std::uint64_t first = 0;
+  for (int start = 0; start < 3; ++start) {
+    StoredServer server(directory / "0");
+    server->Open("r0", kMapper);
+    ASSERT_TRUE(server->WaitPhase("r0", kMapper, SessionPhase::kActive));
+    const std::uint64_t now = server->LastState("r0", kMapper).map_frame;
+    if (start == 0) first = now;
+    EXPECT_EQ(now, first);
+    server->Drive("r0", kMapper, 10 * start, 10 * start + 10);
+  }
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <csignal>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -11,6 +12,7 @@
 
 #include "tests/child_process.h"
 #include "tests/own_mount.h"
+#include "tests/server/support/raw_records.h"
 #include "tests/system/killed_fleet.h"
 #include "tests/temp_directory.h"
 #include "tests/test_domain.h"
@@ -101,6 +103,29 @@ TEST(Kill, WithoutSpaceOnTheDiskItIsDegradedSaysSoAndEndsWithThree) {
   const auto after = ChildProcess({CAIRN_PATH, "status", "--domain", domain, "--json"}).Wait();
   EXPECT_NE(after.output.find("\"degraded\":\"\""), std::string::npos) << after.output;
   EXPECT_NE(after.output.find("\"robots\":[{"), std::string::npos) << after.output;
+}
+
+// A record of the state is damaged: everything else is served, and whoever stops the server hears of it.
+TEST(Kill, WithADamagedRecordItServesTheRestAndEndsWithThree) {
+  const char* const source = std::getenv("CAIRN_SOURCE_DIR");
+  ASSERT_NE(source, nullptr);
+  const TempDirectory directory;
+  std::filesystem::copy_file(std::filesystem::path(source) / "tests" / "golden" / "state-1" / "cairn.db",
+                             directory / "cairn.db");
+  ASSERT_GE(cairn::server::testing::RawRecords(directory.path())
+                .Run("UPDATE records SET content = CAST(x'00ff00' || substr(content, 4) AS BLOB) WHERE kind = " +
+                     std::to_string(static_cast<int>(cairn::server::RecordKind::kSession)) + " AND owner = 1"),
+            1);
+  const std::string domain = std::to_string(TestDomain());
+  ChildProcess server({CAIRND_PATH, "--domain", domain, "--state", directory.path().string()});
+  ASSERT_TRUE(server.Says(" ready"));
+  const auto status = ChildProcess({CAIRN_PATH, "status", "--domain", domain, "--json"}).Wait();
+  EXPECT_NE(status.output.find("set aside"), std::string::npos) << status.output;
+  EXPECT_NE(status.output.find("\"robot2\""), std::string::npos) << status.output;
+  server.Signal(SIGTERM);
+  const auto outcome = server.Wait();
+  EXPECT_EQ(outcome.exit_code, 3) << outcome.output;
+  EXPECT_NE(outcome.output.find("some of the old could not be read"), std::string::npos) << outcome.output;
 }
 
 // A server that leaves its state behind.

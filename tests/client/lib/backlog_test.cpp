@@ -90,43 +90,61 @@ TEST(Backlog, GivesUpTheOldestBeyondItsBoundAndSaysSo) {
 
 TEST(Backlog, ASpillFileTakesWhatIsBeyondTheBoundWithoutAChange) {
   const TempDirectory directory;
+  Backlog backlog(20 * 1024);
+  auto file = *SpillFile::Create((directory / "spill").string());
+  const SpillFile& spill = *file;
+  backlog.SpillTo(std::move(file));
+  backlog.Add(OdometryOf(1, 50, 7.5));
+  for (std::uint64_t i = 1; i <= 100; ++i) backlog.Add(ScanOf(i));
+  EXPECT_LE(backlog.bytes(), 20U * 1024);
+  EXPECT_EQ(backlog.displaced(), 0U);
+  EXPECT_EQ(backlog.spill_error(), "");
+  const auto odometry = backlog.Next();
+  EXPECT_EQ(std::get<OdometrySample>(*odometry).odometry.T_odom_robot.x, 7.5);
+  const auto first = backlog.Next();
+  const Scan& scan = std::get<ScanSample>(*first).scan;
+  EXPECT_EQ(scan.sequence, 1U);
+  EXPECT_EQ(scan.stamp, 100);
+  EXPECT_EQ(scan.tilt_rad, 0.25);
+  EXPECT_EQ(scan.T_robot_laser, (Pose2{1, 2, 3}));
+  EXPECT_EQ(scan.ranges_m, std::vector<float>(100, 1.0F));
+  EXPECT_EQ(Rest(backlog).size(), 99U);
+  // Renumbered in a new session, also on disk.
+  backlog.Safe(kOdometry, 1);
+  backlog.Safe(kLaser, 40);
+  const auto highest = backlog.MoveTo(6);
+  EXPECT_EQ(highest.at(kLaser), 60U);
+  EXPECT_EQ(highest.at(kOdometry), 1U);
+  static_cast<void>(backlog.Next());
+  const auto renumbered = backlog.Next();
+  EXPECT_EQ(std::get<ScanSample>(*renumbered).scan.sequence, 1U);
+  EXPECT_EQ(std::get<ScanSample>(*renumbered).stream.session, 6U);
+  EXPECT_EQ(std::get<ScanSample>(*renumbered).scan.ranges_m[0], 41.0F);
+  EXPECT_GT(spill.size(), 0U);
+  static_cast<void>(Rest(backlog));
+  backlog.Safe(kOdometry, 1);
+  backlog.Safe(kLaser, 59);
+  EXPECT_EQ(spill.size(), 0U);
+}
+
+// A process that was killed could not remove its file, and could not be started again with the same command.
+TEST(Backlog, AKilledProcessLeavesNoSpillFile) {
+  const TempDirectory directory;
   const std::string path = (directory / "spill").string();
-  {
-    Backlog backlog(20 * 1024);
-    backlog.SpillTo(std::move(*SpillFile::Create(path)));
-    backlog.Add(OdometryOf(1, 50, 7.5));
-    for (std::uint64_t i = 1; i <= 100; ++i) backlog.Add(ScanOf(i));
-    EXPECT_LE(backlog.bytes(), 20U * 1024);
-    EXPECT_EQ(backlog.displaced(), 0U);
-    EXPECT_EQ(backlog.spill_error(), "");
-    const auto odometry = backlog.Next();
-    EXPECT_EQ(std::get<OdometrySample>(*odometry).odometry.T_odom_robot.x, 7.5);
-    const auto first = backlog.Next();
-    const Scan& scan = std::get<ScanSample>(*first).scan;
-    EXPECT_EQ(scan.sequence, 1U);
-    EXPECT_EQ(scan.stamp, 100);
-    EXPECT_EQ(scan.tilt_rad, 0.25);
-    EXPECT_EQ(scan.T_robot_laser, (Pose2{1, 2, 3}));
-    EXPECT_EQ(scan.ranges_m, std::vector<float>(100, 1.0F));
-    EXPECT_EQ(Rest(backlog).size(), 99U);
-    // Renumbered in a new session, also on disk.
-    backlog.Safe(kOdometry, 1);
-    backlog.Safe(kLaser, 40);
-    const auto highest = backlog.MoveTo(6);
-    EXPECT_EQ(highest.at(kLaser), 60U);
-    EXPECT_EQ(highest.at(kOdometry), 1U);
-    static_cast<void>(backlog.Next());
-    const auto renumbered = backlog.Next();
-    EXPECT_EQ(std::get<ScanSample>(*renumbered).scan.sequence, 1U);
-    EXPECT_EQ(std::get<ScanSample>(*renumbered).stream.session, 6U);
-    EXPECT_EQ(std::get<ScanSample>(*renumbered).scan.ranges_m[0], 41.0F);
-    EXPECT_GT(std::filesystem::file_size(path), 0U);
-    static_cast<void>(Rest(backlog));
-    backlog.Safe(kOdometry, 1);
-    backlog.Safe(kLaser, 59);
-    EXPECT_EQ(std::filesystem::file_size(path), 0U);
-  }
+  const auto of_one = SpillFile::Create(path), of_another = SpillFile::Create(path);
+  ASSERT_TRUE(of_one && of_another);
   EXPECT_FALSE(std::filesystem::exists(path));
+  ASSERT_TRUE((*of_one)->Append("one") && (*of_another)->Append("another"));
+  EXPECT_EQ(*(*of_one)->Read(0), "one");
+  EXPECT_EQ(*(*of_another)->Read(0), "another");
+}
+
+TEST(Backlog, KnowsTheOldestOfEachStream) {
+  Backlog backlog(20 * 1024);
+  EXPECT_EQ(backlog.OldestOf(kLaser), std::nullopt);
+  backlog.Add(OdometryOf(1, 50, 0.0));
+  for (std::uint64_t i = 1; i <= 100; ++i) backlog.Add(ScanOf(i));
+  EXPECT_EQ(backlog.OldestOf(kLaser), backlog.displaced());  // The odometry is one of those.
 }
 
 TEST(Backlog, NobodysFileIsOverwritten) {

@@ -72,6 +72,16 @@ void FakeServer::Restart(Generation generation) {
   for (SessionRequest& request : sessions) OnSession(std::move(request));
 }
 
+void FakeServer::SayStale() {
+  std::vector<SessionRequest> sessions;
+  {
+    const MutexLock lock(mutex_);
+    stale_ = true;
+    for (const auto& [robot, request] : owners_) sessions.push_back(request);
+  }
+  for (SessionRequest& request : sessions) OnSession(std::move(request));
+}
+
 void FakeServer::SetAnswering(bool answering) {
   const MutexLock lock(mutex_);
   answering_ = answering;
@@ -151,6 +161,8 @@ void FakeServer::OnSession(SessionRequest&& request) {
     if (sessions_to_ignore_ > 0 && sessions_to_ignore_-- > 0) return;
     state.generation = generation_;
     state.durable = durable_;
+    state.map_frame = kMapFrame;
+    state.stale = stale_;
     const bool known = owners_.contains(request.robot);
     if (!known && request.started) {
       state.phase = SessionPhase::kRefused;

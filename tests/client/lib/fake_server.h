@@ -30,6 +30,7 @@ class FakeServer {
   // Begins a later generation that knows its sessions and the scans that were durable, and nothing else.
   void Restart(Generation generation);
   void SetAnswering(bool answering);
+  void SayStale();  // That nothing of a stream arrives.
   // Of all that is sent from now on; 1 at first.
   void SetGeneration(Generation generation);
   void IgnoreSessions(int count);  // So many session requests are not answered.
@@ -49,6 +50,7 @@ class FakeServer {
   [[nodiscard]] std::vector<RequestKind> asked() const;
   [[nodiscard]] std::uint64_t datagrams_refused() const { return bus_->datagrams_refused(); }
 
+  static constexpr std::uint64_t kMapFrame = 77;
   // Tile queries are answered with so many parts of one tile of 50 KB each, which hold no image; those about the site
   // `drawn` with one tile of occupied cells.
   static constexpr std::uint32_t kTileParts = 40;
@@ -74,6 +76,7 @@ class FakeServer {
   bool settling_ CAIRN_GUARDED_BY(mutex_) = true;
   std::atomic<bool> localized_ = true;
   bool durable_ CAIRN_GUARDED_BY(mutex_) = false;
+  bool stale_ CAIRN_GUARDED_BY(mutex_) = false;
   std::uint64_t durable_through_ CAIRN_GUARDED_BY(mutex_) = 0;
   bool answering_ CAIRN_GUARDED_BY(mutex_) = true;
   std::set<std::uint64_t> to_lose_ CAIRN_GUARDED_BY(mutex_);

@@ -59,6 +59,8 @@ TEST_F(RobotClientTest, OpensANewSessionWhereTheRobotIsIfTheServerForgotIt) {
   // The fake server's poses say that the frames `map` and `odom` are the same. The robot drives 0.1 m from scan to
   // scan.
   EXPECT_NEAR(last.T_map_robot_start.x, 0.1 * settled, 1e-9);
+  EXPECT_EQ(first.map_frame, 0U);
+  EXPECT_EQ(last.map_frame, FakeServer::kMapFrame) << "it must not be believed in another map";
 }
 
 // Its odometry begins anew, or scans are missing for some time, between the last pose and what the next server gets.
@@ -100,6 +102,7 @@ TEST_F(RobotClientTest, ARobotThatMayBeElsewhereGivesNoStartToTheNextServer) {
     ASSERT_TRUE(client->WaitSettled(20.0));
     EXPECT_EQ(client->restarted(), 1);
     EXPECT_EQ(server_->sessions().back().has_start, one.has_start);
+    EXPECT_EQ(server_->sessions().back().map_frame, one.has_start ? FakeServer::kMapFrame : 0);
   }
 }
 

@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <chrono>
+
 #include "tests/client/lib/one_robot.h"
 
 namespace cairn::client {
@@ -112,6 +115,44 @@ TEST_F(RobotClientTest, WhatTheServerWaitsForComesBehindScansThatDoNotSettle) {
   ASSERT_TRUE(Eventually([&] { return client->resent() >= 32; }));
   ASSERT_TRUE(client->Publish(Odometry{}));
   EXPECT_TRUE(Eventually([&] { return highest == 1; }));
+}
+
+// A server waits for numbers that the client does not have any more: they were displaced while the server was away, or
+// the server was set back to a saved state.
+TEST_F(RobotClientTest, WhatIsGoneHoldsNothingUp) {
+  constexpr std::uint64_t kScans = 5000;
+  for (std::uint64_t i = 1; i <= kScans; ++i) server_->LoseOnce(i);
+  RobotClientOptions options;
+  options.resend_after_s = 0.1;
+  options.window = 0;
+  options.max_kept_bytes = 20'000;
+  const auto client = Open(options);
+  for (std::uint64_t i = 1; i <= kScans; ++i) ASSERT_TRUE(client->Publish(SomeScan()));
+  EXPECT_GT(client->displaced(), kScans - 100);
+  const auto arrives = [this](std::uint64_t number) {
+    const auto received = server_->received();
+    return std::ranges::find(received, number) != received.end();
+  };
+  EXPECT_TRUE(Eventually([&] { return arrives(kScans); }));
+  ASSERT_TRUE(client->Publish(SomeScan()));
+  EXPECT_TRUE(Eventually([&] { return arrives(kScans + 1); }));
+}
+
+// A lidar is switched off while the rest of the robot goes on. The server calls its stream stale, which is true, and a
+// new participant would change nothing.
+TEST_F(RobotClientTest, AStreamThatIsNotSentIsNoReasonToJoinAgain) {
+  const auto client = Open();
+  ASSERT_TRUE(client->Publish(SomeScan(), "rear"));
+  ASSERT_TRUE(client->WaitSettled(20.0));
+  server_->SayStale();
+  ASSERT_TRUE(Eventually([&] { return client->session().stale; }));
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(3);
+  while (std::chrono::steady_clock::now() < end) {
+    ASSERT_TRUE(client->Publish(SomeScan(), "front"));
+    ASSERT_TRUE(client->WaitSettled(20.0));
+  }
+  EXPECT_EQ(client->renewed(), 0);
+  EXPECT_TRUE(client->session().status.ok()) << client->session().status.message;
 }
 
 TEST_F(RobotClientTest, GoesOnAfterAServerThatNobodyHeardOfForAWhile) {

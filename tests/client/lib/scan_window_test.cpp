@@ -24,6 +24,13 @@ TEST(ScanWindow, NumbersFromOne) {
   EXPECT_EQ(window.Next(), 2U);
 }
 
+TEST(ScanWindow, NobodyWaitsForWhatIsGone) {
+  ScanWindow window(4);
+  Give(window, 10);
+  EXPECT_FALSE(window.HasRoom(6));
+  EXPECT_TRUE(window.HasRoom(7));
+}
+
 TEST(ScanWindow, IsFullAtItsLimitUntilTheServerSettles) {
   ScanWindow window(4);
   Give(window, 4);

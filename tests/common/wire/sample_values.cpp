@@ -82,6 +82,7 @@ SessionRequest ExtremeSessionRequest() {
   value.session = kMax64 - 4;
   value.started = true;
   value.end = true;
+  value.map_frame = kMax64 - 5;
   return value;
 }
 
@@ -95,7 +96,8 @@ SessionState ExtremeSessionState() {
           .session = kMax64 - 2,
           .durable = true,
           .stale = true,
-          .generation = kMax64 - 3};
+          .generation = kMax64 - 3,
+          .map_frame = kMax64 - 4};
 }
 
 SessionRefusal ExtremeSessionRefusal() {
@@ -273,12 +275,12 @@ Reply ExtremeReply() {
 bool Same(const SessionRequest& a, const SessionRequest& b) {
   return a.robot == b.robot && a.site == b.site && a.sensors == b.sensors && a.client == b.client &&
          a.session == b.session && a.started == b.started && a.has_start == b.has_start &&
-         Eq(a.T_map_robot_start, b.T_map_robot_start) && a.end == b.end;
+         Eq(a.T_map_robot_start, b.T_map_robot_start) && a.end == b.end && a.map_frame == b.map_frame;
 }
 bool Same(const SessionState& a, const SessionState& b) {
   return a.robot_id == b.robot_id && a.client == b.client && a.robot == b.robot && a.site == b.site &&
          a.phase == b.phase && Eq(a.status, b.status) && a.session == b.session && a.durable == b.durable &&
-         a.stale == b.stale && a.generation == b.generation;
+         a.stale == b.stale && a.generation == b.generation && a.map_frame == b.map_frame;
 }
 bool Same(const SessionRefusal& a, const SessionRefusal& b) {
   return Same(a.state, b.state);

@@ -33,6 +33,16 @@ TEST(RequestQueue, ClientsTakeTurns) {
   EXPECT_EQ(queue.taken(), 4U);
 }
 
+// Whoever gave a command would have been told to give it again.
+TEST(RequestQueue, AnAnswerDoesNotGiveWay) {
+  RequestQueue queue(2);
+  for (std::int64_t i = 1; i <= 4; ++i) queue.PutBack({From(7, i), ReplyParts(Answer(Reply{}))});
+  const auto refused = queue.Push(From(8, 1));
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->client, 8U);
+  for (int i = 0; i < 4; ++i) EXPECT_TRUE(queue.Pop()->rest);
+}
+
 TEST(RequestQueue, AnAnswerGoesOnBeforeTheClientsOtherRequestsAndAfterOtherClients) {
   RequestQueue queue(10);
   for (std::int64_t i = 1; i <= 2; ++i) EXPECT_FALSE(queue.Push(From(7, i)));

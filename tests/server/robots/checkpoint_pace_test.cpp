@@ -29,6 +29,16 @@ TEST(CheckpointPace, IsDueAfterSoMuchWork) {
   EXPECT_FALSE(pace.IsDue(10));
 }
 
+TEST(CheckpointPace, IsOverdueWhereNoneCanBeMadeForVeryLong) {
+  CheckpointPace pace(kLimits);
+  EXPECT_FALSE(pace.IsOverdue(5000)) << "nobody has tried";
+  for (int i = 0; i < 100; ++i) pace.Refused();
+  EXPECT_FALSE(pace.IsOverdue(4999));
+  EXPECT_TRUE(pace.IsOverdue(5000));
+  pace.Begun(5000);
+  EXPECT_FALSE(pace.IsOverdue(20000));
+}
+
 TEST(CheckpointPace, IsNotDueWhereNothingIsNew) {
   CheckpointPace pace(kLimits);
   pace.Begun(5);

@@ -1,8 +1,10 @@
 // Which sessions a roster knows, and when it gives their keys back.
 #include <gmock/gmock.h>
 
+#include <atomic>
 #include <functional>
 #include <future>
+#include <thread>
 #include <type_traits>
 #include <variant>
 #include <vector>
@@ -164,6 +166,32 @@ TEST_F(RosterTest, TheKeysOfASessionThatIsGoneAreGivenBack) {
   EXPECT_THAT(kinds, ::testing::UnorderedElementsAre(0, 1, 2, 2));  // State, pose, the ledgers of laser and odometry.
   roster().Tick();
   EXPECT_EQ(sent().All<Retired>().size(), 4U);
+}
+
+// Between entering the site and being known, a session could lose its site to somebody who deleted it.
+TEST_F(RosterTest, NoSessionIsOpenInASiteThatIsDeleted) {
+  roster();
+  std::atomic<bool> opened = false;
+  std::jthread deletes([&] {
+    while (!opened) {
+      if (roster().RemoveSite("brief")) atlas_->Release("brief");
+    }
+  });
+  int open = 0;
+  for (int i = 0; i < 300; ++i) {
+    SessionRequest request = RequestOf("r1", 7);
+    request.site = "brief";
+    request.session = static_cast<SessionToken>(i + 1);
+    roster().Take(request);
+    const auto session = roster().Find("r1");
+    if (session == nullptr || session->record().state().phase != SessionPhase::kActive) continue;
+    ++open;
+    EXPECT_NE(atlas_->Find("brief"), nullptr) << i;
+    request.end = true;
+    roster().Take(request);
+  }
+  opened = true;
+  EXPECT_GT(open, 0);
 }
 
 }  // namespace

@@ -56,7 +56,7 @@ class WholeServer {
   void Push(InboundValue value) { ASSERT_TRUE(inbound_.Push(std::move(value))); }
 
   void Open(const std::string& robot, ClientId client, const std::string& site = "lab",
-            const std::optional<Pose2>& start = Pose2{}) {
+            const std::optional<Pose2>& start = Pose2{}, std::uint64_t map_frame = 0) {
     SessionToken& token = tokens_[{robot, client}];
     if (token == 0 || LastState(robot, client).phase == SessionPhase::kEnded) token += client;
     Push(SessionRequest{.robot = robot,
@@ -66,7 +66,9 @@ class WholeServer {
                         .has_start = start.has_value(),
                         .T_map_robot_start = start.value_or(Pose2{}),
                         .end = false,
-                        .session = TokenOf(robot, client)});
+                        .session = TokenOf(robot, client),
+                        .started = false,
+                        .map_frame = map_frame});
   }
   void End(const std::string& robot, ClientId client) {
     Push(SessionRequest{.robot = robot,
