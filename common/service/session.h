@@ -47,7 +47,8 @@ struct SessionState {
   bool durable = false;       // The server stores the samples.
   bool stale = false;         // A stream stands still although the robot's client is alive; `status` says which.
   Generation generation = 0;  // Set by the server's egress.
-  // Of the site's coordinate frame `map`: poses in maps of different numbers have nothing to do with each other. Not 0.
+  // A random number of the site's coordinate frame `map`, never 0. Poses in maps with different numbers cannot be
+  // compared.
   std::uint64_t map_frame = 0;
 };
 

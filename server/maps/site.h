@@ -57,7 +57,7 @@ class Site : public std::enable_shared_from_this<Site> {
   using Wanted = std::function<bool()>;
 
   // The epoch and the version with which the map begins: above those of a deleted site of the same name, because a
-  // client may still know them. And the number of its coordinate frame (SessionState::map_frame), which no other has.
+  // client may still know them. And the number of its coordinate frame (SessionState::map_frame).
   struct Beginning {
     std::uint32_t epoch = 0;
     std::uint64_t tile_version = 0;
@@ -66,7 +66,8 @@ class Site : public std::enable_shared_from_this<Site> {
 
   // `journal`: null if nothing is stored. `generation`: the number of this start of the server.
   Site(const std::string& name, double resolution_m, const MapsOptions& options, asio::thread_pool& pool,
-       Outbound& outbound, Journal* journal = nullptr, Generation generation = 0, const Beginning& beginning = {0, 0, 1});
+       Outbound& outbound, Journal* journal = nullptr, Generation generation = 0,
+       const Beginning& beginning = {0, 0, 1});
 
   // Restores what an earlier server has stored: the epoch, the versions, and the parts of the map that were drawn by
   // sessions that no longer exist. Records that cannot be read are set aside; without the enabled version, the newest
@@ -244,8 +245,6 @@ void Site::StoreTogether(const Act& act) {
   }
   Journal::Edit edit = *std::exchange(together_, std::nullopt);
   if (journal_ == nullptr) return;
-  // Its records are deleted, and those of another site of its name may be there. Only a session may still go.
-  if (retired_) edit = {.removed = {}, .put = {}, .forgotten = std::move(edit.forgotten)};
   edit.forgotten.insert(edit.forgotten.end(), unforgotten_.begin(), unforgotten_.end());
   unforgotten_ = edit.forgotten;
   incomplete_ = !journal_->Apply(std::move(edit));

@@ -110,8 +110,9 @@ Result<void> Site::Restore(const StoredSite& stored, StartControl& control) {
   epoch_ = std::max(epoch_, stored.epoch);
   tile_version_ = std::max(tile_version_, stored.tile_version);
   switches_ = stored.switches;
-  // A site that was stored without one gets the same one at each start, until it is stored with it.
-  map_frame_ = stored.map_frame != 0 ? stored.map_frame : site_id_;
+  // One that was stored without a number has a new one. It is stored with the first session, before which no robot
+  // learns it.
+  if (stored.map_frame != 0) map_frame_ = stored.map_frame;
   for (const SessionId session : stored.fragments) joint_.SetHidden(session, true);
   for (const SessionId session : stored.past) joint_.SetPast(session);
   merged_ = stored.merged;

@@ -21,12 +21,14 @@ std::optional<Request> RequestQueue::Push(Request&& request) {
   if (closed_) return std::move(request);
   std::optional<Request> refused;
   if (size_ >= capacity_) {
-    const auto longest = std::max_element(
-        askers_.begin(), askers_.end(), [](const auto& a, const auto& b) { return a.second.size() < b.second.size(); });
+    // A command whose answer is there was carried out: nobody may be told that it was not.
+    const auto may_give_way = [](const Waiting& waiting) { return waiting.back().rest ? 0 : waiting.size(); };
+    const auto longest = std::max_element(askers_.begin(), askers_.end(), [&](const auto& a, const auto& b) {
+      return may_give_way(a.second) < may_give_way(b.second);
+    });
     const auto own = askers_.find(AskerOf(request));
     const std::size_t waiting = own == askers_.end() ? 0 : own->second.size();
-    // A command whose answer is there was carried out: nobody may be told that it was not.
-    if (longest->second.size() < waiting + 2 || longest->second.back().rest) return std::move(request);
+    if (may_give_way(longest->second) < waiting + 2) return std::move(request);
     refused = std::move(longest->second.back().request);
     longest->second.pop_back();
     --size_;

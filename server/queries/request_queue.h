@@ -1,7 +1,7 @@
 // The requests that wait for the desk. Those who ask take turns, so one with many requests, or with one whose answer is
 // large, delays the others by one turn at most. Bounded: where the queue is full, the newest request of the one that
-// has most waiting gives way to one of somebody who has fewer. Who asks is a participant of the domain
-// (Request::asker), not a client: a program can invent any number of clients. Thread-safe.
+// has most waiting gives way to one of somebody who has fewer. An answer that is there does not give way. Who asks is a
+// participant of the domain (Request::asker), not a client: a program can invent any number of clients. Thread-safe.
 #pragma once
 
 #include <cstddef>

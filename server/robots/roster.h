@@ -105,6 +105,8 @@ class Roster {
   Result<void> Open(const SessionRequest& request);
   void StoreQuiet() CAIRN_REQUIRES(mutex_);
   [[nodiscard]] std::string WhyNotRestored(const std::string& robot) const;
+  // Whether others have begun the map of this site.
+  [[nodiscard]] bool HasBegun(const std::string& name, const Site& site) const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool BeginsFragment(const SessionRequest& request, const Site& site) const CAIRN_REQUIRES(mutex_);
   std::shared_ptr<Session> Make(const StoredSession& stored, const std::shared_ptr<Site>& site,
                                 const slam::MapperOptions& mapper) const;

@@ -36,11 +36,18 @@ Result<void> Roster::Open(const SessionRequest& request) {
     gone = *std::move(giving_way);
     stored.id = next_id_++;
     stored.map_epoch = site->snapshot()->info.epoch;
+    stored.in_map = HasBegun(request.site, *site);
     stored.fragment = BeginsFragment(request, *site);
     // The first that comes back after the state was lost: the others know their places in the same map.
     const bool elsewhere = request.has_start && request.map_frame != 0 && request.map_frame != site->map_frame();
-    if (elsewhere && !stored.fragment && mapper_.filter.kind != slam::FilterKind::kLineMatch)
+    if (elsewhere && !stored.fragment && mapper_.filter.kind != slam::FilterKind::kLineMatch) {
       site->AdoptFrame(request.map_frame);
+      for (const auto& [id, other] : sessions_) {
+        if (other->record().state().site != request.site) continue;
+        other->record().SetMapFrame(request.map_frame);
+        other->Announce();
+      }
+    }
     session = Make(stored, site, mapper_);
     session->record().AddSensors(request.sensors);
     for (const std::string& sensor : request.sensors) {
@@ -63,8 +70,10 @@ Result<void> Roster::Open(const SessionRequest& request) {
         request.robot, request.has_start ? "knows where it starts in another map only" : "did not say where it starts",
         request.site);
   }
-  if (!TakePlace(session, gone, *site))
+  if (!TakePlace(session, gone, *site)) {
+    if (journal_ != nullptr) journal_->Forget(session->id());
     return Fail(StatusCode::kUnavailable, "the site or a session of the robot has just changed; ask again");
+  }
   try {
     RetireGone();
   } catch (const std::exception& error) {  // The session is open all the same, and the next Tick retires the others.
@@ -73,8 +82,7 @@ Result<void> Roster::Open(const SessionRequest& request) {
   return {};
 }
 
-// Since the site was entered, somebody may have deleted it, or it made room for another one: it had no session yet. Or
-// a session of the robot was loaded.
+// Since the site was entered, somebody may have deleted it, or loaded a session of the robot.
 bool Roster::TakePlace(const std::shared_ptr<Session>& session, const std::shared_ptr<Session>& gone,
                        const Site& site) {
   const SessionState state = session->record().state();
@@ -83,7 +91,8 @@ bool Roster::TakePlace(const std::shared_ptr<Session>& session, const std::share
   if (atlas_.Find(state.site).get() != &site || (known != sessions_.end() && known->second != gone)) return false;
   std::shared_ptr<Session>& place = sessions_[state.robot_id];
   if (gone != nullptr) gone_.push_back({gone, gone == place});
-  if (gone != nullptr && gone != place) sessions_.erase(gone->record().state().robot_id);
+  if (gone != nullptr && gone->record().state().robot_id != state.robot_id)
+    sessions_.erase(gone->record().state().robot_id);
   place = session;
   return true;
 }
@@ -92,13 +101,17 @@ bool Roster::BeginsFragment(const SessionRequest& request, const Site& site) con
   const bool in_this_map = request.map_frame == 0 || request.map_frame == site.map_frame();
   // The filter line_match finds the robot in a map that it was given.
   if ((request.has_start && in_this_map) || mapper_.filter.kind == slam::FilterKind::kLineMatch) return false;
+  return HasBegun(request.site, site);
+}
+
+bool Roster::HasBegun(const std::string& name, const Site& site) const {
   if (site.snapshot()->info.tile_count > 0) return true;
   // Others may have begun a map that is not rendered yet.
   return std::ranges::any_of(sessions_, [&](const auto& one) {
     const SessionRecord& record = one.second->record();
     const RobotStatus status = record.snapshot().status;
     const bool draws = status.session.phase != SessionPhase::kEnded || status.pose.reason != PoseReason::kWaiting;
-    return status.session.site == request.site && draws && !record.joining().fragment;
+    return status.session.site == name && draws && !record.joining().fragment;
   });
 }
 
@@ -116,16 +129,17 @@ void Roster::Enter(Site& site, const std::shared_ptr<Session>& session) {
 std::shared_ptr<Session> Roster::Make(const StoredSession& stored, const std::shared_ptr<Site>& site,
                                       const slam::MapperOptions& mapper) const {
   const SessionId id = stored.id;
-  const SessionSetup setup{
-      .id = id,
-      .request = stored.request,
-      .map_epoch = stored.map_epoch,
-      .estimator = {.mapper = mapper, .T_map_robot_start = StartOf(stored.request), .fragment = stored.fragment},
-      .quiet_since_ms = stored.quiet_since_ms};
+  const SessionSetup setup{.id = id,
+                           .request = stored.request,
+                           .map_epoch = stored.map_epoch,
+                           .estimator = {.mapper = mapper,
+                                         .T_map_robot_start = StartOf(stored.request),
+                                         .fragment = stored.fragment,
+                                         .in_map = stored.in_map},
+                           .quiet_since_ms = stored.quiet_since_ms};
   SessionOutputs outputs{.send = [this](OutboundValue value) { return outbound_.Send(std::move(value)); },
                          .grid_changed = [site](GridChange&& change) { site->Change(std::move(change)); },
                          .store = {},
-                         .others_have_drawn = [site] { return site->snapshot()->info.tile_count > 0; },
                          .hidden = [site, id] { site->Hide(id); },
                          .ended = [site, id] { site->End(id); },
                          .gone =

@@ -202,8 +202,8 @@ Result<void> Roster::HasRoomFor(const std::set<std::string>& robots) const {
   return {};
 }
 
-// One after the other on the caller's thread: those of the pool belong to the robots that drive meanwhile, and a session
-// may take a minute.
+// One after the other on the caller's thread: those of the pool belong to the robots that drive meanwhile, and a
+// session may take a minute.
 std::size_t Roster::OpenStored(const std::vector<SessionId>& ids, StartControl& control) {
   const std::set<SessionId> loaded(ids.begin(), ids.end());
   std::size_t taken = 0;

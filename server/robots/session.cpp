@@ -18,7 +18,12 @@ constexpr std::chrono::seconds kOpeningPatience{1};  // A robot waits this long 
 Session::Session(const SessionSetup& setup, const RobotsOptions& options, asio::thread_pool& pool,
                  SessionOutputs outputs)
     : id_(setup.id),
-      stored_{setup.id, setup.request, setup.map_epoch, setup.estimator.fragment, setup.quiet_since_ms},
+      stored_{setup.id,
+              setup.request,
+              setup.map_epoch,
+              setup.estimator.fragment,
+              setup.quiet_since_ms,
+              setup.estimator.in_map},
       outputs_(std::move(outputs)),
       record_(setup.id, setup.request, options),
       queue_(static_cast<std::size_t>(options.queue_scans), static_cast<std::size_t>(options.queue_odometry)),

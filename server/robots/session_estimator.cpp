@@ -61,6 +61,7 @@ SessionEstimator::SessionEstimator(const EstimatorSetup& setup, SessionRecord& r
       epoch_(record.epoch()),
       fragment_(setup.fragment),
       options_(setup.mapper),
+      in_map_(setup.in_map),
       pipeline_(setup.mapper, setup.T_map_robot_start, slam::SerialFor,
                 {.used = [this](const Scan& scan, const slam::ScanOutcome& outcome) { Used(scan, outcome); },
                  .dropped = [this](const Scan& scan, DropReason reason) { Dropped(scan, reason); }}) {
@@ -100,7 +101,10 @@ void SessionEstimator::On(ScanArrival&& arrival) {
   if (ended_) return Discard(std::move(arrival));
   Store(ScanTaken{arrival.stream, arrival.scan});
   ComesFrom(arrival.stream.session);
-  if (!first_scan_ && !record_.begun()) first_scan_ = {arrival.scan->sequence, arrival.scan->stamp};
+  if (!first_sequence_ && !record_.begun()) {
+    first_sequence_ = arrival.scan->sequence;
+    first_stamp_ = arrival.scan->stamp;
+  }
   waiting_.emplace(arrival.scan.get(), Waiting{arrival.stream, arrival.scan->sequence, arrival.received});
   pipeline_.Add(std::move(arrival.scan));
 }
@@ -300,16 +304,16 @@ void SessionEstimator::On(StartRefused&& refused) {
 }
 
 // Called with each scan that is used. The first one may be much later than the robot's start: those before it never
-// arrived, or were dropped. Where there is a map, the robot may then be elsewhere in it.
+// arrived, or were dropped. Where there is a map, the robot may then be elsewhere in it. Repeated when the journal is
+// read, which must come to the same result: so it depends on nothing but what the session itself has received.
 void SessionEstimator::DoubtLateStart(const Scan& scan) {
   // A start that is wrong by what a robot drives in about a second is corrected by the match.
   constexpr std::uint64_t kMostMissing = 10, kLatestNs = kNanosPerSecond;
   // The filter line_match finds the robot in a map that it was given.
-  if (replaying_ || !first_scan_ || options_.filter.kind == slam::FilterKind::kLineMatch) return;
-  const auto [sequence, stamp] = *std::exchange(first_scan_, std::nullopt);
-  const bool late = scan.stamp > stamp && NanosBetween(stamp, scan.stamp) > kLatestNs;
-  if ((sequence <= kMostMissing + 1 && !late) || record_.begun()) return;
-  if (!outputs_.others_have_drawn || !outputs_.others_have_drawn()) return;
+  if (!in_map_ || !first_sequence_ || options_.filter.kind == slam::FilterKind::kLineMatch) return;
+  const std::uint64_t first = *std::exchange(first_sequence_, std::nullopt);
+  const bool late = scan.stamp > first_stamp_ && NanosBetween(first_stamp_, scan.stamp) > kLatestNs;
+  if (first <= kMostMissing + 1 && !late) return;
   On(StartRefused{"none of the first " + std::to_string(scan.sequence - 1) +
                   " scans of its session was used, so nothing says that it is still where it was said to start"});
 }

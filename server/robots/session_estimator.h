@@ -38,8 +38,6 @@ struct SessionOutputs {
   std::function<std::uint64_t()> recover = {};
   std::function<void()> abandon = {};
   CheckpointPace::Limits checkpoint_limits = {};
-  // Whether there is a map, so that it matters where the robot begins. May be empty.
-  std::function<bool()> others_have_drawn = {};
   // What the session draws is not shown from now on, because it is not where it was said to start. May be empty.
   std::function<void()> hidden = {};
   // Called when the session ends. May be empty.
@@ -54,6 +52,7 @@ struct EstimatorSetup {
   // Nobody has said where the robot starts in a map that others have begun. Its start is the origin of a frame of its
   // own, and it is not localized, until a map version joins it (maps/robot_grid.h).
   bool fragment = false;
+  bool in_map = false;  // Others have begun the map, so that it matters where the robot starts.
 };
 
 class SessionEstimator {
@@ -125,9 +124,11 @@ class SessionEstimator {
   std::uint32_t epoch_ = 0;
   bool fragment_ = false;
   const slam::MapperOptions options_;
-  std::string start_refused_;                                  // Why, if it was.
+  std::string start_refused_;  // Why, if it was.
+  const bool in_map_;
   // Number and stamp of the first scan that arrived, until one is used.
-  std::optional<std::pair<std::uint64_t, Stamp>> first_scan_;
+  std::optional<std::uint64_t> first_sequence_;
+  Stamp first_stamp_ = 0;
   double driven_m_ = 0.0;                                      // See SessionRecord::Joining. Along the keyframes.
   std::optional<Pose2> T_map_keyframe_;                        // The last one; empty after a correction.
   std::shared_ptr<const std::atomic<bool>> switch_completed_;  // Belongs to the last correction.

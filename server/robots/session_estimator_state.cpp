@@ -95,7 +95,7 @@ Journal::Content SessionEstimator::Save() const {
   // The scans themselves are saved by the pipeline, in the same order.
   std::vector<NameId> waiting;
   pipeline_.ForEachWaiting([&](const Scan& scan) { waiting.push_back(waiting_.at(&scan).stream.sensor_id); });
-  (*writer)(epoch_, session_, fragment_, driven_m_, start_refused_, waiting);
+  (*writer)(epoch_, session_, fragment_, driven_m_, start_refused_, first_sequence_, first_stamp_, waiting);
   if (!record_.Save(*writer, WaitingBySensor())) return nullptr;
   return [writer, pipeline = std::make_shared<const slam::Checkpoint>(pipeline_.Save())] {
     const std::string own = writer->Main();
@@ -120,9 +120,13 @@ Result<SessionEstimator::PieceValues> SessionEstimator::Load(std::string_view ma
   // The estimator is loaded first: if that fails, nothing has changed.
   const auto loaded = pipeline_.LoadPieces(parts->estimator, pieces.subspan(parts->session_pieces));
   if (!loaded) return tl::unexpected(loaded.error());
-  slam::StateReader reader(parts->session, pieces.first(parts->session_pieces));
+  const auto opened = slam::OpenCheckpoint(parts->estimator, options_);  // Both parts have one format.
+  if (!opened) return tl::unexpected(opened.error());
+  slam::StateReader reader(parts->session, pieces.first(parts->session_pieces), opened->format);
   std::vector<NameId> waiting;
-  reader(epoch_, session_, fragment_, driven_m_, start_refused_, waiting);
+  reader(epoch_, session_, fragment_, driven_m_, start_refused_);
+  if (reader.format() >= 9) reader(first_sequence_, first_stamp_);
+  reader(waiting);
   T_map_keyframe_.reset();
   waiting_.clear();
   std::size_t next = 0;

@@ -57,8 +57,9 @@ void Mapper::State::Follow(std::span<const Pose2> first_poses, std::uint64_t mad
   const std::size_t known = path.size();
   for (std::size_t k = known; k < before.size(); ++k)
     path.push_back(path[known - 1] * Between(before[known - 1], before[k]));
+  const bool was_own = !trail.keeps_shape();
   trail.DropKeptShape();
-  if (!own) KeepShape(path, known);
+  if (!own) KeepShape(path, known, was_own);
   const bool knows_all_loops = drawing.changed_at() <= made;
   if (!knows_all_loops || !FitRest(path, known, before)) {
     OptimisePoses(path, trail.relations(), options.pose_graph);
@@ -74,8 +75,9 @@ void Mapper::State::Follow(std::span<const Pose2> first_poses, std::uint64_t mad
 }
 
 // A version may know more than the relations of this robot, such as what others have seen. Where it has changed the
-// path, relations along the way keep what it has found when the next large loop closes.
-void Mapper::State::KeepShape(std::span<const Pose2> path, std::size_t known) {
+// path, relations along the way keep what it has found when the next large loop closes. `was_own`: so far the path had
+// the shape that the robot's own relations give it, so that they keep the parts that have not changed.
+void Mapper::State::KeepShape(std::span<const Pose2> path, std::size_t known, bool was_own) {
   constexpr double kEveryM = 10.0;
   // More certain than the steps over this way, so that they do not pull it back. Half of this is no change.
   constexpr double kSigmaM = 0.02, kSigmaRad = 0.002;
@@ -85,7 +87,7 @@ void Mapper::State::KeepShape(std::span<const Pose2> path, std::size_t known) {
     if (k + 1 < known && trail.shapes()[k].travelled_m - trail.shapes()[last].travelled_m < kEveryM) continue;
     const Pose2 T_last_k = Between(path[last], path[k]);
     const Pose2 change = Between(Between(before[last], before[k]), T_last_k);
-    if (change.translation().norm() > 0.5 * kSigmaM || std::abs(change.theta) > 0.5 * kSigmaRad)
+    if (!was_own || change.translation().norm() > 0.5 * kSigmaM || std::abs(change.theta) > 0.5 * kSigmaRad)
       trail.AddLoop({last, k, T_last_k, PoseCovariance(kSigmaM, kSigmaRad), true, true});
     last = k;
   }

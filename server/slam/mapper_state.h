@@ -95,7 +95,7 @@ struct Mapper::State {
   void RetireKeyframes();
   void Follow(std::span<const Pose2> first_poses, std::uint64_t made, bool own);
   [[nodiscard]] std::vector<Pose2> PosesOfFirst(const GivenPath& given) const;
-  void KeepShape(std::span<const Pose2> path, std::size_t known);
+  void KeepShape(std::span<const Pose2> path, std::size_t known, bool was_own);
   bool FitRest(std::vector<Pose2>& path, std::size_t known, std::span<const Pose2> before) const;
   void Draw(const TrackStep& step, bool placed_before);
   ScanOutcome Report(Stamp stamp, const Pose2& T_odom_robot, const TrackStep& step, bool keyframe);

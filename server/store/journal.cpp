@@ -59,7 +59,8 @@ void Journal::Open(const StoredSession& session, Durable durable) {
   // Nothing that an earlier session of this number may have left can become a part of this one.
   if (RemoveStatesOf(session.id, 1024, Room::kForSamples)) {
     // The caller is told as soon as the session itself is on the disk.
-    PushRecord(key, [session] { return BytesOf(session); }, 0, Room::kForSamples);
+    PushRecord(
+        key, [session] { return BytesOf(session); }, 0, Room::kForSamples);
   } else {
     Lose(session.id, line, kTooSlow);
   }
@@ -247,6 +248,7 @@ bool Journal::PushRecord(const RecordKey& key, Bytes bytes, std::size_t size, Ro
     queued_bytes_ += size - std::min(size, written.size);
     written.size = std::max(size, written.size);
     queue_.splice(queue_.end(), queue_, older->second);  // After removals that came meanwhile.
+    omitted_.erase(key);
     return true;
   }
   if (!HasRoom(size, room)) {
@@ -263,6 +265,11 @@ bool Journal::Push(Change change, std::size_t size, Room room) {
   if (!HasRoom(size, room)) {
     if (room == Room::kWithReserve) left_out_ = kTooSlow;
     return false;
+  }
+  if (const auto* const range = std::get_if<RecordRange>(&change)) {
+    std::erase_if(omitted_, [range](const RecordKey& key) { return range->Covers(key); });
+  } else if (const auto* const forgotten = std::get_if<Forgotten>(&change)) {
+    omitted_.erase({RecordKind::kSession, forgotten->session, 0});
   }
   // Only the first change of a group wakes the thread, which then sleeps until the group is due.
   if (queue_.empty()) {

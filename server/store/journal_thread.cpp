@@ -154,11 +154,7 @@ Journal::Prepared Journal::Prepare(Group&& group) {
       put[written->key] = written->bytes();
       if (written->key.kind == RecordKind::kSession) batches.try_emplace(written->key.owner);
     } else if (const auto* const range = std::get_if<RecordRange>(&change)) {
-      std::erase_if(put, [range](const auto& one) {
-        const RecordKey& key = one.first;
-        return key.kind == range->kind && key.owner == range->owner && key.number >= range->first &&
-               key.number <= range->last;
-      });
+      std::erase_if(put, [range](const auto& one) { return range->Covers(one.first); });
       if (range->kind == RecordKind::kJournal) batches.erase(range->owner);
       prepared.changes.removed.push_back(*range);
     } else if (const auto* const forgotten = std::get_if<Forgotten>(&change)) {

@@ -42,6 +42,7 @@ std::string BytesOf(const StoredSession& session) {
   to.set_map_epoch(session.map_epoch);
   to.set_fragment(session.fragment);
   to.set_quiet_since_ms(session.quiet_since_ms);
+  to.set_in_map(session.in_map);
   return to.SerializeAsString();
 }
 
@@ -52,7 +53,8 @@ Result<StoredSession> SessionOf(std::string_view bytes) {
                         .request = ValueOf(from.request()),
                         .map_epoch = from.map_epoch(),
                         .fragment = from.fragment(),
-                        .quiet_since_ms = from.quiet_since_ms()};
+                        .quiet_since_ms = from.quiet_since_ms(),
+                        .in_map = from.in_map()};
   const bool valid = session.id != 0 && ValidateName("robot", session.request.robot) &&
                      ValidateName("site", session.request.site) &&
                      (!session.request.has_start || ValidateStart(session.request.T_map_robot_start));

@@ -50,6 +50,9 @@ struct RecordRange {
   std::uint64_t owner = 0;
   std::uint64_t first = 0;
   std::uint64_t last = UINT64_MAX;
+  [[nodiscard]] bool Covers(const RecordKey& key) const {
+    return key.kind == kind && key.owner == owner && key.number >= first && key.number <= last;
+  }
 };
 
 // What one commit changes: first the removals, then the new or replaced records.

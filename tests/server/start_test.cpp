@@ -1,6 +1,7 @@
 // Where a robot is said to start in a map that others have made: who is believed, and for how long.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <optional>
 
 #include "tests/server/support/stored_server.h"
@@ -80,16 +81,27 @@ TEST_F(Start, IsNotBelievedAMinuteLater) {
 
 // All of them arrived, and the server could use none: its queue was full, or nothing said how the robot had moved.
 TEST_F(Start, IsNotBelievedWhereTheServerDroppedTheFirstScans) {
-  const std::size_t tiles = house_.CurrentTiles().size();
-  for (int step = 0; step < 40; ++step) house_.SendScan("r1", kFirst, RoomScan(step));
+  constexpr ClientId kThird = 30;
+  house_.Open("r3", kThird, "lab", Pose2{40.0, 0.0, 0.0});
+  ASSERT_TRUE(house_.WaitPhase("r3", kThird, SessionPhase::kActive));
+  for (int step = 0; step < 40; ++step) house_.SendScan("r3", kThird, RoomScan(step));
   for (int step = 30; step < 44; ++step) {
     Odometry odometry = RoomOdometry(step);
     odometry.sequence -= 30;
-    house_.SendOdometry("r1", kFirst, odometry);
+    house_.SendOdometry("r3", kThird, odometry);
   }
-  EXPECT_FALSE(FirstPose().localized);
-  EXPECT_EQ(FirstPose().reason, PoseReason::kNotJoined);
-  EXPECT_EQ(house_.CurrentTiles().size(), tiles) << "what it draws is not shown";
+  ASSERT_NO_FATAL_FAILURE(house_.WaitSettled("r3", 40));
+  const auto poses = house_.All<PoseReport>();
+  const auto first = std::ranges::find(poses, "r3", &PoseReport::robot);
+  ASSERT_NE(first, poses.end());
+  EXPECT_FALSE(first->localized);
+  EXPECT_EQ(first->reason, PoseReason::kNotJoined);
+  // Nor is what it draws shown, 40 m away from the map.
+  const auto version = [this] { return house_.Ask(About(RequestKind::kMapInfo)).map_version; };
+  const std::uint64_t before = version();
+  house_.Drive("r0", kMapper, 20, 40);
+  ASSERT_TRUE(house_.WaitFor([&] { return version() > before; }));
+  for (const auto& [key, tile] : house_.CurrentTiles()) EXPECT_LT(key.x, 3) << key.y << " " << int{key.level};
 }
 
 // Opens a session with a start that is known in this map, drives a little, and returns the first pose.
@@ -124,7 +136,7 @@ TEST(StartInAnEmptySite, TheMapGoesOnInTheFrameThatTheFirstRobotKnows) {
   EXPECT_EQ(FirstPoseFrom(house, "r2", kSecond, 4713).reason, PoseReason::kNotJoined);
 }
 
-// Also after a restart, and where the site is saved and loaded again.
+// Also after a restart.
 TEST(StoredFrame, IsThatOfTheMapForEver) {
   const TempDirectory directory;
   std::uint64_t first = 0;

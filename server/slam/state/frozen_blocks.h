@@ -42,6 +42,8 @@ class FrozenBlocks {
     for (const auto& block : blocks_)
       if (archive.Require(block->values.size() == kBlock, "a block")) Append(*block, values);
     Append(*rest, values);
+    // The next checkpoint would refer to their bytes as if they had its own format.
+    if (archive.format() != kStateFormat) blocks_.clear();
   }
 
  private:

@@ -41,6 +41,10 @@ TEST(RequestQueue, AnAnswerDoesNotGiveWay) {
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->client, 8U);
   for (int i = 0; i < 4; ++i) EXPECT_TRUE(queue.Pop()->rest);
+  EXPECT_FALSE(queue.Push(From(9, 1)));
+  EXPECT_FALSE(queue.Push(From(9, 2)));
+  for (std::int64_t i = 1; i <= 4; ++i) queue.PutBack({From(7, i), ReplyParts(Answer(Reply{}))});
+  EXPECT_EQ(queue.Push(From(8, 2))->client, 9U) << "of those who wait for an answer, the one with most gives way";
 }
 
 TEST(RequestQueue, AnAnswerGoesOnBeforeTheClientsOtherRequestsAndAfterOtherClients) {

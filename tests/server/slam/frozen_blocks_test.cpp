@@ -2,6 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <string>
+#include <string_view>
+#include <vector>
+
 #include "server/slam/trail/shared_sequence.h"
 #include "server/slam/trail/trail.h"
 
@@ -47,6 +52,30 @@ TEST(FrozenBlocks, WhatChangedIsCopiedAnewAfterForgetAndEarlierCheckpointsKeepTh
   blocks.Forget();
   EXPECT_TRUE(BytesInBlocks(blocks, poses) == BytesInBlocks(FrozenBlocks<Pose2>(), poses));
   EXPECT_TRUE(before.Bytes() == old);
+}
+
+// The bytes of an older format must not become a part of a checkpoint of this one.
+TEST(FrozenBlocks, BlocksOfAnOlderFormatAreWrittenAgain) {
+  const std::vector<Pose2> poses = PosesUpTo(3000);
+  StateWriter first;
+  InBlocks(first, FrozenBlocks<Pose2>(), poses);
+  std::vector<std::string> bytes;
+  for (const StatePiece& piece : first.pieces()) bytes.push_back(piece.Bytes());
+  const std::vector<std::string_view> pieces(bytes.begin(), bytes.end());
+  const std::string main = first.Main();
+  for (const std::uint32_t format : {kStateFormat, kStateFormat - 1}) {
+    StateReader reader(main, pieces, format);
+    FrozenBlocks<Pose2> blocks;
+    std::vector<Pose2> read;
+    InBlocks(reader, blocks, read);
+    ASSERT_TRUE(reader.done());
+    EXPECT_EQ(read, poses);
+    StateWriter again;
+    InBlocks(again, blocks, read);
+    const auto known = reader.values();
+    const bool shared = std::ranges::find(known, again.pieces().front().value) != known.end();
+    EXPECT_EQ(shared, format == kStateFormat) << format;
+  }
 }
 
 // Of 3000 values only the blocks before the first changed one are kept.
