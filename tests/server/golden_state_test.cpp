@@ -82,7 +82,8 @@ const auto kNameOf = [](const ::testing::TestParamInfo<const char*>& state) {
   return name;
 };
 INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenState,
-                         ::testing::Values("state-1", "state-1-checkpoints-8", "state-1-checkpoints-9", "state-1-ended"),
+                         ::testing::Values("state-1", "state-1-checkpoints-8", "state-1-checkpoints-9",
+                                           "state-1-ended"),
                          kNameOf);
 
 class GoldenEnded : public GoldenState {};
