@@ -86,13 +86,14 @@ Result<void> Roster::Open(const SessionRequest& request) {
 bool Roster::TakePlace(const std::shared_ptr<Session>& session, const std::shared_ptr<Session>& gone,
                        const Site& site) {
   const SessionState state = session->record().state();
+  const NameId gone_id = gone != nullptr ? gone->record().state().robot_id : 0;
   const MutexLock lock(mutex_);
   const auto known = sessions_.find(state.robot_id);
   if (atlas_.Find(state.site).get() != &site || (known != sessions_.end() && known->second != gone)) return false;
+  gone_.reserve(gone_.size() + 1);  // Where memory is short, an exception comes before anything has changed.
   std::shared_ptr<Session>& place = sessions_[state.robot_id];
   if (gone != nullptr) gone_.push_back({gone, gone == place});
-  if (gone != nullptr && gone->record().state().robot_id != state.robot_id)
-    sessions_.erase(gone->record().state().robot_id);
+  if (gone != nullptr && gone_id != state.robot_id) sessions_.erase(gone_id);
   place = session;
   return true;
 }

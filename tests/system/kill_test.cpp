@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "server/store/store.h"
 #include "tests/child_process.h"
 #include "tests/own_mount.h"
 #include "tests/server/support/raw_records.h"

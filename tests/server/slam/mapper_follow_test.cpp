@@ -162,9 +162,8 @@ TEST(MapperFollows, WhatWasDrivenSinceAVersionFitsWhatWasSeenAgain) {
   wrong.Adopt();
   wrong.Take(280, 281);
   EXPECT_LT(wrong.ErrorHere(280), 0.1);
-  wrong.Take(281, 400);
   wrong.mapper.FinishMap();
-  EXPECT_EQ(wrong.mapper.Snapshot().online_path, wrong.mapper.BestPath()) << "and it is drawn so";
+  EXPECT_TRUE(wrong.mapper.Snapshot().online_path == wrong.mapper.BestPath()) << "and it is drawn so";
 }
 
 // Nothing of a version is left when it is no longer followed, however often versions change.
