@@ -66,6 +66,7 @@ class Backlog {
   [[nodiscard]] std::uint64_t displaced() const { return displaced_; }
   // Why the spill file did not take or give a sample, the last time; empty where it always did.
   [[nodiscard]] const std::string& spill_error() const { return spill_error_; }
+  [[nodiscard]] std::uint64_t spilled_bytes() const { return spill_ != nullptr ? spill_->size() : 0; }
   [[nodiscard]] std::size_t bytes() const { return bytes_; }  // Memory used.
 
  private:

@@ -339,6 +339,11 @@ std::uint64_t RobotClient::displaced() const {
   return backlog_.displaced();
 }
 
+std::uint64_t RobotClient::spilled_bytes() const {
+  const MutexLock lock(mutex_);
+  return backlog_.spilled_bytes();
+}
+
 std::string RobotClient::spill_error() const {
   const MutexLock lock(mutex_);
   return backlog_.spill_error();

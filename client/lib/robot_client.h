@@ -90,6 +90,7 @@ class RobotClient {
   // did not take them.
   [[nodiscard]] std::uint64_t displaced() const;
   [[nodiscard]] std::string spill_error() const;
+  [[nodiscard]] std::uint64_t spilled_bytes() const;  // In the spill file, which has no name.
 
  private:
   struct Stream {

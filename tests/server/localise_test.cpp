@@ -1,6 +1,8 @@
 // A robot that is only localised in the map that others have made, through the whole server.
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <map>
 #include <optional>
 
@@ -11,6 +13,7 @@ namespace cairn::server::testing {
 namespace {
 
 constexpr ClientId kGuest = 9;
+constexpr std::ptrdiff_t kKnownCells = 18'000;  // That r1 sees, and a few more.
 
 PoseReport LastPoseOf(const WholeServer& house, const std::string& robot) {
   std::optional<PoseReport> last;
@@ -31,11 +34,19 @@ std::map<TileKey, TileCells> StopAndGetCells(WholeServer& house) {
   return drawn;
 }
 
-// r1 has drawn the map.
+// r1 has drawn the map, and all that it has seen is published.
 void DrawMap(WholeServer& house) {
   house.Open("r1", kDriver);
   house.Drive("r1", kDriver, 0, 60);
-  ASSERT_TRUE(house.WaitFor([&] { return house.CurrentTiles().size() >= 4; }));
+  ASSERT_TRUE(house.WaitFor([&] {
+    std::ptrdiff_t known = 0;
+    for (const auto& [key, tile] : house.CurrentTiles()) {
+      if (key.level != 0) continue;
+      const TileCells cells = *DecodeCells(tile.bytes, tile.encoding);
+      known += std::ranges::count_if(cells, [](std::uint8_t cell) { return cell != kUnknownCell; });
+    }
+    return known > kKnownCells;
+  }));
 }
 
 TEST(Localise, ARobotIsLocalizedInTheMapOfOthersAndChangesNothing) {
@@ -47,7 +58,8 @@ TEST(Localise, ARobotIsLocalizedInTheMapOfOthersAndChangesNothing) {
   ASSERT_TRUE(Ask(house, RequestKind::kLocalise, "r2").ok());
   house.Drive("r2", kGuest, 0, 40);
   const PoseReport pose = LastPoseOf(house, "r2");
-  EXPECT_TRUE(pose.localized);
+  EXPECT_TRUE(pose.localized) << PoseReasonName(pose.reason) << " scan " << pose.scan_sequence << " epoch "
+                              << pose.map_epoch;
   EXPECT_LT((pose.T_map_robot.translation() - TruePose(39).translation()).norm(), 0.1);
   const Reply status = house.Ask(About(RequestKind::kStatus, "r2"));
   ASSERT_EQ(status.robots.size(), 1U);

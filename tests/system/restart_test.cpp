@@ -31,14 +31,12 @@ class Restart : public ::testing::Test {
     StartServer("20");
     for (int i = 0; i < kRobots; ++i) {
       RobotClientOptions options;
-      if (stored) options = {.max_kept_bytes = 8 * 1024, .spill_file = SpillOf(i).string()};
+      if (stored)
+        options = {.max_kept_bytes = 8 * 1024, .spill_file = (directory_ / ("spill" + std::to_string(i))).string()};
       riders_.push_back(std::make_unique<Rider>(*bus_, fleet_.name(i), "office", fleet_.T_map_robot_start(i), options));
     }
   }
 
-  [[nodiscard]] std::filesystem::path SpillOf(int robot) const {
-    return directory_ / ("spill" + std::to_string(robot));
-  }
   static sim::Fleet MakeFleet() {
     sim::FleetOptions options;
     options.robots = kRobots;
@@ -159,7 +157,7 @@ TEST_F(RestartOnItsState, WhatDoesNotFitIntoMemoryComesOnceFromTheSpillFile) {
   ASSERT_NO_FATAL_FAILURE(Drive(30, true));
   KillServer();
   ASSERT_NO_FATAL_FAILURE(Drive(90, false));
-  for (int i = 0; i < kRobots; ++i) EXPECT_GT(std::filesystem::file_size(SpillOf(i)), 30U * 1024);
+  for (const auto& rider : riders_) EXPECT_GT(rider->client().spilled_bytes(), 30U * 1024);
   StartServer();
   ASSERT_NO_FATAL_FAILURE(Drive(100, true));
   for (int i = 0; i < kRobots; ++i) {
@@ -177,7 +175,7 @@ TEST_F(RestartOnItsState, WhatDoesNotFitIntoMemoryComesOnceFromTheSpillFile) {
     EXPECT_EQ(rider.client().restarted(), 0) << "the server knew the session";
     EXPECT_EQ(rider.client().displaced(), 0U);
     EXPECT_EQ(rider.client().spill_error(), "");
-    EXPECT_TRUE(Eventually([&] { return std::filesystem::file_size(SpillOf(i)) == 0; })) << "all of it was stored";
+    EXPECT_TRUE(Eventually([&] { return rider.client().spilled_bytes() == 0; })) << "all of it was stored";
   }
 }
 
