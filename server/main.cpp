@@ -190,7 +190,7 @@ int StopJournal(Journal& journal) {
                counts.entries, counts.commits, counts.failed_commits, counts.delay_p50_ms, counts.delay_p99_ms);
   const JournalHealth health = journal.health();
   if (health.degraded) {
-    spdlog::critical("stopped while degraded; the last data is not stored: {}", health.reason);
+    spdlog::critical("stopped while degraded: {}", health.reason);
     return kDegraded;
   }
   if (const std::string aside = journal.set_aside().text(); !aside.empty()) {

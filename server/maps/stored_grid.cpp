@@ -11,7 +11,7 @@ StoredGrid ToStored(const RobotGrid& grid) {
                     .path = grid.path,
                     .numbers = grid.numbers,
                     .fragment = grid.fragment,
-                    .own_path = grid.own_path};
+                    .followed = grid.followed};
   for (const auto& [key, chunk] : grid.chunks) {
     stored.chunks.push_back({key.x, key.y, std::shared_ptr<const std::int16_t>(chunk, chunk->log_odds.data())});
   }
@@ -23,7 +23,7 @@ RobotGrid FromStored(const StoredGrid& stored) {
                  .keyframes = stored.keyframes,
                  .path = stored.path,
                  .numbers = stored.numbers,
-                 .own_path = stored.own_path,
+                 .followed = stored.followed,
                  .fragment = stored.fragment};
   for (const StoredChunk& one : stored.chunks) {
     auto chunk = std::make_shared<slam::GridChunk>();

@@ -88,9 +88,9 @@ class Mapper {
     std::uint64_t made = 0;
     std::span<const Pose2> path{};
     std::span<const std::uint64_t> numbers{};
-    // It is an earlier path of this mapper that nothing but its own relations had shaped (path_is_own). Otherwise the
-    // shape of the path is kept when a large loop closes later.
-    bool own = false;
+    // This mapper has followed the path before, and has extended it since it was made. Otherwise it comes from a job
+    // that may know more than this mapper: its shape is kept when a large loop closes later.
+    bool followed = false;
   };
   // Replaces the grid by that of a map version: the result of a finished job, or what was displaced by one. Path,
   // particles, landmarks and the pose follow its path, so that all agree with the grid. The later keyframes lie where
@@ -100,8 +100,6 @@ class Mapper {
   // Every chunk of both grids counts as changed. Where the grid knows of later keyframes than this mapper has made, it
   // can only be used if the path follows; else nothing is changed and the answer is false.
   bool AdoptGrid(OccupancyGrid grid, const GivenPath& given);
-  // No map version that is followed shapes the path (GivenPath::own).
-  [[nodiscard]] bool path_is_own() const;
   // Somebody says that the robot is not where it is believed to be, and perhaps where it is (T_map_robot at the last
   // scan). From the next scan on it is not localized until it is found in its map: near that pose, or anywhere
   // (recovery/recovery.h). Nothing happens before there is a map.

@@ -23,13 +23,9 @@ bool Mapper::AdoptGrid(OccupancyGrid grid, const GivenPath& given) {
   const bool follows = !first_poses.empty();
   if (given.made > s.trail.made() && !follows) return false;
   const std::uint64_t known = std::min(given.made, s.trail.made());
-  if (follows) s.Follow(first_poses, known, given.own);
+  if (follows) s.Follow(first_poses, known, given.followed);
   s.drawing.Adopt(std::move(grid), known, s.trail.CountBelow(known), s.trail.keyframes(), s.believed_path(), follows);
   return true;
-}
-
-bool Mapper::path_is_own() const {
-  return !state_->trail.keeps_shape();
 }
 
 // The poses of the keyframes with numbers below `made`, out of a path that may have more of these, because some were
@@ -51,15 +47,15 @@ std::vector<Pose2> Mapper::State::PosesOfFirst(const GivenPath& given) const {
 }
 
 // Takes the poses of the first keyframes from a map version, as after a large loop. It knew `made` keyframes.
-void Mapper::State::Follow(std::span<const Pose2> first_poses, std::uint64_t made, bool own) {
+void Mapper::State::Follow(std::span<const Pose2> first_poses, std::uint64_t made, bool followed) {
   const std::vector<Pose2> before = believed_path().values();
   std::vector<Pose2> path(first_poses.begin(), first_poses.end());
   const std::size_t known = path.size();
   for (std::size_t k = known; k < before.size(); ++k)
     path.push_back(path[known - 1] * Between(before[known - 1], before[k]));
-  const bool was_own = !trail.keeps_shape();
+  const bool shaped = trail.keeps_shape();
   trail.DropKeptShape();
-  if (!own) KeepShape(path, known, was_own);
+  if (!followed) KeepShape(path, known, shaped ? OwnPath(before) : before);
   const bool knows_all_loops = drawing.changed_at() <= made;
   if (!knows_all_loops || !FitRest(path, known, before)) {
     OptimisePoses(path, trail.relations(), options.pose_graph);
@@ -74,20 +70,31 @@ void Mapper::State::Follow(std::span<const Pose2> first_poses, std::uint64_t mad
   level.outcome.T_map_odom = T_new_old * level.outcome.T_map_odom;
 }
 
-// A version may know more than the relations of this robot, such as what others have seen. Where it has changed the
-// path, relations along the way keep what it has found when the next large loop closes. `was_own`: so far the path had
-// the shape that the robot's own relations give it, so that they keep the parts that have not changed.
-void Mapper::State::KeepShape(std::span<const Pose2> path, std::size_t known, bool was_own) {
+// The path that the robot's own relations give it, without what a map version knew. The search begins at `path`.
+std::vector<Pose2> Mapper::State::OwnPath(std::vector<Pose2> path) const {
+  const std::vector<PoseRelation> relations = trail.relations();
+  if (!relations.empty()) {
+    OptimisePoses(path, relations, options.pose_graph);
+    return path;
+  }
+  const Pose2 T_map_track = path.front() * trail.shapes().front().T_track_robot.Inverse();
+  for (std::size_t k = 0; k < path.size(); ++k) path[k] = T_map_track * trail.shapes()[k].T_track_robot;
+  return path;
+}
+
+// A job may know more than the relations of this robot, such as what others have seen. Where that has changed the path
+// that these alone give (`own`), relations along the way keep what it has found when the next large loop closes. Only
+// the path of the job itself is kept so: what was added to it later may be bent by any loop.
+void Mapper::State::KeepShape(std::span<const Pose2> path, std::size_t known, std::span<const Pose2> own) {
   constexpr double kEveryM = 10.0;
   // More certain than the steps over this way, so that they do not pull it back. Half of this is no change.
   constexpr double kSigmaM = 0.02, kSigmaRad = 0.002;
-  const std::vector<Pose2> before = believed_path().values();
   std::size_t last = 0;
   for (std::size_t k = 1; k < known; ++k) {
     if (k + 1 < known && trail.shapes()[k].travelled_m - trail.shapes()[last].travelled_m < kEveryM) continue;
     const Pose2 T_last_k = Between(path[last], path[k]);
-    const Pose2 change = Between(Between(before[last], before[k]), T_last_k);
-    if (!was_own || change.translation().norm() > 0.5 * kSigmaM || std::abs(change.theta) > 0.5 * kSigmaRad)
+    const Pose2 change = Between(Between(own[last], own[k]), T_last_k);
+    if (change.translation().norm() > 0.5 * kSigmaM || std::abs(change.theta) > 0.5 * kSigmaRad)
       trail.AddLoop({last, k, T_last_k, PoseCovariance(kSigmaM, kSigmaRad), true, true});
     last = k;
   }

@@ -93,9 +93,10 @@ struct Mapper::State {
   StepMotion MotionTo(const Keyframe& keyframe, const TrackStep& step, const Eigen::Matrix3d& covariance);
   void CloseLargeLoop();
   void RetireKeyframes();
-  void Follow(std::span<const Pose2> first_poses, std::uint64_t made, bool own);
+  void Follow(std::span<const Pose2> first_poses, std::uint64_t made, bool followed);
   [[nodiscard]] std::vector<Pose2> PosesOfFirst(const GivenPath& given) const;
-  void KeepShape(std::span<const Pose2> path, std::size_t known, bool was_own);
+  [[nodiscard]] std::vector<Pose2> OwnPath(std::vector<Pose2> path) const;
+  void KeepShape(std::span<const Pose2> path, std::size_t known, std::span<const Pose2> own);
   bool FitRest(std::vector<Pose2>& path, std::size_t known, std::span<const Pose2> before) const;
   void Draw(const TrackStep& step, bool placed_before);
   ScanOutcome Report(Stamp stamp, const Pose2& T_odom_robot, const TrackStep& step, bool keyframe);

@@ -49,7 +49,7 @@ StoredGrid Transformed(const StoredGrid& grid, const Pose2& T_to_from, double re
                     .path = {},
                     .numbers = grid.numbers,
                     .fragment = grid.fragment,
-                    .own_path = grid.own_path};
+                    .followed = grid.followed};
   if (grid.path != nullptr) {
     auto path = std::make_shared<std::vector<Pose2>>();
     for (const Pose2& pose : *grid.path) path->push_back(T_to_from * pose);

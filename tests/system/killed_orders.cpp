@@ -97,7 +97,10 @@ bool KilledOrders::CheckJobs() {
       continue;
     }
     if (job->submitted != known.submitted) Break(fmt::format("job {} is another one", id));
-    if (IsFinal(job->state) && job->state != JobState::kSucceeded)
+    // A job during which eight servers have died is given up by the ninth, because it may be the cause.
+    const bool given_up = job->message.find("times while this job ran") != std::string::npos;
+    if (given_up && !IsFinal(known.state)) ++outcome_.given_up;
+    if (IsFinal(job->state) && job->state != JobState::kSucceeded && !given_up)
       Break(fmt::format("job {} is {}: {}", id, JobStateName(job->state), job->message));
     if (job->state == JobState::kSucceeded) heard_.insert(job->map_version);
     known = *job;

@@ -22,7 +22,8 @@ class KilledOrders {
  public:
   struct Outcome {
     int jobs = 0;      // Whose submission was answered.
-    int ended = 0;     // Jobs that have succeeded. Those that have ended otherwise are in `broken`.
+    int ended = 0;     // Jobs that have succeeded or were given up. Those that have ended otherwise are in `broken`.
+    int given_up = 0;  // Because eight servers have died while they ran.
     int switches = 0;  // Of the map to another version than was known to be enabled, whose order was answered.
     int checks = 0;    // How often everything was compared with what had been answered.
     std::vector<std::string> broken;

@@ -42,6 +42,7 @@ void Add(test::KilledFleetOutcome& all, const test::KilledFleetOutcome& one) {
   all.paths_that_differ += one.paths_that_differ;
   all.orders.jobs += one.orders.jobs;
   all.orders.ended += one.orders.ended;
+  all.orders.given_up += one.orders.given_up;
   all.orders.switches += one.orders.switches;
   all.orders.checks += one.orders.checks;
   all.orders.broken.insert(all.orders.broken.end(), one.orders.broken.begin(), one.orders.broken.end());
@@ -111,18 +112,20 @@ void StudyOrders(StudyContext& context) {
   const test::KilledFleetOutcome& all = *outcome;
   Report& report = context.report;
   report.Heading("SIGKILL while paths are smoothed and the map is switched");
-  Table table({"kills", "jobs", "of these ended well", "switches of the map", "checks", "broken promises", "scans sent",
-               "lost", "doubled", "poses told", "beside the truth", "at most (m)",
+  Table table({"kills", "jobs", "of these ended", "given up", "switches of the map", "checks", "broken promises",
+               "scans sent", "lost", "doubled", "poses told", "beside the truth", "at most (m)",
                "beside it undisturbed and without orders", "at most (m)"});
   const auto broken = static_cast<long long>(all.orders.broken.size());
-  table.Add({Count(all.kills), Count(all.orders.jobs), Count(all.orders.ended), Count(all.orders.switches),
-             Count(all.orders.checks), Count(broken), Count(static_cast<long long>(all.sent)),
-             Count(static_cast<long long>(all.lost)), Count(static_cast<long long>(all.doubled)),
-             Count(static_cast<long long>(all.poses)), Share(all.beside_truth, all.poses), Number(all.farthest_m, 2),
+  table.Add({Count(all.kills), Count(all.orders.jobs), Count(all.orders.ended), Count(all.orders.given_up),
+             Count(all.orders.switches), Count(all.orders.checks), Count(broken),
+             Count(static_cast<long long>(all.sent)), Count(static_cast<long long>(all.lost)),
+             Count(static_cast<long long>(all.doubled)), Count(static_cast<long long>(all.poses)),
+             Share(all.beside_truth, all.poses), Number(all.farthest_m, 2),
              Share(all.undisturbed_beside_truth, all.undisturbed_poses), Number(all.undisturbed_farthest_m, 2)});
   report.Add(table, "orders");
   report.Text(
-      "Jobs and switches whose order was answered. Beside the truth: poses called localized and more than 0.5 m or "
+      "Jobs and switches whose order was answered. A job is given up when eight servers have died while it ran. Beside "
+      "the truth: poses called localized and more than 0.5 m or "
       "0.5 rad away from it.");
   report.Expect(broken == 0, "what was answered did not hold after a start");
   report.Expect(all.orders.ended == all.orders.jobs, "jobs did not end well");
