@@ -25,9 +25,6 @@ struct RobotGrid {
   std::shared_ptr<const std::vector<Pose2>> path{};
   // The numbers of the keyframes of the path, because some may have been retired. Null: all of them, 0, 1, 2, ...
   std::shared_ptr<const std::vector<std::uint64_t>> numbers{};
-  // The robot has followed this path before: it was replaced by that of another map version. Otherwise it comes from a
-  // job.
-  bool followed = false;
   // Whether it is not joined with the map of the site: it has a frame of its own and is not shown.
   bool fragment = false;
 };

@@ -208,7 +208,6 @@ RobotGrid SessionEstimator::DisplacedGrid() {
                       .keyframes = mapper.keyframes_made(),
                       .path = {},
                       .numbers = {},
-                      .followed = true,
                       .fragment = fragment_};
   if (auto path = mapper.BestPath(); path.size() == mapper.keyframe_count()) {
     displaced.path = std::make_shared<const std::vector<Pose2>>(std::move(path));
@@ -223,8 +222,8 @@ void SessionEstimator::AdoptGrid(std::uint32_t epoch, const RobotGrid& grid) {
   const auto numbers = grid.numbers != nullptr ? std::span(*grid.numbers) : std::span<const std::uint64_t>();
   const std::vector<Pose2> before = mapper.BestPath();
   // A session that was not stored to its end may not be able to follow: then its place in this map is not known.
-  const bool adopted = mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), grid.chunks),
-                                        {grid.keyframes, path, numbers, grid.followed});
+  const bool adopted =
+      mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), grid.chunks), grid.keyframes, path, numbers);
   const bool fragment = grid.fragment || !adopted;
   if (fragment && !fragment_) driven_m_ = 0.0;  // So that no job joins it again at once.
   fragment_ = fragment;

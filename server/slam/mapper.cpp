@@ -263,6 +263,74 @@ void Mapper::FinishMap() {
   state_->drawing.Finish(state_->trail.keyframes(), state_->believed_path());
 }
 
+bool Mapper::AdoptGrid(OccupancyGrid grid, std::uint64_t keyframes, std::span<const Pose2> path,
+                       std::span<const std::uint64_t> numbers) {
+  State& s = *state_;
+  std::vector<Pose2> first_poses;
+  if (s.filter->rebases() && s.filter->placed()) first_poses = s.PosesOfFirst(keyframes, path, numbers);
+  const bool follows = !first_poses.empty();
+  if (keyframes > s.trail.made() && !follows) return false;
+  const std::uint64_t known = std::min(keyframes, s.trail.made());
+  if (follows) s.Follow(first_poses, known);
+  s.drawing.Adopt(std::move(grid), known, s.trail.CountBelow(known), s.trail.keyframes(), s.believed_path(), follows);
+  return true;
+}
+
+// The poses of the keyframes with numbers below `made`, out of a path that may have more of these, because some were
+// retired since. Empty if it lacks one.
+std::vector<Pose2> Mapper::State::PosesOfFirst(std::uint64_t made, std::span<const Pose2> path,
+                                               std::span<const std::uint64_t> numbers) const {
+  std::vector<Pose2> poses;
+  if (path.size() != (numbers.empty() ? made : numbers.size())) return poses;
+  for (const std::uint64_t wanted : trail.numbers()) {
+    if (wanted >= made) break;
+    std::size_t at = static_cast<std::size_t>(wanted);
+    if (!numbers.empty()) {
+      at = static_cast<std::size_t>(std::ranges::lower_bound(numbers, wanted) - numbers.begin());
+      if (at == numbers.size() || numbers[at] != wanted) return {};
+    }
+    poses.push_back(path[at]);
+  }
+  return poses;
+}
+
+// Takes the poses of the first keyframes from a job, as after a large loop. The job knew `made` keyframes.
+void Mapper::State::Follow(std::span<const Pose2> first_poses, std::uint64_t made) {
+  const std::vector<Pose2> before = believed_path().values();
+  std::vector<Pose2> path(first_poses.begin(), first_poses.end());
+  const std::size_t known = path.size();
+  for (std::size_t k = known; k < before.size(); ++k)
+    path.push_back(path[known - 1] * Between(before[known - 1], before[k]));
+  KeepShape(path, known);
+  // Large loops that the job did not know.
+  if (drawing.changed_at() > made) OptimisePoses(path, trail.relations(), options.pose_graph);
+  filter->Rebase(path);
+  trail.ConfirmTentative();
+  self_check.Forget();
+  const Pose2 T_new_old = path.back() * before.back().Inverse();
+  recovery.Move(T_new_old);
+  level.outcome.T_map_robot = T_new_old * level.outcome.T_map_robot;
+  level.outcome.T_map_odom = T_new_old * level.outcome.T_map_odom;
+}
+
+// A job may know more than the relations of this robot, such as what others have seen. Where it has changed the path,
+// relations along the way keep what it has found when the next large loop closes.
+void Mapper::State::KeepShape(std::span<const Pose2> path, std::size_t known) {
+  constexpr double kEveryM = 10.0;
+  // More certain than the steps over this way, so that they do not pull it back. Half of this is no change.
+  constexpr double kSigmaM = 0.02, kSigmaRad = 0.002;
+  const std::vector<Pose2> before = believed_path().values();
+  std::size_t last = 0;
+  for (std::size_t k = 1; k < known; ++k) {
+    if (k + 1 < known && trail.shapes()[k].travelled_m - trail.shapes()[last].travelled_m < kEveryM) continue;
+    const Pose2 T_last_k = Between(path[last], path[k]);
+    const Pose2 change = Between(Between(before[last], before[k]), T_last_k);
+    if (change.translation().norm() > 0.5 * kSigmaM || std::abs(change.theta) > 0.5 * kSigmaRad)
+      trail.AddLoop({last, k, T_last_k, PoseCovariance(kSigmaM, kSigmaRad), true});
+    last = k;
+  }
+}
+
 void Mapper::Relocalise(const std::optional<Pose2>& T_map_robot) {
   state_->Relocalise(T_map_robot);
 }

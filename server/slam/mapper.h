@@ -82,24 +82,15 @@ class Mapper {
   [[nodiscard]] MapperSnapshot Snapshot() const;
   // Ends the mapping: if the map is still being drawn again after a large loop, draws the rest.
   void FinishMap();
-  // The path of a map version: the poses of the keyframes with these `numbers` (none: 0, 1, 2, ...) when there had been
-  // `made` of them (keyframes_made).
-  struct GivenPath {
-    std::uint64_t made = 0;
-    std::span<const Pose2> path{};
-    std::span<const std::uint64_t> numbers{};
-    // This mapper has followed the path before, and has extended it since it was made. Otherwise it comes from a job
-    // that may know more than this mapper: its shape is kept when a large loop closes later.
-    bool followed = false;
-  };
-  // Replaces the grid by that of a map version: the result of a finished job, or what was displaced by one. Path,
-  // particles, landmarks and the pose follow its path, so that all agree with the grid. The later keyframes lie where
-  // they fit the last of these and what was seen again of them; if that contradicts the version, all keyframes are
-  // moved as after a large loop. If the path lacks one of the earlier keyframes, or the filter can not follow
-  // (Filter::rebases), only the grid is replaced. Then draws the later keyframes onto it along the present best path.
-  // Every chunk of both grids counts as changed. Where the grid knows of later keyframes than this mapper has made, it
-  // can only be used if the path follows; else nothing is changed and the answer is false.
-  bool AdoptGrid(OccupancyGrid grid, const GivenPath& given);
+  // Replaces the grid by the result of a finished job, drawn when there had been `keyframes` keyframes
+  // (keyframes_made). `path` holds the poses of those with these `numbers` in it (none: 0, 1, 2, ...): path, particles,
+  // landmarks and the pose follow, so that all agree with the grid. The later keyframes keep their places relative to
+  // the last of these. If `path` lacks one of the earlier keyframes, or the filter can not follow (Filter::rebases),
+  // only the grid is replaced. Then draws the later keyframes onto it along the present best path. Every chunk of both
+  // grids counts as changed. Where the grid knows of later keyframes than this mapper has made, it can only be used if
+  // the path follows; else nothing is changed and the answer is false.
+  bool AdoptGrid(OccupancyGrid grid, std::uint64_t keyframes, std::span<const Pose2> path = {},
+                 std::span<const std::uint64_t> numbers = {});
   // Somebody says that the robot is not where it is believed to be, and perhaps where it is (T_map_robot at the last
   // scan). From the next scan on it is not localized until it is found in its map: near that pose, or anywhere
   // (recovery/recovery.h). Nothing happens before there is a map.

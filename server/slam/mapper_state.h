@@ -1,6 +1,5 @@
-// The state of a mapper, for the sources that implement it: mapper.cpp (a robot whose place is known),
-// mapper_recovery.cpp (one whose place has to be confirmed), mapper_localise.cpp (one that is only localised) and
-// mapper_follow.cpp (a change of the map version).
+// The state of a mapper, for the sources that implement it: mapper.cpp (a robot whose place is known) and
+// mapper_recovery.cpp (one whose place has to be confirmed).
 #pragma once
 
 #include <memory>
@@ -93,11 +92,10 @@ struct Mapper::State {
   StepMotion MotionTo(const Keyframe& keyframe, const TrackStep& step, const Eigen::Matrix3d& covariance);
   void CloseLargeLoop();
   void RetireKeyframes();
-  void Follow(std::span<const Pose2> first_poses, std::uint64_t made, bool followed);
-  [[nodiscard]] std::vector<Pose2> PosesOfFirst(const GivenPath& given) const;
-  [[nodiscard]] std::vector<Pose2> OwnPath(std::vector<Pose2> path) const;
-  void KeepShape(std::span<const Pose2> path, std::size_t known, std::span<const Pose2> own);
-  bool FitRest(std::vector<Pose2>& path, std::size_t known, std::span<const Pose2> before) const;
+  void Follow(std::span<const Pose2> first_poses, std::uint64_t made);
+  [[nodiscard]] std::vector<Pose2> PosesOfFirst(std::uint64_t made, std::span<const Pose2> path,
+                                                std::span<const std::uint64_t> numbers) const;
+  void KeepShape(std::span<const Pose2> path, std::size_t known);
   void Draw(const TrackStep& step, bool placed_before);
   ScanOutcome Report(Stamp stamp, const Pose2& T_odom_robot, const TrackStep& step, bool keyframe);
   [[nodiscard]] PoseReason ReasonOf(const TrackStep& step) const;

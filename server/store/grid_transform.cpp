@@ -44,12 +44,8 @@ StoredGrid Transformed(const StoredGrid& grid, const Pose2& T_to_from, double re
     AddTouched({chunk.x, chunk.y}, T_to_from, side_m, touched);
   }
   const Pose2 T_from_to = T_to_from.Inverse();
-  StoredGrid result{.keyframes = grid.keyframes,
-                    .chunks = {},
-                    .path = {},
-                    .numbers = grid.numbers,
-                    .fragment = grid.fragment,
-                    .followed = grid.followed};
+  StoredGrid result{
+      .keyframes = grid.keyframes, .chunks = {}, .path = {}, .numbers = grid.numbers, .fragment = grid.fragment};
   if (grid.path != nullptr) {
     auto path = std::make_shared<std::vector<Pose2>>();
     for (const Pose2& pose : *grid.path) path->push_back(T_to_from * pose);

@@ -48,7 +48,6 @@ void Fill(record::SessionRequest& to, const SessionRequest& from) {
 void Fill(record::Grid& to, const StoredGrid& from) {
   to.set_keyframes(from.keyframes);
   to.set_fragment(from.fragment);
-  to.set_followed(from.followed);
   for (const StoredChunk& chunk : from.chunks) {
     record::GridChunk& added = *to.add_chunks();
     added.set_x(chunk.x);
@@ -91,7 +90,6 @@ Result<StoredGrid> ValueOf(const record::Grid& from) {
   StoredGrid grid;
   grid.keyframes = from.keyframes();
   grid.fragment = from.fragment();
-  grid.followed = from.followed();
   for (const record::GridChunk& chunk : from.chunks()) {
     const auto is_near = [](int place) { return -kFarthestChunk <= place && place <= kFarthestChunk; };
     if (chunk.log_odds().size() != kChunkBytes || !is_near(chunk.x()) || !is_near(chunk.y()))

@@ -36,7 +36,6 @@ struct StoredGrid {
   // The numbers of the keyframes of the path, increasing; null: 0, 1, 2, ...
   std::shared_ptr<const std::vector<std::uint64_t>> numbers{};
   bool fragment = false;  // Not joined with the map of the site.
-  bool followed = false;  // The robot has followed this path before (RobotGrid::followed).
 };
 
 // The entries of a session's journal: the events that its strand processed, in this order.

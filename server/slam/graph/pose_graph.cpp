@@ -3,7 +3,6 @@
 #include <ceres/ceres.h>
 
 #include <Eigen/Cholesky>
-#include <algorithm>
 #include <array>
 #include <memory>
 
@@ -74,7 +73,7 @@ PoseRelationError ErrorOf(const PoseRelation& relation, const Pose2& T_map_from,
 }
 
 PoseGraphSummary OptimisePoses(std::vector<Pose2>& poses, std::span<const PoseRelation> relations,
-                               const PoseGraphOptions& options, const std::function<bool()>& go_on, std::size_t held) {
+                               const PoseGraphOptions& options, const std::function<bool()>& go_on) {
   PoseGraphSummary result;
   if (poses.size() < 2 || relations.empty()) return result;
   std::vector<std::array<double, 3>> blocks;
@@ -87,14 +86,11 @@ PoseGraphSummary OptimisePoses(std::vector<Pose2>& poses, std::span<const PoseRe
   ownership.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   ceres::Problem problem(ownership);
   for (const PoseRelation& relation : relations) {
-    if (std::max(relation.from, relation.to) < held) continue;
     problem.AddResidualBlock(new RelationCost(relation),  // The problem takes ownership of the cost.
                              relation.loop ? &loop_loss : nullptr, blocks[relation.from].data(),
                              blocks[relation.to].data());
   }
-  if (problem.NumResidualBlocks() == 0) return result;
-  for (std::size_t k = 0; k < std::min(held, blocks.size()); ++k)
-    if (problem.HasParameterBlock(blocks[k].data())) problem.SetParameterBlockConstant(blocks[k].data());
+  if (problem.HasParameterBlock(blocks[0].data())) problem.SetParameterBlockConstant(blocks[0].data());
   const auto narrow_to = [&](double widening) {
     loop_loss.Reset(new ceres::CauchyLoss(widening * kLoopLoss), ceres::TAKE_OWNERSHIP);
   };

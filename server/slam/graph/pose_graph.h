@@ -25,16 +25,10 @@ struct PoseRelation {
   // Covariance of (x, y, theta) of T_from_to; positive definite.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
   bool loop = false;  // True for a loop, which may be wrong and therefore has the robust loss.
-  // True if it was not measured: it keeps the shape of a path that came with a map version (Mapper::AdoptGrid), for as
-  // long as that version is followed.
-  bool kept_shape = false;
 
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     archive(self.from, self.to, self.T_from_to, self.covariance, self.loop);
-    if constexpr (Archive::kReads)
-      if (archive.format() < 9) return;
-    archive(self.kept_shape);
   }
 };
 
@@ -62,11 +56,10 @@ struct PoseRelationError {
 };
 [[nodiscard]] PoseRelationError ErrorOf(const PoseRelation& relation, const Pose2& T_map_from, const Pose2& T_map_to);
 
-// Moves `poses` to the path that fits best, or leaves them unchanged if no better one is found; the first `held` of
-// them stay where they are. If `go_on` is given, it is called after each iteration of the solver, and the work ends
-// when it returns false. REQUIRES: the indices of all relations lie within poses; held >= 1.
+// Moves `poses` to the path that fits best, or leaves them unchanged if no better one is found. If `go_on` is
+// given, it is called after each iteration of the solver, and the work ends when it returns false. REQUIRES:
+// the indices of all relations lie within poses.
 PoseGraphSummary OptimisePoses(std::vector<Pose2>& poses, std::span<const PoseRelation> relations,
-                               const PoseGraphOptions& options, const std::function<bool()>& go_on = {},
-                               std::size_t held = 1);
+                               const PoseGraphOptions& options, const std::function<bool()>& go_on = {});
 
 }  // namespace cairn::slam

@@ -92,13 +92,6 @@ void Trail::AddLoop(const PoseRelation& loop) {
   distances_current_ = false;
 }
 
-void Trail::DropKeptShape() {
-  if (!keeps_shape()) return;
-  std::erase_if(relations_, &PoseRelation::kept_shape);
-  frozen_relations_.Forget();
-  RestoreRest();
-}
-
 void Trail::NoteLoop(const PoseRelation& loop) {
   const double way_m = loop.T_from_to.translation().norm();
   loops_[loop.from].push_back({loop.to, way_m});

@@ -6,7 +6,6 @@
 // Source: Lu and Milios 1997; distance along the graph as a measure of uncertainty: Bosse et al. 2004 (Atlas).
 #pragma once
 
-#include <algorithm>
 #include <optional>
 #include <span>
 #include <vector>
@@ -43,9 +42,6 @@ class Trail {
   void AddScan(Stamp stamp, const Pose2& T_keyframe_robot);
   // Adds a large loop that was used to correct the path.
   void AddLoop(const PoseRelation& loop);
-  // Gives up the relations that keep the shape of a map version that is no longer followed (PoseRelation::kept_shape).
-  void DropKeptShape();
-  [[nodiscard]] bool keeps_shape() const { return std::ranges::any_of(relations_, &PoseRelation::kept_shape); }
   // The path that fits all relations and `loop` best; the search starts at `path` (one pose per keyframe).
   // Nothing if the result is not usable. The loop is not added to the relations.
   [[nodiscard]] std::optional<std::vector<Pose2>> PathWithLoop(const PoseRelation& loop, std::vector<Pose2> path,

@@ -45,12 +45,9 @@ PoseRelation HandedOver(const PoseRelation& relation, const Retirement& retireme
   const Pose2& T_representative_to = retirement.T_representative_keyframe[relation.to];
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
   R.topLeftCorner<2, 2>() = T_representative_from.rotation();
-  PoseRelation result{retirement.representative[relation.from],
-                      retirement.representative[relation.to],
+  PoseRelation result{retirement.representative[relation.from], retirement.representative[relation.to],
                       T_representative_from * relation.T_from_to * T_representative_to.Inverse(),
-                      R * relation.covariance * R.transpose(),
-                      true,
-                      relation.kept_shape};
+                      R * relation.covariance * R.transpose(), true};
   for (const std::size_t keyframe : {relation.from, relation.to})
     if (!retirement.IsKept(keyframe)) result.covariance += PoseCovariance(kPlaceSigmaM, kPlaceSigmaRad);
   return result;

@@ -1,7 +1,6 @@
 // The estimator follows the path that a job has found.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -45,7 +44,7 @@ TEST(MapperFollows, TheEstimatorFollowsThePathThatComesWithAGrid) {
   }
   const std::vector<Landmark> landmarks = mapper.landmarks();
   ASSERT_FALSE(landmarks.empty());
-  mapper.AdoptGrid(std::move(grid), {path.size(), path});
+  mapper.AdoptGrid(std::move(grid), path.size(), path);
 
   EXPECT_EQ(mapper.BestPath().front(), path.front());
   ASSERT_EQ(mapper.BestPath().size(), mapper.keyframe_count());
@@ -77,7 +76,7 @@ TEST(MapperFollows, ATiltedScanAfterTheMapHasMovedIsReportedInTheNewMap) {
   const Pose2 T_new_old{3.0, -2.0, 0.5};
   std::vector<Pose2> path = mapper.BestPath();
   for (Pose2& pose : path) pose = T_new_old * pose;
-  mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), {path.size(), path});
+  mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), path.size(), path);
   Scan tilted = *drive.scans[40];
   tilted.tilt_rad = 0.3;
   const ScanOutcome outcome = mapper.Process(std::make_shared<const Scan>(tilted), drive.odometry[39], SerialFor);
@@ -97,7 +96,7 @@ TEST(MapperFollows, TheShapeOfAPathThatWasTakenIsKeptInRelations) {
     const Pose2 step = Between(mapper.BestPath()[k - 1], mapper.BestPath()[k]);
     path[k] = path[k - 1] * Pose2{step.x, step.y, step.theta + 0.0005};
   }
-  const auto adopt = [&] { mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), {path.size(), path}); };
+  const auto adopt = [&] { mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), path.size(), path); };
   adopt();
   MapperSnapshot snapshot = mapper.Snapshot();
   ASSERT_FALSE(snapshot.relations.empty());
@@ -109,78 +108,6 @@ TEST(MapperFollows, TheShapeOfAPathThatWasTakenIsKeptInRelations) {
   EXPECT_EQ(mapper.Snapshot().relations.size(), relations) << "what has not changed is not added again";
 }
 
-// A drive of more than a round, and a map version of its first part whose path turns by `bend_rad` more from keyframe
-// to keyframe. Since then the robot has seen the beginning again.
-struct BentVersion {
-  explicit BentVersion(double bend_rad) : mapper(Options(), drive.truth.front(), 1) {
-    Take(0, 200);
-    known = mapper.keyframe_count();
-    Take(200, 280);
-    path = mapper.BestPath();
-    path.resize(known);
-    for (std::size_t k = 1; k < known; ++k) {
-      const Pose2 step = Between(mapper.BestPath()[k - 1], mapper.BestPath()[k]);
-      path[k] = path[k - 1] * Pose2{step.x, step.y, step.theta + bend_rad};
-    }
-  }
-  static MapperOptions Options() {
-    MapperOptions options;
-    options.filter.particles = 20;
-    return options;
-  }
-  void Take(std::size_t from, std::size_t to) {
-    for (std::size_t i = from; i < to; ++i) last = mapper.Process(drive.scans[i], drive.odometry[i], SerialFor);
-  }
-  void Adopt() { mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), {known, path}); }
-  // How far the robot is from where it stands relative to the keyframe of the first round that it is nearest to.
-  [[nodiscard]] double ErrorHere(std::size_t scan) const {
-    const MapperSnapshot snapshot = mapper.Snapshot();
-    const std::size_t near =
-        static_cast<std::size_t>(std::ranges::find(snapshot.keyframes, drive.scans[scan - 240]->stamp,
-                                                   [](const Keyframe& one) { return one.scan->stamp; }) -
-                                 snapshot.keyframes.begin());
-    const Pose2 expected = snapshot.full_path.at(near) * Between(drive.truth[scan - 240], drive.truth[scan]);
-    return (last.T_map_robot.translation() - expected.translation()).norm();
-  }
-  Drive drive = DriveRound();
-  Mapper mapper;
-  std::size_t known = 0;
-  std::vector<Pose2> path;
-  ScanOutcome last;
-};
-
-// What was driven since a version was made does not hang on its last keyframe alone: it must fit what was seen again.
-TEST(MapperFollows, WhatWasDrivenSinceAVersionFitsWhatWasSeenAgain) {
-  BentVersion slight(0.0001);
-  slight.Adopt();
-  slight.Take(280, 281);
-  EXPECT_LT(slight.ErrorHere(280), 0.05);
-  for (std::size_t k = 0; k < slight.known; ++k) EXPECT_EQ(slight.mapper.BestPath()[k], slight.path[k]) << k;
-  EXPECT_TRUE(slight.last.localized);
-
-  BentVersion wrong(0.001);  // What has been seen since contradicts it.
-  wrong.Adopt();
-  wrong.Take(280, 281);
-  EXPECT_LT(wrong.ErrorHere(280), 0.1);
-  wrong.mapper.FinishMap();
-  EXPECT_TRUE(wrong.mapper.Snapshot().online_path == wrong.mapper.BestPath()) << "and it is drawn so";
-}
-
-// Nothing of a version is left when it is no longer followed, however often versions change.
-TEST(MapperFollows, ARobotsOwnPathIsItsOwnAgain) {
-  BentVersion bent(0.0005);
-  Mapper& mapper = bent.mapper;
-  const std::vector<Pose2> own = mapper.BestPath();
-  const std::size_t relations = mapper.Snapshot().relations.size();
-  for (int i = 0; i < 3; ++i) {
-    bent.Adopt();
-    EXPECT_GT(mapper.Snapshot().relations.size(), relations);
-    mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), {own.size(), own, {}, true});
-    EXPECT_EQ(mapper.Snapshot().relations.size(), relations);
-    EXPECT_EQ(mapper.BestPath(), own);
-  }
-}
-
 // A path that does not belong to the keyframes is not taken.
 TEST(MapperFollows, APathOfAnotherLengthDoesNotMoveTheEstimator) {
   const Drive drive = DriveRound();
@@ -190,9 +117,9 @@ TEST(MapperFollows, APathOfAnotherLengthDoesNotMoveTheEstimator) {
   for (std::size_t i = 0; i < 40; ++i) static_cast<void>(mapper.Process(drive.scans[i], drive.odometry[i], SerialFor));
   const std::vector<Pose2> before = mapper.BestPath();
   const std::vector<Pose2> short_path(before.size() - 1), long_path(before.size() + 1);
-  mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), {before.size(), short_path});
-  mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), {before.size(), long_path});
-  EXPECT_FALSE(mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), {long_path.size(), short_path}));
+  mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), before.size(), short_path);
+  mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), before.size(), long_path);
+  EXPECT_FALSE(mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), long_path.size(), short_path));
   EXPECT_EQ(mapper.BestPath(), before);
 }
 

@@ -112,7 +112,7 @@ TEST(MapperRetires, APathFromBeforeIsFollowed) {
   course.TakeAll(390, size);
   ASSERT_LT(course.mapper.keyframe_count(), course.mapper.keyframes_made());
   const std::vector<Pose2> before = course.mapper.BestPath();
-  course.mapper.AdoptGrid(OccupancyGrid(course.mapper.grid().options()), {snapshot.made(), path, snapshot.numbers});
+  course.mapper.AdoptGrid(OccupancyGrid(course.mapper.grid().options()), snapshot.made(), path, snapshot.numbers);
   const std::vector<Pose2> after = course.mapper.BestPath();
   ASSERT_EQ(after.size(), before.size());
   for (std::size_t k = 0; k < after.size(); ++k)
@@ -121,13 +121,13 @@ TEST(MapperRetires, APathFromBeforeIsFollowed) {
   // And one from afterwards, which has not all of them.
   const MapperSnapshot later = course.mapper.Snapshot();
   ASSERT_EQ(later.numbers, course.mapper.keyframe_numbers());
-  course.mapper.AdoptGrid(OccupancyGrid(course.mapper.grid().options()), {later.made(), before, later.numbers});
+  course.mapper.AdoptGrid(OccupancyGrid(course.mapper.grid().options()), later.made(), before, later.numbers);
   EXPECT_LT((course.mapper.BestPath().back().translation() - before.back().translation()).norm(), 1e-6);
 
   // A path that lacks a keyframe is not taken.
   std::vector<std::uint64_t> fewer(later.numbers.begin() + 1, later.numbers.end());
   const std::vector<Pose2> shorter(after.begin() + 1, after.end());
-  course.mapper.AdoptGrid(OccupancyGrid(course.mapper.grid().options()), {later.made(), shorter, fewer});
+  course.mapper.AdoptGrid(OccupancyGrid(course.mapper.grid().options()), later.made(), shorter, fewer);
   EXPECT_LT((course.mapper.BestPath().back().translation() - before.back().translation()).norm(), 1e-6);
 }
 

@@ -214,7 +214,7 @@ TEST(Mapper, AGridFromBeforeALargeLoopIsDrawnAnew) {
   const OccupancyGrid after = published();
   EXPECT_GT(ShareMissing(before, after), 0.05) << "the loop must have moved walls";
 
-  mapper.AdoptGrid(OccupancyGrid(before.options(), before.Share()), {keyframes});
+  mapper.AdoptGrid(OccupancyGrid(before.options(), before.Share()), keyframes);
   EXPECT_GT(ShareMissing(mapper.grid(), after), 0.03) << "the old walls are there at first";
   process(adopted_at, end);
   EXPECT_LT(ShareMissing(mapper.grid(), after), 0.01);
@@ -237,7 +237,7 @@ TEST(Mapper, AGridThatComesBackGetsWhatWasMappedMeanwhile) {
   process(60, 160);
   const OccupancyGrid after(mapper.grid().options(), mapper.ShareGrid());
   ASSERT_GT(ShareMissing(after, before), 0.1);
-  mapper.AdoptGrid(std::move(before), {keyframes});
+  mapper.AdoptGrid(std::move(before), keyframes);
   EXPECT_LT(ShareMissing(after, mapper.grid()), 0.01);
   // What the grid had is not drawn twice.
   EXPECT_LT(ShareOfCellsThatDiffer(mapper.grid(), after), 0.08);

@@ -97,7 +97,7 @@ TEST(LineLocalization, AGridThatComesBeforeTheRobotIsPlacedStaysAsItIs) {
   const test::World room = test::Room(-3, -3, 8, 6);
   LostRobot robot(Options(room));
   for (int step = 0; step < 20; ++step) ASSERT_FALSE(robot.Step(room).localized);
-  robot.mapper.AdoptGrid(OccupancyGrid(GridOptions{}), {});
+  robot.mapper.AdoptGrid(OccupancyGrid(GridOptions{}), 0);
   EXPECT_EQ(robot.mapper.grid().chunk_count(), 0U);
 }
 
