@@ -115,7 +115,8 @@ TEST(Kill, WithADamagedRecordItServesTheRestAndEndsWithThree) {
                              directory / "cairn.db");
   ASSERT_GE(cairn::server::testing::RawRecords(directory.path())
                 .Run("UPDATE records SET content = CAST(x'00ff00' || substr(content, 4) AS BLOB) WHERE kind = " +
-                     std::to_string(static_cast<int>(cairn::server::RecordKind::kSession)) + " AND owner = (SELECT MIN(owner) FROM records WHERE kind = 1)"),
+                     std::to_string(static_cast<int>(cairn::server::RecordKind::kSession)) +
+                     " AND owner = (SELECT MIN(owner) FROM records WHERE kind = 1)"),
             1);
   const std::string domain = std::to_string(TestDomain());
   ChildProcess server({CAIRND_PATH, "--domain", domain, "--state", directory.path().string()});
