@@ -294,9 +294,12 @@ std::vector<Pose2> Mapper::State::PosesOfFirst(std::uint64_t made, std::span<con
   return poses;
 }
 
-// Takes the poses of the first keyframes from a job, as after a large loop. The job knew `made` keyframes.
+// Takes the poses of the first keyframes from a job that knew `made` keyframes. How sure the filter is does not change:
+// a robot whose map is switched again and again must not get worse by it.
 void Mapper::State::Follow(std::span<const Pose2> first_poses, std::uint64_t made) {
   const std::vector<Pose2> before = believed_path().values();
+  // Then the present path contradicts the scans as much or as little as before.
+  if (std::ranges::equal(first_poses, std::span(before).first(first_poses.size()))) return;
   std::vector<Pose2> path(first_poses.begin(), first_poses.end());
   const std::size_t known = path.size();
   for (std::size_t k = known; k < before.size(); ++k)
@@ -304,7 +307,7 @@ void Mapper::State::Follow(std::span<const Pose2> first_poses, std::uint64_t mad
   KeepShape(path, known);
   // Large loops that the job did not know.
   if (drawing.changed_at() > made) OptimisePoses(path, trail.relations(), options.pose_graph);
-  filter->Rebase(path);
+  filter->MoveTo(path);
   trail.ConfirmTentative();
   self_check.Forget();
   const Pose2 T_new_old = path.back() * before.back().Inverse();

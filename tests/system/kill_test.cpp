@@ -43,7 +43,7 @@ TEST(Kill, TwentyKillsChangeNothing) {
     EXPECT_GT(outcome.sent, 500U);
     EXPECT_EQ(outcome.lost, 0U);
     EXPECT_EQ(outcome.doubled, 0U);
-    EXPECT_EQ(outcome.wrongly_localized, 0U);
+    EXPECT_EQ(outcome.wrongly_localized, 0U) << testing::PrintToString(outcome.wrong);
     EXPECT_EQ(outcome.beside_truth, 0U);  // The drive is too short for an error of this size.
     EXPECT_GT(outcome.undisturbed_poses, 0U);
     EXPECT_EQ(outcome.paths_that_differ, 0);
@@ -69,7 +69,7 @@ TEST(Kill, OrdersThatWereAnsweredHold) {
   EXPECT_GE(outcome.kills, 3);
   EXPECT_EQ(outcome.lost, 0U) << testing::PrintToString(outcome.differences);
   EXPECT_EQ(outcome.doubled, 0U) << testing::PrintToString(outcome.differences);
-  EXPECT_EQ(outcome.wrongly_localized, 0U);
+  EXPECT_EQ(outcome.wrongly_localized, 0U) << testing::PrintToString(outcome.wrong);
   EXPECT_GT(outcome.orders.jobs, 0);
   EXPECT_EQ(outcome.orders.ended, outcome.orders.jobs);
   EXPECT_GT(outcome.orders.switches, 0);

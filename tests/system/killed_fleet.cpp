@@ -53,6 +53,7 @@ class PoseWatcher {
     std::uint64_t beside_truth = 0;  // Called localized.
     std::uint64_t beside_other = 0;  // Called localized.
     double farthest_m = 0.0;         // From the truth, called localized.
+    std::vector<std::string> first_beside_truth, first_beside_other;
   };
 
   // `other`: may be empty.
@@ -113,8 +114,26 @@ class PoseWatcher {
     if (!pose.localized) return;
     if (const auto there = There(truth_, pose))
       counts_.farthest_m = std::max(counts_.farthest_m, Distance(pose, *there));
-    if (IsBeside(truth_, pose)) ++counts_.beside_truth;
-    if (IsBeside(other_, pose)) ++counts_.beside_other;
+    if (IsBeside(truth_, pose)) {
+      ++counts_.beside_truth;
+      Describe(pose, truth_, counts_.first_beside_truth);
+    }
+    if (IsBeside(other_, pose)) {
+      ++counts_.beside_other;
+      Describe(pose, other_, counts_.first_beside_other);
+    }
+  }
+  static void Describe(const PoseReport& pose, const Trajectories& right, std::vector<std::string>& described) {
+    constexpr std::size_t kMost = 20;
+    if (described.size() >= kMost) return;
+    const Pose2& is = pose.T_map_robot;
+    const Pose2 should = There(right, pose).value_or(Pose2{});
+    described.push_back(fmt::format(
+        "{} at {:.2f} s is told to be at ({:.2f}, {:.2f}, {:.2f}) instead of ({:.2f}, {:.2f}, {:.2f}): {}, score "
+        "{:.2f}, sigma ({:.2f}, {:.2f}, {:.2f}), generation {}, map epoch {}",
+        pose.robot, static_cast<double>(pose.stamp) / kNanosPerSecond, is.x, is.y, is.theta, should.x, should.y,
+        should.theta, PoseReasonName(pose.reason), pose.score, std::sqrt(pose.covariance(0, 0)),
+        std::sqrt(pose.covariance(1, 1)), std::sqrt(pose.covariance(2, 2)), pose.generation, pose.map_epoch));
   }
 
   const Trajectories truth_, other_;
@@ -151,6 +170,7 @@ class Drive {
     outcome.beside_truth = watcher->counts().beside_truth;
     outcome.farthest_m = watcher->counts().farthest_m;
     outcome.wrongly_localized = options_.orders ? outcome.beside_truth : watcher->counts().beside_other;
+    outcome.wrong = options_.orders ? watcher->counts().first_beside_truth : watcher->counts().first_beside_other;
     for (const auto& [robot, calm] : undisturbed) {
       const Result& other = killed.at(robot);
       outcome.sent += other.sent;

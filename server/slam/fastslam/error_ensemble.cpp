@@ -78,6 +78,22 @@ void ErrorEnsemble::Rebase(std::size_t keyframes, const Pose2& T_map_robot, cons
   Disturb(T_map_robot, covariance);
 }
 
+// The adjoint of the motion, because Exp(error_new) = T_new_old * Exp(error_old) * T_new_old^-1.
+Eigen::Matrix3f ErrorEnsemble::J_new_old(const Pose2& T_new_old) {
+  Eigen::Matrix3d J = Eigen::Matrix3d::Identity();
+  J.topLeftCorner<2, 2>() = T_new_old.rotation();
+  J(0, 2) = T_new_old.y;
+  J(1, 2) = -T_new_old.x;
+  return J.cast<float>();
+}
+
+void ErrorEnsemble::MoveMap(std::span<const Pose2> T_new_old) {
+  for (std::size_t k = 0; k < path_.size(); ++k)
+    path_[k] = std::make_shared<const Kept>(Kept{J_new_old(T_new_old[k]) * path_[k]->errors, path_[k]->spread_share});
+  frozen_path_.Forget();
+  robot_ = J_new_old(T_new_old.back()) * robot_;
+}
+
 Eigen::Matrix3d ErrorEnsemble::covariance(const Pose2& T_map_robot) const {
   const auto centred = Centred(robot_);
   const Eigen::Matrix3d errors = (centred * centred.transpose()).cast<double>() / (kMembers - 1.0);

@@ -21,6 +21,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "common/geometry/pose2.h"
@@ -54,6 +55,8 @@ class ErrorEnsemble {
   // Sets the errors of all past keyframes to zero, and gives the robot's error this covariance of the pose,
   // (x, y, theta) in map.
   void Rebase(std::size_t keyframes, const Pose2& T_map_robot, const Eigen::Matrix3d& covariance);
+  // The map was moved: what lies where keyframe k is, by T_new_old[k]. The errors stay as seen from the poses.
+  void MoveMap(std::span<const Pose2> T_new_old);
   // Forgets the errors of keyframes.
   void Retire(const Retirement& retirement) {
     KeepOnly(path_, retirement);
@@ -90,6 +93,8 @@ class ErrorEnsemble {
   static auto Centred(const Matrix& columns) {
     return (columns.colwise() - columns.rowwise().mean()).eval();
   }
+  // How an error changes with the frame in which it is given.
+  static Eigen::Matrix3f J_new_old(const Pose2& T_new_old);
   void Disturb(const Pose2& T_map_robot, const Eigen::Matrix3d& covariance);
   void LoseAncestors(Errors& errors, double share, int partner) const;
 

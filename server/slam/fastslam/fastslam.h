@@ -43,6 +43,7 @@ class FastSlam final : public Filter {
   void Commit() override;
   [[nodiscard]] bool rebases() const override { return true; }
   void Rebase(std::span<const Pose2> path) override;
+  void MoveTo(std::span<const Pose2> path) override;
   [[nodiscard]] bool retires() const override { return true; }
   void Retire(const Retirement& retirement) override;
 
@@ -250,6 +251,19 @@ void FastSlam<LandmarkModel>::Rebase(std::span<const Pose2> path) {
   }
   set_.Rebase(path);
   std::fill(maps_.begin(), maps_.end(), map);
+}
+
+// A landmark that several particles share was seen from a keyframe before they parted, so that it moves once for all.
+template <typename LandmarkModel>
+void FastSlam<LandmarkModel>::MoveTo(std::span<const Pose2> path) {
+  const std::vector<Pose2> T_new_old = set_.MoveTo(path);
+  const auto change = [&](std::size_t slot, Entry& entry) {
+    if (entry.sightings == 0) return;
+    entry.landmark.Move(T_new_old[entry.first_keyframe]);
+    index_.Grow(slot, entry.landmark.p_map());
+  };
+  typename Map::Rewritten done;
+  for (Map& map : maps_) map.Rewrite(change, done);
 }
 
 template <typename LandmarkModel>

@@ -107,25 +107,54 @@ void ParticleSet::Rebase(std::span<const Pose2> path) {
   estimate_ = {particle.T_map_robot, particle.covariance};
 }
 
-// The part of the paths that all share is made once, so that they share it again.
+std::vector<Pose2> ParticleSet::MoveTo(std::span<const Pose2> path) {
+  const PosePath before = best().path;
+  std::vector<Pose2> T_new_old;
+  T_new_old.reserve(path.size());
+  // What has not moved keeps its bits.
+  for (std::size_t k = 0; k < path.size(); ++k)
+    T_new_old.push_back(path[k] == before[k] ? Pose2{} : path[k] * before[k].Inverse());
+  RemakePaths(path.size(), SharedByAll(), [&](const PosePath& old, std::size_t k) {
+    return old[k] == before[k] ? path[k] : T_new_old[k] * old[k];
+  });
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  R.topLeftCorner<2, 2>() = T_new_old.back().rotation();
+  for (Particle& particle : particles_) {
+    particle.T_map_robot = particle.path[path.size() - 1];
+    particle.covariance = R * particle.covariance * R.transpose();
+  }
+  errors_.MoveMap(T_new_old);
+  estimate_ = {T_new_old.back() * estimate_.T_map_robot, R * estimate_.covariance * R.transpose()};
+  return T_new_old;
+}
+
 void ParticleSet::Retire(const Retirement& retirement) {
   const std::vector<std::size_t>& kept = retirement.kept;
+  const auto apart = static_cast<std::size_t>(std::ranges::lower_bound(kept, SharedByAll()) - kept.begin());
+  RemakePaths(kept.size(), apart, [&kept](const PosePath& old, std::size_t i) { return old[kept[i]]; });
+  errors_.Retire(retirement);
+}
+
+std::size_t ParticleSet::SharedByAll() const {
   std::size_t shared = best().path.size();
   for (const Particle& particle : particles_) shared = particle.path.SharedWith(best().path, shared);
-  const auto apart = std::ranges::lower_bound(kept, shared);
+  return shared;
+}
+
+template <typename MakePose>
+void ParticleSet::RemakePaths(std::size_t size, std::size_t apart, const MakePose& pose) {
   PosePath common;
-  for (auto k = kept.begin(); k != apart; ++k) common.Append(best().path[*k]);
+  for (std::size_t i = 0; i < apart; ++i) common.Append(pose(best().path, i));
   PosePath before, after;  // Of the last particle. Particles that were resampled lately have the same path.
   for (Particle& particle : particles_) {
-    const std::size_t size = particle.path.size();
-    if (before.size() != size || particle.path.SharedWith(before, size) != size) {
+    const std::size_t old_size = particle.path.size();
+    if (before.size() != old_size || particle.path.SharedWith(before, old_size) != old_size) {
       after = common;
-      for (auto k = apart; k != kept.end(); ++k) after.Append(particle.path[*k]);
+      for (std::size_t i = apart; i < size; ++i) after.Append(pose(particle.path, i));
       before = particle.path;
     }
     particle.path = after;
   }
-  errors_.Retire(retirement);
 }
 
 void ParticleSet::Summarise(const std::vector<double>& shares) {

@@ -98,6 +98,9 @@ class ParticleSet {
   [[nodiscard]] std::vector<int> Commit();
   // Replaces the path of every particle by this one. All particles are equal afterwards.
   void Rebase(std::span<const Pose2> path);
+  // Moves the best particle to this path, and the others with it (filter.h: MoveTo). Returns by what each keyframe has
+  // moved.
+  std::vector<Pose2> MoveTo(std::span<const Pose2> path);
   // Leaves out keyframes of all paths.
   void Retire(const Retirement& retirement);
 
@@ -124,6 +127,12 @@ class ParticleSet {
 
  private:
   std::vector<int> Resample(std::vector<double>& left);
+  // How many poses of their paths all particles share.
+  [[nodiscard]] std::size_t SharedByAll() const;
+  // Replaces every path by poses 0..size-1 that pose(old path, index) returns. Those before `apart` are the same for
+  // all particles; they are made once, so that all share them again.
+  template <typename MakePose>
+  void RemakePaths(std::size_t size, std::size_t apart, const MakePose& pose);
   void Summarise(const std::vector<double>& shares);
 
   FastSlamOptions options_;

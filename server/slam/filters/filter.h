@@ -80,12 +80,17 @@ class Filter {
   virtual void Observe(const KeyframeSight& sight, const ParallelFor& parallel_for) = 0;
   // Ends the step and appends the pose to the path.
   virtual void Commit() = 0;
-  // True if the filter supports Rebase.
+  // True if the filter supports Rebase and MoveTo.
   [[nodiscard]] virtual bool rebases() const { return false; }
   // Replaces the path after a large loop was closed; `path` has one pose per committed keyframe. Every
   // hypothesis takes this path, and its landmarks move with the keyframes from which they were seen.
   // REQUIRES: rebases(), and called between steps.
   virtual void Rebase(std::span<const Pose2> /*path*/) {}
+  // Moves the path of hypothesis 0 to `path`, which has one pose per committed keyframe, and all that is believed with
+  // it: at each keyframe the other hypotheses and what was seen from it keep their places relative to hypothesis 0. In
+  // contrast to Rebase nothing is forgotten, because a map that is drawn along another path is no new evidence.
+  // REQUIRES: rebases(), and called between steps.
+  virtual void MoveTo(std::span<const Pose2> path) { Rebase(path); }
   // True if the filter supports Retire.
   [[nodiscard]] virtual bool retires() const { return false; }
   // Gives up committed keyframes: the paths go on without them, and what was seen from them counts as seen from their

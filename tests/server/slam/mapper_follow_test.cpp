@@ -65,6 +65,46 @@ TEST(MapperFollows, TheEstimatorFollowsThePathThatComesWithAGrid) {
   EXPECT_LT(ShareMissing(mapper.grid(), expected), 0.01);
 }
 
+// A map version that was made when the path was the same is no news: nobody's estimate gets worse however often the
+// version is switched.
+TEST(MapperFollows, ItsOwnPathChangesNothing) {
+  const Drive drive = DriveRound();
+  MapperOptions options;
+  options.filter.particles = 20;
+  Mapper mapper(options, drive.truth.front(), 1), undisturbed(options, drive.truth.front(), 1);
+  for (std::size_t i = 0; i < 100; ++i) {
+    const auto process = [&](Mapper& one) { return one.Process(drive.scans[i], drive.odometry[i], SerialFor); };
+    const ScanOutcome here = process(mapper), there = process(undisturbed);
+    ASSERT_EQ(here.T_map_robot, there.T_map_robot) << i;
+    ASSERT_EQ(here.covariance, there.covariance) << i;
+    const std::vector<Pose2> path = mapper.BestPath();
+    ASSERT_TRUE(mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), mapper.keyframes_made(), path));
+  }
+}
+
+// There and back: the robot is as sure of its pose, and as near to the truth, as if the map had not been switched.
+TEST(MapperFollows, ManySwitchesBetweenTwoPathsDoNotBlurTheEstimate) {
+  const Drive drive = DriveRound();
+  MapperOptions options;
+  options.filter.particles = 20;
+  Mapper mapper(options, drive.truth.front(), 1), undisturbed(options, drive.truth.front(), 1);
+  const Pose2 T_new_old{3.0, -2.0, 0.5};
+  bool moved = false;
+  for (std::size_t i = 0; i < 100; ++i) {
+    const auto process = [&](Mapper& one) { return one.Process(drive.scans[i], drive.odometry[i], SerialFor); };
+    ScanOutcome here = process(mapper);
+    const ScanOutcome there = process(undisturbed);
+    if (moved) here.T_map_robot = T_new_old.Inverse() * here.T_map_robot;
+    ASSERT_LT((here.T_map_robot.translation() - there.T_map_robot.translation()).norm(), 0.05) << i;
+    ASSERT_LT(std::abs(AngleDiff(here.T_map_robot.theta, there.T_map_robot.theta)), 0.01) << i;
+    ASSERT_NEAR(here.covariance(2, 2), there.covariance(2, 2), 0.5 * there.covariance(2, 2)) << i;
+    std::vector<Pose2> path = mapper.BestPath();
+    for (Pose2& pose : path) pose = (moved ? T_new_old.Inverse() : T_new_old) * pose;
+    moved = !moved;
+    ASSERT_TRUE(mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), mapper.keyframes_made(), path));
+  }
+}
+
 // The pose of a scan that is not level comes from the last level one, also when that was before the map moved.
 TEST(MapperFollows, ATiltedScanAfterTheMapHasMovedIsReportedInTheNewMap) {
   const Drive drive = DriveRound();

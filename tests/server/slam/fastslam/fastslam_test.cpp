@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <set>
 
 #include "server/slam/landmark_variants/landmark_oriented.h"
 #include "server/slam/landmark_variants/landmark_point.h"
@@ -138,6 +139,67 @@ TYPED_TEST(FastSlamVariants, RetiredKeyframesLeaveAllPathsAndTheirLandmarksStay)
   filter.Rebase(path);
   EXPECT_LT((filter.landmarks().front().p_map - T_new_old * landmark).norm(), 1e-9);
   EXPECT_TRUE(filter.Observe({1, Between(path[1], path[3]), Eigen::Matrix3d::Identity()}));
+}
+
+// All particles and all that they have seen move with the best one, and none is forgotten.
+TYPED_TEST(FastSlamVariants, AMovedPathTakesEveryParticleAlong) {
+  auto filter = Make<TypeParam>::Filter(3), moved = Make<TypeParam>::Filter(3);
+  const auto drive = [](auto& one) {
+    for (int i = 0; i < 12; ++i) {
+      if (i > 0) one.Predict({{i % 2 == 0 ? 1.0 : -1.0, 0, 0}});
+      if (i == 2) one.Observe(TwoCorners({1.0, 0, 0}), 1.0);
+      one.Commit();
+    }
+  };
+  drive(filter);
+  drive(moved);
+  const Pose2 T_new_old{3, -2, 0.5};
+  std::vector<Pose2> path = filter.hypothesis(0).path.values();
+  const std::size_t first_seen_from = 2;
+  for (std::size_t k = 0; k < path.size(); ++k) path[k] = T_new_old * path[k];
+  moved.MoveTo(path);
+  EXPECT_EQ(moved.hypothesis(0).path.values(), path);
+  std::set<double> different;
+  for (std::size_t i = 0; i < filter.hypothesis_count(); ++i) {
+    const auto was = filter.hypothesis(i), is = moved.hypothesis(i);
+    EXPECT_LT((is.T_map_robot.translation() - (T_new_old * was.T_map_robot).translation()).norm(), 1e-9);
+    EXPECT_LT((is.path[first_seen_from].translation() - (T_new_old * was.path[first_seen_from]).translation()).norm(),
+              1e-9);
+    EXPECT_EQ(is.path[is.path.size() - 1], is.T_map_robot);
+    different.insert(is.T_map_robot.x);
+  }
+  EXPECT_GT(different.size(), 5U);
+  ASSERT_EQ(moved.landmarks().size(), 2U);
+  EXPECT_LT((moved.landmarks()[0].p_map - T_new_old * filter.landmarks()[0].p_map).norm(), 1e-9);
+  Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
+  R.topLeftCorner<2, 2>() = T_new_old.rotation();
+  const auto was = filter.estimate(), is = moved.estimate();
+  EXPECT_LT((is.T_map_robot.translation() - (T_new_old * was.T_map_robot).translation()).norm(), 1e-9);
+  EXPECT_LT((is.covariance - R * was.covariance * R.transpose()).norm(), 1e-9);
+  // It goes on as sure as before.
+  filter.Predict({{1.0, 0, 0}});
+  moved.Predict({{1.0, 0, 0}});
+  filter.Commit();
+  moved.Commit();
+  EXPECT_LT((moved.estimate().covariance - R * filter.estimate().covariance * R.transpose()).norm(),
+            0.3 * filter.estimate().covariance.norm());
+}
+
+// A landmark moves with the keyframe from which it was first seen.
+TYPED_TEST(FastSlamVariants, ABentPathMovesLandmarksWithTheirKeyframes) {
+  auto filter = Make<TypeParam>::Filter(3);
+  for (int i = 0; i < 6; ++i) {
+    if (i > 0) filter.Predict({{0.5, 0, 0}});
+    if (i == 2) filter.Observe(TwoCorners({1.0, 0, 0}), 1.0);
+    filter.Commit();
+  }
+  const Eigen::Vector2d before = filter.landmarks().front().p_map;
+  std::vector<Pose2> path = filter.hypothesis(0).path.values();
+  const Pose2 T_new_old{0.3, -0.2, 0.1};
+  path[2] = T_new_old * path[2];
+  filter.MoveTo(path);
+  EXPECT_LT((filter.landmarks().front().p_map - T_new_old * before).norm(), 1e-9);
+  EXPECT_EQ(filter.hypothesis(0).T_map_robot, path.back());
 }
 
 TYPED_TEST(FastSlamVariants, EveryParticleDecidesForItselfWhatItSees) {
