@@ -36,7 +36,7 @@ Result<void> Roster::Open(const SessionRequest& request) {
     gone = *std::move(giving_way);
     stored.id = next_id_++;
     stored.map_epoch = site->snapshot()->info.epoch;
-    stored.in_map = HasBegun(request.site, *site);
+    stored.map_begun = HasBegun(request.site, *site);
     stored.fragment = BeginsFragment(request, *site);
     // The first that comes back after the state was lost: the others know their places in the same map.
     const bool elsewhere = request.has_start && request.map_frame != 0 && request.map_frame != site->map_frame();
@@ -136,7 +136,7 @@ std::shared_ptr<Session> Roster::Make(const StoredSession& stored, const std::sh
                            .estimator = {.mapper = mapper,
                                          .T_map_robot_start = StartOf(stored.request),
                                          .fragment = stored.fragment,
-                                         .in_map = stored.in_map},
+                                         .map_begun = stored.map_begun},
                            .quiet_since_ms = stored.quiet_since_ms};
   SessionOutputs outputs{.send = [this](OutboundValue value) { return outbound_.Send(std::move(value)); },
                          .grid_changed = [site](GridChange&& change) { site->Change(std::move(change)); },

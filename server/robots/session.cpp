@@ -23,7 +23,7 @@ Session::Session(const SessionSetup& setup, const RobotsOptions& options, asio::
               setup.map_epoch,
               setup.estimator.fragment,
               setup.quiet_since_ms,
-              setup.estimator.in_map},
+              setup.estimator.map_begun},
       outputs_(std::move(outputs)),
       record_(setup.id, setup.request, options),
       queue_(static_cast<std::size_t>(options.queue_scans), static_cast<std::size_t>(options.queue_odometry)),

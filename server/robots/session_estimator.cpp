@@ -61,7 +61,7 @@ SessionEstimator::SessionEstimator(const EstimatorSetup& setup, SessionRecord& r
       epoch_(record.epoch()),
       fragment_(setup.fragment),
       options_(setup.mapper),
-      in_map_(setup.in_map),
+      map_begun_(setup.map_begun),
       pipeline_(setup.mapper, setup.T_map_robot_start, slam::SerialFor,
                 {.used = [this](const Scan& scan, const slam::ScanOutcome& outcome) { Used(scan, outcome); },
                  .dropped = [this](const Scan& scan, DropReason reason) { Dropped(scan, reason); }}) {
@@ -309,7 +309,7 @@ void SessionEstimator::DoubtLateStart(const Scan& scan) {
   // A start that is wrong by what a robot drives in about a second is corrected by the match.
   constexpr std::uint64_t kMostMissing = 10, kLatestNs = kNanosPerSecond;
   // The filter line_match finds the robot in a map that it was given.
-  if (!in_map_ || !first_sequence_ || options_.filter.kind == slam::FilterKind::kLineMatch) return;
+  if (!map_begun_ || !first_sequence_ || options_.filter.kind == slam::FilterKind::kLineMatch) return;
   const std::uint64_t first = *std::exchange(first_sequence_, std::nullopt);
   const bool late = scan.stamp > first_stamp_ && NanosBetween(first_stamp_, scan.stamp) > kLatestNs;
   if (first <= kMostMissing + 1 && !late) return;

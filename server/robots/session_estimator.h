@@ -52,7 +52,7 @@ struct EstimatorSetup {
   // Nobody has said where the robot starts in a map that others have begun. Its start is the origin of a frame of its
   // own, and it is not localized, until a map version joins it (maps/robot_grid.h).
   bool fragment = false;
-  bool in_map = false;  // Others have begun the map, so that it matters where the robot starts.
+  bool map_begun = false;  // Others have begun the map, so that it matters where the robot starts.
 };
 
 class SessionEstimator {
@@ -125,7 +125,7 @@ class SessionEstimator {
   bool fragment_ = false;
   const slam::MapperOptions options_;
   std::string start_refused_;  // Why, if it was.
-  const bool in_map_;
+  const bool map_begun_;
   // Number and stamp of the first scan that arrived, until one is used.
   std::optional<std::uint64_t> first_sequence_;
   Stamp first_stamp_ = 0;

@@ -42,7 +42,7 @@ std::string BytesOf(const StoredSession& session) {
   to.set_map_epoch(session.map_epoch);
   to.set_fragment(session.fragment);
   to.set_quiet_since_ms(session.quiet_since_ms);
-  to.set_in_map(session.in_map);
+  to.set_map_begun(session.map_begun);
   return to.SerializeAsString();
 }
 
@@ -54,7 +54,7 @@ Result<StoredSession> SessionOf(std::string_view bytes) {
                         .map_epoch = from.map_epoch(),
                         .fragment = from.fragment(),
                         .quiet_since_ms = from.quiet_since_ms(),
-                        .in_map = from.in_map()};
+                        .map_begun = from.map_begun()};
   const bool valid = session.id != 0 && ValidateName("robot", session.request.robot) &&
                      ValidateName("site", session.request.site) &&
                      (!session.request.has_start || ValidateStart(session.request.T_map_robot_start));

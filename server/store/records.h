@@ -101,7 +101,7 @@ struct StoredSession {
   bool fragment = false;  // It began without being joined with the map of the site.
   // Since when its robot is away, or it has ended: milliseconds since 1970. 0: neither, or not known.
   std::uint64_t quiet_since_ms = 0;
-  bool in_map = false;  // When it began, others had begun the map: it matters where it is in it.
+  bool map_begun = false;  // When it began, others had begun the map: it matters where it is in it.
 };
 
 // The path of a robot after smoothing, and the session that drove it: the robot may have begun another since.
