@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/service/start_pose.h"
+#include "server/store/crash_note.h"
 
 namespace cairn::server {
 namespace {

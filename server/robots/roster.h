@@ -23,6 +23,7 @@
 #include <atomic>
 #include <cstdint>
 #include <deque>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <set>
@@ -40,6 +41,7 @@
 
 namespace cairn::server {
 
+class CrashNote;
 class RestoreMarks;
 
 class Roster {
@@ -55,7 +57,8 @@ class Roster {
   // the sites were restored before, and no other function was called. A session whose records are damaged, or were
   // written by a newer server, is set aside (store/set_aside.h): its records stay, and its robot is told to open a new
   // one. A session during whose restoring earlier servers failed (RestoreMarks) is restored alone; after two failures
-  // it is set aside, and only its part of the map is shown, from its checkpoint; after three, not even this.
+  // it is set aside, and only its part of the map is shown, from its checkpoint; after three, not even this. The same
+  // after three crashes of its thread within hours, because its robot sends again what the estimator cannot process.
   // A session whose checkpoint was made with other options of the estimator is restored from its whole journal, if that
   // is there and short; otherwise it keeps its options. `control`: CANCELLED if it was given up, after which the next
   // start does the same again.
@@ -125,6 +128,8 @@ class Roster {
   using RestoredSession = Result<std::shared_ptr<Session>>;
   void MakeEarlier(const std::shared_ptr<Session>& ended) CAIRN_EXCLUDES(mutex_);
   std::vector<RestoredSession> RestoreEach(const std::vector<SessionId>& ids, const Restoring& how);
+  Result<void> RestoreAll(const std::vector<SessionId>& ids, SessionId last, RestoreMarks& marks,
+                          const std::filesystem::path& note, StartControl& control);
   Result<void> RestoreTogether(const std::vector<SessionId>& ids, const Restoring& how);
   Result<void> RestoreDoubtful(SessionId id, Restoring how);
   void Register(SessionId id, RestoredSession restored);
@@ -161,6 +166,7 @@ class Roster {
   Journal* const journal_;
   // The roster is being destroyed. Sessions that are destroyed now stay in the store.
   const std::shared_ptr<std::atomic<bool>> closing_ = std::make_shared<std::atomic<bool>>(false);
+  std::unique_ptr<CrashNote> crash_note_;  // Of the sessions, from when they are restored.
 
   mutable Mutex mutex_;
   std::map<NameId, std::shared_ptr<Session>> sessions_ CAIRN_GUARDED_BY(mutex_);

@@ -1,6 +1,7 @@
 // How the roster restores the sessions of earlier servers (roster.h).
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <asio/post.hpp>
 #include <chrono>
 #include <filesystem>
@@ -30,14 +31,12 @@ Result<StoredSession> ReadSession(Store& store, SessionId id) {
 // The longest journal, in entries, that is processed again only because of other options: some minutes.
 constexpr std::uint64_t kMostReprocessed = 100'000;
 
-constexpr const char* kCrashNoteFile = "crashed-session";  // In the state directory, while sessions are restored.
+// In the state directory: while sessions are restored, and while their robots drive.
+constexpr const char* kRestoringNote = "crashed-session";
+constexpr const char* kDrivingNote = "crashed-driving";
 
-constexpr std::uint32_t kAttemptsWithJournal = 2;     // After so many failures the journal is not used,
-constexpr std::uint32_t kAttemptsWithCheckpoint = 3;  // and after so many neither is the checkpoint.
-
-// Why a session is not restored, or not completely.
-std::string AfterFailures(std::uint32_t failures) {
-  return "the server ended " + std::to_string(failures) + " times while it restored this session";
+std::int64_t SecondsSince1970() {
+  return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
 tl::unexpected<Status> GivenUp() {
@@ -67,23 +66,36 @@ Result<void> Roster::Restore(StartControl& control) {
   const auto last = LastSession(journal_->store());
   if (!last) return tl::unexpected(last.error());
   const std::filesystem::path place = journal_->store().directory();
-  const std::filesystem::path note = place.empty() ? place : place / kCrashNoteFile;
-  auto marks = RestoreMarks::Read(journal_->store(), CrashNote::Of(note));
+  const auto note = [&place](const char* name) { return place.empty() ? place : place / name; };
+  auto driving = CrashNote::Of(note(kDrivingNote));
+  if (driving && std::ranges::find(*ids, *driving) == ids->end()) driving.reset();  // It was not stored.
+  auto marks = RestoreMarks::Read(
+      journal_->store(),
+      {.restoring = CrashNote::Of(note(kRestoringNote)), .driving = driving, .now_s = SecondsSince1970()});
   if (!marks) return tl::unexpected(marks.error());
   if (auto settled = marks->Settle(); !settled) return settled;
+  std::error_code ignored;
+  std::filesystem::remove(note(kDrivingNote), ignored);  // It is counted now.
+  const auto restored = RestoreAll(*ids, *last, *marks, note(kRestoringNote), control);
+  if (restored) crash_note_ = std::make_unique<CrashNote>(note(kDrivingNote));
+  return restored;
+}
+
+Result<void> Roster::RestoreAll(const std::vector<SessionId>& ids, SessionId last, RestoreMarks& marks,
+                                const std::filesystem::path& note, StartControl& control) {
   const CrashNote crash_note(note);
   const auto begin = std::chrono::steady_clock::now();
-  if (!ids->empty()) spdlog::info("restoring {} sessions", ids->size());
+  if (!ids.empty()) spdlog::info("restoring {} sessions", ids.size());
   std::vector<SessionId> doubtful, others;
   {
     const MutexLock lock(mutex_);
-    next_id_ = std::max(next_id_, *last + 1);
+    next_id_ = std::max(next_id_, last + 1);
     for (const auto& site : atlas_.All()) next_id_ = std::max(next_id_, site->LastSession() + 1);
-    for (const SessionId id : *ids) {
-      (marks->failed(id) == 0 ? others : doubtful).push_back(id);
+    for (const SessionId id : ids) {
+      (marks.failed(id) == 0 ? others : doubtful).push_back(id);
     }
   }
-  const Restoring how{control, &*marks};
+  const Restoring how{control, &marks};
   if (auto restored = RestoreTogether(others, how); !restored) return restored;
   // One of these may have ended the server before. One at a time, so that it alone is marked when it does so again.
   for (const SessionId id : doubtful) {
@@ -110,11 +122,12 @@ Result<void> Roster::RestoreTogether(const std::vector<SessionId>& ids, const Re
 Result<void> Roster::RestoreDoubtful(SessionId id, Restoring how) {
   RestoreMarks& marks = *how.marks;
   const std::uint32_t failures = marks.failed(id);
-  if (failures >= kAttemptsWithCheckpoint) {
-    Register(id, NotRestored(id, {StatusCode::kAborted, AfterFailures(failures)}));
+  const std::string reason = marks.Why(id);
+  if (failures >= RestoreMarks::kWithoutCheckpoint) {
+    Register(id, NotRestored(id, {StatusCode::kAborted, reason}));
     return {};
   }
-  how.with_journal = failures < kAttemptsWithJournal;
+  how.with_journal = failures < RestoreMarks::kWithoutJournal;
   if (auto marked = how.with_journal ? marks.Begin({id}) : marks.BeginWithoutJournal(id); !marked) return marked;
   auto session = RestoreOne(id, how);
   if (how.control.given_up()) {
@@ -133,7 +146,7 @@ Result<void> Roster::RestoreDoubtful(SessionId id, Restoring how) {
   }
   // The robot has moved on since the checkpoint, so it begins a new session. What is stored of this one stays, and its
   // part of the map is shown as it was in the checkpoint.
-  const Status why = session ? Status{StatusCode::kAborted, AfterFailures(failures)} : session.error();
+  const Status why = session ? Status{StatusCode::kAborted, reason} : session.error();
   Register(id, NotRestored(id, why));
   return {};
 }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/thread_time.h"
+#include "server/store/crash_note.h"
 
 namespace cairn::server {
 namespace {
@@ -238,6 +239,7 @@ void Session::Schedule() {
 }
 
 void Session::Drain() {
+  const CrashNote::Working working(id_);
   const auto begin = ThreadTime();
   for (int i = 0; i < kEventsPerTurn; ++i) {
     std::optional<RobotEvent> event = queue_.Pop();

@@ -9,6 +9,9 @@
 #include <fstream>
 #include <system_error>
 #include <utility>
+#include <vector>
+
+#include "common/mutex.h"
 
 namespace cairn::server {
 namespace {
@@ -37,10 +40,12 @@ void Note(int signal, siginfo_t* info, void* /*context*/) {
 
 CrashNote::CrashNote(const std::filesystem::path& file) {
   if (file.empty()) return;
-  const int opened = open(file.c_str(), O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0600);
-  if (opened < 0) return;
+  static Mutex making;
+  const MutexLock lock(making);
+  if (note_file >= 0) return;
+  note_file = open(file.c_str(), O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0600);
+  if (note_file < 0) return;
   file_ = file;
-  note_file = opened;
   struct sigaction action {};
   action.sa_sigaction = Note;
   action.sa_flags = SA_SIGINFO | SA_ONSTACK;
@@ -57,17 +62,20 @@ CrashNote::~CrashNote() {
 }
 
 // The handler needs a stack of its own where the thread's is used up.
-CrashNote::Working::Working(std::uint64_t number) : before_(working_on), stack_(kStackBytes) {
-  stack_t stack{};
-  stack.ss_sp = stack_.data();
-  stack.ss_size = stack_.size();
-  sigaltstack(&stack, &stack_before_);
+CrashNote::Working::Working(std::uint64_t number) : before_(working_on) {
+  thread_local std::vector<char> memory(kStackBytes);
+  if (before_ == 0) {
+    stack_t stack{};
+    stack.ss_sp = memory.data();
+    stack.ss_size = memory.size();
+    sigaltstack(&stack, &stack_before_);
+  }
   working_on = number;
 }
 
 CrashNote::Working::~Working() {
   working_on = before_;
-  sigaltstack(&stack_before_, nullptr);
+  if (before_ == 0) sigaltstack(&stack_before_, nullptr);
 }
 
 std::optional<std::uint64_t> CrashNote::Of(const std::filesystem::path& file) {

@@ -1,20 +1,19 @@
 // Notes on the disk what a thread was working on when it crashed, so that the next process knows what not to try again
-// for ever. A process that is killed from outside (SIGKILL, a power failure) leaves no note. One at a time in a
-// process.
+// for ever. A process that is killed from outside (SIGKILL, a power failure) leaves no note.
 #pragma once
 
 #include <csignal>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
-#include <vector>
 
 namespace cairn::server {
 
 class CrashNote {
  public:
   // While it exists, SIGSEGV, SIGBUS, SIGFPE, SIGILL and SIGABRT are noted in this file before they do what they did
-  // before. If the file cannot be made, nothing is noted. An empty path: nothing is noted.
+  // before. If the file cannot be made, or another note of this process exists, nothing is noted. An empty path:
+  // nothing is noted.
   explicit CrashNote(const std::filesystem::path& file);
   CrashNote(const CrashNote&) = delete;
   CrashNote& operator=(const CrashNote&) = delete;
@@ -30,8 +29,7 @@ class CrashNote {
 
    private:
     const std::uint64_t before_;
-    std::vector<char> stack_;
-    stack_t stack_before_{};
+    stack_t stack_before_{};  // Where nothing was worked on before.
   };
 
   // What the last process has noted; nothing if it did not crash.

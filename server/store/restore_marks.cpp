@@ -1,11 +1,13 @@
 #include "server/store/restore_marks.h"
 
+#include <algorithm>
+
 #include "cairn/record.pb.h"
 #include "server/store/record_values.h"
 
 namespace cairn::server {
 
-Result<RestoreMarks> RestoreMarks::Read(Store& store, std::optional<std::uint64_t> crashed) {
+Result<RestoreMarks> RestoreMarks::Read(Store& store, const Crashed& crashed) {
   RestoreMarks marks(store);
   const auto sessions = store.Owners(RecordKind::kRestoring);
   if (!sessions) return tl::unexpected(sessions.error());
@@ -13,16 +15,23 @@ Result<RestoreMarks> RestoreMarks::Read(Store& store, std::optional<std::uint64_
     const auto take = [&](std::uint64_t, std::string_view bytes) -> Result<void> {
       record::Restoring from;
       if (!from.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return Unreadable("a mark");
-      Ends& ends = marks.ends_[session] = {from.attempts(), from.kills(), from.place()};
-      if (from.open() && crashed != session) {
+      Ends& ends =
+          marks.ends_[session] = {from.attempts(), from.kills(), from.place(), from.driving(), from.driving_s()};
+      if (from.open() && crashed.restoring != session) {
         if (ends.crashes > 0) --ends.crashes;
-        if (!crashed) ++ends.kills;
+        if (!crashed.restoring) ++ends.kills;
       }
       return {};
     };
     const auto read = store.Read({.kind = RecordKind::kRestoring, .owner = session}, take);
     if (!read && read.error().code != StatusCode::kDataLoss) return tl::unexpected(read.error());
     if (!read) marks.ends_[session] = {.crashes = 1};
+  }
+  if (crashed.driving) {
+    Ends& ends = marks.ends_[*crashed.driving];
+    const bool together = crashed.now_s >= ends.driving_s && crashed.now_s - ends.driving_s <= kDrivingTogetherS;
+    ends.driving = together ? ends.driving + 1 : 1;
+    ends.driving_s = crashed.now_s;
   }
   return marks;
 }
@@ -48,7 +57,15 @@ RestoreMarks::Ends RestoreMarks::EndsOf(std::uint64_t session) const {
 
 std::uint32_t RestoreMarks::failed(std::uint64_t session) const {
   const Ends ends = EndsOf(session);
-  return ends.crashes + ends.kills / kKillsPerFailure;
+  const std::uint32_t restoring = ends.crashes + ends.kills / kKillsPerFailure;
+  return ends.driving >= kDrivingCrashes ? std::max(restoring, kWithoutJournal) : restoring;
+}
+
+std::string RestoreMarks::Why(std::uint64_t session) const {
+  const std::uint32_t driving = EndsOf(session).driving;
+  if (driving >= kDrivingCrashes)
+    return "the server crashed " + std::to_string(driving) + " times in what the robot of this session sent";
+  return "the server ended " + std::to_string(failed(session)) + " times while it restored this session";
 }
 
 Record RestoreMarks::RecordOf(std::uint64_t session, const Ends& ends, bool open) {
@@ -57,13 +74,15 @@ Record RestoreMarks::RecordOf(std::uint64_t session, const Ends& ends, bool open
   to.set_place(ends.place);
   to.set_kills(ends.kills);
   to.set_open(open);
+  to.set_driving(ends.driving);
+  to.set_driving_s(ends.driving_s);
   return {{RecordKind::kRestoring, session, 0}, to.SerializeAsString()};
 }
 
 // Should the process end now without a note, it counts as a crash for a server that knows no notes.
 Record RestoreMarks::MarkAt(std::uint64_t session, std::uint64_t place) const {
   Ends ends = EndsOf(session);
-  if (ends.place != place) ends = {.place = place};
+  if (ends.place != place) ends = {.place = place, .driving = ends.driving, .driving_s = ends.driving_s};
   ++ends.crashes;
   return RecordOf(session, ends, true);
 }
@@ -84,17 +103,25 @@ Result<void> RestoreMarks::Reached(std::uint64_t session, std::uint64_t entries)
 }
 
 Result<void> RestoreMarks::Set(std::uint64_t session, std::uint32_t failures) {
-  ends_[session] = {.crashes = failures, .place = EndsOf(session).place};
-  return Commit({.removed = {}, .put = {RecordOf(session, ends_[session], false)}});
+  Ends& ends = ends_[session];
+  ends.crashes = failures;
+  ends.kills = 0;
+  return Commit({.removed = {}, .put = {RecordOf(session, ends, false)}});
 }
 
 Result<void> RestoreMarks::Succeeded(const std::vector<std::uint64_t>& sessions) {
   RecordChanges changes;
   for (const std::uint64_t session : sessions) {
+    const Ends ends = EndsOf(session);
     ends_.erase(session);
-    changes.removed.push_back({.kind = RecordKind::kRestoring, .owner = session});
+    if (ends.driving == 0) {
+      changes.removed.push_back({.kind = RecordKind::kRestoring, .owner = session});
+    } else {
+      ends_[session] = {.driving = ends.driving, .driving_s = ends.driving_s};
+      changes.put.push_back(RecordOf(session, ends_[session], false));
+    }
   }
-  return changes.removed.empty() ? Result<void>{} : Commit(changes);
+  return changes.removed.empty() && changes.put.empty() ? Result<void>{} : Commit(changes);
 }
 
 }  // namespace cairn::server

@@ -151,7 +151,8 @@ TEST(Restore, ASessionWhoseJournalEndsTheServerDoesSoTwiceAndTheOthersComeBack) 
   DriveTwoRobots(directory / "0", options);
   const auto failed = [&](std::uint64_t session) {
     const auto store = *OpenStore(directory / "0");
-    return RestoreMarks::Read(*store, CrashNote::Of(directory / "0" / "crashed-session"))->failed(session);
+    return RestoreMarks::Read(*store, {.restoring = CrashNote::Of(directory / "0" / "crashed-session")})
+        ->failed(session);
   };
   EXPECT_FALSE(StartsElsewhere(directory / "0", options, 1, SIGABRT));
   EXPECT_EQ(failed(1), 1U);
@@ -216,7 +217,7 @@ TEST(Restore, AStartThatIsGivenUpIsDoneByTheNextOne) {
     ASSERT_FALSE(started);
     EXPECT_EQ(started.error().code, StatusCode::kCancelled);
   }
-  EXPECT_EQ(RestoreMarks::Read(**OpenStore(directory / "0"))->failed(1), 0U);
+  EXPECT_EQ(RestoreMarks::Read(**OpenStore(directory / "0"), {})->failed(1), 0U);
   StoredServer second(directory / "0", options);
   for (const char* robot : {"r1", "r2"}) EXPECT_EQ(PathOf(*second.operator->(), robot).size(), 60U);
 }
@@ -226,11 +227,11 @@ TEST(Restore, OnlyEndsAtTheSamePlaceAreCountedTogether) {
   std::filesystem::create_directories(directory / "0");
   const auto store = *OpenStore(directory / "0");
   const auto ends_at = [&](std::uint64_t entries) {
-    auto marks = *RestoreMarks::Read(*store, 1);
+    auto marks = *RestoreMarks::Read(*store, {.restoring = 1});
     ASSERT_TRUE(marks.Begin({1}));
     for (std::uint64_t entry = 1; entry <= entries; ++entry) ASSERT_TRUE(marks.Reached(1, entry));
   };
-  const auto failed = [&] { return RestoreMarks::Read(*store, 1)->failed(1); };
+  const auto failed = [&] { return RestoreMarks::Read(*store, {.restoring = 1})->failed(1); };
   constexpr std::uint64_t kPlace = RestoreMarks::kPlaceEntries;
   ends_at(kPlace + 5);
   EXPECT_EQ(failed(), 1U);
@@ -239,7 +240,7 @@ TEST(Restore, OnlyEndsAtTheSamePlaceAreCountedTogether) {
   ends_at(3 * kPlace + 7);
   EXPECT_EQ(failed(), 2U);
   // Without the journal it does not come to that place, and is one more all the same.
-  ASSERT_TRUE(RestoreMarks::Read(*store, 1)->BeginWithoutJournal(1));
+  ASSERT_TRUE(RestoreMarks::Read(*store, {.restoring = 1})->BeginWithoutJournal(1));
   EXPECT_EQ(failed(), 3U);
   ends_at(7);
   EXPECT_EQ(failed(), 1U);
@@ -289,7 +290,7 @@ TEST(Restore, ASessionThatEndedTheServerStaysInTheStoreWithItsPartOfTheMapShown)
   };
   const auto before = records();
   ASSERT_FALSE(before.second.empty());
-  ASSERT_TRUE(RestoreMarks::Read(**OpenStore(directory / "0"))->Set(1, 2));
+  ASSERT_TRUE(RestoreMarks::Read(**OpenStore(directory / "0"), {})->Set(1, 2));
   for (std::uint64_t start = 0; start < 2; ++start) {
     StoredServer second(directory / "0", options);
     const Reply status = second->Ask(About(RequestKind::kStatus, ""));
@@ -315,10 +316,10 @@ TEST(Restore, ASessionThatEndsTheServerEvenWithoutItsJournalIsLeftOut) {
   }
   {
     const auto store = *OpenStore(directory / "0");
-    auto marks = *RestoreMarks::Read(*store);
+    auto marks = *RestoreMarks::Read(*store, {});
     for (int failure = 0; failure < 3; ++failure) {
       ASSERT_TRUE(marks.Begin({1}));
-      marks = *RestoreMarks::Read(*store, 1);
+      marks = *RestoreMarks::Read(*store, {.restoring = 1});
     }
     ASSERT_TRUE(marks.Settle());
   }
