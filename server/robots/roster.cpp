@@ -92,20 +92,22 @@ Result<void> Roster::Admit(const SessionRequest& request) {
     session->End();  // Announces again that it has ended.
     return {};
   }
-  if (request.started) {
-    return Fail(StatusCode::kFailedPrecondition, "the server does not know this session of '" + request.robot +
-                                                     "'; open a new one" + WhyNotRestored(request.robot));
-  }
+  if (request.started) return tl::unexpected(WhyNotKnown(request.robot));
   if (session == nullptr || session->record().phase() == SessionPhase::kEnded) return Open(request);
   // Before the first scan of a session was used, the robot may have been carried away from where the old client said.
   const bool replaces = request.has_start || !HasDrawn(*session);
   return replaces ? Replace(*session, request) : Resume(*session, request);
 }
 
-std::string Roster::WhyNotRestored(const std::string& robot) const {
+// A client opens a new session by itself, and sends again what no server has stored, unless that is the reason.
+Status Roster::WhyNotKnown(const std::string& robot) const {
+  const std::string what = "the server does not know this session of '" + robot + "'";
   const MutexLock lock(mutex_);
   const auto found = not_restored_.find(robot);
-  return found == not_restored_.end() ? std::string() : " (" + found->second + ")";
+  if (found == not_restored_.end()) return {StatusCode::kFailedPrecondition, what + "; open a new one"};
+  const auto& [code, why] = found->second;
+  if (code == StatusCode::kInvalidArgument) return {code, what + " any more (" + why + ")"};
+  return {StatusCode::kFailedPrecondition, what + "; open a new one (" + why + ")"};
 }
 
 // Whether the request may take over this session, or else why not. REQUIRES: the session has not ended.

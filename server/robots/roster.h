@@ -57,8 +57,9 @@ class Roster {
   // the sites were restored before, and no other function was called. A session whose records are damaged, or were
   // written by a newer server, is set aside (store/set_aside.h): its records stay, and its robot is told to open a new
   // one. A session during whose restoring earlier servers failed (RestoreMarks) is restored alone; after two failures
-  // it is set aside, and only its part of the map is shown, from its checkpoint; after three, not even this. The same
-  // after three crashes of its thread within hours, because its robot sends again what the estimator cannot process.
+  // it is set aside, and only its part of the map is shown, from its checkpoint; after three, not even this. After
+  // three crashes of its thread while its robot drove (RestoreMarks::kDrivingTogetherS) it is set aside as after two
+  // failures, and its client is refused (INVALID_ARGUMENT): it would send again what the estimator cannot process.
   // A session whose checkpoint was made with other options of the estimator is restored from its whole journal, if that
   // is there and short; otherwise it keeps its options. `control`: CANCELLED if it was given up, after which the next
   // start does the same again.
@@ -107,7 +108,7 @@ class Roster {
   void TellDisplaced(const SessionState& before, const SessionRequest& request);
   Result<void> Open(const SessionRequest& request);
   void StoreQuiet() CAIRN_REQUIRES(mutex_);
-  [[nodiscard]] std::string WhyNotRestored(const std::string& robot) const;
+  [[nodiscard]] Status WhyNotKnown(const std::string& robot) const;
   // Whether others have begun the map of this site.
   [[nodiscard]] bool HasBegun(const std::string& name, const Site& site) const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool BeginsFragment(const SessionRequest& request, const Site& site) const CAIRN_REQUIRES(mutex_);
@@ -180,7 +181,7 @@ class Roster {
   std::vector<Leaving> gone_ CAIRN_GUARDED_BY(mutex_);
   std::map<SessionId, std::shared_ptr<Session>> earlier_ CAIRN_GUARDED_BY(mutex_);  // Ended; others follow them.
   SessionId next_id_ CAIRN_GUARDED_BY(mutex_) = 1;
-  std::map<std::string, std::string> not_restored_ CAIRN_GUARDED_BY(mutex_);  // By robot: why.
+  std::map<std::string, Status> not_restored_ CAIRN_GUARDED_BY(mutex_);  // By robot: why.
 };
 
 }  // namespace cairn::server

@@ -141,6 +141,7 @@ std::shared_ptr<Session> Roster::Make(const StoredSession& stored, const std::sh
   SessionOutputs outputs{.send = [this](OutboundValue value) { return outbound_.Send(std::move(value)); },
                          .grid_changed = [site](GridChange&& change) { site->Change(std::move(change)); },
                          .store = {},
+                         .map_begun = [site] { return site->snapshot()->info.tile_count > 0; },
                          .hidden = [site, id] { site->Hide(id); },
                          .ended = [site, id] { site->End(id); },
                          .gone =

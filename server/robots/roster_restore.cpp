@@ -122,9 +122,9 @@ Result<void> Roster::RestoreTogether(const std::vector<SessionId>& ids, const Re
 Result<void> Roster::RestoreDoubtful(SessionId id, Restoring how) {
   RestoreMarks& marks = *how.marks;
   const std::uint32_t failures = marks.failed(id);
-  const std::string reason = marks.Why(id);
+  const Status reason = marks.Why(id);
   if (failures >= RestoreMarks::kWithoutCheckpoint) {
-    Register(id, NotRestored(id, {StatusCode::kAborted, reason}));
+    Register(id, NotRestored(id, reason));
     return {};
   }
   how.with_journal = failures < RestoreMarks::kWithoutJournal;
@@ -146,7 +146,7 @@ Result<void> Roster::RestoreDoubtful(SessionId id, Restoring how) {
   }
   // The robot has moved on since the checkpoint, so it begins a new session. What is stored of this one stays, and its
   // part of the map is shown as it was in the checkpoint.
-  const Status why = session ? Status{StatusCode::kAborted, reason} : session.error();
+  const Status why = session ? reason : session.error();
   Register(id, NotRestored(id, why));
   return {};
 }
@@ -178,7 +178,7 @@ Roster::RestoredSession Roster::NotRestored(SessionId id, Status why) {
     site = stored->request.site;
     what += " of robot '" + stored->request.robot + "' in site '" + site + "'";
     const MutexLock lock(mutex_);
-    not_restored_[stored->request.robot] = why.message;
+    not_restored_[stored->request.robot] = why;
     if (const auto drawn_in = atlas_.Find(site)) drawn_in->End(id);
   }
   spdlog::error("{}", journal_->set_aside().Add(site, what, why));

@@ -14,6 +14,9 @@ using Clock = std::chrono::steady_clock;
 // How often landmarks are copied for queries: a landmark hardly moves in less time.
 constexpr auto kLandmarkPeriod = std::chrono::milliseconds(500);
 
+// A start that is wrong by what a robot drives in about a second is corrected by the match.
+constexpr std::uint64_t kMostMissing = 10, kLatestNs = kNanosPerSecond;
+
 PoseReport ReportOf(const Scan& scan, const slam::ScanOutcome& outcome, const SessionState& session, SessionToken token,
                     std::uint32_t epoch, bool fragment) {
   PoseReport report;
@@ -99,12 +102,13 @@ void SessionEstimator::DropWaiting() {
 
 void SessionEstimator::On(ScanArrival&& arrival) {
   if (ended_) return Discard(std::move(arrival));
-  Store(ScanTaken{arrival.stream, arrival.scan});
-  ComesFrom(arrival.stream.session);
   if (!first_sequence_ && !record_.begun()) {
     first_sequence_ = arrival.scan->sequence;
     first_stamp_ = arrival.scan->stamp;
   }
+  DoubtStartInNewMap(*arrival.scan);  // Journaled before the scan, so that no restart can come between the two.
+  Store(ScanTaken{arrival.stream, arrival.scan});
+  ComesFrom(arrival.stream.session);
   waiting_.emplace(arrival.scan.get(), Waiting{arrival.stream, arrival.scan->sequence, arrival.received});
   pipeline_.Add(std::move(arrival.scan));
 }
@@ -199,6 +203,8 @@ void SessionEstimator::On(EpochChange&& change) {
 void SessionEstimator::SetEpoch(std::uint32_t epoch) {
   epoch_ = epoch;
   record_.SetEpoch(epoch_);
+  const auto known = pipeline_.mapper().known_map_epoch();
+  if (known && *known != epoch_) record_.LoseLast();
 }
 
 // The grid before a correction, and the path to go back to with it.
@@ -229,9 +235,11 @@ void SessionEstimator::AdoptGrid(std::uint32_t epoch, const RobotGrid& grid) {
   fragment_ = fragment;
   if (!fragment_) start_refused_.clear();
   T_map_keyframe_.reset();
-  // A robot that sends nothing more is where the map version has it as well.
+  // A robot that sends nothing more is where the map version has it as well. (One that is only localised was there when
+  // it mapped last, and must be found again.)
   const std::vector<Pose2> after = mapper.BestPath();
-  if (!before.empty() && after.size() == before.size()) record_.MoveLast(after.back() * before.back().Inverse());
+  if (!mapper.localises() && !before.empty() && after.size() == before.size())
+    record_.MoveLast(after.back() * before.back().Inverse());
   record_.SetJoining({fragment_, driven_m_, start_refused_});
   SetEpoch(epoch);
 }
@@ -304,15 +312,34 @@ void SessionEstimator::On(StartRefused&& refused) {
 
 // Called with each scan that is used. The first one may be much later than the robot's start: those before it never
 // arrived, or were dropped. Where there is a map, the robot may then be elsewhere in it. Repeated when the journal is
-// read, which must come to the same result: so it depends on nothing but what the session itself has received.
+// read, which must come to the same result: so it depends on nothing but what the session itself has received, unless
+// there was no map at the opening. Then the journal holds the decision.
 void SessionEstimator::DoubtLateStart(const Scan& scan) {
-  // A start that is wrong by what a robot drives in about a second is corrected by the match.
-  constexpr std::uint64_t kMostMissing = 10, kLatestNs = kNanosPerSecond;
+  if (!first_sequence_) return;
+  const bool late = IsLate(scan);
+  first_sequence_.reset();
+  if (late && (map_begun_ || OthersHaveBegun())) RefuseLateStart(scan);
+}
+
+// Others may have begun a map since the opening. Decided before the first scan is journaled, so that no restart can
+// come between the two.
+void SessionEstimator::DoubtStartInNewMap(const Scan& scan) {
+  const bool numbered_late = !record_.begun() && *first_sequence_ > kMostMissing + 1;
+  if (numbered_late && !map_begun_ && OthersHaveBegun()) RefuseLateStart(scan);
+}
+
+bool SessionEstimator::OthersHaveBegun() const {
+  return !replaying_ && outputs_.map_begun && outputs_.map_begun();
+}
+
+bool SessionEstimator::IsLate(const Scan& scan) const {
+  return *first_sequence_ > kMostMissing + 1 ||
+         (scan.stamp > first_stamp_ && NanosBetween(first_stamp_, scan.stamp) > kLatestNs);
+}
+
+void SessionEstimator::RefuseLateStart(const Scan& scan) {
   // The filter line_match finds the robot in a map that it was given.
-  if (!map_begun_ || !first_sequence_ || options_.filter.kind == slam::FilterKind::kLineMatch) return;
-  const std::uint64_t first = *std::exchange(first_sequence_, std::nullopt);
-  const bool late = scan.stamp > first_stamp_ && NanosBetween(first_stamp_, scan.stamp) > kLatestNs;
-  if (first <= kMostMissing + 1 && !late) return;
+  if (options_.filter.kind == slam::FilterKind::kLineMatch) return;
   On(StartRefused{"none of the first " + std::to_string(scan.sequence - 1) +
                   " scans of its session was used, so nothing says that it is still where it was said to start"});
 }

@@ -38,6 +38,8 @@ struct SessionOutputs {
   std::function<std::uint64_t()> recover = {};
   std::function<void()> abandon = {};
   CheckpointPace::Limits checkpoint_limits = {};
+  // Whether the site has a map by now. Asked before the first scan of the session was used. May be empty.
+  std::function<bool()> map_begun = {};
   // What the session draws is not shown from now on, because it is not where it was said to start. May be empty.
   std::function<void()> hidden = {};
   // Called when the session ends. May be empty.
@@ -52,7 +54,7 @@ struct EstimatorSetup {
   // Nobody has said where the robot starts in a map that others have begun. Its start is the origin of a frame of its
   // own, and it is not localized, until a map version joins it (maps/robot_grid.h).
   bool fragment = false;
-  bool map_begun = false;  // Others have begun the map, so that it matters where the robot starts.
+  bool map_begun = false;  // Others had begun the map at the opening, so that it matters where the robot starts.
 };
 
 class SessionEstimator {
@@ -106,6 +108,10 @@ class SessionEstimator {
   void Used(const Scan& scan, const slam::ScanOutcome& outcome);
   void Dropped(const Scan& scan, DropReason reason);
   void DoubtLateStart(const Scan& scan);
+  void DoubtStartInNewMap(const Scan& scan);
+  [[nodiscard]] bool OthersHaveBegun() const;
+  [[nodiscard]] bool IsLate(const Scan& scan) const;
+  void RefuseLateStart(const Scan& scan);
   void ComesFrom(SessionToken session);
   GridChange TakeGridChange();
   slam::OccupancyGrid::Chunks PublishedChunks();

@@ -230,6 +230,13 @@ void SessionRecord::MoveLast(const Pose2& T_new_old) {
   pose.covariance = R * pose.covariance * R.transpose();
 }
 
+void SessionRecord::LoseLast() {
+  const MutexLock lock(mutex_);
+  if (!status_.pose.localized) return;
+  status_.pose.localized = false;
+  status_.pose.reason = PoseReason::kLost;
+}
+
 void SessionRecord::SetMapFrame(std::uint64_t map_frame) {
   const MutexLock lock(mutex_);
   status_.session.map_frame = map_frame;

@@ -104,6 +104,8 @@ class SessionRecord {
   void SetEpoch(std::uint32_t epoch);
   // The map around the last pose has moved (`map` before and after): the pose in the status follows.
   void MoveLast(const Pose2& T_new_old);
+  // The last pose is not one in the present map.
+  void LoseLast();
   void SetMapFrame(std::uint64_t map_frame);
   void SetAlive(bool alive);
   [[nodiscard]] bool begun() const;  // A scan was used.

@@ -298,7 +298,8 @@ std::vector<Pose2> Mapper::State::PosesOfFirst(std::uint64_t made, std::span<con
 // a robot whose map is switched again and again must not get worse by it.
 void Mapper::State::Follow(std::span<const Pose2> first_poses, std::uint64_t made) {
   const std::vector<Pose2> before = believed_path().values();
-  // Then the present path contradicts the scans as much or as little as before.
+  trail.ConfirmTentative();  // They are drawn in the grid that comes with the path.
+  // The same path contradicts the scans as much or as little as before.
   if (std::ranges::equal(first_poses, std::span(before).first(first_poses.size()))) return;
   std::vector<Pose2> path(first_poses.begin(), first_poses.end());
   const std::size_t known = path.size();
@@ -308,7 +309,6 @@ void Mapper::State::Follow(std::span<const Pose2> first_poses, std::uint64_t mad
   // Large loops that the job did not know.
   if (drawing.changed_at() > made) OptimisePoses(path, trail.relations(), options.pose_graph);
   filter->MoveTo(path);
-  trail.ConfirmTentative();
   self_check.Forget();
   const Pose2 T_new_old = path.back() * before.back().Inverse();
   recovery.Move(T_new_old);

@@ -61,11 +61,14 @@ std::uint32_t RestoreMarks::failed(std::uint64_t session) const {
   return ends.driving >= kDrivingCrashes ? std::max(restoring, kWithoutJournal) : restoring;
 }
 
-std::string RestoreMarks::Why(std::uint64_t session) const {
+Status RestoreMarks::Why(std::uint64_t session) const {
   const std::uint32_t driving = EndsOf(session).driving;
-  if (driving >= kDrivingCrashes)
-    return "the server crashed " + std::to_string(driving) + " times in what the robot of this session sent";
-  return "the server ended " + std::to_string(failed(session)) + " times while it restored this session";
+  if (driving >= kDrivingCrashes) {
+    return {StatusCode::kInvalidArgument,
+            "the server crashed " + std::to_string(driving) + " times in what the robot of this session sent"};
+  }
+  return {StatusCode::kAborted,
+          "the server ended " + std::to_string(failed(session)) + " times while it restored this session"};
 }
 
 Record RestoreMarks::RecordOf(std::uint64_t session, const Ends& ends, bool open) {

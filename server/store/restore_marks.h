@@ -13,7 +13,6 @@
 #include <cstdint>
 #include <map>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "server/store/store.h"
@@ -48,8 +47,9 @@ class RestoreMarks {
 
   // How many processes failed in a row at the same place of this session.
   [[nodiscard]] std::uint32_t failed(std::uint64_t session) const;
-  // Why it is not restored, or not completely.
-  [[nodiscard]] std::string Why(std::uint64_t session) const;
+  // Why it is not restored, or not completely. INVALID_ARGUMENT: because of what its robot has sent, and would send
+  // again.
+  [[nodiscard]] Status Why(std::uint64_t session) const;
   // These return when the change is on the disk, or when the disk is full. Begin: from the first entry, or from a
   // checkpoint.
   [[nodiscard]] Result<void> Begin(const std::vector<std::uint64_t>& sessions);

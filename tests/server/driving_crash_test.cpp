@@ -66,6 +66,8 @@ TEST(DrivingCrash, ASessionThatCrashesEveryServerIsSetAsideAndTheOthersDriveOn) 
     EXPECT_TRUE(server->WaitFor([&] { return server->CurrentTiles().size() >= 4; })) << "its part of the map is shown";
     SayStarted(*server.operator->());
     ASSERT_TRUE(server->WaitPhase("r1", kDriver, SessionPhase::kRefused));
+    // Its client would send the same again in another session if it were told to open one.
+    EXPECT_EQ(server->LastState("r1", kDriver).status.code, StatusCode::kInvalidArgument);
     EXPECT_THAT(server->LastState("r1", kDriver).status.message, ::testing::HasSubstr("crashed 3 times"));
   }
 }

@@ -79,6 +79,39 @@ TEST_F(Start, IsNotBelievedAMinuteLater) {
   EXPECT_EQ(FirstPose().reason, PoseReason::kNotJoined);
 }
 
+// It was to begin the map; but nothing of it arrived until others had begun it.
+TEST_F(Start, IsNotBelievedAMinuteLaterInASiteThatWasEmpty) {
+  const auto open = [this](const std::string& robot, ClientId client) {
+    house_.Open(robot, client, "yard");
+    ASSERT_TRUE(house_.WaitPhase(robot, client, SessionPhase::kActive));
+  };
+  open("late", 41);
+  open("first", 42);
+  house_.Drive("first", 42, 0, 20);
+  ASSERT_TRUE(house_.WaitFor([this] {
+    Request about = About(RequestKind::kMapInfo);
+    about.site = "yard";
+    const Reply map = house_.Ask(about);
+    return !map.maps.empty() && map.maps[0].tile_count > 0;
+  }));
+  for (int step = 0; step < 4; ++step) {
+    Odometry odometry = RoomOdometry(step);
+    odometry.sequence += 600;
+    house_.SendOdometry("late", 41, odometry);
+    Scan scan = RoomScan(step);
+    scan.sequence += 600;
+    house_.SendScan("late", 41, std::move(scan));
+  }
+  std::optional<PoseReport> pose;
+  ASSERT_TRUE(house_.WaitFor([&] {
+    for (const PoseReport& one : house_.All<PoseReport>())
+      if (!pose && one.robot == "late") pose = one;
+    return pose.has_value();
+  }));
+  EXPECT_FALSE(pose->localized);
+  EXPECT_EQ(pose->reason, PoseReason::kNotJoined);
+}
+
 // All of them arrived, and the server could use none: its queue was full, or nothing said how the robot had moved.
 TEST_F(Start, IsNotBelievedWhereTheServerDroppedTheFirstScans) {
   constexpr ClientId kThird = 30;

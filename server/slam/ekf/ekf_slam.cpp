@@ -167,6 +167,14 @@ void EkfSlam::Rebase(std::span<const Pose2> path) {
   since_anchor_.T_anchor_robot = keyframes_.back().T_anchor_robot;
 }
 
+void EkfSlam::MoveTo(std::span<const Pose2> path) {
+  const auto turn = [&](std::size_t keyframe) { return AngleDiff(path[keyframe].theta, path_[keyframe].theta); };
+  for (const Entry& entry : landmarks_) state_.Turn(entry.at, turn(entry.first_keyframe));
+  for (const Anchor& anchor : anchors_) state_.Turn(anchor.at, turn(anchor.keyframe));
+  state_.Turn(0, turn(path.size() - 1));
+  Rebase(path);
+}
+
 FilterHealth EkfSlam::health() const {
   const FilterEstimate now = estimate();
   const bool sound = now.T_map_robot.IsFinite() && IsCovariance(now.covariance, 1e-6);

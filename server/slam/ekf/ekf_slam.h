@@ -40,6 +40,7 @@ class EkfSlam final : public Filter {
   // Moves the means only. The covariance is unchanged and thus larger than necessary.
   [[nodiscard]] bool rebases() const override { return true; }
   void Rebase(std::span<const Pose2> path) override;
+  void MoveTo(std::span<const Pose2> path) override;
 
   [[nodiscard]] FilterEstimate estimate() const override { return {state_.robot(), state_.covariance<3, 3>(0, 0)}; }
   [[nodiscard]] FilterHealth health() const override;

@@ -10,6 +10,14 @@ namespace cairn::slam {
 JointState::JointState(const Pose2& T_map_robot_start)
     : mean_(T_map_robot_start.vector()), covariance_(Eigen::Matrix3d::Zero()) {}
 
+void JointState::Turn(Eigen::Index at, double angle_rad) {
+  const Eigen::Matrix2d R = Eigen::Rotation2Dd(angle_rad).toRotationMatrix();
+  const Eigen::Matrix2Xd rows = R * covariance_.block(at, 0, 2, size_);
+  covariance_.block(at, 0, 2, size_) = rows;
+  const Eigen::MatrixX2d columns = covariance_.block(0, at, size_, 2) * R.transpose();
+  covariance_.block(0, at, size_, 2) = columns;
+}
+
 void JointState::Move(const Pose2& T_prev_curr, const Eigen::Matrix3d& step_covariance_prev) {
   const OdometryControl control = InverseOdometry(T_prev_curr);
   const Pose2 before = robot();

@@ -32,6 +32,9 @@ class JointState {
   void SetPose(Eigen::Index at, const Pose2& pose) { mean_.segment<3>(at) = pose.vector(); }
   void SetPoint(Eigen::Index at, const Eigen::Vector2d& point) { mean_.segment<2>(at) = point; }
 
+  // The covariances of a pose or a point are those in a frame that is turned by this angle.
+  void Turn(Eigen::Index at, double angle_rad);
+
   // Prediction. Only the robot moves, so F changes its rows and columns only (4.5). `step_covariance_prev` is
   // in the frame in which the step starts.
   void Move(const Pose2& T_prev_curr, const Eigen::Matrix3d& step_covariance_prev);

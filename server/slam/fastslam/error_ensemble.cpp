@@ -1,5 +1,6 @@
 #include "server/slam/fastslam/error_ensemble.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -88,9 +89,13 @@ Eigen::Matrix3f ErrorEnsemble::J_new_old(const Pose2& T_new_old) {
 }
 
 void ErrorEnsemble::MoveMap(std::span<const Pose2> T_new_old) {
-  for (std::size_t k = 0; k < path_.size(); ++k)
+  std::size_t unmoved = path_.size();
+  for (std::size_t k = 0; k < path_.size(); ++k) {
+    if (T_new_old[k] == Pose2{}) continue;
+    unmoved = std::min(unmoved, k);
     path_[k] = std::make_shared<const Kept>(Kept{J_new_old(T_new_old[k]) * path_[k]->errors, path_[k]->spread_share});
-  frozen_path_.Forget();
+  }
+  frozen_path_.ForgetFrom(unmoved);
   robot_ = J_new_old(T_new_old.back()) * robot_;
 }
 

@@ -88,9 +88,10 @@ class Filter {
   virtual void Rebase(std::span<const Pose2> /*path*/) {}
   // Moves the path of hypothesis 0 to `path`, which has one pose per committed keyframe, and all that is believed with
   // it: at each keyframe the other hypotheses and what was seen from it keep their places relative to hypothesis 0. In
-  // contrast to Rebase nothing is forgotten, because a map that is drawn along another path is no new evidence.
-  // REQUIRES: rebases(), and called between steps.
-  virtual void MoveTo(std::span<const Pose2> path) { Rebase(path); }
+  // contrast to Rebase no doubt is removed: what a job has found out from other robots moves the path, but does not
+  // make the filter surer of it, and what the filter has found out since is not lost. REQUIRES: rebases(), and called
+  // between steps.
+  virtual void MoveTo(std::span<const Pose2> /*path*/) {}
   // True if the filter supports Retire.
   [[nodiscard]] virtual bool retires() const { return false; }
   // Gives up committed keyframes: the paths go on without them, and what was seen from them counts as seen from their

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <set>
 
 #include "server/store/sqlite_store.h"
 #include "tests/eventually.h"
@@ -34,11 +35,13 @@ TEST(CommandAnswers, WaitForTheDiskAndNotMoreOfThemThanABound) {
   journal.Start();
   EXPECT_TRUE(test::Eventually([&] { return requests.size() == static_cast<std::size_t>(sent); }));
   EXPECT_FALSE(answers->full());
+  std::set<std::int64_t> answered;
   for (std::int64_t i = 1; i <= sent; ++i) {
     const auto open = requests.Pop();
     ASSERT_TRUE(open && open->rest);
-    EXPECT_EQ(open->request.sequence, i);
+    answered.insert(open->request.sequence);
   }
+  EXPECT_EQ(answered.size(), static_cast<std::size_t>(sent));
 }
 
 TEST(CommandAnswers, AreSentAtOnceWhereNothingIsStored) {

@@ -129,6 +129,7 @@ void StudyOrders(StudyContext& context) {
       "0.5 rad away from it.");
   report.Expect(broken == 0, "what was answered did not hold after a start");
   report.Expect(all.orders.ended == all.orders.jobs, "jobs did not end well");
+  report.Expect(all.orders.given_up <= all.kills / 8, "jobs were given up too early");
   report.Expect(all.lost == 0 && all.doubled == 0, "scans were lost or used twice");
 }
 

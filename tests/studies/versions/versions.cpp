@@ -25,6 +25,7 @@ namespace cairn::studies {
 namespace {
 
 constexpr double kWrong_m = 0.5, kWrong_rad = 0.5;
+constexpr double kMostMore_m = 0.2;  // By which switches may bring a robot farther from the truth.
 constexpr std::size_t kMostWaitingJobs = 2, kVersions = 32;
 
 struct Part {
@@ -210,7 +211,10 @@ void StudyVersions(StudyContext& context) {
       all += ordered;
       all_undisturbed += undisturbed;
     }
+    report.Expect(all.switches > 10 * runs, "there were hardly any switches: " + world);
+    report.Expect(20 * all.poses > 19 * all_undisturbed.poses, "switches make robots lose their places: " + world);
     report.Expect(all.beside_truth <= all_undisturbed.beside_truth, "switches put robots beside the truth: " + world);
+    report.Expect(all.farthest_m < all_undisturbed.farthest_m + kMostMore_m, "switches blur the poses: " + world);
     table.Add({world, "all", Count(all.jobs), Count(all.switches), Count(static_cast<long long>(all.poses)), share(all),
                Number(all.farthest_m, 2), share(all_undisturbed), Number(all_undisturbed.farthest_m, 2)});
   }
