@@ -85,6 +85,23 @@ TEST(JointState, ACloneIsTheRobotUntilTheRobotMoves) {
   EXPECT_GT((state.covariance<2, 2>(0, 0).trace()), (clone.topLeftCorner<2, 2>().trace()));
 }
 
+// A turn of everything is another choice of axes: the covariance is that of a robot that drove the same way there.
+TEST(JointState, ATurnedStateIsAsUncertainAlongTheTurnedAxes) {
+  const Pose2 start{1.0, 2.0, 0.5}, turn{0, 0, 0.8};
+  const Eigen::Matrix3d along = Eigen::Vector3d(0.04, 0.0001, 0.001).asDiagonal();
+  const auto drive = [&](const Pose2& from) {
+    JointState state(from);
+    state.Move({3.0, 0.1, 0.2}, along);
+    state.AddPoint({2.0, 0.7}, kNoise);
+    return state;
+  };
+  JointState state = drive(start);
+  const JointState expected = drive(turn * start);
+  state.Turn(0, turn.theta);
+  state.Turn(3, turn.theta);
+  EXPECT_LT((state.covariance<5, 5>(0, 0) - expected.covariance<5, 5>(0, 0)).norm(), 1e-12);
+}
+
 TEST(JointState, LeavingAnEntryOutChangesNothingElse) {
   JointState state = Moved();
   const Eigen::Index a = state.AddPoint({2.0, 0.7}, kNoise);
