@@ -190,6 +190,9 @@ void RobotClient::OnLedger(Ledger&& ledger) {
       return;
     generation_ = ledger.generation;
     Stream& stream = found->second;
+    // A damaged number may have come through: what was never sent is not safe on the server.
+    for (std::uint64_t* const number : {&ledger.settled_through, &ledger.durable_through, &ledger.last_sequence})
+      *number = std::min(*number, stream.window.sent());
     const std::uint64_t before = stream.window.settled_through();
     stream.window.OnLedger(ledger);
     if (stream.window.settled_through() != before) {

@@ -122,6 +122,7 @@ Result<void> Atlas::OpenStored(const std::string& name) {
   }
   StartControl control;
   if (auto restored = site->Restore(*stored, control); !restored) return restored;
+  site->SetLoading(true);
   const MutexLock lock(mutex_);
   sites_.emplace(name, Place{std::move(site), false});
   reserved_.erase(name);

@@ -93,6 +93,11 @@ class Site : public std::enable_shared_from_this<Site> {
   // The map goes on in the frame of another one, for example of a server that has lost its state. REQUIRES: nothing is
   // drawn yet.
   void AdoptFrame(std::uint64_t map_frame);
+  // Others have begun the map, although perhaps nothing of it is shown: a part of it cannot be read, or is still being
+  // loaded. A robot that does not say where it is must not begin the map anew. Thread rule: any thread.
+  [[nodiscard]] bool begun() const { return lost_part_ || loading_; }
+  void LosePart() { lost_part_ = true; }
+  void SetLoading(bool loading) { loading_ = loading; }
   // What the session draws is not shown from now on, as that of a fragment.
   void Hide(SessionId session);
   // Compares what the session has drawn with what earlier ones have drawn there. `refuses` is asked once, on the
@@ -203,6 +208,7 @@ class Site : public std::enable_shared_from_this<Site> {
   std::optional<VersionSwitch> switch_;
   std::set<TileKey> unsent_;  // Tiles (or tombstones) to publish.
 
+  std::atomic<bool> lost_part_{false}, loading_{false};
   std::atomic<std::uint64_t> map_frame_;
   std::atomic<std::uint64_t> asked_{0}, handled_{0};  // Pieces of work posted to the strand, and finished on it.
   std::atomic<std::uint64_t> encoded_{0};             // Tiles: a piece of work that encodes thousands is progress.

@@ -125,6 +125,7 @@ Result<void> Site::Restore(const StoredSite& stored, StartControl& control) {
 }
 
 void Site::PutAside(const std::string& what, const Status& why) {
+  LosePart();
   spdlog::error("{}", journal_->set_aside().Add(name_, what + " of site '" + name_ + "'", why));
 }
 

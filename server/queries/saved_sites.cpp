@@ -212,6 +212,7 @@ Result<void> SavedSites::OpenLoaded(const SiteFileSummary& loaded) {
   std::vector<SessionId> ids;
   for (const auto& [id, robot] : loaded.sessions) ids.push_back(id);
   const std::size_t taken = rooms_.roster.OpenStored(ids, loading_);
+  if (const auto opened = rooms_.atlas.Find(site)) opened->SetLoading(false);
   if (unfinished) {
     for (const StoredJob& job : *unfinished) rooms_.worker.Requeue(job.job.id, job.enable);
   }

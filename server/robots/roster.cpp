@@ -75,7 +75,8 @@ void Roster::Take(const SessionRequest& request) {
     if (auto admitted = Admit(request); !admitted) Refuse(request, admitted.error());
   } catch (const std::exception& error) {
     spdlog::error("a session of robot {} could not be opened because of an exception: {}", request.robot, error.what());
-    Refuse(request, {StatusCode::kInternal, "internal error of the server; see its log for the cause"});
+    // The client asks again: memory, for example, may be short only now.
+    Refuse(request, {StatusCode::kUnavailable, "internal error of the server; see its log for the cause"});
   }
 }
 

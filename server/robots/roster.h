@@ -109,9 +109,10 @@ class Roster {
   Result<void> Open(const SessionRequest& request);
   void StoreQuiet() CAIRN_REQUIRES(mutex_);
   [[nodiscard]] Status WhyNotKnown(const std::string& robot) const;
-  // Whether others have begun the map of this site.
-  [[nodiscard]] bool HasBegun(const std::string& name, const Site& site) const CAIRN_REQUIRES(mutex_);
-  [[nodiscard]] bool BeginsFragment(const SessionRequest& request, const Site& site) const CAIRN_REQUIRES(mutex_);
+  // Whether a map of the site was begun, by others than `gone`, a session that gives way, if that has drawn nothing.
+  [[nodiscard]] bool HasBegun(const std::string& name, const Site& site, const Session* gone) const
+      CAIRN_REQUIRES(mutex_);
+  [[nodiscard]] bool BeginsFragment(const SessionRequest& request, const Site& site, bool map_begun) const;
   std::shared_ptr<Session> Make(const StoredSession& stored, const std::shared_ptr<Site>& site,
                                 const slam::MapperOptions& mapper) const;
   static void Enter(Site& site, const std::shared_ptr<Session>& session);
@@ -136,6 +137,7 @@ class Roster {
   void Register(SessionId id, RestoredSession restored);
   RestoredSession NotRestored(SessionId id, Status why);
   RestoredSession RestoreOne(SessionId id, const Restoring& how);
+  std::shared_ptr<Session> ReadCheckpointOnly(SessionId id, Restoring how);
   // One session as the store has it.
   struct Stored {
     StoredSession session;

@@ -36,8 +36,8 @@ Result<void> Roster::Open(const SessionRequest& request) {
     gone = *std::move(giving_way);
     stored.id = next_id_++;
     stored.map_epoch = site->snapshot()->info.epoch;
-    stored.map_begun = HasBegun(request.site, *site);
-    stored.fragment = BeginsFragment(request, *site);
+    stored.map_begun = HasBegun(request.site, *site, gone.get());
+    stored.fragment = BeginsFragment(request, *site, stored.map_begun);
     // The first that comes back after the state was lost: the others know their places in the same map.
     const bool elsewhere = request.has_start && request.map_frame != 0 && request.map_frame != site->map_frame();
     if (elsewhere && !stored.fragment && mapper_.filter.kind != slam::FilterKind::kLineMatch) {
@@ -98,20 +98,21 @@ bool Roster::TakePlace(const std::shared_ptr<Session>& session, const std::share
   return true;
 }
 
-bool Roster::BeginsFragment(const SessionRequest& request, const Site& site) const {
+bool Roster::BeginsFragment(const SessionRequest& request, const Site& site, bool map_begun) const {
   const bool in_this_map = request.map_frame == 0 || request.map_frame == site.map_frame();
   // The filter line_match finds the robot in a map that it was given.
   if ((request.has_start && in_this_map) || mapper_.filter.kind == slam::FilterKind::kLineMatch) return false;
-  return HasBegun(request.site, site);
+  return map_begun;
 }
 
-bool Roster::HasBegun(const std::string& name, const Site& site) const {
-  if (site.snapshot()->info.tile_count > 0) return true;
+bool Roster::HasBegun(const std::string& name, const Site& site, const Session* gone) const {
+  if (site.begun() || site.snapshot()->info.tile_count > 0) return true;
   // Others may have begun a map that is not rendered yet.
   return std::ranges::any_of(sessions_, [&](const auto& one) {
     const SessionRecord& record = one.second->record();
     const RobotStatus status = record.snapshot().status;
-    const bool draws = status.session.phase != SessionPhase::kEnded || status.pose.reason != PoseReason::kWaiting;
+    const bool goes_on = status.session.phase != SessionPhase::kEnded && one.second.get() != gone;
+    const bool draws = goes_on || status.pose.reason != PoseReason::kWaiting;
     return status.session.site == name && draws && !record.joining().fragment;
   });
 }
@@ -141,7 +142,7 @@ std::shared_ptr<Session> Roster::Make(const StoredSession& stored, const std::sh
   SessionOutputs outputs{.send = [this](OutboundValue value) { return outbound_.Send(std::move(value)); },
                          .grid_changed = [site](GridChange&& change) { site->Change(std::move(change)); },
                          .store = {},
-                         .map_begun = [site] { return site->snapshot()->info.tile_count > 0; },
+                         .map_begun = [site] { return site->begun() || site->snapshot()->info.tile_count > 0; },
                          .hidden = [site, id] { site->Hide(id); },
                          .ended = [site, id] { site->End(id); },
                          .gone =

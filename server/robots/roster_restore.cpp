@@ -179,7 +179,10 @@ Roster::RestoredSession Roster::NotRestored(SessionId id, Status why) {
     what += " of robot '" + stored->request.robot + "' in site '" + site + "'";
     const MutexLock lock(mutex_);
     not_restored_[stored->request.robot] = why;
-    if (const auto drawn_in = atlas_.Find(site)) drawn_in->End(id);
+    if (const auto drawn_in = atlas_.Find(site)) {
+      drawn_in->LosePart();
+      drawn_in->End(id);
+    }
   }
   spdlog::error("{}", journal_->set_aside().Add(site, what, why));
   return tl::unexpected(std::move(why));
@@ -190,10 +193,18 @@ Roster::RestoredSession Roster::RestoreOne(SessionId id, const Restoring& how) {
   try {
     auto restored = ReadBack(id, how);
     if (restored || how.control.given_up()) return restored;
+    const auto shown = how.with_journal ? ReadCheckpointOnly(id, how) : nullptr;
     return NotRestored(id, restored.error());
   } catch (const std::exception& error) {
     return NotRestored(id, {StatusCode::kInternal, error.what()});
   }
+}
+
+// Shows the session's part of the map as it was in its last checkpoint. Null: that cannot be read.
+std::shared_ptr<Session> Roster::ReadCheckpointOnly(SessionId id, Restoring how) {
+  how.with_journal = false;
+  auto session = ReadBack(id, how);
+  return session ? *std::move(session) : nullptr;
 }
 
 SessionId Roster::ReserveIds(std::uint64_t count) {

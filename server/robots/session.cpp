@@ -194,7 +194,7 @@ void Session::Replay(JournalEntry&& entry, const SessionEstimator::Switched& swi
 }
 
 void Session::Replayed() {
-  if (!failed_) Throws([this] { estimator_.Replayed(); });
+  Throws([this] { estimator_.Replayed(); });  // Also of one that failed: what it has drawn is part of the map.
   record_.Restored(stored_.quiet_since_ms);
   if (record_.phase() == SessionPhase::kEnded) ending_ = true;
   state_unsent_ = true;
@@ -360,9 +360,12 @@ void Session::Fail(const char* what) noexcept {
     if (!first) return;
     const std::string robot = record_.state().robot;
     spdlog::error("robot '{}': its session ends because of an exception: {}", robot, what);
+    const Status why{StatusCode::kInternal, "the estimator of '" + robot + "' failed: " + what};
+    // The next server may not fail where this one did, but the robot knows that the session has ended.
+    if (!estimator_.replaying()) Store(SessionFinished{true, why});
     estimator_.DropWaiting();
     state_unsent_ = true;  // Should the next line fail as well, housekeeping tries again.
-    Finished(SessionPhase::kEnded, {StatusCode::kInternal, "the estimator of '" + robot + "' failed: " + what});
+    Finished(SessionPhase::kEnded, why);
   } catch (...) {
     // Whatever it was, the first exception is the one to know about; housekeeping announces the end later.
   }

@@ -75,6 +75,7 @@ class SessionEstimator {
   void Replay(JournalEntry&& entry, const Switched& switched);
   // Called after the last entry: gives the drawn grid to the map.
   void Replayed();
+  [[nodiscard]] bool replaying() const { return replaying_; }
   // Saves the state after the entries so far. The result is a function that makes the content; it may take long and may
   // run on any thread. Empty if the moment does not allow a checkpoint (SessionRecord::Save). Load restores this state;
   // then the entries that follow are replayed.

@@ -156,6 +156,17 @@ Result<void> CheckNames(const SiteFileSummary& file, const ImportOptions& option
   return {};
 }
 
+// The side of a site's cells; 0 where that is not known.
+double CellsOf(Store& store, const std::string& site) {
+  double cells_m = 0.0;
+  const auto take = [&cells_m](std::uint64_t, std::string_view bytes) -> Result<void> {
+    if (const auto stored = SiteOf(bytes)) cells_m = stored->resolution_m;
+    return {};
+  };
+  static_cast<void>(store.Read({.kind = RecordKind::kSite, .owner = HashName(site)}, take));
+  return cells_m;
+}
+
 // Whether everything of the file can be beside what the store holds.
 Result<void> CheckRoom(Store& store, const std::map<std::uint64_t, StoredSession>& stored, const SiteFileSummary& file,
                        const Renaming& renaming) {
@@ -165,6 +176,12 @@ Result<void> CheckRoom(Store& store, const std::map<std::uint64_t, StoredSession
     if (HashName(site) == HashName(renaming.site()))
       return Fail(StatusCode::kAlreadyExists,
                   "there is a site '" + site + "' already; delete it, or give this one another name");
+    // A server has cells of one size only, and does not start where a site has others.
+    const double cells_m = CellsOf(store, site);
+    if (cells_m != 0.0 && file.site.resolution_m != 0.0 && cells_m != file.site.resolution_m)
+      return Fail(StatusCode::kFailedPrecondition, "the file has cells of " + std::to_string(file.site.resolution_m) +
+                                                       " m, and site '" + site + "' those of " +
+                                                       std::to_string(cells_m) + " m; a server has one size");
   }
   std::map<NameId, std::string> taken;  // Robot -> its site.
   for (const auto& [id, session] : stored) taken[HashName(session.request.robot)] = session.request.site;

@@ -195,5 +195,41 @@ INSTANTIATE_TEST_SUITE_P(OfEachKind, RestoreOneBadRecord,
                                            BadRecord{RecordKind::kJob, Sql(1), {"r0", "r1", "r2"}, "job 1"}),
                          [](const auto& one) { return "Kind" + std::to_string(static_cast<int>(one.param.kind)); });
 
+// The map that the session had drawn was gone, and the next robot began another one at its origin, `tracking`.
+TEST(Restore, ADamagedJournalLeavesTheMapOfTheCheckpointAndNobodyBeginsItAnew) {
+  const TempDirectory directory;
+  ServerOptions options = TestOptions();
+  options.robots.checkpoint_entries = 40;
+  {
+    StoredServer first(directory / "0", options);
+    first->Open("r1", kDriver);
+    first->Drive("r1", kDriver, 0, 60);
+    ASSERT_TRUE(first->WaitFor([&] { return DurableScans(*first.operator->()) == 60; }));
+    first->Drive("r1", kDriver, 60, 65);  // Behind the last checkpoint, or most of it.
+    ASSERT_TRUE(first->WaitFor([&] { return DurableScans(*first.operator->()) == 65; }));
+    CopyState(directory / "0", directory / "1");  // As a kill leaves it; in good order no journal is left.
+  }
+  const std::string journal = "kind = 2 AND owner = " + Sql(1);
+  ASSERT_EQ(RawRecords(directory / "1")
+                .Run("UPDATE records SET content = CAST(substr(content, 1, 20) || x'00ff00' ||"
+                     " substr(content, 24) AS BLOB) WHERE " +
+                     journal + " AND number = (SELECT MAX(number) FROM records WHERE " + journal + ")"),
+            1);
+  StoredServer second(directory / "1", options);
+  EXPECT_THAT(second->Ask(About(RequestKind::kStatus, "")).status.message,
+              ::testing::HasSubstr("session 1 of robot 'r1' in site 'lab' is set aside"));
+  EXPECT_TRUE(second->WaitFor([&] { return second->CurrentTiles().size() >= 4; }));
+  second->Open("r2", 8, "lab", std::nullopt);
+  ASSERT_TRUE(second->WaitPhase("r2", 8, SessionPhase::kActive));
+  second->Drive("r2", 8, 0, 4);
+  std::optional<PoseReport> pose;
+  ASSERT_TRUE(second->WaitFor([&] {
+    for (const PoseReport& one : second->All<PoseReport>())
+      if (!pose && one.robot == "r2") pose = one;
+    return pose.has_value();
+  }));
+  EXPECT_EQ(pose->reason, PoseReason::kNotJoined);
+}
+
 }  // namespace
 }  // namespace cairn::server::testing

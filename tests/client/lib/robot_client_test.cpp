@@ -246,6 +246,23 @@ TEST_F(RobotClientTest, SendsAgainWhatIsNotDurable) {
   EXPECT_EQ(client->resent(), 4U);
 }
 
+// The ledger of a server that has believed a damaged number: what was never sent is not safe there.
+TEST_F(RobotClientTest, KeepsWhatIsSentAfterALedgerWithAnImpossibleNumber) {
+  server_->SetDurable(true);
+  const auto client = Open();
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(client->Publish(SomeScan()));
+  ASSERT_TRUE(client->WaitSettled(20.0));
+  server_->SetDurableThrough(std::uint64_t{1} << 40);
+  ASSERT_TRUE(Eventually([&] { return client->ledger()->durable_through == 3; }));
+  server_->SetDurableThrough(4);
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(client->Publish(SomeScan()));
+  ASSERT_TRUE(client->WaitSettled(20.0));
+  ASSERT_TRUE(Eventually([&] { return client->ledger()->durable_through == 4; }));
+  server_->Restart(2);
+  EXPECT_TRUE(Eventually([&] { return server_->received().size() == 2; }));
+  EXPECT_EQ(server_->received(), (std::vector<std::uint64_t>{5, 6}));
+}
+
 TEST_F(RobotClientTest, EndsItsSession) {
   const auto client = Open();
   ASSERT_TRUE(client->End(20.0));

@@ -102,7 +102,12 @@ class OneSession {
                              const bool taken = !on_send || on_send(value);
                              return taken && sent_.Keep(std::move(value));
                            },
-                       .grid_changed = [](GridChange&&) {},
+                       .grid_changed = [this](GridChange&&) { ++grid_changes; },
+                       .store =
+                           [this](JournalEntry entry) {
+                             if (on_store) on_store(std::move(entry));
+                             return true;
+                           },
                        .position = [this] { return position.load(); },
                        .checkpoint =
                            [this](std::uint64_t, const Journal::Content&, const Journal::Done& done) {
@@ -157,6 +162,8 @@ class OneSession {
   Session& session() { return *session_; }
   const Sent& sent() const { return sent_; }
   std::function<bool(const OutboundValue&)> on_send;  // Set before anything arrives.
+  std::function<void(JournalEntry&&)> on_store;       // The same. On the strand.
+  std::atomic<int> grid_changes{0};
   // A checkpoint is due when the position is above that of the last one.
   std::atomic<std::uint64_t> position{0};
   std::atomic<int> checkpoints{0};

@@ -55,7 +55,7 @@ TEST_F(RosterTest, WhicheverAllocationFailsTheNextRequestOpensTheSession) {
     roster().Take(request);
     failed = allocations_left < 0;
     allocations_left = -1;
-    const bool told = LastState(robot, client).status.code == StatusCode::kInternal;
+    const bool told = LastState(robot, client).status.code == StatusCode::kUnavailable;
     refused += told ? 1 : 0;
     EXPECT_TRUE(!told || roster().Find(robot) == nullptr) << "allocation " << fails_at << ": half open";
     roster().Take(request);

@@ -80,6 +80,33 @@ TEST_F(RosterTest, ARobotThatFindsNoMapBeginsIt) {
   EXPECT_FALSE(roster().Find("r3")->record().joining().fragment);
 }
 
+// Its program was started again before its lidar was up. It was a fragment for ever then, in a site without a map.
+TEST_F(RosterTest, ARobotThatIsStartedAgainBeforeItsFirstScanStillBeginsTheMap) {
+  roster().Take(RequestOf("r1", 7));
+  Suspend(7);
+  roster().Take(RequestOf("r1", 8));
+  ASSERT_EQ(LastState("r1", 8).phase, SessionPhase::kActive);
+  EXPECT_FALSE(roster().Find("r1")->record().joining().fragment);
+}
+
+// Nothing of the map is shown, but there is one, in which the robot is somewhere.
+TEST_F(RosterTest, ARobotThatDoesNotSayWhereItStartsIsAFragmentWhereAMapIsLoadedOrCannotBeRead) {
+  const auto is_fragment = [&](const std::string& robot) { return roster().Find(robot)->record().joining().fragment; };
+  Roster& robots = roster();
+  const auto lab = atlas_->Find("lab");
+  lab->SetLoading(true);
+  robots.Take(RequestOf("r1", 7));
+  EXPECT_TRUE(is_fragment("r1"));
+  lab->SetLoading(false);
+  robots.Take(RequestOf("r2", 8));
+  EXPECT_FALSE(is_fragment("r2"));
+  ASSERT_TRUE(robots.End("r2"));
+  ASSERT_TRUE(WaitPhase("r2", 8, SessionPhase::kEnded));
+  lab->LosePart();
+  robots.Take(RequestOf("r3", 9));
+  EXPECT_TRUE(is_fragment("r3"));
+}
+
 TEST_F(RosterTest, WhatARobotHasDrawnIsAMapAlsoAfterItHasGone) {
   roster().Take(RequestOf("r1", 7));
   for (int step = 0; step < 5; ++step) {
