@@ -76,7 +76,7 @@ Result<void> Roster::Restore(StartControl& control) {
   if (auto settled = marks->Settle(); !settled) return settled;
   std::error_code ignored;
   std::filesystem::remove(note(kDrivingNote), ignored);  // It is counted now.
-  const auto restored = RestoreAll(*ids, *last, *marks, note(kRestoringNote), control);
+  auto restored = RestoreAll(*ids, *last, *marks, note(kRestoringNote), control);
   if (restored) crash_note_ = std::make_unique<CrashNote>(note(kDrivingNote));
   return restored;
 }

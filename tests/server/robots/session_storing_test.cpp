@@ -1,5 +1,9 @@
-// A session that was not stored for a while, and is again.
+// A session that was not stored for a while, and is again; and what an exception leaves of one that is read back.
 #include <gtest/gtest.h>
+
+#include <stdexcept>
+#include <utility>
+#include <vector>
 
 #include "tests/server/robots/one_session.h"
 
@@ -75,6 +79,21 @@ TEST_F(StoredSessionTest, HasNoWorkOnceItHasEnded) {
   ASSERT_TRUE(one_.sent().WaitFor([&] { return !one_.session().has_work(); }));
   one_.session().Tick();
   EXPECT_FALSE(one_.session().has_work());
+}
+
+// It fails at the same scan each time that it is read: nothing of its map was shown any more.
+TEST(StoredSession, AnExceptionWhileItIsRestoredLeavesItsPartOfTheMap) {
+  OneSession first, later;
+  std::vector<JournalEntry> journal;
+  first.on_store = [&journal](JournalEntry&& entry) { journal.push_back(std::move(entry)); };
+  first.Drive(0, 10);
+  ASSERT_TRUE(first.WaitSettled(10));
+  const auto switched = [](std::uint32_t, std::uint64_t) -> bool { throw std::runtime_error("not known"); };
+  for (JournalEntry& entry : journal) later.session().Replay(std::move(entry), switched);
+  later.session().Replay(CorrectionTaken{}, switched);
+  later.session().Replayed();
+  EXPECT_EQ(later.phase(), SessionPhase::kEnded);
+  EXPECT_GT(later.grid_changes, 0);
 }
 
 }  // namespace

@@ -295,21 +295,6 @@ TEST(Session, AnExceptionEndsItWithAReasonAndNothingElse) {
   EXPECT_GT(later.grid_changes, 0);
 }
 
-// It fails at the same scan each time that it is read: nothing of its map was shown any more.
-TEST(Session, AnExceptionWhileItIsRestoredLeavesItsPartOfTheMap) {
-  OneSession first, later;
-  std::vector<JournalEntry> journal;
-  first.on_store = [&journal](JournalEntry&& entry) { journal.push_back(std::move(entry)); };
-  first.Drive(0, 10);
-  ASSERT_TRUE(first.WaitSettled(10));
-  const auto switched = [](std::uint32_t, std::uint64_t) -> bool { throw std::runtime_error("not known"); };
-  for (JournalEntry& entry : journal) later.session().Replay(std::move(entry), switched);
-  later.session().Replay(CorrectionTaken{}, switched);
-  later.session().Replayed();
-  EXPECT_EQ(later.phase(), SessionPhase::kEnded);
-  EXPECT_GT(later.grid_changes, 0);
-}
-
 // This room was compiled with a logger of its own, which server.log_level did not reach.
 TEST(Session, LogsToTheLoggerOfTheProcess) {
   const auto kept = std::make_shared<spdlog::sinks::ringbuffer_sink_mt>(8);

@@ -140,26 +140,6 @@ TEST(ImportSite, NumbersGrowByWhatTheFileHoldsAndNotByTheirSize) {
   }
 }
 
-// A server does not start on a state in which sites have cells of several sizes.
-TEST(ImportSite, RefusesCellsOfAnotherSizeThanThoseThere) {
-  const TempDirectory directory;
-  const auto path = Saved(directory, {});
-  const auto file = *SurveySiteFile(path);
-  ASSERT_GT(file.site.resolution_m, 0.0);
-  for (const double factor : {1.0, 2.0}) {
-    const auto store = MemoryStore();
-    StoredSite other = file.site;
-    other.name = "hall";
-    other.resolution_m *= factor;
-    ASSERT_TRUE(store->Commit({.removed = {}, .put = {{{RecordKind::kSite, HashName("hall"), 0}, BytesOf(other)}}}));
-    const auto imported = ImportSite(*store, path);
-    EXPECT_EQ(imported.has_value(), factor == 1.0);
-    if (imported) continue;
-    EXPECT_EQ(imported.error().code, StatusCode::kFailedPrecondition);
-    EXPECT_NE(imported.error().message.find("cells"), std::string::npos) << imported.error().message;
-  }
-}
-
 TEST(ImportSite, RefusesWhatIsThereAlreadyAndTakesItUnderOtherNames) {
   const TempDirectory directory;
   const auto path = Saved(directory, {});

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <iterator>
 
+#include "server/store/site_edit.h"
 #include "tests/server/store/stored_sites.h"
 #include "tests/temp_directory.h"
 
@@ -155,6 +156,30 @@ TEST_F(SiteFile, AFileThatCannotBeWrittenLeavesTheOneBefore) {
   EXPECT_TRUE(SurveySiteFile(path_));
   // No temporary file is left.
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(directory_.path()), {}), 1);
+}
+
+// A server does not start on a state in which sites have cells of several sizes.
+TEST(ImportSite, RefusesCellsOfAnotherSizeThanThoseThere) {
+  const TempDirectory directory;
+  const auto saved = MemoryStore();
+  const SampleSite sample;
+  Put(*saved, sample);
+  const auto path = directory / "lab.site";
+  ASSERT_TRUE(WriteSiteFile(*saved, sample.name, path));
+  const auto file = *SurveySiteFile(path);
+  ASSERT_GT(file.site.resolution_m, 0.0);
+  for (const double factor : {1.0, 2.0}) {
+    const auto store = MemoryStore();
+    StoredSite other = file.site;
+    other.name = "hall";
+    other.resolution_m *= factor;
+    ASSERT_TRUE(store->Commit({.removed = {}, .put = {{{RecordKind::kSite, HashName("hall"), 0}, BytesOf(other)}}}));
+    const auto imported = ImportSite(*store, path);
+    EXPECT_EQ(imported.has_value(), factor == 1.0);
+    if (imported) continue;
+    EXPECT_EQ(imported.error().code, StatusCode::kFailedPrecondition);
+    EXPECT_NE(imported.error().message.find("cells"), std::string::npos) << imported.error().message;
+  }
 }
 
 }  // namespace
