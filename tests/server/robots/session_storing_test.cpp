@@ -1,6 +1,7 @@
 // A session that was not stored for a while, and is again; and what an exception leaves of one that is read back.
 #include <gtest/gtest.h>
 
+#include <future>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -92,6 +93,32 @@ TEST(StoredSession, AnExceptionWhileItIsRestoredLeavesItsPartOfTheMap) {
   for (JournalEntry& entry : journal) later.session().Replay(std::move(entry), switched);
   later.session().Replay(CorrectionTaken{}, switched);
   later.session().Replayed();
+  EXPECT_EQ(later.phase(), SessionPhase::kEnded);
+  EXPECT_GT(later.grid_changes, 0);
+}
+
+// The next server may not fail where the first one did; but the robot was told that the session has ended.
+TEST(StoredSession, ThatAnExceptionEndedHasEndedForTheNextServerToo) {
+  OneSession broken, later;
+  std::vector<JournalEntry> journal;
+  broken.on_store = [&journal](JournalEntry&& entry) { journal.push_back(std::move(entry)); };
+  broken.on_send = [](const OutboundValue& value) {
+    const PoseReport* const pose = std::get_if<PoseReport>(&value);
+    if (pose != nullptr && pose->scan_sequence == 5) throw std::runtime_error("no memory for pose 5");
+    return true;
+  };
+  broken.Drive(0, 10);
+  ASSERT_TRUE(broken.WaitSettled(10));
+  std::promise<void> stopped;
+  broken.session().Suspend([&stopped] { stopped.set_value(); });
+  stopped.get_future().wait();
+  std::size_t ends = 0;
+  for (JournalEntry& entry : journal) {
+    ends += std::holds_alternative<SessionFinished>(entry) ? 1 : 0;
+    later.session().Replay(std::move(entry), [](std::uint32_t, std::uint64_t) { return true; });
+  }
+  later.session().Replayed();
+  EXPECT_EQ(ends, 1U);
   EXPECT_EQ(later.phase(), SessionPhase::kEnded);
   EXPECT_GT(later.grid_changes, 0);
 }
