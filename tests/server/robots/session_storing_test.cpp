@@ -84,8 +84,8 @@ TEST_F(StoredSessionTest, HasNoWorkOnceItHasEnded) {
 
 // It fails at the same scan each time that it is read: nothing of its map was shown any more.
 TEST(StoredSession, AnExceptionWhileItIsRestoredLeavesItsPartOfTheMap) {
-  OneSession first, later;
   std::vector<JournalEntry> journal;
+  OneSession first, later;
   first.on_store = [&journal](JournalEntry&& entry) { journal.push_back(std::move(entry)); };
   first.Drive(0, 10);
   ASSERT_TRUE(first.WaitSettled(10));
@@ -99,8 +99,8 @@ TEST(StoredSession, AnExceptionWhileItIsRestoredLeavesItsPartOfTheMap) {
 
 // The next server may not fail where the first one did; but the robot was told that the session has ended.
 TEST(StoredSession, ThatAnExceptionEndedHasEndedForTheNextServerToo) {
-  OneSession broken, later;
   std::vector<JournalEntry> journal;
+  OneSession broken, later;
   broken.on_store = [&journal](JournalEntry&& entry) { journal.push_back(std::move(entry)); };
   broken.on_send = [](const OutboundValue& value) {
     const PoseReport* const pose = std::get_if<PoseReport>(&value);
