@@ -220,7 +220,7 @@ TEST(Kill, ASecondServerOnTheSameStateEndsWithOneAndSaysSo) {
   ChildProcess first({CAIRND_PATH, "--domain", std::to_string(TestDomain()), "--state", directory.path().string()});
   ASSERT_TRUE(first.Says(" ready"));
   ChildProcess second(
-      {CAIRND_PATH, "--domain", std::to_string(TestDomain() + 1), "--state", directory.path().string()});
+      {CAIRND_PATH, "--domain", std::to_string(AnotherTestDomain()), "--state", directory.path().string()});
   const auto outcome = second.Wait();
   EXPECT_EQ(outcome.exit_code, 1);
   EXPECT_NE(outcome.output.find("another server uses the state directory"), std::string::npos) << outcome.output;
