@@ -93,9 +93,9 @@ class Site : public std::enable_shared_from_this<Site> {
   // The map goes on in the frame of another one, for example of a server that has lost its state. REQUIRES: nothing is
   // drawn yet.
   void AdoptFrame(std::uint64_t map_frame);
-  // Others have begun the map, although perhaps nothing of it is shown: a part of it cannot be read, or is still being
-  // loaded. A robot that does not say where it is must not begin the map anew. Thread rule: any thread.
-  [[nodiscard]] bool begun() const { return lost_part_ || loading_; }
+  // Others have begun the map: some of it is shown, or a part of it cannot be read or is still being loaded. A robot
+  // that does not say where it is must not begin the map anew. Thread rule: any thread.
+  [[nodiscard]] bool begun() const { return lost_part_ || loading_ || snapshot()->info.tile_count > 0; }
   void LosePart() { lost_part_ = true; }
   void SetLoading(bool loading) { loading_ = loading; }
   // What the session draws is not shown from now on, as that of a fragment.

@@ -106,7 +106,7 @@ bool Roster::BeginsFragment(const SessionRequest& request, const Site& site, boo
 }
 
 bool Roster::HasBegun(const std::string& name, const Site& site, const Session* gone) const {
-  if (site.begun() || site.snapshot()->info.tile_count > 0) return true;
+  if (site.begun()) return true;
   // Others may have begun a map that is not rendered yet.
   return std::ranges::any_of(sessions_, [&](const auto& one) {
     const SessionRecord& record = one.second->record();
@@ -142,7 +142,7 @@ std::shared_ptr<Session> Roster::Make(const StoredSession& stored, const std::sh
   SessionOutputs outputs{.send = [this](OutboundValue value) { return outbound_.Send(std::move(value)); },
                          .grid_changed = [site](GridChange&& change) { site->Change(std::move(change)); },
                          .store = {},
-                         .map_begun = [site] { return site->begun() || site->snapshot()->info.tile_count > 0; },
+                         .map_begun = [site] { return site->begun(); },
                          .hidden = [site, id] { site->Hide(id); },
                          .ended = [site, id] { site->End(id); },
                          .gone =
