@@ -4,6 +4,7 @@
 #include <fastdds/rtps/builtin/discovery/participant/PDP.h>
 #include <fastdds/rtps/history/History.h>
 #include <fastdds/rtps/history/ReaderHistory.h>
+#include <fastdds/rtps/history/WriterHistory.h>
 #include <fastdds/rtps/resources/TimedEvent.h>
 #include <fastdds/rtps/writer/LivelinessManager.h>
 #include <fastrtps/fastrtps_dll.h>
@@ -147,6 +148,21 @@ History::const_iterator History::get_change_nts(const SequenceNumber_t& seq, con
     if (!of_reader) break;
   }
   return next;
+}
+
+// Takes a change out of a history. The library's own version looks for it without the mutex of the history, while other
+// threads add changes and remove them. The messages of DDS Security's handshakes with all peers are in one history, and
+// the thread of timers sends those again that are not answered. A message that was not found was never sent again: the
+// peer was never let in.
+CacheChange_t* WriterHistory::remove_change_and_reuse(const SequenceNumber_t& sequence_number) {
+  if (mp_writer == nullptr || mp_mutex == nullptr) return nullptr;
+  const std::lock_guard<eprosima::fastrtps::RecursiveTimedMutex> lock(*mp_mutex);
+  const auto has_number = [&](const CacheChange_t* change) { return change->sequenceNumber == sequence_number; };
+  const auto found = std::find_if(m_changes.cbegin(), m_changes.cend(), has_number);
+  if (found == m_changes.cend()) return nullptr;
+  CacheChange_t* const change = *found;
+  remove_change_nts(found, false);
+  return change;
 }
 
 // The next three functions replace those with which the library notes that a writer is alive, is not, or has gone. It

@@ -1,15 +1,20 @@
 #include "common/wire/library_repairs.h"
 
 #include <fastdds/rtps/history/ReaderHistory.h>
+#include <fastdds/rtps/history/WriterHistory.h>
 #include <fastdds/rtps/resources/ResourceEvent.h>
 #include <fastdds/rtps/writer/LivelinessManager.h>
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <memory>
+#include <mutex>
 #include <thread>
 #include <utility>
 #include <vector>
+
+#include "tests/eventually.h"
 
 namespace cairn::wire {
 namespace {
@@ -74,6 +79,35 @@ TEST(LibraryRepairs, WhereAChangeIsMissingTheNextOneOfItsWriterIsGiven) {
   ASSERT_NE(next, history.changesEnd());
   EXPECT_EQ((*next)->sequenceNumber.low, 5U);
   EXPECT_EQ(history.get_change_nts({0, 6}, WriterOf(1), &found, history.changesBegin()), history.changesEnd());
+}
+
+// The history of a writer that is not there. What it looks for is never found.
+class EmptyHistory : public rtps::WriterHistory {
+ public:
+  EmptyHistory() : rtps::WriterHistory(rtps::HistoryAttributes()) {
+    mp_mutex = &mutex;
+    mp_writer = reinterpret_cast<rtps::RTPSWriter*>(this);  // It only must not be null.
+  }
+  ~EmptyHistory() override {
+    mp_mutex = nullptr;
+    mp_writer = nullptr;
+  }
+  eprosima::fastrtps::RecursiveTimedMutex mutex;
+};
+
+// A message of a handshake that was not found for this reason was never sent again.
+TEST(LibraryRepairs, AChangeIsNotLookedForWhileTheHistoryChanges) {
+  UseRepairs();
+  EmptyHistory history;
+  std::atomic<bool> looked{false};
+  std::unique_lock<eprosima::fastrtps::RecursiveTimedMutex> changing(history.mutex);
+  std::jthread other([&] {
+    EXPECT_EQ(history.remove_change_and_reuse({0, 1}), nullptr);
+    looked = true;
+  });
+  EXPECT_FALSE(cairn::test::Eventually([&] { return looked.load(); }, std::chrono::milliseconds(100)));
+  changing.unlock();
+  EXPECT_TRUE(cairn::test::Eventually([&] { return looked.load(); }));
 }
 
 // Leases run out while they are renewed, as where a process stood still: a loss and a return must be told in turn. The
