@@ -96,7 +96,8 @@ std::string RobotClient::Silence(Clock::time_point now) {
   if (over_ || reopening_ || state_->phase == SessionPhase::kEnded) return {};
   if (now - answered_at_ > kStaleAfter) return "the server does not answer the session's request";
   const bool hostile = wire_->bus->datagrams_refused() > refused_at_renewal_;
-  // With DDS Security a handshake gets stuck now and then (Fast DDS 2.9); a new participant begins another one.
+  // With DDS Security a handshake may get stuck, and the server may have lost this participant while this one has not
+  // lost the server: then none is begun any more (Fast DDS 2.9). A new participant begins another one.
   const bool stuck = !wire_->bus->options().security.empty() && now - connected_at_ > kLongestHandshake;
   if (stuck || (hostile && now - connected_at_ > kLostServer)) return "no server is found";
   for (const auto& [sensor_id, stream] : streams_) {

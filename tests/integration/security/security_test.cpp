@@ -66,8 +66,8 @@ class SecureDoors : public ::testing::Test {
     std::unique_ptr<wire::Bus> bus;
     std::vector<std::unique_ptr<wire::Publication<Sample>>> writers;
   };
-  // Joins until the server has matched the writers: a handshake of Fast DDS 2.9 gets stuck now and then, on a busy
-  // machine once in fifty. The clients of Cairn then join as a new participant as well.
+  // Joins until the server has matched the writers. On a very slow machine a handshake may get stuck: the clients of
+  // Cairn then join as a new participant as well.
   template <typename Sample>
   Member<Sample> Join(const std::filesystem::path& identity, const std::vector<std::string>& robots = {}) {
     Member<Sample> member;
@@ -255,7 +255,7 @@ TEST_F(SecureDoors, LetInMembersThatJoinAtTheSameTime) {
   EXPECT_EQ(let_in, kMembers * kRounds);
 }
 
-// A handshake of Fast DDS gets stuck now and then: to a client it looks as if there were no server.
+// A handshake that is stuck looks to a client as if there were no server.
 TEST(SecureClients, JoinAgainWhereNoServerIsFound) {
   auto server = std::make_unique<test::FakeServer>(SecureOptions(Fleet() / "server"));
   const auto bus = MakeBus("robot", SecureOptions(Fleet() / "robots" / "r1"));
@@ -273,7 +273,7 @@ TEST(SecureClients, JoinAgainWhereNoServerIsFound) {
   Scan scan;
   scan.ranges_m.assign(10, 2.0F);
   Must(robot->Publish(scan));
-  Must(robot->WaitSettled(150.0));  // Several handshakes in a row may get stuck on a busy machine.
+  Must(robot->WaitSettled(150.0));
 }
 
 class SecurityFiles : public ::testing::Test {
