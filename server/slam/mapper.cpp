@@ -306,8 +306,11 @@ void Mapper::State::Follow(std::span<const Pose2> first_poses, std::uint64_t mad
   for (std::size_t k = known; k < before.size(); ++k)
     path.push_back(path[known - 1] * Between(before[known - 1], before[k]));
   KeepShape(path, known);
-  // Large loops that the job did not know.
-  if (drawing.changed_at() > made) OptimisePoses(path, trail.relations(), options.pose_graph);
+  if (drawing.changed_at() > made) {  // Large loops that the job did not know.
+    OptimisePoses(path, trail.relations(), options.pose_graph);
+  } else {
+    FitRest(path, known);
+  }
   filter->MoveTo(path);
   self_check.Forget();
   const Pose2 T_new_old = path.back() * before.back().Inverse();
@@ -332,6 +335,16 @@ void Mapper::State::KeepShape(std::span<const Pose2> path, std::size_t known) {
       trail.AddLoop({last, k, T_last_k, PoseCovariance(kSigmaM, kSigmaRad), true});
     last = k;
   }
+}
+
+// What was driven since the job knew the path does not hang on the last of its poses alone: it must fit what was seen
+// again of the first `known` keyframes.
+void Mapper::State::FitRest(std::vector<Pose2>& path, std::size_t known) const {
+  const auto holds = [known](const PoseRelation& one) {
+    return one.loop && std::min(one.from, one.to) < known && std::max(one.from, one.to) >= known;
+  };
+  if (std::ranges::none_of(trail.relations(), holds)) return;
+  OptimisePoses(path, trail.relations(), options.pose_graph, {}, known);
 }
 
 void Mapper::Relocalise(const std::optional<Pose2>& T_map_robot) {

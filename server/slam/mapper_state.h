@@ -96,6 +96,7 @@ struct Mapper::State {
   [[nodiscard]] std::vector<Pose2> PosesOfFirst(std::uint64_t made, std::span<const Pose2> path,
                                                 std::span<const std::uint64_t> numbers) const;
   void KeepShape(std::span<const Pose2> path, std::size_t known);
+  void FitRest(std::vector<Pose2>& path, std::size_t known) const;
   void Draw(const TrackStep& step, bool placed_before);
   ScanOutcome Report(Stamp stamp, const Pose2& T_odom_robot, const TrackStep& step, bool keyframe);
   [[nodiscard]] PoseReason ReasonOf(const TrackStep& step) const;

@@ -3,6 +3,7 @@
 #include <ceres/ceres.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <array>
 #include <memory>
 
@@ -73,7 +74,7 @@ PoseRelationError ErrorOf(const PoseRelation& relation, const Pose2& T_map_from,
 }
 
 PoseGraphSummary OptimisePoses(std::vector<Pose2>& poses, std::span<const PoseRelation> relations,
-                               const PoseGraphOptions& options, const std::function<bool()>& go_on) {
+                               const PoseGraphOptions& options, const std::function<bool()>& go_on, std::size_t held) {
   PoseGraphSummary result;
   if (poses.size() < 2 || relations.empty()) return result;
   std::vector<std::array<double, 3>> blocks;
@@ -86,11 +87,14 @@ PoseGraphSummary OptimisePoses(std::vector<Pose2>& poses, std::span<const PoseRe
   ownership.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   ceres::Problem problem(ownership);
   for (const PoseRelation& relation : relations) {
+    if (std::max(relation.from, relation.to) < held) continue;
     problem.AddResidualBlock(new RelationCost(relation),  // The problem takes ownership of the cost.
                              relation.loop ? &loop_loss : nullptr, blocks[relation.from].data(),
                              blocks[relation.to].data());
   }
-  if (problem.HasParameterBlock(blocks[0].data())) problem.SetParameterBlockConstant(blocks[0].data());
+  if (problem.NumResidualBlocks() == 0) return result;
+  for (std::size_t k = 0; k < std::min(held, blocks.size()); ++k)
+    if (problem.HasParameterBlock(blocks[k].data())) problem.SetParameterBlockConstant(blocks[k].data());
   const auto narrow_to = [&](double widening) {
     loop_loss.Reset(new ceres::CauchyLoss(widening * kLoopLoss), ceres::TAKE_OWNERSHIP);
   };
@@ -124,7 +128,7 @@ PoseGraphSummary OptimisePoses(std::vector<Pose2>& poses, std::span<const PoseRe
   }
   result.usable = result.cost_after <= result.cost_before;
   if (!result.usable) return result;
-  for (std::size_t k = 0; k < poses.size(); ++k) poses[k] = {blocks[k][0], blocks[k][1], WrapAngle(blocks[k][2])};
+  for (std::size_t k = held; k < poses.size(); ++k) poses[k] = {blocks[k][0], blocks[k][1], WrapAngle(blocks[k][2])};
   return result;
 }
 

@@ -56,10 +56,11 @@ struct PoseRelationError {
 };
 [[nodiscard]] PoseRelationError ErrorOf(const PoseRelation& relation, const Pose2& T_map_from, const Pose2& T_map_to);
 
-// Moves `poses` to the path that fits best, or leaves them unchanged if no better one is found. If `go_on` is
-// given, it is called after each iteration of the solver, and the work ends when it returns false. REQUIRES:
-// the indices of all relations lie within poses.
+// Moves `poses` to the path that fits best, or leaves them unchanged if no better one is found; the first `held` of
+// them stay where they are. If `go_on` is given, it is called after each iteration of the solver, and the work ends
+// when it returns false. REQUIRES: the indices of all relations lie within poses; held >= 1.
 PoseGraphSummary OptimisePoses(std::vector<Pose2>& poses, std::span<const PoseRelation> relations,
-                               const PoseGraphOptions& options, const std::function<bool()>& go_on = {});
+                               const PoseGraphOptions& options, const std::function<bool()>& go_on = {},
+                               std::size_t held = 1);
 
 }  // namespace cairn::slam

@@ -1,6 +1,7 @@
 // The estimator follows the path that a job has found.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -160,6 +161,39 @@ TEST(MapperFollows, TheShapeOfAPathThatWasTakenIsKeptInRelations) {
     EXPECT_LT((snapshot.full_path[k].translation() - path[k].translation()).norm(), 0.05) << k;
   adopt();
   EXPECT_EQ(mapper.Snapshot().relations.size(), relations) << "what has not changed is not added again";
+}
+
+// What was driven since a version was made does not hang on its last keyframe alone: it must fit what was seen again.
+TEST(MapperFollows, WhatWasDrivenSinceAVersionFitsWhatWasSeenAgain) {
+  const Drive drive = DriveRound();
+  MapperOptions options;
+  options.filter.particles = 20;
+  Mapper mapper(options, drive.truth.front(), 1);
+  ScanOutcome last;
+  std::size_t taken = 0;
+  const auto drive_to = [&](std::size_t scan) {
+    for (; taken < scan; ++taken) last = mapper.Process(drive.scans[taken], drive.odometry[taken], SerialFor);
+  };
+  drive_to(200);
+  const std::size_t known = mapper.keyframe_count();
+  drive_to(280);  // The second round has begun.
+  std::vector<Pose2> path = mapper.BestPath();
+  path.resize(known);
+  for (std::size_t k = 1; k < known; ++k) {
+    const Pose2 step = Between(mapper.BestPath()[k - 1], mapper.BestPath()[k]);
+    path[k] = path[k - 1] * Pose2{step.x, step.y, step.theta + 0.0001};
+  }
+  ASSERT_TRUE(mapper.AdoptGrid(OccupancyGrid(mapper.grid().options()), known, path));
+  drive_to(281);
+  const MapperSnapshot snapshot = mapper.Snapshot();
+  const auto begun = std::ranges::find(snapshot.keyframes, drive.scans[40]->stamp,
+                                       [](const Keyframe& one) { return one.scan->stamp; });
+  ASSERT_NE(begun, snapshot.keyframes.end());
+  const Pose2 expected = snapshot.full_path.at(static_cast<std::size_t>(begun - snapshot.keyframes.begin())) *
+                         Between(drive.truth[40], drive.truth[280]);
+  EXPECT_LT((last.T_map_robot.translation() - expected.translation()).norm(), 0.05);
+  for (std::size_t k = 0; k < known; ++k) EXPECT_EQ(mapper.BestPath()[k], path[k]) << k;
+  EXPECT_TRUE(last.localized);
 }
 
 // A path that does not belong to the keyframes is not taken.

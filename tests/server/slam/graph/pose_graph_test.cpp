@@ -96,6 +96,19 @@ TEST(PoseGraph, OneLoopStraightensTheSquare) {
   EXPECT_EQ(path.front(), square.measured.front());
 }
 
+TEST(PoseGraph, WhatIsHeldStaysWhereItIs) {
+  Square square;
+  square.relations.push_back({0, 40, Between(square.truth[0], square.truth[40]), kLoopCovariance, true});
+  std::vector<Pose2> path = square.measured;
+  ASSERT_TRUE(OptimisePoses(path, square.relations, {}, {}, 11).usable);
+  for (std::size_t k = 0; k < 11; ++k) EXPECT_EQ(path[k], square.measured[k]) << k;
+  const auto gap_m = [&](const std::vector<Pose2>& of) {
+    return (Between(of[0], of[40]).translation() - Between(square.truth[0], square.truth[40]).translation()).norm();
+  };
+  EXPECT_LT(gap_m(path), 0.25 * gap_m(square.measured));
+  EXPECT_FALSE(OptimisePoses(path, square.relations, {}, {}, path.size()).usable) << "nothing may move";
+}
+
 TEST(PoseGraph, AWrongLoopIsOutvoted) {
   Square square;
   for (const std::size_t k : {36U, 37U, 38U, 39U, 40U})
