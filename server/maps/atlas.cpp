@@ -47,7 +47,7 @@ Result<void> Atlas::Restore(StartControl& control) {
       PutAside(owner, stored.error());
       continue;
     }
-    const auto site = Make(stored->name, false);
+    const auto site = MakeStored(stored->name);
     if (!site) return tl::unexpected(site.error());
     if (auto restored = (*site)->Restore(*stored, control); !restored) return restored;
   }
@@ -171,6 +171,18 @@ Result<std::shared_ptr<Site>> Atlas::Make(const std::string& name, bool configur
   return site;
 }
 
+// All that are stored have room, although there may be more than maps.max_sites by now: none gives way to another one
+// before its sessions are restored.
+Result<std::shared_ptr<Site>> Atlas::MakeStored(const std::string& name) {
+  if (auto valid = ValidateName("site", name); !valid) return tl::unexpected(valid.error());
+  const MutexLock lock(mutex_);
+  if (const auto found = sites_.find(name); found != sites_.end()) return found->second.site;
+  if (auto free = CheckName(name); !free) return tl::unexpected(free.error());
+  auto site = NewSite(name);
+  sites_.emplace(name, Place{site, false});
+  return site;
+}
+
 std::shared_ptr<Site> Atlas::NewSite(const std::string& name) const {
   Site::Beginning beginning = beginning_;
   std::random_device random;  // No server, also on another machine, may draw the same number again.
@@ -201,7 +213,7 @@ Result<void> Atlas::CheckName(const std::string& name) const {
 bool Atlas::Idle(const Place& place) const {
   // Every session and every waiting piece of work holds its site. With a use count of one, only this map holds it.
   const auto last = place.site->snapshot();
-  return place.site.use_count() == 1 && last->tiles.empty() && last->info.versions.size() <= 1;
+  return place.site.use_count() == 1 && !place.site->begun() && last->info.versions.size() <= 1;
 }
 
 void Atlas::Erase(std::map<std::string, Place>::iterator place) {

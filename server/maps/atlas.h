@@ -70,6 +70,7 @@ class Atlas {
     bool configured = false;
   };
   Result<std::shared_ptr<Site>> Make(const std::string& name, bool configured);
+  Result<std::shared_ptr<Site>> MakeStored(const std::string& name);
   std::shared_ptr<Site> NewSite(const std::string& name) const CAIRN_REQUIRES(mutex_);
   Result<StoredSite> Stored(NameId owner) const;
   void PutAside(NameId owner, const Status& why);

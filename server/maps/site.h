@@ -97,6 +97,8 @@ class Site : public std::enable_shared_from_this<Site> {
   // that does not say where it is must not begin the map anew. Thread rule: any thread.
   [[nodiscard]] bool begun() const { return lost_part_ || loading_ || snapshot()->info.tile_count > 0; }
   void LosePart() { lost_part_ = true; }
+  // Whether the stored site names the session among those that draw it. Thread rule: any thread, after Restore.
+  [[nodiscard]] bool WasDrawnBy(SessionId session) const { return stored_members_.contains(session); }
   void SetLoading(bool loading) { loading_ = loading; }
   // What the session draws is not shown from now on, as that of a fragment.
   void Hide(SessionId session);
@@ -209,6 +211,7 @@ class Site : public std::enable_shared_from_this<Site> {
   std::set<TileKey> unsent_;  // Tiles (or tombstones) to publish.
 
   std::atomic<bool> lost_part_{false}, loading_{false};
+  std::set<SessionId> stored_members_;  // Set by Restore, before others know the site.
   std::atomic<std::uint64_t> map_frame_;
   std::atomic<std::uint64_t> asked_{0}, handled_{0};  // Pieces of work posted to the strand, and finished on it.
   std::atomic<std::uint64_t> encoded_{0};             // Tiles: a piece of work that encodes thousands is progress.

@@ -116,6 +116,7 @@ Result<void> Site::Restore(const StoredSite& stored, StartControl& control) {
   for (const SessionId session : stored.fragments) joint_.SetHidden(session, true);
   for (const SessionId session : stored.past) joint_.SetPast(session);
   merged_ = stored.merged;
+  for (const auto& [robot, session] : stored.members) stored_members_.insert(session);
   if (auto restored = RestoreVersions(stored, control); !restored) return restored;
   if (auto restored = RestoreLayers(control); !restored) return restored;
   if (control.given_up()) return Fail(StatusCode::kCancelled, "the start was given up");

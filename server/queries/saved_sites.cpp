@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <exception>
+#include <functional>
 #include <future>
 #include <memory>
 #include <set>
@@ -15,6 +16,18 @@
 
 namespace cairn::server {
 namespace {
+
+// Does something when the block is left, also by an exception.
+class AtTheEnd {
+ public:
+  explicit AtTheEnd(std::function<void()> what) : what_(std::move(what)) {}
+  AtTheEnd(const AtTheEnd&) = delete;
+  AtTheEnd& operator=(const AtTheEnd&) = delete;
+  ~AtTheEnd() { what_(); }
+
+ private:
+  const std::function<void()> what_;
+};
 
 constexpr const char* kExtension = ".site";
 constexpr std::size_t kMostListed = 4096;
@@ -191,13 +204,12 @@ Result<void> SavedSites::Load(const Request& request) {
   options.site = request.site.empty() ? file->site.name : request.site;
   if (auto valid = ValidateName("site", options.site); !valid) return valid;
   if (auto reserved = rooms_.atlas.Reserve(options.site); !reserved) return reserved;
+  const AtTheEnd release([&] { rooms_.atlas.Release(options.site); });  // Also where something throws.
   options.first_session = rooms_.roster.ReserveIds(file->session_numbers.size());
   options.first_job = rooms_.jobs.ReserveIds(file->job_numbers.size());
   const auto loaded =
       Between<SiteFileSummary>([path = *path, options](Store& store) { return ImportSite(store, path, options); });
-  auto taken = loaded ? OpenLoaded(*loaded) : Result<void>(tl::unexpected(loaded.error()));
-  rooms_.atlas.Release(options.site);
-  return taken;
+  return loaded ? OpenLoaded(*loaded) : Result<void>(tl::unexpected(loaded.error()));
 }
 
 Result<void> SavedSites::OpenLoaded(const SiteFileSummary& loaded) {
@@ -207,12 +219,14 @@ Result<void> SavedSites::OpenLoaded(const SiteFileSummary& loaded) {
       spdlog::error("site '{}' is stored and not loaded: {}", site, removed.error().message);
     return open;
   }
+  const AtTheEnd loaded_all([&] {
+    if (const auto opened = rooms_.atlas.Find(site)) opened->SetLoading(false);
+  });
   const auto unfinished = rooms_.jobs.AddStored({loaded.jobs.begin(), loaded.jobs.end()});
   if (!unfinished) spdlog::error("the jobs of site '{}' are not loaded: {}", site, unfinished.error().message);
   std::vector<SessionId> ids;
   for (const auto& [id, robot] : loaded.sessions) ids.push_back(id);
   const std::size_t taken = rooms_.roster.OpenStored(ids, loading_);
-  if (const auto opened = rooms_.atlas.Find(site)) opened->SetLoading(false);
   if (unfinished) {
     for (const StoredJob& job : *unfinished) rooms_.worker.Requeue(job.job.id, job.enable);
   }

@@ -107,7 +107,13 @@ bool Roster::BeginsFragment(const SessionRequest& request, const Site& site, boo
 
 bool Roster::HasBegun(const std::string& name, const Site& site, const Session* gone) const {
   if (site.begun()) return true;
-  // Others may have begun a map that is not rendered yet.
+  // Others may have begun a map that is not rendered yet, such as after a start.
+  const auto has_drawn = [&name](const Session& session) {
+    return session.record().state().site == name && session.record().begun() && !session.record().joining().fragment;
+  };
+  if (std::ranges::any_of(earlier_, [&](const auto& one) { return has_drawn(*one.second); }) ||
+      std::ranges::any_of(gone_, [&](const Leaving& one) { return one.keep && has_drawn(*one.session); }))
+    return true;
   return std::ranges::any_of(sessions_, [&](const auto& one) {
     const SessionRecord& record = one.second->record();
     const RobotStatus status = record.snapshot().status;

@@ -183,6 +183,15 @@ Roster::RestoredSession Roster::NotRestored(SessionId id, Status why) {
       drawn_in->LosePart();
       drawn_in->End(id);
     }
+  } else {
+    // Its own record cannot be read either. Sites without a map are asked as well: it may have drawn one of them and
+    // not have been the last session of its robot there.
+    const auto sites = atlas_.All();
+    const auto was_drawn = [id](const auto& one) { return one->WasDrawnBy(id); };
+    const bool known = std::ranges::any_of(sites, was_drawn);
+    for (const auto& one : sites) {
+      if (known ? was_drawn(one) : !one->begun()) one->LosePart();
+    }
   }
   spdlog::error("{}", journal_->set_aside().Add(site, what, why));
   return tl::unexpected(std::move(why));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <limits>
 #include <utility>
 
 namespace cairn::server {
@@ -98,6 +99,20 @@ void StreamLedger::NewClient() {
   waiting_.clear();
   undurable_.clear();
   gaps_.clear();
+}
+
+bool StreamLedger::AreSound(const std::vector<std::uint64_t>& gaps) const {
+  constexpr std::uint64_t kLargest = std::numeric_limits<std::int64_t>::max();
+  const std::uint64_t last = ledger_.last_sequence;
+  if (last > kLargest || ledger_.settled_through > last || gaps.size() % 2 != 0 || gaps.size() > 2 * kMaxGaps)
+    return false;
+  if (!waiting_.empty() && (*waiting_.begin() < 1 || *waiting_.rbegin() > last)) return false;
+  std::uint64_t after = 0;  // Each gap lies behind the one before, and the last number is in none.
+  for (std::size_t i = 0; i < gaps.size(); i += 2) {
+    if (gaps[i] <= after || gaps[i + 1] < gaps[i] || gaps[i + 1] >= last) return false;
+    after = gaps[i + 1];
+  }
+  return true;
 }
 
 void StreamLedger::AdvanceDurable() {

@@ -8,6 +8,8 @@
 namespace cairn::server {
 namespace {
 
+constexpr std::chrono::seconds kLongestCommit{5};
+constexpr const char* kHangs = "the disk has not answered for more than 5 s: what robots send is not durable";
 constexpr const char* kTooSlow =
     "the disk was too slow or failed for too long, and a part of the state is no longer stored";
 
@@ -290,7 +292,9 @@ JournalHealth Journal::health() const {
       lost = "what a session has done while the disk failed is not on the disk yet";
   }
   const std::string omitted = omitted_.empty() ? std::string() : kTooSlow;
-  for (const std::string& reason : {disk_fault_, left_out_, omitted, lost, checkpoint_fault_})
+  const bool hangs = committing_since_ && Clock::now() - *committing_since_ > kLongestCommit;
+  const std::string hanging = hangs ? kHangs : std::string();
+  for (const std::string& reason : {disk_fault_, hanging, left_out_, omitted, lost, checkpoint_fault_})
     if (!reason.empty())
       return {.degraded = true, .reason = reason, .disk_fails = !disk_fault_.empty(), .over_budget = over_budget_};
   return {.degraded = false, .reason = {}, .disk_fails = false, .over_budget = over_budget_};

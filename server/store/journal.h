@@ -230,6 +230,7 @@ class Journal {
   std::size_t held_bytes_ CAIRN_GUARDED_BY(mutex_) = 0;
   Clock::time_point oldest_ CAIRN_GUARDED_BY(mutex_);
   bool urgent_ CAIRN_GUARDED_BY(mutex_) = false;
+  std::optional<Clock::time_point> committing_since_ CAIRN_GUARDED_BY(mutex_);
   std::string disk_fault_ CAIRN_GUARDED_BY(mutex_);        // Why the last commit failed; empty if it did not.
   std::string left_out_ CAIRN_GUARDED_BY(mutex_);          // What else than a session is no longer stored, and why.
   std::string checkpoint_fault_ CAIRN_GUARDED_BY(mutex_);  // Why the last checkpoint is missing.

@@ -257,8 +257,13 @@ void Journal::BeginCheckpoint(WantedCheckpoint wanted) {
 }
 
 bool Journal::CommitOnce(const RecordChanges& changes) {
+  {
+    const MutexLock lock(mutex_);
+    committing_since_ = Clock::now();
+  }
   const auto committed = store_.Commit(changes);
   const MutexLock lock(mutex_);
+  committing_since_.reset();
   disk_fault_ = committed ? std::string() : committed.error().message;
   ++(committed ? counts_.commits : counts_.failed_commits);
   return committed.has_value();

@@ -113,6 +113,7 @@ class Survey {
     for (const auto& [robot, session] : site->members) summary_.session_numbers.insert(session);
     summary_.session_numbers.insert(site->fragments.begin(), site->fragments.end());
     summary_.session_numbers.insert(site->past.begin(), site->past.end());
+    summary_.session_numbers.insert(site->merged.begin(), site->merged.end());
     summary_.site = std::move(*site);
     return {};
   }

@@ -121,7 +121,7 @@ bool RunServer(std::string_view account, std::string_view state) {
     writer.AddTo(changes);
     static_cast<void>(store.Commit(changes));
   }
-  return StartOn(store);
+  return StartOn(store) == Restored::kSessions;
 }
 
 bool RunCheckpoint(std::string_view input) {
@@ -170,7 +170,8 @@ std::string SeedOfServer(int scans) {
     static_cast<void>(record.ScanReceived(stream, sequence));
     numbers[HashName("laser")].insert(sequence);
   });
-  writer(std::uint32_t{3}, std::uint64_t{kTokenBefore}, false, 0.0, std::string(), waiting);
+  writer(std::uint32_t{3}, std::uint64_t{kTokenBefore}, false, 0.0, std::string(), std::optional<std::uint64_t>(),
+         Stamp{0}, waiting);
   Must(record.Save(writer, numbers), "the account of a session");
   return std::string(1, static_cast<char>(kServer)) + Piece(writer.Bytes()) + StateOf(saved);
 }

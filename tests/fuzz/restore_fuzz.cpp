@@ -15,7 +15,7 @@ bool RunRestore(std::string_view input) {
     const std::uint64_t owner = pieces.Take(), number = pieces.Take<std::uint16_t>();
     store.Put({kind, owner == 0 ? HashName("lab") : owner, number}, pieces.TakePiece());
   }
-  return StartOn(store);
+  return StartOn(store) != Restored::kNothing;
 }
 
 std::string Stored(RecordKind kind, std::uint8_t owner, std::uint16_t number, const std::string& bytes) {

@@ -60,22 +60,24 @@ inline void AskEverything(Rooms& rooms) {
   }
 }
 
-// Whether everything of the store was restored.
-inline bool StartOn(MemoryStore& store) {
+// What of a store is there after a start.
+enum class Restored { kNothing, kNoSession, kSessions };
+inline Restored StartOn(MemoryStore& store) {
   server::Journal journal(store, {});  // Never started: nothing is written.
   Rooms rooms([](server::OutboundValue&&) {}, &journal);
   server::StartControl control;
   const auto sites = rooms.atlas().Restore(control);
-  if (!sites) return Must(!sites.error().message.empty(), "a refusal has a reason"), false;
+  if (!sites) return Must(!sites.error().message.empty(), "a refusal has a reason"), Restored::kNothing;
   const auto sessions = rooms.roster().Restore(control);
-  if (!sessions) return Must(!sessions.error().message.empty(), "a refusal has a reason"), false;
+  if (!sessions) return Must(!sessions.error().message.empty(), "a refusal has a reason"), Restored::kNothing;
   const auto jobs = rooms.jobs().Restore();
-  if (!jobs) return Must(!jobs.error().message.empty(), "a refusal has a reason"), false;
+  if (!jobs) return Must(!jobs.error().message.empty(), "a refusal has a reason"), Restored::kNothing;
   AskEverything(rooms);
   const auto restored = rooms.roster().All();
   for (const auto& session : restored) GoOn(rooms.roster(), *session, 8);
   rooms.Finish();
-  return !restored.empty() || !rooms.atlas().All().empty() || !jobs->empty();
+  if (!restored.empty()) return Restored::kSessions;
+  return rooms.atlas().All().empty() && jobs->empty() ? Restored::kNothing : Restored::kNoSession;
 }
 
 }  // namespace cairn::fuzz

@@ -195,19 +195,42 @@ INSTANTIATE_TEST_SUITE_P(OfEachKind, RestoreOneBadRecord,
                                            BadRecord{RecordKind::kJob, Sql(1), {"r0", "r1", "r2"}, "job 1"}),
                          [](const auto& one) { return "Kind" + std::to_string(static_cast<int>(one.param.kind)); });
 
+// A robot that does not say where it starts comes to the site. It must not begin the map anew.
+void JoinsAndBeginsNothing(StoredServer& server) {
+  server->Open("r2", 8, "lab", std::nullopt);
+  ASSERT_TRUE(server->WaitPhase("r2", 8, SessionPhase::kActive));
+  server->Drive("r2", 8, 0, 4);
+  std::optional<PoseReport> pose;
+  ASSERT_TRUE(server->WaitFor([&] {
+    for (const PoseReport& one : server->All<PoseReport>())
+      if (!pose && one.robot == "r2") pose = one;
+    return pose.has_value();
+  }));
+  EXPECT_EQ(pose->reason, PoseReason::kNotJoined);
+}
+
+// Robot r1 has driven here, in session 1.
+void MakeOneSession(const std::filesystem::path& state) {
+  StoredServer first(state);
+  first->Open("r1", kDriver);
+  first->Drive("r1", kDriver, 0, 60);
+  ASSERT_TRUE(first->WaitFor([&] { return DurableScans(*first.operator->()) == 60; }));
+}
+
 // The map that the session had drawn was gone, and the next robot began another one at its origin, `tracking`.
 TEST(Restore, ADamagedJournalLeavesTheMapOfTheCheckpointAndNobodyBeginsItAnew) {
   const TempDirectory directory;
-  ServerOptions options = TestOptions();
-  options.robots.checkpoint_entries = 40;
+  ASSERT_NO_FATAL_FAILURE(MakeOneSession(directory / "0"));  // In good order: a checkpoint, and no journal behind it.
   {
-    StoredServer first(directory / "0", options);
-    first->Open("r1", kDriver);
-    first->Drive("r1", kDriver, 0, 60);
-    ASSERT_TRUE(first->WaitFor([&] { return DurableScans(*first.operator->()) == 60; }));
-    first->Drive("r1", kDriver, 60, 65);  // Behind the last checkpoint, or most of it.
-    ASSERT_TRUE(first->WaitFor([&] { return DurableScans(*first.operator->()) == 65; }));
-    CopyState(directory / "0", directory / "1");  // As a kill leaves it; in good order no journal is left.
+    ServerOptions options = TestOptions();
+    options.robots.checkpoint_entries = 1'000'000;  // What follows stays in the journal.
+    options.robots.checkpoint_work_s = 1e6;
+    StoredServer again(directory / "0", options);
+    SayStarted(*again.operator->());
+    ASSERT_TRUE(again->WaitPhase("r1", kDriver, SessionPhase::kActive));
+    again->Drive("r1", kDriver, 60, 65);
+    ASSERT_TRUE(again->WaitFor([&] { return DurableScans(*again.operator->()) == 65; }));
+    CopyState(directory / "0", directory / "1");  // As a kill leaves it.
   }
   const std::string journal = "kind = 2 AND owner = " + Sql(1);
   ASSERT_EQ(RawRecords(directory / "1")
@@ -215,20 +238,25 @@ TEST(Restore, ADamagedJournalLeavesTheMapOfTheCheckpointAndNobodyBeginsItAnew) {
                      " substr(content, 24) AS BLOB) WHERE " +
                      journal + " AND number = (SELECT MAX(number) FROM records WHERE " + journal + ")"),
             1);
-  StoredServer second(directory / "1", options);
+  StoredServer second(directory / "1");
   EXPECT_THAT(second->Ask(About(RequestKind::kStatus, "")).status.message,
               ::testing::HasSubstr("session 1 of robot 'r1' in site 'lab' is set aside"));
   EXPECT_TRUE(second->WaitFor([&] { return second->CurrentTiles().size() >= 4; }));
-  second->Open("r2", 8, "lab", std::nullopt);
-  ASSERT_TRUE(second->WaitPhase("r2", 8, SessionPhase::kActive));
-  second->Drive("r2", 8, 0, 4);
-  std::optional<PoseReport> pose;
-  ASSERT_TRUE(second->WaitFor([&] {
-    for (const PoseReport& one : second->All<PoseReport>())
-      if (!pose && one.robot == "r2") pose = one;
-    return pose.has_value();
-  }));
-  EXPECT_EQ(pose->reason, PoseReason::kNotJoined);
+  JoinsAndBeginsNothing(second);
+}
+
+// Not even the site of the session could be read from it.
+TEST(Restore, NobodyBeginsTheMapOfASessionAnewWhoseOwnRecordIsDamaged) {
+  const TempDirectory directory;
+  ASSERT_NO_FATAL_FAILURE(MakeOneSession(directory / "0"));
+  ASSERT_EQ(RawRecords(directory / "0")
+                .Run("UPDATE records SET content = CAST(x'00ff00' || substr(content, 4) AS BLOB) WHERE kind = 1 AND "
+                     "owner = " +
+                     Sql(1)),
+            1);
+  StoredServer second(directory / "0");
+  EXPECT_THAT(second->Ask(About(RequestKind::kStatus, "")).status.message, ::testing::HasSubstr("set aside"));
+  JoinsAndBeginsNothing(second);
 }
 
 }  // namespace

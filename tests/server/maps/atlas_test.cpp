@@ -7,6 +7,10 @@
 #include <map>
 #include <string>
 #include <variant>
+#include <vector>
+
+#include "server/store/journal.h"
+#include "server/store/sqlite_store.h"
 
 namespace cairn::server {
 namespace {
@@ -42,6 +46,47 @@ TEST(Atlas, ADeletedSiteIsMadeAgainOnlyWhenItIsReleased) {
   EXPECT_EQ(atlas.Enter("lab").error().code, StatusCode::kUnavailable);
   atlas.Release("lab");
   EXPECT_TRUE(atlas.Enter("lab"));
+  pool.join();
+}
+
+// While sites are restored, none of them has a session yet. One that held nothing else gave way to the next, and lost
+// its record.
+TEST(Atlas, AllSitesThatAreStoredComeBack) {
+  asio::thread_pool pool(1);
+  Outbound outbound(64);
+  const auto store = *OpenStore(std::string(kInMemory));
+  const std::vector<std::string> names = {"hall", "lab", "yard"};
+  RecordChanges changes;
+  for (const std::string& name : names) {
+    StoredSite site;
+    site.name = name;
+    site.next_version = 2;
+    site.enabled_version = 1;
+    changes.put.push_back({{RecordKind::kSite, HashName(name), 0}, BytesOf(site)});
+  }
+  ASSERT_TRUE(store->Commit(changes));
+  Journal journal(*store, {});
+  MapsOptions options;
+  options.max_sites = 2;  // There were more before.
+  Atlas atlas(options, 0.05, true, pool, outbound, &journal);
+  StartControl control;
+  ASSERT_TRUE(atlas.Restore(control));
+  EXPECT_EQ(atlas.All().size(), names.size());
+  journal.Start();
+  journal.Stop();
+  EXPECT_EQ(store->Owners(RecordKind::kSite)->size(), names.size());
+  pool.join();
+}
+
+TEST(Atlas, ASiteOfWhichAPartCannotBeReadDoesNotGiveWay) {
+  asio::thread_pool pool(1);
+  Outbound outbound(64);
+  MapsOptions options;
+  options.max_sites = 1;
+  Atlas atlas(options, 0.05, true, pool, outbound);
+  (*atlas.Enter("lab"))->LosePart();
+  EXPECT_EQ(atlas.Enter("hall").error().code, StatusCode::kResourceExhausted);
+  EXPECT_EQ(atlas.Reserve("lab").error().code, StatusCode::kAlreadyExists);
   pool.join();
 }
 

@@ -121,6 +121,25 @@ TEST_F(RosterTest, WhatARobotHasDrawnIsAMapAlsoAfterItHasGone) {
   EXPECT_TRUE(roster().Find("r1")->record().joining().fragment);
 }
 
+// As after a start: the map of an earlier session is not rendered yet.
+TEST_F(RosterTest, WhatAnEarlierSessionHasDrawnIsAMapBeforeItIsShown) {
+  roster().Take(RequestOf("r1", 7));
+  for (int step = 0; step < 5; ++step) {
+    roster().Take(OdometryOf("r1", RoomOdometry(step), 7));
+    roster().Take(ScanOf("r1", RoomScan(step), 7));
+  }
+  ASSERT_TRUE(roster().End("r1"));
+  ASSERT_TRUE(WaitPhase("r1", 7, SessionPhase::kEnded));
+  SessionRequest elsewhere = RequestOf("r1", 7);
+  elsewhere.session = 70;
+  elsewhere.site = "hall";
+  roster().Take(elsewhere);
+  ASSERT_EQ(roster().Find("r1")->record().state().site, "hall");
+  ASSERT_EQ(atlas_->Find("lab")->snapshot()->info.tile_count, 0U);
+  roster().Take(RequestOf("r9", 9));
+  EXPECT_TRUE(roster().Find("r9")->record().joining().fragment);
+}
+
 // Robot r1 has drawn something, its session has ended, and another one follows.
 void BeginAgain(Roster& roster, const std::function<bool()>& ended) {
   roster.Take(RequestOf("r1", 7));

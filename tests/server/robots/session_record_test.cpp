@@ -93,6 +93,32 @@ TEST_F(SessionRecordTest, AStreamThatStandsStillAfterARestartIsStale) {
   EXPECT_TRUE(next.state().stale);
 }
 
+// A checkpoint may come from a file. A gap without end was walked through for ever, with the lock held.
+TEST_F(SessionRecordTest, NumbersThatCannotBeThoseOfAStreamAreRefused) {
+  using Gaps = std::vector<std::uint64_t>;
+  const auto is_read = [](const Gaps& gaps, std::uint64_t last = 10, std::uint64_t settled = 2,
+                          const std::set<std::uint64_t>& waiting = {3}) {
+    slam::StateWriter writer;
+    const Ledger counts;
+    writer(std::uint64_t{5}, std::uint64_t{4}, std::uint64_t{1}, counts.dropped, last, settled, Stamp{7}, true,
+           std::uint64_t{1}, std::uint64_t{4}, waiting, gaps);
+    const std::string bytes = writer.Bytes();
+    slam::StateReader reader(bytes);
+    StreamLedger ledger{Ledger{}};
+    reader(ledger);
+    return !reader.failed();
+  };
+  EXPECT_TRUE(is_read({}));
+  EXPECT_TRUE(is_read({4, 4, 5, 9}));
+  for (const Gaps& bad : {Gaps{4}, Gaps{0, 4}, Gaps{0, UINT64_MAX}, Gaps{5, 4}, Gaps{4, 10}, Gaps{4, UINT64_MAX},
+                          Gaps{4, 6, 6, 7}, Gaps{6, 7, 4, 5}})
+    EXPECT_FALSE(is_read(bad)) << ::testing::PrintToString(bad);
+  EXPECT_FALSE(is_read({}, UINT64_MAX));
+  EXPECT_FALSE(is_read({}, 10, 11));
+  EXPECT_FALSE(is_read({}, 10, 2, {0}));
+  EXPECT_FALSE(is_read({}, 10, 2, {11}));
+}
+
 // A server that is started again every night ended no session ever.
 TEST_F(SessionRecordTest, ItIsAwayForAsLongAsBeforeTheRestart) {
   const std::uint64_t now_ms = SessionRecord::MillisecondsNow();

@@ -163,6 +163,50 @@ std::unique_ptr<Store> StoreWithALongJournal(const std::filesystem::path& direct
   return *OpenStore(directory);
 }
 
+// The disk does not answer until it is let go.
+class HangingStore : public Store {
+ public:
+  explicit HangingStore(Store& store) : store_(store) {}
+  Result<void> Commit(const RecordChanges& changes) override {
+    hangs_.wait(true);
+    return store_.Commit(changes);
+  }
+  Result<void> CommitEach(const Next& next) override { return store_.CommitEach(next); }
+  Result<std::size_t> RemoveFirst(const RecordRange& range, std::size_t count) override {
+    return store_.RemoveFirst(range, count);
+  }
+  Result<void> Read(const RecordRange& range, const Visit& visit) override { return store_.Read(range, visit); }
+  Result<std::vector<std::uint64_t>> Owners(RecordKind kind) override { return store_.Owners(kind); }
+  Result<std::vector<std::uint64_t>> Numbers(const RecordRange& range) override { return store_.Numbers(range); }
+  Result<std::uint64_t> bytes_used() override { return store_.bytes_used(); }
+  void Hang(bool hangs) {
+    hangs_ = hangs;
+    hangs_.notify_all();
+  }
+
+ private:
+  Store& store_;
+  std::atomic<bool> hangs_{false};
+};
+
+// Nothing was said of it, although nothing was durable any more.
+TEST(JournalFaults, ADiskThatDoesNotAnswerIsSaid) {
+  const auto memory = *OpenStore(std::string(kInMemory));
+  HangingStore store(*memory);
+  Followed told;
+  Journal journal(store, {.commit_delay_ms = 1});
+  journal.Open(SampleSession(1), told.durable());
+  journal.Start();
+  ASSERT_TRUE(test::Eventually([&] { return told.through == 0; }));
+  store.Hang(true);
+  journal.Append(1, SampleOdometry(1));
+  EXPECT_FALSE(journal.health().degraded);
+  EXPECT_TRUE(test::Eventually([&] { return journal.health().degraded; }, std::chrono::seconds(30)));
+  EXPECT_THAT(journal.health().reason, ::testing::HasSubstr("the disk has not answered"));
+  store.Hang(false);
+  EXPECT_TRUE(test::Eventually([&] { return !journal.health().degraded && told.through == 1; }));
+}
+
 // Counts how records are removed piece by piece.
 class CountedRemovals : public Store {
  public:

@@ -158,6 +158,34 @@ TEST_F(SiteFile, AFileThatCannotBeWrittenLeavesTheOneBefore) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(directory_.path()), {}), 1);
 }
 
+// It threw, and the name stayed blocked.
+TEST(ImportSite, GivesNumbersAlsoToSessionsOfWhichNothingElseIsLeft) {
+  const TempDirectory directory;
+  const auto saved = MemoryStore();
+  const SampleSite sample;
+  Put(*saved, sample);
+  StoredSite site;
+  const auto take = [&site](std::uint64_t, std::string_view bytes) -> Result<void> {
+    site = *SiteOf(bytes);
+    return {};
+  };
+  const RecordKey key{RecordKind::kSite, HashName(sample.name), 0};
+  ASSERT_TRUE(saved->Read({.kind = key.kind, .owner = key.owner}, take));
+  site.merged = {77};
+  ASSERT_TRUE(saved->Commit({.removed = {}, .put = {{key, BytesOf(site)}}}));
+  const auto path = directory / "lab.site";
+  ASSERT_TRUE(WriteSiteFile(*saved, sample.name, path));
+  ImportOptions options;
+  options.site = "hall";
+  options.first_session = 100;
+  options.first_job = 1;
+  const auto store = MemoryStore();
+  const auto imported = ImportSite(*store, path, options);
+  ASSERT_TRUE(imported) << imported.error().message;
+  ASSERT_EQ(imported->site.merged.size(), 1U);
+  EXPECT_GE(*imported->site.merged.begin(), 100U);
+}
+
 // A server does not start on a state in which sites have cells of several sizes.
 TEST(ImportSite, RefusesCellsOfAnotherSizeThanThoseThere) {
   const TempDirectory directory;
