@@ -64,7 +64,7 @@ class StreamLedger {
     if constexpr (Archive::kReads) {
       ledger.waiting = self.waiting_.size();
       self.gaps_.clear();
-      if (!archive.Require(self.AreSound(gaps), "numbers of a stream")) return;
+      if (!archive.RequireThat([&] { return self.AreSound(gaps); }, "numbers of a stream")) return;
       for (std::size_t i = 0; i < gaps.size(); i += 2) self.gaps_.emplace(gaps[i], gaps[i + 1]);
     }
   }

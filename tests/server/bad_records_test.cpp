@@ -211,7 +211,9 @@ void JoinsAndBeginsNothing(StoredServer& server) {
 
 // Robot r1 has driven here, in session 1.
 void MakeOneSession(const std::filesystem::path& state) {
-  StoredServer first(state);
+  ServerOptions options = TestOptions();
+  options.robots.checkpoint_entries = 40;
+  StoredServer first(state, options);
   first->Open("r1", kDriver);
   first->Drive("r1", kDriver, 0, 60);
   ASSERT_TRUE(first->WaitFor([&] { return DurableScans(*first.operator->()) == 60; }));
@@ -220,7 +222,7 @@ void MakeOneSession(const std::filesystem::path& state) {
 // The map that the session had drawn was gone, and the next robot began another one at its origin, `tracking`.
 TEST(Restore, ADamagedJournalLeavesTheMapOfTheCheckpointAndNobodyBeginsItAnew) {
   const TempDirectory directory;
-  ASSERT_NO_FATAL_FAILURE(MakeOneSession(directory / "0"));  // In good order: a checkpoint, and no journal behind it.
+  ASSERT_NO_FATAL_FAILURE(MakeOneSession(directory / "0"));
   {
     ServerOptions options = TestOptions();
     options.robots.checkpoint_entries = 1'000'000;  // What follows stays in the journal.

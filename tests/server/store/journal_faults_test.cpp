@@ -1,7 +1,9 @@
 // A journal whose disk is full or fails at the worst moment, or whose memory is short.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <new>
 
 #include "server/store/checkpoint_writer.h"
