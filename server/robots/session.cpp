@@ -38,7 +38,12 @@ Session::Session(const SessionSetup& setup, const RobotsOptions& options, asio::
           record_, outputs_) {}
 
 Session::~Session() {
-  if (outputs_.gone && !keep_stored_) outputs_.gone();
+  if (!outputs_.gone || keep_stored_) return;
+  try {
+    outputs_.gone();
+  } catch (const std::exception& error) {  // Such as without memory. What is stored of it is read at the next start.
+    spdlog::error("session {} is not taken out of its site: {}", id_, error.what());
+  }
 }
 
 // A sample that is settled here, away from the strand, is recorded before it is journalled. A checkpoint that is taken

@@ -66,5 +66,23 @@ TEST_F(RosterTest, WhicheverAllocationFailsTheNextRequestOpensTheSession) {
   EXPECT_GT(refused, 15);
 }
 
+// The memory ended when the last one let go of the session. An exception that leaves a destructor ends the process.
+TEST(Session, ThatCannotBeTakenOutOfItsSiteEndsNothing) {
+  asio::thread_pool pool(1);
+  int asked = 0;
+  auto session = std::make_shared<Session>(
+      SessionSetup{.id = 1, .request = RequestOf("r1"), .map_epoch = 1, .estimator = {}}, RobotsOptions{}, pool,
+      SessionOutputs{.send = [](const OutboundValue&) { return true; },
+                     .grid_changed = [](GridChange&&) {},
+                     .gone =
+                         [&asked] {
+                           ++asked;
+                           throw std::bad_alloc();
+                         }});
+  session.reset();
+  EXPECT_EQ(asked, 1);
+  pool.join();
+}
+
 }  // namespace
 }  // namespace cairn::server
