@@ -104,7 +104,7 @@ class GuardTransport : public transport::ChainingTransport {
   GuardDescriptor descriptor_;
   std::shared_ptr<GuardReport> report_;
   SequenceGate gate_;
-  Mutex discovery_;
+  Mutex discovery_;  // Held while a message of discovery is handled, where DDS Security is used.
   Mutex mutex_;
   FragmentAssembly assembly_ CAIRN_GUARDED_BY(mutex_);
 };
