@@ -28,6 +28,9 @@
 
 namespace cairn::server {
 
+// The samples of a stream are numbered from 1. No client counts farther than this.
+inline constexpr std::uint64_t kMaxSequence = INT64_MAX;
+
 // A scan at the door. Refused ones carry sequence and stamp only: they are counted, never estimated.
 struct ScanArrival {
   StreamId stream;

@@ -264,8 +264,11 @@ int Serve(const CairndOptions& options, const std::filesystem::path& state) {
   spdlog::info("cairnd {} starts in DDS domain {}", kVersion, options.wire.domain);
   LogConfig(options);
 
-  const auto failed = [](const Status& status) {
+  const ServiceNotifier notifier;
+  const auto failed = [&notifier](const Status& status) {
     spdlog::critical("cannot start: {}", status.message);
+    // systemd starts it again at once, as is right after a crash. What keeps it from starting may last for long.
+    if (notifier.Failed(status.message)) std::this_thread::sleep_for(std::chrono::seconds(2));
     return ExitCodeOf(status);
   };
   const ProcessOptions& process = options.server.server;
@@ -285,7 +288,6 @@ int Serve(const CairndOptions& options, const std::filesystem::path& state) {
   if (!ros2) return failed(ros2.error());
   const auto saved = state == kNoState || state == kInMemory ? std::filesystem::path() : state / "saved";
   Server server(options.server, inbound, outbound, kept->generation, kept->journal.get(), saved);
-  const ServiceNotifier notifier;
   if (auto started = StartWatched(server, context, signals, notifier); !started) {
     if (started.error().code != StatusCode::kCancelled) return failed(started.error());
     spdlog::info("stopped before the start was finished");

@@ -68,8 +68,8 @@ class QueryClient {
                                                                    const QueryClientOptions& options = {});
   ~QueryClient();
 
-  // Times it joined anew: with a server that does not answer, and where none is found with DDS Security, because a
-  // handshake of Fast DDS 2.9 gets stuck now and then, or after forged messages have arrived, which can make it deaf.
+  // Times it joined anew: with a server that does not answer, and with DDS Security where none is found. Forged
+  // messages can make either side deaf, and a handshake whose messages were lost may not come to an end.
   [[nodiscard]] int renewed() const;
 
   // The server's version.

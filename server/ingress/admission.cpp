@@ -4,11 +4,18 @@
 #include <utility>
 
 namespace cairn::server {
+namespace {
+
+bool IsNumber(std::uint64_t sequence) {
+  return sequence > 0 && sequence <= kMaxSequence;
+}
+
+}  // namespace
 
 ScanArrival Admit(ScanSample&& sample, std::chrono::steady_clock::time_point received) {
   ScanArrival arrival{.stream = sample.stream, .scan = nullptr, .refused = {}, .received = received};
   const auto valid = ValidateScan(sample.scan);
-  if (!valid || sample.scan.sequence == 0) {
+  if (!valid || !IsNumber(sample.scan.sequence)) {
     arrival.refused = valid ? DropReason::kBadGeometry : DropReasonOf(valid.error().fault);
     Scan stub;
     stub.sequence = sample.scan.sequence;
@@ -23,7 +30,7 @@ ScanArrival Admit(ScanSample&& sample, std::chrono::steady_clock::time_point rec
 OdometryArrival Admit(OdometrySample&& sample) {
   return {.stream = sample.stream,
           .odometry = sample.odometry,
-          .refused = sample.odometry.sequence == 0 || !ValidateOdometry(sample.odometry).has_value()};
+          .refused = !IsNumber(sample.odometry.sequence) || !ValidateOdometry(sample.odometry).has_value()};
 }
 
 }  // namespace cairn::server

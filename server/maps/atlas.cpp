@@ -47,7 +47,7 @@ Result<void> Atlas::Restore(StartControl& control) {
       PutAside(owner, stored.error());
       continue;
     }
-    const auto site = MakeStored(stored->name);
+    const auto site = Make(stored->name, Why::kStored);
     if (!site) return tl::unexpected(site.error());
     if (auto restored = (*site)->Restore(*stored, control); !restored) return restored;
   }
@@ -146,40 +146,28 @@ Result<std::shared_ptr<Site>> Atlas::Enter(const std::string& name) {
   if (!create_sites_) {
     return Fail(StatusCode::kNotFound, "site '" + name + "' is not served here (server.sites, server.create_sites)");
   }
-  return Make(name, false);
+  return Make(name, Why::kEntered);
 }
 
 Result<std::shared_ptr<Site>> Atlas::Create(const std::string& name) {
-  return Make(name, true);
+  return Make(name, Why::kConfigured);
 }
 
-Result<std::shared_ptr<Site>> Atlas::Make(const std::string& name, bool configured) {
+Result<std::shared_ptr<Site>> Atlas::Make(const std::string& name, Why why) {
   if (auto valid = ValidateName("site", name); !valid) return tl::unexpected(valid.error());
   const MutexLock lock(mutex_);
   const auto found = sites_.find(name);
   if (found != sites_.end()) {
-    found->second.configured |= configured;
+    found->second.configured |= why == Why::kConfigured;
     return found->second.site;
   }
   if (auto free = CheckName(name); !free) return tl::unexpected(free.error());
-  if (!MakeRoom()) {
+  if (why != Why::kStored && !MakeRoom()) {
     return Fail(StatusCode::kResourceExhausted,
                 std::to_string(sites_.size()) + " sites are open; the limit is maps.max_sites");
   }
   auto site = NewSite(name);
-  sites_.emplace(name, Place{site, configured});
-  return site;
-}
-
-// All that are stored have room, although there may be more than maps.max_sites by now: none gives way to another one
-// before its sessions are restored.
-Result<std::shared_ptr<Site>> Atlas::MakeStored(const std::string& name) {
-  if (auto valid = ValidateName("site", name); !valid) return tl::unexpected(valid.error());
-  const MutexLock lock(mutex_);
-  if (const auto found = sites_.find(name); found != sites_.end()) return found->second.site;
-  if (auto free = CheckName(name); !free) return tl::unexpected(free.error());
-  auto site = NewSite(name);
-  sites_.emplace(name, Place{site, false});
+  sites_.emplace(name, Place{site, why == Why::kConfigured});
   return site;
 }
 

@@ -69,8 +69,10 @@ class Atlas {
     std::shared_ptr<Site> site;
     bool configured = false;
   };
-  Result<std::shared_ptr<Site>> Make(const std::string& name, bool configured);
-  Result<std::shared_ptr<Site>> MakeStored(const std::string& name);
+  // A stored one has room although there may be more than maps.max_sites by now: none gives way to another one before
+  // its sessions are restored.
+  enum class Why { kEntered, kConfigured, kStored };
+  Result<std::shared_ptr<Site>> Make(const std::string& name, Why why);
   std::shared_ptr<Site> NewSite(const std::string& name) const CAIRN_REQUIRES(mutex_);
   Result<StoredSite> Stored(NameId owner) const;
   void PutAside(NameId owner, const Status& why);

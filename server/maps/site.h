@@ -196,7 +196,7 @@ class Site : public std::enable_shared_from_this<Site> {
   std::uint32_t epoch_ = 0;
   std::uint64_t tile_version_ = 0;
   std::map<SessionId, Member> members_;
-  std::map<std::uint32_t, Generation> switches_;  // Epoch -> the server that switched the map to it.
+  Switches switches_;
   // Removed sessions whose parts of the map stay. One number may stand for several of them (MergeOldestLayers).
   std::set<SessionId> layers_;
   std::set<SessionId> merged_;             // Those of them that stand for several sessions.

@@ -97,8 +97,7 @@ void Site::RemoveOldVersions() {
 }
 
 bool Site::Switched(std::uint32_t epoch, Generation generation) const {
-  const auto made = switches_.find(epoch);
-  return made != switches_.end() && made->second == generation;
+  return IsCompleted(switches_, epoch, generation);
 }
 
 Result<void> Site::Restore(const StoredSite& stored, StartControl& control) {

@@ -93,6 +93,7 @@ void Site::CommitIfComplete() {
     const std::uint32_t before = versions_.enabled();
     versions_.Enable(complete.version, std::move(complete.displaced));
     switches_[++epoch_] = generation_;
+    while (switches_.size() > kMostSwitches) switches_.erase(switches_.begin());
     StoreVersion(before);
     RenderAll();
   });

@@ -29,6 +29,10 @@ void ServiceNotifier::Stopping() const {
   static_cast<void>(sd_notify(0, "STOPPING=1"));
 }
 
+bool ServiceNotifier::Failed(const std::string& why) const {
+  return sd_notify(0, ("STATUS=cannot start: " + why).c_str()) != 0;
+}
+
 std::optional<std::chrono::microseconds> ServiceNotifier::watchdog() const {
   std::uint64_t microseconds = 0;
   if (sd_watchdog_enabled(0, &microseconds) <= 0) return std::nullopt;

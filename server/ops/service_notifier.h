@@ -17,6 +17,8 @@ class ServiceNotifier {
   // One line that the service manager shows beside the service (systemctl status).
   void Status(const std::string& text) const;
   void Stopping() const;
+  // The start has failed. Returns whether a service manager started the process.
+  [[nodiscard]] bool Failed(const std::string& why) const;
   // The longest allowed time between two calls of Alive; nothing if no watchdog is configured.
   [[nodiscard]] std::optional<std::chrono::microseconds> watchdog() const;
 };

@@ -70,6 +70,17 @@ std::uint64_t BytesIn(const std::filesystem::path& directory) {
   return bytes;
 }
 
+// A server that was killed while it saved a site has left a file that no request lists (AtomicFile).
+void RemoveUnfinished(const std::filesystem::path& directory) {
+  std::error_code error;
+  for (auto entry = std::filesystem::directory_iterator(directory, error);
+       !error && entry != std::filesystem::directory_iterator(); entry.increment(error)) {
+    std::error_code ignored;
+    if (entry->path().filename().string().find(std::string(kExtension) + ".tmp.") != std::string::npos)
+      std::filesystem::remove(entry->path(), ignored);
+  }
+}
+
 }  // namespace
 
 SavedSites::SavedSites(std::filesystem::path directory, std::uint64_t max_bytes, Journal* journal, const Rooms& rooms)
@@ -80,6 +91,7 @@ SavedSites::~SavedSites() {
 }
 
 void SavedSites::Start() {
+  RemoveUnfinished(directory_);
   thread_ = std::jthread([this] {
     while (const auto request = requests_.Pop()) Serve(*request);
   });

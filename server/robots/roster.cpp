@@ -266,6 +266,7 @@ void Roster::Tick() {
   SendRefusals();
   RetireGone();
   const MutexLock lock(mutex_);
+  for (const auto& [id, session] : earlier_) session->SaveEnded();
   StoreQuiet();
   for (Ledger& ledger : unclaimed_.TakeChanged()) outbound_.Send(std::move(ledger));
   unclaimed_.ForgetSilent(UnclaimedStreams::Clock::now(), [this](const Ledger& ledger) CAIRN_REQUIRES(mutex_) {
@@ -304,12 +305,11 @@ void Roster::RetireGone() {
   std::erase_if(gone_, [&](const Leaving& leaving) CAIRN_REQUIRES(mutex_) {
     const std::shared_ptr<Session>& gone = leaving.session;
     const auto successor = sessions_.find(gone->record().state().robot_id);
-    if (successor == sessions_.end()) {
-      if (!gone->ending() && gone->record().phase() != SessionPhase::kEnded)
-        gone->End({StatusCode::kResourceExhausted, "its robot stayed away, and its place was needed for another"});
-      gone->Tick();
-    }
-    if (gone->record().phase() != SessionPhase::kEnded || gone->has_work()) return false;
+    if (successor == sessions_.end() && !gone->ending() && gone->record().phase() != SessionPhase::kEnded)
+      gone->End({StatusCode::kResourceExhausted, "its robot stayed away, and its place was needed for another"});
+    const bool works = gone->has_work();  // Before the Tick, which may schedule a checkpoint.
+    if (successor == sessions_.end()) gone->Tick();
+    if (gone->record().phase() != SessionPhase::kEnded || works) return false;
     const RobotStatus status = gone->record().snapshot().status;
     bool retired = true;
     const auto retire = [&](auto&& of) { retired = retired && outbound_.Send(Retired{std::move(of)}); };

@@ -101,6 +101,11 @@ Result<void> Roster::RestoreAll(const std::vector<SessionId>& ids, SessionId las
   for (const SessionId id : doubtful) {
     if (auto restored = RestoreDoubtful(id, how); !restored) return restored;
   }
+  const auto remains = SessionsWithoutRecord(journal_->store());
+  if (!remains) return tl::unexpected(remains.error());
+  for (const SessionId id : *remains)
+    Register(id,
+             NotRestored(id, {StatusCode::kDataLoss, "its own record is missing, and other parts of it are there"}));
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
   spdlog::info("{} sessions restored in {:.2f} s", All().size(), took.count());
   return {};
@@ -374,7 +379,7 @@ Roster::RestoredSession Roster::GoOn(const Stored& stored, Begun begun, const Re
   if (position == 0 && had_checkpoint && *last == 0)
     return Fail(StatusCode::kDataLoss, "its checkpoint cannot be used, and the journal before it was removed");
   session->Replayed();
-  session->SetCheckpointed(position);
+  session->SetCheckpointed(position, *last);
   journal_->Reopen(id, *last, DurableFor(session), position, std::move(pieces));
   session->KeepStored(false);
   return session;

@@ -2,9 +2,11 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <asio/post.hpp>
 #include <exception>
 #include <utility>
+#include <variant>
 
 #include "common/thread_time.h"
 #include "server/store/crash_note.h"
@@ -12,7 +14,8 @@
 namespace cairn::server {
 namespace {
 
-constexpr std::chrono::seconds kOpeningPatience{1};  // A robot waits this long for the disk when it opens a session.
+// A robot waits this long for the disk when it opens a session or ends it.
+constexpr std::chrono::seconds kDiskPatience{1};
 
 }  // namespace
 
@@ -131,22 +134,6 @@ bool Session::Resume(ClientId client, SessionToken session) {
   return true;
 }
 
-void Session::End(const Status& reason, std::shared_ptr<Receipt> receipt) {
-  if (ending_.exchange(true)) {
-    if (receipt) receipt->Taken();                                 // By the one that asked before.
-    if (record_.phase() == SessionPhase::kEnded) AnnounceState();  // A repeated request gets the same answer.
-    return;
-  }
-  Finish finish;
-  finish.reason = reason;
-  finish.done = [self = shared_from_this(), reason, receipt = std::move(receipt)] {
-    self->Finished(SessionPhase::kEnded, reason);
-    if (receipt) receipt->Taken();
-  };
-  queue_.Push(std::move(finish));
-  Schedule();
-}
-
 void Session::Suspend(const std::function<void()>& done) {
   // If the end was requested before, it is handled first, and there is nothing left to suspend.
   const bool ended_before = ending_.exchange(true);
@@ -177,12 +164,19 @@ void Session::Store(JournalEntry entry) {
 
 void Session::Lost(const Status& why) {
   lost_ = true;
-  if (record_.SetStored(false, why)) AnnounceState();
+  const bool untold = end_untold_.exchange(false);
+  if (record_.SetStored(false, why) || untold) AnnounceState();
 }
 
 void Session::Durable(const std::vector<JournalEntry>& entries) {
   record_.Durable(entries);
-  if (unannounced_.exchange(false)) AnnounceState();
+  const bool begins = unannounced_.exchange(false);
+  bool ends = false;
+  if (std::ranges::any_of(entries, [](const auto& one) { return std::holds_alternative<SessionFinished>(one); })) {
+    end_stored_ = true;
+    ends = end_untold_.exchange(false);
+  }
+  if (begins || ends) AnnounceState();
   PublishLedgers(SessionRecord::Urgency::kWhenDue);
 }
 
@@ -205,19 +199,37 @@ void Session::Replayed() {
   state_unsent_ = true;
 }
 
+void Session::SetCheckpointed(std::uint64_t position, std::uint64_t last) {
+  pace_.RestoredFrom(position);
+  end_unsaved_ = record_.phase() == SessionPhase::kEnded && last > position;
+}
+
 void Session::Tick() {
   // If the disk is slow, the robot need not wait for it: a scan counts as durable only once it is on the disk.
-  if (unannounced_ && SessionRecord::Clock::now() - opened_ > kOpeningPatience) {
+  const auto now = SessionRecord::Clock::now();
+  if (unannounced_ && now - opened_ > kDiskPatience) {
     unannounced_ = false;
     AnnounceState();
   }
+  if (end_untold_ && record_.EndedFor(now) > kDiskPatience) {
+    end_untold_ = false;
+    AnnounceState();
+  }
   if (lost_ && !ending_) Schedule();  // The disk may work again, while nothing arrives from the robot.
-  if (record_.LookForSilence(SessionRecord::Clock::now())) state_unsent_ = true;
+  SaveEnded();
+  if (record_.LookForSilence(now)) state_unsent_ = true;
   if (state_unsent_) AnnounceState();
   PublishLedgers(SessionRecord::Urgency::kWhenDue);
 }
 
+void Session::SaveEnded() {
+  if (end_unsaved_ && !lost_) Schedule();
+}
+
 void Session::Finished(SessionPhase phase, Status status) {
+  // Told when it is on the disk (Durable): whoever has seen the end may rely on it, also after a kill.
+  end_untold_ = phase == SessionPhase::kEnded && outputs_.position && outputs_.position() != 0;
+  if (end_stored_) end_untold_ = false;
   record_.SetPhase(phase, std::move(status));
   if (phase == SessionPhase::kEnded && outputs_.ended) outputs_.ended();
   PublishLedgers(SessionRecord::Urgency::kNow);
@@ -225,7 +237,7 @@ void Session::Finished(SessionPhase phase, Status status) {
 }
 
 void Session::AnnounceState() {
-  if (unannounced_) return;
+  if (unannounced_ || end_untold_) return;
   const MutexLock lock(publishing_);
   state_unsent_ = !outputs_.send(record_.state());
 }
@@ -265,9 +277,7 @@ void Session::Drain() {
 }
 
 void Session::TakeCheckpoint() {
-  // What is dropped when a session ends or the server stops is in the record but not in the journal. The client sends
-  // it again to the next server, which must not take it for something that it has received before.
-  if (failed_ || ending_ || !outputs_.position || !outputs_.checkpoint) return;
+  if (failed_ || stopping() || !outputs_.position || !outputs_.checkpoint) return;
   if (outputs_.checkpointing && outputs_.checkpointing()) return;
   const std::uint64_t position = outputs_.position();
   if (position == 0) {
@@ -275,6 +285,8 @@ void Session::TakeCheckpoint() {
   } else if (lost_) {
     // Lost came from another thread, about an entry before StoreAgain, and took back what that had begun.
     outputs_.abandon();
+  } else if (record_.phase() == SessionPhase::kEnded) {
+    if (end_unsaved_ && SaveAt(position, {})) end_unsaved_ = false;
   } else if (pace_.IsDue(position) && !SaveAt(position, {})) {
     pace_.Refused();
     if (!pace_.IsOverdue(position)) return;
@@ -314,7 +326,7 @@ bool Session::SaveAt(std::uint64_t position, Journal::Done done) {
   const auto begin = ThreadTime();
   auto save = estimator_.Save();
   // Samples that were settled meanwhile are in the record, but perhaps not in the journal before this position.
-  if (!save || ending_ || outputs_.position() != position) return false;
+  if (!save || stopping() || outputs_.position() != position) return false;
   auto content = [save = std::move(save), saving = ThreadTime() - begin, cost = pace_.cost()] {
     const auto making = ThreadTime();
     CheckpointContent made = save();
@@ -338,8 +350,11 @@ void Session::Handle(RobotEvent&& event) {
   // What its status says of the robot's place may change with these.
   const bool changes_state = std::holds_alternative<StartRefused>(event) || std::holds_alternative<Correction>(event) ||
                              std::holds_alternative<LocaliseWanted>(event);
+  const bool changes_ended = std::holds_alternative<Finish>(event) || std::holds_alternative<Correction>(event) ||
+                             std::holds_alternative<EpochChange>(event);
   if (!failed_ && !Throws([&] { estimator_.Handle(std::move(event)); })) {
     if (changes_state) state_unsent_ = true;
+    if (changes_ended && outputs_.checkpoint && record_.phase() == SessionPhase::kEnded) end_unsaved_ = true;
     return;
   }
   Throws([&] { estimator_.Discard(std::move(event)); });

@@ -90,8 +90,11 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
                                                            std::span<const std::string_view> pieces) {
     return estimator_.Load(main, pieces);
   }
-  // Its newest checkpoint. REQUIRES: nothing was taken yet.
-  void SetCheckpointed(std::uint64_t position) { pace_.RestoredFrom(position); }
+  // Its newest checkpoint, and the last entry of its journal. REQUIRES: nothing was taken yet.
+  void SetCheckpointed(std::uint64_t position, std::uint64_t last);
+  // An ended session takes a checkpoint after its end and after each switch of the map, or its journal would grow with
+  // every switch. Takes the one that could not be taken yet.
+  void SaveEnded();
   // Publishes ledgers that are due and whatever could not be sent before.
   void Tick();
 
@@ -102,8 +105,8 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   [[nodiscard]] bool ending() const { return ending_; }
   // Busy while an event is being handled; while it waits for a thread of the pool it does not count as busy.
   [[nodiscard]] Pulse pulse() const { return {handled_, handling_}; }
-  // Events wait or are being handled.
-  [[nodiscard]] bool has_work() const { return scheduled_; }
+  // Events wait or are being handled, or the end is not announced yet.
+  [[nodiscard]] bool has_work() const { return scheduled_ || end_untold_; }
 
   static constexpr int kEventsPerTurn = 8;  // After so many, the pool may do other work first.
 
@@ -122,6 +125,10 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   void AnnounceState();
   void PublishLedgers(SessionRecord::Urgency urgency);
   void Finished(SessionPhase phase, Status status);
+  // An end was asked for, or the server stops, and that is not settled yet. What is dropped then is in the record but
+  // not in the journal. The client sends it again to the next server, which must not take it for something that it has
+  // received before; so there are no checkpoints.
+  [[nodiscard]] bool stopping() const { return ending_ && record_.phase() != SessionPhase::kEnded; }
 
   const SessionId id_;
   StoredSession stored_;
@@ -134,6 +141,9 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   std::atomic<bool> keep_stored_{false};
   std::atomic<bool> unannounced_{false};  // Not announced as open until its record is on the disk.
   SessionRecord::Clock::time_point opened_{};
+  std::atomic<bool> end_untold_{false};   // It has ended, which is announced when that is on the disk.
+  std::atomic<bool> end_stored_{false};   // That is on the disk.
+  std::atomic<bool> end_unsaved_{false};  // Ended, and no checkpoint has what it is now.
   std::atomic<bool> scheduled_{false};
   std::atomic<bool> handling_{false};
   std::atomic<std::uint64_t> handled_{0};

@@ -91,7 +91,7 @@ void SessionEstimator::ReplayOdometry(const OdometryTaken& odometry) {
 
 Journal::Content SessionEstimator::Save() const {
   auto writer = std::make_shared<slam::StateWriter>();
-  if (ended_ || (switch_completed_ && !*switch_completed_)) return nullptr;
+  if (switch_completed_ && !*switch_completed_) return nullptr;
   // The scans themselves are saved by the pipeline, in the same order.
   std::vector<NameId> waiting;
   pipeline_.ForEachWaiting([&](const Scan& scan) { waiting.push_back(waiting_.at(&scan).stream.sensor_id); });
@@ -137,6 +137,7 @@ Result<SessionEstimator::PieceValues> SessionEstimator::Load(std::string_view ma
   });
   reader.Require(next == waiting.size(), "number of waiting scans");
   if (auto record = record_.Load(reader, WaitingBySensor()); !record) return tl::unexpected(record.error());
+  ended_ = record_.phase() == SessionPhase::kEnded;
   record_.SetLocalises(pipeline_.mapper().localises());
   record_.SetJoining({fragment_, driven_m_, start_refused_});
   PieceValues values = reader.values();

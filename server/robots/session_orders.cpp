@@ -14,6 +14,25 @@ tl::unexpected<Status> TooMany() {
 
 }  // namespace
 
+void Session::End(const Status& reason, std::shared_ptr<Receipt> receipt) {
+  if (record_.phase() == SessionPhase::kEnded) {  // A repeated request gets the same answer.
+    AnnounceState();
+    if (receipt) receipt->Taken();
+    return;
+  }
+  const bool first = !ending_.exchange(true);
+  if (!first && !receipt) return;
+  Finish finish;
+  finish.final = first;
+  finish.reason = reason;
+  finish.done = [self = shared_from_this(), reason, first, receipt = std::move(receipt)] {
+    if (first) self->Finished(SessionPhase::kEnded, reason);
+    if (receipt && self->record_.phase() == SessionPhase::kEnded) receipt->Taken();
+  };
+  queue_.Push(std::move(finish));
+  Schedule();
+}
+
 Result<void> Session::Relocalise(const std::optional<Pose2>& T_map_robot, std::shared_ptr<Receipt> receipt) {
   if (ending_) return cairn::Fail(StatusCode::kFailedPrecondition, "the session has ended");
   if (T_map_robot && record_.joining().fragment && !record_.localises())

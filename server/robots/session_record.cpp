@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/inbound.h"
+
 namespace cairn::server {
 
 SessionRecord::SessionRecord(SessionId id, const SessionRequest& request, const RobotsOptions& options)
@@ -72,7 +74,7 @@ bool SessionRecord::Has(NameId sensor_id) const {
 }
 
 std::uint64_t SessionRecord::NumberOf(SessionToken session, std::uint64_t sequence) const {
-  return session == status_.session.session ? sequence : 0;
+  return session == status_.session.session && sequence <= kMaxSequence ? sequence : 0;
 }
 
 SessionRecord::Arrival SessionRecord::Account(Stream& stream, std::uint64_t sequence, std::uint64_t number, From from) {

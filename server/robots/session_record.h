@@ -147,6 +147,8 @@ class SessionRecord {
   // Both callers hold the lock of `self`. The thread-safety analysis cannot see that.
   template <typename Archive>
   static void Members(Archive& archive, auto& self, auto& odometry) CAIRN_NO_THREAD_SAFETY_ANALYSIS;
+  template <typename Archive>
+  static void EndMembers(Archive& archive, auto& state);
   bool LeftAside(Stream& stream, std::uint64_t sequence) const;
   // Takes a sample's number into the account. Returns kAside or kDuplicate if it must not be used.
   Arrival Account(Stream& stream, std::uint64_t sequence, std::uint64_t number, From from) CAIRN_REQUIRES(mutex_);

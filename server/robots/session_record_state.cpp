@@ -8,6 +8,21 @@
 
 namespace cairn::server {
 
+// That it has ended, and why. Earlier formats have no checkpoints of sessions that have ended.
+template <typename Archive>
+void SessionRecord::EndMembers(Archive& archive, auto& state) {
+  if constexpr (Archive::kReads)
+    if (archive.format() < 10) return;
+  bool ended = state.phase == SessionPhase::kEnded;
+  archive(ended);
+  if (!ended) return;
+  archive(state.status.code, state.status.message);
+  archive.Require(state.status.code >= StatusCode::kOk && state.status.code <= StatusCode::kDataLoss,
+                  "why it has ended");
+  if constexpr (Archive::kReads)
+    if (archive.ok()) state.phase = SessionPhase::kEnded;
+}
+
 template <typename Archive>
 void SessionRecord::Members(Archive& archive, auto& self, auto& odometry) {
   auto& pose = self.status_.pose;
@@ -15,12 +30,12 @@ void SessionRecord::Members(Archive& archive, auto& self, auto& odometry) {
           pose.T_map_robot, pose.covariance, pose.T_map_odom, pose.localized, pose.score, pose.reason, pose.map_epoch);
   archive.Require(pose.reason <= PoseReason::kNotJoined, "the reason of a pose");
   archive(odometry, self.history_);
+  EndMembers(archive, self.status_.session);
 }
 
 bool SessionRecord::Save(slam::StateWriter& writer, const WaitingScans& in_estimator) const {
   static const std::set<std::uint64_t> kNone;
   const MutexLock lock(mutex_);
-  if (status_.session.phase == SessionPhase::kEnded) return false;
   writer(static_cast<std::uint64_t>(streams_.size()));
   for (const auto& [sensor_id, stream] : streams_) {
     const auto taken = in_estimator.find(sensor_id);

@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <iterator>
-#include <limits>
 #include <utility>
+
+#include "server/inbound.h"
 
 namespace cairn::server {
 namespace {
@@ -102,9 +103,8 @@ void StreamLedger::NewClient() {
 }
 
 bool StreamLedger::AreSound(const std::vector<std::uint64_t>& gaps) const {
-  constexpr std::uint64_t kLargest = std::numeric_limits<std::int64_t>::max();
   const std::uint64_t last = ledger_.last_sequence;
-  if (last > kLargest || ledger_.settled_through > last || gaps.size() % 2 != 0 || gaps.size() > 2 * kMaxGaps)
+  if (last > kMaxSequence || ledger_.settled_through > last || gaps.size() % 2 != 0 || gaps.size() > 2 * kMaxGaps)
     return false;
   if (!waiting_.empty() && (*waiting_.begin() < 1 || *waiting_.rbegin() > last)) return false;
   std::uint64_t after = 0;  // Each gap lies behind the one before, and the last number is in none.
@@ -151,7 +151,7 @@ void StreamLedger::Advance(std::uint64_t sequence) {
   if (sequence > expected) {
     gaps_.emplace(expected, sequence - 1);
     Count(ledger_, DropReason::kLostOnWire) += sequence - expected;
-    if (gaps_.size() > kMaxGaps) gaps_.erase(gaps_.begin());
+    ForgetOldGaps();
   }
   ledger_.last_sequence = sequence;
 }
@@ -165,8 +165,13 @@ bool StreamLedger::FillGap(std::uint64_t sequence) {
   gaps_.erase(gap);
   if (first < sequence) gaps_.emplace(first, sequence - 1);
   if (sequence < last) gaps_.emplace(sequence + 1, last);
+  ForgetOldGaps();
   if (sequence > first_sequence_) --Count(ledger_, DropReason::kLostOnWire);
   return true;
+}
+
+void StreamLedger::ForgetOldGaps() {
+  while (gaps_.size() > kMaxGaps) gaps_.erase(gaps_.begin());
 }
 
 std::optional<StreamLedger> StreamLedger::AsJournaled(const std::set<std::uint64_t>& taken) const {

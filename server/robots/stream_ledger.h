@@ -35,8 +35,8 @@ class StreamLedger {
 
   // Whether the sample must not be taken yet. Called with each number in the order of arrival, before Received.
   [[nodiscard]] bool IsDoubtful(std::uint64_t sequence);
-  // A sample arrived. Returns false for a duplicate number, which the caller must ignore. Otherwise Used or Dropped
-  // must follow.
+  // A sample arrived. REQUIRES: at most kMaxSequence (inbound.h). Returns false for a duplicate number, which the
+  // caller must ignore. Otherwise Used or Dropped must follow.
   bool Received(std::uint64_t sequence);
   void Used(std::uint64_t sequence, Stamp stamp, bool keyframe, double latency_ms);
   // The same for odometry, whose latency is not measured.
@@ -98,6 +98,7 @@ class StreamLedger {
   [[nodiscard]] bool AreSound(const std::vector<std::uint64_t>& gaps) const;
   void Advance(std::uint64_t sequence);
   bool FillGap(std::uint64_t sequence);
+  void ForgetOldGaps();
   bool TakeBack(std::uint64_t sequence);
   void BeginAt(std::uint64_t sequence);
   void Settle(std::uint64_t sequence);

@@ -8,7 +8,7 @@
 namespace cairn::server {
 namespace {
 
-constexpr std::chrono::seconds kLongestCommit{5};
+constexpr std::chrono::seconds kLongestAnswer{5};
 constexpr const char* kHangs = "the disk has not answered for more than 5 s: what robots send is not durable";
 constexpr const char* kTooSlow =
     "the disk was too slow or failed for too long, and a part of the state is no longer stored";
@@ -292,7 +292,7 @@ JournalHealth Journal::health() const {
       lost = "what a session has done while the disk failed is not on the disk yet";
   }
   const std::string omitted = omitted_.empty() ? std::string() : kTooSlow;
-  const bool hangs = committing_since_ && Clock::now() - *committing_since_ > kLongestCommit;
+  const bool hangs = asking_since_ && Clock::now() - *asking_since_ > kLongestAnswer;
   const std::string hanging = hangs ? kHangs : std::string();
   for (const std::string& reason : {disk_fault_, hanging, left_out_, omitted, lost, checkpoint_fault_})
     if (!reason.empty())

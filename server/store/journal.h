@@ -198,6 +198,8 @@ class Journal {
   void StartOver(const std::string& why) CAIRN_EXCLUDES(mutex_);
   void FindRests();
   void TellOrders();
+  // While it exists, the store is asked for something, which takes long where the disk hangs.
+  class Asking;
   void RemovePiece() CAIRN_EXCLUDES(mutex_);
   std::optional<Group> Next(const std::stop_token& stop);
   static Prepared Prepare(Group&& group);
@@ -230,7 +232,7 @@ class Journal {
   std::size_t held_bytes_ CAIRN_GUARDED_BY(mutex_) = 0;
   Clock::time_point oldest_ CAIRN_GUARDED_BY(mutex_);
   bool urgent_ CAIRN_GUARDED_BY(mutex_) = false;
-  std::optional<Clock::time_point> committing_since_ CAIRN_GUARDED_BY(mutex_);
+  std::optional<Clock::time_point> asking_since_ CAIRN_GUARDED_BY(mutex_);
   std::string disk_fault_ CAIRN_GUARDED_BY(mutex_);        // Why the last commit failed; empty if it did not.
   std::string left_out_ CAIRN_GUARDED_BY(mutex_);          // What else than a session is no longer stored, and why.
   std::string checkpoint_fault_ CAIRN_GUARDED_BY(mutex_);  // Why the last checkpoint is missing.

@@ -77,6 +77,22 @@ void Journal::StartOver(const std::string& why) {
   TellOrders();
 }
 
+class Journal::Asking {
+ public:
+  explicit Asking(Journal& journal) : journal_(journal) { Set(Clock::now()); }
+  Asking(const Asking&) = delete;
+  Asking& operator=(const Asking&) = delete;
+  ~Asking() { Set(std::nullopt); }
+
+ private:
+  void Set(std::optional<Clock::time_point> since) {
+    const MutexLock lock(journal_.mutex_);
+    journal_.asking_since_ = since;
+  }
+
+  Journal& journal_;
+};
+
 void Journal::FindRests() {
   const auto removed = store_.Owners(RecordKind::kRemoved);
   if (!removed) return;  // The disk fails; the next start finds them.
@@ -101,6 +117,7 @@ void Journal::RemovePiece() {
       return;
     }
   }
+  const Asking asking(*this);
   const std::size_t piece = RemovedAtOnce(range.kind);
   const auto removed = store_.RemoveFirst(range, piece);
   if (removed) {
@@ -257,13 +274,11 @@ void Journal::BeginCheckpoint(WantedCheckpoint wanted) {
 }
 
 bool Journal::CommitOnce(const RecordChanges& changes) {
-  {
-    const MutexLock lock(mutex_);
-    committing_since_ = Clock::now();
-  }
-  const auto committed = store_.Commit(changes);
+  const auto committed = [&] {
+    const Asking asking(*this);
+    return store_.Commit(changes);
+  }();
   const MutexLock lock(mutex_);
-  committing_since_.reset();
   disk_fault_ = committed ? std::string() : committed.error().message;
   ++(committed ? counts_.commits : counts_.failed_commits);
   return committed.has_value();
@@ -321,6 +336,7 @@ void Journal::EndCheckpoint() {
 void Journal::KeepBudget() {
   if (!unwanted_.empty() || Clock::now() - budget_checked_ < kBudgetPeriod) return;
   budget_checked_ = Clock::now();
+  std::optional<Asking> asking(*this);
   const auto used = store_.bytes_used();
   if (!used) return;
   bool over = *used > BytesOf(options_.max_gib);
@@ -339,6 +355,7 @@ void Journal::KeepBudget() {
     budget_checked_ = {};  // It may be enough.
     over = false;
   }
+  asking.reset();
   const MutexLock lock(mutex_);
   over_budget_ = over;
 }

@@ -119,19 +119,29 @@ struct StoredVersion {
   SmoothedPaths smoothed;
 };
 
+// The switches of a map that were completed: epoch -> generation of the server that began it. Only the newest are kept;
+// all before them count as completed.
+using Switches = std::map<std::uint32_t, std::uint64_t>;
+inline constexpr std::size_t kMostSwitches = 1024;
+[[nodiscard]] inline bool IsCompleted(const Switches& switches, std::uint32_t epoch, std::uint64_t generation) {
+  if (switches.size() >= kMostSwitches && epoch < switches.begin()->first) return true;
+  const auto made = switches.find(epoch);
+  return made != switches.end() && made->second == generation;
+}
+
 struct StoredSite {
   std::string name;
   std::uint32_t epoch = 0;
   std::uint64_t tile_version = 0;
   std::uint32_t next_version = 2;
   std::uint32_t enabled_version = 1;
-  std::map<std::uint32_t, std::uint64_t> switches;  // Epoch -> generation of the server that began it.
-  std::map<NameId, std::uint64_t> members;          // Robot -> the session that draws for it.
-  double resolution_m = 0.0;                        // Side of the map's cells; 0: not known.
-  std::set<std::uint64_t> fragments;                // Sessions that are not joined with the map.
-  std::vector<std::uint64_t> past;                  // Sessions that have ended, in the order in which they did.
-  std::set<std::uint64_t> merged{};                 // Layers that stand for several sessions.
-  std::uint64_t map_frame = 0;                      // SessionState::map_frame; 0: stored without one.
+  Switches switches;
+  std::map<NameId, std::uint64_t> members;  // Robot -> the session that draws for it.
+  double resolution_m = 0.0;                // Side of the map's cells; 0: not known.
+  std::set<std::uint64_t> fragments;        // Sessions that are not joined with the map.
+  std::vector<std::uint64_t> past;          // Sessions that have ended, in the order in which they did.
+  std::set<std::uint64_t> merged{};         // Layers that stand for several sessions.
+  std::uint64_t map_frame = 0;              // SessionState::map_frame; 0: stored without one.
 };
 
 struct StoredLayer {

@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <charconv>
+#include <optional>
+#include <set>
 #include <utility>
+
+#include "server/store/checkpoint_writer.h"
 
 namespace cairn::server {
 namespace {
@@ -33,6 +37,11 @@ Result<std::map<std::uint64_t, Value>> ReadAll(Store& store, RecordKind kind, Of
     if (!read && !unreadable) return tl::unexpected(read.error());
   }
   return all;
+}
+
+// Of a session that could not be stored, a checkpoint may have been begun.
+bool IsComplete(const Result<std::optional<StoredCheckpoint>>& checkpoint) {
+  return !checkpoint || *checkpoint;
 }
 
 }  // namespace
@@ -84,14 +93,33 @@ std::string NameOfSite(Store& store, NameId site) {
   return {};
 }
 
+Result<std::vector<std::uint64_t>> SessionsWithoutRecord(Store& store) {
+  std::set<std::uint64_t> known, others;
+  for (const RecordKind kind :
+       {RecordKind::kSession, RecordKind::kRemoved, RecordKind::kJournal, RecordKind::kCheckpoint}) {
+    const bool names = kind == RecordKind::kSession || kind == RecordKind::kRemoved;
+    const auto owners = store.Owners(kind);
+    if (!owners) return tl::unexpected(owners.error());
+    for (const std::uint64_t session : *owners) {
+      if (names || known.contains(session)) {
+        known.insert(session);
+      } else if (kind == RecordKind::kJournal || IsComplete(ReadCheckpoint(store, session))) {
+        others.insert(session);
+      }
+    }
+  }
+  return std::vector<std::uint64_t>(others.begin(), others.end());
+}
+
 Result<std::uint64_t> LastSession(Store& store) {
-  const auto sessions = store.Owners(RecordKind::kSession);
-  if (!sessions) return tl::unexpected(sessions.error());
-  std::uint64_t last = sessions->empty() ? 0 : sessions->back();
-  // One that was removed counts as long as something is left of it.
-  const auto removed = store.Owners(RecordKind::kRemoved);
-  if (!removed) return tl::unexpected(removed.error());
-  if (!removed->empty()) last = std::max(last, removed->back());
+  std::uint64_t last = 0;
+  // One that was removed, or of which the own record is missing, counts as long as something is left of it.
+  for (const RecordKind kind :
+       {RecordKind::kSession, RecordKind::kRemoved, RecordKind::kJournal, RecordKind::kCheckpoint}) {
+    const auto owners = store.Owners(kind);
+    if (!owners) return tl::unexpected(owners.error());
+    if (!owners->empty()) last = std::max(last, owners->back());
+  }
   // A session that was never stored itself may be named by its site.
   const auto named = ReadAll<StoredSite>(store, RecordKind::kSite, SiteOf);
   if (!named && named.error().code != StatusCode::kDataLoss) return tl::unexpected(named.error());

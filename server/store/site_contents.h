@@ -29,6 +29,9 @@ struct SiteContents {
 [[nodiscard]] Result<std::map<std::uint64_t, StoredSession>> ReadSessions(Store& store);
 // The name of a site whose own record cannot be read, as its sessions say; empty if none of them does.
 [[nodiscard]] std::string NameOfSite(Store& store, NameId site);
+// Sessions without a record of their own of which a journal or a complete checkpoint is there, in ascending order.
+// Removed ones do not count.
+[[nodiscard]] Result<std::vector<std::uint64_t>> SessionsWithoutRecord(Store& store);
 // The highest number that a session has or had; 0: there was none. Records that cannot be read count.
 [[nodiscard]] Result<std::uint64_t> LastSession(Store& store);
 // A session's own record is removed first, in one commit with a mark of it, because the rest, its checkpoints and its

@@ -95,8 +95,7 @@ class Merge {
           auto* const correction = std::get_if<CorrectionTaken>(&entry);
           if (correction == nullptr) continue;
           changed = true;
-          const auto made = of.site.switches.find(correction->epoch);
-          const bool completed = made != of.site.switches.end() && made->second == correction->generation;
+          const bool completed = IsCompleted(of.site.switches, correction->epoch, correction->generation);
           correction->epoch = completed ? correction->epoch + shift : 0;
           if (moves && !correction->grid.fragment)
             correction->grid = Transformed(correction->grid, T_into_from_, of.site.resolution_m);

@@ -4,6 +4,8 @@
 
 #include <functional>
 #include <limits>
+#include <random>
+#include <utility>
 
 #include "tests/server/support/whole_server.h"
 
@@ -133,6 +135,43 @@ TEST_F(BadInput, MissingOdometryDropsTheScanWithAReason) {
   const Ledger ledger = house_.LastLedger("r1");
   EXPECT_EQ(Dropped(ledger, DropReason::kNoOdometry), 30U);
   EXPECT_EQ(Dropped(ledger, DropReason::kLostOnWire), 5U);  // Sequences 41 to 45 were never sent.
+}
+
+// Random ranges once made a map of hundreds of megabytes in half a minute.
+TEST_F(BadInput, ALostRobotDrawsNothingIntoTheMapOfItsSite) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> range(0.5F, 19.0F);
+  const auto drive = [&](int first, int last) {
+    for (int step = first; step < last; ++step) {
+      Scan scan = RoomScan(step);
+      for (float& one : scan.ranges_m) one = range(random);
+      house_.SendOdometry("r1", kSender, RoomOdometry(step));
+      house_.SendScan("r1", kSender, scan);
+      if (step % 8 == 7) house_.WaitSettled("r1", static_cast<std::uint64_t>(step) + 1);
+    }
+    house_.WaitSettled("r1", static_cast<std::uint64_t>(last));
+  };
+  // When it has not changed for a while.
+  const auto map_version = [this] {
+    std::uint64_t version = 0;
+    int same = 0;
+    EXPECT_TRUE(house_.WaitFor([&] {
+      Request about;
+      about.kind = RequestKind::kMapInfo;
+      about.site = "lab";
+      same = std::exchange(version, house_.Ask(about).maps.at(0).version) == version ? same + 1 : 0;
+      return same == 10;
+    }));
+    return version;
+  };
+  house_.Drive("r1", kSender, 10, 60);
+  drive(60, 120);
+  ASSERT_EQ(house_.All<PoseReport>().back().reason, PoseReason::kLost);
+  const std::uint64_t before = map_version();
+  EXPECT_GT(before, 0U);
+  drive(120, 240);
+  EXPECT_EQ(house_.All<PoseReport>().back().reason, PoseReason::kLost);
+  EXPECT_EQ(map_version(), before);
 }
 
 TEST_F(BadInput, GapsInTheNumbersAreLostAndLateArrivalsFillThem) {

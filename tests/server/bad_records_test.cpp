@@ -247,18 +247,25 @@ TEST(Restore, ADamagedJournalLeavesTheMapOfTheCheckpointAndNobodyBeginsItAnew) {
   JoinsAndBeginsNothing(second);
 }
 
-// Not even the site of the session could be read from it.
-TEST(Restore, NobodyBeginsTheMapOfASessionAnewWhoseOwnRecordIsDamaged) {
-  const TempDirectory directory;
-  ASSERT_NO_FATAL_FAILURE(MakeOneSession(directory / "0"));
-  ASSERT_EQ(RawRecords(directory / "0")
-                .Run("UPDATE records SET content = CAST(x'00ff00' || substr(content, 4) AS BLOB) WHERE kind = 1 AND "
-                     "owner = " +
-                     Sql(1)),
-            1);
-  StoredServer second(directory / "0");
-  EXPECT_THAT(second->Ask(About(RequestKind::kStatus, "")).status.message, ::testing::HasSubstr("set aside"));
-  JoinsAndBeginsNothing(second);
+// Not even the site of the session can be read. A damaged index hides a record altogether.
+TEST(Restore, NobodyBeginsTheMapOfASessionAnewWhoseOwnRecordIsDamagedOrMissing) {
+  const std::string record = " WHERE kind = 1 AND owner = " + Sql(1);
+  const std::string damage = "UPDATE records SET content = CAST(x'00ff00' || substr(content, 4) AS BLOB)";
+  for (const std::string& change : {damage + record, "DELETE FROM records" + record}) {
+    const TempDirectory directory;
+    ASSERT_NO_FATAL_FAILURE(MakeOneSession(directory / "0"));
+    ASSERT_EQ(RawRecords(directory / "0").Run(change), 1);
+    const auto journal = [&] { return RawRecords(directory / "0").Of("kind IN (2, 3) AND owner = " + Sql(1)); };
+    const auto before = journal();
+    ASSERT_FALSE(before.empty());
+    {
+      StoredServer second(directory / "0");
+      EXPECT_THAT(second->Ask(About(RequestKind::kStatus, "")).status.message,
+                  ::testing::HasSubstr("session 1 is set aside"));
+      JoinsAndBeginsNothing(second);
+    }
+    EXPECT_EQ(journal(), before);
+  }
 }
 
 }  // namespace

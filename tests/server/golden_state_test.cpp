@@ -22,7 +22,7 @@ Request OfLab(RequestKind kind) {
 }
 
 // A new format needs a state directory in tests/golden that was written with it.
-static_assert(slam::kCheckpointFormat == 9);
+static_assert(slam::kCheckpointFormat == 10);
 static_assert(kRecordFormat == 2);
 
 class GoldenState : public ::testing::TestWithParam<const char*> {

@@ -10,6 +10,7 @@
 
 #include "server/store/crash_note.h"
 #include "server/store/restore_marks.h"
+#include "tests/server/store/passing_store.h"
 #include "tests/server/support/raw_records.h"
 #include "tests/server/support/stored_server.h"
 #include "tests/temp_directory.h"
@@ -75,33 +76,23 @@ TEST(Restore, ASessionWithDamagedRecordsIsRefusedAndTheOthersComeBack) {
 }
 
 // Calls a function before anything is read.
-class WatchedStore : public Store {
+class WatchedStore : public PassingStore {
  public:
   using BeforeRead = std::function<void(const RecordRange& range)>;
-  WatchedStore(std::unique_ptr<Store> store, BeforeRead before)
-      : store_(std::move(store)), before_(std::move(before)) {}
-  Result<void> Commit(const RecordChanges& changes) override { return store_->Commit(changes); }
-  Result<void> CommitEach(const Next& next) override { return store_->CommitEach(next); }
-  Result<std::size_t> RemoveFirst(const RecordRange& range, std::size_t count) override {
-    return store_->RemoveFirst(range, count);
-  }
+  WatchedStore(Store& store, BeforeRead before) : PassingStore(store), before_(std::move(before)) {}
   Result<void> Read(const RecordRange& range, const Visit& visit) override {
     before_(range);
-    return store_->Read(range, visit);
+    return PassingStore::Read(range, visit);
   }
-  Result<std::vector<std::uint64_t>> Owners(RecordKind kind) override { return store_->Owners(kind); }
-  Result<std::vector<std::uint64_t>> Numbers(const RecordRange& range) override { return store_->Numbers(range); }
-  Result<std::uint64_t> bytes_used() override { return store_->bytes_used(); }
-  std::filesystem::path directory() const override { return store_->directory(); }
 
  private:
-  const std::unique_ptr<Store> store_;
   const BeforeRead before_;
 };
 
 // Starts a server on this state, and stops it; whether it started.
 bool StartOnce(const std::filesystem::path& directory, const ServerOptions& options, WatchedStore::BeforeRead before) {
-  WatchedStore store(*OpenStore(directory), std::move(before));
+  const auto stored = *OpenStore(directory);
+  WatchedStore store(*stored, std::move(before));
   Journal journal(store, {.commit_delay_ms = 5});
   Inbound inbound(16);
   Outbound outbound(16);
@@ -206,7 +197,8 @@ TEST(Restore, AStartThatIsGivenUpIsDoneByTheNextOne) {
   DriveTwoRobots(directory / "0", options);
   for (int start = 0; start < 4; ++start) {
     StartControl control;
-    WatchedStore store(*OpenStore(directory / "0"), [&control](const RecordRange& range) {
+    const auto stored = *OpenStore(directory / "0");
+    WatchedStore store(*stored, [&control](const RecordRange& range) {
       if (range.kind == RecordKind::kJournal) control.GiveUp();
     });
     Journal journal(store, {.commit_delay_ms = 5});

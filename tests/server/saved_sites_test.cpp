@@ -281,6 +281,8 @@ TEST(SavedSites, FilesAreDeletedByNameAndTakeABoundedSpace) {
   const TempDirectory directory;
   ServerOptions options = TestOptions();
   options.store.max_saved_gib = 1e-9;  // One byte: the first file is already as much as is allowed.
+  std::filesystem::create_directories(directory / "0" / "saved");
+  WriteText(directory / "0" / "saved" / "sunday.site.tmp.17.0", "a server was killed while it wrote this");
   StoredServer server(directory / "0", options);
   WholeServer& house = *server.operator->();
   house.Open("r1", kRider);

@@ -34,6 +34,7 @@ int RunNamed(const Study& study, StudyContext context) {
   } catch (const std::exception& error) {
     report.Fault(std::string("the study ended early: ") + error.what());
   }
+  if (!only.empty() && report.empty()) report.Fault("no part is called *" + only + "*: nothing was measured");
   if (const auto written = report.Finish(); !written) {
     std::cerr << "cairn-study: " << written.error().message << '\n';
     return 1;

@@ -55,6 +55,7 @@ void Report::Progress(const std::string& text) {
 }
 
 void Report::Add(const Table& table, const std::string& name) {
+  empty_ = false;
   markdown_ += "\n" + table.Markdown();
   out_ << '\n' << table.Aligned() << '\n' << std::flush;
   WriteFile(FileStem(name) + ".csv", table.Csv());
@@ -73,6 +74,7 @@ void Report::AddMap(const OccupancyImage& map, const Plot& plot, const std::stri
 }
 
 void Report::AddPicture(const RasterImage& picture, const std::string& caption, const std::string& name) {
+  empty_ = false;
   const auto png = EncodeImage(picture, ".png", 6);
   if (!png) {
     if (written_) written_ = tl::unexpected<Status>(png.error());

@@ -28,6 +28,8 @@ class Report {
   // Records the failure `otherwise` if the condition does not hold.
   void Expect(bool holds, const std::string& otherwise);
   [[nodiscard]] bool failed() const { return failed_; }
+  // Whether it has no table and no picture.
+  [[nodiscard]] bool empty() const { return empty_; }
   // Prints progress on the stream only; it is not part of the report.
   void Progress(const std::string& text);
   // Also written as NAME.csv; blanks in names become underscores.
@@ -50,6 +52,7 @@ class Report {
   std::string markdown_;
   Result<void> written_;
   bool failed_ = false;
+  bool empty_ = true;
 };
 
 }  // namespace cairn::studies

@@ -47,6 +47,17 @@ TEST(CairndCommandLine, TheDomainOfTheMachineGivesWayToWhatIsTyped) {
   unsetenv("CAIRN_DOMAIN");
 }
 
+// systemd starts it again at once: ten times a second, for as long as something keeps it from starting.
+TEST(CairndCommandLine, ThatCannotStartUnderSystemdTakesItsTime) {
+  const auto begin = std::chrono::steady_clock::now();
+  const auto outcome =
+      ChildProcess({"/usr/bin/env", "NOTIFY_SOCKET=@none", CAIRND_PATH, "--set", "wire.interfaces=192.0.2.77",
+                    "--domain", std::to_string(test::TestDomain()), "--state", "none"})
+          .Wait();
+  EXPECT_EQ(outcome.exit_code, 1) << outcome.output;
+  EXPECT_GT(std::chrono::steady_clock::now() - begin, std::chrono::milliseconds(1900));
+}
+
 TEST(CairndCommandLine, PrintsItsVersion) {
   const auto outcome = RunCairnd({"--version"});
   EXPECT_EQ(outcome.exit_code, 0);

@@ -59,6 +59,21 @@ TEST(Admission, TellsEmptyFromTooManyFromBadGeometry) {
   EXPECT_EQ(RefusalOf(scan), DropReason::kBadGeometry);
 }
 
+// A session that had believed such a number could not be restored.
+TEST(Admission, NumbersThatNoClientCountsToAreRefused) {
+  for (const std::uint64_t number : {std::uint64_t{0}, kMaxSequence + 1}) {
+    Scan scan = RoomScan(3);
+    scan.sequence = number;
+    EXPECT_EQ(RefusalOf(scan), DropReason::kBadGeometry);
+    Odometry odometry = RoomOdometry(3);
+    odometry.sequence = number;
+    EXPECT_TRUE(Admit(OdometrySample{{1, 2, 3}, odometry}).refused);
+  }
+  Scan scan = RoomScan(3);
+  scan.sequence = kMaxSequence;
+  EXPECT_FALSE(RefusalOf(scan));
+}
+
 TEST(Admission, OdometryThatIsNoPoseIsRefused) {
   Odometry odometry = RoomOdometry(3);
   EXPECT_FALSE(Admit(OdometrySample{{1, 2, 3}, odometry}).refused);

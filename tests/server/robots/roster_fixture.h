@@ -55,6 +55,16 @@ class RosterTest : public ::testing::Test {
       return state.robot == robot && state.phase == phase;
     });
   }
+  // The robot opens a session, draws something and ends it.
+  void DriveAndEnd(const std::string& robot, ClientId client) {
+    roster().Take(RequestOf(robot, client));
+    for (int step = 0; step < 5; ++step) {
+      roster().Take(OdometryOf(robot, RoomOdometry(step), client));
+      roster().Take(ScanOf(robot, RoomScan(step), client));
+    }
+    ASSERT_TRUE(roster().End(robot));
+    ASSERT_TRUE(WaitPhase(robot, client, SessionPhase::kEnded));
+  }
   void Suspend(ClientId client) {
     for (const auto& session : roster().All()) {
       const SessionState state = session->record().state();

@@ -108,13 +108,7 @@ TEST_F(RosterTest, ARobotThatDoesNotSayWhereItStartsIsAFragmentWhereAMapIsLoaded
 }
 
 TEST_F(RosterTest, WhatARobotHasDrawnIsAMapAlsoAfterItHasGone) {
-  roster().Take(RequestOf("r1", 7));
-  for (int step = 0; step < 5; ++step) {
-    roster().Take(OdometryOf("r1", RoomOdometry(step), 7));
-    roster().Take(ScanOf("r1", RoomScan(step), 7));
-  }
-  ASSERT_TRUE(roster().End("r1"));
-  ASSERT_TRUE(WaitPhase("r1", 7, SessionPhase::kEnded));
+  ASSERT_NO_FATAL_FAILURE(DriveAndEnd("r1", 7));
   SessionRequest again = RequestOf("r1", 7);
   again.session = 70;
   roster().Take(again);
@@ -123,13 +117,7 @@ TEST_F(RosterTest, WhatARobotHasDrawnIsAMapAlsoAfterItHasGone) {
 
 // As after a start: the map of an earlier session is not rendered yet.
 TEST_F(RosterTest, WhatAnEarlierSessionHasDrawnIsAMapBeforeItIsShown) {
-  roster().Take(RequestOf("r1", 7));
-  for (int step = 0; step < 5; ++step) {
-    roster().Take(OdometryOf("r1", RoomOdometry(step), 7));
-    roster().Take(ScanOf("r1", RoomScan(step), 7));
-  }
-  ASSERT_TRUE(roster().End("r1"));
-  ASSERT_TRUE(WaitPhase("r1", 7, SessionPhase::kEnded));
+  ASSERT_NO_FATAL_FAILURE(DriveAndEnd("r1", 7));
   SessionRequest elsewhere = RequestOf("r1", 7);
   elsewhere.session = 70;
   elsewhere.site = "hall";

@@ -1,7 +1,10 @@
 // A session that was not stored for a while, and is again; and what an exception leaves of one that is read back.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
 #include <future>
+#include <memory>
 #include <stdexcept>
 #include <utility>
 #include <vector>
@@ -80,6 +83,61 @@ TEST_F(StoredSessionTest, HasNoWorkOnceItHasEnded) {
   ASSERT_TRUE(one_.sent().WaitFor([&] { return !one_.session().has_work(); }));
   one_.session().Tick();
   EXPECT_FALSE(one_.session().has_work());
+}
+
+std::size_t EndsTold(const Sent& sent) {
+  return static_cast<std::size_t>(
+      std::ranges::count(sent.All<SessionState>(), SessionPhase::kEnded, &SessionState::phase));
+}
+
+// A robot that was told so began something else; after a kill its session went on.
+TEST_F(StoredSessionTest, ItsEndIsToldWhenThatIsOnTheDisk) {
+  one_.position = 5;
+  one_.session().End();
+  ASSERT_TRUE(one_.WaitPhase(SessionPhase::kEnded));
+  one_.session().Announce();
+  one_.session().Durable({OdometryTaken{}});
+  EXPECT_EQ(EndsTold(one_.sent()), 0U);
+  EXPECT_TRUE(one_.session().has_work());
+  one_.session().Durable({SessionFinished{true, {}}});
+  EXPECT_EQ(EndsTold(one_.sent()), 1U);
+}
+
+TEST_F(StoredSessionTest, ItsEndIsToldSoonAlsoWhereTheDiskIsSlow) {
+  one_.position = 5;
+  one_.session().End();
+  ASSERT_TRUE(one_.WaitPhase(SessionPhase::kEnded));
+  EXPECT_TRUE(one_.sent().WaitFor([&] {
+    one_.session().Tick();
+    return EndsTold(one_.sent()) == 1;
+  }));
+}
+
+// Its journal grew with every switch of the map, for ever.
+TEST_F(StoredSessionTest, ThatHasEndedTakesACheckpointAfterItsEndAndAfterEachMapSwitch) {
+  one_.Drive(0, 10);
+  ASSERT_TRUE(one_.WaitSettled(10));
+  const auto Ticked = [this](int checkpoints) {
+    return one_.sent().WaitFor([&] {
+      one_.session().Tick();
+      return !one_.session().has_work() && one_.checkpoints == checkpoints;
+    });
+  };
+  one_.session().End();
+  ASSERT_TRUE(one_.WaitPhase(SessionPhase::kEnded));
+  EXPECT_EQ(one_.checkpoints, 0);  // The journal has nothing of it yet.
+  one_.position = 5;
+  EXPECT_TRUE(Ticked(1));
+  const auto completed = std::make_shared<std::atomic<bool>>(false);
+  std::atomic<bool> adopted{false};
+  one_.session().Adopt(
+      {.epoch = 4, .generation = 1, .grid = {}, .done = [&](Adopted&&) { adopted = true; }, .completed = completed});
+  ASSERT_TRUE(one_.sent().WaitFor([&] { return adopted.load(); }));
+  one_.position = 6;
+  EXPECT_TRUE(Ticked(1));
+  *completed = true;
+  EXPECT_TRUE(Ticked(2));
+  EXPECT_TRUE(Ticked(2));
 }
 
 // It fails at the same scan each time that it is read: nothing of its map was shown any more.

@@ -220,6 +220,18 @@ TEST(Session, WhoeverAsksForTheEndAgainIsAnsweredAgain) {
   EXPECT_EQ(told(), 2U);
 }
 
+TEST(Session, WhoeverAsksForTheEndAgainIsToldOnlyAfterIt) {
+  OneSession one;
+  const auto release = one.HoldStrand();
+  std::atomic<int> told{0};
+  for (int i = 0; i < 2; ++i)
+    one.session().End({}, std::make_shared<Receipt>([&told](bool taken) { told += taken ? 1 : 100; }));
+  EXPECT_EQ(told, 0);
+  release->set_value();
+  EXPECT_TRUE(one.sent().WaitFor([&] { return told == 2; }));
+  EXPECT_EQ(one.phase(), SessionPhase::kEnded);
+}
+
 TEST(Session, SuspendFinishesTheScansAndCallsBack) {
   OneSession one;
   one.Drive(0, 5);

@@ -5,6 +5,9 @@
 #include <iterator>
 #include <random>
 #include <set>
+#include <string>
+
+#include "server/slam/state/archive.h"
 
 namespace cairn::server {
 namespace {
@@ -199,6 +202,26 @@ TEST(StreamLedger, IsJournaledAlsoWhereItHasAsManyGapsAsItMayHave) {
   ASSERT_TRUE(account);
   EXPECT_EQ(account->ledger().waiting, 0U);
   EXPECT_EQ(account->ledger().last_sequence, 3999U);
+}
+
+// A late number splits a gap in two. With one gap too many, the next server refused the checkpoint.
+TEST(StreamLedger, HasNeverMoreGapsThanItMayHave) {
+  StreamLedger ledger{Ledger{}};
+  const auto take = [&ledger](std::uint64_t number) {
+    EXPECT_TRUE(ledger.Received(number));
+    ledger.Used(number, 1, false, 1.0);
+  };
+  for (std::uint64_t n = 1; n <= 4 * StreamLedger::kMaxGaps + 1; n += 4) take(n);
+  for (std::uint64_t n = 403; n < 4000; n += 4) take(n);
+  slam::StateWriter writer;
+  writer(ledger);
+  const std::string bytes = writer.Bytes();
+  slam::StateReader reader(bytes);
+  StreamLedger read{Ledger{}};
+  reader(read);
+  EXPECT_TRUE(reader.done()) << reader.failed();
+  EXPECT_FALSE(read.Received(3));  // Forgotten: lost for good.
+  EXPECT_TRUE(read.Received(4000));
 }
 
 // Property: whatever arrives in whatever order, no scan vanishes and settled_through never goes back.

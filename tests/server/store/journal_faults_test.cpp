@@ -11,6 +11,7 @@
 #include "server/store/sqlite_store.h"
 #include "tests/eventually.h"
 #include "tests/server/store/followed.h"
+#include "tests/server/store/passing_store.h"
 #include "tests/server/store/sample_entries.h"
 #include "tests/server/store/stored_sites.h"
 #include "tests/temp_directory.h"
@@ -22,26 +23,17 @@ constexpr std::size_t kQueueBytes = std::size_t{1} << 20;
 const StoreOptions kSmallQueue{.commit_delay_ms = 1, .queue_mib = 1};
 
 // Nothing can be written any more after the commit in which a checkpoint becomes complete.
-class FullAfterACheckpoint : public Store {
+class FullAfterACheckpoint : public PassingStore {
  public:
-  explicit FullAfterACheckpoint(Store& store) : store_(store) {}
+  using PassingStore::PassingStore;
   Result<void> Commit(const RecordChanges& changes) override {
     if (full_) return Fail(StatusCode::kResourceExhausted, "the disk is full");
-    auto committed = store_.Commit(changes);
-    full_ = ReadCheckpoint(store_, 1).value().has_value();
+    auto committed = store().Commit(changes);
+    full_ = ReadCheckpoint(store(), 1).value().has_value();
     return committed;
   }
-  Result<void> CommitEach(const Next& next) override { return store_.CommitEach(next); }
-  Result<std::size_t> RemoveFirst(const RecordRange& range, std::size_t count) override {
-    return store_.RemoveFirst(range, count);
-  }
-  Result<void> Read(const RecordRange& range, const Visit& visit) override { return store_.Read(range, visit); }
-  Result<std::vector<std::uint64_t>> Owners(RecordKind kind) override { return store_.Owners(kind); }
-  Result<std::vector<std::uint64_t>> Numbers(const RecordRange& range) override { return store_.Numbers(range); }
-  Result<std::uint64_t> bytes_used() override { return store_.bytes_used(); }
 
  private:
-  Store& store_;
   std::atomic<bool> full_{false};
 };
 
@@ -165,71 +157,64 @@ std::unique_ptr<Store> StoreWithALongJournal(const std::filesystem::path& direct
   return *OpenStore(directory);
 }
 
-// The disk does not answer until it is let go.
-class HangingStore : public Store {
+// The disk does not answer, where it is asked to, until it is let go.
+class HangingStore : public PassingStore {
  public:
-  explicit HangingStore(Store& store) : store_(store) {}
+  using PassingStore::PassingStore;
   Result<void> Commit(const RecordChanges& changes) override {
-    hangs_.wait(true);
-    return store_.Commit(changes);
+    commits_hang_.wait(true);
+    return store().Commit(changes);
   }
-  Result<void> CommitEach(const Next& next) override { return store_.CommitEach(next); }
   Result<std::size_t> RemoveFirst(const RecordRange& range, std::size_t count) override {
-    return store_.RemoveFirst(range, count);
+    removals_hang_.wait(true);
+    return store().RemoveFirst(range, count);
   }
-  Result<void> Read(const RecordRange& range, const Visit& visit) override { return store_.Read(range, visit); }
-  Result<std::vector<std::uint64_t>> Owners(RecordKind kind) override { return store_.Owners(kind); }
-  Result<std::vector<std::uint64_t>> Numbers(const RecordRange& range) override { return store_.Numbers(range); }
-  Result<std::uint64_t> bytes_used() override { return store_.bytes_used(); }
-  void Hang(bool hangs) {
-    hangs_ = hangs;
-    hangs_.notify_all();
+  void Hang(bool commits, bool removals) {
+    commits_hang_ = commits;
+    removals_hang_ = removals;
+    commits_hang_.notify_all();
+    removals_hang_.notify_all();
   }
 
  private:
-  Store& store_;
-  std::atomic<bool> hangs_{false};
+  std::atomic<bool> commits_hang_{false}, removals_hang_{false};
 };
 
 // Nothing was said of it, although nothing was durable any more.
 TEST(JournalFaults, ADiskThatDoesNotAnswerIsSaid) {
-  const auto memory = *OpenStore(std::string(kInMemory));
-  HangingStore store(*memory);
-  Followed told;
-  Journal journal(store, {.commit_delay_ms = 1});
-  journal.Open(SampleSession(1), told.durable());
-  journal.Start();
-  ASSERT_TRUE(test::Eventually([&] { return told.through == 0; }));
-  store.Hang(true);
-  journal.Append(1, SampleOdometry(1));
-  EXPECT_FALSE(journal.health().degraded);
-  EXPECT_TRUE(test::Eventually([&] { return journal.health().degraded; }, std::chrono::seconds(30)));
-  EXPECT_THAT(journal.health().reason, ::testing::HasSubstr("the disk has not answered"));
-  store.Hang(false);
-  EXPECT_TRUE(test::Eventually([&] { return !journal.health().degraded && told.through == 1; }));
+  for (const bool removals : {false, true}) {
+    const auto memory = *OpenStore(std::string(kInMemory));
+    HangingStore store(*memory);
+    Followed told;
+    Journal journal(store, {.commit_delay_ms = 1});
+    journal.Open(SampleSession(1), told.durable());
+    journal.Start();
+    ASSERT_TRUE(test::Eventually([&] { return told.through == 0; }));
+    store.Hang(!removals, removals);
+    if (removals) journal.Forget(2);
+    journal.Append(1, SampleOdometry(1));
+    EXPECT_FALSE(journal.health().degraded);
+    EXPECT_TRUE(test::Eventually([&] { return journal.health().degraded; }, std::chrono::seconds(30)));
+    EXPECT_THAT(journal.health().reason, ::testing::HasSubstr("the disk has not answered"));
+    store.Hang(false, false);
+    EXPECT_TRUE(test::Eventually([&] { return !journal.health().degraded && told.through == 1; }));
+  }
 }
 
 // Counts how records are removed piece by piece.
-class CountedRemovals : public Store {
+class CountedRemovals : public PassingStore {
  public:
-  explicit CountedRemovals(Store& store) : store_(store) {}
-  Result<void> Commit(const RecordChanges& changes) override { return store_.Commit(changes); }
-  Result<void> CommitEach(const Next& next) override { return store_.CommitEach(next); }
+  using PassingStore::PassingStore;
   Result<std::size_t> RemoveFirst(const RecordRange& range, std::size_t count) override {
-    auto removed = store_.RemoveFirst(range, count);
+    auto removed = store().RemoveFirst(range, count);
     ++removals_;
     if (removed && *removed > largest_removal_) largest_removal_ = *removed;
     return removed;
   }
-  Result<void> Read(const RecordRange& range, const Visit& visit) override { return store_.Read(range, visit); }
-  Result<std::vector<std::uint64_t>> Owners(RecordKind kind) override { return store_.Owners(kind); }
-  Result<std::vector<std::uint64_t>> Numbers(const RecordRange& range) override { return store_.Numbers(range); }
-  Result<std::uint64_t> bytes_used() override { return store_.bytes_used(); }
   [[nodiscard]] std::size_t removals() const { return removals_; }
   [[nodiscard]] std::size_t largest_removal() const { return largest_removal_; }
 
  private:
-  Store& store_;
   std::atomic<std::size_t> removals_{0}, largest_removal_{0};
 };
 
@@ -295,26 +280,15 @@ TEST(JournalFaults, AfterAnExceptionTheJournalGoesOnAndItsSessionsAreStoredAgain
 }
 
 // Longer records do not fit.
-class SmallRecords : public Store {
+class SmallRecords : public PassingStore {
  public:
-  explicit SmallRecords(Store& store) : store_(store) {}
+  using PassingStore::PassingStore;
   Result<void> Commit(const RecordChanges& changes) override {
     for (const Record& record : changes.put)
       if (record.bytes.size() > max_record_bytes()) return Fail(StatusCode::kOutOfRange, "too long");
-    return store_.Commit(changes);
+    return store().Commit(changes);
   }
-  Result<void> CommitEach(const Next& next) override { return store_.CommitEach(next); }
-  Result<std::size_t> RemoveFirst(const RecordRange& range, std::size_t count) override {
-    return store_.RemoveFirst(range, count);
-  }
-  Result<void> Read(const RecordRange& range, const Visit& visit) override { return store_.Read(range, visit); }
-  Result<std::vector<std::uint64_t>> Owners(RecordKind kind) override { return store_.Owners(kind); }
-  Result<std::vector<std::uint64_t>> Numbers(const RecordRange& range) override { return store_.Numbers(range); }
   std::size_t max_record_bytes() const override { return 20'000; }
-  Result<std::uint64_t> bytes_used() override { return store_.bytes_used(); }
-
- private:
-  Store& store_;
 };
 
 // The group with it was tried again for ever, and everything behind it waited.
