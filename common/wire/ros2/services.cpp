@@ -146,6 +146,7 @@ class AnswerWriter final : public Answers<S> {
     fd::DataWriterQos qos;
     SetCommon(kAnswerQos, qos);
     qos.publish_mode().kind = fd::SYNCHRONOUS_PUBLISH_MODE;
+    qos.liveliness().kind = fd::MANUAL_BY_TOPIC_LIVELINESS_QOS;  // Send says why.
     auto& times = qos.reliable_writer_qos().times;
     times.initialHeartbeatDelay = Duration_t(0.01);
     times.heartbeatPeriod = Duration_t(0.02);
@@ -170,6 +171,10 @@ class AnswerWriter final : public Answers<S> {
       params.related_sample_identity().sequence_number(rtps::SequenceNumber_t(
           static_cast<std::int32_t>(caller.sequence >> 32), static_cast<std::uint32_t>(caller.sequence)));
     }
+    // Cyclone DDS skips whatever a volatile writer has sent before the first heartbeat that it sees. The one that Fast
+    // DDS sends when it finds a reader may come before that reader has found this writer. Who asks has found it; so a
+    // heartbeat goes out first, which an assertion of liveliness is.
+    static_cast<void>(writer_->assert_liveliness());
     if (writer_->write(&sample, params)) return {};
     return Fail(StatusCode::kUnavailable, writer_->get_topic()->get_name() + ": not accepted");
   }
