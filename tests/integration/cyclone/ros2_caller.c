@@ -1,10 +1,10 @@
 /* A ROS 2 program that calls a service as rmw_cyclonedds does, without ROS: waits for the service, asks, waits for the
  * answer with its own two numbers in front, and prints it as one line of JSON. Exits 0 if it came.
- *   ros2_caller DOMAIN KIND SERVICE [TEXT] [jazzy] [impatient]
+ *   ros2_caller DOMAIN KIND SERVICE [TEXT] [jazzy] [impatient] [briefly]
  * KIND is get_map, load_map, save_map, serialize_map, pause or reset (TEXT "true": paused afterwards). Words: jazzy: type
  * hashes in the user data of endpoints (from Iron on); without it: as Humble. impatient: asks as soon as its request
  * can be read, without a look whether its reader of answers is known, and 300 times at once, of which one answer will
- * do. CYCLONEDDS_URI chooses the network interface.
+ * do. briefly: looks for the service for 5 s, not 30. CYCLONEDDS_URI chooses the network interface.
  */
 #include <dds/dds.h>
 #include <stdbool.h>
@@ -14,7 +14,7 @@
 
 #include "service_calls.h"
 
-enum { kSeconds = 30, kFlood = 300 };
+enum { kSeconds = 30, kBriefly = 5, kFlood = 300 };
 
 struct Kind {
   const char *name, *type; /* Of the service, as types begin on the wire. */
@@ -155,6 +155,10 @@ static bool TakeAnswer(const struct Caller* caller, int64_t number, int64_t coun
   return mine;
 }
 
+static bool IsWord(const char* text) {
+  return strcmp(text, "jazzy") == 0 || strcmp(text, "impatient") == 0 || strcmp(text, "briefly") == 0;
+}
+
 static bool Has(int argc, char** argv, const char* word) {
   for (int i = 4; i < argc; ++i)
     if (strcmp(argv[i], word) == 0) return true;
@@ -162,15 +166,15 @@ static bool Has(int argc, char** argv, const char* word) {
 }
 
 int main(int argc, char** argv) {
-  if (argc < 4) Die("usage: ros2_caller DOMAIN KIND SERVICE [TEXT] [jazzy] [impatient]");
+  if (argc < 4) Die("usage: ros2_caller DOMAIN KIND SERVICE [TEXT] [jazzy] [impatient] [briefly]");
   struct Caller caller = {.kind = NULL, .jazzy = Has(argc, argv, "jazzy")};
   for (size_t i = 0; i < sizeof(kKinds) / sizeof(kKinds[0]); ++i)
     if (strcmp(kKinds[i].name, argv[2]) == 0) caller.kind = &kKinds[i];
   if (caller.kind == NULL) Die("no such kind");
   const bool impatient = Has(argc, argv, "impatient");
-  const char* const text = argc > 4 && strcmp(argv[4], "jazzy") != 0 && strcmp(argv[4], "impatient") != 0 ? argv[4] : "";
+  const char* const text = argc > 4 && !IsWord(argv[4]) ? argv[4] : "";
   Join(&caller, (dds_domainid_t)strtoul(argv[1], NULL, 10), argv[3]);
-  const dds_time_t end = dds_time() + DDS_SECS(kSeconds);
+  const dds_time_t end = dds_time() + DDS_SECS(Has(argc, argv, "briefly") ? kBriefly : kSeconds);
   while (!IsThere(&caller, impatient)) {
     if (dds_time() > end) Die("the service is not there");
     dds_sleepfor(DDS_MSECS(impatient ? 1 : 20));
