@@ -204,8 +204,8 @@ int StopJournal(Journal& journal) {
 Result<std::unique_ptr<Ros2Door>> OpenRos2(const CairndOptions& options, bool keeps_sites, Inbound& inbound,
                                            Outbound& outbound) {
   if (!options.ros2.enabled) return nullptr;
-  auto door = Ros2Door::Open(options.ros2, options.wire, {keeps_sites, options.server.server.create_sites},
-                             inbound, outbound);
+  auto door =
+      Ros2Door::Open(options.ros2, options.wire, {keeps_sites, options.server.server.create_sites}, inbound, outbound);
   if (door) spdlog::info("ROS 2 robots are served in DDS domain {}", options.ros2.domain);
   return door;
 }

@@ -25,7 +25,8 @@ Reply Failed(StatusCode code, const char* why) {
 template <typename Items>
 void Append(const Items& more, Items& all) {
   const std::size_t room = kMostItems - std::min(kMostItems, all.size());
-  all.insert(all.end(), more.begin(), std::next(more.begin(), static_cast<std::ptrdiff_t>(std::min(room, more.size()))));
+  all.insert(all.end(), more.begin(),
+             std::next(more.begin(), static_cast<std::ptrdiff_t>(std::min(room, more.size()))));
 }
 
 }  // namespace
@@ -36,8 +37,8 @@ void CommandCalls::Ask(std::uint64_t asker, Request&& request, Done done, Clock:
   std::int64_t number = 0;
   {
     const MutexLock lock(mutex_);
-    const auto of_asker = std::count_if(calls_.begin(), calls_.end(),
-                                        [asker](const auto& call) { return call.second.asker == asker; });
+    const auto of_asker =
+        std::count_if(calls_.begin(), calls_.end(), [asker](const auto& call) { return call.second.asker == asker; });
     if (calls_.size() < kMostOpen && static_cast<std::size_t>(of_asker) < kMostOfOne) {
       number = next_++;
       calls_.emplace(number, Call{asker, done, now, {}, false});

@@ -1,7 +1,8 @@
 // The requests for the map of a site that wait for the thread of the maps. Bounded: at most kMost wait, and at most
-// kMostOfOne of one participant (as many again while a turn is under way); a further one is not taken. One turn answers no more cells than one message may have
-// (but at least one request), so that nobody keeps the thread busy with maps. A request whose answer cannot be delivered
-// yet waits for a later turn, until its deadline. Thread rule: Add from any thread, the rest from one.
+// kMostOfOne of one participant (as many again while a turn is under way); a further one is not taken. One turn answers
+// no more cells than one message may have (but at least one request), so that nobody keeps the thread busy with maps. A
+// request whose answer cannot be delivered yet waits for a later turn, until its deadline. Thread rule: Add from any
+// thread, the rest from one.
 #pragma once
 
 #include <chrono>
@@ -33,8 +34,8 @@ class MapWishes {
 
   // Whether it was taken.
   [[nodiscard]] bool Add(MapWish&& wish) CAIRN_EXCLUDES(mutex_);
-  // Answers in the order of the requests. `map_of` makes the map of a site as it is now. Returns how many were given up,
-  // because nobody was there at their deadline.
+  // Answers in the order of the requests. `map_of` makes the map of a site as it is now. Returns how many were given
+  // up, because nobody was there at their deadline.
   std::size_t Answer(const std::function<ros2::Grid(NameId)>& map_of, std::size_t max_cells, Clock::time_point now)
       CAIRN_EXCLUDES(mutex_);
 

@@ -1,7 +1,7 @@
 // The door for robots that run ROS 2: a DDS participant of its own beside the native one, with the same values in and
-// out (README.md). Ros2Ingress is its way in, Ros2Egress its way out; Ros2Services answers who asks. Order: Open before the server starts (it watches
-// what goes out), Start when the server runs, Close before the server stops, Finish after. Thread rule: these from one
-// thread; report and the counts from any.
+// out (README.md). Ros2Ingress is its way in, Ros2Egress its way out; Ros2Services answers who asks. Order: Open before
+// the server starts (it watches what goes out), Start when the server runs, Close before the server stops, Finish
+// after. Thread rule: these from one thread; report and the counts from any.
 #pragma once
 
 #include <chrono>
@@ -40,7 +40,9 @@ class Ros2Door {
   [[nodiscard]] std::uint64_t malformed() const {
     return ingress_.malformed() + services_.malformed() + failures_.count();
   }
-  [[nodiscard]] std::uint64_t unpublished() const { return egress_.unpublished() + services_.unanswered() + unseen_.count(); }
+  [[nodiscard]] std::uint64_t unpublished() const {
+    return egress_.unpublished() + services_.unanswered() + unseen_.count();
+  }
   [[nodiscard]] std::uint64_t datagrams_refused() const { return bus_->datagrams_refused(); }
   [[nodiscard]] std::chrono::nanoseconds busy_with_one_datagram() const { return bus_->busy_with_one_datagram(); }
 

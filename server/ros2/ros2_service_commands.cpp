@@ -61,7 +61,8 @@ void Ros2Services::Load(ros2::LoadMap::Request&& request, const Asked<ros2::Load
       [this, asked](const Reply& reply) {
         if (!reply.status.ok()) return Answer(asked, {{}, LoadMapResult(reply.status)});
         const std::string site = reply.saved.empty() ? std::string() : reply.saved.front().site;
-        MapWish wish{asked.asker(), HashName(site), true, now_ + kMapOfLoadedWaits, [this, asked](const ros2::Grid& map) {
+        MapWish wish{asked.asker(), HashName(site), true, now_ + kMapOfLoadedWaits,
+                     [this, asked](const ros2::Grid& map) {
                        return Send(asked, {map, ros2::LoadMap::kSuccess});
                      }};
         if (!doors_.want_map(std::move(wish))) Answer(asked, {{}, ros2::LoadMap::kSuccess});
@@ -105,8 +106,8 @@ void Ros2Services::ForEach(const std::shared_ptr<Round>& round, std::function<vo
       [this, round, then = std::move(then)](const Reply& reply) {
         if (!reply.status.ok()) {
           round->all = false;
-          spdlog::warn("ROS 2: {} of robot {} failed: {}", RequestKindName(round->kind),
-                       round->robots[round->next - 1], reply.status.message);
+          spdlog::warn("ROS 2: {} of robot {} failed: {}", RequestKindName(round->kind), round->robots[round->next - 1],
+                       reply.status.message);
         }
         // The others would be refused as well, and within this call.
         if (reply.status.code == StatusCode::kResourceExhausted) return then(false);
@@ -141,8 +142,8 @@ void Ros2Services::Reset(NameId site_id, const ros2::Reset::Request& request, co
   commands_.Ask(
       asked.asker(), About(RequestKind::kJobList, site),
       [this, site, asked](const Reply& reply) {
-        const bool idle = std::all_of(reply.jobs.begin(), reply.jobs.end(),
-                                      [](const Job& job) { return IsFinal(job.state); });
+        const bool idle =
+            std::all_of(reply.jobs.begin(), reply.jobs.end(), [](const Job& job) { return IsFinal(job.state); });
         if (!reply.status.ok() || !idle) {
           spdlog::warn("ROS 2: site {} is not reset: {}", site, idle ? reply.status.message : "a job of it runs");
           return Answer(asked, {ros2::Reset::kFailure});
@@ -167,7 +168,8 @@ void Ros2Services::Delete(const std::string& site, int tries, const Asked<ros2::
       asked.asker(), About(RequestKind::kSiteDelete, site),
       [this, site, tries, asked](const Reply& reply) {
         if (reply.status.code == StatusCode::kFailedPrecondition && tries > 1) return Delete(site, tries - 1, asked);
-        spdlog::info("ROS 2: site {} {}", site, reply.status.ok() ? "is reset" : "is not reset: " + reply.status.message);
+        spdlog::info("ROS 2: site {} {}", site,
+                     reply.status.ok() ? "is reset" : "is not reset: " + reply.status.message);
         if (const auto found = sites_.find(HashName(site)); found != sites_.end()) found->second.paused = false;
         doors_.begin_anew(site);  // Also where it failed: their sessions have ended.
         Answer(asked, {reply.status.ok() ? ros2::Reset::kSuccess : ros2::Reset::kFailure});

@@ -100,27 +100,23 @@ void Ros2Services::OpenSite(NameId site_id, const std::string& name) {
 }
 
 void Ros2Services::OfferMap(NameId site_id, const std::string& service, Endpoints& endpoints) {
-  Offer<ros2::GetMap>(
-      service, endpoints, [this, site_id](ros2::GetMap::Request&&, const Asked<ros2::GetMap>& asked) {
-        MapWish wish{asked.asker(), site_id, false, now_ + kAnswerWaits, [this, asked](const ros2::Grid& map) {
-                       return Send(asked, ros2::GetMap::Response{map});
-                     }};
-        if (!doors_.want_map(std::move(wish))) overflow_.fetch_add(1, std::memory_order_relaxed);
-      });
+  Offer<ros2::GetMap>(service, endpoints, [this, site_id](ros2::GetMap::Request&&, const Asked<ros2::GetMap>& asked) {
+    MapWish wish{asked.asker(), site_id, false, now_ + kAnswerWaits,
+                 [this, asked](const ros2::Grid& map) { return Send(asked, ros2::GetMap::Response{map}); }};
+    if (!doors_.want_map(std::move(wish))) overflow_.fetch_add(1, std::memory_order_relaxed);
+  });
 }
 
 void Ros2Services::OfferCommands(NameId site_id, Site& site) {
   const std::string prefix = "/" + site.topic_part + "/";
-  Offer<ros2::Pause>(prefix + "pause_new_measurements", site.endpoints,
-                     [this, site_id](ros2::Pause::Request&&, const Asked<ros2::Pause>& asked) {
-                       TogglePause(site_id, asked);
-                     });
+  Offer<ros2::Pause>(
+      prefix + "pause_new_measurements", site.endpoints,
+      [this, site_id](ros2::Pause::Request&&, const Asked<ros2::Pause>& asked) { TogglePause(site_id, asked); });
   if (!abilities_.keeps_sites) return;
   Offer<ros2::SaveMap>(prefix + "save_map", site.endpoints,
                        [this, site_id](ros2::SaveMap::Request&& request, const Asked<ros2::SaveMap>& asked) {
-                         Save(site_id, request.name, asked.asker(), [this, asked](const Status& status) {
-                           Answer(asked, {SaveMapResult(status)});
-                         });
+                         Save(site_id, request.name, asked.asker(),
+                              [this, asked](const Status& status) { Answer(asked, {SaveMapResult(status)}); });
                        });
   using Serialize = ros2::SerializePoseGraph;
   Offer<Serialize>(prefix + "serialize_map", site.endpoints,
@@ -137,10 +133,9 @@ void Ros2Services::OfferCommands(NameId site_id, Site& site) {
 }
 
 void Ros2Services::OfferLoad() {
-  Offer<ros2::LoadMap>(std::string(kOfServer) + "/load_map", of_server_,
-                       [this](ros2::LoadMap::Request&& request, const Asked<ros2::LoadMap>& asked) {
-                         Load(std::move(request), asked);
-                       });
+  Offer<ros2::LoadMap>(
+      std::string(kOfServer) + "/load_map", of_server_,
+      [this](ros2::LoadMap::Request&& request, const Asked<ros2::LoadMap>& asked) { Load(std::move(request), asked); });
 }
 
 }  // namespace cairn::server

@@ -1,8 +1,8 @@
 // The services that ROS 2 programs call (README.md, "Services"): the map of each site and, where ros2.commands allows
 // it, commands, with names and types of slam_toolbox and of Nav2's map_server. A map is answered by the thread of the
-// maps (map_wishes.h); a command goes to the desk as a native one does (command_calls.h). Requests that find no room are
-// answered as failed, or left out where the type has no word for that. Thread rule: Take and the counts from any thread,
-// the rest on the thread of the bus, or while it does not run.
+// maps (map_wishes.h); a command goes to the desk as a native one does (command_calls.h). Requests that find no room
+// are answered as failed, or left out where the type has no word for that. Thread rule: Take and the counts from any
+// thread, the rest on the thread of the bus, or while it does not run.
 #pragma once
 
 #include <atomic>

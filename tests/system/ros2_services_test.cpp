@@ -1,5 +1,5 @@
-// Services for ROS 2 programs against cairnd, called as rmw_cyclonedds does it (tests/integration/cyclone/ros2_caller.c),
-// while a robot maps.
+// Services for ROS 2 programs against cairnd, called as rmw_cyclonedds does it
+// (tests/integration/cyclone/ros2_caller.c), while a robot maps.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -24,9 +24,9 @@ class RosCallers : public ::testing::Test {
   RosCallers() { setenv("CYCLONEDDS_URI", "file://" CAIRN_CYCLONE_CONFIG, 1); }
 
   void StartServer(const std::string& commands) {
-    server_ = std::make_unique<ChildProcess>(
-        Words{CAIRND_PATH, "--domain", domain_, "--state", state_.path().string(), "--set", "ros2.enabled=true", "--set",
-              "ros2.domain=" + domain_, "--set", "ros2.commands=" + commands, "--set", "slam.particles=20"});
+    server_ = std::make_unique<ChildProcess>(Words{CAIRND_PATH, "--domain", domain_, "--state", state_.path().string(),
+                                                   "--set", "ros2.enabled=true", "--set", "ros2.domain=" + domain_,
+                                                   "--set", "ros2.commands=" + commands, "--set", "slam.particles=20"});
     EXPECT_TRUE(server_->Says("ready"));
   }
   // A robot that has drawn something of the site lab.
@@ -45,9 +45,7 @@ class RosCallers : public ::testing::Test {
     words.insert(words.begin(), {CAIRN_PATH, "--domain", domain_});
     return ChildProcess(words).Wait().output;
   }
-  bool IsSaved(const std::string& name) const {
-    return std::filesystem::exists(state_ / "saved" / (name + ".site"));
-  }
+  bool IsSaved(const std::string& name) const { return std::filesystem::exists(state_ / "saved" / (name + ".site")); }
   void StopServer() {
     server_->Signal(SIGTERM);
     EXPECT_EQ(server_->Wait().exit_code, 0);
@@ -110,7 +108,9 @@ TEST_F(RosCallers, LoadASavedSiteWithItsMap) {
     EXPECT_EQ(Call({"save_map", "/lab/save_map", "monday"})["result"], 0);
   }
   Cairn({"session", "end", "r1"});
-  EXPECT_TRUE(test::Eventually([this] { return ChildProcess({CAIRN_PATH, "--domain", domain_, "site", "delete", "lab"}).Wait().exit_code == 0; }));
+  EXPECT_TRUE(test::Eventually([this] {
+    return ChildProcess({CAIRN_PATH, "--domain", domain_, "site", "delete", "lab"}).Wait().exit_code == 0;
+  }));
   const nlohmann::json loaded = Call({"load_map", "/cairn/load_map", "monday", "jazzy"});
   EXPECT_EQ(loaded["result"], 0);
   EXPECT_GT(loaded["occupied"], 100);

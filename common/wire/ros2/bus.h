@@ -68,11 +68,11 @@ class Publication {
   [[nodiscard]] virtual int matched() const = 0;
 };
 
-// Who has asked, and what his answer has to be marked with. rmw_fastrtps marks a request with the identity of its sample
-// in the inline QoS, rmw_cyclonedds with 16 bytes in front of the message (service_endpoint.h).
+// Who has asked, and what his answer has to be marked with. rmw_fastrtps marks a request with the identity of its
+// sample in the inline QoS, rmw_cyclonedds with 16 bytes in front of the message (service_endpoint.h).
 struct Caller {
-  WriterId writer{};       // The endpoint that asked. Its first 12 bytes are its participant's.
-  WriterId answer_to{};    // The endpoint that reads the answer, where the request names it; else that which asked.
+  WriterId writer{};          // The endpoint that asked. Its first 12 bytes are its participant's.
+  WriterId answer_to{};       // The endpoint that reads the answer, where the request names it; else that which asked.
   std::int64_t sequence = 0;  // Of the request, as the caller counts.
   bool in_message = false;    // As rmw_cyclonedds does it.
   std::uint64_t client = 0;   // The caller's number for itself, in that case.

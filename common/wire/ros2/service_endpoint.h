@@ -5,7 +5,8 @@
 //   answer carries the identity of the request, with the GUID of that reader where it is named, as its own related one.
 //   (rmw_fastrtps_shared_cpp: custom_service_info.hpp, rmw_request.cpp, rmw_response.cpp)
 // - rmw_cyclonedds: in front of the message are 16 bytes, a 64-bit number of the client and one of the request, in the
-//   byte order of the message. The answer has the same 16 bytes in front. (rmw_cyclonedds_cpp: serdata.cpp, rmw_node.cpp)
+//   byte order of the message. The answer has the same 16 bytes in front. (rmw_cyclonedds_cpp: serdata.cpp,
+//   rmw_node.cpp)
 //
 // Names, types and QoS are the same in both, so one pair of endpoints serves both; which one a caller speaks is told by
 // the vendor that its GUID begins with (RTPS 2.5, 9.3.1.5). This header uses the Fast DDS 2.x API; include it only

@@ -1,5 +1,6 @@
-// The types of each service on the wire: those of idl/ros2 with their type supports, and their hashes, as message_types.h
-// has them for messages. This header includes generated code; include it only inside common/wire and tests.
+// The types of each service on the wire: those of idl/ros2 with their type supports, and their hashes, as
+// message_types.h has them for messages. This header includes generated code; include it only inside common/wire and
+// tests.
 #pragma once
 
 #include "common/ros2/services.h"

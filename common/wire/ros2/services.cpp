@@ -1,4 +1,6 @@
 // The part of Bus that serves services.
+#include "common/ros2/services.h"
+
 #include <algorithm>
 #include <atomic>
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
@@ -8,7 +10,6 @@
 #include <utility>
 
 #include "common/mutex.h"
-#include "common/ros2/services.h"
 #include "common/wire/ros2/participant.h"
 #include "common/wire/ros2/service_endpoint.h"
 
@@ -153,8 +154,8 @@ class AnswerWriter final : public Answers<S> {
     times.nackResponseDelay = Duration_t(0.002);
     SetUserData(qos.user_data(), UserData(ServiceType<S>::kResponseHash));
     const MutexLock lock(participant_->endpoints());
-    writer_ = participant_->publisher()->create_datawriter(*topic, qos, &readers_,
-                                                           fd::StatusMask::publication_matched());
+    writer_ =
+        participant_->publisher()->create_datawriter(*topic, qos, &readers_, fd::StatusMask::publication_matched());
     if (writer_ == nullptr) return tl::unexpected(Broken("a writer of " + name));
     return {};
   }
@@ -204,9 +205,9 @@ Result<std::unique_ptr<Answers<S>>> Bus::AdvertiseAnswers(const std::string& ser
 }
 
 // The macro's argument is a type and cannot be in parentheses. NOLINTBEGIN(bugprone-macro-parentheses)
-#define CAIRN_ROS2_SERVICE(S)                                                      \
-  template Result<std::unique_ptr<Subscription>> Bus::SubscribeRequests<S>(        \
-      const std::string&, std::function<void(S::Request&&, const Caller&)>);       \
+#define CAIRN_ROS2_SERVICE(S)                                                \
+  template Result<std::unique_ptr<Subscription>> Bus::SubscribeRequests<S>(  \
+      const std::string&, std::function<void(S::Request&&, const Caller&)>); \
   template Result<std::unique_ptr<Answers<S>>> Bus::AdvertiseAnswers<S>(const std::string&)
 // NOLINTEND(bugprone-macro-parentheses)
 CAIRN_ROS2_SERVICE(GetMap);

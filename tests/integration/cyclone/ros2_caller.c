@@ -1,10 +1,10 @@
 /* A ROS 2 program that calls a service as rmw_cyclonedds does, without ROS: waits for the service, asks, waits for the
  * answer with its own two numbers in front, and prints it as one line of JSON. Exits 0 if it came.
  *   ros2_caller DOMAIN KIND SERVICE [TEXT] [jazzy] [impatient] [briefly]
- * KIND is get_map, load_map, save_map, serialize_map, pause or reset (TEXT "true": paused afterwards). Words: jazzy: type
- * hashes in the user data of endpoints (from Iron on); without it: as Humble. impatient: asks as soon as its request
- * can be read, without a look whether its reader of answers is known, and 300 times at once, of which one answer will
- * do. briefly: looks for the service for 5 s, not 30. CYCLONEDDS_URI chooses the network interface.
+ * KIND is get_map, load_map, save_map, serialize_map, pause or reset (TEXT "true": paused afterwards). Words: jazzy:
+ * type hashes in the user data of endpoints (from Iron on); without it: as Humble. impatient: asks as soon as its
+ * request can be read, without a look whether its reader of answers is known, and 300 times at once, of which one
+ * answer will do. briefly: looks for the service for 5 s, not 30. CYCLONEDDS_URI chooses the network interface.
  */
 #include <dds/dds.h>
 #include <stdbool.h>
@@ -29,8 +29,8 @@ static const struct Kind kKinds[] = {
     {"load_map", "nav_msgs::srv::dds_::LoadMap", &service_calls_TextRequest_desc, &service_calls_LoadAnswer_desc,
      "0f8fe3aac433c977d7c2f8b57ab1c3a17677e24880d76919b69e4208e99f5132",
      "e7970ddf9f58e10d34b5eae6d2baca31b2b3e2f2fe6d082b3aae2a5f92777b2a"},
-    {"save_map", "slam_toolbox::srv::dds_::SaveMap", &service_calls_TextRequest_desc,
-     &service_calls_ResultAnswer_desc, "53030f29f705b5f868bf35ce8a5bdd5a9b17f670649396fdbbc4a8dbe7ad0973",
+    {"save_map", "slam_toolbox::srv::dds_::SaveMap", &service_calls_TextRequest_desc, &service_calls_ResultAnswer_desc,
+     "53030f29f705b5f868bf35ce8a5bdd5a9b17f670649396fdbbc4a8dbe7ad0973",
      "713758aaa982f631420bcd79707de16f6729ecd6ba855070267104bdcdee6b22"},
     {"serialize_map", "slam_toolbox::srv::dds_::SerializePoseGraph", &service_calls_TextRequest_desc,
      &service_calls_ResultAnswer_desc, "723d3bfb9150b866fcbb26e447c8c7af3fb1e77e14d684037dc2baa0dbe80bd6",
@@ -68,7 +68,8 @@ static dds_qos_t* MakeQos(const struct Caller* caller, const char* hash) {
   return qos;
 }
 
-/* `topic`: "rq" or "rr" and so on; the type gets the name that ROS gives it. The descriptor stays, as the topic does. */
+/* `topic`: "rq" or "rr" and so on; the type gets the name that ROS gives it. The descriptor stays, as the topic does.
+ */
 static dds_entity_t Topic(const struct Caller* caller, const dds_topic_descriptor_t* type, const char* suffix,
                           const char* topic) {
   char* name = malloc(128);
@@ -91,13 +92,13 @@ static void Join(struct Caller* caller, dds_domainid_t domain, const char* servi
   char topic[256];
   snprintf(topic, sizeof(topic), "rq%sRequest", service);
   qos = MakeQos(caller, caller->kind->request_hash);
-  caller->writer = dds_create_writer(caller->participant, Topic(caller, caller->kind->request, "Request", topic), qos,
-                                     NULL);
+  caller->writer =
+      dds_create_writer(caller->participant, Topic(caller, caller->kind->request, "Request", topic), qos, NULL);
   dds_delete_qos(qos);
   snprintf(topic, sizeof(topic), "rr%sReply", service);
   qos = MakeQos(caller, caller->kind->answer_hash);
-  caller->reader = dds_create_reader(caller->participant, Topic(caller, caller->kind->answer, "Response", topic), qos,
-                                     NULL);
+  caller->reader =
+      dds_create_reader(caller->participant, Topic(caller, caller->kind->answer, "Response", topic), qos, NULL);
   dds_delete_qos(qos);
   dds_instance_handle_t handle = 0;
   if (caller->writer < 0 || caller->reader < 0 || dds_get_instance_handle(caller->writer, &handle) < 0)
@@ -125,9 +126,10 @@ static void PrintGrid(const nav_msgs_msg_dds__OccupancyGrid_* grid) {
   unsigned occupied = 0;
   for (uint32_t i = 0; i < grid->data._length; ++i) occupied += grid->data._buffer[i] >= 65;
   const double cells = (double)grid->info.width * grid->info.height;
-  printf("\"frame\":\"%s\",\"width\":%u,\"height\":%u,\"resolution\":%.3f,\"origin_x\":%.3f,\"occupied\":%u,\"whole\":%s",
-         grid->header.frame_id, grid->info.width, grid->info.height, grid->info.resolution,
-         grid->info.origin.position.x, occupied, grid->data._length == cells ? "true" : "false");
+  printf(
+      "\"frame\":\"%s\",\"width\":%u,\"height\":%u,\"resolution\":%.3f,\"origin_x\":%.3f,\"occupied\":%u,\"whole\":%s",
+      grid->header.frame_id, grid->info.width, grid->info.height, grid->info.resolution, grid->info.origin.position.x,
+      occupied, grid->data._length == cells ? "true" : "false");
 }
 
 /* Takes one sample; true if it answers one of `count` requests from `number` on. Then it is printed. */
@@ -137,8 +139,8 @@ static bool TakeAnswer(const struct Caller* caller, int64_t number, int64_t coun
   if (dds_take(caller->reader, samples, &info, 1, 1) != 1) return false;
   /* All answers begin with these two numbers. */
   const service_calls_ResultAnswer* const head = samples[0];
-  const bool mine = info.valid_data && head->client == caller->client && head->number >= number &&
-                    head->number < number + count;
+  const bool mine =
+      info.valid_data && head->client == caller->client && head->number >= number && head->number < number + count;
   if (mine) {
     printf("{");
     if (caller->kind->answer == &service_calls_MapAnswer_desc) {

@@ -2,6 +2,8 @@
 // rmw_cyclonedds is told apart by its GUID; what is no request is counted. What throws does not end the thread of the
 // bus. The client uses the generated types and Fast DDS itself, not our types for services. (A client on Cyclone DDS:
 // tests/system/ros2_services_test.cpp.)
+#include "common/ros2/services.h"
+
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -12,7 +14,6 @@
 #include <new>
 #include <thread>
 
-#include "common/ros2/services.h"
 #include "common/wire/ros2/participant.h"
 #include "common/wire/ros2/service_endpoint.h"
 #include "tests/eventually.h"
@@ -47,8 +48,10 @@ class FastClient {
     SetCommon({true, false, 10}, writer_qos);
     fd::DataReaderQos reader_qos;
     SetCommon({true, false, 10}, reader_qos);
-    writer_ = participant_->publisher()->create_datawriter(Topic("rq" + service + "Request", request_type_), writer_qos);
-    reader_ = participant_->subscriber()->create_datareader(Topic("rr" + service + "Reply", response_type_), reader_qos);
+    writer_ =
+        participant_->publisher()->create_datawriter(Topic("rq" + service + "Request", request_type_), writer_qos);
+    reader_ =
+        participant_->subscriber()->create_datareader(Topic("rr" + service + "Reply", response_type_), reader_qos);
   }
 
   bool ServiceIsThere() const {
@@ -85,7 +88,9 @@ class FastClient {
   const ResponseWire& answer() const { return answer_; }
 
  private:
-  fd::Topic* Topic(const std::string& name, const fd::TypeSupport& type) { return Must(participant_->TopicFor(name, type)); }
+  fd::Topic* Topic(const std::string& name, const fd::TypeSupport& type) {
+    return Must(participant_->TopicFor(name, type));
+  }
 
   const bool names_its_reader_;
   const fd::TypeSupport request_type_{new typename ServiceType<S>::RequestType()};
@@ -207,8 +212,8 @@ TEST_F(RosServices, WhatThrowsIsReportedAndTheBusGoesOn) {
   EXPECT_GT(failures_, 2);
 }
 
-// Request and answer of rmw_cyclonedds: a number of the client and one of the request, then the message. These bytes are
-// written here by hand.
+// Request and answer of rmw_cyclonedds: a number of the client and one of the request, then the message. These bytes
+// are written here by hand.
 TEST(RequestsOfCyclone, HaveTheirIdentityInFrontOfTheMessage) {
   const std::vector<std::uint8_t> from_cyclone{0x01, 0x10, 5}, from_fast{0x01, 0x0f, 5};
   WriterId cyclone{}, fast{};
@@ -218,7 +223,8 @@ TEST(RequestsOfCyclone, HaveTheirIdentityInFrontOfTheMessage) {
   EXPECT_FALSE(IsOfCyclone(fast));
 
   // Big endian: client 0x0102030405060708, request 9, a string of four letters.
-  std::vector<char> bytes{0, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 0, 0, 0, 0, 0, 0, 0, 9, 0, 0, 0, 5, 'm', 'a', 'p', 's', 0};
+  std::vector<char> bytes{0, 0, 0, 0, 1, 2, 3, 4, 5, 6,   7,   8,   0,   0, 0,
+                          0, 0, 0, 0, 9, 0, 0, 0, 5, 'm', 'a', 'p', 's', 0};
   Caller caller;
   caller.in_message = true;
   const auto request = DecodeRequest<SaveMap>(bytes, caller);
@@ -240,7 +246,8 @@ TEST(RequestsOfCyclone, HaveTheirIdentityInFrontOfTheMessage) {
 TEST(RequestsOfCyclone, ThatAreTooShortOrNonsenseAreRefused) {
   Caller caller;
   caller.in_message = true;
-  std::vector<char> bytes{0, 1, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 0, 0, 0, 0, 0, 0, 0, 9, '\xff', '\xff', '\xff', '\x7f', 'm'};
+  std::vector<char> bytes{0, 1, 0, 0, 1, 2, 3, 4,      5,      6,      7,      8,  0,
+                          0, 0, 0, 0, 0, 0, 9, '\xff', '\xff', '\xff', '\x7f', 'm'};
   EXPECT_FALSE(DecodeRequest<SaveMap>(bytes, caller)) << "a string of 2 GiB";
   for (std::size_t length = 0; length < 20; ++length) {
     std::vector<char> part(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(length));
