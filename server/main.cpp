@@ -201,9 +201,11 @@ int StopJournal(Journal& journal) {
 }
 
 // The door for ROS 2 robots; null if it is not wanted.
-Result<std::unique_ptr<Ros2Door>> OpenRos2(const CairndOptions& options, Inbound& inbound, Outbound& outbound) {
+Result<std::unique_ptr<Ros2Door>> OpenRos2(const CairndOptions& options, bool keeps_sites, Inbound& inbound,
+                                           Outbound& outbound) {
   if (!options.ros2.enabled) return nullptr;
-  auto door = Ros2Door::Open(options.ros2, options.wire, inbound, outbound);
+  auto door =
+      Ros2Door::Open(options.ros2, options.wire, {keeps_sites, options.server.server.create_sites}, inbound, outbound);
   if (door) spdlog::info("ROS 2 robots are served in DDS domain {}", options.ros2.domain);
   return door;
 }
@@ -284,9 +286,9 @@ int Serve(const CairndOptions& options, const std::filesystem::path& state) {
   if (!others) return failed(others.error());
   auto egress = Egress::Open(**bus, outbound, kept->generation);
   if (!egress) return failed(egress.error());
-  auto ros2 = OpenRos2(options, inbound, outbound);
-  if (!ros2) return failed(ros2.error());
   const auto saved = state == kNoState || state == kInMemory ? std::filesystem::path() : state / "saved";
+  auto ros2 = OpenRos2(options, !saved.empty(), inbound, outbound);
+  if (!ros2) return failed(ros2.error());
   Server server(options.server, inbound, outbound, kept->generation, kept->journal.get(), saved);
   if (auto started = StartWatched(server, context, signals, notifier); !started) {
     if (started.error().code != StatusCode::kCancelled) return failed(started.error());

@@ -9,7 +9,7 @@ Outbound::Outbound(std::size_t capacity_per_lane)
              BoundedChannel<OutboundValue>(capacity_per_lane)} {}
 
 bool Outbound::Send(OutboundValue value) {
-  See(value);
+  if (See(value)) return true;
   const Lane of_value = LaneOf(value);
   if (lane(of_value).TryPush(std::move(value))) return true;
   refused_.fetch_add(1, std::memory_order_relaxed);
@@ -17,20 +17,20 @@ bool Outbound::Send(OutboundValue value) {
 }
 
 bool Outbound::SendPatiently(OutboundValue value) {
-  See(value);
+  if (See(value)) return true;
   const Lane of_value = LaneOf(value);
   if (lane(of_value).Push(std::move(value))) return true;
   refused_.fetch_add(1, std::memory_order_relaxed);
   return false;
 }
 
-void Outbound::See(const OutboundValue& value) {
+bool Outbound::See(const OutboundValue& value) {
   const auto* const reply = std::get_if<Reply>(&value);
   const auto* const refusal = std::get_if<SessionRefusal>(&value);
   const bool over_limit = (reply != nullptr && reply->status.code == StatusCode::kResourceExhausted) ||
                           (refusal != nullptr && refusal->state.status.code == StatusCode::kResourceExhausted);
   if (over_limit) over_limit_.fetch_add(1, std::memory_order_relaxed);
-  if (watcher_) watcher_(value);
+  return watcher_ && watcher_(value);
 }
 
 void Outbound::Close() {

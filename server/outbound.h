@@ -36,8 +36,9 @@ class Outbound {
   explicit Outbound(std::size_t capacity_per_lane);
 
   // `watcher` sees every value that is sent from now on, also one that finds no room: a state is then sent again, so it
-  // may see one twice. It must not wait. REQUIRES: nothing was sent yet.
-  void Watch(std::function<void(const OutboundValue&)> watcher) { watcher_ = std::move(watcher); }
+  // may see one twice. A value for which it returns true is for the watcher only, and goes no further. It must not wait
+  // or throw. REQUIRES: nothing was sent yet.
+  void Watch(std::function<bool(const OutboundValue&)> watcher) { watcher_ = std::move(watcher); }
 
   bool Send(OutboundValue value);
   // As Send, but waits for room until Close: only for the thread that answers queries, whose own queue then fills and
@@ -54,9 +55,10 @@ class Outbound {
 
  private:
   static Lane LaneOf(const OutboundValue& value);
-  void See(const OutboundValue& value);
+  // Whether the value has reached the only one it is for.
+  bool See(const OutboundValue& value);
 
-  std::function<void(const OutboundValue&)> watcher_;
+  std::function<bool(const OutboundValue&)> watcher_;
   std::array<BoundedChannel<OutboundValue>, kLanes> lanes_;
   std::atomic<std::uint64_t> refused_{0}, over_limit_{0};
 };

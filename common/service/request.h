@@ -126,7 +126,7 @@ struct Reply {
   std::vector<RobotStatus> robots;
   std::vector<Job> jobs;
   std::string server_version;       // kPing.
-  std::vector<SavedSite> saved;     // kSavedList; kSiteSave: the file that was written.
+  std::vector<SavedSite> saved;     // kSavedList; kSiteSave: the file that was written; kSiteLoad: that, as which site.
   std::vector<Refusals> refused;    // kStatus: one.
   std::vector<Ros2DoorState> ros2;  // kRos2: one.
   std::vector<Ros2Namespace> ros2_namespaces;

@@ -132,7 +132,7 @@ Result<std::vector<SavedSite>> SavedSites::Answer(const Request& request) {
   const auto nothing = [] { return std::vector<SavedSite>{}; };
   if (request.kind == RequestKind::kSavedList) return List();
   if (request.kind == RequestKind::kSiteSave) return Save(request);
-  if (request.kind == RequestKind::kSiteLoad) return Load(request).map(nothing);
+  if (request.kind == RequestKind::kSiteLoad) return Load(request);
   if (request.saved.empty()) return Delete(request.site).map(nothing);
   if (!request.site.empty())
     return Fail(StatusCode::kInvalidArgument, "either a site is deleted or a saved one, not both in one request");
@@ -199,7 +199,7 @@ Result<std::vector<SavedSite>> SavedSites::Save(const Request& request) {
   return std::vector<SavedSite>{SavedAt(*path)};
 }
 
-Result<void> SavedSites::Load(const Request& request) {
+Result<std::vector<SavedSite>> SavedSites::Load(const Request& request) {
   const auto path = PathOf(request.saved);
   if (!path) return tl::unexpected(path.error());
   const auto file = SurveySiteFile(*path);
@@ -211,17 +211,21 @@ Result<void> SavedSites::Load(const Request& request) {
   }
   std::set<std::string> robots;
   for (const auto& [id, robot] : file->sessions) robots.insert(robot);
-  if (auto room = rooms_.roster.HasRoomFor(robots); !room) return room;
+  if (auto room = rooms_.roster.HasRoomFor(robots); !room) return tl::unexpected(room.error());
   ImportOptions options;
   options.site = request.site.empty() ? file->site.name : request.site;
-  if (auto valid = ValidateName("site", options.site); !valid) return valid;
-  if (auto reserved = rooms_.atlas.Reserve(options.site); !reserved) return reserved;
+  if (auto valid = ValidateName("site", options.site); !valid) return tl::unexpected(valid.error());
+  if (auto reserved = rooms_.atlas.Reserve(options.site); !reserved) return tl::unexpected(reserved.error());
   const AtTheEnd release([&] { rooms_.atlas.Release(options.site); });  // Also where something throws.
   options.first_session = rooms_.roster.ReserveIds(file->session_numbers.size());
   options.first_job = rooms_.jobs.ReserveIds(file->job_numbers.size());
   const auto loaded =
       Between<SiteFileSummary>([path = *path, options](Store& store) { return ImportSite(store, path, options); });
-  return loaded ? OpenLoaded(*loaded) : Result<void>(tl::unexpected(loaded.error()));
+  if (!loaded) return tl::unexpected(loaded.error());
+  if (const auto opened = OpenLoaded(*loaded); !opened) return tl::unexpected(opened.error());
+  SavedSite saved = SavedAt(*path);
+  saved.site = loaded->site.name;
+  return std::vector<SavedSite>{std::move(saved)};
 }
 
 Result<void> SavedSites::OpenLoaded(const SiteFileSummary& loaded) {

@@ -52,7 +52,7 @@ class SavedSites {
   Result<std::vector<SavedSite>> Answer(const Request& request);
   Result<std::vector<SavedSite>> List() const;
   Result<std::vector<SavedSite>> Save(const Request& request);
-  Result<void> Load(const Request& request);
+  Result<std::vector<SavedSite>> Load(const Request& request);
   Result<void> OpenLoaded(const SiteFileSummary& loaded);
   Result<void> Delete(const std::string& site);
   Result<void> DeleteFile(const std::string& name);

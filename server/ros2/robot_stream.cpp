@@ -171,6 +171,12 @@ void RobotStream::TakeStart(const ros2::PoseWithCovariance& message, Clock::time
   client_ = 0;
 }
 
+void RobotStream::BeginAnew() {
+  phase_ = Phase::kWaiting;
+  client_ = 0;
+  start_.reset();
+}
+
 bool RobotStream::odometry_is_fresh(Clock::time_point now) const {
   return odometry_stamp_ && now - odometry_received_ < kFresh;
 }

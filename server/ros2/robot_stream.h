@@ -43,6 +43,9 @@ class RobotStream {
   // The robot is here now: the session, if one is open, ends, and a new one begins at this pose.
   void TakeStart(const ros2::PoseWithCovariance& message, Clock::time_point now);
 
+  // Its site was reset, and its session with it: a new one begins, wherever the robot is.
+  void BeginAnew();
+
   // From the server.
   void Take(const SessionState& state, Clock::time_point now);
   void Take(const SessionRefusal& refusal, Clock::time_point now);

@@ -23,25 +23,39 @@ wire::WireOptions WireOf(const Ros2Options& options, const wire::WireOptions& na
 }  // namespace
 
 Result<std::unique_ptr<Ros2Door>> Ros2Door::Open(const Ros2Options& options, const wire::WireOptions& wire,
-                                                 Inbound& inbound, Outbound& outbound) {
+                                                 const ServerAbilities& abilities, Inbound& inbound,
+                                                 Outbound& outbound) {
   auto rules = NamespaceRules::Parse(options.namespaces, options.site);
   if (!rules) return tl::unexpected(rules.error());
   auto bus = ros2::Bus::Create(WireOf(options, wire), "cairnd_ros2");
   if (!bus) return tl::unexpected(bus.error());
-  std::unique_ptr<Ros2Door> door(new Ros2Door(options, *std::move(rules), *std::move(bus), inbound));
-  outbound.Watch([to = door.get()](const OutboundValue& value) {
-    to->ingress_.Take(value);
-    to->egress_.See(value);
-  });
+  std::unique_ptr<Ros2Door> door(new Ros2Door(options, *std::move(rules), *std::move(bus), abilities, inbound));
+  outbound.Watch([to = door.get()](const OutboundValue& value) { return to->See(value); });
   return door;
 }
 
-Ros2Door::Ros2Door(const Ros2Options& options, NamespaceRules rules, std::unique_ptr<ros2::Bus> bus, Inbound& inbound)
+Ros2Door::Ros2Door(const Ros2Options& options, NamespaceRules rules, std::unique_ptr<ros2::Bus> bus,
+                   const ServerAbilities& abilities, Inbound& inbound)
     : options_(options),
       bus_(std::move(bus)),
       egress_(*bus_, options),
       ingress_(*bus_, options, std::move(rules), inbound,
-               [this](const RobotAddress& address) { egress_.Serve(address); }) {}
+               [this](const RobotAddress& address) { egress_.Serve(address); }),
+      services_(*bus_, options, abilities, inbound,
+                {[this](MapWish&& wish) { return egress_.WantMap(std::move(wish)); },
+                 [this](const std::string& site) { ingress_.BeginAnew(site); }}) {}
+
+// A value that is not seen because memory is short counts as one that was not published; the server goes on.
+bool Ros2Door::See(const OutboundValue& value) {
+  bool own = false;
+  static_cast<void>(unseen_.Guard([&] {
+    own = services_.Take(value);
+    if (own) return;
+    ingress_.Take(value);
+    egress_.See(value);
+  }));
+  return own;
+}
 
 Ros2Door::~Ros2Door() {
   Close();
@@ -52,13 +66,19 @@ void Ros2Door::Start() {
   egress_.Start();
   thread_ = std::jthread([this](const std::stop_token& stop) {
     bus_->Run(
-        stop, [this] { ingress_.Tick(Ros2Ingress::Clock::now()); }, kTickPeriod);
+        stop,
+        [this] {
+          ingress_.Tick(Ros2Ingress::Clock::now());
+          services_.Tick(Ros2Services::Clock::now());
+        },
+        kTickPeriod, [this](const std::exception& error) { failures_.Count(error); });
   });
 }
 
 void Ros2Door::Close() {
   thread_ = {};
   ingress_.Close();
+  services_.Close();
 }
 
 void Ros2Door::Finish() {

@@ -41,6 +41,17 @@ Stamp WallClock() {
 
 }  // namespace
 
+void Ros2Egress::News::MakeNewer(News&& newer) {
+  if (newer.info) info = std::move(newer.info);
+  for (auto tile = newer.tiles.begin(); tile != newer.tiles.end();) {
+    const auto next = std::next(tile);
+    auto node = newer.tiles.extract(tile);
+    tiles.erase(node.key());
+    tiles.insert(std::move(node));
+    tile = next;
+  }
+}
+
 Ros2Egress::Ros2Egress(ros2::Bus& bus, const Ros2Options& options) : bus_(bus), options_(options), poses_(kMaxPoses) {}
 
 Ros2Egress::~Ros2Egress() {
@@ -111,7 +122,7 @@ void Ros2Egress::Serve(const RobotAddress& address) {
 }
 
 void Ros2Egress::RunPoses() {
-  while (const auto report = poses_.Pop()) Publish(*report);
+  while (const auto report = poses_.Pop()) poses_failed_.Guard([&] { Publish(*report); });
 }
 
 void Ros2Egress::Publish(const PoseReport& report) {
@@ -142,7 +153,9 @@ void Ros2Egress::RunMaps() {
       }
       if (finished_ && news_.empty()) return;
     }
-    PublishMaps();
+    maps_failed_.Guard([this] { TakeNews(); });
+    maps_failed_.Guard([this] { PublishMaps(); });
+    maps_failed_.Guard([this] { AnswerWishes(); });
   }
 }
 
@@ -163,23 +176,38 @@ Ros2Egress::Site& Ros2Egress::SiteOf(NameId site_id, const MapInfo& info) {
   return sites_.emplace(site_id, std::move(site)).first->second;
 }
 
-void Ros2Egress::PublishMaps() {
-  std::map<NameId, News> news;
+void Ros2Egress::TakeNews() {
   {
     const MutexLock lock(news_mutex_);
-    // Tiles wait until the name of their site is known.
+    // Tiles wait until the name of their site is known. Whole nodes move, which needs no memory.
     for (auto one = news_.begin(); one != news_.end();) {
       const auto next = std::next(one);
-      if (one->second.info || sites_.contains(one->first)) news.insert(news_.extract(one));
+      if (one->second.info || sites_.contains(one->first)) {
+        auto node = news_.extract(one);
+        if (const auto older = taken_.find(node.key()); older != taken_.end()) {
+          older->second.MakeNewer(std::move(node.mapped()));
+        } else {
+          taken_.insert(std::move(node));
+        }
+      }
       one = next;
     }
     if (finished_) news_.clear();
   }
-  for (auto& [site_id, one] : news) {
+  while (!taken_.empty()) {
+    const auto& [site_id, one] = *taken_.begin();
     Site& site = SiteOf(site_id, one.info.value_or(MapInfo{}));
     if (one.info) site.grid.Take(*one.info);
-    for (const auto& [key, tile] : one.tiles) site.grid.Take(tile);
+    auto& tiles = taken_.begin()->second.tiles;
+    while (!tiles.empty()) {
+      site.grid.Take(tiles.begin()->second);
+      tiles.erase(tiles.begin());
+    }
+    taken_.erase(taken_.begin());
   }
+}
+
+void Ros2Egress::PublishMaps() {
   std::vector<std::string> too_large;
   for (auto& [site_id, site] : sites_) {
     if (site.map == nullptr) continue;
@@ -192,6 +220,19 @@ void Ros2Egress::PublishMaps() {
   }
   const MutexLock lock(mutex_);
   too_large_ = std::move(too_large);
+}
+
+void Ros2Egress::AnswerWishes() {
+  const auto map_of = [this](NameId site_id) {
+    const auto site = sites_.find(site_id);
+    if (site != sites_.end()) return site->second.grid.Now(WallClock());
+    ros2::Grid nothing;
+    nothing.header = {WallClock(), options_.map_frame};
+    return nothing;
+  };
+  unpublished_.fetch_add(
+      wishes_.Answer(map_of, static_cast<std::size_t>(options_.max_map_cells), MapWishes::Clock::now()),
+      std::memory_order_relaxed);
 }
 
 std::vector<std::string> Ros2Egress::problems() const {

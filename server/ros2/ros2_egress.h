@@ -17,6 +17,8 @@
 #include "common/mutex.h"
 #include "common/wire/ros2/bus.h"
 #include "server/outbound.h"
+#include "server/ros2/failures.h"
+#include "server/ros2/map_wishes.h"
 #include "server/ros2/ros2_ingress.h"
 #include "server/ros2/site_grid.h"
 
@@ -34,8 +36,14 @@ class Ros2Egress {
   // Makes the topics of a robot, or moves them.
   void Serve(const RobotAddress& address) CAIRN_EXCLUDES(mutex_);
 
-  // Values that found no room or that the middleware did not accept.
-  [[nodiscard]] std::uint64_t unpublished() const { return unpublished_.load(std::memory_order_relaxed); }
+  // Has a request for the map of a site answered by the thread of the maps; false if there is no room for it. From any
+  // thread.
+  [[nodiscard]] bool WantMap(MapWish&& wish) { return wishes_.Add(std::move(wish)); }
+
+  // Values that found no room, that the middleware did not accept, or whose publication ended with an exception.
+  [[nodiscard]] std::uint64_t unpublished() const {
+    return unpublished_.load(std::memory_order_relaxed) + poses_failed_.count() + maps_failed_.count();
+  }
   // Sites whose map is too large for one message.
   [[nodiscard]] std::vector<std::string> problems() const CAIRN_EXCLUDES(mutex_);
 
@@ -57,12 +65,17 @@ class Ros2Egress {
   struct News {
     std::optional<MapInfo> info;
     std::map<TileKey, TileSample> tiles;
+
+    void MakeNewer(News&& newer);
   };
 
   void RunPoses();
   void Publish(const PoseReport& report);
   void RunMaps();
+  // Takes over the news of the sites whose names are known.
+  void TakeNews() CAIRN_EXCLUDES(news_mutex_);
   void PublishMaps();
+  void AnswerWishes();
   Site& SiteOf(NameId site_id, const MapInfo& info);
   void Count(const Result<void>& published);
 
@@ -77,7 +90,12 @@ class Ros2Egress {
   CondVar news_came_;
   bool finished_ CAIRN_GUARDED_BY(news_mutex_) = false;
   std::map<NameId, News> news_ CAIRN_GUARDED_BY(news_mutex_);
-  std::map<NameId, Site> sites_;  // Used by the thread of the maps only.
+  MapWishes wishes_;
+  Failures poses_failed_{"a pose for ROS 2"};
+  Failures maps_failed_{"a map for ROS 2"};
+  // Used by the thread of the maps only. News stay until they are in the grid, also if an exception comes between.
+  std::map<NameId, News> taken_;
+  std::map<NameId, Site> sites_;
   std::jthread poses_thread_;
   std::jthread maps_thread_;
 };

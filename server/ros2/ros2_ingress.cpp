@@ -270,6 +270,13 @@ void Ros2Ingress::TellRobots(Clock::time_point now) {
   }
 }
 
+void Ros2Ingress::BeginAnew(const std::string& site) {
+  const MutexLock lock(mutex_);
+  for (auto& [name, one] : namespaces_) {
+    if (one.robot != nullptr && one.place->site == site) one.robot->BeginAnew();
+  }
+}
+
 void Ros2Ingress::Measure(Clock::time_point now) {
   const double seconds = std::chrono::duration<double>(now - measured_).count();
   if (seconds < 2.0) return;

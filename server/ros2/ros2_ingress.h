@@ -43,6 +43,8 @@ class Ros2Ingress {
   void Tick(Clock::time_point now) CAIRN_EXCLUDES(mutex_);
   // What the server sends of sessions and poses: kept for the next Tick. Never waits for the bus.
   void Take(const OutboundValue& value) CAIRN_EXCLUDES(news_mutex_);
+  // The robots of a site that was reset open new sessions. On the thread of the bus.
+  void BeginAnew(const std::string& site) CAIRN_EXCLUDES(mutex_);
   // Ends all subscriptions. REQUIRES: the bus does not run.
   void Close() CAIRN_EXCLUDES(mutex_);
 

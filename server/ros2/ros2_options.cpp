@@ -60,6 +60,9 @@ void Visit(OptionVisitor& visitor, Ros2Options& options) {
   visitor.Text("odom_topic", options.odom_topic,
                ForOperators("Topic of odometry in the namespace of a robot. Without it, the transform from odom_frame "
                             "to one of base_frames is used."));
+  visitor.Flag("commands", options.commands,
+               ForOperators("Whether ROS 2 programs may save, load and reset sites and pause mapping through services. "
+                            "Everybody in the DDS domain of the robots may then do so."));
   visitor.Text("odom_frame", options.odom_frame, "Frame of the odometry of a robot that sends it as a transform only.");
   visitor.Text("base_frames", options.base_frames,
                "Frames that may be the robot itself, separated by commas, for a robot whose odometry names none.");

@@ -25,6 +25,7 @@ struct Ros2Options {
   double map_period_s = 5.0;
   std::int64_t max_map_cells = 25'000'000;
   std::int64_t max_robots = 256;
+  bool commands = false;
 
   [[nodiscard]] std::vector<std::string> scan_names() const;
   [[nodiscard]] std::vector<std::string> base_names() const;

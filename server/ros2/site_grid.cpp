@@ -73,22 +73,37 @@ std::vector<std::int8_t> SiteGrid::CellsOf(const Bounds& bounds) const {
   return cells;
 }
 
-ros2::Grid SiteGrid::Whole(Stamp stamp) {
+SiteGrid::Bounds SiteGrid::BoundsOfTiles() const {
+  Bounds bounds;
+  for (const auto& [place, cells] : tiles_) bounds.Add(place.second, place.first);
+  return bounds;
+}
+
+ros2::Grid SiteGrid::Now(Stamp stamp) const {
+  const Bounds bounds = BoundsOfTiles();
+  if (!bounds.empty() && bounds.cells() <= max_cells_) return Whole(bounds, stamp);
+  ros2::Grid nothing;
+  nothing.header = {stamp, frame_};
+  nothing.loaded = stamp;
+  nothing.resolution = resolution_;
+  return nothing;
+}
+
+ros2::Grid SiteGrid::Whole(const Bounds& bounds, Stamp stamp) const {
   ros2::Grid grid;
   grid.header = {stamp, frame_};
   grid.loaded = stamp;
   grid.resolution = resolution_;
-  grid.width = static_cast<std::uint32_t>((published_.x_max - published_.x_min + 1) * kTileCells);
-  grid.height = static_cast<std::uint32_t>((published_.y_max - published_.y_min + 1) * kTileCells);
-  grid.T_frame_origin = {published_.x_min * kTileCells * resolution_, published_.y_min * kTileCells * resolution_, 0.0};
-  grid.cells = CellsOf(published_);
+  grid.width = static_cast<std::uint32_t>((bounds.x_max - bounds.x_min + 1) * kTileCells);
+  grid.height = static_cast<std::uint32_t>((bounds.y_max - bounds.y_min + 1) * kTileCells);
+  grid.T_frame_origin = {bounds.x_min * kTileCells * resolution_, bounds.y_min * kTileCells * resolution_, 0.0};
+  grid.cells = CellsOf(bounds);
   return grid;
 }
 
 SiteGrid::Due SiteGrid::Next(bool wanted, Stamp stamp, Clock::time_point now) {
   if (site_.empty() || (changed_.empty() && !whole_is_old_)) return {};
-  Bounds bounds;
-  for (const auto& [place, cells] : tiles_) bounds.Add(place.second, place.first);
+  Bounds bounds = BoundsOfTiles();
   if (bounds.empty()) bounds = published_;  // The site was emptied: nothing of it is known any more.
   too_large_ = bounds.cells() > max_cells_;
   if (bounds.empty() || too_large_) return {};
@@ -100,7 +115,7 @@ SiteGrid::Due SiteGrid::Next(bool wanted, Stamp stamp, Clock::time_point now) {
     changed_ = {};
     whole_is_old_ = false;
     whole_at_ = now;
-    return Whole(stamp);
+    return Whole(published_, stamp);
   }
   if (resized || changed_.empty()) return {};
   // A tile outside may have come and gone in between.

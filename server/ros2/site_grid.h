@@ -35,6 +35,9 @@ class SiteGrid {
   using Due = std::variant<std::monostate, ros2::Grid, ros2::GridUpdate>;
   [[nodiscard]] Due Next(bool wanted, Stamp stamp, Clock::time_point now);
 
+  // The whole map as it is now, whatever was published; without cells if there is none, or if it is too large.
+  [[nodiscard]] ros2::Grid Now(Stamp stamp) const;
+
   [[nodiscard]] const std::string& site() const { return site_; }
   // The map has more cells than a message may have, and is not published.
   [[nodiscard]] bool too_large() const { return too_large_; }
@@ -51,7 +54,8 @@ class SiteGrid {
 
   // The cells of all tiles within the bounds.
   [[nodiscard]] std::vector<std::int8_t> CellsOf(const Bounds& bounds) const;
-  [[nodiscard]] ros2::Grid Whole(Stamp stamp);
+  [[nodiscard]] Bounds BoundsOfTiles() const;
+  [[nodiscard]] ros2::Grid Whole(const Bounds& bounds, Stamp stamp) const;
 
   const std::string frame_;
   const std::chrono::duration<double> period_;

@@ -1,8 +1,9 @@
 // The server's door for ROS 2: pieces, each a number and a sample that a program of ROS 2 sends: scans, odometry,
-// transforms of its own and shared ones, initial poses; or the name of a topic. What is decoded goes into the stream of
-// a robot; only what an estimator may rely on comes out of it.
+// transforms of its own and shared ones, initial poses, requests of services in both conventions; or the name of a
+// topic. What is decoded goes into the stream of a robot; only what an estimator may rely on comes out of it.
 #include "common/wire/ros2/convert.h"
 #include "common/wire/ros2/message_types.h"
+#include "common/wire/ros2/service_endpoint.h"
 #include "server/ros2/robot_stream.h"
 #include "server/ros2/shared_frames.h"
 #include "tests/fuzz/fuzz_target.h"
@@ -23,6 +24,23 @@ std::optional<Message> Decoded(std::string_view bytes) {
   if (sample.decoding != wire::Decoding::kDecoded) return std::nullopt;
   auto message = ros2::FromWire(std::move(sample.value));
   return message ? std::optional(*std::move(message)) : std::nullopt;
+}
+
+// Whether the bytes are a request of the service, as they come from the middleware.
+template <typename S>
+bool IsRequest(std::string_view bytes, bool of_cyclone) {
+  ros2::RequestType<S> type;
+  ros2::RequestBytes sample;
+  eprosima::fastrtps::rtps::SerializedPayload_t payload(static_cast<std::uint32_t>(bytes.size()));
+  std::copy(bytes.begin(), bytes.end(), payload.data);
+  payload.length = static_cast<std::uint32_t>(bytes.size());
+  Must(type.deserialize(&payload, &sample), "no request is refused by the middleware");
+  ros2::Caller caller;
+  caller.in_message = of_cyclone;
+  const auto request = ros2::DecodeRequest<S>(sample.bytes, caller);
+  if constexpr (std::is_same_v<S, ros2::SaveMap>)
+    Must(!request || request->name.size() <= ros2::kMaxServiceText, "names are short");
+  return request.has_value();
 }
 
 template <typename Message>
@@ -56,6 +74,10 @@ class Door {
         });
       case 4:
         return With<ros2::PoseWithCovariance>(bytes, [&](auto&& message) { robot_.TakeStart(message, now_); });
+      case 6:
+      case 7:
+        return IsRequest<ros2::SaveMap>(bytes, kind == 7) | IsRequest<ros2::GetMap>(bytes, kind == 7) |
+               IsRequest<ros2::Reset>(bytes, kind == 7);
       default:
         break;
     }
@@ -103,7 +125,7 @@ bool RunRos2(std::string_view input) {
   bool accepted = false;
   std::size_t sent = 0;
   for (Pieces pieces(input); !pieces.empty() && sent < kMostRos2Pieces; ++sent) {
-    const std::uint8_t kind = pieces.Take() % 6;
+    const std::uint8_t kind = pieces.Take() % 8;
     accepted |= door.Send(kind, pieces.TakePiece());
   }
   door.Check();
@@ -137,6 +159,8 @@ std::vector<std::string> SeedsOfRos2() {
           PieceOf(3, Encoded(transforms)),
           PieceOf(4, Encoded(start)),
           PieceOf(5, "rt/hall/r1/scan"),
+          PieceOf(6, std::string("\0\1\0\0\5\0\0\0maps\0", 13)),
+          PieceOf(7, std::string("\0\1\0\0ABCDEFGH\1\0\0\0\0\0\0\0\5\0\0\0maps\0", 29)),
           drive,
           drive + PieceOf(4, Encoded(start)) + drive};
 }

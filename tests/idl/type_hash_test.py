@@ -16,6 +16,7 @@ PUBLISHED = {
     "builtin_interfaces/msg/Time": "b106235e25a4c5ed35098aa0a61a3ee9c9b18d197f398b0e4206cea9acf9c197",
     "geometry_msgs/msg/Point": "6963084842a9b04494d6b2941d11444708d892da2f4b09843b9c43f42a7f6881",
     "geometry_msgs/msg/Quaternion": "8a765f66778c8ff7c8ab94afcc590a2ed5325a1d9a076ffff38fbce36f458684",
+    "nav_msgs/srv/GetMap_Request": "b531e302f1bd6a81f8a5e03453266c378b1f711b4296000c1c0f53a40e00a7c4",
 }
 
 
@@ -24,8 +25,11 @@ def read_types(folder):
     for path in sorted(folder.glob("*.idl")):
         text = re.sub(r"//.*", "", path.read_text())
         package = re.search(r"module (\w+)", text).group(1)
-        for name, body in re.findall(r"struct (\w+)_ \{(.*?)\}", text, re.DOTALL):
-            types[f"{package}/msg/{name}"] = re.findall(r"([\w:<>]+) (\w+)(?:\[(\d+)\])?;", body)
+        kind = "msg"
+        for module, name, body in re.findall(r"module (msg|srv) \{|struct (\w+)_ \{(.*?)\}", text, re.DOTALL):
+            kind = module or kind
+            if name:
+                types[f"{package}/{kind}/{name}"] = re.findall(r"([\w:<>]+) _?(\w+)(?:\[(\d+)\])?;", body)
     return types
 
 
@@ -35,8 +39,8 @@ def field_type(kind, length):
         kind = kind[len("sequence<"):-1]
     nested = ""
     if "::" in kind:
-        package, msg, _, name = kind.split("::")
-        nested = f"{package}/{msg}/{name[:-1]}"
+        package, folder, _, name = kind.split("::")
+        nested = f"{package}/{folder}/{name[:-1]}"
     number = 1 if nested else NUMBERS[kind]
     number += ARRAY if length else SEQUENCE if is_sequence else 0
     return {"type_id": number, "capacity": int(length or 0), "string_capacity": 0, "nested_type_name": nested}
@@ -66,14 +70,14 @@ def main(root):
     types = read_types(root / "idl/ros2")
     wrong = [f"{name}: {type_hash(types, name)}, but ROS says {known}" for name, known in PUBLISHED.items()
              if type_hash(types, name) != known]
-    code = (root / "common/wire/ros2/message_types.h").read_text()
-    pairs = re.findall(r"using Wire = ::(\w+)::msg::dds_::(\w+)_;.*?kHash = \"(\w+)\"", code, re.DOTALL)
-    if len(pairs) < 6:
-        wrong.append(f"only {len(pairs)} hashes are found in message_types.h")
-    for package, name, known in pairs:
-        computed = type_hash(types, f"{package}/msg/{name}")
+    code = "".join((root / "common/wire/ros2" / name).read_text() for name in ("message_types.h", "service_types.h"))
+    pairs = re.findall(r"using \w*Wire = ::(\w+)::(msg|srv)::dds_::(\w+)_;.*?Hash = \"(\w+)\"", code, re.DOTALL)
+    if len(pairs) < 18:
+        wrong.append(f"only {len(pairs)} hashes are found in message_types.h and service_types.h")
+    for package, kind, name, known in pairs:
+        computed = type_hash(types, f"{package}/{kind}/{name}")
         if computed != known:
-            wrong.append(f"{package}/msg/{name}: {computed}, but message_types.h says {known}")
+            wrong.append(f"{package}/{kind}/{name}: {computed}, but the code says {known}")
     print("\n".join(wrong) or f"{len(pairs)} type hashes are right")
     return 1 if wrong else 0
 

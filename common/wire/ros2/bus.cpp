@@ -1,170 +1,43 @@
 #include "common/wire/ros2/bus.h"
 
-#include <algorithm>
 #include <atomic>
-#include <fastdds/dds/domain/DomainParticipant.hpp>
-#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <exception>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
-#include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
-#include <numeric>
+#include <thread>
 #include <utility>
 
 #include "common/mutex.h"
-#include "common/wire/participant_qos.h"
 #include "common/wire/ros2/convert.h"
 #include "common/wire/ros2/message_types.h"
+#include "common/wire/ros2/participant.h"
 #include "common/wire/ros2/writer_list.h"
 
 namespace cairn::ros2 {
 namespace {
 
-namespace fd = eprosima::fastdds::dds;
-namespace rtps = eprosima::fastrtps::rtps;
 using eprosima::fastrtps::Duration_t;
 using eprosima::fastrtps::types::ReturnCode_t;
 
-Status Broken(const std::string& what) {
-  return {StatusCode::kInternal, "Fast DDS refused to make " + what};
+// Memory may be short: it gets a moment.
+constexpr std::chrono::milliseconds kPauseAfterFailure{10};
+
+// Whether `act` ended without an exception.
+template <typename Act>
+bool Try(const Act& act, const std::function<void(const std::exception&)>& failed) {
+  try {
+    act();
+    return true;
+  } catch (const std::exception& error) {
+    failed(error);
+  }
+  std::this_thread::sleep_for(kPauseAfterFailure);
+  return false;
 }
-
-template <typename Policy>
-void SetUserData(Policy& policy, const std::string& text) {
-  policy.data_vec(std::vector<rtps::octet>(text.begin(), text.end()));
-}
-
-// Every limit is set, and the memory of a sample is taken when it arrives (idl/README.md).
-template <typename EndpointQos>
-void SetCommon(const Qos& wanted, EndpointQos& qos) {
-  qos.reliability().kind = wanted.reliable ? fd::RELIABLE_RELIABILITY_QOS : fd::BEST_EFFORT_RELIABILITY_QOS;
-  qos.reliability().max_blocking_time = Duration_t(0.1);
-  qos.durability().kind = wanted.transient_local ? fd::TRANSIENT_LOCAL_DURABILITY_QOS : fd::VOLATILE_DURABILITY_QOS;
-  qos.history().kind = fd::KEEP_LAST_HISTORY_QOS;
-  qos.history().depth = wanted.depth;
-  qos.resource_limits().max_instances = 1;
-  qos.resource_limits().max_samples_per_instance = wanted.depth;
-  qos.resource_limits().max_samples = wanted.depth;
-  qos.resource_limits().allocated_samples = 1;
-  qos.data_sharing().off();
-  qos.endpoint().history_memory_policy = rtps::DYNAMIC_RESERVE_MEMORY_MODE;
-}
-
-class Reader;
-
-// The readers that have something to take. Thread-safe.
-class ReadyReaders {
- public:
-  void Add(Reader* reader) {
-    const MutexLock lock(mutex_);
-    if (std::find(ready_.begin(), ready_.end(), reader) == ready_.end()) ready_.push_back(reader);
-    filled_.NotifyOne();
-  }
-  void Remove(Reader* reader) {
-    const MutexLock lock(mutex_);
-    std::erase(ready_, reader);
-  }
-  // One of them, or null at the deadline or once a stop is requested.
-  Reader* Next(const std::stop_token& stop, std::chrono::steady_clock::time_point deadline) {
-    const MutexLock lock(mutex_);
-    while (ready_.empty() && !stop.stop_requested() && filled_.WaitUntil(mutex_, deadline)) {
-    }
-    if (ready_.empty() || stop.stop_requested()) return nullptr;
-    Reader* const reader = ready_.front();
-    ready_.erase(ready_.begin());
-    return reader;
-  }
-  void Wake() {
-    const MutexLock lock(mutex_);
-    filled_.NotifyAll();
-  }
-
- private:
-  Mutex mutex_;
-  CondVar filled_;
-  std::vector<Reader*> ready_ CAIRN_GUARDED_BY(mutex_);
-};
-
-class Participant;
-
-class Reader : public Subscription, protected fd::DataReaderListener {
- public:
-  virtual void TakeAll() = 0;
-};
-
-// The participant and its topics. Endpoints keep it alive.
-class Participant {
- public:
-  ~Participant() {
-    if (participant_ == nullptr) return;
-    participant_->delete_contained_entities();
-    fd::DomainParticipantFactory::get_instance()->delete_participant(participant_);
-  }
-
-  [[nodiscard]] static Result<std::shared_ptr<Participant>> Create(const WireOptions& options,
-                                                                   const std::string& name) {
-    if (const auto valid = Validate(options); !valid) return tl::unexpected(valid.error());
-    if (const auto present = RequireInterfaces(options); !present) return tl::unexpected(present.error());
-    wire::ConfigureLibraryOnce();
-    auto made = std::make_shared<Participant>();
-    fd::DomainParticipantQos qos = wire::ParticipantQos(options, name, made->guard_);
-    SetUserData(qos.user_data(), "enclave=/;");
-    made->participant_ = fd::DomainParticipantFactory::get_instance()->create_participant(
-        static_cast<fd::DomainId_t>(options.domain), qos, &made->writers_, fd::StatusMask::none());
-    if (made->participant_ == nullptr) {
-      return Fail(StatusCode::kUnavailable, "cannot join the DDS domain " + std::to_string(options.domain) +
-                                                " of the ROS 2 robots: no free port or address, or it is full");
-    }
-    made->publisher_ = made->participant_->create_publisher(fd::PUBLISHER_QOS_DEFAULT);
-    made->subscriber_ = made->participant_->create_subscriber(fd::SUBSCRIBER_QOS_DEFAULT);
-    if (made->publisher_ == nullptr || made->subscriber_ == nullptr) return tl::unexpected(Broken("a participant"));
-    return made;
-  }
-
-  // A topic belongs to the endpoint that asked for it first, and stays: there are as many as names in use.
-  Result<fd::Topic*> TopicFor(const std::string& name, const fd::TypeSupport& type) {
-    const MutexLock lock(mutex_);
-    if (const auto known = topics_.find(name); known != topics_.end()) {
-      if (known->second->get_type_name() == type.get_type_name()) return known->second;
-      return Fail(StatusCode::kFailedPrecondition, name + " is in use with another type");
-    }
-    if (participant_->find_type(type.get_type_name()).empty() &&
-        type.register_type(participant_) != ReturnCode_t::RETCODE_OK) {
-      return tl::unexpected(Broken("type " + type.get_type_name()));
-    }
-    fd::Topic* const topic = participant_->create_topic(name, type.get_type_name(), fd::TOPIC_QOS_DEFAULT);
-    if (topic == nullptr) return tl::unexpected(Broken("topic " + name));
-    topics_.emplace(name, topic);
-    return topic;
-  }
-
-  fd::Publisher* publisher() const { return publisher_; }
-  fd::Subscriber* subscriber() const { return subscriber_; }
-  const WriterList& writers() const { return writers_; }
-  ReadyReaders& ready() { return ready_; }
-  // Held while an endpoint is made or deleted, as in common/wire/participant.h.
-  Mutex& endpoints() { return endpoints_; }
-  std::uint64_t datagrams_refused() const {
-    return std::accumulate(guard_->refused.begin(), guard_->refused.end(), std::uint64_t{0});
-  }
-  std::chrono::nanoseconds busy_with_one_datagram() const {
-    return guard_->receiving.Longest(wire::ReceiveWatch::Clock::now());
-  }
-
- private:
-  const std::shared_ptr<wire::GuardReport> guard_ = std::make_shared<wire::GuardReport>();
-  WriterList writers_;  // The participant's listener.
-  ReadyReaders ready_;
-  Mutex endpoints_;
-  Mutex mutex_;
-  std::map<std::string, fd::Topic*> topics_ CAIRN_GUARDED_BY(mutex_);
-  fd::DomainParticipant* participant_ = nullptr;
-  fd::Publisher* publisher_ = nullptr;
-  fd::Subscriber* subscriber_ = nullptr;
-};
 
 template <typename Message>
 class MessageReader final : public Reader {
@@ -173,7 +46,9 @@ class MessageReader final : public Reader {
  public:
   using OnMessage = std::function<void(Message&&, const Origin&)>;
   MessageReader(std::shared_ptr<Participant> participant, OnMessage on_message)
-      : participant_(std::move(participant)), on_message_(std::move(on_message)) {}
+      : participant_(std::move(participant)), on_message_(std::move(on_message)) {
+    participant_->ready().MakeRoom();
+  }
   ~MessageReader() override {
     if (reader_ != nullptr) {
       const MutexLock lock(participant_->endpoints());
@@ -278,13 +153,15 @@ class DdsBus final : public Bus {
   explicit DdsBus(std::shared_ptr<Participant> participant) : participant_(std::move(participant)) {}
   const std::shared_ptr<Participant>& participant() const { return participant_; }
 
-  void Run(const std::stop_token& stop, const std::function<void()>& tick, std::chrono::milliseconds period) override {
+  void Run(const std::stop_token& stop, const std::function<void()>& tick, std::chrono::milliseconds period,
+           const std::function<void(const std::exception&)>& failed) override {
     const std::stop_callback wake(stop, [this] { participant_->ready().Wake(); });
     auto next = std::chrono::steady_clock::now();
     while (!stop.stop_requested()) {
-      if (Reader* const reader = participant_->ready().Next(stop, next)) reader->TakeAll();
+      Reader* const reader = participant_->ready().Next(stop, next);
+      if (reader != nullptr && !Try([reader] { reader->TakeAll(); }, failed)) participant_->ready().Add(reader);
       if (std::chrono::steady_clock::now() < next) continue;
-      tick();
+      static_cast<void>(Try(tick, failed));
       next = std::chrono::steady_clock::now() + period;
     }
   }
@@ -298,12 +175,12 @@ class DdsBus final : public Bus {
   const std::shared_ptr<Participant> participant_;
 };
 
+}  // namespace
+
 // The cast is safe because Create makes no other class.
 const std::shared_ptr<Participant>& ParticipantOf(const Bus& bus) {
   return static_cast<const DdsBus&>(bus).participant();
 }
-
-}  // namespace
 
 Result<std::unique_ptr<Bus>> Bus::Create(const WireOptions& options, const std::string& name) {
   auto participant = Participant::Create(options, name);

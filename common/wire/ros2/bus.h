@@ -12,6 +12,7 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <memory>
 #include <stop_token>
@@ -67,6 +68,27 @@ class Publication {
   [[nodiscard]] virtual int matched() const = 0;
 };
 
+// Who has asked, and what his answer has to be marked with. rmw_fastrtps marks a request with the identity of its
+// sample in the inline QoS, rmw_cyclonedds with 16 bytes in front of the message (service_endpoint.h).
+struct Caller {
+  WriterId writer{};          // The endpoint that asked. Its first 12 bytes are its participant's.
+  WriterId answer_to{};       // The endpoint that reads the answer, where the request names it; else that which asked.
+  std::int64_t sequence = 0;  // Of the request, as the caller counts.
+  bool in_message = false;    // As rmw_cyclonedds does it.
+  std::uint64_t client = 0;   // The caller's number for itself, in that case.
+};
+
+// Answers a service. Thread-safe.
+template <typename S>
+class Answers {
+ public:
+  virtual ~Answers() = default;
+  // Whether the reader of the caller's answers is known already. What is sent before that, does not arrive.
+  [[nodiscard]] virtual bool Reaches(const Caller& caller) const = 0;
+  // kUnavailable: the middleware did not accept it.
+  [[nodiscard]] virtual Result<void> Send(const Caller& caller, const typename S::Response& response) = 0;
+};
+
 class Bus {
  public:
   virtual ~Bus() = default;
@@ -83,9 +105,18 @@ class Bus {
   template <typename Message>
   [[nodiscard]] Result<std::unique_ptr<Publication<Message>>> Advertise(const std::string& topic, const Qos& qos);
 
-  // Hands on what arrives until a stop is requested, and calls `tick` at least once a `period`.
-  virtual void Run(const std::stop_token& stop, const std::function<void()>& tick,
-                   std::chrono::milliseconds period) = 0;
+  // `service` is its name as ROS shows it, "/lab/dynamic_map", and S one of services.h (common/ros2). What is asked and
+  // what is answered have endpoints of their own, so that answers may be given from any thread.
+  template <typename S>
+  [[nodiscard]] Result<std::unique_ptr<Subscription>> SubscribeRequests(
+      const std::string& service, std::function<void(typename S::Request&&, const Caller&)> on_request);
+  template <typename S>
+  [[nodiscard]] Result<std::unique_ptr<Answers<S>>> AdvertiseAnswers(const std::string& service);
+
+  // Hands on what arrives until a stop is requested, and calls `tick` at least once a `period`. What throws an
+  // exception (a message, a tick) is dropped, `failed` is told, and the loop goes on. `failed` must not throw.
+  virtual void Run(const std::stop_token& stop, const std::function<void()>& tick, std::chrono::milliseconds period,
+                   const std::function<void(const std::exception&)>& failed) = 0;
 
   // The writers of others, at most kMaxWriters; the number changes whenever they do.
   static constexpr std::size_t kMaxWriters = 4096;

@@ -93,6 +93,21 @@ class RosRobot : public ::testing::Test {
   SessionRequest request_;
 };
 
+TEST_F(RosRobot, BeginsAnewWhenItsSiteWasReset) {
+  Open();
+  const SessionRequest first = request_;
+  robot_.BeginAnew();
+  Odom(2);
+  Scan(2);
+  const auto requests = Pushed<SessionRequest>();
+  ASSERT_EQ(requests.size(), 1U);
+  EXPECT_NE(requests[0].session, first.session);
+  EXPECT_NE(requests[0].client, first.client);
+  // The end of the first session may be told late.
+  robot_.Take(State(SessionPhase::kEnded), now_);
+  EXPECT_TRUE(robot_.open());
+}
+
 TEST_F(RosRobot, OpensItsSessionWithTheFirstScanThatIsComplete) {
   Odom(1, 0.5);
   Scan(1);

@@ -43,6 +43,29 @@ TEST_F(GridTest, NothingIsPublishedOfAnEmptySite) {
   EXPECT_TRUE(std::holds_alternative<std::monostate>(After(std::chrono::seconds(10), true)));
 }
 
+TEST_F(GridTest, WhoAsksGetsTheMapAsItIsNowWhateverWasPublished) {
+  EXPECT_TRUE(grid_.Now(9).cells.empty());
+  EXPECT_EQ(grid_.Now(9).header.frame, "map");
+  Tile(0, 0, 100);
+  static_cast<void>(After(std::chrono::milliseconds(0)));
+  Tile(1, 0, 50);
+  const ros2::Grid now = grid_.Now(9);
+  EXPECT_EQ(now.header.stamp, 9);
+  EXPECT_EQ(now.width, 2U * kTileCells);
+  EXPECT_EQ(now.height, static_cast<std::uint32_t>(kTileCells));
+  EXPECT_EQ(At(now, 0, 0), 100);
+  EXPECT_EQ(At(now, kTileCells, 0), 50);
+  // Asking takes nothing away from what is published.
+  EXPECT_TRUE(std::holds_alternative<ros2::Grid>(After(SiteGrid::kShortestPeriod)));
+}
+
+TEST_F(GridTest, WhoAsksForAMapThatIsTooLargeGetsNoCells) {
+  Tile(0, 0, 100);
+  Tile(40, 0, 100);
+  EXPECT_TRUE(grid_.Now(9).cells.empty());
+  EXPECT_EQ(grid_.Now(9).width, 0U);
+}
+
 TEST_F(GridTest, TilesStandAtTheirPlaceWithTheValuesOfRos) {
   Tile(-1, 0, 100);
   Tile(0, 1, 0);

@@ -103,7 +103,7 @@ class Ros2Side final : public Door {
     }
     thread_ = std::jthread([this](const std::stop_token& stop) {
       bus_->Run(
-          stop, [] {}, std::chrono::milliseconds(1000));
+          stop, [] {}, std::chrono::milliseconds(1000), [](const std::exception&) {});
     });
   }
   void Send(int robot, const Odometry& odometry) override {
