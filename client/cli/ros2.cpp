@@ -27,7 +27,7 @@ ExitCode Diagnose(Program& program, const std::string& name) {
 }  // namespace
 
 void AddRos2(CLI::App& app, Program& program) {
-  auto* ros2 = app.add_subcommand("ros2", "Robots that run ROS 2");
+  auto* ros2 = app.add_subcommand("ros2", "Robots that run ROS 2: why one is not on the map");
   ros2->require_subcommand(1);
   auto* doctor = ros2->add_subcommand("doctor", "Why a ROS 2 robot is not on the map");
   doctor->footer(
