@@ -14,6 +14,8 @@ import subprocess
 import sys
 import tempfile
 import time
+import urllib.error
+import urllib.request
 
 from chromium import Page
 
@@ -120,11 +122,23 @@ def make_pictures(page, folder):
     shot("web-phone.png", 390, 800, "light")
 
 
-def change_the_mode(page):
+def status_of_post(address, path, token):
+    request = urllib.request.Request(address + path, data=b"{}", headers={"Authorization": f"Bearer {token}"})
+    try:
+        with urllib.request.urlopen(request, timeout=30) as answer:
+            return answer.status
+    except urllib.error.HTTPError as error:
+        return error.code
+
+
+def change_the_mode(page, address):
     """Of robot2, in the map that robot1 draws, with the keyboard."""
     robot = "#robots [data-key=robot2]"
     if page.text(f"{robot} .mode") != "Maps" or page.shows(f"{robot} .to-map"):
         raise Failed(f"the mode of a robot that maps is '{page.text(f'{robot} .mode')}'")
+    for path, token, wanted in (("localise", "wrong", 401), ("map", "", 401), ("fly", TOKEN, 404)):
+        if status_of_post(address, f"api/robots/robot2/{path}", token) != wanted:
+            raise Failed(f"{path} with the token '{token}' is not answered {wanted}")
     page.run(f"document.querySelector('{robot} .to-localise').focus()")
     page.press_enter()
     eventually("it is only localised", lambda: page.text(f"{robot} .mode").startswith("Only localised"))
@@ -204,7 +218,7 @@ def use_the_page(programs, page, pictures):
     state = "document.querySelector('#robots [data-key=robot1] .pill').innerText"
     eventually("and found", lambda: page.run(state) == "Tracking")
 
-    change_the_mode(page)
+    change_the_mode(page, address)
     for name, begins in (("hall.yaml", b"image: \"hall.png\"\n"), ("hall.png", b"\x89PNG")):
         page.click(f"#download-{name.split('.')[1]}")
         path = os.path.join(page.downloads, name)
