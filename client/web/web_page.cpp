@@ -111,7 +111,7 @@ HttpResponse WebPage::TileFile(const HttpRequest& request, const Parts& parts) {
       !ParseNumber(parts[5], key.x) || !ParseNumber(y.substr(0, y.size() - kEnd.size()), key.y)) {
     return HttpError(400, "a tile is LEVEL/X/Y.png");
   }
-  auto map = maps_.Open(parts[2]);
+  auto map = maps_.Open(parts[2], *queries_);
   if (!map) return Refused(map.error());
   const Theme theme = request.Query("theme") == "dark" ? Theme::kDark : Theme::kLight;
   const auto picture = (*map)->Picture(key, theme, request.Header("if-none-match"));
@@ -131,7 +131,7 @@ HttpResponse WebPage::Events(const std::string& site) {
   if (!site.empty() && watch_->view()->Sites().count(site) == 0) return HttpError(404, "the server has no such site");
   std::shared_ptr<SiteMap> map;
   if (!site.empty()) {
-    auto opened = maps_.Open(site);
+    auto opened = maps_.Open(site, *queries_);
     if (!opened) return Refused(opened.error());
     map = std::move(*opened);
   }

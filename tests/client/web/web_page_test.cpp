@@ -158,6 +158,18 @@ TEST_F(Page, TilesArePicturesWithATagPerContentAndTheme) {
   EXPECT_EQ(page_->maps().open(), 1U) << "a site that the server does not know opens no map";
 }
 
+// All tiles of a large map come in seconds; a picture of it must not wait for them. The fake server never publishes
+// this tile, and answers it.
+TEST_F(Page, TheCoarsestTilesAreThereAtOnce) {
+  StartServer();
+  Open();
+  ASSERT_TRUE(KnowsSite());
+  EXPECT_EQ(Get("/api/sites/drawn/tiles/3/0/0.png").status, 200);
+  std::string piece;
+  EXPECT_TRUE(Get("/api/events", {{"site", "drawn"}}).stream(piece));
+  EXPECT_THAT(piece, HasSubstr("[3,0,0,1]"));
+}
+
 TEST_F(Page, TheEventsTellTheStateAndEachTileOnce) {
   StartServer();
   Open();

@@ -55,33 +55,22 @@ MapInfo DrawYard(StudyContext& context, const LiveServer& server, client::QueryC
   const std::string world = (directory / "yard.yaml").string();
   std::ofstream(world) << YardText(context.Pick(650, 180));
   context.report.Progress("a robot draws the yard, which takes minutes");
-  server.Run({"sim",
-              "--world",
-              world,
-              "--site",
-              "yard",
-              "--robots",
-              "1",
-              "--fast",
-              "--hz",
-              "1",
-              "--seconds",
-              context.quick ? "30" : "840",
-              "--odometry-hz",
-              "20",
-              "--speed",
-              "3",
-              "--slip",
-              "0",
-              "--wheel-spread",
-              "0",
-              "--range",
-              "100",
-              "--fov",
-              "360",
-              "--beams",
-              "720"});
-  return Must(queries.Map("yard"));
+  const std::string seconds = context.quick ? "30" : "840";
+  std::vector<std::string> line = {"sim", "--site", "yard", "--robots", "1", "--fast", "--world", world};
+  for (const char* word : {"--hz", "1", "--odometry-hz", "20", "--speed", "3", "--slip", "0", "--wheel-spread", "0",
+                           "--range", "100", "--fov", "360", "--beams", "720", "--seconds"}) {
+    line.emplace_back(word);
+  }
+  line.push_back(seconds);
+  server.Run(line);
+  // What was streamed faster than it can be drawn is drawn afterwards.
+  MapInfo site = Must(queries.Map("yard"));
+  for (std::uint64_t version = site.version + 1; site.version != version;) {
+    version = site.version;
+    std::this_thread::sleep_for(std::chrono::seconds(3));
+    site = Must(queries.Map("yard"));
+  }
+  return site;
 }
 
 // A client of its own each time, as one that has just been started.
