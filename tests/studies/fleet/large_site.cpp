@@ -4,6 +4,7 @@
 
 #include <fstream>
 #include <thread>
+#include <utility>
 
 #include "client/lib/map_client.h"
 #include "client/web/web_page.h"
@@ -63,12 +64,11 @@ MapInfo DrawYard(StudyContext& context, const LiveServer& server, client::QueryC
   }
   line.push_back(seconds);
   server.Run(line);
-  // What was streamed faster than it can be drawn is drawn afterwards.
+  // What was streamed faster than it can be drawn is drawn afterwards: until nothing has changed four times in a row.
   MapInfo site = Must(queries.Map("yard"));
-  for (std::uint64_t version = site.version + 1; site.version != version;) {
-    version = site.version;
-    std::this_thread::sleep_for(std::chrono::seconds(3));
-    site = Must(queries.Map("yard"));
+  for (int still = 0; still < 4; std::this_thread::sleep_for(std::chrono::seconds(3))) {
+    const std::uint64_t before = std::exchange(site, Must(queries.Map("yard"))).version;
+    still = site.version == before ? still + 1 : 0;
   }
   return site;
 }
