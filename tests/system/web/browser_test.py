@@ -122,8 +122,16 @@ def make_pictures(page, folder):
     shot("web-phone.png", 390, 800, "light")
 
 
+def begins_with(path, begins):
+    if not os.path.exists(path):
+        return False
+    with open(path, "rb") as file:
+        return file.read(len(begins)) == begins
+
+
 def status_of_post(address, path, token):
-    request = urllib.request.Request(address + path, data=b"{}", headers={"Authorization": f"Bearer {token}"})
+    request = urllib.request.Request(address + path, data=b"{}", headers={
+        "Authorization": f"Bearer {token}", "Content-Type": "application/json"})
     try:
         with urllib.request.urlopen(request, timeout=30) as answer:
             return answer.status
@@ -149,6 +157,9 @@ def change_the_mode(page, address):
     eventually("the keyboard stays where the other mode is",
                lambda: page.run(f"document.activeElement === document.querySelector('{robot} .to-map')"))
     page.press_enter()
+    eventually("the page says something of the other mode", lambda: re.search("maps again|Not done", page.text("#said")))
+    if "robot2 maps again" not in page.text("#said"):
+        raise Failed(f"the page says '{page.text('#said')}'")
     eventually("it maps again", lambda: page.text(f"{robot} .mode") == "Maps")
 
 
@@ -222,10 +233,7 @@ def use_the_page(programs, page, pictures):
     for name, begins in (("hall.yaml", b"image: \"hall.png\"\n"), ("hall.png", b"\x89PNG")):
         page.click(f"#download-{name.split('.')[1]}")
         path = os.path.join(page.downloads, name)
-        eventually(f"{name} is downloaded", lambda: os.path.exists(path))
-        with open(path, "rb") as file:
-            if not file.read().startswith(begins):
-                raise Failed(f"{name} is no map")
+        eventually(f"{name} is downloaded", lambda: begins_with(path, begins))  # It is there before it is filled.
 
     # That the wrong token is refused was wanted, and a tile may be replaced while the page asks for it.
     refused = [(status, url) for status, url in page.refused if not (status == 401 and "/api/token" in url)
