@@ -1,8 +1,8 @@
 # Completion in bash for all programs of Cairn: commands, options and named values, as the program's own --help prints
 # them, so a new option needs no change here. Everything else is completed as a file name.
 
-# What a page of help lists: its commands, its options, the values that an option may have.
-_cairn_commands() { awk '/^[^ ]/ { inside = /^Subcommands:/ } inside && /^  [a-z]/ { print $1 }' <<<"$1"; }
+# What a page of help lists: its commands, under one or several headings; its options; the values that an option may have.
+_cairn_commands() { awk '/^[^ ]/ { inside = /:$/ && !/^(Options|Positionals):/ } inside && /^  [a-z]/ { print $1 }' <<<"$1"; }
 _cairn_options() { grep -oE '^ +(-[A-Za-z],)?--[a-z][a-z0-9-]*' <<<"$1" | grep -oE -- '-.*' | tr ',' '\n'; }
 _cairn_values() { grep -E -- "^ +(-[A-Za-z],)?$2[ =:,]|^ +$2," <<<"$1" | grep -oE '\{[^}]*\}' | head -n 1 | tr -d '{}' | tr ',' '\n'; }
 

@@ -4,6 +4,7 @@
 
 #include <exception>
 #include <utility>
+#include <vector>
 
 #include "client/cli/commands.h"
 #include "client/cli/json_output.h"
@@ -67,6 +68,29 @@ void AddGlobalOptions(CLI::App& app, Program& program, wire::WireArguments& wire
   app.add_flag("--json", options.json, "Print JSON on standard output, one object per line");
 }
 
+// The commands as `cairn --help` lists them: a table of contents, from looking to making robots up.
+struct Chapter {
+  const char* heading;
+  std::vector<void (*)(CLI::App&, Program&)> commands;
+};
+
+void AddCommands(CLI::App& app, Program& program) {
+  const std::vector<Chapter> chapters = {
+      {"Watch", {AddStatus, AddTop, AddPose, AddPath, AddPing}},
+      {"Robots", {AddRobot, AddSession, AddRos2}},
+      {"Maps", {AddMap, AddTiles, AddJob}},
+      {"Sites", {AddSite}},
+      {"Logs and recordings", {AddReplay, AddRecord, AddCheckLog, AddCloud, AddEval}},
+      {"Simulation", {AddSim}},
+  };
+  for (const Chapter& chapter : chapters) {
+    for (const auto add : chapter.commands) {
+      add(app, program);
+      app.get_subcommands({}).back()->group(chapter.heading);
+    }
+  }
+}
+
 }  // namespace
 
 ExitCode RunCairn(const std::vector<std::string>& arguments, std::ostream& out, std::ostream& err) {
@@ -80,24 +104,7 @@ ExitCode RunCairn(const std::vector<std::string>& arguments, std::ostream& out, 
   app.fallthrough();
   app.require_subcommand(1);
   AddGlobalOptions(app, program, wire);
-  AddReplay(app, program);
-  AddRecord(app, program);
-  AddSim(app, program);
-  AddPose(app, program);
-  AddPath(app, program);
-  AddMap(app, program);
-  AddTiles(app, program);
-  AddCloud(app, program);
-  AddStatus(app, program);
-  AddTop(app, program);
-  AddJob(app, program);
-  AddSession(app, program);
-  AddRobot(app, program);
-  AddRos2(app, program);
-  AddSite(app, program);
-  AddCheckLog(app, program);
-  AddEval(app, program);
-  AddPing(app, program);
+  AddCommands(app, program);
   try {
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 takes them from the back.
   } catch (const CLI::ParseError& error) {

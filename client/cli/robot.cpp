@@ -39,7 +39,7 @@ ExitCode MapAgain(Program& program, const ModeArguments& arguments) {
 }  // namespace
 
 void AddRobot(CLI::App& app, Program& program) {
-  auto* robot = app.add_subcommand("robot", "What can be said to a robot's estimator");
+  auto* robot = app.add_subcommand("robot", "Have a robot found again, only localised, or mapping again");
   robot->require_subcommand(1);
   auto* relocalise = robot->add_subcommand("relocalise", "Have a robot found again that is not where its pose says");
   relocalise->footer(

@@ -1,11 +1,9 @@
 // cairn ros2: what the server sees of robots that run ROS 2.
-#include <fmt/format.h>
-
 #include <algorithm>
 
 #include "client/cli/commands.h"
 #include "client/cli/json_output.h"
-#include "client/cli/text_output.h"
+#include "client/lib/ros2_findings.h"
 
 namespace cairn::client {
 namespace {
@@ -23,13 +21,13 @@ ExitCode Diagnose(Program& program, const std::string& name) {
       return one.name != name && one.robot != name && one.name != "/" + name;
     });
   }
-  return program.Print(FormatRos2(report), report);
+  return program.Print(FormatRos2(FindingsOf(report)), report);
 }
 
 }  // namespace
 
 void AddRos2(CLI::App& app, Program& program) {
-  auto* ros2 = app.add_subcommand("ros2", "Robots that run ROS 2");
+  auto* ros2 = app.add_subcommand("ros2", "Robots that run ROS 2: why one is not on the map");
   ros2->require_subcommand(1);
   auto* doctor = ros2->add_subcommand("doctor", "Why a ROS 2 robot is not on the map");
   doctor->footer(

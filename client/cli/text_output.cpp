@@ -79,31 +79,6 @@ std::string FormatRefusals(const Refusals& refused) {
       refused.datagrams, refused.over_limit);
 }
 
-std::string FormatRos2(const Ros2Report& report) {
-  std::string text = fmt::format("ROS 2 in DDS domain {}\n", report.door.domain);
-  for (const std::string& problem : report.door.problems) text += fmt::format("! {}\n", problem);
-  if (report.namespaces.empty()) {
-    text +=
-        "no namespace publishes laser scans or odometry: is ROS_DOMAIN_ID the same, and is ros2.interfaces the address "
-        "of "
-        "this server in the robots' network?\n";
-  }
-  for (const Ros2Namespace& one : report.namespaces) {
-    text += fmt::format("{}  {}{}\n", one.name,
-                        one.robot.empty() ? "no robot" : fmt::format("robot {} in site {}", one.robot, one.site),
-                        one.on_map ? ": on the map" : ": NOT on the map");
-    for (const std::string& problem : one.problems) text += fmt::format("  - {}\n", problem);
-    for (const Ros2Topic& topic : one.topics) {
-      text +=
-          fmt::format("    {} ({}): {} publisher{}, {}{}, {:.1f} Hz, {} received{}\n", topic.name, topic.type,
-                      topic.publishers, topic.publishers == 1 ? "" : "s", topic.reliable ? "reliable" : "best effort",
-                      topic.transient_local ? ", transient local" : "", topic.rate_hz, topic.received,
-                      topic.refused > 0 ? fmt::format(", {} refused", topic.refused) : "");
-    }
-  }
-  return text;
-}
-
 std::string FormatMap(const MapInfo& map) {
   std::string text = fmt::format("{}: {} tiles in {} levels of {} m, epoch {}, version {}, {} robots\n", map.site,
                                  map.tile_count, map.levels, map.resolution_m, map.epoch, map.version, map.robots);

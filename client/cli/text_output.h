@@ -17,7 +17,6 @@ namespace cairn::client {
 [[nodiscard]] std::string FormatRobot(const RobotStatus& robot);
 // What the server refused; empty where DDS Security is off and nothing was refused.
 [[nodiscard]] std::string FormatRefusals(const Refusals& refused);
-[[nodiscard]] std::string FormatRos2(const Ros2Report& report);
 [[nodiscard]] std::string FormatMap(const MapInfo& map);
 [[nodiscard]] std::string FormatTrajectoryError(const TrajectoryError& error);
 [[nodiscard]] std::string FormatLogReport(const LogReport& report);

@@ -106,6 +106,16 @@ Result<void> MapClient::WaitComplete(double timeout_s) {
   return {};
 }
 
+void MapClient::Fill(TileAnswer&& answer) {
+  bool filled = false;
+  {
+    const MutexLock lock(mutex_);
+    for (Tile& tile : answer.tiles) filled = mirror_->Fill(answer.generation, std::move(tile)) || filled;
+    if (filled) changed_.NotifyAll();
+  }
+  if (filled && on_change_) on_change_();
+}
+
 std::vector<Tile> MapClient::tiles() const {
   const MutexLock lock(mutex_);
   return mirror_->tiles();

@@ -33,16 +33,25 @@ bool TileMirror::Apply(TileSample&& sample) {
     ++ignored_;
     return false;
   }
+  version_ = std::max(version_, tile.version);  // Also of a tile that was filled in before.
   if (known != entries_.end() && tile.version <= known->second.version) return false;
   Entry& entry = entries_[tile.key];
   entry.version = tile.version;
   entry.arrived = ++arrivals_;
-  version_ = std::max(version_, tile.version);
   if (sample.deleted) {
     entry.tile.reset();
   } else {
     entry.tile = std::move(tile);
   }
+  return true;
+}
+
+bool TileMirror::Fill(Generation generation, Tile&& tile) {
+  if (!Enter(generation, tile.epoch) || entries_.count(tile.key) > 0 || entries_.size() >= kMaxTiles) return false;
+  Entry& entry = entries_[tile.key];
+  entry.version = tile.version;
+  entry.arrived = ++arrivals_;
+  entry.tile = std::move(tile);
   return true;
 }
 

@@ -44,12 +44,15 @@ class TileMirror {
   // True if it changed the mirror. Other sites' values are ignored.
   bool Apply(MapInfo&& info);
   bool Apply(TileSample&& sample);
+  // A tile from the answer to a question, for who cannot wait until the wire brings it. Only where nothing of that tile
+  // is here yet; version() counts only what the wire has brought.
+  bool Fill(Generation generation, Tile&& tile);
 
   // Everything the last map info announces is here.
   [[nodiscard]] bool complete() const;
   [[nodiscard]] Generation generation() const { return generation_; }
   [[nodiscard]] std::uint32_t epoch() const { return epoch_; }
-  [[nodiscard]] std::uint64_t version() const { return version_; }  // Highest of the tiles here.
+  [[nodiscard]] std::uint64_t version() const { return version_; }  // Highest of the tiles that came.
   [[nodiscard]] const std::optional<MapInfo>& info() const { return info_; }
   [[nodiscard]] std::vector<Tile> tiles() const;  // By key.
   [[nodiscard]] std::vector<Tile> tiles(int level) const;

@@ -36,7 +36,9 @@ Result<std::unique_ptr<ServerWatch>> ServerWatch::Create(wire::Bus& bus) {
   // One answer late is no reason to call the server gone.
   auto queries = client::QueryClient::Create(bus, {.timeout_s = 1.5});
   if (!queries) return tl::unexpected(queries.error());
-  std::unique_ptr<ServerWatch> watch(new ServerWatch(std::move(*queries)));
+  auto strays = StrayStreams::Create(bus);
+  if (!strays) return tl::unexpected(strays.error());
+  std::unique_ptr<ServerWatch> watch(new ServerWatch(std::move(*queries), std::move(*strays)));
   watch->thread_ = std::thread([self = watch.get()] { self->Run(); });
   return watch;
 }
@@ -111,13 +113,21 @@ ServerView ServerWatch::Ask() {
   view.answered_ms = NowMs();
   const bool runs = std::any_of(view.jobs.begin(), view.jobs.end(), [](const Job& job) { return !IsFinal(job.state); });
   if (runs || Clock::now() - listed_ >= kListPeriod) {
-    listed_ = Clock::now();
-    if (auto version = queries_->Ping()) view.version = std::move(*version);
-    if (auto maps = queries_->Maps()) view.maps = std::move(*maps);
-    if (auto jobs = queries_->Jobs()) view.jobs = std::move(*jobs);
+    AddLists(view);
   }
   AddFlows(view);
   return view;
+}
+
+// What is not asked for as often as the status.
+void ServerWatch::AddLists(ServerView& view) {
+  listed_ = Clock::now();
+  if (auto version = queries_->Ping()) view.version = std::move(*version);
+  if (auto maps = queries_->Maps()) view.maps = std::move(*maps);
+  if (auto jobs = queries_->Jobs()) view.jobs = std::move(*jobs);
+  if (auto ros2 = queries_->Ros2())
+    view.ros2 = ros2->door.enabled ? std::make_shared<const Ros2Report>(std::move(*ros2)) : nullptr;
+  view.strays = strays_->Shown(listed_);
 }
 
 void ServerWatch::AddFlows(ServerView& view) {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "client/lib/query_client.h"
+#include "client/web/stray_streams.h"
 #include "common/mutex.h"
 #include "common/wire/bus.h"
 
@@ -41,6 +42,8 @@ struct ServerView {
   std::vector<MapInfo> maps;
   std::vector<Job> jobs;
   std::map<std::string, std::shared_ptr<const Flow>> flows;  // By site.
+  std::shared_ptr<const Ros2Report> ros2;                    // Null where the server serves no ROS 2 robots.
+  std::vector<StrayStream> strays;                           // Robots that have no session.
 
   [[nodiscard]] std::set<std::string> Sites() const;
   [[nodiscard]] const MapInfo* Map(const std::string& site) const;
@@ -68,13 +71,16 @@ class ServerWatch {
     std::uint64_t dropped = 0;
   };
 
-  explicit ServerWatch(std::unique_ptr<client::QueryClient> queries) : queries_(std::move(queries)) {}
+  ServerWatch(std::unique_ptr<client::QueryClient> queries, std::unique_ptr<StrayStreams> strays)
+      : queries_(std::move(queries)), strays_(std::move(strays)) {}
   void Run();
   [[nodiscard]] ServerView Ask();
+  void AddLists(ServerView& view);
   void AddFlows(ServerView& view);
   void Publish(ServerView&& view);
 
   const std::unique_ptr<client::QueryClient> queries_;
+  const std::unique_ptr<StrayStreams> strays_;
   // Of the thread.
   std::map<std::string, Counts> counted_;
   Clock::time_point sampled_{};

@@ -51,19 +51,27 @@ bool SiteMaps::MakeRoom() {
   return places_.size() < kMaxOpenMaps;
 }
 
-Result<std::shared_ptr<SiteMap>> SiteMaps::Open(const std::string& site) {
-  const MutexLock lock(mutex_);
-  const auto now = Clock::now();
+std::shared_ptr<SiteMap> SiteMaps::Find(const std::string& site) {
   const auto found = places_.find(site);
-  if (found != places_.end()) {
-    found->second.asked = now;
-    return found->second.map;
+  if (found == places_.end()) return nullptr;
+  found->second.asked = Clock::now();
+  return found->second.map;
+}
+
+Result<std::shared_ptr<SiteMap>> SiteMaps::Open(const std::string& site, client::QueryClient& queries) {
+  {
+    const MutexLock lock(mutex_);
+    if (auto map = Find(site)) return map;
   }
+  auto coarsest = queries.Tiles({.site = site, .area = {}, .level = kPyramidLevels - 1});
+  const MutexLock lock(mutex_);
+  if (auto map = Find(site)) return map;  // Somebody else was faster.
   if (!MakeRoom()) return Fail(StatusCode::kResourceExhausted, "too many sites are looked at; try again in a minute");
   auto map = client::MapClient::Create(bus_, site);
   if (!map) return tl::unexpected(map.error());
   auto opened = std::make_shared<SiteMap>(std::move(*map));
-  places_[site] = {.map = opened, .asked = now};
+  if (coarsest) opened->map().Fill(std::move(*coarsest));
+  places_[site] = {.map = opened, .asked = Clock::now()};
   return opened;
 }
 

@@ -45,9 +45,10 @@ class SiteMaps {
  public:
   explicit SiteMaps(wire::Bus& bus) : bus_(bus) {}
 
-  // Joins the map where nobody looked at it before. REQUIRES: the server has the site. kResourceExhausted: too many
-  // maps are looked at.
-  [[nodiscard]] Result<std::shared_ptr<SiteMap>> Open(const std::string& site);
+  // Joins the map where nobody looked at it before. The coarsest tiles are asked for first, because it takes seconds
+  // until the wire has brought all tiles of a large map. REQUIRES: the server has the site. kResourceExhausted: too
+  // many maps are looked at.
+  [[nodiscard]] Result<std::shared_ptr<SiteMap>> Open(const std::string& site, client::QueryClient& queries);
   [[nodiscard]] std::size_t open() const;
 
  private:
@@ -56,6 +57,7 @@ class SiteMaps {
     std::shared_ptr<SiteMap> map;
     Clock::time_point asked;
   };
+  [[nodiscard]] std::shared_ptr<SiteMap> Find(const std::string& site) CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool MakeRoom() CAIRN_REQUIRES(mutex_);
 
   wire::Bus& bus_;

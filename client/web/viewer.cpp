@@ -13,18 +13,24 @@ std::string Event(const std::string& name, const std::string& json) {
 
 StateTexts::Text StateTexts::Get(const ServerView& view, const std::string& site) {
   const MutexLock lock(mutex_);
-  const auto found = written_.find(site);
-  if (found != written_.end() && found->second.view == view.number) return found->second.text;
-  auto text = std::make_shared<const std::string>(StateJson(view, site, commands_));
-  if (found != written_.end() && found->second.view > view.number) return text;
+  if (written_.size() > kMaxSites && written_.count(site) == 0) written_.clear();
+  return Renew(written_[site], view.number, [&] { return StateJson(view, site, commands_); });
+}
+
+StateTexts::Text StateTexts::Doctor(const ServerView& view) {
+  const MutexLock lock(mutex_);
+  return Renew(doctor_, view.number, [&] { return DoctorJson(view); });
+}
+
+template <typename Write>
+StateTexts::Text StateTexts::Renew(Written& written, std::uint64_t view, const Write& write) {
+  if (written.text && written.view == view) return written.text;
+  auto text = std::make_shared<const std::string>(write());
+  if (written.text && written.view > view) return text;
+  written.view = view;
   // The same text stays the same object, so that a viewer need not compare the whole of it.
-  if (found != written_.end() && *found->second.text == *text) {
-    found->second.view = view.number;
-    return found->second.text;
-  }
-  if (written_.size() > kMaxSites) written_.clear();
-  written_[site] = {.view = view.number, .text = text};
-  return text;
+  if (!written.text || *written.text != *text) written.text = std::move(text);
+  return written.text;
 }
 
 std::string Viewer::NextPiece() {
@@ -46,6 +52,9 @@ void Viewer::AddView(const ServerView& view, std::string& piece) {
   const StateTexts::Text state = states_.Get(view, site_);
   if (state != state_) piece += Event("state", *state);
   state_ = state;
+  const StateTexts::Text doctor = states_.Doctor(view);
+  if (doctor != doctor_) piece += Event("doctor", *doctor);
+  doctor_ = doctor;
   const auto flow = view.flows.find(site_);
   if (flow == view.flows.end() || flow->second->back().time_ms <= flow_ms_) return;
   piece += Event("flow", FlowJson(*flow->second, flow_ms_));

@@ -24,15 +24,22 @@ class StateTexts {
 
   // REQUIRES: `site` is empty or one of the view's sites.
   [[nodiscard]] Text Get(const ServerView& view, const std::string& site);
+  // Why robots are not on the map, of whatever site.
+  [[nodiscard]] Text Doctor(const ServerView& view);
 
  private:
   struct Written {
     std::uint64_t view = 0;
     Text text;
   };
+  // The newest text of its kind: what `write` gives, or the one before where it is the same.
+  template <typename Write>
+  [[nodiscard]] static Text Renew(Written& written, std::uint64_t view, const Write& write);
+
   const bool commands_;
   Mutex mutex_;
   std::map<std::string, Written> written_ CAIRN_GUARDED_BY(mutex_);  // By site; those of the newest views only.
+  Written doctor_ CAIRN_GUARDED_BY(mutex_);
 };
 
 class Viewer {
@@ -58,6 +65,7 @@ class Viewer {
   // What the person has been told.
   std::uint64_t view_ = 0;
   StateTexts::Text state_;
+  StateTexts::Text doctor_;
   client::TileChanges::Place tiles_;
   std::int64_t flow_ms_ = 0;
   Clock::time_point told_{};

@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "client/lib/ros2_findings.h"
+
 namespace cairn::web {
 namespace {
 
@@ -54,12 +56,21 @@ Json LedgerJson(const Ledger& ledger) {
           {"p50", ledger.latency_p50_ms},  {"p99", ledger.latency_p99_ms}, {"odometry", ledger.odometry_received}};
 }
 
+// Whether the robot maps or is only localised. The server says the latter in the text of a status that is OK
+// (idl/README.md); null where the status says something else.
+Json ModeOf(const SessionState& session) {
+  constexpr std::string_view kOnlyLocalised = "only localised";
+  if (!session.status.ok()) return nullptr;
+  return session.status.message.substr(0, kOnlyLocalised.size()) == kOnlyLocalised ? "localise" : "map";
+}
+
 Json RobotJson(const RobotStatus& robot) {
   Json ledgers = Json::array();
   for (const Ledger& ledger : robot.ledgers) ledgers.push_back(LedgerJson(ledger));
   Json json = {{"name", robot.session.robot},  {"phase", SessionPhaseName(robot.session.phase)},
                {"stale", robot.session.stale}, {"note", robot.session.status.message},
-               {"alive", robot.alive},         {"sensors", ledgers}};
+               {"alive", robot.alive},         {"sensors", ledgers},
+               {"mode", ModeOf(robot.session)}};
   json["pose"] = robot.pose.reason == PoseReason::kWaiting ? Json() : PoseJson(robot.pose);
   return json;
 }
@@ -185,6 +196,27 @@ std::string LandmarksJson(const std::vector<LandmarkReport>& landmarks) {
 
 std::string JobJson(const Job& job) {
   return Text(ToJson(job));
+}
+
+std::string DoctorJson(const ServerView& view) {
+  Json json = {{"ros2", nullptr}, {"strays", Json::array()}};
+  for (const StrayStream& stray : view.strays)
+    json["strays"].push_back({{"robot", stray.robot}, {"dropped", stray.dropped}, {"why", stray.why}});
+  if (view.ros2 == nullptr) return Text(json);
+  const client::Ros2Findings findings = client::FindingsOf(*view.ros2);
+  Json namespaces = Json::array();
+  for (const client::Ros2Findings::Namespace& one : findings.namespaces) {
+    namespaces.push_back({{"name", one.name},
+                          {"who", one.who},
+                          {"on_map", one.on_map},
+                          {"problems", one.problems},
+                          {"topics", one.topics}});
+  }
+  json["ros2"] = {{"where", findings.where},
+                  {"problems", findings.problems},
+                  {"advice", findings.advice},
+                  {"namespaces", namespaces}};
+  return Text(json);
 }
 
 }  // namespace cairn::web

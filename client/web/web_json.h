@@ -20,5 +20,8 @@ namespace cairn::web {
 [[nodiscard]] std::string PathJson(const Trajectory& path, std::size_t most);
 [[nodiscard]] std::string LandmarksJson(const std::vector<LandmarkReport>& landmarks);
 [[nodiscard]] std::string JobJson(const Job& job);
+// Why robots are not on the map: `ros2` in the words of the doctor (client/lib/ros2_findings.h), null where the server
+// has no door for them; `strays`, the robots without a session.
+[[nodiscard]] std::string DoctorJson(const ServerView& view);
 
 }  // namespace cairn::web

@@ -85,6 +85,7 @@ HttpResponse WebPage::AnswerGet(const HttpRequest& request, const Parts& parts) 
     if (!site.empty() && view->Sites().count(site) == 0) return HttpError(404, "the server has no such site");
     return JsonAnswer(*states_.Get(*view, site));
   }
+  if (parts.size() == 2 && parts[1] == "doctor") return JsonAnswer(*states_.Doctor(*watch_->view()));
   if (parts.size() == 4 && parts[1] == "robots" && parts[3] == "path")
     return Path(parts[2], request.Query("smoothed") == "1");
   if (parts.size() >= 4 && parts[1] == "sites") return AnswerAboutSite(request, parts);
@@ -110,7 +111,7 @@ HttpResponse WebPage::TileFile(const HttpRequest& request, const Parts& parts) {
       !ParseNumber(parts[5], key.x) || !ParseNumber(y.substr(0, y.size() - kEnd.size()), key.y)) {
     return HttpError(400, "a tile is LEVEL/X/Y.png");
   }
-  auto map = maps_.Open(parts[2]);
+  auto map = maps_.Open(parts[2], *queries_);
   if (!map) return Refused(map.error());
   const Theme theme = request.Query("theme") == "dark" ? Theme::kDark : Theme::kLight;
   const auto picture = (*map)->Picture(key, theme, request.Header("if-none-match"));
@@ -130,7 +131,7 @@ HttpResponse WebPage::Events(const std::string& site) {
   if (!site.empty() && watch_->view()->Sites().count(site) == 0) return HttpError(404, "the server has no such site");
   std::shared_ptr<SiteMap> map;
   if (!site.empty()) {
-    auto opened = maps_.Open(site);
+    auto opened = maps_.Open(site, *queries_);
     if (!opened) return Refused(opened.error());
     map = std::move(*opened);
   }
@@ -210,14 +211,22 @@ HttpResponse WebPage::AnswerPost(const HttpRequest& request, const Parts& parts)
   if (parts[1] == "jobs" && parts[3] == "cancel" && ParseNumber(parts[2], id)) {
     const auto job = queries_->CancelJob(id);
     response = job ? JsonAnswer(JobJson(*job)) : Refused(job.error());
-  } else if (parts[1] == "robots" && parts[3] == "relocalise") {
-    response = Relocalise(parts[2], request.body);
+  } else if (parts[1] == "robots") {
+    response = CommandRobot(parts[2], parts[3], request.body);
   } else if (parts[1] == "sites") {
     if (watch_->view()->Sites().count(parts[2]) == 0) return HttpError(404, "the server has no such site");
     response = CommandSite(parts[2], parts[3], request.body);
   }
   watch_->AskNow();
   return response;
+}
+
+HttpResponse WebPage::CommandRobot(const std::string& robot, const std::string& command, const std::string& body) {
+  const auto done = [](const auto& result) { return result ? JsonAnswer("{}") : Refused(result.error()); };
+  if (command == "relocalise") return Relocalise(robot, body);
+  if (command == "localise") return done(queries_->Localise(robot));
+  if (command == "map") return done(queries_->MapAgain(robot));
+  return HttpError(404, "there is no such command");
 }
 
 // The body holds x, y and theta, or nothing where nobody knows where the robot is.

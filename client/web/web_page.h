@@ -38,6 +38,8 @@ class WebPage {
   [[nodiscard]] HttpResponse AnswerGet(const HttpRequest& request, const Parts& parts);
   [[nodiscard]] HttpResponse AnswerAboutSite(const HttpRequest& request, const Parts& parts);
   [[nodiscard]] HttpResponse AnswerPost(const HttpRequest& request, const Parts& parts);
+  [[nodiscard]] HttpResponse CommandRobot(const std::string& robot, const std::string& command,
+                                          const std::string& body);
   [[nodiscard]] HttpResponse Relocalise(const std::string& robot, const std::string& body);
   [[nodiscard]] HttpResponse CommandSite(const std::string& site, const std::string& command, const std::string& body);
   [[nodiscard]] HttpResponse Events(const std::string& site);

@@ -30,7 +30,11 @@ refuses() {
   done
 }
 
-offers 'cairn ' replay record map site check-log
+offers 'cairn ' replay record map site check-log status sim ping
+# Words of the text around the commands.
+refuses 'cairn ' cairn stream --help 0
+refuses 'cairn robot ' cairn estimator
+refuses 'cairn pose ' robot cairn
 offers 'cairn ma' map
 refuses 'cairn ma' replay
 offers 'cairn map ' draw export

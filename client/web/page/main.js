@@ -3,6 +3,7 @@ import { SiteMap } from '/map.js';
 import { plot } from '/plots.js';
 import { onThemeChange } from '/theme.js';
 import * as panels from '/panels.js';
+import { showDoctor } from '/doctor.js';
 import { command, say, token, tokenOfAddress, useToken } from '/commands.js';
 
 const $ = (id) => document.getElementById(id);
@@ -27,6 +28,7 @@ function listen() {
     const changes = JSON.parse(event.data);
     if (map) map.applyTiles(changes); else waitingTiles.push(changes);
   });
+  source.addEventListener('doctor', (event) => showDoctor(JSON.parse(event.data)));
   source.addEventListener('flow', (event) => { flow = flow.concat(JSON.parse(event.data)).slice(-300); showFlow(); });
   source.onerror = () => {
     streamLost = true;
@@ -87,7 +89,7 @@ function show(now) {
   panels.showRobots(state, may(), (name) => {
     const robot = state.robots.find((one) => one.name === name);
     if (robot?.pose) map?.centre(robot.pose);
-  }, relocalise);
+  }, relocalise, setMode);
   panels.showJobs(state, may(), (id) => command(`/api/jobs/${id}/cancel`, {}, 'The job is cancelled.'));
   panels.showMap(state, may(), (version) => command(`/api/sites/${state.site}/enable`, { version }, `Version ${version} is enabled.`));
   panels.showServer(state, may());
@@ -101,6 +103,10 @@ function relocalise(name, how, pose) {
   if (map.placing === name) { map.stopPlacing(); return; }
   map.place(name, robot.pose.theta, (placed) => { if (placed) tell(placed); else say(''); });
   say(`Press where ${name} is, and drag to where it looks. Escape, or the button again, leaves it as it is.`, true);
+}
+
+function setMode(name, mode) {
+  command(`/api/robots/${name}/${mode}`, {}, mode === 'map' ? `${name} maps again.` : `${name} is only localised from now on, in the map of its site.`);
 }
 
 function showFlow() {

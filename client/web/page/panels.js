@@ -6,10 +6,10 @@ import { format } from '/plots.js';
 const $ = (id) => document.getElementById(id);
 const PILLS = { tracking: 'good', unsure: 'warn', lost: 'bad', silent: '' };
 
-function setText(element, text) { if (element.textContent !== text) element.textContent = text; }
+export function setText(element, text) { if (element.textContent !== text) element.textContent = text; }
 
 // One child of `list` for each item, by key, in the order of the items.
-function keyed(list, items, keyOf, make, update) {
+export function keyed(list, items, keyOf, make, update) {
   const old = new Map([...list.children].map((child) => [child.dataset.key, child]));
   items.forEach((item, index) => {
     const key = String(keyOf(item));
@@ -22,7 +22,7 @@ function keyed(list, items, keyOf, make, update) {
   for (const child of old.values()) child.remove();
 }
 
-function element(tag, className, parent) {
+export function element(tag, className, parent) {
   const made = document.createElement(tag);
   if (className) made.className = className;
   parent?.append(made);
@@ -73,7 +73,37 @@ function makeRelocalise(item, robot, onRelocalise) {
   });
 }
 
-export function showRobots(state, may, onChosen, onRelocalise) {
+// Whether it maps or is only localised, and for those who may command: the other of both. Where the server says something
+// else of it (mode null), nobody knows which, so both can be said.
+const MODES = { map: 'Maps', localise: 'Only localised: nothing is drawn of it' };
+
+function makeMode(item, robot, onMode) {
+  element('span', 'mode', item);
+  const row = element('span', 'row modes', item);
+  for (const [mode, words] of [['localise', 'Only localise'], ['map', 'Map again']]) {
+    const button = element('button', `command to-${mode}`, row);
+    button.type = 'button';
+    setText(button, words);
+    button.setAttribute('aria-label', `${words}: ${robot.name}`);
+    button.addEventListener('click', () => onMode(robot.name, mode));
+  }
+}
+
+function showMode(item, robot, may) {
+  const ended = robot.phase === 'ended';
+  const mode = item.querySelector('.mode');
+  mode.hidden = ended || !robot.mode;
+  setText(mode, MODES[robot.mode] ?? '');
+  item.querySelector('.modes').hidden = !may || ended;
+  const localise = item.querySelector('.to-localise'), map = item.querySelector('.to-map');
+  for (const [button, other, is] of [[localise, map, 'localise'], [map, localise, 'map']]) {
+    const focused = document.activeElement === button;
+    button.hidden = robot.mode === is;
+    if (focused && button.hidden) { other.hidden = false; other.focus(); }  // Who uses the keyboard stays here.
+  }
+}
+
+export function showRobots(state, may, onChosen, onRelocalise, onMode) {
   $('robots-empty').hidden = state.robots.length > 0;
   keyed($('robots'), state.robots, (robot) => robot.name, (robot) => {
     const item = element('li', 'robot');
@@ -84,6 +114,7 @@ export function showRobots(state, may, onChosen, onRelocalise) {
     element('span', 'pill', item);
     element('span', 'where', item);
     element('span', 'note', item);
+    makeMode(item, robot, onMode);
     const details = element('details', '', item);
     setText(element('summary', '', details), 'Scans');
     element('div', 'sensors', details);
@@ -105,8 +136,10 @@ export function showRobots(state, may, onChosen, onRelocalise) {
     const place = pose ? `${pose.x.toFixed(2)}, ${pose.y.toFixed(2)} m, ${Math.round((pose.theta * 180) / Math.PI) || 0}°, ±${pose.ellipse ? pose.ellipse[0].toFixed(2) : '?'} m` : 'no pose yet';
     setText(item.querySelector('.where'), `${place} · ${used} scans used${dropped ? `, ${dropped} dropped` : ''}`);
     const note = item.querySelector('.note');
-    note.hidden = !robot.note;
-    setText(note, robot.note);
+    const said = robot.mode === 'localise' ? '' : robot.note;  // The mode says that already.
+    note.hidden = !said;
+    setText(note, said);
+    showMode(item, robot, may);
     keyed(item.querySelector('.sensors'), scanSensors(robot), (sensor) => sensor.sensor, () => element('p'), (p, sensor) => setText(p, describeSensor(sensor)));
   });
 }

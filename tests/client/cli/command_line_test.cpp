@@ -2,8 +2,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cctype>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <sstream>
 
 #include "client/cli/program.h"
@@ -97,6 +99,32 @@ TEST_F(CommandLine, HelpIsNoError) {
   }
   EXPECT_THAT(RunLine({"replay", "--help"}).out, HasSubstr("EXAMPLES"));
   EXPECT_THAT(RunLine({"--help"}).out, HasSubstr("Exit codes"));
+}
+
+// The heading in `cairn --help` below which each command stands.
+std::map<std::string, std::string> HeadingsOfCommands() {
+  std::map<std::string, std::string> headings;
+  std::istringstream help(RunLine({"--help"}).out);
+  std::string heading;
+  for (std::string line; std::getline(help, line);) {
+    if (!line.empty() && line[0] != ' ') heading = line;
+    if (line.size() > 2 && line.substr(0, 2) == "  " && std::isalpha(static_cast<unsigned char>(line[2])) != 0)
+      headings[line.substr(2, line.find(' ', 2) - 2)] = heading;
+  }
+  return headings;
+}
+
+TEST_F(CommandLine, HelpIsATableOfContents) {
+  const auto headings = HeadingsOfCommands();
+  const std::map<std::string, std::string> some = {{"top", "Watch:"},
+                                                   {"ros2", "Robots:"},
+                                                   {"job", "Maps:"},
+                                                   {"site", "Sites:"},
+                                                   {"record", "Logs and recordings:"},
+                                                   {"sim", "Simulation:"}};
+  for (const auto& [command, heading] : some) EXPECT_EQ(headings.count(command) ? headings.at(command) : "", heading);
+  EXPECT_EQ(headings.size(), 18U) << ::testing::PrintToString(headings);
+  EXPECT_THAT(RunLine({"--help"}).out, ::testing::Not(HasSubstr("Subcommands:"))) << "a command without a chapter";
 }
 
 TEST_F(CommandLine, SimWritesLogsThatCheckLogFindsGood) {

@@ -250,6 +250,8 @@ void FakeServer::OnRequest(Request&& request) {
       reply.map_version = 9;
       reply.tiles.resize(1);
       if (request.site == "drawn") {
+        reply.tiles[0].key.level = static_cast<int>(request.level);
+        reply.tiles[0].version = 1;
         reply.tiles[0].encoding = TileEncoding::kRaw;
         reply.tiles[0].bytes.assign(kTileArea, 100);
         break;

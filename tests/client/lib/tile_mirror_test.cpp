@@ -36,6 +36,27 @@ TEST(TileMirror, ANewerVersionReplacesTheTile) {
   EXPECT_EQ(mirror.tiles()[0].version, 6U);
 }
 
+// A client that asks for a part of the map is shown that first, and the rest as the wire brings it.
+TEST(TileMirror, AnAnswerFillsWhatHasNotComeYet) {
+  TileMirror mirror(kSite);
+  EXPECT_TRUE(mirror.Apply(Announce(0, 6, 2)));
+  EXPECT_TRUE(mirror.Apply(MirroredTile(1, 0, 5)));
+  EXPECT_FALSE(mirror.Fill(0, MirroredTile(1, 0, 4).tile)) << "what has come counts";
+  EXPECT_TRUE(mirror.Fill(0, MirroredTile(2, 0, 6).tile));
+  EXPECT_EQ(mirror.tiles().size(), 2U);
+  EXPECT_EQ(mirror.ChangesSince({}).changed.size(), 2U);
+  EXPECT_EQ(mirror.version(), 5U) << "a wire that brings nothing must be noticed";
+  EXPECT_FALSE(mirror.complete());
+  EXPECT_FALSE(mirror.Apply(MirroredTile(2, 0, 6))) << "it is here already";
+  EXPECT_EQ(mirror.version(), 6U);
+  EXPECT_TRUE(mirror.complete());
+  EXPECT_TRUE(mirror.Apply(MirroredTile(2, 0, 7, true)));
+  EXPECT_FALSE(mirror.Fill(0, MirroredTile(2, 0, 6).tile)) << "a removed tile does not come back";
+  EXPECT_EQ(mirror.tiles().size(), 1U);
+  EXPECT_TRUE(mirror.Apply(MirroredTile(1, 1, 8)));
+  EXPECT_FALSE(mirror.Fill(0, MirroredTile(3, 0, 7).tile)) << "of an epoch before";
+}
+
 // A mirror that lived through a restart of the server rejected every tile of the new one.
 TEST(TileMirror, AHigherGenerationStartsOver) {
   TileMirror mirror(kSite);

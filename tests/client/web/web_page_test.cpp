@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "client/lib/ros2_findings.h"
 #include "client/web/web_metrics.h"
 #include "common/map/image_codec.h"
 #include "tests/client/lib/fake_server.h"
@@ -157,6 +158,18 @@ TEST_F(Page, TilesArePicturesWithATagPerContentAndTheme) {
   EXPECT_EQ(page_->maps().open(), 1U) << "a site that the server does not know opens no map";
 }
 
+// All tiles of a large map come in seconds; a picture of it must not wait for them. The fake server never publishes
+// this tile, and answers it.
+TEST_F(Page, TheCoarsestTilesAreThereAtOnce) {
+  StartServer();
+  Open();
+  ASSERT_TRUE(KnowsSite());
+  EXPECT_EQ(Get("/api/sites/drawn/tiles/3/0/0.png").status, 200);
+  std::string piece;
+  EXPECT_TRUE(Get("/api/events", {{"site", "drawn"}}).stream(piece));
+  EXPECT_THAT(piece, HasSubstr("[3,0,0,1]"));
+}
+
 TEST_F(Page, TheEventsTellTheStateAndEachTileOnce) {
   StartServer();
   Open();
@@ -237,6 +250,50 @@ TEST_F(Page, SomebodySaysWhereARobotIs) {
     EXPECT_EQ(relocalise(body), 400) << body;
   const auto asked = server_->asked();
   EXPECT_EQ(std::count(asked.begin(), asked.end(), RequestKind::kRelocalise), 3);
+}
+
+TEST_F(Page, ARobotIsOnlyLocalisedOrMapsAgain) {
+  StartServer();
+  Open("secret");
+  ASSERT_TRUE(KnowsSite());
+  for (const char* mode : {"localise", "map"}) {
+    const std::string path = std::string("/api/robots/robot1/") + mode;
+    EXPECT_EQ(Post(path, "").status, 401);
+    EXPECT_EQ(Post(path, "secret").status, 200);
+    EXPECT_EQ(Post(std::string("/api/robots/nobody/") + mode, "secret").status, 404);
+  }
+  EXPECT_EQ(Post("/api/robots/robot1/fly", "secret").status, 404);
+  const auto asked = server_->asked();
+  EXPECT_EQ(std::count(asked.begin(), asked.end(), RequestKind::kLocalise), 2);
+  EXPECT_EQ(std::count(asked.begin(), asked.end(), RequestKind::kMap), 2);
+}
+
+TEST_F(Page, TheDoctorSaysWhatTheCommandLinePrints) {
+  Open();
+  EXPECT_EQ(json::parse(Get("/api/doctor").body)["ros2"], nullptr);
+  StartServer();
+  ASSERT_TRUE(KnowsSite());
+  const auto client = Must(client::QueryClient::Create(*bus_));
+  const std::string printed = client::FormatRos2(client::FindingsOf(Must(client->Ros2())));
+  json doctor;
+  ASSERT_TRUE(Eventually([&] { return !(doctor = json::parse(Get("/api/doctor").body))["ros2"].is_null(); }));
+  EXPECT_THAT(printed, HasSubstr(doctor["ros2"]["where"].get<std::string>() + "\n"));
+  ASSERT_EQ(doctor["ros2"]["namespaces"].size(), 1U);
+  const json& one = doctor["ros2"]["namespaces"][0];
+  EXPECT_THAT(printed, HasSubstr(one["name"].get<std::string>() + "  " + one["who"].get<std::string>() + ": NOT"));
+  ASSERT_EQ(one["problems"].size(), 1U);
+  EXPECT_THAT(printed, HasSubstr("  - " + one["problems"][0].get<std::string>() + "\n"));
+
+  // It is told to who looks as well, also where no site is looked at.
+  const HttpResponse events = Get("/api/events");
+  std::string said;
+  EXPECT_TRUE(Eventually([&] {
+    std::string piece;
+    EXPECT_TRUE(events.stream(piece));
+    said += piece;
+    return said.find("event: doctor") != std::string::npos;
+  }));
+  EXPECT_THAT(said, HasSubstr("no odometry"));
 }
 
 TEST_F(Page, WithoutATokenItIsReadOnly) {

@@ -1,13 +1,14 @@
 // cairn-study fleet measures a live server from outside: the time from scan to pose for fleets of simulated
 // robots, the longest delay while whole trajectories are smoothed, and logs that are streamed twenty times
-// faster than they were recorded, compared with the same logs offline. Times are wall-clock times, so no
-// other program should run on the machine.
+// faster than they were recorded, compared with the same logs offline, and joining late where the map is large. Times
+// are wall-clock times, so no other program should run on the machine.
 #include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <optional>
 
 #include "tests/real_log_path.h"
+#include "tests/studies/fleet/large_site.h"
 #include "tests/studies/fleet/live_server.h"
 #include "tests/studies/fleet/ros2_latency.h"
 #include "tests/studies/stopwatch.h"
@@ -223,11 +224,13 @@ void RunFleet(StudyContext& context) {
   if (context.Wants("pauses")) StudyPauses(context);
   if (context.Wants("replay")) StudyReplay(context);
   if (context.Wants("ros2")) StudyRos2Latency(context);
+  if (context.Wants("large-site")) StudyLargeSite(context);
 }
 
-const Registration kRegistered{
-    "fleet", "a live server: latency, pauses during jobs, logs at x20, the door for ROS 2 (--only latency ...)",
-    RunFleet};
+const Registration kRegistered{"fleet",
+                               "a live server: latency, pauses during jobs, logs at x20, the door for ROS 2, late to a "
+                               "large site (--only latency ...)",
+                               RunFleet};
 
 }  // namespace
 }  // namespace cairn::studies

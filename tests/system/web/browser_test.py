@@ -14,6 +14,8 @@ import subprocess
 import sys
 import tempfile
 import time
+import urllib.error
+import urllib.request
 
 from chromium import Page
 
@@ -71,9 +73,18 @@ class Programs:
         self.all.append(process)
         return process
 
-    def start_server(self):
+    def start_server(self, *options):
         return self.start("cairnd", "--state", os.path.join(self.work, "state"), "--set", "slam.particles=20",
-                          "--set", "jobs.nice=0")
+                          "--set", "jobs.nice=0", *options)
+
+    def start_web(self, page):
+        """The address of the page, which is opened."""
+        web = self.start("cairn-web", "--port", "0", f"--token={TOKEN}")
+        eventually("cairn-web prints its address", lambda: re.search(r"http://\S+", said_by(web)))
+        address = re.search(r"http://[0-9.:]+/", said_by(web)).group()
+        page.look(1180, 720, "light")
+        page.open(address)
+        return address
 
     def stop(self):
         for process in self.all:
@@ -111,13 +122,50 @@ def make_pictures(page, folder):
     shot("web-phone.png", 390, 800, "light")
 
 
+def begins_with(path, begins):
+    if not os.path.exists(path):
+        return False
+    with open(path, "rb") as file:
+        return file.read(len(begins)) == begins
+
+
+def status_of_post(address, path, token):
+    request = urllib.request.Request(address + path, data=b"{}", headers={
+        "Authorization": f"Bearer {token}", "Content-Type": "application/json"})
+    try:
+        with urllib.request.urlopen(request, timeout=30) as answer:
+            return answer.status
+    except urllib.error.HTTPError as error:
+        return error.code
+
+
+def change_the_mode(page, address):
+    """Of robot2, in the map that robot1 draws, with the keyboard."""
+    robot = "#robots [data-key=robot2]"
+    if page.text(f"{robot} .mode") != "Maps" or page.shows(f"{robot} .to-map"):
+        raise Failed(f"the mode of a robot that maps is '{page.text(f'{robot} .mode')}'")
+    for path, token, wanted in (("localise", "wrong", 401), ("map", "", 401), ("fly", TOKEN, 404)):
+        if status_of_post(address, f"api/robots/robot2/{path}", token) != wanted:
+            raise Failed(f"{path} with the token '{token}' is not answered {wanted}")
+    page.run(f"document.querySelector('{robot} .to-localise').focus()")
+    page.press_enter()
+    eventually("it is only localised", lambda: page.text(f"{robot} .mode").startswith("Only localised"))
+    if "only localised" not in page.text("#said"):
+        raise Failed(f"the page says '{page.text('#said')}' of it")
+    if page.shows(f"{robot} .to-localise"):
+        raise Failed("it can be localised twice")
+    eventually("the keyboard stays where the other mode is",
+               lambda: page.run(f"document.activeElement === document.querySelector('{robot} .to-map')"))
+    page.press_enter()
+    eventually("the page says something of the other mode", lambda: re.search("maps again|Not done", page.text("#said")))
+    if "robot2 maps again" not in page.text("#said"):
+        raise Failed(f"the page says '{page.text('#said')}'")
+    eventually("it maps again", lambda: page.text(f"{robot} .mode") == "Maps")
+
+
 def use_the_page(programs, page, pictures):
     server = programs.start_server()
-    web = programs.start("cairn-web", "--port", "0", f"--token={TOKEN}")
-    eventually("cairn-web prints its address", lambda: re.search(r"http://\S+", said_by(web)))
-    address = re.search(r"http://[0-9.:]+/", said_by(web)).group()
-    page.look(1180, 720, "light")
-    page.open(address)
+    address = programs.start_web(page)
     eventually("without a robot the page says what to do", lambda: "No site yet" in page.text("#map-empty"))
 
     programs.start(
@@ -181,13 +229,11 @@ def use_the_page(programs, page, pictures):
     state = "document.querySelector('#robots [data-key=robot1] .pill').innerText"
     eventually("and found", lambda: page.run(state) == "Tracking")
 
+    change_the_mode(page, address)
     for name, begins in (("hall.yaml", b"image: \"hall.png\"\n"), ("hall.png", b"\x89PNG")):
         page.click(f"#download-{name.split('.')[1]}")
         path = os.path.join(page.downloads, name)
-        eventually(f"{name} is downloaded", lambda: os.path.exists(path))
-        with open(path, "rb") as file:
-            if not file.read().startswith(begins):
-                raise Failed(f"{name} is no map")
+        eventually(f"{name} is downloaded", lambda: begins_with(path, begins))  # It is there before it is filled.
 
     # That the wrong token is refused was wanted, and a tile may be replaced while the page asks for it.
     refused = [(status, url) for status, url in page.refused if not (status == 401 and "/api/token" in url)
@@ -213,8 +259,9 @@ def use_the_page(programs, page, pictures):
         raise Failed(f"the page asks others: {outside}")
 
 
-def main():
-    binaries, pictures = sys.argv[1], sys.argv[2] if len(sys.argv) > 2 else None
+def run_in_browser(use):
+    """Calls use(programs, page) with a browser and a domain of their own; the exit code of the test."""
+    binaries = sys.argv[1]
     browser = shutil.which("chromium") or shutil.which("chromium-browser")
     if not browser:
         print("SKIPPED: there is no Chromium on this machine (deploy/install-packages.sh test)")
@@ -225,7 +272,7 @@ def main():
         page = None
         try:
             page = Page(browser, work)
-            use_the_page(programs, page, pictures)
+            use(programs, page)
             return 0
         except Exception as error:  # Whatever it is: what the programs said must be shown.
             print(f"FAILED: {error}")
@@ -241,4 +288,5 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    pictures_folder = sys.argv[2] if len(sys.argv) > 2 else None
+    sys.exit(run_in_browser(lambda programs, page: use_the_page(programs, page, pictures_folder)))

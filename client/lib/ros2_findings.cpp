@@ -1,0 +1,52 @@
+#include "client/lib/ros2_findings.h"
+
+#include <fmt/format.h>
+
+namespace cairn::client {
+namespace {
+
+std::string TopicText(const Ros2Topic& topic) {
+  return fmt::format("{} ({}): {} publisher{}, {}{}, {:.1f} Hz, {} received{}", topic.name, topic.type,
+                     topic.publishers, topic.publishers == 1 ? "" : "s", topic.reliable ? "reliable" : "best effort",
+                     topic.transient_local ? ", transient local" : "", topic.rate_hz, topic.received,
+                     topic.refused > 0 ? fmt::format(", {} refused", topic.refused) : "");
+}
+
+Ros2Findings::Namespace FindingsOf(const Ros2Namespace& one) {
+  Ros2Findings::Namespace findings;
+  findings.name = one.name;
+  findings.who = one.robot.empty() ? "no robot" : fmt::format("robot {} in site {}", one.robot, one.site);
+  findings.on_map = one.on_map;
+  findings.problems = one.problems;
+  for (const Ros2Topic& topic : one.topics) findings.topics.push_back(TopicText(topic));
+  return findings;
+}
+
+}  // namespace
+
+Ros2Findings FindingsOf(const Ros2Report& report) {
+  Ros2Findings findings;
+  findings.where = fmt::format("ROS 2 in DDS domain {}", report.door.domain);
+  findings.problems = report.door.problems;
+  for (const Ros2Namespace& one : report.namespaces) findings.namespaces.push_back(FindingsOf(one));
+  if (report.namespaces.empty()) {
+    findings.advice =
+        "no namespace publishes laser scans or odometry: is ROS_DOMAIN_ID the same, and is ros2.interfaces the address "
+        "of this server in the robots' network?";
+  }
+  return findings;
+}
+
+std::string FormatRos2(const Ros2Findings& findings) {
+  std::string text = findings.where + "\n";
+  for (const std::string& problem : findings.problems) text += fmt::format("! {}\n", problem);
+  if (!findings.advice.empty()) text += findings.advice + "\n";
+  for (const Ros2Findings::Namespace& one : findings.namespaces) {
+    text += fmt::format("{}  {}{}\n", one.name, one.who, one.on_map ? ": on the map" : ": NOT on the map");
+    for (const std::string& problem : one.problems) text += fmt::format("  - {}\n", problem);
+    for (const std::string& topic : one.topics) text += fmt::format("    {}\n", topic);
+  }
+  return text;
+}
+
+}  // namespace cairn::client

@@ -1,0 +1,47 @@
+// What the page reads.
+#include "client/web/web_json.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+namespace cairn::web {
+namespace {
+
+using nlohmann::json;
+
+json RobotOf(const Status& status) {
+  ServerView view;
+  view.status.robots.resize(1);
+  SessionState& session = view.status.robots[0].session;
+  session.robot = "r1";
+  session.site = "hall";
+  session.status = status;
+  return json::parse(StateJson(view, "hall", false)).at("robots").at(0);
+}
+
+TEST(WebJson, ARobotMapsOrIsOnlyLocalised) {
+  EXPECT_EQ(RobotOf({})["mode"], "map");
+  EXPECT_EQ(RobotOf({StatusCode::kOk, "only localised: nothing is drawn of it"})["mode"], "localise");
+  EXPECT_EQ(RobotOf({StatusCode::kOk, "a word of something else"})["mode"], "map");
+  EXPECT_EQ(RobotOf({StatusCode::kUnavailable, "stale: nothing arrives of laser"})["mode"], nullptr) << "nobody knows";
+}
+
+TEST(WebJson, TheDoctorsWordsAreNotChanged) {
+  ServerView view;
+  EXPECT_EQ(json::parse(DoctorJson(view)), json::parse(R"({"ros2": null, "strays": []})"));
+  Ros2Report report;
+  report.namespaces.resize(1);
+  report.namespaces[0].name = "/<b>\"r1\"&\xff";  // The page sets names as text; JSON needs valid UTF-8.
+  report.namespaces[0].problems = {"first", "second"};
+  view.ros2 = std::make_shared<const Ros2Report>(report);
+  view.strays = {{.robot = "r7", .dropped = 12, .why = "no session"}};
+  const json doctor = json::parse(DoctorJson(view));
+  EXPECT_EQ(doctor["ros2"]["namespaces"][0]["name"], "/<b>\"r1\"&\xef\xbf\xbd");
+  EXPECT_EQ(doctor["ros2"]["namespaces"][0]["problems"], (std::vector<std::string>{"first", "second"}));
+  EXPECT_EQ(doctor["strays"][0]["dropped"], 12);
+}
+
+}  // namespace
+}  // namespace cairn::web
