@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <map>
+#include <string>
 
 #include "server/slam/checkpoint.h"
 #include "server/store/envelope.h"
@@ -83,8 +85,21 @@ const auto kNameOf = [](const ::testing::TestParamInfo<const char*>& state) {
 };
 INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenState,
                          ::testing::Values("state-1", "state-1-checkpoints-8", "state-1-checkpoints-9",
-                                           "state-1-ended"),
+                                           "state-1-checkpoints-10", "state-1-ended"),
                          kNameOf);
+
+class GoldenEndedCheckpoint : public GoldenState {};
+INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenEndedCheckpoint, ::testing::Values("state-1-checkpoints-10"), kNameOf);
+
+TEST_P(GoldenEndedCheckpoint, TheEndIsRestoredFromTheCheckpointAlone) {
+  ASSERT_NO_FATAL_FAILURE(RemoveBeginnings());
+  StoredServer server(state());
+  std::map<std::string, SessionPhase> phases;
+  for (const RobotStatus& robot : server->Ask(About(RequestKind::kStatus, "")).robots)
+    phases[robot.session.robot] = robot.session.phase;
+  EXPECT_EQ(phases["robot1"], SessionPhase::kSuspended);
+  EXPECT_EQ(phases["robot2"], SessionPhase::kEnded);
+}
 
 class GoldenEnded : public GoldenState {};
 INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenEnded, ::testing::Values("state-1-ended"), kNameOf);
