@@ -13,6 +13,10 @@ std::string TagOf(const Tile& tile, Theme theme) {
          (theme == Theme::kDark ? "-d\"" : "-l\"");
 }
 
+tl::unexpected<Status> TooMany() {
+  return Fail(StatusCode::kResourceExhausted, "too many sites are looked at; try again in a minute");
+}
+
 }  // namespace
 
 Result<TilePicture> SiteMap::Picture(const TileKey& key, Theme theme, const std::string& known_etag) {
@@ -62,11 +66,12 @@ Result<std::shared_ptr<SiteMap>> SiteMaps::Open(const std::string& site, client:
   {
     const MutexLock lock(mutex_);
     if (auto map = Find(site)) return map;
+    if (!MakeRoom()) return TooMany();  // Before the server is asked.
   }
   auto coarsest = queries.Tiles({.site = site, .area = {}, .level = kPyramidLevels - 1});
   const MutexLock lock(mutex_);
   if (auto map = Find(site)) return map;  // Somebody else was faster.
-  if (!MakeRoom()) return Fail(StatusCode::kResourceExhausted, "too many sites are looked at; try again in a minute");
+  if (!MakeRoom()) return TooMany();
   auto map = client::MapClient::Create(bus_, site);
   if (!map) return tl::unexpected(map.error());
   auto opened = std::make_shared<SiteMap>(std::move(*map));

@@ -159,7 +159,10 @@ template <typename Give>
 std::optional<Answer> Desk::Order(const Request& request, const Give& give) {
   const auto receipt = std::make_shared<Receipt>([answers = answers_, request](bool taken) {
     answers->Send(
-        request, ReplyTo(request, taken ? Status{} : Status{StatusCode::kFailedPrecondition, "the session has ended"}));
+        request,
+        ReplyTo(request, taken ? Status{}
+                               : Status{StatusCode::kFailedPrecondition,
+                                        "the session has ended, or the robot's place in the map is not known"}));
   });
   const Result<void> given = give(receipt);
   if (given) return std::nullopt;

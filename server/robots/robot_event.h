@@ -60,7 +60,7 @@ struct EpochChange {
 };
 
 struct Finish {
-  bool final = true;
+  bool final = true;  // False: the server stops, or the end was asked for before.
   Status reason = {};
   std::function<void()> done;
 };

@@ -71,6 +71,10 @@ void RobotQueue::Push(StartRefused refused) {
   control_.push_back({next_++, std::move(refused)});
 }
 
+bool RobotQueue::PushAgain(Finish finish) {
+  return PushIfRoom(std::move(finish));
+}
+
 void RobotQueue::Push(Finish finish) {
   const MutexLock lock(mutex_);
   control_.push_back({next_++, std::move(finish)});

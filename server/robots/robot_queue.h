@@ -7,7 +7,8 @@
 //  - changes of the epoch: the newest stays, where two follow each other;
 //  - snapshots, and that the robot has to be found: refused while kMaxControl control events wait;
 //  - that the start is refused: never refused, asked once;
-//  - the end of the session: never refused. It is asked for once, and once more when the server stops.
+//  - the end of the session: never refused. It is asked for once, and once more when the server stops; whoever asks
+//    again waits for the first one, or is refused while kMaxControl control events wait.
 // Thread rule: any thread.
 #pragma once
 
@@ -38,6 +39,8 @@ class RobotQueue {
   bool Push(RelocaliseWanted wanted);
   bool Push(LocaliseWanted wanted);
   void Push(StartRefused refused);
+  // False where too many wait.
+  bool PushAgain(Finish finish);
   void Push(Finish finish);
 
   // The event that arrived first.

@@ -266,7 +266,7 @@ void Roster::Tick() {
   SendRefusals();
   RetireGone();
   const MutexLock lock(mutex_);
-  for (const auto& [id, session] : earlier_) session->SaveEnded();
+  for (const auto& [id, session] : earlier_) session->TickEnded(now);
   StoreQuiet();
   for (Ledger& ledger : unclaimed_.TakeChanged()) outbound_.Send(std::move(ledger));
   unclaimed_.ForgetSilent(UnclaimedStreams::Clock::now(), [this](const Ledger& ledger) CAIRN_REQUIRES(mutex_) {
@@ -308,8 +308,12 @@ void Roster::RetireGone() {
     if (successor == sessions_.end() && !gone->ending() && gone->record().phase() != SessionPhase::kEnded)
       gone->End({StatusCode::kResourceExhausted, "its robot stayed away, and its place was needed for another"});
     const bool works = gone->has_work();  // Before the Tick, which may schedule a checkpoint.
-    if (successor == sessions_.end()) gone->Tick();
-    if (gone->record().phase() != SessionPhase::kEnded || works) return false;
+    if (successor == sessions_.end()) {
+      gone->Tick();
+    } else {
+      gone->TickEnded(SessionRecord::Clock::now());
+    }
+    if (gone->record().phase() != SessionPhase::kEnded || works || gone->end_untold()) return false;
     const RobotStatus status = gone->record().snapshot().status;
     bool retired = true;
     const auto retire = [&](auto&& of) { retired = retired && outbound_.Send(Retired{std::move(of)}); };

@@ -201,7 +201,7 @@ void Session::Replayed() {
 
 void Session::SetCheckpointed(std::uint64_t position, std::uint64_t last) {
   pace_.RestoredFrom(position);
-  end_unsaved_ = record_.phase() == SessionPhase::kEnded && last > position;
+  end_unsaved_ = !failed_ && record_.phase() == SessionPhase::kEnded && last > position;
 }
 
 void Session::Tick() {
@@ -211,19 +211,19 @@ void Session::Tick() {
     unannounced_ = false;
     AnnounceState();
   }
-  if (end_untold_ && record_.EndedFor(now) > kDiskPatience) {
-    end_untold_ = false;
-    AnnounceState();
-  }
+  TickEnded(now);
   if (lost_ && !ending_) Schedule();  // The disk may work again, while nothing arrives from the robot.
-  SaveEnded();
   if (record_.LookForSilence(now)) state_unsent_ = true;
   if (state_unsent_) AnnounceState();
   PublishLedgers(SessionRecord::Urgency::kWhenDue);
 }
 
-void Session::SaveEnded() {
-  if (end_unsaved_ && !lost_) Schedule();
+void Session::TickEnded(SessionRecord::Clock::time_point now) {
+  if (end_untold_ && record_.EndedFor(now) > kDiskPatience) {
+    end_untold_ = false;
+    AnnounceState();
+  }
+  if (record_.phase() == SessionPhase::kEnded && (end_unsaved_ || lost_)) Schedule();
 }
 
 void Session::Finished(SessionPhase phase, Status status) {
@@ -350,8 +350,7 @@ void Session::Handle(RobotEvent&& event) {
   // What its status says of the robot's place may change with these.
   const bool changes_state = std::holds_alternative<StartRefused>(event) || std::holds_alternative<Correction>(event) ||
                              std::holds_alternative<LocaliseWanted>(event);
-  const bool changes_ended = std::holds_alternative<Finish>(event) || std::holds_alternative<Correction>(event) ||
-                             std::holds_alternative<EpochChange>(event);
+  const bool changes_ended = std::holds_alternative<Finish>(event) || std::holds_alternative<Correction>(event);
   if (!failed_ && !Throws([&] { estimator_.Handle(std::move(event)); })) {
     if (changes_state) state_unsent_ = true;
     if (changes_ended && outputs_.checkpoint && record_.phase() == SessionPhase::kEnded) end_unsaved_ = true;

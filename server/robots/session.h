@@ -92,9 +92,10 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   }
   // Its newest checkpoint, and the last entry of its journal. REQUIRES: nothing was taken yet.
   void SetCheckpointed(std::uint64_t position, std::uint64_t last);
-  // An ended session takes a checkpoint after its end and after each switch of the map, or its journal would grow with
-  // every switch. Takes the one that could not be taken yet.
-  void SaveEnded();
+  // What is still to be done for one that has ended: its end is announced also where the disk is slow, and it takes the
+  // checkpoint that could not be taken yet. It takes one after its end and after each switch of the map, or its journal
+  // would grow with every switch.
+  void TickEnded(SessionRecord::Clock::time_point now);
   // Publishes ledgers that are due and whatever could not be sent before.
   void Tick();
 
@@ -105,8 +106,10 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   [[nodiscard]] bool ending() const { return ending_; }
   // Busy while an event is being handled; while it waits for a thread of the pool it does not count as busy.
   [[nodiscard]] Pulse pulse() const { return {handled_, handling_}; }
-  // Events wait or are being handled, or the end is not announced yet.
-  [[nodiscard]] bool has_work() const { return scheduled_ || end_untold_; }
+  // Events wait or are being handled.
+  [[nodiscard]] bool has_work() const { return scheduled_; }
+  // It has ended, which is not announced yet.
+  [[nodiscard]] bool end_untold() const { return end_untold_; }
 
   static constexpr int kEventsPerTurn = 8;  // After so many, the pool may do other work first.
 

@@ -276,12 +276,11 @@ void SessionEstimator::On(LocaliseWanted&& wanted) {
     wanted.map->tiles.ForEach(0, [&taken](const std::shared_ptr<const Tile>& tile) { taken.tiles.push_back(tile); });
   }
   Store(taken);
-  if (wanted.receipt) wanted.receipt->Taken();
-  On(std::move(taken));
+  if (Localise(std::move(taken)) && wanted.receipt) wanted.receipt->Taken();
 }
 
 // In a map that can not be read or is too large, the robot is not found.
-void SessionEstimator::On(LocaliseTaken&& taken) {
+bool SessionEstimator::Localise(LocaliseTaken&& taken) {
   std::shared_ptr<const slam::KnownGrid> map;
   if (!taken.maps_again) {
     slam::KnownGrid::Source source{{}, taken.resolution_m, taken.epoch};
@@ -295,9 +294,12 @@ void SessionEstimator::On(LocaliseTaken&& taken) {
         std::make_shared<const slam::KnownGrid>(std::move(source), options_.recovery.place, options_.self_check.near_m);
   }
   // A robot that can not map again, because its place is not known or it is not joined, is localised on.
-  if (map != nullptr || !fragment_) static_cast<void>(pipeline_.mapper().LocaliseIn(std::move(map), !fragment_));
+  const bool begins = map != nullptr && !pipeline_.mapper().localises();
+  const bool done = (map != nullptr || !fragment_) && pipeline_.mapper().LocaliseIn(std::move(map), !fragment_);
+  if (begins) record_.LoseLast();  // It has to be found in the map: until then it cannot map again either.
   record_.SetLocalises(pipeline_.mapper().localises());
   T_map_keyframe_.reset();
+  return done;
 }
 
 void SessionEstimator::On(StartRefused&& refused) {

@@ -103,7 +103,8 @@ class SessionEstimator {
   void On(SnapshotWanted&& wanted);
   void On(RelocaliseWanted&& wanted);
   void On(LocaliseWanted&& wanted);
-  void On(LocaliseTaken&& taken);
+  // False if it cannot map again, because its place is not known or it is not joined with the map.
+  bool Localise(LocaliseTaken&& taken);
   void On(StartRefused&& refused);
   void On(Finish&& finish);
   void Used(const Scan& scan, const slam::ScanOutcome& outcome);

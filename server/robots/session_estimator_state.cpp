@@ -70,7 +70,7 @@ void SessionEstimator::Replay(JournalEntry&& entry, const Switched& switched) {
   } else if (const auto* const relocalise = std::get_if<RelocaliseTaken>(&entry)) {
     On(RelocaliseWanted{relocalise->T_map_robot});
   } else if (auto* const localise = std::get_if<LocaliseTaken>(&entry)) {
-    On(std::move(*localise));
+    static_cast<void>(Localise(std::move(*localise)));
   } else if (auto* const refusal = std::get_if<StartRefusal>(&entry)) {
     On(StartRefused{std::move(refusal->why)});
   } else if (const auto* const finished = std::get_if<SessionFinished>(&entry)) {

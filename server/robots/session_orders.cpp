@@ -29,7 +29,11 @@ void Session::End(const Status& reason, std::shared_ptr<Receipt> receipt) {
     if (first) self->Finished(SessionPhase::kEnded, reason);
     if (receipt && self->record_.phase() == SessionPhase::kEnded) receipt->Taken();
   };
-  queue_.Push(std::move(finish));
+  if (first) {
+    queue_.Push(std::move(finish));
+  } else if (!queue_.PushAgain(std::move(finish))) {
+    return;  // The receipt says that it was not taken.
+  }
   Schedule();
 }
 

@@ -57,16 +57,16 @@ void CommandCalls::Ask(std::uint64_t asker, Request&& request, Done done, Clock:
 }
 
 bool CommandCalls::Take(const Reply& reply) {
-  if (reply.client != client_) return false;
+  if (!IsOwn(reply)) return false;
   const MutexLock lock(mutex_);
   const auto found = calls_.find(reply.sequence);
   if (found == calls_.end()) return true;  // Too late.
   Call& call = found->second;
+  call.answered = reply.last;  // First: also where memory is short, nobody waits in vain.
   call.reply.status = reply.status;
   Append(reply.robots, call.reply.robots);
   Append(reply.jobs, call.reply.jobs);
   Append(reply.saved, call.reply.saved);
-  call.answered = reply.last;
   return true;
 }
 

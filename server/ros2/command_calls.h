@@ -32,6 +32,7 @@ class CommandCalls {
   void Ask(std::uint64_t asker, Request&& request, Done done, Clock::time_point now) CAIRN_EXCLUDES(mutex_);
   // Whether the reply is to one of these commands: then it is nobody else's.
   [[nodiscard]] bool Take(const Reply& reply) CAIRN_EXCLUDES(mutex_);
+  [[nodiscard]] bool IsOwn(const Reply& reply) const noexcept { return reply.client == client_; }
   // Tells those who wait for what has been answered. They may ask again.
   void Tick(Clock::time_point now) CAIRN_EXCLUDES(mutex_);
 

@@ -1,6 +1,7 @@
 // The requests for the map of a site that wait for the thread of the maps. Bounded: at most kMost wait, and at most
-// kMostOfOne of one participant (as many again while a turn is under way); a further one is not taken. One turn answers
-// no more cells than one message may have (but at least one request), so that nobody keeps the thread busy with maps. A
+// kMostOfOne of one participant (as many again while a turn is under way); a further one is not taken. One turn ends
+// with the map after which it has answered as many cells as one message may have, so that nobody keeps the thread busy
+// with maps. A
 // request whose answer cannot be delivered yet waits for a later turn, until its deadline. Thread rule: Add from any
 // thread, the rest from one.
 #pragma once

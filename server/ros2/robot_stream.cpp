@@ -172,6 +172,8 @@ void RobotStream::TakeStart(const ros2::PoseWithCovariance& message, Clock::time
 }
 
 void RobotStream::BeginAnew() {
+  // One that could not be ended is left, as with a start.
+  if (phase_ == Phase::kOpen) Push(ClientLiveliness{client_, robot_id_, false});
   phase_ = Phase::kWaiting;
   client_ = 0;
   start_.reset();

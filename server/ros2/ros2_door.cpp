@@ -47,9 +47,10 @@ Ros2Door::Ros2Door(const Ros2Options& options, NamespaceRules rules, std::unique
 
 // A value that is not seen because memory is short counts as one that was not published; the server goes on.
 bool Ros2Door::See(const OutboundValue& value) {
-  bool own = false;
+  const auto* const reply = std::get_if<Reply>(&value);
+  const bool own = reply != nullptr && services_.IsOwn(*reply);
   static_cast<void>(unseen_.Guard([&] {
-    own = services_.Take(value);
+    services_.Take(value);
     if (own) return;
     ingress_.Take(value);
     egress_.See(value);
@@ -65,13 +66,12 @@ Ros2Door::~Ros2Door() {
 void Ros2Door::Start() {
   egress_.Start();
   thread_ = std::jthread([this](const std::stop_token& stop) {
-    bus_->Run(
-        stop,
-        [this] {
-          ingress_.Tick(Ros2Ingress::Clock::now());
-          services_.Tick(Ros2Services::Clock::now());
-        },
-        kTickPeriod, [this](const std::exception& error) { failures_.Count(error); });
+    const auto tick = [this] {
+      ingress_.Tick(Ros2Ingress::Clock::now());
+      services_.Tick(Ros2Services::Clock::now());
+    };
+    static_cast<void>(failures_.Guard(tick));  // Requests have come while sessions were restored.
+    bus_->Run(stop, tick, kTickPeriod, [this](const std::exception& error) { failures_.Count(error); });
   });
 }
 

@@ -42,6 +42,11 @@ Stamp WallClock() {
 }  // namespace
 
 void Ros2Egress::News::MakeNewer(News&& newer) {
+  if (newer.gone) {
+    gone = true;
+    info.reset();
+    tiles.clear();
+  }
   if (newer.info) info = std::move(newer.info);
   for (auto tile = newer.tiles.begin(); tile != newer.tiles.end();) {
     const auto next = std::next(tile);
@@ -85,9 +90,16 @@ void Ros2Egress::See(const OutboundValue& value) {
   }
   const auto* const info = std::get_if<MapInfo>(&value);
   const auto* const tile = std::get_if<TileSample>(&value);
-  if (info == nullptr && (tile == nullptr || tile->tile.key.level != 0)) return;
+  const auto* const retired = std::get_if<Retired>(&value);
+  const auto* const gone = retired != nullptr ? std::get_if<MapInfo>(&retired->of) : nullptr;
+  if (info == nullptr && gone == nullptr && (tile == nullptr || tile->tile.key.level != 0)) return;
   const MutexLock lock(news_mutex_);
   if (finished_) return;
+  if (gone != nullptr) {
+    News news;
+    news.gone = true;
+    news_.insert_or_assign(gone->site_id, std::move(news));
+  }
   if (info != nullptr) news_[info->site_id].info = *info;
   if (tile != nullptr) news_[tile->site_id].tiles.insert_or_assign(tile->tile.key, *tile);
 }
@@ -182,7 +194,7 @@ void Ros2Egress::TakeNews() {
     // Tiles wait until the name of their site is known. Whole nodes move, which needs no memory.
     for (auto one = news_.begin(); one != news_.end();) {
       const auto next = std::next(one);
-      if (one->second.info || sites_.contains(one->first)) {
+      if (one->second.gone || one->second.info || sites_.contains(one->first)) {
         auto node = news_.extract(one);
         if (const auto older = taken_.find(node.key()); older != taken_.end()) {
           older->second.MakeNewer(std::move(node.mapped()));
@@ -195,7 +207,12 @@ void Ros2Egress::TakeNews() {
     if (finished_) news_.clear();
   }
   while (!taken_.empty()) {
-    const auto& [site_id, one] = *taken_.begin();
+    auto& [site_id, one] = *taken_.begin();
+    if (std::exchange(one.gone, false)) sites_.erase(site_id);
+    if (!one.info && !sites_.contains(site_id)) {
+      taken_.erase(taken_.begin());
+      continue;
+    }
     Site& site = SiteOf(site_id, one.info.value_or(MapInfo{}));
     if (one.info) site.grid.Take(*one.info);
     auto& tiles = taken_.begin()->second.tiles;

@@ -63,6 +63,7 @@ class Ros2Egress {
   };
   // What waits for the thread of the maps.
   struct News {
+    bool gone = false;  // The site was deleted, before what follows.
     std::optional<MapInfo> info;
     std::map<TileKey, TileSample> tiles;
 

@@ -171,8 +171,9 @@ void Ros2Services::Delete(const std::string& site, int tries, const Asked<ros2::
         spdlog::info("ROS 2: site {} {}", site,
                      reply.status.ok() ? "is reset" : "is not reset: " + reply.status.message);
         if (const auto found = sites_.find(HashName(site)); found != sites_.end()) found->second.paused = false;
-        doors_.begin_anew(site);  // Also where it failed: their sessions have ended.
+        doors_.begin_anew(site);  // Also where it failed: sessions have ended.
         Answer(asked, {reply.status.ok() ? ros2::Reset::kSuccess : ros2::Reset::kFailure});
+        lingering_.push_back({now_ + kAnswerWaits, asked.answers});
       },
       now_);
 }

@@ -21,38 +21,54 @@ Ros2Services::Ros2Services(ros2::Bus& bus, const Ros2Options& options, const Ser
   if (options_.commands && abilities_.keeps_sites) OfferLoad();
 }
 
-bool Ros2Services::Take(const OutboundValue& value) {
-  if (const auto* const reply = std::get_if<Reply>(&value)) return commands_.Take(*reply);
-  if (const auto* const info = std::get_if<MapInfo>(&value)) {
+void Ros2Services::Take(const OutboundValue& value) {
+  if (const auto* const reply = std::get_if<Reply>(&value)) {
+    static_cast<void>(commands_.Take(*reply));
+  } else if (const auto* const info = std::get_if<MapInfo>(&value)) {
     const MutexLock lock(news_mutex_);
     news_.insert_or_assign(info->site_id, info->site);
   } else if (const auto* const retired = std::get_if<Retired>(&value)) {
     const auto* const gone = std::get_if<MapInfo>(&retired->of);
-    if (gone == nullptr) return false;
+    if (gone == nullptr) return;
     const MutexLock lock(news_mutex_);
     news_.insert_or_assign(gone->site_id, std::nullopt);
   }
-  return false;
 }
 
 void Ros2Services::Tick(Clock::time_point now) {
   now_ = now;
-  std::map<NameId, std::optional<std::string>> news;
-  {
-    const MutexLock lock(news_mutex_);
-    news.swap(news_);
-  }
-  for (const auto& [site_id, name] : news) {
+  while (auto news = NextNews()) {
+    const auto& [site_id, name] = *news;
     if (name) {
       OpenSite(site_id, *name);
-    } else if (const auto gone = sites_.find(site_id); gone != sites_.end()) {
-      for (const auto& endpoint : gone->second.endpoints) ended_refused_ += endpoint->refused();
-      sites_.erase(gone);
+    } else {
+      EndSite(site_id);
     }
   }
   commands_.Tick(now);
   SendLater();
+  std::erase_if(lingering_, [now](const Lingering& one) { return one.until < now; });
   CountMalformed();
+}
+
+// One at a time: where an exception comes between, the others are there at the next Tick.
+std::optional<std::pair<NameId, std::optional<std::string>>> Ros2Services::NextNews() {
+  const MutexLock lock(news_mutex_);
+  if (news_.empty()) return std::nullopt;
+  auto node = news_.extract(news_.begin());
+  return std::pair(node.key(), std::move(node.mapped()));
+}
+
+void Ros2Services::EndSite(NameId site_id) {
+  const auto gone = sites_.find(site_id);
+  if (gone == sites_.end()) return;
+  for (const auto& endpoint : gone->second.endpoints) ended_refused_ += endpoint->refused();
+  const std::string topic_part = gone->second.topic_part;
+  sites_.erase(gone);
+  // Another one may have waited for the name.
+  for (auto& [other_id, other] : sites_) {
+    if (other.topic_part == topic_part) return OfferAll(other_id, other);
+  }
 }
 
 void Ros2Services::Close() {
@@ -60,6 +76,7 @@ void Ros2Services::Close() {
   of_server_.clear();
   sites_.clear();
   undelivered_.clear();
+  lingering_.clear();
 }
 
 void Ros2Services::CountMalformed() {
@@ -92,11 +109,15 @@ void Ros2Services::OpenSite(NameId site_id, const std::string& name) {
   if (taken) {
     spdlog::warn("ROS 2: site {} has no services, because another site is '{}' there too", name, site.topic_part);
   } else {
-    OfferMap(site_id, "/" + site.topic_part + "/dynamic_map", site.endpoints);
-    OfferMap(site_id, "/" + site.topic_part + "/map", site.endpoints);
-    if (options_.commands) OfferCommands(site_id, site);
+    OfferAll(site_id, site);
   }
   sites_.emplace(site_id, std::move(site));
+}
+
+void Ros2Services::OfferAll(NameId site_id, Site& site) {
+  OfferMap(site_id, "/" + site.topic_part + "/dynamic_map", site.endpoints);
+  OfferMap(site_id, "/" + site.topic_part + "/map", site.endpoints);
+  if (options_.commands) OfferCommands(site_id, site);
 }
 
 void Ros2Services::OfferMap(NameId site_id, const std::string& service, Endpoints& endpoints) {

@@ -14,6 +14,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/mutex.h"
@@ -42,15 +43,16 @@ class Ros2Services {
   struct Doors {
     // Passes a request for a map on; false if there is no room for it.
     std::function<bool(MapWish&&)> want_map;
-    // The robots of this site whose sessions have ended open new ones.
+    // The robots of this site open new sessions.
     std::function<void(const std::string& site)> begin_anew;
   };
 
   Ros2Services(ros2::Bus& bus, const Ros2Options& options, const ServerAbilities& abilities, Inbound& inbound,
                Doors doors);
 
-  // Whether the value is the answer to a command of these services: then it is nobody else's.
-  [[nodiscard]] bool Take(const OutboundValue& value) CAIRN_EXCLUDES(news_mutex_);
+  // Whether this is the answer to a command of these services: then it is nobody else's.
+  [[nodiscard]] bool IsOwn(const Reply& reply) const noexcept { return commands_.IsOwn(reply); }
+  void Take(const OutboundValue& value) CAIRN_EXCLUDES(news_mutex_);
   void Tick(Clock::time_point now) CAIRN_EXCLUDES(news_mutex_);
   // Ends all services. REQUIRES: the bus does not run.
   void Close();
@@ -85,7 +87,10 @@ class Ros2Services {
     bool all = true;
   };
 
+  [[nodiscard]] std::optional<std::pair<NameId, std::optional<std::string>>> NextNews() CAIRN_EXCLUDES(news_mutex_);
   void OpenSite(NameId site_id, const std::string& name);
+  void EndSite(NameId site_id);
+  void OfferAll(NameId site_id, Site& site);
   void OfferMap(NameId site_id, const std::string& service, Endpoints& endpoints);
   void OfferCommands(NameId site_id, Site& site);
   void OfferLoad();
@@ -119,13 +124,19 @@ class Ros2Services {
   CommandCalls commands_;
   Endpoints of_server_;
   std::map<NameId, Site> sites_;
-  Clock::time_point now_{};
+  Clock::time_point now_{};  // Of the last Tick; the first one comes before the first request.
   // Answers that nobody reads yet; each says whether it has been sent.
   struct Undelivered {
     Clock::time_point deadline;
     std::function<bool()> send;
   };
   std::list<Undelivered> undelivered_;
+  // Writers of answers that may have to be sent again, although their service is gone.
+  struct Lingering {
+    Clock::time_point until;
+    std::shared_ptr<const void> writer;
+  };
+  std::list<Lingering> lingering_;
   std::uint64_t ended_refused_ = 0;  // Of endpoints that are gone.
   std::atomic<std::uint64_t> overflow_{0}, malformed_{0}, unanswered_{0};
 

@@ -58,23 +58,25 @@ class MessageReader final : public Reader {
   }
 
   Result<void> Open(const std::string& name, const Qos& wanted) {
-    const Result<fd::Topic*> topic = participant_->TopicFor(name, type_);
+    auto topic = participant_->TopicFor(name, type_);
     if (!topic) return tl::unexpected(topic.error());
+    topic_ = *std::move(topic);
     fd::DataReaderQos qos;
     SetCommon(wanted, qos);
     qos.reliable_reader_qos().times.heartbeatResponseDelay = Duration_t(0.001);
     SetUserData(qos.user_data(), std::string("typehash=RIHS01_") + MessageType<Message>::kHash + ";");
     const MutexLock lock(participant_->endpoints());
-    reader_ = participant_->subscriber()->create_datareader(*topic, qos, this);
+    reader_ = participant_->subscriber()->create_datareader(topic_.get(), qos, this);
     if (reader_ == nullptr) return tl::unexpected(Broken("a reader of " + name));
     participant_->ready().Add(this);  // What came before the pointer was there.
     return {};
   }
 
-  void TakeAll() override {
+  bool TakeAll() override {
     wire::Sample<Wire> sample;
     fd::SampleInfo info;
-    while (reader_->take_next_sample(&sample, &info) == ReturnCode_t::RETCODE_OK) {
+    for (int taken = 0; taken < kMostAtOnce; ++taken) {
+      if (reader_->take_next_sample(&sample, &info) != ReturnCode_t::RETCODE_OK) return false;
       if (!info.valid_data) continue;
       Result<Message> message = sample.decoding == wire::Decoding::kDecoded
                                     ? FromWire(std::move(sample.value))
@@ -86,6 +88,7 @@ class MessageReader final : public Reader {
       on_message_(*std::move(message), {IdOf(info.sample_identity.writer_guid()),
                                         static_cast<std::int64_t>(info.sample_identity.sequence_number().to64long())});
     }
+    return true;
   }
 
   std::uint64_t refused() const override { return refused_.load(std::memory_order_relaxed); }
@@ -97,6 +100,7 @@ class MessageReader final : public Reader {
   const OnMessage on_message_;
   const fd::TypeSupport type_{new typename MessageType<Message>::Type()};
   std::atomic<std::uint64_t> refused_{0};
+  TopicUse topic_;  // Until the reader is deleted.
   fd::DataReader* reader_ = nullptr;
 };
 
@@ -113,8 +117,9 @@ class MessageWriter final : public Publication<Message> {
   }
 
   Result<void> Open(const std::string& name, const Qos& wanted) {
-    const Result<fd::Topic*> topic = participant_->TopicFor(name, type_);
+    auto topic = participant_->TopicFor(name, type_);
     if (!topic) return tl::unexpected(topic.error());
+    topic_ = *std::move(topic);
     fd::DataWriterQos qos;
     SetCommon(wanted, qos);
     qos.publish_mode().kind = fd::SYNCHRONOUS_PUBLISH_MODE;
@@ -124,7 +129,7 @@ class MessageWriter final : public Publication<Message> {
     times.nackResponseDelay = Duration_t(0.002);
     SetUserData(qos.user_data(), std::string("typehash=RIHS01_") + MessageType<Message>::kHash + ";");
     const MutexLock lock(participant_->endpoints());
-    writer_ = participant_->publisher()->create_datawriter(*topic, qos);
+    writer_ = participant_->publisher()->create_datawriter(topic_.get(), qos);
     if (writer_ == nullptr) return tl::unexpected(Broken("a writer of " + name));
     return {};
   }
@@ -145,6 +150,7 @@ class MessageWriter final : public Publication<Message> {
  private:
   const std::shared_ptr<Participant> participant_;
   const fd::TypeSupport type_{new typename MessageType<Message>::Type()};
+  TopicUse topic_;  // Until the writer is deleted.
   fd::DataWriter* writer_ = nullptr;
 };
 
@@ -159,7 +165,9 @@ class DdsBus final : public Bus {
     auto next = std::chrono::steady_clock::now();
     while (!stop.stop_requested()) {
       Reader* const reader = participant_->ready().Next(stop, next);
-      if (reader != nullptr && !Try([reader] { reader->TakeAll(); }, failed)) participant_->ready().Add(reader);
+      bool more = true;  // Also where an exception comes between.
+      if (reader != nullptr) static_cast<void>(Try([&] { more = reader->TakeAll(); }, failed));
+      if (reader != nullptr && more) participant_->ready().Add(reader);
       if (std::chrono::steady_clock::now() < next) continue;
       static_cast<void>(Try(tick, failed));
       next = std::chrono::steady_clock::now() + period;

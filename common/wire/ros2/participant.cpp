@@ -33,20 +33,38 @@ Result<std::shared_ptr<Participant>> Participant::Create(const WireOptions& opti
   return made;
 }
 
-Result<fd::Topic*> Participant::TopicFor(const std::string& name, const fd::TypeSupport& type) {
+TopicUse::~TopicUse() {
+  if (participant_ != nullptr) participant_->EndUse(topic_);
+}
+
+Result<TopicUse> Participant::TopicFor(const std::string& name, const fd::TypeSupport& type) {
   const MutexLock lock(mutex_);
   if (const auto known = topics_.find(name); known != topics_.end()) {
-    if (known->second->get_type_name() == type.get_type_name()) return known->second;
-    return Fail(StatusCode::kFailedPrecondition, name + " is in use with another type");
+    if (known->second.topic->get_type_name() != type.get_type_name())
+      return Fail(StatusCode::kFailedPrecondition, name + " is in use with another type");
+    ++known->second.uses;
+    return TopicUse(*this, known->second.topic);
   }
   if (participant_->find_type(type.get_type_name()).empty() &&
       type.register_type(participant_) != ReturnCode_t::RETCODE_OK) {
     return tl::unexpected(Broken("type " + type.get_type_name()));
   }
-  fd::Topic* const topic = participant_->create_topic(name, type.get_type_name(), fd::TOPIC_QOS_DEFAULT);
-  if (topic == nullptr) return tl::unexpected(Broken("topic " + name));
-  topics_.emplace(name, topic);
-  return topic;
+  UsedTopic& used = topics_[name];
+  used.topic = participant_->create_topic(name, type.get_type_name(), fd::TOPIC_QOS_DEFAULT);
+  if (used.topic == nullptr) {
+    topics_.erase(name);
+    return tl::unexpected(Broken("topic " + name));
+  }
+  used.uses = 1;
+  return TopicUse(*this, used.topic);
+}
+
+void Participant::EndUse(fd::Topic* topic) {
+  const MutexLock lock(mutex_);
+  const auto used = topics_.find(topic->get_name());
+  if (used == topics_.end() || --used->second.uses > 0) return;
+  topics_.erase(used);
+  participant_->delete_topic(topic);
 }
 
 }  // namespace cairn::ros2

@@ -16,6 +16,7 @@
 #include <memory>
 #include <numeric>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/mutex.h"
@@ -101,7 +102,30 @@ class ReadyReaders {
 // the sample is then lost, and the rest stays.
 class Reader : public Subscription, protected fd::DataReaderListener {
  public:
-  virtual void TakeAll() = 0;
+  // Whether it stopped after kMostAtOnce samples, with more to take: others have their turn before.
+  [[nodiscard]] virtual bool TakeAll() = 0;
+  static constexpr int kMostAtOnce = 64;
+};
+
+class Participant;
+
+// An endpoint's use of a topic, which is deleted with its last use. Outlived by the participant.
+class TopicUse {
+ public:
+  TopicUse() = default;
+  TopicUse(Participant& participant, fd::Topic* topic) : participant_(&participant), topic_(topic) {}
+  TopicUse(TopicUse&& other) noexcept { *this = std::move(other); }
+  TopicUse& operator=(TopicUse&& other) noexcept {
+    std::swap(participant_, other.participant_);
+    std::swap(topic_, other.topic_);
+    return *this;
+  }
+  ~TopicUse();
+  [[nodiscard]] fd::Topic* get() const { return topic_; }
+
+ private:
+  Participant* participant_ = nullptr;
+  fd::Topic* topic_ = nullptr;
 };
 
 // The participant and its topics. Endpoints keep it alive.
@@ -113,9 +137,8 @@ class Participant {
   Participant& operator=(const Participant&) = delete;
   [[nodiscard]] static Result<std::shared_ptr<Participant>> Create(const WireOptions& options, const std::string& name);
 
-  // A topic belongs to the endpoint that asked for it first, and stays: there are as many as names in use.
-  [[nodiscard]] Result<fd::Topic*> TopicFor(const std::string& name, const fd::TypeSupport& type)
-      CAIRN_EXCLUDES(mutex_);
+  // The topic of this name. FAILED_PRECONDITION: it is in use with another type.
+  [[nodiscard]] Result<TopicUse> TopicFor(const std::string& name, const fd::TypeSupport& type) CAIRN_EXCLUDES(mutex_);
 
   fd::Publisher* publisher() const { return publisher_; }
   fd::Subscriber* subscriber() const { return subscriber_; }
@@ -136,7 +159,13 @@ class Participant {
   ReadyReaders ready_;
   Mutex endpoints_;
   Mutex mutex_;
-  std::map<std::string, fd::Topic*> topics_ CAIRN_GUARDED_BY(mutex_);
+  friend class TopicUse;
+  void EndUse(fd::Topic* topic) CAIRN_EXCLUDES(mutex_);
+  struct UsedTopic {
+    fd::Topic* topic = nullptr;
+    int uses = 0;
+  };
+  std::map<std::string, UsedTopic> topics_ CAIRN_GUARDED_BY(mutex_);
   fd::DomainParticipant* participant_ = nullptr;
   fd::Publisher* publisher_ = nullptr;
   fd::Subscriber* subscriber_ = nullptr;

@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <atomic>
+#include <exception>
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <set>
 #include <string>
+#include <type_traits>
 #include <utility>
 
 #include "common/mutex.h"
@@ -21,7 +23,8 @@ using eprosima::fastrtps::types::ReturnCode_t;
 
 // Requests that may wait for the thread of the bus, and answers that may wait for a reader that is slow.
 constexpr Qos kRequestQos{.reliable = true, .transient_local = false, .depth = 64};
-constexpr Qos kAnswerQos{.reliable = true, .transient_local = false, .depth = 10};
+constexpr int kAnswers = 10;
+constexpr int kAnswersWithMaps = 2;  // Each may have megabytes.
 
 std::string UserData(const char* hash) {
   return std::string("typehash=RIHS01_") + hash + ";";
@@ -62,23 +65,25 @@ class RequestReader final : public Reader {
 
   Result<void> Open(const std::string& service) {
     const std::string name = "rq" + service + "Request";
-    const Result<fd::Topic*> topic = participant_->TopicFor(name, type_);
+    auto topic = participant_->TopicFor(name, type_);
     if (!topic) return tl::unexpected(topic.error());
+    topic_ = *std::move(topic);
     fd::DataReaderQos qos;
     SetCommon(kRequestQos, qos);
     qos.reliable_reader_qos().times.heartbeatResponseDelay = Duration_t(0.001);
     SetUserData(qos.user_data(), UserData(ServiceType<S>::kRequestHash));
     const MutexLock lock(participant_->endpoints());
-    reader_ = participant_->subscriber()->create_datareader(*topic, qos, this);
+    reader_ = participant_->subscriber()->create_datareader(topic_.get(), qos, this);
     if (reader_ == nullptr) return tl::unexpected(Broken("a reader of " + name));
     participant_->ready().Add(this);  // What came before the pointer was there.
     return {};
   }
 
-  void TakeAll() override {
+  bool TakeAll() override {
     RequestBytes sample;
     fd::SampleInfo info;
-    while (reader_->take_next_sample(&sample, &info) == ReturnCode_t::RETCODE_OK) {
+    for (int taken = 0; taken < kMostAtOnce; ++taken) {
+      if (reader_->take_next_sample(&sample, &info) != ReturnCode_t::RETCODE_OK) return false;
       if (!info.valid_data) continue;
       Caller caller = CallerOf(info);
       auto request = DecodeRequest<S>(sample.bytes, caller);
@@ -88,6 +93,7 @@ class RequestReader final : public Reader {
         refused_.fetch_add(1, std::memory_order_relaxed);
       }
     }
+    return true;
   }
 
   std::uint64_t refused() const override { return refused_.load(std::memory_order_relaxed); }
@@ -99,6 +105,7 @@ class RequestReader final : public Reader {
   const OnRequest on_request_;
   const fd::TypeSupport type_{new RequestType<S>()};
   std::atomic<std::uint64_t> refused_{0};
+  TopicUse topic_;  // Until the reader is deleted.
   fd::DataReader* reader_ = nullptr;
 };
 
@@ -121,8 +128,11 @@ class MatchedReaders final : public fd::DataWriterListener {
     const MutexLock lock(mutex_);
     if (status.current_count_change < 0) {
       readers_.erase(reader);
-    } else {
+      return;
+    }
+    try {  // No exception may reach the middleware. A reader that is not remembered gets no answer, and asks again.
       readers_.insert(reader);
+    } catch (const std::exception&) {
     }
   }
 
@@ -142,10 +152,12 @@ class AnswerWriter final : public Answers<S> {
 
   Result<void> Open(const std::string& service) {
     const std::string name = "rr" + service + "Reply";
-    const Result<fd::Topic*> topic = participant_->TopicFor(name, type_);
+    auto topic = participant_->TopicFor(name, type_);
     if (!topic) return tl::unexpected(topic.error());
+    topic_ = *std::move(topic);
     fd::DataWriterQos qos;
-    SetCommon(kAnswerQos, qos);
+    constexpr bool kHasMap = std::is_same_v<S, GetMap> || std::is_same_v<S, LoadMap>;
+    SetCommon({.reliable = true, .transient_local = false, .depth = kHasMap ? kAnswersWithMaps : kAnswers}, qos);
     qos.publish_mode().kind = fd::SYNCHRONOUS_PUBLISH_MODE;
     qos.liveliness().kind = fd::MANUAL_BY_TOPIC_LIVELINESS_QOS;  // Send says why.
     auto& times = qos.reliable_writer_qos().times;
@@ -154,8 +166,8 @@ class AnswerWriter final : public Answers<S> {
     times.nackResponseDelay = Duration_t(0.002);
     SetUserData(qos.user_data(), UserData(ServiceType<S>::kResponseHash));
     const MutexLock lock(participant_->endpoints());
-    writer_ =
-        participant_->publisher()->create_datawriter(*topic, qos, &readers_, fd::StatusMask::publication_matched());
+    writer_ = participant_->publisher()->create_datawriter(topic_.get(), qos, &readers_,
+                                                           fd::StatusMask::publication_matched());
     if (writer_ == nullptr) return tl::unexpected(Broken("a writer of " + name));
     return {};
   }
@@ -185,6 +197,7 @@ class AnswerWriter final : public Answers<S> {
   const std::shared_ptr<Participant> participant_;
   const fd::TypeSupport type_{new AnswerType<S>()};
   MatchedReaders readers_;  // The writer's listener.
+  TopicUse topic_;          // Until the writer is deleted.
   fd::DataWriter* writer_ = nullptr;
 };
 

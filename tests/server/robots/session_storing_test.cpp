@@ -74,15 +74,16 @@ TEST_F(StoredSessionTest, OnlyTheNewestCheckpointMakesItDurable) {
   EXPECT_TRUE(state().durable);
 }
 
-// Whoever waits for its end would wait for ever.
-TEST_F(StoredSessionTest, HasNoWorkOnceItHasEnded) {
+// It went on after the next start, as if it had not ended.
+TEST_F(StoredSessionTest, IsStoredAgainAlsoAfterItsEnd) {
+  one_.Drive(0, 4);
   Lose();
-  one_.on_recover = {};
+  one_.position = 0;
   one_.session().End();
   ASSERT_TRUE(one_.WaitPhase(SessionPhase::kEnded));
-  ASSERT_TRUE(one_.sent().WaitFor([&] { return !one_.session().has_work(); }));
-  one_.session().Tick();
-  EXPECT_FALSE(one_.session().has_work());
+  one_.WaitStoring()(true);
+  EXPECT_TRUE(state().durable);
+  EXPECT_TRUE(one_.sent().WaitFor([&] { return !one_.session().has_work(); }));
 }
 
 std::size_t EndsTold(const Sent& sent) {
@@ -98,7 +99,7 @@ TEST_F(StoredSessionTest, ItsEndIsToldWhenThatIsOnTheDisk) {
   one_.session().Announce();
   one_.session().Durable({OdometryTaken{}});
   EXPECT_EQ(EndsTold(one_.sent()), 0U);
-  EXPECT_TRUE(one_.session().has_work());
+  EXPECT_TRUE(one_.session().end_untold());
   one_.session().Durable({SessionFinished{true, {}}});
   EXPECT_EQ(EndsTold(one_.sent()), 1U);
 }
@@ -137,6 +138,8 @@ TEST_F(StoredSessionTest, ThatHasEndedTakesACheckpointAfterItsEndAndAfterEachMap
   EXPECT_TRUE(Ticked(1));
   *completed = true;
   EXPECT_TRUE(Ticked(2));
+  one_.session().SetMapEpoch(5);  // The journal has no entry of it, so there is nothing to be saved.
+  ASSERT_TRUE(one_.sent().WaitFor([&] { return one_.session().record().epoch() == 5; }));
   EXPECT_TRUE(Ticked(2));
 }
 

@@ -142,17 +142,16 @@ def status_of_post(address, path, token):
 def change_the_mode(page, address):
     """Of robot2, in the map that robot1 draws, with the keyboard."""
     robot = "#robots [data-key=robot2]"
-    if page.text(f"{robot} .mode") != "Maps" or page.shows(f"{robot} .to-map"):
-        raise Failed(f"the mode of a robot that maps is '{page.text(f'{robot} .mode')}'")
+    # On a busy machine a robot may be silent for a moment, and its mode is not known then.
+    eventually("a robot maps", lambda: page.text(f"{robot} .mode") == "Maps" and not page.shows(f"{robot} .to-map"))
     for path, token, wanted in (("localise", "wrong", 401), ("map", "", 401), ("fly", TOKEN, 404)):
         if status_of_post(address, f"api/robots/robot2/{path}", token) != wanted:
             raise Failed(f"{path} with the token '{token}' is not answered {wanted}")
     page.run(f"document.querySelector('{robot} .to-localise').focus()")
     page.press_enter()
     eventually("it is only localised", lambda: page.text(f"{robot} .mode").startswith("Only localised"))
-    eventually("the page says so", lambda: "only localised" in page.text("#said"))
-    if page.shows(f"{robot} .to-localise"):
-        raise Failed("it can be localised twice")
+    eventually("it cannot be localised twice", lambda: not page.shows(f"{robot} .to-localise"))
+    eventually("it is found in the map", lambda: page.text(f"{robot} .pill") == "Tracking")
     eventually("the keyboard stays where the other mode is",
                lambda: page.run(f"document.activeElement === document.querySelector('{robot} .to-map')"))
     page.press_enter()
@@ -209,6 +208,7 @@ def use_the_page(programs, page, pictures):
         eventually("there is much to see", lambda: page.run(used) > 600, 120)
     before = page.run(TILES)
     page.click("#smooth")
+    eventually("the page says that it has begun", lambda: "Smoothing has begun" in page.text("#said"))
     eventually("the job ends", lambda: "Done" in page.text("#jobs"), 120)
     eventually("its map version is enabled", lambda: re.search(r"Version 2[^V]*Enabled", page.text("#versions")))
     eventually("every tile of the map is a new one", lambda: page.run(TILES) and not set(page.run(TILES)) & set(before))

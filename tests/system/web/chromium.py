@@ -118,19 +118,29 @@ class Page:
         return self.run(f"document.querySelector({json.dumps(selector)})?.checkVisibility() ?? false")
 
     def click(self, selector):
-        """As a person does: with the mouse, on an element that is shown, enabled and not covered by another one."""
-        place = self.run(f"""(() => {{
-            const element = document.querySelector({json.dumps(selector)});
-            if (!element || element.disabled || !element.checkVisibility()) return null;
-            element.scrollIntoView({{ block: 'nearest' }});
-            const box = element.getBoundingClientRect(), x = box.x + box.width / 2, y = box.y + box.height / 2;
-            const hit = document.elementFromPoint(x, y);
-            return hit && (element.contains(hit) || hit.contains(element)) ? {{ x, y }} : null;
-        }})()""")
-        if place is None:
-            raise BrowserError(f"{selector} cannot be clicked: it is absent, hidden, disabled or covered")
-        for what in ("mousePressed", "mouseReleased"):
-            self.call("Input.dispatchMouseEvent", type=what, button="left", clickCount=1, **place)
+        """As a person does: with the mouse, on an element that is shown, enabled and not covered by another one. Where the text
+        of a robot changes meanwhile, so that the element is not there any more when the button goes down or up, again."""
+        chosen = f"document.querySelector({json.dumps(selector)})"
+        for _ in range(20):
+            place = self.run(f"""(() => {{
+                const element = {chosen};
+                if (!element || element.disabled || !element.checkVisibility()) return null;
+                element.scrollIntoView({{ block: 'nearest' }});
+                const box = element.getBoundingClientRect(), x = box.x + box.width / 2, y = box.y + box.height / 2;
+                const hit = document.elementFromPoint(x, y);
+                if (!hit || !element.contains(hit)) return null;
+                window.clicked = false;
+                element.addEventListener('click', () => {{ window.clicked = true; }}, {{ once: true, capture: true }});
+                return {{ x, y }};
+            }})()""")
+            if place is None:
+                time.sleep(0.1)
+                continue
+            for what in ("mousePressed", "mouseReleased"):
+                self.call("Input.dispatchMouseEvent", type=what, button="left", clickCount=1, **place)
+            if self.run("window.clicked"):
+                return
+        raise BrowserError(f"{selector} cannot be clicked: it is absent, hidden, disabled, covered, or never where the mouse is")
 
     def drag(self, begin, end):
         """With the mouse, from one point of the window to another: (x, y) in pixels."""
