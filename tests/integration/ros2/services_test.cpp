@@ -12,7 +12,9 @@
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <memory>
 #include <new>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "common/wire/ros2/participant.h"
 #include "common/wire/ros2/service_endpoint.h"
@@ -89,13 +91,15 @@ class FastClient {
 
  private:
   fd::Topic* Topic(const std::string& name, const fd::TypeSupport& type) {
-    return Must(participant_->TopicFor(name, type));
+    topics_.push_back(Must(participant_->TopicFor(name, type)));
+    return topics_.back().get();
   }
 
   const bool names_its_reader_;
   const fd::TypeSupport request_type_{new typename ServiceType<S>::RequestType()};
   const fd::TypeSupport response_type_{new typename ServiceType<S>::ResponseType()};
   std::shared_ptr<Participant> participant_;
+  std::vector<TopicUse> topics_;
   fd::DataWriter* writer_ = nullptr;
   fd::DataReader* reader_ = nullptr;
   rtps::SampleIdentity asked_;
