@@ -128,6 +128,10 @@ void StudyOrders(StudyContext& context) {
       "the truth: poses called localized and more than 0.5 m or "
       "0.5 rad away from it.");
   report.Expect(broken == 0, "what was answered did not hold after a start");
+  // Smoothing makes the map better; kills and switches must not make it worse than it is without both.
+  report.Expect(static_cast<double>(all.beside_truth) * static_cast<double>(all.undisturbed_poses) <=
+                    static_cast<double>(all.undisturbed_beside_truth) * static_cast<double>(all.poses),
+                "more poses are beside the truth than without kills and orders");
   report.Expect(all.orders.ended == all.orders.jobs, "jobs did not end well");
   report.Expect(all.orders.given_up <= all.kills / 8, "jobs were given up too early");
   report.Expect(all.lost == 0 && all.doubled == 0, "scans were lost or used twice");
@@ -198,8 +202,10 @@ void StudyRestart(StudyContext& context) {
       "eight clients in this process, which continue their sessions and "
       "drive back and forth over the last half minute of their logs; a new pose is one of a scan that was made after "
       "the kill.");
-  report.Expect(At(times.poses_s, 0.99) <= kLongestRestart_s, "a restart takes more than 2 s");
-  report.Expect(At(times.new_poses_s, 0.99) <= kLongestRestart_s, "robots wait more than 2 s for their new poses");
+  // A quick run is a test beside other tests, of logs that are too short for a checkpoint.
+  report.Expect(context.quick || At(times.poses_s, 0.99) <= kLongestRestart_s, "a restart takes more than 2 s");
+  report.Expect(context.quick || At(times.new_poses_s, 0.99) <= kLongestRestart_s,
+                "robots wait more than 2 s for their new poses");
   report.Expect(times.new_sessions == 0, "the server did not know sessions that it had stored");
 }
 
