@@ -75,9 +75,12 @@ class Door {
       case 4:
         return With<ros2::PoseWithCovariance>(bytes, [&](auto&& message) { robot_.TakeStart(message, now_); });
       case 6:
-      case 7:
-        return IsRequest<ros2::SaveMap>(bytes, kind == 7) | IsRequest<ros2::GetMap>(bytes, kind == 7) |
-               IsRequest<ros2::Reset>(bytes, kind == 7);
+      case 7: {
+        const bool saves = IsRequest<ros2::SaveMap>(bytes, kind == 7);  // All three, whatever the first one says.
+        const bool gets = IsRequest<ros2::GetMap>(bytes, kind == 7);
+        const bool resets = IsRequest<ros2::Reset>(bytes, kind == 7);
+        return saves || gets || resets;
+      }
       default:
         break;
     }
