@@ -68,19 +68,21 @@ static dds_qos_t* MakeQos(const struct Caller* caller, const char* hash) {
   return qos;
 }
 
-/* `topic`: "rq" or "rr" and so on; the type gets the name that ROS gives it. The descriptor stays, as the topic does.
- */
+/* `topic`: "rq" or "rr" and so on; the type gets the name that ROS gives it. The descriptor stays, as the topic does:
+ * it is called twice. */
 static dds_entity_t Topic(const struct Caller* caller, const dds_topic_descriptor_t* type, const char* suffix,
                           const char* topic) {
-  char* name = malloc(128);
-  dds_topic_descriptor_t* renamed = malloc(sizeof(*renamed));
-  if (name == NULL || renamed == NULL) Die("no memory");
-  snprintf(name, 128, "%s_%s_", caller->kind->type, suffix);
-  memcpy(renamed, type, sizeof(*renamed));
-  *(const char**)&renamed->m_typename = name;
-  const dds_entity_t made = dds_create_topic(caller->participant, renamed, topic, NULL, NULL);
-  if (made < 0) Die("a topic");
-  return made;
+  static char names[2][128];
+  static dds_topic_descriptor_t types[2];
+  static int made = 0;
+  if (made == 2) Die("too many topics");
+  snprintf(names[made], sizeof(names[made]), "%s_%s_", caller->kind->type, suffix);
+  memcpy(&types[made], type, sizeof(types[made]));
+  *(const char**)&types[made].m_typename = names[made];
+  const dds_entity_t entity = dds_create_topic(caller->participant, &types[made], topic, NULL, NULL);
+  if (entity < 0) Die("a topic");
+  ++made;
+  return entity;
 }
 
 static void Join(struct Caller* caller, dds_domainid_t domain, const char* service) {
