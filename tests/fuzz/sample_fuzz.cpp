@@ -1,6 +1,7 @@
 // Samples of every topic: the number of the topic, then the serialised sample. What a reader accepts is a value that
 // can be sent again and arrives as the same value; scans and odometry go through the door of the server.
 #include <array>
+#include <cstdint>
 
 #include "server/ingress/admission.h"
 #include "tests/common/wire/sample_values.h"
@@ -9,15 +10,19 @@
 namespace cairn::fuzz {
 namespace {
 
+bool IsNumber(std::uint64_t sequence) {
+  return sequence > 0 && sequence <= server::kMaxSequence;
+}
+
 void UseSample(const ScanSample& sample) {
   const server::ScanArrival arrival = server::Admit(ScanSample(sample), {});
-  Must(arrival.refused.has_value() == (sample.scan.sequence == 0 || !ValidateScan(sample.scan)),
+  Must(arrival.refused.has_value() == (!IsNumber(sample.scan.sequence) || !ValidateScan(sample.scan)),
        "only valid scans are admitted");
   Must(arrival.scan != nullptr && arrival.scan->sequence == sample.scan.sequence, "a refused scan can be counted");
 }
 void UseSample(const OdometrySample& sample) {
   const server::OdometryArrival arrival = server::Admit(OdometrySample(sample));
-  Must(arrival.refused == (sample.odometry.sequence == 0 || !ValidateOdometry(sample.odometry)),
+  Must(arrival.refused == (!IsNumber(sample.odometry.sequence) || !ValidateOdometry(sample.odometry)),
        "only valid odometry is admitted");
 }
 void UseSample(const TileSample& sample) {
