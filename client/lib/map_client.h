@@ -28,8 +28,8 @@ class MapClient {
   // kDeadlineExceeded: some tiles are still missing.
   [[nodiscard]] Result<void> WaitComplete(double timeout_s);
 
-  // Tiles that the server has answered (QueryClient::Tiles), for who cannot wait until the wire brings them: of a large
-  // map that takes seconds. What the wire brings replaces them.
+  // Tiles that the server has answered (QueryClient::Tiles), for those who cannot wait until the wire brings them: of a
+  // large map that takes seconds. What the wire brings replaces them.
   void Fill(TileAnswer&& answer);
 
   // All of one epoch.

@@ -44,8 +44,8 @@ class TileMirror {
   // True if it changed the mirror. Other sites' values are ignored.
   bool Apply(MapInfo&& info);
   bool Apply(TileSample&& sample);
-  // A tile from the answer to a question, for who cannot wait until the wire brings it. Only where nothing of that tile
-  // is here yet; version() counts only what the wire has brought.
+  // A tile from the answer to a question, for those who cannot wait until the wire brings it. Only where nothing of
+  // that tile is here yet; version() counts only what the wire has brought.
   bool Fill(Generation generation, Tile&& tile);
 
   // Everything the last map info announces is here.

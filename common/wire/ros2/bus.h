@@ -68,7 +68,7 @@ class Publication {
   [[nodiscard]] virtual int matched() const = 0;
 };
 
-// Who has asked, and what his answer has to be marked with. rmw_fastrtps marks a request with the identity of its
+// Who has asked, and what the answer has to be marked with. rmw_fastrtps marks a request with the identity of its
 // sample in the inline QoS, rmw_cyclonedds with 16 bytes in front of the message (service_endpoint.h).
 struct Caller {
   WriterId writer{};          // The endpoint that asked. Its first 12 bytes are its participant's.
