@@ -4,6 +4,9 @@
 #include <fastdds/rtps/transport/ChainingTransport.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 
+#include <algorithm>
+#include <fastdds/rtps/common/LocatorSelector.hpp>
+
 #include "common/mutex.h"
 #include "common/wire/fragment_assembly.h"
 
@@ -38,6 +41,26 @@ class GuardTransport : public transport::ChainingTransport {
     return udp->send(asking.data(), static_cast<std::uint32_t>(asking.size()), begin, end, timeout);
   }
 
+  // Samples of topics go to each reader's own address, never by multicast. By itself, Fast DDS sends what two readers
+  // may have to their common multicast address, and what one of them needs to its own. A participant has a thread for
+  // each address, so the two overtake each other: Cyclone DDS then saw the heartbeat of an answer before the answer,
+  // took the answer for one of the past, and the program that had asked waited in vain (1 of 12 on a busy machine).
+  void select_locators(rtps::LocatorSelector& selector) const override {
+    auto& readers = selector.transport_starts();
+    if (std::any_of(readers.begin(), readers.end(), IsOfDiscoveryOrHasNoAddress))
+      return ChainingTransport::select_locators(selector);
+    for (std::size_t i = 0; i < readers.size(); ++i) {
+      rtps::LocatorSelectorEntry& reader = *readers[i];
+      if (!reader.transport_should_process) continue;
+      for (std::size_t j = 0; j < reader.unicast.size(); ++j) {
+        // Readers of one participant share their address. It gets each datagram once.
+        if (IsLocatorSupported(reader.unicast[j]) && !selector.is_selected(reader.unicast[j]))
+          reader.state.unicast.push_back(j);
+      }
+      if (reader.state.unicast.size() > 0) selector.select(i);
+    }
+  }
+
   void receive(transport::TransportReceiverInterface* next, const rtps::octet* bytes, std::uint32_t size,
                const rtps::Locator_t& local, const rtps::Locator_t& remote) override {
     report_->bytes.fetch_add(size, std::memory_order_relaxed);
@@ -67,6 +90,11 @@ class GuardTransport : public transport::ChainingTransport {
   // DDSI-RTPS 2.2, 9.6.1.1: what participants and endpoints tell of themselves arrives at ports with even numbers, and
   // samples of topics at those with odd ones. A participant has a thread for each of its ports.
   static bool IsOfDiscovery(const rtps::Locator_t& local) { return local.port % 2 == 0; }
+  // The last byte of an entity id: DDSI-RTPS 2.2, 9.3.1.2.
+  static bool IsOfDiscoveryOrHasNoAddress(const rtps::LocatorSelectorEntry* reader) {
+    const bool is_of_discovery = (reader->remote_guid.entityId.value[3] & 0xc0) == 0xc0;
+    return reader->transport_should_process && (is_of_discovery || reader->unicast.size() == 0);
+  }
 
   void Deliver(transport::TransportReceiverInterface* next, Bytes datagram, const rtps::Locator_t& local,
                const rtps::Locator_t& remote) {
