@@ -96,26 +96,35 @@ constexpr std::chrono::minutes kLongestUnhealthy{1};
   std::_Exit(kStuck);
 }
 
-// Checks once a second for servers on other machines (they are discovered only when both run), for refused peers,
-// for lost messages and whether the store works.
+// Checks for servers on other machines (they are discovered only when both run), for refused peers, for lost messages
+// and whether the store works.
+void LookOnce(const Watched& watched, DoorLosses& losses, ServiceStatus& status) {
+  if (watched.others.Joined()) {
+    spdlog::error("another server serves this DDS domain: clients get answers from both; stop one of them");
+  }
+  TellRefusals(watched);
+  auto busy = watched.bus.busy_with_one_datagram();
+  if (watched.ros2 != nullptr) busy = std::max(busy, watched.ros2->busy_with_one_datagram());
+  watched.server.SetReceiving(busy);
+  const DoorCounts counts = LossesOf(watched);
+  if (const auto line = losses.Check(counts, DoorLosses::Clock::now())) {
+    spdlog::warn("{}", *line);
+    status.Losses(TextOf(counts));
+  }
+  if (watched.ros2 != nullptr) watched.server.SetRos2(watched.ros2->report());
+  if (watched.journal != nullptr) status.Degraded(watched.journal->health().reason);
+}
+
+// The same once a second.
 void Look(asio::steady_timer& timer, const Watched& watched, DoorLosses& losses, ServiceStatus& status) {
   timer.expires_after(std::chrono::seconds(1));
   timer.async_wait([&](const asio::error_code& error) {
     if (error) return;
-    if (watched.others.Joined()) {
-      spdlog::error("another server serves this DDS domain: clients get answers from both; stop one of them");
+    try {
+      LookOnce(watched, losses, status);
+    } catch (const std::exception& failure) {  // Such as memory that is short for a moment.
+      spdlog::error("a look at the doors failed with an exception: {}", failure.what());
     }
-    TellRefusals(watched);
-    auto busy = watched.bus.busy_with_one_datagram();
-    if (watched.ros2 != nullptr) busy = std::max(busy, watched.ros2->busy_with_one_datagram());
-    watched.server.SetReceiving(busy);
-    const DoorCounts counts = LossesOf(watched);
-    if (const auto line = losses.Check(counts, DoorLosses::Clock::now())) {
-      spdlog::warn("{}", *line);
-      status.Losses(TextOf(counts));
-    }
-    if (watched.ros2 != nullptr) watched.server.SetRos2(watched.ros2->report());
-    if (watched.journal != nullptr) status.Degraded(watched.journal->health().reason);
     Look(timer, watched, losses, status);
   });
 }

@@ -58,6 +58,11 @@ Server::~Server() {
 
 Result<void> Server::Restore(StartControl& control) {
   if (auto sites = atlas_.Restore(control); !sites) return sites;
+  // Before the sessions: of one that was stored just before a kill, the site may not be stored yet.
+  for (const std::string& name : options_.server.site_names()) {
+    if (atlas_.IsSetAside(name)) continue;
+    if (const auto site = atlas_.Create(name); !site) return tl::unexpected(site.error());
+  }
   if (auto sessions = roster_.Restore(control); !sessions) return sessions;
   const auto unfinished = jobs_.Restore();
   if (!unfinished) return tl::unexpected(unfinished.error());
@@ -67,10 +72,6 @@ Result<void> Server::Restore(StartControl& control) {
 
 Result<void> Server::Start(StartControl& control) {
   if (auto restored = Restore(control); !restored) return restored;
-  for (const std::string& name : options_.server.site_names()) {
-    if (atlas_.IsSetAside(name)) continue;
-    if (const auto site = atlas_.Create(name); !site) return tl::unexpected(site.error());
-  }
   looked_at_ = Clock::now().time_since_epoch();
   saved_sites_.Start();
   desk_.Start();

@@ -74,6 +74,7 @@ ExitCode ListStored(Program& program, const std::string& state) {
   const auto names = server::SiteNames(**store);
   if (!names) return program.Refuse(names.error());
   std::string text;
+  std::vector<std::uint64_t> unreadable;
   nlohmann::json sites = nlohmann::json::array();
   for (const std::string& name : *names) {
     const auto contents = server::ReadSite(**store, name);
@@ -90,9 +91,12 @@ ExitCode ListStored(Program& program, const std::string& state) {
                           merged ? ", together with that of earlier sessions" : "");
       sessions.push_back({{"session", id}, {"with_earlier", merged}});
     }
+    unreadable = contents->unreadable;
     sites.push_back({{"site", name}, {"sessions", sessions}});
   }
-  return program.Print(text.empty() ? "no site yet\n" : text, {{"sites", sites}});
+  for (const std::uint64_t id : unreadable)
+    text += fmt::format("session {}, which cannot be read: it may be of any of these sites\n", id);
+  return program.Print(text.empty() ? "no site yet\n" : text, {{"sites", sites}, {"unreadable", unreadable}});
 }
 
 ExitCode List(Program& program, const SiteArguments& arguments) {
@@ -171,7 +175,18 @@ Result<NamedSessions> OpenSessions(const SiteArguments& arguments) {
   return named;
 }
 
+bool AreOneFile(const std::string& one, const std::string& other) {
+  std::error_code error;
+  const auto whole = [&error](const std::string& path) { return std::filesystem::weakly_canonical(path, error); };
+  return whole(one) == whole(other);
+}
+
 ExitCode Split(Program& program, const SiteArguments& arguments) {
+  if (arguments.state.empty() &&
+      AreOneFile(arguments.output, arguments.rest.empty() ? arguments.names[0] : arguments.rest)) {
+    program.err() << "cairn: the new site would replace what is left of the old one; write it into another file\n";
+    return ExitCode::kUsage;
+  }
   const auto named = OpenSessions(arguments);
   if (!named) return program.Refuse(named.error());
   Store& store = *named->store;
@@ -179,11 +194,13 @@ ExitCode Split(Program& program, const SiteArguments& arguments) {
   if (auto split = server::SplitSite(store, site, named->sessions, arguments.as); !split)
     return program.Refuse(split.error());
   if (arguments.state.empty()) {
-    if (!arguments.rest.empty()) {
+    // The rest may replace the file that was read. By then, what it lacks is on the disk.
+    const auto written = server::WriteSiteFile(store, arguments.as, arguments.output);
+    if (written && !arguments.rest.empty()) {
       const auto rest = server::WriteSiteFile(store, site, arguments.rest);
       if (!rest) return program.Refuse(rest.error());
     }
-    return PrintSummary(program, server::WriteSiteFile(store, arguments.as, arguments.output));
+    return PrintSummary(program, written);
   }
   return program.Print(
       fmt::format("{} sessions of site {} are site {} now\n", named->sessions.size(), site, arguments.as),
@@ -202,6 +219,13 @@ ExitCode DeleteSession(Program& program, const SiteArguments& arguments) {
   if (auto removed = server::RemoveRests(store); !removed) return program.Refuse(removed.error());
   return program.Print(fmt::format("{} of site {} deleted\n", arguments.names[1], site),
                        {{"site", site}, {"session", arguments.names[1]}, {"deleted", true}});
+}
+
+ExitCode DeleteJob(Program& program, const SiteArguments& arguments, std::uint64_t job) {
+  const auto store = OpenToEdit(arguments.state, true);
+  if (!store) return program.Refuse(store.error());
+  if (auto deleted = server::DeleteJob(**store, job); !deleted) return program.Refuse(deleted.error());
+  return program.Print(fmt::format("job {} deleted\n", job), {{"job", job}, {"deleted", true}});
 }
 
 // A command whose result goes either into the state directory or into a new file.
@@ -277,6 +301,14 @@ void AddStoredSites(CLI::App& site, Program& program) {
                          "The site, and a robot or the number of a session");
   remove->get_option("names")->expected(2);
   OnEdit(program, *remove, deleted, DeleteSession);
+  auto of_job = std::make_shared<SiteArguments>();
+  auto job = std::make_shared<std::uint64_t>(0);
+  auto* forget =
+      site.add_subcommand("delete-job", "Remove a job from a stopped server, such as one that cannot be read");
+  forget->add_option("job", *job, "The job's number")->required();
+  forget->add_option("--state", of_job->state, "State directory of the stopped server")->required();
+  program.OnChosen(*forget, of_job,
+                   [job](Program& chosen, const SiteArguments& given) { return DeleteJob(chosen, given, *job); });
 }
 
 }  // namespace cairn::client

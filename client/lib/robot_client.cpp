@@ -96,7 +96,10 @@ Result<void> RobotClient::AwaitSession(const wire::Bus& bus, double timeout_s) {
         return Fail(StatusCode::kFailedPrecondition, fmt::format("the session of '{}' is not active", request_.robot));
       // The writers of the streams must have matched too: samples sent before are lost.
       if (Streaming()) return {};
-      if (Clock::now() >= deadline) return Fail(StatusCode::kUnavailable, NoServer(bus, timeout_s));
+      if (Clock::now() >= deadline) {
+        if (not_yet_) return tl::unexpected(*not_yet_);
+        return Fail(StatusCode::kUnavailable, NoServer(bus, timeout_s));
+      }
       changed_.WaitFor(mutex_, std::chrono::milliseconds(5));
       if (Answered() || Clock::now() - asked_ < kAskPeriod) continue;
     }
@@ -169,7 +172,10 @@ void RobotClient::OnRefusal(SessionRefusal&& refusal) {
     if (state.generation < generation_ || state.session != request_.session) return;
     generation_ = state.generation;
     answered_at_ = Clock::now();
-    if (state_ && IsTemporary(state.status.code)) return;
+    if (IsTemporary(state.status.code)) {
+      not_yet_ = state.status;
+      return;
+    }
     if (request_.started && !request_.end && state.status.code == StatusCode::kFailedPrecondition) {
       if (!std::exchange(reopening_, true)) refused_ = Clock::now();
     } else {

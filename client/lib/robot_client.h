@@ -181,7 +181,8 @@ class RobotClient {
   std::optional<SessionState> state_ CAIRN_GUARDED_BY(mutex_);
   bool answered_ CAIRN_GUARDED_BY(mutex_) = false;  // The server that answered is still there.
   bool reopening_ CAIRN_GUARDED_BY(mutex_) = false;
-  std::optional<Status> over_ CAIRN_GUARDED_BY(mutex_);  // Why the session ended for good.
+  std::optional<Status> over_ CAIRN_GUARDED_BY(mutex_);     // Why the session ended for good.
+  std::optional<Status> not_yet_ CAIRN_GUARDED_BY(mutex_);  // The last refusal that means: repeat the request.
   std::optional<PoseReport> pose_ CAIRN_GUARDED_BY(mutex_);
   std::optional<Odometry> start_odometry_ CAIRN_GUARDED_BY(mutex_);  // When the session was opened.
   // The last two samples of odometry, and the stamps at which it began anew, the oldest first.

@@ -247,8 +247,7 @@ void RobotStream::SetPublishers(bool scans, bool odometry, Clock::time_point /*n
   // A session that somebody has ended is opened again only for a robot that was started again.
   if (returns && phase_ == Phase::kEnded) phase_ = Phase::kWaiting;
   if (phase_ != Phase::kOpen || alive_ == scans) return;
-  alive_ = scans;
-  Push(ClientLiveliness{client_, robot_id_, alive_});
+  if (Push(ClientLiveliness{client_, robot_id_, scans})) alive_ = scans;  // Else at the next call.
 }
 
 void RobotStream::Tick(Clock::time_point now) {

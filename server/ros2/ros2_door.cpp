@@ -39,8 +39,9 @@ Ros2Door::Ros2Door(const Ros2Options& options, NamespaceRules rules, std::unique
     : options_(options),
       bus_(std::move(bus)),
       egress_(*bus_, options),
-      ingress_(*bus_, options, std::move(rules), inbound,
-               [this](const RobotAddress& address) { egress_.Serve(address); }),
+      ingress_(
+          *bus_, options, std::move(rules), inbound, [this](const RobotAddress& address) { egress_.Serve(address); },
+          [this](NameId robot_id) { egress_.Leave(robot_id); }),
       services_(*bus_, options, abilities, inbound,
                 {[this](MapWish&& wish) { return egress_.WantMap(std::move(wish)); },
                  [this](const std::string& site) { ingress_.BeginAnew(site); }}) {}

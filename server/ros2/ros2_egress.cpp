@@ -133,6 +133,11 @@ void Ros2Egress::Serve(const RobotAddress& address) {
   robots_.insert_or_assign(address.robot_id, std::move(robot));
 }
 
+void Ros2Egress::Leave(NameId robot_id) {
+  const MutexLock lock(mutex_);
+  robots_.erase(robot_id);
+}
+
 void Ros2Egress::RunPoses() {
   while (const auto report = poses_.Pop()) poses_failed_.Guard([&] { Publish(*report); });
 }

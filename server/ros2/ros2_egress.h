@@ -35,6 +35,8 @@ class Ros2Egress {
   void See(const OutboundValue& value);
   // Makes the topics of a robot, or moves them.
   void Serve(const RobotAddress& address) CAIRN_EXCLUDES(mutex_);
+  // Deletes the topics of a robot.
+  void Leave(NameId robot_id) CAIRN_EXCLUDES(mutex_);
 
   // Has a request for the map of a site answered by the thread of the maps; false if there is no room for it. From any
   // thread.

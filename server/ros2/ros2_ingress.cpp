@@ -28,13 +28,14 @@ std::string DirectoryOf(const std::string& topic) {
 }  // namespace
 
 Ros2Ingress::Ros2Ingress(ros2::Bus& bus, const Ros2Options& options, NamespaceRules rules, Inbound& inbound,
-                         std::function<void(const RobotAddress&)> serve)
+                         std::function<void(const RobotAddress&)> serve, std::function<void(NameId)> leave)
     : bus_(bus),
       options_(options),
       scan_names_(options.scan_names()),
       rules_(std::move(rules)),
       inbound_(inbound),
-      serve_(std::move(serve)) {}
+      serve_(std::move(serve)),
+      leave_(std::move(leave)) {}
 
 Ros2Ingress::~Ros2Ingress() {
   Close();
@@ -53,6 +54,11 @@ void Ros2Ingress::End(Topic& topic) {
   topic.subscription.reset();
 }
 
+bool Ros2Ingress::IsGone(const Namespace& one) {
+  return std::all_of(one.topics.begin(), one.topics.end(),
+                     [](const auto& topic) { return topic.second.publishers == 0; });
+}
+
 bool Ros2Ingress::IsScan(const std::string& stream) const {
   return std::find(scan_names_.begin(), scan_names_.end(), stream) != scan_names_.end();
 }
@@ -61,7 +67,7 @@ void Ros2Ingress::Tick(Clock::time_point now) {
   const MutexLock lock(mutex_);
   if (const std::uint64_t version = bus_.writers_version(); version != writers_version_) {
     writers_version_ = version;
-    Discover();
+    Discover(now);
   }
   TellRobots(now);
   for (auto& [name, one] : namespaces_) {
@@ -79,7 +85,37 @@ void Ros2Ingress::Tick(Clock::time_point now) {
   Measure(now);
 }
 
-void Ros2Ingress::Discover() {
+void Ros2Ingress::Discover(Clock::time_point now) {
+  CountPublishers();
+  if (publishers_left_out_ > 0 && ForgetGone(now)) CountPublishers();
+  SubscribeShared();
+  for (auto& [name, one] : namespaces_) Subscribe(name, one);
+  const auto is_empty = [](const auto& one) { return one.second.robot == nullptr && IsGone(one.second); };
+  std::erase_if(namespaces_, is_empty);
+}
+
+bool Ros2Ingress::ForgetGone(Clock::time_point now) {
+  bool forgotten = false;
+  for (auto entry = namespaces_.begin(); entry != namespaces_.end();) {
+    Namespace& one = entry->second;
+    if (IsGone(one) && one.robot != nullptr) one.robot->SetPublishers(false, false, now);
+    if (!IsGone(one) || (one.robot != nullptr && !one.robot->IsAway())) {
+      ++entry;
+      continue;
+    }
+    for (auto& [stream, topic] : one.topics) End(topic);
+    if (one.robot != nullptr) {
+      ended_overflow_ += one.robot->overflow();
+      leave_(HashName(one.place->robot));
+    }
+    entry = namespaces_.erase(entry);
+    forgotten = true;
+  }
+  return forgotten;
+}
+
+void Ros2Ingress::CountPublishers() {
+  publishers_left_out_ = 0;
   for (auto& [stream, topic] : shared_) topic.publishers = 0;
   for (auto& [name, one] : namespaces_) {
     for (auto& [stream, topic] : one.topics) topic.publishers = 0;
@@ -101,14 +137,7 @@ void Ros2Ingress::Discover() {
       if (makes(writer) == first && writer.topic.starts_with("rt/")) Note(writer);
     }
   }
-  SubscribeShared();
   shared_frames_.SetWriters(alive);
-  for (auto& [name, one] : namespaces_) Subscribe(name, one);
-  const auto is_empty = [](const auto& one) {
-    return one.second.robot == nullptr && std::all_of(one.second.topics.begin(), one.second.topics.end(),
-                                                      [](const auto& topic) { return topic.second.publishers == 0; });
-  };
-  std::erase_if(namespaces_, is_empty);
 }
 
 void Ros2Ingress::Note(const ros2::RemoteWriter& writer) {
@@ -141,7 +170,7 @@ void Ros2Ingress::Note(const ros2::RemoteWriter& writer) {
   if (found == namespaces_.end()) {
     if (!is_scan && !is_odometry && !IsScan(stream)) return;  // Somebody else's tf.
     if (namespaces_.size() >= static_cast<std::size_t>(options_.max_robots)) {
-      ++namespaces_left_out_;
+      ++publishers_left_out_;
       return;
     }
     found = namespaces_.emplace(*name, Namespace{}).first;
@@ -293,7 +322,7 @@ void Ros2Ingress::Measure(Clock::time_point now) {
 
 std::uint64_t Ros2Ingress::overflow() const {
   const MutexLock lock(mutex_);
-  std::uint64_t sum = 0;
+  std::uint64_t sum = ended_overflow_;
   for (const auto& [name, one] : namespaces_) sum += one.robot != nullptr ? one.robot->overflow() : 0;
   return sum;
 }

@@ -35,9 +35,10 @@ struct RobotAddress {
 class Ros2Ingress {
  public:
   using Clock = RobotStream::Clock;
-  // `serve` is called on the thread of the bus, when a robot appears or its address changes.
+  // Both are called on the thread of the bus. `serve`: a robot appears, or its address changes; `leave`: it is
+  // forgotten.
   Ros2Ingress(ros2::Bus& bus, const Ros2Options& options, NamespaceRules rules, Inbound& inbound,
-              std::function<void(const RobotAddress&)> serve);
+              std::function<void(const RobotAddress&)> serve, std::function<void(NameId)> leave);
   ~Ros2Ingress();
 
   void Tick(Clock::time_point now) CAIRN_EXCLUDES(mutex_);
@@ -75,7 +76,11 @@ class Ros2Ingress {
     RobotAddress address;
   };
 
-  void Discover() CAIRN_REQUIRES(mutex_);
+  void Discover(Clock::time_point now) CAIRN_REQUIRES(mutex_);
+  void CountPublishers() CAIRN_REQUIRES(mutex_);
+  // Makes room: forgets the namespaces in which nobody publishes any more. The server keeps their sessions as long as
+  // those of any robot that is away, and a robot that returns goes on. Returns whether there was one.
+  bool ForgetGone(Clock::time_point now) CAIRN_REQUIRES(mutex_);
   void Note(const ros2::RemoteWriter& writer) CAIRN_REQUIRES(mutex_);
   // Makes, renews and ends the subscriptions of a namespace.
   void Subscribe(const std::string& name, Namespace& one) CAIRN_REQUIRES(mutex_);
@@ -91,6 +96,8 @@ class Ros2Ingress {
   [[nodiscard]] std::vector<std::string> ProblemsOf(const std::string& name, const Namespace& one,
                                                     Clock::time_point now) const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool IsScan(const std::string& stream) const;
+  // Nobody publishes in it.
+  [[nodiscard]] static bool IsGone(const Namespace& one);
 
   ros2::Bus& bus_;
   const Ros2Options options_;
@@ -98,6 +105,7 @@ class Ros2Ingress {
   const NamespaceRules rules_;
   Inbound& inbound_;
   const std::function<void(const RobotAddress&)> serve_;
+  const std::function<void(NameId)> leave_;
 
   mutable Mutex mutex_;
   SharedFrames shared_frames_ CAIRN_GUARDED_BY(mutex_);
@@ -105,8 +113,9 @@ class Ros2Ingress {
   std::map<std::string, Namespace> namespaces_ CAIRN_GUARDED_BY(mutex_);
   std::uint64_t writers_version_ CAIRN_GUARDED_BY(mutex_) = 0;
   Clock::time_point measured_ CAIRN_GUARDED_BY(mutex_){};
-  std::uint64_t ended_refused_ CAIRN_GUARDED_BY(mutex_) = 0;  // Of subscriptions that have ended.
-  std::uint64_t namespaces_left_out_ CAIRN_GUARDED_BY(mutex_) = 0;
+  std::uint64_t ended_refused_ CAIRN_GUARDED_BY(mutex_) = 0;        // Of subscriptions that have ended.
+  std::uint64_t ended_overflow_ CAIRN_GUARDED_BY(mutex_) = 0;       // Of robots that were forgotten.
+  std::uint64_t publishers_left_out_ CAIRN_GUARDED_BY(mutex_) = 0;  // Their namespaces found no room.
 
   // The newest of each robot, until the next Tick.
   struct News {

@@ -101,8 +101,12 @@ std::vector<std::string> Ros2Ingress::problems() const {
         "' on /tf or /tf_static: give each robot tf topics in its namespace, or frames that begin with its name");
     if (problems.size() == kMaxProblems) break;
   }
-  if (namespaces_left_out_ > 0)
+  if (publishers_left_out_ > 0)
     problems.emplace_back("there are more namespaces than ros2.max_robots; some are ignored");
+  if (shared_frames_.full()) {
+    problems.push_back("/tf and /tf_static have more than " + std::to_string(ros2::FrameTree::kMaxFrames) +
+                       " frames; some are ignored: give the robots tf topics in their namespaces");
+  }
   return problems;
 }
 

@@ -31,16 +31,38 @@ ros2::Transforms SharedFrames::Take(const ros2::Transforms& message, const ros2:
       tree_.Forget(child);
       continue;
     }
-    if (!tree_.Set(transform)) continue;
+    if (!Set(transform)) continue;
+    if (owner == owners_.end()) std::erase(left_, child);
     owners_.insert_or_assign(child, Owner{writer, transform});
     clear.transforms.push_back(transform);
   }
   return clear;
 }
 
+bool SharedFrames::Set(const ros2::Transform& transform) {
+  for (;;) {
+    const auto set = tree_.Set(transform);
+    const bool full = !set && set.error().code == StatusCode::kResourceExhausted;
+    if (!full || left_.empty()) {
+      full_ |= full;
+      return set.has_value();
+    }
+    tree_.Forget(left_.front());
+    left_.pop_front();
+  }
+}
+
 void SharedFrames::SetWriters(const std::set<ros2::WriterId>& writers) {
+  full_ = false;
   // The transforms stay in the tree: a robot whose program is started again is mounted as before.
-  std::erase_if(owners_, [&writers](const auto& one) { return !writers.contains(one.second.writer); });
+  for (auto owner = owners_.begin(); owner != owners_.end();) {
+    if (writers.contains(owner->second.writer)) {
+      ++owner;
+      continue;
+    }
+    left_.push_back(owner->first);
+    owner = owners_.erase(owner);
+  }
   for (auto frame = contended_.begin(); frame != contended_.end();) {
     Contenders& contenders = frame->second;
     std::erase_if(contenders, [&writers](const auto& one) { return !writers.contains(one.first); });
@@ -48,7 +70,7 @@ void SharedFrames::SetWriters(const std::set<ros2::WriterId>& writers) {
       ++frame;
       continue;
     }
-    if (contenders.size() == 1 && tree_.Set(contenders.begin()->second))
+    if (contenders.size() == 1 && Set(contenders.begin()->second))
       owners_.insert_or_assign(frame->first, Owner{contenders.begin()->first, contenders.begin()->second});
     frame = contended_.erase(frame);
   }

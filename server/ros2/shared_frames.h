@@ -3,6 +3,7 @@
 // is gone. Not thread-safe: one owner.
 #pragma once
 
+#include <deque>
 #include <map>
 #include <set>
 #include <string>
@@ -24,6 +25,8 @@ class SharedFrames {
   [[nodiscard]] const ros2::FrameTree& tree() const { return tree_; }
   // The frames that two publishers contend for.
   [[nodiscard]] std::vector<std::string> contended() const;
+  // There are more frames than the tree can hold.
+  [[nodiscard]] bool full() const { return full_; }
 
  private:
   struct Owner {
@@ -34,7 +37,12 @@ class SharedFrames {
   using Contenders = std::map<ros2::WriterId, ros2::Transform>;
   static constexpr std::size_t kMaxContenders = 16;
 
+  // As FrameTree::Set. Where there are too many frames, one gives way that nobody publishes any more.
+  bool Set(const ros2::Transform& transform);
+
   std::map<std::string, Owner, std::less<>> owners_;
+  std::deque<std::string> left_;  // Frames in the tree whose publisher is gone, the first that left first.
+  bool full_ = false;             // A frame found no room, since the writers changed last.
   std::map<std::string, Contenders> contended_;  // At most ros2::FrameTree::kMaxFrames.
   ros2::FrameTree tree_;
 };

@@ -30,11 +30,16 @@ Values TakeOut(Values& values, Chosen chosen) {
   return taken;
 }
 
+bool Contains(const std::vector<std::uint64_t>& ids, std::uint64_t id) {
+  return std::find(ids.begin(), ids.end(), id) != ids.end();
+}
+
 // A site that is divided: the part that stays, and the part that goes.
 struct Division {
   SiteContents contents;
   std::set<std::uint64_t> going;  // Sessions.
   std::set<std::string> robots;   // The robots of these sessions.
+  bool unreadable = false;        // One of them cannot be read.
   std::vector<StoredVersion> staying_versions, going_versions;
   StoredSite going_site;
 };
@@ -46,11 +51,14 @@ Result<Division> Divide(Store& store, const std::string& site, const std::vector
   division.contents = std::move(*contents);
   division.going = {sessions.begin(), sessions.end()};
   const std::vector<std::uint64_t>& layers = division.contents.layers;
+  const std::vector<std::uint64_t>& unreadable = division.contents.unreadable;
   for (const std::uint64_t id : division.going) {
     const auto session = division.contents.sessions.find(id);
     if (session != division.contents.sessions.end()) {
       division.robots.insert(session->second.request.robot);
-    } else if (std::find(layers.begin(), layers.end(), id) == layers.end()) {
+    } else if (Contains(unreadable, id)) {
+      division.unreadable = true;
+    } else if (!Contains(layers, id)) {
       return Fail(StatusCode::kNotFound, "site '" + site + "' has no session " + std::to_string(id));
     }
   }
@@ -126,11 +134,20 @@ Result<void> DeleteSession(Store& store, const std::string& site, std::uint64_t 
   return store.Commit(changes);
 }
 
+Result<void> DeleteJob(Store& store, std::uint64_t job) {
+  const auto jobs = store.Owners(RecordKind::kJob);
+  if (!jobs) return tl::unexpected(jobs.error());
+  if (!Contains(*jobs, job)) return Fail(StatusCode::kNotFound, "there is no job " + std::to_string(job));
+  return store.Commit({.removed = {{.kind = RecordKind::kJob, .owner = job}}, .put = {}});
+}
+
 Result<void> SplitSite(Store& store, const std::string& site, const std::vector<std::uint64_t>& sessions,
                        const std::string& new_site) {
   if (auto fresh = CheckNewSite(store, new_site); !fresh) return fresh;
   auto division = Divide(store, site, sessions);
   if (!division) return tl::unexpected(division.error());
+  if (division->unreadable)
+    return Fail(StatusCode::kFailedPrecondition, "a session that cannot be read cannot be moved");
   RecordChanges changes;
   PutStaying(*division, changes);
   const NameId to = HashName(new_site);

@@ -1,5 +1,6 @@
 // How two sites of a store become one (site_edit.h).
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "common/service/start_pose.h"
@@ -21,6 +22,10 @@ SmoothedPaths Shown(const Versions& versions, std::uint32_t enabled) {
   }
   return {};
 }
+
+// The epoch of a switch that was not completed: higher than any that there is, because those that are lower than the
+// ones a site knows count as completed.
+constexpr std::uint32_t kNever = std::numeric_limits<std::uint32_t>::max();
 
 class Merge {
  public:
@@ -96,7 +101,9 @@ class Merge {
           if (correction == nullptr) continue;
           changed = true;
           const bool completed = IsCompleted(of.site.switches, correction->epoch, correction->generation);
-          correction->epoch = completed ? correction->epoch + shift : 0;
+          correction->epoch = completed ? correction->epoch + shift : kNever;
+          // The site that it comes from may have forgotten it, for which only its newest switches are kept.
+          if (completed) into_.site.switches.emplace(correction->epoch, correction->generation);
           if (moves && !correction->grid.fragment)
             correction->grid = Transformed(correction->grid, T_into_from_, of.site.resolution_m);
         }

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "server/store/envelope.h"
+#include "server/store/site_edit.h"
 #include "tests/server/support/raw_records.h"
 #include "tests/server/support/stored_server.h"
 #include "tests/temp_directory.h"
@@ -133,6 +134,7 @@ struct BadRecord {
   std::string owner;                // As SQL.
   std::vector<std::string> robots;  // Who is there without it.
   std::string told;                 // In the server's state.
+  Result<void> (*remove)(Store&);
 };
 
 class RestoreOneBadRecord : public ::testing::TestWithParam<BadRecord> {
@@ -179,21 +181,45 @@ TEST_P(RestoreOneBadRecord, StaysInTheStoreAndEverythingElseComesBack) {
   }
   const std::vector<std::string> left = RawRecords(state).Of(Where());
   EXPECT_THAT(left, ::testing::IsSupersetOf(bad));
+
+  // As deploy/README.md says how to be rid of it.
+  {
+    const auto store = *OpenStore(state);
+    ASSERT_TRUE(GetParam().remove(*store));
+    ASSERT_TRUE(RemoveRests(*store));
+  }
+  StoredServer cleaned(state);
+  EXPECT_THAT(cleaned->Ask(About(RequestKind::kStatus, "")).status.message,
+              ::testing::Not(::testing::HasSubstr("set aside")));
 }
 
-INSTANTIATE_TEST_SUITE_P(OfEachKind, RestoreOneBadRecord,
-                         ::testing::Values(BadRecord{RecordKind::kSite, Sql(HashName("lab")), {"r2"}, "site 'lab'"},
-                                           BadRecord{RecordKind::kMapVersion,
-                                                     Sql(HashName("lab")) + " AND number = " + Sql(2),
-                                                     {"r0", "r1", "r2"},
-                                                     "map version 2 of site 'lab'"},
-                                           BadRecord{RecordKind::kLayer,
-                                                     Sql(HashName("lab")),
-                                                     {"r0", "r1", "r2"},
-                                                     "session 1 has drawn of site 'lab'"},
-                                           BadRecord{RecordKind::kSession, Sql(3), {"r0", "r2"}, "session 3"},
-                                           BadRecord{RecordKind::kJob, Sql(1), {"r0", "r1", "r2"}, "job 1"}),
-                         [](const auto& one) { return "Kind" + std::to_string(static_cast<int>(one.param.kind)); });
+Result<void> DeleteLab(Store& store) {
+  return DeleteSite(store, "lab");
+}
+template <std::uint64_t session>
+Result<void> DeleteSessionOfLab(Store& store) {
+  return DeleteSession(store, "lab", session);
+}
+Result<void> DeleteFirstJob(Store& store) {
+  return DeleteJob(store, 1);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    OfEachKind, RestoreOneBadRecord,
+    ::testing::Values(BadRecord{RecordKind::kSite, Sql(HashName("lab")), {"r2"}, "site 'lab'", DeleteLab},
+                      BadRecord{RecordKind::kMapVersion,
+                                Sql(HashName("lab")) + " AND number = " + Sql(2),
+                                {"r0", "r1", "r2"},
+                                "map version 2 of site 'lab'",
+                                DeleteLab},
+                      BadRecord{RecordKind::kLayer,
+                                Sql(HashName("lab")),
+                                {"r0", "r1", "r2"},
+                                "session 1 has drawn of site 'lab'",
+                                DeleteSessionOfLab<1>},
+                      BadRecord{RecordKind::kSession, Sql(3), {"r0", "r2"}, "session 3", DeleteSessionOfLab<3>},
+                      BadRecord{RecordKind::kJob, Sql(1), {"r0", "r1", "r2"}, "job 1", DeleteFirstJob}),
+    [](const auto& one) { return "Kind" + std::to_string(static_cast<int>(one.param.kind)); });
 
 // A robot that does not say where it starts comes to the site. It must not begin the map anew.
 void JoinsAndBeginsNothing(StoredServer& server) {
@@ -245,6 +271,28 @@ TEST(Restore, ADamagedJournalLeavesTheMapOfTheCheckpointAndNobodyBeginsItAnew) {
               ::testing::HasSubstr("session 1 of robot 'r1' in site 'lab' is set aside"));
   EXPECT_TRUE(second->WaitFor([&] { return second->CurrentTiles().size() >= 4; }));
   JoinsAndBeginsNothing(second);
+}
+
+// A kill right after the first session of a site: the session was stored, and its site not yet. Where a server makes
+// only the sites that it was told, the session was set aside.
+TEST(Restore, ASessionComesBackWhoseConfiguredSiteWasNotStoredYet) {
+  const TempDirectory directory;
+  ASSERT_NO_FATAL_FAILURE(MakeOneSession(directory / "0"));
+  {
+    const auto store = *OpenStore(directory / "0");
+    RecordChanges changes;
+    for (const RecordKind kind : {RecordKind::kSite, RecordKind::kMapVersion, RecordKind::kLayer})
+      changes.removed.push_back({.kind = kind, .owner = HashName("lab")});
+    ASSERT_TRUE(store->Commit(changes));
+  }
+  ServerOptions options = TestOptions();
+  options.server.sites = "lab";
+  options.server.create_sites = false;
+  StoredServer second(directory / "0", options);
+  const Reply status = second->Ask(About(RequestKind::kStatus, ""));
+  EXPECT_EQ(Robots(status), std::vector<std::string>{"r1"});
+  EXPECT_EQ(status.status.message, "");
+  EXPECT_EQ(PathOf(*second.operator->()).size(), 60U);
 }
 
 // Not even the site of the session can be read. A damaged index hides a record altogether.

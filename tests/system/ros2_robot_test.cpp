@@ -19,11 +19,14 @@ using Words = std::vector<std::string>;
 
 class RosFleet : public ::testing::Test {
  protected:
-  RosFleet() {
-    setenv("CYCLONEDDS_URI", "file://" CAIRN_CYCLONE_CONFIG, 1);
-    server_ = std::make_unique<ChildProcess>(
-        Words{CAIRND_PATH, "--domain", domain_, "--set", "ros2.enabled=true", "--set", "ros2.domain=" + domain_,
-              "--set", "ros2.namespaces=/r2=yard/r2, /{robot}, /=rootless", "--set", "slam.particles=20"});
+  RosFleet() { setenv("CYCLONEDDS_URI", "file://" CAIRN_CYCLONE_CONFIG, 1); }
+  void SetUp() override { StartServer("256"); }
+
+  void StartServer(const std::string& max_robots) {
+    server_ = std::make_unique<ChildProcess>(Words{CAIRND_PATH, "--domain", domain_, "--set", "ros2.enabled=true",
+                                                   "--set", "ros2.domain=" + domain_, "--set",
+                                                   "ros2.namespaces=/r2=yard/r2, /{robot}, /=rootless", "--set",
+                                                   "slam.particles=20", "--set", "ros2.max_robots=" + max_robots});
     EXPECT_TRUE(server_->Says("ready"));
   }
 
@@ -107,6 +110,18 @@ TEST_F(RosFleet, TheDoctorSaysWhyARobotIsNotOnTheMap) {
   EXPECT_THAT(doctor.output, HasSubstr("/r4  robot r4 in site lab: NOT on the map\n  - "));
   server_->Signal(SIGTERM);
   EXPECT_EQ(server_->Wait().exit_code, 0);
+}
+
+// Names that had come once kept others out until the server was started again.
+TEST_F(RosFleet, NamespacesThatAreGoneMakeRoomForOthers) {
+  server_->Signal(SIGTERM);
+  EXPECT_EQ(server_->Wait().exit_code, 0);
+  StartServer("1");
+  ExpectGood(*Robot("r1", "5"));
+  const auto second = Robot("r2", "12", {}, "yard");
+  DoctorOf("/r2", [](const nlohmann::json& one) { return one["on_map"] == true; });
+  EXPECT_EQ(Doctor()["namespaces"].size(), 1U);
+  ExpectGood(*second);
 }
 
 TEST(Ros2Doctor, SaysThatTheDoorIsShut) {

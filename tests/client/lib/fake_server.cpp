@@ -122,6 +122,12 @@ void FakeServer::IgnoreSessions(int count) {
   sessions_to_ignore_ = count;
 }
 
+void FakeServer::RefuseSessions(int count, const Status& why) {
+  const MutexLock lock(mutex_);
+  sessions_to_refuse_ = count;
+  why_refused_ = why;
+}
+
 std::vector<SessionRequest> FakeServer::sessions() const {
   const MutexLock lock(mutex_);
   return asked_sessions_;
@@ -164,7 +170,11 @@ void FakeServer::OnSession(SessionRequest&& request) {
     state.map_frame = kMapFrame;
     state.stale = stale_;
     const bool known = owners_.contains(request.robot);
-    if (!known && request.started) {
+    if (sessions_to_refuse_ > 0) {
+      --sessions_to_refuse_;
+      state.phase = SessionPhase::kRefused;
+      state.status = why_refused_;
+    } else if (!known && request.started) {
       state.phase = SessionPhase::kRefused;
       state.status = {StatusCode::kFailedPrecondition, "the server does not know this session"};
     } else if (known && owners_[request.robot].client != request.client) {

@@ -34,6 +34,7 @@ class FakeServer {
   // Of all that is sent from now on; 1 at first.
   void SetGeneration(Generation generation);
   void IgnoreSessions(int count);  // So many session requests are not answered.
+  void RefuseSessions(int count, const Status& why);
   // Scans with this number are lost on their way, once.
   void LoseOnce(std::uint64_t sequence);
 
@@ -82,6 +83,8 @@ class FakeServer {
   std::set<std::uint64_t> to_lose_ CAIRN_GUARDED_BY(mutex_);
   Generation generation_ CAIRN_GUARDED_BY(mutex_);
   int sessions_to_ignore_ CAIRN_GUARDED_BY(mutex_) = 0;
+  int sessions_to_refuse_ CAIRN_GUARDED_BY(mutex_) = 0;
+  Status why_refused_ CAIRN_GUARDED_BY(mutex_);
   std::vector<SessionRequest> asked_sessions_ CAIRN_GUARDED_BY(mutex_);
   std::map<std::string, SessionRequest> owners_ CAIRN_GUARDED_BY(mutex_);
   std::map<NameId, Account> accounts_ CAIRN_GUARDED_BY(mutex_);

@@ -194,6 +194,22 @@ TEST_F(RobotClientTest, AsksAgainUntilItIsAnswered) {
   EXPECT_EQ(server_->sessions()[0].session, server_->sessions()[1].session);
 }
 
+// A robot's program that was started again while its last session was still ending gave up at once.
+TEST_F(RobotClientTest, AsksAgainWhereTheServerCannotOpenTheSessionYet) {
+  server_->RefuseSessions(2, {StatusCode::kUnavailable, "the last session is still ending"});
+  const auto client = Open();
+  EXPECT_EQ(client->session().phase, SessionPhase::kActive);
+  EXPECT_EQ(server_->sessions().size(), 3U);
+}
+
+TEST_F(RobotClientTest, SaysWhyTheServerCouldNotOpenTheSessionInTime) {
+  server_->RefuseSessions(1000, {StatusCode::kResourceExhausted, "too many robots"});
+  const auto client = RobotClient::Open(*bus_, Robot("r1"), 2.0);
+  ASSERT_FALSE(client);
+  EXPECT_EQ(client.error().code, StatusCode::kResourceExhausted);
+  EXPECT_EQ(client.error().message, "too many robots");
+}
+
 // It went on streaming into a session that was another's by then.
 TEST_F(RobotClientTest, IsToldThatAnotherClientHasTakenTheRobotOver) {
   const auto client = Open();

@@ -4,6 +4,7 @@
 
 #include <random>
 #include <set>
+#include <utility>
 
 namespace cairn::server {
 namespace {
@@ -70,6 +71,20 @@ TEST(TileSet, AChangeMakesAnotherSet) {
   EXPECT_EQ(after.Find(far), before.Find(far));
   EXPECT_TRUE(after.With({{far, nullptr}}).empty());
   EXPECT_FALSE(after.BoxOf(1));
+}
+
+// A change in a large map once copied all of it.
+TEST(TileSet, AChangeCopiesOnlyTheBlockThatItIsIn) {
+  std::map<TileKey, TileSet::TilePtr> all;
+  for (int x = 0; x < 160; x += 8) {
+    for (int y = 0; y < 160; y += 8) all[{0, x, y}] = TileAt({0, x, y});
+  }
+  const TileSet before = TileSet().With(std::exchange(all, {}));
+  const TileSet after = before.With({{{0, 1, 1}, TileAt({0, 1, 1})}});
+  int copied = 0, shared = 0;
+  before.ForEach(0, [&](const TileSet::TilePtr& tile) { ++(tile.use_count() > 1 ? copied : shared); });
+  EXPECT_EQ(copied, 4);  // Of 16 x 16 tiles, each eighth.
+  EXPECT_EQ(shared, 396);
 }
 
 }  // namespace

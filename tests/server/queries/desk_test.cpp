@@ -95,6 +95,18 @@ TEST_F(DeskTest, ARequestBeyondTheQueueIsAnsweredBusyAtOnceAndTheOthersLater) {
   }
 }
 
+// The watchdog looks at it: a desk that has work and finishes none is stalled.
+TEST_F(DeskTest, ItsPulseTellsWhetherRequestsWaitAndWhetherTheyAreTaken) {
+  EXPECT_FALSE(desk_.pulse().busy);
+  desk_.Take(Of(RequestKind::kPing));
+  EXPECT_TRUE(desk_.pulse().busy);
+  EXPECT_EQ(desk_.pulse().finished, 0U);
+  desk_.Start();
+  ASSERT_TRUE(NextReply());
+  EXPECT_FALSE(desk_.pulse().busy);
+  EXPECT_EQ(desk_.pulse().finished, 1U);
+}
+
 TEST_F(DeskTest, AMapInfoIsThatOfTheSiteOrOfAllSites) {
   const Reply one = Ask(Of(RequestKind::kMapInfo));
   ASSERT_EQ(one.maps.size(), 1U);

@@ -60,5 +60,28 @@ TEST(SharedFrames, APublisherThatWasStartedAgainOwnsItsFrames) {
   EXPECT_NEAR(Find(frames.tree(), "base_link", "laser")->x, 3.0, 1e-12);
 }
 
+// Those of robots that were gone kept every later robot from being mounted.
+TEST(SharedFrames, WhereThereAreTooManyThoseOfPublishersThatAreGoneGiveWay) {
+  SharedFrames frames;
+  const auto take = [&frames](const ros2::WriterId& writer, const std::string& child) {
+    return frames.Take(Message(Link("base_link", child, 1.0)), writer, true).transforms.size();
+  };
+  const auto name = [](std::size_t i) { return "frame" + std::to_string(i); };
+  for (std::size_t i = 0; i < ros2::FrameTree::kMaxFrames; ++i) EXPECT_EQ(take(i < 2 ? kFirst : kSecond, name(i)), 1U);
+  EXPECT_FALSE(frames.full());
+  EXPECT_EQ(take(kSecond, "one more"), 0U);
+  EXPECT_TRUE(frames.full());
+
+  frames.SetWriters({kSecond});
+  EXPECT_FALSE(frames.full());
+  EXPECT_TRUE(Find(frames.tree(), "base_link", name(0))) << "there is room yet";
+  EXPECT_EQ(take(kSecond, name(1)), 1U) << "started again: it stays";
+  EXPECT_EQ(take(kSecond, "one more"), 1U);
+  EXPECT_FALSE(Find(frames.tree(), "base_link", name(0)));
+  EXPECT_TRUE(Find(frames.tree(), "base_link", name(1)));
+  EXPECT_EQ(take(kSecond, "and another"), 0U);
+  EXPECT_TRUE(frames.full());
+}
+
 }  // namespace
 }  // namespace cairn::server

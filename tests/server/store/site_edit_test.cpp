@@ -13,22 +13,6 @@ namespace {
 
 constexpr double kQuarterTurn = kPi / 2;
 
-// These sessions of the site have begun without a start and are not joined with the map.
-void MakeFragments(Store& store, const std::string& name, const std::set<std::uint64_t>& sessions) {
-  auto contents = ReadSite(store, name);
-  ASSERT_TRUE(contents);
-  contents->site.fragments = sessions;
-  contents->site.past = {sessions.begin(), sessions.end()};
-  RecordChanges changes;
-  changes.put.push_back({{RecordKind::kSite, HashName(name), 0}, BytesOf(contents->site)});
-  for (auto& [id, session] : contents->sessions) {
-    session.fragment = sessions.contains(id);
-    session.request.has_start = session.request.has_start && !session.fragment;
-    changes.put.push_back({{RecordKind::kSession, id, 0}, BytesOf(session)});
-  }
-  ASSERT_TRUE(store.Commit(std::move(changes)));
-}
-
 std::filesystem::path Saved(const TempDirectory& directory, const SampleSite& sample, std::uint64_t fragment = 0) {
   const auto store = MemoryStore();
   Put(*store, sample);
@@ -36,16 +20,6 @@ std::filesystem::path Saved(const TempDirectory& directory, const SampleSite& sa
   const auto path = directory / (sample.name + ".site");
   EXPECT_TRUE(WriteSiteFile(*store, sample.name, path));
   return path;
-}
-
-std::vector<JournalEntry> JournalOf(Store& store, std::uint64_t session) {
-  std::vector<JournalEntry> entries;
-  const auto last = ReadJournal(store, session, 0, [&](std::uint64_t, JournalEntry&& entry) {
-    entries.push_back(std::move(entry));
-    return Result<void>{};
-  });
-  EXPECT_TRUE(last) << last.error().message;
-  return entries;
 }
 
 TEST(ImportSite, GivesNewNumbersBesideOtherSites) {
@@ -179,132 +153,6 @@ TEST(ImportSite, AnErrorOfTheDiskLeavesNothingBehind) {
   vfs.Set(DiskFault::kNone);
   EXPECT_TRUE(Everything(**store).empty());
   EXPECT_TRUE(ImportSite(**store, path));
-}
-
-TEST(MergeSites, BothSitesAreOneAndEveryScanIsThere) {
-  const auto store = MemoryStore();
-  Put(*store, {.name = "lab"});
-  Put(*store, {.name = "hall", .first_session = 11, .job = 4, .epoch = 2, .generation = 6});
-  const auto before = Everything(*store);
-  ASSERT_TRUE(MergeSites(*store, "lab", "hall"));
-  EXPECT_EQ(*SiteNames(*store), std::vector<std::string>{"lab"});
-  const auto lab = ReadSite(*store, "lab");
-  ASSERT_TRUE(lab);
-  EXPECT_EQ(lab->sessions.size(), 4U);
-  EXPECT_EQ(lab->layers, (std::vector<std::uint64_t>{3, 13}));
-  EXPECT_EQ(lab->jobs.size(), 2U);
-  EXPECT_EQ(lab->jobs.at(4).job.map_version, 3U);
-  // Epoch 2 of the hall follows epoch 1 of the lab, and its corrections say so.
-  EXPECT_EQ(lab->site.epoch, 3U);
-  EXPECT_EQ(lab->site.switches, (std::map<std::uint32_t, std::uint64_t>{{1, 5}, {3, 6}}));
-  EXPECT_EQ(std::get<CorrectionTaken>(JournalOf(*store, 1)[2]).epoch, 1U);
-  EXPECT_EQ(std::get<CorrectionTaken>(JournalOf(*store, 11)[2]).epoch, 3U);
-  EXPECT_EQ(lab->sessions.at(11).map_epoch, 1U);
-  EXPECT_EQ(lab->sessions.at(11).request.T_map_robot_start, (Pose2{1, 2, 0.5}));
-  // Checkpoints stay, because nothing has moved; the scans are the same bytes.
-  for (const std::uint64_t session : {1, 2, 11, 12}) {
-    EXPECT_TRUE(*ReadCheckpoint(*store, session)) << session;
-    EXPECT_EQ(Everything(*store)[(RecordKey{RecordKind::kJournal, session, 2})],
-              before.at({RecordKind::kJournal, session, 2}));
-  }
-  const auto versions = *ReadVersions(*store, HashName("lab"));
-  ASSERT_EQ(versions.size(), 4U);
-  EXPECT_EQ(versions.at(1).parts.size(), 4U);
-  EXPECT_EQ(versions.at(3).parts.size(), 2U);
-  EXPECT_EQ(lab->site.enabled_version, 4U);
-  EXPECT_EQ(lab->site.next_version, 5U);
-  EXPECT_EQ(versions.at(4).smoothed.size(), 4U);
-}
-
-// A switch of one site that was not completed must not become true by a switch of the other one.
-TEST(MergeSites, ACorrectionThatNeverHappenedDoesNotHappenLater) {
-  const auto store = MemoryStore();
-  Put(*store, {.name = "lab", .epoch = 1, .generation = 5});
-  Put(*store, {.name = "hall", .first_session = 11, .job = 4, .epoch = 1, .generation = 6});
-  const JournalEntry begun = CorrectionTaken{2, 6, SampleGrid(8)};
-  ASSERT_TRUE(store->Commit({.removed = {}, .put = {{{RecordKind::kJournal, 1, 5}, BytesOf(5, {begun})}}}));
-  ASSERT_TRUE(MergeSites(*store, "lab", "hall"));
-  ASSERT_EQ(ReadSite(*store, "lab")->site.switches.at(2), 6U);
-  EXPECT_EQ(std::get<CorrectionTaken>(JournalOf(*store, 1)[4]).epoch, 0U);
-}
-
-TEST(MergeSites, ATransformMovesWhatHasBeenDrawnAndWhereSessionsBegin) {
-  const auto store = MemoryStore();
-  Put(*store, {.name = "lab"});
-  Put(*store, {.name = "hall", .first_session = 11, .job = 4});
-  const Pose2 T_lab_hall{1.0, 0.5, kQuarterTurn};
-  ASSERT_TRUE(MergeSites(*store, "lab", "hall", T_lab_hall));
-  const auto lab = ReadSite(*store, "lab");
-  ASSERT_TRUE(lab);
-  EXPECT_EQ(lab->sessions.at(1).request.T_map_robot_start, (Pose2{1, 2, 0.5}));
-  const Pose2 start = lab->sessions.at(11).request.T_map_robot_start;
-  EXPECT_NEAR(start.x, 1.0 - 2.0, 1e-12);
-  EXPECT_NEAR(start.y, 0.5 + 1.0, 1e-12);
-  EXPECT_NEAR(start.theta, 0.5 + kQuarterTurn, 1e-12);
-  EXPECT_TRUE(*ReadCheckpoint(*store, 1));
-  EXPECT_FALSE(*ReadCheckpoint(*store, 11)) << "it was made in the other frame";
-  // The cell (645, -128) of the hall's session 13 is at (20 + 127, 10 + 645) now: one turned cell, no more.
-  const auto layers = *ReadLayers(*store, HashName("lab"));
-  ASSERT_EQ(layers.size(), 2U);
-  EXPECT_EQ(CellAt(layers[1].grid, 147, 655), 5);
-  EXPECT_EQ(CellAt(layers[1].grid, 146, 655), INT16_MIN);
-  EXPECT_EQ(CellAt(layers[0].grid, 645, -128), 5) << "the lab stays where it is";
-  EXPECT_EQ(CellAt(std::get<CorrectionTaken>(JournalOf(*store, 11)[2]).grid, 147, 271), 2);
-  const auto versions = *ReadVersions(*store, HashName("lab"));
-  EXPECT_EQ(CellAt(versions.at(3).parts.at(11), 147, 527), 4);
-  const StampedPose& pose = versions.at(4).smoothed.at("r11").path->front();
-  EXPECT_NEAR(pose.T_map_robot.x, -1.0, 1e-12);
-  EXPECT_NEAR(versions.at(4).smoothed.at("r1").path->front().T_map_robot.x, 1.0, 0.0);
-}
-
-// Where a fragment lies in the map is not known, so a transform of the map says nothing of it.
-TEST(MergeSites, AFragmentKeepsItsFrameAndIsOneInTheOtherSiteToo) {
-  const auto store = MemoryStore();
-  Put(*store, {.name = "lab"});
-  Put(*store, {.name = "hall", .first_session = 11, .job = 4});
-  MakeFragments(*store, "hall", {12, 13});
-  const Pose2 start = ReadSite(*store, "hall")->sessions.at(12).request.T_map_robot_start;
-  ASSERT_TRUE(MergeSites(*store, "lab", "hall", {1.0, 0.5, kQuarterTurn}));
-  const auto lab = ReadSite(*store, "lab");
-  ASSERT_TRUE(lab);
-  EXPECT_EQ(lab->site.fragments, (std::set<std::uint64_t>{12, 13}));
-  EXPECT_EQ(lab->site.past, (std::vector<std::uint64_t>{12, 13}));
-  EXPECT_TRUE(lab->sessions.at(12).fragment);
-  EXPECT_FALSE(lab->sessions.at(12).request.has_start);
-  EXPECT_EQ(lab->sessions.at(12).request.T_map_robot_start, start);
-  EXPECT_EQ(CellAt(ReadLayers(*store, HashName("lab"))->at(1).grid, 645, -128), 5);
-  // A version has joined it once: what it has drawn since lies in the map.
-  EXPECT_EQ(CellAt(std::get<CorrectionTaken>(JournalOf(*store, 12)[2]).grid, 147, 271), 2);
-}
-
-TEST(MergeSites, WhatCannotBeMergedStaysAsItIs) {
-  const auto store = MemoryStore();
-  Put(*store, {.name = "lab"});
-  Put(*store, {.name = "hall", .first_session = 11, .job = 4});
-  ASSERT_TRUE(
-      store->Commit({.removed = {{.kind = RecordKind::kJournal, .owner = 12, .first = 0, .last = 2}}, .put = {}}));
-  const auto before = Everything(*store);
-  const auto cut = MergeSites(*store, "lab", "hall", {1.0, 0.0, 0.0});
-  ASSERT_FALSE(cut);
-  EXPECT_EQ(cut.error().code, StatusCode::kFailedPrecondition);
-  EXPECT_NE(cut.error().message.find("begins at entry 3"), std::string::npos) << cut.error().message;
-  EXPECT_EQ(MergeSites(*store, "lab", "lab").error().code, StatusCode::kInvalidArgument);
-  EXPECT_EQ(MergeSites(*store, "lab", "nowhere").error().code, StatusCode::kNotFound);
-  EXPECT_EQ(MergeSites(*store, "lab", "hall", {1e9, 0, 0}).error().code, StatusCode::kInvalidArgument);
-  EXPECT_EQ(Everything(*store), before);
-  EXPECT_TRUE(MergeSites(*store, "lab", "hall")) << "without a transform nothing is estimated again";
-}
-
-// Its checkpoint would be removed, and nothing would be left of it.
-TEST(MergeSites, ASessionOfWhichOnlyTheCheckpointIsLeftIsNotMoved) {
-  const auto store = MemoryStore();
-  Put(*store, {.name = "lab"});
-  Put(*store, {.name = "hall", .first_session = 11, .job = 4});
-  ASSERT_TRUE(store->Commit({.removed = {{.kind = RecordKind::kJournal, .owner = 11}}, .put = {}}));
-  const auto moved = MergeSites(*store, "lab", "hall", {1.0, 0.0, 0.0});
-  ASSERT_FALSE(moved);
-  EXPECT_NE(moved.error().message.find("has no entries"), std::string::npos) << moved.error().message;
-  EXPECT_TRUE(*ReadCheckpoint(*store, 11));
 }
 
 TEST(SplitSite, TheSessionsGoWithTheirPartOfEverything) {

@@ -7,8 +7,10 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "server/store/checkpoint_writer.h"
+#include "server/store/journal.h"
 #include "server/store/site_edit.h"
 #include "server/store/sqlite_store.h"
 #include "tests/server/store/sample_entries.h"
@@ -104,6 +106,32 @@ inline std::int16_t CellAt(const StoredGrid& grid, int x, int y) {
       return chunk.cells.get()[(y - chunk.y * kTileCells) * kTileCells + x - chunk.x * kTileCells];
   }
   return INT16_MIN;
+}
+
+// These sessions of the site have begun without a start and are not joined with the map.
+inline void MakeFragments(Store& store, const std::string& name, const std::set<std::uint64_t>& sessions) {
+  auto contents = ReadSite(store, name);
+  ASSERT_TRUE(contents);
+  contents->site.fragments = sessions;
+  contents->site.past = {sessions.begin(), sessions.end()};
+  RecordChanges changes;
+  changes.put.push_back({{RecordKind::kSite, HashName(name), 0}, BytesOf(contents->site)});
+  for (auto& [id, session] : contents->sessions) {
+    session.fragment = sessions.contains(id);
+    session.request.has_start = session.request.has_start && !session.fragment;
+    changes.put.push_back({{RecordKind::kSession, id, 0}, BytesOf(session)});
+  }
+  ASSERT_TRUE(store.Commit(std::move(changes)));
+}
+
+inline std::vector<JournalEntry> JournalOf(Store& store, std::uint64_t session) {
+  std::vector<JournalEntry> entries;
+  const auto last = ReadJournal(store, session, 0, [&](std::uint64_t, JournalEntry&& entry) {
+    entries.push_back(std::move(entry));
+    return Result<void>{};
+  });
+  EXPECT_TRUE(last) << last.error().message;
+  return entries;
 }
 
 }  // namespace cairn::server::testing

@@ -156,8 +156,15 @@ TEST_F(CairnSite, FilesAreMergedSplitAndShortened) {
   const auto merged = MustJson(
       {"site", "merge", File("hall.site"), File("annex.site"), "--transform", "30,0,90deg", "-o", File("both.site")});
   EXPECT_EQ(merged["sessions"].size(), 4u);
-  MustJson({"site", "split", File("both.site"), "a1", "h2", "--to", "half", "-o", File("half.site"), "--rest",
-            File("rest.site")});
+  // A split that does not come to its end has lost nothing, although the rest replaces the file.
+  const std::string whole = directory_.Read("both.site");
+  const auto split = [this](const std::string& output, const std::string& rest) {
+    return Cairn({"site", "split", File("both.site"), "a1", "h2", "--to", "half", "-o", output, "--rest", rest}).code;
+  };
+  EXPECT_EQ(split(File("nowhere/half.site"), File("both.site")), ExitCode::kFailed);
+  EXPECT_EQ(split(File("half.site"), File("./half.site")), ExitCode::kUsage) << "one of them would be lost";
+  EXPECT_EQ(directory_.Read("both.site"), whole);
+  EXPECT_EQ(split(File("half.site"), File("rest.site")), ExitCode::kOk);
   const auto shorter = MustJson({"site", "delete-session", File("half.site"), "h2", "-o", File("shorter.site")});
   EXPECT_EQ(shorter["sessions"].size(), 1u);
   EXPECT_EQ(shorter["sessions"][0]["robot"], "a1");
@@ -218,8 +225,20 @@ TEST_F(CairnSite, AKilledCommandHasChangedEverythingOrNothing) {
         EXPECT_THAT(sites, ::testing::AnyOf(both, merged));
         is_whole(state, sites);
       });
+  const int splits = KillAtEachChange("annex", {"split", "annex", "a1", "--to", "half"}, [&](const std::string& state) {
+    const Sites sites = SitesIn(state);
+    EXPECT_THAT(sites, ::testing::AnyOf(both, Sites{{"annex", {"a2"}}, {"half", {"a1"}}, {"hall", {"h1", "h2"}}}));
+    is_whole(state, sites);
+  });
+  const int deletions = KillAtEachChange("annex", {"delete-session", "annex", "a1"}, [&](const std::string& state) {
+    const Sites sites = SitesIn(state);
+    EXPECT_THAT(sites, ::testing::AnyOf(both, Sites{{"annex", {"a2"}}, {"hall", {"h1", "h2"}}}));
+    is_whole(state, sites);
+  });
   EXPECT_GT(imports, 0);
   EXPECT_GT(merges, 0);
+  EXPECT_GT(splits, 0);
+  EXPECT_GT(deletions, 0);
 }
 
 // The same of a running server that loads a saved site.
