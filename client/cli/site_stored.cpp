@@ -2,7 +2,10 @@
 // files of saved sites. A directory is changed in one commit; files are read, and new ones are written.
 #include <fmt/format.h>
 
+#include <charconv>
+#include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "client/cli/commands.h"
 #include "client/cli/option_checks.h"
@@ -73,8 +76,9 @@ ExitCode ListStored(Program& program, const std::string& state) {
   if (!store) return program.Refuse(store.error());
   const auto names = server::SiteNames(**store);
   if (!names) return program.Refuse(names.error());
+  const auto unreadable = server::UnreadableSessions(**store);
+  if (!unreadable) return program.Refuse(unreadable.error());
   std::string text;
-  std::vector<std::uint64_t> unreadable;
   nlohmann::json sites = nlohmann::json::array();
   for (const std::string& name : *names) {
     const auto contents = server::ReadSite(**store, name);
@@ -91,12 +95,10 @@ ExitCode ListStored(Program& program, const std::string& state) {
                           merged ? ", together with that of earlier sessions" : "");
       sessions.push_back({{"session", id}, {"with_earlier", merged}});
     }
-    unreadable = contents->unreadable;
     sites.push_back({{"site", name}, {"sessions", sessions}});
   }
-  for (const std::uint64_t id : unreadable)
-    text += fmt::format("session {}, which cannot be read: it may be of any of these sites\n", id);
-  return program.Print(text.empty() ? "no site yet\n" : text, {{"sites", sites}, {"unreadable", unreadable}});
+  for (const std::uint64_t id : *unreadable) text += fmt::format("session {} of a site that cannot be read\n", id);
+  return program.Print(text.empty() ? "no site yet\n" : text, {{"sites", sites}, {"unreadable", *unreadable}});
 }
 
 ExitCode List(Program& program, const SiteArguments& arguments) {
@@ -177,14 +179,16 @@ Result<NamedSessions> OpenSessions(const SiteArguments& arguments) {
 
 bool AreOneFile(const std::string& one, const std::string& other) {
   std::error_code error;
-  const auto whole = [&error](const std::string& path) { return std::filesystem::weakly_canonical(path, error); };
-  return whole(one) == whole(other);
+  const auto whole = [&error](const std::string& path) {
+    return std::filesystem::weakly_canonical(std::filesystem::absolute(path, error), error);
+  };
+  return whole(one) == whole(other) && !error;
 }
 
 ExitCode Split(Program& program, const SiteArguments& arguments) {
-  if (arguments.state.empty() &&
-      AreOneFile(arguments.output, arguments.rest.empty() ? arguments.names[0] : arguments.rest)) {
-    program.err() << "cairn: the new site would replace what is left of the old one; write it into another file\n";
+  const std::string& output = arguments.output;
+  if (arguments.state.empty() && (AreOneFile(output, arguments.names[0]) || AreOneFile(output, arguments.rest))) {
+    program.err() << "cairn: the new site would replace the rest of the old one; write it into another file\n";
     return ExitCode::kUsage;
   }
   const auto named = OpenSessions(arguments);
@@ -207,7 +211,25 @@ ExitCode Split(Program& program, const SiteArguments& arguments) {
       {{"site", site}, {"new_site", arguments.as}, {"sessions", named->sessions}});
 }
 
+// By the number of a session that cannot be read: no site lists it. Nothing if it is none of those.
+std::optional<ExitCode> DeleteUnreadable(Program& program, const SiteArguments& arguments) {
+  std::uint64_t session = 0;
+  const std::string& text = arguments.names[1];
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), session);
+  if (arguments.state.empty() || error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  const auto store = OpenToEdit(arguments.state, true);
+  if (!store) return std::nullopt;
+  if (auto deleted = server::DeleteUnreadable(**store, session); !deleted) {
+    if (deleted.error().code == StatusCode::kNotFound) return std::nullopt;
+    return program.Refuse(deleted.error());
+  }
+  if (auto removed = server::RemoveRests(**store); !removed) return program.Refuse(removed.error());
+  return program.Print(fmt::format("session {} deleted, which could not be read\n", session),
+                       {{"session", text}, {"deleted", true}});
+}
+
 ExitCode DeleteSession(Program& program, const SiteArguments& arguments) {
+  if (const auto done = DeleteUnreadable(program, arguments)) return *done;
   const auto named = OpenSessions(arguments);
   if (!named) return program.Refuse(named.error());
   Store& store = *named->store;

@@ -131,7 +131,10 @@ bool RobotClient::Streaming() const {
 
 void RobotClient::OnMatched(int servers) {
   const MutexLock lock(mutex_);
-  if (servers == 0) answered_ = false;
+  if (servers == 0) {
+    answered_ = false;
+    not_yet_.reset();
+  }
   changed_.NotifyAll();
 }
 
@@ -159,6 +162,7 @@ void RobotClient::OnSession(SessionState&& state) {
     if (state.stale && !(state_ && state_->stale)) called_stale_ = Clock::now();
     state_ = state;
     answered_ = true;
+    not_yet_.reset();
     changed_.NotifyAll();
   }
   if (callbacks_.session) callbacks_.session(state);

@@ -52,8 +52,9 @@ class RobotClient {
   };
 
   // `bus` must outlive the client. Draws a client id and a session, and repeats the request until the server answers.
-  // If the server refuses, its reason is the error. kUnavailable: no server answers. `request.sensors` names at least
-  // one stream.
+  // If the server refuses, its reason is the error; where that is kUnavailable or kResourceExhausted, only once the
+  // request was repeated until the timeout. kUnavailable: no server answers. `request.sensors` names at least one
+  // stream.
   [[nodiscard]] static Result<std::unique_ptr<RobotClient>> Open(wire::Bus& bus, SessionRequest request,
                                                                  double timeout_s, Callbacks callbacks = {},
                                                                  const RobotClientOptions& options = {});

@@ -41,10 +41,11 @@ class GuardTransport : public transport::ChainingTransport {
     return udp->send(asking.data(), static_cast<std::uint32_t>(asking.size()), begin, end, timeout);
   }
 
-  // Samples of topics go to each reader's own address, never by multicast. By itself, Fast DDS sends what two readers
-  // may have to their common multicast address, and what one of them needs to its own. A participant has a thread for
-  // each address, so the two overtake each other: Cyclone DDS then saw the heartbeat of an answer before the answer,
-  // took the answer for one of the past, and the program that had asked waited in vain (1 of 12 on a busy machine).
+  // Samples of topics go to each reader's own address, and not by multicast where all readers have one. By itself, Fast
+  // DDS sends what two readers may have to their common multicast address, and what one of them needs to its own. A
+  // participant has a thread for each address, so the two overtake each other: Cyclone DDS then saw the heartbeat of an
+  // answer before the answer, took the answer for one of the past, and the program that had asked waited in vain (1 of
+  // 12 on a busy machine).
   void select_locators(rtps::LocatorSelector& selector) const override {
     auto& readers = selector.transport_starts();
     if (std::any_of(readers.begin(), readers.end(), IsOfDiscoveryOrHasNoAddress))

@@ -162,7 +162,7 @@ Result<std::shared_ptr<Site>> Atlas::Make(const std::string& name, Why why) {
     return found->second.site;
   }
   if (auto free = CheckName(name); !free) return tl::unexpected(free.error());
-  if (why != Why::kStored && !MakeRoom()) {
+  if (why == Why::kEntered && !MakeRoom()) {
     return Fail(StatusCode::kResourceExhausted,
                 std::to_string(sites_.size()) + " sites are open; the limit is maps.max_sites");
   }

@@ -69,8 +69,8 @@ class Atlas {
     std::shared_ptr<Site> site;
     bool configured = false;
   };
-  // A stored one has room although there may be more than maps.max_sites by now: none gives way to another one before
-  // its sessions are restored.
+  // A stored or configured one has room although there may be more than maps.max_sites by now: none gives way to
+  // another one before its sessions are restored.
   enum class Why { kEntered, kConfigured, kStored };
   Result<std::shared_ptr<Site>> Make(const std::string& name, Why why);
   std::shared_ptr<Site> NewSite(const std::string& name) const CAIRN_REQUIRES(mutex_);

@@ -53,7 +53,7 @@ class RobotStream {
 
   // Which writers exist now. A robot without a publisher of scans is away.
   void SetPublishers(bool scans, bool odometry, Clock::time_point now);
-  // The server knows that the robot is away, or has no session of it.
+  // The server was told that the robot is away, or has no session of it.
   [[nodiscard]] bool IsAway() const { return phase_ != Phase::kOpen || !alive_; }
   // Opens what has to be opened again.
   void Tick(Clock::time_point now);

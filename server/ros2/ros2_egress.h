@@ -1,8 +1,8 @@
 // What the server says of robots and maps, on its way to ROS 2: for each scan used, while the robot is localized, its
 // pose and the transform from map to odom; for each site its map, whole and as updates. A robot that is not localized
 // gets neither, so that its transform grows old and whoever drives it stops. See never waits: poses wait in a bounded
-// queue (the newest is left out when it is full), and of every tile only the newest version waits. Thread rule: See and
-// Serve from any thread; two threads of its own publish.
+// queue (the newest is left out when it is full), and of every tile only the newest version waits. Thread rule: See,
+// Serve and Leave from any thread; two threads of its own publish.
 #pragma once
 
 #include <atomic>

@@ -59,13 +59,19 @@ bool Ros2Ingress::IsGone(const Namespace& one) {
                      [](const auto& topic) { return topic.second.publishers == 0; });
 }
 
+bool Ros2Ingress::HasGone() const {
+  return std::any_of(namespaces_.begin(), namespaces_.end(), [](const auto& one) { return IsGone(one.second); });
+}
+
 bool Ros2Ingress::IsScan(const std::string& stream) const {
   return std::find(scan_names_.begin(), scan_names_.end(), stream) != scan_names_.end();
 }
 
 void Ros2Ingress::Tick(Clock::time_point now) {
   const MutexLock lock(mutex_);
-  if (const std::uint64_t version = bus_.writers_version(); version != writers_version_) {
+  // Where there was no room, again: the server may not have heard yet that a robot is away.
+  const std::uint64_t version = bus_.writers_version();
+  if (version != writers_version_ || (publishers_left_out_ > 0 && HasGone())) {
     writers_version_ = version;
     Discover(now);
   }
@@ -96,6 +102,7 @@ void Ros2Ingress::Discover(Clock::time_point now) {
 
 bool Ros2Ingress::ForgetGone(Clock::time_point now) {
   bool forgotten = false;
+  std::set<NameId> left;
   for (auto entry = namespaces_.begin(); entry != namespaces_.end();) {
     Namespace& one = entry->second;
     if (IsGone(one) && one.robot != nullptr) one.robot->SetPublishers(false, false, now);
@@ -106,11 +113,15 @@ bool Ros2Ingress::ForgetGone(Clock::time_point now) {
     for (auto& [stream, topic] : one.topics) End(topic);
     if (one.robot != nullptr) {
       ended_overflow_ += one.robot->overflow();
-      leave_(HashName(one.place->robot));
+      left.insert(HashName(one.place->robot));
     }
     entry = namespaces_.erase(entry);
     forgotten = true;
   }
+  for (const NameId robot_id : left) leave_(robot_id);
+  // Another namespace may be of the same robot. Its topics are made again.
+  for (auto& [name, one] : namespaces_)
+    if (left.contains(one.address.robot_id)) one.address = {};
   return forgotten;
 }
 
@@ -209,7 +220,7 @@ void Ros2Ingress::Subscribe(const std::string& name, Namespace& one) {
   RobotStream* const robot = one.robot.get();
   for (auto& [stream, topic] : one.topics) {
     const std::string wire_name = TopicIn(name, stream);
-    // The map and its robots live as long as this object, and the callbacks end before (Close).
+    // The callbacks end before their namespace is forgotten (End).
     const auto counted = [this, &received = topic.received, robot](auto take) {
       return [this, &received, robot, take](auto&& message, const ros2::Origin& origin) {
         const MutexLock lock(mutex_);

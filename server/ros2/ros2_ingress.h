@@ -96,6 +96,7 @@ class Ros2Ingress {
   [[nodiscard]] std::vector<std::string> ProblemsOf(const std::string& name, const Namespace& one,
                                                     Clock::time_point now) const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool IsScan(const std::string& stream) const;
+  [[nodiscard]] bool HasGone() const CAIRN_REQUIRES(mutex_);
   // Nobody publishes in it.
   [[nodiscard]] static bool IsGone(const Namespace& one);
 

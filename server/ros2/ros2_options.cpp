@@ -76,8 +76,9 @@ void Visit(OptionVisitor& visitor, Ros2Options& options) {
                "as map_updates.");
   visitor.Integer("max_map_cells", options.max_map_cells, "cells", 16384, 1'000'000'000,
                   "Larger maps are not published to ROS 2, because a grid is one message.");
-  visitor.Integer("max_robots", options.max_robots, "", 1, 4096,
-                  "Namespaces that are looked at. Further ones are ignored.");
+  visitor.Integer(
+      "max_robots", options.max_robots, "", 1, 4096,
+      "Namespaces that are looked at. Further ones are ignored until nobody publishes in one of these any more.");
 }
 
 Result<void> Validate(const Ros2Options& options) {

@@ -1,5 +1,6 @@
 #include "server/ros2/shared_frames.h"
 
+#include <iterator>
 #include <utility>
 
 namespace cairn::server {
@@ -31,7 +32,13 @@ ros2::Transforms SharedFrames::Take(const ros2::Transforms& message, const ros2:
       tree_.Forget(child);
       continue;
     }
-    if (!Set(transform)) continue;
+    if (const auto set = Set(transform); !set) {
+      const bool room = left_out_.size() < ros2::FrameTree::kMaxFrames || left_out_.contains(child);
+      if (set.error().code == StatusCode::kResourceExhausted && room)
+        left_out_.insert_or_assign(child, Owner{writer, transform});
+      continue;
+    }
+    left_out_.erase(child);
     if (owner == owners_.end()) std::erase(left_, child);
     owners_.insert_or_assign(child, Owner{writer, transform});
     clear.transforms.push_back(transform);
@@ -39,21 +46,17 @@ ros2::Transforms SharedFrames::Take(const ros2::Transforms& message, const ros2:
   return clear;
 }
 
-bool SharedFrames::Set(const ros2::Transform& transform) {
+Result<void> SharedFrames::Set(const ros2::Transform& transform) {
   for (;;) {
-    const auto set = tree_.Set(transform);
+    auto set = tree_.Set(transform);
     const bool full = !set && set.error().code == StatusCode::kResourceExhausted;
-    if (!full || left_.empty()) {
-      full_ |= full;
-      return set.has_value();
-    }
+    if (!full || left_.empty()) return set;
     tree_.Forget(left_.front());
     left_.pop_front();
   }
 }
 
 void SharedFrames::SetWriters(const std::set<ros2::WriterId>& writers) {
-  full_ = false;
   // The transforms stay in the tree: a robot whose program is started again is mounted as before.
   for (auto owner = owners_.begin(); owner != owners_.end();) {
     if (writers.contains(owner->second.writer)) {
@@ -73,6 +76,13 @@ void SharedFrames::SetWriters(const std::set<ros2::WriterId>& writers) {
     if (contenders.size() == 1 && Set(contenders.begin()->second))
       owners_.insert_or_assign(frame->first, Owner{contenders.begin()->first, contenders.begin()->second});
     frame = contended_.erase(frame);
+  }
+  // A static transform is not said again: what found no room before is tried once more.
+  for (auto frame = left_out_.begin(); frame != left_out_.end();) {
+    const auto& [child, owner] = *frame;
+    const bool taken = writers.contains(owner.writer) && Set(owner.said);
+    if (taken) owners_.insert_or_assign(child, owner);
+    frame = taken || !writers.contains(owner.writer) ? left_out_.erase(frame) : std::next(frame);
   }
 }
 

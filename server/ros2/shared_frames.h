@@ -26,7 +26,7 @@ class SharedFrames {
   // The frames that two publishers contend for.
   [[nodiscard]] std::vector<std::string> contended() const;
   // There are more frames than the tree can hold.
-  [[nodiscard]] bool full() const { return full_; }
+  [[nodiscard]] bool full() const { return !left_out_.empty(); }
 
  private:
   struct Owner {
@@ -38,11 +38,11 @@ class SharedFrames {
   static constexpr std::size_t kMaxContenders = 16;
 
   // As FrameTree::Set. Where there are too many frames, one gives way that nobody publishes any more.
-  bool Set(const ros2::Transform& transform);
+  Result<void> Set(const ros2::Transform& transform);
 
   std::map<std::string, Owner, std::less<>> owners_;
-  std::deque<std::string> left_;  // Frames in the tree whose publisher is gone, the first that left first.
-  bool full_ = false;             // A frame found no room, since the writers changed last.
+  std::deque<std::string> left_;           // Frames in the tree whose publisher is gone, the first that left first.
+  std::map<std::string, Owner> left_out_;  // There was no room for them. At most ros2::FrameTree::kMaxFrames.
   std::map<std::string, Contenders> contended_;  // At most ros2::FrameTree::kMaxFrames.
   ros2::FrameTree tree_;
 };

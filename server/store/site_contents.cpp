@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <iterator>
 #include <optional>
 #include <set>
 #include <utility>
@@ -111,6 +112,19 @@ Result<std::vector<std::uint64_t>> SessionsWithoutRecord(Store& store) {
   return std::vector<std::uint64_t>(others.begin(), others.end());
 }
 
+Result<std::vector<std::uint64_t>> UnreadableSessions(Store& store) {
+  auto unreadable = SessionsWithoutRecord(store);
+  if (!unreadable) return unreadable;
+  const auto recorded = store.Owners(RecordKind::kSession);
+  if (!recorded) return tl::unexpected(recorded.error());
+  const auto read = ReadSessions(store);
+  if (!read) return tl::unexpected(read.error());
+  std::copy_if(recorded->begin(), recorded->end(), std::back_inserter(*unreadable),
+               [&read](std::uint64_t id) { return !read->contains(id); });
+  std::sort(unreadable->begin(), unreadable->end());
+  return unreadable;
+}
+
 Result<std::uint64_t> LastSession(Store& store) {
   std::uint64_t last = 0;
   // One that was removed, or of which the own record is missing, counts as long as something is left of it.
@@ -169,23 +183,6 @@ Result<SiteContents> ReadSite(Store& store, const std::string& name) {
   return contents;
 }
 
-namespace {
-
-// Those of which a damaged record, a journal or a checkpoint is there, but which are not among the ones that were read.
-Result<std::vector<std::uint64_t>> UnreadableSessions(Store& store,
-                                                      const std::map<std::uint64_t, StoredSession>& read) {
-  auto unreadable = SessionsWithoutRecord(store);
-  if (!unreadable) return unreadable;
-  const auto recorded = store.Owners(RecordKind::kSession);
-  if (!recorded) return tl::unexpected(recorded.error());
-  std::copy_if(recorded->begin(), recorded->end(), std::back_inserter(*unreadable),
-               [&read](std::uint64_t id) { return !read.contains(id); });
-  std::sort(unreadable->begin(), unreadable->end());
-  return unreadable;
-}
-
-}  // namespace
-
 Result<SiteContents> ReadAround(Store& store, const std::string& name) {
   SiteContents contents;
   contents.site.name = name;
@@ -194,9 +191,6 @@ Result<SiteContents> ReadAround(Store& store, const std::string& name) {
   contents.layers = std::move(*layers);
   auto sessions = ReadSessions(store);
   if (!sessions) return tl::unexpected(sessions.error());
-  auto unreadable = UnreadableSessions(store, *sessions);
-  if (!unreadable) return tl::unexpected(unreadable.error());
-  contents.unreadable = std::move(*unreadable);
   std::erase_if(*sessions, [&name](const auto& one) { return one.second.request.site != name; });
   contents.sessions = std::move(*sessions);
   auto jobs = ReadAll<StoredJob>(store, RecordKind::kJob, JobOf);
@@ -232,10 +226,8 @@ Result<std::uint64_t> FindSession(const SiteContents& contents, const std::strin
   std::uint64_t number = 0;
   const char* const end = robot_or_number.data() + robot_or_number.size();
   const auto [stopped, error] = std::from_chars(robot_or_number.data(), end, number);
-  const auto has = [number](const std::vector<std::uint64_t>& numbers) {
-    return std::find(numbers.begin(), numbers.end(), number) != numbers.end();
-  };
-  const bool known = contents.sessions.contains(number) || has(contents.layers) || has(contents.unreadable);
+  const bool known = contents.sessions.contains(number) ||
+                     std::find(contents.layers.begin(), contents.layers.end(), number) != contents.layers.end();
   if (error == std::errc() && stopped == end && known) return number;
   return Fail(StatusCode::kNotFound, "site '" + contents.site.name + "' has no session of '" + robot_or_number + "'");
 }

@@ -16,8 +16,6 @@ struct SiteContents {
   std::map<std::uint64_t, StoredSession> sessions;  // By id.
   std::vector<std::uint64_t> layers;                // Sessions that exist no more.
   std::map<std::uint64_t, StoredJob> jobs;          // By id.
-  // Sessions of the store whose own record is damaged or missing: they may be of any site.
-  std::vector<std::uint64_t> unreadable;
 };
 
 // The names of all sites, sorted. Sites, sessions and jobs whose own record cannot be read are left out here, in
@@ -34,6 +32,8 @@ struct SiteContents {
 // Sessions without a record of their own of which a journal or a complete checkpoint is there, in ascending order.
 // Removed ones do not count.
 [[nodiscard]] Result<std::vector<std::uint64_t>> SessionsWithoutRecord(Store& store);
+// These, and the sessions whose own record is damaged, in ascending order: which site they belong to is not known.
+[[nodiscard]] Result<std::vector<std::uint64_t>> UnreadableSessions(Store& store);
 // The highest number that a session has or had; 0: there was none. Records that cannot be read count.
 [[nodiscard]] Result<std::uint64_t> LastSession(Store& store);
 // A session's own record is removed first, in one commit with a mark of it, because the rest, its checkpoints and its
@@ -49,8 +49,8 @@ struct SiteContents {
 [[nodiscard]] std::vector<RecordRange> RangesOf(const SiteContents& contents);
 [[nodiscard]] std::vector<RecordRange> RangesOfSession(std::uint64_t session);
 
-// The session of the robot of this name, else the session of this number; sessions that exist no more, or cannot be
-// read, have only a number. NOT_FOUND: the site has no such session.
+// The session of the robot of this name, else the session of this number; sessions that exist no more have only a
+// number. NOT_FOUND: the site has no such session.
 [[nodiscard]] Result<std::uint64_t> FindSession(const SiteContents& contents, const std::string& robot_or_number);
 
 }  // namespace cairn::server

@@ -39,30 +39,19 @@ struct Division {
   SiteContents contents;
   std::set<std::uint64_t> going;  // Sessions.
   std::set<std::string> robots;   // The robots of these sessions.
-  bool unreadable = false;        // One of them cannot be read.
   std::vector<StoredVersion> staying_versions, going_versions;
   StoredSite going_site;
 };
 
-Result<Division> Divide(Store& store, const std::string& site, const std::vector<std::uint64_t>& sessions) {
-  auto contents = ReadSite(store, site);
-  if (!contents) return tl::unexpected(contents.error());
+Result<Division> Divide(Store& store, SiteContents contents, const std::vector<std::uint64_t>& sessions) {
   Division division;
-  division.contents = std::move(*contents);
+  division.contents = std::move(contents);
   division.going = {sessions.begin(), sessions.end()};
-  const std::vector<std::uint64_t>& layers = division.contents.layers;
-  const std::vector<std::uint64_t>& unreadable = division.contents.unreadable;
   for (const std::uint64_t id : division.going) {
     const auto session = division.contents.sessions.find(id);
-    if (session != division.contents.sessions.end()) {
-      division.robots.insert(session->second.request.robot);
-    } else if (Contains(unreadable, id)) {
-      division.unreadable = true;
-    } else if (!Contains(layers, id)) {
-      return Fail(StatusCode::kNotFound, "site '" + site + "' has no session " + std::to_string(id));
-    }
+    if (session != division.contents.sessions.end()) division.robots.insert(session->second.request.robot);
   }
-  auto versions = ReadVersions(store, HashName(site));
+  auto versions = ReadVersions(store, HashName(division.contents.site.name));
   if (!versions) return tl::unexpected(versions.error());
   for (auto& [number, version] : *versions) {
     StoredVersion gone{.version = number, .job = version.job, .note = version.note, .parts = {}, .smoothed = {}};
@@ -87,6 +76,23 @@ Result<Division> Divide(Store& store, const std::string& site, const std::vector
   std::erase_if(division.going_site.past, std::not_fn(goes));
   ++stays.tile_version;
   return division;
+}
+
+// NOT_FOUND: no such site or session.
+Result<Division> DivideSite(Store& store, const std::string& site, const std::vector<std::uint64_t>& sessions) {
+  auto contents = ReadSite(store, site);
+  if (!contents) return tl::unexpected(contents.error());
+  for (const std::uint64_t id : sessions) {
+    if (!contents->sessions.contains(id) && !Contains(contents->layers, id))
+      return Fail(StatusCode::kNotFound, "site '" + site + "' has no session " + std::to_string(id));
+  }
+  return Divide(store, std::move(*contents), sessions);
+}
+
+bool Names(const StoredSite& site, std::uint64_t session) {
+  const auto& members = site.members;
+  return Contains(site.past, session) || site.fragments.contains(session) || site.merged.contains(session) ||
+         std::any_of(members.begin(), members.end(), [session](const auto& one) { return one.second == session; });
 }
 
 // Removes a session but for what is large, which RemoveRests does.
@@ -126,10 +132,30 @@ Result<void> DeleteSite(Store& store, const std::string& site) {
 }
 
 Result<void> DeleteSession(Store& store, const std::string& site, std::uint64_t session) {
-  const auto division = Divide(store, site, {session});
+  const auto division = DivideSite(store, site, {session});
   if (!division) return tl::unexpected(division.error());
   RecordChanges changes;
   PutStaying(*division, changes);
+  RemoveSession(session, changes);
+  return store.Commit(changes);
+}
+
+Result<void> DeleteUnreadable(Store& store, std::uint64_t session) {
+  const auto unreadable = UnreadableSessions(store);
+  if (!unreadable) return tl::unexpected(unreadable.error());
+  if (!Contains(*unreadable, session))
+    return Fail(StatusCode::kNotFound, "there is no session " + std::to_string(session) + " that cannot be read");
+  const auto names = SiteNames(store);
+  if (!names) return tl::unexpected(names.error());
+  RecordChanges changes;
+  for (const std::string& name : *names) {
+    auto contents = ReadSite(store, name);
+    if (!contents) return tl::unexpected(contents.error());
+    if (!Names(contents->site, session)) continue;
+    const auto division = Divide(store, std::move(*contents), {session});
+    if (!division) return tl::unexpected(division.error());
+    PutStaying(*division, changes);
+  }
   RemoveSession(session, changes);
   return store.Commit(changes);
 }
@@ -144,10 +170,8 @@ Result<void> DeleteJob(Store& store, std::uint64_t job) {
 Result<void> SplitSite(Store& store, const std::string& site, const std::vector<std::uint64_t>& sessions,
                        const std::string& new_site) {
   if (auto fresh = CheckNewSite(store, new_site); !fresh) return fresh;
-  auto division = Divide(store, site, sessions);
+  auto division = DivideSite(store, site, sessions);
   if (!division) return tl::unexpected(division.error());
-  if (division->unreadable)
-    return Fail(StatusCode::kFailedPrecondition, "a session that cannot be read cannot be moved");
   RecordChanges changes;
   PutStaying(*division, changes);
   const NameId to = HashName(new_site);

@@ -41,14 +41,17 @@ struct ImportOptions {
                                       const Pose2& T_into_from = {});
 
 // Moves the sessions (by number) with their parts of the map and of its versions into a new site. Jobs stay where they
-// ran. NOT_FOUND: no such site or session. ALREADY_EXISTS: there is a site of the new name. FAILED_PRECONDITION: a
-// session cannot be read.
+// ran. NOT_FOUND: no such site or session. ALREADY_EXISTS: there is a site of the new name.
 [[nodiscard]] Result<void> SplitSite(Store& store, const std::string& site, const std::vector<std::uint64_t>& sessions,
                                      const std::string& new_site);
 
-// Removes a session with its scans and its part of the map and of its versions, also one that cannot be read.
-// NOT_FOUND: no such site or session.
+// Removes a session with its scans and its part of the map and of its versions. NOT_FOUND: no such site or session.
 [[nodiscard]] Result<void> DeleteSession(Store& store, const std::string& site, std::uint64_t session);
+
+// Removes a session that cannot be read (UnreadableSessions), and what sites say of it. NOT_FOUND: there is none of
+// this number. DATA_LOSS: a map version of a site that names it cannot be read, either; then that site is to be deleted
+// first.
+[[nodiscard]] Result<void> DeleteUnreadable(Store& store, std::uint64_t session);
 
 // Also one that cannot be read. NOT_FOUND: no such job.
 [[nodiscard]] Result<void> DeleteJob(Store& store, std::uint64_t job);

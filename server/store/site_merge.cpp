@@ -102,8 +102,9 @@ class Merge {
           changed = true;
           const bool completed = IsCompleted(of.site.switches, correction->epoch, correction->generation);
           correction->epoch = completed ? correction->epoch + shift : kNever;
-          // The site that it comes from may have forgotten it, for which only its newest switches are kept.
-          if (completed) into_.site.switches.emplace(correction->epoch, correction->generation);
+          // Its site may have forgotten the switch, as it does with the oldest. The merged one has to know it.
+          if (completed)
+            correction->generation = completed_.emplace(correction->epoch, correction->generation).first->second;
           if (moves && !correction->grid.fragment)
             correction->grid = Transformed(correction->grid, T_into_from_, of.site.resolution_m);
         }
@@ -201,6 +202,7 @@ class Merge {
     site.epoch += from_.site.epoch;
     site.tile_version = std::max(site.tile_version, from_.site.tile_version) + 1;
     for (const auto& [epoch, generation] : from_.site.switches) site.switches[epoch + epoch_shift_] = generation;
+    site.switches.insert(completed_.begin(), completed_.end());
     site.members.insert(from_.site.members.begin(), from_.site.members.end());
     site.fragments.insert(from_.site.fragments.begin(), from_.site.fragments.end());
     site.past.insert(site.past.end(), from_.site.past.begin(), from_.site.past.end());
@@ -217,6 +219,7 @@ class Merge {
   const bool moves_;
   const std::uint32_t epoch_shift_;
   std::uint32_t version_shift_ = 0;
+  Switches completed_;  // Those that corrections name, by their epochs in the merged site.
   RecordChanges changes_;
 };
 

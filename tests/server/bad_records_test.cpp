@@ -189,16 +189,19 @@ TEST_P(RestoreOneBadRecord, StaysInTheStoreAndEverythingElseComesBack) {
     ASSERT_TRUE(RemoveRests(*store));
   }
   StoredServer cleaned(state);
-  EXPECT_THAT(cleaned->Ask(About(RequestKind::kStatus, "")).status.message,
-              ::testing::Not(::testing::HasSubstr("set aside")));
+  const Reply status = cleaned->Ask(About(RequestKind::kStatus, ""));
+  EXPECT_TRUE(status.status.ok());
+  EXPECT_THAT(status.status.message, ::testing::Not(::testing::HasSubstr("set aside")));
 }
 
 Result<void> DeleteLab(Store& store) {
   return DeleteSite(store, "lab");
 }
-template <std::uint64_t session>
-Result<void> DeleteSessionOfLab(Store& store) {
-  return DeleteSession(store, "lab", session);
+Result<void> DeleteLayer(Store& store) {
+  return DeleteSession(store, "lab", 1);
+}
+Result<void> DeleteThird(Store& store) {
+  return DeleteUnreadable(store, 3);
 }
 Result<void> DeleteFirstJob(Store& store) {
   return DeleteJob(store, 1);
@@ -216,8 +219,8 @@ INSTANTIATE_TEST_SUITE_P(
                                 Sql(HashName("lab")),
                                 {"r0", "r1", "r2"},
                                 "session 1 has drawn of site 'lab'",
-                                DeleteSessionOfLab<1>},
-                      BadRecord{RecordKind::kSession, Sql(3), {"r0", "r2"}, "session 3", DeleteSessionOfLab<3>},
+                                DeleteLayer},
+                      BadRecord{RecordKind::kSession, Sql(3), {"r0", "r2"}, "session 3", DeleteThird},
                       BadRecord{RecordKind::kJob, Sql(1), {"r0", "r1", "r2"}, "job 1", DeleteFirstJob}),
     [](const auto& one) { return "Kind" + std::to_string(static_cast<int>(one.param.kind)); });
 
@@ -291,6 +294,7 @@ TEST(Restore, ASessionComesBackWhoseConfiguredSiteWasNotStoredYet) {
   StoredServer second(directory / "0", options);
   const Reply status = second->Ask(About(RequestKind::kStatus, ""));
   EXPECT_EQ(Robots(status), std::vector<std::string>{"r1"});
+  EXPECT_TRUE(status.status.ok());
   EXPECT_EQ(status.status.message, "");
   EXPECT_EQ(PathOf(*second.operator->()).size(), 60U);
 }

@@ -204,7 +204,7 @@ TEST_F(RobotClientTest, AsksAgainWhereTheServerCannotOpenTheSessionYet) {
 
 TEST_F(RobotClientTest, SaysWhyTheServerCouldNotOpenTheSessionInTime) {
   server_->RefuseSessions(1000, {StatusCode::kResourceExhausted, "too many robots"});
-  const auto client = RobotClient::Open(*bus_, Robot("r1"), 2.0);
+  const auto client = RobotClient::Open(*bus_, Robot("r1"), 6.0);
   ASSERT_FALSE(client);
   EXPECT_EQ(client.error().code, StatusCode::kResourceExhausted);
   EXPECT_EQ(client.error().message, "too many robots");

@@ -11,8 +11,6 @@
 namespace cairn::server::testing {
 namespace {
 
-constexpr double kQuarterTurn = kPi / 2;
-
 std::filesystem::path Saved(const TempDirectory& directory, const SampleSite& sample, std::uint64_t fragment = 0) {
   const auto store = MemoryStore();
   Put(*store, sample);

@@ -3,12 +3,9 @@
 
 #include "server/store/site_edit.h"
 #include "tests/server/store/stored_sites.h"
-#include "tests/temp_directory.h"
 
 namespace cairn::server::testing {
 namespace {
-
-constexpr double kQuarterTurn = kPi / 2;
 
 TEST(MergeSites, BothSitesAreOneAndEveryScanIsThere) {
   const auto store = MemoryStore();
@@ -54,29 +51,40 @@ TEST(MergeSites, ACorrectionThatNeverHappenedDoesNotHappenLater) {
   ASSERT_TRUE(store->Commit({.removed = {}, .put = {{{RecordKind::kJournal, 1, 5}, BytesOf(5, {begun})}}}));
   ASSERT_TRUE(MergeSites(*store, "lab", "hall"));
   ASSERT_EQ(ReadSite(*store, "lab")->site.switches.at(2), 6U);
-  const auto& never = std::get<CorrectionTaken>(JournalOf(*store, 1)[4]);
+  const auto never = std::get<CorrectionTaken>(JournalOf(*store, 1)[4]);
   Switches many;
   for (std::uint32_t epoch = 1; epoch <= kMostSwitches; ++epoch) many[epoch + 100] = 6;
   EXPECT_FALSE(IsCompleted(many, never.epoch, never.generation));
 }
 
 // A site keeps its newest switches only, and those before count as completed. In a merged site they did not.
-TEST(MergeSites, ACorrectionThatItsSiteHasForgottenStaysCompleted) {
-  const auto store = MemoryStore();
-  Put(*store, {.name = "lab", .epoch = 3, .generation = 5});
-  Put(*store, {.name = "hall", .first_session = 11, .job = 4, .epoch = 2000, .generation = 6});
-  auto hall = ReadSite(*store, "hall")->site;
-  hall.switches.clear();
-  for (std::uint32_t epoch = 977; epoch <= 2000; ++epoch) hall.switches[epoch] = 6;
-  ASSERT_EQ(hall.switches.size(), kMostSwitches);
-  const JournalEntry forgotten = CorrectionTaken{12, 6, SampleGrid(8)};
-  ASSERT_TRUE(store->Commit({.removed = {},
-                             .put = {{{RecordKind::kSite, HashName("hall"), 0}, BytesOf(hall)},
-                                     {{RecordKind::kJournal, 11, 5}, BytesOf(5, {forgotten})}}}));
-  ASSERT_TRUE(MergeSites(*store, "lab", "hall"));
-  const auto& correction = std::get<CorrectionTaken>(JournalOf(*store, 11)[4]);
-  EXPECT_EQ(correction.epoch, 15U);
-  EXPECT_TRUE(IsCompleted(ReadSite(*store, "lab")->site.switches, correction.epoch, correction.generation));
+TEST(MergeSites, CorrectionsThatTheirSiteHasForgottenStayCompleted) {
+  for (const bool of_into : {false, true}) {
+    const auto store = MemoryStore();
+    Put(*store, {.name = "lab", .epoch = of_into ? 2000U : 3U, .generation = 5});
+    Put(*store, {.name = "hall", .first_session = 11, .job = 4, .epoch = of_into ? 3U : 2000U, .generation = 5});
+    const std::string long_lived = of_into ? "lab" : "hall";
+    const std::uint64_t session = of_into ? 1 : 11;
+    StoredSite site = ReadSite(*store, long_lived)->site;
+    site.switches.clear();
+    for (std::uint32_t epoch = 977; epoch <= 2000; ++epoch) site.switches[epoch] = 5;
+    ASSERT_EQ(site.switches.size(), kMostSwitches);
+    // Of the same epoch in two generations only one was completed; which one is not known any more.
+    const std::vector<JournalEntry> forgotten = {CorrectionTaken{12, 2, SampleGrid(8)},
+                                                 CorrectionTaken{500, 3, SampleGrid(8)},
+                                                 CorrectionTaken{500, 4, SampleGrid(8)}};
+    ASSERT_TRUE(store->Commit({.removed = {},
+                               .put = {{{RecordKind::kSite, HashName(long_lived), 0}, BytesOf(site)},
+                                       {{RecordKind::kJournal, session, 7}, BytesOf(5, forgotten)}}}));
+    ASSERT_TRUE(MergeSites(*store, "lab", "hall"));
+    const Switches merged = ReadSite(*store, "lab")->site.switches;
+    const std::vector<JournalEntry> journal = JournalOf(*store, session);
+    for (std::size_t i = 0; i < forgotten.size(); ++i) {
+      const auto& correction = std::get<CorrectionTaken>(journal[4 + i]);
+      EXPECT_EQ(correction.epoch, std::get<CorrectionTaken>(forgotten[i]).epoch + (of_into ? 0 : 3));
+      EXPECT_TRUE(IsCompleted(merged, correction.epoch, correction.generation)) << i;
+    }
+  }
 }
 
 TEST(MergeSites, ATransformMovesWhatHasBeenDrawnAndWhereSessionsBegin) {

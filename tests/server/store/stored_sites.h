@@ -17,6 +17,8 @@
 
 namespace cairn::server::testing {
 
+inline constexpr double kQuarterTurn = kPi / 2;
+
 inline std::unique_ptr<Store> MemoryStore() {
   return *OpenStore(std::string(kInMemory));
 }

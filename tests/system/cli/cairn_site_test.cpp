@@ -163,6 +163,7 @@ TEST_F(CairnSite, FilesAreMergedSplitAndShortened) {
   };
   EXPECT_EQ(split(File("nowhere/half.site"), File("both.site")), ExitCode::kFailed);
   EXPECT_EQ(split(File("half.site"), File("./half.site")), ExitCode::kUsage) << "one of them would be lost";
+  EXPECT_EQ(split(File("both.site"), File("rest.site")), ExitCode::kUsage) << "the rest would be lost for a moment";
   EXPECT_EQ(directory_.Read("both.site"), whole);
   EXPECT_EQ(split(File("half.site"), File("rest.site")), ExitCode::kOk);
   const auto shorter = MustJson({"site", "delete-session", File("half.site"), "h2", "-o", File("shorter.site")});
