@@ -210,8 +210,11 @@ void RobotClient::OnLedger(Ledger&& ledger) {
       pace_ = kFirstPace / 2;
     }
     stream.ledger = ledger;
+    scans_used_ |= ledger.used > 0 && ledger.sensor_id != HashName(kOdometrySensor);
     Arrived(stream, ledger.last_sequence);
-    backlog_.Safe(ledger.sensor_id, state_->durable ? ledger.durable_through : ledger.settled_through);
+    // A server that does not know the session settles its samples as well: it drops them.
+    if (ledger.generation == state_->generation)
+      backlog_.Safe(ledger.sensor_id, state_->durable ? ledger.durable_through : ledger.settled_through);
     changed_.NotifyAll();
   }
   if (callbacks_.ledger) callbacks_.ledger(ledger);

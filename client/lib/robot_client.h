@@ -190,6 +190,7 @@ class RobotClient {
   std::deque<Odometry> newest_odometry_ CAIRN_GUARDED_BY(mutex_);
   std::deque<Stamp> began_anew_ CAIRN_GUARDED_BY(mutex_);
   bool start_unknown_ CAIRN_GUARDED_BY(mutex_) = false;  // The robot was not localized when this session was opened.
+  bool scans_used_ CAIRN_GUARDED_BY(mutex_) = false;     // A server has used scans of this session.
   Clock::time_point asked_ CAIRN_GUARDED_BY(mutex_);
   Clock::time_point refused_ CAIRN_GUARDED_BY(mutex_);  // When reopening began.
   Clock::time_point progress_ CAIRN_GUARDED_BY(mutex_);

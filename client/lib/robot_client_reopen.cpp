@@ -56,11 +56,8 @@ std::optional<Pose2> RobotClient::StartOfNextSession() const {
     if (!IsOneDrive(std::min(scan, pose_->stamp), std::max(odometry->newest, pose_->stamp))) return std::nullopt;
     return pose_->T_map_odom * odometry->T_odom_robot;
   }
-  // Scans have been settled, and no pose has come: nothing says where the robot was when they were taken.
-  const bool settled = std::ranges::any_of(streams_, [](const auto& entry) CAIRN_NO_THREAD_SAFETY_ANALYSIS {
-    return entry.first != HashName(kOdometrySensor) && entry.second.window.settled_through() > 0;
-  });
-  if (settled) return std::nullopt;
+  // Scans have been used, and no pose has come: nothing says where the robot was when they were taken.
+  if (scans_used_) return std::nullopt;
   if (!request_.has_start) return std::nullopt;  // Nobody has said where it was at the beginning either.
   const Pose2 first = request_.T_map_robot_start;
   if (!odometry || !start_odometry_) return first;
@@ -88,6 +85,7 @@ void RobotClient::Reopen() {
     if (const auto odometry = backlog_.OdometryAtFirstScan())
       start_odometry_ = Odometry{.stamp = odometry->newest, .T_odom_robot = odometry->T_odom_robot};
     pose_.reset();
+    scans_used_ = false;
     sent_before_ = backlog_.size() - backlog_.unsent();
     const std::map<NameId, std::uint64_t> highest = backlog_.MoveTo(session);
     for (auto& [sensor_id, stream] : streams_) {

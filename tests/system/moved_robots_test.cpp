@@ -116,6 +116,14 @@ class MovedRobots : public ::testing::Test {
     const auto pose = riders_[robot]->client().pose();
     return pose && pose->localized;
   }
+  // What the server says of a robot, for a test that fails.
+  std::string Told(int robot) {
+    const RobotClient& client = riders_[robot]->client();
+    const auto pose = client.pose();
+    return (pose ? "pose of reason " + std::to_string(static_cast<int>(pose->reason)) : std::string("no pose")) +
+           ", session " + std::to_string(static_cast<int>(client.session().phase)) + " " +
+           client.session().status.message + ", " + std::to_string(client.restarted()) + " new sessions";
+  }
 
   const TempDirectory state_;
   bool stores_ = true;
@@ -131,7 +139,7 @@ class MovedRobots : public ::testing::Test {
 
 TEST_F(MovedRobots, OneThatWasCarriedWhileTheServerWasDeadIsLostUntilItIsFound) {
   ASSERT_NO_FATAL_FAILURE(Drive(100.0, {0, 1}));
-  EXPECT_TRUE(IsLocalized(0));
+  EXPECT_TRUE(IsLocalized(0)) << Told(0);
   KillServer();
   ASSERT_NO_FATAL_FAILURE(Drive(20.0, {}));
   Set(0, Odometer::kStandsStill);  // Somebody has carried it.
@@ -141,7 +149,7 @@ TEST_F(MovedRobots, OneThatWasCarriedWhileTheServerWasDeadIsLostUntilItIsFound) 
   EXPECT_EQ(Wrong(), 0);
   ASSERT_TRUE(FirstPose(0, back));
   EXPECT_FALSE(FirstPose(0, back)->localized);
-  EXPECT_TRUE(IsLocalized(0));
+  EXPECT_TRUE(IsLocalized(0)) << Told(0);
 }
 
 // The next server knows nothing, so that it believes the start pose that a client gives.
@@ -150,7 +158,7 @@ TEST_F(MovedRobots, OneThatWasCarriedWhileAServerWithoutAStateWasDeadGivesNoStar
   KillServer();
   StartServer();
   ASSERT_NO_FATAL_FAILURE(Drive(60.0, {0, 1}));
-  EXPECT_TRUE(IsLocalized(0));
+  EXPECT_TRUE(IsLocalized(0)) << Told(0);
   KillServer();
   ASSERT_NO_FATAL_FAILURE(Drive(20.0, {}));
   Set(0, Odometer::kStandsStill);  // Somebody has carried it.
@@ -171,7 +179,7 @@ TEST_F(MovedRobots, OneThatDrivesOnWhileAServerWithoutAStateIsDeadIsWhereItIs) {
   for (const int robot : {0, 1}) {
     ASSERT_TRUE(riders_[robot]->T_map_robot_restarted()) << robot;
     EXPECT_NE(riders_[robot]->T_map_robot_restarted(), Pose2{}) << robot;
-    EXPECT_TRUE(IsLocalized(robot));
+    EXPECT_TRUE(IsLocalized(robot)) << Told(robot);
   }
   EXPECT_EQ(Wrong(), 0);
 }
@@ -193,7 +201,7 @@ TEST_F(MovedRobots, OdometryThatBeginsAnewPutsNoRobotAtAWrongPlace) {
   Ride(1, fleet_.name(1), std::nullopt);  // Another process, which knows nothing.
   ASSERT_NO_FATAL_FAILURE(Drive(60.0, {0, 1}));
   EXPECT_EQ(Wrong(), 0);
-  EXPECT_TRUE(IsLocalized(0));
+  EXPECT_TRUE(IsLocalized(0)) << Told(0);
 }
 
 TEST_F(MovedRobots, WhoExchangedTheirNamesAreNotPutAtEachOthersPlaces) {

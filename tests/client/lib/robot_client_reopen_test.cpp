@@ -148,6 +148,38 @@ TEST_F(RobotClientTest, ARobotThatNeverHadAStartNorAPoseGivesNoneToTheNextServer
   EXPECT_FALSE(server_->sessions().back().has_start);
 }
 
+// A server that does not know the session drops its scans, which settles them. The robot's start was forgotten.
+TEST_F(RobotClientTest, ScansThatAServerHasDroppedLeaveTheStartKnown) {
+  SessionRequest request = Robot("r1");
+  request.has_start = true;
+  request.T_map_robot_start = {10, 0, 0};
+  server_->SetSettling(false);
+  const auto client = Must(RobotClient::Open(*bus_, request, 20.0));
+  ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = 0, .T_odom_robot = {5, 0, 0}}));
+  Scan scan = SomeScan();
+  scan.stamp = kStep;
+  ASSERT_TRUE(client->Publish(scan));
+  ASSERT_TRUE(client->Publish(Odometry{.sequence = 0, .stamp = kStep, .T_odom_robot = {5.1, 0, 0}}));
+  ASSERT_TRUE(Eventually([&] { return server_->received().size() == 1; }));
+  const auto other = Must(bus_->Advertise<Ledger>());
+  ASSERT_TRUE(Eventually([&] { return other->matched() > 0; }));
+  Ledger ledger;
+  ledger.robot_id = HashName("r1");
+  ledger.sensor_id = HashName("front");
+  ledger.received = ledger.last_sequence = ledger.settled_through = 1;
+  ledger.dropped[static_cast<std::size_t>(DropReason::kNoSession)] = 1;
+  ledger.session = server_->sessions().back().session;
+  ledger.generation = 2;
+  ASSERT_TRUE(other->Publish(ledger));
+  ASSERT_TRUE(Eventually([&] { return client->ledger() && client->ledger()->settled_through == 1; }));
+  server_.reset();
+  server_ = std::make_unique<FakeServer>(LoopbackOptions(), 2);
+  ASSERT_TRUE(Eventually([&] { return server_->received().size() == 1; })) << "it was dropped, so it goes again";
+  EXPECT_EQ(client->restarted(), 1);
+  EXPECT_TRUE(server_->sessions().back().has_start);
+  EXPECT_NEAR(server_->sessions().back().T_map_robot_start.x, 10.1, 1e-9);
+}
+
 TEST_F(RobotClientTest, WithoutAPoseTheFirstStartIsCarriedOnByTheOdometry) {
   SessionRequest request = Robot("r1");
   request.has_start = true;
