@@ -113,6 +113,8 @@ class SqliteStore : public Store {
   static Result<void> Check(const std::string& path, const std::string& vfs) {
     SQLite::Database database(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, 0, vfs);
     database.exec("PRAGMA locking_mode = EXCLUSIVE");
+    // Otherwise the end of this connection copies the whole log into the database and waits for the disk.
+    sqlite3_db_config(database.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
     const int version = database.execAndGet("PRAGMA user_version").getInt();
     const int application = database.execAndGet("PRAGMA application_id").getInt();
     const int tables = database.execAndGet("SELECT count(*) FROM sqlite_master").getInt();
