@@ -97,7 +97,8 @@ ExitCode ListStored(Program& program, const std::string& state) {
     }
     sites.push_back({{"site", name}, {"sessions", sessions}});
   }
-  for (const std::uint64_t id : *unreadable) text += fmt::format("session {} of a site that cannot be read\n", id);
+  for (const std::uint64_t id : *unreadable)
+    text += fmt::format("session {}, which cannot be read: its site is not known\n", id);
   return program.Print(text.empty() ? "no site yet\n" : text, {{"sites", sites}, {"unreadable", *unreadable}});
 }
 
