@@ -17,6 +17,8 @@ constexpr std::chrono::seconds kFirstPatience{2};   // For the first part of an 
 constexpr std::chrono::seconds kAnswerPatience{1};  // Pings of a server that was found are not answered for so long.
 constexpr std::chrono::seconds kHostileFirstPatience{1};  // Where forged messages may have made the client deaf.
 
+constexpr std::chrono::steady_clock::duration kOnce{0};  // A question is not sent again.
+
 // The answer's only element, which a server that says OK must give.
 template <typename T>
 Result<T> Only(std::vector<T>&& list, const char* what) {
@@ -125,7 +127,7 @@ Result<Reply> QueryClient::Ask(const Request& request) {
   for (Clock::duration patience = MayBeDeaf() ? kHostileFirstPatience : kFirstPatience;; patience *= 2) {
     if (auto found = WaitForServer(command, deadline); !found) return tl::unexpected(found.error());
     const Deadline begun = repeatable ? std::min(deadline, Clock::now() + patience) : deadline;
-    Result<Reply> reply = AskOnce(request, begun, deadline);
+    Result<Reply> reply = AskOnce(request, begun, deadline, kOnce);
     if (reply && !reply->status.ok()) return tl::unexpected(reply->status);
     if (reply || reply.error().code != StatusCode::kDeadlineExceeded || Clock::now() >= deadline) return reply;
   }
@@ -140,7 +142,7 @@ bool QueryClient::CommandsMatched() const {
 // have found their peers, an answer may be lost. Only an answered ping proves that they have; a ping may be repeated,
 // while a question that starts a job may not.
 Result<void> QueryClient::WaitForServer(bool command, Deadline deadline) {
-  constexpr std::chrono::milliseconds kPatience{100};
+  constexpr std::chrono::milliseconds kPatience{100}, kEvery{20};
   const bool secure = !bus_.options().security.empty();
   Deadline began = Clock::now();  // Since when pings are not answered.
   for (;;) {
@@ -160,7 +162,7 @@ Result<void> QueryClient::WaitForServer(bool command, Deadline deadline) {
       continue;
     }
     const Deadline soon = std::min(deadline, Clock::now() + kPatience);
-    const Result<Reply> pong = AskOnce(MakeRequest(RequestKind::kPing), soon, soon);
+    const Result<Reply> pong = AskOnce(MakeRequest(RequestKind::kPing), soon, soon, kEvery);
     if (!pong) RenewIfSilent(began, kAnswerPatience);
     const MutexLock lock(mutex_);
     if (pong) {
@@ -172,7 +174,7 @@ Result<void> QueryClient::WaitForServer(bool command, Deadline deadline) {
   }
 }
 
-Result<Reply> QueryClient::AskOnce(Request request, Deadline begun, Deadline deadline) {
+Result<Reply> QueryClient::AskOnce(Request request, Deadline begun, Deadline deadline, Deadline::duration every) {
   const std::shared_ptr<Wire> wire = CurrentWire();
   request.client = wire->client;
   {
@@ -180,18 +182,22 @@ Result<Reply> QueryClient::AskOnce(Request request, Deadline begun, Deadline dea
     request.sequence = ++sequence_;
     pending_.try_emplace(request.sequence);
   }
-  const Result<void> published = wire->Publish(request);
-  const MutexLock lock(mutex_);
-  const auto pending = pending_.find(request.sequence);
-  const auto until = [&] { return pending->second.parts() > 0 ? deadline : begun; };
-  while (published && !pending->second.complete() && Clock::now() < until()) changed_.WaitUntil(mutex_, until());
-  auto node = pending_.extract(pending);
-  if (!published) return tl::unexpected(published.error());
-  if (node.mapped().complete()) return node.mapped().Take();
-  server_found_ = false;
-  return Fail(StatusCode::kDeadlineExceeded,
-              fmt::format("no {}answer to {} within {:.1f} s", node.mapped().parts() > 0 ? "complete " : "",
-                          RequestKindName(request.kind), options_.timeout_s));
+  for (;;) {
+    const Result<void> published = wire->Publish(request);
+    const Deadline again = every == kOnce ? begun : std::min(begun, Clock::now() + every);
+    const MutexLock lock(mutex_);
+    const auto pending = pending_.find(request.sequence);
+    const auto until = [&] { return pending->second.parts() > 0 ? deadline : again; };
+    while (published && !pending->second.complete() && Clock::now() < until()) changed_.WaitUntil(mutex_, until());
+    if (published && pending->second.parts() == 0 && Clock::now() < begun) continue;
+    auto node = pending_.extract(pending);
+    if (!published) return tl::unexpected(published.error());
+    if (node.mapped().complete()) return node.mapped().Take();
+    server_found_ = false;
+    return Fail(StatusCode::kDeadlineExceeded,
+                fmt::format("no {}answer to {} within {:.1f} s", node.mapped().parts() > 0 ? "complete " : "",
+                            RequestKindName(request.kind), options_.timeout_s));
+  }
 }
 
 Result<std::string> QueryClient::Ping() {

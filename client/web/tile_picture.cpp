@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "common/map/image_codec.h"
+#include "common/map/png_codec.h"
 
 namespace cairn::web {
 namespace {
@@ -42,8 +42,7 @@ Result<std::string> DrawTile(const Tile& tile, Theme theme) {
       to[3] = 255;
     }
   }
-  constexpr int kLevel = 3;
-  const auto png = EncodeImage(image, ".png", kLevel);
+  const auto png = EncodePng(image);
   if (!png) return tl::unexpected(png.error());
   return std::string(png->begin(), png->end());
 }

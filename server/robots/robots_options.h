@@ -18,7 +18,7 @@ struct RobotsOptions {
   double ledger_rate_hz = 10.0;
   double gap_wait_s = 10.0;
   std::int64_t checkpoint_entries = 1500;
-  double checkpoint_work_s = 0.2;
+  double checkpoint_work_s = 0.15;
 };
 void Visit(OptionVisitor& visitor, RobotsOptions& options);
 

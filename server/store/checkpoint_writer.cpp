@@ -133,9 +133,10 @@ namespace {
 // Puts a checkpoint together from its records, which come in the order of their numbers.
 class CheckpointReader {
  public:
-  Result<void> Take(std::uint64_t number, std::string_view bytes) {
-    if (number >= kFirstRest) return TakePiece((number - kFirstRest) / kParts, (number - kFirstRest) % kParts, bytes);
-    if (number >= kFirstPiece) return TakePiece(number - kFirstPiece, 0, bytes);
+  Result<void> Take(std::uint64_t number, std::string&& bytes) {
+    if (number >= kFirstRest)
+      return TakePiece((number - kFirstRest) / kParts, (number - kFirstRest) % kParts, std::move(bytes));
+    if (number >= kFirstPiece) return TakePiece(number - kFirstPiece, 0, std::move(bytes));
     if (number % kParts == 0) return TakeHead(number / kParts, bytes);
     return TakeMain(number / kParts, number % kParts, bytes);
   }
@@ -169,13 +170,18 @@ class CheckpointReader {
     newest_->bytes.append(bytes);
     return {};
   }
-  Result<void> TakePiece(std::uint64_t number, std::uint64_t part, std::string_view bytes) {
+  Result<void> TakePiece(std::uint64_t number, std::uint64_t part, std::string&& bytes) {
     if (!newest_) return {};
     const auto piece = newest_->parts.find(number);
     if (piece == newest_->parts.end() || part >= piece->second)
       return {};  // It belongs to a piece that was never completed.
     if (read_[number]++ != part) return Unreadable("a checkpoint");
-    newest_->pieces[number].append(bytes);
+    std::string& whole = newest_->pieces[number];
+    if (part == 0) {
+      whole = std::move(bytes);
+    } else {
+      whole.append(bytes);
+    }
     return {};
   }
 
@@ -189,7 +195,9 @@ class CheckpointReader {
 
 Result<std::optional<StoredCheckpoint>> ReadCheckpoint(Store& store, std::uint64_t session) {
   CheckpointReader reader;
-  const auto take = [&reader](std::uint64_t number, std::string_view bytes) { return reader.Take(number, bytes); };
+  const auto take = [&reader](std::uint64_t number, std::string&& bytes) {
+    return reader.Take(number, std::move(bytes));
+  };
   if (auto read = store.Read({.kind = RecordKind::kCheckpoint, .owner = session}, take); !read)
     return tl::unexpected(read.error());
   return std::move(reader).Finish();

@@ -26,6 +26,8 @@ constexpr const char* kSetUp =
     // In pages of 4 KiB: how long the write-ahead log gets before it is copied into the database. Checkpoints replace
     // their records within seconds; what was replaced in the log is never copied.
     "PRAGMA wal_autocheckpoint = 4000;"
+    // In KiB. To remove a record reads its pages, and those of a checkpoint are removed soon after they were written.
+    "PRAGMA cache_size = -8192;"
     // What a large commit has made of the log is given back. What is removed is not overwritten with zeros, as Debian's
     // SQLite does by default: to remove a gigabyte would write a gigabyte.
     "PRAGMA journal_size_limit = 67108864;"
@@ -95,10 +97,9 @@ class Use {
 
 class SqliteStore : public Store {
  public:
-  SqliteStore(std::filesystem::path directory, const std::string& path, const std::string& vfs, DirectoryLock lock)
-      : directory_(std::move(directory)),
-        lock_(std::move(lock)),
-        database_(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, 0, vfs) {
+  // REQUIRES: Check has accepted the database.
+  SqliteStore(std::filesystem::path directory, SQLite::Database database, DirectoryLock lock)
+      : directory_(std::move(directory)), lock_(std::move(lock)), database_(std::move(database)) {
     database_.exec(kSetUp);
     if (int version = Pragma("user_version"); version == 0) MakeTables();
     put_.emplace(database_, kPut);
@@ -109,22 +110,26 @@ class SqliteStore : public Store {
     numbers_.emplace(database_, kNumbers);
   }
 
-  // The tables' version, and whether they are ours. Before the constructor, so that it reads nothing foreign.
-  static Result<void> Check(const std::string& path, const std::string& vfs) {
-    SQLite::Database database(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, 0, vfs);
+  // The tables' version, and whether they are ours. The connection goes on being used: to open a second one reads the
+  // whole write-ahead log again.
+  static Result<void> Check(SQLite::Database& database, const std::string& path) {
+    const auto copies_log_at_close = [&database](bool copies) {
+      sqlite3_db_config(database.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, copies ? 0 : 1, nullptr);
+    };
+    copies_log_at_close(false);  // What is not ours is left as it is.
     database.exec("PRAGMA locking_mode = EXCLUSIVE");
-    // Otherwise the end of this connection copies the whole log into the database and waits for the disk.
-    sqlite3_db_config(database.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
     const int version = database.execAndGet("PRAGMA user_version").getInt();
     const int application = database.execAndGet("PRAGMA application_id").getInt();
     const int tables = database.execAndGet("SELECT count(*) FROM sqlite_master").getInt();
-    if (version == 0 && tables == 0) return {};
-    if (application != kApplication) return Fail(StatusCode::kDataLoss, "'" + path + "' is not a store of cairnd");
-    if (version > kSchema) {
-      return Fail(StatusCode::kFailedPrecondition, "'" + path + "' was written by a newer server (tables of version " +
-                                                       std::to_string(version) + "; this one reads " +
-                                                       std::to_string(kSchema) + ")");
+    if (version != 0 || tables != 0) {
+      if (application != kApplication) return Fail(StatusCode::kDataLoss, "'" + path + "' is not a store of cairnd");
+      if (version > kSchema) {
+        return Fail(StatusCode::kFailedPrecondition,
+                    "'" + path + "' was written by a newer server (tables of version " + std::to_string(version) +
+                        "; this one reads " + std::to_string(kSchema) + ")");
+      }
     }
+    copies_log_at_close(true);
     return {};
   }
 
@@ -188,11 +193,10 @@ class SqliteStore : public Store {
       while (read->executeStep()) {
         const std::uint64_t number = FromSql(read->getColumn(0).getInt64());
         const SQLite::Column content = read->getColumn(1);
-        const auto opened =
-            codec_.Open({range.kind, range.owner, number},
-                        {static_cast<const char*>(content.getBlob()), static_cast<std::size_t>(content.getBytes())});
+        auto opened = codec_.Open({range.kind, range.owner, number}, {static_cast<const char*>(content.getBlob()),
+                                                                      static_cast<std::size_t>(content.getBytes())});
         if (!opened) return tl::unexpected(opened.error());
-        if (auto visited = visit(number, *opened); !visited) return visited;
+        if (auto visited = visit(number, *std::move(opened)); !visited) return visited;
       }
       return {};
     } catch (const SQLite::Exception& error) {
@@ -287,9 +291,11 @@ Result<std::unique_ptr<Store>> OpenStore(const std::filesystem::path& directory,
       auto taken = DirectoryLock::Take(directory);
       if (!taken) return tl::unexpected(taken.error());
       lock = std::move(*taken);
-      if (auto checked = SqliteStore::Check(path, vfs); !checked) return tl::unexpected(checked.error());
     }
-    return std::make_unique<SqliteStore>(in_memory ? std::filesystem::path() : directory, path, vfs, std::move(lock));
+    SQLite::Database database(path, SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE, 0, vfs);
+    if (auto checked = SqliteStore::Check(database, path); !checked) return tl::unexpected(checked.error());
+    return std::make_unique<SqliteStore>(in_memory ? std::filesystem::path() : directory, std::move(database),
+                                         std::move(lock));
   } catch (const SQLite::Exception& error) {
     return tl::unexpected(StatusOf(error, "cannot open the store '" + path + "'"));
   } catch (const std::filesystem::filesystem_error& error) {

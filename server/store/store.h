@@ -68,8 +68,8 @@ struct RecordChanges {
 
 class Store {
  public:
-  // Called with a number and the record's bytes; an error ends the reading and is returned.
-  using Visit = std::function<Result<void>(std::uint64_t number, std::string_view bytes)>;
+  // Called with a number and the record's bytes, which may be moved from; an error ends the reading and is returned.
+  using Visit = std::function<Result<void>(std::uint64_t number, std::string&& bytes)>;
 
   virtual ~Store() = default;
 

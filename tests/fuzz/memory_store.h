@@ -42,7 +42,7 @@ class MemoryStore : public server::Store {
   Result<void> Read(const server::RecordRange& range, const Visit& visit) override {
     for (const auto& [key, bytes] : records_) {
       if (!Within(range, key)) continue;
-      if (auto visited = visit(key.number, bytes); !visited) return visited;
+      if (auto visited = visit(key.number, std::string(bytes)); !visited) return visited;
     }
     return {};
   }

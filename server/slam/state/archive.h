@@ -15,6 +15,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
@@ -357,6 +358,9 @@ class StateReader {
   void GetEach(Values& values) {
     values.clear();
     const std::size_t size = Size(1);
+    // What was not checked yet takes no more memory than twice the bytes that are there.
+    if constexpr (requires { values.reserve(size); })
+      values.reserve(std::min(size, 2 * rest_.size() / sizeof(typename Values::value_type)));
     for (std::size_t i = 0; i < size && ok(); ++i) Get(values.emplace_back());
   }
 

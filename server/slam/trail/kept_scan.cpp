@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cmath>
+#include <cstring>
 #include <utility>
 
 namespace cairn::slam {
@@ -27,25 +27,22 @@ bool SameBits(float a, float b) {
   return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
 }
 
-// Empty if one of the values is no multiple of the step.
-std::vector<std::uint32_t> StepsOf(std::span<const float> values, Code code) {
-  std::vector<std::uint32_t> steps;
-  steps.reserve(values.size());
+// False if one of the values is no multiple of the step.
+bool ToSteps(std::span<const float> values, Code code, std::vector<std::uint32_t>& steps) {
+  steps.clear();
   for (const float value : values) {
-    const double rounded = std::round(static_cast<double>(value) * StepsPerMetre(code));
-    if (!(rounded >= 0.0 && rounded < kMostSteps)) return {};
-    const auto step = static_cast<std::uint32_t>(rounded);
-    if (!SameBits(FloatOf(step, code), value)) return {};
+    const double exact = static_cast<double>(value) * StepsPerMetre(code);
+    if (!(exact >= 0.0 && exact < kMostSteps)) return false;
+    const auto step = static_cast<std::uint32_t>(exact + 0.5);
+    if (!SameBits(FloatOf(step, code), value)) return false;
     steps.push_back(step);
   }
-  return steps;
+  return true;
 }
 
-std::vector<std::uint32_t> BitsOf(std::span<const float> values) {
-  std::vector<std::uint32_t> bits;
-  bits.reserve(values.size());
+void ToBits(std::span<const float> values, std::vector<std::uint32_t>& bits) {
+  bits.clear();
   for (const float value : values) bits.push_back(std::bit_cast<std::uint32_t>(value));
-  return bits;
 }
 
 // Small numbers of either sign become small numbers.
@@ -56,7 +53,11 @@ std::uint32_t FromZigZag(std::uint32_t number) {
   return (number >> 1) ^ (0U - (number & 1U));
 }
 
-void AppendBlocks(std::span<const std::uint32_t> numbers, std::vector<std::uint8_t>& packed) {
+constexpr std::size_t kMostBytesOfBlock = 1 + kBlock * sizeof(std::uint32_t);
+
+// Returns the end of what was written. REQUIRES: there is room for kMostBytesOfBlock for each block.
+std::uint8_t* WriteBlocks(std::span<const std::uint32_t> numbers, std::uint8_t* to) {
+  static_assert(std::endian::native == std::endian::little, "words are written as they are in memory");
   std::uint32_t before = 0;
   for (std::size_t first = 0; first < numbers.size(); first += kBlock) {
     const std::size_t count = std::min(kBlock, numbers.size() - first);
@@ -68,33 +69,40 @@ void AppendBlocks(std::span<const std::uint32_t> numbers, std::vector<std::uint8
       all |= differences[i];
     }
     const int width = std::bit_width(all);
-    packed.push_back(static_cast<std::uint8_t>(width));
+    *to++ = static_cast<std::uint8_t>(width);
     std::uint64_t bits = 0;
     int held = 0;
     for (std::size_t i = 0; i < count; ++i) {
       bits |= std::uint64_t{differences[i]} << held;
-      for (held += width; held >= 8; held -= 8, bits >>= 8) packed.push_back(static_cast<std::uint8_t>(bits));
+      held += width;
+      if (held < 32) continue;
+      std::memcpy(to, &bits, 4);
+      to += 4;
+      bits >>= 32;
+      held -= 32;
     }
-    if (held > 0) packed.push_back(static_cast<std::uint8_t>(bits));
+    for (; held > 0; held -= 8, bits >>= 8) *to++ = static_cast<std::uint8_t>(bits);
   }
+  return to;
 }
 
 }  // namespace
 
 std::vector<std::uint8_t> PackFloats(std::span<const float> values) {
+  std::vector<std::uint32_t> numbers;
+  numbers.reserve(values.size());
   Code code = Code::kMillimetres;
-  std::vector<std::uint32_t> numbers = StepsOf(values, code);
-  if (numbers.size() != values.size()) numbers = StepsOf(values, code = Code::kQuarters);
-  if (numbers.size() != values.size()) {
-    code = Code::kBits;
-    numbers = BitsOf(values);
+  if (!ToSteps(values, code, numbers)) {
+    code = Code::kQuarters;
+    if (!ToSteps(values, code, numbers)) {
+      code = Code::kBits;
+      ToBits(values, numbers);
+    }
   }
-  std::vector<std::uint8_t> packed;
-  packed.reserve(4 * values.size() + 2);
-  packed.push_back(static_cast<std::uint8_t>(code));
-  AppendBlocks(numbers, packed);
-  packed.shrink_to_fit();
-  return packed;
+  const std::size_t blocks = (numbers.size() + kBlock - 1) / kBlock;
+  std::vector<std::uint8_t> room(1 + blocks * kMostBytesOfBlock);
+  room[0] = static_cast<std::uint8_t>(code);
+  return {room.data(), WriteBlocks(numbers, room.data() + 1)};
 }
 
 std::vector<float> UnpackFloats(std::span<const std::uint8_t> packed, std::size_t count) {

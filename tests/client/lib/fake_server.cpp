@@ -82,6 +82,16 @@ void FakeServer::SayStale() {
   for (SessionRequest& request : sessions) OnSession(std::move(request));
 }
 
+void FakeServer::IgnorePings(int count) {
+  const MutexLock lock(mutex_);
+  ignored_pings_ = count;
+}
+
+std::vector<std::uint64_t> FakeServer::pings() const {
+  const MutexLock lock(mutex_);
+  return pings_;
+}
+
 void FakeServer::SetAnswering(bool answering) {
   const MutexLock lock(mutex_);
   answering_ = answering;
@@ -233,7 +243,13 @@ void FakeServer::OnRequest(Request&& request) {
   {
     const MutexLock lock(mutex_);
     asked_.push_back(request.kind);
-    if (!answering_ && request.kind != RequestKind::kPing) return;
+    const bool is_ping = request.kind == RequestKind::kPing;
+    if (!answering_ && !is_ping) return;
+    if (is_ping) pings_.push_back(request.sequence);
+    if (is_ping && ignored_pings_ > 0) {
+      --ignored_pings_;
+      return;
+    }
   }
   Reply reply;
   reply.client = request.client;

@@ -30,7 +30,8 @@ class FakeServer {
   // Begins a later generation that knows its sessions and the scans that were durable, and nothing else.
   void Restart(Generation generation);
   void SetAnswering(bool answering);
-  void SayStale();  // That nothing of a stream arrives.
+  void IgnorePings(int count);  // So many pings are not answered.
+  void SayStale();              // That nothing of a stream arrives.
   // Of all that is sent from now on; 1 at first.
   void SetGeneration(Generation generation);
   void IgnoreSessions(int count);  // So many session requests are not answered.
@@ -49,6 +50,7 @@ class FakeServer {
   [[nodiscard]] ScanSample last_scan() const;
   [[nodiscard]] int odometry_received() const;
   [[nodiscard]] std::vector<RequestKind> asked() const;
+  [[nodiscard]] std::vector<std::uint64_t> pings() const;  // The numbers of those that have arrived.
   [[nodiscard]] std::uint64_t datagrams_refused() const { return bus_->datagrams_refused(); }
 
   static constexpr std::uint64_t kMapFrame = 77;
@@ -80,6 +82,8 @@ class FakeServer {
   bool stale_ CAIRN_GUARDED_BY(mutex_) = false;
   std::uint64_t durable_through_ CAIRN_GUARDED_BY(mutex_) = 0;
   bool answering_ CAIRN_GUARDED_BY(mutex_) = true;
+  int ignored_pings_ CAIRN_GUARDED_BY(mutex_) = 0;
+  std::vector<std::uint64_t> pings_ CAIRN_GUARDED_BY(mutex_);
   std::set<std::uint64_t> to_lose_ CAIRN_GUARDED_BY(mutex_);
   Generation generation_ CAIRN_GUARDED_BY(mutex_);
   int sessions_to_ignore_ CAIRN_GUARDED_BY(mutex_) = 0;
