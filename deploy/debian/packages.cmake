@@ -102,7 +102,7 @@ paths, jobs, downloads of maps, and figures for Prometheus.")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libcairn-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libeigen3-dev, libexpected-dev, libfastcdr-dev, libfastrtps-dev, \
-libfmt-dev, libopencv-core-dev, libopencv-imgcodecs-dev, libopencv-imgproc-dev, libssl-dev, libyaml-cpp-dev")
+libfmt-dev, libopencv-core-dev, libopencv-imgcodecs-dev, libopencv-imgproc-dev, libpng-dev, libssl-dev, libyaml-cpp-dev")
 set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "Client library of the mapping server cairnd: headers and static libraries with
 which a program streams scans to a server, asks questions and follows poses and
 maps; for find_package(cairn).")
