@@ -191,8 +191,8 @@ Result<Reply> QueryClient::AskOnce(Request request, Deadline begun, Deadline dea
     while (published && !pending->second.complete() && Clock::now() < until()) changed_.WaitUntil(mutex_, until());
     if (published && pending->second.parts() == 0 && Clock::now() < begun) continue;
     auto node = pending_.extract(pending);
-    if (!published) return tl::unexpected(published.error());
     if (node.mapped().complete()) return node.mapped().Take();
+    if (!published) return tl::unexpected(published.error());
     server_found_ = false;
     return Fail(StatusCode::kDeadlineExceeded,
                 fmt::format("no {}answer to {} within {:.1f} s", node.mapped().parts() > 0 ? "complete " : "",

@@ -6,6 +6,7 @@
 #include <exception>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <optional>
 
 namespace cairn {
 namespace {
@@ -61,8 +62,7 @@ Result<RasterImage> FromMat(const cv::Mat& decoded) {
   return raster;
 }
 
-}  // namespace
-
+// The size that the header of a PNG, PNM or BMP file states; nothing for other bytes.
 std::optional<ImageSize> DeclaredSize(const std::vector<std::uint8_t>& bytes) {
   if (bytes.size() >= 26 && std::equal(kPngSignature.begin(), kPngSignature.end(), bytes.begin())) {
     return ImageSize{BigEndian32(bytes, 16), BigEndian32(bytes, 20)};
@@ -73,6 +73,8 @@ std::optional<ImageSize> DeclaredSize(const std::vector<std::uint8_t>& bytes) {
   if (bytes.size() >= 4 && bytes[0] == 'P' && bytes[1] >= '2' && bytes[1] <= '6') return PnmSize(bytes);
   return std::nullopt;
 }
+
+}  // namespace
 
 Result<std::vector<std::uint8_t>> EncodeImage(const RasterImage& image, const std::string& extension, int png_level) {
   try {

@@ -5,7 +5,7 @@
 #include <set>
 #include <string>
 
-#include "common/map/image_codec.h"
+#include "common/map/raster_image.h"
 
 namespace cairn {
 namespace {

@@ -110,7 +110,8 @@ PLANNED = {
 # `folder/*` for the files directly in a folder. Tests may include every library.
 LIBRARIES = {
     "DDS": (("fastdds/", "fastrtps/", "fastcdr/", "dds/", "ddsc/"), ("common/wire",), False),
-    "OpenCV": (("opencv2/",), ("common/map", "server/slam", "server/maps", "client/cli"), True),
+    "OpenCV": (("opencv2/",), ("common/map", "client/cli"), True),
+    "libpng": (("png.h",), ("common/map",), True),
     "Ceres": (("ceres/",), ("server/slam",), True),
     "Protobuf": (("google/protobuf/",), ("server/store", "common/bag"), False),
     "SQLite": (("SQLiteCpp/", "sqlite3.h"), ("server/store", "common/bag"), True),

@@ -24,10 +24,9 @@ eventually() {
 runs_anew() { [ "$(pid)" -ne 0 ] && [ "$(pid)" -ne "$1" ] && [ "$(property ActiveState)" = active ]; }
 answers() { cairn ping --timeout 2s >/dev/null; }
 
-# A system call that the unit forbids is an error to the server, which may not care; here it ends it. (libnuma, which
-# comes with OpenCV, tries set_mempolicy once when it is loaded, and does well without.)
+# A system call that the unit forbids is an error to the server, which may not care; here it ends it.
 mkdir -p /run/systemd/system/cairnd.service.d
-printf '[Service]\nSystemCallErrorNumber=kill\nSystemCallFilter=set_mempolicy\n' \
+printf '[Service]\nSystemCallErrorNumber=kill\n' \
   >/run/systemd/system/cairnd.service.d/walls.conf
 systemctl daemon-reload
 

@@ -126,16 +126,16 @@ TEST_F(QueryClientTest, SavesLoadsAndDeletesSites) {
   EXPECT_EQ(client_->DeleteSavedSite("hall").error().code, StatusCode::kNotFound);
 }
 
-// A question that does something must not be asked twice, however slowly the two sides find each other.
 // While DDS matches both sides, the answer to the first question is often lost.
 TEST_F(QueryClientTest, SendsTheFirstPingAgainSoonAndWaitsOnForItsAnswer) {
-  server_.IgnorePings(2);
+  server_.IgnorePings(6);
   EXPECT_EQ(Must(client_->Ping()), "fake");
   const std::vector<std::uint64_t> pings = server_.pings();
-  ASSERT_GE(pings.size(), 3U);
-  EXPECT_EQ(pings[0], pings[1]);
+  EXPECT_GE(pings.size(), 7U);
+  EXPECT_NE(std::adjacent_find(pings.begin(), pings.end()), pings.end()) << "no ping was sent twice";
 }
 
+// A question that does something must not be asked twice, however slowly the two sides find each other.
 TEST_F(QueryClientTest, SubmitsAJobOnce) {
   ASSERT_TRUE(client_->SubmitJob("hall", JobKind::kSmooth));
   const std::vector<RequestKind> asked = server_.asked();

@@ -1,6 +1,10 @@
 #include "common/map/png_codec.h"
 
 #include <gtest/gtest.h>
+#include <zlib.h>
+
+#include <string>
+#include <vector>
 
 #include "common/map/image_codec.h"
 
@@ -36,6 +40,59 @@ TEST(PngCodec, AnotherLibraryReadsWhatIsWrittenAndTheOtherWayRound) {
   const auto samples = DecodeGreyPng(*EncodeImage(image, ".png", 6), {6, 4});
   ASSERT_TRUE(samples) << samples.error().message;
   EXPECT_EQ(*samples, image.samples);
+}
+
+std::vector<std::uint8_t> Chunk(const std::string& type, const std::string& content) {
+  std::vector<std::uint8_t> bytes;
+  const auto append = [&bytes](std::uint32_t number) {
+    for (int shift = 24; shift >= 0; shift -= 8) bytes.push_back(static_cast<std::uint8_t>(number >> shift));
+  };
+  append(static_cast<std::uint32_t>(content.size()));
+  const std::string summed = type + content;
+  bytes.insert(bytes.end(), summed.begin(), summed.end());
+  append(static_cast<std::uint32_t>(
+      crc32(0, reinterpret_cast<const Bytef*>(summed.data()), static_cast<uInt>(summed.size()))));
+  return bytes;
+}
+
+// libpng would scale the samples of the first, convert those of the second, and expand the last in memory.
+TEST(PngCodec, ChunksThatATileDoesNotNeedAreRefused) {
+  const auto png = EncodePng(Ramp(6, 4, 1)).value();
+  constexpr std::ptrdiff_t kHeaderEnd = 33;
+  const auto with = [&](const std::string& type, const std::string& content) {
+    std::vector<std::uint8_t> changed = png;
+    const auto chunk = Chunk(type, content);
+    changed.insert(changed.begin() + kHeaderEnd, chunk.begin(), chunk.end());
+    return changed;
+  };
+  const std::string linear("\x00\x01\x86\xa0", 4), transparent("\x00\x07", 2);
+  EXPECT_TRUE(DecodeImage(with("gAMA", linear))) << "the chunk is well made";
+  EXPECT_FALSE(DecodeGreyPng(with("gAMA", linear), {6, 4}));
+  EXPECT_FALSE(DecodeGreyPng(with("tRNS", transparent), {6, 4}));
+  EXPECT_FALSE(DecodeGreyPng(with("zTXt", std::string("a\0\0x", 4)), {6, 4}));
+}
+
+TEST(PngCodec, OtherHeadersAreRefused) {
+  const auto with_header = [](char bits, char colour, char interlaced, const std::string& rows) {
+    std::vector<std::uint8_t> bytes = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+    std::string header("\x00\x00\x00\x01\x00\x00\x00\x01\x08\x00\x00\x00\x00", 13);
+    header[8] = bits;
+    header[9] = colour;
+    header[12] = interlaced;
+    std::vector<Bytef> packed(100);
+    uLongf size = packed.size();
+    compress(packed.data(), &size, reinterpret_cast<const Bytef*>(rows.data()), static_cast<uLong>(rows.size()));
+    const std::string samples(packed.begin(), packed.begin() + static_cast<std::ptrdiff_t>(size));
+    for (const auto& chunk : {Chunk("IHDR", header), Chunk("IDAT", samples), Chunk("IEND", "")})
+      bytes.insert(bytes.end(), chunk.begin(), chunk.end());
+    return bytes;
+  };
+  const std::string one_row(4, '\0');
+  ASSERT_TRUE(DecodeGreyPng(with_header(8, 0, 0, one_row.substr(0, 2)), {1, 1}));
+  for (const char bits : {1, 2, 4}) EXPECT_FALSE(DecodeGreyPng(with_header(bits, 0, 0, one_row.substr(0, 2)), {1, 1}));
+  EXPECT_FALSE(DecodeGreyPng(with_header(16, 0, 0, one_row.substr(0, 3)), {1, 1}));
+  EXPECT_FALSE(DecodeGreyPng(with_header(8, 2, 0, one_row), {1, 1}));
+  EXPECT_FALSE(DecodeGreyPng(with_header(8, 0, 1, one_row.substr(0, 2)), {1, 1}));
 }
 
 TEST(PngCodec, OtherSizesColoursAndDamageAreRefused) {
