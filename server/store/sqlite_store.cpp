@@ -26,8 +26,6 @@ constexpr const char* kSetUp =
     // In pages of 4 KiB: how long the write-ahead log gets before it is copied into the database. Checkpoints replace
     // their records within seconds; what was replaced in the log is never copied.
     "PRAGMA wal_autocheckpoint = 4000;"
-    // In KiB. To remove a record reads its pages, and those of a checkpoint are removed soon after they were written.
-    "PRAGMA cache_size = -8192;"
     // What a large commit has made of the log is given back. What is removed is not overwritten with zeros, as Debian's
     // SQLite does by default: to remove a gigabyte would write a gigabyte.
     "PRAGMA journal_size_limit = 67108864;"
