@@ -171,29 +171,27 @@ void FakeServer::OnSession(SessionRequest&& request) {
                      .phase = SessionPhase::kActive,
                      .status = {},
                      .session = request.session};
-  {
-    const MutexLock lock(mutex_);
-    asked_sessions_.push_back(request);
-    if (sessions_to_ignore_ > 0 && sessions_to_ignore_-- > 0) return;
-    state.generation = generation_;
-    state.durable = durable_;
-    state.map_frame = kMapFrame;
-    state.stale = stale_;
-    const bool known = owners_.contains(request.robot);
-    if (sessions_to_refuse_ > 0) {
-      --sessions_to_refuse_;
-      state.phase = SessionPhase::kRefused;
-      state.status = why_refused_;
-    } else if (!known && request.started) {
-      state.phase = SessionPhase::kRefused;
-      state.status = {StatusCode::kFailedPrecondition, "the server does not know this session"};
-    } else if (known && owners_[request.robot].client != request.client) {
-      state.phase = SessionPhase::kRefused;
-      state.status = {StatusCode::kAlreadyExists, "robot '" + request.robot + "' is connected already"};
-    } else {
-      owners_[request.robot] = request;
-      if (request.end) state.phase = SessionPhase::kEnded;
-    }
+  const MutexLock lock(mutex_);  // Also while publishing: otherwise an older state might follow a newer one.
+  asked_sessions_.push_back(request);
+  if (sessions_to_ignore_ > 0 && sessions_to_ignore_-- > 0) return;
+  state.generation = generation_;
+  state.durable = durable_;
+  state.map_frame = kMapFrame;
+  state.stale = stale_;
+  const bool known = owners_.contains(request.robot);
+  if (sessions_to_refuse_ > 0) {
+    --sessions_to_refuse_;
+    state.phase = SessionPhase::kRefused;
+    state.status = why_refused_;
+  } else if (!known && request.started) {
+    state.phase = SessionPhase::kRefused;
+    state.status = {StatusCode::kFailedPrecondition, "the server does not know this session"};
+  } else if (known && owners_[request.robot].client != request.client) {
+    state.phase = SessionPhase::kRefused;
+    state.status = {StatusCode::kAlreadyExists, "robot '" + request.robot + "' is connected already"};
+  } else {
+    owners_[request.robot] = request;
+    if (request.end) state.phase = SessionPhase::kEnded;
   }
   if (state.phase == SessionPhase::kRefused) {
     Must(refusals_->Publish({state}));
