@@ -94,14 +94,16 @@ Result<void> RobotClient::AwaitSession(const wire::Bus& bus, double timeout_s) {
       if (over_) return tl::unexpected(*over_);
       if (state_ && state_->phase == SessionPhase::kEnded)
         return Fail(StatusCode::kFailedPrecondition, fmt::format("the session of '{}' is not active", request_.robot));
-      // The writers of the streams must have matched too: samples sent before are lost.
-      if (Streaming()) return {};
-      if (Clock::now() >= deadline) {
-        if (not_yet_) return tl::unexpected(*not_yet_);
-        return Fail(StatusCode::kUnavailable, NoServer(bus, timeout_s));
+      if (!MustTellFrame()) {
+        // The writers of the streams must have matched too: samples sent before are lost.
+        if (Streaming()) return {};
+        if (Clock::now() >= deadline) {
+          if (not_yet_) return tl::unexpected(*not_yet_);
+          return Fail(StatusCode::kUnavailable, NoServer(bus, timeout_s));
+        }
+        changed_.WaitFor(mutex_, std::chrono::milliseconds(5));
+        if (Answered() || Clock::now() - asked_ < kAskPeriod) continue;
       }
-      changed_.WaitFor(mutex_, std::chrono::milliseconds(5));
-      if (Answered() || Clock::now() - asked_ < kAskPeriod) continue;
     }
     Ask();
   }
@@ -115,6 +117,7 @@ void RobotClient::Ask() {
     const MutexLock lock(mutex_);
     request = request_;
     asked_ = Clock::now();
+    told_frame_ = request_.map_frame;
     wire = wire_;
   }
   static_cast<void>(wire->session->Publish(request));  // If it is not accepted, Watch asks again.
@@ -122,6 +125,10 @@ void RobotClient::Ask() {
 
 bool RobotClient::Answered() const {
   return answered_ && state_->phase != SessionPhase::kSuspended && state_->generation == generation_;
+}
+
+bool RobotClient::MustTellFrame() const {
+  return Answered() && !request_.started && told_frame_ != request_.map_frame;
 }
 
 bool RobotClient::Streaming() const {
@@ -160,12 +167,23 @@ void RobotClient::OnSession(SessionState&& state) {
       progress_ = Clock::now();
     }
     if (state.stale && !(state_ && state_->stale)) called_stale_ = Clock::now();
+    KeepMapFrame(state);
     state_ = state;
     answered_ = true;
     not_yet_.reset();
     changed_.NotifyAll();
   }
   if (callbacks_.session) callbacks_.session(state);
+}
+
+// The start was believed in this map. If the server dies before the first sample and its state is lost, the next one
+// must know this: the other robots come back with their places in the same map. A server renames the frame of a map
+// that is not begun yet when a robot comes back with another one. The middleware keeps the newest request for the next
+// server, so that it is published once more with the frame (MustTellFrame).
+void RobotClient::KeepMapFrame(const SessionState& state) {
+  if (!request_.has_start || state.phase != SessionPhase::kActive) return;
+  const bool renamed = state_ && state_->generation == state.generation && state_->map_frame == request_.map_frame;
+  if (request_.map_frame == 0 || renamed) request_.map_frame = state.map_frame;
 }
 
 void RobotClient::OnRefusal(SessionRefusal&& refusal) {
@@ -312,7 +330,7 @@ void RobotClient::Watch() {
       reopen = reopening_ && ReadyToReopen();
       const bool over = over_ || state_->phase == SessionPhase::kEnded || reopening_;
       const auto period = stale_.empty() ? std::chrono::milliseconds(kAskPeriod) : kUrgentAskPeriod;
-      ask = ask || (!Answered() && !over && wire_->session->matched() > 0 && now - asked_ >= period);
+      ask = ask || MustTellFrame() || (!Answered() && !over && wire_->session->matched() > 0 && now - asked_ >= period);
     }
     Recover();
     if (reopen) Reopen();

@@ -127,6 +127,7 @@ class RobotClient {
   [[nodiscard]] Result<void> Connect(wire::Bus& bus);
   [[nodiscard]] Result<void> AwaitSession(const wire::Bus& bus, double timeout_s);
   void OnSession(SessionState&& state);
+  void KeepMapFrame(const SessionState& state) CAIRN_REQUIRES(mutex_);
   void OnRefusal(SessionRefusal&& refusal);
   void OnLedger(Ledger&& ledger);
   void OnPose(PoseReport&& report);
@@ -136,6 +137,7 @@ class RobotClient {
   [[nodiscard]] Result<void> AwaitRoom(NameId sensor_id, const Stream& stream) CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool Answered() const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool IsSafe(const Stream& stream) const CAIRN_REQUIRES(mutex_);
+  [[nodiscard]] bool MustTellFrame() const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool Streaming() const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] bool ReadyToReopen() const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] std::optional<Pose2> StartOfNextSession() const CAIRN_REQUIRES(mutex_);
@@ -192,7 +194,8 @@ class RobotClient {
   bool start_unknown_ CAIRN_GUARDED_BY(mutex_) = false;  // The robot was not localized when this session was opened.
   bool scans_used_ CAIRN_GUARDED_BY(mutex_) = false;     // A server has used scans of this session.
   Clock::time_point asked_ CAIRN_GUARDED_BY(mutex_);
-  Clock::time_point refused_ CAIRN_GUARDED_BY(mutex_);  // When reopening began.
+  std::uint64_t told_frame_ CAIRN_GUARDED_BY(mutex_) = 0;  // Of the newest request that was published.
+  Clock::time_point refused_ CAIRN_GUARDED_BY(mutex_);     // When reopening began.
   Clock::time_point progress_ CAIRN_GUARDED_BY(mutex_);
   // Largest number of scans that were sent again and have not settled. At first fewer than fit into the server's queue
   // and the writer's history. Doubled with each time that all is sent again and nothing has settled: the server may

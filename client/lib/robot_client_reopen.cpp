@@ -78,8 +78,8 @@ void RobotClient::Reopen() {
     request_.has_start = start.has_value();
     request_.T_map_robot_start = start.value_or(Pose2{});
     // Another map of this name may be there now, with another origin.
-    const bool from_map = pose_ || request_.map_frame == 0;  // Otherwise it is the start of the last session.
-    request_.map_frame = !start ? 0 : from_map && state_ ? state_->map_frame : request_.map_frame;
+    // Without a pose it is the start of the last session.
+    request_.map_frame = !start ? 0 : pose_ && state_ ? state_->map_frame : request_.map_frame;
     request_.started = false;
     // If this session is lost before its first pose, the next one starts from here.
     if (const auto odometry = backlog_.OdometryAtFirstScan())

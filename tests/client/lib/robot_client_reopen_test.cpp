@@ -180,6 +180,18 @@ TEST_F(RobotClientTest, ScansThatAServerHasDroppedLeaveTheStartKnown) {
   EXPECT_NEAR(server_->sessions().back().T_map_robot_start.x, 10.1, 1e-9);
 }
 
+// The other robots of the fleet came back with the frame of their map, and this one was a stranger in it.
+TEST_F(RobotClientTest, AStartThatAServerHasTakenKeepsTheFrameOfItsMap) {
+  SessionRequest request = Robot("r1");
+  request.has_start = true;
+  const auto client = Must(RobotClient::Open(*bus_, request, 20.0));
+  server_.reset();
+  server_ = std::make_unique<FakeServer>(LoopbackOptions(), 2);
+  ASSERT_TRUE(Eventually([&] { return !server_->sessions().empty(); }));
+  EXPECT_FALSE(server_->sessions().back().started);
+  EXPECT_EQ(server_->sessions().back().map_frame, FakeServer::kMapFrame);
+}
+
 TEST_F(RobotClientTest, WithoutAPoseTheFirstStartIsCarriedOnByTheOdometry) {
   SessionRequest request = Robot("r1");
   request.has_start = true;

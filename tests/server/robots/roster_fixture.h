@@ -49,6 +49,14 @@ class RosterTest : public ::testing::Test {
     });
     return last;
   }
+  // Refusals have their own topic: the state of the client's former session may be published before or after one.
+  SessionState LastRefusal(const std::string& robot, ClientId client) {
+    SessionState last;
+    for (const SessionRefusal& refusal : sent().All<SessionRefusal>()) {
+      if (refusal.state.robot == robot && refusal.state.client == client) last = refusal.state;
+    }
+    return last;
+  }
   bool WaitPhase(const std::string& robot, ClientId client, SessionPhase phase) {
     return sent_.WaitFor([&] {
       const SessionState state = LastState(robot, client);

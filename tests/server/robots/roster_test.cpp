@@ -58,8 +58,8 @@ TEST_F(RosterTest, AClientWhoseSessionIsTakenOverIsTold) {
   EXPECT_EQ(LastState("r1", 7).phase, SessionPhase::kSuspended);
   roster().Take(RequestOf("r1", 8));
   EXPECT_EQ(LastState("r1", 8).phase, SessionPhase::kActive);
-  EXPECT_EQ(LastState("r1", 7).phase, SessionPhase::kRefused);
-  EXPECT_EQ(LastState("r1", 7).status.code, StatusCode::kAlreadyExists);
+  EXPECT_EQ(LastRefusal("r1", 7).phase, SessionPhase::kRefused);
+  EXPECT_EQ(LastRefusal("r1", 7).status.code, StatusCode::kAlreadyExists);
   // Its lease comes back: that changes nothing for the new owner.
   roster().Take(ClientLiveliness{7, HashName("r1"), true});
   EXPECT_EQ(roster().Find("r1")->record().owner(), 8U);
