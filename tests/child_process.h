@@ -15,6 +15,8 @@
 #include <utility>
 #include <vector>
 
+#include "tests/eventually.h"
+
 extern char** environ;
 
 namespace cairn {
@@ -67,7 +69,7 @@ class ChildProcess {
   }
 
   // Reads on until its output holds the text; false if it ends, or the deadline passes, without.
-  bool Says(const std::string& text, std::chrono::seconds deadline = std::chrono::seconds(60)) {
+  bool Says(const std::string& text, std::chrono::seconds deadline = test::kDeadline) {
     const auto end = std::chrono::steady_clock::now() + deadline;
     while (said_.find(text) == std::string::npos)
       if (Read(end) != Output::kMore) return false;
@@ -75,7 +77,7 @@ class ChildProcess {
   }
 
   // Reads to the end of its output, then its exit code; killed where it takes longer than the deadline.
-  Outcome Wait(std::chrono::seconds deadline = std::chrono::seconds(60)) {
+  Outcome Wait(std::chrono::seconds deadline = test::kDeadline) {
     const auto end = std::chrono::steady_clock::now() + deadline;
     Output output = Output::kMore;
     while (output == Output::kMore) output = Read(end);

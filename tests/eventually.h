@@ -7,7 +7,7 @@
 
 namespace cairn::test {
 
-inline constexpr std::chrono::seconds kDeadline{20};  // Generous: sanitizers, a busy machine. Never waited for in full.
+inline constexpr std::chrono::seconds kDeadline{120};  // Generous: sanitizers, a busy machine. Never waited for in full.
 
 // Polls; for conditions no callback announces.
 inline bool Eventually(const std::function<bool()>& condition, std::chrono::milliseconds deadline = kDeadline) {

@@ -127,7 +127,7 @@ Result<Reply> QueryClient::Ask(const Request& request) {
   for (Clock::duration patience = MayBeDeaf() ? kHostileFirstPatience : kFirstPatience;; patience *= 2) {
     if (auto found = WaitForServer(command, deadline); !found) return tl::unexpected(found.error());
     const Deadline begun = repeatable ? std::min(deadline, Clock::now() + patience) : deadline;
-    Result<Reply> reply = AskOnce(request, begun, deadline, kOnce);
+    Result<Reply> reply = Exchange(request, begun, deadline, kOnce);
     if (reply && !reply->status.ok()) return tl::unexpected(reply->status);
     if (reply || reply.error().code != StatusCode::kDeadlineExceeded || Clock::now() >= deadline) return reply;
   }
@@ -162,7 +162,7 @@ Result<void> QueryClient::WaitForServer(bool command, Deadline deadline) {
       continue;
     }
     const Deadline soon = std::min(deadline, Clock::now() + kPatience);
-    const Result<Reply> pong = AskOnce(MakeRequest(RequestKind::kPing), soon, soon, kEvery);
+    const Result<Reply> pong = Exchange(MakeRequest(RequestKind::kPing), soon, soon, kEvery);
     if (!pong) RenewIfSilent(began, kAnswerPatience);
     const MutexLock lock(mutex_);
     if (pong) {
@@ -174,7 +174,7 @@ Result<void> QueryClient::WaitForServer(bool command, Deadline deadline) {
   }
 }
 
-Result<Reply> QueryClient::AskOnce(Request request, Deadline begun, Deadline deadline, Deadline::duration every) {
+Result<Reply> QueryClient::Exchange(Request request, Deadline begun, Deadline deadline, Deadline::duration every) {
   const std::shared_ptr<Wire> wire = CurrentWire();
   request.client = wire->client;
   {

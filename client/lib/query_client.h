@@ -162,7 +162,7 @@ class QueryClient {
   [[nodiscard]] Result<Job> AskForJob(const Request& request);
   // `begun`: until when the first part must be here. `every`: how long after one question it is sent again, as long as
   // no part of an answer is here; only for what may be asked twice.
-  [[nodiscard]] Result<Reply> AskOnce(Request request, Deadline begun, Deadline deadline, Deadline::duration every);
+  [[nodiscard]] Result<Reply> Exchange(Request request, Deadline begun, Deadline deadline, Deadline::duration every);
 
   wire::Bus& bus_;
   const QueryClientOptions options_;

@@ -44,7 +44,7 @@ double SecondsFor(const ServerOptions& options, int robot_count, int steps,
       return house.LastLedger(robot).settled_through == static_cast<std::uint64_t>(steps);
     });
   };
-  EXPECT_TRUE(house.WaitFor(settled, std::chrono::seconds(200)));  // Sanitized, beside other tests.
+  EXPECT_TRUE(house.WaitFor(settled, std::chrono::seconds(600)));  // Sanitized, beside other tests.
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
 }
 

@@ -59,7 +59,7 @@ TEST_F(RobotClientTest, OpensANewSessionWhereTheRobotIsIfTheServerForgotIt) {
   // The fake server's poses say that the frames `map` and `odom` are the same. The robot drives 0.1 m from scan to
   // scan.
   EXPECT_NEAR(last.T_map_robot_start.x, 0.1 * settled, 1e-9);
-  EXPECT_EQ(first.map_frame, 0U);
+  EXPECT_EQ(first.map_frame, FakeServer::kMapFrame);
   EXPECT_EQ(last.map_frame, FakeServer::kMapFrame) << "it must not be believed in another map";
 }
 

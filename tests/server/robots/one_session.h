@@ -16,6 +16,7 @@
 
 #include "common/mutex.h"
 #include "server/robots/session.h"
+#include "tests/eventually.h"
 #include "tests/server/support/room_world.h"
 
 namespace cairn::server::testing {
@@ -75,7 +76,7 @@ class Sent {
     return all;
   }
   bool WaitFor(const std::function<bool()>& condition) const {
-    const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    const auto deadline = std::chrono::steady_clock::now() + test::kDeadline;
     while (!condition()) {
       const MutexLock lock(mutex_);
       if (std::chrono::steady_clock::now() > deadline) return false;

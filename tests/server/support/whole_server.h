@@ -16,6 +16,7 @@
 #include "common/mutex.h"
 #include "server/ingress/admission.h"
 #include "server/server.h"
+#include "tests/eventually.h"
 #include "tests/server/support/room_world.h"
 
 namespace cairn::server::testing {
@@ -181,7 +182,7 @@ class WholeServer {
     return tiles;
   }
 
-  bool WaitFor(const std::function<bool()>& condition, std::chrono::seconds at_most = std::chrono::seconds(30)) const {
+  bool WaitFor(const std::function<bool()>& condition, std::chrono::seconds at_most = test::kDeadline) const {
     const auto deadline = std::chrono::steady_clock::now() + at_most;
     while (!condition()) {
       const MutexLock lock(mutex_);
