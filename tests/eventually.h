@@ -7,7 +7,8 @@
 
 namespace cairn::test {
 
-inline constexpr std::chrono::seconds kDeadline{120};  // Generous: sanitizers, a busy machine. Never waited for in full.
+// Generous, for sanitizers and a busy machine; never waited for in full.
+inline constexpr std::chrono::seconds kDeadline{120};
 
 // Polls; for conditions no callback announces.
 inline bool Eventually(const std::function<bool()>& condition, std::chrono::milliseconds deadline = kDeadline) {

@@ -17,6 +17,7 @@ constexpr std::chrono::seconds kFirstPatience{2};   // For the first part of an 
 constexpr std::chrono::seconds kAnswerPatience{1};  // Pings of a server that was found are not answered for so long.
 constexpr std::chrono::seconds kHostileFirstPatience{1};  // Where forged messages may have made the client deaf.
 
+constexpr std::chrono::milliseconds kPingPatience{100}, kPingEvery{20};
 constexpr std::chrono::steady_clock::duration kOnce{0};  // A question is not sent again.
 
 // The answer's only element, which a server that says OK must give.
@@ -140,38 +141,53 @@ bool QueryClient::CommandsMatched() const {
 
 // DDS matches the topic of requests and the topic of replies one after the other, on both sides. Until all four ends
 // have found their peers, an answer may be lost. Only an answered ping proves that they have; a ping may be repeated,
-// while a question that starts a job may not.
+// while a question that starts a job may not. One thread sends pings for all that wait: four hundred of them kept the
+// server too busy to answer.
 Result<void> QueryClient::WaitForServer(bool command, Deadline deadline) {
-  constexpr std::chrono::milliseconds kPatience{100}, kEvery{20};
   const bool secure = !bus_.options().security.empty();
   Deadline began = Clock::now();  // Since when pings are not answered.
   for (;;) {
-    bool matched = false;
+    bool matched = false, pings = false;
     {
       const MutexLock lock(mutex_);
       if (server_found_ && (!command || CommandsMatched())) return {};
       matched = wire_->requests->matched() > 0 && wire_->replies->matched() > 0 && (!command || CommandsMatched());
       if (matched) alone_since_.reset();
       if (!matched && !alone_since_) alone_since_ = Clock::now();
-      if (!matched) changed_.WaitFor(mutex_, std::chrono::milliseconds(5));
+      pings = matched && !std::exchange(pinging_, true);
+      if (!pings) changed_.WaitFor(mutex_, matched ? kPingPatience : std::chrono::milliseconds(5));
     }
     if (!matched) {
       began = Clock::now();
-      if (began >= deadline) return Fail(StatusCode::kUnavailable, NoServer(bus_, options_.timeout_s));
       RenewIfAlone(secure);
-      continue;
-    }
-    const Deadline soon = std::min(deadline, Clock::now() + kPatience);
-    const Result<Reply> pong = Exchange(MakeRequest(RequestKind::kPing), soon, soon, kEvery);
-    if (!pong) RenewIfSilent(began, kAnswerPatience);
-    const MutexLock lock(mutex_);
-    if (pong) {
-      server_found_ = true;
-      renewal_pause_ = std::chrono::seconds(1);
+    } else if (pings && PingOnce(began, deadline)) {
       return {};
     }
     if (Clock::now() >= deadline) return Fail(StatusCode::kUnavailable, NoServer(bus_, options_.timeout_s));
   }
+}
+
+// `began`: see WaitForServer. Whether the server has answered.
+bool QueryClient::PingOnce(Deadline began, Deadline deadline) {
+  struct Turn {
+    QueryClient& client;
+    ~Turn() {
+      const MutexLock lock(client.mutex_);
+      client.pinging_ = false;
+      client.changed_.NotifyAll();
+    }
+  };
+  const Turn turn{*this};
+  const Deadline soon = std::min(deadline, Clock::now() + kPingPatience);
+  const Result<Reply> pong = Exchange(MakeRequest(RequestKind::kPing), soon, soon, kPingEvery);
+  if (!pong) {
+    RenewIfSilent(began, kAnswerPatience);
+    return false;
+  }
+  const MutexLock lock(mutex_);
+  server_found_ = true;
+  renewal_pause_ = std::chrono::seconds(1);
+  return true;
 }
 
 Result<Reply> QueryClient::Exchange(Request request, Deadline begun, Deadline deadline, Deadline::duration every) {

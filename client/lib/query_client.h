@@ -158,6 +158,7 @@ class QueryClient {
   void RenewIfAlone(bool secure);
   [[nodiscard]] bool CommandsMatched() const CAIRN_REQUIRES(mutex_);
   [[nodiscard]] Result<void> WaitForServer(bool command, Deadline deadline);
+  [[nodiscard]] bool PingOnce(Deadline began, Deadline deadline);
   [[nodiscard]] Result<Reply> Ask(const Request& request);
   [[nodiscard]] Result<Job> AskForJob(const Request& request);
   // `begun`: until when the first part must be here. `every`: how long after one question it is sent again, as long as
@@ -170,6 +171,7 @@ class QueryClient {
   mutable Mutex mutex_;
   CondVar changed_;
   bool server_found_ CAIRN_GUARDED_BY(mutex_) = false;
+  bool pinging_ CAIRN_GUARDED_BY(mutex_) = false;  // A thread waits for an answer to its ping.
   std::int64_t sequence_ CAIRN_GUARDED_BY(mutex_) = 0;
   std::map<std::int64_t, ReplyAssembly> pending_ CAIRN_GUARDED_BY(mutex_);  // By sequence; what callers wait for.
   Deadline last_answer_ CAIRN_GUARDED_BY(mutex_);                           // Last answer, however late.

@@ -151,7 +151,8 @@ def change_the_mode(page, address):
     page.press_enter()
     eventually("it is only localised", lambda: page.text(f"{robot} .mode").startswith("Only localised"))
     eventually("it cannot be localised twice", lambda: not page.shows(f"{robot} .to-localise"))
-    eventually("it is found in the map", lambda: page.text(f"{robot} .pill") == "Tracking")
+    # It may have driven on to where nothing is drawn yet. At this rate the other robot has drawn all after a minute.
+    eventually("it is found in the map", lambda: page.text(f"{robot} .pill") == "Tracking", 240.0)
     eventually("the keyboard stays where the other mode is",
                lambda: page.run(f"document.activeElement === document.querySelector('{robot} .to-map')"))
     page.press_enter()
