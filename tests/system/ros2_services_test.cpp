@@ -91,7 +91,8 @@ TEST_F(RosCallers, SavePauseAndResetSitesWhereThatIsAllowed) {
   // Once the robot is found in the map. Until then the answer is 0, and nothing changes.
   EXPECT_TRUE(test::Eventually([this] {
     return Call({"pause", "/lab/pause_new_measurements", "jazzy"})["result"] == 1;
-  })) << "maps again";
+  })) << "maps again\n"
+      << Cairn({"status"}) << Cairn({"ros2", "doctor"});
 
   EXPECT_EQ(Call({"load_map", "/cairn/load_map", "nothing"})["result"], 1);
   EXPECT_EQ(Call({"load_map", "/cairn/load_map", "/etc/passwd"})["result"], 1);

@@ -47,7 +47,7 @@ struct Robot {
   dds_entity_t pose, tf, map, updates, publications; /* Readers. */
   dds_time_t began;
   /* What came back. */
-  int poses, transforms, maps, update_count, occupied_cells, hashes;
+  int poses, transforms, maps, update_count, early_updates, occupied_cells, hashes;
   bool has_first;
   struct RoomPose first_estimate, first_truth;
   double worst_m, worst_rad, worst_odom_m;
@@ -293,6 +293,22 @@ static void CheckPose(struct Robot* robot, const PoseStamped* pose) {
   Keep(&robot->worst_rad, fabs(error.theta));
 }
 
+static void TakeMaps(struct Robot* robot) {
+  TAKE_ALL(robot->map, OccupancyGrid, map, {
+    if (map->data._length != map->info.width * map->info.height) Die("a map of another size than it says");
+    ++robot->maps;
+    robot->width = map->info.width;
+    robot->height = map->info.height;
+    robot->occupied_cells = 0;
+    for (uint32_t k = 0; k < map->data._length; ++k) robot->occupied_cells += map->data._buffer[k] > 65;
+  })
+}
+
+static bool Fits(const struct Robot* robot, const OccupancyGridUpdate* update) {
+  return update->x >= 0 && update->y >= 0 && update->x + update->width <= robot->width &&
+         update->y + update->height <= robot->height;
+}
+
 static void TakeAll(struct Robot* robot) {
   TAKE_ALL(robot->pose, PoseStamped, pose, { CheckPose(robot, pose); })
   TAKE_ALL(robot->tf, TFMessage, message, {
@@ -303,19 +319,13 @@ static void TakeAll(struct Robot* robot) {
       ++robot->transforms;
     }
   })
-  TAKE_ALL(robot->map, OccupancyGrid, map, {
-    if (map->data._length != map->info.width * map->info.height) Die("a map of another size than it says");
-    ++robot->maps;
-    robot->width = map->info.width;
-    robot->height = map->info.height;
-    robot->occupied_cells = 0;
-    for (uint32_t k = 0; k < map->data._length; ++k) robot->occupied_cells += map->data._buffer[k] > 65;
-  })
+  TakeMaps(robot);
   TAKE_ALL(robot->updates, OccupancyGridUpdate, update, {
     if (update->data._length != update->width * update->height) Die("an update of another size than it says");
-    if (update->x < 0 || update->y < 0 || update->x + update->width > robot->width ||
-        update->y + update->height > robot->height)
-      Die("an update outside the map");
+    /* The map to which it belongs may have come meanwhile, or be under way on its own topic. Nav2 leaves the update out
+       then. */
+    if (!Fits(robot, update)) TakeMaps(robot);
+    if (!Fits(robot, update)) ++robot->early_updates;
     ++robot->update_count;
   })
   /* The endpoints of the server have the user data of Iron and later. */
@@ -385,7 +395,7 @@ int main(int argc, char** argv) {
   const bool ok = silent ? robot.poses == 0 && robot.transforms == 0
                          : robot.poses > 5 * seconds && robot.transforms > 5 * seconds && robot.maps > 0 && late &&
                                robot.occupied_cells > 100 && robot.hashes > 0 && robot.worst_m < 0.08 &&
-                               robot.worst_rad < 0.03;
+                               robot.worst_rad < 0.03 && robot.early_updates <= robot.maps;
   printf(
       "{\"ok\":%s,\"poses\":%d,\"transforms\":%d,\"maps\":%d,\"updates\":%d,\"late_map\":%s,\"occupied\":%d,"
       "\"hashes\":%d,\"worst_m\":%.3f,\"worst_rad\":%.4f}\n",
