@@ -50,7 +50,7 @@ struct Robot {
   int poses, transforms, maps, update_count, early_updates, occupied_cells, hashes;
   bool has_first;
   struct RoomPose first_estimate, first_truth;
-  double worst_m, worst_rad, worst_odom_m;
+  double worst_m, worst_rad;
   uint32_t width, height;
 };
 
@@ -267,10 +267,6 @@ static double Yaw(geometry_msgs_msg_dds__Quaternion_ turn) {
   return 2 * atan2(turn.z, turn.w);
 }
 
-static void Keep(double* worst, double value) {
-  if (value > *worst) *worst = value;
-}
-
 /* Compares a pose with the truth, both relative to the first pose: the map begins where the robot was then. */
 static void CheckPose(struct Robot* robot, const PoseStamped* pose) {
   const dds_time_t stamp = (dds_time_t)pose->header.stamp.sec * DDS_NSECS_IN_SEC + pose->header.stamp.nanosec;
@@ -289,8 +285,8 @@ static void CheckPose(struct Robot* robot, const PoseStamped* pose) {
   }
   const struct RoomPose error =
       RelativePose(RelativePose(robot->first_truth, truth), RelativePose(robot->first_estimate, estimate));
-  Keep(&robot->worst_m, hypot(error.x, error.y));
-  Keep(&robot->worst_rad, fabs(error.theta));
+  robot->worst_m = fmax(robot->worst_m, hypot(error.x, error.y));
+  robot->worst_rad = fmax(robot->worst_rad, fabs(error.theta));
 }
 
 static void TakeMaps(struct Robot* robot) {
@@ -322,8 +318,7 @@ static void TakeAll(struct Robot* robot) {
   TakeMaps(robot);
   TAKE_ALL(robot->updates, OccupancyGridUpdate, update, {
     if (update->data._length != update->width * update->height) Die("an update of another size than it says");
-    /* The map to which it belongs may have come meanwhile, or be under way on its own topic. Nav2 leaves the update out
-       then. */
+    /* Its map may have come meanwhile, or be under way on its own topic. Nav2 leaves the update out then. */
     if (!Fits(robot, update)) TakeMaps(robot);
     if (!Fits(robot, update)) ++robot->early_updates;
     ++robot->update_count;
@@ -387,10 +382,9 @@ int main(int argc, char** argv) {
   }
   /* The last map may be under way. */
   const bool silent = robot.options.no_tf || robot.options.nonsense || robot.options.only_scan;
-  for (const dds_time_t end = dds_time() + DDS_SECS(10); !silent && dds_time() < end; dds_sleepfor(DDS_MSECS(5))) {
+  const dds_time_t end = dds_time() + DDS_SECS(10);
+  for (; !silent && (robot.maps == 0 || robot.hashes == 0) && dds_time() < end; dds_sleepfor(DDS_MSECS(5)))
     TakeAll(&robot);
-    if (robot.maps > 0 && robot.hashes > 0) break;
-  }
   const bool late = !silent && LateMap(&robot, domain, argv[3]);
   const bool ok = silent ? robot.poses == 0 && robot.transforms == 0
                          : robot.poses > 5 * seconds && robot.transforms > 5 * seconds && robot.maps > 0 && late &&
