@@ -17,7 +17,8 @@ constexpr std::chrono::seconds kFirstPatience{2};   // For the first part of an 
 constexpr std::chrono::seconds kAnswerPatience{1};  // Pings of a server that was found are not answered for so long.
 constexpr std::chrono::seconds kHostileFirstPatience{1};  // Where forged messages may have made the client deaf.
 
-constexpr std::chrono::milliseconds kPingPatience{100}, kPingEvery{20};
+constexpr std::chrono::milliseconds kPingPatience{100};  // For the answer to a ping; then a new one is begun.
+constexpr std::chrono::milliseconds kPingEvery{20};      // Until then the same one is sent again.
 constexpr std::chrono::steady_clock::duration kOnce{0};  // A question is not sent again.
 
 // The answer's only element, which a server that says OK must give.
@@ -155,7 +156,8 @@ Result<void> QueryClient::WaitForServer(bool command, Deadline deadline) {
       if (matched) alone_since_.reset();
       if (!matched && !alone_since_) alone_since_ = Clock::now();
       pings = matched && !std::exchange(pinging_, true);
-      if (!pings) changed_.WaitFor(mutex_, matched ? kPingPatience : std::chrono::milliseconds(5));
+      const auto patience = matched ? kPingPatience : std::chrono::milliseconds(5);
+      if (!pings) changed_.WaitUntil(mutex_, std::min(deadline, Clock::now() + patience));
     }
     if (!matched) {
       began = Clock::now();

@@ -77,8 +77,8 @@ void RobotClient::Reopen() {
     start_unknown_ = !start;
     request_.has_start = start.has_value();
     request_.T_map_robot_start = start.value_or(Pose2{});
-    // Another map of this name may be there now, with another origin.
-    // Without a pose it is the start of the last session.
+    // Another map of this name may be there now, with another origin. Without a pose, the start is that of the last
+    // session carried on, in the map of that start.
     request_.map_frame = !start ? 0 : pose_ && state_ ? state_->map_frame : request_.map_frame;
     request_.started = false;
     // If this session is lost before its first pose, the next one starts from here.

@@ -7,8 +7,10 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <set>
 #include <string_view>
 #include <thread>
+#include <vector>
 
 #include "tests/client/lib/fake_server.h"
 #include "tests/loopback.h"
@@ -134,6 +136,18 @@ TEST_F(QueryClientTest, SendsTheFirstPingAgainSoonAndWaitsOnForItsAnswer) {
   const std::vector<std::uint64_t> pings = server_.pings();
   EXPECT_GE(pings.size(), 7U);
   EXPECT_NE(std::adjacent_find(pings.begin(), pings.end()), pings.end()) << "no ping was sent twice";
+}
+
+// Four hundred threads of eight clients pinged at once, and a busy server answered hardly any question.
+TEST_F(QueryClientTest, OneThreadSendsPingsForAllThatWait) {
+  constexpr int kThreads = 50;
+  server_.IgnorePings(60);
+  {
+    std::vector<std::jthread> threads;
+    for (int i = 0; i < kThreads; ++i) threads.emplace_back([this] { EXPECT_TRUE(client_->Maps()); });
+  }
+  const std::vector<std::uint64_t> pings = server_.pings();
+  EXPECT_LT(std::set<std::uint64_t>(pings.begin(), pings.end()).size(), kThreads / 2) << "sent again counts once";
 }
 
 // A question that does something must not be asked twice, however slowly the two sides find each other.
