@@ -1,10 +1,11 @@
 /* A ROS 2 program that calls a service as rmw_cyclonedds does, without ROS: waits for the service, asks, waits for the
  * answer with its own two numbers in front, and prints it as one line of JSON. Exits 0 if it came.
- *   ros2_caller DOMAIN KIND SERVICE [TEXT] [jazzy] [impatient] [briefly]
+ *   ros2_caller DOMAIN KIND SERVICE [TEXT] [jazzy] [flood] [impatient] [briefly]
  * KIND is get_map, load_map, save_map, serialize_map, pause or reset (TEXT "true": paused afterwards). Words: jazzy:
- * type hashes in the user data of endpoints (from Iron on); without it: as Humble. impatient: asks as soon as its
- * request can be read, without a look whether its reader of answers is known, and 300 times at once, of which one
- * answer will do. briefly: looks for the service for 5 s, not 30. CYCLONEDDS_URI chooses the network interface.
+ * type hashes in the user data of endpoints (from Iron on); without it: as Humble. flood: asks 300 times at once, of
+ * which one answer will do. impatient: asks as soon as its request can be read, without a look whether it knows who
+ * answers, and again every second. briefly: looks for the service for 5 s, not 30. CYCLONEDDS_URI chooses the network
+ * interface.
  */
 #include <dds/dds.h>
 #include <stdbool.h>
@@ -108,6 +109,8 @@ static void Join(struct Caller* caller, dds_domainid_t domain, const char* servi
   caller->client = handle;
 }
 
+/* As rmw_service_server_is_available looks: both endpoints of the server are known. What a writer has sent before
+ * Cyclone DDS knows it is lost for ever, so an impatient caller may get no answer to what it asked first. */
 static bool IsThere(const struct Caller* caller, bool impatient) {
   dds_instance_handle_t peer = 0;
   return dds_get_matched_subscriptions(caller->writer, &peer, 1) > 0 &&
@@ -160,7 +163,8 @@ static bool TakeAnswer(const struct Caller* caller, int64_t number, int64_t coun
 }
 
 static bool IsWord(const char* text) {
-  return strcmp(text, "jazzy") == 0 || strcmp(text, "impatient") == 0 || strcmp(text, "briefly") == 0;
+  return strcmp(text, "jazzy") == 0 || strcmp(text, "flood") == 0 || strcmp(text, "impatient") == 0 ||
+         strcmp(text, "briefly") == 0;
 }
 
 static bool Has(int argc, char** argv, const char* word) {
@@ -170,26 +174,31 @@ static bool Has(int argc, char** argv, const char* word) {
 }
 
 int main(int argc, char** argv) {
-  if (argc < 4) Die("usage: ros2_caller DOMAIN KIND SERVICE [TEXT] [jazzy] [impatient] [briefly]");
+  if (argc < 4) Die("usage: ros2_caller DOMAIN KIND SERVICE [TEXT] [jazzy] [flood] [impatient] [briefly]");
   struct Caller caller = {.kind = NULL, .jazzy = Has(argc, argv, "jazzy")};
   for (size_t i = 0; i < sizeof(kKinds) / sizeof(kKinds[0]); ++i)
     if (strcmp(kKinds[i].name, argv[2]) == 0) caller.kind = &kKinds[i];
   if (caller.kind == NULL) Die("no such kind");
-  const bool impatient = Has(argc, argv, "impatient");
   const char* const text = argc > 4 && !IsWord(argv[4]) ? argv[4] : "";
   Join(&caller, (dds_domainid_t)strtoul(argv[1], NULL, 10), argv[3]);
   const dds_time_t end = dds_time() + DDS_SECS(Has(argc, argv, "briefly") ? kBriefly : kSeconds);
+  const bool impatient = Has(argc, argv, "impatient");
   while (!IsThere(&caller, impatient)) {
     if (dds_time() > end) Die("the service is not there");
     dds_sleepfor(DDS_MSECS(impatient ? 1 : 20));
   }
   const int64_t first = 4000000001; /* More than 32 bits. */
-  const int64_t count = impatient ? kFlood : 1;
+  int64_t count = Has(argc, argv, "flood") ? kFlood : 1;
   for (int64_t i = 0; i < count; ++i) Ask(&caller, first + i, text);
+  dds_time_t asked = dds_time();
   bool answered = false;
   while (!answered && dds_time() < end) {
     answered = TakeAnswer(&caller, first, count);
     if (!answered) dds_sleepfor(DDS_MSECS(5));
+    if (impatient && !answered && dds_time() > asked + DDS_SECS(1)) {
+      Ask(&caller, first + count++, text);
+      asked = dds_time();
+    }
   }
   if (!answered) printf("{\"error\":\"no answer\"}\n");
   dds_delete(caller.participant);
