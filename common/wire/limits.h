@@ -33,6 +33,10 @@ inline constexpr std::size_t kMaxReplyNamespaces = 256;
 inline constexpr std::size_t kMaxRos2Problems = 16;
 inline constexpr std::size_t kMaxRos2Topics = 64;
 
+// A reader that comes late counts the numbers of all samples that a writer has ever written (idl/README.md). After so
+// many, which takes it less than 0.1 s, a new writer of a keyed topic begins again at 1.
+inline constexpr std::uint64_t kMostWritten = 200'000;
+
 // The size of one serialised sample. It bounds what a datagram can make the middleware allocate.
 inline constexpr std::uint32_t kMaxSampleBytes = 256 * 1024;
 

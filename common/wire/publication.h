@@ -12,6 +12,7 @@
 
 #include "common/wire/bounds.h"
 #include "common/wire/convert.h"
+#include "common/wire/limits.h"
 #include "common/wire/participant.h"
 
 namespace cairn::wire {
@@ -93,8 +94,11 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
       if (used_.size() >= places && !used_.contains(key)) {
         // The samples of keys that are new wait until the writer has room.
         if (live_.size() >= used_.size() || !Renew()) return false;
+      } else if (written_ >= kMostWritten) {
+        static_cast<void>(Renew());  // Until it can, the old one goes on.
       }
       if (!writer_->write(&sample)) return false;
+      ++written_;
       used_.insert(key);
       live_.insert_or_assign(key, sample);
       return true;
@@ -102,9 +106,9 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
   }
 
   // The place of a key in a writer cannot be freed, because unregistering a key stops the data to the readers
-  // (idl/README.md). Instead a new writer, which has only the keys that still exist, replaces the old one as soon as it
-  // has matched the same readers. Before that, samples of topics without history would be lost. Returns false if it has
-  // not matched them yet.
+  // (idl/README.md), nor its numbers begun anew. Instead a new writer, which has only the keys that still exist,
+  // replaces the old one as soon as it has matched the same readers. Before that, samples of topics without history
+  // would be lost. Returns false if it has not matched them yet.
   bool Renew() CAIRN_REQUIRES(mutex_) {
     constexpr std::chrono::seconds kLongestSearch{2};  // A reader on a host that was lost never matches the new writer.
     const auto now = std::chrono::steady_clock::now();
@@ -122,6 +126,7 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
     for (auto& [key, sample] : live_) {
       if (Topic<Value>::kProfile.transient_local && successor_->write(&sample)) used_.insert(key);
     }
+    written_ = used_.size();
     writer_ = std::move(successor_);
     matched_.store(ReadersOf(*writer_));
     return true;
@@ -143,6 +148,7 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
   Mutex mutex_;
   std::map<Key, Sample<Wire>> live_ CAIRN_GUARDED_BY(mutex_);  // Where keys are retired: the last sample of each.
   std::set<Key> used_ CAIRN_GUARDED_BY(mutex_);                // Keys that have a place in the writer.
+  std::uint64_t written_ CAIRN_GUARDED_BY(mutex_) = 0;         // Samples, by the present writer.
   // The last members: they call the listener until they are destroyed.
   Participant::Writer writer_;
   Participant::Writer successor_

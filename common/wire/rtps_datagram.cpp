@@ -140,7 +140,8 @@ DatagramFault InspectGap(const Submessage& m, const Inspection& with) {
   if (!SetFits(m, 24, 0)) return DatagramFault::kSequenceSet;
   const std::int64_t start = m.body.Sequence(8);
   const std::int64_t base = m.body.Sequence(16);
-  if (start <= 0 || base < start || base - start > kMaxGap) return DatagramFault::kSequence;
+  if (start <= 0 || base < start) return DatagramFault::kSequence;
+  if (base - start > kMaxGap && !with.gate.Reached(m.Numbers(4), base - 1)) return DatagramFault::kSequence;
   const std::int64_t last = std::max(base - 1, HighestOf(m, 16));
   return with.Accepts(m.Numbers(4), last) ? DatagramFault::kNone : DatagramFault::kSequence;
 }

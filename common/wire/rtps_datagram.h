@@ -29,8 +29,10 @@ enum class DatagramFault : std::uint8_t {
   kSecurity,       // A part of DDS Security whose counts or lengths exceed it (secure_datagram.h).
 };
 inline constexpr std::size_t kDatagramFaults = 10;
-// A gap may leave out this many numbers of samples. The library looks up every one of them with its reader locked, and
-// a gap of almost a million kept a reader busy for more than two minutes. Of a longer one, heartbeats say the same.
+// A gap may leave out this many numbers that its writer has not reached yet. The library looks up every one of them
+// with its reader locked, and a forged gap of almost a million kept a reader busy for more than two minutes. What the
+// writer has reached may be left out in any number: a writer that keeps one sample for each key leaves out all between
+// the last sample of a key that has not changed for hours and the next one that it keeps.
 inline constexpr std::int64_t kMaxGap = 16'384;
 [[nodiscard]] std::string_view DatagramFaultName(DatagramFault fault);
 

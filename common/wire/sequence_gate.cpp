@@ -34,6 +34,12 @@ bool SequenceGate::Accept(const Key& whose, std::int64_t number, Clock::time_poi
   return true;
 }
 
+bool SequenceGate::Reached(const Key& whose, std::int64_t number) const {
+  const MutexLock lock(mutex_);
+  const auto known = peers_.find(whose);
+  return known != peers_.end() && known->second.accepted && number <= known->second.highest;
+}
+
 bool SequenceGate::IsRepeated(Peer& peer, std::int64_t number, Clock::time_point now) {
   if (peer.claims == 0 || number > peer.claimed + kStep || number < peer.claimed - kStep) {
     peer.claims = 0;

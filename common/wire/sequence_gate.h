@@ -45,6 +45,9 @@ class SequenceGate {
   // Accepts and stores a number of a peer, or refuses it. Lower numbers than before are always accepted.
   [[nodiscard]] bool Accept(const Key& whose, std::int64_t number, Clock::time_point now);
 
+  // Whether a number of a peer that is at least as high was accepted before.
+  [[nodiscard]] bool Reached(const Key& whose, std::int64_t number) const;
+
   // The next number of what a peer sends and the participant wants counted. It is higher than any before, also if the
   // peer was forgotten meanwhile because there are too many.
   [[nodiscard]] std::uint32_t NextCount(const Key& whose);

@@ -236,6 +236,21 @@ TEST(RtpsDatagram, GapsTheLibraryWouldWalkForMinutesAreRefused) {
   EXPECT_EQ(gap(1, 100, 64, 1).Inspect(), DatagramFault::kSequenceSet);
 }
 
+// Of a robot that has left, the last sample is kept for years, and the other robots go on.
+TEST(RtpsDatagram, AGapMayLeaveOutEverythingThatItsWriterHasReached) {
+  constexpr std::uint32_t kWriter = 0x000002c2;
+  const auto gap = [](std::int64_t start, std::int64_t base) {
+    return Datagram().Begin(0x08, 0).U32(7).U32(kWriter).Sequence(start).Sequence(base).U32(0).End();
+  };
+  Numbers numbers;
+  const std::int64_t reached = 20 * kMaxGap;
+  EXPECT_EQ(numbers.Take(gap(2, reached)), DatagramFault::kSequence);
+  EXPECT_EQ(numbers.Take(Datagram().Heartbeat(1, reached)), DatagramFault::kNone);
+  EXPECT_EQ(numbers.Take(gap(2, reached)), DatagramFault::kNone);
+  EXPECT_EQ(numbers.Take(gap(2, reached + 1)), DatagramFault::kNone);
+  EXPECT_EQ(numbers.Take(gap(2, reached + 2)), DatagramFault::kSequence);
+}
+
 TEST(RtpsDatagram, AcknowledgementsMustHoldTheirBits) {
   const auto ack = [](std::int64_t base, std::uint32_t bits, std::size_t words) {
     return Datagram().Begin(0x06, 0).U32(0).U32(0).Sequence(base).U32(bits).Zeros(4 * words).U32(1).End();

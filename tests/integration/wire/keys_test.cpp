@@ -3,7 +3,11 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
+#include <thread>
 
+#include "common/wire/limits.h"
+#include "common/wire/rtps_datagram.h"
 #include "tests/common/wire/sample_values.h"
 #include "tests/loopback.h"
 
@@ -74,6 +78,64 @@ TYPED_TEST(Keys, ThatAreRetiredMakeRoomForOthers) {
       return std::any_of(values.begin(), values.end(), [](const TypeParam& v) { return KeyOf(v) == kLasting; });
     })) << "what lives outlives the writers";
   }
+}
+
+// The last ledger of a robot that has left is kept while the others go on, so that many numbers are left out behind it.
+TYPED_TEST(Keys, ALateJoinerGetsWhatWasWrittenLongAgo) {
+  const auto publication = Must(this->sender_->template Advertise<TypeParam>());
+  Inbox<TypeParam> first;
+  const auto subscription = Must(this->receiver_->template Subscribe<TypeParam>(first.Sink()));
+  ASSERT_TRUE(Eventually([&] { return publication->matched() == 1 && subscription->matched() == 1; }));
+  ASSERT_TRUE(publication->Publish(OfRobot<TypeParam>(kLasting)));
+  for (std::int64_t count = 1; count <= 2 * kMaxGap; ++count) {
+    ASSERT_TRUE(publication->Publish(OfRobot<TypeParam>(1)));
+    if (count % 512 == 0) {
+      ASSERT_TRUE(publication->WaitForAcknowledgement(kDeadline));
+    }
+  }
+  // In a process of its own, so to speak: what other participants know of the writer's numbers does not help it.
+  const auto late_bus = MakeBus("late");
+  Inbox<TypeParam> late;
+  const auto late_subscription = Must(late_bus->template Subscribe<TypeParam>(late.Sink()));
+  const auto has = [&](std::uint64_t key) {
+    const auto values = late.values();
+    return std::any_of(values.begin(), values.end(), [&](const TypeParam& v) { return KeyOf(v) == key; });
+  };
+  if constexpr (std::is_same_v<TypeParam, PoseReport>) {  // A topic without history.
+    ASSERT_TRUE(Eventually([&] { return publication->matched() == 2 && late_subscription->matched() == 1; }));
+  } else {
+    EXPECT_TRUE(Eventually([&] { return has(kLasting) && has(1); }));
+  }
+  ASSERT_TRUE(publication->Publish(OfRobot<TypeParam>(2)));
+  EXPECT_TRUE(Eventually([&] { return has(2); })) << "the stream goes on";
+}
+
+// Poses are not kept for late joiners: each must come, also while a new writer takes over.
+TEST(Numbers, OfAWriterBeginAnewAndNothingIsLost) {
+  const auto sender = MakeBus("sender"), receiver = MakeBus("receiver");
+  const auto publication = Must(sender->Advertise<PoseReport>());
+  std::atomic<std::uint64_t> last = 0, out_of_order = 0, matches = 0;
+  const auto subscription = Must(receiver->Subscribe<PoseReport>(
+      [&](PoseReport&& pose) {
+        if (pose.scan_sequence != last + 1) ++out_of_order;
+        last = pose.scan_sequence;
+      },
+      {{}, {}, {}, [&](int) { ++matches; }}));
+  ASSERT_TRUE(Eventually([&] { return publication->matched() == 1 && subscription->matched() == 1; }));
+  PoseReport pose = OfRobot<PoseReport>(1);
+  const std::uint64_t poses = kMostWritten + 5000;
+  while (++pose.scan_sequence <= poses) {
+    ASSERT_TRUE(publication->Publish(pose));
+    if (pose.scan_sequence % 8 != 0) continue;
+    // Not Eventually, which looks some hundred times a second only.
+    const auto deadline = std::chrono::steady_clock::now() + kDeadline;
+    while (last != pose.scan_sequence && std::chrono::steady_clock::now() < deadline) std::this_thread::yield();
+    ASSERT_EQ(last, pose.scan_sequence);
+  }
+  EXPECT_TRUE(Eventually([&] { return last == poses; }));
+  EXPECT_EQ(out_of_order, 0U);
+  EXPECT_TRUE(Eventually([&] { return matches >= 3; })) << "the first writer, the second one, and the first one's end";
+  EXPECT_EQ(publication->matched(), 1);
 }
 
 TYPED_TEST(Keys, ThatLiveKeepTheirPlaces) {

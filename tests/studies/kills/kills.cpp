@@ -197,6 +197,18 @@ void StudyRestart(StudyContext& context) {
              Number(At(times.tiles_s, 0.99), 2), Number(At(times.poses_s, 0.5), 2), Number(At(times.poses_s, 0.99), 2),
              Number(At(times.new_poses_s, 0.5), 2), Number(At(times.new_poses_s, 0.99), 2), Count(times.new_sessions)});
   report.Add(table, "restart");
+  Plot plot{
+      .title = "Restart with eight robots of an hour each", .x = {.label = "kill"}, .y = {"time since the kill", "s"}};
+  const auto add = [&plot](const char* label, const std::vector<double>& times_s) {
+    Series series{.label = label, .mark = Mark::kPoints};
+    for (std::size_t kill = 0; kill < times_s.size(); ++kill) series.x.push_back(static_cast<double>(kill + 1));
+    series.y = times_s;
+    plot.series.push_back(std::move(series));
+  };
+  add("tiles", times.tiles_s);
+  add("new poses of all robots", times.new_poses_s);
+  plot.bounds.push_back({kLongestRestart_s, "target"});
+  report.Add(plot, "restart");
   report.Text(
       "Since the kill, with the pause of 0.1 s after which the service manager starts the server again. The robots are "
       "eight clients in this process, which continue their sessions and "

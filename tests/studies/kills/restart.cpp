@@ -157,7 +157,16 @@ RestartTimes MeasureRestarts(StudyContext& context) {
     times.poses_s.push_back(TimeUntil(start, [&] { return HasAllPoses(**queries); }));
     if (!test::Eventually(all_back, kLongest)) throw std::runtime_error("a robot has no pose after a restart");
     times.new_poses_s.push_back(std::chrono::duration<double>(*AllBack(robots) - start).count());
-    if (kill % 50 == 49) context.report.Progress(std::to_string(kill + 1) + " kills");
+    constexpr int kPerLine = 50;
+    if (kill % kPerLine == kPerLine - 1) {
+      const auto median = [](const std::vector<double>& values) {
+        std::vector<double> newest(values.end() - kPerLine, values.end());
+        std::ranges::nth_element(newest, newest.begin() + kPerLine / 2);
+        return Number(newest[kPerLine / 2], 2);
+      };
+      context.report.Progress(std::to_string(kill + 1) + " kills; median of the last ones: tiles " +
+                              median(times.tiles_s) + " s, new poses " + median(times.new_poses_s) + " s");
+    }
     // The moment of the kill is random.
     std::this_thread::sleep_for(std::chrono::milliseconds(random() % 300));
   }

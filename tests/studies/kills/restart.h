@@ -1,4 +1,4 @@
-// The times of a server's restarts on the state of eight robots that drove for an hour each, and that stand now.
+// The times of a server's restarts on the state of eight robots that have driven for an hour each, and go on driving.
 #pragma once
 
 #include <cstdint>
