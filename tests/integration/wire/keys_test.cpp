@@ -114,19 +114,19 @@ TYPED_TEST(Keys, ALateJoinerGetsWhatWasWrittenLongAgo) {
 TEST(Numbers, OfAWriterBeginAnewAndNothingIsLost) {
   const auto sender = MakeBus("sender"), receiver = MakeBus("receiver");
   const auto publication = Must(sender->Advertise<PoseReport>());
-  std::atomic<std::uint64_t> last = 0, out_of_order = 0, matches = 0;
-  const auto subscription = Must(receiver->Subscribe<PoseReport>(
-      [&](PoseReport&& pose) {
-        if (pose.scan_sequence != last + 1) ++out_of_order;
-        last = pose.scan_sequence;
-      },
-      {{}, {}, {}, [&](int) { ++matches; }}));
+  std::atomic<std::uint64_t> last = 0, out_of_order = 0;
+  const auto subscription = Must(receiver->Subscribe<PoseReport>([&](PoseReport&& pose) {
+    if (pose.scan_sequence != last + 1) ++out_of_order;
+    last = pose.scan_sequence;
+  }));
   ASSERT_TRUE(Eventually([&] { return publication->matched() == 1 && subscription->matched() == 1; }));
   PoseReport pose = OfRobot<PoseReport>(1);
   const std::uint64_t poses = kMostWritten + 5000;
   while (++pose.scan_sequence <= poses) {
     ASSERT_TRUE(publication->Publish(pose));
-    if (pose.scan_sequence % 8 != 0) continue;
+    // The writer keeps one sample. While the next one is not known to the reader, a later sample would take its place.
+    const bool changes = pose.scan_sequence >= kMostWritten && pose.scan_sequence < kMostWritten + 64;
+    if (!changes && pose.scan_sequence % 8 != 0) continue;
     // Not Eventually, which looks some hundred times a second only.
     const auto deadline = std::chrono::steady_clock::now() + kDeadline;
     while (last != pose.scan_sequence && std::chrono::steady_clock::now() < deadline) std::this_thread::yield();
@@ -134,7 +134,6 @@ TEST(Numbers, OfAWriterBeginAnewAndNothingIsLost) {
   }
   EXPECT_TRUE(Eventually([&] { return last == poses; }));
   EXPECT_EQ(out_of_order, 0U);
-  EXPECT_TRUE(Eventually([&] { return matches >= 3; })) << "the first writer, the second one, and the first one's end";
   EXPECT_EQ(publication->matched(), 1);
 }
 
