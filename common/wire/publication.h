@@ -106,7 +106,7 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
   }
 
   // The place of a key in a writer cannot be freed, because unregistering a key stops the data to the readers
-  // (idl/README.md), nor its numbers begun anew. Instead a new writer, which has only the keys that still exist,
+  // (idl/README.md), and the numbers of a writer only grow. So a new writer, which has only the keys that still exist,
   // replaces the old one as soon as it has matched the same readers. Before that, samples of topics without history
   // would be lost. Returns false if it has not matched them yet.
   bool Renew() CAIRN_REQUIRES(mutex_) {

@@ -86,6 +86,7 @@ TEST_F(RosCallers, GetTheMapInBothConventions) {
   }
   // 300 requests at once do not keep the server from answering.
   EXPECT_GT(Call({"get_map", "/lab/map", "flood"})["occupied"], 100);
+  // A program that asks before it knows who answers gets an answer once it asks again.
   EXPECT_GT(Call({"get_map", "/lab/map", "impatient"})["occupied"], 100);
   EXPECT_GT(Call({"get_map", "/lab/map"})["occupied"], 100);
   EXPECT_THAT(Cairn({"status"}), HasSubstr("r1"));

@@ -109,8 +109,8 @@ static void Join(struct Caller* caller, dds_domainid_t domain, const char* servi
   caller->client = handle;
 }
 
-/* As rmw_service_server_is_available looks: both endpoints of the server are known. What a writer has sent before
- * Cyclone DDS knows it is lost for ever, so an impatient caller may get no answer to what it asked first. */
+/* As rmw_service_server_is_available looks: both endpoints of the server are known. Cyclone DDS never
+ * delivers what a writer sent before it had found that writer, so an impatient caller may get no first answer. */
 static bool IsThere(const struct Caller* caller, bool impatient) {
   dds_instance_handle_t peer = 0;
   return dds_get_matched_subscriptions(caller->writer, &peer, 1) > 0 &&

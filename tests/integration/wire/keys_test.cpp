@@ -93,7 +93,7 @@ TYPED_TEST(Keys, ALateJoinerGetsWhatWasWrittenLongAgo) {
       ASSERT_TRUE(publication->WaitForAcknowledgement(kDeadline));
     }
   }
-  // In a process of its own, so to speak: what other participants know of the writer's numbers does not help it.
+  // A participant of its own, whose guard has seen no number of the writer before.
   const auto late_bus = MakeBus("late");
   Inbox<TypeParam> late;
   const auto late_subscription = Must(late_bus->template Subscribe<TypeParam>(late.Sink()));
@@ -110,7 +110,7 @@ TYPED_TEST(Keys, ALateJoinerGetsWhatWasWrittenLongAgo) {
   EXPECT_TRUE(Eventually([&] { return has(2); })) << "the stream goes on";
 }
 
-// Poses are not kept for late joiners: each must come, also while a new writer takes over.
+// A reader gets every pose once and in order, also while a new writer takes over.
 TEST(Numbers, OfAWriterBeginAnewAndNothingIsLost) {
   const auto sender = MakeBus("sender"), receiver = MakeBus("receiver");
   const auto publication = Must(sender->Advertise<PoseReport>());
