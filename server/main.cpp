@@ -28,6 +28,7 @@
 #include "server/ingress/other_servers.h"
 #include "server/ops/domain_lock.h"
 #include "server/ops/heartbeat.h"
+#include "server/ops/process_load.h"
 #include "server/ops/service_notifier.h"
 #include "server/ros2/ros2_door.h"
 #include "server/server.h"
@@ -53,12 +54,14 @@ void LogConfig(const CairndOptions& options) {
 struct Watched {
   wire::Bus& bus;
   Server& server;
+  const Inbound& inbound;
   const Outbound& outbound;
   const Ingress& ingress;
   const Egress& egress;
   OtherServers& others;
   const Journal* journal;  // Null if nothing is stored.
   const Ros2Door* ros2;    // Null if ROS 2 robots are not served.
+  std::chrono::steady_clock::time_point started;
 };
 
 DoorCounts LossesOf(const Watched& watched) {
@@ -73,6 +76,25 @@ DoorCounts LossesOf(const Watched& watched) {
     counts.unpublished += watched.ros2->unpublished();
   }
   return counts;
+}
+
+void TellLoad(const Watched& watched) {
+  const std::chrono::duration<double> up = std::chrono::steady_clock::now() - watched.started;
+  ServerLoad load{.up_s = up.count(),
+                  .processor_s = ProcessorSeconds(),
+                  .memory_bytes = ResidentBytes(),
+                  .inbound_waiting = watched.inbound.size(),
+                  .outbound_waiting = watched.outbound.size()};
+  if (watched.journal != nullptr) {
+    const JournalCounts counts = watched.journal->counts();
+    load.stores = true;
+    load.commits = counts.commits;
+    load.failed_commits = counts.failed_commits;
+    load.store_bytes = counts.store_bytes;
+    load.stored_after_p50_ms = counts.delay_p50_ms;
+    load.stored_after_p99_ms = counts.delay_p99_ms;
+  }
+  watched.server.SetLoad(load);
 }
 
 void TellRefusals(const Watched& watched) {
@@ -96,13 +118,14 @@ constexpr std::chrono::minutes kLongestUnhealthy{1};
   std::_Exit(kStuck);
 }
 
-// Checks for servers on other machines (they are discovered only when both run), for refused peers, for lost messages
-// and whether the store works.
+// Checks for servers on other machines (they are discovered only when both run), for refused peers, for lost messages,
+// whether the store works and how busy the server is.
 void LookOnce(const Watched& watched, DoorLosses& losses, ServiceStatus& status) {
   if (watched.others.Joined()) {
     spdlog::error("another server serves this DDS domain: clients get answers from both; stop one of them");
   }
   TellRefusals(watched);
+  TellLoad(watched);
   auto busy = watched.bus.busy_with_one_datagram();
   if (watched.ros2 != nullptr) busy = std::max(busy, watched.ros2->busy_with_one_datagram());
   watched.server.SetReceiving(busy);
@@ -268,6 +291,7 @@ Result<void> StartWatched(Server& server, asio::io_context& context, asio::signa
 }
 
 int Serve(const CairndOptions& options, const std::filesystem::path& state) {
+  const auto started = std::chrono::steady_clock::now();
   StartLogging(options.server.server.log_level);
   // The signal set is made before any thread starts, so that no thread receives the signals instead.
   asio::io_context context(1);
@@ -299,8 +323,8 @@ int Serve(const CairndOptions& options, const std::filesystem::path& state) {
   auto ros2 = OpenRos2(options, !saved.empty(), inbound, outbound);
   if (!ros2) return failed(ros2.error());
   Server server(options.server, inbound, outbound, kept->generation, kept->journal.get(), saved);
-  if (auto started = StartWatched(server, context, signals, notifier); !started) {
-    if (started.error().code != StatusCode::kCancelled) return failed(started.error());
+  if (auto serves = StartWatched(server, context, signals, notifier); !serves) {
+    if (serves.error().code != StatusCode::kCancelled) return failed(serves.error());
     spdlog::info("stopped before the start was finished");
     return 0;
   }
@@ -316,7 +340,9 @@ int Serve(const CairndOptions& options, const std::filesystem::path& state) {
   ServiceStatus service_status(notifier, serving);
   notifier.Ready(serving);
   spdlog::info("ready");
-  const Watched watched{**bus, server, outbound, **ingress, **egress, **others, kept->journal.get(), ros2->get()};
+  const Watched watched{**bus,       server, inbound, outbound, **ingress, **egress, **others, kept->journal.get(),
+                        ros2->get(), started};
+  TellLoad(watched);
   WaitForSignal(context, signals, watched, notifier, service_status);
   notifier.Stopping();
 

@@ -33,6 +33,12 @@ bool Outbound::See(const OutboundValue& value) {
   return watcher_ && watcher_(value);
 }
 
+std::size_t Outbound::size() const {
+  std::size_t size = 0;
+  for (const auto& lane : lanes_) size += lane.size();
+  return size;
+}
+
 void Outbound::Close() {
   for (auto& lane : lanes_) lane.Close();
 }

@@ -44,6 +44,8 @@ class Outbound {
   // As Send, but waits for room until Close: only for the thread that answers queries, whose own queue then fills and
   // refuses. The door's reader always moves on (its writes have a bounded blocking time).
   bool SendPatiently(OutboundValue value);
+  // How many values wait in all lanes.
+  [[nodiscard]] std::size_t size() const;
   [[nodiscard]] std::uint64_t refused() const { return refused_.load(std::memory_order_relaxed); }
   // Sessions and requests that were answered RESOURCE_EXHAUSTED.
   [[nodiscard]] std::uint64_t over_limit() const { return over_limit_.load(std::memory_order_relaxed); }

@@ -20,8 +20,10 @@ void AddPing(CLI::App& app, Program& program);
 void AddCheckLog(CLI::App& app, Program& program);
 void AddEval(CLI::App& app, Program& program);
 
-void AddMap(CLI::App& app, Program& program);  // All commands of maps; `map draw` is a file of its own.
+void AddMap(CLI::App& app,
+            Program& program);  // All commands of maps; `map draw` and `map edit` are files of their own.
 void AddMapDraw(CLI::App& map, Program& program);
+void AddMapEdit(CLI::App& map, Program& program);
 void AddJob(CLI::App& app, Program& program);
 void AddCloud(CLI::App& app, Program& program);
 void AddSite(CLI::App& app, Program& program);  // All commands of sites; those that need no server have their own file.

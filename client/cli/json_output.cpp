@@ -85,7 +85,16 @@ void to_json(nlohmann::json& json, const MapInfo& map) {
       {"bounds_m", {{"x_min", map.x_min_m}, {"y_min", map.y_min_m}, {"x_max", map.x_max_m}, {"y_max", map.y_max_m}}},
       {"robots", map.robots},
       {"enabled_version", map.enabled_version},
-      {"versions", map.versions}};
+      {"versions", map.versions},
+      {"edits_version", map.edits_version}};
+}
+
+void to_json(nlohmann::json& json, const MapEdit& edit) {
+  std::vector<std::array<double, 2>> points;
+  for (const Eigen::Vector2d& point : edit.points_map) points.push_back({point.x(), point.y()});
+  json = {{"id", edit.id},      {"kind", MapEditKindName(edit.kind)},
+          {"points_m", points}, {"width_m", edit.width_m},
+          {"note", edit.note},  {"made", edit.made}};
 }
 
 void to_json(nlohmann::json& json, const SavedSite& saved) {
@@ -96,6 +105,24 @@ void to_json(nlohmann::json& json, const Refusals& refused) {
   json = {{"secure", refused.secure},        {"peers", refused.peers},       {"endpoints", refused.endpoints},
           {"samples", refused.samples},      {"commands", refused.commands}, {"datagrams", refused.datagrams},
           {"over_limit", refused.over_limit}};
+}
+
+void to_json(nlohmann::json& json, const PoseHypothesis& hypothesis) {
+  json = {{"stamp", hypothesis.stamp}, {"T_map_robot", hypothesis.T_map_robot}, {"weight", hypothesis.weight}};
+}
+
+void to_json(nlohmann::json& json, const ServerLoad& load) {
+  json = {{"up_s", load.up_s},
+          {"processor_s", load.processor_s},
+          {"memory_bytes", load.memory_bytes},
+          {"inbound_waiting", load.inbound_waiting},
+          {"outbound_waiting", load.outbound_waiting},
+          {"stores", load.stores},
+          {"commits", load.commits},
+          {"failed_commits", load.failed_commits},
+          {"store_bytes", load.store_bytes},
+          {"stored_after_p50_ms", load.stored_after_p50_ms},
+          {"stored_after_p99_ms", load.stored_after_p99_ms}};
 }
 
 void to_json(nlohmann::json& json, const Ros2Topic& topic) {

@@ -19,10 +19,13 @@ void to_json(nlohmann::json& json, const Ledger& ledger);
 void to_json(nlohmann::json& json, const RobotStatus& robot);
 void to_json(nlohmann::json& json, const MapVersionInfo& version);
 void to_json(nlohmann::json& json, const MapInfo& map);
+void to_json(nlohmann::json& json, const MapEdit& edit);
 void to_json(nlohmann::json& json, const Tile& tile);  // Without the tile's bytes, but with their number.
 void to_json(nlohmann::json& json, const Job& job);
 void to_json(nlohmann::json& json, const SavedSite& saved);
 void to_json(nlohmann::json& json, const Refusals& refused);
+void to_json(nlohmann::json& json, const ServerLoad& load);
+void to_json(nlohmann::json& json, const PoseHypothesis& hypothesis);
 void to_json(nlohmann::json& json, const Ros2Report& report);
 void to_json(nlohmann::json& json, const LogComplaint& complaint);
 

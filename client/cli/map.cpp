@@ -1,5 +1,9 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
 #include "client/cli/commands.h"
 #include "client/cli/json_output.h"
 #include "client/cli/option_checks.h"
@@ -24,9 +28,33 @@ struct ExportArguments {
   std::string file;
   std::string image = "png";
   std::string mode = "trinary";
+  std::string keep_out;  // The yaml file of the mask; empty: none.
 };
 
+namespace fs = std::filesystem;
+
+// The mask of Nav2's keepout filter: occupied where robots must not drive, free elsewhere, and as large as the map.
+OccupancyImage KeepOutMask(OccupancyImage map, const std::vector<MapEdit>& edits) {
+  std::ranges::fill(map.cells, std::uint8_t{0});
+  const auto column = static_cast<int>(std::lround(map.T_map_origin.x / map.resolution_m));
+  const auto row = static_cast<int>(std::lround(map.T_map_origin.y / map.resolution_m));
+  for (const MapEdit& edit : edits) {
+    if (edit.kind != MapEditKind::kKeepOut) continue;
+    for (const CellRun& run : CellsOf(edit, map.resolution_m)) {
+      const int y = run.y - row;
+      if (y < 0 || y >= map.height) continue;
+      for (int x = std::max(0, run.x_first - column); x <= std::min(map.width - 1, run.x_last - column); ++x)
+        map.cells[static_cast<std::size_t>(y) * static_cast<std::size_t>(map.width) + static_cast<std::size_t>(x)] =
+            100;
+    }
+  }
+  return map;
+}
+
 ExitCode ExportMap(Program& program, const ExportArguments& arguments) {
+  // Both would have the same image.
+  if (fs::path(arguments.keep_out).replace_extension() == fs::path(arguments.file).replace_extension())
+    return program.Refuse({StatusCode::kInvalidArgument, "--keep-out must have another name than the map"});
   const auto map = program.Ask([&](QueryClient& server) { return server.MapImage(arguments.site); });
   if (!map) return program.Refuse(map.error());
   MapSaveOptions options;
@@ -36,9 +64,19 @@ ExitCode ExportMap(Program& program, const ExportArguments& arguments) {
   if (const auto saved = SaveMapYaml(*map, arguments.file, "." + arguments.image, options); !saved) {
     return program.Refuse(saved.error());
   }
+  if (!arguments.keep_out.empty()) {
+    const auto edits = program.Ask([&](QueryClient& server) { return server.MapEdits(arguments.site); });
+    if (!edits) return program.Refuse(edits.error());
+    const auto saved = SaveMapYaml(KeepOutMask(*map, *edits), arguments.keep_out, "." + arguments.image, options);
+    if (!saved) return program.Refuse(saved.error());
+  }
   return program.Print(
       fmt::format("{}: {} x {} cells of {} m\n", arguments.file, map->width, map->height, map->resolution_m),
-      {{"file", arguments.file}, {"width", map->width}, {"height", map->height}, {"resolution_m", map->resolution_m}});
+      {{"file", arguments.file},
+       {"width", map->width},
+       {"height", map->height},
+       {"resolution_m", map->resolution_m},
+       {"keep_out", arguments.keep_out}});
 }
 
 struct EnableArguments {
@@ -75,6 +113,11 @@ void AddMapExport(CLI::App& map, Program& program) {
   command->add_option("--mode", arguments->mode, "Meaning of the image's values, as map_server has them")
       ->check(CLI::IsMember({"trinary", "scale", "raw"}))
       ->capture_default_str();
+  command
+      ->add_option("--keep-out", arguments->keep_out,
+                   "Also write the areas where robots must not drive, as the mask of Nav2's keepout filter. It is as "
+                   "large as the map: what lies beyond is not in it")
+      ->type_name("FILE");
   program.OnChosen(*command, arguments, ExportMap);
 }
 
@@ -92,12 +135,13 @@ void AddMapEnable(CLI::App& map, Program& program) {
 }  // namespace
 
 void AddMap(CLI::App& app, Program& program) {
-  auto* map = app.add_subcommand("map", "A site's map: what it is, export, versions, pictures");
+  auto* map = app.add_subcommand("map", "A site's map: what it is, export, versions, pictures, edits");
   map->require_subcommand(1);
   AddMapInfo(*map, program);
   AddMapExport(*map, program);
   AddMapEnable(*map, program);
   AddMapDraw(*map, program);
+  AddMapEdit(*map, program);
 }
 
 }  // namespace cairn::client

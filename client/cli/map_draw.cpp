@@ -13,6 +13,7 @@ namespace {
 struct DrawArguments {
   std::string site;
   std::string map_file;
+  std::string layer = "map";
   std::vector<std::string> robots;
   std::vector<std::string> paths;
   std::vector<std::string> truths;
@@ -50,9 +51,11 @@ ExitCode DrawMap(Program& program, const DrawArguments& arguments) {
                                                            "' is the image of the map with the same name; give the "
                                                            "picture another one"});
   }
-  const auto map = arguments.map_file.empty()
-                       ? program.Ask([&](QueryClient& server) { return server.MapImage(arguments.site); })
-                       : LoadMapYaml(arguments.map_file);
+  const auto ask = [&](QueryClient& server) {
+    return arguments.layer == "disagreement" ? server.DisagreementImage(arguments.site)
+                                             : server.MapImage(arguments.site);
+  };
+  const auto map = arguments.map_file.empty() ? program.Ask(ask) : LoadMapYaml(arguments.map_file);
   if (!map) return program.Refuse(map.error());
   const auto paths = CollectPaths(program, arguments);
   if (!paths) return program.Refuse(paths.error());
@@ -70,13 +73,20 @@ void AddMapDraw(CLI::App& map, Program& program) {
   auto* command = map.add_subcommand("draw", "Draw the map and trajectories over it as a picture for people");
   command->footer(
       "The map comes from the server (--site) or a file (--map); paths from the server (--robots) or TUM files.\n"
+      "With --layer disagreement, dark cells are those that one robot has seen occupied and another one free, or that\n"
+      "have changed since an earlier run; white ones are agreed on, grey ones seen by one only.\n"
       "EXAMPLES\n  cairn map draw --site hall --robots robot1 robot2 -o hall-picture.png\n"
+      "  cairn map draw --site hall --layer disagreement -o hall-differs.png\n"
       "  cairn map draw --map hall.yaml --paths \"robot 1=r1.tum\" --truth truth=t1.tum -o hall-picture.png");
   auto arguments = std::make_shared<DrawArguments>();
   auto* source = command->add_option_group("map's source");
   source->add_option("--site", arguments->site, "The site's name: the map the server has now");
-  source->add_option("--map", arguments->map_file, "A map.yaml file")->type_name("FILE");
+  auto* file = source->add_option("--map", arguments->map_file, "A map.yaml file")->type_name("FILE");
   source->require_option(1);
+  command->add_option("--layer", arguments->layer, "What of the site: its map, or where robots differ")
+      ->check(CLI::IsMember({"map", "disagreement"}))
+      ->excludes(file)
+      ->capture_default_str();
   command->add_option("--robots", arguments->robots, "Robots whose paths are asked from the server");
   command->add_option("--paths", arguments->paths, "TUM files, each with a label where wanted")
       ->type_name("[LABEL=]FILE");

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <numbers>
 
 #include "client/cli/commands.h"
 #include "client/cli/interrupt.h"
@@ -16,6 +17,7 @@ namespace {
 struct PoseArguments {
   std::string robot;
   std::optional<Stamp> at;
+  bool hypotheses = false;
   bool follow = false;
   int count = 0;  // 0: until interrupted.
 };
@@ -24,6 +26,17 @@ ExitCode AskPose(Program& program, const PoseArguments& arguments) {
   const auto pose = program.Ask([&](QueryClient& server) { return server.Pose(arguments.robot, arguments.at); });
   if (!pose) return program.Refuse(pose.error());
   return program.Print(FormatPose(*pose) + "\n", *pose);
+}
+
+ExitCode AskHypotheses(Program& program, const PoseArguments& arguments) {
+  const auto hypotheses = program.Ask([&](QueryClient& server) { return server.Hypotheses(arguments.robot); });
+  if (!hypotheses) return program.Refuse(hypotheses.error());
+  std::string text = hypotheses->empty() ? arguments.robot + " is not localized\n" : "";
+  for (const PoseHypothesis& one : *hypotheses) {
+    text += fmt::format("{:5.1f} %  x {:.3f} m, y {:.3f} m, {:.1f} deg\n", 100.0 * one.weight, one.T_map_robot.x,
+                        one.T_map_robot.y, one.T_map_robot.theta * 180.0 / std::numbers::pi);
+  }
+  return program.Print(text, {{"hypotheses", *hypotheses}});
 }
 
 ExitCode FollowPose(Program& program, const PoseArguments& arguments) {
@@ -47,6 +60,7 @@ ExitCode FollowPose(Program& program, const PoseArguments& arguments) {
 }
 
 ExitCode ShowPose(Program& program, const PoseArguments& arguments) {
+  if (arguments.hypotheses) return AskHypotheses(program, arguments);
   return arguments.follow ? FollowPose(program, arguments) : AskPose(program, arguments);
 }
 
@@ -71,6 +85,9 @@ void AddPose(CLI::App& app, Program& program) {
                        "SECONDS");
   auto* follow =
       command->add_flag("-f,--follow", arguments->follow, "Print every pose as it is published")->excludes(at);
+  command->add_flag("--hypotheses", arguments->hypotheses, "All places where it may be, with their share of the belief")
+      ->excludes(at)
+      ->excludes(follow);
   command->add_option("-n,--count", arguments->count, "With --follow: end after this many poses")
       ->needs(follow)
       ->check(CLI::PositiveNumber);

@@ -12,9 +12,11 @@ ExitCode ShowStatus(Program& program, const std::string& robot) {
   if (!answer->degraded.empty()) text += "DEGRADED: " + answer->degraded + "\n";
   if (answer->robots.empty()) text += "no robot yet\n";
   for (const RobotStatus& status : answer->robots) text += FormatRobot(status);
-  text += FormatRefusals(answer->refused);
-  return program.Print(text,
-                       {{"robots", answer->robots}, {"degraded", answer->degraded}, {"refused", answer->refused}});
+  text += FormatLoad(answer->load) + FormatRefusals(answer->refused);
+  return program.Print(text, {{"robots", answer->robots},
+                              {"degraded", answer->degraded},
+                              {"refused", answer->refused},
+                              {"load", answer->load}});
 }
 
 ExitCode EndSession(Program& program, const std::string& robot) {
@@ -29,7 +31,8 @@ void AddStatus(CLI::App& app, Program& program) {
   auto* command = app.add_subcommand("status", "Sessions, poses and ledgers of all robots, or of one");
   command->footer(
       "The ledger says what became of every scan: received = used + dropped (by reason) + waiting.\n"
-      "The last line counts what the server refused because of its sender. The server's log names the senders.\n"
+      "The last lines say how busy the server is and count what it refused because of its sender. The server's log\n"
+      "names the senders.\n"
       "EXAMPLES\n  cairn status\n  cairn status robot1 --json");
   auto robot = std::make_shared<std::string>();
   command->add_option("robot", *robot, "Only this robot");

@@ -70,6 +70,26 @@ std::string FormatRobot(const RobotStatus& robot) {
   return text;
 }
 
+std::string FormatLoad(const ServerLoad& now, const ServerLoad* before) {
+  if (now.up_s <= 0.0) return "";
+  constexpr double kMib = 1024.0 * 1024.0;
+  // Not after a restart. Without a newer measurement there is nothing to compare.
+  const bool compares = before != nullptr && before->up_s <= now.up_s && before->processor_s <= now.processor_s;
+  const ServerLoad since = compares ? *before : ServerLoad{};
+  std::string text = fmt::format("server: up {:.1f} h, ", now.up_s / 3600.0);
+  if (now.up_s > since.up_s) {
+    text += fmt::format("{:.0f} % of a processor, ",
+                        100.0 * (now.processor_s - since.processor_s) / (now.up_s - since.up_s));
+  }
+  text += fmt::format("{:.0f} MiB of memory, {} values wait in it", static_cast<double>(now.memory_bytes) / kMib,
+                      now.inbound_waiting + now.outbound_waiting);
+  if (now.stores) {
+    text += fmt::format("; on the disk after {:.0f} ms (p99 {:.0f} ms), {:.0f} MiB there", now.stored_after_p50_ms,
+                        now.stored_after_p99_ms, static_cast<double>(now.store_bytes) / kMib);
+  }
+  return text + "\n";
+}
+
 std::string FormatRefusals(const Refusals& refused) {
   if (refused == Refusals{}) return "";
   return fmt::format(
@@ -92,6 +112,14 @@ std::string FormatMap(const MapInfo& map) {
                         version.note.empty() ? "" : ": " + version.note);
   }
   return text;
+}
+
+std::string FormatEdit(const MapEdit& edit) {
+  std::string text = fmt::format("{}: {}", edit.id, MapEditKindName(edit.kind));
+  if (edit.width_m > 0.0) text += fmt::format(", a line of {} m", edit.width_m);
+  for (const Eigen::Vector2d& point : edit.points_map) text += fmt::format(" {:.2f},{:.2f}", point.x(), point.y());
+  if (!edit.note.empty()) text += ": " + edit.note;
+  return text + "\n";
 }
 
 std::string FormatTrajectoryError(const TrajectoryError& e) {

@@ -63,6 +63,7 @@ void AddTiles(CLI::App& app, Program& program) {
   TileQuery& query = arguments->query;
   command->add_option("--site", query.site, "The site's name")->required();
   command->add_option("--level", query.level, "Level of the pyramid")->check(CLI::Range(0, kPyramidLevels - 1));
+  command->add_flag("--disagreement", query.disagreement, "Tiles of where robots differ, instead of the map's");
   AddParsed(*command, "--area", query.area, ParseArea, "Only tiles that touch this area", "XMIN,YMIN,XMAX,YMAX");
   auto* version = command->add_option("--since-version", query.since_version, "Only tiles changed after this version");
   command->add_option("--since-epoch", query.since_epoch, "The epoch that version belongs to")->needs(version);

@@ -52,7 +52,10 @@ ExitCode ShowTop(Program& program, const TopArguments& arguments) {
     }
     nlohmann::json object;
     if (now) {
-      object = {{"robots", now->status.robots}, {"jobs", now->jobs}, {"degraded", now->status.degraded}};
+      object = {{"robots", now->status.robots},
+                {"jobs", now->jobs},
+                {"degraded", now->status.degraded},
+                {"load", now->status.load}};
       before = std::move(*now);
     }
     program.Print(text, object);

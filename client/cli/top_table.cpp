@@ -109,7 +109,8 @@ std::string FormatTop(const TopView& now, const TopView* before) {
   for (const Job& job : now.jobs) {
     if (!IsFinal(job.state)) text += FormatJob(job) + "\n";
   }
-  return text + FormatRefusals(now.status.refused);
+  return text + FormatLoad(now.status.load, before == nullptr ? nullptr : &before->status.load) +
+         FormatRefusals(now.status.refused);
 }
 
 }  // namespace cairn::client

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <type_traits>
 #include <utility>
 
 #include "client/lib/client_id.h"
@@ -46,13 +47,18 @@ Result<std::unique_ptr<MapClient::Wire>> MapClient::Connect(wire::Bus& bus, int 
 
 template <typename Value>
 void MapClient::Apply(int number, Value&& value) {
+  bool hears = true, changed = false;
   {
     const MutexLock lock(mutex_);
-    if (number != number_ || !mirror_->Apply(std::forward<Value>(value))) return;
-    changed_.NotifyAll();
+    if (number != number_) return;
+    changed = mirror_->Apply(std::forward<Value>(value));
+    // Tiles of other sites come as well, and a description alone is no sign that tiles come: their reader can be deaf
+    // by itself.
+    if constexpr (std::is_same_v<Value, MapInfo>) hears = changed && !MissesTiles();
+    if (changed) changed_.NotifyAll();
   }
-  watch_.Arrived();
-  if (on_change_) on_change_();
+  if (hears) watch_.Arrived();
+  if (changed && on_change_) on_change_();
 }
 
 // Whether the mirror is not what the server has by now.
@@ -61,7 +67,21 @@ bool MapClient::Behind(QueryClient& queries) {
   if (!asked) return false;
   const MutexLock lock(mutex_);
   const std::uint64_t known = std::max(mirror_->version(), mirror_->info() ? mirror_->info()->version : 0);
-  return asked->generation != mirror_->generation() || asked->epoch != mirror_->epoch() || asked->version > known;
+  if (asked->generation != mirror_->generation() || asked->epoch != mirror_->epoch() || asked->version > known)
+    return true;
+  // Joining anew helps once at most: the newest tile may have been deleted before the server was started.
+  return MissesTiles() && missed_before_ != DescribedVersion();
+}
+
+bool MapClient::MissesTiles() const {
+  const auto& info = mirror_->info();
+  return info && info->tile_count > 0 && mirror_->version() < info->version;
+}
+
+std::optional<MapClient::Version> MapClient::DescribedVersion() const {
+  const auto& info = mirror_->info();
+  if (!info) return std::nullopt;
+  return Version{info->generation, info->epoch, info->version};
 }
 
 // Nothing that was received before counts any more: it may have been forged.
@@ -72,6 +92,7 @@ void MapClient::Renew() {
   {
     const MutexLock lock(mutex_);
     number = ++number_;
+    missed_before_ = DescribedVersion();
     mirror_.emplace(HashName(site_));
   }
   auto wire = Connect(**bus, number);

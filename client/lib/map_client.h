@@ -44,6 +44,12 @@ class MapClient {
   [[nodiscard]] int renewed() const;  // Times it joined anew.
 
  private:
+  struct Version {
+    Generation generation = 0;
+    std::uint32_t epoch = 0;
+    std::uint64_t version = 0;
+    bool operator==(const Version&) const = default;
+  };
   struct Wire {
     std::unique_ptr<wire::Bus> own;  // Null for the first, which uses the caller's.
     std::unique_ptr<wire::Subscription> map;
@@ -55,6 +61,10 @@ class MapClient {
   void Apply(int number, Value&& value);
   [[nodiscard]] Result<std::unique_ptr<Wire>> Connect(wire::Bus& bus, int number);
   [[nodiscard]] bool Behind(QueryClient& queries);
+  // Whether the newest tile that the description of the map knows of has not come.
+  [[nodiscard]] bool MissesTiles() const CAIRN_REQUIRES(mutex_);
+  // Of the map that was described last.
+  [[nodiscard]] std::optional<Version> DescribedVersion() const CAIRN_REQUIRES(mutex_);
   void Renew();
 
   wire::Bus& bus_;
@@ -63,7 +73,8 @@ class MapClient {
   mutable Mutex mutex_;
   CondVar changed_;
   std::optional<TileMirror> mirror_ CAIRN_GUARDED_BY(mutex_);
-  int number_ CAIRN_GUARDED_BY(mutex_) = 0;  // The number of the wire whose values count.
+  int number_ CAIRN_GUARDED_BY(mutex_) = 0;                        // The number of the wire whose values count.
+  std::optional<Version> missed_before_ CAIRN_GUARDED_BY(mutex_);  // Of the map when it joined anew last.
   SilenceWatch watch_;
   // Last: its callbacks use everything above.
   std::unique_ptr<Wire> wire_ CAIRN_GUARDED_BY(mutex_);

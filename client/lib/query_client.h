@@ -35,6 +35,7 @@ struct StatusAnswer {
   // Why new data is not stored, and what was not restored; empty if there is neither, or if the server stores nothing.
   std::string degraded;
   Refusals refused;  // What the server has refused because of its sender.
+  ServerLoad load;
 };
 
 struct PathAnswer {
@@ -59,6 +60,7 @@ struct TileQuery {
   Generation since_generation = 0;
   std::uint32_t since_epoch = 0;
   std::uint64_t since_version = 0;
+  bool disagreement = false;  // Tiles that say by how much robots, or today and earlier runs, differ: 0..100.
 };
 
 class QueryClient {
@@ -78,6 +80,8 @@ class QueryClient {
   // The newest pose, or the pose at a stamp of the robot's clock, interpolated. kUnavailable: the server has not used a
   // scan that late yet; kOutOfRange: the stamp is before the robot's first scan.
   [[nodiscard]] Result<PoseReport> Pose(const std::string& robot, std::optional<Stamp> at = {});
+  // The places where the robot may be, the most believed one first; none while it is not localized.
+  [[nodiscard]] Result<std::vector<PoseHypothesis>> Hypotheses(const std::string& robot);
   // All poses so far, or those of the smoothing job whose map is enabled (kFailedPrecondition if there is none).
   [[nodiscard]] Result<PathAnswer> Path(const std::string& robot, bool smoothed = false);
   // Session, newest pose and ledgers of all robots, or of one (kNotFound if the server does not know it), and the state
@@ -103,13 +107,24 @@ class QueryClient {
   // The map of one site. kNotFound if the server has none of that name.
   [[nodiscard]] Result<MapInfo> Map(const std::string& site);
   [[nodiscard]] Result<TileAnswer> Tiles(const TileQuery& query);
-  // The whole map at its finest level. kUnavailable where nothing is drawn yet.
-  [[nodiscard]] Result<OccupancyImage> MapImage(const std::string& site);
+  // The whole map at one level. kUnavailable where nothing is drawn yet.
+  [[nodiscard]] Result<OccupancyImage> MapImage(const std::string& site, std::uint32_t level = 0);
+  // By how much robots, or today and earlier runs, differ: 0..100 in cells that at least two have seen. kUnavailable
+  // where nobody differs.
+  [[nodiscard]] Result<OccupancyImage> DisagreementImage(const std::string& site, std::uint32_t level = 0);
   [[nodiscard]] Result<std::vector<LandmarkReport>> Landmarks(const std::string& site, const Area& area = {});
   // Switches the site to one of its map versions. Returns the map as it is then.
   [[nodiscard]] Result<MapInfo> EnableMap(const std::string& site, std::uint32_t map_version);
   // Switches to the highest version below the enabled one; kFailedPrecondition if there is none.
   [[nodiscard]] Result<MapInfo> RollBackMap(const std::string& site);
+
+  // What people have said about the map, in the order in which they did; later edits count where they overlap.
+  [[nodiscard]] Result<std::vector<MapEdit>> MapEdits(const std::string& site);
+  // Returns the edit with its number. kInvalidArgument: ValidateMapEdit. kFailedPrecondition: nothing is drawn yet.
+  // kResourceExhausted: the site has as many as it may have.
+  [[nodiscard]] Result<MapEdit> AddMapEdit(const std::string& site, const MapEdit& edit);
+  // kNotFound: there is no such site or edit.
+  [[nodiscard]] Result<void> RemoveMapEdit(const std::string& site, std::uint64_t id);
 
   // The sites that the server keeps as files.
   [[nodiscard]] Result<std::vector<SavedSite>> SavedSites();
@@ -138,6 +153,8 @@ class QueryClient {
  private:
   QueryClient(wire::Bus& bus, const QueryClientOptions& options);
   void OnReply(Reply&& part);
+  // kUnavailable with `none` where there is no tile.
+  [[nodiscard]] Result<OccupancyImage> ImageOf(const TileQuery& query, const std::string& none);
   struct Wire {
     std::unique_ptr<wire::Bus> own;  // Null for the first, which uses the caller's.
     wire::Bus* bus = nullptr;

@@ -40,8 +40,11 @@ Reply ReplyAssembly::Take() {
     Append(whole.jobs, std::move(part.jobs));
     Append(whole.saved, std::move(part.saved));
     Append(whole.ros2_namespaces, std::move(part.ros2_namespaces));
+    Append(whole.edits, std::move(part.edits));
+    if (whole.hypotheses.empty()) whole.hypotheses = std::move(part.hypotheses);
     if (whole.ros2.empty()) whole.ros2 = std::move(part.ros2);
     if (whole.refused.empty()) whole.refused = std::move(part.refused);
+    if (whole.load.empty()) whole.load = std::move(part.load);
   }
   Reply& last = parts_.at(last_part_);
   whole.client = last.client;

@@ -14,6 +14,9 @@ constexpr std::chrono::seconds kLongestHostileRest{8};
 constexpr std::chrono::seconds kShortestHostileRest{1};
 constexpr std::chrono::milliseconds kLook{
     500};  // They come by the thousand: so long without one, and they have stopped.
+// The time between two questions where forged messages were refused within the last kAlertFor.
+constexpr std::chrono::milliseconds kAlertRest{500};
+constexpr std::chrono::seconds kAlertFor{15};
 
 }  // namespace
 
@@ -61,6 +64,12 @@ bool SilenceWatch::RestWhileHostile() {
   return true;
 }
 
+bool SilenceWatch::NoteRefusals(Clock::time_point now) {
+  const std::uint64_t refused = bus_.datagrams_refused();
+  if (std::exchange(seen_refused_, refused) != refused) alert_until_ = now + kAlertFor;
+  return now < alert_until_;
+}
+
 bool SilenceWatch::IsBehind() {
   if (queries_ == nullptr) {
     auto queries = QueryClient::Create(bus_);
@@ -74,15 +83,22 @@ void SilenceWatch::Run() {
   Clock::duration after_renewal = kRest;
   Clock::time_point next_question = Clock::now();
   std::uint64_t refused = bus_.datagrams_refused();
+  seen_refused_ = refused;
+  // The second question may come early only once, until the client is no longer behind: a robot that sends few poses,
+  // or a participant that has just joined, needs the whole kSilence.
+  bool patient = false;
   while (WaitForSilence(next_question)) {
     const auto asked = Clock::now();
-    next_question = asked + kRest;
+    const bool alert = NoteRefusals(asked);
+    next_question = asked + (alert ? Clock::duration(kAlertRest) : kRest);
     if (!IsBehind()) {
       after_renewal = kRest;
+      patient = false;
       continue;
     }
-    // What is on its way has a second to arrive; then WaitForSilence waits for the next silence.
-    if (!WaitForSilence(asked + kSilence)) return;
+    // What is on its way has some time to arrive; then WaitForSilence waits for the next silence.
+    if (!WaitForSilence(asked + (alert && !patient ? Clock::duration(kAlertRest) : kSilence))) return;
+    patient = true;
     {
       const MutexLock lock(mutex_);
       if (last_arrival_ > asked) continue;

@@ -2,11 +2,14 @@
 // reader of DDS into such a state, and it does not get out of it by itself. After a second of silence the watch asks
 // the server, and where the client is behind twice in a row, it has the client join the domain anew. It asks again
 // after two seconds, and later and later, up to once a minute, where joining did not help. While forged messages
-// arrive, which may make it deaf again, it asks every eight seconds, and as soon as they have stopped. Thread rule:
-// Arrived from any thread, Stop from one. The functions run on the watch's thread.
+// arrive, which may make it deaf again, it waits eight seconds after it has joined, or until they have stopped. For
+// some time after them it asks twice a second: a robot's stream may have stood still as well, so that the server has
+// new poses only when that flows again. Thread rule: Arrived from any thread, Stop from one. The functions run on the
+// watch's thread.
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <thread>
@@ -39,6 +42,8 @@ class SilenceWatch {
   bool WaitForSilence(Clock::time_point next_question);
   bool RestWhileHostile();
   bool IsBehind();
+  // Looks whether forged messages were refused since the last question. Returns whether that was so lately.
+  bool NoteRefusals(Clock::time_point now);
 
   wire::Bus& bus_;
   const std::function<bool(QueryClient& queries)> behind_;
@@ -47,8 +52,11 @@ class SilenceWatch {
   CondVar stopped_;
   Clock::time_point last_arrival_ CAIRN_GUARDED_BY(mutex_) = Clock::now();
   bool stopping_ CAIRN_GUARDED_BY(mutex_) = false;
-  std::unique_ptr<QueryClient> queries_;  // From the first silence on; used by the thread only.
-  std::thread thread_;                    // Last: it uses everything above.
+  // Used by the thread only.
+  std::unique_ptr<QueryClient> queries_;  // From the first silence on.
+  std::uint64_t seen_refused_ = 0;
+  Clock::time_point alert_until_{};
+  std::thread thread_;  // Last: it uses everything above.
 };
 
 }  // namespace cairn::client

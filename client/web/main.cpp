@@ -2,6 +2,7 @@
 // Exit codes: 0 stopped on request; 1 could not start; 2 wrong command line.
 #include <pthread.h>
 #include <signal.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <array>
@@ -53,9 +54,10 @@ void AddOptions(CLI::App& app, Arguments& arguments) {
       ->check(CLI::Range(0, 65535));
   app.add_option("--host", arguments.http.hosts, "Name under which browsers reach this machine, besides its addresses")
       ->allow_extra_args(false);
-  app.add_option(
-         "--token", arguments.token,
-         "Allow commands to who has the token. Without TEXT, CAIRN_WEB_TOKEN is used, or else one is drawn and printed")
+  app.add_option("--token", arguments.token,
+                 "Allow commands to who has the token. Without TEXT, CAIRN_WEB_TOKEN is used, or else one is drawn and "
+                 "shown on\n"
+                 "the terminal")
       ->type_name("TEXT")
       ->expected(0, 1);
   app.add_option("--domain", arguments.wire.domain, "DDS domain of server and robots [CAIRN_DOMAIN, or 0]");
@@ -78,6 +80,10 @@ std::string GivenToken(const std::vector<std::string>& given) {
 }
 
 int Serve(const Arguments& arguments, bool commands) {
+  const std::string given = GivenToken(arguments.token);
+  // What a service prints is kept in a log, which more people may read than may send commands.
+  if (commands && given.empty() && isatty(STDOUT_FILENO) == 0)
+    return Refuse("a token is drawn only where a terminal shows it; give one: --token=TEXT or CAIRN_WEB_TOKEN", 2);
   // Before any thread starts, so that none of them takes the signals.
   sigset_t signals;
   sigemptyset(&signals);
@@ -88,14 +94,13 @@ int Serve(const Arguments& arguments, bool commands) {
   auto bus = wire::Bus::Create(arguments.wire_options, "cairn-web");
   if (!bus) return Refuse(bus.error().message, 1);
   WebOptions options;
-  const std::string given = GivenToken(arguments.token);
   if (commands) options.token = given.empty() ? NewToken() : given;
   auto page = WebPage::Create(**bus, options);
   if (!page) return Refuse(page.error().message, 1);
   auto server = HttpServer::Start(arguments.http, [&](const HttpRequest& request) { return (*page)->Answer(request); });
   if (!server) return Refuse(server.error().message, 1);
   // A page that gets the token this way does not ask for it. The part after # is not sent to any server. A token that
-  // was given is not printed, because what a service prints is kept in a log.
+  // was given is not printed.
   std::cout << "cairn-web: " << AddressText(arguments.http, (*server)->port())
             << (commands && given.empty() ? "#token=" + options.token : std::string()) << std::endl;
   int signal_number = 0;

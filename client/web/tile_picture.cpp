@@ -21,6 +21,10 @@ Palette PaletteOf(Theme theme) {
   return {.free = {255, 255, 255}, .occupied = {46, 34, 24}};
 }
 
+Result<std::string> BytesOf(const RasterImage& image) {
+  return EncodePng(image).map([](const auto& png) { return std::string(png.begin(), png.end()); });
+}
+
 }  // namespace
 
 Result<std::string> DrawTile(const Tile& tile, Theme theme) {
@@ -42,9 +46,23 @@ Result<std::string> DrawTile(const Tile& tile, Theme theme) {
       to[3] = 255;
     }
   }
-  const auto png = EncodePng(image);
-  if (!png) return tl::unexpected(png.error());
-  return std::string(png->begin(), png->end());
+  return BytesOf(image);
+}
+
+Result<std::string> DrawDisagreement(const OccupancyImage& image) {
+  constexpr std::uint8_t kHalf = 50;
+  constexpr std::array<std::uint8_t, 4> kRed = {48, 40, 214, 230};
+  const auto width = static_cast<std::size_t>(image.width), height = static_cast<std::size_t>(image.height);
+  RasterImage picture{.width = image.width, .height = image.height, .channels = 4, .samples = {}};
+  picture.samples.resize(4 * width * height);
+  auto to = picture.samples.begin();
+  for (std::size_t row = height; row-- > 0;) {
+    for (std::size_t column = 0; column < width; ++column, to += 4) {
+      const std::uint8_t cell = image.cells[row * width + column];
+      if (cell != kUnknownCell && cell > kHalf) std::ranges::copy(kRed, to);
+    }
+  }
+  return BytesOf(picture);
 }
 
 }  // namespace cairn::web

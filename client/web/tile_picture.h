@@ -1,9 +1,10 @@
-// A tile of the map as a picture for the page: in the colours of a theme, unknown cells transparent, the highest row
-// first. Stateless, thread-safe.
+// Pictures of a map for the page: transparent where there is nothing to show, the highest row first. Stateless,
+// thread-safe.
 #pragma once
 
 #include <string>
 
+#include "common/map/occupancy_image.h"
 #include "common/map/tile.h"
 #include "common/status.h"
 
@@ -11,7 +12,9 @@ namespace cairn::web {
 
 enum class Theme { kLight, kDark };
 
-// The bytes of a PNG. Fails where the tile's bytes are damaged.
+// The bytes of a PNG: a tile in the colours of a theme. Fails where the tile's bytes are damaged.
 [[nodiscard]] Result<std::string> DrawTile(const Tile& tile, Theme theme);
+// The same of the cells about which robots differ by more than half (QueryClient::DisagreementImage).
+[[nodiscard]] Result<std::string> DrawDisagreement(const OccupancyImage& image);
 
 }  // namespace cairn::web

@@ -83,10 +83,15 @@ Json MapJson(const MapInfo& map) {
                         {"job", std::to_string(version.job)},
                         {"note", version.note}});
   }
-  return {{"resolution", map.resolution_m}, {"epoch", map.epoch},
-          {"version", map.version},         {"levels", map.levels},
-          {"tiles", map.tile_count},        {"bounds", {map.x_min_m, map.y_min_m, map.x_max_m, map.y_max_m}},
-          {"enabled", map.enabled_version}, {"versions", versions}};
+  return {{"resolution", map.resolution_m},
+          {"epoch", map.epoch},
+          {"version", map.version},
+          {"levels", map.levels},
+          {"tiles", map.tile_count},
+          {"bounds", {map.x_min_m, map.y_min_m, map.x_max_m, map.y_max_m}},
+          {"enabled", map.enabled_version},
+          {"versions", versions},
+          {"edits", std::to_string(map.edits_version)}};
 }
 
 Json ToJson(const Job& job) {
@@ -147,6 +152,51 @@ std::string StateJson(const ServerView& view, const std::string& site, bool comm
   for (auto& [name, robot] : robots) json["robots"].push_back(std::move(robot));
   json["jobs"] = JobsJson(view.jobs, site);
   return Text(json);
+}
+
+std::string EditsJson(const std::vector<MapEdit>& edits) {
+  Json json = Json::array();
+  for (const MapEdit& edit : edits) {
+    Json points = Json::array();
+    for (const Eigen::Vector2d& point : edit.points_map) points.push_back({point.x(), point.y()});
+    json.push_back({{"id", std::to_string(edit.id)},
+                    {"kind", MapEditKindName(edit.kind)},
+                    {"points", std::move(points)},
+                    {"width", edit.width_m},
+                    {"note", edit.note},
+                    {"made_ms", edit.made / 1000000}});
+  }
+  return Text(json);
+}
+
+Result<MapEdit> EditFromJson(const nlohmann::json& json) {
+  const auto invalid = [](const char* why) { return Fail(StatusCode::kInvalidArgument, why); };
+  MapEdit edit;
+  const auto text = [&json](const char* name) {
+    const auto found = json.find(name);
+    return found != json.end() && found->is_string() ? found->get<std::string>() : std::string();
+  };
+  const std::string kind = text("kind");
+  int number = 0;
+  while (number < kMapEditKindCount && kind != MapEditKindName(static_cast<MapEditKind>(number))) ++number;
+  if (number == kMapEditKindCount) return invalid("`kind` must be free, unknown, occupied or keep_out");
+  edit.kind = static_cast<MapEditKind>(number);
+  const auto points = json.find("points");
+  if (points == json.end() || !points->is_array() || points->size() > kMostEditPoints)
+    return invalid("`points` must be a list of at most 64 points");
+  for (const auto& point : *points) {
+    if (!point.is_array() || point.size() != 2 || !point[0].is_number() || !point[1].is_number())
+      return invalid("a point must be two numbers");
+    edit.points_map.emplace_back(point[0].get<double>(), point[1].get<double>());
+  }
+  const auto width = json.find("width");
+  if (width != json.end() && !width->is_number()) return invalid("`width` must be a number");
+  if (width != json.end()) edit.width_m = width->get<double>();
+  const auto note = json.find("note");
+  if (note != json.end() && !note->is_string()) return invalid("`note` must be a text");
+  edit.note = text("note");
+  if (auto valid = ValidateMapEdit(edit); !valid) return tl::unexpected(valid.error());
+  return edit;
 }
 
 std::string TilesJson(const client::TileChanges& changes) {

@@ -3,10 +3,13 @@
 #pragma once
 
 #include <cstdint>
+#include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "client/lib/tile_mirror.h"
 #include "client/web/server_watch.h"
+#include "common/map/map_edit.h"
 #include "common/sensor/trajectory.h"
 
 namespace cairn::web {
@@ -20,6 +23,9 @@ namespace cairn::web {
 [[nodiscard]] std::string PathJson(const Trajectory& path, std::size_t most);
 [[nodiscard]] std::string LandmarksJson(const std::vector<LandmarkReport>& landmarks);
 [[nodiscard]] std::string JobJson(const Job& job);
+[[nodiscard]] std::string EditsJson(const std::vector<MapEdit>& edits);
+// INVALID_ARGUMENT, with what is wrong in the words of the page.
+[[nodiscard]] Result<MapEdit> EditFromJson(const nlohmann::json& json);
 // Why robots are not on the map: `ros2` in the words of the doctor (client/lib/ros2_findings.h), null where the server
 // has no door for them; `strays`, the robots without a session.
 [[nodiscard]] std::string DoctorJson(const ServerView& view);

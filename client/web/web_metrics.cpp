@@ -113,6 +113,29 @@ std::string RefusalMetrics(const Refusals& refused) {
   return metric.text();
 }
 
+std::string LoadMetrics(const ServerLoad& load) {
+  Metric up("cairn_server_up_seconds", "gauge", "Since the server's start.");
+  up.Add("", load.up_s);
+  Metric processor("cairn_server_processor_seconds_total", "counter", "Processor time of the server since its start.");
+  processor.Add("", load.processor_s);
+  Metric memory("cairn_server_memory_bytes", "gauge", "Memory of the server that is in RAM.");
+  memory.Add("", load.memory_bytes);
+  Metric waiting("cairn_server_waiting", "gauge", "Values in the server's queues that no thread has looked at yet.");
+  waiting.Add("queue=\"inbound\"", load.inbound_waiting);
+  waiting.Add("queue=\"outbound\"", load.outbound_waiting);
+  std::string text = up.text() + processor.text() + memory.text() + waiting.text();
+  if (!load.stores) return text;
+  Metric commits("cairn_store_commits_total", "counter", "Commits of the server's store, by result.");
+  commits.Add("result=\"stored\"", load.commits);
+  commits.Add("result=\"failed\"", load.failed_commits);
+  Metric bytes("cairn_store_bytes", "gauge", "What the records in the server's store take.");
+  bytes.Add("", load.store_bytes);
+  Metric delay("cairn_store_delay_seconds", "summary", "A change until it was on the disk, of the last 4,096 commits.");
+  delay.Add("quantile=\"0.5\"", load.stored_after_p50_ms / 1000.0);
+  delay.Add("quantile=\"0.99\"", load.stored_after_p99_ms / 1000.0);
+  return text + commits.text() + bytes.text() + delay.text();
+}
+
 }  // namespace
 
 std::string MetricsText(const ServerView& view) {
@@ -121,8 +144,8 @@ std::string MetricsText(const ServerView& view) {
   if (!view.connected) return up.text();
   Metric degraded("cairn_degraded", "gauge", "1 while the server cannot store new data, or did not restore all.");
   degraded.Add("", view.status.degraded.empty() ? 0 : 1);
-  return up.text() + degraded.text() + RefusalMetrics(view.status.refused) + RobotMetrics(view.status.robots) +
-         SiteMetrics(view.maps, view.jobs);
+  return up.text() + degraded.text() + LoadMetrics(view.status.load) + RefusalMetrics(view.status.refused) +
+         RobotMetrics(view.status.robots) + SiteMetrics(view.maps, view.jobs);
 }
 
 }  // namespace cairn::web

@@ -1,5 +1,6 @@
 #include "client/web/web_page.h"
 
+#include <fmt/format.h>
 #include <openssl/crypto.h>
 
 #include <limits>
@@ -8,6 +9,7 @@
 #include <utility>
 
 #include "client/web/http_answers.h"
+#include "client/web/tile_picture.h"
 #include "client/web/web_json.h"
 #include "client/web/web_metrics.h"
 #include "common/geometry/angle.h"
@@ -98,6 +100,8 @@ HttpResponse WebPage::AnswerAboutSite(const HttpRequest& request, const Parts& p
   if (parts.size() == 7 && parts[3] == "tiles") return TileFile(request, parts);
   if (parts.size() != 4) return HttpError(404, "there is no such address");
   if (parts[3] == "landmarks") return Landmarks(site);
+  if (parts[3] == "edits") return Edits(site);
+  if (parts[3] == "disagreement.png") return Disagreement(site);
   if (parts[3] == "map.png" || parts[3] == "map.yaml") return MapFile(site, parts[3]);
   return HttpError(404, "there is no such address");
 }
@@ -176,6 +180,61 @@ HttpResponse WebPage::Landmarks(const std::string& site) {
     return queries_->Landmarks(site).map(
         [](const std::vector<LandmarkReport>& landmarks) { return LandmarksJson(landmarks); });
   });
+}
+
+HttpResponse WebPage::Edits(const std::string& site) {
+  const auto view = watch_->view();
+  const MapInfo* const map = view->Map(site);
+  const std::uint64_t version = map == nullptr ? 0 : map->edits_version;
+  return Recent("edits " + site + " " + std::to_string(version), [&] {
+    return queries_->MapEdits(site).map([](const std::vector<MapEdit>& edits) { return EditsJson(edits); });
+  });
+}
+
+namespace {
+
+// The finest level at which the picture of the whole map stays small; nothing where none is.
+std::optional<std::uint32_t> LevelOfPicture(const MapInfo& map) {
+  constexpr double kMostCells = 4e6;
+  double cells = (map.x_max_m - map.x_min_m) * (map.y_max_m - map.y_min_m) / (map.resolution_m * map.resolution_m);
+  for (std::uint32_t level = 0; level < map.levels; ++level, cells /= 4.0) {
+    if (cells <= kMostCells) return level;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+// The area that the picture covers is in a header of its own, because that of the map may have changed meanwhile.
+HttpResponse WebPage::Disagreement(const std::string& site) {
+  const auto view = watch_->view();
+  const MapInfo* const map = view->Map(site);
+  if (map == nullptr) return HttpError(404, "the site has no map yet");
+  const auto level = LevelOfPicture(*map);
+  if (!level) return HttpError(413, "the map is too large for one picture");
+  const auto text = pictures_.Get(site, [&]() -> Result<std::string> {
+    if (!watch_->view()->connected) return ServerLost();
+    const auto image = queries_->DisagreementImage(site, *level);
+    if (!image && image.error().code == StatusCode::kUnavailable) return std::string();  // Nobody differs.
+    if (!image) return tl::unexpected(image.error());
+    const Pose2& low = image->T_map_origin;
+    return DrawDisagreement(*image).map([&](const std::string& png) {
+      return fmt::format("{} {} {} {}\n", low.x, low.y, low.x + image->width * image->resolution_m,
+                         low.y + image->height * image->resolution_m) +
+             png;
+    });
+  });
+  if (!text) return Refused(text.error());
+  HttpResponse response;
+  if ((*text)->empty()) {
+    response.status = 204;
+    return response;
+  }
+  const std::size_t end = (*text)->find('\n');
+  response.type = "image/png";
+  response.body = (*text)->substr(end + 1);
+  response.headers = {{"X-Map-Area", (*text)->substr(0, end)}, {"Cache-Control", "no-store"}};
+  return response;
 }
 
 HttpResponse WebPage::MapFile(const std::string& site, const std::string& name) {
@@ -264,6 +323,17 @@ HttpResponse WebPage::CommandSite(const std::string& site, const std::string& co
     return done(queries_->EnableMap(site, version->get<std::uint32_t>()));
   }
   if (command == "rollback") return done(queries_->RollBackMap(site));
+  if (command == "edit") {
+    const auto edit = EditFromJson(*arguments);
+    return edit ? done(queries_->AddMapEdit(site, *edit)) : Refused(edit.error());
+  }
+  if (command == "remove-edit") {
+    const auto id = arguments->find("id");
+    std::uint64_t number = 0;
+    if (id == arguments->end() || !id->is_string() || !ParseNumber(id->get<std::string>(), number))
+      return HttpError(400, "`id` must be the number of an edit");
+    return done(queries_->RemoveMapEdit(site, number));
+  }
   if (command == "save") return done(queries_->SaveSite(site));
   return HttpError(404, "there is no such command");
 }

@@ -45,8 +45,10 @@ class WebPage {
   [[nodiscard]] HttpResponse Events(const std::string& site);
   [[nodiscard]] HttpResponse TileFile(const HttpRequest& request, const Parts& parts);
   [[nodiscard]] HttpResponse MapFile(const std::string& site, const std::string& name);
+  [[nodiscard]] HttpResponse Disagreement(const std::string& site);
   [[nodiscard]] HttpResponse Metrics() const;
   [[nodiscard]] HttpResponse Landmarks(const std::string& site);
+  [[nodiscard]] HttpResponse Edits(const std::string& site);
   [[nodiscard]] HttpResponse Path(const std::string& robot, bool smoothed);
   // The newest answer to a question that many people ask.
   [[nodiscard]] HttpResponse Recent(const std::string& question, const AnswerCache::Ask& ask);
@@ -58,6 +60,7 @@ class WebPage {
   SiteMaps maps_;
   StateTexts states_;
   AnswerCache answers_{std::chrono::seconds(4), 64};
+  AnswerCache pictures_{std::chrono::seconds(10), 8};
   AnswerCache exports_{std::chrono::seconds(4), 2};  // A large map takes 100 MB while it is drawn: one at a time.
 };
 

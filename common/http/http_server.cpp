@@ -213,7 +213,7 @@ class HttpServer::Impl final : public httplib::Server {
               return false;
             }
           });
-    } else if (from.status != 304) {
+    } else if (from.status != 304 && from.status != 204) {
       to.set_content(from.body, from.type);
     }
   }

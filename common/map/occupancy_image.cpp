@@ -38,8 +38,9 @@ Result<TileBox> BoundingBox(const std::vector<Tile>& tiles) {
 }  // namespace
 
 Result<OccupancyImage> AssembleTiles(const std::vector<Tile>& tiles, double level0_resolution_m) {
-  if (!std::isfinite(level0_resolution_m) || level0_resolution_m <= 0.0) {
-    return Fail(StatusCode::kInvalidArgument, "resolution must be positive");
+  constexpr double kFinest_m = 0.001;
+  if (!std::isfinite(level0_resolution_m) || level0_resolution_m < kFinest_m) {
+    return Fail(StatusCode::kInvalidArgument, "the resolution must be at least 0.001 m");
   }
   OccupancyImage image;
   image.resolution_m = level0_resolution_m;

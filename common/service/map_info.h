@@ -29,7 +29,8 @@ struct MapInfo {
   std::uint32_t robots = 0;                                   // Sessions in the site.
   std::uint32_t enabled_version = 1;
   std::vector<MapVersionInfo> versions;
-  Generation generation = 0;  // Set by the server's egress.
+  std::uint64_t edits_version = 0;  // Grows with every change of the edits (map_edit.h); 0: there was none.
+  Generation generation = 0;        // Set by the server's egress.
 };
 
 }  // namespace cairn

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -42,5 +43,13 @@ struct PoseReport {
   std::uint32_t map_epoch = 0;
   Generation generation = 0;  // Set by the server's egress.
 };
+
+// A place where a robot may be, as the particles of its filter say.
+struct PoseHypothesis {
+  Stamp stamp = 0;
+  Pose2 T_map_robot;
+  double weight = 0.0;  // Its share of the belief, 0..1.
+};
+inline constexpr std::size_t kMostHypotheses = 8;
 
 }  // namespace cairn

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/geometry/pose2.h"
+#include "common/map/map_edit.h"
 #include "common/map/tile.h"
 #include "common/sensor/trajectory.h"
 #include "common/service/job.h"
@@ -15,6 +16,7 @@
 #include "common/service/pose_report.h"
 #include "common/service/refusals.h"
 #include "common/service/ros2_report.h"
+#include "common/service/server_load.h"
 #include "common/service/session.h"
 #include "common/status.h"
 
@@ -22,28 +24,31 @@ namespace cairn {
 
 enum class RequestKind : std::uint8_t {
   kPing = 0,
-  kPose,        // robot; stamp or latest.
-  kPath,        // robot; smoothed or live.
-  kTiles,       // site; area, level, since_epoch + since_version.
-  kLandmarks,   // site.
-  kMapInfo,     // site, or all where empty.
-  kStatus,      // Ledgers and session states; robot or all.
-  kJobSubmit,   // site, job_kind, enable.
-  kJobGet,      // job.
-  kJobCancel,   // job.
-  kJobList,     // site or all.
-  kSessionEnd,  // robot.
-  kMapEnable,   // site, map_version (an older version: roll back).
-  kSavedList,   // The files of saved sites.
-  kSiteSave,    // site, saved (the file's name; empty: the site's).
-  kSiteLoad,    // saved, site (empty: as in the file).
-  kSiteDelete,  // site, or saved: then that file.
-  kRos2,        // What the door for ROS 2 robots sees.
-  kRelocalise,  // robot; T_map_robot (where it is) or nothing (it is not known).
-  kLocalise,    // robot: from now on it is only localised, in the map of its site.
-  kMap,         // robot: it maps again.
+  kPose,           // robot; stamp or latest.
+  kPath,           // robot; smoothed or live.
+  kTiles,          // site; area, level, since_epoch + since_version.
+  kLandmarks,      // site.
+  kMapInfo,        // site, or all where empty.
+  kStatus,         // Ledgers and session states; robot or all.
+  kJobSubmit,      // site, job_kind, enable.
+  kJobGet,         // job.
+  kJobCancel,      // job.
+  kJobList,        // site or all.
+  kSessionEnd,     // robot.
+  kMapEnable,      // site, map_version (an older version: roll back).
+  kSavedList,      // The files of saved sites.
+  kSiteSave,       // site, saved (the file's name; empty: the site's).
+  kSiteLoad,       // saved, site (empty: as in the file).
+  kSiteDelete,     // site, or saved: then that file.
+  kRos2,           // What the door for ROS 2 robots sees.
+  kRelocalise,     // robot; T_map_robot (where it is) or nothing (it is not known).
+  kLocalise,       // robot: from now on it is only localised, in the map of its site.
+  kMap,            // robot: it maps again.
+  kMapEdits,       // site.
+  kMapEditAdd,     // site, edit.
+  kMapEditRemove,  // site, edit: only the id.
 };
-inline constexpr int kRequestKindCount = 21;
+inline constexpr int kRequestKindCount = 24;
 [[nodiscard]] std::string_view RequestKindName(RequestKind kind);
 // Whether it changes something, and is therefore sent as a Command.
 [[nodiscard]] bool IsCommand(RequestKind kind);
@@ -76,6 +81,8 @@ struct Request {
   // kSiteSave, kSiteLoad, kSiteDelete: the name of a file in the server's directory of saved sites.
   std::string saved;
   std::optional<Pose2> T_map_robot;  // kRelocalise.
+  MapEdit edit;                      // kMapEditAdd, kMapEditRemove.
+  bool disagreement = false;         // kTiles: of the layer that says where robots differ.
 };
 
 // A request that changes something. It has a topic of its own, because DDS Security gives permissions by topic.
@@ -128,8 +135,12 @@ struct Reply {
   std::string server_version;       // kPing.
   std::vector<SavedSite> saved;     // kSavedList; kSiteSave: the file that was written; kSiteLoad: that, as which site.
   std::vector<Refusals> refused;    // kStatus: one.
+  std::vector<ServerLoad> load;     // kStatus: one.
   std::vector<Ros2DoorState> ros2;  // kRos2: one.
   std::vector<Ros2Namespace> ros2_namespaces;
+  std::vector<MapEdit> edits;  // kMapEdits; kMapEditAdd: the one that was added.
+  // kPose, latest: the places where the robot may be, the most believed one first; none while it is not localized.
+  std::vector<PoseHypothesis> hypotheses;
   Generation generation = 0;  // Set by the server's egress.
 };
 

@@ -4,13 +4,16 @@
 #include <string_view>
 #include <vector>
 
+#include "common/map/map_edit.h"
 #include "common/service/names.h"
+#include "common/service/pose_report.h"
 #include "common/wire/limits.h"
 
 namespace cairn::wire {
 // Checks of nested values. They are in the namespace cairn::wire, not in an unnamed one, so that Bounds::Each
 // finds all overloads.
 static Result<void> CheckBounds(const v1::MapVersion& version);
+static Result<void> CheckBounds(const v1::MapEdit& edit);
 static Result<void> CheckBounds(const v1::TileContent& content);
 static Result<void> CheckBounds(const v1::TileRecord& tile);
 static Result<void> CheckBounds(const v1::Landmark& landmark);
@@ -88,6 +91,14 @@ class Bounds {
 
 static Result<void> CheckBounds(const v1::MapVersion& version) {
   return Bounds().Text("note", version.note()).result();
+}
+
+static Result<void> CheckBounds(const v1::MapEdit& edit) {
+  return Bounds()
+      .Known("kind", edit.kind(), v1::MAP_EDIT_KEEP_OUT)
+      .AtMost("points", edit.points().size(), kMostEditPoints)
+      .Text("note", edit.note())
+      .result();
 }
 
 static Result<void> CheckBounds(const v1::TileContent& content) {
@@ -209,12 +220,13 @@ Result<void> CheckBounds(const v1::Job& job) {
 
 Result<void> CheckBounds(const v1::Request& request) {
   return Bounds()
-      .Known("kind", request.kind(), v1::REQUEST_MAP)
+      .Known("kind", request.kind(), v1::REQUEST_MAP_EDIT_REMOVE)
       .Name("site", request.site())
       .Name("robot", request.robot())
       .Within("level", request.level(), 0, kMaxTileLevel)
       .Known("job_kind", request.job_kind(), v1::JOB_JOIN)
       .Name("saved", request.saved())
+      .Inside("edit", CheckBounds(request.edit()))
       .result();
 }
 
@@ -231,8 +243,11 @@ Result<void> CheckBounds(const v1::Reply& reply) {
       .Text("server_version", reply.server_version())
       .Each("saved", reply.saved(), kMaxReplySaved)
       .AtMost("refused", reply.refused().size(), 1)
+      .AtMost("load", reply.load().size(), 1)
       .Each("ros2", reply.ros2(), 1)
       .Each("ros2_namespaces", reply.ros2_namespaces(), kMaxReplyNamespaces)
+      .Each("edits", reply.edits(), kMaxReplyEdits)
+      .AtMost("hypotheses", reply.hypotheses().size(), kMostHypotheses)
       .result();
 }
 

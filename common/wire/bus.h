@@ -20,6 +20,7 @@
 #include "common/service/request.h"
 #include "common/service/stream.h"
 #include "common/status.h"
+#include "common/wire/limits.h"
 
 namespace cairn::wire {
 
@@ -33,6 +34,8 @@ struct WireOptions {
   // "ADDRESS" or "ADDRESS:PORT" of discovery servers of Fast DDS, in the order of their numbers (fast-discovery-server
   // -i). Empty: participants find each other by multicast.
   std::vector<std::string> discovery_servers;
+  // Not an option of the file: after how many samples a keyed writer of the server is replaced. Tests use less.
+  std::uint64_t most_written = kMostWritten;
 };
 // Checks domain, addresses (IPv4, each once), discovery servers and leases, independently of the machine.
 [[nodiscard]] Result<void> Validate(const WireOptions& options);
@@ -51,7 +54,7 @@ class Publication {
   [[nodiscard]] virtual Result<void> Publish(const Value& value) = 0;
   // Marks the key of `value` as no longer needed. When the topic's instances are used up, its place is given to another
   // key, and late joiners no longer get its last sample. A later Publish of the same key takes a new place. Only for
-  // SessionState, PoseReport, Ledger, Job and MapInfo. kNotFound: nothing of that key was published.
+  // SessionState, PoseReport, Ledger, Job, MapInfo and TileSample. kNotFound: nothing of that key was published.
   [[nodiscard]] virtual Result<void> Retire(const Value& value) = 0;
   // Waits until every matched subscription has acknowledged everything, or the deadline passes (false).
   [[nodiscard]] virtual bool WaitForAcknowledgement(std::chrono::milliseconds deadline) = 0;

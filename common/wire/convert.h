@@ -26,6 +26,7 @@ namespace cairn::wire {
 [[nodiscard]] v1::PoseReport ToWire(const PoseReport& value);
 [[nodiscard]] v1::Ledger ToWire(const Ledger& value);
 [[nodiscard]] v1::MapInfo ToWire(const MapInfo& value);
+[[nodiscard]] v1::MapEdit ToWire(const MapEdit& value);
 [[nodiscard]] v1::Tile ToWire(const TileSample& value);
 [[nodiscard]] v1::Job ToWire(const Job& value);
 [[nodiscard]] v1::Request ToWire(const Request& value);
@@ -43,6 +44,7 @@ namespace cairn::wire {
 [[nodiscard]] PoseReport FromWire(v1::PoseReport&& wire);
 [[nodiscard]] Ledger FromWire(v1::Ledger&& wire);
 [[nodiscard]] MapInfo FromWire(v1::MapInfo&& wire);
+[[nodiscard]] MapEdit FromWire(v1::MapEdit&& wire);
 [[nodiscard]] TileSample FromWire(v1::Tile&& wire);
 [[nodiscard]] Job FromWire(v1::Job&& wire);
 [[nodiscard]] Request FromWire(v1::Request&& wire);

@@ -28,6 +28,7 @@ v1::MapInfo ToWire(const MapInfo& value) {
     out.job(version.job);
     out.note(version.note);
   }
+  wire.edits_version(value.edits_version);
   return wire;
 }
 
@@ -51,6 +52,33 @@ MapInfo FromWire(v1::MapInfo&& wire) {
   for (v1::MapVersion& version : wire.versions()) {
     value.versions.push_back({version.version(), version.enabled(), version.job(), std::move(version.note())});
   }
+  value.edits_version = wire.edits_version();
+  return value;
+}
+
+v1::MapEdit ToWire(const MapEdit& value) {
+  v1::MapEdit wire;
+  wire.id(value.id);
+  wire.kind(static_cast<v1::MapEditKind>(value.kind));
+  for (const Eigen::Vector2d& point : value.points_map) {
+    v1::MapPoint& out = wire.points().emplace_back();
+    out.x_m(point.x());
+    out.y_m(point.y());
+  }
+  wire.width_m(value.width_m);
+  wire.note(value.note);
+  wire.made_ns(value.made);
+  return wire;
+}
+
+MapEdit FromWire(v1::MapEdit&& wire) {
+  MapEdit value;
+  value.id = wire.id();
+  value.kind = static_cast<MapEditKind>(wire.kind());
+  for (const v1::MapPoint& point : wire.points()) value.points_map.emplace_back(point.x_m(), point.y_m());
+  value.width_m = wire.width_m();
+  value.note = std::move(wire.note());
+  value.made = wire.made_ns();
   return value;
 }
 

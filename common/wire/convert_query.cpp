@@ -84,6 +84,17 @@ static SavedSite FromWire(v1::SavedSite&& wire) {
   return {std::move(wire.name()), std::move(wire.site()), wire.bytes(), wire.saved_ns()};
 }
 
+static v1::PoseHypothesis ToWire(const PoseHypothesis& value) {
+  v1::PoseHypothesis wire;
+  wire.stamp_ns(value.stamp);
+  wire.T_map_robot(ToWire(value.T_map_robot));
+  wire.weight(value.weight);
+  return wire;
+}
+static PoseHypothesis FromWire(v1::PoseHypothesis&& wire) {
+  return {.stamp = wire.stamp_ns(), .T_map_robot = FromWire(wire.T_map_robot()), .weight = wire.weight()};
+}
+
 static v1::Refusals ToWire(const Refusals& value) {
   v1::Refusals wire;
   wire.secure(value.secure);
@@ -98,6 +109,35 @@ static v1::Refusals ToWire(const Refusals& value) {
 static Refusals FromWire(v1::Refusals&& wire) {
   return {wire.secure(),   wire.peers(),     wire.endpoints(), wire.samples(),
           wire.commands(), wire.datagrams(), wire.over_limit()};
+}
+
+static v1::ServerLoad ToWire(const ServerLoad& value) {
+  v1::ServerLoad wire;
+  wire.up_s(value.up_s);
+  wire.processor_s(value.processor_s);
+  wire.memory_bytes(value.memory_bytes);
+  wire.inbound_waiting(value.inbound_waiting);
+  wire.outbound_waiting(value.outbound_waiting);
+  wire.stores(value.stores);
+  wire.commits(value.commits);
+  wire.failed_commits(value.failed_commits);
+  wire.store_bytes(value.store_bytes);
+  wire.stored_after_p50_ms(value.stored_after_p50_ms);
+  wire.stored_after_p99_ms(value.stored_after_p99_ms);
+  return wire;
+}
+static ServerLoad FromWire(v1::ServerLoad&& wire) {
+  return {.up_s = wire.up_s(),
+          .processor_s = wire.processor_s(),
+          .memory_bytes = wire.memory_bytes(),
+          .inbound_waiting = wire.inbound_waiting(),
+          .outbound_waiting = wire.outbound_waiting(),
+          .stores = wire.stores(),
+          .commits = wire.commits(),
+          .failed_commits = wire.failed_commits(),
+          .store_bytes = wire.store_bytes(),
+          .stored_after_p50_ms = wire.stored_after_p50_ms(),
+          .stored_after_p99_ms = wire.stored_after_p99_ms()};
 }
 
 static v1::Ros2Topic ToWire(const Ros2Topic& value) {
@@ -184,6 +224,8 @@ v1::Request ToWire(const Request& value) {
   wire.saved(value.saved);
   wire.has_pose(value.T_map_robot.has_value());
   wire.T_map_robot(ToWire(value.T_map_robot.value_or(Pose2{})));
+  wire.edit(ToWire(value.edit));
+  wire.disagreement(value.disagreement);
   return wire;
 }
 
@@ -208,6 +250,8 @@ Request FromWire(v1::Request&& wire) {
   value.map_version = wire.map_version();
   value.saved = std::move(wire.saved());
   if (wire.has_pose()) value.T_map_robot = FromWire(wire.T_map_robot());
+  value.edit = FromWire(std::move(wire.edit()));
+  value.disagreement = wire.disagreement();
   return value;
 }
 
@@ -230,8 +274,11 @@ v1::Reply ToWire(const Reply& value) {
   ListToWire(value.jobs, wire.jobs());
   ListToWire(value.saved, wire.saved());
   ListToWire(value.refused, wire.refused());
+  ListToWire(value.load, wire.load());
   ListToWire(value.ros2, wire.ros2());
   ListToWire(value.ros2_namespaces, wire.ros2_namespaces());
+  ListToWire(value.edits, wire.edits());
+  ListToWire(value.hypotheses, wire.hypotheses());
   wire.server_version(value.server_version);
   return wire;
 }
@@ -255,8 +302,11 @@ Reply FromWire(v1::Reply&& wire) {
   ListFromWire(wire.jobs(), value.jobs);
   ListFromWire(wire.saved(), value.saved);
   ListFromWire(wire.refused(), value.refused);
+  ListFromWire(wire.load(), value.load);
   ListFromWire(wire.ros2(), value.ros2);
   ListFromWire(wire.ros2_namespaces(), value.ros2_namespaces);
+  ListFromWire(wire.edits(), value.edits);
+  ListFromWire(wire.hypotheses(), value.hypotheses);
   value.server_version = std::move(wire.server_version());
   return value;
 }

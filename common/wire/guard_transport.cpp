@@ -15,6 +15,7 @@ namespace {
 
 namespace transport = eprosima::fastdds::rtps;
 namespace rtps = eprosima::fastrtps::rtps;
+using Bytes = std::span<const rtps::octet>;
 
 struct GuardDescriptor : transport::ChainingTransportDescriptor {
   GuardDescriptor(std::shared_ptr<transport::TransportDescriptorInterface> udp, std::shared_ptr<GuardReport> to,
@@ -65,29 +66,28 @@ class GuardTransport : public transport::ChainingTransport {
   void receive(transport::TransportReceiverInterface* next, const rtps::octet* bytes, std::uint32_t size,
                const rtps::Locator_t& local, const rtps::Locator_t& remote) override {
     report_->bytes.fetch_add(size, std::memory_order_relaxed);
-    if (!IsSound({bytes, size})) return;
-    const auto deliver = [&](std::span<const rtps::octet> datagram) {
+    const Bytes received = WithoutStatistics({bytes, size});
+    if (!IsSound(received)) return;
+    const auto deliver = [&](Bytes datagram) {
       const std::vector<rtps::octet> counted = WithOwnCounts(datagram, gate_);
       if (!counted.empty()) datagram = counted;
       if (descriptor_.secure && IsOfDiscovery(local)) return DeliverAlone(next, datagram, local, remote);
       Deliver(next, datagram, local, remote);
     };
-    if (!HasFragments({bytes, size})) return deliver({bytes, size});
+    if (!HasFragments(received)) return deliver(received);
     if (descriptor_.secure) {
       // Each fragment is encrypted by itself, and a reader takes none of a stranger. What built-in endpoints receive
       // could be inspected only in part.
-      if (HasBuiltInFragments({bytes, size})) return Refuse(DatagramFault::kFragment);
-      return deliver({bytes, size});
+      if (HasBuiltInFragments(received)) return Refuse(DatagramFault::kFragment);
+      return deliver(received);
     }
-    for (const FragmentAssembly::Datagram& datagram : Assemble({bytes, size})) {
+    for (const FragmentAssembly::Datagram& datagram : Assemble(received)) {
       // The beginning of a sample could be seen only in part before.
       if (IsSound(datagram)) deliver(datagram);
     }
   }
 
  private:
-  using Bytes = std::span<const rtps::octet>;
-
   // DDSI-RTPS 2.2, 9.6.1.1: what participants and endpoints tell of themselves arrives at ports with even numbers, and
   // samples of topics at those with odd ones. A participant has a thread for each of its ports.
   static bool IsOfDiscovery(const rtps::Locator_t& local) { return local.port % 2 == 0; }
@@ -112,7 +112,7 @@ class GuardTransport : public transport::ChainingTransport {
     Deliver(next, datagram, local, remote);
   }
 
-  bool IsSound(std::span<const rtps::octet> datagram) {
+  bool IsSound(Bytes datagram) {
     const DatagramFault fault = InspectDatagram(datagram, gate_);
     if (fault != DatagramFault::kNone) Refuse(fault);
     return fault == DatagramFault::kNone;
@@ -121,11 +121,11 @@ class GuardTransport : public transport::ChainingTransport {
   void Refuse(DatagramFault fault) {
     report_->refused[static_cast<std::size_t>(fault)].fetch_add(1, std::memory_order_relaxed);
   }
-  std::vector<FragmentAssembly::Datagram> Assemble(std::span<const rtps::octet> datagram) {
+  std::vector<FragmentAssembly::Datagram> Assemble(Bytes datagram) {
     const MutexLock lock(mutex_);
     return assembly_.Take(datagram);
   }
-  FragmentAssembly::Datagram WithQuestions(std::span<const rtps::octet> datagram) {
+  FragmentAssembly::Datagram WithQuestions(Bytes datagram) {
     const MutexLock lock(mutex_);
     return assembly_.WithQuestions(datagram);
   }

@@ -1,10 +1,12 @@
 #include "common/wire/library_repairs.h"
 
+#include <dlfcn.h>
 #include <fastdds/rtps/builtin/data/ParticipantProxyData.h>
 #include <fastdds/rtps/builtin/discovery/participant/PDP.h>
 #include <fastdds/rtps/history/History.h>
 #include <fastdds/rtps/history/ReaderHistory.h>
 #include <fastdds/rtps/history/WriterHistory.h>
+#include <fastdds/rtps/reader/StatefulReader.h>
 #include <fastdds/rtps/resources/TimedEvent.h>
 #include <fastdds/rtps/writer/LivelinessManager.h>
 #include <fastrtps/fastrtps_dll.h>
@@ -12,6 +14,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
+#include <cstdio>
+#include <cstdlib>
 #include <deque>
 #include <functional>
 #include <map>
@@ -21,13 +25,15 @@
 
 #include "common/mutex.h"
 
+#if FASTRTPS_VERSION_MAJOR != 2 || FASTRTPS_VERSION_MINOR != 9
+
 namespace cairn::wire {
 
 void UseRepairs() {}
 
 }  // namespace cairn::wire
 
-#if FASTRTPS_VERSION_MAJOR == 2 && FASTRTPS_VERSION_MINOR == 9
+#else
 
 namespace cairn::wire {
 namespace {
@@ -35,6 +41,19 @@ namespace {
 using eprosima::fastrtps::ResourceLimitedVector;
 using eprosima::fastrtps::rtps::LivelinessData;
 using eprosima::fastrtps::rtps::LivelinessManager;
+using eprosima::fastrtps::rtps::StatefulReader;
+namespace rtps = eprosima::fastrtps::rtps;
+
+// The library's own StatefulReader::processGapMsg, which the dynamic linker finds behind the one below.
+using ProcessGap = bool (*)(StatefulReader*, const rtps::GUID_t&, const rtps::SequenceNumber_t&,
+                            const rtps::SequenceNumberSet_t&);
+ProcessGap LibraryProcessGap() {
+  static const auto kFunction = reinterpret_cast<ProcessGap>(
+      dlsym(RTLD_NEXT,
+            "_ZN8eprosima8fastrtps4rtps14StatefulReader13processGapMsgERKNS1_6GUID_tERKNS1_16SequenceNumber_tERKNS0_"
+            "11BitmapRangeIS6_NS1_18SequenceNumberDiffELj256EEE"));
+  return kFunction;
+}
 
 // Tells of changes of liveliness in the order in which they were made, one after the other. Thread-safe.
 class LivelinessNews {
@@ -93,6 +112,14 @@ std::optional<double> MillisecondsUntilTheNextIsDue(const ResourceLimitedVector<
 }
 
 }  // namespace
+
+void UseRepairs() {
+  if (LibraryProcessGap() != nullptr) return;
+  std::fputs("cairn: this build of Fast DDS 2.9 lacks a function that Cairn needs: StatefulReader::processGapMsg\n",
+             stderr);
+  std::abort();
+}
+
 }  // namespace cairn::wire
 
 namespace eprosima::fastrtps::rtps {
@@ -148,6 +175,31 @@ History::const_iterator History::get_change_nts(const SequenceNumber_t& seq, con
     if (!of_reader) break;
   }
   return next;
+}
+
+// What a reader keeps of a writer. The library does not install the header of this class, only the function.
+class WriterProxy {
+ public:
+  [[nodiscard]] SequenceNumber_t available_changes_max() const;  // Up to here, all samples have come or are left out.
+};
+
+// A writer that keeps the last sample of each key leaves out the numbers between them, and says so again with each of
+// its heartbeats. The library's readers go through those numbers one by one each time. With an old key that does not
+// change and 200,000 newer samples, that took 36 ms for each heartbeat, and heartbeats come every 20 ms: a reader
+// on a busy machine did not acknowledge anything for minutes (seen in a test; github.com/ros2/rmw_fastrtps/issues/789
+// describes the same). Here the numbers up to which the reader has everything are passed over, except for the last one:
+// the library ignores a message without any, with what it says of later numbers. The mutex is not held while the
+// library's own function runs, because listeners that it calls release it.
+bool StatefulReader::processGapMsg(const GUID_t& writer, const SequenceNumber_t& first,
+                                   const SequenceNumberSet_t& left_out) {
+  SequenceNumber_t from = first;
+  if (const SequenceNumber_t none(0, 0); none < first && first < left_out.base()) {
+    const std::lock_guard<eprosima::fastrtps::RecursiveTimedMutex> lock(getMutex());
+    WriterProxy* proxy = nullptr;
+    if (matched_writer_lookup(writer, &proxy) && proxy != nullptr)
+      from = std::min(std::max(first, proxy->available_changes_max() + 1), left_out.base() - 1);
+  }
+  return cairn::wire::LibraryProcessGap()(this, writer, from, left_out);
 }
 
 // Takes a change out of a history. The library's own version looks for it without the mutex of the history, while other

@@ -9,6 +9,7 @@
 #include <set>
 #include <string>
 #include <type_traits>
+#include <utility>
 
 #include "common/wire/bounds.h"
 #include "common/wire/convert.h"
@@ -71,11 +72,10 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
 
  private:
   using Key = std::array<std::uint8_t, 16>;
-  // The topics whose keys change while a server runs: sessions, jobs and sites begin and end. (So do tiles, but to keep
-  // each tile here as well would double their memory.)
+  // The topics of the server whose keys change while it runs: sessions, jobs, sites and tiles begin and end.
   static constexpr bool kRetires = std::is_same_v<Value, SessionState> || std::is_same_v<Value, PoseReport> ||
                                    std::is_same_v<Value, Ledger> || std::is_same_v<Value, Job> ||
-                                   std::is_same_v<Value, MapInfo>;
+                                   std::is_same_v<Value, MapInfo> || std::is_same_v<Value, TileSample>;
 
   Key KeyOf(Sample<Wire>& sample) {
     fd::InstanceHandle_t handle;
@@ -92,16 +92,44 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
       const Key key = KeyOf(sample);
       const auto places = static_cast<std::size_t>(Topic<Value>::kProfile.max_instances);
       if (used_.size() >= places && !used_.contains(key)) {
+        ForgetDeleted();
         // The samples of keys that are new wait until the writer has room.
         if (live_.size() >= used_.size() || !Renew()) return false;
-      } else if (written_ >= kMostWritten) {
+      } else if (written_ >= MostWritten()) {
         static_cast<void>(Renew());  // Until it can, the old one goes on.
       }
       if (!writer_->write(&sample)) return false;
       ++written_;
       used_.insert(key);
       live_.insert_or_assign(key, sample);
+      if constexpr (std::is_same_v<Value, TileSample>) deleted_ += sample.value.deleted() ? 1 : 0;
       return true;
+    }
+  }
+
+  // The new writer sends what is kept to every reader again, so it must be little beside what the old one has sent.
+  [[nodiscard]] std::uint64_t MostWritten() const CAIRN_REQUIRES(mutex_) {
+    constexpr std::uint64_t kMostAgain = 10;  // One of so many samples is one that is sent again.
+    return std::max<std::uint64_t>(participant_->options().most_written, kMostAgain * live_.size());
+  }
+
+  // A deleted tile is told to the readers that know the tile. When all of them have been told, it needs no place any
+  // more, unless it is the newest change of its site: whoever comes late waits for that (TileMirror::complete).
+  void ForgetDeleted() CAIRN_REQUIRES(mutex_) {
+    if constexpr (std::is_same_v<Value, TileSample>) {
+      if (deleted_ == 0) return;
+      if (writer_->wait_for_acknowledgments({0, 1}) != eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) return;
+      deleted_ = 0;
+      std::map<NameId, const Wire*> newest;
+      for (const auto& [key, sample] : live_) {
+        const Wire*& known = newest[sample.value.site_id()];
+        const auto rank = [](const Wire& tile) { return std::pair(tile.content().version(), !tile.deleted()); };
+        if (known == nullptr || rank(*known) < rank(sample.value)) known = &sample.value;
+      }
+      std::erase_if(live_, [&](const auto& one) {
+        const Wire& tile = one.second.value;
+        return tile.deleted() && newest.at(tile.site_id()) != &tile;
+      });
     }
   }
 
@@ -121,6 +149,7 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
     if (ReadersOf(*successor_) < ReadersOf(*writer_) && now - successor_made_ < kLongestSearch) return false;
     constexpr long double kPatienceS = 0.1L;
     static_cast<void>(writer_->wait_for_acknowledgments(eprosima::fastrtps::Duration_t(kPatienceS)));
+    ForgetDeleted();
     used_.clear();
     // Late joiners get the last sample of each key from the writer that knows it.
     for (auto& [key, sample] : live_) {
@@ -149,6 +178,7 @@ class DdsPublication final : public Publication<Value>, private fd::DataWriterLi
   std::map<Key, Sample<Wire>> live_ CAIRN_GUARDED_BY(mutex_);  // Where keys are retired: the last sample of each.
   std::set<Key> used_ CAIRN_GUARDED_BY(mutex_);                // Keys that have a place in the writer.
   std::uint64_t written_ CAIRN_GUARDED_BY(mutex_) = 0;         // Samples, by the present writer.
+  std::uint64_t deleted_ CAIRN_GUARDED_BY(mutex_) = 0;         // Of tiles: deletions since ForgetDeleted.
   // The last members: they call the listener until they are destroyed.
   Participant::Writer writer_;
   Participant::Writer successor_

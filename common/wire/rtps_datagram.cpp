@@ -204,6 +204,16 @@ std::string_view DatagramFaultName(DatagramFault fault) {
   return kNames[static_cast<std::size_t>(fault)];
 }
 
+Bytes WithoutStatistics(Bytes datagram) {
+  for (std::size_t at = kRtpsHeaderBytes; at + 4 <= datagram.size();) {
+    const std::size_t length = SubmessageReader{datagram, (datagram[at + 1] & 1) != 0}.U16(at + 2);
+    const bool to_the_end = EndsWithDatagram(datagram[at], length) || at + 4 + length >= datagram.size();
+    if (to_the_end) return datagram[at] == kEprosimaStatistics ? datagram.first(at) : datagram;
+    at += 4 + length;
+  }
+  return datagram;
+}
+
 DatagramFault InspectDatagram(Bytes datagram, SequenceGate& gate, SequenceGate::Clock::time_point now) {
   const Inspection with{gate, now};
   return Walk(datagram, [&](const Submessage& submessage) { return InspectSubmessage(submessage, with); });

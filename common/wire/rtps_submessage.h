@@ -80,6 +80,11 @@ struct Submessage {
 [[nodiscard]] std::size_t PayloadStart(const Submessage& m, std::size_t fixed);
 [[nodiscard]] SequenceGate::GuidPrefix PrefixAt(std::span<const std::uint8_t> bytes, std::size_t at);
 
+// Length 0 means "to the end of the datagram", except for the two kinds of submessage that may be empty.
+[[nodiscard]] inline bool EndsWithDatagram(std::uint8_t id, std::size_t length) {
+  return length == 0 && id != kPad && id != kInfoTimestamp;
+}
+
 // Gives each submessage to `inspect` until one has a fault.
 template <typename Inspect>
 [[nodiscard]] DatagramFault Walk(std::span<const std::uint8_t> datagram, Inspect inspect) {
@@ -97,9 +102,7 @@ template <typename Inspect>
     const std::uint8_t flags = datagram[at + 1];
     const bool little = (flags & 1) != 0;
     const std::size_t length = SubmessageReader{datagram, little}.U16(at + 2);
-    // Length 0 means "to the end of the datagram", except for the two kinds of submessage that may be empty.
-    const bool to_the_end = length == 0 && id != kPad && id != kInfoTimestamp;
-    const std::size_t end = to_the_end ? datagram.size() : at + 4 + length;
+    const std::size_t end = EndsWithDatagram(id, length) ? datagram.size() : at + 4 + length;
     if (end > datagram.size()) return DatagramFault::kFraming;
     // All but the last are multiples of four bytes (9.4.5.1.3). Receivers differ in where the next one of another
     // length begins: what is harmless here may be something else there.

@@ -1,6 +1,6 @@
 // All sites by name. A site is created when the first robot enters it, if the server may create sites, and is
-// kept. When maps.max_sites is reached, a new site replaces one that is empty (no tile, no version, no session) and not
-// configured, so that misspelt names do not use up the sites. Thread rule: any thread.
+// kept. When maps.max_sites is reached, a new site replaces one that is empty (nothing drawn, no version, no session)
+// and not configured, so that misspelt names do not use up the sites. Thread rule: any thread.
 #pragma once
 
 #include <asio/thread_pool.hpp>

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/maps/layer_disagreement.h"
 #include "server/maps/layer_sum.h"
 
 namespace cairn::server {
@@ -54,13 +55,47 @@ slam::OccupancyGrid::Chunks JointMap::DrawnBefore(SessionId session) const {
   return sum;
 }
 
+void JointMap::SetEdits(EditOverlay overlay) {
+  for (const auto& [key, cells] : edits_) {
+    const auto now = overlay.find(key);
+    if (now == overlay.end() || now->second != cells) dirty_.insert(key);
+  }
+  for (const auto& [key, cells] : overlay) {
+    if (!edits_.contains(key)) dirty_.insert(key);
+  }
+  edits_ = std::move(overlay);
+}
+
+bool JointMap::IsShown(const Layers& layers) const {
+  return std::ranges::any_of(layers, [this](const auto& layer) { return !hidden_.contains(layer.first); });
+}
+
+bool JointMap::drawn() const {
+  return std::ranges::any_of(chunks_, [this](const auto& place) { return IsShown(place.second); });
+}
+
+std::optional<std::pair<slam::ChunkKey, slam::ChunkKey>> JointMap::DrawnBox() const {
+  std::optional<std::pair<slam::ChunkKey, slam::ChunkKey>> box;
+  for (const auto& [key, layers] : chunks_) {
+    if (!IsShown(layers)) continue;
+    if (!box) box.emplace(key, key);
+    auto& [low, high] = *box;
+    low = {std::min(low.x, key.x), std::min(low.y, key.y)};
+    high = {std::max(high.x, key.x), std::max(high.y, key.y)};
+  }
+  return box;
+}
+
 void JointMap::SetHidden(SessionId session, bool hidden) {
   const bool changed = hidden ? hidden_.insert(session).second : hidden_.erase(session) > 0;
   if (changed) MarkChanged(session);
 }
 
 void JointMap::SetPast(SessionId session) {
-  if (past_.emplace(session, past_.size()).second) MarkChanged(session);
+  if (!past_.emplace(session, past_.size()).second) return;
+  for (const auto& [key, layers] : chunks_) {
+    if (layers.contains(session)) dirty_.insert(key);  // By how much it differs from others stays the same.
+  }
 }
 
 std::vector<SessionId> JointMap::past() const {
@@ -115,12 +150,12 @@ void JointMap::Remove(SessionId session) {
 
 void JointMap::MarkChanged(SessionId session) {
   for (const auto& [key, layers] : chunks_) {
-    if (layers.contains(session)) dirty_.insert(key);
+    if (layers.contains(session)) Touch(key);
   }
 }
 
 void JointMap::SetLayer(slam::ChunkKey key, SessionId session, std::shared_ptr<const slam::GridChunk> chunk) {
-  dirty_.insert(key);
+  Touch(key);
   if (chunk != nullptr) {
     chunks_[key][session] = std::move(chunk);
     return;
@@ -131,37 +166,22 @@ void JointMap::SetLayer(slam::ChunkKey key, SessionId session, std::shared_ptr<c
   if (found->second.empty()) chunks_.erase(found);
 }
 
-std::vector<TileKey> JointMap::Render() {
-  std::vector<TileKey> changed;
-  std::set<TileKey> below;
-  for (const slam::ChunkKey& key : dirty_) {
-    const TileKey tile{0, key.x, key.y};
-    if (Store(tile, Sum(key))) below.insert(tile);
-  }
-  dirty_.clear();
-  for (int level = 1; !below.empty(); ++level) {
-    changed.insert(changed.end(), below.begin(), below.end());
-    if (level == kPyramidLevels) break;
-    std::set<TileKey> parents, changed_parents;
-    for (const TileKey& child : below) parents.insert({level, FloorDiv(child.x, 2), FloorDiv(child.y, 2)});
-    for (const TileKey& parent : parents) {
-      if (Store(parent, Reduce(parent))) changed_parents.insert(parent);
-    }
-    below = std::move(changed_parents);
-  }
-  return changed;
+void JointMap::Touch(slam::ChunkKey key) {
+  dirty_.insert(key);
+  differing_dirty_.insert(key);
 }
 
-bool JointMap::Store(TileKey key, Cells cells) {
-  const auto found = cells_.find(key);
-  if (cells == nullptr) {
-    if (found == cells_.end()) return false;
-    cells_.erase(found);
-    return true;
-  }
-  if (found != cells_.end() && *found->second == *cells) return false;
-  cells_.insert_or_assign(key, std::move(cells));
-  return true;
+std::vector<TileKey> JointMap::Render() {
+  std::map<TileKey, Cells> finest;
+  for (const slam::ChunkKey& key : std::exchange(dirty_, {})) finest.emplace(TileKey{0, key.x, key.y}, Sum(key));
+  return sum_.Update(finest);
+}
+
+std::vector<TileKey> JointMap::RenderDisagreement() {
+  std::map<TileKey, Cells> finest;
+  for (const slam::ChunkKey& key : std::exchange(differing_dirty_, {}))
+    finest.emplace(TileKey{0, key.x, key.y}, Disagreement(key));
+  return disagreement_.Update(finest);
 }
 
 template <typename Counts>
@@ -190,24 +210,23 @@ std::shared_ptr<const slam::GridChunk> JointMap::SumOf(const Layers& layers, con
 
 JointMap::Cells JointMap::Sum(slam::ChunkKey key) const {
   const auto found = chunks_.find(key);
-  if (found == chunks_.end()) return nullptr;
-  const auto sum = SumOf(found->second, [](SessionId) { return true; });
-  if (sum == nullptr) return nullptr;
+  const auto edits = edits_.find(key);
+  const auto sum = found == chunks_.end() ? nullptr : SumOf(found->second, [](SessionId) { return true; });
+  if (sum == nullptr && edits == edits_.end()) return nullptr;
   auto cells = std::make_shared<TileCells>();
-  for (std::size_t i = 0; i < cells->size(); ++i) (*cells)[i] = slam::OccupancyOf(sum->log_odds[i]);
+  for (std::size_t i = 0; i < cells->size(); ++i)
+    (*cells)[i] = sum == nullptr ? kUnknownCell : slam::OccupancyOf(sum->log_odds[i]);
+  if (edits != edits_.end()) DrawOver(*edits->second, *cells);
   return AllUnknown(*cells) ? nullptr : cells;
 }
 
-JointMap::Cells JointMap::Reduce(TileKey parent) const {
-  std::array<const TileCells*, 4> children{};
-  bool any = false;
-  for (int i = 0; i < 4; ++i) {
-    const auto child = cells_.find({parent.level - 1, 2 * parent.x + i % 2, 2 * parent.y + i / 2});
-    if (child == cells_.end()) continue;
-    children[static_cast<std::size_t>(i)] = child->second.get();
-    any = true;
-  }
-  return any ? std::make_shared<const TileCells>(ReduceTiles(children)) : nullptr;
+JointMap::Cells JointMap::Disagreement(slam::ChunkKey key) const {
+  const auto found = chunks_.find(key);
+  if (found == chunks_.end()) return nullptr;
+  std::vector<const slam::GridChunk*> grids;
+  for (const auto& [session, chunk] : found->second)
+    if (!hidden_.contains(session)) grids.push_back(chunk.get());
+  return grids.size() < 2 ? nullptr : DisagreementOf(grids);
 }
 
 }  // namespace cairn::server

@@ -2,25 +2,29 @@
 // summed into the cells of one tile, with less weight for those of sessions that have ended (layer_sum.h). The start
 // poses place the robots in one map frame. This class does not publish: Render returns the tiles whose cells changed;
 // epochs, versions and encodings are handled by Site. Invariant: after Render, cells() equals a map that is built from
-// scratch from the same chunks, with the same sessions hidden and ended. Not thread-safe: used on the site's strand
-// only.
+// scratch from the same chunks and edits, with the same sessions hidden and ended. Not thread-safe: used on the site's
+// strand only.
 #pragma once
 
 #include <cstddef>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "common/map/tile.h"
+#include "server/maps/map_edits.h"
 #include "server/maps/robot_grid.h"
+#include "server/maps/tile_pyramid.h"
 #include "server/slam/grid/occupancy_grid.h"
 
 namespace cairn::server {
 
 class JointMap {
  public:
-  using Cells = std::shared_ptr<const TileCells>;
+  using Cells = TilePyramid::Cells;
 
   // `past_probability`: the largest probability that ended sessions give a cell that a later one has seen as well.
   explicit JointMap(double past_probability);
@@ -53,9 +57,20 @@ class JointMap {
   // The sum of the grids of the sessions before this one that are shown, in and around the area of its own grid.
   [[nodiscard]] slam::OccupancyGrid::Chunks DrawnBefore(SessionId session) const;
 
+  // What people have said about the map, in place of what they had said before. It covers the cells, and is not part of
+  // the grids of sessions.
+  void SetEdits(EditOverlay overlay);
+  // Whether a session that is shown has drawn anything.
+  [[nodiscard]] bool drawn() const;
+  // The smallest and the largest place of a tile of level 0 in which they have; nothing where drawn() is false.
+  [[nodiscard]] std::optional<std::pair<slam::ChunkKey, slam::ChunkKey>> DrawnBox() const;
+
   // Updates cells(). Returns the tiles of all levels that changed, were added or were removed.
   std::vector<TileKey> Render();
-  [[nodiscard]] const std::map<TileKey, Cells>& cells() const { return cells_; }
+  [[nodiscard]] const std::map<TileKey, Cells>& cells() const { return sum_.cells(); }
+  // The same of the tiles that say by how much the sessions that are shown differ (layer_disagreement.h).
+  std::vector<TileKey> RenderDisagreement();
+  [[nodiscard]] const std::map<TileKey, Cells>& disagreement() const { return disagreement_.cells(); }
 
  private:
   using Layers = std::map<SessionId, std::shared_ptr<const slam::GridChunk>>;
@@ -63,20 +78,22 @@ class JointMap {
   // Of the sessions that `counts` accepts. Null: they have drawn nothing there.
   template <typename Counts>
   [[nodiscard]] std::shared_ptr<const slam::GridChunk> SumOf(const Layers& layers, const Counts& counts) const;
+  [[nodiscard]] bool IsShown(const Layers& layers) const;
   void MarkChanged(SessionId session);
   void SetPastOrder(const std::vector<SessionId>& in_order);
   void SetLayer(slam::ChunkKey key, SessionId session, std::shared_ptr<const slam::GridChunk> chunk);
-  // Stores the cells if they differ, and returns whether they did. Null means that every cell is unknown.
-  bool Store(TileKey key, Cells cells);
-  Cells Sum(slam::ChunkKey key) const;
-  Cells Reduce(TileKey parent) const;
+  // What the sessions have drawn there, or who is shown, has changed.
+  void Touch(slam::ChunkKey key);
+  [[nodiscard]] Cells Sum(slam::ChunkKey key) const;
+  [[nodiscard]] Cells Disagreement(slam::ChunkKey key) const;
 
   const int most_past_;  // Log odds.
   std::map<slam::ChunkKey, Layers> chunks_;
+  EditOverlay edits_;
   std::set<SessionId> hidden_;
-  std::map<SessionId, std::size_t> past_;  // Sessions that have ended, and how many had before.
-  std::set<slam::ChunkKey> dirty_;
-  std::map<TileKey, Cells> cells_;
+  std::map<SessionId, std::size_t> past_;             // Sessions that have ended, and how many had before.
+  std::set<slam::ChunkKey> dirty_, differing_dirty_;  // To be rendered.
+  TilePyramid sum_, disagreement_;
 };
 
 }  // namespace cairn::server

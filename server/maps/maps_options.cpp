@@ -15,6 +15,8 @@ void Visit(OptionVisitor& visitor, MapsOptions& options) {
   visitor.Real("past_probability", options.past_probability, "", 0.51, 0.999,
                "Largest probability that sessions which have ended give a cell that a later session has seen as well. "
                "Nearer to 1, what was moved between two runs stays in the map for longer.");
+  visitor.Integer("max_edits", options.max_edits, "", 0, 4096,
+                  "Edits by people (cairn map edit) that each site may have at one time. Further ones are refused.");
 }
 
 }  // namespace cairn::server

@@ -1,4 +1,5 @@
-// Options of the joint maps: how often they are published, how many versions are kept, and how much the past counts.
+// Options of the joint maps: how often they are published, how many versions and edits are kept, and how much the
+// past counts.
 #pragma once
 
 #include <cstdint>
@@ -12,6 +13,7 @@ struct MapsOptions {
   std::int64_t max_sites = 64;
   std::int64_t max_versions = 8;
   double past_probability = 0.8;
+  std::int64_t max_edits = 256;
 };
 void Visit(OptionVisitor& visitor, MapsOptions& options);
 

@@ -7,34 +7,10 @@
 #include <exception>
 #include <utility>
 
+#include "server/maps/answer_once.h"
 #include "server/maps/tile_encoding.h"
 
 namespace cairn::server {
-namespace {
-
-// Calls `done` exactly once: with the result, or with an error from the destructor if there was no result
-// because the work ended with an exception.
-class Answer {
- public:
-  explicit Answer(Site::Done done) : done_(std::move(done)) {}
-  Answer(const Answer&) = delete;
-  Answer& operator=(const Answer&) = delete;
-  ~Answer() {
-    if (done_) done_(Fail(StatusCode::kInternal, "internal error of the server; see its log for the cause"));
-  }
-  void Give(Result<std::uint32_t> result) { std::exchange(done_, nullptr)(std::move(result)); }
-
- private:
-  Site::Done done_;
-};
-
-Site::Done Once(Site::Done done) {
-  return [answer = std::make_shared<Answer>(std::move(done))](Result<std::uint32_t> result) {
-    answer->Give(std::move(result));
-  };
-}
-
-}  // namespace
 
 Site::Site(const std::string& name, double resolution_m, const MapsOptions& options, asio::thread_pool& pool,
            Outbound& outbound, Journal* journal, Generation generation, const Beginning& beginning)
@@ -46,6 +22,7 @@ Site::Site(const std::string& name, double resolution_m, const MapsOptions& opti
       strand_(asio::make_strand(pool)),
       journal_(journal),
       joint_(options.past_probability),
+      edits_(resolution_m, static_cast<std::size_t>(options.max_edits)),
       versions_(static_cast<std::size_t>(options.max_versions)),
       epoch_(beginning.epoch),
       tile_version_(beginning.tile_version),
@@ -131,7 +108,8 @@ void Site::AdoptFrame(std::uint64_t map_frame) {
 }
 
 void Site::AddVersion(MapVersion&& version, Done done, Wanted wanted) {
-  Run([version = std::move(version), done = Once(std::move(done)), wanted = std::move(wanted)](Site& site) mutable {
+  Run([version = std::move(version), done = Once<std::uint32_t>(std::move(done)),
+       wanted = std::move(wanted)](Site& site) mutable {
     if (wanted && !wanted()) return done(Fail(StatusCode::kCancelled, "no longer wanted"));
     // A session that has left meanwhile may have no layer of its own any more: the layers stay as they are.
     std::erase_if(version.parts, [&site](const auto& part) {
@@ -145,14 +123,14 @@ void Site::AddVersion(MapVersion&& version, Done done, Wanted wanted) {
       site.RemoveOldVersions();
       site.StoreSite();
     });
-    site.Refresh({}, false);
+    site.Refresh({}, {}, false);
     site.Send();
     done(number);
   });
 }
 
 void Site::Enable(std::uint32_t version, Done done, Wanted wanted) {
-  Run([version, done = Once(std::move(done)), wanted = std::move(wanted)](Site& site) mutable {
+  Run([version, done = Once<std::uint32_t>(std::move(done)), wanted = std::move(wanted)](Site& site) mutable {
     if (wanted && !wanted()) return done(Fail(StatusCode::kCancelled, "no longer wanted"));
     if (site.switch_) {
       return done(Fail(StatusCode::kUnavailable, "another map version is being enabled; try again later"));
@@ -219,35 +197,46 @@ void Site::Probe(std::function<void()> done) {
 }
 
 void Site::Render() {
-  const std::vector<TileKey> changed = joint_.Render();
-  if (!changed.empty() || info_changed_) Refresh(changed, false);
+  const std::vector<TileKey> changed = joint_.Render(), differing = joint_.RenderDisagreement();
+  if (!changed.empty() || !differing.empty() || info_changed_) Refresh(changed, differing, false);
 }
 
 void Site::RenderAll() {
-  Refresh(joint_.Render(), true);
+  const std::vector<TileKey> changed = joint_.Render(), differing = joint_.RenderDisagreement();
+  Refresh(changed, differing, true);
 }
 
-void Site::Refresh(const std::vector<TileKey>& changed, bool all) {
+std::map<TileKey, TileSet::TilePtr> Site::Encoded(const std::vector<TileKey>& changed,
+                                                  const std::map<TileKey, JointMap::Cells>& cells,
+                                                  const TileSet& before, bool all) {
+  std::map<TileKey, TileSet::TilePtr> tiles;
+  for (const TileKey& key : changed) {
+    const auto of_key = cells.find(key);
+    tiles[key] = of_key == cells.end() ? nullptr : EncodeTile(key, *of_key->second, epoch_, tile_version_);
+    ++encoded_;
+  }
+  for (int level = 0; all && level < kPyramidLevels; ++level) {
+    before.ForEach(level, [&](const TileSet::TilePtr& tile) {
+      if (!tiles.contains(tile->key)) tiles[tile->key] = Restamp(*tile, epoch_, tile_version_);
+    });
+  }
+  return tiles;
+}
+
+void Site::Refresh(const std::vector<TileKey>& changed, const std::vector<TileKey>& differing, bool all) {
   const std::shared_ptr<const MapSnapshot> before = snapshot();
   auto after = std::make_shared<MapSnapshot>();
   after->smoothed = versions_.smoothed();
+  after->edits = edits_.all();
+  after->drawn = joint_.drawn();
   if (!changed.empty() || all) {
     ++tile_version_;
     StoreSite();
   }
-  std::map<TileKey, TileSet::TilePtr> tiles;
-  for (const TileKey& key : changed) {
-    const auto cells = joint_.cells().find(key);
-    tiles[key] = cells == joint_.cells().end() ? nullptr : EncodeTile(key, *cells->second, epoch_, tile_version_);
-    ++encoded_;
-  }
-  for (int level = 0; all && level < kPyramidLevels; ++level) {
-    before->tiles.ForEach(level, [&](const TileSet::TilePtr& tile) {
-      if (!tiles.contains(tile->key)) tiles[tile->key] = Restamp(*tile, epoch_, tile_version_);
-    });
-  }
+  const auto tiles = Encoded(changed, joint_.cells(), before->tiles, all);
   for (const auto& [key, tile] : tiles) unsent_.insert(key);
   after->tiles = before->tiles.With(tiles);
+  after->disagreement = before->disagreement.With(Encoded(differing, joint_.disagreement(), before->disagreement, all));
   after->info = InfoOf(after->tiles);
   info_changed_ = true;
   const MutexLock lock(mutex_);
@@ -288,6 +277,7 @@ MapInfo Site::InfoOf(const TileSet& tiles) const {
   info.robots = static_cast<std::uint32_t>(robots.size());
   info.enabled_version = versions_.enabled();
   info.versions = versions_.infos();
+  info.edits_version = edits_.version();
   if (const auto box = tiles.BoxOf(0)) {
     const double tile_m = kTileCells * resolution_m_;
     info.tile_count = static_cast<std::uint32_t>(box->count);

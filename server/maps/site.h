@@ -5,7 +5,7 @@
 // A switch to another map version is atomic for readers. Every session gets a correction through its own
 // queue and continues with its part of that version. Changes that the sessions send meanwhile are stored
 // apart. When all sessions have answered, the whole map changes at once under epoch + 1: every tile is
-// published again, and removed tiles are published as deleted.
+// published again, and removed tiles are published as deleted. What people have said about the map (map_edits.h) stays.
 // Thread rule: any thread may call; the work runs on the site's strand; readers get immutable snapshots. Work
 // that ends with an exception is logged and dropped, and the site continues.
 #pragma once
@@ -29,6 +29,7 @@
 #include "common/service/names.h"
 #include "server/maps/grid_agreement.h"
 #include "server/maps/joint_map.h"
+#include "server/maps/map_edits.h"
 #include "server/maps/map_snapshot.h"
 #include "server/maps/map_versions.h"
 #include "server/maps/maps_options.h"
@@ -95,7 +96,7 @@ class Site : public std::enable_shared_from_this<Site> {
   void AdoptFrame(std::uint64_t map_frame);
   // Others have begun the map: some of it is shown, or a part of it cannot be read or is still being loaded. A robot
   // that does not say where it is must not begin the map anew. Thread rule: any thread.
-  [[nodiscard]] bool begun() const { return lost_part_ || loading_ || snapshot()->info.tile_count > 0; }
+  [[nodiscard]] bool begun() const { return lost_part_ || loading_ || snapshot()->drawn; }
   void LosePart() { lost_part_ = true; }
   // Whether the stored site names the session among those that draw it. Thread rule: any thread, after Restore.
   [[nodiscard]] bool WasDrawnBy(SessionId session) const { return stored_members_.contains(session); }
@@ -126,6 +127,15 @@ class Site : public std::enable_shared_from_this<Site> {
   void AddVersion(MapVersion&& version, Done done, Wanted wanted = {});
   // UNAVAILABLE: another switch is under way. NOT_FOUND: the version does not exist or has been removed.
   void Enable(std::uint32_t version, Done done, Wanted wanted = {});
+  // What a person says about the map (common/map/map_edit.h); `done` receives the edit's number, on the strand.
+  // FAILED_PRECONDITION: nothing is drawn yet, or not near it. NOT_FOUND: the site is deleted. Else errors of
+  // MapEdits::Add.
+  using EditDone = std::function<void(Result<std::uint64_t>)>;
+  void AddEdit(MapEdit&& edit, EditDone done);
+  // `done` receives the number of this change. NOT_FOUND: there is no such edit, or the site is deleted.
+  void RemoveEdit(std::uint64_t id, EditDone done);
+  // A robot is about to begin the map. Where nothing is drawn, edits belong to a map that is gone, and are removed.
+  void ForgetEditsOfLostMap();
   // Renders and publishes what changed, soon; does nothing where an earlier call still waits for the strand. Then calls
   // `then`, if there is one.
   void Publish(std::function<void()> then = {});
@@ -162,7 +172,14 @@ class Site : public std::enable_shared_from_this<Site> {
   void CommitIfComplete();
   void Render();
   void RenderAll();
-  void Refresh(const std::vector<TileKey>& changed, bool all);
+  // Stores what people have said about the map, and publishes it. Returns its version.
+  std::uint64_t ShowEdits();
+  [[nodiscard]] Result<void> CheckNear(const MapEdit& edit) const;
+  // `differing`: changed tiles of the layer of disagreement. `all`: those that did not change get the new epoch, too.
+  void Refresh(const std::vector<TileKey>& changed, const std::vector<TileKey>& differing, bool all);
+  [[nodiscard]] std::map<TileKey, TileSet::TilePtr> Encoded(const std::vector<TileKey>& changed,
+                                                            const std::map<TileKey, JointMap::Cells>& cells,
+                                                            const TileSet& before, bool all);
   void Send();
   void StoreSite();
   void StoreVersion(std::uint32_t version);
@@ -192,6 +209,7 @@ class Site : public std::enable_shared_from_this<Site> {
   Journal* journal_;  // Null where nothing is stored.
   bool retired_ = false;
   JointMap joint_;
+  MapEdits edits_;
   MapVersions versions_;
   std::uint32_t epoch_ = 0;
   std::uint64_t tile_version_ = 0;

@@ -75,7 +75,9 @@ void Site::StoreSite() {
                     .fragments = joint_.hidden(),
                     .past = joint_.past(),
                     .merged = merged_,
-                    .map_frame = map_frame_};
+                    .map_frame = map_frame_,
+                    .edits = *edits_.all(),
+                    .edits_version = edits_.version()};
   for (const auto& [session, member] : members_) stored.members[member.robot] = session;  // The last one.
   Put({RecordKind::kSite, site_id_, 0}, [stored = std::move(stored)] { return BytesOf(stored); });
 }
@@ -115,6 +117,9 @@ Result<void> Site::Restore(const StoredSite& stored, StartControl& control) {
   for (const SessionId session : stored.fragments) joint_.SetHidden(session, true);
   for (const SessionId session : stored.past) joint_.SetPast(session);
   merged_ = stored.merged;
+  const std::size_t left_out = edits_.Restore(stored.edits, stored.edits_version, [&control] { control.Advance(); });
+  if (left_out > 0) spdlog::error("site {}: {} edits of its map cover too much and are left out", name_, left_out);
+  joint_.SetEdits(edits_.overlay());
   for (const auto& [robot, session] : stored.members) stored_members_.insert(session);
   if (auto restored = RestoreVersions(stored, control); !restored) return restored;
   if (auto restored = RestoreLayers(control); !restored) return restored;

@@ -76,6 +76,10 @@ Reply AnswerPose(const Request& request, const Sessions& sessions) {
   reply.map_epoch = newest.map_epoch;
   if (request.latest || request.stamp == newest.stamp) {
     reply.poses.push_back(newest);
+    if (request.latest && newest.localized) reply.hypotheses = session.hypotheses;
+    // None are known since the server was started, or since the map has moved.
+    if (request.latest && newest.localized && reply.hypotheses.empty())
+      reply.hypotheses = {{newest.stamp, newest.T_map_robot, 1.0}};
     return reply;
   }
   if (request.stamp < path.first_stamp()) {
@@ -151,9 +155,12 @@ Answer AnswerTiles(const Request& request, const Maps& maps, Generation generati
   reply.map_epoch = map.info.epoch;
   reply.map_version = map.info.version;
   const int level = static_cast<int>(request.level);
-  const bool all = request.since_generation != generation || request.since_epoch != map.info.epoch;
+  // Versions are those of the map. The layer of disagreement may change without it.
+  const bool all =
+      request.disagreement || request.since_generation != generation || request.since_epoch != map.info.epoch;
   std::vector<std::shared_ptr<const Tile>> tiles;
-  map.tiles.ForEach(level, [&](const std::shared_ptr<const Tile>& tile) {
+  const TileSet& layer = request.disagreement ? map.disagreement : map.tiles;
+  layer.ForEach(level, [&](const std::shared_ptr<const Tile>& tile) {
     if (!all && tile->version <= request.since_version) return;
     if (Overlap(request.area, AreaOf(tile->key, map.info.resolution_m))) tiles.push_back(tile);
   });
@@ -168,6 +175,13 @@ Reply AnswerMapInfo(const Request& request, const Maps& maps) {
     reply.map_epoch = maps.front()->info.epoch;
     reply.map_version = maps.front()->info.version;
   }
+  return reply;
+}
+
+Reply AnswerMapEdits(const Request& request, const Maps& maps) {
+  if (maps.empty()) return NoSite(request);
+  Reply reply = ReplyTo(request);
+  reply.edits = *maps.front()->edits;
   return reply;
 }
 

@@ -21,7 +21,7 @@ using Maps = std::vector<std::shared_ptr<const MapSnapshot>>;
 // An answer without content. Every other answer starts from it.
 [[nodiscard]] Reply ReplyTo(const Request& request, Status status = {});
 
-// The newest pose of the robot, or its pose at a stamp, interpolated between the two nearest poses.
+// The newest pose of the robot and its hypotheses, or its pose at a stamp, interpolated between the two nearest poses.
 // UNAVAILABLE: the pose may exist later (no scan has been used, or the stamp is after the newest pose of a
 // running session). OUT_OF_RANGE: the pose will never exist (the stamp is before the first pose, or after the
 // last pose of an ended session). `sessions`: the robot's session, if any.
@@ -40,14 +40,17 @@ using Maps = std::vector<std::shared_ptr<const MapSnapshot>>;
 // INVALID_ARGUMENT: the area is not valid. `sessions`: all sessions; `maps`: the map of the site, if any.
 [[nodiscard]] Reply AnswerLandmarks(const Request& request, const Sessions& sessions, const Maps& maps);
 
-// The tiles of a level in an area that changed since a version. An area of all zeros means everywhere. If
-// since_epoch is not the map's epoch, or since_generation not the server's `generation`, the client's tiles are no
-// longer valid, and all tiles of the area are sent. INVALID_ARGUMENT: the level or the area is not valid. `maps`: the
-// map of the site, if any.
+// The tiles of a level of the map, or of the layer of disagreement, in an area that changed since a version. An area of
+// all zeros means everywhere. If since_epoch is not the map's epoch, or since_generation not the server's `generation`,
+// the client's tiles are no longer valid, and all tiles of the area are sent. INVALID_ARGUMENT: the level or the area
+// is not valid. `maps`: the map of the site, if any.
 [[nodiscard]] Answer AnswerTiles(const Request& request, const Maps& maps, Generation generation);
 
 // The state and the versions of a site's map, or of all maps. `maps`: all maps, or the site's if the request
 // names a site.
 [[nodiscard]] Reply AnswerMapInfo(const Request& request, const Maps& maps);
+
+// What people have said about a site's map. `maps`: the map of the site, if any.
+[[nodiscard]] Reply AnswerMapEdits(const Request& request, const Maps& maps);
 
 }  // namespace cairn::server

@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <chrono>
 #include <exception>
 #include <stdexcept>
 #include <utility>
@@ -143,6 +144,11 @@ std::optional<Answer> Desk::AnswerTo(const Request& request) {
       });
     case RequestKind::kMapEnable:
       return EnableMap(request);
+    case RequestKind::kMapEdits:
+      return AnswerMapEdits(request, MapOf(request.site));
+    case RequestKind::kMapEditAdd:
+    case RequestKind::kMapEditRemove:
+      return EditMap(request);
     case RequestKind::kSavedList:
     case RequestKind::kSiteSave:
     case RequestKind::kSiteLoad:
@@ -181,6 +187,11 @@ void Desk::SetRefusals(const Refusals& refusals) {
   refusals_ = refusals;
 }
 
+void Desk::SetLoad(const ServerLoad& load) {
+  const MutexLock lock(mutex_);
+  load_ = load;
+}
+
 void Desk::SetRos2(Ros2Report&& report) {
   const MutexLock lock(mutex_);
   ros2_ = std::move(report);
@@ -199,6 +210,7 @@ Reply Desk::StatusReply(const Request& request) {
   if (reply.status.ok() && journal_ != nullptr) reply.status.message = WhyDegraded(*journal_);
   const MutexLock lock(mutex_);
   reply.refused = {refusals_};
+  reply.load = {load_};
   return reply;
 }
 
@@ -215,6 +227,30 @@ std::optional<Answer> Desk::EnableMap(const Request& request) {
     if (enabled) spdlog::info("site {}: map version {} is enabled", request.site, *enabled);
     answers->Send(request, std::move(reply));
   });
+  return std::nullopt;
+}
+
+std::optional<Answer> Desk::EditMap(const Request& asked) {
+  const auto site = atlas_.Find(asked.site);
+  if (site == nullptr) return ReplyTo(asked, {StatusCode::kNotFound, "no site '" + asked.site + "'"});
+  Request request = asked;
+  request.edit.made =
+      std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch()).count();
+  const auto answer = [answers = answers_, request](Result<std::uint64_t> edited) {
+    Reply reply = ReplyTo(request, edited ? Status{} : edited.error());
+    if (!edited) return answers->Send(request, std::move(reply));
+    const bool added = request.kind == RequestKind::kMapEditAdd;
+    spdlog::info("site {}: edit {} of the map is {}", request.site, added ? *edited : request.edit.id,
+                 added ? "made" : "removed");
+    if (added) reply.edits = {request.edit};
+    if (added) reply.edits.front().id = *edited;
+    answers->Send(request, std::move(reply));
+  };
+  if (request.kind == RequestKind::kMapEditRemove) {
+    site->RemoveEdit(request.edit.id, answer);
+  } else {
+    site->AddEdit(MapEdit(request.edit), answer);
+  }
   return std::nullopt;
 }
 

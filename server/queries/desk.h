@@ -36,6 +36,7 @@ class Desk {
   void Take(Request&& request);
   // What the next answers about the status say. From any thread.
   void SetRefusals(const Refusals& refusals);
+  void SetLoad(const ServerLoad& load);
   void SetRos2(Ros2Report&& report);
   // Answers the waiting requests, then returns.
   void Stop();
@@ -52,6 +53,7 @@ class Desk {
   std::optional<Answer> AnswerTo(const Request& request);
   Result<Job> SubmitJob(const Request& request);
   std::optional<Answer> EnableMap(const Request& request);
+  std::optional<Answer> EditMap(const Request& request);
   // Where the order is taken, the answer is sent when it is on the disk.
   template <typename Give>
   std::optional<Answer> Order(const Request& request, const Give& give);
@@ -72,6 +74,7 @@ class Desk {
   Journal* const journal_;  // Null if nothing is stored.
   Mutex mutex_;
   Refusals refusals_ CAIRN_GUARDED_BY(mutex_);
+  ServerLoad load_ CAIRN_GUARDED_BY(mutex_);
   Ros2Report ros2_ CAIRN_GUARDED_BY(mutex_);
   RequestQueue requests_;
   const std::shared_ptr<CommandAnswers> answers_;

@@ -37,6 +37,10 @@ std::size_t BytesOf(const Ros2Namespace& name_space) {
   return bytes;
 }
 
+std::size_t BytesOf(const MapEdit& edit) {
+  return 96 + edit.note.size() + 16 * edit.points_map.size();
+}
+
 template <typename Item>
 Item Content(Item&& item) {
   return std::forward<Item>(item);
@@ -98,6 +102,7 @@ ReplyParts::ReplyParts(Answer&& answer)
   items_.jobs = std::exchange(header_.jobs, {});
   items_.saved = std::exchange(header_.saved, {});
   items_.ros2_namespaces = std::exchange(header_.ros2_namespaces, {});
+  items_.edits = std::exchange(header_.edits, {});
 }
 
 std::optional<Reply> ReplyParts::Next() {
@@ -115,7 +120,8 @@ bool ReplyParts::Fill(Reply& part) {
          full.Take(tiles_, taken_.tiles, part.tiles) && full.Take(items_.landmarks, taken_.landmarks, part.landmarks) &&
          full.Take(items_.maps, taken_.maps, part.maps) && full.Take(items_.robots, taken_.robots, part.robots) &&
          full.Take(items_.jobs, taken_.jobs, part.jobs) && full.Take(items_.saved, taken_.saved, part.saved) &&
-         full.Take(items_.ros2_namespaces, taken_.ros2_namespaces, part.ros2_namespaces);
+         full.Take(items_.ros2_namespaces, taken_.ros2_namespaces, part.ros2_namespaces) &&
+         full.Take(items_.edits, taken_.edits, part.edits);
 }
 
 }  // namespace cairn::server

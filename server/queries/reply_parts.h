@@ -64,7 +64,7 @@ class ReplyParts {
   Reply items_;   // Only the lists of it are used.
   struct {
     std::size_t poses = 0, tiles = 0, landmarks = 0, maps = 0, robots = 0, jobs = 0, saved = 0;
-    std::size_t ros2_namespaces = 0;
+    std::size_t ros2_namespaces = 0, edits = 0;
   } taken_;  // Items in the parts so far.
   bool done_ = false;
 };

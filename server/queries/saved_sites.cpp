@@ -10,6 +10,7 @@
 #include <memory>
 #include <set>
 #include <system_error>
+#include <thread>
 #include <utility>
 
 #include "server/queries/answers.h"
@@ -32,6 +33,7 @@ class AtTheEnd {
 constexpr const char* kExtension = ".site";
 constexpr std::size_t kMostListed = 4096;
 constexpr auto kLook = std::chrono::milliseconds(50);  // How often a wait checks whether the server stops.
+constexpr auto kPatience = std::chrono::seconds(3);    // For a disk that fails, and that may work again.
 
 Stamp ModifiedAt(const std::filesystem::path& path) {
   std::error_code error;
@@ -145,19 +147,36 @@ Result<std::filesystem::path> SavedSites::PathOf(const std::string& name) const 
   return directory_ / (name + kExtension);
 }
 
+Result<void> SavedSites::AwaitDisk() const {
+  for (const auto asked = std::chrono::steady_clock::now();; std::this_thread::sleep_for(kLook)) {
+    const JournalHealth health = journal_->health();
+    if (!health.disk_fails && !health.disk_hangs) return {};
+    if (stopping_) return Fail(StatusCode::kUnavailable, "the server is stopping");
+    if (std::chrono::steady_clock::now() - asked >= kPatience) return Fail(StatusCode::kUnavailable, health.reason);
+  }
+}
+
 template <typename Value>
 Result<Value> SavedSites::Between(std::function<Result<Value>(Store&)> work) {
-  const auto promise = std::make_shared<std::promise<Result<Value>>>();
-  auto answer = promise->get_future();
-  journal_->Between([promise, work = std::move(work)](Store& store) {
+  if (auto works = AwaitDisk(); !works) return tl::unexpected(works.error());
+  struct Call {
+    std::atomic<bool> begun{false};  // Or given up: the work is done once or never.
+    std::promise<Result<Value>> promise;
+  };
+  const auto call = std::make_shared<Call>();
+  auto answer = call->promise.get_future();
+  journal_->Between([call, work = std::move(work)](Store& store) {
+    if (call->begun.exchange(true)) return;
     try {
-      promise->set_value(work(store));
+      call->promise.set_value(work(store));
     } catch (...) {  // No exception may reach the journal; it goes on in the thread that waits.
-      promise->set_exception(std::current_exception());
+      call->promise.set_exception(std::current_exception());
     }
   });
   while (answer.wait_for(kLook) != std::future_status::ready) {
     if (stopping_) return Fail(StatusCode::kUnavailable, "the server is stopping");
+    // The work waits for what came before it, which a disk that fails may not take for hours.
+    if (auto works = AwaitDisk(); !works && !call->begun.exchange(true)) return tl::unexpected(works.error());
   }
   return answer.get();
 }
@@ -271,6 +290,8 @@ Result<void> SavedSites::Delete(const std::string& name) {
                 "job " + std::to_string(job.id) + " of site '" + name + "' has not ended; cancel it first");
   }
   if (rooms_.atlas.IsSetAside(name)) return DeleteSetAside(name);
+  // Nothing is deleted in part where the disk is known to fail.
+  if (auto works = AwaitDisk(); !works) return works;
   const auto site = rooms_.roster.RemoveSite(name);
   if (!site) return tl::unexpected(site.error());
   rooms_.jobs.RemoveSite(name);

@@ -42,8 +42,6 @@ class SavedSites {
   void Take(Request&& request);
   // Does not wait for a request that waits for the disk.
   void Stop();
-  // Thread rule: any thread.
-  [[nodiscard]] Pulse pulse() const { return {requests_.taken(), requests_.size() > 0}; }
 
  private:
   static constexpr std::size_t kCapacity = 16;
@@ -59,7 +57,9 @@ class SavedSites {
   Result<void> DeleteSetAside(const std::string& site);
   Result<bool> DeleteStored(const std::string& site);
   [[nodiscard]] Result<std::filesystem::path> PathOf(const std::string& name) const;
-  // Calls `work` between two commits of the journal, and waits for it.
+  // Waits for a disk that fails, for a few seconds. UNAVAILABLE, with the reason: it goes on failing.
+  Result<void> AwaitDisk() const;
+  // Calls `work` between two commits of the journal, and waits for it, or until the disk has failed for some seconds.
   template <typename Value>
   Result<Value> Between(std::function<Result<Value>(Store&)> work);
 

@@ -52,8 +52,14 @@ class CheckpointPace {
     refused_ = 0;
     work_ = next_try_ = Time{0};
   }
-  // The one on the disk, which the session was restored from. What was processed since then counts as work.
-  void RestoredFrom(std::uint64_t position) { newest_ = position; }
+  // The one on the disk, which the session was restored from. What was processed since then counts as work. Unless it
+  // was little, the next checkpoint is due at once: a server that is killed again and again soon after its starts would
+  // otherwise repeat more and more work at each of them.
+  void RestoredFrom(std::uint64_t position) {
+    constexpr int kLittle = 4;  // Part of the work after which a checkpoint is due anyway.
+    newest_ = position;
+    if (work_ >= limits_.work / kLittle) work_ = std::max(work_, limits_.work);
+  }
 
  private:
   const Limits limits_;

@@ -17,8 +17,8 @@ struct RobotsOptions {
   double suspended_expiry_s = 86400.0;
   double ledger_rate_hz = 10.0;
   double gap_wait_s = 10.0;
-  std::int64_t checkpoint_entries = 1500;
-  double checkpoint_work_s = 0.15;
+  std::int64_t checkpoint_entries = 2500;
+  double checkpoint_work_s = 0.2;
 };
 void Visit(OptionVisitor& visitor, RobotsOptions& options);
 

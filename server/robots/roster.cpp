@@ -240,8 +240,7 @@ Result<void> Roster::Localise(const std::string& robot, bool only, const std::sh
   if (!only) return (*session)->MapAgain(receipt);
   const auto site = atlas_.Find((*session)->record().state().site);
   const auto map = site != nullptr ? site->snapshot() : nullptr;
-  if (map == nullptr || !map->tiles.BoxOf(0))
-    return Fail(StatusCode::kNotFound, "nothing is drawn in the map of its site");
+  if (map == nullptr || !map->drawn) return Fail(StatusCode::kNotFound, "nothing is drawn in the map of its site");
   return (*session)->Localise(map, receipt);
 }
 

@@ -38,6 +38,7 @@ Result<void> Roster::Open(const SessionRequest& request) {
     stored.map_epoch = site->snapshot()->info.epoch;
     stored.map_begun = HasBegun(request.site, *site, gone.get());
     stored.fragment = BeginsFragment(request, *site, stored.map_begun);
+    if (!stored.fragment && !site->begun()) site->ForgetEditsOfLostMap();
     // The first that comes back after the state was lost: the others know their places in the same map.
     const bool elsewhere = request.has_start && request.map_frame != 0 && request.map_frame != site->map_frame();
     if (elsewhere && !stored.fragment && mapper_.filter.kind != slam::FilterKind::kLineMatch) {

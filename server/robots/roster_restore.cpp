@@ -5,7 +5,9 @@
 #include <asio/post.hpp>
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <latch>
+#include <map>
 #include <set>
 #include <utility>
 
@@ -35,6 +37,16 @@ constexpr std::uint64_t kMostReprocessed = 100'000;
 constexpr const char* kRestoringNote = "crashed-session";
 constexpr const char* kDrivingNote = "crashed-driving";
 
+// Indices of the sessions, that with the longest journal to process again first: at the end all threads have work.
+std::vector<std::size_t> LongestFirst(Store& store, const std::vector<SessionId>& ids) {
+  std::multimap<std::uint64_t, std::size_t, std::greater<>> by_length;
+  for (std::size_t i = 0; i < ids.size(); ++i)
+    by_length.emplace(EntriesAfterCheckpoint(store, ids[i]).value_or(0), i);  // Reading it will tell the error.
+  std::vector<std::size_t> indices(ids.size());
+  std::ranges::transform(by_length, indices.begin(), &decltype(by_length)::value_type::second);
+  return indices;
+}
+
 std::int64_t SecondsSince1970() {
   return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
@@ -48,7 +60,7 @@ tl::unexpected<Status> GivenUp() {
 std::vector<Roster::RestoredSession> Roster::RestoreEach(const std::vector<SessionId>& ids, const Restoring& how) {
   std::vector<RestoredSession> sessions(ids.size(), Fail(StatusCode::kInternal, "not restored"));
   std::latch done(static_cast<std::ptrdiff_t>(ids.size()));
-  for (std::size_t i = 0; i < ids.size(); ++i) {
+  for (const std::size_t i : LongestFirst(journal_->store(), ids)) {
     asio::post(pool_, [&, i] {
       sessions[i] = RestoreOne(ids[i], how);
       how.control.Advance();

@@ -154,6 +154,7 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   struct KnownMap {
     std::uint32_t epoch = 0;
     std::uint64_t version = 0;
+    std::uint64_t edits_version = 0;
     SessionRecord::Clock::time_point given{};
   };
   Mutex known_map_mutex_;

@@ -1,16 +1,21 @@
 #include "server/robots/session_estimator.h"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 #include <variant>
 
+#include "server/maps/localising_tiles.h"
 #include "server/maps/stored_grid.h"
+#include "server/robots/most_believed.h"
 
 namespace cairn::server {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
+// How often the poses of the particles are summed up for queries.
+constexpr std::uint64_t kHypothesesPeriod_ns = kNanosPerSecond / 2;
 // How often landmarks are copied for queries: a landmark hardly moves in less time.
 constexpr auto kLandmarkPeriod = std::chrono::milliseconds(500);
 
@@ -156,6 +161,7 @@ void SessionEstimator::Used(const Scan& scan, const slam::ScanOutcome& outcome) 
     if (!change.chunks.empty()) outputs_.grid_changed(std::move(change));
     RefreshLandmarks(false);
   }
+  if (!replaying_) RefreshHypotheses(report, known_epoch.has_value());
 }
 
 void SessionEstimator::Dropped(const Scan& scan, DropReason reason) {
@@ -181,6 +187,20 @@ void SessionEstimator::RefreshLandmarks(bool at_once) {
   landmarks_refreshed_ = now;
   if (fragment_) return record_.SetLandmarks({});  // They lie in a frame of their own.
   record_.SetLandmarks(ReportsOf(pipeline_.mapper().landmarks(), identity_.status.session.robot));
+}
+
+void SessionEstimator::RefreshHypotheses(const PoseReport& report, bool in_known_map) {
+  // By the robot's clock, which may be set back.
+  const auto [earlier, later] = std::minmax(report.stamp, hypotheses_refreshed_);
+  if (NanosBetween(earlier, later) < kHypothesesPeriod_ns) return;
+  hypotheses_refreshed_ = report.stamp;
+  std::vector<PoseHypothesis> hypotheses;
+  if (report.localized) {
+    // A robot that is only localised has one hypothesis: its filter stays where it stopped mapping.
+    hypotheses = in_known_map ? std::vector<PoseHypothesis>{{report.stamp, report.T_map_robot, 1.0}}
+                              : MostBelieved(pipeline_.mapper().belief(report.T_map_robot), report.stamp);
+  }
+  record_.SetHypotheses(std::move(hypotheses));
 }
 
 void SessionEstimator::On(Correction&& correction) {
@@ -273,7 +293,7 @@ void SessionEstimator::On(LocaliseWanted&& wanted) {
   if (wanted.map != nullptr) {
     taken.resolution_m = wanted.map->info.resolution_m;
     taken.epoch = wanted.map->info.epoch;
-    wanted.map->tiles.ForEach(0, [&taken](const std::shared_ptr<const Tile>& tile) { taken.tiles.push_back(tile); });
+    taken.tiles = TilesToLocaliseIn(*wanted.map);
   }
   Store(taken);
   if (Localise(std::move(taken)) && wanted.receipt) wanted.receipt->Taken();

@@ -118,6 +118,8 @@ class SessionEstimator {
   GridChange TakeGridChange();
   slam::OccupancyGrid::Chunks PublishedChunks();
   void RefreshLandmarks(bool at_once);
+  // `in_known_map`: the robot is only localised.
+  void RefreshHypotheses(const PoseReport& report, bool in_known_map);
   void Store(JournalEntry entry);
   [[nodiscard]] SessionRecord::WaitingScans WaitingBySensor() const;
   void ReplayOdometry(const OdometryTaken& odometry);
@@ -145,6 +147,7 @@ class SessionEstimator {
   SessionToken session_ = 0;                          // The session of the last sample.
   std::unordered_map<const Scan*, Waiting> waiting_;  // Scans inside the pipeline; its pairing bounds them.
   std::chrono::steady_clock::time_point landmarks_refreshed_{};
+  Stamp hypotheses_refreshed_ = 0;
   slam::ScanPipeline pipeline_;
 };
 

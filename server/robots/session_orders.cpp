@@ -6,7 +6,9 @@
 namespace cairn::server {
 namespace {
 
-constexpr std::chrono::minutes kMapPeriod{10};  // A robot that is only localised gets a map that others draw so often.
+// How often a robot that is only localised gets a map that others draw, or that people edit.
+constexpr std::chrono::minutes kDrawnPeriod{10};
+constexpr std::chrono::seconds kEditedPeriod{10};
 
 tl::unexpected<Status> TooMany() {
   return cairn::Fail(StatusCode::kResourceExhausted, "too many commands wait for the robot's estimator");
@@ -49,7 +51,7 @@ Result<void> Session::Relocalise(const std::optional<Pose2>& T_map_robot, std::s
 
 Result<void> Session::Localise(std::shared_ptr<const MapSnapshot> map, std::shared_ptr<Receipt> receipt) {
   if (ending_) return cairn::Fail(StatusCode::kFailedPrecondition, "the session has ended");
-  const KnownMap known{map->info.epoch, map->info.version, SessionRecord::Clock::now()};
+  const KnownMap known{map->info.epoch, map->info.version, map->info.edits_version, SessionRecord::Clock::now()};
   const MutexLock lock(known_map_mutex_);
   if (!queue_.Push(LocaliseWanted{std::move(map), false, std::move(receipt)})) return TooMany();
   known_map_ = known;
@@ -74,10 +76,12 @@ void Session::KeepUpWith(const std::shared_ptr<const MapSnapshot>& map) {
   const auto now = SessionRecord::Clock::now();
   const MutexLock lock(known_map_mutex_);
   const bool moved = !known_map_ || known_map_->epoch != map->info.epoch;
-  const bool drawn = known_map_ && known_map_->version != map->info.version && now - known_map_->given > kMapPeriod;
-  if (!moved && !drawn) return;
+  const auto since = known_map_ ? now - known_map_->given : now.time_since_epoch();
+  const bool drawn = since > kDrawnPeriod && known_map_ && known_map_->version != map->info.version;
+  const bool edited = since > kEditedPeriod && known_map_ && known_map_->edits_version != map->info.edits_version;
+  if (!moved && !drawn && !edited) return;
   if (!queue_.Push(LocaliseWanted{map, true})) return;  // The next call tries again.
-  known_map_ = {map->info.epoch, map->info.version, now};
+  known_map_ = {map->info.epoch, map->info.version, map->info.edits_version, now};
   Schedule();
 }
 

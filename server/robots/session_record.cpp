@@ -197,6 +197,11 @@ void SessionRecord::SetLandmarks(std::vector<LandmarkReport> landmarks) {
   landmarks_.swap(shared);
 }
 
+void SessionRecord::SetHypotheses(std::vector<PoseHypothesis> hypotheses) {
+  const MutexLock lock(mutex_);
+  hypotheses_ = std::move(hypotheses);
+}
+
 void SessionRecord::SetJoining(const Joining& joining) {
   const MutexLock lock(mutex_);
   joining_ = joining;
@@ -226,6 +231,7 @@ void SessionRecord::MoveLast(const Pose2& T_new_old) {
   Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
   R.topLeftCorner<2, 2>() = T_new_old.rotation();
   const MutexLock lock(mutex_);
+  hypotheses_.clear();
   PoseReport& pose = status_.pose;
   pose.T_map_robot = T_new_old * pose.T_map_robot;
   pose.T_map_odom = T_new_old * pose.T_map_odom;
@@ -234,6 +240,7 @@ void SessionRecord::MoveLast(const Pose2& T_new_old) {
 
 void SessionRecord::LoseLast() {
   const MutexLock lock(mutex_);
+  hypotheses_.clear();
   if (!status_.pose.localized) return;
   status_.pose.localized = false;
   status_.pose.reason = PoseReason::kLost;
@@ -368,7 +375,8 @@ std::uint32_t SessionRecord::epoch() const {
 
 SessionSnapshot SessionRecord::snapshot() const {
   const MutexLock lock(mutex_);
-  SessionSnapshot snapshot{.id = id_, .status = status_, .path = history_.view(), .landmarks = landmarks_};
+  SessionSnapshot snapshot{
+      .id = id_, .status = status_, .path = history_.view(), .landmarks = landmarks_, .hypotheses = hypotheses_};
   snapshot.status.session = StateNow();
   for (const auto& [sensor_id, stream] : streams_) snapshot.status.ledgers.push_back(LedgerOf(stream));
   return snapshot;

@@ -88,6 +88,7 @@ class SessionRecord {
   [[nodiscard]] std::vector<std::string> sensors() const;
 
   void SetLandmarks(std::vector<LandmarkReport> landmarks);
+  void SetHypotheses(std::vector<PoseHypothesis> hypotheses);
   // Whether the robot is not joined with the map of its site, and how far it has driven since it began, or since it was
   // taken out of the map.
   struct Joining {
@@ -182,6 +183,7 @@ class SessionRecord {
   Joining joining_ CAIRN_GUARDED_BY(mutex_);
   bool localises_ CAIRN_GUARDED_BY(mutex_) = false;
   std::shared_ptr<const std::vector<LandmarkReport>> landmarks_ CAIRN_GUARDED_BY(mutex_);
+  std::vector<PoseHypothesis> hypotheses_ CAIRN_GUARDED_BY(mutex_);
 };
 
 }  // namespace cairn::server

@@ -16,6 +16,7 @@ struct SessionSnapshot {
   RobotStatus status;
   PathView path;  // Online poses, one per scan used, as published.
   std::shared_ptr<const std::vector<LandmarkReport>> landmarks;
+  std::vector<PoseHypothesis> hypotheses;  // The most believed first; of half a second of scans ago at most.
 };
 
 }  // namespace cairn::server

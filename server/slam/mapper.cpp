@@ -237,6 +237,15 @@ std::vector<Landmark> Mapper::landmarks() const {
   return state_->filter->landmarks();
 }
 
+std::vector<WeightedPose> Mapper::belief(const Pose2& T_map_robot) const {
+  // The filter may be at the last keyframe, from which the front end has followed the robot on. So each hypothesis goes
+  // on from its own pose by the same motion.
+  const Pose2 T_filter_robot = Between(state_->filter->estimate().T_map_robot, T_map_robot);
+  std::vector<WeightedPose> belief = state_->filter->belief();
+  for (WeightedPose& pose : belief) pose.T_map_robot = pose.T_map_robot * T_filter_robot;
+  return belief;
+}
+
 std::size_t Mapper::keyframe_count() const {
   return state_->trail.size();
 }

@@ -73,6 +73,9 @@ class Mapper {
   [[nodiscard]] OccupancyGrid::Chunks ShareGrid();
   [[nodiscard]] OccupancyGrid::Change TakeGridChange();
   [[nodiscard]] std::vector<Landmark> landmarks() const;  // The landmarks of the best hypothesis.
+  // The poses of all hypotheses of the filter, with weights, where its estimate is `T_map_robot`. Only for a robot that
+  // is localized in the map that it draws.
+  [[nodiscard]] std::vector<WeightedPose> belief(const Pose2& T_map_robot) const;
   // The keyframes that are kept, and all that there have been.
   [[nodiscard]] std::size_t keyframe_count() const;
   [[nodiscard]] std::uint64_t keyframes_made() const;

@@ -37,7 +37,7 @@ struct Mapper::State {
         loops(given.loop, given.front_end.refine),
         self_check(given.self_check),
         recovery(given.recovery, given.loop, given.self_check, given.front_end.refine, given.front_end.surface,
-                 given.blind, given.lost_after_m),
+                 given.blind, given.front_end.use_odometry, given.lost_after_m),
         drawing(given.grid) {}
 
   void Begin(ScanStep step) const { slam::Begin(front_end.watch(), step); }

@@ -193,6 +193,15 @@ class CheckpointReader {
 
 }  // namespace
 
+// A newer one that is not complete has no head yet.
+Result<std::uint64_t> PositionOfCheckpoint(Store& store, std::uint64_t session) {
+  const auto numbers = store.Numbers(Range(session, 0, kFirstPiece - 1));
+  if (!numbers) return tl::unexpected(numbers.error());
+  const auto is_head = [](std::uint64_t number) { return number % kParts == 0; };
+  const auto newest = std::ranges::find_if(numbers->rbegin(), numbers->rend(), is_head);
+  return newest == numbers->rend() ? 0 : *newest / kParts;
+}
+
 Result<std::optional<StoredCheckpoint>> ReadCheckpoint(Store& store, std::uint64_t session) {
   CheckpointReader reader;
   const auto take = [&reader](std::uint64_t number, std::string&& bytes) {

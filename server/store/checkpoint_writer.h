@@ -92,6 +92,8 @@ struct StoredCheckpoint {
 
   [[nodiscard]] std::vector<std::string_view> PiecesInOrder() const;
 };
+// Its position. 0: there is none. Its content is not read.
+[[nodiscard]] Result<std::uint64_t> PositionOfCheckpoint(Store& store, std::uint64_t session);
 // DATA_LOSS: it is damaged, or a part of it is missing.
 [[nodiscard]] Result<std::optional<StoredCheckpoint>> ReadCheckpoint(Store& store, std::uint64_t session);
 

@@ -294,10 +294,18 @@ JournalHealth Journal::health() const {
   const std::string omitted = omitted_.empty() ? std::string() : kTooSlow;
   const bool hangs = asking_since_ && Clock::now() - *asking_since_ > kLongestAnswer;
   const std::string hanging = hangs ? kHangs : std::string();
-  for (const std::string& reason : {disk_fault_, hanging, left_out_, omitted, lost, checkpoint_fault_})
-    if (!reason.empty())
-      return {.degraded = true, .reason = reason, .disk_fails = !disk_fault_.empty(), .over_budget = over_budget_};
-  return {.degraded = false, .reason = {}, .disk_fails = false, .over_budget = over_budget_};
+  JournalHealth health{.degraded = false,
+                       .reason = {},
+                       .disk_fails = !disk_fault_.empty(),
+                       .disk_hangs = hangs,
+                       .over_budget = over_budget_};
+  for (const std::string& reason : {disk_fault_, hanging, left_out_, omitted, lost, checkpoint_fault_}) {
+    if (reason.empty()) continue;
+    health.degraded = true;
+    health.reason = reason;
+    break;
+  }
+  return health;
 }
 
 JournalCounts Journal::counts() const {

@@ -43,6 +43,7 @@ struct JournalHealth {
   bool degraded = false;
   std::string reason;
   bool disk_fails = false;   // The last commit failed.
+  bool disk_hangs = false;   // The disk has not answered for seconds.
   bool over_budget = false;  // The store is larger than store.max_gib, and everything in it is needed.
 };
 
@@ -51,6 +52,7 @@ struct JournalCounts {
   std::uint64_t commits = 0;
   std::uint64_t entries = 0;
   std::uint64_t failed_commits = 0;
+  std::uint64_t store_bytes = 0;  // What the records took when the budget was last checked.
   // From the arrival of the oldest change of a group until it was on the disk, over the last 4,096 groups.
   double delay_p50_ms = 0.0;
   double delay_p99_ms = 0.0;
@@ -202,6 +204,7 @@ class Journal {
   class Asking;
   void RemovePiece() CAIRN_EXCLUDES(mutex_);
   std::optional<Group> Next(const std::stop_token& stop);
+  std::optional<WantedCheckpoint> TakeCheckpoint() CAIRN_REQUIRES(mutex_);
   static Prepared Prepare(Group&& group);
   void LeaveOutTooLong(Prepared& prepared) CAIRN_EXCLUDES(mutex_);
   void DropForgottenCheckpoint() CAIRN_EXCLUDES(mutex_);
@@ -260,6 +263,9 @@ class Journal {
 [[nodiscard]] Result<std::uint64_t> ReadJournal(
     Store& store, std::uint64_t session, std::uint64_t position,
     const std::function<Result<void>(std::uint64_t position, JournalEntry&& entry)>& visit);
+
+// How many entries of the session's journal follow its checkpoint. Reads neither; their content may be damaged.
+[[nodiscard]] Result<std::uint64_t> EntriesAfterCheckpoint(Store& store, std::uint64_t session);
 
 // Returns the number of this start: larger than that of every earlier start on this store, and at least `milliseconds`
 // (since 1970). It is on the disk when this returns.

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/store/checkpoint_writer.h"
 #include "server/store/journal.h"
 #include "server/store/record_values.h"
 
@@ -57,6 +58,14 @@ Result<std::uint64_t> ReadJournal(
     }
     if (page->last) return last;
   }
+}
+
+Result<std::uint64_t> EntriesAfterCheckpoint(Store& store, std::uint64_t session) {
+  const auto position = PositionOfCheckpoint(store, session);
+  if (!position) return tl::unexpected(position.error());
+  const auto numbers = store.Numbers({.kind = RecordKind::kJournal, .owner = session, .first = *position + 1});
+  if (!numbers) return tl::unexpected(numbers.error());
+  return numbers->empty() ? 0 : numbers->back() - *position;  // The number of a record is that of its last entry.
 }
 
 Result<std::uint64_t> NextGeneration(Store& store, std::uint64_t milliseconds) {

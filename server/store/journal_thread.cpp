@@ -151,11 +151,22 @@ std::optional<Journal::Group> Journal::Next(const std::stop_token& stop) {
   queued_records_.clear();
   Group group{std::exchange(queue_, {}), std::exchange(works_, {}), std::exchange(told_, {}), std::nullopt, oldest_};
   // Together with the queue: the entries before a checkpoint are in this group or in an earlier one.
-  if (!writing_ && !checkpoints_.empty()) {
-    group.checkpoint = std::move(checkpoints_.front());
-    checkpoints_.pop_front();
-  }
+  if (!writing_) group.checkpoint = TakeCheckpoint();
   return group;
+}
+
+// That of the session with the longest journal after its last one. A server that is killed again and again may have
+// time for one only between two kills, and would otherwise repeat the journals of the other sessions at each start.
+std::optional<Journal::WantedCheckpoint> Journal::TakeCheckpoint() {
+  const auto journal_length = [this](const WantedCheckpoint& wanted) CAIRN_NO_THREAD_SAFETY_ANALYSIS {
+    const auto line = lines_.find(wanted.session);
+    return line == lines_.end() ? 0 : line->second.next - 1 - line->second.checkpointed;
+  };
+  const auto longest = std::ranges::max_element(checkpoints_, {}, journal_length);
+  if (longest == checkpoints_.end()) return std::nullopt;
+  WantedCheckpoint taken = std::move(*longest);
+  checkpoints_.erase(longest);
+  return taken;
 }
 
 Journal::Prepared Journal::Prepare(Group&& group) {
@@ -358,6 +369,7 @@ void Journal::KeepBudget() {
   asking.reset();
   const MutexLock lock(mutex_);
   over_budget_ = over;
+  counts_.store_bytes = *used;
 }
 
 }  // namespace cairn::server

@@ -33,6 +33,32 @@ Result<std::shared_ptr<const Trajectory>> PathOf(const record::MapVersion::Smoot
   return path;
 }
 
+void Fill(record::Site::Edit& to, const MapEdit& edit) {
+  to.set_id(edit.id);
+  to.set_kind(static_cast<std::uint32_t>(edit.kind));
+  for (const Eigen::Vector2d& point : edit.points_map) {
+    to.add_points(point.x());
+    to.add_points(point.y());
+  }
+  to.set_width_m(edit.width_m);
+  to.set_note(edit.note);
+  to.set_made(edit.made);
+}
+
+Result<MapEdit> ValueOf(const record::Site::Edit& from) {
+  if (from.id() == 0 || from.points_size() % 2 != 0 || from.kind() >= static_cast<std::uint32_t>(kMapEditKindCount))
+    return Unreadable("an edit of a map");
+  MapEdit edit{.id = from.id(),
+               .kind = static_cast<MapEditKind>(from.kind()),
+               .points_map = {},
+               .width_m = from.width_m(),
+               .note = from.note(),
+               .made = from.made()};
+  for (int i = 0; i < from.points_size(); i += 2) edit.points_map.emplace_back(from.points(i), from.points(i + 1));
+  if (!ValidateMapEdit(edit)) return Unreadable("an edit of a map");
+  return edit;
+}
+
 }  // namespace
 
 std::string BytesOf(const StoredSession& session) {
@@ -118,6 +144,8 @@ std::string BytesOf(const StoredSite& site) {
   for (const std::uint64_t session : site.past) to.add_past(session);
   for (const std::uint64_t session : site.merged) to.add_merged(session);
   to.set_map_frame(site.map_frame);
+  for (const MapEdit& edit : site.edits) Fill(*to.add_edits(), edit);
+  to.set_edits_version(site.edits_version);
   return to.SerializeAsString();
 }
 
@@ -136,10 +164,21 @@ Result<StoredSite> SiteOf(std::string_view bytes) {
                   .fragments = {from.fragments().begin(), from.fragments().end()},
                   .past = {from.past().begin(), from.past().end()},
                   .merged = {from.merged().begin(), from.merged().end()},
-                  .map_frame = from.map_frame()};
+                  .map_frame = from.map_frame(),
+                  .edits = {},
+                  .edits_version = from.edits_version()};
   if (!(site.resolution_m >= 0.0 && site.resolution_m <= 10.0)) return Unreadable("a site");
   for (const auto& made : from.switches()) site.switches[made.epoch()] = made.generation();
   for (const auto& member : from.members()) site.members[member.robot_id()] = member.session();
+  const auto edits = static_cast<std::uint64_t>(from.edits_size());
+  if (edits > kMostStoredEdits || from.edits_version() >= kMaxEditsVersion - edits) return Unreadable("a site");
+  for (const record::Site::Edit& one : from.edits()) {
+    auto edit = ValueOf(one);
+    if (!edit) return tl::unexpected(edit.error());
+    if (edit->id > site.edits_version || (!site.edits.empty() && edit->id <= site.edits.back().id))
+      return Unreadable("a site");
+    site.edits.push_back(*std::move(edit));
+  }
   return site;
 }
 

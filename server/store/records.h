@@ -14,6 +14,7 @@
 #include <variant>
 #include <vector>
 
+#include "common/map/map_edit.h"
 #include "common/map/tile.h"
 #include "common/sensor/trajectory.h"
 #include "common/service/job.h"
@@ -129,6 +130,10 @@ inline constexpr std::size_t kMostSwitches = 1024;
   return made != switches.end() && made->second == generation;
 }
 
+// Of a site. The server allows half as many (maps.max_edits), and two sites can be merged.
+inline constexpr std::size_t kMostStoredEdits = 8192;
+inline constexpr std::uint64_t kMaxEditsVersion = std::uint64_t{1} << 53;
+
 struct StoredSite {
   std::string name;
   std::uint32_t epoch = 0;
@@ -142,6 +147,8 @@ struct StoredSite {
   std::vector<std::uint64_t> past;          // Sessions that have ended, in the order in which they did.
   std::set<std::uint64_t> merged{};         // Layers that stand for several sessions.
   std::uint64_t map_frame = 0;              // SessionState::map_frame; 0: stored without one.
+  std::vector<MapEdit> edits{};             // By people, in the order in which they were made,
+  std::uint64_t edits_version = 0;          // and how often they were changed; no number of an edit is higher.
 };
 
 struct StoredLayer {

@@ -35,13 +35,15 @@ struct ImportOptions {
 // Moves everything of the site `from` into the site `into`. Where the transform is not the identity, each session of
 // `from` begins at its transformed start and is estimated again from its journal at the next start of the server; grids
 // of jobs and of sessions that exist no more are transformed cell by cell. The map versions of both are kept, and a new
-// one is enabled that shows what is enabled in both. NOT_FOUND. FAILED_PRECONDITION: the sites have cells of different
+// one is enabled that shows what is enabled in both. Edits by people stay where they are in the building, those of
+// `from` over those of `into`. NOT_FOUND. FAILED_PRECONDITION: the sites have cells of different
 // sizes; or a journal does not reach back to its beginning, so that the session cannot be estimated again.
 [[nodiscard]] Result<void> MergeSites(Store& store, const std::string& into, const std::string& from,
                                       const Pose2& T_into_from = {});
 
 // Moves the sessions (by number) with their parts of the map and of its versions into a new site. Jobs stay where they
-// ran. NOT_FOUND: no such site or session. ALREADY_EXISTS: there is a site of the new name.
+// ran; edits by people are in both sites then, because they say something of the building. NOT_FOUND: no such site or
+// session. ALREADY_EXISTS: there is a site of the new name.
 [[nodiscard]] Result<void> SplitSite(Store& store, const std::string& site, const std::vector<std::uint64_t>& sessions,
                                      const std::string& new_site);
 

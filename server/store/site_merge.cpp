@@ -46,7 +46,7 @@ class Merge {
       if (stored.job.map_version > 1) stored.job.map_version += version_shift_;
       Put({RecordKind::kJob, id, 0}, BytesOf(stored));
     }
-    Site();
+    if (auto merged = Site(); !merged) return tl::unexpected(merged.error());
     return std::move(changes_);
   }
 
@@ -197,7 +197,7 @@ class Merge {
     return {};
   }
 
-  void Site() {
+  Result<void> Site() {
     StoredSite& site = into_.site;
     site.epoch += from_.site.epoch;
     site.tile_version = std::max(site.tile_version, from_.site.tile_version) + 1;
@@ -207,9 +207,33 @@ class Merge {
     site.fragments.insert(from_.site.fragments.begin(), from_.site.fragments.end());
     site.past.insert(site.past.end(), from_.site.past.begin(), from_.site.past.end());
     site.merged.insert(from_.site.merged.begin(), from_.site.merged.end());
+    if (auto added = AddEdits(); !added) return added;
     Put({RecordKind::kSite, HashName(site.name), 0}, BytesOf(site));
     for (const RecordKind kind : {RecordKind::kSite, RecordKind::kMapVersion, RecordKind::kLayer})
       changes_.removed.push_back({.kind = kind, .owner = HashName(from_.site.name)});
+    return {};
+  }
+
+  // A site that was split has left its edits in both parts: one of two that are the same is enough.
+  Result<void> AddEdits() {
+    StoredSite& site = into_.site;
+    const std::size_t own = site.edits.size();
+    for (const MapEdit& edit : from_.site.edits) {
+      MapEdit moved = cairn::Moved(edit, T_into_from_);
+      if (auto valid = ValidateMapEdit(moved); !valid) return valid;
+      const auto is_same = [&moved](MapEdit other) {
+        other.id = moved.id;
+        return other == moved;
+      };
+      if (std::any_of(site.edits.begin(), site.edits.begin() + static_cast<std::ptrdiff_t>(own), is_same)) continue;
+      moved.id += site.edits_version;
+      site.edits.push_back(std::move(moved));
+    }
+    site.edits_version += from_.site.edits_version;
+    // A record with more could not be read again.
+    if (site.edits.size() > kMostStoredEdits || site.edits_version >= kMaxEditsVersion - site.edits.size())
+      return Fail(StatusCode::kOutOfRange, "the two sites have too many edits of their maps");
+    return {};
   }
 
   Store& store_;

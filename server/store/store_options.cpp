@@ -7,7 +7,7 @@ void Visit(OptionVisitor& visitor, StoreOptions& options) {
                   ForOperators("Time during which changes are collected before they are written to the disk together. "
                                "With a larger value the disk has less work, and robots must send more samples again "
                                "after a crash."));
-  visitor.Real("max_gib", options.max_gib, "GiB", 0.1, 1e6,
+  visitor.Real("max_gib", options.max_gib, "GiB", 0.001, 1e6,
                ForOperators("Disk space for the store. The oldest history that no checkpoint needs is removed first."));
   visitor.Real("max_saved_gib", options.max_saved_gib, "GiB", 0.001, 1e6,
                "Disk space for the files of saved sites. While they take more, no site is saved; delete some of them "

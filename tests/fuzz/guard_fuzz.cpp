@@ -141,8 +141,11 @@ bool RunGuard(std::string_view input) {
   wire::FragmentAssembly assembly;
   bool accepted = false;
   for (Pieces pieces(input); !pieces.empty();) {
-    const std::string_view piece = pieces.TakePiece();
-    const std::vector<std::uint8_t> datagram(piece.begin(), piece.end());  // Exactly as long as the piece.
+    const std::string_view received = pieces.TakePiece();
+    const std::vector<std::uint8_t> bytes(received.begin(), received.end());  // Exactly as long as the piece.
+    const auto kept = wire::WithoutStatistics(bytes);
+    const std::string_view piece = received.substr(0, kept.size());
+    const std::vector<std::uint8_t> datagram(kept.begin(), kept.end());
     const wire::DatagramFault fault = wire::InspectDatagram(datagram, gate);
     Must(!wire::DatagramFaultName(fault).empty(), "a fault has a name");
     if (fault != wire::DatagramFault::kNone) continue;

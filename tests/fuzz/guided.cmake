@@ -8,7 +8,8 @@ if(CAIRN_SANITIZE MATCHES address AND CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
   set(guided cairn_bag cairn_common cairn_sim cairn_known_map cairn_store cairn_records cairn_maps cairn_robots cairn_jobs
     cairn_queries cairn_server)
   if(CAIRN_WITH_DDS)
-    list(APPEND guided cairn_idl cairn_wire cairn_client cairn_ros2 cairn_ros2_idl cairn_ros2_wire)
+    list(APPEND guided cairn_idl cairn_wire cairn_client cairn_http cairn_web_page cairn_ros2 cairn_ros2_idl
+      cairn_ros2_wire)
   endif()
   foreach(library ${guided})
     target_compile_options(${library} PRIVATE ${CAIRN_FUZZ_GUIDED})

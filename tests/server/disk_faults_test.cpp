@@ -202,5 +202,30 @@ TEST(DiskFaults, ASiteThatCannotBeReadIsNotSavedAndTheReasonIsTheAnswer) {
   EXPECT_TRUE(saved.status.ok()) << saved.status.message;
 }
 
+// A site is saved after what came before it is on the disk. The answer must not wait for a disk that fails for hours.
+TEST(DiskFaults, ASiteIsNotSavedWhileTheDiskDoesNotTakeWhatCameBefore) {
+  const TempDirectory directory;
+  FaultyVfs vfs;
+  StoredServer server(directory / "state", TestOptions(), FaultyVfs::name());
+  server->Open("r1", kDriver);
+  server->Drive("r1", kDriver, 0, 40);
+  ASSERT_TRUE(server->WaitFor([&] { return server->LastLedger("r1").durable_through == 40; }));
+  vfs.Set(DiskFault::kWriteError);
+  server->Drive("r1", kDriver, 40, 41);
+  Request save = About(RequestKind::kSiteSave);
+  save.saved = "lab";
+  const Reply failed = server->Ask(save);
+  EXPECT_EQ(failed.status.code, StatusCode::kUnavailable);
+  EXPECT_THAT(failed.status.message, HasSubstr("disk I/O error"));
+  const Reply not_deleted = server->Ask(About(RequestKind::kSiteDelete));
+  EXPECT_EQ(not_deleted.status.code, StatusCode::kUnavailable);
+  EXPECT_THAT(not_deleted.status.message, HasSubstr("disk I/O error"));
+  vfs.Set(DiskFault::kNone);
+  ASSERT_TRUE(server->WaitFor([&] { return server->LastLedger("r1").durable_through == 41; }));
+  EXPECT_FALSE(std::filesystem::exists(directory / "state" / "saved" / "lab.site"));
+  const Reply saved = server->Ask(save);
+  EXPECT_TRUE(saved.status.ok()) << saved.status.message;
+}
+
 }  // namespace
 }  // namespace cairn::server::testing

@@ -10,6 +10,7 @@
 
 #include "server/slam/checkpoint.h"
 #include "server/store/envelope.h"
+#include "server/store/site_file.h"
 #include "tests/server/support/stored_server.h"
 #include "tests/temp_directory.h"
 
@@ -23,9 +24,17 @@ Request OfLab(RequestKind kind) {
   return request;
 }
 
-// A new format needs a state directory in tests/golden that was written with it.
-static_assert(slam::kCheckpointFormat == 10);
+// A new format needs a state directory in tests/golden that was written with it; one of site files, a saved site.
+static_assert(slam::kCheckpointFormat == 11);
 static_assert(kRecordFormat == 2);
+static_assert(kSiteFileFormat == 1);
+
+// However long ago the states were written: no session is too old to be shown.
+ServerOptions AnyAge() {
+  ServerOptions options = TestOptions();
+  options.robots.suspended_expiry_s = 1e10;
+  return options;
+}
 
 class GoldenState : public ::testing::TestWithParam<const char*> {
  protected:
@@ -51,7 +60,7 @@ class GoldenState : public ::testing::TestWithParam<const char*> {
     }
   }
   void ExpectWhatItHolds() const {
-    StoredServer server(state());
+    StoredServer server(state(), AnyAge());
     WholeServer& house = *server.operator->();
     const Reply status = house.Ask(About(RequestKind::kStatus, ""));
     EXPECT_THAT(status.status.message, ::testing::IsEmpty());  // Nothing is set aside.
@@ -85,15 +94,17 @@ const auto kNameOf = [](const ::testing::TestParamInfo<const char*>& state) {
 };
 INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenState,
                          ::testing::Values("state-1", "state-1-checkpoints-8", "state-1-checkpoints-9",
-                                           "state-1-checkpoints-10", "state-1-ended"),
+                                           "state-1-checkpoints-10", "state-1-checkpoints-10-dpslam",
+                                           "state-1-checkpoints-11-dpslam", "state-1-ended"),
                          kNameOf);
 
 class GoldenEndedCheckpoint : public GoldenState {};
-INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenEndedCheckpoint, ::testing::Values("state-1-checkpoints-10"), kNameOf);
+INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenEndedCheckpoint,
+                         ::testing::Values("state-1-checkpoints-10", "state-1-checkpoints-11-dpslam"), kNameOf);
 
 TEST_P(GoldenEndedCheckpoint, TheEndIsRestoredFromTheCheckpointAlone) {
   ASSERT_NO_FATAL_FAILURE(RemoveBeginnings());
-  StoredServer server(state());
+  StoredServer server(state(), AnyAge());
   std::map<std::string, SessionPhase> phases;
   for (const RobotStatus& robot : server->Ask(About(RequestKind::kStatus, "")).robots)
     phases[robot.session.robot] = robot.session.phase;
@@ -106,7 +117,7 @@ INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenEnded, ::testing::Values("state-1-e
 
 TEST_P(GoldenEnded, TheOrderInWhichSessionsEndedIsRestored) {
   {
-    StoredServer server(state());
+    StoredServer server(state(), AnyAge());
     const Reply status = server->Ask(About(RequestKind::kStatus, ""));
     ASSERT_EQ(status.robots.size(), 2U);
     for (const RobotStatus& robot : status.robots) EXPECT_EQ(robot.session.phase, SessionPhase::kEnded);

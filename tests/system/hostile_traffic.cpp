@@ -1,11 +1,14 @@
 #include "tests/system/hostile_traffic.h"
 
 #include <arpa/inet.h>
+#include <linux/filter.h>
+#include <linux/if_packet.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cstring>
 #include <set>
 
@@ -13,6 +16,7 @@ namespace cairn::test {
 namespace {
 
 constexpr std::size_t kRtpsHeader = 20;
+constexpr char kGroup[] = "239.255.0.1";  // RTPS 9.6.1.4.1: where participants announce themselves.
 
 bool IsRtps(const Bytes& bytes) {
   return bytes.size() >= kRtpsHeader && std::memcmp(bytes.data(), "RTPS", 4) == 0;
@@ -112,18 +116,35 @@ std::vector<std::uint16_t> UnicastPorts(std::int64_t domain, int participants) {
   return ports;
 }
 
-Cannon::Cannon() : socket_(socket(AF_INET, SOCK_DGRAM, 0)) {}
+Cannon::Cannon() : socket_(socket(AF_INET, SOCK_DGRAM, 0)) {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  socklen_t size = sizeof(address);
+  bind(socket_, reinterpret_cast<const sockaddr*>(&address), size);  // To a port that is free.
+  getsockname(socket_, reinterpret_cast<sockaddr*>(&address), &size);
+  own_port_ = ntohs(address.sin_port);
+  in_addr loopback{};
+  loopback.s_addr = htonl(INADDR_LOOPBACK);
+  setsockopt(socket_, IPPROTO_IP, IP_MULTICAST_IF, &loopback, sizeof(loopback));
+}
 Cannon::~Cannon() {
   close(socket_);
 }
 
 void Cannon::Send(const Bytes& bytes, std::uint16_t port) const {
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_port = htons(port);
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  static_cast<void>(
-      sendto(socket_, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&address), sizeof(address)));
+  SendTo(bytes, htonl(INADDR_LOOPBACK), port);
+}
+
+void Cannon::SendToAll(const Bytes& bytes, std::int64_t domain) const {
+  SendTo(bytes, inet_addr(kGroup), FirstPort(domain));
+}
+
+void Cannon::SendTo(const Bytes& bytes, std::uint32_t address, std::uint16_t port) const {
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_port = htons(port);
+  to.sin_addr.s_addr = address;
+  static_cast<void>(sendto(socket_, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&to), sizeof(to)));
 }
 
 std::vector<GuidPrefix> PrefixesOf(const std::vector<Bytes>& datagrams) {
@@ -144,7 +165,7 @@ std::vector<GuidPrefix> OverhearParticipants(std::int64_t domain, std::chrono::m
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(FirstPort(domain));
-  address.sin_addr.s_addr = inet_addr("239.255.0.1");
+  address.sin_addr.s_addr = inet_addr(kGroup);
   std::vector<Bytes> heard;
   ip_mreq group{};
   group.imr_multiaddr.s_addr = address.sin_addr.s_addr;
@@ -159,12 +180,33 @@ std::vector<GuidPrefix> OverhearParticipants(std::int64_t domain, std::chrono::m
   return PrefixesOf(heard);
 }
 
-std::vector<Bytes> RecordDatagrams(std::int64_t domain, std::chrono::milliseconds time) {
+bool MayRecord() {
+  const int listener = socket(AF_PACKET, SOCK_RAW, 0);
+  if (listener < 0) return errno != EPERM && errno != EACCES;
+  close(listener);
+  return true;
+}
+
+std::vector<Bytes> RecordDatagrams(std::int64_t domain, std::chrono::milliseconds time, std::uint16_t except) {
   constexpr std::uint16_t kIpv4 = 0x0800;
   constexpr std::size_t kEthernet = 14;
   constexpr std::uint8_t kUdp = 17;
-  const int listener = socket(AF_PACKET, SOCK_RAW, htons(kIpv4));
+  const int listener = socket(AF_PACKET, SOCK_RAW, 0);  // It receives nothing until it is bound.
   if (listener < 0) return {};
+  // The kernel leaves them out: there may be a hundred thousand a second. The port stands first behind the IP header.
+  sock_filter unless_from_port[] = {BPF_STMT(BPF_LDX | BPF_B | BPF_MSH, kEthernet),
+                                    BPF_STMT(BPF_LD | BPF_H | BPF_IND, kEthernet),
+                                    BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, except, 0, 1), BPF_STMT(BPF_RET | BPF_K, 0),
+                                    BPF_STMT(BPF_RET | BPF_K, 0xffffffff)};
+  const sock_fprog filter{.len = std::size(unless_from_port), .filter = unless_from_port};
+  sockaddr_ll all{};
+  all.sll_family = AF_PACKET;
+  all.sll_protocol = htons(kIpv4);
+  if (setsockopt(listener, SOL_SOCKET, SO_ATTACH_FILTER, &filter, sizeof(filter)) != 0 ||
+      bind(listener, reinterpret_cast<const sockaddr*>(&all), sizeof(all)) != 0) {
+    close(listener);
+    return {};
+  }
   std::set<Bytes> recorded;
   Listen(listener, time, [&](Bytes&& frame) {
     if (frame.size() < kEthernet + 28 || frame[kEthernet + 9] != kUdp) return;
@@ -244,7 +286,8 @@ Bytes Generated(const std::vector<GuidPrefix>& prefixes, std::mt19937& random) {
 }
 
 HostileSenders::HostileSenders(std::int64_t domain, std::vector<Bytes> recorded, int senders, std::uint64_t seed)
-    : recorded_(std::move(recorded)), prefixes_(PrefixesOf(recorded_)), ports_(UnicastPorts(domain, 8)) {
+    : domain_(domain), ports_(UnicastPorts(domain, 8)), traffic_(std::make_shared<const Traffic>(std::move(recorded))) {
+  threads_.emplace_back([this] { Record(); });
   for (int i = 0; i < senders; ++i)
     threads_.emplace_back([this, seed, i] { Send(seed + 1000 * static_cast<std::uint64_t>(i)); });
 }
@@ -256,14 +299,34 @@ void HostileSenders::Stop() {
   }
 }
 
-void HostileSenders::Send(std::uint64_t seed) {
-  std::mt19937 random(static_cast<std::mt19937::result_type>(seed));
-  const Cannon cannon;
+void HostileSenders::Record() {
+  constexpr std::chrono::milliseconds kFor{500};
   while (!stop_) {
-    const Bytes bytes =
-        random() % 3 == 0 ? Generated(prefixes_, random) : Mutated(recorded_[random() % recorded_.size()], random);
-    cannon.Send(bytes, ports_[random() % ports_.size()]);
-    sent_.fetch_add(1, std::memory_order_relaxed);
+    auto recorded = RecordDatagrams(domain_, kFor, cannon_.own_port());
+    if (recorded.empty()) continue;  // Nobody sends, because nobody receives.
+    auto traffic = std::make_shared<const Traffic>(std::move(recorded));
+    const MutexLock lock(mutex_);
+    traffic_ = std::move(traffic);
+    recordings_.fetch_add(1, std::memory_order_relaxed);
+  }
+}
+
+void HostileSenders::Send(std::uint64_t seed) {
+  constexpr int kWithTheSame = 1000;  // So many datagrams are made of one recording.
+  std::mt19937 random(static_cast<std::mt19937::result_type>(seed));
+  while (!stop_) {
+    const auto lately = traffic();
+    for (int i = 0; i < kWithTheSame && !stop_; ++i) {
+      const Bytes bytes = random() % 3 == 0 ? Generated(lately->prefixes, random)
+                                            : Mutated(lately->datagrams[random() % lately->datagrams.size()], random);
+      const std::size_t port = random() % (ports_.size() + 1);
+      if (port < ports_.size()) {
+        cannon_.Send(bytes, ports_[port]);
+      } else {
+        cannon_.SendToAll(bytes, domain_);
+      }
+      sent_.fetch_add(1, std::memory_order_relaxed);
+    }
   }
 }
 

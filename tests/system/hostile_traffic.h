@@ -1,15 +1,19 @@
 // Datagrams that no honest participant sends, for a test and a study: forged RTPS submessages that name live
-// participants, and mutations of recorded traffic, sent to every port of a DDS domain on loopback.
+// participants, and mutations of recorded traffic, sent to every port of a DDS domain on loopback, also by multicast.
 #pragma once
 
 #include <array>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <memory>
 #include <random>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
+
+#include "common/mutex.h"
 
 namespace cairn::test {
 
@@ -23,7 +27,7 @@ constexpr int kPortsOfDomain = 250;
 }
 [[nodiscard]] std::vector<std::uint16_t> UnicastPorts(std::int64_t domain, int participants);
 
-// A socket for sending to loopback. Not thread-safe.
+// A socket for sending to loopback. Thread-safe.
 class Cannon {
  public:
   Cannon();
@@ -31,16 +35,25 @@ class Cannon {
   Cannon(const Cannon&) = delete;
   Cannon& operator=(const Cannon&) = delete;
   void Send(const Bytes& bytes, std::uint16_t port) const;
+  // To all participants of the domain that listen for announcements.
+  void SendToAll(const Bytes& bytes, std::int64_t domain) const;
+  [[nodiscard]] std::uint16_t own_port() const { return own_port_; }
 
  private:
+  void SendTo(const Bytes& bytes, std::uint32_t address, std::uint16_t port) const;
+
   int socket_ = -1;
+  std::uint16_t own_port_ = 0;
 };
 
 // The GUID prefixes of the participants that announce themselves within `time`, by multicast on loopback.
 [[nodiscard]] std::vector<GuidPrefix> OverhearParticipants(std::int64_t domain, std::chrono::milliseconds time);
-// All RTPS datagrams on loopback to ports of the domain within `time`, each once. Empty where the system does not let
-// this user listen (CAP_NET_RAW).
-[[nodiscard]] std::vector<Bytes> RecordDatagrams(std::int64_t domain, std::chrono::milliseconds time);
+// Whether the system lets this user record what others send (CAP_NET_RAW).
+[[nodiscard]] bool MayRecord();
+// All RTPS datagrams on loopback to ports of the domain within `time`, each once, but none that were sent from the port
+// `except`.
+[[nodiscard]] std::vector<Bytes> RecordDatagrams(std::int64_t domain, std::chrono::milliseconds time,
+                                                 std::uint16_t except = 0);
 // Of the senders of the datagrams.
 [[nodiscard]] std::vector<GuidPrefix> PrefixesOf(const std::vector<Bytes>& datagrams);
 
@@ -52,22 +65,38 @@ class Cannon {
 // One to four submessages with fields that are plausible, extreme or random, from one of `prefixes`.
 [[nodiscard]] Bytes Generated(const std::vector<GuidPrefix>& prefixes, std::mt19937& random);
 
-// Sends mutated and generated datagrams from several threads, as fast as the system takes them.
+// Sends mutated and generated datagrams from several threads, as fast as the system takes them. What it mutates is what
+// the participants have sent lately, so that its numbers, names and secrets are those of now.
 class HostileSenders {
  public:
   HostileSenders(std::int64_t domain, std::vector<Bytes> recorded, int senders, std::uint64_t seed);
   ~HostileSenders() { Stop(); }
   void Stop();
   [[nodiscard]] std::uint64_t sent() const { return sent_.load(std::memory_order_relaxed); }
+  // How often it has recorded anew.
+  [[nodiscard]] int recordings() const { return recordings_.load(std::memory_order_relaxed); }
 
  private:
+  struct Traffic {
+    explicit Traffic(std::vector<Bytes> recorded) : datagrams(std::move(recorded)), prefixes(PrefixesOf(datagrams)) {}
+    std::vector<Bytes> datagrams;  // Never empty.
+    std::vector<GuidPrefix> prefixes;
+  };
+  void Record();
   void Send(std::uint64_t seed);
+  [[nodiscard]] std::shared_ptr<const Traffic> traffic() const {
+    const MutexLock lock(mutex_);
+    return traffic_;
+  }
 
-  const std::vector<Bytes> recorded_;
-  const std::vector<GuidPrefix> prefixes_;
+  const std::int64_t domain_;
   const std::vector<std::uint16_t> ports_;
+  const Cannon cannon_;
+  mutable Mutex mutex_;
+  std::shared_ptr<const Traffic> traffic_ CAIRN_GUARDED_BY(mutex_);
   std::atomic<bool> stop_ = false;
   std::atomic<std::uint64_t> sent_ = 0;
+  std::atomic<int> recordings_ = 0;
   std::vector<std::thread> threads_;
 };
 

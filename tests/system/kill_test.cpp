@@ -21,6 +21,14 @@
 namespace cairn::test {
 namespace {
 
+KilledFleetOptions FleetIn(const TempDirectory& directory) {
+  KilledFleetOptions options;
+  options.cairnd = CAIRND_PATH;
+  options.cairn = CAIRN_PATH;
+  options.directory = directory.path();
+  return options;
+}
+
 TEST(Kill, TwentyKillsChangeNothing) {
   constexpr int kKills = 20;
   int kills = 0;
@@ -28,10 +36,7 @@ TEST(Kill, TwentyKillsChangeNothing) {
   // One round, where the machine is fast enough.
   for (std::uint64_t round = 1; kills < kKills; ++round) {
     const TempDirectory directory;
-    KilledFleetOptions options;
-    options.cairnd = CAIRND_PATH;
-    options.cairn = CAIRN_PATH;
-    options.directory = directory.path();
+    KilledFleetOptions options = FleetIn(directory);
     options.robots = 4;
     options.seconds = 15.0;
     options.most_up_s = 0.6;
@@ -54,13 +59,32 @@ TEST(Kill, TwentyKillsChangeNothing) {
   EXPECT_GT(poses, 300U);
 }
 
+// A limited disk: the server removes what no checkpoint needs, also while it is killed again and again.
+TEST(Kill, WhileOldHistoryIsRemovedChangesNothing) {
+  const TempDirectory directory;
+  KilledFleetOptions options = FleetIn(directory);
+  options.robots = 4;
+  options.seconds = 20.0;
+  options.most_up_s = 1.0;
+  options.kills = 10;
+  options.settings = {"store.max_gib=0.001"};
+  const KilledFleetOutcome outcome = RunKilledFleet(options);
+  EXPECT_GE(outcome.kills, 3);
+  EXPECT_EQ(outcome.lost, 0U) << testing::PrintToString(outcome.differences);
+  EXPECT_EQ(outcome.doubled, 0U) << testing::PrintToString(outcome.differences);
+  EXPECT_EQ(outcome.wrongly_localized, 0U) << testing::PrintToString(outcome.wrong);
+  EXPECT_EQ(outcome.paths_that_differ, 0) << testing::PrintToString(outcome.differences);
+  // The first seconds of all robots are gone, and everything since their checkpoints is there.
+  cairn::server::testing::RawRecords records(directory / "killed");
+  const std::string journal = "kind = " + std::to_string(static_cast<int>(cairn::server::RecordKind::kJournal));
+  EXPECT_TRUE(records.Of(journal + " AND number <= " + cairn::server::testing::Sql(100)).empty());
+  EXPECT_FALSE(records.Of(journal).empty());
+}
+
 // Whoever was told that the map is switched, or that a job is there, finds it so after each start.
 TEST(Kill, OrdersThatWereAnsweredHold) {
   const TempDirectory directory;
-  KilledFleetOptions options;
-  options.cairnd = CAIRND_PATH;
-  options.cairn = CAIRN_PATH;
-  options.directory = directory.path();
+  KilledFleetOptions options = FleetIn(directory);
   options.seconds = 20.0;
   options.most_up_s = 2.0;
   options.kills = 10;
@@ -93,7 +117,9 @@ TEST(Kill, WithoutSpaceOnTheDiskItIsDegradedSaysSoAndEndsWithThree) {
   const auto status = ChildProcess({CAIRN_PATH, "status", "--domain", domain, "--json"}).Wait();
   EXPECT_EQ(status.exit_code, 0);
   EXPECT_NE(status.output.find("\"degraded\":\"cannot write to the store"), std::string::npos) << status.output;
-  // Poses go on.
+  const auto poses =
+      ChildProcess({CAIRN_PATH, "pose", "robot1", "--follow", "--count", "5", "--domain", domain, "--json"}).Wait();
+  EXPECT_EQ(poses.exit_code, 0) << poses.output;
   EXPECT_TRUE(robots.RunningAfter(std::chrono::milliseconds(0)));
   server.Signal(SIGTERM);
   const auto outcome = server.Wait();
@@ -148,7 +174,7 @@ TEST(Kill, AServerOnAReadOnlyStateDoesNotStartAndSaysWhy) {
   ASSERT_NO_FATAL_FAILURE(StartAndStop(command));
   {
     const auto mount = OwnMount::ReadOnly(directory.path());
-    if (!mount) GTEST_SKIP() << "this user may not mount a directory read-only";
+    if (!mount) GTEST_SKIP() << "SKIPPED: this user may not mount a directory read-only";
     const auto outcome = ChildProcess(command).Wait();
     EXPECT_EQ(outcome.exit_code, 1) << outcome.output;
     EXPECT_NE(outcome.output.find("cannot start: cannot open '"), std::string::npos) << outcome.output;
@@ -181,6 +207,52 @@ TEST(Kill, AServerOnADamagedDatabaseEndsWithTwoAndSaysWhy) {
     EXPECT_TRUE(says_why) << outcome.output;
     EXPECT_EQ(std::filesystem::file_size(database), size);
   }
+}
+
+// Any page of the database holds something else. Robots and maps of which it held nothing are as they were; of the
+// others the status says that they are set aside, and so does the exit code. Nothing is shorter than it was without a
+// word.
+TEST(Kill, WithAnyDamagedPageItServesTheRestAndSaysWhatIsMissing) {
+  constexpr std::uintmax_t kPage = 4096, kStep = 12;
+  const char* const source = std::getenv("CAIRN_SOURCE_DIR");
+  ASSERT_NE(source, nullptr);
+  const auto golden = std::filesystem::path(source) / "tests" / "golden" / "state-1" / "cairn.db";
+  const std::string domain = std::to_string(TestDomain());
+  int whole = 0, set_aside = 0;
+  for (std::uintmax_t at = 3 * kPage; at < std::filesystem::file_size(golden); at += kStep * kPage) {
+    SCOPED_TRACE("page " + std::to_string(at / kPage));
+    const TempDirectory directory;
+    std::filesystem::copy_file(golden, directory / "cairn.db");
+    {
+      std::fstream file(directory / "cairn.db", std::ios::in | std::ios::out | std::ios::binary);
+      file.seekp(static_cast<std::streamoff>(at));
+      file << std::string(kPage, '\x5a');
+    }
+    ChildProcess server({CAIRND_PATH, "--domain", domain, "--state", directory.path().string()});
+    if (!server.Says(" ready")) {
+      const auto outcome = server.Wait();
+      EXPECT_EQ(outcome.exit_code, 2) << outcome.output;
+      EXPECT_NE(outcome.output.find("database disk image is malformed"), std::string::npos) << outcome.output;
+      continue;
+    }
+    const auto asked = ChildProcess({CAIRN_PATH, "status", "--domain", domain, "--timeout", "20s", "--json"}).Wait();
+    ASSERT_EQ(asked.exit_code, 0) << asked.output;
+    const std::string& status = asked.output;
+    server.Signal(SIGTERM);
+    const int exit_code = server.Wait().exit_code;
+    if (status.find("set aside") != std::string::npos) {
+      EXPECT_EQ(exit_code, 3);
+      ++set_aside;
+      continue;
+    }
+    EXPECT_EQ(exit_code, 0);
+    const auto first = status.find("\"used\":32");
+    ASSERT_NE(first, std::string::npos) << status;
+    EXPECT_NE(status.find("\"used\":32", first + 1), std::string::npos) << status;
+    ++whole;
+  }
+  EXPECT_GT(whole, 0);
+  EXPECT_GT(set_aside, 0);
 }
 
 // With another filter, every scan is processed again before the server is ready, which takes long with so many

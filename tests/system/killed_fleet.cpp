@@ -222,9 +222,12 @@ class Drive {
   }
 
   void LaunchServer(const std::string& state) {
-    server_ = std::make_unique<ChildProcess>(std::vector<std::string>{
-        options_.cairnd, "--domain", Domain(), "--state", (options_.directory / state).string(), "--set",
-        "slam.particles=20", "--set", "robots.checkpoint_entries=100", "--set", "maps.max_versions=64"});
+    std::vector<std::string> program = {options_.cairnd, "--domain", Domain(), "--state",
+                                        (options_.directory / state).string()};
+    std::vector<std::string> settings = {"slam.particles=20", "robots.checkpoint_entries=100", "maps.max_versions=64"};
+    settings.insert(settings.end(), options_.settings.begin(), options_.settings.end());
+    for (std::string& setting : settings) program.insert(program.end(), {"--set", std::move(setting)});
+    server_ = std::make_unique<ChildProcess>(std::move(program));
   }
 
   void StartServer(const std::string& state) {

@@ -4,14 +4,18 @@ import { plot } from '/plots.js';
 import { onThemeChange } from '/theme.js';
 import * as panels from '/panels.js';
 import { showDoctor } from '/doctor.js';
+import { editOf, listenToTools, showEdits } from '/edits.js';
 import { command, say, token, tokenOfAddress, useToken } from '/commands.js';
 
 const $ = (id) => document.getElementById(id);
 const PATH_PERIOD_MS = 4000;
+let edits = [], editsShown = '';
 let state = null, map = null, events = null, streamLost = false, waitingTiles = [], flow = [], retry = 0;
 let wanted = new URLSearchParams(location.search).get('site') ?? '';
 
 const may = () => Boolean(state?.commands && token());
+
+const LAYERS = ['path', 'smoothed', 'ellipse', 'landmarks', 'edits', 'disagreement'];
 
 async function getJson(path) {
   const answer = await fetch(path).catch(() => null);
@@ -50,6 +54,9 @@ function choose(site) {
   flow = [];
   waitingTiles = [];
   state = null;
+  edits = [];
+  editsShown = '';
+  showEdits(site, edits, false);
   const address = new URL(location.href);
   if (site) address.searchParams.set('site', site); else address.searchParams.delete('site');
   history.replaceState(null, '', address);
@@ -79,7 +86,7 @@ function show(now) {
   document.title = `${state.site} – Cairn`;
   if (!map && state.map) {
     map = new SiteMap($('map'), state.site, state.map);
-    for (const name of ['path', 'smoothed', 'ellipse', 'landmarks']) map.shown[name] = $(`show-${name}`).checked;
+    for (const name of LAYERS) map.shown[name] = $(`show-${name}`).checked;
     for (const changes of waitingTiles) map.applyTiles(changes);
     waitingTiles = [];
     askPaths();
@@ -93,6 +100,7 @@ function show(now) {
   panels.showJobs(state, may(), (id) => command(`/api/jobs/${id}/cancel`, {}, 'The job is cancelled.'));
   panels.showMap(state, may(), (version) => command(`/api/sites/${state.site}/enable`, { version }, `Version ${version} is enabled.`));
   panels.showServer(state, may());
+  askEdits();
 }
 
 function relocalise(name, how, pose) {
@@ -116,10 +124,53 @@ function showFlow() {
     { name: 'median', value: (sample) => sample[3], style: 'first' }, { name: '99 %', value: (sample) => sample[4], style: 'third' }], 'ms');
 }
 
+// They are asked for when the server says that they have changed.
+async function askEdits() {
+  const site = state.site, version = `${site} ${state.map?.edits ?? '0'}`;
+  if (version !== editsShown) {
+    editsShown = version;
+    const answer = state.map?.edits === '0' ? [] : await getJson(`/api/sites/${site}/edits`);
+    if (state?.site !== site || editsShown !== version) return;
+    if (!answer) editsShown = '';  // With the next state.
+    edits = answer ?? edits;
+    map?.setEdits(edits);
+  }
+  showEdits(site, edits, may(), (id) => command(`/api/sites/${site}/remove-edit`, { id }, 'The edit is removed.'));
+}
+
+function sendEdit(edit) { command(`/api/sites/${state.site}/edit`, edit, 'The map is edited.'); }
+
+listenToTools((kind, note) => {
+  if (!map) return;
+  if (map.placing === 'edit') { map.stopPlacing(); return; }
+  map.span(kind === 'occupied', (from, to) => { if (from) sendEdit(editOf(kind, from, to, note)); else say(''); });
+  say(`Press on the map and drag ${kind === 'occupied' ? 'along the wall' : 'to the opposite corner'}. Escape leaves it as it is.`, true);
+}, sendEdit);
+
+async function askDisagreement(asked) {
+  const answer = await fetch(`/api/sites/${asked.site}/disagreement.png`).catch(() => null);
+  const [url, area] = answer?.status === 200 ? [await asDataUrl(await answer.blob()), answer.headers.get('X-Map-Area').split(' ').map(Number)] : [null, null];
+  if (map === asked) asked.setDisagreement(url, area);
+}
+
+function asDataUrl(blob) {
+  return new Promise((resolve) => {
+    const reader = new FileReader();
+    reader.onload = () => resolve(reader.result);
+    reader.onerror = () => resolve(null);
+    reader.readAsDataURL(blob);
+  });
+}
+
 let asking = false;
 async function askPaths() {
   if (!map || !state?.connected || asking || document.hidden) return;
   asking = true;
+  try { await askAll(); } catch { /* The connection broke in the middle of an answer: it is asked again. */ }
+  asking = false;
+}
+
+async function askAll() {
   const asked = map, smoothed = state.map?.versions.some((version) => version.enabled && version.job !== '0');
   for (const robot of state.robots) {
     if (asked.shown.path) {
@@ -131,17 +182,19 @@ async function askPaths() {
       if (map === asked) asked.setPath(robot.name, path?.points ?? [], true);
     }
   }
+  if (asked.shown.disagreement && map === asked) await askDisagreement(asked);
   if (asked.shown.landmarks && map === asked) asked.setLandmarks((await getJson(`/api/sites/${asked.site}/landmarks`)) ?? []);
-  asking = false;
 }
 
 $('site').addEventListener('change', (event) => choose(event.target.value));
 $('fit').addEventListener('click', () => map?.fit(state?.map, true));
-for (const name of ['path', 'smoothed', 'ellipse', 'landmarks']) {
+for (const name of LAYERS) {
   $(`show-${name}`).addEventListener('change', (event) => {
     if (!map) return;
     map.shown[name] = event.target.checked;
     if (name === 'landmarks' && !event.target.checked) map.setLandmarks([]);
+    if (name === 'disagreement' && !event.target.checked) map.setDisagreement(null);
+    map.setEdits(edits);
     map.update(state.robots, state.connected);
     askPaths();
   });

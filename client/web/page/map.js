@@ -81,7 +81,7 @@ export class SiteMap {
   constructor(element, site, map) {
     this.site = site;
     this.robots = new Map();
-    this.shown = { path: true, smoothed: true, ellipse: true, landmarks: false };
+    this.shown = { path: true, smoothed: true, ellipse: true, landmarks: false, edits: true, disagreement: false };
     this.moved = false;
     const factor = map.resolution * 2 ** (map.levels - 1);
     this.leaflet = L.map(element, {
@@ -96,6 +96,7 @@ export class SiteMap {
       tileSize: TILE, minZoom: -3, maxZoom: map.levels + 3, minNativeZoom: 0, maxNativeZoom: map.levels - 1, updateWhenZooming: false,
     }).addTo(this.leaflet);
     this.landmarks = L.layerGroup().addTo(this.leaflet);
+    this.edits = L.layerGroup().addTo(this.leaflet);
     const near = () => element.classList.toggle('near', this.leaflet.getZoom() > map.levels - 1);
     this.leaflet.on('zoomend', near);
     // Robots glide when they move, and not when the map does.
@@ -216,22 +217,30 @@ export class SiteMap {
     }
   }
 
-  // Somebody shows where a robot is: presses at its place and drags to where it looks. `done` gets the pose, or nothing if
-  // Escape was pressed. Without a drag it looks where it looked before (`theta`).
-  place(name, theta, done) {
+  // Where robots differ: a picture, and the area that it covers. Without one, nobody does.
+  setDisagreement(url, area) {
+    this.disagreement?.remove();
+    this.disagreement = null;
+    if (!url || !this.shown.disagreement) return;
+    const [x0, y0, x1, y1] = area;
+    this.disagreement = L.imageOverlay(url, [at(x0, y0), at(x1, y1)], { className: 'differs', interactive: false }).addTo(this.leaflet);
+  }
+
+  // Somebody presses on the map and drags. `draw` gets both ends as they move, `done` as they are in the end, or nothing if
+  // Escape was pressed. `what` names what is being shown.
+  drag(what, layer, draw, done) {
     this.stopPlacing?.();
-    this.placing = name;
+    this.placing = what;
     const { leaflet } = this, element = leaflet.getContainer();
-    const arrow = L.polyline([], { color: colourOf(name), weight: 5, interactive: false });
     const stop = new AbortController();
     let from = null;
-    const finish = (pose) => {
+    const finish = (to) => {
       stop.abort();
       this.stopPlacing = this.placing = null;
-      arrow.remove();
+      layer.remove();
       element.classList.remove('placing');
       leaflet.dragging.enable();
-      done(pose);
+      done(to && from, to);
     };
     const on = (target, event, listener) => target.addEventListener(event, listener, { signal: stop.signal });
     const metres = (event) => leaflet.mouseEventToLatLng(event);
@@ -242,16 +251,47 @@ export class SiteMap {
       if (event.target.closest('.leaflet-control')) return;
       element.setPointerCapture(event.pointerId);
       from = metres(event);
-      arrow.setLatLngs([from, from]).addTo(leaflet);
+      draw(from, from);
+      layer.addTo(leaflet);
     });
-    on(element, 'pointermove', (event) => { if (from) arrow.setLatLngs([from, metres(event)]); });
-    on(element, 'pointerup', (event) => {
-      if (!from) return;
-      const to = metres(event);
-      const dragged = leaflet.latLngToContainerPoint(from).distanceTo(leaflet.latLngToContainerPoint(to)) > 8;
-      finish({ x: from.lng, y: from.lat, theta: dragged ? Math.atan2(to.lat - from.lat, to.lng - from.lng) : theta });
-    });
+    on(element, 'pointermove', (event) => { if (from) draw(from, metres(event)); });
+    on(element, 'pointerup', (event) => { if (from) finish(metres(event)); });
     on(window, 'keydown', (event) => { if (event.key === 'Escape') finish(null); });
+  }
+
+  // Somebody shows where a robot is: presses at its place and drags to where it looks. `done` gets the pose, or nothing.
+  // Without a drag it looks where it looked before (`theta`).
+  place(name, theta, done) {
+    const arrow = L.polyline([], { color: colourOf(name), weight: 5, interactive: false });
+    const pixel = (end) => this.leaflet.latLngToContainerPoint(end);
+    this.drag(name, arrow, (from, to) => arrow.setLatLngs([from, to]), (from, to) => {
+      if (!from) { done(null); return; }
+      const dragged = pixel(from).distanceTo(pixel(to)) > 8;
+      done({ x: from.lng, y: from.lat, theta: dragged ? Math.atan2(to.lat - from.lat, to.lng - from.lng) : theta });
+    });
+  }
+
+  // Somebody shows a wall, or a box by two opposite corners. `done` gets both ends, or nothing.
+  span(wall, done) {
+    const style = { color: getComputedStyle(document.documentElement).getPropertyValue('--bad'), weight: 3, interactive: false };
+    const shape = wall ? L.polyline([], style) : L.polygon([], { ...style, fillOpacity: 0.2 });
+    const corners = (from, to) => [from, L.latLng(from.lat, to.lng), to, L.latLng(to.lat, from.lng)];
+    this.drag('edit', shape, (from, to) => shape.setLatLngs(wall ? [from, to] : corners(from, to)), (from, to) => {
+      done(from && { x: from.lng, y: from.lat }, to && { x: to.lng, y: to.lat });
+    });
+  }
+
+  // Tiles show what is free, unknown and occupied; where robots must not drive is seen only here.
+  setEdits(edits) {
+    this.edits.clearLayers();
+    if (!this.shown.edits) return;
+    const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name);
+    for (const edit of edits) {
+      const keepOut = edit.kind === 'keep_out';
+      const style = { color: colour(keepOut ? '--bad' : '--warn'), weight: keepOut ? 2 : 1, dashArray: '4 4', fillOpacity: keepOut ? 0.15 : 0, interactive: false };
+      const places = edit.points.map(([x, y]) => at(x, y));
+      this.edits.addLayer(edit.width > 0 ? L.polyline(places, style) : L.polygon(places, style));
+    }
   }
 
   centre(pose) {

@@ -194,6 +194,16 @@ Hypothesis DpSlam::hypothesis(std::size_t index) const {
   return result;
 }
 
+std::vector<WeightedPose> DpSlam::belief() const {
+  const LevelFilter& level = high() != nullptr ? *high() : low();
+  // The pending scans follow rigidly.
+  const Pose2 T_joint_robot = high() != nullptr ? Between(T_low_joint_, low_->best().T_map_robot) : Pose2{};
+  std::vector<WeightedPose> belief;
+  for (const double weight : level.weights())
+    belief.push_back({level.particles()[belief.size()].T_map_robot * T_joint_robot, weight});
+  return belief;
+}
+
 OccupancyImage DpSlam::MapImage() const {
   if (high_) return high_->MapImage();
   const LevelFilter& level = plain_ ? *plain_ : *low_;

@@ -36,6 +36,7 @@ class DpSlam final : public Filter {
   [[nodiscard]] FilterHealth health() const override;
   [[nodiscard]] std::size_t hypothesis_count() const override;
   [[nodiscard]] Hypothesis hypothesis(std::size_t index) const override;
+  [[nodiscard]] std::vector<WeightedPose> belief() const override;
   [[nodiscard]] std::vector<Landmark> landmarks() const override { return {}; }
   void Save(StateWriter& archive) const override { archive(*this); }
   void Load(StateReader& archive) override { archive(*this); }

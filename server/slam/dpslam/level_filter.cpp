@@ -140,11 +140,15 @@ void LevelFilter::Adopt(const Drawings& drawings, std::vector<Ancestry::Child> c
   for (std::size_t i = 0; i < particles_.size(); ++i) particles_[i].map = drawings.of_particle[i];
 }
 
-std::vector<double> LevelFilter::Summarise() {
+std::vector<double> LevelFilter::weights() const {
   std::vector<double> log_weights;
   log_weights.reserve(particles_.size());
   for (const GridParticle& particle : particles_) log_weights.push_back(particle.log_weight);
-  std::vector<double> weights = NormalisedWeights(log_weights);
+  return NormalisedWeights(log_weights);
+}
+
+std::vector<double> LevelFilter::Summarise() {
+  std::vector<double> weights = this->weights();
   effective_ = EffectiveSampleSize(weights);
   best_ = 0;
   for (std::size_t i = 1; i < particles_.size(); ++i)

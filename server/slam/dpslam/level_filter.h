@@ -93,6 +93,7 @@ class LevelFilter {
   void Adopt(const Drawings& drawings, std::vector<Ancestry::Child> children);
 
   [[nodiscard]] const std::vector<GridParticle>& particles() const { return particles_; }
+  [[nodiscard]] std::vector<double> weights() const;  // Normalised weights.
   [[nodiscard]] const GridParticle& best() const { return particles_[best_]; }
   [[nodiscard]] std::size_t best_index() const { return best_; }
   [[nodiscard]] const LevelOptions& options() const { return options_; }

@@ -61,15 +61,28 @@ std::size_t ChangeTile::bytes() const {
   return list.capacity() * sizeof(CellChange) + all.capacity() * sizeof(Counts);
 }
 
+ChangeTile& MapChanges::Own(std::shared_ptr<const ChangeTile>& tile) {
+  if (tile.use_count() > 1) tile = std::make_shared<ChangeTile>(*tile);
+  // The last other owner may have been a checkpoint on another thread. Taking and giving back the tile once more puts
+  // what that thread has read before what is written now.
+  const std::shared_ptr<const ChangeTile> synchronised = tile;
+  return const_cast<ChangeTile&>(*tile);
+}
+
+bool MapChanges::IsAscending() const {
+  return std::adjacent_find(tiles_.begin(), tiles_.end(),
+                            [](const auto& a, const auto& b) { return !(a->key < b->key); }) == tiles_.end();
+}
+
 void MapChanges::Add(MapChanges&& other) {
   if (tiles_.size() < other.tiles_.size()) std::swap(tiles_, other.tiles_);
-  std::vector<ChangeTile> fresh;
+  Tiles fresh;
   auto place = tiles_.begin();
-  for (ChangeTile& tile : other.tiles_) {
-    place = std::lower_bound(place, tiles_.end(), tile.key,
-                             [](const ChangeTile& have, const ChangeTileKey& key) { return have.key < key; });
-    if (place != tiles_.end() && place->key == tile.key) {
-      place->Add(std::move(tile));
+  for (std::shared_ptr<const ChangeTile>& tile : other.tiles_) {
+    place = std::lower_bound(place, tiles_.end(), tile->key,
+                             [](const auto& have, const ChangeTileKey& key) { return have->key < key; });
+    if (place != tiles_.end() && (*place)->key == tile->key) {
+      Own(*place).Add(std::move(Own(tile)));
     } else {
       fresh.push_back(std::move(tile));
     }
@@ -78,20 +91,21 @@ void MapChanges::Add(MapChanges&& other) {
     const auto old = static_cast<std::ptrdiff_t>(tiles_.size());
     std::move(fresh.begin(), fresh.end(), std::back_inserter(tiles_));
     std::inplace_merge(tiles_.begin(), tiles_.begin() + old, tiles_.end(),
-                       [](const ChangeTile& a, const ChangeTile& b) { return a.key < b.key; });
+                       [](const auto& a, const auto& b) { return a->key < b->key; });
   }
   other.tiles_.clear();
 }
 
 void MapChanges::KeepOnly(const ChangeTileKey& low, const ChangeTileKey& high) {
-  std::erase_if(tiles_, [&](const ChangeTile& tile) {
-    return tile.key.x < low.x || tile.key.x > high.x || tile.key.y < low.y || tile.key.y > high.y;
+  std::erase_if(tiles_, [&](const auto& tile) {
+    const ChangeTileKey& key = tile->key;
+    return key.x < low.x || key.x > high.x || key.y < low.y || key.y > high.y;
   });
 }
 
 std::size_t MapChanges::bytes() const {
-  std::size_t sum = tiles_.capacity() * sizeof(ChangeTile);
-  for (const ChangeTile& tile : tiles_) sum += tile.bytes();
+  std::size_t sum = tiles_.capacity() * sizeof(Tiles::value_type);
+  for (const auto& tile : tiles_) sum += sizeof(ChangeTile) + tile->bytes();
   return sum;
 }
 

@@ -3,7 +3,7 @@
 // be merged by adding the smaller set to the larger, and a map is the sum along a line of ancestors, in any
 // order.
 // The changes are stored in square tiles of 64 x 64 cells: as a short sorted list if few cells changed, as an
-// array of all cells if many did.
+// array of all cells if many did. A tile that a checkpoint holds is copied before it changes (archive.h).
 // Counts of one cell in one particle stay below 65536: before they reach it, travel and stops are both
 // halved, which reduces the weight of old evidence and keeps the opacity. So the sum over 10,000 ancestors
 // cannot overflow 32 bits.
@@ -94,27 +94,61 @@ struct ChangeTile {
 
 class MapChanges {
  public:
+  using Tiles = std::vector<std::shared_ptr<const ChangeTile>>;
+
   // REQUIRES: tiles are appended in ascending order of their keys.
-  void Append(ChangeTile tile) { tiles_.push_back(std::move(tile)); }
+  void Append(ChangeTile tile) { tiles_.push_back(std::make_shared<ChangeTile>(std::move(tile))); }
   // Adds the other's changes to these.
   void Add(MapChanges&& other);
   // Removes the tiles outside [low, high].
   void KeepOnly(const ChangeTileKey& low, const ChangeTileKey& high);
 
-  [[nodiscard]] const std::vector<ChangeTile>& tiles() const { return tiles_; }
+  [[nodiscard]] const Tiles& tiles() const { return tiles_; }
   [[nodiscard]] bool empty() const { return tiles_.empty(); }
   [[nodiscard]] std::size_t bytes() const;  // Memory on the heap.
 
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
-    archive(self.tiles_);
-    bool sound = true;
-    for (std::size_t i = 1; i < self.tiles_.size(); ++i) sound = sound && self.tiles_[i - 1].key < self.tiles_[i].key;
-    archive.Require(sound, "the tiles of a map");
+    // Since format 11 a checkpoint shares the large tiles. It takes less time to write the others.
+    if constexpr (Archive::kReads) {
+      constexpr std::uint32_t kShared = 11;
+      std::uint64_t count = 0;
+      archive(count);
+      self.tiles_.clear();
+      while (archive.ok() && self.tiles_.size() < count) {
+        bool shared = false;
+        if (archive.format() >= kShared) archive(shared);
+        if (shared) {
+          archive(self.tiles_.emplace_back());
+        } else {
+          ChangeTile tile;
+          archive(tile);
+          self.Append(std::move(tile));
+        }
+      }
+      archive.RequireThat([&] { return self.IsAscending(); }, "the tiles of a map");
+    } else {
+      archive(static_cast<std::uint64_t>(self.tiles_.size()));
+      for (const auto& tile : self.tiles_) {
+        // By its cells and not by its memory: the same state gives the same bytes.
+        const bool shared = tile->list.size() + tile->all.size() >= kLarge;
+        archive(shared);
+        if (shared) {
+          archive(tile);
+        } else {
+          archive(*tile);
+        }
+      }
+    }
   }
 
  private:
-  std::vector<ChangeTile> tiles_;  // The tiles, ascending by key.
+  static constexpr std::size_t kLarge = 64;  // Cells.
+  // The tile of which this map is the only owner from now on.
+  static ChangeTile& Own(std::shared_ptr<const ChangeTile>& tile);
+  [[nodiscard]] bool IsAscending() const;
+
+  Tiles tiles_;  // Ascending by key. None is null, and all were made as values that can change.
 };
 
 // Draws scans taken at given poses and returns the resulting changes of the map: per cell, how far laser

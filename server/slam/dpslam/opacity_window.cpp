@@ -22,18 +22,18 @@ void OpacityWindow::Show(Ancestry::Id id) {
 
 template <int Sign>
 void OpacityWindow::Apply(const MapChanges& changes) {
-  const std::vector<ChangeTile>& tiles = changes.tiles();
+  const MapChanges::Tiles& tiles = changes.tiles();
   auto tile = std::lower_bound(tiles.begin(), tiles.end(), ChangeTileKey{box_.low_y, box_.low_x},
-                               [](const ChangeTile& have, const ChangeTileKey& key) { return have.key < key; });
-  for (; tile != tiles.end() && tile->key.y < box_.low_y + box_.height; ++tile) {
-    const int column = tile->key.x - box_.low_x, row = tile->key.y - box_.low_y;
+                               [](const auto& have, const ChangeTileKey& key) { return have->key < key; });
+  for (; tile != tiles.end() && (*tile)->key.y < box_.low_y + box_.height; ++tile) {
+    const int column = (*tile)->key.x - box_.low_x, row = (*tile)->key.y - box_.low_y;
     if (column < 0 || column >= box_.width) continue;
     const auto stride = static_cast<std::size_t>(width());
     const std::size_t corner =
         (static_cast<std::size_t>(row) << kTileBits) * stride + (static_cast<std::size_t>(column) << kTileBits);
     CellCounts* const counts = counts_.data() + corner;
     float* const rates = rates_.data() + corner;
-    tile->ForEach([&](std::uint16_t cell, std::uint16_t travel, std::uint16_t stops) {
+    (*tile)->ForEach([&](std::uint16_t cell, std::uint16_t travel, std::uint16_t stops) {
       const std::size_t at = (cell >> kTileBits) * stride + (cell & (kChangeTileSide - 1));
       CellCounts sum = counts[at];  // Unsigned arithmetic: subtraction undoes addition exactly.
       if constexpr (Sign > 0) {

@@ -116,9 +116,9 @@ OccupancyImage ParticleMaps::Image(std::size_t map, std::span<const PlacedRays> 
   TileBox box;
   int high_x = INT32_MIN, high_y = INT32_MIN;
   box.low_x = box.low_y = INT32_MAX;
-  for (const ChangeTile& tile : whole.tiles()) {
-    box.low_x = std::min(box.low_x, tile.key.x), high_x = std::max(high_x, tile.key.x);
-    box.low_y = std::min(box.low_y, tile.key.y), high_y = std::max(high_y, tile.key.y);
+  for (const auto& tile : whole.tiles()) {
+    box.low_x = std::min(box.low_x, tile->key.x), high_x = std::max(high_x, tile->key.x);
+    box.low_y = std::min(box.low_y, tile->key.y), high_y = std::max(high_y, tile->key.y);
   }
   OccupancyImage image;
   image.resolution_m = options_.resolution_m;

@@ -52,6 +52,7 @@ class FastSlam final : public Filter {
   // Hypothesis 0 is the best particle; after it come all particles.
   [[nodiscard]] std::size_t hypothesis_count() const override { return set_.size() + 1; }
   [[nodiscard]] Hypothesis hypothesis(std::size_t index) const override;
+  [[nodiscard]] std::vector<WeightedPose> belief() const override { return set_.belief(); }
   [[nodiscard]] std::vector<Landmark> landmarks() const override;
   void Save(StateWriter& archive) const override { archive(*this); }
   void Load(StateReader& archive) override { archive(*this); }

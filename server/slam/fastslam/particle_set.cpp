@@ -206,6 +206,13 @@ std::vector<double> ParticleSet::weights() const {
   return NormalisedWeights(log_weights);
 }
 
+std::vector<WeightedPose> ParticleSet::belief() const {
+  std::vector<WeightedPose> belief;
+  belief.reserve(particles_.size());
+  for (const double weight : weights()) belief.push_back({particles_[belief.size()].T_map_robot, weight});
+  return belief;
+}
+
 // `left` receives the weights of the set after resampling.
 std::vector<int> ParticleSet::Resample(std::vector<double>& left) {
   left = weights();

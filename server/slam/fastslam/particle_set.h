@@ -88,6 +88,7 @@ class ParticleSet {
     if (!innovation.empty()) nis_.Add(innovation.nis(), N);
   }
   [[nodiscard]] std::vector<double> weights() const;  // Normalised weights.
+  [[nodiscard]] std::vector<WeightedPose> belief() const;
   // Draws the pose of a particle from N(xv, pv) and sets its covariance to zero.
   void Sample(std::size_t index);
   void SampledAll() { travelled_ = 0.0; }

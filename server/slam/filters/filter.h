@@ -51,6 +51,12 @@ struct Hypothesis {
   PosePath path;  // T_map_robot at every committed keyframe.
 };
 
+// A pose of the robot and its share of the belief, 0..1.
+struct WeightedPose {
+  Pose2 T_map_robot;
+  double weight = 0.0;
+};
+
 struct FilterEstimate {
   Pose2 T_map_robot;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // Covariance of (x, y, theta) in map.
@@ -106,6 +112,8 @@ class Filter {
   // Hypothesis 0 is the best one; the others represent the spread of the belief.
   [[nodiscard]] virtual std::size_t hypothesis_count() const = 0;
   [[nodiscard]] virtual Hypothesis hypothesis(std::size_t index) const = 0;
+  // The poses of all hypotheses with their weights, whose sum is 1.
+  [[nodiscard]] virtual std::vector<WeightedPose> belief() const { return {{estimate().T_map_robot, 1.0}}; }
   [[nodiscard]] virtual std::vector<Landmark> landmarks() const = 0;  // Landmarks of the best hypothesis.
 
   // Writes the whole state, and replaces it (state/archive.h). REQUIRES: called between steps. If reading fails, the

@@ -34,7 +34,7 @@ Eigen::Matrix3d PositivePart(const Eigen::Matrix3d& matrix) {
 GridLocalisation::GridLocalisation(const GridLocalisationOptions& options)
     : options_(options),
       recovery_(options.recovery, options.loop, options.self_check, options.align, options.surface, options.blind,
-                options.lost_after_m) {
+                options.uses_odometry, options.lost_after_m) {
   options_.align.min_score = kMinScore;
 }
 

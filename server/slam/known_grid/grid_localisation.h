@@ -30,6 +30,7 @@ struct GridLocalisationOptions {
   MotionGateOptions gate;
   MotionNoise drift;  // Of a step that scans have measured, ...
   MotionNoise blind;  // ... and of one that odometry alone has.
+  bool uses_odometry = true;
   double lost_after_m = 2.0;
 };
 

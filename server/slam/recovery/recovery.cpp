@@ -151,11 +151,19 @@ Recovery::Belief Recovery::BeliefAt(const Pose2& T_odom_robot, const Pose2& T_tr
   const Pose2 moved = Between(known_.T_odom_robot, T_odom_robot);
   const Eigen::Matrix3d J_known = J_compose_left(known_.T_map_robot, moved);
   const Eigen::Matrix3d J_moved = J_compose_right(known_.T_map_robot, moved);
-  const Eigen::Matrix3d doubt = J_moved * blind_.Covariance(moved) * J_moved.transpose();
+  Eigen::Matrix3d covariance =
+      J_known * known_.covariance * J_known.transpose() + J_moved * blind_.Covariance(moved) * J_moved.transpose();
   const bool lost = contradicted_ || moved.translation().norm() > lost_after_m_;
-  return {T_map_track_ ? *T_map_track_ * T_track_robot : known_.T_map_robot * moved,
-          J_known * known_.covariance * J_known.transpose() + doubt,
-          lost ? PoseReason::kLost : PoseReason::kOdometryOnly};
+  const PoseReason reason = lost ? PoseReason::kLost : PoseReason::kOdometryOnly;
+  const Pose2 T_map_carried = known_.T_map_robot * moved;
+  if (!T_map_track_) return {T_map_carried, covariance, reason};
+  // The track may go on at a place that only looks like the last one, and odometry does not know of being carried.
+  const Pose2 T_map_tracked = *T_map_track_ * T_track_robot;
+  Eigen::Vector3d apart;
+  apart << T_map_tracked.translation() - T_map_carried.translation(),
+      AngleDiff(T_map_tracked.theta, T_map_carried.theta);
+  if (uses_odometry_) covariance += apart * apart.transpose();
+  return {T_map_tracked, covariance, reason};
 }
 
 }  // namespace cairn::slam

@@ -60,13 +60,14 @@ class Recovery {
 
   // `blind` is the noise of motion known by odometry alone.
   Recovery(const RecoveryOptions& options, const LoopOptions& loop, const SelfCheckOptions& check,
-           const PointToLineOptions& align, const SurfaceOptions& surface, const MotionNoise& blind,
+           const PointToLineOptions& align, const SurfaceOptions& surface, const MotionNoise& blind, bool uses_odometry,
            double lost_after_m)
       : options_(options),
         loop_(loop),
         search_(options.place, loop, check, align),
         surface_(surface),
         blind_(blind),
+        uses_odometry_(uses_odometry),
         lost_after_m_(lost_after_m) {}
 
   [[nodiscard]] bool active() const { return active_; }
@@ -147,6 +148,7 @@ class Recovery {
   PlaceSearch search_;
   SurfaceOptions surface_;
   MotionNoise blind_;
+  bool uses_odometry_;
   double lost_after_m_;
   bool active_ = false;
   bool odometry_goes_on_ = false;

@@ -8,10 +8,10 @@
 // the conditions on which the rest of the class relies, such as valid indices and sizes. If one does not hold while
 // reading, the reading fails, and the values read so far must not be used. Immutable values (std::shared_ptr<const T>:
 // scans, parts of the map) are not written at once. The writer shares them until Bytes() writes them, which may be
-// called on another thread. Other shared nodes (SharedSequence) are written once in the main part and once in each
-// immutable value, and are shared there again after reading. An immutable value must not contain immutable values.
-// Later() makes an immutable value of what is cheap to copy and slow to write. All numbers are little-endian. The same
-// state gives the same bytes. Not thread-safe.
+// called on another thread; as long as a value is shared, whoever wants to change it makes a copy. Other shared nodes
+// (SharedSequence) are written once in the main part and once in each immutable value, and are shared there again after
+// reading. An immutable value must not contain immutable values. Later() makes an immutable value of what is cheap to
+// copy and slow to write. All numbers are little-endian. The same state gives the same bytes. Not thread-safe.
 #pragma once
 
 #include <Eigen/Core>
@@ -72,7 +72,7 @@ inline constexpr char kKindOf = 0;
 
 // The version of what is written; it grows when the members of a class change. A reader is told which version it reads,
 // so that a class that has got a member later can leave it as it is.
-inline constexpr std::uint32_t kStateFormat = 10;
+inline constexpr std::uint32_t kStateFormat = 11;
 
 class StateWriter;
 

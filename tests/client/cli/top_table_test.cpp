@@ -39,12 +39,34 @@ std::string LineOf(const std::string& text, const std::string& robot) {
 }
 
 TEST(TopTable, RatesAreOfTheTimeBetweenTwoAnswers) {
-  TopView before{.status = {.robots = {Robot("r1", 100)}, .degraded = {}, .refused = {}}, .jobs = {}, .seconds = 10.0};
-  TopView now{.status = {.robots = {Robot("r1", 125)}, .degraded = {}, .refused = {}}, .jobs = {}, .seconds = 12.0};
+  TopView before{
+      .status = {.robots = {Robot("r1", 100)}, .degraded = {}, .refused = {}, .load = {}}, .jobs = {}, .seconds = 10.0};
+  TopView now{
+      .status = {.robots = {Robot("r1", 125)}, .degraded = {}, .refused = {}, .load = {}}, .jobs = {}, .seconds = 12.0};
   EXPECT_EQ(LineOf(FormatTop(now, &before), "r1"), "r1 hall tracking 1.50 -2.25 90 0.02 12.5 0.0 3 1.2 / 20.0");
   EXPECT_EQ(LineOf(FormatTop(now, nullptr), "r1"), "r1 hall tracking 1.50 -2.25 90 0.02 - - 3 1.2 / 20.0");
   now.status.robots[0] = Robot("r1", 7);  // A new session.
   EXPECT_EQ(LineOf(FormatTop(now, &before), "r1"), "r1 hall tracking 1.50 -2.25 90 0.02 - 0.0 3 1.2 / 20.0");
+}
+
+TEST(TopTable, TheServersLoadIsThatSinceTheLastAnswer) {
+  TopView before, now;
+  before.status.load = {.up_s = 3600.0, .processor_s = 1800.0, .memory_bytes = 100U << 20U};
+  now.status.load = {
+      .up_s = 3602.0, .processor_s = 1802.5, .memory_bytes = 200U << 20U, .inbound_waiting = 3, .outbound_waiting = 4};
+  EXPECT_THAT(FormatTop(now, &before),
+              HasSubstr("server: up 1.0 h, 125 % of a processor, 200 MiB of memory, 7 values wait in it\n"));
+  EXPECT_THAT(FormatTop(now, nullptr), HasSubstr("up 1.0 h, 50 % of"));
+  std::swap(before, now);  // The server was started again.
+  EXPECT_THAT(FormatTop(now, &before), HasSubstr("up 1.0 h, 50 % of"));
+  now.status.load = {};
+  EXPECT_THAT(FormatTop(now, nullptr), Not(HasSubstr("server:")));
+  now.status.load = {.up_s = 60.0,
+                     .stores = true,
+                     .store_bytes = 5U << 20U,
+                     .stored_after_p50_ms = 101.0,
+                     .stored_after_p99_ms = 125.4};
+  EXPECT_THAT(FormatTop(now, nullptr), HasSubstr("; on the disk after 101 ms (p99 125 ms), 5 MiB there\n"));
 }
 
 TEST(TopTable, SaysWhatIsNotAsUsual) {

@@ -188,7 +188,7 @@ TEST(Backlog, WhatNoFileTakesIsGivenUpAndSaid) {
 TEST(Backlog, OnAFullDiskTheOldestMakeRoomForTheNewest) {
   const TempDirectory directory;
   const auto disk = test::OwnMount::Disk(directory.path(), 64 * 1024);
-  if (!disk) GTEST_SKIP() << "this user may not mount a small disk";
+  if (!disk) GTEST_SKIP() << "SKIPPED: this user may not mount a small disk";
   Backlog backlog(20 * 1024);
   backlog.SpillTo(std::move(*SpillFile::Create((directory / "spill").string())));
   std::uint64_t added = 0;

@@ -339,6 +339,17 @@ void FakeServer::OnRequest(Request&& request) {
       break;
     case RequestKind::kSessionEnd:
       break;
+    case RequestKind::kMapEdits:
+      reply.edits.resize(2);
+      for (MapEdit& edit : reply.edits) edit.points_map = {{0, 0}, {1, 0}, {request.site == "moon" ? 1e9 : 1, 1}};
+      break;
+    case RequestKind::kMapEditAdd:
+      reply.edits = {request.edit};
+      reply.edits[0].id = 5;
+      break;
+    case RequestKind::kMapEditRemove:
+      if (request.edit.id != 5) reply.status = {StatusCode::kNotFound, "no edit"};
+      break;
     case RequestKind::kLocalise:
     case RequestKind::kMap:
       if (request.robot != "robot1") reply.status = {StatusCode::kNotFound, "no robot " + request.robot};

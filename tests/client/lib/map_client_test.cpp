@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 
 #include "tests/client/lib/fake_server.h"
 #include "tests/loopback.h"
@@ -59,6 +60,39 @@ TEST(MapClient, ANewEpochReplacesTheMapWhole) {
   server.Publish(TileAt(3, 1, 2));
   EXPECT_TRUE(Eventually([&] { return client->epoch() == 1 && client->tiles().size() == 1; }));
   Must(client->WaitComplete(20.0));
+}
+
+// The reader of tiles can become deaf by itself, while descriptions of the map arrive without a pause.
+TEST(MapClient, WhereOnlyTheDescriptionsArriveItJoinsAnew) {
+  FakeServer server(LoopbackOptions());
+  server.Publish(TileAt(3, 0, 1));
+  server.Publish(Hall(0, 1, 1));
+  const auto bus = MakeBus("client");
+  const auto client = Must(MapClient::Create(*bus, "hall"));
+  Must(client->WaitComplete(20.0));
+  auto next = std::chrono::steady_clock::now();
+  std::uint64_t version = 1;
+  EXPECT_TRUE(Eventually([&] {
+    if (std::chrono::steady_clock::now() >= next) {
+      server.Publish(Hall(0, ++version, 1));
+      next += std::chrono::milliseconds(200);
+    }
+    return client->renewed() > 0;
+  }));
+  server.Publish(TileAt(3, 0, version));
+  Must(client->WaitComplete(20.0));
+  EXPECT_EQ(client->version(), version);
+}
+
+// All tiles may have been deleted, and the newest one before the server was started.
+TEST(MapClient, WhereNoTileIsMissingItStays) {
+  FakeServer server(LoopbackOptions());
+  server.Publish(Hall(0, 5, 0));
+  const auto bus = MakeBus("client");
+  const auto client = Must(MapClient::Create(*bus, "hall"));
+  ASSERT_TRUE(Eventually([&] { return client->info().has_value(); }));
+  // Longer than it takes to join anew where only descriptions arrive.
+  EXPECT_FALSE(Eventually([&] { return client->renewed() > 0; }, std::chrono::seconds(6)));
 }
 
 // Everything of an earlier generation of the server is ignored, so a forged later one would hide the map for ever.

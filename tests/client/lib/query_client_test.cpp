@@ -77,6 +77,17 @@ TEST_F(QueryClientTest, SwitchesToAMapVersionAndBack) {
   EXPECT_EQ(Must(client_->EnableMap("hall", 3)).enabled_version, 3U);
 }
 
+TEST_F(QueryClientTest, EditsOfAMapAreListedAddedAndRemoved) {
+  EXPECT_EQ(Must(client_->MapEdits("hall")).size(), 2U);
+  EXPECT_EQ(client_->MapEdits("moon").error().code, StatusCode::kInternal) << "its points are far away";
+  const MapEdit wall{.kind = MapEditKind::kOccupied, .points_map = {{0, 0}, {1, 2}}, .width_m = 0.1, .note = "glass"};
+  const MapEdit added = Must(client_->AddMapEdit("hall", wall));
+  EXPECT_EQ(added.id, 5U);
+  EXPECT_EQ(added.points_map, wall.points_map);
+  EXPECT_TRUE(client_->RemoveMapEdit("hall", 5));
+  EXPECT_EQ(client_->RemoveMapEdit("hall", 6).error().code, StatusCode::kNotFound);
+}
+
 TEST_F(QueryClientTest, WaitsForAJobUntilItEndsOrTheCallerHasEnough) {
   int running = 0;
   const Job ended = Must(client_->WaitForJob(5, [&](const Job& job) { return ++running, !IsFinal(job.state); }));

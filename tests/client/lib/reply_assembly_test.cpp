@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/common/wire/sample_values.h"
+
 namespace cairn::client {
 namespace {
 
@@ -19,6 +21,19 @@ TEST(ReplyAssembly, ASinglePartIsComplete) {
   EXPECT_FALSE(assembly.complete());
   assembly.Add(Part(0, true));
   EXPECT_TRUE(assembly.complete());
+}
+
+TEST(ReplyAssembly, NothingOfAReplyIsLost) {
+  Reply reply = wire::ExtremeReply();
+  reply.part = 0;
+  reply.last = true;
+  ReplyAssembly assembly;
+  assembly.Add(Reply(reply));
+  const Reply whole = assembly.Take();
+  Reply expected = reply;
+  expected.part = whole.part;
+  expected.last = whole.last;
+  EXPECT_TRUE(wire::Same(whole, expected));
 }
 
 TEST(ReplyAssembly, PartsInAnyOrderMakeTheListInOrder) {
@@ -40,6 +55,28 @@ TEST(ReplyAssembly, RepeatedPartsCountOnce) {
   assembly.Add(Part(0, false));
   assembly.Add(Part(1, true));
   EXPECT_EQ(assembly.Take().path.size(), 2U);
+}
+
+// A server that was started anew answers the repeated question. Parts of its answer and of the earlier server's must
+// not be mixed.
+TEST(ReplyAssembly, AllPartsAreOfOneServer) {
+  const auto of = [](Generation generation, std::uint32_t number, bool last) {
+    Reply part = Part(number, last);
+    part.generation = generation;
+    return part;
+  };
+  ReplyAssembly assembly;
+  assembly.Add(of(5, 0, false));
+  assembly.Add(of(5, 2, true));
+  assembly.Add(of(6, 1, true));
+  EXPECT_FALSE(assembly.complete());
+  assembly.Add(of(5, 1, false));
+  EXPECT_FALSE(assembly.complete()) << "what an earlier server has sent comes too late";
+  assembly.Add(of(6, 0, false));
+  ASSERT_TRUE(assembly.complete());
+  const Reply whole = assembly.Take();
+  EXPECT_EQ(whole.generation, 6U);
+  EXPECT_EQ(whole.path.size(), 2U);
 }
 
 TEST(ReplyAssembly, AMissingPartIsMissed) {

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "client/lib/ros2_findings.h"
+#include "client/web/tile_picture.h"
 #include "client/web/web_metrics.h"
 #include "common/map/image_codec.h"
 #include "tests/client/lib/fake_server.h"
@@ -128,6 +129,33 @@ TEST(Metrics, NamesAreQuotedAndSamplesOfAMetricStandTogether) {
                               "\n"
                               R"(cairn_scans_used_total{site="",robot="",sensor="laser"} 7)"));
   EXPECT_THAT(text, HasSubstr("quantile=\"0.99\"} 0.025\n"));
+}
+
+TEST(Metrics, AServerThatStoresNothingHasNoFiguresOfItsStore) {
+  ServerView view;
+  view.connected = true;
+  view.status.load = {.up_s = 60.0, .processor_s = 3.5, .memory_bytes = 1U << 20U, .outbound_waiting = 4};
+  const std::string in_memory = MetricsText(view);
+  EXPECT_THAT(in_memory, HasSubstr("\ncairn_server_processor_seconds_total 3.5\n"));
+  EXPECT_THAT(in_memory, HasSubstr("\ncairn_server_memory_bytes 1048576\n"));
+  EXPECT_THAT(in_memory, HasSubstr("\ncairn_server_waiting{queue=\"outbound\"} 4\n"));
+  EXPECT_THAT(in_memory, Not(HasSubstr("cairn_store")));
+  view.status.load.stores = true;
+  view.status.load.failed_commits = 2;
+  view.status.load.stored_after_p99_ms = 125.0;
+  EXPECT_THAT(MetricsText(view), HasSubstr("\ncairn_store_commits_total{result=\"failed\"} 2\n"));
+  EXPECT_THAT(MetricsText(view), HasSubstr("\ncairn_store_delay_seconds{quantile=\"0.99\"} 0.125\n"));
+}
+
+TEST(TilePicture, OnlyCellsAboutWhichRobotsDifferAreDrawn) {
+  OccupancyImage image{.resolution_m = 0.05, .T_map_origin = {}, .width = 2, .height = 2, .cells = {0, 100, 50, 255}};
+  const auto png = DrawDisagreement(image);
+  ASSERT_TRUE(png);
+  const auto drawn = Must(DecodeImage({png->begin(), png->end()}));
+  EXPECT_EQ(drawn.channels, 4);
+  std::vector<int> alpha;
+  for (std::size_t i = 3; i < drawn.samples.size(); i += 4) alpha.push_back(drawn.samples[i]);
+  EXPECT_EQ(alpha, (std::vector<int>{0, 0, 0, 230})) << "the highest row first";
 }
 
 TEST_F(Page, TilesArePicturesWithATagPerContentAndTheme) {
@@ -250,6 +278,34 @@ TEST_F(Page, SomebodySaysWhereARobotIs) {
     EXPECT_EQ(relocalise(body), 400) << body;
   const auto asked = server_->asked();
   EXPECT_EQ(std::count(asked.begin(), asked.end(), RequestKind::kRelocalise), 3);
+}
+
+TEST_F(Page, PeopleEditAMap) {
+  StartServer();
+  Open("secret");
+  ASSERT_TRUE(KnowsSite());
+  const auto edits = json::parse(Get("/api/sites/drawn/edits").body);
+  ASSERT_EQ(edits.size(), 2U);
+  EXPECT_EQ(edits[0]["kind"], "free");
+  EXPECT_EQ(edits[0]["points"][1], json({1.0, 0.0}));
+  const std::string wall = R"({"kind":"occupied","points":[[0,0],[1,2.5]],"width":0.1,"note":"glass"})";
+  EXPECT_EQ(Post("/api/sites/drawn/edit", "", wall).status, 401);
+  EXPECT_EQ(Post("/api/sites/drawn/edit", "secret", wall).status, 200);
+  for (const char* body :
+       {"[]", "{}", R"({"kind":"hole","points":[[0,0],[1,0],[1,1]]})", R"({"kind":"free","points":[[0,0],[1,1]]})",
+        R"({"kind":"free","points":7})", R"({"kind":"free","points":[[0,0],[1,0],[1]]})",
+        R"({"kind":"free","points":[[0,0],[1,0],[1,"1"]]})", R"({"kind":"free","points":[[0,0],[1,0],[1,1e999]]})",
+        R"({"kind":"free","points":[[0,0],[1,0],[1,1]],"width":"1"})",
+        R"({"kind":"free","points":[[0,0],[1,0],[1,1]],"note":7})",
+        R"({"kind":"free","points":[[0,0],[1,0],[1,1]],"note":"\u001b"})"})
+    EXPECT_EQ(Post("/api/sites/drawn/edit", "secret", body).status, 400) << body;
+  EXPECT_EQ(Post("/api/sites/drawn/remove-edit", "", R"({"id":"5"})").status, 401);
+  EXPECT_EQ(Post("/api/sites/drawn/remove-edit", "secret", R"({"id":"5"})").status, 200);
+  EXPECT_EQ(Post("/api/sites/drawn/remove-edit", "secret", R"({"id":"6"})").status, 404);
+  for (const char* body : {"{}", R"({"id":5})", R"({"id":"-5"})", R"({"id":"5 "})"})
+    EXPECT_EQ(Post("/api/sites/drawn/remove-edit", "secret", body).status, 400) << body;
+  const auto asked = server_->asked();
+  EXPECT_EQ(std::count(asked.begin(), asked.end(), RequestKind::kMapEditAdd), 1);
 }
 
 TEST_F(Page, ARobotIsOnlyLocalisedOrMapsAgain) {

@@ -57,6 +57,18 @@ TEST(Bounds, RefuseAbsurdScans) {
   ExpectRefused(scan, "ranges_m");
 }
 
+TEST(Bounds, RefuseEditsOfTooManyPointsAndTooManyEdits) {
+  v1::Request request = ToWire(ExtremeRequest());
+  request.edit().points().emplace_back();
+  ExpectRefused(request, "edit");
+  v1::Reply reply = ToWire(ExtremeReply());
+  reply.edits().resize(kMaxReplyEdits + 1);
+  ExpectRefused(reply, "edits");
+  reply.edits().clear();
+  reply.hypotheses().resize(kMostHypotheses + 1);
+  ExpectRefused(reply, "hypotheses");
+}
+
 TEST(Bounds, RefuseAReportOnRos2ThatIsTooLong) {
   v1::Reply reply = ToWire(ExtremeReply());
   reply.ros2_namespaces().at(0).problems().resize(kMaxRos2Problems + 1);
@@ -83,8 +95,11 @@ TEST(Bounds, RefuseUnknownEnumValues) {
   job.state(static_cast<v1::JobState>(5));
   ExpectRefused(job, "state");
   v1::Request request = ToWire(ExtremeRequest());
-  request.kind(static_cast<v1::RequestKind>(21));
+  request.kind(static_cast<v1::RequestKind>(kRequestKindCount));
   ExpectRefused(request, "kind");
+  request = ToWire(ExtremeRequest());
+  request.edit().kind(static_cast<v1::MapEditKind>(kMapEditKindCount));
+  ExpectRefused(request, "edit");
   request = ToWire(ExtremeRequest());
   request.job_kind(static_cast<v1::JobKind>(77));
   ExpectRefused(request, "job_kind");

@@ -77,7 +77,7 @@ TEST(Convert, NumbersOfTheIdlEnumsAreThoseOfTheValues) {
   EXPECT_EQ(static_cast<int>(v1::JOB_JOIN), static_cast<int>(JobKind::kJoin));
   EXPECT_EQ(static_cast<int>(v1::JOB_CANCELLED), static_cast<int>(JobState::kCancelled));
   EXPECT_EQ(static_cast<int>(v1::REQUEST_SESSION_END), static_cast<int>(RequestKind::kSessionEnd));
-  EXPECT_EQ(static_cast<int>(v1::REQUEST_MAP) + 1, kRequestKindCount);
+  EXPECT_EQ(static_cast<int>(v1::REQUEST_MAP_EDIT_REMOVE) + 1, kRequestKindCount);
 }
 
 // The number idl/README.md gives to writers of other clients.

@@ -39,6 +39,27 @@ TEST(RtpsDatagram, TheStatisticsAssertIsNotReached) {
   EXPECT_EQ(followed.Inspect(), DatagramFault::kStatistics);
 }
 
+// Fast DDS adds statistics to each datagram, also where its receivers cut them off.
+TEST(RtpsDatagram, StatisticsAtTheEndAreLeftOut) {
+  const Bytes plain = Datagram().Heartbeat(1, 2).bytes();
+  const auto left = [](const Bytes& datagram) {
+    const auto kept = WithoutStatistics(datagram);
+    return Bytes(kept.begin(), kept.end());
+  };
+  EXPECT_EQ(left(plain), plain);
+  Bytes with = Datagram().Heartbeat(1, 2).Begin(0x80, 0).Zeros(56).End().bytes();
+  ASSERT_EQ(with.size(), plain.size() + 60);
+  for (; with.size() >= plain.size() + 4; with.pop_back()) EXPECT_EQ(left(with), plain) << with.size();
+  const Bytes to_the_end = Datagram().Heartbeat(1, 2).Begin(0x80, 0).Zeros(56).EndWithLength(0).bytes();
+  EXPECT_EQ(left(to_the_end), plain);
+  const Bytes followed = Datagram().Begin(0x80, 0).Zeros(56).End().Heartbeat(1, 2).bytes();
+  EXPECT_EQ(left(followed), followed);
+  for (std::size_t size = 0; size <= plain.size(); ++size) {
+    const Bytes cut(plain.begin(), plain.begin() + static_cast<std::ptrdiff_t>(size));
+    EXPECT_EQ(left(cut), cut);
+  }
+}
+
 // It aborts Fast DDS 2.9.1, which goes on at the next multiple of four bytes, with an empty submessage and then with
 // statistics that are not the last. Without the gap there is one unknown submessage to the end.
 TEST(RtpsDatagram, TheNextSubmessageBeginsAtTheSamePlaceForEveryReceiver) {

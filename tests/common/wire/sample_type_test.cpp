@@ -133,7 +133,8 @@ TYPED_TEST(HostileCdr, HugeLengthsAnywhereNeitherThrowNorAllocate) {
   }
   rusage after{};
   getrusage(RUSAGE_SELF, &after);
-  EXPECT_LT(after.ru_maxrss - before.ru_maxrss, 256 * 1024);  // KiB.
+  // In KiB: less than the smallest of these lengths. The address sanitizer alone keeps 256 MiB of what was freed.
+  EXPECT_LT(after.ru_maxrss - before.ru_maxrss, 400 * 1024);
 }
 
 TYPED_TEST(HostileCdr, RandomBytesAndMutationsNeverThrow) {

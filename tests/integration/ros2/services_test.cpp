@@ -109,9 +109,9 @@ class FastClient {
 
 class RosServices : public ::testing::Test {
  protected:
-  ~RosServices() override { thread_ = {}; }
-  void Run(std::function<void()> tick = [] {}) {
-    thread_ = std::jthread([this, tick = std::move(tick)](const std::stop_token& stop) {
+  // Serves until the thread is destroyed, which must come before what `tick` and the services refer to.
+  [[nodiscard]] std::jthread Run(std::function<void()> tick = [] {}) {
+    return std::jthread([this, tick = std::move(tick)](const std::stop_token& stop) {
       bus_->Run(stop, tick, std::chrono::milliseconds(10), [this](const std::exception&) { ++failures_; });
     });
   }
@@ -137,7 +137,6 @@ class RosServices : public ::testing::Test {
 
   std::unique_ptr<Bus> bus_ = Must(Bus::Create(Options(), "server"));
   std::atomic<int> failures_{0};
-  std::jthread thread_;
 };
 
 TEST_F(RosServices, AMapForWhoAsksAsRmwFastrtpsDoes) {
@@ -149,7 +148,7 @@ TEST_F(RosServices, AMapForWhoAsksAsRmwFastrtpsDoes) {
     response.map.cells.assign(200'000, 100);  // More than one datagram.
     return response;
   });
-  Run();
+  const std::jthread bus_thread = Run();
   for (const bool names_its_reader : {true, false}) {
     FastClient<GetMap> client("/lab/dynamic_map", names_its_reader), other("/lab/dynamic_map", names_its_reader);
     AskAndWait<GetMap>(other, {});  // Answered itself, so that the service has found its reader.
@@ -172,7 +171,7 @@ TEST_F(RosServices, TextsAndResults) {
     name = request.name;
     return SaveMap::Response{SaveMap::kNoMapReceived};
   });
-  Run();
+  const std::jthread bus_thread = Run();
   FastClient<SaveMap> client("/lab/save_map", true);
   ::slam_toolbox::srv::dds_::SaveMap_Request_ request;
   request.name().data("monday");
@@ -184,7 +183,7 @@ TEST_F(RosServices, TextsAndResults) {
 TEST_F(RosServices, ATextThatIsTooLongIsCountedAndNotAnswered) {
   const auto service =
       Serve<SaveMap>("/lab/save_map", [](const SaveMap::Request&) { return SaveMap::Response{SaveMap::kSuccess}; });
-  Run();
+  const std::jthread bus_thread = Run();
   FastClient<SaveMap> client("/lab/save_map", true);
   ASSERT_TRUE(Eventually([&] { return client.ServiceIsThere(); }));
   ::slam_toolbox::srv::dds_::SaveMap_Request_ request;
@@ -203,7 +202,7 @@ TEST_F(RosServices, WhatThrowsIsReportedAndTheBusGoesOn) {
     if (++calls == 1) throw std::bad_alloc();
     return Pause::Response{true};
   });
-  Run([&ticks] {
+  const std::jthread bus_thread = Run([&ticks] {
     if (++ticks % 2 == 1) throw std::bad_alloc();
   });
   FastClient<Pause> client("/lab/pause", true);

@@ -1,6 +1,8 @@
 // A member of a fleet, or a stranger, that ignores every check of its own side: of its certificate, and of what its
 // permissions allow it to write. Only what the other side enforces can stop it.
-// Usage: hostile_peer DOMAIN DIRECTORY ask | command | scan ROBOT PARTITION
+// Usage: hostile_peer DOMAIN DIRECTORY ask | command | pose ROBOT | tile SITE
+//                                      | scan ROBOT PARTITION | odometry ROBOT PARTITION | end ROBOT PARTITION
+// `end` asks the server to end the robot's session.
 // It sends ten times a second until it is killed, and says when it has matched a reader.
 #include <openssl/x509_vfy.h>
 
@@ -43,6 +45,7 @@ int Send(wire::Bus& bus, const std::string& robot, Value value) {
       std::cout << "matched" << std::endl;
     }
     if constexpr (std::is_same_v<Value, ScanSample>) ++value.scan.sequence;
+    if constexpr (std::is_same_v<Value, OdometrySample>) ++value.odometry.sequence;
     static_cast<void>((*publication)->Publish(value));
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
   }
@@ -72,8 +75,33 @@ int main(int argc, char** argv) {
   }
   if (arguments[2] == "ask") return Send(**bus, "", RequestOf(RequestKind::kPing));
   if (arguments[2] == "command") return Send(**bus, "", Command{RequestOf(RequestKind::kJobSubmit)});
+  const std::string& name = arguments.at(3);
+  if (arguments[2] == "pose") {
+    PoseReport pose;
+    pose.robot = name;
+    pose.robot_id = HashName(name);
+    pose.localized = true;
+    return Send(**bus, "", pose);
+  }
+  if (arguments[2] == "tile") {
+    TileSample tile;
+    tile.site_id = HashName(name);
+    tile.tile.version = 1;
+    return Send(**bus, "", tile);
+  }
+  const std::string& partition = arguments.at(4);
+  if (arguments[2] == "end") {
+    SessionRequest request;
+    request.robot = name;
+    request.site = "hall";
+    request.end = true;
+    request.client = request.session = 66;
+    return Send(**bus, partition, request);
+  }
+  const StreamId stream = {.robot_id = HashName(name), .sensor_id = HashName("laser"), .session = 5};
+  if (arguments[2] == "odometry") return Send(**bus, partition, OdometrySample{.stream = stream, .odometry = {}});
   ScanSample sample;
-  sample.stream = {.robot_id = HashName(arguments.at(3)), .sensor_id = HashName("laser"), .session = 5};
+  sample.stream = stream;
   sample.scan.ranges_m.assign(10, 1.0F);
-  return Send(**bus, arguments.at(4), sample);
+  return Send(**bus, partition, sample);
 }

@@ -40,7 +40,8 @@ PoseReport Of(const std::string& robot) {
 }
 
 TEST(DiscoveryServer, ParticipantsFindEachOtherThroughItAndOnlyThroughIt) {
-  if (!std::filesystem::exists(kProgram)) GTEST_SKIP() << kProgram << " is not installed (package fastdds-tools)";
+  if (!std::filesystem::exists(kProgram))
+    GTEST_SKIP() << "SKIPPED: " << kProgram << " is not installed (package fastdds-tools)";
   const std::string port = std::to_string(FreePort());
   const auto start = [&] {
     return std::make_unique<ChildProcess>(std::vector<std::string>{kProgram, "-i", "0", "-l", "127.0.0.1", "-p", port});

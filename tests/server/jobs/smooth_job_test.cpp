@@ -321,9 +321,15 @@ SessionMaterial MaterialWithALongFit() {
   return material;
 }
 
+// Whether somebody cancels the job, or the server stops.
+class EndOfAFit : public ::testing::TestWithParam<bool> {};
+
+INSTANTIATE_TEST_SUITE_P(JobWorker, EndOfAFit, ::testing::Bool(),
+                         [](const auto& cancels) { return cancels.param ? "Cancel" : "Stop"; });
+
 // Drawing asks before each step whether the job was cancelled, but the fit draws nothing for minutes. A server that
 // was told to stop meanwhile waited for its end.
-TEST(JobWorker, StopEndsALongFitAtItsNextIteration) {
+TEST_P(EndOfAFit, ComesAtTheNextIteration) {
   const SessionMaterial material = MaterialWithALongFit();
   const JobsOptions options;
   Outbound outbound(32);
@@ -358,7 +364,12 @@ TEST(JobWorker, StopEndsALongFitAtItsNextIteration) {
   const double begun_s = worked_s();
   ASSERT_TRUE(wait_until([&] { return worked_s() > begun_s + 0.05; }));
   const auto stopped = std::chrono::steady_clock::now();
-  worker.Stop();
+  if (GetParam()) {
+    ASSERT_TRUE(list.Cancel(job->id));
+    EXPECT_TRUE(wait_until([&] { return list.Find(job->id)->state == JobState::kCancelled; }));
+  } else {
+    worker.Stop();
+  }
   EXPECT_LT(std::chrono::steady_clock::now() - stopped, std::chrono::seconds(5));
   EXPECT_EQ(list.Find(job->id)->state, JobState::kCancelled);
   EXPECT_LT(list.Find(job->id)->progress, 0.5) << "the drawing after the fit has begun";

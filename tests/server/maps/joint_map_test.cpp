@@ -98,6 +98,49 @@ TEST(LayerSum, CellsThatOnlyOneHasSeenAreKeptAndSumsAreBounded) {
   EXPECT_EQ(sum.log_odds[1], 45);
 }
 
+TEST(JointMap, WhereSessionsDifferIsALayerOfItsOwn) {
+  JointMap map(kPast);
+  const std::int16_t wall = 300, free = -300;
+  auto first = std::make_shared<slam::GridChunk>(*ChunkOf(free)), second = std::make_shared<slam::GridChunk>(*first);
+  const auto at = [](std::size_t column, std::size_t row) { return row * kTileCells + column; };
+  second->log_odds[at(10, 10)] = wall;  // The first has seen no wall near it.
+  first->log_odds[at(50, 50)] = wall;   // A wall that they have placed in neighbouring cells.
+  second->log_odds[at(51, 49)] = wall;
+  first->log_odds[at(90, 90)] = slam::kUnseen;
+  second->log_odds[at(0, 70)] = wall;  // At the border.
+  map.Apply({.session = 1, .chunks = {{{0, 0}, first}, {{1, 0}, ChunkOf(wall)}}});
+  EXPECT_TRUE(map.RenderDisagreement().empty());
+  map.Apply({.session = 2, .chunks = {{{0, 0}, second}}});
+  EXPECT_EQ(map.RenderDisagreement(), (std::vector<TileKey>{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}}));
+  const TileCells& cells = *map.disagreement().at({0, 0, 0});
+  EXPECT_EQ(cells[at(10, 10)], slam::OccupancyOf(wall) - slam::OccupancyOf(free));
+  EXPECT_EQ(cells[at(11, 10)], 0);
+  EXPECT_EQ(cells[at(50, 50)], 0);
+  EXPECT_EQ(cells[at(51, 49)], 0);
+  EXPECT_EQ(cells[at(90, 90)], kUnknownCell) << "only one has seen it";
+  EXPECT_EQ(cells[at(0, 70)], kUnknownCell) << "its neighbours are in another chunk";
+  EXPECT_FALSE(map.disagreement().contains({0, 1, 0}));
+  map.SetHidden(2, true);
+  EXPECT_EQ(map.RenderDisagreement().size(), 4U);
+  EXPECT_TRUE(map.disagreement().empty());
+  map.SetHidden(2, false);
+  EXPECT_EQ(map.RenderDisagreement().size(), 4U);
+  map.SetPast(1);  // It still counts: this is how a change since the last run shows.
+  EXPECT_TRUE(map.RenderDisagreement().empty());
+  EXPECT_FALSE(map.disagreement().empty());
+  map.SetPast(2);
+  map.MergePast(1, 2);  // Both are one layer now.
+  EXPECT_EQ(map.RenderDisagreement().size(), 4U);
+  EXPECT_TRUE(map.disagreement().empty());
+}
+
+TEST(JointMap, WhereSessionsDifferByLessThanHalfThereIsNoTile) {
+  JointMap map(kPast);
+  map.Apply({.session = 1, .chunks = {{{0, 0}, ChunkOf(0)}}});
+  map.Apply({.session = 2, .chunks = {{{0, 0}, ChunkOf(300)}}});
+  EXPECT_TRUE(map.RenderDisagreement().empty());
+}
+
 TEST(JointMap, AHiddenSessionIsKeptAndNotShown) {
   JointMap map(kPast);
   map.Apply({.session = 1, .chunks = {{{0, 0}, ChunkOf(100, 2)}}});

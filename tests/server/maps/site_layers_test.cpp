@@ -70,6 +70,35 @@ TEST_F(SiteLayers, WhatEndedFirstIsThePastAlsoForTheNextServer) {
   EXPECT_EQ(CellOf(*next), before);
 }
 
+TEST_F(SiteLayers, EditsAreThereForTheNextServer) {
+  {
+    Journal journal(*store_, StoreOptions{});
+    journal.Start();
+    const auto site = NewSite(journal);
+    site->Join({.session = 1, .robot = 101, .owner = {}});
+    site->Change({.session = 1, .chunks = {{{0, 0}, UniformChunk(389)}}});
+    site->Leave(1);
+    for (const MapEditKind kind : {MapEditKind::kOccupied, MapEditKind::kFree}) {
+      MapEdit edit{.kind = kind, .points_map = {{0, 0}, {1, 0}, {1, 1}, {0, 1}}, .note = "seen by Ann"};
+      site->AddEdit(std::move(edit), [](const Result<std::uint64_t>& id) { EXPECT_TRUE(id); });
+    }
+    site->RemoveEdit(1, [](const Result<std::uint64_t>& version) { EXPECT_EQ(version, 3U); });
+    EXPECT_EQ(CellOf(*site), 0);
+    journal.Stop();
+  }
+  Journal journal(*store_, StoreOptions{});
+  const auto stored = ReadSite(*store_, "lab");
+  ASSERT_TRUE(stored);
+  const auto next = NewSite(journal);
+  StartControl control;
+  ASSERT_TRUE(next->Restore(stored->site, control));
+  EXPECT_EQ(CellOf(*next), 0);
+  ASSERT_EQ(next->snapshot()->edits->size(), 1U);
+  EXPECT_EQ(next->snapshot()->edits->front().id, 2U);
+  EXPECT_EQ(next->snapshot()->edits->front().note, "seen by Ann");
+  EXPECT_EQ(next->snapshot()->info.edits_version, 3U);
+}
+
 // As a session that had ended before the server was started.
 TEST_F(SiteLayers, ASessionThatEntersAsEndedIsThePast) {
   Journal journal(*store_, StoreOptions{});

@@ -95,6 +95,22 @@ TEST_F(DeskTest, ARequestBeyondTheQueueIsAnsweredBusyAtOnceAndTheOthersLater) {
   }
 }
 
+TEST_F(DeskTest, ASavedSiteBeyondTheQueueIsAnsweredBusyAtOnce) {
+  desk_.Start();  // It hands them on to a thread that has not been started.
+  constexpr std::int64_t kWaiting = 16;
+  for (std::int64_t sequence = 1; sequence <= kWaiting + 1; ++sequence) {
+    Request save = Of(RequestKind::kSiteSave);
+    save.sequence = sequence;
+    desk_.Take(std::move(save));
+    ASSERT_TRUE(test::Eventually([&] { return desk_.pulse().finished == static_cast<std::uint64_t>(sequence); }));
+  }
+  const auto busy = NextReply();
+  ASSERT_TRUE(busy);
+  EXPECT_EQ(busy->sequence, kWaiting + 1);
+  EXPECT_EQ(busy->status.code, StatusCode::kResourceExhausted);
+  EXPECT_EQ(outbound_.over_limit(), 1U);
+}
+
 // The watchdog looks at it: a desk that has work and finishes none is stalled.
 TEST_F(DeskTest, ItsPulseTellsWhetherRequestsWaitAndWhetherTheyAreTaken) {
   EXPECT_FALSE(desk_.pulse().busy);

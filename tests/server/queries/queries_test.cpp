@@ -73,6 +73,8 @@ class Queries : public ::testing::Test {
       case RequestKind::kMapInfo:
         return AnswerMapInfo(request_,
                              request_.site.empty() ? Maps{std::make_shared<const MapSnapshot>(map_)} : Site());
+      case RequestKind::kMapEdits:
+        return AnswerMapEdits(request_, Site());
       case RequestKind::kStatus:
         return AnswerStatus(request_, request_.robot.empty() ? Sessions{session_} : Robot());
       default:
@@ -115,6 +117,22 @@ TEST_F(Queries, PoseAtAStampIsInterpolatedNotYetOrNever) {
   EXPECT_EQ(Ask(RequestKind::kPose).status.code, StatusCode::kOutOfRange);
   request_.robot = "r2";
   EXPECT_EQ(Ask(RequestKind::kPose).status.code, StatusCode::kNotFound);
+}
+
+TEST_F(Queries, TheNewestPoseComesWithItsHypotheses) {
+  AddPose(100, 1.0);
+  AddPose(200, 2.0);
+  session_.hypotheses = {{200, {2.0, 0.0, 0.0}, 0.75}, {200, {9.0, 0.0, 0.0}, 0.25}};
+  EXPECT_TRUE(Ask(RequestKind::kPose).hypotheses.empty()) << "the robot is not localized";
+  session_.status.pose.localized = true;
+  EXPECT_EQ(Ask(RequestKind::kPose).hypotheses.size(), 2U);
+  EXPECT_EQ(Ask(RequestKind::kPose).hypotheses.at(1).weight, 0.25);
+  session_.hypotheses.clear();  // As after a restart.
+  EXPECT_EQ(Ask(RequestKind::kPose).hypotheses.at(0).T_map_robot.x, 2.0);
+  EXPECT_EQ(Ask(RequestKind::kPose).hypotheses.at(0).weight, 1.0);
+  request_.latest = false;
+  request_.stamp = 150;
+  EXPECT_TRUE(Ask(RequestKind::kPose).hypotheses.empty());
 }
 
 TEST_F(Queries, PathIsOnlineOrSmoothed) {
@@ -164,6 +182,18 @@ TEST_F(Queries, TilesByAreaLevelAndVersion) {
   EXPECT_EQ(Ask(RequestKind::kTiles).map_version, 10U);
 }
 
+TEST_F(Queries, TilesOfTheLayerOfDisagreement) {
+  AddTile({0, 0, 0}, 5);
+  AddTile({0, 1, 0}, 8);
+  request_.disagreement = true;
+  EXPECT_TRUE(Ask(RequestKind::kTiles).tiles.empty());
+  auto tile = std::make_shared<Tile>();
+  tile->key = {0, 7, 7};
+  map_.disagreement = map_.disagreement.With({{tile->key, tile}});
+  EXPECT_EQ(Ask(RequestKind::kTiles).tiles.at(0).key, (TileKey{0, 7, 7}));
+  EXPECT_EQ(Ask(RequestKind::kTiles).tiles.size(), 1U);
+}
+
 TEST_F(Queries, TilesOfImpossibleLevelsAndAreasAreRefused) {
   request_.level = 4;
   EXPECT_EQ(Ask(RequestKind::kTiles).status.code, StatusCode::kInvalidArgument);
@@ -195,6 +225,23 @@ TEST_F(Queries, MapInfoOfOneSiteOrAll) {
   EXPECT_EQ(Ask(RequestKind::kMapInfo).maps.size(), 1U);
   request_.site = "moon";
   EXPECT_EQ(Ask(RequestKind::kMapInfo).status.code, StatusCode::kNotFound);
+}
+
+TEST_F(Queries, TheEditsOfASiteHoweverMany) {
+  auto edits = std::make_shared<std::vector<MapEdit>>(4096);
+  for (std::size_t i = 0; i < edits->size(); ++i) {
+    (*edits)[i].id = i + 1;
+    (*edits)[i].points_map.assign(kMostEditPoints, {1.5, -2.5});
+  }
+  map_.edits = edits;
+  std::vector<MapEdit> sent;
+  for (const Reply& part : AllParts(AnswerMapEdits(request_, Site()))) {
+    EXPECT_LT(part.edits.size(), 50U) << "a part holds less than 64 KB";
+    sent.insert(sent.end(), part.edits.begin(), part.edits.end());
+  }
+  EXPECT_TRUE(sent == *edits);
+  request_.site = "moon";
+  EXPECT_EQ(Ask(RequestKind::kMapEdits).status.code, StatusCode::kNotFound);
 }
 
 TEST_F(Queries, StatusOfOneRobotOrAll) {

@@ -54,6 +54,18 @@ TEST(CheckpointPace, WhatARestartHasRepeatedCountsAsWork) {
   EXPECT_TRUE(pace.IsDue(60));
 }
 
+// One that is killed soon after every start would otherwise never reach the work after which a checkpoint is due, and
+// repeat more at each start.
+TEST(CheckpointPace, IsDueSoonAfterARestartThatHasRepeatedMoreThanLittle) {
+  CheckpointPace little(kLimits), more(kLimits);
+  little.Worked(milliseconds(19));
+  little.RestoredFrom(40);
+  more.Worked(milliseconds(20));
+  more.RestoredFrom(40);
+  EXPECT_FALSE(little.IsDue(41));
+  EXPECT_TRUE(more.IsDue(41));
+}
+
 TEST(CheckpointPace, CheckpointsTakeATwentiethOfTheTime) {
   CheckpointPace pace(kLimits);
   *pace.cost() = CheckpointPace::Time(milliseconds(10)).count();

@@ -40,20 +40,6 @@ TEST(Journal, TellsOnlyWhatIsOnTheDisk) {
   EXPECT_EQ(journal.Append(3, SampleOdometry(1)), 0U);  // No such session.
 }
 
-TEST(Journal, GathersWhatComesWithinTheDelayIntoOneCommit) {
-  const auto store = *OpenStore(std::string(kInMemory));
-  Journal journal(*store, {.commit_delay_ms = 10000});
-  journal.Start();
-  Followed told;
-  journal.Open(SampleSession(1), told.durable());
-  EXPECT_TRUE(test::Eventually([&] { return told.through == 0; }));  // A new session does not wait for the delay.
-  for (std::uint64_t i = 1; i <= 100; ++i) journal.Append(1, SampleOdometry(i));
-  journal.Stop();  // What waits is written.
-  EXPECT_EQ(told.through, 100);
-  EXPECT_EQ(journal.counts().commits, 2U);
-  EXPECT_EQ(StoredEntries(*store, 1), 100U);
-}
-
 TEST(Journal, TheSessionGoesOnAfterTheLastPositionWhenItIsOpenedAgain) {
   const TempDirectory directory;
   for (std::uint64_t start = 0; start < 3; ++start) {
@@ -189,6 +175,35 @@ TEST(Journal, ACheckpointIsWholeOrTheOneBeforeIsTaken) {
     return {};
   }));
   EXPECT_EQ(after, std::vector<std::uint64_t>{5});
+  EXPECT_EQ(*PositionOfCheckpoint(*store, 1), 4U);
+  EXPECT_EQ(*EntriesAfterCheckpoint(*store, 1), 1U);
+  EXPECT_EQ(*EntriesAfterCheckpoint(*store, 2), 0U) << "no such session";
+}
+
+// A server that is killed again and again may have the time for one between two kills.
+TEST(Journal, TheCheckpointOfTheLongestJournalIsWrittenFirst) {
+  const auto store = *OpenStore(std::string(kInMemory));
+  Journal journal(*store, {});
+  Mutex mutex;
+  std::vector<std::uint64_t> written;
+  const std::uint64_t lengths[] = {2, 5, 3};
+  for (std::uint64_t session = 1; session <= 3; ++session) {
+    journal.Open(SampleSession(session), {});
+    const std::uint64_t length = lengths[session - 1];
+    for (std::uint64_t i = 1; i <= length; ++i) journal.Append(session, SampleOdometry(i));
+    const auto content = [&, session] {
+      const MutexLock lock(mutex);
+      written.push_back(session);
+      return CheckpointContent{"state"};
+    };
+    // Of where it was wanted, not of how much that one leaves out: what waits for long becomes more urgent.
+    ASSERT_TRUE(journal.Checkpoint(session, 1, content));
+  }
+  journal.Start();
+  EXPECT_TRUE(test::Eventually([&] {
+    const MutexLock lock(mutex);
+    return written == std::vector<std::uint64_t>{2, 3, 1};
+  }));
 }
 
 // The oldest history goes first, and never what a checkpoint needs: all of it where there is none.

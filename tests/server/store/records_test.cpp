@@ -68,6 +68,8 @@ TEST(Records, SessionsSitesVersionsLayersAndJobsComeBack) {
   EXPECT_EQ(site_back->tile_version, 90U);
   EXPECT_EQ(site_back->fragments, site.fragments);
   EXPECT_EQ(site_back->past, site.past);
+  EXPECT_EQ(site_back->edits, site.edits);
+  EXPECT_EQ(site_back->edits_version, 5U);
 
   StoredVersion version{.version = 3, .job = 8, .note = "smoothed", .parts = {{5, SampleGrid(1)}}, .smoothed = {}};
   version.smoothed["r5"] = {5, std::make_shared<const Trajectory>(Trajectory{{10, {1, 2, 3}}, {20, {4, 5, 6}}})};
@@ -133,6 +135,22 @@ TEST(Records, ValuesThatNoServerWritesAreRefused) {
   impossible.name = "lab";
   impossible.enabled_version = impossible.next_version;
   EXPECT_FALSE(SiteOf(BytesOf(impossible)));
+  for (const auto& spoil : std::vector<std::function<void(std::vector<MapEdit>&)>>{
+           [](auto& edits) { edits[0].id = 0; }, [](auto& edits) { edits[0].id = 6; },
+           [](auto& edits) { edits[1].id = 2; }, [](auto& edits) { edits[0].points_map[1].x() = 1e9; },
+           [](auto& edits) { edits[0].kind = static_cast<MapEditKind>(4); },
+           [](auto& edits) { edits[1].points_map.pop_back(); }, [](auto& edits) { edits[0].note = "T\xfcr"; },
+           [](auto& edits) { edits[0].note = "\x1b[2J"; }}) {
+    StoredSite edited = testing::SampleSiteRecord();
+    EXPECT_TRUE(SiteOf(BytesOf(edited)));
+    spoil(edited.edits);
+    EXPECT_FALSE(SiteOf(BytesOf(edited)));
+  }
+  StoredSite last = testing::SampleSiteRecord();
+  last.edits_version = kMaxEditsVersion - last.edits.size() - 1;
+  EXPECT_TRUE(SiteOf(BytesOf(last)));
+  ++last.edits_version;
+  EXPECT_FALSE(SiteOf(BytesOf(last))) << "there are no numbers for the removal of its edits";
   EXPECT_FALSE(VersionOf("\xff\xff\xff"));
   StoredLayer far{6, SampleGrid(1)};
   EXPECT_TRUE(LayerOf(BytesOf(far)));

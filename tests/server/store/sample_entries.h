@@ -98,7 +98,15 @@ inline StoredSite SampleSiteRecord() {
           .switches = {{1, 100}, {2, 101}},
           .members = {{HashName("r5"), 5}},
           .fragments = {5, 7},
-          .past = {7, 5}};
+          .past = {7, 5},
+          .edits = {{.id = 2,
+                     .kind = MapEditKind::kOccupied,
+                     .points_map = {{1.0, 2.0}, {3.0, 4.5}},
+                     .width_m = 0.1,
+                     .note = "glass",
+                     .made = 77},
+                    {.id = 4, .kind = MapEditKind::kKeepOut, .points_map = {{0, 0}, {1, 0}, {1, 1}}, .note = {}}},
+          .edits_version = 5};
 }
 
 }  // namespace cairn::server::testing

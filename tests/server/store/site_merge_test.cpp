@@ -116,6 +116,54 @@ TEST(MergeSites, ATransformMovesWhatHasBeenDrawnAndWhereSessionsBegin) {
   EXPECT_NEAR(versions.at(4).smoothed.at("r1").path->front().T_map_robot.x, 1.0, 0.0);
 }
 
+TEST(MergeSites, EditsOfBothStayWhereTheyAreInTheBuilding) {
+  const auto store = MemoryStore();
+  Put(*store, {.name = "lab"});
+  Put(*store, {.name = "hall", .first_session = 11, .job = 4});
+  for (const char* const name : {"lab", "hall"}) {
+    StoredSite site = ReadSite(*store, name)->site;
+    site.edits = {{.id = 2, .kind = MapEditKind::kKeepOut, .points_map = {{0, 0}, {2, 0}, {2, 1}}, .note = name}};
+    site.edits_version = 3;
+    ASSERT_TRUE(store->Commit({.removed = {}, .put = {{{RecordKind::kSite, HashName(name), 0}, BytesOf(site)}}}));
+  }
+  ASSERT_TRUE(MergeSites(*store, "lab", "hall", {1.0, 0.5, kQuarterTurn}));
+  const auto lab = ReadSite(*store, "lab");
+  ASSERT_TRUE(lab);
+  EXPECT_EQ(lab->site.edits_version, 6U);
+  ASSERT_EQ(lab->site.edits.size(), 2U);
+  EXPECT_EQ(lab->site.edits[0].points_map[1], Eigen::Vector2d(2, 0));
+  EXPECT_EQ(lab->site.edits[1].id, 5U);
+  EXPECT_EQ(lab->site.edits[1].note, "hall");
+  EXPECT_NEAR(lab->site.edits[1].points_map[1].x(), 1.0, 1e-12);
+  EXPECT_NEAR(lab->site.edits[1].points_map[1].y(), 2.5, 1e-12);
+}
+
+TEST(MergeSites, EditsThatASplitLeftInBothPartsAreThereOnceAgain) {
+  const auto store = MemoryStore();
+  Put(*store, {.name = "lab"});
+  Put(*store, {.name = "hall", .first_session = 11, .job = 4});
+  const auto set = [&](const char* name, std::vector<MapEdit> edits, std::uint64_t version) {
+    StoredSite site = ReadSite(*store, name)->site;
+    site.edits = std::move(edits);
+    site.edits_version = version;
+    ASSERT_TRUE(store->Commit({.removed = {}, .put = {{{RecordKind::kSite, HashName(name), 0}, BytesOf(site)}}}));
+  };
+  const MapEdit both{.id = 2, .kind = MapEditKind::kKeepOut, .points_map = {{0, 0}, {2, 0}, {2, 1}}, .note = "stairs"};
+  MapEdit own = both;
+  own.id = 3;
+  own.note = "of the hall";
+  set("lab", {both}, 3);
+  set("hall", {both, own}, kMaxEditsVersion - 3);
+  EXPECT_EQ(MergeSites(*store, "lab", "hall").error().code, StatusCode::kOutOfRange);
+  ASSERT_TRUE(ReadSite(*store, "hall")) << "nothing has changed";
+  set("hall", {both, own}, 3);
+  ASSERT_TRUE(MergeSites(*store, "lab", "hall"));
+  const auto lab = ReadSite(*store, "lab");
+  ASSERT_EQ(lab->site.edits.size(), 2U);
+  EXPECT_EQ(lab->site.edits[0], both);
+  EXPECT_EQ(lab->site.edits[1].note, "of the hall");
+}
+
 // Where a fragment lies in the map is not known, so a transform of the map says nothing of it.
 TEST(MergeSites, AFragmentKeepsItsFrameAndIsOneInTheOtherSiteToo) {
   const auto store = MemoryStore();

@@ -33,13 +33,23 @@ class WholeServer {
  public:
   static constexpr Generation kGeneration = 7;
 
+  using Watcher = std::function<void(const OutboundValue&)>;
+
   // `journal`: the server restores what its store holds, and stores its own state there. `saved`: the directory of
-  // saved sites.
+  // saved sites. `watcher` is called with every value that is sent, on the thread of the server that sends it. To
+  // disturb that thread it may wait or throw, which watchers otherwise must not (Outbound::Watch).
   explicit WholeServer(const ServerOptions& options = TestOptions(), Journal* journal = nullptr,
-                       Generation generation = kGeneration, const std::filesystem::path& saved = {})
+                       Generation generation = kGeneration, const std::filesystem::path& saved = {},
+                       const Watcher& watcher = {})
       : inbound_(static_cast<std::size_t>(options.server.inbound_capacity)),
         outbound_(static_cast<std::size_t>(options.server.outbound_capacity)),
         server_(options, inbound_, outbound_, generation, journal, saved) {
+    if (watcher) {
+      outbound_.Watch([watcher](const OutboundValue& value) {
+        watcher(value);
+        return false;
+      });
+    }
     for (const auto lane : {Outbound::Lane::kLive, Outbound::Lane::kMap, Outbound::Lane::kReplies}) {
       readers_.emplace_back([this, lane] {
         while (auto value = outbound_.lane(lane).Pop()) Keep(std::move(*value));

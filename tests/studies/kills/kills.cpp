@@ -81,6 +81,16 @@ std::string Share(std::uint64_t part, std::uint64_t whole) {
   return Percent(static_cast<double>(part) / static_cast<double>(std::max<std::uint64_t>(1, whole)));
 }
 
+// The two servers do not tell the same poses, so the shares may differ by one in a thousand.
+void ExpectNoMoreBesideTheTruth(Report& report, const test::KilledFleetOutcome& all, const std::string& without) {
+  const auto share = [](std::uint64_t part, std::uint64_t whole) {
+    return static_cast<double>(part) / static_cast<double>(std::max<std::uint64_t>(1, whole));
+  };
+  report.Expect(
+      share(all.beside_truth, all.poses) <= share(all.undisturbed_beside_truth, all.undisturbed_poses) + 0.001,
+      "more poses are beside the truth than without " + without);
+}
+
 void StudyKills(StudyContext& context) {
   const auto outcome = Kill(context, context.runs > 0 ? context.runs : context.Pick(1000, 20), false);
   if (!outcome) return;
@@ -104,6 +114,7 @@ void StudyKills(StudyContext& context) {
   report.Expect(all.lost == 0 && all.doubled == 0, "scans were lost or used twice");
   report.Expect(all.wrongly_localized == 0, "a robot was localized at a wrong place");
   report.Expect(all.paths_that_differ == 0, "paths differ from those of an undisturbed server");
+  ExpectNoMoreBesideTheTruth(report, all, "kills");
 }
 
 void StudyOrders(StudyContext& context) {
@@ -129,9 +140,7 @@ void StudyOrders(StudyContext& context) {
       "0.5 rad away from it.");
   report.Expect(broken == 0, "what was answered did not hold after a start");
   // Smoothing makes the map better; kills and switches must not make it worse than it is without both.
-  report.Expect(static_cast<double>(all.beside_truth) * static_cast<double>(all.undisturbed_poses) <=
-                    static_cast<double>(all.undisturbed_beside_truth) * static_cast<double>(all.poses),
-                "more poses are beside the truth than without kills and orders");
+  ExpectNoMoreBesideTheTruth(report, all, "kills and orders");
   report.Expect(all.orders.ended == all.orders.jobs, "jobs did not end well");
   report.Expect(all.orders.given_up <= all.kills / 8, "jobs were given up too early");
   report.Expect(all.lost == 0 && all.doubled == 0, "scans were lost or used twice");
@@ -141,6 +150,12 @@ struct Cost {
   double cpu_s = 0.0;
   double scans = 0.0;      // Used by the estimators. A busy machine drops some.
   std::string store_line;  // What the server logs about its store at the end.
+
+  Cost& operator+=(const Cost& other) {
+    cpu_s += other.cpu_s;
+    scans += other.scans;
+    return *this;
+  }
 };
 
 Cost CostOf(const std::string& state, int domain_number, int seconds) {
@@ -164,25 +179,33 @@ Cost CostOf(const std::string& state, int domain_number, int seconds) {
 void StudyCost(StudyContext& context) {
   Report& report = context.report;
   report.Heading("What being durable costs: eight robots at 10 Hz, 360 beams");
-  const int seconds = context.seconds > 0.0 ? static_cast<int>(context.seconds) : context.Pick(400, 10);
-  Table table({"state", "processor time (s)", "scans used", "of a scan (ms)", "store"});
-  const TempDirectory directory;
-  // At the same time, because what a scan costs on this machine differs by more from one minute to the next.
-  auto beside = std::async(std::launch::async, CostOf, "none", test::AnotherTestDomain(), seconds);
-  const Cost with = CostOf((directory / "state").string(), test::TestDomain(), seconds);
-  const Cost without = beside.get();
+  const int seconds = context.seconds > 0.0 ? static_cast<int>(context.seconds) : context.Pick(240, 10);
+  // Two servers that do the same differ by up to 3 % in one round.
+  const int rounds = context.Pick(3, 1);
+  Table table({"round", "state", "processor time (s)", "scans used", "of a scan (ms)", "more", "store"});
   const auto of_scan = [](const Cost& cost) { return cost.cpu_s / cost.scans; };
-  const auto add = [&](const char* state, const Cost& cost) {
-    table.Add({state, Number(cost.cpu_s, 2), Number(cost.scans, 0), Number(1e3 * of_scan(cost), 3),
-               cost.store_line.empty() ? "-" : cost.store_line});
-  };
-  add("none", without);
-  add("on disk", with);
+  const auto more = [&](const Cost& with, const Cost& without) { return of_scan(with) / of_scan(without) - 1.0; };
+  Cost all_with, all_without;
+  for (int round = 1; round <= rounds; ++round) {
+    const TempDirectory directory;
+    // At the same time, because what a scan costs on this machine differs by more from one minute to the next.
+    auto beside = std::async(std::launch::async, CostOf, "none", test::AnotherTestDomain(), seconds);
+    const Cost with = CostOf((directory / "state").string(), test::TestDomain(), seconds);
+    const Cost without = beside.get();
+    const auto add = [&](const char* state, const Cost& cost, const std::string& percent) {
+      table.Add({Count(round), state, Number(cost.cpu_s, 2), Number(cost.scans, 0), Number(1e3 * of_scan(cost), 3),
+                 percent, cost.store_line.empty() ? "-" : cost.store_line});
+    };
+    add("none", without, "-");
+    add("on disk", with, Percent(more(with, without)));
+    all_with += with;
+    all_without += without;
+  }
   report.Add(table, "cost");
-  const double more = of_scan(with) / of_scan(without) - 1.0;
-  report.Text("Being durable costs " + Percent(more) + " more processor time for each scan.");
-  report.Expect(context.quick || more <= kMostCost, "being durable costs more than " + Percent(kMostCost));
-  report.Expect(context.quick || std::min(with.cpu_s, without.cpu_s) >= kLeastCpu_s,
+  const double all_more = more(all_with, all_without);
+  report.Text("Being durable costs " + Percent(all_more) + " more processor time for each scan, over all rounds.");
+  report.Expect(context.quick || all_more <= kMostCost, "being durable costs more than " + Percent(kMostCost));
+  report.Expect(context.quick || std::min(all_with.cpu_s, all_without.cpu_s) >= kLeastCpu_s,
                 "less than " + Number(kLeastCpu_s, 0) + " s of processor time: run it for longer (--seconds)");
 }
 

@@ -1,17 +1,18 @@
 // cairn-study overload: robots stream to a live server while others ask too much of it: a reader of tiles that takes
-// none, eight clients that ask up to 1,000 questions a second or 400 at once, 200 robots that open sessions at once,
-// and more jobs than can be done. Does the time from scan to pose stay within twice that of a server without them, is
-// every scan accounted for, is each question answered or refused, and does the server's memory stay bounded? Times are
-// wall-clock times. Those who ask would be on other machines, so here they have the lowest priority. And, in a part of
-// its own, estimators that are too slow for what the robots send.
+// none, one whose process stands still, eight clients that ask up to 1,000 questions a second or 400 at once, 200
+// robots that open sessions at once, and more jobs than can be done. Does the time from scan to pose stay within twice
+// that of a server without them, is every scan accounted for, is each question answered or refused, and does the
+// server's memory stay bounded? Times are wall-clock times. Those who ask would be on other machines, so here they have
+// the lowest priority. And, in a part of its own, estimators that are too slow for what the robots send.
 // --seconds: how long the robots drive in each part (60; slow: 300); --only
-// alone|tiles|questions|flood|sessions|jobs|slow.
+// alone|tiles|stands|questions|flood|sessions|jobs|slow.
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
 #include <condition_variable>
+#include <csignal>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -24,6 +25,7 @@
 #include "tests/studies/overload/slow_estimator.h"
 #include "tests/studies/stopwatch.h"
 #include "tests/studies/study.h"
+#include "tests/test_domain.h"
 
 namespace cairn::studies {
 namespace {
@@ -77,6 +79,29 @@ void ReadTilesSlowly(const std::stop_token& stop, Answers& answers) {
       {});
   if (!tiles) throw std::runtime_error(tiles.error().message);
   WaitForStop(stop);
+}
+
+// A process that reads tiles and stands still again and again, each time for less than a participant may be silent:
+// what it has not acknowledged stays with the server meanwhile. After each time it must get tiles again.
+void StandStill(const std::stop_token& stop, Answers& answers) {
+  constexpr auto kStands = 2s;
+  ChildProcess reader({TILE_READER_PATH, std::to_string(test::TestDomain())});
+  const auto reads = [&](int stops) { return reader.Says("tile after " + std::to_string(stops) + " signals", 10s); };
+  if (!reads(0)) throw std::runtime_error("tile_reader reads nothing: " + reader.Wait().output);
+  ++answers.ok;
+  std::mutex mutex;
+  std::condition_variable_any stopped;
+  std::unique_lock lock(mutex);
+  for (int stops = 1; !stop.stop_requested(); ++stops) {
+    reader.Signal(SIGSTOP);
+    stopped.wait_for(lock, stop, kStands, [&] { return stop.stop_requested(); });
+    reader.Signal(SIGCONT);
+    reader.Signal(SIGUSR1);
+    if (stop.stop_requested()) return;
+    // The robots may have come to their end meanwhile, and the map with them.
+    const bool again = reads(stops);
+    if (again || !stop.stop_requested()) ++(again ? answers.ok : answers.other);
+  }
 }
 
 // `at_once`: questions of each client; a thread waits for each answer. `every`: of each thread.
@@ -227,6 +252,7 @@ void StudyCrowds(StudyContext& context) {
   const std::vector<Part> parts = {
       {"alone", "nobody", nullptr, {}, 0.0, 0.0, false},
       {"tiles", "a reader of tiles that takes none", ReadTilesSlowly, {}, 0.0, 0.0, false},
+      {"stands", "a reader of tiles whose process stands still", StandStill, {}, 0.0, 0.0, false},
       {"questions", "eight clients, up to 1,000 questions a second", AskALot, {}, 800.0, 100.0, false},
       {"flood",
        "eight clients, 400 questions at once, where 64 may wait",

@@ -29,7 +29,6 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr int kSlowRobots = 12;
-constexpr double kWatchdog_s = 10.0;  // WatchdogSec of deploy/systemd/cairnd.service.in.
 constexpr double kLongestAnswer_s = 5.0;
 
 double SecondsBetween(std::chrono::steady_clock::time_point from, std::chrono::steady_clock::time_point to) {
@@ -39,7 +38,10 @@ double SecondsBetween(std::chrono::steady_clock::time_point from, std::chrono::s
 // What the service manager of the system hears from a service (sd_notify(3)).
 class NotifySocket {
  public:
-  NotifySocket() : name_("cairn-study-" + std::to_string(getpid())), socket_(socket(AF_UNIX, SOCK_DGRAM, 0)) {
+  explicit NotifySocket(double watchdog_s)
+      : watchdog_s_(watchdog_s),
+        name_("cairn-study-" + std::to_string(getpid())),
+        socket_(socket(AF_UNIX, SOCK_DGRAM, 0)) {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     name_.copy(address.sun_path + 1, sizeof(address.sun_path) - 2);  // The name of no file (unix(7)).
@@ -56,7 +58,7 @@ class NotifySocket {
   }
 
   [[nodiscard]] std::vector<std::string> Environment() const {
-    return {"NOTIFY_SOCKET=@" + name_, "WATCHDOG_USEC=" + std::to_string(std::llround(1e6 * kWatchdog_s))};
+    return {"NOTIFY_SOCKET=@" + name_, "WATCHDOG_USEC=" + std::to_string(std::llround(1e6 * watchdog_s_))};
   }
   // From now on.
   void Restart() {
@@ -88,6 +90,7 @@ class NotifySocket {
     }
   }
 
+  const double watchdog_s_;
   const std::string name_;
   const int socket_;
   std::mutex mutex_;
@@ -101,12 +104,18 @@ class NotifySocket {
 
 void StudySlowEstimator(StudyContext& context) {
   Report& report = context.report;
-  const int seconds = context.seconds > 0.0 ? static_cast<int>(context.seconds) : context.Pick(300, 3);
-  report.Heading("Twelve robots at 5 Hz, 360 beams; the filter dpslam on one thread");
-  NotifySocket socket;
-  LiveServer server({"--set", "slam.filter=dpslam", "--set", "server.threads=1"}, socket.Environment());
+  const int seconds = context.seconds > 0.0 ? static_cast<int>(context.seconds) : context.Pick(300, 10);
+  const double watchdog_s = context.Pick(10.0, 5.0);  // WatchdogSec of deploy/systemd/cairnd.service.in is 10 s.
+  // A short drive must be too much as well: more scans, of which few may wait.
+  const std::string hz = context.quick ? "20" : "5";
+  const int queue = context.Pick(0, 8);
+  report.Heading("Twelve robots at " + hz + " Hz, 360 beams; the filter dpslam on one thread");
+  NotifySocket socket(watchdog_s);
+  std::vector<std::string> settings = {"--set", "slam.filter=dpslam", "--set", "server.threads=1"};
+  if (queue > 0) settings.insert(settings.end(), {"--set", "robots.queue_scans=" + std::to_string(queue)});
+  LiveServer server(settings, socket.Environment());
   const auto robots =
-      server.Start({"sim", "--site", "slow", "--robots", std::to_string(kSlowRobots), "--beams", "360", "--hz", "5",
+      server.Start({"sim", "--site", "slow", "--robots", std::to_string(kSlowRobots), "--beams", "360", "--hz", hz,
                     "--world", "building", "--seconds", std::to_string(seconds), "--timeout",
                     "300"});  // The server works on what waits when the robots have stopped.
   socket.Restart();
@@ -144,10 +153,10 @@ void StudySlowEstimator(StudyContext& context) {
              Count(unanswered), Number(answers.median, 3), Number(answers.max, 3), Number(most_mib, 0)});
   report.Add(table, "slow");
   report.Text("Dropped: " + (why.empty() ? "nothing" : why) + ".");
-  report.Expect(heard.longest_s < kWatchdog_s, "the service manager would have killed the server");
+  report.Expect(heard.longest_s < watchdog_s, "the service manager would have killed the server");
   report.Expect(unexplained == 0 && sent == used + dropped + waiting, "scans are not accounted for");
   report.Expect(unanswered == 0 && !answers_s.empty() && answers.max <= kLongestAnswer_s, "questions waited too long");
-  report.Expect(context.quick || dropped > 0, "the estimators were not too slow");
+  report.Expect(dropped > 0, "the estimators were not too slow");
   if (const auto alive = server.queries().Ping(); !alive) report.Fault("afterwards: " + alive.error().message);
 }
 

@@ -127,6 +127,10 @@ TEST_F(SecureServer, GivesEachRoleItsRightsAndSaysWhoWasRefused) {
   const SecureOutcome plain = Cairn("", {"ping"}, "2s");
   EXPECT_EQ(plain.code, ExitCode::kFailed);
   EXPECT_THAT(plain.err, HasSubstr("no server answers"));
+  const TempDirectory of_former;
+  const auto expired = test::CopyOf(Fleet() / "operators" / "o", of_former);
+  test::Expire(expired, Fleet());
+  ChildProcess former({CAIRN_HOSTILE_PEER, std::to_string(test::TestDomain()), expired.string(), "ask"});
   ChildProcess hostile(
       {CAIRN_HOSTILE_PEER, std::to_string(test::TestDomain()), (Fleet() / "viewers/v").string(), "command"});
   ChildProcess impostor(
@@ -134,11 +138,12 @@ TEST_F(SecureServer, GivesEachRoleItsRightsAndSaysWhoWasRefused) {
   // Each look at it starts a program that joins the domain with its identity, which takes seconds under a sanitizer.
   const auto all_refused = [] {
     const auto refused = Refused();
-    return refused.is_object() && refused["peers"] >= 1 && refused["endpoints"] >= 1 && refused["samples"] >= 1;
+    return refused.is_object() && refused["peers"] >= 2 && refused["endpoints"] >= 1 && refused["samples"] >= 1;
   };
   ASSERT_TRUE(test::Eventually(all_refused, std::chrono::seconds(90))) << Refused().dump();
   EXPECT_THAT(Cairn("viewers/v", {"status"}).out, HasSubstr("DDS Security on; refused since the start: "));
 
+  EXPECT_TRUE(server_->Says("its identity is not valid: certificate has expired", std::chrono::seconds(90)));
   server_->Signal(SIGTERM);
   const auto outcome = server_->Wait();
   EXPECT_EQ(outcome.exit_code, 0);

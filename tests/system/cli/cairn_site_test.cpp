@@ -1,6 +1,7 @@
 // `cairn site` against cairnd as a process and against its state directory: what operators do with whole sites.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <chrono>
 #include <csignal>
@@ -10,7 +11,6 @@
 #include <optional>
 #include <set>
 #include <sstream>
-#include <utility>
 
 #include "client/cli/program.h"
 #include "tests/child_process.h"
@@ -71,42 +71,28 @@ class CairnSite : public ::testing::Test {
     }
     return sites;
   }
-  // Runs `cairn site COMMAND... --state DIR` on copies of a state directory. Kills it when it has changed the files
-  // there for the first time, for the second time, and so on until it ends before. Calls `check` with the directory
-  // that is left. Returns how often it was killed.
-  int KillAtEachChange(const std::string& state, std::vector<std::string> command,
-                       const std::function<void(const std::string& state)>& check) {
-    constexpr int kMost = 100;
-    command.insert(command.begin(), {CAIRN_PATH, "site"});
+  // Runs `cairn site COMMAND... --state DIR` on copies of a state directory. The system kills it at its first write
+  // beyond a file size, which is small at first and grows until the command ends before: within the write-ahead log
+  // and, after that, while the log is copied into the database. Calls `check` with the directory that is left. Returns
+  // how often it was killed.
+  int KillAtEachSize(const std::string& state, std::vector<std::string> command,
+                     const std::function<void(const std::string& state)>& check) {
+    constexpr double kFirst_bytes = 2048.0, kGrowth = 1.4, kLast_bytes = 1e9;
+    command.insert(command.begin(), {"/usr/bin/prlimit", "--core=0", "", CAIRN_PATH, "site"});
     command.insert(command.end(), {"--state", ""});
-    for (int kills = 0; kills < kMost; ++kills) {
+    int kills = 0;
+    for (double bytes = kFirst_bytes; bytes < kLast_bytes; bytes *= kGrowth) {
       const TempDirectory place;
-      const std::string copy = (place / state).string();
-      std::filesystem::copy(File(state), copy, std::filesystem::copy_options::recursive);
-      command.back() = copy;
-      ChildProcess killed(command);
-      std::uintmax_t bytes = BytesIn(copy);
-      int changes = 0;
-      bool running = true;
-      while (running && changes <= kills) {
-        running = killed.RunningAfter(std::chrono::microseconds(0));
-        if (const std::uintmax_t now = BytesIn(copy); std::exchange(bytes, now) != now) ++changes;
-      }
-      killed.Signal(SIGKILL);
-      static_cast<void>(killed.Wait());
-      check(copy);
-      if (!running) return kills;
+      command.back() = (place / state).string();
+      std::filesystem::copy(File(state), command.back(), std::filesystem::copy_options::recursive);
+      command[2] = "--fsize=" + std::to_string(static_cast<std::uint64_t>(bytes));
+      const auto outcome = ChildProcess(command).Wait();
+      EXPECT_THAT(outcome.exit_code, ::testing::AnyOf(0, -1)) << outcome.output;
+      check(command.back());
+      if (outcome.exit_code >= 0) break;
+      ++kills;
     }
-    return kMost;
-  }
-  // Of all files. Files that come and go meanwhile do not matter.
-  static std::uintmax_t BytesIn(const std::string& directory) {
-    std::uintmax_t bytes = 0;
-    for (const auto& file : std::filesystem::directory_iterator(directory)) {
-      std::error_code gone;
-      if (const std::uintmax_t size = file.file_size(gone); !gone) bytes += size;
-    }
-    return bytes;
+    return kills;
   }
   [[nodiscard]] std::string File(const std::string& name) const { return (directory_ / name).string(); }
 
@@ -212,7 +198,7 @@ TEST_F(CairnSite, AKilledCommandHasChangedEverythingOrNothing) {
       EXPECT_EQ(MustJson({"site", "export", site, "--state", state, "-o", File("again.site")})["sessions"].size(),
                 robots.size());
   };
-  const int imports = KillAtEachChange("annex", {"import", File("hall.site")}, [&](const std::string& state) {
+  const int imports = KillAtEachSize("annex", {"import", File("hall.site")}, [&](const std::string& state) {
     const Sites sites = SitesIn(state);
     EXPECT_THAT(sites, ::testing::AnyOf(one, both));
     is_whole(state, sites);
@@ -221,30 +207,30 @@ TEST_F(CairnSite, AKilledCommandHasChangedEverythingOrNothing) {
   });
   MustJson({"site", "import", File("hall.site"), "--state", File("annex")});
   const int merges =
-      KillAtEachChange("annex", {"merge", "annex", "hall", "--transform", "30,0,90deg"}, [&](const std::string& state) {
+      KillAtEachSize("annex", {"merge", "annex", "hall", "--transform", "30,0,90deg"}, [&](const std::string& state) {
         const Sites sites = SitesIn(state);
         EXPECT_THAT(sites, ::testing::AnyOf(both, merged));
         is_whole(state, sites);
       });
-  const int splits = KillAtEachChange("annex", {"split", "annex", "a1", "--to", "half"}, [&](const std::string& state) {
+  const int splits = KillAtEachSize("annex", {"split", "annex", "a1", "--to", "half"}, [&](const std::string& state) {
     const Sites sites = SitesIn(state);
     EXPECT_THAT(sites, ::testing::AnyOf(both, Sites{{"annex", {"a2"}}, {"half", {"a1"}}, {"hall", {"h1", "h2"}}}));
     is_whole(state, sites);
   });
-  const int deletions = KillAtEachChange("annex", {"delete-session", "annex", "a1"}, [&](const std::string& state) {
+  const int deletions = KillAtEachSize("annex", {"delete-session", "annex", "a1"}, [&](const std::string& state) {
     const Sites sites = SitesIn(state);
     EXPECT_THAT(sites, ::testing::AnyOf(both, Sites{{"annex", {"a2"}}, {"hall", {"h1", "h2"}}}));
     is_whole(state, sites);
   });
-  EXPECT_GT(imports, 0);
-  EXPECT_GT(merges, 0);
-  EXPECT_GT(splits, 0);
-  EXPECT_GT(deletions, 0);
+  EXPECT_GT(imports, 5);
+  EXPECT_GT(merges, 5);
+  EXPECT_GT(splits, 5);
+  EXPECT_GT(deletions, 5);
 }
 
 // The same of a running server that loads a saved site.
 TEST_F(CairnSite, AServerThatIsKilledWhileItLoadsASiteHasAllOfItOrNothing) {
-  constexpr int kMostKills = 5;
+  constexpr std::uintmax_t kFirst_bytes = 8192, kGrowth = 4, kLast_bytes = 1U << 30U;
   ASSERT_NO_FATAL_FAILURE(StartServer("saved"));
   Stream("hall", "robot");
   const std::vector<std::string> paths = {PathOf("robot1"), PathOf("robot2")};
@@ -252,22 +238,26 @@ TEST_F(CairnSite, AServerThatIsKilledWhileItLoadsASiteHasAllOfItOrNothing) {
   MustJson({"site", "delete", "hall"});
   StopServer();
   int kills = 0;
-  for (bool killed = true; killed && kills < kMostKills; ++kills) {
-    const std::string state = "copy" + std::to_string(kills);
+  bool killed = true;
+  for (std::uintmax_t bytes = kFirst_bytes; killed && bytes < kLast_bytes; bytes *= kGrowth) {
+    const std::string state = "copy" + std::to_string(bytes);
     std::filesystem::copy(File("saved"), File(state), std::filesystem::copy_options::recursive);
     ASSERT_NO_FATAL_FAILURE(StartServer(state));
-    std::uintmax_t bytes = BytesIn(File(state));
+    // The system kills the server at its first write beyond this file size.
+    const rlimit size = {.rlim_cur = std::filesystem::file_size(directory_ / state / "cairn.db-wal") + bytes,
+                         .rlim_max = RLIM_INFINITY};
+    ASSERT_EQ(prlimit(server_->pid(), RLIMIT_FSIZE, &size, nullptr), 0);
     ChildProcess load({CAIRN_PATH, "--domain", std::to_string(test::TestDomain()), "site", "load", "monday"});
-    int changes = 0;
-    for (bool running = true; running && changes <= kills;) {
-      running = load.RunningAfter(std::chrono::microseconds(0));
-      if (const std::uintmax_t now = BytesIn(File(state)); std::exchange(bytes, now) != now) ++changes;
+    constexpr std::chrono::milliseconds kTurn(1);
+    while (server_->RunningAfter(kTurn) && load.RunningAfter(kTurn)) continue;
+    killed = !server_->RunningAfter(kTurn);
+    if (killed) {
+      ++kills;
+    } else {
+      EXPECT_EQ(load.Wait().exit_code, 0);
+      server_->Signal(SIGKILL);
     }
-    killed = changes > kills;
-    server_->Signal(SIGKILL);
     static_cast<void>(server_->Wait());
-    load.Signal(SIGKILL);
-    static_cast<void>(load.Wait());
     ASSERT_NO_FATAL_FAILURE(StartServer(state));
     if (MustJson({"site", "list"})["sites"].empty()) MustJson({"site", "load", "monday"});
     EXPECT_EQ((std::vector<std::string>{PathOf("robot1"), PathOf("robot2")}), paths);

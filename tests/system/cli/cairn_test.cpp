@@ -2,70 +2,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <csignal>
 #include <filesystem>
-#include <optional>
-#include <sstream>
 #include <thread>
 
-#include "client/cli/program.h"
 #include "common/map/occupancy_image.h"
 #include "common/sensor/stamp.h"
 #include "common/sensor/trajectory.h"
-#include "tests/child_process.h"
-#include "tests/loopback.h"
-#include "tests/temp_directory.h"
+#include "tests/system/cli/cairn_program.h"
 
 namespace cairn::client {
 namespace {
 
 using ::testing::HasSubstr;
-
-struct Outcome {
-  ExitCode code;
-  std::string out;
-  std::string err;
-
-  [[nodiscard]] nlohmann::json json() const { return nlohmann::json::parse(out); }
-};
-
-class CairnProgram : public ::testing::Test {
- protected:
-  void StartServer() {
-    server_.emplace(std::vector<std::string>{CAIRND_PATH, "--domain", std::to_string(test::TestDomain()), "--set",
-                                             "slam.particles=20", "--log-level", "warn"});
-    if (Cairn({"ping"}).code == ExitCode::kOk) return;
-    server_->Signal(SIGKILL);
-    FAIL() << "cairnd does not answer: " << server_->Wait().output;
-  }
-
-  // One command line, told the domain and to be patient with a busy machine.
-  static Outcome Cairn(std::vector<std::string> arguments, const std::string& timeout = "20s") {
-    arguments.insert(arguments.begin(), {"--domain", std::to_string(test::TestDomain()), "--timeout", timeout});
-    std::ostringstream out, err;
-    const ExitCode code = RunCairn(arguments, out, err);
-    return {code, out.str(), err.str()};
-  }
-  static nlohmann::json MustJson(std::vector<std::string> arguments) {
-    arguments.push_back("--json");
-    const Outcome outcome = Cairn(std::move(arguments));
-    EXPECT_EQ(outcome.code, ExitCode::kOk) << outcome.err;
-    return outcome.out.empty() ? nlohmann::json() : outcome.json();
-  }
-  // Two robots, 10 s each, into site `hall`; the truth in truth/.
-  nlohmann::json StreamFleet() {
-    return MustJson({"sim", "--robots", "2", "--seconds", "10", "--fast", "--beams", "181", "--site", "hall",
-                     "--first-stamp", "1000", "--truth-dir", File("truth")});
-  }
-  void WriteLog(const std::string& seconds) {
-    MustJson({"sim", "--no-stream", "--robots", "1", "--seconds", seconds, "--beams", "181", "--fov", "180",
-              "--first-stamp", "1000", "--log-dir", File("")});
-  }
-  [[nodiscard]] std::string File(const std::string& name) const { return (directory_ / name).string(); }
-
-  TempDirectory directory_;
-  std::optional<ChildProcess> server_;
-};
 
 TEST_F(CairnProgram, SaysWhenThereIsNoServer) {
   for (const std::vector<std::string>& arguments :
@@ -74,6 +22,23 @@ TEST_F(CairnProgram, SaysWhenThereIsNoServer) {
     EXPECT_EQ(outcome.code, ExitCode::kFailed);
     EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
   }
+}
+
+// The figures are measured once a second.
+TEST_F(CairnProgram, TheStatusSaysHowBusyTheServerIs) {
+  ASSERT_NO_FATAL_FAILURE(StartServer());
+  EXPECT_THAT(Cairn({"status"}).out, HasSubstr("server: up 0.0 h, "));
+  StreamFleet();
+  nlohmann::json load;
+  ASSERT_TRUE(test::Eventually([&] {
+    load = MustJson({"status"})["load"];
+    return load["commits"] > 0 && load["store_bytes"] > 0;
+  })) << load;
+  EXPECT_GT(load["memory_bytes"], 5'000'000);
+  EXPECT_GT(load["processor_s"], 0.01);
+  EXPECT_GT(load["up_s"], 1.0);
+  EXPECT_EQ(load["failed_commits"], 0);
+  EXPECT_GT(load["stored_after_p99_ms"], 0.0);
 }
 
 TEST_F(CairnProgram, ARobotThatNodsIsMappedAndItsCloudLiesOnTheWalls) {
@@ -147,35 +112,96 @@ TEST_F(CairnProgram, TheMapComesAsTilesFilesAndPicture) {
   EXPECT_GT(std::filesystem::file_size(File("hall-picture.png")), 10'000u);
 }
 
-TEST_F(CairnProgram, AReplayAsFastAsTheServerTakesItLosesNothing) {
+TEST_F(CairnProgram, WhatPeopleSayAboutAMapIsInItsFilesUntilItIsTakenBack) {
   ASSERT_NO_FATAL_FAILURE(StartServer());
-  WriteLog("30");
-  const auto account =
-      MustJson({"replay", File("robot1.log"), "--site", "hall", "--robot", "r1", "--fast", "--start", "1.2,8.2,0deg"});
-  EXPECT_EQ(account["sent"], 300);
-  EXPECT_EQ(account["used"], 300);
-  EXPECT_EQ(account["dropped_total"], 0);
-  EXPECT_EQ(account["unexplained"], 0);
-  EXPECT_EQ(MustJson({"robot", "relocalise", "r1", "--here", "1.2,8.2,90deg"})["accepted"], true);
+  StreamFleet();
+  const auto cell_at = [&](const std::string& file, double x_m, double y_m) {
+    const auto map = LoadMapYaml(File(file));
+    if (!map) return -1;
+    const auto column = static_cast<int>(std::floor((x_m - map->T_map_origin.x) / map->resolution_m));
+    const auto row = static_cast<int>(std::floor((y_m - map->T_map_origin.y) / map->resolution_m));
+    return static_cast<int>(map->cells.at(static_cast<std::size_t>(row * map->width + column)));
+  };
+  const std::vector<std::string> save = {"map", "export",          "--site",     "hall",
+                                         "-o",  File("hall.yaml"), "--keep-out", File("mask.yaml")};
+  const auto export_map = [&] { MustJson(save); };
+  // Robot 1 begins here, so nothing stands here.
+  constexpr double kX_m = 1.225, kY_m = 8.225;
+  // At first there may be no tile yet.
+  ASSERT_TRUE(
+      test::Eventually([&] { return Cairn(save).code == ExitCode::kOk && cell_at("hall.yaml", kX_m, kY_m) == 0; }));
+  const auto wall =
+      MustJson({"map", "edit", "wall", "--site", "hall", "--line", "1,8.2", "1.5,8.2", "--note", "glass"});
+  EXPECT_EQ(wall["kind"], "occupied");
+  MustJson({"map", "edit", "keep-out", "--site", "hall", "--box", "2,8", "3,8.5"});
+  export_map();
+  EXPECT_EQ(cell_at("hall.yaml", kX_m, kY_m), 100);
+  EXPECT_EQ(cell_at("mask.yaml", kX_m, kY_m), 0);
+  const auto mask = LoadMapYaml(File("mask.yaml"));
+  ASSERT_TRUE(mask);
+  EXPECT_EQ(std::count(mask->cells.begin(), mask->cells.end(), 100), 200) << "a square metre has 400 cells";
+  EXPECT_EQ(cell_at("mask.yaml", 2.5, 8.25), 100);
+
+  const auto listed = MustJson({"map", "edit", "list", "--site", "hall"})["edits"];
+  ASSERT_EQ(listed.size(), 2u);
+  EXPECT_EQ(listed[0]["note"], "glass");
+  MustJson({"map", "edit", "remove", "--site", "hall", "--id", std::to_string(wall["id"].get<int>())});
+  export_map();
+  EXPECT_EQ(cell_at("hall.yaml", kX_m, kY_m), 0);
+  EXPECT_EQ(cell_at("mask.yaml", 2.5, 8.25), 100);
+  EXPECT_EQ(Cairn({"map", "export", "--site", "hall", "-o", File("a.yaml"), "--keep-out", File("a.yml")}).code,
+            ExitCode::kFailed)
+      << "both would have the image a.png";
+  EXPECT_EQ(Cairn({"map", "edit", "erase", "--site", "hall", "--box", "1500,1", "1501,2"}).code, ExitCode::kFailed);
+  EXPECT_EQ(Cairn({"map", "edit", "erase", "--site", "hall", "--box", "1,1", "2,2", "--width", "1"}).code,
+            ExitCode::kUsage);
+  EXPECT_EQ(Cairn({"map", "edit", "erase", "--site", "hall"}).code, ExitCode::kUsage) << "where?";
+  EXPECT_EQ(Cairn({"map", "edit", "erase", "--site", "hall", "--box", "1,1", "here"}).code, ExitCode::kUsage);
+  EXPECT_EQ(Cairn({"map", "edit", "erase", "--site", "hall", "--box", "1,1", "1,1"}).code, ExitCode::kFailed);
 }
 
-TEST_F(CairnProgram, AnEndedSessionCanBeReplayedAgainAndAResumedOneTakesTheClockAsSetBack) {
+// The furniture stands elsewhere in the second run.
+TEST_F(CairnProgram, WhatChangedBetweenTwoRunsIsALayerOfTheMap) {
   ASSERT_NO_FATAL_FAILURE(StartServer());
-  WriteLog("5");
-  const std::vector<std::string> replay = {"replay", File("robot1.log"), "--site", "hall", "--robot", "r1", "--fast"};
-  auto and_end = replay;
-  and_end.push_back("--end");
-  EXPECT_EQ(MustJson(and_end)["used"], 50);
-  EXPECT_EQ(MustJson(replay)["used"], 50) << "a new session";
-  const auto again = MustJson(replay);
-  // The same stamps in the same session look like a clock that was set back: the first ones are dropped, and the others
-  // are used. How many are dropped depends on how the two streams interleave.
-  EXPECT_GE(again["dropped_total"], 4);
-  EXPECT_GE(again["used"], 5);
-  EXPECT_EQ(again["used"].get<int>() + again["dropped_total"].get<int>(), 50);
-  EXPECT_EQ(again["unexplained"], 0);
-  MustJson({"session", "end", "r1"});
-  EXPECT_EQ(MustJson({"status", "r1"})["robots"][0]["phase"], "ended");
+  const auto drive = [&](const std::string& prefix, const std::string& furniture) {
+    MustJson({"sim",
+              "--robots",
+              "1",
+              "--prefix",
+              prefix,
+              "--world",
+              "office",
+              "--seconds",
+              "30",
+              "--fast",
+              "--beams",
+              "181",
+              "--site",
+              "hall",
+              "--first-stamp",
+              "1000",
+              "--furniture",
+              "20",
+              "--furniture-seed",
+              furniture});
+  };
+  drive("monday", "1");
+  const std::vector<std::string> draw = {"map",     "draw",         "--site", "hall",
+                                         "--layer", "disagreement", "-o",     File("d.png")};
+  const Outcome alone = Cairn(draw);
+  EXPECT_EQ(alone.code, ExitCode::kFailed);
+  EXPECT_THAT(alone.err, HasSubstr("nobody disagrees"));
+  drive("tuesday", "2");
+  ASSERT_TRUE(test::Eventually([&] { return Cairn(draw).code == ExitCode::kOk; }));
+  EXPECT_GT(std::filesystem::file_size(File("d.png")), 1000U);
+  const auto tiles = MustJson({"tiles", "--site", "hall", "--disagreement", "--level", "3"});
+  EXPECT_FALSE(tiles["tiles"].empty());
+  const auto places = MustJson({"pose", "tuesday1", "--hypotheses"})["hypotheses"];
+  ASSERT_FALSE(places.empty());
+  double sum = 0.0;
+  for (const auto& place : places) sum += place["weight"].get<double>();
+  EXPECT_GT(sum, 0.9);
+  EXPECT_LT(sum, 1.0 + 1e-9);
 }
 
 TEST_F(CairnProgram, SmoothingMakesAVersionThatCanBeRolledBack) {
@@ -234,40 +260,6 @@ TEST_F(CairnProgram, WhatTheServerDoesNotKnowFailsWithItsReason) {
     EXPECT_THAT(outcome.err, HasSubstr(code)) << arguments[0];
     EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
   }
-}
-
-TEST_F(CairnProgram, AServerThatDiesWhileStreamingIsAClearError) {
-  ASSERT_NO_FATAL_FAILURE(StartServer());
-  WriteLog("200");
-  std::optional<Outcome> replayed;
-  std::thread replay([&] {
-    replayed = Cairn({"replay", File("robot1.log"), "--site", "hall", "--robot", "r1", "--rate", "20"}, "3s");
-  });
-  ASSERT_TRUE(test::Eventually([] { return Cairn({"pose", "r1"}, "1s").code == ExitCode::kOk; }));
-  server_->Signal(SIGKILL);
-  server_->Wait();
-  replay.join();
-  EXPECT_EQ(replayed->code, ExitCode::kFailed) << replayed->out;
-  EXPECT_THAT(replayed->err, HasSubstr("UNAVAILABLE"));
-}
-
-// It went on streaming to nobody, at the log's own pace.
-TEST_F(CairnProgram, AServerThatIsStoppedEndsAReplayAtOnceWithAReason) {
-  ASSERT_NO_FATAL_FAILURE(StartServer());
-  WriteLog("200");
-  std::optional<Outcome> replayed;
-  std::thread replay([&] {
-    replayed = Cairn({"replay", File("robot1.log"), "--site", "hall", "--robot", "r1", "--rate", "2"}, "3s");
-  });
-  ASSERT_TRUE(test::Eventually([] { return Cairn({"pose", "r1"}, "1s").code == ExitCode::kOk; }));
-  const auto stopped = std::chrono::steady_clock::now();
-  server_->Signal(SIGTERM);
-  server_->Wait();
-  replay.join();
-  EXPECT_EQ(replayed->code, ExitCode::kFailed) << replayed->out;
-  EXPECT_THAT(replayed->err, HasSubstr("the server is stopping"));
-  // The log has 100 s to go.
-  EXPECT_LT(std::chrono::steady_clock::now() - stopped, std::chrono::seconds(30));
 }
 
 TEST_F(CairnProgram, ASecondServerOfTheDomainIsRefused) {

@@ -40,9 +40,9 @@ FullMap MapOf(const Ancestry& ancestry, Ancestry::Id id) {
   std::vector<Ancestry::Id> line;
   ancestry.LineTo(id, line);
   for (const Ancestry::Id ancestor : line)
-    for (const ChangeTile& tile : ancestry.changes(ancestor).tiles())
-      tile.ForEach([&](std::uint16_t cell, std::uint16_t travel, std::uint16_t stops) {
-        CellCounts& sum = map[tile.key.x * kChangeTileArea + cell];
+    for (const auto& tile : ancestry.changes(ancestor).tiles())
+      tile->ForEach([&](std::uint16_t cell, std::uint16_t travel, std::uint16_t stops) {
+        CellCounts& sum = map[tile->key.x * kChangeTileArea + cell];
         sum = {sum.travel + travel, sum.stops + stops};
       });
   return map;

@@ -7,6 +7,8 @@
 #include <random>
 #include <utility>
 
+#include "server/slam/state/archive.h"
+
 namespace cairn::slam {
 namespace {
 
@@ -14,10 +16,10 @@ using Sums = std::map<std::pair<int, int>, CellCounts>;
 
 Sums SumsOf(const MapChanges& changes) {
   Sums sums;
-  for (const ChangeTile& tile : changes.tiles())
-    tile.ForEach([&](std::uint16_t cell, std::uint16_t travel, std::uint16_t stops) {
-      CellCounts& sum = sums[{tile.key.x * kChangeTileSide + cell % kChangeTileSide,
-                              tile.key.y * kChangeTileSide + cell / kChangeTileSide}];
+  for (const auto& tile : changes.tiles())
+    tile->ForEach([&](std::uint16_t cell, std::uint16_t travel, std::uint16_t stops) {
+      CellCounts& sum = sums[{tile->key.x * kChangeTileSide + cell % kChangeTileSide,
+                              tile->key.y * kChangeTileSide + cell / kChangeTileSide}];
       sum = {sum.travel + travel, sum.stops + stops};
     });
   return sums;
@@ -52,7 +54,7 @@ TEST(MapChanges, AddingIsAddingCellByCellHoweverManyTheyAre) {
       sum.Add(std::move(more));
     }
     ASSERT_EQ(SumsOf(sum), oracle);
-    for (std::size_t i = 1; i < sum.tiles().size(); ++i) ASSERT_LT(sum.tiles()[i - 1].key, sum.tiles()[i].key);
+    for (std::size_t i = 1; i < sum.tiles().size(); ++i) ASSERT_LT(sum.tiles()[i - 1]->key, sum.tiles()[i]->key);
   }
 }
 
@@ -62,6 +64,47 @@ TEST(MapChanges, ATileNeverTakesMoreThanAllItsCells) {
   for (int i = 0; i < 60; ++i) sum.Add(RandomChanges(rng, 49, 0.02));
   EXPECT_EQ(sum.tiles().size(), 49u);
   EXPECT_LE(sum.bytes(), 64 * (sizeof(ChangeTile) + kChangeTileArea * sizeof(ChangeTile::Counts)));
+}
+
+TEST(MapChanges, ACheckpointKeepsWhatItSharesWhileTheMapGoesOn) {
+  std::mt19937_64 rng(4);
+  MapChanges changes = RandomChanges(rng, 20, 0.02);
+  const Sums before = SumsOf(changes);
+  StateWriter checkpoint;
+  checkpoint(changes);
+  for (int i = 0; i < 20; ++i) changes.Add(RandomChanges(rng, 20, 0.1));
+  EXPECT_NE(SumsOf(changes), before);
+  const std::string bytes = checkpoint.Bytes();
+  StateReader reader(bytes);
+  MapChanges read;
+  reader(read);
+  ASSERT_TRUE(reader.done()) << reader.failed();
+  EXPECT_EQ(SumsOf(read), before);
+  read.Add(MapChanges(changes));
+  EXPECT_NE(SumsOf(read), before);
+}
+
+// Until format 10 the tiles stood where the map stands.
+TEST(MapChanges, AreReadFromCheckpointsOfEarlierFormats) {
+  std::mt19937_64 rng(5);
+  const MapChanges changes = RandomChanges(rng, 20, 0.3);
+  std::vector<ChangeTile> tiles;
+  for (const auto& tile : changes.tiles()) tiles.push_back(*tile);
+  StateWriter writer;
+  writer(tiles);
+  const std::string bytes = writer.Bytes();
+  StateReader reader(bytes, {}, 10);
+  MapChanges read;
+  reader(read);
+  ASSERT_TRUE(reader.done()) << reader.failed();
+  EXPECT_EQ(SumsOf(read), SumsOf(changes));
+  std::swap(tiles[0], tiles[1]);
+  StateWriter disordered;
+  disordered(tiles);
+  const std::string wrong = disordered.Bytes();
+  StateReader refusing(wrong, {}, 10);
+  refusing(read);
+  EXPECT_STREQ(refusing.failed(), "the tiles of a map");
 }
 
 TEST(MapChanges, EvidenceAgesInsteadOfOverflowing) {

@@ -149,8 +149,8 @@ class Lost : public ::testing::Test {
  protected:
   static Recovery Make() {
     const MapperOptions options;
-    return {options.recovery,          options.loop,  options.self_check,  options.front_end.refine,
-            options.front_end.surface, options.blind, options.lost_after_m};
+    return {options.recovery, options.loop, options.self_check,  options.front_end.refine, options.front_end.surface,
+            options.blind,    true,         options.lost_after_m};
   }
   static Recovery::Known KnownAt(double x) {
     Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();

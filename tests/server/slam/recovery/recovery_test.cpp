@@ -222,6 +222,34 @@ TEST(Recovery, OnItsPathTheRobotGoesOnAsIfThereHadBeenNoPauseOnceItHasProvedItsP
   EXPECT_EQ(Wrong(seen), 0);
 }
 
+// Where scans are missing and odometry goes on, the pose is carried by odometry, with the doubt that belongs to it.
+TEST(Carried, UntilItIsFoundTheErrorOfThePoseIsWithinThreeSigma) {
+  constexpr double kThreeSigma = 11.83;  // Of the square of a distance in two dimensions: 99.73 %.
+  constexpr double kFourSigma = 19.33;
+  int unsure = 0, beyond = 0;
+  for (const double from_s : {90.0, 150.0, 170.0, 230.0}) {
+    for (const double gap_s : {2.4, 10.0, 30.0}) {
+      SCOPED_TRACE(testing::Message() << gap_s << " s without scans from " << from_s << " s on");
+      const Away away{.from_s = from_s, .to_s = from_s + gap_s, .odometry_missing = false, .new_client = true};
+      const std::vector<Seen> seen = Play(Building(), away, away.to_s + 20.0);
+      EXPECT_EQ(Wrong(seen), 0);
+      for (const Seen& one : seen) {
+        if (one.seconds < away.to_s || one.outcome.localized) continue;
+        ++unsure;
+        const Eigen::Vector2d error = one.outcome.T_map_robot.translation() - one.T_map_robot_true.translation();
+        const Eigen::Matrix2d covariance = one.outcome.covariance.topLeftCorner<2, 2>();
+        const double squared_sigmas = error.dot(covariance.ldlt().solve(error));
+        beyond += squared_sigmas < kThreeSigma ? 0 : 1;
+        EXPECT_LT(squared_sigmas, kFourSigma)
+            << "at " << one.seconds << " s " << error.norm() << " m beside the truth, sigma "
+            << std::sqrt(covariance(0, 0)) << ", " << std::sqrt(covariance(1, 1)) << " m";
+      }
+    }
+  }
+  EXPECT_GT(unsure, 50);
+  EXPECT_LE(beyond, unsure / 50);
+}
+
 // A robot that drives along the x axis of a world of walls, five scans a second.
 class Driver {
  public:

@@ -1,0 +1,131 @@
+// `cairn map edit`: what people say about a map (common/map/map_edit.h).
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "client/cli/commands.h"
+#include "client/cli/json_output.h"
+#include "client/cli/option_checks.h"
+#include "client/cli/text_output.h"
+
+namespace cairn::client {
+namespace {
+
+struct DrawnEditArguments {
+  std::string site;
+  MapEdit edit;
+  std::vector<Eigen::Vector2d> area, line, box;  // One of them.
+  double width_m = 0.1;                          // Of a line.
+};
+struct KnownEditArguments {
+  std::string site;
+  std::uint64_t id = 0;
+};
+
+Result<Eigen::Vector2d> PointFrom(const std::string& text) {
+  Eigen::Vector2d point;
+  const std::size_t comma = text.find(',');
+  if (comma == std::string::npos || !ParseNumber(text.substr(0, comma), point.x()) ||
+      !ParseNumber(text.substr(comma + 1), point.y()))
+    return Fail(StatusCode::kInvalidArgument, "'" + text + "' is not a point X,Y in metres");
+  return point;
+}
+
+CLI::Option* AddPoints(CLI::App& app, const std::string& name, std::vector<Eigen::Vector2d>& points, int fewest,
+                       int most, const std::string& help) {
+  return app
+      .add_option_function<std::vector<std::string>>(
+          name,
+          [&points, name](const std::vector<std::string>& texts) {
+            points.clear();
+            for (const std::string& text : texts) {
+              const auto point = PointFrom(text);
+              if (!point) throw CLI::ValidationError(name, point.error().message);
+              points.push_back(*point);
+            }
+          },
+          help)
+      ->expected(fewest, most)
+      ->type_name("X,Y ...");
+}
+
+ExitCode AddEdit(Program& program, const DrawnEditArguments& arguments) {
+  MapEdit edit = arguments.edit;
+  edit.points_map = arguments.area;
+  if (!arguments.line.empty()) {
+    edit.points_map = arguments.line;
+    edit.width_m = arguments.width_m;
+  }
+  if (!arguments.box.empty()) {
+    const Eigen::Vector2d &a = arguments.box[0], &b = arguments.box[1];
+    edit.points_map = {a, {b.x(), a.y()}, b, {a.x(), b.y()}};
+  }
+  const auto added = program.Ask([&](QueryClient& server) { return server.AddMapEdit(arguments.site, edit); });
+  if (!added) return program.Refuse(added.error());
+  return program.Print(FormatEdit(*added), *added);
+}
+
+ExitCode ListEdits(Program& program, const KnownEditArguments& arguments) {
+  const auto edits = program.Ask([&](QueryClient& server) { return server.MapEdits(arguments.site); });
+  if (!edits) return program.Refuse(edits.error());
+  std::string text = edits->empty() ? "no edits\n" : "";
+  for (const MapEdit& edit : *edits) text += FormatEdit(edit);
+  return program.Print(text, {{"edits", *edits}});
+}
+
+ExitCode RemoveEdit(Program& program, const KnownEditArguments& arguments) {
+  const auto removed =
+      program.Ask([&](QueryClient& server) { return server.RemoveMapEdit(arguments.site, arguments.id); });
+  if (!removed) return program.Refuse(removed.error());
+  return program.Print(fmt::format("edit {} is removed\n", arguments.id), {{"removed", arguments.id}});
+}
+
+void AddKind(CLI::App& edit, Program& program, MapEditKind kind, const std::string& name, const std::string& help) {
+  auto* command = edit.add_subcommand(name, help);
+  auto arguments = std::make_shared<DrawnEditArguments>();
+  arguments->edit.kind = kind;
+  command->add_option("--site", arguments->site, "The site's name")->required();
+  const int most = static_cast<int>(kMostEditPoints);
+  auto* shape = command->add_option_group("shape", "Where, in metres of the map's frame");
+  AddPoints(*shape, "--box", arguments->box, 2, 2, "Two opposite corners of a box");
+  AddPoints(*shape, "--area", arguments->area, 3, most, "The corners of an area, in order");
+  auto* line = AddPoints(*shape, "--line", arguments->line, 2, most, "The points of a line");
+  shape->require_option(1);
+  AddNumber(*command, "--width", arguments->width_m, 0.01, 10.0, "Width of the line", "M")->needs(line);
+  command->add_option("--note", arguments->edit.note, "Why, for people; at most 256 bytes");
+  program.OnChosen(*command, arguments, AddEdit);
+}
+
+}  // namespace
+
+void AddMapEdit(CLI::App& map, Program& program) {
+  auto* edit = map.add_subcommand("edit", "Say what is in a map, whatever robots have drawn");
+  edit->require_subcommand(1);
+  edit->footer(
+      "Edits are a layer above the map. They keep their coordinates where the map is smoothed, drawn anew or switched\n"
+      "to another version, and after restarts, until they are removed; they do not move with walls that smoothing "
+      "moves.\n"
+      "Where they overlap, the later one counts. Robots that are only localised are localised in the edited map after\n"
+      "some seconds, but for walls that people drew, because lidars may not see them. Robots that map do not see "
+      "edits.\n"
+      "EXAMPLES\n  cairn map edit erase --site hall --box 2,1 3,1.5 --note 'a pallet that is gone'\n"
+      "  cairn map edit wall --site hall --line 0,4 6,4 --width 0.05 --note 'glass'\n"
+      "  cairn map edit keep-out --site hall --area 8,0 10,0 10,3 9,4\n"
+      "  cairn map edit list --site hall\n  cairn map edit remove --site hall --id 2");
+  AddKind(*edit, program, MapEditKind::kFree, "erase", "Nothing stands here");
+  AddKind(*edit, program, MapEditKind::kUnknown, "forget", "What is drawn here does not count: it is unknown");
+  AddKind(*edit, program, MapEditKind::kOccupied, "wall", "Something stands here");
+  AddKind(*edit, program, MapEditKind::kKeepOut, "keep-out",
+          "Robots must not drive here; the map does not change (map export --keep-out)");
+  auto listed = std::make_shared<KnownEditArguments>();
+  auto* list = edit->add_subcommand("list", "All edits of a site's map");
+  list->add_option("--site", listed->site, "The site's name")->required();
+  program.OnChosen(*list, listed, ListEdits);
+  auto gone = std::make_shared<KnownEditArguments>();
+  auto* remove = edit->add_subcommand("remove", "Take an edit back");
+  remove->add_option("--site", gone->site, "The site's name")->required();
+  remove->add_option("--id", gone->id, "Its number, as in `cairn map edit list`")->required();
+  program.OnChosen(*remove, gone, RemoveEdit);
+}
+
+}  // namespace cairn::client
