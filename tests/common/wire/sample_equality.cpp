@@ -34,6 +34,15 @@ bool Eq(const LandmarkReport& a, const LandmarkReport& b) {
   return a.id == b.id && a.robot == b.robot && a.corner == b.corner && EqMatrix(a.p_map, b.p_map) &&
          Eq(a.direction_rad, b.direction_rad) && EqMatrix(a.covariance, b.covariance) && a.sightings == b.sightings;
 }
+bool Eq(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return EqMatrix(a, b);
+}
+bool Eq(const ServerLoad& a, const ServerLoad& b) {
+  return Eq(a.up_s, b.up_s) && Eq(a.processor_s, b.processor_s) && a.memory_bytes == b.memory_bytes &&
+         a.inbound_waiting == b.inbound_waiting && a.outbound_waiting == b.outbound_waiting && a.stores == b.stores &&
+         a.commits == b.commits && a.failed_commits == b.failed_commits && a.store_bytes == b.store_bytes &&
+         Eq(a.stored_after_p50_ms, b.stored_after_p50_ms) && Eq(a.stored_after_p99_ms, b.stored_after_p99_ms);
+}
 bool Eq(const MapVersionInfo& a, const MapVersionInfo& b) {
   return a.version == b.version && a.enabled == b.enabled && a.job == b.job && a.note == b.note;
 }
@@ -44,6 +53,10 @@ bool EqList(const std::vector<T>& a, const std::vector<T>& b, Equal equal) {
     if (!equal(a[i], b[i])) return false;
   }
   return true;
+}
+bool Eq(const MapEdit& a, const MapEdit& b) {
+  return a.id == b.id && a.kind == b.kind && Eq(a.width_m, b.width_m) && a.note == b.note && a.made == b.made &&
+         EqList(a.points_map, b.points_map, [](const auto& p, const auto& q) { return Eq(p, q); });
 }
 
 }  // namespace
@@ -115,7 +128,8 @@ bool Same(const Request& a, const Request& b) {
          a.since_generation == b.since_generation && a.job == b.job && a.job_kind == b.job_kind &&
          a.enable == b.enable && a.map_version == b.map_version && a.saved == b.saved &&
          a.T_map_robot.has_value() == b.T_map_robot.has_value() &&
-         (!a.T_map_robot || Eq(*a.T_map_robot, *b.T_map_robot)) && a.edit == b.edit && a.disagreement == b.disagreement;
+         (!a.T_map_robot || Eq(*a.T_map_robot, *b.T_map_robot)) && Eq(a.edit, b.edit) &&
+         a.disagreement == b.disagreement;
 }
 bool Same(const Reply& a, const Reply& b) {
   const auto same = [](const auto& x, const auto& y) { return Same(x, y); };
@@ -145,7 +159,7 @@ bool Same(const Reply& a, const Reply& b) {
          EqList(a.tiles, b.tiles, eq) && EqList(a.landmarks, b.landmarks, eq) && EqList(a.maps, b.maps, same) &&
          EqList(a.robots, b.robots, same_robot) && EqList(a.jobs, b.jobs, same) && EqList(a.ros2, b.ros2, same_door) &&
          EqList(a.ros2_namespaces, b.ros2_namespaces, same_namespace) && a.server_version == b.server_version &&
-         a.edits == b.edits && a.refused == b.refused && a.load == b.load &&
+         EqList(a.edits, b.edits, eq) && a.refused == b.refused && Eq(a.load, b.load) &&
          EqList(a.hypotheses, b.hypotheses, same_hypothesis) &&
          EqList(a.saved, b.saved, [](const SavedSite& x, const SavedSite& y) {
            return x.name == y.name && x.site == y.site && x.bytes == y.bytes && x.saved == y.saved;
