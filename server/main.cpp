@@ -27,6 +27,7 @@
 #include "server/ingress/ingress.h"
 #include "server/ingress/other_servers.h"
 #include "server/ops/domain_lock.h"
+#include "server/ops/end_when_stuck.h"
 #include "server/ops/heartbeat.h"
 #include "server/ops/process_load.h"
 #include "server/ops/service_notifier.h"
@@ -107,16 +108,7 @@ void TellRefusals(const Watched& watched) {
   watched.server.SetRefusals(refusals);
 }
 
-constexpr int kStuck = 4;
 constexpr std::chrono::minutes kLongestUnhealthy{1};
-
-// A thread that is stuck cannot be asked to stop, so nothing is closed. What was called durable is on the disk.
-[[noreturn]] void EndAtOnce() {
-  spdlog::critical(
-      "the server has not worked for a minute and no service manager watches it: it ends, to be started again");
-  spdlog::shutdown();
-  std::_Exit(kStuck);
-}
 
 // Checks for servers on other machines (they are discovered only when both run), for refused peers, for lost messages,
 // whether the store works and how busy the server is.
@@ -163,13 +155,12 @@ void WaitForSignal(asio::io_context& context, asio::signal_set& signals, const W
   asio::steady_timer timer(context);
   const auto watchdog = notifier.watchdog();
   const auto period = watchdog ? *watchdog / 3 : std::chrono::microseconds(std::chrono::seconds(1));
-  Heartbeat whole_server(kLongestUnhealthy);
+  EndWhenStuck end_when_stuck(kLongestUnhealthy);
   const std::function<void(const asio::error_code&)> check = [&](const asio::error_code& error) {
     if (error) return;
     const bool healthy = watched.server.healthy();
     if (healthy) notifier.Alive();
-    const Pulse pulse{.finished = 0, .busy = !healthy};
-    if (!watchdog && !whole_server.Check({{"server", pulse}}, Heartbeat::Clock::now()).empty()) EndAtOnce();
+    if (!watchdog) end_when_stuck.Look(healthy, Heartbeat::Clock::now());
     timer.expires_after(period);
     timer.async_wait(check);
   };
