@@ -2,6 +2,7 @@
 // can be sent again and arrives as the same value; scans and odometry go through the door of the server.
 #include <array>
 #include <cstdint>
+#include <limits>
 
 #include "server/ingress/admission.h"
 #include "tests/common/wire/sample_values.h"
@@ -75,6 +76,9 @@ std::vector<std::string> SeedsOfSamples() {
   Must(seeds.size() == kRunSample.size(), "a seed of every topic");
   Reply reply = wire::ExtremeReply();
   reply.tiles.resize(0);
+  // No number, which is not equal to itself.
+  reply.load.front().up_s = std::numeric_limits<double>::quiet_NaN();
+  reply.edits.front().width_m = std::numeric_limits<double>::quiet_NaN();
   seeds.push_back(std::string(1, static_cast<char>(seeds.size() - 1)) + Serialized(reply));
   return seeds;
 }

@@ -159,7 +159,7 @@ bool Same(const Reply& a, const Reply& b) {
          EqList(a.tiles, b.tiles, eq) && EqList(a.landmarks, b.landmarks, eq) && EqList(a.maps, b.maps, same) &&
          EqList(a.robots, b.robots, same_robot) && EqList(a.jobs, b.jobs, same) && EqList(a.ros2, b.ros2, same_door) &&
          EqList(a.ros2_namespaces, b.ros2_namespaces, same_namespace) && a.server_version == b.server_version &&
-         EqList(a.edits, b.edits, eq) && a.refused == b.refused && Eq(a.load, b.load) &&
+         EqList(a.edits, b.edits, eq) && a.refused == b.refused && EqList(a.load, b.load, eq) &&
          EqList(a.hypotheses, b.hypotheses, same_hypothesis) &&
          EqList(a.saved, b.saved, [](const SavedSite& x, const SavedSite& y) {
            return x.name == y.name && x.site == y.site && x.bytes == y.bytes && x.saved == y.saved;
