@@ -15,6 +15,7 @@ GridLocalisationOptions Mapper::State::LocalisationOptions() const {
           .gate = options.gate,
           .drift = options.filter.back_end.drift,
           .blind = options.blind,
+          .odometry_walk = options.odometry_walk,
           .uses_odometry = options.front_end.use_odometry,
           .lost_after_m = options.lost_after_m};
 }

@@ -19,8 +19,13 @@ void Visit(OptionVisitor& visitor, MapperOptions& options) {
   visitor.Integer("max_chunks", options.max_chunks, "chunks", 1, 10000000,
                   "Pieces of the map of one session, 32 KiB each. When it has as many, its scans are "
                   "dropped as session_full.");
-  visitor.Section("blind", "Uncertainty of a motion that is known from odometry alone. It is added to slam.drift.",
+  visitor.Section("blind", "Uncertainty of a whole motion that is known from odometry alone, as while no scans come.",
                   [&] { Visit(visitor, options.blind); });
+  visitor.Section("odometry_walk",
+                  "Uncertainty of the steps from scan to scan that are known from odometry alone: of scans without a "
+                  "match, and of the way along a corridor. It is added to slam.drift, and says how far odometry is "
+                  "believed along a corridor.",
+                  [&] { Visit(visitor, options.odometry_walk); });
   visitor.Real("max_tilt_rad", options.max_tilt_rad, "rad", 0.0, 1.58,
                ForOperators("A scan of a robot that is tilted by more than this is neither matched nor drawn; its pose "
                             "comes from odometry."));

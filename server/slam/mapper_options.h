@@ -27,6 +27,7 @@ struct MapperOptions {
   std::int64_t max_keyframes = 500000;
   std::int64_t max_chunks = 16384;  // 0.67 km^2 at 5 cm a cell, 512 MiB.
   MotionNoise blind{0.002, 0.2, 0.0, 0.001, 0.05, 0.0};
+  OdometryNoise odometry_walk;
   MatcherKind matcher = MatcherKind::kVoting;
   MatcherOptions matching;
   FrontEndOptions front_end;

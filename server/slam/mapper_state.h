@@ -29,8 +29,8 @@ namespace cairn::slam {
 struct Mapper::State {
   State(const MapperOptions& given, const Pose2& T_map_robot_start, std::uint64_t seed)
       : options(given),
-        front_end(given.front_end, MakeMatcher(given.matcher, given.matching)),
-        blind(given.blind, given.front_end.use_odometry, given.lost_after_m),
+        front_end(given.front_end, MakeMatcher(given.matcher, given.matching), given.odometry_walk),
+        blind(given.odometry_walk, given.front_end.use_odometry, given.lost_after_m),
         trail(given.filter.back_end.drift, given.front_end.surface),
         revisits(given.revisit, given.front_end.refine),
         filter(MakeFilter(given.filter.kind, given.filter, T_map_robot_start, seed)),

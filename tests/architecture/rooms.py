@@ -27,7 +27,7 @@ SLAM_ROOMS = {
     "loops": ["filters", "trail", "matching", "grid", "scan"],  # Old places seen again; contradictions.
     "tracking": ["matching", "features", "motion", "trail", "scan"],  # Scan against the last keyframes.
     "recovery": ["loops", "tracking", "matching", "trail", "motion", "scan"],  # A robot that was not watched.
-    "known_grid": ["recovery", "loops", "matching", "motion", "grid", "trail", "scan"],  # A map of others.
+    "known_grid": ["recovery", "loops", "tracking", "matching", "motion", "grid", "trail", "scan"],  # A map of others.
     "drawing": ["trail", "grid"],  # The map of the robot along its path.
     "smoothing": ["trail", "grid"],  # Paths and maps after the fact.
     "site": ["recovery", "loops", "smoothing", "graph", "matching", "trail", "motion", "scan"],  # Several sessions as one graph.

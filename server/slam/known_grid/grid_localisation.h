@@ -28,8 +28,9 @@ struct GridLocalisationOptions {
   PointToLineOptions align;
   SurfaceOptions surface;
   MotionGateOptions gate;
-  MotionNoise drift;  // Of a step that scans have measured, ...
-  MotionNoise blind;  // ... and of one that odometry alone has.
+  MotionNoise drift;            // Of a step that scans have measured, ...
+  MotionNoise blind;            // ... of a whole motion that odometry alone knows, ...
+  OdometryNoise odometry_walk;  // ... and of one that is cut into steps.
   bool uses_odometry = true;
   double lost_after_m = 2.0;
 };

@@ -9,12 +9,18 @@ void DetectDegeneracy(const Eigen::Matrix3d& H, MatchResult& result) {
   // A room is far above this ratio and a corridor far below: half or twice the value changes nothing (study
   // `sensitivity`).
   constexpr double kCorridorRatio = 0.02;
+  // Error of the direction of a surface point. It alone makes a bare wall seem to show a position along it.
+  constexpr double kDirectionSigmaRad = 0.05;
   const Eigen::Matrix2d H_translation =
       H.topLeftCorner<2, 2>() - H.topRightCorner<2, 1>() * H.bottomLeftCorner<1, 2>() / std::max(H(2, 2), 1e-12);
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver;
   solver.computeDirect(H_translation);
-  result.degenerate = solver.eigenvalues()(0) < kCorridorRatio * solver.eigenvalues()(1);
-  if (result.degenerate) result.degenerate_direction = solver.eigenvectors().col(0);
+  const double least = solver.eigenvalues()(0), largest = solver.eigenvalues()(1);
+  result.degenerate = least < kCorridorRatio * largest;
+  if (!result.degenerate) return;
+  result.degenerate_direction = solver.eigenvectors().col(0);
+  const double shown = std::max(0.0, least - kDirectionSigmaRad * kDirectionSigmaRad * largest);
+  result.open_information = shown / std::max(1e-6, 1.0 - least / (kCorridorRatio * largest));
 }
 
 Eigen::Vector2d TakeAlongFromPrior(const Eigen::Vector2d& measured, const Eigen::Vector2d& prior,
@@ -31,6 +37,21 @@ void TakeAlongFromPrior(const MatchPrior& prior, MatchResult& result) {
   across.topLeftCorner<2, 2>() -= u * u.transpose();
   result.covariance = across * result.covariance * across.transpose();
   result.covariance.topLeftCorner<2, 2>() += u.dot(prior.covariance.topLeftCorner<2, 2>() * u) * u * u.transpose();
+}
+
+void WeighAlongWithPrior(const MatchPrior& prior, MatchResult& result) {
+  if (!result.degenerate) return;
+  const Eigen::Vector2d u = result.degenerate_direction;
+  const double variance = u.dot(prior.covariance.topLeftCorner<2, 2>() * u);
+  const double information = result.open_information, share_of_prior = 1.0 / (1.0 + variance * information);
+  const Eigen::Vector2d measured = result.T_ref_curr.translation();
+  MatchPrior weighed = prior;
+  const Eigen::Vector2d t = measured + share_of_prior * (prior.T_ref_curr.translation() - measured);
+  weighed.T_ref_curr.x = t.x();
+  weighed.T_ref_curr.y = t.y();
+  weighed.covariance.topLeftCorner<2, 2>() = VarianceAfter(variance, information) * Eigen::Matrix2d::Identity();
+  TakeAlongFromPrior(weighed, result);
+  result.open_information = information;
 }
 
 }  // namespace cairn::slam

@@ -24,6 +24,8 @@ struct MatchResult {
   bool converged = false;   // The pose is usable.
   bool degenerate = false;  // One direction of the plane is not constrained (corridor).
   Eigen::Vector2d degenerate_direction = Eigen::Vector2d::Zero();  // That direction: a unit vector, in ref.
+  // Information of the surfaces on the position along it, 1/m^2, in T_ref_curr; 0 if it comes from the prior alone.
+  double open_information = 0.0;
   MatchFailure failure = MatchFailure::kNone;
 };
 
@@ -47,5 +49,14 @@ void DetectDegeneracy(const Eigen::Matrix3d& H, MatchResult& result);
 // are replaced by those of the prior. Apparent evidence along a corridor is only the end of the view, which
 // moves with the robot.
 void TakeAlongFromPrior(const MatchPrior& prior, MatchResult& result);
+
+// If the result is degenerate: takes the position along the degenerate direction, and its uncertainty, from the prior
+// and from what surfaces show of it (`open_information`), each according to its certainty.
+void WeighAlongWithPrior(const MatchPrior& prior, MatchResult& result);
+
+// Variance of a position of which `variance` was known before `information` on it, 1/m^2, was added.
+[[nodiscard]] inline double VarianceAfter(double variance, double information) {
+  return variance / (1.0 + variance * information);
+}
 
 }  // namespace cairn::slam

@@ -206,7 +206,7 @@ MatchResult AlignPointsToSurfaces(std::span<const SurfacePoint> points_robot, co
   result.covariance = 0.5 * (result.covariance + result.covariance.transpose()).eval();
   // A reference point without a surface direction seems to constrain all directions, so only surfaces are
   // used to judge degeneracy.
-  DetectDegeneracy(H_surfaces, result);
+  DetectDegeneracy(per_point * H_surfaces, result);
   return result;
 }
 

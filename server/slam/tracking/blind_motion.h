@@ -1,27 +1,45 @@
-// Accumulates the motion that no scan measured: the part that is known by odometry or by a forecast alone. It
-// gives the uncertainty of a step between keyframes in addition to the drift of matching, and decides when
-// the robot counts as lost. Not thread-safe.
+// Accumulates the motion that no scan measured: the part that is known by odometry or by a forecast alone. Along a
+// corridor this is the position along it, although the scan matches. It gives the uncertainty of a step between
+// keyframes in addition to the drift of matching, and decides when the robot counts as lost. Not thread-safe.
 #pragma once
 
 #include <Eigen/Core>
 #include <utility>
 
+#include "server/slam/matching/match_result.h"
 #include "server/slam/motion/step_motion.h"
 #include "server/slam/tracking/front_end.h"
 
 namespace cairn::slam {
 
+// What no scan has measured of the motion since a pose `from`, after one more step: the covariance of (x, y, theta) in
+// the frame of the robot at `from`; `before` is that before the step. A match shows where the robot is, but for the
+// direction that it leaves open: there the doubt of odometry stays, less what the scan shows of it.
+[[nodiscard]] inline Eigen::Matrix3d UnmeasuredAfter(const Eigen::Matrix3d& before, const TrackStep& step,
+                                                     const Pose2& T_track_from, const OdometryNoise& noise) {
+  Eigen::Matrix3d all = before + noise.Covariance(step.T_prev_curr_blind);
+  if (!step.matched) return all;
+  const Eigen::Vector2d open = T_track_from.rotation().transpose() * step.open_direction;
+  const double along = open.dot(all.topLeftCorner<2, 2>() * open);
+  all.setZero();
+  all.topLeftCorner<2, 2>() = VarianceAfter(along, step.open_information) * open * open.transpose();
+  return all;
+}
+
 class BlindMotion {
  public:
   // `noise` is the noise of motion known by odometry alone. Without odometry the front-end itself reports the
   // covariance of what it did not measure.
-  BlindMotion(const MotionNoise& noise, bool use_odometry, double lost_after_m)
+  BlindMotion(const OdometryNoise& noise, bool use_odometry, double lost_after_m)
       : noise_(noise), use_odometry_(use_odometry), lost_after_m_(lost_after_m) {}
 
   // `T_track_keyframe` is the pose of the last keyframe.
   void Add(const TrackStep& step, const Pose2& T_track_keyframe) {
     unmatched_m_ = step.matched ? 0.0 : unmatched_m_ + step.moved_m;
-    if (!step.matched && use_odometry_) covariance_ += noise_.Covariance({step.moved_m, 0.0, 0.0});
+    if (use_odometry_) {
+      covariance_ = UnmeasuredAfter(covariance_, step, T_track_keyframe, noise_);
+      return;
+    }
     Eigen::Matrix3d R = Eigen::Matrix3d::Identity();
     R.topLeftCorner<2, 2>() = T_track_keyframe.rotation().transpose();
     covariance_ += R * step.forecast_covariance * R.transpose();
@@ -43,7 +61,7 @@ class BlindMotion {
   }
 
  private:
-  MotionNoise noise_;
+  OdometryNoise noise_;
   bool use_odometry_;
   double lost_after_m_;
   double unmatched_m_ = 0.0;  // Distance travelled since the last match.

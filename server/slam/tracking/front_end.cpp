@@ -10,7 +10,7 @@
 #include "common/geometry/transform2.h"
 #include "server/slam/matching/match_result.h"
 #include "server/slam/matching/point_to_line.h"
-#include "server/slam/tracking/surface_votes.h"
+#include "server/slam/tracking/odometry_check.h"
 
 namespace cairn::slam {
 namespace {
@@ -23,16 +23,6 @@ constexpr int kTurns = 4;  // Turns to either side that are tried.
 // An unusual guess must explain this share of the scan more than the best one so far. With half or twice
 // the value, the error on mit-csail changes no more than with another seed (tests/studies/sensitivity).
 constexpr double kClearly = 0.05;
-
-// A match that moves the robot otherwise than odometry by this, and this share of the step, must be shown by more
-// surfaces than odometry is. Where it holds the robot back by half of the step, what moves along with it may be the
-// cause, so there must be so many more. Not in turns, where odometry freezes and catches up. With more votes for every
-// match, the online error on intel is twice as large.
-constexpr double kContradictsM = 0.02, kContradictsShare = 0.1;
-constexpr double kHeldBack = 0.5;
-constexpr int kMoreVotes = 1, kMoreVotesHeldBack = 3;
-constexpr double kStepM = 0.03, kTurnRad = 0.1;  // Shorter steps and larger turns are not checked.
-constexpr double kHeldM = 0.002;                 // Standard deviation that holds an alignment where it begins.
 
 // Distance between an answer and the odometry in standard deviations.
 double JumpOf(const Pose2& T_track_robot, const Pose2& guess, const Eigen::Matrix3d& covariance) {
@@ -110,8 +100,8 @@ void Visit(OptionVisitor& visitor, FrontEndOptions& options) {
                   "no_odometry.merged_keyframes", "must not exceed", "reference_keyframes");
 }
 
-FrontEnd::FrontEnd(const FrontEndOptions& options, ScanMatcher matcher)
-    : options_(options), matcher_(std::move(matcher)) {}
+FrontEnd::FrontEnd(const FrontEndOptions& options, ScanMatcher matcher, const OdometryNoise& walk)
+    : options_(options), matcher_(std::move(matcher)), walk_(walk) {}
 
 ScanView Look(const Scan& scan, const FrontEndOptions& options) {
   const std::vector<BeamPoint> points = PointsOf(scan);
@@ -140,17 +130,22 @@ TrackStep FrontEnd::Follow(const ScanView& view, const Pose2& T_odom_robot, cons
   if (!options_.use_odometry && options_.refine_enabled)
     TakeAlongFromPrior({guess.T_track_robot, guess.covariance}, coarse);
   Begin(watch_, ScanStep::kRefine);
-  const MatchResult match = options_.refine_enabled ? Checked(view, guess, Refine(view, T_odom_robot, guess, coarse))
-                                                    : MatchAlone(view, T_odom_robot, guess, coarse, parallel_for);
-  return StepOf(match);
+  const MatchResult match = options_.refine_enabled
+                                ? Checked(view, T_odom_robot, guess, Refine(view, T_odom_robot, guess, coarse))
+                                : MatchAlone(view, T_odom_robot, guess, coarse, parallel_for);
+  return StepOf(match, T_odom_robot);
 }
 
-TrackStep FrontEnd::StepOf(const MatchResult& match) const {
+TrackStep FrontEnd::StepOf(const MatchResult& match, const Pose2& T_odom_robot) const {
   TrackStep step{.T_track_robot = match.T_ref_curr,
                  .score = match.score,
                  .matched = match.converged,
-                 .degenerate = match.degenerate};
-  step.moved_m = Between(history_.back().T_track_robot, step.T_track_robot).translation().norm();
+                 .degenerate = match.degenerate,
+                 .open_information = match.open_information};
+  if (match.degenerate) step.open_direction = match.degenerate_direction;
+  const Pose2 moved = Between(history_.back().T_track_robot, step.T_track_robot);
+  step.moved_m = moved.translation().norm();
+  step.T_prev_curr_blind = options_.use_odometry ? Between(history_.back().T_odom_robot, T_odom_robot) : moved;
   if (!options_.use_odometry) {
     if (!step.matched) step.moved_m = std::max(step.moved_m, options_.no_odometry.unmatched_step_m);
     step.forecast_covariance = ForecastShare(match);
@@ -169,10 +164,9 @@ std::optional<TrackStep> FrontEnd::TrackAgain(const ScanView& view, const Pose2&
   history_.pop_back();
   const Guess guess = Predict(T_odom_robot);
   Begin(watch_, ScanStep::kRefine);
-  const MatchResult match = AlignPointsToSurfaces(
-      view.points_robot, index_, {step.T_track_robot, guess.T_track_robot, guess.covariance}, options_.refine);
+  const MatchResult match = Align(view, step.T_track_robot, guess);
   const bool better = match.converged && match.score > step.score;
-  const TrackStep again = better ? StepOf(match) : step;
+  const TrackStep again = better ? StepOf(match, T_odom_robot) : step;
   score_ = again.score;
   history_.push_back({again.T_track_robot, first.T_odom_robot});
   if (!better) return std::nullopt;
@@ -265,6 +259,19 @@ double FrontEnd::Explained(const ScanView& view, const Pose2& T_track_robot) con
       .score;
 }
 
+// The prior of the alignment is generous, because real odometry fails. Along a corridor rough points and the ends of
+// the view, which move with the robot, would outweigh it and hold the robot back.
+MatchResult FrontEnd::Align(const ScanView& view, const Pose2& start, const Guess& guess) const {
+  MatchResult match =
+      AlignPointsToSurfaces(view.points_robot, index_, {start, guess.T_track_robot, guess.covariance}, options_.refine);
+  // After scans without a match it may correct what odometry did wrong on that way.
+  if (options_.use_odometry && unmatched_m_ <= 0.0) {
+    const Pose2 motion = Between(history_.back().T_track_robot, guess.T_track_robot);
+    WeighAlongWithPrior({guess.T_track_robot, walk_.Covariance(motion)}, match);
+  }
+  return match;
+}
+
 std::vector<Pose2> FrontEnd::UnusualGuesses(const Pose2& T_odom_robot) const {
   std::vector<Pose2> guesses = {history_.back().T_track_robot};
   for (const std::size_t back : kLookBack) {
@@ -277,10 +284,7 @@ std::vector<Pose2> FrontEnd::UnusualGuesses(const Pose2& T_odom_robot) const {
 
 MatchResult FrontEnd::Refine(const ScanView& view, const Pose2& T_odom_robot, const Guess& guess,
                              const MatchResult& coarse) const {
-  const auto align = [&](const Pose2& start) {
-    return AlignPointsToSurfaces(view.points_robot, index_, {start, guess.T_track_robot, guess.covariance},
-                                 options_.refine);
-  };
+  const auto align = [&](const Pose2& start) { return Align(view, start, guess); };
 
   // The refinement starts at the matcher's answer or, if there is none, at the prediction.
   MatchResult best = align(coarse.converged ? coarse.T_ref_curr : guess.T_track_robot);
@@ -307,32 +311,17 @@ MatchResult FrontEnd::Refine(const ScanView& view, const Pose2& T_odom_robot, co
   return best;
 }
 
-MatchResult FrontEnd::Checked(const ScanView& view, const Guess& guess, const MatchResult& match) const {
+MatchResult FrontEnd::Checked(const ScanView& view, const Pose2& T_odom_robot, const Guess& guess,
+                              const MatchResult& match) const {
   if (!options_.use_odometry || !match.converged) return match;
   if (unmatched_m_ > 0.0) return match;  // It may correct what odometry did wrong on that way.
-  const Pose2& T_track_last = history_.back().T_track_robot;
-  const Eigen::Vector2d expected = guess.T_track_robot.translation() - T_track_last.translation();
-  const Eigen::Vector2d moved = match.T_ref_curr.translation() - T_track_last.translation();
-  const Eigen::Vector2d jump = moved - expected;
-  const double step_m = expected.norm();
-  const bool checked =
-      step_m >= kStepM && std::abs(WrapAngle(guess.T_track_robot.theta - T_track_last.theta)) <= kTurnRad;
-  if (!checked || jump.norm() < kContradictsM + kContradictsShare * step_m) return match;
-
-  // As far as odometry says in this direction, else as the scan shows.
-  const Eigen::Vector3d along = (Eigen::Vector3d() << jump.normalized(), 0.0).finished();
-  const Eigen::Matrix3d others = Eigen::Matrix3d::Identity() - along * along.transpose();
-  const Eigen::Matrix3d held = others * guess.covariance * others + kHeldM * kHeldM * along * along.transpose();
-  MatchResult odometry = AlignPointsToSurfaces(view.points_robot, index_,
-                                               {guess.T_track_robot, guess.T_track_robot, held}, options_.refine);
-  if (!odometry.converged) return match;
-  const bool held_back = moved.dot(expected) < kHeldBack * step_m * step_m;
-  const int votes = SurfaceVotes(view.points_robot, index_, odometry.T_ref_curr, match.T_ref_curr);
-  if (votes >= (held_back ? kMoreVotesHeldBack : kMoreVotes)) return match;
-  odometry.covariance += along.dot(guess.covariance * along) * along * along.transpose();
-  odometry.degenerate = true;
-  odometry.degenerate_direction = along.head<2>();
-  return odometry;
+  // The newest scan from which the robot has moved far enough.
+  const auto from = std::find_if(history_.rbegin(), history_.rend(), [&](const Sight& sight) {
+    return Between(sight.T_odom_robot, T_odom_robot).translation().norm() >= kShortestCheckedStepM;
+  });
+  if (from == history_.rend()) return match;
+  const OdometryStep step{from->T_track_robot, Between(from->T_odom_robot, T_odom_robot), guess.covariance};
+  return CheckAgainstOdometry(view.points_robot, index_, step, match, options_.refine);
 }
 
 void FrontEnd::AddKeyframe(const ScanView& view) {

@@ -68,13 +68,20 @@ struct TrackStep {
   double score = 0.0;       // Share of the scan that agrees with the last keyframes, 0..1.
   bool matched = false;     // False if the pose comes from odometry or from the forecast.
   bool degenerate = false;  // True in a corridor: the scan does not show the position along it.
-  double moved_m = 0.0;     // Distance travelled since the previous scan.
-  bool found = false;       // The step leads to where the robot was found again; odometry does not know it.
+  // Then that direction, a unit vector along the axes of `track`, and the information of the scan on the position along
+  // it, 1/m^2. Otherwise zero.
+  Eigen::Vector2d open_direction = Eigen::Vector2d::Zero();
+  double open_information = 0.0;
+  double moved_m = 0.0;  // Distance travelled since the previous scan.
+  // The step from the previous scan as odometry measured it; without odometry, as it is in `track`.
+  Pose2 T_prev_curr_blind;
+  bool found = false;  // The step leads to where the robot was found again; odometry does not know it.
   // Covariance of the part of the step that neither a scan nor odometry measured (the direction along a
   // corridor, or a scan without a match), along the axes of `track`. It is zero if odometry is used:
   // BlindMotion accounts for that case.
   Eigen::Matrix3d forecast_covariance = Eigen::Matrix3d::Zero();
 
+  // Steps are stored only after BlindMotion has used what is not in this list.
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
     archive(self.T_track_robot, self.score, self.matched, self.degenerate, self.moved_m, self.found,
@@ -84,7 +91,8 @@ struct TrackStep {
 
 class FrontEnd {
  public:
-  FrontEnd(const FrontEndOptions& options, ScanMatcher matcher);
+  // `walk` is the noise of steps that odometry alone knows.
+  FrontEnd(const FrontEndOptions& options, ScanMatcher matcher, const OdometryNoise& walk = {});
 
   // From now on `watch` is told when kLook, kMatch and kRefine begin.
   void Watch(StepWatch watch) { watch_ = std::move(watch); }
@@ -130,15 +138,19 @@ class FrontEnd {
   };
   [[nodiscard]] TrackStep Follow(const ScanView& view, const Pose2& T_odom_robot,
                                  const ParallelFor& parallel_for) const;
-  [[nodiscard]] TrackStep StepOf(const MatchResult& match) const;
+  [[nodiscard]] TrackStep StepOf(const MatchResult& match, const Pose2& T_odom_robot) const;
   [[nodiscard]] Guess Predict(const Pose2& T_odom_robot) const;
+  // Alignment with the reference, from `start`; the result is in `track`. In the direction that the surfaces leave
+  // open, odometry with the noise that it usually has decides together with what they show.
+  [[nodiscard]] MatchResult Align(const ScanView& view, const Pose2& start, const Guess& guess) const;
   // In the results of the next three functions the reference frame is `track`.
   [[nodiscard]] MatchResult MatchLastKeyframe(const ScanView& view, const Guess& guess,
                                               const ParallelFor& parallel_for) const;
   [[nodiscard]] MatchResult Refine(const ScanView& view, const Pose2& T_odom_robot, const Guess& guess,
                                    const MatchResult& coarse) const;
-  // The match, or the pose that odometry gives if the match contradicts it and too few separate surfaces show that.
-  [[nodiscard]] MatchResult Checked(const ScanView& view, const Guess& guess, const MatchResult& match) const;
+  // The match, unless odometry contradicts it and the surfaces do not show more than odometry (odometry_check.h).
+  [[nodiscard]] MatchResult Checked(const ScanView& view, const Pose2& T_odom_robot, const Guess& guess,
+                                    const MatchResult& match) const;
   [[nodiscard]] MatchResult MatchAlone(const ScanView& view, const Pose2& T_odom_robot, const Guess& guess,
                                        const MatchResult& coarse, const ParallelFor& parallel_for) const;
   // Guesses that do not use the odometry since the last scan, for odometry that stood still or came late. One
@@ -154,6 +166,7 @@ class FrontEnd {
 
   FrontEndOptions options_;
   ScanMatcher matcher_;
+  OdometryNoise walk_;
   StepWatch watch_;
   double score_ = 0.0;  // Score of the last match.
   // The way of the last scans without a match, less that of the scans with one since then: where it is not zero, a

@@ -17,6 +17,11 @@
 namespace cairn::studies {
 namespace {
 
+// Where only odometry shows the way, the estimate must be as long.
+constexpr double kMostShareOfWay = 0.02;
+// The simulated drives, at whatever rate they are scanned.
+constexpr double kMostErrorSmoothedM = 0.16;
+
 // Every k-th scan such that `share` of them stay.
 StudyLog Thinned(const StudyLog& log, double share) {
   StudyLog thinned = log;
@@ -46,7 +51,17 @@ void RunRates(StudyContext& context) {
       const StudyLog thinned = Thinned(log, std::min(1.0, hz / full_hz));
       const Mapped mapped = MapLog(context, thinned, {});
       const bool known = !log.truth.empty();
-      table.Add({log.name, Number(hz, 1), Number(LengthOf(RawPath(thinned)), 2), Number(LengthOf(mapped.run.online), 2),
+      const std::string which = log.name + ", " + Number(hz, 1) + " scans per second: ";
+      const double odometry_m = LengthOf(RawPath(thinned));
+      if (known) {
+        report.Expect(TrajectoryError(mapped.smoothed, log.truth) <= kMostErrorSmoothedM,
+                      which + "the error depends on the rate");
+      } else {
+        for (const double length_m : {LengthOf(mapped.run.online), LengthOf(mapped.smoothed)})
+          report.Expect(std::abs(length_m / odometry_m - 1.0) <= kMostShareOfWay,
+                        which + "the corridor is not as long");
+      }
+      table.Add({log.name, Number(hz, 1), Number(odometry_m, 2), Number(LengthOf(mapped.run.online), 2),
                  Number(LengthOf(mapped.smoothed), 2),
                  known ? Number(TrajectoryError(mapped.run.online, log.truth), 3) : "",
                  known ? Number(TrajectoryError(mapped.smoothed, log.truth), 3) : ""});

@@ -110,6 +110,7 @@ void AddFilter(std::vector<Constant>& all) {
   all.push_back(Of("filter: gate.distance_m", runs, CAIRN_FIELD(gate.distance_m)));
   all.push_back(Of("filter: gate.turn_rad", runs, CAIRN_FIELD(gate.turn_rad)));
   all.push_back(Of("filter: blind.trans_per_m", runs, CAIRN_FIELD(blind.trans_per_m)));
+  all.push_back(Of("filter: odometry_walk.trans_m_per_sqrt_m", runs, CAIRN_FIELD(odometry_walk.trans_m_per_sqrt_m)));
 }
 
 void AddLandmarks(std::vector<Constant>& all) {

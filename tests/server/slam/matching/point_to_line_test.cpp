@@ -108,7 +108,7 @@ struct Plain {
     result.inliers = sum.inliers;
     result.covariance = (per_point * sum.H + prior).llt().solve(Eigen::Matrix3d::Identity());
     result.covariance = 0.5 * (result.covariance + result.covariance.transpose()).eval();
-    DetectDegeneracy(sum.H_surfaces, result);
+    DetectDegeneracy(per_point * sum.H_surfaces, result);
     return result;
   }
 };
@@ -168,6 +168,48 @@ TEST(PointToLine, SaysThatACorridorHoldsOnlyOneDirection) {
   // large uncertainty.
   EXPECT_NEAR(match.T_ref_curr.x, 0.35, 0.1);
   EXPECT_GT(match.covariance(0, 0), 20.0 * match.covariance(1, 1));
+}
+
+// The walls of a corridor whose hits have noise, and the same with a pillar at one of them.
+MatchResult InACorridor(bool pillar) {
+  World corridor;
+  corridor.Add({{-50, 1}, {50, 1}}).Add({{-50, -1}, {50, -1}});
+  if (pillar) corridor.Add({{4.0, 1}, {4.0, 0.9}, {4.3, 0.9}, {4.3, 1}});
+  const Laser laser{.beams = 361, .step_rad = Radians(0.5), .sigma_m = 0.01};
+  std::mt19937_64 rng(3);
+  const PointIndex reference(SurfaceOf(Look(corridor, {}, laser, &rng)));
+  return AlignPointsToSurfaces(SurfaceOf(Look(corridor, {0.1, 0.0, 0.0}, laser, &rng)), reference,
+                               {{0.1, 0.0, 0.0}, {0.1, 0.0, 0.0}, kPrior}, {});
+}
+
+TEST(PointToLine, SaysHowMuchOfTheWayAlongACorridorSurfacesShow) {
+  const MatchResult bare = InACorridor(false), pillar = InACorridor(true);
+  ASSERT_TRUE(bare.degenerate);
+  ASSERT_TRUE(pillar.degenerate);
+  EXPECT_LT(bare.open_information, 1.0 / (1.0 * 1.0)) << "noise in the directions of the walls shows no position";
+  EXPECT_GT(pillar.open_information, 1.0 / (0.1 * 0.1));
+}
+
+TEST(PointToLine, AlongACorridorTheAnswerIsWeighedWithThePrior) {
+  MatchResult match = InACorridor(false);
+  match.T_ref_curr = {1.0, 0.2, 0.1};
+  match.degenerate_direction = {1.0, 0.0};
+  const MatchPrior prior{{3.0, 0.5, 0.3}, PoseCovariance(0.1, 0.5)};
+  match.open_information = 0.0;
+  MatchResult weighed = match;
+  WeighAlongWithPrior(prior, weighed);
+  EXPECT_EQ(weighed.T_ref_curr, (Pose2{3.0, 0.2, 0.1}));
+  EXPECT_NEAR(weighed.covariance(0, 0), 0.01, 1e-12);
+  match.open_information = 300.0;  // Three times as much as that of the prior.
+  weighed = match;
+  WeighAlongWithPrior(prior, weighed);
+  EXPECT_NEAR(weighed.T_ref_curr.x, 1.5, 1e-12);
+  EXPECT_EQ(weighed.T_ref_curr.y, 0.2);
+  EXPECT_NEAR(weighed.covariance(0, 0), 0.0025, 1e-12);
+  EXPECT_EQ(weighed.open_information, 300.0);
+  match.degenerate = false;
+  WeighAlongWithPrior(prior, match);
+  EXPECT_EQ(match.T_ref_curr, (Pose2{1.0, 0.2, 0.1}));
 }
 
 TEST(PointToLine, WithoutPointsTheAnswerIsThePrior) {
