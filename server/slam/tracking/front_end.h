@@ -74,7 +74,7 @@ struct TrackStep {
   double open_information = 0.0;
   double moved_m = 0.0;  // Distance travelled since the previous scan.
   // The step from the previous scan as odometry measured it; without odometry, as it is in `track`.
-  Pose2 T_prev_curr_blind;
+  Pose2 T_prev_curr_blind{};
   bool found = false;  // The step leads to where the robot was found again; odometry does not know it.
   // Covariance of the part of the step that neither a scan nor odometry measured (the direction along a
   // corridor, or a scan without a match), along the axes of `track`. It is zero if odometry is used:
