@@ -22,9 +22,7 @@ void Visit(OptionVisitor& visitor, MapperOptions& options) {
   visitor.Section("blind", "Uncertainty of a whole motion that is known from odometry alone, as while no scans come.",
                   [&] { Visit(visitor, options.blind); });
   visitor.Section("odometry_walk",
-                  "Uncertainty of the steps from scan to scan that are known from odometry alone: of scans without a "
-                  "match, and of the way along a corridor. It is added to slam.drift, and says how far odometry is "
-                  "believed along a corridor.",
+                  "Uncertainty of the steps that odometry alone knows: of scans without a match, and along a corridor.",
                   [&] { Visit(visitor, options.odometry_walk); });
   visitor.Real("max_tilt_rad", options.max_tilt_rad, "rad", 0.0, 1.58,
                ForOperators("A scan of a robot that is tilted by more than this is neither matched nor drawn; its pose "
