@@ -19,8 +19,10 @@ void Visit(OptionVisitor& visitor, MapperOptions& options) {
   visitor.Integer("max_chunks", options.max_chunks, "chunks", 1, 10000000,
                   "Pieces of the map of one session, 32 KiB each. When it has as many, its scans are "
                   "dropped as session_full.");
-  visitor.Section("blind", "Uncertainty of a whole motion that is known from odometry alone, as while no scans come.",
-                  [&] { Visit(visitor, options.blind); });
+  visitor.Section(
+      "blind",
+      "Uncertainty of a whole motion that odometry alone knows: under tilted scans, and of a robot that is looked for.",
+      [&] { Visit(visitor, options.blind); });
   visitor.Section("odometry_walk",
                   "Uncertainty of the steps that odometry alone knows: of scans without a match, and along a corridor.",
                   [&] { Visit(visitor, options.odometry_walk); });

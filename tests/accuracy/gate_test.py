@@ -157,7 +157,9 @@ class WayMetric(unittest.TestCase):
         self.assertEqual(self.run_metric(longer, odometry, "--max-share", "0.029").returncode, 1)
 
     def test_a_robot_that_returns_has_no_such_figure(self):
-        self.assertEqual(self.run_metric([(0.0, 0, 0), (1.0, 1, 0)], [(0.0, 1, 1), (1.0, 1, 1)]).returncode, 1)
+        done = self.run_metric([(0.0, 0, 0), (1.0, 1, 0)], [(0.0, 1, 1), (1.0, 1, 1)])
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("ends where it began", done.stderr)
 
 
 if __name__ == "__main__":

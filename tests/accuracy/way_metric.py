@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """How far from its start a robot ended, beside what its odometry says: for a corridor in which scans show no way along it.
 
-Where only odometry shows how far the robot drives, the estimate must not be shorter or longer. TRAJECTORY is TUM text
+Where only odometry shows how far the robot drives, the estimate must not be shorter or longer. That is no figure of accuracy:
+odometry itself has no error here. TRAJECTORY is TUM text
 (`stamp x y z qx qy qz qw`), LOG a CARMEN log whose ROBOTLASER1 lines carry the odometry.
 
 Prints one line of key=value pairs (m). Exit code 1 when the input cannot be used, or the distance from start to end differs

@@ -132,7 +132,11 @@ GridLocalisation::Followed GridLocalisation::Follow(const Sight& sight) {
   const TrackStep& step = sight.step;
   const double step_m = (step.T_track_robot.translation() - T_track_robot_.translation()).norm();
   way_m_ += step_m;
-  blind_covariance_ = UnmeasuredAfter(blind_covariance_, step, fix_.T_track_robot, options_.odometry_walk);
+  if (options_.uses_odometry) {
+    blind_covariance_ = UnmeasuredAfter(blind_covariance_, step, fix_.T_track_robot, options_.odometry_walk);
+  } else if (!step.matched) {
+    blind_covariance_ += options_.blind.Covariance({step_m, 0.0, 0.0});
+  }
   unmatched_m_ = step.matched ? 0.0 : unmatched_m_ + step_m;
   Fix now = Predicted(step);
   PoseReason reason = step.matched ? last_.reason : PoseReason::kOdometryOnly;

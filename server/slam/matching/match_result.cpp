@@ -17,9 +17,12 @@ void DetectDegeneracy(const Eigen::Matrix3d& H, MatchResult& result) {
   solver.computeDirect(H_translation);
   const double least = solver.eigenvalues()(0), largest = solver.eigenvalues()(1);
   result.degenerate = least < kCorridorRatio * largest;
+  result.open_information = 0.0;
   if (!result.degenerate) return;
   result.degenerate_direction = solver.eigenvectors().col(0);
   const double shown = std::max(0.0, least - kDirectionSigmaRad * kDirectionSigmaRad * largest);
+  // Towards the bound it grows, so that nothing jumps where the direction is no longer open and the match decides
+  // alone.
   result.open_information = shown / std::max(1e-6, 1.0 - least / (kCorridorRatio * largest));
 }
 
@@ -37,19 +40,20 @@ void TakeAlongFromPrior(const MatchPrior& prior, MatchResult& result) {
   across.topLeftCorner<2, 2>() -= u * u.transpose();
   result.covariance = across * result.covariance * across.transpose();
   result.covariance.topLeftCorner<2, 2>() += u.dot(prior.covariance.topLeftCorner<2, 2>() * u) * u * u.transpose();
+  result.open_information = 0.0;
 }
 
 void WeighAlongWithPrior(const MatchPrior& prior, MatchResult& result) {
   if (!result.degenerate) return;
   const Eigen::Vector2d u = result.degenerate_direction;
-  const double variance = u.dot(prior.covariance.topLeftCorner<2, 2>() * u);
-  const double information = result.open_information, share_of_prior = 1.0 / (1.0 + variance * information);
+  const double variance = u.dot(prior.covariance.topLeftCorner<2, 2>() * u), information = result.open_information;
+  const double from_prior = 1.0 - GainAlong(variance, information);
   const Eigen::Vector2d measured = result.T_ref_curr.translation();
+  const Eigen::Vector2d t = measured + from_prior * (prior.T_ref_curr.translation() - measured);
   MatchPrior weighed = prior;
-  const Eigen::Vector2d t = measured + share_of_prior * (prior.T_ref_curr.translation() - measured);
   weighed.T_ref_curr.x = t.x();
   weighed.T_ref_curr.y = t.y();
-  weighed.covariance.topLeftCorner<2, 2>() = VarianceAfter(variance, information) * Eigen::Matrix2d::Identity();
+  weighed.covariance.topLeftCorner<2, 2>() = from_prior * variance * Eigen::Matrix2d::Identity();
   TakeAlongFromPrior(weighed, result);
   result.open_information = information;
 }

@@ -24,7 +24,7 @@ struct MatchResult {
   bool converged = false;   // The pose is usable.
   bool degenerate = false;  // One direction of the plane is not constrained (corridor).
   Eigen::Vector2d degenerate_direction = Eigen::Vector2d::Zero();  // That direction: a unit vector, in ref.
-  // Information of the surfaces on the position along it, 1/m^2, in T_ref_curr; 0 if it comes from the prior alone.
+  // Information of the surfaces on the position along it, 1/m^2; 0 if the position comes from the prior alone.
   double open_information = 0.0;
   MatchFailure failure = MatchFailure::kNone;
 };
@@ -37,7 +37,9 @@ struct MatchPrior {
 
 // Sets `degenerate` and `degenerate_direction`. H is the information on (x, y, theta). The match is
 // degenerate if, with the heading left free, the smallest eigenvalue of the information on the translation is
-// below 0.02 times the largest. The direction is the eigenvector of the smallest.
+// below 0.02 times the largest. The direction is the eigenvector of the smallest. `open_information` is that
+// eigenvalue, without the part that errors in the directions of the surfaces would show along a bare wall; it is 1/m^2
+// only if H is. Towards the bound it grows beyond all measure, because a match that is not degenerate decides alone.
 void DetectDegeneracy(const Eigen::Matrix3d& H, MatchResult& result);
 
 // Combines two translations: across `along` the result is `measured`, along it `prior`. Both are in one
@@ -54,9 +56,11 @@ void TakeAlongFromPrior(const MatchPrior& prior, MatchResult& result);
 // and from what surfaces show of it (`open_information`), each according to its certainty.
 void WeighAlongWithPrior(const MatchPrior& prior, MatchResult& result);
 
-// Variance of a position of which `variance` was known before `information` on it, 1/m^2, was added.
-[[nodiscard]] inline double VarianceAfter(double variance, double information) {
-  return variance / (1.0 + variance * information);
+// How far WeighAlongWithPrior moves the position along the open direction from the prior, which has this variance,
+// towards the one that the surfaces show: 0 stays at the prior.
+[[nodiscard]] inline double GainAlong(double prior_variance, double open_information) {
+  const double ratio = prior_variance * open_information;
+  return ratio / (1.0 + ratio);
 }
 
 }  // namespace cairn::slam

@@ -31,8 +31,8 @@ void Visit(OptionVisitor& visitor, MotionNoise& options);
 // The uncertainty of steps that only odometry shows: a random walk. Its variances grow in proportion to the distance
 // and to the turn, so that their sum does not depend on how many scans or steps a motion is cut into. An error of the
 // scale of odometry grows faster; where a whole motion is known, MotionNoise says it.
-// The default values are what the odometry of intel and mit-csail shows against their smoothed paths, over straight
-// stretches of 1 to 5 m: 0.04 to 0.07 m/sqrt(m) and 0.05 to 0.09 rad/sqrt(m).
+// The default values of distances are what the odometry of intel and mit-csail shows against their smoothed paths, over
+// straight stretches of 1 to 5 m: 0.04 to 0.07 m/sqrt(m) and 0.05 to 0.09 rad/sqrt(m). Those of turns are estimates.
 // Source: Chong, Kleeman, ICRA 1997.
 struct OdometryNoise {
   double trans_m_per_sqrt_m = 0.06;

@@ -12,17 +12,23 @@
 
 namespace cairn::slam {
 
-// What no scan has measured of the motion since a pose `from`, after one more step: the covariance of (x, y, theta) in
-// the frame of the robot at `from`; `before` is that before the step. A match shows where the robot is, but for the
-// direction that it leaves open: there the doubt of odometry stays, less what the scan shows of it.
+// What no scan has measured of the motion since a pose `from`, after one more step of a robot that has odometry: the
+// covariance of (x, y, theta) in the frame of the robot at `from`; `before` is that before the step. A match shows
+// where the robot is, but for the direction that it leaves open. There it has moved the position from that of odometry
+// by a gain for which only the noise of this step counted (FrontEnd::Align), and so much of the doubt before is left.
 [[nodiscard]] inline Eigen::Matrix3d UnmeasuredAfter(const Eigen::Matrix3d& before, const TrackStep& step,
                                                      const Pose2& T_track_from, const OdometryNoise& noise) {
-  Eigen::Matrix3d all = before + noise.Covariance(step.T_prev_curr_blind);
+  const Eigen::Matrix3d of_step = noise.Covariance(step.T_prev_curr_odom);
+  Eigen::Matrix3d all = before + of_step;
   if (!step.matched) return all;
   const Eigen::Vector2d open = T_track_from.rotation().transpose() * step.open_direction;
-  const double along = open.dot(all.topLeftCorner<2, 2>() * open);
+  double along = open.dot(all.topLeftCorner<2, 2>() * open);
+  if (step.open_information > 0.0) {
+    const double gain = GainAlong(of_step(0, 0), step.open_information);
+    along = (1.0 - gain) * (1.0 - gain) * along + gain * gain / step.open_information;
+  }
   all.setZero();
-  all.topLeftCorner<2, 2>() = VarianceAfter(along, step.open_information) * open * open.transpose();
+  all.topLeftCorner<2, 2>() = along * open * open.transpose();
   return all;
 }
 

@@ -140,13 +140,15 @@ TrackStep FrontEnd::StepOf(const MatchResult& match, const Pose2& T_odom_robot) 
   TrackStep step{.T_track_robot = match.T_ref_curr,
                  .score = match.score,
                  .matched = match.converged,
-                 .degenerate = match.degenerate,
-                 .open_information = match.open_information};
-  if (match.degenerate) step.open_direction = match.degenerate_direction;
-  const Pose2 moved = Between(history_.back().T_track_robot, step.T_track_robot);
-  step.moved_m = moved.translation().norm();
-  step.T_prev_curr_blind = options_.use_odometry ? Between(history_.back().T_odom_robot, T_odom_robot) : moved;
-  if (!options_.use_odometry) {
+                 .degenerate = match.degenerate};
+  if (match.degenerate) {
+    step.open_direction = match.degenerate_direction;
+    step.open_information = match.open_information;
+  }
+  step.moved_m = Between(history_.back().T_track_robot, step.T_track_robot).translation().norm();
+  if (options_.use_odometry) {
+    step.T_prev_curr_odom = Between(history_.back().T_odom_robot, T_odom_robot);
+  } else {
     if (!step.matched) step.moved_m = std::max(step.moved_m, options_.no_odometry.unmatched_step_m);
     step.forecast_covariance = ForecastShare(match);
   }

@@ -72,10 +72,9 @@ struct TrackStep {
   // it, 1/m^2. Otherwise zero.
   Eigen::Vector2d open_direction = Eigen::Vector2d::Zero();
   double open_information = 0.0;
-  double moved_m = 0.0;  // Distance travelled since the previous scan.
-  // The step from the previous scan as odometry measured it; without odometry, as it is in `track`.
-  Pose2 T_prev_curr_blind{};
-  bool found = false;  // The step leads to where the robot was found again; odometry does not know it.
+  double moved_m = 0.0;      // Distance travelled since the previous scan.
+  Pose2 T_prev_curr_odom{};  // The step from the previous scan as odometry measured it; none without odometry.
+  bool found = false;        // The step leads to where the robot was found again; odometry does not know it.
   // Covariance of the part of the step that neither a scan nor odometry measured (the direction along a
   // corridor, or a scan without a match), along the axes of `track`. It is zero if odometry is used:
   // BlindMotion accounts for that case.
@@ -92,7 +91,7 @@ struct TrackStep {
 class FrontEnd {
  public:
   // `walk` is the noise of steps that odometry alone knows.
-  FrontEnd(const FrontEndOptions& options, ScanMatcher matcher, const OdometryNoise& walk = {});
+  FrontEnd(const FrontEndOptions& options, ScanMatcher matcher, const OdometryNoise& walk);
 
   // From now on `watch` is told when kLook, kMatch and kRefine begin.
   void Watch(StepWatch watch) { watch_ = std::move(watch); }

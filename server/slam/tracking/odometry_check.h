@@ -11,7 +11,8 @@
 namespace cairn::slam {
 
 // A shorter step tells nothing, because matches are no more exact. Where scans come faster than the robot drives this
-// far, the step over several of them is checked, so that the rate of the scans does not matter.
+// far, the step over several of them is checked, over at most twelve: a robot that drives less than 2.5 mm from scan to
+// scan is not checked.
 inline constexpr double kShortestCheckedStepM = 0.03;
 
 // The motion since an earlier scan as odometry measured it, at least kShortestCheckedStepM.

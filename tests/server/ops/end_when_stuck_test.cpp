@@ -11,14 +11,14 @@ void Look(EndWhenStuck& end, int second, bool healthy) {
   end.Look(healthy, Heartbeat::Clock::time_point{} + seconds(second));
 }
 
-TEST(EndWhenStuck, EndsTheProcessWithItsOwnExitCodeAfterTheLongestTime) {
+TEST(EndWhenStuckDeathTest, EndsTheProcessWithItsOwnExitCodeAfterTheLongestTime) {
   EndWhenStuck end(seconds(60));
   Look(end, 0, false);
   Look(end, 60, false);
   EXPECT_EXIT(Look(end, 61, false), testing::ExitedWithCode(4), "");
 }
 
-TEST(EndWhenStuck, OneHealthyLookBeginsTheTimeAnew) {
+TEST(EndWhenStuckDeathTest, OneHealthyLookBeginsTheTimeAnew) {
   EndWhenStuck end(seconds(60));
   Look(end, 0, false);
   Look(end, 59, true);

@@ -243,6 +243,7 @@ TEST(Mapper, AGridThatComesBackGetsWhatWasMappedMeanwhile) {
   EXPECT_LT(ShareOfCellsThatDiffer(mapper.grid(), after), 0.08);
 }
 
+// The slip is where it leaves the track with the error that the tests need; elsewhere the niches correct it.
 // No filter corrects the slip on a short side, so the first side is drawn a second time beside itself. The
 // pose reports this with self_check on, from the second round on and not before. If the loop is closed, the
 // robot is localized again.

@@ -12,7 +12,7 @@ FrontEnd WithoutOdometry(MatcherKind matcher, bool refined) {
   FrontEndOptions options;
   options.use_odometry = false;
   options.refine_enabled = refined;
-  return FrontEnd(options, MakeMatcher(matcher, {}));
+  return FrontEnd(options, MakeMatcher(matcher, {}), {});
 }
 
 // A drive through the office, with steps of eight centimetres and two degrees per scan. `odometry` is the

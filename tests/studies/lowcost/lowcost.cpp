@@ -19,7 +19,8 @@ namespace {
 
 // Where only odometry shows the way, the estimate must be as long.
 constexpr double kMostShareOfWay = 0.02;
-// The simulated drives, at whatever rate they are scanned.
+// The simulated drives, at whatever rate they are scanned. Over the seeds 1 to 3 it was 0.05 to 0.15 m; before
+// odometry's noise counted by distance, up to 1.3 m at 40 scans a second.
 constexpr double kMostErrorSmoothedM = 0.16;
 
 // Every k-th scan such that `share` of them stay.
@@ -55,7 +56,7 @@ void RunRates(StudyContext& context) {
       const double odometry_m = LengthOf(RawPath(thinned));
       if (known) {
         report.Expect(TrajectoryError(mapped.smoothed, log.truth) <= kMostErrorSmoothedM,
-                      which + "the error depends on the rate");
+                      which + "the smoothed error is too large");
       } else {
         for (const double length_m : {LengthOf(mapped.run.online), LengthOf(mapped.smoothed)})
           report.Expect(std::abs(length_m / odometry_m - 1.0) <= kMostShareOfWay,

@@ -11,7 +11,7 @@ TrackStep Moved(double metres, bool matched) {
   TrackStep step;
   step.matched = matched;
   step.moved_m = metres;
-  step.T_prev_curr_blind = {metres, 0.0, 0.0};
+  step.T_prev_curr_odom = {metres, 0.0, 0.0};
   return step;
 }
 
@@ -55,12 +55,19 @@ TEST(BlindMotion, AlongACorridorIsThatOfOdometryAndAcrossItNone) {
   EXPECT_TRUE(covariance.isApprox(expected, 1e-9)) << covariance;
 }
 
-TEST(BlindMotion, IsNoMoreThanWhatTheScanLeavesOpen) {
-  constexpr double kShown = 1.0 / (0.03 * 0.03);
+// A filter whose gain counts only the noise of one step: its variance is the fixed point of
+// V = (1 - k)^2 (V + q) + k^2 / I.
+TEST(BlindMotion, ConvergesToWhatSurfacesShowAsSlowlyAsTheyAreBelieved) {
+  constexpr double kShown = 1.0 / (0.03 * 0.03), kStepM = 0.05;
+  const double q = kNoise.Covariance(kStepM, 0.0)(1, 1), k = q * kShown / (1.0 + q * kShown);
+  const double rest = (1.0 - k) * (1.0 - k), fixed_point = (rest * q + k * k / kShown) / (1.0 - rest);
   std::vector<TrackStep> steps(100, AlongY(0.5, 0.0));
-  steps.push_back(AlongY(0.0, kShown));
-  EXPECT_LT(After(steps)(1, 1), 0.03 * 0.03);
-  EXPECT_GT(After(steps)(1, 1), 0.9 * 0.03 * 0.03);
+  const double before = After(steps)(1, 1);
+  steps.push_back(AlongY(kStepM, kShown));
+  EXPECT_NEAR(After(steps)(1, 1), rest * (before + q) + k * k / kShown, 1e-9);
+  steps.insert(steps.end(), 300, AlongY(kStepM, kShown));
+  EXPECT_NEAR(After(steps)(1, 1), fixed_point, 1e-6);
+  EXPECT_LT(fixed_point, 1.0 / kShown);
 }
 
 }  // namespace

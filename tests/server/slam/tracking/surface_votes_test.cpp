@@ -62,7 +62,7 @@ TEST(SurfaceVotes, AWideSurfaceCountsTwice) {
 // before it (nobody, if 0). From scan to scan it drives `step_m`.
 double ErrorBehind(double ahead_m, double step_m = 0.1) {
   const FrontEndOptions options;
-  FrontEnd front_end(options, MakeMatcher(MatcherKind::kVoting, {}));
+  FrontEnd front_end(options, MakeMatcher(MatcherKind::kVoting, {}), {});
   const test::World corridor = test::RingCorridor(true);
   const test::Laser laser{.range_max_m = 12.0, .sigma_m = 0.01};
   std::mt19937_64 rng(1);
