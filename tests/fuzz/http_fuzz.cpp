@@ -48,17 +48,7 @@ class WebServer {
 
   // The answers to all that is sent. The connection is closed for writing afterwards, so nothing waits for more.
   std::string Exchange(std::string_view bytes) {
-    const int connection = socket(AF_INET, SOCK_STREAM, 0);
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    // A connection that was closed keeps its port for a minute, and one address has not enough of them: each connection
-    // comes from another address of this machine (127.1.x.y).
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK + 0x10000 + (connections_++ & 0xffff));
-    Must(bind(connection, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0,
-         "an address of this machine");
-    address.sin_port = htons(static_cast<std::uint16_t>(server_->port()));
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    Must(connect(connection, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0, "it can be asked");
+    const int connection = Connect();
     // Less is sent where the server has refused and closed.
     static_cast<void>(send(connection, bytes.data(), bytes.size(), MSG_NOSIGNAL));
     shutdown(connection, SHUT_WR);
@@ -73,6 +63,27 @@ class WebServer {
   [[nodiscard]] int handled() const { return handled_; }
 
  private:
+  // A connection that was closed keeps its port for a minute, and one address has not enough of them: each connection
+  // comes from another address of this machine (127.1.x.y). Where all of them were used within that minute, the port
+  // that the system chooses may still be kept; the next one is tried.
+  int Connect() {
+    constexpr int kMostTries = 10;
+    for (int attempt = 0; attempt < kMostTries; ++attempt) {
+      const int connection = socket(AF_INET, SOCK_STREAM, 0);
+      sockaddr_in address{};
+      address.sin_family = AF_INET;
+      address.sin_addr.s_addr = htonl(INADDR_LOOPBACK + 0x10000 + (connections_++ & 0xffff));
+      Must(bind(connection, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0,
+           "an address of this machine");
+      address.sin_port = htons(static_cast<std::uint16_t>(server_->port()));
+      address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+      if (connect(connection, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0) return connection;
+      close(connection);
+    }
+    Must(false, "it can be asked");
+    return -1;
+  }
+
   // The server would answer an exception with an error.
   HttpResponse Answer(const HttpRequest& request) {
     try {
