@@ -13,7 +13,7 @@ std::vector<Pose2> Track(MatcherKind matcher, bool refined, double keep_above, s
   FrontEndOptions options;
   options.refine_enabled = refined;
   options.keep_above = keep_above;
-  FrontEnd front_end(options, MakeMatcher(matcher, {}));
+  FrontEnd front_end(options, MakeMatcher(matcher, {}), {});
   const test::World world = test::RingCorridor(true);
   const test::Laser laser{.range_max_m = 12.0, .sigma_m = 0.02};
   std::mt19937_64 rng(seed);
