@@ -78,7 +78,7 @@ TEST(NoOdometry, TheMatcherSeesWhatTheLastKeyframesSaw) {
     options.use_odometry = false;
     options.refine_enabled = false;
     options.no_odometry.merged_keyframes = merged ? 8 : 1;
-    FrontEnd front_end(options, MakeMatcher(MatcherKind::kNdt, {}));
+    FrontEnd front_end(options, MakeMatcher(MatcherKind::kNdt, {}), {});
     const ScanView view = test::ViewFrom(test::Office(), {});
     front_end.Track(view, {}, SerialFor);
     front_end.AddKeyframe(view);
