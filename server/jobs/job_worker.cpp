@@ -57,19 +57,27 @@ void JobWorker::Stop() {
 void JobWorker::Run() {
   LowerOwnPriority(options_.nice);
   while (const auto ticket = queue_.Pop()) {
-    if (!list_.Start(ticket->id)) continue;
-    const auto job = list_.Find(ticket->id);
-    const auto control = list_.ControlOf(ticket->id);
-    spdlog::info("job {}: started, {} of site {}", job->id, JobKindName(job->kind), job->site);
-    const auto outcome = Work(*job, ticket->enable, *control);
-    if (outcome) {
-      spdlog::info("job {}: succeeded, map version {}, disagreement {:.6f} -> {:.6f} m^2 ({})", job->id,
-                   outcome->map_version, outcome->cost_before, outcome->cost_after, outcome->message);
-      list_.Succeed(ticket->id, *outcome);
-    } else {
-      spdlog::info("job {}: ended without a result: {}", job->id, outcome.error().message);
-      list_.Fail(ticket->id, outcome.error());
+    try {
+      RunOne(*ticket);
+    } catch (const std::exception& error) {  // Of the list of jobs; those of the work itself end only the job.
+      spdlog::error("job {}: its state could not be changed because of an exception: {}", ticket->id, error.what());
     }
+  }
+}
+
+void JobWorker::RunOne(const Ticket& ticket) {
+  if (!list_.Start(ticket.id)) return;
+  const auto job = list_.Find(ticket.id);
+  const auto control = list_.ControlOf(ticket.id);
+  spdlog::info("job {}: started, {} of site {}", job->id, JobKindName(job->kind), job->site);
+  const auto outcome = Work(*job, ticket.enable, *control);
+  if (outcome) {
+    spdlog::info("job {}: succeeded, map version {}, disagreement {:.6f} -> {:.6f} m^2 ({})", job->id,
+                 outcome->map_version, outcome->cost_before, outcome->cost_after, outcome->message);
+    list_.Succeed(ticket.id, *outcome);
+  } else {
+    spdlog::info("job {}: ended without a result: {}", job->id, outcome.error().message);
+    list_.Fail(ticket.id, outcome.error());
   }
 }
 

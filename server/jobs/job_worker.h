@@ -37,6 +37,7 @@ class JobWorker {
     bool enable = false;
   };
   void Run();  // Until the queue is closed and empty.
+  void RunOne(const Ticket& ticket);
   Result<JobOutcome> Work(const Job& job, bool enable, const JobControl& control) const;
 
   const JobsOptions options_;

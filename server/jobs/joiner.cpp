@@ -24,12 +24,12 @@ void Joiner::Tick() {
   }
 }
 
-// The sites that have fragments.
+// The sites that have fragments that can be joined.
 std::map<std::string, Joiner::Driven> Joiner::Look() const {
   std::map<std::string, Driven> sites;
   for (const auto& session : roster_.All()) {
     const SessionRecord::Joining joining = session->record().joining();
-    if (joining.fragment) sites[session->record().state().site].fragments.emplace(session->id(), joining.driven_m);
+    if (joining.fragment && joining.joinable) sites[session->record().state().site].fragments.emplace(session->id(), joining.driven_m);
   }
   for (auto& [site, driven] : sites) {
     for (const auto& session : roster_.InSite(site)) {

@@ -87,6 +87,7 @@ Result<void> Site::RestoreLayers(StartControl& control) {
 void Site::StageGone(SessionId session) {
   const RobotGrid& part = versions_.Find(switch_->version)->parts.at(session);
   switch_->staged.emplace(session, part.chunks);
+  if (part.fragment) switch_->apart.insert(session);
   RobotGrid& displaced = switch_->displaced[session];
   displaced.chunks = joint_.ChunksOf(session);
   displaced.keyframes = part.keyframes;

@@ -68,6 +68,7 @@ void Site::Settle(std::uint32_t version, SessionId session, std::optional<Adopte
     for (const auto& [key, chunk] : adopted->change.chunks) {
       if (chunk != nullptr) staged.emplace(key, chunk);
     }
+    if (adopted->fragment) switch_->apart.insert(session);
     switch_->displaced.emplace(session, std::move(adopted->displaced));
   } else {
     StageGone(session);
@@ -79,11 +80,10 @@ void Site::CommitIfComplete() {
   if (!switch_->awaited.empty()) return;
   VersionSwitch complete = std::move(*switch_);
   switch_.reset();
-  const MapVersion& version = *versions_.Find(complete.version);
   StoreTogether([&] {
     for (const auto& [session, chunks] : complete.staged) {
       joint_.Replace(session, chunks);
-      joint_.SetHidden(session, version.parts.at(session).fragment);
+      joint_.SetHidden(session, complete.apart.contains(session));
       if (OwnerOf(session) == nullptr) {
         joint_.SetPast(session);
         layers_.insert(session);

@@ -80,8 +80,12 @@ void Desk::Serve(OpenRequest&& open) {
   } catch (const std::exception& error) {
     spdlog::error("a request of kind {} failed with an exception: {}", RequestKindName(open.request.kind),
                   error.what());
-    outbound_.Send(
-        ReplyTo(open.request, {StatusCode::kInternal, "internal error of the server; see its log for the cause"}));
+    try {
+      outbound_.Send(
+          ReplyTo(open.request, {StatusCode::kInternal, "internal error of the server; see its log for the cause"}));
+    } catch (const std::exception& unsent) {  // The client asks again.
+      spdlog::error("and that could not be answered: {}", unsent.what());
+    }
   }
 }
 

@@ -123,8 +123,13 @@ void SavedSites::Serve(const Request& request) {
     spdlog::error("a request of kind {} failed with an exception: {}", RequestKindName(request.kind), error.what());
     reply = ReplyTo(request, {StatusCode::kInternal, "internal error of the server; see its log for the cause"});
   }
-  ReplyParts parts(std::move(reply));
-  while (auto part = parts.Next()) rooms_.outbound.SendPatiently(*std::move(part));
+  try {
+    ReplyParts parts(std::move(reply));
+    while (auto part = parts.Next()) rooms_.outbound.SendPatiently(*std::move(part));
+  } catch (const std::exception& error) {  // The client asks again.
+    spdlog::error("the answer to a request of kind {} could not be sent because of an exception: {}",
+                  RequestKindName(request.kind), error.what());
+  }
 }
 
 Result<std::vector<SavedSite>> SavedSites::Answer(const Request& request) {
@@ -213,7 +218,9 @@ Result<std::vector<SavedSite>> SavedSites::Save(const Request& request) {
                     " MiB, which is all that store.max_saved_gib allows; delete some of them");
   }
   const auto written = Between<SiteFileSummary>(
-      [site = request.site, path = *path](Store& store) { return WriteSiteFile(store, site, path); });
+      [this, site = request.site, path = *path](Store& store) {
+        return WriteSiteFile(store, site, path, [this] { return journal_->HasTimeToSpare(); });
+      });
   if (!written) return tl::unexpected(written.error());
   return std::vector<SavedSite>{SavedAt(*path)};
 }
@@ -238,6 +245,7 @@ Result<std::vector<SavedSite>> SavedSites::Load(const Request& request) {
   const AtTheEnd release([&] { rooms_.atlas.Release(options.site); });  // Also where something throws.
   options.first_session = rooms_.roster.ReserveIds(file->session_numbers.size());
   options.first_job = rooms_.jobs.ReserveIds(file->job_numbers.size());
+  options.may_go_on = [this] { return journal_->HasTimeToSpare(); };
   const auto loaded =
       Between<SiteFileSummary>([path = *path, options](Store& store) { return ImportSite(store, path, options); });
   if (!loaded) return tl::unexpected(loaded.error());

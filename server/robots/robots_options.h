@@ -15,6 +15,7 @@ struct RobotsOptions {
   std::int64_t max_unclaimed = 256;
   std::int64_t max_earlier = 32;
   double suspended_expiry_s = 86400.0;
+  double place_kept_s = 60.0;
   double ledger_rate_hz = 10.0;
   double gap_wait_s = 10.0;
   std::int64_t checkpoint_entries = 2500;

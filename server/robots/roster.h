@@ -15,7 +15,8 @@
 // - A new session that does not say where the robot starts, in a site that has a map, is a fragment: its part is not
 //   shown, and its robot is not localized, until a map version joins it (jobs/joiner.h).
 // When max_robots is reached, the oldest ended session is removed first (its part of the map stays), then the one that
-// has been suspended for longest. A session that has been suspended for too long is ended. Thread rule: any thread;
+// has been suspended for longest, and for robots.place_kept_s at least: after a start of the server all robots are away
+// for a moment. A session that has been suspended for too long is ended. Thread rule: any thread;
 // nothing here waits for an estimator.
 #pragma once
 

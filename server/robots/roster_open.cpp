@@ -193,13 +193,14 @@ Result<std::shared_ptr<Session>> Roster::GivesWay(NameId robot_id) const {
   if (own != sessions_.end()) return own->second;
   if (sessions_.size() < static_cast<std::size_t>(options_.max_robots)) return nullptr;
   const auto now = SessionRecord::Clock::now();
+  const std::chrono::duration<double> kept(options_.place_kept_s);
   std::shared_ptr<Session> ended, suspended;
   for (const auto& [id, session] : sessions_) {
     const SessionRecord& record = session->record();
     const bool is_ended = record.phase() == SessionPhase::kEnded;
     if (is_ended && (ended == nullptr || session->id() < ended->id())) ended = session;
     const auto away = record.SuspendedFor(now);
-    if (away > (suspended == nullptr ? away.zero() : suspended->record().SuspendedFor(now))) suspended = session;
+    if (away >= kept && away > (suspended == nullptr ? away.zero() : suspended->record().SuspendedFor(now))) suspended = session;
   }
   if (ended != nullptr) return ended;
   if (suspended != nullptr) return suspended;

@@ -252,7 +252,12 @@ void Session::PublishLedgers(SessionRecord::Urgency urgency) {
 
 void Session::Schedule() {
   if (scheduled_.exchange(true)) return;
-  asio::post(strand_, [self = shared_from_this()] { self->Drain(); });
+  try {
+    asio::post(strand_, [self = shared_from_this()] { self->Drain(); });
+  } catch (...) {  // The next event tries it again.
+    scheduled_ = false;
+    throw;
+  }
 }
 
 void Session::Drain() {

@@ -73,7 +73,7 @@ SessionEstimator::SessionEstimator(const EstimatorSetup& setup, SessionRecord& r
       pipeline_(setup.mapper, setup.T_map_robot_start, slam::SerialFor,
                 {.used = [this](const Scan& scan, const slam::ScanOutcome& outcome) { Used(scan, outcome); },
                  .dropped = [this](const Scan& scan, DropReason reason) { Dropped(scan, reason); }}) {
-  record_.SetJoining({fragment_, driven_m_, start_refused_});
+  TellJoining();
 }
 
 void SessionEstimator::Handle(RobotEvent&& event) {
@@ -207,9 +207,10 @@ void SessionEstimator::On(Correction&& correction) {
   Store(CorrectionTaken{correction.epoch, correction.generation, ToStored(correction.grid)});
   Adopted adopted{
       .session = identity_.id, .displaced = DisplacedGrid(), .change = {.session = identity_.id, .chunks = {}}};
-  AdoptGrid(correction.epoch, correction.grid);
+  const bool changed = AdoptGrid(correction.epoch, correction.grid);
   switch_completed_ = std::move(correction.completed);
   adopted.change = TakeGridChange();
+  if (!changed) adopted.change.chunks.assign(adopted.displaced.chunks.begin(), adopted.displaced.chunks.end());
   adopted.fragment = fragment_;
   correction.done(std::move(adopted));
 }
@@ -242,16 +243,17 @@ RobotGrid SessionEstimator::DisplacedGrid() {
   return displaced;
 }
 
-void SessionEstimator::AdoptGrid(std::uint32_t epoch, const RobotGrid& grid) {
+bool SessionEstimator::AdoptGrid(std::uint32_t epoch, const RobotGrid& grid) {
   slam::Mapper& mapper = pipeline_.mapper();
   const auto path = grid.path != nullptr ? std::span<const Pose2>(*grid.path) : std::span<const Pose2>();
   const auto numbers = grid.numbers != nullptr ? std::span(*grid.numbers) : std::span<const std::uint64_t>();
   const std::vector<Pose2> before = mapper.BestPath();
   // A session that was not stored to its end may not be able to follow: then its place in this map is not known.
-  const bool adopted =
-      mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), grid.chunks), grid.keyframes, path, numbers);
+  // The map of a fragment is in a frame of its own: if its path cannot follow, its place in this map is not known either.
+  const bool adopted = mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), grid.chunks), grid.keyframes, path,
+                                        numbers, fragment_ && !grid.fragment);
   const bool fragment = grid.fragment || !adopted;
-  if (fragment && !fragment_) driven_m_ = 0.0;  // So that no job joins it again at once.
+  if (fragment && (!fragment_ || !adopted)) driven_m_ = 0.0;  // So that no job joins it again at once.
   fragment_ = fragment;
   if (!fragment_) start_refused_.clear();
   T_map_keyframe_.reset();
@@ -260,14 +262,24 @@ void SessionEstimator::AdoptGrid(std::uint32_t epoch, const RobotGrid& grid) {
   const std::vector<Pose2> after = mapper.BestPath();
   if (!mapper.localises() && !before.empty() && after.size() == before.size())
     record_.MoveLast(after.back() * before.back().Inverse());
-  record_.SetJoining({fragment_, driven_m_, start_refused_});
+  TellJoining();
   SetEpoch(epoch);
+  return adopted;
 }
 
 void SessionEstimator::Drive(const Pose2& T_map_robot) {
   if (T_map_keyframe_) driven_m_ += (T_map_robot.translation() - T_map_keyframe_->translation()).norm();
   T_map_keyframe_ = T_map_robot;
-  record_.SetJoining({fragment_, driven_m_, start_refused_});
+  TellJoining();
+}
+
+void SessionEstimator::TellJoining() {
+  const bool joinable = pipeline_.mapper().follows_paths();
+  std::string why = start_refused_;
+  if (fragment_ && why.empty() && !joinable)
+    why = "not joined with the map of its site: the filter that it is run with cannot continue in a map in which a job "
+          "has found it; open its session with a start pose in this map";
+  record_.SetJoining({fragment_, driven_m_, std::move(why), joinable});
 }
 
 void SessionEstimator::On(SnapshotWanted&& wanted) {
@@ -327,7 +339,7 @@ void SessionEstimator::On(StartRefused&& refused) {
   Store(StartRefusal{refused.why});
   fragment_ = true;
   start_refused_ = std::move(refused.why);
-  record_.SetJoining({fragment_, driven_m_, start_refused_});
+  TellJoining();
   if (outputs_.hidden && !replaying_) outputs_.hidden();
   RefreshLandmarks(true);
 }

@@ -124,9 +124,11 @@ class SessionEstimator {
   [[nodiscard]] SessionRecord::WaitingScans WaitingBySensor() const;
   void ReplayOdometry(const OdometryTaken& odometry);
   RobotGrid DisplacedGrid();
-  void AdoptGrid(std::uint32_t epoch, const RobotGrid& grid);
+  // Returns false if the grid stays as it was, because the path cannot follow.
+  bool AdoptGrid(std::uint32_t epoch, const RobotGrid& grid);
   void SetEpoch(std::uint32_t epoch);
   void Drive(const Pose2& T_map_robot);
+  void TellJoining();
 
   SessionRecord& record_;
   const SessionOutputs outputs_;

@@ -64,7 +64,8 @@ void SessionEstimator::Replay(JournalEntry&& entry, const Switched& switched) {
     static_cast<void>(record_.Resume(owner->client, owner->session));
   } else if (const auto* const correction = std::get_if<CorrectionTaken>(&entry)) {
     // A switch that was not completed before the server ended has no effect.
-    if (switched(correction->epoch, correction->generation)) AdoptGrid(correction->epoch, FromStored(correction->grid));
+    if (switched(correction->epoch, correction->generation))
+      static_cast<void>(AdoptGrid(correction->epoch, FromStored(correction->grid)));
   } else if (const auto* const epoch = std::get_if<EpochChanged>(&entry)) {
     SetEpoch(epoch->epoch);
   } else if (const auto* const relocalise = std::get_if<RelocaliseTaken>(&entry)) {
@@ -139,7 +140,7 @@ Result<SessionEstimator::PieceValues> SessionEstimator::Load(std::string_view ma
   if (auto record = record_.Load(reader, WaitingBySensor()); !record) return tl::unexpected(record.error());
   ended_ = record_.phase() == SessionPhase::kEnded;
   record_.SetLocalises(pipeline_.mapper().localises());
-  record_.SetJoining({fragment_, driven_m_, start_refused_});
+  TellJoining();
   PieceValues values = reader.values();
   values.insert(values.end(), loaded->begin(), loaded->end());
   return values;

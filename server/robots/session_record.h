@@ -94,7 +94,8 @@ class SessionRecord {
   struct Joining {
     bool fragment = false;
     double driven_m = 0.0;
-    std::string why = {};  // Why its start was refused, if it was; the status of an active session says it.
+    std::string why = {};  // Why it is not joined, where more is to be said; the status of an active session says it.
+    bool joinable = true;  // Its estimator can continue in the map of the site once a job has found its place there.
   };
   void SetJoining(const Joining& joining);
   // Whether the robot is only localised, and maps nothing.

@@ -273,16 +273,20 @@ void Mapper::FinishMap() {
 }
 
 bool Mapper::AdoptGrid(OccupancyGrid grid, std::uint64_t keyframes, std::span<const Pose2> path,
-                       std::span<const std::uint64_t> numbers) {
+                       std::span<const std::uint64_t> numbers, bool must_follow) {
   State& s = *state_;
   std::vector<Pose2> first_poses;
   if (s.filter->rebases() && s.filter->placed()) first_poses = s.PosesOfFirst(keyframes, path, numbers);
   const bool follows = !first_poses.empty();
-  if (keyframes > s.trail.made() && !follows) return false;
+  if ((must_follow || keyframes > s.trail.made()) && !follows) return false;
   const std::uint64_t known = std::min(keyframes, s.trail.made());
   if (follows) s.Follow(first_poses, known);
   s.drawing.Adopt(std::move(grid), known, s.trail.CountBelow(known), s.trail.keyframes(), s.believed_path(), follows);
   return true;
+}
+
+bool Mapper::follows_paths() const {
+  return state_->filter->rebases();
 }
 
 // The poses of the keyframes with numbers below `made`, out of a path that may have more of these, because some were

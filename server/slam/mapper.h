@@ -90,10 +90,13 @@ class Mapper {
   // landmarks and the pose follow, so that all agree with the grid. The later keyframes keep their places relative to
   // the last of these. If `path` lacks one of the earlier keyframes, or the filter can not follow (Filter::rebases),
   // only the grid is replaced. Then draws the later keyframes onto it along the present best path. Every chunk of both
-  // grids counts as changed. Where the grid knows of later keyframes than this mapper has made, it can only be used if
-  // the path follows; else nothing is changed and the answer is false.
+  // grids counts as changed. Where the grid knows of later keyframes than this mapper has made, or where it is in
+  // another frame than this mapper's path (`must_follow`), it can only be used if the path follows; else nothing is
+  // changed and the answer is false.
   bool AdoptGrid(OccupancyGrid grid, std::uint64_t keyframes, std::span<const Pose2> path = {},
-                 std::span<const std::uint64_t> numbers = {});
+                 std::span<const std::uint64_t> numbers = {}, bool must_follow = false);
+  // Whether the path can follow that of a job (Filter::rebases).
+  [[nodiscard]] bool follows_paths() const;
   // Somebody says that the robot is not where it is believed to be, and perhaps where it is (T_map_robot at the last
   // scan). From the next scan on it is not localized until it is found in its map: near that pose, or anywhere
   // (recovery/recovery.h). Nothing happens before there is a map.

@@ -187,6 +187,11 @@ void Journal::Between(Work work) {
   arrived_.NotifyAll();
 }
 
+bool Journal::HasTimeToSpare() const {
+  const MutexLock lock(mutex_);
+  return HasRoom(BytesOfQueue() / 2, Room::kForSamples);
+}
+
 void Journal::WhenStored(std::function<void()> told) {
   const MutexLock lock(mutex_);
   told_.push_back(std::move(told));

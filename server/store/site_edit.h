@@ -20,6 +20,7 @@ struct ImportOptions {
   // taken into account in any case.
   std::uint64_t first_session = 1;
   std::uint64_t first_job = 1;
+  MayGoOn may_go_on = {};
 };
 
 // Adds the site of a file. Its sessions and jobs get new numbers in the old order, without gaps, after the store's own.

@@ -272,7 +272,14 @@ Result<SiteFileSummary> SurveySiteFile(const std::filesystem::path& path) {
   return summary;
 }
 
-Result<SiteFileSummary> WriteSiteFile(Store& store, const std::string& site, const std::filesystem::path& path) {
+tl::unexpected<Status> TakesTooLong(const std::string& what) {
+  return Fail(StatusCode::kResourceExhausted,
+              what + " takes longer than the samples of the robots can wait (store.queue_mib); do it while the server is "
+                     "stopped (cairn site export, cairn site import), or with a larger queue");
+}
+
+Result<SiteFileSummary> WriteSiteFile(Store& store, const std::string& site, const std::filesystem::path& path,
+                                      const MayGoOn& may_go_on) {
   const auto contents = ReadSite(store, site);
   if (!contents) return tl::unexpected(contents.error());
   auto file = AtomicFile::Create(path);
@@ -284,6 +291,7 @@ Result<SiteFileSummary> WriteSiteFile(Store& store, const std::string& site, con
   for (const RecordRange& range : RangesOf(*contents)) {
     if (range.kind == RecordKind::kRestoring) continue;  // It says something about this server only.
     const auto write = [&](std::uint64_t number, std::string_view bytes) -> Result<void> {
+      if (may_go_on && !may_go_on()) return TakesTooLong("to save site '" + site + "'");
       const Record record{{range.kind, range.owner, number}, std::string(bytes)};
       if (auto taken = survey.Take(record); !taken) return taken;
       return writer.Append(record);

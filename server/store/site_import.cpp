@@ -253,6 +253,7 @@ Result<SiteFileSummary> ImportSite(Store& store, const std::filesystem::path& pa
   auto reader = SiteFileReader::Open(path);
   if (!reader) return tl::unexpected(reader.error());
   const auto next = [&]() -> Result<std::optional<Record>> {
+    if (options.may_go_on && !options.may_go_on()) return TakesTooLong("to load site '" + renaming.site() + "'");
     auto record = reader->Next();
     if (!record || !*record) return record;
     auto renamed = renaming.Apply(std::move(**record));

@@ -245,6 +245,43 @@ TEST(Joining, IsAsItWasAfterRestarts) {
   EXPECT_EQ(JoinedBy(server.house())->id, 1U);  // No other job was needed.
 }
 
+// With a filter that cannot continue on another path, a fragment would report poses in its own frame as places of the
+// map once a job had joined it.
+class WithFilter : public ::testing::TestWithParam<slam::FilterKind> {};
+
+TEST_P(WithFilter, ARobotThatCannotFollowAJobIsNeverCalledLocalized) {
+  ServerOptions options = JoiningOptions(true);
+  options.mapper.filter.kind = GetParam();
+  options.mapper.particles = 20;
+  WholeServer house(options);
+  RingRobot first = FirstRobot(), second = SecondRobot();
+  first.Open(house);
+  first.Drive(house, first.left());
+  EXPECT_TRUE(first.LastPose(house).localized);
+  second.Open(house);
+  second.Drive(house, second.left() - 20);
+  const SessionState told = house.LastState("r2", kOther);
+  EXPECT_EQ(told.status.code, StatusCode::kFailedPrecondition);
+  EXPECT_NE(told.status.message.find("start pose"), std::string::npos) << told.status.message;
+
+  // Nobody submits a job by itself; one that somebody asks for finds where the robot is, and the robot does not follow.
+  EXPECT_TRUE(house.All<Job>().empty());
+  const Reply submitted = house.Ask(About(RequestKind::kJobSubmit));
+  ASSERT_EQ(submitted.jobs.size(), 1U);
+  const Job job = house.WaitJob(submitted.jobs[0].id);
+  ASSERT_EQ(job.state, JobState::kSucceeded) << job.message;
+  ASSERT_NE(job.message.find("joined 2"), std::string::npos) << job.message;
+  ASSERT_TRUE(Enable(house, job.map_version).status.ok());
+  second.Drive(house, 10);
+  EXPECT_EQ(second.LastPose(house).reason, PoseReason::kNotJoined);
+  EXPECT_FALSE(second.LastPose(house).localized);
+}
+
+INSTANTIATE_TEST_SUITE_P(Joining, WithFilter,
+                         ::testing::Values(slam::FilterKind::kNone, slam::FilterKind::kLandmarkCorrection,
+                                           slam::FilterKind::kDpSlam),
+                         [](const auto& kind) { return std::to_string(static_cast<int>(kind.param)); });
+
 // The next day the robot stands elsewhere, and nobody says where.
 TEST(Joining, ARobotIsFittedToWhatItSawInAnEarlierSession) {
   const TempDirectory directory;

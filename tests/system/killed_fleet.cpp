@@ -194,7 +194,7 @@ class Drive {
     Trajectory path;
   };
 
-  // Empty: the paths are the same to the last bit.
+  // Empty: the paths are the same in every digit that `cairn path` prints.
   static std::string DifferenceOf(const Trajectory& a, const Trajectory& b) {
     const auto [x, y] =
         std::mismatch(a.begin(), a.end(), b.begin(), b.end(), [](const StampedPose& p, const StampedPose& q) {

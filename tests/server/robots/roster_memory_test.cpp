@@ -41,6 +41,7 @@ using testing::RosterTest;
 TEST_F(RosterTest, WhicheverAllocationFailsTheNextRequestOpensTheSession) {
   RobotsOptions options;
   options.max_robots = 1;  // Each session takes the place of the one before.
+  options.place_kept_s = 0.0;
   roster(options).Take(RequestOf("r0", 7));
   ASSERT_NE(roster().Find("r0"), nullptr);
   int refused = 0;

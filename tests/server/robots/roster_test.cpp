@@ -199,6 +199,7 @@ TEST_F(RosterTest, ARobotThatComesBackInTimeIsNotEnded) {
 TEST_F(RosterTest, WhenPlacesRunOutTheEndedGoFirstThenTheLongestAway) {
   RobotsOptions options;
   options.max_robots = 3;
+  options.place_kept_s = 0.0;
   roster(options).Take(RequestOf("ended", 1));
   roster().Take(RequestOf("away", 2));
   roster().Take(RequestOf("away_later", 3));
@@ -227,6 +228,20 @@ TEST_F(RosterTest, WhenPlacesRunOutTheEndedGoFirstThenTheLongestAway) {
   EXPECT_EQ(outbound_.over_limit(), 1U);  // `cairn status` prints how many were refused.
 }
 
+// After a start of the server every robot is away for a moment, and a newcomer that asked first took the place of one
+// that was driving.
+TEST_F(RosterTest, ARobotThatIsAwayForAMomentKeepsItsPlace) {
+  RobotsOptions options;
+  options.max_robots = 1;
+  roster(options).Take(RequestOf("r1", 7));
+  Suspend(7);
+  roster().Take(RequestOf("r2", 8));
+  EXPECT_EQ(LastState("r2", 8).phase, SessionPhase::kRefused);
+  EXPECT_EQ(LastState("r2", 8).status.code, StatusCode::kResourceExhausted);
+  ASSERT_NE(roster().Find("r1"), nullptr);
+  EXPECT_EQ(roster().Find("r1")->record().phase(), SessionPhase::kSuspended);
+}
+
 // Sixty-four misspelt site names, from a robot there was no room for, filled the list of sites.
 TEST_F(RosterTest, WhoeverIsRefusedLeavesNoSiteBehind) {
   RobotsOptions options;
@@ -242,6 +257,7 @@ TEST_F(RosterTest, WhoeverIsRefusedLeavesNoSiteBehind) {
 TEST_F(RosterTest, ASiteThatCanNotBeEnteredDisplacesNobody) {
   RobotsOptions options;
   options.max_robots = 1;
+  options.place_kept_s = 0.0;
   roster(options, false).Take(RequestOf("r1", 7));
   Suspend(7);
   SessionRequest request = RequestOf("r2", 8);
