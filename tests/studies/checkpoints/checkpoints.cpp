@@ -209,7 +209,8 @@ void StudyDay(StudyContext& context) {
   sim::FleetOptions options;
   options.seed = context.seed;
   const StudyLog log = SimulateLog("building", 3600.0 * hours, options);
-  const auto hour = std::max<std::size_t>(1, static_cast<std::size_t>(static_cast<double>(log.scans()) / hours));
+  const std::size_t all = log.scans();
+  const auto hour = std::max<std::size_t>(1, static_cast<std::size_t>(static_cast<double>(all) / hours));
   slam::MapperOptions mapper;
   SessionAccount account;
   const auto pipeline = account.MakePipeline(mapper, log.T_map_robot_start);
@@ -219,7 +220,7 @@ void StudyDay(StudyContext& context) {
     account.Add(*pipeline, record);
     if (!std::holds_alternative<Scan>(record)) continue;
     if (++scans % 10 == 0) (void)pipeline->mapper().TakeGridChange();
-    if (scans % hour != 0 && scans != log.scans()) continue;
+    if (scans % hour != 0 && scans != all) continue;
     longest_ms = std::max(longest_ms, MeasureSaving(*pipeline, account, mapper, log, scans, context, table));
   }
   report.Add(table, "day");
