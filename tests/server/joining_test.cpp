@@ -251,8 +251,7 @@ class WithFilter : public ::testing::TestWithParam<slam::FilterKind> {};
 
 TEST_P(WithFilter, ARobotThatCannotFollowAJobIsNeverCalledLocalized) {
   ServerOptions options = JoiningOptions(true);
-  options.mapper.filter.kind = GetParam();
-  options.mapper.particles = 20;
+  options.slam.filter.kind = GetParam();
   WholeServer house(options);
   RingRobot first = FirstRobot(), second = SecondRobot();
   first.Open(house);

@@ -337,6 +337,26 @@ TEST(Journal, WorkBetweenTwoCommitsSeesEverythingBeforeAndNothingElseIsWrittenMe
   EXPECT_EQ(StoredEntries(*store, 1), 25U);
 }
 
+// Saving a large site took so long that the queue overflowed, and sessions were no longer stored.
+TEST(Journal, AWorkCanEndBeforeTheQueueOverflows) {
+  const auto store = *OpenStore(std::string(kInMemory));
+  Journal journal(*store, {.commit_delay_ms = 1, .queue_mib = 1});
+  journal.Start();
+  journal.Open(SampleSession(1), {});
+  std::atomic<std::uint64_t> appended{0};
+  std::atomic<bool> done{false};
+  journal.Between([&](Store&) {
+    while (journal.HasTimeToSpare() && appended < 1'000'000) journal.Append(1, SampleScan(++appended));
+    done = true;
+  });
+  ASSERT_TRUE(test::Eventually([&] { return done.load(); }));
+  EXPECT_GT(appended, 10U);
+  EXPECT_LT(appended, 1'000'000U);
+  EXPECT_FALSE(journal.IsLost(1));
+  journal.Stop();
+  EXPECT_EQ(StoredEntries(*store, 1), appended);
+}
+
 // Its parts would be found by a later session of the same number.
 TEST(Journal, ACheckpointOfASessionThatIsClosedMeanwhileIsNotFinished) {
   const auto store = *OpenStore(std::string(kInMemory));

@@ -153,6 +153,26 @@ TEST(ImportSite, AnErrorOfTheDiskLeavesNothingBehind) {
   EXPECT_TRUE(ImportSite(**store, path));
 }
 
+// A work that takes too long for the robots of a running server.
+TEST(ImportSite, AWorkThatMayNotGoOnChangesNothing) {
+  const TempDirectory directory;
+  const auto path = Saved(directory, {});
+  const auto store = MemoryStore();
+  ImportOptions options;
+  int asked = 0;
+  options.may_go_on = [&asked] { return ++asked < 4; };
+  EXPECT_EQ(ImportSite(*store, path, options).error().code, StatusCode::kResourceExhausted);
+  EXPECT_TRUE(Everything(*store).empty());
+
+  ASSERT_TRUE(ImportSite(*store, path));
+  const auto other = directory / "other.site";
+  asked = 0;
+  const auto written = WriteSiteFile(*store, "lab", other, options.may_go_on);
+  ASSERT_FALSE(written);
+  EXPECT_EQ(written.error().code, StatusCode::kResourceExhausted);
+  EXPECT_FALSE(std::filesystem::exists(other));
+}
+
 TEST(SplitSite, TheSessionsGoWithTheirPartOfEverything) {
   const auto store = MemoryStore();
   Put(*store, {});
