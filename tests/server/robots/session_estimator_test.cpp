@@ -127,10 +127,15 @@ TEST_F(SessionEstimatorTest, AFragmentIsNotLocalizedUntilAVersionJoinsIt) {
                                 .done = [&](Adopted&& adopted) { displaced = std::move(adopted.displaced); },
                                 .completed = std::make_shared<std::atomic<bool>>(true)});
   };
+  // Without its path in the map it does not know where it is there.
   adopt({.chunks = {}, .keyframes = 1});
+  EXPECT_TRUE(record.joining().fragment);
+  drive(40, 42);
+  EXPECT_EQ(poses.back().reason, PoseReason::kNotJoined);
+  adopt({.chunks = {}, .keyframes = 1, .path = std::make_shared<const std::vector<Pose2>>(1, Pose2{1.0, 0.0, 0.0})});
   EXPECT_TRUE(displaced.fragment);
   EXPECT_FALSE(record.joining().fragment);
-  drive(40, 45);
+  drive(42, 45);
   EXPECT_TRUE(poses.back().localized);
   adopt(RobotGrid(displaced));
   EXPECT_FALSE(displaced.fragment);
