@@ -29,7 +29,8 @@ std::map<std::string, Joiner::Driven> Joiner::Look() const {
   std::map<std::string, Driven> sites;
   for (const auto& session : roster_.All()) {
     const SessionRecord::Joining joining = session->record().joining();
-    if (joining.fragment && joining.joinable) sites[session->record().state().site].fragments.emplace(session->id(), joining.driven_m);
+    if (joining.fragment && joining.joinable)
+      sites[session->record().state().site].fragments.emplace(session->id(), joining.driven_m);
   }
   for (auto& [site, driven] : sites) {
     for (const auto& session : roster_.InSite(site)) {

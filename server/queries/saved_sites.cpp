@@ -217,10 +217,9 @@ Result<std::vector<SavedSite>> SavedSites::Save(const Request& request) {
                 "the saved sites take " + std::to_string(bytes >> 20) +
                     " MiB, which is all that store.max_saved_gib allows; delete some of them");
   }
-  const auto written = Between<SiteFileSummary>(
-      [this, site = request.site, path = *path](Store& store) {
-        return WriteSiteFile(store, site, path, [this] { return journal_->HasTimeToSpare(); });
-      });
+  const auto written = Between<SiteFileSummary>([this, site = request.site, path = *path](Store& store) {
+    return WriteSiteFile(store, site, path, [this] { return journal_->HasTimeToSpare(); });
+  });
   if (!written) return tl::unexpected(written.error());
   return std::vector<SavedSite>{SavedAt(*path)};
 }

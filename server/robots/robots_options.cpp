@@ -31,9 +31,10 @@ void Visit(OptionVisitor& visitor, RobotsOptions& options) {
                    "server was started. With a longer time robots "
                    "may come back later, and vanished ones take memory for longer. A session that ended so "
                    "long ago is not shown any more and counts for max_earlier."));
-  visitor.Real("place_kept_s", options.place_kept_s, "s", 0.0, 1e8,
-               "A robot that is away, also because the server was started again, keeps its place for at least this long "
-               "when robots.max_robots are served and another one wants to begin.");
+  visitor.Real(
+      "place_kept_s", options.place_kept_s, "s", 0.0, 1e8,
+      "A robot that is away, also because the server was started again, keeps its place for at least this long "
+      "when robots.max_robots are served and another one wants to begin.");
   visitor.Real("ledger_rate_hz", options.ledger_rate_hz, "Hz", 0.1, 100.0,
                "How often the counters of a robot are published while scans arrive. They are published at once after "
                "every eight scans and when its queue becomes empty.");

@@ -249,7 +249,8 @@ bool SessionEstimator::AdoptGrid(std::uint32_t epoch, const RobotGrid& grid) {
   const auto numbers = grid.numbers != nullptr ? std::span(*grid.numbers) : std::span<const std::uint64_t>();
   const std::vector<Pose2> before = mapper.BestPath();
   // A session that was not stored to its end may not be able to follow: then its place in this map is not known.
-  // The map of a fragment is in a frame of its own: if its path cannot follow, its place in this map is not known either.
+  // The map of a fragment is in a frame of its own: if its path cannot follow, its place in this map is not known
+  // either.
   const bool adopted = mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), grid.chunks), grid.keyframes, path,
                                         numbers, fragment_ && !grid.fragment);
   const bool fragment = grid.fragment || !adopted;
@@ -277,8 +278,9 @@ void SessionEstimator::TellJoining() {
   const bool joinable = pipeline_.mapper().follows_paths();
   std::string why = start_refused_;
   if (fragment_ && why.empty() && !joinable)
-    why = "not joined with the map of its site: the filter that it is run with cannot continue in a map in which a job "
-          "has found it; open its session with a start pose in this map";
+    why =
+        "not joined with the map of its site: the filter that it is run with cannot continue in a map in which a job "
+        "has found it; open its session with a start pose in this map";
   record_.SetJoining({fragment_, driven_m_, std::move(why), joinable});
 }
 

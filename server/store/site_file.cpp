@@ -274,8 +274,9 @@ Result<SiteFileSummary> SurveySiteFile(const std::filesystem::path& path) {
 
 tl::unexpected<Status> TakesTooLong(const std::string& what) {
   return Fail(StatusCode::kResourceExhausted,
-              what + " takes longer than the samples of the robots can wait (store.queue_mib); do it while the server is "
-                     "stopped (cairn site export, cairn site import), or with a larger queue");
+              what +
+                  " takes longer than the samples of the robots can wait (store.queue_mib); do it while the server is "
+                  "stopped (cairn site export, cairn site import), or with a larger queue");
 }
 
 Result<SiteFileSummary> WriteSiteFile(Store& store, const std::string& site, const std::filesystem::path& path,

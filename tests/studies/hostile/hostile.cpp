@@ -3,22 +3,19 @@
 // time, so that it has the numbers and names of now: whether a process dies, what the guard drops, whether streams stop
 // and how soon they flow again, and whether a client that joins then is answered in every partition of replies.
 // Everything is on loopback in a domain of its own. Recording the traffic needs CAP_NET_RAW.
-// --seconds: of the long part (600); --runs: of the short ones (100).
+// --seconds: of the long part (600), and of that with DDS Security (--only secure, 120); --runs: of the short ones
+// (100).
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <future>
-#include <map>
 #include <memory>
 #include <thread>
 
-#include "client/lib/map_client.h"
-#include "client/lib/pose_client.h"
-#include "client/lib/query_client.h"
 #include "common/wire/partitions.h"
 #include "tests/eventually.h"
 #include "tests/must.h"
-#include "tests/studies/fleet/live_server.h"
+#include "tests/studies/hostile/hostile_fleet.h"
 #include "tests/studies/study.h"
 #include "tests/system/hostile_traffic.h"
 #include "tests/temp_directory.h"
@@ -27,17 +24,11 @@
 namespace cairn::studies {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using test::TestDomain;
 
-constexpr int kRobots = 2;
 constexpr int kSenders = 3;
 constexpr double kFlowTarget_s = 5.0;
 constexpr double kQuickFlow_s = 30.0;
-
-double SecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 double Share(std::vector<double> values, double share) {
   if (values.empty()) return 0.0;
@@ -45,188 +36,9 @@ double Share(std::vector<double> values, double share) {
   return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
 }
 
-// A cairnd and robots, each a process that is started again where it dies.
-class HostileFleet {
- public:
-  HostileFleet() {
-    StartServer();
-    for (int i = 0; i < kRobots; ++i) robots_.push_back(StartRobot(i));
-  }
-
-  // What the server says of each robot: scans and odometry received, and whether it is stale. Nothing where it does not
-  // answer. Each answer comes to a process of its own, because the senders must not receive what these processes send.
-  struct RobotFlow {
-    std::uint64_t scans = 0;
-    std::uint64_t odometry = 0;
-    bool stale = false;
-  };
-  using Flow = std::map<std::string, RobotFlow>;
-  [[nodiscard]] static Flow Look() {
-    ChildProcess status({ProgramPath("cairn"), "status", "--timeout", "2", "--json", "--domain", DomainText()});
-    const auto outcome = status.Wait(std::chrono::seconds(20));
-    Flow flow;
-    const auto object = nlohmann::json::parse(outcome.output, nullptr, false);
-    if (outcome.exit_code != 0 || !object.is_object()) return flow;
-    for (const auto& robot : object["robots"]) {
-      RobotFlow& one = flow[robot["robot"]];
-      one.stale = robot["stale"];
-      for (const auto& ledger : robot["ledgers"]) {
-        one.scans = ledger["received"];
-        one.odometry = ledger["odometry_received"];
-      }
-    }
-    return flow;
-  }
-
-  // Starts again who has died; returns who.
-  std::vector<std::string> Bury() {
-    std::vector<std::string> dead;
-    if (!server_->RunningAfter(std::chrono::milliseconds(0))) {
-      dead.push_back("cairnd: " + LastWords(*server_));
-      StartServer();
-    }
-    for (int i = 0; i < kRobots; ++i) {
-      auto& robot = robots_[static_cast<std::size_t>(i)];
-      if (robot->RunningAfter(std::chrono::milliseconds(0))) continue;
-      dead.push_back("robot " + std::to_string(i + 1) + ": " + LastWords(*robot));
-      robot = StartRobot(i);
-    }
-    return dead;
-  }
-
-  // Seconds until scans and odometry of all robots arrive again; what it took to ask is included.
-  [[nodiscard]] double AwaitFlow(double patience_s) const {
-    const auto start = Clock::now();
-    Flow before;
-    while (SecondsSince(start) < patience_s) {
-      const Flow now = Look();
-      if (before.size() < kRobots) {
-        before = now;
-        continue;
-      }
-      const bool flows = std::all_of(before.begin(), before.end(), [&](const auto& entry) {
-        const auto found = now.find(entry.first);
-        return found != now.end() && found->second.scans > entry.second.scans &&
-               found->second.odometry > entry.second.odometry;
-      });
-      if (flows) return SecondsSince(start);
-    }
-    return patience_s;
-  }
-
-  // The server's log after it was asked to stop.
-  [[nodiscard]] std::string StopServer() {
-    server_->Signal(SIGTERM);
-    return server_->Wait().output;
-  }
-
- private:
-  static std::string DomainText() { return std::to_string(TestDomain()); }
-
-  static std::string LastWords(ChildProcess& process) {
-    const auto outcome = process.Wait();
-    return (outcome.exit_code < 0 ? "by a signal: " : "exit code " + std::to_string(outcome.exit_code) + ": ") +
-           outcome.output.substr(outcome.output.size() - std::min<std::size_t>(outcome.output.size(), 600));
-  }
-
-  void StartServer() {
-    server_ = std::make_unique<ChildProcess>(std::vector<std::string>{ProgramPath("cairnd"), "--domain", DomainText(),
-                                                                      "--state", (directory_ / "state").string()});
-    if (!server_->Says(" ready")) throw std::runtime_error("cairnd does not start");
-  }
-  [[nodiscard]] static std::unique_ptr<ChildProcess> StartRobot(int i) {
-    return std::make_unique<ChildProcess>(std::vector<std::string>{ProgramPath("cairn"),
-                                                                   "sim",
-                                                                   "--site",
-                                                                   "hostile",
-                                                                   "--robots",
-                                                                   "1",
-                                                                   "--prefix",
-                                                                   "r" + std::to_string(i + 1) + "-",
-                                                                   "--beams",
-                                                                   "180",
-                                                                   "--hz",
-                                                                   "10",
-                                                                   "--world",
-                                                                   "building",
-                                                                   "--seconds",
-                                                                   "100000",
-                                                                   "--timeout",
-                                                                   "600",
-                                                                   "--domain",
-                                                                   DomainText(),
-                                                                   "--json"});
-  }
-
-  const TempDirectory directory_;
-  std::unique_ptr<ChildProcess> server_;
-  std::vector<std::unique_ptr<ChildProcess>> robots_;
-};
-
-// Who watches the fleet, as a page does: the poses of its robots, and the map. It lives in the study's process: should
-// a datagram end it, the study ends with it.
-class Viewer {
- public:
-  Viewer() {
-    wire::WireOptions options;
-    options.domain = TestDomain();
-    bus_ = test::Must(wire::Bus::Create(options, "viewer"));
-    for (int i = 1; i <= kRobots; ++i)
-      poses_.push_back(test::Must(client::PoseClient::Create(*bus_, "r" + std::to_string(i) + "-1")));
-    map_ = test::Must(client::MapClient::Create(*bus_, "hostile"));
-    queries_ = test::Must(client::QueryClient::Create(*bus_));
-  }
-
-  // Seconds until a new pose of each robot has come, a question was answered, and the map is the server's.
-  struct News {
-    double poses_s = 0.0, answer_s = 0.0, map_s = 0.0;
-    [[nodiscard]] double all_s() const { return std::max({poses_s, answer_s, map_s}); }
-  };
-  [[nodiscard]] News AwaitNews(double patience_s) {
-    const auto start = Clock::now();
-    for (const auto& robot : poses_) {
-      while (robot->Next(0.0)) {  // What came before.
-      }
-    }
-    News news{.answer_s = patience_s, .map_s = patience_s};
-    auto poses = std::async(std::launch::async, [&] {
-      for (const auto& robot : poses_) {
-        if (!robot->Next(patience_s)) return patience_s;
-      }
-      return SecondsSince(start);
-    });
-    while (SecondsSince(start) < patience_s) {
-      const auto now = queries_->Map("hostile");
-      if (!now) continue;
-      news.answer_s = std::min(news.answer_s, SecondsSince(start));
-      const auto shown = [&] { return map_->epoch() == now->epoch && map_->version() >= now->version; };
-      if (!test::Eventually(shown, std::chrono::milliseconds(500))) continue;
-      news.map_s = SecondsSince(start);
-      break;
-    }
-    news.poses_s = poses.get();
-    return news;
-  }
-  // How often its parts have joined the domain anew.
-  [[nodiscard]] std::string Renewals() const {
-    int poses = 0;
-    for (const auto& robot : poses_) poses += robot->renewed();
-    return Count(poses) + " times for poses, " + Count(map_->renewed()) + " times for the map, " +
-           Count(queries_->renewed()) + " times for questions";
-  }
-
- private:
-  std::unique_ptr<wire::Bus> bus_;
-  std::vector<std::unique_ptr<client::PoseClient>> poses_;
-  std::unique_ptr<client::MapClient> map_;
-  std::unique_ptr<client::QueryClient> queries_;
-};
-
 // The partitions of replies in which a client that has just joined gets no answer to a ping.
-std::vector<int> SilentPartitions(std::chrono::seconds patience) {
-  wire::WireOptions options;
-  options.domain = TestDomain();
-  const auto bus = test::Must(wire::Bus::Create(options, "partitions"));
+std::vector<int> SilentPartitions(const Members& members, std::chrono::seconds patience) {
+  const auto bus = test::Must(wire::Bus::Create(members.OptionsOfPage(), "partitions"));
   std::array<std::atomic<bool>, wire::kReplyPartitions> answered{};
   const auto requests = test::Must(bus->Advertise<Request>());
   std::vector<std::unique_ptr<wire::Subscription>> replies;
@@ -288,7 +100,7 @@ void Attack(HostileFleet& fleet, Viewer& viewer, double seconds, std::uint64_t s
         static_cast<void>(fleet.AwaitFlow(60.0));
         outcome.silence_s.push_back(SecondsSince(death));
       }
-      const HostileFleet::Flow flow = HostileFleet::Look();
+      const HostileFleet::Flow flow = fleet.Look();
       ++outcome.looks;
       outcome.unanswered += flow.empty() ? 1 : 0;
       outcome.stale += std::any_of(flow.begin(), flow.end(), [](const auto& one) { return one.second.stale; }) ? 1 : 0;
@@ -305,7 +117,7 @@ void Attack(HostileFleet& fleet, Viewer& viewer, double seconds, std::uint64_t s
   outcome.news = shows.get();
   outcome.shows_s.push_back(stopping_s + outcome.news.all_s());
   for (std::string& dead : fleet.Bury()) outcome.deaths.push_back(std::move(dead));
-  outcome.silent = SilentPartitions(patience);
+  outcome.silent = SilentPartitions(fleet.members(), patience);
   outcome.silent_runs += outcome.silent.empty() ? 0 : 1;
 }
 
@@ -357,31 +169,29 @@ std::string LastOf(const Outcome& outcome) {
          (outcome.deaths.empty() ? "" : ", the last one " + outcome.deaths.back());
 }
 
-void StudyHostile(StudyContext& context) {
+void StudyFleet(StudyContext& context, const Members& members, const std::vector<std::string>& parts) {
   Report& report = context.report;
-  if (!test::MayRecord()) return report.Fault("this user may not record the traffic on loopback (CAP_NET_RAW)");
-  HostileFleet fleet;
+  HostileFleet fleet(members);
   if (fleet.AwaitFlow(30.0) >= 30.0) return report.Fault("the robots do not stream");
-  Viewer viewer;
+  Viewer viewer(members);
   if (viewer.AwaitNews(30.0).all_s() >= 30.0) return report.Fault("the viewer sees no robots");
   const auto patience = std::chrono::seconds(context.Pick(4, 30));  // For an answer in each partition of replies.
-  if (context.Wants("long")) {
-    report.Heading("Traffic without a pause");
-    Outcome outcome;
-    Attack(fleet, viewer, context.seconds > 0 ? context.seconds : context.Pick(600.0, 10.0), context.seed, patience,
-           outcome);
-    report.Progress(LastOf(outcome));
-    Print(context, "long", outcome);
-  }
-  if (context.Wants("runs")) {
-    report.Heading("Short runs: the time until everything flows again");
-    const int runs = context.runs > 0 ? context.runs : context.Pick(100, 3);
+  for (const std::string& part : parts) {
+    const bool in_runs = part == "runs";
+    report.Heading(in_runs            ? "Short runs: the time until everything flows again"
+                   : part == "secure" ? "Traffic without a pause, with DDS Security"
+                                      : "Traffic without a pause");
+    const int runs = !in_runs ? 1 : context.runs > 0 ? context.runs : context.Pick(100, 3);
+    const double seconds = in_runs               ? 5.0
+                           : context.seconds > 0 ? context.seconds
+                                                 : context.Pick(part == "secure" ? 120.0 : 600.0, 10.0);
     Outcome outcome;
     for (int run = 0; run < runs; ++run) {
-      Attack(fleet, viewer, 5.0, context.seed + 7 + static_cast<std::uint64_t>(run), patience, outcome);
+      Attack(fleet, viewer, seconds, context.seed + (in_runs ? 7 + static_cast<std::uint64_t>(run) : 0), patience,
+             outcome);
       report.Progress("run " + Count(run + 1) + ": " + LastOf(outcome));
     }
-    Print(context, "runs", outcome);
+    Print(context, part, outcome);
   }
   report.Text("The viewer has joined anew " + viewer.Renewals() + ".");
   const std::string log = fleet.StopServer();
@@ -389,6 +199,17 @@ void StudyHostile(StudyContext& context) {
   report.Text("cairnd's last participant: " + (refused == std::string::npos
                                                    ? "it did not say what it refused"
                                                    : log.substr(refused, log.find('\n', refused) - refused)));
+}
+
+void StudyHostile(StudyContext& context) {
+  if (!test::MayRecord()) return context.report.Fault("this user may not record the traffic on loopback (CAP_NET_RAW)");
+  std::vector<std::string> open;
+  for (const char* part : {"long", "runs"})
+    if (context.Wants(part)) open.emplace_back(part);
+  if (!open.empty()) StudyFleet(context, {}, open);
+  if (!context.Wants("secure")) return;
+  const TempDirectory directory;
+  StudyFleet(context, Members(directory / "fleet"), {"secure"});
 }
 
 const Registration kHostile("hostile", "mutated and forged datagrams at full rate against a server and two robots",
