@@ -126,10 +126,10 @@ Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMateria
   }
   // The rest of the progress is the share of scans drawn and compared.
   const double begun = together ? kShareOfJoining : 0.0;
-  const double steps = static_cast<double>(slam::kSmoothingStepsPerKeyframe) * static_cast<double>(keyframes);
-  std::size_t done = 0;
+  std::size_t steps = 0, done = 0;
+  for (const SessionMaterial& session : material) steps += slam::SmoothingSteps(session.snapshot);
   const auto next = [&] {
-    control.Progress(begun + (1.0 - begun) * static_cast<double>(done++) / steps);
+    control.Progress(begun + (1.0 - begun) * static_cast<double>(done++) / static_cast<double>(steps));
     return !control.cancelled();
   };
   slam::Disagreement before, after;

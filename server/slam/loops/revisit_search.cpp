@@ -14,6 +14,7 @@ constexpr double kGuessSigmaM = 0.5;         // Standard deviation of the positi
 constexpr double kGuessSigmaRad = 0.15;      // Standard deviation of its heading.
 constexpr double kMinRevisitScore = 0.6;     // Share of the points of the scan that must be explained.
 constexpr double kRevisitSigmaRad = 0.02;    // Standard deviation that is added to the heading of a match.
+constexpr double kOpenSigmaM = 5.0;  // Standard deviation where the scan shows nothing: the match is no farther.
 
 // The old keyframe that most likely shows the same surroundings: near, and with a similar heading.
 std::optional<std::size_t> NearestKeyframe(const Pose2& T_map_robot, const PathIndex& index, const Trail& trail,
@@ -38,6 +39,13 @@ std::optional<std::size_t> NearestKeyframe(const Pose2& T_map_robot, const PathI
   const auto go_on = [&best](double distance_m) { return distance_m <= best; };
   index.ForEachFrom(here, options.max_distance_m, go_on, look);
   return nearest;
+}
+
+// Along a corridor the match stays where the guess was, which is a particle's own belief: it must not count once more
+// as something that was measured.
+Eigen::Matrix2d UnseenAlong(const MatchResult& match) {
+  const double variance = 1.0 / std::max(match.open_information, 1.0 / (kOpenSigmaM * kOpenSigmaM));
+  return variance * match.degenerate_direction * match.degenerate_direction.transpose();
 }
 
 }  // namespace
@@ -77,8 +85,9 @@ std::optional<RevisitObservation> RevisitSearch::Find(std::span<const SurfacePoi
   if (!match.converged) match = AlignFromOthers(filter, align, parallel_for);
   if (!match.converged) return std::nullopt;
   // Neighbouring matches have similar errors.
-  return RevisitObservation{*centre, match.T_ref_curr,
-                            match.covariance + PoseCovariance(options_.sigma_m, kRevisitSigmaRad)};
+  Eigen::Matrix3d covariance = match.covariance + PoseCovariance(options_.sigma_m, kRevisitSigmaRad);
+  if (match.degenerate) covariance.topLeftCorner<2, 2>() += UnseenAlong(match);
+  return RevisitObservation{*centre, match.T_ref_curr, covariance};
 }
 
 // Aligns with other hypotheses of the filter, and returns the result that explains most.

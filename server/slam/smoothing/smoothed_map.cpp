@@ -1,5 +1,6 @@
 #include "server/slam/smoothing/smoothed_map.h"
 
+#include <cmath>
 #include <utility>
 
 namespace cairn::slam {
@@ -22,6 +23,57 @@ std::optional<Drawing> DrawAlong(const std::vector<Pose2>& path, const MapperSna
     if (snapshot.keyframes[k].localized) drawing.disagreement.Add(*snapshot.keyframes[k].scan, path[k], drawing.grid);
   }
   return drawing;
+}
+
+// Of each keyframe, how far its scan disagrees with the map that was drawn from the others: keyframes with odd numbers
+// are compared with those with even numbers, and the other way round. A scan agrees well with a map that it is part of,
+// however wrong its pose is.
+std::optional<std::vector<double>> DisagreementWithOthers(const std::vector<Pose2>& path,
+                                                          const MapperSnapshot& snapshot, const GridOptions& options,
+                                                          const std::function<bool()>& next) {
+  std::vector<double> each_m2;
+  for (std::size_t half = 0; half < 2; ++half) {
+    OccupancyGrid grid(options);
+    for (std::size_t k = half; k < snapshot.keyframes.size(); k += 2) {
+      if (!next()) return {};
+      if (snapshot.keyframes[k].localized) grid.Draw(*snapshot.keyframes[k].scan, path[k]);
+    }
+    for (std::size_t k = 1 - half; k < snapshot.keyframes.size(); k += 2) {
+      if (!next()) return {};
+      if (!snapshot.keyframes[k].localized) continue;
+      Disagreement one;
+      one.Add(*snapshot.keyframes[k].scan, path[k], grid);
+      each_m2.push_back(one.mean_m2());
+    }
+  }
+  return each_m2;
+}
+
+// Whether the values of `a` are smaller than those of `b`, by more than chance explains (a paired t-test).
+bool IsClearlySmaller(const std::vector<double>& a, const std::vector<double>& b) {
+  constexpr double kClearly = 2.0;  // Standard errors of the mean difference: one in fifty is as large by chance.
+  if (a.size() < 2) return false;
+  const auto count = static_cast<double>(a.size());
+  double mean = 0.0, squares = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) mean += (b[i] - a[i]) / count;
+  for (std::size_t i = 0; i < a.size(); ++i) squares += (b[i] - a[i] - mean) * (b[i] - a[i] - mean);
+  return mean > kClearly * std::sqrt(squares / (count * (count - 1.0)));
+}
+
+// Nothing was seen twice, so there is nothing to fit.
+bool IsChosenByScans(const MapperSnapshot& snapshot) {
+  return snapshot.pose_graph.enabled && snapshot.relations.empty();
+}
+
+// The best particle's path is one sample of many, and the online path their mean. So the sample is taken only where the
+// scans clearly agree better with it.
+std::optional<std::vector<Pose2>> ChosenPath(const MapperSnapshot& snapshot, const GridOptions& options,
+                                             const std::function<bool()>& next) {
+  const auto online = DisagreementWithOthers(snapshot.online_path, snapshot, options, next);
+  if (!online) return {};
+  const auto sample = DisagreementWithOthers(snapshot.full_path, snapshot, options, next);
+  if (!sample) return {};
+  return IsClearlySmaller(*sample, *online) ? snapshot.full_path : snapshot.online_path;
 }
 
 }  // namespace
@@ -47,20 +99,21 @@ std::optional<SmoothedMap> MapAlong(const MapperSnapshot& snapshot, std::vector<
   return SmoothedMap{std::move(path), std::move(smoothed->grid), online->disagreement, smoothed->disagreement};
 }
 
+std::size_t SmoothingSteps(const MapperSnapshot& snapshot) {
+  const std::size_t per_keyframe = IsChosenByScans(snapshot) ? 8 : 4;
+  return per_keyframe * snapshot.keyframes.size();
+}
+
 std::optional<SmoothedMap> SmoothMap(const MapperSnapshot& snapshot, const GridOptions& options,
                                      const std::function<bool()>& next, const std::function<bool()>& go_on) {
   auto online = DrawAlong(snapshot.online_path, snapshot, options, next);
   if (!online) return {};
-  auto path = SmoothedPath(snapshot, go_on);
+  auto path = IsChosenByScans(snapshot) ? ChosenPath(snapshot, options, next) : SmoothedPath(snapshot, go_on);
   if (!path) return {};
+  const Disagreement before = online->disagreement;
+  if (*path == snapshot.online_path) return SmoothedMap{*std::move(path), std::move(online->grid), before, before};
   auto smoothed = DrawAlong(*path, snapshot, options, next);
   if (!smoothed) return {};
-  const Disagreement before = online->disagreement;
-  // An optimised path is always preferred: the two disagreements are often nearly alike and must not decide
-  // against it.
-  const bool fitted = !snapshot.pose_graph.enabled || !snapshot.relations.empty();
-  if (!fitted && before.mean_m2() < smoothed->disagreement.mean_m2())
-    return SmoothedMap{snapshot.online_path, std::move(online->grid), before, before};
   return SmoothedMap{*std::move(path), std::move(smoothed->grid), before, smoothed->disagreement};
 }
 

@@ -1,8 +1,9 @@
 // The result of smoothing one robot's data: its whole path, the grid drawn anew along that path, and how well
 // the scans agree with this grid and with the grid along the online path. If no place was seen again there is
 // nothing to optimise. Then two paths are compared, the best particle's (one sample of many) and the online
-// path (their mean), and the result is the one with which the scans agree better. With `pose_graph.enabled`
-// off it is always the best particle's path (thesis A 5.4).
+// path (their mean), and the result is the online path, unless the scans clearly agree better with the other one: each
+// scan is compared with a map in which it was not drawn. With `pose_graph.enabled` off it is always the best particle's
+// path (thesis A 5.4).
 // Stateless, thread-safe, deterministic. May take seconds on long paths.
 #pragma once
 
@@ -37,7 +38,8 @@ struct SmoothedMap {
 [[nodiscard]] std::optional<SmoothedMap> MapAlong(const MapperSnapshot& snapshot, std::vector<Pose2> path,
                                                   const GridOptions& options, const std::function<bool()>& next);
 
-inline constexpr int kSmoothingStepsPerKeyframe = 4;  // Two paths are each drawn and compared.
+// How often SmoothMap calls `next` at most.
+[[nodiscard]] std::size_t SmoothingSteps(const MapperSnapshot& snapshot);
 
 // `next` is called before each step, and `go_on` between the iterations of the optimisation. If either
 // returns false, the work ends and there is no result.
