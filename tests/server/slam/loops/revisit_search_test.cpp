@@ -42,13 +42,13 @@ struct Seen {
 
 // A robot that comes past its start once more, and believes that it is 0.4 m farther than it is.
 std::optional<Seen> SeeAgain(const World& world) {
-  constexpr double kOnTheFirstSideM = 138.0, kTooFarM = 0.4;
+  constexpr double kPastTheStartM = 130.0, kTooFarM = 0.4;
   Trail trail{MotionNoise{0.002, 0.01, 0.005, 0.0005, 0.002, 0.005}};
   std::vector<Pose2> truth;
   PosePath path;
   std::mt19937_64 rng(1);
   std::vector<SurfacePoint> points;
-  for (const Pose2& step : RingSteps(kOnTheFirstSideM, 0.4)) {
+  for (const Pose2& step : RingSteps(kPastTheStartM, 0.4)) {
     truth.push_back(truth.empty() ? Pose2{} : truth.back() * step);
     auto scan = std::make_shared<const Scan>(
         Look(world, truth.back(), Laser{.first_rad = -kPi / 2, .range_max_m = 12.0, .sigma_m = 0.01}, &rng));
