@@ -56,6 +56,9 @@ std::optional<Seen> SeeAgain(const World& world) {
     trail.Append({scan, truth.back()}, truth.back(), points, Eigen::Matrix3d::Zero(), std::nullopt);
     path.Append(truth.back());
   }
+  // The round was closed before: otherwise the start counts as a large loop, which is not looked for here.
+  const std::size_t before = trail.size() - 20;
+  trail.AddLoop({0, before, Between(truth[0], truth[before]), PoseCovariance(0.05, 0.01), true});
   PathIndex index;
   index.Follow(path);
   const Believer filter({truth.back() * Pose2{kTooFarM, 0.0, 0.0}, path});
