@@ -216,7 +216,9 @@ Bytes WithoutStatistics(Bytes datagram) {
 
 DatagramFault InspectDatagram(Bytes datagram, SequenceGate& gate, SequenceGate::Clock::time_point now) {
   const Inspection with{gate, now};
-  return Walk(datagram, [&](const Submessage& submessage) { return InspectSubmessage(submessage, with); });
+  const DatagramFault fault =
+      Walk(datagram, [&](const Submessage& submessage) { return InspectSubmessage(submessage, with); });
+  return fault != DatagramFault::kNone || IsWholeIfSigned(datagram) ? fault : DatagramFault::kSecurity;
 }
 
 std::vector<std::uint8_t> WithOwnCounts(std::span<const std::uint8_t> datagram, SequenceGate& gate) {

@@ -123,6 +123,19 @@ bool IsWholeProtection(std::uint8_t id, Bytes content) {
   }
 }
 
+bool IsWholeIfSigned(Bytes datagram) {
+  constexpr std::size_t kRtpsHeaderBytes = 20;
+  constexpr std::uint8_t kSignedPrefix = 0x33, kSignedPostfix = 0x34;
+  if (datagram.size() <= kRtpsHeaderBytes || datagram[kRtpsHeaderBytes] != kSignedPrefix) return true;
+  for (std::size_t at = kRtpsHeaderBytes; at + 4 <= datagram.size();) {
+    if (datagram[at] == kSignedPostfix) return true;
+    const bool little = (datagram[at + 1] & 1) != 0;
+    const std::size_t length = datagram[at + (little ? 2 : 3)] + std::size_t{256} * datagram[at + (little ? 3 : 2)];
+    at += 4 + ((length + 3) & ~std::size_t{3});
+  }
+  return false;
+}
+
 bool HoldsItsCiphertext(Bytes beginning, std::size_t size) {
   constexpr std::uint32_t kAes128Gcm = 2;
   constexpr std::uint32_t kAes256Gcm = 4;

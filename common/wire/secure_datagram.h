@@ -23,6 +23,12 @@ namespace cairn::wire {
 // SRTPS_POSTFIX. True for every other `id`.
 [[nodiscard]] bool IsWholeProtection(std::uint8_t id, std::span<const std::uint8_t> content);
 
+// A datagram that is signed as a whole begins with SRTPS_PREFIX. Its submessages must be whole as the library counts
+// them, which knows none that ends with the datagram, up to an SRTPS_POSTFIX. The library adds up their lengths,
+// stays where it is at one that leads beyond the end, and computes the signature over the sum. True for every other
+// datagram. REQUIRES: at least an RTPS header.
+[[nodiscard]] bool IsWholeIfSigned(std::span<const std::uint8_t> datagram);
+
 // The beginning of a sample of `size` bytes. If it is encrypted, the ciphertext must lie within the sample.
 [[nodiscard]] bool HoldsItsCiphertext(std::span<const std::uint8_t> beginning, std::size_t size);
 

@@ -106,15 +106,34 @@ TEST(SecureDatagram, ProtectedPartsHoldTheirLengths) {
   EXPECT_EQ(part(0x30, 0, 64, 64), DatagramFault::kNone);
   EXPECT_EQ(part(0x30, 0, 65, 64), DatagramFault::kSecurity);
   EXPECT_EQ(part(0x30, 0, 0xfffffff5, 64), DatagramFault::kSecurity);
-  for (const std::uint8_t id : {0x31, 0x33}) {
-    EXPECT_EQ(part(id, 16, 0, 0), DatagramFault::kNone);
-    EXPECT_EQ(part(id, 12, 0, 0), DatagramFault::kSecurity);
-  }
+  EXPECT_EQ(part(0x31, 16, 0, 0), DatagramFault::kNone);
+  EXPECT_EQ(part(0x31, 12, 0, 0), DatagramFault::kSecurity);
+  EXPECT_EQ(part(0x33, 12, 0, 0), DatagramFault::kSecurity);
   for (const std::uint8_t id : {0x32, 0x34}) {
     EXPECT_EQ(part(id, 16, 2, 40), DatagramFault::kNone);
     EXPECT_EQ(part(id, 16, 3, 40), DatagramFault::kSecurity);
     EXPECT_EQ(part(id, 12, 0, 0), DatagramFault::kSecurity);
   }
+}
+
+// In a submessage that ends with the datagram (its length is 0) the library looks for further ones, which need not be
+// whole. It came out of mutated traffic, and ended every program of a fleet with DDS Security.
+TEST(SecureDatagram, WhatIsSignedAsAWholeEndsWithItsSignature) {
+  const auto prefix = [] { return Datagram().Begin(0x33, 0).Zeros(20).End(); };
+  const auto signed_by = [](Datagram datagram) { return datagram.Begin(0x34, 0).Zeros(20).End().Inspect(); };
+  EXPECT_EQ(signed_by(prefix()), DatagramFault::kNone);
+  EXPECT_EQ(signed_by(prefix().Heartbeat(1, 3)), DatagramFault::kNone);
+  EXPECT_EQ(signed_by(prefix().Heartbeat(1, 3).Begin(0x30, 0).BigEndian(8).Zeros(8).End()), DatagramFault::kNone);
+  EXPECT_EQ(prefix().Inspect(), DatagramFault::kSecurity);
+  EXPECT_EQ(prefix().Heartbeat(1, 3).Inspect(), DatagramFault::kSecurity);
+  // A heartbeat of the length 0. What it holds is taken for a submessage with a length beyond the end, or for none.
+  const auto to_the_end = [&] {
+    return prefix().Begin(0x07, 0).U32(0).U32(0x000002c2).Sequence(1).Sequence(3).U32(1).EndWithLength(0);
+  };
+  EXPECT_EQ(to_the_end().Inspect(), DatagramFault::kSecurity);
+  EXPECT_EQ(to_the_end().U32(0xffff0101).Inspect(), DatagramFault::kSecurity);
+  // Somewhere else a signature is no beginning of one.
+  EXPECT_EQ(Datagram().Heartbeat(1, 3).Begin(0x33, 0).Zeros(20).End().Inspect(), DatagramFault::kNone);
 }
 
 // The length of the ciphertext is used before anything of the sample is authenticated.
