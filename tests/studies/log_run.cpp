@@ -18,6 +18,7 @@ LogRun RunOverLog(const StudyLog& log, const slam::MapperOptions& options) {
                                      run.scan_cpu_ms.push_back(watch.CpuMs());
                                      run.scan_wall_ms.push_back(watch.WallMs());
                                      run.online.push_back({scan.stamp, outcome.T_map_robot});
+                                     run.covariances.push_back(outcome.covariance);
                                      run.keyframes += outcome.keyframe ? 1 : 0;
                                      run.not_localized += outcome.localized ? 0 : 1;
                                      run.localized.push_back(outcome.localized ? 1 : 0);

@@ -19,7 +19,9 @@ namespace cairn::studies {
 inline constexpr int kPoseReasonCount = static_cast<int>(PoseReason::kNotJoined) + 1;
 
 struct LogRun {
-  Trajectory online;                 // The poses as estimated during the run.
+  Trajectory online;  // The poses as estimated during the run.
+  // Of each pose of `online`: its covariance of (x, y, theta) in map.
+  std::vector<Eigen::Matrix3d> covariances;
   Trajectory full;                   // The path of the best particle at the end.
   std::vector<double> scan_cpu_ms;   // Processor time per scan used, all threads.
   std::vector<double> scan_wall_ms;  // ... and on the wall.

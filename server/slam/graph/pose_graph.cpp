@@ -63,6 +63,10 @@ void Visit(OptionVisitor& visitor, PoseGraphOptions& options) {
                   "Most iterations of the least squares in each of its three steps.");
 }
 
+double LoopWeight(double squared_error) {
+  return 1.0 / (1.0 + squared_error / (kLoopLoss * kLoopLoss));
+}
+
 PoseRelationError ErrorOf(const PoseRelation& relation, const Pose2& T_map_from, const Pose2& T_map_to) {
   const Pose2 T_from_map = T_map_from.Inverse();
   const Pose2 T_from_to = T_from_map * T_map_to;

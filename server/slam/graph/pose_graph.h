@@ -56,6 +56,9 @@ struct PoseRelationError {
 };
 [[nodiscard]] PoseRelationError ErrorOf(const PoseRelation& relation, const Pose2& T_map_from, const Pose2& T_map_to);
 
+// Weight of a loop in the fit, 0..1, by its squared normalised error: the robust loss of the last step.
+[[nodiscard]] double LoopWeight(double squared_error);
+
 // Moves `poses` to the path that fits best, or leaves them unchanged if no better one is found; the first `held` of
 // them stay where they are. If `go_on` is given, it is called after each iteration of the solver, and the work ends
 // when it returns false. REQUIRES: the indices of all relations lie within poses; held >= 1.

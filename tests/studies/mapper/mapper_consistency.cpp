@@ -1,12 +1,14 @@
 #include "tests/studies/mapper/mapper_consistency.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
 #include "client/sim/fleet.h"
 #include "client/sim/shipped_worlds.h"
+#include "common/geometry/pose_difference.h"
 #include "server/slam/landmarks/innovation.h"
 #include "server/slam/scan_pipeline.h"
 
@@ -88,6 +90,17 @@ sim::World EqualRooms() {
   return rooms.Route(way).world();
 }
 
+// A ring of four corridors with the same niche every 4 m on both sides, so that every place looks like many others.
+sim::World Niches() {
+  constexpr double kLength = 26.0, kDepth = 18.0, kWidth = 2.4;
+  WorldBuilder ring("niches");
+  ring.Box(0, 0, kLength, kDepth).Box(kWidth, kWidth, kLength - 2 * kWidth, kDepth - 2 * kWidth);
+  for (double x = 5.0; x < kLength - 4.0; x += 4.0) ring.Box(x, 0, 0.8, 0.3).Box(x, kDepth - 0.3, 0.8, 0.3);
+  for (double y = 5.0; y < kDepth - 4.0; y += 4.0) ring.Box(0, y, 0.3, 0.8).Box(kLength - 0.3, y, 0.3, 0.8);
+  const double near = 0.5 * kWidth, right = kLength - near, top = kDepth - near;
+  return ring.Route({{near, near}, {right, near}, {right, top}, {near, top}}).world();
+}
+
 sim::World Shipped(const std::string& name) {
   auto world = sim::OpenWorld(name);
   if (!world) throw std::invalid_argument(world.error().message);
@@ -125,9 +138,52 @@ Place PlaceOf(const slam::ScanOutcome& outcome, const Pose2& T_map_robot_true, d
   return place;
 }
 
-// The places of one drive, every kPointEveryM of the true path.
-std::vector<Place> DriveOnce(const ConsistencyDrive& drive, const MapperConsistencyOptions& options,
-                             std::uint64_t seed) {
+// Whether the error of a relation is larger than that of any match, apart from directions that it calls uncertain.
+bool IsWrong(const slam::PoseRelation& relation, const Pose2& T_from_to_true) {
+  constexpr double kWrongM = 0.5, kWrongRad = 0.2, kSigmas = 4.0;
+  const Eigen::Vector3d error = Minus(relation.T_from_to, T_from_to_true);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(relation.covariance.topLeftCorner<2, 2>());
+  Eigen::Vector2d offset = axes.eigenvectors().transpose() * error.head<2>();
+  for (int i = 0; i < 2; ++i)
+    if (offset[i] * offset[i] < kSigmas * kSigmas * axes.eigenvalues()[i]) offset[i] = 0.0;
+  return offset.norm() > kWrongM || std::abs(error.z()) > kWrongRad;
+}
+
+SeenAgain SeenAgainIn(const slam::MapperSnapshot& snapshot, const Trajectory& truth) {
+  constexpr double kNearM = 1.0, kSameHeadingRad = 0.5, kLaterM = 12.0;
+  std::vector<Pose2> keyframes;
+  std::vector<double> way_m;
+  std::size_t at = 0;
+  for (const slam::Keyframe& keyframe : snapshot.keyframes) {
+    while (at + 1 < truth.size() && truth[at].stamp < keyframe.scan->stamp) ++at;
+    const Pose2& pose = truth[at].T_map_robot;
+    way_m.push_back(keyframes.empty() ? 0.0
+                                      : way_m.back() + (pose.translation() - keyframes.back().translation()).norm());
+    keyframes.push_back(pose);
+  }
+  SeenAgain seen;
+  std::vector<bool> related(keyframes.size(), false);
+  for (const slam::PoseRelation& relation : snapshot.relations) {
+    if (!relation.loop) continue;
+    related[std::max(relation.from, relation.to)] = true;
+    ++seen.relations;
+    seen.wrong += IsWrong(relation, Between(keyframes[relation.from], keyframes[relation.to])) ? 1 : 0;
+  }
+  for (std::size_t k = 0; k < keyframes.size(); ++k) {
+    bool chance = false;
+    for (std::size_t old = 0; old < k && way_m[k] - way_m[old] >= kLaterM && !chance; ++old)
+      chance = (keyframes[old].translation() - keyframes[k].translation()).norm() < kNearM &&
+               std::abs(AngleDiff(keyframes[old].theta, keyframes[k].theta)) < kSameHeadingRad;
+    if (!chance) continue;
+    ++seen.chances;
+    seen.found += related[k] ? 1 : 0;
+  }
+  return seen;
+}
+
+// The places of one drive, every kPointEveryM of the true path. What was seen again is added to `seen_again`.
+std::vector<Place> DriveOnce(const ConsistencyDrive& drive, const MapperConsistencyOptions& options, std::uint64_t seed,
+                             SeenAgain& seen_again) {
   const sim::FleetOptions robot = RobotOf(seed);
   auto fleet = sim::Fleet::Create(drive.world, robot);
   if (!fleet) throw std::invalid_argument(fleet.error().message);
@@ -152,6 +208,11 @@ std::vector<Place> DriveOnce(const ConsistencyDrive& drive, const MapperConsiste
 
   std::vector<Place> places;
   const Trajectory& truth = fleet->truth(0);
+  const SeenAgain seen = SeenAgainIn(pipeline.mapper().Snapshot(), truth);
+  seen_again.chances += seen.chances;
+  seen_again.found += seen.found;
+  seen_again.relations += seen.relations;
+  seen_again.wrong += seen.wrong;
   double travelled_m = 0.0;
   for (std::size_t i = 1, used = 0; i < truth.size(); ++i) {
     travelled_m += (truth[i].T_map_robot.translation() - truth[i - 1].T_map_robot.translation()).norm();
@@ -205,21 +266,23 @@ std::vector<ConsistencyDrive> ConsistencyDrives(double seconds) {
   std::vector<ConsistencyDrive> drives;
   for (sim::World world : {Shipped("building"), Shipped("corridor"), Hall(), EqualRooms()})
     drives.push_back({std::move(world), seconds});
+  drives.push_back({Niches(), 3.0 * seconds});
   return drives;
 }
 
 MapperConsistency StudyMapperConsistency(const ConsistencyDrive& drive, const MapperConsistencyOptions& options,
                                          const std::function<void(int)>& after_run) {
+  MapperConsistency result;
   std::vector<std::vector<Place>> by_point;
   std::vector<Place> all;
   for (int run = 0; run < options.runs; ++run) {
-    const std::vector<Place> places = DriveOnce(drive, options, options.first_seed + static_cast<std::uint64_t>(run));
+    const std::vector<Place> places =
+        DriveOnce(drive, options, options.first_seed + static_cast<std::uint64_t>(run), result.seen_again);
     if (by_point.size() < places.size()) by_point.resize(places.size());
     for (std::size_t p = 0; p < places.size(); ++p) by_point[p].push_back(places[p]);
     all.insert(all.end(), places.begin(), places.end());
     if (after_run) after_run(run + 1);
   }
-  MapperConsistency result;
   for (const auto& places : by_point) result.points.push_back(Summarise(places));
   if (!all.empty()) result.whole = Summarise(all);
   const double numbers = 3.0 * options.runs;

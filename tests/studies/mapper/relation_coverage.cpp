@@ -1,0 +1,121 @@
+#include "tests/studies/mapper/relation_coverage.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "common/geometry/pose_difference.h"
+#include "server/slam/landmarks/innovation.h"
+#include "server/slam/smoothing/smoothed_map.h"
+#include "tests/studies/mapper/path_errors.h"
+
+namespace cairn::studies {
+namespace {
+
+constexpr int kSamples = 300;
+constexpr Stamp kSameScan = 50'000'000;  // A relation names the stamps of scans, rounded.
+
+// The element of `stamped` whose stamp is the nearest, if it is near enough. REQUIRES: in the order of the stamps.
+template <typename Stamped>
+const Stamped* AtStamp(const std::vector<Stamped>& stamped, Stamp stamp) {
+  const auto after =
+      std::ranges::lower_bound(stamped, stamp, std::ranges::less{}, [](const Stamped& one) { return one.stamp; });
+  const Stamped* nearest = nullptr;
+  const auto consider = [&](const Stamped& one) {
+    if (std::abs(one.stamp - stamp) > kSameScan) return;
+    if (nearest == nullptr || std::abs(one.stamp - stamp) < std::abs(nearest->stamp - stamp)) nearest = &one;
+  };
+  if (after != stamped.end()) consider(*after);
+  if (after != stamped.begin()) consider(*(after - 1));
+  return nearest;
+}
+
+class Coverage {
+ public:
+  explicit Coverage(const std::string& log) {
+    const RelationNoise noise = RelationNoiseOf(log);
+    noise_ = PoseCovariance(noise.sigma_m, noise.sigma_rad);
+  }
+  void Add(const Pose2& T_from_to, const Eigen::Matrix3d& covariance, const Pose2& T_from_to_true) {
+    const Eigen::Vector3d error = Minus(T_from_to, T_from_to_true);
+    nees_.push_back(error.dot((covariance + noise_).ldlt().solve(error)));
+  }
+  [[nodiscard]] RelationCoverage result() {
+    RelationCoverage result;
+    result.compared = nees_.size();
+    if (nees_.empty()) return result;
+    const double share = 1.0 / static_cast<double>(nees_.size()), inside = slam::ChiSquareQuantile(0.95, 3.0);
+    for (const double nees : nees_) {
+      result.nees += share * nees;
+      result.inside += nees <= inside ? share : 0.0;
+    }
+    std::ranges::sort(nees_);
+    result.nees_median = nees_[nees_.size() / 2];
+    return result;
+  }
+
+ private:
+  Eigen::Matrix3d noise_;
+  std::vector<double> nees_;
+};
+
+}  // namespace
+
+RelationNoise RelationNoiseOf(const std::string& log) {
+  // Mean distance (m) and mean angle (deg) between the relations and the alignments of their two scans.
+  struct Yardstick {
+    const char* log;
+    double mean_m;
+    double mean_deg;
+  };
+  constexpr Yardstick kYardsticks[] = {
+      {"intel", 0.013, 0.24}, {"mit-csail", 0.025, 0.33}, {"mit-killian", 0.031, 0.36}};
+  const auto* known = std::ranges::find_if(kYardsticks, [&](const Yardstick& one) { return log == one.log; });
+  const Yardstick& yardstick = known == std::end(kYardsticks) ? kYardsticks[2] : *known;
+  // The mean of a distance in the plane is sqrt(pi / 2) standard deviations of each axis, that of the size of an angle
+  // sqrt(2 / pi).
+  return {yardstick.mean_m / std::sqrt(kPi / 2.0), Radians(yardstick.mean_deg) / std::sqrt(2.0 / kPi)};
+}
+
+RelationCoverage CoverageOfSmoothed(const LogRun& run, const StudyLog& log) {
+  const slam::MapperSnapshot& snapshot = run.snapshot;
+  const std::vector<Pose2> path = slam::SmoothedPath(snapshot);
+  slam::Rng rng(1);
+  const auto errors = SamplePathErrors(path, snapshot.relations, kSamples, rng);
+  Coverage coverage(log.name);
+  using Place = slam::MapperSnapshot::ScanPlace;
+  const auto pose = [&](const Place& place) { return path[place.keyframe] * place.T_keyframe_robot; };
+  const auto errors_of = [&](const Place& place) -> PoseErrorSamples {
+    return J_compose_left(path[place.keyframe], place.T_keyframe_robot).cast<float>() * errors[place.keyframe];
+  };
+  for (const Relation& relation : log.relations) {
+    const Place *from = AtStamp(snapshot.scans, relation.from), *to = AtStamp(snapshot.scans, relation.to);
+    if (from == nullptr || to == nullptr) continue;
+    const Pose2 T_map_from = pose(*from), T_map_to = pose(*to);
+    coverage.Add(Between(T_map_from, T_map_to),
+                 RelativeCovariance(T_map_from, errors_of(*from), T_map_to, errors_of(*to)), relation.T_from_to);
+  }
+  return coverage.result();
+}
+
+RelationCoverage CoverageOfOnline(const LogRun& run, const StudyLog& log) {
+  Coverage coverage(log.name);
+  for (const Relation& relation : log.relations) {
+    const StampedPose *from = AtStamp(run.online, relation.from), *to = AtStamp(run.online, relation.to);
+    if (from == nullptr || to == nullptr) continue;
+    const Pose2 &T_map_from = from->T_map_robot, &T_map_to = to->T_map_robot, T_from_map = T_map_from.Inverse();
+    const Eigen::Matrix3d J_from = J_compose_left(T_from_map, T_map_to) * J_inverse(T_map_from);
+    const Eigen::Matrix3d J_to = J_compose_right(T_from_map, T_map_to);
+    const auto covariance = [&](const StampedPose* at) {
+      return run.covariances[static_cast<std::size_t>(at - run.online.data())];
+    };
+    coverage.Add(Between(T_map_from, T_map_to),
+                 J_from * covariance(from) * J_from.transpose() + J_to * covariance(to) * J_to.transpose(),
+                 relation.T_from_to);
+  }
+  return coverage.result();
+}
+
+}  // namespace cairn::studies
