@@ -11,6 +11,8 @@
 #include <optional>
 #include <string_view>
 
+#include "common/wire/rtps_submessage.h"
+
 namespace cairn::wire {
 namespace {
 
@@ -124,10 +126,9 @@ bool IsWholeProtection(std::uint8_t id, Bytes content) {
 }
 
 bool IsWholeIfSigned(Bytes datagram) {
-  constexpr std::size_t kFirst = 20;  // After the RTPS header.
   constexpr std::uint8_t kSignedPrefix = 0x33, kSignedPostfix = 0x34;
-  if (datagram.size() <= kFirst || datagram[kFirst] != kSignedPrefix) return true;
-  for (std::size_t at = kFirst; at + 4 <= datagram.size();) {
+  if (datagram.size() <= kRtpsHeaderBytes || datagram[kRtpsHeaderBytes] != kSignedPrefix) return true;
+  for (std::size_t at = kRtpsHeaderBytes; at + 4 <= datagram.size();) {
     if (datagram[at] == kSignedPostfix) return true;
     const bool little = (datagram[at + 1] & 1) != 0;
     const std::size_t length = datagram[at + (little ? 2 : 3)] + std::size_t{256} * datagram[at + (little ? 3 : 2)];

@@ -23,10 +23,10 @@ namespace cairn::wire {
 // SRTPS_POSTFIX. True for every other `id`.
 [[nodiscard]] bool IsWholeProtection(std::uint8_t id, std::span<const std::uint8_t> content);
 
-// A datagram that is signed as a whole begins with SRTPS_PREFIX. Its submessages must be whole as the library counts
-// them, which knows none that ends with the datagram, up to an SRTPS_POSTFIX. The library adds up their lengths,
-// stays where it is at one that leads beyond the end, and computes the signature over the sum. True for every other
-// datagram. REQUIRES: at least an RTPS header.
+// A datagram that begins with SRTPS_PREFIX is signed as a whole. Fast DDS steps from submessage to submessage by their
+// lengths until it finds SRTPS_POSTFIX, and takes a length of 0 literally. If a length leads beyond the end, it does
+// not move but still adds the length, and reads beyond the datagram. So every step must stay inside, up to an
+// SRTPS_POSTFIX. True for every other datagram.
 [[nodiscard]] bool IsWholeIfSigned(std::span<const std::uint8_t> datagram);
 
 // The beginning of a sample of `size` bytes. If it is encrypted, the ciphertext must lie within the sample.

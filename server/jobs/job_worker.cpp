@@ -59,9 +59,19 @@ void JobWorker::Run() {
   while (const auto ticket = queue_.Pop()) {
     try {
       RunOne(*ticket);
-    } catch (const std::exception& error) {  // Of the list of jobs; those of the work itself end only the job.
+    } catch (const std::exception& error) {  // Thrown by the list of jobs; what the work throws is caught in Work.
       spdlog::error("job {}: its state could not be changed because of an exception: {}", ticket->id, error.what());
+      GiveUp(ticket->id);
     }
+  }
+}
+
+// Otherwise it would be called running for ever, and others of its site would wait for it.
+void JobWorker::GiveUp(std::uint64_t job) {
+  try {
+    list_.Fail(job, {StatusCode::kInternal, "an exception; see the server's log"});
+  } catch (const std::exception& error) {
+    spdlog::error("job {}: it could not be given up either: {}", job, error.what());
   }
 }
 

@@ -38,6 +38,7 @@ class JobWorker {
   };
   void Run();  // Until the queue is closed and empty.
   void RunOne(const Ticket& ticket);
+  void GiveUp(std::uint64_t job);
   Result<JobOutcome> Work(const Job& job, bool enable, const JobControl& control) const;
 
   const JobsOptions options_;

@@ -51,7 +51,8 @@ std::optional<std::vector<slam::SmoothedSession>> SmoothTogether(const std::vect
                               kind == JobKind::kJoin ? slam::SiteSearch::kFragments : slam::SiteSearch::kAll);
 }
 
-// For each session, whether it is shown: its place in the map is known, or it is joined with one whose place is known.
+// For each session, whether it is shown: its place in the map is known, or it is joined with one whose place is known
+// and can continue there.
 std::vector<bool> Shown(const std::vector<SessionMaterial>& material, const std::vector<slam::SmoothedSession>& joint) {
   const auto frame_of = [&joint](std::size_t i) { return joint[i].joined ? joint[i].frame : i; };
   std::set<std::size_t> frames;
@@ -59,13 +60,14 @@ std::vector<bool> Shown(const std::vector<SessionMaterial>& material, const std:
     if (material[i].start_known) frames.insert(frame_of(i));
   }
   std::vector<bool> shown(material.size());
-  for (std::size_t i = 0; i < material.size(); ++i) shown[i] = frames.contains(frame_of(i));
+  for (std::size_t i = 0; i < material.size(); ++i)
+    shown[i] = frames.contains(frame_of(i)) && (material[i].start_known || material[i].joinable);
   return shown;
 }
 
 bool JoinsAny(const std::vector<SessionMaterial>& material, const std::vector<bool>& shown) {
   for (std::size_t i = 0; i < material.size(); ++i) {
-    if (shown[i] && !material[i].start_known) return true;
+    if (shown[i] && !material[i].start_known && material[i].joinable) return true;
   }
   return false;
 }
@@ -88,7 +90,8 @@ std::string Joins(const std::vector<SessionMaterial>& material, const std::vecto
     if (joint[i].joined) {
       if (++joined > kMostNamed) continue;
       together += (together.empty() ? "" : ", ") + material[i].robot + " (" + std::to_string(joint[i].relations) +
-                  " relations, " + std::to_string(std::lround(100.0 * joint[i].agreement)) + " % agrees)";
+                  " relations, " + std::to_string(std::lround(100.0 * joint[i].agreement)) + " % agrees" +
+                  (material[i].start_known || material[i].joinable ? ")" : "; its filter cannot continue there)");
     } else if (++alone <= kMostNamed) {
       apart += (apart.empty() ? "" : ", ") + material[i].robot;
     }
@@ -127,7 +130,8 @@ Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMateria
   // The rest of the progress is the share of scans drawn and compared.
   const double begun = together ? kShareOfJoining : 0.0;
   std::size_t steps = 0, done = 0;
-  for (const SessionMaterial& session : material) steps += slam::SmoothingSteps(session.snapshot);
+  for (std::size_t i = 0; i < material.size(); ++i)
+    steps += slam::SmoothingSteps(material[i].snapshot, joint[i].joined);
   const auto next = [&] {
     control.Progress(begun + (1.0 - begun) * static_cast<double>(done++) / static_cast<double>(steps));
     return !control.cancelled();

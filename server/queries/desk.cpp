@@ -84,7 +84,8 @@ void Desk::Serve(OpenRequest&& open) {
       outbound_.Send(
           ReplyTo(open.request, {StatusCode::kInternal, "internal error of the server; see its log for the cause"}));
     } catch (const std::exception& unsent) {  // The client asks again.
-      spdlog::error("and that could not be answered: {}", unsent.what());
+      spdlog::error("the failure of a request of kind {} could not be answered because of an exception: {}",
+                    RequestKindName(open.request.kind), unsent.what());
     }
   }
 }

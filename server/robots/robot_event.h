@@ -27,6 +27,7 @@ struct SessionMaterial {
   // Whether the place of its start in the map is known: somebody has said where it is, the session began the map, or a
   // map version has joined it (maps/robot_grid.h).
   bool start_known = true;
+  bool joinable = true;  // See SessionRecord::Joining.
 };
 
 struct SnapshotWanted {

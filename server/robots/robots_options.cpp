@@ -6,8 +6,8 @@ void Visit(OptionVisitor& visitor, RobotsOptions& options) {
   visitor.Integer(
       "max_robots", options.max_robots, "", 1, 4096,
       ForOperators("Robots that may be served at one time. When there are more, the session that ended first "
-                   "is forgotten, then the one whose robot has been away for longest; then further robots "
-                   "are refused. Each one takes the memory of an estimator."));
+                   "is forgotten, then the one whose robot has been away for longest (at least for place_kept_s); "
+                   "then further robots are refused. Each one takes the memory of an estimator."));
   visitor.Integer("queue_scans", options.queue_scans, "scans", 4, 4096,
                   "Scans of a robot that may wait. When the queue is full, the oldest scan is dropped. A "
                   "longer queue survives longer interruptions, and poses come later after one.");

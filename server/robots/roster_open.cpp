@@ -200,7 +200,8 @@ Result<std::shared_ptr<Session>> Roster::GivesWay(NameId robot_id) const {
     const bool is_ended = record.phase() == SessionPhase::kEnded;
     if (is_ended && (ended == nullptr || session->id() < ended->id())) ended = session;
     const auto away = record.SuspendedFor(now);
-    if (away >= kept && away > (suspended == nullptr ? away.zero() : suspended->record().SuspendedFor(now)))
+    if (record.AwayFor(now) >= kept &&
+        away > (suspended == nullptr ? away.zero() : suspended->record().SuspendedFor(now)))
       suspended = session;
   }
   if (ended != nullptr) return ended;

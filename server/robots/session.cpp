@@ -212,7 +212,8 @@ void Session::Tick() {
     AnnounceState();
   }
   TickEnded(now);
-  if (lost_ && !ending_) Schedule();  // The disk may work again, while nothing arrives from the robot.
+  // The disk may work again, while nothing arrives from the robot. Or memory was short when an event came.
+  if ((lost_ && !ending_) || !queue_.empty()) Schedule();
   if (record_.LookForSilence(now)) state_unsent_ = true;
   if (state_unsent_) AnnounceState();
   PublishLedgers(SessionRecord::Urgency::kWhenDue);
@@ -254,7 +255,7 @@ void Session::Schedule() {
   if (scheduled_.exchange(true)) return;
   try {
     asio::post(strand_, [self = shared_from_this()] { self->Drain(); });
-  } catch (...) {  // The next event tries it again.
+  } catch (...) {  // The next event tries it again, or housekeeping.
     scheduled_ = false;
     throw;
   }
@@ -278,7 +279,7 @@ void Session::Drain() {
   Throws([&] { PublishLedgers(drained ? SessionRecord::Urgency::kDrained : SessionRecord::Urgency::kWhenDue); });
   scheduled_ = false;
   // An event that came between the last Pop and the line above found `scheduled_` set and relies on this turn.
-  if (!queue_.empty()) Schedule();
+  if (!queue_.empty()) Throws([this] { Schedule(); });
 }
 
 void Session::TakeCheckpoint() {

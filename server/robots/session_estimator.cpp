@@ -249,10 +249,9 @@ bool SessionEstimator::AdoptGrid(std::uint32_t epoch, const RobotGrid& grid) {
   const auto numbers = grid.numbers != nullptr ? std::span(*grid.numbers) : std::span<const std::uint64_t>();
   const std::vector<Pose2> before = mapper.BestPath();
   // A session that was not stored to its end may not be able to follow: then its place in this map is not known.
-  // The map of a fragment is in a frame of its own: if its path cannot follow, its place in this map is not known
-  // either.
+  // The map of a fragment is in a frame of its own: a grid in another frame does not fit a path that cannot follow.
   const bool adopted = mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), grid.chunks), grid.keyframes, path,
-                                        numbers, fragment_ && !grid.fragment);
+                                        numbers, fragment_);
   const bool fragment = grid.fragment || !adopted;
   if (fragment && (!fragment_ || !adopted)) driven_m_ = 0.0;  // So that no job joins it again at once.
   fragment_ = fragment;
@@ -289,7 +288,8 @@ void SessionEstimator::On(SnapshotWanted&& wanted) {
                .robot = identity_.status.session.robot,
                .snapshot = pipeline_.mapper().Snapshot(),
                .grid_options = pipeline_.mapper().grid().options(),
-               .start_known = !fragment_});
+               .start_known = !fragment_,
+               .joinable = pipeline_.mapper().follows_paths()});
 }
 
 void SessionEstimator::On(RelocaliseWanted&& wanted) {

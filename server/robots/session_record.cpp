@@ -347,6 +347,12 @@ SessionRecord::Clock::duration SessionRecord::SuspendedFor(Clock::time_point now
   return status_.session.phase == SessionPhase::kSuspended ? now - suspended_ : Clock::duration::zero();
 }
 
+SessionRecord::Clock::duration SessionRecord::AwayFor(Clock::time_point now) const {
+  const MutexLock lock(mutex_);
+  if (status_.session.phase != SessionPhase::kSuspended) return Clock::duration::zero();
+  return restored_ ? std::min(now - suspended_, now - *restored_) : now - suspended_;
+}
+
 bool SessionRecord::HasHadTime(Clock::time_point now) const {
   const MutexLock lock(mutex_);
   return !restored_ || now - *restored_ >= std::chrono::hours(1);

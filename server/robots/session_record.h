@@ -80,6 +80,8 @@ class SessionRecord {
   // Called after the record was read from the disk, while the robot is not connected yet. `quiet_since_ms`: what
   // quiet_since_ms said last; 0: not known.
   void Restored(std::uint64_t quiet_since_ms = 0);
+  // For how long its robot could have come back and has not: since it is suspended, or since the server was started.
+  [[nodiscard]] Clock::duration AwayFor(Clock::time_point now) const;
   // Whether its robot has had an hour to come back since the server was started. Clocks may be wrong.
   [[nodiscard]] bool HasHadTime(Clock::time_point now) const;
   // Since when the robot is away or the session has ended, in milliseconds since 1970; 0: neither.

@@ -121,8 +121,8 @@ class Journal {
   // meanwhile waits. `work` is destroyed without a call if the journal stops before.
   using Work = std::function<void(Store&)>;
   void Between(Work work);
-  // Whether at most half of the queue's room is taken. A work that may take long should end when it is not: where the
-  // queue overflows, sessions are no longer stored.
+  // Whether at most half of the queue's room is taken. A work that may take long should end when this is false: where
+  // the queue overflows, sessions are no longer stored.
   [[nodiscard]] bool HasTimeToSpare() const;
   // Calls `told` on the journal's thread when everything that was handed over before is on the disk, and sees to it
   // that this is soon; also where that fails, because a disk that fails may do so for long. `told` is destroyed without

@@ -256,12 +256,13 @@ Result<std::optional<Record>> SiteFileReader::Next() {
   return record;
 }
 
-Result<SiteFileSummary> SurveySiteFile(const std::filesystem::path& path) {
+Result<SiteFileSummary> SurveySiteFile(const std::filesystem::path& path, const MayGoOn& may_go_on) {
   auto reader = SiteFileReader::Open(path);
   if (!reader) return tl::unexpected(reader.error());
   const auto named = [&path](const Status& status) { return Fail(status.code, path.string() + ": " + status.message); };
   Survey survey;
   for (;;) {
+    if (may_go_on && !may_go_on()) return TakesTooLong("to read " + path.string());
     const auto record = reader->Next();
     if (!record) return tl::unexpected(record.error());
     if (!*record) break;

@@ -69,17 +69,17 @@ struct SiteFileSummary {
   std::uint64_t entries = 0;  // Number of entries in all journals.
 };
 
-// Reads the whole file and every record in it. Errors as of SiteFileReader, with the path and what is wrong.
-[[nodiscard]] Result<SiteFileSummary> SurveySiteFile(const std::filesystem::path& path);
-
 // Asked before each record. If it returns false, the work ends with RESOURCE_EXHAUSTED, and nothing has changed.
 using MayGoOn = std::function<bool()>;
+
+// Reads the whole file and every record in it. Errors as of SiteFileReader, with the path and what is wrong.
+[[nodiscard]] Result<SiteFileSummary> SurveySiteFile(const std::filesystem::path& path, const MayGoOn& may_go_on = {});
 
 // Writes all records of the site. The store must not change meanwhile. NOT_FOUND: no such site. Errors of the disk,
 // after which the path holds what it held before.
 [[nodiscard]] Result<SiteFileSummary> WriteSiteFile(Store& store, const std::string& site,
                                                     const std::filesystem::path& path, const MayGoOn& may_go_on = {});
-// The error of such a work.
+// The error when MayGoOn has returned false; `what` names the task.
 [[nodiscard]] tl::unexpected<Status> TakesTooLong(const std::string& what);
 
 }  // namespace cairn::server

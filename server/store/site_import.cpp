@@ -240,7 +240,7 @@ SiteFileSummary Renamed(SiteFileSummary&& file, const Renaming& renaming) {
 }  // namespace
 
 Result<SiteFileSummary> ImportSite(Store& store, const std::filesystem::path& path, const ImportOptions& options) {
-  auto file = SurveySiteFile(path);
+  auto file = SurveySiteFile(path, options.may_go_on);
   if (!file) return file;
   if (auto named = CheckNames(*file, options); !named) return tl::unexpected(named.error());
   const auto sessions = ReadSessions(store);

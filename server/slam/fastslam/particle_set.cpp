@@ -69,7 +69,9 @@ bool ParticleSet::Observe(const RevisitObservation& revisit) {
   for (std::size_t i = 0; i < particles_.size(); ++i)
     mixture.Add(before[i], innovations[i].v, innovations[i].S(particles_[i].covariance));
   AddInnovation(mixture);
-  Constrain<3>(revisit.keyframe, innovations[best_]);
+  Innovation<3> alike = innovations[best_];
+  alike.S_known_pose *= static_cast<double>(1 + revisit.alike);
+  Constrain<3>(revisit.keyframe, alike);
   for (std::size_t i = 0; i < particles_.size(); ++i) Fuse<3>(i, innovations[i]);
   sample_due_ = true;
   return true;

@@ -14,7 +14,8 @@ constexpr double kGuessSigmaM = 0.5;         // Standard deviation of the positi
 constexpr double kGuessSigmaRad = 0.15;      // Standard deviation of its heading.
 constexpr double kMinRevisitScore = 0.6;     // Share of the points of the scan that must be explained.
 constexpr double kRevisitSigmaRad = 0.02;    // Standard deviation that is added to the heading of a match.
-constexpr double kOpenSigmaM = 5.0;  // Standard deviation where the scan shows nothing: the match is no farther.
+constexpr double kAlikeM = 2.0;              // Way on which matches have the same errors.
+constexpr double kOpenSigmaM = 100.0;        // Standard deviation of a position that the scan does not show at all.
 
 // The old keyframe that most likely shows the same surroundings: near, and with a similar heading.
 std::optional<std::size_t> NearestKeyframe(const Pose2& T_map_robot, const PathIndex& index, const Trail& trail,
@@ -87,7 +88,7 @@ std::optional<RevisitObservation> RevisitSearch::Find(std::span<const SurfacePoi
   // Neighbouring matches have similar errors.
   Eigen::Matrix3d covariance = match.covariance + PoseCovariance(options_.sigma_m, kRevisitSigmaRad);
   if (match.degenerate) covariance.topLeftCorner<2, 2>() += UnseenAlong(match);
-  return RevisitObservation{*centre, match.T_ref_curr, covariance};
+  return RevisitObservation{*centre, match.T_ref_curr, covariance, trail.RevisitsWithin(kAlikeM, travelled_m)};
 }
 
 // Aligns with other hypotheses of the filter, and returns the result that explains most.

@@ -1,6 +1,7 @@
 // Recognises places seen before: selects the old keyframe nearest to the believed pose and aligns the scan
 // with the surfaces seen around that keyframe. It searches only near the given guesses and is not a global
-// search. The result, the pose of the robot relative to the keyframe, does not depend on any particle. Not
+// search. The result, the pose of the robot relative to the keyframe, does not depend on any particle, except along a
+// corridor: there it stays where the guess was, and its covariance says so. Not
 // thread-safe (scratch memory).
 // Source: loop detection by scan alignment as in Gutmann and Konolige 1999 (local registration, global
 // correlation).

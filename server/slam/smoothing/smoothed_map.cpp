@@ -25,9 +25,9 @@ std::optional<Drawing> DrawAlong(const std::vector<Pose2>& path, const MapperSna
   return drawing;
 }
 
-// Of each keyframe, how far its scan disagrees with the map that was drawn from the others: keyframes with odd numbers
-// are compared with those with even numbers, and the other way round. A scan agrees well with a map that it is part of,
-// however wrong its pose is.
+// Of each keyframe, how far its scan disagrees with a map in which it was not drawn: keyframes with odd numbers are
+// compared with the map of those with even numbers, and the other way round. A scan agrees well with a map that it is
+// part of, however wrong its pose is.
 std::optional<std::vector<double>> DisagreementWithOthers(const std::vector<Pose2>& path,
                                                           const MapperSnapshot& snapshot, const GridOptions& options,
                                                           const std::function<bool()>& next) {
@@ -49,18 +49,26 @@ std::optional<std::vector<double>> DisagreementWithOthers(const std::vector<Pose
   return each_m2;
 }
 
-// Whether the values of `a` are smaller than those of `b`, by more than chance explains (a paired t-test).
+// Whether the values of `a` are smaller than those of `b`, by more than chance explains: a t-test of the differences.
+// Neighbouring scans share their errors, so a block of them counts as one value.
 bool IsClearlySmaller(const std::vector<double>& a, const std::vector<double>& b) {
-  constexpr double kClearly = 2.0;  // Standard errors of the mean difference: one in fifty is as large by chance.
-  if (a.size() < 2) return false;
-  const auto count = static_cast<double>(a.size());
+  constexpr std::size_t kBlock = 5, kLeastBlocks = 4;
+  constexpr double kClearly =
+      3.0;  // Standard errors of the mean; with four blocks chance exceeds this in 3 % of cases.
+  const std::size_t blocks = a.size() / kBlock;
+  if (blocks < kLeastBlocks) return false;
+  const auto count = static_cast<double>(blocks);
+  std::vector<double> better(blocks, 0.0);
   double mean = 0.0, squares = 0.0;
-  for (std::size_t i = 0; i < a.size(); ++i) mean += (b[i] - a[i]) / count;
-  for (std::size_t i = 0; i < a.size(); ++i) squares += (b[i] - a[i] - mean) * (b[i] - a[i] - mean);
+  for (std::size_t block = 0; block < blocks; ++block) {
+    for (std::size_t i = block * kBlock; i < (block + 1) * kBlock; ++i) better[block] += (b[i] - a[i]) / kBlock;
+    mean += better[block] / count;
+  }
+  for (const double one : better) squares += (one - mean) * (one - mean);
   return mean > kClearly * std::sqrt(squares / (count * (count - 1.0)));
 }
 
-// Nothing was seen twice, so there is nothing to fit.
+// True if there are no relations to fit, although the fit is wanted. Then the scans choose between two paths.
 bool IsChosenByScans(const MapperSnapshot& snapshot) {
   return snapshot.pose_graph.enabled && snapshot.relations.empty();
 }
@@ -99,8 +107,8 @@ std::optional<SmoothedMap> MapAlong(const MapperSnapshot& snapshot, std::vector<
   return SmoothedMap{std::move(path), std::move(smoothed->grid), online->disagreement, smoothed->disagreement};
 }
 
-std::size_t SmoothingSteps(const MapperSnapshot& snapshot) {
-  const std::size_t per_keyframe = IsChosenByScans(snapshot) ? 8 : 4;
+std::size_t SmoothingSteps(const MapperSnapshot& snapshot, bool fitted_elsewhere) {
+  const std::size_t per_keyframe = IsChosenByScans(snapshot) && !fitted_elsewhere ? 8 : 4;
   return per_keyframe * snapshot.keyframes.size();
 }
 

@@ -38,8 +38,8 @@ struct SmoothedMap {
 [[nodiscard]] std::optional<SmoothedMap> MapAlong(const MapperSnapshot& snapshot, std::vector<Pose2> path,
                                                   const GridOptions& options, const std::function<bool()>& next);
 
-// How often SmoothMap calls `next` at most.
-[[nodiscard]] std::size_t SmoothingSteps(const MapperSnapshot& snapshot);
+// How often SmoothMap calls `next` at most; MapAlong, if the path was `fitted_elsewhere`.
+[[nodiscard]] std::size_t SmoothingSteps(const MapperSnapshot& snapshot, bool fitted_elsewhere = false);
 
 // `next` is called before each step, and `go_on` between the iterations of the optimisation. If either
 // returns false, the work ends and there is no result.

@@ -57,6 +57,9 @@ struct RevisitObservation {
   std::size_t keyframe = 0;
   Pose2 T_keyframe_robot;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
+  // How many revisits there were on the last metres before. They were matched with the same surfaces, so their errors
+  // are those of this one, and together they say hardly more than one of them.
+  std::size_t alike = 0;
 };
 
 // The state of a mapper at one moment as jobs use it, shared without locks: the keyframes, the path of the

@@ -82,6 +82,13 @@ void Trail::RestoreRest() {
   distances_current_ = empty();
 }
 
+std::size_t Trail::RevisitsWithin(double way_m, double travelled_m) const {
+  std::size_t revisits = 0;
+  for (std::size_t k = size(); k-- > 0 && travelled_m - shapes_[k].travelled_m < way_m;)
+    revisits += std::ranges::any_of(loops_[k], [k](const Loop& loop) { return loop.other < k; }) ? 1 : 0;
+  return revisits;
+}
+
 void Trail::AddScan(Stamp stamp, const Pose2& T_keyframe_robot) {
   scans_.push_back({stamp, size() - 1, T_keyframe_robot});
 }

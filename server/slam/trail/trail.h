@@ -68,6 +68,9 @@ class Trail {
   // the keyframes below a node of a path (shared_sequence.h) it takes no longer than for one.
   [[nodiscard]] bool AllWithin(std::size_t begin, std::size_t end, double way_m) const;
   [[nodiscard]] const std::vector<MapperSnapshot::ScanPlace>& scans() const { return scans_; }
+  // How many of the keyframes on the last `way_m` metres, before the robot has travelled `travelled_m`, have seen an
+  // older one again.
+  [[nodiscard]] std::size_t RevisitsWithin(double way_m, double travelled_m) const;
   // Steps, revisits and loops; empty as long as no place was seen again.
   [[nodiscard]] std::vector<PoseRelation> relations() const;
   // How many keyframes there have been, with those that were retired.

@@ -108,7 +108,11 @@ TEST(SecureDatagram, ProtectedPartsHoldTheirLengths) {
   EXPECT_EQ(part(0x30, 0, 0xfffffff5, 64), DatagramFault::kSecurity);
   EXPECT_EQ(part(0x31, 16, 0, 0), DatagramFault::kNone);
   EXPECT_EQ(part(0x31, 12, 0, 0), DatagramFault::kSecurity);
-  EXPECT_EQ(part(0x33, 12, 0, 0), DatagramFault::kSecurity);
+  for (const bool whole : {true, false}) {
+    Datagram datagram;
+    datagram.Begin(0x33, 0).Zeros(whole ? 20 : 16).End().Begin(0x34, 0).Zeros(20).End();
+    EXPECT_EQ(datagram.Inspect(), whole ? DatagramFault::kNone : DatagramFault::kSecurity);
+  }
   for (const std::uint8_t id : {0x32, 0x34}) {
     EXPECT_EQ(part(id, 16, 2, 40), DatagramFault::kNone);
     EXPECT_EQ(part(id, 16, 3, 40), DatagramFault::kSecurity);

@@ -160,13 +160,20 @@ TEST(ImportSite, AWorkThatMayNotGoOnChangesNothing) {
   const auto store = MemoryStore();
   ImportOptions options;
   int asked = 0;
-  options.may_go_on = [&asked] { return ++asked < 4; };
-  EXPECT_EQ(ImportSite(*store, path, options).error().code, StatusCode::kResourceExhausted);
-  EXPECT_TRUE(Everything(*store).empty());
+  int goes_on = 0;
+  options.may_go_on = [&] { return ++asked <= goes_on; };
+  const auto records = static_cast<int>(SurveySiteFile(path)->records);
+  for (const int most : {0, 3, records + 4}) {  // While the file is looked through, and while it is taken in.
+    asked = 0;
+    goes_on = most;
+    EXPECT_EQ(ImportSite(*store, path, options).error().code, StatusCode::kResourceExhausted) << most;
+    EXPECT_TRUE(Everything(*store).empty());
+  }
 
   ASSERT_TRUE(ImportSite(*store, path));
   const auto other = directory / "other.site";
   asked = 0;
+  goes_on = 3;
   const auto written = WriteSiteFile(*store, "lab", other, options.may_go_on);
   ASSERT_FALSE(written);
   EXPECT_EQ(written.error().code, StatusCode::kResourceExhausted);

@@ -44,13 +44,16 @@ void CompareRelations(StudyContext& context) {
     slam::MapperOptions mapper;
     mapper.seed = static_cast<std::int64_t>(context.seed);
     const LogRun run = RunOverLog(*log, mapper);
+    const RelationNoise noise = RelationNoiseOf(*log);
+    report.Text(std::string(name) + ": the relations themselves are taken as exact to " +
+                Number(1e3 * noise.sigma_m, 1) + " mm and " + Number(Degrees(noise.sigma_rad), 2) + " degrees.");
     const auto add = [&](const std::string& poses, const RelationCoverage& coverage, const Trajectory& trajectory) {
       table.Add({name, poses, Count(static_cast<int>(coverage.compared)), Percent(coverage.inside),
                  Number(coverage.nees, 2), Number(coverage.nees_median, 2),
                  Number(ErrorOf(trajectory, log->relations).trans_mean_m, 4)});
     };
-    add("online, each by itself", CoverageOfOnline(run, *log), run.online);
-    add("smoothed, together", CoverageOfSmoothed(run, *log),
+    add("online, each by itself", CoverageOfOnline(run, *log, noise), run.online);
+    add("smoothed, together", CoverageOfSmoothed(run, *log, noise),
         run.snapshot.TrajectoryAlong(slam::SmoothedPath(run.snapshot)));
   }
   report.Text(
@@ -77,7 +80,10 @@ void RunConsistency(StudyContext& context) {
   Plot inside{
       .title = "Single poses inside the 95 % region", .x = way, .y = {"share of the runs", "", false, 0.0, 1.0}};
   inside.bounds = {{0.95, "consistent"}};
-  for (const ConsistencyDrive& drive : ConsistencyDrives(context.Pick(90.0, 40.0))) {
+  const double seconds = context.Pick(90.0, 40.0);
+  std::vector<ConsistencyDrive> drives = ConsistencyDrives(seconds);
+  drives.push_back(NichesDrive(3.0 * seconds));
+  for (const ConsistencyDrive& drive : drives) {
     const std::string& name = drive.world.name;
     if (!context.Wants(name)) continue;
     MapperConsistencyOptions options;
@@ -102,7 +108,8 @@ void RunConsistency(StudyContext& context) {
     nees.bounds = {{result.nees_low, "95 %"}, {result.nees_high, "95 %"}};
     inside.series.push_back(SeriesOf(result, name, &MapperConsistencyPoint::inside));
     if (result.seen_again.wrong > 0)
-      report.Warn(Count(static_cast<long long>(result.seen_again.wrong)) + " wrong relations to old places in " + name);
+      report.Fault(Count(static_cast<long long>(result.seen_again.wrong)) + " wrong relations to old places in " +
+                   name);
     if (VerdictOf(result) != "consistent") report.Warn("the mapper is " + VerdictOf(result) + " in " + name + ".");
   }
   report.Add(table, "mapper consistency");

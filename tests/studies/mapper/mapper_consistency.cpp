@@ -266,8 +266,11 @@ std::vector<ConsistencyDrive> ConsistencyDrives(double seconds) {
   std::vector<ConsistencyDrive> drives;
   for (sim::World world : {Shipped("building"), Shipped("corridor"), Hall(), EqualRooms()})
     drives.push_back({std::move(world), seconds});
-  drives.push_back({Niches(), 3.0 * seconds});
   return drives;
+}
+
+ConsistencyDrive NichesDrive(double seconds) {
+  return {Niches(), seconds};
 }
 
 MapperConsistency StudyMapperConsistency(const ConsistencyDrive& drive, const MapperConsistencyOptions& options,

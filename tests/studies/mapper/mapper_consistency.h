@@ -26,6 +26,9 @@ struct ConsistencyDrive {
 // twice round a ring of equal corridors, which takes three times as long.
 [[nodiscard]] std::vector<ConsistencyDrive> ConsistencyDrives(double seconds);
 
+// A ring of corridors with equal niches, in which every place is seen again and looks like many others.
+[[nodiscard]] ConsistencyDrive NichesDrive(double seconds);
+
 struct MapperConsistencyOptions {
   int runs = 100;
   std::uint64_t first_seed = 1;

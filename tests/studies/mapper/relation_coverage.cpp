@@ -8,6 +8,8 @@
 
 #include "common/geometry/pose_difference.h"
 #include "server/slam/landmarks/innovation.h"
+#include "server/slam/matching/point_to_line.h"
+#include "server/slam/scan/surface_points.h"
 #include "server/slam/smoothing/smoothed_map.h"
 #include "tests/studies/mapper/path_errors.h"
 
@@ -34,10 +36,7 @@ const Stamped* AtStamp(const std::vector<Stamped>& stamped, Stamp stamp) {
 
 class Coverage {
  public:
-  explicit Coverage(const std::string& log) {
-    const RelationNoise noise = RelationNoiseOf(log);
-    noise_ = PoseCovariance(noise.sigma_m, noise.sigma_rad);
-  }
+  explicit Coverage(const RelationNoise& noise) : noise_(PoseCovariance(noise.sigma_m, noise.sigma_rad)) {}
   void Add(const Pose2& T_from_to, const Eigen::Matrix3d& covariance, const Pose2& T_from_to_true) {
     const Eigen::Vector3d error = Minus(T_from_to, T_from_to_true);
     nees_.push_back(error.dot((covariance + noise_).ldlt().solve(error)));
@@ -63,28 +62,40 @@ class Coverage {
 
 }  // namespace
 
-RelationNoise RelationNoiseOf(const std::string& log) {
-  // Mean distance (m) and mean angle (deg) between the relations and the alignments of their two scans.
-  struct Yardstick {
-    const char* log;
-    double mean_m;
-    double mean_deg;
+RelationNoise RelationNoiseOf(const StudyLog& log) {
+  struct StampedScan {
+    Stamp stamp;
+    const Scan* scan;
   };
-  constexpr Yardstick kYardsticks[] = {
-      {"intel", 0.013, 0.24}, {"mit-csail", 0.025, 0.33}, {"mit-killian", 0.031, 0.36}};
-  const auto* known = std::ranges::find_if(kYardsticks, [&](const Yardstick& one) { return log == one.log; });
-  const Yardstick& yardstick = known == std::end(kYardsticks) ? kYardsticks[2] : *known;
+  std::vector<StampedScan> scans;
+  for (const LogRecord& record : log.records)
+    if (const auto* const scan = std::get_if<Scan>(&record)) scans.push_back({scan->stamp, scan});
+  double metres = 0.0, radians = 0.0, compared = 0.0;
+  for (const Relation& relation : log.relations) {
+    const StampedScan *from = AtStamp(scans, relation.from), *to = AtStamp(scans, relation.to);
+    if (from == nullptr || to == nullptr) continue;
+    const auto points = [](const Scan& scan) { return slam::SurfacePointsOf(slam::PointsOf(scan), scan, {}); };
+    const slam::PointIndex reference(points(*from->scan));
+    const slam::MatchResult match = slam::AlignPointsToSurfaces(
+        points(*to->scan), reference, {relation.T_from_to, relation.T_from_to, PoseCovariance(0.5, 0.15)}, {});
+    if (!match.converged || match.degenerate) continue;
+    const Eigen::Vector3d apart = Minus(match.T_ref_curr, relation.T_from_to);
+    metres += apart.head<2>().norm();
+    radians += std::abs(apart.z());
+    compared += 1.0;
+  }
+  if (compared == 0.0) return {};
   // The mean of a distance in the plane is sqrt(pi / 2) standard deviations of each axis, that of the size of an angle
   // sqrt(2 / pi).
-  return {yardstick.mean_m / std::sqrt(kPi / 2.0), Radians(yardstick.mean_deg) / std::sqrt(2.0 / kPi)};
+  return {metres / compared / std::sqrt(kPi / 2.0), radians / compared / std::sqrt(2.0 / kPi)};
 }
 
-RelationCoverage CoverageOfSmoothed(const LogRun& run, const StudyLog& log) {
+RelationCoverage CoverageOfSmoothed(const LogRun& run, const StudyLog& log, const RelationNoise& noise) {
   const slam::MapperSnapshot& snapshot = run.snapshot;
   const std::vector<Pose2> path = slam::SmoothedPath(snapshot);
   slam::Rng rng(1);
   const auto errors = SamplePathErrors(path, snapshot.relations, kSamples, rng);
-  Coverage coverage(log.name);
+  Coverage coverage(noise);
   using Place = slam::MapperSnapshot::ScanPlace;
   const auto pose = [&](const Place& place) { return path[place.keyframe] * place.T_keyframe_robot; };
   const auto errors_of = [&](const Place& place) -> PoseErrorSamples {
@@ -100,8 +111,8 @@ RelationCoverage CoverageOfSmoothed(const LogRun& run, const StudyLog& log) {
   return coverage.result();
 }
 
-RelationCoverage CoverageOfOnline(const LogRun& run, const StudyLog& log) {
-  Coverage coverage(log.name);
+RelationCoverage CoverageOfOnline(const LogRun& run, const StudyLog& log, const RelationNoise& noise) {
+  Coverage coverage(noise);
   for (const Relation& relation : log.relations) {
     const StampedPose *from = AtStamp(run.online, relation.from), *to = AtStamp(run.online, relation.to);
     if (from == nullptr || to == nullptr) continue;

@@ -18,9 +18,9 @@ struct RelationNoise {
   double sigma_m = 0.0;
   double sigma_rad = 0.0;
 };
-// How far scans that are aligned by themselves disagree with the relations of this log. Logs that are not known get
-// the largest of the known ones.
-[[nodiscard]] RelationNoise RelationNoiseOf(const std::string& log);
+// How far the relations of a log disagree with the alignment of their two scans. That includes the error of the
+// alignment, so it is an upper bound, and the shares inside are a little too large.
+[[nodiscard]] RelationNoise RelationNoiseOf(const StudyLog& log);
 
 struct RelationCoverage {
   std::size_t compared = 0;
@@ -29,7 +29,7 @@ struct RelationCoverage {
   double nees_median = 0.0;  // 2.37 is right.
 };
 
-[[nodiscard]] RelationCoverage CoverageOfSmoothed(const LogRun& run, const StudyLog& log);
-[[nodiscard]] RelationCoverage CoverageOfOnline(const LogRun& run, const StudyLog& log);
+[[nodiscard]] RelationCoverage CoverageOfSmoothed(const LogRun& run, const StudyLog& log, const RelationNoise& noise);
+[[nodiscard]] RelationCoverage CoverageOfOnline(const LogRun& run, const StudyLog& log, const RelationNoise& noise);
 
 }  // namespace cairn::studies
