@@ -150,7 +150,7 @@ TEST_F(SmoothSiteTest, TheSmoothedPathIsTheOneAlongWhichTheMapIsDrawn) {
 
 TEST_F(SmoothSiteTest, ProgressGoesFromNothingToAll) {
   ASSERT_TRUE(SmoothSite(job_, {Material()}, nullptr, control_));
-  ASSERT_EQ(progress_.size(), 4U * kKeyframes);
+  ASSERT_EQ(progress_.size(), slam::SmoothingSteps(Material().snapshot));
   EXPECT_TRUE(std::is_sorted(progress_.begin(), progress_.end()));
   EXPECT_EQ(progress_.front(), 0.0);
   EXPECT_GT(progress_.back(), 0.95);
@@ -256,11 +256,14 @@ TEST_F(SmoothJobTest, ACancelledJobWaitsForNobody) {
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(20));
 }
 
+// Of eight steps six are made, because the online path is kept.
+constexpr double kLastStepOfOneKeyframe = 5.0 / 8.0;
+
 TEST_F(SmoothJobTest, AJobThatIsCancelledWhileItWaitsForItsSiteEndsAtOnce) {
   HoldSite();
   std::atomic<bool> nearly_drawn{false};
-  // With one keyframe, the last of its four steps begins at three quarters.
-  JobControl control([&nearly_drawn](double progress) { nearly_drawn = nearly_drawn || progress >= 0.75; });
+  JobControl control(
+      [&nearly_drawn](double progress) { nearly_drawn = nearly_drawn || progress >= kLastStepOfOneKeyframe; });
   std::jthread cancels([&] {
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(20);
     while (!nearly_drawn && std::chrono::steady_clock::now() < deadline) std::this_thread::yield();
@@ -280,7 +283,7 @@ TEST_F(SmoothJobTest, ASwitchThatHasBegunIsWaitedFor) {
   bool holds = false;
   // The robot has handed over its state by the last step, and answers the correction late.
   JobControl control([&](double progress) {
-    if (progress < 0.75 || std::exchange(holds, true)) return;
+    if (progress < kLastStepOfOneKeyframe || std::exchange(holds, true)) return;
     EXPECT_TRUE(roster_.Find("r1")->Post(SnapshotWanted{[robot_held](SessionMaterial&&) { robot_held.wait(); }}));
   });
   constexpr double kTimeoutS = 3.0;
