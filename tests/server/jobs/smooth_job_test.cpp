@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "server/jobs/job_worker.h"
+#include "server/slam/smoothing/smoothed_map.h"
 #include "tests/server/robots/one_session.h"
 #include "tests/server/slam/site/site_drives.h"
 #include "tests/server/support/room_world.h"
