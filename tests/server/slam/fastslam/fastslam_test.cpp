@@ -71,6 +71,31 @@ TYPED_TEST(FastSlamVariants, UncertaintyGrowsAlongThePathAndARevisitTakesItAway)
   EXPECT_LT(filter.estimate().T_map_robot.translation().norm(), 0.2);
 }
 
+// Matches on the same metres have the same errors. Ten of them made the stated doubt as small as if each one had its
+// own, and it was smaller than the error.
+TYPED_TEST(FastSlamVariants, RevisitsThatAreAlikeTakeAwayLessDoubtAndMoveThePoseAsMuch) {
+  const auto drive = [](bool alike) {
+    auto filter = Make<TypeParam>::Filter(1);
+    DriveOutAndBack(filter);
+    for (std::size_t i = 0; i < 10; ++i) {
+      filter.Predict({{0, 0, 0}});
+      EXPECT_TRUE(filter.Observe(
+          {0, {0, 0, kPi}, Eigen::Vector3d(0.01, 0.01, 0.0004).asDiagonal(), alike ? i : std::size_t{0}}));
+      filter.Commit();
+    }
+    return filter.estimate();
+  };
+  const FilterEstimate alike = drive(true), apart = drive(false);
+  EXPECT_EQ(alike.T_map_robot, apart.T_map_robot);
+  const auto doubt = [](const FilterEstimate& estimate) {
+    return estimate.covariance.template topLeftCorner<2, 2>().trace();
+  };
+  // Ten of a standard deviation of 0.1 m say as much as one of 0.03 m; one after the other, as 1 + 1/2 + ... + 1/10
+  // = 2.9.
+  EXPECT_GT(doubt(alike), 2.0 * doubt(apart));
+  EXPECT_LT(doubt(alike), 0.02);
+}
+
 TYPED_TEST(FastSlamVariants, ARevisitNoParticleExplainsChangesNothingAndManyMeanDiverged) {
   auto filter = Make<TypeParam>::Filter(1);
   DriveOutAndBack(filter);

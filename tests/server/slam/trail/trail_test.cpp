@@ -125,6 +125,21 @@ TEST(Trail, ARevisitIsALoopOfTheKeyframeThatSawIt) {
   EXPECT_EQ(relations.back().to, 10U);
 }
 
+TEST(Trail, CountsTheRevisitsOfTheLastMetres) {
+  Trail trail = Chain(10);
+  const auto append = [&trail](double at_m, std::size_t seen) {
+    trail.Append({std::make_shared<const Scan>(), {}}, {at_m, 0.0, 0.0}, {}, Eigen::Matrix3d::Zero(),
+                 RevisitObservation{seen, {}, Eigen::Matrix3d::Identity()});
+  };
+  const double end_m = trail.shapes().back().travelled_m;
+  append(end_m + 1.0, 2);
+  append(end_m + 2.0, 3);
+  EXPECT_EQ(trail.RevisitsWithin(0.5, end_m + 3.0), 0U);
+  EXPECT_EQ(trail.RevisitsWithin(1.5, end_m + 3.0), 1U);
+  EXPECT_EQ(trail.RevisitsWithin(2.5, end_m + 3.0), 2U);
+  EXPECT_EQ(trail.RevisitsWithin(100.0, end_m + 3.0), 2U) << "a keyframe that is seen again has seen nothing again";
+}
+
 TEST(Trail, TentativeKeyframesCountOnceThePathIsCorrectedAndBlindMotionNever) {
   Trail trail(MotionNoise{});
   const auto append = [&trail](bool localized, bool on_the_path) {
