@@ -90,7 +90,7 @@ double ErrorBehind(double ahead_m, double step_m = 0.1) {
 // Its scans stand still before the robot, and it stood still with them.
 TEST(FrontEnd, FollowsTheWallsAndNotARobotThatDrivesAhead) {
   EXPECT_LT(ErrorBehind(0.0), 0.1);
-  EXPECT_LT(ErrorBehind(0.8), 1.5);  // Without the votes it stays behind by 24 m.
+  EXPECT_LT(ErrorBehind(0.8), 1.5);  // Before there were votes it stayed behind by 24 m.
 }
 
 // A fast lidar on a slow robot.
