@@ -129,7 +129,8 @@ bool IsWholeIfSigned(Bytes datagram) {
   constexpr std::uint8_t kSignedPrefix = 0x33, kSignedPostfix = 0x34;
   if (datagram.size() <= kRtpsHeaderBytes || datagram[kRtpsHeaderBytes] != kSignedPrefix) return true;
   for (std::size_t at = kRtpsHeaderBytes; at + 4 <= datagram.size();) {
-    if (datagram[at] == kSignedPostfix) return true;
+    // It may stand in a submessage that ends with the datagram, where nothing else looks at it.
+    if (datagram[at] == kSignedPostfix) return IsWholeProtection(kSignedPostfix, datagram.subspan(at + 4));
     const bool little = (datagram[at + 1] & 1) != 0;
     const std::size_t length = datagram[at + (little ? 2 : 3)] + std::size_t{256} * datagram[at + (little ? 3 : 2)];
     at += 4 + ((length + 3) & ~std::size_t{3});

@@ -279,7 +279,13 @@ void Session::Drain() {
   Throws([&] { PublishLedgers(drained ? SessionRecord::Urgency::kDrained : SessionRecord::Urgency::kWhenDue); });
   scheduled_ = false;
   // An event that came between the last Pop and the line above found `scheduled_` set and relies on this turn.
-  if (!queue_.empty()) Throws([this] { Schedule(); });
+  if (queue_.empty()) return;
+  try {
+    Schedule();
+  } catch (const std::exception& error) {  // Housekeeping tries it again.
+    spdlog::error("the session of robot '{}' waits for its turn because of an exception: {}", record_.state().robot,
+                  error.what());
+  }
 }
 
 void Session::TakeCheckpoint() {

@@ -1,5 +1,6 @@
 // The guard in front of the middleware: pieces, each a datagram of the same traffic. What it lets through is read here
 // as a receiver of RTPS 2.3 reads it (8.3.4, 9.4.5), with a check at every step that the middleware does not make.
+#include <algorithm>
 #include <limits>
 #include <span>
 
@@ -129,6 +130,9 @@ void ReadAsSigned(std::string_view datagram) {
     at += 4 + (Body(datagram, little).Number(at + 2, 2) + 3) / 4 * 4;
     Must(at < datagram.size(), "what is signed ends with its signature");
   }
+  const Body signature(datagram.substr(std::min(at + 4, datagram.size())), false);
+  Must(signature.size() >= 20 && signature.BigEndian(16) <= (signature.size() - 20) / 20,
+       "the codes of all receivers are inside the datagram");
 }
 
 void ReadAsReceiver(std::string_view datagram) {

@@ -53,8 +53,9 @@ std::optional<std::vector<double>> DisagreementWithOthers(const std::vector<Pose
 // Neighbouring scans share their errors, so a block of them counts as one value.
 bool IsClearlySmaller(const std::vector<double>& a, const std::vector<double>& b) {
   constexpr std::size_t kBlock = 5, kLeastBlocks = 4;
-  constexpr double kClearly =
-      3.0;  // Standard errors of the mean; with four blocks chance exceeds this in 3 % of cases.
+  // Standard errors of the mean. Blocks of odd and of even keyframes lie side by side on the way and share errors as
+  // well, so that three are about two of blocks that share none.
+  constexpr double kClearly = 3.0;
   const std::size_t blocks = a.size() / kBlock;
   if (blocks < kLeastBlocks) return false;
   const auto count = static_cast<double>(blocks);

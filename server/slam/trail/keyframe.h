@@ -58,7 +58,7 @@ struct RevisitObservation {
   Pose2 T_keyframe_robot;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
   // How many revisits there were on the last metres before. They were matched with the same surfaces, so their errors
-  // are those of this one, and together they say hardly more than one of them.
+  // are those of this one: in the stated doubt the n-th of them counts as 1/n.
   std::size_t alike = 0;
 };
 

@@ -136,6 +136,13 @@ TEST(SecureDatagram, WhatIsSignedAsAWholeEndsWithItsSignature) {
   };
   EXPECT_EQ(to_the_end().Inspect(), DatagramFault::kSecurity);
   EXPECT_EQ(to_the_end().U32(0xffff0101).Inspect(), DatagramFault::kSecurity);
+  // The signature itself must be whole, also in such a submessage.
+  const auto signed_within = [&](std::uint32_t receivers) {
+    Datagram datagram = prefix().Begin(0x50, 0).EndWithLength(0);
+    return datagram.Begin(0x34, 0).Zeros(16).BigEndian(receivers).End().Inspect();
+  };
+  EXPECT_EQ(signed_within(0), DatagramFault::kNone);
+  EXPECT_EQ(signed_within(7), DatagramFault::kSecurity);
   // Somewhere else a signature is no beginning of one.
   EXPECT_EQ(Datagram().Heartbeat(1, 3).Begin(0x33, 0).Zeros(20).End().Inspect(), DatagramFault::kNone);
 }

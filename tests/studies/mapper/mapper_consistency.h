@@ -22,8 +22,7 @@ struct ConsistencyDrive {
   double seconds = 0.0;
 };
 
-// The shipped building and corridor, a hall with pillars where the laser often sees no wall, a row of equal rooms, and
-// twice round a ring of equal corridors, which takes three times as long.
+// The shipped building and corridor, a hall with pillars where the laser often sees no wall, and a row of equal rooms.
 [[nodiscard]] std::vector<ConsistencyDrive> ConsistencyDrives(double seconds);
 
 // A ring of corridors with equal niches, in which every place is seen again and looks like many others.
