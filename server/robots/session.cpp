@@ -255,9 +255,9 @@ void Session::Schedule() {
   if (scheduled_.exchange(true)) return;
   try {
     asio::post(strand_, [self = shared_from_this()] { self->Drain(); });
-  } catch (...) {  // The next event tries it again, or housekeeping.
+  } catch (const std::exception& error) {  // The next event tries it again, or housekeeping.
     scheduled_ = false;
-    throw;
+    spdlog::error("session {} waits for its turn: {}", id_, error.what());
   }
 }
 
@@ -279,13 +279,7 @@ void Session::Drain() {
   Throws([&] { PublishLedgers(drained ? SessionRecord::Urgency::kDrained : SessionRecord::Urgency::kWhenDue); });
   scheduled_ = false;
   // An event that came between the last Pop and the line above found `scheduled_` set and relies on this turn.
-  if (queue_.empty()) return;
-  try {
-    Schedule();
-  } catch (const std::exception& error) {  // Housekeeping tries it again.
-    spdlog::error("the session of robot '{}' waits for its turn because of an exception: {}", record_.state().robot,
-                  error.what());
-  }
+  if (!queue_.empty()) Schedule();
 }
 
 void Session::TakeCheckpoint() {
