@@ -67,7 +67,7 @@ std::vector<bool> Shown(const std::vector<SessionMaterial>& material, const std:
 
 bool JoinsAny(const std::vector<SessionMaterial>& material, const std::vector<bool>& shown) {
   for (std::size_t i = 0; i < material.size(); ++i) {
-    if (shown[i] && !material[i].start_known && material[i].joinable) return true;
+    if (shown[i] && !material[i].start_known) return true;
   }
   return false;
 }

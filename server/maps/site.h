@@ -45,8 +45,8 @@ struct VersionSwitch {
   std::uint32_t version = 0;
   std::set<SessionId> awaited;
   std::map<SessionId, slam::OccupancyGrid::Chunks> staged;  // The new grids of the sessions that have answered.
-  std::set<SessionId>
-      apart;  // Those that are not joined, because they could not follow or because the version says so.
+  // Those that are not joined, because they could not follow or because the version says so.
+  std::set<SessionId> apart;
   std::map<SessionId, RobotGrid> displaced;
   std::function<void(Result<std::uint32_t>)> done;
   std::shared_ptr<std::atomic<bool>> completed = std::make_shared<std::atomic<bool>>(false);  // Correction::completed.
