@@ -41,8 +41,8 @@ struct KilledFleetOutcome {
   std::uint64_t beside_truth = 0, undisturbed_poses = 0, undisturbed_beside_truth = 0;
   double farthest_m = 0.0, undisturbed_farthest_m = 0.0;  // The same as the longest distance.
   std::vector<std::string> wrong;                         // Describes the first of the wrongly localized ones.
-  int paths_that_differ =
-      0;  // Robots whose path is not the undisturbed one, to the nanometre that `cairn path` prints.
+  // Robots whose path is not the undisturbed one, to the nanometre that `cairn path` prints.
+  int paths_that_differ = 0;
   // About each robot with a loss, a scan used twice or another path: what differs, and the account of its samples.
   std::vector<std::string> differences;
   KilledOrders::Outcome orders;
