@@ -14,7 +14,7 @@ deploy/install-packages.sh build package
 rm -rf "$build/packages" "$build/_CPack_Packages"
 cmake --preset release -B "$build"
 cmake --build "$build" -j "$(deploy/build-jobs.sh)" \
-  --target cairnd cairn cairn-offline cairn-calibrate cairn_client man_pages
+  --target cairnd cairn cairn-web cairn-offline cairn-calibrate cairn_shared man_pages
 # Not the umask of whoever runs this.
 (umask 022 && cd "$build" && fakeroot cpack -G DEB)
 packages=("$build"/packages/*.deb)

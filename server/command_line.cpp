@@ -43,7 +43,7 @@ Result<void> Validate(const CairndOptions& options) {
 std::optional<CommandLine> ParseCommandLine(int argc, char** argv, int& exit_code) {
   CLI::App app("Cairn's server: takes laser scans of robots over DDS, answers with poses and the map they share.",
                "cairnd");
-  std::string config, log_level, state;
+  std::string config, log_level, log_format, state;
   wire::WireArguments arguments;
   bool print_config = false, check_config = false;
   app.add_option("--config", config, "Configuration file (YAML); every key has a default");
@@ -52,6 +52,7 @@ std::optional<CommandLine> ParseCommandLine(int argc, char** argv, int& exit_cod
   app.add_option("--domain", arguments.domain,
                  "DDS domain (wire.domain); CAIRN_DOMAIN stands below --set and above the file");
   app.add_option("--log-level", log_level, "trace, debug, info, warn, error, critical or off (server.log_level)");
+  app.add_option("--log-format", log_format, "text or json (server.log_format)");
   app.add_option("--state", state,
                  "Directory in which the server keeps its state; \"none\" keeps nothing. Default: CAIRN_STATE, the "
                  "StateDirectory of systemd, or cairn/domain-N in XDG_STATE_HOME or ~/.local/state");
@@ -70,6 +71,7 @@ std::optional<CommandLine> ParseCommandLine(int argc, char** argv, int& exit_cod
   const VisitOptions visit = [&line](OptionVisitor& visitor) { Visit(visitor, line.options); };
   if (!config.empty() && Complain(ApplyYamlFile(config, visit))) return std::nullopt;
   if (!log_level.empty()) arguments.assignments.push_back("server.log_level=" + log_level);
+  if (!log_format.empty()) arguments.assignments.push_back("server.log_format=" + log_format);
   if (Complain(Apply(arguments, visit)) || Complain(Validate(line.options))) return std::nullopt;
   if (!print_config && Complain(LoadKnownMap(line.options.server.slam))) return std::nullopt;
   if (auto place = StateDirectory(state, line.options.wire.domain)) {

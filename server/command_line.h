@@ -1,5 +1,5 @@
 // The command line of cairnd: the task and the options. Precedence, lowest first: defaults, --config, the
-// environment variable CAIRN_DOMAIN, --set, --domain, --log-level (see common/wire/wire_arguments.h).
+// environment variable CAIRN_DOMAIN, --set, --domain, --log-level, --log-format (see common/wire/wire_arguments.h).
 #pragma once
 
 #include <filesystem>

@@ -81,11 +81,14 @@ DoorCounts LossesOf(const Watched& watched) {
 
 void TellLoad(const Watched& watched) {
   const std::chrono::duration<double> up = std::chrono::steady_clock::now() - watched.started;
+  const DelayMeter::Quantiles waits = watched.server.robot_waits();
   ServerLoad load{.up_s = up.count(),
                   .processor_s = ProcessorSeconds(),
                   .memory_bytes = ResidentBytes(),
                   .inbound_waiting = watched.inbound.size(),
-                  .outbound_waiting = watched.outbound.size()};
+                  .outbound_waiting = watched.outbound.size(),
+                  .strand_wait_p50_ms = waits.p50_ms,
+                  .strand_wait_p99_ms = waits.p99_ms};
   if (watched.journal != nullptr) {
     const JournalCounts counts = watched.journal->counts();
     load.stores = true;
@@ -283,7 +286,7 @@ Result<void> StartWatched(Server& server, asio::io_context& context, asio::signa
 
 int Serve(const CairndOptions& options, const std::filesystem::path& state) {
   const auto started = std::chrono::steady_clock::now();
-  StartLogging(options.server.server.log_level);
+  StartLogging(options.server.server.log_level, options.server.server.log_format);
   // The signal set is made before any thread starts, so that no thread receives the signals instead.
   asio::io_context context(1);
   asio::signal_set signals(context, SIGTERM, SIGINT);

@@ -8,6 +8,9 @@ namespace {
 void VisitProcess(OptionVisitor& visitor, ProcessOptions& options) {
   VisitEnum(visitor, "log_level", options.log_level, kLogLevels,
             ForOperators("Messages of this severity and of every more severe one are logged."));
+  VisitEnum(visitor, "log_format", options.log_format, kLogFormats,
+            "How lines of the log are written: as text for people, or each as a JSON object for programs that collect "
+            "logs.");
   visitor.Integer("threads", options.threads, "", 0, 256,
                   ForOperators("Threads that run the estimators of all robots together. 0 takes one per core."));
   visitor.Text("sites", options.sites,

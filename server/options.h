@@ -17,6 +17,7 @@ namespace cairn::server {
 // Options of the server process.
 struct ProcessOptions {
   LogLevel log_level = LogLevel::kInfo;
+  LogFormat log_format = LogFormat::kText;
   std::int64_t threads = 0;
   std::string sites;
   bool create_sites = true;

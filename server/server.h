@@ -57,6 +57,8 @@ class Server {
   void SetRefusals(const Refusals& refusals) { desk_.SetRefusals(refusals); }
   // What `cairn status` says of how busy the server is.
   void SetLoad(const ServerLoad& load) { desk_.SetLoad(load); }
+  // How long the robots' work has waited for a thread.
+  [[nodiscard]] DelayMeter::Quantiles robot_waits() const { return roster_.waits(); }
   // For how long the middleware has been busy with one datagram. It counts for `healthy`, because nothing can arrive
   // meanwhile, not even a question.
   void SetReceiving(std::chrono::nanoseconds busy_with_one) { receiving_ns_ = busy_with_one.count(); }

@@ -122,8 +122,10 @@ run_demo() { # folder, options of demo.sh
   local folder=$1
   shift
   DEMO_SECONDS=20 DEMO_OUT=$root/build/$folder deploy/demo.sh "$@"
-  local left
-  for left in map.png report.md; do [ -s "build/$folder/$left" ] || { echo "the demo left no $left"; return 1; }; done
+  local left frames
+  for left in map.png growing.png report.md; do [ -s "build/$folder/$left" ] || { echo "the demo left no $left"; return 1; }; done
+  frames=$(grep -ao fcTL "build/$folder/growing.png" | wc -l) || true
+  [ "$frames" -ge 3 ] || { echo "the picture of the growing map has $frames frames"; return 1; }
 }
 
 stage_demo() { run_demo demo; }

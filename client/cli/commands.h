@@ -21,7 +21,8 @@ void AddCheckLog(CLI::App& app, Program& program);
 void AddEval(CLI::App& app, Program& program);
 
 void AddMap(CLI::App& app,
-            Program& program);  // All commands of maps; `map draw` and `map edit` are files of their own.
+            Program& program);  // All commands of maps; those that draw and `map edit` are files of their own.
+void AddMapAnimate(CLI::App& map, Program& program);
 void AddMapDraw(CLI::App& map, Program& program);
 void AddMapEdit(CLI::App& map, Program& program);
 void AddJob(CLI::App& app, Program& program);

@@ -86,7 +86,8 @@ void to_json(nlohmann::json& json, const MapInfo& map) {
       {"robots", map.robots},
       {"enabled_version", map.enabled_version},
       {"versions", map.versions},
-      {"edits_version", map.edits_version}};
+      {"edits_version", map.edits_version},
+      {"memory_bytes", map.memory_bytes}};
 }
 
 void to_json(nlohmann::json& json, const MapEdit& edit) {
@@ -117,6 +118,8 @@ void to_json(nlohmann::json& json, const ServerLoad& load) {
           {"memory_bytes", load.memory_bytes},
           {"inbound_waiting", load.inbound_waiting},
           {"outbound_waiting", load.outbound_waiting},
+          {"strand_wait_p50_ms", load.strand_wait_p50_ms},
+          {"strand_wait_p99_ms", load.strand_wait_p99_ms},
           {"stores", load.stores},
           {"commits", load.commits},
           {"failed_commits", load.failed_commits},
@@ -142,7 +145,9 @@ void to_json(nlohmann::json& json, const Ros2Namespace& one) {
 }
 
 void to_json(nlohmann::json& json, const Ros2Report& report) {
-  json = {{"domain", report.door.domain}, {"problems", report.door.problems}, {"namespaces", report.namespaces}};
+  json = {{"domain", report.door.domain},     {"malformed", report.door.malformed},
+          {"overflow", report.door.overflow}, {"unpublished", report.door.unpublished},
+          {"problems", report.door.problems}, {"namespaces", report.namespaces}};
 }
 
 void to_json(nlohmann::json& json, const Tile& tile) {
@@ -188,6 +193,17 @@ void to_json(nlohmann::json& json, const TrajectoryError& error) {
           {"ate_rmse_m", error.rmse_m}, {"mean_m", error.mean_m},   {"median_m", error.median_m},
           {"max_m", error.max_m},       {"final_m", error.final_m}, {"rmse_rad", error.rmse_rad},
           {"max_rad", error.max_rad}};
+}
+
+void to_json(nlohmann::json& json, const NamedCrispness& row) {
+  const TrajectoryCrispness& crispness = row.crispness;
+  json = {{"trajectory", row.name},
+          {"mean_map_entropy", crispness.map.mean_entropy},
+          {"thickness_m", crispness.map.thickness_m},
+          {"places", crispness.map.places},
+          {"points", crispness.points},
+          {"scans", crispness.scans},
+          {"scans_left_out", crispness.scans_left_out}};
 }
 
 void to_json(nlohmann::json& json, const StampSummary& stamps) {

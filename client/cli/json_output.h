@@ -7,6 +7,7 @@
 
 #include "client/cli/log_check.h"
 #include "client/cli/scan_account.h"
+#include "client/cli/trajectory_crispness.h"
 #include "client/cli/trajectory_error.h"
 #include "common/service/request.h"
 
@@ -35,6 +36,7 @@ namespace cairn::client {
 
 void to_json(nlohmann::json& json, const ScanAccount& account);
 void to_json(nlohmann::json& json, const TrajectoryError& error);
+void to_json(nlohmann::json& json, const NamedCrispness& row);
 void to_json(nlohmann::json& json, const StampSummary& stamps);
 void to_json(nlohmann::json& json, const Finding& finding);
 void to_json(nlohmann::json& json, const LogReport& report);

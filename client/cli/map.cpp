@@ -141,6 +141,7 @@ void AddMap(CLI::App& app, Program& program) {
   AddMapExport(*map, program);
   AddMapEnable(*map, program);
   AddMapDraw(*map, program);
+  AddMapAnimate(*map, program);
   AddMapEdit(*map, program);
 }
 

@@ -1,11 +1,8 @@
 #include <fmt/format.h>
 
-#include <filesystem>
-
 #include "client/cli/commands.h"
 #include "client/cli/map_picture.h"
 #include "client/cli/quantity_text.h"
-#include "common/file/atomic_file.h"
 
 namespace cairn::client {
 namespace {
@@ -39,18 +36,8 @@ Result<std::vector<PicturePath>> CollectPaths(Program& program, const DrawArgume
   return paths;
 }
 
-// Whether the file is the image of an exported map, which a picture would replace.
-bool IsImageOfMap(const std::filesystem::path& file) {
-  std::filesystem::path yaml = file;
-  return std::filesystem::exists(file) && std::filesystem::exists(yaml.replace_extension(".yaml"));
-}
-
 ExitCode DrawMap(Program& program, const DrawArguments& arguments) {
-  if (IsImageOfMap(arguments.output)) {
-    return program.Refuse({StatusCode::kAlreadyExists, "'" + arguments.output +
-                                                           "' is the image of the map with the same name; give the "
-                                                           "picture another one"});
-  }
+  if (const auto allowed = CheckPictureFile(arguments.output); !allowed) return program.Refuse(allowed.error());
   const auto ask = [&](QueryClient& server) {
     return arguments.layer == "disagreement" ? server.DisagreementImage(arguments.site)
                                              : server.MapImage(arguments.site);
@@ -61,8 +48,7 @@ ExitCode DrawMap(Program& program, const DrawArguments& arguments) {
   if (!paths) return program.Refuse(paths.error());
   const auto png = DrawMapPicture(*map, *paths, arguments.picture);
   if (!png) return program.Refuse(png.error());
-  const auto written = WriteFileAtomically(arguments.output, {reinterpret_cast<const char*>(png->data()), png->size()});
-  if (!written) return program.Refuse(written.error());
+  if (const auto written = WritePictureFile(arguments.output, *png); !written) return program.Refuse(written.error());
   return program.Print(fmt::format("{}: {} paths, {} KiB\n", arguments.output, paths->size(), png->size() / 1024),
                        {{"file", arguments.output}, {"paths", paths->size()}, {"bytes", png->size()}});
 }

@@ -6,8 +6,10 @@
 #include <array>
 #include <cmath>
 #include <exception>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+
+#include "common/file/atomic_file.h"
+#include "common/map/image_codec.h"
 
 namespace cairn::client {
 namespace {
@@ -20,48 +22,17 @@ const std::array<cv::Scalar, 8> kPathColors = {
     cv::Scalar(0, 159, 230), cv::Scalar(233, 180, 86), cv::Scalar(40, 40, 180), cv::Scalar(120, 90, 90)};
 constexpr int kSubpixelBits = 4;
 
-struct Frame {
-  double x_min = 1e300, y_min = 1e300, x_max = -1e300, y_max = -1e300;
-
-  void Include(double x, double y) {
-    x_min = std::min(x_min, x);
-    x_max = std::max(x_max, x);
-    y_min = std::min(y_min, y);
-    y_max = std::max(y_max, y);
-  }
-  [[nodiscard]] bool empty() const { return x_min > x_max; }
-};
-
-Frame FrameOf(const OccupancyImage& map, const std::vector<PicturePath>& paths, double margin_m) {
-  Frame frame;
-  for (int row = 0; row < map.height; ++row) {
-    for (int column = 0; column < map.width; ++column) {
-      if (map.cells[static_cast<std::size_t>(row) * map.width + column] == kUnknownCell) continue;
-      frame.Include(map.T_map_origin.x + column * map.resolution_m, map.T_map_origin.y + row * map.resolution_m);
-      frame.Include(map.T_map_origin.x + (column + 1) * map.resolution_m,
-                    map.T_map_origin.y + (row + 1) * map.resolution_m);
-    }
-  }
-  for (const PicturePath& path : paths) {
-    for (const StampedPose& pose : path.trajectory) frame.Include(pose.T_map_robot.x, pose.T_map_robot.y);
-  }
-  if (!frame.empty()) {
-    frame.Include(frame.x_min - margin_m, frame.y_min - margin_m);
-    frame.Include(frame.x_max + margin_m, frame.y_max + margin_m);
-  }
-  return frame;
-}
-
 class Canvas {
  public:
-  Canvas(const Frame& frame, const PictureOptions& options)
+  Canvas(const PictureFrame& frame, const PictureOptions& options)
       : frame_(frame),
         // The second bound keeps the picture of a tall map at most twice as high as it is wide.
-        px_per_m_(std::min(options.width_px / (frame.x_max - frame.x_min),
-                           2.0 * options.width_px / (frame.y_max - frame.y_min))),
-        unit_(options.width_px / 1800.0) {
-    const int width = static_cast<int>(std::lround((frame.x_max - frame.x_min) * px_per_m_));
-    const int height = static_cast<int>(std::lround((frame.y_max - frame.y_min) * px_per_m_));
+        px_per_m_(std::min(options.width_px / (frame.x_max_m - frame.x_min_m),
+                           2.0 * options.width_px / (frame.y_max_m - frame.y_min_m))),
+        unit_(options.width_px / 1800.0),
+        shades_(static_cast<float>(options.shades)) {
+    const int width = static_cast<int>(std::lround((frame.x_max_m - frame.x_min_m) * px_per_m_));
+    const int height = static_cast<int>(std::lround((frame.y_max_m - frame.y_min_m) * px_per_m_));
     map_ = cv::Rect(0, options.title.empty() ? 0 : Pixels(70), std::max(width, Pixels(600)), std::max(height, 1));
     drawn_ = cv::Rect(0, map_.y, width, map_.height);
     image_.create(map_.y + map_.height + Pixels(84), map_.width, CV_8UC3);
@@ -82,8 +53,8 @@ class Canvas {
     }
     // Maps cells of the map to pixels of the picture.
     const double cell_px = map.resolution_m * px_per_m_;
-    const double dx = (map.T_map_origin.x - frame_.x_min) * px_per_m_,
-                 dy = (frame_.y_max - map.T_map_origin.y) * px_per_m_;
+    const double dx = (map.T_map_origin.x - frame_.x_min_m) * px_per_m_,
+                 dy = (frame_.y_max_m - map.T_map_origin.y) * px_per_m_;
     const cv::Mat to_picture =
         (cv::Mat_<double>(2, 3) << cell_px, 0, dx + 0.5 * cell_px - 0.5, 0, -cell_px, dy - 0.5 * cell_px - 0.5);
     cv::Mat target = image_(drawn_), known_px, wall_px;
@@ -167,7 +138,11 @@ class Canvas {
     cv::line(image_, {0, map_.y + map_.height}, {map_.width, map_.y + map_.height}, cv::Scalar(220, 212, 205), 1);
   }
 
-  [[nodiscard]] const cv::Mat& image() const { return image_; }
+  [[nodiscard]] RasterImage image() const {
+    RasterImage raster{image_.cols, image_.rows, 3, {}};
+    raster.samples.assign(image_.datastart, image_.dataend);
+    return raster;
+  }
 
  private:
   [[nodiscard]] int Pixels(double at_1800) const { return std::max(1, static_cast<int>(std::lround(at_1800 * unit_))); }
@@ -175,13 +150,14 @@ class Canvas {
   // Makes interpolated edges steeper, so that they stay about a pixel wide when cells are drawn large.
   [[nodiscard]] float Sharpen(float value) const {
     const auto gain = static_cast<float>(std::clamp(0.25 * px_per_m_ * 0.05, 1.0, 3.0));
-    return std::clamp((value - 0.5f) * gain + 0.5f, 0.0f, 1.0f);
+    const float sharp = std::clamp((value - 0.5f) * gain + 0.5f, 0.0f, 1.0f);
+    return shades_ > 0.0f ? std::round(sharp * shades_) / shades_ : sharp;
   }
 
   [[nodiscard]] cv::Point At(const Eigen::Vector2d& p_map) const {
     constexpr double kOne = 1 << kSubpixelBits;
-    return {static_cast<int>(std::lround(((p_map.x() - frame_.x_min) * px_per_m_ - 0.5) * kOne)),
-            static_cast<int>(std::lround(((frame_.y_max - p_map.y()) * px_per_m_ - 0.5 + map_.y) * kOne))};
+    return {static_cast<int>(std::lround(((p_map.x() - frame_.x_min_m) * px_per_m_ - 0.5) * kOne)),
+            static_cast<int>(std::lround(((frame_.y_max_m - p_map.y()) * px_per_m_ - 0.5 + map_.y) * kOne))};
   }
 
   [[nodiscard]] int TextWidth(const std::string& text, double size, int weight) const {
@@ -192,11 +168,12 @@ class Canvas {
     return TextWidth(text, size, weight);
   }
 
-  const Frame frame_;
+  const PictureFrame frame_;
   const double px_per_m_;
   const double unit_;  // Pens and letters are sized for a picture 1800 px wide.
-  cv::Rect map_;       // The map's band.
-  cv::Rect drawn_;     // The part of it the frame covers.
+  const float shades_;
+  cv::Rect map_;    // The map's band.
+  cv::Rect drawn_;  // The part of it the frame covers.
   cv::Mat image_;
 };
 
@@ -210,12 +187,46 @@ double RoundLength(double wanted_m) {
   return power;
 }
 
-Result<std::vector<std::uint8_t>> DrawMapPicture(const OccupancyImage& map, const std::vector<PicturePath>& paths,
-                                                 const PictureOptions& options) {
+void PictureFrame::Include(double x_m, double y_m) {
+  x_min_m = std::min(x_min_m, x_m);
+  x_max_m = std::max(x_max_m, x_m);
+  y_min_m = std::min(y_min_m, y_m);
+  y_max_m = std::max(y_max_m, y_m);
+}
+
+void PictureFrame::Include(const PictureFrame& other) {
+  if (other.empty()) return;
+  Include(other.x_min_m, other.y_min_m);
+  Include(other.x_max_m, other.y_max_m);
+}
+
+PictureFrame FrameOf(const OccupancyImage& map, const std::vector<PicturePath>& paths, double margin_m) {
+  PictureFrame frame;
+  for (int row = 0; row < map.height; ++row) {
+    for (int column = 0; column < map.width; ++column) {
+      if (map.cells[static_cast<std::size_t>(row) * map.width + column] == kUnknownCell) continue;
+      frame.Include(map.T_map_origin.x + column * map.resolution_m, map.T_map_origin.y + row * map.resolution_m);
+      frame.Include(map.T_map_origin.x + (column + 1) * map.resolution_m,
+                    map.T_map_origin.y + (row + 1) * map.resolution_m);
+    }
+  }
+  for (const PicturePath& path : paths) {
+    for (const StampedPose& pose : path.trajectory) frame.Include(pose.T_map_robot.x, pose.T_map_robot.y);
+  }
+  if (!frame.empty()) {
+    frame.Include(frame.x_min_m - margin_m, frame.y_min_m - margin_m);
+    frame.Include(frame.x_max_m + margin_m, frame.y_max_m + margin_m);
+  }
+  return frame;
+}
+
+Result<RasterImage> DrawMapPixels(const OccupancyImage& map, const std::vector<PicturePath>& paths,
+                                  const PictureOptions& options) {
   if (options.width_px < 200 || options.width_px > 8000) {
     return Fail(StatusCode::kInvalidArgument, "a picture is 200 to 8000 pixels wide");
   }
-  const Frame frame = FrameOf(map, paths, std::max(0.05, options.margin_m));
+  const PictureFrame frame =
+      options.frame.empty() ? FrameOf(map, paths, std::max(0.05, options.margin_m)) : options.frame;
   if (frame.empty()) return Fail(StatusCode::kNotFound, "nothing to draw: the map is empty and so are the paths");
   std::vector<cv::Scalar> colors;
   for (const PicturePath& path : paths) {
@@ -237,12 +248,30 @@ Result<std::vector<std::uint8_t>> DrawMapPicture(const OccupancyImage& map, cons
     }
     canvas.DrawTitle(options.title);
     canvas.DrawLegend(paths, colors);
-    std::vector<std::uint8_t> png;
-    cv::imencode(".png", canvas.image(), png, {cv::IMWRITE_PNG_COMPRESSION, 9});
-    return png;
+    return canvas.image();
   } catch (const std::exception& error) {
     return Fail(StatusCode::kInternal, fmt::format("drawing failed: {}", error.what()));
   }
+}
+
+Result<std::vector<std::uint8_t>> DrawMapPicture(const OccupancyImage& map, const std::vector<PicturePath>& paths,
+                                                 const PictureOptions& options) {
+  return DrawMapPixels(map, paths, options).and_then([](const RasterImage& image) {
+    return EncodeImage(image, ".png", 9);
+  });
+}
+
+Result<void> CheckPictureFile(const std::filesystem::path& file) {
+  std::filesystem::path yaml = file;
+  std::error_code ignored;
+  if (!std::filesystem::exists(file, ignored) || !std::filesystem::exists(yaml.replace_extension(".yaml"), ignored))
+    return {};
+  return Fail(StatusCode::kAlreadyExists,
+              "'" + file.string() + "' is the image of the map with the same name; give the picture another one");
+}
+
+Result<void> WritePictureFile(const std::filesystem::path& file, const std::vector<std::uint8_t>& bytes) {
+  return WriteFileAtomically(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 }  // namespace cairn::client

@@ -8,6 +8,7 @@
 
 #include "client/cli/commands.h"
 #include "client/cli/json_output.h"
+#include "client/cli/manual_pages.h"
 #include "client/cli/option_checks.h"
 #include "client/cli/quantity_text.h"
 #include "common/options/config.h"
@@ -49,10 +50,15 @@ ExitCode Program::Print(const std::string& text, const nlohmann::json& object) {
 }
 
 ExitCode Program::Refuse(const Status& status) {
+  // What fails for another reason names no request.
+  const std::string request = status.message == failure_ ? failed_request_ : std::string();
   if (options.json) {
-    Print("", {{"error", status}});
+    nlohmann::json error = status;
+    if (!request.empty()) error["request"] = request;
+    Print("", {{"error", error}});
   }
-  err_ << "cairn: " << status.message << " (" << StatusCodeName(status.code) << ")\n";
+  err_ << "cairn: " << status.message << " (" << StatusCodeName(status.code)
+       << (request.empty() ? "" : ", request " + request) << ")\n";
   return ExitCode::kFailed;
 }
 
@@ -66,6 +72,19 @@ void AddGlobalOptions(CLI::App& app, Program& program, wire::WireArguments& wire
       ->allow_extra_args(false);
   AddParsed(app, "--timeout", options.timeout_s, ParseDuration, "How long to wait for an answer [5]", "SECONDS");
   app.add_flag("--json", options.json, "Print JSON on standard output, one object per line");
+}
+
+// For those who make packages: not in the help. It ends the program, as --help does.
+void AddManualPages(CLI::App& app) {
+  app.add_option_function<std::string>(
+         "--manual-pages",
+         [&app](const std::string& directory) {
+           if (const auto written = WriteManualPages(app, directory); !written)
+             throw CLI::ValidationError("--manual-pages", written.error().message);
+           throw CLI::Success();
+         },
+         "Write the manual pages into this directory")
+      ->group("");
 }
 
 // The commands as `cairn --help` lists them: a table of contents, from looking to making robots up.
@@ -99,12 +118,14 @@ ExitCode RunCairn(const std::vector<std::string>& arguments, std::ostream& out, 
   CLI::App app("Stream robots to a Cairn server, ask it for poses and maps, and give it jobs.", "cairn");
   app.set_version_flag("--version", std::string("cairn ") + kVersion);
   app.footer(
-      "Options above work with every command, before or after it. `cairn COMMAND --help` tells more.\n"
+      "Options above work with every command, before or after it. `cairn COMMAND --help` tells more, and so does\n"
+      "`man cairn-COMMAND` where the package is installed.\n"
       "Exit codes: 0 done, 1 failed (one line on standard error says why), 2 wrong command line.");
   app.fallthrough();
   app.require_subcommand(1);
   AddGlobalOptions(app, program, wire);
   AddCommands(app, program);
+  AddManualPages(app);
   try {
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 takes them from the back.
   } catch (const CLI::ParseError& error) {

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "client/lib/last_request.h"
 #include "client/lib/query_client.h"
 #include "common/wire/bus.h"
 
@@ -55,12 +56,19 @@ class Program {
   [[nodiscard]] auto Ask(const Question& question) -> decltype(question(std::declval<QueryClient&>())) {
     const auto client = queries();
     if (!client) return tl::unexpected(client.error());
-    return question(**client);
+    TakeLastRequest();
+    auto answer = question(**client);
+    if (!answer) {
+      failed_request_ = TakeLastRequest();
+      failure_ = answer.error().message;
+    }
+    return answer;
   }
 
   // Text for people, or the object for machines.
   ExitCode Print(const std::string& text, const nlohmann::json& object);
-  // Says in one line on `err` why the command failed, and under --json also as an object with `error` on `out`.
+  // Says in one line on `err` why the command failed, and under --json also as an object with `error` on `out`. If a
+  // request has failed (Ask), it gives the request's id, which the server's log has too.
   ExitCode Refuse(const Status& status);
 
  private:
@@ -71,6 +79,7 @@ class Program {
   std::function<ExitCode()> action_;
   std::unique_ptr<wire::Bus> bus_;
   std::unique_ptr<QueryClient> queries_;
+  std::string failed_request_, failure_;  // The last request that failed (empty: none was sent), and why.
 };
 
 // Parses and runs one command line, without the program's name.

@@ -33,9 +33,8 @@ void AddRos2(CLI::App& app, Program& program) {
   doctor->footer(
       "Shows each namespace that publishes laser scans or odometry in the DDS domain of the ROS 2 robots: the robot "
       "and\n"
-      "the site that the rules of the server give it, whether it is on the map, and else why not, in the order in "
-      "which\n"
-      "to mend it.\n"
+      "the site that the rules of the server give it, whether it is on the map, and what is wrong, in the order\n"
+      "in which to mend it.\n"
       "EXAMPLES\n  cairn ros2 doctor\n  cairn ros2 doctor r1\n  cairn ros2 doctor --json");
   auto name = std::make_shared<std::string>();
   doctor->add_option("robot", *name, "Only this robot, or this namespace");

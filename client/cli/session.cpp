@@ -13,10 +13,16 @@ ExitCode ShowStatus(Program& program, const std::string& robot) {
   if (answer->robots.empty()) text += "no robot yet\n";
   for (const RobotStatus& status : answer->robots) text += FormatRobot(status);
   text += FormatLoad(answer->load) + FormatRefusals(answer->refused);
-  return program.Print(text, {{"robots", answer->robots},
-                              {"degraded", answer->degraded},
-                              {"refused", answer->refused},
-                              {"load", answer->load}});
+  nlohmann::json object = {
+      {"robots", answer->robots}, {"degraded", answer->degraded}, {"refused", answer->refused}, {"load", answer->load}};
+  if (robot.empty()) {
+    // An addition only: the status does not fail where this question does.
+    const auto ros2 = program.Ask([](QueryClient& server) { return server.Ros2(); });
+    if (ros2) text += FormatRos2Door(*ros2);
+    if (ros2 && ros2->door.enabled)
+      object["ros2"] = {{"robots", ros2->namespaces.size()}, {"not_on_map", RobotsOffMap(*ros2)}};
+  }
+  return program.Print(text, object);
 }
 
 ExitCode EndSession(Program& program, const std::string& robot) {
@@ -32,7 +38,7 @@ void AddStatus(CLI::App& app, Program& program) {
   command->footer(
       "The ledger says what became of every scan: received = used + dropped (by reason) + waiting.\n"
       "The last lines say how busy the server is and count what it refused because of its sender. The server's log\n"
-      "names the senders.\n"
+      "names the senders. Where ROS 2 robots are not on the map, a line says how many.\n"
       "EXAMPLES\n  cairn status\n  cairn status robot1 --json");
   auto robot = std::make_shared<std::string>();
   command->add_option("robot", *robot, "Only this robot");

@@ -11,6 +11,8 @@
 namespace cairn::client {
 namespace {
 
+constexpr double kMib = 1024.0 * 1024.0;
+
 std::string FormatStamps(const StampSummary& stamps) {
   return fmt::format("{} over {}, {:.1f} Hz, p99 period {}, longest gap {}", stamps.count,
                      FormatDuration(stamps.duration_s), stamps.rate_hz, FormatDuration(stamps.period_p99_s),
@@ -72,7 +74,6 @@ std::string FormatRobot(const RobotStatus& robot) {
 
 std::string FormatLoad(const ServerLoad& now, const ServerLoad* before) {
   if (now.up_s <= 0.0) return "";
-  constexpr double kMib = 1024.0 * 1024.0;
   // Not after a restart. Without a newer measurement there is nothing to compare.
   const bool compares = before != nullptr && before->up_s <= now.up_s && before->processor_s <= now.processor_s;
   const ServerLoad since = compares ? *before : ServerLoad{};
@@ -83,6 +84,10 @@ std::string FormatLoad(const ServerLoad& now, const ServerLoad* before) {
   }
   text += fmt::format("{:.0f} MiB of memory, {} values wait in it", static_cast<double>(now.memory_bytes) / kMib,
                       now.inbound_waiting + now.outbound_waiting);
+  if (now.strand_wait_p99_ms > 0.0) {
+    text += fmt::format(", work waits {:.1f} ms for a thread (p99 {:.1f} ms)", now.strand_wait_p50_ms,
+                        now.strand_wait_p99_ms);
+  }
   if (now.stores) {
     text += fmt::format("; on the disk after {:.0f} ms (p99 {:.0f} ms), {:.0f} MiB there", now.stored_after_p50_ms,
                         now.stored_after_p99_ms, static_cast<double>(now.store_bytes) / kMib);
@@ -99,9 +104,24 @@ std::string FormatRefusals(const Refusals& refused) {
       refused.datagrams, refused.over_limit);
 }
 
+std::size_t RobotsOffMap(const Ros2Report& report) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(report.namespaces, [](const Ros2Namespace& one) { return !one.on_map; }));
+}
+
+std::string FormatRos2Door(const Ros2Report& report, std::size_t problems) {
+  const std::size_t off_map = RobotsOffMap(report);
+  if (!report.door.enabled || (off_map == 0 && problems == 0)) return "";
+  return fmt::format("ROS 2: {} of {} robots {} not on the map{}; see `cairn ros2 doctor`\n", off_map,
+                     report.namespaces.size(), off_map == 1 ? "is" : "are",
+                     problems == 0 ? "" : fmt::format(", {} problem{}", problems, problems == 1 ? "" : "s"));
+}
+
 std::string FormatMap(const MapInfo& map) {
-  std::string text = fmt::format("{}: {} tiles in {} levels of {} m, epoch {}, version {}, {} robots\n", map.site,
+  std::string text = fmt::format("{}: {} tiles in {} levels of {} m, epoch {}, version {}, {} robots", map.site,
                                  map.tile_count, map.levels, map.resolution_m, map.epoch, map.version, map.robots);
+  if (map.memory_bytes > 0) text += fmt::format(", {:.1f} MiB of memory", static_cast<double>(map.memory_bytes) / kMib);
+  text += "\n";
   if (map.tile_count > 0) {
     text +=
         fmt::format("  x {:.2f}..{:.2f} m, y {:.2f}..{:.2f} m\n", map.x_min_m, map.x_max_m, map.y_min_m, map.y_max_m);
@@ -128,6 +148,18 @@ std::string FormatTrajectoryError(const TrajectoryError& e) {
       "{:.4f}; heading rmse {:.3f} deg, max {:.3f} deg\n",
       e.compared, e.way_m, e.skipped, e.rmse_m, e.mean_m, e.median_m, e.max_m, e.final_m, Degrees(e.rmse_rad),
       Degrees(e.max_rad));
+}
+
+std::string FormatCrispness(const std::vector<NamedCrispness>& rows) {
+  std::size_t width = std::string_view("TRAJECTORY").size();
+  for (const NamedCrispness& row : rows) width = std::max(width, row.name.size());
+  std::string text = fmt::format("{:<{}}  ENTROPY  THICKNESS (mm)    POINTS    SCANS  LEFT OUT\n", "TRAJECTORY", width);
+  for (const auto& [name, crispness] : rows) {
+    text +=
+        fmt::format("{:<{}}  {:>7.3f}  {:>14.1f}  {:>8}  {:>7}  {:>8}\n", name, width, crispness.map.mean_entropy,
+                    1000.0 * crispness.map.thickness_m, crispness.points, crispness.scans, crispness.scans_left_out);
+  }
+  return text;
 }
 
 std::string FormatLogReport(const LogReport& r) {

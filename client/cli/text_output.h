@@ -1,9 +1,12 @@
 // Formats values of the server as text for people. Stateless.
 #pragma once
 
+#include <cstddef>
 #include <string>
+#include <vector>
 
 #include "client/cli/log_check.h"
+#include "client/cli/trajectory_crispness.h"
 #include "client/cli/trajectory_error.h"
 #include "common/service/request.h"
 
@@ -20,9 +23,15 @@ namespace cairn::client {
 [[nodiscard]] std::string FormatLoad(const ServerLoad& now, const ServerLoad* before = nullptr);
 // What the server refused; empty where DDS Security is off and nothing was refused.
 [[nodiscard]] std::string FormatRefusals(const Refusals& refused);
+[[nodiscard]] std::size_t RobotsOffMap(const Ros2Report& report);
+// How many ROS 2 robots are not on the map, and where `problems` is given, how many problems there are: one line. Empty
+// where the server does not serve ROS 2 robots, or there is neither.
+[[nodiscard]] std::string FormatRos2Door(const Ros2Report& report, std::size_t problems = 0);
 [[nodiscard]] std::string FormatMap(const MapInfo& map);
 [[nodiscard]] std::string FormatEdit(const MapEdit& edit);
 [[nodiscard]] std::string FormatTrajectoryError(const TrajectoryError& error);
+// A table with one line for each trajectory.
+[[nodiscard]] std::string FormatCrispness(const std::vector<NamedCrispness>& rows);
 [[nodiscard]] std::string FormatLogReport(const LogReport& report);
 
 }  // namespace cairn::client

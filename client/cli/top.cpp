@@ -9,9 +9,12 @@
 #include "client/cli/interrupt.h"
 #include "client/cli/json_output.h"
 #include "client/cli/top_table.h"
+#include "client/cli/top_terminal.h"
 
 namespace cairn::client {
 namespace {
+
+using Clock = std::chrono::steady_clock;
 
 struct TopArguments {
   double interval_s = 1.0;
@@ -22,44 +25,52 @@ Result<TopView> AskServer(Program& program) {
   TopView view;
   auto status = program.Ask([](QueryClient& server) { return server.ServerStatus(); });
   if (!status) return tl::unexpected(status.error());
+  auto maps = program.Ask([](QueryClient& server) { return server.Maps(); });
+  if (!maps) return tl::unexpected(maps.error());
   auto jobs = program.Ask([](QueryClient& server) { return server.Jobs(); });
   if (!jobs) return tl::unexpected(jobs.error());
+  // An addition only: the rest is shown where there is no answer to this.
+  auto ros2 = program.Ask([](QueryClient& server) { return server.Ros2(); });
+  if (ros2) view.ros2 = std::move(*ros2);
   view.status = std::move(*status);
+  view.maps = std::move(*maps);
   view.jobs = std::move(*jobs);
-  view.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  view.seconds = std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
   return view;
+}
+
+nlohmann::json ToJson(const TopView& view) {
+  nlohmann::json object = {{"robots", view.status.robots},
+                           {"sites", view.maps},
+                           {"jobs", view.jobs},
+                           {"degraded", view.status.degraded},
+                           {"load", view.status.load}};
+  if (view.ros2.door.enabled) object["ros2"] = view.ros2;
+  return object;
 }
 
 ExitCode ShowTop(Program& program, const TopArguments& arguments) {
   // On a terminal each table takes the place of the one before; in a file or a pipe they follow each other.
   const bool screen = &program.out() == &std::cout && isatty(STDOUT_FILENO) != 0 && !program.options.json;
+  const auto interval =
+      std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(arguments.interval_s));
   std::optional<TopView> before;
   for (int shown = 0; !Interrupted() && (arguments.count == 0 || shown < arguments.count); ++shown) {
-    if (shown > 0) {
-      const std::chrono::duration<double> interval(arguments.interval_s);
-      WaitUntil(std::chrono::steady_clock::now() +
-                std::chrono::duration_cast<std::chrono::steady_clock::duration>(interval));
-      if (Interrupted()) break;
-    }
+    const bool last = shown + 1 == arguments.count;
     auto now = AskServer(program);
     // The server may be started again; where nobody looks at it, its silence ends the command.
     if (!now && (!screen || shown == 0)) return program.Refuse(now.error());
-    std::string text = now ? FormatTop(*now, before ? &*before : nullptr) : now.error().message + "\n";
+    const auto text = [&](const TerminalSize& size) {
+      return now ? FormatTop(*now, before ? &*before : nullptr, size) : FitTerminal(now.error().message + "\n", size);
+    };
+    const auto next = Clock::now() + (last ? Clock::duration::zero() : interval);
     if (screen) {
-      text.insert(0, "\x1b[H\x1b[2J");
-    } else if (shown > 0) {
-      text.insert(0, "\n");
+      if (!DrawUntil(program.out(), text, next)) break;
+    } else {
+      program.Print((shown > 0 ? "\n" : "") + text({}), ToJson(*now));
+      WaitUntil(next);
     }
-    nlohmann::json object;
-    if (now) {
-      object = {{"robots", now->status.robots},
-                {"jobs", now->jobs},
-                {"degraded", now->status.degraded},
-                {"load", now->status.load}};
-      before = std::move(*now);
-    }
-    program.Print(text, object);
-    program.out().flush();
+    if (now) before = std::move(*now);
   }
   return ExitCode::kOk;
 }
@@ -67,11 +78,12 @@ ExitCode ShowTop(Program& program, const TopArguments& arguments) {
 }  // namespace
 
 void AddTop(CLI::App& app, Program& program) {
-  auto* command = app.add_subcommand("top", "Robots and jobs, shown again and again until Ctrl-C");
+  auto* command = app.add_subcommand("top", "Server, sites, jobs and robots, shown again and again until q or Ctrl-C");
   command->footer(
-      "One line for each robot: state, pose, doubt of the position, scans used and dropped in a second, scans that "
-      "wait,\n"
-      "time from scan to pose. Below: jobs that are not finished, and what the server refused.\n"
+      "How busy the server is and what it refused; one line for each site, with its enabled version, its epoch, the\n"
+      "memory that its map takes and its jobs that are not finished; problems of ROS 2 robots (see `cairn ros2\n"
+      "doctor`); jobs that are not finished; and one line for each robot: state, pose, doubt of the position, scans\n"
+      "used and dropped in a second, scans that wait, time from scan to pose. What does not fit the terminal is cut.\n"
       "EXAMPLES\n  cairn top\n  cairn top --interval 5\n  cairn top -n 1 --json");
   auto arguments = std::make_shared<TopArguments>();
   command->add_option("--interval", arguments->interval_s, "Time between two tables")

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "client/lib/client_id.h"
+#include "client/lib/last_request.h"
 
 namespace cairn::client {
 namespace {
@@ -170,6 +171,7 @@ Result<Reply> QueryClient::Exchange(Request request, Deadline begun, Deadline de
   }
   for (;;) {
     const Result<void> published = wire->Publish(request);
+    if (published && every == kOnce) NoteRequest(request);
     const Deadline again = every == kOnce ? begun : std::min(begun, Clock::now() + every);
     const MutexLock lock(mutex_);
     const auto pending = pending_.find(request.sequence);

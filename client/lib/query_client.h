@@ -107,6 +107,9 @@ class QueryClient {
   // The map of one site. kNotFound if the server has none of that name.
   [[nodiscard]] Result<MapInfo> Map(const std::string& site);
   [[nodiscard]] Result<TileAnswer> Tiles(const TileQuery& query);
+  // What one robot alone has drawn: of a robot that is not joined with the map of its site, in the frame of its start,
+  // else in that of the map. kNotFound: the server does not know it, or it has drawn nothing.
+  [[nodiscard]] Result<std::vector<Tile>> RobotTiles(const std::string& robot, std::uint32_t level = 0);
   // The whole map at one level. kUnavailable where nothing is drawn yet.
   [[nodiscard]] Result<OccupancyImage> MapImage(const std::string& site, std::uint32_t level = 0);
   // By how much robots, or today and earlier runs, differ: 0..100 in cells that at least two have seen. kUnavailable

@@ -127,6 +127,12 @@ Result<TileAnswer> QueryClient::Tiles(const TileQuery& query) {
   });
 }
 
+Result<std::vector<Tile>> QueryClient::RobotTiles(const std::string& robot, std::uint32_t level) {
+  Request request = AboutRobot(RequestKind::kTiles, robot);
+  request.level = level;
+  return Ask(request).map([](Reply&& reply) { return std::move(reply.tiles); });
+}
+
 Result<OccupancyImage> QueryClient::ImageOf(const TileQuery& query, const std::string& none) {
   auto info = Map(query.site);
   if (!info) return tl::unexpected(info.error());

@@ -22,11 +22,24 @@ Ros2Findings::Namespace FindingsOf(const Ros2Namespace& one) {
   return findings;
 }
 
+// What was lost, or nothing.
+std::string LossesText(const Ros2DoorState& door) {
+  if (door.malformed == 0 && door.overflow == 0 && door.unpublished == 0) return {};
+  return fmt::format(
+      "; messages since the server's start: {} not decoded, {} dropped for want of room, {} not published",
+      door.malformed, door.overflow, door.unpublished);
+}
+
+const char* StateText(const Ros2Findings::Namespace& one) {
+  if (!one.on_map) return ": NOT on the map";
+  return one.problems.empty() ? ": on the map" : ": on the map, but:";
+}
+
 }  // namespace
 
 Ros2Findings FindingsOf(const Ros2Report& report) {
   Ros2Findings findings;
-  findings.where = fmt::format("ROS 2 in DDS domain {}", report.door.domain);
+  findings.where = fmt::format("ROS 2 in DDS domain {}{}", report.door.domain, LossesText(report.door));
   findings.problems = report.door.problems;
   for (const Ros2Namespace& one : report.namespaces) findings.namespaces.push_back(FindingsOf(one));
   if (report.namespaces.empty()) {
@@ -42,7 +55,7 @@ std::string FormatRos2(const Ros2Findings& findings) {
   for (const std::string& problem : findings.problems) text += fmt::format("! {}\n", problem);
   if (!findings.advice.empty()) text += findings.advice + "\n";
   for (const Ros2Findings::Namespace& one : findings.namespaces) {
-    text += fmt::format("{}  {}{}\n", one.name, one.who, one.on_map ? ": on the map" : ": NOT on the map");
+    text += fmt::format("{}  {}{}\n", one.name, one.who, StateText(one));
     for (const std::string& problem : one.problems) text += fmt::format("  - {}\n", problem);
     for (const std::string& topic : one.topics) text += fmt::format("    {}\n", topic);
   }

@@ -1,6 +1,6 @@
-// What the server's report about ROS 2 robots says in words: why a robot is not on the map. `cairn ros2 doctor` prints
-// these texts, and the page of cairn-web shows them. Names in them come from the wire: whoever shows them escapes them.
-// Stateless.
+// What the server's report about ROS 2 robots says in words: why a robot is not on the map, and what else is wrong.
+// `cairn ros2 doctor` prints these texts, and the page of cairn-web shows them. Names in them come from the wire:
+// whoever shows them escapes them. Stateless.
 #pragma once
 
 #include <string>
@@ -15,10 +15,10 @@ struct Ros2Findings {
     std::string name;                   // "/r1".
     std::string who;                    // The robot and the site that the rules of the server give it.
     bool on_map = false;                // Scans are used, and its last pose is localized.
-    std::vector<std::string> problems;  // Why not, in the order in which to mend them.
+    std::vector<std::string> problems;  // Why not, or what else is wrong, in the order in which to mend them.
     std::vector<std::string> topics;    // One line each: what arrives.
   };
-  std::string where;                  // Where the server looks.
+  std::string where;                  // Where the server looks, and what it has lost there.
   std::vector<std::string> problems;  // Of all robots together.
   std::string advice;                 // Where no namespace is seen: what to look at. Else empty.
   std::vector<Namespace> namespaces;

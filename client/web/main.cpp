@@ -6,12 +6,17 @@
 
 #include <CLI/CLI.hpp>
 #include <array>
+#include <chrono>
 #include <cstdlib>
 #include <iostream>
 #include <optional>
 #include <random>
+#include <string>
+#include <string_view>
+#include <vector>
 
 #include "client/web/web_page.h"
+#include "common/log_line.h"
 #include "common/version.h"
 #include "common/wire/wire_arguments.h"
 
@@ -23,7 +28,12 @@ struct Arguments {
   wire::WireArguments wire;
   wire::WireOptions wire_options;
   std::vector<std::string> token;  // Empty: no option; "": one is drawn.
+  std::string log_format = "text";
 };
+
+LogFormat FormatOf(const Arguments& arguments) {
+  return arguments.log_format == kLogFormats[1] ? LogFormat::kJson : LogFormat::kText;
+}
 
 std::string NewToken() {
   constexpr std::string_view kLetters = "abcdefghijklmnopqrstuvwxyz234567";
@@ -38,9 +48,22 @@ std::string AddressText(const HttpOptions& options, int port) {
   return "http://" + host + ":" + std::to_string(port) + "/";
 }
 
+// From any thread: a line is written at once.
+void Log(LogFormat format, std::string_view level, std::string_view message, const LogSubject& fields = {}) {
+  std::cerr << LogLine(format, std::chrono::system_clock::now(), level, message, fields) + "\n";
+}
+
 int Refuse(const std::string& why, int code) {
   std::cerr << "cairn-web: " << why << "\n";
   return code;
+}
+
+// With --log-format json, also the line that says why the start failed is an object.
+int FailStart(const Arguments& arguments, const Status& why) {
+  constexpr int kFailed = 1;
+  if (FormatOf(arguments) == LogFormat::kText) return Refuse(why.message, kFailed);
+  Log(LogFormat::kJson, "critical", "cannot start: " + why.message);
+  return kFailed;
 }
 
 void AddOptions(CLI::App& app, Arguments& arguments) {
@@ -60,6 +83,9 @@ void AddOptions(CLI::App& app, Arguments& arguments) {
                  "the terminal")
       ->type_name("TEXT")
       ->expected(0, 1);
+  app.add_option("--log-format", arguments.log_format, "How commands are logged on standard error: text or json")
+      ->capture_default_str()
+      ->check(CLI::IsMember(std::vector<std::string>(kLogFormats.begin(), kLogFormats.end())));
   app.add_option("--domain", arguments.wire.domain, "DDS domain of server and robots [CAIRN_DOMAIN, or 0]");
   app.add_option("--set", arguments.wire.assignments,
                  "Set any option of the section wire, e.g. wire.interfaces=192.168.1.5")
@@ -92,13 +118,16 @@ int Serve(const Arguments& arguments, bool commands) {
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
 
   auto bus = wire::Bus::Create(arguments.wire_options, "cairn-web");
-  if (!bus) return Refuse(bus.error().message, 1);
+  if (!bus) return FailStart(arguments, bus.error());
   WebOptions options;
   if (commands) options.token = given.empty() ? NewToken() : given;
+  options.log = [format = FormatOf(arguments)](const std::string& message, const LogSubject& fields) {
+    Log(format, "info", message, fields);
+  };
   auto page = WebPage::Create(**bus, options);
-  if (!page) return Refuse(page.error().message, 1);
+  if (!page) return FailStart(arguments, page.error());
   auto server = HttpServer::Start(arguments.http, [&](const HttpRequest& request) { return (*page)->Answer(request); });
-  if (!server) return Refuse(server.error().message, 1);
+  if (!server) return FailStart(arguments, server.error());
   // A page that gets the token this way does not ask for it. The part after # is not sent to any server. A token that
   // was given is not printed.
   std::cout << "cairn-web: " << AddressText(arguments.http, (*server)->port())

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 
 #include "common/map/png_codec.h"
 
@@ -25,18 +26,16 @@ Result<std::string> BytesOf(const RasterImage& image) {
   return EncodePng(image).map([](const auto& png) { return std::string(png.begin(), png.end()); });
 }
 
-}  // namespace
-
-Result<std::string> DrawTile(const Tile& tile, Theme theme) {
-  const auto cells = DecodeCells(tile.bytes, tile.encoding);
-  if (!cells) return tl::unexpected(cells.error());
+// `cells`: row by row from the lowest one.
+Result<std::string> DrawCells(std::span<const std::uint8_t> cells, int width, int height, Theme theme) {
   const Palette palette = PaletteOf(theme);
-  RasterImage image{.width = kTileCells, .height = kTileCells, .channels = 4, .samples = {}};
-  image.samples.resize(std::size_t{4} * kTileArea);
+  const auto columns = static_cast<std::size_t>(width);
+  RasterImage image{.width = width, .height = height, .channels = 4, .samples = {}};
+  image.samples.resize(4 * cells.size());
   auto to = image.samples.begin();
-  for (int row = kTileCells - 1; row >= 0; --row) {
-    for (int column = 0; column < kTileCells; ++column, to += 4) {
-      const std::uint8_t cell = (*cells)[static_cast<std::size_t>(row * kTileCells + column)];
+  for (auto row = static_cast<std::size_t>(height); row-- > 0;) {
+    for (std::size_t column = 0; column < columns; ++column, to += 4) {
+      const std::uint8_t cell = cells[row * columns + column];
       if (cell == kUnknownCell) continue;  // Transparent.
       const double share = cell / 100.0;
       for (std::size_t i = 0; i < 3; ++i) {
@@ -47,6 +46,18 @@ Result<std::string> DrawTile(const Tile& tile, Theme theme) {
     }
   }
   return BytesOf(image);
+}
+
+}  // namespace
+
+Result<std::string> DrawTile(const Tile& tile, Theme theme) {
+  const auto cells = DecodeCells(tile.bytes, tile.encoding);
+  if (!cells) return tl::unexpected(cells.error());
+  return DrawCells(*cells, kTileCells, kTileCells, theme);
+}
+
+Result<std::string> DrawMap(const OccupancyImage& map, Theme theme) {
+  return DrawCells(map.cells, map.width, map.height, theme);
 }
 
 Result<std::string> DrawDisagreement(const OccupancyImage& image) {

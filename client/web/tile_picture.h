@@ -14,7 +14,9 @@ enum class Theme { kLight, kDark };
 
 // The bytes of a PNG: a tile in the colours of a theme. Fails where the tile's bytes are damaged.
 [[nodiscard]] Result<std::string> DrawTile(const Tile& tile, Theme theme);
-// The same of the cells about which robots differ by more than half (QueryClient::DisagreementImage).
+// The same of a whole map. REQUIRES: it has at least one cell, and as many as its size says.
+[[nodiscard]] Result<std::string> DrawMap(const OccupancyImage& map, Theme theme);
+// The bytes of a PNG that shows the cells about which robots differ by more than half (QueryClient::DisagreementImage).
 [[nodiscard]] Result<std::string> DrawDisagreement(const OccupancyImage& image);
 
 }  // namespace cairn::web

@@ -62,7 +62,7 @@ void Viewer::AddView(const ServerView& view, std::string& piece) {
 }
 
 void Viewer::AddTiles(std::string& piece) {
-  const client::TileChanges changes = map_->map().ChangesSince(tiles_);
+  const client::TileChanges changes = pacer_.Next(map_->map().ChangesSince(tiles_), Clock::now());
   tiles_ = changes.now;
   if (changes.whole || !changes.changed.empty()) piece += Event("tiles", TilesJson(changes));
 }

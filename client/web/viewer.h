@@ -11,6 +11,7 @@
 
 #include "client/web/server_watch.h"
 #include "client/web/site_maps.h"
+#include "client/web/tile_pacer.h"
 #include "common/mutex.h"
 
 namespace cairn::web {
@@ -67,6 +68,7 @@ class Viewer {
   StateTexts::Text state_;
   StateTexts::Text doctor_;
   client::TileChanges::Place tiles_;
+  TilePacer pacer_;
   std::int64_t flow_ms_ = 0;
   Clock::time_point told_{};
 };

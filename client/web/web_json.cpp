@@ -56,21 +56,19 @@ Json LedgerJson(const Ledger& ledger) {
           {"p50", ledger.latency_p50_ms},  {"p99", ledger.latency_p99_ms}, {"odometry", ledger.odometry_received}};
 }
 
-// Whether the robot maps or is only localised. The server says the latter in the text of a status that is OK
-// (idl/README.md); null where the status says something else.
-Json ModeOf(const SessionState& session) {
-  constexpr std::string_view kOnlyLocalised = "only localised";
-  if (!session.status.ok()) return nullptr;
-  return session.status.message.substr(0, kOnlyLocalised.size()) == kOnlyLocalised ? "localise" : "map";
-}
-
 Json RobotJson(const RobotStatus& robot) {
   Json ledgers = Json::array();
   for (const Ledger& ledger : robot.ledgers) ledgers.push_back(LedgerJson(ledger));
-  Json json = {{"name", robot.session.robot},  {"phase", SessionPhaseName(robot.session.phase)},
-               {"stale", robot.session.stale}, {"note", robot.session.status.message},
-               {"alive", robot.alive},         {"sensors", ledgers},
-               {"mode", ModeOf(robot.session)}};
+  const SessionState& session = robot.session;
+  // The server says in a status that is OK that a robot is only localised; `mode` says the same.
+  const bool said_by_mode = session.localise_only && session.status.ok();
+  Json json = {{"name", session.robot},
+               {"phase", SessionPhaseName(session.phase)},
+               {"stale", session.stale},
+               {"note", said_by_mode ? std::string() : session.status.message},
+               {"alive", robot.alive},
+               {"sensors", ledgers},
+               {"mode", session.localise_only ? "localise" : "map"}};
   json["pose"] = robot.pose.reason == PoseReason::kWaiting ? Json() : PoseJson(robot.pose);
   return json;
 }

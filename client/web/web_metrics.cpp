@@ -2,9 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
+#include <cstdint>
 #include <map>
+#include <set>
 #include <string_view>
 #include <vector>
+
+#include "common/sensor/stamp.h"
 
 namespace cairn::web {
 namespace {
@@ -71,7 +77,8 @@ std::string RobotMetrics(const std::vector<RobotStatus>& robots) {
       for (int i = 0; i < kDropReasonCount; ++i) {
         const std::uint64_t count = ledger.dropped[static_cast<std::size_t>(i)];
         const auto reason = DropReasonName(static_cast<DropReason>(i));
-        if (count > 0) dropped.Add(fmt::format("{},reason={}", sensor, Quoted(reason)), count);
+        // Also 0: Prometheus sees a counter grow only after it has seen it once before.
+        dropped.Add(fmt::format("{},reason={}", sensor, Quoted(reason)), count);
       }
       latency.Add(sensor + ",quantile=\"0.5\"", ledger.latency_p50_ms / 1000.0);
       latency.Add(sensor + ",quantile=\"0.99\"", ledger.latency_p99_ms / 1000.0);
@@ -83,20 +90,81 @@ std::string RobotMetrics(const std::vector<RobotStatus>& robots) {
   return text;
 }
 
-std::string SiteMetrics(const std::vector<MapInfo>& maps, const std::vector<Job>& kept_jobs) {
+std::string PoseReasonMetrics(const std::vector<RobotStatus>& robots) {
+  Metric metric("cairn_robot_pose_reason", "gauge", "1 for the one reason that the robot's pose has now, else 0.");
+  for (const RobotStatus& robot : robots) {
+    for (int i = 0; i <= static_cast<int>(PoseReason::kNotJoined); ++i) {
+      const auto reason = static_cast<PoseReason>(i);
+      metric.Add(fmt::format("{},reason={}", RobotLabels(robot), Quoted(PoseReasonName(reason))),
+                 robot.pose.reason == reason ? 1 : 0);
+    }
+  }
+  return metric.text();
+}
+
+std::string MapMetrics(const std::vector<MapInfo>& maps) {
   Metric tiles("cairn_map_tiles", "gauge", "Tiles of the map, of all levels.");
   Metric version("cairn_map_enabled_version", "gauge", "The map version that is enabled.");
+  Metric memory("cairn_site_memory_bytes", "gauge",
+                "What the site's map and its versions take in the server's memory.");
   for (const MapInfo& map : maps) {
     const std::string labels = "site=" + Quoted(map.site);
     tiles.Add(labels, map.tile_count);
     version.Add(labels, map.enabled_version);
+    memory.Add(labels, map.memory_bytes);
+  }
+  return tiles.text() + version.text() + memory.text();
+}
+
+// Of each site every state is written, also where no job has it, and the time of the last failure. The time, and not a
+// count of failures, because it does not depend on what this process has seen: it is the same after a restart of this
+// process, it does not fall when the server forgets older jobs, and a site that is loaded with old jobs has not failed
+// just now.
+std::string JobMetrics(const std::set<std::string>& known_sites, const std::vector<Job>& kept_jobs) {
+  struct OfSite {
+    std::array<int, static_cast<std::size_t>(JobState::kCancelled) + 1> counts{};
+    Stamp last_failure = 0;
+  };
+  std::map<std::string, OfSite> sites;
+  for (const std::string& site : known_sites) sites.try_emplace(site);
+  for (const Job& job : kept_jobs) {
+    OfSite& site = sites[job.site];
+    const auto state = static_cast<std::size_t>(job.state);
+    if (state < site.counts.size()) ++site.counts[state];
+    if (job.state == JobState::kFailed) site.last_failure = std::max(site.last_failure, job.ended);
   }
   Metric jobs("cairn_jobs", "gauge", "Jobs that the server remembers, by state.");
-  std::map<std::string, int> counts;
-  for (const Job& job : kept_jobs)
-    ++counts[fmt::format("site={},state={}", Quoted(job.site), Quoted(JobStateName(job.state)))];
-  for (const auto& [labels, count] : counts) jobs.Add(labels, count);
-  return tiles.text() + version.text() + jobs.text();
+  Metric failure("cairn_job_last_failure_timestamp_seconds", "gauge",
+                 "When a job of the site failed last, in seconds since 1970 by the server's clock; 0 if none did.");
+  for (const auto& [name, site] : sites) {
+    const std::string labels = "site=" + Quoted(name);
+    for (std::size_t i = 0; i < site.counts.size(); ++i)
+      jobs.Add(fmt::format("{},state={}", labels, Quoted(JobStateName(static_cast<JobState>(i)))), site.counts[i]);
+    failure.Add(labels, SecondsFromStamp(site.last_failure));
+  }
+  return jobs.text() + failure.text();
+}
+
+std::string Ros2Metrics(const Ros2Report& report) {
+  std::uint64_t on_map = 0, not_on_map = 0;
+  for (const Ros2Namespace& one : report.namespaces) {
+    // The server remembers robots that are switched off; nobody publishes a topic of theirs.
+    if (one.topics.empty()) continue;
+    ++(one.on_map ? on_map : not_on_map);
+  }
+  Metric robots("cairn_ros2_robots", "gauge",
+                "Namespaces in which a ROS 2 robot publishes, by whether it is on the map.");
+  robots.Add("on_map=\"true\"", on_map);
+  robots.Add("on_map=\"false\"", not_on_map);
+  Metric refused("cairn_ros2_refused_total", "counter", "Messages of ROS 2 robots that could not be decoded.");
+  refused.Add("", report.door.malformed);
+  Metric overflow("cairn_ros2_overflow_total", "counter",
+                  "Messages of ROS 2 robots that found no room in the server's queue.");
+  overflow.Add("", report.door.overflow);
+  Metric unpublished("cairn_ros2_unpublished_total", "counter",
+                     "Messages to ROS 2 robots that could not be published.");
+  unpublished.Add("", report.door.unpublished);
+  return robots.text() + refused.text() + overflow.text() + unpublished.text();
 }
 
 std::string RefusalMetrics(const Refusals& refused) {
@@ -123,7 +191,11 @@ std::string LoadMetrics(const ServerLoad& load) {
   Metric waiting("cairn_server_waiting", "gauge", "Values in the server's queues that no thread has looked at yet.");
   waiting.Add("queue=\"inbound\"", load.inbound_waiting);
   waiting.Add("queue=\"outbound\"", load.outbound_waiting);
-  std::string text = up.text() + processor.text() + memory.text() + waiting.text();
+  Metric wait("cairn_server_strand_wait_seconds", "summary",
+              "Time that work waits for a thread, of the last 4,096 turns.");
+  wait.Add("quantile=\"0.5\"", load.strand_wait_p50_ms / 1000.0);
+  wait.Add("quantile=\"0.99\"", load.strand_wait_p99_ms / 1000.0);
+  std::string text = up.text() + processor.text() + memory.text() + waiting.text() + wait.text();
   if (!load.stores) return text;
   Metric commits("cairn_store_commits_total", "counter", "Commits of the server's store, by result.");
   commits.Add("result=\"stored\"", load.commits);
@@ -145,7 +217,8 @@ std::string MetricsText(const ServerView& view) {
   Metric degraded("cairn_degraded", "gauge", "1 while the server cannot store new data, or did not restore all.");
   degraded.Add("", view.status.degraded.empty() ? 0 : 1);
   return up.text() + degraded.text() + LoadMetrics(view.status.load) + RefusalMetrics(view.status.refused) +
-         RobotMetrics(view.status.robots) + SiteMetrics(view.maps, view.jobs);
+         RobotMetrics(view.status.robots) + PoseReasonMetrics(view.status.robots) + MapMetrics(view.maps) +
+         JobMetrics(view.Sites(), view.jobs) + (view.ros2 != nullptr ? Ros2Metrics(*view.ros2) : std::string());
 }
 
 }  // namespace cairn::web

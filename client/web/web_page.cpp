@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "client/lib/last_request.h"
 #include "client/web/http_answers.h"
 #include "client/web/tile_picture.h"
 #include "client/web/web_json.h"
@@ -60,8 +61,14 @@ Result<std::unique_ptr<WebPage>> WebPage::Create(wire::Bus& bus, const WebOption
 }
 
 HttpResponse WebPage::Answer(const HttpRequest& request) {
+  const auto begun = std::chrono::steady_clock::now();
   const Parts parts = SplitPath(request.path);
-  HttpResponse response = request.method == "POST" ? AnswerPost(request, parts) : AnswerGet(request, parts);
+  const bool posted = request.method == "POST";
+  client::TakeLastRequest();  // That of an earlier answer of this thread, which an exception ended.
+  HttpResponse response = posted ? AnswerPost(request, parts) : AnswerGet(request, parts);
+  const std::string id = client::TakeLastRequest();
+  if (!id.empty()) response.headers.emplace_back("X-Request-Id", id);
+  if (posted && !id.empty()) LogCommand(request, parts, id, response.status, begun);
   // Nothing from outside, no frames, no guessing of types.
   response.headers.insert(
       response.headers.end(),
@@ -90,6 +97,7 @@ HttpResponse WebPage::AnswerGet(const HttpRequest& request, const Parts& parts) 
   if (parts.size() == 2 && parts[1] == "doctor") return JsonAnswer(*states_.Doctor(*watch_->view()));
   if (parts.size() == 4 && parts[1] == "robots" && parts[3] == "path")
     return Path(parts[2], request.Query("smoothed") == "1");
+  if (parts.size() == 4 && parts[1] == "robots" && parts[3] == "map.png") return FragmentMap(request, parts[2]);
   if (parts.size() >= 4 && parts[1] == "sites") return AnswerAboutSite(request, parts);
   return HttpError(404, "there is no such address");
 }
@@ -278,6 +286,19 @@ HttpResponse WebPage::AnswerPost(const HttpRequest& request, const Parts& parts)
   }
   watch_->AskNow();
   return response;
+}
+
+void WebPage::LogCommand(const HttpRequest& request, const Parts& parts, const std::string& id, int status,
+                         std::chrono::steady_clock::time_point begun) const {
+  if (!options_.log || parts.size() < 3) return;
+  LogSubject fields;
+  fields.request = id;
+  fields.client = id.substr(0, id.find('-'));
+  if (parts[1] == "robots") fields.robot = parts[2];
+  if (parts[1] == "sites") fields.site = parts[2];
+  if (parts[1] == "jobs") static_cast<void>(ParseNumber(parts[2], fields.job));
+  const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - begun;
+  options_.log(fmt::format("POST {}: {} after {:.1f} ms", request.path, status, took.count()), fields);
 }
 
 HttpResponse WebPage::CommandRobot(const std::string& robot, const std::string& command, const std::string& body) {

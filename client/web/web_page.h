@@ -5,6 +5,7 @@
 #pragma once
 
 #include <chrono>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -15,11 +16,14 @@
 #include "client/web/site_maps.h"
 #include "client/web/viewer.h"
 #include "common/http/http_server.h"
+#include "common/log_line.h"
 
 namespace cairn::web {
 
 struct WebOptions {
   std::string token;  // Who sends it may send commands. Empty: nobody may.
+  // Called after each command that was sent to the server, on the thread that answers. Null: nothing is logged.
+  std::function<void(const std::string& message, const LogSubject& fields)> log = nullptr;
 };
 
 class WebPage {
@@ -27,6 +31,7 @@ class WebPage {
   // `bus` outlives the page, and the page outlives the HTTP server and its streams.
   [[nodiscard]] static Result<std::unique_ptr<WebPage>> Create(wire::Bus& bus, const WebOptions& options);
 
+  // If the server was asked for the answer, its header X-Request-Id holds the id of the request (RequestId).
   [[nodiscard]] HttpResponse Answer(const HttpRequest& request);
   [[nodiscard]] ServerWatch& watch() { return *watch_; }
   [[nodiscard]] const SiteMaps& maps() const { return maps_; }
@@ -46,6 +51,8 @@ class WebPage {
   [[nodiscard]] HttpResponse TileFile(const HttpRequest& request, const Parts& parts);
   [[nodiscard]] HttpResponse MapFile(const std::string& site, const std::string& name);
   [[nodiscard]] HttpResponse Disagreement(const std::string& site);
+  // What one robot alone has drawn, for those that are not joined with the map of their site (fragment_picture.h).
+  [[nodiscard]] HttpResponse FragmentMap(const HttpRequest& request, const std::string& robot);
   [[nodiscard]] HttpResponse Metrics() const;
   [[nodiscard]] HttpResponse Landmarks(const std::string& site);
   [[nodiscard]] HttpResponse Edits(const std::string& site);
@@ -53,6 +60,8 @@ class WebPage {
   // The newest answer to a question that many people ask.
   [[nodiscard]] HttpResponse Recent(const std::string& question, const AnswerCache::Ask& ask);
   [[nodiscard]] bool MayCommand(const HttpRequest& request) const;
+  void LogCommand(const HttpRequest& request, const Parts& parts, const std::string& id, int status,
+                  std::chrono::steady_clock::time_point begun) const;
 
   const WebOptions options_;
   std::unique_ptr<ServerWatch> watch_;
@@ -61,6 +70,7 @@ class WebPage {
   StateTexts states_;
   AnswerCache answers_{std::chrono::seconds(4), 64};
   AnswerCache pictures_{std::chrono::seconds(10), 8};
+  AnswerCache fragments_{std::chrono::seconds(4), 32};
   AnswerCache exports_{std::chrono::seconds(4), 2};  // A large map takes 100 MB while it is drawn: one at a time.
 };
 

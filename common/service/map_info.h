@@ -30,7 +30,9 @@ struct MapInfo {
   std::uint32_t enabled_version = 1;
   std::vector<MapVersionInfo> versions;
   std::uint64_t edits_version = 0;  // Grows with every change of the edits (map_edit.h); 0: there was none.
-  Generation generation = 0;        // Set by the server's egress.
+  // What the site's tiles, grids and versions take in the server's memory. Shared parts count once.
+  std::uint64_t memory_bytes = 0;
+  Generation generation = 0;  // Set by the server's egress.
 };
 
 }  // namespace cairn

@@ -1,6 +1,7 @@
 // A question to the server and its answer, as plain values.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -26,7 +27,7 @@ enum class RequestKind : std::uint8_t {
   kPing = 0,
   kPose,           // robot; stamp or latest.
   kPath,           // robot; smoothed or live.
-  kTiles,          // site; area, level, since_epoch + since_version.
+  kTiles,          // site; area, level, since_epoch + since_version. Or robot without site: what it alone has drawn.
   kLandmarks,      // site.
   kMapInfo,        // site, or all where empty.
   kStatus,         // Ledgers and session states; robot or all.
@@ -61,6 +62,8 @@ struct Request {
   // Not sent: which participant of the domain it came from, as the receiver of the message knows it. A client chooses
   // its own id, so that shares of the server's time go by this number. 0: not received.
   std::uint64_t asker = 0;
+  // Not sent: when the server took it.
+  std::chrono::steady_clock::time_point received = {};
   ClientId client = 0;
   std::int64_t sequence = 0;
   RequestKind kind = RequestKind::kPing;

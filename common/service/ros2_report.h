@@ -23,13 +23,18 @@ struct Ros2Namespace {
   std::string robot;  // Empty where no rule fits.
   std::string site;
   bool on_map = false;                // Scans are used, and its last pose is localized.
-  std::vector<std::string> problems;  // Why not, in the order in which to mend them; empty if on the map.
+  std::vector<std::string> problems;  // Why not, or what else is wrong, in the order in which to mend it.
   std::vector<Ros2Topic> topics;
 };
 
 struct Ros2DoorState {
   bool enabled = false;
   std::int64_t domain = 0;
+  // Since the server's start: messages that were not decoded, that found no room in the server's queue, and that could
+  // not be published.
+  std::uint64_t malformed = 0;
+  std::uint64_t overflow = 0;
+  std::uint64_t unpublished = 0;
   std::vector<std::string> problems;  // Of all robots together.
 };
 

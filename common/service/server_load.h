@@ -11,7 +11,10 @@ struct ServerLoad {
   std::uint64_t memory_bytes = 0;      // Resident.
   std::uint64_t inbound_waiting = 0;   // Samples, questions and session requests that no thread has looked at yet.
   std::uint64_t outbound_waiting = 0;  // Values that are not written to DDS yet.
-  bool stores = false;                 // Whether it keeps its state. If not, the rest is 0.
+  // From the moment at which a robot's estimator has work until a thread takes it, over the last 4,096 times.
+  double strand_wait_p50_ms = 0.0;
+  double strand_wait_p99_ms = 0.0;
+  bool stores = false;  // Whether it keeps its state. If not, the rest is 0.
   std::uint64_t commits = 0;
   std::uint64_t failed_commits = 0;
   std::uint64_t store_bytes = 0;  // What the records take, as of a few seconds ago.

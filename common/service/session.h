@@ -44,9 +44,10 @@ struct SessionState {
   SessionPhase phase = SessionPhase::kActive;
   Status status;  // Why refused.
   SessionToken session = 0;
-  bool durable = false;       // The server stores the samples.
-  bool stale = false;         // A stream stands still although the robot's client is alive; `status` says which.
-  Generation generation = 0;  // Set by the server's egress.
+  bool durable = false;        // The server stores the samples.
+  bool localise_only = false;  // Nothing is drawn of it (RequestKind::kLocalise).
+  bool stale = false;          // A stream stands still although the robot's client is alive; `status` says which.
+  Generation generation = 0;   // Set by the server's egress.
   // A random number of the site's coordinate frame `map`, never 0. Poses in maps with different numbers cannot be
   // compared.
   std::uint64_t map_frame = 0;

@@ -29,6 +29,7 @@ v1::MapInfo ToWire(const MapInfo& value) {
     out.note(version.note);
   }
   wire.edits_version(value.edits_version);
+  wire.memory_bytes(value.memory_bytes);
   return wire;
 }
 
@@ -53,6 +54,7 @@ MapInfo FromWire(v1::MapInfo&& wire) {
     value.versions.push_back({version.version(), version.enabled(), version.job(), std::move(version.note())});
   }
   value.edits_version = wire.edits_version();
+  value.memory_bytes = wire.memory_bytes();
   return value;
 }
 

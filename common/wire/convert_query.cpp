@@ -118,6 +118,8 @@ static v1::ServerLoad ToWire(const ServerLoad& value) {
   wire.memory_bytes(value.memory_bytes);
   wire.inbound_waiting(value.inbound_waiting);
   wire.outbound_waiting(value.outbound_waiting);
+  wire.strand_wait_p50_ms(value.strand_wait_p50_ms);
+  wire.strand_wait_p99_ms(value.strand_wait_p99_ms);
   wire.stores(value.stores);
   wire.commits(value.commits);
   wire.failed_commits(value.failed_commits);
@@ -132,6 +134,8 @@ static ServerLoad FromWire(v1::ServerLoad&& wire) {
           .memory_bytes = wire.memory_bytes(),
           .inbound_waiting = wire.inbound_waiting(),
           .outbound_waiting = wire.outbound_waiting(),
+          .strand_wait_p50_ms = wire.strand_wait_p50_ms(),
+          .strand_wait_p99_ms = wire.strand_wait_p99_ms(),
           .stores = wire.stores(),
           .commits = wire.commits(),
           .failed_commits = wire.failed_commits(),
@@ -180,11 +184,15 @@ static v1::Ros2DoorState ToWire(const Ros2DoorState& value) {
   v1::Ros2DoorState wire;
   wire.enabled(value.enabled);
   wire.domain(value.domain);
+  wire.malformed(value.malformed);
+  wire.overflow(value.overflow);
+  wire.unpublished(value.unpublished);
   wire.problems(value.problems);
   return wire;
 }
 static Ros2DoorState FromWire(v1::Ros2DoorState&& wire) {
-  return {wire.enabled(), wire.domain(), std::move(wire.problems())};
+  return {wire.enabled(),  wire.domain(),      wire.malformed(),
+          wire.overflow(), wire.unpublished(), std::move(wire.problems())};
 }
 
 // Convert a list element by element, in both directions.

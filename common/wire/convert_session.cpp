@@ -69,6 +69,7 @@ v1::SessionState ToWire(const SessionState& value) {
   wire.phase(static_cast<v1::SessionPhase>(value.phase));
   wire.durable(value.durable);
   wire.map_frame(value.map_frame);
+  wire.localise_only(value.localise_only);
   wire.stale(value.stale);
   wire.status(ToWire(value.status));
   return wire;
@@ -85,6 +86,7 @@ SessionState FromWire(v1::SessionState&& wire) {
   value.phase = static_cast<SessionPhase>(wire.phase());
   value.durable = wire.durable();
   value.map_frame = wire.map_frame();
+  value.localise_only = wire.localise_only();
   value.stale = wire.stale();
   value.status = FromWire(std::move(wire.status()));
   return value;

@@ -2,17 +2,19 @@
 #   cairn-server   cairnd with its unit and its configuration, cairn-offline, cairn-calibrate
 #   cairn-client   cairn: robots from logs, questions, maps, jobs
 #   cairn-web      the page with the live map, with its unit
-#   libcairn-dev   the client library for find_package(cairn)
+#   libcairn0.1    the client library; the number is that of its binary interface
+#   libcairn-dev   its headers and find_package(cairn), with an example
 # deploy/make-packages.sh builds them. What only a package needs (its copyright, its changelog) is left out of a plain
 # `cmake --install`.
-set(CAIRN_PACKAGES server client web development)
+set(CAIRN_PACKAGES server client web library development)
 set(server_package cairn-server)
 set(client_package cairn-client)
 set(web_package cairn-web)
+set(library_package libcairn${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
 set(development_package libcairn-dev)
 
-# Pages for man(1), from what the programs say themselves. `cmake --build ... --target man_pages`; without help2man
-# there is no such target, and no pages are installed.
+# Pages for man(1), from what the programs say themselves: `cmake --build ... --target man_pages`. What is not built is
+# not installed; without help2man, that is all but the pages of `cairn`.
 find_program(HELP2MAN help2man)
 set(pages)
 function(cairn_man_page program section component name)
@@ -30,10 +32,18 @@ cairn_man_page(cairnd 8 server "mapping server for robot fleets")
 cairn_man_page(cairn-offline 1 server "maps and trajectories from logs, without a server")
 cairn_man_page(cairn-calibrate 1 server "wheels, mountings and motion models of a robot from its logs")
 cairn_man_page(cairn-web 1 web "shows the mapping server cairnd in the browser")
-cairn_man_page(cairn 1 client "client of the mapping server cairnd")
-if(HELP2MAN)
-  add_custom_target(man_pages DEPENDS ${pages})
+# `cairn` writes its pages itself, one for each of its commands: help2man knows no commands of a program.
+set(cairn_pages ${CMAKE_BINARY_DIR}/man/cairn)
+install(DIRECTORY ${cairn_pages}/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT client OPTIONAL
+  FILES_MATCHING PATTERN "*.1.gz")
+if(TARGET cairn)
+  add_custom_command(OUTPUT ${cairn_pages}/cairn.1.gz DEPENDS cairn VERBATIM
+    COMMAND ${CMAKE_COMMAND} -E rm -rf ${cairn_pages}
+    COMMAND cairn --manual-pages ${cairn_pages}
+    COMMAND sh -c "gzip -9n \"$0\"/*.1" ${cairn_pages})
+  list(APPEND pages ${cairn_pages}/cairn.1.gz)
 endif()
+add_custom_target(man_pages DEPENDS ${pages})
 
 set(changelog ${CMAKE_CURRENT_BINARY_DIR}/changelog.gz)
 execute_process(COMMAND gzip -9nc ${CMAKE_CURRENT_LIST_DIR}/changelog OUTPUT_FILE ${changelog})
@@ -59,6 +69,9 @@ set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION misc)
 set(CPACK_DEBIAN_PACKAGE_PRIORITY optional)
 set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
+# For who links a shared library of these packages: dpkg-shlibdeps finds in it which package, and from which version on.
+set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
+set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS_POLICY ">=")
 
 # The scripts with which a package enables, starts, stops and forgets its service. `purge`: more that is deleted then.
 function(cairn_service_scripts folder service purge)
@@ -99,11 +112,21 @@ cairn_service_scripts(${scripts} cairn-web.service "")
 set(CPACK_DEBIAN_WEB_PACKAGE_CONTROL_EXTRA ${scripts}/postinst ${scripts}/prerm ${scripts}/postrm)
 set(CPACK_COMPONENT_WEB_DESCRIPTION "The mapping server cairnd in the browser: the live map with robots and their
 paths, jobs, downloads of maps, and figures for Prometheus.")
+set(CPACK_DEBIAN_LIBRARY_PACKAGE_NAME ${library_package})
+set(CPACK_DEBIAN_LIBRARY_PACKAGE_SECTION libs)
+set(CPACK_DEBIAN_LIBRARY_PACKAGE_SHLIBDEPS ON)
+# The trigger has dpkg run ldconfig. CPack would write scripts that do so, which Debian does not want any more, unless
+# it is given some. These two do not exist: CPack says that they are missing, and the package has none.
+set(CPACK_DEBIAN_LIBRARY_PACKAGE_CONTROL_EXTRA ${CMAKE_CURRENT_LIST_DIR}/triggers
+  ${CMAKE_CURRENT_LIST_DIR}/none/postinst ${CMAKE_CURRENT_LIST_DIR}/none/postrm)
+set(CPACK_COMPONENT_LIBRARY_DESCRIPTION "Client library of the mapping server cairnd, with which programs stream
+scans to a server, ask questions and follow poses and maps.")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libcairn-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
-set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libeigen3-dev, libexpected-dev, libfastcdr-dev, libfastrtps-dev, \
-libfmt-dev, libopencv-core-dev, libopencv-imgcodecs-dev, libopencv-imgproc-dev, libpng-dev, libssl-dev, libyaml-cpp-dev")
-set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "Client library of the mapping server cairnd: headers and static libraries with
-which a program streams scans to a server, asks questions and follows poses and
-maps; for find_package(cairn).")
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
+  "${library_package} (= ${PROJECT_VERSION}), libeigen3-dev, libexpected-dev")
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SUGGESTS "cmake, cairn-server")
+set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "What it takes to compile programs with the client library of the
+mapping server cairnd: headers, find_package(cairn) for CMake, and a robot as
+an example.")
 include(CPack)

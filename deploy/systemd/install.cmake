@@ -1,7 +1,7 @@
 # Run by `cmake --install`. Installs the server's unit and its configuration for the prefix of this call (--prefix,
 # DESTDIR).
 set(bindir ${CMAKE_INSTALL_PREFIX}/bin)
-set(docdir ${CMAKE_INSTALL_PREFIX}/share/doc/cairn)
+set(docdir ${CMAKE_INSTALL_PREFIX}/share/doc/cairn-server)
 set(sysconfdir ${CMAKE_INSTALL_PREFIX}/etc)
 if(CMAKE_INSTALL_PREFIX STREQUAL "/usr")
   set(sysconfdir /etc)

@@ -7,6 +7,8 @@
 #include <exception>
 #include <utility>
 
+#include "server/ops/log_context.h"
+
 namespace cairn::server {
 namespace {
 
@@ -32,10 +34,10 @@ void JobWorker::Start() {
   thread_ = std::jthread([this] { Run(); });
 }
 
-Result<Job> JobWorker::Submit(const std::string& site, JobKind kind, bool enable) {
+Result<Job> JobWorker::Submit(const std::string& site, JobKind kind, bool enable, const std::string& request) {
   auto job = list_.Add(site, kind, enable);
   const bool full_already = queue_.size() >= static_cast<std::size_t>(options_.max_queued);
-  if (job && (full_already || !queue_.TryPush(Ticket{job->id, enable}))) {
+  if (job && (full_already || !queue_.TryPush(Ticket{job->id, enable, request}))) {
     const Status full{StatusCode::kResourceExhausted, "too many jobs are waiting (jobs.max_queued); try again later"};
     list_.Fail(job->id, full);
     return tl::unexpected(full);
@@ -44,7 +46,7 @@ Result<Job> JobWorker::Submit(const std::string& site, JobKind kind, bool enable
 }
 
 void JobWorker::Requeue(std::uint64_t id, bool enable) {
-  if (!queue_.TryPush(Ticket{id, enable}))
+  if (!queue_.TryPush(Ticket{id, enable, {}}))
     list_.Fail(id, {StatusCode::kResourceExhausted, "too many jobs are waiting (jobs.max_queued); try again later"});
 }
 
@@ -79,6 +81,11 @@ void JobWorker::RunOne(const Ticket& ticket) {
   if (!list_.Start(ticket.id)) return;
   const auto job = list_.Find(ticket.id);
   const auto control = list_.ControlOf(ticket.id);
+  LogSubject fields;
+  fields.request = ticket.request;
+  fields.site = job->site;
+  fields.job = job->id;
+  const LogContext context(std::move(fields));
   spdlog::info("job {}: started, {} of site {}", job->id, JobKindName(job->kind), job->site);
   const auto outcome = Work(*job, ticket.enable, *control);
   if (outcome) {

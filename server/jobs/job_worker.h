@@ -24,8 +24,9 @@ class JobWorker {
   ~JobWorker();
 
   void Start();
-  // RESOURCE_EXHAUSTED: the queue is full.
-  Result<Job> Submit(const std::string& site, JobKind kind, bool enable);
+  // RESOURCE_EXHAUSTED: the queue is full. `request`: the id (RequestId) of the request that submits it, for the log;
+  // empty where the server itself does. The next server does not know it any more.
+  Result<Job> Submit(const std::string& site, JobKind kind, bool enable, const std::string& request = "");
   // Queues a restored job, which is in the list already.
   void Requeue(std::uint64_t id, bool enable);
   // Cancels the running and the waiting jobs. Returns when the thread has ended.
@@ -35,6 +36,7 @@ class JobWorker {
   struct Ticket {
     std::uint64_t id = 0;
     bool enable = false;
+    std::string request;
   };
   void Run();  // Until the queue is closed and empty.
   void RunOne(const Ticket& ticket);

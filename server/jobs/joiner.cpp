@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/ops/log_context.h"
+
 namespace cairn::server {
 namespace {
 
@@ -17,6 +19,7 @@ void Joiner::Tick() {
   auto sites = Look();
   std::erase_if(tried_, [&sites](const auto& one) { return !sites.contains(one.first); });
   for (auto& [site, driven] : sites) {
+    const LogContext context(AboutSite(site));
     if (!IsDue(site, driven) || HasWork(site) || jobs_.EndsServers(site, JobKind::kJoin)) continue;
     if (const auto job = worker_.Submit(site, JobKind::kJoin, true); !job)
       spdlog::warn("site {}: no job to join its robots could be submitted: {}", site, job.error().message);

@@ -5,6 +5,8 @@
 
 #include <utility>
 
+#include "server/ops/log_context.h"
+
 namespace cairn::server {
 namespace {
 
@@ -45,6 +47,7 @@ void StartCheck::Compare(const std::shared_ptr<Session>& session, const std::sha
     const std::string why =
         fmt::format("its start contradicts the map: {:.0f} % of the walls that it sees are free for others",
                     100.0 * agreement.contradicted_share());
+    const LogContext context(AboutRobot(session->record().state().robot, session->record().state().site));
     spdlog::warn("robot {}: {}. It is not localized, and not shown, until it is joined with the map",
                  session->record().state().robot, why);
     session->RefuseStart(why);

@@ -184,6 +184,20 @@ std::vector<TileKey> JointMap::RenderDisagreement() {
   return disagreement_.Update(finest);
 }
 
+void JointMap::ForgetDisagreement() {
+  disagreement_ = {};
+  for (const auto& [key, layers] : chunks_) differing_dirty_.insert(key);
+}
+
+void JointMap::Count(MemoryCount& memory) const {
+  for (const auto& [key, layers] : chunks_) {
+    for (const auto& [session, chunk] : layers) memory.Add(chunk, sizeof(slam::GridChunk));
+  }
+  for (const TilePyramid* pyramid : {&sum_, &disagreement_}) {
+    for (const auto& [key, cells] : pyramid->cells()) memory.Add(cells, sizeof(TileCells));
+  }
+}
+
 template <typename Counts>
 std::shared_ptr<const slam::GridChunk> JointMap::SumOf(const Layers& layers, const Counts& counts) const {
   using Chunk = std::shared_ptr<const slam::GridChunk>;

@@ -16,6 +16,7 @@
 
 #include "common/map/tile.h"
 #include "server/maps/map_edits.h"
+#include "server/maps/memory_count.h"
 #include "server/maps/robot_grid.h"
 #include "server/maps/tile_pyramid.h"
 #include "server/slam/grid/occupancy_grid.h"
@@ -68,9 +69,14 @@ class JointMap {
   // Updates cells(). Returns the tiles of all levels that changed, were added or were removed.
   std::vector<TileKey> Render();
   [[nodiscard]] const std::map<TileKey, Cells>& cells() const { return sum_.cells(); }
-  // The same of the tiles that say by how much the sessions that are shown differ (layer_disagreement.h).
+  // The same of the tiles that say by how much the sessions that are shown differ (layer_disagreement.h). What changes
+  // between two calls is computed at the next one only.
   std::vector<TileKey> RenderDisagreement();
   [[nodiscard]] const std::map<TileKey, Cells>& disagreement() const { return disagreement_.cells(); }
+  // Frees them. The next RenderDisagreement makes all anew.
+  void ForgetDisagreement();
+  // Adds the grids of the sessions, and the cells and those of the disagreement.
+  void Count(MemoryCount& memory) const;
 
  private:
   using Layers = std::map<SessionId, std::shared_ptr<const slam::GridChunk>>;

@@ -15,7 +15,7 @@ namespace cairn::server {
 struct MapSnapshot {
   MapInfo info;
   TileSet tiles;         // All levels.
-  TileSet disagreement;  // The same of how much the sessions differ (layer_disagreement.h).
+  TileSet disagreement;  // The same of how much the sessions differ (layer_disagreement.h), while somebody asks for it.
   // Those of the enabled map version; if it has none, those of the newest version that has some.
   SmoothedPaths smoothed;
   std::shared_ptr<const std::vector<MapEdit>> edits = std::make_shared<std::vector<MapEdit>>();

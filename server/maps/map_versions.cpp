@@ -78,4 +78,16 @@ const SmoothedPaths& MapVersions::smoothed() const {
   return of_enabled;
 }
 
+void MapVersions::Count(MemoryCount& memory) const {
+  for (const auto& [number, version] : versions_) {
+    for (const auto& [session, part] : version.parts) {
+      for (const auto& [key, chunk] : part.chunks) memory.Add(chunk, sizeof(slam::GridChunk));
+      if (part.path != nullptr) memory.Add(part.path, part.path->size() * sizeof(Pose2));
+      if (part.numbers != nullptr) memory.Add(part.numbers, part.numbers->size() * sizeof(std::uint64_t));
+    }
+    for (const auto& [robot, smoothed] : version.smoothed)
+      if (smoothed.path != nullptr) memory.Add(smoothed.path, smoothed.path->size() * sizeof(StampedPose));
+  }
+}
+
 }  // namespace cairn::server

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "common/service/map_info.h"
+#include "server/maps/memory_count.h"
 #include "server/maps/robot_grid.h"
 #include "server/store/records.h"
 
@@ -43,6 +44,9 @@ class MapVersions {
 
   // Restores the stored versions. REQUIRES: `enabled` is one of the versions, and all are below `next`.
   void Restore(std::map<std::uint32_t, MapVersion> versions, std::uint32_t next, std::uint32_t enabled);
+
+  // Adds the grids and the paths of all versions.
+  void Count(MemoryCount& memory) const;
 
   [[nodiscard]] std::uint32_t enabled() const { return enabled_; }
   [[nodiscard]] std::uint32_t next() const { return next_; }

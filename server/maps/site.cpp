@@ -197,12 +197,13 @@ void Site::Probe(std::function<void()> done) {
 }
 
 void Site::Render() {
-  const std::vector<TileKey> changed = joint_.Render(), differing = joint_.RenderDisagreement();
-  if (!changed.empty() || !differing.empty() || info_changed_) Refresh(changed, differing, false);
+  const std::vector<TileKey> changed = joint_.Render(), differing = RenderDisagreement();
+  if (!changed.empty() || !differing.empty() || info_changed_ || MemoryIsToBeCounted())
+    Refresh(changed, differing, false);
 }
 
 void Site::RenderAll() {
-  const std::vector<TileKey> changed = joint_.Render(), differing = joint_.RenderDisagreement();
+  const std::vector<TileKey> changed = joint_.Render(), differing = RenderDisagreement();
   Refresh(changed, differing, true);
 }
 
@@ -238,6 +239,8 @@ void Site::Refresh(const std::vector<TileKey>& changed, const std::vector<TileKe
   after->tiles = before->tiles.With(tiles);
   after->disagreement = before->disagreement.With(Encoded(differing, joint_.disagreement(), before->disagreement, all));
   after->info = InfoOf(after->tiles);
+  CountMemory(*after);
+  after->info.memory_bytes = memory_bytes_;
   info_changed_ = true;
   const MutexLock lock(mutex_);
   snapshot_ = std::move(after);

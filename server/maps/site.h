@@ -14,6 +14,7 @@
 #include <asio/strand.hpp>
 #include <asio/thread_pool.hpp>
 #include <atomic>
+#include <chrono>
 #include <exception>
 #include <functional>
 #include <map>
@@ -141,6 +142,14 @@ class Site : public std::enable_shared_from_this<Site> {
   // Renders and publishes what changed, soon; does nothing where an earlier call still waits for the strand. Then calls
   // `then`, if there is one.
   void Publish(std::function<void()> then = {});
+  // Called once, on the strand; INTERNAL if the work ended with an exception.
+  using SnapshotDone = std::function<void(Result<std::shared_ptr<const MapSnapshot>>)>;
+  // The map with the layer of disagreement as it is now. The layer costs as much as the map itself, so it is made when
+  // somebody asks for it, and kept up to date until nobody has asked for a minute.
+  void AskDisagreement(SnapshotDone done);
+  // What one session alone has drawn, as a map of its own: for a fragment in its own frame. Only tiles of `level` are
+  // in it. NOT_FOUND: the session has drawn nothing. REQUIRES: there is such a level.
+  void AskPartOf(SessionId session, int level, SnapshotDone done);
   // Does nothing but call `done` on the strand, to show that the strand makes progress.
   void Probe(std::function<void()> done);
 
@@ -174,6 +183,9 @@ class Site : public std::enable_shared_from_this<Site> {
   void CommitIfComplete();
   void Render();
   void RenderAll();
+  [[nodiscard]] std::vector<TileKey> RenderDisagreement();
+  void CountMemory(const MapSnapshot& snapshot) noexcept;
+  [[nodiscard]] bool MemoryIsToBeCounted() const;
   // Stores what people have said about the map, and publishes it. Returns its version.
   std::uint64_t ShowEdits();
   [[nodiscard]] Result<void> CheckNear(const MapEdit& edit) const;
@@ -229,6 +241,11 @@ class Site : public std::enable_shared_from_this<Site> {
   bool info_changed_ = true;
   std::optional<VersionSwitch> switch_;
   std::set<TileKey> unsent_;  // Tiles (or tombstones) to publish.
+  // Until then the layer of disagreement is kept up to date.
+  std::optional<std::chrono::steady_clock::time_point> disagreement_wanted_;
+  std::optional<std::chrono::steady_clock::time_point> memory_counted_;
+  std::uint64_t memory_bytes_ = 0;  // As counted then, ...
+  bool memory_changed_ = false;     // ... and whether the map has changed since.
 
   std::atomic<bool> lost_part_{false}, loading_{false};
   std::set<SessionId> stored_members_;  // Set by Restore, before others know the site.

@@ -142,7 +142,7 @@ Reply AnswerLandmarks(const Request& request, const Sessions& sessions, const Ma
   return reply;
 }
 
-Answer AnswerTiles(const Request& request, const Maps& maps, Generation generation) {
+std::optional<Reply> RefusesTiles(const Request& request, const Maps& maps) {
   if (maps.empty()) return NoSite(request);
   const MapSnapshot& map = *maps.front();
   if (request.level >= map.info.levels) {
@@ -151,6 +151,12 @@ Answer AnswerTiles(const Request& request, const Maps& maps, Generation generati
                                                                std::to_string(map.info.levels - 1)});
   }
   if (!IsValid(request.area)) return BadArea(request);
+  return std::nullopt;
+}
+
+Answer AnswerTiles(const Request& request, const Maps& maps, Generation generation) {
+  if (auto refused = RefusesTiles(request, maps)) return *std::move(refused);
+  const MapSnapshot& map = *maps.front();
   Reply reply = ReplyTo(request);
   reply.map_epoch = map.info.epoch;
   reply.map_version = map.info.version;

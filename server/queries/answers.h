@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "common/service/request.h"
@@ -43,7 +44,8 @@ using Maps = std::vector<std::shared_ptr<const MapSnapshot>>;
 // The tiles of a level of the map, or of the layer of disagreement, in an area that changed since a version. An area of
 // all zeros means everywhere. If since_epoch is not the map's epoch, or since_generation not the server's `generation`,
 // the client's tiles are no longer valid, and all tiles of the area are sent. INVALID_ARGUMENT: the level or the area
-// is not valid. `maps`: the map of the site, if any.
+// is not valid; RefusesTiles says only this. `maps`: the map of the site, if any.
+[[nodiscard]] std::optional<Reply> RefusesTiles(const Request& request, const Maps& maps);
 [[nodiscard]] Answer AnswerTiles(const Request& request, const Maps& maps, Generation generation);
 
 // The state and the versions of a site's map, or of all maps. `maps`: all maps, or the site's if the request

@@ -7,8 +7,11 @@
 #include <stdexcept>
 #include <utility>
 
+#include "common/service/request_id.h"
 #include "common/version.h"
+#include "server/ops/log_context.h"
 #include "server/queries/answers.h"
+#include "server/queries/request_log.h"
 
 namespace cairn::server {
 namespace {
@@ -59,9 +62,12 @@ void Desk::Start() {
 }
 
 void Desk::Take(Request&& request) {
+  request.received = std::chrono::steady_clock::now();
   const auto refused = requests_.Push(std::move(request));
   if (!refused) return;
-  outbound_.Send(ReplyTo(*refused, {StatusCode::kResourceExhausted, "too many requests are waiting; try again later"}));
+  const Status busy{StatusCode::kResourceExhausted, "too many requests are waiting; try again later"};
+  LogRefused(*refused, busy);
+  outbound_.Send(ReplyTo(*refused, busy));
 }
 
 void Desk::Stop() {
@@ -70,7 +76,9 @@ void Desk::Stop() {
 }
 
 void Desk::Serve(OpenRequest&& open) {
+  std::optional<LogContext> context;  // Also of what is logged about an exception.
   try {
+    context.emplace(FieldsOf(open.request));
     if (!open.rest) {
       auto answer = AnswerTo(open.request);
       if (!answer) return;
@@ -96,8 +104,10 @@ void Desk::Send(OpenRequest& open) {
     auto part = open.rest->Next();
     if (!part) return;
     const bool last = part->last;
+    const Status status = last ? part->status : Status{};
     outbound_.SendPatiently(*std::move(part));
-    if (last) return;
+    if (!last) continue;
+    return LogAnswered(open.request, status);
   }
   requests_.PutBack(std::move(open));
 }
@@ -118,7 +128,7 @@ std::optional<Answer> Desk::AnswerTo(const Request& request) {
       return AnswerPath(request, sessions, sessions.empty() ? Maps{} : MapOf(sessions.front().status.session.site));
     }
     case RequestKind::kTiles:
-      return AnswerTiles(request, MapOf(request.site), generation_);
+      return AskTiles(request);
     case RequestKind::kLandmarks:
       return AnswerLandmarks(request, AllSessions(), MapOf(request.site));
     case RequestKind::kMapInfo:
@@ -221,13 +231,14 @@ Reply Desk::StatusReply(const Request& request) {
 
 Result<Job> Desk::SubmitJob(const Request& request) {
   if (atlas_.Find(request.site) == nullptr) return Fail(StatusCode::kNotFound, "no site '" + request.site + "'");
-  return worker_.Submit(request.site, request.job_kind, request.enable);
+  return worker_.Submit(request.site, request.job_kind, request.enable, RequestId(request.client, request.sequence));
 }
 
 std::optional<Answer> Desk::EnableMap(const Request& request) {
   const auto site = atlas_.Find(request.site);
   if (site == nullptr) return ReplyTo(request, {StatusCode::kNotFound, "no site '" + request.site + "'"});
   site->Enable(request.map_version, [answers = answers_, request](Result<std::uint32_t> enabled) {
+    const LogContext context(FieldsOf(request));
     Reply reply = ReplyTo(request, enabled ? Status{} : enabled.error());
     if (enabled) spdlog::info("site {}: map version {} is enabled", request.site, *enabled);
     answers->Send(request, std::move(reply));
@@ -242,6 +253,7 @@ std::optional<Answer> Desk::EditMap(const Request& asked) {
   request.edit.made =
       std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch()).count();
   const auto answer = [answers = answers_, request](Result<std::uint64_t> edited) {
+    const LogContext context(FieldsOf(request));
     Reply reply = ReplyTo(request, edited ? Status{} : edited.error());
     if (!edited) return answers->Send(request, std::move(reply));
     const bool added = request.kind == RequestKind::kMapEditAdd;

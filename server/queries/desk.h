@@ -3,10 +3,13 @@
 // parts of large answers. The queue is bounded: when it is full, requests are answered RESOURCE_EXHAUSTED at once,
 // first those of the client that has most waiting. A request to enable a map version is answered when the switch is
 // complete; the thread does not wait for it. If handling a request ends with an exception, the request is answered
-// INTERNAL and the thread continues. Thread rule: Take from any thread; Start and Stop from one.
+// INTERNAL and the thread continues. Each answer that was sent is logged with the id of its request (request_log.h).
+// Thread rule: Take from any thread; Start and Stop from one.
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -44,6 +47,16 @@ class Desk {
   [[nodiscard]] Pulse pulse() const { return {requests_.taken(), requests_.size() > 0}; }
 
  private:
+  // Counts the questions for tiles that sites have not answered yet. Thread-safe; may outlive the desk.
+  class SiteQuestions : public std::enable_shared_from_this<SiteQuestions> {
+   public:
+    [[nodiscard]] std::shared_ptr<const void> Take(std::uint64_t asker);
+
+   private:
+    Mutex mutex_;
+    std::map<std::uint64_t, int> open_ CAIRN_GUARDED_BY(mutex_);  // By asker; none is 0.
+  };
+
   // Sends a few parts of the answer; what is left waits for the client's next turn.
   void Serve(OpenRequest&& open);
   void Send(OpenRequest& open);
@@ -54,6 +67,7 @@ class Desk {
   Result<Job> SubmitJob(const Request& request);
   std::optional<Answer> EnableMap(const Request& request);
   std::optional<Answer> EditMap(const Request& request);
+  std::optional<Answer> AskTiles(const Request& request);
   // Where the order is taken, the answer is sent when it is on the disk.
   template <typename Give>
   std::optional<Answer> Order(const Request& request, const Give& give);
@@ -78,6 +92,7 @@ class Desk {
   Ros2Report ros2_ CAIRN_GUARDED_BY(mutex_);
   RequestQueue requests_;
   const std::shared_ptr<CommandAnswers> answers_;
+  const std::shared_ptr<SiteQuestions> site_questions_ = std::make_shared<SiteQuestions>();
   std::jthread thread_;  // The last member, because it uses the members above.
 };
 

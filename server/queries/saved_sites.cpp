@@ -8,12 +8,15 @@
 #include <functional>
 #include <future>
 #include <memory>
+#include <optional>
 #include <set>
 #include <system_error>
 #include <thread>
 #include <utility>
 
+#include "server/ops/log_context.h"
 #include "server/queries/answers.h"
+#include "server/queries/request_log.h"
 
 namespace cairn::server {
 namespace {
@@ -112,12 +115,13 @@ void SavedSites::Stop() {
 }
 
 void SavedSites::Serve(const Request& request) {
+  std::optional<LogContext> context;  // Also of what is logged about an exception.
   Reply reply = ReplyTo(request);
   try {
+    context.emplace(FieldsOf(request));
     auto answer = Answer(request);
     if (!answer) reply.status = answer.error();
-    spdlog::info("{} of site '{}', file '{}': {}", RequestKindName(request.kind), request.site, request.saved,
-                 answer ? "done" : answer.error().message);
+    LogAnswered(request, reply.status);
     if (answer) reply.saved = *std::move(answer);
   } catch (const std::exception& error) {
     spdlog::error("a request of kind {} failed with an exception: {}", RequestKindName(request.kind), error.what());

@@ -4,9 +4,11 @@
 
 #include <chrono>
 #include <exception>
+#include <optional>
 #include <utility>
 
 #include "common/service/start_pose.h"
+#include "server/ops/log_context.h"
 #include "server/store/crash_note.h"
 
 namespace cairn::server {
@@ -71,7 +73,9 @@ void Roster::Take(const SessionRequest& request) {
     }
     return;
   }
+  std::optional<LogContext> context;  // Also of what is logged about an exception.
   try {
+    context.emplace(AboutRobot(request.robot, request.site));
     if (auto admitted = Admit(request); !admitted) Refuse(request, admitted.error());
   } catch (const std::exception& error) {
     spdlog::error("a session of robot {} could not be opened because of an exception: {}", request.robot, error.what());
@@ -370,6 +374,14 @@ std::vector<std::shared_ptr<Session>> Roster::InSite(const std::string& site) co
   }
   for (const auto& [robot_id, session] : sessions_) add(session);
   return in_site;
+}
+
+DelayMeter::Quantiles Roster::waits() const {
+  const DelayMeter newest = [this] {
+    const MutexLock lock(waits_->mutex);
+    return waits_->meter;
+  }();
+  return newest.quantiles();
 }
 
 std::uint64_t Roster::unclaimed_overflow() const {

@@ -31,6 +31,7 @@
 #include <string>
 #include <vector>
 
+#include "common/delay_meter.h"
 #include "common/mutex.h"
 #include "server/maps/atlas.h"
 #include "server/ops/start_control.h"
@@ -100,6 +101,8 @@ class Roster {
   // All sessions that draw the site, also the earlier ones of its robots.
   [[nodiscard]] std::vector<std::shared_ptr<Session>> InSite(const std::string& site) const;
   [[nodiscard]] std::uint64_t unclaimed_overflow() const;
+  // How long the robots' work has waited for a thread, over the last turns of all sessions.
+  [[nodiscard]] DelayMeter::Quantiles waits() const;
 
  private:
   Result<void> Admit(const SessionRequest& request);
@@ -170,6 +173,12 @@ class Roster {
   Journal* const journal_;
   // The roster is being destroyed. Sessions that are destroyed now stay in the store.
   const std::shared_ptr<std::atomic<bool>> closing_ = std::make_shared<std::atomic<bool>>(false);
+  // Sessions may outlive the roster.
+  struct Waits {
+    Mutex mutex;
+    DelayMeter meter CAIRN_GUARDED_BY(mutex);
+  };
+  const std::shared_ptr<Waits> waits_ = std::make_shared<Waits>();
   std::unique_ptr<CrashNote> crash_note_;  // Of the sessions, from when they are restored.
 
   mutable Mutex mutex_;

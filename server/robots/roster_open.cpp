@@ -155,6 +155,11 @@ std::shared_ptr<Session> Roster::Make(const StoredSession& stored, const std::sh
                          .gone =
                              [site, id, closing = closing_] {
                                if (!*closing) site->Leave(id);
+                             },
+                         .waited =
+                             [waits = waits_](std::chrono::nanoseconds waited) {
+                               const MutexLock lock(waits->mutex);
+                               waits->meter.Add(waited);
                              }};
   const auto self = std::make_shared<std::weak_ptr<Session>>();
   if (journal_ != nullptr) {

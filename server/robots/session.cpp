@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "common/thread_time.h"
+#include "server/ops/log_context.h"
 #include "server/store/crash_note.h"
 
 namespace cairn::server {
@@ -68,12 +69,31 @@ bool Session::Take(ScanArrival&& arrival) {
     PublishLedgers(SessionRecord::Urgency::kWhenDue);
     return true;
   }
-  if (const auto displaced = queue_.Push(std::move(arrival))) {
+  const MutexLock lock(merge_mutex_);
+  Enqueue(merge_.Add(std::move(arrival), ScanMerge::Clock::now()));
+  return true;
+}
+
+void Session::Enqueue(std::vector<ScanArrival>&& scans) {
+  if (scans.empty()) return;
+  for (ScanArrival& scan : scans) {
+    const auto displaced = queue_.Push(std::move(scan));
+    if (!displaced) continue;
     record_.ScanDropped(displaced->stream, displaced->scan->sequence, DropReason::kQueueFull);
     Store(ScanRefused{displaced->stream, displaced->scan->sequence, DropReason::kQueueFull});
   }
   Schedule();
-  return true;
+}
+
+// Before an event that is to come after all scans that have arrived.
+void Session::EnqueueAll() {
+  const MutexLock lock(merge_mutex_);
+  Enqueue(merge_.TakeAll());
+}
+
+void Session::EnqueueDue() {
+  const MutexLock lock(merge_mutex_);
+  Enqueue(merge_.TakeDue(ScanMerge::Clock::now()));
 }
 
 void Session::Take(OdometryArrival&& arrival) {
@@ -89,6 +109,7 @@ void Session::Take(OdometryArrival&& arrival) {
     record_.OdometryDropped(merged->stream.session, merged->odometry.sequence, DropReason::kQueueFull);
     Store(OdometryTaken{merged->stream, merged->odometry, OdometryUse::kMerged});
   }
+  EnqueueDue();
   Schedule();
 }
 
@@ -145,11 +166,13 @@ void Session::Suspend(const std::function<void()>& done) {
     }
     done();
   };
+  EnqueueAll();
   queue_.Push(std::move(finish));
   Schedule();
 }
 
 void Session::Abandon() {
+  EnqueueAll();
   for (const ScanArrival& scan : queue_.TakeScans()) {
     record_.ScanDropped(scan.stream, scan.scan->sequence, DropReason::kSessionEnded);
   }
@@ -199,11 +222,6 @@ void Session::Replayed() {
   state_unsent_ = true;
 }
 
-void Session::SetCheckpointed(std::uint64_t position, std::uint64_t last) {
-  pace_.RestoredFrom(position);
-  end_unsaved_ = !failed_ && record_.phase() == SessionPhase::kEnded && last > position;
-}
-
 void Session::Tick() {
   // If the disk is slow, the robot need not wait for it: a scan counts as durable only once it is on the disk.
   const auto now = SessionRecord::Clock::now();
@@ -212,6 +230,7 @@ void Session::Tick() {
     AnnounceState();
   }
   TickEnded(now);
+  EnqueueDue();
   // The disk may work again, while nothing arrives from the robot. Or memory was short when an event came.
   if ((lost_ && !ending_) || !queue_.empty()) Schedule();
   if (record_.LookForSilence(now)) state_unsent_ = true;
@@ -253,6 +272,7 @@ void Session::PublishLedgers(SessionRecord::Urgency urgency) {
 
 void Session::Schedule() {
   if (scheduled_.exchange(true)) return;
+  scheduled_at_ = SessionRecord::Clock::now();
   try {
     asio::post(strand_, [self = shared_from_this()] { self->Drain(); });
   } catch (const std::exception& error) {  // The next event tries it again, or housekeeping.
@@ -263,6 +283,7 @@ void Session::Schedule() {
 
 void Session::Drain() {
   const CrashNote::Working working(id_);
+  if (outputs_.waited) outputs_.waited(SessionRecord::Clock::now() - scheduled_at_.load());
   const auto begin = ThreadTime();
   for (int i = 0; i < kEventsPerTurn; ++i) {
     std::optional<RobotEvent> event = queue_.Pop();
@@ -280,76 +301,6 @@ void Session::Drain() {
   scheduled_ = false;
   // An event that came between the last Pop and the line above found `scheduled_` set and relies on this turn.
   if (!queue_.empty()) Schedule();
-}
-
-void Session::TakeCheckpoint() {
-  if (failed_ || stopping() || !outputs_.position || !outputs_.checkpoint) return;
-  if (outputs_.checkpointing && outputs_.checkpointing()) return;
-  const std::uint64_t position = outputs_.position();
-  if (position == 0) {
-    if (lost_ && outputs_.recover) StoreAgain();
-  } else if (lost_) {
-    // Lost came from another thread, about an entry before StoreAgain, and took back what that had begun.
-    outputs_.abandon();
-  } else if (record_.phase() == SessionPhase::kEnded) {
-    if (end_unsaved_ && SaveAt(position, {})) end_unsaved_ = false;
-  } else if (pace_.IsDue(position) && !SaveAt(position, {})) {
-    pace_.Refused();
-    if (!pace_.IsOverdue(position)) return;
-    outputs_.abandon();
-    Lost({StatusCode::kUnavailable, "no checkpoint of it could be made for very long"});
-  }
-}
-
-// Nothing of the session was stored for a while: what came meanwhile is in the checkpoint that begins this.
-void Session::StoreAgain() {
-  const std::uint64_t position = outputs_.recover();
-  if (position == 0) return;
-  lost_ = false;
-  const auto done = [weak = weak_from_this(), position](bool stored) {
-    const auto self = weak.lock();
-    if (self == nullptr) return;
-    if (!stored) {
-      self->lost_ = true;  // Housekeeping tries again.
-    } else if (self->record_.StoredAgain(position)) {
-      self->AnnounceState();
-      self->PublishLedgers(SessionRecord::Urgency::kNow);
-    }
-  };
-  try {
-    estimator_.BeginStoring(position);
-    if (SaveAt(position, done)) return;
-  } catch (...) {
-    outputs_.abandon();
-    throw;
-  }
-  outputs_.abandon();
-  record_.SetStored(false);
-  lost_ = true;
-}
-
-bool Session::SaveAt(std::uint64_t position, Journal::Done done) {
-  const auto begin = ThreadTime();
-  auto save = estimator_.Save();
-  // Samples that were settled meanwhile are in the record, but perhaps not in the journal before this position.
-  if (!save || stopping() || outputs_.position() != position) return false;
-  auto content = [save = std::move(save), saving = ThreadTime() - begin, cost = pace_.cost()] {
-    const auto making = ThreadTime();
-    CheckpointContent made = save();
-    *cost = (saving + (ThreadTime() - making)).count();
-    for (CheckpointPiece& piece : made.pieces) {
-      piece.bytes = [bytes = std::move(piece.bytes), cost] {
-        const auto writing = ThreadTime();
-        std::string written = bytes();
-        *cost += (ThreadTime() - writing).count();
-        return written;
-      };
-    }
-    return made;
-  };
-  if (!outputs_.checkpoint(position, std::move(content), std::move(done))) return false;
-  pace_.Begun(position);
-  return true;
 }
 
 void Session::Handle(RobotEvent&& event) {
@@ -384,6 +335,7 @@ void Session::Fail(const char* what) noexcept {
   try {
     if (!first) return;
     const std::string robot = record_.state().robot;
+    const LogContext context(AboutRobot(robot, record_.state().site));
     spdlog::error("robot '{}': its session ends because of an exception: {}", robot, what);
     const Status why{StatusCode::kInternal, "the estimator of '" + robot + "' failed: " + what};
     // The next server may not fail where this one did, but the robot knows that the session has ended.

@@ -9,10 +9,12 @@
 #include <asio/thread_pool.hpp>
 #include <atomic>
 #include <memory>
+#include <vector>
 
 #include "common/mutex.h"
 #include "server/ops/heartbeat.h"
 #include "server/robots/robot_queue.h"
+#include "server/robots/scan_merge.h"
 #include "server/robots/session_estimator.h"
 #include "server/robots/session_record.h"
 
@@ -114,6 +116,9 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   static constexpr int kEventsPerTurn = 8;  // After so many, the pool may do other work first.
 
  private:
+  void Enqueue(std::vector<ScanArrival>&& scans) CAIRN_REQUIRES(merge_mutex_);
+  void EnqueueAll() CAIRN_EXCLUDES(merge_mutex_);
+  void EnqueueDue() CAIRN_EXCLUDES(merge_mutex_);
   void Schedule();
   void Drain();
   void Handle(RobotEvent&& event);
@@ -137,6 +142,8 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   StoredSession stored_;
   const SessionOutputs outputs_;
   SessionRecord record_;
+  Mutex merge_mutex_;
+  ScanMerge merge_ CAIRN_GUARDED_BY(merge_mutex_);
   RobotQueue queue_;
   std::atomic<bool> ending_{false};  // An end was asked for: nothing new is taken.
   std::atomic<bool> state_unsent_{false};
@@ -148,6 +155,7 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   std::atomic<bool> end_stored_{false};   // That is on the disk.
   std::atomic<bool> end_unsaved_{false};  // Ended, and no checkpoint has what it is now.
   std::atomic<bool> scheduled_{false};
+  std::atomic<SessionRecord::Clock::time_point> scheduled_at_{};
   std::atomic<bool> handling_{false};
   std::atomic<std::uint64_t> handled_{0};
   // What the map was when it was given to the estimator of a robot that is only localised.

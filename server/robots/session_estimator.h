@@ -46,6 +46,9 @@ struct SessionOutputs {
   std::function<void()> ended = {};
   // Called when the session has been destroyed, after all of its changes were reported. May be empty.
   std::function<void()> gone = {};
+  // How long the session's work has waited for a thread, in each turn. Called on the strand; throws nothing. May be
+  // empty.
+  std::function<void(std::chrono::nanoseconds)> waited = {};
 };
 
 struct EstimatorSetup {

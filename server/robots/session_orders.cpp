@@ -32,6 +32,7 @@ void Session::End(const Status& reason, std::shared_ptr<Receipt> receipt) {
     if (receipt && self->record_.phase() == SessionPhase::kEnded) receipt->Taken();
   };
   if (first) {
+    EnqueueAll();
     queue_.Push(std::move(finish));
   } else if (!queue_.PushAgain(std::move(finish))) {
     return;  // The receipt says that it was not taken.

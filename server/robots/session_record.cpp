@@ -334,6 +334,7 @@ SessionState SessionRecord::StateNow() const {
     state.status = {StatusCode::kFailedPrecondition, joining_.why};
   if (localises_ && state.status.ok() && state.status.message.empty())
     state.status.message = "only localised: nothing is drawn of it";
+  state.localise_only = localises_;
   state.stale = !silence_.empty();
   if (state.stale && state.status.ok()) {
     state.status = {StatusCode::kUnavailable,

@@ -1,8 +1,8 @@
-// The commands that ROS 2 programs give through services, on their way to the desk and back: each goes through the
-// inbound channel as a native one does, under a client number that is the door's own, so that it takes its turn there,
-// and its answer is kept away from the native wire. Bounded: at most kMostOpen wait for their answers, and at most
-// kMostOfOne of them for one participant; further ones are answered RESOURCE_EXHAUSTED. One that gets no answer within
-// kPatience is answered DEADLINE_EXCEEDED. Thread rule: Take from any thread, the rest from one.
+// The commands of ROS 2 programs, from services and initial poses, on their way to the desk and back: each goes through
+// the inbound channel as a native one does, under a client number that is the door's own, so that it takes its turn
+// there, and its answer is kept away from the native wire. Bounded: at most kMostOpen wait for their answers, and at
+// most kMostOfOne of them for one participant; further ones are answered RESOURCE_EXHAUSTED. One that gets no answer
+// within kPatience is answered DEADLINE_EXCEEDED. Thread rule: Take from any thread, the rest from one.
 #pragma once
 
 #include <chrono>
@@ -28,7 +28,8 @@ class CommandCalls {
 
   explicit CommandCalls(Inbound& inbound);
 
-  // `asker`: the participant that asks. `done` is called by Tick; where the command is refused at once, by this call.
+  // `asker`: the participant that asks, or another number for who takes turns with others. `done` is called by Tick;
+  // where the command is refused at once, by this call.
   void Ask(std::uint64_t asker, Request&& request, Done done, Clock::time_point now) CAIRN_EXCLUDES(mutex_);
   // Whether the reply is to one of these commands: then it is nobody else's.
   [[nodiscard]] bool Take(const Reply& reply) CAIRN_EXCLUDES(mutex_);

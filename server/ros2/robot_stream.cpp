@@ -19,6 +19,7 @@ constexpr std::chrono::seconds kFresh{2};            // Odometry that is older d
 constexpr std::chrono::seconds kTryAgain{1};         // After a refusal that will pass by itself.
 constexpr std::chrono::seconds kTryLater{5};         // After any other.
 constexpr std::size_t kMaxEarly = 64;                // Odometry samples kept for the first scan of a session.
+constexpr std::size_t kMostMapToOdom = 16;           // Publishers of it that are remembered, the newest ones.
 constexpr const char* kOdometrySensor = "odometry";  // As on the native wire.
 
 // A random number other than 0, as clients of the native wire draw it.
@@ -138,6 +139,22 @@ void RobotStream::TakeShared(const ros2::Transforms& message, bool its_own, cons
   TakeTransformOdometry(message, its_own, origin, now);
 }
 
+void RobotStream::SeeMapToOdom(const ros2::Transforms& message, bool fixed, const ros2::WriterId& writer,
+                               Clock::time_point now) {
+  const auto leads_to_odom = [this](const ros2::Transform& transform) {
+    return transform.header.frame == options_.map_frame && transform.child_frame == odom_frame_or_usual();
+  };
+  if (std::none_of(message.transforms.begin(), message.transforms.end(), leads_to_odom)) return;
+  map_to_odom_[writer] = {now, fixed};
+  if (map_to_odom_.size() <= kMostMapToOdom) return;
+  const auto older = [](const auto& one, const auto& other) { return one.second.seen < other.second.seen; };
+  map_to_odom_.erase(std::min_element(map_to_odom_.begin(), map_to_odom_.end(), older));
+}
+
+const std::string& RobotStream::odom_frame_or_usual() const {
+  return odom_frame_.empty() ? options_.odom_frame : odom_frame_;
+}
+
 // A robot that publishes no odometry may still say it as the transform from odom to base_link. On the shared tf its
 // frames begin with its name.
 void RobotStream::TakeTransformOdometry(const ros2::Transforms& message, bool its_own, const ros2::Origin& origin,
@@ -163,20 +180,54 @@ void RobotStream::TakeStart(const ros2::PoseWithCovariance& message, Clock::time
                  in_map ? "it is no pose" : "its frame is not '" + options_.map_frame + "'");
     return;
   }
-  start_ = ros2::PlanarPart(*motion);
+  const Pose2 pose = ros2::PlanarPart(*motion);
   start_received_ = now;
-  // The present session is left, so that a new one may begin at the pose (robots/roster.h).
-  if (phase_ == Phase::kOpen) Push(ClientLiveliness{client_, robot_id_, false});
-  phase_ = Phase::kWaiting;
-  client_ = 0;
+  // A session without a used scan has nothing in which the robot could be looked for.
+  if (phase_ != Phase::kOpen || !last_pose_) return Leave(pose);
+  hint_ = pose;
+  hint_asked_ = false;
+  ++hint_number_;
+  why_hint_failed_.clear();
+}
+
+std::optional<RobotStream::Hint> RobotStream::TakeHint() {
+  // One at a time: the places for orders are few, and of several hints the newest counts.
+  if (!hint_ || hint_open_ || std::exchange(hint_asked_, true)) return std::nullopt;
+  hint_open_ = true;
+  Hint hint{hint_number_, {}};
+  hint.request.kind = RequestKind::kRelocalise;
+  hint.request.robot = place_.robot;
+  hint.request.T_map_robot = hint_;
+  return hint;
+}
+
+void RobotStream::TakeHintAnswer(std::uint64_t number, const Status& status) {
+  hint_open_ = false;
+  if (!hint_ || number != hint_number_) return;  // A newer one counts.
+  const Pose2 pose = *hint_;
+  hint_.reset();
+  if (status.ok()) return spdlog::info("ROS 2: {} is looked for where its initial pose says", place_.robot);
+  if (status.code == StatusCode::kFailedPrecondition || status.code == StatusCode::kNotFound) {
+    spdlog::info("ROS 2: {} begins a new session at its initial pose: {}", place_.robot, status.message);
+    return Leave(pose);
+  }
+  spdlog::warn("ROS 2: an initial pose of {} is not used: {}", place_.robot, status.message);
+  why_hint_failed_ = status.message;
 }
 
 void RobotStream::BeginAnew() {
-  // One that could not be ended is left, as with a start.
+  Leave(std::nullopt);  // Also one that could not be ended.
+}
+
+void RobotStream::Leave(const std::optional<Pose2>& start) {
   if (phase_ == Phase::kOpen) Push(ClientLiveliness{client_, robot_id_, false});
   phase_ = Phase::kWaiting;
   client_ = 0;
-  start_.reset();
+  session_ = 0;  // What is still said of it is not about the next one.
+  last_pose_.reset();
+  start_ = start;
+  hint_.reset();
+  why_hint_failed_.clear();
 }
 
 bool RobotStream::odometry_is_fresh(Clock::time_point now) const {
@@ -195,6 +246,7 @@ void RobotStream::OpenIfComplete(Clock::time_point now) {
   }
   if (client_ == 0) client_ = DrawId();
   session_ = DrawId();
+  last_pose_.reset();
   for (auto& [topic, lidar] : lidars_) lidar.numbers.Restart();
   odometry_numbers_.Restart();
   Open(now);
@@ -233,6 +285,12 @@ void RobotStream::Take(const SessionState& state, Clock::time_point /*now*/) {
   if (state.phase != SessionPhase::kEnded || phase_ != Phase::kOpen) return;
   phase_ = Phase::kEnded;
   why_refused_ = state.status.message;
+}
+
+void RobotStream::Take(const PoseReport& report, Clock::time_point now) {
+  if (report.session != session_ || session_ == 0) return;
+  last_pose_ = report;
+  pose_received_ = now;
 }
 
 void RobotStream::Take(const SessionRefusal& refusal, Clock::time_point now) {

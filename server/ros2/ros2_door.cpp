@@ -1,6 +1,8 @@
 #include "server/ros2/ros2_door.h"
 
+#include <algorithm>
 #include <chrono>
+#include <string>
 #include <utility>
 
 #include "common/options/number_text.h"
@@ -16,6 +18,7 @@ wire::WireOptions WireOf(const Ros2Options& options, const wire::WireOptions& na
   wire::WireOptions wire;
   wire.domain = options.domain;
   wire.interfaces = options.interfaces.empty() ? native.interfaces : SplitAtCommas(options.interfaces);
+  wire.discovery_servers = options.discovery_server_names();
   wire.participant_lease_s = kParticipantLease_s;
   return wire;
 }
@@ -38,21 +41,23 @@ Ros2Door::Ros2Door(const Ros2Options& options, NamespaceRules rules, std::unique
                    const ServerAbilities& abilities, Inbound& inbound)
     : options_(options),
       bus_(std::move(bus)),
+      calls_(inbound),
       egress_(*bus_, options),
       ingress_(
-          *bus_, options, std::move(rules), inbound, [this](const RobotAddress& address) { egress_.Serve(address); },
+          *bus_, options, std::move(rules), inbound, calls_,
+          [this](const RobotAddress& address) { egress_.Serve(address); },
           [this](NameId robot_id) { egress_.Leave(robot_id); }),
-      services_(*bus_, options, abilities, inbound,
+      services_(*bus_, options, abilities, calls_,
                 {[this](MapWish&& wish) { return egress_.WantMap(std::move(wish)); },
                  [this](const std::string& site) { ingress_.BeginAnew(site); }}) {}
 
 // A value that is not seen because memory is short counts as one that was not published; the server goes on.
 bool Ros2Door::See(const OutboundValue& value) {
   const auto* const reply = std::get_if<Reply>(&value);
-  const bool own = reply != nullptr && services_.IsOwn(*reply);
+  const bool own = reply != nullptr && calls_.IsOwn(*reply);
   static_cast<void>(unseen_.Guard([&] {
+    if (own) return static_cast<void>(calls_.Take(*reply));
     services_.Take(value);
-    if (own) return;
     ingress_.Take(value);
     egress_.See(value);
   }));
@@ -70,6 +75,7 @@ void Ros2Door::Start() {
     const auto tick = [this] {
       ingress_.Tick(Ros2Ingress::Clock::now());
       services_.Tick(Ros2Services::Clock::now());
+      calls_.Tick(CommandCalls::Clock::now());
     };
     static_cast<void>(failures_.Guard(tick));  // Requests have come while sessions were restored.
     bus_->Run(stop, tick, kTickPeriod, [this](const std::exception& error) { failures_.Count(error); });
@@ -88,8 +94,16 @@ void Ros2Door::Finish() {
 
 Ros2Report Ros2Door::report() const {
   Ros2Report report;
-  report.door = {.enabled = true, .domain = options_.domain, .problems = ingress_.problems()};
-  for (std::string& problem : egress_.problems()) report.door.problems.push_back(std::move(problem));
+  report.door = {.enabled = true,
+                 .domain = options_.domain,
+                 .malformed = malformed(),
+                 .overflow = overflow(),
+                 .unpublished = unpublished(),
+                 .problems = ingress_.problems()};
+  std::vector<std::string>& problems = report.door.problems;
+  for (std::string& problem : egress_.problems()) problems.push_back(std::move(problem));
+  problems.resize(std::min(problems.size(), wire::kMaxRos2Problems));
+  for (std::string& problem : problems) problem.resize(std::min(problem.size(), wire::kMaxTextBytes));
   report.namespaces = ingress_.report(Ros2Ingress::Clock::now());
   return report;
 }

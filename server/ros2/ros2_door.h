@@ -14,6 +14,7 @@
 #include "common/wire/bus.h"
 #include "server/inbound.h"
 #include "server/outbound.h"
+#include "server/ros2/command_calls.h"
 #include "server/ros2/failures.h"
 #include "server/ros2/ros2_egress.h"
 #include "server/ros2/ros2_ingress.h"
@@ -54,6 +55,7 @@ class Ros2Door {
 
   const Ros2Options options_;
   const std::unique_ptr<ros2::Bus> bus_;
+  CommandCalls calls_;  // Of robots and of services.
   Ros2Egress egress_;
   Ros2Ingress ingress_;
   Ros2Services services_;

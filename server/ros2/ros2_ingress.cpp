@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <exception>
 #include <set>
 #include <utility>
 
@@ -28,12 +29,14 @@ std::string DirectoryOf(const std::string& topic) {
 }  // namespace
 
 Ros2Ingress::Ros2Ingress(ros2::Bus& bus, const Ros2Options& options, NamespaceRules rules, Inbound& inbound,
-                         std::function<void(const RobotAddress&)> serve, std::function<void(NameId)> leave)
+                         CommandCalls& calls, std::function<void(const RobotAddress&)> serve,
+                         std::function<void(NameId)> leave)
     : bus_(bus),
       options_(options),
       scan_names_(options.scan_names()),
       rules_(std::move(rules)),
       inbound_(inbound),
+      calls_(calls),
       serve_(std::move(serve)),
       leave_(std::move(leave)) {}
 
@@ -67,8 +70,24 @@ bool Ros2Ingress::IsScan(const std::string& stream) const {
   return std::find(scan_names_.begin(), scan_names_.end(), stream) != scan_names_.end();
 }
 
+// Without the lock, because an answer may come within the call.
 void Ros2Ingress::Tick(Clock::time_point now) {
+  for (auto& [name, hint] : TickRobots(now)) {
+    const std::uint64_t asker = HashName(hint.request.robot);
+    const auto answered = [this, robot = name, number = hint.number](const Reply& reply) {
+      TakeHintAnswer(robot, number, reply.status);
+    };
+    try {
+      calls_.Ask(asker, std::move(hint.request), answered, now);
+    } catch (const std::exception&) {  // The others are asked all the same.
+      TakeHintAnswer(name, hint.number, {StatusCode::kResourceExhausted, "the server has no memory left"});
+    }
+  }
+}
+
+Ros2Ingress::Hints Ros2Ingress::TickRobots(Clock::time_point now) {
   const MutexLock lock(mutex_);
+  Hints hints;
   // Where there was no room, again: the server may not have heard yet that a robot is away.
   const std::uint64_t version = bus_.writers_version();
   if (version != writers_version_ || (publishers_left_out_ > 0 && HasGone())) {
@@ -87,8 +106,17 @@ void Ros2Ingress::Tick(Clock::time_point now) {
     one.robot->Tick(now);
     const RobotAddress address = AddressOf(name, one);
     if (address != one.address) serve_(one.address = address);
+    if (auto hint = one.robot->TakeHint()) hints.emplace_back(name, *std::move(hint));
   }
   Measure(now);
+  return hints;
+}
+
+// The robot may have been forgotten meanwhile.
+void Ros2Ingress::TakeHintAnswer(const std::string& name, std::uint64_t number, const Status& status) {
+  const MutexLock lock(mutex_);
+  const auto found = namespaces_.find(name);
+  if (found != namespaces_.end() && found->second.robot != nullptr) found->second.robot->TakeHintAnswer(number, status);
 }
 
 void Ros2Ingress::Discover(Clock::time_point now) {
@@ -131,7 +159,8 @@ void Ros2Ingress::CountPublishers() {
   for (auto& [name, one] : namespaces_) {
     for (auto& [stream, topic] : one.topics) topic.publishers = 0;
   }
-  std::set<ros2::WriterId> alive;
+  writers_.clear();
+  foreign_maps_.clear();
   const std::vector<ros2::RemoteWriter> writers = bus_.writers();
   // Scans and odometry first: they make the namespaces that the other topics belong to.
   const auto makes = [this](const ros2::RemoteWriter& writer) {
@@ -142,13 +171,16 @@ void Ros2Ingress::CountPublishers() {
              return name_space.has_value();
            });
   };
+  for (const ros2::RemoteWriter& writer : writers) {
+    writers_.insert(writer.id);
+    if (writer.type == ros2::Bus::TypeName<ros2::Grid>()) foreign_maps_.insert(writer.topic);
+  }
   for (const bool first : {true, false}) {
     for (const ros2::RemoteWriter& writer : writers) {
-      alive.insert(writer.id);
       if (makes(writer) == first && writer.topic.starts_with("rt/")) Note(writer);
     }
   }
-  shared_frames_.SetWriters(alive);
+  shared_frames_.SetWriters(writers_);
 }
 
 void Ros2Ingress::Note(const ros2::RemoteWriter& writer) {
@@ -239,10 +271,12 @@ void Ros2Ingress::Subscribe(const std::string& name, Namespace& one) {
                              to.Take(std::forward<decltype(message)>(message), origin, Clock::now());
                            }));
     } else if (stream == kTf || stream == kTfStatic) {
-      Keep<ros2::Transforms>(wire_name, topic, kTransformDepth, stream == kTfStatic,
-                             counted([](RobotStream& to, auto&& message, const ros2::Origin& origin) {
-                               to.Take(message, origin, Clock::now());
-                             }));
+      Keep<ros2::Transforms>(
+          wire_name, topic, kTransformDepth, stream == kTfStatic,
+          counted([fixed = stream == kTfStatic](RobotStream& to, auto&& message, const ros2::Origin& origin) {
+            to.SeeMapToOdom(message, fixed, origin.writer, Clock::now());
+            to.Take(message, origin, Clock::now());
+          }));
     } else if (stream == kInitialPose) {
       Keep<ros2::PoseWithCovariance>(
           wire_name, topic, 1, false,
@@ -259,12 +293,20 @@ void Ros2Ingress::SubscribeShared() {
         [this, fixed, &received = topic.received](ros2::Transforms&& message, const ros2::Origin& origin) {
           const MutexLock lock(mutex_);
           ++received;
-          TakeShared(message, origin, fixed);
+          TakeShared(std::move(message), origin, fixed);
         });
   }
 }
 
-void Ros2Ingress::TakeShared(const ros2::Transforms& message, const ros2::Origin& origin, bool fixed) {
+void Ros2Ingress::TakeShared(ros2::Transforms&& message, const ros2::Origin& origin, bool fixed) {
+  const std::string shared_tf = TopicIn("/", kTf);
+  for (auto& [name, one] : namespaces_) {
+    if (one.robot != nullptr && one.address.tf_topic == shared_tf)
+      one.robot->SeeMapToOdom(message, fixed, origin.writer, Clock::now());
+  }
+  // Below the map are only odometry frames, also those that this server publishes there: not how a lidar is mounted.
+  std::erase_if(message.transforms,
+                [this](const ros2::Transform& transform) { return transform.header.frame == options_.map_frame; });
   const ros2::Transforms clear = shared_frames_.Take(message, origin.writer, fixed);
   if (fixed) return;
   const auto robots = std::count_if(namespaces_.begin(), namespaces_.end(),
@@ -306,7 +348,7 @@ void Ros2Ingress::TellRobots(Clock::time_point now) {
     if (of_robot == news.end()) continue;
     if (of_robot->second.state) one.robot->Take(*of_robot->second.state, now);
     if (of_robot->second.refusal) one.robot->Take(*of_robot->second.refusal, now);
-    if (of_robot->second.pose) one.robot->Take(*of_robot->second.pose);
+    if (of_robot->second.pose) one.robot->Take(*of_robot->second.pose, now);
   }
 }
 
@@ -315,40 +357,6 @@ void Ros2Ingress::BeginAnew(const std::string& site) {
   for (auto& [name, one] : namespaces_) {
     if (one.robot != nullptr && one.place->site == site) one.robot->BeginAnew();
   }
-}
-
-void Ros2Ingress::Measure(Clock::time_point now) {
-  const double seconds = std::chrono::duration<double>(now - measured_).count();
-  if (seconds < 2.0) return;
-  measured_ = now;
-  const auto measure = [seconds](Topic& topic) {
-    topic.rate_hz = static_cast<double>(topic.received - topic.received_before) / seconds;
-    topic.received_before = topic.received;
-  };
-  for (auto& [stream, topic] : shared_) measure(topic);
-  for (auto& [name, one] : namespaces_) {
-    for (auto& [stream, topic] : one.topics) measure(topic);
-  }
-}
-
-std::uint64_t Ros2Ingress::overflow() const {
-  const MutexLock lock(mutex_);
-  std::uint64_t sum = ended_overflow_;
-  for (const auto& [name, one] : namespaces_) sum += one.robot != nullptr ? one.robot->overflow() : 0;
-  return sum;
-}
-
-std::uint64_t Ros2Ingress::malformed() const {
-  const MutexLock lock(mutex_);
-  std::uint64_t sum = ended_refused_;
-  const auto add = [&sum](const Topic& topic) {
-    if (topic.subscription != nullptr) sum += topic.subscription->refused();
-  };
-  for (const auto& [stream, topic] : shared_) add(topic);
-  for (const auto& [name, one] : namespaces_) {
-    for (const auto& [stream, topic] : one.topics) add(topic);
-  }
-  return sum;
 }
 
 }  // namespace cairn::server

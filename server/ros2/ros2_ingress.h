@@ -1,7 +1,9 @@
 // What the ROS 2 robots publish, on its way in: looks which namespaces have publishers of scans or odometry, subscribes
 // to the topics of those that belong to a robot (namespace_rules.h), and hands the messages to the robot's stream. A
-// topic is read with the QoS that its publishers offer: reliable where all are, else best effort. Thread rule: Tick and
-// the messages come on the thread of the bus; Take and report may be called from any thread.
+// topic is read with the QoS that its publishers offer: reliable where all are, else best effort. What robots ask of
+// the server (RobotStream::TakeHint) goes to the desk through the calls that it shares with the services. Thread rule:
+// Tick, the messages and the answers of the calls come on the thread of the bus; Take and report may be called from any
+// thread.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +11,9 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/mutex.h"
@@ -17,6 +21,7 @@
 #include "common/wire/ros2/bus.h"
 #include "server/inbound.h"
 #include "server/outbound.h"
+#include "server/ros2/command_calls.h"
 #include "server/ros2/robot_stream.h"
 #include "server/ros2/shared_frames.h"
 
@@ -37,7 +42,7 @@ class Ros2Ingress {
   using Clock = RobotStream::Clock;
   // Both are called on the thread of the bus. `serve`: a robot appears, or its address changes; `leave`: it is
   // forgotten.
-  Ros2Ingress(ros2::Bus& bus, const Ros2Options& options, NamespaceRules rules, Inbound& inbound,
+  Ros2Ingress(ros2::Bus& bus, const Ros2Options& options, NamespaceRules rules, Inbound& inbound, CommandCalls& calls,
               std::function<void(const RobotAddress&)> serve, std::function<void(NameId)> leave);
   ~Ros2Ingress();
 
@@ -50,7 +55,8 @@ class Ros2Ingress {
   void Close() CAIRN_EXCLUDES(mutex_);
 
   [[nodiscard]] std::vector<Ros2Namespace> report(Clock::time_point now) const CAIRN_EXCLUDES(mutex_);
-  // Frames of the shared topics that two publishers contend for, for people.
+  // What concerns several robots, for people: frames of the shared topics that two publishers contend for, maps that
+  // others publish as well.
   [[nodiscard]] std::vector<std::string> problems() const CAIRN_EXCLUDES(mutex_);
   [[nodiscard]] std::uint64_t overflow() const CAIRN_EXCLUDES(mutex_);
   [[nodiscard]] std::uint64_t malformed() const CAIRN_EXCLUDES(mutex_);
@@ -76,6 +82,11 @@ class Ros2Ingress {
     RobotAddress address;
   };
 
+  // What a robot asks of the server, by the name of its namespace.
+  using Hints = std::vector<std::pair<std::string, RobotStream::Hint>>;
+
+  [[nodiscard]] Hints TickRobots(Clock::time_point now) CAIRN_EXCLUDES(mutex_);
+  void TakeHintAnswer(const std::string& name, std::uint64_t number, const Status& status) CAIRN_EXCLUDES(mutex_);
   void Discover(Clock::time_point now) CAIRN_REQUIRES(mutex_);
   void CountPublishers() CAIRN_REQUIRES(mutex_);
   // Makes room: forgets the namespaces in which nobody publishes any more. The server keeps their sessions as long as
@@ -88,7 +99,7 @@ class Ros2Ingress {
   void Keep(const std::string& wire_name, Topic& topic, int depth, bool transient_local,
             std::function<void(Message&&, const ros2::Origin&)> take) CAIRN_REQUIRES(mutex_);
   void SubscribeShared() CAIRN_REQUIRES(mutex_);
-  void TakeShared(const ros2::Transforms& message, const ros2::Origin& origin, bool fixed) CAIRN_REQUIRES(mutex_);
+  void TakeShared(ros2::Transforms&& message, const ros2::Origin& origin, bool fixed) CAIRN_REQUIRES(mutex_);
   void TellRobots(Clock::time_point now) CAIRN_REQUIRES(mutex_);
   void End(Topic& topic) CAIRN_REQUIRES(mutex_);
   void Measure(Clock::time_point now) CAIRN_REQUIRES(mutex_);
@@ -105,6 +116,7 @@ class Ros2Ingress {
   const std::vector<std::string> scan_names_;
   const NamespaceRules rules_;
   Inbound& inbound_;
+  CommandCalls& calls_;
   const std::function<void(const RobotAddress&)> serve_;
   const std::function<void(NameId)> leave_;
 
@@ -113,6 +125,8 @@ class Ros2Ingress {
   std::map<std::string, Topic> shared_ CAIRN_GUARDED_BY(mutex_);  // tf and tf_static.
   std::map<std::string, Namespace> namespaces_ CAIRN_GUARDED_BY(mutex_);
   std::uint64_t writers_version_ CAIRN_GUARDED_BY(mutex_) = 0;
+  std::set<ros2::WriterId> writers_ CAIRN_GUARDED_BY(mutex_);    // Of others, as of the last look.
+  std::set<std::string> foreign_maps_ CAIRN_GUARDED_BY(mutex_);  // Topics of grids that others publish, as on the wire.
   Clock::time_point measured_ CAIRN_GUARDED_BY(mutex_){};
   std::uint64_t ended_refused_ CAIRN_GUARDED_BY(mutex_) = 0;        // Of subscriptions that have ended.
   std::uint64_t ended_overflow_ CAIRN_GUARDED_BY(mutex_) = 0;       // Of robots that were forgotten.

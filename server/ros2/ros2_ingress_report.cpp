@@ -1,6 +1,8 @@
-// What the door says of each namespace, and why its robot is not on the map.
+// What the door says of each namespace, and why its robot is not on the map; what it counts.
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
+#include <set>
 #include <string>
 
 #include "server/ros2/ros2_ingress.h"
@@ -24,6 +26,12 @@ std::string ShownType(const std::string& wire) {
 
 std::string ShownName(const std::string& wire) {
   return wire.substr(2);
+}
+
+// As stamps say it.
+Stamp ClockOfServer() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::system_clock::now().time_since_epoch())
+      .count();
 }
 
 }  // namespace
@@ -57,7 +65,8 @@ std::vector<std::string> Ros2Ingress::ProblemsOf(const std::string& name, const 
     }
   }
   if (one.robot != nullptr) {
-    for (std::string& problem : one.robot->Problems(now)) problems.push_back(std::move(problem));
+    for (std::string& problem : one.robot->Problems(now, ClockOfServer(), writers_))
+      problems.push_back(std::move(problem));
   }
   if (problems.size() > kMaxProblems) problems.resize(kMaxProblems);
   for (std::string& problem : problems) problem.resize(std::min(problem.size(), kMaxText));
@@ -75,7 +84,7 @@ std::vector<Ros2Namespace> Ros2Ingress::report(Clock::time_point now) const {
       shown.site = one.place->site;
     }
     shown.problems = ProblemsOf(name, one, now);
-    shown.on_map = shown.problems.empty();
+    shown.on_map = one.robot != nullptr && one.robot->IsOnMap(now);
     for (const auto& [stream, topic] : one.topics) {
       if (topic.publishers == 0) continue;
       shown.topics.push_back({.name = ShownName(TopicIn(name, stream)),
@@ -101,6 +110,15 @@ std::vector<std::string> Ros2Ingress::problems() const {
         "' on /tf or /tf_static: give each robot tf topics in its namespace, or frames that begin with its name");
     if (problems.size() == kMaxProblems) break;
   }
+  std::set<std::string> sites;
+  for (const auto& [name, one] : namespaces_)
+    if (one.place) sites.insert(one.place->site);
+  for (const std::string& site : sites) {
+    const std::string topic = "rt/" + TopicPart(site) + "/map";
+    if (!foreign_maps_.contains(topic) || problems.size() >= kMaxProblems) continue;
+    problems.push_back("another node also publishes " + ShownName(topic) +
+                       " (map_server or slam_toolbox, for example, which has to be stopped or publish it elsewhere)");
+  }
   if (publishers_left_out_ > 0)
     problems.emplace_back("there are more namespaces than ros2.max_robots; some are ignored");
   if (shared_frames_.full()) {
@@ -108,6 +126,40 @@ std::vector<std::string> Ros2Ingress::problems() const {
                        " frames; some are ignored: give the robots tf topics in their namespaces");
   }
   return problems;
+}
+
+void Ros2Ingress::Measure(Clock::time_point now) {
+  const double seconds = std::chrono::duration<double>(now - measured_).count();
+  if (seconds < 2.0) return;
+  measured_ = now;
+  const auto measure = [seconds](Topic& topic) {
+    topic.rate_hz = static_cast<double>(topic.received - topic.received_before) / seconds;
+    topic.received_before = topic.received;
+  };
+  for (auto& [stream, topic] : shared_) measure(topic);
+  for (auto& [name, one] : namespaces_) {
+    for (auto& [stream, topic] : one.topics) measure(topic);
+  }
+}
+
+std::uint64_t Ros2Ingress::overflow() const {
+  const MutexLock lock(mutex_);
+  std::uint64_t sum = ended_overflow_;
+  for (const auto& [name, one] : namespaces_) sum += one.robot != nullptr ? one.robot->overflow() : 0;
+  return sum;
+}
+
+std::uint64_t Ros2Ingress::malformed() const {
+  const MutexLock lock(mutex_);
+  std::uint64_t sum = ended_refused_;
+  const auto add = [&sum](const Topic& topic) {
+    if (topic.subscription != nullptr) sum += topic.subscription->refused();
+  };
+  for (const auto& [stream, topic] : shared_) add(topic);
+  for (const auto& [name, one] : namespaces_) {
+    for (const auto& [stream, topic] : one.topics) add(topic);
+  }
+  return sum;
 }
 
 }  // namespace cairn::server

@@ -1,10 +1,12 @@
 #include "server/ros2/ros2_options.h"
 
 #include <algorithm>
+#include <string_view>
 #include <utility>
 
 #include "common/options/number_text.h"
 #include "common/service/names.h"
+#include "common/wire/bus.h"
 #include "server/ros2/namespace_rules.h"
 
 namespace cairn::server {
@@ -31,7 +33,21 @@ Result<void> CheckNames(const std::string& key, const std::vector<std::string>& 
   return {};
 }
 
+// They are written as those of the native wire, so that an error names the same key there.
+Result<void> CheckDiscoveryServers(const std::vector<std::string>& servers) {
+  constexpr std::string_view kNative = "wire.";
+  wire::WireOptions wire;
+  wire.discovery_servers = servers;
+  const auto valid = wire::Validate(wire);
+  if (valid) return {};
+  return Fail(valid.error().code, "ros2." + valid.error().message.substr(kNative.size()));
+}
+
 }  // namespace
+
+std::vector<std::string> Ros2Options::discovery_server_names() const {
+  return Names(discovery_servers);
+}
 
 std::vector<std::string> Ros2Options::scan_names() const {
   return Names(scan_topics);
@@ -49,6 +65,9 @@ void Visit(OptionVisitor& visitor, Ros2Options& options) {
   visitor.Text("interfaces", options.interfaces,
                ForOperators("IPv4 addresses of this machine on which the ROS 2 robots are met, separated by commas. "
                             "Empty: those of wire.interfaces."));
+  visitor.Text("discovery_servers", options.discovery_servers,
+               "For robots that find each other through discovery servers of Fast DDS: what is in their "
+               "ROS_DISCOVERY_SERVER, with commas instead of semicolons. Empty: they are found by multicast.");
   visitor.Text("namespaces", options.namespaces,
                ForOperators("Rules, separated by commas, that say which robot a namespace of ROS 2 belongs to, such as "
                             "/{robot}, /{site}/{robot}, /fleet/{robot}, or /=r1 and /agv7=hall/r7 for one namespace. "
@@ -84,6 +103,7 @@ void Visit(OptionVisitor& visitor, Ros2Options& options) {
 Result<void> Validate(const Ros2Options& options) {
   if (!options.enabled) return {};
   if (auto valid = ValidateName("ros2.site", options.site); !valid) return valid;
+  if (auto valid = CheckDiscoveryServers(options.discovery_server_names()); !valid) return valid;
   if (const auto rules = NamespaceRules::Parse(options.namespaces, options.site); !rules)
     return tl::unexpected(rules.error());
   if (auto valid = CheckNames("ros2.scan_topics", options.scan_names()); !valid) return valid;

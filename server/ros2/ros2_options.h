@@ -14,6 +14,7 @@ struct Ros2Options {
   bool enabled = false;
   std::int64_t domain = 0;
   std::string interfaces;
+  std::string discovery_servers;
   std::string namespaces = "/{robot}";
   std::string site = "lab";
   std::string scan_topics = "scan";
@@ -27,11 +28,12 @@ struct Ros2Options {
   std::int64_t max_robots = 256;
   bool commands = false;
 
+  [[nodiscard]] std::vector<std::string> discovery_server_names() const;
   [[nodiscard]] std::vector<std::string> scan_names() const;
   [[nodiscard]] std::vector<std::string> base_names() const;
 };
 void Visit(OptionVisitor& visitor, Ros2Options& options);
-// Checks the rules of namespaces, and the names of the site, topics and frames.
+// Checks the addresses of discovery servers, the rules of namespaces, and the names of the site, topics and frames.
 [[nodiscard]] Result<void> Validate(const Ros2Options& options);
 
 }  // namespace cairn::server

@@ -23,8 +23,11 @@ Request About(RequestKind kind, const std::string& site) {
   return request;
 }
 
-bool HasSession(const RobotStatus& robot) {
-  return robot.session.phase == SessionPhase::kActive || robot.session.phase == SessionPhase::kSuspended;
+std::vector<std::string> RobotsOf(const std::vector<SessionState>& sessions) {
+  std::vector<std::string> robots;
+  robots.reserve(sessions.size());
+  for (const SessionState& session : sessions) robots.push_back(session.robot);
+  return robots;
 }
 
 }  // namespace
@@ -81,17 +84,17 @@ void Ros2Services::Save(NameId site_id, const std::string& name, std::uint64_t a
       asker, std::move(save), [done = std::move(done)](const Reply& reply) { done(reply.status); }, now_);
 }
 
-void Ros2Services::WithRobots(const std::string& site, std::uint64_t asker,
-                              std::function<void(std::optional<std::vector<std::string>>)> then) {
+void Ros2Services::WithSessions(const std::string& site, std::uint64_t asker, std::function<void(Sessions)> then) {
   commands_.Ask(
       asker, About(RequestKind::kStatus, site),
       [then = std::move(then)](const Reply& reply) {
         if (!reply.status.ok()) return then(std::nullopt);
-        std::vector<std::string> robots;
+        std::vector<SessionState> sessions;
         for (const RobotStatus& robot : reply.robots) {
-          if (HasSession(robot)) robots.push_back(robot.session.robot);
+          const SessionPhase phase = robot.session.phase;
+          if (phase == SessionPhase::kActive || phase == SessionPhase::kSuspended) sessions.push_back(robot.session);
         }
-        then(std::move(robots));
+        then(std::move(sessions));
       },
       now_);
 }
@@ -117,16 +120,15 @@ void Ros2Services::ForEach(const std::shared_ptr<Round>& round, std::function<vo
 }
 
 void Ros2Services::TogglePause(NameId site_id, const Asked<ros2::Pause>& asked) {
-  const bool pause = !sites_.at(site_id).paused;
   const std::string site = sites_.at(site_id).name;
-  WithRobots(site, asked.asker(), [this, site_id, site, pause, asked](std::optional<std::vector<std::string>> robots) {
-    if (!robots || robots->empty()) return Answer(asked, {false});
+  WithSessions(site, asked.asker(), [this, site, asked](Sessions sessions) {
+    if (!sessions || sessions->empty()) return Answer(asked, {false});
+    const auto is_paused = [](const SessionState& session) { return session.localise_only; };
+    const bool pause = !std::all_of(sessions->begin(), sessions->end(), is_paused);
+    if (pause) std::erase_if(*sessions, is_paused);
     const auto round = std::make_shared<Round>();
-    *round = {asked.asker(), pause ? RequestKind::kLocalise : RequestKind::kMap, *std::move(robots)};
-    ForEach(round, [this, site_id, site, pause, asked](bool all) {
-      const auto found = sites_.find(site_id);
-      // Where it failed for one, the next call tries the same again.
-      if (all && found != sites_.end()) found->second.paused = pause;
+    *round = {asked.asker(), pause ? RequestKind::kLocalise : RequestKind::kMap, RobotsOf(*sessions)};
+    ForEach(round, [this, site, pause, asked](bool all) {
       spdlog::info("ROS 2: the robots of site {} {}{}", site, pause ? "are only localised" : "map again",
                    all ? "" : ", except for some");
       Answer(asked, {all});
@@ -154,10 +156,10 @@ void Ros2Services::Reset(NameId site_id, const ros2::Reset::Request& request, co
 }
 
 void Ros2Services::EndAndDelete(const std::string& site, const Asked<ros2::Reset>& asked) {
-  WithRobots(site, asked.asker(), [this, site, asked](std::optional<std::vector<std::string>> robots) {
-    if (!robots) return Answer(asked, {ros2::Reset::kFailure});
+  WithSessions(site, asked.asker(), [this, site, asked](Sessions sessions) {
+    if (!sessions) return Answer(asked, {ros2::Reset::kFailure});
     const auto round = std::make_shared<Round>();
-    *round = {asked.asker(), RequestKind::kSessionEnd, *std::move(robots)};
+    *round = {asked.asker(), RequestKind::kSessionEnd, RobotsOf(*sessions)};
     // One that could not be ended has ended by itself, or forbids the deletion.
     ForEach(round, [this, site, asked](bool /*all*/) { Delete(site, kDeleteTries, asked); });
   });
@@ -170,7 +172,6 @@ void Ros2Services::Delete(const std::string& site, int tries, const Asked<ros2::
         if (reply.status.code == StatusCode::kFailedPrecondition && tries > 1) return Delete(site, tries - 1, asked);
         spdlog::info("ROS 2: site {} {}", site,
                      reply.status.ok() ? "is reset" : "is not reset: " + reply.status.message);
-        if (const auto found = sites_.find(HashName(site)); found != sites_.end()) found->second.paused = false;
         doors_.begin_anew(site);  // Also where it failed: sessions have ended.
         Answer(asked, {reply.status.ok() ? ros2::Reset::kSuccess : ros2::Reset::kFailure});
         lingering_.push_back({now_ + kAnswerWaits, asked.answers});

@@ -16,15 +16,13 @@ constexpr const char* kOfServer = "/cairn";
 }  // namespace
 
 Ros2Services::Ros2Services(ros2::Bus& bus, const Ros2Options& options, const ServerAbilities& abilities,
-                           Inbound& inbound, Doors doors)
-    : bus_(bus), options_(options), abilities_(abilities), doors_(std::move(doors)), commands_(inbound) {
+                           CommandCalls& commands, Doors doors)
+    : bus_(bus), options_(options), abilities_(abilities), doors_(std::move(doors)), commands_(commands) {
   if (options_.commands && abilities_.keeps_sites) OfferLoad();
 }
 
 void Ros2Services::Take(const OutboundValue& value) {
-  if (const auto* const reply = std::get_if<Reply>(&value)) {
-    static_cast<void>(commands_.Take(*reply));
-  } else if (const auto* const info = std::get_if<MapInfo>(&value)) {
+  if (const auto* const info = std::get_if<MapInfo>(&value)) {
     const MutexLock lock(news_mutex_);
     news_.insert_or_assign(info->site_id, info->site);
   } else if (const auto* const retired = std::get_if<Retired>(&value)) {
@@ -45,7 +43,6 @@ void Ros2Services::Tick(Clock::time_point now) {
       EndSite(site_id);
     }
   }
-  commands_.Tick(now);
   SendLater();
   std::erase_if(lingering_, [now](const Lingering& one) { return one.until < now; });
   CountMalformed();

@@ -1,6 +1,7 @@
 // The services that ROS 2 programs call (README.md, "Services"): the map of each site and, where ros2.commands allows
 // it, commands, with names and types of slam_toolbox and of Nav2's map_server. A map is answered by the thread of the
-// maps (map_wishes.h); a command goes to the desk as a native one does (command_calls.h). Requests that find no room
+// maps (map_wishes.h); a command goes to the desk as a native one does (command_calls.h), and what it does is told by
+// the door, which calls CommandCalls::Tick on the same thread. Requests that find no room
 // are answered as failed, or left out where the type has no word for that. Thread rule: Take and the counts from any
 // thread, the rest on the thread of the bus, or while it does not run.
 #pragma once
@@ -47,11 +48,10 @@ class Ros2Services {
     std::function<void(const std::string& site)> begin_anew;
   };
 
-  Ros2Services(ros2::Bus& bus, const Ros2Options& options, const ServerAbilities& abilities, Inbound& inbound,
+  // `commands` outlives the services.
+  Ros2Services(ros2::Bus& bus, const Ros2Options& options, const ServerAbilities& abilities, CommandCalls& commands,
                Doors doors);
 
-  // Whether this is the answer to a command of these services: then it is nobody else's.
-  [[nodiscard]] bool IsOwn(const Reply& reply) const noexcept { return commands_.IsOwn(reply); }
   void Take(const OutboundValue& value) CAIRN_EXCLUDES(news_mutex_);
   void Tick(Clock::time_point now) CAIRN_EXCLUDES(news_mutex_);
   // Ends all services. REQUIRES: the bus does not run.
@@ -68,7 +68,6 @@ class Ros2Services {
     std::string name;
     std::string topic_part;
     Endpoints endpoints;
-    bool paused = false;  // As the last call has left it.
   };
   // A request, with what answers it.
   template <typename S>
@@ -112,16 +111,16 @@ class Ros2Services {
   void Reset(NameId site_id, const ros2::Reset::Request& request, const Asked<ros2::Reset>& asked);
   void EndAndDelete(const std::string& site, const Asked<ros2::Reset>& asked);
   void Delete(const std::string& site, int tries, const Asked<ros2::Reset>& asked);
-  // Gets the robots of the site that have a session, or nothing if they cannot be known.
-  void WithRobots(const std::string& site, std::uint64_t asker,
-                  std::function<void(std::optional<std::vector<std::string>>)> then);
+  // Gets the sessions of the site that have not ended, or nothing if they cannot be known.
+  using Sessions = std::optional<std::vector<SessionState>>;
+  void WithSessions(const std::string& site, std::uint64_t asker, std::function<void(Sessions)> then);
   void ForEach(const std::shared_ptr<Round>& round, std::function<void(bool all)> then);
 
   ros2::Bus& bus_;
   const Ros2Options options_;
   const ServerAbilities abilities_;
   const Doors doors_;
-  CommandCalls commands_;
+  CommandCalls& commands_;
   Endpoints of_server_;
   std::map<NameId, Site> sites_;
   Clock::time_point now_{};  // Of the last Tick; the first one comes before the first request.

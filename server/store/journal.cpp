@@ -316,11 +316,9 @@ JournalHealth Journal::health() const {
 JournalCounts Journal::counts() const {
   const MutexLock lock(mutex_);
   JournalCounts counts = counts_;
-  if (delays_ms_.empty()) return counts;
-  std::vector<float> sorted(delays_ms_.begin(), delays_ms_.end());
-  std::sort(sorted.begin(), sorted.end());
-  counts.delay_p50_ms = sorted[(sorted.size() - 1) / 2];
-  counts.delay_p99_ms = sorted[(sorted.size() - 1) * 99 / 100];
+  const DelayMeter::Quantiles delays = delays_.quantiles();
+  counts.delay_p50_ms = delays.p50_ms;
+  counts.delay_p99_ms = delays.p99_ms;
   return counts;
 }
 

@@ -30,6 +30,7 @@
 #include <variant>
 #include <vector>
 
+#include "common/delay_meter.h"
 #include "common/mutex.h"
 #include "server/store/checkpoint_writer.h"
 #include "server/store/records.h"
@@ -244,7 +245,7 @@ class Journal {
   std::string checkpoint_fault_ CAIRN_GUARDED_BY(mutex_);  // Why the last checkpoint is missing.
   bool over_budget_ CAIRN_GUARDED_BY(mutex_) = false;
   JournalCounts counts_ CAIRN_GUARDED_BY(mutex_);
-  std::deque<float> delays_ms_ CAIRN_GUARDED_BY(mutex_);
+  DelayMeter delays_ CAIRN_GUARDED_BY(mutex_);
   std::deque<WantedCheckpoint> checkpoints_ CAIRN_GUARDED_BY(mutex_);
   std::vector<Work> works_ CAIRN_GUARDED_BY(mutex_);
   std::vector<std::function<void()>> told_ CAIRN_GUARDED_BY(mutex_);

@@ -12,7 +12,6 @@ namespace {
 
 constexpr auto kRetry = std::chrono::seconds(1);
 constexpr auto kBudgetPeriod = std::chrono::seconds(10);
-constexpr std::size_t kMaxDelays = 4096;
 constexpr int kPiecesAtStop = 20;
 
 }  // namespace
@@ -313,8 +312,7 @@ void Journal::Tell(const Prepared& prepared, Clock::time_point oldest) {
     const MutexLock lock(mutex_);
     committing_bytes_ = 0;
     if (prepared.empty()) return;
-    delays_ms_.push_back(std::chrono::duration<float, std::milli>(Clock::now() - oldest).count());
-    if (delays_ms_.size() > kMaxDelays) delays_ms_.pop_front();
+    delays_.Add(Clock::now() - oldest);
     for (const auto& [session, batch] : prepared.batches) {
       counts_.entries += batch.entries.size();
       const auto line = lines_.find(session);

@@ -29,36 +29,11 @@ fi
 build=$2 tree=$3
 # Of this process alone, and gone with it: the container's root over the tree, and what nspawn keeps in /run.
 enter_overlay "$tree"
-# The hierarchy that every systemd takes; where the machine has the older one, that stays as it is outside.
-umount -R /sys/fs/cgroup 2>/dev/null || true
-mount -t cgroup2 cgroup2 /sys/fs/cgroup
-
 # Twice: the second keeps the configuration that is there. (Not into a pipe: grep -q would end before cmake has said all.)
-for _ in first second; do DESTDIR=/run/root cmake --install "$build" --prefix /usr/local >/run/installed; done
+for _ in first second; do
+  for component in server client web; do
+    DESTDIR=/run/root cmake --install "$build" --component "$component" --prefix /usr/local
+  done >/run/installed
+done
 grep -q 'cairnd.yaml.default$' /run/installed
-cp "$here/service_checks.sh" /run/root/opt/
-cat >/run/root/etc/systemd/system/checks.service <<'UNIT'
-[Service]
-Type=oneshot
-TimeoutStartSec=240
-ExecStart=/bin/bash /opt/service_checks.sh
-StandardOutput=file:/opt/said
-StandardError=inherit
-ExecStopPost=/bin/sh -c 'journalctl -u cairnd -o short-monotonic >/opt/journal; systemctl exit "$$EXIT_STATUS"'
-[Install]
-WantedBy=multi-user.target
-UNIT
-mkdir -p /run/root/etc/systemd/system/multi-user.target.wants
-ln -s ../checks.service /run/root/etc/systemd/system/multi-user.target.wants/
-echo "booting; what the checks say follows"
-code=0
-# The time-out is for the container as a whole; the checks have their own.
-SYSTEMD_NSPAWN_UNIFIED_HIERARCHY=1 timeout --kill-after=10 300 systemd-nspawn --boot --quiet --register=no --keep-unit \
-  --private-network --console=pipe --directory=/run/root </dev/null >/run/console 2>&1 || code=$?
-cat /run/root/opt/said || true  # Where it did not come to the checks there is none.
-if [ "$code" -ne 0 ]; then
-  echo "the container ended with $code; its console and the service's journal:"
-  tail -n 20 /run/console
-  grep -v ' config: ' /run/root/opt/journal | tail -n 100 || true
-fi
-exit "$code"
+run_booted "$here/service_checks.sh" 240

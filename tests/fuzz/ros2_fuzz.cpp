@@ -67,9 +67,13 @@ class Door {
       case 1:
         return With<ros2::Odometry>(bytes, [&](auto&& message) { robot_.Take(std::move(message), origin, now_); });
       case 2:
-        return With<ros2::Transforms>(bytes, [&](auto&& message) { robot_.Take(message, origin, now_); });
+        return With<ros2::Transforms>(bytes, [&](auto&& message) {
+          robot_.SeeMapToOdom(message, false, origin.writer, now_);
+          robot_.Take(message, origin, now_);
+        });
       case 3:
         return With<ros2::Transforms>(bytes, [&](auto&& message) {
+          robot_.SeeMapToOdom(message, true, origin.writer, now_);
           robot_.TakeShared(shared_.Take(message, origin.writer, false), true, origin, now_);
         });
       case 4:
@@ -93,7 +97,7 @@ class Door {
   }
 
   void Check() {
-    Must(robot_.Problems(now_).size() < 16, "what it says of itself is short");
+    Must(robot_.Problems(now_, kNanosPerSecond, {{2}, {3}}).size() < 16, "what it says of itself is short");
     while (inbound_.size() > 0) {
       const auto value = inbound_.Pop();
       if (const auto* const scan = std::get_if<server::ScanArrival>(&*value))

@@ -137,11 +137,11 @@ TEST(Restore, ARobotWhoseOdometryLagsGetsCheckpointsToo) {
   {
     StoredServer first(directory / "0", options);
     first->Open("r1", kDriver);
+    // The last sample is a scan: when it is durable, all samples are.
     for (int step = 0; step < 90; ++step) {
+      if (step >= kLag) first->SendOdometry("r1", kDriver, RoomOdometry(step - kLag));
       first->SendScan("r1", kDriver, RoomScan(step));
-      if (step < kLag) continue;
-      first->SendOdometry("r1", kDriver, RoomOdometry(step - kLag));
-      if (step % 8 == 0) first->WaitSettled("r1", static_cast<std::uint64_t>(step - kLag) + 1);
+      if (step >= kLag && step % 8 == 0) first->WaitSettled("r1", static_cast<std::uint64_t>(step - kLag) + 1);
     }
     ASSERT_TRUE(first->WaitFor([&] { return DurableScans(*first.operator->()) == 90; }));
     CopyState(directory / "0", directory / "1");

@@ -20,14 +20,28 @@ using Words = std::vector<std::string>;
 class RosFleet : public ::testing::Test {
  protected:
   RosFleet() { setenv("CYCLONEDDS_URI", "file://" CAIRN_CYCLONE_CONFIG, 1); }
-  void SetUp() override { StartServer("256"); }
+  void SetUp() override { StartServer({}); }
 
-  void StartServer(const std::string& max_robots) {
-    server_ = std::make_unique<ChildProcess>(Words{CAIRND_PATH, "--domain", domain_, "--set", "ros2.enabled=true",
-                                                   "--set", "ros2.domain=" + domain_, "--set",
-                                                   "ros2.namespaces=/r2=yard/r2, /{robot}, /=rootless", "--set",
-                                                   "slam.particles=20", "--set", "ros2.max_robots=" + max_robots});
+  void StartServer(const Words& settings) {
+    Words line{CAIRND_PATH,
+               "--domain",
+               domain_,
+               "--set",
+               "ros2.enabled=true",
+               "--set",
+               "ros2.domain=" + domain_,
+               "--set",
+               "ros2.namespaces=/r2=yard/r2, /{robot}, /=rootless",
+               "--set",
+               "slam.particles=20"};
+    for (const std::string& setting : settings) line.insert(line.end(), {"--set", setting});
+    server_ = std::make_unique<ChildProcess>(line);
     EXPECT_TRUE(server_->Says("ready"));
+  }
+  void StartServerAnew(const Words& settings) {
+    server_->Signal(SIGTERM);
+    EXPECT_EQ(server_->Wait().exit_code, 0);
+    StartServer(settings);
   }
 
   std::unique_ptr<ChildProcess> Robot(const std::string& name_space, const std::string& seconds, Words words = {},
@@ -63,6 +77,13 @@ class RosFleet : public ::testing::Test {
   static auto Says(const std::string& text) {
     return [text](const nlohmann::json& one) { return ProblemsOf(one).find(text) != std::string::npos; };
   }
+  static bool IsOnMap(const nlohmann::json& one) { return one["on_map"] == true; }
+  // How many scans of the robot have arrived.
+  static int ScansOf(const nlohmann::json& one) {
+    for (const auto& topic : one["topics"])
+      if (topic["name"] == one["name"].get<std::string>() + "/scan") return topic["received"].get<int>();
+    return 0;
+  }
 
   const std::string domain_ = std::to_string(test::TestDomain());
   std::unique_ptr<ChildProcess> server_;
@@ -72,9 +93,8 @@ TEST_F(RosFleet, RobotsAsTheyAreGetTheirPosesAndTheMap) {
   // They must still be there when the doctor is asked, which takes some seconds under a sanitizer.
   const auto humble = Robot("r1", "14");
   const auto jazzy = Robot("r2", "14", {"jazzy"}, "yard");  // In the other's map it would have to be joined first.
-  const auto on_map = [](const nlohmann::json& one) { return one["on_map"] == true; };
-  EXPECT_EQ(DoctorOf("/r1", on_map)["site"], "lab");
-  EXPECT_EQ(DoctorOf("/r2", on_map)["topics"].size(), 3U);
+  EXPECT_EQ(DoctorOf("/r1", IsOnMap)["site"], "lab");
+  EXPECT_EQ(DoctorOf("/r2", IsOnMap)["topics"].size(), 3U);
   ExpectGood(*humble);
   ExpectGood(*jazzy);
   server_->Signal(SIGTERM);
@@ -112,15 +132,61 @@ TEST_F(RosFleet, TheDoctorSaysWhyARobotIsNotOnTheMap) {
   EXPECT_EQ(server_->Wait().exit_code, 0);
 }
 
+// What does not keep a robot from the map is said as well.
+TEST_F(RosFleet, TheDoctorSaysWhatElseIsWrong) {
+  const auto beside = Robot("r1", "100", {"other-slam"});
+  const auto late = Robot("r2", "100", {"late-odom", "shared-tf"}, "yard");
+  const auto forgetful = Robot("r3", "100", {"volatile-tf", "shared-tf"});
+  DoctorOf("/r1", [](const nlohmann::json& one) {
+    return IsOnMap(one) && Says("another node also publishes map to odom")(one);
+  });
+  const auto printed = ChildProcess({CAIRN_PATH, "--domain", domain_, "ros2", "doctor", "r1"}).Wait();
+  EXPECT_THAT(printed.output, HasSubstr("/r1  robot r1 in site lab: on the map, but:\n  - another node also"));
+  DoctorOf("/r2", Says("apart: their clocks differ"));
+  DoctorOf("/r3", Says("tf_static has a publisher whose durability is volatile"));
+  std::string of_all;
+  EXPECT_TRUE(test::Eventually([&] {
+    of_all = Doctor()["problems"].dump();
+    return of_all.find("two publishers contend for the frame 'base_footprint'") != std::string::npos &&
+           of_all.find("another node also publishes /lab/map") != std::string::npos;
+  })) << of_all;
+}
+
+// As RViz says it: "2D Pose Estimate".
+TEST_F(RosFleet, AnInitialPoseLeavesTheSessionWhereTheServerCanLookForTheRobotThere) {
+  // The second robot has to stay outside the map until it says where it is, and says so only roughly.
+  StartServerAnew({"jobs.join=false", "jobs.check_starts=false"});
+  const auto mapper = Robot("r1", "100", {"hint"});
+  DoctorOf("/r1", IsOnMap);
+  const auto stranger = Robot("r3", "100", {"hint"});
+  DoctorOf("/r3", Says("nobody has said where it started"));
+  const int before = ScansOf(DoctorOf("/r1", IsOnMap));
+  mapper->Signal(SIGUSR1);
+  EXPECT_TRUE(server_->Says("ROS 2: r1 is looked for where its initial pose says"));
+  DoctorOf("/r1", [before](const nlohmann::json& one) { return IsOnMap(one) && ScansOf(one) > before + 50; });
+  stranger->Signal(SIGUSR1);
+  EXPECT_TRUE(server_->Says("ROS 2: r3 begins a new session at its initial pose"));
+  DoctorOf("/r3", IsOnMap);
+  server_->Signal(SIGTERM);
+  const auto outcome = server_->Wait();
+  EXPECT_EQ(outcome.exit_code, 0);
+  const auto sessions = [&outcome](const std::string& robot) {
+    const std::string line = "the session of " + robot + " in lab is opened";
+    int count = 0;
+    for (auto at = outcome.output.find(line); at != std::string::npos; at = outcome.output.find(line, at + 1)) ++count;
+    return count;
+  };
+  EXPECT_EQ(sessions("r1"), 1) << outcome.output;
+  EXPECT_EQ(sessions("r3"), 2) << outcome.output;
+}
+
 // Names that had come once kept others out until the server was started again.
 TEST_F(RosFleet, NamespacesThatAreGoneMakeRoomForOthers) {
-  server_->Signal(SIGTERM);
-  EXPECT_EQ(server_->Wait().exit_code, 0);
-  StartServer("1");
+  StartServerAnew({"ros2.max_robots=1"});
   ExpectGood(*Robot("r1", "5"));
   // The first one does not say that it goes: its lease of 10 s has to end.
   const auto second = Robot("r2", "100", {}, "yard");
-  DoctorOf("/r2", [](const nlohmann::json& one) { return one["on_map"] == true; });
+  DoctorOf("/r2", IsOnMap);
   EXPECT_EQ(Doctor()["namespaces"].size(), 1U);
 }
 

@@ -103,12 +103,18 @@ TEST_F(RosCallers, SavePauseAndResetSitesWhereThatIsAllowed) {
   EXPECT_TRUE(IsSaved("monday"));
   EXPECT_TRUE(IsSaved("graph"));
 
-  EXPECT_EQ(Call({"pause", "/lab/pause_new_measurements"})["result"], 1) << "only localised";
-  // Once the robot is found in the map. Until then the answer is 0, and nothing changes.
-  EXPECT_TRUE(
-      CallUntil({"pause", "/lab/pause_new_measurements", "jazzy"}, "result", [](int result) { return result == 1; }))
-      << "maps again\n"
-      << Cairn({"status"}) << Cairn({"ros2", "doctor"});
+  // A robot maps again once it is found in the map. Until then the answer is 0, and nothing changes.
+  const auto maps_again = [this] {
+    return CallUntil({"pause", "/lab/pause_new_measurements", "jazzy"}, "result",
+                     [](int result) { return result == 1; });
+  };
+  // Somebody else has paused it: the first call has it map again.
+  EXPECT_THAT(Cairn({"robot", "localise", "r1"}), HasSubstr("only localised"));
+  EXPECT_TRUE(maps_again()) << Cairn({"status"}) << Cairn({"ros2", "doctor"});
+  EXPECT_TRUE(server_->Says("ROS 2: the robots of site lab map again"));
+  EXPECT_EQ(Call({"pause", "/lab/pause_new_measurements"})["result"], 1);
+  EXPECT_TRUE(server_->Says("ROS 2: the robots of site lab are only localised"));
+  EXPECT_TRUE(maps_again()) << Cairn({"status"}) << Cairn({"ros2", "doctor"});
 
   EXPECT_EQ(Call({"load_map", "/cairn/load_map", "nothing"})["result"], 1);
   EXPECT_EQ(Call({"load_map", "/cairn/load_map", "/etc/passwd"})["result"], 1);

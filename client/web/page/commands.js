@@ -18,7 +18,12 @@ const post = (path, body, bearer) => fetch(path, {
 });
 
 export async function useToken(text) {
-  const answer = await post('/api/token', {}, text).catch(() => null);
+  let answer = null;
+  // Without an answer nobody knows whether it is the right one.
+  for (let tries = 0; !answer && tries < 5; ++tries) {
+    if (tries > 0) await new Promise((done) => setTimeout(done, 1000));
+    answer = await post('/api/token', {}, text).catch(() => null);
+  }
   if (!answer?.ok) return false;
   sessionStorage.setItem(KEY, text);
   return true;

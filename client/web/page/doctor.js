@@ -1,4 +1,4 @@
-// Why robots are not on the map: what `cairn ros2 doctor` says, in the same words, and robots that have no session. Names
+// Why robots are not on the map, or what else is wrong: what `cairn ros2 doctor` says, in the same words, and robots that have no session. Names
 // in it come from the network, so everything is set as text.
 import { element, keyed, setText } from '/panels.js';
 
@@ -32,8 +32,9 @@ function makeNamespace() {
 function showNamespace(item, one) {
   setText(item.querySelector('.title'), one.name);
   const pill = item.querySelector('.pill');
-  pill.className = `pill ${one.on_map ? 'good' : 'bad'}`;
-  setText(pill, one.on_map ? 'On the map' : 'Not on the map');
+  const [look, state] = !one.on_map ? ['bad', 'Not on the map'] : one.problems.length === 0 ? ['good', 'On the map'] : ['warn', 'On the map, but:'];
+  pill.className = `pill ${look}`;
+  setText(pill, state);
   setText(item.querySelector('.detail'), one.who);
   texts(item.querySelector('.problems'), one.problems);
   const summary = item.querySelector('summary');

@@ -1,10 +1,11 @@
 // Holds the page together: chooses the site, listens to the events, and hands what they say to the map and the lists.
-import { SiteMap } from '/map.js';
+import { SiteMap, isFragment } from '/map.js';
 import { plot } from '/plots.js';
 import { onThemeChange } from '/theme.js';
 import * as panels from '/panels.js';
 import { showDoctor } from '/doctor.js';
 import { editOf, listenToTools, showEdits } from '/edits.js';
+import { askFragment, showFragments } from '/fragments.js';
 import { command, say, token, tokenOfAddress, useToken } from '/commands.js';
 
 const $ = (id) => document.getElementById(id);
@@ -51,6 +52,7 @@ function choose(site) {
   wanted = site;
   map?.remove();
   map = null;
+  showFragments([]);
   flow = [];
   waitingTiles = [];
   state = null;
@@ -93,9 +95,10 @@ function show(now) {
   }
   map?.fit(state.map, false);
   map?.update(state.robots, state.connected);
+  showFragments(state.robots);
   panels.showRobots(state, may(), (name) => {
     const robot = state.robots.find((one) => one.name === name);
-    if (robot?.pose) map?.centre(robot.pose);
+    if (robot?.pose && !isFragment(robot)) map?.centre(robot.pose);
   }, relocalise, setMode);
   panels.showJobs(state, may(), (id) => command(`/api/jobs/${id}/cancel`, {}, 'The job is cancelled.'));
   panels.showMap(state, may(), (version) => command(`/api/sites/${state.site}/enable`, { version }, `Version ${version} is enabled.`));
@@ -109,6 +112,7 @@ function relocalise(name, how, pose) {
   const robot = state.robots.find((one) => one.name === name);
   if (!map || !robot?.pose) return;
   if (map.placing === name) { map.stopPlacing(); return; }
+  $('map').scrollIntoView({ block: 'nearest' });  // On a phone it is above the lists.
   map.place(name, robot.pose.theta, (placed) => { if (placed) tell(placed); else say(''); });
   say(`Press where ${name} is, and drag to where it looks. Escape, or the button again, leaves it as it is.`, true);
 }
@@ -143,6 +147,7 @@ function sendEdit(edit) { command(`/api/sites/${state.site}/edit`, edit, 'The ma
 listenToTools((kind, note) => {
   if (!map) return;
   if (map.placing === 'edit') { map.stopPlacing(); return; }
+  $('map').scrollIntoView({ block: 'nearest' });
   map.span(kind === 'occupied', (from, to) => { if (from) sendEdit(editOf(kind, from, to, note)); else say(''); });
   say(`Press on the map and drag ${kind === 'occupied' ? 'along the wall' : 'to the opposite corner'}. Escape leaves it as it is.`, true);
 }, sendEdit);
@@ -173,6 +178,12 @@ async function askPaths() {
 async function askAll() {
   const asked = map, smoothed = state.map?.versions.some((version) => version.enabled && version.job !== '0');
   for (const robot of state.robots) {
+    if (isFragment(robot)) {
+      await askFragment(robot, getJson);
+      if (map !== asked) return;
+      showFragments(state.robots);
+      continue;  // Its path is none in this map.
+    }
     if (asked.shown.path) {
       const path = await getJson(`/api/robots/${robot.name}/path`);
       if (path && map === asked) asked.setPath(robot.name, path.points, false);
@@ -216,9 +227,16 @@ $('token-dialog').querySelector('form').addEventListener('submit', async (event)
   }
 });
 
-onThemeChange(() => { if (state?.site) show(state); });
+onThemeChange(() => { if (state?.site) show(state); askPaths(); });
+document.addEventListener('visibilitychange', () => map?.refresh());
+$('fragments').addEventListener('toggle', askPaths);
 showFlow();
 panels.showEmptyMap(null);
 await tokenOfAddress();
+// The address with a token, opened where the page is already open: the browser does not load it again.
+window.addEventListener('hashchange', async () => {
+  await tokenOfAddress();
+  if (state) show(state);
+});
 listen();
 setInterval(askPaths, PATH_PERIOD_MS);

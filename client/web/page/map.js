@@ -11,7 +11,8 @@ const CellLayer = L.GridLayer.extend({
     L.GridLayer.prototype.initialize.call(this, options);
     this.site = site;
     this.levels = levels;
-    this.versions = new Map();
+    this.versions = new Map();  // What is newest of each tile of each level.
+    this.turn = 0;  // Versions begin anew with each whole map.
   },
   keyOf(coords) { return `${this.levels - 1 - coords.z}/${coords.x}/${-coords.y - 1}`; },
   createTile(coords, done) {
@@ -33,26 +34,35 @@ const CellLayer = L.GridLayer.extend({
   show(tile, key) {
     const version = this.versions.get(key);
     tile.dataset.key = key;
+    tile.version = version;
     tile.hidden = version === undefined;
     if (tile.hidden) return false;
     tile.src = `/api/sites/${this.site}/tiles/${key}.png?theme=${theme()}&v=${version}`;
     return true;
   },
   apply(changes) {
-    if (changes.whole) this.versions.clear();
-    const changed = new Set();
+    if (changes.whole) { this.versions.clear(); this.turn += 1; }
     for (const [level, x, y, version] of changes.tiles) {
       const key = `${level}/${x}/${y}`;
-      if (version === 0) this.versions.delete(key); else this.versions.set(key, version);
-      changed.add(key);
+      if (version === 0) this.versions.delete(key); else this.versions.set(key, `${this.turn}.${version}`);
     }
+    this.refresh();
+  },
+  // Loads what has changed, of the level that is shown and where it is seen. Whatever else has changed is loaded when it comes
+  // into view.
+  refresh() {
+    if (document.hidden || this._tileZoom === undefined) return;
+    const seen = this._pxBoundsToTileRange(this._getTiledPixelBounds(this._map.getCenter()));
     for (const { coords, el } of Object.values(this._tiles)) {
       const key = this.keyOf(coords);
-      if (changes.whole || changed.has(key)) this.show(el, key);
+      if (coords.z === this._tileZoom && seen.contains(coords) && el.version !== this.versions.get(key)) this.show(el, key);
     }
   },
   reload() { for (const { coords, el } of Object.values(this._tiles)) this.show(el, this.keyOf(coords)); },
 });
+
+// Whether its poses are relative to its own start and say nothing about the map of its site.
+export const isFragment = (robot) => robot.pose?.reason === 'not_joined';
 
 export function robotState(robot, connected) {
   if (robot.phase === 'ended') return ['silent', 'Ended'];
@@ -61,7 +71,7 @@ export function robotState(robot, connected) {
   if (!robot.pose) return ['unsure', 'Waiting for scans'];
   if (robot.pose.reason === 'lost' || robot.pose.reason === 'diverged') return ['lost', 'Lost'];
   if (robot.pose.reason === 'odometry_only') return ['unsure', 'Odometry only'];
-  if (robot.pose.reason === 'not_joined') return ['unsure', 'Not joined'];
+  if (isFragment(robot)) return ['unsure', 'Not joined'];
   if (!robot.pose.localized) return ['unsure', 'Not localized'];
   if (robot.pose.reason === 'degenerate') return ['tracking', 'Corridor'];
   return ['tracking', connected ? 'Tracking' : 'Last known'];
@@ -99,6 +109,7 @@ export class SiteMap {
     this.edits = L.layerGroup().addTo(this.leaflet);
     const near = () => element.classList.toggle('near', this.leaflet.getZoom() > map.levels - 1);
     this.leaflet.on('zoomend', near);
+    this.leaflet.on('move moveend', () => this.refresh());
     // Robots glide when they move, and not when the map does.
     this.leaflet.on('zoomstart viewreset', () => element.classList.remove('gliding'));
     // Once somebody has moved the map, it stays where they put it.
@@ -118,6 +129,9 @@ export class SiteMap {
   }
 
   applyTiles(changes) { this.cells.apply(changes); }
+
+  // When the page is seen again.
+  refresh() { this.cells.refresh(); }
 
   fit(map, force) {
     if (!map || map.tiles === 0 || (this.moved && !force)) return;
@@ -161,8 +175,7 @@ export class SiteMap {
     for (const robot of robots) {
       if (!robot.pose) continue;
       const drawn = this.draw(robot), { pose } = robot;
-      // Its pose is relative to its own start and says nothing about this map.
-      if (pose.reason === 'not_joined') {
+      if (isFragment(robot)) {
         for (const layer of [drawn.path, drawn.smoothed, drawn.ellipse, drawn.marker]) this.toggle(layer, false);
         continue;
       }

@@ -1,6 +1,6 @@
 // The lists beside the map. Elements are kept and changed in place, so that focus and what a screen reader reads stay.
 import { colourOf } from '/theme.js';
-import { robotState } from '/map.js';
+import { isFragment, robotState } from '/map.js';
 import { format } from '/plots.js';
 
 const $ = (id) => document.getElementById(id);
@@ -73,8 +73,7 @@ function makeRelocalise(item, robot, onRelocalise) {
   });
 }
 
-// Whether it maps or is only localised, and for those who may command: the other of both. Where the server says something
-// else of it (mode null), nobody knows which, so both can be said.
+// Whether it maps or is only localised, and for those who may command: the other of both.
 const MODES = { map: 'Maps', localise: 'Only localised: nothing is drawn of it' };
 
 function makeMode(item, robot, onMode) {
@@ -92,8 +91,8 @@ function makeMode(item, robot, onMode) {
 function showMode(item, robot, may) {
   const ended = robot.phase === 'ended';
   const mode = item.querySelector('.mode');
-  mode.hidden = ended || !robot.mode;
-  setText(mode, MODES[robot.mode] ?? '');
+  mode.hidden = ended;
+  setText(mode, MODES[robot.mode]);
   item.querySelector('.modes').hidden = !may || ended;
   const localise = item.querySelector('.to-localise'), map = item.querySelector('.to-map');
   for (const [button, other, is] of [[localise, map, 'localise'], [map, localise, 'map']]) {
@@ -133,12 +132,11 @@ export function showRobots(state, may, onChosen, onRelocalise, onMode) {
     item.querySelector('.relocalise').hidden = !may || !pose || robot.phase === 'ended';
     const used = scanSensors(robot).reduce((sum, sensor) => sum + sensor.used, 0);
     const dropped = scanSensors(robot).reduce((sum, sensor) => sum + droppedOf(sensor), 0);
-    const place = pose ? `${pose.x.toFixed(2)}, ${pose.y.toFixed(2)} m, ${Math.round((pose.theta * 180) / Math.PI) || 0}°, ±${pose.ellipse ? pose.ellipse[0].toFixed(2) : '?'} m` : 'no pose yet';
+    const place = pose ? `${pose.x.toFixed(2)}, ${pose.y.toFixed(2)} m, ${Math.round((pose.theta * 180) / Math.PI) || 0}°, ±${pose.ellipse ? pose.ellipse[0].toFixed(2) : '?'} m${isFragment(robot) ? ' from its start' : ''}` : 'no pose yet';
     setText(item.querySelector('.where'), `${place} · ${used} scans used${dropped ? `, ${dropped} dropped` : ''}`);
     const note = item.querySelector('.note');
-    const said = robot.mode === 'localise' ? '' : robot.note;  // The mode says that already.
-    note.hidden = !said;
-    setText(note, said);
+    note.hidden = !robot.note;
+    setText(note, robot.note);
     showMode(item, robot, may);
     keyed(item.querySelector('.sensors'), scanSensors(robot), (sensor) => sensor.sensor, () => element('p'), (p, sensor) => setText(p, describeSensor(sensor)));
   });

@@ -20,6 +20,9 @@ Result<std::shared_ptr<Participant>> Participant::Create(const WireOptions& opti
   wire::ConfigureLibraryOnce();
   auto made = std::make_shared<Participant>();
   fd::DomainParticipantQos qos = wire::ParticipantQos(options, name, made->guard_);
+  // A discovery server tells a mere client only of topics that it has itself; the door looks for those of others.
+  if (!options.discovery_servers.empty())
+    qos.wire_protocol().builtin.discovery_config.discoveryProtocol = rtps::DiscoveryProtocol_t::SUPER_CLIENT;
   SetUserData(qos.user_data(), "enclave=/;");
   made->participant_ = fd::DomainParticipantFactory::get_instance()->create_participant(
       static_cast<fd::DomainId_t>(options.domain), qos, &made->writers_, fd::StatusMask::none());

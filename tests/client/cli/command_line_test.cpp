@@ -66,6 +66,9 @@ TEST_F(CommandLine, NonsenseIsAUsageError) {
       {"map", "export", "--site", "s"},
       {"map", "draw", "-o", "x.png"},
       {"map", "draw", "--site", "s", "--map", "m.yaml", "-o", "x.png"},
+      {"map", "animate", "-o", "x.png"},
+      {"map", "animate", "--site", "s", "-o", "x.png", "--every", "0"},
+      {"map", "animate", "--site", "s", "-o", "x.png", "--frames", "1"},
       {"tiles", "--site", "s", "--area", "5,5,1,1"},
       {"tiles", "--site", "s", "--level", "9"},
       {"job", "show", "0"},
@@ -188,9 +191,13 @@ TEST_F(CommandLine, FilesThatAreNotThereFailWithOneLine) {
 TEST_F(CommandLine, APictureDoesNotReplaceTheImageOfAMap) {
   const OccupancyImage map{.resolution_m = 0.05, .T_map_origin = {}, .width = 2, .height = 2, .cells = {0, 0, 100, 0}};
   ASSERT_TRUE(SaveMapYaml(map, File("lab.yaml"), ".png", {}));
-  const CommandOutcome refused = RunLine({"map", "draw", "--map", File("lab.yaml"), "-o", File("lab.png")});
-  EXPECT_EQ(refused.code, ExitCode::kFailed);
-  EXPECT_THAT(refused.err, HasSubstr("lab.png' is the image of the map"));
+  for (const std::vector<std::string>& line :
+       {std::vector<std::string>{"map", "draw", "--map", File("lab.yaml"), "-o", File("lab.png")},
+        {"map", "animate", "--site", "lab", "-o", File("lab.png")}}) {
+    const CommandOutcome refused = RunLine(line);
+    EXPECT_EQ(refused.code, ExitCode::kFailed);
+    EXPECT_THAT(refused.err, HasSubstr("lab.png' is the image of the map"));
+  }
   EXPECT_EQ(LoadMapYaml(File("lab.yaml"))->cells, map.cells);
   for (int again = 0; again < 2; ++again)
     EXPECT_EQ(RunLine({"map", "draw", "--map", File("lab.yaml"), "-o", File("picture.png")}).code, ExitCode::kOk);

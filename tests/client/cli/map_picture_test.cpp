@@ -56,6 +56,30 @@ TEST(MapPicture, PathsAreColouredAndUpIsY) {
   EXPECT_GT(Brightness(image, x, y + 100), 250);
 }
 
+// The pictures of an animation: the map grows, and what was there stays where it was.
+TEST(MapPicture, PicturesOfOneFrameHaveOneSizeAndAPlaceIsAtTheSamePixel) {
+  OccupancyImage grown = Map();
+  grown.T_map_origin.x -= 2.0;
+  grown.width += 40;
+  grown.cells.assign(static_cast<std::size_t>(grown.width) * static_cast<std::size_t>(grown.height), 0);
+  for (int row = 0; row < grown.height; ++row) grown.cells[static_cast<std::size_t>(row * grown.width + 100)] = 100;
+  PictureOptions options;
+  options.width_px = 1200;
+  options.shades = 4;
+  options.frame.Include(FrameOf(Map(), {}, 0.5));
+  options.frame.Include(FrameOf(grown, {}, 0.5));
+  options.frame.Include(PictureFrame{});
+  EXPECT_NEAR(options.frame.x_max_m - options.frame.x_min_m, 7.0, 1e-9);
+  const cv::Mat small = Draw(Map(), {}, options), large = Draw(grown, {}, options);
+  ASSERT_EQ(small.size(), large.size());
+  const int wall_x = static_cast<int>((0.5 + 2.0 + 3.025) * 1200.0 / 7.0), y = static_cast<int>(1.5 * 1200.0 / 7.0);
+  EXPECT_LT(Brightness(small, wall_x, y), 80);
+  EXPECT_LT(Brightness(large, wall_x, y), 80);
+  const int new_x = static_cast<int>((0.5 + 1.0) * 1200.0 / 7.0);
+  EXPECT_LT(Brightness(small, new_x, y), 245) << "unknown before";
+  EXPECT_GT(Brightness(large, new_x, y), 250) << "free now";
+}
+
 TEST(MapPicture, DrawsPathsAloneAndRefusesNothingAtAll) {
   EXPECT_FALSE(DrawMapPicture({}, {}, {}));
   const cv::Mat image = Draw({}, {{"one pose", {{0, {1, 2, 3}}}, false}}, {});

@@ -3,6 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <sstream>
+
+#include "client/cli/text_output.h"
+
 namespace cairn::client {
 namespace {
 
@@ -30,6 +35,42 @@ RobotStatus Robot(const std::string& name, std::uint64_t used) {
   return robot;
 }
 
+Job RunningJob(std::uint64_t id) {
+  Job job;
+  job.id = id;
+  job.site = "hall";
+  job.state = JobState::kRunning;
+  return job;
+}
+
+MapInfo Site(const std::string& name) {
+  MapInfo map;
+  map.site = name;
+  map.epoch = 4;
+  map.tile_count = 37;
+  map.robots = 2;
+  map.enabled_version = 3;
+  map.memory_bytes = 5U << 20U;
+  return map;
+}
+
+// ROS 2 robots /r1, /r2, ... that are not on the map, with two problems each.
+Ros2Report Ros2Robots(int robots) {
+  Ros2Report report;
+  report.door.enabled = true;
+  for (int i = 1; i <= robots; ++i) {
+    Ros2Namespace one;
+    one.name = "/r" + std::to_string(i);
+    one.problems = {"no odometry", "no transform of the lidar"};
+    report.namespaces.push_back(one);
+  }
+  return report;
+}
+
+std::size_t LinesOf(const std::string& text) {
+  return static_cast<std::size_t>(std::count(text.begin(), text.end(), '\n'));
+}
+
 // The words of the line that begins with the robot's name.
 std::string LineOf(const std::string& text, const std::string& robot) {
   const std::size_t begin = text.find("\n" + robot) + 1;
@@ -39,10 +80,11 @@ std::string LineOf(const std::string& text, const std::string& robot) {
 }
 
 TEST(TopTable, RatesAreOfTheTimeBetweenTwoAnswers) {
-  TopView before{
-      .status = {.robots = {Robot("r1", 100)}, .degraded = {}, .refused = {}, .load = {}}, .jobs = {}, .seconds = 10.0};
-  TopView now{
-      .status = {.robots = {Robot("r1", 125)}, .degraded = {}, .refused = {}, .load = {}}, .jobs = {}, .seconds = 12.0};
+  TopView before, now;
+  before.status.robots = {Robot("r1", 100)};
+  before.seconds = 10.0;
+  now.status.robots = {Robot("r1", 125)};
+  now.seconds = 12.0;
   EXPECT_EQ(LineOf(FormatTop(now, &before), "r1"), "r1 hall tracking 1.50 -2.25 90 0.02 12.5 0.0 3 1.2 / 20.0");
   EXPECT_EQ(LineOf(FormatTop(now, nullptr), "r1"), "r1 hall tracking 1.50 -2.25 90 0.02 - - 3 1.2 / 20.0");
   now.status.robots[0] = Robot("r1", 7);  // A new session.
@@ -57,6 +99,9 @@ TEST(TopTable, TheServersLoadIsThatSinceTheLastAnswer) {
   EXPECT_THAT(FormatTop(now, &before),
               HasSubstr("server: up 1.0 h, 125 % of a processor, 200 MiB of memory, 7 values wait in it\n"));
   EXPECT_THAT(FormatTop(now, nullptr), HasSubstr("up 1.0 h, 50 % of"));
+  now.status.load.strand_wait_p50_ms = 0.21;
+  now.status.load.strand_wait_p99_ms = 12.0;
+  EXPECT_THAT(FormatTop(now, nullptr), HasSubstr("wait in it, work waits 0.2 ms for a thread (p99 12.0 ms)\n"));
   std::swap(before, now);  // The server was started again.
   EXPECT_THAT(FormatTop(now, &before), HasSubstr("up 1.0 h, 50 % of"));
   now.status.load = {};
@@ -78,20 +123,89 @@ TEST(TopTable, SaysWhatIsNotAsUsual) {
   stale.session.stale = true;
   now.status.robots = {gone, stale};
   now.status.degraded = "the disk is full";
-  Job running, done;
-  running.id = 7;
-  running.site = "hall";
-  running.state = JobState::kRunning;
-  done = running;
-  done.id = 6;
+  Job done = RunningJob(6);
   done.state = JobState::kSucceeded;
-  now.jobs = {running, done};
+  now.jobs = {RunningJob(7), done};
   const std::string text = FormatTop(now, nullptr);
   EXPECT_THAT(text, HasSubstr("DEGRADED: the disk is full"));
   EXPECT_EQ(LineOf(text, "gone"), "gone hall suspended - - - - 3 1.2 / 20.0");
   EXPECT_THAT(LineOf(text, "stuck"), HasSubstr(" stale "));
   EXPECT_THAT(text, HasSubstr("job 7"));
   EXPECT_THAT(text, Not(HasSubstr("job 6")));
+}
+
+TEST(TopTable, EachSiteHasALineWithItsUnfinishedJobs) {
+  TopView now;
+  now.maps = {Site("hall"), Site("yard")};
+  Job done = RunningJob(6);
+  done.state = JobState::kSucceeded;
+  now.jobs = {RunningJob(7), RunningJob(8), done};
+  const std::string text = "\n" + FormatTop(now, nullptr);
+  EXPECT_THAT(LineOf(text, "SITE"), HasSubstr("VERSION EPOCH TILES MEMORY (MiB) JOBS"));
+  EXPECT_EQ(LineOf(text, "hall"), "hall 2 3 4 37 5.0 2");
+  EXPECT_EQ(LineOf(text, "yard"), "yard 2 3 4 37 5.0 0");
+}
+
+TEST(TopTable, SaysWhatIsWrongWithRos2Robots) {
+  TopView now;
+  now.ros2 = Ros2Robots(2);
+  now.ros2.namespaces[1].on_map = true;
+  now.ros2.namespaces[1].problems.clear();
+  now.ros2.door.problems = {"two publishers contend for a frame"};
+  EXPECT_THAT(FormatTop(now, nullptr),
+              HasSubstr("ROS 2: 1 of 2 robots is not on the map, 3 problems; see `cairn ros2 doctor`\n"
+                        "  ! two publishers contend for a frame\n  /r1: no odometry\n"));
+  now.ros2.door.enabled = false;
+  EXPECT_THAT(FormatTop(now, nullptr), Not(HasSubstr("ROS 2")));
+}
+
+// The line of `cairn status`, which names no problems.
+TEST(TopTable, StatusSaysHowManyRos2RobotsAreNotOnTheMap) {
+  Ros2Report report = Ros2Robots(3);
+  report.namespaces[1].on_map = true;
+  EXPECT_EQ(FormatRos2Door(report), "ROS 2: 2 of 3 robots are not on the map; see `cairn ros2 doctor`\n");
+  for (Ros2Namespace& one : report.namespaces) one.on_map = true;
+  EXPECT_EQ(FormatRos2Door(report), "");
+  EXPECT_EQ(FormatRos2Door({}), "");
+}
+
+TEST(TopTable, FitsTheTerminalAndSaysWhatIsMissing) {
+  TopView now;
+  now.status.load.up_s = 60.0;
+  for (int i = 0; i < 50; ++i) {
+    now.status.robots.push_back(Robot("robot" + std::to_string(i), 1));
+    now.maps.push_back(Site("site" + std::to_string(i)));
+    now.jobs.push_back(RunningJob(static_cast<std::uint64_t>(i)));
+  }
+  now.ros2 = Ros2Robots(50);
+  EXPECT_GT(LinesOf(FormatTop(now, nullptr)), 250U);
+  for (const int rows : {2, 5, 10, 24, 60, 200, 1000}) {
+    const std::string text = FormatTop(now, nullptr, {.rows = rows, .columns = 40});
+    EXPECT_LT(LinesOf(text), static_cast<std::size_t>(rows));
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 40U);
+    if (rows < 24) continue;
+    for (const char* part : {"server: up", "site0 ", "ROS 2: 50 of 50", "  /r1: no odometry", "job 0", "robot0 "})
+      EXPECT_THAT(text, HasSubstr(part)) << rows;
+  }
+  // A quarter of 23 rows each; the robots get what is left.
+  const std::string text = FormatTop(now, nullptr, {.rows = 24, .columns = 80});
+  EXPECT_THAT(text, HasSubstr("  ... and 47 more\n")) << "of 51 lines of sites";
+  EXPECT_THAT(text, HasSubstr("  ... and 97 more\n")) << "of 101 lines about ROS 2";
+  EXPECT_EQ(LinesOf(text), 23U);
+}
+
+TEST(TopTable, WhatComesFromOtherProgramsDoesNotControlTheTerminal) {
+  const TerminalSize wide = {.rows = 5, .columns = 10};
+  EXPECT_EQ(FitTerminal("a\x1b[2Jb\x7f\xC2\x9Bz\n", wide), "a?[2Jb??z\n");
+  EXPECT_EQ(FitTerminal("a\x9B"
+                        "2Jb\xE2\x80\xA8z\n",
+                        wide),
+            "a?2Jb?z\n")
+      << "some terminals obey single bytes";
+  EXPECT_EQ(FitTerminal("\xC3\xA4\xC3\xB6\xC3\xBC\n", {.rows = 5, .columns = 2}), "\xC3\xA4\xC3\xB6\n");
+  EXPECT_EQ(FitTerminal("one\ntwo\nthree\n", {.rows = 3, .columns = 80}), "one\ntwo\n");
+  EXPECT_EQ(FitTerminal("a\x1b[2Jb\n", {}), "a\x1b[2Jb\n");
 }
 
 }  // namespace

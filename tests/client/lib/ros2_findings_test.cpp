@@ -31,6 +31,30 @@ TEST(Ros2Findings, AreTheLinesOfTheDoctor) {
       "  - no odometry\n");
 }
 
+// A robot that is on the map may have something else that is wrong.
+TEST(Ros2Findings, TellWhatIsWrongFromWhyItIsNotOnTheMap) {
+  Ros2Report report;
+  report.namespaces.resize(1);
+  report.namespaces[0].name = "/r1";
+  report.namespaces[0].on_map = true;
+  report.namespaces[0].problems = {"another node also publishes map to odom"};
+  EXPECT_EQ(FormatRos2(FindingsOf(report)),
+            "ROS 2 in DDS domain 0\n"
+            "/r1  no robot: on the map, but:\n"
+            "  - another node also publishes map to odom\n");
+}
+
+TEST(Ros2Findings, SayWhatWasLostIfAnythingWas) {
+  Ros2Report report;
+  EXPECT_EQ(FindingsOf(report).where, "ROS 2 in DDS domain 0");
+  report.door.malformed = 3;
+  report.door.unpublished = 1;
+  EXPECT_EQ(
+      FindingsOf(report).where,
+      "ROS 2 in DDS domain 0; messages since the server's start: 3 not decoded, 0 dropped for want of room, 1 not "
+      "published");
+}
+
 TEST(Ros2Findings, SayWhatToLookAtWhereNobodyIsSeen) {
   Ros2Report report;
   EXPECT_THAT(FormatRos2(FindingsOf(report)), ::testing::HasSubstr("is ROS_DOMAIN_ID the same"));

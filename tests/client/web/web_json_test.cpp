@@ -11,21 +11,27 @@ namespace {
 
 using nlohmann::json;
 
-json RobotOf(const Status& status) {
+json RobotOf(bool localise_only, const Status& status) {
   ServerView view;
   view.status.robots.resize(1);
   SessionState& session = view.status.robots[0].session;
   session.robot = "r1";
   session.site = "hall";
+  session.localise_only = localise_only;
   session.status = status;
   return json::parse(StateJson(view, "hall", false)).at("robots").at(0);
 }
 
-TEST(WebJson, ARobotMapsOrIsOnlyLocalised) {
-  EXPECT_EQ(RobotOf({})["mode"], "map");
-  EXPECT_EQ(RobotOf({StatusCode::kOk, "only localised: nothing is drawn of it"})["mode"], "localise");
-  EXPECT_EQ(RobotOf({StatusCode::kOk, "a word of something else"})["mode"], "map");
-  EXPECT_EQ(RobotOf({StatusCode::kUnavailable, "stale: nothing arrives of laser"})["mode"], nullptr) << "nobody knows";
+TEST(WebJson, ARobotMapsOrIsOnlyLocalisedWhateverItsStatusSays) {
+  const Status ok{StatusCode::kOk, "only localised: nothing is drawn of it"};
+  const Status stale{StatusCode::kUnavailable, "stale: nothing arrives of laser"};
+  EXPECT_EQ(RobotOf(false, {})["mode"], "map");
+  EXPECT_EQ(RobotOf(false, ok)["mode"], "map");
+  EXPECT_EQ(RobotOf(false, stale)["mode"], "map");
+  EXPECT_EQ(RobotOf(true, ok)["mode"], "localise");
+  EXPECT_EQ(RobotOf(true, ok)["note"], "") << "the mode says it already";
+  EXPECT_EQ(RobotOf(true, stale)["mode"], "localise");
+  EXPECT_EQ(RobotOf(true, stale)["note"], stale.message);
 }
 
 TEST(WebJson, TheDoctorsWordsAreNotChanged) {

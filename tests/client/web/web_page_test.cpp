@@ -11,7 +11,6 @@
 
 #include "client/lib/ros2_findings.h"
 #include "client/web/tile_picture.h"
-#include "client/web/web_metrics.h"
 #include "common/map/image_codec.h"
 #include "tests/client/lib/fake_server.h"
 #include "tests/loopback.h"
@@ -96,6 +95,8 @@ TEST_F(Page, WithoutAServerItSaysSo) {
   const json state = json::parse(Get("/api/state").body);
   EXPECT_EQ(state["connected"], false);
   EXPECT_EQ(Get("/api/robots/r1/path").status, 503);
+  EXPECT_EQ(Get("/api/robots/r1/map.png").status, 404);
+  EXPECT_EQ(Get("/api/robots/../map.png").status, 404);
   EXPECT_EQ(Get("/api/sites/hall/tiles/0/0/0.png").status, 404);
 }
 
@@ -111,40 +112,6 @@ TEST_F(Page, FiguresForMonitoringSayWhetherTheServerAnswers) {
   const std::string text = Get("/metrics").body;
   EXPECT_THAT(text, HasSubstr("# TYPE cairn_up gauge\ncairn_up 1\n"));
   EXPECT_THAT(text, HasSubstr("cairn_map_tiles{site=\"drawn\"} 1\n"));
-}
-
-TEST(Metrics, NamesAreQuotedAndSamplesOfAMetricStandTogether) {
-  ServerView view;
-  view.connected = true;
-  view.status.robots.resize(2);
-  view.status.robots[0].session.site = "a\"b\\c\nd";
-  for (RobotStatus& robot : view.status.robots) {
-    robot.ledgers.resize(1);
-    robot.ledgers[0].sensor = "laser";
-    robot.ledgers[0].used = 7;
-    robot.ledgers[0].latency_p99_ms = 25.0;
-  }
-  const std::string text = MetricsText(view);
-  EXPECT_THAT(text, HasSubstr(R"(cairn_scans_used_total{site="a\"b\\c\nd",robot="",sensor="laser"} 7)"
-                              "\n"
-                              R"(cairn_scans_used_total{site="",robot="",sensor="laser"} 7)"));
-  EXPECT_THAT(text, HasSubstr("quantile=\"0.99\"} 0.025\n"));
-}
-
-TEST(Metrics, AServerThatStoresNothingHasNoFiguresOfItsStore) {
-  ServerView view;
-  view.connected = true;
-  view.status.load = {.up_s = 60.0, .processor_s = 3.5, .memory_bytes = 1U << 20U, .outbound_waiting = 4};
-  const std::string in_memory = MetricsText(view);
-  EXPECT_THAT(in_memory, HasSubstr("\ncairn_server_processor_seconds_total 3.5\n"));
-  EXPECT_THAT(in_memory, HasSubstr("\ncairn_server_memory_bytes 1048576\n"));
-  EXPECT_THAT(in_memory, HasSubstr("\ncairn_server_waiting{queue=\"outbound\"} 4\n"));
-  EXPECT_THAT(in_memory, Not(HasSubstr("cairn_store")));
-  view.status.load.stores = true;
-  view.status.load.failed_commits = 2;
-  view.status.load.stored_after_p99_ms = 125.0;
-  EXPECT_THAT(MetricsText(view), HasSubstr("\ncairn_store_commits_total{result=\"failed\"} 2\n"));
-  EXPECT_THAT(MetricsText(view), HasSubstr("\ncairn_store_delay_seconds{quantile=\"0.99\"} 0.125\n"));
 }
 
 TEST(TilePicture, OnlyCellsAboutWhichRobotsDifferAreDrawn) {

@@ -39,9 +39,11 @@ bool Eq(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
 }
 bool Eq(const ServerLoad& a, const ServerLoad& b) {
   return Eq(a.up_s, b.up_s) && Eq(a.processor_s, b.processor_s) && a.memory_bytes == b.memory_bytes &&
-         a.inbound_waiting == b.inbound_waiting && a.outbound_waiting == b.outbound_waiting && a.stores == b.stores &&
-         a.commits == b.commits && a.failed_commits == b.failed_commits && a.store_bytes == b.store_bytes &&
-         Eq(a.stored_after_p50_ms, b.stored_after_p50_ms) && Eq(a.stored_after_p99_ms, b.stored_after_p99_ms);
+         a.inbound_waiting == b.inbound_waiting && a.outbound_waiting == b.outbound_waiting &&
+         Eq(a.strand_wait_p50_ms, b.strand_wait_p50_ms) && Eq(a.strand_wait_p99_ms, b.strand_wait_p99_ms) &&
+         a.stores == b.stores && a.commits == b.commits && a.failed_commits == b.failed_commits &&
+         a.store_bytes == b.store_bytes && Eq(a.stored_after_p50_ms, b.stored_after_p50_ms) &&
+         Eq(a.stored_after_p99_ms, b.stored_after_p99_ms);
 }
 bool Eq(const MapVersionInfo& a, const MapVersionInfo& b) {
   return a.version == b.version && a.enabled == b.enabled && a.job == b.job && a.note == b.note;
@@ -69,7 +71,8 @@ bool Same(const SessionRequest& a, const SessionRequest& b) {
 bool Same(const SessionState& a, const SessionState& b) {
   return a.robot_id == b.robot_id && a.client == b.client && a.robot == b.robot && a.site == b.site &&
          a.phase == b.phase && Eq(a.status, b.status) && a.session == b.session && a.durable == b.durable &&
-         a.stale == b.stale && a.generation == b.generation && a.map_frame == b.map_frame;
+         a.localise_only == b.localise_only && a.stale == b.stale && a.generation == b.generation &&
+         a.map_frame == b.map_frame;
 }
 bool Same(const SessionRefusal& a, const SessionRefusal& b) {
   return Same(a.state, b.state);
@@ -108,6 +111,7 @@ bool Same(const MapInfo& a, const MapInfo& b) {
          a.version == b.version && a.levels == b.levels && a.tile_count == b.tile_count && Eq(a.x_min_m, b.x_min_m) &&
          Eq(a.y_min_m, b.y_min_m) && Eq(a.x_max_m, b.x_max_m) && Eq(a.y_max_m, b.y_max_m) && a.robots == b.robots &&
          a.enabled_version == b.enabled_version && a.generation == b.generation && a.edits_version == b.edits_version &&
+         a.memory_bytes == b.memory_bytes &&
          EqList(a.versions, b.versions, [](const auto& x, const auto& y) { return Eq(x, y); });
 }
 bool Same(const TileSample& a, const TileSample& b) {
@@ -139,7 +143,8 @@ bool Same(const Reply& a, const Reply& b) {
            EqList(x.ledgers, y.ledgers, same);
   };
   const auto same_door = [](const Ros2DoorState& x, const Ros2DoorState& y) {
-    return x.enabled == y.enabled && x.domain == y.domain && x.problems == y.problems;
+    return x.enabled == y.enabled && x.domain == y.domain && x.malformed == y.malformed && x.overflow == y.overflow &&
+           x.unpublished == y.unpublished && x.problems == y.problems;
   };
   const auto same_topic = [](const Ros2Topic& x, const Ros2Topic& y) {
     return x.name == y.name && x.type == y.type && x.publishers == y.publishers && x.reliable == y.reliable &&

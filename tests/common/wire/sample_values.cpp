@@ -54,6 +54,7 @@ SessionState ExtremeSessionState() {
           .status = {StatusCode::kDataLoss, Text('m')},
           .session = kMax64 - 2,
           .durable = true,
+          .localise_only = true,
           .stale = true,
           .generation = kMax64 - 3,
           .map_frame = kMax64 - 4};
@@ -147,6 +148,7 @@ MapInfo ExtremeMapInfo() {
   value.generation = kMax64;
   value.versions = {{1, true, 0, ""}, {kMax32, false, kMax64, Text('n')}};
   value.edits_version = kMax64 - 4;
+  value.memory_bytes = kMax64 - 5;
   return value;
 }
 
@@ -238,6 +240,8 @@ Reply ExtremeReply() {
                  .memory_bytes = kMax64,
                  .inbound_waiting = kMax64 - 1,
                  .outbound_waiting = kMax64 - 2,
+                 .strand_wait_p50_ms = 3.5,
+                 .strand_wait_p99_ms = 4.5,
                  .stores = true,
                  .commits = kMax64 - 3,
                  .failed_commits = kMax64 - 4,
@@ -247,7 +251,7 @@ Reply ExtremeReply() {
   value.refused = {{true, kMax64, kMax64 - 1, kMax64 - 2, kMax64 - 3, kMax64 - 4, kMax64 - 5}};
   value.server_version = Text('v');
   value.saved = {{Name('f'), Name('s'), kMax64, kMin64}, SavedSite{}};
-  value.ros2 = {{true, kMin64, {Text('d'), ""}}};
+  value.ros2 = {{true, kMin64, kMax64, kMax64 - 1, kMax64 - 2, {Text('d'), ""}}};
   Ros2Namespace name_space{Text('n'), Name('r'), Name('s'), true, {Text('p')}, {}};
   name_space.topics = {{Text('t'), Text('y'), kMax32, true, true, kTiny, kMax64, kMax64}, Ros2Topic{}};
   value.ros2_namespaces = {name_space, Ros2Namespace{}};

@@ -1,14 +1,12 @@
 // Participants that find each other through a discovery server of Fast DDS (Debian's fastdds-tools), without multicast.
-#include <arpa/inet.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
 
 #include <filesystem>
 #include <memory>
 #include <optional>
 
 #include "tests/child_process.h"
+#include "tests/free_port.h"
 #include "tests/loopback.h"
 
 namespace cairn::wire {
@@ -17,20 +15,6 @@ namespace {
 using namespace test;
 
 constexpr const char* kProgram = "/usr/bin/fast-discovery-server";
-
-// A UDP port that nobody uses now.
-std::uint16_t FreePort() {
-  const int socket = ::socket(AF_INET, SOCK_DGRAM, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof(address);
-  auto* const any = reinterpret_cast<sockaddr*>(&address);
-  const bool bound = bind(socket, any, size) == 0 && getsockname(socket, any, &size) == 0;
-  close(socket);
-  if (!bound) throw std::runtime_error("no free port");
-  return ntohs(address.sin_port);
-}
 
 PoseReport Of(const std::string& robot) {
   PoseReport pose;

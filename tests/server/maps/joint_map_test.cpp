@@ -128,6 +128,9 @@ TEST(JointMap, WhereSessionsDifferIsALayerOfItsOwn) {
   map.SetPast(1);  // It still counts: this is how a change since the last run shows.
   EXPECT_TRUE(map.RenderDisagreement().empty());
   EXPECT_FALSE(map.disagreement().empty());
+  map.ForgetDisagreement();
+  EXPECT_TRUE(map.disagreement().empty());
+  EXPECT_EQ(map.RenderDisagreement().size(), 4U);
   map.SetPast(2);
   map.MergePast(1, 2);  // Both are one layer now.
   EXPECT_EQ(map.RenderDisagreement().size(), 4U);

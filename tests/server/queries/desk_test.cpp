@@ -11,6 +11,7 @@
 
 #include "server/store/sqlite_store.h"
 #include "tests/eventually.h"
+#include "tests/server/maps/uniform_chunk.h"
 #include "tests/server/robots/one_session.h"
 
 namespace cairn::server {
@@ -273,6 +274,30 @@ TEST_F(DeskTest, EndingASessionSaysWhetherThereIsOne) {
   Request nobody = Of(RequestKind::kSessionEnd);
   nobody.robot = "r9";
   EXPECT_EQ(Ask(nobody).status.code, StatusCode::kNotFound);
+}
+
+// Both are made by the site when they are asked for.
+TEST_F(DeskTest, TilesOfOneRobotAndOfTheLayerOfDisagreement) {
+  Request tiles = Of(RequestKind::kTiles);
+  tiles.site.clear();
+  EXPECT_EQ(Ask(tiles).status.code, StatusCode::kNotFound) << "it has drawn nothing";
+  atlas_.Find("lab")->Change({.session = roster_.Find("r1")->id(), .chunks = {{{2, 0}, UniformChunk(300)}}});
+  const Reply own = Ask(tiles);
+  ASSERT_EQ(own.tiles.size(), 1U);
+  EXPECT_EQ(own.tiles[0].key, (TileKey{0, 2, 0}));
+  tiles.level = 9;
+  EXPECT_EQ(Ask(tiles).status.code, StatusCode::kInvalidArgument);
+  tiles.level = 0;
+  tiles.robot = "r9";
+  EXPECT_EQ(Ask(tiles).status.code, StatusCode::kNotFound);
+
+  Request differing = Of(RequestKind::kTiles);
+  differing.disagreement = true;
+  EXPECT_TRUE(Ask(differing).tiles.empty());
+  atlas_.Find("lab")->Change({.session = 99, .chunks = {{{2, 0}, UniformChunk(-300)}}});
+  EXPECT_EQ(Ask(differing).tiles.size(), 1U);
+  differing.site = "moon";
+  EXPECT_EQ(Ask(differing).status.code, StatusCode::kNotFound);
 }
 
 TEST_F(DeskTest, AMapVersionOrASiteThatDoesNotExistCannotBeEnabled) {

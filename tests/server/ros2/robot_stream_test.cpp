@@ -1,97 +1,18 @@
-// A ROS 2 robot at the door: what reaches the server of its scans, odometry and transforms, and what it says of itself
-// when it is not on the map.
+// A ROS 2 robot at the door: what reaches the server of its scans, odometry and transforms.
 #include "server/ros2/robot_stream.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/server/ros2/ros_robot.h"
+
 namespace cairn::server {
 namespace {
 
-using std::chrono::milliseconds;
 using std::chrono::seconds;
 using ::testing::Contains;
 using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 using ::testing::Not;
-
-constexpr ros2::WriterId kLidar{1}, kBase{2}, kStatic{3}, kOther{4};
-constexpr Stamp kStart = 1000 * kNanosPerSecond;
-
-class RosRobot : public ::testing::Test {
- protected:
-  RosRobot() { robot_.SetPublishers(true, true, now_); }
-
-  static ros2::Transforms Mounting(const std::string& parent = "base_link", const std::string& frame = "laser") {
-    ros2::Transform transform;
-    transform.header.frame = parent;
-    transform.child_frame = frame;
-    transform.T_frame_child.translation = {0.2, 0.0, 0.3};
-    ros2::Transforms message;
-    message.transforms.push_back(transform);
-    return message;
-  }
-  void Mount() { robot_.Take(Mounting(), {kStatic, 1}, now_); }
-
-  void Scan(std::int64_t number, const ros2::WriterId& writer = kLidar, const std::string& topic = "scan") {
-    ros2::LaserScan message;
-    message.header = {kStart + number * 100'000'000, "laser"};
-    message.angle_increment = 0.1;
-    message.range_max = 10.0;
-    message.ranges = {1.0F, 2.0F};
-    robot_.Take(topic, std::move(message), {writer, number}, now_);
-  }
-  void Odom(std::int64_t number, double x = 0.0) {
-    ros2::Odometry message;
-    message.header = {kStart + number * 100'000'000, "odom"};
-    message.child_frame = "base_link";
-    message.pose.translation.x() = x;
-    robot_.Take(std::move(message), {kBase, number}, now_);
-  }
-
-  template <typename Value>
-  std::vector<Value> Pushed() {
-    std::vector<Value> all;
-    while (inbound_.size() > 0) {
-      auto value = inbound_.Pop();
-      if (auto* const one = std::get_if<Value>(&*value)) all.push_back(std::move(*one));
-    }
-    return all;
-  }
-  std::vector<InboundValue> Everything() {
-    std::vector<InboundValue> all;
-    while (inbound_.size() > 0) all.push_back(*inbound_.Pop());
-    return all;
-  }
-  void Open() {
-    Mount();
-    Odom(1);
-    Scan(1);
-    const auto requests = Pushed<SessionRequest>();
-    ASSERT_EQ(requests.size(), 1U);
-    request_ = requests.front();
-  }
-  SessionState State(SessionPhase phase) const {
-    SessionState state;
-    state.robot_id = HashName("r1");
-    state.client = request_.client;
-    state.session = request_.session;
-    state.phase = phase;
-    return state;
-  }
-  SessionRefusal Refusal(StatusCode code, const std::string& why) const {
-    SessionRefusal refusal{State(SessionPhase::kRefused)};
-    refusal.state.status = {code, why};
-    return refusal;
-  }
-
-  Inbound inbound_{64};
-  ros2::FrameTree shared_;
-  Ros2Options options_;
-  RobotStream robot_{{"r1", "lab"}, options_, shared_, inbound_};
-  RobotStream::Clock::time_point now_ = RobotStream::Clock::time_point() + std::chrono::hours(1);
-  SessionRequest request_;
-};
 
 TEST_F(RosRobot, BeginsAnewWhenItsSiteWasReset) {
   Open();
@@ -160,7 +81,7 @@ TEST_F(RosRobot, AScanOfALidarWhosePlaceIsUnknownIsCountedAsRefused) {
   ASSERT_EQ(scans.size(), 1U);
   EXPECT_EQ(scans[0].refused, DropReason::kBadGeometry);
   EXPECT_EQ(scans[0].scan->sequence, 2U);
-  EXPECT_THAT(robot_.Problems(now_), Contains(HasSubstr("'unknown_frame'")));
+  EXPECT_THAT(Problems(), Contains(HasSubstr("'unknown_frame'")));
 }
 
 TEST_F(RosRobot, ASecondLidarJoinsTheSession) {
@@ -194,7 +115,7 @@ TEST_F(RosRobot, OfTheSharedTransformsOnlyItsOwnFramesAreItsOdometry) {
   robot_.TakeShared(Mounting("r2/odom", "r2/base_link"), false, {kBase, 2}, now_);
   Scan(1);
   EXPECT_EQ(inbound_.size(), 0U);
-  EXPECT_THAT(robot_.Problems(now_), Contains(HasSubstr("there is no odometry")));
+  EXPECT_THAT(Problems(), Contains(HasSubstr("there is no odometry")));
   robot_.TakeShared(Mounting("r1/odom", "r1/base_link"), false, {kBase, 3}, now_);
   EXPECT_EQ(robot_.odom_frame(), "r1/odom");
 }
@@ -205,7 +126,7 @@ TEST_F(RosRobot, TriesAgainWhereItIsRefused) {
   EXPECT_FALSE(robot_.open());
   Scan(2);
   EXPECT_EQ(inbound_.size(), 0U) << "samples of a refused session would only be counted";
-  EXPECT_THAT(robot_.Problems(now_), Contains(HasSubstr("another live client")));
+  EXPECT_THAT(Problems(), Contains(HasSubstr("another live client")));
   now_ += seconds(6);
   Odom(3);
   Scan(3);
@@ -229,7 +150,7 @@ TEST_F(RosRobot, ASessionThatSomebodyEndedStaysEndedUntilTheRobotIsStartedAgain)
   Odom(2);
   Scan(2);
   EXPECT_TRUE(Pushed<SessionRequest>().empty());
-  EXPECT_THAT(robot_.Problems(now_), Contains(HasSubstr("its session was ended")));
+  EXPECT_THAT(Problems(), Contains(HasSubstr("its session was ended")));
   robot_.SetPublishers(false, false, now_);
   robot_.SetPublishers(true, true, now_);
   Odom(3);
@@ -252,83 +173,6 @@ TEST_F(RosRobot, IsAwayWhileNobodyPublishesItsScans) {
   EXPECT_TRUE(robot_.open());
 }
 
-TEST_F(RosRobot, AnInitialPoseBeginsANewSessionThere) {
-  Open();
-  ros2::PoseWithCovariance start;
-  start.header.frame = "map";
-  start.pose.translation = {3.0, 4.0, 0.0};
-  robot_.TakeStart(start, now_);
-  Odom(2);
-  Scan(2);
-  const std::vector<InboundValue> values = Everything();
-  ASSERT_GE(values.size(), 3U);
-  // The old session has no living client any more, so the server lets the new one replace it.
-  EXPECT_FALSE(std::get<ClientLiveliness>(values[0]).alive);
-  const auto& request = std::get<SessionRequest>(values[1]);
-  EXPECT_NE(request.client, request_.client);
-  EXPECT_NE(request.session, request_.session);
-  EXPECT_TRUE(request.has_start);
-  EXPECT_EQ(request.T_map_robot_start.x, 3.0);
-}
-
-// The robot may have driven on since, where nobody could see it.
-TEST_F(RosRobot, AnInitialPoseThatCannotBeUsedSoonIsNotUsed) {
-  Open();
-  ros2::PoseWithCovariance start;
-  start.header.frame = "map";
-  robot_.TakeStart(start, now_);
-  static_cast<void>(Everything());
-  now_ += std::chrono::seconds(30);
-  Odom(2);
-  Scan(2);
-  const std::vector<InboundValue> values = Everything();
-  const auto request = std::ranges::find_if(
-      values, [](const InboundValue& value) { return std::holds_alternative<SessionRequest>(value); });
-  ASSERT_NE(request, values.end());
-  EXPECT_FALSE(std::get<SessionRequest>(*request).has_start);
-}
-
-TEST_F(RosRobot, AnInitialPoseInAnotherFrameIsIgnored) {
-  Open();
-  ros2::PoseWithCovariance start;
-  start.header.frame = "odom";
-  robot_.TakeStart(start, now_);
-  EXPECT_TRUE(robot_.open());
-  start.header.frame = "map";
-  start.pose.translation.x() = std::nan("");
-  robot_.TakeStart(start, now_);
-  EXPECT_TRUE(robot_.open());
-}
-
-TEST_F(RosRobot, SaysWhatIsMissing) {
-  EXPECT_THAT(robot_.Problems(now_), Contains(HasSubstr("none arrives")));
-  Scan(1);
-  EXPECT_THAT(robot_.Problems(now_), Contains(HasSubstr("the frame of the robot is not known yet")));
-  EXPECT_THAT(robot_.Problems(now_), Contains(HasSubstr("odometry is published, but none arrives")));
-  Odom(1);
-  robot_.Tick(now_);
-  EXPECT_THAT(robot_.Problems(now_), Contains(HasSubstr("no transform connects its frame 'laser'")));
-  Mount();
-  Odom(100);  // Ten seconds beside the scans.
-  Scan(2);
-  EXPECT_THAT(robot_.Problems(now_), Contains(HasSubstr("their clocks differ")));
-  now_ += seconds(3);
-  EXPECT_THAT(robot_.Problems(now_), Contains(HasSubstr("no scan for 3.0 s")));
-}
-
-TEST_F(RosRobot, SaysNothingWhileItIsLocalized) {
-  Open();
-  EXPECT_THAT(robot_.Problems(now_), Contains(HasSubstr("no scan has been used yet")));
-  PoseReport report;
-  report.localized = true;
-  robot_.Take(report);
-  EXPECT_THAT(robot_.Problems(now_), IsEmpty());
-  report.localized = false;
-  report.reason = PoseReason::kLost;
-  robot_.Take(report);
-  EXPECT_THAT(robot_.Problems(now_), Contains(HasSubstr("lost")));
-}
-
 TEST_F(RosRobot, RefusesOdometryThatIsNoPose) {
   Open();
   ros2::Odometry message;
@@ -337,9 +181,9 @@ TEST_F(RosRobot, RefusesOdometryThatIsNoPose) {
   message.pose.rotation.coeffs().setZero();
   robot_.Take(std::move(message), {kBase, 2}, now_);
   EXPECT_EQ(inbound_.size(), 0U);
-  EXPECT_THAT(robot_.Problems(now_), Contains(HasSubstr("its odometry is refused")));
+  EXPECT_THAT(Problems(), Contains(HasSubstr("its odometry is refused")));
   Odom(3);
-  EXPECT_THAT(robot_.Problems(now_), Not(Contains(HasSubstr("its odometry is refused"))));
+  EXPECT_THAT(Problems(), Not(Contains(HasSubstr("its odometry is refused"))));
 }
 
 TEST_F(RosRobot, CountsWhatTheFullChannelDidNotTake) {

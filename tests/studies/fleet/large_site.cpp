@@ -1,13 +1,22 @@
 #include "tests/studies/fleet/large_site.h"
 
+#include <arpa/inet.h>
 #include <fmt/format.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <fstream>
+#include <stdexcept>
 #include <thread>
 #include <utility>
 
 #include "client/lib/map_client.h"
 #include "client/web/web_page.h"
+#include "common/http/http_server.h"
 #include "tests/must.h"
 #include "tests/studies/fleet/live_server.h"
 #include "tests/studies/stopwatch.h"
@@ -121,33 +130,89 @@ double AskForPicture() {
   return SecondsSince(began);
 }
 
-HttpRequest Get(const std::string& path) {
-  HttpRequest request;
-  request.method = "GET";
-  request.path = path;
-  return request;
-}
+// A connection to the page, which is kept from one request to the next, as a browser does.
+class HttpConnection {
+ public:
+  explicit HttpConnection(int port) : socket_(socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(static_cast<std::uint16_t>(port));
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    const timeval patience{.tv_sec = 20, .tv_usec = 0};
+    setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof(patience));
+    if (connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0) {
+      close(socket_);
+      throw std::runtime_error("the page takes no connection");
+    }
+  }
+  ~HttpConnection() { close(socket_); }
+  HttpConnection(const HttpConnection&) = delete;
+  HttpConnection& operator=(const HttpConnection&) = delete;
 
-// A page that has been running, at whose map nobody has looked: from the request to a picture of each of the coarsest
-// tiles.
+  // The status of the answer, after all of it has come.
+  int Get(const std::string& path) {
+    const std::string request = "GET " + path + " HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n";
+    if (send(socket_, request.data(), request.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(request.size()))
+      throw std::runtime_error("the page has closed the connection");
+    const std::string head = ReadHead();
+    constexpr std::string_view kLength = "\r\nContent-Length: ";
+    const std::size_t length = head.find(kLength);
+    if (length == std::string::npos) throw std::runtime_error("an answer without a length: " + head);
+    const std::size_t end = head.find("\r\n\r\n") + 4 + std::stoul(head.substr(length + kLength.size()));
+    while (received_.size() < end) Read();
+    received_.erase(0, end);
+    return std::stoi(head.substr(head.find(' ')));
+  }
+
+ private:
+  std::string ReadHead() {
+    std::size_t end = std::string::npos;
+    while ((end = received_.find("\r\n\r\n")) == std::string::npos) Read();
+    return received_.substr(0, end + 4);
+  }
+  void Read() {
+    std::array<char, 65536> buffer{};
+    const ssize_t count = recv(socket_, buffer.data(), buffer.size(), 0);
+    if (count <= 0) throw std::runtime_error("the page does not answer");
+    received_.append(buffer.data(), static_cast<std::size_t>(count));
+  }
+
+  const int socket_;
+  std::string received_;
+};
+
+// A page that has been running, at whose map nobody has looked: from the first request to a picture of each of the
+// coarsest tiles, over HTTP on loopback.
 double LookAtPage(const std::vector<Tile>& coarsest) {
   const auto bus = NewBus();
   const auto page = Must(web::WebPage::Create(*bus, {}));
+  const auto server = Must(HttpServer::Start({}, [&](const HttpRequest& request) { return page->Answer(request); }));
   while (page->watch().view()->Sites().count("yard") == 0) (void)page->watch().WaitForNewer(0, std::chrono::seconds(1));
   const auto began = Clock::now();
+  HttpConnection connection(server->port());
   for (const Tile& tile : coarsest) {
     const auto path = fmt::format("/api/sites/yard/tiles/{}/{}/{}.png", tile.key.level, tile.key.x, tile.key.y);
-    while (page->Answer(Get(path)).status != 200) std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    if (SecondsSince(began) > 60.0) throw std::runtime_error("the page shows no map");
+    while (connection.Get(path) != 200) {
+      if (SecondsSince(began) > 60.0) throw std::runtime_error("the page shows no map");
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
   }
   return SecondsSince(began);
 }
 
+// Nearest rank, as DistributionOf.
+double NinetiethOf(std::vector<double> samples) {
+  std::sort(samples.begin(), samples.end());
+  return samples[static_cast<std::size_t>(std::ceil(0.9 * static_cast<double>(samples.size()))) - 1];
+}
+
 void AddRow(Report& report, Table& table, const std::string& what, const std::vector<double>& seconds, double most) {
   const Distribution times = DistributionOf(seconds);
-  table.Add({what, Count(static_cast<long long>(seconds.size())), Number(times.median, 2), Number(times.max, 2),
-             Number(most, 1)});
-  report.Expect(times.median <= most, what + ": " + Number(times.median, 2) + " s, wanted at most " + Number(most, 1));
+  const double p90 = NinetiethOf(seconds);
+  table.Add({what, Count(static_cast<long long>(seconds.size())), Number(times.median, 2), Number(p90, 2),
+             Number(times.max, 2), Number(most, 1)});
+  report.Expect(times.median <= most && p90 <= most, what + ": p50 " + Number(times.median, 2) + " s, p90 " +
+                                                         Number(p90, 2) + " s, wanted at most " + Number(most, 1));
 }
 
 }  // namespace
@@ -162,7 +227,7 @@ void StudyLargeSite(StudyContext& context) {
     report.Expect(site.tile_count >= kTiles, "the site has only " + Count(site.tile_count) + " tiles");
   const std::vector<Tile> coarsest =
       Must(server.queries().Tiles({.site = "yard", .area = {}, .level = kCoarsest})).tiles;
-  const int runs = context.runs > 0 ? context.runs : context.Pick(10, 2);
+  const int runs = context.runs > 0 ? context.runs : context.Pick(10, 5);
   const std::size_t count = CountTiles(site, server.queries());
   std::vector<double> joined_s, asked_s, page_s;
   Joined joined;
@@ -176,7 +241,7 @@ void StudyLargeSite(StudyContext& context) {
       fmt::format("A site of {} tiles, with the coarser levels {}, of {:.1f} KiB on average, through the "
                   "middleware on loopback; the robot stands still. Each time with a new participant.",
                   site.tile_count, count, static_cast<double>(joined.bytes) / 1024.0 / static_cast<double>(count)));
-  Table table({"from nothing to", "times", "p50 (s)", "max (s)", "wanted at most"});
+  Table table({"from nothing to", "times", "p50 (s)", "p90 (s)", "max (s)", "wanted at most"});
   AddRow(report, table, "every tile at a client that joins late", joined_s, kMostJoinS);
   AddRow(report, table, "a picture of the whole site, asked for by a new client", asked_s, kMostPictureS);
   AddRow(report, table, "a picture of the whole site from a page that nobody has looked at", page_s, kMostPictureS);

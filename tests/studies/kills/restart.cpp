@@ -142,6 +142,10 @@ RestartTimes MeasureRestarts(StudyContext& context) {
   });
   const auto all_back = [&robots] { return AllBack(robots).has_value(); };
   if (!test::Eventually(all_back, kLongest)) throw std::runtime_error("the robots have no poses");
+  const auto all_stored = [&robots] {
+    return std::ranges::all_of(robots, [](const auto& robot) { return robot->stored(); });
+  };
+  if (!test::Eventually(all_stored, kLongest)) throw std::runtime_error("the sessions of the robots are not stored");
   std::mt19937_64 random(context.seed);
   const int kills = context.runs > 0 ? context.runs : context.Pick(1000, 3);
   for (int kill = 0; kill < kills; ++kill) {

@@ -35,6 +35,12 @@ class ReturningRobot {
   void Expect();
   // When that pose arrived.
   [[nodiscard]] std::optional<Clock::time_point> back() const;
+  // Whether the server has stored a scan of its present session, and so the session: before, a server that is killed
+  // need not know it.
+  [[nodiscard]] bool stored() const {
+    const auto ledger = client_->ledger();
+    return ledger && ledger->session == client_->session().session && ledger->durable_through > 0;
+  }
   // New sessions, because the server did not know the one before.
   [[nodiscard]] int restarted() const { return client_->restarted(); }
 

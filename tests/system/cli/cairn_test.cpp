@@ -112,6 +112,24 @@ TEST_F(CairnProgram, TheMapComesAsTilesFilesAndPicture) {
   EXPECT_GT(std::filesystem::file_size(File("hall-picture.png")), 10'000u);
 }
 
+TEST_F(CairnProgram, AMapIsWatchedAndDrawnAsAnAnimation) {
+  ASSERT_NO_FATAL_FAILURE(StartServer());
+  const Outcome nowhere = Cairn({"map", "animate", "--site", "hall", "--seconds", "0", "-o", File("hall-grows.png")});
+  EXPECT_EQ(nowhere.code, ExitCode::kFailed);
+  EXPECT_THAT(nowhere.err, HasSubstr("hall"));
+  EXPECT_FALSE(std::filesystem::exists(File("hall-grows.png")));
+  StreamFleet();
+  ASSERT_TRUE(test::Eventually([&] { return MustJson({"tiles", "--site", "hall"})["tiles"].size() > 4; }));
+  // More looks than frames may be kept, and a robot that never comes.
+  const auto grown = MustJson({"map", "animate", "--site", "hall", "--robots", "robot1", "nobody", "--every", "0.1",
+                               "--seconds", "1", "--frames", "4", "-o", File("hall-grows.png")});
+  EXPECT_GE(grown["frames"].get<int>(), 2);  // The first and the last.
+  EXPECT_LE(grown["frames"].get<int>(), 4);
+  EXPECT_EQ(grown["missed"].get<int>(), 0);
+  EXPECT_EQ(grown["bytes"].get<std::uintmax_t>(), std::filesystem::file_size(File("hall-grows.png")));
+  EXPECT_GT(grown["bytes"].get<std::uintmax_t>(), 10'000u);
+}
+
 TEST_F(CairnProgram, WhatPeopleSayAboutAMapIsInItsFilesUntilItIsTakenBack) {
   ASSERT_NO_FATAL_FAILURE(StartServer());
   StreamFleet();

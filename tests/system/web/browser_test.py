@@ -5,23 +5,12 @@ unlocks commands, starts a job, sees the smoothed map, shows where a robot is, d
 Usage: browser_test.py BIN_DIR [PICTURES]. BIN_DIR has cairnd, cairn and cairn-web. PICTURES is a folder for the pictures of the
 documentation; without it none are made. It waits for conditions and never for a time. Exit code 77, with the line
 `SKIPPED: why`: there is no Chromium."""
-import fcntl
 import math
 import os
 import re
-import shutil
-import subprocess
 import sys
-import tempfile
-import time
-import urllib.error
-import urllib.request
 
-from chromium import Page
-
-TOKEN = "token-of-the-test"
-TILES = "[...document.querySelectorAll('#map img.cell:not([hidden])')].filter((tile) => tile.complete && tile.naturalWidth === 128).map((tile) => tile.src)"
-
+from harness import TILES, TOKEN, Failed, check_what_it_asked, eventually, icon_of, run_in_browser, said_by, status_of_post
 
 # How many pixels each robot is drawn from where it must be: a tile that is shown tells where the metres of the map are on the
 # screen, and the list beside the map says where the robot is. Infinite where either is missing.
@@ -39,71 +28,6 @@ APART = """(() => {
       box.bottom - (place[2] - row * metres) * scale - (drawn.top + drawn.bottom) / 2);
   });
 })()"""
-
-
-class Failed(Exception):
-    pass
-
-
-def own_domain():
-    """A DDS domain that no other test uses, and the lock that keeps it: those of tests/test_domain.h."""
-    for i in range(200):
-        domain = 1 + (os.getpid() + i) % 200
-        lock = open(os.path.join(tempfile.gettempdir(), f"cairn-domain-{domain}"), "a")
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return domain, lock
-        except OSError:
-            lock.close()
-    raise Failed("all DDS test domains are in use")
-
-
-class Programs:
-    """The programs of one test, on one domain; what they say goes into files."""
-
-    def __init__(self, binaries, work, domain):
-        self.binaries, self.work, self.domain, self.all = binaries, work, domain, []
-
-    def start(self, program, *options):
-        said = os.path.join(self.work, f"{len(self.all)}-{program}.txt")
-        with open(said, "w") as file:
-            process = subprocess.Popen([os.path.join(self.binaries, program), *options], stdin=subprocess.DEVNULL, stdout=file,
-                                       stderr=subprocess.STDOUT, env={**os.environ, "CAIRN_DOMAIN": str(self.domain)})
-        process.said = said
-        self.all.append(process)
-        return process
-
-    def start_server(self, *options):
-        return self.start("cairnd", "--state", os.path.join(self.work, "state"), "--set", "slam.particles=20",
-                          "--set", "jobs.nice=0", *options)
-
-    def start_web(self, page):
-        """The address of the page, which is opened."""
-        web = self.start("cairn-web", "--port", "0", f"--token={TOKEN}")
-        eventually("cairn-web prints its address", lambda: re.search(r"http://\S+", said_by(web)))
-        address = re.search(r"http://[0-9.:]+/", said_by(web)).group()
-        page.look(1180, 720, "light")
-        page.open(address)
-        return address
-
-    def stop(self):
-        for process in self.all:
-            process.kill()
-            process.wait()
-
-
-def said_by(process):
-    with open(process.said) as file:
-        return file.read()
-
-
-def eventually(what, condition, deadline_s=60.0):
-    began = time.monotonic()
-    while not condition():
-        if time.monotonic() - began > deadline_s:
-            raise Failed(f"not within {deadline_s:.0f} s: {what}")
-        time.sleep(0.05)
-    print(f"ok: {what} ({time.monotonic() - began:.1f} s)", flush=True)
 
 
 def make_pictures(page, folder):
@@ -129,20 +53,9 @@ def begins_with(path, begins):
         return file.read(len(begins)) == begins
 
 
-def status_of_post(address, path, token):
-    request = urllib.request.Request(address + path, data=b"{}", headers={
-        "Authorization": f"Bearer {token}", "Content-Type": "application/json"})
-    try:
-        with urllib.request.urlopen(request, timeout=30) as answer:
-            return answer.status
-    except urllib.error.HTTPError as error:
-        return error.code
-
-
 def change_the_mode(page, address):
     """Of robot2, in the map that robot1 draws, with the keyboard."""
     robot = "#robots [data-key=robot2]"
-    # On a busy machine a robot may be silent for a moment, and its mode is not known then.
     eventually("a robot maps", lambda: page.text(f"{robot} .mode") == "Maps" and not page.shows(f"{robot} .to-map"))
     for path, token, wanted in (("localise", "wrong", 401), ("map", "", 401), ("fly", TOKEN, 404)):
         if status_of_post(address, f"api/robots/robot2/{path}", token) != wanted:
@@ -189,15 +102,6 @@ def edit_the_map(page, pictures):
         page.run("document.querySelector('#edits li button').click()")
         eventually("one fewer is in the list", lambda: page.run("document.querySelectorAll('#edits li').length") == left)
     eventually("none is drawn", lambda: page.run(drawn) == 0)
-
-
-def show_where_robots_differ(page):
-    """A picture over the map, or nothing where nobody differs; it goes with the box."""
-    box = "document.getElementById('show-disagreement').click()"
-    page.run(box)
-    eventually("the page asks where robots differ", lambda: page.run("performance.getEntriesByType('resource').some((one) => one.name.endsWith('/disagreement.png'))"))
-    page.run(box)
-    eventually("nothing is left of it", lambda: page.run("document.querySelectorAll('img.differs').length") == 0)
 
 
 def use_the_page(programs, page, pictures):
@@ -260,10 +164,7 @@ def use_the_page(programs, page, pictures):
     page.click("#robots [data-key=robot1] .relocalise summary")
     page.click("#robots [data-key=robot1] .on-map")
     eventually("the page says how to show a place", lambda: "robot1" in page.text("#said"))
-    icon = page.run("(() => { const box = document.querySelector('.robot-icon[data-robot=robot1] svg').getBoundingClientRect();"
-                    " const turn = /rotate\\((.*)\\)/.exec(document.querySelector('.robot-icon[data-robot=robot1] .body').getAttribute('transform'))[1];"
-                    " return [box.x + box.width / 2, box.y + box.height / 2, turn * Math.PI / 180]; })()")
-    x, y, turn = icon
+    x, y, turn = icon_of(page, "robot1")
     page.drag((x, y), (x + 40 * math.cos(turn), y + 40 * math.sin(turn)))
     eventually("the robot is looked for there", lambda: "looked for there" in page.text("#said"))
     state = "document.querySelector('#robots [data-key=robot1] .pill').innerText"
@@ -271,17 +172,12 @@ def use_the_page(programs, page, pictures):
 
     change_the_mode(page, address)
     edit_the_map(page, pictures)
-    show_where_robots_differ(page)
     for name, begins in (("hall.yaml", b"image: \"hall.png\"\n"), ("hall.png", b"\x89PNG")):
         page.click(f"#download-{name.split('.')[1]}")
         path = os.path.join(page.downloads, name)
         eventually(f"{name} is downloaded", lambda: begins_with(path, begins))  # It is there before it is filled.
 
-    # That the wrong token is refused was wanted, and a tile may be replaced while the page asks for it.
-    refused = [(status, url) for status, url in page.refused if not (status == 401 and "/api/token" in url)
-               and not (status == 404 and "/tiles/" in url)]
-    if refused:
-        raise Failed(f"the page asks for what is refused: {refused}")
+    check_what_it_asked(page, address, [(401, "/api/token")])  # That the wrong token is refused was wanted.
     server.kill()
     eventually("the page says that the server is lost", lambda: "Server lost" in page.text("#connection") and page.shows("#banner"))
     if not page.run(TILES):
@@ -291,42 +187,11 @@ def use_the_page(programs, page, pictures):
     eventually("with the map", lambda: page.run(TILES))
     before_place = page.run(place)
     eventually("and the robots drive on", lambda: page.run(place) != before_place)
-    if page.errors:
-        raise Failed(f"errors of the page: {page.errors}")
     told = [os.path.basename(process.said) for process in programs.all if TOKEN in said_by(process)]
     if told:
         raise Failed(f"the token is in what they said: {told}")
-    outside = [url for url in page.requests if not url.startswith((address, "data:", "about:", "blob:"))]
-    if outside:
-        raise Failed(f"the page asks others: {outside}")
-
-
-def run_in_browser(use):
-    """Calls use(programs, page) with a browser and a domain of their own; the exit code of the test."""
-    binaries = sys.argv[1]
-    browser = shutil.which("chromium") or shutil.which("chromium-browser")
-    if not browser:
-        print("SKIPPED: there is no Chromium on this machine (deploy/install-packages.sh test)")
-        return 77
-    domain, lock = own_domain()
-    with lock, tempfile.TemporaryDirectory(prefix="cairn-browser-", ignore_cleanup_errors=True) as work:
-        programs = Programs(binaries, work, domain)
-        page = None
-        try:
-            page = Page(browser, work)
-            use(programs, page)
-            return 0
-        except Exception as error:  # Whatever it is: what the programs said must be shown.
-            print(f"FAILED: {error}")
-            if page is not None and page.errors:
-                print(f"--- errors of the page: {page.errors}")
-            for process in programs.all:
-                print(f"--- {os.path.basename(process.said)}:\n{said_by(process)[-1500:]}")
-            return 1
-        finally:
-            if page is not None:
-                page.close()
-            programs.stop()
+    page.refused.clear()  # A server that is gone answers nothing.
+    check_what_it_asked(page, address)
 
 
 if __name__ == "__main__":

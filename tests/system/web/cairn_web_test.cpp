@@ -1,4 +1,5 @@
-// cairn-web as a process: the token of those who may send commands does not get into a log.
+// cairn-web as a process: the token of those who may send commands does not get into a log, and the log has the form
+// that was asked for.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -12,8 +13,10 @@
 namespace cairn::test {
 namespace {
 
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::Not;
+using ::testing::StartsWith;
 
 std::vector<std::string> Page(const std::string& token) {
   return {"/usr/bin/env", "--unset=CAIRN_WEB_TOKEN",    CAIRN_WEB_PATH, "--port", "0",
@@ -45,6 +48,19 @@ TEST(WebToken, IsShownOnATerminal) {
   EXPECT_TRUE(terminal.Says("#token="));
   terminal.Signal(SIGTERM);
   terminal.Wait();
+}
+
+TEST(WebLog, SaysInItsFormatWhyTheStartFailed) {
+  for (const std::string format : {"text", "json"}) {
+    const auto outcome = ChildProcess({CAIRN_WEB_PATH, "--port", "0", "--log-format", format, "--domain",
+                                       std::to_string(TestDomain()), "--set", "wire.interfaces=192.0.2.77"})
+                             .Wait();
+    EXPECT_EQ(outcome.exit_code, 1) << outcome.output;
+    EXPECT_THAT(outcome.output, HasSubstr("192.0.2.77"));
+    EXPECT_THAT(outcome.output, StartsWith(format == "json" ? "{\"time\":\"" : "cairn-web: "));
+    EXPECT_THAT(outcome.output, EndsWith(format == "json" ? "\"}\n" : "\n"));
+  }
+  EXPECT_EQ(ChildProcess({CAIRN_WEB_PATH, "--log-format", "xml"}).Wait().exit_code, 2);
 }
 
 }  // namespace

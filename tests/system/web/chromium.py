@@ -11,6 +11,7 @@ import subprocess
 import time
 
 ANSWER_TIMEOUT_S = 30.0
+KEYS = {"Enter": (13, "\r"), "Tab": (9, "")}  # Their numbers, and what they write.
 
 
 class BrowserError(Exception):
@@ -24,6 +25,7 @@ class Page:
         os.makedirs(self.downloads, exist_ok=True)
         self.errors = []  # Exceptions of scripts, and what the browser refused to load or run.
         self.requests = []  # Addresses, in order.
+        self.posts = []  # Address and body of those that are commands.
         self.refused = []  # Status and address of answers that are errors.
         self.bytes_received = 0  # Of all answers, as they came over the network.
         self._number = 0
@@ -93,6 +95,8 @@ class Page:
             self.errors.append(what["entry"]["text"])
         elif method == "Network.requestWillBeSent":
             self.requests.append(what["request"]["url"])
+            if what["request"]["method"] == "POST":
+                self.posts.append((what["request"]["url"], what["request"].get("postData", "")))
         elif method == "Network.dataReceived":
             self.bytes_received += what["encodedDataLength"]
         elif method == "Network.responseReceived":
@@ -120,6 +124,16 @@ class Page:
     def click(self, selector):
         """As a person does: with the mouse, on an element that is shown, enabled and not covered by another one. Where the text
         of a robot changes meanwhile, so that the element is not there any more when the button goes down or up, again."""
+        def press(place):
+            for what in ("mousePressed", "mouseReleased"):
+                self.call("Input.dispatchMouseEvent", type=what, button="left", clickCount=1, **place)
+        self._activate(selector, press)
+
+    def tap(self, selector):
+        """The same with a finger."""
+        self._activate(selector, lambda place: self.touch((place["x"], place["y"])))
+
+    def _activate(self, selector, press):
         chosen = f"document.querySelector({json.dumps(selector)})"
         for _ in range(20):
             place = self.run(f"""(() => {{
@@ -136,8 +150,7 @@ class Page:
             if place is None:
                 time.sleep(0.1)
                 continue
-            for what in ("mousePressed", "mouseReleased"):
-                self.call("Input.dispatchMouseEvent", type=what, button="left", clickCount=1, **place)
+            press(place)
             if self.run("window.clicked"):
                 return
         raise BrowserError(f"{selector} cannot be clicked: it is absent, hidden, disabled, covered, or never where the mouse is")
@@ -148,12 +161,28 @@ class Page:
             self.call("Input.dispatchMouseEvent", type=what, button="none" if what == "mouseMoved" and (x, y) == begin else "left",
                       buttons=0 if what == "mouseReleased" else 1, clickCount=1, x=x, y=y)
 
+    def touch(self, *places):
+        """A finger goes down at the first place, (x, y) in pixels of the window, moves over the others, and is lifted."""
+        for place in places:
+            self.call("Input.dispatchTouchEvent", type="touchStart" if place is places[0] else "touchMove",
+                      touchPoints=[{"x": place[0], "y": place[1]}])
+        self.call("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+
+    def use_fingers(self, fingers):
+        """Whether the screen can be touched."""
+        self.call("Emulation.setTouchEmulationEnabled", enabled=fingers, maxTouchPoints=1)
+
     def type(self, text):
         self.call("Input.insertText", text=text)
 
+    def press(self, key):
+        """One of KEYS."""
+        number, text = KEYS[key]
+        for what in ("keyDown" if text else "rawKeyDown", "keyUp"):
+            self.call("Input.dispatchKeyEvent", type=what, key=key, code=key, text=text, windowsVirtualKeyCode=number)
+
     def press_enter(self):
-        for what in ("keyDown", "keyUp"):
-            self.call("Input.dispatchKeyEvent", type=what, key="Enter", code="Enter", text="\r", windowsVirtualKeyCode=13)
+        self.press("Enter")
 
     def nameless(self):
         """Role and attributes of each control that a screen reader could not name."""

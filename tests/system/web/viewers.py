@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
-"""What viewers of the page cost: viewers.py BIN_DIR [VIEWERS]
+"""What viewers of the page cost: viewers.py BIN_DIR [--viewers N] [--seconds S]
 
-Two simulated robots drive at real time, 10 scans a second each. Printed: how long a browser needs to its first map, what one
-viewer receives, and the processor time of the server and of cairn-web without a viewer and with VIEWERS (50) of them, who
-read the events and fetch each tile that changes. Needs Chromium."""
+Two simulated robots drive at real time, 10 scans a second each. Printed: how long a browser needs to its first map, what it
+receives, and the processor time of the server and of cairn-web without a viewer, with the browser, and with N (50) viewers, who
+read the events and fetch each tile that changes; each measured for S (20) seconds. Without Chromium there is no browser among them.
+The last line is a JSON object with the figures: `cairn-study viewers` runs this and says whether they are as they must be."""
+import argparse
 import http.client
 import json
 import os
@@ -14,10 +16,8 @@ import tempfile
 import threading
 import time
 
-from browser_test import TILES, Failed, Programs, eventually, own_domain, said_by
+from harness import TILES, Failed, Programs, eventually, own_domain, said_by
 from chromium import Page
-
-SECONDS = 20
 
 
 def processor_s(process):
@@ -71,18 +71,60 @@ class Viewer(threading.Thread):
             self.problem = error
 
 
-def measure(what, processes, during=lambda: None):
+def measure(what, processes, seconds, during=lambda: None):
+    """The shares of a core, in percent, that the processes use."""
     before = [processor_s(process) for process in processes]
     began = time.monotonic()
     during()
     # A rate needs a span of time.
-    time.sleep(max(0.0, SECONDS - (time.monotonic() - began)))
+    time.sleep(max(0.0, seconds - (time.monotonic() - began)))
     took = time.monotonic() - began
     shares = [100 * (processor_s(process) - start) / took for process, start in zip(processes, before)]
     print(f"{what}: cairnd {shares[0]:.1f} % of a core, cairn-web {shares[1]:.1f} %", flush=True)
+    return {"server": shares[0], "web": shares[1]}
 
 
-def run(programs, browser, work, count):
+def look_with_a_browser(browser, work, address, processes, seconds):
+    page = Page(browser, work)
+    try:
+        page.look(1180, 720, "light")
+        began = time.monotonic()
+        page.open(address)
+        while not page.run(f"window.L ? {TILES}.length : 0"):
+            if time.monotonic() - began > 60:
+                raise Failed("the browser shows no map")
+        first_s, first_kb = time.monotonic() - began, page.bytes_received / 1000
+        print(f"first map in a browser: {first_s:.2f} s, {first_kb:.0f} kB with the page itself", flush=True)
+        start, began = page.bytes_received, time.monotonic()
+        figures = measure("1 browser", processes, seconds, lambda: [(page.run("1"), time.sleep(0.5)) for _ in range(int(2 * seconds))])
+        page.run("1")
+        kb_s = (page.bytes_received - start) / (time.monotonic() - began) / 1000
+        print(f"one browser receives {kb_s:.1f} kB/s", flush=True)
+        return {**figures, "first_s": first_s, "first_kb": first_kb, "kb_s": kb_s}
+    finally:
+        page.close()
+
+
+def look_with_many(count, port, processes, seconds):
+    viewers = [Viewer(port) for _ in range(count)]
+    for viewer in viewers:
+        viewer.start()
+    eventually("all see the map", lambda: all(viewer.pictures or viewer.problem for viewer in viewers))
+    start, began = sum(viewer.bytes for viewer in viewers), time.monotonic()
+    figures = measure(f"{count} viewers", processes, seconds)
+    kb_s = (sum(viewer.bytes for viewer in viewers) - start) / (time.monotonic() - began) / count / 1000
+    problems = [viewer.problem for viewer in viewers if viewer.problem]
+    if problems:
+        raise Failed(f"{len(problems)} viewers were not served: {problems[0]}")
+    print(f"one of {count} viewers receives {kb_s:.1f} kB/s", flush=True)
+    for viewer in viewers:
+        viewer.ending = True
+    for viewer in viewers:
+        viewer.join()
+    return {**figures, "kb_s": kb_s}
+
+
+def run(programs, browser, work, count, seconds):
     server = programs.start_server()
     web = programs.start("cairn-web", "--port", "0")
     eventually("the page is there", lambda: re.search(r"http://\S+", said_by(web)))
@@ -96,54 +138,36 @@ def run(programs, browser, work, count):
         connection.request("GET", "/api/state?site=hall")
         answer = connection.getresponse()
         text = answer.read()
-        return json.loads(text) if answer.status == 200 else {}
-    eventually("there is a map", lambda: (state().get("map") or {}).get("tiles", 0) > 20, 120)
-    measure("no viewer", (server, web))
+        connection.close()
+        return json.loads(text) if answer.status == 200 else {"robots": []}
 
-    page = Page(browser, work)
-    try:
-        page.look(1180, 720, "light")
-        began = time.monotonic()
-        page.open(address)
-        while not page.run(f"window.L ? {TILES}.length : 0"):
-            pass
-        print(f"first map in a browser: {time.monotonic() - began:.2f} s, {page.bytes_received / 1000:.0f} kB with the page itself", flush=True)
-        start = page.bytes_received
-        measure("1 browser", (server, web), lambda: [(page.run("1"), time.sleep(0.5)) for _ in range(2 * SECONDS)])
-        print(f"one browser receives {(page.bytes_received - start) / SECONDS / 1000:.1f} kB/s", flush=True)
-    finally:
-        page.close()
-
-    viewers = [Viewer(port) for _ in range(count)]
-    for viewer in viewers:
-        viewer.start()
-    eventually("all see the map", lambda: all(viewer.pictures or viewer.problem for viewer in viewers))
-    start = sum(viewer.bytes for viewer in viewers)
-    measure(f"{count} viewers", (server, web))
-    received = sum(viewer.bytes for viewer in viewers) - start
-    problems = [viewer.problem for viewer in viewers if viewer.problem]
-    if problems:
-        raise Failed(f"{len(problems)} viewers were not served: {problems[0]}")
-    print(f"one of {count} viewers receives {received / SECONDS / count / 1000:.1f} kB/s", flush=True)
-    dropped = sum(sum(sensor["dropped"].values()) for robot in state()["robots"] for sensor in robot["sensors"])
-    print(f"scans dropped by the server: {dropped}")
-    for viewer in viewers:
-        viewer.ending = True
-    for viewer in viewers:
-        viewer.join()
+    def scans(account):
+        return sum(account(sensor) for robot in state()["robots"] for sensor in robot["sensors"] if sensor["sensor"] != "odometry")
+    # At first a scan costs more, because all that it shows is new.
+    eventually("there is a map", lambda: (state().get("map") or {}).get("tiles", 0) > 20 and scans(lambda one: one["used"]) > 300, 120)
+    processes = (server, web)
+    figures = {"viewers": count, "alone": measure("no viewer", processes, seconds)}
+    figures["browser"] = look_with_a_browser(browser, work, address, processes, seconds) if browser else None
+    figures["many"] = look_with_many(count, port, processes, seconds)
+    figures["used"], figures["dropped"] = scans(lambda one: one["used"]), scans(lambda one: sum(one["dropped"].values()))
+    print(f"scans dropped by the server: {figures['dropped']}")
+    print(json.dumps(figures))
 
 
 def main():
-    binaries, count = sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 50
+    parser = argparse.ArgumentParser(description="What viewers of the page cost.")
+    parser.add_argument("binaries", help="folder of cairnd, cairn and cairn-web")
+    parser.add_argument("--viewers", type=int, default=50)
+    parser.add_argument("--seconds", type=float, default=20)
+    arguments = parser.parse_args()
     browser = shutil.which("chromium") or shutil.which("chromium-browser")
     if not browser:
-        print("SKIPPED: there is no Chromium on this machine (deploy/install-packages.sh test)")
-        return 77
+        print("there is no Chromium on this machine (deploy/install-packages.sh test), so none looks")
     domain, lock = own_domain()
     with lock, tempfile.TemporaryDirectory(prefix="cairn-viewers-", ignore_cleanup_errors=True) as work:
-        programs = Programs(binaries, work, domain)
+        programs = Programs(arguments.binaries, work, domain)
         try:
-            run(programs, browser, work, count)
+            run(programs, browser, work, arguments.viewers, arguments.seconds)
         finally:
             programs.stop()
     return 0

@@ -1,0 +1,52 @@
+// Puts the scans of all lidars of one robot into one order of stamps. Drivers that do not wait for each other deliver
+// scans late and by turns, and the estimator uses no scan that is older than the last one. So a scan waits until each
+// other lidar that is at work has sent one that is not older, at most kPatience and until the next call. So a robot
+// with a slow second lidar gets its poses up to 0.3 s later; the scans of a single lidar pass at once. Lidars may
+// measure at the same moment; then each further scan gets a stamp that is a microsecond later, because the estimator
+// needs stamps that increase. Bounded by the patience and by kMostHeld; beyond, the oldest scan passes early. Not
+// thread-safe; time is given by the caller.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "server/inbound.h"
+
+namespace cairn::server {
+
+class ScanMerge {
+ public:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::milliseconds kPatience{200};
+  static constexpr std::size_t kMostHeld = 64;
+
+  // Each returns the scans whose turn has come, in their order.
+  [[nodiscard]] std::vector<ScanArrival> Add(ScanArrival&& scan, Clock::time_point now);
+  [[nodiscard]] std::vector<ScanArrival> TakeDue(Clock::time_point now);
+  // All that wait, because nothing more will come.
+  [[nodiscard]] std::vector<ScanArrival> TakeAll();
+
+ private:
+  struct Lidar {
+    Stamp newest = 0;
+    Clock::time_point arrived{};
+  };
+  struct Held {
+    ScanArrival scan;
+    Clock::time_point since;
+  };
+
+  [[nodiscard]] bool MayGo(const Held& held, Clock::time_point now) const;
+  [[nodiscard]] bool IsOfOneMoment(NameId sensor, Stamp stamp) const;
+  void PassFirst(std::vector<ScanArrival>& out);
+
+  std::map<NameId, Lidar> lidars_;
+  std::multimap<Stamp, Held> held_;
+  std::optional<std::pair<NameId, Stamp>> last_;  // The lidar and the stamp of the last scan that passed.
+};
+
+}  // namespace cairn::server

@@ -1,0 +1,45 @@
+// A robot with several lidars.
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <utility>
+
+#include "tests/server/robots/one_session.h"
+
+namespace cairn::server {
+namespace {
+
+using testing::OdometryOf;
+using testing::OneSession;
+using testing::RoomOdometry;
+using testing::RoomScan;
+using testing::ScanOf;
+
+// The second driver delivers its scans later than the first one, although they are older.
+TEST(Session, UsesTheScansOfTwoLidarsWhoseDriversDoNotWaitForEachOther) {
+  OneSession one;
+  ASSERT_TRUE(one.session().record().AddSensors({"back"}));
+  constexpr std::uint64_t kOfEach = 12;
+  for (int step = 0; step <= static_cast<int>(kOfEach); ++step) {
+    one.session().Take(OdometryOf("r1", RoomOdometry(step)));
+    EXPECT_TRUE(one.session().Take(ScanOf("r1", RoomScan(step))));
+    if (step == 0) continue;
+    Scan late = RoomScan(step);
+    late.stamp -= 20'000'000;
+    late.sequence = static_cast<std::uint64_t>(step);
+    ScanArrival arrival = ScanOf("r1", std::move(late));
+    arrival.stream.sensor_id = HashName("back");
+    EXPECT_TRUE(one.session().Take(std::move(arrival)));
+  }
+  one.session().End();
+  ASSERT_TRUE(one.WaitPhase(SessionPhase::kEnded));
+  std::uint64_t used = 0;
+  for (const Ledger& ledger : one.session().record().snapshot().status.ledgers) {
+    if (ledger.sensor != "odometry") used += ledger.used;
+  }
+  // Only the very first one of the second lidar comes too late: nobody knew of that lidar.
+  EXPECT_EQ(used, 2 * kOfEach);
+}
+
+}  // namespace
+}  // namespace cairn::server
