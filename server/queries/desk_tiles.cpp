@@ -7,8 +7,8 @@
 namespace cairn::server {
 namespace {
 
-// So many of these questions may wait for sites, of all participants together and of one.
-constexpr std::size_t kMostAsked = 64;
+// So many participants may have questions that wait for sites, and each of them so many questions.
+constexpr std::size_t kMostAskers = 64;
 constexpr int kMostOfOne = 2;
 
 }  // namespace
@@ -16,7 +16,7 @@ constexpr int kMostOfOne = 2;
 // Null where too many wait. The place is free again when nobody has the result any more.
 std::shared_ptr<const void> Desk::SiteQuestions::Take(std::uint64_t asker) {
   const MutexLock lock(mutex_);
-  if (open_.size() >= kMostAsked && !open_.contains(asker)) return nullptr;
+  if (open_.size() >= kMostAskers && !open_.contains(asker)) return nullptr;
   int& of_asker = open_[asker];
   if (of_asker >= kMostOfOne) return nullptr;
   ++of_asker;

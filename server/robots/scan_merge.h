@@ -1,6 +1,6 @@
 // Puts the scans of all lidars of one robot into one order of stamps. Drivers that do not wait for each other deliver
 // scans late and by turns, and the estimator uses no scan that is older than the last one. So a scan waits until each
-// other lidar that is at work has sent one that is not older, at most kPatience and until the next call. So a robot
+// other lidar that is at work has sent one that is not older, at most kPatience and until the next call. A robot
 // with a slow second lidar gets its poses up to 0.3 s later; the scans of a single lidar pass at once. Lidars may
 // measure at the same moment; then each further scan gets a stamp that is a microsecond later, because the estimator
 // needs stamps that increase. Bounded by the patience and by kMostHeld; beyond, the oldest scan passes early. Not
