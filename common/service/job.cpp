@@ -5,7 +5,7 @@
 namespace cairn {
 
 std::string_view JobKindName(JobKind kind) {
-  static constexpr std::array<std::string_view, 2> kNames = {"smooth", "join"};
+  static constexpr std::array<std::string_view, 3> kNames = {"smooth", "join", "relocalise"};
   const auto index = static_cast<std::size_t>(kind);
   return index < kNames.size() ? kNames[index] : "unknown";
 }

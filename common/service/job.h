@@ -4,16 +4,19 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "common/sensor/stamp.h"
 #include "common/service/generation.h"
 #include "common/service/names.h"
+#include "common/service/pose_report.h"
 
 namespace cairn {
 
 enum class JobKind : std::uint8_t {
   kSmooth = 0,  // Smooths the paths of all robots of a site.
   kJoin,        // The same, but changes nothing unless a robot that was not joined with the map can be joined now.
+  kRelocalise,  // Looks for a robot in the map of its site.
 };
 enum class JobState : std::uint8_t { kQueued = 0, kRunning, kSucceeded, kFailed, kCancelled };
 [[nodiscard]] std::string_view JobKindName(JobKind kind);
@@ -35,7 +38,9 @@ struct Job {
   Stamp started = 0;
   Stamp ended = 0;
   std::string message;
-  Generation generation = 0;  // Set by the server's egress.
+  std::string robot;                   // kRelocalise: which robot is looked for.
+  std::vector<PoseHypothesis> places;  // kRelocalise: where it may be, the best one first; at most kMostHypotheses.
+  Generation generation = 0;           // Set by the server's egress.
 };
 
 }  // namespace cairn

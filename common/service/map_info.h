@@ -32,6 +32,7 @@ struct MapInfo {
   std::uint64_t edits_version = 0;  // Grows with every change of the edits (map_edit.h); 0: there was none.
   // What the site's tiles, grids and versions take in the server's memory. Shared parts count once.
   std::uint64_t memory_bytes = 0;
+  std::string memory_note;    // What was given up to stay below maps.max_memory_mib; empty: nothing.
   Generation generation = 0;  // Set by the server's egress.
 };
 

@@ -12,6 +12,7 @@
 #include "common/map/tile.h"
 #include "common/sensor/trajectory.h"
 #include "common/service/job.h"
+#include "common/service/learned_value.h"
 #include "common/service/ledger.h"
 #include "common/service/map_info.h"
 #include "common/service/pose_report.h"
@@ -108,7 +109,8 @@ struct RobotStatus {
   SessionState session;
   bool alive = false;  // The client's liveliness lease holds.
   PoseReport pose;
-  std::vector<Ledger> ledgers;  // One per sensor.
+  std::vector<Ledger> ledgers;        // One per sensor.
+  std::vector<LearnedValue> learned;  // At most kMostLearned.
 };
 
 // A site as a file in the server's directory of saved sites.

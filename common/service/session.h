@@ -46,6 +46,7 @@ struct SessionState {
   SessionToken session = 0;
   bool durable = false;        // The server stores the samples.
   bool localise_only = false;  // Nothing is drawn of it (RequestKind::kLocalise).
+  bool fragment = false;       // Not joined with the map of its site: its poses are in a frame of its own.
   bool stale = false;          // A stream stands still although the robot's client is alive; `status` says which.
   Generation generation = 0;   // Set by the server's egress.
   // A random number of the site's coordinate frame `map`, never 0. Poses in maps with different numbers cannot be

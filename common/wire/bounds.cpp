@@ -17,6 +17,7 @@ static Result<void> CheckBounds(const v1::MapEdit& edit);
 static Result<void> CheckBounds(const v1::TileContent& content);
 static Result<void> CheckBounds(const v1::TileRecord& tile);
 static Result<void> CheckBounds(const v1::Landmark& landmark);
+static Result<void> CheckBounds(const v1::LearnedValue& learned);
 static Result<void> CheckBounds(const v1::RobotStatus& robot);
 static Result<void> CheckBounds(const v1::SavedSite& saved);
 static Result<void> CheckBounds(const v1::Ros2DoorState& door);
@@ -119,11 +120,16 @@ static Result<void> CheckBounds(const v1::Landmark& landmark) {
   return Bounds().Name("robot", landmark.robot()).result();
 }
 
+static Result<void> CheckBounds(const v1::LearnedValue& learned) {
+  return Bounds().Name("name", learned.name()).Name("unit", learned.unit()).result();
+}
+
 static Result<void> CheckBounds(const v1::RobotStatus& robot) {
   return Bounds()
       .Inside("session", CheckBounds(robot.session()))
       .Inside("pose", CheckBounds(robot.pose()))
       .Each("ledgers", robot.ledgers(), kMaxSensors)
+      .Each("learned", robot.learned(), kMostLearned)
       .result();
 }
 
@@ -199,7 +205,11 @@ Result<void> CheckBounds(const v1::Ledger& ledger) {
 }
 
 Result<void> CheckBounds(const v1::MapInfo& info) {
-  return Bounds().Name("site", info.site()).Each("versions", info.versions(), kMaxMapVersions).result();
+  return Bounds()
+      .Name("site", info.site())
+      .Each("versions", info.versions(), kMaxMapVersions)
+      .Text("memory_note", info.memory_note())
+      .result();
 }
 
 Result<void> CheckBounds(const v1::Tile& tile) {
@@ -212,9 +222,11 @@ Result<void> CheckBounds(const v1::Tile& tile) {
 Result<void> CheckBounds(const v1::Job& job) {
   return Bounds()
       .Name("site", job.site())
-      .Known("kind", job.kind(), v1::JOB_JOIN)
+      .Known("kind", job.kind(), v1::JOB_RELOCALISE)
       .Known("state", job.state(), v1::JOB_CANCELLED)
       .Text("message", job.message())
+      .Name("robot", job.robot())
+      .AtMost("places", job.places().size(), kMostHypotheses)
       .result();
 }
 
@@ -224,7 +236,7 @@ Result<void> CheckBounds(const v1::Request& request) {
       .Name("site", request.site())
       .Name("robot", request.robot())
       .Within("level", request.level(), 0, kMaxTileLevel)
-      .Known("job_kind", request.job_kind(), v1::JOB_JOIN)
+      .Known("job_kind", request.job_kind(), v1::JOB_RELOCALISE)
       .Name("saved", request.saved())
       .Inside("edit", CheckBounds(request.edit()))
       .result();

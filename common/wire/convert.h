@@ -24,6 +24,7 @@ namespace cairn::wire {
 [[nodiscard]] v1::Scan ToWire(const ScanSample& value);
 [[nodiscard]] v1::Odometry ToWire(const OdometrySample& value);
 [[nodiscard]] v1::PoseReport ToWire(const PoseReport& value);
+[[nodiscard]] v1::PoseHypothesis ToWire(const PoseHypothesis& value);
 [[nodiscard]] v1::Ledger ToWire(const Ledger& value);
 [[nodiscard]] v1::MapInfo ToWire(const MapInfo& value);
 [[nodiscard]] v1::MapEdit ToWire(const MapEdit& value);
@@ -42,6 +43,7 @@ namespace cairn::wire {
 [[nodiscard]] ScanSample FromWire(v1::Scan&& wire);
 [[nodiscard]] OdometrySample FromWire(v1::Odometry&& wire);
 [[nodiscard]] PoseReport FromWire(v1::PoseReport&& wire);
+[[nodiscard]] PoseHypothesis FromWire(v1::PoseHypothesis&& wire);
 [[nodiscard]] Ledger FromWire(v1::Ledger&& wire);
 [[nodiscard]] MapInfo FromWire(v1::MapInfo&& wire);
 [[nodiscard]] MapEdit FromWire(v1::MapEdit&& wire);

@@ -30,6 +30,7 @@ v1::MapInfo ToWire(const MapInfo& value) {
   }
   wire.edits_version(value.edits_version);
   wire.memory_bytes(value.memory_bytes);
+  wire.memory_note(value.memory_note);
   return wire;
 }
 
@@ -55,6 +56,7 @@ MapInfo FromWire(v1::MapInfo&& wire) {
   }
   value.edits_version = wire.edits_version();
   value.memory_bytes = wire.memory_bytes();
+  value.memory_note = std::move(wire.memory_note());
   return value;
 }
 

@@ -55,12 +55,26 @@ static LandmarkReport FromWire(v1::Landmark&& wire) {
   return value;
 }
 
+static v1::LearnedValue ToWire(const LearnedValue& value) {
+  v1::LearnedValue wire;
+  wire.name(value.name);
+  wire.unit(value.unit);
+  wire.value(value.value);
+  wire.sigma(value.sigma);
+  wire.applied(value.applied);
+  return wire;
+}
+static LearnedValue FromWire(v1::LearnedValue&& wire) {
+  return {std::move(wire.name()), std::move(wire.unit()), wire.value(), wire.sigma(), wire.applied()};
+}
+
 static v1::RobotStatus ToWire(const RobotStatus& value) {
   v1::RobotStatus wire;
   wire.session(ToWire(value.session));
   wire.alive(value.alive);
   wire.pose(ToWire(value.pose));
   for (const Ledger& ledger : value.ledgers) wire.ledgers().push_back(ToWire(ledger));
+  for (const LearnedValue& learned : value.learned) wire.learned().push_back(ToWire(learned));
   return wire;
 }
 static RobotStatus FromWire(v1::RobotStatus&& wire) {
@@ -69,6 +83,7 @@ static RobotStatus FromWire(v1::RobotStatus&& wire) {
   value.alive = wire.alive();
   value.pose = FromWire(std::move(wire.pose()));
   for (v1::Ledger& ledger : wire.ledgers()) value.ledgers.push_back(FromWire(std::move(ledger)));
+  for (v1::LearnedValue& learned : wire.learned()) value.learned.push_back(FromWire(std::move(learned)));
   return value;
 }
 
@@ -82,17 +97,6 @@ static v1::SavedSite ToWire(const SavedSite& value) {
 }
 static SavedSite FromWire(v1::SavedSite&& wire) {
   return {std::move(wire.name()), std::move(wire.site()), wire.bytes(), wire.saved_ns()};
-}
-
-static v1::PoseHypothesis ToWire(const PoseHypothesis& value) {
-  v1::PoseHypothesis wire;
-  wire.stamp_ns(value.stamp);
-  wire.T_map_robot(ToWire(value.T_map_robot));
-  wire.weight(value.weight);
-  return wire;
-}
-static PoseHypothesis FromWire(v1::PoseHypothesis&& wire) {
-  return {.stamp = wire.stamp_ns(), .T_map_robot = FromWire(wire.T_map_robot()), .weight = wire.weight()};
 }
 
 static v1::Refusals ToWire(const Refusals& value) {

@@ -51,6 +51,17 @@ PoseReport FromWire(v1::PoseReport&& wire) {
   return value;
 }
 
+v1::PoseHypothesis ToWire(const PoseHypothesis& value) {
+  v1::PoseHypothesis wire;
+  wire.stamp_ns(value.stamp);
+  wire.T_map_robot(ToWire(value.T_map_robot));
+  wire.weight(value.weight);
+  return wire;
+}
+PoseHypothesis FromWire(v1::PoseHypothesis&& wire) {
+  return {.stamp = wire.stamp_ns(), .T_map_robot = FromWire(wire.T_map_robot()), .weight = wire.weight()};
+}
+
 v1::Ledger ToWire(const Ledger& value) {
   v1::Ledger wire;
   wire.robot_id(value.robot_id);
@@ -119,6 +130,8 @@ v1::Job ToWire(const Job& value) {
   wire.started_ns(value.started);
   wire.ended_ns(value.ended);
   wire.message(value.message);
+  wire.robot(value.robot);
+  for (const PoseHypothesis& place : value.places) wire.places().push_back(ToWire(place));
   return wire;
 }
 
@@ -137,6 +150,8 @@ Job FromWire(v1::Job&& wire) {
   value.started = wire.started_ns();
   value.ended = wire.ended_ns();
   value.message = std::move(wire.message());
+  value.robot = std::move(wire.robot());
+  for (v1::PoseHypothesis& place : wire.places()) value.places.push_back(FromWire(std::move(place)));
   return value;
 }
 

@@ -70,6 +70,7 @@ v1::SessionState ToWire(const SessionState& value) {
   wire.durable(value.durable);
   wire.map_frame(value.map_frame);
   wire.localise_only(value.localise_only);
+  wire.fragment(value.fragment);
   wire.stale(value.stale);
   wire.status(ToWire(value.status));
   return wire;
@@ -87,6 +88,7 @@ SessionState FromWire(v1::SessionState&& wire) {
   value.durable = wire.durable();
   value.map_frame = wire.map_frame();
   value.localise_only = wire.localise_only();
+  value.fragment = wire.fragment();
   value.stale = wire.stale();
   value.status = FromWire(std::move(wire.status()));
   return value;

@@ -16,18 +16,18 @@ std::size_t BytesOf(const LandmarkReport&) {
   return 192;
 }
 std::size_t BytesOf(const MapInfo& info) {
-  std::size_t bytes = 256;
+  std::size_t bytes = 256 + info.memory_note.size();
   for (const MapVersionInfo& version : info.versions) bytes += version.note.size() + 48;
   return bytes;
 }
 std::size_t BytesOf(const RobotStatus& robot) {
-  return 1024 + robot.session.status.message.size() + robot.ledgers.size() * 512;
+  return 1024 + robot.session.status.message.size() + robot.ledgers.size() * 512 + robot.learned.size() * 176;
 }
 std::size_t BytesOf(const SavedSite&) {
   return 192;
 }
 std::size_t BytesOf(const Job& job) {
-  return job.message.size() + job.site.size() + 160;
+  return job.message.size() + job.site.size() + job.robot.size() + job.places.size() * 40 + 176;
 }
 
 std::size_t BytesOf(const Ros2Namespace& name_space) {

@@ -335,6 +335,7 @@ SessionState SessionRecord::StateNow() const {
   if (localises_ && state.status.ok() && state.status.message.empty())
     state.status.message = "only localised: nothing is drawn of it";
   state.localise_only = localises_;
+  state.fragment = joining_.fragment;
   state.stale = !silence_.empty();
   if (state.stale && state.status.ok()) {
     state.status = {StatusCode::kUnavailable,

@@ -74,7 +74,7 @@ TEST(Convert, NumbersOfTheIdlEnumsAreThoseOfTheValues) {
   EXPECT_EQ(static_cast<int>(v1::DROP_SESSION_FULL), static_cast<int>(DropReason::kSessionFull));
   EXPECT_EQ(static_cast<int>(v1::DROP_SESSION_FULL) + 1, kDropReasonCount);
   EXPECT_EQ(static_cast<int>(v1::TILE_PNG), static_cast<int>(TileEncoding::kPng));
-  EXPECT_EQ(static_cast<int>(v1::JOB_JOIN), static_cast<int>(JobKind::kJoin));
+  EXPECT_EQ(static_cast<int>(v1::JOB_RELOCALISE), static_cast<int>(JobKind::kRelocalise));
   EXPECT_EQ(static_cast<int>(v1::JOB_CANCELLED), static_cast<int>(JobState::kCancelled));
   EXPECT_EQ(static_cast<int>(v1::REQUEST_SESSION_END), static_cast<int>(RequestKind::kSessionEnd));
   EXPECT_EQ(static_cast<int>(v1::REQUEST_MAP_EDIT_REMOVE) + 1, kRequestKindCount);

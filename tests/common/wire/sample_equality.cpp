@@ -71,8 +71,8 @@ bool Same(const SessionRequest& a, const SessionRequest& b) {
 bool Same(const SessionState& a, const SessionState& b) {
   return a.robot_id == b.robot_id && a.client == b.client && a.robot == b.robot && a.site == b.site &&
          a.phase == b.phase && Eq(a.status, b.status) && a.session == b.session && a.durable == b.durable &&
-         a.localise_only == b.localise_only && a.stale == b.stale && a.generation == b.generation &&
-         a.map_frame == b.map_frame;
+         a.localise_only == b.localise_only && a.fragment == b.fragment && a.stale == b.stale &&
+         a.generation == b.generation && a.map_frame == b.map_frame;
 }
 bool Same(const SessionRefusal& a, const SessionRefusal& b) {
   return Same(a.state, b.state);
@@ -111,17 +111,20 @@ bool Same(const MapInfo& a, const MapInfo& b) {
          a.version == b.version && a.levels == b.levels && a.tile_count == b.tile_count && Eq(a.x_min_m, b.x_min_m) &&
          Eq(a.y_min_m, b.y_min_m) && Eq(a.x_max_m, b.x_max_m) && Eq(a.y_max_m, b.y_max_m) && a.robots == b.robots &&
          a.enabled_version == b.enabled_version && a.generation == b.generation && a.edits_version == b.edits_version &&
-         a.memory_bytes == b.memory_bytes &&
+         a.memory_bytes == b.memory_bytes && a.memory_note == b.memory_note &&
          EqList(a.versions, b.versions, [](const auto& x, const auto& y) { return Eq(x, y); });
 }
 bool Same(const TileSample& a, const TileSample& b) {
   return a.site_id == b.site_id && Eq(a.tile, b.tile) && a.deleted == b.deleted && a.generation == b.generation;
 }
 bool Same(const Job& a, const Job& b) {
+  const auto same_place = [](const PoseHypothesis& x, const PoseHypothesis& y) {
+    return x.stamp == y.stamp && Eq(x.T_map_robot, y.T_map_robot) && Eq(x.weight, y.weight);
+  };
   return a.id == b.id && a.site == b.site && a.kind == b.kind && a.state == b.state && Eq(a.progress, b.progress) &&
          Eq(a.cost_before, b.cost_before) && Eq(a.cost_after, b.cost_after) && a.map_version == b.map_version &&
          a.submitted == b.submitted && a.started == b.started && a.ended == b.ended && a.message == b.message &&
-         a.generation == b.generation;
+         a.generation == b.generation && a.robot == b.robot && EqList(a.places, b.places, same_place);
 }
 bool Same(const Request& a, const Request& b) {
   return a.client == b.client && a.sequence == b.sequence && a.kind == b.kind && a.site == b.site &&
@@ -140,7 +143,7 @@ bool Same(const Reply& a, const Reply& b) {
   const auto eq = [](const auto& x, const auto& y) { return Eq(x, y); };
   const auto same_robot = [&](const RobotStatus& x, const RobotStatus& y) {
     return Same(x.session, y.session) && x.alive == y.alive && Same(x.pose, y.pose) &&
-           EqList(x.ledgers, y.ledgers, same);
+           EqList(x.ledgers, y.ledgers, same) && x.learned == y.learned;
   };
   const auto same_door = [](const Ros2DoorState& x, const Ros2DoorState& y) {
     return x.enabled == y.enabled && x.domain == y.domain && x.malformed == y.malformed && x.overflow == y.overflow &&

@@ -55,6 +55,7 @@ SessionState ExtremeSessionState() {
           .session = kMax64 - 2,
           .durable = true,
           .localise_only = true,
+          .fragment = true,
           .stale = true,
           .generation = kMax64 - 3,
           .map_frame = kMax64 - 4};
@@ -149,6 +150,7 @@ MapInfo ExtremeMapInfo() {
   value.versions = {{1, true, 0, ""}, {kMax32, false, kMax64, Text('n')}};
   value.edits_version = kMax64 - 4;
   value.memory_bytes = kMax64 - 5;
+  value.memory_note = Text('g');
   return value;
 }
 
@@ -171,6 +173,8 @@ Job ExtremeJob() {
           .started = -1,
           .ended = -2,
           .message = Text('m'),
+          .robot = Name('r'),
+          .places = {{kMin64, {kMax, -kMax, kTiny}, kMax}, PoseHypothesis{}},
           .generation = kMax64 - 1};
 }
 
@@ -233,7 +237,11 @@ Reply ExtremeReply() {
   landmark.sightings = kMax32;
   value.landmarks = {landmark, LandmarkReport{}};
   value.maps = {ExtremeMapInfo()};
-  value.robots = {{ExtremeSessionState(), true, ExtremePose(), {ExtremeLedger(), Ledger{}}}};
+  value.robots = {{ExtremeSessionState(),
+                   true,
+                   ExtremePose(),
+                   {ExtremeLedger(), Ledger{}},
+                   {{Name('n'), Name('u'), kMax, kTiny, true}, LearnedValue{}}}};
   value.jobs = {ExtremeJob(), Job{}};
   value.load = {{.up_s = kMax,
                  .processor_s = -kMax,
