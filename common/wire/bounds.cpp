@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/map/map_edit.h"
+#include "common/service/learned_value.h"
 #include "common/service/names.h"
 #include "common/service/pose_report.h"
 #include "common/wire/limits.h"
