@@ -38,9 +38,10 @@ struct Job {
   Stamp started = 0;
   Stamp ended = 0;
   std::string message;
-  std::string robot;                   // kRelocalise: which robot is looked for.
-  std::vector<PoseHypothesis> places;  // kRelocalise: where it may be, the best one first; at most kMostHypotheses.
-  Generation generation = 0;           // Set by the server's egress.
+  std::string robot = {};  // kRelocalise: which robot is looked for.
+  // kRelocalise: where it may be, the best one first; at most kMostHypotheses.
+  std::vector<PoseHypothesis> places = {};
+  Generation generation = 0;  // Set by the server's egress.
 };
 
 }  // namespace cairn

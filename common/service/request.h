@@ -109,8 +109,8 @@ struct RobotStatus {
   SessionState session;
   bool alive = false;  // The client's liveliness lease holds.
   PoseReport pose;
-  std::vector<Ledger> ledgers;        // One per sensor.
-  std::vector<LearnedValue> learned;  // At most kMostLearned.
+  std::vector<Ledger> ledgers;             // One per sensor.
+  std::vector<LearnedValue> learned = {};  // At most kMostLearned.
 };
 
 // A site as a file in the server's directory of saved sites.
