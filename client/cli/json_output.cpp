@@ -19,6 +19,7 @@ nlohmann::json DropsToJson(const std::array<std::uint64_t, kDropReasonCount>& dr
 
 void to_json(nlohmann::json& json, const Status& status) {
   json = {{"code", StatusCodeName(status.code)}, {"message", status.message}};
+  if (!status.request.empty()) json["request"] = status.request;
 }
 
 void to_json(nlohmann::json& json, const Pose2& pose) {
@@ -63,6 +64,7 @@ void to_json(nlohmann::json& json, const RobotStatus& robot) {
   json = {{"robot", robot.session.robot},
           {"site", robot.session.site},
           {"phase", SessionPhaseName(robot.session.phase)},
+          {"fragment", robot.session.fragment},
           {"stale", robot.session.stale},
           {"status", robot.session.status},
           {"alive", robot.alive},

@@ -67,6 +67,7 @@ Json RobotJson(const RobotStatus& robot) {
                {"stale", session.stale},
                {"note", said_by_mode ? std::string() : session.status.message},
                {"alive", robot.alive},
+               {"fragment", session.fragment},
                {"sensors", ledgers},
                {"mode", session.localise_only ? "localise" : "map"}};
   json["pose"] = robot.pose.reason == PoseReason::kWaiting ? Json() : PoseJson(robot.pose);

@@ -62,7 +62,7 @@ const CellLayer = L.GridLayer.extend({
 });
 
 // Whether its poses are relative to its own start and say nothing about the map of its site.
-export const isFragment = (robot) => robot.pose?.reason === 'not_joined';
+export const isFragment = (robot) => robot.fragment;
 
 export function robotState(robot, connected) {
   if (robot.phase === 'ended') return ['silent', 'Ended'];

@@ -34,6 +34,19 @@ TEST(WebJson, ARobotMapsOrIsOnlyLocalisedWhateverItsStatusSays) {
   EXPECT_EQ(RobotOf(true, stale)["note"], stale.message);
 }
 
+// Also a lost one, whose pose says only that it is lost: the page must not draw it at a place in its own frame.
+TEST(WebJson, ARobotThatIsNotJoinedIsAFragmentWhateverItsPoseSays) {
+  ServerView view;
+  view.status.robots.resize(1);
+  RobotStatus& robot = view.status.robots[0];
+  robot.session.site = "hall";
+  robot.pose.reason = PoseReason::kLost;
+  const auto fragment = [&view] { return json::parse(StateJson(view, "hall", false)).at("robots").at(0).at("fragment"); };
+  EXPECT_EQ(fragment(), false);
+  robot.session.fragment = true;
+  EXPECT_EQ(fragment(), true);
+}
+
 TEST(WebJson, TheDoctorsWordsAreNotChanged) {
   ServerView view;
   EXPECT_EQ(json::parse(DoctorJson(view)), json::parse(R"({"ros2": null, "strays": []})"));

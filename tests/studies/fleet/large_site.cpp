@@ -40,7 +40,7 @@ double SecondsSince(Clock::time_point start) {
 
 // A square yard with short walls, and a way along lanes from which all of it is seen.
 std::string YardText(int side_m) {
-  constexpr int kLane = 160, kEdge = 80;
+  constexpr int kLane = 170, kEdge = 80;
   std::string text = fmt::format(
       "cairn-world: 1\nname: yard\nlines:\n"
       "  - {{points: [[0, 0], [{0}, 0], [{0}, {0}], [0, {0}]], closed: true}}\nwalls:\n",
@@ -63,9 +63,9 @@ std::string YardText(int side_m) {
 MapInfo DrawYard(StudyContext& context, const LiveServer& server, client::QueryClient& queries) {
   const TempDirectory directory;
   const std::string world = (directory / "yard.yaml").string();
-  std::ofstream(world) << YardText(context.Pick(650, 180));
+  std::ofstream(world) << YardText(context.Pick(680, 180));
   context.report.Progress("a robot draws the yard, which takes minutes");
-  const std::string seconds = context.quick ? "30" : "840";
+  const std::string seconds = context.quick ? "30" : "900";
   std::vector<std::string> line = {"sim", "--site", "yard", "--robots", "1", "--fast", "--world", world};
   for (const char* word : {"--hz", "1", "--odometry-hz", "20", "--speed", "3", "--slip", "0", "--wheel-spread", "0",
                            "--range", "100", "--fov", "360", "--beams", "720", "--seconds"}) {
