@@ -34,6 +34,8 @@ enum class StatusCode : int {
 struct [[nodiscard]] Status {
   StatusCode code = StatusCode::kOk;
   std::string message;  // For a person: what was wrong, with the offending value.
+  // Of a question or command to a server that failed: the id under which the server logs it (service/request_id.h).
+  std::string request = {};
 
   [[nodiscard]] bool ok() const { return code == StatusCode::kOk; }
 };

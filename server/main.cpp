@@ -4,6 +4,7 @@
 // restart would fail again, also because of a store that a newer server has written or that is damaged; 3 stopped on
 // request, but the store had failed and the last data is lost; 4 ended itself, because it had not worked for a minute
 // and no service manager watched it: start it again.
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -18,6 +19,7 @@
 #include <sstream>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "common/options/config.h"
 #include "common/version.h"
@@ -43,11 +45,26 @@ std::string PrintConfig(CairndOptions options) {
   return PrintYaml([&options](OptionVisitor& visitor) { Visit(visitor, options); });
 }
 
+// What is set otherwise than by default; `cairnd --print-config` with the same arguments prints all of it.
 void LogConfig(const CairndOptions& options) {
-  std::istringstream lines(PrintConfig(options));
-  for (std::string line; std::getline(lines, line);) {
-    const auto content = line.find_first_not_of(' ');
-    if (content != std::string::npos && line[content] != '#') spdlog::info("config: {}", line);
+  const auto lines_of = [](const CairndOptions& of) {
+    std::vector<std::string> lines;
+    std::istringstream text(PrintConfig(of));
+    for (std::string line; std::getline(text, line);) {
+      const auto content = line.find_first_not_of(' ');
+      if (content != std::string::npos && line[content] != '#') lines.push_back(line.substr(0, line.find("  #")));
+    }
+    return lines;
+  };
+  const std::vector<std::string> set = lines_of(options), usual = lines_of({});
+  std::vector<std::string> sections;  // Those that the line is in, by their depth.
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    const auto depth = set[i].find_first_not_of(' ') / 2;
+    sections.resize(std::min(sections.size(), depth));
+    const std::string entry = set[i].substr(2 * depth);
+    if (entry.ends_with(':')) sections.push_back(entry.substr(0, entry.size() - 1) + ".");
+    if (i >= usual.size() || set[i] == usual[i]) continue;
+    spdlog::info("config: {}{}", fmt::join(sections, ""), entry);
   }
 }
 

@@ -40,12 +40,16 @@ Server::Server(const ServerOptions& options, Inbound& inbound, Outbound& outboun
              generation),
       roster_(options.robots, options.slam, robots_pool_, outbound, atlas_, journal),
       jobs_(options.jobs, outbound, ServerClock, journal),
-      smooth_(options.jobs, SiteOptionsOf(options.slam), roster_, atlas_),
-      worker_(
-          options.jobs, jobs_,
-          [this](const Job& job, bool enable, const JobControl& control) { return smooth_.Run(job, enable, control); }),
-      joiner_(options.jobs, roster_, jobs_, worker_),
+      smooth_(options.jobs, SiteOptionsOf(options.slam), roster_, atlas_, journal, &jobs_),
+      relocalise_(options.jobs, SiteOptionsOf(options.slam), roster_, atlas_, smooth_),
+      worker_(options.jobs, jobs_,
+              [this](const Job& job, bool enable, const JobControl& control) {
+                if (job.kind == JobKind::kRelocalise) return relocalise_.Run(job, control);
+                return smooth_.Run(job, enable, control);
+              }),
+      joiner_(options.jobs, roster_, atlas_, jobs_, worker_),
       start_check_(options.jobs, roster_, atlas_),
+      lost_robots_(options.jobs, roster_, jobs_, worker_),
       saved_sites_(saved, BytesOf(options.store.max_saved_gib), journal, {outbound, roster_, atlas_, jobs_, worker_}),
       desk_(static_cast<std::size_t>(options.server.query_queue), outbound, roster_, atlas_, jobs_, worker_,
             saved_sites_, generation, journal),
@@ -117,6 +121,7 @@ void Server::KeepHouse(const std::stop_token& stop) {
       jobs_.Tick();
       joiner_.Tick();
       start_check_.Tick();
+      lost_robots_.Tick();
       if (Clock::now() >= next_publish) {
         next_publish = std::max(next_publish + publish_period, Clock::now());
         atlas_.Publish();

@@ -18,6 +18,8 @@
 #include "server/inbound.h"
 #include "server/jobs/job_worker.h"
 #include "server/jobs/joiner.h"
+#include "server/jobs/lost_robots.h"
+#include "server/jobs/relocalise_job.h"
 #include "server/jobs/smooth_job.h"
 #include "server/jobs/start_check.h"
 #include "server/maps/atlas.h"
@@ -87,10 +89,13 @@ class Server {
   Atlas atlas_;
   Roster roster_;
   JobList jobs_;
-  const SmoothJob smooth_;
+  SmoothJob smooth_;  // Used by the worker only.
+  const RelocaliseJob relocalise_;
   JobWorker worker_;
-  Joiner joiner_;           // Used by housekeeping only, ...
-  StartCheck start_check_;  // ... as this.
+  // Used by housekeeping only.
+  Joiner joiner_;
+  StartCheck start_check_;
+  LostRobots lost_robots_;
   SavedSites saved_sites_;
   Desk desk_;
   Heartbeat heartbeat_;

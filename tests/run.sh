@@ -13,7 +13,7 @@ set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
 all=(packages format architecture release accuracy demo nodds tidy asan fuzz tsan)
-full=(asan_rest plain demo_secure debs containers systemd)
+full=(asan_rest plain demo_secure debs containers recordings systemd)
 stages=()
 studies=()
 full_too=0
@@ -205,6 +205,15 @@ stage_containers() {
   deploy/install-packages.sh images
   deploy/make-packages.sh build/release
   tests/deploy/images_test.sh build/release/packages build/images
+}
+
+# Bags and recordings, with the libraries of MCAP's makers and of Foxglove as witnesses.
+stage_recordings() {
+  command -v npm >/dev/null || deploy/install-packages.sh containers
+  if ! npm ping --loglevel=error >/dev/null 2>&1; then echo "SKIPPED: the registry of npm is not reachable"; return 77; fi
+  configure release
+  build release --target cairnd cairn cairn-offline
+  tests/recordings/witness_test.sh build/release/bin build/recordings
 }
 
 # Root only: it makes a system of its own and boots it.

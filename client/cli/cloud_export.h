@@ -17,7 +17,7 @@ struct CloudExportOptions {
   bool text = false;
   std::string truth_world;  // A world in space to measure the cloud against; empty: none.
   CloudOptions cloud;
-  LogReaderOptions reader;
+  LogReaderOptions reader = {.all_lidars = true};
 };
 
 struct CloudExportReport {

@@ -21,10 +21,11 @@ void AddCheckLog(CLI::App& app, Program& program);
 void AddEval(CLI::App& app, Program& program);
 
 void AddMap(CLI::App& app,
-            Program& program);  // All commands of maps; those that draw and `map edit` are files of their own.
+            Program& program);  // All commands of maps; those that draw, `map edit` and `map import` have own files.
 void AddMapAnimate(CLI::App& map, Program& program);
 void AddMapDraw(CLI::App& map, Program& program);
 void AddMapEdit(CLI::App& map, Program& program);
+void AddMapImport(CLI::App& map, Program& program);
 void AddJob(CLI::App& app, Program& program);
 void AddCloud(CLI::App& app, Program& program);
 void AddSite(CLI::App& app, Program& program);  // All commands of sites; those that need no server have their own file.

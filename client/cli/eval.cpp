@@ -19,7 +19,7 @@ struct EvalArguments {
   double max_rmse_m = 0.0;
   std::string log;  // Of --map-entropy; empty: the error against the truth is asked for.
   CrispnessOptions crispness;
-  LogReaderOptions reader;
+  LogReaderOptions reader = {.all_lidars = true};
 };
 
 ExitCode CompareWithTruth(Program& program, const EvalArguments& arguments) {

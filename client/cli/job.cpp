@@ -1,10 +1,7 @@
-#include <chrono>
-
 #include "client/cli/commands.h"
-#include "client/cli/interrupt.h"
+#include "client/cli/job_wait.h"
 #include "client/cli/json_output.h"
 #include "client/cli/option_checks.h"
-#include "client/cli/progress_line.h"
 #include "client/cli/text_output.h"
 
 namespace cairn::client {
@@ -15,20 +12,6 @@ struct SmoothArguments {
   bool wait = false;
   bool no_enable = false;
 };
-
-Result<Job> WaitForEnd(Program& program, const Job& submitted) {
-  const auto start = std::chrono::steady_clock::now();
-  const auto seconds = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
-  ProgressLine progress(program.err(), ErrorIsTerminal(), program.options.json);
-  auto job = program.Ask([&](QueryClient& server) {
-    return server.WaitForJob(submitted.id, [&](const Job& now) {
-      progress.Show(seconds(), now.progress, FormatJob(now));
-      return !Interrupted();
-    });
-  });
-  if (job) progress.Finish(seconds(), job->progress, FormatJob(*job));
-  return job;
-}
 
 ExitCode Smooth(Program& program, const SmoothArguments& arguments) {
   auto job = program.Ask(

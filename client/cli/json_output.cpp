@@ -60,6 +60,14 @@ void to_json(nlohmann::json& json, const Ledger& ledger) {
           {"latency_p99_ms", ledger.latency_p99_ms}};
 }
 
+void to_json(nlohmann::json& json, const LearnedValue& learned) {
+  json = {{"name", learned.name},
+          {"unit", learned.unit},
+          {"value", learned.value},
+          {"sigma", learned.sigma},
+          {"applied", learned.applied}};
+}
+
 void to_json(nlohmann::json& json, const RobotStatus& robot) {
   json = {{"robot", robot.session.robot},
           {"site", robot.session.site},
@@ -69,6 +77,7 @@ void to_json(nlohmann::json& json, const RobotStatus& robot) {
           {"status", robot.session.status},
           {"alive", robot.alive},
           {"pose", robot.pose},
+          {"learned", robot.learned},
           {"ledgers", robot.ledgers}};
 }
 
@@ -89,7 +98,8 @@ void to_json(nlohmann::json& json, const MapInfo& map) {
       {"enabled_version", map.enabled_version},
       {"versions", map.versions},
       {"edits_version", map.edits_version},
-      {"memory_bytes", map.memory_bytes}};
+      {"memory_bytes", map.memory_bytes},
+      {"memory_note", map.memory_note}};
 }
 
 void to_json(nlohmann::json& json, const MapEdit& edit) {
@@ -172,6 +182,10 @@ void to_json(nlohmann::json& json, const Job& job) {
           {"started", job.started},
           {"ended", job.ended},
           {"message", job.message}};
+  if (job.kind != JobKind::kRelocalise) return;
+  json["robot"] = job.robot;
+  json["places"] = job.places;
+  json["ambiguity"] = Ambiguity(job);
 }
 
 void to_json(nlohmann::json& json, const LogComplaint& complaint) {

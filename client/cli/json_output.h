@@ -17,6 +17,7 @@ void to_json(nlohmann::json& json, const Status& status);
 void to_json(nlohmann::json& json, const Pose2& pose);
 void to_json(nlohmann::json& json, const PoseReport& pose);
 void to_json(nlohmann::json& json, const Ledger& ledger);
+void to_json(nlohmann::json& json, const LearnedValue& learned);
 void to_json(nlohmann::json& json, const RobotStatus& robot);
 void to_json(nlohmann::json& json, const MapVersionInfo& version);
 void to_json(nlohmann::json& json, const MapInfo& map);

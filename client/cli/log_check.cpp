@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <variant>
+#include <vector>
 
 #include "client/cli/commands.h"
 #include "client/cli/interrupt.h"
@@ -21,16 +23,30 @@ struct CheckArguments {
   LogReaderOptions reader;
 };
 
+// Each lidar by itself: two at a time have other rates and gaps.
 ExitCode CheckLog(Program& program, const CheckArguments& arguments) {
-  LogCheck check;
-  const auto summary = ReadRecording(arguments.log, arguments.reader, [&check](LogRecord&& record) {
-    check.Add(record);
+  LogReaderOptions reader = arguments.reader;
+  reader.all_lidars = true;
+  const auto survey = ReadRecording(arguments.log, reader, [](LogRecord&&) { return false; });
+  if (!survey) return program.Refuse(survey.error());
+  const bool several = survey->lidars.size() > 1;
+  std::vector<LogCheck> checks(std::max<std::size_t>(survey->lidars.size(), 1));
+  const auto summary = ReadLidars(arguments.log, reader, [&](LogRecord&& record, std::size_t lidar) {
+    const bool of_all = std::holds_alternative<Odometry>(record);
+    for (std::size_t i = 0; i < checks.size(); ++i)
+      if (of_all || i == lidar) checks[i].Add(record);
     return !Interrupted();
   });
   if (!summary) return program.Refuse(summary.error());
-  const LogReport report = check.Finish(*summary);
-  program.Print(FormatLogReport(report), report);
-  return report.has_errors() ? ExitCode::kFailed : ExitCode::kOk;
+  bool good = true;
+  for (std::size_t i = 0; i < checks.size(); ++i) {
+    const LogReport report = checks[i].Finish(*summary);
+    nlohmann::json object = report;
+    if (several) object["scan_topic"] = summary->lidars[i];
+    program.Print((several ? summary->lidars[i] + "\n" : std::string()) + FormatLogReport(report), object);
+    good = good && !report.has_errors();
+  }
+  return good ? ExitCode::kOk : ExitCode::kFailed;
 }
 
 }  // namespace

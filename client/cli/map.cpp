@@ -5,9 +5,11 @@
 #include <filesystem>
 
 #include "client/cli/commands.h"
+#include "client/cli/frame_option.h"
 #include "client/cli/json_output.h"
 #include "client/cli/option_checks.h"
 #include "client/cli/text_output.h"
+#include "common/map/building_frame.h"
 
 namespace cairn::client {
 namespace {
@@ -29,6 +31,7 @@ struct ExportArguments {
   std::string image = "png";
   std::string mode = "trinary";
   std::string keep_out;  // The yaml file of the mask; empty: none.
+  std::string frame = "map";
 };
 
 namespace fs = std::filesystem;
@@ -57,26 +60,32 @@ ExitCode ExportMap(Program& program, const ExportArguments& arguments) {
     return program.Refuse({StatusCode::kInvalidArgument, "--keep-out must have another name than the map"});
   const auto map = program.Ask([&](QueryClient& server) { return server.MapImage(arguments.site); });
   if (!map) return program.Refuse(map.error());
+  const auto T_map_frame = FrameOf(program, arguments.frame, arguments.site);
+  if (!T_map_frame) return program.Refuse(T_map_frame.error());
   MapSaveOptions options;
   options.mode = arguments.mode == "raw"     ? MapImageMode::kRaw
                  : arguments.mode == "scale" ? MapImageMode::kScale
                                              : MapImageMode::kTrinary;
-  if (const auto saved = SaveMapYaml(*map, arguments.file, "." + arguments.image, options); !saved) {
+  if (const auto saved = SaveMapYaml(InFrame(*map, *T_map_frame), arguments.file, "." + arguments.image, options);
+      !saved) {
     return program.Refuse(saved.error());
   }
   if (!arguments.keep_out.empty()) {
     const auto edits = program.Ask([&](QueryClient& server) { return server.MapEdits(arguments.site); });
     if (!edits) return program.Refuse(edits.error());
-    const auto saved = SaveMapYaml(KeepOutMask(*map, *edits), arguments.keep_out, "." + arguments.image, options);
+    const auto saved = SaveMapYaml(InFrame(KeepOutMask(*map, *edits), *T_map_frame), arguments.keep_out,
+                                   "." + arguments.image, options);
     if (!saved) return program.Refuse(saved.error());
   }
-  return program.Print(
-      fmt::format("{}: {} x {} cells of {} m\n", arguments.file, map->width, map->height, map->resolution_m),
-      {{"file", arguments.file},
-       {"width", map->width},
-       {"height", map->height},
-       {"resolution_m", map->resolution_m},
-       {"keep_out", arguments.keep_out}});
+  const std::string image = fs::path(arguments.file).replace_extension(arguments.image).string();
+  return program.Print(fmt::format("{} and {}: {} x {} cells of {} m\n", arguments.file, image, map->width, map->height,
+                                   map->resolution_m),
+                       {{"file", arguments.file},
+                        {"width", map->width},
+                        {"height", map->height},
+                        {"resolution_m", map->resolution_m},
+                        {"frame", arguments.frame},
+                        {"keep_out", arguments.keep_out}});
 }
 
 struct EnableArguments {
@@ -118,6 +127,7 @@ void AddMapExport(CLI::App& map, Program& program) {
                    "Also write the areas where robots must not drive, as the mask of Nav2's keepout filter. It is as "
                    "large as the map: what lies beyond is not in it")
       ->type_name("FILE");
+  AddFrame(*command, arguments->frame);
   program.OnChosen(*command, arguments, ExportMap);
 }
 
@@ -135,10 +145,11 @@ void AddMapEnable(CLI::App& map, Program& program) {
 }  // namespace
 
 void AddMap(CLI::App& app, Program& program) {
-  auto* map = app.add_subcommand("map", "A site's map: what it is, export, versions, pictures, edits");
+  auto* map = app.add_subcommand("map", "A site's map: what it is, export, import, versions, pictures, edits");
   map->require_subcommand(1);
   AddMapInfo(*map, program);
   AddMapExport(*map, program);
+  AddMapImport(*map, program);
   AddMapEnable(*map, program);
   AddMapDraw(*map, program);
   AddMapAnimate(*map, program);

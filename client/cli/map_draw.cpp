@@ -1,8 +1,10 @@
 #include <fmt/format.h>
 
 #include "client/cli/commands.h"
+#include "client/cli/frame_option.h"
 #include "client/cli/map_picture.h"
 #include "client/cli/quantity_text.h"
+#include "common/map/building_frame.h"
 
 namespace cairn::client {
 namespace {
@@ -15,6 +17,7 @@ struct DrawArguments {
   std::vector<std::string> paths;
   std::vector<std::string> truths;
   std::string output;
+  std::string frame = "map";
   PictureOptions picture;
 };
 
@@ -44,12 +47,17 @@ ExitCode DrawMap(Program& program, const DrawArguments& arguments) {
   };
   const auto map = arguments.map_file.empty() ? program.Ask(ask) : LoadMapYaml(arguments.map_file);
   if (!map) return program.Refuse(map.error());
-  const auto paths = CollectPaths(program, arguments);
+  auto paths = CollectPaths(program, arguments);
   if (!paths) return program.Refuse(paths.error());
-  const auto png = DrawMapPicture(*map, *paths, arguments.picture);
+  const auto T_map_frame = FrameOf(program, arguments.frame, arguments.site);
+  if (!T_map_frame) return program.Refuse(T_map_frame.error());
+  for (PicturePath& path : *paths) MoveInto(path.trajectory, *T_map_frame);
+  const auto png =
+      DrawMapPicture(arguments.frame == "map" ? *map : InFrame(*map, *T_map_frame), *paths, arguments.picture);
   if (!png) return program.Refuse(png.error());
   if (const auto written = WritePictureFile(arguments.output, *png); !written) return program.Refuse(written.error());
-  return program.Print(fmt::format("{}: {} paths, {} KiB\n", arguments.output, paths->size(), png->size() / 1024),
+  return program.Print(fmt::format("{}: {} path{}, {} KiB\n", arguments.output, paths->size(),
+                                   paths->size() == 1 ? "" : "s", png->size() / 1024),
                        {{"file", arguments.output}, {"paths", paths->size()}, {"bytes", png->size()}});
 }
 
@@ -82,6 +90,7 @@ void AddMapDraw(CLI::App& map, Program& program) {
   command->add_option("--width", arguments->picture.width_px, "Pixels across")
       ->check(CLI::Range(200, 8000))
       ->capture_default_str();
+  AddFrame(*command, arguments->frame)->excludes(file);
   command->add_option("--title", arguments->picture.title, "Title above the map");
   program.OnChosen(*command, arguments, DrawMap);
 }

@@ -2,11 +2,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include "client/cli/commands.h"
 #include "client/cli/json_output.h"
 #include "client/cli/option_checks.h"
 #include "client/cli/text_output.h"
+#include "common/map/building_frame.h"
 
 namespace cairn::client {
 namespace {
@@ -16,6 +19,14 @@ struct DrawnEditArguments {
   MapEdit edit;
   std::vector<Eigen::Vector2d> area, line, box;  // One of them.
   double width_m = 0.1;                          // Of a line.
+};
+struct OriginArguments {
+  std::string site;
+  std::string note;
+  std::vector<Eigen::Vector2d> at = {Eigen::Vector2d::Zero()};
+  std::vector<Eigen::Vector2d> axis;  // A point on the x axis; empty: see below.
+  bool along_walls = false;
+  double turned_deg = 0.0;
 };
 struct KnownEditArguments {
   std::string site;
@@ -65,6 +76,30 @@ ExitCode AddEdit(Program& program, const DrawnEditArguments& arguments) {
   return program.Print(FormatEdit(*added), *added);
 }
 
+ExitCode SetOrigin(Program& program, const OriginArguments& arguments) {
+  double turned_rad = arguments.turned_deg * std::numbers::pi / 180.0;
+  if (arguments.along_walls) {
+    const auto direction = program.Ask([&](QueryClient& server) { return server.MapImage(arguments.site); })
+                               .and_then([](const OccupancyImage& map) { return WallDirection(map); });
+    if (!direction) return program.Refuse(direction.error());
+    turned_rad = *direction;
+  }
+  const Eigen::Vector2d& origin = arguments.at.front();
+  const Eigen::Vector2d ahead = origin + Eigen::Vector2d(std::cos(turned_rad), std::sin(turned_rad));
+  const MapEdit edit{.kind = MapEditKind::kOrigin,
+                     .points_map = {origin, arguments.axis.empty() ? ahead : arguments.axis.front()},
+                     .note = arguments.note};
+  const auto added = program.Ask([&](QueryClient& server) { return server.AddMapEdit(arguments.site, edit); });
+  if (!added) return program.Refuse(added.error());
+  const Pose2 T_map_building = BuildingFrameOf({*added}).value_or(Pose2{});
+  nlohmann::json json = *added;
+  json["T_map_building"] = T_map_building;
+  return program.Print(
+      fmt::format("{}: the building's origin is at {:.3f},{:.3f} of the map, turned by {:.3f} deg\n", added->id,
+                  T_map_building.x, T_map_building.y, T_map_building.theta * 180.0 / std::numbers::pi),
+      json);
+}
+
 ExitCode ListEdits(Program& program, const KnownEditArguments& arguments) {
   const auto edits = program.Ask([&](QueryClient& server) { return server.MapEdits(arguments.site); });
   if (!edits) return program.Refuse(edits.error());
@@ -96,6 +131,28 @@ void AddKind(CLI::App& edit, Program& program, MapEditKind kind, const std::stri
   program.OnChosen(*command, arguments, AddEdit);
 }
 
+void AddOrigin(CLI::App& edit, Program& program) {
+  auto* command = edit.add_subcommand("origin", "Where the building's frame begins, and how it is turned");
+  command->footer(
+      "Maps are exported and drawn, and poses and paths printed, in this frame with their option --frame building.\n"
+      "Robots, tiles and queries go on in the frame `map`, so nothing moves. The last origin counts.\n"
+      "EXAMPLES\n  cairn map edit origin --site hall --at 1.2,-3 --along-walls\n"
+      "  cairn map edit origin --site hall --at 1.2,-3 --x-axis 8.4,-2.9\n"
+      "  cairn map export --site hall -o hall.yaml --frame building");
+  auto arguments = std::make_shared<OriginArguments>();
+  command->add_option("--site", arguments->site, "The site's name")->required();
+  AddPoints(*command, "--at", arguments->at, 1, 1, "The origin, in metres of the map's frame (without it 0,0)");
+  auto* axis = AddPoints(*command, "--x-axis", arguments->axis, 1, 1, "A point on the x axis");
+  auto* walls = command->add_flag("--along-walls", arguments->along_walls,
+                                  "The x axis is along most walls of the map, as little turned as can be");
+  auto* turned =
+      AddNumber(*command, "--turned", arguments->turned_deg, -360.0, 360.0, "By how much it is turned", "DEG");
+  walls->excludes(axis);
+  turned->excludes(axis)->excludes(walls);
+  command->add_option("--note", arguments->note, "Why, for people; at most 256 bytes");
+  program.OnChosen(*command, arguments, SetOrigin);
+}
+
 }  // namespace
 
 void AddMapEdit(CLI::App& map, Program& program) {
@@ -111,12 +168,14 @@ void AddMapEdit(CLI::App& map, Program& program) {
       "EXAMPLES\n  cairn map edit erase --site hall --box 2,1 3,1.5 --note 'a pallet that is gone'\n"
       "  cairn map edit wall --site hall --line 0,4 6,4 --width 0.05 --note 'glass'\n"
       "  cairn map edit keep-out --site hall --area 8,0 10,0 10,3 9,4\n"
-      "  cairn map edit list --site hall\n  cairn map edit remove --site hall --id 2");
+      "  cairn map edit origin --site hall --along-walls\n  cairn map edit list --site hall\n  cairn map edit remove "
+      "--site hall --id 2");
   AddKind(*edit, program, MapEditKind::kFree, "erase", "Nothing stands here");
   AddKind(*edit, program, MapEditKind::kUnknown, "forget", "What is drawn here does not count: it is unknown");
   AddKind(*edit, program, MapEditKind::kOccupied, "wall", "Something stands here");
   AddKind(*edit, program, MapEditKind::kKeepOut, "keep-out",
           "Robots must not drive here; the map does not change (map export --keep-out)");
+  AddOrigin(*edit, program);
   auto listed = std::make_shared<KnownEditArguments>();
   auto* list = edit->add_subcommand("list", "All edits of a site's map");
   list->add_option("--site", listed->site, "The site's name")->required();

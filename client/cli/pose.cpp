@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "client/cli/commands.h"
+#include "client/cli/frame_option.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/json_output.h"
 #include "client/cli/option_checks.h"
@@ -20,11 +21,24 @@ struct PoseArguments {
   bool hypotheses = false;
   bool follow = false;
   int count = 0;  // 0: until interrupted.
+  std::string frame = "map";
 };
 
+// The covariance turns with the frame.
+void MoveInto(PoseReport& pose, const Pose2& T_map_frame) {
+  pose.T_map_robot = Between(T_map_frame, pose.T_map_robot);
+  pose.T_map_odom = Between(T_map_frame, pose.T_map_odom);
+  Eigen::Matrix3d R_frame_map = Eigen::Matrix3d::Identity();
+  R_frame_map.topLeftCorner<2, 2>() = T_map_frame.Inverse().rotation();
+  pose.covariance = R_frame_map * pose.covariance * R_frame_map.transpose();
+}
+
 ExitCode AskPose(Program& program, const PoseArguments& arguments) {
-  const auto pose = program.Ask([&](QueryClient& server) { return server.Pose(arguments.robot, arguments.at); });
+  auto pose = program.Ask([&](QueryClient& server) { return server.Pose(arguments.robot, arguments.at); });
   if (!pose) return program.Refuse(pose.error());
+  const auto T_map_frame = FrameOfRobot(program, arguments.frame, arguments.robot);
+  if (!T_map_frame) return program.Refuse(T_map_frame.error());
+  if (arguments.frame != "map") MoveInto(*pose, *T_map_frame);
   return program.Print(FormatPose(*pose) + "\n", *pose);
 }
 
@@ -75,7 +89,8 @@ Result<std::optional<Stamp>> ReadStamp(const std::string& text) {
 void AddPose(CLI::App& app, Program& program) {
   auto* command = app.add_subcommand("pose", "Where a robot is, or was");
   command->footer(
-      "The pose is the robot's in the site's map frame: metres, radians in (-pi, pi].\n"
+      "The pose is the robot's in the site's map frame, or with --frame in the building's: metres, radians in (-pi, "
+      "pi].\n"
       "A stamp after the last used scan fails with UNAVAILABLE (not known yet).\n"
       "A stamp before the first fails with OUT_OF_RANGE.\n"
       "EXAMPLES\n  cairn pose robot1\n  cairn pose robot1 --at 976052890.25 --json\n  cairn pose robot1 --follow");
@@ -85,12 +100,15 @@ void AddPose(CLI::App& app, Program& program) {
                        "SECONDS");
   auto* follow =
       command->add_flag("-f,--follow", arguments->follow, "Print every pose as it is published")->excludes(at);
-  command->add_flag("--hypotheses", arguments->hypotheses, "All places where it may be, with their share of the belief")
-      ->excludes(at)
-      ->excludes(follow);
+  auto* hypotheses = command
+                         ->add_flag("--hypotheses", arguments->hypotheses,
+                                    "All places where it may be, with their share of the belief")
+                         ->excludes(at)
+                         ->excludes(follow);
   command->add_option("-n,--count", arguments->count, "With --follow: end after this many poses")
       ->needs(follow)
       ->check(CLI::PositiveNumber);
+  AddFrame(*command, arguments->frame)->excludes(follow)->excludes(hypotheses);
   program.OnChosen(*command, arguments, ShowPose);
 }
 

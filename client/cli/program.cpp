@@ -50,15 +50,9 @@ ExitCode Program::Print(const std::string& text, const nlohmann::json& object) {
 }
 
 ExitCode Program::Refuse(const Status& status) {
-  // What fails for another reason names no request.
-  const std::string request = status.message == failure_ ? failed_request_ : std::string();
-  if (options.json) {
-    nlohmann::json error = status;
-    if (!request.empty()) error["request"] = request;
-    Print("", {{"error", error}});
-  }
+  if (options.json) Print("", {{"error", status}});
   err_ << "cairn: " << status.message << " (" << StatusCodeName(status.code)
-       << (request.empty() ? "" : ", request " + request) << ")\n";
+       << (status.request.empty() ? "" : ", request " + status.request) << ")\n";
   return ExitCode::kFailed;
 }
 
@@ -129,7 +123,10 @@ ExitCode RunCairn(const std::vector<std::string>& arguments, std::ostream& out, 
   try {
     app.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));  // CLI11 takes them from the back.
   } catch (const CLI::ParseError& error) {
-    const int code = app.exit(error, out, err);
+    // Where something is missing, a word that nobody knows is the likelier mistake: a mistyped command or option.
+    const std::vector<std::string> unknown = app.remaining_for_passthrough(true);
+    const bool mistyped = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr && !unknown.empty();
+    const int code = mistyped ? app.exit(CLI::ExtrasError(unknown), out, err) : app.exit(error, out, err);
     return code == 0 ? ExitCode::kOk : ExitCode::kUsage;
   }
   const VisitOptions visit = [&options = program.options](OptionVisitor& visitor) {

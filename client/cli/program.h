@@ -12,7 +12,6 @@
 #include <utility>
 #include <vector>
 
-#include "client/lib/last_request.h"
 #include "client/lib/query_client.h"
 #include "common/wire/bus.h"
 
@@ -56,19 +55,13 @@ class Program {
   [[nodiscard]] auto Ask(const Question& question) -> decltype(question(std::declval<QueryClient&>())) {
     const auto client = queries();
     if (!client) return tl::unexpected(client.error());
-    TakeLastRequest();
-    auto answer = question(**client);
-    if (!answer) {
-      failed_request_ = TakeLastRequest();
-      failure_ = answer.error().message;
-    }
-    return answer;
+    return question(**client);
   }
 
   // Text for people, or the object for machines.
   ExitCode Print(const std::string& text, const nlohmann::json& object);
-  // Says in one line on `err` why the command failed, and under --json also as an object with `error` on `out`. If a
-  // request has failed (Ask), it gives the request's id, which the server's log has too.
+  // Says in one line on `err` why the command failed, and under --json also as an object with `error` on `out`. Of a
+  // request that has failed, it gives the id.
   ExitCode Refuse(const Status& status);
 
  private:
@@ -79,7 +72,6 @@ class Program {
   std::function<ExitCode()> action_;
   std::unique_ptr<wire::Bus> bus_;
   std::unique_ptr<QueryClient> queries_;
-  std::string failed_request_, failure_;  // The last request that failed (empty: none was sent), and why.
 };
 
 // Parses and runs one command line, without the program's name.

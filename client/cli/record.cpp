@@ -17,6 +17,7 @@
 #include "client/cli/quantity_text.h"
 #include "client/cli/record_source.h"
 #include "client/cli/recorder.h"
+#include "client/cli/ros2_source.h"
 #include "client/lib/map_client.h"
 
 namespace cairn::client {
@@ -106,6 +107,11 @@ class Recording {
     }
     if (!source) return tl::unexpected(source.error());
     source_ = *std::move(source);
+    if (options.samples) {
+      auto ros2 = Ros2Source::Create(bus_, queue_, options.robots);
+      if (!ros2) return tl::unexpected(ros2.error());
+      ros2_ = *std::move(ros2);
+    }
     auto file = RecordingFile::Create(arguments_.file, arguments_.force);
     if (!file && file.error().code == StatusCode::kAlreadyExists)
       return Fail(file.error().code, arguments_.file + " exists; --force overwrites it");
@@ -125,6 +131,8 @@ class Recording {
 
   [[nodiscard]] Result<void> End() {
     source_.reset();
+    if (ros2_ != nullptr) ros2_problem_ = ros2_->problem();
+    ros2_.reset();
     if (auto taken = TakeAll(std::chrono::milliseconds(0)); !taken) return taken;
     if (auto written = WriteMaps(true); !written) return written;
     if (const std::string losses = Losses(); !losses.empty())
@@ -155,6 +163,8 @@ class Recording {
     add(account.missing, "samples did not arrive");
     add(account.nameless, "samples of robots or sensors that the server does not know");
     add(file_->counts().without_topic, "messages left out because there are too many topics");
+    const std::string ros2 = ros2_ != nullptr ? ros2_->problem() : ros2_problem_;
+    if (!ros2.empty()) text += (text.empty() ? "" : "; ") + std::string("scans of robots on ROS 2: ") + ros2;
     return text;
   }
   [[nodiscard]] nlohmann::json Json() const {
@@ -200,6 +210,8 @@ class Recording {
   std::optional<Recorder> recorder_;
   std::map<std::string, RecordedMap> maps_;
   std::unique_ptr<RecordSource> source_;
+  std::unique_ptr<Ros2Source> ros2_;
+  std::string ros2_problem_;  // Of the source when it ended.
 };
 
 ExitCode Record(Program& program, const RecordArguments& arguments) {
@@ -249,10 +261,9 @@ void AddRecord(CLI::App& app, Program& program) {
   command->footer(
       "Writes scans, odometry, the server's poses, the maps of the sites as they change, and a log of what happens. "
       "The\n"
-      "file opens in Foxglove, and replay, check-log and cairn-offline read it as a log. It only listens: the server "
-      "is\n"
-      "not asked for more, and a recorder that is killed leaves a file that can be read up to its last two seconds.\n"
-      "Robots that come later are recorded too. Robots on ROS 2 send no scans here: only their poses are recorded.\n"
+      "file opens in Foxglove, and replay, check-log and cairn-offline read it as a log. It only listens, and a\n"
+      "recorder that is killed leaves a file that can be read up to its last two seconds. Robots that come later are\n"
+      "recorded too, and so are robots on ROS 2, whose domain the recorder joins as a reader.\n"
       "EXAMPLES\n  cairn record monday.mcap\n  cairn record r1.mcap --robot r1 --seconds 60\n"
       "  cairn record hall.mcap --site hall --map-every 30 --max-mib 2000\n"
       "  cairn-offline monday.mcap --scan-topic /robots/r1/scan/laser --map map.yaml");

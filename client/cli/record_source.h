@@ -1,6 +1,6 @@
-// Receives everything of a domain that a recorder may write, into a queue. It only reads: no server or robot is asked
-// for anything, except that where nothing arrives although the server has new poses, it joins the domain anew
-// (SilenceWatch). Thread rule: every method from any thread.
+// Receives everything of the native domain that a recorder may write, into a queue (robots on ROS 2: ros2_source.h). It
+// only reads: no server or robot is asked for anything, except that where nothing arrives although the server has new
+// poses, it joins the domain anew (SilenceWatch). Thread rule: every method from any thread.
 #pragma once
 
 #include <map>

@@ -6,6 +6,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/json_output.h"
+#include "client/cli/lidar_names.h"
 #include "client/cli/option_checks.h"
 #include "client/cli/pacer.h"
 #include "client/cli/progress_line.h"
@@ -22,7 +23,8 @@ using Clock = std::chrono::steady_clock;
 
 struct ReplayArguments {
   std::string log;
-  LogReaderOptions reader;
+  std::string sensor;  // Empty: `laser`, or for several lidars the names of their topics.
+  LogReaderOptions reader = {.all_lidars = true};
   StreamOptions stream;
   double rate = 1.0;
   bool fast = false;
@@ -47,10 +49,10 @@ Result<LogSummary> StreamLog(Program& program, const ReplayArguments& arguments,
                      account.dropped_total(), account.waiting));
   };
   Result<void> sent;
-  auto summary = ReadRecording(arguments.log, arguments.reader, [&](LogRecord&& record) {
+  auto summary = ReadLidars(arguments.log, arguments.reader, [&](LogRecord&& record, std::size_t lidar) {
     pacer.WaitFor(std::visit([](const auto& value) { return value.stamp; }, record));
     if (Interrupted()) return false;
-    sent = stream.Send(std::move(record));
+    sent = stream.Send(std::move(record), lidar);
     show([&](double s, double share, const std::string& text) { progress.Show(s, share, text); });
     return sent.has_value();
   });
@@ -84,6 +86,14 @@ ExitCode Replay(Program& program, const ReplayArguments& arguments) {
   if (!survey) return program.Refuse(survey.error());
   if (survey->scans == 0) return program.Refuse({StatusCode::kInvalidArgument, arguments.log + " holds no scan"});
   StreamOptions options = arguments.stream;
+  if (survey->lidars.size() > 1) {
+    if (!arguments.sensor.empty())
+      return program.Refuse({StatusCode::kInvalidArgument, "--sensor names one lidar, and " + arguments.log + " has " +
+                                                               std::to_string(survey->lidars.size())});
+    options.sensors = LidarNames(survey->lidars);
+  } else if (!arguments.sensor.empty()) {
+    options.sensors = {arguments.sensor};
+  }
   if (arguments.fast && options.window == 0) options.window = kFastWindow;
   options.measure_latency = !arguments.fast;
   auto stream = RobotStream::Open(program, options);
@@ -151,7 +161,8 @@ void AddReplay(CLI::App& app, Program& program) {
   command->add_option("log", arguments->log, "The log file, or the bag")->required()->type_name("FILE");
   command->add_option("--site", arguments->stream.site, "The site to map into")->required();
   command->add_option("--robot", arguments->stream.robot, "The robot's name")->required();
-  command->add_option("--sensor", arguments->stream.sensor, "The scanner's name")->capture_default_str();
+  command->add_option("--sensor", arguments->sensor,
+                      "The scanner's name [laser]; several lidars of a bag have the names of their topics");
   auto* rate = AddNumber(*command, "--rate", arguments->rate, 1e-3, 1e6, "How many times faster than the log's stamps");
   command->add_flag("--fast", arguments->fast, "As fast as the server takes it, without losing a scan")->excludes(rate);
   AddWindowOption(*command, arguments->stream.window);

@@ -1,5 +1,10 @@
+#include <fmt/format.h>
+
 #include "client/cli/commands.h"
+#include "client/cli/job_wait.h"
+#include "client/cli/json_output.h"
 #include "client/cli/option_checks.h"
+#include "client/cli/text_output.h"
 #include "common/service/start_pose.h"
 
 namespace cairn::client {
@@ -8,12 +13,37 @@ namespace {
 struct RelocaliseArguments {
   std::string robot;
   std::optional<Pose2> T_map_robot;
+  bool no_wait = false;
 };
+
+// One line per place, the best one first.
+std::string FormatPlaces(const Job& job) {
+  std::string text;
+  for (const PoseHypothesis& one : job.places) {
+    const Pose2& pose = one.T_map_robot;
+    text += fmt::format("{:5.1f} %  x {:.3f} m, y {:.3f} m, theta {:.1f} deg\n", 100.0 * one.weight, pose.x, pose.y,
+                        pose.theta * 180.0 / kPi);
+  }
+  if (job.places.size() > 1)
+    text += fmt::format("the second best place has {:.0f} % of the score of the best\n", 100.0 * Ambiguity(job));
+  return text;
+}
+
+ExitCode FollowJob(Program& program, const RelocaliseArguments& arguments, const Job& submitted) {
+  const auto job = arguments.no_wait ? Result<Job>(submitted) : WaitForEnd(program, submitted);
+  if (!job) return program.Refuse(job.error());
+  nlohmann::json object = *job;
+  object["accepted"] = true;
+  const bool succeeded = job->state == JobState::kSucceeded;
+  program.Print(FormatJob(*job) + "\n" + (succeeded ? FormatPlaces(*job) : std::string()), object);
+  return arguments.no_wait || succeeded ? ExitCode::kOk : ExitCode::kFailed;
+}
 
 ExitCode Relocalise(Program& program, const RelocaliseArguments& arguments) {
   const auto taken =
       program.Ask([&](QueryClient& server) { return server.Relocalise(arguments.robot, arguments.T_map_robot); });
   if (!taken) return program.Refuse(taken.error());
+  if (*taken) return FollowJob(program, arguments, **taken);
   const std::string where = arguments.T_map_robot ? "near the pose given" : "anywhere in its map";
   return program.Print(arguments.robot + " has to be found again, " + where + "; cairn status says when it is\n",
                        {{"robot", arguments.robot}, {"accepted", true}});
@@ -43,16 +73,19 @@ void AddRobot(CLI::App& app, Program& program) {
   robot->require_subcommand(1);
   auto* relocalise = robot->add_subcommand("relocalise", "Have a robot found again that is not where its pose says");
   relocalise->footer(
-      "From now on the robot is not localized, and nothing is drawn of it, until what it sees agrees with its own "
-      "map.\n"
-      "With --here one scan can be enough; it is looked for near that pose (slam.recovery.near_m, near_rad). Otherwise "
-      "it\n"
-      "is looked for in all of its map, and has to drive until two searches agree.\n"
+      "From now on the robot is not localized, and nothing is drawn of it, until what it sees agrees with the map.\n"
+      "With --here one scan can be enough; it is looked for near that pose (slam.recovery.near_m, near_rad).\n"
+      "Otherwise it looks for itself in its own map, and has to drive until two searches agree; and a job looks for\n"
+      "it in the whole map of its site and ranks all places where it may be. If the best one has no rival, the\n"
+      "robot's next scans have to confirm it; otherwise nothing is changed, and --here decides.\n"
+      "A robot that is not joined with the map of its site is joined by --here, if what it has seen agrees with the\n"
+      "map there. The exit code says whether the job succeeded; interrupting only stops the waiting.\n"
       "EXAMPLES\n  cairn robot relocalise robot1 --here 12.5,-3,90deg\n  cairn robot relocalise robot1");
   auto arguments = std::make_shared<RelocaliseArguments>();
   relocalise->add_option("robot", arguments->robot, "The robot's name")->required();
   AddParsed(*relocalise, "--here", arguments->T_map_robot, ParseStart, "Where it is, in the map of its site",
             "X,Y,THETA");
+  relocalise->add_flag("--no-wait", arguments->no_wait, "Do not wait until the job has ended");
   program.OnChosen(*relocalise, arguments, Relocalise);
 
   auto* localise = robot->add_subcommand("localise", "Have a robot only localised, in the map of its site");

@@ -12,11 +12,12 @@ Result<std::unique_ptr<RobotStream>> RobotStream::Open(Program& program, const S
   SessionRequest request;
   request.robot = options.robot;
   request.site = options.site;
-  request.sensors = {options.sensor};
+  request.sensors = options.sensors;
   request.has_start = options.T_map_robot_start.has_value();
   request.T_map_robot_start = options.T_map_robot_start.value_or(Pose2{});
   RobotClientOptions client_options;
-  client_options.window = options.window;
+  // The client counts those of each lidar by itself.
+  client_options.window = options.window == 0 ? 0 : std::max<std::uint64_t>(1, options.window / options.sensors.size());
   client_options.spill_file = options.spill_file;
   client_options.send_timeout_s = program.options.timeout_s;
   RobotClient::Callbacks callbacks;
@@ -27,7 +28,7 @@ Result<std::unique_ptr<RobotStream>> RobotStream::Open(Program& program, const S
   stream->client_ = std::move(*client);
 
   // A query and not a subscription: before the first scan of a stream, no ledger of it is published.
-  const auto before = stream->AskLedger(program);
+  const auto before = stream->AskLedgers(program);
   if (!before) return tl::unexpected(before.error());
   const std::lock_guard lock(stream->mutex_);
   if (stream->restarted_ == 0) {
@@ -37,17 +38,19 @@ Result<std::unique_ptr<RobotStream>> RobotStream::Open(Program& program, const S
   return stream;
 }
 
-Result<Ledger> RobotStream::AskLedger(Program& program) const {
+Result<std::vector<Ledger>> RobotStream::AskLedgers(Program& program) const {
   const auto robots = program.Ask([&](QueryClient& server) { return server.Robots(options_.robot); });
   if (!robots) return tl::unexpected(robots.error());
-  Ledger ledger;
-  ledger.sensor = options_.sensor;
-  for (const RobotStatus& robot : *robots) {
-    for (const Ledger& stream : robot.ledgers) {
-      if (stream.sensor == options_.sensor) ledger = stream;
+  std::vector<Ledger> ledgers(options_.sensors.size());
+  for (std::size_t i = 0; i < ledgers.size(); ++i) {
+    ledgers[i].sensor = options_.sensors[i];
+    for (const RobotStatus& robot : *robots) {
+      for (const Ledger& stream : robot.ledgers) {
+        if (stream.sensor == options_.sensors[i]) ledgers[i] = stream;
+      }
     }
   }
-  return ledger;
+  return ledgers;
 }
 
 void RobotStream::OnPose(const PoseReport& pose) {
@@ -65,8 +68,13 @@ RobotStream::Departure& RobotStream::DepartureOf(Stamp stamp) {
 }
 
 ScanAccount RobotStream::AccountOfSession(std::uint64_t sent) const {
-  const std::optional<Ledger> ledger = client_->ledger(options_.sensor);
-  return AccountScans(sent, before_, ledger && ledger->session == session_ ? *ledger : before_);
+  ScanAccount account;
+  account.sent = sent;
+  for (std::size_t i = 0; i < options_.sensors.size(); ++i) {
+    const std::optional<Ledger> ledger = client_->ledger(options_.sensors[i]);
+    account.Add(AccountScans(0, before_[i], ledger && ledger->session == session_ ? *ledger : before_[i]));
+  }
+  return account;
 }
 
 // The samples that the old session settled stay counted. The others are sent again in the new session.
@@ -74,7 +82,7 @@ void RobotStream::OnRestart(SessionToken session) {
   const std::lock_guard lock(mutex_);
   closed_.Add(AccountOfSession(0));
   closed_.waiting = 0;
-  before_ = {};
+  before_.assign(options_.sensors.size(), {});
   session_ = session;
   ++restarted_;
 }
@@ -93,7 +101,7 @@ Result<void> RobotStream::CheckServer() {
   return Fail(StatusCode::kUnavailable, reason);
 }
 
-Result<void> RobotStream::Send(LogRecord&& record) {
+Result<void> RobotStream::Send(LogRecord&& record, std::size_t lidar) {
   if (auto there = CheckServer(); !there) return there;
   if (const auto* odometry = std::get_if<Odometry>(&record)) return client_->Publish(*odometry);
   const auto& scan = std::get<Scan>(record);
@@ -102,7 +110,7 @@ Result<void> RobotStream::Send(LogRecord&& record) {
     const std::lock_guard lock(mutex_);
     DepartureOf(scan.stamp) = {scan.stamp, Clock::now(), true};
   }
-  return client_->Publish(scan);
+  return client_->Publish(scan, options_.sensors[lidar]);
 }
 
 void RobotStream::Settle() {

@@ -11,6 +11,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "client/cli/percentiles.h"
 #include "client/cli/program.h"
@@ -23,7 +24,7 @@ namespace cairn::client {
 struct StreamOptions {
   std::string robot;
   std::string site;
-  std::string sensor = "laser";
+  std::vector<std::string> sensors = {"laser"};  // Its lidars; at least one.
   std::optional<Pose2> T_map_robot_start;
   // The largest number of scans sent and not yet settled: beyond it, sending waits for the server. 0: no limit; the
   // server drops scans that come too fast.
@@ -39,7 +40,8 @@ class RobotStream {
 
   // Waits for room in the window; fails if the server settles nothing within the program's timeout, says that it
   // stops, or has been away for that long.
-  [[nodiscard]] Result<void> Send(LogRecord&& record);
+  // `lidar`: of a scan, its place in `sensors`.
+  [[nodiscard]] Result<void> Send(LogRecord&& record, std::size_t lidar = 0);
   // Waits until everything sent is settled and then until it is stored, each at most for the program's timeout:
   // account() tells what is left.
   void Settle();
@@ -66,8 +68,9 @@ class RobotStream {
     bool waiting = false;
   };
 
-  RobotStream(const StreamOptions& options, double timeout_s) : options_(options), timeout_s_(timeout_s) {}
-  [[nodiscard]] Result<Ledger> AskLedger(Program& program) const;
+  RobotStream(const StreamOptions& options, double timeout_s)
+      : options_(options), timeout_s_(timeout_s), before_(options.sensors.size()) {}
+  [[nodiscard]] Result<std::vector<Ledger>> AskLedgers(Program& program) const;  // By sensor.
   void OnPose(const PoseReport& pose);
   void OnRestart(SessionToken session);
   [[nodiscard]] Departure& DepartureOf(Stamp stamp);
@@ -81,7 +84,8 @@ class RobotStream {
 
   mutable std::mutex mutex_;
   SessionToken session_ = 0;
-  Ledger before_;       // The ledger before the session's first scan; not zero if a session is resumed.
+  // The ledgers before the session's first scan, by sensor; not zero if a session is resumed.
+  std::vector<Ledger> before_;
   ScanAccount closed_;  // The counts of sessions that a restarted server did not know.
   int restarted_ = 0;
   std::array<Departure, kRemembered> departures_{};

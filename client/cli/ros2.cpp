@@ -13,7 +13,8 @@ ExitCode Diagnose(Program& program, const std::string& name) {
   if (!answer) return program.Refuse(answer.error());
   if (!answer->door.enabled) {
     return program.Refuse({StatusCode::kFailedPrecondition,
-                           "the server does not serve ROS 2 robots: start it with --set ros2.enabled=true"});
+                           "the server does not serve ROS 2 robots: start it with --set ros2.enabled=true, or write "
+                           "enabled: true below ros2: in its configuration (of the package: /etc/cairn/cairnd.yaml)"});
   }
   Ros2Report report = *answer;
   if (!name.empty()) {

@@ -61,7 +61,7 @@ Result<std::vector<Outlet>> OpenOutlets(Program& program, const SimRunOptions& o
       outlet.writer = std::make_unique<CarmenWriter>(outlet.log);
     }
     if (!options.stream) continue;
-    StreamOptions stream{outlet.robot, options.site, "laser", std::nullopt, options.window, !options.fast};
+    StreamOptions stream{outlet.robot, options.site, {"laser"}, std::nullopt, options.window, !options.fast};
     if (options.starts_known) stream.T_map_robot_start = fleet.T_map_robot_start(i);
     if (options.fast && options.window == 0) stream.window = kFastWindow;
     auto opened = RobotStream::Open(program, stream);

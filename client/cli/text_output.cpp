@@ -32,14 +32,16 @@ std::string FormatPose(const PoseReport& pose) {
 }
 
 std::string FormatJob(const Job& job) {
-  std::string line = fmt::format("job {}: {} of {}, {}, {:.0f} %", job.id, JobKindName(job.kind), job.site,
+  const std::string what = job.robot.empty() ? job.site : job.robot + " in " + job.site;
+  std::string line = fmt::format("job {}: {} of {}, {}, {:.0f} %", job.id, JobKindName(job.kind), what,
                                  JobStateName(job.state), 100 * job.progress);
   if (job.ended > job.started && job.started > 0)
     line += ", took " + FormatDuration(SecondsFromStamp(job.ended - job.started));
   if (job.state == JobState::kSucceeded) {
     // A job that had nothing to join has made no map to compare.
-    if (job.map_version > 0)
-      line += fmt::format(", cost {:.4g} -> {:.4g}, map version {}", job.cost_before, job.cost_after, job.map_version);
+    if (job.map_version > 0 && job.kind != JobKind::kRelocalise)
+      line += fmt::format(", cost {:.4g} -> {:.4g}", job.cost_before, job.cost_after);
+    if (job.map_version > 0) line += fmt::format(", map version {}", job.map_version);
   }
   if (!job.message.empty()) line += ": " + job.message;
   return line;
@@ -56,6 +58,12 @@ std::string FormatRobot(const RobotStatus& robot) {
     const Pose2& p = robot.pose.T_map_robot;
     text += fmt::format("  pose {:.3f} {:.3f} {:.4f} at {}, {}, score {:.2f}\n", p.x, p.y, p.theta,
                         FormatStamp(robot.pose.stamp), PoseReasonName(robot.pose.reason), robot.pose.score);
+  }
+  // What is not sure enough to be used is only in the JSON.
+  for (const LearnedValue& learned : robot.learned) {
+    if (!learned.applied) continue;
+    text += fmt::format("  learned {} {:.4f} +- {:.4f}{}\n", learned.name, learned.value, learned.sigma,
+                        learned.unit == "1" ? "" : ' ' + learned.unit);
   }
   for (const Ledger& ledger : robot.ledgers) {
     text += fmt::format(
@@ -122,6 +130,7 @@ std::string FormatMap(const MapInfo& map) {
                                  map.tile_count, map.levels, map.resolution_m, map.epoch, map.version, map.robots);
   if (map.memory_bytes > 0) text += fmt::format(", {:.1f} MiB of memory", static_cast<double>(map.memory_bytes) / kMib);
   text += "\n";
+  if (!map.memory_note.empty()) text += "  memory: " + map.memory_note + "\n";
   if (map.tile_count > 0) {
     text +=
         fmt::format("  x {:.2f}..{:.2f} m, y {:.2f}..{:.2f} m\n", map.x_min_m, map.x_max_m, map.y_min_m, map.y_max_m);

@@ -7,6 +7,7 @@
 
 #include "client/lib/client_id.h"
 #include "client/lib/last_request.h"
+#include "common/service/request_id.h"
 
 namespace cairn::client {
 namespace {
@@ -179,12 +180,19 @@ Result<Reply> QueryClient::Exchange(Request request, Deadline begun, Deadline de
     while (published && !pending->second.complete() && Clock::now() < until()) changed_.WaitUntil(mutex_, until());
     if (published && pending->second.parts() == 0 && Clock::now() < begun) continue;
     auto node = pending_.extract(pending);
-    if (node.mapped().complete()) return node.mapped().Take();
+    const std::string id = RequestId(request.client, request.sequence);
+    if (node.mapped().complete()) {
+      Reply reply = node.mapped().Take();
+      if (!reply.status.ok()) reply.status.request = id;
+      return reply;
+    }
     if (!published) return tl::unexpected(published.error());
     server_found_ = false;
-    return Fail(StatusCode::kDeadlineExceeded,
-                fmt::format("no {}answer to {} within {:.1f} s", node.mapped().parts() > 0 ? "complete " : "",
-                            RequestKindName(request.kind), options_.timeout_s));
+    return tl::unexpected(
+        Status{StatusCode::kDeadlineExceeded,
+               fmt::format("no {}answer to {} within {:.1f} s", node.mapped().parts() > 0 ? "complete " : "",
+                           RequestKindName(request.kind), options_.timeout_s),
+               id});
   }
 }
 

@@ -77,12 +77,15 @@ class QueryClient {
   // The server's version.
   [[nodiscard]] Result<std::string> Ping();
 
-  // The newest pose, or the pose at a stamp of the robot's clock, interpolated. kUnavailable: the server has not used a
+  // The newest pose, or the pose at a stamp of the robot's clock, interpolated. Past poses lie where they are in the
+  // present map, which may have been corrected since. kUnavailable: the server has not used a
   // scan that late yet; kOutOfRange: the stamp is before the robot's first scan.
   [[nodiscard]] Result<PoseReport> Pose(const std::string& robot, std::optional<Stamp> at = {});
-  // The places where the robot may be, the most believed one first; none while it is not localized.
+  // The places where the robot may be, the most believed one first. While it is not localized: where a job, or its own
+  // searches, have found that it may be, at the stamps of these places; none where that is not known.
   [[nodiscard]] Result<std::vector<PoseHypothesis>> Hypotheses(const std::string& robot);
-  // All poses so far, or those of the smoothing job whose map is enabled (kFailedPrecondition if there is none).
+  // All poses so far, where they lie in the present map, or those of the smoothing job whose map is enabled
+  // (kFailedPrecondition if there is none).
   [[nodiscard]] Result<PathAnswer> Path(const std::string& robot, bool smoothed = false);
   // Session, newest pose and ledgers of all robots, or of one (kNotFound if the server does not know it), and the state
   // of the server itself.
@@ -92,10 +95,13 @@ class QueryClient {
   [[nodiscard]] Result<Ros2Report> Ros2();
   // Ends the robot's session for good.
   [[nodiscard]] Result<void> EndSession(const std::string& robot);
-  // The robot is not where the server believes. It is not localized until it has been found in its map: near
-  // `T_map_robot` where that is given, else anywhere. kFailedPrecondition: a pose is given, and the robot is not joined
-  // with the map of its site.
-  [[nodiscard]] Result<void> Relocalise(const std::string& robot, const std::optional<Pose2>& T_map_robot = {});
+  // The robot is not where the server believes. It is not localized until it has been found: near `T_map_robot` where
+  // that is given, else anywhere. A robot that is not joined with the map of its site is joined there by a job, if what
+  // it has seen agrees with the map. kFailedPrecondition: its session has ended, or it is not joined and no scan of it
+  // was used.
+  // The job that looks for it in the whole map of its site, or that joins it with the map there, if there is one.
+  [[nodiscard]] Result<std::optional<Job>> Relocalise(const std::string& robot,
+                                                      const std::optional<Pose2>& T_map_robot = {});
   // From now on the robot is only localised, in the map of its site, and nothing is drawn of it. kNotFound: the site
   // has no map yet.
   [[nodiscard]] Result<void> Localise(const std::string& robot);

@@ -90,10 +90,12 @@ Result<void> QueryClient::EndSession(const std::string& robot) {
   return Ask(AboutRobot(RequestKind::kSessionEnd, robot)).map([](Reply&&) {});
 }
 
-Result<void> QueryClient::Relocalise(const std::string& robot, const std::optional<Pose2>& T_map_robot) {
+Result<std::optional<Job>> QueryClient::Relocalise(const std::string& robot, const std::optional<Pose2>& T_map_robot) {
   Request request = AboutRobot(RequestKind::kRelocalise, robot);
   request.T_map_robot = T_map_robot;
-  return Ask(request).map([](Reply&&) {});
+  return Ask(request).map([](Reply&& reply) {
+    return reply.jobs.empty() ? std::optional<Job>() : std::optional<Job>(std::move(reply.jobs.front()));
+  });
 }
 
 Result<void> QueryClient::Localise(const std::string& robot) {

@@ -5,10 +5,13 @@
 namespace cairn::client {
 namespace {
 
-std::string TopicText(const Ros2Topic& topic) {
-  return fmt::format("{} ({}): {} publisher{}, {}{}, {:.1f} Hz, {} received{}", topic.name, topic.type,
-                     topic.publishers, topic.publishers == 1 ? "" : "s", topic.reliable ? "reliable" : "best effort",
-                     topic.transient_local ? ", transient local" : "", topic.rate_hz, topic.received,
+// Nobody subscribes to the topics of a namespace that is no robot, so their rate is not known.
+std::string TopicText(const Ros2Topic& topic, bool is_robot) {
+  const std::string arrived =
+      is_robot ? fmt::format("{:.1f} Hz, {} received", topic.rate_hz, topic.received) : "not listened to";
+  return fmt::format("{} ({}): {} publisher{}, {}{}, {}{}", topic.name, topic.type, topic.publishers,
+                     topic.publishers == 1 ? "" : "s", topic.reliable ? "reliable" : "best effort",
+                     topic.transient_local ? ", transient local" : "", arrived,
                      topic.refused > 0 ? fmt::format(", {} refused", topic.refused) : "");
 }
 
@@ -18,7 +21,7 @@ Ros2Findings::Namespace FindingsOf(const Ros2Namespace& one) {
   findings.who = one.robot.empty() ? "no robot" : fmt::format("robot {} in site {}", one.robot, one.site);
   findings.on_map = one.on_map;
   findings.problems = one.problems;
-  for (const Ros2Topic& topic : one.topics) findings.topics.push_back(TopicText(topic));
+  for (const Ros2Topic& topic : one.topics) findings.topics.push_back(TopicText(topic, !one.robot.empty()));
   return findings;
 }
 
@@ -44,8 +47,8 @@ Ros2Findings FindingsOf(const Ros2Report& report) {
   for (const Ros2Namespace& one : report.namespaces) findings.namespaces.push_back(FindingsOf(one));
   if (report.namespaces.empty()) {
     findings.advice =
-        "no namespace publishes laser scans or odometry: is ROS_DOMAIN_ID the same, and is ros2.interfaces the address "
-        "of this server in the robots' network?";
+        "no namespace publishes laser scans or odometry: is ROS_DOMAIN_ID the same, is ros2.interfaces the address of "
+        "this server in the robots' network, and is ROS_LOCALHOST_ONLY off?";
   }
   return findings;
 }

@@ -108,11 +108,26 @@ std::vector<DriveLeg> Fleet::DriveDuringScan(const Member& member) const {
   return legs;
 }
 
+void Fleet::AddDoors(const Member& member, double seconds, std::vector<Post>& posts) const {
+  constexpr double kOpensM = 0.8;  // From the centre of a robot.
+  std::vector<Disc> leaves;
+  for (const Door& door : surroundings_.doors) {
+    if (!IsClosed(door, seconds)) continue;
+    if (DistanceFrom(door, member.robot.PoseAt(seconds).translation()) > options_.laser.range_max_m + kOpensM) continue;
+    const bool opens = std::any_of(robots_.begin(), robots_.end(), [&](const Member& one) {
+      return DistanceFrom(door, one.robot.PoseAt(seconds).translation()) < kOpensM;
+    });
+    if (!opens) AppendLeaf(door, &leaves);
+  }
+  for (const Disc& disc : leaves) posts.push_back({disc});
+}
+
 Scan Fleet::TakeScan(std::size_t index, Stamp since_start) {
   Member& member = robots_[index];
   const double seconds = SecondsFromStamp(since_start);
   std::vector<Post> posts = surroundings_.posts;
   for (const Walker& walker : surroundings_.walkers) posts.push_back({WalkerAt(walker, seconds), kWalkerHeight_m});
+  AddDoors(member, seconds, posts);
   if (options_.see_each_other) {
     for (std::size_t i = 0; i < robots_.size(); ++i) {
       if (i == index) continue;

@@ -87,6 +87,8 @@ class Fleet {
   [[nodiscard]] Stamp NextOdometry(const Member& member) const;
   // What a robot that begins a scan now will drive until the last beam.
   [[nodiscard]] std::vector<DriveLeg> DriveDuringScan(const Member& member) const;
+  // Those that a robot can see closed.
+  void AddDoors(const Member& member, double seconds, std::vector<Post>& posts) const;
   [[nodiscard]] Scan TakeScan(std::size_t index, Stamp since_start);
 
   Surroundings surroundings_;

@@ -48,6 +48,7 @@ Surroundings SurroundingsOf(World world) {
   surroundings.scene = std::make_shared<FlatScene>(RayCaster(std::move(world.segments)));
   for (const Disc& disc : world.discs) surroundings.posts.push_back({disc});
   surroundings.walkers = std::move(world.walkers);
+  surroundings.doors = std::move(world.doors);
   surroundings.routes = std::move(world.routes);
   return surroundings;
 }

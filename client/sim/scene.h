@@ -58,13 +58,14 @@ struct Post {
 [[nodiscard]] double CastAtPosts(std::span<const Post> posts, const Eigen::Vector3d& origin_map,
                                  const Eigen::Vector3d& direction);
 
-// The place in which a fleet drives, flat or in space: obstacles that stand still, people who walk, and routes. A
-// value: copies share what is immutable.
+// The place in which a fleet drives, flat or in space: obstacles that stand still, people who walk, doors, and routes.
+// A value: copies share what is immutable.
 struct Surroundings {
   std::string name;
   std::shared_ptr<const Scene> scene;
   std::vector<Post> posts;      // Round things that stand still.
   std::vector<Walker> walkers;  // People, all of the height kWalkerHeight_m.
+  std::vector<Door> doors;      // As high as anything. One that a robot is about to touch opens.
   std::vector<Route> routes;
 };
 inline constexpr double kWalkerHeight_m = 1.75;

@@ -9,6 +9,23 @@ Disc WalkerAt(const Walker& walker, double seconds) {
   return {PlaceOnPath(walker.path_map, walker.speed_m_s * seconds).p_map, walker.radius_m};
 }
 
+bool IsClosed(const Door& door, double seconds) {
+  return std::fmod(door.begin_s + seconds, door.closed_s + door.open_s) < door.closed_s;
+}
+
+double DistanceFrom(const Door& door, const Eigen::Vector2d& p_map) {
+  const Eigen::Vector2d along = door.b_map - door.a_map;
+  const double share = std::clamp((p_map - door.a_map).dot(along) / along.squaredNorm(), 0.0, 1.0);
+  return (door.a_map + share * along - p_map).norm();
+}
+
+void AppendLeaf(const Door& door, std::vector<Disc>* discs) {
+  constexpr double kRadiusM = 0.04, kApartM = 0.05;
+  const int parts = std::max(1, static_cast<int>(std::ceil((door.b_map - door.a_map).norm() / kApartM)));
+  for (int i = 0; i <= parts; ++i)
+    discs->push_back({door.a_map + static_cast<double>(i) / parts * (door.b_map - door.a_map), kRadiusM});
+}
+
 double ClosedLength(const std::vector<Eigen::Vector2d>& points) {
   double length = 0.0;
   for (std::size_t i = 0; i < points.size(); ++i) length += (points[(i + 1) % points.size()] - points[i]).norm();

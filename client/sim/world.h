@@ -26,6 +26,16 @@ struct Walker {
   std::vector<Eigen::Vector2d> path_map;  // At least 2 points; from the last back to the first.
 };
 
+// A sliding door: closed for a while, then open for a while, and so on. A closed one is a leaf between two points; an
+// open one is not there.
+struct Door {
+  Eigen::Vector2d a_map;
+  Eigen::Vector2d b_map;
+  double closed_s = 0.0;
+  double open_s = 0.0;
+  double begin_s = 0.0;  // How long before the beginning it was closed.
+};
+
 // Waypoints a robot drives in a circle: at least 2, from the last back to the first.
 struct Route {
   std::string name;
@@ -37,11 +47,19 @@ struct World {
   std::vector<Segment> segments;
   std::vector<Disc> discs;
   std::vector<Walker> walkers;
+  std::vector<Door> doors;
   std::vector<Route> routes;
 };
 
 // Where a walker stands after `seconds` (>= 0). It starts at the first point of its path.
 [[nodiscard]] Disc WalkerAt(const Walker& walker, double seconds);
+
+// Whether the door is closed after `seconds` (>= 0).
+[[nodiscard]] bool IsClosed(const Door& door, double seconds);
+// From the leaf of a closed door.
+[[nodiscard]] double DistanceFrom(const Door& door, const Eigen::Vector2d& p_map);
+// Adds the leaf: discs that overlap, 8 cm thick.
+void AppendLeaf(const Door& door, std::vector<Disc>* discs);
 
 // A closed polyline measured by the distance along it. Walkers walk on one, and the starts of robots are spread over
 // one.

@@ -204,6 +204,16 @@ void TakeFlatBox(Keys& keys, std::vector<Segment>* segments) {
               true, segments);
 }
 
+Door TakeDoor(Keys& keys) {
+  constexpr double kWidest_m = 10.0;
+  Door door{keys.Point2("from"), keys.Point2("to"), keys.Positive("closed"), keys.Positive("open"),
+            keys.Number("begin", 0.0)};
+  if (door.a_map == door.b_map || (door.b_map - door.a_map).norm() > kWidest_m)
+    Complain(keys.node(), "a door must be wider than 0, and at most 10 m");
+  if (door.begin_s < 0.0) Complain(keys.node(), "begin must not be below 0");
+  return door;
+}
+
 World TakeWorld(Keys& keys) {
   World world;
   std::vector<Segment>& segments = world.segments;
@@ -219,6 +229,7 @@ World TakeWorld(Keys& keys) {
   keys.ForEachMap("walkers", "walker", [&](Keys& k) {
     world.walkers.push_back({k.Positive("radius"), k.Positive("speed"), k.Points(2)});
   });
+  keys.ForEachMap("doors", "door", [&](Keys& k) { world.doors.push_back(TakeDoor(k)); });
   return world;
 }
 

@@ -62,14 +62,10 @@ Json RobotJson(const RobotStatus& robot) {
   const SessionState& session = robot.session;
   // The server says in a status that is OK that a robot is only localised; `mode` says the same.
   const bool said_by_mode = session.localise_only && session.status.ok();
-  Json json = {{"name", session.robot},
-               {"phase", SessionPhaseName(session.phase)},
-               {"stale", session.stale},
-               {"note", said_by_mode ? std::string() : session.status.message},
-               {"alive", robot.alive},
-               {"fragment", session.fragment},
-               {"sensors", ledgers},
-               {"mode", session.localise_only ? "localise" : "map"}};
+  Json json = {{"name", session.robot},  {"phase", SessionPhaseName(session.phase)},
+               {"stale", session.stale}, {"note", said_by_mode ? std::string() : session.status.message},
+               {"alive", robot.alive},   {"fragment", session.fragment},
+               {"sensors", ledgers},     {"mode", session.localise_only ? "localise" : "map"}};
   json["pose"] = robot.pose.reason == PoseReason::kWaiting ? Json() : PoseJson(robot.pose);
   return json;
 }
@@ -178,7 +174,7 @@ Result<MapEdit> EditFromJson(const nlohmann::json& json) {
   const std::string kind = text("kind");
   int number = 0;
   while (number < kMapEditKindCount && kind != MapEditKindName(static_cast<MapEditKind>(number))) ++number;
-  if (number == kMapEditKindCount) return invalid("`kind` must be free, unknown, occupied or keep_out");
+  if (number == kMapEditKindCount) return invalid("`kind` must be free, unknown, occupied, keep_out or origin");
   edit.kind = static_cast<MapEditKind>(number);
   const auto points = json.find("points");
   if (points == json.end() || !points->is_array() || points->size() > kMostEditPoints)

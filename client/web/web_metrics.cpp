@@ -107,13 +107,16 @@ std::string MapMetrics(const std::vector<MapInfo>& maps) {
   Metric version("cairn_map_enabled_version", "gauge", "The map version that is enabled.");
   Metric memory("cairn_site_memory_bytes", "gauge",
                 "What the site's map and its versions take in the server's memory.");
+  Metric above("cairn_site_memory_above_limit", "gauge",
+               "1: the site's map takes more memory than it may, although all that is not needed was given up.");
   for (const MapInfo& map : maps) {
     const std::string labels = "site=" + Quoted(map.site);
     tiles.Add(labels, map.tile_count);
     version.Add(labels, map.enabled_version);
     memory.Add(labels, map.memory_bytes);
+    above.Add(labels, map.memory_note.starts_with(kAboveMemoryLimit) ? 1 : 0);
   }
-  return tiles.text() + version.text() + memory.text();
+  return tiles.text() + version.text() + memory.text() + above.text();
 }
 
 // Of each site every state is written, also where no job has it, and the time of the last failure. The time, and not a

@@ -6,6 +6,7 @@
 
 #include "common/bag/mcap_file.h"
 #include "common/bag/mcap_records.h"
+#include "common/bag/packed_file.h"
 #include "common/bag/sqlite_file.h"
 
 namespace cairn::bag {
@@ -30,8 +31,7 @@ Result<std::unique_ptr<File>> OpenFile(const std::filesystem::path& path) {
     case FileKind::kSqlite:
       return OpenSqlite(path);
     case FileKind::kZstd:
-      return Fail(StatusCode::kUnimplemented,
-                  path.string() + ": the file as a whole is compressed; unpack it first: unzstd " + path.string());
+      return OpenPacked(path);
     case FileKind::kNone:
       break;
   }

@@ -1,6 +1,6 @@
 // One file of a bag: messages on topics, as ROS 2 records them. Implementations: MCAP (mcap_file.h), SQLite
-// (sqlite_file.h). A file may hold anything: damage ends in an error that says where, and neither memory nor time grow
-// beyond a multiple of the file's length. Not thread-safe.
+// (sqlite_file.h), and either of them packed as a whole (packed_file.h). A file may hold anything: damage ends in an
+// error that says where, and neither memory nor time grow beyond a multiple of the file's length. Not thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -37,6 +37,8 @@ class File {
   // The messages of those topics (numbers in topics()), in the order of the time when they were recorded; what was
   // recorded at the same time, in the order of the file.
   [[nodiscard]] virtual Result<void> Read(const std::vector<std::size_t>& wanted, const Sink& sink) const = 0;
+  // Lets go what the next Read can make again, such as an unpacked copy.
+  virtual void LetGo() const {}
 };
 
 // What the first bytes of a regular file say.

@@ -8,8 +8,8 @@
 
 namespace cairn::bag {
 
-// The names in metadata.yaml are looked for in the folder itself, wherever they point to. A file that was compressed as
-// a whole counts if its unpacked twin lies beside it.
+// The names in metadata.yaml are looked for in the folder itself, wherever they point to. Of a file that was compressed
+// as a whole, its unpacked twin counts where that lies beside it.
 [[nodiscard]] Result<std::vector<std::filesystem::path>> FilesOf(const std::filesystem::path& bag);
 
 }  // namespace cairn::bag

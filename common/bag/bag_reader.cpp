@@ -10,6 +10,7 @@
 #include "common/bag/bag_folder.h"
 #include "common/bag/bag_messages.h"
 #include "common/bag/bag_survey.h"
+#include "common/bag/scan_order.h"
 
 namespace cairn::bag {
 namespace {
@@ -19,44 +20,54 @@ constexpr int kMostComplaints = 100;
 // Turns messages into records.
 class BagEmitter {
  public:
-  BagEmitter(const BagSurvey& survey, const LogReaderOptions& options, const std::function<bool(LogRecord&&)>& sink)
-      : survey_(survey), options_(options), sink_(sink) {
+  BagEmitter(const BagSurvey& survey, const LogReaderOptions& options, const RecordingSink& sink)
+      : survey_(survey),
+        options_(options),
+        sink_(sink),
+        lidars_(survey.topics().lidars.size()),
+        order_(lidars_.size(), [this](Scan&& scan, std::size_t lidar) {
+          ++summary_.scans;
+          return sink_(std::move(scan), lidar);
+        }) {
     summary_.notes = survey.notes();
+    summary_.lidars = survey.LidarNames();
     summary_.entry = "message";
   }
 
   // False if the sink wants no more, as below.
-  bool TakeScan(std::string_view bytes) {
+  bool TakeScan(std::size_t number, std::string_view bytes) {
     ++messages_;
-    const Topic& topic = survey_.topics().scans;
+    const Topic& topic = survey_.topics().lidars[number].scans;
+    Lidar& lidar = lidars_[number];
     auto message = DecodeScan(topic, bytes);
     if (!message) return Complain(topic.name, message.error());
     Scan scan;
-    if (scan_details_ && scan_details_->stamp == message->scan.header.stamp) {
+    if (lidar.details && lidar.details->stamp == message->scan.header.stamp) {
       if (options_.no_return_m > 0.0) SetNoReturn(message->scan);
-      scan = *std::exchange(scan_details_, std::nullopt);
+      scan = *std::exchange(lidar.details, std::nullopt);
       scan.sequence = 0;
       scan.ranges_m = std::move(message->scan.ranges);
       if (options_.no_return_m > 0.0) scan.range_max_m = options_.no_return_m;
       if (options_.T_robot_laser) scan.T_robot_laser = *options_.T_robot_laser;
     } else {
-      const auto& mounting = MountingOf(*message);
+      const auto& mounting = MountingOf(lidar, *message);
       if (!mounting) return Complain(topic.name, mounting.error());
       if (options_.no_return_m > 0.0) SetNoReturn(message->scan);
       scan = ros2::ScanOf(std::move(message->scan), *mounting);
     }
     if (options_.timing.scan_period_s == 0.0) scan.beam_period_s = 0.0;
     if (const auto timed = PutInOrderOfTime(options_.timing, scan); !timed) return Complain(topic.name, timed.error());
-    ++summary_.scans;
-    return sink_(std::move(scan));
+    return order_.Add(std::move(scan), number);
   }
+  // The scans that wait for those of other lidars.
+  bool Finish() { return order_.Finish(); }
 
   // What the next scan has no fields for, and the same for odometry.
-  bool TakeScanDetails(std::string_view bytes) {
+  bool TakeScanDetails(std::size_t lidar, std::string_view bytes) {
     ++messages_;
     auto details = DecodeScanDetails(bytes);
-    if (!details) return Complain(survey_.topics().scan_details->name, details.error());
-    scan_details_ = *std::move(details);
+    if (!details) return Complain(survey_.topics().lidars[lidar].details->name, details.error());
+    lidars_[lidar].details = *std::move(details);
     return true;
   }
   bool TakeOdometryDetails(std::string_view bytes) {
@@ -75,7 +86,7 @@ class BagEmitter {
       return EmitOdometry(message->header.stamp, message->pose);
     const Odometry exact = *std::exchange(odometry_details_, std::nullopt);
     ++summary_.odometries;
-    return sink_(Odometry{0, exact.stamp, exact.T_odom_robot});
+    return sink_(Odometry{0, exact.stamp, exact.T_odom_robot}, 0);
   }
 
   bool TakeTransforms(const Topic& topic, std::string_view bytes) {
@@ -92,25 +103,32 @@ class BagEmitter {
   [[nodiscard]] LogSummary summary() && { return std::move(summary_); }
 
  private:
+  struct Lidar {
+    std::string frame;         // Of the scan before.
+    ros2::Pose3 T_frame_scan;  // The same.
+    std::optional<Result<ros2::Mounting>> mounting;
+    std::optional<Scan> details;
+  };
+
   bool EmitOdometry(Stamp stamp, const ros2::Pose3& pose) {
     const auto motion = ros2::MotionOf(pose);
     if (!motion) return Complain("odometry", motion.error());
     if (last_stamp_ == stamp) return true;
     last_stamp_ = stamp;
     ++summary_.odometries;
-    return sink_(Odometry{0, stamp, ros2::PlanarPart(*motion)});
+    return sink_(Odometry{0, stamp, ros2::PlanarPart(*motion)}, 0);
   }
 
-  const Result<ros2::Mounting>& MountingOf(const ScanMessage& message) {
+  const Result<ros2::Mounting>& MountingOf(Lidar& lidar, const ScanMessage& message) {
     const ros2::Pose3& T = message.T_frame_scan;
     const bool moved =
-        T.translation != T_frame_scan_.translation || T.rotation.coeffs() != T_frame_scan_.rotation.coeffs();
-    if (!mounting_ || message.scan.header.frame != frame_ || moved) {
-      frame_ = message.scan.header.frame;
-      T_frame_scan_ = T;
-      mounting_ = survey_.MountingOf(frame_, T, options_.T_robot_laser);
+        T.translation != lidar.T_frame_scan.translation || T.rotation.coeffs() != lidar.T_frame_scan.rotation.coeffs();
+    if (!lidar.mounting || message.scan.header.frame != lidar.frame || moved) {
+      lidar.frame = message.scan.header.frame;
+      lidar.T_frame_scan = T;
+      lidar.mounting = survey_.MountingOf(lidar.frame, T, options_.T_robot_laser);
     }
-    return *mounting_;
+    return *lidar.mounting;
   }
 
   // What is at or beyond the limit has hit nothing, whatever the message's own limit is.
@@ -128,13 +146,11 @@ class BagEmitter {
 
   const BagSurvey& survey_;
   const LogReaderOptions& options_;
-  const std::function<bool(LogRecord&&)>& sink_;
+  const RecordingSink& sink_;
   LogSummary summary_;
   int messages_ = 0;
-  std::string frame_;         // Of the scan before.
-  ros2::Pose3 T_frame_scan_;  // The same.
-  std::optional<Result<ros2::Mounting>> mounting_;
-  std::optional<Scan> scan_details_;
+  std::vector<Lidar> lidars_;
+  ScanOrder order_;
   std::optional<Odometry> odometry_details_;
   std::optional<Stamp> last_stamp_;
 };
@@ -142,13 +158,14 @@ class BagEmitter {
 }  // namespace
 
 Result<LogSummary> ReadBag(const std::filesystem::path& path, const LogReaderOptions& options,
-                           const std::function<bool(LogRecord&&)>& sink) {
+                           const RecordingSink& sink) {
   const auto names = FilesOf(path);
   if (!names) return tl::unexpected(names.error());
   Files files;
   for (const std::filesystem::path& name : *names) {
     auto file = OpenFile(name);
     if (!file) return tl::unexpected(file.error());
+    if (names->size() > 1) (*file)->LetGo();
     files.push_back(*std::move(file));
   }
   const auto survey = BagSurvey::Of(files, options);
@@ -161,18 +178,23 @@ Result<LogSummary> ReadBag(const std::filesystem::path& path, const LogReaderOpt
     wanted.push_back(topic);
     takers.push_back(std::move(take));
   };
-  want(topics.scans, [&](std::string_view bytes) { return emitter.TakeScan(bytes); });
-  if (topics.scan_details)
-    want(*topics.scan_details, [&](std::string_view bytes) { return emitter.TakeScanDetails(bytes); });
+  for (std::size_t lidar = 0; lidar < topics.lidars.size(); ++lidar) {
+    const ScanTopic& topic = topics.lidars[lidar];
+    want(topic.scans, [&emitter, lidar](std::string_view bytes) { return emitter.TakeScan(lidar, bytes); });
+    if (topic.details)
+      want(*topic.details, [&emitter, lidar](std::string_view bytes) { return emitter.TakeScanDetails(lidar, bytes); });
+  }
   if (topics.odometry) want(*topics.odometry, [&](std::string_view bytes) { return emitter.TakeOdometry(bytes); });
   if (topics.odometry_details)
     want(*topics.odometry_details, [&](std::string_view bytes) { return emitter.TakeOdometryDetails(bytes); });
   if (!topics.odometry)
     for (const Topic& topic : topics.moving)
       want(topic, [&](std::string_view bytes) { return emitter.TakeTransforms(topic, bytes); });
-  auto read =
-      ReadMessages(files, wanted, [&](std::size_t topic, std::string_view bytes) { return takers[topic](bytes); });
+  bool goes_on = true;
+  auto read = ReadMessages(files, wanted,
+                           [&](std::size_t topic, std::string_view bytes) { return goes_on = takers[topic](bytes); });
   if (!read) return tl::unexpected(read.error());
+  if (goes_on) emitter.Finish();
   return std::move(emitter).summary();
 }
 

@@ -47,6 +47,7 @@ Result<void> ReadMessages(const Files& files, const std::vector<Topic>& topics, 
       const auto unpacked = UnpackZstd(message, kMaxMessageBytes);
       return goes_on = sink(index, unpacked ? std::string_view(*unpacked) : std::string_view());
     });
+    if (files.size() > 1) file->LetGo();
     if (!read || !goes_on) return read;
   }
   return {};
@@ -55,15 +56,16 @@ Result<void> ReadMessages(const Files& files, const std::vector<Topic>& topics, 
 Result<BagSurvey> BagSurvey::Of(const Files& files, const LogReaderOptions& options) {
   BagSurvey survey;
   for (const auto& file : files) survey.notes_.insert(survey.notes_.end(), file->notes().begin(), file->notes().end());
-  auto topics = ChooseTopics(TopicsOf(files), options.scan_topic, options.odometry_topic);
+  auto topics = ChooseTopics(TopicsOf(files), options.scan_topic, options.odometry_topic, options.all_lidars);
   if (!topics) return tl::unexpected(topics.error());
   survey.topics_ = *std::move(topics);
   if (auto read = survey.ReadFixed(files); !read) return tl::unexpected(read.error());
   if (auto read = survey.ReadFirstFrames(files); !read) return tl::unexpected(read.error());
   if (auto found = survey.FindBaseFrame(files); !found) return tl::unexpected(found.error());
   const auto mounted = [&] {
-    return survey.laser_frame_ &&
-           survey.MountingOf(*survey.laser_frame_, survey.T_frame_scan_, std::nullopt).has_value();
+    return std::all_of(survey.first_scans_.begin(), survey.first_scans_.end(), [&](const FirstScan& scan) {
+      return scan.frame && survey.MountingOf(*scan.frame, scan.T_frame_scan, std::nullopt).has_value();
+    });
   };
   if (!survey.topics_.odometry) {
     if (auto read = survey.ReadMoving(files, [] { return false; }); !read) return tl::unexpected(read.error());
@@ -71,11 +73,14 @@ Result<BagSurvey> BagSurvey::Of(const Files& files, const LogReaderOptions& opti
   } else if (!mounted()) {
     if (auto read = survey.ReadMoving(files, mounted); !read) return tl::unexpected(read.error());
   }
-  if (survey.laser_frame_) {
-    const auto mounting = survey.MountingOf(*survey.laser_frame_, survey.T_frame_scan_, options.T_robot_laser);
+  if (auto checked = survey.CheckLidars(options); !checked) return tl::unexpected(checked.error());
+  for (std::size_t lidar = 0; lidar < survey.first_scans_.size(); ++lidar) {
+    const FirstScan& scan = survey.first_scans_[lidar];
+    if (!scan.frame) continue;
+    const auto mounting = survey.MountingOf(*scan.frame, scan.T_frame_scan, options.T_robot_laser);
     if (!mounting) return tl::unexpected(mounting.error());
     const Pose2& T = mounting->T_robot_laser;
-    survey.notes_.push_back(survey.topics_.scans.name + ": frame '" + *survey.laser_frame_ + "' is mounted on '" +
+    survey.notes_.push_back(survey.LidarNames()[lidar] + ": frame '" + *scan.frame + "' is mounted on '" +
                             survey.base_frame_ + "' at " + std::to_string(T.x) + ", " + std::to_string(T.y) + ", " +
                             std::to_string(T.theta) + (mounting->upside_down ? ", upside down" : ""));
   }
@@ -83,6 +88,34 @@ Result<BagSurvey> BagSurvey::Of(const Files& files, const LogReaderOptions& opti
                                                                   : "transforms from '" + survey.odometry_frame_ +
                                                                         "' to '" + survey.base_frame_ + "'"));
   return survey;
+}
+
+std::vector<std::string> BagSurvey::LidarNames() const {
+  std::vector<std::string> names;
+  for (const ScanTopic& lidar : topics_.lidars) names.push_back(lidar.scans.name);
+  return names;
+}
+
+Result<void> BagSurvey::CheckLidars(const LogReaderOptions& options) const {
+  if (first_scans_.size() < 2) return {};
+  const std::vector<std::string> names = LidarNames();
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
+  const std::string choose = "; --scan-topic chooses one or, with commas, some of " + list;
+  if (options.T_robot_laser)
+    return Fail(StatusCode::kInvalidArgument, "--laser-at says where one lidar is, and there are several" + choose);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const FirstScan& scan = first_scans_[i];
+    if (!scan.frame) continue;
+    const auto mounting = MountingOf(*scan.frame, scan.T_frame_scan, std::nullopt);
+    if (!mounting) return Fail(mounting.error().code, names[i] + ": " + mounting.error().message + choose);
+    // A program that filters scans publishes those of the same lidar once more.
+    for (std::size_t k = 0; k < i; ++k)
+      if (first_scans_[k].frame == scan.frame && !topics_.lidars[i].details)
+        return Fail(StatusCode::kInvalidArgument,
+                    names[k] + " and " + names[i] + " are of one lidar: their frame is '" + *scan.frame + "'" + choose);
+  }
+  return {};
 }
 
 Result<void> BagSurvey::ReadFixed(const Files& files) {
@@ -94,23 +127,25 @@ Result<void> BagSurvey::ReadFixed(const Files& files) {
 }
 
 Result<void> BagSurvey::ReadFirstFrames(const Files& files) {
-  std::vector<Topic> wanted = {topics_.scans};
+  const std::size_t lidars = topics_.lidars.size();
+  first_scans_.resize(lidars);
+  std::vector<Topic> wanted;
+  for (const ScanTopic& lidar : topics_.lidars) wanted.push_back(lidar.scans);
   if (topics_.odometry) wanted.push_back(*topics_.odometry);
   bool odometry_seen = !topics_.odometry;
   auto read = ReadMessages(files, wanted, [&](std::size_t topic, std::string_view bytes) {
-    if (topic == 0 && !laser_frame_) {
-      if (const auto message = DecodeScan(topics_.scans, bytes)) {
-        laser_frame_ = message->scan.header.frame;
-        T_frame_scan_ = message->T_frame_scan;
-      }
-    } else if (topic == 1 && !odometry_seen) {
+    if (topic < lidars && !first_scans_[topic].frame) {
+      if (const auto message = DecodeScan(wanted[topic], bytes))
+        first_scans_[topic] = {message->scan.header.frame, message->T_frame_scan};
+    } else if (topic == lidars && !odometry_seen) {
       if (const auto odometry = DecodeOdometry(*topics_.odometry, bytes)) {
         odometry_seen = true;
         odometry_frame_ = odometry->header.frame;
         base_frame_ = odometry->child_frame;
       }
     }
-    return !laser_frame_ || !odometry_seen;
+    return !odometry_seen || !std::all_of(first_scans_.begin(), first_scans_.end(),
+                                          [](const FirstScan& scan) { return scan.frame.has_value(); });
   });
   return read;
 }
@@ -125,7 +160,7 @@ Result<void> BagSurvey::FindBaseFrame(const Files& files) {
     };
     if (auto read = ReadMoving(files, found); !read) return read;
     // Without transforms, scans are taken to be in the frame of the robot: their pose says the mounting.
-    if (base_frame_.empty() && laser_frame_) base_frame_ = *laser_frame_;
+    if (base_frame_.empty() && first_scans_.front().frame) base_frame_ = *first_scans_.front().frame;
   }
   if (base_frame_.empty()) base_frame_ = kUsualBaseFrame;
   return {};

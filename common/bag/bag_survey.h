@@ -33,12 +33,20 @@ class BagSurvey {
   [[nodiscard]] const std::string& odometry_frame() const { return odometry_frame_; }
   [[nodiscard]] const std::string& base_frame() const { return base_frame_; }
   [[nodiscard]] const std::vector<std::string>& notes() const { return notes_; }
+  [[nodiscard]] std::vector<std::string> LidarNames() const;  // The topics of their scans.
   // How a lidar is mounted on the robot whose scans are in the plane T_frame_scan of this frame. What the options say
   // counts first, but only transforms say whether it is tilted or upside down.
   [[nodiscard]] Result<ros2::Mounting> MountingOf(const std::string& laser_frame, const ros2::Pose3& T_frame_scan,
                                                   const std::optional<Pose2>& T_robot_laser) const;
 
  private:
+  struct FirstScan {
+    std::optional<std::string> frame;  // Nothing where there is no scan.
+    ros2::Pose3 T_frame_scan;
+  };
+
+  // That the scans of several topics are those of several lidars, whose mountings are known.
+  [[nodiscard]] Result<void> CheckLidars(const LogReaderOptions& options) const;
   Result<void> ReadFirstFrames(const Files& files);
   Result<void> ReadFixed(const Files& files);
   // Where odometry does not name the robot's frame, a transform from the odometry's frame does.
@@ -49,8 +57,7 @@ class BagSurvey {
   Result<void> FindOdometryTransform();
 
   TopicChoice topics_;
-  std::optional<std::string> laser_frame_;  // Of the first scan.
-  ros2::Pose3 T_frame_scan_;                // Of the first scan.
+  std::vector<FirstScan> first_scans_;  // Of each lidar.
   std::string odometry_frame_;
   std::string base_frame_;
   ros2::FrameTree fixed_;

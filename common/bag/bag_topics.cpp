@@ -61,7 +61,7 @@ bool IsCalledOdometry(std::string_view topic) {
 std::vector<Topic> OdometryAmong(const std::vector<Topic>& topics, const std::string& scan_topic) {
   std::vector<Topic> found = OfTypes(topics, kOdometryTypes);
   std::erase_if(found, [](const Topic& topic) { return topic.type == kPoseSchema && !IsCalledOdometry(topic.name); });
-  const std::size_t scan = scan_topic.rfind("/scan");
+  const std::size_t scan = scan_topic.rfind("/scan/");  // A lidar may be called scan, too.
   if (found.size() < 2 || scan == std::string::npos) return found;
   const auto beside = std::find_if(found.begin(), found.end(), [&](const Topic& topic) {
     return topic.type == kPoseSchema && topic.name == scan_topic.substr(0, scan) + "/odometry";
@@ -82,6 +82,35 @@ Result<Topic> Choose(const std::vector<Topic>& all, std::vector<Topic> found, Me
   return found.front();
 }
 
+// "/robots/r1" of "/robots/r1/scan/front", where `cairn record` has put the scans of a robot. Empty for other topics.
+std::string_view RobotOf(const Topic& topic) {
+  const std::size_t scan = topic.encoding == kProtobuf ? topic.name.rfind("/scan/") : std::string::npos;
+  return scan == std::string::npos ? std::string_view() : std::string_view(topic.name).substr(0, scan);
+}
+
+Result<std::vector<Topic>> ChooseScans(const std::vector<Topic>& topics, const std::string& scan_topic,
+                                       bool all_lidars) {
+  constexpr std::size_t kMostLidars = 16;  // That a session has.
+  const std::string option = "--scan-topic";
+  std::vector<Topic> found = OfTypes(topics, kScanTypes), chosen;
+  if (all_lidars && scan_topic.empty() && found.size() > 1 && found.size() <= kMostLidars) {
+    const bool of_one_robot = std::all_of(found.begin(), found.end(),
+                                          [&](const Topic& topic) { return RobotOf(topic) == RobotOf(found.front()); });
+    if (of_one_robot) return found;
+  }
+  std::string_view names = scan_topic;
+  do {
+    const std::string name(names.substr(0, all_lidars ? names.find(',') : names.size()));
+    auto one = Choose(topics, found, kScanTypes, name, option);
+    if (!one) return tl::unexpected(one.error());
+    if (std::find(chosen.begin(), chosen.end(), *one) != chosen.end() || chosen.size() == kMostLidars)
+      return Fail(StatusCode::kInvalidArgument, option + " names a topic twice, or more than 16");
+    chosen.push_back(*std::move(one));
+    names.remove_prefix(std::min(names.size(), name.size() + 1));
+  } while (!names.empty());
+  return chosen;
+}
+
 std::optional<Topic> DetailsOf(const std::vector<Topic>& topics, const Topic& topic) {
   const std::vector<Topic> details = OfTypes(topics, kDetailsTypes);
   const std::string_view type = topic.type == kLaserScanSchema ? kScanDetailsSchema : kOdometryDetailsSchema;
@@ -94,18 +123,21 @@ std::optional<Topic> DetailsOf(const std::vector<Topic>& topics, const Topic& to
 }  // namespace
 
 Result<TopicChoice> ChooseTopics(const std::vector<Topic>& topics, const std::string& scan_topic,
-                                 const std::string& odometry_topic) {
-  auto scans = Choose(topics, OfTypes(topics, kScanTypes), kScanTypes, scan_topic, "--scan-topic");
+                                 const std::string& odometry_topic, bool all_lidars) {
+  auto scans = ChooseScans(topics, scan_topic, all_lidars);
   if (!scans) return tl::unexpected(scans.error());
-  TopicChoice choice{.scans = *std::move(scans), .odometry = std::nullopt};
-  choice.scan_details = DetailsOf(topics, choice.scans);
+  TopicChoice choice;
+  for (Topic& one : *scans) {
+    std::optional<Topic> details = DetailsOf(topics, one);
+    choice.lidars.push_back({std::move(one), std::move(details)});
+  }
   for (Topic& topic : OfTypes(topics, kTransformTypes))
     (topic.name.ends_with("tf_static") ? choice.fixed : choice.moving).push_back(std::move(topic));
   const bool named_transforms = std::any_of(choice.moving.begin(), choice.moving.end(), [&](const Topic& topic) {
     return WithoutSlash(topic.name) == WithoutSlash(odometry_topic);
   });
-  std::vector<Topic> odometries =
-      odometry_topic.empty() ? OdometryAmong(topics, choice.scans.name) : OfTypes(topics, kOdometryTypes);
+  std::vector<Topic> odometries = odometry_topic.empty() ? OdometryAmong(topics, choice.lidars.front().scans.name)
+                                                         : OfTypes(topics, kOdometryTypes);
   const bool only_transforms = odometry_topic.empty() && odometries.empty() && !choice.moving.empty();
   if (named_transforms || only_transforms) return choice;
   auto odometry = Choose(topics, std::move(odometries), kOdometryTypes, odometry_topic, "--odom-topic");

@@ -140,8 +140,9 @@ Result<void> McapFile::AddChunk(const ReadableFile& file, std::uint64_t offset, 
 
 Result<void> McapFile::AddBlock(const ReadableFile& file, McapBlock block) {
   unpacked_ += block.bytes;
-  if (unpacked_ > limits_.unpacked_bytes + 1000 * file.size())
-    return Damaged(block.offset, "the file unpacks to more than 1000 times its length");
+  if (unpacked_ > limits_.unpacked_bytes + limits_.times_length * file.size())
+    return Damaged(block.offset,
+                   "the file unpacks to more than " + std::to_string(limits_.times_length) + " times its length");
   const auto content = UnpackBlock(file, block, true);
   if (!content) return At(block.offset, content.error());
   block.first_time = std::numeric_limits<std::uint64_t>::max();

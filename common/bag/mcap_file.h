@@ -22,9 +22,10 @@ struct McapLimits {
   std::uint64_t chunk_bytes = std::uint64_t{128} << 20;
   // Of all chunks that overlap at one time.
   std::uint64_t open_bytes = std::uint64_t{512} << 20;
-  // Of the whole file unpacked: so much, and 1000 times the length of the file. A small file must not keep the reader
-  // busy for hours; 1000 is more than maps and scans can be compressed.
+  // Of the whole file unpacked: so much, and so many times the length of the file. A small file must not keep the
+  // reader busy for hours; 1000 is more than maps and scans can be compressed.
   std::uint64_t unpacked_bytes = std::uint64_t{1} << 30;
+  std::uint64_t times_length = 1000;
 };
 
 [[nodiscard]] Result<std::unique_ptr<File>> OpenMcap(const std::filesystem::path& path, const McapLimits& limits = {});

@@ -10,6 +10,10 @@
 
 namespace cairn::bag {
 
-[[nodiscard]] Result<std::unique_ptr<File>> OpenSqlite(const std::filesystem::path& path);
+// kKeepOpen: nobody else uses the file, and its path is not used again after this call. Otherwise the file is opened
+// for each reading: a bag may have more files than a process may have open.
+enum class SqliteUse { kOpenEachTime, kKeepOpen };
+[[nodiscard]] Result<std::unique_ptr<File>> OpenSqlite(const std::filesystem::path& path,
+                                                       SqliteUse use = SqliteUse::kOpenEachTime);
 
 }  // namespace cairn::bag

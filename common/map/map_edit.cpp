@@ -105,18 +105,21 @@ class Raster {
 }  // namespace
 
 std::string_view MapEditKindName(MapEditKind kind) {
-  static constexpr std::array<std::string_view, kMapEditKindCount> kNames = {"free", "unknown", "occupied", "keep_out"};
+  static constexpr std::array<std::string_view, kMapEditKindCount> kNames = {"free", "unknown", "occupied", "keep_out",
+                                                                             "origin"};
   const auto index = static_cast<std::size_t>(kind);
   return index < kNames.size() ? kNames[index] : "unknown kind";
 }
 
 Result<void> ValidateMapEdit(const MapEdit& edit) {
   if (static_cast<int>(edit.kind) >= kMapEditKindCount) return Invalid("its kind is not known");
-  const bool is_line = edit.width_m != 0.0;
+  const bool is_line = edit.width_m != 0.0, is_origin = edit.kind == MapEditKind::kOrigin;
+  if (is_origin && (is_line || edit.points_map.size() != 2))
+    return Invalid("an origin has two points and no width: where it is, and a point on the x axis");
   if (is_line && !(edit.width_m >= kThinnestLine_m && edit.width_m <= kWidestLine_m)) {
     return Invalid("a line is " + ExactText(kThinnestLine_m) + " to " + ExactText(kWidestLine_m) + " m wide");
   }
-  const std::size_t fewest = is_line ? 2 : 3;
+  const std::size_t fewest = is_line || is_origin ? 2 : 3;
   if (edit.points_map.size() < fewest || edit.points_map.size() > kMostEditPoints) {
     return Invalid((is_line ? "a line has " : "an area has ") + std::to_string(fewest) + " to " +
                    std::to_string(kMostEditPoints) + " points, not " + std::to_string(edit.points_map.size()));
@@ -128,7 +131,9 @@ Result<void> ValidateMapEdit(const MapEdit& edit) {
     if ((point - edit.points_map.front()).norm() > kFarthestInEdit_m + kRounding_m)
       return Invalid("a point is more than " + ExactText(kFarthestInEdit_m) + " m from the first one; divide it");
   }
-  if (!is_line && Surface(edit.points_map) < kSmallestArea_m2 - kRounding_m2)
+  if (is_origin && (edit.points_map[1] - edit.points_map[0]).norm() < kThinnestLine_m - kRounding_m)
+    return Invalid("the two points of an origin are at one place");
+  if (!is_line && !is_origin && Surface(edit.points_map) < kSmallestArea_m2 - kRounding_m2)
     return Invalid("its corners enclose nothing; give a width if it is a line");
   if (edit.note.size() > kMostEditNoteBytes)
     return Invalid("its note has more than " + std::to_string(kMostEditNoteBytes) + " bytes");

@@ -22,9 +22,12 @@ enum class MapEditKind : std::uint8_t {
   kOccupied,  // Something stands here that lidars may not see, such as a glass wall.
   // Robots must not drive here. The tiles of the map stay as they are, because robots are localised by them.
   kKeepOut,
+  // The origin of the building's frame and a point on its x axis (building_frame.h); the last one counts. The tiles of
+  // the map stay as they are.
+  kOrigin,
 };
-inline constexpr int kMapEditKindCount = 4;
-// "free", "unknown", "occupied" and "keep_out".
+inline constexpr int kMapEditKindCount = 5;
+// "free", "unknown", "occupied", "keep_out" and "origin".
 [[nodiscard]] std::string_view MapEditKindName(MapEditKind kind);
 
 inline constexpr std::size_t kMostEditPoints = 64;
@@ -45,7 +48,8 @@ struct MapEdit {
 
 // INVALID_ARGUMENT, with the reason: too few or too many points, or some that are not finite or farther than 10 km from
 // the origin, or than kFarthestInEdit_m from the first of them; an area without a surface; a line of less than 1 cm or
-// more than 10 m; a note of more than kMostEditNoteBytes, or one that is not UTF-8 or has control characters.
+// more than 10 m; an origin of other than two points, or with an axis of less than 1 cm; a note of more than
+// kMostEditNoteBytes, or one that is not UTF-8 or has control characters.
 [[nodiscard]] Result<void> ValidateMapEdit(const MapEdit& edit);
 
 // The same edit where the map's coordinates are changed.

@@ -51,7 +51,8 @@ void AddLogOptions(Command& command, LogReaderOptions& options) {
       ->type_name("X,Y,THETA");
   command
       .add_option("--scan-topic", options.scan_topic,
-                  "Bags and recordings: the topic of the laser scans, where there are several")
+                  "Bags and recordings: the topic of the laser scans, where there are several; with commas, of several "
+                  "lidars")
       ->type_name("TOPIC");
   command
       .add_option(

@@ -46,6 +46,8 @@ struct LogReaderOptions {
   // Bags of ROS 2 (bag/bag_reader.h): the topics of scans and odometry. Empty: the only ones of their types.
   std::string scan_topic = {};
   std::string odometry_topic = {};
+  // Several topics of scans are the lidars of one robot. Otherwise one has to be chosen.
+  bool all_lidars = false;
 };
 
 // The path must be a regular file (it is read twice). Calls `sink` for every record; a sink that returns false ends the

@@ -26,7 +26,8 @@ struct LogSummary {
   const char* entry = "line";            // What LogComplaint::line counts: lines of a log, or messages of a bag.
   std::vector<LogComplaint> complaints;  // The first 100.
   int complaint_count = 0;
-  std::vector<std::string> notes;  // Conclusions from the content: range limit, mounting.
+  std::vector<std::string> notes;   // Conclusions from the content: range limit, mounting.
+  std::vector<std::string> lidars;  // Of a bag: the topics of the scans that are read.
 };
 
 }  // namespace cairn

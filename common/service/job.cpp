@@ -16,4 +16,9 @@ std::string_view JobStateName(JobState state) {
   return index < kNames.size() ? kNames[index] : "unknown";
 }
 
+double Ambiguity(const Job& job) {
+  if (job.places.size() < 2 || !(job.places[0].weight > 0.0)) return 0.0;
+  return job.places[1].weight / job.places[0].weight;
+}
+
 }  // namespace cairn

@@ -44,4 +44,8 @@ struct Job {
   Generation generation = 0;  // Set by the server's egress.
 };
 
+// How much the second of its places is believed over the first, 0..1: near 1 where two places look alike, 0 where there
+// is no second one.
+[[nodiscard]] double Ambiguity(const Job& job);
+
 }  // namespace cairn

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/service/generation.h"
@@ -16,6 +17,9 @@ struct MapVersionInfo {
   std::uint64_t job = 0;  // The job that made it; 0 for the live map.
   std::string note;
 };
+
+// MapInfo::memory_note begins with this while the map takes more than it may although it has given up all that it can.
+inline constexpr std::string_view kAboveMemoryLimit = "above the limit of memory";
 
 struct MapInfo {
   NameId site_id = 0;
@@ -32,8 +36,8 @@ struct MapInfo {
   std::uint64_t edits_version = 0;  // Grows with every change of the edits (map_edit.h); 0: there was none.
   // What the site's tiles, grids and versions take in the server's memory. Shared parts count once.
   std::uint64_t memory_bytes = 0;
-  std::string memory_note;    // What was given up to stay below maps.max_memory_mib; empty: nothing.
-  Generation generation = 0;  // Set by the server's egress.
+  std::string memory_note = {};  // What was given up to stay below maps.max_memory_mib; empty: nothing.
+  Generation generation = 0;     // Set by the server's egress.
 };
 
 }  // namespace cairn

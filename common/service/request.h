@@ -27,7 +27,7 @@ namespace cairn {
 enum class RequestKind : std::uint8_t {
   kPing = 0,
   kPose,           // robot; stamp or latest.
-  kPath,           // robot; smoothed or live.
+  kPath,           // robot; smoothed, or live: every pose so far, where it lies in the present map.
   kTiles,          // site; area, level, since_epoch + since_version. Or robot without site: what it alone has drawn.
   kLandmarks,      // site.
   kMapInfo,        // site, or all where empty.

@@ -97,7 +97,7 @@ static Result<void> CheckBounds(const v1::MapVersion& version) {
 
 static Result<void> CheckBounds(const v1::MapEdit& edit) {
   return Bounds()
-      .Known("kind", edit.kind(), v1::MAP_EDIT_KEEP_OUT)
+      .Known("kind", edit.kind(), v1::MAP_EDIT_ORIGIN)
       .AtMost("points", edit.points().size(), kMostEditPoints)
       .Text("note", edit.note())
       .result();

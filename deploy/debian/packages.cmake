@@ -96,14 +96,18 @@ set(CPACK_DEBIAN_SERVER_PACKAGE_CONTROL_EXTRA
   ${CMAKE_CURRENT_LIST_DIR}/conffiles ${scripts}/postinst ${scripts}/prerm ${scripts}/postrm)
 set(CPACK_COMPONENT_SERVER_DESCRIPTION "Robots stream 2D laser scans and odometry over DDS. The server keeps the SLAM
 state and the maps of all of them, answers questions for poses and map tiles,
-and smooths whole trajectories as jobs. Its state outlives it.
+and smooths whole trajectories as jobs. Its state outlives it. Robots that run
+ROS 2 are served as they are.
 
 With cairn-offline, which makes maps and trajectories from logs, and
-cairn-calibrate, which measures a robot from its logs.")
+cairn-calibrate, which measures a robot from its logs. The first steps are in
+/usr/share/doc/cairn-server/deploy/FIRST_HOUR.md.")
 set(CPACK_DEBIAN_CLIENT_PACKAGE_NAME cairn-client)
 set(CPACK_DEBIAN_CLIENT_PACKAGE_SHLIBDEPS ON)
-set(CPACK_COMPONENT_CLIENT_DESCRIPTION "Client of the mapping server cairnd: replays logs as robots, simulates robots,
-asks for poses, paths and maps, exports maps, starts jobs and edits sites.")
+set(CPACK_COMPONENT_CLIENT_DESCRIPTION "Client of the mapping server cairnd: replays logs and bags of ROS 2 as robots,
+simulates robots, asks for poses, paths and maps, exports maps for Nav2, starts
+jobs and edits sites. The first steps are in
+/usr/share/doc/cairn-client/deploy/FIRST_HOUR.md.")
 set(CPACK_DEBIAN_WEB_PACKAGE_NAME cairn-web)
 set(CPACK_DEBIAN_WEB_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_WEB_PACKAGE_CONTROL_STRICT_PERMISSION ON)

@@ -8,6 +8,9 @@
 #include <functional>
 #include <string>
 #include <utility>
+#include <vector>
+
+#include "common/service/pose_report.h"
 
 namespace cairn::server {
 
@@ -31,6 +34,7 @@ struct JobOutcome {
   double cost_after = 0.0;
   std::uint32_t map_version = 0;
   std::string message;
+  std::vector<PoseHypothesis> places = {};  // See Job.
 };
 
 }  // namespace cairn::server

@@ -86,7 +86,7 @@ void JobList::RemoveSite(const std::string& site) {
   RetireReplaced();
 }
 
-Result<Job> JobList::Add(const std::string& site, JobKind kind, bool enable) {
+Result<Job> JobList::Add(const std::string& site, JobKind kind, bool enable, const JobSubject& about) {
   const MutexLock lock(mutex_);
   if (!MakeRoom()) {
     return cairn::Fail(StatusCode::kResourceExhausted, "too many jobs are unfinished (jobs.max_kept); try again later");
@@ -96,6 +96,8 @@ Result<Job> JobList::Add(const std::string& site, JobKind kind, bool enable) {
   entry.job.id = id;
   entry.job.site = site;
   entry.job.kind = kind;
+  entry.job.robot = about.robot;
+  entry.job.places = about.places;
   entry.job.submitted = now_();
   entry.enable = enable;
   entry.control = std::make_shared<JobControl>([this, id](double progress) { Progress(id, progress); });
@@ -121,6 +123,7 @@ void JobList::Succeed(std::uint64_t id, const JobOutcome& outcome) {
     job.cost_after = outcome.cost_after;
     job.map_version = outcome.map_version;
     job.message = outcome.message;
+    job.places = outcome.places;
   });
 }
 
@@ -242,8 +245,12 @@ void JobList::SendLocked(Entry& entry) {
 
 bool JobList::MakeRoom() {
   if (jobs_.size() < static_cast<std::size_t>(options_.max_kept)) return true;
-  const auto oldest =
-      std::find_if(jobs_.begin(), jobs_.end(), [](const auto& entry) { return IsFinal(entry.second.job.state); });
+  // One that has ended servers goes last: while it is remembered, the server does not submit another by itself.
+  auto oldest = std::find_if(jobs_.begin(), jobs_.end(), [](const auto& one) {
+    return IsFinal(one.second.job.state) && one.second.attempts < kMostAttempts;
+  });
+  if (oldest == jobs_.end())
+    oldest = std::find_if(jobs_.begin(), jobs_.end(), [](const auto& one) { return IsFinal(one.second.job.state); });
   if (oldest == jobs_.end()) return false;
   if (journal_ != nullptr) journal_->Remove({.kind = RecordKind::kJob, .owner = oldest->first});
   replaced_.push_back(std::move(oldest->second.job));

@@ -19,6 +19,12 @@
 
 namespace cairn::server {
 
+// What a job of the kind kRelocalise is about.
+struct JobSubject {
+  std::string robot;
+  std::vector<PoseHypothesis> places{};  // Where somebody says that the robot is. At the job's end: where it may be.
+};
+
 class JobList {
  public:
   // `now` is the server's clock. `journal`: null if nothing is stored.
@@ -35,7 +41,7 @@ class JobList {
   // The site is deleted: its jobs that have ended are removed from memory; their records stay.
   void RemoveSite(const std::string& site);
   // Adds a queued job. RESOURCE_EXHAUSTED: the list is full of unfinished jobs. `enable`: see JobWorker.
-  Result<Job> Add(const std::string& site, JobKind kind, bool enable = true);
+  Result<Job> Add(const std::string& site, JobKind kind, bool enable = true, const JobSubject& about = {});
   // Marks the job as running. Returns false if it was cancelled meanwhile. From now on Cancel sets the flag
   // in the job's JobControl.
   bool Start(std::uint64_t id);

@@ -34,8 +34,9 @@ void JobWorker::Start() {
   thread_ = std::jthread([this] { Run(); });
 }
 
-Result<Job> JobWorker::Submit(const std::string& site, JobKind kind, bool enable, const std::string& request) {
-  auto job = list_.Add(site, kind, enable);
+Result<Job> JobWorker::Submit(const std::string& site, JobKind kind, bool enable, const std::string& request,
+                              const JobSubject& about) {
+  auto job = list_.Add(site, kind, enable, about);
   const bool full_already = queue_.size() >= static_cast<std::size_t>(options_.max_queued);
   if (job && (full_already || !queue_.TryPush(Ticket{job->id, enable, request}))) {
     const Status full{StatusCode::kResourceExhausted, "too many jobs are waiting (jobs.max_queued); try again later"};

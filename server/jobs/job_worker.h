@@ -26,7 +26,8 @@ class JobWorker {
   void Start();
   // RESOURCE_EXHAUSTED: the queue is full. `request`: the id (RequestId) of the request that submits it, for the log;
   // empty where the server itself does. The next server does not know it any more.
-  Result<Job> Submit(const std::string& site, JobKind kind, bool enable, const std::string& request = "");
+  Result<Job> Submit(const std::string& site, JobKind kind, bool enable, const std::string& request = "",
+                     const JobSubject& about = {});
   // Queues a restored job, which is in the list already.
   void Requeue(std::uint64_t id, bool enable);
   // Cancels the running and the waiting jobs. Returns when the thread has ended.

@@ -23,9 +23,19 @@ void Visit(OptionVisitor& visitor, JobsOptions& options) {
   visitor.Real("join_way_m", options.join_way_m, "m", 1.0, 1e5,
                "How far such a robot, and the others of the site together, must have driven before it is tried for the "
                "first time. It is tried again whenever it or they have driven a quarter more.");
+  visitor.Flag(
+      "align", options.align,
+      "Whether robots that have said where they start are fitted to each other by themselves, when two of them "
+      "have driven `join_way_m` and whenever all have driven a quarter more. A map version is made and enabled "
+      "only if it moves something by more than a cell and agrees better, and never in place of one that a "
+      "person has chosen. Has no effect unless `joint` is true.");
   visitor.Flag("check_starts", options.check_starts,
                "Whether a robot whose first metres contradict what others have drawn there is taken for one that has "
                "not said where it starts.");
+  visitor.Real("relocalise_after_s", options.relocalise_after_s, "s", 0.0, 1e5,
+               "How long a robot must have been lost before it is looked for in the whole map of its site, and not in "
+               "its own one alone. If it is not found, it is looked for again after twice that time, and so on. 0: "
+               "only when somebody asks.");
   visitor.Require(options.max_queued < options.max_kept, "max_queued", "must be below", "max_kept");
 }
 

@@ -15,7 +15,9 @@ struct JobsOptions {
   bool joint = true;
   bool join = true;
   double join_way_m = 20;
+  bool align = true;
   bool check_starts = true;
+  double relocalise_after_s = 10;
 };
 void Visit(OptionVisitor& visitor, JobsOptions& options);
 

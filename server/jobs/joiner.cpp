@@ -15,37 +15,54 @@ constexpr double kAgainAfter = 1.25;  // Ratio of the ways driven until the next
 }  // namespace
 
 void Joiner::Tick() {
-  if (!options_.joint || !options_.join) return;
+  if (!options_.joint) return;
   auto sites = Look();
   std::erase_if(tried_, [&sites](const auto& one) { return !sites.contains(one.first); });
   for (auto& [site, driven] : sites) {
     const LogContext context(AboutSite(site));
-    if (!IsDue(site, driven) || HasWork(site) || jobs_.EndsServers(site, JobKind::kJoin)) continue;
+    if ((!IsDue(site, driven) && !IsDueToAlign(site, driven)) || HasWork(site) ||
+        jobs_.EndsServers(site, JobKind::kJoin))
+      continue;
     if (const auto job = worker_.Submit(site, JobKind::kJoin, true); !job)
       spdlog::warn("site {}: no job to join its robots could be submitted: {}", site, job.error().message);
+    // One that has not driven far enough was not tried.
+    std::erase_if(driven.fragments, [this](const auto& one) { return one.second < options_.join_way_m; });
     tried_[site] = std::move(driven);
   }
 }
 
-// The sites that have fragments that can be joined.
 std::map<std::string, Joiner::Driven> Joiner::Look() const {
   std::map<std::string, Driven> sites;
   for (const auto& session : roster_.All()) {
     const SessionRecord::Joining joining = session->record().joining();
-    if (joining.fragment && joining.joinable)
-      sites[session->record().state().site].fragments.emplace(session->id(), joining.driven_m);
+    Driven& driven = sites[session->record().state().site];
+    if (joining.fragment && joining.joinable) driven.fragments.emplace(session->id(), joining.driven_m);
   }
   for (auto& [site, driven] : sites) {
-    for (const auto& session : roster_.InSite(site)) {
+    for (const auto& session : roster_.InSite(site)) {  // Earlier ones too.
       const SessionRecord::Joining joining = session->record().joining();
-      if (!joining.fragment) driven.others_m += joining.driven_m;
+      if (joining.fragment) continue;
+      driven.others_m += joining.driven_m;
+      if (!joining.joinable || joining.driven_m < options_.join_way_m) continue;
+      ++driven.far;
+      driven.active = driven.active || session->record().phase() != SessionPhase::kEnded;
     }
   }
   return sites;
 }
 
+bool Joiner::IsDueToAlign(const std::string& name, const Driven& now) const {
+  if (!options_.align || now.far < 2 || !now.active) return false;
+  const auto tried = tried_.find(name);
+  // A second one that has driven far enough by now is new.
+  const bool more =
+      tried == tried_.end() || now.others_m >= kAgainAfter * tried->second.others_m || now.far > tried->second.far;
+  const auto site = more ? atlas_.Find(name) : nullptr;
+  return site != nullptr && site->MayBeAligned();
+}
+
 bool Joiner::IsDue(const std::string& site, const Driven& now) const {
-  if (now.others_m < options_.join_way_m) return false;
+  if (!options_.join || now.others_m < options_.join_way_m) return false;
   const auto tried = tried_.find(site);
   return std::ranges::any_of(now.fragments, [&](const auto& fragment) {
     const auto& [session, driven_m] = fragment;

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "common/bounded_channel.h"
+#include "server/jobs/alignment.h"
 #include "server/slam/site/site_smoothing.h"
 #include "server/slam/smoothing/smoothed_map.h"
 
@@ -39,16 +40,18 @@ constexpr double kShareOfJoining = 0.5;  // Of the progress.
 // Nothing: cancelled.
 std::optional<std::vector<slam::SmoothedSession>> SmoothTogether(const std::vector<SessionMaterial>& material,
                                                                  const slam::SiteOptions& site, JobKind kind,
-                                                                 const JobControl& control) {
+                                                                 const JobControl& control, slam::RelationBook* book,
+                                                                 bool align) {
   std::vector<slam::SiteSession> sessions;
   sessions.reserve(material.size());
-  for (const SessionMaterial& session : material) sessions.push_back({session.snapshot, session.start_known});
+  for (const SessionMaterial& session : material)
+    sessions.push_back({session.snapshot, session.start_known, session.session});
   const auto go_on = [&control](double share) {
     control.Progress(kShareOfJoining * share);
     return !control.cancelled();
   };
-  return slam::SmoothSessions(sessions, site, go_on,
-                              kind == JobKind::kJoin ? slam::SiteSearch::kFragments : slam::SiteSearch::kAll);
+  const slam::SiteSearch joins = align ? slam::SiteSearch::kRobots : slam::SiteSearch::kFragments;
+  return slam::SmoothSessions(sessions, site, go_on, kind == JobKind::kJoin ? joins : slam::SiteSearch::kAll, book);
 }
 
 // For each session, whether it is shown: its place in the map is known, or it is joined with one whose place is known
@@ -100,10 +103,18 @@ std::string Joins(const std::vector<SessionMaterial>& material, const std::vecto
          std::to_string(alone) + (apart.empty() ? "" : ": " + apart);
 }
 
+std::string Moves(const Alignment& alignment) {
+  return "; moved by up to " + std::to_string(std::lround(100.0 * alignment.moved_m)) +
+         " cm, so that scans are off the maps of others by " +
+         std::to_string(std::lround(1000.0 * std::sqrt(alignment.after_m2))) + " instead of " +
+         std::to_string(std::lround(1000.0 * std::sqrt(alignment.before_m2))) + " mm";
+}
+
 }  // namespace
 
 Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMaterial>& material,
-                                const slam::SiteOptions* site, const JobControl& control) {
+                                const slam::SiteOptions* site, const JobControl& control, slam::RelationBook* book,
+                                bool align) {
   std::size_t keyframes = 0, scans = 0;
   for (const SessionMaterial& session : material) {
     keyframes += session.snapshot.keyframes.size();
@@ -114,7 +125,7 @@ Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMateria
   const bool together = site != nullptr && material.size() > 1;
   std::vector<slam::SmoothedSession> joint(material.size());
   if (together) {
-    auto smoothed = SmoothTogether(material, *site, job.kind, control);
+    auto smoothed = SmoothTogether(material, *site, job.kind, control, book, align);
     if (!smoothed) return Fail(StatusCode::kCancelled, "cancelled");
     joint = *std::move(smoothed);
   }
@@ -122,10 +133,20 @@ Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMateria
   std::string summary =
       Counts(material) + ", " + std::to_string(keyframes) + " keyframes, " + std::to_string(scans) + " scans";
   if (together) summary += Joins(material, joint);
+  if (together && book != nullptr)
+    summary +=
+        "; measured " + std::to_string(book->measured()) + ", known from before " + std::to_string(book->reused());
   SmoothedSite smoothed;
   if (job.kind == JobKind::kJoin && !JoinsAny(material, shown)) {
-    smoothed.outcome.message = "nothing to join yet: " + summary;
-    return smoothed;
+    const auto go_on = [&control] { return !control.cancelled(); };
+    const auto alignment = align ? AlignmentOf(material, joint, go_on) : Alignment{};
+    if (!alignment) return Fail(StatusCode::kCancelled, "cancelled");
+    smoothed.aligns = alignment->IsBetter();
+    if (!smoothed.aligns) {
+      smoothed.outcome.message = "nothing to join yet: " + summary;
+      return smoothed;
+    }
+    summary += Moves(*alignment);
   }
   // The rest of the progress is the share of scans drawn and compared.
   const double begun = together ? kShareOfJoining : 0.0;
@@ -164,22 +185,48 @@ Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMateria
   return smoothed;
 }
 
-Result<JobOutcome> SmoothJob::Run(const Job& job, bool enable, const JobControl& control) const {
+bool SmoothJob::MayAlign(const Job& job) const {
+  const auto site = atlas_.Find(job.site);
+  if (!options_.align || job.kind != JobKind::kJoin || site == nullptr || !site->MayBeAligned()) return false;
+  if (jobs_ == nullptr) return true;
+  return std::ranges::none_of(jobs_->OfSite(job.site),
+                              [&job](const Job& other) { return other.id != job.id && !IsFinal(other.state); });
+}
+
+Result<SmoothedSite> SmoothJob::Smooth(const Job& job, const std::vector<SessionMaterial>& material,
+                                       const JobControl& control) {
+  std::vector<std::uint64_t> sessions;
+  sessions.reserve(material.size());
+  for (const SessionMaterial& one : material) sessions.push_back(one.session);
+  slam::RelationBook& book = books_.Open(job.site, sessions);
+  auto smoothed = SmoothSite(job, material, options_.joint ? &site_ : nullptr, control, &book, MayAlign(job));
+  // Also where the job was cancelled: what it has measured holds.
+  books_.Close(job.site, sessions, [this](const std::string& site) { return atlas_.Find(site) != nullptr; });
+  return smoothed;
+}
+
+Result<JobOutcome> SmoothJob::Run(const Job& job, bool enable, const JobControl& control) {
   const auto material = Collect(job.site, control);
   if (!material) return tl::unexpected(material.error());
-  auto smoothed = SmoothSite(job, *material, options_.joint ? &site_ : nullptr, control);
+  auto smoothed = Smooth(job, *material, control);
   if (!smoothed) return tl::unexpected(smoothed.error());
   JobOutcome outcome = std::move(smoothed->outcome);
   if (!smoothed->version) return outcome;
+  if (smoothed->aligns && !MayAlign(job)) {  // It took long; a person may have come meanwhile.
+    outcome.message = "given up for the sake of a person's wish: " + outcome.message;
+    return outcome;
+  }
   const auto number = Await(job.site, control, [&](Site& site, Site::Done done, Site::Wanted wanted) {
     site.AddVersion(*std::move(smoothed->version), std::move(done), std::move(wanted));
   });
   if (!number) return tl::unexpected(number.error());
   outcome.map_version = *number;
   if (!enable || control.cancelled()) return outcome;
-  const auto enabled = Await(job.site, control, [version = *number](Site& site, Site::Done done, Site::Wanted wanted) {
-    site.Enable(version, std::move(done), std::move(wanted));
-  });
+  const auto by = smoothed->aligns ? Site::EnabledBy::kAlignment : Site::EnabledBy::kJob;
+  const auto enable_it = [version = *number, by](Site& site, Site::Done done, Site::Wanted wanted) {
+    site.Enable(version, std::move(done), std::move(wanted), by);
+  };
+  const auto enabled = Await(job.site, control, enable_it);
   if (!enabled) return tl::unexpected(enabled.error());
   return outcome;
 }

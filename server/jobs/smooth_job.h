@@ -4,9 +4,11 @@
 // start was unknown or wrong moves to where the others have seen the same. The result is published as a new map
 // version, which is disabled at first. A robot whose place in the map is not known and that is not joined with one
 // whose place is known stays a fragment in the new version (maps/robot_grid.h). A job of the kind kJoin makes no
-// version unless it joins a fragment. Source: thesis A 5.4 (full-SLAM path of the best particle). Thread rule: runs on
-// the job worker's thread. It waits for the sessions and for the site, at most jobs.snapshot_timeout_s each, and for a
-// switch of versions that has begun until it is complete; no other thread waits for it.
+// version unless it joins a fragment, or fits robots that said where they start better to each other (alignment.h; only
+// where no person has chosen the enabled version, and no other job of the site waits). Source: thesis A 5.4 (full-SLAM
+// path of the best particle). Thread rule: runs on the job worker's thread. It waits for the sessions and for the site,
+// at most jobs.snapshot_timeout_s each, and for a switch of versions that has begun until it is complete; no other
+// thread waits for it.
 #pragma once
 
 #include <functional>
@@ -15,44 +17,58 @@
 #include <vector>
 
 #include "server/jobs/job_control.h"
+#include "server/jobs/job_list.h"
 #include "server/jobs/jobs_options.h"
+#include "server/jobs/relation_books.h"
 #include "server/maps/atlas.h"
 #include "server/robots/roster.h"
+#include "server/slam/site/relation_book.h"
 #include "server/slam/site/site_options.h"
 
 namespace cairn::server {
 
 // The result of smoothing a site, before it is published.
 struct SmoothedSite {
-  std::optional<MapVersion> version;  // Nothing: a job of the kind kJoin has found nothing to join.
+  std::optional<MapVersion> version;  // Nothing: a job of the kind kJoin has found nothing to do.
+  bool aligns = false;                // It joins nobody, and only fits robots to each other.
   JobOutcome outcome;                 // Its map_version is still 0.
 };
 
-// A pure function: the same material gives the same result. Progress is reported from 0 to 1. `site`: how robots are
-// smoothed together; null: each by itself.
-// FAILED_PRECONDITION: there are no scans. CANCELLED: the job was cancelled.
+// A pure function: the same material and the same book give the same result. Progress is reported from 0 to 1. `site`:
+// how robots are smoothed together; null: each by itself. `book`: see SmoothSessions. `align`: whether a job of the
+// kind kJoin also fits robots that said where they start to each other. FAILED_PRECONDITION: there are no scans.
+// CANCELLED: the job was cancelled.
 [[nodiscard]] Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMaterial>& material,
-                                              const slam::SiteOptions* site, const JobControl& control);
+                                              const slam::SiteOptions* site, const JobControl& control,
+                                              slam::RelationBook* book = nullptr, bool align = false);
 
 class SmoothJob {
  public:
-  SmoothJob(const JobsOptions& options, const slam::SiteOptions& site, const Roster& roster, const Atlas& atlas)
-      : options_(options), site_(site), roster_(roster), atlas_(atlas) {}
+  // `journal`: null if nothing is stored. `jobs`: all jobs; null: there are no others.
+  SmoothJob(const JobsOptions& options, const slam::SiteOptions& site, const Roster& roster, const Atlas& atlas,
+            Journal* journal = nullptr, const JobList* jobs = nullptr)
+      : options_(options), site_(site), roster_(roster), atlas_(atlas), jobs_(jobs), books_(journal) {}
 
   // `enable`: whether to enable the new map version.
-  Result<JobOutcome> Run(const Job& job, bool enable, const JobControl& control) const;
+  Result<JobOutcome> Run(const Job& job, bool enable, const JobControl& control);
 
- private:
-  Result<std::vector<SessionMaterial>> Collect(const std::string& site, const JobControl& control) const;
   using Ask = std::function<void(Site&, Site::Done, Site::Wanted)>;
   // Sends `ask` to the site and waits for its answer, a map version. DEADLINE_EXCEEDED, CANCELLED: the site had not
   // begun by then, and will not. What it has begun is waited for, because it can not be taken back.
   Result<std::uint32_t> Await(const std::string& site, const JobControl& control, const Ask& ask) const;
 
+ private:
+  // Whether the job may make a version that nobody has asked for.
+  [[nodiscard]] bool MayAlign(const Job& job) const;
+  Result<SmoothedSite> Smooth(const Job& job, const std::vector<SessionMaterial>& material, const JobControl& control);
+  Result<std::vector<SessionMaterial>> Collect(const std::string& site, const JobControl& control) const;
+
   const JobsOptions options_;
   const slam::SiteOptions site_;
   const Roster& roster_;
   const Atlas& atlas_;
+  const JobList* const jobs_;
+  RelationBooks books_;
 };
 
 }  // namespace cairn::server

@@ -8,24 +8,17 @@
 #include "server/ops/log_context.h"
 
 namespace cairn::server {
-namespace {
-
-constexpr double kEveryM = 1.0;     // Way between two comparisons.
-constexpr double kFirstM = 8.0;     // Way on which they are made.
-constexpr int kContradictions = 2;  // In a row.
-
-}  // namespace
 
 void StartCheck::Tick() {
   if (!options_.check_starts) return;
   std::map<SessionId, std::shared_ptr<Watched>> watched;
   for (const auto& session : roster_.All()) {
     const SessionRecord::Joining joining = session->record().joining();
-    if (joining.fragment || joining.driven_m > kFirstM || session->ending()) continue;
+    if (joining.fragment || joining.driven_m > StartJudgement::kFirstM || session->ending()) continue;
     const auto known = watched_.find(session->id());
     const auto one = known == watched_.end() ? std::make_shared<Watched>() : known->second;
     watched.emplace(session->id(), one);
-    if (joining.driven_m < one->compared_at_m + kEveryM || one->comparing) continue;
+    if (joining.driven_m < one->compared_at_m + StartJudgement::kEveryM || one->comparing) continue;
     one->compared_at_m = joining.driven_m;
     Compare(session, one);
   }
@@ -38,12 +31,9 @@ void StartCheck::Compare(const std::shared_ptr<Session>& session, const std::sha
   if (site == nullptr || !status.pose.localized) return;
   watched->comparing = true;
   site->CheckStart(session->id(), status.pose.T_map_robot, [session, watched](const GridAgreement& agreement) {
+    const bool refuses = watched->judgement.Refuses(agreement);
     watched->comparing = false;
-    if (!agreement.Contradicts()) {
-      watched->contradictions = 0;
-      return false;
-    }
-    if (++watched->contradictions < kContradictions) return false;
+    if (!refuses) return false;
     const std::string why =
         fmt::format("its start contradicts the map: {:.0f} % of the walls that it sees are free for others",
                     100.0 * agreement.contradicted_share());

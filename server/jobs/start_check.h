@@ -10,6 +10,7 @@
 #include <memory>
 
 #include "server/jobs/jobs_options.h"
+#include "server/jobs/start_judgement.h"
 #include "server/maps/atlas.h"
 #include "server/robots/roster.h"
 
@@ -28,7 +29,7 @@ class StartCheck {
   struct Watched {
     double compared_at_m = 0.0;
     std::atomic<bool> comparing = false;
-    std::atomic<int> contradictions = 0;
+    StartJudgement judgement;  // On the site's strand.
   };
   void Compare(const std::shared_ptr<Session>& session, const std::shared_ptr<Watched>& watched) const;
 

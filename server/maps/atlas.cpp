@@ -250,12 +250,24 @@ void Atlas::Publish() {
   }
   auto others = All();
   if (others.empty()) return;
+  ShareMemory(others);
   const auto next = others.begin() + static_cast<std::ptrdiff_t>(first_++ % others.size());
   const std::shared_ptr<Site> first = *next;
   others.erase(next);
   first->Publish([others = std::move(others)] {
     for (const auto& site : others) site->Publish();
   });
+}
+
+// Each site follows when it publishes.
+void Atlas::ShareMemory(const std::vector<std::shared_ptr<Site>>& sites) const {
+  const std::uint64_t total = BytesOfMib(options_.max_total_memory_mib);
+  if (total == 0) return;
+  std::vector<SiteMemory> taken;
+  taken.reserve(sites.size());
+  for (const auto& site : sites) taken.push_back({site->snapshot()->info.memory_bytes, site->gives_no_more()});
+  const std::uint64_t share = MemoryShare(taken, total);
+  for (const auto& site : sites) site->SetMemoryShare(share);
 }
 
 void Atlas::Close() {

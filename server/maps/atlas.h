@@ -81,6 +81,7 @@ class Atlas {
   [[nodiscard]] bool Idle(const Place& place) const;
   void Erase(std::map<std::string, Place>::iterator place) CAIRN_REQUIRES(mutex_);
   bool MakeRoom() CAIRN_REQUIRES(mutex_);
+  void ShareMemory(const std::vector<std::shared_ptr<Site>>& sites) const;
 
   const MapsOptions options_;
   const double resolution_m_;

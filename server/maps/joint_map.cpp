@@ -37,6 +37,15 @@ slam::OccupancyGrid::Chunks JointMap::ChunksOf(SessionId session) const {
   return mine;
 }
 
+bool JointMap::IsCovered(SessionId session) const {
+  return std::ranges::all_of(chunks_, [&](const auto& place) {
+    const Layers& layers = place.second;
+    return !layers.contains(session) || std::ranges::any_of(layers, [&](const auto& layer) {
+      return layer.first != session && !hidden_.contains(layer.first);
+    });
+  });
+}
+
 slam::OccupancyGrid::Chunks JointMap::DrawnBefore(SessionId session) const {
   constexpr int kAround = 2;  // Chunks.
   std::set<slam::ChunkKey> area;

@@ -55,6 +55,9 @@ class JointMap {
   // Forgets the session with all that it has drawn.
   void Remove(SessionId session);
 
+  // Wherever the session has drawn, another one that is shown has drawn as well.
+  [[nodiscard]] bool IsCovered(SessionId session) const;
+
   // The sum of the grids of the sessions before this one that are shown, in and around the area of its own grid.
   [[nodiscard]] slam::OccupancyGrid::Chunks DrawnBefore(SessionId session) const;
 

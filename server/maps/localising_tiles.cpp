@@ -13,7 +13,7 @@ namespace {
 
 // What the edit says for lidars.
 std::optional<std::uint8_t> CellSeenOf(MapEditKind kind) {
-  if (kind == MapEditKind::kKeepOut) return std::nullopt;
+  if (kind == MapEditKind::kKeepOut || kind == MapEditKind::kOrigin) return std::nullopt;
   return kind == MapEditKind::kFree ? std::uint8_t{0} : kUnknownCell;
 }
 
@@ -32,6 +32,31 @@ EditOverlay OverlayWithoutWalls(const std::vector<MapEdit>& edits, double resolu
 }
 
 }  // namespace
+
+std::vector<TileSet::TilePtr> TilesNear(std::span<const TileSet::TilePtr> tiles, double resolution_m,
+                                        const Eigen::Vector2d& p_map, double reach_m) {
+  const double side_m = resolution_m * kTileCells;
+  const auto is_near = [&](std::int32_t tile, double at_m) {
+    return (tile + 1) * side_m >= at_m - reach_m && tile * side_m <= at_m + reach_m;
+  };
+  std::vector<TileSet::TilePtr> near;
+  for (const TileSet::TilePtr& tile : tiles)
+    if (is_near(tile->key.x, p_map.x()) && is_near(tile->key.y, p_map.y())) near.push_back(tile);
+  return near;
+}
+
+std::shared_ptr<const slam::KnownGrid> KnownGridOf(std::span<const TileSet::TilePtr> tiles, double resolution_m,
+                                                   std::uint32_t epoch, const slam::PlaceSearchOptions& options,
+                                                   double near_m) {
+  slam::KnownGrid::Source source{{}, resolution_m, epoch};
+  for (const TileSet::TilePtr& tile : tiles) {
+    if (auto cells = DecodeCells(tile->bytes, tile->encoding))
+      source.tiles.emplace(slam::ChunkKey{tile->key.x, tile->key.y},
+                           std::make_shared<const TileCells>(std::move(*cells)));
+  }
+  if (!slam::KnownGrid::IsBounded(source)) return nullptr;
+  return std::make_shared<const slam::KnownGrid>(std::move(source), options, near_m);
+}
 
 std::vector<TileSet::TilePtr> TilesToLocaliseIn(const MapSnapshot& map) {
   const EditOverlay overlay = OverlayWithoutWalls(*map.edits, map.info.resolution_m);

@@ -3,13 +3,25 @@
 // are unknown. Stateless, thread-safe.
 #pragma once
 
+#include <memory>
+#include <span>
 #include <vector>
 
 #include "server/maps/map_snapshot.h"
+#include "server/slam/known_grid/known_grid.h"
 
 namespace cairn::server {
 
 // Of level 0. A tile without such walls is that of the map itself. Takes time for the area of the tiles that have some.
 [[nodiscard]] std::vector<TileSet::TilePtr> TilesToLocaliseIn(const MapSnapshot& map);
+// Those of the tiles of which a part lies within `reach_m` of a point, in x and in y.
+[[nodiscard]] std::vector<TileSet::TilePtr> TilesNear(std::span<const TileSet::TilePtr> tiles, double resolution_m,
+                                                      const Eigen::Vector2d& p_map, double reach_m);
+// The map that tiles of level 0 show. Tiles that cannot be read are left out. Null: it is larger than a search allows
+// (slam::KnownGrid::IsBounded). `near_m`: as slam::SelfCheckOptions.
+[[nodiscard]] std::shared_ptr<const slam::KnownGrid> KnownGridOf(std::span<const TileSet::TilePtr> tiles,
+                                                                 double resolution_m, std::uint32_t epoch,
+                                                                 const slam::PlaceSearchOptions& options,
+                                                                 double near_m);
 
 }  // namespace cairn::server

@@ -20,6 +20,7 @@ std::optional<std::uint8_t> CellOf(MapEditKind kind) {
     case MapEditKind::kOccupied:
       return kOccupiedCell;
     case MapEditKind::kKeepOut:
+    case MapEditKind::kOrigin:
       break;
   }
   return std::nullopt;

@@ -1,6 +1,7 @@
 #include "server/maps/map_versions.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace cairn::server {
@@ -32,6 +33,18 @@ void MapVersions::Enable(std::uint32_t version, std::map<SessionId, RobotGrid> d
   outgoing.info.enabled = false;
   enabled_ = version;
   versions_.at(version).info.enabled = true;
+}
+
+std::optional<std::uint32_t> MapVersions::LeastNeeded(bool last) const {
+  const auto enabled = versions_.find(enabled_);
+  const std::uint32_t before = enabled == versions_.begin() ? 0 : std::prev(enabled)->first;
+  const std::uint32_t newest = versions_.rbegin()->first;
+  for (const auto& [number, version] : versions_) {
+    if (number != enabled_ && number != before && number != newest) return number;
+  }
+  if (last && newest != enabled_) return newest;
+  if (last && before != 0) return before;
+  return std::nullopt;
 }
 
 SessionId MapVersions::LastSession() const {

@@ -2,12 +2,13 @@
 // site was created. Every job adds a version, which is disabled at first. When another version is enabled,
 // the sessions' grids of the version enabled so far are stored, so that it can be enabled again (rolled back
 // to). The number of versions is bounded: the oldest is removed, except version 1, the enabled one, the
-// newest one, and the one that a switch under way will enable. Not thread-safe: used on the site's strand
-// only.
+// newest one, and the one that a switch under way will enable. Where memory is limited, version 1 can go as
+// well. Not thread-safe: used on the site's strand only.
 #pragma once
 
 #include <functional>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "common/service/map_info.h"
@@ -33,6 +34,12 @@ class MapVersions {
   [[nodiscard]] const MapVersion* Find(std::uint32_t version) const;
   // REQUIRES: Find(version). `displaced`: the sessions' grids of the version that has been enabled so far.
   void Enable(std::uint32_t version, std::map<SessionId, RobotGrid> displaced);
+
+  // The version that is least needed; nothing if all are. `last`: also one that a job has made last, and then the one
+  // before the enabled version, to which a roll back goes. Never the enabled one.
+  [[nodiscard]] std::optional<std::uint32_t> LeastNeeded(bool last) const;
+  // REQUIRES: it is not the enabled one.
+  void Remove(std::uint32_t version) { versions_.erase(version); }
 
   // Two sessions that no longer exist count as one from now on, with the number of the later one. `merge` makes one
   // grid of the parts that a version has of them, null where it has none. Returns the versions that this changed.

@@ -17,6 +17,15 @@ void Visit(OptionVisitor& visitor, MapsOptions& options) {
                "Nearer to 1, what was moved between two runs stays in the map for longer.");
   visitor.Integer("max_edits", options.max_edits, "", 0, 4096,
                   "Edits by people (cairn map edit) that each site may have at one time. Further ones are refused.");
+  visitor.Real(
+      "max_memory_mib", options.max_memory_mib, "MiB", 0.0, 1e9,
+      "Memory that the map of each site may take with its versions (cairn map info shows it). Above it, what is "
+      "least needed is given up: the layer of disagreement, old map versions that are not enabled, the "
+      "difference between the oldest earlier sessions, and what earlier sessions saw where others have drawn "
+      "as well. The map itself stays, also where it alone takes more. 0: no limit.");
+  visitor.Real("max_total_memory_mib", options.max_total_memory_mib, "MiB", 0.0, 1e9,
+               "The same for the maps of all sites together. The largest sites give up first. The estimators of the "
+               "robots are not counted: robots.max_robots and robots.max_earlier limit them. 0: no limit.");
 }
 
 }  // namespace cairn::server

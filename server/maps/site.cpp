@@ -24,6 +24,8 @@ Site::Site(const std::string& name, double resolution_m, const MapsOptions& opti
       joint_(options.past_probability),
       edits_(resolution_m, static_cast<std::size_t>(options.max_edits)),
       versions_(static_cast<std::size_t>(options.max_versions)),
+      memory_limit_(BytesOfMib(options.max_memory_mib)),
+      memory_is_limited_(options.max_memory_mib > 0.0 || options.max_total_memory_mib > 0.0),
       epoch_(beginning.epoch),
       tile_version_(beginning.tile_version),
       map_frame_(beginning.map_frame) {
@@ -123,20 +125,31 @@ void Site::AddVersion(MapVersion&& version, Done done, Wanted wanted) {
       site.RemoveOldVersions();
       site.StoreSite();
     });
+    site.version_added_ = Clock::now();
+    site.CountSoon();
     site.Refresh({}, {}, false);
     site.Send();
     done(number);
   });
 }
 
-void Site::Enable(std::uint32_t version, Done done, Wanted wanted) {
-  Run([version, done = Once<std::uint32_t>(std::move(done)), wanted = std::move(wanted)](Site& site) mutable {
+bool Site::MayBeAligned() const {
+  const MapInfo info = snapshot()->info;
+  const bool newest = std::none_of(info.versions.begin(), info.versions.end(),
+                                   [&info](const MapVersionInfo& one) { return one.version > info.enabled_version; });
+  return newest && !chosen_;
+}
+
+void Site::Enable(std::uint32_t version, Done done, Wanted wanted, EnabledBy by) {
+  Run([version, by, done = Once<std::uint32_t>(std::move(done)), wanted = std::move(wanted)](Site& site) mutable {
+    if (by == EnabledBy::kAlignment && site.chosen_)
+      return done(Fail(StatusCode::kFailedPrecondition, "a person has chosen the enabled map version"));
     if (wanted && !wanted()) return done(Fail(StatusCode::kCancelled, "no longer wanted"));
     if (site.switch_) {
       return done(Fail(StatusCode::kUnavailable, "another map version is being enabled; try again later"));
     }
     try {
-      site.Begin(version, std::move(done));
+      site.Begin(version, std::move(done), by == EnabledBy::kPerson);
     } catch (...) {
       site.switch_.reset();  // Otherwise no other switch could ever begin.
       throw;
@@ -179,14 +192,16 @@ void Site::Leave(SessionId session) {
   });
 }
 
-void Site::Publish(std::function<void()> then) {
+void Site::Publish(std::function<void()> then, Clock::time_point now) {
   if (publish_waits_.exchange(true)) {
     if (then) then();
     return;
   }
-  Run([then = std::move(then)](Site& site) {
+  Run([then = std::move(then), now](Site& site) {
     site.publish_waits_ = false;
+    site.ExpireDisagreement(now);
     site.Render();
+    site.StayWithinMemory(now);
     site.Send();
     if (then) then();
   });
@@ -241,6 +256,7 @@ void Site::Refresh(const std::vector<TileKey>& changed, const std::vector<TileKe
   after->info = InfoOf(after->tiles);
   CountMemory(*after);
   after->info.memory_bytes = memory_bytes_;
+  after->info.memory_note = memory_note_;
   info_changed_ = true;
   const MutexLock lock(mutex_);
   snapshot_ = std::move(after);

@@ -34,6 +34,7 @@
 #include "server/maps/map_snapshot.h"
 #include "server/maps/map_versions.h"
 #include "server/maps/maps_options.h"
+#include "server/maps/memory_shares.h"
 #include "server/ops/heartbeat.h"
 #include "server/ops/start_control.h"
 #include "server/outbound.h"
@@ -44,6 +45,7 @@ namespace cairn::server {
 // A version switch under way. It is complete when no session is awaited.
 struct VersionSwitch {
   std::uint32_t version = 0;
+  bool chosen = false;  // By a person.
   std::set<SessionId> awaited;
   std::map<SessionId, slam::OccupancyGrid::Chunks> staged;  // The new grids of the sessions that have answered.
   // Those that are not joined, because they could not follow or because the version says so.
@@ -55,6 +57,7 @@ struct VersionSwitch {
 
 class Site : public std::enable_shared_from_this<Site> {
  public:
+  using Clock = std::chrono::steady_clock;
   // Receives a map version; called once, on the site's strand. INTERNAL if the work ended with an exception.
   using Done = std::function<void(Result<std::uint32_t>)>;
   // Asked once, on the site's strand, before the work begins; false: the work is not done, and the answer is CANCELLED.
@@ -128,8 +131,15 @@ class Site : public std::enable_shared_from_this<Site> {
   void Close(std::function<void()> done);
   // Adds a disabled version; `done` receives its number.
   void AddVersion(MapVersion&& version, Done done, Wanted wanted = {});
+  // Who wants a version: a person who has chosen it, a job that a person has asked for or that joins a robot, or a job
+  // that fits robots to each other by itself. The last one must not undo what a person has chosen.
+  enum class EnabledBy : std::uint8_t { kPerson, kJob, kAlignment };
   // UNAVAILABLE: another switch is under way. NOT_FOUND: the version does not exist or has been removed.
-  void Enable(std::uint32_t version, Done done, Wanted wanted = {});
+  // FAILED_PRECONDITION: kAlignment, and a person has chosen the enabled version.
+  void Enable(std::uint32_t version, Done done, Wanted wanted = {}, EnabledBy by = EnabledBy::kPerson);
+  // Whether a job may enable a version without being asked: no person has chosen the enabled one, and there is no newer
+  // one about which a person has not decided. Thread rule: any thread.
+  [[nodiscard]] bool MayBeAligned() const;
   // What a person says about the map (common/map/map_edit.h); `done` receives the edit's number, on the strand.
   // FAILED_PRECONDITION: nothing is drawn yet, or not near it. NOT_FOUND: the site is deleted. Else errors of
   // MapEdits::Add.
@@ -141,15 +151,22 @@ class Site : public std::enable_shared_from_this<Site> {
   void ForgetEditsOfLostMap();
   // Renders and publishes what changed, soon; does nothing where an earlier call still waits for the strand. Then calls
   // `then`, if there is one.
-  void Publish(std::function<void()> then = {});
+  void Publish(std::function<void()> then = {}, Clock::time_point now = Clock::now());
   // Called once, on the strand; INTERNAL if the work ended with an exception.
   using SnapshotDone = std::function<void(Result<std::shared_ptr<const MapSnapshot>>)>;
   // The map with the layer of disagreement as it is now. The layer costs as much as the map itself, so it is made when
-  // somebody asks for it, and kept up to date until nobody has asked for a minute.
-  void AskDisagreement(SnapshotDone done);
+  // somebody asks for it, and kept up to date until nobody has asked for a minute before the `now` of Publish.
+  void AskDisagreement(SnapshotDone done, Clock::time_point now = Clock::now());
   // What one session alone has drawn, as a map of its own: for a fragment in its own frame. Only tiles of `level` are
   // in it. NOT_FOUND: the session has drawn nothing. REQUIRES: there is such a level.
   void AskPartOf(SessionId session, int level, SnapshotDone done);
+  // Of all sites together (memory_shares.h); 0: no limit. Thread rule: any thread.
+  void SetMemoryShare(std::uint64_t bytes) { memory_share_ = bytes; }
+  // The map takes more memory than it may, and nothing is left that it could give up. Thread rule: any thread.
+  [[nodiscard]] bool gives_no_more() const { return gives_no_more_; }
+  // A session that has ended and that the site can do without, because others have drawn all of its area; 0: none. It
+  // may be removed, if no robot goes on with it: then Leave is called. Thread rule: any thread.
+  [[nodiscard]] SessionId spare_session() const { return spare_session_; }
   // Does nothing but call `done` on the strand, to show that the strand makes progress.
   void Probe(std::function<void()> done);
 
@@ -173,7 +190,7 @@ class Site : public std::enable_shared_from_this<Site> {
   void LogFailure(const std::exception& error) const;
   // The functions below run on the strand only.
   void Apply(SessionId session, const slam::OccupancyGrid::Chunks& chunks);
-  void Begin(std::uint32_t version, Done done);
+  void Begin(std::uint32_t version, Done done, bool chosen);
   void FailSwitch(StatusCode code, const std::string& why);
   void Settle(std::uint32_t version, SessionId session, std::optional<Adopted>&& adopted);
   std::shared_ptr<GridOwner> OwnerOf(SessionId session) const;
@@ -186,6 +203,18 @@ class Site : public std::enable_shared_from_this<Site> {
   [[nodiscard]] std::vector<TileKey> RenderDisagreement();
   void CountMemory(const MapSnapshot& snapshot) noexcept;
   [[nodiscard]] bool MemoryIsToBeCounted() const;
+  void CountSoon();
+  void StayWithinMemory(Clock::time_point now);
+  [[nodiscard]] std::uint64_t MemoryLimit() const;
+  [[nodiscard]] std::string MemoryNote(bool above) const;
+  enum class GaveUp { kSomething, kLaterPerhaps, kNothing };
+  GaveUp GiveUpLeastNeeded(Clock::time_point now);
+  bool GiveUpVersion(bool last);
+  bool GiveUpLayer();
+  bool OfferSpareSession(Clock::time_point now);
+  void NoteLeft(SessionId session);
+  [[nodiscard]] std::vector<TileKey> DropDisagreement();
+  void ExpireDisagreement(Clock::time_point now);
   // Stores what people have said about the map, and publishes it. Returns its version.
   std::uint64_t ShowEdits();
   [[nodiscard]] Result<void> CheckNear(const MapEdit& edit) const;
@@ -205,7 +234,9 @@ class Site : public std::enable_shared_from_this<Site> {
   void RemoveRecords(const RecordRange& range);
   void StoreEverything();
   void KeepAsLayer(SessionId session);
-  void MergeOldestLayers();
+  void RemoveOtherLayers();
+  [[nodiscard]] std::vector<SessionId> ShownLayers() const;  // The one that ended first comes first.
+  void MergeOldestLayers(std::size_t most);
   void RemoveOldVersions();
   Result<void> RestoreVersions(const StoredSite& stored, StartControl& control);
   Result<void> RestoreLayers(StartControl& control);
@@ -225,6 +256,8 @@ class Site : public std::enable_shared_from_this<Site> {
   JointMap joint_;
   MapEdits edits_;
   MapVersions versions_;
+  const std::uint64_t memory_limit_;  // Bytes; 0: none.
+  const bool memory_is_limited_;      // By this, or with that of all other sites.
   std::uint32_t epoch_ = 0;
   std::uint64_t tile_version_ = 0;
   std::map<SessionId, Member> members_;
@@ -240,16 +273,26 @@ class Site : public std::enable_shared_from_this<Site> {
   std::set<std::uint32_t> stored_versions_;
   bool info_changed_ = true;
   std::optional<VersionSwitch> switch_;
-  std::set<TileKey> unsent_;  // Tiles (or tombstones) to publish.
+  std::atomic<bool> chosen_ = false;  // The enabled version, by a person. Written on the strand only.
+  std::set<TileKey> unsent_;          // Tiles (or tombstones) to publish.
   // Until then the layer of disagreement is kept up to date.
-  std::optional<std::chrono::steady_clock::time_point> disagreement_wanted_;
+  std::optional<Clock::time_point> disagreement_wanted_;
   std::optional<std::chrono::steady_clock::time_point> memory_counted_;
   std::uint64_t memory_bytes_ = 0;  // As counted then, ...
   bool memory_changed_ = false;     // ... and whether the map has changed since.
+  GivenUp given_up_;
+  bool disagreement_given_up_ = false;
+  std::string memory_note_;
+  std::set<SessionId> offered_;                  // As spare_session, in this round.
+  std::optional<Clock::time_point> next_offer_;  // Not before.
+  std::optional<Clock::time_point> version_added_;
 
   std::atomic<bool> lost_part_{false}, loading_{false};
   std::set<SessionId> stored_members_;  // Set by Restore, before others know the site.
   std::atomic<std::uint64_t> map_frame_;
+  std::atomic<std::uint64_t> memory_share_{0};
+  std::atomic<bool> gives_no_more_{false};
+  std::atomic<SessionId> spare_session_{0};
   std::atomic<std::uint64_t> asked_{0}, handled_{0};  // Pieces of work posted to the strand, and finished on it.
   std::atomic<std::uint64_t> encoded_{0};             // Tiles: a piece of work that encodes thousands is progress.
   mutable Mutex mutex_;

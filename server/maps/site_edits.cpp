@@ -21,6 +21,7 @@ std::uint64_t Site::ShowEdits() {
 
 // A tile far away would make the whole map too large for those who draw it or are localised in it.
 Result<void> Site::CheckNear(const MapEdit& edit) const {
+  if (edit.kind == MapEditKind::kOrigin) return {};  // It makes no tile.
   constexpr double kNear_m = 20.0;
   const auto box = joint_.DrawnBox();
   if (!box) return Fail(StatusCode::kFailedPrecondition, "nothing is drawn in site '" + name_ + "' yet");

@@ -26,12 +26,19 @@ void Site::KeepAsLayer(SessionId session) {
     joint_.SetPast(session);
     layers_.insert(session);
     StoreLayer(session);
-    if (!switch_) MergeOldestLayers();
+    if (!switch_) MergeOldestLayers(kMaxLayers);
   } else {
     joint_.Remove(session);
     layers_.erase(session);
   }
-  // All others go, also those that an earlier change has left because there was no room for it.
+  RemoveOtherLayers();
+  NoteLeft(session);
+  StoreSite();
+}
+
+// All records of layers that are none any more, also those that an earlier change has left because there was no room
+// for it.
+void Site::RemoveOtherLayers() {
   std::set<SessionId> stay = layers_;
   stay.insert(unreadable_layers_.begin(), unreadable_layers_.end());
   SessionId next = 0;
@@ -40,14 +47,18 @@ void Site::KeepAsLayer(SessionId session) {
     next = kept + 1;
   }
   RemoveRecords({.kind = RecordKind::kLayer, .owner = site_id_, .first = next});
-  StoreSite();
 }
 
-void Site::MergeOldestLayers() {
-  std::vector<SessionId> shown;  // The one that ended first comes first.
+std::vector<SessionId> Site::ShownLayers() const {
+  std::vector<SessionId> shown;
   for (const SessionId session : joint_.past())
     if (layers_.contains(session) && !joint_.hidden().contains(session)) shown.push_back(session);
-  for (std::size_t merged = 0; shown.size() - merged > kMaxLayers; ++merged) {
+  return shown;
+}
+
+void Site::MergeOldestLayers(std::size_t most) {
+  const std::vector<SessionId> shown = ShownLayers();
+  for (std::size_t merged = 0; shown.size() - merged > most; ++merged) {
     const SessionId older = shown[merged], later = shown[merged + 1];
     const RobotGrid of_older{.chunks = joint_.ChunksOf(older)}, of_later{.chunks = joint_.ChunksOf(later)};
     // A version without a part of a session leaves its layer as it is.

@@ -1,6 +1,5 @@
-// What a site makes of its map only when it is asked for (site.h), and what it says of its own size.
+// What a site makes of its map only when it is asked for (site.h).
 #include <chrono>
-#include <exception>
 #include <utility>
 
 #include "server/maps/answer_once.h"
@@ -10,18 +9,21 @@
 namespace cairn::server {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 // The layer of disagreement is kept up to date for so long after somebody has asked for it.
 constexpr std::chrono::seconds kDisagreementLasts{60};
-// Counting looks at every chunk of every version.
-constexpr std::chrono::seconds kCountEvery{10};
 
 }  // namespace
 
 std::vector<TileKey> Site::RenderDisagreement() {
-  if (!disagreement_wanted_) return {};
-  if (Clock::now() < *disagreement_wanted_) return joint_.RenderDisagreement();
+  return disagreement_wanted_ ? joint_.RenderDisagreement() : std::vector<TileKey>{};
+}
+
+void Site::ExpireDisagreement(Clock::time_point now) {
+  if (disagreement_wanted_ && now >= *disagreement_wanted_) Refresh({}, DropDisagreement(), false);
+}
+
+// Returns the tiles that are gone.
+std::vector<TileKey> Site::DropDisagreement() {
   disagreement_wanted_.reset();
   std::vector<TileKey> gone;
   for (const auto& [key, cells] : joint_.disagreement()) gone.push_back(key);
@@ -29,9 +31,9 @@ std::vector<TileKey> Site::RenderDisagreement() {
   return gone;
 }
 
-void Site::AskDisagreement(SnapshotDone done) {
-  Run([done = Once<std::shared_ptr<const MapSnapshot>>(std::move(done))](Site& site) {
-    site.disagreement_wanted_ = Clock::now() + kDisagreementLasts;
+void Site::AskDisagreement(SnapshotDone done, Clock::time_point now) {
+  Run([now, done = Once<std::shared_ptr<const MapSnapshot>>(std::move(done))](Site& site) {
+    site.disagreement_wanted_ = now + kDisagreementLasts;
     site.Render();
     done(site.snapshot());
   });
@@ -60,29 +62,6 @@ void Site::AskPartOf(SessionId session, int level, SnapshotDone done) {
     part->drawn = true;
     done(std::shared_ptr<const MapSnapshot>(std::move(part)));
   });
-}
-
-bool Site::MemoryIsToBeCounted() const {
-  return memory_changed_ && (!memory_counted_ || Clock::now() - *memory_counted_ >= kCountEvery);
-}
-
-void Site::CountMemory(const MapSnapshot& snapshot) noexcept {
-  memory_changed_ = true;
-  if (!MemoryIsToBeCounted()) return;
-  memory_counted_ = Clock::now();
-  try {
-    MemoryCount memory;
-    joint_.Count(memory);
-    versions_.Count(memory);
-    for (const TileSet* tiles : {&snapshot.tiles, &snapshot.disagreement}) {
-      for (int level = 0; level < kPyramidLevels; ++level)
-        tiles->ForEach(level,
-                       [&](const TileSet::TilePtr& tile) { memory.Add(tile, sizeof(Tile) + tile->bytes.size()); });
-    }
-    memory_bytes_ = memory.bytes();
-    memory_changed_ = false;
-  } catch (const std::exception&) {  // Without memory for the count, the last one stays.
-  }
 }
 
 }  // namespace cairn::server

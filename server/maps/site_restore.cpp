@@ -77,7 +77,9 @@ void Site::StoreSite() {
                     .merged = merged_,
                     .map_frame = map_frame_,
                     .edits = *edits_.all(),
-                    .edits_version = edits_.version()};
+                    .edits_version = edits_.version(),
+                    .given_up = given_up_,
+                    .chosen = chosen_};
   for (const auto& [session, member] : members_) stored.members[member.robot] = session;  // The last one.
   Put({RecordKind::kSite, site_id_, 0}, [stored = std::move(stored)] { return BytesOf(stored); });
 }
@@ -117,6 +119,9 @@ Result<void> Site::Restore(const StoredSite& stored, StartControl& control) {
   for (const SessionId session : stored.fragments) joint_.SetHidden(session, true);
   for (const SessionId session : stored.past) joint_.SetPast(session);
   merged_ = stored.merged;
+  given_up_ = stored.given_up;
+  memory_note_ = MemoryNote(false);
+  chosen_ = stored.chosen;
   const std::size_t left_out = edits_.Restore(stored.edits, stored.edits_version, [&control] { control.Advance(); });
   if (left_out > 0) spdlog::error("site {}: {} edits of its map cover too much and are left out", name_, left_out);
   joint_.SetEdits(edits_.overlay());
@@ -136,7 +141,9 @@ void Site::PutAside(const std::string& what, const Status& why) {
 
 Result<void> Site::RestoreVersions(const StoredSite& stored, StartControl& control) {
   std::map<std::uint32_t, MapVersion> versions;
-  versions[1].info = {.version = 1, .enabled = false, .job = 0, .note = "live"};
+  const auto add_live = [&versions] { versions[1].info = {.version = 1, .enabled = false, .job = 0, .note = "live"}; };
+  // Without a record it is the map that robots draw, or was given up.
+  if (stored.given_up.versions == 0 || stored.enabled_version == 1) add_live();
   std::uint32_t next = stored.next_version;
   const auto take = [&versions, &control](std::uint64_t number, std::string_view bytes) -> Result<void> {
     control.Advance();
@@ -153,6 +160,7 @@ Result<void> Site::RestoreVersions(const StoredSite& stored, StartControl& contr
   };
   const RecordRange all{.kind = RecordKind::kMapVersion, .owner = site_id_};
   if (auto read = ReadEach(journal_->store(), all, take, unreadable); !read) return read;
+  if (versions.empty()) add_live();
   for (const auto& [number, version] : versions) stored_versions_.insert(number);
   const std::uint32_t newest = versions.rbegin()->first;
   const std::uint32_t enabled = versions.contains(stored.enabled_version) ? stored.enabled_version : newest;

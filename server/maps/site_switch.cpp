@@ -33,14 +33,19 @@ class Site::Ticket {
   bool used_ = false;
 };
 
-void Site::Begin(std::uint32_t version, Done done) {
+void Site::Begin(std::uint32_t version, Done done, bool chosen) {
   const MapVersion* const wanted = versions_.Find(version);
   if (wanted == nullptr) {
     return done(Fail(StatusCode::kNotFound, "site '" + name_ + "' has no map version " + std::to_string(version)));
   }
-  if (version == versions_.enabled()) return done(version);
+  if (version == versions_.enabled()) {
+    chosen_ = chosen_ || chosen;
+    StoreSite();
+    return done(version);
+  }
   switch_.emplace();
   switch_->version = version;
+  switch_->chosen = chosen;
   switch_->done = std::move(done);
   for (const auto& [session, part] : wanted->parts) {
     switch_->awaited.insert(session);
@@ -92,9 +97,11 @@ void Site::CommitIfComplete() {
     }
     const std::uint32_t before = versions_.enabled();
     versions_.Enable(complete.version, std::move(complete.displaced));
+    chosen_ = complete.chosen;
     switches_[++epoch_] = generation_;
     while (switches_.size() > kMostSwitches) switches_.erase(switches_.begin());
     StoreVersion(before);
+    CountSoon();
     RenderAll();
   });
   *complete.completed = true;

@@ -76,7 +76,7 @@ Reply AnswerPose(const Request& request, const Sessions& sessions) {
   reply.map_epoch = newest.map_epoch;
   if (request.latest || request.stamp == newest.stamp) {
     reply.poses.push_back(newest);
-    if (request.latest && newest.localized) reply.hypotheses = session.hypotheses;
+    if (request.latest) reply.hypotheses = session.hypotheses;
     // None are known since the server was started, or since the map has moved.
     if (request.latest && newest.localized && reply.hypotheses.empty())
       reply.hypotheses = {{newest.stamp, newest.T_map_robot, 1.0}};

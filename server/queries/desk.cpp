@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/service/request_id.h"
+#include "common/service/start_pose.h"
 #include "common/version.h"
 #include "server/ops/log_context.h"
 #include "server/queries/answers.h"
@@ -149,9 +150,7 @@ std::optional<Answer> Desk::AnswerTo(const Request& request) {
     case RequestKind::kSessionEnd:
       return Order(request, [&](const auto& receipt) { return roster_.End(request.robot, receipt); });
     case RequestKind::kRelocalise:
-      return Order(request, [&](const auto& receipt) {
-        return roster_.Relocalise(request.robot, request.T_map_robot, receipt);
-      });
+      return Relocalise(request);
     case RequestKind::kLocalise:
     case RequestKind::kMap:
       return Order(request, [&](const auto& receipt) {
@@ -177,13 +176,14 @@ std::optional<Answer> Desk::AnswerTo(const Request& request) {
 }
 
 template <typename Give>
-std::optional<Answer> Desk::Order(const Request& request, const Give& give) {
-  const auto receipt = std::make_shared<Receipt>([answers = answers_, request](bool taken) {
-    answers->Send(
-        request,
+std::optional<Answer> Desk::Order(const Request& request, const Give& give, const std::function<void(Reply&)>& then) {
+  const auto receipt = std::make_shared<Receipt>([answers = answers_, request, then](bool taken) {
+    Reply reply =
         ReplyTo(request, taken ? Status{}
                                : Status{StatusCode::kFailedPrecondition,
-                                        "the session has ended, or the robot's place in the map is not known"}));
+                                        "the session has ended, or the robot's place in the map is not known"});
+    if (taken && then) then(reply);
+    answers->Send(request, std::move(reply));
   });
   const Result<void> given = give(receipt);
   if (given) return std::nullopt;
@@ -229,7 +229,43 @@ Reply Desk::StatusReply(const Request& request) {
   return reply;
 }
 
+// Where somebody says where the robot is, its session looks at that place with the next scan. Otherwise a job looks for
+// it in the whole map of its site, from when the session knows that it is lost. Of one that is lost already, what it
+// has seen since counts. A job also joins a robot that is not joined with the map of its site at the place given.
+std::optional<Answer> Desk::Relocalise(const Request& request) {
+  const auto session = roster_.FindOrFail(request.robot);
+  if (!session) return ReplyTo(request, session.error());
+  const SessionRecord& record = (*session)->record();
+  const std::string site = record.state().site;
+  const std::string id = RequestId(request.client, request.sequence);
+  const PoseReport pose = record.snapshot().status.pose;
+  // In its own map it knows where it is; asked is where it is in that of its site.
+  const bool fragment = record.joining().fragment && !record.localises();
+  const bool joins = request.T_map_robot && fragment;
+  const bool lost = !request.T_map_robot && !pose.localized && pose.reason == PoseReason::kLost;
+  if ((fragment || lost) && record.begun() && !(*session)->ending()) {
+    JobSubject about{request.robot};
+    if (joins) {
+      if (auto valid = ValidateStart(*request.T_map_robot); !valid) return ReplyTo(request, valid.error());
+      about.places = {{0, *request.T_map_robot, 1.0}};
+    }
+    return AnswerAboutJob(request, worker_.Submit(site, JobKind::kRelocalise, true, id, about));
+  }
+  const auto order = [&](const auto& receipt) {
+    return roster_.Relocalise(request.robot, request.T_map_robot, receipt);
+  };
+  if (request.T_map_robot) return Order(request, order);
+  return Order(request, order, [&worker = worker_, site, robot = request.robot, id](Reply& reply) {
+    auto job = worker.Submit(site, JobKind::kRelocalise, true, id, {robot});
+    // The robot looks for itself, anyway.
+    if (!job) spdlog::warn("robot {}: no job looks for it: {}", robot, job.error().message);
+    if (job) reply.jobs = {*std::move(job)};
+  });
+}
+
 Result<Job> Desk::SubmitJob(const Request& request) {
+  if (request.job_kind == JobKind::kRelocalise)
+    return Fail(StatusCode::kInvalidArgument, "a job that looks for a robot is submitted by the request RELOCALISE");
   if (atlas_.Find(request.site) == nullptr) return Fail(StatusCode::kNotFound, "no site '" + request.site + "'");
   return worker_.Submit(request.site, request.job_kind, request.enable, RequestId(request.client, request.sequence));
 }

@@ -9,6 +9,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -65,12 +66,14 @@ class Desk {
   // Returns nothing if the answer is sent later.
   std::optional<Answer> AnswerTo(const Request& request);
   Result<Job> SubmitJob(const Request& request);
+  std::optional<Answer> Relocalise(const Request& request);
   std::optional<Answer> EnableMap(const Request& request);
   std::optional<Answer> EditMap(const Request& request);
   std::optional<Answer> AskTiles(const Request& request);
-  // Where the order is taken, the answer is sent when it is on the disk.
+  // Where the order is taken, the answer is sent when it is on the disk. `then` is called before, on the session's
+  // strand.
   template <typename Give>
-  std::optional<Answer> Order(const Request& request, const Give& give);
+  std::optional<Answer> Order(const Request& request, const Give& give, const std::function<void(Reply&)>& then = {});
   std::optional<Answer> AnswerAboutJob(const Request& request, Result<Job> job);
   // Both return one snapshot, or none if there is no such robot or site.
   [[nodiscard]] Sessions SessionOf(const std::string& robot) const;

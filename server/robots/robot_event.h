@@ -15,6 +15,7 @@
 #include "server/robots/receipt.h"
 #include "server/slam/mapper.h"
 #include "server/slam/trail/keyframe.h"
+#include "server/store/records.h"
 
 namespace cairn::server {
 
@@ -28,6 +29,7 @@ struct SessionMaterial {
   // map version has joined it (maps/robot_grid.h).
   bool start_known = true;
   bool joinable = true;  // See SessionRecord::Joining.
+  slam::Mapper::LostView lost{};
 };
 
 struct SnapshotWanted {
@@ -38,6 +40,13 @@ struct SnapshotWanted {
 struct RelocaliseWanted {
   std::optional<Pose2> T_map_robot;
   std::shared_ptr<Receipt> receipt{};  // Null: nobody is told.
+};
+
+// A job has looked for the robot in the map of its site.
+struct PlaceFound {
+  std::optional<PlaceSuggested> place;     // If there is only one place where the robot can be.
+  std::vector<PoseHypothesis> places;      // All where it may be, for queries.
+  std::function<void(bool taken)> done{};  // Called once: whether the robot's scans will confirm the place, or not.
 };
 
 // From now on the robot is only localised, in this map; null: it maps again. `again`: the map of a robot that is only
@@ -67,6 +76,6 @@ struct Finish {
 };
 
 using RobotEvent = std::variant<ScanArrival, OdometryArrival, Correction, EpochChange, SnapshotWanted, RelocaliseWanted,
-                                LocaliseWanted, StartRefused, Finish>;
+                                LocaliseWanted, PlaceFound, StartRefused, Finish>;
 
 }  // namespace cairn::server

@@ -66,6 +66,10 @@ bool RobotQueue::Push(LocaliseWanted wanted) {
   return PushIfRoom(std::move(wanted));
 }
 
+bool RobotQueue::Push(PlaceFound found) {
+  return PushIfRoom(std::move(found));
+}
+
 void RobotQueue::Push(StartRefused refused) {
   const MutexLock lock(mutex_);
   control_.push_back({next_++, std::move(refused)});

@@ -5,7 +5,7 @@
 //  - odometry: the two oldest become one; poses in `odom` are absolute, so leaving out the older keeps all motion;
 //  - corrections: the newest wins; one displaced is returned and never adopted;
 //  - changes of the epoch: the newest stays, where two follow each other;
-//  - snapshots, and that the robot has to be found: refused while kMaxControl control events wait;
+//  - snapshots, that the robot has to be found, and where it was found: refused while kMaxControl control events wait;
 //  - that the start is refused: never refused, asked once;
 //  - the end of the session: never refused. It is asked for once, and once more when the server stops; whoever asks
 //    again waits for the first one, or is refused while kMaxControl control events wait.
@@ -38,6 +38,7 @@ class RobotQueue {
   bool Push(SnapshotWanted wanted);
   bool Push(RelocaliseWanted wanted);
   bool Push(LocaliseWanted wanted);
+  bool Push(PlaceFound found);
   void Push(StartRefused refused);
   // False where too many wait.
   bool PushAgain(Finish finish);

@@ -110,9 +110,9 @@ Status Roster::WhyNotKnown(const std::string& robot) const {
   const MutexLock lock(mutex_);
   const auto found = not_restored_.find(robot);
   if (found == not_restored_.end()) return {StatusCode::kFailedPrecondition, what + "; open a new one"};
-  const auto& [code, why] = found->second;
-  if (code == StatusCode::kInvalidArgument) return {code, what + " any more (" + why + ")"};
-  return {StatusCode::kFailedPrecondition, what + "; open a new one (" + why + ")"};
+  const Status& why = found->second;
+  if (why.code == StatusCode::kInvalidArgument) return {why.code, what + " any more (" + why.message + ")"};
+  return {StatusCode::kFailedPrecondition, what + "; open a new one (" + why.message + ")"};
 }
 
 // Whether the request may take over this session, or else why not. REQUIRES: the session has not ended.
@@ -127,8 +127,8 @@ Result<void> Roster::MayTakeOver(const Session& session, const SessionRequest& r
   if (state.client != request.client && session.record().alive())
     return Fail(StatusCode::kAlreadyExists, "another live client streams as '" + request.robot + "'");
   if (state.site != request.site) {
-    return Fail(StatusCode::kFailedPrecondition,
-                "'" + request.robot + "' has an open session in site '" + state.site + "'; end it first");
+    return Fail(StatusCode::kFailedPrecondition, "'" + request.robot + "' has an open session in site '" + state.site +
+                                                     "'; end it first (`cairn session end " + request.robot + "`)");
   }
   return {};
 }
@@ -268,6 +268,7 @@ void Roster::Tick() {
   }
   SendRefusals();
   RetireGone();
+  ForgetSpareSessions();
   const MutexLock lock(mutex_);
   for (const auto& [id, session] : earlier_) session->TickEnded(now);
   StoreQuiet();

@@ -163,6 +163,7 @@ class Roster {
   Result<std::shared_ptr<Session>> GivesWay(NameId robot_id) const CAIRN_REQUIRES(mutex_);
   void Refuse(const SessionRequest& request, Status status);
   void RetireGone();
+  void ForgetSpareSessions() CAIRN_EXCLUDES(mutex_);
   void SendRefusals();
 
   const RobotsOptions options_;

@@ -51,7 +51,7 @@ std::int64_t SecondsSince1970() {
   return std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
-tl::unexpected<Status> GivenUp() {
+tl::unexpected<Status> StartGivenUp() {
   return Fail(StatusCode::kCancelled, "the start was given up");
 }
 
@@ -130,7 +130,7 @@ Result<void> Roster::RestoreTogether(const std::vector<SessionId>& ids, const Re
   if (how.control.given_up()) {
     for (const RestoredSession& session : sessions)
       if (session) (*session)->KeepStored();
-    return GivenUp();
+    return StartGivenUp();
   }
   for (std::size_t i = 0; i < ids.size(); ++i) Register(ids[i], std::move(sessions[i]));
   return {};
@@ -150,7 +150,7 @@ Result<void> Roster::RestoreDoubtful(SessionId id, Restoring how) {
   if (how.control.given_up()) {
     if (session) (*session)->KeepStored();
     if (auto marked = marks.Set(id, failures); !marked) return marked;
-    return GivenUp();
+    return StartGivenUp();
   }
   if (how.with_journal) {
     if (auto unmarked = marks.Succeeded({id}); !unmarked) return unmarked;
@@ -379,7 +379,7 @@ Roster::RestoredSession Roster::GoOn(const Stored& stored, Begun begun, const Re
     return stored.site->Switched(epoch, generation);
   };
   const auto replay = [&, &session = session](std::uint64_t at, JournalEntry&& entry) -> Result<void> {
-    if (how.control.given_up()) return GivenUp();
+    if (how.control.given_up()) return StartGivenUp();
     session->Replay(std::move(entry), switched);
     how.control.Advance();
     return how.marks != nullptr ? how.marks->Reached(id, at) : Result<void>{};

@@ -144,7 +144,7 @@ void Session::SetLiveliness(bool alive) {
   record_.SetAlive(alive);
   const SessionPhase wanted = alive ? SessionPhase::kActive : SessionPhase::kSuspended;
   if (ending_ || record_.phase() == wanted) return;
-  Status status = alive ? Status{} : Status{StatusCode::kUnavailable, "the robot's client is not alive"};
+  Status status = alive ? Status{} : Status{StatusCode::kUnavailable, "the robot's client has left; it may come back"};
   if (record_.SetPhase(wanted, std::move(status))) AnnounceState();
 }
 

@@ -42,6 +42,8 @@ class Session : public GridOwner, public std::enable_shared_from_this<Session> {
   void SetMapEpoch(std::uint32_t epoch) override;
   // Asks for a snapshot; false where too many wait.
   bool Post(SnapshotWanted&& wanted);
+  // Tells where a job has found the robot; false where too many events wait, and then its `done` is not called.
+  bool Post(PlaceFound&& found);
   // From now on it is a fragment: it is not where somebody said it starts.
   void RefuseStart(const std::string& why);
   // The robot has to be found in its map. FAILED_PRECONDITION: the session is ending, or a pose is given and the robot

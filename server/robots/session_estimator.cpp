@@ -7,15 +7,12 @@
 
 #include "server/maps/localising_tiles.h"
 #include "server/maps/stored_grid.h"
-#include "server/robots/most_believed.h"
 
 namespace cairn::server {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// How often the poses of the particles are summed up for queries.
-constexpr std::uint64_t kHypothesesPeriod_ns = kNanosPerSecond / 2;
 // How often landmarks are copied for queries: a landmark hardly moves in less time.
 constexpr auto kLandmarkPeriod = std::chrono::milliseconds(500);
 
@@ -94,6 +91,8 @@ void SessionEstimator::Discard(RobotEvent&& event) {
                   .robot = identity_.status.session.robot,
                   .snapshot = {},
                   .grid_options = pipeline_.mapper().grid().options()});
+  } else if (auto* const found = std::get_if<PlaceFound>(&event)) {
+    found->done(false);
   } else if (auto* const finish = std::get_if<Finish>(&event)) {
     if (finish->done) finish->done();
   }
@@ -152,9 +151,12 @@ void SessionEstimator::Used(const Scan& scan, const slam::ScanOutcome& outcome) 
     report.reason = PoseReason::kLost;
   }
   if (outcome.keyframe) Drive(outcome.T_map_robot);
+  // Before the pose is added, which lies on the new path already.
+  if (pipeline_.mapper().path_changed_at() != path_changed_at_) FollowPath({});
   if (!replaying_) outputs_.send(report);
   const std::chrono::duration<double, std::milli> latency = Clock::now() - waiting->second.received;
   record_.ScanUsed(waiting->second.stream, report, outcome.stamp, outcome.keyframe, latency.count());
+  if (outcome.keyframe) record_.SetLearned(pipeline_.mapper().learned());
   waiting_.erase(waiting);  // Only now: whatever fails before leaves it among those to be dropped.
   if (outcome.keyframe && !replaying_) {
     GridChange change = TakeGridChange();
@@ -189,20 +191,6 @@ void SessionEstimator::RefreshLandmarks(bool at_once) {
   record_.SetLandmarks(ReportsOf(pipeline_.mapper().landmarks(), identity_.status.session.robot));
 }
 
-void SessionEstimator::RefreshHypotheses(const PoseReport& report, bool in_known_map) {
-  // By the robot's clock, which may be set back.
-  const auto [earlier, later] = std::minmax(report.stamp, hypotheses_refreshed_);
-  if (NanosBetween(earlier, later) < kHypothesesPeriod_ns) return;
-  hypotheses_refreshed_ = report.stamp;
-  std::vector<PoseHypothesis> hypotheses;
-  if (report.localized) {
-    // A robot that is only localised has one hypothesis: its filter stays where it stopped mapping.
-    hypotheses = in_known_map ? std::vector<PoseHypothesis>{{report.stamp, report.T_map_robot, 1.0}}
-                              : MostBelieved(pipeline_.mapper().belief(report.T_map_robot), report.stamp);
-  }
-  record_.SetHypotheses(std::move(hypotheses));
-}
-
 void SessionEstimator::On(Correction&& correction) {
   Store(CorrectionTaken{correction.epoch, correction.generation, ToStored(correction.grid)});
   Adopted adopted{
@@ -222,49 +210,15 @@ void SessionEstimator::On(EpochChange&& change) {
 }
 
 void SessionEstimator::SetEpoch(std::uint32_t epoch) {
+  if (epoch != epoch_) {  // What a job has found are places in the map before.
+    pipeline_.mapper().ForgetSuggestion();
+    if (!looked_for_.empty()) record_.SetHypotheses({});
+    looked_for_.clear();
+  }
   epoch_ = epoch;
   record_.SetEpoch(epoch_);
   const auto known = pipeline_.mapper().known_map_epoch();
   if (known && *known != epoch_) record_.LoseLast();
-}
-
-// The grid before a correction, and the path to go back to with it.
-RobotGrid SessionEstimator::DisplacedGrid() {
-  const slam::Mapper& mapper = pipeline_.mapper();
-  RobotGrid displaced{.chunks = PublishedChunks(),
-                      .keyframes = mapper.keyframes_made(),
-                      .path = {},
-                      .numbers = {},
-                      .fragment = fragment_};
-  if (auto path = mapper.BestPath(); path.size() == mapper.keyframe_count()) {
-    displaced.path = std::make_shared<const std::vector<Pose2>>(std::move(path));
-    displaced.numbers = std::make_shared<const std::vector<std::uint64_t>>(mapper.keyframe_numbers());
-  }
-  return displaced;
-}
-
-bool SessionEstimator::AdoptGrid(std::uint32_t epoch, const RobotGrid& grid) {
-  slam::Mapper& mapper = pipeline_.mapper();
-  const auto path = grid.path != nullptr ? std::span<const Pose2>(*grid.path) : std::span<const Pose2>();
-  const auto numbers = grid.numbers != nullptr ? std::span(*grid.numbers) : std::span<const std::uint64_t>();
-  const std::vector<Pose2> before = mapper.BestPath();
-  // A session that was not stored to its end may not be able to follow: then its place in this map is not known.
-  // The map of a fragment is in a frame of its own: a grid in another frame does not fit a path that cannot follow.
-  const bool adopted = mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), grid.chunks), grid.keyframes, path,
-                                        numbers, fragment_);
-  const bool fragment = grid.fragment || !adopted;
-  if (fragment && (!fragment_ || !adopted)) driven_m_ = 0.0;  // So that no job joins it again at once.
-  fragment_ = fragment;
-  if (!fragment_) start_refused_.clear();
-  T_map_keyframe_.reset();
-  // A robot that sends nothing more is where the map version has it as well. (One that is only localised was there when
-  // it mapped last, and must be found again.)
-  const std::vector<Pose2> after = mapper.BestPath();
-  if (!mapper.localises() && !before.empty() && after.size() == before.size())
-    record_.MoveLast(after.back() * before.back().Inverse());
-  TellJoining();
-  SetEpoch(epoch);
-  return adopted;
 }
 
 void SessionEstimator::Drive(const Pose2& T_map_robot) {
@@ -289,7 +243,8 @@ void SessionEstimator::On(SnapshotWanted&& wanted) {
                .snapshot = pipeline_.mapper().Snapshot(),
                .grid_options = pipeline_.mapper().grid().options(),
                .start_known = !fragment_,
-               .joinable = pipeline_.mapper().follows_paths()});
+               .joinable = pipeline_.mapper().follows_paths(),
+               .lost = pipeline_.mapper().SeenWhileLost()});
 }
 
 void SessionEstimator::On(RelocaliseWanted&& wanted) {
@@ -317,15 +272,11 @@ void SessionEstimator::On(LocaliseWanted&& wanted) {
 bool SessionEstimator::Localise(LocaliseTaken&& taken) {
   std::shared_ptr<const slam::KnownGrid> map;
   if (!taken.maps_again) {
-    slam::KnownGrid::Source source{{}, taken.resolution_m, taken.epoch};
-    for (const auto& tile : taken.tiles) {
-      if (auto cells = DecodeCells(tile->bytes, tile->encoding))
-        source.tiles.emplace(slam::ChunkKey{tile->key.x, tile->key.y},
-                             std::make_shared<const TileCells>(std::move(*cells)));
-    }
-    if (!slam::KnownGrid::IsBounded(source)) source = {{}, options_.grid.resolution_m, taken.epoch};
-    map =
-        std::make_shared<const slam::KnownGrid>(std::move(source), options_.recovery.place, options_.self_check.near_m);
+    const auto known_grid = [&](std::span<const TileSet::TilePtr> tiles, double resolution_m) {
+      return KnownGridOf(tiles, resolution_m, taken.epoch, options_.recovery.place, options_.self_check.near_m);
+    };
+    map = known_grid(taken.tiles, taken.resolution_m);
+    if (map == nullptr) map = known_grid({}, options_.grid.resolution_m);
   }
   // A robot that can not map again, because its place is not known or it is not joined, is localised on.
   const bool begins = map != nullptr && !pipeline_.mapper().localises();
@@ -341,6 +292,8 @@ void SessionEstimator::On(StartRefused&& refused) {
   Store(StartRefusal{refused.why});
   fragment_ = true;
   start_refused_ = std::move(refused.why);
+  pipeline_.mapper().ForgetSuggestion();  // It is a place in the map of the others.
+  record_.MovePath({}, true, fragment_);  // Nor was it localized before.
   TellJoining();
   if (outputs_.hidden && !replaying_) outputs_.hidden();
   RefreshLandmarks(true);
@@ -388,6 +341,7 @@ void SessionEstimator::On(Finish&& finish) {
     pipeline_.Finish();
     RefreshLandmarks(true);
     ended_ = finish.final;
+    if (ended_) pipeline_.mapper().ForgetSuggestion();
   }
   if (finish.done) finish.done();
 }

@@ -106,6 +106,9 @@ class SessionEstimator {
   void On(SnapshotWanted&& wanted);
   void On(RelocaliseWanted&& wanted);
   void On(LocaliseWanted&& wanted);
+  void On(PlaceFound&& found);
+  // Whether the robot's next scans will confirm the place, or not.
+  bool Suggest(const PlaceSuggested& place);
   // False if it cannot map again, because its place is not known or it is not joined with the map.
   bool Localise(LocaliseTaken&& taken);
   void On(StartRefused&& refused);
@@ -129,6 +132,7 @@ class SessionEstimator {
   RobotGrid DisplacedGrid();
   // Returns false if the grid stays as it was, because the path cannot follow.
   bool AdoptGrid(std::uint32_t epoch, const RobotGrid& grid);
+  void FollowPath(std::optional<bool> fragment);
   void SetEpoch(std::uint32_t epoch);
   void Drive(const Pose2& T_map_robot);
   void TellJoining();
@@ -146,6 +150,7 @@ class SessionEstimator {
   Stamp first_stamp_ = 0;
   double driven_m_ = 0.0;                                      // See SessionRecord::Joining. Along the keyframes.
   std::optional<Pose2> T_map_keyframe_;                        // The last one; empty after a correction.
+  std::uint64_t path_changed_at_ = 0;                          // Mapper::path_changed_at when past poses followed it.
   std::shared_ptr<const std::atomic<bool>> switch_completed_;  // Belongs to the last correction.
   bool ended_ = false;
   bool replaying_ = false;
@@ -153,6 +158,8 @@ class SessionEstimator {
   std::unordered_map<const Scan*, Waiting> waiting_;  // Scans inside the pipeline; its pairing bounds them.
   std::chrono::steady_clock::time_point landmarks_refreshed_{};
   Stamp hypotheses_refreshed_ = 0;
+  bool hypotheses_localized_ = false;
+  std::vector<PoseHypothesis> looked_for_;  // What a job has found; empty again once the robot is localized.
   slam::ScanPipeline pipeline_;
 };
 

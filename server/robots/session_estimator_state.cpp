@@ -72,6 +72,8 @@ void SessionEstimator::Replay(JournalEntry&& entry, const Switched& switched) {
     On(RelocaliseWanted{relocalise->T_map_robot});
   } else if (auto* const localise = std::get_if<LocaliseTaken>(&entry)) {
     static_cast<void>(Localise(std::move(*localise)));
+  } else if (const auto* const suggested = std::get_if<PlaceSuggested>(&entry)) {
+    static_cast<void>(Suggest(*suggested));
   } else if (auto* const refusal = std::get_if<StartRefusal>(&entry)) {
     On(StartRefused{std::move(refusal->why)});
   } else if (const auto* const finished = std::get_if<SessionFinished>(&entry)) {
@@ -93,6 +95,8 @@ void SessionEstimator::ReplayOdometry(const OdometryTaken& odometry) {
 Journal::Content SessionEstimator::Save() const {
   auto writer = std::make_shared<slam::StateWriter>();
   if (switch_completed_ && !*switch_completed_) return nullptr;
+  // The place that a job has found comes with a map, which is in the journal and not in a checkpoint.
+  if (pipeline_.mapper().has_suggestion()) return nullptr;
   // The scans themselves are saved by the pipeline, in the same order.
   std::vector<NameId> waiting;
   pipeline_.ForEachWaiting([&](const Scan& scan) { waiting.push_back(waiting_.at(&scan).stream.sensor_id); });
@@ -138,8 +142,10 @@ Result<SessionEstimator::PieceValues> SessionEstimator::Load(std::string_view ma
   });
   reader.Require(next == waiting.size(), "number of waiting scans");
   if (auto record = record_.Load(reader, WaitingBySensor()); !record) return tl::unexpected(record.error());
+  record_.SetLearned(pipeline_.mapper().learned());
   ended_ = record_.phase() == SessionPhase::kEnded;
   record_.SetLocalises(pipeline_.mapper().localises());
+  path_changed_at_ = pipeline_.mapper().path_changed_at();
   TellJoining();
   PieceValues values = reader.values();
   values.insert(values.end(), loaded->begin(), loaded->end());

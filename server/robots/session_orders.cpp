@@ -50,6 +50,12 @@ Result<void> Session::Relocalise(const std::optional<Pose2>& T_map_robot, std::s
   return {};
 }
 
+bool Session::Post(PlaceFound&& found) {
+  if (!queue_.Push(std::move(found))) return false;
+  Schedule();
+  return true;
+}
+
 Result<void> Session::Localise(std::shared_ptr<const MapSnapshot> map, std::shared_ptr<Receipt> receipt) {
   if (ending_) return cairn::Fail(StatusCode::kFailedPrecondition, "the session has ended");
   const KnownMap known{map->info.epoch, map->info.version, map->info.edits_version, SessionRecord::Clock::now()};

@@ -163,27 +163,6 @@ bool SessionRecord::SetStored(bool stored, const Status& why) {
   return true;
 }
 
-void SessionRecord::Durable(const std::vector<JournalEntry>& entries) {
-  const MutexLock lock(mutex_);
-  const auto scan = [this](const StreamId& of, std::uint64_t sequence) CAIRN_NO_THREAD_SAFETY_ANALYSIS {
-    Stream* const stream = of.session == status_.session.session ? Find(of.sensor_id) : nullptr;
-    if (stream == nullptr) return;
-    stream->account.Durable(sequence);
-    stream->changed = true;
-  };
-  for (const JournalEntry& entry : entries) {
-    if (const auto* const taken = std::get_if<ScanTaken>(&entry)) {
-      scan(taken->stream, taken->scan->sequence);
-    } else if (const auto* const refused = std::get_if<ScanRefused>(&entry)) {
-      scan(refused->stream, refused->sequence);
-    } else if (const auto* const odometry = std::get_if<OdometryTaken>(&entry)) {
-      if (odometry->stream.session != status_.session.session) continue;
-      odometry_.account.Durable(odometry->odometry.sequence);
-      odometry_.changed = true;
-    }
-  }
-}
-
 std::vector<std::string> SessionRecord::sensors() const {
   const MutexLock lock(mutex_);
   std::vector<std::string> names;
@@ -195,6 +174,11 @@ void SessionRecord::SetLandmarks(std::vector<LandmarkReport> landmarks) {
   auto shared = std::make_shared<const std::vector<LandmarkReport>>(std::move(landmarks));
   const MutexLock lock(mutex_);
   landmarks_.swap(shared);
+}
+
+void SessionRecord::SetLearned(std::vector<LearnedValue> learned) {
+  const MutexLock lock(mutex_);
+  status_.learned = std::move(learned);
 }
 
 void SessionRecord::SetHypotheses(std::vector<PoseHypothesis> hypotheses) {
@@ -236,6 +220,11 @@ void SessionRecord::MoveLast(const Pose2& T_new_old) {
   pose.T_map_robot = T_new_old * pose.T_map_robot;
   pose.T_map_odom = T_new_old * pose.T_map_odom;
   pose.covariance = R * pose.covariance * R.transpose();
+}
+
+void SessionRecord::MovePath(std::span<const StampedPose> now, bool moves_rest, std::optional<bool> fragment) {
+  const MutexLock lock(mutex_);
+  history_.MoveOnto(now, moves_rest, fragment);
 }
 
 void SessionRecord::LoseLast() {

@@ -10,7 +10,9 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -91,6 +93,7 @@ class SessionRecord {
 
   void SetLandmarks(std::vector<LandmarkReport> landmarks);
   void SetHypotheses(std::vector<PoseHypothesis> hypotheses);
+  void SetLearned(std::vector<LearnedValue> learned);
   // Whether the robot is not joined with the map of its site, and how far it has driven since it began, or since it was
   // taken out of the map.
   struct Joining {
@@ -108,6 +111,8 @@ class SessionRecord {
   void SetEpoch(std::uint32_t epoch);
   // The map around the last pose has moved (`map` before and after): the pose in the status follows.
   void MoveLast(const Pose2& T_new_old);
+  // The map around the whole path has moved: the path follows (PoseHistory::MoveOnto).
+  void MovePath(std::span<const StampedPose> now, bool moves_rest, std::optional<bool> fragment);
   // The last pose is not one in the present map.
   void LoseLast();
   void SetMapFrame(std::uint64_t map_frame);

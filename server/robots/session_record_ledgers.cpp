@@ -48,4 +48,25 @@ void SessionRecord::MarkUnsent(NameId sensor_id) {
   if (sensor_id == HashName(kOdometry)) odometry_.changed = true;
 }
 
+void SessionRecord::Durable(const std::vector<JournalEntry>& entries) {
+  const MutexLock lock(mutex_);
+  const auto scan = [this](const StreamId& of, std::uint64_t sequence) CAIRN_NO_THREAD_SAFETY_ANALYSIS {
+    Stream* const stream = of.session == status_.session.session ? Find(of.sensor_id) : nullptr;
+    if (stream == nullptr) return;
+    stream->account.Durable(sequence);
+    stream->changed = true;
+  };
+  for (const JournalEntry& entry : entries) {
+    if (const auto* const taken = std::get_if<ScanTaken>(&entry)) {
+      scan(taken->stream, taken->scan->sequence);
+    } else if (const auto* const refused = std::get_if<ScanRefused>(&entry)) {
+      scan(refused->stream, refused->sequence);
+    } else if (const auto* const odometry = std::get_if<OdometryTaken>(&entry)) {
+      if (odometry->stream.session != status_.session.session) continue;
+      odometry_.account.Durable(odometry->odometry.sequence);
+      odometry_.changed = true;
+    }
+  }
+}
+
 }  // namespace cairn::server

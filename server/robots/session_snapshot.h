@@ -14,9 +14,11 @@ namespace cairn::server {
 struct SessionSnapshot {
   SessionId id = 0;
   RobotStatus status;
-  PathView path;  // Online poses, one per scan used, as published.
+  PathView path;  // One pose per scan that was used, where it lies in the present map (pose_history.h).
   std::shared_ptr<const std::vector<LandmarkReport>> landmarks;
-  std::vector<PoseHypothesis> hypotheses;  // The most believed first; of half a second of scans ago at most.
+  // The most believed first; of half a second of scans ago at most. Of a robot that is not localized: of a job, or of
+  // its own searches.
+  std::vector<PoseHypothesis> hypotheses;
 };
 
 }  // namespace cairn::server

@@ -182,8 +182,14 @@ void RobotStream::TakeStart(const ros2::PoseWithCovariance& message, Clock::time
   }
   const Pose2 pose = ros2::PlanarPart(*motion);
   start_received_ = now;
-  // A session without a used scan has nothing in which the robot could be looked for.
-  if (phase_ != Phase::kOpen || !last_pose_) return Leave(pose);
+  // A session without a used scan has nothing in which the robot could be looked for, and one that is not joined with
+  // the map begins anew there, at once.
+  const bool apart = last_pose_ && last_pose_->reason == PoseReason::kNotJoined;
+  if (apart) {
+    spdlog::info("ROS 2: {} begins a new session at its initial pose: it is not joined with the map of its site",
+                 place_.robot);
+  }
+  if (phase_ != Phase::kOpen || !last_pose_ || apart) return Leave(pose);
   hint_ = pose;
   hint_asked_ = false;
   ++hint_number_;
@@ -251,7 +257,6 @@ void RobotStream::OpenIfComplete(Clock::time_point now) {
   odometry_numbers_.Restart();
   Open(now);
   if (phase_ != Phase::kOpen) return;
-  spdlog::info("ROS 2: the session of {} in {} is opened", place_.robot, place_.site);
   for (const EarlyOdometry& one : early_) Send(one.odometry, one.origin);
 }
 
@@ -276,12 +281,23 @@ void RobotStream::Refused(const Status& why, Clock::time_point now) {
   const bool passes = why.code == StatusCode::kResourceExhausted || why.code == StatusCode::kUnavailable;
   phase_ = Phase::kRefused;
   why_refused_ = why.message;
+  // It is tried again for ever; the log has each reason once.
+  if (refusal_logged_ != why.message) {
+    spdlog::warn("ROS 2: the session of {} in {} is refused: {}", place_.robot, place_.site, why.message);
+    refusal_logged_ = why.message;
+  }
   try_again_ = now + (passes ? kTryAgain : kTryLater);
 }
 
 void RobotStream::Take(const SessionState& state, Clock::time_point /*now*/) {
   if (state.session != session_ || session_ == 0) return;
-  if (state.phase == SessionPhase::kActive) start_.reset();  // It has begun there; it counts once.
+  if (state.phase == SessionPhase::kActive) {
+    start_.reset();  // It has begun there; it counts once.
+    refusal_logged_.clear();
+    if (opening_logged_ != session_)
+      spdlog::info("ROS 2: the session of {} in {} is opened", place_.robot, place_.site);
+    opening_logged_ = session_;
+  }
   if (state.phase != SessionPhase::kEnded || phase_ != Phase::kOpen) return;
   phase_ = Phase::kEnded;
   why_refused_ = state.status.message;

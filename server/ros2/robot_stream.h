@@ -21,10 +21,10 @@
 #include "common/service/request.h"
 #include "common/service/session.h"
 #include "common/wire/ros2/bus.h"
+#include "common/wire/ros2/sample_numbers.h"
 #include "server/inbound.h"
 #include "server/ros2/namespace_rules.h"
 #include "server/ros2/ros2_options.h"
-#include "server/ros2/sample_numbers.h"
 
 namespace cairn::server {
 
@@ -91,7 +91,7 @@ class RobotStream {
   enum class Phase { kWaiting, kOpen, kRefused, kEnded };
   struct Lidar {
     std::string sensor;  // Its name in the session.
-    SampleNumbers numbers;
+    ros2::SampleNumbers numbers;
     std::string frame;
     std::string why_not;  // Why its scans cannot be used; empty if they can.
     std::optional<ros2::Mounting> mounting;
@@ -141,7 +141,7 @@ class RobotStream {
 
   std::string odom_frame_;
   std::string base_frame_;  // Empty until odometry says it.
-  SampleNumbers odometry_numbers_;
+  ros2::SampleNumbers odometry_numbers_;
   std::deque<EarlyOdometry> early_;  // The last ones: the first scan of a session needs odometry before it.
   std::optional<Stamp> odometry_stamp_;
   Clock::time_point odometry_received_{};
@@ -158,6 +158,8 @@ class RobotStream {
   std::uint64_t hint_number_ = 0;
   std::string why_hint_failed_;  // Empty if it did not fail.
   std::string why_refused_;
+  std::string refusal_logged_;       // Empty while none was logged since a session was opened.
+  SessionToken opening_logged_ = 0;  // The last session of which the log says that it is opened.
   Clock::time_point try_again_{};
   bool scans_published_ = false;
   bool odometry_published_ = false;

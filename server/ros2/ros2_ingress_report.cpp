@@ -39,7 +39,10 @@ Stamp ClockOfServer() {
 std::vector<std::string> Ros2Ingress::ProblemsOf(const std::string& name, const Namespace& one,
                                                  Clock::time_point now) const {
   std::vector<std::string> problems;
-  if (!one.place) problems.push_back("no rule of ros2.namespaces fits it: " + options_.namespaces);
+  if (!one.place) {
+    problems.push_back("no rule of ros2.namespaces fits it (" + options_.namespaces + "): add one, such as " + name +
+                       "=NAME");
+  }
   for (const auto& [stream, topic] : one.topics) {
     if (topic.publishers == 0) continue;
     const bool is_scan = topic.type == ros2::Bus::TypeName<ros2::LaserScan>();

@@ -22,9 +22,9 @@ Mapper::~Mapper() = default;
 Mapper::Mapper(Mapper&&) noexcept = default;
 Mapper& Mapper::operator=(Mapper&&) noexcept = default;
 
-ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot,
-                            const ParallelFor& parallel_for, Passage passage, const RollingScan* rolling) {
-  State& s = *state_;
+ScanOutcome Mapper::State::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot,
+                                   const ParallelFor& parallel_for, Passage passage, const RollingScan* rolling) {
+  State& s = *this;
   const Stamp stamp = scan->stamp;
   const bool tilted = IsTilted(*scan, s.options.max_tilt_rad);
   if (s.localisation) {
@@ -32,9 +32,10 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
     if (tilted)
       return s.ReportLocalised(stamp, T_odom_robot, s.localisation->CarriedTo(s.OdometryOrNone(T_odom_robot)), 0.0);
     if (passage != Passage::kDriven || s.localisation->looking()) rolling = nullptr;
-    return s.Localise(TrackScan(s.front_end, {s.options.front_end, s.options.pairing.rolling}, s.trail, std::move(scan),
-                                rolling, T_odom_robot, parallel_for),
-                      T_odom_robot, passage, parallel_for);
+    TrackedScan tracked = TrackScan(s.front_end, {s.options.front_end, s.options.pairing.rolling}, s.trail,
+                                    std::move(scan), rolling, T_odom_robot, parallel_for);
+    s.learning.LearnUnless(passage != Passage::kDriven || s.localisation->looking(), tracked.step);
+    return s.Localise(std::move(tracked), T_odom_robot, passage, parallel_for);
   }
   passage = s.BeginAfter(passage, tilted);
   if (tilted) return s.Coast(stamp, T_odom_robot);
@@ -51,6 +52,7 @@ ScanOutcome Mapper::Process(std::shared_ptr<const Scan> scan, const Pose2& T_odo
   s.Begin(ScanStep::kRecover);
   s.CheckPlace(passage, tracked, T_odom_robot, parallel_for);
   auto& [still, view, step] = tracked;
+  s.learning.LearnUnless(passage != Passage::kDriven || s.recovery.active(), step);
   if (s.recovery.active()) return s.Recover({std::move(still), T_odom_robot}, std::move(view), step, parallel_for);
 
   s.Begin(ScanStep::kOther);
@@ -263,7 +265,8 @@ MapperSnapshot Mapper::Snapshot() const {
           .numbers = s.trail.numbers(),
           .online_path = s.drawing.path(),
           .full_path = s.believed_path().values(),
-          .relations = s.trail.relations(),
+          .relations = s.trail.measured(),
+          .steps = s.trail.steps_of_shaped(),
           .pose_graph = s.options.pose_graph,
           .scans = s.trail.scans()};
 }
@@ -287,77 +290,6 @@ bool Mapper::AdoptGrid(OccupancyGrid grid, std::uint64_t keyframes, std::span<co
 
 bool Mapper::follows_paths() const {
   return state_->filter->rebases();
-}
-
-// The poses of the keyframes with numbers below `made`, out of a path that may have more of these, because some were
-// retired since. Empty if it lacks one.
-std::vector<Pose2> Mapper::State::PosesOfFirst(std::uint64_t made, std::span<const Pose2> path,
-                                               std::span<const std::uint64_t> numbers) const {
-  std::vector<Pose2> poses;
-  if (path.size() != (numbers.empty() ? made : numbers.size())) return poses;
-  for (const std::uint64_t wanted : trail.numbers()) {
-    if (wanted >= made) break;
-    std::size_t at = static_cast<std::size_t>(wanted);
-    if (!numbers.empty()) {
-      at = static_cast<std::size_t>(std::ranges::lower_bound(numbers, wanted) - numbers.begin());
-      if (at == numbers.size() || numbers[at] != wanted) return {};
-    }
-    poses.push_back(path[at]);
-  }
-  return poses;
-}
-
-// Takes the poses of the first keyframes from a job that knew `made` keyframes. How sure the filter is does not change:
-// a robot whose map is switched again and again must not get worse by it.
-void Mapper::State::Follow(std::span<const Pose2> first_poses, std::uint64_t made) {
-  const std::vector<Pose2> before = believed_path().values();
-  trail.ConfirmTentative();  // They are drawn in the grid that comes with the path.
-  // The same path contradicts the scans as much or as little as before.
-  if (std::ranges::equal(first_poses, std::span(before).first(first_poses.size()))) return;
-  std::vector<Pose2> path(first_poses.begin(), first_poses.end());
-  const std::size_t known = path.size();
-  for (std::size_t k = known; k < before.size(); ++k)
-    path.push_back(path[known - 1] * Between(before[known - 1], before[k]));
-  KeepShape(path, known);
-  if (drawing.changed_at() > made) {  // Large loops that the job did not know.
-    OptimisePoses(path, trail.relations(), options.pose_graph);
-  } else {
-    FitRest(path, known);
-  }
-  filter->MoveTo(path);
-  self_check.Forget();
-  const Pose2 T_new_old = path.back() * before.back().Inverse();
-  recovery.Move(T_new_old);
-  level.outcome.T_map_robot = T_new_old * level.outcome.T_map_robot;
-  level.outcome.T_map_odom = T_new_old * level.outcome.T_map_odom;
-}
-
-// A job may know more than the relations of this robot, such as what others have seen. Where it has changed the path,
-// relations along the way keep what it has found when the next large loop closes.
-void Mapper::State::KeepShape(std::span<const Pose2> path, std::size_t known) {
-  constexpr double kEveryM = 10.0;
-  // More certain than the steps over this way, so that they do not pull it back. Half of this is no change.
-  constexpr double kSigmaM = 0.02, kSigmaRad = 0.002;
-  const std::vector<Pose2> before = believed_path().values();
-  std::size_t last = 0;
-  for (std::size_t k = 1; k < known; ++k) {
-    if (k + 1 < known && trail.shapes()[k].travelled_m - trail.shapes()[last].travelled_m < kEveryM) continue;
-    const Pose2 T_last_k = Between(path[last], path[k]);
-    const Pose2 change = Between(Between(before[last], before[k]), T_last_k);
-    if (change.translation().norm() > 0.5 * kSigmaM || std::abs(change.theta) > 0.5 * kSigmaRad)
-      trail.AddLoop({last, k, T_last_k, PoseCovariance(kSigmaM, kSigmaRad), true});
-    last = k;
-  }
-}
-
-// What was driven since the job knew the path does not hang on the last of its poses alone: it must fit what was seen
-// again of the first `known` keyframes.
-void Mapper::State::FitRest(std::vector<Pose2>& path, std::size_t known) const {
-  const auto holds = [known](const PoseRelation& one) {
-    return one.loop && std::min(one.from, one.to) < known && std::max(one.from, one.to) >= known;
-  };
-  if (std::ranges::none_of(trail.relations(), holds)) return;
-  OptimisePoses(path, trail.relations(), options.pose_graph, {}, known);
 }
 
 void Mapper::Relocalise(const std::optional<Pose2>& T_map_robot) {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "common/sensor/scan.h"
+#include "common/service/learned_value.h"
 #include "common/service/pose_report.h"
 #include "common/status.h"
 #include "server/slam/grid/occupancy_grid.h"
@@ -19,6 +20,7 @@
 #include "server/slam/landmarks/landmark.h"
 #include "server/slam/mapper_options.h"
 #include "server/slam/parallel_for.h"
+#include "server/slam/recovery/place_search.h"
 #include "server/slam/scan/scan_motion.h"
 #include "server/slam/tracking/scan_steps.h"
 #include "server/slam/trail/keyframe.h"
@@ -58,9 +60,16 @@ class Mapper {
   // `passage` is what lies between this scan and the one before it. Where that is a pause in which the scan does not
   // agree with the map, or is not known, the robot is not localized until it has been found in its map
   // (recovery/recovery.h); such scans are not in the snapshot unless they become keyframes. `rolling`: the same scan as
-  // it was measured, if its beams were measured one after the other (tracking/scan_tracking.h).
+  // it was measured, if its beams were measured one after the other (tracking/scan_tracking.h). `odometry_rate`:
+  // PairedScan::rate.
   ScanOutcome Process(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot, const ParallelFor& parallel_for,
-                      Passage passage = Passage::kDriven, const RollingScan* rolling = nullptr);
+                      Passage passage = Passage::kDriven, const RollingScan* rolling = nullptr,
+                      const Pose2& odometry_rate = {});
+
+  // What was learned of the robot's odometry (tracking/odometry_learning.h), and the lag with which scans are to be
+  // paired from now on (OdometryPairing::SetLag).
+  [[nodiscard]] std::vector<LearnedValue> learned() const;
+  [[nodiscard]] double learned_lag_s() const;
 
   // From now on `watch` is told when a step of Process begins. It is not part of the state: Load keeps it.
   void WatchSteps(StepWatch watch);
@@ -101,6 +110,23 @@ class Mapper {
   // scan). From the next scan on it is not localized until it is found in its map: near that pose, or anywhere
   // (recovery/recovery.h). Nothing happens before there is a map.
   void Relocalise(const std::optional<Pose2>& T_map_robot);
+  // What a robot has seen whose place is not known, for a search elsewhere: the last scans that belong together, in the
+  // order of time. If there are none since it was lost, the scan before. Empty where its place is known.
+  struct LostView {
+    bool lost = false;
+    bool since_lost = false;  // The scans are those since it was lost.
+    std::vector<RecentScan> scans;
+  };
+  [[nodiscard]] LostView SeenWhileLost() const;
+  // A search in another map has found the robot: it was at `T_map_robot` when it saw the scan of this stamp. Its next
+  // scans have to confirm that (Recovery::Suggest). False, and nothing is changed: the robot has been found or lost
+  // anew meanwhile, has itself found another place, or is only localised and looks for itself in the map of its site.
+  bool SuggestPlace(Stamp seen, const Pose2& T_map_robot, std::shared_ptr<const SearchedMap> map);
+  // While there is such a place, the state is not complete without that map: it must not be saved.
+  [[nodiscard]] bool has_suggestion() const;
+  void ForgetSuggestion();
+  // Where a robot may be whose place is not known: places that were found and are not confirmed. Equal weights.
+  [[nodiscard]] std::vector<WeightedPose> UnconfirmedPlaces() const;
   // From now on the robot is only localised in this map: what it has mapped itself stays as it is, and nothing is
   // added. `place_known`: its pose, or its start before the first scan, is one in this map; then it is looked for near
   // there, otherwise everywhere. A later call replaces the map, and the next scans must show that the robot is where it
@@ -111,6 +137,12 @@ class Mapper {
   [[nodiscard]] std::optional<std::uint32_t> known_map_epoch() const;
   // T_map_robot of every keyframe along the best path; empty while the robot's place in the map is not known.
   [[nodiscard]] std::vector<Pose2> BestPath() const;
+  // The best path by stamps: where the robot was at the first of the scans that were seen from each keyframe. Empty
+  // while its place in the map is not known.
+  [[nodiscard]] Trajectory PathByStamps() const;
+  // How many keyframes there had been when the past path changed last: by a large loop, or because the robot's place
+  // became known. AdoptGrid does not count.
+  [[nodiscard]] std::uint64_t path_changed_at() const;
 
   // Writes the whole state, and replaces it by one of a mapper with the same options (state/archive.h). If reading
   // fails, nothing changes.

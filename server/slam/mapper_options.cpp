@@ -49,6 +49,8 @@ void Visit(OptionVisitor& visitor, MapperOptions& options) {
   visitor.Section("grid", "The occupancy grid.", [&] { Visit(visitor, options.grid); });
   visitor.Section("pairing", "Finding the odometry at the time of each scan.",
                   [&] { Visit(visitor, options.pairing); });
+  visitor.Section("learning", "What is learned of the wheels and of the lag of the lidar while the robot drives.",
+                  [&] { Visit(visitor, options.learning); });
 }
 
 Result<void> Validate(const MapperOptions& options) {

@@ -16,6 +16,7 @@
 #include "server/slam/recovery/recovery_options.h"
 #include "server/slam/scan/odometry_pairing.h"
 #include "server/slam/tracking/front_end.h"
+#include "server/slam/tracking/odometry_learning.h"
 #include "server/slam/trail/retirement_choice.h"
 
 namespace cairn::slam {
@@ -41,6 +42,7 @@ struct MapperOptions {
   FilterOptions filter;
   GridOptions grid;
   PairingOptions pairing;
+  LearningOptions learning;
 };
 void Visit(OptionVisitor& visitor, MapperOptions& options);
 // Checks the rules between fields that Visit declares. The error names both keys as in a configuration file,

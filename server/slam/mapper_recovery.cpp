@@ -83,6 +83,39 @@ void Mapper::State::Relocalise(const std::optional<Pose2>& T_map_robot) {
   front_end.Restart();
 }
 
+Mapper::LostView Mapper::SeenWhileLost() const {
+  const State& s = *state_;
+  const Recovery& recovery = s.localisation ? s.localisation->recovery() : s.recovery;
+  LostView view{recovery.active(), recovery.has_scans(), recovery.recent()};
+  if (!view.lost) return {};
+  if (!view.since_lost && s.last_scan) {
+    view.scans = {{s.last_scan->scan, s.last_scan->T_track_robot, 0.0,
+                   Look(*s.last_scan->scan, s.options.front_end).points_robot}};
+  }
+  return view;
+}
+
+bool Mapper::SuggestPlace(Stamp seen, const Pose2& T_map_robot, std::shared_ptr<const SearchedMap> map) {
+  return !state_->localisation && state_->recovery.Suggest(seen, T_map_robot, std::move(map));
+}
+
+bool Mapper::has_suggestion() const {
+  return state_->recovery.suggested();
+}
+
+void Mapper::ForgetSuggestion() {
+  state_->recovery.ForgetSuggestion();
+}
+
+std::vector<WeightedPose> Mapper::UnconfirmedPlaces() const {
+  const Recovery& recovery = state_->localisation ? state_->localisation->recovery() : state_->recovery;
+  std::vector<WeightedPose> places;
+  if (!recovery.active()) return places;
+  const std::vector<Pose2> poses = recovery.Unconfirmed();
+  for (const Pose2& pose : poses) places.push_back({pose, 1.0 / static_cast<double>(poses.size())});
+  return places;
+}
+
 // Whether nothing at all has changed since the last scan: nobody has moved the robot.
 bool Mapper::State::StoodStill(const Scan& scan, const Pose2& T_odom_robot, const TrackStep& step) const {
   if (!last_scan || !step.matched) return false;
@@ -146,6 +179,7 @@ TrackStep Mapper::State::DoubtPlace(const ScanView& view, const Pose2& T_odom_ro
 ScanOutcome Mapper::State::Recover(Keyframe keyframe, ScanView view, TrackStep step, const ParallelFor& parallel_for) {
   const Stamp stamp = keyframe.scan->stamp;
   const Pose2 T_odom_robot = keyframe.T_odom_robot;
+  recovery.AgeSuggestion();
   if (!step.matched) {
     recovery.ForgetScans();
     front_end.Restart();

@@ -20,6 +20,7 @@
 #include "server/slam/scan/stamp_gate.h"
 #include "server/slam/tracking/blind_motion.h"
 #include "server/slam/tracking/front_end.h"
+#include "server/slam/tracking/odometry_learning.h"
 #include "server/slam/tracking/scan_tracking.h"
 #include "server/slam/trail/path_index.h"
 #include "server/slam/trail/trail.h"
@@ -38,9 +39,13 @@ struct Mapper::State {
         self_check(given.self_check),
         recovery(given.recovery, given.loop, given.self_check, given.front_end.refine, given.front_end.surface,
                  given.blind, given.front_end.use_odometry, given.lost_after_m),
-        drawing(given.grid) {}
+        drawing(given.grid),
+        learning(given.learning, given.front_end.use_odometry) {}
 
   void Begin(ScanStep step) const { slam::Begin(front_end.watch(), step); }
+  // Mapper::Process, with odometry as it is used.
+  ScanOutcome Process(std::shared_ptr<const Scan> scan, const Pose2& T_odom_robot, const ParallelFor& parallel_for,
+                      Passage passage, const RollingScan* rolling);
   ScanOutcome Coast(Stamp stamp, const Pose2& T_odom_robot);
   Passage BeginAfter(Passage passage, bool tilted);
   void CheckPlace(Passage passage, TrackedScan& tracked, const Pose2& T_odom_robot, const ParallelFor& parallel_for);
@@ -115,6 +120,9 @@ struct Mapper::State {
     if constexpr (Archive::kReads)
       if (archive.format() < 8) return;
     LocalisationMembers(archive, self);
+    if constexpr (Archive::kReads)
+      if (archive.format() < 12) return;
+    archive(self.learning);
   }
   template <typename Archive>
   static void LocalisationMembers(Archive& archive, auto& self) {
@@ -183,6 +191,7 @@ struct Mapper::State {
   SelfCheck self_check;
   Recovery recovery;
   MapDrawing drawing;
+  OdometryLearning learning;
   LevelScan level;
   std::optional<LastScan> last_scan;
   std::optional<GridLocalisation> localisation;  // Of a robot that does not map now.

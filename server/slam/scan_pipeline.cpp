@@ -23,7 +23,8 @@ ScanPipeline::ScanPipeline(const MapperOptions& options, const Pose2& T_map_robo
                       const RollingScan rolling{pair.scan, std::move(pair.during)};
                       const ScanOutcome outcome =
                           mapper_.Process(std::move(scan), pair.T_odom_robot, parallel_for_, pair.passage,
-                                          rolling.odometry.empty() ? nullptr : &rolling);
+                                          rolling.odometry.empty() ? nullptr : &rolling, pair.rate);
+                      pairing_.SetLag(mapper_.learned_lag_s());
                       sink_.used(*pair.scan, outcome);
                     },
                 .dropped = [this](const Scan& scan, DropReason reason) { sink_.dropped(scan, reason); }}) {}

@@ -19,7 +19,9 @@ std::size_t SizeOf(const JournalEntry& entry) {
   if (const auto* const scan = std::get_if<ScanTaken>(&entry)) {
     return kSmall + sizeof(float) * scan->scan->ranges_m.size();
   }
-  if (const auto* const localise = std::get_if<LocaliseTaken>(&entry)) {
+  const auto* localise = std::get_if<LocaliseTaken>(&entry);
+  if (const auto* const suggested = std::get_if<PlaceSuggested>(&entry)) localise = &suggested->map;
+  if (localise != nullptr) {
     std::size_t size = kSmall;
     for (const auto& tile : localise->tiles) size += kSmall + tile->bytes.size();
     return size;

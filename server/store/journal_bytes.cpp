@@ -59,8 +59,7 @@ void FillEntry(record::Entry& to, const RelocaliseTaken& from) {
   if (from.T_map_robot) Fill(*relocalise.mutable_t_map_robot(), *from.T_map_robot);
 }
 
-void FillEntry(record::Entry& to, const LocaliseTaken& from) {
-  record::Localise& localise = *to.mutable_localise();
+void FillMap(record::Localise& localise, const LocaliseTaken& from) {
   for (const auto& tile : from.tiles) {
     record::Localise::Tile& added = *localise.add_tiles();
     added.set_x(tile->key.x);
@@ -71,6 +70,17 @@ void FillEntry(record::Entry& to, const LocaliseTaken& from) {
   localise.set_resolution_m(from.resolution_m);
   localise.set_epoch(from.epoch);
   localise.set_maps_again(from.maps_again);
+}
+
+void FillEntry(record::Entry& to, const LocaliseTaken& from) {
+  FillMap(*to.mutable_localise(), from);
+}
+
+void FillEntry(record::Entry& to, const PlaceSuggested& from) {
+  record::PlaceSuggested& suggested = *to.mutable_place_suggested();
+  suggested.set_seen(from.seen);
+  Fill(*suggested.mutable_t_map_robot(), from.T_map_robot);
+  FillMap(*suggested.mutable_map(), from.map);
 }
 
 void FillEntry(record::Entry& to, const StartRefusal& from) {
@@ -123,7 +133,7 @@ Result<JournalEntry> RelocaliseOf(const record::Relocalise& from) {
 }
 
 // Whether the tiles can be read, and lie where a robot can be localised, is looked at by the estimator.
-Result<JournalEntry> LocaliseOf(const record::Localise& from) {
+Result<LocaliseTaken> LocaliseOf(const record::Localise& from) {
   LocaliseTaken taken{from.maps_again(), {}, from.resolution_m(), from.epoch()};
   for (const record::Localise::Tile& tile : from.tiles()) {
     if (tile.encoding() > static_cast<std::uint32_t>(TileEncoding::kPng)) return Unreadable("a tile");
@@ -134,6 +144,14 @@ Result<JournalEntry> LocaliseOf(const record::Localise& from) {
     taken.tiles.push_back(std::move(added));
   }
   return taken;
+}
+
+Result<JournalEntry> SuggestedOf(const record::PlaceSuggested& from) {
+  auto map = LocaliseOf(from.map());
+  if (!map) return tl::unexpected(map.error());
+  const Pose2 T_map_robot = ValueOf(from.t_map_robot());
+  if (!ValidateStart(T_map_robot)) return Unreadable("a pose");
+  return PlaceSuggested{from.seen(), T_map_robot, *std::move(map)};
 }
 
 Result<JournalEntry> EntryOf(const record::Entry& from) {
@@ -157,7 +175,9 @@ Result<JournalEntry> EntryOf(const record::Entry& from) {
     case record::Entry::kRelocalise:
       return RelocaliseOf(from.relocalise());
     case record::Entry::kLocalise:
-      return LocaliseOf(from.localise());
+      return LocaliseOf(from.localise()).map([](LocaliseTaken&& taken) { return JournalEntry(std::move(taken)); });
+    case record::Entry::kPlaceSuggested:
+      return SuggestedOf(from.place_suggested());
     case record::Entry::kStartRefusal:
       return StartRefusal{from.start_refusal().why()};
     case record::Entry::kFinish:

@@ -189,7 +189,10 @@ Journal::Prepared Journal::Prepare(Group&& group) {
       put.erase({RecordKind::kSession, session, 0});
       batches.erase(session);
       prepared.forgotten.push_back(session);
-      for (const RecordKind kind : {RecordKind::kSession, RecordKind::kRestoring})
+      std::erase_if(put, [session](const auto& one) {
+        return one.first.kind == RecordKind::kRelations && one.first.owner == session;
+      });
+      for (const RecordKind kind : {RecordKind::kSession, RecordKind::kRestoring, RecordKind::kRelations})
         prepared.changes.removed.push_back({.kind = kind, .owner = session});
       put[MarkOfRemoved(session).key] = MarkOfRemoved(session).bytes;
     }

@@ -146,6 +146,12 @@ std::string BytesOf(const StoredSite& site) {
   to.set_map_frame(site.map_frame);
   for (const MapEdit& edit : site.edits) Fill(*to.add_edits(), edit);
   to.set_edits_version(site.edits_version);
+  if (site.given_up.versions > 0 || site.given_up.layers > 0 || site.given_up.sessions > 0) {
+    to.mutable_given_up()->set_versions(site.given_up.versions);
+    to.mutable_given_up()->set_layers(site.given_up.layers);
+    to.mutable_given_up()->set_sessions(site.given_up.sessions);
+  }
+  to.set_chosen(site.chosen);
   return to.SerializeAsString();
 }
 
@@ -166,7 +172,11 @@ Result<StoredSite> SiteOf(std::string_view bytes) {
                   .merged = {from.merged().begin(), from.merged().end()},
                   .map_frame = from.map_frame(),
                   .edits = {},
-                  .edits_version = from.edits_version()};
+                  .edits_version = from.edits_version(),
+                  .given_up = {.versions = from.given_up().versions(),
+                               .layers = from.given_up().layers(),
+                               .sessions = from.given_up().sessions()},
+                  .chosen = from.chosen()};
   if (!(site.resolution_m >= 0.0 && site.resolution_m <= 10.0)) return Unreadable("a site");
   for (const auto& made : from.switches()) site.switches[made.epoch()] = made.generation();
   for (const auto& member : from.members()) site.members[member.robot_id()] = member.session();
@@ -214,13 +224,20 @@ std::string BytesOf(const StoredJob& stored) {
   to.set_message(job.message);
   to.set_enable(stored.enable);
   to.set_attempts(stored.attempts);
+  to.set_robot(job.robot);
+  for (const PoseHypothesis& place : job.places) {
+    record::Job::Place& added = *to.add_places();
+    added.set_stamp(place.stamp);
+    Fill(*added.mutable_t_map_robot(), place.T_map_robot);
+    added.set_weight(place.weight);
+  }
   return to.SerializeAsString();
 }
 
 Result<StoredJob> JobOf(std::string_view bytes) {
   record::Job from;
   if (!Parse(from, bytes) || from.id() == 0) return Unreadable("a job");
-  if (from.kind() > static_cast<std::uint32_t>(JobKind::kJoin)) return Unreadable("a job");
+  if (from.kind() > static_cast<std::uint32_t>(JobKind::kRelocalise)) return Unreadable("a job");
   if (from.state() > static_cast<std::uint32_t>(JobState::kCancelled)) return Unreadable("a job");
   StoredJob stored;
   Job& job = stored.job;
@@ -238,6 +255,10 @@ Result<StoredJob> JobOf(std::string_view bytes) {
   job.message = from.message();
   stored.enable = from.enable();
   stored.attempts = from.attempts();
+  job.robot = from.robot();
+  if (from.places_size() > static_cast<int>(kMostHypotheses)) return Unreadable("a job");
+  for (const record::Job::Place& place : from.places())
+    job.places.push_back({place.stamp(), ValueOf(place.t_map_robot()), place.weight()});
   return stored;
 }
 

@@ -84,6 +84,13 @@ struct LocaliseTaken {
   double resolution_m = 0.0;
   std::uint32_t epoch = 0;
 };
+// A job has found a robot whose place was not known: it was at this pose when it saw the scan of this stamp. Its next
+// scans confirm that in the `map` around that pose.
+struct PlaceSuggested {
+  Stamp seen = 0;
+  Pose2 T_map_robot;
+  LocaliseTaken map;
+};
 // The robot is not where it was said to start: from now on it is a fragment.
 struct StartRefusal {
   std::string why;
@@ -93,7 +100,7 @@ struct SessionFinished {
   Status status;
 };
 using JournalEntry = std::variant<ScanTaken, ScanRefused, OdometryTaken, OwnerChanged, CorrectionTaken, EpochChanged,
-                                  RelocaliseTaken, LocaliseTaken, StartRefusal, SessionFinished>;
+                                  RelocaliseTaken, LocaliseTaken, PlaceSuggested, StartRefusal, SessionFinished>;
 
 struct StoredSession {
   std::uint64_t id = 0;
@@ -134,6 +141,13 @@ inline constexpr std::size_t kMostSwitches = 1024;
 inline constexpr std::size_t kMostStoredEdits = 8192;
 inline constexpr std::uint64_t kMaxEditsVersion = std::uint64_t{1} << 53;
 
+// How much a site has given up so far to stay below its limit of memory (maps/site_memory.cpp).
+struct GivenUp {
+  std::uint32_t versions = 0;  // Map versions that were removed.
+  std::uint32_t layers = 0;    // Layers of earlier sessions that became part of another one.
+  std::uint32_t sessions = 0;  // Earlier sessions of which only the layer was kept.
+};
+
 struct StoredSite {
   std::string name;
   std::uint32_t epoch = 0;
@@ -149,6 +163,8 @@ struct StoredSite {
   std::uint64_t map_frame = 0;              // SessionState::map_frame; 0: stored without one.
   std::vector<MapEdit> edits{};             // By people, in the order in which they were made,
   std::uint64_t edits_version = 0;          // and how often they were changed; no number of an edit is higher.
+  GivenUp given_up{};
+  bool chosen = false;  // A person has chosen the enabled version.
 };
 
 struct StoredLayer {

@@ -204,7 +204,8 @@ std::vector<RecordRange> RangesOfSession(std::uint64_t session) {
   return {{.kind = RecordKind::kSession, .owner = session},
           {.kind = RecordKind::kCheckpoint, .owner = session},
           {.kind = RecordKind::kJournal, .owner = session},
-          {.kind = RecordKind::kRestoring, .owner = session}};
+          {.kind = RecordKind::kRestoring, .owner = session},
+          {.kind = RecordKind::kRelations, .owner = session}};
 }
 
 std::vector<RecordRange> RangesOf(const SiteContents& contents) {

@@ -97,7 +97,7 @@ bool Names(const StoredSite& site, std::uint64_t session) {
 
 // Removes a session but for what is large, which RemoveRests does.
 void RemoveSession(std::uint64_t session, RecordChanges& changes) {
-  for (const RecordKind kind : {RecordKind::kSession, RecordKind::kRestoring})
+  for (const RecordKind kind : {RecordKind::kSession, RecordKind::kRestoring, RecordKind::kRelations})
     changes.removed.push_back({.kind = kind, .owner = session});
   changes.put.push_back(MarkOfRemoved(session));
 }

@@ -37,8 +37,9 @@ struct ImportOptions {
 // `from` begins at its transformed start and is estimated again from its journal at the next start of the server; grids
 // of jobs and of sessions that exist no more are transformed cell by cell. The map versions of both are kept, and a new
 // one is enabled that shows what is enabled in both. Edits by people stay where they are in the building, those of
-// `from` over those of `into`. NOT_FOUND. FAILED_PRECONDITION: the sites have cells of different
-// sizes; or a journal does not reach back to its beginning, so that the session cannot be estimated again.
+// `from` over those of `into`; but the building's frame is that of `into`, if it has one. NOT_FOUND.
+// FAILED_PRECONDITION: the sites have cells of different sizes; or a journal does not reach back to its beginning, so
+// that the session cannot be estimated again.
 [[nodiscard]] Result<void> MergeSites(Store& store, const std::string& into, const std::string& from,
                                       const Pose2& T_into_from = {});
 

@@ -92,6 +92,8 @@ class Survey {
         return TakeLayer(record);
       case RecordKind::kJob:
         return TakeJob(record);
+      case RecordKind::kRelations:
+        return TakeRelations(record);
       case RecordKind::kServer:
       case RecordKind::kRestoring:
       case RecordKind::kRemoved:
@@ -128,6 +130,13 @@ class Survey {
     }
     summary_.sessions[session->id] = session->request.robot;
     summary_.session_numbers.insert(session->id);
+    return {};
+  }
+  // The other session may be one that exists no more.
+  Result<void> TakeRelations(const Record& record) {
+    if (!summary_.sessions.contains(record.key.owner) || !IsId(record.key.number))
+      return Unreadable("relations without a session");
+    summary_.session_numbers.insert(record.key.number);
     return {};
   }
   Result<void> TakeJournal(const Record& record) {
@@ -246,7 +255,7 @@ Result<std::optional<Record>> SiteFileReader::Next() {
   ++records_;
   record::SavedRecord saved;
   if (!saved.ParseFromArray(bytes.data(), static_cast<int>(size)) ||
-      saved.kind() > static_cast<std::uint32_t>(RecordKind::kJob)) {
+      saved.kind() > static_cast<std::uint32_t>(RecordKind::kRelations)) {
     return Damaged("record " + std::to_string(records_) + " is none");
   }
   Record record{.key = {static_cast<RecordKind>(saved.kind()), saved.owner(), saved.number()}, .bytes = {}};

@@ -4,7 +4,7 @@
 //
 // The bytes, numbers little-endian:
 //   8 bytes   "cairnste"
-//   4 bytes   version of the format
+//   4 bytes   version of the format: 2; 1 where no record is of the kind kRelations
 //   then for each record: 4 bytes length (not 0), a SavedRecord (idl/cairn/record.proto). The site's record is the
 //   first
 //             one; a session's record comes before its checkpoint and its journal. Each is compressed with zstd and has
@@ -29,7 +29,7 @@
 namespace cairn::server {
 
 // The format of the files that are written; files of all formats up to this one are read.
-inline constexpr std::uint32_t kSiteFileFormat = 1;
+inline constexpr std::uint32_t kSiteFileFormat = 2;
 // Numbers of sessions and jobs in a file are smaller.
 inline constexpr std::uint64_t kMaxSavedId = std::uint64_t{1} << 53;
 

@@ -60,6 +60,7 @@ class Renaming {
         return As(JobOf(record.bytes), Job(record.key.owner), 0, [this](StoredJob& stored) {
           stored.job.id = Job(stored.job.id);
           stored.job.site = site_;
+          stored.job.robot = Robot(stored.job.robot);
         });
       case RecordKind::kSession:
         return As(SessionOf(record.bytes), Session(record.key.owner), 0, [this](StoredSession& session) {
@@ -70,6 +71,9 @@ class Renaming {
         });
       case RecordKind::kJournal:
         return Journal(std::move(record));
+      case RecordKind::kRelations:
+        record.key.number = Session(record.key.number);
+        break;
       case RecordKind::kCheckpoint:
       case RecordKind::kServer:
       case RecordKind::kRestoring:

@@ -3,6 +3,7 @@
 #include <limits>
 #include <utility>
 
+#include "common/map/building_frame.h"
 #include "common/service/start_pose.h"
 #include "server/store/checkpoint_writer.h"
 #include "server/store/grid_transform.h"
@@ -44,6 +45,7 @@ class Merge {
     for (auto& [id, stored] : from_.jobs) {
       stored.job.site = into_.site.name;
       if (stored.job.map_version > 1) stored.job.map_version += version_shift_;
+      for (PoseHypothesis& place : stored.job.places) place.T_map_robot = T_into_from_ * place.T_map_robot;
       Put({RecordKind::kJob, id, 0}, BytesOf(stored));
     }
     if (auto merged = Site(); !merged) return tl::unexpected(merged.error());
@@ -92,6 +94,11 @@ class Merge {
             relocalise->T_map_robot = T_into_from_ * *relocalise->T_map_robot;
           }
           const auto* const localise = std::get_if<LocaliseTaken>(&entry);
+          if (std::holds_alternative<PlaceSuggested>(entry) && moves) {
+            return Fail(StatusCode::kFailedPrecondition, "a job has looked for the robot of session " +
+                                                             std::to_string(id) +
+                                                             " in the map of its site; such a session cannot be moved");
+          }
           if (localise != nullptr && !localise->maps_again && moves) {
             return Fail(StatusCode::kFailedPrecondition,
                         "session " + std::to_string(id) +
@@ -214,11 +221,14 @@ class Merge {
     return {};
   }
 
-  // A site that was split has left its edits in both parts: one of two that are the same is enough.
+  // A site that was split has left its edits in both parts: one of two that are the same is enough. The frame of the
+  // building is that of `into`, if it has one.
   Result<void> AddEdits() {
     StoredSite& site = into_.site;
     const std::size_t own = site.edits.size();
+    const bool has_frame = BuildingFrameOf(site.edits).has_value();
     for (const MapEdit& edit : from_.site.edits) {
+      if (has_frame && edit.kind == MapEditKind::kOrigin) continue;
       MapEdit moved = cairn::Moved(edit, T_into_from_);
       if (auto valid = ValidateMapEdit(moved); !valid) return valid;
       const auto is_same = [&moved](MapEdit other) {

@@ -30,6 +30,9 @@ enum class RecordKind : std::uint8_t {
   kJob = 7,         // Owner: job id.
   kRestoring = 8,   // Owner: session id; number 0.
   kRemoved = 9,     // Owner: the id of a session that was removed, while something is left of it; number 0.
+  // Owner: the id of a session; number: that of another one in which it was looked for. What smoothing jobs have
+  // measured between them: bytes of slam/site/relation_book.h, which this folder does not read.
+  kRelations = 10,
 };
 
 struct RecordKey {

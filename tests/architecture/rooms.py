@@ -53,7 +53,7 @@ MAY_INCLUDE = {
     "common/wire": COMMON,
     # Recordings, and bags of ROS 2: for programs that read and write logs, not for the server.
     "common/bag": COMMON,
-    # The messages of ROS 2 on the wire: only the server speaks them.
+    # The messages of ROS 2 on the wire: the server speaks them, and a recorder listens.
     "common/wire/ros2": [*COMMON, "common/wire"],
     # The pure library: its rooms, and at the top the recipe and the choice of methods, which may use them all.
     PARALLEL: [],
@@ -87,12 +87,13 @@ MAY_INCLUDE = {
                "server/queries", "server/ingress", "server/egress", "server/ros2", "server/known_map.h"],
     "client/lib": [*COMMON, "common/wire"],
     "client/sim": COMMON,
-    "client/cli": [*COMMON, "common/bag", "common/wire", "client/lib", "client/sim"],
+    "client/cli": [*COMMON, "common/bag", "common/wire", "common/wire/ros2", "client/lib", "client/sim"],
     # The web page and what serves it: a client like any other.
     "client/web": [*COMMON, "common/wire", "client/lib"],
     # The commands on a stopped server's state and on saved sites: they read and write the store's records, and know
     # nothing else of the server.
     "client/cli/site_stored.cpp": [*COMMON, "client/cli", "client/lib", "server/store"],
+    "client/cli/map_import.cpp": [*COMMON, "client/cli", "client/lib", "server/store"],
     # Tests may look into everything.
     "tests": [*CHANNELS, *SLAM, "common/bag", "common/wire", "server/store", "server/ops", "server/maps", "server/robots", "server/jobs",
               "server/queries", "server/ingress", "server/egress", "server/ros2", "common/wire/ros2", "server", "server/tools",

@@ -84,7 +84,7 @@ install 2 nothing
 expect "an unknown section is a usage error that names the known ones" grep -q 'build test' "$world/said"
 
 # The real list: one plain name or alternatives a line, nothing twice in a section. (A section is installed without the others.)
-bad=$(grep -vE '^(#.*|\[(build|run|test|boot|containers|package)\]|[a-z0-9][a-z0-9.+-]+( \| [a-z0-9][a-z0-9.+-]+)*|)$' "$source_dir/deploy/packages.txt" || true)
+bad=$(grep -vE '^(#.*|\[(build|run|test|boot|containers|images|package)\]|[a-z0-9][a-z0-9.+-]+( \| [a-z0-9][a-z0-9.+-]+)*|)$' "$source_dir/deploy/packages.txt" || true)
 expect "every line of packages.txt has a known form ($bad)" [ -z "$bad" ]
 twice=$(awk '/^\[/ {section = $0; next} /^(#|$)/ {next} seen[section, $0]++ {print}' "$source_dir/deploy/packages.txt")
 expect "no package is listed twice in a section ($twice)" [ -z "$twice" ]

@@ -1,12 +1,15 @@
-// Recordings: a number, then an MCAP file that is read as a drive, or one message of a topic that is decoded: of ROS 2,
-// of Foxglove, or of a recording of our own. SQLite opens files by their names only, and is fuzzed by its makers;
-// damaged databases are in sqlite_file_test.
+// Recordings: a number, then an MCAP file that is read as a drive, one that was compressed as a whole, or one message
+// of a topic that is decoded: of ROS 2, of Foxglove, or of a recording of our own. SQLite opens files by their names
+// only, and is fuzzed by its makers; damaged databases are in sqlite_file_test.
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "common/bag/foxglove_decoding.h"
 #include "common/bag/foxglove_encoding.h"
 #include "common/bag/mcap_file.h"
 #include "common/bag/mcap_writer.h"
+#include "common/bag/packed_file.h"
 #include "common/bag/recording.h"
 #include "common/ros2/cdr_decoding.h"
 #include "common/ros2/frame_tree.h"
@@ -29,7 +32,9 @@ bool RunDrive(std::string_view bytes) {
     return false;
   }
   int scans = 0, odometries = 0;
-  const auto summary = ReadRecording(path, {}, [&](LogRecord&& record) {
+  std::size_t most = 0;  // The lidars' numbers.
+  const auto summary = ReadLidars(path, {.all_lidars = true}, [&](LogRecord&& record, std::size_t lidar) {
+    most = std::max(most, lidar);
     if (const auto* const odometry = std::get_if<Odometry>(&record)) {
       ++odometries;
       Must(odometry->T_odom_robot.IsFinite(), "odometry is a pose");
@@ -45,7 +50,28 @@ bool RunDrive(std::string_view bytes) {
     return false;
   }
   Must(summary->scans == scans && summary->odometries == odometries, "the summary counts every record");
+  Must(most < summary->lidars.size(), "the summary names every lidar");
   return scans + odometries > 0;
+}
+
+// A small one: unpacking a large one takes the time of many rounds.
+bool RunPacked(std::string_view bytes) {
+  static const MemoryFile file;
+  const auto opened = bag::OpenPacked(file.With(bytes), {.bytes = 1 << 20, .times_length = 1});
+  if (!opened) {
+    Must(!opened.error().message.empty(), "a refusal has a reason");
+    return false;
+  }
+  std::vector<std::size_t> wanted((*opened)->topics().size());
+  std::iota(wanted.begin(), wanted.end(), std::size_t{0});
+  std::size_t count = 0;
+  const auto read = (*opened)->Read(wanted, [&](std::size_t topic, std::string_view) {
+    Must(topic < wanted.size(), "a message is of a topic");
+    ++count;
+    return true;
+  });
+  Must(read || !read.error().message.empty(), "a refusal has a reason");
+  return count > 0;
 }
 
 bool TakeTransforms(const Result<ros2::Transforms>& message) {
@@ -84,16 +110,18 @@ bool RunMessage(std::uint8_t kind, std::string_view bytes) {
       Must(twice && bag::EncodeDetails(*twice, 0) == again, "details of a scan read back");
       return true;
     }
-    default: {
+    case 9: {
       const auto odometry = bag::DecodeOdometryDetails(bytes);
       Must(!odometry || odometry->T_odom_robot.IsFinite(), "odometry is a pose");
       return odometry.has_value();
     }
+    default:
+      return RunPacked(bytes);
   }
 }
 
 bool RunBag(std::string_view input) {
-  constexpr std::uint8_t kKinds = 10;
+  constexpr std::uint8_t kKinds = 11;
   Pieces pieces(input);
   const std::uint8_t kind = pieces.Take() % kKinds;
   return kind == 0 ? RunDrive(pieces.rest()) : RunMessage(kind, pieces.rest());
@@ -170,6 +198,18 @@ std::vector<std::string> SeedsOfBags() {
       for (const bool as_transform : {false, true})
         seeds.push_back(std::string(1, '\0') + recorded::McapOf({mounting, as_transform ? moving : moved, seen, packed},
                                                                 compression, per_chunk));
+  // Two lidars of one robot, and files that were compressed as a whole, in one frame and in two.
+  ros2::LaserScan other = scan;
+  other.header.frame = "rear";
+  ros2::Transforms other_frames;
+  other_frames.transforms = {recorded::Link("base_link", "rear", {-0.2, 0.0, 3.0})};
+  const recorded::BagMessage other_mounting{"/tf_static", recorded::kTransformType, 1, recorded::CdrOf(other_frames)},
+      seen_by_other{"/rear/scan", recorded::kScanType, 4, recorded::CdrOf(other)};
+  seeds.push_back(std::string(1, '\0') +
+                  recorded::McapOf({mounting, other_mounting, moved, seen, seen_by_other}, "zstd", 2));
+  const std::string whole = recorded::McapOf({mounting, moved, seen}, "", 0);
+  seeds.push_back('\12' + recorded::PackZstd(whole));
+  seeds.push_back('\12' + recorded::PackZstd(whole.substr(0, 100)) + recorded::PackZstd(whole.substr(100)));
   AddSeedsOfRecordings(seeds);
   return seeds;
 }

@@ -1,9 +1,10 @@
 // Map files: a number, then a picture (PNG, PNM or BMP) under a map.yaml of one kind, a map.yaml over a good picture,
-// or a map of lines. What was read can be written and reads back as the same map.
+// or a map of lines. What was read can be written and reads back as the same map, and a site can be made of it.
 #include <cmath>
 
 #include "common/map/image_codec.h"
 #include "common/map/map_lines.h"
+#include "common/map/map_tiles.h"
 #include "common/map/occupancy_image.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/temp_directory.h"
@@ -28,6 +29,14 @@ bool RunMapFile(const TempDirectory& directory, const std::filesystem::path& yam
   }
   MustBeMap(*map);
   if (map->cells.size() > kMostPixels) return true;
+  if (const auto tiles = ResampleToTiles(*map, map->resolution_m)) {
+    Must(!tiles->empty(), "a map has tiles");
+    for (const auto& [key, cells] : *tiles) {
+      for (const std::uint8_t cell : cells) Must(cell <= 100 || cell == kUnknownCell, "a cell is a share or unknown");
+    }
+  } else {
+    Must(!tiles.error().message.empty(), "a refusal has a reason");
+  }
   MapSaveOptions raw;
   raw.mode = MapImageMode::kRaw;
   Must(SaveMapYaml(*map, directory / "again.yaml", ".pgm", raw).has_value(), "a map that was read can be written");

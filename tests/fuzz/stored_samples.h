@@ -39,6 +39,7 @@ inline std::vector<server::JournalEntry> SmallJournal() {
           RelocaliseTaken{Pose2{1.0, 2.0, 3.0}},
           LocaliseTaken{false, {testing::SampleTile()}, 0.05, 3},
           LocaliseTaken{true, {}, 0.0, 0},
+          PlaceSuggested{9, {1.0, 2.0, 0.5}, {false, {testing::SampleTile()}, 0.05, 3}},
           StartRefusal{"it is elsewhere"},
           SessionFinished{true, {StatusCode::kUnavailable, "gone"}}};
 }

@@ -25,9 +25,9 @@ Request OfLab(RequestKind kind) {
 }
 
 // A new format needs a state directory in tests/golden that was written with it; one of site files, a saved site.
-static_assert(slam::kCheckpointFormat == 11);
+static_assert(slam::kCheckpointFormat == 12);
 static_assert(kRecordFormat == 2);
-static_assert(kSiteFileFormat == 1);
+static_assert(kSiteFileFormat == 2);
 
 // However long ago the states were written: no session is too old to be shown.
 ServerOptions AnyAge() {
@@ -95,12 +95,14 @@ const auto kNameOf = [](const ::testing::TestParamInfo<const char*>& state) {
 INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenState,
                          ::testing::Values("state-1", "state-1-checkpoints-8", "state-1-checkpoints-9",
                                            "state-1-checkpoints-10", "state-1-checkpoints-10-dpslam",
-                                           "state-1-checkpoints-11-dpslam", "state-1-ended"),
+                                           "state-1-checkpoints-11-dpslam", "state-1-checkpoints-12", "state-1-ended"),
                          kNameOf);
 
 class GoldenEndedCheckpoint : public GoldenState {};
 INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenEndedCheckpoint,
-                         ::testing::Values("state-1-checkpoints-10", "state-1-checkpoints-11-dpslam"), kNameOf);
+                         ::testing::Values("state-1-checkpoints-10", "state-1-checkpoints-11-dpslam",
+                                           "state-1-checkpoints-12"),
+                         kNameOf);
 
 TEST_P(GoldenEndedCheckpoint, TheEndIsRestoredFromTheCheckpointAlone) {
   ASSERT_NO_FATAL_FAILURE(RemoveBeginnings());

@@ -373,7 +373,7 @@ TEST(SavedSites, TwoSitesAreMergedIntoOneMap) {
 TEST(SavedSites, TheGoldenFileOfEveryVersionLoads) {
   const char* const source = std::getenv("CAIRN_SOURCE_DIR");
   ASSERT_NE(source, nullptr);
-  for (const char* const name : {"site-v1.site", "site-v1-records-2.site"}) {
+  for (const char* const name : {"site-v1.site", "site-v1-records-2.site", "site-v2.site"}) {
     SCOPED_TRACE(name);
     const TempDirectory directory;
     std::filesystem::create_directories(directory / "0" / "saved");

@@ -44,6 +44,7 @@ LogRun RunOverLog(const StudyLog& log, const slam::MapperOptions& options) {
   run.user_cpu_s = UserCpuSeconds() - user_before;
   run.snapshot = pipeline.mapper().Snapshot();
   run.full = run.snapshot.FullTrajectory();
+  run.learned = pipeline.mapper().learned();
   run.landmarks = pipeline.mapper().landmarks().size();
   return run;
 }

@@ -9,6 +9,7 @@
 
 #include "common/map/occupancy_image.h"
 #include "common/sensor/trajectory.h"
+#include "common/service/learned_value.h"
 #include "server/slam/mapper.h"
 #include "tests/studies/logs.h"
 #include "tests/studies/relations.h"
@@ -34,6 +35,7 @@ struct LogRun {
   // For each pose of `online`: whether the mapper reported it as localized.
   std::vector<std::uint8_t> localized;
   std::size_t landmarks = 0;
+  std::vector<LearnedValue> learned;  // Mapper::learned at the end.
   slam::MapperSnapshot snapshot;
 
   [[nodiscard]] Distribution time_ms() const { return DistributionOf(scan_cpu_ms); }

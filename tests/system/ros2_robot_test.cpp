@@ -10,6 +10,7 @@
 
 #include "tests/child_process.h"
 #include "tests/loopback.h"
+#include "tests/temp_directory.h"
 
 namespace cairn {
 namespace {
@@ -106,6 +107,41 @@ TEST_F(RosFleet, RobotsAsTheyAreGetTheirPosesAndTheMap) {
 TEST_F(RosFleet, OdometryAsATransformOfARobotWithoutNamespace) {
   const auto robot = Robot("-", "5", {"tf-odom"});
   ExpectGood(*robot);
+}
+
+// A recording holds what they publish as if they were robots of Cairn's, and can be replayed as one.
+TEST_F(RosFleet, ARecorderWritesDownTheirScansAndOdometry) {
+  const TempDirectory directory;
+  const std::string file = (directory / "fleet.mcap").string();
+  ChildProcess recorder({CAIRN_PATH, "--domain", domain_, "record", file});
+  const auto topic = Robot("r1", "100");
+  const auto transform = Robot("r2", "100", {"tf-odom"}, "yard");
+  const auto checked = [&](const std::string& robot) {
+    const auto outcome =
+        ChildProcess({CAIRN_PATH, "check-log", file, "--json", "--scan-topic", "/robots/" + robot + "/scan/scan"})
+            .Wait();
+    return nlohmann::json::parse(outcome.output, nullptr, false);
+  };
+  const auto count = [&](const std::string& robot, const char* what) {
+    const nlohmann::json report = checked(robot);
+    return report.is_object() && report.contains(what) ? report[what].value("count", 0) : 0;
+  };
+  for (const std::string robot : {"r1", "r2"}) {
+    EXPECT_TRUE(test::Eventually([&] { return count(robot, "scans") > 20 && count(robot, "odometry") > 20; }))
+        << robot << ": " << checked(robot);
+  }
+  recorder.Signal(SIGINT);
+  const auto recorded = recorder.Wait();
+  EXPECT_EQ(recorded.exit_code, 0) << recorded.output;
+  EXPECT_THAT(recorded.output, HasSubstr("of r1, r2 in"));
+  const nlohmann::json report = checked("r1");
+  EXPECT_EQ(report["refused"].size(), 0U) << report;
+  EXPECT_EQ(report["complaint_count"], 0) << report;
+  const auto replayed = ChildProcess({CAIRN_PATH, "--domain", domain_, "replay", file, "--scan-topic",
+                                      "/robots/r1/scan/scan", "--site", "again", "--robot", "copy", "--fast"})
+                            .Wait();
+  EXPECT_EQ(replayed.exit_code, 0) << replayed.output;
+  EXPECT_THAT(replayed.output, HasSubstr("unexplained 0"));
 }
 
 TEST_F(RosFleet, TheDoctorSaysWhyARobotIsNotOnTheMap) {

@@ -3,7 +3,7 @@ import { element, keyed, setText } from '/panels.js';
 
 const $ = (id) => document.getElementById(id);
 // As the server calls them, in words for people.
-const KINDS = { free: 'Erased', unknown: 'Forgotten', occupied: 'Wall', keep_out: 'Keep out' };
+const KINDS = { free: 'Erased', unknown: 'Forgotten', occupied: 'Wall', keep_out: 'Keep out', origin: 'Origin of the building' };
 const WALL_WIDTH = 0.1;  // Metres.
 
 // Two ends as an edit: of a wall they are its ends, of anything else opposite corners of a box.

@@ -34,8 +34,9 @@ ParticleSet::ParticleSet(const FastSlamOptions& options, std::int64_t count, con
 
 void ParticleSet::Predict(const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev) {
   errors_.Move(best().T_map_robot, T_prev_curr, covariance_prev);
+  const OdometryControl control = InverseOdometry(T_prev_curr);
   for (Particle& particle : particles_)
-    DeadReckon(particle.T_map_robot, particle.covariance, T_prev_curr, covariance_prev);
+    DeadReckon(particle.T_map_robot, particle.covariance, T_prev_curr, control, covariance_prev);
   travelled_ += T_prev_curr.translation().norm();
 }
 

@@ -74,16 +74,17 @@ OccupancyGrid::OccupancyGrid(const GridOptions& options, const Chunks& shared) :
 void OccupancyGrid::Draw(const Scan& scan, const Pose2& T_map_robot) {
   const RasterOptions raster{options_.resolution_m, options_.max_ray_m, options_.no_return_free_m,
                              options_.model == GridModel::kTriangular ? options_.hit_spread_m : 0.0};
-  ChunkKey current{std::numeric_limits<int>::min(), 0};
-  GridChunk* chunk = nullptr;
+  // A scan touches few chunks, but goes from one to the next in every row of cells.
+  std::vector<std::pair<int, GridChunk*>> chunks;  // Those of one row of chunks, by their x.
+  int row = std::numeric_limits<int>::min();
   static_assert(kTileCells % ScanRaster::kPiece == 0);  // A piece lies in one chunk.
   raster_.Rasterise(scan, T_map_robot, raster, [&](GridCell first, const ScanRaster::Piece& marks) {
     const ChunkKey key{FloorDiv(first.x, kTileCells), FloorDiv(first.y, kTileCells)};
-    if (key != current) {
-      chunk = &Writable(key);
-      current = key;
-    }
-    std::int16_t* cells = chunk->log_odds.data() + IndexInChunk(first, key);
+    if (key.y != row) chunks.clear();
+    row = key.y;
+    auto chunk = std::ranges::find(chunks, key.x, &std::pair<int, GridChunk*>::first);
+    if (chunk == chunks.end()) chunk = chunks.insert(chunk, {key.x, &Writable(key)});
+    std::int16_t* cells = chunk->second->log_odds.data() + IndexInChunk(first, key);
     if (adds_up_) return AddUp(marks, cells);
     for (std::size_t i = 0; i < marks.size(); ++i)
       if (marks[i] != ScanRaster::kUntouched) cells[i] = After(cells[i], ScanRaster::HitShare(marks[i]));

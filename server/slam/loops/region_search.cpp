@@ -33,8 +33,8 @@ struct Block {
 class BranchAndBound {
  public:
   BranchAndBound(std::span<const Eigen::Vector2d> points, const LikelihoodPyramid& pyramid, const SearchWindow& window,
-                 const std::optional<Exclusion>& exclusion)
-      : pyramid_(pyramid), window_(window), exclusion_(exclusion) {
+                 std::span<const Exclusion> exclusions)
+      : pyramid_(pyramid), window_(window), exclusions_(exclusions) {
     double farthest = 1.0;
     for (const Eigen::Vector2d& p : points) farthest = std::max(farthest, p.norm());
     step_rad_ = pyramid.cell_m() / std::min(farthest, kFullDetailM);
@@ -75,16 +75,16 @@ class BranchAndBound {
   }
 
   [[nodiscard]] bool Excluded(const Block& block, int level) const {
-    if (!exclusion_) return false;
+    if (exclusions_.empty()) return false;
     const Pose2 low = PoseOf(block);
-    if (std::abs(AngleDiff(low.theta, exclusion_->T_ref_curr.theta)) > exclusion_->radius_rad) return false;
     // The whole block must lie inside, so its farthest corner is checked.
     const double side = ((1 << level) - 1) * pyramid_.cell_m();
-    const double dx =
-        std::max(std::abs(low.x - exclusion_->T_ref_curr.x), std::abs(low.x + side - exclusion_->T_ref_curr.x));
-    const double dy =
-        std::max(std::abs(low.y - exclusion_->T_ref_curr.y), std::abs(low.y + side - exclusion_->T_ref_curr.y));
-    return std::hypot(dx, dy) <= exclusion_->radius_m;
+    return std::any_of(exclusions_.begin(), exclusions_.end(), [&](const Exclusion& one) {
+      if (std::abs(AngleDiff(low.theta, one.T_ref_curr.theta)) > one.radius_rad) return false;
+      const double dx = std::max(std::abs(low.x - one.T_ref_curr.x), std::abs(low.x + side - one.T_ref_curr.x));
+      const double dy = std::max(std::abs(low.y - one.T_ref_curr.y), std::abs(low.y + side - one.T_ref_curr.y));
+      return std::hypot(dx, dy) <= one.radius_m;
+    });
   }
 
   // Depth first, in the order of the bounds; skips blocks that cannot exceed the best score.
@@ -115,7 +115,7 @@ class BranchAndBound {
 
   const LikelihoodPyramid& pyramid_;
   const SearchWindow window_;
-  const std::optional<Exclusion> exclusion_;
+  const std::span<const Exclusion> exclusions_;
   double step_rad_ = 0.0;
   int reach_turns_ = 0;
   int reach_cells_ = 0;
@@ -197,8 +197,15 @@ std::int64_t LikelihoodPyramid::SumOfBest(int level, std::span<const Cell> cells
 std::optional<RegionPeak> FindBestPose(std::span<const Eigen::Vector2d> points_curr, const LikelihoodPyramid& pyramid,
                                        const SearchWindow& window, double min_score,
                                        const std::optional<Exclusion>& exclusion) {
+  if (!exclusion) return FindBestPose(points_curr, pyramid, window, min_score, std::span<const Exclusion>());
+  return FindBestPose(points_curr, pyramid, window, min_score, std::span(&*exclusion, 1));
+}
+
+std::optional<RegionPeak> FindBestPose(std::span<const Eigen::Vector2d> points_curr, const LikelihoodPyramid& pyramid,
+                                       const SearchWindow& window, double min_score,
+                                       std::span<const Exclusion> exclusions) {
   if (points_curr.empty()) return std::nullopt;
-  return BranchAndBound(points_curr, pyramid, window, exclusion).Run(min_score);
+  return BranchAndBound(points_curr, pyramid, window, exclusions).Run(min_score);
 }
 
 }  // namespace cairn::slam

@@ -78,5 +78,9 @@ inline constexpr int kMaxBlocks = 1'000'000;
                                                      const LikelihoodPyramid& pyramid, const SearchWindow& window,
                                                      double min_score,
                                                      const std::optional<Exclusion>& exclusion = std::nullopt);
+// The same, without the poses near any of several.
+[[nodiscard]] std::optional<RegionPeak> FindBestPose(std::span<const Eigen::Vector2d> points_curr,
+                                                     const LikelihoodPyramid& pyramid, const SearchWindow& window,
+                                                     double min_score, std::span<const Exclusion> exclusions);
 
 }  // namespace cairn::slam

@@ -5,10 +5,9 @@
 namespace cairn::slam {
 namespace {
 
-// Half or twice of each of these changes the results on the first 4500 scans of mit-killian no more than another seed
-// (study `sensitivity`).
+// Half or twice of each of these, and of kMinLikelihood, changes the results on the first 4500 scans of mit-killian no
+// more than another seed (study `sensitivity`).
 constexpr std::size_t kMaxSearchPoints = 250;  // Most surface points that are used.
-constexpr double kMinLikelihood = 0.5;         // Smallest mean likelihood of the surfaces.
 // A pose is a rival of the best one if it is farther away than this, or if its heading differs by more.
 constexpr double kRivalBeyondM = 1.0;
 constexpr double kRivalBeyondRad = 0.3;

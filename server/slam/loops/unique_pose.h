@@ -16,6 +16,7 @@ inline constexpr std::size_t kMinSurfaces = 20;   // Fewest surfaces on either s
 inline constexpr double kSearchCellM = 0.1;       // Cell of the raster for the search.
 inline constexpr double kLikelihoodReachM = 0.3;  // At this distance from a surface the likelihood is zero.
 inline constexpr double kConfirmWithinM = 10.0;   // Largest way between two poses that confirm each other.
+inline constexpr double kMinLikelihood = 0.5;     // Smallest mean likelihood of the surfaces at a pose.
 inline constexpr double kFoundSigmaRad = 0.01;    // Standard deviation of the heading of a pose that was found.
 
 // Pose T_ref_curr in the window at which the surfaces fit best. No value if they fit badly, if a pose farther away or

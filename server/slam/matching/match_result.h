@@ -26,6 +26,9 @@ struct MatchResult {
   Eigen::Vector2d degenerate_direction = Eigen::Vector2d::Zero();  // That direction: a unit vector, in ref.
   // Information of the surfaces on the position along it, 1/m^2; 0 if the position comes from the prior alone.
   double open_information = 0.0;
+  // Information of the surfaces on the translation, in ref and 1/m^2, with the heading left free. Zero where the result
+  // does not come from the alignment with surfaces.
+  Eigen::Matrix2d surface_information = Eigen::Matrix2d::Zero();
   MatchFailure failure = MatchFailure::kNone;
 };
 

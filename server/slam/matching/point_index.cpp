@@ -182,9 +182,11 @@ void PointIndex::LookInto(std::int32_t i, std::int32_t j, Search& search) const 
       const FourFloats farther = squared > search.nearest ? squared : search.nearest;
       search.next = farther < search.next ? farther : search.next;
       search.nearest = squared < search.nearest ? squared : search.nearest;
-      const auto nearer = std::bit_cast<std::array<std::uint64_t, 2>>(squared <= search.may_be_nearer_m2);
-      if ((nearer[0] | nearer[1]) == 0) continue;
+      const auto nearer = squared <= search.may_be_nearer_m2;
+      const auto halves = std::bit_cast<std::array<std::uint64_t, 2>>(nearer);
+      if ((halves[0] | halves[1]) == 0) continue;
       for (std::int32_t n = std::min(4 * four + 4, block.size); n-- > std::max(4 * four, end);) {
+        if (nearer[static_cast<std::size_t>(n % 4)] == 0) continue;
         const std::int32_t at = block.point[static_cast<std::size_t>(n)];
         const double squared_m2 = (points_[static_cast<std::size_t>(at)].p - search.p).squaredNorm();
         if (squared_m2 < search.squared_m2 && at >= dropped) search.Set(squared_m2, at);

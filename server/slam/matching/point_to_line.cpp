@@ -207,6 +207,9 @@ MatchResult AlignPointsToSurfaces(std::span<const SurfacePoint> points_robot, co
   // A reference point without a surface direction seems to constrain all directions, so only surfaces are
   // used to judge degeneracy.
   DetectDegeneracy(per_point * H_surfaces, result);
+  result.surface_information = per_point * (H_surfaces.topLeftCorner<2, 2>() - H_surfaces.topRightCorner<2, 1>() *
+                                                                                   H_surfaces.bottomLeftCorner<1, 2>() /
+                                                                                   std::max(H_surfaces(2, 2), 1e-12));
   return result;
 }
 

@@ -30,5 +30,8 @@ struct OdometryControl {
 // of the step's (x, y, theta), in the frame in which the step starts; it takes the place of Gu R_u Gu'.
 void DeadReckon(Pose2& T_map_robot, Eigen::Matrix3d& covariance, const Pose2& T_prev_curr,
                 const Eigen::Matrix3d& step_covariance_prev);
+// The same for many poses: `control` must be InverseOdometry(T_prev_curr).
+void DeadReckon(Pose2& T_map_robot, Eigen::Matrix3d& covariance, const Pose2& T_prev_curr,
+                const OdometryControl& control, const Eigen::Matrix3d& step_covariance_prev);
 
 }  // namespace cairn::slam

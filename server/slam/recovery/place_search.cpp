@@ -8,6 +8,9 @@
 namespace cairn::slam {
 namespace {
 
+// Places with a smaller share of the best score are none.
+constexpr double kLeastOfBest = 0.5;
+
 // The surface points of the scans, one per cell, in the frame of the last scan.
 std::vector<SurfacePoint> SurfacesOf(std::span<const RecentScan> recent, double cell_m) {
   std::vector<SurfacePoint> surfaces;
@@ -51,6 +54,28 @@ std::optional<FoundPlace> PlaceSearch::FindWithin(const SearchWindow* window, co
       FindUniquePose(surfaces, index_->pyramid, window != nullptr ? *window : index_->window, loop_.max_rival);
   if (!unique) return std::nullopt;
   return Fit(map, recent, surfaces, *unique, UniquePoseCovariance());
+}
+
+RankedPlaces PlaceSearch::Rank(const SearchedMap& map, std::span<const RecentScan> recent, std::size_t most,
+                               const std::function<bool()>& go_on) {
+  RankedPlaces ranked;
+  if (recent.empty() || IndexOf(map).surfaces.size() < kMinSurfaces) return ranked;
+  const auto surfaces = SurfacesOf(recent, options_.cell_scale * kSearchCellM);
+  if (surfaces.size() < kMinSurfaces) return ranked;
+  const auto points = SampleOf(surfaces);
+  std::vector<Exclusion> known;
+  while (ranked.places.size() < most && go_on()) {
+    const double least = known.empty() ? kMinLikelihood : kLeastOfBest * ranked.places.front().score;
+    const auto peak = FindBestPose(points, index_->pyramid, index_->window, least, known);
+    ranked.complete = !peak || peak->complete;
+    if (!peak || !ranked.complete) break;
+    ranked.places.push_back({peak->T_ref_curr, peak->score});
+    known.push_back(ApartFrom(peak->T_ref_curr));
+  }
+  if (ranked.places.empty() || !go_on()) return ranked;
+  ranked.found = Find(map, recent);
+  if (ranked.found) ranked.places.front().T_map_robot = ranked.found->T_map_robot;
+  return ranked;
 }
 
 const IndexedSurfaces& PlaceSearch::IndexOf(const SearchedMap& map) {

@@ -8,6 +8,8 @@
 // visibility.h.
 #pragma once
 
+#include <cstddef>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -40,6 +42,22 @@ struct FoundPlace {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
 };
 
+// Where the last of some scans may have been seen.
+struct RankedPlaces {
+  struct Place {
+    Pose2 T_map_robot;
+    double score = 0.0;  // Mean likelihood of the surfaces, 0..1.
+  };
+  std::vector<Place> places;  // The best one first.
+  bool complete = true;       // False: a search ended at its bound on work, and there may be other places.
+  // The place, exactly, if it has no rival and the scans do not contradict it: as PlaceSearch::Find.
+  std::optional<FoundPlace> found;
+
+  // The score of the second place over that of the first: near 1 where two places look alike, 0 where no other place
+  // has half of the score of the best.
+  [[nodiscard]] double ambiguity() const { return places.size() < 2 ? 0.0 : places[1].score / places[0].score; }
+};
+
 class PlaceSearch {
  public:
   // Shares the options of large loops and of the self-check, so that a place is judged alike everywhere.
@@ -54,6 +72,11 @@ class PlaceSearch {
   [[nodiscard]] std::optional<FoundPlace> FindNear(const SearchedMap& map, std::span<const RecentScan> recent,
                                                    const Pose2& T_map_robot, double reach_m = 0.0,
                                                    double reach_rad = 0.0);
+  // All places that may be that of the last of the scans, at most `most`. `go_on` is asked between the searches, each
+  // of which is bounded (kMaxBlocks); if it returns false, what was found so far is returned and must not be used.
+  // REQUIRES: as Find.
+  [[nodiscard]] RankedPlaces Rank(const SearchedMap& map, std::span<const RecentScan> recent, std::size_t most,
+                                  const std::function<bool()>& go_on);
   void Forget() { index_.reset(); }
   // How well the surfaces of these scans fit, with the last of them at this pose and as seen best with a search of some
   // cells around it, 0..1. REQUIRES: as Find.

@@ -1,5 +1,6 @@
 #include "server/slam/recovery/recovery.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -10,6 +11,10 @@ namespace {
 
 constexpr std::size_t kMaxRecent = 120;  // Scans that are kept: turning on the spot makes many.
 constexpr std::size_t kMaxHeld = 60;  // Keyframes that may be added to the path at once: bounds the time of one scan.
+// Scans for which a place that a job has found is looked at: a minute of most lidars.
+constexpr int kMaxScansSuggested = 600;
+// Standard deviations of the place of another map relative to that of the robot.
+constexpr double kOtherMapSigmaM = 0.1, kOtherMapSigmaRad = 0.01;
 constexpr double kUnknownM = 1000.0;  // Standard deviation of a place that is not known.
 constexpr double kNever = -1.0;       // No search yet.
 constexpr double kSigmas = 3.0;       // The search near a pose reaches so far, in standard deviations.
@@ -61,10 +66,52 @@ void Recovery::End() {
 }
 
 void Recovery::ForgetScans() {
+  suggestion_.reset();
   LeavePath();
   recent_.clear();
   unconfirmed_.clear();
   searched_at_m_ = kNever;
+}
+
+bool Recovery::Suggest(Stamp seen, const Pose2& T_map_robot, std::shared_ptr<const SearchedMap> map) {
+  const auto scan = std::ranges::find_if(recent_, [seen](const RecentScan& one) { return one.scan->stamp == seen; });
+  if (!active_ || scan == recent_.end()) return false;
+  const Candidate place{T_map_robot * scan->T_track_robot.Inverse(), scan->travelled_m};
+  const RecentScan& now = recent_.back();
+  const bool found_elsewhere = !unconfirmed_.empty() &&
+                               now.travelled_m - unconfirmed_.back().travelled_m <= kConfirmWithinM &&
+                               !Agree(unconfirmed_.back(), place.T_map_track * now.T_track_robot);
+  if (found_elsewhere) return false;
+  suggestion_.emplace(Suggestion{place, std::move(map), search_, kMaxScansSuggested});
+  suggestion_->search.Forget();
+  return true;
+}
+
+void Recovery::AgeSuggestion() {
+  if (suggestion_ && --suggestion_->scans_left <= 0) suggestion_.reset();
+}
+
+// Like a place that was found here: by a second search, some way later, which agrees.
+std::optional<FoundPlace> Recovery::ConfirmSuggestion() {
+  if (!suggestion_) return std::nullopt;
+  const RecentScan& now = recent_.back();
+  const double way_m = now.travelled_m - suggestion_->place.travelled_m;
+  if (way_m > kConfirmWithinM) suggestion_.reset();
+  if (!suggestion_ || way_m < loop_.confirm_after_m) return std::nullopt;
+  const Pose2 T_map_robot = suggestion_->place.T_map_track * now.T_track_robot;
+  auto place = suggestion_->search.FindNear(*suggestion_->map, recent_, T_map_robot);
+  if (place && !ConfirmEachOther(T_map_robot, place->T_map_robot)) place.reset();
+  if (place) place->covariance += PoseCovariance(kOtherMapSigmaM, kOtherMapSigmaRad);
+  return place;
+}
+
+std::vector<Pose2> Recovery::Unconfirmed() const {
+  std::vector<Pose2> places;
+  if (!has_scans()) return places;
+  const Pose2& T_track_robot = recent_.back().T_track_robot;
+  for (const Candidate& one : unconfirmed_) places.push_back(one.T_map_track * T_track_robot);
+  if (suggestion_) places.push_back(suggestion_->place.T_map_track * T_track_robot);
+  return places;
 }
 
 void Recovery::LeavePath() {
@@ -92,6 +139,7 @@ void Recovery::Append(const Keyframe& keyframe, const TrackStep& step, std::vect
 std::optional<Recovery::Found> Recovery::Take(const Keyframe& keyframe, const TrackStep& step,
                                               std::vector<SurfacePoint> points_robot, const SearchedMap& map) {
   Append(keyframe, step, std::move(points_robot));
+  if (const auto place = ConfirmSuggestion()) return Found{*place, false};
   const Pose2 T_map_robot = BeliefAt(keyframe.T_odom_robot, step.T_track_robot).T_map_robot;
   contradicted_ = search_.Compare(map, *recent_.back().scan, recent_.back().points, T_map_robot) ==
                   PlaceSearch::Agreement::kContradicts;
@@ -130,6 +178,11 @@ std::pair<double, double> Recovery::ReachOfTrack() const {
 // All places found within kConfirmWithinM of way must agree.
 bool Recovery::IsConfirmed(const Pose2& T_map_robot) {
   const RecentScan& now = recent_.back();
+  // That of a job is one of them.
+  if (suggestion_ && !Agree(suggestion_->place, T_map_robot)) {
+    suggestion_.reset();
+    unconfirmed_.clear();
+  }
   if (!unconfirmed_.empty() &&
       (now.travelled_m - unconfirmed_.back().travelled_m > kConfirmWithinM || !Agree(unconfirmed_.back(), T_map_robot)))
     unconfirmed_.clear();

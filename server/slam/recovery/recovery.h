@@ -5,12 +5,15 @@
 //    added to the path as if there had been no pause, if the place found is that one (`on_path`).
 //  - Otherwise its pose is carried on by odometry where there is any, and the path goes on at the place found.
 //  - Where somebody has said where the robot is, one search near there that finds it is enough (`BeginWhereSaid`).
+//  - Where a job has found the robot in the map of its site, which shows more than that of the robot (`Suggest`), that
+//    was the first of the two searches, and the second one is made in that map.
 //  - A robot that has been followed in the map of others, with too much doubt (`BeginNear`), is found by one search
 //  where
 //    the track leads, and elsewhere by two that agree, like all others.
 // Frames: `track` is that of the front-end. Not thread-safe. Deterministic.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -85,9 +88,23 @@ class Recovery {
   void Move(const Pose2& T_new_old);
   // The map is another one now.
   void ForgetMap() {
+    suggestion_.reset();
     unconfirmed_.clear();
     search_.Forget();
   }
+  // A job has found the robot in another map: it was at `T_map_robot` when it saw the scan of this stamp. From now on
+  // that place is looked at, in that map, until the robot is found, or has driven kConfirmWithinM, or its scans do not
+  // continue that one, or it is found elsewhere in its own map. False, and nothing is changed: it is not one of the
+  // last scans, or the robot has just been found elsewhere in its own map, which is not confirmed yet.
+  [[nodiscard]] bool Suggest(Stamp seen, const Pose2& T_map_robot, std::shared_ptr<const SearchedMap> map);
+  [[nodiscard]] bool suggested() const { return suggestion_.has_value(); }
+  void ForgetSuggestion() { suggestion_.reset(); }
+  // Called with each scan: a suggestion does not last for ever, also if the robot stands still.
+  void AgeSuggestion();
+  // The last scans, if they belong together with the next one.
+  [[nodiscard]] const std::vector<RecentScan>& recent() const { return recent_; }
+  // Where the robot may be now: at the places found that are not confirmed.
+  [[nodiscard]] std::vector<Pose2> Unconfirmed() const;
   // The odometry has begun anew.
   void OdometryBeganAnew() { odometry_goes_on_ = false; }
   void End();
@@ -119,6 +136,7 @@ class Recovery {
             self.searched_at_m_, self.recent_, self.held_, self.unconfirmed_);
     if constexpr (Archive::kReads) {
       self.search_.Forget();
+      self.suggestion_.reset();  // Nothing is saved while there is one.
       if (archive.ok()) self.RestorePoints();
     }
   }
@@ -134,6 +152,15 @@ class Recovery {
       archive(self.T_map_track, self.travelled_m);
     }
   };
+  // A place found by a job.
+  struct Suggestion {
+    Candidate place;
+    std::shared_ptr<const SearchedMap> map;
+    PlaceSearch search;
+    int scans_left = 0;
+  };
+  // The place of the last scan, if it is the suggested one.
+  [[nodiscard]] std::optional<FoundPlace> ConfirmSuggestion();
   void RestorePoints();
   [[nodiscard]] Pose2 FromLast(const Pose2& T_track_robot) const;
   void Append(const Keyframe& keyframe, const TrackStep& step, std::vector<SurfacePoint> points_robot);
@@ -160,6 +187,7 @@ class Recovery {
   std::vector<RecentScan> recent_;
   std::vector<Held> held_;  // While the scans continue the path: those that will be its keyframes.
   std::vector<Candidate> unconfirmed_;
+  std::optional<Suggestion> suggestion_;  // Not part of a checkpoint: it has a map of its own.
 };
 
 }  // namespace cairn::slam

@@ -14,6 +14,10 @@ namespace {
 // The time assumed between the last scan of a clock and the first one after the clock was set back, because the true
 // time is not known.
 constexpr Stamp kIntervalNs = kNanosPerSecond / 10;
+// The speed at a scan is that since so long before it, from odometry of at most such distances in time, with so many
+// samples since the scan before.
+constexpr std::uint64_t kRateReachNs = kNanosPerSecond / 10, kDenseNs = 60 * kNanosPerSecond / 1000;
+constexpr int kFewestSamples = 3;
 
 std::uint64_t Nanos(double seconds) {
   return static_cast<std::uint64_t>(seconds * 1e9);
@@ -189,7 +193,7 @@ bool OdometryPairing::Follows(const Odometry& odometry, const Pose2& logged) con
                 limits);
 }
 
-void OdometryPairing::Pair(const std::shared_ptr<const Scan>& scan, const Pose2& T_odom_robot) {
+void OdometryPairing::Pair(const std::shared_ptr<const Scan>& scan, const Pose2& T_odom_robot, const Pose2& rate) {
   // Unsigned, because a broken clock may be anywhere in int64.
   const auto robot_time = static_cast<std::uint64_t>(scan->stamp);
   auto stamp = static_cast<Stamp>(robot_time + set_back_ns_);
@@ -204,34 +208,72 @@ void OdometryPairing::Pair(const std::shared_ptr<const Scan>& scan, const Pose2&
   last_paired_ = stamp;
   std::vector<Odometry> during = During(*scan);
   sink_.paired({scan, WithoutMotion(scan, during, options_.rolling.deskew), T_odom_robot, stamp,
-                std::exchange(passage_, Passage::kDriven), std::move(during)});
+                std::exchange(passage_, Passage::kDriven), std::move(during), rate});
+}
+
+void OdometryPairing::SetLag(double lag_s) {
+  lag_ns_ = StampFromSeconds(std::clamp(lag_s, -kMostLagS, kMostLagS));
+}
+
+// Unsigned, because a broken clock may be anywhere in int64.
+Stamp OdometryPairing::TimeOf(const Scan& scan) const {
+  return static_cast<Stamp>(static_cast<std::uint64_t>(scan.stamp) - static_cast<std::uint64_t>(lag_ns_));
+}
+
+// Only from dense odometry between the scans: where it comes with the scans alone, their stamps come in bursts, and no
+// lag between the two can be seen. Zero if it is not known. From samples at and before the first one after `time`, so
+// that it does not matter how much has arrived since.
+Pose2 OdometryPairing::RateAt(Stamp time) const {
+  const auto after = std::lower_bound(odometry_.begin(), odometry_.end(), time,
+                                      [](const Odometry& odometry, Stamp stamp) { return odometry.stamp < stamp; });
+  if (after == odometry_.end() || !last_paired_) return {};
+  const auto last = static_cast<Stamp>(static_cast<std::uint64_t>(*last_paired_) - set_back_ns_ -
+                                       static_cast<std::uint64_t>(lag_ns_));
+  auto before = after;
+  int since_last = 1;
+  while (before->stamp > time || NanosBetween(before->stamp, time) < kRateReachNs) {
+    if (before == odometry_.begin()) return {};
+    const auto earlier = std::prev(before);
+    since_last += earlier->stamp > last ? 1 : 0;
+    if (NanosBetween(earlier->stamp, before->stamp) > kDenseNs) return {};
+    before = earlier;
+  }
+  if (since_last < kFewestSamples) return {};
+  const Pose2 step = Between(before->T_odom_robot, after->T_odom_robot);
+  const double per_s = 1e9 / static_cast<double>(NanosBetween(before->stamp, after->stamp));
+  return {step.x * per_s, step.y * per_s, step.theta * per_s};
 }
 
 // Whether odometry covers the whole scan.
 bool OdometryPairing::Covers(const Scan& scan) const {
-  if (odometry_.empty() || odometry_.back().stamp < scan.stamp) return false;
-  return NanosBetween(scan.stamp, odometry_.back().stamp) >= DurationNs(scan);
+  const Stamp time = TimeOf(scan);
+  if (odometry_.empty() || odometry_.back().stamp < time) return false;
+  return NanosBetween(time, odometry_.back().stamp) >= DurationNs(scan);
 }
 
 // Pairs a scan that has odometry at or after its stamp, or drops it.
 void OdometryPairing::PairOrDrop(const std::shared_ptr<const Scan>& scan) {
-  const auto after = std::lower_bound(odometry_.begin(), odometry_.end(), scan->stamp,
+  const Stamp time = TimeOf(*scan);
+  const auto after = std::lower_bound(odometry_.begin(), odometry_.end(), time,
                                       [](const Odometry& odometry, Stamp stamp) { return odometry.stamp < stamp; });
-  const bool exact = after->stamp == scan->stamp;
+  const bool exact = after->stamp == time;
   if (!exact && after == odometry_.begin()) return sink_.dropped(*scan, DropReason::kNoOdometry);
   const auto before = exact ? after : std::prev(after);
   const bool too_far = !exact && NanosBetween(before->stamp, after->stamp) > Nanos(options_.max_gap_s);
-  const Pose2 T_odom_robot = exact ? after->T_odom_robot : PoseAt(scan->stamp, *before, *after);
+  const Pose2 T_odom_robot = exact ? after->T_odom_robot : PoseAt(time, *before, *after);
+  const Pose2 rate = RateAt(time);
   // Later scans have later stamps, so nothing before this sample is needed any more, but the one before it, which says
-  // how the robot moves (Follows).
-  odometry_.erase(odometry_.begin(), before == odometry_.begin() ? before : std::prev(before));
+  // how the robot moves (Follows), and as much as the lag may grow.
+  while (odometry_.size() > 2 && odometry_[1].stamp < before->stamp &&
+         NanosBetween(odometry_[1].stamp, before->stamp) > Nanos(kMostLagS))
+    odometry_.pop_front();
   const std::vector<Odometry> during = During(*scan);
   const auto apart = [this](const Odometry& a, const Odometry& b) {
     return NanosBetween(a.stamp, b.stamp) > Nanos(options_.max_gap_s);
   };
   if (too_far || std::adjacent_find(during.begin(), during.end(), apart) != during.end())
     return sink_.dropped(*scan, DropReason::kNoOdometry);
-  Pair(scan, T_odom_robot);
+  Pair(scan, T_odom_robot, rate);
 }
 
 // The odometry from the last sample at or before the stamp of a scan to its last beam; nothing if the scan was taken at
@@ -239,12 +281,16 @@ void OdometryPairing::PairOrDrop(const std::shared_ptr<const Scan>& scan) {
 std::vector<Odometry> OdometryPairing::During(const Scan& scan) const {
   const std::uint64_t duration_ns = DurationNs(scan);
   std::vector<Odometry> during;
-  if (duration_ns == 0 || odometry_.empty() || odometry_.front().stamp > scan.stamp) return during;
+  const Stamp time = TimeOf(scan);
+  if (duration_ns == 0 || odometry_.empty() || odometry_.front().stamp > time) return during;
   const auto later = [](Stamp stamp, const Odometry& odometry) { return stamp < odometry.stamp; };
-  for (auto at = std::prev(std::upper_bound(odometry_.begin(), odometry_.end(), scan.stamp, later));
-       at != odometry_.end(); ++at) {
+  for (auto at = std::prev(std::upper_bound(odometry_.begin(), odometry_.end(), time, later)); at != odometry_.end();
+       ++at) {
     during.push_back(*at);
-    if (at->stamp >= scan.stamp && NanosBetween(scan.stamp, at->stamp) >= duration_ns) break;
+    // On the clock of the scan.
+    during.back().stamp =
+        static_cast<Stamp>(static_cast<std::uint64_t>(at->stamp) + static_cast<std::uint64_t>(lag_ns_));
+    if (at->stamp >= time && NanosBetween(time, at->stamp) >= duration_ns) break;
   }
   return during;
 }
@@ -265,10 +311,11 @@ void OdometryPairing::Finish() {
     const auto scan = std::move(scans_.front());
     scans_.pop_front();
     // After Flush only scans are left that end later than the last odometry sample.
-    if (!odometry_.empty() && odometry_.back().stamp >= scan->stamp) {
+    const Stamp time = TimeOf(*scan);
+    if (!odometry_.empty() && odometry_.back().stamp >= time) {
       PairOrDrop(scan);
-    } else if (!odometry_.empty() && NanosBetween(odometry_.back().stamp, scan->stamp) <= Nanos(options_.max_gap_s)) {
-      Pair(scan, odometry_.back().T_odom_robot);
+    } else if (!odometry_.empty() && NanosBetween(odometry_.back().stamp, time) <= Nanos(options_.max_gap_s)) {
+      Pair(scan, odometry_.back().T_odom_robot, {});
     } else {
       sink_.dropped(*scan, DropReason::kNoOdometry);
     }

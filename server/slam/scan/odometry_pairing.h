@@ -59,6 +59,9 @@ struct PairedScan {
   Stamp stamp = 0;  // The scan's, plus what the robot's clock was set back by: grows from pair to pair.
   Passage passage = Passage::kDriven;
   std::vector<Odometry> during{};  // RollingScan::odometry; empty if all beams are measured at once.
+  // Speed at the stamp, as odometry shows it: per second, in the frame of the robot. Zero where odometry between the
+  // scans is too sparse to show it.
+  Pose2 rate{};
 };
 
 class OdometryPairing {
@@ -90,6 +93,10 @@ class OdometryPairing {
     for (const auto& scan : scans_) visit(*scan);
     scan_gate_.ForEachHeld([&visit](const std::shared_ptr<const Scan>& scan) { visit(*scan); });
   }
+  // From the next scan on, stamps of scans count as later by this than those of odometry, in addition to
+  // PairingOptions::laser_lag_s. At most kMostLagS either way: so much odometry is kept.
+  static constexpr double kMostLagS = 1.0;
+  void SetLag(double lag_s);
   // Odometry samples refused so far for their stamps.
   [[nodiscard]] std::uint64_t odometry_refused() const { return odometry_refused_; }
 
@@ -97,8 +104,14 @@ class OdometryPairing {
   static void Members(Archive& archive, auto& self) {
     archive(self.scans_, self.odometry_, self.last_paired_, self.set_back_ns_, self.odometry_refused_, self.passage_,
             self.newest_, self.time_known_, self.scan_gate_, self.odometry_gate_);
-    if (self.Corrects()) archive(self.logged_, self.corrected_);
     archive.Require(self.passage_ <= Passage::kUnknown, "a passage");
+    if (self.Corrects()) archive(self.logged_, self.corrected_);
+    if constexpr (Archive::kReads) {
+      self.lag_ns_ = 0;
+      if (archive.format() < 12) return;
+    }
+    archive(self.lag_ns_);
+    archive.Require(-kNanosPerSecond <= self.lag_ns_ && self.lag_ns_ <= kNanosPerSecond, "a lag");
   }
 
  private:
@@ -109,13 +122,16 @@ class OdometryPairing {
   void ScanClockSetBack(Stamp last);
   void OdometryClockSetBack(Stamp last);
   void DropWaitingScans();
+  // The time of the scan on the clock of the odometry.
+  [[nodiscard]] Stamp TimeOf(const Scan& scan) const;
+  [[nodiscard]] Pose2 RateAt(Stamp time) const;
   [[nodiscard]] bool Covers(const Scan& scan) const;
   void PairOrDrop(const std::shared_ptr<const Scan>& scan);
   [[nodiscard]] std::vector<Odometry> During(const Scan& scan) const;
   void BeginAnew(Passage passage);
   [[nodiscard]] bool Follows(const Odometry& odometry, const Pose2& logged) const;
   void Flush();
-  void Pair(const std::shared_ptr<const Scan>& scan, const Pose2& T_odom_robot);
+  void Pair(const std::shared_ptr<const Scan>& scan, const Pose2& T_odom_robot, const Pose2& rate);
 
   PairingOptions options_;
   Sink sink_;
@@ -124,6 +140,7 @@ class OdometryPairing {
   std::optional<Stamp> last_paired_;  // In the estimator's time.
   std::uint64_t set_back_ns_ = 0;     // The estimator's time less the robot's, modulo 2^64.
   std::uint64_t odometry_refused_ = 0;
+  Stamp lag_ns_ = 0;                    // SetLag.
   Passage passage_ = Passage::kDriven;  // Since the last pair, as far as it is known.
   std::optional<Odometry> newest_;      // The last sample taken, of any clock or client,
   bool time_known_ = true;              // and whether the time since then is known.

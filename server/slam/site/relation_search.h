@@ -7,6 +7,7 @@
 //    They need a guess good to half a metre and are the exact ones.
 //  - Stretches (MatchStretches): where the guess is worse.
 // None of them is believed before it is compared with the others (consistent_set.h, site_graph.h).
+// What the book holds already (relation_book.h) is not measured again, and what is measured is noted there.
 // Frames: see session_map.h. Stateless, deterministic. `go_on` is asked between the searches; if it returns false, what
 // was found so far is returned and must not be used.
 #pragma once
@@ -16,6 +17,7 @@
 #include <span>
 #include <vector>
 
+#include "server/slam/site/relation_book.h"
 #include "server/slam/site/session_map.h"
 #include "server/slam/site/site_options.h"
 #include "server/slam/trail/pose_path.h"
@@ -36,7 +38,8 @@ struct PlacedSession {
 // The place around a keyframe of `seen` in the map of `known`: a relation from `known` to `seen`.
 [[nodiscard]] std::optional<SessionRelation> RecognisePlace(std::size_t known_number, SessionMap& known,
                                                             std::size_t seen_number, SessionMap& seen,
-                                                            std::size_t keyframe, const LoopOptions& options);
+                                                            std::size_t keyframe, const LoopOptions& options,
+                                                            RelationBook& book);
 
 // Two keyframes, one of each session, whose relative pose is taken as known: the doubt of a guess grows with the way
 // from there.
@@ -48,6 +51,6 @@ struct Tie {
 // Revisits and stretches near the believed paths: relations from `known` to `seen`. `ties` must not be empty.
 [[nodiscard]] std::vector<SessionRelation> FindRelationsNearby(const PlacedSession& known, const PlacedSession& seen,
                                                                std::span<const Tie> ties, const SiteOptions& options,
-                                                               const GoOn& go_on);
+                                                               const GoOn& go_on, RelationBook& book);
 
 }  // namespace cairn::slam

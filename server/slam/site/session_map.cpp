@@ -1,5 +1,6 @@
 #include "server/slam/site/session_map.h"
 
+#include <algorithm>
 #include <limits>
 #include <utility>
 
@@ -20,10 +21,18 @@ std::vector<PoseRelation> StepsAlong(const std::vector<Pose2>& path, const Motio
   return steps;
 }
 
+std::vector<PoseRelation> MeasuredIn(const MapperSnapshot& snapshot, const std::vector<Pose2>& path,
+                                     const MotionNoise& drift) {
+  if (!snapshot.relations.empty()) return snapshot.relations;
+  return snapshot.steps.empty() ? StepsAlong(path, drift) : snapshot.steps;
+}
+
 }  // namespace
 
-SessionMap::SessionMap(const MapperSnapshot& snapshot, std::vector<Pose2> own_path, const SiteOptions& options)
-    : relations_(snapshot.relations.empty() ? StepsAlong(own_path, options.drift) : snapshot.relations),
+SessionMap::SessionMap(std::uint64_t session, const MapperSnapshot& snapshot, std::vector<Pose2> own_path,
+                       const SiteOptions& options)
+    : session_(session),
+      relations_(MeasuredIn(snapshot, own_path, options.drift)),
       own_path_(std::move(own_path)),
       trail_(MotionNoise{}, options.surface),
       place_(options.place),
@@ -34,7 +43,20 @@ SessionMap::SessionMap(const MapperSnapshot& snapshot, std::vector<Pose2> own_pa
     trail_.Append(snapshot.keyframes[k], own_path_[k], SurfacePointsOf(PointsOf(scan), scan, options.surface),
                   Eigen::Matrix3d::Zero(), std::nullopt);
     shared_own_path_.Append(own_path_[k]);
+    ids_.push_back({snapshot.numbers.empty() ? k : snapshot.numbers[k], scan.stamp});
   }
+}
+
+std::optional<std::size_t> SessionMap::IndexOf(const KeyframeId& id) const {
+  const auto found = std::ranges::lower_bound(ids_, id.number, {}, &KeyframeId::number);
+  if (found == ids_.end() || !(*found == id)) return std::nullopt;
+  return static_cast<std::size_t>(found - ids_.begin());
+}
+
+std::size_t SessionMap::LastAround(std::size_t keyframe, double way_m) const {
+  std::size_t last = StretchAround(trail_.shapes(), keyframe, way_m).last;
+  while (last > keyframe && !localized(last)) --last;
+  return last;
 }
 
 std::vector<RecentScan> SessionMap::ScansAround(std::size_t keyframe, double way_m) const {

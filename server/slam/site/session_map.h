@@ -5,12 +5,15 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "server/slam/graph/pose_graph.h"
 #include "server/slam/recovery/place_search.h"
+#include "server/slam/site/relation_book.h"
 #include "server/slam/site/site_options.h"
 #include "server/slam/trail/keyframe.h"
 #include "server/slam/trail/pose_path.h"
@@ -35,9 +38,17 @@ struct SessionRelation {
 class SessionMap {
  public:
   // `own_path`: one pose T_own_robot per keyframe of `snapshot`.
-  SessionMap(const MapperSnapshot& snapshot, std::vector<Pose2> own_path, const SiteOptions& options);
+  // `session`: its id, which no other of the site has.
+  SessionMap(std::uint64_t session, const MapperSnapshot& snapshot, std::vector<Pose2> own_path,
+             const SiteOptions& options);
 
+  [[nodiscard]] std::uint64_t session() const { return session_; }
   [[nodiscard]] std::size_t size() const { return own_path_.size(); }
+  // How many keyframes there have been, with those that were retired.
+  [[nodiscard]] std::uint64_t made() const { return ids_.empty() ? 0 : ids_.back().number + 1; }
+  [[nodiscard]] const KeyframeId& id(std::size_t keyframe) const { return ids_[keyframe]; }
+  // Nothing: it was retired, or the session has another keyframe of this number.
+  [[nodiscard]] std::optional<std::size_t> IndexOf(const KeyframeId& id) const;
   [[nodiscard]] const Trail& trail() const { return trail_; }
   [[nodiscard]] const std::vector<Pose2>& own_path() const { return own_path_; }
   [[nodiscard]] double travelled_m(std::size_t keyframe) const { return trail_.shapes()[keyframe].travelled_m; }
@@ -45,6 +56,8 @@ class SessionMap {
   // The steps, revisits and loops of the session.
   [[nodiscard]] std::span<const PoseRelation> relations() const { return relations_; }
 
+  // The last localized keyframe within `way_m` of the way after this one; itself if there is none.
+  [[nodiscard]] std::size_t LastAround(std::size_t keyframe, double way_m) const;
   // What is seen within `way_m` of the way to either side of a keyframe. Keyframes that are not localized are left out.
   [[nodiscard]] std::vector<RecentScan> ScansAround(std::size_t keyframe, double way_m) const;
   // The place of the last of these scans in `own`, if it is like no other place there.
@@ -64,10 +77,12 @@ class SessionMap {
  private:
   [[nodiscard]] PathMap map() const { return {trail_, shared_own_path_, place_, near_m_}; }
 
+  std::uint64_t session_;
   std::vector<PoseRelation> relations_;
   std::vector<Pose2> own_path_;
   PosePath shared_own_path_;  // The same poses.
   Trail trail_;
+  std::vector<KeyframeId> ids_;  // Of the keyframes.
   PlaceSearchOptions place_;
   double near_m_;
   PlaceSearch places_;

@@ -10,9 +10,12 @@
 namespace cairn::slam {
 namespace {
 
-// What a person who says where a robot starts may be wrong by. It decides only where relations are few.
-constexpr double kStartSigmaM = 0.3;
-constexpr double kStartSigmaRad = 0.05;
+// What a person who says where a robot starts may be wrong by. Where robots have seen the same, their relations decide.
+// Where they meet only beyond a corridor, the scale of the wheels is as wrong as a start may be, over all of its
+// length, and the steps know only of errors that have nothing to do with each other; so a start must count against
+// them.
+constexpr double kStartSigmaM = 0.1;
+constexpr double kStartSigmaRad = 0.02;
 
 }  // namespace
 

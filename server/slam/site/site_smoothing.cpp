@@ -1,26 +1,20 @@
 #include "server/slam/site/site_smoothing.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <deque>
 #include <limits>
+#include <map>
 #include <utility>
 
+#include "server/slam/site/agreeing_places.h"
 #include "server/slam/site/agreement.h"
-#include "server/slam/site/consistent_set.h"
 #include "server/slam/site/site_graph.h"
 #include "server/slam/smoothing/smoothed_map.h"
 
 namespace cairn::slam {
 namespace {
 
-constexpr std::size_t kMinPlaces = 3;     // Recognised places that must agree before sessions are joined, ...
-constexpr double kMinSpreadM = 15.0;      // ... and the way along which they must lie, in both sessions.
-constexpr std::size_t kEnoughPlaces = 5;  // With so many the search ends.
-constexpr std::array<std::size_t, 4> kPasses{0, 2, 1, 3};  // Each looks at every fourth place, from this one on.
-// A job that will soon be made again ends where so many passes have found no place.
-constexpr std::size_t kFirstPasses = 2;
 constexpr double kTieEveryM = 3.0;          // Way between two ties.
 constexpr std::size_t kMinRelations = 3;    // Two sessions are not related by fewer.
 constexpr double kMaxContradicting = 0.10;  // Share of what both have seen that may contradict, ...
@@ -32,17 +26,28 @@ constexpr double kEnoughMore = 1.02;  // No further search if the last one found
 class Smoothing {
  public:
   Smoothing(std::deque<SessionMap>& maps, SiteGraph graph, const SiteOptions& options, SiteSearch search,
-            const std::function<bool(double)>& go_on)
-      : maps_(maps), graph_(std::move(graph)), options_(options), search_(search), go_on_(go_on) {}
+            const std::function<bool(double)>& go_on, RelationBook& book)
+      : maps_(maps), graph_(std::move(graph)), options_(options), search_(search), go_on_(go_on), book_(book) {}
 
   // False: cancelled.
   bool Run() {
-    if (search_ == SiteSearch::kAll) return JoinByStarts() && JoinByPlaces() && Refine();
+    const SiteGraph nothing = graph_;
+    const bool all = search_ == SiteSearch::kAll;
+    if (!all && !JoinByPlaces()) return false;
     // Where nothing was found, there is nothing to fit.
-    return JoinByPlaces() && (graph_.relations().empty() || (JoinByStarts() && Refine()));
+    if (search_ == SiteSearch::kFragments && graph_.relations().empty()) return true;
+    if (!BeginWithBelieved() || !JoinByStarts() || (all && !JoinByPlaces()) || !Refine()) return false;
+    if (began_with_ > 0 && distrusts_) {
+      // Something of what was believed has turned out wrong, and may have misled the rest.
+      TakeBack(nothing);
+      began_with_ = 0;
+      if ((!all && !JoinByPlaces()) || !JoinByStarts() || (all && !JoinByPlaces()) || !Refine()) return false;
+    }
+    NoteBelieved();
+    return true;
   }
 
-  [[nodiscard]] SmoothedSession ResultOf(std::size_t s) const {
+  [[nodiscard]] SmoothedSession ResultOf(std::size_t s) {
     SmoothedSession result;
     result.path = graph_.path(s);
     result.frame = graph_.frame_of(s);
@@ -59,6 +64,17 @@ class Smoothing {
     return result;
   }
 
+  // SmoothedSession::agreement_before. `online`: one path per session.
+  [[nodiscard]] double AgreementBefore(std::size_t s, std::span<const PosePath> online) const {
+    VisibilityCounts all;
+    for (std::size_t other = 0; other < maps_.size(); ++other) {
+      const std::size_t a = std::min(s, other), b = std::max(s, other);
+      if (a == b || !graph_.Together(a, b) || !graph_.start_known(a) || !graph_.start_known(b)) continue;
+      all += AgreementOf({a, maps_[a], online[a]}, {b, maps_[b], online[b]}, options_).counts;
+    }
+    return all.known() > 0 ? static_cast<double>(all.confirmed) / all.known() : 0.0;
+  }
+
  private:
   struct Pair {
     std::size_t a = 0;
@@ -73,6 +89,45 @@ class Smoothing {
     return pairs;
   }
 
+  [[nodiscard]] RelationBook::Pair InBook(const Pair& pair) const {
+    return {maps_[pair.a].session(), maps_[pair.b].session()};
+  }
+
+  // The relations that the last job believed, as far as their keyframes are still there, take the place of the first
+  // search.
+  bool BeginWithBelieved() {
+    std::vector<SessionRelation> all;
+    for (const Pair& pair : Pairs()) {
+      if (graph_.Together(pair.a, pair.b)) continue;
+      std::vector<SessionRelation> believed;
+      book_.ForEachBelieved(InBook(pair), [&](const Measurement& one) {
+        const auto known = maps_[pair.a].IndexOf(one.known), seen = maps_[pair.b].IndexOf(one.seen);
+        if (known && seen) believed.push_back({{pair.a, *known}, {pair.b, *seen}, one.T_known_seen, one.covariance});
+      });
+      if (believed.size() >= kMinRelations) all.insert(all.end(), believed.begin(), believed.end());
+    }
+    began_with_ = all.size();
+    graph_.Add(all);
+    return all.empty() || SolveAndWithdraw();
+  }
+
+  void NoteBelieved() {
+    for (const Pair& pair : Pairs()) {
+      std::map<std::uint64_t, const SessionRelation*> by_seen;
+      for (const SessionRelation& one : graph_.relations())
+        if (one.from.session == pair.a && one.to.session == pair.b)
+          by_seen[maps_[pair.b].id(one.to.keyframe).number] = &one;
+      book_.SetBelieved(InBook(pair), [&](const Measurement& one) {
+        const auto relation = by_seen.find(one.seen.number);
+        return relation != by_seen.end() && maps_[pair.a].id(relation->second->from.keyframe) == one.known &&
+               relation->second->T_from_to == one.T_known_seen;
+      });
+    }
+  }
+
+  // Some of it may be done twice.
+  void Done(double share) { done_ = std::max(done_, share); }
+
   [[nodiscard]] GoOn Asked() {
     return [this] { return go_on_(done_); };
   }
@@ -80,13 +135,13 @@ class Smoothing {
   // Sessions that start at known places are related where their paths say that they have seen the same.
   bool JoinByStarts() {
     for (const auto& [a, b] : Pairs()) {
-      if (!graph_.start_known(a) || !graph_.start_known(b)) continue;
+      if (!graph_.start_known(a) || !graph_.start_known(b) || RelationsBetween(a, b) > 0) continue;
       const SiteGraph before = graph_;
       const std::vector<Tie> starts{{0, 0}};
       const auto found = SearchNearby(a, b, starts);
       if (!go_on_(done_)) return false;
       if (!Try(a, b, found)) return false;
-      if (!IsTrusted(a, b)) graph_ = before;
+      if (!IsTrusted(a, b)) TakeBack(before);
     }
     return true;
   }
@@ -96,7 +151,7 @@ class Smoothing {
     const std::size_t all = left.size();
     // A fragment that is joined makes pairs of others worth a search that were not before.
     for (auto next = left.begin(); next != left.end();) {
-      done_ = kShareOfPlaces * static_cast<double>(all - left.size()) / static_cast<double>(all);
+      Done(kShareOfPlaces * static_cast<double>(all - left.size()) / static_cast<double>(all));
       const Pair pair = *next;
       if (!IsToBeSearched(pair)) {
         ++next;
@@ -107,7 +162,7 @@ class Smoothing {
       next = left.begin();
     }
     for (SessionMap& map : maps_) map.ForgetPlaces();
-    done_ = kShareOfPlaces;
+    Done(kShareOfPlaces);
     return true;
   }
 
@@ -120,22 +175,24 @@ class Smoothing {
   // False: cancelled.
   bool JoinPair(const Pair& pair) {
     const auto [a, b] = pair;
-    const auto places = AgreeingPlaces(a, b);
+    const auto places =
+        AgreeingPlaces(a, maps_[a], b, maps_[b], options_.loop, search_ != SiteSearch::kAll, Asked(), book_);
     if (!go_on_(done_)) return false;
     if (places.empty()) return true;
     const SiteGraph before = graph_;
     if (!Try(a, b, places)) return false;
     const auto found = SearchNearby(a, b, TiesOf(a, b));
     if (!go_on_(done_) || !Try(a, b, found)) return false;
-    if (!IsTrusted(a, b)) graph_ = before;
+    if (!IsTrusted(a, b)) TakeBack(before);
     return true;
   }
 
   // Relations between all sessions that lie in one frame, searched anew along the solved paths.
   bool Refine() {
-    double relations_before = 0.0;
+    auto relations_before = static_cast<double>(began_with_);
+    distrusts_ = false;
     for (int round = 0; round < kRounds; ++round) {
-      done_ = kShareOfPlaces + (1.0 - kShareOfPlaces) * round / kRounds;
+      Done(kShareOfPlaces + (1.0 - kShareOfPlaces) * round / kRounds);
       std::vector<SessionRelation> all;
       const std::vector<Pair> pairs = Pairs();
       for (const auto& [a, b] : pairs) {
@@ -147,9 +204,14 @@ class Smoothing {
       for (const auto& [a, b] : pairs) graph_.RemoveBetween(a, b);
       graph_.Add(all);
       if (!SolveAndWithdraw()) return false;
-      for (const auto& [a, b] : pairs)
-        if (RelationsBetween(a, b) > 0 && !IsTrusted(a, b)) graph_.RemoveBetween(a, b);
-      if (!graph_.Solve(Asked())) return false;
+      bool removed = false;
+      for (const auto& [a, b] : pairs) {
+        if (RelationsBetween(a, b) == 0 || IsTrusted(a, b)) continue;
+        graph_.RemoveBetween(a, b);
+        removed = true;
+      }
+      distrusts_ = distrusts_ || removed;
+      if (removed && !Solve()) return false;
       const auto relations_now = static_cast<double>(graph_.relations().size());
       if (relations_now <= kEnoughMore * relations_before) break;
       relations_before = relations_now;
@@ -167,9 +229,19 @@ class Smoothing {
   bool SolveAndWithdraw() {
     constexpr int kMostRounds = 4;
     for (int i = 0; i < kMostRounds; ++i) {
-      if (!graph_.Solve(Asked())) return false;
+      if (!Solve()) return false;
       if (graph_.WithdrawOutvoted() == 0) return true;
     }
+    return Solve();
+  }
+
+  void TakeBack(const SiteGraph& before) {
+    graph_ = before;
+    agreements_.clear();
+  }
+
+  bool Solve() {
+    agreements_.clear();
     return graph_.Solve(Asked());
   }
 
@@ -179,79 +251,23 @@ class Smoothing {
     }));
   }
 
-  [[nodiscard]] SessionAgreement AgreementBetween(std::size_t a, std::size_t b) const {
-    const PosePath path_a = PathOf(a), path_b = PathOf(b);
-    return AgreementOf({a, maps_[a], path_a}, {b, maps_[b], path_b}, options_);
+  // Along the paths as they were solved last: of each pair it is asked for again and again.
+  [[nodiscard]] const SessionAgreement& AgreementBetween(std::size_t a, std::size_t b) {
+    const auto [known, added] = agreements_.try_emplace({a, b});
+    if (added) {
+      const PosePath path_a = PathOf(a), path_b = PathOf(b);
+      known->second = AgreementOf({a, maps_[a], path_a}, {b, maps_[b], path_b}, options_);
+    }
+    return known->second;
   }
 
   // Whether the relations between two sessions may bend the map.
-  [[nodiscard]] bool IsTrusted(std::size_t a, std::size_t b) const {
+  [[nodiscard]] bool IsTrusted(std::size_t a, std::size_t b) {
     if (RelationsBetween(a, b) < kMinRelations) return false;
-    const SessionAgreement agreement = AgreementBetween(a, b);
+    const SessionAgreement& agreement = AgreementBetween(a, b);
     return agreement.places >= kMinComparedPlaces &&
            agreement.counts.contradicted <= kMaxContradicting * agreement.counts.known() &&
            static_cast<double>(agreement.contradicting) <= kMaxBadPlaces * static_cast<double>(agreement.places);
-  }
-
-  // Places of each that are recognised in the other, the largest set of them that agrees. Empty if these are no proof.
-  // The search ends with the first proof; it looks at places far apart first.
-  [[nodiscard]] std::vector<SessionRelation> AgreeingPlaces(std::size_t a, std::size_t b) {
-    const std::vector<std::size_t> of_a = PlacesToLookFor(maps_[a]), of_b = PlacesToLookFor(maps_[b]);
-    std::vector<SessionRelation> all;
-    std::vector<SessionRelation> agreeing;
-    const auto add = [&](const std::optional<SessionRelation>& place) {
-      if (!place) return;
-      all.push_back(*place);
-      agreeing = LargestAgreeing(all);
-    };
-    for (std::size_t pass = 0; pass < kPasses.size(); ++pass) {
-      if (search_ == SiteSearch::kFragments && pass == kFirstPasses && all.empty()) return {};
-      for (std::size_t i = kPasses[pass]; i < std::max(of_a.size(), of_b.size()); i += kPasses.size()) {
-        if (IsProof(agreeing, kEnoughPlaces)) return agreeing;
-        if (!go_on_(done_)) return {};
-        if (i < of_b.size()) add(RecognisePlace(a, maps_[a], b, maps_[b], of_b[i], options_.loop));
-        if (i >= of_a.size() || !go_on_(done_)) continue;
-        const auto place = RecognisePlace(b, maps_[b], a, maps_[a], of_a[i], options_.loop);
-        if (place) add(Reversed(*place));
-      }
-    }
-    if (!IsProof(agreeing, kMinPlaces)) agreeing.clear();
-    return agreeing;
-  }
-
-  [[nodiscard]] static SessionRelation Reversed(const SessionRelation& one) {
-    const Eigen::Matrix3d J = J_inverse(one.T_from_to);
-    return {one.to, one.from, one.T_from_to.Inverse(), J * one.covariance * J.transpose()};
-  }
-
-  // All are between the same two sessions.
-  [[nodiscard]] std::vector<SessionRelation> LargestAgreeing(const std::vector<SessionRelation>& all) const {
-    const SessionMap& from = maps_[all.front().from.session];
-    const SessionMap& to = maps_[all.front().to.session];
-    const auto set = LargestConsistentSet(all.size(), [&](std::size_t i, std::size_t j) {
-      return Disagreement2(all[i], all[j], from, to, options_.loop) <= kMaxChiSquare;
-    });
-    std::vector<SessionRelation> agreeing;
-    agreeing.reserve(set.size());
-    for (const std::size_t i : set) agreeing.push_back(all[i]);
-    return agreeing;
-  }
-
-  // So many places, spread over some way in both sessions.
-  [[nodiscard]] bool IsProof(const std::vector<SessionRelation>& places, std::size_t least) const {
-    if (places.size() < least) return false;
-    const auto spread = [&](auto keyframe_of) {
-      double low = std::numeric_limits<double>::infinity(), high = -low;
-      for (const SessionRelation& one : places) {
-        const SessionKeyframe at = keyframe_of(one);
-        const double here = maps_[at.session].travelled_m(at.keyframe);
-        low = std::min(low, here);
-        high = std::max(high, here);
-      }
-      return high - low;
-    };
-    return spread([](const auto& one) { return one.from; }) >= kMinSpreadM &&
-           spread([](const auto& one) { return one.to; }) >= kMinSpreadM;
   }
 
   [[nodiscard]] PosePath PathOf(std::size_t session) const {
@@ -262,7 +278,7 @@ class Smoothing {
 
   [[nodiscard]] std::vector<SessionRelation> SearchNearby(std::size_t a, std::size_t b, std::span<const Tie> ties) {
     const PosePath path_a = PathOf(a), path_b = PathOf(b);
-    return FindRelationsNearby({a, maps_[a], path_a}, {b, maps_[b], path_b}, ties, options_, Asked());
+    return FindRelationsNearby({a, maps_[a], path_a}, {b, maps_[b], path_b}, ties, options_, Asked(), book_);
   }
 
   // The relations between two sessions, some metres apart. Sessions that are related only through others are tied where
@@ -303,6 +319,10 @@ class Smoothing {
   const SiteOptions& options_;
   const SiteSearch search_;
   const std::function<bool(double)>& go_on_;
+  RelationBook& book_;
+  std::map<std::pair<std::size_t, std::size_t>, SessionAgreement> agreements_;
+  std::size_t began_with_ = 0;  // Relations that were believed before.
+  bool distrusts_ = false;      // The last Refine has removed the relations of a pair.
   double done_ = 0.0;
 };
 
@@ -310,21 +330,29 @@ class Smoothing {
 
 std::optional<std::vector<SmoothedSession>> SmoothSessions(std::span<const SiteSession> sessions,
                                                            const SiteOptions& options,
-                                                           const std::function<bool(double)>& go_on,
-                                                           SiteSearch search) {
+                                                           const std::function<bool(double)>& go_on, SiteSearch search,
+                                                           RelationBook* book) {
+  RelationBook own_book;
   std::deque<SessionMap> maps;
   std::vector<const SessionMap*> known;
   std::vector<bool> start_known;
   for (const SiteSession& session : sessions) {
     auto own_path = SmoothedPath(session.snapshot, [&go_on] { return go_on(0.0); });
     if (!own_path) return std::nullopt;
-    known.push_back(&maps.emplace_back(session.snapshot, *std::move(own_path), options));
+    const std::uint64_t id = book == nullptr ? maps.size() + 1 : session.id;
+    known.push_back(&maps.emplace_back(id, session.snapshot, *std::move(own_path), options));
     start_known.push_back(session.start_known);
   }
-  Smoothing smoothing(maps, SiteGraph(known, std::move(start_known), options.pose_graph), options, search, go_on);
+  Smoothing smoothing(maps, SiteGraph(known, std::move(start_known), options.pose_graph), options, search, go_on,
+                      book == nullptr ? own_book : *book);
   if (options.pose_graph.enabled && !smoothing.Run()) return std::nullopt;
   std::vector<SmoothedSession> results;
   for (std::size_t s = 0; s < maps.size(); ++s) results.push_back(smoothing.ResultOf(s));
+  if (search != SiteSearch::kRobots) return results;
+  std::vector<PosePath> online(maps.size());
+  for (std::size_t s = 0; s < maps.size(); ++s)
+    for (const Pose2& pose : sessions[s].snapshot.online_path) online[s].Append(pose);
+  for (std::size_t s = 0; s < maps.size(); ++s) results[s].agreement_before = smoothing.AgreementBefore(s, online);
   return results;
 }
 

@@ -145,6 +145,10 @@ TrackStep FrontEnd::StepOf(const MatchResult& match, const Pose2& T_odom_robot) 
     step.open_direction = match.degenerate_direction;
     step.open_information = match.open_information;
   }
+  if (match.converged) {
+    const Eigen::Matrix2d shown = Eigen::Matrix2d::Identity() - step.open_direction * step.open_direction.transpose();
+    step.surface_information = shown * match.surface_information * shown;
+  }
   step.moved_m = Between(history_.back().T_track_robot, step.T_track_robot).translation().norm();
   if (options_.use_odometry) {
     step.T_prev_curr_odom = Between(history_.back().T_odom_robot, T_odom_robot);

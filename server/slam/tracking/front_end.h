@@ -72,6 +72,9 @@ struct TrackStep {
   // it, 1/m^2. Otherwise zero.
   Eigen::Vector2d open_direction = Eigen::Vector2d::Zero();
   double open_information = 0.0;
+  // Information of the scan's surfaces on the position, along the axes of `track`, 1/m^2: none along an open direction,
+  // and none without a match.
+  Eigen::Matrix2d surface_information = Eigen::Matrix2d::Zero();
   double moved_m = 0.0;      // Distance travelled since the previous scan.
   Pose2 T_prev_curr_odom{};  // The step from the previous scan as odometry measured it; none without odometry.
   bool found = false;        // The step leads to where the robot was found again; odometry does not know it.

@@ -71,8 +71,12 @@ struct MapperSnapshot {
   std::vector<std::uint64_t> numbers;  // Of the keyframes. Empty: 0, 1, 2, ...
   std::vector<Pose2> online_path;      // T_map_robot per keyframe with which it was drawn into the grid.
   std::vector<Pose2> full_path;        // T_map_robot per keyframe along the best particle's ancestry.
-  // Steps, revisits and loops; empty if the filter uses none of them, or if no place was seen again.
+  // Steps, revisits and loops, as they were measured; empty if the filter uses none of them, or if no place was seen
+  // again.
   std::vector<PoseRelation> relations;
+  // The measured steps, if `relations` is empty and an earlier job has bent the path; else they are those along the
+  // path.
+  std::vector<PoseRelation> steps{};
   PoseGraphOptions pose_graph;
   struct ScanPlace {
     Stamp stamp = 0;

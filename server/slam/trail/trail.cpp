@@ -21,6 +21,12 @@ PoseRelation PositiveDefinite(PoseRelation relation) {
 
 }  // namespace
 
+bool KeepsShape(const PoseRelation& relation) {
+  constexpr double kRounding = 1e-9;  // Earlier versions have added 1e-10.
+  return relation.loop &&
+         (relation.covariance - PoseCovariance(kShapeSigmaM, kShapeSigmaRad)).cwiseAbs().maxCoeff() < kRounding;
+}
+
 void Trail::Append(Keyframe keyframe, const Pose2& T_track_robot, std::vector<SurfacePoint> points_robot,
                    const Eigen::Matrix3d& step_covariance, const std::optional<RevisitObservation>& revisit) {
   const std::size_t node = size();
@@ -77,7 +83,7 @@ void Trail::RestoreRest() {
   loops_.assign(size(), {});
   way_bounds_.Clear();
   for (const PoseRelation& relation : relations_)
-    if (relation.loop) NoteLoop(relation);
+    if (relation.loop && !KeepsShape(relation)) NoteLoop(relation);
   distances_m_.clear();
   distances_current_ = empty();
 }
@@ -97,6 +103,16 @@ void Trail::AddLoop(const PoseRelation& loop) {
   relations_.push_back(PositiveDefinite(loop));
   NoteLoop(loop);
   distances_current_ = false;
+}
+
+void Trail::SetShape(const std::vector<PoseRelation>& shape) {
+  std::erase_if(relations_, KeepsShape);
+  for (PoseRelation relation : shape) {
+    relation.covariance = PoseCovariance(kShapeSigmaM, kShapeSigmaRad);
+    relation.loop = true;
+    relations_.push_back(relation);
+  }
+  frozen_relations_.Forget();
 }
 
 void Trail::NoteLoop(const PoseRelation& loop) {
@@ -180,6 +196,23 @@ double Trail::TravelledTo(const Pose2& T_track_robot) const {
 std::vector<PoseRelation> Trail::relations() const {
   const bool seen_again = std::ranges::any_of(relations_, [](const PoseRelation& one) { return one.loop; });
   return seen_again ? relations_ : std::vector<PoseRelation>{};
+}
+
+std::vector<PoseRelation> Trail::measured() const {
+  std::vector<PoseRelation> measured = relations_;
+  std::erase_if(measured, KeepsShape);
+  const bool seen_again = std::ranges::any_of(measured, [](const PoseRelation& one) { return one.loop; });
+  return seen_again ? measured : std::vector<PoseRelation>{};
+}
+
+std::vector<PoseRelation> Trail::steps_of_shaped() const {
+  const bool shaped = std::ranges::any_of(relations_, KeepsShape);
+  const bool seen_again =
+      std::ranges::any_of(relations_, [](const PoseRelation& one) { return one.loop && !KeepsShape(one); });
+  if (!shaped || seen_again) return {};
+  std::vector<PoseRelation> steps = relations_;
+  std::erase_if(steps, KeepsShape);
+  return steps;
 }
 
 std::vector<std::uint64_t> Trail::numbers() const {

@@ -21,6 +21,14 @@
 
 namespace cairn::slam {
 
+// How well the relations of Trail::SetShape are known: more certain than the steps over the way between two of them, so
+// that those do not pull it back.
+inline constexpr double kShapeSigmaM = 0.02;
+inline constexpr double kShapeSigmaRad = 0.002;
+// Whether a relation is one of Trail::SetShape. It is told by its covariance, which no measured relation has, so that
+// checkpoints of all formats say it.
+[[nodiscard]] bool KeepsShape(const PoseRelation& relation);
+
 class Trail {
  public:
   // `drift` gives the covariance of a matched step; `surface` are the options with which the points were found.
@@ -71,8 +79,15 @@ class Trail {
   // How many of the keyframes on the last `way_m` metres, before the robot has travelled `travelled_m`, have seen an
   // older one again.
   [[nodiscard]] std::size_t RevisitsWithin(double way_m, double travelled_m) const;
-  // Steps, revisits and loops; empty as long as no place was seen again.
+  // The shape of a path that a job has found, along which it knew more than this trail: relations that keep it when the
+  // path is fitted again, in place of those of the job before. They are no measurements (KeepsShape).
+  void SetShape(const std::vector<PoseRelation>& shape);
+  // Steps, revisits, loops, and the relations of SetShape; empty as long as there are only steps.
   [[nodiscard]] std::vector<PoseRelation> relations() const;
+  // The same without those of SetShape: what was measured. Empty as long as no place was seen again.
+  [[nodiscard]] std::vector<PoseRelation> measured() const;
+  // The steps alone, if a shape was set and no place was seen again; else nothing.
+  [[nodiscard]] std::vector<PoseRelation> steps_of_shaped() const;
   // How many keyframes there have been, with those that were retired.
   [[nodiscard]] std::uint64_t made() const { return empty() ? 0 : shapes_.back().number + 1; }
   [[nodiscard]] std::vector<std::uint64_t> numbers() const;  // Of the keyframes.
@@ -121,7 +136,8 @@ class Trail {
   mutable WayBounds way_bounds_;  // Follows from the rest.
   mutable bool distances_current_ = true;
   std::vector<MapperSnapshot::ScanPlace> scans_;
-  // For checkpoints: all of these grow at their ends only, but for the keyframes in ConfirmTentative, and in Retire.
+  // For checkpoints: all of these grow at their ends only, but for the keyframes in ConfirmTentative, the relations in
+  // SetShape, and in Retire.
   FrozenBlocks<Keyframe> frozen_keyframes_;
   FrozenBlocks<KeyframeShape> frozen_shapes_;
   FrozenBlocks<PoseRelation> frozen_relations_;

@@ -48,6 +48,11 @@ PoseRelation HandedOver(const PoseRelation& relation, const Retirement& retireme
   PoseRelation result{retirement.representative[relation.from], retirement.representative[relation.to],
                       T_representative_from * relation.T_from_to * T_representative_to.Inverse(),
                       R * relation.covariance * R.transpose(), true};
+  // A shape stays one; how well it is kept is no matter of what was measured.
+  if (KeepsShape(relation)) {
+    result.covariance = relation.covariance;
+    return result;
+  }
   for (const std::size_t keyframe : {relation.from, relation.to})
     if (!retirement.IsKept(keyframe)) result.covariance += PoseCovariance(kPlaceSigmaM, kPlaceSigmaRad);
   return result;

@@ -64,6 +64,8 @@ Result<JointReport> RunJoint(const OfflineOptions& options) {
       if (!written) return tl::unexpected<Status>(written.error());
     }
     snapshots.push_back(robot->pipeline->mapper().Snapshot());
+    if (auto written = WriteKnown(options, i, snapshots.back()); !written)
+      return tl::unexpected<Status>(written.error());
     report.robots.push_back({.log = options.logs[i], .report = std::move(robot->report), .smoothed = {}});
   }
 

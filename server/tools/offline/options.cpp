@@ -29,7 +29,8 @@ void VisitFile(OptionVisitor& visitor, OfflineOptions& options) {
 Result<void> TakeStarts(const std::vector<std::string>& texts, OfflineOptions& options) {
   const std::size_t logs = options.logs.size();
   if (texts.empty()) {
-    options.starts.assign(logs, logs == 1 ? std::optional(Pose2{}) : std::nullopt);
+    const bool at_origin = logs == 1 && options.known_map.empty();
+    options.starts.assign(logs, at_origin ? std::optional(Pose2{}) : std::nullopt);
     return {};
   }
   if (texts.size() != logs) {
@@ -50,8 +51,9 @@ Result<void> TakeStarts(const std::vector<std::string>& texts, OfflineOptions& o
 
 Result<void> CheckCounts(const OfflineOptions& options) {
   const std::size_t logs = options.logs.size();
-  for (const auto& [name, files] : {std::pair{"--trajectory", &options.trajectories},
-                                    std::pair{"--smoothed-trajectory", &options.smoothed_trajectories}}) {
+  for (const auto& [name, files] :
+       {std::pair{"--trajectory", &options.trajectories}, std::pair{"--known-trajectory", &options.known_trajectories},
+        std::pair{"--smoothed-trajectory", &options.smoothed_trajectories}}) {
     if (!files->empty() && files->size() != logs) {
       return Fail(StatusCode::kInvalidArgument, std::string(name) + " is given " + std::to_string(files->size()) +
                                                     " times for " + std::to_string(logs) + " logs");
@@ -59,6 +61,12 @@ Result<void> CheckCounts(const OfflineOptions& options) {
   }
   if (logs > 1 && !(options.map.empty() && options.map_lines.empty()))
     return Fail(StatusCode::kInvalidArgument, "--map and --map-lines take a single log; --smoothed-map takes several");
+  const bool maps =
+      options.smooth || !(options.map.empty() && options.map_lines.empty() && options.known_trajectories.empty());
+  if (!options.known_map.empty() && (logs > 1 || maps))
+    return Fail(StatusCode::kInvalidArgument,
+                "--known-map takes a single log, whose robot maps nothing: no map and no path of it can be written or "
+                "smoothed");
   return {};
 }
 
@@ -85,6 +93,10 @@ std::optional<OfflineOptions> ParseOfflineOptions(int argc, char** argv, int& ex
   // With several logs an option takes one file at a time, so that it does not take the next log.
   app.add_option("--trajectory", options.trajectories, "Write the online trajectory (TUM); once per log")
       ->allow_extra_args(false);
+  app.add_option("--known-trajectory", options.known_trajectories,
+                 "Write the trajectory as the estimator knows it at the end of the log, without smoothing (TUM); once "
+                 "per log")
+      ->allow_extra_args(false);
   app.add_option("--map", options.map, "Write the online map (map.yaml and an image beside it)");
   app.add_flag("--smooth", options.smooth, "Also smooth the whole path and redraw the map along it");
   app.add_option("--smoothed-trajectory", options.smoothed_trajectories,
@@ -93,6 +105,10 @@ std::optional<OfflineOptions> ParseOfflineOptions(int argc, char** argv, int& ex
   app.add_option("--smoothed-map", options.smoothed_map, "Write the map redrawn along the smoothed path");
   app.add_option("--map-lines", options.map_lines,
                  "Write the walls seen, as lines, for slam.line_match.map (along the smoothed path with --smooth)");
+  app.add_option("--known-map", options.known_map,
+                 "Map nothing: only localise the robot in this map (map.yaml). It is looked for everywhere, or near "
+                 "--start. The trajectory has the poses at which it is localized")
+      ->type_name("MAP.yaml");
   std::vector<std::string> starts;
   app.add_option("--start", starts,
                  "Where the robot stands at first (m; rad, or 45deg), or unknown; once per log. Without it a single "
@@ -113,10 +129,10 @@ std::optional<OfflineOptions> ParseOfflineOptions(int argc, char** argv, int& ex
     exit_code = app.exit(error) == 0 ? 0 : 2;
     return std::nullopt;
   }
+  options.smooth = options.smooth || !options.smoothed_trajectories.empty() || !options.smoothed_map.empty();
   if (Complain(TakeStarts(starts, options), exit_code) || Complain(CheckCounts(options), exit_code))
     return std::nullopt;
   if (!seed.empty()) assignments.push_back("slam.seed=" + seed);
-  options.smooth = options.smooth || !options.smoothed_trajectories.empty() || !options.smoothed_map.empty();
 
   if (!config.empty() &&
       Complain(ApplyYamlFile(config, [&](OptionVisitor& visitor) { VisitFile(visitor, options); }), exit_code))

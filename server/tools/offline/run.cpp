@@ -12,6 +12,7 @@
 #include "common/bag/recording.h"
 #include "common/map/map_lines.h"
 #include "common/thread_time.h"
+#include "server/known_map.h"
 #include "server/slam/grid/grid_image.h"
 #include "server/slam/localisation/keyframe_lines.h"
 #include "server/slam/scan_pipeline.h"
@@ -107,6 +108,11 @@ void AddUsage(OfflineReport& report) {
   report.peak_rss_mib = static_cast<double>(usage.ru_maxrss) / 1024.0;
 }
 
+Result<void> WriteKnown(const OfflineOptions& options, std::size_t i, const slam::MapperSnapshot& snapshot) {
+  if (options.known_trajectories.empty()) return {};
+  return WriteTum(snapshot.FullTrajectory(), options.known_trajectories[i]);
+}
+
 Result<void> WriteMap(const slam::OccupancyGrid& grid, const std::filesystem::path& path) {
   return SaveMapYaml(slam::ImageOf(grid), path, ".png", MapSaveOptions{});
 }
@@ -118,8 +124,9 @@ Result<void> WriteResults(const OfflineOptions& options, const Trajectory& onlin
     if (auto written = WriteTum(online, options.trajectories.front()); !written) return written;
   if (!options.map.empty())
     if (auto written = WriteMap(mapper.grid(), options.map); !written) return written;
-  if (!options.smooth && options.map_lines.empty()) return {};
+  if (!options.smooth && options.map_lines.empty() && options.known_trajectories.empty()) return {};
   const slam::MapperSnapshot snapshot = mapper.Snapshot();
+  if (auto written = WriteKnown(options, 0, snapshot); !written) return written;
   const auto write_lines = [&](const std::vector<Pose2>& path) {
     return options.map_lines.empty() ? Result<void>{}
                                      : WriteMapLines(LinesOfKeyframes(snapshot.keyframes, path), options.map_lines);
@@ -137,7 +144,7 @@ Result<void> WriteResults(const OfflineOptions& options, const Trajectory& onlin
 }  // namespace
 
 Result<OfflineRobot> Estimate(const OfflineOptions& options, const std::filesystem::path& log,
-                              const Pose2& T_map_robot_start) {
+                              const Pose2& T_map_robot_start, const LocalisedIn& known) {
   OfflineRobot robot;
   OfflineReport& report = robot.report;
   ScanTimes times(report);
@@ -149,10 +156,15 @@ Result<OfflineRobot> Estimate(const OfflineOptions& options, const std::filesyst
             ++report.scans_used;
             report.keyframes += outcome.keyframe ? 1 : 0;
             report.not_localized += outcome.localized ? 0 : 1;
-            robot.online.push_back({outcome.stamp, outcome.T_map_robot});
+            if (known.grid == nullptr || outcome.localized)
+              robot.online.push_back({outcome.stamp, outcome.T_map_robot});
           },
           [&](const Scan&, DropReason reason) { ++report.dropped[static_cast<std::size_t>(reason)]; }});
   slam::ScanPipeline& pipeline = *robot.pipeline;
+  if (known.grid != nullptr) {
+    if (auto begun = pipeline.mapper().LocaliseIn(known.grid, known.place_known); !begun)
+      return tl::unexpected<Status>(begun.error());
+  }
   // Reading the clock so often takes a few per cent of the time.
   if (options.json) pipeline.mapper().WatchSteps([&](slam::ScanStep step) { times.Enter(step); });
 
@@ -183,12 +195,19 @@ Result<OfflineRobot> Estimate(const OfflineOptions& options, const std::filesyst
   report.odometry_dropped += pipeline.odometry_refused();
   pipeline.mapper().FinishMap();
   report.landmarks = pipeline.mapper().landmarks().size();
+  report.learned = pipeline.mapper().learned();
   return robot;
 }
 
 Result<OfflineReport> RunOffline(const OfflineOptions& options) {
   const Clock::time_point start = Clock::now();
-  auto robot = Estimate(options, options.logs.front(), options.starts.front().value_or(Pose2{}));
+  LocalisedIn known;
+  if (!options.known_map.empty()) {
+    auto grid = ReadKnownGrid(options.known_map, options.slam);
+    if (!grid) return tl::unexpected<Status>(grid.error());
+    known = {*std::move(grid), options.starts.front().has_value()};
+  }
+  auto robot = Estimate(options, options.logs.front(), options.starts.front().value_or(Pose2{}), known);
   if (!robot) return tl::unexpected<Status>(robot.error());
   if (auto written = WriteResults(options, robot->online, robot->pipeline->mapper()); !written)
     return tl::unexpected<Status>(written.error());
@@ -215,6 +234,10 @@ std::string ReportText(const OfflineReport& report) {
       << Percentile(report.scan_ms, 0.99) << ", max " << Percentile(report.scan_ms, 1.0) << '\n';
   out << "           " << report.wall_s << " s in all, " << report.cpu_s << " s of processor time\n";
   out << "landmarks  " << report.landmarks << '\n';
+  for (const LearnedValue& learned : report.learned)
+    if (learned.applied)
+      out << "learned    " << learned.name << ' ' << std::setprecision(4) << learned.value << " +- " << learned.sigma
+          << std::setprecision(2) << (learned.unit == "1" ? "" : ' ' + learned.unit) << '\n';
   out << "memory     " << report.peak_rss_mib << " MiB at the most\n";
   return out.str();
 }
@@ -223,6 +246,9 @@ Json JsonOf(const OfflineReport& report) {
   Json dropped = Json::object();
   for (std::size_t i = 0; i < report.dropped.size(); ++i)
     if (report.dropped[i] > 0) dropped[std::string(DropReasonName(static_cast<DropReason>(i)))] = report.dropped[i];
+  Json learned = Json::object();
+  for (const LearnedValue& one : report.learned)
+    learned[one.name] = {{"unit", one.unit}, {"value", one.value}, {"sigma", one.sigma}, {"applied", one.applied}};
   return {{"time_ms_mean", Mean(report.scan_ms)},
           {"time_ms_p50", Percentile(report.scan_ms, 0.5)},
           {"time_ms_p99", Percentile(report.scan_ms, 0.99)},
@@ -242,6 +268,7 @@ Json JsonOf(const OfflineReport& report) {
           {"keyframes", report.keyframes},
           {"not_localized", report.not_localized},
           {"dropped", std::move(dropped)},
+          {"learned", std::move(learned)},
           {"log_complaints", report.log.complaint_count}};
 }
 

@@ -11,8 +11,10 @@
 
 #include "common/sensor/log_record.h"
 #include "common/sensor/trajectory.h"
+#include "common/service/learned_value.h"
 #include "common/service/ledger.h"
 #include "common/status.h"
+#include "server/slam/known_grid/known_grid.h"
 #include "server/slam/scan_pipeline.h"
 #include "server/slam/tracking/scan_steps.h"
 #include "server/tools/log_run/json_line.h"
@@ -36,6 +38,7 @@ struct OfflineReport {
   std::array<std::uint64_t, kDropReasonCount> dropped{};
   std::uint64_t odometry_dropped = 0;
   std::size_t landmarks = 0;
+  std::vector<LearnedValue> learned;  // Mapper::learned.
   LogSummary log;
 };
 
@@ -46,8 +49,20 @@ struct OfflineRobot {
   std::unique_ptr<slam::ScanPipeline> pipeline;
 };
 
+// `known`: the map in which the robot is only localised; null: it maps. Then it is at the start, if `place_known`, and
+// only its localized poses are in the trajectory.
+struct LocalisedIn {
+  std::shared_ptr<const slam::KnownGrid> grid;
+  bool place_known = false;
+};
 [[nodiscard]] Result<OfflineRobot> Estimate(const OfflineOptions& options, const std::filesystem::path& log,
-                                            const Pose2& T_map_robot_start);
+                                            const Pose2& T_map_robot_start, const LocalisedIn& known = {});
+
+// Writes, as a TUM trajectory to `known_trajectories[i]`, where the best particle's path now has the robot at each
+// scan: large loops have corrected it since the poses were reported, but no job has. Nothing where no such file is
+// wanted.
+[[nodiscard]] Result<void> WriteKnown(const OfflineOptions& options, std::size_t i,
+                                      const slam::MapperSnapshot& snapshot);
 
 [[nodiscard]] Result<void> WriteMap(const slam::OccupancyGrid& grid, const std::filesystem::path& path);
 

@@ -93,6 +93,17 @@ TEST_F(CommandLine, ADomainOfTheMachineThatIsNoneIsAUsageErrorThatNamesIt) {
   EXPECT_THAT(outcome.err, HasSubstr("CAIRN_DOMAIN: wire.domain: 'much'"));
 }
 
+// And not only that a command or a positional is missing.
+TEST_F(CommandLine, AWordThatNobodyKnowsIsNamed) {
+  for (const std::vector<std::string>& line :
+       {std::vector<std::string>{"mpa"}, {"map", "mpa"}, {"pose", "--mpa"}, {"--domain", "7", "mpa"}}) {
+    const CommandOutcome outcome = RunLine(line);
+    EXPECT_EQ(outcome.code, ExitCode::kUsage);
+    EXPECT_THAT(outcome.err, HasSubstr("was not expected: "));
+    EXPECT_THAT(outcome.err, HasSubstr("mpa\n"));
+  }
+}
+
 TEST_F(CommandLine, HelpIsNoError) {
   for (const std::vector<std::string>& arguments :
        {std::vector<std::string>{"--help"}, {"replay", "--help"}, {"map", "draw", "--help"}, {"--version"}}) {

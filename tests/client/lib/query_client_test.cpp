@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "client/lib/last_request.h"
 #include "tests/client/lib/fake_server.h"
 #include "tests/loopback.h"
 
@@ -104,6 +105,7 @@ TEST_F(QueryClientTest, PassesTheServersErrorOn) {
   ASSERT_FALSE(enabled);
   EXPECT_EQ(enabled.error().code, StatusCode::kNotFound);
   EXPECT_EQ(enabled.error().message, "no version 7");
+  EXPECT_EQ(enabled.error().request, TakeLastRequest());
 }
 
 TEST_F(QueryClientTest, SaysWhatWasNotAnsweredInTime) {
@@ -111,10 +113,12 @@ TEST_F(QueryClientTest, SaysWhatWasNotAnsweredInTime) {
   int asked = 0;  // Until the two have found each other, which takes as long as the machine is busy.
   while (!impatient->Ping()) ASSERT_LT(++asked, 100);
   server_.SetAnswering(false);
+  static_cast<void>(TakeLastRequest());  // A command of another test would count before a question.
   const Result<PathAnswer> path = impatient->Path("r1");
   ASSERT_FALSE(path);
   EXPECT_EQ(path.error().code, StatusCode::kDeadlineExceeded);
   EXPECT_EQ(path.error().message, "no answer to path within 0.2 s");
+  EXPECT_EQ(path.error().request, TakeLastRequest());
 }
 
 TEST_F(QueryClientTest, AsksWhatTheDoorForRos2Sees) {

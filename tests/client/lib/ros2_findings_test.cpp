@@ -18,6 +18,7 @@ TEST(Ros2Findings, AreTheLinesOfTheDoctor) {
                                  {"/r1/tf_static", "tf2_msgs/msg/TFMessage", 2, false, true, 0.0, 1, 3}};
   report.namespaces[1].name = "/";
   report.namespaces[1].problems = {"no rule of ros2.namespaces fits it", "no odometry"};
+  report.namespaces[1].topics = {{"/scan", "sensor_msgs/msg/LaserScan", 1, true, false, 0.0, 0, 0}};
   EXPECT_EQ(
       FormatRos2(FindingsOf(report)),
       "ROS 2 in DDS domain 7\n"
@@ -28,7 +29,8 @@ TEST(Ros2Findings, AreTheLinesOfTheDoctor) {
       "3 refused\n"
       "/  no robot: NOT on the map\n"
       "  - no rule of ros2.namespaces fits it\n"
-      "  - no odometry\n");
+      "  - no odometry\n"
+      "    /scan (sensor_msgs/msg/LaserScan): 1 publisher, reliable, not listened to\n");
 }
 
 // A robot that is on the map may have something else that is wrong.

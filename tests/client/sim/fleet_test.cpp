@@ -8,6 +8,7 @@
 #include <map>
 
 #include "client/sim/shipped_worlds.h"
+#include "client/sim/world_file.h"
 #include "tests/flat_world.h"
 
 namespace cairn::sim {
@@ -55,6 +56,46 @@ TEST(Fleet, SameSeedGivesTheSameRecords) {
     differs |= !Same(record, other.Next());
   }
   EXPECT_TRUE(differs);
+}
+
+// The longest range of each scan, by the time since the beginning, of a robot that drives from (2, 2) towards (4, 2) in
+// a hall of 20 x 4 m.
+std::map<double, float> FarthestSeen(const std::string& doors, double seconds) {
+  const auto place = ParseSurroundings(
+      "cairn-world: 1\nlines: [{points: [[0, 0], [20, 0], [20, 4], [0, 4]], closed: true}]\ndoors: " + doors +
+          "\nroutes: [{name: r, points: [[2, 2], [4, 2]]}]\n",
+      "test");
+  EXPECT_TRUE(place) << place.error().message;
+  FleetOptions options;
+  options.robots = 1;
+  options.laser.range_max_m = 30.0;
+  auto fleet = Fleet::Create(*place, options);
+  EXPECT_TRUE(fleet) << fleet.error().message;
+  std::map<double, float> farthest;
+  for (const FleetRecord& record : Take(*fleet, seconds)) {
+    if (const auto* scan = std::get_if<Scan>(&record.record))
+      farthest[SecondsFromStamp(scan->stamp - options.first_stamp)] =
+          *std::max_element(scan->ranges_m.begin(), scan->ranges_m.end());
+  }
+  return farthest;
+}
+
+TEST(Fleet, AClosedDoorHidesWhatIsBehindItAndAnOpenOneDoesNot) {
+  int closed = 0, open = 0;
+  for (const auto& [seconds, range_m] : FarthestSeen("[{from: [10, 0], to: [10, 4], closed: 0.5, open: 0.5}]", 1.9)) {
+    const double into_turn_s = std::fmod(seconds, 1.0);
+    if (std::abs(into_turn_s - 0.5) < 0.01 || into_turn_s > 0.99) continue;
+    EXPECT_EQ(range_m < 9.0F, into_turn_s < 0.5) << seconds;
+    ++(into_turn_s < 0.5 ? closed : open);
+  }
+  EXPECT_GT(closed, 5);
+  EXPECT_GT(open, 5);
+}
+
+TEST(Fleet, ADoorOpensForARobotThatIsNear) {
+  const auto farthest = FarthestSeen("[{from: [3, 0], to: [3, 4], closed: 1000, open: 1}]", 4.0);
+  EXPECT_LT(farthest.begin()->second, 5.0F);
+  EXPECT_TRUE(std::any_of(farthest.begin(), farthest.end(), [](const auto& one) { return one.second > 10.0F; }));
 }
 
 TEST(Fleet, RecordsComeInTheOrderOfTheirStampsAtTheirRates) {

@@ -75,6 +75,23 @@ TEST(WorldFile, WalkersWalkAroundTheirPathForEver) {
   EXPECT_TRUE(WalkerAt(world.walkers[0], 3 * round_s + 2).center_map.isApprox(Eigen::Vector2d(1, 0), 1e-9));
 }
 
+TEST(WorldFile, DoorsAreClosedAndOpenInTurn) {
+  const World world =
+      Parse("lines: [{points: [[0, 0], [1, 0]]}]\ndoors: [{from: [2, 0], to: [2, 1], closed: 4, open: 3, begin: 1}]");
+  ASSERT_EQ(world.doors.size(), 1u);
+  const Door& door = world.doors[0];
+  for (const auto& [seconds, closed] : {std::pair{0.0, true}, {2.9, true}, {3.1, false}, {5.9, false}, {6.1, true}})
+    EXPECT_EQ(IsClosed(door, seconds), closed) << seconds;
+  EXPECT_DOUBLE_EQ(DistanceFrom(door, {0, 0.5}), 2.0);
+  EXPECT_DOUBLE_EQ(DistanceFrom(door, {2, 3}), 2.0);
+  std::vector<Disc> leaf;
+  AppendLeaf(door, &leaf);
+  for (std::size_t i = 1; i < leaf.size(); ++i)
+    EXPECT_LT((leaf[i].center_map - leaf[i - 1].center_map).norm(), 2 * leaf[i].radius_m) << "no ray passes between";
+  EXPECT_EQ(leaf.front().center_map, Eigen::Vector2d(2, 0));
+  EXPECT_EQ(leaf.back().center_map, Eigen::Vector2d(2, 1));
+}
+
 TEST(WorldFile, ComplaintsNameLineColumnAndReason) {
   const std::pair<std::string, std::string> wrong[] = {
       {"", "cairn-world: 1"},
@@ -87,6 +104,8 @@ TEST(WorldFile, ComplaintsNameLineColumnAndReason) {
       {"cairn-world: 1\nname: [x]\n", "test:2:7: world: name must be a word"},
       {"cairn-world: 1\n\n# x\nblobs: []\n", "'blobs' is not a key"},
       {"cairn-world: 1\npillars:\n  - {center: [1, 2]}\n", "test:3:5: pillar: 'radius' is missing"},
+      {"cairn-world: 1\ndoors:\n  - {from: [1, 2], to: [1, 2], closed: 1, open: 1}\n", "a door must be wider than 0"},
+      {"cairn-world: 1\ndoors:\n  - {from: [1, 2], to: [1, 3], closed: 1, open: 1, begin: -1}\n", "begin must not"},
       {"cairn-world: 1\npillars:\n  - {center: [1, 2], radius: -3}\n", "test:3:30: pillar: radius must be above 0"},
       {"cairn-world: 1\npillars:\n  - {center: [1, 2], radius: 1, 1: 2}\n", "'1' is not a key"},
       {"cairn-world: 1\npillars:\n  - {center: [1, 2], radius: 1, radius: 2}\n", "'radius' is given twice"},
@@ -157,10 +176,10 @@ TEST(WorldFile, OpensShippedWorldsAndFilesOfEitherKind) {
 }
 
 TEST(WorldFile, AMissingFileIsNamed) {
-  for (const auto& [code, message] : {OpenWorld("/nowhere/at-all.yaml").error(), OpenWorld3("nowhere").error(),
-                                      OpenSurroundings("nowhere.yaml").error()}) {
-    EXPECT_EQ(code, StatusCode::kNotFound);
-    EXPECT_THAT(message, HasSubstr("neither a file nor one of: building"));
+  for (const Status& error : {OpenWorld("/nowhere/at-all.yaml").error(), OpenWorld3("nowhere").error(),
+                              OpenSurroundings("nowhere.yaml").error()}) {
+    EXPECT_EQ(error.code, StatusCode::kNotFound);
+    EXPECT_THAT(error.message, HasSubstr("neither a file nor one of: building"));
   }
 }
 

@@ -41,7 +41,9 @@ TEST(WebJson, ARobotThatIsNotJoinedIsAFragmentWhateverItsPoseSays) {
   RobotStatus& robot = view.status.robots[0];
   robot.session.site = "hall";
   robot.pose.reason = PoseReason::kLost;
-  const auto fragment = [&view] { return json::parse(StateJson(view, "hall", false)).at("robots").at(0).at("fragment"); };
+  const auto fragment = [&view] {
+    return json::parse(StateJson(view, "hall", false)).at("robots").at(0).at("fragment");
+  };
   EXPECT_EQ(fragment(), false);
   robot.session.fragment = true;
   EXPECT_EQ(fragment(), true);

@@ -120,12 +120,16 @@ TEST(Metrics, MemoryIsThatOfEachSiteAndWaitsAreInSeconds) {
   view.maps.resize(2);
   view.maps[0].site = "hall";
   view.maps[0].memory_bytes = 5000000000;
+  view.maps[0].memory_note = std::string(kAboveMemoryLimit) + ", and all that is left is needed";
   view.maps[1].site = "yard";
+  view.maps[1].memory_note = "to stay below the limit of memory: map versions removed: 1";
   view.status.load.strand_wait_p50_ms = 0.5;
   view.status.load.strand_wait_p99_ms = 125.0;
   const std::string text = MetricsText(view);
   EXPECT_THAT(text, HasSubstr("\ncairn_site_memory_bytes{site=\"hall\"} 5000000000\n"));
   EXPECT_THAT(text, HasSubstr("\ncairn_site_memory_bytes{site=\"yard\"} 0\n"));
+  EXPECT_THAT(text, HasSubstr("\ncairn_site_memory_above_limit{site=\"hall\"} 1\n"));
+  EXPECT_THAT(text, HasSubstr("\ncairn_site_memory_above_limit{site=\"yard\"} 0\n"));
   EXPECT_THAT(text, HasSubstr("\ncairn_server_strand_wait_seconds{quantile=\"0.5\"} 0.0005\n"));
   EXPECT_THAT(text, HasSubstr("\ncairn_server_strand_wait_seconds{quantile=\"0.99\"} 0.125\n"));
 }

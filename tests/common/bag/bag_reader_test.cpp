@@ -161,8 +161,20 @@ TEST_F(Bag, IsTheSameInEveryStorage) {
   recorded::WriteSqlite(sqlite_packed / "bag_0.db3", packed);
   const auto unpacked = folder("unpacked", {"bag_0.db3.zstd"});
   recorded::WriteSqlite(unpacked / "bag_0.db3", messages_);
+  const auto whole_mcap = folder("whole_mcap", {"bag_0.mcap.zstd", "bag_1.mcap.zstd"});
+  static_cast<void>(directory_.Write("whole_mcap/bag_0.mcap.zstd", recorded::PackZstd(McapOf(first, "", 2))));
+  static_cast<void>(directory_.Write("whole_mcap/bag_1.mcap.zstd", recorded::PackZstd(McapOf(second, "lz4", 2))));
+  const auto whole_sqlite = folder("whole_sqlite", {"bag_0.db3.zstd", "bag_1.db3.zstd"});
+  for (const char* name : {"bag_0.db3", "bag_1.db3"}) {
+    const std::string file = directory_.Read(std::string("sqlite/") + name);
+    // In two frames, as a program that packs while it reads may write them.
+    const std::string packed_file = recorded::PackZstd(file.substr(0, 5000)) + recorded::PackZstd(file.substr(5000));
+    static_cast<void>(directory_.Write(std::string("whole_sqlite/") + name + ".zstd", packed_file));
+  }
 
-  for (const auto& path : {sqlite, mcap, sqlite_packed, unpacked, sqlite_packed / "bag_0.db3",
+  for (const auto& path : {sqlite, mcap, sqlite_packed, unpacked, whole_mcap, whole_sqlite, sqlite_packed / "bag_0.db3",
+                           directory_.Write("one.mcap.zstd", recorded::PackZstd(McapOf(messages_, "", 0))),
+                           directory_.Write("one.db3.zstd", recorded::PackZstd(directory_.Read("unpacked/bag_0.db3"))),
                            directory_.Write("packed.mcap", McapOf(packed, "", 0))}) {
     const Content content = Read(path);
     EXPECT_EQ(content.error, "") << path;
@@ -185,8 +197,11 @@ TEST_F(Bag, WithAFolderThatIsNoneSaysWhy) {
   static_cast<void>(directory_.Write("bag/metadata.yaml", recorded::MetadataOf({"../../etc/passwd"})));
   EXPECT_THAT(Read(directory_ / "bag").error, HasSubstr("bag/passwd: no such file"));
   static_cast<void>(directory_.Write("bag/metadata.yaml", recorded::MetadataOf({"bag_0.mcap.zstd"})));
-  static_cast<void>(directory_.Write("bag/bag_0.mcap.zstd", recorded::PackZstd(McapOf(messages_, "", 0))));
-  EXPECT_THAT(Read(directory_ / "bag").error, HasSubstr("unzstd"));
+  const std::string whole = recorded::PackZstd(McapOf(messages_, "", 0));
+  static_cast<void>(directory_.Write("bag/bag_0.mcap.zstd", whole.substr(0, whole.size() - 1)));
+  EXPECT_THAT(Read(directory_ / "bag").error, HasSubstr("bag_0.mcap.zstd: zstd: the end is missing"));
+  static_cast<void>(directory_.Write("bag/bag_0.mcap.zstd", recorded::PackZstd("no bag")));
+  EXPECT_THAT(Read(directory_ / "bag").error, HasSubstr("bag_0.mcap.zstd, unpacked: neither MCAP"));
 }
 
 TEST_F(Bag, WithSeveralTopicsNeedsAChoice) {
@@ -206,6 +221,59 @@ TEST_F(Bag, WithSeveralTopicsNeedsAChoice) {
   EXPECT_EQ(ReadIt({.scan_topic = "/scan", .odometry_topic = "/odom"}).scans.size(), 4U);
   EXPECT_THAT(ReadIt({.scan_topic = "/odom"}).error,
               AllOf(HasSubstr("no topic '/odom' of type sensor_msgs/msg/LaserScan"), HasSubstr("/camera")));
+}
+
+// Two lidars that are mounted on one robot, the second one a little later, and some of its scans late.
+TEST_F(Bag, MayHoldSeveralLidarsOfOneRobot) {
+  AddMounting();
+  Add("/tf_static", recorded::kTransformType, CdrOf(Message(Link("base_link", "rear_laser", {-0.25, 0.0, kPi}))));
+  AddDrive(3);  // At 0, 0.1 and 0.2 s.
+  for (const Stamp after : {30'000'000, 130'000'000, 200'000'000})
+    Add("/rear/scan", recorded::kScanType, CdrOf(ScanAt(kStart + after, "rear_laser")));
+  EXPECT_THAT(ReadIt().error, HasSubstr("more than one topic of type sensor_msgs/msg/LaserScan"));
+  const LogReaderOptions all = {.all_lidars = true};
+  const Content both = ReadIt(all);
+  ASSERT_EQ(both.error, "");
+  EXPECT_THAT(both.summary.lidars, ::testing::ElementsAre("/scan", "/rear/scan"));
+  EXPECT_THAT(both.summary.notes, Contains(HasSubstr("/rear/scan: frame 'rear_laser' is mounted on 'base_link'")));
+  ASSERT_EQ(both.scans.size(), 6U);
+  EXPECT_EQ(both.summary.scans, 6);
+  std::vector<double> forward;
+  std::vector<Stamp> stamps;
+  for (const Scan& scan : both.scans) {
+    forward.push_back(scan.T_robot_laser.x);
+    stamps.push_back(scan.stamp - kStart);
+  }
+  EXPECT_THAT(forward, ::testing::ElementsAre(0.25, -0.25, 0.25, -0.25, 0.25, -0.25));
+  // The last two were taken at the same moment.
+  EXPECT_THAT(stamps, ::testing::ElementsAre(0, 30'000'000, 100'000'000, 130'000'000, 200'000'000, 200'001'000));
+  std::vector<std::size_t> lidars;
+  const auto path = directory_.Write("bag.mcap", McapOf(messages_, "zstd", 3));
+  const auto summary = ReadLidars(path, all, [&](LogRecord&& record, std::size_t lidar) {
+    if (std::holds_alternative<Scan>(record)) lidars.push_back(lidar);
+    return true;
+  });
+  ASSERT_TRUE(summary.has_value());
+  EXPECT_THAT(lidars, ::testing::ElementsAre(0, 1, 0, 1, 0, 1));
+  EXPECT_EQ(ReadIt({.scan_topic = "/rear/scan", .all_lidars = true}).scans.size(), 3U);
+  EXPECT_EQ(ReadIt({.scan_topic = "/rear/scan,scan", .all_lidars = true}).scans.size(), 6U);
+  EXPECT_THAT(ReadIt({.scan_topic = "/scan,/scan", .all_lidars = true}).error, HasSubstr("names a topic twice"));
+  EXPECT_THAT(ReadIt({.scan_topic = "/scan,/none", .all_lidars = true}).error, HasSubstr("no topic '/none'"));
+  EXPECT_THAT(ReadIt({.T_robot_laser = Pose2{}, .all_lidars = true}).error, HasSubstr("--laser-at says where one"));
+}
+
+TEST_F(Bag, WithSeveralTopicsOfScansThatAreNotLidarsOfOneRobotNamesThem) {
+  AddMounting();
+  AddDrive();
+  const LogReaderOptions all = {.all_lidars = true};
+  Add("/scan_filtered", recorded::kScanType, CdrOf(ScanAt(kStart)));
+  EXPECT_THAT(ReadIt(all).error,
+              AllOf(HasSubstr("/scan and /scan_filtered are of one lidar"), HasSubstr("--scan-topic chooses")));
+  EXPECT_EQ(ReadIt({.scan_topic = "/scan", .all_lidars = true}).scans.size(), 4U);
+  messages_.pop_back();
+  Add("/other/scan", recorded::kScanType, CdrOf(ScanAt(kStart, "other/laser")));
+  EXPECT_THAT(ReadIt(all).error,
+              AllOf(HasSubstr("/other/scan: no transform connects"), HasSubstr("/scan, /other/scan")));
 }
 
 TEST_F(Bag, WithoutScansOrOdometrySaysWhatItHas) {

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -51,6 +53,27 @@ TEST_F(SqliteFile, GivesMessagesInTheOrderOfTheirTimes) {
   EXPECT_THAT((*OpenSqlite(path_))->topics()[2], (Topic{"/c", "C", "cdr"}));
   Execute(path_, "DROP INDEX timestamp_idx");
   EXPECT_THAT(Read(path_), ElementsAre("0one", "0five", "0five too")) << "without the index";
+}
+
+// As `ros2 bag record --storage-preset-profile resilient` makes them. Reading left files beside the bag, and failed
+// where it could not.
+TEST_F(SqliteFile, WithAnEndedLogIsReadWithoutAnotherFile) {
+  std::filesystem::create_directory(directory_ / "100%?#");
+  const std::filesystem::path path = directory_ / "100%?#/bag.db3";
+  std::filesystem::copy_file(path_, path);
+  const auto files = [&] {
+    const std::filesystem::directory_iterator entries(path.parent_path());
+    return std::distance(begin(entries), end(entries));
+  };
+  Execute(path, "PRAGMA journal_mode = WAL");
+  ASSERT_EQ(files(), 1);
+  EXPECT_THAT(Read(path), ElementsAre("0one", "0five", "0five too"));
+  EXPECT_EQ(files(), 1);
+  // While a recorder is at work, its log counts.
+  SQLite::Database recorder(path.string(), SQLite::OPEN_READWRITE);
+  recorder.exec("INSERT INTO messages (topic_id, timestamp, data) VALUES (7, 6, 'six')");
+  ASSERT_GT(files(), 1);
+  EXPECT_THAT(Read(path), ElementsAre("0one", "0five", "0five too", "0six"));
 }
 
 TEST_F(SqliteFile, RefusesWhatIsNoBag) {

@@ -100,6 +100,21 @@ TEST(MapEdit, AThinLineHasNoGapsAndAWideOneItsWidth) {
   EXPECT_FALSE(wide.contains({40, -11}));
 }
 
+TEST(MapEdit, AnOriginIsTwoPointsApart) {
+  MapEdit origin;
+  origin.kind = MapEditKind::kOrigin;
+  origin.points_map = {{1, 2}, {1.5, 2}};
+  EXPECT_TRUE(ValidateMapEdit(origin).has_value());
+  for (const auto& points :
+       std::vector<std::vector<Eigen::Vector2d>>{{{1, 2}}, {{1, 2}, {1, 2}}, {{1, 2}, {2, 2}, {2, 3}}}) {
+    MapEdit bad = origin;
+    bad.points_map = points;
+    EXPECT_FALSE(ValidateMapEdit(bad).has_value()) << points.size();
+  }
+  origin.width_m = 0.1;
+  EXPECT_FALSE(ValidateMapEdit(origin).has_value());
+}
+
 TEST(MapEdit, WhatNobodyCanMeanIsRefusedWithTheReason) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   MapEdit kind = Box(0, 0, 1, 1);

@@ -29,7 +29,7 @@ void ExpectNamed(int count, std::string_view (*name)(Enum)) {
 }
 
 TEST(EnumNames, AreCompleteAndDifferent) {
-  ExpectNamed<JobKind>(2, JobKindName);
+  ExpectNamed<JobKind>(3, JobKindName);
   ExpectNamed<JobState>(5, JobStateName);
   ExpectNamed<DropReason>(kDropReasonCount, DropReasonName);
   ExpectNamed<PoseReason>(7, PoseReasonName);

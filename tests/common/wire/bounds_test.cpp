@@ -89,7 +89,7 @@ TEST(Bounds, RefuseUnknownEnumValues) {
   pose.reason(static_cast<v1::PoseReason>(0xffffffffU));
   ExpectRefused(pose, "reason");
   v1::Job job = ToWire(ExtremeJob());
-  job.kind(static_cast<v1::JobKind>(2));
+  job.kind(static_cast<v1::JobKind>(3));
   ExpectRefused(job, "kind");
   job = ToWire(ExtremeJob());
   job.state(static_cast<v1::JobState>(5));

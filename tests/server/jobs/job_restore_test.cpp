@@ -203,7 +203,7 @@ TEST_F(JobRestore, AJobThatEndsServersIsGivenUp) {
     ASSERT_TRUE(list.list.Start(2));
     EXPECT_FALSE(list.list.EndsServers("hall", JobKind::kSmooth));
   }
-  StoredList last(*store_);
+  StoredList last(*store_, {.max_queued = 1, .max_kept = 4});
   const auto unfinished = last.list.Restore();
   ASSERT_TRUE(unfinished);
   ASSERT_EQ(unfinished->size(), 1U);  // The one that only waited.
@@ -212,6 +212,13 @@ TEST_F(JobRestore, AJobThatEndsServersIsGivenUp) {
   EXPECT_TRUE(last.list.EndsServers("hall", JobKind::kSmooth));
   EXPECT_FALSE(last.list.EndsServers("hall", JobKind::kJoin));
   EXPECT_FALSE(last.list.EndsServers("lab", JobKind::kSmooth));
+  // Many later jobs do not make it forgotten.
+  for (int later = 0; later < 8; ++later) {
+    const auto job = last.list.Add("lab", JobKind::kRelocalise);
+    ASSERT_TRUE(job);
+    last.list.Fail(job->id, {StatusCode::kFailedPrecondition, "found nowhere"});
+  }
+  EXPECT_TRUE(last.list.EndsServers("hall", JobKind::kSmooth));
 }
 
 TEST_F(JobRestore, AServerThatIsStoppedWhileAJobRunsWasNotEndedByIt) {

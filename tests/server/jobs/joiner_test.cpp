@@ -1,5 +1,6 @@
 #include "server/jobs/joiner.h"
 
+#include <future>
 #include <vector>
 
 #include "tests/server/robots/roster_fixture.h"
@@ -39,7 +40,7 @@ class JoinerTest : public testing::RosterTest {
   JobsOptions options_;
   JobList jobs_{options_, outbound_, [] { return Stamp{0}; }};
   JobWorker worker_{options_, jobs_, [](const Job&, bool, const JobControl&) { return JobOutcome{}; }};
-  Joiner joiner_{options_, roster(), jobs_, worker_};
+  Joiner joiner_{options_, roster(), *atlas_, jobs_, worker_};
 };
 
 TEST_F(JoinerTest, TriesWhenBothHaveDrivenFarEnough) {
@@ -80,10 +81,41 @@ TEST_F(JoinerTest, DoesNothingWhileTheSiteHasAJobAndForRobotsWhosePlacesAreKnown
   joiner_.Tick();
   EXPECT_EQ(jobs_.OfSite("lab").size(), 1U);
   jobs_.Fail(job->id, {StatusCode::kCancelled, "cancelled"});
-  roster().Find("r2")->record().SetJoining({false, 40.0});
+  roster().Find("r2")->record().SetJoining({false, 19.0});
   EXPECT_FALSE(Tries());
   roster().Find("r2")->record().SetJoining({true, 40.0});
   EXPECT_TRUE(Tries());
+}
+
+// Robots that have said where they start are fitted to each other, too.
+TEST_F(JoinerTest, AlignsRobotsWithKnownStartsAndAgainAfterAQuarterMore) {
+  roster().Find("r2")->record().SetJoining({false, 0.0});
+  Driven("r1", 100.0);
+  Driven("r2", 19.0);
+  EXPECT_FALSE(Tries());
+  Driven("r2", 20.0);
+  EXPECT_TRUE(Tries());
+  EXPECT_FALSE(Tries());
+  Driven("r1", 129.0);
+  EXPECT_FALSE(Tries());
+  Driven("r1", 130.0);
+  EXPECT_TRUE(Tries());
+  roster().Take(RequestOf("r3", 9));
+  roster().Find("r3")->record().SetJoining({false, 21.0});
+  EXPECT_TRUE(Tries()) << "one more has driven far enough";
+}
+
+TEST_F(JoinerTest, AlignsNothingWhereItIsSwitchedOffOrAPersonHasChosenTheMap) {
+  roster().Find("r2")->record().SetJoining({false, 40.0});
+  Driven("r1", 100.0);
+  JobsOptions off = options_;
+  off.align = false;
+  Joiner(off, roster(), *atlas_, jobs_, worker_).Tick();
+  EXPECT_TRUE(jobs_.OfSite("lab").empty());
+  std::promise<void> chosen;
+  atlas_->Find("lab")->Enable(1, [&chosen](const Result<std::uint32_t>&) { chosen.set_value(); });
+  chosen.get_future().wait();
+  EXPECT_FALSE(Tries());
 }
 
 TEST_F(JoinerTest, DoesNothingWhereItIsSwitchedOff) {
@@ -92,7 +124,7 @@ TEST_F(JoinerTest, DoesNothingWhereItIsSwitchedOff) {
   for (bool JobsOptions::*const flag : {&JobsOptions::join, &JobsOptions::joint}) {
     JobsOptions off = options_;
     off.*flag = false;
-    Joiner(off, roster(), jobs_, worker_).Tick();
+    Joiner(off, roster(), *atlas_, jobs_, worker_).Tick();
     EXPECT_TRUE(jobs_.OfSite("lab").empty());
   }
 }

@@ -47,6 +47,24 @@ TEST(MapVersions, TheOldestThatNobodyNeedsIsForgotten) {
   EXPECT_NE(versions.Find(4), nullptr);
 }
 
+TEST(MapVersions, TheLeastNeededIsTheOldestThatNoRollBackAndNoJobNeeds) {
+  MapVersions versions(9);
+  EXPECT_EQ(versions.LeastNeeded(true), std::nullopt);
+  while (versions.Add({}) < 6) continue;
+  versions.Enable(4, {});
+  std::vector<std::uint32_t> gone;
+  for (const bool last : {false, true}) {
+    while (const auto version = versions.LeastNeeded(last)) {
+      versions.Remove(*version);
+      gone.push_back(*version);
+    }
+    if (last) break;
+    EXPECT_EQ(gone, (std::vector<std::uint32_t>{1, 2, 5}));
+  }
+  EXPECT_EQ(gone, (std::vector<std::uint32_t>{1, 2, 5, 6, 3}));
+  EXPECT_EQ(versions.Add({}), 7U);
+}
+
 // A job that ended while an older version was being enabled pushed that version out, and the switch ended the process.
 TEST(MapVersions, TheOneThatIsBeingSwitchedToIsNotForgotten) {
   MapVersions versions(2);

@@ -1,6 +1,7 @@
 // What a site makes of its map only when somebody asks for it.
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <future>
 #include <memory>
 
@@ -43,6 +44,34 @@ TEST_F(SiteQuestions, TheLayerOfDisagreementIsMadeWhenItIsAskedFor) {
   Draw(2, {1, 0}, -300);
   TakeTiles();
   EXPECT_NE(site_->snapshot()->disagreement.Find({0, 1, 0}), nullptr);
+}
+
+TEST_F(SiteQuestions, TheLayerOfDisagreementIsGoneWhenNobodyHasAskedForAMinute) {
+  Draw(1, {0, 0}, 300);
+  Draw(2, {0, 0}, -300);
+  TakeTiles();
+  const Site::Clock::time_point begin{};
+  const auto kept_at = [&](std::chrono::seconds after) {
+    site_->Publish({}, begin + after);
+    Settle();
+    return !site_->snapshot()->disagreement.empty();
+  };
+  const auto ask_at = [&](std::chrono::seconds after) {
+    std::promise<void> answered;
+    site_->AskDisagreement([&](const Result<Snapshot>&) { answered.set_value(); }, begin + after);
+    answered.get_future().wait();
+  };
+  ask_at(std::chrono::seconds(0));
+  EXPECT_TRUE(kept_at(std::chrono::seconds(59)));
+  ask_at(std::chrono::seconds(59));
+  EXPECT_TRUE(kept_at(std::chrono::seconds(118)));
+  EXPECT_FALSE(kept_at(std::chrono::seconds(119)));
+  // It is not made again by what is drawn, until somebody asks.
+  Draw(1, {1, 0}, 300);
+  Draw(2, {1, 0}, -300);
+  EXPECT_FALSE(kept_at(std::chrono::seconds(120)));
+  ask_at(std::chrono::seconds(121));
+  EXPECT_TRUE(kept_at(std::chrono::seconds(122)));
 }
 
 TEST_F(SiteQuestions, WhatOneRobotHasDrawnIsAMapOfItsOwnAlsoIfItIsHidden) {

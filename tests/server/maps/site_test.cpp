@@ -297,6 +297,30 @@ TEST_F(SiteTest, EnablingWhatIsEnabledOrMissing) {
   EXPECT_EQ(Enable(77).get().error().code, StatusCode::kNotFound);
 }
 
+// What a person has chosen stays until a person asks for something else.
+TEST_F(SiteTest, NoAlignmentReplacesTheVersionThatAPersonHasChosen) {
+  sessions_.clear();
+  const auto enable_by = [this](std::uint32_t version, Site::EnabledBy by) {
+    std::promise<Result<std::uint32_t>> enabled;
+    site_->Enable(
+        version, [&enabled](Result<std::uint32_t> result) { enabled.set_value(std::move(result)); }, {}, by);
+    return enabled.get_future().get();
+  };
+  EXPECT_TRUE(site_->MayBeAligned());
+  const std::uint32_t first = AddVersion({{1, {{{{0, 0}, UniformChunk(100)}}, 3}}});
+  EXPECT_FALSE(site_->MayBeAligned()) << "a person has not decided about it";
+  EXPECT_TRUE(enable_by(first, Site::EnabledBy::kJob));
+  EXPECT_TRUE(site_->MayBeAligned());
+  const std::uint32_t second = AddVersion({{1, {{{{0, 0}, UniformChunk(-100)}}, 3}}});
+  EXPECT_TRUE(enable_by(second, Site::EnabledBy::kAlignment));
+  EXPECT_TRUE(enable_by(first, Site::EnabledBy::kPerson));
+  EXPECT_FALSE(site_->MayBeAligned());
+  EXPECT_EQ(enable_by(second, Site::EnabledBy::kAlignment).error().code, StatusCode::kFailedPrecondition);
+  EXPECT_EQ(site_->snapshot()->info.enabled_version, first);
+  EXPECT_TRUE(enable_by(second, Site::EnabledBy::kJob));
+  EXPECT_TRUE(site_->MayBeAligned());
+}
+
 // At the end of a server. The last changes were lost where Publish had been asked for before them and still waited.
 TEST_F(SiteTest, WhatChangedLastIsPublishedWhenItCloses) {
   std::promise<void> gate;

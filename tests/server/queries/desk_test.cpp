@@ -228,7 +228,7 @@ TEST_F(DeskTest, OrdersAreAnsweredWhenTheyAreOnTheDisk) {
     EXPECT_TRUE(reply->status.ok()) << reply->status.message;
     jobs += static_cast<int>(reply->jobs.size());
   }
-  EXPECT_EQ(jobs, 1);
+  EXPECT_EQ(jobs, 2);
   Request nobody = Of(RequestKind::kRelocalise);
   nobody.robot = "r9";
   desk.Take(std::move(nobody));

@@ -123,13 +123,15 @@ TEST_F(Queries, TheNewestPoseComesWithItsHypotheses) {
   AddPose(100, 1.0);
   AddPose(200, 2.0);
   session_.hypotheses = {{200, {2.0, 0.0, 0.0}, 0.75}, {200, {9.0, 0.0, 0.0}, 0.25}};
-  EXPECT_TRUE(Ask(RequestKind::kPose).hypotheses.empty()) << "the robot is not localized";
+  EXPECT_EQ(Ask(RequestKind::kPose).hypotheses.size(), 2U) << "where it may be, also if it is lost";
   session_.status.pose.localized = true;
   EXPECT_EQ(Ask(RequestKind::kPose).hypotheses.size(), 2U);
   EXPECT_EQ(Ask(RequestKind::kPose).hypotheses.at(1).weight, 0.25);
   session_.hypotheses.clear();  // As after a restart.
   EXPECT_EQ(Ask(RequestKind::kPose).hypotheses.at(0).T_map_robot.x, 2.0);
   EXPECT_EQ(Ask(RequestKind::kPose).hypotheses.at(0).weight, 1.0);
+  session_.status.pose.localized = false;
+  EXPECT_TRUE(Ask(RequestKind::kPose).hypotheses.empty()) << "nobody knows where it may be";
   request_.latest = false;
   request_.stamp = 150;
   EXPECT_TRUE(Ask(RequestKind::kPose).hypotheses.empty());
@@ -145,6 +147,21 @@ TEST_F(Queries, PathIsOnlineOrSmoothed) {
   const Reply smoothed = Ask(RequestKind::kPath);
   ASSERT_EQ(smoothed.path.size(), 1U);
   EXPECT_EQ(smoothed.path[0].T_map_robot.x, 7.0);
+}
+
+// The map was corrected since the poses were published.
+TEST_F(Queries, PastPosesLieInThePresentMap) {
+  AddPose(100, 1.0);
+  AddPose(200, 2.0);
+  const std::vector<StampedPose> now = {{100, {1.0, 4.0, 0.0}}, {200, {2.0, 4.0, 0.0}}};
+  history_.MoveOnto(now, true, {});
+  session_.path = history_.view();
+  EXPECT_NEAR(Ask(RequestKind::kPath).path.at(0).T_map_robot.y, 4.0, 1e-9);
+  request_.latest = false;
+  for (const Stamp stamp : {100, 150}) {
+    request_.stamp = stamp;
+    EXPECT_NEAR(Ask(RequestKind::kPose).poses.at(0).T_map_robot.y, 4.0, 1e-9) << stamp;
+  }
 }
 
 // The robot has begun again since: its old path says nothing of where it is.

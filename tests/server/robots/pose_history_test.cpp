@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "server/slam/state/archive.h"
 
@@ -62,6 +65,82 @@ TEST(PoseHistory, AViewDoesNotChangeAsThePathGrows) {
   history.Append(PoseAt(2));
   EXPECT_EQ(view.size(), 1U);
   EXPECT_EQ(history.view().size(), 2U);
+}
+
+// The path lies along the x axis. Around its end the map is moved by 10 m and turned by half a radian.
+TEST(PoseHistory, ACorrectionMovesThePosesBetweenTwoKeyframesWithBoth) {
+  PoseHistory history(100000);
+  for (Stamp stamp = 0; stamp <= 1200; ++stamp) history.Append(PoseAt(stamp));
+  const PathView before = history.view();
+  const std::vector<StampedPose> now = {{500, {50, 0, 0}}, {1000, {100, 10, 0.5}}, {5000, {0, 0, 0}}};
+  history.MoveOnto(now, true, {});
+  const PathView after = history.view();
+  EXPECT_EQ(before.At(1000)->T_map_robot, (Pose2{100, 0, 0}));
+  EXPECT_EQ(after.size(), before.size());
+  for (const Stamp stamp : {0, 300, 500}) EXPECT_EQ(after.At(stamp)->T_map_robot, before.At(stamp)->T_map_robot);
+  EXPECT_NEAR(after.At(1000)->T_map_robot.y, 10.0, 1e-9);
+  EXPECT_NEAR(after.At(1000)->T_map_robot.theta, 0.5, 1e-9);
+  // Half way: half from where the map stayed, half from where it was turned.
+  EXPECT_NEAR(after.At(750)->T_map_robot.x, 0.5 * (75.0 + 100.0 - 25.0 * std::cos(0.5)), 1e-9);
+  EXPECT_NEAR(after.At(750)->T_map_robot.theta, 0.25, 1e-9);
+  EXPECT_NEAR(after.At(1100)->T_map_robot.y, 10.0 + 10.0 * std::sin(0.5), 1e-9);
+  // Read piece by piece it is the same.
+  std::size_t compared = 0;
+  for (std::size_t i = 0; i < after.blocks(); ++i) {
+    for (const PathPose& pose : after.block(i)) {
+      EXPECT_EQ(pose.T_map_robot, history.view().At(pose.stamp)->T_map_robot);
+      ++compared;
+    }
+  }
+  EXPECT_EQ(compared, 1201U);
+}
+
+// Somebody who reads the path seldom, or never, gets the same as one who reads it after each correction.
+TEST(PoseHistory, ManyCorrectionsThatNobodyHasAskedForAreNotLost) {
+  PoseHistory read(100000), unread(100000);
+  for (PoseHistory* const one : {&read, &unread})
+    for (Stamp stamp = 0; stamp <= 2000; ++stamp) one->Append(PoseAt(stamp));
+  for (int correction = 1; correction <= 40; ++correction) {
+    const std::vector<StampedPose> now = {{100, {10.0, 0.0, 0.0}},
+                                          {1900, {190.0, 0.5 * correction, 0.01 * correction}}};
+    for (PoseHistory* const one : {&read, &unread}) one->MoveOnto(now, true, {});
+    const PathView view = read.view();
+    for (std::size_t i = 0; i < view.blocks(); ++i) static_cast<void>(view.block(i));
+  }
+  EXPECT_NEAR(unread.view().At(1900)->T_map_robot.y, 20.0, 1e-6);
+  for (Stamp stamp = 0; stamp <= 2000; stamp += 7)
+    EXPECT_EQ(read.view().At(stamp)->T_map_robot, unread.view().At(stamp)->T_map_robot) << stamp;
+}
+
+TEST(PoseHistory, WhatFollowsTheLastKeyframeStaysWhereItDoesNotHangOnIt) {
+  for (const bool moves_rest : {true, false}) {
+    PoseHistory history(100000);
+    for (Stamp stamp = 0; stamp <= 600; ++stamp) history.Append(PoseAt(stamp));
+    const std::vector<StampedPose> now = {{300, {30, 2, 0}}};
+    history.MoveOnto(now, moves_rest, {});
+    EXPECT_NEAR(history.view().At(200)->T_map_robot.y, 2.0, 1e-9);
+    EXPECT_NEAR(history.view().At(590)->T_map_robot.y, moves_rest ? 2.0 : 0.0, 1e-9);
+  }
+}
+
+TEST(PoseHistory, ACheckpointHoldsThePosesWhereTheyLieNow) {
+  PoseHistory history(100000);
+  for (Stamp stamp = 0; stamp <= 600; ++stamp) history.Append(PoseAt(stamp));
+  const std::vector<StampedPose> now = {{0, {0, 2, 0}}};
+  history.MoveOnto(now, true, true);
+  slam::StateWriter writer;
+  writer(history);
+  const std::string bytes = writer.Bytes();
+  slam::StateReader reader(bytes);
+  PoseHistory loaded(100000);
+  reader(loaded);
+  ASSERT_TRUE(reader.ok());
+  for (const Stamp stamp : {0, 255, 256, 600}) {
+    const auto pose = loaded.view().At(stamp);
+    EXPECT_NEAR(pose->T_map_robot.y, 2.0, 1e-9);
+    EXPECT_FALSE(pose->localized);
+    EXPECT_EQ(pose->reason, PoseReason::kNotJoined);
+  }
 }
 
 TEST(PoseHistory, StampsThatDoNotIncreaseAreLeftOut) {

@@ -24,7 +24,7 @@ class RosterTest : public ::testing::Test {
     if (roster_ != nullptr) return *roster_;
     slam::MapperOptions mapper;
     mapper.filter.particles = 20;
-    atlas_ = std::make_unique<Atlas>(MapsOptions{}, 0.05, create_sites, pool_, outbound_);
+    atlas_ = std::make_unique<Atlas>(maps_, 0.05, create_sites, pool_, outbound_);
     EXPECT_TRUE(atlas_->Create("lab"));
     roster_ = std::make_unique<Roster>(options, mapper, pool_, outbound_, *atlas_);
     return *roster_;
@@ -80,6 +80,7 @@ class RosterTest : public ::testing::Test {
     }
   }
 
+  MapsOptions maps_;
   asio::thread_pool pool_{2};
   Outbound outbound_{kLane};
   Sent sent_;

@@ -176,6 +176,41 @@ TEST_F(RosterTest, EarlierSessionsAreBounded) {
   }));
 }
 
+// Its layer stays, so the map is the same.
+TEST_F(RosterTest, ASiteThatTakesTooMuchMemoryDoesWithoutAnEarlierSessionWhereOthersHaveDrawn) {
+  maps_.max_memory_mib = 1e-3;
+  ASSERT_NO_FATAL_FAILURE(BeginAgain(roster(), [&] { return WaitPhase("r1", 7, SessionPhase::kEnded); }));
+  const auto lab = atlas_->Find("lab");
+  const auto tick = [&] {
+    lab->Publish();
+    roster().Tick();
+    static_cast<void>(sent());
+  };
+  ASSERT_TRUE(test::Eventually([&] {
+    tick();
+    return lab->gives_no_more();
+  }));
+  EXPECT_EQ(roster().InSite("lab").size(), 2U) << "nobody else has drawn there";
+  SessionRequest other = RequestOf("r2", 8);
+  other.has_start = true;
+  roster().Take(other);
+  for (int step = 0; step < 5; ++step) {
+    roster().Take(OdometryOf("r2", RoomOdometry(step), 8));
+    roster().Take(ScanOf("r2", RoomScan(step), 8));
+  }
+  EXPECT_EQ(roster().InSite("lab").size(), 3U);
+  EXPECT_TRUE(test::Eventually([&] {
+    tick();
+    return roster().InSite("lab").size() == 2;
+  }));
+  EXPECT_TRUE(test::Eventually([&] {
+    tick();
+    return lab->snapshot()->info.memory_note.find("earlier sessions forgotten but for their map: 1") !=
+           std::string::npos;
+  }));
+  EXPECT_NE(lab->snapshot()->tiles.Find({0, 0, 0}), nullptr);
+}
+
 TEST_F(RosterTest, TheKeysOfASessionThatIsGoneAreGivenBack) {
   RobotsOptions options;
   options.max_robots = 1;

@@ -91,6 +91,18 @@ TEST_F(InitialPose, BeginsANewSessionWhereNoScanWasUsedYet) {
   EXPECT_EQ(std::get<SessionRequest>(values[1]).T_map_robot_start.x, 3.0);
 }
 
+// The session would only join it there by a job, later.
+TEST_F(InitialPose, ARobotThatIsNotJoinedWithTheMapBeginsAnewThere) {
+  Open();
+  Pose(false, PoseReason::kNotJoined);
+  SayWhereItIs(3.0);
+  EXPECT_FALSE(robot_.TakeHint());
+  ScanAgain();
+  const auto requests = Pushed<SessionRequest>();
+  ASSERT_EQ(requests.size(), 1U);
+  EXPECT_EQ(requests[0].T_map_robot_start.x, 3.0);
+}
+
 TEST_F(InitialPose, TheNewestCounts) {
   Drive();
   SayWhereItIs(1.0);

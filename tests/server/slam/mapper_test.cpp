@@ -178,6 +178,14 @@ TEST(Mapper, ALargeLoopStaysARelation) {
   const MapperSnapshot snapshot = mapper.Snapshot();
   EXPECT_TRUE(std::any_of(snapshot.relations.begin(), snapshot.relations.end(),
                           [](const PoseRelation& relation) { return relation.loop; }));
+  // And whoever keeps past poses sees that the path has changed, and where it lies now.
+  EXPECT_GT(mapper.path_changed_at(), 1U);
+  const Trajectory along = mapper.PathByStamps();
+  ASSERT_EQ(along.size(), snapshot.full_path.size());
+  for (std::size_t k = 0; k < along.size(); ++k) {
+    EXPECT_EQ(along[k].stamp, snapshot.keyframes[k].scan->stamp);
+    EXPECT_EQ(along[k].T_map_robot, snapshot.full_path[k]);
+  }
 }
 
 // The share of the seen cells of `a` that are by more than 10 % fuller or emptier in `b`.

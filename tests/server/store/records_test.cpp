@@ -70,6 +70,9 @@ TEST(Records, SessionsSitesVersionsLayersAndJobsComeBack) {
   EXPECT_EQ(site_back->past, site.past);
   EXPECT_EQ(site_back->edits, site.edits);
   EXPECT_EQ(site_back->edits_version, 5U);
+  EXPECT_EQ(site_back->given_up.versions, 3U);
+  EXPECT_EQ(site_back->given_up.layers, 2U);
+  EXPECT_EQ(site_back->given_up.sessions, 1U);
 
   StoredVersion version{.version = 3, .job = 8, .note = "smoothed", .parts = {{5, SampleGrid(1)}}, .smoothed = {}};
   version.smoothed["r5"] = {5, std::make_shared<const Trajectory>(Trajectory{{10, {1, 2, 3}}, {20, {4, 5, 6}}})};
@@ -105,12 +108,29 @@ TEST(Records, SessionsSitesVersionsLayersAndJobsComeBack) {
   EXPECT_EQ(thinned_back.path->size(), 3U);
 
   StoredJob job;
-  job.job = {.id = 4, .site = "lab", .state = JobState::kRunning, .progress = 0.5, .message = "m"};
+  job.job.id = 4;
+  job.job.site = "lab";
+  job.job.state = JobState::kRunning;
+  job.job.progress = 0.5;
+  job.job.message = "m";
   job.enable = false;
   const auto job_back = JobOf(BytesOf(job));
   ASSERT_TRUE(job_back);
   EXPECT_EQ(job_back->job.state, JobState::kRunning);
   EXPECT_FALSE(job_back->enable);
+  job.job.kind = JobKind::kRelocalise;
+  job.job.robot = "r5";
+  job.job.places = {{7, {1.0, 2.0, 0.5}, 0.75}, {7, {3.0, 2.0, 0.5}, 0.25}};
+  const auto looks_back = JobOf(BytesOf(job));
+  ASSERT_TRUE(looks_back);
+  EXPECT_EQ(looks_back->job.kind, JobKind::kRelocalise);
+  EXPECT_EQ(looks_back->job.robot, "r5");
+  ASSERT_EQ(looks_back->job.places.size(), 2U);
+  EXPECT_EQ(looks_back->job.places[1].stamp, 7);
+  EXPECT_EQ(looks_back->job.places[1].T_map_robot, (Pose2{3.0, 2.0, 0.5}));
+  EXPECT_EQ(looks_back->job.places[1].weight, 0.25);
+  job.job.places.resize(kMostHypotheses + 1);
+  EXPECT_FALSE(JobOf(BytesOf(job)));
 }
 
 // A file may contain anything; the estimator relies on valid scans.
@@ -138,7 +158,7 @@ TEST(Records, ValuesThatNoServerWritesAreRefused) {
   for (const auto& spoil : std::vector<std::function<void(std::vector<MapEdit>&)>>{
            [](auto& edits) { edits[0].id = 0; }, [](auto& edits) { edits[0].id = 6; },
            [](auto& edits) { edits[1].id = 2; }, [](auto& edits) { edits[0].points_map[1].x() = 1e9; },
-           [](auto& edits) { edits[0].kind = static_cast<MapEditKind>(4); },
+           [](auto& edits) { edits[0].kind = static_cast<MapEditKind>(kMapEditKindCount); },
            [](auto& edits) { edits[1].points_map.pop_back(); }, [](auto& edits) { edits[0].note = "T\xfcr"; },
            [](auto& edits) { edits[0].note = "\x1b[2J"; }}) {
     StoredSite edited = testing::SampleSiteRecord();

@@ -71,6 +71,7 @@ inline std::vector<JournalEntry> OneOfEach() {
           RelocaliseTaken{},
           LocaliseTaken{false, {SampleTile()}, 0.05, 3},
           LocaliseTaken{true, {}, 0.0, 0},
+          PlaceSuggested{9, {1.0, 2.0, 0.5}, {false, {SampleTile()}, 0.05, 3}},
           StartRefusal{"it is elsewhere"},
           SessionFinished{true, {StatusCode::kUnavailable, "gone"}}};
 }
@@ -106,7 +107,8 @@ inline StoredSite SampleSiteRecord() {
                      .note = "glass",
                      .made = 77},
                     {.id = 4, .kind = MapEditKind::kKeepOut, .points_map = {{0, 0}, {1, 0}, {1, 1}}, .note = {}}},
-          .edits_version = 5};
+          .edits_version = 5,
+          .given_up = {.versions = 3, .layers = 2, .sessions = 1}};
 }
 
 }  // namespace cairn::server::testing

@@ -134,6 +134,8 @@ TEST(ImportSite, RefusesWhatIsThereAlreadyAndTakesItUnderOtherNames) {
   const auto contents = ReadSite(*store, "copy");
   ASSERT_TRUE(contents);
   EXPECT_EQ(contents->sessions.at(4).request.robot, "c1");
+  ASSERT_EQ(contents->jobs.size(), 1U);
+  EXPECT_EQ(contents->jobs.begin()->second.job.robot, "c1");
   EXPECT_EQ(contents->site.members.at(HashName("c2")), 5U);
   EXPECT_EQ(ReadVersions(*store, HashName("copy"))->at(2).smoothed.at("c2").session, 5U);
   // The samples in a journal name a robot by its number.

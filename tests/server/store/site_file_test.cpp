@@ -90,6 +90,27 @@ TEST_F(SiteFile, EveryRecordComesBackWithTheSameBytes) {
   EXPECT_EQ((*checkpoint)->bytes, "the state of session 2");
 }
 
+// What smoothing jobs have measured goes with its session; the session in which it was looked for may be gone.
+TEST_F(SiteFile, WhatWasMeasuredBetweenSessionsComesWithThem) {
+  ASSERT_TRUE(store_->Commit({.removed = {},
+                              .put = {{{RecordKind::kRelations, 2, 1}, "measured"},
+                                      {{RecordKind::kRelations, 2, 9}, "of one that is gone"}}}));
+  ASSERT_TRUE(WriteSiteFile(*store_, "lab", path_));
+  const auto into = MemoryStore();
+  ImportOptions options;
+  options.first_session = 21;
+  ASSERT_TRUE(ImportSite(*into, path_, options));
+  std::map<std::uint64_t, std::string> read;
+  ASSERT_TRUE(
+      into->Read({.kind = RecordKind::kRelations, .owner = 22}, [&](std::uint64_t number, std::string_view bytes) {
+        read[number] = bytes;
+        return Result<void>{};
+      }));
+  EXPECT_EQ(read, (std::map<std::uint64_t, std::string>{{21, "measured"}, {24, "of one that is gone"}}));
+  ASSERT_TRUE(DeleteSession(*into, "lab", 22));
+  EXPECT_TRUE(into->Owners(RecordKind::kRelations)->empty());
+}
+
 TEST_F(SiteFile, HoldsNothingOfAnotherSite) {
   Put(*store_, {.name = "hall", .first_session = 11, .job = 7});
   const std::string before = BytesAt(path_);

@@ -114,6 +114,8 @@ TEST(MergeSites, ATransformMovesWhatHasBeenDrawnAndWhereSessionsBegin) {
   const StampedPose& pose = versions.at(4).smoothed.at("r11").path->front();
   EXPECT_NEAR(pose.T_map_robot.x, -1.0, 1e-12);
   EXPECT_NEAR(versions.at(4).smoothed.at("r1").path->front().T_map_robot.x, 1.0, 0.0);
+  EXPECT_NEAR(lab->jobs.at(4).job.places.at(0).T_map_robot.x, -1.0, 1e-12);
+  EXPECT_EQ(lab->jobs.at(1).job.places.at(0).T_map_robot.x, 1.0);
 }
 
 TEST(MergeSites, EditsOfBothStayWhereTheyAreInTheBuilding) {
@@ -136,6 +138,26 @@ TEST(MergeSites, EditsOfBothStayWhereTheyAreInTheBuilding) {
   EXPECT_EQ(lab->site.edits[1].note, "hall");
   EXPECT_NEAR(lab->site.edits[1].points_map[1].x(), 1.0, 1e-12);
   EXPECT_NEAR(lab->site.edits[1].points_map[1].y(), 2.5, 1e-12);
+}
+
+TEST(MergeSites, TheFrameOfTheBuildingIsThatOfTheSiteThatStays) {
+  for (const bool lab_has_one : {true, false}) {
+    const auto store = MemoryStore();
+    Put(*store, {.name = "lab"});
+    Put(*store, {.name = "hall", .first_session = 11, .job = 4});
+    for (const char* const name : {"lab", "hall"}) {
+      if (!lab_has_one && name == std::string("lab")) continue;
+      StoredSite site = ReadSite(*store, name)->site;
+      site.edits = {{.id = 1, .kind = MapEditKind::kOrigin, .points_map = {{3, 4}, {4, 4}}, .note = name}};
+      site.edits_version = 1;
+      ASSERT_TRUE(store->Commit({.removed = {}, .put = {{{RecordKind::kSite, HashName(name), 0}, BytesOf(site)}}}));
+    }
+    ASSERT_TRUE(MergeSites(*store, "lab", "hall", {1.0, 0.5, kQuarterTurn}));
+    const auto lab = ReadSite(*store, "lab");
+    ASSERT_TRUE(lab);
+    ASSERT_EQ(lab->site.edits.size(), 1U);
+    EXPECT_EQ(lab->site.edits[0].note, lab_has_one ? "lab" : "hall");
+  }
 }
 
 TEST(MergeSites, EditsThatASplitLeftInBothPartsAreThereOnceAgain) {

@@ -91,6 +91,8 @@ inline RecordChanges RecordsOf(const SampleSite& sample) {
   job.job.site = sample.name;
   job.job.state = JobState::kSucceeded;
   job.job.map_version = 2;
+  job.job.robot = "r" + std::to_string(sample.first_session);
+  job.job.places = {{100, {1.0, 2.0, 0.5}, 1.0}};
   put({RecordKind::kJob, sample.job, 0}, BytesOf(job));
   put({RecordKind::kSite, id, 0}, BytesOf(site));
   return changes;

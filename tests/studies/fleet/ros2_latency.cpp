@@ -50,7 +50,8 @@ class Waiting {
   std::vector<double> latency_ms_ CAIRN_GUARDED_BY(mutex_);
 };
 
-// A fleet as one of the doors sees it.
+// A fleet as one of the doors sees it. Each robot has a site of its own: in a site with a map it would not be localized
+// before a job has joined it, and until then ROS 2 gets no pose of it.
 class Door {
  public:
   virtual ~Door() = default;
@@ -64,7 +65,7 @@ class NativeDoor final : public Door {
     for (int robot = 0; robot < kRobots; ++robot) {
       SessionRequest request;
       request.robot = prefix + std::to_string(robot);
-      request.site = prefix;
+      request.site = request.robot;
       request.sensors = {"scan"};
       client::RobotClient::Callbacks callbacks;
       callbacks.pose = [&waiting, robot](const PoseReport& pose) { waiting.Came(robot, pose.stamp); };
@@ -91,7 +92,8 @@ class Ros2Side final : public Door {
   Ros2Side(const std::string& prefix, Waiting& waiting)
       : bus_(Must(ros2::Bus::Create(NativeDoor::Wire(), "cairn-study-ros2"))) {
     for (int robot = 0; robot < kRobots; ++robot) {
-      const std::string in = "rt/" + prefix + std::to_string(robot) + "/";
+      const std::string name = prefix + std::to_string(robot);
+      const std::string in = "rt/" + name + "/" + name + "/";  // The rule in StudyRos2Latency: /{site}/{robot}.
       robots_.push_back({Must(bus_->Advertise<ros2::LaserScan>(in + "scan", {true, false, 10})),
                          Must(bus_->Advertise<ros2::Odometry>(in + "odom", {true, false, 10})),
                          Must(bus_->Advertise<ros2::Transforms>(in + "tf_static", {true, true, 1})), false});
@@ -202,7 +204,8 @@ void Add(Drive& sum, Drive&& more) {
 void StudyRos2Latency(StudyContext& context) {
   Report& report = context.report;
   report.Heading("Scan published to pose received, through the native door and through that for ROS 2");
-  const LiveServer server({"--set", "ros2.enabled=true", "--set", "ros2.domain=" + std::to_string(test::TestDomain())});
+  const LiveServer server({"--set", "ros2.enabled=true", "--set", "ros2.domain=" + std::to_string(test::TestDomain()),
+                           "--set", "ros2.namespaces=/{site}/{robot}"});
   const int rounds = context.Pick(4, 1);
   const double seconds = context.Pick(30.0, 5.0);
   Drive native, ros2;

@@ -1,6 +1,7 @@
 // cairn-study furniture: furniture is moved between two runs. How often must a robot of today pass the place where a
 // piece stood until the joint map does not show it any more, and is what was brought there shown? With one and with
-// several runs before; and, for comparison, if the runs before counted as much as the one of today.
+// several runs before; and, for comparison, if the runs before counted as much as the one of today. Then doors that
+// open and close (doors.cpp). --only moved, --only doors: one part.
 #include "client/sim/furniture.h"
 
 #include <algorithm>
@@ -17,6 +18,7 @@
 #include "server/maps/joint_map.h"
 #include "server/maps/maps_options.h"
 #include "server/slam/scan_pipeline.h"
+#include "tests/studies/furniture/doors.h"
 #include "tests/studies/logs.h"
 #include "tests/studies/study.h"
 
@@ -170,7 +172,7 @@ std::vector<Place> Apart(const std::vector<sim::Post>& here, const std::vector<s
   return apart;
 }
 
-void StudyFurniture(StudyContext& context) {
+void StudyMovedFurniture(StudyContext& context) {
   Report& report = context.report;
   report.Heading("Furniture that was moved between two runs");
   slam::MapperOptions options;
@@ -214,7 +216,13 @@ void StudyFurniture(StudyContext& context) {
   report.Add(table, "furniture");
 }
 
-const Registration kFurniture("furniture", "furniture that was moved between two runs: how soon the map shows it",
+void StudyFurniture(StudyContext& context) {
+  if (context.Wants("moved")) StudyMovedFurniture(context);
+  if (context.Wants("doors")) StudyDoors(context);
+}
+
+const Registration kFurniture("furniture",
+                              "furniture that was moved between two runs, and doors: how soon the map shows it",
                               StudyFurniture);
 
 }  // namespace

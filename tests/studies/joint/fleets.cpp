@@ -1,6 +1,7 @@
 #include "tests/studies/joint/fleets.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <stdexcept>
@@ -16,7 +17,7 @@ namespace cairn::studies {
 namespace {
 
 constexpr int kRobots = 3;
-constexpr double kWrongM = 1.0;
+constexpr double kWrongM = 0.5, kWrongRad = 0.1;
 
 std::vector<slam::MapperSnapshot> Drive(sim::Fleet& fleet, double seconds, Stamp first_stamp,
                                         const slam::MapperOptions& options) {
@@ -58,7 +59,7 @@ std::vector<Pose2> TruthAt(const slam::MapperSnapshot& snapshot, const Trajector
 // How far keyframes of one robot are from their true places, seen from those of others where these have been as well:
 // elsewhere each drifts by itself.
 struct Distance {
-  double sum_m = 0.0;
+  double sum_m = 0.0, sum_rad = 0.0;
   int compared = 0;
 
   void Add(const std::vector<Pose2>& path_a, const std::vector<Pose2>& truth_a, const std::vector<Pose2>& path_b,
@@ -70,13 +71,17 @@ struct Distance {
       if (away(truth_a[nearest]) > kNearM) continue;
       ++compared;
       const Pose2 truth = Between(truth_a[nearest], truth_b[k]);
-      sum_m += (Between(path_a[nearest], path_b[k]).translation() - truth.translation()).norm();
+      const Pose2 seen = Between(path_a[nearest], path_b[k]);
+      sum_m += (seen.translation() - truth.translation()).norm();
+      sum_rad += std::abs(WrapAngle(seen.theta - truth.theta));
     }
   }
   // Robots that are joined without having been at one place are at a wrong one.
   [[nodiscard]] double mean_m() const {
     return compared > 0 ? sum_m / compared : std::numeric_limits<double>::infinity();
   }
+  [[nodiscard]] double mean_rad() const { return compared > 0 ? sum_rad / compared : 0.0; }
+  [[nodiscard]] bool IsWrong() const { return mean_m() > kWrongM || mean_rad() > kWrongRad; }
 };
 
 }  // namespace
@@ -111,8 +116,10 @@ FleetJoin JoinFleet(const ConsistencyDrive& drive, const slam::MapperOptions& op
     for (std::size_t other = 0; other < smoothed->size(); ++other)
       if (other != i && (*smoothed)[other].frame == session.frame)
         distance.Add((*smoothed)[other].path, truths[other], session.path, truths[i]);
-    result.wrong += distance.mean_m() > kWrongM ? 1 : 0;
-    if (distance.mean_m() <= kWrongM) sum_m += distance.mean_m();
+    result.wrong += distance.IsWrong() ? 1 : 0;
+    if (!distance.IsWrong()) sum_m += distance.mean_m();
+    result.most_m = std::max(result.most_m, distance.mean_m());
+    result.most_rad = std::max(result.most_rad, distance.mean_rad());
   }
   result.error_m = sum_m / std::max(1, result.joined - result.wrong);
   return result;

@@ -11,9 +11,10 @@ namespace cairn::studies {
 struct FleetJoin {
   int robots = 0;
   int joined = 0;  // To another robot's frame, or with others in their own.
-  // Of these: more than a metre from the true place, seen from the others where these have been.
+  // Of these: more than 0.5 m or 0.1 rad from the true place, seen from the others where these have been.
   int wrong = 0;
-  double error_m = 0.0;  // Mean distance of those that are not wrong.
+  double error_m = 0.0;                 // Mean distance of those that are not wrong.
+  double most_m = 0.0, most_rad = 0.0;  // Of the joined robot that is farthest from its place, and most turned.
 };
 
 // Three robots drive through a world.

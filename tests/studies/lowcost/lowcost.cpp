@@ -257,6 +257,7 @@ void RunLowcost(StudyContext& context) {
   if (context.Wants("lidars")) RunLidars(context);
   if (context.Wants("rolling")) RunRolling(context);
   if (context.Wants("unknown")) RunUnknown(context);
+  if (context.Wants("learning")) RunLearning(context);
 }
 
 const Registration kRegistered{

@@ -29,5 +29,7 @@ struct Mapped {
 
 // The part of the study on real logs.
 void RunLowcostLogs(StudyContext& context);
+// Robots with wrong wheels and late scans, which the estimator learns while they drive.
+void RunLearning(StudyContext& context);
 
 }  // namespace cairn::studies

@@ -1,10 +1,11 @@
 // cairn-study moved follows robots that nobody watched for a while: how many poses are called localized at a wrong
 // place, how many robots are found again, and after which time and way. --only constants: the same with each constant
-// of the recovery halved and doubled.
+// of the recovery halved and doubled. --only elsewhere: robots carried to where only others have mapped (elsewhere.h).
 #include <algorithm>
 #include <map>
 
 #include "tests/server/slam/moved_sweep.h"
+#include "tests/studies/moved/elsewhere.h"
 #include "tests/studies/sensitivity/constants.h"
 #include "tests/studies/study.h"
 
@@ -87,6 +88,7 @@ void StudyConstants(StudyContext& context) {
 
 void StudyMoved(StudyContext& context) {
   if (context.only == "constants") return StudyConstants(context);
+  if (context.only == "elsewhere") return StudyElsewhere(context);
   Report& report = context.report;
   std::map<std::string, Tally> by_kind, by_world, all;
   bool stood_still = true;
@@ -115,6 +117,7 @@ void StudyMoved(StudyContext& context) {
   report.Expect(2 * all["all"].found_s.size() > static_cast<std::size_t>(all["all"].cases),
                 "fewer than half of the robots were found again");
   report.Expect(stood_still, "a robot that stood still was lost");
+  if (context.only.empty()) StudyElsewhere(context);
 }
 
 const Registration kRegistered{"moved", "robots that nobody watched for a while: never localized at a wrong place",

@@ -1,7 +1,7 @@
 // cairn-study starts: robots that are told a wrong place where they start, in a map that others have made. After which
 // way the map contradicts what such a robot draws, and whether it ever contradicts one whose start is as exact as a
-// person says it. Through the estimator and the comparison of the server, without a server. --runs: starts for each
-// robot and kind (10).
+// person says it. Through the estimator, the comparison and the judgement of the server (jobs/start_judgement.h),
+// without a server. --runs: starts for each robot and kind (10).
 #include <cmath>
 #include <map>
 #include <memory>
@@ -14,7 +14,7 @@
 
 #include "client/sim/fleet.h"
 #include "client/sim/shipped_worlds.h"
-#include "server/maps/grid_agreement.h"
+#include "server/jobs/start_judgement.h"
 #include "server/maps/layer_sum.h"
 #include "server/slam/scan_pipeline.h"
 #include "tests/studies/study.h"
@@ -24,9 +24,9 @@ namespace {
 
 using server::CompareGrids;
 using server::GridAgreement;
+using server::StartJudgement;
 using slam::OccupancyGrid;
 
-constexpr double kFirstM = 1.0, kStepM = 1.0, kLastM = 8.0;
 constexpr double kWantedM = 5.0;  // A wrong start is to be noticed within this way.
 
 sim::Fleet MakeFleet(const std::string& world, std::uint64_t seed) {
@@ -53,16 +53,19 @@ RobotRecords Drive(sim::Fleet& fleet, double seconds) {
   }
 }
 
-// Calls visit(way_m, pose, grid) after every metre from kFirstM to kLastM, and at the end (way_m < 0).
+// Calls visit(way_m, pose, grid) where the server would compare, as far as `last_m`, and at the end (way_m < 0). Where
+// the robot is not localized after a metre, nothing is compared.
 template <typename Visit>
 void Draw(const std::vector<LogRecord>& records, const Pose2& T_map_robot_start, double last_m, const Visit& visit) {
-  double way_m = 0.0, next_m = kFirstM;
+  double way_m = 0.0, next_m = StartJudgement::kEveryM;
+  bool localized = false;
   std::optional<Pose2> last;
   slam::MapperOptions options;
   options.filter.particles = 20;
   slam::ScanPipeline pipeline(options, T_map_robot_start, slam::SerialFor,
                               {.used =
                                    [&](const Scan&, const slam::ScanOutcome& outcome) {
+                                     localized = outcome.localized;
                                      if (!outcome.keyframe) return;
                                      if (last)
                                        way_m += (outcome.T_map_robot.translation() - last->translation()).norm();
@@ -75,7 +78,8 @@ void Draw(const std::vector<LogRecord>& records, const Pose2& T_map_robot_start,
     } else {
       pipeline.Add(std::get<Odometry>(record));
     }
-    for (; way_m >= next_m && next_m <= last_m; next_m += kStepM) visit(next_m, *last, pipeline.mapper().ShareGrid());
+    for (; way_m >= next_m && next_m <= last_m; next_m += StartJudgement::kEveryM)
+      if (localized) visit(next_m, *last, pipeline.mapper().ShareGrid());
     if (way_m > last_m) break;
   }
   visit(-1.0, last.value_or(T_map_robot_start), pipeline.mapper().ShareGrid());
@@ -142,11 +146,12 @@ void RunStarts(StudyContext& context) {
           const Pose2 said{start.x + away_m * std::cos(direction), start.y + away_m * std::sin(direction),
                            WrapAngle(start.theta + turn)};
           std::optional<double> refused_m;
+          StartJudgement judgement;
           GridAgreement last;
-          Draw(first[robot], said, kLastM,
+          Draw(first[robot], said, StartJudgement::kFirstM,
                [&](double way_m, const Pose2& T_map_robot, const OccupancyGrid::Chunks& grid) {
                  last = CompareGrids(grid, others, T_map_robot, slam::GridOptions{}.resolution_m);
-                 if (!refused_m && way_m >= 0.0 && last.Contradicts()) refused_m = way_m;
+                 if (way_m >= 0.0 && judgement.Refuses(last) && !refused_m) refused_m = way_m;
                });
           ++count.starts;
           if (last.compared < 100) continue;

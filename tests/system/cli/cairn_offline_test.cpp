@@ -53,6 +53,30 @@ TEST_F(CairnOffline, SameInputAndSeedGiveTheSameBytesWhateverTheThreads) {
   }
 }
 
+// What the estimator knows at the end of the log: another pose for each scan than the one of its time, where the path
+// has been corrected since; and it does not need a smoothing, nor does a smoothing change it.
+TEST_F(CairnOffline, WritesThePathAsItIsKnownAtTheEndOfTheLog) {
+  const TempDirectory out;
+  const auto run =
+      Run({Log(), "--trajectory", (out / "t.tum").string(), "--known-trajectory", (out / "k.tum").string()});
+  ASSERT_EQ(run.exit_code, 0) << run.output;
+  const auto online = ReadTum((out / "t.tum").string()), known = ReadTum((out / "k.tum").string());
+  ASSERT_TRUE(online && known);
+  ASSERT_EQ(known->size(), online->size());
+  for (std::size_t i = 0; i < known->size(); ++i) {
+    EXPECT_EQ((*known)[i].stamp, (*online)[i].stamp);
+    EXPECT_LT(Between((*online)[i].T_map_robot, (*known)[i].T_map_robot).translation().norm(), 0.2);
+  }
+  const auto smoothing = Run({Log(), "--smooth", "--known-trajectory", (out / "again.tum").string()});
+  ASSERT_EQ(smoothing.exit_code, 0) << smoothing.output;
+  EXPECT_EQ(out.Read("again.tum"), out.Read("k.tum"));
+  const auto two = Run({Log(), Log(), "--start", "0,0,0", "--start", "0,0,0", "--known-trajectory",
+                        (out / "a.tum").string(), "--known-trajectory", (out / "b.tum").string()});
+  ASSERT_EQ(two.exit_code, 0) << two.output;
+  EXPECT_EQ(out.Read("a.tum"), out.Read("k.tum"));
+  EXPECT_EQ(out.Read("b.tum"), out.Read("k.tum"));
+}
+
 // The drive of a log once more, as a bag and as a log. The angles of beams are rounded to floats, as a
 // bag has them.
 void WriteAgain(const std::string& drive, const std::filesystem::path& log, const std::filesystem::path& bag) {
@@ -123,6 +147,31 @@ TEST_F(CairnOffline, ABagGivesThePosesOfTheLog) {
   EXPECT_LT(farthest_m, 0.01);
 }
 
+// In the map of the same drive the robot is where it was, and nothing is mapped.
+TEST_F(CairnOffline, ARobotIsOnlyLocalisedInAKnownMap) {
+  const TempDirectory out;
+  const std::string map = (out / "map.yaml").string();
+  const auto mapped = Run({Log(), "--trajectory", (out / "mapped.tum").string(), "--map", map});
+  ASSERT_EQ(mapped.exit_code, 0) << mapped.output;
+  const auto localised =
+      Run({Log(), "--known-map", map, "--start", "0,0,0", "--trajectory", (out / "localised.tum").string(), "--json"});
+  ASSERT_EQ(localised.exit_code, 0) << localised.output;
+  EXPECT_EQ(nlohmann::json::parse(localised.output)["keyframes"], 0);
+  const auto path = ReadTum(out / "mapped.tum"), known = ReadTum(out / "localised.tum");
+  ASSERT_TRUE(path && known);
+  EXPECT_GT(known->size(), path->size() / 4);
+  for (const StampedPose& pose : *known) {
+    const auto same = std::ranges::find(*path, pose.stamp, &StampedPose::stamp);
+    ASSERT_NE(same, path->end());
+    EXPECT_LT((same->T_map_robot.translation() - pose.T_map_robot.translation()).norm(), 0.2) << pose.stamp;
+  }
+  EXPECT_EQ(Run({Log(), "--known-map", map, "--map", map}).exit_code, 2);
+  EXPECT_EQ(Run({Log(), Log(), "--known-map", map}).exit_code, 2);
+  const auto missing = Run({Log(), "--known-map", (out / "nowhere.yaml").string()});
+  EXPECT_EQ(missing.exit_code, 1);
+  EXPECT_NE(missing.output.find("nowhere.yaml"), std::string::npos) << missing.output;
+}
+
 // The same drive as two robots, the second of which is said to have started a little beside the first.
 TEST_F(CairnOffline, SeveralRobotsAreSmoothedTogetherToTheSameBytesEveryTime) {
   const std::vector<std::string> names{"a.tum", "b.tum", "map.png"};
@@ -169,6 +218,7 @@ TEST_F(CairnOffline, ARobotThatIsNotJoinedIsNotDrawnIntoTheOthersMap) {
 TEST_F(CairnOffline, SaysWhichOptionsEachOfSeveralLogsNeeds) {
   EXPECT_EQ(Run({Log(), Log(), "--start", "0,0,0"}).exit_code, 2);
   EXPECT_EQ(Run({Log(), Log(), "--smoothed-trajectory", "a.tum"}).exit_code, 2);
+  EXPECT_EQ(Run({Log(), Log(), "--known-trajectory", "a.tum"}).exit_code, 2);
   EXPECT_EQ(Run({Log(), Log(), "--map", "map.yaml"}).exit_code, 2);
   EXPECT_EQ(Run({Log(), "--start", "somewhere"}).exit_code, 2);
 }

@@ -2,8 +2,13 @@
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <thread>
+#include <utility>
 
+#include "client/cli/recording_file.h"
+#include "common/sensor/log_reader.h"
+#include "tests/must.h"
 #include "tests/system/cli/cairn_program.h"
 
 namespace cairn::client {
@@ -21,6 +26,55 @@ TEST_F(CairnProgram, AReplayAsFastAsTheServerTakesItLosesNothing) {
   EXPECT_EQ(account["dropped_total"], 0);
   EXPECT_EQ(account["unexplained"], 0);
   EXPECT_EQ(MustJson({"robot", "relocalise", "r1", "--here", "1.2,8.2,90deg"})["accepted"], true);
+  // Without a pose a job looks for it, and the command waits for the job.
+  const auto job = MustJson({"robot", "relocalise", "r1"});
+  EXPECT_EQ(job["kind"], "relocalise");
+  EXPECT_EQ(job["robot"], "r1");
+  EXPECT_EQ(job["state"], "succeeded") << job["message"];
+  EXPECT_LE(job["places"].size(), 8U);
+  EXPECT_LE(job["ambiguity"], 1.0);
+}
+
+// Here the second lidar measures 20 ms before the first, and not at the very beginning, where there is no odometry yet.
+TEST_F(CairnProgram, AReplayOfSeveralLidarsSendsEachAsASensorOfTheRobot) {
+  ASSERT_NO_FATAL_FAILURE(StartServer());
+  WriteLog("5");
+  const auto file = test::Must(RecordingFile::Create(File("two.mcap"), false));
+  std::int64_t time = 1;
+  bool began = false;
+  const auto add = [&](LogRecord&& record) {
+    ++time;
+    if (const auto* const odometry = std::get_if<Odometry>(&record)) {
+      test::Must(file->Add("r7", 1, *odometry, time));
+      return true;
+    }
+    Scan scan = std::get<Scan>(std::move(record));
+    test::Must(file->Add("r7", "front", 1, scan, time));
+    scan.stamp -= 20'000'000;
+    if (std::exchange(began, true)) test::Must(file->Add("r7", "rear", 1, scan, time));
+    return true;
+  };
+  ASSERT_EQ(test::Must(ReadLog(File("robot1.log"), {}, add)).scans, 50);
+  test::Must(file->Finish());
+  const std::vector<std::string> replay = {"replay", File("two.mcap"), "--site", "hall", "--robot", "r1", "--fast"};
+  const auto account = MustJson(replay);
+  EXPECT_EQ(account["sent"], 99);
+  // On a busy machine one lidar may be late by more than the 0.2 s for which the other one waits.
+  EXPECT_EQ(account["used"].get<int>() + account["dropped_total"].get<int>(), 99) << account;
+  EXPECT_GT(account["used"].get<int>(), 60) << account;
+  EXPECT_EQ(account["unexplained"], 0);
+  std::map<std::string, int> received;
+  const auto status = MustJson({"status", "r1"});
+  for (const auto& ledger : status["robots"][0]["ledgers"])
+    received[ledger.value("sensor", "")] = ledger.value("received", 0);
+  EXPECT_EQ(received["front"], 50);
+  EXPECT_EQ(received["rear"], 49);
+  auto named = replay;
+  named.insert(named.end(), {"--sensor", "laser"});
+  EXPECT_THAT(Cairn(named).err, HasSubstr("--sensor names one lidar"));
+  const Outcome checked = Cairn({"check-log", File("two.mcap")});
+  EXPECT_THAT(checked.out, HasSubstr("/robots/r7/scan/front\nscans     50 "));
+  EXPECT_THAT(checked.out, HasSubstr("/robots/r7/scan/rear\nscans     49 "));
 }
 
 TEST_F(CairnProgram, AReplayUsesItsSpillFileAndNeverOneThatIsThere) {

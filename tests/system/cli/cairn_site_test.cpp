@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <filesystem>
@@ -13,7 +14,9 @@
 #include <sstream>
 
 #include "client/cli/program.h"
+#include "common/map/occupancy_image.h"
 #include "tests/child_process.h"
+#include "tests/eventually.h"
 #include "tests/loopback.h"
 #include "tests/temp_directory.h"
 
@@ -130,6 +133,48 @@ TEST_F(CairnSite, IsSavedDeletedLoadedAndMovedToAnotherServer) {
   const auto job = MustJson({"job", "smooth", "--site", "annex", "--wait"});
   EXPECT_EQ(job["state"], "succeeded");
   StopServer();
+}
+
+// Cell by cell, in the frame of the map that was exported.
+TEST_F(CairnSite, AMapOfNav2IsASiteAgain) {
+  ASSERT_NO_FATAL_FAILURE(StartServer("a"));
+  Stream("hall", "robot");
+  const std::vector<std::string> to_file = {"map", "export",          "--site", "hall",
+                                            "-o",  File("hall.yaml"), "--mode", "raw"};
+  ASSERT_TRUE(test::Eventually([&] { return Cairn(to_file).code == ExitCode::kOk; }));  // At first there is no tile.
+  StopServer();
+  const auto imported = MustJson({"map", "import", File("hall.yaml"), "--site", "copy", "-o", File("copy.site")});
+  EXPECT_EQ(imported["site"], "copy");
+  EXPECT_GT(imported["tiles"], 0);
+  MustJson({"site", "import", File("copy.site"), "--state", File("b")});
+  ASSERT_NO_FATAL_FAILURE(StartServer("b"));
+  const std::vector<std::string> again_to_file = {"map", "export",           "--site", "copy",
+                                                  "-o",  File("again.yaml"), "--mode", "raw"};
+  ASSERT_TRUE(test::Eventually([&] { return Cairn(again_to_file).code == ExitCode::kOk; }));
+  StopServer();
+  auto hall = LoadMapYaml(File("hall.yaml"));
+  const auto again = LoadMapYaml(File("again.yaml"));
+  ASSERT_TRUE(hall && again);
+  for (std::uint8_t& cell : hall->cells) {
+    // An imported cell is as sure as one that a single robot has drawn.
+    if (cell != kUnknownCell) cell = std::clamp<std::uint8_t>(cell, 2, 98);
+  }
+  EXPECT_TRUE(again->cells == hall->cells);
+  EXPECT_EQ(again->width, hall->width);
+  EXPECT_EQ(again->T_map_origin, hall->T_map_origin);
+
+  // What cannot be read makes no file.
+  const std::string image = directory_.Read("hall.png");
+  static_cast<void>(directory_.Write("hall.png", image.substr(0, image.size() / 2)));
+  const SiteOutcome damaged = Cairn({"map", "import", File("hall.yaml"), "-o", File("damaged.site")});
+  EXPECT_EQ(damaged.code, ExitCode::kFailed);
+  EXPECT_THAT(damaged.err, HasSubstr("hall.png"));
+  const SiteOutcome missing = Cairn({"map", "import", File("nowhere.yaml"), "-o", File("damaged.site")});
+  EXPECT_EQ(missing.code, ExitCode::kFailed);
+  EXPECT_THAT(missing.err, HasSubstr("nowhere.yaml"));
+  EXPECT_EQ(Cairn({"map", "import", File("hall.yaml"), "--site", "a/b", "-o", File("damaged.site")}).code,
+            ExitCode::kFailed);
+  EXPECT_FALSE(std::filesystem::exists(File("damaged.site")));
 }
 
 TEST_F(CairnSite, FilesAreMergedSplitAndShortened) {

@@ -160,6 +160,20 @@ TEST_F(CairnProgram, WhatPeopleSayAboutAMapIsInItsFilesUntilItIsTakenBack) {
   EXPECT_EQ(std::count(mask->cells.begin(), mask->cells.end(), 100), 200) << "a square metre has 400 cells";
   EXPECT_EQ(cell_at("mask.yaml", 2.5, 8.25), 100);
 
+  // The building's x axis is the map's y axis.
+  const std::vector<std::string> in_building = {"map", "export",           "--site",  "hall",
+                                                "-o",  File("built.yaml"), "--frame", "building"};
+  EXPECT_EQ(Cairn(in_building).code, ExitCode::kFailed) << "nobody has said where the building is";
+  const auto origin = MustJson({"map", "edit", "origin", "--site", "hall", "--at", "1,8", "--x-axis", "1,9"});
+  MustJson(in_building);
+  EXPECT_EQ(cell_at("built.yaml", kY_m - 8.0, 1.0 - kX_m), 100) << "the wall";
+  const auto path = MustJson({"path", "robot1"})["path"],
+             moved = MustJson({"path", "robot1", "--frame", "building"})["path"];
+  ASSERT_FALSE(path.empty());
+  EXPECT_NEAR(moved[0]["pose"]["x"].get<double>(), path[0]["pose"]["y"].get<double>() - 8.0, 1e-6);
+  EXPECT_NEAR(moved[0]["pose"]["y"].get<double>(), 1.0 - path[0]["pose"]["x"].get<double>(), 1e-6);
+  MustJson({"map", "edit", "remove", "--site", "hall", "--id", std::to_string(origin["id"].get<int>())});
+
   const auto listed = MustJson({"map", "edit", "list", "--site", "hall"})["edits"];
   ASSERT_EQ(listed.size(), 2u);
   EXPECT_EQ(listed[0]["note"], "glass");

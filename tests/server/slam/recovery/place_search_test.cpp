@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <memory>
+#include <optional>
 #include <random>
 #include <vector>
 
@@ -158,12 +160,13 @@ class Lost : public ::testing::Test {
     return {{x, 0, 0}, {5, 5, kPi / 2}, covariance};
   }
   // The robot stands at `truth`, `odometry` beyond the odometry of KnownAt.
-  std::optional<Recovery::Found> Take(Recovery& recovery, const Pose2& truth, const Pose2& odometry) {
+  std::optional<Recovery::Found> Take(Recovery& recovery, const Pose2& truth, const Pose2& odometry,
+                                      const SearchedMap& own = MapOfHall().searched) {
     const RecentScan scan = ScanAt(world_, truth, T_track_world_, 0.0, rng_);
     TrackStep step;
     step.T_track_robot = scan.T_track_robot;
     step.matched = true;
-    return recovery.Take({scan.scan, KnownAt(0).T_odom_robot * odometry}, step, scan.points, MapOfHall().searched);
+    return recovery.Take({scan.scan, KnownAt(0).T_odom_robot * odometry}, step, scan.points, own);
   }
 
   const test::World world_ = Hall();
@@ -242,6 +245,60 @@ TEST_F(Lost, WhereItIsSaidToBeOneSearchIsEnough) {
       EXPECT_NEAR(found->place.T_map_robot.x, 8.0, 0.05);
     }
   }
+}
+
+// What a job finds is a place in another map: here the same hall, 50 m away. All scans have the same stamp, so the job
+// has seen the first one.
+class Suggested : public Lost {
+ protected:
+  Suggested() {
+    nothing_.Add(world_, {30, 0, 0}, {30, 0, 0}, false);
+    for (double x = 0.0; x < 38.0; x += 0.25) there_.Add(world_, {x, 0, 0}, {x, 50, 0}, true);
+    recovery_.Begin(KnownAt(30), false);
+  }
+  std::optional<Recovery::Found> DriveTo(double way_m, const Map& own) {
+    return Take(recovery_, {8.0 + way_m, 0, 0}, {way_m, 0, 0}, own.searched);
+  }
+  bool Suggest(const Map& map) {
+    const std::shared_ptr<const SearchedMap> not_owned(std::shared_ptr<void>(), &map.searched);
+    return recovery_.Suggest(recovery_.recent().front().scan->stamp, {8, 50, 0}, not_owned);
+  }
+
+  Map nothing_{world_, 0.0, 0.0}, there_{world_, 0.0, 0.0};
+  Recovery recovery_ = Make();
+};
+
+TEST_F(Suggested, APlaceIsConfirmedInTheMapOfTheJobAfterSomeWay) {
+  ASSERT_FALSE(DriveTo(0.0, nothing_));
+  ASSERT_TRUE(Suggest(there_));
+  std::optional<double> found_m;
+  for (double way_m = 0.25; way_m < 8.0 && !found_m; way_m += 0.25) {
+    const auto found = DriveTo(way_m, nothing_);
+    if (!found) continue;
+    found_m = way_m;
+    EXPECT_NEAR(found->place.T_map_robot.x, 8.0 + way_m, 0.05);
+    EXPECT_NEAR(found->place.T_map_robot.y, 50.0, 0.05);
+  }
+  ASSERT_TRUE(found_m);
+  EXPECT_GE(*found_m, LoopOptions{}.confirm_after_m);
+}
+
+TEST_F(Suggested, APlaceThatTheOwnMapContradictsCountsNoMore) {
+  ASSERT_FALSE(DriveTo(0.0, nothing_));
+  recovery_.ForgetMap();  // Its own map is that of the hall from now on.
+  ASSERT_TRUE(Suggest(nothing_));
+  bool found = false;
+  for (double way_m = 0.25; way_m < 15.0 && !found; way_m += 0.25) found = DriveTo(way_m, MapOfHall()).has_value();
+  EXPECT_TRUE(found);
+  EXPECT_FALSE(recovery_.suggested());
+}
+
+TEST_F(Suggested, APlaceIsNotTakenWhereTheRobotHasJustFoundAnother) {
+  for (double way_m = 0.0; way_m < 15.0 && recovery_.Unconfirmed().empty(); way_m += 0.25)
+    ASSERT_FALSE(DriveTo(way_m, MapOfHall()));
+  ASSERT_FALSE(recovery_.Unconfirmed().empty());
+  EXPECT_FALSE(Suggest(there_));
+  EXPECT_FALSE(recovery_.suggested());
 }
 
 TEST_F(Lost, OnlyPlacesThatAreTheSameConfirmEachOther) {

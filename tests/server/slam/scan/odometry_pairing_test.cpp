@@ -56,6 +56,47 @@ TEST(OdometryPairing, ALagIsTakenOutOfTheOdometry) {
   EXPECT_EQ(p.pairs[0].stamp, 2 * kSecond);
 }
 
+// The same for a lag that was learned meanwhile: it counts from the next scan on, and late odometry is still there.
+TEST(OdometryPairing, ALagThatWasLearnedCountsFromTheNextScanOn) {
+  Pairing p;
+  for (int i = 0; i <= 50; ++i) p.OdometryAt(kSecond + i * kSecond / 50, 0.02 * i);
+  p.ScanAt(2 * kSecond);
+  p.pairing.SetLag(0.25);
+  p.ScanAt(2 * kSecond + kSecond / 10);
+  ASSERT_EQ(p.pairs.size(), 2u);
+  EXPECT_NEAR(p.pairs[0].T_odom_robot.x, 1.0, 1e-12);
+  EXPECT_NEAR(p.pairs[1].T_odom_robot.x, 0.85, 1e-12);
+  EXPECT_EQ(p.pairs[1].stamp, 2 * kSecond + kSecond / 10);
+  // Earlier stamps of scans wait for odometry.
+  p.pairing.SetLag(-0.25);
+  p.ScanAt(2 * kSecond + 2 * kSecond / 10);
+  EXPECT_EQ(p.pairing.waiting(), 1u);
+  p.OdometryAt(2 * kSecond + 5 * kSecond / 10, 1.5);
+  ASSERT_EQ(p.pairs.size(), 3u);
+  EXPECT_NEAR(p.pairs[2].T_odom_robot.x, 1.45, 1e-12);
+}
+
+// Speeds come from dense odometry between the scans, and do not depend on how much of it has arrived after the scan.
+TEST(OdometryPairing, TheSpeedAtAScanComesFromDenseOdometryBetweenScans) {
+  for (const int late : {0, 3}) {
+    Pairing p;
+    for (int i = 0; i <= 40; ++i) {
+      p.OdometryAt(kSecond + i * kSecond / 20, i < 20 ? 0.0 : 0.05 * (i - 20));
+      if (i % 4 == late) p.ScanAt(kSecond + (i - late) * kSecond / 20);
+    }
+    ASSERT_GE(p.rates.size(), 9u);
+    EXPECT_EQ(p.rates[0], Pose2{});  // No scan before it.
+    EXPECT_NEAR(p.rates[4].x, 0.0, 1e-9);
+    EXPECT_NEAR(p.rates[6].x, 1.0, 1e-9);
+  }
+  Pairing alone;  // Odometry that comes with the scans.
+  for (int i = 0; i <= 40; ++i) {
+    alone.OdometryAt(kSecond + i * kSecond / 20, 0.05 * i);
+    alone.ScanAt(kSecond + i * kSecond / 20);
+  }
+  for (const Pose2& rate : alone.rates) EXPECT_EQ(rate, Pose2{});
+}
+
 TEST(OdometryPairing, WheelsAreCorrectedStepByStep) {
   PairingOptions options;
   options.wheels = {1.1, 0.5, 0.1};

@@ -14,6 +14,7 @@ struct Pairing {
       : pairing(options, {[this](PairedScan&& p) {
                             pairs.push_back({p.scan->stamp, p.T_odom_robot});
                             passages.push_back(p.passage);
+                            rates.push_back(p.rate);
                             grows &= pairs.size() == 1 || p.stamp > estimator_time;
                             estimator_time = p.stamp;
                           },
@@ -38,7 +39,8 @@ struct Pairing {
     bool operator==(const Paired&) const = default;
   };
   std::vector<Paired> pairs;
-  std::vector<Passage> passages;  // Of each pair.
+  std::vector<Passage> passages;  // Of each pair,
+  std::vector<Pose2> rates;       // and PairedScan::rate.
   std::vector<std::pair<Stamp, DropReason>> drops;
   bool grows = true;  // The estimator's time, from pair to pair.
   Stamp estimator_time = 0;

@@ -19,8 +19,8 @@ struct TwoPaths : ::testing::Test {
     const std::vector<Pose2> steps(40, Pose2{0.5, 0.0, 0.0});
     for (const Pose2& start : {Pose2{}, Pose2{7.0, 1.0, 0.5}, Pose2{-4.0, 2.0, 2.0}}) {
       drives.push_back(test::DriveThrough({}, {}, steps, start, 1, 0.0));
-      maps.push_back(std::make_unique<SessionMap>(drives.back().snapshot, drives.back().snapshot.full_path,
-                                                  SiteOptionsOf(MapperOptions{})));
+      maps.push_back(std::make_unique<SessionMap>(drives.size(), drives.back().snapshot,
+                                                  drives.back().snapshot.full_path, SiteOptionsOf(MapperOptions{})));
     }
   }
   SiteGraph Graph(std::vector<bool> start_known) {
@@ -123,8 +123,8 @@ TEST(SessionAgreement, IsNearlyCompleteAtTheTruePlaceAndPoorAtAWrongOne) {
   const test::World world = test::RingCorridor(true);
   const SiteOptions options = SiteOptionsOf(MapperOptions{});
   const RobotDrive drive = test::DriveRing(world, 0.0, 60.0, {}, 1), again = test::DriveRing(world, 0.0, 60.0, {}, 2);
-  const SessionMap a(drive.snapshot, drive.snapshot.full_path, options),
-      b(again.snapshot, again.snapshot.full_path, options);
+  const SessionMap a(1, drive.snapshot, drive.snapshot.full_path, options),
+      b(2, again.snapshot, again.snapshot.full_path, options);
   const auto agreement_at = [&](const Pose2& T_true_wrong) {
     PosePath path_a, path_b;
     for (const Pose2& pose : a.own_path()) path_a.Append(pose);

@@ -116,6 +116,50 @@ TEST_F(TwoRobots, TheWorkDoneOnlyGrows) {
   EXPECT_LT(Shares().back(), 1.0);
 }
 
+// The snapshot as it was after so many keyframes.
+MapperSnapshot FirstOf(MapperSnapshot snapshot, std::size_t keyframes) {
+  snapshot.keyframes.resize(keyframes);
+  snapshot.online_path.resize(keyframes);
+  snapshot.full_path.resize(keyframes);
+  return snapshot;
+}
+
+// A second job measures only what is new, and comes to the same result.
+TEST_F(TwoRobots, WhatAJobHasMeasuredTheNextOneKnows) {
+  const std::size_t before = Second().snapshot.keyframes.size() - 5;
+  const MapperSnapshot earlier = FirstOf(Second().snapshot, before);
+  RelationBook book;
+  const auto run = [&](const MapperSnapshot& second) {
+    book.BeginJob();
+    const std::vector<SiteSession> sessions{{First().snapshot, false, 4}, {second, false, 7}};
+    auto smoothed = SmoothSessions(
+        sessions, SiteOptionsOf(MapperOptions{}), [](double) { return true; }, SiteSearch::kAll, &book);
+    book.EndJob([](std::uint64_t) { return true; });
+    return *std::move(smoothed);
+  };
+  static_cast<void>(run(earlier));
+  const std::size_t measured = book.measured();
+  ASSERT_GT(measured, 50U);
+  const auto joined = run(Second().snapshot);
+  EXPECT_LT(book.measured(), measured / 10);
+  EXPECT_GT(book.reused(), measured / 2);
+  ASSERT_TRUE(joined[0].joined && joined[1].joined);
+  for (std::size_t k = 0; k < joined[1].path.size(); k += 10)
+    EXPECT_LT((joined[1].path[k].translation() - Together()[1].path[k].translation()).norm(), 0.15) << k;
+  static_cast<void>(run(Second().snapshot));
+  EXPECT_LE(book.measured(), 2U) << "nothing is new";
+}
+
+// A cancelled job has not worked in vain.
+TEST_F(TwoRobots, WhatACancelledJobHasMeasuredIsKept) {
+  RelationBook book;
+  const std::vector<SiteSession> sessions{{First().snapshot, false, 4}, {Second().snapshot, false, 7}};
+  EXPECT_FALSE(SmoothSessions(
+      sessions, SiteOptionsOf(MapperOptions{}), [&book](double) { return book.measured() < 3; }, SiteSearch::kAll,
+      &book));
+  EXPECT_GE(book.size(), 3U);
+}
+
 // Two wings of a building look alike. One robot has seen one of them, the other one both; it is the other one's own map
 // that tells that a wing is no proof.
 TEST(EqualWings, AreNoProofForWhoHasSeenBoth) {

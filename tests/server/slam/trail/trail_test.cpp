@@ -114,6 +114,28 @@ TEST(Trail, WhetherAKeyframeIsFartherFollowsTheDistancesAlsoLongAfterTheyWereCom
   }
 }
 
+// What an earlier job has found is no measurement for the next one, and does not pile up.
+TEST(Trail, AShapeIsKeptOnceAndIsNoMeasurement) {
+  Trail trail = Chain(10);
+  EXPECT_TRUE(trail.steps_of_shaped().empty());
+  const PoseRelation bent{0, 9, {17.0, 2.0, 0.1}, Eigen::Matrix3d::Identity(), true};
+  trail.SetShape({bent});
+  EXPECT_EQ(trail.relations().size(), 10U);
+  EXPECT_TRUE(KeepsShape(trail.relations().back()));
+  EXPECT_TRUE(trail.measured().empty()) << "no place was seen again";
+  EXPECT_EQ(trail.steps_of_shaped().size(), 9U);
+  EXPECT_DOUBLE_EQ(trail.distances_m()[0], 18.0) << "nor is it a short cut";
+  EXPECT_EQ(trail.RevisitsWithin(100.0, 18.0), 0U);
+  trail.SetShape({bent, {4, 9, {9.0, 0.0, 0.0}, Eigen::Matrix3d::Identity(), true}});
+  EXPECT_EQ(trail.relations().size(), 11U) << "in place of the one before";
+  trail.AddLoop({0, 5, {10.0, 0.0, 0.0}, PoseCovariance(0.1, 0.01), true});
+  EXPECT_EQ(trail.measured().size(), 10U);
+  EXPECT_TRUE(std::ranges::none_of(trail.measured(), KeepsShape));
+  EXPECT_TRUE(trail.steps_of_shaped().empty());
+  trail.SetShape({});
+  EXPECT_EQ(trail.relations().size(), 10U);
+}
+
 TEST(Trail, ARevisitIsALoopOfTheKeyframeThatSawIt) {
   Trail trail = Chain(10);
   trail.Append({std::make_shared<const Scan>(), {}}, {20.0, 0.0, 0.0}, {}, Eigen::Matrix3d::Zero(),

@@ -7,14 +7,14 @@
 
 #include "common/wire/ros2/bus.h"
 
-namespace cairn::server {
+namespace cairn::ros2 {
 
 class SampleNumbers {
  public:
   // A larger gap is no loss: the writer began anew, or wrote while nobody listened.
   static constexpr std::int64_t kMaxGap = 10'000;
 
-  [[nodiscard]] std::uint64_t Next(const ros2::Origin& origin) {
+  [[nodiscard]] std::uint64_t Next(const Origin& origin) {
     const std::int64_t ahead = origin.sequence - last_.sequence;
     const bool gap = last_.writer == origin.writer && ahead > 1 && ahead <= kMaxGap;
     number_ += gap ? static_cast<std::uint64_t>(ahead) : 1U;
@@ -25,8 +25,8 @@ class SampleNumbers {
   void Restart() { *this = {}; }
 
  private:
-  ros2::Origin last_;
+  Origin last_;
   std::uint64_t number_ = 0;
 };
 
-}  // namespace cairn::server
+}  // namespace cairn::ros2

@@ -1,0 +1,25 @@
+#include "client/cli/job_wait.h"
+
+#include <chrono>
+
+#include "client/cli/interrupt.h"
+#include "client/cli/progress_line.h"
+#include "client/cli/text_output.h"
+
+namespace cairn::client {
+
+Result<Job> WaitForEnd(Program& program, const Job& submitted) {
+  const auto start = std::chrono::steady_clock::now();
+  const auto seconds = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
+  ProgressLine progress(program.err(), ErrorIsTerminal(), program.options.json);
+  auto job = program.Ask([&](QueryClient& server) {
+    return server.WaitForJob(submitted.id, [&](const Job& now) {
+      progress.Show(seconds(), now.progress, FormatJob(now));
+      return !Interrupted();
+    });
+  });
+  if (job) progress.Finish(seconds(), job->progress, FormatJob(*job));
+  return job;
+}
+
+}  // namespace cairn::client

@@ -1,0 +1,34 @@
+// Whether fitting robots that said where they start to each other makes the map of their site better: how far it moves
+// what they have drawn, and how well what each has seen agrees with what the others have drawn, before and after. A
+// robot's own part of the map says nothing about that: it agrees with its own scans wherever it lies. Stateless,
+// deterministic.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "server/robots/robot_event.h"
+#include "server/slam/site/site_smoothing.h"
+
+namespace cairn::server {
+
+struct Alignment {
+  double moved_m = 0.0;    // The farthest that a keyframe moves.
+  double cell_m = 0.0;     // The side of the map's cells.
+  double before_m2 = 0.0;  // Disagreement of scans with the maps of others (slam/grid/disagreement.h).
+  double after_m2 = 0.0;
+  double agreement_before = 0.0;  // SmoothedSession, mean over the sessions.
+  double agreement = 0.0;
+
+  // It moves something by more than a cell, and nothing agrees worse.
+  [[nodiscard]] bool IsBetter() const;
+};
+
+// Of the sessions that are joined with others and whose starts are known. `go_on` is asked before each scan. Nothing:
+// it said no.
+[[nodiscard]] std::optional<Alignment> AlignmentOf(const std::vector<SessionMaterial>& material,
+                                                   const std::vector<slam::SmoothedSession>& joint,
+                                                   const std::function<bool()>& go_on);
+
+}  // namespace cairn::server

@@ -1,0 +1,55 @@
+// The places where a robot may be: what its filter believes, and what it, or a job, has found while its place is not
+// known (session_estimator.h).
+#include <algorithm>
+#include <utility>
+
+#include "server/maps/localising_tiles.h"
+#include "server/robots/most_believed.h"
+#include "server/robots/session_estimator.h"
+
+namespace cairn::server {
+namespace {
+
+// How often the poses of the particles are summed up for queries.
+constexpr std::uint64_t kHypothesesPeriod_ns = kNanosPerSecond / 2;
+
+}  // namespace
+
+void SessionEstimator::RefreshHypotheses(const PoseReport& report, bool in_known_map) {
+  if (report.localized) looked_for_.clear();
+  // By the robot's clock, which may be set back. What was believed of a robot that is lost now is gone at once.
+  const bool changed = std::exchange(hypotheses_localized_, report.localized) != report.localized;
+  const auto [earlier, later] = std::minmax(report.stamp, hypotheses_refreshed_);
+  if (!changed && NanosBetween(earlier, later) < kHypothesesPeriod_ns) return;
+  hypotheses_refreshed_ = report.stamp;
+  std::vector<PoseHypothesis> hypotheses;
+  if (report.localized) {
+    // A robot that is only localised has one hypothesis: its filter stays where it stopped mapping.
+    hypotheses = in_known_map ? std::vector<PoseHypothesis>{{report.stamp, report.T_map_robot, 1.0}}
+                              : MostBelieved(pipeline_.mapper().belief(report.T_map_robot), report.stamp);
+  } else {
+    // What a fragment finds by itself is a place in a frame of its own.
+    if (!fragment_) hypotheses = MostBelieved(pipeline_.mapper().UnconfirmedPlaces(), report.stamp);
+    if (hypotheses.empty()) hypotheses = looked_for_;
+  }
+  record_.SetHypotheses(std::move(hypotheses));
+}
+
+void SessionEstimator::On(PlaceFound&& found) {
+  const bool taken = !ended_ && found.place && found.place->map.epoch == epoch_ && Suggest(*found.place);
+  if (taken) Store(std::move(*found.place));
+  if (!record_.snapshot().status.pose.localized) {
+    looked_for_ = std::move(found.places);
+    record_.SetHypotheses(looked_for_);
+  }
+  found.done(taken);
+}
+
+bool SessionEstimator::Suggest(const PlaceSuggested& place) {
+  if (fragment_) return false;  // Its map has a frame of its own.
+  auto map = KnownGridOf(place.map.tiles, place.map.resolution_m, place.map.epoch, options_.recovery.place,
+                         options_.self_check.near_m);
+  return map != nullptr && pipeline_.mapper().SuggestPlace(place.seen, place.T_map_robot, std::move(map));
+}
+
+}  // namespace cairn::server

@@ -1,0 +1,23 @@
+// Where a mapper's path lies by stamps, for those who keep poses that were reported before it was corrected (mapper.h).
+#include "server/slam/mapper_state.h"
+
+namespace cairn::slam {
+
+Trajectory Mapper::PathByStamps() const {
+  const State& s = *state_;
+  Trajectory along;
+  if (!s.filter->placed()) return along;
+  const std::vector<Pose2> path = s.believed_path().values();
+  std::size_t last = path.size();
+  for (const MapperSnapshot::ScanPlace& scan : s.trail.scans()) {
+    if (scan.keyframe != last) along.push_back({scan.stamp, path[scan.keyframe] * scan.T_keyframe_robot});
+    last = scan.keyframe;
+  }
+  return along;
+}
+
+std::uint64_t Mapper::path_changed_at() const {
+  return state_->drawing.changed_at();
+}
+
+}  // namespace cairn::slam

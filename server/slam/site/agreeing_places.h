@@ -1,0 +1,20 @@
+// Places of two sessions that are recognised in each other and agree: the proof that two sessions have been at the same
+// places, where nobody knows where they started. Stateless, deterministic.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "server/slam/site/relation_search.h"
+
+namespace cairn::slam {
+
+// Relations from `a` to `b`: of the places of each that are recognised in the other the largest set that agrees, if
+// these are enough, and spread over enough way in both sessions; else none. The search ends with the first proof; it
+// looks at places far apart first. `soon_again`: it ends where half of the places have shown nothing, because it will
+// be made again. If `go_on` returns false, the result must not be used.
+[[nodiscard]] std::vector<SessionRelation> AgreeingPlaces(std::size_t a, SessionMap& map_a, std::size_t b,
+                                                          SessionMap& map_b, const LoopOptions& options,
+                                                          bool soon_again, const GoOn& go_on, RelationBook& book);
+
+}  // namespace cairn::slam

@@ -1,0 +1,46 @@
+#include "server/jobs/alignment.h"
+
+#include <gtest/gtest.h>
+
+#include "server/jobs/smooth_job.h"
+#include "tests/server/slam/site/site_drives.h"
+
+namespace cairn::server {
+namespace {
+
+// Two robots that said where they start; the second one's start was wrong by 0.2 m.
+TEST(Alignment, RobotsWithKnownStartsAreFittedToEachOtherOnlyWhereThatIsBetter) {
+  const slam::test::World world = slam::test::RingCorridor(true);
+  const auto material_of = [&](SessionId session, double from_m, const Pose2& T_own_start) {
+    return SessionMaterial{.session = session,
+                           .robot = "r" + std::to_string(session),
+                           .snapshot = slam::test::DriveRing(world, from_m, 40.0, T_own_start, session).snapshot,
+                           .grid_options = {}};
+  };
+  std::vector<SessionMaterial> material{material_of(1, 0.0, {}), material_of(2, 8.0, {8.15, 0.15, 0.0})};
+  const slam::SiteOptions options = SiteOptionsOf(slam::MapperOptions{});
+  Job job;
+  job.id = 9;
+  job.site = "lab";
+  job.kind = JobKind::kJoin;
+  const JobControl control([](double) {});
+  EXPECT_FALSE(SmoothSite(job, material, &options, control)->version) << "it was not asked to";
+  slam::RelationBook book;
+  const auto first = SmoothSite(job, material, &options, control, &book, true);
+  ASSERT_TRUE(first && first->version) << first->outcome.message;
+  EXPECT_TRUE(first->aligns);
+  EXPECT_NE(first->outcome.message.find("; moved by up to"), std::string::npos) << first->outcome.message;
+  const std::size_t measured = book.measured();
+  EXPECT_GT(measured, 20U);
+  // The robots have taken it over: nothing is left to do, and nothing to be measured.
+  for (SessionMaterial& one : material)
+    one.snapshot.online_path = one.snapshot.full_path = *first->version->parts.at(one.session).path;
+  book.BeginJob();
+  const auto second = SmoothSite(job, material, &options, control, &book, true);
+  ASSERT_TRUE(second);
+  EXPECT_FALSE(second->version) << second->outcome.message;
+  EXPECT_LT(book.measured(), measured / 10);
+}
+
+}  // namespace
+}  // namespace cairn::server

@@ -1,0 +1,301 @@
+// cairn-study correction: the graph of a site has been solved, and its keyframes have moved. How long is it until the
+// last of eight robots has been told, and until the map has changed as a whole; and how long do their scans wait
+// meanwhile, which go on arriving as fast as robots send them? Through the sessions and the site of the server, without
+// the middleware. Times are wall-clock times, so no other program should run on the machine. --only: a number of
+// keyframes instead of 10,000, of all robots together.
+#include <algorithm>
+#include <asio/thread_pool.hpp>
+#include <atomic>
+#include <chrono>
+#include <future>
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "client/sim/fleet.h"
+#include "client/sim/shipped_worlds.h"
+#include "common/mutex.h"
+#include "server/maps/site.h"
+#include "server/robots/session.h"
+#include "tests/studies/stopwatch.h"
+#include "tests/studies/study.h"
+
+namespace cairn::studies {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Site = server::Site;
+
+constexpr int kRobots = 8;
+constexpr double kMostToldS = 1.0;
+
+double SecondsBetween(Clock::time_point from, Clock::time_point to) {
+  return std::chrono::duration<double>(to - from).count();
+}
+
+sim::Fleet MakeFleet(std::uint64_t seed) {
+  auto place = sim::OpenSurroundings("storey");
+  if (!place) throw std::invalid_argument(place.error().message);
+  sim::FleetOptions options;
+  options.robots = kRobots;
+  options.scan_hz = 5.0;
+  options.seed = seed;
+  auto fleet = sim::Fleet::Create(*std::move(place), options);
+  if (!fleet) throw std::invalid_argument(fleet.error().message);
+  return std::move(*fleet);
+}
+
+// A session, which stands between the site and itself to see when it has been told. Thread rule: any thread.
+class ToldRobot : public server::GridOwner {
+ public:
+  ToldRobot(int number, const std::string& name, const Pose2& start, const slam::MapperOptions& options,
+            asio::thread_pool& pool, const std::shared_ptr<Site>& site)
+      : name_(name), token_(static_cast<ClientId>(number) + 1) {
+    server::EstimatorSetup estimator;
+    estimator.mapper = options;
+    estimator.T_map_robot_start = start;
+    SessionRequest request;
+    request.robot = name;
+    request.site = "study";
+    request.sensors = {"laser"};
+    request.client = request.session = token_;
+    server::SessionSetup setup;
+    setup.id = static_cast<server::SessionId>(number) + 1;
+    setup.request = request;
+    setup.estimator = estimator;
+    server::SessionOutputs outputs;
+    outputs.send = [this](const server::OutboundValue& value) {
+      if (const auto* const pose = std::get_if<PoseReport>(&value)) Posed(pose->scan_sequence);
+      return true;
+    };
+    outputs.grid_changed = [site](server::GridChange&& change) { site->Change(std::move(change)); };
+    session_ = std::make_shared<server::Session>(setup, server::RobotsOptions{}, pool, std::move(outputs));
+    if (!session_->record().AddSensors(request.sensors)) throw std::logic_error("a session takes one laser");
+  }
+
+  void SetMapEpoch(std::uint32_t epoch) override { session_->SetMapEpoch(epoch); }
+  void Adopt(server::Correction&& correction) override {
+    correction.done = [this, done = std::move(correction.done)](server::Adopted&& adopted) {
+      told_ = Clock::now();
+      done(std::move(adopted));
+    };
+    session_->Adopt(std::move(correction));
+  }
+  [[nodiscard]] Clock::time_point told() const { return told_; }
+
+  void Take(LogRecord&& record) {
+    if (auto* const odometry = std::get_if<Odometry>(&record)) {
+      session_->Take(server::OdometryArrival{{HashName(name_), HashName("odometry"), token_}, *odometry, false});
+      return;
+    }
+    auto scan = std::make_shared<const Scan>(std::get<Scan>(std::move(record)));
+    const Clock::time_point now = Clock::now();
+    {
+      const MutexLock lock(mutex_);
+      sent_.emplace(scan->sequence, now);
+    }
+    static_cast<void>(session_->Take(
+        server::ScanArrival{{HashName(name_), HashName("laser"), token_}, std::move(scan), std::nullopt, now}));
+  }
+  // Waits until few of its scans wait.
+  void AwaitFew() const {
+    while (Waiting() > 16) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  // The longest time from a scan to its pose since the last call, in ms.
+  [[nodiscard]] double TakeLongestMs() {
+    const MutexLock lock(mutex_);
+    return 1e3 * std::exchange(longest_s_, 0.0);
+  }
+  [[nodiscard]] std::uint64_t keyframes() const {
+    return session_->record().snapshot().status.ledgers.front().keyframes;
+  }
+  [[nodiscard]] slam::MapperSnapshot Snapshot() const {
+    std::promise<slam::MapperSnapshot> taken;
+    const bool asked = session_->Post(server::SnapshotWanted{
+        [&taken](server::SessionMaterial&& material) { taken.set_value(std::move(material.snapshot)); }});
+    if (!asked) throw std::runtime_error("a session has no room for a question");
+    return taken.get_future().get();
+  }
+  [[nodiscard]] server::SessionId id() const { return session_->id(); }
+
+ private:
+  void Posed(std::uint64_t sequence) {
+    const MutexLock lock(mutex_);
+    const auto sent = sent_.find(sequence);
+    if (sent == sent_.end()) return;
+    longest_s_ = std::max(longest_s_, SecondsBetween(sent->second, Clock::now()));
+    sent_.erase(sent_.begin(), std::next(sent));  // Also those that were dropped before.
+  }
+  [[nodiscard]] std::size_t Waiting() const {
+    const MutexLock lock(mutex_);
+    return sent_.size();
+  }
+
+  const std::string name_;
+  const SessionToken token_;
+  std::shared_ptr<server::Session> session_;
+  std::atomic<Clock::time_point> told_{};
+  mutable Mutex mutex_;
+  std::map<std::uint64_t, Clock::time_point> sent_ CAIRN_GUARDED_BY(mutex_);  // Scans without a pose yet.
+  double longest_s_ CAIRN_GUARDED_BY(mutex_) = 0.0;
+};
+
+using Robots = std::vector<std::shared_ptr<ToldRobot>>;
+
+// Waits for what the sessions still do, before those to whom they report are gone.
+struct AwaitPool {
+  explicit AwaitPool(asio::thread_pool& threads) : pool(threads) {}
+  AwaitPool(const AwaitPool&) = delete;
+  AwaitPool& operator=(const AwaitPool&) = delete;
+  ~AwaitPool() { pool.join(); }
+
+  asio::thread_pool& pool;
+};
+
+// What the solver returns: every keyframe has moved a little.
+std::vector<std::vector<Pose2>> Solved(const std::vector<slam::MapperSnapshot>& snapshots) {
+  std::vector<std::vector<Pose2>> paths;
+  for (const slam::MapperSnapshot& snapshot : snapshots) {
+    std::vector<Pose2>& path = paths.emplace_back(snapshot.full_path);
+    for (std::size_t k = 0; k < path.size(); ++k) path[k] = Pose2{0.1, -0.05, 1e-5 * static_cast<double>(k)} * path[k];
+  }
+  return paths;
+}
+
+struct Times {
+  double drawn_s = 0.0, told_s = 0.0, switched_s = 0.0;
+};
+
+// What a job does from the solved graph on.
+Times Correct(const std::vector<slam::MapperSnapshot>& snapshots, const Robots& robots, Site& site,
+              const slam::GridOptions& options) {
+  const std::vector<std::vector<Pose2>> paths = Solved(snapshots);
+  const Clock::time_point solved = Clock::now();
+  server::MapVersion version;
+  for (std::size_t i = 0; i < robots.size(); ++i) {
+    slam::OccupancyGrid grid(options);
+    for (std::size_t k = 0; k < paths[i].size(); ++k)
+      if (snapshots[i].keyframes[k].localized) grid.Draw(*snapshots[i].keyframes[k].scan, paths[i][k]);
+    server::RobotGrid part;
+    part.chunks = grid.Share();
+    part.keyframes = snapshots[i].made();
+    part.path = std::make_shared<const std::vector<Pose2>>(paths[i]);
+    part.numbers = std::make_shared<const std::vector<std::uint64_t>>(snapshots[i].numbers);
+    version.parts.emplace(robots[i]->id(), std::move(part));
+  }
+  Times times;
+  times.drawn_s = SecondsBetween(solved, Clock::now());
+  std::promise<Result<std::uint32_t>> added, enabled;
+  site.AddVersion(std::move(version), [&](Result<std::uint32_t> number) { added.set_value(std::move(number)); });
+  const auto number = added.get_future().get();
+  if (!number) throw std::runtime_error(number.error().message);
+  site.Enable(*number, [&](Result<std::uint32_t> result) { enabled.set_value(std::move(result)); });
+  const auto result = enabled.get_future().get();
+  if (!result) throw std::runtime_error(result.error().message);
+  times.switched_s = SecondsBetween(solved, Clock::now());
+  for (const auto& robot : robots) times.told_s = std::max(times.told_s, SecondsBetween(solved, robot->told()));
+  return times;
+}
+
+// Hands on what the fleet sends, as fast as it drives, until `ended` says so. The map is published twice a second.
+template <typename Ended>
+void Stream(sim::Fleet& fleet, const Robots& robots, Site& site, const Ended& ended) {
+  const auto stamp_of = [](const LogRecord& record) {
+    return std::visit([](const auto& one) { return one.stamp; }, record);
+  };
+  sim::FleetRecord next = fleet.Next();
+  const Stamp first = stamp_of(next.record);
+  const Clock::time_point begin = Clock::now();
+  Clock::time_point published = begin;
+  while (!ended(SecondsBetween(begin, Clock::now()))) {
+    std::this_thread::sleep_until(begin + std::chrono::nanoseconds(stamp_of(next.record) - first));
+    robots[static_cast<std::size_t>(next.robot)]->Take(std::move(next.record));
+    next = fleet.Next();
+    if (Clock::now() - published < std::chrono::milliseconds(500)) continue;
+    published = Clock::now();
+    site.Publish();
+  }
+}
+
+double LongestMs(const Robots& robots) {
+  double longest_ms = 0.0;
+  for (const auto& robot : robots) longest_ms = std::max(longest_ms, robot->TakeLongestMs());
+  return longest_ms;
+}
+
+void Drive(sim::Fleet& fleet, const Robots& robots, Site& site, std::uint64_t keyframes, Report& report) {
+  std::uint64_t made = 0, told = 0;
+  for (std::size_t records = 0; made < keyframes; ++records) {
+    sim::FleetRecord next = fleet.Next();
+    const auto& robot = robots[static_cast<std::size_t>(next.robot)];
+    robot->Take(std::move(next.record));
+    robot->AwaitFew();
+    if (records % 5000 != 0) continue;
+    site.Publish();
+    made = 0;
+    for (const auto& one : robots) made += one->keyframes();
+    if (made / 2000 > told) report.Progress(Count(static_cast<long long>(made)) + " keyframes");
+    told = made / 2000;
+  }
+}
+
+void StudyCorrection(StudyContext& context) {
+  Report& report = context.report;
+  slam::MapperOptions options;
+  options.seed = static_cast<std::int64_t>(context.seed);
+  options.retire.enabled = false;  // All keyframes stay, so that there are so many.
+  const std::uint64_t wanted = context.only.empty() ? context.Pick(10000, 400) : std::stoull(context.only);
+  sim::Fleet fleet = MakeFleet(context.seed);
+  asio::thread_pool pool(2);
+  server::Outbound outbound(64);
+  outbound.Watch([](const server::OutboundValue&) { return true; });
+  const auto site = std::make_shared<Site>("study", options.grid.resolution_m, server::MapsOptions{}, pool, outbound);
+  Robots robots;
+  const AwaitPool await(pool);
+  for (int i = 0; i < kRobots; ++i) {
+    robots.push_back(std::make_shared<ToldRobot>(i, fleet.name(i), fleet.T_map_robot_start(i), options, pool, site));
+    Site::Member member;
+    member.session = robots.back()->id();
+    member.robot = HashName(fleet.name(i));
+    member.owner = robots.back();
+    site->Join(std::move(member));
+  }
+  Drive(fleet, robots, *site, wanted, report);
+
+  std::vector<slam::MapperSnapshot> snapshots;
+  std::size_t keyframes = 0;
+  for (const auto& robot : robots) keyframes += snapshots.emplace_back(robot->Snapshot()).full_path.size();
+  static_cast<void>(LongestMs(robots));
+  Stream(fleet, robots, *site, [](double seconds) { return seconds > 5.0; });
+  const double before_ms = LongestMs(robots);
+  auto correcting = std::async(std::launch::async, [&] { return Correct(snapshots, robots, *site, options.grid); });
+  Stream(fleet, robots, *site,
+         [&](double /*seconds*/) { return correcting.wait_for(std::chrono::seconds(0)) == std::future_status::ready; });
+  const Times times = correcting.get();
+  Stream(fleet, robots, *site, [](double seconds) { return seconds > 1.0; });
+  const double during_ms = LongestMs(robots);
+
+  Table table({"keyframes", "robots", "drawn (s)", "all robots told (s)", "map changed (s)",
+               "longest from scan to pose before (ms)", "meanwhile (ms)"});
+  table.Add({Count(static_cast<long long>(keyframes)), Count(kRobots), Number(times.drawn_s, 2),
+             Number(times.told_s, 2), Number(times.switched_s, 2), Number(before_ms, 0), Number(during_ms, 0)});
+  report.Text(
+      "Times from the solved graph on: all parts of the map have been drawn along it, by one thread; the last robot "
+      "has "
+      "taken over its path, its past poses and its part of the map; the map of the site has changed as a whole. To be "
+      "told within 1 s.");
+  report.Add(table, "correction");
+  if (times.told_s > kMostToldS)
+    report.Warn("the last robot was told " + Number(times.told_s, 2) + " s after the graph was solved");
+}
+
+const Registration kRegistered{"correction", "a solved graph goes back to the robots: how soon, and what it costs them",
+                               StudyCorrection};
+
+}  // namespace
+}  // namespace cairn::studies
