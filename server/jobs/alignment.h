@@ -21,7 +21,8 @@ struct Alignment {
   double agreement_before = 0.0;  // SmoothedSession, mean over the sessions.
   double agreement = 0.0;
 
-  // It moves something by more than a cell, and nothing agrees worse.
+  // It moves something by more than a cell, scans are clearly less off the maps of others (their mean square by a tenth
+  // or more), and the agreement of the sessions is not worse.
   [[nodiscard]] bool IsBetter() const;
 };
 
