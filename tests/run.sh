@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # The one command: installs what is missing, builds every way that counts, runs every test, holds the accuracy.
 #   tests/run.sh                 packages to tsan below; stops at the first that fails
-#   tests/run.sh --full          the other tests under the address sanitizer, every source by itself, the demo with DDS
-#                                Security, Debian packages, and a real systemd, besides
+#   tests/run.sh --full          every test in the ordinary build and under the address sanitizer, every source by itself,
+#                                the demo with DDS Security, Debian packages, containers, and a real systemd, besides
 #   tests/run.sh --quick         packages, format, architecture, release
 #   tests/run.sh --stage NAME    this stage (may be repeated), with the build it needs
 #   tests/run.sh --studies       whatever else is asked for, and the slow studies (tests/studies) last
@@ -105,8 +105,17 @@ tracked() {
 
 stage_architecture() { python3 tests/architecture/include_direction.py "$root"; }
 
+# Where the address sanitizer comes after it and it is not --full, the tests that run there are left to it.
 stage_release() {
-  configure release
+  case " ${stages[*]} " in
+    *" asan_rest "*) ;;
+    *" asan "*)
+      configure release -DCAIRN_TESTS_ONCE=ON
+      build release
+      run_tests release -LE 'study|twice'
+      return ;;
+  esac
+  configure release -DCAIRN_TESTS_ONCE=OFF
   build release
   run_tests release -LE study
 }

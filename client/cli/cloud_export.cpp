@@ -84,10 +84,10 @@ void AddCloudExport(CLI::App& cloud, Program& program) {
   AddNumber(*command, "--voxel", options.cloud.voxel_m, 0.0, 100.0, "Keep one point per cube of this size; 0: all",
             "METRES");
   command->add_option("--max-range", options.cloud.max_range_m, "Leave out hits farther away")
-      ->check(CLI::PositiveNumber)
+      ->check(Positive())
       ->type_name("METRES");
   command->add_option("--max-gap", options.cloud.max_pose_gap_s, "Longest time between the two poses around a scan")
-      ->check(CLI::PositiveNumber)
+      ->check(Positive())
       ->type_name("SECONDS")
       ->capture_default_str();
   command->add_flag("--tilted-only", options.cloud.tilted_only, "Leave out level scans");

@@ -86,7 +86,7 @@ void AddEval(CLI::App& app, Program& program) {
                     ->check(CLI::IsMember({"none", "se2"}))
                     ->capture_default_str();
   auto* max_rmse = command->add_option("--max-rmse", arguments->max_rmse_m, "Exit code 1 where the ATE is larger")
-                       ->check(CLI::PositiveNumber)
+                       ->check(Positive())
                        ->type_name("METRES");
   auto* log = command
                   ->add_option("--map-entropy", arguments->log,
@@ -101,7 +101,7 @@ void AddEval(CLI::App& app, Program& program) {
             "One point is kept per square of this size", "METRES")
       ->needs(log);
   command->add_option("--max-range", arguments->crispness.max_range_m, "Leave out hits farther away")
-      ->check(CLI::PositiveNumber)
+      ->check(Positive())
       ->type_name("METRES")
       ->needs(log);
   AddLogOptions(*command, arguments->reader);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <functional>
 #include <sstream>
 #include <string>
@@ -40,6 +41,27 @@ inline CLI::Validator InRange(double least, double most) {
         double value = 0.0;
         const bool good = ParseNumber(text, value) && value >= least && value <= most;
         return good ? std::string() : "'" + text + "' is not a number from " + range;
+      },
+      "");
+}
+
+// A finite number above 0, and one that is 0 or above. (CLI::PositiveNumber and CLI::NonNegativeNumber print the
+// largest double with all its digits.)
+inline CLI::Validator Positive() {
+  return CLI::Validator(
+      [](std::string& text) {
+        double value = 0.0;
+        const bool good = ParseNumber(text, value) && std::isfinite(value) && value > 0.0;
+        return good ? std::string() : "'" + text + "' is not a number above 0";
+      },
+      "");
+}
+inline CLI::Validator NotNegative() {
+  return CLI::Validator(
+      [](std::string& text) {
+        double value = 0.0;
+        const bool good = ParseNumber(text, value) && std::isfinite(value) && value >= 0.0;
+        return good ? std::string() : "'" + text + "' is not a number of 0 or above";
       },
       "");
 }

@@ -107,7 +107,7 @@ void AddPose(CLI::App& app, Program& program) {
                          ->excludes(follow);
   command->add_option("-n,--count", arguments->count, "With --follow: end after this many poses")
       ->needs(follow)
-      ->check(CLI::PositiveNumber);
+      ->check(Positive());
   AddFrame(*command, arguments->frame)->excludes(follow)->excludes(hypotheses);
   program.OnChosen(*command, arguments, ShowPose);
 }

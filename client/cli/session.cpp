@@ -1,3 +1,5 @@
+#include <algorithm>
+
 #include "client/cli/commands.h"
 #include "client/cli/json_output.h"
 #include "client/cli/text_output.h"
@@ -6,8 +8,9 @@ namespace cairn::client {
 namespace {
 
 ExitCode ShowStatus(Program& program, const std::string& robot) {
-  const auto answer = program.Ask([&](QueryClient& server) { return server.ServerStatus(robot); });
+  auto answer = program.Ask([&](QueryClient& server) { return server.ServerStatus(robot); });
   if (!answer) return program.Refuse(answer.error());
+  std::ranges::stable_sort(answer->robots, {}, [](const RobotStatus& status) { return status.session.robot; });
   std::string text;
   if (!answer->degraded.empty()) text += "DEGRADED: " + answer->degraded + "\n";
   if (answer->robots.empty()) text += "no robot yet\n";

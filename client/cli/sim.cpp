@@ -119,7 +119,7 @@ void AddSim(CLI::App& app, Program& program) {
   command->add_option("--log-dir", options->log_dir, "Write what is streamed here as CARMEN logs (<robot>.log)")
       ->type_name("DIR");
   command->add_option("--first-stamp", arguments->first_stamp_s, "Stamp of the first record; 0: now")
-      ->check(CLI::NonNegativeNumber)
+      ->check(NotNegative())
       ->type_name("SECONDS");
   command->add_flag(
       "!--unknown-starts", options->starts_known,
@@ -130,7 +130,7 @@ void AddSim(CLI::App& app, Program& program) {
   command
       ->add_option("--watch-pid", options->watched_pid,
                    "Report how much processor time this process uses (e.g. the server)")
-      ->check(CLI::PositiveNumber);
+      ->check(Positive());
   program.OnChosen(*command, arguments, Simulate);
 }
 

@@ -19,6 +19,18 @@ std::string FormatStamps(const StampSummary& stamps) {
                      FormatDuration(stamps.longest_gap_s));
 }
 
+std::string Counted(std::uint64_t count, std::string_view thing) {
+  return fmt::format("{} {}{}", count, thing, count == 1 ? "" : "s");
+}
+
+// In the unit in which a person would say it.
+std::string FormatUpTime(double seconds) {
+  if (seconds < 60.0) return fmt::format("{:.0f} s", seconds);
+  if (seconds < 3600.0) return fmt::format("{:.0f} min", seconds / 60.0);
+  if (seconds < 48.0 * 3600.0) return fmt::format("{:.1f} h", seconds / 3600.0);
+  return fmt::format("{:.1f} days", seconds / 86400.0);
+}
+
 }  // namespace
 
 std::string FormatPose(const PoseReport& pose) {
@@ -40,7 +52,8 @@ std::string FormatJob(const Job& job) {
   if (job.state == JobState::kSucceeded) {
     // A job that had nothing to join has made no map to compare.
     if (job.map_version > 0 && job.kind != JobKind::kRelocalise)
-      line += fmt::format(", cost {:.4g} -> {:.4g}", job.cost_before, job.cost_after);
+      line += fmt::format(", disagreement of scans and map {:.0f} -> {:.0f} mm", 1000 * std::sqrt(job.cost_before),
+                          1000 * std::sqrt(job.cost_after));
     if (job.map_version > 0) line += fmt::format(", map version {}", job.map_version);
   }
   if (!job.message.empty()) line += ": " + job.message;
@@ -85,7 +98,7 @@ std::string FormatLoad(const ServerLoad& now, const ServerLoad* before) {
   // Not after a restart. Without a newer measurement there is nothing to compare.
   const bool compares = before != nullptr && before->up_s <= now.up_s && before->processor_s <= now.processor_s;
   const ServerLoad since = compares ? *before : ServerLoad{};
-  std::string text = fmt::format("server: up {:.1f} h, ", now.up_s / 3600.0);
+  std::string text = "server: up " + FormatUpTime(now.up_s) + ", ";
   if (now.up_s > since.up_s) {
     text += fmt::format("{:.0f} % of a processor, ",
                         100.0 * (now.processor_s - since.processor_s) / (now.up_s - since.up_s));
@@ -126,8 +139,9 @@ std::string FormatRos2Door(const Ros2Report& report, std::size_t problems) {
 }
 
 std::string FormatMap(const MapInfo& map) {
-  std::string text = fmt::format("{}: {} tiles in {} levels of {} m, epoch {}, version {}, {} robots", map.site,
-                                 map.tile_count, map.levels, map.resolution_m, map.epoch, map.version, map.robots);
+  std::string text =
+      fmt::format("{}: {} in {} of {} m, epoch {}, version {}, {}", map.site, Counted(map.tile_count, "tile"),
+                  Counted(map.levels, "level"), map.resolution_m, map.epoch, map.version, Counted(map.robots, "robot"));
   if (map.memory_bytes > 0) text += fmt::format(", {:.1f} MiB of memory", static_cast<double>(map.memory_bytes) / kMib);
   text += "\n";
   if (!map.memory_note.empty()) text += "  memory: " + map.memory_note + "\n";
@@ -136,8 +150,9 @@ std::string FormatMap(const MapInfo& map) {
         fmt::format("  x {:.2f}..{:.2f} m, y {:.2f}..{:.2f} m\n", map.x_min_m, map.x_max_m, map.y_min_m, map.y_max_m);
   }
   for (const MapVersionInfo& version : map.versions) {
+    // The note of the live map says that it is live.
     text += fmt::format("  {} version {}{}{}\n", version.enabled ? "*" : " ", version.version,
-                        version.job > 0 ? fmt::format(" by job {}", version.job) : ", live",
+                        version.job > 0 ? fmt::format(" by job {}", version.job) : "",
                         version.note.empty() ? "" : ": " + version.note);
   }
   return text;

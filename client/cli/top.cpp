@@ -1,5 +1,6 @@
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <iostream>
 #include <optional>
@@ -8,6 +9,7 @@
 #include "client/cli/commands.h"
 #include "client/cli/interrupt.h"
 #include "client/cli/json_output.h"
+#include "client/cli/option_checks.h"
 #include "client/cli/top_table.h"
 #include "client/cli/top_terminal.h"
 
@@ -33,6 +35,7 @@ Result<TopView> AskServer(Program& program) {
   auto ros2 = program.Ask([](QueryClient& server) { return server.Ros2(); });
   if (ros2) view.ros2 = std::move(*ros2);
   view.status = std::move(*status);
+  std::ranges::stable_sort(view.status.robots, {}, [](const RobotStatus& robot) { return robot.session.robot; });
   view.maps = std::move(*maps);
   view.jobs = std::move(*jobs);
   view.seconds = std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
@@ -90,7 +93,7 @@ void AddTop(CLI::App& app, Program& program) {
       ->type_name("SECONDS")
       ->check(CLI::Range(0.1, 3600.0))
       ->capture_default_str();
-  command->add_option("-n,--count", arguments->count, "End after this many tables")->check(CLI::PositiveNumber);
+  command->add_option("-n,--count", arguments->count, "End after this many tables")->check(Positive());
   program.OnChosen(*command, arguments, ShowTop);
 }
 

@@ -88,9 +88,7 @@ void JobList::RemoveSite(const std::string& site) {
 
 Result<Job> JobList::Add(const std::string& site, JobKind kind, bool enable, const JobSubject& about) {
   const MutexLock lock(mutex_);
-  if (!MakeRoom()) {
-    return cairn::Fail(StatusCode::kResourceExhausted, "too many jobs are unfinished (jobs.max_kept); try again later");
-  }
+  if (!MakeRoom()) return cairn::Fail(StatusCode::kResourceExhausted, std::string(kTooManyUnfinished));
   const std::uint64_t id = next_++;
   Entry& entry = jobs_[id];
   entry.job.id = id;
@@ -103,6 +101,12 @@ Result<Job> JobList::Add(const std::string& site, JobKind kind, bool enable, con
   entry.control = std::make_shared<JobControl>([this, id](double progress) { Progress(id, progress); });
   ChangedLocked(entry);
   return entry.job;
+}
+
+bool JobList::HasRoom() const {
+  const MutexLock lock(mutex_);
+  return jobs_.size() < static_cast<std::size_t>(options_.max_kept) ||
+         std::ranges::any_of(jobs_, [](const auto& one) { return IsFinal(one.second.job.state); });
 }
 
 bool JobList::Start(std::uint64_t id) {

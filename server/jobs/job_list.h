@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/mutex.h"
@@ -18,6 +19,9 @@
 #include "server/store/journal.h"
 
 namespace cairn::server {
+
+// Why a job is refused.
+inline constexpr std::string_view kTooManyUnfinished = "too many jobs are unfinished (jobs.max_kept); try again later";
 
 // What a job of the kind kRelocalise is about.
 struct JobSubject {
@@ -42,6 +46,8 @@ class JobList {
   void RemoveSite(const std::string& site);
   // Adds a queued job. RESOURCE_EXHAUSTED: the list is full of unfinished jobs. `enable`: see JobWorker.
   Result<Job> Add(const std::string& site, JobKind kind, bool enable = true, const JobSubject& about = {});
+  // Whether Add has room for a job now.
+  [[nodiscard]] bool HasRoom() const;
   // Marks the job as running. Returns false if it was cancelled meanwhile. From now on Cancel sets the flag
   // in the job's JobControl.
   bool Start(std::uint64_t id);

@@ -17,6 +17,10 @@ void LowerOwnPriority(std::int64_t nice) {
   static_cast<void>(setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), static_cast<int>(nice)));
 }
 
+Status TooManyWait() {
+  return {StatusCode::kResourceExhausted, "too many jobs are waiting (jobs.max_queued); try again later"};
+}
+
 }  // namespace
 
 JobWorker::JobWorker(const JobsOptions& options, JobList& list, JobWork work)
@@ -37,18 +41,21 @@ void JobWorker::Start() {
 Result<Job> JobWorker::Submit(const std::string& site, JobKind kind, bool enable, const std::string& request,
                               const JobSubject& about) {
   auto job = list_.Add(site, kind, enable, about);
-  const bool full_already = queue_.size() >= static_cast<std::size_t>(options_.max_queued);
-  if (job && (full_already || !queue_.TryPush(Ticket{job->id, enable, request}))) {
-    const Status full{StatusCode::kResourceExhausted, "too many jobs are waiting (jobs.max_queued); try again later"};
-    list_.Fail(job->id, full);
-    return tl::unexpected(full);
+  if (job && (IsFull() || !queue_.TryPush(Ticket{job->id, enable, request}))) {
+    list_.Fail(job->id, TooManyWait());
+    return tl::unexpected(TooManyWait());
   }
   return job;
 }
 
+Result<void> JobWorker::CheckRoom() const {
+  if (IsFull()) return tl::unexpected(TooManyWait());
+  if (!list_.HasRoom()) return Fail(StatusCode::kResourceExhausted, std::string(kTooManyUnfinished));
+  return {};
+}
+
 void JobWorker::Requeue(std::uint64_t id, bool enable) {
-  if (!queue_.TryPush(Ticket{id, enable, {}}))
-    list_.Fail(id, {StatusCode::kResourceExhausted, "too many jobs are waiting (jobs.max_queued); try again later"});
+  if (!queue_.TryPush(Ticket{id, enable, {}})) list_.Fail(id, TooManyWait());
 }
 
 void JobWorker::Stop() {

@@ -28,6 +28,8 @@ class JobWorker {
   // empty where the server itself does. The next server does not know it any more.
   Result<Job> Submit(const std::string& site, JobKind kind, bool enable, const std::string& request = "",
                      const JobSubject& about = {});
+  // Whether Submit would take a job now; the errors are those of Submit. Others may take the room before the next call.
+  [[nodiscard]] Result<void> CheckRoom() const;
   // Queues a restored job, which is in the list already.
   void Requeue(std::uint64_t id, bool enable);
   // Cancels the running and the waiting jobs. Returns when the thread has ended.
@@ -39,6 +41,7 @@ class JobWorker {
     bool enable = false;
     std::string request;
   };
+  [[nodiscard]] bool IsFull() const { return queue_.size() >= static_cast<std::size_t>(options_.max_queued); }
   void Run();  // Until the queue is closed and empty.
   void RunOne(const Ticket& ticket);
   void GiveUp(std::uint64_t job);

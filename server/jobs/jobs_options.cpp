@@ -22,7 +22,7 @@ void Visit(OptionVisitor& visitor, JobsOptions& options) {
                "Has no effect unless `joint` is true.");
   visitor.Real("join_way_m", options.join_way_m, "m", 1.0, 1e5,
                "How far such a robot, and the others of the site together, must have driven before it is tried for the "
-               "first time. It is tried again whenever it or they have driven a quarter more.");
+               "first time. It is tried again whenever it or they have driven a tenth more.");
   visitor.Flag(
       "align", options.align,
       "Whether robots that have said where they start are fitted to each other by themselves, when two of them "

@@ -10,7 +10,10 @@
 namespace cairn::server {
 namespace {
 
-constexpr double kAgainAfter = 1.25;  // Ratio of the ways driven until the next job and until the last one.
+// Ratio of the ways driven until the next job and until the last one. A robot that is not joined drives without a map
+// of its site, and a job that joins nothing is short.
+constexpr double kJoinAgainAfter = 1.1;
+constexpr double kFitAgainAfter = 1.25;
 
 }  // namespace
 
@@ -56,7 +59,7 @@ bool Joiner::IsDueToAlign(const std::string& name, const Driven& now) const {
   const auto tried = tried_.find(name);
   // A second one that has driven far enough by now is new.
   const bool more =
-      tried == tried_.end() || now.others_m >= kAgainAfter * tried->second.others_m || now.far > tried->second.far;
+      tried == tried_.end() || now.others_m >= kFitAgainAfter * tried->second.others_m || now.far > tried->second.far;
   const auto site = more ? atlas_.Find(name) : nullptr;
   return site != nullptr && site->MayBeAligned();
 }
@@ -70,8 +73,8 @@ bool Joiner::IsDue(const std::string& site, const Driven& now) const {
     if (tried == tried_.end()) return true;
     const auto before = tried->second.fragments.find(session);
     return before == tried->second.fragments.end() ||
-           driven_m >= kAgainAfter * std::max(before->second, options_.join_way_m) ||
-           now.others_m >= kAgainAfter * tried->second.others_m;
+           driven_m >= kJoinAgainAfter * std::max(before->second, options_.join_way_m) ||
+           now.others_m >= kJoinAgainAfter * tried->second.others_m;
   });
 }
 

@@ -2,7 +2,7 @@
 // part of the map is not shown (robots/roster.h). A job of the kind kJoin looks for places that it and others have
 // seen, and, where it finds enough of them, makes and enables a map version that contains the fragment. A job takes
 // time that grows with the map, so one is submitted when a fragment has driven jobs.join_way_m, and again only when it,
-// or those with whom it may be joined, have driven a quarter more. Such a job also fits robots that said where they
+// or those with whom it may be joined, have driven a tenth more. Such a job also fits robots that said where they
 // start to each other (jobs.align), so that a site's map stays right without a person. For these one is submitted when
 // two of them have driven jobs.join_way_m, and again when all have driven a quarter more; not while a person has chosen
 // the enabled map version (Site::MayBeAligned). Thread rule: one thread (housekeeping).

@@ -151,6 +151,8 @@ Result<JobOutcome> RelocaliseJob::Run(const Job& job, const JobControl& control)
     found.place = PlaceSuggested{scans.back().scan->stamp, T_map_robot, map->tiles};
     found.place->map.tiles =
         TilesNear(map->tiles.tiles, map->tiles.resolution_m, T_map_robot.translation(), kMapAroundM);
+    found.map = KnownGridOf(found.place->map.tiles, map->tiles.resolution_m, map->tiles.epoch, material->place_search,
+                            material->near_m);
   }
   const auto taken = Tell(**session, std::move(found), control);
   if (!taken) return tl::unexpected(taken.error());

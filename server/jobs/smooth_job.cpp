@@ -10,6 +10,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -35,7 +36,8 @@ class Decision {
   std::atomic<bool> taken_ = false;
 };
 
-constexpr double kShareOfJoining = 0.5;  // Of the progress.
+constexpr double kShareOfJoining = 0.5;    // Of the progress.
+constexpr double kAlignAgainAfter = 1.25;  // SmoothJob::IsDueToAlign.
 
 // Nothing: cancelled.
 std::optional<std::vector<slam::SmoothedSession>> SmoothTogether(const std::vector<SessionMaterial>& material,
@@ -78,16 +80,20 @@ bool JoinsAny(const std::vector<SessionMaterial>& material, const std::vector<bo
 std::string Counts(const std::vector<SessionMaterial>& material) {
   std::set<std::string> robots;
   for (const SessionMaterial& session : material) robots.insert(session.robot);
-  std::string counts = std::to_string(robots.size()) + " robots";
+  std::string counts = std::to_string(robots.size()) + (robots.size() == 1 ? " robot" : " robots");
   if (robots.size() < material.size()) counts += " in " + std::to_string(material.size()) + " sessions";
   return counts;
 }
 
-// What a person wants to know of the joint smoothing: at most as many robots as fit on a line.
+// What a person wants to know of the joint smoothing: at most as many robots as fit on a line. A robot that said where
+// it starts is in the map also where nothing joins it with others.
 std::string Joins(const std::vector<SessionMaterial>& material, const std::vector<slam::SmoothedSession>& joint) {
   constexpr int kMostNamed = 4;
-  std::string together, apart;
-  int joined = 0, alone = 0;
+  std::string together, placed, apart;
+  int joined = 0, by_start = 0, alone = 0;
+  const auto part = [](std::string_view what, int count, const std::string& names) {
+    return count == 0 ? std::string() : "; " + std::string(what) + " " + std::to_string(count) + ": " + names;
+  };
   for (std::size_t i = 0; i < material.size(); ++i) {
     if (joint[i].path.empty()) continue;
     if (joint[i].joined) {
@@ -95,12 +101,14 @@ std::string Joins(const std::vector<SessionMaterial>& material, const std::vecto
       together += (together.empty() ? "" : ", ") + material[i].robot + " (" + std::to_string(joint[i].relations) +
                   " relations, " + std::to_string(std::lround(100.0 * joint[i].agreement)) + " % agrees" +
                   (material[i].start_known || material[i].joinable ? ")" : "; its filter cannot continue there)");
+    } else if (material[i].start_known) {
+      if (++by_start <= kMostNamed) placed += (placed.empty() ? "" : ", ") + material[i].robot;
     } else if (++alone <= kMostNamed) {
       apart += (apart.empty() ? "" : ", ") + material[i].robot;
     }
   }
-  return "; joined " + std::to_string(joined) + (together.empty() ? "" : ": " + together) + "; not joined " +
-         std::to_string(alone) + (apart.empty() ? "" : ": " + apart);
+  return part("joined", joined, together) + part("placed by their known starts alone", by_start, placed) +
+         part("not joined", alone, apart);
 }
 
 std::string Moves(const Alignment& alignment) {
@@ -114,7 +122,7 @@ std::string Moves(const Alignment& alignment) {
 
 Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMaterial>& material,
                                 const slam::SiteOptions* site, const JobControl& control, slam::RelationBook* book,
-                                bool align) {
+                                bool align, KeptDrawings::OfSite* drawings) {
   std::size_t keyframes = 0, scans = 0;
   for (const SessionMaterial& session : material) {
     keyframes += session.snapshot.keyframes.size();
@@ -134,11 +142,11 @@ Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMateria
       Counts(material) + ", " + std::to_string(keyframes) + " keyframes, " + std::to_string(scans) + " scans";
   if (together) summary += Joins(material, joint);
   if (together && book != nullptr)
-    summary +=
-        "; measured " + std::to_string(book->measured()) + ", known from before " + std::to_string(book->reused());
+    summary += "; relations measured " + std::to_string(book->measured()) + ", known from before " +
+               std::to_string(book->reused());
+  const auto go_on = [&control] { return !control.cancelled(); };
   SmoothedSite smoothed;
   if (job.kind == JobKind::kJoin && !JoinsAny(material, shown)) {
-    const auto go_on = [&control] { return !control.cancelled(); };
     const auto alignment = align ? AlignmentOf(material, joint, go_on) : Alignment{};
     if (!alignment) return Fail(StatusCode::kCancelled, "cancelled");
     smoothed.aligns = alignment->IsBetter();
@@ -163,9 +171,9 @@ Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMateria
   for (std::size_t i = 0; i < material.size(); ++i) {
     const SessionMaterial& session = material[i];
     const slam::MapperSnapshot& snapshot = session.snapshot;
-    auto map = joint[i].joined
-                   ? slam::MapAlong(snapshot, joint[i].path, session.grid_options, next)
-                   : slam::SmoothMap(snapshot, session.grid_options, next, [&control] { return !control.cancelled(); });
+    slam::DrawnMaps* const drawn = drawings == nullptr ? nullptr : &(*drawings)[session.session];
+    auto map = joint[i].joined ? slam::MapAlong(snapshot, joint[i].path, session.grid_options, next, drawn)
+                               : slam::SmoothMap(snapshot, session.grid_options, next, go_on, drawn);
     if (!map) return Fail(StatusCode::kCancelled, "cancelled");
     before.Add(map->before);
     after.Add(map->after);
@@ -193,15 +201,35 @@ bool SmoothJob::MayAlign(const Job& job) const {
                               [&job](const Job& other) { return other.id != job.id && !IsFinal(other.state); });
 }
 
+bool SmoothJob::IsDueToAlign(const std::string& site, const std::vector<SessionMaterial>& material) {
+  std::erase_if(aligned_, [this](const auto& one) { return atlas_.Find(one.first) == nullptr; });
+  std::uint64_t made = 0;
+  bool waits = false;
+  for (const SessionMaterial& session : material) {
+    if (session.start_known) made += session.snapshot.made();
+    waits = waits || (!session.start_known && session.joinable && !session.snapshot.keyframes.empty());
+  }
+  const auto last = aligned_.find(site);
+  if (waits && last != aligned_.end() && made >= last->second &&
+      static_cast<double>(made) < kAlignAgainAfter * static_cast<double>(last->second))
+    return false;
+  aligned_[site] = made;
+  return true;
+}
+
 Result<SmoothedSite> SmoothJob::Smooth(const Job& job, const std::vector<SessionMaterial>& material,
                                        const JobControl& control) {
   std::vector<std::uint64_t> sessions;
   sessions.reserve(material.size());
   for (const SessionMaterial& one : material) sessions.push_back(one.session);
   slam::RelationBook& book = books_.Open(job.site, sessions);
-  auto smoothed = SmoothSite(job, material, options_.joint ? &site_ : nullptr, control, &book, MayAlign(job));
-  // Also where the job was cancelled: what it has measured holds.
-  books_.Close(job.site, sessions, [this](const std::string& site) { return atlas_.Find(site) != nullptr; });
+  const bool align = MayAlign(job) && IsDueToAlign(job.site, material);
+  auto smoothed =
+      SmoothSite(job, material, options_.joint ? &site_ : nullptr, control, &book, align, &drawings_.Open(job.site));
+  // Also where the job was cancelled: what it has measured and drawn holds.
+  const auto site_exists = [this](const std::string& site) { return atlas_.Find(site) != nullptr; };
+  books_.Close(job.site, sessions, site_exists);
+  drawings_.Close(job.site, sessions, site_exists);
   return smoothed;
 }
 

@@ -11,7 +11,9 @@
 // thread waits for it.
 #pragma once
 
+#include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,6 +21,7 @@
 #include "server/jobs/job_control.h"
 #include "server/jobs/job_list.h"
 #include "server/jobs/jobs_options.h"
+#include "server/jobs/kept_drawings.h"
 #include "server/jobs/relation_books.h"
 #include "server/maps/atlas.h"
 #include "server/robots/roster.h"
@@ -34,13 +37,15 @@ struct SmoothedSite {
   JobOutcome outcome;                 // Its map_version is still 0.
 };
 
-// A pure function: the same material and the same book give the same result. Progress is reported from 0 to 1. `site`:
+// A pure function: the same material, book and drawings give the same result. Progress is reported from 0 to 1. `site`:
 // how robots are smoothed together; null: each by itself. `book`: see SmoothSessions. `align`: whether a job of the
-// kind kJoin also fits robots that said where they start to each other. FAILED_PRECONDITION: there are no scans.
-// CANCELLED: the job was cancelled.
+// kind kJoin also fits robots that said where they start to each other. `drawings`: what the last job of the site drew;
+// what this one draws replaces it. Null: all is drawn anew. FAILED_PRECONDITION: there are no scans. CANCELLED: the job
+// was cancelled.
 [[nodiscard]] Result<SmoothedSite> SmoothSite(const Job& job, const std::vector<SessionMaterial>& material,
                                               const slam::SiteOptions* site, const JobControl& control,
-                                              slam::RelationBook* book = nullptr, bool align = false);
+                                              slam::RelationBook* book = nullptr, bool align = false,
+                                              KeptDrawings::OfSite* drawings = nullptr);
 
 class SmoothJob {
  public:
@@ -60,6 +65,9 @@ class SmoothJob {
  private:
   // Whether the job may make a version that nobody has asked for.
   [[nodiscard]] bool MayAlign(const Job& job) const;
+  // While a robot waits for being joined, one job aligns only when the others have a quarter more keyframes than at the
+  // last one: to align takes long, and no job looks for a place of that robot meanwhile.
+  [[nodiscard]] bool IsDueToAlign(const std::string& site, const std::vector<SessionMaterial>& material);
   Result<SmoothedSite> Smooth(const Job& job, const std::vector<SessionMaterial>& material, const JobControl& control);
   Result<std::vector<SessionMaterial>> Collect(const std::string& site, const JobControl& control) const;
 
@@ -69,6 +77,9 @@ class SmoothJob {
   const Atlas& atlas_;
   const JobList* const jobs_;
   RelationBooks books_;
+  KeptDrawings drawings_;
+  // By site: how many keyframes the robots whose places are known had made when a job aligned them last.
+  std::map<std::string, std::uint64_t> aligned_;
 };
 
 }  // namespace cairn::server

@@ -267,7 +267,8 @@ void Atlas::ShareMemory(const std::vector<std::shared_ptr<Site>>& sites) const {
   taken.reserve(sites.size());
   for (const auto& site : sites) taken.push_back({site->snapshot()->info.memory_bytes, site->gives_no_more()});
   const std::uint64_t share = MemoryShare(taken, total);
-  for (const auto& site : sites) site->SetMemoryShare(share);
+  const bool clearly_below = AreClearlyBelow(taken, total);
+  for (const auto& site : sites) site->SetMemoryShare(share, clearly_below);
 }
 
 void Atlas::Close() {

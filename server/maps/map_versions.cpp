@@ -27,12 +27,22 @@ const MapVersion* MapVersions::Find(std::uint32_t version) const {
   return found == versions_.end() ? nullptr : &found->second;
 }
 
-void MapVersions::Enable(std::uint32_t version, std::map<SessionId, RobotGrid> displaced) {
+std::vector<std::uint32_t> MapVersions::Enable(std::uint32_t version, const std::map<SessionId, RobotGrid>& displaced) {
   MapVersion& outgoing = versions_.at(enabled_);
-  for (auto& part : displaced) outgoing.parts.insert_or_assign(part.first, std::move(part.second));
+  std::vector<std::uint32_t> changed;
+  for (auto& [number, other] : versions_) {
+    if (number == enabled_) continue;
+    const std::map<SessionId, RobotGrid>& missing = number == version ? outgoing.parts : displaced;
+    const std::size_t before = other.parts.size();
+    other.parts.insert(missing.begin(), missing.end());  // Parts that it has stay.
+    if (other.parts.size() != before) changed.push_back(number);
+  }
+  for (const auto& [session, part] : displaced) outgoing.parts.insert_or_assign(session, part);
+  changed.push_back(enabled_);
   outgoing.info.enabled = false;
   enabled_ = version;
   versions_.at(version).info.enabled = true;
+  return changed;
 }
 
 std::optional<std::uint32_t> MapVersions::LeastNeeded(bool last) const {

@@ -1,9 +1,12 @@
 // The versions of a site's map, their content, and which one is enabled. Version 1 is the live map since the
 // site was created. Every job adds a version, which is disabled at first. When another version is enabled,
 // the sessions' grids of the version enabled so far are stored, so that it can be enabled again (rolled back
-// to). The number of versions is bounded: the oldest is removed, except version 1, the enabled one, the
-// newest one, and the one that a switch under way will enable. Where memory is limited, version 1 can go as
-// well. Not thread-safe: used on the site's strand only.
+// to). A job that joins one robot makes a version with this part alone, and sessions of which a version has no part
+// stay as they are when it is enabled. So that every version shows all sessions as they were under it, the enabled one
+// takes over such parts from the one before; and where a session is changed for the first time since a version was left
+// or made without a part of it, the version gets the session's grid before that change. The number of versions is
+// bounded: the oldest is removed, except version 1, the enabled one, the newest one, and the one that a switch under
+// way will enable. Where memory is limited, version 1 can go as well. Not thread-safe: used on the site's strand only.
 #pragma once
 
 #include <functional>
@@ -32,8 +35,9 @@ class MapVersions {
   // enable; 0: none.
   std::uint32_t Add(MapVersion version, std::uint32_t wanted = 0);
   [[nodiscard]] const MapVersion* Find(std::uint32_t version) const;
-  // REQUIRES: Find(version). `displaced`: the sessions' grids of the version that has been enabled so far.
-  void Enable(std::uint32_t version, std::map<SessionId, RobotGrid> displaced);
+  // REQUIRES: Find(version). `displaced`: the grids, under the version that has been enabled so far, of those sessions
+  // of which the new one has a part. Returns the versions of which parts may have changed.
+  std::vector<std::uint32_t> Enable(std::uint32_t version, const std::map<SessionId, RobotGrid>& displaced);
 
   // The version that is least needed; nothing if all are. `last`: also one that a job has made last, and then the one
   // before the enabled version, to which a roll back goes. Never the enabled one.

@@ -4,6 +4,12 @@
 
 namespace cairn::server {
 
+bool AreClearlyBelow(const std::vector<SiteMemory>& sites, std::uint64_t total) {
+  std::uint64_t all = 0;
+  for (const SiteMemory& site : sites) all += site.bytes;
+  return IsClearlyBelow(all, total);
+}
+
 std::uint64_t MemoryShare(const std::vector<SiteMemory>& sites, std::uint64_t total) {
   std::uint64_t all = 0, fixed = 0;
   std::vector<std::uint64_t> others;

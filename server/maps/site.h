@@ -160,9 +160,14 @@ class Site : public std::enable_shared_from_this<Site> {
   // What one session alone has drawn, as a map of its own: for a fragment in its own frame. Only tiles of `level` are
   // in it. NOT_FOUND: the session has drawn nothing. REQUIRES: there is such a level.
   void AskPartOf(SessionId session, int level, SnapshotDone done);
-  // Of all sites together (memory_shares.h); 0: no limit. Thread rule: any thread.
-  void SetMemoryShare(std::uint64_t bytes) { memory_share_ = bytes; }
-  // The map takes more memory than it may, and nothing is left that it could give up. Thread rule: any thread.
+  // Of all sites together (memory_shares.h); 0: no limit. `clearly_below`: all together take clearly less than they
+  // may. Thread rule: any thread.
+  void SetMemoryShare(std::uint64_t bytes, bool clearly_below) {
+    memory_share_ = bytes;
+    total_clearly_below_ = clearly_below;
+  }
+  // The map takes more memory than it may, and nothing is left that it could give up. So it is called until it takes
+  // clearly less (memory_shares.h). Thread rule: any thread.
   [[nodiscard]] bool gives_no_more() const { return gives_no_more_; }
   // A session that has ended and that the site can do without, because others have drawn all of its area; 0: none. It
   // may be removed, if no robot goes on with it: then Leave is called. Thread rule: any thread.
@@ -206,6 +211,7 @@ class Site : public std::enable_shared_from_this<Site> {
   void CountSoon();
   void StayWithinMemory(Clock::time_point now);
   [[nodiscard]] std::uint64_t MemoryLimit() const;
+  void NoteLimits(bool is_above);
   [[nodiscard]] std::string MemoryNote(bool above) const;
   enum class GaveUp { kSomething, kLaterPerhaps, kNothing };
   GaveUp GiveUpLeastNeeded(Clock::time_point now);
@@ -282,6 +288,7 @@ class Site : public std::enable_shared_from_this<Site> {
   bool memory_changed_ = false;     // ... and whether the map has changed since.
   GivenUp given_up_;
   bool disagreement_given_up_ = false;
+  bool above_own_ = false, above_share_ = false;  // Above which limits the map is called.
   std::string memory_note_;
   std::set<SessionId> offered_;                  // As spare_session, in this round.
   std::optional<Clock::time_point> next_offer_;  // Not before.
@@ -291,6 +298,7 @@ class Site : public std::enable_shared_from_this<Site> {
   std::set<SessionId> stored_members_;  // Set by Restore, before others know the site.
   std::atomic<std::uint64_t> map_frame_;
   std::atomic<std::uint64_t> memory_share_{0};
+  std::atomic<bool> total_clearly_below_{true};
   std::atomic<bool> gives_no_more_{false};
   std::atomic<SessionId> spare_session_{0};
   std::atomic<std::uint64_t> asked_{0}, handled_{0};  // Pieces of work posted to the strand, and finished on it.

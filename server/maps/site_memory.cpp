@@ -77,13 +77,23 @@ void Site::StayWithinMemory(Clock::time_point now) {
     Render();
   }
   // While something may still go, nothing else is said than before.
-  const bool above = limit != 0 && memory_bytes_ > limit && (gave_up == GaveUp::kNothing || gives_no_more_);
-  gives_no_more_ = above;
-  std::string note = MemoryNote(above);
+  NoteLimits(limit != 0 && memory_bytes_ > limit && (gave_up == GaveUp::kNothing || gives_no_more_));
+  std::string note = MemoryNote(gives_no_more_);
   if (note == memory_note_) return;
   if (!note.empty()) spdlog::warn("site {}: {}", name_, note);
   memory_note_ = std::move(note);
   Refresh({}, {}, false);
+}
+
+// `is_above`: the map takes more than it may now, and can give up no more.
+void Site::NoteLimits(bool is_above) {
+  const std::uint64_t share = memory_share_;
+  const auto stays = [this, is_above](bool was, std::uint64_t limit, bool clearly_below) {
+    return (is_above && limit != 0 && memory_bytes_ > limit) || (was && !clearly_below);
+  };
+  above_own_ = stays(above_own_, memory_limit_, IsClearlyBelow(memory_bytes_, memory_limit_));
+  above_share_ = stays(above_share_, share, total_clearly_below_);
+  gives_no_more_ = above_own_ || above_share_;
 }
 
 Site::GaveUp Site::GiveUpLeastNeeded(Clock::time_point now) {

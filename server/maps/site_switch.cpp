@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "server/maps/site.h"
 
@@ -95,12 +96,11 @@ void Site::CommitIfComplete() {
       }
       if (layers_.contains(session)) StoreLayer(session);
     }
-    const std::uint32_t before = versions_.enabled();
-    versions_.Enable(complete.version, std::move(complete.displaced));
+    const std::vector<std::uint32_t> changed = versions_.Enable(complete.version, complete.displaced);
     chosen_ = complete.chosen;
     switches_[++epoch_] = generation_;
     while (switches_.size() > kMostSwitches) switches_.erase(switches_.begin());
-    StoreVersion(before);
+    for (const std::uint32_t version : changed) StoreVersion(version);
     CountSoon();
     RenderAll();
   });

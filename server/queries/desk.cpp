@@ -231,7 +231,9 @@ Reply Desk::StatusReply(const Request& request) {
 
 // Where somebody says where the robot is, its session looks at that place with the next scan. Otherwise a job looks for
 // it in the whole map of its site, from when the session knows that it is lost. Of one that is lost already, what it
-// has seen since counts. A job also joins a robot that is not joined with the map of its site at the place given.
+// has seen since counts. Where no job can be submitted, the session is not told either, because then the robot would be
+// lost without being looked for. A job also joins a robot that is not joined with the map of its site at the place
+// given.
 std::optional<Answer> Desk::Relocalise(const Request& request) {
   const auto session = roster_.FindOrFail(request.robot);
   if (!session) return ReplyTo(request, session.error());
@@ -255,11 +257,15 @@ std::optional<Answer> Desk::Relocalise(const Request& request) {
     return roster_.Relocalise(request.robot, request.T_map_robot, receipt);
   };
   if (request.T_map_robot) return Order(request, order);
+  if (const auto room = worker_.CheckRoom(); !room) return ReplyTo(request, room.error());
   return Order(request, order, [&worker = worker_, site, robot = request.robot, id](Reply& reply) {
     auto job = worker.Submit(site, JobKind::kRelocalise, true, id, {robot});
-    // The robot looks for itself, anyway.
-    if (!job) spdlog::warn("robot {}: no job looks for it: {}", robot, job.error().message);
-    if (job) reply.jobs = {*std::move(job)};
+    if (job) {
+      reply.jobs = {*std::move(job)};
+    } else {  // Others have taken the room meanwhile. The robot looks for itself in its own map.
+      spdlog::warn("robot {}: no job looks for it: {}", robot, job.error().message);
+      reply.status = job.error();
+    }
   });
 }
 

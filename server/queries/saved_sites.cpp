@@ -138,7 +138,8 @@ void SavedSites::Serve(const Request& request) {
 
 Result<std::vector<SavedSite>> SavedSites::Answer(const Request& request) {
   if (journal_ == nullptr || directory_.empty())
-    return Fail(StatusCode::kFailedPrecondition, "the server keeps no state (--state none), so it has no saved sites");
+    return Fail(StatusCode::kFailedPrecondition,
+                "the server keeps no state (--state none): its sites cannot be saved, loaded or deleted");
   if (stopping_) return Fail(StatusCode::kUnavailable, "the server is stopping");
   const auto nothing = [] { return std::vector<SavedSite>{}; };
   if (request.kind == RequestKind::kSavedList) return List();

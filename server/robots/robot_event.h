@@ -13,7 +13,9 @@
 #include "server/maps/map_snapshot.h"
 #include "server/maps/robot_grid.h"
 #include "server/robots/receipt.h"
+#include "server/slam/known_grid/known_grid.h"
 #include "server/slam/mapper.h"
+#include "server/slam/recovery/recovery_options.h"
 #include "server/slam/trail/keyframe.h"
 #include "server/store/records.h"
 
@@ -30,6 +32,9 @@ struct SessionMaterial {
   bool start_known = true;
   bool joinable = true;  // See SessionRecord::Joining.
   slam::Mapper::LostView lost{};
+  // With which the session itself would make the map of a PlaceSuggested ready for use (KnownGridOf).
+  slam::PlaceSearchOptions place_search{};
+  double near_m = 0.0;
 };
 
 struct SnapshotWanted {
@@ -44,7 +49,10 @@ struct RelocaliseWanted {
 
 // A job has looked for the robot in the map of its site.
 struct PlaceFound {
-  std::optional<PlaceSuggested> place;     // If there is only one place where the robot can be.
+  std::optional<PlaceSuggested> place;  // If there is only one place where the robot can be.
+  // The map of `place`, made ready for use with the options of the SessionMaterial. That takes so long for a large area
+  // that the session's scans would wait. Null: there is no place, or its map is too large.
+  std::shared_ptr<const slam::KnownGrid> map{};
   std::vector<PoseHypothesis> places;      // All where it may be, for queries.
   std::function<void(bool taken)> done{};  // Called once: whether the robot's scans will confirm the place, or not.
 };

@@ -78,6 +78,7 @@ bool Session::SaveAt(std::uint64_t position, Journal::Done done) {
   };
   if (!outputs_.checkpoint(position, std::move(content), std::move(done))) return false;
   pace_.Begun(position);
+  estimator_.RepeatSuggestion();
   return true;
 }
 

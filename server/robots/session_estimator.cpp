@@ -153,6 +153,7 @@ void SessionEstimator::Used(const Scan& scan, const slam::ScanOutcome& outcome) 
   if (outcome.keyframe) Drive(outcome.T_map_robot);
   // Before the pose is added, which lies on the new path already.
   if (pipeline_.mapper().path_changed_at() != path_changed_at_) FollowPath({});
+  if (suggested_ && !pipeline_.mapper().has_suggestion()) suggested_.reset();  // Its map takes memory.
   if (!replaying_) outputs_.send(report);
   const std::chrono::duration<double, std::milli> latency = Clock::now() - waiting->second.received;
   record_.ScanUsed(waiting->second.stream, report, outcome.stamp, outcome.keyframe, latency.count());
@@ -244,7 +245,9 @@ void SessionEstimator::On(SnapshotWanted&& wanted) {
                .grid_options = pipeline_.mapper().grid().options(),
                .start_known = !fragment_,
                .joinable = pipeline_.mapper().follows_paths(),
-               .lost = pipeline_.mapper().SeenWhileLost()});
+               .lost = pipeline_.mapper().SeenWhileLost(),
+               .place_search = options_.recovery.place,
+               .near_m = options_.self_check.near_m});
 }
 
 void SessionEstimator::On(RelocaliseWanted&& wanted) {

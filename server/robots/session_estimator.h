@@ -83,6 +83,11 @@ class SessionEstimator {
   // run on any thread. Empty if the moment does not allow a checkpoint (SessionRecord::Save). Load restores this state;
   // then the entries that follow are replayed.
   [[nodiscard]] Journal::Content Save() const;
+  // Called after each Save of which a checkpoint is made, before the next event. A place that a job has found, and that
+  // the next scans have to confirm, is not part of the checkpoint, because it comes with a map. It is looked at anew
+  // from here on, and is in the journal again as the first entry after the checkpoint. One that has waited for long is
+  // given up instead.
+  void RepeatSuggestion();
   // The session is stored again from here on; the Save at `position` holds what came before
   // (SessionRecord::BeginStoring).
   void BeginStoring(std::uint64_t position);
@@ -107,8 +112,9 @@ class SessionEstimator {
   void On(RelocaliseWanted&& wanted);
   void On(LocaliseWanted&& wanted);
   void On(PlaceFound&& found);
-  // Whether the robot's next scans will confirm the place, or not.
-  bool Suggest(const PlaceSuggested& place);
+  // Whether the robot's next scans will confirm the place in this map, or not. Null: it has none that can be used.
+  bool Suggest(PlaceSuggested place, std::shared_ptr<const slam::KnownGrid> map);
+  void ReplaySuggestion(const PlaceSuggested& place);
   // False if it cannot map again, because its place is not known or it is not joined with the map.
   bool Localise(LocaliseTaken&& taken);
   void On(StartRefused&& refused);
@@ -160,6 +166,12 @@ class SessionEstimator {
   Stamp hypotheses_refreshed_ = 0;
   bool hypotheses_localized_ = false;
   std::vector<PoseHypothesis> looked_for_;  // What a job has found; empty again once the robot is localized.
+  // The newest place that scans had to confirm, for RepeatSuggestion. Whether they still have to, the mapper knows.
+  struct Suggested {
+    PlaceSuggested place;
+    std::shared_ptr<const slam::KnownGrid> map;
+  };
+  std::optional<Suggested> suggested_;
   slam::ScanPipeline pipeline_;
 };
 

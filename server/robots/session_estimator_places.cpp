@@ -12,6 +12,9 @@ namespace {
 
 // How often the poses of the particles are summed up for queries.
 constexpr std::uint64_t kHypothesesPeriod_ns = kNanosPerSecond / 2;
+// So long a place that a job has found is suggested again after checkpoints, by the robot's clock. A robot that stands
+// still would otherwise have it for ever, and its journal would get the map with each checkpoint.
+constexpr std::uint64_t kSuggestedAtMost_ns = 60 * kNanosPerSecond;
 
 }  // namespace
 
@@ -36,7 +39,8 @@ void SessionEstimator::RefreshHypotheses(const PoseReport& report, bool in_known
 }
 
 void SessionEstimator::On(PlaceFound&& found) {
-  const bool taken = !ended_ && found.place && found.place->map.epoch == epoch_ && Suggest(*found.place);
+  const bool taken =
+      !ended_ && found.place && found.place->map.epoch == epoch_ && Suggest(*found.place, std::move(found.map));
   if (taken) Store(std::move(*found.place));
   if (!record_.snapshot().status.pose.localized) {
     looked_for_ = std::move(found.places);
@@ -45,11 +49,30 @@ void SessionEstimator::On(PlaceFound&& found) {
   found.done(taken);
 }
 
-bool SessionEstimator::Suggest(const PlaceSuggested& place) {
-  if (fragment_) return false;  // Its map has a frame of its own.
-  auto map = KnownGridOf(place.map.tiles, place.map.resolution_m, place.map.epoch, options_.recovery.place,
-                         options_.self_check.near_m);
-  return map != nullptr && pipeline_.mapper().SuggestPlace(place.seen, place.T_map_robot, std::move(map));
+bool SessionEstimator::Suggest(PlaceSuggested place, std::shared_ptr<const slam::KnownGrid> map) {
+  // The map of a fragment has a frame of its own.
+  if (fragment_ || map == nullptr || !pipeline_.mapper().SuggestPlace(place.seen, place.T_map_robot, map)) return false;
+  suggested_ = Suggested{std::move(place), std::move(map)};
+  return true;
+}
+
+// Forgets the place, and suggests it again: so does who reads the journal, with a checkpoint from here or from earlier,
+// and comes to the same state.
+void SessionEstimator::RepeatSuggestion() {
+  if (!suggested_ || !pipeline_.mapper().has_suggestion()) return;
+  PlaceSuggested place = suggested_->place;
+  const Stamp now = record_.snapshot().status.pose.stamp;
+  const bool is_old = now > place.seen && NanosBetween(place.seen, now) > kSuggestedAtMost_ns;
+  pipeline_.mapper().ForgetSuggestion();
+  if (is_old || !Suggest(place, suggested_->map)) place.map.tiles.clear();
+  Store(std::move(place));
+}
+
+void SessionEstimator::ReplaySuggestion(const PlaceSuggested& place) {
+  pipeline_.mapper().ForgetSuggestion();
+  if (place.map.tiles.empty()) return;
+  static_cast<void>(Suggest(place, KnownGridOf(place.map.tiles, place.map.resolution_m, place.map.epoch,
+                                               options_.recovery.place, options_.self_check.near_m)));
 }
 
 }  // namespace cairn::server

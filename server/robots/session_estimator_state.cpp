@@ -73,7 +73,7 @@ void SessionEstimator::Replay(JournalEntry&& entry, const Switched& switched) {
   } else if (auto* const localise = std::get_if<LocaliseTaken>(&entry)) {
     static_cast<void>(Localise(std::move(*localise)));
   } else if (const auto* const suggested = std::get_if<PlaceSuggested>(&entry)) {
-    static_cast<void>(Suggest(*suggested));
+    ReplaySuggestion(*suggested);
   } else if (auto* const refusal = std::get_if<StartRefusal>(&entry)) {
     On(StartRefused{std::move(refusal->why)});
   } else if (const auto* const finished = std::get_if<SessionFinished>(&entry)) {
@@ -95,8 +95,6 @@ void SessionEstimator::ReplayOdometry(const OdometryTaken& odometry) {
 Journal::Content SessionEstimator::Save() const {
   auto writer = std::make_shared<slam::StateWriter>();
   if (switch_completed_ && !*switch_completed_) return nullptr;
-  // The place that a job has found comes with a map, which is in the journal and not in a checkpoint.
-  if (pipeline_.mapper().has_suggestion()) return nullptr;
   // The scans themselves are saved by the pipeline, in the same order.
   std::vector<NameId> waiting;
   pipeline_.ForEachWaiting([&](const Scan& scan) { waiting.push_back(waiting_.at(&scan).stream.sensor_id); });

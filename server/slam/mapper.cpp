@@ -67,12 +67,17 @@ ScanOutcome Mapper::State::Process(std::shared_ptr<const Scan> scan, const Pose2
 
 // Adds a scan with enough new content to the filter, the loops and the map.
 void Mapper::State::AddKeyframe(Keyframe keyframe, ScanView view, const TrackStep& step,
-                                const Eigen::Matrix3d& step_covariance, const ParallelFor& parallel_for,
-                                std::optional<RevisitObservation> revisit) {
+                                Eigen::Matrix3d step_covariance, const ParallelFor& parallel_for, Regained regained) {
   const double travelled_m = trail.TravelledTo(step.T_track_robot);
   const bool placed_before = filter->placed();
+  auto& [revisit, elsewhere] = regained;
 
-  if (!trail.empty()) {
+  if (elsewhere) {
+    Begin(ScanStep::kFilter);
+    const Eigen::Matrix3d doubt = DoubtOfStep(trail.FromLast(step.T_track_robot));
+    if (!filter->GoOnAt(*elsewhere)) filter->Predict(MotionTo(keyframe, step, step_covariance));
+    step_covariance += doubt;
+  } else if (!trail.empty()) {
     Begin(ScanStep::kFilter);
     filter->Predict(MotionTo(keyframe, step, step_covariance));
     Begin(ScanStep::kRevisit);
@@ -120,6 +125,7 @@ void Mapper::State::CloseLargeLoop() {
   const auto path = trail.PathWithLoop(loop->relation(), believed.values(), options.pose_graph);
   if (!path) return;  // The loop is not stored, so that it will be searched for again.
   filter->Rebase(*path);
+  filter->LearnLoop({loop->old, loop->T_old_recent, loop->covariance});
   trail.AddLoop(loop->relation());
   trail.ConfirmTentative();
   drawing.StartAgain(trail.made());

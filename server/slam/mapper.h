@@ -122,7 +122,8 @@ class Mapper {
   // scans have to confirm that (Recovery::Suggest). False, and nothing is changed: the robot has been found or lost
   // anew meanwhile, has itself found another place, or is only localised and looks for itself in the map of its site.
   bool SuggestPlace(Stamp seen, const Pose2& T_map_robot, std::shared_ptr<const SearchedMap> map);
-  // While there is such a place, the state is not complete without that map: it must not be saved.
+  // Such a place is not part of the saved state, because it comes with a map: who saves the state has to forget the
+  // place, or to suggest it again here and after loading.
   [[nodiscard]] bool has_suggestion() const;
   void ForgetSuggestion();
   // Where a robot may be whose place is not known: places that were found and are not confirmed. Equal weights.

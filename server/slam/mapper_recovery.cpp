@@ -201,7 +201,7 @@ ScanOutcome Mapper::State::Recover(Keyframe keyframe, ScanView view, TrackStep s
     const auto found = recovery.Take({keyframe.scan, OdometryOrNone(T_odom_robot)}, step, view.points_robot,
                                      PathMap(trail, path, options.recovery.place, options.self_check.near_m));
     if (found && found->on_path) return GoOnAlongPath(parallel_for);
-    if (found) return GoOnAt(found->place, std::move(keyframe), std::move(view), step, parallel_for);
+    if (found) return GoOnAt(*found, std::move(keyframe), std::move(view), step, parallel_for);
   }
   return ReportRecovery(stamp, T_odom_robot, step.T_track_robot);
 }
@@ -216,6 +216,15 @@ ScanOutcome Mapper::State::GoOnAlongPath(const ParallelFor& parallel_for) {
   }
   const Recovery::Held& now = held.back();
   return Report(now.keyframe.scan->stamp, now.keyframe.T_odom_robot, now.step, true);
+}
+
+// By how much a step from the last keyframe to a place of the map is uncertain because the pose of that keyframe in the
+// map is: the covariance of (x, y, theta) in the frame in which the step starts.
+Eigen::Matrix3d Mapper::State::DoubtOfStep(const Pose2& T_prev_curr) const {
+  const FilterEstimate last = filter->estimate();
+  const Eigen::Matrix3d J =
+      J_compose_right(last.T_map_robot, T_prev_curr).inverse() * J_compose_left(last.T_map_robot, T_prev_curr);
+  return J * last.covariance * J.transpose();
 }
 
 // The place found as seen from the nearest keyframe. Each hypothesis has a map of its own, in which that place is not
@@ -236,8 +245,11 @@ RevisitObservation Mapper::State::SeenFromNearest(const FoundPlace& place) const
 }
 
 // The robot has been found: the path goes on there, with a step from the last keyframe that no scan or odometry shows.
-ScanOutcome Mapper::State::GoOnAt(const FoundPlace& place, Keyframe keyframe, ScanView view, TrackStep step,
+// A place that only the map of others shows is not told as seen from a keyframe: by this the error of the map of one
+// hypothesis would become that of the place in all others.
+ScanOutcome Mapper::State::GoOnAt(const Recovery::Found& found, Keyframe keyframe, ScanView view, TrackStep step,
                                   const ParallelFor& parallel_for) {
+  const FoundPlace& place = found.place;
   const Stamp stamp = keyframe.scan->stamp;
   const Pose2 T_odom_robot = keyframe.T_odom_robot;
   const Pose2 T_map_last = believed_path()[trail.size() - 1];
@@ -250,7 +262,13 @@ ScanOutcome Mapper::State::GoOnAt(const FoundPlace& place, Keyframe keyframe, Sc
   blind.Found(R * place.covariance * R.transpose());
   recovery.End();
   self_check.Forget();
-  AddKeyframe(std::move(keyframe), std::move(view), step, blind.TakeCovariance(), parallel_for, SeenFromNearest(place));
+  Regained regained;
+  if (found.elsewhere) {
+    regained.elsewhere = {place.T_map_robot, place.covariance};
+  } else {
+    regained.revisit = SeenFromNearest(place);
+  }
+  AddKeyframe(std::move(keyframe), std::move(view), step, blind.TakeCovariance(), parallel_for, std::move(regained));
   speed.Forget();
   return Report(stamp, T_odom_robot, step, true);
 }

@@ -88,11 +88,17 @@ struct Mapper::State {
                        const ParallelFor& parallel_for);
   [[nodiscard]] GridLocalisationOptions LocalisationOptions() const;
   ScanOutcome GoOnAlongPath(const ParallelFor& parallel_for);
-  ScanOutcome GoOnAt(const FoundPlace& place, Keyframe keyframe, ScanView view, TrackStep step,
+  ScanOutcome GoOnAt(const Recovery::Found& found, Keyframe keyframe, ScanView view, TrackStep step,
                      const ParallelFor& parallel_for);
-  // `revisit`: the old keyframe that the scan is known to show; without it, one is searched for.
-  void AddKeyframe(Keyframe keyframe, ScanView view, const TrackStep& step, const Eigen::Matrix3d& step_covariance,
-                   const ParallelFor& parallel_for, std::optional<RevisitObservation> revisit = std::nullopt);
+  // What is known of a keyframe besides its step: the old keyframe that the scan shows, or the place of the robot in
+  // the map of others. With neither, an old keyframe is searched for.
+  struct Regained {
+    std::optional<RevisitObservation> revisit;
+    std::optional<FilterEstimate> elsewhere;
+  };
+  void AddKeyframe(Keyframe keyframe, ScanView view, const TrackStep& step, Eigen::Matrix3d step_covariance,
+                   const ParallelFor& parallel_for, Regained regained = {});
+  [[nodiscard]] Eigen::Matrix3d DoubtOfStep(const Pose2& T_prev_curr) const;
   [[nodiscard]] RevisitObservation SeenFromNearest(const FoundPlace& place) const;
   StepMotion MotionTo(const Keyframe& keyframe, const TrackStep& step, const Eigen::Matrix3d& covariance);
   void CloseLargeLoop();

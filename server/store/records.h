@@ -85,7 +85,9 @@ struct LocaliseTaken {
   std::uint32_t epoch = 0;
 };
 // A job has found a robot whose place was not known: it was at this pose when it saw the scan of this stamp. Its next
-// scans confirm that in the `map` around that pose.
+// scans confirm that in the `map` around that pose. It takes the place of an earlier one. While such a place waits for
+// the scans, it is repeated after each checkpoint, which does not hold it. Without tiles: no place is looked at any
+// more.
 struct PlaceSuggested {
   Stamp seen = 0;
   Pose2 T_map_robot;

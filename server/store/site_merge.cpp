@@ -28,6 +28,13 @@ SmoothedPaths Shown(const Versions& versions, std::uint32_t enabled) {
 // ones a site knows count as completed.
 constexpr std::uint32_t kNever = std::numeric_limits<std::uint32_t>::max();
 
+tl::unexpected<Status> CannotBeMoved(std::uint64_t session, const std::string& why) {
+  return Fail(StatusCode::kFailedPrecondition,
+              "session " + std::to_string(session) + " cannot be moved: " + why +
+                  ". Merge the sites the other way round, so that the other one is moved, or remove the session before "
+                  "(cairn site delete-session)");
+}
+
 class Merge {
  public:
   Merge(Store& store, SiteContents into, SiteContents from, const Pose2& T_into_from)
@@ -75,7 +82,7 @@ class Merge {
   Result<void> Journals(const SiteContents& of, std::uint32_t shift, bool moves) {
     for (const auto& [id, session] : of.sessions) {
       std::uint64_t first = 0, next = 1;
-      bool whole = true;
+      bool whole = true, place_waits = false;
       const auto take = [&, id = id](std::uint64_t number, std::string_view bytes) -> Result<void> {
         auto batch = BatchOf(bytes);
         if (!batch) return tl::unexpected(batch.error());
@@ -94,16 +101,18 @@ class Merge {
             relocalise->T_map_robot = T_into_from_ * *relocalise->T_map_robot;
           }
           const auto* const localise = std::get_if<LocaliseTaken>(&entry);
-          if (std::holds_alternative<PlaceSuggested>(entry) && moves) {
-            return Fail(StatusCode::kFailedPrecondition, "a job has looked for the robot of session " +
-                                                             std::to_string(id) +
-                                                             " in the map of its site; such a session cannot be moved");
+          auto* const suggested = std::get_if<PlaceSuggested>(&entry);
+          if (suggested != nullptr && !suggested->map.tiles.empty() && moves) {
+            // The map around the place is one of the site before. A place that no scan has confirmed is given up, and
+            // the robot is looked for again.
+            changed = place_waits = true;
+            suggested->map.tiles.clear();
           }
-          if (localise != nullptr && !localise->maps_again && moves) {
-            return Fail(StatusCode::kFailedPrecondition,
-                        "session " + std::to_string(id) +
-                            " was only localised in the map of its site; such a session cannot be moved");
-          }
+          if (place_waits && std::holds_alternative<ScanTaken>(entry))
+            return CannotBeMoved(id,
+                                 "a job has found its robot in the map of its site, which scans may have confirmed");
+          if (localise != nullptr && !localise->maps_again && moves)
+            return CannotBeMoved(id, "its robot was only localised in the map of its site");
           auto* const correction = std::get_if<CorrectionTaken>(&entry);
           if (correction == nullptr) continue;
           changed = true;
@@ -125,10 +134,9 @@ class Merge {
         whole = checkpoint && !*checkpoint;
       }
       if (moves && !whole) {
-        return Fail(StatusCode::kFailedPrecondition,
-                    "the journal of session " + std::to_string(id) +
-                        (first == 0 ? " has no entries" : " begins at entry " + std::to_string(first)) +
-                        ", because older ones were removed (store.max_gib); such a session cannot be moved");
+        return CannotBeMoved(
+            id, (first == 0 ? "its journal has no entries" : "its journal begins at entry " + std::to_string(first)) +
+                    ", because older ones were removed (store.max_gib)");
       }
     }
     return {};

@@ -29,7 +29,7 @@ SLAM_ROOMS = {
     "recovery": ["loops", "tracking", "matching", "trail", "motion", "scan"],  # A robot that was not watched.
     "known_grid": ["recovery", "loops", "tracking", "matching", "motion", "grid", "trail", "scan"],  # A map of others.
     "drawing": ["trail", "grid"],  # The map of the robot along its path.
-    "smoothing": ["trail", "grid"],  # Paths and maps after the fact.
+    "smoothing": ["trail", "grid", "scan"],  # Paths and maps after the fact.
     "site": ["recovery", "loops", "smoothing", "graph", "matching", "trail", "motion", "scan"],  # Several sessions as one graph.
 
     "motion_models": ["motion", "random"],  # Learnt or sampled models of a step.

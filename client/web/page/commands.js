@@ -17,6 +17,7 @@ const post = (path, body, bearer) => fetch(path, {
   method: 'POST', headers: { 'Content-Type': 'application/json', Authorization: `Bearer ${bearer}` }, body: JSON.stringify(body ?? {}),
 });
 
+// What is wrong, in words; '' where it is the right one.
 export async function useToken(text) {
   let answer = null;
   // Without an answer nobody knows whether it is the right one.
@@ -24,16 +25,20 @@ export async function useToken(text) {
     if (tries > 0) await new Promise((done) => setTimeout(done, 1000));
     answer = await post('/api/token', {}, text).catch(() => null);
   }
-  if (!answer?.ok) return false;
+  if (!answer) return 'cairn-web does not answer. Try again.';
+  if (!answer.ok) return answer.status === 401 ? 'This is not the token.' : `cairn-web does not say whether this is the token (${answer.status}). Try again.`;
   sessionStorage.setItem(KEY, text);
-  return true;
+  return '';
 }
 
 export async function tokenOfAddress() {
   const match = /[#&]token=([^&]+)/.exec(location.hash);
   if (!match) return;
   history.replaceState(null, '', location.pathname + location.search);
-  await useToken(decodeURIComponent(match[1]));
+  let text = match[1];
+  try { text = decodeURIComponent(text); } catch { /* It holds a % that stands for itself. */ }
+  const wrong = await useToken(text);
+  if (wrong) say(`Commands stay locked. ${wrong}`);
 }
 
 // The answer, or null after it was said what went wrong.

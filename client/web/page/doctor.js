@@ -1,6 +1,6 @@
 // Why robots are not on the map, or what else is wrong: what `cairn ros2 doctor` says, in the same words, and robots that have no session. Names
 // in it come from the network, so everything is set as text.
-import { element, keyed, setText } from '/panels.js';
+import { counted, element, keyed, setText } from '/panels.js';
 
 const $ = (id) => document.getElementById(id);
 
@@ -62,6 +62,6 @@ export function showDoctor(doctor) {
     return item;
   }, (item, stray) => {
     setText(item.querySelector('.title'), stray.robot);
-    setText(item.querySelector('.detail'), `${stray.why} (${stray.dropped} scans dropped)`);
+    setText(item.querySelector('.detail'), `${stray.why} (${counted(stray.dropped, 'scan')} dropped)`);
   });
 }

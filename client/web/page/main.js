@@ -76,16 +76,12 @@ function showSites() {
 }
 
 function show(now) {
-  state = now;
+  state = { robots: [], jobs: [], map: null, ...now };  // Without a site the server says nothing of these.
   showSites();
   panels.showConnection(state, streamLost);
   panels.showEmptyMap(state);
-  if (!state.site) {
-    panels.showServer({ ...state, robots: [] }, may());
-    if (state.sites.length > 0) choose(state.sites[0]);
-    return;
-  }
-  document.title = `${state.site} – Cairn`;
+  if (!state.site && state.sites.length > 0) { choose(state.sites[0]); return; }
+  document.title = state.site ? `${state.site} – Cairn` : 'Cairn';
   if (!map && state.map) {
     map = new SiteMap($('map'), state.site, state.map);
     for (const name of LAYERS) map.shown[name] = $(`show-${name}`).checked;
@@ -103,7 +99,7 @@ function show(now) {
   panels.showJobs(state, may(), (id) => command(`/api/jobs/${id}/cancel`, {}, 'The job is cancelled.'));
   panels.showMap(state, may(), (version) => command(`/api/sites/${state.site}/enable`, { version }, `Version ${version} is enabled.`));
   panels.showServer(state, may());
-  askEdits();
+  if (state.site) askEdits();
 }
 
 function relocalise(name, how, pose) {
@@ -122,10 +118,11 @@ function setMode(name, mode) {
 }
 
 function showFlow() {
+  const latency = (at) => (sample) => (sample[1] > 0 ? sample[at] : null);  // Without scans there is none.
   plot($('flow'), flow, [
     { name: 'used', value: (sample) => sample[1], style: 'first' }, { name: 'dropped', value: (sample) => sample[2], style: 'second' }], '/s');
   plot($('latency'), flow, [
-    { name: 'median', value: (sample) => sample[3], style: 'first' }, { name: '99 %', value: (sample) => sample[4], style: 'third' }], 'ms');
+    { name: 'median', value: latency(3), style: 'first' }, { name: '99 %', value: latency(4), style: 'third' }], 'ms');
 }
 
 // They are asked for when the server says that they have changed.
@@ -218,13 +215,13 @@ $('unlock').addEventListener('click', () => { $('token-wrong').hidden = true; $(
 $('token-dialog').querySelector('form').addEventListener('submit', async (event) => {
   if (event.submitter?.value !== 'use') return;
   event.preventDefault();
-  if (await useToken($('token').value.trim())) {
-    $('token-dialog').close();
-    say('Commands are unlocked.');
-    if (state) show(state);
-  } else {
-    $('token-wrong').hidden = false;
-  }
+  const wrong = await useToken($('token').value.trim());
+  panels.setText($('token-wrong'), wrong);
+  $('token-wrong').hidden = !wrong;
+  if (wrong) return;
+  $('token-dialog').close();
+  say('Commands are unlocked.');
+  if (state) show(state);
 });
 
 onThemeChange(() => { if (state?.site) show(state); askPaths(); });

@@ -35,11 +35,12 @@ function facts(list, rows) {
 }
 
 const scanSensors = (robot) => robot.sensors.filter((sensor) => sensor.sensor !== 'odometry');
+export const counted = (number, thing) => `${number} ${thing}${number === 1 ? '' : 's'}`;
 const droppedOf = (sensor) => Object.values(sensor.dropped).reduce((sum, count) => sum + count, 0);
 
 function describeSensor(sensor) {
   const reasons = Object.entries(sensor.dropped).map(([reason, count]) => `${count} ${reason.replaceAll('_', ' ')}`);
-  return `${sensor.sensor}: ${sensor.received} received, ${sensor.used} used, ${sensor.keyframes} keyframes, ${sensor.waiting} waiting`
+  return `${sensor.sensor}: ${sensor.received} received, ${sensor.used} used, ${counted(sensor.keyframes, 'keyframe')}, ${sensor.waiting} waiting`
     + (reasons.length ? `, dropped: ${reasons.join(', ')}` : ', none dropped')
     + `. Scan to pose ${format(sensor.p50)} ms (median), ${format(sensor.p99)} ms (99 %).`;
 }
@@ -74,7 +75,7 @@ function makeRelocalise(item, robot, onRelocalise) {
 }
 
 // Whether it maps or is only localised, and for those who may command: the other of both.
-const MODES = { map: 'Maps', localise: 'Only localised: nothing is drawn of it' };
+const MODES = { map: 'Draws the map', localise: 'Only localised: nothing is drawn of it' };
 
 function makeMode(item, robot, onMode) {
   element('span', 'mode', item);
@@ -103,7 +104,7 @@ function showMode(item, robot, may) {
 }
 
 export function showRobots(state, may, onChosen, onRelocalise, onMode) {
-  $('robots-empty').hidden = state.robots.length > 0;
+  $('robots-empty').hidden = state.robots.length > 0 || !state.connected;
   keyed($('robots'), state.robots, (robot) => robot.name, (robot) => {
     const item = element('li', 'robot');
     element('span', 'dot', item);
@@ -133,7 +134,7 @@ export function showRobots(state, may, onChosen, onRelocalise, onMode) {
     const used = scanSensors(robot).reduce((sum, sensor) => sum + sensor.used, 0);
     const dropped = scanSensors(robot).reduce((sum, sensor) => sum + droppedOf(sensor), 0);
     const place = pose ? `${pose.x.toFixed(2)}, ${pose.y.toFixed(2)} m, ${Math.round((pose.theta * 180) / Math.PI) || 0}°, ±${pose.ellipse ? pose.ellipse[0].toFixed(2) : '?'} m${isFragment(robot) ? ' from its start' : ''}` : 'no pose yet';
-    setText(item.querySelector('.where'), `${place} · ${used} scans used${dropped ? `, ${dropped} dropped` : ''}`);
+    setText(item.querySelector('.where'), `${place} · ${counted(used, 'scan')} used${dropped ? `, ${dropped} dropped` : ''}`);
     const note = item.querySelector('.note');
     note.hidden = !robot.note;
     setText(note, robot.note);
@@ -142,10 +143,11 @@ export function showRobots(state, may, onChosen, onRelocalise, onMode) {
   });
 }
 
+const JOBS = { smooth: 'Smoothing', join: 'Joining robots', relocalise: 'Looking for a robot' };
 const STATES = { queued: ['', 'Queued'], running: ['warn', 'Running'], succeeded: ['good', 'Done'], failed: ['bad', 'Failed'], cancelled: ['', 'Cancelled'] };
 
 export function showJobs(state, may, onCancel) {
-  $('jobs-empty').hidden = state.jobs.length > 0;
+  $('jobs-empty').hidden = state.jobs.length > 0 || !state.connected;
   keyed($('jobs'), state.jobs, (job) => job.id, (job) => {
     const item = element('li', 'job');
     element('span', 'title', item);
@@ -160,7 +162,7 @@ export function showJobs(state, may, onCancel) {
     cancel.addEventListener('click', () => onCancel(job.id));
     return item;
   }, (item, job) => {
-    setText(item.querySelector('.title'), `${job.kind === 'smooth' ? 'Smoothing' : job.kind} ${job.id}`);
+    setText(item.querySelector('.title'), `${JOBS[job.kind] ?? job.kind} ${job.id}`);
     const [style, words] = STATES[job.state] ?? ['', job.state];
     const pill = item.querySelector('.pill');
     pill.className = `pill ${style}`;
@@ -180,7 +182,7 @@ export function showMap(state, may, onEnable) {
   const { map } = state;
   const versions = map?.versions ?? [];
   facts($('map-facts'), !map ? [['Map', 'nothing drawn yet']] : [
-    ['Size', map.tiles === 0 ? 'nothing drawn yet' : `${(map.bounds[2] - map.bounds[0]).toFixed(0)} × ${(map.bounds[3] - map.bounds[1]).toFixed(0)} m, ${map.tiles} tiles`],
+    ['Size', map.tiles === 0 ? 'nothing drawn yet' : `${(map.bounds[2] - map.bounds[0]).toFixed(0)} × ${(map.bounds[3] - map.bounds[1]).toFixed(0)} m, ${counted(map.tiles, 'tile')}`],
     ['Cells', `${Math.round(map.resolution * 1000) / 10} cm`], ['Epoch', String(map.epoch)]]);
   keyed($('versions'), versions, (version) => version.version, (version) => {
     const item = element('li', 'version');
@@ -200,8 +202,11 @@ export function showMap(state, may, onEnable) {
     setText(pill, 'Enabled');
     item.querySelector('button').hidden = version.enabled || !may;
   });
+  const enabled = versions.find((version) => version.enabled)?.version;
   $('rollback').hidden = !may || versions.length < 2;
-  $('save').hidden = !may;
+  $('rollback').disabled = !versions.some((version) => version.version < enabled);
+  $('save').hidden = !may || !state.site;
+  $('download').hidden = !state.site;
   for (const kind of ['yaml', 'png']) {
     if (state.site) $(`download-${kind}`).href = `/api/sites/${state.site}/map.${kind}`;
   }

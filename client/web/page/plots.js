@@ -14,14 +14,15 @@ function niceTop(most) {
   return most;
 }
 
-// lines: [{ values: sample -> number, style, name }]
+// lines: [{ value: sample -> number, or null where there is none, style, name }]
 export function plot(figure, samples, lines, unit) {
   figure.querySelector('svg')?.remove();
   const svg = make('svg', { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: 'img', preserveAspectRatio: 'none' }, figure);
   const last = samples[samples.length - 1];
-  const words = lines.map((line) => `${line.name} ${last ? format(line.value(last)) : 'none'} ${unit}`);
-  figure.querySelector('.value').textContent = last ? words.join(', ') : 'nothing yet';
-  svg.setAttribute('aria-label', `Scans of the last minutes. Now: ${last ? words.join(', ') : 'nothing yet'}.`);
+  const words = !last ? 'nothing yet' : lines[0].value(last) === null ? 'no scans now'
+    : `${lines.map((line) => `${line.name} ${format(line.value(last))}`).join(', ')} ${unit}`;
+  figure.querySelector('.value').textContent = words;
+  svg.setAttribute('aria-label', `Scans of the last minutes. Now: ${words}.`);
   const now = last ? last[0] : 0;
   const recent = samples.filter((sample) => now - sample[0] < LONGEST_MS);
   const span = Math.max(SHORTEST_MS, now - (recent[0]?.[0] ?? now));
@@ -33,7 +34,7 @@ export function plot(figure, samples, lines, unit) {
     make('text', { x: LEFT - 5, y: y(value) + 3, 'text-anchor': 'end', class: 'plot-text' }, svg).textContent = value;
   }
   for (const line of lines) {
-    const points = recent.map((sample) => `${x(sample[0]).toFixed(1)},${y(line.value(sample)).toFixed(1)}`);
+    const points = recent.filter((sample) => line.value(sample) !== null).map((sample) => `${x(sample[0]).toFixed(1)},${y(line.value(sample)).toFixed(1)}`);
     make('polyline', { points: points.join(' '), class: `plot-line ${line.style}` }, svg);
   }
 }

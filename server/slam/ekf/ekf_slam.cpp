@@ -5,7 +5,6 @@
 
 #include "server/slam/filters/revisit_innovation.h"
 #include "server/slam/landmark_variants/landmark_point.h"
-#include "server/slam/landmarks/innovation.h"
 #include "server/slam/motion/odometry_model.h"
 
 namespace cairn::slam {
@@ -36,23 +35,29 @@ void EkfSlam::Predict(const StepMotion& step) {
   since_anchor_m_ += step.T_prev_curr.translation().norm();
 }
 
-bool EkfSlam::Observe(const RevisitObservation& revisit) {
+EkfSlam::SeenFromAnchor EkfSlam::SeeFromAnchor(const RevisitObservation& revisit) const {
   const Hung& hung = keyframes_[revisit.keyframe];
   const Eigen::Index at = anchors_[hung.anchor].at;
   const Pose2 T_map_anchor = state_.pose(at), T_map_robot = state_.robot();
   const Pose2 T_map_keyframe = T_map_anchor * hung.T_anchor_robot;
-  const Innovation<3> innovation = InnovateRevisit(T_map_keyframe, T_map_robot, revisit);
   const Eigen::Matrix3d J_z_keyframe =
       J_compose_left(T_map_keyframe.Inverse(), T_map_robot) * J_inverse(T_map_keyframe);
-  const Eigen::Matrix3d J_z_anchor = J_z_keyframe * J_compose_left(T_map_anchor, hung.T_anchor_robot);
   const Eigen::Matrix3d J_z_hung = J_z_keyframe * J_compose_right(T_map_anchor, hung.T_anchor_robot);
-  const Eigen::Matrix3d R = revisit.covariance + J_z_hung * hung.covariance * J_z_hung.transpose();
-  const double nis = Nis<3>(innovation.v, state_.InnovationCovariance<3, 3>(innovation.J_z_pose, at, J_z_anchor, R));
+  return {InnovateRevisit(T_map_keyframe, T_map_robot, revisit), at,
+          J_z_keyframe * J_compose_left(T_map_anchor, hung.T_anchor_robot),
+          revisit.covariance + J_z_hung * hung.covariance * J_z_hung.transpose()};
+}
+
+bool EkfSlam::Observe(const RevisitObservation& revisit) {
+  const SeenFromAnchor seen = SeeFromAnchor(revisit);
+  const Innovation<3>& innovation = seen.innovation;
+  const double nis =
+      Nis<3>(innovation.v, state_.InnovationCovariance<3, 3>(innovation.J_z_pose, seen.at, seen.J_z_anchor, seen.R));
   const bool explained = nis < kMaxNis;
   contradictions_.Add(explained);
   if (!explained) return false;
   nis_.Add(nis, 3);
-  state_.Update<3, 3>(innovation.v, innovation.J_z_pose, at, J_z_anchor, R);
+  state_.Update<3, 3>(innovation.v, innovation.J_z_pose, seen.at, seen.J_z_anchor, seen.R);
   moved_path_ = true;
   return true;
 }
@@ -165,6 +170,12 @@ void EkfSlam::Rebase(std::span<const Pose2> path) {
     path_.Set(k, path[k]);
   }
   since_anchor_.T_anchor_robot = keyframes_.back().T_anchor_robot;
+}
+
+// The path follows the loop already, so nothing moves.
+void EkfSlam::LearnLoop(const RevisitObservation& loop) {
+  const SeenFromAnchor seen = SeeFromAnchor(loop);
+  state_.Update<3, 3>(Eigen::Vector3d::Zero(), seen.innovation.J_z_pose, seen.at, seen.J_z_anchor, seen.R);
 }
 
 void EkfSlam::MoveTo(std::span<const Pose2> path) {

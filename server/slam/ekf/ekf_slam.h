@@ -17,6 +17,7 @@
 #include "server/slam/filters/filter.h"
 #include "server/slam/filters/filter_health.h"
 #include "server/slam/landmarks/association.h"
+#include "server/slam/landmarks/innovation.h"
 #include "server/slam/landmarks/landmark_candidates.h"
 
 namespace cairn::slam {
@@ -37,9 +38,10 @@ class EkfSlam final : public Filter {
   void Observe(const KeyframeSight& sight, const ParallelFor& parallel_for) override;
   void Observe(const std::vector<LandmarkSighting>& sightings, double travelled_m);
   void Commit() override;
-  // Moves the means only. The covariance is unchanged and thus larger than necessary.
   [[nodiscard]] bool rebases() const override { return true; }
+  // Moves the means only; what the loop tells reaches the covariance by LearnLoop.
   void Rebase(std::span<const Pose2> path) override;
+  void LearnLoop(const RevisitObservation& loop) override;
   void MoveTo(std::span<const Pose2> path) override;
 
   [[nodiscard]] FilterEstimate estimate() const override { return {state_.robot(), state_.covariance<3, 3>(0, 0)}; }
@@ -91,6 +93,14 @@ class EkfSlam final : public Filter {
   // Whether all indices lie within what they count, with this many keyframes.
   [[nodiscard]] bool IsConsistent(std::size_t keyframes) const;
 
+  // A revisit as a measurement of the robot and of the anchor on which the old keyframe hangs.
+  struct SeenFromAnchor {
+    Innovation<3> innovation;
+    Eigen::Index at = 0;  // First index of the anchor in the state.
+    Eigen::Matrix3d J_z_anchor;
+    Eigen::Matrix3d R;
+  };
+  [[nodiscard]] SeenFromAnchor SeeFromAnchor(const RevisitObservation& revisit) const;
   [[nodiscard]] Association Associate(const LandmarkSighting& sighting, double travelled_m) const;
   void AddLandmark(const LandmarkSighting& sighting, double travelled_m);
   void DropLeastUseful();

@@ -75,8 +75,7 @@ void ErrorEnsemble::LoseAncestors(Errors& errors, double share, int partner) con
 void ErrorEnsemble::Rebase(std::size_t keyframes, const Pose2& T_map_robot, const Eigen::Matrix3d& covariance) {
   path_.assign(keyframes, std::make_shared<const Kept>());
   frozen_path_.Forget();
-  robot_.setZero();
-  Disturb(T_map_robot, covariance);
+  Begin(T_map_robot, covariance);
 }
 
 // The adjoint of the motion, because Exp(error_new) = T_new_old * Exp(error_old) * T_new_old^-1.

@@ -42,6 +42,12 @@ class ErrorEnsemble {
   void Move(const Pose2& T_map_prev, const Pose2& T_prev_curr, const Eigen::Matrix3d& covariance_prev);
   // Adds the noise of a step as the motion model samples it. Any further noise of the step is added by Move.
   void MoveBySampling(const Pose2& T_map_prev, const StepMotion& step, const MotionSampler& sampler);
+  // Replaces the robot's error by one with this covariance of the pose, (x, y, theta) in map, that has nothing to do
+  // with those of past keyframes.
+  void Begin(const Pose2& T_map_robot, const Eigen::Matrix3d& covariance) {
+    robot_.setZero();
+    Disturb(T_map_robot, covariance);
+  }
   // Corrects the robot's error by an observation of an old keyframe, or of something first seen from it.
   // REQUIRES: Keep was called for that keyframe.
   template <int N>

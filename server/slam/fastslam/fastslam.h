@@ -36,6 +36,10 @@ class FastSlam final : public Filter {
            const Pose2& T_map_robot_start, std::uint64_t seed, MotionSampler sampler = {});
 
   void Predict(const StepMotion& step) override;
+  bool GoOnAt(const FilterEstimate& place) override {
+    set_.GoOnAt(place);
+    return true;
+  }
   bool Observe(const RevisitObservation& revisit) override;
   void Observe(const KeyframeSight& sight, const ParallelFor& parallel_for) override;
   // Association, proposal and weights, sampling, landmark updates and new landmarks (Tables 4.3-4.8).

@@ -56,6 +56,15 @@ void ParticleSet::PredictBySampling(const StepMotion& measured) {
   }
 }
 
+void ParticleSet::GoOnAt(const FilterEstimate& place) {
+  errors_.Begin(place.T_map_robot, place.covariance);
+  for (Particle& particle : particles_) {
+    particle.T_map_robot = place.T_map_robot;
+    particle.covariance = place.covariance;
+  }
+  sample_due_ = true;
+}
+
 bool ParticleSet::Observe(const RevisitObservation& revisit) {
   std::vector<Innovation<3>> innovations;
   innovations.reserve(particles_.size());

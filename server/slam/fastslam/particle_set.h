@@ -60,6 +60,10 @@ class ParticleSet {
   void PredictBySampling(const StepMotion& measured);
   [[nodiscard]] bool samples_motion() const { return sampler_.draw != nullptr; }
 
+  // Puts every particle where the robot was found, with this doubt (filter.h: GoOnAt). Their weights stay, because this
+  // says nothing of the way before.
+  void GoOnAt(const FilterEstimate& place);
+
   // Proposal and weight for one revisit. False if no particle explains it; then nothing changes.
   bool Observe(const RevisitObservation& revisit);
   // Proposal and weight for one innovation of a landmark. Its squared Mahalanobis distance counts at most as

@@ -81,6 +81,10 @@ class Filter {
   virtual ~Filter() = default;
 
   virtual void Predict(const StepMotion& step) = 0;
+  // Instead of Predict, for a robot whose way from the last keyframe nobody knows, and that was found in the map of
+  // others: every hypothesis goes on at this pose of `map`, wherever it has the places that the robot has seen before.
+  // False, and nothing changes: the filter needs a step.
+  virtual bool GoOnAt(const FilterEstimate& /*place*/) { return false; }
   // Uses a revisit. False if the filter cannot explain it or does not use revisits; then nothing changes.
   virtual bool Observe(const RevisitObservation& revisit) = 0;
   virtual void Observe(const KeyframeSight& sight, const ParallelFor& parallel_for) = 0;
@@ -92,6 +96,9 @@ class Filter {
   // hypothesis takes this path, and its landmarks move with the keyframes from which they were seen.
   // REQUIRES: rebases(), and called between steps.
   virtual void Rebase(std::span<const Pose2> /*path*/) {}
+  // After Rebase: the large loop that `path` follows has measured the last keyframe from an old one. For filters whose
+  // doubt Rebase does not replace. REQUIRES: rebases(), and called between steps.
+  virtual void LearnLoop(const RevisitObservation& /*loop*/) {}
   // Moves the path of hypothesis 0 to `path`, which has one pose per committed keyframe, and all that is believed with
   // it: at each keyframe the other hypotheses and what was seen from it keep their places relative to hypothesis 0. In
   // contrast to Rebase no doubt is removed: what a job has found out from other robots moves the path, but does not

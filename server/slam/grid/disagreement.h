@@ -5,7 +5,10 @@
 #pragma once
 
 #include <cstdint>
+#include <set>
+#include <vector>
 
+#include "common/geometry/pose2.h"
 #include "common/sensor/scan.h"
 #include "server/slam/grid/occupancy_grid.h"
 
@@ -23,5 +26,15 @@ class Disagreement {
   double sum_m2_ = 0.0;
   std::int64_t beams_ = 0;
 };
+
+// What Disagreement::Add looks at: squares of kBlockCells x kBlockCells cells. A block is named as chunks are; block
+// (0, 0) has its lower-left corner at the map origin.
+inline constexpr int kBlockCells = 16;
+
+// The blocks in which Add looks for occupied cells, and maybe a few next to them.
+[[nodiscard]] std::set<ChunkKey> BlocksComparedWith(const Scan& scan, const Pose2& T_map_robot,
+                                                    const GridOptions& options);
+// Adds the blocks of a chunk in which Add would not find the same cells occupied. Null: there is no such chunk.
+void AddChangedBlocks(const ChunkKey& key, const GridChunk* before, const GridChunk* after, std::set<ChunkKey>& blocks);
 
 }  // namespace cairn::slam

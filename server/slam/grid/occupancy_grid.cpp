@@ -71,11 +71,11 @@ OccupancyGrid::OccupancyGrid(const GridOptions& options, const Chunks& shared) :
   for (const auto& [key, chunk] : shared) slots_[key].shared = chunk;
 }
 
-void OccupancyGrid::Draw(const Scan& scan, const Pose2& T_map_robot) {
+void OccupancyGrid::Draw(const Scan& scan, const Pose2& T_map_robot, const Wants& wants) {
   const RasterOptions raster{options_.resolution_m, options_.max_ray_m, options_.no_return_free_m,
                              options_.model == GridModel::kTriangular ? options_.hit_spread_m : 0.0};
   // A scan touches few chunks, but goes from one to the next in every row of cells.
-  std::vector<std::pair<int, GridChunk*>> chunks;  // Those of one row of chunks, by their x.
+  std::vector<std::pair<int, GridChunk*>> chunks;  // Those of one row of chunks, by their x; null: not wanted.
   int row = std::numeric_limits<int>::min();
   static_assert(kTileCells % ScanRaster::kPiece == 0);  // A piece lies in one chunk.
   raster_.Rasterise(scan, T_map_robot, raster, [&](GridCell first, const ScanRaster::Piece& marks) {
@@ -83,7 +83,8 @@ void OccupancyGrid::Draw(const Scan& scan, const Pose2& T_map_robot) {
     if (key.y != row) chunks.clear();
     row = key.y;
     auto chunk = std::ranges::find(chunks, key.x, &std::pair<int, GridChunk*>::first);
-    if (chunk == chunks.end()) chunk = chunks.insert(chunk, {key.x, &Writable(key)});
+    if (chunk == chunks.end()) chunk = chunks.insert(chunk, {key.x, !wants || wants(key) ? &Writable(key) : nullptr});
+    if (chunk->second == nullptr) return;
     std::int16_t* cells = chunk->second->log_odds.data() + IndexInChunk(first, key);
     if (adds_up_) return AddUp(marks, cells);
     for (std::size_t i = 0; i < marks.size(); ++i)

@@ -8,6 +8,7 @@
 #include <array>
 #include <compare>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <set>
@@ -75,6 +76,8 @@ struct GridOptions {
   double max_ray_m = 25.0;
   double no_return_free_m = 0.0;
   double hit_spread_m = 0.15;  // The thesis prints no value.
+
+  bool operator==(const GridOptions&) const = default;
 };
 void Visit(OptionVisitor& visitor, GridOptions& options);
 
@@ -91,8 +94,11 @@ class OccupancyGrid {
   OccupancyGrid(OccupancyGrid&&) = default;
   OccupancyGrid& operator=(OccupancyGrid&&) = default;
 
-  // Draws one scan taken at this pose. REQUIRES: the scan passed ValidateScan, and the pose is finite.
-  void Draw(const Scan& scan, const Pose2& T_map_robot);
+  using Wants = std::function<bool(const ChunkKey& key)>;
+  // Draws one scan taken at this pose. `wants`, if given, is asked once about every chunk in which the scan changes
+  // cells, and only those chunks change for which it says yes. REQUIRES: the scan passed ValidateScan, and the pose is
+  // finite.
+  void Draw(const Scan& scan, const Pose2& T_map_robot, const Wants& wants = {});
   // Replaces all chunks by those of another grid with the same options. All chunks of both grids count as
   // changed.
   void ReplaceBy(OccupancyGrid&& other);

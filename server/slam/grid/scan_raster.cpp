@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <span>
 
 #include "common/geometry/transform2.h"
 #include "server/slam/scan/beam_points.h"
@@ -55,6 +56,7 @@ void ScanRaster::MarkAll(const Scan& scan, const Pose2& T_map_robot, const Raste
 void ScanRaster::FindRays(const Scan& scan, const Pose2& T_map_laser, const RasterOptions& options) {
   rays_.clear();
   const double cos_tilt = std::cos(scan.tilt_rad);
+  const std::span<const Eigen::Vector2d> directions = directions_.Of(scan);
   const Transform2 to_map(T_map_laser);
   for (std::size_t beam = 0; beam < scan.ranges_m.size(); ++beam) {
     const BeamClass kind = ClassifyRange(scan.ranges_m[beam], scan.range_min_m, scan.range_max_m);
@@ -67,8 +69,7 @@ void ScanRaster::FindRays(const Scan& scan, const Pose2& T_map_laser, const Rast
       hit = false;
     }
     if (range <= 0.0) continue;
-    const double bearing = scan.angle_first_rad + static_cast<double>(beam) * scan.angle_step_rad;
-    rays_.push_back({CellOf(to_map * OnGround(range, bearing, cos_tilt), options.resolution_m), hit});
+    rays_.push_back({CellOf(to_map * OnGround(range, directions[beam], cos_tilt), options.resolution_m), hit});
   }
 }
 

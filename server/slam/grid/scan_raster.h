@@ -13,6 +13,7 @@
 
 #include "common/geometry/pose2.h"
 #include "common/sensor/scan.h"
+#include "server/slam/scan/beam_points.h"
 
 namespace cairn::slam {
 
@@ -76,6 +77,7 @@ class ScanRaster {
                   static_cast<std::size_t>(x - low_.x)];
   }
 
+  BeamDirections directions_;
   GridCell low_{};              // Lowest cell of the scratch area, which contains all rays.
   int width_ = 0, height_ = 0;  // Its size; the width is a multiple of kPiece.
   std::vector<Ray> rays_;

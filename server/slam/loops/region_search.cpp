@@ -58,10 +58,23 @@ class BranchAndBound {
     best_.bound = static_cast<std::int64_t>(min_score * full);
     std::vector<Block> top;
     const int level = pyramid_.levels() - 1;
-    for (int turn = 0; turn < static_cast<int>(turned_.size()); ++turn)
-      for (int y = -reach_cells_; y <= reach_cells_; y += 1 << level)
-        for (int x = -reach_cells_; x <= reach_cells_; x += 1 << level) top.push_back({turn, x, y, 0});
-    Descend(std::move(top), level);
+    const int side = 1 << level;
+    std::vector<std::int64_t> bounds(static_cast<std::size_t>(2 * reach_cells_ / side + 1));  // Those of a row.
+    for (int turn = 0; turn < static_cast<int>(turned_.size()) && scored_ <= kMaxBlocks; ++turn) {
+      for (int y = -reach_cells_; y <= reach_cells_ && scored_ <= kMaxBlocks; y += side) {
+        scored_ += static_cast<int>(bounds.size());
+        pyramid_.SumsOfRow(turned_[static_cast<std::size_t>(turn)], -reach_cells_, y, bounds);
+        int x = -reach_cells_;
+        for (const std::int64_t bound : bounds) {
+          if (bound > best_.bound) top.push_back({turn, x, y, bound});
+          x += side;
+        }
+      }
+    }
+    if (scored_ <= kMaxBlocks) {
+      std::erase_if(top, [&](const Block& block) { return Excluded(block, level); });
+      Search(std::move(top), level);
+    }
     const bool complete = scored_ <= kMaxBlocks;
     if (!found_ && complete) return std::nullopt;
     return RegionPeak{PoseOf(best_), static_cast<double>(best_.bound) / full, complete};
@@ -87,7 +100,6 @@ class BranchAndBound {
     });
   }
 
-  // Depth first, in the order of the bounds; skips blocks that cannot exceed the best score.
   void Descend(std::vector<Block> blocks, int level) {
     std::erase_if(blocks, [&](const Block& block) { return Excluded(block, level); });
     for (Block& block : blocks) {
@@ -95,6 +107,11 @@ class BranchAndBound {
       block.bound =
           pyramid_.SumOfBest(level, turned_[static_cast<std::size_t>(block.turn)], block.x, block.y, best_.bound);
     }
+    Search(std::move(blocks), level);
+  }
+
+  // Depth first, in the order of the bounds; skips blocks that cannot exceed the best score.
+  void Search(std::vector<Block> blocks, int level) {
     std::stable_sort(blocks.begin(), blocks.end(), [](const Block& a, const Block& b) { return a.bound > b.bound; });
     for (const Block& block : blocks) {
       if (block.bound <= best_.bound) return;
@@ -171,6 +188,37 @@ LikelihoodPyramid::LikelihoodPyramid(std::span<const SurfacePoint> reference, do
       MaxAhead(levels_.back().data() + row, along.data() + row, width, half);
     levels_.emplace_back(size);
     MaxAhead(along.data(), levels_.back().data(), size, half * width);  // All rows are processed at once.
+  }
+  const std::size_t side = std::size_t{1} << (levels - 1);
+  blocks_in_row_ = (width + side - 1) / side;
+  by_phase_.assign(static_cast<std::size_t>(height_) * side * blocks_in_row_, 0);
+  for (std::size_t row = 0; row < static_cast<std::size_t>(height_); ++row)
+    for (std::size_t column = 0; column < width; ++column)
+      by_phase_[(row * side + column % side) * blocks_in_row_ + column / side] = levels_.back()[row * width + column];
+}
+
+void LikelihoodPyramid::SumsOfRow(std::span<const Cell> cells, int x, int y, std::span<std::int64_t> sums) const {
+  constexpr std::size_t kAtOnce = 257;  // The sum of so many values of at most 255 fits into 16 bits.
+  const int shift = levels() - 1, side = 1 << shift;
+  const int to_column = x + kPad - low_x_, to_row = y + kPad - low_y_;
+  std::ranges::fill(sums, 0);
+  std::vector<std::uint16_t> part(sums.size());
+  for (std::size_t first = 0; first < cells.size(); first += kAtOnce) {
+    std::ranges::fill(part, std::uint16_t{0});
+    for (const Cell& cell : cells.subspan(first, std::min(kAtOnce, cells.size() - first))) {
+      const int column = cell.x + to_column, row = cell.y + to_row;
+      if (row < 0 || row >= height_) continue;
+      // Rounded down also where the column is negative.
+      const std::ptrdiff_t block = column >> shift;
+      const auto begin = std::max<std::ptrdiff_t>(0, -block);
+      const auto end = std::min(std::ssize(part), static_cast<std::ptrdiff_t>(blocks_in_row_) - block);
+      const std::size_t phase = static_cast<std::size_t>(row) * static_cast<std::size_t>(side) +
+                                static_cast<std::size_t>(column & (side - 1));
+      const std::uint8_t* values = by_phase_.data() + phase * blocks_in_row_;
+      std::uint16_t* to = part.data();
+      for (std::ptrdiff_t i = begin; i < end; ++i) to[i] = static_cast<std::uint16_t>(to[i] + values[block + i]);
+    }
+    for (std::size_t i = 0; i < part.size(); ++i) sums[i] += part[i];
   }
 }
 

@@ -39,6 +39,9 @@ class LikelihoodPyramid {
   };
   // The sum of Best over cells that are moved by (x, y), or, if it is at most `enough`, any number that is.
   [[nodiscard]] std::int64_t SumOfBest(int level, std::span<const Cell> cells, int x, int y, std::int64_t enough) const;
+  // For each element i of `sums` the sum of Best on the coarsest level over cells that are moved by
+  // (x + i * 2^level, y): a row of blocks side by side, in a fraction of the time that they would take one by one.
+  void SumsOfRow(std::span<const Cell> cells, int x, int y, std::span<std::int64_t> sums) const;
   [[nodiscard]] double cell_m() const { return cell_m_; }
   [[nodiscard]] int levels() const { return static_cast<int>(levels_.size()); }
 
@@ -50,6 +53,10 @@ class LikelihoodPyramid {
   int low_x_ = 0, low_y_ = 0;  // Lowest cell of the points.
   int width_ = 0, height_ = 0;
   std::vector<std::vector<std::uint8_t>> levels_;  // Rasters by level, each row-major, width_ x height_.
+  // The coarsest raster once more: within each row first the columns 0, 2^level, 2 * 2^level..., then those one further
+  // and so on, so that what a point reads for a row of blocks lies side by side.
+  std::vector<std::uint8_t> by_phase_;
+  std::size_t blocks_in_row_ = 0;
 };
 
 struct SearchWindow {

@@ -13,7 +13,7 @@ constexpr std::size_t kMaxRecent = 120;  // Scans that are kept: turning on the 
 constexpr std::size_t kMaxHeld = 60;  // Keyframes that may be added to the path at once: bounds the time of one scan.
 // Scans for which a place that a job has found is looked at: a minute of most lidars.
 constexpr int kMaxScansSuggested = 600;
-// Standard deviations of the place of another map relative to that of the robot.
+// Standard deviations of the place of another map relative to that of the robot, where both show it.
 constexpr double kOtherMapSigmaM = 0.1, kOtherMapSigmaRad = 0.01;
 constexpr double kUnknownM = 1000.0;  // Standard deviation of a place that is not known.
 constexpr double kNever = -1.0;       // No search yet.
@@ -101,7 +101,6 @@ std::optional<FoundPlace> Recovery::ConfirmSuggestion() {
   const Pose2 T_map_robot = suggestion_->place.T_map_track * now.T_track_robot;
   auto place = suggestion_->search.FindNear(*suggestion_->map, recent_, T_map_robot);
   if (place && !ConfirmEachOther(T_map_robot, place->T_map_robot)) place.reset();
-  if (place) place->covariance += PoseCovariance(kOtherMapSigmaM, kOtherMapSigmaRad);
   return place;
 }
 
@@ -139,7 +138,12 @@ void Recovery::Append(const Keyframe& keyframe, const TrackStep& step, std::vect
 std::optional<Recovery::Found> Recovery::Take(const Keyframe& keyframe, const TrackStep& step,
                                               std::vector<SurfacePoint> points_robot, const SearchedMap& map) {
   Append(keyframe, step, std::move(points_robot));
-  if (const auto place = ConfirmSuggestion()) return Found{*place, false};
+  if (auto place = ConfirmSuggestion()) {
+    const bool own = search_.Compare(map, *recent_.back().scan, recent_.back().points, place->T_map_robot) ==
+                     PlaceSearch::Agreement::kAgrees;
+    if (own) place->covariance += PoseCovariance(kOtherMapSigmaM, kOtherMapSigmaRad);
+    return Found{*place, false, !own};
+  }
   const Pose2 T_map_robot = BeliefAt(keyframe.T_odom_robot, step.T_track_robot).T_map_robot;
   contradicted_ = search_.Compare(map, *recent_.back().scan, recent_.back().points, T_map_robot) ==
                   PlaceSearch::Agreement::kContradicts;

@@ -6,7 +6,8 @@
 //  - Otherwise its pose is carried on by odometry where there is any, and the path goes on at the place found.
 //  - Where somebody has said where the robot is, one search near there that finds it is enough (`BeginWhereSaid`).
 //  - Where a job has found the robot in the map of its site, which shows more than that of the robot (`Suggest`), that
-//    was the first of the two searches, and the second one is made in that map.
+//    was the first of the two searches, and the second one is made in that map. If the map of the robot does not show
+//    the place as well, it is no place relative to what the robot has seen before (`Found::elsewhere`).
 //  - A robot that has been followed in the map of others, with too much doubt (`BeginNear`), is found by one search
 //  where
 //    the track leads, and elsewhere by two that agree, like all others.
@@ -59,6 +60,9 @@ class Recovery {
   struct Found {
     FoundPlace place;
     bool on_path = false;  // Then the held keyframes belong to the path.
+    // Only the map of others shows the place. That of the robot may have its places elsewhere, so that this does not
+    // say where the robot is relative to them.
+    bool elsewhere = false;
   };
 
   // `blind` is the noise of motion known by odometry alone.
@@ -136,7 +140,7 @@ class Recovery {
             self.searched_at_m_, self.recent_, self.held_, self.unconfirmed_);
     if constexpr (Archive::kReads) {
       self.search_.Forget();
-      self.suggestion_.reset();  // Nothing is saved while there is one.
+      self.suggestion_.reset();  // Not saved (Mapper::has_suggestion).
       if (archive.ok()) self.RestorePoints();
     }
   }

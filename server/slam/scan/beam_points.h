@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 #include <cmath>
+#include <span>
 #include <vector>
 
 #include "common/sensor/scan.h"
@@ -23,6 +24,22 @@ struct BeamPoint {
 
 [[nodiscard]] std::vector<BeamPoint> PointsOf(const Scan& scan);
 
+[[nodiscard]] inline double BearingOf(const Scan& scan, std::size_t beam) {
+  return scan.angle_first_rad + static_cast<double>(beam) * scan.angle_step_rad;
+}
+
+// Cosine and sine of the bearing of every beam, in the laser frame. Scans of one lidar have the same, so those of the
+// last scan are kept. Not thread-safe.
+class BeamDirections {
+ public:
+  // Valid until the next call.
+  [[nodiscard]] std::span<const Eigen::Vector2d> Of(const Scan& scan);
+
+ private:
+  double first_rad_ = 0.0, step_rad_ = 0.0;
+  std::vector<Eigen::Vector2d> directions_;
+};
+
 // True if the beam after the last one would reach the first one again, to within half a step.
 [[nodiscard]] bool IsFullTurn(const Scan& scan);
 
@@ -38,6 +55,10 @@ struct BeamPoint {
 // shrink by `cos_tilt`.
 [[nodiscard]] inline Eigen::Vector2d OnGround(double range_m, double bearing_rad, double cos_tilt) {
   return {range_m * std::cos(bearing_rad) * cos_tilt, range_m * std::sin(bearing_rad)};
+}
+// The same, for one of BeamDirections.
+[[nodiscard]] inline Eigen::Vector2d OnGround(double range_m, const Eigen::Vector2d& direction, double cos_tilt) {
+  return {range_m * direction.x() * cos_tilt, range_m * direction.y()};
 }
 
 }  // namespace cairn::slam

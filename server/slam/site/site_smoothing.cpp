@@ -36,7 +36,14 @@ class Smoothing {
     if (!all && !JoinByPlaces()) return false;
     // Where nothing was found, there is nothing to fit.
     if (search_ == SiteSearch::kFragments && graph_.relations().empty()) return true;
-    if (!BeginWithBelieved() || !JoinByStarts() || (all && !JoinByPlaces()) || !Refine()) return false;
+    const bool joins = !all && !graph_.relations().empty();
+    if (!BeginWithBelieved()) return false;
+    // A fragment drives on as long as the job takes; to measure the rest can wait until the next job.
+    if (joins && FitsAllTogether()) {
+      NoteBelieved();
+      return true;
+    }
+    if (!JoinByStarts() || (all && !JoinByPlaces()) || !Refine()) return false;
     if (began_with_ > 0 && distrusts_) {
       // Something of what was believed has turned out wrong, and may have misled the rest.
       TakeBack(nothing);
@@ -98,7 +105,7 @@ class Smoothing {
   bool BeginWithBelieved() {
     std::vector<SessionRelation> all;
     for (const Pair& pair : Pairs()) {
-      if (graph_.Together(pair.a, pair.b)) continue;
+      if (RelationsBetween(pair.a, pair.b) > 0) continue;
       std::vector<SessionRelation> believed;
       book_.ForEachBelieved(InBook(pair), [&](const Measurement& one) {
         const auto known = maps_[pair.a].IndexOf(one.known), seen = maps_[pair.b].IndexOf(one.seen);
@@ -219,6 +226,13 @@ class Smoothing {
     return true;
   }
 
+  // Whether no two sessions in one frame contradict each other, also those that are related through others only.
+  [[nodiscard]] bool FitsAllTogether() {
+    return std::ranges::all_of(Pairs(), [this](const Pair& pair) {
+      return !graph_.Together(pair.a, pair.b) || !Contradicts(AgreementBetween(pair.a, pair.b));
+    });
+  }
+
   // False: cancelled.
   bool Try(std::size_t a, std::size_t b, std::span<const SessionRelation> relations) {
     graph_.RemoveBetween(a, b);
@@ -265,9 +279,12 @@ class Smoothing {
   [[nodiscard]] bool IsTrusted(std::size_t a, std::size_t b) {
     if (RelationsBetween(a, b) < kMinRelations) return false;
     const SessionAgreement& agreement = AgreementBetween(a, b);
-    return agreement.places >= kMinComparedPlaces &&
-           agreement.counts.contradicted <= kMaxContradicting * agreement.counts.known() &&
-           static_cast<double>(agreement.contradicting) <= kMaxBadPlaces * static_cast<double>(agreement.places);
+    return agreement.places >= kMinComparedPlaces && !Contradicts(agreement);
+  }
+
+  [[nodiscard]] static bool Contradicts(const SessionAgreement& agreement) {
+    return agreement.counts.contradicted > kMaxContradicting * agreement.counts.known() ||
+           static_cast<double>(agreement.contradicting) > kMaxBadPlaces * static_cast<double>(agreement.places);
   }
 
   [[nodiscard]] PosePath PathOf(std::size_t session) const {

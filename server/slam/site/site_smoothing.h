@@ -44,10 +44,11 @@ struct SmoothedSession {
 };
 
 enum class SiteSearch : std::uint8_t {
-  kAll = 0,    // All sessions are related with each other.
-  kFragments,  // Only sessions whose start is not known are looked for, and only where sessions of a known place have
-               // been.
-  kRobots,     // These, and sessions whose starts are known with each other.
+  kAll = 0,  // All sessions are related with each other.
+  // Only sessions whose start is not known are looked for, and only where sessions of a known place have been. Where
+  // one is joined, other relations are left to the next call: the robot drives on meanwhile.
+  kFragments,
+  kRobots,  // These, and sessions whose starts are known with each other.
 };
 
 // One result per session. `book`: what earlier jobs have measured; what this one does is noted there, also where it is

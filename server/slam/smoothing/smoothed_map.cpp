@@ -1,29 +1,12 @@
 #include "server/slam/smoothing/smoothed_map.h"
 
+#include <array>
 #include <cmath>
+#include <memory>
 #include <utility>
 
 namespace cairn::slam {
 namespace {
-
-struct Drawing {
-  OccupancyGrid grid;
-  Disagreement disagreement;
-};
-
-std::optional<Drawing> DrawAlong(const std::vector<Pose2>& path, const MapperSnapshot& snapshot,
-                                 const GridOptions& options, const std::function<bool()>& next) {
-  Drawing drawing{OccupancyGrid(options), {}};
-  for (std::size_t k = 0; k < snapshot.keyframes.size(); ++k) {
-    if (!next()) return {};
-    if (snapshot.keyframes[k].localized) drawing.grid.Draw(*snapshot.keyframes[k].scan, path[k]);
-  }
-  for (std::size_t k = 0; k < snapshot.keyframes.size(); ++k) {
-    if (!next()) return {};
-    if (snapshot.keyframes[k].localized) drawing.disagreement.Add(*snapshot.keyframes[k].scan, path[k], drawing.grid);
-  }
-  return drawing;
-}
 
 // Of each keyframe, how far its scan disagrees with a map in which it was not drawn: keyframes with odd numbers are
 // compared with the map of those with even numbers, and the other way round. A scan agrees well with a map that it is
@@ -85,6 +68,19 @@ std::optional<std::vector<Pose2>> ChosenPath(const MapperSnapshot& snapshot, con
   return IsClearlySmaller(*sample, *online) ? snapshot.full_path : snapshot.online_path;
 }
 
+// The smoothed one first, because after a job the robot's online path is what the job has smoothed.
+std::array<std::shared_ptr<const DrawnMap>, 2> DrawingsOf(const DrawnMaps* drawn) {
+  if (drawn == nullptr) return {};
+  return {drawn->smoothed, drawn->online};
+}
+
+SmoothedMap MapOf(DrawnMaps maps, std::vector<Pose2> path, DrawnMaps* kept) {
+  SmoothedMap map{std::move(path), OccupancyGrid(maps.smoothed->options, maps.smoothed->chunks), maps.online->Sum(),
+                  maps.smoothed->Sum()};
+  if (kept != nullptr) *kept = std::move(maps);
+  return map;
+}
+
 }  // namespace
 
 std::optional<std::vector<Pose2>> SmoothedPath(const MapperSnapshot& snapshot, const std::function<bool()>& go_on) {
@@ -100,12 +96,13 @@ std::vector<Pose2> SmoothedPath(const MapperSnapshot& snapshot) {
 }
 
 std::optional<SmoothedMap> MapAlong(const MapperSnapshot& snapshot, std::vector<Pose2> path, const GridOptions& options,
-                                    const std::function<bool()>& next) {
-  const auto online = DrawAlong(snapshot.online_path, snapshot, options, next);
+                                    const std::function<bool()>& next, DrawnMaps* drawn) {
+  const std::array earlier = DrawingsOf(drawn);
+  auto online = DrawMap(snapshot, snapshot.online_path, options, earlier, next);
   if (!online) return {};
-  auto smoothed = DrawAlong(path, snapshot, options, next);
+  auto smoothed = DrawMap(snapshot, path, options, earlier, next);
   if (!smoothed) return {};
-  return SmoothedMap{std::move(path), std::move(smoothed->grid), online->disagreement, smoothed->disagreement};
+  return MapOf({std::move(online), std::move(smoothed)}, std::move(path), drawn);
 }
 
 std::size_t SmoothingSteps(const MapperSnapshot& snapshot, bool fitted_elsewhere) {
@@ -114,16 +111,16 @@ std::size_t SmoothingSteps(const MapperSnapshot& snapshot, bool fitted_elsewhere
 }
 
 std::optional<SmoothedMap> SmoothMap(const MapperSnapshot& snapshot, const GridOptions& options,
-                                     const std::function<bool()>& next, const std::function<bool()>& go_on) {
-  auto online = DrawAlong(snapshot.online_path, snapshot, options, next);
+                                     const std::function<bool()>& next, const std::function<bool()>& go_on,
+                                     DrawnMaps* drawn) {
+  const std::array earlier = DrawingsOf(drawn);
+  auto online = DrawMap(snapshot, snapshot.online_path, options, earlier, next);
   if (!online) return {};
   auto path = IsChosenByScans(snapshot) ? ChosenPath(snapshot, options, next) : SmoothedPath(snapshot, go_on);
   if (!path) return {};
-  const Disagreement before = online->disagreement;
-  if (*path == snapshot.online_path) return SmoothedMap{*std::move(path), std::move(online->grid), before, before};
-  auto smoothed = DrawAlong(*path, snapshot, options, next);
+  auto smoothed = *path == snapshot.online_path ? online : DrawMap(snapshot, *path, options, earlier, next);
   if (!smoothed) return {};
-  return SmoothedMap{*std::move(path), std::move(smoothed->grid), before, smoothed->disagreement};
+  return MapOf({std::move(online), std::move(smoothed)}, *std::move(path), drawn);
 }
 
 }  // namespace cairn::slam

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "server/slam/grid/disagreement.h"
+#include "server/slam/smoothing/drawn_map.h"
 #include "server/slam/trail/keyframe.h"
 
 namespace cairn::slam {
@@ -28,23 +29,25 @@ namespace cairn::slam {
 
 struct SmoothedMap {
   std::vector<Pose2> path;  // T_map_robot, one per keyframe.
-  OccupancyGrid grid;       // Drawn along `path`.
+  OccupancyGrid grid;       // Drawn along `path`, or as near to it as drawn_map.h says where drawings were kept.
   Disagreement before;      // The scans along the online path against the grid drawn along it.
   Disagreement after;       // The scans along `path` against `grid`.
 };
 
-// The map along a path that was fitted elsewhere, together with those of other robots (server/slam/site). `next`: as
-// below.
+// The map along a path that was fitted elsewhere, together with those of other robots (server/slam/site). `next` and
+// `drawn`: as below.
 [[nodiscard]] std::optional<SmoothedMap> MapAlong(const MapperSnapshot& snapshot, std::vector<Pose2> path,
-                                                  const GridOptions& options, const std::function<bool()>& next);
+                                                  const GridOptions& options, const std::function<bool()>& next,
+                                                  DrawnMaps* drawn = nullptr);
 
 // How often SmoothMap calls `next` at most; MapAlong, if the path was `fitted_elsewhere`.
 [[nodiscard]] std::size_t SmoothingSteps(const MapperSnapshot& snapshot, bool fitted_elsewhere = false);
 
 // `next` is called before each step, and `go_on` between the iterations of the optimisation. If either
-// returns false, the work ends and there is no result.
+// returns false, the work ends and there is no result. `drawn`: what was drawn the last time, which makes it cheap to
+// draw what has not changed; where there is a result, what was drawn now replaces it. Null: all is drawn anew.
 [[nodiscard]] std::optional<SmoothedMap> SmoothMap(const MapperSnapshot& snapshot, const GridOptions& options,
                                                    const std::function<bool()>& next,
-                                                   const std::function<bool()>& go_on = {});
+                                                   const std::function<bool()>& go_on = {}, DrawnMaps* drawn = nullptr);
 
 }  // namespace cairn::slam

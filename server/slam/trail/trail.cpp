@@ -1,9 +1,11 @@
 #include "server/slam/trail/trail.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <limits>
 #include <utility>
 
+#include "server/slam/graph/loop_graph.h"
 #include "server/slam/scan/beam_points.h"
 
 namespace cairn::slam {
@@ -11,12 +13,21 @@ namespace {
 
 constexpr std::uint64_t kMostMade = std::uint64_t{1} << 48;
 constexpr double kRoundingM = 1e-6;  // More than sums of the same lengths in another order can differ.
+// A loop that is farther off than this many of its standard deviations on the path that fits best has been outvoted: it
+// has less than a tenth of its weight there.
+constexpr double kOutvotedSigmas = 10.0;
 
 // Added to every covariance: options may set all noise to zero, but the least squares need positive definite
 // covariances.
 PoseRelation PositiveDefinite(PoseRelation relation) {
   relation.covariance += 1e-10 * Eigen::Matrix3d::Identity();
   return relation;
+}
+
+// Whether the other relations of the path contradict this one.
+bool IsOutvoted(const PoseRelation& relation, std::span<const Pose2> path) {
+  const Eigen::Vector3d error = ErrorOf(relation, path[relation.from], path[relation.to]).error;
+  return error.dot(relation.covariance.llt().solve(error)) > kOutvotedSigmas * kOutvotedSigmas;
 }
 
 }  // namespace
@@ -181,7 +192,8 @@ std::optional<std::vector<Pose2>> Trail::PathWithLoop(const PoseRelation& loop, 
                                                       const PoseGraphOptions& options) const {
   std::vector<PoseRelation> relations = relations_;
   relations.push_back(PositiveDefinite(loop));
-  if (!OptimisePoses(path, relations, options).usable) return std::nullopt;
+  if (!OptimiseLoopGraph(path, relations, options).usable) return std::nullopt;
+  if (IsOutvoted(relations.back(), path)) return std::nullopt;
   return path;
 }
 

@@ -51,7 +51,8 @@ class Trail {
   // Adds a large loop that was used to correct the path.
   void AddLoop(const PoseRelation& loop);
   // The path that fits all relations and `loop` best; the search starts at `path` (one pose per keyframe).
-  // Nothing if the result is not usable. The loop is not added to the relations.
+  // Nothing if the result is not usable, or if the other relations contradict the loop, which is then most likely
+  // wrong. The loop is not added to the relations.
   [[nodiscard]] std::optional<std::vector<Pose2>> PathWithLoop(const PoseRelation& loop, std::vector<Pose2> path,
                                                                const PoseGraphOptions& options) const;
 

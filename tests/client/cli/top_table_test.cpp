@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <sstream>
+#include <utility>
 
 #include "client/cli/text_output.h"
 
@@ -104,6 +105,10 @@ TEST(TopTable, TheServersLoadIsThatSinceTheLastAnswer) {
   EXPECT_THAT(FormatTop(now, nullptr), HasSubstr("wait in it, work waits 0.2 ms for a thread (p99 12.0 ms)\n"));
   std::swap(before, now);  // The server was started again.
   EXPECT_THAT(FormatTop(now, &before), HasSubstr("up 1.0 h, 50 % of"));
+  for (const auto& [up_s, text] : {std::pair(12.0, "up 12 s, "), {600.0, "up 10 min, "}, {259200.0, "up 3.0 days, "}}) {
+    now.status.load.up_s = up_s;
+    EXPECT_THAT(FormatTop(now, nullptr), HasSubstr(text));
+  }
   now.status.load = {};
   EXPECT_THAT(FormatTop(now, nullptr), Not(HasSubstr("server:")));
   now.status.load = {.up_s = 60.0,

@@ -54,18 +54,18 @@ TEST_F(JoinerTest, TriesWhenBothHaveDrivenFarEnough) {
   EXPECT_TRUE(Tries());
 }
 
-TEST_F(JoinerTest, TriesAgainWhenEitherHasDrivenAQuarterMore) {
+TEST_F(JoinerTest, TriesAgainWhenEitherHasDrivenATenthMore) {
   Driven("r1", 100.0);
   Driven("r2", 40.0);
   EXPECT_TRUE(Tries());
   EXPECT_FALSE(Tries());
-  Driven("r2", 49.0);
+  Driven("r2", 43.0);
   EXPECT_FALSE(Tries());
-  Driven("r2", 50.0);
+  Driven("r2", 45.0);
   EXPECT_TRUE(Tries());
-  Driven("r1", 124.0);
+  Driven("r1", 109.0);
   EXPECT_FALSE(Tries());
-  Driven("r1", 125.0);
+  Driven("r1", 111.0);
   EXPECT_TRUE(Tries());
   EXPECT_FALSE(Tries());
   roster().Take(RequestOf("r3", 9));

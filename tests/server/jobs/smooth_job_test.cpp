@@ -58,8 +58,8 @@ TEST_F(SmoothSiteTest, RedrawsTheMapAlongTheFullPathAndSaysHowMuchBetterItFits) 
   EXPECT_LT(smoothed->outcome.cost_after, smoothed->outcome.cost_before);
   EXPECT_GT(smoothed->outcome.cost_after, 0.0);
   EXPECT_EQ(smoothed->version->info.job, 9U);
-  EXPECT_EQ(smoothed->version->info.note, "smoothed: 1 robots, 20 keyframes, 20 scans");
-  EXPECT_EQ(smoothed->outcome.message, "1 robots, 20 keyframes, 20 scans");
+  EXPECT_EQ(smoothed->version->info.note, "smoothed: 1 robot, 20 keyframes, 20 scans");
+  EXPECT_EQ(smoothed->outcome.message, "1 robot, 20 keyframes, 20 scans");
   slam::OccupancyGrid expected{slam::GridOptions{}};
   for (int k = 0; k < kKeyframes; ++k) expected.Draw(RoomScan(4 * k), TruePose(4 * k));
   const RobotGrid& part = smoothed->version->parts.at(5);
@@ -102,7 +102,7 @@ TEST_F(SmoothSiteTest, RobotsThatHaveSeenTheSameAreSmoothedTogether) {
   const auto smoothed = SmoothSite(job_, material, &options, control_);
   ASSERT_TRUE(smoothed);
   EXPECT_NE(smoothed->outcome.message.find("; joined 2: r1 ("), std::string::npos) << smoothed->outcome.message;
-  EXPECT_NE(smoothed->outcome.message.find("not joined 0"), std::string::npos) << smoothed->outcome.message;
+  EXPECT_EQ(smoothed->outcome.message.find("not joined"), std::string::npos) << smoothed->outcome.message;
   const RobotGrid& moved = smoothed->version->parts.at(2);
   EXPECT_FALSE(moved.fragment);
   ASSERT_TRUE(moved.path);

@@ -2,6 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
 namespace cairn::server {
 namespace {
 
@@ -33,6 +39,42 @@ TEST(MapVersions, EnablingKeepsWhatTheOutgoingVersionGivesUp) {
   EXPECT_EQ(versions.Find(1)->parts.at(7).keyframes, 12U);
   EXPECT_FALSE(versions.Find(1)->info.enabled);
   EXPECT_TRUE(versions.Find(2)->info.enabled);
+}
+
+MapVersion Of(const std::map<SessionId, RobotGrid>& parts) {
+  MapVersion version;
+  version.parts = parts;
+  return version;
+}
+
+// A version that a job has made of one robot alone: others were not in it, and stayed behind in the map before.
+TEST(MapVersions, TheEnabledOneTakesOverThePartsThatItDoesNotHave) {
+  MapVersions versions(9);
+  versions.Add(Of({{1, RobotGrid{{}, 10}}, {2, RobotGrid{{}, 20}}}));
+  EXPECT_EQ(versions.Enable(2, {{1, RobotGrid{{}, 1}}, {2, RobotGrid{{}, 2}}}), std::vector<std::uint32_t>{1});
+  versions.Add(Of({{2, RobotGrid{{}, 21}}, {3, RobotGrid{{}, 31}}}));
+  // Version 1 shows session 3 as it was until now, and version 2 does as well.
+  EXPECT_EQ(versions.Enable(3, {{2, RobotGrid{{}, 22}}, {3, RobotGrid{{}, 30}}}),
+            (std::vector<std::uint32_t>{1, 3, 2}));
+  EXPECT_EQ(versions.Find(3)->parts.at(1).keyframes, 10U);
+  EXPECT_EQ(versions.Find(3)->parts.at(2).keyframes, 21U);
+  EXPECT_EQ(versions.Find(2)->parts.at(2).keyframes, 22U);
+  EXPECT_EQ(versions.Find(2)->parts.at(3).keyframes, 30U);
+  EXPECT_EQ(versions.Find(1)->parts.at(2).keyframes, 2U);
+  EXPECT_EQ(versions.Find(1)->parts.at(3).keyframes, 30U);
+}
+
+// After a robot was joined, and then all were smoothed, a roll back to the first version moved that robot alone.
+TEST(MapVersions, AVersionShowsAllAsTheyWereAlsoWhereALaterOneIsOfOneRobotAlone) {
+  MapVersions versions(9);
+  versions.Add(Of({{3, RobotGrid{{}, 31}}}));
+  versions.Enable(2, {{3, RobotGrid{{}, 30}}});
+  versions.Add(Of({{1, RobotGrid{{}, 11}}, {3, RobotGrid{{}, 33}}}));
+  versions.Enable(3, {{1, RobotGrid{{}, 10}}, {3, RobotGrid{{}, 32}}});
+  EXPECT_EQ(versions.Find(1)->parts.at(1).keyframes, 10U);
+  EXPECT_EQ(versions.Find(1)->parts.at(3).keyframes, 30U);
+  EXPECT_EQ(versions.Find(2)->parts.at(1).keyframes, 10U);
+  EXPECT_EQ(versions.Find(2)->parts.at(3).keyframes, 32U);
 }
 
 TEST(MapVersions, TheOldestThatNobodyNeedsIsForgotten) {

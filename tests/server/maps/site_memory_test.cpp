@@ -144,6 +144,49 @@ TEST_F(SiteMemoryTest, TheMapStaysAlsoWhereItAloneTakesTooMuch) {
   EXPECT_NE(site->snapshot()->tiles.Find({0, 3, 0}), nullptr);
 }
 
+// It came and went with each change of the map, and the alert with it.
+TEST_F(SiteMemoryTest, WhatIsSaidStaysUntilTheMapTakesClearlyLess) {
+  constexpr int kChunks = 40;
+  const auto fill = [](Site& site) {
+    site.Join({.session = 9, .robot = 9, .owner = {}});
+    for (int i = 0; i < kChunks; ++i) site.Change({.session = 9, .chunks = {{{i, 0}, UniformChunk(200)}}});
+    return InfoOf(site, kLater);
+  };
+  const auto whole = NewSite(1000.0);
+  const double all_mib = static_cast<double>(fill(*whole).memory_bytes) / (1024.0 * 1024.0);
+  const auto site = NewSite(0.99 * all_mib);
+  EXPECT_THAT(fill(*site).memory_note, StartsWith(std::string(kAboveMemoryLimit)));
+  int removed = 0;
+  const auto remove = [&](int chunks) {
+    for (const int last = removed + chunks; removed < last; ++removed)
+      site->Change({.session = 9, .chunks = {{{removed, 0}, nullptr}}});
+    static_cast<void>(InfoOf(*site, kLater));
+    site->Leave(1000);  // After anything that leaves, memory is counted at once.
+    return InfoOf(*site, kLater);
+  };
+  const MapInfo little = remove(1);
+  EXPECT_LT(static_cast<double>(little.memory_bytes), 0.99 * all_mib * 1024 * 1024);
+  EXPECT_THAT(little.memory_note, StartsWith(std::string(kAboveMemoryLimit)));
+  EXPECT_TRUE(site->gives_no_more());
+  const MapInfo much = remove(10);
+  EXPECT_EQ(much.memory_note, "");
+  EXPECT_FALSE(site->gives_no_more());
+}
+
+TEST_F(SiteMemoryTest, WhatIsSaidOfAllSitesTogetherStaysAsLong) {
+  Atlas atlas(MapsOptions{.max_total_memory_mib = 1000.0}, 0.05, true, pool_, outbound_);
+  const auto site = *atlas.Create("lab");
+  site->Join({.session = 9, .robot = 9, .owner = {}});
+  site->Change({.session = 9, .chunks = {{{0, 0}, UniformChunk(200)}}});
+  EXPECT_EQ(InfoOf(*site).memory_note, "");
+  site->SetMemoryShare(1, false);
+  EXPECT_THAT(InfoOf(*site, kLater).memory_note, StartsWith(std::string(kAboveMemoryLimit)));
+  site->SetMemoryShare(0, false);
+  EXPECT_THAT(InfoOf(*site, kLater).memory_note, StartsWith(std::string(kAboveMemoryLimit)));
+  site->SetMemoryShare(0, true);
+  EXPECT_EQ(InfoOf(*site, kLater).memory_note, "");
+}
+
 TEST_F(SiteMemoryTest, TheLayerOfDisagreementIsMadeWhenItIsAskedForAndNotKept) {
   const auto site = NewSite(kChunk_mib);
   for (const SessionId id : {SessionId{1}, SessionId{2}}) {
@@ -228,6 +271,12 @@ TEST_F(SiteMemoryTest, AllSitesTogetherStayBelowTheirLimit) {
     EXPECT_EQ(info.memory_note.empty(), !is_limited) << info.memory_note;
     EXPECT_EQ(VersionsOf(info).size(), is_limited ? 3U : 4U);
   }
+}
+
+TEST(MemoryShare, SitesAreClearlyBelowTheirLimitWithSomeRoom) {
+  EXPECT_FALSE(AreClearlyBelow({{40, false}, {60, true}}, 100));
+  EXPECT_FALSE(AreClearlyBelow({{40, false}, {56, true}}, 100));
+  EXPECT_TRUE(AreClearlyBelow({{40, false}, {54, true}}, 100));
 }
 
 TEST(MemoryShare, TheLargestSitesGiveUpFirst) {

@@ -8,44 +8,24 @@
 #include <utility>
 #include <vector>
 
-#include "server/robots/session_estimator.h"
-#include "tests/server/robots/one_session.h"
+#include "tests/server/robots/room_robot.h"
 #include "tests/server/slam/ring_world.h"
 
 namespace cairn::server {
 namespace {
 
-using testing::kOwner;
-using testing::kScans;
-using testing::RequestOf;
-using testing::RoomOdometry;
 using testing::RoomScan;
 
 constexpr double kPastCellM = 0.05;
 
-struct MappingRobot {
+struct MappingRobot : testing::RoomRobot {
   explicit MappingRobot(bool fragment = false) : MappingRobot(SetupOf(fragment)) {}
-  explicit MappingRobot(const EstimatorSetup& setup) : estimator(setup, record, Outputs()) {
-    EXPECT_TRUE(record.AddSensors({"laser"}));
-  }
+  explicit MappingRobot(const EstimatorSetup& setup) : RoomRobot(setup) {}
 
   static EstimatorSetup SetupOf(bool fragment) {
-    EstimatorSetup setup;
-    setup.mapper.filter.particles = 20;
+    EstimatorSetup setup = FewParticles();
     setup.fragment = fragment;
     return setup;
-  }
-  static SessionOutputs Outputs() {
-    return {.send = [](const OutboundValue&) { return true; }, .grid_changed = [](GridChange&&) {}};
-  }
-  void Take(const Odometry& odometry, Scan scan) {
-    EXPECT_TRUE(record.OdometryReceived(kOwner, odometry.sequence));
-    estimator.Handle(testing::OdometryOf("r1", odometry));
-    record.ScanReceived(kScans, scan.sequence);
-    estimator.Handle(testing::ScanOf("r1", std::move(scan)));
-  }
-  void Drive(int first, int last) {
-    for (int step = first; step < last; ++step) Take(RoomOdometry(step), RoomScan(step));
   }
   slam::MapperSnapshot Snapshot() {
     SessionMaterial taken;
@@ -98,9 +78,6 @@ struct MappingRobot {
       EXPECT_LT((between->T_map_robot.translation() - middle.translation()).norm(), kPastCellM) << i;
     }
   }
-
-  SessionRecord record{4, RequestOf("r1"), RobotsOptions{}};
-  SessionEstimator estimator;
 };
 
 TEST(PastPoses, ASwitchOfTheMapMovesThemWithTheKeyframesNextToThem) {

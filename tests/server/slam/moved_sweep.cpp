@@ -7,9 +7,8 @@
 #include <optional>
 #include <utility>
 
-#include "client/sim/fleet.h"
-#include "client/sim/shipped_worlds.h"
 #include "server/slam/scan_pipeline.h"
+#include "tests/server/slam/fleet_drives.h"
 
 namespace cairn::test {
 namespace {
@@ -55,37 +54,13 @@ const std::vector<Kind> kKinds = {
     {"other robot, odometry fits", 0.0, 5.0, Odometer::kStandsStill, true, true, true},
 };
 
-struct OneDrive {
-  struct Timed {
-    double seconds = 0.0;
-    LogRecord record;
-  };
-  Pose2 T_map_robot_start;
-  std::vector<Timed> records;
-  Trajectory truth;
+// Nothing is missing in what the robot sends: its scans show another place, and its odometry goes on.
+const std::vector<Kind> kKidnapped = {
+    {"carried unseen, 10 s of the way", 10.0, 0.0, Odometer::kStandsStill},
+    {"carried unseen, 20 s of the way", 20.0, 0.0, Odometer::kStandsStill},
+    {"carried unseen, 45 s of the way", 45.0, 0.0, Odometer::kStandsStill},
+    {"carried unseen, 80 s of the way", 80.0, 0.0, Odometer::kStandsStill},
 };
-
-std::vector<OneDrive> DriveThrough(const std::string& world, double seconds, std::uint64_t seed) {
-  sim::FleetOptions options;
-  options.robots = 2;
-  options.see_each_other = false;
-  options.scan_hz = 5.0;
-  options.odometry_hz = 10.0;
-  options.laser.beams = 181;
-  options.seed = seed;
-  auto fleet = sim::Fleet::Create(*sim::OpenWorld(world), options);
-  std::vector<OneDrive> drives(2);
-  for (double now = 0.0; now < seconds;) {
-    sim::FleetRecord next = fleet->Next();
-    now = SecondsFromStamp(std::visit([](const auto& one) { return one.stamp; }, next.record) - options.first_stamp);
-    drives[static_cast<std::size_t>(next.robot)].records.push_back({now, std::move(next.record)});
-  }
-  for (int robot = 0; robot < 2; ++robot) {
-    drives[static_cast<std::size_t>(robot)].T_map_robot_start = fleet->T_map_robot_start(robot);
-    drives[static_cast<std::size_t>(robot)].truth = fleet->truth(robot);
-  }
-  return drives;
-}
 
 // A place of the world, and where the map shows it.
 struct Shown {
@@ -156,6 +131,7 @@ class Follower {
     T_odom_robot_ = outcome.T_map_odom.Inverse() * outcome.T_map_robot;
     const double error_m = ErrorOf(outcome.T_map_robot, *truth);
     if (!outcome.localized) {
+      if (case_->noticed_after_m < 0.0) case_->noticed_after_m = way_m_;
       case_->found_after_s = case_->found_after_m = -1.0;
     } else if (case_->found_after_s < 0.0) {
       case_->found_after_s = SecondsFromStamp(scan.stamp - *first_);
@@ -163,7 +139,9 @@ class Follower {
     }
     if (!outcome.localized) return;
     case_->worst_m = std::max(case_->worst_m, error_m);
-    if (error_m > kMovedWrongM) ++case_->wrong;
+    if (error_m <= kMovedWrongM) return;
+    ++case_->wrong;
+    case_->wrong_later += way_m_ > kNoticedWithinM ? 1 : 0;
   }
   // The places before the gap, as the best hypothesis has them now.
   [[nodiscard]] std::vector<Shown> Mapped() const {
@@ -211,9 +189,9 @@ struct Before {
   std::string state;
 };
 
-MovedCase After(const Before& before, const std::vector<OneDrive>& drives, const std::vector<Shown>& undisturbed,
+MovedCase After(const Before& before, const std::vector<FleetDrive>& drives, const std::vector<Shown>& undisturbed,
                 const Kind& kind, const MovedSweepOptions& options, MovedCase result) {
-  const OneDrive& drive = drives[kind.other_robot ? 1 : 0];
+  const FleetDrive& drive = drives[kind.other_robot ? 1 : 0];
   Follower follower({}, options);
   if (!follower.pipeline().Load(before.state)) std::abort();
   if (kind.new_client) follower.pipeline().NewClient();
@@ -260,7 +238,8 @@ MovedCase After(const Before& before, const std::vector<OneDrive>& drives, const
 }
 
 // The state at each moment of the drive as it is without a gap.
-std::vector<Before> RunUndisturbed(const OneDrive& drive, const MovedSweepOptions& options, std::vector<Shown>* shown) {
+std::vector<Before> RunUndisturbed(const FleetDrive& drive, const MovedSweepOptions& options,
+                                   std::vector<Shown>* shown) {
   std::vector<Before> moments;
   Follower follower(drive.T_map_robot_start, options);
   MovedCase undisturbed;
@@ -295,11 +274,11 @@ std::vector<MovedCase> RunMovedSweep(const MovedSweepOptions& options) {
   std::vector<MovedCase> cases;
   for (const std::string& world : options.worlds) {
     const double last_s = options.first_s + options.between_s * (options.moments - 1);
-    const std::vector<OneDrive> drives =
-        DriveThrough(world, last_s + 80.0 + options.watched_again_s + 1.0, options.seed);
+    const std::vector<FleetDrive> drives =
+        DriveFleet(world, 2, last_s + 80.0 + options.watched_again_s + 1.0, options.seed);
     std::vector<Shown> undisturbed;
     for (const Before& before : RunUndisturbed(drives.front(), options, &undisturbed)) {
-      for (const Kind& kind : kKinds) {
+      for (const Kind& kind : options.kidnapped ? kKidnapped : kKinds) {
         if (kind.name.find(options.only) == std::string::npos) continue;
         MovedCase one{.world = world, .kind = kind.name, .from_s = before.seconds, .seed = options.seed};
         one.stood_still = kind.odometer == Odometer::kStandsStill && kind.skipped_s == 0.0 && !kind.other_robot;

@@ -22,6 +22,8 @@ struct MovedSweepOptions {
   slam::MapperOptions mapper;  // Its number of particles and its seed are those of the sweep.
   // Only kinds whose name contains this.
   std::string only{};
+  // Other kinds: robots that are carried between two scans, so that no gap tells that something has happened.
+  bool kidnapped = false;
   // Called after every case.
   std::function<void(const struct MovedCase&)> done = [](const struct MovedCase&) {};
 };
@@ -41,12 +43,18 @@ struct MovedCase {
   // From the first scan after the gap to the first pose that is localized, and stays so; negative if there is none.
   double found_after_s = -1.0;
   double found_after_m = -1.0;
+  // The way from the first scan after the gap to the first pose that is not localized; negative if there is none.
+  double noticed_after_m = -1.0;
+  // Those of `wrong` at which the robot had driven more than kNoticedWithinM.
+  int wrong_later = 0;
   bool stood_still = false;  // Nothing had happened to the robot, so that it must go on at once.
 };
 
 // The drift of a map whose loop of 100 m is still open is up to 0.7 m in these worlds, also of robots that are watched
 // all the time. Places that look alike are farther apart.
 inline constexpr double kMovedWrongM = 1.0;
+// Of a robot that was carried unseen: the way after which its poses must not be called localized at a wrong place.
+inline constexpr double kNoticedWithinM = 2.0;
 
 [[nodiscard]] std::vector<MovedCase> RunMovedSweep(const MovedSweepOptions& options);
 // The names of what may happen to a robot.

@@ -224,6 +224,31 @@ TEST(MergeSites, WhatCannotBeMergedStaysAsItIs) {
   EXPECT_TRUE(MergeSites(*store, "lab", "hall")) << "without a transform nothing is estimated again";
 }
 
+// Such a session could not be moved, and nobody said what to do.
+TEST(MergeSites, ASessionWithAPlaceThatNoScanHasConfirmedIsMovedWithoutIt) {
+  const JournalEntry found = PlaceSuggested{9, {1.0, 2.0, 0.5}, {false, {SampleTile()}, 0.05, 1}};
+  for (const bool scan_follows : {false, true}) {
+    const auto store = MemoryStore();
+    Put(*store, {.name = "lab"});
+    Put(*store, {.name = "hall", .first_session = 11, .job = 4});
+    std::vector<JournalEntry> entries{found};
+    if (scan_follows) entries.emplace_back(SampleScan(3));
+    const std::uint64_t last = 4 + entries.size();
+    ASSERT_TRUE(store->Commit({.removed = {}, .put = {{{RecordKind::kJournal, 11, last}, BytesOf(5, entries)}}}));
+    const auto moved = MergeSites(*store, "lab", "hall", {1.0, 0.5, kQuarterTurn});
+    if (scan_follows) {
+      ASSERT_FALSE(moved);
+      EXPECT_EQ(moved.error().code, StatusCode::kFailedPrecondition);
+      EXPECT_NE(moved.error().message.find("session 11"), std::string::npos) << moved.error().message;
+      EXPECT_NE(moved.error().message.find("other way round"), std::string::npos) << moved.error().message;
+      EXPECT_TRUE(MergeSites(*store, "hall", "lab", {1.0, 0.5, kQuarterTurn})) << "as the error says";
+    } else {
+      ASSERT_TRUE(moved) << moved.error().message;
+      EXPECT_TRUE(std::get<PlaceSuggested>(JournalOf(*store, 11)[4]).map.tiles.empty());
+    }
+  }
+}
+
 // Its checkpoint would be removed, and nothing would be left of it.
 TEST(MergeSites, ASessionOfWhichOnlyTheCheckpointIsLeftIsNotMoved) {
   const auto store = MemoryStore();

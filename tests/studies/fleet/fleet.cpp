@@ -1,7 +1,7 @@
 // cairn-study fleet measures a live server from outside: the time from scan to pose for fleets of simulated
 // robots, the longest delay while whole trajectories are smoothed, and logs that are streamed twenty times
-// faster than they were recorded, compared with the same logs offline, and joining late where the map is large. Times
-// are wall-clock times, so no other program should run on the machine.
+// faster than they were recorded, compared with the same logs offline, joining late where the map is large, and how
+// many robots one core carries. Times are wall-clock times, so no other program should run on the machine.
 #include <algorithm>
 #include <fstream>
 #include <iterator>
@@ -16,6 +16,7 @@
 #include "common/wire/bus.h"
 #include "tests/must.h"
 #include "tests/real_log_path.h"
+#include "tests/studies/fleet/capacity.h"
 #include "tests/studies/fleet/large_site.h"
 #include "tests/studies/fleet/live_server.h"
 #include "tests/studies/fleet/ros2_latency.h"
@@ -274,6 +275,7 @@ void StudyReplay(StudyContext& context) {
 
 void RunFleet(StudyContext& context) {
   if (context.Wants("latency")) StudyLatency(context);
+  if (context.Wants("capacity")) StudyCapacity(context);
   if (context.Wants("pauses")) StudyPauses(context);
   if (context.Wants("replay")) StudyReplay(context);
   if (context.Wants("ros2")) StudyRos2Latency(context);
@@ -281,8 +283,8 @@ void RunFleet(StudyContext& context) {
 }
 
 const Registration kRegistered{"fleet",
-                               "a live server: latency, pauses during jobs, logs at x20, the door for ROS 2, late to a "
-                               "large site (--only latency ...)",
+                               "a live server: latency, robots that one core carries, pauses during jobs, logs at x20, "
+                               "the door for ROS 2, late to a large site (--only latency ...)",
                                RunFleet};
 
 }  // namespace

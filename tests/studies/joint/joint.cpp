@@ -58,18 +58,33 @@ Joined Smooth(const std::vector<LogRun>& runs, const std::vector<std::size_t>& o
   return joined;
 }
 
+struct JobTime {
+  double all_s = 0.0, drawing_s = 0.0;
+  std::size_t keyframes = 0, drawn_anew = 0;  // Along both paths.
+};
+
 // What a job of the server does with them: smooths them together, and draws and compares each along both its paths.
-double JobSeconds(const std::vector<slam::MapperSnapshot>& snapshots, const slam::MapperOptions& options,
-                  slam::RelationBook& book) {
+JobTime RunJob(const std::vector<slam::MapperSnapshot>& snapshots, const slam::MapperOptions& options,
+               slam::RelationBook& book, std::vector<slam::DrawnMaps>& drawings) {
+  JobTime time;
   const Stopwatch watch;
   book.BeginJob();
   std::vector<slam::SiteSession> sessions;
   for (std::size_t i = 0; i < snapshots.size(); ++i) sessions.push_back({snapshots[i], false, i + 1});
   const auto smoothed = slam::SmoothSessions(
       sessions, SiteOptionsOf(options), [](double) { return true; }, slam::SiteSearch::kAll, &book);
-  for (std::size_t i = 0; i < snapshots.size(); ++i)
-    static_cast<void>(slam::MapAlong(snapshots[i], (*smoothed)[i].path, options.grid, [] { return true; }));
-  return watch.CpuMs() * 1e-3;
+  const Stopwatch drawing;
+  drawings.resize(snapshots.size());
+  for (std::size_t i = 0; i < snapshots.size(); ++i) {
+    slam::DrawnMaps& drawn = drawings[i];
+    static_cast<void>(slam::MapAlong(
+        snapshots[i], (*smoothed)[i].path, options.grid, [] { return true; }, &drawn));
+    time.keyframes += drawn.online->keyframes.size() + drawn.smoothed->keyframes.size();
+    time.drawn_anew += drawn.online->drawn_anew + drawn.smoothed->drawn_anew;
+  }
+  time.drawing_s = drawing.CpuMs() * 1e-3;
+  time.all_s = watch.CpuMs() * 1e-3;
+  return time;
 }
 
 // A job, and a second one when little has changed: each robot has driven three hundredths more.
@@ -82,10 +97,13 @@ void RunTwoJobs(const std::vector<LogRun>& runs, const std::string& name, const 
     now.push_back(run.snapshot);
   }
   slam::RelationBook book;
-  const double first_s = JobSeconds(before, options, book);
+  std::vector<slam::DrawnMaps> drawings;
+  const JobTime first = RunJob(before, options, book, drawings);
   const std::size_t measured_first = book.measured();
-  const double second_s = JobSeconds(now, options, book);
-  table.Add({name, Number(first_s, 2), Number(second_s, 2), Number(second_s / first_s, 3),
+  const JobTime second = RunJob(now, options, book, drawings);
+  table.Add({name, Number(first.all_s, 2), Number(second.all_s, 2), Number(second.all_s / first.all_s, 3),
+             Number(first.drawing_s, 2), Number(second.drawing_s, 2),
+             std::to_string(second.drawn_anew) + " of " + std::to_string(second.keyframes),
              std::to_string(measured_first), std::to_string(book.measured()), std::to_string(book.reused()),
              Number(1e-6 * static_cast<double>(book.BytesOf({1, 2}).size()), 2)});
 }
@@ -216,8 +234,8 @@ void RunJoint(StudyContext& context) {
       "one part, and between two.");
   Table table({"log", "robots", "joined", "one robot live (m)", "live / smoothed", "one robot (m)", "joint (m)",
                "ratio", "inside (m)", "across (m)", "relations across", "max (m)", "processor time (s)"});
-  Table jobs({"log", "first job (s)", "second (s)", "ratio", "measured", "measured by the second", "used again",
-              "MB of the first pair"});
+  Table jobs({"log", "first job (s)", "second (s)", "ratio", "first, drawing (s)", "second, drawing (s)",
+              "drawn anew by the second", "measured", "measured by the second", "used again", "MB of the first pair"});
   Table sessions({"robot", "joined", "frame of", "relations", "withdrawn", "agreement"});
   for (const Case& one : {Case{"intel", 3, 1.15}, Case{"mit-csail", 2, 1.3}, Case{"mit-killian", 2, 1.3}})
     if (context.Wants(one.log)) RunCut(context, one, table, sessions, jobs);
@@ -225,7 +243,8 @@ void RunJoint(StudyContext& context) {
   context.report.Add(sessions, "sessions");
   context.report.Text(
       "A job when 97 % of each part is driven, and a second one at its end, which knows what the first has measured "
-      "(RelationBook). Both with the drawing of the maps, processor time.");
+      "(RelationBook) and drawn (DrawnMap: keyframes along both paths; only those that have moved are drawn anew). "
+      "Both with the drawing of the maps, processor time.");
   context.report.Add(jobs, "jobs");
   context.report.Text(
       "Three simulated robots, starts unknown, a hundred metres of way each. `at a wrong place`: on the average more "

@@ -257,7 +257,10 @@ void RunLowcost(StudyContext& context) {
   if (context.Wants("lidars")) RunLidars(context);
   if (context.Wants("rolling")) RunRolling(context);
   if (context.Wants("unknown")) RunUnknown(context);
-  if (context.Wants("learning")) RunLearning(context);
+  if (context.Wants("learning")) {
+    RunLearning(context);
+    RunLearnedHeadings(context);
+  }
 }
 
 const Registration kRegistered{

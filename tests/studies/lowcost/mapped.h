@@ -31,5 +31,7 @@ struct Mapped {
 void RunLowcostLogs(StudyContext& context);
 // Robots with wrong wheels and late scans, which the estimator learns while they drive.
 void RunLearning(StudyContext& context);
+// The same on drives whose wheels are as wrong as usual: whether what was learned of turns makes headings better.
+void RunLearnedHeadings(StudyContext& context);
 
 }  // namespace cairn::studies

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,11 +9,11 @@
 #include <variant>
 #include <vector>
 
-#include "client/sim/fleet.h"
-#include "client/sim/shipped_worlds.h"
 #include "common/service/pose_report.h"
 #include "server/slam/known_grid/known_grid.h"
+#include "server/slam/scan/beam_points.h"
 #include "server/slam/scan_pipeline.h"
+#include "tests/server/slam/fleet_drives.h"
 
 namespace cairn::studies {
 namespace {
@@ -23,43 +22,13 @@ constexpr double kMappedS = 60.0;  // The carried robot has mapped for so long.
 constexpr double kEveryS = 20.0;   // It is carried to where the third robot is, each time from the same state.
 constexpr double kFollowedS = 90.0;
 constexpr double kFirstJobS = 10.0;
-constexpr double kOwnMapM = 15.0;  // Farther than this from where it was, its own map does not show the place, ...
-constexpr double kShownM = 3.0;    // ... and within this of where the other robot was, the map of the site does.
+// What the robot sees where it is carried to is another place if its own map knows at most the first of these shares of
+// it, and the map of the site at least the second.
+constexpr double kOwnShare = 0.2, kSiteShare = 0.5;
 constexpr double kWrongPlaceM = 1.0;
+constexpr double kDrawnEveryM = 0.25;
 
-struct SimulatedRobot {
-  struct Timed {
-    double seconds = 0.0;
-    LogRecord record;
-  };
-  Pose2 T_map_robot_start;
-  std::vector<Timed> records;
-  Trajectory truth;
-};
-
-// The first one is carried, the second one maps the site, and the third one drives where the first one is carried to:
-// its scans are in nobody's map.
-std::vector<SimulatedRobot> ThreeRobots(const std::string& world, double seconds, std::uint64_t seed) {
-  sim::FleetOptions options;
-  options.robots = 3;
-  options.see_each_other = false;
-  options.scan_hz = 5.0;
-  options.odometry_hz = 10.0;
-  options.laser.beams = 181;
-  options.seed = seed;
-  auto fleet = sim::Fleet::Create(*sim::OpenWorld(world), options);
-  std::vector<SimulatedRobot> robots(3);
-  for (double now = 0.0; now < seconds;) {
-    sim::FleetRecord next = fleet->Next();
-    now = SecondsFromStamp(std::visit([](const auto& one) { return one.stamp; }, next.record) - options.first_stamp);
-    robots[static_cast<std::size_t>(next.robot)].records.push_back({now, std::move(next.record)});
-  }
-  for (int i = 0; i < 3; ++i) {
-    robots[static_cast<std::size_t>(i)].T_map_robot_start = fleet->T_map_robot_start(i);
-    robots[static_cast<std::size_t>(i)].truth = fleet->truth(i);
-  }
-  return robots;
-}
+using test::FleetDrive;
 
 slam::MapperOptions FewParticles(std::uint64_t seed) {
   slam::MapperOptions options;
@@ -86,16 +55,15 @@ class SiteMap {
  public:
   explicit SiteMap(const slam::MapperOptions& options) : options_(options), grid_(options.grid) {}
   // All scans of the first `seconds`.
-  void Draw(const SimulatedRobot& robot, double seconds, double every_m, std::vector<Pose2>& places) {
+  void Draw(const FleetDrive& robot, double seconds) {
     std::optional<Pose2> last;
     for (const auto& [now, record] : robot.records) {
       const auto* const scan = std::get_if<Scan>(&record);
       if (scan == nullptr || now > seconds) continue;
       const auto truth = PoseOn(robot.truth, scan->stamp, 1.0);
-      if (!truth || (last && (last->translation() - truth->translation()).norm() < every_m)) continue;
+      if (!truth || (last && (last->translation() - truth->translation()).norm() < kDrawnEveryM)) continue;
       last = truth;
       grid_.Draw(*scan, *truth);
-      places.push_back(*truth);
     }
   }
   [[nodiscard]] std::shared_ptr<const slam::KnownGrid> Known() const {
@@ -129,7 +97,7 @@ struct BeforeCarrying {
 };
 
 // `map`: that of the site; null: the robot has nothing but its own.
-FollowedRobot FollowFrom(const BeforeCarrying& before, const SimulatedRobot& robot, double from_s,
+FollowedRobot FollowFrom(const BeforeCarrying& before, const FleetDrive& robot, double from_s,
                          const std::shared_ptr<const slam::KnownGrid>& map, const slam::MapperOptions& options) {
   FollowedRobot result;
   const Stamp later = StampFromSeconds(kMappedS + 1.0 - from_s);
@@ -181,10 +149,15 @@ FollowedRobot FollowFrom(const BeforeCarrying& before, const SimulatedRobot& rob
   return result;
 }
 
-double NearestM(const std::vector<Pose2>& places, const Pose2& pose) {
-  double nearest_m = std::numeric_limits<double>::infinity();
-  for (const Pose2& one : places) nearest_m = std::min(nearest_m, (one.translation() - pose.translation()).norm());
-  return nearest_m;
+// The share of the hits of a scan at this pose that lie in what the map knows: a little before them it is not unknown.
+double ShareKnown(const slam::KnownGrid& map, const Scan& scan, const Pose2& T_map_robot) {
+  constexpr double kBeforeM = 0.1;
+  int hits = 0, known = 0;
+  for (const slam::BeamPoint& point : slam::PointsOf(scan)) {
+    ++hits;
+    known += map.At(T_map_robot * (point.p_robot - kBeforeM * point.p_robot.normalized())) != kUnknownCell ? 1 : 0;
+  }
+  return static_cast<double>(known) / std::max(1, hits);
 }
 
 struct ElsewhereTally {
@@ -208,7 +181,9 @@ struct ElsewhereTally {
 
 void CarryThrough(const std::string& world, std::uint64_t seed, int moments, ElsewhereTally& tally) {
   const double until_s = kMappedS + kEveryS * moments + kFollowedS;
-  const std::vector<SimulatedRobot> robots = ThreeRobots(world, until_s, seed);
+  // The first one is carried, the second one maps the site, and the third one drives where the first one is carried to:
+  // its scans are in nobody's map.
+  const std::vector<FleetDrive> robots = test::DriveFleet(world, 3, until_s, seed);
   const slam::MapperOptions options = FewParticles(seed);
   BeforeCarrying before;
   {
@@ -222,19 +197,20 @@ void CarryThrough(const std::string& world, std::uint64_t seed, int moments, Els
     }
     mapping.Save(before.state);
   }
-  std::vector<Pose2> own, other;
   SiteMap site(options);
-  site.Draw(robots[0], kMappedS, 0.25, own);
-  site.Draw(robots[1], until_s, 0.25, other);
+  site.Draw(robots[0], kMappedS);
+  const auto own = site.Known();
+  site.Draw(robots[1], until_s);
   const auto map = site.Known();
   for (int i = 0; i < moments; ++i) {
     const double from_s = kMappedS + kEveryS * (i + 1);
-    const auto scan = std::ranges::find_if(robots[2].records, [&](const SimulatedRobot::Timed& one) {
+    const auto scan = std::ranges::find_if(robots[2].records, [&](const FleetDrive::Timed& one) {
       return one.seconds > from_s && std::holds_alternative<Scan>(one.record);
     });
     if (scan == robots[2].records.end()) break;
     const auto there = PoseOn(robots[2].truth, std::get<Scan>(scan->record).stamp, 1.0);
-    if (!there || NearestM(own, *there) < kOwnMapM || NearestM(other, *there) > kShownM) continue;
+    const Scan& seen = std::get<Scan>(scan->record);
+    if (!there || ShareKnown(*own, seen, *there) > kOwnShare || ShareKnown(*map, seen, *there) < kSiteShare) continue;
     tally.Add(FollowFrom(before, robots[2], from_s, nullptr, options),
               FollowFrom(before, robots[2], from_s, map, options));
   }

@@ -1,6 +1,7 @@
 // cairn-study moved follows robots that nobody watched for a while: how many poses are called localized at a wrong
 // place, how many robots are found again, and after which time and way. --only constants: the same with each constant
 // of the recovery halved and doubled. --only elsewhere: robots carried to where only others have mapped (elsewhere.h).
+// --only kidnapped: robots carried between two scans, which nothing but their scans shows.
 #include <algorithm>
 #include <map>
 
@@ -86,7 +87,68 @@ void StudyConstants(StudyContext& context) {
   context.report.Add(table, "moved constants");
 }
 
+// The robots of one row of the table of kidnapped robots.
+struct Kidnapped {
+  int cases = 0, noticed = 0, found = 0, wrong = 0, wrong_later = 0;
+  std::vector<double> noticed_m, found_m;
+
+  void Add(const test::MovedCase& one) {
+    ++cases;
+    wrong += one.wrong;
+    wrong_later += one.wrong_later;
+    if (one.noticed_after_m >= 0.0) noticed_m.push_back(one.noticed_after_m);
+    noticed += one.noticed_after_m >= 0.0 && one.noticed_after_m <= test::kNoticedWithinM ? 1 : 0;
+    if (one.noticed_after_m < 0.0 || one.found_after_m < 0.0) return;
+    ++found;
+    found_m.push_back(one.found_after_m);
+  }
+  [[nodiscard]] double Share(int count) const { return static_cast<double>(count) / std::max(cases, 1); }
+};
+
+void StudyKidnapped(StudyContext& context) {
+  constexpr double kLeastFound = 0.95;
+  Report& report = context.report;
+  report.Heading("Kidnapped");
+  report.Text(
+      "Robots that are carried along their way between two scans. Nothing is missing, and their odometry stands "
+      "still meanwhile. A robot is noticed at its first pose that is not localized. Wrong: poses that are called "
+      "localized at a wrong place, and those of them after more than " +
+      Number(test::kNoticedWithinM, 0) + " m of way.");
+  std::map<std::string, Kidnapped> rows;
+  Kidnapped all;
+  test::MovedSweepOptions options;
+  options.kidnapped = true;
+  options.moments = context.Pick(3, 1);
+  options.done = [&](const test::MovedCase& one) {
+    rows[one.world + ", " + one.kind].Add(one);
+    all.Add(one);
+  };
+  const int seeds = context.runs > 0 ? context.runs : context.Pick(3, 1);
+  for (int k = 0; k < seeds; ++k) {
+    options.seed = context.seed + static_cast<std::uint64_t>(k);
+    static_cast<void>(test::RunMovedSweep(options));
+    report.Progress(Count(all.cases) + " robots, " + Count(all.wrong_later) +
+                    " wrong poses after they could be noticed");
+  }
+  Table table({"world, carried", "robots", "noticed in time", "after p50 (m)", "p90 (m)", "found again",
+               "after p50 (m)", "p90 (m)", "wrong", "wrong later"});
+  const auto add = [&table](const std::string& name, const Kidnapped& row) {
+    table.Add({name, Count(row.cases), Percent(row.Share(row.noticed)), Number(Quantile(row.noticed_m, 0.5), 1),
+               Number(Quantile(row.noticed_m, 0.9), 1), Percent(row.Share(row.found)),
+               Number(Quantile(row.found_m, 0.5), 1), Number(Quantile(row.found_m, 0.9), 1), Count(row.wrong),
+               Count(row.wrong_later)});
+  };
+  for (const auto& [name, row] : rows) add(name, row);
+  add("all", all);
+  report.Add(table, "kidnapped");
+  if (all.noticed < all.cases)
+    report.Warn(Count(all.cases - all.noticed) + " of " + Count(all.cases) + " robots were not noticed in time");
+  if (all.Share(all.found) < kLeastFound) report.Warn("fewer robots than wanted were found again");
+  if (all.wrong_later > 0) report.Warn("robots were called localized at a wrong place");
+}
+
 void StudyMoved(StudyContext& context) {
+  if (context.only == "kidnapped") return StudyKidnapped(context);
   if (context.only == "constants") return StudyConstants(context);
   if (context.only == "elsewhere") return StudyElsewhere(context);
   Report& report = context.report;
@@ -117,7 +179,9 @@ void StudyMoved(StudyContext& context) {
   report.Expect(2 * all["all"].found_s.size() > static_cast<std::size_t>(all["all"].cases),
                 "fewer than half of the robots were found again");
   report.Expect(stood_still, "a robot that stood still was lost");
-  if (context.only.empty()) StudyElsewhere(context);
+  if (!context.only.empty()) return;
+  StudyKidnapped(context);
+  StudyElsewhere(context);
 }
 
 const Registration kRegistered{"moved", "robots that nobody watched for a while: never localized at a wrong place",

@@ -1,4 +1,5 @@
-// cairn-study systems: every matcher and every filter over the real logs, time and accuracy in one table.
+// cairn-study systems: every matcher and every filter over the real logs, time and accuracy in one table. --only seeds:
+// the default configuration alone, with several seeds (seeds.h).
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -13,6 +14,7 @@
 #include "tests/studies/log_run.h"
 #include "tests/studies/mapper_choice.h"
 #include "tests/studies/study.h"
+#include "tests/studies/systems/seeds.h"
 
 namespace cairn::studies {
 namespace {
@@ -148,6 +150,7 @@ void StudyOneLog(StudyContext& context, const StudyLog& log) {
 }
 
 void RunSystems(StudyContext& context) {
+  if (context.only == "seeds") return StudySeeds(context);
   context.report.Text(
       "The runs are made one at a time, with one thread, in this process. Times are processor time per "
       "scan, so that other load on the machine changes them little; the table also shows the user time "
@@ -164,6 +167,7 @@ void RunSystems(StudyContext& context) {
       "line_match starts without a known pose in the map of lines that is made ");
   for (const StudyLog& log : ChooseLogs(context, {"mit-csail", "intel"}, context.Pick(0, 500)))
     StudyOneLog(context, log);
+  if (context.only.empty()) StudySeeds(context);
 }
 
 const Registration kRegistered{"systems", "time per scan and accuracy of every matcher and filter on the real logs",

@@ -34,6 +34,7 @@ def make_pictures(page, folder):
     def shot(name, width, height, theme):
         page.look(width, height, theme)
         page.click("#fit")
+        page.run("document.getElementById('panel').scrollTo(0, 0)")
         eventually(f"the map is drawn for {name}", lambda: page.run(
             "new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))).then(() => ((tiles) => tiles.length > 0"
             " && tiles.every((tile) => tile.complete && tile.naturalWidth === 128 && tile.classList.contains('leaflet-tile-loaded')"
@@ -56,7 +57,7 @@ def begins_with(path, begins):
 def change_the_mode(page, address):
     """Of robot2, in the map that robot1 draws, with the keyboard."""
     robot = "#robots [data-key=robot2]"
-    eventually("a robot maps", lambda: page.text(f"{robot} .mode") == "Maps" and not page.shows(f"{robot} .to-map"))
+    eventually("a robot maps", lambda: page.text(f"{robot} .mode") == "Draws the map" and not page.shows(f"{robot} .to-map"))
     for path, token, wanted in (("localise", "wrong", 401), ("map", "", 401), ("fly", TOKEN, 404)):
         if status_of_post(address, f"api/robots/robot2/{path}", token) != wanted:
             raise Failed(f"{path} with the token '{token}' is not answered {wanted}")
@@ -72,7 +73,7 @@ def change_the_mode(page, address):
     if "robot2 maps again" not in page.text("#said"):
         raise Failed(f"the page says '{page.text('#said')}'")
     try:
-        eventually("it maps again", lambda: page.text(f"{robot} .mode") == "Maps")
+        eventually("it maps again", lambda: page.text(f"{robot} .mode") == "Draws the map")
     except Failed:
         raise Failed(f"robot2 does not map again, the page says of it: {page.text(robot)}")
 

@@ -57,6 +57,28 @@ TEST(EkfSlam, ARevisitMovesTheRobotAndThePathBehindIt) {
   EXPECT_EQ(filter.hypothesis(0).path[0], Pose2{}) << "the start is certain";
 }
 
+// A large loop replaces the path, and the filter knows as much as if it had fused the loop itself.
+TEST(EkfSlam, ALargeLoopMakesItAsSureAsARevisitDoes) {
+  EkfSlam filter({}, WideDrift(), {}), fused({}, WideDrift(), {});
+  for (EkfSlam* const one : {&filter, &fused}) {
+    one->Commit();
+    DriveSteps(*one, OutTurnAndBack());
+  }
+  const double before = filter.estimate().covariance.trace();
+  ASSERT_TRUE(fused.Observe(AtTheStart()));
+  fused.Commit();
+  std::vector<Pose2> path;
+  for (std::size_t k = 0; k < 42; ++k) path.push_back(fused.hypothesis(0).path[k]);
+  ASSERT_EQ(filter.hypothesis(0).path.size(), path.size());
+  filter.Rebase(path);
+  filter.LearnLoop(AtTheStart());
+  EXPECT_LT(Between(filter.estimate().T_map_robot, path.back()).translation().norm(), 1e-9)
+      << "the path follows the loop already";
+  EXPECT_TRUE(IsCovariance(filter.estimate().covariance));
+  EXPECT_LT(filter.estimate().covariance.trace(), 0.2 * before);
+  EXPECT_NEAR(filter.estimate().covariance.trace(), fused.estimate().covariance.trace(), 0.05 * before);
+}
+
 TEST(EkfSlam, LandmarksSeenAgainPullTheRobotBack) {
   EkfSlam filter({}, WideDrift(), {});
   filter.Observe(SightTwoCorners({}), 0.0);

@@ -4,6 +4,7 @@
 
 #include <random>
 
+#include "server/slam/graph/loop_graph.h"
 #include "tests/numerical_derivative.h"
 
 namespace cairn::slam {
@@ -120,6 +121,32 @@ TEST(PoseGraph, AWrongLoopIsOutvoted) {
   std::vector<Pose2> path = square.measured;
   ASSERT_TRUE(OptimisePoses(path, square.relations, {}).usable);
   EXPECT_LT(square.Error(path), square.Error(right) + 0.3);
+}
+
+// Runs of steps without loops are fitted as one relation each, and then every step takes its share.
+TEST(LoopGraph, IsTheSameFitAsThatOfAllNodes) {
+  Square square;
+  for (std::size_t k = 0; k < square.relations.size(); ++k)  // Some steps are less certain than others.
+    square.relations[k].covariance *= k % 7 == 3 ? 20.0 : 1.0;
+  square.relations.push_back({0, 40, Between(square.truth[0], square.truth[40]), kLoopCovariance, true});
+  square.relations.push_back({3, 38, Between(square.truth[3], square.truth[38]), kLoopCovariance, true});
+  square.relations.push_back({9, 31, Between(square.truth[9], square.truth[31]), kLoopCovariance, true});
+  std::vector<Pose2> all = square.measured, ends = square.measured;
+  ASSERT_TRUE(OptimisePoses(all, square.relations, {}).usable);
+  ASSERT_TRUE(OptimiseLoopGraph(ends, square.relations, {}).usable);
+  EXPECT_GT(square.Error(square.measured), 0.5);
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    const Pose2 apart = Between(all[k], ends[k]);
+    EXPECT_LT(apart.translation().norm(), 0.01) << k;
+    EXPECT_LT(std::abs(apart.theta), 0.002) << k;
+  }
+  EXPECT_EQ(ends.front(), square.measured.front());
+}
+
+TEST(LoopGraph, LeavesAPathThatCannotBeFitted) {
+  std::vector<Pose2> path = {{1, 2, 3}};
+  EXPECT_FALSE(OptimiseLoopGraph(path, {}, {}).usable);
+  EXPECT_EQ(path.front(), (Pose2{1, 2, 3}));
 }
 
 TEST(PoseGraph, TurningTheWholeProblemTurnsTheAnswer) {

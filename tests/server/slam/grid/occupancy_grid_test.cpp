@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
 #include "server/slam/grid/grid_image.h"
 #include "tests/server/slam/worlds.h"
@@ -19,6 +20,26 @@ TEST(OccupancyGrid, WallsAreOccupiedFreeSpaceFreeBeyondUnknown) {
   EXPECT_GT(grid.OccupancyAt({3.01, 0.0}), 80);
   EXPECT_LT(grid.OccupancyAt({1.5, 0.5}), 20);
   EXPECT_EQ(grid.OccupancyAt({4.0, 0.0}), kUnknownCell);
+}
+
+TEST(OccupancyGrid, OnlyTheChunksThatAreWantedChange) {
+  const Scan scan = Look(Room(-3, -2, 6, 4), {}, test::FullTurnLaser(720));
+  OccupancyGrid all{GridOptions{}}, some{GridOptions{}};
+  all.Draw(scan, {});
+  std::vector<ChunkKey> asked;
+  some.Draw(scan, {}, [&asked](const ChunkKey& key) {
+    asked.push_back(key);
+    return key.x == 0;
+  });
+  const OccupancyGrid::Chunks drawn = all.Share(), wanted = some.Share();
+  ASSERT_EQ(asked.size(), 4U);  // Those round the origin.
+  EXPECT_EQ(drawn.size(), 4U);
+  EXPECT_EQ(wanted.size(), 2U);
+  for (const auto& [key, chunk] : wanted) {
+    EXPECT_EQ(key.x, 0);
+    EXPECT_TRUE(chunk->log_odds == drawn.at(key)->log_odds);
+  }
+  EXPECT_EQ(some.TakeChange().size(), 2U);
 }
 
 TEST(OccupancyGrid, DeterministicCellsFollowTheLastScan) {

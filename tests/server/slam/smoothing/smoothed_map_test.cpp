@@ -136,6 +136,30 @@ TEST(SmoothedMap, TheFitCanBeEndedToo) {
   EXPECT_TRUE(SmoothMap(snapshot, {}, next, kGoOn));
 }
 
+TEST(SmoothedMap, WhatAnEarlierJobHasDrawnIsNotDrawnAgain) {
+  DrawnMaps drawn;
+  MapperSnapshot snapshot = Snapshot(BrokenPath(), TruePath());
+  const auto first = SmoothMap(snapshot, {}, kGoOn, {}, &drawn);
+  ASSERT_TRUE(first && drawn.online && drawn.smoothed);
+  EXPECT_EQ(drawn.smoothed->drawn_anew, static_cast<std::size_t>(kLooks));
+  const auto chunks = drawn.smoothed->chunks;
+  const auto second = SmoothMap(snapshot, {}, kGoOn, {}, &drawn);
+  ASSERT_TRUE(second);
+  EXPECT_EQ(drawn.online->drawn_anew + drawn.smoothed->drawn_anew, 0U);
+  EXPECT_EQ(drawn.smoothed->chunks, chunks);
+  EXPECT_EQ(second->before.mean_m2(), first->before.mean_m2());
+  EXPECT_EQ(second->after.mean_m2(), first->after.mean_m2());
+  // The result was enabled: the robot's own path is now what was the smoothed one.
+  snapshot.online_path = TruePath();
+  ASSERT_TRUE(MapAlong(snapshot, TruePath(), {}, kGoOn, &drawn));
+  EXPECT_EQ(drawn.online->drawn_anew, 0U);
+  EXPECT_EQ(drawn.online->chunks, chunks);
+  // A job that is cancelled forgets nothing.
+  EXPECT_FALSE(MapAlong(
+      snapshot, BrokenPath(), {}, [] { return false; }, &drawn));
+  EXPECT_EQ(drawn.smoothed->chunks, chunks);
+}
+
 TEST(SmoothedMap, OfNothingIsEmpty) {
   const auto map = SmoothMap({}, {}, kGoOn);
   ASSERT_TRUE(map);

@@ -268,6 +268,18 @@ TEST(Trail, ALoopChangesThePathOnlyOnceItIsAdded) {
   EXPECT_LT(trail.distances_m()[0], 2.0);
 }
 
+// The steps say to 0.1 m where the last keyframe is. A loop that says otherwise by metres must not move the path, nor
+// be kept, also where the search has found it twice.
+TEST(Trail, AWrongLoopIsOutvotedAndNotTaken) {
+  const Trail trail = Chain(6);
+  std::vector<Pose2> path;
+  for (std::size_t k = 0; k < 6; ++k) path.push_back({2.0 * static_cast<double>(k), 0.0, 0.0});
+  const Eigen::Matrix3d covariance = PoseCovariance(0.1, 0.01);
+  EXPECT_FALSE(trail.PathWithLoop({0, 5, {6.0, 0.0, 0.0}, covariance, true}, path, PoseGraphOptions{}));
+  EXPECT_FALSE(trail.PathWithLoop({0, 5, {10.0, 4.0, 0.0}, covariance, true}, path, PoseGraphOptions{}));
+  EXPECT_TRUE(trail.PathWithLoop({0, 5, {10.3, 0.1, 0.0}, covariance, true}, path, PoseGraphOptions{}));
+}
+
 TEST(Trail, APathThatCannotBeFittedIsNoPath) {
   Trail trail(MotionNoise{});
   trail.Append({std::make_shared<const Scan>(), {}}, {}, {}, kNoCovariance, std::nullopt);
