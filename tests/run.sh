@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # The one command: installs what is missing, builds every way that counts, runs every test, holds the accuracy.
 #   tests/run.sh                 packages to tsan below; stops at the first that fails
-#   tests/run.sh --full          every test in the ordinary build and under the address sanitizer, every source by itself,
-#                                the demo with DDS Security, Debian packages, containers, and a real systemd, besides
+#   tests/run.sh --full          clang-tidy, every test in the ordinary build and under the address sanitizer, every source by
+#                                itself, the demo with DDS Security, Debian packages, containers, and a real systemd, besides
 #   tests/run.sh --quick         packages, format, architecture, release
 #   tests/run.sh --stage NAME    this stage (may be repeated), with the build it needs
 #   tests/run.sh --studies       whatever else is asked for, and the slow studies (tests/studies) last
@@ -12,8 +12,8 @@ set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cd "$root"
-all=(packages format architecture release accuracy demo nodds tidy asan fuzz tsan)
-full=(asan_rest plain demo_secure debs containers recordings systemd)
+all=(packages format architecture release accuracy demo nodds asan fuzz tsan)
+full=(tidy asan_rest plain demo_secure debs containers recordings systemd)
 stages=()
 studies=()
 full_too=0

@@ -46,13 +46,17 @@ ScanOutcome Mapper::State::Process(std::shared_ptr<const Scan> scan, const Pose2
   }
 
   // The motion of the last scans says nothing where they do not belong together with this one.
-  if (passage != Passage::kDriven || s.recovery.active()) rolling = nullptr;
+  const bool doubted = s.recovery.doubt().has_value();
+  if (passage != Passage::kDriven || (s.recovery.active() && !doubted)) rolling = nullptr;
+  std::optional<ScanBefore> last;  // Not in the trail.
+  if (doubted) last = ScanBefore{s.last_scan->scan->stamp, s.last_scan->T_track_robot};
   TrackedScan tracked = TrackScan(s.front_end, {s.options.front_end, s.options.pairing.rolling}, s.trail,
-                                  std::move(scan), rolling, T_odom_robot, parallel_for);
+                                  std::move(scan), rolling, T_odom_robot, parallel_for, last);
   s.Begin(ScanStep::kRecover);
   s.CheckPlace(passage, tracked, T_odom_robot, parallel_for);
   auto& [still, view, step] = tracked;
   s.learning.LearnUnless(passage != Passage::kDriven || s.recovery.active(), step);
+  if (s.recovery.doubt()) s.EndDoubt(*still, view.points_robot, step, parallel_for);
   if (s.recovery.active()) return s.Recover({std::move(still), T_odom_robot}, std::move(view), step, parallel_for);
 
   s.Begin(ScanStep::kOther);

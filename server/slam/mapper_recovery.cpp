@@ -41,10 +41,43 @@ Passage Mapper::State::BeginAfter(Passage passage, bool tilted) {
 void Mapper::State::CheckPlace(Passage passage, TrackedScan& tracked, const Pose2& T_odom_robot,
                                const ParallelFor& parallel_for) {
   auto& [still, view, step] = tracked;
-  const bool watched = passage == Passage::kDriven || StoodStill(*still, T_odom_robot, step) ||
+  const bool driven = passage == Passage::kDriven;
+  const auto before_carried = driven ? BeforeCarried(*still, view.points_robot, step) : std::nullopt;
+  const bool watched = (driven && !before_carried) || StoodStill(*still, T_odom_robot, step) ||
                        (passage == Passage::kPaused && GoesOn(*still, view.points_robot, T_odom_robot, step));
   if (!watched && passage != Passage::kUnknown) step = DoubtPlace(view, T_odom_robot, step, parallel_for);
+  if (before_carried && recovery.on_path()) recovery.BeginDoubt(*before_carried);
   last_scan = LastScan{still, T_odom_robot, step.T_track_robot};
+}
+
+// If somebody may have carried the robot since the last scan: how that agreed with the last keyframes.
+std::optional<SceneAgreement> Mapper::State::BeforeCarried(const Scan& scan,
+                                                           const std::vector<SurfacePoint>& points_robot,
+                                                           const TrackStep& step) const {
+  if (!options.self_check.enabled || !HasMap() || recovery.active() || !last_scan) return std::nullopt;
+  if (!MayBeCarried(level.outcome.score, step.score)) return std::nullopt;
+  const std::vector<SurfacePoint> last_points = Look(*last_scan->scan, options.front_end).points_robot;
+  const SeenScan last{*last_scan->scan, last_points, last_scan->T_track_robot, level.outcome.score};
+  const SceneAgreement before = AgreementWithLast(trail, last);
+  if (!LooksCarried(trail, last, before, {scan, points_robot, step.T_track_robot, step.score})) return std::nullopt;
+  return before;
+}
+
+// Nobody has carried a robot whose scans agree again with the last keyframes, or with each other as little as with
+// these: it is localized, and what was held is added to its path.
+void Mapper::State::EndDoubt(const Scan& scan, const std::vector<SurfacePoint>& points_robot, const TrackStep& step,
+                             const ParallelFor& parallel_for) {
+  if (!step.matched || recovery.was_carried()) return;
+  const SceneAgreement& before = recovery.doubt()->before;
+  const SeenScan now{scan, points_robot, step.T_track_robot, step.score};
+  // The first scan since then was matched with what it may not belong to.
+  const std::vector<RecentScan>& recent = recovery.recent();
+  const auto since = std::span(recent).subspan(std::min<std::size_t>(1, recent.size()));
+  const bool fits_again = recent.size() == 1 && IsExplainedAsBefore(before, step.score);
+  if (!fits_again && StaysDifferent(before, AgreementWithLast(trail, now), ConflictWith(since, now))) return;
+  const std::vector<Recovery::Held> held = recovery.TakeHeld();
+  recovery.End();
+  AddHeld(held, parallel_for);
 }
 
 // From now on the robot has to be found again.
@@ -86,7 +119,7 @@ void Mapper::State::Relocalise(const std::optional<Pose2>& T_map_robot) {
 Mapper::LostView Mapper::SeenWhileLost() const {
   const State& s = *state_;
   const Recovery& recovery = s.localisation ? s.localisation->recovery() : s.recovery;
-  LostView view{recovery.active(), recovery.has_scans(), recovery.recent()};
+  LostView view{recovery.active() && !recovery.doubt(), recovery.has_scans(), recovery.recent()};
   if (!view.lost) return {};
   if (!view.since_lost && s.last_scan) {
     view.scans = {{s.last_scan->scan, s.last_scan->T_track_robot, 0.0,
@@ -180,6 +213,7 @@ ScanOutcome Mapper::State::Recover(Keyframe keyframe, ScanView view, TrackStep s
   const Stamp stamp = keyframe.scan->stamp;
   const Pose2 T_odom_robot = keyframe.T_odom_robot;
   recovery.AgeSuggestion();
+  recovery.AddDoubtedWay(step.moved_m);
   if (!step.matched) {
     recovery.ForgetScans();
     front_end.Restart();
@@ -191,12 +225,16 @@ ScanOutcome Mapper::State::Recover(Keyframe keyframe, ScanView view, TrackStep s
   const Pose2 T_track_kept = on_path ? trail.shapes().back().T_track_robot : step.T_track_robot;
   const Pose2 T_track_last = recovery.LastKept(T_track_kept);
   const bool keep = MovedEnough(Between(T_track_last, step.T_track_robot), options.gate) || (first && !on_path);
-  if (keep) front_end.AddKeyframe(view);
+  // Where the robot may have been carried, the first scan is not matched with: until the second one, the score tells
+  // how scans fit what was seen before. The second one is always kept.
+  const bool doubted_first = recovery.doubt() && first;
+  const bool doubted_second = recovery.doubt() && recovery.recent().size() == 1;
+  if ((keep && !doubted_first) || doubted_second) front_end.AddKeyframe(view);
   if (on_path) {
     blind.Add(step, T_track_last);
     if (keep) recovery.Hold({keyframe, step, blind.TakeCovariance()});
   }
-  if (keep || first) {
+  if (keep || first || doubted_second) {
     const PosePath path = believed_path();
     const auto found = recovery.Take({keyframe.scan, OdometryOrNone(T_odom_robot)}, step, view.points_robot,
                                      PathMap(trail, path, options.recovery.place, options.self_check.near_m));
@@ -210,12 +248,17 @@ ScanOutcome Mapper::State::Recover(Keyframe keyframe, ScanView view, TrackStep s
 ScanOutcome Mapper::State::GoOnAlongPath(const ParallelFor& parallel_for) {
   const std::vector<Recovery::Held> held = recovery.TakeHeld();
   recovery.End();
+  const Recovery::Held& now = held.back();
+  AddHeld(std::span(held).first(held.size() - 1), parallel_for);
+  AddKeyframe(now.keyframe, Look(*now.keyframe.scan, options.front_end), now.step, now.step_covariance, parallel_for);
+  return Report(now.keyframe.scan->stamp, now.keyframe.T_odom_robot, now.step, true);
+}
+
+void Mapper::State::AddHeld(std::span<const Recovery::Held> held, const ParallelFor& parallel_for) {
   for (const Recovery::Held& one : held) {
     AddKeyframe(one.keyframe, Look(*one.keyframe.scan, options.front_end), one.step, one.step_covariance, parallel_for);
-    if (&one != &held.back()) trail.AddScan(one.keyframe.scan->stamp, {});
+    trail.AddScan(one.keyframe.scan->stamp, {});
   }
-  const Recovery::Held& now = held.back();
-  return Report(now.keyframe.scan->stamp, now.keyframe.T_odom_robot, now.step, true);
 }
 
 // By how much a step from the last keyframe to a place of the map is uncertain because the pose of that keyframe in the

@@ -60,6 +60,12 @@ struct Mapper::State {
   [[nodiscard]] Pose2 OdometryOrNone(const Pose2& T_odom_robot) const {
     return options.front_end.use_odometry ? T_odom_robot : level.T_odom_robot;
   }
+  [[nodiscard]] std::optional<SceneAgreement> BeforeCarried(const Scan& scan,
+                                                            const std::vector<SurfacePoint>& points_robot,
+                                                            const TrackStep& step) const;
+  void EndDoubt(const Scan& scan, const std::vector<SurfacePoint>& points_robot, const TrackStep& step,
+                const ParallelFor& parallel_for);
+  void AddHeld(std::span<const Recovery::Held> held, const ParallelFor& parallel_for);
   [[nodiscard]] bool StoodStill(const Scan& scan, const Pose2& T_odom_robot, const TrackStep& step) const;
   [[nodiscard]] bool FollowsOdometry(const Scan& scan, const Pose2& T_odom_robot, const TrackStep& step) const;
   // A map, and where the track lies in it.

@@ -23,7 +23,10 @@ constexpr std::size_t kMaxComparisons =
 }  // namespace
 
 void Visit(OptionVisitor& visitor, SelfCheckOptions& options) {
-  visitor.Flag("enabled", options.enabled, "Whether scans are compared with the map of earlier visits.");
+  visitor.Flag(
+      "enabled", options.enabled,
+      "Whether scans are compared with the map of earlier visits, and with the scan before to notice that somebody "
+      "has carried the robot.");
   visitor.Real("min_travel_m", options.min_travel_m, "m", 0.0, 1000.0,
                "Way between the two visits that are compared. After a shorter way both may have the same drift.");
   visitor.Real(

@@ -114,6 +114,7 @@ std::vector<Pose2> Recovery::Unconfirmed() const {
 }
 
 void Recovery::LeavePath() {
+  doubt_.reset();
   T_map_track_.reset();
   held_.clear();
 }
@@ -138,6 +139,7 @@ void Recovery::Append(const Keyframe& keyframe, const TrackStep& step, std::vect
 std::optional<Recovery::Found> Recovery::Take(const Keyframe& keyframe, const TrackStep& step,
                                               std::vector<SurfacePoint> points_robot, const SearchedMap& map) {
   Append(keyframe, step, std::move(points_robot));
+  if (doubt_ && !was_carried()) return std::nullopt;
   if (auto place = ConfirmSuggestion()) {
     const bool own = search_.Compare(map, *recent_.back().scan, recent_.back().points, place->T_map_robot) ==
                      PlaceSearch::Agreement::kAgrees;

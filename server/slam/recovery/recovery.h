@@ -8,6 +8,8 @@
 //  - Where a job has found the robot in the map of its site, which shows more than that of the robot (`Suggest`), that
 //    was the first of the two searches, and the second one is made in that map. If the map of the robot does not show
 //    the place as well, it is no place relative to what the robot has seen before (`Found::elsewhere`).
+//  - A robot that may have been carried between two scans (carried.h) is first held on its path as well. It is looked
+//    for only if its scans have not shown within kMostDoubtedM of way that nobody has carried it.
 //  - A robot that has been followed in the map of others, with too much doubt (`BeginNear`), is found by one search
 //  where
 //    the track leads, and elsewhere by two that agree, like all others.
@@ -21,6 +23,7 @@
 
 #include "common/service/pose_report.h"
 #include "server/slam/motion/step_motion.h"
+#include "server/slam/recovery/carried.h"
 #include "server/slam/recovery/place_search.h"
 #include "server/slam/tracking/front_end.h"
 
@@ -107,6 +110,23 @@ class Recovery {
   void AgeSuggestion();
   // The last scans, if they belong together with the next one.
   [[nodiscard]] const std::vector<RecentScan>& recent() const { return recent_; }
+  // A robot on its path that may have been carried since the last keyframe.
+  struct Doubt {
+    SceneAgreement before;  // Of the last scan that was not doubted.
+    double way_m = 0.0;     // Since then.
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.before, self.way_m);
+    }
+  };
+  // REQUIRES: on_path.
+  void BeginDoubt(const SceneAgreement& before) { doubt_ = Doubt{before}; }
+  [[nodiscard]] const std::optional<Doubt>& doubt() const { return doubt_; }
+  void AddDoubtedWay(double moved_m) {
+    if (doubt_) doubt_->way_m += moved_m;
+  }
+  [[nodiscard]] bool was_carried() const { return doubt_ && doubt_->way_m > kMostDoubtedM; }
   // Where the robot may be now: at the places found that are not confirmed.
   [[nodiscard]] std::vector<Pose2> Unconfirmed() const;
   // The odometry has begun anew.
@@ -138,9 +158,13 @@ class Recovery {
   static void Members(Archive& archive, auto& self) {
     archive(self.active_, self.odometry_goes_on_, self.said_, self.contradicted_, self.known_, self.T_map_track_,
             self.searched_at_m_, self.recent_, self.held_, self.unconfirmed_);
+    bool has_doubt = true;
+    if constexpr (Archive::kReads) has_doubt = archive.format() >= 13;
+    if (has_doubt) archive(self.doubt_);
     if constexpr (Archive::kReads) {
       self.search_.Forget();
       self.suggestion_.reset();  // Not saved (Mapper::has_suggestion).
+      archive.Require(!self.doubt_ || self.on_path(), "a robot that may have been carried");
       if (archive.ok()) self.RestorePoints();
     }
   }
@@ -187,6 +211,7 @@ class Recovery {
   bool contradicted_ = false;  // The last scan does not fit where the robot is believed to be.
   Known known_;
   std::optional<Pose2> T_map_track_;  // While the scans continue the path.
+  std::optional<Doubt> doubt_;
   double searched_at_m_ = 0.0;
   std::vector<RecentScan> recent_;
   std::vector<Held> held_;  // While the scans continue the path: those that will be its keyframes.

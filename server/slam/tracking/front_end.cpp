@@ -104,6 +104,11 @@ std::optional<Pose2> FrontEnd::LastOdometryStep() const {
   return Between(history_[history_.size() - 2].T_odom_robot, history_.back().T_odom_robot);
 }
 
+std::optional<Pose2> FrontEnd::LastStep() const {
+  if (history_.size() < 2) return std::nullopt;
+  return Between(history_[history_.size() - 2].T_track_robot, history_.back().T_track_robot);
+}
+
 std::optional<TrackStep> FrontEnd::TrackAgain(const ScanView& view, const Pose2& T_odom_robot, const TrackStep& step) {
   if (history_.size() < 2 || !options_.refine_enabled) return std::nullopt;
   const Sight first = history_.back();

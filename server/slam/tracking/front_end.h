@@ -108,6 +108,8 @@ class FrontEnd {
   std::optional<TrackStep> TrackAgain(const ScanView& view, const Pose2& T_odom_robot, const TrackStep& step);
   // The step of odometry from the scan before to the scan just tracked; nothing if there is none before.
   [[nodiscard]] std::optional<Pose2> LastOdometryStep() const;
+  // The step between the last two scans, in the frame of the earlier one; nothing if there are fewer.
+  [[nodiscard]] std::optional<Pose2> LastStep() const;
   // Makes the scan just tracked part of the reference.
   void AddKeyframe(const ScanView& view);
   // Forgets all scans: the next one is at the identity again.

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "server/slam/features/scan_view.h"
 #include "server/slam/scan/scan_motion.h"
@@ -25,10 +26,17 @@ struct TrackedScan {
   TrackStep step;
 };
 
+// The scan before another one.
+struct ScanBefore {
+  Stamp stamp = 0;
+  Pose2 T_track_robot;
+};
+
 // `scan`: all beams at its stamp, by odometry. `rolling` is the same scan as it was measured; null if it was
-// taken at once. `trail` has the scans before this one.
+// taken at once. `trail` has the scans before this one, but for `last`, if that is given.
 [[nodiscard]] TrackedScan TrackScan(FrontEnd& front_end, const TrackScanOptions& options, const Trail& trail,
                                     std::shared_ptr<const Scan> scan, const RollingScan* rolling,
-                                    const Pose2& T_odom_robot, const ParallelFor& parallel_for);
+                                    const Pose2& T_odom_robot, const ParallelFor& parallel_for,
+                                    std::optional<ScanBefore> last = std::nullopt);
 
 }  // namespace cairn::slam

@@ -67,27 +67,18 @@ TEST(LostRobot, DrawsNothingUntilItIsLocalizedAgain) {
   Robot robot(FewParticles());
   robot.Drive(30, false);
   ASSERT_TRUE(robot.last.localized);
-  robot.Drive(30, true);
-  ASSERT_FALSE(robot.last.localized);
   const std::size_t chunks = robot.chunks();
   const std::size_t keyframes = robot.mapper().keyframe_count();
-  robot.Drive(80, true);
+  robot.Drive(110, true);
   EXPECT_FALSE(robot.last.localized);
-  EXPECT_GT(robot.mapper().keyframe_count(), keyframes + 40);
+  EXPECT_EQ(robot.mapper().keyframe_count(), keyframes);
   EXPECT_EQ(robot.chunks(), chunks);
-  const MapperSnapshot snapshot = robot.mapper().Snapshot();
-  EXPECT_FALSE(snapshot.keyframes.back().localized);
-  EXPECT_TRUE(snapshot.keyframes.front().localized);
-  // It sees walls again. Once they agree with its map, what it saw of them before that counts for smoothing as well.
-  const auto seen_again = static_cast<std::ptrdiff_t>(robot.mapper().keyframe_count());
-  robot.Drive(20, false);
-  ASSERT_FALSE(robot.last.localized);
-  EXPECT_FALSE(robot.mapper().Snapshot().keyframes.back().localized);
-  robot.Drive(130, false);
+  // It sees walls again, and its path goes on when it has been found in its map.
+  robot.Drive(60, false);
   EXPECT_TRUE(robot.last.localized);
-  const std::vector<Keyframe> later = robot.mapper().Snapshot().keyframes;
-  EXPECT_TRUE(std::all_of(later.begin() + seen_again, later.end(), [](const Keyframe& k) { return k.localized; }));
-  EXPECT_FALSE(std::all_of(later.begin(), later.end(), [](const Keyframe& k) { return k.localized; }));
+  EXPECT_GT(robot.mapper().keyframe_count(), keyframes + 10);
+  const std::vector<Keyframe> all = robot.mapper().Snapshot().keyframes;
+  EXPECT_TRUE(std::all_of(all.begin(), all.end(), [](const Keyframe& k) { return k.localized; }));
 }
 
 TEST(LostRobot, AFullSessionRefusesScansAndCountsThem) {

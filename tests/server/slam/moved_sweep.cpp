@@ -1,5 +1,6 @@
 #include "tests/server/slam/moved_sweep.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
@@ -124,7 +125,11 @@ class Follower {
     const auto truth = PoseOn(*truth_, scan.stamp - later_, 1.0);
     if (!truth) return;
     if (!first_) first_ = scan.stamp;
-    if (before_) way_m_ += DistanceM(*truth, *before_);
+    if (before_) {
+      const double step_m = DistanceM(*truth, *before_);
+      way_m_ += step_m;
+      if (DrovePast(*truth)) case_->shown_m += step_m;
+    }
     before_ = *truth;
     if (outcome.localized) shown_.push_back({*truth, outcome.T_map_robot});
     ++case_->poses;
@@ -142,6 +147,13 @@ class Follower {
     if (error_m <= kMovedWrongM) return;
     ++case_->wrong;
     case_->wrong_later += way_m_ > kNoticedWithinM ? 1 : 0;
+  }
+  // Whether the way before the gap leads past this place.
+  [[nodiscard]] bool DrovePast(const Pose2& truth) const {
+    if (truth_before_ == nullptr) return false;
+    return std::ranges::any_of(*truth_before_, [&](const auto& one) {
+      return one.stamp <= until_ && DistanceM(one.T_map_robot, truth) < kShownM;
+    });
   }
   // The places before the gap, as the best hypothesis has them now.
   [[nodiscard]] std::vector<Shown> Mapped() const {

@@ -47,6 +47,8 @@ struct MovedCase {
   double noticed_after_m = -1.0;
   // Those of `wrong` at which the robot had driven more than kNoticedWithinM.
   int wrong_later = 0;
+  // The way after the gap that leads along the way before it, within kShownM: there its own map shows the robot.
+  double shown_m = 0.0;
   bool stood_still = false;  // Nothing had happened to the robot, so that it must go on at once.
 };
 
@@ -55,6 +57,7 @@ struct MovedCase {
 inline constexpr double kMovedWrongM = 1.0;
 // Of a robot that was carried unseen: the way after which its poses must not be called localized at a wrong place.
 inline constexpr double kNoticedWithinM = 2.0;
+inline constexpr double kShownM = 1.5;
 
 [[nodiscard]] std::vector<MovedCase> RunMovedSweep(const MovedSweepOptions& options);
 // The names of what may happen to a robot.

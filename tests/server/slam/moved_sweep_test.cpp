@@ -25,5 +25,22 @@ TEST(MovedSweep, NoRobotIsLocalizedAtAWrongPlace) {
   EXPECT_GE(3 * found, static_cast<int>(cases.size()));
 }
 
+// The cut of `moved --only kidnapped`. Nobody noticed such robots for 6 m in the middle, and up to 40 m.
+TEST(MovedSweep, ARobotThatIsCarriedUnseenIsNeverLocalizedAtAWrongPlaceAndIsFound) {
+  MovedSweepOptions options;
+  options.worlds = {"office", "room"};
+  options.moments = 1;
+  options.first_s = 135.0;
+  options.kidnapped = true;
+  int found = 0;
+  const std::vector<MovedCase> cases = RunMovedSweep(options);
+  for (const MovedCase& one : cases) {
+    EXPECT_EQ(one.wrong, 0) << one.world << ", " << one.kind;
+    found += one.found_after_m >= 0.0 ? 1 : 0;
+  }
+  EXPECT_EQ(cases.size(), 8U);
+  EXPECT_GE(found, 7);
+}
+
 }  // namespace
 }  // namespace cairn::test

@@ -1,0 +1,58 @@
+// Notices that somebody has carried the robot between two scans, although nothing is missing in what it sends (the
+// kidnapped robot). Such a scan is explained suddenly less by the surfaces of the last keyframes than the scan before,
+// and it contradicts them more: either shows surfaces where beams of the other passed. What passes close to the lidar
+// looks so for a moment, but then the next scans are again as those before. So the robot is doubted first, and has been
+// carried if it stays so. It can not notice a robot that is carried to where all that it sees looks the same, such as
+// along a corridor without doors. Frames: `track` is that of the front-end. Stateless, thread-safe.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "common/geometry/pose2.h"
+#include "common/sensor/scan.h"
+#include "server/slam/scan/surface_points.h"
+#include "server/slam/recovery/place_search.h"
+#include "server/slam/trail/trail.h"
+
+namespace cairn::slam {
+
+// How far a robot that is doubted is followed before it counts as carried.
+inline constexpr double kMostDoubtedM = 1.0;
+
+// How a scan agrees with the last keyframes where the robot is believed to be.
+struct SceneAgreement {
+  double score = 0.0;     // TrackStep::score.
+  double conflict = 0.0;  // Share of the points compared that are contradicted.
+
+  template <typename Archive>
+  static void Members(Archive& archive, auto& self) {
+    archive(self.score, self.conflict);
+  }
+};
+
+// A scan, seen at `T_track_robot`.
+struct SeenScan {
+  const Scan& scan;
+  const std::vector<SurfacePoint>& points_robot;
+  Pose2 T_track_robot;
+  double score = 0.0;
+};
+
+// How a scan agrees with the last keyframes of the trail.
+[[nodiscard]] SceneAgreement AgreementWithLast(const Trail& trail, const SeenScan& seen);
+// Whether the score alone may show that the robot was carried after a scan with score `before`: it costs nothing.
+[[nodiscard]] bool MayBeCarried(double before, double score);
+// Whether `now`, which comes after `last`, may show that the robot was carried between the two. `before` is the
+// agreement of `last`.
+[[nodiscard]] bool LooksCarried(const Trail& trail, const SeenScan& last, const SceneAgreement& before,
+                                const SeenScan& now);
+// Whether so much of a scan is explained by what was seen before.
+[[nodiscard]] bool IsExplainedAsBefore(const SceneAgreement& before, double score);
+// The share of the points compared that are contradicted between a scan and earlier ones since the robot is doubted.
+[[nodiscard]] double ConflictWith(std::span<const RecentScan> since, const SeenScan& now);
+// Whether the scans of a doubted robot differ from the last keyframes but not from each other: then it is somewhere
+// else. What moves past the robot contradicts the scans since then as well. `since`: ConflictWith.
+[[nodiscard]] bool StaysDifferent(const SceneAgreement& before, const SceneAgreement& now, double since);
+
+}  // namespace cairn::slam

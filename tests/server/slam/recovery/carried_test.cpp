@@ -1,0 +1,145 @@
+// Robots that somebody carries between two scans while nothing is missing in what they send, and robots that only look
+// so for a moment.
+#include "server/slam/recovery/carried.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/slam/scan_pipeline.h"
+#include "tests/server/slam/ring_world.h"
+
+namespace cairn::slam {
+namespace {
+
+using test::Laser;
+using test::Look;
+using test::World;
+
+constexpr Laser kTenthOfASecond{.beams = 181, .step_rad = Radians(1.5), .sigma_m = 0.01};
+
+// Drives round in a room of 27 x 10 m with shelves along its walls, a quarter of a metre a scan. Nobody tells it of being carried.
+class CarriedRobot {
+ public:
+  CarriedRobot() : pipeline_(std::make_unique<ScanPipeline>(Options(), Pose2{}, SerialFor, Sink())) {
+    room_.Add({{4, 5}, {4, 4.2}, {5, 4.2}, {5, 5}});
+    room_.Add({{8, -5}, {8, -4}, {8.5, -4}, {8.5, -5}});
+    room_.Add({{14, -5}, {14, -2}, {16, -2}, {16, -5}});
+  }
+  // `others` stands in the room as well.
+  void Drive(int scans, const World& others = {}) {
+    World seen = room_;
+    seen.walls.insert(seen.walls.end(), others.walls.begin(), others.walls.end());
+    for (int i = 0; i < scans; ++i) {
+      const double step_m = 0.25;
+      truth_ = truth_ * Pose2{step_m, 0, truth_.x > 19.0 || truth_.x < 0.0 ? 0.15 : 0.0};
+      odometry_ = odometry_ * Between(before_, truth_);
+      before_ = truth_;
+      Scan scan = Look(seen, truth_, kTenthOfASecond, &rng_);
+      scan.stamp = (++stamp_) * kNanosPerSecond / 5;
+      pipeline_->Add(Odometry{0, scan.stamp, odometry_});
+      pipeline_->Add(std::make_shared<const Scan>(std::move(scan)));
+    }
+  }
+  void Carry(const Pose2& T_world_robot) { truth_ = before_ = T_world_robot; }
+  [[nodiscard]] double ErrorM() const { return (last.T_map_robot.translation() - truth_.translation()).norm(); }
+  [[nodiscard]] std::string Save() const {
+    std::string bytes;
+    pipeline_->Save(bytes);
+    return bytes;
+  }
+  void GoOnFrom(const std::string& state) {
+    pipeline_ = std::make_unique<ScanPipeline>(Options(), Pose2{}, SerialFor, Sink());
+    ASSERT_TRUE(pipeline_->Load(state));
+  }
+  [[nodiscard]] const Mapper& mapper() const { return pipeline_->mapper(); }
+
+  ScanOutcome last;
+  int not_localized = 0, wrong = 0;
+
+ private:
+  static MapperOptions Options() {
+    MapperOptions options;
+    options.filter.particles = 10;
+    return options;
+  }
+  ScanPipeline::Sink Sink() {
+    return {.used =
+                [this](const Scan&, const ScanOutcome& outcome) {
+                  last = outcome;
+                  not_localized += outcome.localized ? 0 : 1;
+                  wrong += outcome.localized && ErrorM() > 1.0 ? 1 : 0;
+                },
+            .dropped = [](const Scan&, DropReason) {}};
+  }
+
+  World room_ = test::Room(-3, -5, 27, 10);
+  Pose2 truth_, before_, odometry_;
+  Stamp stamp_ = 0;
+  std::mt19937_64 rng_{4};
+  std::unique_ptr<ScanPipeline> pipeline_;
+};
+
+TEST(CarriedUnseen, ARobotIsNotLocalizedFromTheFirstScanOnUntilItIsFoundInItsMap) {
+  CarriedRobot robot;
+  robot.Drive(140);
+  ASSERT_EQ(robot.not_localized, 0);
+  robot.Carry({3.0, 0.5, 0.0});
+  robot.Drive(1);
+  EXPECT_FALSE(robot.last.localized);
+  EXPECT_EQ(robot.last.reason, PoseReason::kOdometryOnly);
+  robot.Drive(40);
+  EXPECT_EQ(robot.wrong, 0);
+  EXPECT_TRUE(robot.last.localized);
+  EXPECT_LT(robot.ErrorM(), 0.3);
+}
+
+TEST(CarriedUnseen, ARobotThatIsDoubtedIsTheSameAfterACheckpointToTheLastBit) {
+  CarriedRobot whole, stopped;
+  for (CarriedRobot* const robot : {&whole, &stopped}) {
+    robot->Drive(140);
+    robot->Carry({3.0, 0.5, 0.0});
+  }
+  whole.Drive(6);
+  for (int i = 0; i < 6; ++i) {
+    stopped.Drive(1);
+    stopped.GoOnFrom(stopped.Save());
+  }
+  EXPECT_TRUE(whole.Save() == stopped.Save());
+}
+
+// A panel that people carry across hides half of the room, and is elsewhere in every scan.
+TEST(CarriedUnseen, ARobotThatSomethingLargePassesIsLocalizedAgainAndLosesNothing) {
+  CarriedRobot robot, undisturbed;
+  robot.Drive(30);
+  undisturbed.Drive(30);
+  for (int i = 0; i < 8; ++i) {
+    World panel;
+    panel.Add({{11.0 + 0.5 * i, -2.5}, {11.0 + 0.5 * i, 2.5}});
+    robot.Drive(1, panel);
+    undisturbed.Drive(1);
+  }
+  EXPECT_GT(robot.not_localized, 0);  // It has been doubted.
+  EXPECT_LT(robot.not_localized, 6);
+  robot.Drive(20);
+  undisturbed.Drive(20);
+  EXPECT_TRUE(robot.last.localized);
+  EXPECT_LT(robot.ErrorM(), 0.5);
+  EXPECT_GE(robot.mapper().keyframe_count(), undisturbed.mapper().keyframe_count());
+}
+
+TEST(CarriedScene, DiffersForLongOnlyWhereNothingMoves) {
+  const SceneAgreement before{0.95, 0.01};
+  EXPECT_TRUE(StaysDifferent(before, {0.8, 0.08}, 0.005));
+  EXPECT_FALSE(StaysDifferent(before, {0.8, 0.08}, 0.05));  // What it saw since then moves as well.
+  EXPECT_FALSE(StaysDifferent(before, {0.8, 0.015}, 0.0));  // Nothing contradicts the last keyframes any more.
+  EXPECT_TRUE(IsExplainedAsBefore(before, 0.93));
+  EXPECT_FALSE(IsExplainedAsBefore(before, 0.91));
+}
+
+}  // namespace
+}  // namespace cairn::slam
