@@ -12,6 +12,13 @@
 #include "server/slam/motion/odometry_model.h"
 
 namespace cairn::slam {
+namespace {
+
+// Particles this near to the most likely one take part in the reported pose, however small the doubt is, and a path that
+// is believed ends this near to it.
+constexpr double kAgreementM = 0.5;
+
+}  // namespace
 
 void Visit(OptionVisitor& visitor, FastSlamOptions& options) {
   visitor.Real("sample_distance_m", options.sample_distance_m, "m", 0.0, 1000.0,
@@ -169,24 +176,26 @@ void ParticleSet::RemakePaths(std::size_t size, std::size_t apart, const MakePos
   }
 }
 
+// As long as no place has been seen again, all particles are about as likely, and which one is the most likely is
+// chance. The mean of those near it would lie as far from the middle of all as a single particle does, and would jump
+// whenever another one becomes the most likely. Therefore all particles take part that the stated doubt covers.
 void ParticleSet::Summarise(const std::vector<double>& shares) {
-  best_ = 0;
-  for (std::size_t i = 1; i < particles_.size(); ++i)
-    if (particles_[i].log_likelihood > particles_[best_].log_likelihood) best_ = i;
-  // Particles this near to the best one take part in the reported pose, so that other hypotheses do not distort it.
-  // Half or twice the value changes the errors no more than another seed (study `sensitivity`).
-  constexpr double kAgreementM = 0.5;
-  const Pose2& centre = best().T_map_robot;
+  const auto likeliest = std::ranges::max_element(particles_, {}, &Particle::log_likelihood);
+  const Pose2 centre = likeliest->T_map_robot;
+  const Eigen::Matrix2d near = kAgreementM * kAgreementM / kMaxNis * Eigen::Matrix2d::Identity();
+  // Two poses that are drawn from the same doubt are apart by twice its covariance.
+  const Eigen::Matrix2d apart = 2.0 * errors_.covariance(centre).topLeftCorner<2, 2>() + near;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   double sum = 0.0;
   for (std::size_t i = 0; i < particles_.size(); ++i) {
     const Eigen::Vector3d d = Minus(particles_[i].T_map_robot, centre);
-    if (d.head<2>().norm() > kAgreementM) continue;
+    if (Nis<2>(d.head<2>(), apart) > kMaxNis) continue;
     mean += shares[i] * d;
     sum += shares[i];
   }
   if (sum > 0.0) mean /= sum;
   estimate_.T_map_robot = Plus(centre, mean);
+  best_ = MostLikelyNear(estimate_.T_map_robot);
   const Eigen::Matrix3d covariance = errors_.covariance(estimate_.T_map_robot);
   const Eigen::LDLT<Eigen::Matrix3d> whiten(covariance);
   Eigen::Vector3d spread = Eigen::Vector3d::Zero();
@@ -198,6 +207,21 @@ void ParticleSet::Summarise(const std::vector<double>& shares) {
   }
   const Eigen::Vector3d variance = covariance.diagonal().cwiseMax(1e-12);
   spread_share_ = std::min(1.0, spread.cwiseQuotient(variance).mean());
+}
+
+// The particle whose path is believed: it has to end where the robot is said to be.
+std::size_t ParticleSet::MostLikelyNear(const Pose2& T_map_robot) const {
+  std::size_t best = 0;
+  double least_m = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < particles_.size(); ++i) {
+    const double distance_m = (particles_[i].T_map_robot.translation() - T_map_robot.translation()).norm();
+    const double away_m = std::max(distance_m, kAgreementM);  // All that are near are alike in this.
+    const bool likelier = particles_[i].log_likelihood > particles_[best].log_likelihood;
+    if (away_m > least_m || (away_m == least_m && !likelier)) continue;
+    best = i;
+    least_m = away_m;
+  }
+  return best;
 }
 
 void ParticleSet::Sample(std::size_t index) {

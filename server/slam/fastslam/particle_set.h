@@ -112,12 +112,13 @@ class ParticleSet {
   [[nodiscard]] const std::vector<Particle>& particles() const { return particles_; }
   [[nodiscard]] const Particle& operator[](std::size_t index) const { return particles_[index]; }
   [[nodiscard]] std::size_t size() const { return particles_.size(); }
+  // The most likely particle of those near the estimate.
   [[nodiscard]] std::size_t best_index() const { return best_; }
   [[nodiscard]] const Particle& best() const { return particles_[best_]; }
-  // The weighted mean pose of the particles near the best one, which changes less from step to step than the
-  // best particle does, because another particle may become the best. Its covariance is larger than the
-  // spread of the particles (error_ensemble.h). Particles too far away to be covered by it add their distance
-  // to the covariance.
+  // The weighted mean pose of the particles around the most likely one, as far as the doubt reaches. It changes less
+  // from step to step than the most likely particle does, because another one may become the most likely. Its
+  // covariance is larger than the spread of the particles (error_ensemble.h). Particles too far away to be covered by it
+  // add their distance to the covariance.
   [[nodiscard]] const FilterEstimate& estimate() const { return estimate_; }
   [[nodiscard]] FilterHealth health() const;
 
@@ -139,6 +140,8 @@ class ParticleSet {
   template <typename MakePose>
   void RemakePaths(std::size_t size, std::size_t apart, const MakePose& pose);
   void Summarise(const std::vector<double>& shares);
+  // Of the particles near a pose the one whose whole path is the most likely; if none is near, the nearest one.
+  [[nodiscard]] std::size_t MostLikelyNear(const Pose2& T_map_robot) const;
 
   FastSlamOptions options_;
   MotionSampler sampler_;

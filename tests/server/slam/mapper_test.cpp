@@ -152,7 +152,7 @@ MapperOptions SlipOptions(bool loops) {
 
 // What follows from the loop reaches the pose, the path and, some scans later, the map.
 TEST(Mapper, ClosesALargeLoopAndDrawsTheMapAgain) {
-  const Drive drive = DriveLargeRing(70.0, 3.0);
+  const Drive drive = DriveLargeRing(44.0, 3.0);
   const auto run = [&](bool loops) {
     Mapper mapper(SlipOptions(loops), {}, 1);
     ScanOutcome outcome;

@@ -2,6 +2,7 @@
 // What does its map show of them after so many changes that it has seen, and does it still know where it is?
 #include "tests/studies/furniture/doors.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -15,6 +16,7 @@
 
 #include "client/sim/fleet.h"
 #include "client/sim/shipped_worlds.h"
+#include "server/slam/landmarks/innovation.h"
 #include "server/slam/scan_pipeline.h"
 
 namespace cairn::studies {
@@ -92,6 +94,7 @@ struct Looks {
 
 struct Errors {
   int localized = 0, not_localized = 0, wrong = 0;
+  int outside = 0;  // The error of the position lies outside the 99.9 % region of the stated doubt.
   double sum_m = 0.0, most_m = 0.0;
 
   void Add(const slam::ScanOutcome& outcome, const Pose2& truth) {
@@ -105,6 +108,10 @@ struct Errors {
     sum_m += error_m;
     most_m = std::max(most_m, error_m);
     wrong += error_m > kWrongM || std::abs(error.theta) > kWrongRad ? 1 : 0;
+    const Eigen::Vector2d beside = outcome.T_map_robot.translation() - truth.translation();
+    const Eigen::Matrix2d doubt = outcome.covariance.topLeftCorner<2, 2>();
+    static const double kLargestNis = slam::ChiSquareQuantile(0.999, 2.0);
+    outside += beside.dot(doubt.ldlt().solve(beside)) > kLargestNis ? 1 : 0;
   }
 };
 
@@ -188,13 +195,15 @@ void StudyDoors(StudyContext& context) {
   report.Add(shown, "doors");
   if (const auto last = looks.find(kMostChanges); last != looks.end() && 2 * last->second.sometimes < last->second.all)
     report.Warn("fewer than half of the doors that have changed often are shown as sometimes occupied");
-  Table places({"doors", "poses localized", "not localized", "mean error (m)", "largest error (m)", "wrong"});
+  Table places(
+      {"doors", "poses localized", "not localized", "mean error (m)", "largest error (m)", "wrong", "outside 99.9 %"});
   for (const auto& [name, errors] : {std::pair{"open and close", with}, std::pair{"none", without}})
     places.Add({name, Count(errors.localized), Count(errors.not_localized),
-                Number(errors.sum_m / std::max(1, errors.localized), 3), Number(errors.most_m, 3),
-                Count(errors.wrong)});
+                Number(errors.sum_m / std::max(1, errors.localized), 3), Number(errors.most_m, 3), Count(errors.wrong),
+                Percent(static_cast<double>(errors.outside) / std::max(1, errors.localized), 2)});
   report.Add(places, "doors-places");
   report.Expect(with.wrong == 0, "a robot that drove past doors was localized at a wrong place");
+  report.Expect(without.wrong == 0, "a robot was localized at a wrong place where there are no doors");
 }
 
 }  // namespace cairn::studies

@@ -227,6 +227,25 @@ TYPED_TEST(FastSlamVariants, ABentPathMovesLandmarksWithTheirKeyframes) {
   EXPECT_EQ(filter.hypothesis(0).T_map_robot, path.back());
 }
 
+// Before a place is seen again all particles are about as likely. The pose was that of the particles near one of them,
+// which was as far from the steps driven as the doubt allows, and jumped when another one became the most likely.
+TYPED_TEST(FastSlamVariants, AsLongAsNothingSpeaksForOneParticleThePoseIsInTheMiddleOfAll) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    auto filter = Make<TypeParam>::Filter(seed);
+    for (int i = 0; i < 120; ++i) {
+      if (i > 0) filter.Predict({{0.5, 0, 0}});
+      filter.Commit();
+    }
+    const FilterEstimate estimate = filter.estimate();
+    const double doubt_m = std::sqrt(estimate.covariance.template topLeftCorner<2, 2>().trace());
+    ASSERT_GT(doubt_m, 2.0);
+    const double error_m = (estimate.T_map_robot.translation() - Eigen::Vector2d(59.5, 0.0)).norm();
+    EXPECT_LT(error_m, 0.35 * doubt_m) << "seed " << seed;
+    const double beside_m = Between(estimate.T_map_robot, filter.hypothesis(0).T_map_robot).translation().norm();
+    EXPECT_LT(beside_m, 0.35 * doubt_m) << "seed " << seed << ", the path that is believed";
+  }
+}
+
 TYPED_TEST(FastSlamVariants, EveryParticleDecidesForItselfWhatItSees) {
   // Particles spread over metres see a corner of another slot, and only some of them have a landmark there.
   auto filter = Make<TypeParam>::Filter(5);
