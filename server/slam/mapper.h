@@ -90,6 +90,13 @@ class Mapper {
   [[nodiscard]] std::uint64_t keyframes_made() const;
   // The numbers (trail/keyframe.h) of those that are kept, increasing.
   [[nodiscard]] std::vector<std::uint64_t> keyframe_numbers() const;
+  // Those that are drawn into the grid (Keyframe::localized), by increasing number, and T_map_robot at which they are.
+  // Empty while the robot's place in the map is not known.
+  struct DrawnKeyframes {
+    std::vector<std::uint64_t> numbers;
+    std::vector<Pose2> path;
+  };
+  [[nodiscard]] DrawnKeyframes drawn_keyframes() const;
   // Empty while the robot's place in the map is not known (filter.h: placed).
   [[nodiscard]] MapperSnapshot Snapshot() const;
   // Ends the mapping: if the map is still being drawn again after a large loop, draws the rest.

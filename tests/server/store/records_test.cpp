@@ -70,6 +70,7 @@ TEST(Records, SessionsSitesVersionsLayersAndJobsComeBack) {
   EXPECT_EQ(site_back->past, site.past);
   EXPECT_EQ(site_back->edits, site.edits);
   EXPECT_EQ(site_back->edits_version, 5U);
+  EXPECT_EQ(site_back->anchors, site.anchors);
   EXPECT_EQ(site_back->given_up.versions, 3U);
   EXPECT_EQ(site_back->given_up.layers, 2U);
   EXPECT_EQ(site_back->given_up.sessions, 1U);
@@ -165,6 +166,16 @@ TEST(Records, ValuesThatNoServerWritesAreRefused) {
     EXPECT_TRUE(SiteOf(BytesOf(edited)));
     spoil(edited.edits);
     EXPECT_FALSE(SiteOf(BytesOf(edited)));
+  }
+  for (const auto& spoil : std::vector<std::function<void(EditAnchors&)>>{
+           [](auto& anchors) { anchors.points_then.pop_back(); },
+           [](auto& anchors) { anchors.points_then[1].y() = std::nan(""); },
+           [](auto& anchors) { anchors.keyframes[0].T_map_then.x = std::nan(""); },
+           [](auto& anchors) { anchors.keyframes[1].T_map_now.theta = INFINITY; },
+           [](auto& anchors) { anchors.keyframes.resize(kMostEditPoints + 1); }}) {
+    StoredSite anchored = testing::SampleSiteRecord();
+    spoil(anchored.anchors.at(4));
+    EXPECT_FALSE(SiteOf(BytesOf(anchored)));
   }
   StoredSite last = testing::SampleSiteRecord();
   last.edits_version = kMaxEditsVersion - last.edits.size() - 1;
