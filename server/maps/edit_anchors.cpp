@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <limits>
 #include <memory>
 #include <optional>
+#include <utility>
 
 namespace cairn::server {
 namespace {
@@ -14,6 +14,9 @@ using Complex = std::complex<double>;
 
 // The heading of a keyframe counts as much as the place of a point so far from the others.
 constexpr double kHeadingAsFar_m = 1.0;
+// Whether a keyframe sees a point is asked of so many at most, the nearest first.
+constexpr double kNear_m = 10.0;
+constexpr std::size_t kMostLookedAt = 64;
 
 std::uint64_t NumberAt(const DrawnPath& drawn, std::size_t index) {
   return drawn.numbers == nullptr ? index : (*drawn.numbers)[index];
@@ -24,22 +27,29 @@ std::size_t SizeOf(const DrawnPath& drawn) {
   return drawn.numbers == nullptr ? drawn.path->size() : std::min(drawn.path->size(), drawn.numbers->size());
 }
 
-std::optional<EditAnchor> Nearest(const Eigen::Vector2d& point, const DrawnPaths& paths,
-                                  const std::vector<SessionId>& sessions) {
-  std::optional<EditAnchor> nearest;
-  double nearest_m2 = std::numeric_limits<double>::infinity();
-  for (const SessionId session : sessions) {
+std::optional<EditAnchor> AnchorOf(const Eigen::Vector2d& point, const DrawnPaths& paths, const AnchorChoice& choice) {
+  using Found = std::pair<double, EditAnchor>;  // How far it is, squared.
+  std::optional<Found> nearest;
+  std::vector<Found> near;
+  for (const SessionId session : choice.sessions_at(point)) {
     const auto drawn = paths.find(session);
     if (drawn == paths.end()) continue;
     for (std::size_t i = 0; i < SizeOf(drawn->second); ++i) {
       const Pose2& pose = (*drawn->second.path)[i];
       const double away_m2 = (pose.translation() - point).squaredNorm();
-      if (away_m2 >= nearest_m2) continue;
-      nearest_m2 = away_m2;
-      nearest = EditAnchor{session, NumberAt(drawn->second, i), pose, pose};
+      const bool is_near = away_m2 <= kNear_m * kNear_m, is_nearest = !nearest || away_m2 < nearest->first;
+      if (!is_near && !is_nearest) continue;
+      const Found found{away_m2, {session, NumberAt(drawn->second, i), pose, pose}};
+      if (is_near) near.push_back(found);
+      if (is_nearest) nearest = found;
     }
   }
-  return nearest;
+  if (!nearest) return std::nullopt;
+  std::ranges::stable_sort(near, {}, &Found::first);
+  if (near.size() > kMostLookedAt) near.resize(kMostLookedAt);
+  const auto seen = std::ranges::find_if(
+      near, [&](const Found& one) { return choice.sees(one.second.T_map_now.translation(), point); });
+  return seen == near.end() ? nearest->second : seen->second;
 }
 
 // The motion of the keyframe that is nearest to the point.
@@ -52,12 +62,12 @@ Pose2 MotionAt(const Eigen::Vector2d& point_then, const std::vector<EditAnchor>&
 
 }  // namespace
 
-EditAnchors AnchorsOf(const MapEdit& edit, const DrawnPaths& paths, const SessionsAt& sessions_at) {
+EditAnchors AnchorsOf(const MapEdit& edit, const DrawnPaths& paths, const AnchorChoice& choice) {
   EditAnchors anchors{.points_then = edit.points_map, .keyframes = {}};
   for (const Eigen::Vector2d& point : edit.points_map) {
-    const auto nearest = Nearest(point, paths, sessions_at(point));
-    if (nearest && std::ranges::find(anchors.keyframes, *nearest) == anchors.keyframes.end())
-      anchors.keyframes.push_back(*nearest);
+    const auto anchor = AnchorOf(point, paths, choice);
+    if (anchor && std::ranges::find(anchors.keyframes, *anchor) == anchors.keyframes.end())
+      anchors.keyframes.push_back(*anchor);
   }
   return anchors;
 }

@@ -1,5 +1,5 @@
-// How an edit of a map moves with the map. When it is made, each of its points hangs on the nearest keyframe of those
-// sessions that have drawn the tile in which the point lies. Where these keyframes lie elsewhere later, because a large
+// How an edit of a map moves with the map. When it is made, each of its points hangs on the nearest keyframe that sees
+// it, of those sessions that have drawn the tile in which the point lies. Where these keyframes lie elsewhere later, because a large
 // loop, a job or a switch of the map version has bent the map, the edit moves with them: as a whole, without changing
 // its shape. Points and poses are in the map frame. Stateless functions; thread-safe.
 #pragma once
@@ -17,10 +17,14 @@ namespace cairn::server {
 
 using DrawnPaths = std::map<SessionId, DrawnPath>;
 
-// What the edit hangs on, where it lies now. `sessions_at`: those whose keyframes count for a point. Without keyframes:
-// there are none for any of its points.
-using SessionsAt = std::function<std::vector<SessionId>(const Eigen::Vector2d& p_map)>;
-[[nodiscard]] EditAnchors AnchorsOf(const MapEdit& edit, const DrawnPaths& paths, const SessionsAt& sessions_at);
+// Which keyframes count for a point: those of these sessions; and of near ones those from which it is seen come first,
+// because a keyframe behind a wall may have been drawn at another time, and may move otherwise.
+struct AnchorChoice {
+  std::function<std::vector<SessionId>(const Eigen::Vector2d& point)> sessions_at;
+  std::function<bool(const Eigen::Vector2d& from, const Eigen::Vector2d& point)> sees;
+};
+// What the edit hangs on, where it lies now. Without keyframes: there are none for any of its points.
+[[nodiscard]] EditAnchors AnchorsOf(const MapEdit& edit, const DrawnPaths& paths, const AnchorChoice& choice);
 
 // T_now_then: the rigid motion that is nearest, in the sense of least squares, to that of all its points, each of which
 // moves with its own keyframe. Exactly the identity where the keyframes lie where they were. REQUIRES: there are points

@@ -241,6 +241,7 @@ class Site : public std::enable_shared_from_this<Site> {
   [[nodiscard]] bool AnchorNew();
   enum class AnchorTo : std::uint8_t { kLiving, kAll };
   [[nodiscard]] EditAnchors AnchorsOf(const MapEdit& edit, AnchorTo to) const;
+  [[nodiscard]] bool Sees(const Eigen::Vector2d& from, const Eigen::Vector2d& point) const;
   // `differing`: changed tiles of the layer of disagreement. `all`: those that did not change get the new epoch, too.
   void Refresh(const std::vector<TileKey>& changed, const std::vector<TileKey>& differing, bool all);
   [[nodiscard]] std::map<TileKey, TileSet::TilePtr> Encoded(const std::vector<TileKey>& changed,

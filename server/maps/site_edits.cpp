@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -63,7 +64,27 @@ EditAnchors Site::AnchorsOf(const MapEdit& edit, AnchorTo to) const {
       if (paths_.contains(session)) (layers_.contains(session) ? gone : living).push_back(session);
     return living.empty() && to == AnchorTo::kAll ? gone : living;
   };
-  return server::AnchorsOf(edit, paths_, sessions_at);
+  const auto sees = [this](const Eigen::Vector2d& from, const Eigen::Vector2d& point) { return Sees(from, point); };
+  return server::AnchorsOf(edit, paths_, {sessions_at, sees});
+}
+
+// Whether nothing stands between the two places in the map as it is shown. The wall on which the point may lie, and what
+// is beside it, do not count.
+bool Site::Sees(const Eigen::Vector2d& from, const Eigen::Vector2d& point) const {
+  constexpr double kBesidePoint_m = 0.3;
+  constexpr int kOccupiedFrom = 65, kMostOccupied = 100;
+  const double way_m = (point - from).norm() - kBesidePoint_m;
+  for (double at_m = 0.0; at_m < way_m; at_m += resolution_m_) {
+    const Eigen::Vector2d cell = (from + (point - from).normalized() * at_m) / resolution_m_;
+    const int x = static_cast<int>(std::floor(cell.x())), y = static_cast<int>(std::floor(cell.y()));
+    const TileKey key{0, FloorDiv(x, kTileCells), FloorDiv(y, kTileCells)};
+    const auto tile = joint_.cells().find(key);
+    if (tile == joint_.cells().end()) continue;
+    const int index = (y - key.y * kTileCells) * kTileCells + x - key.x * kTileCells;
+    const int value = (*tile->second)[static_cast<std::size_t>(index)];
+    if (value >= kOccupiedFrom && value <= kMostOccupied) return false;
+  }
+  return true;
 }
 
 // Edits that hang on nothing, because an older server has stored them or nothing else was there, or on layers alone.
@@ -99,6 +120,7 @@ void Site::FollowPaths(const DrawnPaths& changed) {
       now.emplace(session, drawn);
     }
   }
+  if (now.empty()) return;
   bool anchored = false;
   if (!edits_.all()->empty()) {
     // Keyframes may have been retired. What hangs on them is anchored anew before anything moves: to keyframes of which

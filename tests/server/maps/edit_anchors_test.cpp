@@ -24,20 +24,32 @@ double Away(const Pose2& a, const Pose2& b) {
   return (a.vector() - b.vector()).norm();
 }
 
+// Keyframes of these sessions; nobody sees through the line x = `wall_x_m`.
+AnchorChoice Of(std::vector<SessionId> sessions, double wall_x_m = 100.0) {
+  return {[sessions = std::move(sessions)](const auto&) { return sessions; },
+          [wall_x_m](const auto& from, const auto& point) { return (from.x() < wall_x_m) == (point.x() < wall_x_m); }};
+}
+
 TEST(EditAnchors, EachPointHangsOnTheNearestKeyframeOfTheSessionsThatCount) {
-  const DrawnPaths paths = {{1, PathWith({{0, 0, 0}, {4, 0, 0}, {8, 0, 0}}, {0, 5, 9})}, {2, PathWith({{4, 1, 0}}, {3})}};
+  const DrawnPaths paths = {{1, PathWith({{0, 0, 0}, {4, 0, 0}, {8, 0, 0}}, {0, 5, 9})},
+                            {2, PathWith({{4, 1, 0}}, {3})}};
   const MapEdit edit = Line({3.5, 1.0}, {7.0, 1.0});
-  const EditAnchors both = AnchorsOf(edit, paths, [](const auto&) { return std::vector<SessionId>{1, 2}; });
+  const EditAnchors both = AnchorsOf(edit, paths, Of({1, 2}));
   ASSERT_EQ(both.keyframes.size(), 2U);
   EXPECT_EQ(both.keyframes[0].session, 2U);
   EXPECT_EQ(both.keyframes[0].keyframe, 3U);
   EXPECT_EQ(both.keyframes[1].session, 1U);
   EXPECT_EQ(both.keyframes[1].keyframe, 9U);
-  const EditAnchors first = AnchorsOf(edit, paths, [](const auto&) { return std::vector<SessionId>{1, 7}; });
-  EXPECT_EQ(first.keyframes[0].keyframe, 5U);
-  const MapEdit short_one = Line({3.5, 1.0}, {3.8, 1.0});
-  EXPECT_EQ(AnchorsOf(short_one, paths, [](const auto&) { return std::vector<SessionId>{1}; }).keyframes.size(), 1U);
-  EXPECT_TRUE(AnchorsOf(edit, paths, [](const auto&) { return std::vector<SessionId>{}; }).keyframes.empty());
+  EXPECT_EQ(AnchorsOf(edit, paths, Of({1, 7})).keyframes[0].keyframe, 5U);
+  EXPECT_EQ(AnchorsOf(Line({3.5, 1.0}, {3.8, 1.0}), paths, Of({1})).keyframes.size(), 1U);
+  EXPECT_TRUE(AnchorsOf(edit, paths, Of({})).keyframes.empty());
+}
+
+TEST(EditAnchors, AKeyframeBehindAWallCountsOnlyWhereNoOtherIsNear) {
+  const DrawnPaths paths = {{1, PathWith({{0, 0, 0}, {3, 0, 0}}, {0, 1})}};
+  EXPECT_EQ(AnchorsOf(Line({2.0, 0.0}, {2.2, 0.0}), paths, Of({1}, 2.5)).keyframes.at(0).keyframe, 0U);
+  EXPECT_EQ(AnchorsOf(Line({2.0, 30.0}, {2.2, 30.0}), paths, Of({1}, 2.5)).keyframes.at(0).keyframe, 1U);
+  EXPECT_EQ(AnchorsOf(Line({-2.0, 0.0}, {-2.2, 0.0}), paths, Of({1}, -1.0)).keyframes.at(0).keyframe, 0U);
 }
 
 TEST(EditAnchors, AllKeyframesThatMoveTogetherTakeTheEditWithThem) {

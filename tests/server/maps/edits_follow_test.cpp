@@ -111,6 +111,23 @@ TEST_F(EditsFollow, WhatLiesBesideKeyframesThatStayStays) {
   EXPECT_EQ(Edits().at(0).points_map, wall.points_map);
 }
 
+// What lies in a room moves with the robot when it was in the room, and not as when it drove past behind the wall.
+TEST_F(EditsFollow, AnEditMovesWithTheKeyframesThatSeeIt) {
+  auto walled = std::make_shared<slam::GridChunk>(*UniformChunk(-300));
+  for (std::size_t x = 0; x < kTileCells; ++x) walled->log_odds[20 * kTileCells + x] = 300;  // At y = 1 m.
+  const auto draw = [&](const Pose2& later) {
+    site_->Change({.session = 1,
+                   .chunks = {{{0, 0}, walled}},
+                   .drawn = PathOf({{3.0, 0.5, 0.0}, later}, {0, 9})});
+    TakeTiles();
+  };
+  draw({3.0, 4.0, 0.0});
+  const MapEdit box{.kind = MapEditKind::kKeepOut, .points_map = {{2.9, 1.5}, {3.1, 1.5}, {3.0, 1.7}}, .note = {}};
+  ASSERT_NE(Add(box), 0U);
+  draw({3.5, 4.0, 0.0});
+  ExpectMoved(Edits().at(0), box, {0.5, 0.0, 0.0});
+}
+
 TEST_F(EditsFollow, KeepOutsAndTheBuildingsFrameMoveInASwitchOfTheVersionAndBackAgain) {
   for (const auto kind : {MapEditKind::kKeepOut, MapEditKind::kOrigin}) ASSERT_NE(Add(Around(kind)), 0U);
   const auto adopted = [](const DrawnPath& displaced, const DrawnPath& drawn) {
