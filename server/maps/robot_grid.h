@@ -45,6 +45,9 @@ struct RobotGrid {
   std::shared_ptr<const std::vector<Pose2>> path{};
   // The numbers of the keyframes of the path, because some may have been retired. Null: all of them, 0, 1, 2, ...
   std::shared_ptr<const std::vector<std::uint64_t>> numbers{};
+  // T_map_robot at which these keyframes are drawn in the grid, where that is not along the path: a filter may have
+  // come to believe in another hypothesis since. Null: along the path.
+  std::shared_ptr<const std::vector<Pose2>> drawn{};
   // Whether it is not joined with the map of the site: it has a frame of its own and is not shown.
   bool fragment = false;
 };

@@ -117,7 +117,7 @@ Result<void> Site::RestoreLayers(StartControl& control) {
 void Site::StageGone(SessionId session) {
   const RobotGrid& part = versions_.Find(switch_->version)->parts.at(session);
   switch_->staged.emplace(session, part.chunks);
-  switch_->drawn.emplace(session, DrawnPath{part.path, part.numbers});
+  switch_->drawn.emplace(session, DrawnPath{part.drawn != nullptr ? part.drawn : part.path, part.numbers});
   if (part.fragment) switch_->apart.insert(session);
   RobotGrid& displaced = switch_->displaced[session];
   displaced = PartOfGone(session);

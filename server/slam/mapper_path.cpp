@@ -29,6 +29,10 @@ Mapper::DrawnKeyframes Mapper::drawn_keyframes() const {
   return drawn;
 }
 
+const std::vector<Pose2>& Mapper::drawn_path() const {
+  return state_->drawing.path();
+}
+
 std::uint64_t Mapper::path_changed_at() const {
   return state_->drawing.changed_at();
 }

@@ -36,7 +36,8 @@ struct StoredGrid {
   std::shared_ptr<const std::vector<Pose2>> path{};  // T_map_robot of the keyframes; null: not known.
   // The numbers of the keyframes of the path, increasing; null: 0, 1, 2, ...
   std::shared_ptr<const std::vector<std::uint64_t>> numbers{};
-  bool fragment = false;  // Not joined with the map of the site.
+  std::shared_ptr<const std::vector<Pose2>> drawn{};  // At which they are in the grid; null: those of the path.
+  bool fragment = false;                              // Not joined with the map of the site.
 };
 
 // The entries of a session's journal: the events that its strand processed, in this order.

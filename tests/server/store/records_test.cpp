@@ -107,6 +107,18 @@ TEST(Records, SessionsSitesVersionsLayersAndJobsComeBack) {
   ASSERT_NE(thinned_back.numbers, nullptr);
   EXPECT_EQ(*thinned_back.numbers, *thinned.numbers);
   EXPECT_EQ(thinned_back.path->size(), 3U);
+  EXPECT_EQ(thinned_back.drawn, nullptr);
+  for (StoredGrid* const grid : {&whole, &thinned}) {
+    std::vector<Pose2> drawn = *grid->path;
+    drawn[1].x += 0.5;
+    grid->drawn = std::make_shared<const std::vector<Pose2>>(drawn);
+    EXPECT_EQ(*LayerOf(BytesOf(StoredLayer{6, *grid}))->grid.drawn, drawn);
+    drawn[2].y = std::nan("");
+    grid->drawn = std::make_shared<const std::vector<Pose2>>(drawn);
+    EXPECT_FALSE(LayerOf(BytesOf(StoredLayer{6, *grid})));
+    grid->drawn = std::make_shared<const std::vector<Pose2>>(2);
+    EXPECT_FALSE(LayerOf(BytesOf(StoredLayer{6, *grid})));
+  }
 
   StoredJob job;
   job.job.id = 4;
