@@ -160,8 +160,8 @@ void AddMapEdit(CLI::App& map, Program& program) {
   edit->require_subcommand(1);
   edit->footer(
       "Edits are a layer above the map, which stays, also after restarts, until they are removed. Where the map is\n"
-      "smoothed, joined, bent by a large loop or switched to another version, an edit moves with the keyframes near it:\n"
-      "as a whole, without changing its shape. So its coordinates may be others then, as `cairn map edit list` says.\n"
+      "smoothed, joined, bent by a large loop or switched to another version, an edit moves as a whole with the\n"
+      "keyframes near it, and keeps its shape. Its coordinates are others then: `cairn map edit list` says which.\n"
       "Where they overlap, the later one counts. Robots that are only localised are localised in the edited map after\n"
       "some seconds, but for walls that people drew, because lidars may not see them. Robots that map do not see "
       "edits.\n"

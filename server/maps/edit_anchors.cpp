@@ -54,9 +54,8 @@ std::optional<EditAnchor> AnchorOf(const Eigen::Vector2d& point, const DrawnPath
 
 // The motion of the keyframe that is nearest to the point.
 Pose2 MotionAt(const Eigen::Vector2d& point_then, const std::vector<EditAnchor>& keyframes) {
-  const EditAnchor& nearest = *std::ranges::min_element(keyframes, {}, [&](const EditAnchor& one) {
-    return (one.T_map_then.translation() - point_then).squaredNorm();
-  });
+  const EditAnchor& nearest = *std::ranges::min_element(
+      keyframes, {}, [&](const EditAnchor& one) { return (one.T_map_then.translation() - point_then).squaredNorm(); });
   return nearest.T_map_now * nearest.T_map_then.Inverse();
 }
 

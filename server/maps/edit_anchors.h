@@ -1,7 +1,7 @@
 // How an edit of a map moves with the map. When it is made, each of its points hangs on the nearest keyframe that sees
-// it, of those sessions that have drawn the tile in which the point lies. Where these keyframes lie elsewhere later, because a large
-// loop, a job or a switch of the map version has bent the map, the edit moves with them: as a whole, without changing
-// its shape. Points and poses are in the map frame. Stateless functions; thread-safe.
+// it, of those sessions that have drawn the tile in which the point lies. Where these keyframes lie elsewhere later,
+// because a large loop, a job or a switch of the map version has bent the map, the edit moves with them: as a whole,
+// without changing its shape. Points and poses are in the map frame. Stateless functions; thread-safe.
 #pragma once
 
 #include <Eigen/Core>

@@ -167,9 +167,8 @@ bool MapEdits::Follow(const DrawnPaths& paths) {
     MapEdit there = edit;
     there.points_map = anchors.points_then;
     there = Moved(there, MotionOf(anchors));
-    const bool stays = std::ranges::equal(there.points_map, edit.points_map, [](const auto& a, const auto& b) {
-      return (a - b).norm() <= kRounding_m;
-    });
+    const bool stays = std::ranges::equal(there.points_map, edit.points_map,
+                                          [](const auto& a, const auto& b) { return (a - b).norm() <= kRounding_m; });
     if (stays || !ValidateMapEdit(there)) continue;
     if (CellOf(edit.kind)) {
       tiles.merge(TilesOf(edit, resolution_m_));

@@ -1,6 +1,6 @@
 // What people have said about a site's map (common/map/map_edit.h), and the cells that this gives. They are a layer
-// above all that robots have drawn; where edits overlap, the later one counts. An edit moves with the keyframes on which
-// it hangs (edit_anchors.h). Not thread-safe: used on the site's strand only. The functions are stateless.
+// above all that robots have drawn; where edits overlap, the later one counts. An edit moves with the keyframes on
+// which it hangs (edit_anchors.h). Not thread-safe: used on the site's strand only. The functions are stateless.
 #pragma once
 
 #include <cstddef>

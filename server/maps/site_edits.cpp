@@ -68,8 +68,8 @@ EditAnchors Site::AnchorsOf(const MapEdit& edit, AnchorTo to) const {
   return server::AnchorsOf(edit, paths_, {sessions_at, sees});
 }
 
-// Whether nothing stands between the two places in the map as it is shown. The wall on which the point may lie, and what
-// is beside it, do not count.
+// Whether nothing stands between the two places in the map as it is shown. The wall on which the point may lie, and
+// what is beside it, do not count.
 bool Site::Sees(const Eigen::Vector2d& from, const Eigen::Vector2d& point) const {
   constexpr double kBesidePoint_m = 0.3;
   constexpr int kOccupiedFrom = 65, kMostOccupied = 100;
@@ -108,7 +108,8 @@ void Site::AnchorElsewhere(SessionId session) {
   const auto is_lost = [session](const EditAnchors& anchors) {
     return std::ranges::find(anchors.keyframes, session, &EditAnchor::session) != anchors.keyframes.end();
   };
-  static_cast<void>(edits_.AnchorAgain(is_lost, [this](const MapEdit& edit) { return AnchorsOf(edit, AnchorTo::kAll); }));
+  static_cast<void>(
+      edits_.AnchorAgain(is_lost, [this](const MapEdit& edit) { return AnchorsOf(edit, AnchorTo::kAll); }));
 }
 
 void Site::FollowPaths(const DrawnPaths& changed) {

@@ -123,8 +123,8 @@ Result<void> Site::Restore(const StoredSite& stored, StartControl& control) {
   given_up_ = stored.given_up;
   memory_note_ = MemoryNote(false);
   chosen_ = stored.chosen;
-  const std::size_t left_out =
-      edits_.Restore(stored.edits, stored.edits_version, [&control] { control.Advance(); }, stored.anchors);
+  const std::size_t left_out = edits_.Restore(
+      stored.edits, stored.edits_version, [&control] { control.Advance(); }, stored.anchors);
   if (left_out > 0) spdlog::error("site {}: {} edits of its map cover too much and are left out", name_, left_out);
   joint_.SetEdits(edits_.overlay());
   for (const auto& [robot, session] : stored.members) stored_members_.insert(session);

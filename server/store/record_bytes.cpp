@@ -81,7 +81,8 @@ Result<EditAnchors> AnchorsOf(const record::Site::Edit& from) {
   for (int i = 0; i < from.points_then_size(); i += 2)
     anchors.points_then.emplace_back(from.points_then(i), from.points_then(i + 1));
   for (const record::Site::Edit::Anchor& one : from.anchors())
-    anchors.keyframes.push_back({one.session(), one.keyframe(), server::ValueOf(one.then()), server::ValueOf(one.now())});
+    anchors.keyframes.push_back(
+        {one.session(), one.keyframe(), server::ValueOf(one.then()), server::ValueOf(one.now())});
   const bool finite =
       std::ranges::all_of(anchors.points_then, [](const Eigen::Vector2d& point) { return point.allFinite(); }) &&
       std::ranges::all_of(anchors.keyframes, [](const EditAnchor& anchor) {

@@ -181,7 +181,8 @@ struct StoredSite {
   std::uint64_t map_frame = 0;              // SessionState::map_frame; 0: stored without one.
   std::vector<MapEdit> edits{};             // By people, in the order in which they were made,
   std::uint64_t edits_version = 0;          // and how often they were changed; no number of an edit is higher.
-  std::map<std::uint64_t, EditAnchors> anchors{};  // By the number of the edit. Others have none.
+  // By the number of the edit. Others have none.
+  std::map<std::uint64_t, EditAnchors> anchors{};
   GivenUp given_up{};
   bool chosen = false;  // A person has chosen the enabled version.
 };

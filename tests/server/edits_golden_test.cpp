@@ -51,7 +51,9 @@ TEST_P(GoldenEdits, AreReadAndHangOnKeyframes) {
 INSTANTIATE_TEST_SUITE_P(EveryVersion, GoldenEdits,
                          ::testing::Values("site-v2-edits.site", "site-v2-anchored-edits.site"),
                          [](const ::testing::TestParamInfo<const char*>& file) {
-                           return std::string_view(file.param).find("anchored") != std::string_view::npos ? "Anchored" : "OfAnOlderServer";
+                           return std::string_view(file.param).find("anchored") != std::string_view::npos
+                                      ? "Anchored"
+                                      : "OfAnOlderServer";
                          });
 
 }  // namespace

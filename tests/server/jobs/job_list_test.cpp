@@ -69,7 +69,8 @@ TEST_F(JobListTest, OfJobsThatHadNothingToJoinTheLastOneOfASiteIsKept) {
   const std::uint64_t waiting = list.Add("lab", JobKind::kJoin)->id;
   const std::uint64_t last = run("lab", JobKind::kJoin, 0);
   EXPECT_EQ(list.Find(first).error().code, StatusCode::kNotFound);
-  for (const std::uint64_t stays : {joined, elsewhere, asked_for, waiting, last}) EXPECT_TRUE(list.Find(stays)) << stays;
+  for (const std::uint64_t stays : {joined, elsewhere, asked_for, waiting, last})
+    EXPECT_TRUE(list.Find(stays)) << stays;
   static_cast<void>(TakeSent());
   EXPECT_EQ(retired_, std::vector<std::uint64_t>{first});
 }

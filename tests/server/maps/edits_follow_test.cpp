@@ -116,9 +116,7 @@ TEST_F(EditsFollow, AnEditMovesWithTheKeyframesThatSeeIt) {
   auto walled = std::make_shared<slam::GridChunk>(*UniformChunk(-300));
   for (std::size_t x = 0; x < kTileCells; ++x) walled->log_odds[20 * kTileCells + x] = 300;  // At y = 1 m.
   const auto draw = [&](const Pose2& later) {
-    site_->Change({.session = 1,
-                   .chunks = {{{0, 0}, walled}},
-                   .drawn = PathOf({{3.0, 0.5, 0.0}, later}, {0, 9})});
+    site_->Change({.session = 1, .chunks = {{{0, 0}, walled}}, .drawn = PathOf({{3.0, 0.5, 0.0}, later}, {0, 9})});
     TakeTiles();
   };
   draw({3.0, 4.0, 0.0});

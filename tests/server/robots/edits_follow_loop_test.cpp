@@ -68,7 +68,8 @@ class MapOfOneRobot : public ::testing::Test {
   Outbound outbound_{65536};
   std::shared_ptr<Site> site_ = std::make_shared<Site>("lab", 0.05, MapsOptions{}, pool_, outbound_);
   SessionRecord record_{4, testing::RequestOf("r1"), RobotsOptions{}};
-  SessionEstimator estimator_{FewParticles(), record_,
+  SessionEstimator estimator_{FewParticles(),
+                              record_,
                               {.send = [](const OutboundValue&) { return true; },
                                .grid_changed = [this](GridChange&& change) { site_->Change(std::move(change)); }}};
   std::shared_ptr<EstimatorOwner> owner_ = std::make_shared<EstimatorOwner>(estimator_);
