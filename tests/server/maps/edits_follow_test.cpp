@@ -238,6 +238,7 @@ TEST_F(EditsOfStoredSite, WhileSessionsAreRestoredNothingHangsOnOthers) {
   StartControl control;
   ASSERT_TRUE(next->Restore(stored, control));
   DrawIn(*next, 2, Bent({}));
+  EditsOf(*next);
   DrawIn(*next, 1, Bent(kMotion));
   for (const SessionId id : {SessionId{1}, SessionId{2}})
     next->Join({.session = id, .robot = 100 + id, .owner = sessions_.at(id)});
@@ -259,10 +260,12 @@ TEST_F(EditsOfStoredSite, OnesOfAnOlderServerAreAnchoredWhenTheSessionsAreRestor
   DrawIn(*next, 1, Bent(kMotion));
   next->Join({.session = 1, .robot = 101, .owner = sessions_.at(1)});
   EXPECT_EQ(EditsOf(*next).at(0), there);
+  journal.Stop();
+  const auto anchors = ReadSite(*store_, "lab")->site.anchors;
+  ASSERT_TRUE(anchors.contains(1)) << "also where no robot drives";
+  EXPECT_EQ(anchors.at(1).points_then, there.points_map);
   DrawIn(*next, 1, Bent({}));
   ExpectMoved(EditsOf(*next).at(0), there, kMotion.Inverse());
-  journal.Stop();
-  EXPECT_EQ(ReadSite(*store_, "lab")->site.anchors.at(1).points_then, there.points_map);
 }
 
 // Its layer is corrected by switches of the version, as the map of a session that exists.
