@@ -159,9 +159,9 @@ void AddMapEdit(CLI::App& map, Program& program) {
   auto* edit = map.add_subcommand("edit", "Say what is in a map, whatever robots have drawn");
   edit->require_subcommand(1);
   edit->footer(
-      "Edits are a layer above the map. They keep their coordinates where the map is smoothed, drawn anew or switched\n"
-      "to another version, and after restarts, until they are removed; they do not move with walls that smoothing "
-      "moves.\n"
+      "Edits are a layer above the map, which stays, also after restarts, until they are removed. Where the map is\n"
+      "smoothed, joined, bent by a large loop or switched to another version, an edit moves as a whole with the\n"
+      "keyframes near it, and keeps its shape. Its coordinates are others then: `cairn map edit list` says which.\n"
       "Where they overlap, the later one counts. Robots that are only localised are localised in the edited map after\n"
       "some seconds, but for walls that people drew, because lidars may not see them. Robots that map do not see "
       "edits.\n"

@@ -1,10 +1,12 @@
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <chrono>
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -178,10 +180,13 @@ class Recording {
             {"missing", account.missing},    {"left_out_others", queue_.left_out().others},
             {"repeated", account.repeated},  {"nameless", account.nameless}};
   }
-  [[nodiscard]] std::string Robots() const {
-    std::string text;
-    for (const std::string& robot : recorder_->robots()) text += (text.empty() ? "" : ", ") + robot;
-    return text.empty() ? "no robot" : text;
+  // The robots of which something is in the file; if there are none, the sites whose maps are. Empty where nothing is.
+  [[nodiscard]] std::string Subjects() const {
+    const std::vector<std::string> robots = recorder_->robots();
+    if (!robots.empty()) return fmt::format(" of {}", fmt::join(robots, ", "));
+    if (file_->counts().maps == 0) return {};
+    const std::set<std::string>& sites = recorder_->sites();
+    return fmt::format(" of {} {}", sites.size() == 1 ? "site" : "sites", fmt::join(sites, ", "));
   }
 
  private:
@@ -240,7 +245,7 @@ ExitCode Record(Program& program, const RecordArguments& arguments) {
   progress.Finish(seconds(), -1.0, show());
 
   const std::string losses = recording.Losses();
-  std::string text = fmt::format("{}: {} of {} in {}\n", arguments.file, recording.Counts(), recording.Robots(),
+  std::string text = fmt::format("{}: {}{} in {}\n", arguments.file, recording.Counts(), recording.Subjects(),
                                  FormatDuration(seconds()));
   if (!losses.empty()) text += "not recorded: " + losses + "\n";
   nlohmann::json object = recording.Json();

@@ -13,6 +13,11 @@ constexpr auto kProgressPeriod = std::chrono::milliseconds(200);
 // So many servers may die while a job runs. Kills have other causes as well, so one or two say nothing about the job.
 constexpr std::uint32_t kMostAttempts = 8;
 
+// It looked for something to join and found nothing. Servers submit such jobs by themselves, again and again.
+bool IsVain(const Job& job) {
+  return job.kind == JobKind::kJoin && job.state == JobState::kSucceeded && job.map_version == 0;
+}
+
 }  // namespace
 
 JobList::JobList(const JobsOptions& options, Outbound& outbound, std::function<Stamp()> now, Journal* journal)
@@ -145,6 +150,20 @@ void JobList::End(std::uint64_t id, JobState state, const std::function<void(Job
   job.ended = now_();
   fill(job);
   ChangedLocked(found->second);
+  if (IsVain(job)) RemoveVainBefore(job);
+}
+
+void JobList::RemoveVainBefore(const Job& last) {
+  for (auto it = jobs_.begin(); it != jobs_.end();) {
+    if (it->first >= last.id || it->second.job.site != last.site || !IsVain(it->second.job)) {
+      ++it;
+      continue;
+    }
+    if (journal_ != nullptr) journal_->Remove({.kind = RecordKind::kJob, .owner = it->first});
+    replaced_.push_back(std::move(it->second.job));
+    it = jobs_.erase(it);
+  }
+  RetireReplaced();
 }
 
 Result<Job> JobList::Cancel(std::uint64_t id) {

@@ -1,6 +1,6 @@
 // All jobs that the server keeps; every change of a job is published. The list is bounded: a new job replaces
-// the oldest finished one, and is refused if no job is finished. Ids are unique while the server runs. Thread
-// rule: any thread.
+// the oldest finished one, and is refused if no job is finished. Of the jobs of a site that looked for something to
+// join and found nothing, only the last one is kept. Ids are unique while the server runs. Thread rule: any thread.
 #pragma once
 
 #include <chrono>
@@ -83,6 +83,7 @@ class JobList {
   Result<void> RestoreOne(std::uint64_t id, std::vector<StoredJob>& unfinished) CAIRN_REQUIRES(mutex_);
   bool MakeRoom() CAIRN_REQUIRES(mutex_);
   void RetireReplaced() CAIRN_REQUIRES(mutex_);
+  void RemoveVainBefore(const Job& last) CAIRN_REQUIRES(mutex_);
   void End(std::uint64_t id, JobState state, const std::function<void(Job&)>& fill);
 
   const JobsOptions options_;

@@ -83,6 +83,15 @@ bool JointMap::drawn() const {
   return std::ranges::any_of(chunks_, [this](const auto& place) { return IsShown(place.second); });
 }
 
+std::vector<SessionId> JointMap::DrawnBy(slam::ChunkKey key) const {
+  std::vector<SessionId> sessions;
+  const auto layers = chunks_.find(key);
+  if (layers == chunks_.end()) return sessions;
+  for (const auto& [session, chunk] : layers->second)
+    if (!hidden_.contains(session)) sessions.push_back(session);
+  return sessions;
+}
+
 std::optional<std::pair<slam::ChunkKey, slam::ChunkKey>> JointMap::DrawnBox() const {
   std::optional<std::pair<slam::ChunkKey, slam::ChunkKey>> box;
   for (const auto& [key, layers] : chunks_) {

@@ -66,6 +66,8 @@ class JointMap {
   void SetEdits(EditOverlay overlay);
   // Whether a session that is shown has drawn anything.
   [[nodiscard]] bool drawn() const;
+  // The sessions that are shown and have drawn in this tile of level 0.
+  [[nodiscard]] std::vector<SessionId> DrawnBy(slam::ChunkKey key) const;
   // The smallest and the largest place of a tile of level 0 in which they have; nothing where drawn() is false.
   [[nodiscard]] std::optional<std::pair<slam::ChunkKey, slam::ChunkKey>> DrawnBox() const;
 

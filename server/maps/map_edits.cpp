@@ -88,7 +88,7 @@ void DrawOver(const TileCells& overlay, TileCells& cells) {
 
 MapEdits::MapEdits(double resolution_m, std::size_t most) : resolution_m_(resolution_m), most_(most) {}
 
-Result<std::uint64_t> MapEdits::Add(MapEdit edit) {
+Result<std::uint64_t> MapEdits::Add(MapEdit edit, EditAnchors anchors) {
   if (auto valid = ValidateMapEdit(edit); !valid) return tl::unexpected(valid.error());
   if (all_->size() >= most_) {
     return Fail(StatusCode::kResourceExhausted,
@@ -105,6 +105,7 @@ Result<std::uint64_t> MapEdits::Add(MapEdit edit) {
                 "the edits of the map would cover more than " + std::to_string(kMostOverlayTiles) + " tiles");
   }
   all_ = std::move(more);
+  anchors_[edit.id] = std::move(anchors);
   return ++version_;
 }
 
@@ -115,21 +116,79 @@ Result<void> MapEdits::Remove(std::uint64_t id) {
   if (CellOf(gone->kind)) {
     const std::set<slam::ChunkKey> tiles = TilesOf(*gone, resolution_m_);
     fewer->erase(gone);
-    EditOverlay overlay = overlay_;
-    for (const slam::ChunkKey& key : tiles) overlay.erase(key);
-    // There are no more tiles than before.
-    for (const MapEdit& edit : *fewer)
-      static_cast<void>(DrawEdit(edit, CellOf(edit.kind), resolution_m_, &tiles, overlay));
-    overlay_ = std::move(overlay);
+    if (auto overlay = Redrawn(*fewer, tiles)) overlay_ = *std::move(overlay);  // There are no more tiles than before.
   } else {
     fewer->erase(gone);
   }
   all_ = std::move(fewer);
+  anchors_.erase(id);
   ++version_;
   return {};
 }
 
-std::size_t MapEdits::Restore(std::vector<MapEdit> all, std::uint64_t version, const std::function<void()>& advance) {
+std::optional<EditOverlay> MapEdits::Redrawn(const std::vector<MapEdit>& edits,
+                                             const std::set<slam::ChunkKey>& tiles) const {
+  EditOverlay overlay = overlay_;
+  for (const slam::ChunkKey& key : tiles) overlay.erase(key);
+  for (const MapEdit& edit : edits)
+    if (!DrawEdit(edit, CellOf(edit.kind), resolution_m_, &tiles, overlay)) return std::nullopt;
+  return overlay;
+}
+
+bool MapEdits::AnchorAgain(const std::function<bool(const EditAnchors&)>& is_lost, const Anchoring& anchors_of) {
+  bool changed = false;
+  for (const MapEdit& edit : *all_) {
+    EditAnchors& anchors = anchors_[edit.id];
+    if (!is_lost(anchors)) continue;
+    auto again = anchors_of(edit);
+    if (!again) continue;
+    anchors = *std::move(again);
+    changed = true;
+  }
+  return changed;
+}
+
+bool MapEdits::Follow(const DrawnPaths& paths) {
+  constexpr double kRounding_m = 1e-6;
+  std::vector<MapEdit> all = *all_;
+  std::set<slam::ChunkKey> tiles;
+  bool moved = false;
+  for (MapEdit& edit : all) {
+    EditAnchors& anchors = anchors_[edit.id];
+    bool changed = false;
+    for (EditAnchor& one : anchors.keyframes) {
+      const auto drawn = paths.find(one.session);
+      const Pose2* const now = drawn == paths.end() ? nullptr : drawn->second.Find(one.keyframe);
+      if (now == nullptr || *now == one.T_map_now) continue;
+      one.T_map_now = *now;
+      changed = true;
+    }
+    if (!changed) continue;
+    MapEdit there = edit;
+    there.points_map = anchors.points_then;
+    there = Moved(there, MotionOf(anchors));
+    const bool stays = std::ranges::equal(there.points_map, edit.points_map,
+                                          [](const auto& a, const auto& b) { return (a - b).norm() <= kRounding_m; });
+    if (stays || !ValidateMapEdit(there)) continue;
+    if (CellOf(edit.kind)) {
+      tiles.merge(TilesOf(edit, resolution_m_));
+      tiles.merge(TilesOf(there, resolution_m_));
+    }
+    edit = std::move(there);
+    moved = true;
+  }
+  // Each edit may still be removed, which takes a number as well.
+  if (!moved || version_ + all.size() + 2 >= kMaxEditsVersion) return false;
+  auto overlay = Redrawn(all, tiles);
+  if (!overlay) return false;
+  overlay_ = *std::move(overlay);
+  all_ = std::make_shared<std::vector<MapEdit>>(std::move(all));
+  ++version_;
+  return true;
+}
+
+std::size_t MapEdits::Restore(std::vector<MapEdit> all, std::uint64_t version, const std::function<void()>& advance,
+                              std::map<std::uint64_t, EditAnchors> anchors) {
   EditOverlay overlay;
   const std::size_t left_out = std::erase_if(all, [&](const MapEdit& edit) {
     advance();
@@ -138,12 +197,14 @@ std::size_t MapEdits::Restore(std::vector<MapEdit> all, std::uint64_t version, c
   overlay_ = std::move(overlay);
   all_ = std::make_shared<std::vector<MapEdit>>(std::move(all));
   version_ = version;
+  anchors_ = std::move(anchors);
   return left_out;
 }
 
 void MapEdits::Clear() {
   all_ = std::make_shared<std::vector<MapEdit>>();
   overlay_.clear();
+  anchors_.clear();
   ++version_;
 }
 

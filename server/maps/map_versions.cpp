@@ -106,6 +106,7 @@ void MapVersions::Count(MemoryCount& memory) const {
     for (const auto& [session, part] : version.parts) {
       for (const auto& [key, chunk] : part.chunks) memory.Add(chunk, sizeof(slam::GridChunk));
       if (part.path != nullptr) memory.Add(part.path, part.path->size() * sizeof(Pose2));
+      if (part.drawn != nullptr) memory.Add(part.drawn, part.drawn->size() * sizeof(Pose2));
       if (part.numbers != nullptr) memory.Add(part.numbers, part.numbers->size() * sizeof(std::uint64_t));
     }
     for (const auto& [robot, smoothed] : version.smoothed)

@@ -2,6 +2,7 @@
 // calls a session (GridOwner). Chunks are shared, immutable, and in the map frame.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -16,6 +17,25 @@ namespace cairn::server {
 
 using SessionId = std::uint64_t;  // Unique while the server runs; later sessions have larger ids.
 
+// Where keyframes of a robot lie in its grid: T_map_robot, by the numbers of the keyframes, which increase.
+struct DrawnPath {
+  std::shared_ptr<const std::vector<Pose2>> path;  // Null: not known.
+  // One for each pose. Null: 0, 1, 2, ...
+  std::shared_ptr<const std::vector<std::uint64_t>> numbers;
+
+  // Null: it has no such keyframe.
+  [[nodiscard]] const Pose2* Find(std::uint64_t number) const {
+    if (path == nullptr) return nullptr;
+    std::size_t index = number;
+    if (numbers != nullptr) {
+      const auto found = std::ranges::lower_bound(*numbers, number);
+      if (found == numbers->end() || *found != number) return nullptr;
+      index = static_cast<std::size_t>(found - numbers->begin());
+    }
+    return index < path->size() ? &(*path)[index] : nullptr;
+  }
+};
+
 // A robot's grid, drawn when there had been so many keyframes.
 struct RobotGrid {
   slam::OccupancyGrid::Chunks chunks;
@@ -25,6 +45,9 @@ struct RobotGrid {
   std::shared_ptr<const std::vector<Pose2>> path{};
   // The numbers of the keyframes of the path, because some may have been retired. Null: all of them, 0, 1, 2, ...
   std::shared_ptr<const std::vector<std::uint64_t>> numbers{};
+  // T_map_robot at which these keyframes are drawn in the grid, where that is not along the path: a filter may have
+  // come to believe in another hypothesis since. Null: along the path.
+  std::shared_ptr<const std::vector<Pose2>> drawn{};
   // Whether it is not joined with the map of the site: it has a frame of its own and is not shown.
   bool fragment = false;
 };
@@ -33,6 +56,7 @@ struct RobotGrid {
 struct GridChange {
   SessionId session = 0;
   slam::OccupancyGrid::Change chunks;
+  DrawnPath drawn{};  // Of the keyframes that are drawn, where they lie after the change.
 };
 
 // A session's answer to a correction: its previous grid, and the change to the grid with which it continues.

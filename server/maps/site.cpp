@@ -43,8 +43,9 @@ void Site::Change(GridChange&& change) {
   const MutexLock lock(mutex_);
   const bool first = waiting_ == nullptr;
   if (first) waiting_ = std::make_shared<Changes>();
-  slam::OccupancyGrid::Chunks& newest = (*waiting_)[change.session];
-  for (auto& [key, chunk] : change.chunks) newest.insert_or_assign(key, std::move(chunk));
+  Drawing& newest = (*waiting_)[change.session];
+  for (auto& [key, chunk] : change.chunks) newest.chunks.insert_or_assign(key, std::move(chunk));
+  if (change.drawn.path != nullptr) newest.drawn = std::move(change.drawn);
   if (!first) return;
   Post([changes = waiting_](Site& site) {
     {
@@ -52,22 +53,24 @@ void Site::Change(GridChange&& change) {
       if (site.waiting_ == changes) site.waiting_.reset();
     }
     // `changes` is final now.
-    for (const auto& [session, chunks] : *changes) site.Apply(session, chunks);
+    for (const auto& [session, drawing] : *changes) site.Apply(session, drawing);
   });
 }
 
-void Site::Apply(SessionId session, const slam::OccupancyGrid::Chunks& chunks) {
+void Site::Apply(SessionId session, const Drawing& drawing) {
   if (switch_) {
     const auto staged = switch_->staged.find(session);
     if (staged != switch_->staged.end()) {
-      for (const auto& [key, chunk] : chunks) {
+      if (drawing.drawn.path != nullptr) switch_->drawn[session] = drawing.drawn;
+      for (const auto& [key, chunk] : drawing.chunks) {
         if (chunk != nullptr) staged->second.insert_or_assign(key, chunk);
         if (chunk == nullptr) staged->second.erase(key);
       }
       return;
     }
   }
-  joint_.Apply({session, {chunks.begin(), chunks.end()}});
+  joint_.Apply({.session = session, .chunks = {drawing.chunks.begin(), drawing.chunks.end()}});
+  FollowPaths({{session, drawing.drawn}});
 }
 
 void Site::Join(Member member) {
@@ -77,6 +80,7 @@ void Site::Join(Member member) {
     site.joint_.SetHidden(member.session, member.fragment);
     if (member.ended) site.joint_.SetPast(member.session);
     site.info_changed_ = true;
+    static_cast<void>(site.AnchorNew());
     site.StoreSite();
     // The map may have been switched since the session was made, or since the server that made it was killed.
     if (member.epoch == site.epoch_ || site.GiveMissedPart(member)) return;
@@ -100,6 +104,7 @@ void Site::Hide(SessionId session) {
 
 void Site::SetHidden(SessionId session) {
   joint_.SetHidden(session, true);
+  ForgetPath(session);
   info_changed_ = true;
   StoreSite();
 }

@@ -5,7 +5,8 @@
 // A switch to another map version is atomic for readers. Every session gets a correction through its own
 // queue and continues with its part of that version. Changes that the sessions send meanwhile are stored
 // apart. When all sessions have answered, the whole map changes at once under epoch + 1: every tile is
-// published again, and removed tiles are published as deleted. What people have said about the map (map_edits.h) stays.
+// published again, and removed tiles are published as deleted. What people have said about the map (map_edits.h) stays,
+// and moves with the keyframes near it (edit_anchors.h).
 // Thread rule: any thread may call; the work runs on the site's strand; readers get immutable snapshots. Work
 // that ends with an exception is logged and dropped, and the site continues.
 #pragma once
@@ -28,6 +29,7 @@
 #include "common/mutex.h"
 #include "common/service/generation.h"
 #include "common/service/names.h"
+#include "server/maps/edit_anchors.h"
 #include "server/maps/grid_agreement.h"
 #include "server/maps/joint_map.h"
 #include "server/maps/map_edits.h"
@@ -47,7 +49,8 @@ struct VersionSwitch {
   std::uint32_t version = 0;
   bool chosen = false;  // By a person.
   std::set<SessionId> awaited;
-  std::map<SessionId, slam::OccupancyGrid::Chunks> staged;  // The new grids of the sessions that have answered.
+  std::map<SessionId, slam::OccupancyGrid::Chunks> staged;  // The new grids of the sessions that have answered,
+  DrawnPaths drawn;                                         // and where their keyframes lie in these.
   // Those that are not joined, because they could not follow or because the version says so.
   std::set<SessionId> apart;
   std::map<SessionId, RobotGrid> displaced;
@@ -185,7 +188,11 @@ class Site : public std::enable_shared_from_this<Site> {
 
  private:
   class Ticket;
-  using Changes = std::map<SessionId, slam::OccupancyGrid::Chunks>;  // A null chunk: removed.
+  struct Drawing {
+    slam::OccupancyGrid::Chunks chunks;  // A null chunk: removed.
+    DrawnPath drawn;                     // The newest.
+  };
+  using Changes = std::map<SessionId, Drawing>;
 
   // Does `act` on the strand, after everything that was asked for before.
   template <typename Act>
@@ -194,7 +201,7 @@ class Site : public std::enable_shared_from_this<Site> {
   void Post(Act act) CAIRN_REQUIRES(mutex_);
   void LogFailure(const std::exception& error) const;
   // The functions below run on the strand only.
-  void Apply(SessionId session, const slam::OccupancyGrid::Chunks& chunks);
+  void Apply(SessionId session, const Drawing& drawing);
   void Begin(std::uint32_t version, Done done, bool chosen);
   void FailSwitch(StatusCode code, const std::string& why);
   void Settle(std::uint32_t version, SessionId session, std::optional<Adopted>&& adopted);
@@ -224,6 +231,17 @@ class Site : public std::enable_shared_from_this<Site> {
   // Stores what people have said about the map, and publishes it. Returns its version.
   std::uint64_t ShowEdits();
   [[nodiscard]] Result<void> CheckNear(const MapEdit& edit) const;
+  // Keyframes lie elsewhere now, or there are other ones: edits move with them, and are stored.
+  void FollowPaths(const DrawnPaths& changed);
+  // Nothing can hang on keyframes of this session any more.
+  void ForgetPath(SessionId session);
+  // What hangs on keyframes of this session hangs on those of sessions that still exist from now on, where there are
+  // some.
+  void AnchorElsewhere(SessionId session);
+  [[nodiscard]] bool AnchorNew();
+  enum class AnchorTo : std::uint8_t { kLiving, kAll };
+  [[nodiscard]] EditAnchors AnchorsOf(const MapEdit& edit, AnchorTo to) const;
+  [[nodiscard]] bool Sees(const Eigen::Vector2d& from, const Eigen::Vector2d& point) const;
   // `differing`: changed tiles of the layer of disagreement. `all`: those that did not change get the new epoch, too.
   void Refresh(const std::vector<TileKey>& changed, const std::vector<TileKey>& differing, bool all);
   [[nodiscard]] std::map<TileKey, TileSet::TilePtr> Encoded(const std::vector<TileKey>& changed,
@@ -240,6 +258,7 @@ class Site : public std::enable_shared_from_this<Site> {
   void RemoveRecords(const RecordRange& range);
   void StoreEverything();
   void KeepAsLayer(SessionId session);
+  [[nodiscard]] RobotGrid PartOfGone(SessionId session) const;
   void RemoveOtherLayers();
   [[nodiscard]] std::vector<SessionId> ShownLayers() const;  // The one that ended first comes first.
   void MergeOldestLayers(std::size_t most);
@@ -261,6 +280,7 @@ class Site : public std::enable_shared_from_this<Site> {
   bool retired_ = false;
   JointMap joint_;
   MapEdits edits_;
+  DrawnPaths paths_;  // Of sessions that are shown, as far as they are known.
   MapVersions versions_;
   const std::uint64_t memory_limit_;  // Bytes; 0: none.
   const bool memory_is_limited_;      // By this, or with that of all other sites.

@@ -3,12 +3,24 @@
 #include <spdlog/spdlog.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "server/maps/answer_once.h"
 #include "server/maps/site.h"
 
 namespace cairn::server {
+namespace {
+
+slam::ChunkKey TileAt(const Eigen::Vector2d& point, double resolution_m) {
+  const Eigen::Vector2d tile = (point / (kTileCells * resolution_m)).array().floor();
+  return {static_cast<int>(tile.x()), static_cast<int>(tile.y())};
+}
+
+}  // namespace
 
 std::uint64_t Site::ShowEdits() {
   joint_.SetEdits(edits_.overlay());
@@ -40,6 +52,102 @@ Result<void> Site::CheckNear(const MapEdit& edit) const {
   return {};
 }
 
+// Its own tile says who has drawn a place. Sessions that still exist come before layers, because these are corrected
+// seldom, and jobs do not fit them any more. Where nobody has drawn, all are asked.
+EditAnchors Site::AnchorsOf(const MapEdit& edit, AnchorTo to) const {
+  const auto sessions_at = [&](const Eigen::Vector2d& point) {
+    std::vector<SessionId> drawn_by = joint_.DrawnBy(TileAt(point, resolution_m_));
+    if (drawn_by.empty())
+      for (const auto& [session, drawn] : paths_) drawn_by.push_back(session);
+    std::vector<SessionId> living, gone;
+    for (const SessionId session : drawn_by)
+      if (paths_.contains(session)) (layers_.contains(session) ? gone : living).push_back(session);
+    return living.empty() && to == AnchorTo::kAll ? gone : living;
+  };
+  const auto sees = [this](const Eigen::Vector2d& from, const Eigen::Vector2d& point) { return Sees(from, point); };
+  return server::AnchorsOf(edit, paths_, {sessions_at, sees});
+}
+
+// Whether nothing stands between the two places in the map as it is shown. The wall on which the point may lie, and
+// what is beside it, do not count.
+bool Site::Sees(const Eigen::Vector2d& from, const Eigen::Vector2d& point) const {
+  constexpr double kBesidePoint_m = 0.3;
+  constexpr int kOccupiedFrom = 65, kMostOccupied = 100;
+  const double way_m = (point - from).norm() - kBesidePoint_m;
+  for (double at_m = 0.0; at_m < way_m; at_m += resolution_m_) {
+    const Eigen::Vector2d cell = (from + (point - from).normalized() * at_m) / resolution_m_;
+    const int x = static_cast<int>(std::floor(cell.x())), y = static_cast<int>(std::floor(cell.y()));
+    const TileKey key{0, FloorDiv(x, kTileCells), FloorDiv(y, kTileCells)};
+    const auto tile = joint_.cells().find(key);
+    if (tile == joint_.cells().end()) continue;
+    const int index = (y - key.y * kTileCells) * kTileCells + x - key.x * kTileCells;
+    const int value = (*tile->second)[static_cast<std::size_t>(index)];
+    if (value >= kOccupiedFrom && value <= kMostOccupied) return false;
+  }
+  return true;
+}
+
+// Edits that hang on nothing, because an older server has stored them or nothing else was there, or on layers alone.
+bool Site::AnchorNew() {
+  const auto on_nothing = [this](const EditAnchors& anchors) {
+    return std::ranges::all_of(anchors.keyframes,
+                               [this](const EditAnchor& one) { return layers_.contains(one.session); });
+  };
+  return edits_.AnchorAgain(on_nothing, [this](const MapEdit& edit) -> std::optional<EditAnchors> {
+    auto anchors = AnchorsOf(edit, AnchorTo::kLiving);
+    if (anchors.keyframes.empty()) return std::nullopt;
+    return anchors;
+  });
+}
+
+void Site::ForgetPath(SessionId session) {
+  paths_.erase(session);
+}
+
+void Site::AnchorElsewhere(SessionId session) {
+  const auto is_lost = [session](const EditAnchors& anchors) {
+    return std::ranges::find(anchors.keyframes, session, &EditAnchor::session) != anchors.keyframes.end();
+  };
+  static_cast<void>(
+      edits_.AnchorAgain(is_lost, [this](const MapEdit& edit) { return AnchorsOf(edit, AnchorTo::kAll); }));
+}
+
+void Site::FollowPaths(const DrawnPaths& changed) {
+  DrawnPaths now;
+  for (const auto& [session, drawn] : changed) {
+    if (joint_.hidden().contains(session)) {
+      ForgetPath(session);
+    } else if (drawn.path != nullptr) {
+      now.emplace(session, drawn);
+    }
+  }
+  if (now.empty()) return;
+  bool anchored = false;
+  if (!edits_.all()->empty()) {
+    // Keyframes may have been retired. What hangs on them is anchored anew before anything moves: to keyframes of which
+    // it is known where they lay before and where they lie now.
+    for (const auto& [session, drawn] : now) {
+      const auto known = paths_.find(session);
+      paths_[session] = known == paths_.end() ? drawn : PosesBefore(known->second, drawn);
+    }
+    const auto is_lost = [&now](const EditAnchors& anchors) {
+      return std::ranges::any_of(anchors.keyframes, [&now](const EditAnchor& one) {
+        const auto drawn = now.find(one.session);
+        return drawn != now.end() && drawn->second.Find(one.keyframe) == nullptr;
+      });
+    };
+    anchored = edits_.AnchorAgain(is_lost, [this](const MapEdit& edit) { return AnchorsOf(edit, AnchorTo::kAll); });
+    if (!members_.empty()) anchored = AnchorNew() || anchored;
+  }
+  for (const auto& [session, drawn] : now) paths_[session] = drawn;
+  const bool moved = edits_.Follow(now);
+  if (moved) {
+    joint_.SetEdits(edits_.overlay());
+    info_changed_ = true;
+  }
+  if (moved || anchored) StoreSite();
+}
+
 void Site::ForgetEditsOfLostMap() {
   Run([](Site& site) {
     if (site.joint_.drawn() || site.edits_.all()->empty()) return;
@@ -56,7 +164,9 @@ void Site::AddEdit(MapEdit&& edit, EditDone done) {
     if (site.retired_) return done(Fail(StatusCode::kNotFound, "site '" + site.name_ + "' was deleted"));
     if (auto valid = ValidateMapEdit(edit); !valid) return done(tl::unexpected(valid.error()));
     if (auto near = site.CheckNear(edit); !near) return done(tl::unexpected(near.error()));
-    if (auto added = site.edits_.Add(std::move(edit)); !added) return done(tl::unexpected(added.error()));
+    EditAnchors anchors = site.AnchorsOf(edit, AnchorTo::kAll);
+    if (auto added = site.edits_.Add(std::move(edit), std::move(anchors)); !added)
+      return done(tl::unexpected(added.error()));
     done(site.ShowEdits());
   });
 }

@@ -15,7 +15,17 @@ constexpr std::size_t kMaxLayers = 8;
 
 void Site::StoreLayer(SessionId session) {
   Put({RecordKind::kLayer, site_id_, session},
-      [layer = StoredLayer{session, ToStored({.chunks = joint_.ChunksOf(session)})}] { return BytesOf(layer); });
+      [layer = StoredLayer{session, ToStored(PartOfGone(session))}] { return BytesOf(layer); });
+}
+
+RobotGrid Site::PartOfGone(SessionId session) const {
+  RobotGrid part{.chunks = joint_.ChunksOf(session)};
+  const auto drawn = paths_.find(session);
+  if (drawn == paths_.end()) return part;
+  part.path = drawn->second.path;
+  part.numbers = drawn->second.numbers;
+  if (!part.path->empty()) part.keyframes = part.numbers == nullptr ? part.path->size() : part.numbers->back() + 1;
+  return part;
 }
 
 // What nobody sees goes with the session: nothing can be joined with it any more. While the map is being switched it is
@@ -25,10 +35,13 @@ void Site::KeepAsLayer(SessionId session) {
   if (shown || switch_) {
     joint_.SetPast(session);
     layers_.insert(session);
+    AnchorElsewhere(session);
     StoreLayer(session);
     if (!switch_) MergeOldestLayers(kMaxLayers);
   } else {
     joint_.Remove(session);
+    ForgetPath(session);
+    AnchorElsewhere(session);
     layers_.erase(session);
   }
   RemoveOtherLayers();
@@ -73,6 +86,10 @@ void Site::MergeOldestLayers(std::size_t most) {
     layers_.erase(older);
     merged_.erase(older);
     merged_.insert(later);
+    for (const SessionId one : {older, later}) {
+      ForgetPath(one);
+      AnchorElsewhere(one);
+    }
     StoreLayer(later);
   }
 }
@@ -83,9 +100,11 @@ Result<void> Site::RestoreLayers(StartControl& control) {
     const auto layer = LayerOf(bytes);
     if (!layer) return tl::unexpected(layer.error());
     if (layer->session != number) return Fail(StatusCode::kDataLoss, "the record is that of another session");
+    const RobotGrid part = FromStored(layer->grid);
     layers_.insert(layer->session);
-    joint_.Replace(layer->session, FromStored(layer->grid).chunks);
+    joint_.Replace(layer->session, part.chunks);
     joint_.SetPast(layer->session);
+    if (part.path != nullptr) paths_[layer->session] = {part.path, part.numbers};
     return {};
   };
   const auto unreadable = [this](std::uint64_t number, const Status& why) {
@@ -98,10 +117,11 @@ Result<void> Site::RestoreLayers(StartControl& control) {
 void Site::StageGone(SessionId session) {
   const RobotGrid& part = versions_.Find(switch_->version)->parts.at(session);
   switch_->staged.emplace(session, part.chunks);
+  switch_->drawn.emplace(session, DrawnPath{part.drawn != nullptr ? part.drawn : part.path, part.numbers});
   if (part.fragment) switch_->apart.insert(session);
   RobotGrid& displaced = switch_->displaced[session];
-  displaced.chunks = joint_.ChunksOf(session);
-  displaced.keyframes = part.keyframes;
+  displaced = PartOfGone(session);
+  if (displaced.path == nullptr) displaced.keyframes = part.keyframes;
   displaced.fragment = joint_.hidden().contains(session);
 }
 

@@ -49,6 +49,10 @@ void Site::CountMemory(const MapSnapshot& snapshot) noexcept {
     MemoryCount memory;
     joint_.Count(memory);
     versions_.Count(memory);
+    for (const auto& [session, drawn] : paths_) {
+      if (drawn.path != nullptr) memory.Add(drawn.path, drawn.path->size() * sizeof(Pose2));
+      if (drawn.numbers != nullptr) memory.Add(drawn.numbers, drawn.numbers->size() * sizeof(std::uint64_t));
+    }
     for (const TileSet* tiles : {&snapshot.tiles, &snapshot.disagreement}) {
       for (int level = 0; level < kPyramidLevels; ++level)
         tiles->ForEach(level,

@@ -78,6 +78,7 @@ void Site::StoreSite() {
                     .map_frame = map_frame_,
                     .edits = *edits_.all(),
                     .edits_version = edits_.version(),
+                    .anchors = edits_.anchors(),
                     .given_up = given_up_,
                     .chosen = chosen_};
   for (const auto& [session, member] : members_) stored.members[member.robot] = session;  // The last one.
@@ -122,7 +123,8 @@ Result<void> Site::Restore(const StoredSite& stored, StartControl& control) {
   given_up_ = stored.given_up;
   memory_note_ = MemoryNote(false);
   chosen_ = stored.chosen;
-  const std::size_t left_out = edits_.Restore(stored.edits, stored.edits_version, [&control] { control.Advance(); });
+  const std::size_t left_out = edits_.Restore(
+      stored.edits, stored.edits_version, [&control] { control.Advance(); }, stored.anchors);
   if (left_out > 0) spdlog::error("site {}: {} edits of its map cover too much and are left out", name_, left_out);
   joint_.SetEdits(edits_.overlay());
   for (const auto& [robot, session] : stored.members) stored_members_.insert(session);

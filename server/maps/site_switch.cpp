@@ -74,6 +74,7 @@ void Site::Settle(std::uint32_t version, SessionId session, std::optional<Adopte
     for (const auto& [key, chunk] : adopted->change.chunks) {
       if (chunk != nullptr) staged.emplace(key, chunk);
     }
+    switch_->drawn.emplace(session, adopted->change.drawn);
     if (adopted->fragment) switch_->apart.insert(session);
     switch_->displaced.emplace(session, std::move(adopted->displaced));
   } else {
@@ -93,9 +94,12 @@ void Site::CommitIfComplete() {
       if (OwnerOf(session) == nullptr) {
         joint_.SetPast(session);
         layers_.insert(session);
+        if (complete.drawn[session].path == nullptr) ForgetPath(session);  // Where it lies now is not known.
       }
-      if (layers_.contains(session)) StoreLayer(session);
     }
+    FollowPaths(complete.drawn);
+    for (const auto& [session, chunks] : complete.staged)
+      if (layers_.contains(session)) StoreLayer(session);
     const std::vector<std::uint32_t> changed = versions_.Enable(complete.version, complete.displaced);
     chosen_ = complete.chosen;
     switches_[++epoch_] = generation_;
@@ -136,6 +140,7 @@ bool Site::GiveMissedPart(const Member& member) {
                   site->Run([adopted = std::move(adopted)](Site& self) {
                     self.joint_.Apply(adopted.change);
                     self.joint_.SetHidden(adopted.session, adopted.fragment);
+                    self.FollowPaths({{adopted.session, adopted.change.drawn}});
                     self.StoreSite();
                   });
                 }});

@@ -6,8 +6,12 @@
 namespace cairn::server {
 
 StoredGrid ToStored(const RobotGrid& grid) {
-  StoredGrid stored{
-      .keyframes = grid.keyframes, .chunks = {}, .path = grid.path, .numbers = grid.numbers, .fragment = grid.fragment};
+  StoredGrid stored{.keyframes = grid.keyframes,
+                    .chunks = {},
+                    .path = grid.path,
+                    .numbers = grid.numbers,
+                    .drawn = grid.drawn,
+                    .fragment = grid.fragment};
   for (const auto& [key, chunk] : grid.chunks) {
     stored.chunks.push_back({key.x, key.y, std::shared_ptr<const std::int16_t>(chunk, chunk->log_odds.data())});
   }
@@ -19,6 +23,7 @@ RobotGrid FromStored(const StoredGrid& stored) {
                  .keyframes = stored.keyframes,
                  .path = stored.path,
                  .numbers = stored.numbers,
+                 .drawn = stored.drawn,
                  .fragment = stored.fragment};
   for (const StoredChunk& one : stored.chunks) {
     auto chunk = std::make_shared<slam::GridChunk>();

@@ -174,7 +174,14 @@ void SessionEstimator::Dropped(const Scan& scan, DropReason reason) {
 }
 
 GridChange SessionEstimator::TakeGridChange() {
-  return {.session = identity_.id, .chunks = pipeline_.mapper().TakeGridChange()};
+  return {.session = identity_.id, .chunks = pipeline_.mapper().TakeGridChange(), .drawn = Drawn()};
+}
+
+DrawnPath SessionEstimator::Drawn() const {
+  slam::Mapper::DrawnKeyframes drawn = pipeline_.mapper().drawn_keyframes();
+  if (drawn.path.empty()) return {};
+  return {std::make_shared<const std::vector<Pose2>>(std::move(drawn.path)),
+          std::make_shared<const std::vector<std::uint64_t>>(std::move(drawn.numbers))};
 }
 
 slam::OccupancyGrid::Chunks SessionEstimator::PublishedChunks() {

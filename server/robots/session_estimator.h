@@ -128,6 +128,7 @@ class SessionEstimator {
   void RefuseLateStart(const Scan& scan);
   void ComesFrom(SessionToken session);
   GridChange TakeGridChange();
+  [[nodiscard]] DrawnPath Drawn() const;
   slam::OccupancyGrid::Chunks PublishedChunks();
   void RefreshLandmarks(bool at_once);
   // `in_known_map`: the robot is only localised.

@@ -15,8 +15,12 @@ RobotGrid SessionEstimator::DisplacedGrid() {
                       .keyframes = mapper.keyframes_made(),
                       .path = {},
                       .numbers = {},
+                      .drawn = {},
                       .fragment = fragment_};
   if (auto path = mapper.BestPath(); path.size() == mapper.keyframe_count()) {
+    const std::vector<Pose2>& drawn = mapper.drawn_path();
+    if (drawn.size() == path.size() && drawn != path)
+      displaced.drawn = std::make_shared<const std::vector<Pose2>>(drawn);
     displaced.path = std::make_shared<const std::vector<Pose2>>(std::move(path));
     displaced.numbers = std::make_shared<const std::vector<std::uint64_t>>(mapper.keyframe_numbers());
   }
@@ -27,11 +31,12 @@ bool SessionEstimator::AdoptGrid(std::uint32_t epoch, const RobotGrid& grid) {
   slam::Mapper& mapper = pipeline_.mapper();
   const auto path = grid.path != nullptr ? std::span<const Pose2>(*grid.path) : std::span<const Pose2>();
   const auto numbers = grid.numbers != nullptr ? std::span(*grid.numbers) : std::span<const std::uint64_t>();
+  const auto drawn = grid.drawn != nullptr ? std::span<const Pose2>(*grid.drawn) : path;
   const std::vector<Pose2> before = mapper.BestPath();
   // A session that was not stored to its end may not be able to follow: then its place in this map is not known.
   // The map of a fragment is in a frame of its own: a grid in another frame does not fit a path that cannot follow.
   const bool adopted = mapper.AdoptGrid(slam::OccupancyGrid(mapper.grid().options(), grid.chunks), grid.keyframes, path,
-                                        numbers, fragment_);
+                                        numbers, fragment_, drawn);
   const bool fragment = grid.fragment || !adopted, was_fragment = fragment_;
   if (fragment && (!fragment_ || !adopted)) driven_m_ = 0.0;  // So that no job joins it again at once.
   fragment_ = fragment;

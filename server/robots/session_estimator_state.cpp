@@ -165,7 +165,7 @@ SessionRecord::WaitingScans SessionEstimator::WaitingBySensor() const {
 void SessionEstimator::Replayed() {
   replaying_ = false;
   static_cast<void>(TakeGridChange());  // The whole grid is reported instead.
-  GridChange whole{.session = identity_.id, .chunks = {}};
+  GridChange whole{.session = identity_.id, .chunks = {}, .drawn = Drawn()};
   for (const auto& [key, chunk] : pipeline_.mapper().ShareGrid()) whole.chunks.emplace_back(key, chunk);
   if (!whole.chunks.empty()) outputs_.grid_changed(std::move(whole));
   RefreshLandmarks(true);

@@ -286,15 +286,17 @@ void Mapper::FinishMap() {
 }
 
 bool Mapper::AdoptGrid(OccupancyGrid grid, std::uint64_t keyframes, std::span<const Pose2> path,
-                       std::span<const std::uint64_t> numbers, bool must_follow) {
+                       std::span<const std::uint64_t> numbers, bool must_follow, std::span<const Pose2> drawn) {
   State& s = *state_;
   std::vector<Pose2> first_poses;
   if (s.filter->rebases() && s.filter->placed()) first_poses = s.PosesOfFirst(keyframes, path, numbers);
   const bool follows = !first_poses.empty();
   if ((must_follow || keyframes > s.trail.made()) && !follows) return false;
   const std::uint64_t known = std::min(keyframes, s.trail.made());
+  const std::vector<Pose2> in_grid = s.PosesOfFirst(keyframes, drawn.empty() ? path : drawn, numbers);
   if (follows) s.Follow(first_poses, known);
-  s.drawing.Adopt(std::move(grid), known, s.trail.CountBelow(known), s.trail.keyframes(), s.believed_path(), follows);
+  s.drawing.Adopt(std::move(grid), known, s.trail.CountBelow(known), s.trail.keyframes(), s.believed_path(), follows,
+                  in_grid);
   return true;
 }
 

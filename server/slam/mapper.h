@@ -90,6 +90,15 @@ class Mapper {
   [[nodiscard]] std::uint64_t keyframes_made() const;
   // The numbers (trail/keyframe.h) of those that are kept, increasing.
   [[nodiscard]] std::vector<std::uint64_t> keyframe_numbers() const;
+  // Those that are drawn into the grid (Keyframe::localized), by increasing number, and T_map_robot at which they are.
+  // Empty while the robot's place in the map is not known.
+  struct DrawnKeyframes {
+    std::vector<std::uint64_t> numbers;
+    std::vector<Pose2> path;
+  };
+  [[nodiscard]] DrawnKeyframes drawn_keyframes() const;
+  // The same of all keyframes, also those that are not drawn. Not one each where the robot's place is not known.
+  [[nodiscard]] const std::vector<Pose2>& drawn_path() const;
   // Empty while the robot's place in the map is not known (filter.h: placed).
   [[nodiscard]] MapperSnapshot Snapshot() const;
   // Ends the mapping: if the map is still being drawn again after a large loop, draws the rest.
@@ -101,9 +110,10 @@ class Mapper {
   // only the grid is replaced. Then draws the later keyframes onto it along the present best path. Every chunk of both
   // grids counts as changed. Where the grid knows of later keyframes than this mapper has made, or where it is in
   // another frame than this mapper's path (`must_follow`), it can only be used if the path follows; else nothing is
-  // changed and the answer is false.
+  // changed and the answer is false. `drawn`: the poses at which these keyframes are in the grid, if not at `path`.
   bool AdoptGrid(OccupancyGrid grid, std::uint64_t keyframes, std::span<const Pose2> path = {},
-                 std::span<const std::uint64_t> numbers = {}, bool must_follow = false);
+                 std::span<const std::uint64_t> numbers = {}, bool must_follow = false,
+                 std::span<const Pose2> drawn = {});
   // Whether the path can follow that of a job (Filter::rebases).
   [[nodiscard]] bool follows_paths() const;
   // Somebody says that the robot is not where it is believed to be, and perhaps where it is (T_map_robot at the last

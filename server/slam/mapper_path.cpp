@@ -16,6 +16,23 @@ Trajectory Mapper::PathByStamps() const {
   return along;
 }
 
+Mapper::DrawnKeyframes Mapper::drawn_keyframes() const {
+  const State& s = *state_;
+  const std::vector<Pose2>& path = s.drawing.path();
+  DrawnKeyframes drawn;
+  if (path.size() != s.trail.size()) return drawn;
+  for (std::size_t k = 0; k < path.size(); ++k) {
+    if (!s.trail.keyframes()[k].localized) continue;
+    drawn.numbers.push_back(s.trail.shapes()[k].number);
+    drawn.path.push_back(path[k]);
+  }
+  return drawn;
+}
+
+const std::vector<Pose2>& Mapper::drawn_path() const {
+  return state_->drawing.path();
+}
+
 std::uint64_t Mapper::path_changed_at() const {
   return state_->drawing.changed_at();
 }

@@ -46,11 +46,14 @@ StoredGrid Transformed(const StoredGrid& grid, const Pose2& T_to_from, double re
   const Pose2 T_from_to = T_to_from.Inverse();
   StoredGrid result{
       .keyframes = grid.keyframes, .chunks = {}, .path = {}, .numbers = grid.numbers, .fragment = grid.fragment};
-  if (grid.path != nullptr) {
-    auto path = std::make_shared<std::vector<Pose2>>();
-    for (const Pose2& pose : *grid.path) path->push_back(T_to_from * pose);
-    result.path = std::move(path);
-  }
+  const auto moved = [&T_to_from](const std::shared_ptr<const std::vector<Pose2>>& poses) {
+    if (poses == nullptr) return poses;
+    std::vector<Pose2> there;
+    for (const Pose2& pose : *poses) there.push_back(T_to_from * pose);
+    return std::make_shared<const std::vector<Pose2>>(std::move(there));
+  };
+  result.path = moved(grid.path);
+  result.drawn = moved(grid.drawn);
   for (const Place& place : touched) {
     auto cells = std::make_shared<Cells>();
     bool seen = false;

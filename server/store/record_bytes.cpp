@@ -1,4 +1,5 @@
 // The bytes of all records but the journal (records.h).
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -45,6 +46,20 @@ void Fill(record::Site::Edit& to, const MapEdit& edit) {
   to.set_made(edit.made);
 }
 
+void Fill(record::Site::Edit& to, const EditAnchors& anchors) {
+  for (const EditAnchor& anchor : anchors.keyframes) {
+    record::Site::Edit::Anchor& added = *to.add_anchors();
+    added.set_session(anchor.session);
+    added.set_keyframe(anchor.keyframe);
+    server::Fill(*added.mutable_then(), anchor.T_map_then);
+    server::Fill(*added.mutable_now(), anchor.T_map_now);
+  }
+  for (const Eigen::Vector2d& point : anchors.points_then) {
+    to.add_points_then(point.x());
+    to.add_points_then(point.y());
+  }
+}
+
 Result<MapEdit> ValueOf(const record::Site::Edit& from) {
   if (from.id() == 0 || from.points_size() % 2 != 0 || from.kind() >= static_cast<std::uint32_t>(kMapEditKindCount))
     return Unreadable("an edit of a map");
@@ -57,6 +72,24 @@ Result<MapEdit> ValueOf(const record::Site::Edit& from) {
   for (int i = 0; i < from.points_size(); i += 2) edit.points_map.emplace_back(from.points(i), from.points(i + 1));
   if (!ValidateMapEdit(edit)) return Unreadable("an edit of a map");
   return edit;
+}
+
+Result<EditAnchors> AnchorsOf(const record::Site::Edit& from) {
+  EditAnchors anchors;
+  if (from.points_then_size() != from.points_size() || from.anchors_size() > static_cast<int>(kMostEditPoints))
+    return Unreadable("the anchors of an edit");
+  for (int i = 0; i < from.points_then_size(); i += 2)
+    anchors.points_then.emplace_back(from.points_then(i), from.points_then(i + 1));
+  for (const record::Site::Edit::Anchor& one : from.anchors())
+    anchors.keyframes.push_back(
+        {one.session(), one.keyframe(), server::ValueOf(one.then()), server::ValueOf(one.now())});
+  const bool finite =
+      std::ranges::all_of(anchors.points_then, [](const Eigen::Vector2d& point) { return point.allFinite(); }) &&
+      std::ranges::all_of(anchors.keyframes, [](const EditAnchor& anchor) {
+        return anchor.T_map_then.IsFinite() && anchor.T_map_now.IsFinite();
+      });
+  if (!finite) return Unreadable("the anchors of an edit");
+  return anchors;
 }
 
 }  // namespace
@@ -144,7 +177,12 @@ std::string BytesOf(const StoredSite& site) {
   for (const std::uint64_t session : site.past) to.add_past(session);
   for (const std::uint64_t session : site.merged) to.add_merged(session);
   to.set_map_frame(site.map_frame);
-  for (const MapEdit& edit : site.edits) Fill(*to.add_edits(), edit);
+  for (const MapEdit& edit : site.edits) {
+    record::Site::Edit& added = *to.add_edits();
+    Fill(added, edit);
+    const auto anchors = site.anchors.find(edit.id);
+    if (anchors != site.anchors.end() && !anchors->second.keyframes.empty()) Fill(added, anchors->second);
+  }
   to.set_edits_version(site.edits_version);
   if (site.given_up.versions > 0 || site.given_up.layers > 0 || site.given_up.sessions > 0) {
     to.mutable_given_up()->set_versions(site.given_up.versions);
@@ -187,6 +225,11 @@ Result<StoredSite> SiteOf(std::string_view bytes) {
     if (!edit) return tl::unexpected(edit.error());
     if (edit->id > site.edits_version || (!site.edits.empty() && edit->id <= site.edits.back().id))
       return Unreadable("a site");
+    if (one.anchors_size() > 0) {
+      auto anchors = AnchorsOf(one);
+      if (!anchors) return tl::unexpected(anchors.error());
+      site.anchors.emplace(edit->id, *std::move(anchors));
+    }
     site.edits.push_back(*std::move(edit));
   }
   return site;

@@ -4,7 +4,9 @@
 #include <bit>
 #include <cstring>
 #include <functional>
+#include <memory>
 #include <utility>
+#include <vector>
 
 #include "common/map/tile.h"
 
@@ -15,6 +17,23 @@ constexpr int kFarthestChunk = 1 << 22;  // No estimator draws farther from the 
 constexpr double kFarthestM = 1e7;       // No robot drives farther from it.
 constexpr std::size_t kChunkBytes = sizeof(std::int16_t) * static_cast<std::size_t>(kTileArea);
 static_assert(std::endian::native == std::endian::little, "cells are stored as they lie in memory");
+
+using Doubles = google::protobuf::RepeatedField<double>;
+
+void AddPoses(const std::vector<Pose2>& poses, Doubles& to) {
+  for (const Pose2& pose : poses)
+    for (const double number : {pose.x, pose.y, pose.theta}) to.Add(number);
+}
+
+// Null: they are no poses.
+std::shared_ptr<const std::vector<Pose2>> PosesOf(const Doubles& numbers) {
+  std::vector<Pose2> poses;
+  for (int i = 0; i + 2 < numbers.size(); i += 3) {
+    const Pose2& pose = poses.emplace_back(Pose2{numbers[i], numbers[i + 1], WrapAngle(numbers[i + 2])});
+    if (!pose.IsFinite() || pose.translation().cwiseAbs().maxCoeff() > kFarthestM) return nullptr;
+  }
+  return std::make_shared<const std::vector<Pose2>>(std::move(poses));
+}
 
 }  // namespace
 
@@ -58,8 +77,8 @@ void Fill(record::Grid& to, const StoredGrid& from) {
   const bool all = from.numbers == nullptr || from.keyframes == from.numbers->size();
   if (!all) to.mutable_numbers()->Add(from.numbers->begin(), from.numbers->end());
   auto& numbers = all ? *to.mutable_path() : *to.mutable_kept_path();
-  for (const Pose2& pose : *from.path)
-    for (const double number : {pose.x, pose.y, pose.theta}) numbers.Add(number);
+  AddPoses(*from.path, numbers);
+  if (from.drawn != nullptr) AddPoses(*from.drawn, *to.mutable_drawn());
 }
 
 Pose2 ValueOf(const record::Pose& from) {
@@ -110,13 +129,11 @@ Result<StoredGrid> ValueOf(const record::Grid& from) {
       return Unreadable("the keyframes of a grid");
     grid.numbers = std::move(kept);
   }
-  auto path = std::make_shared<std::vector<Pose2>>();
-  for (int i = 0; i < numbers.size(); i += 3) {
-    const Pose2& pose = path->emplace_back(Pose2{numbers[i], numbers[i + 1], WrapAngle(numbers[i + 2])});
-    if (!pose.IsFinite() || pose.translation().cwiseAbs().maxCoeff() > kFarthestM)
-      return Unreadable("the path of a grid");
-  }
-  grid.path = std::move(path);
+  grid.path = PosesOf(numbers);
+  if (grid.path == nullptr) return Unreadable("the path of a grid");
+  if (from.drawn().empty()) return grid;
+  grid.drawn = from.drawn_size() == numbers.size() ? PosesOf(from.drawn()) : nullptr;
+  if (grid.drawn == nullptr) return Unreadable("the poses of a grid");
   return grid;
 }
 

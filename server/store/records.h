@@ -36,7 +36,8 @@ struct StoredGrid {
   std::shared_ptr<const std::vector<Pose2>> path{};  // T_map_robot of the keyframes; null: not known.
   // The numbers of the keyframes of the path, increasing; null: 0, 1, 2, ...
   std::shared_ptr<const std::vector<std::uint64_t>> numbers{};
-  bool fragment = false;  // Not joined with the map of the site.
+  std::shared_ptr<const std::vector<Pose2>> drawn{};  // At which they are in the grid; null: those of the path.
+  bool fragment = false;                              // Not joined with the map of the site.
 };
 
 // The entries of a session's journal: the events that its strand processed, in this order.
@@ -150,6 +151,21 @@ struct GivenUp {
   std::uint32_t sessions = 0;  // Earlier sessions of which only the layer was kept.
 };
 
+// The keyframes with which an edit of the map moves (maps/edit_anchors.h).
+struct EditAnchor {
+  std::uint64_t session = 0;
+  std::uint64_t keyframe = 0;   // Its number (slam/trail/keyframe.h).
+  Pose2 T_map_then, T_map_now;  // T_map_robot of the keyframe when the edit was anchored, and now.
+
+  bool operator==(const EditAnchor&) const = default;
+};
+struct EditAnchors {
+  std::vector<Eigen::Vector2d> points_then;  // The points of the edit when it was anchored, in the map frame.
+  std::vector<EditAnchor> keyframes;         // At most kMostEditPoints; none: the edit does not move.
+
+  bool operator==(const EditAnchors&) const = default;
+};
+
 struct StoredSite {
   std::string name;
   std::uint32_t epoch = 0;
@@ -165,6 +181,8 @@ struct StoredSite {
   std::uint64_t map_frame = 0;              // SessionState::map_frame; 0: stored without one.
   std::vector<MapEdit> edits{};             // By people, in the order in which they were made,
   std::uint64_t edits_version = 0;          // and how often they were changed; no number of an edit is higher.
+  // By the number of the edit. Others have none.
+  std::map<std::uint64_t, EditAnchors> anchors{};
   GivenUp given_up{};
   bool chosen = false;  // A person has chosen the enabled version.
 };

@@ -43,6 +43,13 @@ struct Division {
   StoredSite going_site;
 };
 
+// An edit that is left without any keyframe is anchored anew where robots draw the map.
+template <typename Goes>
+void DropAnchors(StoredSite& site, const Goes& goes) {
+  for (auto& [edit, anchors] : site.anchors)
+    std::erase_if(anchors.keyframes, [&goes](const EditAnchor& one) { return goes(one.session); });
+}
+
 Result<Division> Divide(Store& store, SiteContents contents, const std::vector<std::uint64_t>& sessions) {
   Division division;
   division.contents = std::move(contents);
@@ -74,6 +81,8 @@ Result<Division> Divide(Store& store, SiteContents contents, const std::vector<s
   const auto goes = [&](std::uint64_t session) { return division.going.contains(session); };
   std::erase_if(stays.past, goes);
   std::erase_if(division.going_site.past, std::not_fn(goes));
+  DropAnchors(stays, goes);
+  DropAnchors(division.going_site, std::not_fn(goes));
   ++stays.tile_version;
   return division;
 }

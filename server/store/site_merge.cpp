@@ -166,6 +166,15 @@ class Merge {
     return moves_ && !grid.fragment ? Transformed(grid, T_into_from_, from_.site.resolution_m) : grid;
   }
 
+  [[nodiscard]] EditAnchors Moved(EditAnchors anchors) const {
+    for (Eigen::Vector2d& point : anchors.points_then) point = T_into_from_ * point;
+    for (EditAnchor& one : anchors.keyframes) {
+      one.T_map_then = T_into_from_ * one.T_map_then;
+      one.T_map_now = T_into_from_ * one.T_map_now;
+    }
+    return anchors;
+  }
+
   Result<void> Layers() {
     auto layers = ReadLayers(store_, HashName(from_.site.name));
     if (!layers) return tl::unexpected(layers.error());
@@ -244,7 +253,9 @@ class Merge {
         return other == moved;
       };
       if (std::any_of(site.edits.begin(), site.edits.begin() + static_cast<std::ptrdiff_t>(own), is_same)) continue;
+      const auto anchors = from_.site.anchors.find(edit.id);
       moved.id += site.edits_version;
+      if (anchors != from_.site.anchors.end()) site.anchors.emplace(moved.id, Moved(anchors->second));
       site.edits.push_back(std::move(moved));
     }
     site.edits_version += from_.site.edits_version;

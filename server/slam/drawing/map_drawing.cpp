@@ -53,15 +53,17 @@ void MapDrawing::Finish(std::span<const Keyframe> keyframes, const PosePath& pat
 }
 
 void MapDrawing::Adopt(OccupancyGrid grid, std::uint64_t made, std::size_t drawn, std::span<const Keyframe> keyframes,
-                       const PosePath& path, bool along_path) {
+                       const PosePath& path, bool along_path, std::span<const Pose2> in_grid) {
   const bool outdated = made < changed_at_ || (redraw_ && !along_path);
   redraw_.reset();
   grid_.ReplaceBy(std::move(grid));
   for (std::size_t k = drawn; k < keyframes.size(); ++k) DrawOnto(grid_, keyframes[k], path[k]);
-  if (along_path) {
-    path_ = path.values();
-    frozen_path_.Forget();
+  if (along_path) path_ = path.values();
+  if (in_grid.size() == drawn && keyframes.size() == path_.size()) {
+    std::ranges::copy(in_grid, path_.begin());
+    for (std::size_t k = drawn; k < keyframes.size(); ++k) path_[k] = path[k];
   }
+  frozen_path_.Forget();
   if (outdated) redraw_ = Redraw{OccupancyGrid(grid_.options()), 0};
 }
 

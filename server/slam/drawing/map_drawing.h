@@ -35,9 +35,10 @@ class MapDrawing {
   void Finish(std::span<const Keyframe> keyframes, const PosePath& path);
   // Replaces the map by one that a job drew when there had been `made` keyframes, of which the first `drawn` are left,
   // and draws the later ones onto it. A map from before a change of the path is also taken, and then drawn again.
-  // `along_path`: the given map was drawn along `path`, which has changed with it.
+  // `along_path`: the given map goes with `path`, which has changed with it. `in_grid`: the poses at which the first
+  // keyframes are drawn in it; empty: not known.
   void Adopt(OccupancyGrid grid, std::uint64_t made, std::size_t drawn, std::span<const Keyframe> keyframes,
-             const PosePath& path, bool along_path = false);
+             const PosePath& path, bool along_path = false, std::span<const Pose2> in_grid = {});
 
   // Keyframes are retired: what they have drawn stays. REQUIRES: not redrawing().
   void Retire(const Retirement& retirement);

@@ -55,6 +55,26 @@ TEST_F(JobListTest, EveryChangeOfStateIsPublishedWithItsTime) {
   EXPECT_EQ(sent[2].progress, 1.0);
 }
 
+// A server looks again and again whether there is something to join.
+TEST_F(JobListTest, OfJobsThatHadNothingToJoinTheLastOneOfASiteIsKept) {
+  JobList list(JobsOptions{}, outbound_, [this] { return now_; });
+  const auto run = [&list](const std::string& site, JobKind kind, std::uint32_t version) {
+    const auto job = list.Add(site, kind);
+    EXPECT_TRUE(list.Start(job->id));
+    list.Succeed(job->id, {.map_version = version, .message = {}});
+    return job->id;
+  };
+  const std::uint64_t joined = run("lab", JobKind::kJoin, 2), elsewhere = run("hall", JobKind::kJoin, 0),
+                      asked_for = run("lab", JobKind::kRelocalise, 0), first = run("lab", JobKind::kJoin, 0);
+  const std::uint64_t waiting = list.Add("lab", JobKind::kJoin)->id;
+  const std::uint64_t last = run("lab", JobKind::kJoin, 0);
+  EXPECT_EQ(list.Find(first).error().code, StatusCode::kNotFound);
+  for (const std::uint64_t stays : {joined, elsewhere, asked_for, waiting, last})
+    EXPECT_TRUE(list.Find(stays)) << stays;
+  static_cast<void>(TakeSent());
+  EXPECT_EQ(retired_, std::vector<std::uint64_t>{first});
+}
+
 TEST_F(JobListTest, NothingChangesAJobThatHasEnded) {
   const auto job = list_.Add("lab", JobKind::kSmooth);
   EXPECT_TRUE(list_.Start(job->id));

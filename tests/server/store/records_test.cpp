@@ -70,6 +70,7 @@ TEST(Records, SessionsSitesVersionsLayersAndJobsComeBack) {
   EXPECT_EQ(site_back->past, site.past);
   EXPECT_EQ(site_back->edits, site.edits);
   EXPECT_EQ(site_back->edits_version, 5U);
+  EXPECT_EQ(site_back->anchors, site.anchors);
   EXPECT_EQ(site_back->given_up.versions, 3U);
   EXPECT_EQ(site_back->given_up.layers, 2U);
   EXPECT_EQ(site_back->given_up.sessions, 1U);
@@ -106,6 +107,18 @@ TEST(Records, SessionsSitesVersionsLayersAndJobsComeBack) {
   ASSERT_NE(thinned_back.numbers, nullptr);
   EXPECT_EQ(*thinned_back.numbers, *thinned.numbers);
   EXPECT_EQ(thinned_back.path->size(), 3U);
+  EXPECT_EQ(thinned_back.drawn, nullptr);
+  for (StoredGrid* const grid : {&whole, &thinned}) {
+    std::vector<Pose2> drawn = *grid->path;
+    drawn[1].x += 0.5;
+    grid->drawn = std::make_shared<const std::vector<Pose2>>(drawn);
+    EXPECT_EQ(*LayerOf(BytesOf(StoredLayer{6, *grid}))->grid.drawn, drawn);
+    drawn[2].y = std::nan("");
+    grid->drawn = std::make_shared<const std::vector<Pose2>>(drawn);
+    EXPECT_FALSE(LayerOf(BytesOf(StoredLayer{6, *grid})));
+    grid->drawn = std::make_shared<const std::vector<Pose2>>(2);
+    EXPECT_FALSE(LayerOf(BytesOf(StoredLayer{6, *grid})));
+  }
 
   StoredJob job;
   job.job.id = 4;
@@ -165,6 +178,16 @@ TEST(Records, ValuesThatNoServerWritesAreRefused) {
     EXPECT_TRUE(SiteOf(BytesOf(edited)));
     spoil(edited.edits);
     EXPECT_FALSE(SiteOf(BytesOf(edited)));
+  }
+  for (const auto& spoil : std::vector<std::function<void(EditAnchors&)>>{
+           [](auto& anchors) { anchors.points_then.pop_back(); },
+           [](auto& anchors) { anchors.points_then[1].y() = std::nan(""); },
+           [](auto& anchors) { anchors.keyframes[0].T_map_then.x = std::nan(""); },
+           [](auto& anchors) { anchors.keyframes[1].T_map_now.theta = INFINITY; },
+           [](auto& anchors) { anchors.keyframes.resize(kMostEditPoints + 1); }}) {
+    StoredSite anchored = testing::SampleSiteRecord();
+    spoil(anchored.anchors.at(4));
+    EXPECT_FALSE(SiteOf(BytesOf(anchored)));
   }
   StoredSite last = testing::SampleSiteRecord();
   last.edits_version = kMaxEditsVersion - last.edits.size() - 1;

@@ -108,6 +108,9 @@ inline StoredSite SampleSiteRecord() {
                      .made = 77},
                     {.id = 4, .kind = MapEditKind::kKeepOut, .points_map = {{0, 0}, {1, 0}, {1, 1}}, .note = {}}},
           .edits_version = 5,
+          .anchors = {{4,
+                       {.points_then = {{0.5, 0}, {1.5, 0}, {1.5, 1}},
+                        .keyframes = {{5, 170, {1, 2, 0.5}, {0.5, 2, 0.5}}, {7, 0, {}, {-0.5, 0, 0}}}}}},
           .given_up = {.versions = 3, .layers = 2, .sessions = 1}};
 }
 

@@ -20,6 +20,50 @@ std::filesystem::path Saved(const TempDirectory& directory, const SampleSite& sa
   return path;
 }
 
+// A keep-out that hangs on a keyframe of each of these sessions.
+void PutEdit(Store& store, const std::string& name, const std::vector<std::uint64_t>& sessions) {
+  StoredSite site = ReadSite(store, name)->site;
+  site.edits = {{.id = 1, .kind = MapEditKind::kKeepOut, .points_map = {{0, 0}, {2, 0}, {2, 1}}, .note = {}}};
+  site.edits_version = 1;
+  site.anchors[1].points_then = site.edits[0].points_map;
+  for (const std::uint64_t session : sessions) site.anchors[1].keyframes.push_back({session, 10 * session, {}, {}});
+  ASSERT_TRUE(store.Commit({.removed = {}, .put = {{{RecordKind::kSite, HashName(name), 0}, BytesOf(site)}}}));
+}
+// The sessions, and the keyframes of these.
+std::map<std::uint64_t, std::uint64_t> AnchorsIn(Store& store, const std::string& name) {
+  std::map<std::uint64_t, std::uint64_t> keyframes;
+  const StoredSite site = ReadSite(store, name)->site;
+  EXPECT_EQ(site.edits.size(), 1U);
+  const auto anchors = site.anchors.find(1);
+  if (anchors == site.anchors.end()) return keyframes;
+  for (const EditAnchor& one : anchors->second.keyframes) keyframes[one.session] = one.keyframe;
+  return keyframes;
+}
+
+TEST(ImportSite, EditsHangOnTheSameKeyframesUnderTheirNewNumbers) {
+  const TempDirectory directory;
+  const auto store = MemoryStore();
+  Put(*store, {.name = "hall"});
+  PutEdit(*store, "hall", {2, 3, 9});
+  ASSERT_TRUE(WriteSiteFile(*store, "hall", directory / "hall.site"));
+  const auto other = MemoryStore();
+  Put(*other, {.name = "lab", .first_session = 11, .job = 4});
+  ASSERT_TRUE(ImportSite(*other, directory / "hall.site"));
+  EXPECT_EQ(AnchorsIn(*other, "hall"), (std::map<std::uint64_t, std::uint64_t>{{15, 20}, {16, 30}}))
+      << "there is no session 9";
+}
+
+TEST(SplitSite, EditsOfBothPartsHangOnTheKeyframesOfTheirOwnSessions) {
+  const auto store = MemoryStore();
+  Put(*store, {});
+  PutEdit(*store, "lab", {1, 2});
+  ASSERT_TRUE(SplitSite(*store, "lab", {2, 3}, "annex"));
+  EXPECT_EQ(AnchorsIn(*store, "lab"), (std::map<std::uint64_t, std::uint64_t>{{1, 10}}));
+  EXPECT_EQ(AnchorsIn(*store, "annex"), (std::map<std::uint64_t, std::uint64_t>{{2, 20}}));
+  ASSERT_TRUE(DeleteSession(*store, "lab", 1));
+  EXPECT_TRUE(AnchorsIn(*store, "lab").empty());
+}
+
 TEST(ImportSite, GivesNewNumbersBesideOtherSites) {
   const TempDirectory directory;
   const auto path = Saved(directory, {.name = "hall"}, 2);

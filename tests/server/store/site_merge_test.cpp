@@ -126,6 +126,8 @@ TEST(MergeSites, EditsOfBothStayWhereTheyAreInTheBuilding) {
     StoredSite site = ReadSite(*store, name)->site;
     site.edits = {{.id = 2, .kind = MapEditKind::kKeepOut, .points_map = {{0, 0}, {2, 0}, {2, 1}}, .note = name}};
     site.edits_version = 3;
+    site.anchors[2] = {.points_then = {{0, 1}, {2, 1}, {2, 2}},
+                       .keyframes = {{site.members.begin()->second, 8, {1, 1, 0}, {1, 0, 0}}}};
     ASSERT_TRUE(store->Commit({.removed = {}, .put = {{{RecordKind::kSite, HashName(name), 0}, BytesOf(site)}}}));
   }
   ASSERT_TRUE(MergeSites(*store, "lab", "hall", {1.0, 0.5, kQuarterTurn}));
@@ -138,6 +140,15 @@ TEST(MergeSites, EditsOfBothStayWhereTheyAreInTheBuilding) {
   EXPECT_EQ(lab->site.edits[1].note, "hall");
   EXPECT_NEAR(lab->site.edits[1].points_map[1].x(), 1.0, 1e-12);
   EXPECT_NEAR(lab->site.edits[1].points_map[1].y(), 2.5, 1e-12);
+  // And they go on with the same keyframes.
+  EXPECT_EQ(lab->site.anchors.at(2).keyframes.at(0).T_map_then, (Pose2{1, 1, 0}));
+  const EditAnchors& anchors = lab->site.anchors.at(5);
+  EXPECT_GT(anchors.keyframes.at(0).session, 10U);
+  EXPECT_NEAR(anchors.points_then.at(1).x(), 0.0, 1e-12);
+  EXPECT_NEAR(anchors.points_then.at(1).y(), 2.5, 1e-12);
+  EXPECT_NEAR(anchors.keyframes.at(0).T_map_then.x, 0.0, 1e-12);
+  EXPECT_NEAR(anchors.keyframes.at(0).T_map_now.y, 1.5, 1e-12);
+  EXPECT_NEAR(anchors.keyframes.at(0).T_map_now.theta, kQuarterTurn, 1e-12);
 }
 
 TEST(MergeSites, TheFrameOfTheBuildingIsThatOfTheSiteThatStays) {
