@@ -73,8 +73,7 @@ void Mapper::State::EndDoubt(const Scan& scan, const std::vector<SurfacePoint>& 
   // The first scan since then was matched with what it may not belong to.
   const std::vector<RecentScan>& recent = recovery.recent();
   const auto since = std::span(recent).subspan(std::min<std::size_t>(1, recent.size()));
-  const bool fits_again = recent.size() == 1 && IsExplainedAsBefore(before, step.score);
-  if (!fits_again && StaysDifferent(before, AgreementWithLast(trail, now), ConflictWith(since, now))) return;
+  if (StaysDifferent(before, AgreementWithLast(trail, now), ConflictWith(since, now))) return;
   const std::vector<Recovery::Held> held = recovery.TakeHeld();
   recovery.End();
   AddHeld(held, parallel_for);
@@ -182,17 +181,21 @@ bool Mapper::State::GoesOn(const Scan& scan, const std::vector<SurfacePoint>& po
          AgreesAsBefore(scan, points_robot, step, {recovery, own_map, T_map_track()});
 }
 
-// Whether the scan agrees with the map where the track leads, or no worse than the last scan.
+// Whether the scan agrees with the map where the track leads, or hardly worse than the last scan.
 bool Mapper::State::AgreesAsBefore(const Scan& scan, const std::vector<SurfacePoint>& points_robot,
                                    const TrackStep& step, const TrackInMap& track) const {
   using Agreement = PlaceSearch::Agreement;
-  const auto agreement = [&](const Scan& one, const std::vector<SurfacePoint>& points, const Pose2& T_track_robot) {
-    return track.recovery.Compare(one, points, track.T_map_track * T_track_robot, track.map);
-  };
-  const Agreement now = agreement(scan, points_robot, step.T_track_robot);
+  const Agreement now = track.recovery.Compare(scan, points_robot, track.T_map_track * step.T_track_robot, track.map);
   if (now != Agreement::kDoubtful) return now == Agreement::kAgrees;
   const std::vector<SurfacePoint> last_points = Look(*last_scan->scan, options.front_end).points_robot;
-  return agreement(*last_scan->scan, last_points, last_scan->T_track_robot) == Agreement::kDoubtful;
+  const Pose2 T_map_last = track.T_map_track * last_scan->T_track_robot;
+  if (track.recovery.Compare(*last_scan->scan, last_points, T_map_last, track.map) == Agreement::kDoubtful) return true;
+  const auto conflict = [](const VisibilityCounts& counts) {
+    return static_cast<double>(counts.contradicted) / std::max(counts.known(), 1);
+  };
+  const double least = 0.5 * options.recovery.place.max_conflict;
+  return conflict(track.map.Compare(scan, points_robot, track.T_map_track * step.T_track_robot)) <
+         conflict(track.map.Compare(*last_scan->scan, last_points, T_map_last)) + least;
 }
 
 // Scans are missing before this one. If it matches the last scans, the robot is probably still on its path, which must
@@ -225,11 +228,8 @@ ScanOutcome Mapper::State::Recover(Keyframe keyframe, ScanView view, TrackStep s
   const Pose2 T_track_kept = on_path ? trail.shapes().back().T_track_robot : step.T_track_robot;
   const Pose2 T_track_last = recovery.LastKept(T_track_kept);
   const bool keep = MovedEnough(Between(T_track_last, step.T_track_robot), options.gate) || (first && !on_path);
-  // Where the robot may have been carried, the first scan is not matched with: until the second one, the score tells
-  // how scans fit what was seen before. The second one is always kept.
-  const bool doubted_first = recovery.doubt() && first;
   const bool doubted_second = recovery.doubt() && recovery.recent().size() == 1;
-  if ((keep && !doubted_first) || doubted_second) front_end.AddKeyframe(view);
+  if (keep) front_end.AddKeyframe(view);
   if (on_path) {
     blind.Add(step, T_track_last);
     if (keep) recovery.Hold({keyframe, step, blind.TakeCovariance()});

@@ -117,8 +117,8 @@ class ParticleSet {
   [[nodiscard]] const Particle& best() const { return particles_[best_]; }
   // The weighted mean pose of the particles around the most likely one, as far as the doubt reaches. It changes less
   // from step to step than the most likely particle does, because another one may become the most likely. Its
-  // covariance is larger than the spread of the particles (error_ensemble.h). Particles too far away to be covered by it
-  // add their distance to the covariance.
+  // covariance is larger than the spread of the particles (error_ensemble.h). Particles too far away to be covered by
+  // it add their distance to the covariance.
   [[nodiscard]] const FilterEstimate& estimate() const { return estimate_; }
   [[nodiscard]] FilterHealth health() const;
 

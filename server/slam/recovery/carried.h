@@ -11,8 +11,8 @@
 
 #include "common/geometry/pose2.h"
 #include "common/sensor/scan.h"
-#include "server/slam/scan/surface_points.h"
 #include "server/slam/recovery/place_search.h"
+#include "server/slam/scan/surface_points.h"
 #include "server/slam/trail/trail.h"
 
 namespace cairn::slam {

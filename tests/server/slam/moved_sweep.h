@@ -52,8 +52,8 @@ struct MovedCase {
   bool stood_still = false;  // Nothing had happened to the robot, so that it must go on at once.
 };
 
-// The drift of a map whose loop of 100 m is still open is up to 0.65 m in these worlds with these few particles, also of
-// robots that are watched all the time. Places that look alike are farther apart.
+// The drift of a map whose loop of 100 m is still open is up to 0.65 m in these worlds with these few particles, also
+// of robots that are watched all the time. Places that look alike are farther apart.
 inline constexpr double kMovedWrongM = 1.0;
 // Of a robot that was carried unseen: the way after which its poses must not be called localized at a wrong place.
 inline constexpr double kNoticedWithinM = 2.0;

@@ -22,7 +22,8 @@ using test::World;
 
 constexpr Laser kTenthOfASecond{.beams = 181, .step_rad = Radians(1.5), .sigma_m = 0.01};
 
-// Drives round in a room of 27 x 10 m with shelves along its walls, a quarter of a metre a scan. Nobody tells it of being carried.
+// Drives round in a room of 27 x 10 m with shelves along its walls, a quarter of a metre a scan. Nobody tells it of
+// being carried.
 class CarriedRobot {
  public:
   CarriedRobot() : pipeline_(std::make_unique<ScanPipeline>(Options(), Pose2{}, SerialFor, Sink())) {
