@@ -26,10 +26,10 @@ struct AnchorChoice {
 // What the edit hangs on, where it lies now. Without keyframes: there are none for any of its points.
 [[nodiscard]] EditAnchors AnchorsOf(const MapEdit& edit, const DrawnPaths& paths, const AnchorChoice& choice);
 
-// T_now_then: the rigid motion that is nearest, in the sense of least squares, to that of all its points, each of which
-// moves with its own keyframe. Exactly the identity where the keyframes lie where they were. REQUIRES: there are points
-// and keyframes.
-// Source: the fit of two sets of points in the plane (Umeyama 1991, without a scale).
+// T_now_then: the rigid motion that is nearest, in the sense of least squares, to that of all its points. Each point
+// moves with the nearest of the keyframes on which the edit hangs, whether or not that one sees it. Exactly the
+// identity where the keyframes lie where they were. REQUIRES: there are points and keyframes. Source: the fit of two
+// sets of points in the plane (Umeyama 1991, without a scale).
 [[nodiscard]] Pose2 MotionOf(const EditAnchors& anchors);
 
 // The poses before, of those keyframes that there are afterwards, too.

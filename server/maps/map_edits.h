@@ -47,8 +47,8 @@ class MapEdits {
   // too many tiles. REQUIRES: `all` are valid, and their numbers are at most `version`.
   std::size_t Restore(std::vector<MapEdit> all, std::uint64_t version, const std::function<void()>& advance,
                       std::map<std::uint64_t, EditAnchors> anchors = {});
-  // Those edits of which `is_lost` says that what they hang on has gone hang on what `anchors_of` returns from now on,
-  // where they lie now; if that is nothing, they keep what they had. Returns whether any has changed.
+  // Each edit for which `is_lost` is true hangs on what `anchors_of` returns from now on, starting from where it lies
+  // now. If that returns nothing, the edit keeps its keyframes. Returns whether any has changed.
   using Anchoring = std::function<std::optional<EditAnchors>(const MapEdit& edit)>;
   bool AnchorAgain(const std::function<bool(const EditAnchors&)>& is_lost, const Anchoring& anchors_of);
   // The keyframes lie there now: moves the edits that hang on them. One that would be no valid edit any more (too far

@@ -80,6 +80,7 @@ void Site::Join(Member member) {
     site.joint_.SetHidden(member.session, member.fragment);
     if (member.ended) site.joint_.SetPast(member.session);
     site.info_changed_ = true;
+    if (member.fragment) site.ForgetPath(member.session);
     static_cast<void>(site.AnchorNew());
     site.StoreSite();
     // The map may have been switched since the session was made, or since the server that made it was killed.

@@ -52,8 +52,8 @@ Result<void> Site::CheckNear(const MapEdit& edit) const {
   return {};
 }
 
-// Its own tile says who has drawn a place. Sessions that still exist come before layers, because these are corrected
-// seldom, and jobs do not fit them any more. Where nobody has drawn, all are asked.
+// The tile of a point says which sessions have drawn there. Sessions that still exist come before layers, because layers
+// are corrected only by switches of the version. Where nobody has drawn, all sessions are asked.
 EditAnchors Site::AnchorsOf(const MapEdit& edit, AnchorTo to) const {
   const auto sessions_at = [&](const Eigen::Vector2d& point) {
     std::vector<SessionId> drawn_by = joint_.DrawnBy(TileAt(point, resolution_m_));

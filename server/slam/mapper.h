@@ -97,7 +97,8 @@ class Mapper {
     std::vector<Pose2> path;
   };
   [[nodiscard]] DrawnKeyframes drawn_keyframes() const;
-  // The same of all keyframes, also those that are not drawn. Not one each where the robot's place is not known.
+  // T_map_robot at which each kept keyframe is drawn, also of those that are not. Empty while the robot's place is not
+  // known.
   [[nodiscard]] const std::vector<Pose2>& drawn_path() const;
   // Empty while the robot's place in the map is not known (filter.h: placed).
   [[nodiscard]] MapperSnapshot Snapshot() const;

@@ -63,12 +63,12 @@ std::optional<SceneAgreement> Mapper::State::BeforeCarried(const Scan& scan,
   return before;
 }
 
-// Nobody has carried a robot whose scans agree again with the last keyframes, or with each other as little as with
-// these: it is localized, and what was held is added to its path.
+// Ends the doubt if the scan agrees again with the last keyframes, or if the scans since then contradict each other
+// too, because then something moves past the robot. What was held is added to its path.
 void Mapper::State::EndDoubt(const Scan& scan, const std::vector<SurfacePoint>& points_robot, const TrackStep& step,
                              const ParallelFor& parallel_for) {
   if (!step.matched || recovery.was_carried()) return;
-  const SceneAgreement& before = recovery.doubt()->before;
+  const SceneAgreement& before = *recovery.doubt();
   const SeenScan now{scan, points_robot, step.T_track_robot, step.score};
   // The first scan since then was matched with what it may not belong to.
   const std::vector<RecentScan>& recent = recovery.recent();
@@ -118,7 +118,8 @@ void Mapper::State::Relocalise(const std::optional<Pose2>& T_map_robot) {
 Mapper::LostView Mapper::SeenWhileLost() const {
   const State& s = *state_;
   const Recovery& recovery = s.localisation ? s.localisation->recovery() : s.recovery;
-  LostView view{recovery.active() && !recovery.doubt(), recovery.has_scans(), recovery.recent()};
+  const bool only_doubted = recovery.doubt() && !recovery.was_carried();
+  LostView view{recovery.active() && !only_doubted, recovery.has_scans(), recovery.recent()};
   if (!view.lost) return {};
   if (!view.since_lost && s.last_scan) {
     view.scans = {{s.last_scan->scan, s.last_scan->T_track_robot, 0.0,
@@ -216,7 +217,6 @@ ScanOutcome Mapper::State::Recover(Keyframe keyframe, ScanView view, TrackStep s
   const Stamp stamp = keyframe.scan->stamp;
   const Pose2 T_odom_robot = keyframe.T_odom_robot;
   recovery.AgeSuggestion();
-  recovery.AddDoubtedWay(step.moved_m);
   if (!step.matched) {
     recovery.ForgetScans();
     front_end.Restart();
@@ -227,14 +227,16 @@ ScanOutcome Mapper::State::Recover(Keyframe keyframe, ScanView view, TrackStep s
   const bool on_path = recovery.on_path();
   const Pose2 T_track_kept = on_path ? trail.shapes().back().T_track_robot : step.T_track_robot;
   const Pose2 T_track_last = recovery.LastKept(T_track_kept);
-  const bool keep = MovedEnough(Between(T_track_last, step.T_track_robot), options.gate) || (first && !on_path);
-  const bool doubted_second = recovery.doubt() && recovery.recent().size() == 1;
+  // The second scan of a doubted robot is the first that is matched with what it belongs to.
+  const bool second = recovery.doubt() && recovery.recent().size() == 1;
+  const bool keep =
+      second || MovedEnough(Between(T_track_last, step.T_track_robot), options.gate) || (first && !on_path);
   if (keep) front_end.AddKeyframe(view);
   if (on_path) {
     blind.Add(step, T_track_last);
     if (keep) recovery.Hold({keyframe, step, blind.TakeCovariance()});
   }
-  if (keep || first || doubted_second) {
+  if (keep || first) {
     const PosePath path = believed_path();
     const auto found = recovery.Take({keyframe.scan, OdometryOrNone(T_odom_robot)}, step, view.points_robot,
                                      PathMap(trail, path, options.recovery.place, options.self_check.near_m));

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -181,7 +180,7 @@ struct StoredSite {
   std::uint64_t map_frame = 0;              // SessionState::map_frame; 0: stored without one.
   std::vector<MapEdit> edits{};             // By people, in the order in which they were made,
   std::uint64_t edits_version = 0;          // and how often they were changed; no number of an edit is higher.
-  // By the number of the edit. Others have none.
+  // By the number of the edit. An edit without an entry hangs on no keyframe.
   std::map<std::uint64_t, EditAnchors> anchors{};
   GivenUp given_up{};
   bool chosen = false;  // A person has chosen the enabled version.

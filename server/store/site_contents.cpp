@@ -233,4 +233,15 @@ Result<std::uint64_t> FindSession(const SiteContents& contents, const std::strin
   return Fail(StatusCode::kNotFound, "site '" + contents.site.name + "' has no session of '" + robot_or_number + "'");
 }
 
+void DropAnchors(StoredSite& site, const std::function<bool(std::uint64_t session)>& goes) {
+  for (const MapEdit& edit : site.edits) {
+    const auto found = site.anchors.find(edit.id);
+    if (found == site.anchors.end()) continue;
+    EditAnchors& anchors = found->second;
+    if (std::erase_if(anchors.keyframes, [&goes](const EditAnchor& one) { return goes(one.session); }) == 0) continue;
+    anchors.points_then = edit.points_map;
+    for (EditAnchor& one : anchors.keyframes) one.T_map_then = one.T_map_now;
+  }
+}
+
 }  // namespace cairn::server

@@ -2,6 +2,7 @@
 // (layers), its jobs, and its sessions with their checkpoints and journals. Stateless, thread-safe.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -52,5 +53,9 @@ struct SiteContents {
 // The session of the robot of this name, else the session of this number; sessions that exist no more have only a
 // number. NOT_FOUND: the site has no such session.
 [[nodiscard]] Result<std::uint64_t> FindSession(const SiteContents& contents, const std::string& robot_or_number);
+
+// Takes away the keyframes of the sessions for which `goes` is true. An edit goes on from where it lies with those that
+// are left. An edit without any is anchored anew where robots draw the map.
+void DropAnchors(StoredSite& site, const std::function<bool(std::uint64_t session)>& goes);
 
 }  // namespace cairn::server

@@ -43,13 +43,6 @@ struct Division {
   StoredSite going_site;
 };
 
-// An edit that is left without any keyframe is anchored anew where robots draw the map.
-template <typename Goes>
-void DropAnchors(StoredSite& site, const Goes& goes) {
-  for (auto& [edit, anchors] : site.anchors)
-    std::erase_if(anchors.keyframes, [&goes](const EditAnchor& one) { return goes(one.session); });
-}
-
 Result<Division> Divide(Store& store, SiteContents contents, const std::vector<std::uint64_t>& sessions) {
   Division division;
   division.contents = std::move(contents);

@@ -109,10 +109,9 @@ class Renaming {
     for (const std::uint64_t session : site.merged) merged.insert(Session(session));
     site.merged = std::move(merged);
     for (std::uint64_t& session : site.past) session = Session(session);
-    for (auto& [edit, anchors] : site.anchors) {
-      std::erase_if(anchors.keyframes, [this](const EditAnchor& one) { return !sessions_.contains(one.session); });
+    DropAnchors(site, [this](std::uint64_t session) { return !sessions_.contains(session); });
+    for (auto& [edit, anchors] : site.anchors)
       for (EditAnchor& one : anchors.keyframes) one.session = Session(one.session);
-    }
   }
   void Rename(StoredVersion& version) const {
     if (version.job != 0) version.job = Job(version.job);

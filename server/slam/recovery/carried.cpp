@@ -13,18 +13,25 @@ constexpr double kApartM = 0.3;  // Way between two of them.
 // As fine as matched scans agree: a doorway of another depth is a contradiction.
 constexpr double kNearM = 0.12;
 constexpr int kLeastKnown = 20;  // Points that must be compared for a comparison to count.
-// In the worlds of the study `moved` one of a hundred robots that are carried shows less of either, if the scan is not
-// the right one again. On the real logs, in which nobody is carried, one scan of two hundred shows more of both, nearly
-// all of them among many people.
+// A scan of a robot that was carried shows at least so much of both (`cairn-study moved --only kidnapped`). Scans of
+// robots that were not carried seldom do; most that do are taken among people.
 constexpr double kLeastDrop = 0.06;
 constexpr double kLeastRise = 0.02;
-// Scans since then contradict each other more than this, and by more than this share of the rise, where something
-// moves: there a third of the rise and more, and less than a seventh of it where the robot was carried.
+// Where much is contradicted already, as among people, the conflict must also be so many times as large.
+constexpr double kTimes = 2.0;
+// The doubt ends below this share of kLeastRise, so that it does not begin again with the next scan.
+constexpr double kEnded = 0.5;
+// Where something moves, the scans since then contradict each other by more than this, and by more than this share of
+// the rise; where the robot was carried, nothing contradicts but noise.
 constexpr double kLeastMoving = 0.015;
 constexpr double kMovingShare = 0.25;
 
+bool IsKnown(const VisibilityCounts& counts) {
+  return counts.known() >= kLeastKnown;
+}
+
 double ConflictOf(const VisibilityCounts& counts) {
-  return counts.known() < kLeastKnown ? 0.0 : static_cast<double>(counts.contradicted) / counts.known();
+  return !IsKnown(counts) ? 0.0 : static_cast<double>(counts.contradicted) / counts.known();
 }
 
 }  // namespace
@@ -43,7 +50,7 @@ SceneAgreement AgreementWithLast(const Trail& trail, const SeenScan& seen) {
     counts += CompareBothWays(keyframe, *trail.points(k), seen.scan, seen.points_robot,
                               Between(shapes[k].T_track_robot, seen.T_track_robot), kNearM);
   }
-  return {seen.score, ConflictOf(counts)};
+  return {seen.score, ConflictOf(counts), IsKnown(counts)};
 }
 
 bool MayBeCarried(double before, double score) {
@@ -54,11 +61,8 @@ bool LooksCarried(const Trail& trail, const SeenScan& last, const SceneAgreement
   if (!MayBeCarried(before.score, now.score)) return false;
   const VisibilityCounts step = CompareBothWays(last.scan, last.points_robot, now.scan, now.points_robot,
                                                 Between(last.T_track_robot, now.T_track_robot), kNearM);
-  return ConflictOf(step) > kLeastRise && AgreementWithLast(trail, now).conflict > 2.0 * before.conflict + kLeastRise;
-}
-
-bool IsExplainedAsBefore(const SceneAgreement& before, double score) {
-  return score > before.score - 0.5 * kLeastDrop;
+  return ConflictOf(step) > kLeastRise &&
+         AgreementWithLast(trail, now).conflict > kTimes * before.conflict + kLeastRise;
 }
 
 double ConflictWith(std::span<const RecentScan> since, const SeenScan& now) {
@@ -71,8 +75,9 @@ double ConflictWith(std::span<const RecentScan> since, const SeenScan& now) {
 }
 
 bool StaysDifferent(const SceneAgreement& before, const SceneAgreement& now, double since) {
+  if (!now.known) return true;  // Nothing tells that it is where it was.
   const double rise = now.conflict - before.conflict;
-  return rise > 0.5 * kLeastRise && since < std::max(kLeastMoving, kMovingShare * rise);
+  return rise > kEnded * kLeastRise && since < std::max(kLeastMoving, kMovingShare * rise);
 }
 
 }  // namespace cairn::slam

@@ -2,8 +2,8 @@
 // kidnapped robot). Such a scan is explained suddenly less by the surfaces of the last keyframes than the scan before,
 // and it contradicts them more: either shows surfaces where beams of the other passed. What passes close to the lidar
 // looks so for a moment, but then the next scans are again as those before. So the robot is doubted first, and has been
-// carried if it stays so. It can not notice a robot that is carried to where all that it sees looks the same, such as
-// along a corridor without doors. Frames: `track` is that of the front-end. Stateless, thread-safe.
+// carried if it stays so. It cannot notice a robot that is carried to a place where all that it sees looks the same,
+// for example along a corridor without doors. Frames: `track` is that of the front-end. Stateless, thread-safe.
 #pragma once
 
 #include <span>
@@ -24,6 +24,7 @@ inline constexpr double kMostDoubtedM = 1.0;
 struct SceneAgreement {
   double score = 0.0;     // TrackStep::score.
   double conflict = 0.0;  // Share of the points compared that are contradicted.
+  bool known = true;      // Whether there were enough points to compare. Not stored.
 
   template <typename Archive>
   static void Members(Archive& archive, auto& self) {
@@ -47,8 +48,6 @@ struct SeenScan {
 // agreement of `last`.
 [[nodiscard]] bool LooksCarried(const Trail& trail, const SeenScan& last, const SceneAgreement& before,
                                 const SeenScan& now);
-// Whether so much of a scan is explained by what was seen before.
-[[nodiscard]] bool IsExplainedAsBefore(const SceneAgreement& before, double score);
 // The share of the points compared that are contradicted between a scan and earlier ones since the robot is doubted.
 [[nodiscard]] double ConflictWith(std::span<const RecentScan> since, const SeenScan& now);
 // Whether the scans of a doubted robot differ from the last keyframes but not from each other: then it is somewhere

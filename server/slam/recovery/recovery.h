@@ -8,8 +8,9 @@
 //  - Where a job has found the robot in the map of its site, which shows more than that of the robot (`Suggest`), that
 //    was the first of the two searches, and the second one is made in that map. If the map of the robot does not show
 //    the place as well, it is no place relative to what the robot has seen before (`Found::elsewhere`).
-//  - A robot that may have been carried between two scans (carried.h) is first held on its path as well. It is looked
-//    for only if its scans have not shown within kMostDoubtedM of way that nobody has carried it.
+//  - A robot that may have been carried between two scans (carried.h) is first held on its path as well, if its scans
+//    match. It is looked for if within kMostDoubtedM of way they have not shown that nobody has carried it, and at once
+//    where a scan does not match.
 //  - A robot that has been followed in the map of others, with too much doubt (`BeginNear`), is found by one search
 //  where
 //    the track leads, and elsewhere by two that agree, like all others.
@@ -110,23 +111,13 @@ class Recovery {
   void AgeSuggestion();
   // The last scans, if they belong together with the next one.
   [[nodiscard]] const std::vector<RecentScan>& recent() const { return recent_; }
-  // A robot on its path that may have been carried since the last keyframe.
-  struct Doubt {
-    SceneAgreement before;  // Of the last scan that was not doubted.
-    double way_m = 0.0;     // Since then.
-
-    template <typename Archive>
-    static void Members(Archive& archive, auto& self) {
-      archive(self.before, self.way_m);
-    }
-  };
+  // A robot on its path may have been carried since the last scan, which agreed with the last keyframes like this.
   // REQUIRES: on_path.
-  void BeginDoubt(const SceneAgreement& before) { doubt_ = Doubt{before}; }
-  [[nodiscard]] const std::optional<Doubt>& doubt() const { return doubt_; }
-  void AddDoubtedWay(double moved_m) {
-    if (doubt_) doubt_->way_m += moved_m;
-  }
-  [[nodiscard]] bool was_carried() const { return doubt_ && doubt_->way_m > kMostDoubtedM; }
+  void BeginDoubt(const SceneAgreement& before) { doubt_ = before; }
+  // The agreement before, as long as the robot is doubted.
+  [[nodiscard]] const std::optional<SceneAgreement>& doubt() const { return doubt_; }
+  // Whether it has been doubted for so long that it counts as carried.
+  [[nodiscard]] bool was_carried() const { return doubt_ && has_scans() && recent_.back().travelled_m > kMostDoubtedM; }
   // Where the robot may be now: at the places found that are not confirmed.
   [[nodiscard]] std::vector<Pose2> Unconfirmed() const;
   // The odometry has begun anew.
@@ -144,7 +135,7 @@ class Recovery {
   [[nodiscard]] std::vector<Held> TakeHeld() { return std::exchange(held_, {}); }
   void Hold(Held held) { held_.push_back(std::move(held)); }
 
-  // Takes a scan, and searches. Returns the robot's place once it is confirmed.
+  // Takes a scan, and searches, unless the robot is only doubted. Returns the robot's place once it is confirmed.
   [[nodiscard]] std::optional<Found> Take(const Keyframe& keyframe, const TrackStep& step,
                                           std::vector<SurfacePoint> points_robot, const SearchedMap& map);
   // How a scan at this pose agrees with what earlier scans have shown there.
@@ -164,7 +155,8 @@ class Recovery {
     if constexpr (Archive::kReads) {
       self.search_.Forget();
       self.suggestion_.reset();  // Not saved (Mapper::has_suggestion).
-      archive.Require(!self.doubt_ || self.on_path(), "a robot that may have been carried");
+      archive.Require(!self.doubt_ || (self.active_ && !self.said_ && self.on_path()),
+                      "a robot that may have been carried");
       if (archive.ok()) self.RestorePoints();
     }
   }
@@ -211,7 +203,7 @@ class Recovery {
   bool contradicted_ = false;  // The last scan does not fit where the robot is believed to be.
   Known known_;
   std::optional<Pose2> T_map_track_;  // While the scans continue the path.
-  std::optional<Doubt> doubt_;
+  std::optional<SceneAgreement> doubt_;
   double searched_at_m_ = 0.0;
   std::vector<RecentScan> recent_;
   std::vector<Held> held_;  // While the scans continue the path: those that will be its keyframes.

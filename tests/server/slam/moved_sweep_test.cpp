@@ -25,7 +25,7 @@ TEST(MovedSweep, NoRobotIsLocalizedAtAWrongPlace) {
   EXPECT_GE(3 * found, static_cast<int>(cases.size()));
 }
 
-// The cut of `moved --only kidnapped`. Nobody noticed such robots for 6 m in the middle, and up to 40 m.
+// The cut of `moved --only kidnapped`. Such robots used to be noticed after 6 m (median), some only after 40 m.
 TEST(MovedSweep, ARobotThatIsCarriedUnseenIsNeverLocalizedAtAWrongPlaceAndIsFound) {
   MovedSweepOptions options;
   options.worlds = {"office", "room"};

@@ -26,7 +26,8 @@ void PutEdit(Store& store, const std::string& name, const std::vector<std::uint6
   site.edits = {{.id = 1, .kind = MapEditKind::kKeepOut, .points_map = {{0, 0}, {2, 0}, {2, 1}}, .note = {}}};
   site.edits_version = 1;
   site.anchors[1].points_then = site.edits[0].points_map;
-  for (const std::uint64_t session : sessions) site.anchors[1].keyframes.push_back({session, 10 * session, {}, {}});
+  for (const std::uint64_t session : sessions)
+    site.anchors[1].keyframes.push_back({session, 10 * session, {}, {0.1 * static_cast<double>(session), 0, 0}});
   ASSERT_TRUE(store.Commit({.removed = {}, .put = {{{RecordKind::kSite, HashName(name), 0}, BytesOf(site)}}}));
 }
 // The sessions, and the keyframes of these.
@@ -60,6 +61,8 @@ TEST(SplitSite, EditsOfBothPartsHangOnTheKeyframesOfTheirOwnSessions) {
   ASSERT_TRUE(SplitSite(*store, "lab", {2, 3}, "annex"));
   EXPECT_EQ(AnchorsIn(*store, "lab"), (std::map<std::uint64_t, std::uint64_t>{{1, 10}}));
   EXPECT_EQ(AnchorsIn(*store, "annex"), (std::map<std::uint64_t, std::uint64_t>{{2, 20}}));
+  const EditAnchors left = ReadSite(*store, "lab")->site.anchors.at(1);
+  EXPECT_EQ(left.keyframes.front().T_map_then, left.keyframes.front().T_map_now) << "the edit lies where it lay";
   ASSERT_TRUE(DeleteSession(*store, "lab", 1));
   EXPECT_TRUE(AnchorsIn(*store, "lab").empty());
 }
