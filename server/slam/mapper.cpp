@@ -53,7 +53,7 @@ ScanOutcome Mapper::State::Process(std::shared_ptr<const Scan> scan, const Pose2
   TrackedScan tracked = TrackScan(s.front_end, {s.options.front_end, s.options.pairing.rolling}, s.trail,
                                   std::move(scan), rolling, T_odom_robot, parallel_for, last);
   s.Begin(ScanStep::kRecover);
-  s.CheckPlace(passage, tracked, T_odom_robot, parallel_for);
+  s.CheckPlace(passage, rolling != nullptr, tracked, T_odom_robot, parallel_for);
   auto& [still, view, step] = tracked;
   s.learning.LearnUnless(passage != Passage::kDriven || s.recovery.active(), step);
   if (s.recovery.doubt()) s.EndDoubt(*still, view.points_robot, step, parallel_for);

@@ -10,6 +10,8 @@
 namespace cairn::slam {
 namespace {
 
+constexpr double kFastTurnRad = 0.1;  // From one scan to the next.
+
 // Whether at least the share `least` of the beams shows the same range.
 bool LookAlike(const Scan& a, const Scan& b, double least, const RecoveryOptions& options) {
   if (a.ranges_m.size() != b.ranges_m.size() || a.angle_first_rad != b.angle_first_rad) return false;
@@ -38,16 +40,28 @@ Passage Mapper::State::BeginAfter(Passage passage, bool tilted) {
 
 // Doubts the robot's place where scans are missing before this one, unless the scan shows that the robot stood still or
 // went on along its path.
-void Mapper::State::CheckPlace(Passage passage, TrackedScan& tracked, const Pose2& T_odom_robot,
+void Mapper::State::CheckPlace(Passage passage, bool rolling, TrackedScan& tracked, const Pose2& T_odom_robot,
                                const ParallelFor& parallel_for) {
   auto& [still, view, step] = tracked;
   const bool driven = passage == Passage::kDriven;
-  const auto before_carried = driven ? BeforeCarried(*still, view.points_robot, step) : std::nullopt;
+  // A scan that was measured in a fast turn may be deformed, and no longer fit what the robot has just seen.
+  const bool judged = driven && !(rolling && std::abs(LastTurn()) > kFastTurnRad);
+  const auto before_carried = judged ? BeforeCarried(*still, view.points_robot, step) : std::nullopt;
   const bool watched = (driven && !before_carried) || StoodStill(*still, T_odom_robot, step) ||
                        (passage == Passage::kPaused && GoesOn(*still, view.points_robot, T_odom_robot, step));
   if (!watched && passage != Passage::kUnknown) step = DoubtPlace(view, T_odom_robot, step, parallel_for);
   if (before_carried && recovery.on_path()) recovery.BeginDoubt(*before_carried);
   last_scan = LastScan{still, T_odom_robot, step.T_track_robot};
+}
+
+// Between the last two scans.
+double Mapper::State::LastTurn() const {
+  const auto& scans = trail.scans();
+  if (scans.size() < 2) return 0.0;
+  const auto heading = [this](const MapperSnapshot::ScanPlace& place) {
+    return (trail.shapes()[place.keyframe].T_track_robot * place.T_keyframe_robot).theta;
+  };
+  return AngleDiff(heading(scans.back()), heading(scans[scans.size() - 2]));
 }
 
 // If somebody may have carried the robot since the last scan: how that agreed with the last keyframes.

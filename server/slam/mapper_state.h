@@ -48,7 +48,9 @@ struct Mapper::State {
                       Passage passage, const RollingScan* rolling);
   ScanOutcome Coast(Stamp stamp, const Pose2& T_odom_robot);
   Passage BeginAfter(Passage passage, bool tilted);
-  void CheckPlace(Passage passage, TrackedScan& tracked, const Pose2& T_odom_robot, const ParallelFor& parallel_for);
+  [[nodiscard]] double LastTurn() const;
+  void CheckPlace(Passage passage, bool rolling, TrackedScan& tracked, const Pose2& T_odom_robot,
+                  const ParallelFor& parallel_for);
   void LosePlace(bool odometry_goes_on);
   void Relocalise(const std::optional<Pose2>& T_map_robot);
   // Before, the next scan defines the start, or the filter itself looks for the robot's place.
