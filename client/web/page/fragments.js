@@ -9,7 +9,8 @@ const WIDTH = 168, HEIGHT = 112, MARGIN = 8;  // Of a picture on the page, in pi
 const LEAST_M = 2;  // A picture shows at least this much to each side.
 const known = new Map();  // By robot: { image, area, points, length }.
 
-const hasPicture = (robot) => isFragment(robot) && robot.phase !== 'ended';
+// Before its first pose a robot has none.
+const hasPicture = (robot) => isFragment(robot) && robot.phase !== 'ended' && robot.pose !== null;
 
 // Asks only while somebody can see the pictures. Without an answer what is shown stays; 404: the robot has drawn nothing yet.
 export async function askFragment(robot, getJson) {
