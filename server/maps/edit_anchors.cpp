@@ -15,7 +15,7 @@ using Complex = std::complex<double>;
 // The heading of a keyframe counts as much as the place of a point so far from the others.
 constexpr double kHeadingAsFar_m = 1.0;
 // Whether a keyframe sees a point is asked of so many at most, the nearest first.
-constexpr double kNear_m = 10.0;
+constexpr double kSeenFrom_m = 10.0;
 constexpr std::size_t kMostLookedAt = 64;
 
 std::uint64_t NumberAt(const DrawnPath& drawn, std::size_t index) {
@@ -37,7 +37,7 @@ std::optional<EditAnchor> AnchorOf(const Eigen::Vector2d& point, const DrawnPath
     for (std::size_t i = 0; i < SizeOf(drawn->second); ++i) {
       const Pose2& pose = (*drawn->second.path)[i];
       const double away_m2 = (pose.translation() - point).squaredNorm();
-      const bool is_near = away_m2 <= kNear_m * kNear_m, is_nearest = !nearest || away_m2 < nearest->first;
+      const bool is_near = away_m2 <= kSeenFrom_m * kSeenFrom_m, is_nearest = !nearest || away_m2 < nearest->first;
       if (!is_near && !is_nearest) continue;
       const Found found{away_m2, {session, NumberAt(drawn->second, i), pose, pose}};
       if (is_near) near.push_back(found);

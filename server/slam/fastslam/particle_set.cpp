@@ -14,8 +14,8 @@
 namespace cairn::slam {
 namespace {
 
-// Particles this near to the most likely one always take part in the reported pose, in metres. The path that is believed
-// ends this near to that pose, if any does.
+// Particles this near to the most likely one always take part in the reported pose, in metres. The path that is
+// believed ends this near to that pose, if any does.
 constexpr double kAgreementM = 0.5;
 
 }  // namespace
