@@ -52,8 +52,8 @@ Result<void> Site::CheckNear(const MapEdit& edit) const {
   return {};
 }
 
-// The tile of a point says which sessions have drawn there. Sessions that still exist come before layers, because layers
-// are corrected only by switches of the version. Where nobody has drawn, all sessions are asked.
+// The tile of a point says which sessions have drawn there. Sessions that still exist come before layers, because
+// layers are corrected only by switches of the version. Where nobody has drawn, all sessions are asked.
 EditAnchors Site::AnchorsOf(const MapEdit& edit, AnchorTo to) const {
   const auto sessions_at = [&](const Eigen::Vector2d& point) {
     std::vector<SessionId> drawn_by = joint_.DrawnBy(TileAt(point, resolution_m_));
