@@ -50,7 +50,7 @@ void Mapper::State::CheckPlace(Passage passage, bool rolling, TrackedScan& track
   const bool watched = (driven && !before_carried) || StoodStill(*still, T_odom_robot, step) ||
                        (passage == Passage::kPaused && GoesOn(*still, view.points_robot, T_odom_robot, step));
   if (!watched && passage != Passage::kUnknown) step = DoubtPlace(view, T_odom_robot, step, parallel_for);
-  if (before_carried && recovery.on_path()) recovery.BeginDoubt(*before_carried);
+  if (before_carried && recovery.on_path()) recovery.BeginDoubt(*before_carried, step.score);
   last_scan = LastScan{still, T_odom_robot, step.T_track_robot};
 }
 
@@ -82,7 +82,7 @@ std::optional<SceneAgreement> Mapper::State::BeforeCarried(const Scan& scan,
 void Mapper::State::EndDoubt(const Scan& scan, const std::vector<SurfacePoint>& points_robot, const TrackStep& step,
                              const ParallelFor& parallel_for) {
   if (!step.matched || recovery.was_carried()) return;
-  const SceneAgreement& before = *recovery.doubt();
+  const SceneAgreement& before = recovery.doubt()->before;
   const SeenScan now{scan, points_robot, step.T_track_robot, step.score};
   // The first scan since then was matched with what it may not belong to.
   const std::vector<RecentScan>& recent = recovery.recent();
@@ -255,6 +255,7 @@ ScanOutcome Mapper::State::Recover(Keyframe keyframe, ScanView view, TrackStep s
     const auto found = recovery.Take({keyframe.scan, OdometryOrNone(T_odom_robot)}, step, view.points_robot,
                                      PathMap(trail, path, options.recovery.place, options.self_check.near_m));
     if (found && found->on_path) return GoOnAlongPath(parallel_for);
+    if (!found && keep && recovery.doubted_in_vain()) return GoOnAlongPath(parallel_for);
     if (found) return GoOnAt(*found, std::move(keyframe), std::move(view), step, parallel_for);
   }
   return ReportRecovery(stamp, T_odom_robot, step.T_track_robot);

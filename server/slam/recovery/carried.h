@@ -19,6 +19,8 @@ namespace cairn::slam {
 
 // How far a robot that is doubted is followed before it counts as carried.
 inline constexpr double kMostDoubtedM = 1.0;
+// How far it is looked for then, where it is not likely that it was carried.
+inline constexpr double kDoubtedInVainM = 12.0;
 
 // How a scan agrees with the last keyframes where the robot is believed to be.
 struct SceneAgreement {

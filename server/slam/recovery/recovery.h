@@ -10,7 +10,7 @@
 //    the place as well, it is no place relative to what the robot has seen before (`Found::elsewhere`).
 //  - A robot that may have been carried between two scans (carried.h) is first held on its path as well, if its scans
 //    match. It is looked for if within kMostDoubtedM of way they have not shown that nobody has carried it, and at once
-//    where a scan does not match.
+//    where a scan does not match. It goes on along its path if that was not likely and it is found nowhere else.
 //  - A robot that has been followed in the map of others, with too much doubt (`BeginNear`), is found by one search
 //  where
 //    the track leads, and elsewhere by two that agree, like all others.
@@ -111,13 +111,28 @@ class Recovery {
   void AgeSuggestion();
   // The last scans, if they belong together with the next one.
   [[nodiscard]] const std::vector<RecentScan>& recent() const { return recent_; }
-  // A robot on its path may have been carried since the last scan, which agreed with the last keyframes like this.
+  // A robot on its path may have been carried since the last scan.
+  struct Doubt {
+    SceneAgreement before;  // Of the last scan with the last keyframes.
+    bool likely = false;    // Most of the scan after it was not explained.
+
+    template <typename Archive>
+    static void Members(Archive& archive, auto& self) {
+      archive(self.before, self.likely);
+    }
+  };
   // REQUIRES: on_path.
-  void BeginDoubt(const SceneAgreement& before) { doubt_ = before; }
-  // The agreement before, as long as the robot is doubted.
-  [[nodiscard]] const std::optional<SceneAgreement>& doubt() const { return doubt_; }
+  void BeginDoubt(const SceneAgreement& before, double score) {
+    doubt_ = Doubt{before, score < options_.place.min_explained};
+  }
+  [[nodiscard]] const std::optional<Doubt>& doubt() const { return doubt_; }
   // Whether it has been doubted for so long that it counts as carried.
   [[nodiscard]] bool was_carried() const { return doubt_ && has_scans() && recent_.back().travelled_m > kMostDoubtedM; }
+  // Whether it was not likely, and has been found nowhere else on so much way that something else must have changed: a
+  // door was closed, or furniture was moved.
+  [[nodiscard]] bool doubted_in_vain() const {
+    return doubt_ && !doubt_->likely && has_scans() && recent_.back().travelled_m > kDoubtedInVainM;
+  }
   // Where the robot may be now: at the places found that are not confirmed.
   [[nodiscard]] std::vector<Pose2> Unconfirmed() const;
   // The odometry has begun anew.
@@ -203,7 +218,7 @@ class Recovery {
   bool contradicted_ = false;  // The last scan does not fit where the robot is believed to be.
   Known known_;
   std::optional<Pose2> T_map_track_;  // While the scans continue the path.
-  std::optional<SceneAgreement> doubt_;
+  std::optional<Doubt> doubt_;
   double searched_at_m_ = 0.0;
   std::vector<RecentScan> recent_;
   std::vector<Held> held_;  // While the scans continue the path: those that will be its keyframes.
