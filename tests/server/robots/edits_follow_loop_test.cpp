@@ -3,14 +3,13 @@
 
 #include <asio/thread_pool.hpp>
 #include <future>
-#include <limits>
 #include <memory>
 #include <utility>
 #include <vector>
 
 #include "server/maps/site.h"
 #include "tests/server/robots/room_robot.h"
-#include "tests/server/slam/ring_world.h"
+#include "tests/server/robots/slipping_drive.h"
 
 namespace cairn::server {
 namespace {
@@ -101,37 +100,20 @@ TEST_F(MapOfOneRobot, AKeepOutGoesWithTheVersionOfTheMapThatIsEnabled) {
   EXPECT_LT((Place() - said).norm(), 1e-6);
 }
 
-// Once round a large ring and on; on three metres the robot saw nothing, and its wheels slipped (past_poses_test.cpp).
 TEST_F(MapOfOneRobot, AKeepOutStaysAroundItsMachineWhereTheRobotClosesALargeLoop) {
-  const auto world = slam::test::RingCorridor(true);
-  const slam::test::Laser laser{.beams = 181, .step_rad = Radians(1.0), .range_max_m = 12.0};
-  constexpr std::uint64_t kAfterTheSlip = 400;
-  constexpr Stamp kPeriod = 2 * testing::kScanPeriod;  // Its wheels slip at 2 m/s.
   const Eigen::Vector2d before_the_robot(1.5, 0.9);
-  Pose2 truth, odometry, true_then;
+  Pose2 true_then;
   Eigen::Vector2d said = Eigen::Vector2d::Zero();
-  double way_m = 0.0;
-  std::uint64_t number = 0;
-  for (const Pose2& step : slam::test::RingSteps(140.0, 0.25)) {
-    const bool blind = way_m > 70.0 && way_m < 73.0;
-    Scan scan = slam::test::Look(world, truth, laser);
-    if (blind) scan.ranges_m.assign(scan.ranges_m.size(), std::numeric_limits<float>::infinity());
-    scan.sequence = ++number;
-    const Stamp stamp = scan.stamp = static_cast<Stamp>(number) * kPeriod;
-    Take({number, stamp, odometry}, std::move(scan));
-    if (number == kAfterTheSlip) {
-      true_then = truth;
-      said = record_.snapshot().status.pose.T_map_robot * before_the_robot;
-      ASSERT_NO_FATAL_FAILURE(AddAround(said));
-    }
-    truth = truth * step;
-    odometry = odometry * Pose2{(blind ? 1.6 : 1.0) * step.x, 0.0, step.theta};
-    way_m += step.x;
-  }
-  // The robot starts at the origin of the world and of its map.
+  testing::DriveWithASlip([&](const Odometry& odometry, Scan scan) { Take(odometry, std::move(scan)); },
+                          [&](const Pose2& truth) {
+                            true_then = truth;
+                            said = record_.snapshot().status.pose.T_map_robot * before_the_robot;
+                            AddAround(said);
+                          });
+  ASSERT_FALSE(HasFatalFailure());
   const Eigen::Vector2d machine = true_then * before_the_robot;
   EXPECT_GT((said - machine).norm(), 0.3) << "the map must need correcting";
-  const Pose2 now = PoseAt(static_cast<Stamp>(kAfterTheSlip) * kPeriod);
+  const Pose2 now = PoseAt(static_cast<Stamp>(testing::kAfterTheSlip) * testing::kSlippingPeriod);
   EXPECT_LT((Place() - now * before_the_robot).norm(), kCell_m);
   EXPECT_LT((Place() - machine).norm(), 0.5 * (said - machine).norm());
 }

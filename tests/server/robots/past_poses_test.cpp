@@ -2,14 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "tests/server/robots/room_robot.h"
-#include "tests/server/slam/ring_world.h"
+#include "tests/server/robots/slipping_drive.h"
 
 namespace cairn::server {
 namespace {
@@ -100,36 +99,18 @@ TEST(PastPoses, ASwitchOfTheMapMovesThemWithTheKeyframesNextToThem) {
             kPastCellM);
 }
 
-// Once round a large ring and on; on three metres the robot saw nothing, and its wheels slipped. When it sees the
-// beginning again, it corrects its path by itself.
 TEST(PastPoses, ALargeLoopOfTheRobotItselfMovesThem) {
   EstimatorSetup setup;
   setup.mapper.filter.particles = 50;
   setup.mapper.filter.back_end.landmarks.enabled = false;  // The landmarks alone would nearly correct the drift.
   MappingRobot robot(setup);
-  const auto world = slam::test::RingCorridor(true);
-  const slam::test::Laser laser{.beams = 181, .step_rad = Radians(1.0), .range_max_m = 12.0};
-  constexpr std::uint64_t kAfterTheSlip = 400;
-  constexpr Stamp kPeriod = 2 * testing::kScanPeriod;  // Its wheels slip at 2 m/s.
-  Pose2 truth, odometry, true_then, published;
-  double way_m = 0.0;
-  std::uint64_t number = 0;
-  for (const Pose2& step : slam::test::RingSteps(140.0, 0.25)) {
-    const bool blind = way_m > 70.0 && way_m < 73.0;
-    Scan scan = slam::test::Look(world, truth, laser);
-    if (blind) scan.ranges_m.assign(scan.ranges_m.size(), std::numeric_limits<float>::infinity());
-    scan.sequence = ++number;
-    const Stamp stamp = scan.stamp = static_cast<Stamp>(number) * kPeriod;
-    robot.Take({number, stamp, odometry}, std::move(scan));
-    if (number == kAfterTheSlip) {
-      true_then = truth;
-      published = robot.record.snapshot().status.pose.T_map_robot;
-    }
-    truth = truth * step;
-    odometry = odometry * Pose2{(blind ? 1.6 : 1.0) * step.x, 0.0, step.theta};
-    way_m += step.x;
-  }
-  const auto now = robot.path().At(static_cast<Stamp>(kAfterTheSlip) * kPeriod);
+  Pose2 true_then, published;
+  testing::DriveWithASlip([&](const Odometry& odometry, Scan scan) { robot.Take(odometry, std::move(scan)); },
+                          [&](const Pose2& truth) {
+                            true_then = truth;
+                            published = robot.record.snapshot().status.pose.T_map_robot;
+                          });
+  const auto now = robot.path().At(static_cast<Stamp>(testing::kAfterTheSlip) * testing::kSlippingPeriod);
   ASSERT_TRUE(now);
   const double before_m = Between(true_then, published).translation().norm();
   EXPECT_GT(before_m, 0.3) << "the path must need correcting";
